@@ -1,0 +1,2 @@
+//! Builds the C++ side of the bridge.
+fn main() {}

@@ -1,0 +1,55 @@
+//! Blocks of 8 x 8 x 8 voxels: OpenVDB's leaf layout, so that a block and a leaf are the same bytes.
+
+/// Voxels along a block's edge.
+pub const DIM: usize = 8;
+/// Voxels in a block.
+pub const VOXELS: usize = DIM * DIM * DIM;
+
+/// Voxel coordinate of a block's least corner: a multiple of 8 on each axis.
+pub type Origin = [i32; 3];
+/// Values of a block; voxel (x, y, z) lies at `x << 6 | y << 3 | z`.
+pub type Values = [f32; VOXELS];
+/// Active voxels of a block: bit `y << 3 | z` of word `x`.
+pub type Mask = [u64; DIM];
+
+/// Offset of voxel (x, y, z), each in 0..8, inside a block.
+#[inline]
+pub const fn offset(x: usize, y: usize, z: usize) -> usize {
+    x << 6 | y << 3 | z
+}
+
+/// Origin of the block that holds a voxel.
+#[inline]
+pub const fn origin_of(voxel: [i32; 3]) -> Origin {
+    [voxel[0] & !7, voxel[1] & !7, voxel[2] & !7]
+}
+
+/// A block of values with its own memory.
+#[derive(Clone, PartialEq)]
+pub struct Block {
+    /// Least corner, in voxels.
+    pub origin: Origin,
+    /// The 512 values.
+    pub values: Box<Values>,
+    /// Which of them are active.
+    pub mask: Mask,
+}
+
+/// What a block position of a grid is to become: dense values, or one value for all 512 voxels.
+#[derive(Clone, PartialEq)]
+pub enum BlockEdit {
+    /// Dense values.
+    Dense(Block),
+    /// One inactive value: the inside or the outside of a level set.
+    Constant(Origin, f32),
+}
+
+impl BlockEdit {
+    /// Least corner, in voxels.
+    pub fn origin(&self) -> Origin {
+        match self {
+            Self::Dense(block) => block.origin,
+            Self::Constant(origin, _) => *origin,
+        }
+    }
+}

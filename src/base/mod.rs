@@ -1,0 +1,11 @@
+//! Plain data that every room shares; knows no file format and no OpenVDB.
+
+pub mod blocks;
+pub mod mesh;
+
+/// A point, direction or velocity in 32 bits: fields and mesh vertices (m, m/s).
+pub type Vec3 = nalgebra::Vector3<f32>;
+/// A point or direction in 64 bits: poses, transforms, conserved sums.
+pub type DVec3 = nalgebra::Vector3<f64>;
+
+pub use mesh::TriMesh;

@@ -1,0 +1,79 @@
+//! One error type for the whole library: each message is one sentence that names what is at fault.
+
+use std::path::{Path, PathBuf};
+
+/// What went wrong, in one sentence.
+///
+/// The kinds are those of the C status numbers; a kind says who can mend it.
+#[derive(Debug, thiserror::Error)]
+pub enum Error {
+    /// A parameter or argument is outside its range: the caller mends it.
+    #[error("{0}")]
+    Argument(String),
+    /// What a file holds cannot be used: the file is to be mended.
+    #[error("{}: {what}", path.display())]
+    File {
+        /// The file at fault.
+        path: PathBuf,
+        /// What is wrong with it, with the line or element where known.
+        what: String,
+    },
+    /// The operating system refused an operation on a file.
+    #[error("{}: cannot {action}: {}", path.display(), os_reason(source))]
+    Io {
+        /// The file or folder.
+        path: PathBuf,
+        /// The verb: "read", "write", "create the folder".
+        action: &'static str,
+        /// The operating system's answer.
+        source: std::io::Error,
+    },
+    /// The work would need more memory than it may use.
+    #[error("{what} needs about {} MB, more than the limit of {} MB", needed >> 20, limit >> 20)]
+    Memory {
+        /// The work, with the setting that makes it large.
+        what: String,
+        /// Bytes it would need.
+        needed: u64,
+        /// Bytes it may use.
+        limit: u64,
+    },
+    /// The context was cancelled; the state is as it was before the call.
+    #[error("cancelled")]
+    Cancelled,
+    /// OpenVDB threw an exception.
+    #[error("OpenVDB: {0}")]
+    OpenVdb(String),
+    /// A promise inside the library does not hold: a bug of ours.
+    #[error("internal error: {0}")]
+    Internal(String),
+}
+
+/// Result with the library's [`enum@Error`].
+pub type Result<T> = std::result::Result<T, Error>;
+
+impl Error {
+    /// A file whose content cannot be used.
+    pub fn file(path: impl AsRef<Path>, what: impl Into<String>) -> Self {
+        Self::File { path: path.as_ref().to_path_buf(), what: what.into() }
+    }
+
+    /// A file operation that the operating system refused.
+    pub fn io(path: impl AsRef<Path>, action: &'static str, source: std::io::Error) -> Self {
+        Self::Io { path: path.as_ref().to_path_buf(), action, source }
+    }
+
+    /// A parameter outside its range.
+    pub fn argument(what: impl Into<String>) -> Self {
+        Self::Argument(what.into())
+    }
+}
+
+/// The system's reason without Rust's "(os error 2)" tail.
+fn os_reason(error: &std::io::Error) -> String {
+    let text = error.to_string();
+    match text.find(" (os error") {
+        Some(end) => text[..end].to_lowercase(),
+        None => text,
+    }
+}

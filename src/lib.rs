@@ -1,0 +1,18 @@
+//! frazil: a volumetric toolkit for visual effects.
+//!
+//! Rooms are layered; a room uses only the rooms below it (see `CONTRIBUTING.md`).
+
+pub mod base;
+pub mod context;
+pub mod error;
+pub mod io;
+pub mod motion;
+#[cfg(feature = "vdb")]
+pub mod snow;
+#[cfg(feature = "vdb")]
+pub mod sweep;
+#[cfg(feature = "vdb")]
+pub mod vdb;
+
+pub use context::{Context, Pool};
+pub use error::{Error, Result};

@@ -1,0 +1,2 @@
+//! The `frazil` command.
+fn main() {}

@@ -1,0 +1,22 @@
+//! Things that move: a fixed set of triangles whose vertices have a position at every time.
+
+use crate::base::DVec3;
+use crate::error::Result;
+
+/// A mesh in motion. The triangles never change; only the vertices move.
+pub trait Motion: Send + Sync {
+    /// Vertex indices of each triangle, counter-clockwise seen from outside.
+    fn triangles(&self) -> &[[u32; 3]];
+
+    /// Number of vertices.
+    fn vertex_count(&self) -> usize;
+
+    /// Writes the vertices' world positions (m) at `time` (s) into `out` (cleared first; its memory is kept).
+    ///
+    /// # Errors
+    /// What a file read on demand reports.
+    fn pose(&self, time: f64, out: &mut Vec<DVec3>) -> Result<()>;
+
+    /// Times inside (from, to) where the motion has a kink: keys, frames of a sequence. Ascending.
+    fn breaks(&self, from: f64, to: f64) -> Vec<f64>;
+}

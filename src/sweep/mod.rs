@@ -1,0 +1,1 @@
+//! The volume that moving meshes sweep.
