@@ -17,6 +17,24 @@ pub struct Simplex {
     pub sign: i8,
 }
 
+impl Simplex {
+    /// A counter-clockwise triangle; none when two corners are the same.
+    pub fn new([a, b, c]: [u32; 3]) -> Option<Self> {
+        if a == b || b == c || c == a {
+            return None;
+        }
+        let mut v = [a, b, c];
+        let mut sign = 1;
+        for (i, j) in [(0, 1), (1, 2), (0, 1)] {
+            if v[i] > v[j] {
+                v.swap(i, j);
+                sign = -sign;
+            }
+        }
+        Some(Self { v, sign })
+    }
+}
+
 /// One triangle beside an edge.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Incidence {
@@ -106,19 +124,8 @@ impl Topology {
         &self.incidences[self.edge_start[edge] as usize..self.edge_start[edge + 1] as usize]
     }
 
-    fn push_triangle(&mut self, [a, b, c]: [u32; 3]) {
-        if a == b || b == c || c == a {
-            return;
-        }
-        let mut v = [a, b, c];
-        let mut sign = 1;
-        for (i, j) in [(0, 1), (1, 2), (0, 1)] {
-            if v[i] > v[j] {
-                v.swap(i, j);
-                sign = -sign;
-            }
-        }
-        self.simplices.push(Simplex { v, sign });
+    fn push_triangle(&mut self, triangle: [u32; 3]) {
+        self.simplices.extend(Simplex::new(triangle));
     }
 
     fn index_edges(&mut self) {
