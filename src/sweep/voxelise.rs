@@ -38,6 +38,15 @@ pub enum Piece {
     Inside(Origin),
 }
 
+impl Piece {
+    /// Least corner, in voxels.
+    pub fn origin(&self) -> Origin {
+        match self {
+            Self::Near(origin, _) | Self::Inside(origin) => *origin,
+        }
+    }
+}
+
 /// A chain ready to be turned into blocks.
 pub struct Voxeliser {
     lattice: Lattice,

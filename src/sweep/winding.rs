@@ -64,13 +64,6 @@ impl Lines {
         &self.crossings[self.start[line] as usize..self.start[line + 1] as usize]
     }
 
-    /// Winding number at voxel (x, y, z).
-    pub fn at(&self, x: i32, y: i32, z: i32) -> i32 {
-        let line = self.line(x, y);
-        let below = line.partition_point(|(height, _)| *height < f64::from(z));
-        if below == 0 { 0 } else { line[below - 1].1 }
-    }
-
     /// Appends the lines that a face crosses.
     fn cross(&self, face: &Face, out: &mut Vec<Crossing>) {
         let v = face.v.map(|p| [i64::from(p[0]), i64::from(p[1])]);
