@@ -24,6 +24,7 @@ fn main() {
     build
         .std("c++17")
         .opt_level(3)
+        .debug(false)
         .define("NDEBUG", None)
         .define("IMATH_HALF_NO_LOOKUP_TABLE", None)
         // The same bits on every machine: the compiler may not fuse multiply and add.

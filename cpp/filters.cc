@@ -11,7 +11,7 @@ namespace frazil {
 
 namespace {
 
-using Filter = openvdb::tools::LevelSetFilter<openvdb::FloatGrid, openvdb::MaskGrid, Interrupter>;
+using Filter = openvdb::tools::LevelSetFilter<openvdb::FloatGrid, openvdb::FloatGrid, Interrupter>;
 
 /// A filter with OpenVDB's defaults (fifth-order WENO), or with one first-order pass: ten times cheaper.
 void configure(Filter& filter, bool weno) {

@@ -1,1 +1,3 @@
 //! Files that are not .vdb.
+
+pub mod atomic;

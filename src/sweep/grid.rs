@@ -96,12 +96,12 @@ pub fn fill(ctx: &Context, faces: Vec<Face>, lattice: Lattice, half_width: f32) 
     let blocks: Vec<usize> = (0..voxeliser.near_blocks().len()).collect();
     for batch in blocks.chunks(BATCH) {
         let edits = ctx.stage("distance", || Ok(pieces(&voxeliser, batch, lattice.voxel, half_width)))?;
-        grid.replace_blocks(&edits)?;
+        grid.replace_blocks(ctx, &edits)?;
     }
     let background = half_width * lattice.voxel as f32;
     for batch in voxeliser.inside_blocks().chunks(BATCH) {
         let edits: Vec<BlockEdit> = batch.iter().map(|&origin| BlockEdit::Constant(origin, -background)).collect();
-        grid.replace_blocks(&edits)?;
+        grid.replace_blocks(ctx, &edits)?;
         ctx.check()?;
     }
     Ok(grid)

@@ -69,7 +69,7 @@ pub(super) mod ffi {
         fn world_to_index(grid: &Grid, world: [f64; 3]) -> [f64; 3];
         fn background(grid: &Grid) -> f32;
         fn grid_class(grid: &Grid) -> i32;
-        fn set_grid_class(grid: Pin<&mut Grid>, class: i32) -> Result<()>;
+        fn set_grid_class(grid: Pin<&mut Grid>, number: i32) -> Result<()>;
         fn name(grid: &Grid) -> String;
         fn set_name(grid: Pin<&mut Grid>, name: &str) -> Result<()>;
         fn metadata(grid: &Grid) -> Result<Vec<Meta>>;
