@@ -8,7 +8,7 @@ pub mod error;
 pub mod io;
 pub mod motion;
 #[cfg(feature = "vdb")]
-//pub mod snow;
+pub mod snow;
 pub mod sweep;
 #[cfg(feature = "vdb")]
 pub mod vdb;
