@@ -1,2 +1,7 @@
-//! The `frazil` command.
-fn main() {}
+//! The `frazil` command: arguments to library calls to files.
+
+mod cli;
+
+fn main() -> std::process::ExitCode {
+    cli::run()
+}

@@ -1,0 +1,83 @@
+//! How the program ends: exit codes and the one sentence on stderr.
+
+use frazil::Error;
+use std::io::Write;
+use std::sync::atomic::{AtomicBool, Ordering};
+
+/// Exit code: done.
+pub const DONE: u8 = 0;
+/// Exit code: failed after the work had begun.
+pub const FAILED: u8 = 1;
+/// Exit code: refused for what could be known before the work began.
+pub const REFUSED: u8 = 2;
+
+/// Why a command ends early.
+#[derive(Debug)]
+pub struct Failure {
+    code: u8,
+    message: String,
+}
+
+impl Failure {
+    /// What can be known before the work begins: exit code 2.
+    pub fn refused(message: impl std::fmt::Display) -> Self {
+        Self { code: REFUSED, message: message.to_string() }
+    }
+
+    /// What went wrong after that: exit code 1.
+    pub fn failed(message: impl std::fmt::Display) -> Self {
+        Self { code: FAILED, message: message.to_string() }
+    }
+
+    /// Prints the sentence and gives the exit code.
+    pub fn report(&self) -> u8 {
+        say_error(&self.message);
+        self.code
+    }
+}
+
+/// Says in which part of a command an error arose.
+pub trait Phase<T> {
+    /// Before the work began: exit code 2.
+    fn before(self) -> Result<T, Failure>;
+    /// After it began: exit code 1, but 2 for arguments and memory, which are known beforehand.
+    fn during(self) -> Result<T, Failure>;
+}
+
+impl<T> Phase<T> for frazil::Result<T> {
+    fn before(self) -> Result<T, Failure> {
+        self.map_err(Failure::refused)
+    }
+
+    fn during(self) -> Result<T, Failure> {
+        self.map_err(|error| match error {
+            Error::Argument(_) | Error::Memory { .. } => Failure::refused(error),
+            _ => Failure::failed(error),
+        })
+    }
+}
+
+/// One sentence on stderr, whatever line breaks its parts had.
+pub fn say_error(message: &str) {
+    let sentence: Vec<&str> = message.split_whitespace().collect();
+    // Nobody is left to tell when stderr is closed.
+    let _ = writeln!(std::io::stderr(), "frazil: {}", sentence.join(" "));
+}
+
+/// Turns a panic, in any thread, into one sentence.
+pub fn install_panic_hook() {
+    static TOLD: AtomicBool = AtomicBool::new(false);
+    std::panic::set_hook(Box::new(|panic| {
+        if TOLD.swap(true, Ordering::Relaxed) {
+            return;
+        }
+        let payload = panic.payload();
+        let what = match (payload.downcast_ref::<&str>(), payload.downcast_ref::<String>()) {
+            (Some(text), _) => text,
+            (_, Some(text)) => text.as_str(),
+            _ => "unknown",
+        };
+        let place = panic.location().map(|at| format!(" ({}:{})", at.file(), at.line())).unwrap_or_default();
+        say_error(&format!("internal error: {what}{place}; please report it"));
+    }));
+}

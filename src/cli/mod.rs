@@ -1,0 +1,70 @@
+//! The command line: one file per command.
+
+mod exit;
+mod info;
+mod machine;
+mod options;
+mod output;
+mod preview;
+mod progress;
+mod session;
+mod signals;
+mod snow;
+mod usage;
+mod vdb;
+
+use clap::{Parser, Subcommand};
+use exit::Failure;
+use session::{Globals, Session};
+use std::process::ExitCode;
+
+/// Volumetric effects on OpenVDB: deep snow with prints, swept volumes, level sets, pictures of them.
+///
+/// Lengths are metres, frames are whole numbers, Y is up.
+#[derive(Parser)]
+#[command(name = "frazil", version, propagate_version = true, max_term_width = 110)]
+#[command(after_help = "Example:\n  frazil snow walker.toml -o cache/ && frazil preview cache/base/base.0048.vdb -o print.png")]
+struct Cli {
+    #[command(flatten)]
+    globals: Globals,
+    #[command(subcommand)]
+    command: Command,
+}
+
+#[derive(Subcommand)]
+enum Command {
+    Snow(snow::Args),
+    Vdb(vdb::Args),
+    Info(info::Args),
+    Preview(preview::Args),
+}
+
+impl Command {
+    fn run(self, session: &Session) -> Result<(), Failure> {
+        match self {
+            Self::Snow(args) => snow::run(args, session),
+            Self::Vdb(args) => vdb::run(args, session),
+            Self::Info(args) => info::run(args, session),
+            Self::Preview(args) => preview::run(args, session),
+        }
+    }
+}
+
+/// Runs the program; nothing that a user can do makes it panic or print a trace.
+pub fn run() -> ExitCode {
+    exit::install_panic_hook();
+    let ended = std::panic::catch_unwind(|| {
+        let cli = match Cli::try_parse() {
+            Ok(cli) => cli,
+            Err(error) => return usage::report(&error),
+        };
+        match Session::start(cli.globals) {
+            Ok(session) => {
+                let result = cli.command.run(&session);
+                session.finish(result)
+            }
+            Err(failure) => failure.report(),
+        }
+    });
+    ended.unwrap_or(exit::FAILED).into()
+}

@@ -1,0 +1,117 @@
+//! What all commands share: threads, signals, verbosity, the report of a run.
+
+use super::exit::{self, Failure, Phase};
+use super::machine;
+use super::output;
+use super::signals::Signals;
+use frazil::{Context, Pool};
+use serde_json::{Map, Value, json};
+use std::path::PathBuf;
+use std::sync::Mutex;
+use std::time::Instant;
+
+/// Options of every command.
+#[derive(clap::Args)]
+pub struct Globals {
+    /// Worker threads [default: one per core]; the output does not depend on it.
+    #[arg(long, value_name = "N", global = true, value_parser = clap::value_parser!(u16).range(1..=1024))]
+    pub threads: Option<u16>,
+    /// Say nothing but errors.
+    #[arg(short, long, global = true, conflicts_with = "verbose")]
+    pub quiet: bool,
+    /// Say more; twice: everything.
+    #[arg(short, long, global = true, action = clap::ArgAction::Count)]
+    pub verbose: u8,
+    /// Write times, memory and results of this run as JSON.
+    #[arg(long, value_name = "FILE", global = true)]
+    pub report: Option<PathBuf>,
+}
+
+/// One run of the program.
+pub struct Session {
+    /// Threads, cancel flag, stage times.
+    pub ctx: Context,
+    globals: Globals,
+    signals: Signals,
+    start: Instant,
+    results: Mutex<Map<String, Value>>,
+}
+
+impl Session {
+    /// Starts threads and signal handlers, and checks what can be checked without knowing the command.
+    pub fn start(globals: Globals) -> Result<Self, Failure> {
+        start_log(&globals);
+        let pool = match globals.threads {
+            Some(threads) => Pool::new(threads.into()),
+            None => Pool::all_cores(),
+        };
+        let ctx = Context::new(pool.before()?);
+        let signals = Signals::install(ctx.cancel_flag())
+            .map_err(|error| Failure::refused(format!("cannot install signal handlers: {error}")))?;
+        if let Some(path) = &globals.report {
+            output::check_writable(path).before()?;
+        }
+        Ok(Self { ctx, globals, signals, start: Instant::now(), results: Mutex::default() })
+    }
+
+    /// Whether only errors are to be said.
+    pub fn is_quiet(&self) -> bool {
+        self.globals.quiet
+    }
+
+    /// Adds a result to the report of this run.
+    pub fn record(&self, key: &str, value: Value) {
+        self.results.lock().expect("nobody panics with this lock").insert(key.to_string(), value);
+    }
+
+    /// Writes the report, says what went wrong, gives the exit code.
+    pub fn finish(&self, result: Result<(), Failure>) -> u8 {
+        let result = match (&self.globals.report, result) {
+            (Some(path), Ok(())) => self.write_report(path).during(),
+            (_, result) => result,
+        };
+        match (result, self.signals.received()) {
+            (Ok(()), _) => exit::DONE,
+            (Err(_), Some(code)) => {
+                exit::say_error(if code == 130 { "interrupted" } else { "terminated" });
+                code
+            }
+            (Err(failure), None) => failure.report(),
+        }
+    }
+
+    fn write_report(&self, path: &std::path::Path) -> frazil::Result<()> {
+        let stages: Vec<Value> = self.ctx.take_timings().iter().map(stage_json).collect();
+        let mut report = self.results.lock().expect("nobody panics with this lock").clone();
+        let arguments: Vec<String> = std::env::args().skip(1).collect();
+        report.insert("arguments".into(), json!(arguments));
+        report.insert("version".into(), json!(env!("CARGO_PKG_VERSION")));
+        report.insert("threads".into(), json!(self.ctx.pool().threads()));
+        report.insert("seconds".into(), json!(self.start.elapsed().as_secs_f64()));
+        report.insert("peak_memory_bytes".into(), json!(machine::peak_memory()));
+        if !stages.is_empty() {
+            report.insert("stages".into(), json!(stages));
+        }
+        output::write_json(path, &Value::Object(report))
+    }
+}
+
+fn stage_json(stage: &frazil::context::StageTime) -> Value {
+    json!({ "name": stage.name, "seconds": stage.time.as_secs_f64() })
+}
+
+fn start_log(globals: &Globals) {
+    let level = match (globals.quiet, globals.verbose) {
+        (true, _) => log::LevelFilter::Error,
+        (_, 0) => log::LevelFilter::Warn,
+        (_, 1) => log::LevelFilter::Info,
+        _ => log::LevelFilter::Trace,
+    };
+    env_logger::Builder::new()
+        .filter_level(level)
+        .format(|out, record| {
+            use std::io::Write;
+            writeln!(out, "frazil: {}: {}", record.level().as_str().to_lowercase(), record.args())
+        })
+        .init();
+}

@@ -1,0 +1,27 @@
+//! What clap has to say: help on stdout, a mistake as one sentence on stderr.
+
+use super::exit;
+use clap::error::{Error, ErrorKind};
+use std::io::Write;
+
+/// Prints help, version or the mistake; gives the exit code.
+pub fn report(error: &Error) -> u8 {
+    if matches!(error.kind(), ErrorKind::DisplayHelp | ErrorKind::DisplayVersion) {
+        // A reader that closes the pipe early has seen enough.
+        let _ = write!(std::io::stdout(), "{}", error.render());
+        return exit::DONE;
+    }
+    let text = error.render().to_string();
+    if error.kind() == ErrorKind::DisplayHelpOnMissingArgumentOrSubcommand {
+        exit::say_error("a command is missing; see `frazil --help`");
+        return exit::REFUSED;
+    }
+    // clap prints a headline, maybe a list and a tip, then the usage; the first two say what is wrong.
+    let told: Vec<&str> = text.lines().take_while(|line| !line.starts_with("Usage:")).collect();
+    let told = told.join(" ");
+    let told = told.strip_prefix("error:").unwrap_or(&told).trim();
+    let told = told.split_once(" For more information").map_or(told, |parts| parts.0);
+    let told = told.replace("  tip:", ";").replace(" ;", ";");
+    exit::say_error(&format!("{told}; see `frazil --help`"));
+    exit::REFUSED
+}

@@ -1,0 +1,149 @@
+//! The camera: given, or placed so that everything is in the picture.
+
+use crate::base::DVec3;
+
+/// Width and height of a picture (pixels), each at least 1.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Size {
+    /// Pixels in a row.
+    pub width: u32,
+    /// Rows.
+    pub height: u32,
+}
+
+/// A pinhole camera; Y is up.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Camera {
+    /// Where it stands (m).
+    pub eye: DVec3,
+    /// The point in the middle of the picture (m).
+    pub target: DVec3,
+    /// Angle between the picture's upper and lower edge (degrees), over 0, below 180.
+    pub fov_deg: f64,
+}
+
+/// Default angle of view: about that of a 50 mm lens in height (degrees).
+const FOV_DEG: f64 = 30.0;
+/// Part of the picture left free at each edge by the automatic camera.
+const MARGIN: f64 = 0.04;
+/// The automatic camera stands this far off the long horizontal axis of what it sees (degrees)...
+const AZIMUTH_DEG: f64 = 35.0;
+/// ...and this far above the horizon (degrees).
+const ELEVATION_DEG: f64 = 33.0;
+
+impl Camera {
+    /// A three-quarter view from above with the whole box in the picture.
+    pub fn framing(bounds: (DVec3, DVec3), size: Size) -> Self {
+        let extent = bounds.1 - bounds.0;
+        let azimuth = if extent.x > extent.z { 90.0 - AZIMUTH_DEG } else { AZIMUTH_DEG };
+        let toward_eye = direction(azimuth, ELEVATION_DEG);
+        let mut camera = Self { eye: toward_eye, target: DVec3::zeros(), fov_deg: FOV_DEG };
+        camera.look_from(bounds, toward_eye, size);
+        camera
+    }
+
+    /// Moves the camera along `toward_eye` (a unit vector from what is seen to the camera) until the box
+    /// fills the picture.
+    fn look_from(&mut self, bounds: (DVec3, DVec3), toward_eye: DVec3, size: Size) {
+        let corners: Vec<DVec3> = (0..8).map(|index| corner(bounds, index)).collect();
+        let reach = ((bounds.1 - bounds.0).norm() * 0.5).max(1.0e-6);
+        let aspect = f64::from(size.width) / f64::from(size.height);
+        let tangent = (self.fov_deg.to_radians() * 0.5).tan() * (1.0 - 2.0 * MARGIN);
+        self.target = (bounds.0 + bounds.1) * 0.5;
+        // Perspective shifts the middle of what is seen: centring and fitting settle in a few rounds.
+        for _ in 0..8 {
+            self.eye = self.target + toward_eye;
+            let [right, up, ahead] = self.axes();
+            let nearest = |axis: DVec3, tangent: f64, corner: &DVec3| {
+                let offset = corner - self.target;
+                offset.dot(&axis).abs() / tangent - offset.dot(&ahead)
+            };
+            let distance = corners.iter().fold(reach * 0.1, |distance, corner| {
+                let wide = nearest(right, tangent * aspect, corner);
+                distance.max(wide).max(nearest(up, tangent, corner))
+            });
+            self.eye = self.target + toward_eye * distance;
+            let shift = |axis: DVec3| {
+                let seen = corners.iter().map(|corner| {
+                    let offset = corner - self.eye;
+                    offset.dot(&axis) / offset.dot(&ahead).max(1.0e-9)
+                });
+                let (low, high) = seen.fold((f64::MAX, f64::MIN), |(low, high), at| (low.min(at), high.max(at)));
+                (low + high) * 0.5 * distance
+            };
+            let step = right * shift(right) + up * shift(up);
+            self.target += step;
+            self.eye += step;
+        }
+    }
+
+    /// Unit vectors to the right, upward and ahead of the camera.
+    pub fn axes(&self) -> [DVec3; 3] {
+        let ahead = (self.target - self.eye).try_normalize(0.0).unwrap_or(-DVec3::z());
+        let right = ahead.cross(&DVec3::y()).try_normalize(1.0e-9);
+        // Looking straight down, the picture's upper edge is -z.
+        let right = right.unwrap_or_else(DVec3::x);
+        [right, right.cross(&ahead), ahead]
+    }
+
+    /// Unit direction through a point of the picture, in pixels from its upper left corner.
+    pub fn through(&self, x: f64, y: f64, size: Size) -> DVec3 {
+        let [right, up, ahead] = self.axes();
+        let half = (self.fov_deg.to_radians() * 0.5).tan();
+        let (width, height) = (f64::from(size.width), f64::from(size.height));
+        let across = (2.0 * x - width) / height * half;
+        let upward = (height - 2.0 * y) / height * half;
+        (ahead + right * across + up * upward).normalize()
+    }
+}
+
+/// Unit vector at an azimuth (from +z towards +x) and an elevation above the horizon (degrees).
+pub(super) fn direction(azimuth_deg: f64, elevation_deg: f64) -> DVec3 {
+    let (azimuth, elevation) = (azimuth_deg.to_radians(), elevation_deg.to_radians());
+    DVec3::new(azimuth.sin() * elevation.cos(), elevation.sin(), azimuth.cos() * elevation.cos())
+}
+
+fn corner(bounds: (DVec3, DVec3), index: usize) -> DVec3 {
+    let pick = |axis: usize| if index >> axis & 1 == 0 { bounds.0[axis] } else { bounds.1[axis] };
+    DVec3::new(pick(0), pick(1), pick(2))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_automatic_camera_has_everything_in_the_picture() {
+        let size = Size { width: 320, height: 180 };
+        let shapes = [[1.0, 0.3, 4.5], [1.0, 1.0, 1.0], [6.0, 0.1, 0.5], [0.1, 3.0, 0.1]];
+        for extent in shapes {
+            let low = DVec3::new(-3.0, 2.0, 10.0);
+            let bounds = (low, low + DVec3::from(extent));
+            let camera = Camera::framing(bounds, size);
+            let [right, up, ahead] = camera.axes();
+            let half = (camera.fov_deg.to_radians() * 0.5).tan();
+            let mut most: f64 = 0.0;
+            for index in 0..8 {
+                let offset = corner(bounds, index) - camera.eye;
+                let depth = offset.dot(&ahead);
+                assert!(depth > 0.0, "behind the camera: {extent:?}");
+                let x = (offset.dot(&right) / depth / half / (320.0 / 180.0)).abs();
+                let y = (offset.dot(&up) / depth / half).abs();
+                assert!(x <= 1.0 && y <= 1.0, "outside at {x} {y}: {extent:?}");
+                most = most.max(x).max(y);
+            }
+            assert!(most > 0.8, "too small: {most} {extent:?}");
+        }
+    }
+
+    #[test]
+    fn the_middle_of_the_picture_shows_the_target() {
+        let camera = Camera { eye: DVec3::new(1.0, 2.0, 3.0), target: DVec3::new(0.0, 0.5, 0.0), fov_deg: 40.0 };
+        let size = Size { width: 64, height: 48 };
+        let seen = camera.through(32.0, 24.0, size);
+        assert!((seen - (camera.target - camera.eye).normalize()).norm() < 1.0e-12);
+        let [right, up, _] = camera.axes();
+        assert!(camera.through(60.0, 24.0, size).dot(&right) > 0.0);
+        assert!(camera.through(32.0, 2.0, size).dot(&up) > 0.0);
+    }
+}

@@ -1,0 +1,103 @@
+//! A surface to be drawn: triangles in a tree, normals, a colour.
+
+use super::shade::{Colour, SNOW};
+use crate::base::bvh::Bvh;
+use crate::base::{DVec3, TriMesh, Vec3};
+use crate::context::Context;
+use crate::error::Result;
+use crate::vdb::FloatGrid;
+
+/// A mesh or a level set, ready to be drawn.
+pub struct Model {
+    mesh: TriMesh,
+    tree: Bvh,
+    /// Unit normals at the vertices of a smooth surface; without them triangles are flat.
+    normals: Option<Vec<Vec3>>,
+    albedo: Colour,
+    /// Rays towards the light start this far off the surface (m), so that it does not shadow itself.
+    pub(super) skin: f64,
+}
+
+/// Where a ray meets a model.
+pub(super) struct Hit {
+    /// Distance along the ray (m).
+    pub distance: f64,
+    /// Unit normal, towards where the ray came from.
+    pub normal: DVec3,
+    /// Part of the light that the surface sends back.
+    pub albedo: Colour,
+    /// As [`Model::skin`].
+    pub skin: f64,
+}
+
+impl Model {
+    /// A mesh with flat triangles and a colour (linear red, green, blue, 0 to 1).
+    pub fn mesh(mesh: &TriMesh, albedo: [f32; 3]) -> Self {
+        let extent = bounds_of(mesh).map_or(1.0, |(low, high)| (high - low).norm());
+        Self::new(mesh.clone(), None, albedo, 1.0e-5 * extent)
+    }
+
+    /// A level set with the colour of snow.
+    ///
+    /// # Errors
+    /// A cancel, or what OpenVDB reports.
+    pub fn level_set(ctx: &Context, grid: &FloatGrid) -> Result<Self> {
+        let mesh = crate::vdb::level_set::to_mesh(ctx, grid, 0.0, 0.0)?;
+        let normals = smooth_normals(&mesh);
+        Ok(Self::new(mesh, Some(normals), SNOW, 0.5 * grid.voxel_size()))
+    }
+
+    fn new(mesh: TriMesh, normals: Option<Vec<Vec3>>, albedo: [f32; 3], skin: f64) -> Self {
+        let tree = Bvh::new(&mesh);
+        let albedo = Colour::from(albedo.map(f64::from));
+        Self { mesh, tree, normals, albedo, skin }
+    }
+
+    /// Its least and greatest corner (m); none when it is empty.
+    pub fn bounds(&self) -> Option<(DVec3, DVec3)> {
+        bounds_of(&self.mesh)
+    }
+
+    /// The first point of the surface on a ray with a unit direction.
+    pub(super) fn hit(&self, origin: DVec3, toward: DVec3) -> Option<Hit> {
+        let hit = self.tree.ray(origin, toward, f64::INFINITY)?;
+        let corners = self.mesh.triangles[hit.triangle].map(|index| index as usize);
+        let normal = match &self.normals {
+            None => {
+                let [a, b, c] = corners.map(|index| self.mesh.positions[index].cast::<f64>());
+                (b - a).cross(&(c - a))
+            }
+            Some(normals) => {
+                let [a, b, c] = corners.map(|index| normals[index].cast::<f64>());
+                a * (1.0 - hit.u - hit.v) + b * hit.u + c * hit.v
+            }
+        };
+        let normal = normal.try_normalize(0.0).unwrap_or(-toward);
+        let normal = if normal.dot(&toward) > 0.0 { -normal } else { normal };
+        Some(Hit { distance: hit.distance, normal, albedo: self.albedo, skin: self.skin })
+    }
+
+    /// Whether the surface hides a direction from a point.
+    pub(super) fn blocks(&self, origin: DVec3, toward: DVec3) -> bool {
+        self.tree.any_hit(origin, toward, f64::INFINITY)
+    }
+}
+
+fn bounds_of(mesh: &TriMesh) -> Option<(DVec3, DVec3)> {
+    let first = mesh.positions.first()?;
+    let (low, high) = mesh.positions.iter().fold((*first, *first), |(low, high), at| (low.inf(at), high.sup(at)));
+    Some((low.cast(), high.cast()))
+}
+
+/// The mean of the triangles' normals around each vertex, weighted by area.
+fn smooth_normals(mesh: &TriMesh) -> Vec<Vec3> {
+    let mut normals = vec![Vec3::zeros(); mesh.positions.len()];
+    for triangle in &mesh.triangles {
+        let [a, b, c] = triangle.map(|index| mesh.positions[index as usize]);
+        let area = (b - a).cross(&(c - a));
+        for index in triangle {
+            normals[*index as usize] += area;
+        }
+    }
+    normals.iter().map(|normal| normal.try_normalize(0.0).unwrap_or_else(Vec3::y)).collect()
+}

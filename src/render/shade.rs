@@ -1,0 +1,150 @@
+//! Light on a surface: a low sun with a soft shadow, and the sky as far as it is not hidden.
+//!
+//! Everything is a function of the pixel alone, so a picture does not depend on the number of threads.
+
+use super::camera::{Camera, direction};
+use crate::base::DVec3;
+
+/// Linear red, green, blue.
+pub(super) type Colour = nalgebra::Vector3<f64>;
+
+/// Albedo of clean snow.
+pub const SNOW: [f32; 3] = [0.90, 0.93, 0.97];
+
+/// Sun and sky.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Light {
+    /// Unit vector towards the sun.
+    pub sun: DVec3,
+}
+
+/// Radiance of the sun on a surface that faces it.
+const SUN: Colour = Colour::new(1.30, 1.14, 0.92);
+/// Radiance of the zenith and of the horizon.
+const ZENITH: Colour = Colour::new(0.20, 0.30, 0.48);
+const HORIZON: Colour = Colour::new(0.42, 0.50, 0.60);
+/// What a hidden part of the sky still sends: light that snow reflected several times.
+const BOUNCED: Colour = Colour::new(0.085, 0.115, 0.165);
+/// Half the angle of the sun's disc, wider than in nature: the edges of shadows are soft (radians).
+const SUN_RADIUS: f64 = 0.02;
+/// Sky rays at each sample of a pixel.
+pub(super) const SKY_RAYS: usize = 2;
+
+impl Light {
+    /// A sun at an azimuth (from +z towards +x) and an elevation above the horizon (degrees).
+    pub fn from_degrees(azimuth: f64, elevation: f64) -> Self {
+        Self { sun: direction(azimuth, elevation) }
+    }
+
+    /// A low sun that comes from the camera's left and a little from ahead: relief shows best so.
+    pub fn beside(camera: &Camera) -> Self {
+        let back = camera.eye - camera.target;
+        let azimuth = back.x.atan2(back.z).to_degrees();
+        Self::from_degrees(azimuth - 112.0, 27.0)
+    }
+
+    /// What is seen where nothing is.
+    pub(super) fn background(&self, toward: DVec3) -> Colour {
+        let height = toward.y.clamp(-0.3, 1.0);
+        // Below the horizon the haze darkens a little, so that a floating layer stands out.
+        if height < 0.0 { HORIZON * (1.0 + 1.2 * height) } else { sky(height) }
+    }
+}
+
+fn sky(height: f64) -> Colour {
+    HORIZON.lerp(&ZENITH, height.sqrt())
+}
+
+/// Light that leaves a point towards the camera.
+///
+/// `blocked(direction)` tells whether something hides that direction from the point; `sample` numbers the
+/// samples of this pixel, `dither` (0 to 1) turns their directions, differently at each pixel.
+pub(super) fn shade(
+    light: &Light,
+    normal: DVec3,
+    albedo: Colour,
+    sample: usize,
+    dither: f64,
+    blocked: impl Fn(DVec3) -> bool,
+) -> Colour {
+    let (side, other) = tangents(light.sun);
+    let (x, y) = disc(sample, dither);
+    let toward_sun = (light.sun + (side * x + other * y) * SUN_RADIUS).normalize();
+    let facing = normal.dot(&toward_sun);
+    let sun = if facing > 0.0 && !blocked(toward_sun) { SUN * facing } else { Colour::zeros() };
+    let (side, other) = tangents(normal);
+    let mut fill = Colour::zeros();
+    for ray in 0..SKY_RAYS {
+        // Directions with density cos / pi: their mean is the light of the sky on the surface.
+        let (x, y) = disc(sample * SKY_RAYS + ray, dither);
+        let toward = side * x + other * y + normal * (1.0 - x * x - y * y).max(0.0).sqrt();
+        let open = toward.y > -0.05 && !blocked(toward);
+        fill += if open { sky(toward.y.max(0.0)) } else { BOUNCED };
+    }
+    albedo.component_mul(&(sun + fill / SKY_RAYS as f64))
+}
+
+/// A point of the unit disc: the plastic sequence (Roberts 2018), turned by `dither`.
+fn disc(index: usize, dither: f64) -> (f64, f64) {
+    const PLASTIC: f64 = 1.324_717_957_244_746;
+    let step = index as f64 + 1.0;
+    let radius = ((step / PLASTIC + dither * 0.37).fract()).sqrt();
+    let angle = std::f64::consts::TAU * (step / (PLASTIC * PLASTIC) + dither).fract();
+    (radius * angle.cos(), radius * angle.sin())
+}
+
+/// Two unit vectors at right angles to a unit vector and to each other.
+fn tangents(normal: DVec3) -> (DVec3, DVec3) {
+    let helper = if normal.x.abs() < 0.7 { DVec3::x() } else { DVec3::y() };
+    let side = normal.cross(&helper).normalize();
+    (side, normal.cross(&side))
+}
+
+/// A number in 0 to 1 for each pixel, evenly spread among neighbours (interleaved gradient noise, Jimenez 2014).
+pub(super) fn dither(x: u32, y: u32) -> f64 {
+    (52.982_918_9 * (0.067_110_56 * f64::from(x) + 0.005_837_15 * f64::from(y)).fract()).fract()
+}
+
+/// Linear light to the 8 bits of a picture: exposure, a shoulder that keeps white snow below 255, sRGB.
+pub(super) fn to_bytes(light: Colour) -> [u8; 3] {
+    let byte = |value: f64| {
+        let value = value * 0.92;
+        // Linear up to the shoulder, then towards 1 with the same slope.
+        let shoulder = 0.6;
+        let value = if value < shoulder {
+            value
+        } else {
+            let over = (value - shoulder) / (1.0 - shoulder);
+            shoulder + (1.0 - shoulder) * (over / (1.0 + over))
+        };
+        let coded = if value <= 0.003_130_8 { 12.92 * value } else { 1.055 * value.powf(1.0 / 2.4) - 0.055 };
+        (coded.clamp(0.0, 1.0) * 255.0).round() as u8
+    };
+    [byte(light.x), byte(light.y), byte(light.z)]
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_shadow_is_darker_and_bluer_than_the_sunny_side() {
+        let light = Light::from_degrees(90.0, 45.0);
+        let albedo = Colour::new(0.9, 0.9, 0.9);
+        let lit = shade(&light, DVec3::y(), albedo, 0, 0.0, |_| false);
+        let shadowed = shade(&light, DVec3::y(), albedo, 0, 0.0, |toward| toward.dot(&light.sun) > 0.99);
+        assert!(lit.x > 2.0 * shadowed.x);
+        assert!(shadowed.z / shadowed.x > lit.z / lit.x);
+    }
+
+    #[test]
+    fn brighter_light_is_never_a_darker_byte() {
+        let mut before = 0;
+        for step in 0..1000 {
+            let byte = to_bytes(Colour::repeat(f64::from(step) * 0.004))[0];
+            assert!(byte >= before);
+            before = byte;
+        }
+        assert!(before > 220);
+    }
+}

@@ -1,0 +1,79 @@
+//! Everything that is in the picture, and the drawing of it.
+
+use super::camera::{Camera, Size};
+use super::model::{Hit, Model};
+use super::picture::Picture;
+use super::shade::{Colour, Light, dither, shade, to_bytes};
+use crate::base::DVec3;
+use crate::context::Context;
+use crate::error::{Error, Result};
+use rayon::prelude::*;
+
+/// Samples along each edge of a pixel.
+const SAMPLES: usize = 3;
+/// Longest edge of a picture (pixels).
+const LONGEST: u32 = 16_384;
+
+/// Models in one picture.
+pub struct Stage {
+    models: Vec<Model>,
+}
+
+impl Stage {
+    /// Puts models together.
+    pub fn new(models: Vec<Model>) -> Self {
+        Self { models }
+    }
+
+    /// Least and greatest corner of everything (m); none when all is empty.
+    pub fn bounds(&self) -> Option<(DVec3, DVec3)> {
+        let boxes = self.models.iter().filter_map(Model::bounds);
+        boxes.reduce(|a, b| (a.0.inf(&b.0), a.1.sup(&b.1)))
+    }
+
+    /// Draws the picture: rows in parallel, the same bytes at any number of threads.
+    ///
+    /// # Errors
+    /// A size outside 1 to 16,384 pixels, or a cancel.
+    pub fn draw(&self, ctx: &Context, camera: &Camera, light: &Light, size: Size) -> Result<Picture> {
+        if [size.width, size.height].iter().any(|edge| !(1..=LONGEST).contains(edge)) {
+            let what = format!("a picture must have 1 to {LONGEST} pixels along each edge");
+            return Err(Error::argument(what));
+        }
+        ctx.stage("draw", || {
+            let row_bytes = 3 * size.width as usize;
+            let mut rgb = vec![0; row_bytes * size.height as usize];
+            rgb.par_chunks_mut(row_bytes).enumerate().try_for_each(|(y, row)| {
+                ctx.check()?;
+                for (x, pixel) in row.chunks_mut(3).enumerate() {
+                    pixel.copy_from_slice(&self.pixel(camera, light, size, x as u32, y as u32));
+                }
+                Ok(())
+            })?;
+            Ok(Picture { size, rgb })
+        })
+    }
+
+    fn pixel(&self, camera: &Camera, light: &Light, size: Size, x: u32, y: u32) -> [u8; 3] {
+        let turn = dither(x, y);
+        let mut sum = Colour::zeros();
+        for sample in 0..SAMPLES * SAMPLES {
+            let inside = |index: usize| (index as f64 + 0.5) / SAMPLES as f64;
+            let across = f64::from(x) + inside(sample % SAMPLES);
+            let down = f64::from(y) + inside(sample / SAMPLES);
+            let toward = camera.through(across, down, size);
+            sum += self.seen(camera.eye, toward, light, sample, turn);
+        }
+        to_bytes(sum / (SAMPLES * SAMPLES) as f64)
+    }
+
+    /// Light that comes along a ray.
+    fn seen(&self, eye: DVec3, toward: DVec3, light: &Light, sample: usize, turn: f64) -> Colour {
+        let hits = self.models.iter().filter_map(|model| model.hit(eye, toward));
+        let nearest = hits.reduce(|a: Hit, b| if b.distance < a.distance { b } else { a });
+        let Some(hit) = nearest else { return light.background(toward) };
+        let point = eye + toward * hit.distance + hit.normal * hit.skin;
+        let blocked = |direction| self.models.iter().any(|model| model.blocks(point, direction));
+        shade(light, hit.normal, hit.albedo, sample, turn, blocked)
+    }
+}

@@ -1,0 +1,150 @@
+//! Scene files (TOML): what a shot is made of, read with every default filled in ([`Scene::read`]), checked
+//! against its inputs and run frame by frame ([`shot`]).
+
+mod file;
+mod frames;
+mod inputs;
+mod memory;
+mod resolved;
+pub mod shot;
+mod table;
+
+pub use frames::Frames;
+pub use inputs::{Inputs, Transformed};
+pub use memory::estimate;
+
+use std::path::PathBuf;
+
+/// A scene with every default filled in and every path absolute.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Scene {
+    /// The file it came from.
+    pub path: PathBuf,
+    /// Which frames, how fast.
+    pub shot: Shot,
+    /// The layer of snow.
+    pub snow: Snow,
+    /// The objects, in the file's order.
+    pub objects: Vec<Object>,
+    /// What is written.
+    pub output: Output,
+}
+
+/// Which frames are made, how fast.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Shot {
+    /// First and last frame.
+    pub frames: Frames,
+    /// Frames per second, over 0, up to 100,000.
+    pub fps: f64,
+}
+
+/// The layer of snow before the first frame, and how it is edited.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Snow {
+    /// What the snow lies on; may be absent when `layer` is a .vdb.
+    pub ground: Option<Ground>,
+    /// How the layer is given.
+    pub layer: Layer,
+    /// Edge of a voxel (m), over 0, up to 10.
+    pub cell: f64,
+    /// Raggedness of the edges.
+    pub noise: Noise,
+}
+
+/// What the snow lies on.
+#[derive(Debug, Clone, PartialEq)]
+pub enum Ground {
+    /// A level plane.
+    Plane {
+        /// Its y (m).
+        height: f64,
+        /// The layer's least and greatest x and z: `[x0, z0, x1, z1]` (m).
+        area: [f64; 4],
+    },
+    /// A mesh file.
+    Mesh(PathBuf),
+}
+
+/// How the layer is given.
+#[derive(Debug, Clone, PartialEq)]
+pub enum Layer {
+    /// Its vertical depth above ground and static objects (m).
+    Depth(f64),
+    /// A mesh of its top surface, above the ground.
+    Top(PathBuf),
+    /// A level set in a .vdb file: the whole layer.
+    Grid(PathBuf),
+}
+
+/// Raggedness that moving objects leave at the edges of what they cut.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Noise {
+    /// Greatest displacement outward (m), 0 to 100 cells; 0 switches it off.
+    pub amplitude: f64,
+    /// Size of its largest features (m), 1 to 10,000 cells.
+    pub size: f64,
+    /// Octaves, 1 to 8, each of half the size and amplitude of the one before.
+    pub octaves: u32,
+    /// Seed.
+    pub seed: u32,
+}
+
+/// One object of the scene.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Object {
+    /// A mesh file, or the pattern of a sequence of them (`body.%04d.obj`).
+    pub file: PathBuf,
+    /// Its sequence starts this many frames later.
+    pub offset: f64,
+    /// Factor from the file's unit to metres, over 0.
+    pub scale: f64,
+    /// The file's upward axis.
+    pub up: Up,
+    /// What it does to the snow.
+    pub role: Role,
+    /// Whether its cuts have ragged edges.
+    pub noise: bool,
+    /// Rigid motion composed over the file's own; ascending frames; may be empty.
+    pub keys: Vec<Key>,
+}
+
+/// A rigid pose at a frame; linear in between, constant before the first and after the last.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Key {
+    /// Frame of the shot.
+    pub frame: f64,
+    /// Where the object's origin is (m).
+    pub at: [f64; 3],
+    /// Turns about the x, then the y, then the z axis (degrees).
+    pub turn_deg: [f64; 3],
+}
+
+/// The upward axis of a file.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Up {
+    /// As frazil, Houdini, Maya.
+    Y,
+    /// As Blender, 3ds Max.
+    Z,
+}
+
+/// What an object does to the snow.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Role {
+    /// It moves through the snow and takes away what it touches.
+    Collide,
+    /// The snow lies on it from the start.
+    Static,
+    /// Nothing.
+    Ignore,
+}
+
+/// What is written.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Output {
+    /// `base/base.%04d.vdb`.
+    pub base: bool,
+    /// `removed/removed.%04d.vdb`.
+    pub removed: bool,
+}

@@ -1,0 +1,113 @@
+//! Writes a scene with every default filled in and commented: the file beside the output that reproduces it.
+
+use super::{Ground, Layer, Object, Role, Scene, Up};
+use std::fmt::Write;
+use std::path::Path;
+
+impl Scene {
+    /// The scene as TOML with every key, its meaning and absolute paths.
+    pub fn to_toml(&self) -> String {
+        let mut text = String::new();
+        self.write_toml(&mut text).expect("writing to a String does not fail");
+        text
+    }
+
+    fn write_toml(&self, out: &mut String) -> std::fmt::Result {
+        writeln!(out, "# Every setting of this output, defaults filled in, made by frazil {VERSION}.")?;
+        writeln!(out, "# SI units; `frazil snow` on this file makes the same output again.\n")?;
+        writeln!(out, "[shot]")?;
+        line(out, "frames", &quoted(&self.shot.frames.to_string()), "first and last")?;
+        line(out, "fps", &number(self.shot.fps), "frames per second")?;
+        self.write_snow(out)?;
+        for object in &self.objects {
+            write_object(out, object)?;
+        }
+        writeln!(out, "\n[output]")?;
+        line(out, "base", kinds(self.output.base), "base/base.%04d.vdb: surface, compression, touched")?;
+        line(out, "removed", kinds(self.output.removed), "removed/removed.%04d.vdb: what each frame took away")
+    }
+
+    fn write_snow(&self, out: &mut String) -> std::fmt::Result {
+        writeln!(out, "\n[snow]")?;
+        match &self.snow.ground {
+            Some(Ground::Plane { height, area }) => {
+                line(out, "ground", &number(*height), "height of a level plane (m)")?;
+                line(out, "area", &numbers(area), "x0, z0, x1, z1 (m)")?;
+            }
+            Some(Ground::Mesh(path)) => line(out, "ground", &file(path), "mesh")?,
+            None => {}
+        }
+        match &self.snow.layer {
+            Layer::Depth(depth) => line(out, "depth", &number(*depth), "above ground and static objects (m)")?,
+            Layer::Top(path) => line(out, "top", &file(path), "mesh of the top surface")?,
+            Layer::Grid(path) => line(out, "top", &file(path), "the layer as a level set")?,
+        }
+        line(out, "cell", &number(self.snow.cell), "edge of a voxel (m)")?;
+        let noise = &self.snow.noise;
+        writeln!(out, "\n[snow.noise]")?;
+        line(out, "amplitude", &number(noise.amplitude), "greatest displacement, outward only (m); 0 = off")?;
+        line(out, "size", &number(noise.size), "size of the largest features (m)")?;
+        line(out, "octaves", &noise.octaves.to_string(), "each of half the size of the one before")?;
+        line(out, "seed", &noise.seed.to_string(), "")
+    }
+}
+
+const VERSION: &str = env!("CARGO_PKG_VERSION");
+
+fn write_object(out: &mut String, object: &Object) -> std::fmt::Result {
+    writeln!(out, "\n[[object]]")?;
+    line(out, "file", &file(&object.file), "mesh or sequence")?;
+    line(out, "offset", &number(object.offset), "frames that a sequence starts later")?;
+    line(out, "scale", &number(object.scale), "from the file's unit to metres")?;
+    let up = match object.up {
+        Up::Y => "y",
+        Up::Z => "z",
+    };
+    line(out, "up", &quoted(up), "the file's upward axis: y or z")?;
+    let role = match object.role {
+        Role::Collide => "collide",
+        Role::Static => "static",
+        Role::Ignore => "ignore",
+    };
+    line(out, "role", &quoted(role), "collide, static or ignore")?;
+    line(out, "noise", &object.noise.to_string(), "ragged edges")?;
+    if object.keys.is_empty() {
+        return line(out, "keys", "[]", "rigid motion over the file's own");
+    }
+    writeln!(out, "keys = [  # rigid motion over the file's own: m, degrees about x, then y, then z")?;
+    for key in &object.keys {
+        let (at, turn) = (numbers(&key.at), numbers(&key.turn_deg));
+        writeln!(out, "    {{ frame = {}, at = {at}, turn_deg = {turn} }},", number(key.frame))?;
+    }
+    writeln!(out, "]")
+}
+
+fn line(out: &mut String, key: &str, value: &str, meaning: &str) -> std::fmt::Result {
+    let assignment = format!("{key} = {value}");
+    if meaning.is_empty() {
+        return writeln!(out, "{assignment}");
+    }
+    writeln!(out, "{assignment:<32} # {meaning}")
+}
+
+fn kinds(written: bool) -> &'static str {
+    if written { "[\"vdb\"]" } else { "[]" }
+}
+
+/// The shortest text that reads back as the same number.
+fn number(value: f64) -> String {
+    format!("{value:?}")
+}
+
+fn numbers(values: &[f64]) -> String {
+    let values: Vec<String> = values.iter().map(|value| number(*value)).collect();
+    format!("[{}]", values.join(", "))
+}
+
+fn file(path: &Path) -> String {
+    quoted(&path.to_string_lossy())
+}
+
+fn quoted(text: &str) -> String {
+    toml::Value::String(text.to_string()).to_string()
+}

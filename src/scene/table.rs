@@ -1,0 +1,288 @@
+//! Tables of a TOML file read key by key, so that every refusal names the file, the line and the key.
+//!
+//! serde's own errors know neither the table nor the nearest key, and say nothing useful of a key that may be
+//! a number or a text; this reader walks the parsed document instead.
+
+use crate::error::{Error, Result};
+use std::path::Path;
+use toml::Spanned;
+use toml::de::{DeTable, DeValue};
+
+/// The text of a scene file and its name, for messages.
+pub(super) struct Document<'a> {
+    pub path: &'a Path,
+    pub text: &'a str,
+}
+
+impl Document<'_> {
+    /// An error at a byte offset of the text: `shot.toml:12: ...`.
+    pub fn error(&self, offset: usize, what: impl std::fmt::Display) -> Error {
+        let line = 1 + self.text.bytes().take(offset).filter(|&byte| byte == b'\n').count();
+        Error::argument(format!("{}:{line}: {what}", self.path.display()))
+    }
+}
+
+/// One table: `[shot]`, an `[[object]]`, or the file itself.
+pub(super) struct Table<'a, 'i> {
+    document: &'a Document<'a>,
+    /// As written in the file: `[shot]`; empty for the file itself.
+    name: &'static str,
+    entries: &'a DeTable<'i>,
+    offset: usize,
+}
+
+impl<'a, 'i> Table<'a, 'i> {
+    /// Opens a table and refuses keys that are not in `known`.
+    pub fn open(
+        document: &'a Document<'a>,
+        name: &'static str,
+        entries: &'a DeTable<'i>,
+        offset: usize,
+        known: &[&str],
+    ) -> Result<Self> {
+        let table = Self { document, name, entries, offset };
+        let unknown = entries.keys().filter(|key| !known.contains(&&**key.get_ref()));
+        match unknown.min_by_key(|key| key.span().start) {
+            None => Ok(table),
+            Some(key) => {
+                let place = if name.is_empty() { String::new() } else { format!(" in {name}") };
+                let hint = match nearest(key.get_ref(), known) {
+                    Some(near) => format!("did you mean `{near}`?"),
+                    None => format!("the keys are {}", listed(known)),
+                };
+                Err(document.error(key.span().start, format!("unknown key `{}`{place}; {hint}", key.get_ref())))
+            }
+        }
+    }
+
+    fn entry(&self, key: &str) -> Option<&'a Spanned<DeValue<'i>>> {
+        self.entries.get(key)
+    }
+
+    /// Whether the key is there.
+    pub fn has(&self, key: &str) -> bool {
+        self.entry(key).is_some()
+    }
+
+    /// An error about a key's value, at its line; about the table's own line when the key is not there.
+    pub fn error(&self, key: &str, what: impl std::fmt::Display) -> Error {
+        let offset = self.entry(key).map_or(self.offset, |value| value.span().start);
+        let place = if self.name.is_empty() { String::new() } else { format!(" in {}", self.name) };
+        self.document.error(offset, format!("`{key}`{place} {what}"))
+    }
+
+    fn wrong_type(&self, key: &str, wanted: &str, found: &DeValue) -> Error {
+        self.error(key, format!("must be {wanted}, not {}", kind_of(found)))
+    }
+
+    /// A text.
+    pub fn text(&self, key: &str) -> Result<Option<&'a str>> {
+        match self.entry(key).map(|value| value.get_ref()) {
+            None => Ok(None),
+            Some(DeValue::String(text)) => Ok(Some(text)),
+            Some(other) => Err(self.wrong_type(key, "a text", other)),
+        }
+    }
+
+    /// A finite number, written with or without a decimal point.
+    pub fn number(&self, key: &str) -> Result<Option<f64>> {
+        match self.entry(key).map(|value| value.get_ref()) {
+            None => Ok(None),
+            Some(value) => match number_of(value) {
+                Some(number) => Ok(Some(number)),
+                None => Err(self.wrong_type(key, "a finite number", value)),
+            },
+        }
+    }
+
+    /// A number inside a range that the message names.
+    pub fn number_in(&self, key: &str, range: std::ops::RangeInclusive<f64>, unit: &str) -> Result<Option<f64>> {
+        let Some(number) = self.number(key)? else { return Ok(None) };
+        if range.contains(&number) {
+            return Ok(Some(number));
+        }
+        let unit = if unit.is_empty() { String::new() } else { format!(" {unit}") };
+        let wanted = format!("must lie in {} to {}{unit}, not {number}", range.start(), range.end());
+        Err(self.error(key, wanted))
+    }
+
+    /// A whole number inside a range that the message names.
+    pub fn integer_in(&self, key: &str, range: std::ops::RangeInclusive<i64>) -> Result<Option<i64>> {
+        let value = match self.entry(key).map(|value| value.get_ref()) {
+            None => return Ok(None),
+            Some(value) => value,
+        };
+        let DeValue::Integer(written) = value else {
+            return Err(self.wrong_type(key, "a whole number", value));
+        };
+        match i64::from_str_radix(written.as_str(), written.radix()) {
+            Ok(number) if range.contains(&number) => Ok(Some(number)),
+            _ => {
+                let wanted = format!("must lie in {} to {}, not {written}", range.start(), range.end());
+                Err(self.error(key, wanted))
+            }
+        }
+    }
+
+    /// `true` or `false`.
+    pub fn flag(&self, key: &str) -> Result<Option<bool>> {
+        match self.entry(key).map(|value| value.get_ref()) {
+            None => Ok(None),
+            Some(DeValue::Boolean(flag)) => Ok(Some(*flag)),
+            Some(other) => Err(self.wrong_type(key, "true or false", other)),
+        }
+    }
+
+    /// A text out of a few, each with its meaning.
+    pub fn choice<T: Copy>(&self, key: &str, choices: &[(&str, T)]) -> Result<Option<T>> {
+        let Some(text) = self.text(key)? else { return Ok(None) };
+        self.chosen(key, text, choices).map(Some)
+    }
+
+    /// A list of texts out of a few.
+    pub fn choices<T: Copy>(&self, key: &str, choices: &[(&str, T)]) -> Result<Option<Vec<T>>> {
+        let values = match self.entry(key).map(|value| value.get_ref()) {
+            None => return Ok(None),
+            Some(DeValue::Array(values)) => values,
+            Some(other) => return Err(self.wrong_type(key, "a list of texts", other)),
+        };
+        let read = |value: &Spanned<DeValue>| match value.get_ref() {
+            DeValue::String(text) => self.chosen(key, text, choices),
+            other => Err(self.wrong_type(key, "a list of texts", other)),
+        };
+        values.iter().map(read).collect::<Result<Vec<T>>>().map(Some)
+    }
+
+    fn chosen<T: Copy>(&self, key: &str, text: &str, choices: &[(&str, T)]) -> Result<T> {
+        let names: Vec<&str> = choices.iter().map(|choice| choice.0).collect();
+        match choices.iter().find(|choice| choice.0 == text) {
+            Some(choice) => Ok(choice.1),
+            None => {
+                let hint = match nearest(text, &names) {
+                    Some(near) => format!("; did you mean \"{near}\"?"),
+                    None => String::new(),
+                };
+                let names: Vec<String> = names.iter().map(|name| format!("\"{name}\"")).collect();
+                Err(self.error(key, format!("must be {}, not \"{text}\"{hint}", names.join(" or "))))
+            }
+        }
+    }
+
+    /// A list of exactly `N` finite numbers.
+    pub fn numbers<const N: usize>(&self, key: &str) -> Result<Option<[f64; N]>> {
+        let Some(value) = self.entry(key).map(|value| value.get_ref()) else { return Ok(None) };
+        let read = || -> Option<[f64; N]> {
+            let DeValue::Array(values) = value else { return None };
+            let numbers: Option<Vec<f64>> = values.iter().map(|value| number_of(value.get_ref())).collect();
+            numbers?.try_into().ok()
+        };
+        match read() {
+            Some(numbers) => Ok(Some(numbers)),
+            None => {
+                let found = match value {
+                    DeValue::Array(values) if values.len() != N => format!("a list of {}", values.len()),
+                    DeValue::Array(_) => "a list with something else in it".to_string(),
+                    other => kind_of(other).to_string(),
+                };
+                Err(self.error(key, format!("must be a list of {N} finite numbers, not {found}")))
+            }
+        }
+    }
+
+    /// A table inside this one.
+    pub fn table(&self, key: &str, name: &'static str, known: &[&str]) -> Result<Option<Table<'a, 'i>>> {
+        let Some(value) = self.entry(key) else { return Ok(None) };
+        let DeValue::Table(entries) = value.get_ref() else {
+            return Err(self.wrong_type(key, "a table", value.get_ref()));
+        };
+        Table::open(self.document, name, entries, value.span().start, known).map(Some)
+    }
+
+    /// A list of tables inside this one.
+    pub fn tables(&self, key: &str, name: &'static str, known: &[&str]) -> Result<Vec<Table<'a, 'i>>> {
+        let Some(value) = self.entry(key) else { return Ok(Vec::new()) };
+        let DeValue::Array(values) = value.get_ref() else {
+            return Err(self.wrong_type(key, "a list of tables", value.get_ref()));
+        };
+        let open = |value: &'a Spanned<DeValue<'i>>| match value.get_ref() {
+            DeValue::Table(entries) => {
+                Table::open(self.document, name, entries, value.span().start, known)
+            }
+            other => Err(self.wrong_type(key, "a list of tables", other)),
+        };
+        values.iter().map(open).collect()
+    }
+}
+
+fn number_of(value: &DeValue) -> Option<f64> {
+    let number = match value {
+        DeValue::Integer(written) => i64::from_str_radix(written.as_str(), written.radix()).ok()? as f64,
+        DeValue::Float(written) => written.as_str().parse().ok()?,
+        _ => return None,
+    };
+    number.is_finite().then_some(number)
+}
+
+fn kind_of(value: &DeValue) -> &'static str {
+    match value {
+        DeValue::String(_) => "a text",
+        DeValue::Integer(_) => "a whole number",
+        DeValue::Float(_) => "a number",
+        DeValue::Boolean(_) => "true or false",
+        DeValue::Datetime(_) => "a date",
+        DeValue::Array(_) => "a list",
+        DeValue::Table(_) => "a table",
+    }
+}
+
+/// "`a`, `b` and `c`".
+fn listed(names: &[&str]) -> String {
+    let quoted: Vec<String> = names.iter().map(|name| format!("`{name}`")).collect();
+    match quoted.split_last() {
+        Some((last, rest)) if !rest.is_empty() => format!("{} and {last}", rest.join(", ")),
+        _ => quoted.join(""),
+    }
+}
+
+/// The known name closest to what was typed, if it is close enough to have been meant.
+fn nearest<'n>(typed: &str, known: &[&'n str]) -> Option<&'n str> {
+    let typed = typed.to_lowercase();
+    let best = known.iter().map(|name| (edits(&typed, name), *name)).min()?;
+    let longest = typed.chars().count().max(best.1.len());
+    (2 * best.0 <= longest).then_some(best.1)
+}
+
+/// Insertions, deletions, replacements and swaps of neighbours that make one word of the other
+/// (optimal string alignment distance).
+fn edits(a: &str, b: &str) -> usize {
+    let (a, b): (Vec<char>, Vec<char>) = (a.chars().collect(), b.chars().collect());
+    let mut rows = vec![(0..=b.len()).collect::<Vec<usize>>()];
+    for i in 1..=a.len() {
+        let mut row = vec![i];
+        for j in 1..=b.len() {
+            let replaced = rows[i - 1][j - 1] + usize::from(a[i - 1] != b[j - 1]);
+            let mut best = replaced.min(rows[i - 1][j] + 1).min(row[j - 1] + 1);
+            if i > 1 && j > 1 && a[i - 1] == b[j - 2] && a[i - 2] == b[j - 1] {
+                best = best.min(rows[i - 2][j - 2] + 1);
+            }
+            row.push(best);
+        }
+        rows.push(row);
+    }
+    rows[a.len()][b.len()]
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_nearest_key_is_the_one_that_was_meant() {
+        let keys = ["frames", "fps", "ground", "depth"];
+        assert_eq!(nearest("framse", &keys), Some("frames"));
+        assert_eq!(nearest("Frames", &keys), Some("frames"));
+        assert_eq!(nearest("dept", &keys), Some("depth"));
+        assert_eq!(nearest("wind", &keys), None);
+        assert_eq!(edits("framse", "frames"), 1);
+    }
+}
