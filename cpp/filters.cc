@@ -11,7 +11,7 @@ namespace frazil {
 
 namespace {
 
-using Filter = openvdb::tools::LevelSetFilter<openvdb::FloatGrid, openvdb::FloatGrid, Interrupter>;
+using Filter = openvdb::tools::LevelSetFilter<openvdb::FloatGrid, openvdb::FloatGrid, openvdb::util::NullInterrupter>;
 
 /// A filter with OpenVDB's defaults (fifth-order WENO), or with one first-order pass: ten times cheaper.
 void configure(Filter& filter, bool weno) {
@@ -93,7 +93,7 @@ void advect_outward(Grid& grid, const Call& call, const Grid& speed) {
     run(call, [&] {
         Interrupter interrupter(call);
         const Outward field(*grid.impl->grid, *speed.impl->grid);
-        openvdb::tools::LevelSetAdvection<openvdb::FloatGrid, Outward, Interrupter> advection(*grid.impl->grid, field,
+        openvdb::tools::LevelSetAdvection<openvdb::FloatGrid, Outward, openvdb::util::NullInterrupter> advection(*grid.impl->grid, field,
                                                                                              &interrupter);
         advection.advect(0.0, 1.0);
         interrupter.check();

@@ -5,6 +5,7 @@
 #include "frazil/src/vdb/bridge.rs.h"
 
 #include <openvdb/openvdb.h>
+#include <openvdb/util/NullInterrupter.h>
 #include <tbb/task_arena.h>
 
 #include <atomic>
@@ -28,12 +29,10 @@ struct Cancelled : std::runtime_error {
 };
 
 /// Stops OpenVDB's tools when the context's cancel flag is set.
-class Interrupter {
+class Interrupter : public openvdb::util::NullInterrupter {
 public:
     explicit Interrupter(const Call& call) : flag_(reinterpret_cast<const volatile bool*>(call.cancel)) {}
-    void start(const char* = nullptr) {}
-    void end() {}
-    bool wasInterrupted(int = -1) { return flag_ != nullptr && *flag_; }
+    bool wasInterrupted(int = -1) override { return flag_ != nullptr && *flag_; }
     void check() {
         if (wasInterrupted()) throw Cancelled();
     }

@@ -78,7 +78,7 @@ Triangles to_mesh(const Grid& grid, const Call& call, double iso, double adaptiv
 void measure(const Grid& grid, const Call& call, double& area, double& volume) {
     run(call, [&] {
         Interrupter interrupter(call);
-        openvdb::tools::LevelSetMeasure<openvdb::FloatGrid, Interrupter> tool(*grid.impl->grid, &interrupter);
+        openvdb::tools::LevelSetMeasure<openvdb::FloatGrid, openvdb::util::NullInterrupter> tool(*grid.impl->grid, &interrupter);
         area = tool.area(true);
         volume = tool.volume(true);
         interrupter.check();
