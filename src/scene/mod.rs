@@ -10,8 +10,8 @@ pub mod shot;
 mod table;
 
 pub use frames::Frames;
-pub use inputs::{Inputs, Transformed};
-pub use memory::estimate;
+pub use inputs::Inputs;
+pub use memory::{check as check_memory, estimate};
 
 use std::path::PathBuf;
 

@@ -1,0 +1,164 @@
+//! Everything a scene reads before its first frame.
+
+use std::path::Path;
+
+use super::{Ground, Layer, Object, Role, Scene, Up};
+use crate::base::{DVec3, TriMesh};
+use crate::context::Context;
+use crate::error::{Error, Result};
+use crate::io::mesh;
+use crate::io::sequence::Pattern;
+use crate::motion::{Key, Keys, MeshSequence, Motion, Placed, Rigid};
+use crate::snow::base_layer::initial::{self, Cover};
+use crate::sweep::Body;
+use crate::vdb::{FloatGrid, GridClass, file};
+
+/// Half width of the snow's narrow band (cells).
+const HALF_WIDTH: f32 = 3.0;
+
+/// What a scene's files hold.
+pub struct Inputs {
+    snow: Snow,
+    statics: Vec<TriMesh>,
+    /// The objects that move through the snow.
+    pub bodies: Vec<Body>,
+}
+
+enum Snow {
+    Made { ground: initial::Ground, cover: Cover },
+    Given(FloatGrid),
+}
+
+impl Inputs {
+    /// Reads every input; of sequences the first frame, after checking that none is missing.
+    ///
+    /// # Errors
+    /// What the files or keys have wrong, with file and key.
+    pub fn load(scene: &Scene) -> Result<Self> {
+        let snow = match &scene.snow.layer {
+            Layer::Grid(path) => Snow::Given(layer_grid(path, scene.snow.cell)?),
+            Layer::Depth(depth) => Snow::Made { ground: ground(scene)?, cover: Cover::Depth(*depth) },
+            Layer::Top(path) => Snow::Made { ground: ground(scene)?, cover: Cover::Top(mesh::read(path)?) },
+        };
+        let start = f64::from(scene.shot.frames.first) / scene.shot.fps;
+        let (mut statics, mut bodies) = (Vec::new(), Vec::new());
+        for object in scene.objects.iter().filter(|object| object.role != Role::Ignore) {
+            let motion = motion(scene, object)?;
+            match object.role {
+                Role::Static => statics.push(posed(&*motion, start)?),
+                _ => bodies.push(Body::new(motion, start)?.with_noise(object.noise)),
+            }
+        }
+        Ok(Self { snow, statics, bodies })
+    }
+
+    /// Least and greatest x and z of the snow (m), as far as they are known before it is made.
+    pub fn area(&self) -> Option<[f64; 4]> {
+        match &self.snow {
+            Snow::Made { ground: initial::Ground::Plane { area, .. }, .. } => Some(*area),
+            Snow::Made { ground: initial::Ground::Mesh(mesh), .. } => {
+                let (low, high) = mesh.bounds()?;
+                Some([low.x, low.z, high.x, high.z].map(f64::from))
+            }
+            Snow::Given(_) => None,
+        }
+    }
+
+    /// The snow before the first frame.
+    ///
+    /// # Errors
+    /// As [`initial::layer`].
+    pub fn layer(&self, ctx: &Context, cell: f64) -> Result<FloatGrid> {
+        match &self.snow {
+            Snow::Given(grid) => grid.deep_copy(),
+            Snow::Made { ground, cover } => initial::layer(ctx, ground, &self.statics, cover, cell, HALF_WIDTH),
+        }
+    }
+}
+
+fn ground(scene: &Scene) -> Result<initial::Ground> {
+    match &scene.snow.ground {
+        Some(Ground::Plane { height, area }) => Ok(initial::Ground::Plane { height: *height, area: *area }),
+        Some(Ground::Mesh(path)) => Ok(initial::Ground::Mesh(mesh::read(path)?)),
+        None => Err(Error::argument("the snow has no ground")),
+    }
+}
+
+fn layer_grid(path: &Path, cell: f64) -> Result<FloatGrid> {
+    let grid = file::read_named(path, None)?;
+    if grid.class() != GridClass::LevelSet {
+        return Err(Error::file(path, format!("grid \"{}\" is not a level set", grid.name())));
+    }
+    let own = grid.voxel_size();
+    if (own - cell).abs() > 1e-6 * cell {
+        return Err(Error::file(path, format!("the layer has cells of {own} m, but `cell` is {cell} m")));
+    }
+    if f64::from(grid.background()) < 2.999 * own {
+        return Err(Error::file(path, "the layer's narrow band is less than 3 cells wide"));
+    }
+    Ok(grid)
+}
+
+/// An object's motion: its file, its own frames, scale and axis, and the keys over them.
+fn motion(scene: &Scene, object: &Object) -> Result<Box<dyn Motion>> {
+    let fps = scene.shot.fps;
+    let radians = |turn: [f64; 3]| DVec3::from(turn.map(f64::to_radians));
+    let keys = object.keys.iter().map(|key| Key {
+        time: key.frame / fps,
+        at: DVec3::from(key.at),
+        turn: radians(key.turn_deg),
+    });
+    let keys = Keys::new(keys.collect())?;
+    let own: Box<dyn Motion> = match Pattern::parse(&object.file) {
+        None => Box::new(Rigid::new(mesh::read(&object.file)?, Keys::default())),
+        Some(pattern) => {
+            let first = (f64::from(scene.shot.frames.first) - object.offset).floor() as i32;
+            let last = (f64::from(scene.shot.frames.last) - object.offset).ceil() as i32;
+            Box::new(MeshSequence::open(pattern, first, last, fps, object.offset)?)
+        }
+    };
+    let own: Box<dyn Motion> = if object.scale == 1.0 && object.up == Up::Y {
+        own
+    } else {
+        Box::new(Transformed { inner: own, scale: object.scale, up: object.up })
+    };
+    Ok(Box::new(Placed::new(own, keys)))
+}
+
+fn posed(motion: &dyn Motion, time: f64) -> Result<TriMesh> {
+    let mut pose = Vec::new();
+    motion.pose(time, &mut pose)?;
+    Ok(TriMesh { positions: pose.iter().map(|p| p.cast()).collect(), triangles: motion.triangles().to_vec() })
+}
+
+/// A motion in another unit, or with another axis up.
+struct Transformed {
+    inner: Box<dyn Motion>,
+    scale: f64,
+    up: Up,
+}
+
+impl Motion for Transformed {
+    fn triangles(&self) -> &[[u32; 3]] {
+        self.inner.triangles()
+    }
+
+    fn vertex_count(&self) -> usize {
+        self.inner.vertex_count()
+    }
+
+    fn pose(&self, time: f64, out: &mut Vec<DVec3>) -> Result<()> {
+        self.inner.pose(time, out)?;
+        for p in out {
+            *p *= self.scale;
+            if self.up == Up::Z {
+                *p = DVec3::new(p.x, p.z, -p.y);
+            }
+        }
+        Ok(())
+    }
+
+    fn breaks(&self, from: f64, to: f64) -> Vec<f64> {
+        self.inner.breaks(from, to)
+    }
+}
