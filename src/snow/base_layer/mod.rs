@@ -11,7 +11,7 @@ use std::collections::{BTreeMap, BTreeSet, HashMap};
 
 use rayon::prelude::*;
 
-pub use noise::NoiseParams;
+pub use noise::{NoiseParams, displace};
 
 use crate::base::DVec3;
 use crate::base::blocks::{Block, BlockEdit, Mask, Origin, VOXELS};
