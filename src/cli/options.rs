@@ -4,7 +4,8 @@
 pub fn size(text: &str) -> Result<frazil::render::Size, String> {
     let refused = || format!("\"{text}\" is no size such as 1280x720");
     let (width, height) = text.split_once('x').ok_or_else(refused)?;
-    let number = |text: &str| text.parse::<u32>().ok().filter(|n| (1..=16_384).contains(n)).ok_or_else(refused);
+    let number =
+        |text: &str| text.parse::<u32>().ok().filter(|n| (1..=16_384).contains(n)).ok_or_else(refused);
     Ok(frazil::render::Size { width: number(width)?, height: number(height)? })
 }
 
@@ -26,5 +27,8 @@ pub fn bytes(text: &str) -> Result<u64, String> {
         text => (text, 0),
     };
     let value: u64 = number.parse().map_err(|_| format!("\"{text}\" is no size such as 800M or 12G"))?;
-    value.checked_shl(shift).filter(|bytes| bytes >> shift == value).ok_or_else(|| format!("{text} is too large"))
+    value
+        .checked_shl(shift)
+        .filter(|bytes| bytes >> shift == value)
+        .ok_or_else(|| format!("{text} is too large"))
 }

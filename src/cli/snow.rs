@@ -44,7 +44,10 @@ pub fn run(args: Args, session: &Session) -> Result<(), Failure> {
     let scene = Scene::read(&args.scene).before()?;
     let frames = args.frames.unwrap_or(scene.shot.frames);
     if frames.first < scene.shot.frames.first || frames.last > scene.shot.frames.last {
-        return Err(Failure::refused(format!("--frames {frames} is not within the shot's {}", scene.shot.frames)));
+        return Err(Failure::refused(format!(
+            "--frames {frames} is not within the shot's {}",
+            scene.shot.frames
+        )));
     }
     let inputs = Inputs::load(&scene).before()?;
     let limit = args.max_memory.or(machine::memory().map(|bytes| bytes / 5 * 4)).unwrap_or(u64::MAX);

@@ -34,7 +34,9 @@ enum Operation {
         made: Made,
     },
     /// The volume that a mesh sequence sweeps.
-    #[command(after_help = "Example:\n  frazil vdb sweep body.%04d.obj --frames 1-2 -o sweep.vdb --cell 0.005")]
+    #[command(
+        after_help = "Example:\n  frazil vdb sweep body.%04d.obj --frames 1-2 -o sweep.vdb --cell 0.005"
+    )]
     Sweep {
         /// A pattern such as body.%04d.obj.
         sequence: PathBuf,
@@ -82,7 +84,9 @@ enum Operation {
         times: u32,
     },
     /// Displace the surface outward by noise.
-    #[command(after_help = "Example:\n  frazil vdb displace boot.vdb -o ragged.vdb --amplitude 0.01 --size 0.06")]
+    #[command(
+        after_help = "Example:\n  frazil vdb displace boot.vdb -o ragged.vdb --amplitude 0.01 --size 0.06"
+    )]
     Displace {
         #[command(flatten)]
         one: One,
@@ -174,8 +178,14 @@ pub fn run(args: Args, session: &Session) -> Result<(), Failure> {
             let swept = match method {
                 Method::Chain => sweep::chain(ctx, &bodies, from, to, &made.settings()),
                 Method::Samples => {
-                    let settings = SamplesSettings { samples, half_width: made.half_width, ..SamplesSettings::new(made.cell) };
-                    made.settings().validate().and_then(|()| sweep::samples(ctx, &bodies, from, to, &settings))
+                    let settings = SamplesSettings {
+                        samples,
+                        half_width: made.half_width,
+                        ..SamplesSettings::new(made.cell)
+                    };
+                    made.settings()
+                        .validate()
+                        .and_then(|()| sweep::samples(ctx, &bodies, from, to, &settings))
                 }
             };
             save(&made.output, swept.during()?)
@@ -218,7 +228,10 @@ fn open(input: &Path, written: &Path) -> Result<FloatGrid, Failure> {
     output::check_writable(written).before()?;
     let grid = read_named(input, None).before()?;
     if grid.class() != GridClass::LevelSet {
-        return Err(Failure::refused(Error::file(input, format!("grid \"{}\" is not a level set", grid.name()))));
+        return Err(Failure::refused(Error::file(
+            input,
+            format!("grid \"{}\" is not a level set", grid.name()),
+        )));
     }
     Ok(grid)
 }

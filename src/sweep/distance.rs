@@ -84,14 +84,20 @@ impl Triangle {
         let t = from / (from - to);
         let at = [0, 1, 2].map(|axis| p[axis] + t * (q[axis] - p[axis]));
         let inside = (0..3).all(|i| dot(sub(at, self.corner[i]), self.inward[i]) > 0.0);
-        if !inside { 0 } else if to > 0.0 { 1 } else { -1 }
+        if !inside {
+            0
+        } else if to > 0.0 {
+            1
+        } else {
+            -1
+        }
     }
 
     /// Squared distances of eight points: the kernel, inlined into each instruction set's copy.
     #[inline(always)]
     fn squared(&self, points: &Points) -> [f32; LANES] {
         let mut out = [0.0; LANES];
-        for lane in 0..LANES {
+        for (lane, out) in out.iter_mut().enumerate() {
             let p = [points.x[lane], points.y[lane], points.z[lane]];
             let mut nearest = f32::INFINITY;
             let mut least_inward = f32::INFINITY;
@@ -109,7 +115,7 @@ impl Triangle {
             }
             let height = dot(sub(p, self.corner[0]), self.normal);
             let plane = height * height;
-            out[lane] = if least_inward > 0.0 { plane } else { nearest };
+            *out = if least_inward > 0.0 { plane } else { nearest };
         }
         out
     }
