@@ -2,7 +2,6 @@
 
 mod exit;
 mod info;
-mod machine;
 mod options;
 mod output;
 mod preview;

@@ -4,14 +4,14 @@
 mod file;
 mod frames;
 mod inputs;
-mod memory;
+pub mod machine;
+pub mod memory;
 mod resolved;
 pub mod shot;
 mod table;
 
 pub use frames::Frames;
-pub use inputs::{Inputs, Transformed};
-pub use memory::estimate;
+pub use inputs::Inputs;
 
 use std::path::PathBuf;
 
