@@ -9,7 +9,6 @@ pub mod io;
 pub mod motion;
 #[cfg(feature = "vdb")]
 pub mod snow;
-#[cfg(feature = "vdb")]
 pub mod sweep;
 #[cfg(feature = "vdb")]
 pub mod vdb;

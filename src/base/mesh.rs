@@ -1,6 +1,7 @@
 //! Triangle meshes.
 
-use super::Vec3;
+use super::{DVec3, Vec3};
+use crate::error::{Error, Result};
 
 /// A triangle mesh: positions in metres, counter-clockwise triangles seen from outside.
 #[derive(Debug, Clone, Default, PartialEq)]
@@ -9,4 +10,130 @@ pub struct TriMesh {
     pub positions: Vec<Vec3>,
     /// Vertex indices of each triangle.
     pub triangles: Vec<[u32; 3]>,
+}
+
+impl TriMesh {
+    /// Checks that there is a triangle, that positions are finite and indices in range.
+    ///
+    /// # Errors
+    /// Names the first vertex or triangle at fault, counted from 1.
+    pub fn validate(&self) -> Result<()> {
+        if self.triangles.is_empty() {
+            return Err(Error::argument("the mesh has no faces"));
+        }
+        let finite = |p: &Vec3| p.iter().all(|value| value.is_finite());
+        if let Some(vertex) = self.positions.iter().position(|p| !finite(p)) {
+            return Err(Error::argument(format!("vertex {} is not finite", vertex + 1)));
+        }
+        let count = self.positions.len();
+        let wild = |triangle: &[u32; 3]| triangle.iter().any(|&index| index as usize >= count);
+        if let Some(triangle) = self.triangles.iter().position(wild) {
+            return Err(Error::argument(format!("face {} names a vertex beyond the {count} there are", triangle + 1)));
+        }
+        Ok(())
+    }
+
+    /// Corners of a triangle in 64 bits.
+    pub fn corners(&self, triangle: usize) -> [DVec3; 3] {
+        self.triangles[triangle].map(|index| self.positions[index as usize].cast())
+    }
+
+    /// Least and greatest corner (m); none without vertices.
+    pub fn bounds(&self) -> Option<(Vec3, Vec3)> {
+        let first = *self.positions.first()?;
+        Some(self.positions.iter().fold((first, first), |(low, high), p| (low.inf(p), high.sup(p))))
+    }
+
+    /// Enclosed volume by the divergence theorem (m3); exact for a closed mesh.
+    pub fn volume(&self) -> f64 {
+        let Some((low, _)) = self.bounds() else { return 0.0 };
+        let origin: DVec3 = low.cast();
+        let six = |triangle: usize| {
+            let [a, b, c] = self.corners(triangle).map(|p| p - origin);
+            a.dot(&b.cross(&c))
+        };
+        (0..self.triangles.len()).map(six).sum::<f64>() / 6.0
+    }
+
+    /// Surface area (m2).
+    pub fn area(&self) -> f64 {
+        let twice = |triangle: usize| {
+            let [a, b, c] = self.corners(triangle);
+            (b - a).cross(&(c - a)).norm()
+        };
+        (0..self.triangles.len()).map(twice).sum::<f64>() / 2.0
+    }
+
+    /// Edges, as (lesser vertex, greater vertex), with how often the triangles run along them each way.
+    fn edge_uses(&self) -> Vec<((u32, u32), i32)> {
+        let mut edges: Vec<((u32, u32), i32)> = self
+            .triangles
+            .iter()
+            .flat_map(|&[a, b, c]| [(a, b), (b, c), (c, a)])
+            .map(|(i, j)| if i < j { ((i, j), 1) } else { ((j, i), -1) })
+            .collect();
+        edges.sort_unstable();
+        edges
+    }
+
+    /// Whether every edge is used as often in one direction as in the other.
+    pub fn is_closed(&self) -> bool {
+        let edges = self.edge_uses();
+        edges.chunk_by(|a, b| a.0 == b.0).all(|uses| uses.iter().map(|(_, way)| way).sum::<i32>() == 0)
+    }
+
+    /// Whether it is closed and no edge has more than two triangles.
+    pub fn is_manifold(&self) -> bool {
+        let edges = self.edge_uses();
+        edges.chunk_by(|a, b| a.0 == b.0).all(|uses| uses.len() == 2 && uses[0].1 + uses[1].1 == 0)
+    }
+
+    /// Vertices less edges plus faces, over the vertices that are used: 2 for a sphere.
+    pub fn euler_characteristic(&self) -> i64 {
+        let mut used: Vec<u32> = self.triangles.as_flattened().to_vec();
+        used.sort_unstable();
+        used.dedup();
+        let edges = self.edge_uses().chunk_by(|a, b| a.0 == b.0).count();
+        used.len() as i64 - edges as i64 + self.triangles.len() as i64
+    }
+
+    /// Adds another mesh's triangles.
+    pub fn append(&mut self, other: &Self) {
+        let first = self.positions.len() as u32;
+        self.positions.extend_from_slice(&other.positions);
+        self.triangles.extend(other.triangles.iter().map(|triangle| triangle.map(|index| index + first)));
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn tetrahedron() -> TriMesh {
+        TriMesh {
+            positions: vec![Vec3::zeros(), Vec3::x(), Vec3::y(), Vec3::z()],
+            triangles: vec![[0, 2, 1], [0, 1, 3], [1, 2, 3], [2, 0, 3]],
+        }
+    }
+
+    #[test]
+    fn a_tetrahedron_has_its_volume_area_and_genus() {
+        let mesh = tetrahedron();
+        assert!((mesh.volume() - 1.0 / 6.0).abs() < 1e-12);
+        assert!((mesh.area() - (1.5 + 0.75f64.sqrt())).abs() < 1e-7);
+        assert!(mesh.is_manifold());
+        assert_eq!(mesh.euler_characteristic(), 2);
+    }
+
+    #[test]
+    fn a_missing_face_and_bad_numbers_are_seen() {
+        let mut mesh = tetrahedron();
+        mesh.triangles.pop();
+        assert!(!mesh.is_closed());
+        mesh.positions[2].y = f32::NAN;
+        assert_eq!(mesh.validate().unwrap_err().to_string(), "vertex 3 is not finite");
+        mesh.positions[2].y = 0.0;
+        mesh.triangles[1][0] = 9;
+        assert!(mesh.validate().unwrap_err().to_string().starts_with("face 2 "));
+    }
 }

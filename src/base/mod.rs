@@ -1,6 +1,8 @@
 //! Plain data that every room shares; knows no file format and no OpenVDB.
 
 pub mod blocks;
+pub mod bvh;
+pub mod cpu;
 pub mod mesh;
 
 /// A point, direction or velocity in 32 bits: fields and mesh vertices (m, m/s).

@@ -1,5 +1,11 @@
 //! Things that move: a fixed set of triangles whose vertices have a position at every time.
 
+mod rigid;
+mod sequence;
+
+pub use rigid::{Key, Keys, Placed, Rigid};
+pub use sequence::MeshSequence;
+
 use crate::base::DVec3;
 use crate::error::Result;
 

@@ -1,1 +1,70 @@
-//! The volume that moving meshes sweep.
+//! The volume that moving meshes sweep in an interval of time.
+//!
+//! [`chain`] is exact up to a tolerance: signed space-time tetrahedra (`chain.rs`), poses dense enough
+//! for arcs (`body.rs`), edges halved where their ends move differently (`refine.rs`), winding numbers
+//! by exact line crossings (`winding.rs`), then exact distances in the narrow band (`voxelise.rs`).
+//! [`samples`] is the thesis' way (section 3.2): the union of N + 1 poses, dilated and smoothed.
+
+mod body;
+mod chain;
+mod distance;
+mod lattice;
+mod nearest;
+mod refine;
+#[cfg(feature = "vdb")]
+mod samples;
+mod topology;
+mod voxelise;
+mod winding;
+
+pub use body::Body;
+pub use chain::{Face, Weights, Window, boundary};
+pub use lattice::{Fixed, Lattice, UNITS};
+pub use nearest::Scratch;
+#[cfg(feature = "vdb")]
+pub use samples::{SamplesSettings, samples};
+pub use topology::Topology;
+pub use voxelise::{Band, Piece, Voxeliser};
+
+use crate::error::{Error, Result};
+
+/// How a swept volume is made.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Settings {
+    /// Cell size (m).
+    pub voxel: f64,
+    /// Half width of the narrow band (cells), at least 3.
+    pub half_width: f32,
+    /// Largest error against true arcs and flat moving triangles (cells), 0.001..=1.
+    pub tolerance: f64,
+}
+
+impl Settings {
+    /// Half width 3 and a tolerance of 0.02 cell.
+    pub fn new(voxel: f64) -> Self {
+        Self { voxel, half_width: 3.0, tolerance: 0.02 }
+    }
+
+    /// Checks every field.
+    ///
+    /// # Errors
+    /// Names the field and its range.
+    pub fn validate(&self) -> Result<()> {
+        let ranges = [
+            ("cell", self.voxel, 1e-6, 1e3, "m"),
+            ("half width", f64::from(self.half_width), 3.0, 64.0, "cells"),
+            ("tolerance", self.tolerance, 0.001, 1.0, "cells"),
+        ];
+        for (name, value, low, high, unit) in ranges {
+            if !(low..=high).contains(&value) {
+                return Err(Error::argument(format!("{name} = {value} is not within {low} to {high} {unit}")));
+            }
+        }
+        Ok(())
+    }
+}
+
+#[cfg(feature = "vdb")]
+mod grid;
+#[cfg(feature = "vdb")]
+pub use grid::{chain, chain_meshes, fill, voxelise};

@@ -1,1 +1,39 @@
-//! The only door to OpenVDB.
+//! The only door to OpenVDB: float grids, level-set tools and .vdb files.
+//!
+//! Grids own their trees alone; leaves are lent without copying. Index space is world-fixed: voxel
+//! (i, j, k) has its centre at (i, j, k) x voxel size, unless a file brings another transform.
+
+mod bridge;
+pub mod file;
+mod grid;
+mod leaf;
+pub mod level_set;
+pub mod ray;
+
+pub use grid::{FloatGrid, GridClass, MetaValue};
+pub use leaf::{Leaf, LeafMut, Probe};
+
+use crate::context::Context;
+use crate::error::Error;
+
+/// Exception text of the C++ side's `Cancelled`.
+const CANCELLED: &str = "frazil: cancelled";
+
+fn fail(error: cxx::Exception) -> Error {
+    match error.what() {
+        CANCELLED => Error::Cancelled,
+        what => Error::OpenVdb(what.to_string()),
+    }
+}
+
+/// Threads and cancel flag for a call into C++; the flag must outlive the call.
+fn call(ctx: &Context) -> (bridge::ffi::Call, std::sync::Arc<std::sync::atomic::AtomicBool>) {
+    let flag = ctx.cancel_flag();
+    let call = bridge::ffi::Call { threads: ctx.pool().threads() as i32, cancel: flag.as_ptr() as usize };
+    (call, flag)
+}
+
+/// A call on the caller's thread that nobody can cancel.
+fn alone() -> bridge::ffi::Call {
+    bridge::ffi::Call { threads: 1, cancel: 0 }
+}

@@ -1,0 +1,94 @@
+// Our C++ classes and functions as Rust sees them; no OpenVDB header here.
+#pragma once
+
+#include "rust/cxx.h"
+
+#include <array>
+#include <cstdint>
+#include <memory>
+#include <string>
+
+namespace frazil {
+
+struct Impl;
+
+/// A float grid whose tree nobody else shares.
+class Grid {
+public:
+    explicit Grid(std::unique_ptr<Impl> impl);
+    ~Grid();
+    Grid(const Grid&) = delete;
+    Grid& operator=(const Grid&) = delete;
+    std::unique_ptr<Impl> impl;
+};
+
+struct LeafView;
+struct Meta;
+struct GridHeader;
+struct Call;
+struct Triangles;
+struct Hit;
+
+std::unique_ptr<Grid> make_grid(double voxel, float background, bool level_set);
+std::unique_ptr<Grid> copy_grid(const Grid& grid);
+double voxel_size(const Grid& grid) noexcept;
+bool is_uniform(const Grid& grid) noexcept;
+std::array<double, 3> index_to_world(const Grid& grid, std::array<double, 3> index) noexcept;
+std::array<double, 3> world_to_index(const Grid& grid, std::array<double, 3> world) noexcept;
+float background(const Grid& grid) noexcept;
+int32_t grid_class(const Grid& grid) noexcept;
+void set_grid_class(Grid& grid, int32_t grid_class);
+rust::String name(const Grid& grid) noexcept;
+void set_name(Grid& grid, rust::Str name);
+rust::Vec<Meta> metadata(const Grid& grid);
+void set_metadata(Grid& grid, const Meta& meta);
+uint64_t active_voxels(const Grid& grid) noexcept;
+size_t leaf_count(const Grid& grid) noexcept;
+uint64_t memory_bytes(const Grid& grid) noexcept;
+bool active_bbox(const Grid& grid, std::array<int32_t, 3>& low, std::array<int32_t, 3>& high);
+rust::Vec<LeafView> leaves(const Grid& grid);
+rust::Vec<LeafView> probe(const Grid& grid, rust::Slice<const int32_t> origins);
+void replace_blocks(Grid& grid, const Call& call, rust::Slice<const int32_t> origins, rust::Slice<const size_t> values,
+                    rust::Slice<const size_t> masks, rust::Slice<const float> constants);
+float value_at(const Grid& grid, int32_t x, int32_t y, int32_t z) noexcept;
+void sample(const Grid& grid, const Call& call, rust::Slice<const double> world, bool linear, rust::Slice<float> out);
+void prune(Grid& grid, const Call& call, bool level_set, float tolerance);
+void flood_fill(Grid& grid, const Call& call);
+rust::Vec<uint64_t> components(const Grid& grid, const Call& call);
+
+std::unique_ptr<std::string> grids_to_bytes(rust::Slice<const size_t> grids, int32_t compression, bool half,
+                                            const rust::Vec<Meta>& meta);
+rust::Vec<GridHeader> describe_file(rust::Str path);
+std::unique_ptr<Grid> read_float_grid(rust::Str path, rust::Str name);
+
+void csg(Grid& a, Grid& b, const Call& call, int32_t operation);
+std::unique_ptr<Grid> csg_copy(const Grid& a, const Grid& b, const Call& call, int32_t operation);
+
+void offset(Grid& grid, const Call& call, float metres, bool weno);
+void smooth(Grid& grid, const Call& call, int32_t kind, int32_t width, int32_t times, bool weno);
+void renormalise(Grid& grid, const Call& call, bool weno, int32_t times);
+void advect_outward(Grid& grid, const Call& call, const Grid& speed);
+
+std::unique_ptr<Grid> from_mesh(const Call& call, rust::Slice<const float> points, rust::Slice<const uint32_t> indices,
+                                double voxel, float half_width);
+Triangles to_mesh(const Grid& grid, const Call& call, double iso, double adaptivity);
+void measure(const Grid& grid, const Call& call, double& area, double& volume);
+void cast_rays(const Grid& grid, const Call& call, rust::Slice<const double> rays, rust::Slice<Hit> hits);
+
+}  // namespace frazil
+
+namespace rust::behavior {
+
+/// Turns anything thrown into an error text: no exception crosses the bridge.
+template <typename Try, typename Fail>
+void trycatch(Try&& attempt, Fail&& fail) noexcept {
+    try {
+        attempt();
+    } catch (const std::exception& error) {
+        fail(error.what());
+    } catch (...) {
+        fail("an exception of unknown type");
+    }
+}
+
+}  // namespace rust::behavior

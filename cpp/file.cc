@@ -1,0 +1,134 @@
+// Files in OpenVDB's own format.
+#include "impl.h"
+
+#include <openvdb/io/Compression.h>
+#include <openvdb/io/File.h>
+#include <openvdb/io/Stream.h>
+
+#include <sstream>
+
+namespace frazil {
+
+namespace {
+
+Meta to_meta(const std::string& key, const openvdb::Metadata& value) {
+    Meta meta;
+    meta.key = key;
+    meta.kind = value.typeName();
+    meta.text = rust::String::lossy(value.str());
+    meta.number = 0.0;
+    meta.integer = 0;
+    if (const auto* v = dynamic_cast<const openvdb::FloatMetadata*>(&value)) meta.number = v->value();
+    if (const auto* v = dynamic_cast<const openvdb::DoubleMetadata*>(&value)) meta.number = v->value();
+    if (const auto* v = dynamic_cast<const openvdb::Int32Metadata*>(&value)) meta.integer = v->value();
+    if (const auto* v = dynamic_cast<const openvdb::Int64Metadata*>(&value)) meta.integer = v->value();
+    if (const auto* v = dynamic_cast<const openvdb::BoolMetadata*>(&value)) meta.integer = v->value();
+    return meta;
+}
+
+openvdb::Metadata::Ptr from_meta(const Meta& meta) {
+    const std::string kind(meta.kind);
+    if (kind == "float") return std::make_shared<openvdb::FloatMetadata>(static_cast<float>(meta.number));
+    if (kind == "double") return std::make_shared<openvdb::DoubleMetadata>(meta.number);
+    if (kind == "int64") return std::make_shared<openvdb::Int64Metadata>(meta.integer);
+    if (kind == "bool") return std::make_shared<openvdb::BoolMetadata>(meta.integer != 0);
+    return std::make_shared<openvdb::StringMetadata>(std::string(meta.text));
+}
+
+rust::Vec<Meta> list(const openvdb::MetaMap& map) {
+    rust::Vec<Meta> out;
+    for (auto entry = map.beginMeta(); entry != map.endMeta(); ++entry) {
+        if (entry->second) out.push_back(to_meta(entry->first, *entry->second));
+    }
+    return out;
+}
+
+int64_t count_of(const openvdb::GridBase& grid, const char* key) {
+    const auto value = grid.getMetadata<openvdb::Int64Metadata>(key);
+    return value ? value->value() : -1;
+}
+
+/// Opens a file for reading; delayed loading would keep it mapped.
+void open(openvdb::io::File& file) {
+    initialise();
+    file.setCopyMaxBytes(0);
+    file.open(/*delayLoad=*/false);
+}
+
+}  // namespace
+
+rust::Vec<Meta> metadata(const Grid& grid) { return list(*grid.impl->grid); }
+
+void set_metadata(Grid& grid, const Meta& meta) {
+    const std::string key(meta.key);
+    grid.impl->grid->removeMeta(key);
+    grid.impl->grid->insertMeta(key, *from_meta(meta));
+}
+
+std::unique_ptr<std::string> grids_to_bytes(rust::Slice<const size_t> grids, int32_t compression, bool half,
+                                            const rust::Vec<Meta>& meta) {
+    initialise();
+    openvdb::GridCPtrVec list;
+    for (const size_t address : grids) {
+        const auto& source = reinterpret_cast<const Grid*>(address)->impl->grid;
+        // A shallow copy carries its own metadata: statistics and precision stay out of the caller's grid.
+        auto copy = openvdb::FloatGrid::create(*source);
+        copy->setSaveFloatAsHalf(half);
+        list.push_back(copy);
+    }
+    openvdb::MetaMap map;
+    for (const auto& entry : meta) map.insertMeta(std::string(entry.key), *from_meta(entry));
+    constexpr uint32_t schemes[] = {openvdb::io::COMPRESS_NONE, openvdb::io::COMPRESS_ZIP, openvdb::io::COMPRESS_BLOSC};
+    std::ostringstream bytes(std::ios_base::binary);
+    openvdb::io::Stream stream(bytes);
+    stream.setCompression(schemes[compression] | openvdb::io::COMPRESS_ACTIVE_MASK);
+    stream.write(list, map);
+    return std::make_unique<std::string>(bytes.str());
+}
+
+rust::Vec<GridHeader> describe_file(rust::Str path) {
+    openvdb::io::File file{std::string(path)};
+    open(file);
+    rust::Vec<GridHeader> out;
+    const auto grids = file.readAllGridMetadata();
+    for (const auto& grid : *grids) {
+        GridHeader header;
+        header.name = rust::String::lossy(grid->getName());
+        header.value_type = grid->type();
+        header.class_name = openvdb::GridBase::gridClassToString(grid->getGridClass());
+        header.voxel = grid->voxelSize()[0];
+        header.active = count_of(*grid, openvdb::GridBase::META_FILE_VOXEL_COUNT);
+        header.memory = count_of(*grid, openvdb::GridBase::META_FILE_MEM_BYTES);
+        const auto low = grid->getMetadata<openvdb::Vec3IMetadata>(openvdb::GridBase::META_FILE_BBOX_MIN);
+        const auto high = grid->getMetadata<openvdb::Vec3IMetadata>(openvdb::GridBase::META_FILE_BBOX_MAX);
+        for (int axis = 0; axis < 3; ++axis) {
+            header.low[axis] = low ? low->value()[axis] : 0;
+            header.high[axis] = high ? high->value()[axis] : -1;
+        }
+        header.half = grid->saveFloatAsHalf();
+        const auto codec = grid->getMetadata<openvdb::StringMetadata>(openvdb::GridBase::META_FILE_COMPRESSION);
+        header.compression = codec ? codec->value() : std::string();
+        header.meta = list(*grid);
+        out.push_back(std::move(header));
+    }
+    file.close();
+    return out;
+}
+
+std::unique_ptr<Grid> read_float_grid(rust::Str path, rust::Str name) {
+    openvdb::io::File file{std::string(path)};
+    open(file);
+    const auto base = file.readGrid(std::string(name));
+    file.close();
+    auto grid = openvdb::gridPtrCast<openvdb::FloatGrid>(base);
+    if (!grid) throw std::runtime_error("grid \"" + std::string(name) + "\" is of type " + base->type());
+    if (grid->tree().leafCount() > 0 && grid->tree().cbeginLeaf()->buffer().isOutOfCore()) grid->tree().readNonresidentBuffers();
+    for (const char* key : {openvdb::GridBase::META_FILE_BBOX_MIN, openvdb::GridBase::META_FILE_BBOX_MAX,
+                            openvdb::GridBase::META_FILE_COMPRESSION, openvdb::GridBase::META_FILE_MEM_BYTES,
+                            openvdb::GridBase::META_FILE_VOXEL_COUNT, openvdb::GridBase::META_FILE_DELAYED_LOAD}) {
+        grid->removeMeta(key);
+    }
+    return wrap(grid);
+}
+
+}  // namespace frazil

@@ -1,0 +1,42 @@
+//! Meshes in files, by extension: Wavefront .obj, Stanford .ply.
+
+use std::path::Path;
+
+use super::{atomic, obj, ply};
+use crate::base::TriMesh;
+use crate::error::{Error, Result};
+
+/// Reads a mesh; polygons become triangle fans.
+///
+/// # Errors
+/// A missing, empty, cut or malformed file; no faces; vertices that are not finite; indices out of range.
+pub fn read(path: &Path) -> Result<TriMesh> {
+    let bytes = std::fs::read(path).map_err(|error| Error::io(path, "read", error))?;
+    if bytes.is_empty() {
+        return Err(Error::file(path, "the file is empty"));
+    }
+    let mesh = match extension(path).as_str() {
+        "obj" => obj::parse(&bytes),
+        "ply" => ply::parse(&bytes),
+        other => Err(format!("a mesh file must be .obj or .ply, not \".{other}\"")),
+    };
+    let mesh = mesh.map_err(|what| Error::file(path, what))?;
+    mesh.validate().map_err(|error| Error::file(path, error.to_string()))?;
+    Ok(mesh)
+}
+
+/// Writes a mesh, whole or not at all.
+///
+/// # Errors
+/// Another extension than .obj or .ply; what the operating system reports.
+pub fn write(path: &Path, mesh: &TriMesh) -> Result<()> {
+    match extension(path).as_str() {
+        "obj" => atomic::write(path, |out| obj::write(out, mesh)),
+        "ply" => atomic::write(path, |out| ply::write(out, mesh)),
+        _ => Err(Error::file(path, "a mesh file must be .obj or .ply")),
+    }
+}
+
+fn extension(path: &Path) -> String {
+    path.extension().and_then(|text| text.to_str()).unwrap_or("").to_lowercase()
+}

@@ -1,0 +1,63 @@
+//! Wavefront OBJ: positions and faces; everything else is passed over.
+
+use std::io::Write;
+
+use crate::base::{TriMesh, Vec3};
+
+/// Reads positions and faces, polygons as fans.
+pub(super) fn parse(bytes: &[u8]) -> Result<TriMesh, String> {
+    check_numbers(bytes)?;
+    let options = tobj::LoadOptions { triangulate: true, ignore_points: true, ignore_lines: true, ..Default::default() };
+    let mut reader = std::io::BufReader::new(bytes);
+    let no_materials = |_: &std::path::Path| Ok((Vec::new(), Default::default()));
+    let (models, _) = tobj::load_obj_buf(&mut reader, &options, no_materials)
+        .map_err(|error| format!("the .obj file cannot be read ({error})"))?;
+    let mut mesh = TriMesh::default();
+    for model in models {
+        mesh.append(&TriMesh {
+            positions: model.mesh.positions.chunks_exact(3).map(|p| Vec3::new(p[0], p[1], p[2])).collect(),
+            triangles: model.mesh.indices.chunks_exact(3).map(|t| [t[0], t[1], t[2]]).collect(),
+        });
+    }
+    Ok(mesh)
+}
+
+/// Finds what tobj would pass over or report without a line: bad numbers, vertices out of range.
+fn check_numbers(bytes: &[u8]) -> Result<(), String> {
+    let text = std::str::from_utf8(bytes).map_err(|_| "the .obj file is not text".to_string())?;
+    let mut vertices = 0i64;
+    for (number, line) in text.lines().enumerate() {
+        let mut words = line.split_whitespace();
+        match words.next() {
+            Some("v") => {
+                vertices += 1;
+                let values: Vec<Option<f32>> = words.take(3).map(|word| word.parse().ok()).collect();
+                if values.len() < 3 || values.iter().any(|value| !value.is_some_and(f32::is_finite)) {
+                    return Err(format!("line {}: the vertex is not three finite numbers", number + 1));
+                }
+            }
+            Some("f") => {
+                for word in words.take_while(|word| !word.starts_with('#')) {
+                    let index: Option<i64> = word.split('/').next().and_then(|index| index.parse().ok());
+                    let known = index.is_some_and(|i| (1..=vertices).contains(&i) || (-vertices..=-1).contains(&i));
+                    if !known {
+                        return Err(format!("line {}: the face names vertex {word}, but there are {vertices} before it", number + 1));
+                    }
+                }
+            }
+            _ => {}
+        }
+    }
+    Ok(())
+}
+
+/// Writes positions and triangles.
+pub(super) fn write(out: &mut dyn Write, mesh: &TriMesh) -> std::io::Result<()> {
+    for p in &mesh.positions {
+        writeln!(out, "v {} {} {}", p.x, p.y, p.z)?;
+    }
+    for [a, b, c] in &mesh.triangles {
+        writeln!(out, "f {} {} {}", a + 1, b + 1, c + 1)?;
+    }
+    Ok(())
+}

@@ -1,0 +1,240 @@
+//! Stanford PLY: ascii and binary of both byte orders; faces as lists or as triangle strips.
+
+use std::io::Write;
+
+use crate::base::{TriMesh, Vec3};
+
+#[derive(Clone, Copy, PartialEq)]
+enum Format {
+    Ascii,
+    Little,
+    Big,
+}
+
+#[derive(Clone, Copy, PartialEq)]
+enum Kind {
+    Int(usize),
+    Unsigned(usize),
+    Float(usize),
+}
+
+struct Property {
+    name: String,
+    kind: Kind,
+    /// Kind of the count, for a list.
+    list: Option<Kind>,
+}
+
+struct Element {
+    name: String,
+    count: usize,
+    properties: Vec<Property>,
+}
+
+/// Reads the vertices and faces of a PLY file.
+pub(super) fn parse(bytes: &[u8]) -> Result<TriMesh, String> {
+    let end = find(bytes, b"end_header").ok_or("not a .ply file, or its header is cut short")?;
+    let body = end + bytes[end..].iter().position(|&byte| byte == b'\n').ok_or("the .ply header is cut short")? + 1;
+    let header = std::str::from_utf8(&bytes[..end]).map_err(|_| "the .ply header is not text")?;
+    let (format, elements) = parse_header(header)?;
+    let mut reader = Reader { format, bytes: &bytes[body..], at: 0 };
+    let mut mesh = TriMesh::default();
+    for element in &elements {
+        for row in 0..element.count {
+            let cut = || format!("the .ply file ends in {} {} of {}", element.name, row + 1, element.count);
+            read_row(&mut reader, element, &mut mesh).ok_or_else(cut)?;
+        }
+    }
+    Ok(mesh)
+}
+
+fn find(bytes: &[u8], needle: &[u8]) -> Option<usize> {
+    bytes.windows(needle.len()).position(|window| window == needle)
+}
+
+fn parse_header(header: &str) -> Result<(Format, Vec<Element>), String> {
+    let mut lines = header.lines();
+    if lines.next().map(str::trim) != Some("ply") {
+        return Err("not a .ply file".into());
+    }
+    let mut format = None;
+    let mut elements: Vec<Element> = Vec::new();
+    for (number, line) in lines.enumerate() {
+        let words: Vec<&str> = line.split_whitespace().collect();
+        let wrong = || format!("line {}: \"{}\" is no line of a .ply header", number + 2, line.trim());
+        match words.as_slice() {
+            ["format", "ascii", _] => format = Some(Format::Ascii),
+            ["format", "binary_little_endian", _] => format = Some(Format::Little),
+            ["format", "binary_big_endian", _] => format = Some(Format::Big),
+            ["element", name, count] => {
+                let count = count.parse().map_err(|_| wrong())?;
+                elements.push(Element { name: name.to_string(), count, properties: Vec::new() });
+            }
+            ["property", "list", count, kind, name] => {
+                let (list, kind) = (Some(kind_of(count).ok_or_else(wrong)?), kind_of(kind).ok_or_else(wrong)?);
+                let element = elements.last_mut().ok_or_else(wrong)?;
+                element.properties.push(Property { name: name.to_string(), kind, list });
+            }
+            ["property", kind, name] => {
+                let kind = kind_of(kind).ok_or_else(wrong)?;
+                let element = elements.last_mut().ok_or_else(wrong)?;
+                element.properties.push(Property { name: name.to_string(), kind, list: None });
+            }
+            [] | ["comment" | "obj_info", ..] => {}
+            _ => return Err(wrong()),
+        }
+    }
+    Ok((format.ok_or("the .ply header names no format")?, elements))
+}
+
+fn kind_of(name: &str) -> Option<Kind> {
+    Some(match name {
+        "char" | "int8" => Kind::Int(1),
+        "short" | "int16" => Kind::Int(2),
+        "int" | "int32" => Kind::Int(4),
+        "uchar" | "uint8" => Kind::Unsigned(1),
+        "ushort" | "uint16" => Kind::Unsigned(2),
+        "uint" | "uint32" => Kind::Unsigned(4),
+        "float" | "float32" => Kind::Float(4),
+        "double" | "float64" => Kind::Float(8),
+        _ => return None,
+    })
+}
+
+struct Reader<'a> {
+    format: Format,
+    bytes: &'a [u8],
+    at: usize,
+}
+
+impl Reader<'_> {
+    fn number(&mut self, kind: Kind) -> Option<f64> {
+        if self.format == Format::Ascii {
+            let rest = &self.bytes[self.at..];
+            let start = rest.iter().position(|byte| !byte.is_ascii_whitespace())?;
+            let length = rest[start..].iter().position(u8::is_ascii_whitespace).unwrap_or(rest.len() - start);
+            self.at += start + length;
+            return std::str::from_utf8(&rest[start..start + length]).ok()?.parse().ok();
+        }
+        let (Kind::Int(size) | Kind::Unsigned(size) | Kind::Float(size)) = kind;
+        let raw = self.bytes.get(self.at..self.at + size)?;
+        self.at += size;
+        let mut wide = [0u8; 8];
+        wide[..size].copy_from_slice(raw);
+        if self.format == Format::Big {
+            wide[..size].reverse();
+        }
+        let bits = u64::from_le_bytes(wide);
+        let unused = 64 - 8 * size as u32;
+        Some(match kind {
+            Kind::Unsigned(_) => bits as f64,
+            Kind::Int(_) => ((bits << unused) as i64 >> unused) as f64,
+            Kind::Float(4) => f64::from(f32::from_bits(bits as u32)),
+            Kind::Float(_) => f64::from_bits(bits),
+        })
+    }
+}
+
+/// Reads one row of an element; none when the file ends in it.
+fn read_row(reader: &mut Reader<'_>, element: &Element, mesh: &mut TriMesh) -> Option<()> {
+    let mut position = [0.0f64; 3];
+    for property in &element.properties {
+        match property.list {
+            None => {
+                let value = reader.number(property.kind)?;
+                if let Some(axis) = ["x", "y", "z"].iter().position(|axis| *axis == property.name) {
+                    position[axis] = value;
+                }
+            }
+            Some(count) => {
+                let count = reader.number(count)?;
+                // A damaged count must not ask for memory beyond the file.
+                if !(0.0..=reader.bytes.len() as f64).contains(&count) {
+                    return None;
+                }
+                let values = (0..count as usize).map(|_| reader.number(property.kind)).collect::<Option<Vec<f64>>>()?;
+                match (element.name.as_str(), property.name.as_str()) {
+                    ("face", "vertex_indices" | "vertex_index") => add_polygon(&values, mesh),
+                    ("tristrips", _) => add_strips(&values, mesh),
+                    _ => {}
+                }
+            }
+        }
+    }
+    if element.name == "vertex" {
+        mesh.positions.push(Vec3::from(position.map(|value| value as f32)));
+    }
+    Some(())
+}
+
+/// Indices that are no whole number from 0 become one that validation refuses.
+fn index(value: f64) -> u32 {
+    if (0.0..f64::from(u32::MAX)).contains(&value) { value as u32 } else { u32::MAX }
+}
+
+fn add_polygon(values: &[f64], mesh: &mut TriMesh) {
+    for pair in values.windows(2).skip(1) {
+        mesh.triangles.push([index(values[0]), index(pair[0]), index(pair[1])]);
+    }
+}
+
+/// Strips end at -1; every other triangle is turned round.
+fn add_strips(values: &[f64], mesh: &mut TriMesh) {
+    for strip in values.split(|&value| value < 0.0) {
+        for (number, three) in strip.windows(3).enumerate() {
+            let [a, b, c] = [index(three[0]), index(three[1]), index(three[2])];
+            mesh.triangles.push(if number % 2 == 0 { [a, b, c] } else { [b, a, c] });
+        }
+    }
+}
+
+/// Writes binary little-endian PLY.
+pub(super) fn write(out: &mut dyn Write, mesh: &TriMesh) -> std::io::Result<()> {
+    write!(
+        out,
+        "ply\nformat binary_little_endian 1.0\ncomment frazil\nelement vertex {}\nproperty float x\nproperty float y\n\
+         property float z\nelement face {}\nproperty list uchar uint vertex_indices\nend_header\n",
+        mesh.positions.len(),
+        mesh.triangles.len()
+    )?;
+    for p in &mesh.positions {
+        for value in p {
+            out.write_all(&value.to_le_bytes())?;
+        }
+    }
+    for triangle in &mesh.triangles {
+        out.write_all(&[3])?;
+        for index in triangle {
+            out.write_all(&index.to_le_bytes())?;
+        }
+    }
+    Ok(())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_is_written_is_read_and_a_cut_file_is_refused() {
+        let mesh = TriMesh {
+            positions: vec![Vec3::new(0.1, -2.5, 1e-7), Vec3::x(), Vec3::y()],
+            triangles: vec![[0, 1, 2], [2, 1, 0]],
+        };
+        let mut bytes = Vec::new();
+        write(&mut bytes, &mesh).unwrap();
+        assert_eq!(parse(&bytes).unwrap(), mesh);
+        for length in 0..bytes.len() {
+            assert!(parse(&bytes[..length]).is_err(), "{length} of {} bytes were accepted", bytes.len());
+        }
+    }
+
+    #[test]
+    fn ascii_polygons_and_strips_become_triangles() {
+        let text = "ply\nformat ascii 1.0\nelement vertex 4\nproperty float x\nproperty float y\nproperty float z\n\
+                    element face 1\nproperty list uchar int vertex_indices\nelement tristrips 1\n\
+                    property list int int vertex_indices\nend_header\n0 0 0\n1 0 0\n1 1 0\n0 1 0\n4 0 1 2 3\n5 0 1 2 3 -1\n";
+        let mesh = parse(text.as_bytes()).unwrap();
+        assert_eq!(mesh.triangles, [[0, 1, 2], [0, 2, 3], [0, 1, 2], [2, 1, 3]]);
+    }
+}

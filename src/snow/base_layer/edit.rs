@@ -1,0 +1,117 @@
+//! Pressing a sweep into the snow, block by block: snow = max(snow, -sweep), removed = max(snow, sweep).
+//!
+//! The intersection is taken before the subtraction: base(t) minus base(t + dt) would leave a ghost
+//! surface of no thickness wherever nothing moved.
+
+use super::columns::{CELLS, cell_of, filled};
+use crate::base::blocks::{Block, BlockEdit, Mask, Origin, VOXELS, Values};
+use crate::sweep::Piece;
+use crate::vdb::Probe;
+
+/// What one block of the snow becomes.
+pub struct Edit {
+    /// The snow.
+    pub surface: BlockEdit,
+    /// What was removed from it.
+    pub removed: Option<BlockEdit>,
+    /// Voxels whose value changed.
+    pub changed: Mask,
+    /// Removed height (cells) in each column of the block.
+    pub heights: [f32; CELLS],
+}
+
+impl Edit {
+    /// Snow removed from the block (cells^3), summed in a fixed order.
+    pub fn volume(&self) -> f64 {
+        self.heights.iter().map(|&height| f64::from(height)).sum()
+    }
+}
+
+/// Lattice of the snow.
+#[derive(Debug, Clone, Copy)]
+pub struct Scale {
+    /// Cell (m).
+    pub cell: f32,
+    /// Background of the level set (m): half width x cell.
+    pub background: f32,
+}
+
+/// Whether a block has snow that a sweep could remove.
+pub fn has_snow(probe: &Probe<'_>) -> bool {
+    match probe {
+        Probe::Leaf(_) => true,
+        Probe::Tile { value, .. } => *value < 0.0,
+    }
+}
+
+/// Subtracts a piece of the sweep from what the snow holds there; none when nothing changes.
+pub fn subtract(piece: &Piece, snow: &Probe<'_>, scale: Scale) -> Option<Edit> {
+    let tile;
+    let (before, mask) = match snow {
+        Probe::Leaf(leaf) => (leaf.values, *leaf.mask),
+        Probe::Tile { value, .. } => {
+            tile = [*value; VOXELS];
+            (&tile, [0; 8])
+        }
+    };
+    match piece {
+        Piece::Inside(origin) => Some(remove_all(*origin, before, mask, snow, scale)),
+        Piece::Near(origin, cells) => remove_part(*origin, before, cells, scale),
+    }
+}
+
+fn remove_all(origin: Origin, before: &Values, mask: Mask, snow: &Probe<'_>, scale: Scale) -> Edit {
+    let removed = match snow {
+        Probe::Leaf(_) => BlockEdit::Dense(Block { origin, values: Box::new(*before), mask }),
+        Probe::Tile { .. } => BlockEdit::Constant(origin, -scale.background),
+    };
+    let mut heights = [0.0; CELLS];
+    (0..VOXELS).for_each(|index| heights[cell_of(index)] += filled(before[index], scale.cell));
+    Edit {
+        surface: BlockEdit::Constant(origin, scale.background),
+        removed: Some(removed),
+        changed: [u64::MAX; 8],
+        heights,
+    }
+}
+
+fn remove_part(origin: Origin, before: &Values, cells: &Values, scale: Scale) -> Option<Edit> {
+    let mut after = Box::new([0.0; VOXELS]);
+    let mut removed = Box::new([0.0; VOXELS]);
+    let mut changed: Mask = [0; 8];
+    let mut heights = [0.0; CELLS];
+    for index in 0..VOXELS {
+        let (snow, sweep) = (before[index], cells[index] * scale.cell);
+        let left = if -sweep > snow { (-sweep).min(scale.background) } else { snow };
+        let taken = if sweep > snow { sweep } else { snow };
+        after[index] = left;
+        removed[index] = taken.clamp(-scale.background, scale.background);
+        changed[index >> 6] |= u64::from(left != snow) << (index & 63);
+        heights[cell_of(index)] += filled(snow, scale.cell) - filled(left, scale.cell);
+    }
+    if changed == [0; 8] {
+        return None;
+    }
+    let removed = pack(origin, removed, scale);
+    let outside = matches!(removed, BlockEdit::Constant(_, value) if value > 0.0);
+    Some(Edit { surface: pack(origin, after, scale), removed: (!outside).then_some(removed), changed, heights })
+}
+
+/// A leaf, or a constant where no value lies within the band.
+fn pack(origin: Origin, values: Box<Values>, scale: Scale) -> BlockEdit {
+    let mask = band_mask(&values, scale.background);
+    let uniform = values.iter().all(|value| (*value > 0.0) == (values[0] > 0.0));
+    if mask == [0; 8] && uniform {
+        return BlockEdit::Constant(origin, if values[0] > 0.0 { scale.background } else { -scale.background });
+    }
+    BlockEdit::Dense(Block { origin, values, mask })
+}
+
+/// Voxels within the narrow band.
+fn band_mask(values: &Values, background: f32) -> Mask {
+    let mut mask = [0; 8];
+    for (index, value) in values.iter().enumerate() {
+        mask[index >> 6] |= u64::from(value.abs() < background) << (index & 63);
+    }
+    mask
+}

@@ -1,0 +1,321 @@
+//! The base layer: snow that nothing has moved yet, a level set that objects press into (thesis section 3.2).
+//!
+//! A step costs what moves: only blocks that hold snow and lie near the swept volume are looked at.
+
+mod columns;
+mod edit;
+pub mod initial;
+mod noise;
+
+use std::collections::{BTreeMap, BTreeSet, HashMap};
+
+use rayon::prelude::*;
+
+pub use noise::NoiseParams;
+
+use crate::base::DVec3;
+use crate::base::blocks::{Block, BlockEdit, Mask, Origin, VOXELS};
+use crate::context::{Context, StageTime};
+use crate::error::{Error, Result};
+use crate::sweep::{Band, Body, Face, Lattice, Piece, Scratch, Settings, UNITS, Voxeliser, Window};
+use crate::vdb::{FloatGrid, GridClass, Probe, level_set};
+use columns::{Column, Columns};
+use edit::{Edit, Scale};
+use noise::Displacement;
+
+/// How objects press into the snow.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Params {
+    /// Ragged edges; none leaves exact imprints.
+    pub noise: Option<NoiseParams>,
+    /// Largest error of the swept volume (cells), 0.001..=1.
+    pub tolerance: f64,
+}
+
+impl Params {
+    /// The thesis' look: noise of two cells.
+    pub fn for_cell(cell: f64) -> Self {
+        Self { noise: Some(NoiseParams::for_cell(cell)), tolerance: 0.02 }
+    }
+}
+
+/// What a step did.
+#[derive(Debug, Clone, PartialEq)]
+pub struct StepReport {
+    /// Snow removed in this step (m3).
+    pub removed_volume: f64,
+    /// Snow left (m3).
+    pub base_volume: f64,
+    /// Blocks of 8^3 voxels that changed.
+    pub touched_blocks: usize,
+    /// Triangles of the swept volume's boundary near the snow.
+    pub sweep_faces: usize,
+    /// Wall-clock time of each stage.
+    pub stages: Vec<StageTime>,
+}
+
+/// A layer of snow and what has happened to it.
+pub struct BaseLayer {
+    params: Params,
+    surface: FloatGrid,
+    removed: FloatGrid,
+    compression: FloatGrid,
+    touched: FloatGrid,
+    columns: Columns,
+    volume: f64,
+    /// Voxels that snow can be in.
+    low: [i32; 3],
+    high: [i32; 3],
+    half_width: f32,
+}
+
+impl BaseLayer {
+    /// A layer whose snow is the inside of a level set.
+    ///
+    /// # Errors
+    /// When `surface` is no level set, holds nothing or is not world-fixed, or a parameter is out of range.
+    pub fn new(ctx: &Context, mut surface: FloatGrid, params: Params) -> Result<Self> {
+        let cell = surface.voxel_size();
+        if surface.class() != GridClass::LevelSet {
+            return Err(Error::argument("the snow is not a level set"));
+        }
+        if !surface.is_world_fixed() {
+            return Err(Error::argument("the snow's grid is rotated or shifted against the world's axes"));
+        }
+        let half_width = (f64::from(surface.background()) / cell) as f32;
+        Settings { voxel: cell, half_width: half_width.round(), tolerance: params.tolerance }.validate()?;
+        if let Some(noise) = &params.noise {
+            noise.validate(cell)?;
+        }
+        let (low, high) = surface.active_bbox().ok_or_else(|| Error::argument("the snow is empty"))?;
+        surface.set_name("surface")?;
+        let volume = level_set::measure(ctx, &surface)?.volume;
+        let plain = |name: &str| -> Result<FloatGrid> {
+            let mut grid = FloatGrid::new(cell, 0.0)?;
+            grid.set_name(name)?;
+            Ok(grid)
+        };
+        let removed = empty_removed(cell, half_width)?;
+        let (compression, touched) = (plain("compression")?, plain("touched")?);
+        let columns = HashMap::new();
+        Ok(Self { params, surface, removed, compression, touched, columns, volume, low, high, half_width })
+    }
+
+    /// The snow (level set).
+    pub fn surface(&self) -> &FloatGrid {
+        &self.surface
+    }
+
+    /// What the last step removed (level set).
+    pub fn removed(&self) -> &FloatGrid {
+        &self.removed
+    }
+
+    /// Part of its column's height that was removed, at touched surface voxels, 0..=1.
+    pub fn compression(&self) -> &FloatGrid {
+        &self.compression
+    }
+
+    /// Frame of the last change, at touched surface voxels.
+    pub fn touched(&self) -> &FloatGrid {
+        &self.touched
+    }
+
+    /// Snow (m3).
+    pub fn volume(&self) -> f64 {
+        self.volume
+    }
+
+    /// Removes what bodies sweep from `from` to `to` (s), or their pose where the two are equal.
+    /// A step that fails or is cancelled leaves the layer as it was.
+    ///
+    /// # Errors
+    /// A pose that cannot be had, a body too far away, cancel, memory.
+    pub fn step(&mut self, ctx: &Context, bodies: &[Body], from: f64, to: f64, frame: i32) -> Result<StepReport> {
+        ctx.take_timings();
+        let displacement = self.params.noise.map(|noise| Displacement::new(&noise, self.surface.voxel_size()));
+        let voxeliser = ctx.stage("sweep", || self.sweep(bodies, from, to, displacement.as_ref()))?;
+        let mut pieces = ctx.stage("distance", || self.pieces(ctx, &voxeliser))?;
+        if let Some(displacement) = &displacement {
+            ctx.stage("noise", || {
+                displacement.apply(&mut pieces, self.half_width);
+                Ok(())
+            })?;
+        }
+        let edits = ctx.stage("subtract", || self.edits(&pieces))?;
+        let change = ctx.stage("columns", || self.change(ctx, edits, frame))?;
+        let (removed_volume, touched_blocks) = (change.volume, change.surface.len());
+        self.commit(ctx, change)?;
+        Ok(StepReport {
+            removed_volume,
+            base_volume: self.volume,
+            touched_blocks,
+            sweep_faces: voxeliser.face_count(),
+            stages: ctx.take_timings(),
+        })
+    }
+
+    fn scale(&self) -> Scale {
+        Scale { cell: self.surface.voxel_size() as f32, background: self.surface.background() }
+    }
+
+    /// The swept volume's boundary near the snow, sorted into blocks.
+    fn sweep(&self, bodies: &[Body], from: f64, to: f64, noise: Option<&Displacement>) -> Result<Voxeliser> {
+        let cell = self.surface.voxel_size();
+        let middle = [0, 1, 2].map(|a| (f64::from(self.low[a]) + f64::from(self.high[a])) * 0.5 * cell);
+        let lattice = Lattice::near(cell, DVec3::from(middle))?;
+        let outside = self.half_width + noise.map_or(0.0, |noise| noise.amplitude);
+        let margin = outside.ceil() as i32 + 1;
+        let relative = |voxel: [i32; 3], grow: i32| [0, 1, 2].map(|a| voxel[a] - lattice.base[a] + grow);
+        let fixed = |voxel: [i32; 3]| voxel.map(|cells| cells.saturating_mul(UNITS));
+        let window =
+            Window { min: fixed(relative(self.low, -margin)), max: fixed(relative(self.high, margin)) };
+        let parts: Vec<Vec<Face>> = bodies
+            .iter()
+            .map(|body| body.chain(from, to, &lattice, self.params.tolerance, &window))
+            .collect::<Result<_>>()?;
+        let band = Band { inside: self.half_width, outside };
+        Voxeliser::new(parts.concat(), lattice, band, relative(self.low, 0), relative(self.high, 0))
+    }
+
+    /// Distances in the blocks that hold snow.
+    fn pieces(&self, ctx: &Context, voxeliser: &Voxeliser) -> Result<Vec<Piece>> {
+        let snowy = |origins: &[Origin]| -> Result<Vec<bool>> {
+            Ok(self.surface.probe(origins)?.iter().map(edit::has_snow).collect())
+        };
+        let near = snowy(&voxeliser.near_blocks())?;
+        let wanted: Vec<usize> = (0..near.len()).filter(|&index| near[index]).collect();
+        let mut pieces: Vec<Piece> = wanted
+            .par_iter()
+            .map_init(Scratch::default, |scratch, &index| {
+                if ctx.is_cancelled() { None } else { voxeliser.piece(index, scratch) }
+            })
+            .flatten_iter()
+            .collect();
+        ctx.check()?;
+        let inside = voxeliser.inside_blocks();
+        let snowy = snowy(&inside)?;
+        pieces.extend(inside.into_iter().zip(snowy).filter(|(_, snowy)| *snowy).map(|(at, _)| Piece::Inside(at)));
+        Ok(pieces)
+    }
+
+    fn edits(&self, pieces: &[Piece]) -> Result<Vec<Edit>> {
+        let origins: Vec<Origin> = pieces.iter().map(Piece::origin).collect();
+        let snow: Vec<Probe<'_>> = self.surface.probe(&origins)?;
+        let scale = self.scale();
+        Ok(pieces.par_iter().zip(&snow).filter_map(|(piece, snow)| edit::subtract(piece, snow, scale)).collect())
+    }
+
+    /// Everything that the commit puts in place.
+    fn change(&self, ctx: &Context, edits: Vec<Edit>, frame: i32) -> Result<Change> {
+        let cell = self.surface.voxel_size();
+        let mut removed = empty_removed(cell, self.half_width)?;
+        let volume = edits.iter().map(Edit::volume).sum::<f64>() * cell.powi(3);
+        let columns = self.updated_columns(&edits)?;
+        let touched = self.touched_edits(&edits, frame)?;
+        let compression = self.compression_edits(&columns, &edits, &touched)?;
+        let (surface, taken): (Vec<BlockEdit>, Vec<Option<BlockEdit>>) =
+            edits.into_iter().map(|edit| (edit.surface, edit.removed)).unzip();
+        removed.replace_blocks(ctx, &taken.into_iter().flatten().collect::<Vec<_>>())?;
+        Ok(Change { surface, touched, compression, removed, columns, volume })
+    }
+
+    /// The column blocks that the edits touch, with what they remove.
+    fn updated_columns(&self, edits: &[Edit]) -> Result<BTreeMap<[i32; 2], Column>> {
+        let mut columns = BTreeMap::new();
+        for edit in edits {
+            let [x, y, z] = edit.surface.origin();
+            let column: &mut Column = match columns.entry([x, z]) {
+                std::collections::btree_map::Entry::Occupied(entry) => entry.into_mut(),
+                std::collections::btree_map::Entry::Vacant(entry) => entry.insert(match self.columns.get(&[x, z]) {
+                    Some(column) => column.clone(),
+                    None => Column {
+                        original: columns::heights(&self.surface, [x, z], self.low[1], self.high[1])?,
+                        removed: [0.0; columns::CELLS],
+                        blocks: BTreeSet::new(),
+                    },
+                }),
+            };
+            column.blocks.insert(y);
+            column.removed.iter_mut().zip(edit.heights).for_each(|(removed, height)| *removed += height);
+        }
+        Ok(columns)
+    }
+
+    /// Frame numbers at the surface voxels of the changed blocks.
+    fn touched_edits(&self, edits: &[Edit], frame: i32) -> Result<Vec<BlockEdit>> {
+        let origins: Vec<Origin> = edits.iter().map(|edit| edit.surface.origin()).collect();
+        let before = self.touched.probe(&origins)?;
+        let edit_one = |(edit, before): (&Edit, &Probe<'_>)| {
+            let BlockEdit::Dense(surface) = &edit.surface else {
+                return BlockEdit::Constant(edit.surface.origin(), 0.0);
+            };
+            let (mut values, known) = match before {
+                Probe::Leaf(leaf) => (Box::new(*leaf.values), *leaf.mask),
+                Probe::Tile { .. } => (Box::new([0.0; VOXELS]), [0; 8]),
+            };
+            for index in (0..VOXELS).filter(|&index| edit.changed[index >> 6] >> (index & 63) & 1 == 1) {
+                values[index] = frame as f32;
+            }
+            let mask: Mask = std::array::from_fn(|x| surface.mask[x] & (known[x] | edit.changed[x]));
+            BlockEdit::Dense(Block { origin: surface.origin, values, mask })
+        };
+        Ok(edits.par_iter().zip(&before).map(edit_one).collect())
+    }
+
+    /// Compression at every touched surface voxel of the columns that changed.
+    fn compression_edits(
+        &self,
+        columns: &BTreeMap<[i32; 2], Column>,
+        edits: &[Edit],
+        touched: &[BlockEdit],
+    ) -> Result<Vec<BlockEdit>> {
+        let fresh: HashMap<Origin, &BlockEdit> =
+            edits.iter().map(|edit| edit.surface.origin()).zip(touched).collect();
+        let mut out = Vec::new();
+        for (&[x, z], column) in columns {
+            let origins: Vec<Origin> = column.blocks.iter().map(|&y| [x, y, z]).collect();
+            for (origin, before) in origins.iter().zip(self.touched.probe(&origins)?) {
+                let mask = match (fresh.get(origin), before) {
+                    (Some(BlockEdit::Dense(block)), _) => block.mask,
+                    (Some(BlockEdit::Constant(..)), _) | (None, Probe::Tile { .. }) => [0; 8],
+                    (None, Probe::Leaf(leaf)) => *leaf.mask,
+                };
+                if mask == [0; 8] {
+                    out.push(BlockEdit::Constant(*origin, 0.0));
+                    continue;
+                }
+                let values = Box::new(std::array::from_fn(|index| column.compression(columns::cell_of(index))));
+                out.push(BlockEdit::Dense(Block { origin: *origin, values, mask }));
+            }
+        }
+        Ok(out)
+    }
+
+    /// Puts a change in place.
+    fn commit(&mut self, ctx: &Context, change: Change) -> Result<()> {
+        self.surface.replace_blocks(ctx, &change.surface)?;
+        self.touched.replace_blocks(ctx, &change.touched)?;
+        self.compression.replace_blocks(ctx, &change.compression)?;
+        self.removed = change.removed;
+        self.columns.extend(change.columns);
+        self.volume -= change.volume;
+        Ok(())
+    }
+}
+
+/// A step's results before they are put in place.
+struct Change {
+    surface: Vec<BlockEdit>,
+    touched: Vec<BlockEdit>,
+    compression: Vec<BlockEdit>,
+    removed: FloatGrid,
+    columns: BTreeMap<[i32; 2], Column>,
+    volume: f64,
+}
+
+fn empty_removed(cell: f64, half_width: f32) -> Result<FloatGrid> {
+    let mut removed = FloatGrid::level_set(cell, half_width)?;
+    removed.set_name("removed")?;
+    Ok(removed)
+}

@@ -1,0 +1,217 @@
+//! Ragged edges: the swept volume is displaced outward by noise that is fixed in world space
+//! (thesis section 3.2: v = grad phi / |grad phi| max(noise, 0)).
+//!
+//! In place of an advection: phi -= max(noise, 0) in the band. Along a normal phi rises with slope 1, so
+//! as long as the noise is less steep, whatever it removes hangs together with the sweep: no islands.
+
+use std::collections::HashMap;
+
+use fastnoise_lite::{FastNoiseLite, FractalType, NoiseType};
+use rayon::prelude::*;
+
+use crate::base::blocks::{Origin, Values, offset};
+use crate::error::{Error, Result};
+use crate::sweep::Piece;
+
+/// Irregularity of an imprint's surface.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct NoiseParams {
+    /// Greatest outward displacement (m). 0 switches the noise off.
+    pub amplitude: f64,
+    /// Size of the largest clumps (m).
+    pub size: f64,
+    /// Octaves, each of half the size and half the strength, 1..=8.
+    pub octaves: u32,
+    /// Seed of the pattern.
+    pub seed: i32,
+}
+
+/// Steepest slope of one octave of unit size and strength (a test samples it).
+const STEEPEST: f64 = 2.3;
+
+impl NoiseParams {
+    /// Two cells of amplitude, clumps of eight cells, three octaves.
+    pub fn for_cell(cell: f64) -> Self {
+        Self { amplitude: 2.0 * cell, size: 8.0 * cell, octaves: 3, seed: 0 }
+    }
+
+    /// Checks every field for a given cell size (m).
+    ///
+    /// # Errors
+    /// Names the field and its range; refuses noise so steep that it would leave islands.
+    pub fn validate(&self, cell: f64) -> Result<()> {
+        if !(0.0..=32.0 * cell).contains(&self.amplitude) {
+            return Err(Error::argument(format!(
+                "noise amplitude = {} m is not within 0 to {} m (32 cells)",
+                self.amplitude,
+                32.0 * cell
+            )));
+        }
+        if !(self.size >= 2.0 * cell && self.size.is_finite()) {
+            return Err(Error::argument(format!(
+                "noise size = {} m is below {} m (two cells)",
+                self.size,
+                2.0 * cell
+            )));
+        }
+        if !(1..=8).contains(&self.octaves) {
+            return Err(Error::argument(format!("noise octaves = {} is not within 1 to 8", self.octaves)));
+        }
+        let slope = self.slope();
+        if slope >= 1.0 {
+            return Err(Error::argument(format!(
+                "noise amplitude = {} m is too steep for size = {} m and would leave islands: at most {:.4} m",
+                self.amplitude,
+                self.size,
+                self.amplitude / slope
+            )));
+        }
+        Ok(())
+    }
+
+    /// Upper bound of the displacement's slope: each octave adds the same, of a sum scaled to 1.
+    fn slope(&self) -> f64 {
+        let octaves = f64::from(self.octaves);
+        let strengths = 2.0 - 2.0 * 0.5f64.powi(self.octaves as i32);
+        STEEPEST * octaves / strengths * self.amplitude / self.size
+    }
+}
+
+/// The displacement field of a layer.
+pub struct Displacement {
+    noise: FastNoiseLite,
+    /// Greatest displacement (cells).
+    pub amplitude: f32,
+    cell: f64,
+}
+
+impl Displacement {
+    /// A field for parameters that were validated.
+    pub fn new(params: &NoiseParams, cell: f64) -> Self {
+        let mut noise = FastNoiseLite::with_seed(params.seed);
+        noise.set_noise_type(Some(NoiseType::Perlin));
+        noise.set_fractal_type(if params.octaves > 1 { Some(FractalType::FBm) } else { None });
+        noise.set_fractal_octaves(Some(params.octaves as i32));
+        noise.set_frequency(Some((1.0 / params.size) as f32));
+        Self { noise, amplitude: (params.amplitude / cell) as f32, cell }
+    }
+
+    /// Outward displacement (cells) at a voxel, 0..=amplitude.
+    fn at(&self, voxel: [i32; 3]) -> f32 {
+        let [x, y, z] = voxel.map(|index| (f64::from(index) * self.cell) as f32);
+        self.amplitude * self.noise.get_noise_3d(x, y, z).clamp(0.0, 1.0)
+    }
+
+    /// Displaces pieces outward, then scales their values back to distances (first order).
+    pub fn apply(&self, pieces: &mut [Piece], half_width: f32) {
+        if self.amplitude == 0.0 {
+            return;
+        }
+        let reach = half_width + self.amplitude;
+        pieces.par_iter_mut().for_each(|piece| {
+            let Piece::Near(origin, values) = piece else { return };
+            for (index, value) in values.iter_mut().enumerate() {
+                if *value > -half_width && *value < reach {
+                    let at = [index >> 6, index >> 3 & 7, index & 7];
+                    *value -= self.at([0, 1, 2].map(|axis| origin[axis] + at[axis] as i32));
+                }
+            }
+        });
+        normalise(pieces);
+    }
+}
+
+/// Divides each value by the field's steepness there, so that distances near the surface are true again.
+fn normalise(pieces: &mut [Piece]) {
+    let places: HashMap<Origin, usize> =
+        pieces.iter().enumerate().map(|(index, piece)| (piece.origin(), index)).collect();
+    let scaled: Vec<Option<Box<Values>>> = pieces
+        .par_iter()
+        .map(|piece| match piece {
+            Piece::Near(origin, values) => Some(Box::new(divided(*origin, values, pieces, &places))),
+            Piece::Inside(_) => None,
+        })
+        .collect();
+    for (piece, scaled) in pieces.iter_mut().zip(scaled) {
+        if let (Piece::Near(_, values), Some(scaled)) = (piece, scaled) {
+            *values = scaled;
+        }
+    }
+}
+
+fn divided(origin: Origin, values: &Values, pieces: &[Piece], places: &HashMap<Origin, usize>) -> Values {
+    let beside = |axis: usize, step: i32| {
+        let mut place = origin;
+        place[axis] += step * 8;
+        places.get(&place).and_then(|&index| match &pieces[index] {
+            Piece::Near(_, values) => Some(values),
+            Piece::Inside(_) => None,
+        })
+    };
+    let neighbours: Vec<[Option<&Box<Values>>; 2]> = (0..3).map(|axis| [beside(axis, -1), beside(axis, 1)]).collect();
+    let mut out = *values;
+    for (index, out) in out.iter_mut().enumerate() {
+        let at = [index >> 6, index >> 3 & 7, index & 7];
+        let mut squared = 0.0;
+        for axis in 0..3 {
+            let value = |coordinate: i32| {
+                let mut place = at;
+                place[axis] = (coordinate & 7) as usize;
+                let block = match coordinate {
+                    -1 => neighbours[axis][0].map_or(values, |block| block),
+                    8 => neighbours[axis][1].map_or(values, |block| block),
+                    _ => values,
+                };
+                let outside = (coordinate == -1 && neighbours[axis][0].is_none())
+                    || (coordinate == 8 && neighbours[axis][1].is_none());
+                if outside { values[index] } else { block[offset(place[0], place[1], place[2])] }
+            };
+            let here = values[index];
+            let (below, above) = (here - value(at[axis] as i32 - 1), value(at[axis] as i32 + 1) - here);
+            squared += upwind_squared(below, above, here > 0.0);
+        }
+        *out /= squared.sqrt().clamp(0.5, 2.0);
+    }
+    out
+}
+
+/// Godunov's choice of the one-sided difference that points away from the surface.
+fn upwind_squared(below: f32, above: f32, outside: bool) -> f32 {
+    let (below, above) = if outside { (below, above) } else { (-below, -above) };
+    let (below, above) = (below.max(0.0), above.min(0.0));
+    (below * below).max(above * above)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn one_octave_is_nowhere_steeper_than_the_bound() {
+        let mut noise = FastNoiseLite::with_seed(3);
+        noise.set_noise_type(Some(NoiseType::Perlin));
+        noise.set_frequency(Some(1.0));
+        let (mut steepest, step): (f32, f32) = (0.0, 1e-2);
+        for index in 0..400_000u32 {
+            let at = [7919, 104_729, 1_299_709].map(|prime: u32| (index.wrapping_mul(prime) % 20_000) as f32 * 1e-3);
+            let sample = |d: [f32; 3]| noise.get_noise_3d(at[0] + d[0], at[1] + d[1], at[2] + d[2]);
+            let here = sample([0.0; 3]);
+            let slope: f32 = [[step, 0.0, 0.0], [0.0, step, 0.0], [0.0, 0.0, step]]
+                .map(|d| ((sample(d) - here) / step).powi(2))
+                .iter()
+                .sum();
+            steepest = steepest.max(slope.sqrt());
+        }
+        assert!(f64::from(steepest) < STEEPEST, "{steepest}");
+        assert!(f64::from(steepest) > STEEPEST * 0.6, "the bound is far from tight: {steepest}");
+    }
+
+    #[test]
+    fn defaults_are_accepted_and_steep_noise_is_refused() {
+        let cell = 0.0075;
+        let params = NoiseParams::for_cell(cell);
+        assert!(params.validate(cell).is_ok(), "{:?}", params.validate(cell));
+        let steep = NoiseParams { amplitude: 4.0 * cell, ..params };
+        assert!(steep.validate(cell).unwrap_err().to_string().contains("at most"));
+    }
+}

@@ -1,0 +1,198 @@
+//! A moving body as the chain wants it: closed triangles, and poses at well-chosen times.
+
+use std::collections::HashMap;
+
+use super::chain::{Face, Weights, Window, boundary};
+use super::lattice::{Fixed, Lattice, UNITS};
+use super::refine::{edge_error, refine};
+use super::topology::Topology;
+use crate::base::DVec3;
+use crate::error::{Error, Result};
+use crate::motion::Motion;
+
+/// Most steps that an interval between two kinks of a motion is split into.
+const MOST_STEPS: f64 = 1024.0;
+
+/// A motion with its topology, prepared once and used for many intervals.
+pub struct Body {
+    motion: Box<dyn Motion>,
+    /// For each vertex the first one at the same place; itself when there is none before it.
+    same: Vec<u32>,
+    topology: Topology,
+    longest_edge: f64,
+}
+
+impl Body {
+    /// Prepares a motion: welds vertices that coincide at `time` (s), closes open loops, and turns the
+    /// triangles round if the solid would have a negative volume.
+    ///
+    /// # Errors
+    /// When the motion has no triangles, or its pose cannot be had.
+    pub fn new(motion: Box<dyn Motion>, time: f64) -> Result<Self> {
+        if motion.triangles().is_empty() {
+            return Err(Error::argument("an object has no triangles"));
+        }
+        let mut pose = Vec::new();
+        motion.pose(time, &mut pose)?;
+        let same = coincident(&pose);
+        let mut topology = Topology::new(motion.triangles(), motion.vertex_count(), &same, true);
+        topology.complete(&mut pose);
+        if volume(&topology, &pose) < 0.0 {
+            topology.simplices.iter_mut().for_each(|simplex| simplex.sign = -simplex.sign);
+        }
+        let length = |&[i, j]: &[u32; 2]| (pose[i as usize] - pose[j as usize]).norm();
+        let longest_edge = topology.edges.iter().map(length).fold(0.0, f64::max);
+        Ok(Self { motion, same, topology, longest_edge })
+    }
+
+    /// The motion itself.
+    pub fn motion(&self) -> &dyn Motion {
+        &*self.motion
+    }
+
+    /// Boundary of the chain that the body sweeps from `from` to `to` (s); the pose itself when they
+    /// are equal. `tolerance` (cells) bounds the error against true arcs and flat moving triangles.
+    ///
+    /// # Errors
+    /// When a pose cannot be had or a vertex is too far away for the lattice.
+    pub fn chain(
+        &self,
+        from: f64,
+        to: f64,
+        lattice: &Lattice,
+        tolerance: f64,
+        window: &Window,
+    ) -> Result<Vec<Face>> {
+        let near = Near::new(window, self.longest_edge / lattice.voxel);
+        let mut poses = self.poses(from, to, lattice, tolerance, &near)?;
+        let apart = self.welds_part(&poses);
+        let separate;
+        let topology = if apart {
+            let identity: Vec<u32> = (0..self.motion.vertex_count() as u32).collect();
+            separate = Topology::new(self.motion.triangles(), identity.len(), &identity, true);
+            &separate
+        } else {
+            &self.topology
+        };
+        poses.iter_mut().for_each(|pose| topology.complete(pose));
+        let refined = refine(topology, &mut poses, tolerance, |poses, edge| near.sees(poses, &edge));
+        let levels: Vec<Vec<Fixed>> = poses
+            .iter()
+            .map(|pose| pose.iter().map(|&cells| lattice.fix(cells)).collect())
+            .collect::<Result<_>>()?;
+        let weights = Weights { solid: 1, swept: 1 };
+        Ok(boundary(refined.as_ref().unwrap_or(topology), &levels, weights, window))
+    }
+
+    /// Poses (cells) at times so dense that straight steps stay within `tolerance` of the motion.
+    fn poses(&self, from: f64, to: f64, lattice: &Lattice, tolerance: f64, near: &Near) -> Result<Vec<Vec<DVec3>>> {
+        let at = |time: f64| -> Result<Vec<DVec3>> {
+            let mut pose = Vec::new();
+            self.motion.pose(time, &mut pose)?;
+            pose.iter_mut().for_each(|position| *position = lattice.to_cells(*position));
+            Ok(pose)
+        };
+        let mut poses = vec![at(from)?];
+        if to <= from {
+            return Ok(poses);
+        }
+        let mut ends = self.motion.breaks(from, to);
+        ends.push(to);
+        let mut begin = from;
+        for end in ends {
+            let first = poses.last().expect("the first pose is there").clone();
+            let last = at(end)?;
+            let quarters = [0.25, 0.5, 0.75].map(|t| at(begin + t * (end - begin)));
+            let [q1, q2, q3] = quarters;
+            let probes = [first, q1?, q2?, q3?, last];
+            let steps = self.steps(&probes, tolerance, near);
+            let [_, _, _, _, last] = probes;
+            for step in 1..steps {
+                poses.push(at(begin + (end - begin) * step as f64 / steps as f64)?);
+            }
+            poses.push(last);
+            begin = end;
+        }
+        Ok(poses)
+    }
+
+    /// Number of equal steps an interval needs, from five poses at its quarters.
+    fn steps(&self, probes: &[Vec<DVec3>; 5], tolerance: f64, near: &Near) -> usize {
+        let mut bend: f64 = 0.0;
+        for vertex in 0..probes[0].len() {
+            let path = [0, 1, 2, 3, 4].map(|probe| probes[probe][vertex]);
+            if near.reaches(&path) {
+                for (index, t) in [(1, 0.25), (2, 0.5), (3, 0.75)] {
+                    bend = bend.max((path[index] - path[0].lerp(&path[4], t)).norm_squared());
+                }
+            }
+        }
+        let arcs = (bend.sqrt() / tolerance).sqrt();
+        let ends = [probes[0].clone(), probes[4].clone()];
+        let own = self.topology.own_vertices as u32;
+        let twist = self
+            .topology
+            .edges
+            .iter()
+            .filter(|edge| edge[1] < own)
+            .map(|&edge| (edge_error(&ends, edge), edge))
+            .filter(|(error, edge)| *error > tolerance && near.sees(&ends, edge))
+            .fold(0.0, |most: f64, (error, _)| most.max(error));
+        // As many steps as pieces an edge: faces then keep a good shape.
+        let twists = (twist / tolerance).sqrt();
+        arcs.max(twists).ceil().clamp(1.0, MOST_STEPS) as usize
+    }
+
+    /// Whether vertices that were welded have moved apart.
+    fn welds_part(&self, poses: &[Vec<DVec3>]) -> bool {
+        self.same.iter().enumerate().any(|(vertex, &same)| {
+            same as usize != vertex && poses.iter().any(|pose| pose[vertex] != pose[same as usize])
+        })
+    }
+}
+
+/// The window in cells, grown for edges longer than a cell: what can touch it.
+struct Near {
+    low: DVec3,
+    high: DVec3,
+    longest: f64,
+}
+
+impl Near {
+    fn new(window: &Window, longest: f64) -> Self {
+        let cells = |p: Fixed| DVec3::from(p.map(|value| f64::from(value) / f64::from(UNITS)));
+        Self { low: cells(window.min), high: cells(window.max), longest }
+    }
+
+    fn touches(&self, path: impl Iterator<Item = DVec3>, margin: f64) -> bool {
+        let (mut low, mut high) = (DVec3::repeat(f64::INFINITY), DVec3::repeat(f64::NEG_INFINITY));
+        path.for_each(|p| (low, high) = (low.inf(&p), high.sup(&p)));
+        (0..3).all(|a| high[a] + margin >= self.low[a] && low[a] - margin <= self.high[a])
+    }
+
+    /// Whether a face at a vertex on this path can touch the window.
+    fn reaches(&self, path: &[DVec3]) -> bool {
+        self.touches(path.iter().copied(), self.longest)
+    }
+
+    /// Whether an edge's sweep can touch the window.
+    fn sees(&self, poses: &[Vec<DVec3>], edge: &[u32; 2]) -> bool {
+        self.touches(poses.iter().flat_map(|pose| edge.map(|vertex| pose[vertex as usize])), 1.0)
+    }
+}
+
+/// For each vertex the first one with the same position.
+fn coincident(pose: &[DVec3]) -> Vec<u32> {
+    let mut first: HashMap<[u64; 3], u32> = HashMap::with_capacity(pose.len());
+    // Adding zero makes -0 and 0 the same.
+    let key = |p: &DVec3| [p.x + 0.0, p.y + 0.0, p.z + 0.0].map(f64::to_bits);
+    pose.iter().enumerate().map(|(index, p)| *first.entry(key(p)).or_insert(index as u32)).collect()
+}
+
+fn volume(topology: &Topology, pose: &[DVec3]) -> f64 {
+    let six = |simplex: &super::topology::Simplex| {
+        let [a, b, c] = simplex.v.map(|vertex| pose[vertex as usize]);
+        a.dot(&b.cross(&c)) * f64::from(simplex.sign)
+    };
+    topology.simplices.iter().map(six).sum::<f64>() / 6.0
+}

@@ -1,0 +1,228 @@
+//! The signed space-time chain of a moving mesh and its boundary.
+//!
+//! Between two poses each triangle sweeps a prism, split into three tetrahedra by ascending vertex
+//! number so that neighbours match: T1 = (a0 a1 a2 b2), T2 = (a0 a1 b1 b2), T3 = (a0 b0 b1 b2), a the
+//! earlier and b the later pose. The chain is the solid at the first pose plus every tetrahedron
+//! through which the surface moves outward; points with winding number > 0 are the swept volume.
+//! Only the boundary of the chain is made: faces between two tetrahedra that are both in the chain,
+//! or both out of it, cancel by counting and are never built.
+
+use rayon::prelude::*;
+
+use super::lattice::{Fixed, UNITS};
+use super::topology::Topology;
+
+/// An oriented triangle of the chain's boundary; the chain lies behind it (`coef` times).
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Face {
+    /// Corners, counter-clockwise seen from outside the chain.
+    pub v: [Fixed; 3],
+    /// How many layers of the chain end here; positive.
+    pub coef: i32,
+}
+
+/// What of a moving mesh goes into the chain.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Weights {
+    /// Layers of the solid at the first pose (1; 0 leaves it out; negative cuts it away).
+    pub solid: i32,
+    /// Layers of what is swept outward (1).
+    pub swept: i32,
+}
+
+/// Fixed-point bounds that faces are wanted in: no limit below `max` on the axis of the scan lines.
+#[derive(Debug, Clone, Copy)]
+pub struct Window {
+    /// Least corner.
+    pub min: Fixed,
+    /// Greatest corner.
+    pub max: Fixed,
+}
+
+impl Window {
+    /// Whether a triangle between these corners can matter: near in x and y, not above in z.
+    fn wants(&self, low: Fixed, high: Fixed) -> bool {
+        high[0] >= self.min[0]
+            && low[0] <= self.max[0]
+            && high[1] >= self.min[1]
+            && low[1] <= self.max[1]
+            && low[2] <= self.max[2]
+    }
+}
+
+/// Outward motion below this (fixed-point units) counts as none: rounding would else decide it.
+const STILL: f64 = 4.0 / 4096.0 * UNITS as f64;
+/// Triangles or edges a task handles: fixed, so that the order of faces never depends on threads.
+const GRAIN: usize = 2048;
+
+/// Boundary of the chain that sweeps `topology` through `levels` (poses in time order, at least one).
+pub fn boundary(topology: &Topology, levels: &[Vec<Fixed>], weights: Weights, window: &Window) -> Vec<Face> {
+    let steps = levels.len() - 1;
+    let triangles = topology.simplices.len();
+    let mut outward = vec![0u8; triangles * steps];
+    let mut faces: Vec<Face> = if steps == 0 {
+        chunks(triangles, |triangle, out| caps(topology, levels, triangle, &[], weights, window, out))
+    } else {
+        outward.par_chunks_mut(steps * GRAIN).enumerate().for_each(|(chunk, bits)| {
+            for (index, bits) in bits.chunks_mut(steps).enumerate() {
+                mark_outward(topology, levels, chunk * GRAIN + index, window, bits);
+            }
+        });
+        chunks(triangles, |triangle, out| {
+            let bits = &outward[triangle * steps..(triangle + 1) * steps];
+            caps(topology, levels, triangle, bits, weights, window, out);
+        })
+    };
+    faces.extend(chunks(if steps == 0 { 0 } else { topology.edges.len() }, |edge, out| {
+        sides(topology, levels, edge, &outward, weights, window, out);
+    }));
+    faces
+}
+
+/// Runs `make` for 0..count in tasks of fixed size and joins what they append, in order.
+fn chunks(count: usize, make: impl Fn(usize, &mut Vec<Face>) + Sync) -> Vec<Face> {
+    let parts: Vec<Vec<Face>> = (0..count.div_ceil(GRAIN))
+        .into_par_iter()
+        .map(|chunk| {
+            let mut out = Vec::new();
+            (chunk * GRAIN..((chunk + 1) * GRAIN).min(count)).for_each(|index| make(index, &mut out));
+            out
+        })
+        .collect();
+    parts.concat()
+}
+
+fn bounds(levels: &[Vec<Fixed>], vertices: &[u32]) -> (Fixed, Fixed) {
+    let (mut low, mut high) = ([i32::MAX; 3], [i32::MIN; 3]);
+    for level in levels {
+        for &vertex in vertices {
+            for axis in 0..3 {
+                let value = level[vertex as usize][axis];
+                low[axis] = low[axis].min(value);
+                high[axis] = high[axis].max(value);
+            }
+        }
+    }
+    (low, high)
+}
+
+/// Sets bit i - 1 of each step's byte when the surface moves outward through tetrahedron Ti.
+fn mark_outward(topology: &Topology, levels: &[Vec<Fixed>], triangle: usize, window: &Window, bits: &mut [u8]) {
+    let simplex = &topology.simplices[triangle];
+    let (low, high) = bounds(levels, &simplex.v);
+    if !window.wants(low, high) {
+        return;
+    }
+    let sign = f64::from(simplex.sign);
+    for (step, bits) in bits.iter_mut().enumerate() {
+        let a = simplex.v.map(|vertex| levels[step][vertex as usize]);
+        let b = simplex.v.map(|vertex| levels[step + 1][vertex as usize]);
+        let [edge1, edge2] = [difference(a[1], a[0]), difference(a[2], a[0])];
+        let normal = cross(edge1, edge2);
+        let still = STILL * dot(normal, normal).sqrt();
+        let volume1 = dot(normal, difference(b[2], a[0]));
+        let volume2 = -determinant(edge1, difference(b[1], a[0]), difference(b[2], a[0]));
+        let volume3 = determinant(difference(b[0], a[0]), difference(b[1], a[0]), difference(b[2], a[0]));
+        *bits = u8::from(sign * volume1 > still)
+            | u8::from(sign * volume2 > still) << 1
+            | u8::from(sign * volume3 > still) << 2;
+    }
+}
+
+/// Faces that belong to one triangle: itself at each pose, and the two cuts inside each prism.
+fn caps(
+    topology: &Topology,
+    levels: &[Vec<Fixed>],
+    triangle: usize,
+    outward: &[u8],
+    weights: Weights,
+    window: &Window,
+    out: &mut Vec<Face>,
+) {
+    let simplex = &topology.simplices[triangle];
+    let (low, high) = bounds(levels, &simplex.v);
+    if !window.wants(low, high) {
+        return;
+    }
+    let sign = i32::from(simplex.sign);
+    let at = |level: usize, corner: usize| levels[level][simplex.v[corner] as usize];
+    let bit = |step: usize, index: u8| i32::from(outward[step] >> index & 1);
+    for level in 0..levels.len() {
+        let solid = if level == 0 { weights.solid } else { 0 };
+        let entered = if level > 0 { bit(level - 1, 2) } else { 0 };
+        let left = if level < outward.len() { bit(level, 0) } else { 0 };
+        let coef = solid + weights.swept * (entered - left);
+        push(out, [at(level, 0), at(level, 1), at(level, 2)], sign * coef);
+    }
+    for step in 0..outward.len() {
+        let (first, second) = (bit(step, 0) - bit(step, 1), bit(step, 1) - bit(step, 2));
+        let weight = sign * weights.swept;
+        push(out, [at(step, 0), at(step, 1), at(step + 1, 2)], weight * first);
+        push(out, [at(step, 0), at(step + 1, 1), at(step + 1, 2)], weight * second);
+    }
+}
+
+/// The two faces that an edge (i, j) sweeps in each step, (ai aj bj) and (ai bi bj), where the
+/// tetrahedra beside them do not cancel.
+fn sides(
+    topology: &Topology,
+    levels: &[Vec<Fixed>],
+    edge: usize,
+    outward: &[u8],
+    weights: Weights,
+    window: &Window,
+    out: &mut Vec<Face>,
+) {
+    let steps = levels.len() - 1;
+    let [i, j] = topology.edges[edge].map(|vertex| vertex as usize);
+    let mut near = None;
+    for step in 0..steps {
+        let (mut lower, mut upper) = (0, 0);
+        for at in topology.beside(edge) {
+            let sign = i32::from(topology.simplices[at.triangle as usize].sign);
+            let bits = i32::from(outward[at.triangle as usize * steps + step]);
+            let [s1, s2, s3] = [bits & 1, bits >> 1 & 1, bits >> 2 & 1];
+            let (low, up) = [(s2, -s3), (s1, -s2), (-s1, s3)][at.side as usize];
+            lower += sign * low;
+            upper += sign * up;
+        }
+        if (lower, upper) == (0, 0) {
+            continue;
+        }
+        let wanted = *near.get_or_insert_with(|| {
+            let (low, high) = bounds(levels, &topology.edges[edge]);
+            window.wants(low, high)
+        });
+        if !wanted {
+            return;
+        }
+        let (a, b) = (&levels[step], &levels[step + 1]);
+        push(out, [a[i], a[j], b[j]], lower * weights.swept);
+        push(out, [a[i], b[i], b[j]], upper * weights.swept);
+    }
+}
+
+/// Adds a face with a positive coefficient, turned round when `coef` is negative.
+fn push(out: &mut Vec<Face>, [a, b, c]: [Fixed; 3], coef: i32) {
+    match coef {
+        0 => {}
+        1.. => out.push(Face { v: [a, b, c], coef }),
+        _ => out.push(Face { v: [a, c, b], coef: -coef }),
+    }
+}
+
+fn difference(a: Fixed, b: Fixed) -> [f64; 3] {
+    [f64::from(a[0] - b[0]), f64::from(a[1] - b[1]), f64::from(a[2] - b[2])]
+}
+
+fn cross(a: [f64; 3], b: [f64; 3]) -> [f64; 3] {
+    [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]]
+}
+
+fn dot(a: [f64; 3], b: [f64; 3]) -> f64 {
+    a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
+}
+
+fn determinant(a: [f64; 3], b: [f64; 3], c: [f64; 3]) -> f64 {
+    dot(a, cross(b, c))
+}

@@ -1,0 +1,133 @@
+//! Swept volumes and meshes as whole level sets.
+
+use rayon::prelude::*;
+
+use super::chain::{Face, Weights, Window, boundary};
+use super::lattice::{Fixed, Lattice};
+use super::nearest::Scratch;
+use super::topology::Topology;
+use super::voxelise::{Band, Piece, Voxeliser};
+use super::{Body, Settings};
+use crate::base::blocks::{Block, BlockEdit, Values};
+use crate::base::{DVec3, TriMesh};
+use crate::context::Context;
+use crate::error::{Error, Result};
+use crate::vdb::FloatGrid;
+
+/// Blocks that are made before they are handed to the grid: bounds the memory beside it.
+const BATCH: usize = 8192;
+/// A window without bounds.
+const EVERYWHERE: Window = Window { min: [i32::MIN; 3], max: [i32::MAX; 3] };
+/// All voxels within the lattice's reach.
+const ALL_VOXELS: i32 = 1 << 18;
+
+/// Level set of the volume that bodies sweep from `from` to `to` (s); of the pose when they are equal.
+///
+/// # Errors
+/// Settings out of range, a pose that cannot be had, a region too large, cancel.
+pub fn chain(ctx: &Context, bodies: &[Body], from: f64, to: f64, settings: &Settings) -> Result<FloatGrid> {
+    settings.validate()?;
+    let mut pose = Vec::new();
+    let first = bodies.first().ok_or_else(|| Error::argument("a sweep needs at least one object"))?;
+    first.motion().pose(from, &mut pose)?;
+    let lattice = Lattice::near(settings.voxel, pose[0])?;
+    let faces = ctx.stage("chain", || {
+        let parts: Vec<Vec<Face>> = bodies
+            .iter()
+            .map(|body| body.chain(from, to, &lattice, settings.tolerance, &EVERYWHERE))
+            .collect::<Result<_>>()?;
+        Ok(parts.concat())
+    })?;
+    fill(ctx, faces, lattice, settings.half_width)
+}
+
+/// Level set of the volume swept by vertices that move straight from one mesh to another with the same triangles.
+///
+/// # Errors
+/// As [`chain`]; and when the meshes differ in their number of vertices.
+pub fn chain_meshes(ctx: &Context, from: &TriMesh, to: &TriMesh, settings: &Settings) -> Result<FloatGrid> {
+    settings.validate()?;
+    if from.positions.len() != to.positions.len() {
+        return Err(Error::argument(format!(
+            "a sweep needs the same vertices at both ends: {} and {}",
+            from.positions.len(),
+            to.positions.len()
+        )));
+    }
+    let (lattice, faces) = mesh_faces(settings.voxel, &from.triangles, &[from, to])?;
+    fill(ctx, faces, lattice, settings.half_width)
+}
+
+/// Level set of the solid that a mesh bounds: winding number > 0, open loops closed.
+///
+/// # Errors
+/// As [`chain`].
+pub fn voxelise(ctx: &Context, mesh: &TriMesh, settings: &Settings) -> Result<FloatGrid> {
+    settings.validate()?;
+    let (lattice, faces) = mesh_faces(settings.voxel, &mesh.triangles, &[mesh])?;
+    fill(ctx, faces, lattice, settings.half_width)
+}
+
+/// The chain's boundary of poses of a mesh.
+fn mesh_faces(voxel: f64, triangles: &[[u32; 3]], poses: &[&TriMesh]) -> Result<(Lattice, Vec<Face>)> {
+    let first = poses[0].positions.first().ok_or_else(|| Error::argument("a mesh has no vertices"))?;
+    let lattice = Lattice::near(voxel, first.cast())?;
+    let count = poses[0].positions.len();
+    let topology = Topology::new(triangles, count, &(0..count as u32).collect::<Vec<_>>(), true);
+    let level = |mesh: &&TriMesh| -> Result<Vec<Fixed>> {
+        let mut pose: Vec<DVec3> = mesh.positions.iter().map(|p| lattice.to_cells(p.cast())).collect();
+        topology.complete(&mut pose);
+        pose.into_iter().map(|cells| lattice.fix(cells)).collect()
+    };
+    let levels: Vec<Vec<Fixed>> = poses.iter().map(level).collect::<Result<_>>()?;
+    Ok((lattice, boundary(&topology, &levels, Weights { solid: 1, swept: 1 }, &EVERYWHERE)))
+}
+
+/// Level set of the points that a closed chain winds around at least once.
+///
+/// # Errors
+/// A region too large; cancel.
+pub fn fill(ctx: &Context, faces: Vec<Face>, lattice: Lattice, half_width: f32) -> Result<FloatGrid> {
+    let band = Band { inside: half_width, outside: half_width };
+    let voxeliser = ctx.stage("winding", || {
+        Voxeliser::new(faces, lattice, band, [-ALL_VOXELS; 3], [ALL_VOXELS; 3])
+    })?;
+    let mut grid = FloatGrid::level_set(lattice.voxel, half_width)?;
+    let blocks: Vec<usize> = (0..voxeliser.near_blocks().len()).collect();
+    for batch in blocks.chunks(BATCH) {
+        let edits = ctx.stage("distance", || Ok(pieces(&voxeliser, batch, lattice.voxel, half_width)))?;
+        grid.replace_blocks(ctx, &edits)?;
+    }
+    let background = half_width * lattice.voxel as f32;
+    for batch in voxeliser.inside_blocks().chunks(BATCH) {
+        let edits: Vec<BlockEdit> = batch.iter().map(|&origin| BlockEdit::Constant(origin, -background)).collect();
+        grid.replace_blocks(ctx, &edits)?;
+        ctx.check()?;
+    }
+    Ok(grid)
+}
+
+fn pieces(voxeliser: &Voxeliser, batch: &[usize], voxel: f64, half_width: f32) -> Vec<BlockEdit> {
+    batch
+        .par_iter()
+        .map_init(Scratch::default, |scratch, &index| voxeliser.piece(index, scratch))
+        .filter_map(|piece| {
+            Some(match piece? {
+                Piece::Inside(origin) => BlockEdit::Constant(origin, -half_width * voxel as f32),
+                Piece::Near(origin, cells) => BlockEdit::Dense(to_block(origin, cells, voxel, half_width)),
+            })
+        })
+        .collect()
+}
+
+/// Distances in cells to a leaf of a level set in metres.
+fn to_block(origin: [i32; 3], mut values: Box<Values>, voxel: f64, half_width: f32) -> Block {
+    let background = half_width * voxel as f32;
+    let mut mask = [0u64; 8];
+    for (voxel_index, value) in values.iter_mut().enumerate() {
+        *value = (*value * voxel as f32).clamp(-background, background);
+        mask[voxel_index >> 6] |= u64::from(value.abs() < background) << (voxel_index & 63);
+    }
+    Block { origin, values, mask }
+}
+

@@ -1,0 +1,70 @@
+//! Fixed-point coordinates: exact predicates on the voxel lattice need integers.
+
+use crate::base::DVec3;
+use crate::error::{Error, Result};
+
+/// Fixed-point units in a cell; rounding to them moves a vertex by at most 1/8192 cell an axis.
+pub const UNITS: i32 = 4096;
+
+/// A position in units of 1/4096 cell from the lattice's base voxel.
+pub type Fixed = [i32; 3];
+
+/// Farthest coordinate, in units: products of two differences then fit 64 bits.
+const LIMIT: f64 = (1 << 29) as f64;
+
+/// World-fixed voxel lattice (voxel (i, j, k) has its centre at (i, j, k) x cell) with a base voxel
+/// near the work, so that coordinates are small.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Lattice {
+    /// Cell size (m).
+    pub voxel: f64,
+    /// The voxel whose centre is the origin of the fixed-point coordinates; multiples of 8.
+    pub base: [i32; 3],
+}
+
+impl Lattice {
+    /// A lattice whose base lies at the block nearest to a world position (m).
+    ///
+    /// # Errors
+    /// When the position is so far from the world's origin that voxel numbers overflow.
+    pub fn near(voxel: f64, position: DVec3) -> Result<Self> {
+        let mut base = [0; 3];
+        for axis in 0..3 {
+            let cell = (position[axis] / voxel).round();
+            if cell.is_nan() || cell.abs() > f64::from(i32::MAX / 2) {
+                return Err(Error::argument(format!(
+                    "a position of {} m is too far from the origin for cells of {voxel} m",
+                    position[axis]
+                )));
+            }
+            base[axis] = (cell as i32) & !7;
+        }
+        Ok(Self { voxel, base })
+    }
+
+    /// World position (m) to index space: cells from the base voxel.
+    pub fn to_cells(&self, world: DVec3) -> DVec3 {
+        DVec3::new(
+            world.x / self.voxel - f64::from(self.base[0]),
+            world.y / self.voxel - f64::from(self.base[1]),
+            world.z / self.voxel - f64::from(self.base[2]),
+        )
+    }
+
+    /// Rounds cells from the base voxel to fixed point.
+    ///
+    /// # Errors
+    /// When a coordinate is not finite or lies farther than 131,072 cells from the base voxel.
+    pub fn fix(&self, cells: DVec3) -> Result<Fixed> {
+        let scaled = cells * f64::from(UNITS);
+        if !(scaled.x.abs() < LIMIT && scaled.y.abs() < LIMIT && scaled.z.abs() < LIMIT) {
+            return Err(Error::argument(format!(
+                "a vertex lies {:.0} m from the work, farther than {:.0} m, the reach of cells of {} m",
+                cells.amax() * self.voxel,
+                LIMIT / f64::from(UNITS) * self.voxel,
+                self.voxel
+            )));
+        }
+        Ok([scaled.x.round() as i32, scaled.y.round() as i32, scaled.z.round() as i32])
+    }
+}

@@ -1,0 +1,243 @@
+//! What a moving mesh keeps while it moves: triangles that close, and the edges between them.
+//!
+//! The boundary of any set of oriented triangles is a set of cycles. Each cycle is closed by a cone
+//! to the (moving) centroid of its vertices, so that open meshes, non-manifold meshes and soups all
+//! become closed chains.
+
+use std::collections::{BTreeMap, HashMap};
+
+use crate::base::DVec3;
+
+/// A triangle with its vertices in ascending order: the simplex that prisms are split by.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Simplex {
+    /// Vertex indices, v0 < v1 < v2.
+    pub v: [u32; 3],
+    /// +1 when (v0, v1, v2) is counter-clockwise seen from outside, else -1.
+    pub sign: i8,
+}
+
+impl Simplex {
+    /// A counter-clockwise triangle; none when two corners are the same.
+    pub fn new([a, b, c]: [u32; 3]) -> Option<Self> {
+        if a == b || b == c || c == a {
+            return None;
+        }
+        let mut v = [a, b, c];
+        let mut sign = 1;
+        for (i, j) in [(0, 1), (1, 2), (0, 1)] {
+            if v[i] > v[j] {
+                v.swap(i, j);
+                sign = -sign;
+            }
+        }
+        Some(Self { v, sign })
+    }
+}
+
+/// One triangle beside an edge.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Incidence {
+    /// Index of the triangle.
+    pub triangle: u32,
+    /// Which of its edges: 0 = (v0, v1), 1 = (v1, v2), 2 = (v0, v2).
+    pub side: u8,
+}
+
+/// A vertex that is made from others at each pose.
+#[derive(Debug, Clone, PartialEq)]
+pub enum Derived {
+    /// Mean of the vertices of an open loop.
+    Centroid(Vec<u32>),
+    /// Middle of an edge.
+    Middle(u32, u32),
+}
+
+/// Closed triangles, their unique edges, and the vertices to be made besides the mesh's own.
+#[derive(Debug, Clone, Default)]
+pub struct Topology {
+    /// Vertices of the mesh itself.
+    pub own_vertices: usize,
+    /// Vertices made at each pose; the first has index `own_vertices`.
+    pub derived: Vec<Derived>,
+    /// The triangles, caps included; degenerate ones left out.
+    pub simplices: Vec<Simplex>,
+    /// Unique edges (i < j).
+    pub edges: Vec<[u32; 2]>,
+    /// `incidences[edge_start[e]..edge_start[e + 1]]` lie beside edge e.
+    pub edge_start: Vec<u32>,
+    /// Triangles beside edges.
+    pub incidences: Vec<Incidence>,
+}
+
+impl Topology {
+    /// Topology of a mesh's triangles; `same[v]` names the vertex that v is welded to (or v itself).
+    ///
+    /// With `close`, open loops are capped.
+    pub fn new(triangles: &[[u32; 3]], vertex_count: usize, same: &[u32], close: bool) -> Self {
+        let mut topology = Self { own_vertices: vertex_count, ..Self::default() };
+        topology.simplices.reserve(triangles.len());
+        for triangle in triangles {
+            topology.push_triangle(triangle.map(|vertex| same[vertex as usize]));
+        }
+        topology.index_edges();
+        if close && topology.cap_open_loops() {
+            topology.index_edges();
+        }
+        topology
+    }
+
+    /// A topology with these triangles and vertices made from others.
+    pub fn from_parts(own_vertices: usize, derived: Vec<Derived>, simplices: Vec<Simplex>) -> Self {
+        let mut topology = Self { own_vertices, derived, simplices, ..Self::default() };
+        topology.index_edges();
+        topology
+    }
+
+    /// Own and derived vertices.
+    pub fn vertex_count(&self) -> usize {
+        self.own_vertices + self.derived.len()
+    }
+
+    /// Appends the derived vertices to a pose of the own ones.
+    pub fn complete(&self, pose: &mut Vec<DVec3>) {
+        pose.truncate(self.own_vertices);
+        for derived in &self.derived {
+            let position = match derived {
+                Derived::Centroid(vertices) => {
+                    let sum: DVec3 = vertices.iter().map(|&vertex| pose[vertex as usize]).sum();
+                    sum / vertices.len() as f64
+                }
+                Derived::Middle(i, j) => (pose[*i as usize] + pose[*j as usize]) * 0.5,
+            };
+            pose.push(position);
+        }
+    }
+
+    /// Whether every edge is balanced, so that the triangles bound a solid.
+    pub fn is_closed(&self) -> bool {
+        (0..self.edges.len()).all(|edge| self.imbalance(edge) == 0)
+    }
+
+    /// Triangles beside an edge.
+    pub fn beside(&self, edge: usize) -> &[Incidence] {
+        &self.incidences[self.edge_start[edge] as usize..self.edge_start[edge + 1] as usize]
+    }
+
+    fn push_triangle(&mut self, triangle: [u32; 3]) {
+        self.simplices.extend(Simplex::new(triangle));
+    }
+
+    fn index_edges(&mut self) {
+        const SIDES: [(usize, usize); 3] = [(0, 1), (1, 2), (0, 2)];
+        let mut keyed = Vec::with_capacity(self.simplices.len() * 3);
+        for (triangle, simplex) in self.simplices.iter().enumerate() {
+            for (side, (i, j)) in SIDES.into_iter().enumerate() {
+                let key = u64::from(simplex.v[i]) << 32 | u64::from(simplex.v[j]);
+                keyed.push((key, Incidence { triangle: triangle as u32, side: side as u8 }));
+            }
+        }
+        keyed.sort_unstable_by_key(|(key, at)| (*key, at.triangle));
+        self.edges.clear();
+        self.edge_start.clear();
+        self.incidences.clear();
+        let mut last = None;
+        for (index, (key, at)) in keyed.into_iter().enumerate() {
+            if last != Some(key) {
+                self.edges.push([(key >> 32) as u32, key as u32]);
+                self.edge_start.push(index as u32);
+                last = Some(key);
+            }
+            self.incidences.push(at);
+        }
+        self.edge_start.push(self.incidences.len() as u32);
+    }
+
+    /// How often the triangles run along edge (i, j) from i to j, less how often from j to i.
+    fn imbalance(&self, edge: usize) -> i32 {
+        let along = |at: &Incidence| {
+            let sign = i32::from(self.simplices[at.triangle as usize].sign);
+            if at.side == 2 { -sign } else { sign }
+        };
+        self.beside(edge).iter().map(along).sum()
+    }
+
+    /// Closes every boundary cycle with a cone to its centroid; whether there was one.
+    fn cap_open_loops(&mut self) -> bool {
+        let open: Vec<([u32; 2], i32)> = (0..self.edges.len())
+            .map(|edge| (self.edges[edge], self.imbalance(edge)))
+            .filter(|(_, imbalance)| *imbalance != 0)
+            .collect();
+        let mut group = Groups::default();
+        for ([i, j], _) in &open {
+            group.join(*i, *j);
+        }
+        let mut loops: BTreeMap<u32, Vec<([u32; 2], i32)>> = BTreeMap::new();
+        for (edge, imbalance) in &open {
+            loops.entry(group.find(edge[0])).or_default().push((*edge, *imbalance));
+        }
+        for edges in loops.into_values() {
+            let mut rim: Vec<u32> = edges.iter().flat_map(|(edge, _)| *edge).collect();
+            rim.sort_unstable();
+            rim.dedup();
+            let apex = self.vertex_count() as u32;
+            self.derived.push(Derived::Centroid(rim));
+            for ([i, j], imbalance) in edges {
+                // A mesh edge that runs i -> j is met by a cap that runs j -> i.
+                for _ in 0..imbalance.abs() {
+                    self.push_triangle(if imbalance > 0 { [j, i, apex] } else { [i, j, apex] });
+                }
+            }
+        }
+        !open.is_empty()
+    }
+}
+
+/// Union-find over vertex numbers; the least vertex names its group.
+#[derive(Default)]
+struct Groups {
+    parent: HashMap<u32, u32>,
+}
+
+impl Groups {
+    fn find(&mut self, vertex: u32) -> u32 {
+        let mut root = vertex;
+        while let Some(&parent) = self.parent.get(&root).filter(|&&parent| parent != root) {
+            root = parent;
+        }
+        self.parent.insert(vertex, root);
+        root
+    }
+
+    fn join(&mut self, i: u32, j: u32) {
+        let (i, j) = (self.find(i), self.find(j));
+        self.parent.insert(i.max(j), i.min(j));
+        self.parent.insert(i.min(j), i.min(j));
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn identity(count: usize) -> Vec<u32> {
+        (0..count as u32).collect()
+    }
+
+    #[test]
+    fn a_tetrahedron_is_closed_and_a_face_less_is_capped_to_closed() {
+        let all = [[0, 2, 1], [0, 1, 3], [1, 2, 3], [2, 0, 3]];
+        assert!(Topology::new(&all, 4, &identity(4), true).derived.is_empty());
+        let open = Topology::new(&all[..3], 4, &identity(4), false);
+        assert!(!open.is_closed());
+        let capped = Topology::new(&all[..3], 4, &identity(4), true);
+        assert!(capped.is_closed());
+        assert_eq!(capped.simplices.len(), 6);
+    }
+
+    #[test]
+    fn three_sheets_on_one_edge_close() {
+        let book = [[0, 1, 2], [0, 1, 3], [0, 1, 4]];
+        assert!(Topology::new(&book, 5, &identity(5), true).is_closed());
+    }
+}

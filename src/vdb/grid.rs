@@ -1,0 +1,317 @@
+//! Sparse grids of 32-bit floats.
+
+use std::marker::PhantomData;
+
+use cxx::UniquePtr;
+
+use super::bridge::ffi;
+use super::leaf::{Leaf, LeafMut, Probe, lend, lend_mut};
+use super::{alone, call, fail};
+use crate::base::DVec3;
+use crate::base::blocks::{BlockEdit, Origin};
+use crate::context::Context;
+use crate::error::Result;
+
+/// What a grid's values mean.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum GridClass {
+    /// Nothing said.
+    Unknown,
+    /// Signed distances (m), negative inside.
+    LevelSet,
+    /// A density.
+    Fog,
+}
+
+/// A metadata value.
+#[derive(Debug, Clone, PartialEq)]
+pub enum MetaValue {
+    /// Text.
+    Text(String),
+    /// A 32-bit float.
+    Float(f32),
+    /// A 64-bit float.
+    Double(f64),
+    /// A whole number.
+    Int(i64),
+    /// Yes or no.
+    Bool(bool),
+    /// Another type, as text; it can be read but not set.
+    Other(String, String),
+}
+
+/// A sparse grid of floats with a uniform transform; its memory is its own.
+pub struct FloatGrid {
+    pub(super) inner: UniquePtr<ffi::Grid>,
+}
+
+// SAFETY: the C++ grid has no thread affinity, and nobody else holds its tree.
+unsafe impl Send for FloatGrid {}
+// SAFETY: `&` methods only read the tree; OpenVDB allows any number of readers.
+unsafe impl Sync for FloatGrid {}
+
+impl FloatGrid {
+    /// An empty grid of cells of `voxel` m whose value is `background` everywhere.
+    ///
+    /// # Errors
+    /// What OpenVDB reports, for instance a cell size of 0.
+    pub fn new(voxel: f64, background: f32) -> Result<Self> {
+        Ok(Self { inner: ffi::make_grid(voxel, background, false).map_err(fail)? })
+    }
+
+    /// An empty level set with a narrow band of `half_width` cells on each side.
+    ///
+    /// # Errors
+    /// As [`FloatGrid::new`].
+    pub fn level_set(voxel: f64, half_width: f32) -> Result<Self> {
+        Ok(Self { inner: ffi::make_grid(voxel, half_width * voxel as f32, true).map_err(fail)? })
+    }
+
+    /// A copy that shares no memory.
+    ///
+    /// # Errors
+    /// When memory runs out.
+    pub fn deep_copy(&self) -> Result<Self> {
+        Ok(Self { inner: ffi::copy_grid(&self.inner).map_err(fail)? })
+    }
+
+    /// Edge of a cell (m).
+    pub fn voxel_size(&self) -> f64 {
+        ffi::voxel_size(&self.inner)
+    }
+
+    /// Whether the transform only scales, rotates and moves, by the same factor on each axis.
+    pub fn is_uniform(&self) -> bool {
+        ffi::is_uniform(&self.inner)
+    }
+
+    /// Whether voxel (0, 0, 0) lies at the origin and the axes are the world's: what our own grids are.
+    pub fn is_world_fixed(&self) -> bool {
+        let voxel = self.voxel_size();
+        let at = |index: [f64; 3]| DVec3::from(ffi::index_to_world(&self.inner, index));
+        let expected = [[0.0; 3], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]];
+        expected.into_iter().all(|index| (at(index) - DVec3::from(index) * voxel).norm() < 1e-9 * voxel.max(1e-9))
+    }
+
+    /// World position (m) of a point in index space.
+    pub fn index_to_world(&self, index: DVec3) -> DVec3 {
+        ffi::index_to_world(&self.inner, index.into()).into()
+    }
+
+    /// Index-space position of a world point (m).
+    pub fn world_to_index(&self, world: DVec3) -> DVec3 {
+        ffi::world_to_index(&self.inner, world.into()).into()
+    }
+
+    /// Value where nothing is stored.
+    pub fn background(&self) -> f32 {
+        ffi::background(&self.inner)
+    }
+
+    /// What the values mean.
+    pub fn class(&self) -> GridClass {
+        match ffi::grid_class(&self.inner) {
+            1 => GridClass::LevelSet,
+            2 => GridClass::Fog,
+            _ => GridClass::Unknown,
+        }
+    }
+
+    /// Says what the values mean.
+    ///
+    /// # Errors
+    /// When memory runs out.
+    pub fn set_class(&mut self, class: GridClass) -> Result<()> {
+        let number = match class {
+            GridClass::Unknown => 0,
+            GridClass::LevelSet => 1,
+            GridClass::Fog => 2,
+        };
+        ffi::set_grid_class(self.inner.pin_mut(), number).map_err(fail)
+    }
+
+    /// The grid's name in a file.
+    pub fn name(&self) -> String {
+        ffi::name(&self.inner)
+    }
+
+    /// Names the grid.
+    ///
+    /// # Errors
+    /// When memory runs out.
+    pub fn set_name(&mut self, name: &str) -> Result<()> {
+        ffi::set_name(self.inner.pin_mut(), name).map_err(fail)
+    }
+
+    /// All metadata, by key.
+    ///
+    /// # Errors
+    /// When memory runs out.
+    pub fn metadata(&self) -> Result<Vec<(String, MetaValue)>> {
+        Ok(ffi::metadata(&self.inner).map_err(fail)?.into_iter().map(from_meta).collect())
+    }
+
+    /// Sets or replaces a metadata entry.
+    ///
+    /// # Errors
+    /// When memory runs out.
+    pub fn set_metadata(&mut self, key: &str, value: MetaValue) -> Result<()> {
+        ffi::set_metadata(self.inner.pin_mut(), &to_meta(key, &value)).map_err(fail)
+    }
+
+    /// Number of active voxels, tiles counted in full.
+    pub fn active_voxels(&self) -> u64 {
+        ffi::active_voxels(&self.inner)
+    }
+
+    /// Number of leaves.
+    pub fn leaf_count(&self) -> usize {
+        ffi::leaf_count(&self.inner)
+    }
+
+    /// Memory of the tree (bytes).
+    pub fn memory_bytes(&self) -> u64 {
+        ffi::memory_bytes(&self.inner)
+    }
+
+    /// Least and greatest active voxel, both included; none when there is none.
+    pub fn active_bbox(&self) -> Option<([i32; 3], [i32; 3])> {
+        let (mut low, mut high) = ([0; 3], [0; 3]);
+        ffi::active_bbox(&self.inner, &mut low, &mut high).ok()?.then_some((low, high))
+    }
+
+    /// Every leaf, in the tree's order; nothing is copied.
+    ///
+    /// # Errors
+    /// When memory runs out.
+    pub fn leaves(&self) -> Result<Vec<Leaf<'_>>> {
+        let views = ffi::leaves(&self.inner).map_err(fail)?;
+        // SAFETY: the views are of this grid, which stays borrowed.
+        Ok(views.iter().map(|view| unsafe { lend(view, PhantomData) }).collect())
+    }
+
+    /// Every leaf, to change; nothing is copied.
+    ///
+    /// # Errors
+    /// When memory runs out.
+    pub fn leaves_mut(&mut self) -> Result<Vec<LeafMut<'_>>> {
+        let views = ffi::leaves(&self.inner).map_err(fail)?;
+        // SAFETY: the views are of this grid, which stays borrowed mutably; each leaf occurs once.
+        Ok(views.iter().map(|view| unsafe { lend_mut(view, PhantomData) }).collect())
+    }
+
+    /// What lies at the given block origins (multiples of 8); nothing is copied.
+    ///
+    /// # Errors
+    /// When memory runs out.
+    pub fn probe(&self, origins: &[Origin]) -> Result<Vec<Probe<'_>>> {
+        let views = ffi::probe(&self.inner, origins.as_flattened()).map_err(fail)?;
+        let lent = views.iter().map(|view| match view.is_leaf {
+            // SAFETY: the views are of this grid, which stays borrowed.
+            true => Probe::Leaf(unsafe { lend(view, PhantomData) }),
+            false => Probe::Tile { value: view.tile, active: view.tile_active },
+        });
+        Ok(lent.collect())
+    }
+
+    /// Puts blocks in the place of leaves or tiles. All memory is had before the first is put in.
+    ///
+    /// # Errors
+    /// When memory runs out; the grid is then as it was.
+    pub fn replace_blocks(&mut self, ctx: &Context, edits: &[BlockEdit]) -> Result<()> {
+        let origins: Vec<Origin> = edits.iter().map(BlockEdit::origin).collect();
+        let mut values = Vec::with_capacity(edits.len());
+        let mut masks = Vec::with_capacity(edits.len());
+        let mut constants = Vec::with_capacity(edits.len());
+        for edit in edits {
+            let (value, mask, constant) = match edit {
+                BlockEdit::Dense(block) => (block.values.as_ptr() as usize, block.mask.as_ptr() as usize, 0.0),
+                BlockEdit::Constant(_, constant) => (0, 0, *constant),
+            };
+            values.push(value);
+            masks.push(mask);
+            constants.push(constant);
+        }
+        let (mut call, _flag) = call(ctx);
+        // The last step of an edit cannot be cancelled.
+        call.cancel = 0;
+        let grid = self.inner.pin_mut();
+        ffi::replace_blocks(grid, &call, origins.as_flattened(), &values, &masks, &constants).map_err(fail)
+    }
+
+    /// Value of a voxel.
+    pub fn value(&self, [x, y, z]: [i32; 3]) -> f32 {
+        ffi::value_at(&self.inner, x, y, z)
+    }
+
+    /// Values at world positions (m), trilinear between voxel centres; `out` is cleared first.
+    ///
+    /// # Errors
+    /// Cancel.
+    pub fn sample_linear(&self, ctx: &Context, world: &[DVec3], out: &mut Vec<f32>) -> Result<()> {
+        self.sample(ctx, world, true, out)
+    }
+
+    /// Values of the voxels that hold world positions (m); `out` is cleared first.
+    ///
+    /// # Errors
+    /// Cancel.
+    pub fn sample_nearest(&self, ctx: &Context, world: &[DVec3], out: &mut Vec<f32>) -> Result<()> {
+        self.sample(ctx, world, false, out)
+    }
+
+    fn sample(&self, ctx: &Context, world: &[DVec3], linear: bool, out: &mut Vec<f32>) -> Result<()> {
+        let flat: Vec<f64> = world.iter().flat_map(|p| [p.x, p.y, p.z]).collect();
+        out.clear();
+        out.resize(world.len(), 0.0);
+        let (call, _flag) = call(ctx);
+        ffi::sample(&self.inner, &call, &flat, linear, out).map_err(fail)
+    }
+
+    /// Turns leaves and nodes of one value (within `tolerance`) into tiles.
+    ///
+    /// # Errors
+    /// When memory runs out.
+    pub fn prune(&mut self, tolerance: f32) -> Result<()> {
+        ffi::prune(self.inner.pin_mut(), &alone(), false, tolerance).map_err(fail)
+    }
+
+    /// Turns what is inactive in a level set into inside and outside tiles.
+    ///
+    /// # Errors
+    /// When memory runs out.
+    pub fn prune_level_set(&mut self) -> Result<()> {
+        ffi::prune(self.inner.pin_mut(), &alone(), true, 0.0).map_err(fail)
+    }
+
+    /// Gives everything outside the band the sign of the band beside it.
+    ///
+    /// # Errors
+    /// When memory runs out.
+    pub fn flood_fill(&mut self) -> Result<()> {
+        ffi::flood_fill(self.inner.pin_mut(), &alone()).map_err(fail)
+    }
+}
+
+pub(super) fn from_meta(meta: ffi::Meta) -> (String, MetaValue) {
+    let value = match meta.kind.as_str() {
+        "string" => MetaValue::Text(meta.text),
+        "float" => MetaValue::Float(meta.number as f32),
+        "double" => MetaValue::Double(meta.number),
+        "int32" | "int64" => MetaValue::Int(meta.integer),
+        "bool" => MetaValue::Bool(meta.integer != 0),
+        _ => MetaValue::Other(meta.kind, meta.text),
+    };
+    (meta.key, value)
+}
+
+pub(super) fn to_meta(key: &str, value: &MetaValue) -> ffi::Meta {
+    let (kind, text, number, integer) = match value {
+        MetaValue::Text(text) | MetaValue::Other(_, text) => ("string", text.clone(), 0.0, 0),
+        MetaValue::Float(number) => ("float", String::new(), f64::from(*number), 0),
+        MetaValue::Double(number) => ("double", String::new(), *number, 0),
+        MetaValue::Int(integer) => ("int64", String::new(), 0.0, *integer),
+        MetaValue::Bool(yes) => ("bool", String::new(), 0.0, i64::from(*yes)),
+    };
+    ffi::Meta { key: key.into(), kind: kind.into(), text, number, integer }
+}

@@ -1,0 +1,69 @@
+//! Leaves lent out of a grid: the same memory, seen as Rust arrays.
+
+use std::marker::PhantomData;
+
+use super::bridge::ffi::LeafView;
+use crate::base::blocks::{Mask, Origin, Values};
+
+/// A leaf to read.
+#[derive(Clone, Copy)]
+pub struct Leaf<'a> {
+    /// Least corner, in voxels.
+    pub origin: Origin,
+    /// The 512 values.
+    pub values: &'a Values,
+    /// Which of them are active.
+    pub mask: &'a Mask,
+}
+
+/// A leaf to change; no two of them share memory.
+pub struct LeafMut<'a> {
+    /// Least corner, in voxels.
+    pub origin: Origin,
+    /// The 512 values.
+    pub values: &'a mut Values,
+    /// Which of them are active.
+    pub mask: &'a mut Mask,
+}
+
+/// What a grid holds at a block position.
+#[derive(Clone, Copy)]
+pub enum Probe<'a> {
+    /// A leaf.
+    Leaf(Leaf<'a>),
+    /// One value for the whole block.
+    Tile {
+        /// The value.
+        value: f32,
+        /// Whether it is active.
+        active: bool,
+    },
+}
+
+/// Lends the leaf that a view points at.
+///
+/// # Safety
+/// The view must come from a grid that is borrowed for `'a` and not changed meanwhile.
+pub(super) unsafe fn lend<'a>(view: &LeafView, _grid: PhantomData<&'a ()>) -> Leaf<'a> {
+    Leaf {
+        origin: [view.x, view.y, view.z],
+        // SAFETY: the caller keeps the grid borrowed; the C++ side asserts the leaf's layout.
+        values: unsafe { &*(view.values as *const Values) },
+        // SAFETY: as above.
+        mask: unsafe { &*(view.mask as *const Mask) },
+    }
+}
+
+/// Lends the leaf that a view points at, to change.
+///
+/// # Safety
+/// As [`lend`], with the grid borrowed mutably, and each leaf lent once.
+pub(super) unsafe fn lend_mut<'a>(view: &LeafView, _grid: PhantomData<&'a mut ()>) -> LeafMut<'a> {
+    LeafMut {
+        origin: [view.x, view.y, view.z],
+        // SAFETY: the caller holds the grid mutably and lends each leaf once.
+        values: unsafe { &mut *(view.values as *mut Values) },
+        // SAFETY: as above.
+        mask: unsafe { &mut *(view.mask as *mut Mask) },
+    }
+}
