@@ -7,6 +7,10 @@ pub mod context;
 pub mod error;
 pub mod io;
 pub mod motion;
+#[cfg(feature = "cli")]
+pub mod render;
+#[cfg(feature = "cli")]
+pub mod scene;
 #[cfg(feature = "vdb")]
 pub mod snow;
 pub mod sweep;

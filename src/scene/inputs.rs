@@ -1,147 +1,164 @@
-//! Loads and checks every input of a scene before its first frame.
+//! Everything a scene reads before its first frame.
 
-use super::{Ground, Key, Layer, Object, Role, Scene, Up};
-use crate::base::{DVec3, TriMesh, Vec3};
-use crate::error::{Error, Result};
-use crate::io;
-use crate::io::sequence::Sequence;
-use crate::motion::{self, Motion};
-use crate::vdb::{self, FloatGrid, GridClass};
 use std::path::Path;
 
-/// What a scene's files hold, checked.
+use super::{Ground, Layer, Object, Role, Scene, Up};
+use crate::base::{DVec3, TriMesh};
+use crate::context::Context;
+use crate::error::{Error, Result};
+use crate::io::mesh;
+use crate::io::sequence::Pattern;
+use crate::motion::{Key, Keys, MeshSequence, Motion, Placed, Rigid};
+use crate::snow::base_layer::initial::{self, Cover};
+use crate::sweep::Body;
+use crate::vdb::{FloatGrid, GridClass, file};
+
+/// Half width of the snow's narrow band (cells).
+const HALF_WIDTH: f32 = 3.0;
+
+/// What a scene's files hold.
 pub struct Inputs {
-    /// The ground's mesh, if it is one.
-    pub ground: Option<TriMesh>,
-    /// The mesh of the top surface, if the layer is given so.
-    pub top: Option<TriMesh>,
-    /// The layer's level set, if it is given so.
-    pub layer: Option<FloatGrid>,
-    /// Static objects.
-    pub statics: Vec<TriMesh>,
-    /// What moves through the snow, with the object's wish for noise.
+    snow: Snow,
+    statics: Vec<TriMesh>,
+    /// The objects that move through the snow.
     pub bodies: Vec<Body>,
 }
 
-/// One thing that moves through the snow.
-pub struct Body {
-    /// Its motion (s, m).
-    pub motion: Box<dyn Motion>,
-    /// Whether its cuts have ragged edges.
-    pub noise: bool,
-    /// Its mesh at the first frame, for estimates.
-    pub first: TriMesh,
+enum Snow {
+    Made { ground: initial::Ground, cover: Cover },
+    Given(FloatGrid),
 }
 
 impl Inputs {
-    /// Reads the meshes and grids of a scene; of sequences the first frame, and finds all others.
+    /// Reads every input; of sequences the first frame, after checking that none is missing.
     ///
     /// # Errors
-    /// The first file that is missing, unreadable or unusable.
+    /// What the files or keys have wrong, with file and key.
     pub fn load(scene: &Scene) -> Result<Self> {
-        let mut inputs = Self { ground: None, top: None, layer: None, statics: Vec::new(), bodies: Vec::new() };
-        if let Some(Ground::Mesh(path)) = &scene.snow.ground {
-            inputs.ground = Some(read_mesh(path)?);
-        }
-        match &scene.snow.layer {
-            Layer::Depth(_) => {}
-            Layer::Top(path) => inputs.top = Some(read_mesh(path)?),
-            Layer::Grid(path) => inputs.layer = Some(read_layer(path, scene.snow.cell)?),
-        }
-        for object in &scene.objects {
+        let snow = match &scene.snow.layer {
+            Layer::Grid(path) => Snow::Given(layer_grid(path, scene.snow.cell)?),
+            Layer::Depth(depth) => Snow::Made { ground: ground(scene)?, cover: Cover::Depth(*depth) },
+            Layer::Top(path) => Snow::Made { ground: ground(scene)?, cover: Cover::Top(mesh::read(path)?) },
+        };
+        let start = f64::from(scene.shot.frames.first) / scene.shot.fps;
+        let (mut statics, mut bodies) = (Vec::new(), Vec::new());
+        for object in scene.objects.iter().filter(|object| object.role != Role::Ignore) {
+            let motion = motion(scene, object)?;
             match object.role {
-                Role::Collide => inputs.bodies.push(body(object, scene)?),
-                Role::Static => inputs.statics.push(static_mesh(object, scene)?),
-                Role::Ignore => {}
+                Role::Static => statics.push(posed(&*motion, start)?),
+                _ => bodies.push(Body::new(motion, start)?.with_noise(object.noise)),
             }
         }
-        inputs.check_reach(scene)?;
-        Ok(inputs)
+        Ok(Self { snow, statics, bodies })
     }
 
-    /// The meshes of static objects and of bodies at the first frame.
-    pub fn meshes(&self) -> impl Iterator<Item = &TriMesh> {
-        self.statics.iter().chain(self.bodies.iter().map(|body| &body.first))
-    }
-
-    /// Voxel coordinates are 32-bit: refuses what lies too far away for the cell.
-    fn check_reach(&self, scene: &Scene) -> Result<()> {
-        let meshes = self.meshes().chain(&self.ground).chain(&self.top);
-        let farthest = meshes.flat_map(|mesh| &mesh.positions).fold(0.0, |far: f32, at| far.max(at.amax()));
-        if f64::from(farthest) / scene.snow.cell < 1.0e9 {
-            return Ok(());
+    /// Least and greatest x and z of the snow (m), as far as they are known before it is made.
+    pub fn area(&self) -> Option<[f64; 4]> {
+        match &self.snow {
+            Snow::Made { ground: initial::Ground::Plane { area, .. }, .. } => Some(*area),
+            Snow::Made { ground: initial::Ground::Mesh(mesh), .. } => {
+                let (low, high) = mesh.bounds()?;
+                Some([low.x, low.z, high.x, high.z].map(f64::from))
+            }
+            Snow::Given(_) => None,
         }
-        let file = scene.path.display();
-        let what = format!("{file}: a mesh reaches {farthest} m from the origin, too far for `cell` in [snow]");
-        Err(Error::argument(what))
+    }
+
+    /// The snow before the first frame.
+    ///
+    /// # Errors
+    /// As [`initial::layer`].
+    pub fn layer(&self, ctx: &Context, cell: f64) -> Result<FloatGrid> {
+        match &self.snow {
+            Snow::Given(grid) => grid.deep_copy(),
+            Snow::Made { ground, cover } => initial::layer(ctx, ground, &self.statics, cover, cell, HALF_WIDTH),
+        }
     }
 }
 
-/// Reads a mesh and refuses one that no computation can use: empty, NaN, wrong indices.
-fn read_mesh(path: &Path) -> Result<TriMesh> {
-    let mesh = io::mesh::read(path)?;
-    mesh.validate().map_err(|what| Error::file(path, what.to_string()))?;
-    Ok(mesh)
+fn ground(scene: &Scene) -> Result<initial::Ground> {
+    match &scene.snow.ground {
+        Some(Ground::Plane { height, area }) => Ok(initial::Ground::Plane { height: *height, area: *area }),
+        Some(Ground::Mesh(path)) => Ok(initial::Ground::Mesh(mesh::read(path)?)),
+        None => Err(Error::argument("the snow has no ground")),
+    }
 }
 
-/// Reads the level set that is the layer.
-fn read_layer(path: &Path, cell: f64) -> Result<FloatGrid> {
-    let mut grids = vdb::file::read(path)?;
-    let at = match grids.iter().position(|grid| grid.name() == "surface") {
-        Some(at) => at,
-        None if grids.len() == 1 => 0,
-        None => return Err(Error::file(path, "holds no float grid named surface")),
-    };
-    let grid = grids.swap_remove(at);
-    let name = grid.name();
+fn layer_grid(path: &Path, cell: f64) -> Result<FloatGrid> {
+    let grid = file::read_named(path, None)?;
     if grid.class() != GridClass::LevelSet {
-        return Err(Error::file(path, format!("the grid {name} is no level set")));
+        return Err(Error::file(path, format!("grid \"{}\" is not a level set", grid.name())));
     }
-    if !grid.is_uniform() || (grid.voxel_size() / cell - 1.0).abs() > 1.0e-6 {
-        let what = format!("the grid {name} has voxels of {} m, not {cell} m as `cell`", grid.voxel_size());
-        return Err(Error::file(path, what));
+    let own = grid.voxel_size();
+    if (own - cell).abs() > 1e-6 * cell {
+        return Err(Error::file(path, format!("the layer has cells of {own} m, but `cell` is {cell} m")));
     }
-    if f64::from(grid.background()) < 2.99 * cell {
-        return Err(Error::file(path, format!("the grid {name} has a band of less than 3 voxels on a side")));
+    if f64::from(grid.background()) < 2.999 * own {
+        return Err(Error::file(path, "the layer's narrow band is less than 3 cells wide"));
     }
     Ok(grid)
 }
 
-/// Whether an object's file is the pattern of a sequence.
-fn is_pattern(object: &Object) -> bool {
-    Sequence::is_pattern(&object.file.to_string_lossy())
-}
-
-fn static_mesh(object: &Object, scene: &Scene) -> Result<TriMesh> {
-    let body = body(object, scene)?;
-    Ok(body.first)
-}
-
-fn body(object: &Object, scene: &Scene) -> Result<Body> {
-    let motion = object_motion(object, scene)?;
-    let mut first = Vec::new();
-    motion.pose(f64::from(scene.shot.frames.first) / scene.shot.fps, &mut first)?;
-    let positions = first.iter().map(|at| at.cast()).collect();
-    let first = TriMesh { positions, triangles: motion.triangles().to_vec() };
-    Ok(Body { motion, noise: object.noise, first })
-}
-
-fn object_motion(object: &Object, scene: &Scene) -> Result<Box<dyn Motion>> {
+/// An object's motion: its file, its own frames, scale and axis, and the keys over them.
+fn motion(scene: &Scene, object: &Object) -> Result<Box<dyn Motion>> {
     let fps = scene.shot.fps;
-    let keys = object.keys.iter().map(|key| motion_key(key, fps)).collect::<Vec<_>>();
-    if is_pattern(object) {
-        let moving = sequence(object, scene)?;
-        return Ok(match keys.is_empty() {
-            true => moving,
-            false => Box::new(motion::Placed::new(moving, keys)?),
-        });
+    let radians = |turn: [f64; 3]| DVec3::from(turn.map(f64::to_radians));
+    let keys = object.keys.iter().map(|key| Key {
+        time: key.frame / fps,
+        at: DVec3::from(key.at),
+        turn: radians(key.turn_deg),
+    });
+    let keys = Keys::new(keys.collect())?;
+    let own: Box<dyn Motion> = match Pattern::parse(&object.file) {
+        None => Box::new(Rigid::new(mesh::read(&object.file)?, Keys::default())),
+        Some(pattern) => {
+            let first = (f64::from(scene.shot.frames.first) - object.offset).floor() as i32;
+            let last = (f64::from(scene.shot.frames.last) - object.offset).ceil() as i32;
+            Box::new(MeshSequence::open(pattern, first, last, fps, object.offset)?)
+        }
+    };
+    let own: Box<dyn Motion> = if object.scale == 1.0 && object.up == Up::Y {
+        own
+    } else {
+        Box::new(Transformed { inner: own, scale: object.scale, up: object.up })
+    };
+    Ok(Box::new(Placed::new(own, keys)))
+}
+
+fn posed(motion: &dyn Motion, time: f64) -> Result<TriMesh> {
+    let mut pose = Vec::new();
+    motion.pose(time, &mut pose)?;
+    Ok(TriMesh { positions: pose.iter().map(|p| p.cast()).collect(), triangles: motion.triangles().to_vec() })
+}
+
+/// A motion in another unit, or with another axis up.
+struct Transformed {
+    inner: Box<dyn Motion>,
+    scale: f64,
+    up: Up,
+}
+
+impl Motion for Transformed {
+    fn triangles(&self) -> &[[u32; 3]] {
+        self.inner.triangles()
     }
-    let mut mesh = read_mesh(&object.file)?;
-    for position in &mut mesh.positions {
-        *position = converted(position.cast(), object).cast();
+
+    fn vertex_count(&self) -> usize {
+        self.inner.vertex_count()
     }
-    Ok(match keys.is_empty() {
-        true => Box::new(motion::Static::new(mesh)),
-        false => Box::new(motion::Rigid::new(mesh, keys)?),
-    })
+
+    fn pose(&self, time: f64, out: &mut Vec<DVec3>) -> Result<()> {
+        self.inner.pose(time, out)?;
+        for p in out {
+            *p *= self.scale;
+            if self.up == Up::Z {
+                *p = DVec3::new(p.x, p.z, -p.y);
+            }
+        }
+        Ok(())
+    }
+
+    fn breaks(&self, from: f64, to: f64) -> Vec<f64> {
+        self.inner.breaks(from, to)
+    }
 }

@@ -4,14 +4,14 @@
 mod file;
 mod frames;
 mod inputs;
-pub mod machine;
-pub mod memory;
+mod memory;
 mod resolved;
 pub mod shot;
 mod table;
 
 pub use frames::Frames;
 pub use inputs::Inputs;
+pub use memory::{check as check_memory, estimate};
 
 use std::path::PathBuf;
 

@@ -20,6 +20,7 @@ pub struct Body {
     same: Vec<u32>,
     topology: Topology,
     longest_edge: f64,
+    noise: bool,
 }
 
 impl Body {
@@ -42,7 +43,17 @@ impl Body {
         }
         let length = |&[i, j]: &[u32; 2]| (pose[i as usize] - pose[j as usize]).norm();
         let longest_edge = topology.edges.iter().map(length).fold(0.0, f64::max);
-        Ok(Self { motion, same, topology, longest_edge })
+        Ok(Self { motion, same, topology, longest_edge, noise: true })
+    }
+
+    /// Says whether its imprints have ragged edges (they do unless this says no).
+    pub fn with_noise(self, noise: bool) -> Self {
+        Self { noise, ..self }
+    }
+
+    /// Whether its imprints have ragged edges.
+    pub fn has_noise(&self) -> bool {
+        self.noise
     }
 
     /// The motion itself.

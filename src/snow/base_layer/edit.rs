@@ -97,6 +97,13 @@ fn remove_part(origin: Origin, before: &Values, cells: &Values, scale: Scale) ->
     Some(Edit { surface: pack(origin, after, scale), removed: (!outside).then_some(removed), changed, heights })
 }
 
+/// A block of a level set from distances in cells.
+pub fn from_cells(origin: Origin, mut cells: Box<Values>, scale: Scale) -> BlockEdit {
+    let metres = |value: f32| (value * scale.cell).clamp(-scale.background, scale.background);
+    cells.iter_mut().for_each(|value| *value = metres(*value));
+    pack(origin, cells, scale)
+}
+
 /// A leaf, or a constant where no value lies within the band.
 fn pack(origin: Origin, values: Box<Values>, scale: Scale) -> BlockEdit {
     let mask = band_mask(&values, scale.background);

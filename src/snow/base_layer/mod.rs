@@ -11,7 +11,7 @@ use std::collections::{BTreeMap, BTreeSet, HashMap};
 
 use rayon::prelude::*;
 
-pub use noise::NoiseParams;
+pub use noise::{NoiseParams, displace};
 
 use crate::base::DVec3;
 use crate::base::blocks::{Block, BlockEdit, Mask, Origin, VOXELS};
@@ -134,14 +134,10 @@ impl BaseLayer {
     pub fn step(&mut self, ctx: &Context, bodies: &[Body], from: f64, to: f64, frame: i32) -> Result<StepReport> {
         ctx.take_timings();
         let displacement = self.params.noise.map(|noise| Displacement::new(&noise, self.surface.voxel_size()));
-        let voxeliser = ctx.stage("sweep", || self.sweep(bodies, from, to, displacement.as_ref()))?;
-        let mut pieces = ctx.stage("distance", || self.pieces(ctx, &voxeliser))?;
-        if let Some(displacement) = &displacement {
-            ctx.stage("noise", || {
-                displacement.apply(&mut pieces, self.half_width);
-                Ok(())
-            })?;
-        }
+        let (ragged, exact): (Vec<&Body>, Vec<&Body>) = bodies.iter().partition(|body| body.has_noise());
+        let (ragged, ragged_faces) = self.sweep(ctx, &ragged, from, to, displacement.as_ref())?;
+        let (exact, exact_faces) = self.sweep(ctx, &exact, from, to, None)?;
+        let pieces = united(ragged, exact);
         let edits = ctx.stage("subtract", || self.edits(&pieces))?;
         let change = ctx.stage("columns", || self.change(ctx, edits, frame))?;
         let (removed_volume, touched_blocks) = (change.volume, change.surface.len());
@@ -150,7 +146,7 @@ impl BaseLayer {
             removed_volume,
             base_volume: self.volume,
             touched_blocks,
-            sweep_faces: voxeliser.face_count(),
+            sweep_faces: ragged_faces + exact_faces,
             stages: ctx.take_timings(),
         })
     }
@@ -159,8 +155,31 @@ impl BaseLayer {
         Scale { cell: self.surface.voxel_size() as f32, background: self.surface.background() }
     }
 
+    /// Distances of the volume that bodies sweep, displaced, in the blocks that hold snow; and its faces.
+    fn sweep(
+        &self,
+        ctx: &Context,
+        bodies: &[&Body],
+        from: f64,
+        to: f64,
+        noise: Option<&Displacement>,
+    ) -> Result<(Vec<Piece>, usize)> {
+        if bodies.is_empty() {
+            return Ok((Vec::new(), 0));
+        }
+        let voxeliser = ctx.stage("sweep", || self.voxeliser(bodies, from, to, noise))?;
+        let mut pieces = ctx.stage("distance", || self.pieces(ctx, &voxeliser))?;
+        if let Some(noise) = noise {
+            ctx.stage("noise", || {
+                noise.apply(&mut pieces, self.half_width);
+                Ok(())
+            })?;
+        }
+        Ok((pieces, voxeliser.face_count()))
+    }
+
     /// The swept volume's boundary near the snow, sorted into blocks.
-    fn sweep(&self, bodies: &[Body], from: f64, to: f64, noise: Option<&Displacement>) -> Result<Voxeliser> {
+    fn voxeliser(&self, bodies: &[&Body], from: f64, to: f64, noise: Option<&Displacement>) -> Result<Voxeliser> {
         let cell = self.surface.voxel_size();
         let middle = [0, 1, 2].map(|a| (f64::from(self.low[a]) + f64::from(self.high[a])) * 0.5 * cell);
         let lattice = Lattice::near(cell, DVec3::from(middle))?;
@@ -312,6 +331,27 @@ struct Change {
     removed: FloatGrid,
     columns: BTreeMap<[i32; 2], Column>,
     volume: f64,
+}
+
+/// The union of two sweeps, block by block.
+fn united(mut pieces: Vec<Piece>, others: Vec<Piece>) -> Vec<Piece> {
+    if pieces.is_empty() {
+        return others;
+    }
+    let places: HashMap<Origin, usize> = pieces.iter().enumerate().map(|(index, p)| (p.origin(), index)).collect();
+    for other in others {
+        match places.get(&other.origin()) {
+            None => pieces.push(other),
+            Some(&index) => match (&mut pieces[index], other) {
+                (Piece::Near(_, values), Piece::Near(_, others)) => {
+                    values.iter_mut().zip(others.iter()).for_each(|(value, other)| *value = value.min(*other));
+                }
+                (piece, inside @ Piece::Inside(_)) => *piece = inside,
+                (Piece::Inside(_), Piece::Near(..)) => {}
+            },
+        }
+    }
+    pieces
 }
 
 fn empty_removed(cell: f64, half_width: f32) -> Result<FloatGrid> {

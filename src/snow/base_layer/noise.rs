@@ -9,9 +9,12 @@ use std::collections::HashMap;
 use fastnoise_lite::{FastNoiseLite, FractalType, NoiseType};
 use rayon::prelude::*;
 
-use crate::base::blocks::{Origin, Values, offset};
+use super::edit::{self, Scale};
+use crate::base::blocks::{BlockEdit, Origin, Values, offset};
+use crate::context::Context;
 use crate::error::{Error, Result};
-use crate::sweep::Piece;
+use crate::sweep::{Piece, Settings};
+use crate::vdb::{FloatGrid, level_set};
 
 /// Irregularity of an imprint's surface.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -119,6 +122,40 @@ impl Displacement {
         });
         normalise(pieces);
     }
+}
+
+/// Displaces a whole level set outward by noise; its band must be as wide as the amplitude and a cell.
+///
+/// # Errors
+/// Parameters out of range; cancel.
+pub fn displace(ctx: &Context, grid: &mut FloatGrid, params: &NoiseParams) -> Result<()> {
+    let cell = grid.voxel_size();
+    params.validate(cell)?;
+    let noise = Displacement::new(params, cell);
+    let half_width = (f64::from(grid.background()) / cell) as f32;
+    // Rebuilt with a band that holds the displaced surface and still three cells around it.
+    let mesh = level_set::to_mesh(ctx, grid, 0.0, 0.0)?;
+    let settings = Settings { half_width: half_width + noise.amplitude.ceil(), ..Settings::new(cell) };
+    let wide = crate::sweep::voxelise(ctx, &mesh, &settings)?;
+    let mut pieces: Vec<Piece> = wide
+        .leaves()?
+        .iter()
+        .map(|leaf| Piece::Near(leaf.origin, Box::new(leaf.values.map(|value| value / cell as f32))))
+        .collect();
+    noise.apply(&mut pieces, half_width);
+    let scale = Scale { cell: cell as f32, background: half_width * cell as f32 };
+    let mut displaced = FloatGrid::level_set(cell, half_width)?;
+    let edits: Vec<BlockEdit> = pieces
+        .into_iter()
+        .filter_map(|piece| match piece {
+            Piece::Near(origin, cells) => Some(edit::from_cells(origin, cells, scale)),
+            Piece::Inside(_) => None,
+        })
+        .collect();
+    displaced.replace_blocks(ctx, &edits)?;
+    displaced.flood_fill()?;
+    *grid = displaced;
+    Ok(())
 }
 
 /// Divides each value by the field's steepness there, so that distances near the surface are true again.

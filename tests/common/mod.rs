@@ -1,0 +1,5 @@
+//! What tests, benchmarks and examples share: shapes made by code.
+#![allow(dead_code)]
+
+pub mod boot;
+pub mod shapes;
