@@ -2,6 +2,7 @@
 
 mod exit;
 mod info;
+mod machine;
 mod options;
 mod output;
 mod preview;

@@ -1,7 +1,7 @@
 //! What all commands share: threads, signals, verbosity, the report of a run.
 
 use super::exit::{self, Failure, Phase};
-use frazil::scene::machine;
+use super::machine;
 use super::output;
 use super::signals::Signals;
 use frazil::{Context, Pool};
