@@ -59,7 +59,7 @@ fn a_wrong_option_is_one_sentence() {
     refuses(folder.path(), "snow shot.toml -o out --frames 1-9", 2, &["1-9", "1-2"]);
     refuses(folder.path(), "snow shot.toml -o out --max-memory lots", 2, &["--max-memory"]);
     refuses(folder.path(), "brew", 2, &["brew"]);
-    refuses(folder.path(), "vdb from-mesh cube.obj --cell -1 -o out.vdb", 2, &["--cell"]);
+    refuses(folder.path(), "vdb from-mesh cube.obj --cell=-1 -o out.vdb", 2, &["--cell"]);
     refuses(folder.path(), "vdb from-mesh cube.obj --cell 0.1 -o out.obj", 2, &["out.obj", ".vdb"]);
 }
 
@@ -80,8 +80,8 @@ fn missing_and_empty_files_are_named() {
 fn meshes_that_cannot_be_used_are_named_with_the_fault() {
     let folder = folder();
     let wrong = [
-        ("nan.obj", CUBE.replacen("v 1 0 0", "v nan 0 0", 1), "vertex 2"),
-        ("inf.obj", CUBE.replacen("v 1 1 1", "v 1 inf 1", 1), "vertex 7"),
+        ("nan.obj", CUBE.replacen("v 1 0 0", "v nan 0 0", 1), "line 2"),
+        ("inf.obj", CUBE.replacen("v 1 1 1", "v 1 inf 1", 1), "line 7"),
         ("range.obj", CUBE.replacen("f 2 3 7 6", "f 2 3 7 60", 1), "face"),
         ("points.obj", CUBE.split("f ").next().unwrap().to_string(), "faces"),
     ];
