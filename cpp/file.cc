@@ -72,7 +72,7 @@ std::unique_ptr<std::string> grids_to_bytes(rust::Slice<const size_t> grids, int
     for (const size_t address : grids) {
         const auto& source = reinterpret_cast<const Grid*>(address)->impl->grid;
         // A shallow copy carries its own metadata: statistics and precision stay out of the caller's grid.
-        auto copy = openvdb::FloatGrid::create(*source);
+        auto copy = source->copy();
         copy->setSaveFloatAsHalf(half);
         list.push_back(copy);
     }

@@ -91,8 +91,9 @@ fn open_non_manifold_and_distant_meshes_work() {
     let folder_fin = folder(2, 0.05, &fin);
     works(folder_fin.path(), "snow shot.toml -o out -q");
     assert!(removed(folder_fin.path(), 1) > 0.02);
-    let far = CUBE.replace("v ", "v 9");
-    let folder_far = folder(2, 0.05, &far.replace("9-.", "-9.").replace("9.2", "9.2"));
+    let folder_far = folder(2, 0.05, CUBE);
+    let scene = fs::read_to_string(folder_far.path().join("shot.toml")).unwrap();
+    fs::write(folder_far.path().join("shot.toml"), scene.replace("at = [0,", "at = [50,")).unwrap();
     works(folder_far.path(), "snow shot.toml -o out -q");
     assert_eq!(removed(folder_far.path(), 2), 0.0);
 }
