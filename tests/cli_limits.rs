@@ -102,3 +102,74 @@ fn damaged_and_foreign_vdb_files_are_named() {
     assert!(!folder.path().join("cut.ply").exists());
     assert_eq!(begun(folder.path()), Vec::<String>::new());
 }
+
+#[test]
+fn a_grid_of_another_type_is_named_with_its_type() {
+    let folder = folder();
+    let make = "import pyopenvdb as v; g = v.BoolGrid(); g.name = 'mask'; g.fill((0, 0, 0), (9, 9, 9), True); \
+                v.write('mask.vdb', g)";
+    let python = std::process::Command::new("/usr/bin/python3").current_dir(folder.path()).args(["-c", make]).output();
+    if !python.is_ok_and(|output| output.status.success()) {
+        eprintln!("skipped: no pyopenvdb");
+        return;
+    }
+    fails(&frazil(folder.path(), "vdb to-mesh mask.vdb -o out.ply"), 2, &["mask.vdb", "\"mask\"", "bool"]);
+    assert!(frazil(folder.path(), "info mask.vdb").status.success());
+}
+
+/// Runs the program in a shell whose files may have at most so many blocks of 512 bytes.
+fn with_file_limit(folder: &Path, blocks: u32, arguments: &str) -> Output {
+    let program = Command::cargo_bin("frazil").unwrap().get_program().to_os_string();
+    let script = format!("ulimit -f {blocks}; exec \"$0\" {arguments}");
+    let mut shell = std::process::Command::new("sh");
+    shell.current_dir(folder).arg("-c").arg(script).arg(program).output().unwrap()
+}
+
+#[test]
+fn a_full_disk_ends_the_run_with_nothing_half_written() {
+    let folder = folder();
+    fs::write(folder.path().join("shot.toml"), scene(3, 0.01, "cube.obj")).unwrap();
+    let output = with_file_limit(folder.path(), 16, "snow shot.toml -o out -q");
+    fails(&output, 1, &["cannot write"]);
+    let made = frazil(folder.path(), "vdb from-mesh cube.obj --cell 0.005 -o whole.vdb");
+    assert!(made.status.success());
+    let output = with_file_limit(folder.path(), 16, "vdb from-mesh cube.obj --cell 0.005 -o out.vdb");
+    fails(&output, 1, &["out.vdb", "cannot write"]);
+    assert!(!folder.path().join("out.vdb").exists());
+    assert_eq!(begun(folder.path()), Vec::<String>::new());
+}
+
+#[test]
+fn a_signal_leaves_whole_frames_and_its_exit_code() {
+    for (signal, code) in [("INT", 130), ("TERM", 143)] {
+        let folder = folder();
+        fs::write(folder.path().join("shot.toml"), scene(100_000, 0.02, "cube.obj")).unwrap();
+        let program = Command::cargo_bin("frazil").unwrap().get_program().to_os_string();
+        let mut command = std::process::Command::new(program);
+        command.current_dir(folder.path()).args(["snow", "shot.toml", "-o", "out"]).stderr(Stdio::piped());
+        let child = command.spawn().unwrap();
+        let second = folder.path().join("out/base/base.0002.vdb");
+        let start = Instant::now();
+        while !second.exists() && start.elapsed() < Duration::from_secs(60) {
+            std::thread::sleep(Duration::from_millis(20));
+        }
+        let kill = std::process::Command::new("kill").args(["-s", signal, &child.id().to_string()]).status();
+        assert!(kill.unwrap().success());
+        let asked = Instant::now();
+        fails(&child.wait_with_output().unwrap(), code, &["frazil: "]);
+        assert!(asked.elapsed() < Duration::from_secs(5), "it went on for {:?}", asked.elapsed());
+        assert_eq!(begun(folder.path()), Vec::<String>::new());
+        assert!(frazil(folder.path(), "info out/base/base.0002.vdb").status.success());
+    }
+}
+
+#[test]
+fn a_closed_pipe_is_no_error() {
+    let folder = folder();
+    let program = Command::cargo_bin("frazil").unwrap().get_program().to_os_string();
+    let mut shell = std::process::Command::new("sh");
+    let script = "(\"$0\" info cube.obj cube.obj; echo $? > code; \"$0\" --help; echo $? >> code) | true; sleep 0.5";
+    let output = shell.current_dir(folder.path()).arg("-c").arg(script).arg(program).output().unwrap();
+    assert!(output.stderr.is_empty(), "{}", String::from_utf8_lossy(&output.stderr));
+    assert_eq!(fs::read_to_string(folder.path().join("code")).unwrap(), "0\n0\n");
+}

@@ -3,7 +3,6 @@
 use assert_cmd::Command;
 use std::fs;
 use std::path::Path;
-use std::process::Stdio;
 use tempfile::TempDir;
 
 const CUBE: &str = "v -.2 0 -.2\nv .2 0 -.2\nv .2 .4 -.2\nv -.2 .4 -.2\nv -.2 0 .2\nv .2 0 .2\nv .2 .4 .2\nv -.2 .4 .2\n\
@@ -39,15 +38,6 @@ fn removed(folder: &Path, frame: u32) -> f64 {
     let text = fs::read_to_string(folder.join(format!("out/report/{frame:04}.json"))).unwrap();
     let report: serde_json::Value = serde_json::from_str(&text).unwrap();
     report["removed_m3"].as_f64().unwrap()
-}
-
-fn part_files(folder: &Path) -> usize {
-    let entries = fs::read_dir(folder).unwrap().map(|entry| entry.unwrap().path());
-    entries.map(|path| if path.is_dir() { part_files(&path) } else { usize::from(is_part(&path)) }).sum()
-}
-
-fn is_part(path: &Path) -> bool {
-    path.extension().is_some_and(|extension| extension == "part")
 }
 
 #[test]
