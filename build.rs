@@ -14,10 +14,16 @@ fn main() {
     let roots: Vec<PathBuf> =
         ["OPENVDB_ROOT", "TBB_ROOT"].iter().filter_map(std::env::var_os).map(PathBuf::from).collect();
     let has_header = |root: &Path| root.join("include/openvdb/openvdb.h").exists();
-    if !roots.iter().any(|root| has_header(root)) && !has_header(Path::new("/usr")) && !has_header(Path::new("/usr/local"))
+    if !roots.iter().any(|root| has_header(root))
+        && !has_header(Path::new("/usr"))
+        && !has_header(Path::new("/usr/local"))
     {
-        eprintln!("OpenVDB's headers were not found: apt-get install libopenvdb-dev libboost-dev libboost-iostreams-dev,");
-        eprintln!("or set OPENVDB_ROOT to the folder that holds include/openvdb; or build with --no-default-features.");
+        eprintln!(
+            "OpenVDB's headers were not found: apt-get install libopenvdb-dev libboost-dev libboost-iostreams-dev,"
+        );
+        eprintln!(
+            "or set OPENVDB_ROOT to the folder that holds include/openvdb; or build with --no-default-features."
+        );
         std::process::exit(1);
     }
     let mut build = cxx_build::bridge("src/vdb/bridge.rs");

@@ -99,7 +99,11 @@ fn scene_mistakes_are_named_with_line_and_key() {
     let folder = folder();
     let wrong = [
         ("frames", "framse", "shot.toml:2: unknown key `framse` in [shot]; did you mean `frames`?"),
-        ("depth = 0.3", "depth = \"deep\"", "shot.toml:6: `depth` in [snow] must be a finite number, not a text"),
+        (
+            "depth = 0.3",
+            "depth = \"deep\"",
+            "shot.toml:6: `depth` in [snow] must be a finite number, not a text",
+        ),
         ("cell = 0.05", "cell = 0", "shot.toml:7: `cell` in [snow] must lie in"),
         ("[[object]]", "[[objects]]", "shot.toml:8: unknown key `objects`; did you mean `object`?"),
         ("\"1-2\"", "\"2-1\"", "ends before it starts"),

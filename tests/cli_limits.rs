@@ -108,7 +108,8 @@ fn a_grid_of_another_type_is_named_with_its_type() {
     let folder = folder();
     let make = "import pyopenvdb as v; g = v.BoolGrid(); g.name = 'mask'; g.fill((0, 0, 0), (9, 9, 9), True); \
                 v.write('mask.vdb', g)";
-    let python = std::process::Command::new("/usr/bin/python3").current_dir(folder.path()).args(["-c", make]).output();
+    let python =
+        std::process::Command::new("/usr/bin/python3").current_dir(folder.path()).args(["-c", make]).output();
     if !python.is_ok_and(|output| output.status.success()) {
         eprintln!("skipped: no pyopenvdb");
         return;
@@ -168,7 +169,8 @@ fn a_closed_pipe_is_no_error() {
     let folder = folder();
     let program = Command::cargo_bin("frazil").unwrap().get_program().to_os_string();
     let mut shell = std::process::Command::new("sh");
-    let script = "(\"$0\" info cube.obj cube.obj; echo $? > code; \"$0\" --help; echo $? >> code) | true; sleep 0.5";
+    let script =
+        "(\"$0\" info cube.obj cube.obj; echo $? > code; \"$0\" --help; echo $? >> code) | true; sleep 0.5";
     let output = shell.current_dir(folder.path()).arg("-c").arg(script).arg(program).output().unwrap();
     assert!(output.stderr.is_empty(), "{}", String::from_utf8_lossy(&output.stderr));
     assert_eq!(fs::read_to_string(folder.path().join("code")).unwrap(), "0\n0\n");

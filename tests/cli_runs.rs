@@ -53,7 +53,8 @@ fn a_scene_makes_frames_and_its_resolved_file_makes_them_again() {
     }
     let json = works(folder.path(), "info out/base/base.0003.vdb --json --measure");
     let told: serde_json::Value = serde_json::from_str(&json).unwrap();
-    let names: Vec<_> = told[0]["holds"].as_array().unwrap().iter().map(|grid| grid["name"].clone()).collect();
+    let names: Vec<_> =
+        told[0]["holds"].as_array().unwrap().iter().map(|grid| grid["name"].clone()).collect();
     assert_eq!(names, ["surface", "compression", "touched"]);
     works(folder.path(), "preview out/base/base.0003.vdb cube.obj -o p.png --size 64x36");
     assert!(folder.path().join("p.png").metadata().unwrap().len() > 500);

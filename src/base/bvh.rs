@@ -37,8 +37,11 @@ pub struct RayHit {
 impl Bvh {
     /// Sorts a mesh's triangles into a tree.
     pub fn new(mesh: &TriMesh) -> Self {
-        let corners: Vec<[Vec3; 3]> =
-            mesh.triangles.iter().map(|triangle| triangle.map(|index| mesh.positions[index as usize])).collect();
+        let corners: Vec<[Vec3; 3]> = mesh
+            .triangles
+            .iter()
+            .map(|triangle| triangle.map(|index| mesh.positions[index as usize]))
+            .collect();
         let mut tree = Self { nodes: Vec::new(), order: (0..corners.len() as u32).collect(), corners };
         if !tree.order.is_empty() {
             tree.split(0, tree.order.len());
@@ -59,7 +62,8 @@ impl Bvh {
             let axis = (high - low).imax();
             let middle = (first + end) / 2;
             let corners = &self.corners;
-            let key = |&triangle: &u32| corners[triangle as usize].iter().map(|corner| corner[axis]).sum::<f32>();
+            let key =
+                |&triangle: &u32| corners[triangle as usize].iter().map(|corner| corner[axis]).sum::<f32>();
             self.order[first..end]
                 .select_nth_unstable_by(middle - first, |a, b| key(a).total_cmp(&key(b)).then(a.cmp(b)));
             self.nodes[index].count = 0;
@@ -90,7 +94,13 @@ impl Bvh {
     }
 
     /// Shows hits to `see`, which gives the new limit, or none to stop.
-    fn walk(&self, origin: DVec3, direction: DVec3, mut limit: f64, mut see: impl FnMut(RayHit) -> Option<f64>) {
+    fn walk(
+        &self,
+        origin: DVec3,
+        direction: DVec3,
+        mut limit: f64,
+        mut see: impl FnMut(RayHit) -> Option<f64>,
+    ) {
         let inverse = direction.map(|value| 1.0 / value);
         let mut stack = [0u32; 64];
         let mut depth = usize::from(!self.nodes.is_empty());

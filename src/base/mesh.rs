@@ -28,7 +28,10 @@ impl TriMesh {
         let count = self.positions.len();
         let wild = |triangle: &[u32; 3]| triangle.iter().any(|&index| index as usize >= count);
         if let Some(triangle) = self.triangles.iter().position(wild) {
-            return Err(Error::argument(format!("face {} names a vertex beyond the {count} there are", triangle + 1)));
+            return Err(Error::argument(format!(
+                "face {} names a vertex beyond the {count} there are",
+                triangle + 1
+            )));
         }
         Ok(())
     }

@@ -23,7 +23,9 @@ use std::process::ExitCode;
 /// Lengths are metres, frames are whole numbers, Y is up.
 #[derive(Parser)]
 #[command(name = "frazil", version, propagate_version = true, max_term_width = 110)]
-#[command(after_help = "Example:\n  frazil snow walker.toml -o cache/ && frazil preview cache/base/base.0048.vdb -o print.png")]
+#[command(
+    after_help = "Example:\n  frazil snow walker.toml -o cache/ && frazil preview cache/base/base.0048.vdb -o print.png"
+)]
 struct Cli {
     #[command(flatten)]
     globals: Globals,

@@ -13,7 +13,9 @@ use super::{options, output};
 
 /// Draw meshes and level sets into a PNG.
 #[derive(clap::Args)]
-#[command(after_help = "Example:\n  frazil preview cache/base/base.0048.vdb boot.obj -o print.png --eye 1,1.5,2 --target 0,0,1")]
+#[command(
+    after_help = "Example:\n  frazil preview cache/base/base.0048.vdb boot.obj -o print.png --eye 1,1.5,2 --target 0,0,1"
+)]
 pub struct Args {
     /// .vdb (its first level set), .obj or .ply files.
     #[arg(required = true)]
@@ -54,9 +56,11 @@ pub fn run(args: Args, session: &Session) -> Result<(), Failure> {
     if !(1.0..=170.0).contains(&args.fov) {
         return Err(Failure::refused(format!("--fov {} is not within 1 to 170 degrees", args.fov)));
     }
-    let models = args.files.iter().map(|path| model(path, &session.ctx)).collect::<frazil::Result<Vec<Model>>>();
+    let models =
+        args.files.iter().map(|path| model(path, &session.ctx)).collect::<frazil::Result<Vec<Model>>>();
     let stage = Stage::new(models.before()?);
-    let bounds = stage.bounds().ok_or_else(|| Failure::refused("there is nothing to draw: the files are empty"))?;
+    let bounds =
+        stage.bounds().ok_or_else(|| Failure::refused("there is nothing to draw: the files are empty"))?;
     let mut camera = Camera::framing(bounds, args.size);
     if let (Some(eye), Some(target)) = (args.eye, args.target) {
         if eye == target {

@@ -5,10 +5,10 @@ use std::path::PathBuf;
 use frazil::scene::{Frames, Inputs, Scene, check_memory, shot};
 
 use super::exit::{Failure, Phase};
-use super::progress::FrameProgress;
-use super::session::Session;
 use super::options::MemoryOption;
 use super::output;
+use super::progress::FrameProgress;
+use super::session::Session;
 
 /// Press moving objects into a layer of snow.
 ///
@@ -44,7 +44,10 @@ pub fn run(args: Args, session: &Session) -> Result<(), Failure> {
     let scene = Scene::read(&args.scene).before()?;
     let frames = args.frames.unwrap_or(scene.shot.frames);
     if frames.first < scene.shot.frames.first || frames.last > scene.shot.frames.last {
-        return Err(Failure::refused(format!("--frames {frames} is not within the shot's {}", scene.shot.frames)));
+        return Err(Failure::refused(format!(
+            "--frames {frames} is not within the shot's {}",
+            scene.shot.frames
+        )));
     }
     let inputs = Inputs::load(&scene).before()?;
     check_memory(&scene, &inputs, args.memory.bytes()).before()?;

@@ -7,7 +7,12 @@ use crate::base::{TriMesh, Vec3};
 /// Reads positions and faces, polygons as fans.
 pub(super) fn parse(bytes: &[u8]) -> Result<TriMesh, String> {
     check_numbers(bytes)?;
-    let options = tobj::LoadOptions { triangulate: true, ignore_points: true, ignore_lines: true, ..Default::default() };
+    let options = tobj::LoadOptions {
+        triangulate: true,
+        ignore_points: true,
+        ignore_lines: true,
+        ..Default::default()
+    };
     let mut reader = std::io::BufReader::new(bytes);
     let no_materials = |_: &std::path::Path| Ok((Vec::new(), Default::default()));
     let (models, _) = tobj::load_obj_buf(&mut reader, &options, no_materials)
@@ -39,9 +44,13 @@ fn check_numbers(bytes: &[u8]) -> Result<(), String> {
             Some("f") => {
                 for word in words.take_while(|word| !word.starts_with('#')) {
                     let index: Option<i64> = word.split('/').next().and_then(|index| index.parse().ok());
-                    let known = index.is_some_and(|i| (1..=vertices).contains(&i) || (-vertices..=-1).contains(&i));
+                    let known =
+                        index.is_some_and(|i| (1..=vertices).contains(&i) || (-vertices..=-1).contains(&i));
                     if !known {
-                        return Err(format!("line {}: the face names vertex {word}, but there are {vertices} before it", number + 1));
+                        return Err(format!(
+                            "line {}: the face names vertex {word}, but there are {vertices} before it",
+                            number + 1
+                        ));
                     }
                 }
             }

@@ -34,7 +34,8 @@ struct Element {
 /// Reads the vertices and faces of a PLY file.
 pub(super) fn parse(bytes: &[u8]) -> Result<TriMesh, String> {
     let end = find(bytes, b"end_header").ok_or("not a .ply file, or its header is cut short")?;
-    let body = end + bytes[end..].iter().position(|&byte| byte == b'\n').ok_or("the .ply header is cut short")? + 1;
+    let body =
+        end + bytes[end..].iter().position(|&byte| byte == b'\n').ok_or("the .ply header is cut short")? + 1;
     let header = std::str::from_utf8(&bytes[..end]).map_err(|_| "the .ply header is not text")?;
     let (format, elements) = parse_header(header)?;
     let mut reader = Reader { format, bytes: &bytes[body..], at: 0 };
@@ -71,7 +72,8 @@ fn parse_header(header: &str) -> Result<(Format, Vec<Element>), String> {
                 elements.push(Element { name: name.to_string(), count, properties: Vec::new() });
             }
             ["property", "list", count, kind, name] => {
-                let (list, kind) = (Some(kind_of(count).ok_or_else(wrong)?), kind_of(kind).ok_or_else(wrong)?);
+                let (list, kind) =
+                    (Some(kind_of(count).ok_or_else(wrong)?), kind_of(kind).ok_or_else(wrong)?);
                 let element = elements.last_mut().ok_or_else(wrong)?;
                 element.properties.push(Property { name: name.to_string(), kind, list });
             }
@@ -152,7 +154,9 @@ fn read_row(reader: &mut Reader<'_>, element: &Element, mesh: &mut TriMesh) -> O
                 if !(0.0..=reader.bytes.len() as f64).contains(&count) {
                     return None;
                 }
-                let values = (0..count as usize).map(|_| reader.number(property.kind)).collect::<Option<Vec<f64>>>()?;
+                let values = (0..count as usize)
+                    .map(|_| reader.number(property.kind))
+                    .collect::<Option<Vec<f64>>>()?;
                 match (element.name.as_str(), property.name.as_str()) {
                     ("face", "vertex_indices" | "vertex_index") => add_polygon(&values, mesh),
                     ("tristrips", _) => add_strips(&values, mesh),

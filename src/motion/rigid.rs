@@ -27,7 +27,8 @@ impl Keys {
     /// # Errors
     /// Times that do not rise, or a number that is not finite.
     pub fn new(keys: Vec<Key>) -> Result<Self> {
-        let finite = |key: &Key| key.time.is_finite() && key.at.iter().chain(&key.turn).all(|v| v.is_finite());
+        let finite =
+            |key: &Key| key.time.is_finite() && key.at.iter().chain(&key.turn).all(|v| v.is_finite());
         if let Some(bad) = keys.iter().position(|key| !finite(key)) {
             return Err(Error::argument(format!("key {} is not finite", bad + 1)));
         }

@@ -68,7 +68,8 @@ impl Camera {
                     let offset = corner - self.eye;
                     offset.dot(&axis) / offset.dot(&ahead).max(1.0e-9)
                 });
-                let (low, high) = seen.fold((f64::MAX, f64::MIN), |(low, high), at| (low.min(at), high.max(at)));
+                let (low, high) =
+                    seen.fold((f64::MAX, f64::MIN), |(low, high), at| (low.min(at), high.max(at)));
                 (low + high) * 0.5 * distance
             };
             let step = right * shift(right) + up * shift(up);
@@ -138,7 +139,8 @@ mod tests {
 
     #[test]
     fn the_middle_of_the_picture_shows_the_target() {
-        let camera = Camera { eye: DVec3::new(1.0, 2.0, 3.0), target: DVec3::new(0.0, 0.5, 0.0), fov_deg: 40.0 };
+        let camera =
+            Camera { eye: DVec3::new(1.0, 2.0, 3.0), target: DVec3::new(0.0, 0.5, 0.0), fov_deg: 40.0 };
         let size = Size { width: 64, height: 48 };
         let seen = camera.through(32.0, 24.0, size);
         assert!((seen - (camera.target - camera.eye).normalize()).norm() < 1.0e-12);

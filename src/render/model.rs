@@ -85,7 +85,8 @@ impl Model {
 
 fn bounds_of(mesh: &TriMesh) -> Option<(DVec3, DVec3)> {
     let first = mesh.positions.first()?;
-    let (low, high) = mesh.positions.iter().fold((*first, *first), |(low, high), at| (low.inf(at), high.sup(at)));
+    let (low, high) =
+        mesh.positions.iter().fold((*first, *first), |(low, high), at| (low.inf(at), high.sup(at)));
     Some((low.cast(), high.cast()))
 }
 

@@ -131,7 +131,9 @@ fn noise(snow: &Table, cell: f64) -> Result<Noise> {
     let table = snow.table("noise", "[snow.noise]", &["amplitude", "size", "octaves", "seed"])?;
     let Some(table) = table else { return Ok(defaults) };
     Ok(Noise {
-        amplitude: table.number_in("amplitude", 0.0..=100.0 * cell, "m (100 cells)")?.unwrap_or(defaults.amplitude),
+        amplitude: table
+            .number_in("amplitude", 0.0..=100.0 * cell, "m (100 cells)")?
+            .unwrap_or(defaults.amplitude),
         size: table.number_in("size", cell..=10_000.0 * cell, "m (10000 cells)")?.unwrap_or(defaults.size),
         octaves: table.integer_in("octaves", 1..=8)?.map_or(defaults.octaves, |value| value as u32),
         seed: table.integer_in("seed", 0..=i64::from(i32::MAX))?.map_or(defaults.seed, |value| value as u32),

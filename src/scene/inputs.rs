@@ -71,7 +71,9 @@ impl Inputs {
     pub fn layer(&self, ctx: &Context, cell: f64) -> Result<FloatGrid> {
         match &self.snow {
             Snow::Given(grid) => grid.deep_copy(),
-            Snow::Made { ground, cover } => initial::layer(ctx, ground, &self.statics, cover, cell, HALF_WIDTH),
+            Snow::Made { ground, cover } => {
+                initial::layer(ctx, ground, &self.statics, cover, cell, HALF_WIDTH)
+            }
         }
     }
 }

@@ -24,7 +24,12 @@ impl Scene {
         }
         writeln!(out, "\n[output]")?;
         line(out, "base", kinds(self.output.base), "base/base.%04d.vdb: surface, compression, touched")?;
-        line(out, "removed", kinds(self.output.removed), "removed/removed.%04d.vdb: what each frame took away")
+        line(
+            out,
+            "removed",
+            kinds(self.output.removed),
+            "removed/removed.%04d.vdb: what each frame took away",
+        )
     }
 
     fn write_snow(&self, out: &mut String) -> std::fmt::Result {
@@ -38,7 +43,9 @@ impl Scene {
             None => {}
         }
         match &self.snow.layer {
-            Layer::Depth(depth) => line(out, "depth", &number(*depth), "above ground and static objects (m)")?,
+            Layer::Depth(depth) => {
+                line(out, "depth", &number(*depth), "above ground and static objects (m)")?
+            }
             Layer::Top(path) => line(out, "top", &file(path), "mesh of the top surface")?,
             Layer::Grid(path) => line(out, "top", &file(path), "the layer as a level set")?,
         }

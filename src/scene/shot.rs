@@ -20,7 +20,10 @@ pub fn prepare(scene: &Scene, folder: &Path) -> Result<()> {
     let resolved = scene.to_toml();
     let path = folder.join("scene.toml");
     if std::fs::read_to_string(&path).is_ok_and(|text| text != resolved) {
-        return Err(Error::file(path, "the folder holds the output of other settings: choose another -o or remove it"));
+        return Err(Error::file(
+            path,
+            "the folder holds the output of other settings: choose another -o or remove it",
+        ));
     }
     for name in ["", "base", "removed", "report"] {
         let folder = folder.join(name);
@@ -69,7 +72,13 @@ pub fn frame_path(folder: &Path, kind: &str, frame: i32, extension: &str) -> Pat
     folder.join(kind).join(format!("{kind}.{frame:04}.{extension}"))
 }
 
-fn write_frame(scene: &Scene, base: &BaseLayer, folder: &Path, frame: i32, report: &StepReport) -> Result<()> {
+fn write_frame(
+    scene: &Scene,
+    base: &BaseLayer,
+    folder: &Path,
+    frame: i32,
+    report: &StepReport,
+) -> Result<()> {
     let metadata = vec![
         ("frazil:frame".into(), MetaValue::Int(frame.into())),
         ("frazil:fps".into(), MetaValue::Double(scene.shot.fps)),
@@ -78,7 +87,8 @@ fn write_frame(scene: &Scene, base: &BaseLayer, folder: &Path, frame: i32, repor
         ("frazil:version".into(), MetaValue::Text(env!("CARGO_PKG_VERSION").into())),
     ];
     let options = WriteOptions { metadata, ..WriteOptions::default() };
-    let save = |kind: &str, grids: &[&FloatGrid]| write(&frame_path(folder, kind, frame, "vdb"), grids, &options);
+    let save =
+        |kind: &str, grids: &[&FloatGrid]| write(&frame_path(folder, kind, frame, "vdb"), grids, &options);
     if scene.output.removed {
         save("removed", &[base.removed()])?;
     }

@@ -50,7 +50,8 @@ impl<'a, 'i> Table<'a, 'i> {
                     Some(near) => format!("did you mean `{near}`?"),
                     None => format!("the keys are {}", listed(known)),
                 };
-                Err(document.error(key.span().start, format!("unknown key `{}`{place}; {hint}", key.get_ref())))
+                Err(document
+                    .error(key.span().start, format!("unknown key `{}`{place}; {hint}", key.get_ref())))
             }
         }
     }
@@ -96,7 +97,12 @@ impl<'a, 'i> Table<'a, 'i> {
     }
 
     /// A number inside a range that the message names.
-    pub fn number_in(&self, key: &str, range: std::ops::RangeInclusive<f64>, unit: &str) -> Result<Option<f64>> {
+    pub fn number_in(
+        &self,
+        key: &str,
+        range: std::ops::RangeInclusive<f64>,
+        unit: &str,
+    ) -> Result<Option<f64>> {
         let Some(number) = self.number(key)? else { return Ok(None) };
         if range.contains(&number) {
             return Ok(Some(number));
@@ -205,9 +211,7 @@ impl<'a, 'i> Table<'a, 'i> {
             return Err(self.wrong_type(key, "a list of tables", value.get_ref()));
         };
         let open = |value: &'a Spanned<DeValue<'i>>| match value.get_ref() {
-            DeValue::Table(entries) => {
-                Table::open(self.document, name, entries, value.span().start, known)
-            }
+            DeValue::Table(entries) => Table::open(self.document, name, entries, value.span().start, known),
             other => Err(self.wrong_type(key, "a list of tables", other)),
         };
         values.iter().map(open).collect()

@@ -96,7 +96,14 @@ impl Body {
     }
 
     /// Poses (cells) at times so dense that straight steps stay within `tolerance` of the motion.
-    fn poses(&self, from: f64, to: f64, lattice: &Lattice, tolerance: f64, near: &Near) -> Result<Vec<Vec<DVec3>>> {
+    fn poses(
+        &self,
+        from: f64,
+        to: f64,
+        lattice: &Lattice,
+        tolerance: f64,
+        near: &Near,
+    ) -> Result<Vec<Vec<DVec3>>> {
         let at = |time: f64| -> Result<Vec<DVec3>> {
             let mut pose = Vec::new();
             self.motion.pose(time, &mut pose)?;

@@ -107,7 +107,13 @@ fn bounds(levels: &[Vec<Fixed>], vertices: &[u32]) -> (Fixed, Fixed) {
 }
 
 /// Sets bit i - 1 of each step's byte when the surface moves outward through tetrahedron Ti.
-fn mark_outward(topology: &Topology, levels: &[Vec<Fixed>], triangle: usize, window: &Window, bits: &mut [u8]) {
+fn mark_outward(
+    topology: &Topology,
+    levels: &[Vec<Fixed>],
+    triangle: usize,
+    window: &Window,
+    bits: &mut [u8],
+) {
     let simplex = &topology.simplices[triangle];
     let (low, high) = bounds(levels, &simplex.v);
     if !window.wants(low, high) {

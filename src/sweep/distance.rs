@@ -84,7 +84,13 @@ impl Triangle {
         let t = from / (from - to);
         let at = [0, 1, 2].map(|axis| p[axis] + t * (q[axis] - p[axis]));
         let inside = (0..3).all(|i| dot(sub(at, self.corner[i]), self.inward[i]) > 0.0);
-        if !inside { 0 } else if to > 0.0 { 1 } else { -1 }
+        if !inside {
+            0
+        } else if to > 0.0 {
+            1
+        } else {
+            -1
+        }
     }
 
     /// Squared distances of eight points: the kernel, inlined into each instruction set's copy.

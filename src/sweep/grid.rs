@@ -89,9 +89,8 @@ fn mesh_faces(voxel: f64, triangles: &[[u32; 3]], poses: &[&TriMesh]) -> Result<
 /// A region too large; cancel.
 pub fn fill(ctx: &Context, faces: Vec<Face>, lattice: Lattice, half_width: f32) -> Result<FloatGrid> {
     let band = Band { inside: half_width, outside: half_width };
-    let voxeliser = ctx.stage("winding", || {
-        Voxeliser::new(faces, lattice, band, [-ALL_VOXELS; 3], [ALL_VOXELS; 3])
-    })?;
+    let voxeliser =
+        ctx.stage("winding", || Voxeliser::new(faces, lattice, band, [-ALL_VOXELS; 3], [ALL_VOXELS; 3]))?;
     let mut grid = FloatGrid::level_set(lattice.voxel, half_width)?;
     let blocks: Vec<usize> = (0..voxeliser.near_blocks().len()).collect();
     for batch in blocks.chunks(BATCH) {
@@ -100,7 +99,8 @@ pub fn fill(ctx: &Context, faces: Vec<Face>, lattice: Lattice, half_width: f32) 
     }
     let background = half_width * lattice.voxel as f32;
     for batch in voxeliser.inside_blocks().chunks(BATCH) {
-        let edits: Vec<BlockEdit> = batch.iter().map(|&origin| BlockEdit::Constant(origin, -background)).collect();
+        let edits: Vec<BlockEdit> =
+            batch.iter().map(|&origin| BlockEdit::Constant(origin, -background)).collect();
         grid.replace_blocks(ctx, &edits)?;
         ctx.check()?;
     }
@@ -130,4 +130,3 @@ fn to_block(origin: [i32; 3], mut values: Box<Values>, voxel: f64, half_width: f
     }
     Block { origin, values, mask }
 }
-

@@ -57,7 +57,9 @@ impl Settings {
         ];
         for (name, value, low, high, unit) in ranges {
             if !(low..=high).contains(&value) {
-                return Err(Error::argument(format!("{name} = {value} is not within {low} to {high} {unit}")));
+                return Err(Error::argument(format!(
+                    "{name} = {value} is not within {low} to {high} {unit}"
+                )));
             }
         }
         Ok(())

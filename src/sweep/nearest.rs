@@ -94,7 +94,8 @@ fn keep(
     reach: f32,
     out: &mut Vec<u32>,
 ) -> bool {
-    let least = squared.iter().fold(f32::INFINITY, |least, d| if d[lane] < least { d[lane] } else { least }).sqrt();
+    let least =
+        squared.iter().fold(f32::INFINITY, |least, d| if d[lane] < least { d[lane] } else { least }).sqrt();
     if least > reach + radius {
         return false;
     }

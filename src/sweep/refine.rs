@@ -29,9 +29,8 @@ pub fn refine(
     let mut refined: Option<Topology> = None;
     for _ in 0..MOST_ROUNDS {
         let current = refined.as_ref().unwrap_or(topology);
-        let middles = middles(current, poses, |edge| {
-            edge_error(poses, edge) > tolerance && wanted(poses, edge)
-        });
+        let middles =
+            middles(current, poses, |edge| edge_error(poses, edge) > tolerance && wanted(poses, edge));
         let Some((derived, middle_of)) = middles else { break };
         let simplices = halve(current, &middle_of);
         for pose in poses.iter_mut() {

@@ -35,7 +35,13 @@ impl SamplesSettings {
 ///
 /// # Errors
 /// No object, no sample, a pose that cannot be had, cancel.
-pub fn samples(ctx: &Context, bodies: &[Body], from: f64, to: f64, settings: &SamplesSettings) -> Result<FloatGrid> {
+pub fn samples(
+    ctx: &Context,
+    bodies: &[Body],
+    from: f64,
+    to: f64,
+    settings: &SamplesSettings,
+) -> Result<FloatGrid> {
     if settings.samples == 0 {
         return Err(Error::argument("samples = 0: a sampled sweep needs at least 1"));
     }

@@ -72,7 +72,13 @@ impl Voxeliser {
     ///
     /// # Errors
     /// When the box spans more than 2^28 blocks.
-    pub fn new(faces: Vec<Face>, lattice: Lattice, band: Band, low: [i32; 3], high: [i32; 3]) -> Result<Self> {
+    pub fn new(
+        faces: Vec<Face>,
+        lattice: Lattice,
+        band: Band,
+        low: [i32; 3],
+        high: [i32; 3],
+    ) -> Result<Self> {
         let region = Region::around(&faces, band.outside, low, high)?;
         let [lo, hi] = [region.low.map(|b| b * 8), region.high.map(|b| b * 8 + 7)];
         let lines = Lines::scan(&faces, [lo[0], lo[1]], [hi[0], hi[1]]);
@@ -183,7 +189,10 @@ impl Voxeliser {
         let below = line.partition_point(|(z, _)| *z < f64::from(low));
         below > 0
             && line[below - 1].1 >= 1
-            && line[below..].iter().take_while(|(z, _)| *z < f64::from(high)).all(|(_, winding)| *winding >= 1)
+            && line[below..]
+                .iter()
+                .take_while(|(z, _)| *z < f64::from(high))
+                .all(|(_, winding)| *winding >= 1)
     }
 
     /// Finds the blocks without faces whose first voxel is inside.

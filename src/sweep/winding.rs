@@ -36,7 +36,8 @@ impl Lines {
     /// Scans faces along the lines through voxels `low..=high` (x and y, from the base voxel).
     pub fn scan(faces: &[Face], low: [i32; 2], high: [i32; 2]) -> Self {
         let (nx, ny) = ((high[0] - low[0] + 1).max(0), (high[1] - low[1] + 1).max(0));
-        let mut lines = Self { x0: low[0], y0: low[1], nx, ny, start: Vec::new(), crossings: Vec::new(), simple: true };
+        let mut lines =
+            Self { x0: low[0], y0: low[1], nx, ny, start: Vec::new(), crossings: Vec::new(), simple: true };
         let parts: Vec<Vec<Crossing>> = faces
             .par_chunks(GRAIN)
             .map(|chunk| {

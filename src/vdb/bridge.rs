@@ -110,7 +110,14 @@ pub(super) mod ffi {
 
         fn offset(grid: Pin<&mut Grid>, call: &Call, metres: f32, weno: bool) -> Result<()>;
         /// 0 mean, 1 gaussian.
-        fn smooth(grid: Pin<&mut Grid>, call: &Call, kind: i32, width: i32, times: i32, weno: bool) -> Result<()>;
+        fn smooth(
+            grid: Pin<&mut Grid>,
+            call: &Call,
+            kind: i32,
+            width: i32,
+            times: i32,
+            weno: bool,
+        ) -> Result<()>;
         fn renormalise(grid: Pin<&mut Grid>, call: &Call, weno: bool, times: i32) -> Result<()>;
         fn advect_outward(grid: Pin<&mut Grid>, call: &Call, speed: &Grid) -> Result<()>;
 

@@ -90,7 +90,9 @@ impl FloatGrid {
         let voxel = self.voxel_size();
         let at = |index: [f64; 3]| DVec3::from(ffi::index_to_world(&self.inner, index));
         let expected = [[0.0; 3], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]];
-        expected.into_iter().all(|index| (at(index) - DVec3::from(index) * voxel).norm() < 1e-9 * voxel.max(1e-9))
+        expected
+            .into_iter()
+            .all(|index| (at(index) - DVec3::from(index) * voxel).norm() < 1e-9 * voxel.max(1e-9))
     }
 
     /// World position (m) of a point in index space.
@@ -225,7 +227,9 @@ impl FloatGrid {
         let mut constants = Vec::with_capacity(edits.len());
         for edit in edits {
             let (value, mask, constant) = match edit {
-                BlockEdit::Dense(block) => (block.values.as_ptr() as usize, block.mask.as_ptr() as usize, 0.0),
+                BlockEdit::Dense(block) => {
+                    (block.values.as_ptr() as usize, block.mask.as_ptr() as usize, 0.0)
+                }
                 BlockEdit::Constant(_, constant) => (0, 0, *constant),
             };
             values.push(value);

@@ -35,7 +35,8 @@ pub fn from_mesh(ctx: &Context, mesh: &TriMesh, voxel: f64, half_width: f32) -> 
     }
     let points: Vec<f32> = mesh.positions.iter().flat_map(|p| [p.x, p.y, p.z]).collect();
     let (call, _flag) = call(ctx);
-    let inner = ffi::from_mesh(&call, &points, mesh.triangles.as_flattened(), voxel, half_width).map_err(fail)?;
+    let inner =
+        ffi::from_mesh(&call, &points, mesh.triangles.as_flattened(), voxel, half_width).map_err(fail)?;
     Ok(FloatGrid { inner })
 }
 
@@ -142,7 +143,13 @@ pub fn offset(ctx: &Context, grid: &mut FloatGrid, metres: f32, scheme: Scheme) 
 ///
 /// # Errors
 /// As [`offset`].
-pub fn mean_filter(ctx: &Context, grid: &mut FloatGrid, width: u32, times: u32, scheme: Scheme) -> Result<()> {
+pub fn mean_filter(
+    ctx: &Context,
+    grid: &mut FloatGrid,
+    width: u32,
+    times: u32,
+    scheme: Scheme,
+) -> Result<()> {
     smooth(ctx, grid, 0, width, times, scheme)
 }
 
@@ -150,11 +157,24 @@ pub fn mean_filter(ctx: &Context, grid: &mut FloatGrid, width: u32, times: u32, 
 ///
 /// # Errors
 /// As [`offset`].
-pub fn gaussian_filter(ctx: &Context, grid: &mut FloatGrid, width: u32, times: u32, scheme: Scheme) -> Result<()> {
+pub fn gaussian_filter(
+    ctx: &Context,
+    grid: &mut FloatGrid,
+    width: u32,
+    times: u32,
+    scheme: Scheme,
+) -> Result<()> {
     smooth(ctx, grid, 1, width, times, scheme)
 }
 
-fn smooth(ctx: &Context, grid: &mut FloatGrid, kind: i32, width: u32, times: u32, scheme: Scheme) -> Result<()> {
+fn smooth(
+    ctx: &Context,
+    grid: &mut FloatGrid,
+    kind: i32,
+    width: u32,
+    times: u32,
+    scheme: Scheme,
+) -> Result<()> {
     let (call, _flag) = call(ctx);
     let weno = scheme == Scheme::Weno5;
     ffi::smooth(grid.inner.pin_mut(), &call, kind, width as i32, times as i32, weno).map_err(fail)

@@ -82,7 +82,10 @@ pub fn offset(args: &OffsetArgs, session: &Session) -> Result<(), Failure> {
     let mut grid = read_level_set(&source.input, source.grid.as_deref()).before()?;
     let cells = args.by.abs() / grid.voxel_size();
     if cells > 1000.0 {
-        return Err(Failure::refused(format!("--by {} is {cells:.0} cells; at most 1000 are possible", args.by)));
+        return Err(Failure::refused(format!(
+            "--by {} is {cells:.0} cells; at most 1000 are possible",
+            args.by
+        )));
     }
     let work = || level_set::offset(&session.ctx, &mut grid, args.by as f32, source.scheme.into());
     session.ctx.stage("offset", work).during()?;

@@ -26,7 +26,11 @@ pub struct Column {
 impl Column {
     /// Part of the original height that is gone, 0..=1, of cell `x << 3 | z`.
     pub fn compression(&self, cell: usize) -> f32 {
-        if self.original[cell] > 0.0 { (self.removed[cell] / self.original[cell]).clamp(0.0, 1.0) } else { 0.0 }
+        if self.original[cell] > 0.0 {
+            (self.removed[cell] / self.original[cell]).clamp(0.0, 1.0)
+        } else {
+            0.0
+        }
     }
 }
 

@@ -94,7 +94,12 @@ fn remove_part(origin: Origin, before: &Values, cells: &Values, scale: Scale) ->
     }
     let removed = pack(origin, removed, scale);
     let outside = matches!(removed, BlockEdit::Constant(_, value) if value > 0.0);
-    Some(Edit { surface: pack(origin, after, scale), removed: (!outside).then_some(removed), changed, heights })
+    Some(Edit {
+        surface: pack(origin, after, scale),
+        removed: (!outside).then_some(removed),
+        changed,
+        heights,
+    })
 }
 
 /// A block of a level set from distances in cells.
@@ -109,7 +114,10 @@ fn pack(origin: Origin, values: Box<Values>, scale: Scale) -> BlockEdit {
     let mask = band_mask(&values, scale.background);
     let uniform = values.iter().all(|value| (*value > 0.0) == (values[0] > 0.0));
     if mask == [0; 8] && uniform {
-        return BlockEdit::Constant(origin, if values[0] > 0.0 { scale.background } else { -scale.background });
+        return BlockEdit::Constant(
+            origin,
+            if values[0] > 0.0 { scale.background } else { -scale.background },
+        );
     }
     BlockEdit::Dense(Block { origin, values, mask })
 }

@@ -76,7 +76,9 @@ pub fn layer(
     })?;
     let mut layer = fill(ctx, faces, lattice, half_width)?;
     if layer.active_voxels() == 0 {
-        return Err(Error::argument("there is no snow: is the depth below a cell, or the top below the ground?"));
+        return Err(Error::argument(
+            "there is no snow: is the depth below a cell, or the top below the ground?",
+        ));
     }
     layer.prune_level_set()?;
     layer.set_name("surface")?;
@@ -89,7 +91,9 @@ fn ground_mesh(ground: &Ground) -> Result<TriMesh> {
         Ground::Plane { height, area } => (*height, *area),
     };
     if !(x1 > x0 && z1 > z0 && height.is_finite() && (x1 - x0).is_finite() && (z1 - z0).is_finite()) {
-        return Err(Error::argument(format!("area = [{x0}, {z0}, {x1}, {z1}] is not [x0, z0, x1, z1] with x1 > x0, z1 > z0")));
+        return Err(Error::argument(format!(
+            "area = [{x0}, {z0}, {x1}, {z1}] is not [x0, z0, x1, z1] with x1 > x0, z1 > z0"
+        )));
     }
     let at = |x: f64, z: f64| Vec3::new(x as f32, height as f32, z as f32);
     Ok(TriMesh {

@@ -131,9 +131,17 @@ impl BaseLayer {
     ///
     /// # Errors
     /// A pose that cannot be had, a body too far away, cancel, memory.
-    pub fn step(&mut self, ctx: &Context, bodies: &[Body], from: f64, to: f64, frame: i32) -> Result<StepReport> {
+    pub fn step(
+        &mut self,
+        ctx: &Context,
+        bodies: &[Body],
+        from: f64,
+        to: f64,
+        frame: i32,
+    ) -> Result<StepReport> {
         ctx.take_timings();
-        let displacement = self.params.noise.map(|noise| Displacement::new(&noise, self.surface.voxel_size()));
+        let displacement =
+            self.params.noise.map(|noise| Displacement::new(&noise, self.surface.voxel_size()));
         let (ragged, exact): (Vec<&Body>, Vec<&Body>) = bodies.iter().partition(|body| body.has_noise());
         let (ragged, ragged_faces) = self.sweep(ctx, &ragged, from, to, displacement.as_ref())?;
         let (exact, exact_faces) = self.sweep(ctx, &exact, from, to, None)?;
@@ -179,7 +187,13 @@ impl BaseLayer {
     }
 
     /// The swept volume's boundary near the snow, sorted into blocks.
-    fn voxeliser(&self, bodies: &[&Body], from: f64, to: f64, noise: Option<&Displacement>) -> Result<Voxeliser> {
+    fn voxeliser(
+        &self,
+        bodies: &[&Body],
+        from: f64,
+        to: f64,
+        noise: Option<&Displacement>,
+    ) -> Result<Voxeliser> {
         let cell = self.surface.voxel_size();
         let middle = [0, 1, 2].map(|a| (f64::from(self.low[a]) + f64::from(self.high[a])) * 0.5 * cell);
         let lattice = Lattice::near(cell, DVec3::from(middle))?;
@@ -214,7 +228,9 @@ impl BaseLayer {
         ctx.check()?;
         let inside = voxeliser.inside_blocks();
         let snowy = snowy(&inside)?;
-        pieces.extend(inside.into_iter().zip(snowy).filter(|(_, snowy)| *snowy).map(|(at, _)| Piece::Inside(at)));
+        pieces.extend(
+            inside.into_iter().zip(snowy).filter(|(_, snowy)| *snowy).map(|(at, _)| Piece::Inside(at)),
+        );
         Ok(pieces)
     }
 
@@ -222,7 +238,11 @@ impl BaseLayer {
         let origins: Vec<Origin> = pieces.iter().map(Piece::origin).collect();
         let snow: Vec<Probe<'_>> = self.surface.probe(&origins)?;
         let scale = self.scale();
-        Ok(pieces.par_iter().zip(&snow).filter_map(|(piece, snow)| edit::subtract(piece, snow, scale)).collect())
+        Ok(pieces
+            .par_iter()
+            .zip(&snow)
+            .filter_map(|(piece, snow)| edit::subtract(piece, snow, scale))
+            .collect())
     }
 
     /// Everything that the commit puts in place.
@@ -246,14 +266,16 @@ impl BaseLayer {
             let [x, y, z] = edit.surface.origin();
             let column: &mut Column = match columns.entry([x, z]) {
                 std::collections::btree_map::Entry::Occupied(entry) => entry.into_mut(),
-                std::collections::btree_map::Entry::Vacant(entry) => entry.insert(match self.columns.get(&[x, z]) {
-                    Some(column) => column.clone(),
-                    None => Column {
-                        original: columns::heights(&self.surface, [x, z], self.low[1], self.high[1])?,
-                        removed: [0.0; columns::CELLS],
-                        blocks: BTreeSet::new(),
-                    },
-                }),
+                std::collections::btree_map::Entry::Vacant(entry) => {
+                    entry.insert(match self.columns.get(&[x, z]) {
+                        Some(column) => column.clone(),
+                        None => Column {
+                            original: columns::heights(&self.surface, [x, z], self.low[1], self.high[1])?,
+                            removed: [0.0; columns::CELLS],
+                            blocks: BTreeSet::new(),
+                        },
+                    })
+                }
             };
             column.blocks.insert(y);
             column.removed.iter_mut().zip(edit.heights).for_each(|(removed, height)| *removed += height);
@@ -304,7 +326,8 @@ impl BaseLayer {
                     out.push(BlockEdit::Constant(*origin, 0.0));
                     continue;
                 }
-                let values = Box::new(std::array::from_fn(|index| column.compression(columns::cell_of(index))));
+                let values =
+                    Box::new(std::array::from_fn(|index| column.compression(columns::cell_of(index))));
                 out.push(BlockEdit::Dense(Block { origin: *origin, values, mask }));
             }
         }
@@ -338,13 +361,17 @@ fn united(mut pieces: Vec<Piece>, others: Vec<Piece>) -> Vec<Piece> {
     if pieces.is_empty() {
         return others;
     }
-    let places: HashMap<Origin, usize> = pieces.iter().enumerate().map(|(index, p)| (p.origin(), index)).collect();
+    let places: HashMap<Origin, usize> =
+        pieces.iter().enumerate().map(|(index, p)| (p.origin(), index)).collect();
     for other in others {
         match places.get(&other.origin()) {
             None => pieces.push(other),
             Some(&index) => match (&mut pieces[index], other) {
                 (Piece::Near(_, values), Piece::Near(_, others)) => {
-                    values.iter_mut().zip(others.iter()).for_each(|(value, other)| *value = value.min(*other));
+                    values
+                        .iter_mut()
+                        .zip(others.iter())
+                        .for_each(|(value, other)| *value = value.min(*other));
                 }
                 (piece, inside @ Piece::Inside(_)) => *piece = inside,
                 (Piece::Inside(_), Piece::Near(..)) => {}

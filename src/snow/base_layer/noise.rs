@@ -185,7 +185,8 @@ fn divided(origin: Origin, values: &Values, pieces: &[Piece], places: &HashMap<O
             Piece::Inside(_) => None,
         })
     };
-    let neighbours: Vec<[Option<&Box<Values>>; 2]> = (0..3).map(|axis| [beside(axis, -1), beside(axis, 1)]).collect();
+    let neighbours: Vec<[Option<&Box<Values>>; 2]> =
+        (0..3).map(|axis| [beside(axis, -1), beside(axis, 1)]).collect();
     let mut out = *values;
     for (index, out) in out.iter_mut().enumerate() {
         let at = [index >> 6, index >> 3 & 7, index & 7];
@@ -230,7 +231,8 @@ mod tests {
         noise.set_frequency(Some(1.0));
         let (mut steepest, step): (f32, f32) = (0.0, 1e-2);
         for index in 0..400_000u32 {
-            let at = [7919, 104_729, 1_299_709].map(|prime: u32| (index.wrapping_mul(prime) % 20_000) as f32 * 1e-3);
+            let at = [7919, 104_729, 1_299_709]
+                .map(|prime: u32| (index.wrapping_mul(prime) % 20_000) as f32 * 1e-3);
             let sample = |d: [f32; 3]| noise.get_noise_3d(at[0] + d[0], at[1] + d[1], at[2] + d[2]);
             let here = sample([0.0; 3]);
             let slope: f32 = [[step, 0.0, 0.0], [0.0, step, 0.0], [0.0, 0.0, step]]
