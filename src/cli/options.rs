@@ -1,34 +1,157 @@
-//! Option values that several commands share.
+//! Options that several commands share, and how their values are written.
 
-/// A picture size: `1280x720`.
-pub fn size(text: &str) -> Result<frazil::render::Size, String> {
-    let refused = || format!("\"{text}\" is no size such as 1280x720");
-    let (width, height) = text.split_once('x').ok_or_else(refused)?;
-    let number =
-        |text: &str| text.parse::<u32>().ok().filter(|n| (1..=16_384).contains(n)).ok_or_else(refused);
-    Ok(frazil::render::Size { width: number(width)?, height: number(height)? })
+use super::machine;
+use frazil::base::{DVec3, TriMesh};
+use frazil::render::Size;
+use frazil::{Error, Result};
+use std::path::Path;
+use std::str::FromStr;
+
+/// `--max-memory`: refuses work that would need more.
+#[derive(clap::Args)]
+pub struct MemoryOption {
+    /// Refuse work that would need more memory, for example 8G, 512M or 50%.
+    #[arg(long, value_name = "SIZE", default_value = "80%")]
+    max_memory: Amount,
 }
 
-/// Three numbers: `0.5,1,-2`.
-pub fn triple(text: &str) -> Result<[f64; 3], String> {
-    let parts: Vec<Option<f64>> = text.split(',').map(|part| part.trim().parse().ok()).collect();
-    match parts.as_slice() {
-        [Some(x), Some(y), Some(z)] if [x, y, z].iter().all(|value| value.is_finite()) => Ok([*x, *y, *z]),
-        _ => Err(format!("\"{text}\" is not three numbers such as 0.5,1,-2")),
+impl MemoryOption {
+    /// The limit in bytes; none when the machine does not tell its memory.
+    pub fn bytes(&self) -> u64 {
+        match self.max_memory {
+            Amount::Bytes(bytes) => bytes,
+            Amount::Part(part) => machine::memory().map_or(u64::MAX, |bytes| (bytes as f64 * part) as u64),
+        }
+    }
+
+    /// Refuses level sets of so much surface (m2) with such a cell (m).
+    pub fn check_surface(&self, area: f64, cell: f64) -> Result<()> {
+        // A band of six voxels crosses 1.6 blocks of 8 voxels on average, of four bytes and a bit each; a
+        // surface that is not level crosses more; a file in the making takes as much again.
+        let needed = (area / (cell * cell) * 128.0).min(1.0e18) as u64;
+        if needed <= self.bytes() {
+            return Ok(());
+        }
+        Err(Error::Memory { what: format!("a level set with --cell {cell}"), needed, limit: self.bytes() })
     }
 }
 
-/// Bytes with a unit: `800M`, `12G`.
-pub fn bytes(text: &str) -> Result<u64, String> {
-    let (number, shift) = match text.trim().to_uppercase() {
-        text if text.ends_with('K') => (text[..text.len() - 1].to_string(), 10),
-        text if text.ends_with('M') => (text[..text.len() - 1].to_string(), 20),
-        text if text.ends_with('G') => (text[..text.len() - 1].to_string(), 30),
-        text => (text, 0),
-    };
-    let value: u64 = number.parse().map_err(|_| format!("\"{text}\" is no size such as 800M or 12G"))?;
-    value
-        .checked_shl(shift)
-        .filter(|bytes| bytes >> shift == value)
-        .ok_or_else(|| format!("{text} is too large"))
+#[derive(Clone, Copy, Debug, PartialEq)]
+enum Amount {
+    Bytes(u64),
+    Part(f64),
+}
+
+impl FromStr for Amount {
+    type Err = String;
+
+    fn from_str(text: &str) -> std::result::Result<Self, String> {
+        let wrong = || "write a size such as 8G, 512M or 50%".to_string();
+        let split = text.find(|letter: char| letter.is_alphabetic() || letter == '%').unwrap_or(text.len());
+        let number: f64 = text[..split].trim().parse().map_err(|_| wrong())?;
+        let unit = text[split..].to_uppercase();
+        let scale = match unit.trim_end_matches('B').trim_end_matches('I') {
+            "%" if (0.0..=100.0).contains(&number) => return Ok(Self::Part(number / 100.0)),
+            "" => 1.0,
+            "K" => 1024.0,
+            "M" => 1024.0 * 1024.0,
+            "G" => 1024.0 * 1024.0 * 1024.0,
+            "T" => 1024.0 * 1024.0 * 1024.0 * 1024.0,
+            _ => return Err(wrong()),
+        };
+        let bytes = number * scale;
+        if (0.0..1.0e19).contains(&bytes) { Ok(Self::Bytes(bytes as u64)) } else { Err(wrong()) }
+    }
+}
+
+/// How a mesh file's space becomes metres with Y up.
+#[derive(clap::Args)]
+pub struct MeshSpace {
+    /// Factor from the mesh file's unit to metres.
+    #[arg(long, value_name = "FACTOR", default_value = "1", value_parser = positive)]
+    pub scale: f64,
+    /// The mesh file's upward axis.
+    #[arg(long, value_name = "AXIS", default_value = "y")]
+    pub up: Axis,
+}
+
+/// An upward axis.
+#[derive(Clone, Copy, PartialEq, Eq, clap::ValueEnum)]
+pub enum Axis {
+    /// As frazil, Houdini, Maya.
+    Y,
+    /// As Blender, 3ds Max.
+    Z,
+}
+
+impl MeshSpace {
+    /// Reads a mesh into metres, Y up.
+    pub fn read(&self, path: &Path) -> Result<TriMesh> {
+        let mut mesh = frazil::io::mesh::read(path)?;
+        for position in &mut mesh.positions {
+            let scaled = position.cast::<f64>() * self.scale;
+            let turned = match self.up {
+                Axis::Y => scaled,
+                Axis::Z => DVec3::new(scaled.x, scaled.z, -scaled.y),
+            };
+            *position = turned.cast();
+        }
+        Ok(mesh)
+    }
+}
+
+/// A picture's size: `1280x720`.
+pub fn size(text: &str) -> std::result::Result<Size, String> {
+    let wrong = || "write a size such as 1280x720, at most 16384 pixels each way".to_string();
+    let (width, height) = text.split_once('x').ok_or_else(wrong)?;
+    let pixels = |text: &str| text.parse::<u32>().ok().filter(|n| (1..=16_384).contains(n)).ok_or_else(wrong);
+    Ok(Size { width: pixels(width)?, height: pixels(height)? })
+}
+
+/// Number of a positive length or factor.
+pub fn positive(text: &str) -> std::result::Result<f64, String> {
+    match text.parse::<f64>() {
+        Ok(number) if number > 0.0 && number.is_finite() => Ok(number),
+        _ => Err("it must be a number above 0".to_string()),
+    }
+}
+
+/// A finite number.
+pub fn finite(text: &str) -> std::result::Result<f64, String> {
+    match text.parse::<f64>() {
+        Ok(number) if number.is_finite() => Ok(number),
+        _ => Err("it must be a finite number".to_string()),
+    }
+}
+
+/// `X,Y,Z`.
+pub fn triple(text: &str) -> std::result::Result<DVec3, String> {
+    let numbers: Option<Vec<f64>> = text.split(',').map(|part| finite(part.trim()).ok()).collect();
+    match numbers.as_deref() {
+        Some([x, y, z]) => Ok(DVec3::new(*x, *y, *z)),
+        _ => Err("write three numbers, X,Y,Z".to_string()),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn amounts_of_memory_have_units() {
+        assert_eq!("8G".parse(), Ok(Amount::Bytes(8 << 30)));
+        assert_eq!("1.5 MiB".parse(), Ok(Amount::Bytes(3 << 19)));
+        assert_eq!("100".parse(), Ok(Amount::Bytes(100)));
+        assert_eq!("50%".parse(), Ok(Amount::Part(0.5)));
+        for wrong in ["", "G", "-1G", "150%", "8 parsecs", "nan"] {
+            assert!(wrong.parse::<Amount>().is_err(), "{wrong}");
+        }
+    }
+
+    #[test]
+    fn points_are_three_numbers() {
+        assert_eq!(triple("1,-2, 0.5"), Ok(DVec3::new(1.0, -2.0, 0.5)));
+        assert!(triple("1,2").is_err());
+        assert!(triple("1,2,nan").is_err());
+    }
 }

@@ -28,10 +28,10 @@ pub struct Args {
     size: Size,
     /// Where the camera is (m) [default: so that everything is seen].
     #[arg(long, value_name = "X,Y,Z", value_parser = options::triple, allow_hyphen_values = true, requires = "target")]
-    eye: Option<[f64; 3]>,
+    eye: Option<DVec3>,
     /// What it looks at (m).
     #[arg(long, value_name = "X,Y,Z", value_parser = options::triple, allow_hyphen_values = true, requires = "eye")]
-    target: Option<[f64; 3]>,
+    target: Option<DVec3>,
     /// Vertical field of view (degrees).
     #[arg(long, default_value_t = 35.0)]
     fov: f64,
@@ -66,7 +66,7 @@ pub fn run(args: Args, session: &Session) -> Result<(), Failure> {
         if eye == target {
             return Err(Failure::refused("--eye and --target are the same point"));
         }
-        camera = Camera { eye: DVec3::from(eye), target: DVec3::from(target), fov_deg: args.fov };
+        camera = Camera { eye: eye, target: target, fov_deg: args.fov };
     }
     let light = match args.sun {
         Some((azimuth, elevation)) => Light::from_degrees(azimuth, elevation),

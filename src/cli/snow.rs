@@ -5,9 +5,10 @@ use std::path::PathBuf;
 use frazil::scene::{Frames, Inputs, Scene, check_memory, shot};
 
 use super::exit::{Failure, Phase};
+use super::options::MemoryOption;
+use super::output;
 use super::progress::FrameProgress;
 use super::session::Session;
-use super::{machine, options, output};
 
 /// Press moving objects into a layer of snow.
 ///
@@ -25,11 +26,10 @@ pub struct Args {
     #[arg(long, value_enum, default_value = "base")]
     stage: Stage,
     /// Write these frames only; the frames before them are still computed.
-    #[arg(long, value_name = "A-B")]
+    #[arg(long, value_name = "A-B", allow_hyphen_values = true)]
     frames: Option<Frames>,
-    /// Refuse scenes that would need more memory [default: 80 % of the machine's], e.g. 800M or 12G.
-    #[arg(long, value_name = "BYTES", value_parser = options::bytes)]
-    max_memory: Option<u64>,
+    #[command(flatten)]
+    memory: MemoryOption,
 }
 
 #[derive(Clone, Copy, PartialEq, clap::ValueEnum)]
@@ -50,8 +50,7 @@ pub fn run(args: Args, session: &Session) -> Result<(), Failure> {
         )));
     }
     let inputs = Inputs::load(&scene).before()?;
-    let limit = args.max_memory.or(machine::memory().map(|bytes| bytes / 5 * 4)).unwrap_or(u64::MAX);
-    check_memory(&scene, &inputs, limit).before()?;
+    check_memory(&scene, &inputs, args.memory.bytes()).before()?;
     shot::prepare(&scene, &args.output).before()?;
     output::check_folder(&args.output).before()?;
     let mut progress = FrameProgress::new(frames.count(), session.is_quiet());

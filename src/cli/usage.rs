@@ -21,7 +21,7 @@ pub fn report(error: &Error) -> u8 {
     let told = told.join(" ");
     let told = told.strip_prefix("error:").unwrap_or(&told).trim();
     let told = told.split_once(" For more information").map_or(told, |parts| parts.0);
-    let told = told.replace("  tip:", ";").replace(" ;", ";");
+    let told = told.replace("tip:", ";").split_whitespace().collect::<Vec<_>>().join(" ").replace(" ;", ";");
     exit::say_error(&format!("{told}; see `frazil --help`"));
     exit::REFUSED
 }

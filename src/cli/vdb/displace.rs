@@ -1,0 +1,45 @@
+//! `frazil vdb displace`.
+
+use super::{VdbOutput, read_level_set};
+use crate::cli::exit::{Failure, Phase};
+use crate::cli::session::Session;
+use frazil::snow::base_layer::{NoiseParams, displace};
+use std::path::PathBuf;
+
+/// Displace a level set's surface outward by noise, never inward
+#[derive(clap::Args)]
+#[command(after_help = "Example:\n  frazil vdb displace boot.vdb --amplitude 0.01 --size 0.06 -o ragged.vdb")]
+pub struct Args {
+    /// Level set (.vdb)
+    input: PathBuf,
+    /// Grid of the file [default: its first level set]
+    #[arg(long, value_name = "NAME")]
+    grid: Option<String>,
+    /// Greatest displacement (m), up to 32 cells [default: 2 cells]
+    #[arg(long, value_name = "M")]
+    amplitude: Option<f64>,
+    /// Size of the largest clumps (m) [default: 8 cells]
+    #[arg(long, value_name = "M")]
+    size: Option<f64>,
+    /// Octaves, each of half the size and half the strength, 1 to 8
+    #[arg(long, value_name = "N", default_value = "3")]
+    octaves: u32,
+    /// Seed of the pattern
+    #[arg(long, value_name = "N", default_value = "0")]
+    seed: i32,
+    #[command(flatten)]
+    output: VdbOutput,
+}
+
+/// Runs the command.
+pub fn run(args: &Args, session: &Session) -> Result<(), Failure> {
+    args.output.check()?;
+    let mut grid = read_level_set(&args.input, args.grid.as_deref()).before()?;
+    let defaults = NoiseParams::for_cell(grid.voxel_size());
+    let amplitude = args.amplitude.unwrap_or(defaults.amplitude);
+    let size = args.size.unwrap_or(defaults.size);
+    let noise = NoiseParams { amplitude, size, octaves: args.octaves, seed: args.seed };
+    noise.validate(grid.voxel_size()).before()?;
+    displace(&session.ctx, &mut grid, &noise).during()?;
+    args.output.write(session, grid).during()
+}

@@ -1,0 +1,39 @@
+//! `frazil vdb from-mesh`.
+
+use super::VdbOutput;
+use crate::cli::exit::{Failure, Phase};
+use crate::cli::options::{MemoryOption, MeshSpace, positive};
+use crate::cli::session::Session;
+use frazil::sweep::{self, Settings};
+use std::path::PathBuf;
+
+/// Make a level set of the solid that a mesh bounds; open meshes are closed
+#[derive(clap::Args)]
+#[command(after_help = "Example:\n  frazil vdb from-mesh boot.obj --cell 0.002 -o boot.vdb")]
+pub struct Args {
+    /// Mesh (.obj, .ply)
+    mesh: PathBuf,
+    /// Edge of a voxel (m)
+    #[arg(long, value_name = "M", value_parser = positive)]
+    cell: f64,
+    /// Half width of the band of distances (cells), 3 to 64
+    #[arg(long, value_name = "CELLS", default_value = "3", value_parser = positive)]
+    half_width: f64,
+    #[command(flatten)]
+    space: MeshSpace,
+    #[command(flatten)]
+    memory: MemoryOption,
+    #[command(flatten)]
+    output: VdbOutput,
+}
+
+/// Runs the command.
+pub fn run(args: &Args, session: &Session) -> Result<(), Failure> {
+    let settings = Settings { half_width: args.half_width as f32, ..Settings::new(args.cell) };
+    settings.validate().before()?;
+    args.output.check()?;
+    let mesh = args.space.read(&args.mesh).before()?;
+    args.memory.check_surface(mesh.area(), args.cell).before()?;
+    let grid = sweep::voxelise(&session.ctx, &mesh, &settings).during()?;
+    args.output.write(session, grid).during()
+}

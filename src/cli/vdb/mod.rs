@@ -1,0 +1,131 @@
+//! `frazil vdb`: level sets from meshes, moving meshes and each other.
+
+mod combine;
+mod displace;
+mod filter;
+mod from_mesh;
+mod sweep;
+mod to_mesh;
+
+use super::exit::{Failure, Phase};
+use super::output;
+use super::session::Session;
+use clap::{Subcommand, ValueEnum};
+use frazil::vdb::file::{self, Compression, WriteOptions};
+use frazil::vdb::{FloatGrid, GridClass};
+use frazil::{Error, Result};
+use serde_json::json;
+use std::path::{Path, PathBuf};
+
+/// Make, combine and change level sets in .vdb files
+#[derive(clap::Args)]
+#[command(after_help = "\
+Example:
+  frazil vdb from-mesh bunny.obj --cell 0.002 -o bunny.vdb
+  frazil vdb offset bunny.vdb --by 0.01 -o fat.vdb
+  frazil vdb difference fat.vdb bunny.vdb -o shell.vdb")]
+pub struct Args {
+    #[command(subcommand)]
+    command: Command,
+}
+
+#[derive(Subcommand)]
+enum Command {
+    FromMesh(from_mesh::Args),
+    Sweep(sweep::Args),
+    Union(combine::UnionArgs),
+    Difference(combine::DifferenceArgs),
+    Intersection(combine::IntersectionArgs),
+    Offset(filter::OffsetArgs),
+    Smooth(filter::SmoothArgs),
+    Displace(displace::Args),
+    ToMesh(to_mesh::Args),
+}
+
+/// Runs the command.
+pub fn run(args: Args, session: &Session) -> std::result::Result<(), Failure> {
+    match args.command {
+        Command::FromMesh(args) => from_mesh::run(&args, session),
+        Command::Sweep(args) => sweep::run(&args, session),
+        Command::Union(args) => combine::union(&args, session),
+        Command::Difference(args) => combine::difference(&args, session),
+        Command::Intersection(args) => combine::intersection(&args, session),
+        Command::Offset(args) => filter::offset(&args, session),
+        Command::Smooth(args) => filter::smooth(&args, session),
+        Command::Displace(args) => displace::run(&args, session),
+        Command::ToMesh(args) => to_mesh::run(&args, session),
+    }
+}
+
+/// Where a level set goes and how it is packed.
+#[derive(clap::Args)]
+struct VdbOutput {
+    /// File to write (.vdb)
+    #[arg(short, long, value_name = "FILE")]
+    output: PathBuf,
+    /// Name of the grid in the file
+    #[arg(long, value_name = "NAME", default_value = "surface")]
+    name: String,
+    /// Codec of the file
+    #[arg(long, value_enum, default_value = "blosc")]
+    compression: Codec,
+    /// Store 16-bit values: smaller, for rendering only
+    #[arg(long)]
+    half: bool,
+}
+
+#[derive(Clone, Copy, ValueEnum)]
+enum Codec {
+    /// Fast
+    Blosc,
+    /// Small
+    Zip,
+    /// Neither
+    None,
+}
+
+impl VdbOutput {
+    /// Refuses a name or a folder that cannot be written, before any work.
+    fn check(&self) -> std::result::Result<(), Failure> {
+        check_name(&self.output, &["vdb"])?;
+        output::check_writable(&self.output).before()
+    }
+
+    /// Writes the grid and records what it holds.
+    fn write(&self, session: &Session, mut grid: FloatGrid) -> Result<()> {
+        grid.set_name(&self.name)?;
+        let compression = match self.compression {
+            Codec::Blosc => Compression::Blosc,
+            Codec::Zip => Compression::Zip,
+            Codec::None => Compression::None,
+        };
+        let options = WriteOptions { compression, half: self.half, metadata: Vec::new() };
+        session.ctx.check()?;
+        file::write(&self.output, &[&grid], &options)?;
+        session.record("active_voxels", json!(grid.active_voxels()));
+        session.record("memory_bytes", json!(grid.memory_bytes()));
+        Ok(())
+    }
+}
+
+/// Refuses an output file whose extension says that it holds something else.
+fn check_name(path: &Path, extensions: &[&str]) -> std::result::Result<(), Failure> {
+    let extension = path.extension().and_then(|text| text.to_str()).unwrap_or("").to_lowercase();
+    if extensions.contains(&extension.as_str()) {
+        return Ok(());
+    }
+    let wanted: Vec<String> = extensions.iter().map(|name| format!(".{name}")).collect();
+    Err(Failure::refused(format!("{}: the output must be a {} file", path.display(), wanted.join(" or "))))
+}
+
+/// Reads a level set: the grid of that name, else the first one.
+fn read_level_set(path: &Path, name: Option<&str>) -> Result<FloatGrid> {
+    let grid = file::read_named(path, name)?;
+    if grid.class() != GridClass::LevelSet {
+        return Err(Error::file(path, format!("grid \"{}\" is not a level set", grid.name())));
+    }
+    if !grid.is_uniform() {
+        return Err(Error::file(path, format!("grid \"{}\" has cells that are not cubes", grid.name())));
+    }
+    Ok(grid)
+}

@@ -1,0 +1,51 @@
+//! `frazil vdb to-mesh`.
+
+use super::{check_name, read_level_set};
+use crate::cli::exit::{Failure, Phase};
+use crate::cli::options::finite;
+use crate::cli::output;
+use crate::cli::session::Session;
+use frazil::vdb::level_set;
+use serde_json::json;
+use std::path::PathBuf;
+
+/// Make a mesh of a level set's surface
+#[derive(clap::Args)]
+#[command(after_help = "Example:\n  frazil vdb to-mesh cache/base/base.0048.vdb -o print.ply")]
+pub struct Args {
+    /// Level set (.vdb)
+    input: PathBuf,
+    /// Grid of the file [default: its first level set]
+    #[arg(long, value_name = "NAME")]
+    grid: Option<String>,
+    /// Distance from the surface to take (m); below 0 is inside
+    #[arg(long, value_name = "M", default_value = "0", value_parser = finite, allow_hyphen_values = true)]
+    iso: f64,
+    /// Larger triangles where the surface is flat, 0 to 1
+    #[arg(long, value_name = "PART", default_value = "0", value_parser = finite)]
+    adaptivity: f64,
+    /// File to write (.ply, .obj)
+    #[arg(short, long, value_name = "FILE")]
+    output: PathBuf,
+}
+
+/// Runs the command.
+pub fn run(args: &Args, session: &Session) -> Result<(), Failure> {
+    if !(0.0..=1.0).contains(&args.adaptivity) {
+        return Err(Failure::refused("--adaptivity must lie in 0 to 1"));
+    }
+    check_name(&args.output, &["ply", "obj"])?;
+    output::check_writable(&args.output).before()?;
+    let grid = read_level_set(&args.input, args.grid.as_deref()).before()?;
+    if args.iso.abs() >= f64::from(grid.background()) {
+        let band = grid.background();
+        return Err(Failure::refused(format!("--iso {} lies outside the band of {band} m", args.iso)));
+    }
+    let (iso, adaptivity) = (args.iso as f32, args.adaptivity as f32);
+    let work = || level_set::to_mesh(&session.ctx, &grid, iso, adaptivity);
+    let mesh = session.ctx.stage("mesh", work).during()?;
+    frazil::io::mesh::write(&args.output, &mesh).during()?;
+    session.record("vertices", json!(mesh.positions.len()));
+    session.record("triangles", json!(mesh.triangles.len()));
+    Ok(())
+}

@@ -1,0 +1,90 @@
+//! What works, what a stopped run leaves, and what a full disk does.
+
+use assert_cmd::Command;
+use std::fs;
+use std::path::Path;
+use tempfile::TempDir;
+
+const CUBE: &str = "v -.2 0 -.2\nv .2 0 -.2\nv .2 .4 -.2\nv -.2 .4 -.2\nv -.2 0 .2\nv .2 0 .2\nv .2 .4 .2\nv -.2 .4 .2\n\
+f 1 4 3 2\nf 5 6 7 8\nf 1 2 6 5\nf 3 4 8 7\nf 1 5 8 4\nf 2 3 7 6\n";
+
+/// A folder with a cube that slides through snow for so many frames.
+fn folder(frames: u32, cell: f64, mesh: &str) -> TempDir {
+    let folder = tempfile::tempdir().unwrap();
+    fs::write(folder.path().join("cube.obj"), mesh).unwrap();
+    let scene = format!(
+        "[shot]\nframes = \"1-{frames}\"\n[snow]\nground = 0.0\narea = [-0.5, -0.5, 0.5, 1.5]\ndepth = 0.3\n\
+         cell = {cell}\n[[object]]\nfile = \"cube.obj\"\nkeys = [{{ frame = 1, at = [0, 0.1, 0] }}, \
+         {{ frame = {frames}, at = [0, 0.1, 0.9], turn_deg = [0, 40, 0] }}]\n"
+    );
+    fs::write(folder.path().join("shot.toml"), scene).unwrap();
+    folder
+}
+
+fn frazil(folder: &Path, arguments: &str) -> std::process::Output {
+    let mut command = Command::cargo_bin("frazil").unwrap();
+    command.current_dir(folder).args(arguments.split_whitespace()).output().unwrap()
+}
+
+#[track_caller]
+fn works(folder: &Path, arguments: &str) -> String {
+    let output = frazil(folder, arguments);
+    let stderr = String::from_utf8(output.stderr).unwrap();
+    assert!(output.status.success(), "{arguments}: {stderr}");
+    String::from_utf8(output.stdout).unwrap() + &stderr
+}
+
+fn removed(folder: &Path, frame: u32) -> f64 {
+    let text = fs::read_to_string(folder.join(format!("out/report/{frame:04}.json"))).unwrap();
+    let report: serde_json::Value = serde_json::from_str(&text).unwrap();
+    report["removed_m3"].as_f64().unwrap()
+}
+
+#[test]
+fn a_scene_makes_frames_and_its_resolved_file_makes_them_again() {
+    let folder = folder(3, 0.05, CUBE);
+    let said = works(folder.path(), "snow shot.toml -o out");
+    assert!(said.contains("frame 3 stage base 100% eta 00:00:00"), "{said}");
+    assert!(removed(folder.path(), 1) > 0.4 * 0.4 * 0.2 * 0.8);
+    works(folder.path(), "snow out/scene.toml -o again -q --threads 1");
+    for name in ["base/base.0003.vdb", "removed/removed.0002.vdb", "scene.toml"] {
+        let [a, b] = ["out", "again"].map(|tree| fs::read(folder.path().join(tree).join(name)).unwrap());
+        assert!(a == b, "{name} differs");
+    }
+    let json = works(folder.path(), "info out/base/base.0003.vdb --json --measure");
+    let told: serde_json::Value = serde_json::from_str(&json).unwrap();
+    let names: Vec<_> =
+        told[0]["holds"].as_array().unwrap().iter().map(|grid| grid["name"].clone()).collect();
+    assert_eq!(names, ["surface", "compression", "touched"]);
+    works(folder.path(), "preview out/base/base.0003.vdb cube.obj -o p.png --size 64x36");
+    assert!(folder.path().join("p.png").metadata().unwrap().len() > 500);
+}
+
+#[test]
+fn another_scene_does_not_mix_into_a_folder() {
+    let folder = folder(2, 0.05, CUBE);
+    works(folder.path(), "snow shot.toml -o out -q");
+    works(folder.path(), "snow shot.toml -o out -q");
+    let scene = fs::read_to_string(folder.path().join("shot.toml")).unwrap();
+    fs::write(folder.path().join("shot.toml"), scene.replace("depth = 0.3", "depth = 0.2")).unwrap();
+    let output = frazil(folder.path(), "snow shot.toml -o out");
+    assert_eq!(output.status.code(), Some(2));
+    assert!(String::from_utf8(output.stderr).unwrap().contains("-o"));
+}
+
+#[test]
+fn open_non_manifold_and_distant_meshes_work() {
+    let open = CUBE.replacen("f 3 4 8 7\n", "", 1);
+    let folder_open = folder(2, 0.05, &open);
+    works(folder_open.path(), "snow shot.toml -o out -q");
+    assert!(removed(folder_open.path(), 1) > 0.02);
+    let fin = format!("{CUBE}v 0 .6 0\nf 3 4 9\n");
+    let folder_fin = folder(2, 0.05, &fin);
+    works(folder_fin.path(), "snow shot.toml -o out -q");
+    assert!(removed(folder_fin.path(), 1) > 0.02);
+    let folder_far = folder(2, 0.05, CUBE);
+    let scene = fs::read_to_string(folder_far.path().join("shot.toml")).unwrap();
+    fs::write(folder_far.path().join("shot.toml"), scene.replace("at = [0,", "at = [50,")).unwrap();
+    works(folder_far.path(), "snow shot.toml -o out -q");
+    assert_eq!(removed(folder_far.path(), 2), 0.0);
+}
