@@ -44,7 +44,6 @@ const XYZ: &str = "element vertex 3\nproperty float x\nproperty float y\npropert
                    element face 1\nproperty list uchar int vertex_indices\n";
 
 #[test]
-#[ignore = "obj: vertices are doubled where groups meet"]
 fn a_closed_obj_stays_closed_across_groups_and_materials() {
     let mut text = String::from("mtllib missing.mtl\n");
     let cube = cuboid([1.0, 2.0, 3.0]);
@@ -73,7 +72,6 @@ fn obj_takes_seams_negative_indices_polygons_and_crlf() {
 }
 
 #[test]
-#[ignore = "obj: tobj refuses a comment behind a face"]
 fn an_obj_face_may_end_in_a_comment() {
     let text = "v 0 0 0\nv 1 0 0 # right\nv 0 1 0\nf 1 2 3 # front\n";
     assert_eq!(read("noted.obj", text.as_bytes()).unwrap().triangles.len(), 1);
@@ -143,14 +141,12 @@ fn bad_plys_are_refused() {
 }
 
 #[test]
-#[ignore = "ply: a missing coordinate reads as 0"]
 fn a_ply_without_a_coordinate_is_refused() {
     let flat = XYZ.replace("property float z\n", "");
     refusal("flat.ply", &ply("ascii", &flat, b"0 0 1 0 0 1\n3 0 1 2\n"));
 }
 
 #[test]
-#[ignore = "ply: a fractional index is cut to a whole one"]
 fn a_fractional_ply_index_is_refused() {
     refusal("half.ply", &ply("ascii", XYZ, b"0 0 0 1 0 0 0 1 0\n3 0 1 1.5\n"));
 }
