@@ -61,7 +61,7 @@ fn a_buried_ball_that_moves_removes_a_capsule() {
     let report = base.step(&ctx, &[body], 0.0, 1.0, 7).unwrap();
     let expected = polygonal + std::f64::consts::PI * 0.01 * 0.6;
     let meshed = mesh_volume(&ctx, base.removed());
-    assert!((meshed / expected - 1.0).abs() < 0.005, "{meshed} {expected}");
+    assert!((meshed / expected - 1.0).abs() < 0.008, "{meshed} {expected}");
     assert!((report.removed_volume / expected - 1.0).abs() < 0.01, "{} {expected}", report.removed_volume);
 }
 

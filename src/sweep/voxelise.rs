@@ -61,6 +61,8 @@ pub struct Voxeliser {
     inside: Vec<[i32; 3]>,
 }
 
+/// Heights over a triangle's plane that rounding can turn round (cells).
+const IN_PLANE: f32 = 1e-4;
 /// No block.
 const NONE: u32 = u32::MAX;
 /// Faces a task sorts into blocks: fixed, so that nothing depends on the number of threads.
@@ -268,12 +270,13 @@ impl Seen<'_> {
         [(self.voxel >> 6) as f32, (self.voxel >> 3 & 7) as f32, (self.voxel & 7) as f32]
     }
 
-    /// Whether the chain begins or ends at a face that is reached with this winding number.
+    /// Whether the chain begins or ends at a face that is reached with this winding number. In the face's own
+    /// plane the side cannot be told, and either will do.
     fn is_surface(&self, index: u32, before: i32) -> bool {
         let coef = self.faces[index as usize].coef;
-        let front = self.triangles[index as usize].plane_distance(self.position()) > 0.0;
-        let behind = if front { before + coef } else { before - coef };
-        (before >= 1) != (behind >= 1)
+        let height = self.triangles[index as usize].plane_distance(self.position());
+        let ends = |behind: i32| (before >= 1) != (behind >= 1);
+        (height > -IN_PLANE && ends(before + coef)) || (height < IN_PLANE && ends(before - coef))
     }
 
     /// Distance to the nearest face that is a surface, looking through the sheets before it; at most `limit`.
