@@ -12,9 +12,15 @@ void csg(Grid& a, Grid& b, const Call& call, int32_t operation) {
         auto& first = *a.impl->grid;
         auto& second = *b.impl->grid;
         switch (operation) {
-            case UNION: openvdb::tools::csgUnion(first, second); break;
-            case DIFFERENCE: openvdb::tools::csgDifference(first, second); break;
-            default: openvdb::tools::csgIntersection(first, second); break;
+            case UNION:
+                openvdb::tools::csgUnion(first, second);
+                break;
+            case DIFFERENCE:
+                openvdb::tools::csgDifference(first, second);
+                break;
+            default:
+                openvdb::tools::csgIntersection(first, second);
+                break;
         }
     });
 }
@@ -24,9 +30,12 @@ std::unique_ptr<Grid> csg_copy(const Grid& a, const Grid& b, const Call& call, i
         const auto& first = *a.impl->grid;
         const auto& second = *b.impl->grid;
         switch (operation) {
-            case UNION: return wrap(openvdb::tools::csgUnionCopy(first, second));
-            case DIFFERENCE: return wrap(openvdb::tools::csgDifferenceCopy(first, second));
-            default: return wrap(openvdb::tools::csgIntersectionCopy(first, second));
+            case UNION:
+                return wrap(openvdb::tools::csgUnionCopy(first, second));
+            case DIFFERENCE:
+                return wrap(openvdb::tools::csgDifferenceCopy(first, second));
+            default:
+                return wrap(openvdb::tools::csgIntersectionCopy(first, second));
         }
     });
 }

@@ -122,7 +122,8 @@ std::unique_ptr<Grid> read_float_grid(rust::Str path, rust::Str name) {
     file.close();
     auto grid = openvdb::gridPtrCast<openvdb::FloatGrid>(base);
     if (!grid) throw std::runtime_error("grid \"" + std::string(name) + "\" is of type " + base->type());
-    if (grid->tree().leafCount() > 0 && grid->tree().cbeginLeaf()->buffer().isOutOfCore()) grid->tree().readNonresidentBuffers();
+    if (grid->tree().leafCount() > 0 && grid->tree().cbeginLeaf()->buffer().isOutOfCore())
+        grid->tree().readNonresidentBuffers();
     for (const char* key : {openvdb::GridBase::META_FILE_BBOX_MIN, openvdb::GridBase::META_FILE_BBOX_MAX,
                             openvdb::GridBase::META_FILE_COMPRESSION, openvdb::GridBase::META_FILE_MEM_BYTES,
                             openvdb::GridBase::META_FILE_VOXEL_COUNT, openvdb::GridBase::META_FILE_DELAYED_LOAD}) {

@@ -93,8 +93,8 @@ void advect_outward(Grid& grid, const Call& call, const Grid& speed) {
     run(call, [&] {
         Interrupter interrupter(call);
         const Outward field(*grid.impl->grid, *speed.impl->grid);
-        openvdb::tools::LevelSetAdvection<openvdb::FloatGrid, Outward, openvdb::util::NullInterrupter> advection(*grid.impl->grid, field,
-                                                                                             &interrupter);
+        openvdb::tools::LevelSetAdvection<openvdb::FloatGrid, Outward, openvdb::util::NullInterrupter> advection(
+            *grid.impl->grid, field, &interrupter);
         advection.advect(0.0, 1.0);
         interrupter.check();
     });

@@ -60,7 +60,9 @@ std::array<double, 3> world_to_index(const Grid& grid, std::array<double, 3> p) 
 
 float background(const Grid& grid) noexcept { return grid.impl->grid->background(); }
 int32_t grid_class(const Grid& grid) noexcept { return static_cast<int32_t>(grid.impl->grid->getGridClass()); }
-void set_grid_class(Grid& grid, int32_t value) { grid.impl->grid->setGridClass(static_cast<openvdb::GridClass>(value)); }
+void set_grid_class(Grid& grid, int32_t value) {
+    grid.impl->grid->setGridClass(static_cast<openvdb::GridClass>(value));
+}
 rust::String name(const Grid& grid) noexcept { return rust::String::lossy(grid.impl->grid->getName()); }
 void set_name(Grid& grid, rust::Str name) { grid.impl->grid->setName(std::string(name)); }
 uint64_t active_voxels(const Grid& grid) noexcept { return grid.impl->grid->activeVoxelCount(); }
@@ -81,7 +83,13 @@ namespace {
 
 LeafView view(const Leaf& leaf) {
     const auto& at = leaf.origin();
-    return {at[0], at[1], at[2], true, false, 0.0f, reinterpret_cast<size_t>(leaf.buffer().data()),
+    return {at[0],
+            at[1],
+            at[2],
+            true,
+            false,
+            0.0f,
+            reinterpret_cast<size_t>(leaf.buffer().data()),
             reinterpret_cast<size_t>(&leaf.getValueMask())};
 }
 
@@ -148,14 +156,16 @@ float value_at(const Grid& grid, int32_t x, int32_t y, int32_t z) noexcept {
 void sample(const Grid& grid, const Call& call, rust::Slice<const double> world, bool linear, rust::Slice<float> out) {
     const auto& source = *grid.impl->grid;
     run(call, [&] {
-        tbb::parallel_for(tbb::blocked_range<size_t>(0, out.size(), 1024), [&](const tbb::blocked_range<size_t>& range) {
-            auto tree = source.getConstAccessor();
-            for (size_t i = range.begin(); i != range.end(); ++i) {
-                const auto at = source.worldToIndex(openvdb::Vec3d(world[3 * i], world[3 * i + 1], world[3 * i + 2]));
-                out[i] = linear ? openvdb::tools::BoxSampler::sample(tree, at)
-                                : openvdb::tools::PointSampler::sample(tree, at);
-            }
-        });
+        tbb::parallel_for(
+            tbb::blocked_range<size_t>(0, out.size(), 1024), [&](const tbb::blocked_range<size_t>& range) {
+                auto tree = source.getConstAccessor();
+                for (size_t i = range.begin(); i != range.end(); ++i) {
+                    const auto at =
+                        source.worldToIndex(openvdb::Vec3d(world[3 * i], world[3 * i + 1], world[3 * i + 2]));
+                    out[i] = linear ? openvdb::tools::BoxSampler::sample(tree, at)
+                                    : openvdb::tools::PointSampler::sample(tree, at);
+                }
+            });
     });
 }
 

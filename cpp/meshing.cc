@@ -35,7 +35,8 @@ std::unique_ptr<Grid> from_mesh(const Call& call, rust::Slice<const float> point
         Interrupter interrupter(call);
         const IndexMesh mesh{points, indices, 1.0 / voxel};
         const auto transform = openvdb::math::Transform::createLinearTransform(voxel);
-        auto grid = openvdb::tools::meshToVolume<openvdb::FloatGrid>(interrupter, mesh, *transform, half_width, half_width);
+        auto grid =
+            openvdb::tools::meshToVolume<openvdb::FloatGrid>(interrupter, mesh, *transform, half_width, half_width);
         interrupter.check();
         grid->setGridClass(openvdb::GRID_LEVEL_SET);
         return wrap(grid);
@@ -78,7 +79,8 @@ Triangles to_mesh(const Grid& grid, const Call& call, double iso, double adaptiv
 void measure(const Grid& grid, const Call& call, double& area, double& volume) {
     run(call, [&] {
         Interrupter interrupter(call);
-        openvdb::tools::LevelSetMeasure<openvdb::FloatGrid, openvdb::util::NullInterrupter> tool(*grid.impl->grid, &interrupter);
+        openvdb::tools::LevelSetMeasure<openvdb::FloatGrid, openvdb::util::NullInterrupter> tool(*grid.impl->grid,
+                                                                                                 &interrupter);
         area = tool.area(true);
         volume = tool.volume(true);
         interrupter.check();
@@ -89,21 +91,23 @@ void cast_rays(const Grid& grid, const Call& call, rust::Slice<const double> ray
     run(call, [&] {
         using Intersector = openvdb::tools::LevelSetRayIntersector<openvdb::FloatGrid>;
         const Intersector source(*grid.impl->grid);
-        tbb::parallel_for(tbb::blocked_range<size_t>(0, hits.size(), 256), [&](const tbb::blocked_range<size_t>& range) {
-            Intersector intersector(source);
-            for (size_t i = range.begin(); i != range.end(); ++i) {
-                const openvdb::Vec3d eye(rays[6 * i], rays[6 * i + 1], rays[6 * i + 2]);
-                const openvdb::Vec3d direction(rays[6 * i + 3], rays[6 * i + 4], rays[6 * i + 5]);
-                const openvdb::math::Ray<double> ray(eye, direction);
-                openvdb::Vec3d at, normal;
-                if (intersector.intersectsWS(ray, at, normal)) {
-                    hits[i].distance = static_cast<float>((at - eye).dot(direction));
-                    for (int axis = 0; axis < 3; ++axis) hits[i].normal[axis] = static_cast<float>(normal[axis]);
-                } else {
-                    hits[i].distance = std::numeric_limits<float>::infinity();
-                }
-            }
-        });
+        tbb::parallel_for(tbb::blocked_range<size_t>(0, hits.size(), 256),
+                          [&](const tbb::blocked_range<size_t>& range) {
+                              Intersector intersector(source);
+                              for (size_t i = range.begin(); i != range.end(); ++i) {
+                                  const openvdb::Vec3d eye(rays[6 * i], rays[6 * i + 1], rays[6 * i + 2]);
+                                  const openvdb::Vec3d direction(rays[6 * i + 3], rays[6 * i + 4], rays[6 * i + 5]);
+                                  const openvdb::math::Ray<double> ray(eye, direction);
+                                  openvdb::Vec3d at, normal;
+                                  if (intersector.intersectsWS(ray, at, normal)) {
+                                      hits[i].distance = static_cast<float>((at - eye).dot(direction));
+                                      for (int axis = 0; axis < 3; ++axis)
+                                          hits[i].normal[axis] = static_cast<float>(normal[axis]);
+                                  } else {
+                                      hits[i].distance = std::numeric_limits<float>::infinity();
+                                  }
+                              }
+                          });
     });
 }
 

@@ -137,8 +137,8 @@ impl Body {
     /// Number of equal steps an interval needs, from five poses at its quarters.
     fn steps(&self, probes: &[Vec<DVec3>; 5], tolerance: f64, near: &Near) -> usize {
         let mut bend: f64 = 0.0;
-        for vertex in 0..probes[0].len() {
-            let path = [0, 1, 2, 3, 4].map(|probe| probes[probe][vertex]);
+        let paths = (0..probes[0].len()).map(|vertex| probes.each_ref().map(|probe| probe[vertex]));
+        for path in paths {
             if near.reaches(&path) {
                 for (index, t) in [(1, 0.25), (2, 0.5), (3, 0.75)] {
                     bend = bend.max((path[index] - path[0].lerp(&path[4], t)).norm_squared());

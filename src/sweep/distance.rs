@@ -97,7 +97,7 @@ impl Triangle {
     #[inline(always)]
     fn squared(&self, points: &Points) -> [f32; LANES] {
         let mut out = [0.0; LANES];
-        for lane in 0..LANES {
+        for (lane, out) in out.iter_mut().enumerate() {
             let p = [points.x[lane], points.y[lane], points.z[lane]];
             let mut nearest = f32::INFINITY;
             let mut least_inward = f32::INFINITY;
@@ -115,7 +115,7 @@ impl Triangle {
             }
             let height = dot(sub(p, self.corner[0]), self.normal);
             let plane = height * height;
-            out[lane] = if least_inward > 0.0 { plane } else { nearest };
+            *out = if least_inward > 0.0 { plane } else { nearest };
         }
         out
     }

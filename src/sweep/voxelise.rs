@@ -9,7 +9,7 @@ use rayon::prelude::*;
 use super::chain::Face;
 use super::distance::Triangle;
 use super::lattice::{Fixed, Lattice, UNITS};
-use super::nearest::{NONE, Nearest, Scratch};
+use super::nearest::{Around, Scratch, search};
 use super::winding::Lines;
 use crate::base::blocks::{Origin, VOXELS, Values};
 use crate::error::{Error, Result};
@@ -61,6 +61,8 @@ pub struct Voxeliser {
     inside: Vec<[i32; 3]>,
 }
 
+/// No block.
+const NONE: u32 = u32::MAX;
 /// Faces a task sorts into blocks: fixed, so that nothing depends on the number of threads.
 const GRAIN: usize = 2048;
 /// Most blocks a region may span: its index then fits 1 GiB.
@@ -217,23 +219,18 @@ impl Voxeliser {
         let ids = &self.face_ids[self.start[index] as usize..self.start[index + 1] as usize];
         let faces: Vec<&Face> = ids.iter().map(|&id| &self.faces[id as usize]).collect();
         let triangles: Vec<Triangle> = faces.iter().map(|face| Triangle::new(&face.v, corner)).collect();
-        let nearest = Nearest::search(&triangles, self.band.reach(), scratch);
         let winding = self.windings(corner);
-        let mut values = Box::new([0.0; VOXELS]);
+        let limits = winding.map(|w| if w >= 1 { self.band.inside } else { self.band.outside });
+        let mut values: Box<Values> =
+            Box::new(std::array::from_fn(|v| if winding[v] >= 1 { -limits[v] } else { limits[v] }));
         let mut uniform = true;
-        for voxel in 0..VOXELS {
-            let inside = winding[voxel] >= 1;
-            let limit = if inside { self.band.inside } else { self.band.outside };
-            let mut distance = nearest.squared[voxel].sqrt().min(limit);
-            if distance < limit {
-                let seen = Seen { triangles: &triangles, faces: &faces, voxel, winding: winding[voxel] };
-                if !seen.is_surface(nearest.index[voxel], seen.winding) {
-                    distance = seen.distance_past_sheets(limit);
-                }
-                uniform &= distance >= limit;
-            }
-            values[voxel] = if inside { -distance } else { distance };
-        }
+        search(&triangles, self.band.reach(), scratch, |around| {
+            let voxel = around.voxel;
+            let seen = Seen { triangles: &triangles, faces: &faces, voxel, winding: winding[voxel] };
+            let distance = seen.distance(around, limits[voxel]);
+            uniform &= distance >= limits[voxel];
+            values[voxel] = if winding[voxel] >= 1 { -distance } else { distance };
+        });
         let mixed = winding.iter().any(|&w| (w >= 1) != (winding[0] >= 1));
         match (uniform && !mixed, winding[0] >= 1) {
             (true, true) => Some(Piece::Inside(self.origin(block))),
@@ -279,8 +276,41 @@ impl Seen<'_> {
         (before >= 1) != (behind >= 1)
     }
 
-    /// Distance to the nearest face that is a surface, looking through the sheets before it.
-    fn distance_past_sheets(&self, limit: f32) -> f32 {
+    /// Distance to the nearest face that is a surface, looking through the sheets before it; at most `limit`.
+    fn distance(&self, around: &Around<'_>, limit: f32) -> f32 {
+        let mut sheets: Vec<u32> = Vec::new();
+        let mut next = Some(around.nearest);
+        while let Some((squared, index)) = next {
+            let distance = squared.sqrt();
+            if distance >= limit {
+                return limit;
+            }
+            if !sheets.is_empty() && distance > around.complete_to {
+                break;
+            }
+            if self.ends_at(index, &sheets) {
+                return distance;
+            }
+            sheets.push(index);
+            next = around.next_after((squared, index));
+        }
+        self.distance_among_all(limit)
+    }
+
+    /// Whether the face's nearest point is on the surface, when these faces are nearer.
+    fn ends_at(&self, index: u32, nearer: &[u32]) -> bool {
+        if nearer.is_empty() {
+            return self.is_surface(index, self.winding);
+        }
+        let p = self.position();
+        let q = self.triangles[index as usize].closest(p);
+        let passed = |&at: &u32| self.triangles[at as usize].passed(p, q) * self.faces[at as usize].coef;
+        let crossed: i32 = nearer.iter().map(passed).sum();
+        self.is_surface(index, self.winding - crossed)
+    }
+
+    /// As [`Seen::distance`], among all faces of the block.
+    fn distance_among_all(&self, limit: f32) -> f32 {
         let p = self.position();
         let mut order: Vec<(f32, u32)> = self
             .triangles
@@ -290,15 +320,12 @@ impl Seen<'_> {
             .filter(|(distance, _)| *distance < limit)
             .collect();
         order.sort_unstable_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
-        for (rank, &(distance, index)) in order.iter().enumerate() {
-            let q = self.triangles[index as usize].closest(p);
-            let crossed: i32 = order[..rank]
-                .iter()
-                .map(|&(_, at)| self.triangles[at as usize].passed(p, q) * self.faces[at as usize].coef)
-                .sum();
-            if self.is_surface(index, self.winding - crossed) {
+        let mut nearer: Vec<u32> = Vec::with_capacity(order.len());
+        for (distance, index) in order {
+            if self.ends_at(index, &nearer) {
                 return distance;
             }
+            nearer.push(index);
         }
         limit
     }

@@ -21,7 +21,9 @@ pub fn sphere(radius: f32, n: usize) -> TriMesh {
 
 /// A bumpy closed body of 12 n^2 triangles, about `size` across.
 pub fn blob(size: f32, n: usize) -> TriMesh {
-    star(n, |d| size / 2.0 * (0.9 + 0.06 * (5.0 * d.x).sin() * (4.0 * d.y).cos() + 0.04 * (9.0 * d.z + d.x).sin()))
+    star(n, |d| {
+        size / 2.0 * (0.9 + 0.06 * (5.0 * d.x).sin() * (4.0 * d.y).cos() + 0.04 * (9.0 * d.z + d.x).sin())
+    })
 }
 
 /// A closed star-shaped body; `radius` gives its reach in a direction.
@@ -32,10 +34,12 @@ fn star(n: usize, radius: impl Fn(Vec3) -> f32) -> TriMesh {
         let at = |i: usize, j: usize| first + (i * (n + 1) + j) as u32;
         for i in 0..=n {
             for j in 0..=n {
-                let tangent = |k: usize| (((2 * k) as f32 / n as f32 - 1.0) * std::f32::consts::FRAC_PI_4).tan();
+                let tangent =
+                    |k: usize| (((2 * k) as f32 / n as f32 - 1.0) * std::f32::consts::FRAC_PI_4).tan();
                 // The rims of neighbouring faces must be the same bits.
                 let (u, v) = (exact(tangent(i), i, n), exact(tangent(j), j, n));
-                let p = [[1.0, u, v], [-1.0, v, u], [v, 1.0, u], [u, -1.0, v], [u, v, 1.0], [v, u, -1.0]][face];
+                let p =
+                    [[1.0, u, v], [-1.0, v, u], [v, 1.0, u], [u, -1.0, v], [u, v, 1.0], [v, u, -1.0]][face];
                 let direction = Vec3::from(p).normalize();
                 mesh.positions.push(direction * radius(direction));
             }

@@ -5,6 +5,8 @@
 
 use std::collections::{BTreeSet, HashMap};
 
+use rayon::prelude::*;
+
 use crate::base::blocks::{Origin, VOXELS, Values};
 use crate::error::Result;
 use crate::vdb::{FloatGrid, Probe};
@@ -60,6 +62,29 @@ pub fn heights(surface: &FloatGrid, [x, z]: [i32; 2], low: i32, high: i32) -> Re
         }
     }
     Ok(heights)
+}
+
+/// Volume of a level set's solid (m3): filled parts of cells, summed leaf by leaf in the tree's order.
+/// Blocks without a leaf are looked up between two voxels.
+pub fn volume(surface: &FloatGrid, low: [i32; 3], high: [i32; 3]) -> Result<f64> {
+    let cell = surface.voxel_size() as f32;
+    let leaves = surface.leaves()?;
+    let parts: Vec<f64> = leaves
+        .par_iter()
+        .map(|leaf| leaf.values.iter().map(|&value| f64::from(filled(value, cell))).sum())
+        .collect();
+    let mut cells: f64 = parts.iter().sum();
+    let [bx, by, bz] = [0, 1, 2].map(|axis| low[axis].div_euclid(8)..=high[axis].div_euclid(8));
+    for x in bx {
+        let origins: Vec<Origin> =
+            by.clone().flat_map(|y| bz.clone().map(move |z| [x * 8, y * 8, z * 8])).collect();
+        for probe in surface.probe(&origins)? {
+            if matches!(probe, Probe::Tile { value, .. } if value < 0.0) {
+                cells += VOXELS as f64;
+            }
+        }
+    }
+    Ok(cells * surface.voxel_size().powi(3))
 }
 
 fn add_filled(values: &Values, cell: f32, heights: &mut [f32; CELLS]) {

@@ -18,7 +18,7 @@ use crate::base::blocks::{Block, BlockEdit, Mask, Origin, VOXELS};
 use crate::context::{Context, StageTime};
 use crate::error::{Error, Result};
 use crate::sweep::{Band, Body, Face, Lattice, Piece, Scratch, Settings, UNITS, Voxeliser, Window};
-use crate::vdb::{FloatGrid, GridClass, Probe, level_set};
+use crate::vdb::{FloatGrid, GridClass, Probe};
 use columns::{Column, Columns};
 use edit::{Edit, Scale};
 use noise::Displacement;
@@ -89,7 +89,7 @@ impl BaseLayer {
         }
         let (low, high) = surface.active_bbox().ok_or_else(|| Error::argument("the snow is empty"))?;
         surface.set_name("surface")?;
-        let volume = level_set::measure(ctx, &surface)?.volume;
+        let volume = ctx.pool().install(|| columns::volume(&surface, low, high))?;
         let plain = |name: &str| -> Result<FloatGrid> {
             let mut grid = FloatGrid::new(cell, 0.0)?;
             grid.set_name(name)?;

@@ -1,0 +1,39 @@
+# frazil: `make demo` shows what it does, `make test` checks it.
+
+PACKAGES := libopenvdb-dev libboost-dev libboost-iostreams-dev g++ cmake pkg-config clang-format python3-openvdb libopenvdb-tools
+RUST_NEEDED := 1.88
+DEMO := target/demo
+
+.PHONY: setup demo test lint gates
+
+# Everything a build needs, from Debian's packages; quick when it is there.
+setup:
+	@./tools/setup "$(RUST_NEEDED)" $(PACKAGES)
+
+demo: setup
+	cargo build --release --bin frazil --example make_scenes
+	target/release/examples/make_scenes $(DEMO)
+	target/release/frazil snow $(DEMO)/walker.toml -o $(DEMO)/walker
+	target/release/frazil preview $(DEMO)/walker/base/base.0048.vdb -o $(DEMO)/walker.png
+	target/release/frazil preview $(DEMO)/walker/base/base.0048.vdb -o $(DEMO)/print.png --eye 0.75,0.95,1.1 --target 0.0,0.2,1.85
+	target/release/frazil snow $(DEMO)/box.toml -o $(DEMO)/box
+	target/release/frazil preview $(DEMO)/box/base/base.0005.vdb -o $(DEMO)/box.png
+	target/release/frazil snow $(DEMO)/cube.toml -o $(DEMO)/cube
+	target/release/frazil preview $(DEMO)/cube/base/base.0007.vdb -o $(DEMO)/cube.png
+	target/release/frazil snow $(DEMO)/ball.toml -o $(DEMO)/ball
+	target/release/frazil preview $(DEMO)/ball/base/base.0024.vdb -o $(DEMO)/ball.png
+	@echo "Pictures: $(DEMO)/walker.png $(DEMO)/print.png $(DEMO)/box.png $(DEMO)/cube.png $(DEMO)/ball.png; volumes: $(DEMO)/walker/base/*.vdb"
+
+lint:
+	@if cargo fmt --version >/dev/null 2>&1; then cargo fmt --check; else echo "lint: rustfmt is not installed, skipped"; fi
+	@if cargo clippy --version >/dev/null 2>&1; then cargo clippy --release --all-targets -- -D warnings; else echo "lint: clippy is not installed, skipped"; fi
+	clang-format --dry-run -Werror cpp/*.cc cpp/*.h
+
+test: setup lint
+	cargo test --release
+	RUSTDOCFLAGS="-D warnings" cargo doc --release --no-deps --lib
+	cargo check --release --no-default-features --lib
+
+# make gates [ONLY=snow.base.wall,...]
+gates: setup
+	@cargo bench --quiet --bench gates -- $(ONLY)

@@ -1,0 +1,104 @@
+//! One line a number: `gate <name> <value> <unit> must <bound> aim <bound> <aim|ok|short>`.
+
+use std::time::Instant;
+
+/// Prints gates and remembers whether one fell short.
+pub struct Harness {
+    only: Vec<String>,
+    short: bool,
+}
+
+/// A bound such as `<=0.1` or `>=1`.
+#[derive(Clone, Copy)]
+pub enum Bound {
+    /// At most.
+    Most(f64),
+    /// At least.
+    Least(f64),
+    /// None.
+    Open,
+}
+
+impl Bound {
+    fn holds(self, value: f64) -> bool {
+        match self {
+            Self::Most(bound) => value <= bound,
+            Self::Least(bound) => value >= bound,
+            Self::Open => true,
+        }
+    }
+
+    fn text(self) -> String {
+        match self {
+            Self::Most(bound) => format!("<={bound}"),
+            Self::Least(bound) => format!(">={bound}"),
+            Self::Open => "-".into(),
+        }
+    }
+}
+
+impl Harness {
+    /// Takes the names (prefixes, comma-separated) to run from the arguments; all without any.
+    pub fn from_arguments() -> Self {
+        let names = std::env::args().skip(1).filter(|argument| !argument.starts_with('-'));
+        let only = names.flat_map(|text| text.split(',').map(str::to_string).collect::<Vec<_>>()).collect();
+        Self { only, short: false }
+    }
+
+    /// Whether any gate whose name begins so is wanted.
+    pub fn wants(&self, name: &str) -> bool {
+        self.only.is_empty() || self.only.iter().any(|only| name.starts_with(only) || only.starts_with(name))
+    }
+
+    /// Prints a gate.
+    pub fn gate(&mut self, name: &str, value: f64, unit: &str, must: Bound, aim: Bound, note: &str) {
+        let state = match (must.holds(value), aim.holds(value)) {
+            (true, true) => "aim",
+            (true, false) => "ok",
+            _ => "short",
+        };
+        self.short |= state == "short";
+        let note = if note.is_empty() { String::new() } else { format!(" # {note}") };
+        println!("gate {name} {value:.6} {unit} must {} aim {} {state}{note}", must.text(), aim.text());
+    }
+
+    /// Prints a yes or no.
+    pub fn holds(&mut self, name: &str, yes: bool, note: &str) {
+        self.gate(name, f64::from(u8::from(yes)), "bool", Bound::Least(1.0), Bound::Open, note);
+    }
+
+    /// Ends the program.
+    pub fn finish(self) -> ! {
+        std::process::exit(i32::from(self.short))
+    }
+}
+
+/// Ticks of other processes and of all, since boot: for `# noisy`.
+fn ticks() -> Option<(f64, f64)> {
+    let stat = std::fs::read_to_string("/proc/stat").ok()?;
+    let all: Vec<f64> = stat.lines().next()?.split_whitespace().skip(1).filter_map(|n| n.parse().ok()).collect();
+    let own = std::fs::read_to_string("/proc/self/stat").ok()?;
+    let own: Vec<f64> = own.rsplit(')').next()?.split_whitespace().filter_map(|n| n.parse().ok()).collect();
+    let busy: f64 = all.iter().take(3).sum();
+    // After the name's parenthesis and the state letter: utime and stime are numbers 10 and 11.
+    Some((busy - own.get(10)? - own.get(11)?, Instant::now().elapsed().as_secs_f64()))
+}
+
+/// Times what `work` does, and says what else the machine did meanwhile.
+pub fn timed(mut work: impl FnMut()) -> (f64, String) {
+    let before = ticks();
+    let start = Instant::now();
+    work();
+    let seconds = start.elapsed().as_secs_f64();
+    let others = match (before, ticks()) {
+        (Some((before, _)), Some((after, _))) => (after - before) / 100.0 / seconds,
+        _ => 0.0,
+    };
+    (seconds, if others > 0.3 { " noisy".into() } else { String::new() })
+}
+
+/// The middle of some numbers.
+pub fn median(mut values: Vec<f64>) -> f64 {
+    values.sort_unstable_by(f64::total_cmp);
+    values[values.len() / 2]
+}

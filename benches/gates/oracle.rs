@@ -1,0 +1,68 @@
+//! Exact answers by other means than the library's.
+
+use frazil::base::{DVec3, TriMesh};
+use nalgebra::Rotation3;
+
+/// A box that moves rigidly, as in the keys of a motion.
+pub struct MovingBox {
+    /// Half the edges (m).
+    pub half: DVec3,
+    /// Place at 0 and at 1 (m).
+    pub at: [DVec3; 2],
+    /// Angles about x, y, z at 0 and at 1 (radians).
+    pub turn: [DVec3; 2],
+}
+
+impl MovingBox {
+    /// Inverse rotation and place at `poses` times.
+    pub fn poses(&self, poses: usize) -> Vec<(Rotation3<f64>, DVec3)> {
+        let pose = |index: usize| {
+            let t = index as f64 / (poses - 1) as f64;
+            let turn = self.turn[0].lerp(&self.turn[1], t);
+            (Rotation3::from_euler_angles(turn.x, turn.y, turn.z).inverse(), self.at[0].lerp(&self.at[1], t))
+        };
+        (0..poses).map(pose).collect()
+    }
+
+    /// Least signed distance of a point over the poses (m): exact outside their union.
+    pub fn distance(&self, poses: &[(Rotation3<f64>, DVec3)], p: DVec3) -> f64 {
+        poses.iter().map(|(back, at)| self.box_distance(back * (p - at))).fold(f64::INFINITY, f64::min)
+    }
+
+    fn box_distance(&self, p: DVec3) -> f64 {
+        let q = p.abs() - self.half;
+        q.sup(&DVec3::zeros()).norm() + q.max().min(0.0)
+    }
+}
+
+/// Vertices whose surroundings (3 cells) are smooth: no normal differs by more than 15 degrees.
+pub fn away_from_creases(mesh: &TriMesh, near: impl Fn(DVec3) -> bool, reach: f64) -> Vec<DVec3> {
+    let mut normals = vec![DVec3::zeros(); mesh.positions.len()];
+    let mut flat: Vec<(DVec3, DVec3)> = Vec::new();
+    for triangle in 0..mesh.triangles.len() {
+        let [a, b, c] = mesh.corners(triangle);
+        if !near(a) {
+            continue;
+        }
+        let area = (b - a).cross(&(c - a));
+        if let Some(normal) = area.try_normalize(1e-18) {
+            flat.push(((a + b + c) / 3.0, normal));
+            mesh.triangles[triangle].iter().for_each(|&index| normals[index as usize] += area);
+        }
+    }
+    let mut cells: std::collections::HashMap<[i64; 3], Vec<usize>> = std::collections::HashMap::new();
+    let cell = |p: DVec3| [0, 1, 2].map(|axis| (p[axis] / reach).floor() as i64);
+    flat.iter().enumerate().for_each(|(index, (p, _))| cells.entry(cell(*p)).or_default().push(index));
+    let smooth = |p: DVec3, normal: DVec3| {
+        let [x, y, z] = cell(p);
+        let around = (-1..=1).flat_map(|i| (-1..=1).flat_map(move |j| (-1..=1).map(move |k| [x + i, y + j, z + k])));
+        let mut close = around.filter_map(|key| cells.get(&key)).flatten();
+        close.all(|&index| (flat[index].0 - p).norm() > reach || flat[index].1.dot(&normal) > 0.966)
+    };
+    let pairs = mesh.positions.iter().zip(&normals);
+    pairs
+        .filter_map(|(p, normal)| Some((p.cast::<f64>(), normal.try_normalize(1e-18)?)))
+        .filter(|(p, normal)| smooth(*p, *normal))
+        .map(|(p, _)| p)
+        .collect()
+}

@@ -1,0 +1,49 @@
+//! Layers and bodies of the gates.
+
+use frazil::base::{DVec3, TriMesh};
+use frazil::motion::{Key, Keys, Rigid};
+use frazil::snow::base_layer::initial::{Cover, Ground, layer};
+use frazil::snow::base_layer::{BaseLayer, Params};
+use frazil::sweep::Body;
+use frazil::{Context, Pool};
+
+/// A context on so many threads.
+pub fn context(threads: usize) -> Context {
+    Context::new(Pool::new(threads).expect("threads"))
+}
+
+/// Snow 0.3 m deep on a square, around the origin.
+pub fn snow(ctx: &Context, edge: f64, cell: f64, params: Params) -> BaseLayer {
+    let half = edge / 2.0;
+    let ground = Ground::Plane { height: 0.0, area: [-half, -half, half, half] };
+    let layer = layer(ctx, &ground, &[], &Cover::Depth(0.3), cell, 3.0).expect("snow");
+    BaseLayer::new(ctx, layer, params).expect("base layer")
+}
+
+/// A body that moves in a straight line, turning at a constant rate; times in frames.
+pub fn body(mesh: TriMesh, at: [DVec3; 2], turn: [DVec3; 2], frames: f64) -> Body {
+    let key = |time: f64, index: usize| Key { time, at: at[index], turn: turn[index] };
+    let keys = Keys::new(vec![key(0.0, 0), key(frames, 1)]).expect("keys");
+    Body::new(Box::new(Rigid::new(mesh, keys)), 0.0).expect("body")
+}
+
+/// Frames of the timed scenes.
+pub const FRAMES: i32 = 6;
+
+/// A 0.4 m blob of 49,152 triangles, half sunk, 0.1 m and 0.3 rad a frame, 5 mm.
+pub fn small(ctx: &Context, layer: f64) -> (BaseLayer, Body) {
+    let frames = f64::from(FRAMES);
+    let ends = [DVec3::new(-0.35, 0.3, 0.0), DVec3::new(-0.35 + 0.1 * frames, 0.3, 0.0)];
+    let turn = [DVec3::zeros(), DVec3::new(0.1, 0.2, 0.2) * frames];
+    let body = body(crate::common::shapes::blob(0.4, 64), ends, turn, frames);
+    (snow(ctx, layer, 0.005, Params::for_cell(0.005)), body)
+}
+
+/// A 1.7 m figure of 47,628 triangles that wades, 0.1 m and 0.05 rad a frame, 7.5 mm.
+pub fn large(ctx: &Context, layer: f64) -> (BaseLayer, Body) {
+    let frames = f64::from(FRAMES);
+    let ends = [DVec3::new(0.0, 0.05, -0.5), DVec3::new(0.0, 0.05, -0.5 + 0.1 * frames)];
+    let turn = [DVec3::zeros(), DVec3::new(0.0, 0.05, 0.0) * frames];
+    let body = body(crate::common::shapes::figure(21), ends, turn, frames);
+    (snow(ctx, layer, 0.0075, Params::for_cell(0.0075)), body)
+}

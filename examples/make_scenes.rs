@@ -1,0 +1,82 @@
+//! Writes the demonstration scenes and their meshes, all made by code: `make_scenes DIR`.
+
+#[path = "../tests/common/mod.rs"]
+mod common;
+
+use std::fmt::Write;
+use std::path::Path;
+
+use common::boot::{Step, left_boot, right_boot, walk};
+use common::shapes::{cuboid, sphere};
+use frazil::io::{atomic, mesh};
+
+fn main() -> frazil::Result<()> {
+    let folder = std::env::args().nth(1).unwrap_or_else(|| "target/demo".into());
+    let folder = Path::new(&folder);
+    std::fs::create_dir_all(folder).map_err(|error| frazil::Error::io(folder, "create the folder", error))?;
+    mesh::write(&folder.join("boot_left.obj"), &left_boot())?;
+    mesh::write(&folder.join("boot_right.obj"), &right_boot())?;
+    mesh::write(&folder.join("box.obj"), &cuboid([0.2; 3]))?;
+    mesh::write(&folder.join("cube.obj"), &cuboid([0.4; 3]))?;
+    mesh::write(&folder.join("ball.obj"), &sphere(0.18, 32))?;
+    for (name, text) in
+        [("walker", walker()), ("box", sliding_box()), ("cube", turning_cube()), ("ball", rolling_ball())]
+    {
+        atomic::write_bytes(&folder.join(format!("{name}.toml")), text.as_bytes())?;
+    }
+    Ok(())
+}
+
+fn head(frames: &str, area: [f64; 4], cell: f64) -> String {
+    format!(
+        "[shot]\nframes = \"{frames}\"\n\n[snow]\nground = 0.0\narea = {area:?}\ndepth = 0.30\ncell = {cell}\n"
+    )
+}
+
+fn object(text: &mut String, file: &str, keys: &[Step]) {
+    let _ = writeln!(text, "\n[[object]]\nfile = \"{file}\"\nkeys = [");
+    for key in keys {
+        let rounded = |values: [f64; 3]| values.map(|value| (value * 1e5).round() / 1e5);
+        let (at, turn) = (rounded(key.at), rounded(key.turn_deg));
+        let _ = writeln!(text, "    {{ frame = {}, at = {at:?}, turn_deg = {turn:?} }},", key.frame);
+    }
+    text.push_str("]\n");
+}
+
+/// Two treaded boots, 48 frames: heel strike, roll, toe-off.
+fn walker() -> String {
+    let mut text = head("1-48", [-0.5975, -0.1975, 0.5975, 3.5975], 0.005);
+    object(&mut text, "boot_left.obj", &walk(-1.0, 48, 0.08));
+    object(&mut text, "boot_right.obj", &walk(1.0, 48, 0.08));
+    text
+}
+
+fn two_keys(last: i32, from: [f64; 3], to: [f64; 3], turn_deg: [f64; 3]) -> [Step; 2] {
+    [Step { frame: 1, at: from, turn_deg: [0.0; 3] }, Step { frame: last, at: to, turn_deg }]
+}
+
+/// A box that crosses 0.4 m of snow in each frame.
+fn sliding_box() -> String {
+    let mut text = head("1-5", [-1.1, -0.5, 1.1, 0.5], 0.005);
+    object(&mut text, "box.obj", &two_keys(5, [-0.8, 0.28, -0.15], [0.8, 0.22, 0.15], [10.0, 35.0, 20.0]));
+    text
+}
+
+/// A cube that turns in its place, half sunk.
+fn turning_cube() -> String {
+    let mut text = head("1-7", [-0.6, -0.6, 0.6, 0.6], 0.005);
+    object(&mut text, "cube.obj", &two_keys(7, [0.0, 0.35, 0.0], [0.0, 0.35, 0.0], [30.0, 60.0, 90.0]));
+    text
+}
+
+/// A ball that rolls through the snow.
+fn rolling_ball() -> String {
+    let turn = 1.8 / 0.18f64;
+    let mut text = head("1-24", [-1.2, -0.5, 1.2, 0.5], 0.005);
+    object(
+        &mut text,
+        "ball.obj",
+        &two_keys(24, [-0.9, 0.26, 0.0], [0.9, 0.26, 0.0], [0.0, 0.0, -turn.to_degrees()]),
+    );
+    text
+}

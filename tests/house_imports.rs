@@ -1,0 +1,75 @@
+//! The import law: which room may use which.
+
+use std::fs;
+use std::path::{Path, PathBuf};
+
+/// Each room with what it may use besides itself, `error` and `context`.
+const LAW: [(&str, &[&str]); 9] = [
+    ("base", &[]),
+    ("io", &["base"]),
+    ("vdb", &["base", "io"]),
+    ("motion", &["base", "io"]),
+    ("sweep", &["base", "vdb", "motion"]),
+    ("render", &["base", "io", "vdb"]),
+    ("snow", &["base", "vdb", "motion", "sweep"]),
+    ("scene", &["base", "io", "vdb", "motion", "sweep", "snow"]),
+    ("cli", &[]),
+];
+
+fn sources(folder: &Path, out: &mut Vec<PathBuf>) {
+    for entry in fs::read_dir(folder).unwrap() {
+        let path = entry.unwrap().path();
+        if path.is_dir() {
+            sources(&path, out);
+        } else if path.extension().is_some_and(|extension| extension == "rs") {
+            out.push(path);
+        }
+    }
+}
+
+fn all_sources() -> Vec<PathBuf> {
+    let mut out = Vec::new();
+    sources(&Path::new(env!("CARGO_MANIFEST_DIR")).join("src"), &mut out);
+    out
+}
+
+fn room(path: &Path) -> String {
+    let inner = path.strip_prefix(Path::new(env!("CARGO_MANIFEST_DIR")).join("src")).unwrap();
+    let first = inner.components().next().unwrap().as_os_str().to_str().unwrap();
+    first.trim_end_matches(".rs").to_string()
+}
+
+#[test]
+fn rooms_use_only_the_rooms_that_the_law_allows() {
+    for path in all_sources() {
+        let text = fs::read_to_string(&path).unwrap();
+        let room = room(&path);
+        let allowed: &[&str] = match room.as_str() {
+            "error" | "context" => &["base"],
+            "lib" | "main" => continue,
+            name => LAW.iter().find(|(room, _)| *room == name).unwrap_or_else(|| panic!("{name} has no law")).1,
+        };
+        for (at, _) in text.match_indices("crate::") {
+            let used: String = text[at + 7..].chars().take_while(|c| c.is_alphanumeric() || *c == '_').collect();
+            let free = used == room || used == "error" || used == "context" || !LAW.iter().any(|(r, _)| *r == used);
+            assert!(free || allowed.contains(&used.as_str()), "{}: {room} may not use {used}", path.display());
+        }
+    }
+}
+
+#[test]
+fn words_stay_in_their_rooms() {
+    for path in all_sources() {
+        let text = fs::read_to_string(&path).unwrap();
+        let room = room(&path);
+        let only = |word: &str, rooms: &[&str]| {
+            assert!(!text.contains(word) || rooms.contains(&room.as_str()), "{}: {word}", path.display());
+        };
+        only("bridge::", &["vdb"]);
+        only("clap::", &["cli"]);
+        only("extern \"C\"", &[]);
+        only("println!", &["cli"]);
+        assert!(!["utils", "helpers", "common"].contains(&room.as_str()), "a room named {room}");
+        assert!(text.lines().count() <= 500, "{} is over 500 lines", path.display());
+    }
+}
