@@ -177,7 +177,8 @@ fn growth(old: &FloatGrid, new: &FloatGrid) -> u64 {
 fn run(ctx: &frazil::Context, base: &mut BaseLayer, body: &Body) -> Vec<f64> {
     let bodies = std::slice::from_ref(body);
     base.step(ctx, bodies, 0.0, 0.0, 0).expect("first pose");
-    let step = |frame: i32| timed(|| drop(base.step(ctx, bodies, f64::from(frame - 1), f64::from(frame), frame))).0;
+    let step =
+        |frame: i32| timed(|| drop(base.step(ctx, bodies, f64::from(frame - 1), f64::from(frame), frame))).0;
     (1..=FRAMES).map(step).collect()
 }
 
@@ -201,7 +202,14 @@ fn times(h: &mut Harness) {
         let bytes = base.surface().memory_bytes() as f64 / base.surface().active_voxels() as f64;
         h.gate("snow.base.memory_voxel", bytes, "B", Bound::Most(14.0), Bound::Most(12.0), "stock=12-14");
         let peak = peak_megabytes();
-        h.gate("snow.base.memory_peak", peak, "MB", Bound::Most(300.0), Bound::Most(200.0), "stock=370; this process");
+        h.gate(
+            "snow.base.memory_peak",
+            peak,
+            "MB",
+            Bound::Most(300.0),
+            Bound::Most(200.0),
+            "stock=370; this process",
+        );
         let (stock, noisy) = timed(|| stock(&ctx, &body, &base));
         let note = format!("stock {stock:.2} s{noisy}");
         h.gate("snow.base.stock_large", stock / seconds, "x", Bound::Least(40.0), Bound::Least(120.0), &note);
@@ -258,7 +266,8 @@ fn readers(h: &mut Harness) {
                   print(g.activeVoxelCount(), g.gridClass, g.transform.voxelSize()[0])";
     let python = std::process::Command::new("/usr/bin/python3").args(["-c", script]).arg(&path).output();
     let expected = format!("{} level set 0.01", base.surface().active_voxels());
-    let said = python.map(|output| String::from_utf8_lossy(&output.stdout).trim().to_string()).unwrap_or_default();
+    let said =
+        python.map(|output| String::from_utf8_lossy(&output.stdout).trim().to_string()).unwrap_or_default();
     h.holds("snow.base.readers_pyopenvdb", said == expected, &format!("{said} | {expected}"));
     let print = std::process::Command::new("vdb_print").arg("-l").arg(&path).output();
     h.holds("snow.base.readers_vdb_print", print.is_ok_and(|output| output.status.success()), "");

@@ -47,12 +47,20 @@ fn rooms_use_only_the_rooms_that_the_law_allows() {
         let allowed: &[&str] = match room.as_str() {
             "error" | "context" => &["base"],
             "lib" | "main" => continue,
-            name => LAW.iter().find(|(room, _)| *room == name).unwrap_or_else(|| panic!("{name} has no law")).1,
+            name => {
+                LAW.iter().find(|(room, _)| *room == name).unwrap_or_else(|| panic!("{name} has no law")).1
+            }
         };
         for (at, _) in text.match_indices("crate::") {
-            let used: String = text[at + 7..].chars().take_while(|c| c.is_alphanumeric() || *c == '_').collect();
-            let free = used == room || used == "error" || used == "context" || !LAW.iter().any(|(r, _)| *r == used);
-            assert!(free || allowed.contains(&used.as_str()), "{}: {room} may not use {used}", path.display());
+            let used: String =
+                text[at + 7..].chars().take_while(|c| c.is_alphanumeric() || *c == '_').collect();
+            let free =
+                used == room || used == "error" || used == "context" || !LAW.iter().any(|(r, _)| *r == used);
+            assert!(
+                free || allowed.contains(&used.as_str()),
+                "{}: {room} may not use {used}",
+                path.display()
+            );
         }
     }
 }

@@ -135,7 +135,8 @@ fn an_open_mesh_is_closed_before_it_presses() {
     let mut open = cuboid([0.3, 0.2, 0.3]);
     let whole = open.volume();
     open.triangles.truncate(10);
-    let keys = Keys::new(vec![Key { time: 0.0, at: DVec3::new(0.0, 0.15, 0.0), turn: DVec3::zeros() }]).unwrap();
+    let keys =
+        Keys::new(vec![Key { time: 0.0, at: DVec3::new(0.0, 0.15, 0.0), turn: DVec3::zeros() }]).unwrap();
     let body = Body::new(Box::new(Rigid::new(open, keys)), 0.0).unwrap();
     let mut base = BaseLayer::new(&ctx, snow(&ctx), exact()).unwrap();
     let report = base.step(&ctx, &[body], 0.0, 0.0, 1).unwrap();

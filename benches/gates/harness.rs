@@ -76,7 +76,8 @@ impl Harness {
 /// Ticks of other processes and of all, since boot: for `# noisy`.
 fn ticks() -> Option<(f64, f64)> {
     let stat = std::fs::read_to_string("/proc/stat").ok()?;
-    let all: Vec<f64> = stat.lines().next()?.split_whitespace().skip(1).filter_map(|n| n.parse().ok()).collect();
+    let all: Vec<f64> =
+        stat.lines().next()?.split_whitespace().skip(1).filter_map(|n| n.parse().ok()).collect();
     let own = std::fs::read_to_string("/proc/self/stat").ok()?;
     let own: Vec<f64> = own.rsplit(')').next()?.split_whitespace().filter_map(|n| n.parse().ok()).collect();
     let busy: f64 = all.iter().take(3).sum();

@@ -55,7 +55,8 @@ pub fn away_from_creases(mesh: &TriMesh, near: impl Fn(DVec3) -> bool, reach: f6
     flat.iter().enumerate().for_each(|(index, (p, _))| cells.entry(cell(*p)).or_default().push(index));
     let smooth = |p: DVec3, normal: DVec3| {
         let [x, y, z] = cell(p);
-        let around = (-1..=1).flat_map(|i| (-1..=1).flat_map(move |j| (-1..=1).map(move |k| [x + i, y + j, z + k])));
+        let around =
+            (-1..=1).flat_map(|i| (-1..=1).flat_map(move |j| (-1..=1).map(move |k| [x + i, y + j, z + k])));
         let mut close = around.filter_map(|key| cells.get(&key)).flatten();
         close.all(|&index| (flat[index].0 - p).norm() > reach || flat[index].1.dot(&normal) > 0.966)
     };
