@@ -13,7 +13,8 @@ pub(super) fn parse(bytes: &[u8]) -> Result<TriMesh, String> {
         ignore_lines: true,
         ..Default::default()
     };
-    let mut reader = std::io::BufReader::new(bytes);
+    let geometry = geometry(bytes);
+    let mut reader = std::io::BufReader::new(geometry.as_slice());
     let no_materials = |_: &std::path::Path| Ok((Vec::new(), Default::default()));
     let (models, _) = tobj::load_obj_buf(&mut reader, &options, no_materials)
         .map_err(|error| format!("the .obj file cannot be read ({error})"))?;
@@ -25,6 +26,21 @@ pub(super) fn parse(bytes: &[u8]) -> Result<TriMesh, String> {
         });
     }
     Ok(mesh)
+}
+
+/// The lines of vertices and faces without comments: tobj doubles the vertices of a mesh wherever a group or a material
+/// begins, which would open it, and refuses a comment behind a face.
+fn geometry(bytes: &[u8]) -> Vec<u8> {
+    let mut kept = Vec::with_capacity(bytes.len());
+    for line in bytes.split(|&byte| byte == b'\n') {
+        let line = line.split(|&byte| byte == b'#').next().unwrap_or(line).trim_ascii();
+        let word = line.split(u8::is_ascii_whitespace).next().unwrap_or(line);
+        if matches!(word, b"v" | b"vt" | b"vn" | b"f") {
+            kept.extend_from_slice(line);
+            kept.push(b'\n');
+        }
+    }
+    kept
 }
 
 /// Finds what tobj would pass over or report without a line: bad numbers, vertices out of range.

@@ -38,6 +38,7 @@ pub(super) fn parse(bytes: &[u8]) -> Result<TriMesh, String> {
         end + bytes[end..].iter().position(|&byte| byte == b'\n').ok_or("the .ply header is cut short")? + 1;
     let header = std::str::from_utf8(&bytes[..end]).map_err(|_| "the .ply header is not text")?;
     let (format, elements) = parse_header(header)?;
+    check_coordinates(&elements)?;
     let mut reader = Reader { format, bytes: &bytes[body..], at: 0 };
     let mut mesh = TriMesh::default();
     for element in &elements {
@@ -87,6 +88,17 @@ fn parse_header(header: &str) -> Result<(Format, Vec<Element>), String> {
         }
     }
     Ok((format.ok_or("the .ply header names no format")?, elements))
+}
+
+/// A vertex without one of x, y, z would lie at 0.
+fn check_coordinates(elements: &[Element]) -> Result<(), String> {
+    let vertex =
+        elements.iter().find(|element| element.name == "vertex").ok_or("the .ply file has no vertices")?;
+    let has = |axis: &str| vertex.properties.iter().any(|p| p.name == axis && p.list.is_none());
+    match ["x", "y", "z"].into_iter().find(|axis| !has(axis)) {
+        Some(axis) => Err(format!("the vertices of the .ply file have no property {axis}")),
+        None => Ok(()),
+    }
 }
 
 fn kind_of(name: &str) -> Option<Kind> {
@@ -173,7 +185,7 @@ fn read_row(reader: &mut Reader<'_>, element: &Element, mesh: &mut TriMesh) -> O
 
 /// Indices that are no whole number from 0 become one that validation refuses.
 fn index(value: f64) -> u32 {
-    if (0.0..f64::from(u32::MAX)).contains(&value) { value as u32 } else { u32::MAX }
+    if (0.0..f64::from(u32::MAX)).contains(&value) && value.fract() == 0.0 { value as u32 } else { u32::MAX }
 }
 
 fn add_polygon(values: &[f64], mesh: &mut TriMesh) {

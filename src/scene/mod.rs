@@ -84,7 +84,7 @@ pub struct Noise {
     pub amplitude: f64,
     /// Size of its largest features (m), 1 to 10,000 cells.
     pub size: f64,
-    /// Octaves, 1 to 8, each of half the size and amplitude of the one before.
+    /// Octaves, 1 to 8, each of half the size and a quarter of the amplitude of the one before.
     pub octaves: u32,
     /// Seed.
     pub seed: u32,

@@ -21,7 +21,7 @@ pub struct Args {
     /// Size of the largest clumps (m) [default: 8 cells]
     #[arg(long, value_name = "M")]
     size: Option<f64>,
-    /// Octaves, each of half the size and half the strength, 1 to 8
+    /// Octaves, each of half the size and a quarter of the strength, 1 to 8
     #[arg(long, value_name = "N", default_value = "3")]
     octaves: u32,
     /// Seed of the pattern

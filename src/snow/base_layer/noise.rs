@@ -23,14 +23,14 @@ pub struct NoiseParams {
     pub amplitude: f64,
     /// Size of the largest clumps (m).
     pub size: f64,
-    /// Octaves, each of half the size and half the strength, 1..=8.
+    /// Octaves, each of half the size and a quarter of the strength, 1..=8.
     pub octaves: u32,
     /// Seed of the pattern.
     pub seed: i32,
 }
 
 /// Steepest slope of one octave of unit size and strength (a test samples it).
-const STEEPEST: f64 = 2.3;
+const STEEPEST: f64 = 2.95;
 
 impl NoiseParams {
     /// Two cells of amplitude, clumps of eight cells, three octaves.
@@ -72,11 +72,10 @@ impl NoiseParams {
         Ok(())
     }
 
-    /// Upper bound of the displacement's slope: each octave adds the same, of a sum scaled to 1.
+    /// Upper bound of the displacement's slope: octave o has strength 4^-o and slope 2^-o, of a sum scaled to 1.
     fn slope(&self) -> f64 {
-        let octaves = f64::from(self.octaves);
-        let strengths = 2.0 - 2.0 * 0.5f64.powi(self.octaves as i32);
-        STEEPEST * octaves / strengths * self.amplitude / self.size
+        let sum = |ratio: f64| (0..self.octaves).map(|octave| ratio.powi(octave as i32)).sum::<f64>();
+        STEEPEST * sum(0.5) / sum(0.25) * self.amplitude / self.size
     }
 }
 
@@ -95,6 +94,7 @@ impl Displacement {
         noise.set_noise_type(Some(NoiseType::Perlin));
         noise.set_fractal_type(if params.octaves > 1 { Some(FractalType::FBm) } else { None });
         noise.set_fractal_octaves(Some(params.octaves as i32));
+        noise.set_fractal_gain(Some(0.25));
         noise.set_frequency(Some((1.0 / params.size) as f32));
         Self { noise, amplitude: (params.amplitude / cell) as f32, cell }
     }
