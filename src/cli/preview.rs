@@ -33,7 +33,7 @@ pub struct Args {
     #[arg(long, value_name = "X,Y,Z", value_parser = options::triple, allow_hyphen_values = true, requires = "eye")]
     target: Option<DVec3>,
     /// Vertical field of view (degrees).
-    #[arg(long, default_value_t = 35.0)]
+    #[arg(long, default_value_t = 35.0, requires = "eye")]
     fov: f64,
     /// Azimuth and elevation of the sun (degrees) [default: beside the camera].
     #[arg(long, value_name = "AZ,EL", value_parser = sun, allow_hyphen_values = true)]
@@ -66,7 +66,7 @@ pub fn run(args: Args, session: &Session) -> Result<(), Failure> {
         if eye == target {
             return Err(Failure::refused("--eye and --target are the same point"));
         }
-        camera = Camera { eye: eye, target: target, fov_deg: args.fov };
+        camera = Camera { eye, target, fov_deg: args.fov };
     }
     let light = match args.sun {
         Some((azimuth, elevation)) => Light::from_degrees(azimuth, elevation),

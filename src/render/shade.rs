@@ -19,7 +19,7 @@ pub struct Light {
 }
 
 /// Radiance of the sun on a surface that faces it.
-const SUN: Colour = Colour::new(1.30, 1.14, 0.92);
+const SUN: Colour = Colour::new(1.75, 1.52, 1.22);
 /// Radiance of the zenith and of the horizon.
 const ZENITH: Colour = Colour::new(0.20, 0.30, 0.48);
 const HORIZON: Colour = Colour::new(0.42, 0.50, 0.60);
@@ -28,7 +28,7 @@ const BOUNCED: Colour = Colour::new(0.085, 0.115, 0.165);
 /// Half the angle of the sun's disc, wider than in nature: the edges of shadows are soft (radians).
 const SUN_RADIUS: f64 = 0.02;
 /// Sky rays at each sample of a pixel.
-pub(super) const SKY_RAYS: usize = 2;
+pub(super) const SKY_RAYS: usize = 4;
 
 impl Light {
     /// A sun at an azimuth (from +z towards +x) and an elevation above the horizon (degrees).
@@ -58,17 +58,16 @@ fn sky(height: f64) -> Colour {
 /// Light that leaves a point towards the camera.
 ///
 /// `blocked(direction)` tells whether something hides that direction from the point; `sample` numbers the
-/// samples of this pixel, `dither` (0 to 1) turns their directions, differently at each pixel.
+/// samples of this pixel.
 pub(super) fn shade(
     light: &Light,
     normal: DVec3,
     albedo: Colour,
     sample: usize,
-    dither: f64,
     blocked: impl Fn(DVec3) -> bool,
 ) -> Colour {
     let (side, other) = tangents(light.sun);
-    let (x, y) = disc(sample, dither);
+    let (x, y) = disc(sample);
     let toward_sun = (light.sun + (side * x + other * y) * SUN_RADIUS).normalize();
     let facing = normal.dot(&toward_sun);
     let sun = if facing > 0.0 && !blocked(toward_sun) { SUN * facing } else { Colour::zeros() };
@@ -76,7 +75,7 @@ pub(super) fn shade(
     let mut fill = Colour::zeros();
     for ray in 0..SKY_RAYS {
         // Directions with density cos / pi: their mean is the light of the sky on the surface.
-        let (x, y) = disc(sample * SKY_RAYS + ray, dither);
+        let (x, y) = disc(sample * SKY_RAYS + ray);
         let toward = side * x + other * y + normal * (1.0 - x * x - y * y).max(0.0).sqrt();
         let open = toward.y > -0.05 && !blocked(toward);
         fill += if open { sky(toward.y.max(0.0)) } else { BOUNCED };
@@ -84,12 +83,12 @@ pub(super) fn shade(
     albedo.component_mul(&(sun + fill / SKY_RAYS as f64))
 }
 
-/// A point of the unit disc: the plastic sequence (Roberts 2018), turned by `dither`.
-fn disc(index: usize, dither: f64) -> (f64, f64) {
+/// A point of the unit disc: the plastic sequence (Roberts 2018), the same at each pixel: flat walls stay flat.
+fn disc(index: usize) -> (f64, f64) {
     const PLASTIC: f64 = 1.324_717_957_244_746;
     let step = index as f64 + 1.0;
-    let radius = ((step / PLASTIC + dither * 0.37).fract()).sqrt();
-    let angle = std::f64::consts::TAU * (step / (PLASTIC * PLASTIC) + dither).fract();
+    let radius = (step / PLASTIC).fract().sqrt();
+    let angle = std::f64::consts::TAU * (step / (PLASTIC * PLASTIC)).fract();
     (radius * angle.cos(), radius * angle.sin())
 }
 
@@ -98,11 +97,6 @@ fn tangents(normal: DVec3) -> (DVec3, DVec3) {
     let helper = if normal.x.abs() < 0.7 { DVec3::x() } else { DVec3::y() };
     let side = normal.cross(&helper).normalize();
     (side, normal.cross(&side))
-}
-
-/// A number in 0 to 1 for each pixel, evenly spread among neighbours (interleaved gradient noise, Jimenez 2014).
-pub(super) fn dither(x: u32, y: u32) -> f64 {
-    (52.982_918_9 * (0.067_110_56 * f64::from(x) + 0.005_837_15 * f64::from(y)).fract()).fract()
 }
 
 /// Linear light to the 8 bits of a picture: exposure, a shoulder that keeps white snow below 255, sRGB.
@@ -131,8 +125,8 @@ mod tests {
     fn a_shadow_is_darker_and_bluer_than_the_sunny_side() {
         let light = Light::from_degrees(90.0, 45.0);
         let albedo = Colour::new(0.9, 0.9, 0.9);
-        let lit = shade(&light, DVec3::y(), albedo, 0, 0.0, |_| false);
-        let shadowed = shade(&light, DVec3::y(), albedo, 0, 0.0, |toward| toward.dot(&light.sun) > 0.99);
+        let lit = shade(&light, DVec3::y(), albedo, 0, |_| false);
+        let shadowed = shade(&light, DVec3::y(), albedo, 0, |toward| toward.dot(&light.sun) > 0.99);
         assert!(lit.x > 2.0 * shadowed.x);
         assert!(shadowed.z / shadowed.x > lit.z / lit.x);
     }

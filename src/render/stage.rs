@@ -3,7 +3,7 @@
 use super::camera::{Camera, Size};
 use super::model::{Hit, Model};
 use super::picture::Picture;
-use super::shade::{Colour, Light, dither, shade, to_bytes};
+use super::shade::{Colour, Light, shade, to_bytes};
 use crate::base::DVec3;
 use crate::context::Context;
 use crate::error::{Error, Result};
@@ -55,25 +55,24 @@ impl Stage {
     }
 
     fn pixel(&self, camera: &Camera, light: &Light, size: Size, x: u32, y: u32) -> [u8; 3] {
-        let turn = dither(x, y);
         let mut sum = Colour::zeros();
         for sample in 0..SAMPLES * SAMPLES {
             let inside = |index: usize| (index as f64 + 0.5) / SAMPLES as f64;
             let across = f64::from(x) + inside(sample % SAMPLES);
             let down = f64::from(y) + inside(sample / SAMPLES);
             let toward = camera.through(across, down, size);
-            sum += self.seen(camera.eye, toward, light, sample, turn);
+            sum += self.seen(camera.eye, toward, light, sample);
         }
         to_bytes(sum / (SAMPLES * SAMPLES) as f64)
     }
 
     /// Light that comes along a ray.
-    fn seen(&self, eye: DVec3, toward: DVec3, light: &Light, sample: usize, turn: f64) -> Colour {
+    fn seen(&self, eye: DVec3, toward: DVec3, light: &Light, sample: usize) -> Colour {
         let hits = self.models.iter().filter_map(|model| model.hit(eye, toward));
         let nearest = hits.reduce(|a: Hit, b| if b.distance < a.distance { b } else { a });
         let Some(hit) = nearest else { return light.background(toward) };
         let point = eye + toward * hit.distance + hit.normal * hit.skin;
         let blocked = |direction| self.models.iter().any(|model| model.blocks(point, direction));
-        shade(light, hit.normal, hit.albedo, sample, turn, blocked)
+        shade(light, hit.normal, hit.albedo, sample, blocked)
     }
 }
