@@ -35,7 +35,7 @@ impl MovingBox {
     }
 }
 
-/// Vertices whose surroundings (3 cells) are smooth: no normal differs by more than 15 degrees.
+/// Vertices whose surroundings (3 cells) are smooth: no normal differs by more than 8 degrees.
 pub fn away_from_creases(mesh: &TriMesh, near: impl Fn(DVec3) -> bool, reach: f64) -> Vec<DVec3> {
     let mut normals = vec![DVec3::zeros(); mesh.positions.len()];
     let mut flat: Vec<(DVec3, DVec3)> = Vec::new();
@@ -58,7 +58,7 @@ pub fn away_from_creases(mesh: &TriMesh, near: impl Fn(DVec3) -> bool, reach: f6
         let around =
             (-1..=1).flat_map(|i| (-1..=1).flat_map(move |j| (-1..=1).map(move |k| [x + i, y + j, z + k])));
         let mut close = around.filter_map(|key| cells.get(&key)).flatten();
-        close.all(|&index| (flat[index].0 - p).norm() > reach || flat[index].1.dot(&normal) > 0.966)
+        close.all(|&index| (flat[index].0 - p).norm() > reach || flat[index].1.dot(&normal) > 0.99)
     };
     let pairs = mesh.positions.iter().zip(&normals);
     pairs
