@@ -7,6 +7,31 @@ use crate::base::cpu::{CpuLevel, cpu_level};
 
 use super::lattice::{Fixed, UNITS};
 
+/// Calls a function's copy for the instruction set in use.
+macro_rules! dispatch {
+    ($body:ident($($name:ident: $kind:ty),*) $(-> $out:ty)?) => {{
+        #[cfg(target_arch = "x86_64")]
+        #[target_feature(enable = "avx2")]
+        fn avx2($($name: $kind),*) $(-> $out)? {
+            $body($($name),*)
+        }
+        #[cfg(target_arch = "x86_64")]
+        #[target_feature(enable = "avx512f,avx512vl,avx512dq,avx512bw")]
+        fn avx512($($name: $kind),*) $(-> $out)? {
+            $body($($name),*)
+        }
+        match cpu_level() {
+            // SAFETY: the level was detected on this processor.
+            #[cfg(target_arch = "x86_64")]
+            CpuLevel::Avx512 => unsafe { avx512($($name),*) },
+            // SAFETY: the level was detected on this processor.
+            #[cfg(target_arch = "x86_64")]
+            CpuLevel::Avx2 => unsafe { avx2($($name),*) },
+            _ => $body($($name),*),
+        }
+    }};
+}
+
 /// Points handled at once.
 pub const LANES: usize = 8;
 
@@ -50,16 +75,11 @@ impl Triangle {
         Self { corner: c, edge, inverse, normal, inward: edge.map(|e| cross(normal, e)) }
     }
 
-    /// Signed distance of a point from the triangle's plane, positive outside.
-    pub fn plane_distance(&self, p: [f32; 3]) -> f32 {
-        dot(sub(p, self.corner[0]), self.normal)
-    }
-
     /// The point of the triangle nearest to `p`.
     pub fn closest(&self, p: [f32; 3]) -> [f32; 3] {
         let inside = (0..3).all(|i| dot(sub(p, self.corner[i]), self.inward[i]) > 0.0);
         if inside {
-            let height = self.plane_distance(p);
+            let height = dot(sub(p, self.corner[0]), self.normal);
             return [0, 1, 2].map(|axis| p[axis] - height * self.normal[axis]);
         }
         let mut best = ([0.0; 3], f32::INFINITY);
@@ -74,32 +94,14 @@ impl Triangle {
         best.0
     }
 
-    /// Whether the segment from `p` to `q` passes through the triangle: +1 from back to front, -1 from
-    /// front to back, else 0.
-    pub fn passed(&self, p: [f32; 3], q: [f32; 3]) -> i32 {
-        let (from, to) = (self.plane_distance(p), self.plane_distance(q));
-        if (from > 0.0) == (to > 0.0) || from == to {
-            return 0;
-        }
-        let t = from / (from - to);
-        let at = [0, 1, 2].map(|axis| p[axis] + t * (q[axis] - p[axis]));
-        let inside = (0..3).all(|i| dot(sub(at, self.corner[i]), self.inward[i]) > 0.0);
-        if !inside {
-            0
-        } else if to > 0.0 {
-            1
-        } else {
-            -1
-        }
-    }
-
-    /// Squared distances of eight points: the kernel, inlined into each instruction set's copy.
+    /// Offsets from the nearest points to eight points: the kernel, inlined into each instruction set's copy.
     #[inline(always)]
-    fn squared(&self, points: &Points) -> [f32; LANES] {
-        let mut out = [0.0; LANES];
-        for (lane, out) in out.iter_mut().enumerate() {
+    fn offsets(&self, points: &Points) -> Offsets {
+        let mut out = Offsets { x: [0.0; LANES], y: [0.0; LANES], z: [0.0; LANES], squared: [0.0; LANES] };
+        for lane in 0..LANES {
             let p = [points.x[lane], points.y[lane], points.z[lane]];
             let mut nearest = f32::INFINITY;
+            let mut offset = [0.0; 3];
             let mut least_inward = f32::INFINITY;
             for i in 0..3 {
                 let d = sub(p, self.corner[i]);
@@ -109,16 +111,75 @@ impl Triangle {
                 let e = self.edge[i];
                 let q = [d[0] - t * e[0], d[1] - t * e[1], d[2] - t * e[2]];
                 let squared = dot(q, q);
-                nearest = if squared < nearest { squared } else { nearest };
+                let nearer = squared < nearest;
+                nearest = if nearer { squared } else { nearest };
+                for axis in 0..3 {
+                    offset[axis] = if nearer { q[axis] } else { offset[axis] };
+                }
                 let inward = dot(d, self.inward[i]);
                 least_inward = if inward < least_inward { inward } else { least_inward };
             }
             let height = dot(sub(p, self.corner[0]), self.normal);
-            let plane = height * height;
-            *out = if least_inward > 0.0 { plane } else { nearest };
+            let over = least_inward > 0.0;
+            out.squared[lane] = if over { height * height } else { nearest };
+            out.x[lane] = if over { height * self.normal[0] } else { offset[0] };
+            out.y[lane] = if over { height * self.normal[1] } else { offset[1] };
+            out.z[lane] = if over { height * self.normal[2] } else { offset[2] };
         }
         out
     }
+}
+
+/// For eight points: the vector from the nearest point of a triangle (cells), and its squared length.
+#[derive(Debug, Clone, Copy, Default)]
+pub struct Offsets {
+    /// x of each.
+    pub x: [f32; LANES],
+    /// y of each.
+    pub y: [f32; LANES],
+    /// z of each.
+    pub z: [f32; LANES],
+    /// Squared distance of each.
+    pub squared: [f32; LANES],
+}
+
+/// The eight voxels around a centre, as signs of half a cell.
+const CORNERS: [[f32; LANES]; 3] = [
+    [-0.5, -0.5, -0.5, -0.5, 0.5, 0.5, 0.5, 0.5],
+    [-0.5, -0.5, 0.5, 0.5, -0.5, -0.5, 0.5, 0.5],
+    [-0.5, 0.5, -0.5, 0.5, -0.5, 0.5, -0.5, 0.5],
+];
+/// Squared distance of those voxels from their centre.
+const CORNER_SQUARED: f32 = 0.75;
+/// Room for rounding in squared distances (cells^2).
+const SLACK: f32 = 1e-3;
+
+#[inline(always)]
+fn prune_body(list: &mut Vec<u32>, offsets: &mut Vec<[f32; 4]>) {
+    let mut most = [f32::INFINITY; LANES];
+    for [x, y, z, squared] in offsets.iter() {
+        for lane in 0..LANES {
+            let along = x * CORNERS[0][lane] + y * CORNERS[1][lane] + z * CORNERS[2][lane];
+            let value = squared + 2.0 * along;
+            most[lane] = if value < most[lane] { value } else { most[lane] };
+        }
+    }
+    most.iter_mut().for_each(|most| *most += CORNER_SQUARED + SLACK);
+    let mut kept = 0;
+    for index in 0..list.len() {
+        let [x, y, z, squared] = offsets[index];
+        let inverse = 1.0 / (squared + 1e-12);
+        let mut near = false;
+        for lane in 0..LANES {
+            let along = x * CORNERS[0][lane] + y * CORNERS[1][lane] + z * CORNERS[2][lane];
+            let least = squared + 2.0 * along + along * along * inverse;
+            near |= (least <= most[lane]) | (squared + along <= 0.0);
+        }
+        list[kept] = list[index];
+        kept += usize::from(near || squared < 1e-4);
+    }
+    list.truncate(kept);
+    offsets.clear();
 }
 
 #[inline(always)]
@@ -136,30 +197,41 @@ fn cross(a: [f32; 3], b: [f32; 3]) -> [f32; 3] {
     [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]]
 }
 
-/// Squared distances from eight points to each listed triangle, into `out` (one entry a listed triangle).
-pub fn to_each(triangles: &[Triangle], list: &[u32], points: &Points, out: &mut Vec<[f32; LANES]>) {
+/// Offsets of eight points from each listed triangle, into `out` (one entry a listed triangle).
+pub fn to_each(triangles: &[Triangle], list: &[u32], points: &Points, out: &mut Vec<Offsets>) {
     #[inline(always)]
-    fn body(triangles: &[Triangle], list: &[u32], points: &Points, out: &mut Vec<[f32; LANES]>) {
+    fn body(triangles: &[Triangle], list: &[u32], points: &Points, out: &mut Vec<Offsets>) {
+        // A plain loop: an iterator's closure would be compiled without the wider instructions.
         out.clear();
-        out.extend(list.iter().map(|&index| triangles[index as usize].squared(points)));
+        out.resize(list.len(), Offsets::default());
+        for at in 0..list.len() {
+            out[at] = triangles[list[at] as usize].offsets(points);
+        }
     }
-    #[cfg(target_arch = "x86_64")]
-    #[target_feature(enable = "avx2")]
-    fn avx2(triangles: &[Triangle], list: &[u32], points: &Points, out: &mut Vec<[f32; LANES]>) {
-        body(triangles, list, points, out);
+    dispatch!(body(triangles: &[Triangle], list: &[u32], points: &Points, out: &mut Vec<Offsets>));
+}
+
+/// Squared distance (cells^2) of each of eight points from the nearest of the listed triangles.
+pub fn nearest(triangles: &[Triangle], list: &[u32], points: &Points) -> [f32; LANES] {
+    #[inline(always)]
+    fn body(triangles: &[Triangle], list: &[u32], points: &Points) -> [f32; LANES] {
+        let mut best = [f32::INFINITY; LANES];
+        for &triangle in list {
+            let squared = triangles[triangle as usize].offsets(points).squared;
+            for lane in 0..LANES {
+                best[lane] = if squared[lane] < best[lane] { squared[lane] } else { best[lane] };
+            }
+        }
+        best
     }
-    #[cfg(target_arch = "x86_64")]
-    #[target_feature(enable = "avx512f,avx512vl,avx512dq,avx512bw")]
-    fn avx512(triangles: &[Triangle], list: &[u32], points: &Points, out: &mut Vec<[f32; LANES]>) {
-        body(triangles, list, points, out);
-    }
-    match cpu_level() {
-        // SAFETY: the level was detected on this processor.
-        #[cfg(target_arch = "x86_64")]
-        CpuLevel::Avx512 => unsafe { avx512(triangles, list, points, out) },
-        // SAFETY: the level was detected on this processor.
-        #[cfg(target_arch = "x86_64")]
-        CpuLevel::Avx2 => unsafe { avx2(triangles, list, points, out) },
-        _ => body(triangles, list, points, out),
-    }
+    dispatch!(body(triangles: &[Triangle], list: &[u32], points: &Points) -> [f32; LANES])
+}
+
+/// Leaves in `list` the triangles that can be nearest to one of the eight voxels around a centre;
+/// `offsets` holds the centre's offset from each listed triangle (x, y, z, squared length) and is emptied.
+///
+/// The distance to a convex set is a convex function: at a voxel it is at least its first-order estimate
+/// from the centre, and at most the distance to the centre's nearest point.
+pub fn prune(list: &mut Vec<u32>, offsets: &mut Vec<[f32; 4]>) {
+    dispatch!(prune_body(list: &mut Vec<u32>, offsets: &mut Vec<[f32; 4]>));
 }

@@ -6,7 +6,7 @@ use super::chain::{Face, Weights, Window, boundary};
 use super::lattice::{Fixed, Lattice};
 use super::nearest::Scratch;
 use super::topology::Topology;
-use super::voxelise::{Band, Piece, Voxeliser};
+use super::voxelise::{ALL, Band, Piece, Voxeliser};
 use super::{Body, Settings};
 use crate::base::blocks::{Block, BlockEdit, Values};
 use crate::base::{DVec3, TriMesh};
@@ -19,7 +19,7 @@ const BATCH: usize = 8192;
 /// A window without bounds.
 const EVERYWHERE: Window = Window { min: [i32::MIN; 3], max: [i32::MAX; 3] };
 /// All voxels within the lattice's reach.
-const ALL_VOXELS: i32 = 1 << 18;
+const ALL_VOXELS: [[i32; 3]; 2] = [[-(1 << 18); 3], [1 << 18; 3]];
 
 /// Level set of the volume that bodies sweep from `from` to `to` (s); of the pose when they are equal.
 ///
@@ -90,7 +90,7 @@ fn mesh_faces(voxel: f64, triangles: &[[u32; 3]], poses: &[&TriMesh]) -> Result<
 pub fn fill(ctx: &Context, faces: Vec<Face>, lattice: Lattice, half_width: f32) -> Result<FloatGrid> {
     let band = Band { inside: half_width, outside: half_width };
     let voxeliser =
-        ctx.stage("winding", || Voxeliser::new(faces, lattice, band, [-ALL_VOXELS; 3], [ALL_VOXELS; 3]))?;
+        ctx.stage("winding", || Voxeliser::new(faces, lattice, band, ALL_VOXELS, |blocks| Ok(vec![true; blocks.len()])))?;
     let mut grid = FloatGrid::level_set(lattice.voxel, half_width)?;
     let blocks: Vec<usize> = (0..voxeliser.near_blocks().len()).collect();
     for batch in blocks.chunks(BATCH) {
@@ -110,7 +110,7 @@ pub fn fill(ctx: &Context, faces: Vec<Face>, lattice: Lattice, half_width: f32) 
 fn pieces(voxeliser: &Voxeliser, batch: &[usize], voxel: f64, half_width: f32) -> Vec<BlockEdit> {
     batch
         .par_iter()
-        .map_init(Scratch::default, |scratch, &index| voxeliser.piece(index, scratch))
+        .map_init(Scratch::default, |scratch, &index| voxeliser.piece(index, &ALL, scratch))
         .filter_map(|piece| {
             Some(match piece? {
                 Piece::Inside(origin) => BlockEdit::Constant(origin, -half_width * voxel as f32),

@@ -6,13 +6,16 @@
 //! [`samples`] is the thesis' way (section 3.2): the union of N + 1 poses, dilated and smoothed.
 
 mod body;
+mod cells;
 mod chain;
 mod distance;
 mod lattice;
 mod nearest;
 mod refine;
+mod region;
 #[cfg(feature = "vdb")]
 mod samples;
+mod surface;
 mod topology;
 mod voxelise;
 mod winding;
@@ -24,7 +27,7 @@ pub use nearest::Scratch;
 #[cfg(feature = "vdb")]
 pub use samples::{SamplesSettings, samples};
 pub use topology::Topology;
-pub use voxelise::{Band, Piece, Voxeliser};
+pub use voxelise::{ALL, Band, Piece, Voxeliser};
 
 use crate::error::{Error, Result};
 

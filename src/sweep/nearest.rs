@@ -1,93 +1,66 @@
 //! Nearest triangle of every voxel of a block, by halving: bounds at the centres of 4^3 and 2^3
 //! sub-blocks leave few triangles for the exact distances.
 
-use super::distance::{LANES, Points, Triangle, to_each};
-use crate::base::blocks::offset;
+use super::distance::{LANES, Offsets, Points, Triangle, nearest, prune, to_each};
+use crate::base::blocks::{Mask, offset};
 
 /// Working memory of one thread.
 #[derive(Default)]
 pub struct Scratch {
     lists: [Vec<u32>; 3],
-    squared: [Vec<[f32; LANES]>; 3],
-}
-
-/// A voxel with the triangles around it.
-pub struct Around<'a> {
-    /// The voxel's number in its block.
-    pub voxel: usize,
-    /// Triangles that may be near.
-    pub list: &'a [u32],
-    /// Squared distance (cells^2) and index of the nearest.
-    pub nearest: (f32, u32),
-    /// Every triangle nearer than this (cells) is listed.
-    pub complete_to: f32,
-    squared: &'a [[f32; LANES]],
-    lane: usize,
-}
-
-impl Around<'_> {
-    /// The nearest triangle after `last`, by squared distance, then index.
-    pub fn next_after(&self, last: (f32, u32)) -> Option<(f32, u32)> {
-        let mut next: Option<(f32, u32)> = None;
-        for (&index, squared) in self.list.iter().zip(self.squared) {
-            let this = (squared[self.lane], index);
-            if before(last, this) && next.is_none_or(|next| before(this, next)) {
-                next = Some(this);
-            }
-        }
-        next
-    }
-}
-
-fn before(a: (f32, u32), b: (f32, u32)) -> bool {
-    a.0 < b.0 || (a.0 == b.0 && a.1 < b.1)
+    offsets: [Vec<Offsets>; 2],
+    centre: Vec<[f32; 4]>,
 }
 
 /// Half diagonals between the voxel centres of a 4^3 and of a 2^3 sub-block, with room for rounding.
 const RADII: [f32; 2] = [2.599, 0.867];
 
-/// Shows `see` every voxel of a block that may be nearer than `reach` cells to a triangle.
-pub fn search(triangles: &[Triangle], reach: f32, scratch: &mut Scratch, mut see: impl FnMut(&Around<'_>)) {
-    let Scratch { lists: [all, some, few], squared: [far, mid, near] } = scratch;
+/// Gives `see` every wanted voxel of a block that may be nearer than `reach` cells to a triangle, with the
+/// distance (cells).
+pub fn search(
+    triangles: &[Triangle],
+    reach: f32,
+    wanted: &Mask,
+    scratch: &mut Scratch,
+    mut see: impl FnMut(usize, f32),
+) {
+    let Scratch { lists: [all, some, few], offsets: [far, mid], centre } = scratch;
     all.clear();
     all.extend(0..triangles.len() as u32);
     to_each(triangles, all, &points([0.0; 3], 4.0, 1.5), far);
     for lane in 0..LANES {
-        if keep(all, far, lane, RADII[0], reach, some).is_none() {
+        let corner = corner_of([0.0; 3], 4.0, lane);
+        if !any_wanted(wanted, corner, 4) || !keep(all, far, lane, RADII[0], reach, some, None) {
             continue;
         }
-        let corner = corner_of([0.0; 3], 4.0, lane);
         to_each(triangles, some, &points(corner, 2.0, 0.5), mid);
         for lane in 0..LANES {
-            let Some(least) = keep(some, mid, lane, RADII[1], reach, few) else { continue };
             let corner = corner_of(corner, 2.0, lane);
-            to_each(triangles, few, &points(corner, 1.0, 0.0), near);
-            show(corner, few, near, least + RADII[1], &mut see);
+            if !any_wanted(wanted, corner, 2) {
+                continue;
+            }
+            if !keep(some, mid, lane, RADII[1], reach, few, Some(centre)) {
+                continue;
+            }
+            prune(few, centre);
+            let squared = nearest(triangles, few, &points(corner, 1.0, 0.0));
+            for (lane, squared) in squared.into_iter().enumerate() {
+                let at = corner_of(corner, 1.0, lane).map(|value| value as usize);
+                let voxel = offset(at[0], at[1], at[2]);
+                if wanted[voxel >> 6] >> (voxel & 63) & 1 == 1 {
+                    see(voxel, squared.sqrt());
+                }
+            }
         }
     }
 }
 
-fn show(
-    corner: [f32; 3],
-    list: &[u32],
-    squared: &[[f32; LANES]],
-    complete_to: f32,
-    see: &mut impl FnMut(&Around<'_>),
-) {
-    let mut best = [f32::INFINITY; LANES];
-    let mut index = [u32::MAX; LANES];
-    for (&triangle, distances) in list.iter().zip(squared) {
-        for lane in 0..LANES {
-            let nearer = distances[lane] < best[lane];
-            best[lane] = if nearer { distances[lane] } else { best[lane] };
-            index[lane] = if nearer { triangle } else { index[lane] };
-        }
-    }
-    for lane in 0..LANES {
-        let at = corner_of(corner, 1.0, lane).map(|value| value as usize);
-        let voxel = offset(at[0], at[1], at[2]);
-        see(&Around { voxel, list, nearest: (best[lane], index[lane]), complete_to, squared, lane });
-    }
+/// Whether a voxel of a sub-block is wanted.
+fn any_wanted(wanted: &Mask, corner: [f32; 3], size: usize) -> bool {
+    let [x, y, z] = corner.map(|value| value as usize);
+    let row = ((1u64 << size) - 1) << z;
+    let plane = (y..y + size).fold(0, |plane, y| plane | row << (y * 8));
+    wanted[x..x + size].iter().any(|bits| bits & plane != 0)
 }
 
 /// Corner of one of the eight sub-blocks of edge `size` inside the block at `corner`.
@@ -106,24 +79,30 @@ fn points(corner: [f32; 3], size: f32, half: f32) -> Points {
     points
 }
 
-/// Lists the triangles that can be nearest to some voxel of a sub-block, and gives the least distance from
-/// its centre; none when all are out of reach.
+/// Lists the triangles that can be nearest to some voxel of a sub-block (and their offsets from its centre),
+/// if any is in reach.
 fn keep(
     list: &[u32],
-    squared: &[[f32; LANES]],
+    offsets: &[Offsets],
     lane: usize,
     radius: f32,
     reach: f32,
     out: &mut Vec<u32>,
-) -> Option<f32> {
-    let least =
-        squared.iter().fold(f32::INFINITY, |least, d| if d[lane] < least { d[lane] } else { least }).sqrt();
+    centre: Option<&mut Vec<[f32; 4]>>,
+) -> bool {
+    let nearer = |least: f32, d: &Offsets| if d.squared[lane] < least { d.squared[lane] } else { least };
+    let least = offsets.iter().fold(f32::INFINITY, nearer).sqrt();
     if least > reach + radius {
-        return None;
+        return false;
     }
     let limit = (least + 2.0 * radius).min(reach + radius);
     let limit = limit * limit;
+    let kept = || list.iter().zip(offsets).filter(|(_, d)| d.squared[lane] <= limit);
     out.clear();
-    out.extend(list.iter().zip(squared).filter(|(_, d)| d[lane] <= limit).map(|(&index, _)| index));
-    Some(least)
+    out.extend(kept().map(|(&index, _)| index));
+    if let Some(centre) = centre {
+        centre.clear();
+        centre.extend(kept().map(|(_, d)| [d.x[lane], d.y[lane], d.z[lane], d.squared[lane]]));
+    }
+    true
 }

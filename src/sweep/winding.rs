@@ -7,6 +7,7 @@ use rayon::prelude::*;
 
 use super::chain::Face;
 use super::lattice::UNITS;
+use super::region::Region;
 
 /// One crossing: where along the line (cells from the base voxel), and by how much the winding
 /// number changes when it is passed upward.
@@ -26,18 +27,17 @@ pub struct Lines {
     start: Vec<u32>,
     /// Where a crossing is, and the winding number above it.
     crossings: Vec<(f64, i32)>,
-    simple: bool,
 }
 
 /// Faces a task scans: fixed, so that nothing depends on the number of threads.
 const GRAIN: usize = 2048;
 
 impl Lines {
-    /// Scans faces along the lines through voxels `low..=high` (x and y, from the base voxel).
-    pub fn scan(faces: &[Face], low: [i32; 2], high: [i32; 2]) -> Self {
-        let (nx, ny) = ((high[0] - low[0] + 1).max(0), (high[1] - low[1] + 1).max(0));
-        let mut lines =
-            Self { x0: low[0], y0: low[1], nx, ny, start: Vec::new(), crossings: Vec::new(), simple: true };
+    /// Scans faces along the lines through the voxels of a region.
+    pub fn scan(faces: &[Face], region: &Region) -> Self {
+        let [x0, y0] = [region.low[0] * 8, region.low[1] * 8];
+        let (nx, ny) = (((region.high[0] + 1) * 8 - x0).max(0), ((region.high[1] + 1) * 8 - y0).max(0));
+        let mut lines = Self { x0, y0, nx, ny, start: Vec::new(), crossings: Vec::new() };
         let parts: Vec<Vec<Crossing>> = faces
             .par_chunks(GRAIN)
             .map(|chunk| {
@@ -50,9 +50,11 @@ impl Lines {
         lines
     }
 
-    /// Whether no line anywhere saw a winding number other than 0 and 1.
-    pub fn is_simple(&self) -> bool {
-        self.simple
+    /// Winding number at a voxel; 0 outside the region.
+    pub fn winding(&self, [x, y, z]: [i32; 3]) -> i32 {
+        let line = self.line(x, y);
+        let below = line.partition_point(|(height, _)| *height < f64::from(z));
+        if below == 0 { 0 } else { line[below - 1].1 }
     }
 
     /// The crossings of line (x, y) upward: position in cells and winding number above; empty outside.
@@ -108,11 +110,9 @@ impl Lines {
             let line = &mut crossings[start[line] as usize..start[line + 1] as usize];
             line.sort_unstable_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
             let mut winding = 0;
-            for index in 0..line.len() {
-                winding += line[index].1;
-                line[index].1 = winding;
-                let passed_together = line.get(index + 1).is_some_and(|next| next.0 - line[index].0 < 1e-3);
-                self.simple &= passed_together || winding == 0 || winding == 1;
+            for crossing in line {
+                winding += crossing.1;
+                crossing.1 = winding;
             }
         }
         self.start = start;

@@ -6,6 +6,7 @@ mod columns;
 mod edit;
 pub mod initial;
 mod noise;
+mod wanted;
 
 use std::collections::{BTreeMap, BTreeSet, HashMap};
 
@@ -22,6 +23,7 @@ use crate::vdb::{FloatGrid, GridClass, Probe};
 use columns::{Column, Columns};
 use edit::{Edit, Scale};
 use noise::Displacement;
+use wanted::snow_masks;
 
 /// How objects press into the snow.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -176,7 +178,7 @@ impl BaseLayer {
             return Ok((Vec::new(), 0));
         }
         let voxeliser = ctx.stage("sweep", || self.voxeliser(bodies, from, to, noise))?;
-        let mut pieces = ctx.stage("distance", || self.pieces(ctx, &voxeliser))?;
+        let mut pieces = ctx.stage("distance", || self.pieces(ctx, &voxeliser, noise.is_some()))?;
         if let Some(noise) = noise {
             ctx.stage("noise", || {
                 noise.apply(&mut pieces, self.half_width);
@@ -198,7 +200,8 @@ impl BaseLayer {
         let middle = [0, 1, 2].map(|a| (f64::from(self.low[a]) + f64::from(self.high[a])) * 0.5 * cell);
         let lattice = Lattice::near(cell, DVec3::from(middle))?;
         let outside = self.half_width + noise.map_or(0.0, |noise| noise.amplitude);
-        let margin = outside.ceil() as i32 + 1;
+        // Sides of faces in reach are told with the voxels around them.
+        let margin = outside.ceil() as i32 + 3;
         let relative = |voxel: [i32; 3], grow: i32| [0, 1, 2].map(|a| voxel[a] - lattice.base[a] + grow);
         let fixed = |voxel: [i32; 3]| voxel.map(|cells| cells.saturating_mul(UNITS));
         let window =
@@ -208,29 +211,23 @@ impl BaseLayer {
             .map(|body| body.chain(from, to, &lattice, self.params.tolerance, &window))
             .collect::<Result<_>>()?;
         let band = Band { inside: self.half_width, outside };
-        Voxeliser::new(parts.concat(), lattice, band, relative(self.low, 0), relative(self.high, 0))
+        let snowy = |origins: &[Origin]| Ok(self.surface.probe(origins)?.iter().map(edit::has_snow).collect());
+        Voxeliser::new(parts.concat(), lattice, band, [relative(self.low, 0), relative(self.high, 0)], snowy)
     }
 
-    /// Distances in the blocks that hold snow.
-    fn pieces(&self, ctx: &Context, voxeliser: &Voxeliser) -> Result<Vec<Piece>> {
-        let snowy = |origins: &[Origin]| -> Result<Vec<bool>> {
-            Ok(self.surface.probe(origins)?.iter().map(edit::has_snow).collect())
-        };
-        let near = snowy(&voxeliser.near_blocks())?;
-        let wanted: Vec<usize> = (0..near.len()).filter(|&index| near[index]).collect();
-        let mut pieces: Vec<Piece> = wanted
-            .par_iter()
-            .map_init(Scratch::default, |scratch, &index| {
-                if ctx.is_cancelled() { None } else { voxeliser.piece(index, scratch) }
+    /// Distances where there is snow.
+    fn pieces(&self, ctx: &Context, voxeliser: &Voxeliser, margin: bool) -> Result<Vec<Piece>> {
+        let near = voxeliser.near_blocks();
+        let wanted = snow_masks(&self.surface, &near, margin)?;
+        let mut pieces: Vec<Piece> = (0..near.len())
+            .into_par_iter()
+            .map_init(Scratch::default, |scratch, index| {
+                if ctx.is_cancelled() { None } else { voxeliser.piece(index, &wanted[index], scratch) }
             })
             .flatten_iter()
             .collect();
         ctx.check()?;
-        let inside = voxeliser.inside_blocks();
-        let snowy = snowy(&inside)?;
-        pieces.extend(
-            inside.into_iter().zip(snowy).filter(|(_, snowy)| *snowy).map(|(at, _)| Piece::Inside(at)),
-        );
+        pieces.extend(voxeliser.inside_blocks().into_iter().map(Piece::Inside));
         Ok(pieces)
     }
 
