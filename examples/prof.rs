@@ -14,6 +14,13 @@ fn main() {
     for f in 1..=FRAMES {
         let t = std::time::Instant::now();
         let r = base.step(&ctx, bodies, f64::from(f - 1), f64::from(f), f).unwrap();
-        println!("{:.1} ms faces {} blocks {} vol {:.5} {:?}", t.elapsed().as_secs_f64() * 1e3, r.sweep_faces, r.touched_blocks, r.removed_volume, r.stages);
+        println!(
+            "{:.1} ms faces {} blocks {} vol {:.5} {:?}",
+            t.elapsed().as_secs_f64() * 1e3,
+            r.sweep_faces,
+            r.touched_blocks,
+            r.removed_volume,
+            r.stages
+        );
     }
 }

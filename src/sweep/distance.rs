@@ -211,6 +211,34 @@ pub fn to_each(triangles: &[Triangle], list: &[u32], points: &Points, out: &mut 
     dispatch!(body(triangles: &[Triangle], list: &[u32], points: &Points, out: &mut Vec<Offsets>));
 }
 
+/// For each triangle a bit for each of eight sub-blocks in which it can be nearest to a voxel, from the offsets
+/// of the sub-blocks' centres and their radius (cells); and which sub-blocks are within `reach` cells of any.
+pub fn near_lanes(offsets: &[Offsets], radius: f32, reach: f32, out: &mut Vec<u8>) -> [bool; LANES] {
+    #[inline(always)]
+    fn body(offsets: &[Offsets], radius: f32, reach: f32, out: &mut Vec<u8>) -> [bool; LANES] {
+        let mut least = [f32::INFINITY; LANES];
+        for offset in offsets {
+            for lane in 0..LANES {
+                let squared = offset.squared[lane];
+                least[lane] = if squared < least[lane] { squared } else { least[lane] };
+            }
+        }
+        let least = least.map(f32::sqrt);
+        let limit = least.map(|least| (least + 2.0 * radius).min(reach + radius).powi(2));
+        out.clear();
+        out.resize(offsets.len(), 0);
+        for at in 0..offsets.len() {
+            let mut bits = 0;
+            for lane in 0..LANES {
+                bits |= u8::from(offsets[at].squared[lane] <= limit[lane]) << lane;
+            }
+            out[at] = bits;
+        }
+        least.map(|least| least <= reach + radius)
+    }
+    dispatch!(body(offsets: &[Offsets], radius: f32, reach: f32, out: &mut Vec<u8>) -> [bool; LANES])
+}
+
 /// Squared distance (cells^2) of each of eight points from the nearest of the listed triangles.
 pub fn nearest(triangles: &[Triangle], list: &[u32], points: &Points) -> [f32; LANES] {
     #[inline(always)]

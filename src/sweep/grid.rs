@@ -89,8 +89,9 @@ fn mesh_faces(voxel: f64, triangles: &[[u32; 3]], poses: &[&TriMesh]) -> Result<
 /// A region too large; cancel.
 pub fn fill(ctx: &Context, faces: Vec<Face>, lattice: Lattice, half_width: f32) -> Result<FloatGrid> {
     let band = Band { inside: half_width, outside: half_width };
-    let voxeliser =
-        ctx.stage("winding", || Voxeliser::new(faces, lattice, band, ALL_VOXELS, |blocks| Ok(vec![true; blocks.len()])))?;
+    let voxeliser = ctx.stage("winding", || {
+        Voxeliser::new(faces, lattice, band, ALL_VOXELS, |blocks| Ok(vec![true; blocks.len()]))
+    })?;
     let mut grid = FloatGrid::level_set(lattice.voxel, half_width)?;
     let blocks: Vec<usize> = (0..voxeliser.near_blocks().len()).collect();
     for batch in blocks.chunks(BATCH) {

@@ -1,7 +1,7 @@
 //! Nearest triangle of every voxel of a block, by halving: bounds at the centres of 4^3 and 2^3
 //! sub-blocks leave few triangles for the exact distances.
 
-use super::distance::{LANES, Offsets, Points, Triangle, nearest, prune, to_each};
+use super::distance::{LANES, Offsets, Points, Triangle, near_lanes, nearest, prune, to_each};
 use crate::base::blocks::{Mask, offset};
 
 /// Working memory of one thread.
@@ -9,6 +9,8 @@ use crate::base::blocks::{Mask, offset};
 pub struct Scratch {
     lists: [Vec<u32>; 3],
     offsets: [Vec<Offsets>; 2],
+    /// For each triangle the sub-blocks in which it can be nearest to a voxel, a bit each.
+    lanes: [Vec<u8>; 2],
     centre: Vec<[f32; 4]>,
 }
 
@@ -24,23 +26,31 @@ pub fn search(
     scratch: &mut Scratch,
     mut see: impl FnMut(usize, f32),
 ) {
-    let Scratch { lists: [all, some, few], offsets: [far, mid], centre } = scratch;
+    let Scratch { lists: [all, some, few], offsets: [far, mid], lanes, centre } = scratch;
     all.clear();
     all.extend(0..triangles.len() as u32);
     to_each(triangles, all, &points([0.0; 3], 4.0, 1.5), far);
+    let far_near = near_lanes(far, RADII[0], reach, &mut lanes[0]);
     for lane in 0..LANES {
         let corner = corner_of([0.0; 3], 4.0, lane);
-        if !any_wanted(wanted, corner, 4) || !keep(all, far, lane, RADII[0], reach, some, None) {
+        if !far_near[lane] || !any_wanted(wanted, corner, 4) {
             continue;
         }
+        some.clear();
+        some.extend(all.iter().zip(&lanes[0]).filter(|(_, bits)| **bits >> lane & 1 == 1).map(|(&id, _)| id));
         to_each(triangles, some, &points(corner, 2.0, 0.5), mid);
+        let mid_near = near_lanes(mid, RADII[1], reach, &mut lanes[1]);
         for lane in 0..LANES {
             let corner = corner_of(corner, 2.0, lane);
-            if !any_wanted(wanted, corner, 2) {
+            if !mid_near[lane] || !any_wanted(wanted, corner, 2) {
                 continue;
             }
-            if !keep(some, mid, lane, RADII[1], reach, few, Some(centre)) {
-                continue;
+            few.clear();
+            centre.clear();
+            for (at, _) in lanes[1].iter().enumerate().filter(|(_, bits)| **bits >> lane & 1 == 1) {
+                let offset = &mid[at];
+                few.push(some[at]);
+                centre.push([offset.x[lane], offset.y[lane], offset.z[lane], offset.squared[lane]]);
             }
             prune(few, centre);
             let squared = nearest(triangles, few, &points(corner, 1.0, 0.0));
@@ -77,32 +87,4 @@ fn points(corner: [f32; 3], size: f32, half: f32) -> Points {
         (points.x[lane], points.y[lane], points.z[lane]) = (at[0] + half, at[1] + half, at[2] + half);
     }
     points
-}
-
-/// Lists the triangles that can be nearest to some voxel of a sub-block (and their offsets from its centre),
-/// if any is in reach.
-fn keep(
-    list: &[u32],
-    offsets: &[Offsets],
-    lane: usize,
-    radius: f32,
-    reach: f32,
-    out: &mut Vec<u32>,
-    centre: Option<&mut Vec<[f32; 4]>>,
-) -> bool {
-    let nearer = |least: f32, d: &Offsets| if d.squared[lane] < least { d.squared[lane] } else { least };
-    let least = offsets.iter().fold(f32::INFINITY, nearer).sqrt();
-    if least > reach + radius {
-        return false;
-    }
-    let limit = (least + 2.0 * radius).min(reach + radius);
-    let limit = limit * limit;
-    let kept = || list.iter().zip(offsets).filter(|(_, d)| d.squared[lane] <= limit);
-    out.clear();
-    out.extend(kept().map(|(&index, _)| index));
-    if let Some(centre) = centre {
-        centre.clear();
-        centre.extend(kept().map(|(_, d)| [d.x[lane], d.y[lane], d.z[lane], d.squared[lane]]));
-    }
-    true
 }

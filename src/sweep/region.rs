@@ -90,7 +90,8 @@ impl Region {
             for index in (0..current.len()).filter(|&index| current[index]) {
                 let at = (index / stride % count) as i32;
                 let (first, last) = ((at - steps).max(0), (at + steps).min(count as i32 - 1));
-                (first..=last).for_each(|to| next[index + to as usize * stride - at as usize * stride] = true);
+                (first..=last)
+                    .for_each(|to| next[index + to as usize * stride - at as usize * stride] = true);
             }
             current = next;
         }
@@ -108,8 +109,9 @@ pub fn extent(v: &[Fixed; 3]) -> ([f32; 3], [f32; 3]) {
 
 /// Every block of the box `first..=last`, in ascending order.
 pub fn each_block(first: [i32; 3], last: [i32; 3]) -> impl Iterator<Item = [i32; 3]> {
-    (first[0]..=last[0])
-        .flat_map(move |x| (first[1]..=last[1]).flat_map(move |y| (first[2]..=last[2]).map(move |z| [x, y, z])))
+    (first[0]..=last[0]).flat_map(move |x| {
+        (first[1]..=last[1]).flat_map(move |y| (first[2]..=last[2]).map(move |z| [x, y, z]))
+    })
 }
 
 /// Block of a coordinate (cells), saturating where there is none.

@@ -9,7 +9,7 @@ use std::sync::atomic::{AtomicU8, Ordering};
 
 use rayon::prelude::*;
 
-use super::cells::{Cells, Point, dot, each_cell, normal};
+use super::cells::{Cells, Point, cross, difference, dot, each_cell, normal, sub};
 use super::chain::Face;
 use super::lattice::{Fixed, UNITS};
 use super::region::{Region, extent};
@@ -21,14 +21,16 @@ pub type Facet = [Fixed; 3];
 /// Depth (fixed-point units) up to which a sheet counts as surface: sides of a sweep are folds of many
 /// sheets, closer together than the sweep's own tolerance.
 const HAIR: f64 = 0.02 * UNITS as f64;
-/// Faces longer than this (cells) are asked in every cell that they pass through.
+/// Faces longer than this (cells) are asked at more than one point.
 const SMALL: f32 = 1.5;
+/// Distance of the points that a long face is asked at (fixed-point units).
+const SPACING: f64 = 1.2 * UNITS as f64;
 /// A corner is asked for this part of the way to the middle, away from what it shares with neighbours.
 const INSET: f64 = 0.05;
 /// Halvings that find where an edge dives: to 1/64 of its length.
-const HALVINGS: usize = 6;
+const HALVINGS: usize = 3;
 /// Faces a task handles: fixed, so that nothing depends on the number of threads.
-const GRAIN: usize = 512;
+const GRAIN: usize = 128;
 
 /// What the samples of a face or a cell said.
 const OPEN: u8 = 1;
@@ -51,14 +53,14 @@ pub fn surface(faces: &[Face], region: &Region, marked: &[bool], lines: &Lines) 
     let verdicts: Vec<u8> =
         (0..faces.len()).into_par_iter().with_min_len(GRAIN).map(|id| chain.verdict(id)).collect();
     let (around, seen) = chain.neighbourhoods(&verdicts);
-    let parts: Vec<Vec<Facet>> = verdicts
+    let parts: Vec<Vec<Facet>> = seen
         .par_chunks(GRAIN)
         .enumerate()
-        .map(|(chunk, verdicts)| {
-            let mut out = Vec::with_capacity(verdicts.len());
-            for (index, &verdict) in verdicts.iter().enumerate() {
+        .map(|(chunk, seen)| {
+            let mut out = Vec::with_capacity(seen.len());
+            for (index, &seen) in seen.iter().enumerate() {
                 let id = chunk * GRAIN + index;
-                chain.open_parts(id, [verdict, seen[id]], &around, &mut out);
+                chain.open_parts(id, seen, &around, &mut out);
             }
             out
         })
@@ -69,17 +71,14 @@ pub fn surface(faces: &[Face], region: &Region, marked: &[bool], lines: &Lines) 
 impl Chain<'_> {
     /// Whether a face is open or buried at its middle; a long one where it passes voxels.
     fn verdict(&self, id: usize) -> u8 {
-        let face = &self.faces[id];
-        let Some(ahead) = self.ahead(id) else { return BURIED };
-        let mut verdict = self.ask(middle(&face.v), ahead);
-        if !is_small(&face.v) {
-            each_cell(&face.v, &self.normals[id], |voxel| {
-                if self.cells.of_voxel(voxel, self.region).is_some() && let Some(at) = self.foot(id, voxel) {
-                    verdict |= self.ask(at, ahead);
-                }
-            });
-        }
-        verdict
+        self.ahead(id).map_or(BURIED, |ahead| self.said(&self.faces[id].v, ahead))
+    }
+
+    /// What the samples of a part of a face say.
+    fn said(&self, v: &Facet, ahead: Point) -> u8 {
+        let mut said = 0;
+        each_sample(v, |at| said |= if self.is_known(at) { self.ask(at, ahead) } else { 0 });
+        said
     }
 
     /// For each cell what its faces said, and for each face what was said in its cells.
@@ -88,25 +87,21 @@ impl Chain<'_> {
         let gather = |cell: usize| {
             let ids = self.cells.faces(cell);
             let said = ids.iter().fold(0, |said, &id| said | verdicts[id as usize]);
-            ids.iter().for_each(|&id| drop(seen[id as usize].fetch_or(said, Ordering::Relaxed)));
+            for &id in ids {
+                seen[id as usize].fetch_or(said, Ordering::Relaxed);
+            }
             said
         };
         let around = (0..self.cells.count()).into_par_iter().with_min_len(8 * GRAIN).map(gather).collect();
         (around, seen.into_iter().map(AtomicU8::into_inner).collect())
     }
 
-    /// Adds the open parts of a face whose own samples gave a verdict.
-    fn open_parts(&self, id: usize, [verdict, seen]: [u8; 2], around: &[u8], out: &mut Vec<Facet>) {
+    /// Adds the open parts of a face, from what was said in its cells.
+    fn open_parts(&self, id: usize, seen: u8, around: &[u8], out: &mut Vec<Facet>) {
         let (v, Some(ahead)) = (self.faces[id].v, self.ahead(id)) else { return };
         match seen {
             OPEN => out.push(v),
             BURIED => {}
-            _ if is_small(&v) => self.clip(v, ahead, out),
-            _ if self.corners(v, ahead).iter().all(|&corner| corner == verdict) => {
-                if verdict == OPEN {
-                    out.push(v);
-                }
-            }
             _ => {
                 self.dice(id, v, ahead, around, out);
             }
@@ -135,7 +130,11 @@ impl Chain<'_> {
                 self.clip(v, ahead, out);
                 out[begin..] == [v]
             }
-            _ => halves(v).map(|half| self.dice(id, half, ahead, around, out)) == [true; 2],
+            _ => match self.said(&v, ahead) {
+                OPEN => true,
+                BURIED => false,
+                _ => halves(v).map(|half| self.dice(id, half, ahead, around, out)) == [true; 2],
+            },
         };
         if open {
             out.truncate(begin);
@@ -201,26 +200,53 @@ impl Chain<'_> {
         if winding < 1 { OPEN } else { BURIED }
     }
 
+    /// Whether distances may be wanted near a point.
+    fn is_known(&self, at: Point) -> bool {
+        let voxel = at.map(|value| (value / f64::from(UNITS)).round() as i32);
+        self.cells.of_voxel(voxel, self.region).is_some()
+    }
+
     /// A hair along a face's normal; none for a face without area.
     fn ahead(&self, id: usize) -> Option<Point> {
         let normal = self.normals[id];
         let length = dot(&normal, &normal).sqrt();
         (length > 0.0).then(|| normal.map(|value| value * HAIR / length))
     }
-
-    /// The foot of the perpendicular from a voxel, where it lies in the face.
-    fn foot(&self, id: usize, voxel: [i32; 3]) -> Option<Point> {
-        let (v, normal) = (&self.faces[id].v, &self.normals[id]);
-        let p = voxel.map(|value| f64::from(value) * f64::from(UNITS));
-        let height = dot(normal, &super::cells::sub(p, v[0].map(f64::from))) / dot(normal, normal);
-        let foot = [0, 1, 2].map(|axis| p[axis] - height * normal[axis]);
-        super::cells::is_over(v, normal, foot).then_some(foot)
-    }
 }
 
 fn is_small(v: &Facet) -> bool {
     let (low, high) = extent(v);
     (0..3).all(|axis| high[axis] - low[axis] <= SMALL)
+}
+
+/// Calls `see` with the middle of a small triangle; with points about [`SPACING`] apart in rows along its
+/// longest edge otherwise.
+fn each_sample(v: &Facet, mut see: impl FnMut(Point)) {
+    if is_small(v) {
+        return see(middle(v));
+    }
+    let [a, b, c] = from_longest(v).map(|p| p.map(f64::from));
+    let (along, up) = (sub(b, a), sub(c, a));
+    let length = dot(&along, &along).sqrt();
+    let area = cross(along, up);
+    let height = dot(&area, &area).sqrt() / length;
+    let rows = (height / SPACING).ceil().max(1.0);
+    for row in 0..rows as usize {
+        let t = (row as f64 + 0.5) / rows;
+        let (begin, end) = (between(a, c, t), between(b, c, t));
+        let count = (length * (1.0 - t) / SPACING).ceil().max(1.0);
+        (0..count as usize).for_each(|index| see(between(begin, end, (index as f64 + 0.5) / count)));
+    }
+}
+
+/// A triangle turned so that its first edge is the longest.
+fn from_longest(v: &Facet) -> Facet {
+    let length = |i: usize| {
+        let d = difference(&v[(i + 1) % 3], &v[i]);
+        dot(&d, &d)
+    };
+    let longest = (1..3).fold(0, |best, i| if length(i) > length(best) { i } else { best });
+    [0, 1, 2].map(|i| v[(longest + i) % 3])
 }
 
 fn middle(v: &Facet) -> Point {
@@ -233,12 +259,7 @@ fn between(a: Point, b: Point, t: f64) -> Point {
 
 /// A triangle cut across its longest edge.
 fn halves(v: Facet) -> [Facet; 2] {
-    let length = |i: usize| {
-        let d = super::cells::difference(&v[(i + 1) % 3], &v[i]);
-        dot(&d, &d)
-    };
-    let longest = (1..3).fold(0, |best, i| if length(i) > length(best) { i } else { best });
-    let [a, b, c] = [0, 1, 2].map(|i| v[(longest + i) % 3]);
+    let [a, b, c] = from_longest(&v);
     let m = between(a.map(f64::from), b.map(f64::from), 0.5).map(|value| value.round() as i32);
     [[a, m, c], [m, b, c]]
 }

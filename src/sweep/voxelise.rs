@@ -69,6 +69,8 @@ const NONE: u32 = u32::MAX;
 const GRAIN: usize = 1024;
 /// Half a block's diagonal between voxel centres (cells), with room for rounding.
 const BLOCK_RADIUS: f32 = 6.07;
+/// Radius of a small facet (cells).
+const SMALL: f32 = 1.0;
 /// All voxels of a block.
 pub const ALL: Mask = [u64::MAX; 8];
 
@@ -185,14 +187,22 @@ impl Voxeliser {
         if (0..3).any(|axis| first[axis] > last[axis]) {
             return;
         }
-        let triangle = Triangle::new(facet, first.map(|block| block * 8));
+        // Small facets are told by a ball around them.
+        let (low, high) = extent(facet);
+        let centre = [0, 1, 2].map(|axis| (low[axis] + high[axis]) / 2.0);
+        let radius = gap(low, high) / 2.0;
+        let triangle = (radius > SMALL).then(|| Triangle::new(facet, [0; 3]));
         for block in each_block(first, last) {
             let index = self.region.index(block);
             if !marked[index] {
                 continue;
             }
-            let center = [0, 1, 2].map(|axis| (block[axis] - first[axis]) as f32 * 8.0 + 3.5);
-            if gap(center, triangle.closest(center)) <= reach + BLOCK_RADIUS {
+            let middle = block.map(|b| b as f32 * 8.0 + 3.5);
+            let distance = match &triangle {
+                Some(triangle) => gap(middle, triangle.closest(middle)),
+                None => gap(middle, centre) - radius,
+            };
+            if distance <= reach + BLOCK_RADIUS {
                 see(index);
             }
         }

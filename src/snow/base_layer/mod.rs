@@ -211,7 +211,8 @@ impl BaseLayer {
             .map(|body| body.chain(from, to, &lattice, self.params.tolerance, &window))
             .collect::<Result<_>>()?;
         let band = Band { inside: self.half_width, outside };
-        let snowy = |origins: &[Origin]| Ok(self.surface.probe(origins)?.iter().map(edit::has_snow).collect());
+        let snowy =
+            |origins: &[Origin]| Ok(self.surface.probe(origins)?.iter().map(edit::has_snow).collect());
         Voxeliser::new(parts.concat(), lattice, band, [relative(self.low, 0), relative(self.high, 0)], snowy)
     }
 

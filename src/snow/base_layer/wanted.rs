@@ -45,7 +45,8 @@ const LOW_Y: u64 = 0xff;
 fn dilated([own, below_x, above_x, below_y, above_y, below_z, above_z]: &[Mask; 7]) -> Mask {
     std::array::from_fn(|x| {
         let bits = own[x];
-        let along_x = (if x > 0 { own[x - 1] } else { below_x[7] }) | (if x < 7 { own[x + 1] } else { above_x[0] });
+        let along_x =
+            (if x > 0 { own[x - 1] } else { below_x[7] }) | (if x < 7 { own[x + 1] } else { above_x[0] });
         let along_y = bits << 8 | bits >> 8 | below_y[x] >> 56 & LOW_Y | (above_y[x] & LOW_Y) << 56;
         let along_z = bits << 1 & !LOW_Z
             | bits >> 1 & !(LOW_Z << 7)
@@ -78,8 +79,17 @@ mod tests {
             voxel(1, 3, 0),
         ]);
         let expected = [
-            (3, 0, 7), (2, 0, 7), (4, 0, 7), (3, 1, 7), (3, 0, 6),
-            (0, 1, 1), (7, 2, 2), (4, 0, 4), (5, 7, 5), (6, 6, 0), (1, 3, 7),
+            (3, 0, 7),
+            (2, 0, 7),
+            (4, 0, 7),
+            (3, 1, 7),
+            (3, 0, 6),
+            (0, 1, 1),
+            (7, 2, 2),
+            (4, 0, 4),
+            (5, 7, 5),
+            (6, 6, 0),
+            (1, 3, 7),
         ];
         let mut mask: Mask = [0; 8];
         for (x, y, z) in expected {
