@@ -9,7 +9,7 @@ use std::sync::atomic::{AtomicU8, Ordering};
 
 use rayon::prelude::*;
 
-use super::cells::{Cells, Point, cross, difference, dot, each_cell, normal, sub};
+use super::cells::{Cells, Point, cross, difference, dot, each_voxel, normal, sub};
 use super::chain::Face;
 use super::lattice::{Fixed, UNITS};
 use super::region::{Region, extent};
@@ -84,16 +84,16 @@ impl Chain<'_> {
     /// For each cell what its faces said, and for each face what was said in its cells.
     fn neighbourhoods(&self, verdicts: &[u8]) -> (Vec<u8>, Vec<u8>) {
         let seen: Vec<AtomicU8> = verdicts.iter().map(|_| AtomicU8::new(0)).collect();
-        let gather = |cell: usize| {
-            let ids = self.cells.faces(cell);
+        let around: Vec<AtomicU8> = (0..self.cells.count()).map(|_| AtomicU8::new(0)).collect();
+        self.cells.for_each(|cell, ids| {
             let said = ids.iter().fold(0, |said, &id| said | verdicts[id as usize]);
+            around[cell].store(said, Ordering::Relaxed);
             for &id in ids {
                 seen[id as usize].fetch_or(said, Ordering::Relaxed);
             }
-            said
-        };
-        let around = (0..self.cells.count()).into_par_iter().with_min_len(8 * GRAIN).map(gather).collect();
-        (around, seen.into_iter().map(AtomicU8::into_inner).collect())
+        });
+        let plain = |flags: Vec<AtomicU8>| flags.into_iter().map(AtomicU8::into_inner).collect();
+        (plain(around), plain(seen))
     }
 
     /// Adds the open parts of a face, from what was said in its cells.
@@ -111,7 +111,7 @@ impl Chain<'_> {
     /// What all faces said in the cells that a part of a face passes through.
     fn seen_around(&self, id: usize, v: Facet, around: &[u8]) -> u8 {
         let mut seen = 0;
-        each_cell(&v, &self.normals[id], |voxel| {
+        each_voxel(&v, &self.normals[id], self.region, |voxel| {
             if let Some(cell) = self.cells.of_voxel(voxel, self.region) {
                 seen |= around[cell];
             }
