@@ -2,6 +2,8 @@
 
 use std::collections::HashMap;
 
+use rayon::prelude::*;
+
 use super::chain::{Face, Weights, Window, boundary};
 use super::lattice::{Fixed, Lattice, UNITS};
 use super::refine::{edge_error, refine};
@@ -12,6 +14,8 @@ use crate::motion::Motion;
 
 /// Most steps that an interval between two kinks of a motion is split into.
 const MOST_STEPS: f64 = 1024.0;
+/// Vertices or edges a task looks at.
+const GRAIN: usize = 2048;
 
 /// A motion with its topology, prepared once and used for many intervals.
 pub struct Body {
@@ -88,7 +92,7 @@ impl Body {
         poses.iter_mut().for_each(|pose| topology.complete(pose));
         let refined = refine(topology, &mut poses, tolerance, |poses, edge| near.sees(poses, &edge));
         let levels: Vec<Vec<Fixed>> = poses
-            .iter()
+            .par_iter()
             .map(|pose| pose.iter().map(|&cells| lattice.fix(cells)).collect())
             .collect::<Result<_>>()?;
         let weights = Weights { solid: 1, swept: 1 };
@@ -120,14 +124,13 @@ impl Body {
         for end in ends {
             let first = poses.last().expect("the first pose is there").clone();
             let last = at(end)?;
-            let quarters = [0.25, 0.5, 0.75].map(|t| at(begin + t * (end - begin)));
-            let [q1, q2, q3] = quarters;
-            let probes = [first, q1?, q2?, q3?, last];
-            let steps = self.steps(&probes, tolerance, near);
-            let [_, _, _, _, last] = probes;
-            for step in 1..steps {
-                poses.push(at(begin + (end - begin) * step as f64 / steps as f64)?);
-            }
+            let quarter = |&t: &f64| at(begin + t * (end - begin));
+            let quarters: Vec<Vec<DVec3>> =
+                [0.25, 0.5, 0.75].par_iter().map(quarter).collect::<Result<_>>()?;
+            let steps =
+                self.steps(&[&first, &quarters[0], &quarters[1], &quarters[2], &last], tolerance, near);
+            let step = |step: usize| at(begin + (end - begin) * step as f64 / steps as f64);
+            poses.extend((1..steps).into_par_iter().map(step).collect::<Result<Vec<_>>>()?);
             poses.push(last);
             begin = end;
         }
@@ -135,27 +138,25 @@ impl Body {
     }
 
     /// Number of equal steps an interval needs, from five poses at its quarters.
-    fn steps(&self, probes: &[Vec<DVec3>; 5], tolerance: f64, near: &Near) -> usize {
-        let mut bend: f64 = 0.0;
-        let paths = (0..probes[0].len()).map(|vertex| probes.each_ref().map(|probe| probe[vertex]));
-        for path in paths {
-            if near.reaches(&path) {
-                for (index, t) in [(1, 0.25), (2, 0.5), (3, 0.75)] {
-                    bend = bend.max((path[index] - path[0].lerp(&path[4], t)).norm_squared());
-                }
+    fn steps(&self, probes: &[&Vec<DVec3>; 5], tolerance: f64, near: &Near) -> usize {
+        let bend = |vertex: usize| -> f64 {
+            let path = probes.map(|probe| probe[vertex]);
+            if !near.reaches(&path) {
+                return 0.0;
             }
-        }
+            let off = |(index, t): (usize, f64)| (path[index] - path[0].lerp(&path[4], t)).norm_squared();
+            [(1, 0.25), (2, 0.5), (3, 0.75)].map(off).into_iter().fold(0.0, f64::max)
+        };
+        let vertices = (0..probes[0].len()).into_par_iter().with_min_len(GRAIN);
+        let bend = vertices.map(bend).reduce(|| 0.0, f64::max);
         let arcs = (bend.sqrt() / tolerance).sqrt();
-        let ends = [probes[0].clone(), probes[4].clone()];
+        let ends = [probes[0], probes[4]];
         let own = self.topology.own_vertices as u32;
-        let twist = self
-            .topology
-            .edges
-            .iter()
-            .filter(|edge| edge[1] < own)
-            .map(|&edge| (edge_error(&ends, edge), edge))
-            .filter(|(error, edge)| *error > tolerance && near.sees(&ends, edge))
-            .fold(0.0, |most: f64, (error, _)| most.max(error));
+        let twist = |edge: &[u32; 2]| {
+            let error = if edge[1] < own { edge_error(&ends, *edge) } else { 0.0 };
+            if error > tolerance && near.sees(&ends, edge) { error } else { 0.0 }
+        };
+        let twist = self.topology.edges.par_iter().with_min_len(GRAIN).map(twist).reduce(|| 0.0, f64::max);
         // As many steps as pieces an edge: faces then keep a good shape.
         let twists = (twist / tolerance).sqrt();
         arcs.max(twists).ceil().clamp(1.0, MOST_STEPS) as usize
@@ -194,8 +195,8 @@ impl Near {
     }
 
     /// Whether an edge's sweep can touch the window.
-    fn sees(&self, poses: &[Vec<DVec3>], edge: &[u32; 2]) -> bool {
-        self.touches(poses.iter().flat_map(|pose| edge.map(|vertex| pose[vertex as usize])), 1.0)
+    fn sees(&self, poses: &[impl AsRef<[DVec3]>], edge: &[u32; 2]) -> bool {
+        self.touches(poses.iter().flat_map(|pose| edge.map(|vertex| pose.as_ref()[vertex as usize])), 1.0)
     }
 }
 

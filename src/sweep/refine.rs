@@ -3,6 +3,8 @@
 //! A moving edge sweeps a bilinear patch; the chain has two triangles in its place, which differ from
 //! it by at most |db - da| / 4 (da, db: the displacements of the edge's ends in a step).
 
+use rayon::prelude::*;
+
 use super::topology::{Derived, Simplex, Topology};
 use crate::base::DVec3;
 
@@ -12,10 +14,11 @@ const NONE: u32 = u32::MAX;
 const MOST_ROUNDS: usize = 12;
 
 /// Largest difference (cells) between the patch that an edge sweeps in one step and its two triangles.
-pub fn edge_error(poses: &[Vec<DVec3>], [i, j]: [u32; 2]) -> f64 {
+pub fn edge_error(poses: &[impl AsRef<[DVec3]>], [i, j]: [u32; 2]) -> f64 {
     let (i, j) = (i as usize, j as usize);
-    let turn = |pair: &[Vec<DVec3>]| ((pair[1][i] - pair[0][i]) - (pair[1][j] - pair[0][j])).norm_squared();
-    poses.windows(2).map(turn).fold(0.0, f64::max).sqrt() / 4.0
+    let edge = |pose: &dyn AsRef<[DVec3]>| pose.as_ref()[i] - pose.as_ref()[j];
+    poses.windows(2).map(|pair| (edge(&pair[1]) - edge(&pair[0])).norm_squared()).fold(0.0, f64::max).sqrt()
+        / 4.0
 }
 
 /// Halves edges until each error is within `tolerance` (cells), extending the poses; none when no edge
@@ -24,7 +27,7 @@ pub fn refine(
     topology: &Topology,
     poses: &mut [Vec<DVec3>],
     tolerance: f64,
-    wanted: impl Fn(&[Vec<DVec3>], [u32; 2]) -> bool,
+    wanted: impl Fn(&[Vec<DVec3>], [u32; 2]) -> bool + Sync,
 ) -> Option<Topology> {
     let mut refined: Option<Topology> = None;
     for _ in 0..MOST_ROUNDS {
@@ -50,15 +53,17 @@ pub fn refine(
 fn middles(
     topology: &Topology,
     poses: &[Vec<DVec3>],
-    needs: impl Fn([u32; 2]) -> bool,
+    needs: impl Fn([u32; 2]) -> bool + Sync,
 ) -> Option<(Vec<Derived>, Vec<u32>)> {
     debug_assert!(poses.iter().all(|pose| pose.len() == topology.vertex_count()));
     let mut derived = topology.derived.clone();
+    let needed: Vec<bool> = topology.edges.par_iter().with_min_len(2048).map(|&edge| needs(edge)).collect();
     let middle_of: Vec<u32> = topology
         .edges
         .iter()
-        .map(|&[i, j]| {
-            if !needs([i, j]) {
+        .zip(needed)
+        .map(|(&[i, j], needed)| {
+            if !needed {
                 return NONE;
             }
             derived.push(Derived::Middle(i, j));

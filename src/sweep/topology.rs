@@ -130,25 +130,37 @@ impl Topology {
 
     fn index_edges(&mut self) {
         const SIDES: [(usize, usize); 3] = [(0, 1), (1, 2), (0, 2)];
-        let mut keyed = Vec::with_capacity(self.simplices.len() * 3);
+        // Sorted by the lower vertex by counting, then by the other: vertices have few neighbours.
+        let mut start = vec![0u32; self.vertex_count() + 1];
+        for simplex in &self.simplices {
+            SIDES.into_iter().for_each(|(i, _)| start[simplex.v[i] as usize + 1] += 1);
+        }
+        (1..start.len()).for_each(|vertex| start[vertex] += start[vertex - 1]);
+        let mut next = start.clone();
+        let mut sorted = vec![(0, Incidence { triangle: 0, side: 0 }); self.simplices.len() * 3];
         for (triangle, simplex) in self.simplices.iter().enumerate() {
             for (side, (i, j)) in SIDES.into_iter().enumerate() {
-                let key = u64::from(simplex.v[i]) << 32 | u64::from(simplex.v[j]);
-                keyed.push((key, Incidence { triangle: triangle as u32, side: side as u8 }));
+                let place = &mut next[simplex.v[i] as usize];
+                let at = Incidence { triangle: triangle as u32, side: side as u8 };
+                sorted[*place as usize] = (simplex.v[j], at);
+                *place += 1;
             }
         }
-        keyed.sort_unstable_by_key(|(key, at)| (*key, at.triangle));
         self.edges.clear();
         self.edge_start.clear();
         self.incidences.clear();
-        let mut last = None;
-        for (index, (key, at)) in keyed.into_iter().enumerate() {
-            if last != Some(key) {
-                self.edges.push([(key >> 32) as u32, key as u32]);
-                self.edge_start.push(index as u32);
-                last = Some(key);
+        for vertex in 0..self.vertex_count() {
+            let beside = &mut sorted[start[vertex] as usize..start[vertex + 1] as usize];
+            beside.sort_unstable_by_key(|(other, at)| (*other, at.triangle));
+            let mut last = None;
+            for &(other, at) in beside.iter() {
+                if last != Some(other) {
+                    self.edges.push([vertex as u32, other]);
+                    self.edge_start.push(self.incidences.len() as u32);
+                    last = Some(other);
+                }
+                self.incidences.push(at);
             }
-            self.incidences.push(at);
         }
         self.edge_start.push(self.incidences.len() as u32);
     }
