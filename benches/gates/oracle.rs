@@ -33,6 +33,28 @@ impl MovingBox {
         let q = p.abs() - self.half;
         q.sup(&DVec3::zeros()).norm() + q.max().min(0.0)
     }
+
+    /// Depth (m) of a point inside what the box sweeps without turning: that is convex, its faces are the box's
+    /// and those that the box's edges sweep.
+    pub fn depth(&self, p: DVec3) -> f64 {
+        let rotation = Rotation3::from_euler_angles(self.turn[0].x, self.turn[0].y, self.turn[0].z);
+        let axes = [0, 1, 2].map(|axis| rotation.matrix().column(axis).into_owned());
+        let way = self.at[1] - self.at[0];
+        let middle = (self.at[0] + self.at[1]) / 2.0;
+        let swept = axes.iter().filter_map(|axis| axis.cross(&way).try_normalize(1e-12));
+        let depth = |normal: DVec3| {
+            let box_reach: f64 = (0..3).map(|axis| self.half[axis] * normal.dot(&axes[axis]).abs()).sum();
+            box_reach + normal.dot(&way).abs() / 2.0 - normal.dot(&(p - middle)).abs()
+        };
+        axes.into_iter().chain(swept).map(depth).fold(f64::INFINITY, f64::min)
+    }
+}
+
+/// Signed distance (m) of a point from a ball of some radius that moved straight from `a` to `b`.
+pub fn capsule(p: DVec3, a: DVec3, b: DVec3, radius: f64) -> f64 {
+    let way = b - a;
+    let t = ((p - a).dot(&way) / way.norm_squared()).clamp(0.0, 1.0);
+    (p - a - way * t).norm() - radius
 }
 
 /// Vertices whose surroundings (3 cells) are smooth: no normal differs by more than 8 degrees.
