@@ -54,17 +54,22 @@ pub const WALK_CELL: f64 = 0.0075;
 /// No noise.
 pub const EXACT: Params = Params { noise: None, tolerance: 0.02 };
 
-/// The boots of the demonstration's walk, frames 1 to 48.
-pub fn walkers() -> Vec<Body> {
+/// The boots of the demonstration's walk and their keys, frames 1 to 48.
+pub fn boots() -> [(TriMesh, Keys); 2] {
     use crate::common::boot::{left_boot, right_boot, walk};
-    let body = |mesh, side: f64| {
+    let keys = |side: f64| {
         let keys = walk(side, 48, 0.08).into_iter().map(|step| Key {
             time: f64::from(step.frame),
             at: DVec3::from(step.at) - DVec3::z() * 1.5,
             turn: DVec3::from(step.turn_deg.map(f64::to_radians)),
         });
-        let keys = Keys::new(keys.collect()).expect("keys");
-        Body::new(Box::new(Rigid::new(mesh, keys)), 1.0).expect("body")
+        Keys::new(keys.collect()).expect("keys")
     };
-    vec![body(left_boot(), -1.0), body(right_boot(), 1.0)]
+    [(left_boot(), keys(-1.0)), (right_boot(), keys(1.0))]
+}
+
+/// The boots as bodies.
+pub fn walkers() -> Vec<Body> {
+    let body = |(mesh, keys)| Body::new(Box::new(Rigid::new(mesh, keys)), 1.0).expect("body");
+    boots().map(body).into()
 }
