@@ -6,8 +6,9 @@ mod common;
 use std::fmt::Write;
 use std::path::Path;
 
-use common::boot::{Step, left_boot, right_boot, walk};
+use common::boot::{left_boot, right_boot};
 use common::shapes::{cuboid, sphere};
+use common::walk::{Step, walk};
 use frazil::io::{atomic, mesh};
 
 fn main() -> frazil::Result<()> {
@@ -46,8 +47,8 @@ fn object(text: &mut String, file: &str, keys: &[Step]) {
 /// Two treaded boots, 48 frames: heel strike, roll, toe-off.
 fn walker() -> String {
     let mut text = head("1-48", [-0.5975, -0.1975, 0.5975, 3.5975], 0.005);
-    object(&mut text, "boot_left.obj", &walk(-1.0, 48, 0.08));
-    object(&mut text, "boot_right.obj", &walk(1.0, 48, 0.08));
+    object(&mut text, "boot_left.obj", &walk(1.0, 48, 0.08));
+    object(&mut text, "boot_right.obj", &walk(-1.0, 48, 0.08));
     text
 }
 

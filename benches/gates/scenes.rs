@@ -56,7 +56,8 @@ pub const EXACT: Params = Params { noise: None, tolerance: 0.02 };
 
 /// The boots of the demonstration's walk and their keys, frames 1 to 48.
 pub fn boots() -> [(TriMesh, Keys); 2] {
-    use crate::common::boot::{left_boot, right_boot, walk};
+    use crate::common::boot::{left_boot, right_boot};
+    use crate::common::walk::walk;
     let keys = |side: f64| {
         let keys = walk(side, 48, 0.08).into_iter().map(|step| Key {
             time: f64::from(step.frame),
@@ -65,7 +66,7 @@ pub fn boots() -> [(TriMesh, Keys); 2] {
         });
         Keys::new(keys.collect()).expect("keys")
     };
-    [(left_boot(), keys(-1.0)), (right_boot(), keys(1.0))]
+    [(left_boot(), keys(1.0)), (right_boot(), keys(-1.0))]
 }
 
 /// The boots as bodies.

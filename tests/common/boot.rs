@@ -1,16 +1,30 @@
-//! A treaded boot and a walk, made by code.
+//! A treaded boot, made by code.
 
 use super::shapes::cuboid;
-use frazil::base::{DVec3, TriMesh, Vec3};
-use nalgebra::Rotation3;
+use frazil::base::{TriMesh, Vec3};
 
 /// Points of a ring around the boot.
 const RING: usize = 40;
 /// The sole's underside (m above the ground); lugs reach down to 0.
 const SOLE: f32 = 0.011;
-/// Heel and ball of the foot, about which it rolls (m along the boot).
-const HEEL: f64 = -0.075;
-const BALL: f64 = 0.115;
+/// Where the sole begins to rise towards the toes, and towards the back of the heel (m along the boot).
+pub const BALL: f32 = 0.09;
+pub const HEEL: f32 = -0.05;
+/// Ends of the sole (m along the boot).
+pub const TOE: f32 = 0.19;
+pub const BACK: f32 = -0.085;
+
+/// How far the sole's underside is above the ground when the boot stands (m): flat in the middle, curved up
+/// at both ends so that the foot rolls.
+pub fn rise(z: f32) -> f32 {
+    if z > BALL {
+        2.0 * (z - BALL).powi(2)
+    } else if z < HEEL {
+        4.0 * (HEEL - z).powi(2)
+    } else {
+        0.0
+    }
+}
 
 /// A right boot: about 0.29 m long, 0.3 m high; Y up, toes towards +Z, the ankle above the origin. Its
 /// parts (sole and upper, lugs) are closed and overlap.
@@ -26,8 +40,10 @@ pub fn right_boot() -> TriMesh {
         for side in [-1.0f32, 1.0] {
             let width = half - 0.006;
             let lug = cuboid([width, SOLE + 0.004, 0.0165]);
-            let centre = Vec3::new(side * (0.006 + width / 2.0), (SOLE + 0.004) / 2.0, z);
-            boot.append(&moved(&lug, centre));
+            let centre = Vec3::new(bend(z) + side * (0.006 + width / 2.0), (SOLE + 0.004) / 2.0, z);
+            let follow = |p: &Vec3| p + centre + Vec3::y() * rise(p.z + z);
+            let positions = lug.positions.iter().map(follow).collect();
+            boot.append(&TriMesh { positions, triangles: lug.triangles });
         }
     }
     boot
@@ -41,8 +57,9 @@ pub fn left_boot() -> TriMesh {
     boot
 }
 
-fn moved(mesh: &TriMesh, by: Vec3) -> TriMesh {
-    TriMesh { positions: mesh.positions.iter().map(|p| p + by).collect(), triangles: mesh.triangles.clone() }
+/// How far the middle of a right boot lies inward (towards +X) at a place along it (m): the big toe is inside.
+fn bend(z: f32) -> f32 {
+    0.014 * ((z - 0.03).max(0.0) / 0.16).powi(2)
 }
 
 /// Half the sole's width at a place along the boot (m).
@@ -75,7 +92,10 @@ fn upper() -> TriMesh {
             // The outline's own place along the sole, squeezed into this ring.
             let along = 0.0525 + 0.1425 * cosine;
             let x = sine.signum() * half_width(along).max(0.02 * sine.abs()) * width;
-            mesh.positions.push(Vec3::new(if sine.abs() < 1e-6 { 0.0 } else { x }, y, z));
+            // Low rings follow the sole, high ones are level.
+            let lift = rise(z) * (1.0 - (y - SOLE) / 0.1).clamp(0.0, 1.0);
+            let x = if sine.abs() < 1e-6 { 0.0 } else { x };
+            mesh.positions.push(Vec3::new(x + bend(z), y + lift, z));
         }
     }
     let ring = |level: usize, point: usize| (level * RING + point % RING) as u32;
@@ -94,55 +114,4 @@ fn upper() -> TriMesh {
         mesh.triangles.push([top, ring(rings.len() - 1, point), ring(rings.len() - 1, point + 1)]);
     }
     mesh
-}
-
-/// Where a boot is at a frame.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Step {
-    /// Frame, from 1.
-    pub frame: i32,
-    /// The boot's origin (m).
-    pub at: [f64; 3],
-    /// Pitch (toes down is positive), yaw, roll (degrees).
-    pub turn_deg: [f64; 3],
-}
-
-/// Frames of a stride (two steps), at 24 frames a second.
-const STRIDE_FRAMES: f64 = 26.0;
-/// Length of a stride (m).
-const STRIDE: f64 = 1.36;
-
-/// The walk of one boot: `side` is -1 (left) or 1 (right); feet press down to `depth` m above y = 0.
-pub fn walk(side: f64, frames: i32, depth: f64) -> Vec<Step> {
-    let shift = if side < 0.0 { 0.25 } else { 0.75 };
-    (1..=frames).map(|frame| pose(side, f64::from(frame - 1) / STRIDE_FRAMES + shift, frame, depth)).collect()
-}
-
-fn pose(side: f64, strides: f64, frame: i32, depth: f64) -> Step {
-    let (stride, phase) = (strides.floor(), strides.fract());
-    let (at, pitch) = if phase < 0.6 {
-        stance(side, stride, phase, depth)
-    } else {
-        let part = (phase - 0.6) / 0.4;
-        let (from, down) = stance(side, stride, 0.6, depth);
-        let (to, up) = stance(side, stride + 1.0, 0.0, depth);
-        let eased = part * part * (3.0 - 2.0 * part);
-        let lift = DVec3::y() * 0.27 * (std::f64::consts::PI * part.powf(0.8)).sin();
-        (from.lerp(&to, eased) + lift, down + (up - down) * eased)
-    };
-    Step { frame, at: at.into(), turn_deg: [pitch, 7.0 * side, 0.0] }
-}
-
-/// On the ground: rolls over the heel, rests, rolls over the ball. Nothing slides.
-fn stance(side: f64, stride: f64, phase: f64, depth: f64) -> (DVec3, f64) {
-    let (pitch, pivot) = match phase {
-        p if p < 0.12 => (-20.0 * (1.0 - p / 0.12), HEEL),
-        p if p < 0.38 => (0.0, HEEL),
-        p => (45.0 * ((p - 0.38) / 0.22).min(1.0), BALL),
-    };
-    let yaw = 7.0 * side;
-    let rest = DVec3::new(0.09 * side, depth, 0.25 + STRIDE * stride);
-    let turned = |pitch: f64| Rotation3::from_euler_angles(pitch.to_radians(), yaw.to_radians(), 0.0);
-    let pivot = DVec3::new(0.0, 0.0, pivot);
-    (rest + turned(0.0) * pivot - turned(pitch) * pivot, pitch)
 }

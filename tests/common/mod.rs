@@ -3,3 +3,4 @@
 
 pub mod boot;
 pub mod shapes;
+pub mod walk;
