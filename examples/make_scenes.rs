@@ -46,9 +46,11 @@ fn object(text: &mut String, file: &str, keys: &[Step]) {
 
 /// Two treaded boots, 48 frames: heel strike, roll, toe-off.
 fn walker() -> String {
-    let mut text = head("1-48", [-0.5975, -0.1975, 0.5975, 3.5975], 0.005);
-    object(&mut text, "boot_left.obj", &walk(1.0, 48, 0.08));
-    object(&mut text, "boot_right.obj", &walk(-1.0, 48, 0.08));
+    let mut text = head("1-48", [-0.6, -0.2, 0.6, 3.6], 0.004);
+    // Less than the default, for treads 15 mm deep to stay.
+    text.push_str("noise = { amplitude = 0.005, size = 0.04 }\n");
+    object(&mut text, "boot_left.obj", &walk(1.0, 48, 0.12));
+    object(&mut text, "boot_right.obj", &walk(-1.0, 48, 0.12));
     text
 }
 

@@ -6,7 +6,7 @@ use frazil::base::{TriMesh, Vec3};
 /// Points of a ring around the boot.
 const RING: usize = 40;
 /// The sole's underside (m above the ground); lugs reach down to 0.
-const SOLE: f32 = 0.011;
+const SOLE: f32 = 0.015;
 /// Where the sole begins to rise towards the toes, and towards the back of the heel (m along the boot).
 pub const BALL: f32 = 0.09;
 pub const HEEL: f32 = -0.05;
@@ -74,8 +74,8 @@ fn upper() -> TriMesh {
     // Height, back and front (m), and width as a part of the sole's or in metres.
     let rings = [
         (SOLE, -0.09, 0.195, 1.0),
-        (0.030, -0.09, 0.195, 1.0),
-        (0.034, -0.085, 0.188, 0.93),
+        (0.034, -0.09, 0.195, 1.0),
+        (0.038, -0.085, 0.188, 0.93),
         (0.060, -0.083, 0.178, 0.90),
         (0.080, -0.081, 0.145, 0.88),
         (0.105, -0.079, 0.085, 0.95),

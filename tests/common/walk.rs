@@ -61,7 +61,9 @@ fn stance(side: f64, stride: f64, phase: f64, depth: f64) -> (DVec3, f64) {
     let yaw = Rotation3::from_euler_angles(0.0, yaw(side).to_radians(), 0.0);
     let (contact, along) = contact(pitch.to_radians());
     let turned = Rotation3::from_axis_angle(&DVec3::x_axis(), pitch.to_radians()) * contact;
-    let rest = DVec3::new(0.09 * side, depth, 0.25 + STRIDE * stride);
+    // The right foot comes down half a stride before the left.
+    let ahead = stride - if side > 0.0 { 0.0 } else { 0.5 };
+    let rest = DVec3::new(0.09 * side, depth, 0.25 + STRIDE * ahead);
     (rest + yaw * (DVec3::z() * along - turned), pitch)
 }
 
