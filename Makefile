@@ -4,7 +4,7 @@ PACKAGES := libopenvdb-dev libboost-dev libboost-iostreams-dev g++ cmake pkg-con
 RUST_NEEDED := 1.88
 DEMO := target/demo
 
-.PHONY: setup demo test lint gates
+.PHONY: setup demo test lint gates bench
 
 # Everything a build needs, from Debian's packages; quick when it is there.
 setup:
@@ -38,3 +38,7 @@ test: setup lint
 # make gates [ONLY=snow.base.wall,...]
 gates: setup
 	@cargo bench --quiet --bench gates -- $(ONLY)
+
+# Times beside the thesis' and stock OpenVDB's.
+bench: setup
+	@cargo bench --quiet --bench times

@@ -20,6 +20,9 @@ use harness::Harness;
 use scenes::context;
 
 fn main() {
+    if std::env::args().any(|argument| argument == speed::PEAK) {
+        return speed::print_peak();
+    }
     let mut h = Harness::from_arguments();
     sweeps::run(&mut h);
     snow::run(&mut h);

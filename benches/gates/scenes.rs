@@ -12,10 +12,15 @@ pub fn context(threads: usize) -> Context {
     Context::new(Pool::new(threads).expect("threads"))
 }
 
-/// Snow 0.3 m deep on a square, around the origin.
+/// Snow 0.3 m deep on a square around the origin, on the ground at y = 0.
 pub fn snow(ctx: &Context, edge: f64, cell: f64, params: Params) -> BaseLayer {
+    snow_on(ctx, 0.0, edge, cell, params)
+}
+
+/// Snow on the ground at a height (m).
+fn snow_on(ctx: &Context, height: f64, edge: f64, cell: f64, params: Params) -> BaseLayer {
     let half = edge / 2.0;
-    let ground = Ground::Plane { height: 0.0, area: [-half, -half, half, half] };
+    let ground = Ground::Plane { height, area: [-half, -half, half, half] };
     let layer = layer(ctx, &ground, &[], &Cover::Depth(0.3), cell, 3.0).expect("snow");
     BaseLayer::new(ctx, layer, params).expect("base layer")
 }
@@ -45,7 +50,8 @@ pub fn large(ctx: &Context, layer: f64) -> (BaseLayer, Body) {
     let ends = [DVec3::new(0.0, 0.05, -0.5), DVec3::new(0.0, 0.05, -0.5 + 0.1 * frames)];
     let turn = [DVec3::zeros(), DVec3::new(0.0, 0.05, 0.0) * frames];
     let body = body(crate::common::shapes::figure(21), ends, turn, frames);
-    (snow(ctx, layer, 0.0075, Params::for_cell(0.0075)), body)
+    // Between two planes of voxels, as a ground usually is: on one, five of a band's six layers are active.
+    (snow_on(ctx, 0.002, layer, 0.0075, Params::for_cell(0.0075)), body)
 }
 
 /// Cell of the demonstration's walk (m).

@@ -19,7 +19,7 @@ use crate::base::blocks::{Block, BlockEdit, Mask, Origin, VOXELS};
 use crate::context::{Context, StageTime};
 use crate::error::{Error, Result};
 use crate::sweep::{Band, Body, Face, Lattice, Piece, Scratch, Settings, UNITS, Voxeliser, Window};
-use crate::vdb::{FloatGrid, GridClass, Probe};
+use crate::vdb::{FloatGrid, GridClass, MetaValue, Probe};
 use columns::{Column, Columns};
 use edit::{Edit, Scale};
 use noise::Displacement;
@@ -254,6 +254,8 @@ impl BaseLayer {
         let (surface, taken): (Vec<BlockEdit>, Vec<Option<BlockEdit>>) =
             edits.into_iter().map(|edit| (edit.surface, edit.removed)).unzip();
         removed.replace_blocks(ctx, &taken.into_iter().flatten().collect::<Vec<_>>())?;
+        // Shells thinner than a cell leave no trace in the level set: the sum over the columns has them.
+        removed.set_metadata("volume_m3", MetaValue::Double(volume))?;
         Ok(Change { surface, touched, compression, removed, columns, volume })
     }
 
