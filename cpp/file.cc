@@ -1,9 +1,9 @@
 // Files in OpenVDB's own format.
 #include "impl.h"
 
+#include <openvdb/io/Archive.h>
 #include <openvdb/io/Compression.h>
 #include <openvdb/io/File.h>
-#include <openvdb/io/Stream.h>
 
 #include <sstream>
 
@@ -48,6 +48,12 @@ int64_t count_of(const openvdb::GridBase& grid, const char* key) {
     return value ? value->value() : -1;
 }
 
+/// Writes to memory as File does to disk, with the offsets of the grids: readers can skip to one.
+class InMemory : public openvdb::io::Archive {
+public:
+    using openvdb::io::Archive::write;
+};
+
 /// Opens a file for reading; delayed loading would keep it mapped.
 void open(openvdb::io::File& file) {
     initialise();
@@ -80,9 +86,9 @@ std::unique_ptr<std::string> grids_to_bytes(rust::Slice<const size_t> grids, int
     for (const auto& entry : meta) map.insertMeta(std::string(entry.key), *from_meta(entry));
     constexpr uint32_t schemes[] = {openvdb::io::COMPRESS_NONE, openvdb::io::COMPRESS_ZIP, openvdb::io::COMPRESS_BLOSC};
     std::ostringstream bytes(std::ios_base::binary);
-    openvdb::io::Stream stream(bytes);
-    stream.setCompression(schemes[compression] | openvdb::io::COMPRESS_ACTIVE_MASK);
-    stream.write(list, map);
+    InMemory archive;
+    archive.setCompression(schemes[compression] | openvdb::io::COMPRESS_ACTIVE_MASK);
+    archive.write(bytes, list, /*seekable=*/true, map);
     return std::make_unique<std::string>(bytes.str());
 }
 

@@ -49,23 +49,32 @@ private:
     const openvdb::FloatGrid& speed_;
 };
 
+/// Runs a tool on a copy, put in the grid's place when it is done: a cancel or an error changes nothing.
+template <typename Work>
+void on_copy(Grid& grid, const Call& call, Work&& work) {
+    run(call, [&] {
+        Interrupter interrupter(call);
+        const openvdb::FloatGrid::Ptr copy = grid.impl->grid->deepCopy();
+        work(*copy, interrupter);
+        interrupter.check();
+        grid.impl->grid = copy;
+    });
+}
+
 }  // namespace
 
 void offset(Grid& grid, const Call& call, float metres, bool weno) {
-    run(call, [&] {
-        Interrupter interrupter(call);
-        Filter filter(*grid.impl->grid, &interrupter);
+    on_copy(grid, call, [&](openvdb::FloatGrid& copy, Interrupter& interrupter) {
+        Filter filter(copy, &interrupter);
         configure(filter, weno);
         // OpenVDB counts an inward offset as positive.
         filter.offset(-metres);
-        interrupter.check();
     });
 }
 
 void smooth(Grid& grid, const Call& call, int32_t kind, int32_t width, int32_t times, bool weno) {
-    run(call, [&] {
-        Interrupter interrupter(call);
-        Filter filter(*grid.impl->grid, &interrupter);
+    on_copy(grid, call, [&](openvdb::FloatGrid& copy, Interrupter& interrupter) {
+        Filter filter(copy, &interrupter);
         configure(filter, weno);
         for (int32_t time = 0; time < times; ++time) {
             if (kind == 0) {
@@ -79,24 +88,20 @@ void smooth(Grid& grid, const Call& call, int32_t kind, int32_t width, int32_t t
 }
 
 void renormalise(Grid& grid, const Call& call, bool weno, int32_t times) {
-    run(call, [&] {
-        Interrupter interrupter(call);
-        Filter filter(*grid.impl->grid, &interrupter);
+    on_copy(grid, call, [&](openvdb::FloatGrid& copy, Interrupter& interrupter) {
+        Filter filter(copy, &interrupter);
         configure(filter, weno);
         filter.setNormCount(times);
         filter.normalize();
-        interrupter.check();
     });
 }
 
 void advect_outward(Grid& grid, const Call& call, const Grid& speed) {
-    run(call, [&] {
-        Interrupter interrupter(call);
-        const Outward field(*grid.impl->grid, *speed.impl->grid);
+    on_copy(grid, call, [&](openvdb::FloatGrid& copy, Interrupter& interrupter) {
+        const Outward field(copy, *speed.impl->grid);
         openvdb::tools::LevelSetAdvection<openvdb::FloatGrid, Outward, openvdb::util::NullInterrupter> advection(
-            *grid.impl->grid, field, &interrupter);
+            copy, field, &interrupter);
         advection.advect(0.0, 1.0);
-        interrupter.check();
     });
 }
 

@@ -1,7 +1,6 @@
 // Between meshes, rays and level sets.
 #include "impl.h"
 
-#include <openvdb/tools/LevelSetMeasure.h>
 #include <openvdb/tools/MeshToVolume.h>
 #include <openvdb/tools/RayIntersector.h>
 #include <openvdb/tools/VolumeToMesh.h>
@@ -73,17 +72,6 @@ Triangles to_mesh(const Grid& grid, const Call& call, double iso, double adaptiv
             }
         }
         return out;
-    });
-}
-
-void measure(const Grid& grid, const Call& call, double& area, double& volume) {
-    run(call, [&] {
-        Interrupter interrupter(call);
-        openvdb::tools::LevelSetMeasure<openvdb::FloatGrid, openvdb::util::NullInterrupter> tool(*grid.impl->grid,
-                                                                                                 &interrupter);
-        area = tool.area(true);
-        volume = tool.volume(true);
-        interrupter.check();
     });
 }
 

@@ -100,6 +100,9 @@ fn name_by_content(bytes: &mut [u8]) {
     bytes[UUID].copy_from_slice(name.as_bytes());
 }
 
+/// Letters of OpenVDB's reason that a message repeats.
+const LONGEST_REASON: usize = 120;
+
 /// Checks what can be known without OpenVDB: the file is there, not empty, and begins as it should.
 fn check_start(path: &Path) -> Result<()> {
     use std::io::Read;
@@ -121,8 +124,11 @@ fn text(path: &Path) -> Result<&str> {
 fn cannot_read(path: &Path, error: &cxx::Exception) -> Error {
     let what = error.what();
     // OpenVDB's texts begin with the exception's name.
-    let what = what.split_once(": ").map_or(what, |(_, rest)| rest).trim();
-    Error::file(path, format!("the .vdb file cannot be read, it is cut short or damaged ({what})"))
+    let what = what.split_once(": ").map_or(what, |(_, rest)| rest);
+    // A damaged name can be long and anything but text.
+    let what: String = what.chars().filter(|letter| !letter.is_control()).take(LONGEST_REASON).collect();
+    let reason = if what.trim().is_empty() { String::new() } else { format!(" ({})", what.trim()) };
+    Error::file(path, format!("the .vdb file cannot be read, it is cut short or damaged{reason}"))
 }
 
 /// What a file says of its grids, of any type; values are not read.

@@ -2,6 +2,7 @@
 
 use super::bridge::ffi;
 use super::{FloatGrid, call, fail};
+use crate::base::DVec3;
 use crate::base::{TriMesh, Vec3};
 use crate::context::Context;
 use crate::error::{Error, Result};
@@ -62,11 +63,19 @@ enum Operation {
 }
 
 fn same_lattice(a: &FloatGrid, b: &FloatGrid) -> Result<()> {
-    let (a, b) = (a.voxel_size(), b.voxel_size());
-    if (a - b).abs() <= 1e-9 * a.max(b) {
-        return Ok(());
+    let (cell_a, cell_b) = (a.voxel_size(), b.voxel_size());
+    if (cell_a - cell_b).abs() > 1e-9 * cell_a.max(cell_b) {
+        let what =
+            format!("the level sets have cells of {cell_a} m and of {cell_b} m: they must be the same");
+        return Err(Error::argument(what));
     }
-    Err(Error::argument(format!("the level sets have cells of {a} m and of {b} m: they must be the same")))
+    // A cell's corner and its neighbours along the axes tell everything of an affine map.
+    let places = [DVec3::zeros(), DVec3::x(), DVec3::y(), DVec3::z()];
+    let apart = |place: DVec3| (a.index_to_world(place) - b.index_to_world(place)).amax();
+    if places.into_iter().map(apart).fold(0.0, f64::max) > 1e-6 * cell_a {
+        return Err(Error::argument("the level sets' cells are shifted or turned against each other"));
+    }
+    Ok(())
 }
 
 fn csg(ctx: &Context, a: &mut FloatGrid, mut b: FloatGrid, operation: Operation) -> Result<()> {
@@ -199,15 +208,14 @@ pub fn advect_outward(ctx: &Context, grid: &mut FloatGrid, speed: &FloatGrid) ->
     ffi::advect_outward(grid.inner.pin_mut(), &call, &speed.inner).map_err(fail)
 }
 
-/// Area and volume, by OpenVDB's smeared delta function.
+/// Area and volume of the mesh of the surface, by the divergence theorem in f64. OpenVDB's own measure takes the
+/// volume about the world's origin in single precision: 6 % off at 100 m from it.
 ///
 /// # Errors
-/// As [`offset`].
+/// As [`to_mesh`].
 pub fn measure(ctx: &Context, grid: &FloatGrid) -> Result<Measure> {
-    let (call, _flag) = call(ctx);
-    let mut measure = Measure { area: 0.0, volume: 0.0 };
-    ffi::measure(&grid.inner, &call, &mut measure.area, &mut measure.volume).map_err(fail)?;
-    Ok(measure)
+    let mesh = to_mesh(ctx, grid, 0.0, 0.0)?;
+    Ok(Measure { area: mesh.area(), volume: mesh.volume() })
 }
 
 /// Voxels of each connected part of the inside, largest first.
