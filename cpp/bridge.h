@@ -72,6 +72,7 @@ void advect_outward(Grid& grid, const Call& call, const Grid& speed);
 std::unique_ptr<Grid> from_mesh(const Call& call, rust::Slice<const float> points, rust::Slice<const uint32_t> indices,
                                 double voxel, float half_width);
 Triangles to_mesh(const Grid& grid, const Call& call, double iso, double adaptivity);
+void measure(const Grid& grid, const Call& call, double& area, double& volume);
 void cast_rays(const Grid& grid, const Call& call, rust::Slice<const double> rays, rust::Slice<Hit> hits);
 
 }  // namespace frazil

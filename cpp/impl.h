@@ -6,9 +6,12 @@
 
 #include <openvdb/openvdb.h>
 #include <openvdb/util/NullInterrupter.h>
+#include <tbb/global_control.h>
+#include <tbb/info.h>
 #include <tbb/task_arena.h>
 
 #include <atomic>
+#include <optional>
 #include <stdexcept>
 
 namespace frazil {
@@ -46,7 +49,13 @@ template <typename Work>
 auto run(const Call& call, Work&& work) {
     initialise();
     Interrupter(call).check();
-    tbb::task_arena arena(call.threads > 0 ? call.threads : 1);
+    const int threads = call.threads > 0 ? call.threads : 1;
+    // TBB warns on stderr when asked for more threads than cores, unless it was told to allow them.
+    std::optional<tbb::global_control> allowed;
+    if (threads > tbb::info::default_concurrency()) {
+        allowed.emplace(tbb::global_control::max_allowed_parallelism, static_cast<size_t>(threads));
+    }
+    tbb::task_arena arena(threads);
     return arena.execute(std::forward<Work>(work));
 }
 

@@ -1,6 +1,7 @@
 // Between meshes, rays and level sets.
 #include "impl.h"
 
+#include <openvdb/tools/LevelSetMeasure.h>
 #include <openvdb/tools/MeshToVolume.h>
 #include <openvdb/tools/RayIntersector.h>
 #include <openvdb/tools/VolumeToMesh.h>
@@ -72,6 +73,21 @@ Triangles to_mesh(const Grid& grid, const Call& call, double iso, double adaptiv
             }
         }
         return out;
+    });
+}
+
+void measure(const Grid& grid, const Call& call, double& area, double& volume) {
+    run(call, [&] {
+        Interrupter interrupter(call);
+        // The tool sums about the world's origin in single precision: the grid is brought there first.
+        const openvdb::FloatGrid::Ptr near = grid.impl->grid->copy();
+        const openvdb::Vec3d centre = near->evalActiveVoxelBoundingBox().getCenter();
+        near->setTransform(near->transform().copy());
+        near->transform().postTranslate(-near->indexToWorld(centre));
+        openvdb::tools::LevelSetMeasure<openvdb::FloatGrid, openvdb::util::NullInterrupter> tool(*near, &interrupter);
+        area = tool.area(true);
+        volume = tool.volume(true);
+        interrupter.check();
     });
 }
 

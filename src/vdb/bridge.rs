@@ -129,6 +129,7 @@ pub(super) mod ffi {
             half_width: f32,
         ) -> Result<UniquePtr<Grid>>;
         fn to_mesh(grid: &Grid, call: &Call, iso: f64, adaptivity: f64) -> Result<Triangles>;
+        fn measure(grid: &Grid, call: &Call, area: &mut f64, volume: &mut f64) -> Result<()>;
         fn cast_rays(grid: &Grid, call: &Call, rays: &[f64], hits: &mut [Hit]) -> Result<()>;
     }
 }

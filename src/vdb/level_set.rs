@@ -2,8 +2,7 @@
 
 use super::bridge::ffi;
 use super::{FloatGrid, call, fail};
-use crate::base::DVec3;
-use crate::base::{TriMesh, Vec3};
+use crate::base::{DVec3, TriMesh, Vec3};
 use crate::context::Context;
 use crate::error::{Error, Result};
 
@@ -208,14 +207,16 @@ pub fn advect_outward(ctx: &Context, grid: &mut FloatGrid, speed: &FloatGrid) ->
     ffi::advect_outward(grid.inner.pin_mut(), &call, &speed.inner).map_err(fail)
 }
 
-/// Area and volume of the mesh of the surface, by the divergence theorem in f64. OpenVDB's own measure takes the
-/// volume about the world's origin in single precision: 6 % off at 100 m from it.
+/// Area and volume by OpenVDB's smeared delta function, about the level set's own middle. Sharp edges are smeared
+/// too: boxes lose some 3 % of their area, and less than 1 % of their volume.
 ///
 /// # Errors
-/// As [`to_mesh`].
+/// As [`offset`].
 pub fn measure(ctx: &Context, grid: &FloatGrid) -> Result<Measure> {
-    let mesh = to_mesh(ctx, grid, 0.0, 0.0)?;
-    Ok(Measure { area: mesh.area(), volume: mesh.volume() })
+    let (call, _flag) = call(ctx);
+    let mut measure = Measure { area: 0.0, volume: 0.0 };
+    ffi::measure(&grid.inner, &call, &mut measure.area, &mut measure.volume).map_err(fail)?;
+    Ok(measure)
 }
 
 /// Voxels of each connected part of the inside, largest first.

@@ -3,4 +3,5 @@
 
 pub mod boot;
 pub mod shapes;
+pub mod tools;
 pub mod walk;
