@@ -218,9 +218,8 @@ pub fn near_lanes(offsets: &[Offsets], radius: f32, reach: f32, out: &mut Vec<u8
     fn body(offsets: &[Offsets], radius: f32, reach: f32, out: &mut Vec<u8>) -> [bool; LANES] {
         let mut least = [f32::INFINITY; LANES];
         for offset in offsets {
-            for lane in 0..LANES {
-                let squared = offset.squared[lane];
-                least[lane] = if squared < least[lane] { squared } else { least[lane] };
+            for (least, &squared) in least.iter_mut().zip(&offset.squared) {
+                *least = if squared < *least { squared } else { *least };
             }
         }
         let least = least.map(f32::sqrt);
@@ -229,8 +228,8 @@ pub fn near_lanes(offsets: &[Offsets], radius: f32, reach: f32, out: &mut Vec<u8
         out.resize(offsets.len(), 0);
         for at in 0..offsets.len() {
             let mut bits = 0;
-            for lane in 0..LANES {
-                bits |= u8::from(offsets[at].squared[lane] <= limit[lane]) << lane;
+            for (lane, (squared, limit)) in offsets[at].squared.iter().zip(&limit).enumerate() {
+                bits |= u8::from(squared <= limit) << lane;
             }
             out[at] = bits;
         }

@@ -31,18 +31,18 @@ pub fn search(
     all.extend(0..triangles.len() as u32);
     to_each(triangles, all, &points([0.0; 3], 4.0, 1.5), far);
     let far_near = near_lanes(far, RADII[0], reach, &mut lanes[0]);
-    for lane in 0..LANES {
+    for (lane, in_reach) in far_near.into_iter().enumerate() {
         let corner = corner_of([0.0; 3], 4.0, lane);
-        if !far_near[lane] || !any_wanted(wanted, corner, 4) {
+        if !in_reach || !any_wanted(wanted, corner, 4) {
             continue;
         }
         some.clear();
         some.extend(all.iter().zip(&lanes[0]).filter(|(_, bits)| **bits >> lane & 1 == 1).map(|(&id, _)| id));
         to_each(triangles, some, &points(corner, 2.0, 0.5), mid);
         let mid_near = near_lanes(mid, RADII[1], reach, &mut lanes[1]);
-        for lane in 0..LANES {
+        for (lane, in_reach) in mid_near.into_iter().enumerate() {
             let corner = corner_of(corner, 2.0, lane);
-            if !mid_near[lane] || !any_wanted(wanted, corner, 2) {
+            if !in_reach || !any_wanted(wanted, corner, 2) {
                 continue;
             }
             few.clear();
