@@ -20,7 +20,7 @@ pub type Facet = [Fixed; 3];
 
 /// Depth (fixed-point units) up to which a sheet counts as surface: sides of a sweep are folds of many
 /// sheets, closer together than the sweep's own tolerance.
-const HAIR: f64 = 0.02 * UNITS as f64;
+const HAIR: f64 = 0.005 * UNITS as f64;
 /// Faces longer than this (cells) are asked at more than one point.
 const SMALL: f32 = 1.5;
 /// Distance of the points that a long face is asked at (fixed-point units).
