@@ -50,3 +50,29 @@ fn detect() -> CpuLevel {
 fn detect() -> CpuLevel {
     CpuLevel::Baseline
 }
+
+/// Calls a function's copy for the instruction set in use.
+macro_rules! dispatch {
+    ($body:ident($($name:ident: $kind:ty),*) $(-> $out:ty)?) => {{
+        #[cfg(target_arch = "x86_64")]
+        #[target_feature(enable = "avx2")]
+        fn avx2($($name: $kind),*) $(-> $out)? {
+            $body($($name),*)
+        }
+        #[cfg(target_arch = "x86_64")]
+        #[target_feature(enable = "avx512f,avx512vl,avx512dq,avx512bw")]
+        fn avx512($($name: $kind),*) $(-> $out)? {
+            $body($($name),*)
+        }
+        match $crate::base::cpu::cpu_level() {
+            // SAFETY: the level was detected on this processor.
+            #[cfg(target_arch = "x86_64")]
+            $crate::base::cpu::CpuLevel::Avx512 => unsafe { avx512($($name),*) },
+            // SAFETY: the level was detected on this processor.
+            #[cfg(target_arch = "x86_64")]
+            $crate::base::cpu::CpuLevel::Avx2 => unsafe { avx2($($name),*) },
+            _ => $body($($name),*),
+        }
+    }};
+}
+pub(crate) use dispatch;

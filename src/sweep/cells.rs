@@ -1,9 +1,13 @@
 //! Which faces pass through the unit cell around each voxel, and the winding number at any point.
 
+use std::collections::HashMap;
+use std::ops::Range;
+
 use rayon::prelude::*;
 
 use super::chain::Face;
 use super::lattice::{Fixed, UNITS};
+use super::planes::{CLEAR, Planes};
 use super::region::{Region, each_block, extent};
 use super::winding::Lines;
 
@@ -14,42 +18,80 @@ pub type Point = [f64; 3];
 const GRAIN: usize = 1024;
 /// A block with at most this many faces is one cell.
 const FEW: usize = 8;
+/// A cell with more faces than this is divided...
+const MANY: usize = 96;
+/// ...into so many parts along each edge.
+const PARTS: usize = 4;
+/// How far the middles of parts are off (cells), lest a face of a regular mesh passes through them.
+const OFF: [f64; 3] = [0.007, 0.0042, -0.0021];
 /// No slot.
 const NONE: u32 = u32::MAX;
-/// A voxel nearer than this (cells) to a plane is told its side of it exactly.
-const CLEAR: f32 = 1e-3;
 /// Where a voxel is taken to be, off its centre (cells): the scan lines' side of faces and edges through it.
 const NUDGE: [f32; 3] = [1e-3, 3e-4, -1e-4];
 /// Room for rounding where a plane touches a cell's corner (cells).
 const TOUCH: f64 = 1e-5;
 
 /// Faces sorted into the unit cells around the voxels of some blocks.
-pub struct Cells {
+pub struct Cells<'a> {
+    faces: &'a [Face],
+    normals: &'a [Point],
+    region: &'a Region,
+    lines: &'a Lines,
+    rims: Vec<Rim>,
     /// Place of each block of the region in `blocks`.
     slots: Vec<u32>,
     blocks: Vec<Block>,
     count: usize,
-    rims: Vec<Rim>,
 }
 
 /// The faces of one block.
 struct Block {
     /// Number of its first cell, among all.
     first: usize,
-    /// `ids[start[c]..start[c + 1]]` pass through cell c: 512 cells, or one.
+    /// `start[c]..start[c + 1]` pass through cell c: 512 cells, or one.
     start: Vec<u32>,
+    near: NearFaces,
+    /// Cells with many faces, divided.
+    dense: HashMap<u32, Dense>,
+}
+
+/// Faces near a place, with their planes as seen from a block's first voxel.
+#[derive(Default)]
+struct NearFaces {
     ids: Vec<u32>,
-    /// For each of `ids` the face's unit normal, and the height of the block's first voxel over its plane (cells).
-    planes: Vec<[f32; 4]>,
+    planes: Planes,
+}
+
+/// A cell divided into [`PARTS`]^3, with the winding number in the middle of each: near the apex of a cone
+/// thousands of faces meet in one cell.
+struct Dense {
+    /// `start[p]..start[p + 1]` pass through part p.
+    start: Vec<u32>,
+    near: NearFaces,
+    winding: Vec<i32>,
+}
+
+/// Where the winding number is known, to count from.
+struct Known {
+    voxel: [i32; 3],
+    /// From the voxel's centre (cells); none at the voxel itself.
+    offset: Option<[f32; 3]>,
+    winding: i32,
 }
 
 /// The rim of a face: for each edge the inward direction in the face's plane, and how far the edge lies that
 /// way from the first corner (cells).
 type Rim = [[f32; 4]; 3];
 
-impl Cells {
+impl<'a> Cells<'a> {
     /// Sorts faces into the cells of the marked blocks.
-    pub fn new(faces: &[Face], normals: &[Point], region: &Region, marked: &[bool]) -> Self {
+    pub fn new(
+        faces: &'a [Face],
+        normals: &'a [Point],
+        region: &'a Region,
+        marked: &[bool],
+        lines: &'a Lines,
+    ) -> Self {
         let mut slots = vec![NONE; marked.len()];
         let places: Vec<[i32; 3]> =
             (0..marked.len()).filter(|&block| marked[block]).map(|block| region.place(block)).collect();
@@ -63,7 +105,11 @@ impl Cells {
             count += block.start.len() - 1;
         }
         let rims = faces.par_iter().zip(normals).with_min_len(GRAIN).map(|(f, n)| rim(&f.v, n)).collect();
-        Self { slots, blocks, count, rims }
+        let mut cells = Self { faces, normals, region, lines, rims, slots, blocks, count };
+        let dense: Vec<HashMap<u32, Dense>> =
+            cells.blocks.par_iter().zip(&places).map(|(block, &place)| cells.divide(block, place)).collect();
+        cells.blocks.iter_mut().zip(dense).for_each(|(block, dense)| block.dense = dense);
+        cells
     }
 
     /// Number of cells.
@@ -74,79 +120,138 @@ impl Cells {
     /// Calls `see` with each cell's number and faces, in parallel.
     pub fn for_each(&self, see: impl Fn(usize, &[u32]) + Sync) {
         self.blocks.par_iter().for_each(|block| {
-            (0..block.start.len() - 1)
-                .for_each(|cell| see(block.first + cell, &block.ids[block.range(cell)]));
+            let cells = 0..block.start.len() - 1;
+            cells.for_each(|cell| see(block.first + cell, &block.near.ids[block.range(cell)]));
         });
     }
 
     /// The cell around a voxel.
-    pub fn of_voxel(&self, voxel: [i32; 3], region: &Region) -> Option<usize> {
-        self.block_of(voxel, region).map(|block| block.first + block.cell(voxel))
+    pub fn of_voxel(&self, voxel: [i32; 3]) -> Option<usize> {
+        self.block_of(voxel).map(|block| block.first + block.cell(voxel))
     }
 
-    fn block_of(&self, voxel: [i32; 3], region: &Region) -> Option<&Block> {
+    fn block_of(&self, voxel: [i32; 3]) -> Option<&Block> {
         let place = voxel.map(|value| value >> 3);
-        let slot = if region.holds(place) { self.slots[region.index(place)] } else { NONE };
+        let slot = if self.region.holds(place) { self.slots[self.region.index(place)] } else { NONE };
         (slot != NONE).then(|| &self.blocks[slot as usize])
     }
 
-    /// Winding number of the chain at a point (fixed-point units): the nearest voxel's, and the faces between.
-    pub fn winding(
-        &self,
-        point: Point,
-        faces: &[Face],
-        normals: &[Point],
-        region: &Region,
-        lines: &Lines,
-    ) -> i32 {
+    /// Winding number of the chain at a point (fixed-point units): that of the nearest place where it is known,
+    /// and the faces between.
+    pub fn winding(&self, point: Point) -> i32 {
         let voxel = point.map(|value| (value / f64::from(UNITS)).round() as i32);
-        let Some(block) = self.block_of(voxel, region) else { return lines.winding(voxel) };
-        let local = voxel.map(|value| (value & 7) as f32);
-        let from = voxel.map(|value| f64::from(value) * f64::from(UNITS));
-        let way = [0, 1, 2].map(|axis| ((point[axis] - from[axis]) / f64::from(UNITS)) as f32);
-        let mut winding = lines.winding(voxel);
-        let range = block.range(block.cell(voxel));
-        for (&id, [x, y, z, height]) in block.ids[range.clone()].iter().zip(&block.planes[range]) {
-            let begin = height + x * local[0] + y * local[1] + z * local[2];
-            let end = begin + x * way[0] + y * way[1] + z * way[2];
-            let one_side = (begin > CLEAR) & (end > 0.0) | (begin < -CLEAR) & (end < 0.0);
-            if one_side || !self.passes(id, &faces[id as usize].v, voxel, way, begin / (begin - end)) {
-                continue;
+        let Some(block) = self.block_of(voxel) else { return self.lines.winding(voxel) };
+        if let Some(dense) = block.dense.get(&(inner(voxel) as u32)) {
+            let part = [0, 1, 2].map(|axis| {
+                let within = point[axis] / f64::from(UNITS) - f64::from(voxel[axis]) + 0.5;
+                ((within * PARTS as f64) as usize).min(PARTS - 1)
+            });
+            let index = (part[0] * PARTS + part[1]) * PARTS + part[2];
+            let offset = middle_of(index).map(|value| value as f32);
+            let known = Known { voxel, offset: Some(offset), winding: dense.winding[index] };
+            let range = dense.start[index] as usize..dense.start[index + 1] as usize;
+            return self.count_from(&known, &dense.near, range, point);
+        }
+        let known = Known { voxel, offset: None, winding: self.lines.winding(voxel) };
+        self.count_from(&known, &block.near, block.range(block.cell(voxel)), point)
+    }
+
+    /// The winding number at a point from a known one, and the faces near both.
+    fn count_from(&self, known: &Known, near: &NearFaces, range: Range<usize>, point: Point) -> i32 {
+        let offset = known.offset.unwrap_or_default();
+        let local = [0, 1, 2].map(|axis| (known.voxel[axis] & 7) as f32 + offset[axis]);
+        let from = known.voxel.map(|value| f64::from(value) * f64::from(UNITS));
+        let way = [0, 1, 2].map(|a| ((point[a] - from[a]) / f64::from(UNITS) - f64::from(offset[a])) as f32);
+        let mut winding = known.winding;
+        near.planes.for_each_met(range, local, way, |index, begin, end| {
+            let id = near.ids[index] as usize;
+            if !self.passes(id, known, way, begin / (begin - end)) {
+                return;
             }
-            let begin_in_front = if begin.abs() > CLEAR {
+            let begin_in_front = if begin.abs() > CLEAR || known.offset.is_some() {
                 begin > 0.0
             } else {
-                let (normal, corner) = (&normals[id as usize], faces[id as usize].v[0].map(f64::from));
+                let (normal, corner) = (&self.normals[id], self.faces[id].v[0].map(f64::from));
                 in_front(dot(normal, &sub(from, corner)), normal)
             };
             if begin_in_front != (end > 0.0) {
-                let coef = faces[id as usize].coef;
+                let coef = self.faces[id].coef;
                 winding += if begin_in_front { coef } else { -coef };
             }
-        }
+        });
         winding
     }
 
     /// Whether a segment that meets the plane of a face after the part `t` of its way passes through the face.
-    fn passes(&self, id: u32, v: &[Fixed; 3], voxel: [i32; 3], way: [f32; 3], t: f32) -> bool {
+    fn passes(&self, id: usize, known: &Known, way: [f32; 3], t: f32) -> bool {
+        let corner = &self.faces[id].v[0];
+        let (begin, end) = match known.offset {
+            None => (NUDGE, way),
+            Some(offset) => (offset, [0, 1, 2].map(|axis| offset[axis] + way[axis])),
+        };
         let t = t.clamp(0.0, 1.0);
         let at = |axis: usize| {
-            (voxel[axis] * UNITS - v[0][axis]) as f32 / UNITS as f32 + t * way[axis] + (1.0 - t) * NUDGE[axis]
+            let from_corner = (known.voxel[axis] * UNITS - corner[axis]) as f32 / UNITS as f32;
+            from_corner + t * end[axis] + (1.0 - t) * begin[axis]
         };
         let [x, y, z] = [at(0), at(1), at(2)];
         let over = |edge: &[f32; 4]| edge[0] * x + edge[1] * y + edge[2] * z > edge[3];
-        let rim = &self.rims[id as usize];
+        let rim = &self.rims[id];
         over(&rim[0]) & over(&rim[1]) & over(&rim[2])
     }
+
+    /// Divides the cells of a block that hold many faces.
+    fn divide(&self, block: &Block, place: [i32; 3]) -> HashMap<u32, Dense> {
+        if block.start.len() == 2 {
+            return HashMap::new();
+        }
+        let many = (0..block.start.len() - 1).filter(|&cell| block.range(cell).len() > MANY);
+        many.map(|cell| (cell as u32, self.dense(block, place, cell))).collect()
+    }
+
+    fn dense(&self, block: &Block, place: [i32; 3], cell: usize) -> Dense {
+        let at = [cell >> 6, cell >> 3 & 7, cell & 7];
+        let voxel = [0, 1, 2].map(|axis| place[axis] * 8 + at[axis] as i32);
+        let known = Known { voxel, offset: None, winding: self.lines.winding(voxel) };
+        let mut dense = Dense { start: vec![0], near: NearFaces::default(), winding: Vec::new() };
+        // A part's known middle is a little off its own: both the part and the way from there count.
+        let room = 0.5 / PARTS as f64 + OFF[0];
+        for index in 0..PARTS * PARTS * PARTS {
+            let offset = middle_of(index);
+            let middle = [0, 1, 2].map(|axis| f64::from(voxel[axis]) + offset[axis]);
+            let point = middle.map(|value| value * f64::from(UNITS));
+            dense.winding.push(self.count_from(&known, &block.near, block.range(cell), point));
+            for at in block.range(cell) {
+                let id = block.near.ids[at];
+                let v = &self.faces[id as usize].v;
+                let (low, high) = extent(v);
+                let overlaps = (0..3).all(|axis| {
+                    f64::from(low[axis]) <= middle[axis] + room && f64::from(high[axis]) >= middle[axis] - room
+                });
+                if overlaps && Slab::new(v, &self.normals[id as usize], room).touches(middle) {
+                    dense.near.ids.push(id);
+                    dense.near.planes.push(block.near.planes.get(at));
+                }
+            }
+            dense.start.push(dense.near.ids.len() as u32);
+        }
+        dense
+    }
+}
+
+/// The middle of a part of a divided cell, from the cell's voxel (cells).
+fn middle_of(part: usize) -> [f64; 3] {
+    let place = [part / (PARTS * PARTS), part / PARTS % PARTS, part % PARTS];
+    [0, 1, 2].map(|axis| (place[axis] as f64 + 0.5) / PARTS as f64 - 0.5 + OFF[axis])
 }
 
 impl Block {
     fn new(place: [i32; 3], ids: Vec<u32>, faces: &[Face], normals: &[Point]) -> Self {
         let corner = place.map(|block| block * 8);
-        let plane = |&id: &u32| Plane::new(&faces[id as usize], &normals[id as usize]).seen_from(corner);
         if ids.len() <= FEW {
-            let planes = ids.iter().map(plane).collect();
-            return Self { first: 0, start: vec![0, ids.len() as u32], ids, planes };
+            let start = vec![0, ids.len() as u32];
+            let near = NearFaces::new(ids, corner, faces, normals);
+            return Self { first: 0, start, near, dense: HashMap::new() };
         }
         let mut pairs: Vec<(u16, u32)> = Vec::with_capacity(ids.len() * 4);
         for &id in &ids {
@@ -162,17 +267,38 @@ impl Block {
             sorted[next[cell as usize] as usize] = id;
             next[cell as usize] += 1;
         }
-        let planes = sorted.iter().map(plane).collect();
-        Self { first: 0, start, ids: sorted, planes }
+        let near = NearFaces::new(sorted, corner, faces, normals);
+        Self { first: 0, start, near, dense: HashMap::new() }
     }
 
     fn cell(&self, voxel: [i32; 3]) -> usize {
         if self.start.len() == 2 { 0 } else { inner(voxel) }
     }
 
-    fn range(&self, cell: usize) -> std::ops::Range<usize> {
+    fn range(&self, cell: usize) -> Range<usize> {
         self.start[cell] as usize..self.start[cell + 1] as usize
     }
+}
+
+impl NearFaces {
+    fn new(ids: Vec<u32>, corner: [i32; 3], faces: &[Face], normals: &[Point]) -> Self {
+        let mut planes = Planes::default();
+        planes.reserve(ids.len());
+        for &id in &ids {
+            planes.push(plane(&faces[id as usize], &normals[id as usize], corner));
+        }
+        Self { ids, planes }
+    }
+}
+
+/// The plane of a face: unit normal, and the height of a voxel over it (cells).
+fn plane(face: &Face, normal: &Point, voxel: [i32; 3]) -> [f32; 4] {
+    let length = dot(normal, normal).sqrt();
+    let unit = if length > 0.0 { normal.map(|value| value / length) } else { [0.0; 3] };
+    let corner = face.v[0].map(|value| f64::from(value) / f64::from(UNITS));
+    let height = dot(&unit, &sub(voxel.map(f64::from), corner));
+    let [x, y, z] = unit;
+    [x as f32, y as f32, z as f32, height as f32]
 }
 
 /// A voxel's number in its block.
@@ -250,27 +376,6 @@ impl<'a> Slab<'a> {
 
     fn touches(&self, centre: Point) -> bool {
         dot(self.normal, &sub(centre, self.corner)).abs() <= self.reach
-    }
-}
-
-/// The plane of a face: unit normal, and the first corner (cells).
-struct Plane {
-    normal: Point,
-    corner: Point,
-}
-
-impl Plane {
-    fn new(face: &Face, normal: &Point) -> Self {
-        let length = dot(normal, normal).sqrt();
-        let unit = if length > 0.0 { normal.map(|value| value / length) } else { [0.0; 3] };
-        Self { normal: unit, corner: face.v[0].map(|value| f64::from(value) / f64::from(UNITS)) }
-    }
-
-    /// Normal, and the height of a voxel over the plane (cells).
-    fn seen_from(&self, voxel: [i32; 3]) -> [f32; 4] {
-        let height = dot(&self.normal, &sub(voxel.map(f64::from), self.corner));
-        let [x, y, z] = self.normal;
-        [x as f32, y as f32, z as f32, height as f32]
     }
 }
 

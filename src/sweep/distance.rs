@@ -3,34 +3,9 @@
 //! The loop over eight lanes is plain Rust that the compiler turns into vector code; it is compiled
 //! once for each instruction set and gives the same bits in all of them (no fused multiply-add).
 
-use crate::base::cpu::{CpuLevel, cpu_level};
+use crate::base::cpu::dispatch;
 
 use super::lattice::{Fixed, UNITS};
-
-/// Calls a function's copy for the instruction set in use.
-macro_rules! dispatch {
-    ($body:ident($($name:ident: $kind:ty),*) $(-> $out:ty)?) => {{
-        #[cfg(target_arch = "x86_64")]
-        #[target_feature(enable = "avx2")]
-        fn avx2($($name: $kind),*) $(-> $out)? {
-            $body($($name),*)
-        }
-        #[cfg(target_arch = "x86_64")]
-        #[target_feature(enable = "avx512f,avx512vl,avx512dq,avx512bw")]
-        fn avx512($($name: $kind),*) $(-> $out)? {
-            $body($($name),*)
-        }
-        match cpu_level() {
-            // SAFETY: the level was detected on this processor.
-            #[cfg(target_arch = "x86_64")]
-            CpuLevel::Avx512 => unsafe { avx512($($name),*) },
-            // SAFETY: the level was detected on this processor.
-            #[cfg(target_arch = "x86_64")]
-            CpuLevel::Avx2 => unsafe { avx2($($name),*) },
-            _ => $body($($name),*),
-        }
-    }};
-}
 
 /// Points handled at once.
 pub const LANES: usize = 8;

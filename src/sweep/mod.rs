@@ -11,6 +11,7 @@ mod chain;
 mod distance;
 mod lattice;
 mod nearest;
+mod planes;
 mod refine;
 mod region;
 #[cfg(feature = "vdb")]

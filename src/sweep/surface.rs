@@ -39,17 +39,16 @@ const BURIED: u8 = 2;
 /// A chain's faces, and how to ask for the winding number near them.
 struct Chain<'a> {
     faces: &'a [Face],
-    normals: Vec<Point>,
-    cells: Cells,
+    normals: &'a [Point],
+    cells: Cells<'a>,
     region: &'a Region,
-    lines: &'a Lines,
 }
 
 /// The surface of a chain in the marked blocks, where all faces there are given.
 pub fn surface(faces: &[Face], region: &Region, marked: &[bool], lines: &Lines) -> Vec<Facet> {
     let normals: Vec<Point> = faces.par_iter().map(normal).collect();
-    let cells = Cells::new(faces, &normals, region, marked);
-    let chain = Chain { faces, normals, cells, region, lines };
+    let cells = Cells::new(faces, &normals, region, marked, lines);
+    let chain = Chain { faces, normals: &normals, cells, region };
     let verdicts: Vec<u8> =
         (0..faces.len()).into_par_iter().with_min_len(GRAIN).map(|id| chain.verdict(id)).collect();
     let (around, seen) = chain.neighbourhoods(&verdicts);
@@ -112,7 +111,7 @@ impl Chain<'_> {
     fn seen_around(&self, id: usize, v: Facet, around: &[u8]) -> u8 {
         let mut seen = 0;
         each_voxel(&v, &self.normals[id], self.region, |voxel| {
-            if let Some(cell) = self.cells.of_voxel(voxel, self.region) {
+            if let Some(cell) = self.cells.of_voxel(voxel) {
                 seen |= around[cell];
             }
         });
@@ -196,14 +195,13 @@ impl Chain<'_> {
     /// Whether a point is open, with the way `ahead` of its face.
     fn ask(&self, at: Point, ahead: Point) -> u8 {
         let point = [0, 1, 2].map(|axis| at[axis] + ahead[axis]);
-        let winding = self.cells.winding(point, self.faces, &self.normals, self.region, self.lines);
-        if winding < 1 { OPEN } else { BURIED }
+        if self.cells.winding(point) < 1 { OPEN } else { BURIED }
     }
 
     /// Whether distances may be wanted near a point.
     fn is_known(&self, at: Point) -> bool {
         let voxel = at.map(|value| (value / f64::from(UNITS)).round() as i32);
-        self.cells.of_voxel(voxel, self.region).is_some()
+        self.cells.of_voxel(voxel).is_some()
     }
 
     /// A hair along a face's normal; none for a face without area.
