@@ -1,13 +1,10 @@
 //! Which faces pass through the unit cell around each voxel, and the winding number at any point.
 
-use std::collections::HashMap;
-use std::ops::Range;
-
 use rayon::prelude::*;
 
 use super::chain::Face;
 use super::lattice::{Fixed, UNITS};
-use super::planes::{CLEAR, Planes};
+use super::prism::Prism;
 use super::region::{Region, each_block, extent};
 use super::winding::Lines;
 
@@ -18,16 +15,12 @@ pub type Point = [f64; 3];
 const GRAIN: usize = 1024;
 /// A block with at most this many faces is one cell.
 const FEW: usize = 8;
-/// A cell with more faces than this is divided...
-const MANY: usize = 96;
-/// ...into so many parts along each edge.
-const PARTS: usize = 4;
-/// How far the middles of parts are off (cells), lest a face of a regular mesh passes through them.
-const OFF: [f64; 3] = [0.007, 0.0042, -0.0021];
 /// No slot.
 const NONE: u32 = u32::MAX;
 /// Where a voxel is taken to be, off its centre (cells): the scan lines' side of faces and edges through it.
 const NUDGE: [f32; 3] = [1e-3, 3e-4, -1e-4];
+/// A voxel nearer than this (cells) to a plane is told its side of it exactly.
+const CLEAR: f32 = 1e-3;
 /// Room for rounding where a plane touches a cell's corner (cells).
 const TOUCH: f64 = 1e-5;
 
@@ -37,7 +30,6 @@ pub struct Cells<'a> {
     normals: &'a [Point],
     region: &'a Region,
     lines: &'a Lines,
-    rims: Vec<Rim>,
     /// Place of each block of the region in `blocks`.
     slots: Vec<u32>,
     blocks: Vec<Block>,
@@ -48,40 +40,30 @@ pub struct Cells<'a> {
 struct Block {
     /// Number of its first cell, among all.
     first: usize,
-    /// `start[c]..start[c + 1]` pass through cell c: 512 cells, or one.
-    start: Vec<u32>,
-    near: NearFaces,
-    /// Cells with many faces, divided.
-    dense: HashMap<u32, Dense>,
-}
-
-/// Faces near a place, with their planes as seen from a block's first voxel.
-#[derive(Default)]
-struct NearFaces {
+    /// Faces near the block, ascending.
     ids: Vec<u32>,
-    planes: Planes,
+    /// Their prisms, seen from the block's first voxel.
+    prisms: Vec<Prism>,
+    /// Which of them pass through each cell: 512 cells, or one.
+    cells: Lists,
 }
 
-/// A cell divided into [`PARTS`]^3, with the winding number in the middle of each: near the apex of a cone
-/// thousands of faces meet in one cell.
-struct Dense {
-    /// `start[p]..start[p + 1]` pass through part p.
+/// Lists of places in a block's faces.
+struct Lists {
+    /// `items[start[i]..start[i + 1]]` are list i.
     start: Vec<u32>,
-    near: NearFaces,
-    winding: Vec<i32>,
+    items: Vec<u32>,
 }
 
-/// Where the winding number is known, to count from.
-struct Known {
-    voxel: [i32; 3],
-    /// From the voxel's centre (cells); none at the voxel itself.
-    offset: Option<[f32; 3]>,
-    winding: i32,
-}
+impl Lists {
+    fn count(&self) -> usize {
+        self.start.len() - 1
+    }
 
-/// The rim of a face: for each edge the inward direction in the face's plane, and how far the edge lies that
-/// way from the first corner (cells).
-type Rim = [[f32; 4]; 3];
+    fn get(&self, list: usize) -> &[u32] {
+        &self.items[self.start[list] as usize..self.start[list + 1] as usize]
+    }
+}
 
 impl<'a> Cells<'a> {
     /// Sorts faces into the cells of the marked blocks.
@@ -102,14 +84,9 @@ impl<'a> Cells<'a> {
         let mut count = 0;
         for block in &mut blocks {
             block.first = count;
-            count += block.start.len() - 1;
+            count += block.cells.count();
         }
-        let rims = faces.par_iter().zip(normals).with_min_len(GRAIN).map(|(f, n)| rim(&f.v, n)).collect();
-        let mut cells = Self { faces, normals, region, lines, rims, slots, blocks, count };
-        let dense: Vec<HashMap<u32, Dense>> =
-            cells.blocks.par_iter().zip(&places).map(|(block, &place)| cells.divide(block, place)).collect();
-        cells.blocks.iter_mut().zip(dense).for_each(|(block, dense)| block.dense = dense);
-        cells
+        Self { faces, normals, region, lines, slots, blocks, count }
     }
 
     /// Number of cells.
@@ -119,9 +96,12 @@ impl<'a> Cells<'a> {
 
     /// Calls `see` with each cell's number and faces, in parallel.
     pub fn for_each(&self, see: impl Fn(usize, &[u32]) + Sync) {
-        self.blocks.par_iter().for_each(|block| {
-            let cells = 0..block.start.len() - 1;
-            cells.for_each(|cell| see(block.first + cell, &block.near.ids[block.range(cell)]));
+        self.blocks.par_iter().for_each_init(Vec::new, |ids, block| {
+            for cell in 0..block.cells.count() {
+                ids.clear();
+                ids.extend(block.cells.get(cell).iter().map(|&place| block.ids[place as usize]));
+                see(block.first + cell, ids);
+            }
         });
     }
 
@@ -136,169 +116,74 @@ impl<'a> Cells<'a> {
         (slot != NONE).then(|| &self.blocks[slot as usize])
     }
 
-    /// Winding number of the chain at a point (fixed-point units): that of the nearest place where it is known,
-    /// and the faces between.
+    /// Winding number of the chain at a point (fixed-point units): the nearest voxel's, and the faces between.
     pub fn winding(&self, point: Point) -> i32 {
         let voxel = point.map(|value| (value / f64::from(UNITS)).round() as i32);
-        let Some(block) = self.block_of(voxel) else { return self.lines.winding(voxel) };
-        if let Some(dense) = block.dense.get(&(inner(voxel) as u32)) {
-            let part = [0, 1, 2].map(|axis| {
-                let within = point[axis] / f64::from(UNITS) - f64::from(voxel[axis]) + 0.5;
-                ((within * PARTS as f64) as usize).min(PARTS - 1)
-            });
-            let index = (part[0] * PARTS + part[1]) * PARTS + part[2];
-            let offset = middle_of(index).map(|value| value as f32);
-            let known = Known { voxel, offset: Some(offset), winding: dense.winding[index] };
-            let range = dense.start[index] as usize..dense.start[index + 1] as usize;
-            return self.count_from(&known, &dense.near, range, point);
-        }
-        let known = Known { voxel, offset: None, winding: self.lines.winding(voxel) };
-        self.count_from(&known, &block.near, block.range(block.cell(voxel)), point)
-    }
-
-    /// The winding number at a point from a known one, and the faces near both.
-    fn count_from(&self, known: &Known, near: &NearFaces, range: Range<usize>, point: Point) -> i32 {
-        let offset = known.offset.unwrap_or_default();
-        let local = [0, 1, 2].map(|axis| (known.voxel[axis] & 7) as f32 + offset[axis]);
-        let from = known.voxel.map(|value| f64::from(value) * f64::from(UNITS));
-        let way = [0, 1, 2].map(|a| ((point[a] - from[a]) / f64::from(UNITS) - f64::from(offset[a])) as f32);
-        let mut winding = known.winding;
-        near.planes.for_each_met(range, local, way, |index, begin, end| {
-            let id = near.ids[index] as usize;
-            if !self.passes(id, known, way, begin / (begin - end)) {
-                return;
+        let mut winding = self.lines.winding(voxel);
+        let Some(block) = self.block_of(voxel) else { return winding };
+        let from = voxel.map(|value| f64::from(value) * f64::from(UNITS));
+        let way = [0, 1, 2].map(|axis| ((point[axis] - from[axis]) / f64::from(UNITS)) as f32);
+        let local = voxel.map(|value| (value & 7) as f32);
+        let nudged = [0, 1, 2].map(|axis| local[axis] + NUDGE[axis]);
+        let end = [0, 1, 2].map(|axis| local[axis] + way[axis]);
+        for &place in block.cells.get(block.cell(voxel)) {
+            let prism = &block.prisms[place as usize];
+            let (begin, end) = (prism.heights_mixed(local, nudged), prism.heights(end));
+            let one_side = (begin[0] > CLEAR) & (end[0] > 0.0) | (begin[0] < -CLEAR) & (end[0] < 0.0);
+            if one_side || !Prism::is_inside(begin, end) {
+                continue;
             }
-            let begin_in_front = if begin.abs() > CLEAR || known.offset.is_some() {
-                begin > 0.0
+            let id = block.ids[place as usize] as usize;
+            let begin_in_front = if begin[0].abs() > CLEAR {
+                begin[0] > 0.0
             } else {
                 let (normal, corner) = (&self.normals[id], self.faces[id].v[0].map(f64::from));
                 in_front(dot(normal, &sub(from, corner)), normal)
             };
-            if begin_in_front != (end > 0.0) {
+            if begin_in_front != (end[0] > 0.0) {
                 let coef = self.faces[id].coef;
                 winding += if begin_in_front { coef } else { -coef };
             }
-        });
+        }
         winding
     }
-
-    /// Whether a segment that meets the plane of a face after the part `t` of its way passes through the face.
-    fn passes(&self, id: usize, known: &Known, way: [f32; 3], t: f32) -> bool {
-        let corner = &self.faces[id].v[0];
-        let (begin, end) = match known.offset {
-            None => (NUDGE, way),
-            Some(offset) => (offset, [0, 1, 2].map(|axis| offset[axis] + way[axis])),
-        };
-        let t = t.clamp(0.0, 1.0);
-        let at = |axis: usize| {
-            let from_corner = (known.voxel[axis] * UNITS - corner[axis]) as f32 / UNITS as f32;
-            from_corner + t * end[axis] + (1.0 - t) * begin[axis]
-        };
-        let [x, y, z] = [at(0), at(1), at(2)];
-        let over = |edge: &[f32; 4]| edge[0] * x + edge[1] * y + edge[2] * z > edge[3];
-        let rim = &self.rims[id];
-        over(&rim[0]) & over(&rim[1]) & over(&rim[2])
-    }
-
-    /// Divides the cells of a block that hold many faces.
-    fn divide(&self, block: &Block, place: [i32; 3]) -> HashMap<u32, Dense> {
-        if block.start.len() == 2 {
-            return HashMap::new();
-        }
-        let many = (0..block.start.len() - 1).filter(|&cell| block.range(cell).len() > MANY);
-        many.map(|cell| (cell as u32, self.dense(block, place, cell))).collect()
-    }
-
-    fn dense(&self, block: &Block, place: [i32; 3], cell: usize) -> Dense {
-        let at = [cell >> 6, cell >> 3 & 7, cell & 7];
-        let voxel = [0, 1, 2].map(|axis| place[axis] * 8 + at[axis] as i32);
-        let known = Known { voxel, offset: None, winding: self.lines.winding(voxel) };
-        let mut dense = Dense { start: vec![0], near: NearFaces::default(), winding: Vec::new() };
-        // A part's known middle is a little off its own: both the part and the way from there count.
-        let room = 0.5 / PARTS as f64 + OFF[0];
-        for index in 0..PARTS * PARTS * PARTS {
-            let offset = middle_of(index);
-            let middle = [0, 1, 2].map(|axis| f64::from(voxel[axis]) + offset[axis]);
-            let point = middle.map(|value| value * f64::from(UNITS));
-            dense.winding.push(self.count_from(&known, &block.near, block.range(cell), point));
-            for at in block.range(cell) {
-                let id = block.near.ids[at];
-                let v = &self.faces[id as usize].v;
-                let (low, high) = extent(v);
-                let overlaps = (0..3).all(|axis| {
-                    f64::from(low[axis]) <= middle[axis] + room && f64::from(high[axis]) >= middle[axis] - room
-                });
-                if overlaps && Slab::new(v, &self.normals[id as usize], room).touches(middle) {
-                    dense.near.ids.push(id);
-                    dense.near.planes.push(block.near.planes.get(at));
-                }
-            }
-            dense.start.push(dense.near.ids.len() as u32);
-        }
-        dense
-    }
-}
-
-/// The middle of a part of a divided cell, from the cell's voxel (cells).
-fn middle_of(part: usize) -> [f64; 3] {
-    let place = [part / (PARTS * PARTS), part / PARTS % PARTS, part % PARTS];
-    [0, 1, 2].map(|axis| (place[axis] as f64 + 0.5) / PARTS as f64 - 0.5 + OFF[axis])
 }
 
 impl Block {
     fn new(place: [i32; 3], ids: Vec<u32>, faces: &[Face], normals: &[Point]) -> Self {
         let corner = place.map(|block| block * 8);
-        if ids.len() <= FEW {
-            let start = vec![0, ids.len() as u32];
-            let near = NearFaces::new(ids, corner, faces, normals);
-            return Self { first: 0, start, near, dense: HashMap::new() };
-        }
-        let mut pairs: Vec<(u16, u32)> = Vec::with_capacity(ids.len() * 4);
-        for &id in &ids {
-            let (v, normal) = (&faces[id as usize].v, &normals[id as usize]);
-            each_cell(v, normal, corner, |voxel| pairs.push((inner(voxel) as u16, id)));
-        }
-        let mut start = vec![0u32; 513];
-        pairs.iter().for_each(|&(cell, _)| start[cell as usize + 1] += 1);
-        (1..513).for_each(|cell| start[cell] += start[cell - 1]);
-        let mut sorted = vec![0; pairs.len()];
-        let mut next = start.clone();
-        for &(cell, id) in &pairs {
-            sorted[next[cell as usize] as usize] = id;
-            next[cell as usize] += 1;
-        }
-        let near = NearFaces::new(sorted, corner, faces, normals);
-        Self { first: 0, start, near, dense: HashMap::new() }
+        let prism = |&id: &u32| Prism::new(&faces[id as usize].v, &normals[id as usize], corner);
+        let prisms = ids.iter().map(prism).collect();
+        let cells = if ids.len() <= FEW {
+            Lists { start: vec![0, ids.len() as u32], items: (0..ids.len() as u32).collect() }
+        } else {
+            by_cell(corner, &ids, faces, normals)
+        };
+        Self { first: 0, ids, prisms, cells }
     }
 
     fn cell(&self, voxel: [i32; 3]) -> usize {
-        if self.start.len() == 2 { 0 } else { inner(voxel) }
-    }
-
-    fn range(&self, cell: usize) -> Range<usize> {
-        self.start[cell] as usize..self.start[cell + 1] as usize
+        if self.cells.count() == 1 { 0 } else { inner(voxel) }
     }
 }
 
-impl NearFaces {
-    fn new(ids: Vec<u32>, corner: [i32; 3], faces: &[Face], normals: &[Point]) -> Self {
-        let mut planes = Planes::default();
-        planes.reserve(ids.len());
-        for &id in &ids {
-            planes.push(plane(&faces[id as usize], &normals[id as usize], corner));
-        }
-        Self { ids, planes }
+/// For each unit cell around a block's voxels which of the block's faces may pass through it.
+fn by_cell(corner: [i32; 3], ids: &[u32], faces: &[Face], normals: &[Point]) -> Lists {
+    let mut pairs: Vec<(u16, u32)> = Vec::with_capacity(ids.len() * 4);
+    for (place, &id) in ids.iter().enumerate() {
+        let (v, normal) = (&faces[id as usize].v, &normals[id as usize]);
+        each_cell(v, normal, corner, |voxel| pairs.push((inner(voxel) as u16, place as u32)));
     }
-}
-
-/// The plane of a face: unit normal, and the height of a voxel over it (cells).
-fn plane(face: &Face, normal: &Point, voxel: [i32; 3]) -> [f32; 4] {
-    let length = dot(normal, normal).sqrt();
-    let unit = if length > 0.0 { normal.map(|value| value / length) } else { [0.0; 3] };
-    let corner = face.v[0].map(|value| f64::from(value) / f64::from(UNITS));
-    let height = dot(&unit, &sub(voxel.map(f64::from), corner));
-    let [x, y, z] = unit;
-    [x as f32, y as f32, z as f32, height as f32]
+    let mut start = vec![0u32; 513];
+    pairs.iter().for_each(|&(cell, _)| start[cell as usize + 1] += 1);
+    (1..513).for_each(|cell| start[cell] += start[cell - 1]);
+    let mut items = vec![0; pairs.len()];
+    let mut next = start.clone();
+    for &(cell, place) in &pairs {
+        items[next[cell as usize] as usize] = place;
+        next[cell as usize] += 1;
+    }
+    Lists { start, items }
 }
 
 /// A voxel's number in its block.
@@ -382,16 +267,6 @@ impl<'a> Slab<'a> {
 /// Normal of a face, as long as twice its area (units^2).
 pub fn normal(face: &Face) -> Point {
     cross(difference(&face.v[1], &face.v[0]), difference(&face.v[2], &face.v[0]))
-}
-
-fn rim(v: &[Fixed; 3], normal: &Point) -> Rim {
-    [0, 1, 2].map(|i| {
-        let inward = cross(*normal, difference(&v[(i + 1) % 3], &v[i]));
-        let length = dot(&inward, &inward).sqrt().max(f64::MIN_POSITIVE);
-        let offset = dot(&inward, &difference(&v[i], &v[0])) / (length * f64::from(UNITS));
-        let [x, y, z] = inward.map(|value| (value / length) as f32);
-        [x, y, z, offset as f32]
-    })
 }
 
 /// Which side of a face a voxel is on; the scan lines move a voxel in a face's plane down, then right.

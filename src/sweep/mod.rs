@@ -11,7 +11,7 @@ mod chain;
 mod distance;
 mod lattice;
 mod nearest;
-mod planes;
+mod prism;
 mod refine;
 mod region;
 #[cfg(feature = "vdb")]

@@ -8,9 +8,9 @@ use rayon::prelude::*;
 use super::topology::{Derived, Simplex, Topology};
 use crate::base::DVec3;
 
-/// No middle vertex.
-const NONE: u32 = u32::MAX;
-/// Rounds of halving: an edge becomes at most 2^12 pieces.
+/// Most pieces that an edge is cut into at once.
+const MOST_PIECES: f64 = 4096.0;
+/// Most rounds: the edges that one round adds are cut by the next.
 const MOST_ROUNDS: usize = 12;
 
 /// Largest difference (cells) between the patch that an edge sweeps in one step and its two triangles.
@@ -21,8 +21,8 @@ pub fn edge_error(poses: &[impl AsRef<[DVec3]>], [i, j]: [u32; 2]) -> f64 {
         / 4.0
 }
 
-/// Halves edges until each error is within `tolerance` (cells), extending the poses; none when no edge
-/// needs it. `wanted` tells which edges matter.
+/// Cuts edges into equal pieces until each error is within `tolerance` (cells), extending the poses; none when
+/// no edge needs it. `wanted` tells which edges matter.
 pub fn refine(
     topology: &Topology,
     poses: &mut [Vec<DVec3>],
@@ -32,81 +32,94 @@ pub fn refine(
     let mut refined: Option<Topology> = None;
     for _ in 0..MOST_ROUNDS {
         let current = refined.as_ref().unwrap_or(topology);
-        let middles =
-            middles(current, poses, |edge| edge_error(poses, edge) > tolerance && wanted(poses, edge));
-        let Some((derived, middle_of)) = middles else { break };
-        let simplices = halve(current, &middle_of);
-        for pose in poses.iter_mut() {
-            for middle in &derived[current.derived.len()..] {
-                if let Derived::Middle(i, j) = middle {
-                    let position = (pose[*i as usize] + pose[*j as usize]) * 0.5;
-                    pose.push(position);
-                }
-            }
+        debug_assert!(poses.iter().all(|pose| pose.len() == current.vertex_count()));
+        let pieces = |edge: &[u32; 2]| {
+            let pieces = (edge_error(poses, *edge) / tolerance).min(MOST_PIECES).ceil();
+            if pieces > 1.0 && wanted(poses, *edge) { pieces as u32 } else { 1 }
+        };
+        let pieces: Vec<u32> = current.edges.par_iter().with_min_len(2048).map(pieces).collect();
+        if pieces.iter().all(|&pieces| pieces == 1) {
+            break;
         }
+        let cut = Cut::new(current, &pieces);
+        let simplices = cut.triangles(current);
+        let mut derived = current.derived.clone();
+        derived.extend(cut.added.iter().cloned());
+        poses.iter_mut().for_each(|pose| cut.added.iter().for_each(|added| pose.push(added.position(pose))));
         refined = Some(Topology::from_parts(topology.own_vertices, derived, simplices));
     }
     refined
 }
 
-/// Gives each edge that needs it a middle vertex: all derived vertices, and each edge's middle.
-fn middles(
-    topology: &Topology,
-    poses: &[Vec<DVec3>],
-    needs: impl Fn([u32; 2]) -> bool + Sync,
-) -> Option<(Vec<Derived>, Vec<u32>)> {
-    debug_assert!(poses.iter().all(|pose| pose.len() == topology.vertex_count()));
-    let mut derived = topology.derived.clone();
-    let needed: Vec<bool> = topology.edges.par_iter().with_min_len(2048).map(|&edge| needs(edge)).collect();
-    let middle_of: Vec<u32> = topology
-        .edges
-        .iter()
-        .zip(needed)
-        .map(|(&[i, j], needed)| {
-            if !needed {
-                return NONE;
-            }
-            derived.push(Derived::Middle(i, j));
-            (topology.own_vertices + derived.len() - 1) as u32
-        })
-        .collect();
-    (derived.len() > topology.derived.len()).then_some((derived, middle_of))
+/// Edges cut into pieces.
+struct Cut {
+    /// The vertices between the pieces.
+    added: Vec<Derived>,
+    /// The first of each edge's, and the number of its pieces.
+    edges: Vec<(u32, u32)>,
 }
 
-/// Splits each triangle at the middles of its edges.
-fn halve(topology: &Topology, middle_of: &[u32]) -> Vec<Simplex> {
-    let mut middles = vec![[NONE; 3]; topology.simplices.len()];
-    for (edge, &middle) in middle_of.iter().enumerate() {
-        for at in topology.beside(edge) {
-            middles[at.triangle as usize][at.side as usize] = middle;
+impl Cut {
+    fn new(topology: &Topology, pieces: &[u32]) -> Self {
+        let mut cut = Self { added: Vec::new(), edges: Vec::with_capacity(pieces.len()) };
+        for (&[i, j], &pieces) in topology.edges.iter().zip(pieces) {
+            cut.edges.push(((topology.vertex_count() + cut.added.len()) as u32, pieces));
+            cut.added
+                .extend((1..pieces).map(|piece| Derived::Along(i, j, f64::from(piece) / f64::from(pieces))));
+        }
+        cut
+    }
+
+    /// The triangles, cut where their edges are.
+    fn triangles(&self, topology: &Topology) -> Vec<Simplex> {
+        let mut edges = vec![[0; 3]; topology.simplices.len()];
+        for edge in 0..topology.edges.len() {
+            for at in topology.beside(edge) {
+                edges[at.triangle as usize][at.side as usize] = edge;
+            }
+        }
+        let mut out = Vec::with_capacity(topology.simplices.len() * 2);
+        for (simplex, [e01, e12, e02]) in topology.simplices.iter().zip(edges) {
+            let [a, b, c] = simplex.v;
+            // Corners counter-clockwise, and the edge that follows each.
+            let (corners, edges) =
+                if simplex.sign > 0 { ([a, b, c], [e01, e12, e02]) } else { ([a, c, b], [e02, e12, e01]) };
+            self.cut_triangle(corners, edges, |triangle| out.extend(Simplex::new(triangle)));
+        }
+        out
+    }
+
+    /// Joins the two sides of a triangle with the most pieces by a strip from their common corner.
+    fn cut_triangle(&self, v: [u32; 3], edges: [usize; 3], mut emit: impl FnMut([u32; 3])) {
+        let pieces = edges.map(|edge| self.edges[edge].1);
+        let base = (0..3).min_by_key(|&side| pieces[side]).unwrap_or(0);
+        let [c, a, b] = [0, 1, 2].map(|i| v[(base + i) % 3]);
+        let [across, left, right] = [0, 1, 2].map(|i| edges[(base + i) % 3]);
+        let [count, lefts, rights] = [across, left, right].map(|edge| self.edges[edge].1);
+        let on_left = |place: u32| self.vertex(left, b, a, place);
+        let on_right = |place: u32| self.vertex(right, b, c, place);
+        let (mut i, mut j) = (1, 1);
+        let mut tip = b;
+        while (i, j) != (lefts, rights) {
+            emit([on_left(i), tip, on_right(j)]);
+            let go_left = j == rights || i < lefts && (i + 1) * rights <= (j + 1) * lefts;
+            tip = if go_left { on_left(i) } else { on_right(j) };
+            (i, j) = if go_left { (i + 1, j) } else { (i, j + 1) };
+        }
+        for place in 0..count {
+            let part = [self.vertex(across, c, a, place), self.vertex(across, c, a, place + 1)];
+            emit([part[1], tip, part[0]]);
         }
     }
-    let mut out = Vec::with_capacity(topology.simplices.len() * 2);
-    for (simplex, [m01, m12, m02]) in topology.simplices.iter().zip(middles) {
-        let [a, b, c] = simplex.v;
-        // Corners in order, and the middle that follows each.
-        let (corners, middles) =
-            if simplex.sign > 0 { ([a, b, c], [m01, m12, m02]) } else { ([a, c, b], [m02, m12, m01]) };
-        split(corners, middles, |triangle| out.extend(Simplex::new(triangle)));
-    }
-    out
-}
 
-fn split(v: [u32; 3], m: [u32; 3], mut emit: impl FnMut([u32; 3])) {
-    let count = m.iter().filter(|&&middle| middle != NONE).count();
-    // Turned so that the odd one out comes last (one middle: first).
-    let turn = match count {
-        1 => (0..3).find(|&i| m[i] != NONE),
-        2 => (0..3).find(|&i| m[(i + 2) % 3] == NONE),
-        _ => Some(0),
-    }
-    .unwrap_or(0);
-    let [a, b, c] = [0, 1, 2].map(|i| v[(i + turn) % 3]);
-    let [ab, bc, ca] = [0, 1, 2].map(|i| m[(i + turn) % 3]);
-    match count {
-        0 => emit([a, b, c]),
-        1 => [[a, ab, c], [ab, b, c]].into_iter().for_each(emit),
-        2 => [[ab, b, bc], [a, ab, bc], [a, bc, c]].into_iter().for_each(emit),
-        _ => [[a, ab, ca], [ab, b, bc], [ca, bc, c], [ab, bc, ca]].into_iter().for_each(emit),
+    /// The vertex that ends the first `place` pieces of an edge, counted from one of its ends to the other.
+    fn vertex(&self, edge: usize, from: u32, to: u32, place: u32) -> u32 {
+        let (first, pieces) = self.edges[edge];
+        match place {
+            0 => from,
+            _ if place == pieces => to,
+            _ if from < to => first + place - 1,
+            _ => first + pieces - place - 1,
+        }
     }
 }

@@ -49,8 +49,21 @@ pub struct Incidence {
 pub enum Derived {
     /// Mean of the vertices of an open loop.
     Centroid(Vec<u32>),
-    /// Middle of an edge.
-    Middle(u32, u32),
+    /// On the way from one vertex to another, this part of it.
+    Along(u32, u32, f64),
+}
+
+impl Derived {
+    /// Its position, from those of the vertices before it.
+    pub fn position(&self, pose: &[DVec3]) -> DVec3 {
+        match self {
+            Self::Centroid(vertices) => {
+                let sum: DVec3 = vertices.iter().map(|&vertex| pose[vertex as usize]).sum();
+                sum / vertices.len() as f64
+            }
+            Self::Along(i, j, part) => pose[*i as usize].lerp(&pose[*j as usize], *part),
+        }
+    }
 }
 
 /// Closed triangles, their unique edges, and the vertices to be made besides the mesh's own.
@@ -103,13 +116,7 @@ impl Topology {
     pub fn complete(&self, pose: &mut Vec<DVec3>) {
         pose.truncate(self.own_vertices);
         for derived in &self.derived {
-            let position = match derived {
-                Derived::Centroid(vertices) => {
-                    let sum: DVec3 = vertices.iter().map(|&vertex| pose[vertex as usize]).sum();
-                    sum / vertices.len() as f64
-                }
-                Derived::Middle(i, j) => (pose[*i as usize] + pose[*j as usize]) * 0.5,
-            };
+            let position = derived.position(pose);
             pose.push(position);
         }
     }
