@@ -57,6 +57,7 @@ fn a_wrong_option_is_one_sentence() {
     refuses(folder.path(), "snow shot.toml -o out --frmaes 1-2", 2, &["--frmaes", "--frames"]);
     refuses(folder.path(), "snow shot.toml -o out --frames 2-1", 2, &["ends before it starts"]);
     refuses(folder.path(), "snow shot.toml -o out --frames 1-9", 2, &["1-9", "1-2"]);
+    refuses(folder.path(), "snow shot.toml -o out --frames 1-2x0", 2, &["choice of frames"]);
     refuses(folder.path(), "snow shot.toml -o out --max-memory lots", 2, &["--max-memory"]);
     refuses(folder.path(), "brew", 2, &["brew"]);
     refuses(folder.path(), "vdb from-mesh cube.obj --cell=-1 -o out.vdb", 2, &["--cell"]);
@@ -111,6 +112,26 @@ fn scene_mistakes_are_named_with_line_and_key() {
         ("cube.obj\"", "cube.obj\"\nrole = \"colide\"", "did you mean \"collide\"?"),
         ("1.5]", "-1.5]", "`area` in [snow] must be [x0, z0, x1, z1]"),
         ("depth = 0.3", "", "`depth` in [snow] is missing"),
+        (
+            "[[object]]",
+            "[snow.noise]\namplitude = 0.2\nsize = 0.2\n[[object]]",
+            "shot.toml:9: `amplitude` in [snow.noise] is too steep",
+        ),
+        (
+            "[[object]]",
+            "[snow.noise]\nsize = 0.1\n[[object]]",
+            "shot.toml:9: `size` in [snow.noise] is too steep",
+        ),
+        (
+            "[[object]]",
+            "[snow.noise]\nsize = 0.09\n[[object]]",
+            "shot.toml:9: `size` in [snow.noise] must lie in",
+        ),
+        (
+            "[[object]]",
+            "[snow.noise]\noctaves = 9\n[[object]]",
+            "shot.toml:9: `octaves` in [snow.noise] must lie in",
+        ),
     ];
     for (from, to, sentence) in wrong {
         fs::write(folder.path().join("shot.toml"), SCENE.replacen(from, to, 1)).unwrap();

@@ -55,7 +55,7 @@ fn a_scene_makes_frames_and_its_resolved_file_makes_them_again() {
     let told: serde_json::Value = serde_json::from_str(&json).unwrap();
     let names: Vec<_> =
         told[0]["holds"].as_array().unwrap().iter().map(|grid| grid["name"].clone()).collect();
-    assert_eq!(names, ["surface", "compression", "touched"]);
+    assert_eq!(names, ["compression", "surface", "touched"]);
     works(folder.path(), "preview out/base/base.0003.vdb cube.obj -o p.png --size 64x36");
     assert!(folder.path().join("p.png").metadata().unwrap().len() > 500);
 }
@@ -69,7 +69,29 @@ fn another_scene_does_not_mix_into_a_folder() {
     fs::write(folder.path().join("shot.toml"), scene.replace("depth = 0.3", "depth = 0.2")).unwrap();
     let output = frazil(folder.path(), "snow shot.toml -o out");
     assert_eq!(output.status.code(), Some(2));
-    assert!(String::from_utf8(output.stderr).unwrap().contains("-o"));
+    let stderr = String::from_utf8(output.stderr).unwrap();
+    assert!(stderr.contains("(snow.depth was 0.3)") && stderr.contains("another -o"), "{stderr}");
+}
+
+#[test]
+fn chosen_frames_are_written_as_in_a_whole_run() {
+    let folder = folder(5, 0.05, CUBE);
+    works(folder.path(), "snow shot.toml -o whole -q");
+    works(folder.path(), "snow shot.toml -o out -q --frames 2-4x2");
+    let there = |tree: &str, frame: u32| folder.path().join(format!("{tree}/base/base.{frame:04}.vdb"));
+    assert_eq!((1..=5).filter(|&frame| there("out", frame).exists()).collect::<Vec<_>>(), [2, 4]);
+    assert!(fs::read(there("out", 4)).unwrap() == fs::read(there("whole", 4)).unwrap());
+}
+
+#[test]
+fn verbose_says_what_is_read_and_how_long_stages_take() {
+    let folder = folder(2, 0.05, &CUBE.replacen("f 3 4 8 7\n", "", 1));
+    let said = works(folder.path(), "snow shot.toml -o out -v --max-memory 1G");
+    for words in ["10 triangles, 1 open loops closed", "active voxels", "frame 2: ", "sweep", " ms"] {
+        assert!(said.contains(words), "no {words:?} in {said}");
+    }
+    let quiet = works(folder.path(), "snow shot.toml -o again --quiet");
+    assert_eq!(quiet, "");
 }
 
 #[test]

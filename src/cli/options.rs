@@ -1,45 +1,29 @@
 //! Options that several commands share, and how their values are written.
 
 use super::machine;
+use frazil::Result;
 use frazil::base::{DVec3, TriMesh};
 use frazil::render::Size;
-use frazil::{Error, Result};
 use std::path::Path;
 use std::str::FromStr;
 
-/// `--max-memory`: refuses work that would need more.
-#[derive(clap::Args)]
-pub struct MemoryOption {
-    /// Refuse work that would need more memory, for example 8G, 512M or 50%.
-    #[arg(long, value_name = "SIZE", default_value = "80%")]
-    max_memory: Amount,
-}
-
-impl MemoryOption {
-    /// The limit in bytes; none when the machine does not tell its memory.
-    pub fn bytes(&self) -> u64 {
-        match self.max_memory {
-            Amount::Bytes(bytes) => bytes,
-            Amount::Part(part) => machine::memory().map_or(u64::MAX, |bytes| (bytes as f64 * part) as u64),
-        }
-    }
-
-    /// Refuses level sets of so much surface (m2) with such a cell (m).
-    pub fn check_surface(&self, area: f64, cell: f64) -> Result<()> {
-        // A band of six voxels crosses 1.6 blocks of 8 voxels on average, of four bytes and a bit each; a
-        // surface that is not level crosses more; a file in the making takes as much again.
-        let needed = (area / (cell * cell) * 128.0).min(1.0e18) as u64;
-        if needed <= self.bytes() {
-            return Ok(());
-        }
-        Err(Error::Memory { what: format!("a level set with --cell {cell}"), needed, limit: self.bytes() })
-    }
-}
-
+/// An amount of memory: bytes, or a part of the machine's.
 #[derive(Clone, Copy, Debug, PartialEq)]
-enum Amount {
+pub enum Amount {
+    /// So many bytes.
     Bytes(u64),
+    /// A part of the machine's memory, 0..=1.
     Part(f64),
+}
+
+impl Amount {
+    /// In bytes; without bounds when the machine does not tell its memory.
+    pub fn bytes(self) -> u64 {
+        match self {
+            Self::Bytes(bytes) => bytes,
+            Self::Part(part) => machine::memory().map_or(u64::MAX, |bytes| (bytes as f64 * part) as u64),
+        }
+    }
 }
 
 impl FromStr for Amount {

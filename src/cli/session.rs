@@ -2,9 +2,10 @@
 
 use super::exit::{self, Failure, Phase};
 use super::machine;
+use super::options::Amount;
 use super::output;
 use super::signals::Signals;
-use frazil::{Context, Pool};
+use frazil::{Context, Error, Pool};
 use serde_json::{Map, Value, json};
 use std::path::PathBuf;
 use std::sync::Mutex;
@@ -16,10 +17,13 @@ pub struct Globals {
     /// Worker threads [default: one per core]; the output does not depend on it.
     #[arg(long, value_name = "N", global = true, value_parser = clap::value_parser!(u16).range(1..=1024))]
     pub threads: Option<u16>,
+    /// Refuse work that would need more memory, for example 8G, 512M or 50%.
+    #[arg(long, value_name = "SIZE", global = true, default_value = "80%")]
+    max_memory: Amount,
     /// Say nothing but errors.
     #[arg(short, long, global = true, conflicts_with = "verbose")]
     pub quiet: bool,
-    /// Say more; twice: everything.
+    /// Say what is read and how long each stage takes; twice: everything.
     #[arg(short, long, global = true, action = clap::ArgAction::Count)]
     pub verbose: u8,
     /// Write times, memory and results of this run as JSON.
@@ -52,6 +56,23 @@ impl Session {
             output::check_writable(path).before()?;
         }
         Ok(Self { ctx, globals, signals, start: Instant::now(), results: Mutex::default() })
+    }
+
+    /// The most memory that the work may need (bytes).
+    pub fn max_memory(&self) -> u64 {
+        self.globals.max_memory.bytes()
+    }
+
+    /// Refuses level sets of so much surface (m2) with such a cell (m).
+    pub fn check_surface(&self, area: f64, cell: f64) -> frazil::Result<()> {
+        // A band of six voxels crosses 1.6 blocks of 8 voxels on average, of four bytes and a bit each; a
+        // surface that is not level crosses more; a file in the making takes as much again.
+        let needed = (area / (cell * cell) * 128.0).min(1.0e18) as u64;
+        let limit = self.max_memory();
+        if needed <= limit {
+            return Ok(());
+        }
+        Err(Error::Memory { what: format!("a level set with --cell {cell}"), needed, limit })
     }
 
     /// Whether only errors are to be said.

@@ -2,10 +2,9 @@
 
 use std::path::PathBuf;
 
-use frazil::scene::{Frames, Inputs, Scene, check_memory, shot};
+use frazil::scene::{FrameChoice, Inputs, Scene, check_memory, shot};
 
 use super::exit::{Failure, Phase};
-use super::options::MemoryOption;
 use super::output;
 use super::progress::FrameProgress;
 use super::session::Session;
@@ -26,10 +25,8 @@ pub struct Args {
     #[arg(long, value_enum, default_value = "base")]
     stage: Stage,
     /// Write these frames only; the frames before them are still computed.
-    #[arg(long, value_name = "A-B", allow_hyphen_values = true)]
-    frames: Option<Frames>,
-    #[command(flatten)]
-    memory: MemoryOption,
+    #[arg(long, value_name = "A-B|A-BxN|A,B,C", allow_hyphen_values = true)]
+    frames: Option<FrameChoice>,
 }
 
 #[derive(Clone, Copy, PartialEq, clap::ValueEnum)]
@@ -42,24 +39,26 @@ enum Stage {
 pub fn run(args: Args, session: &Session) -> Result<(), Failure> {
     let Stage::Base = args.stage;
     let scene = Scene::read(&args.scene).before()?;
-    let frames = args.frames.unwrap_or(scene.shot.frames);
-    if frames.first < scene.shot.frames.first || frames.last > scene.shot.frames.last {
+    let shot_frames = scene.shot.frames;
+    let frames = args.frames.unwrap_or_else(|| shot_frames.into());
+    if frames.first() < shot_frames.first || frames.last() > shot_frames.last {
         return Err(Failure::refused(format!(
-            "--frames {frames} is not within the shot's {}",
-            scene.shot.frames
+            "--frames {}-{} is not within the shot's {shot_frames}",
+            frames.first(),
+            frames.last()
         )));
     }
     let inputs = Inputs::load(&scene).before()?;
-    check_memory(&scene, &inputs, args.memory.bytes()).before()?;
+    check_memory(&scene, &inputs, session.max_memory()).before()?;
     shot::prepare(&scene, &args.output).before()?;
     output::check_folder(&args.output).before()?;
     let mut progress = FrameProgress::new(frames.count(), session.is_quiet());
-    progress.begin(frames.first);
+    progress.begin(frames.first());
     let mut removed = 0.0;
-    shot::run(&session.ctx, &scene, &inputs, &args.output, frames, |frame, report| {
+    shot::run(&session.ctx, &scene, &inputs, &args.output, &frames, |frame, report| {
         removed += report.removed_volume;
         progress.finished(frame);
-        if frame < frames.last {
+        if frame < frames.last() {
             progress.begin(frame + 1);
         }
     })

@@ -2,8 +2,12 @@
 
 use std::io::Write;
 use std::path::Path;
+use std::sync::atomic::{AtomicU64, Ordering};
 
 use crate::error::{Error, Result};
+
+/// Files begun by this process.
+static TURN: AtomicU64 = AtomicU64::new(0);
 
 /// Writes a file through a temporary neighbour that is synced and renamed; nothing is left behind on failure.
 ///
@@ -19,7 +23,9 @@ pub fn write_bytes(path: &Path, bytes: &[u8]) -> Result<()> {
 /// What the operating system or the function reports.
 pub fn write(path: &Path, content: impl FnOnce(&mut dyn Write) -> std::io::Result<()>) -> Result<()> {
     let mut name = path.file_name().unwrap_or_default().to_os_string();
-    name.push(format!(".{}.part", std::process::id()));
+    // Two processes or threads that write the same file do not share a neighbour.
+    let turn = TURN.fetch_add(1, Ordering::Relaxed);
+    name.push(format!(".{}-{turn}.part", std::process::id()));
     let part = path.with_file_name(name);
     let attempt = || -> std::io::Result<()> {
         let mut out = std::io::BufWriter::new(std::fs::File::create(&part)?);

@@ -1,8 +1,9 @@
 //! Reads a scene file: keys to fields, defaults filled in, ranges checked.
 
 use super::table::{Document, Table};
-use super::{Frames, Ground, Key, Layer, Noise, Object, Output, Role, Scene, Shot, Snow, Up};
+use super::{Frames, Ground, Key, Layer, Object, Output, Role, Scene, Shot, Snow, Up};
 use crate::error::{Error, Result};
+use crate::snow::base_layer::NoiseParams;
 use std::path::{Path, PathBuf};
 use toml::de::DeTable;
 
@@ -126,18 +127,27 @@ fn ground(snow: &Table, folder: &Path) -> Result<Option<Ground>> {
     Ok(Some(Ground::Plane { height, area }))
 }
 
-fn noise(snow: &Table, cell: f64) -> Result<Noise> {
-    let defaults = Noise { amplitude: 2.0 * cell, size: 8.0 * cell, octaves: 3, seed: 0 };
+fn noise(snow: &Table, cell: f64) -> Result<NoiseParams> {
+    let defaults = NoiseParams::for_cell(cell);
     let table = snow.table("noise", "[snow.noise]", &["amplitude", "size", "octaves", "seed"])?;
     let Some(table) = table else { return Ok(defaults) };
-    Ok(Noise {
-        amplitude: table
-            .number_in("amplitude", 0.0..=100.0 * cell, "m (100 cells)")?
-            .unwrap_or(defaults.amplitude),
-        size: table.number_in("size", cell..=10_000.0 * cell, "m (10000 cells)")?.unwrap_or(defaults.size),
+    let (amplitudes, sizes) = (NoiseParams::amplitudes(cell), NoiseParams::sizes(cell));
+    let noise = NoiseParams {
+        amplitude: table.number_in("amplitude", amplitudes, "m (32 cells)")?.unwrap_or(defaults.amplitude),
+        size: table.number_in("size", sizes, "m (2 to 10000 cells)")?.unwrap_or(defaults.size),
         octaves: table.integer_in("octaves", 1..=8)?.map_or(defaults.octaves, |value| value as u32),
-        seed: table.integer_in("seed", 0..=i64::from(i32::MAX))?.map_or(defaults.seed, |value| value as u32),
-    })
+        seed: table.integer_in("seed", 0..=i64::from(i32::MAX))?.map_or(defaults.seed, |value| value as i32),
+    };
+    let key = if table.has("amplitude") { "amplitude" } else { "size" };
+    let most = noise.steepest();
+    if noise.amplitude > most {
+        let what = format!(
+            "is too steep, {} m over {} m, and would leave islands: an amplitude of at most {most:.4} m goes with this size",
+            noise.amplitude, noise.size
+        );
+        return Err(table.error(key, what));
+    }
+    Ok(noise)
 }
 
 fn objects(root: &Table, folder: &Path) -> Result<Vec<Object>> {

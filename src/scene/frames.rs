@@ -1,7 +1,10 @@
-//! A range of frames: `1001-1120`, or one frame: `7`.
+//! Ranges of frames: `1001-1120`, or one frame: `7`; and choices of frames: `1-100x2`, `1,5,9`.
 
 use std::fmt;
 use std::str::FromStr;
+
+/// Most frames of a shot.
+const MOST: i64 = 10_000_000;
 
 /// First and last frame of a shot, both included.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -38,8 +41,8 @@ impl FromStr for Frames {
         if last < first {
             return Err(format!("the range of frames \"{text}\" ends before it starts"));
         }
-        if i64::from(last) - i64::from(first) >= 10_000_000 {
-            return Err(format!("the range of frames \"{text}\" has more than 10000000 frames"));
+        if i64::from(last) - i64::from(first) >= MOST {
+            return Err(format!("the range of frames \"{text}\" has more than {MOST} frames"));
         }
         Ok(Self { first, last })
     }
@@ -48,6 +51,65 @@ impl FromStr for Frames {
 impl fmt::Display for Frames {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         write!(f, "{}-{}", self.first, self.last)
+    }
+}
+
+/// A choice of a shot's frames: ranges, each with a step, joined by commas.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct FrameChoice {
+    /// Ascending, each once; at least one.
+    frames: Vec<i32>,
+}
+
+impl FrameChoice {
+    /// The least frame.
+    pub fn first(&self) -> i32 {
+        self.frames[0]
+    }
+
+    /// The greatest frame.
+    pub fn last(&self) -> i32 {
+        self.frames[self.frames.len() - 1]
+    }
+
+    /// Number of frames, at least 1.
+    pub fn count(&self) -> usize {
+        self.frames.len()
+    }
+
+    /// Whether a frame is among them.
+    pub fn contains(&self, frame: i32) -> bool {
+        self.frames.binary_search(&frame).is_ok()
+    }
+}
+
+impl From<Frames> for FrameChoice {
+    fn from(frames: Frames) -> Self {
+        Self { frames: frames.iter().collect() }
+    }
+}
+
+impl FromStr for FrameChoice {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<Self, String> {
+        let refused =
+            || format!("\"{text}\" is no choice of frames such as \"1-100\", \"1-100x2\" or \"1,5,9\"");
+        let mut frames = Vec::new();
+        for part in text.split(',') {
+            let (range, step) = match part.split_once('x') {
+                Some((range, step)) => (range, step.trim().parse().map_err(|_| refused())?),
+                None => (part, 1),
+            };
+            let range: Frames = range.trim().parse()?;
+            if step == 0 {
+                return Err(refused());
+            }
+            frames.extend(range.iter().step_by(step));
+        }
+        frames.sort_unstable();
+        frames.dedup();
+        Ok(Self { frames })
     }
 }
 
@@ -64,6 +126,17 @@ mod tests {
         assert_eq!(Frames { first: 1, last: 3 }.to_string(), "1-3");
         for wrong in ["", "-", "a-b", "3-1", "1-", "1-2-3", "1001-99999999999"] {
             assert!(wrong.parse::<Frames>().is_err(), "{wrong}");
+        }
+    }
+
+    #[test]
+    fn choices_have_steps_and_commas() {
+        let frames = |text: &str| text.parse::<FrameChoice>().unwrap().frames;
+        assert_eq!(frames("1-7x3"), [1, 4, 7]);
+        assert_eq!(frames("9, 1,5"), [1, 5, 9]);
+        assert_eq!(frames("1-3,2-4,-2--1"), [-2, -1, 1, 2, 3, 4]);
+        for wrong in ["", "1,", "1-9x0", "1-9x", "1-9x-2", "x2", "9-1x2"] {
+            assert!(wrong.parse::<FrameChoice>().is_err(), "{wrong}");
         }
     }
 }

@@ -46,7 +46,16 @@ impl Inputs {
             let motion = motion(scene, object)?;
             match object.role {
                 Role::Static => statics.push(posed(&*motion, start)?),
-                _ => bodies.push(Body::new(motion, start)?.with_noise(object.noise)),
+                _ => {
+                    let body = Body::new(motion, start)?.with_noise(object.noise);
+                    log::info!(
+                        "{}: {} triangles, {} open loops closed",
+                        object.file.display(),
+                        body.motion().triangles().len(),
+                        body.closed_loops()
+                    );
+                    bodies.push(body);
+                }
             }
         }
         Ok(Self { snow, statics, bodies })

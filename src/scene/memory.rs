@@ -6,6 +6,8 @@ use crate::vdb::file;
 
 /// Bytes for each column of cells: two surfaces, each across two leaves, and as much again for their copies.
 const BYTES_PER_COLUMN: f64 = 320.0;
+/// Bytes for each triangle that moves: its poses, and what it sweeps in a frame.
+const BYTES_PER_TRIANGLE: f64 = 2000.0;
 /// Bytes that every run takes.
 const FIXED: f64 = 64e6;
 
@@ -14,13 +16,18 @@ const FIXED: f64 = 64e6;
 /// # Errors
 /// When the layer's file cannot be read.
 pub fn estimate(scene: &Scene, inputs: &Inputs) -> Result<u64> {
-    if let Layer::Grid(path) = &scene.snow.layer {
-        let loaded: u64 = file::describe(path)?.iter().filter_map(|grid| grid.memory).sum();
-        return Ok((loaded as f64 * 2.0 + FIXED) as u64);
-    }
-    let [x0, z0, x1, z1] = inputs.area().unwrap_or_default();
-    let columns = ((x1 - x0) / scene.snow.cell + 8.0) * ((z1 - z0) / scene.snow.cell + 8.0);
-    Ok((columns * BYTES_PER_COLUMN + FIXED) as u64)
+    let triangles: usize = inputs.bodies.iter().map(|body| body.motion().triangles().len()).sum();
+    let layer = match (&scene.snow.layer, inputs.area()) {
+        (Layer::Grid(path), _) => {
+            2.0 * file::describe(path)?.iter().filter_map(|grid| grid.memory).sum::<u64>() as f64
+        }
+        (_, Some([x0, z0, x1, z1])) => {
+            let columns = ((x1 - x0) / scene.snow.cell + 8.0) * ((z1 - z0) / scene.snow.cell + 8.0);
+            columns * BYTES_PER_COLUMN
+        }
+        (_, None) => 0.0,
+    };
+    Ok((layer + triangles as f64 * BYTES_PER_TRIANGLE + FIXED) as u64)
 }
 
 /// Refuses a scene that would need more than it may.

@@ -1,6 +1,7 @@
 //! Scene files (TOML): what a shot is made of, read with every default filled in ([`Scene::read`]), checked
 //! against its inputs and run frame by frame ([`shot`]).
 
+mod changes;
 mod file;
 mod frames;
 mod inputs;
@@ -9,10 +10,11 @@ mod resolved;
 pub mod shot;
 mod table;
 
-pub use frames::Frames;
+pub use frames::{FrameChoice, Frames};
 pub use inputs::Inputs;
 pub use memory::{check as check_memory, estimate};
 
+use crate::snow::base_layer::NoiseParams;
 use std::path::PathBuf;
 
 /// A scene with every default filled in and every path absolute.
@@ -48,8 +50,8 @@ pub struct Snow {
     pub layer: Layer,
     /// Edge of a voxel (m), over 0, up to 10.
     pub cell: f64,
-    /// Raggedness of the edges.
-    pub noise: Noise,
+    /// Raggedness of the edges; an amplitude of 0 switches it off.
+    pub noise: NoiseParams,
 }
 
 /// What the snow lies on.
@@ -75,19 +77,6 @@ pub enum Layer {
     Top(PathBuf),
     /// A level set in a .vdb file: the whole layer.
     Grid(PathBuf),
-}
-
-/// Raggedness that moving objects leave at the edges of what they cut.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Noise {
-    /// Greatest displacement outward (m), 0 to 100 cells; 0 switches it off.
-    pub amplitude: f64,
-    /// Size of its largest features (m), 1 to 10,000 cells.
-    pub size: f64,
-    /// Octaves, 1 to 8, each of half the size and a quarter of the amplitude of the one before.
-    pub octaves: u32,
-    /// Seed.
-    pub seed: u32,
 }
 
 /// One object of the scene.

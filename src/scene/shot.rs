@@ -4,11 +4,12 @@ use std::path::{Path, PathBuf};
 
 use serde_json::json;
 
-use super::{Frames, Inputs, Scene};
-use crate::context::Context;
+use super::changes::changed_keys;
+use super::{FrameChoice, Inputs, Scene};
+use crate::context::{Context, StageTime};
 use crate::error::{Error, Result};
 use crate::io::atomic;
-use crate::snow::base_layer::{BaseLayer, NoiseParams, Params, StepReport};
+use crate::snow::base_layer::{BaseLayer, Params, StepReport};
 use crate::vdb::file::{WriteOptions, write};
 use crate::vdb::{FloatGrid, MetaValue};
 
@@ -19,11 +20,15 @@ use crate::vdb::{FloatGrid, MetaValue};
 pub fn prepare(scene: &Scene, folder: &Path) -> Result<()> {
     let resolved = scene.to_toml();
     let path = folder.join("scene.toml");
-    if std::fs::read_to_string(&path).is_ok_and(|text| text != resolved) {
-        return Err(Error::file(
-            path,
-            "the folder holds the output of other settings: choose another -o or remove it",
-        ));
+    if let Ok(before) = std::fs::read_to_string(&path) {
+        let changed = changed_keys(&before, &resolved);
+        if !changed.is_empty() {
+            let what = format!(
+                "the folder holds the output of other settings ({}): choose another -o or remove it",
+                changed.join(", ")
+            );
+            return Err(Error::file(path, what));
+        }
     }
     for name in ["", "base", "removed", "report"] {
         let folder = folder.join(name);
@@ -32,7 +37,7 @@ pub fn prepare(scene: &Scene, folder: &Path) -> Result<()> {
     atomic::write_bytes(&path, resolved.as_bytes())
 }
 
-/// Runs the frames up to `frames.last`, writes those in `frames`, and tells `done` after each.
+/// Runs the frames up to the last of `frames`, writes those in `frames`, and tells `done` after each.
 ///
 /// # Errors
 /// What a step or a file reports; whole frames are left behind.
@@ -41,30 +46,43 @@ pub fn run(
     scene: &Scene,
     inputs: &Inputs,
     folder: &Path,
-    frames: Frames,
+    frames: &FrameChoice,
     mut done: impl FnMut(i32, &StepReport),
 ) -> Result<()> {
-    let noise = scene.snow.noise;
-    let noise = (noise.amplitude > 0.0).then_some(NoiseParams {
-        amplitude: noise.amplitude,
-        size: noise.size,
-        octaves: noise.octaves,
-        seed: noise.seed as i32,
-    });
+    let noise = (scene.snow.noise.amplitude > 0.0).then_some(scene.snow.noise);
     let params = Params { noise, tolerance: 0.02 };
     let mut base = BaseLayer::new(ctx, inputs.layer(ctx, scene.snow.cell)?, params)?;
+    log::info!(
+        "snow: {} active voxels, {:.1} MB, {:.6} m3",
+        base.surface().active_voxels(),
+        base.surface().memory_bytes() as f64 / 1e6,
+        base.volume()
+    );
     let first = scene.shot.frames.first;
-    for frame in first..=frames.last {
+    for frame in first..=frames.last() {
         let time = |frame: i32| f64::from(frame) / scene.shot.fps;
         // The first frame's poses are cut out; nothing has moved yet.
         let from = if frame == first { frame } else { frame - 1 };
         let report = base.step(ctx, &inputs.bodies, time(from), time(frame), frame)?;
-        if frame >= frames.first {
+        log_step(frame, &report);
+        if frames.contains(frame) {
             write_frame(scene, &base, folder, frame, &report)?;
             done(frame, &report);
         }
     }
     Ok(())
+}
+
+fn log_step(frame: i32, report: &StepReport) {
+    let stage = |stage: &StageTime| format!("{} {:.1} ms", stage.name, stage.time.as_secs_f64() * 1e3);
+    let stages: Vec<String> = report.stages.iter().map(stage).collect();
+    log::info!(
+        "frame {frame}: {:.6} m3 removed, {} faces, {} blocks; {}",
+        report.removed_volume,
+        report.sweep_faces,
+        report.touched_blocks,
+        stages.join(", ")
+    );
 }
 
 /// The file of a frame: `base/base.0012.vdb`.

@@ -55,6 +55,11 @@ impl Body {
         Self { noise, ..self }
     }
 
+    /// Number of open loops (joined ones count once) that were closed.
+    pub fn closed_loops(&self) -> usize {
+        self.topology.derived.len()
+    }
+
     /// Whether its imprints have ragged edges.
     pub fn has_noise(&self) -> bool {
         self.noise

@@ -90,12 +90,13 @@ fn mesh_faces(voxel: f64, triangles: &[[u32; 3]], poses: &[&TriMesh]) -> Result<
 pub fn fill(ctx: &Context, faces: Vec<Face>, lattice: Lattice, half_width: f32) -> Result<FloatGrid> {
     let band = Band { inside: half_width, outside: half_width };
     let voxeliser = ctx.stage("winding", || {
-        Voxeliser::new(faces, lattice, band, ALL_VOXELS, |blocks| Ok(vec![true; blocks.len()]))
+        Voxeliser::new(ctx, faces, lattice, band, ALL_VOXELS, |blocks| Ok(vec![true; blocks.len()]))
     })?;
     let mut grid = FloatGrid::level_set(lattice.voxel, half_width)?;
     let blocks: Vec<usize> = (0..voxeliser.near_blocks().len()).collect();
     for batch in blocks.chunks(BATCH) {
-        let edits = ctx.stage("distance", || Ok(pieces(&voxeliser, batch, lattice.voxel, half_width)))?;
+        let edits =
+            ctx.stage("distance", || Ok(pieces(ctx, &voxeliser, batch, lattice.voxel, half_width)))?;
         grid.replace_blocks(ctx, &edits)?;
     }
     let background = half_width * lattice.voxel as f32;
@@ -108,10 +109,18 @@ pub fn fill(ctx: &Context, faces: Vec<Face>, lattice: Lattice, half_width: f32) 
     Ok(grid)
 }
 
-fn pieces(voxeliser: &Voxeliser, batch: &[usize], voxel: f64, half_width: f32) -> Vec<BlockEdit> {
+fn pieces(
+    ctx: &Context,
+    voxeliser: &Voxeliser,
+    batch: &[usize],
+    voxel: f64,
+    half_width: f32,
+) -> Vec<BlockEdit> {
     batch
         .par_iter()
-        .map_init(Scratch::default, |scratch, &index| voxeliser.piece(index, &ALL, scratch))
+        .map_init(Scratch::default, |scratch, &index| {
+            if ctx.is_cancelled() { None } else { voxeliser.piece(index, &ALL, scratch) }
+        })
         .filter_map(|piece| {
             Some(match piece? {
                 Piece::Inside(origin) => BlockEdit::Constant(origin, -half_width * voxel as f32),

@@ -14,6 +14,8 @@ use super::chain::Face;
 use super::lattice::{Fixed, UNITS};
 use super::region::{Region, extent};
 use super::winding::Lines;
+use crate::context::Context;
+use crate::error::Result;
 
 /// A triangle that bounds the volume.
 pub type Facet = [Fixed; 3];
@@ -45,17 +47,31 @@ struct Chain<'a> {
 }
 
 /// The surface of a chain in the marked blocks, where all faces there are given.
-pub fn surface(faces: &[Face], region: &Region, marked: &[bool], lines: &Lines) -> Vec<Facet> {
+///
+/// # Errors
+/// Cancel.
+pub fn surface(
+    ctx: &Context,
+    faces: &[Face],
+    region: &Region,
+    marked: &[bool],
+    lines: &Lines,
+) -> Result<Vec<Facet>> {
     let normals: Vec<Point> = faces.par_iter().map(normal).collect();
     let cells = Cells::new(faces, &normals, region, marked, lines);
+    ctx.check()?;
     let chain = Chain { faces, normals: &normals, cells, region };
-    let verdicts: Vec<u8> =
-        (0..faces.len()).into_par_iter().with_min_len(GRAIN).map(|id| chain.verdict(id)).collect();
+    let verdict = |id| if ctx.is_cancelled() { BURIED } else { chain.verdict(id) };
+    let verdicts: Vec<u8> = (0..faces.len()).into_par_iter().with_min_len(GRAIN).map(verdict).collect();
+    ctx.check()?;
     let (around, seen) = chain.neighbourhoods(&verdicts);
     let parts: Vec<Vec<Facet>> = seen
         .par_chunks(GRAIN)
         .enumerate()
         .map(|(chunk, seen)| {
+            if ctx.is_cancelled() {
+                return Vec::new();
+            }
             let mut out = Vec::with_capacity(seen.len());
             for (index, &seen) in seen.iter().enumerate() {
                 let id = chunk * GRAIN + index;
@@ -64,7 +80,8 @@ pub fn surface(faces: &[Face], region: &Region, marked: &[bool], lines: &Lines) 
             out
         })
         .collect();
-    parts.concat()
+    ctx.check()?;
+    Ok(parts.concat())
 }
 
 impl Chain<'_> {

@@ -12,6 +12,7 @@ use super::region::{Region, each_block, extent};
 use super::surface::{Facet, surface};
 use super::winding::Lines;
 use crate::base::blocks::{Mask, Origin, Values};
+use crate::context::Context;
 use crate::error::Result;
 
 /// How far distances are wanted on each side of the surface (cells).
@@ -79,8 +80,9 @@ impl Voxeliser {
     /// (from the lattice's base voxel). `wanted` says of blocks, by origin, whether distances are wanted.
     ///
     /// # Errors
-    /// When the box spans more than 2^28 blocks; those of `wanted`.
+    /// When the box spans more than 2^28 blocks; those of `wanted`; cancel.
     pub fn new(
+        ctx: &Context,
         mut faces: Vec<Face>,
         lattice: Lattice,
         band: Band,
@@ -100,12 +102,14 @@ impl Voxeliser {
             marked[region.index(*block)] = wanted;
         }
         let relevant = region.dilated(&marked, (reach / 8.0).ceil() as i32);
+        ctx.check()?;
         let lines = Lines::scan(&faces, &region);
+        ctx.check()?;
         retain(&mut faces, |face| {
             let (first, last) = region.touched(extent(&face.v), 0.0);
             each_block(first, last).any(|block| relevant[region.index(block)])
         });
-        let facets = surface(&faces, &region, &relevant, &lines);
+        let facets = surface(ctx, &faces, &region, &relevant, &lines)?;
         let mut voxeliser = Self {
             lattice,
             band,

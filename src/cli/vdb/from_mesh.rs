@@ -2,7 +2,7 @@
 
 use super::VdbOutput;
 use crate::cli::exit::{Failure, Phase};
-use crate::cli::options::{MemoryOption, MeshSpace, positive};
+use crate::cli::options::{MeshSpace, positive};
 use crate::cli::session::Session;
 use frazil::sweep::{self, Settings};
 use std::path::PathBuf;
@@ -22,8 +22,6 @@ pub struct Args {
     #[command(flatten)]
     space: MeshSpace,
     #[command(flatten)]
-    memory: MemoryOption,
-    #[command(flatten)]
     output: VdbOutput,
 }
 
@@ -33,7 +31,7 @@ pub fn run(args: &Args, session: &Session) -> Result<(), Failure> {
     settings.validate().before()?;
     args.output.check()?;
     let mesh = args.space.read(&args.mesh).before()?;
-    args.memory.check_surface(mesh.area(), args.cell).before()?;
+    session.check_surface(mesh.area(), args.cell).before()?;
     let grid = sweep::voxelise(&session.ctx, &mesh, &settings).during()?;
     args.output.write(session, grid).during()
 }

@@ -2,7 +2,7 @@
 
 use super::VdbOutput;
 use crate::cli::exit::{Failure, Phase};
-use crate::cli::options::{MemoryOption, MeshSpace, positive, triple};
+use crate::cli::options::{MeshSpace, positive, triple};
 use crate::cli::session::Session;
 use frazil::base::{DVec3, TriMesh};
 use frazil::io::sequence::Pattern;
@@ -56,8 +56,6 @@ pub struct Args {
     #[command(flatten)]
     space: MeshSpace,
     #[command(flatten)]
-    memory: MemoryOption,
-    #[command(flatten)]
     output: VdbOutput,
 }
 
@@ -88,7 +86,7 @@ pub fn run(args: &Args, session: &Session) -> Result<(), Failure> {
                 let [first, second] = [&args.mesh[0], &args.mesh[1]].map(|path| path.display());
                 return Err(Failure::refused(format!("{second}: has other triangles than {first}")));
             }
-            args.check_memory(&from)?;
+            args.check_memory(session, [&from, &to])?;
             sweep::chain_meshes(&session.ctx, &from, &to, &settings).during()?
         }
         _ => args.sweep_one(session, &settings)?,
@@ -109,17 +107,24 @@ impl Args {
         }
     }
 
-    fn check_memory(&self, mesh: &TriMesh) -> Result<(), Failure> {
-        // A sweep has at most some times the surface of what is swept.
-        self.memory.check_surface(2.0 * mesh.area(), self.cell).before()
+    /// Refuses a sweep between two poses that would need too much memory.
+    fn check_memory(&self, session: &Session, [from, to]: [&TriMesh; 2]) -> Result<(), Failure> {
+        let path = from.positions.iter().zip(&to.positions).map(|(p, q)| (q - p).norm()).fold(0.0, f32::max);
+        let round = from.bounds().map_or(0.0, |(low, high)| 4.0 * (high - low).norm());
+        // Of the surface at both ends, and of what its outline sweeps on the way.
+        let area = from.area() + to.area() + f64::from(round * path);
+        session.check_surface(area, self.cell).before()
     }
 
     fn sweep_one(&self, session: &Session, settings: &Settings) -> Result<FloatGrid, Failure> {
         let (motion, from, to) = self.motion()?;
-        let mut pose = Vec::new();
-        motion.pose(from, &mut pose).before()?;
-        let positions = pose.iter().map(|at| at.cast()).collect();
-        self.check_memory(&TriMesh { positions, triangles: motion.triangles().to_vec() })?;
+        let posed = |time: f64| -> frazil::Result<TriMesh> {
+            let mut pose = Vec::new();
+            motion.pose(time, &mut pose)?;
+            let positions = pose.iter().map(|at| at.cast()).collect();
+            Ok(TriMesh { positions, triangles: motion.triangles().to_vec() })
+        };
+        self.check_memory(session, [&posed(from).before()?, &posed(to).before()?])?;
         let bodies = [Body::new(motion, from).before()?];
         match self.method {
             Method::Chain => sweep::chain(&session.ctx, &bodies, from, to, settings).during(),

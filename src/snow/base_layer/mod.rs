@@ -177,7 +177,7 @@ impl BaseLayer {
         if bodies.is_empty() {
             return Ok((Vec::new(), 0));
         }
-        let voxeliser = ctx.stage("sweep", || self.voxeliser(bodies, from, to, noise))?;
+        let voxeliser = ctx.stage("sweep", || self.voxeliser(ctx, bodies, from, to, noise))?;
         let mut pieces = ctx.stage("distance", || self.pieces(ctx, &voxeliser, noise.is_some()))?;
         if let Some(noise) = noise {
             ctx.stage("noise", || {
@@ -191,6 +191,7 @@ impl BaseLayer {
     /// The swept volume's boundary near the snow, sorted into blocks.
     fn voxeliser(
         &self,
+        ctx: &Context,
         bodies: &[&Body],
         from: f64,
         to: f64,
@@ -208,12 +209,16 @@ impl BaseLayer {
             Window { min: fixed(relative(self.low, -margin)), max: fixed(relative(self.high, margin)) };
         let parts: Vec<Vec<Face>> = bodies
             .iter()
-            .map(|body| body.chain(from, to, &lattice, self.params.tolerance, &window))
+            .map(|body| {
+                ctx.check()?;
+                body.chain(from, to, &lattice, self.params.tolerance, &window)
+            })
             .collect::<Result<_>>()?;
         let band = Band { inside: self.half_width, outside };
         let snowy =
             |origins: &[Origin]| Ok(self.surface.probe(origins)?.iter().map(edit::has_snow).collect());
-        Voxeliser::new(parts.concat(), lattice, band, [relative(self.low, 0), relative(self.high, 0)], snowy)
+        let bounds = [relative(self.low, 0), relative(self.high, 0)];
+        Voxeliser::new(ctx, parts.concat(), lattice, band, bounds, snowy)
     }
 
     /// Distances where there is snow.

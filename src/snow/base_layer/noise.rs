@@ -5,6 +5,7 @@
 //! as long as the noise is less steep, whatever it removes hangs together with the sweep: no islands.
 
 use std::collections::HashMap;
+use std::ops::RangeInclusive;
 
 use fastnoise_lite::{FastNoiseLite, FractalType, NoiseType};
 use rayon::prelude::*;
@@ -43,39 +44,44 @@ impl NoiseParams {
     /// # Errors
     /// Names the field and its range; refuses noise so steep that it would leave islands.
     pub fn validate(&self, cell: f64) -> Result<()> {
-        if !(0.0..=32.0 * cell).contains(&self.amplitude) {
-            return Err(Error::argument(format!(
-                "noise amplitude = {} m is not within 0 to {} m (32 cells)",
-                self.amplitude,
-                32.0 * cell
-            )));
-        }
-        if !(self.size >= 2.0 * cell && self.size.is_finite()) {
-            return Err(Error::argument(format!(
-                "noise size = {} m is below {} m (two cells)",
-                self.size,
-                2.0 * cell
-            )));
-        }
+        let within = |name: &str, value: f64, range: RangeInclusive<f64>| {
+            let (low, high) = (*range.start(), *range.end());
+            if range.contains(&value) {
+                return Ok(());
+            }
+            Err(Error::argument(format!("noise {name} = {value} m is not within {low} to {high} m")))
+        };
+        within("amplitude", self.amplitude, Self::amplitudes(cell))?;
+        within("size", self.size, Self::sizes(cell))?;
         if !(1..=8).contains(&self.octaves) {
             return Err(Error::argument(format!("noise octaves = {} is not within 1 to 8", self.octaves)));
         }
-        let slope = self.slope();
-        if slope >= 1.0 {
+        let most = self.steepest();
+        if self.amplitude > most {
             return Err(Error::argument(format!(
-                "noise amplitude = {} m is too steep for size = {} m and would leave islands: at most {:.4} m",
-                self.amplitude,
-                self.size,
-                self.amplitude / slope
+                "noise amplitude = {} m is too steep for size = {} m and would leave islands: at most {most:.4} m",
+                self.amplitude, self.size
             )));
         }
         Ok(())
     }
 
-    /// Upper bound of the displacement's slope: octave o has strength 4^-o and slope 2^-o, of a sum scaled to 1.
-    fn slope(&self) -> f64 {
+    /// Amplitudes (m) that make sense for a cell size (m).
+    pub fn amplitudes(cell: f64) -> RangeInclusive<f64> {
+        0.0..=32.0 * cell
+    }
+
+    /// Sizes (m) that make sense for a cell size (m): below two cells the grid cannot hold the noise.
+    pub fn sizes(cell: f64) -> RangeInclusive<f64> {
+        2.0 * cell..=10_000.0 * cell
+    }
+
+    /// The greatest amplitude (m) that leaves no islands at this size: the displacement's slope stays below 1.
+    ///
+    /// Octave o has strength 4^-o and slope 2^-o, of a sum scaled to 1.
+    pub fn steepest(&self) -> f64 {
         let sum = |ratio: f64| (0..self.octaves).map(|octave| ratio.powi(octave as i32)).sum::<f64>();
-        STEEPEST * sum(0.5) / sum(0.25) * self.amplitude / self.size
+        self.size * sum(0.25) / (STEEPEST * sum(0.5))
     }
 }
 
