@@ -72,6 +72,24 @@ fn obj_takes_seams_negative_indices_polygons_and_crlf() {
 }
 
 #[test]
+fn a_concave_face_becomes_triangles_inside_it() {
+    let arrow = "v 0 0 0\nv 2 1 0\nv 0 2 0\nv 1 1 0\n";
+    for face in ["1 2 3 4", "2 3 4 1", "3 4 1 2", "4 1 2 3"] {
+        let mesh = read("arrow.obj", format!("{arrow}f {face}\n").as_bytes()).unwrap();
+        assert!((mesh.area() - 1.0).abs() < 1e-6, "{face}: {}", mesh.area());
+    }
+    let body = b"0 0 0\n2 1 0\n0 2 0\n1 1 0\n4 0 1 2 3\n";
+    let mesh = read("arrow.ply", &ply("ascii", &XYZ.replace("vertex 3", "vertex 4"), body)).unwrap();
+    assert!((mesh.area() - 1.0).abs() < 1e-6, "{}", mesh.area());
+}
+
+#[test]
+fn a_ply_word_that_is_no_number_is_told() {
+    let what = refusal("word.ply", &ply("ascii", XYZ, b"0 0 0\n1 zero 0\n0 1 0\n3 0 1 2\n"));
+    assert!(what.contains("vertex 2 of 3") && what.contains("\"zero\" is no number"), "{what}");
+}
+
+#[test]
 fn an_obj_face_may_end_in_a_comment() {
     let text = "v 0 0 0\nv 1 0 0 # right\nv 0 1 0\nf 1 2 3 # front\n";
     assert_eq!(read("noted.obj", text.as_bytes()).unwrap().triangles.len(), 1);

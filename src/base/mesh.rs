@@ -18,22 +18,7 @@ impl TriMesh {
     /// # Errors
     /// Names the first vertex or triangle at fault, counted from 1.
     pub fn validate(&self) -> Result<()> {
-        if self.triangles.is_empty() {
-            return Err(Error::argument("the mesh has no faces"));
-        }
-        let finite = |p: &Vec3| p.iter().all(|value| value.is_finite());
-        if let Some(vertex) = self.positions.iter().position(|p| !finite(p)) {
-            return Err(Error::argument(format!("vertex {} is not finite", vertex + 1)));
-        }
-        let count = self.positions.len();
-        let wild = |triangle: &[u32; 3]| triangle.iter().any(|&index| index as usize >= count);
-        if let Some(triangle) = self.triangles.iter().position(wild) {
-            return Err(Error::argument(format!(
-                "face {} names a vertex beyond the {count} there are",
-                triangle + 1
-            )));
-        }
-        Ok(())
+        validate(&self.positions, self.triangles.iter().map(|triangle| triangle.as_slice()))
     }
 
     /// Corners of a triangle in 64 bits.
@@ -106,6 +91,25 @@ impl TriMesh {
         self.positions.extend_from_slice(&other.positions);
         self.triangles.extend(other.triangles.iter().map(|triangle| triangle.map(|index| index + first)));
     }
+}
+
+/// Checks the vertices and faces of a mesh.
+pub(super) fn validate<'a>(positions: &[Vec3], faces: impl Iterator<Item = &'a [u32]>) -> Result<()> {
+    let mut faces = faces.peekable();
+    if faces.peek().is_none() {
+        return Err(Error::argument("the mesh has no faces"));
+    }
+    let finite = |p: &Vec3| p.iter().all(|value| value.is_finite());
+    if let Some(vertex) = positions.iter().position(|p| !finite(p)) {
+        return Err(Error::argument(format!("vertex {} is not finite", vertex + 1)));
+    }
+    let count = positions.len();
+    let wild = |face: &[u32]| face.iter().any(|&index| index as usize >= count);
+    if let Some(face) = faces.position(wild) {
+        let what = format!("face {} names a vertex beyond the {count} there are", face + 1);
+        return Err(Error::argument(what));
+    }
+    Ok(())
 }
 
 #[cfg(test)]

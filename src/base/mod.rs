@@ -4,6 +4,7 @@ pub mod blocks;
 pub mod bvh;
 pub mod cpu;
 pub mod mesh;
+pub mod polygons;
 
 /// A point, direction or velocity in 32 bits: fields and mesh vertices (m, m/s).
 pub type Vec3 = nalgebra::Vector3<f32>;
@@ -11,3 +12,4 @@ pub type Vec3 = nalgebra::Vector3<f32>;
 pub type DVec3 = nalgebra::Vector3<f64>;
 
 pub use mesh::TriMesh;
+pub use polygons::PolygonMesh;

@@ -2,7 +2,7 @@
 
 use super::machine;
 use frazil::Result;
-use frazil::base::{DVec3, TriMesh};
+use frazil::base::{DVec3, PolygonMesh, TriMesh};
 use frazil::render::Size;
 use std::path::Path;
 use std::str::FromStr;
@@ -71,7 +71,12 @@ pub enum Axis {
 impl MeshSpace {
     /// Reads a mesh into metres, Y up.
     pub fn read(&self, path: &Path) -> Result<TriMesh> {
-        let mut mesh = frazil::io::mesh::read(path)?;
+        self.read_polygons(path).map(PolygonMesh::into_triangles)
+    }
+
+    /// As [`MeshSpace::read`], with the file's polygons.
+    pub fn read_polygons(&self, path: &Path) -> Result<PolygonMesh> {
+        let mut mesh = frazil::io::mesh::read_polygons(path)?;
         for position in &mut mesh.positions {
             let scaled = position.cast::<f64>() * self.scale;
             let turned = match self.up {

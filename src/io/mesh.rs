@@ -3,14 +3,22 @@
 use std::path::Path;
 
 use super::{atomic, obj, ply};
-use crate::base::TriMesh;
+use crate::base::{PolygonMesh, TriMesh};
 use crate::error::{Error, Result};
 
-/// Reads a mesh; polygons become triangle fans.
+/// Reads a mesh in triangles.
 ///
 /// # Errors
 /// A missing, empty, cut or malformed file; no faces; vertices that are not finite; indices out of range.
 pub fn read(path: &Path) -> Result<TriMesh> {
+    read_polygons(path).map(PolygonMesh::into_triangles)
+}
+
+/// Reads a mesh with its polygons: two meshes with the same polygons then get the same triangles.
+///
+/// # Errors
+/// As [`read`].
+pub fn read_polygons(path: &Path) -> Result<PolygonMesh> {
     let bytes = std::fs::read(path).map_err(|error| Error::io(path, "read", error))?;
     if bytes.is_empty() {
         return Err(Error::file(path, "the file is empty"));

@@ -2,28 +2,26 @@
 
 use std::io::Write;
 
-use crate::base::{TriMesh, Vec3};
+use crate::base::{PolygonMesh, TriMesh, Vec3};
 
-/// Reads positions and faces, polygons as fans.
-pub(super) fn parse(bytes: &[u8]) -> Result<TriMesh, String> {
+/// Reads positions and faces.
+pub(super) fn parse(bytes: &[u8]) -> Result<PolygonMesh, String> {
     check_numbers(bytes)?;
-    let options = tobj::LoadOptions {
-        triangulate: true,
-        ignore_points: true,
-        ignore_lines: true,
-        ..Default::default()
-    };
+    let options = tobj::LoadOptions { ignore_points: true, ignore_lines: true, ..Default::default() };
     let geometry = geometry(bytes);
     let mut reader = std::io::BufReader::new(geometry.as_slice());
     let no_materials = |_: &std::path::Path| Ok((Vec::new(), Default::default()));
     let (models, _) = tobj::load_obj_buf(&mut reader, &options, no_materials)
         .map_err(|error| format!("the .obj file cannot be read ({error})"))?;
-    let mut mesh = TriMesh::default();
-    for model in models {
-        mesh.append(&TriMesh {
-            positions: model.mesh.positions.chunks_exact(3).map(|p| Vec3::new(p[0], p[1], p[2])).collect(),
-            triangles: model.mesh.indices.chunks_exact(3).map(|t| [t[0], t[1], t[2]]).collect(),
-        });
+    let mut mesh = PolygonMesh::default();
+    for tobj::Model { mesh: part, .. } in models {
+        let first = mesh.positions.len() as u32;
+        mesh.positions.extend(part.positions.chunks_exact(3).map(|p| Vec3::new(p[0], p[1], p[2])));
+        let mut corners = part.indices.into_iter().map(|index| first + index);
+        // Without a list of sizes all faces are triangles.
+        let triangles = corners.len() / 3;
+        let sizes = if part.face_arities.is_empty() { vec![3; triangles] } else { part.face_arities };
+        sizes.into_iter().for_each(|size| mesh.push(corners.by_ref().take(size as usize)));
     }
     Ok(mesh)
 }

@@ -2,7 +2,7 @@
 
 use std::io::Write;
 
-use crate::base::{TriMesh, Vec3};
+use crate::base::{PolygonMesh, TriMesh, Vec3};
 
 #[derive(Clone, Copy, PartialEq)]
 enum Format {
@@ -32,7 +32,7 @@ struct Element {
 }
 
 /// Reads the vertices and faces of a PLY file.
-pub(super) fn parse(bytes: &[u8]) -> Result<TriMesh, String> {
+pub(super) fn parse(bytes: &[u8]) -> Result<PolygonMesh, String> {
     let end = find(bytes, b"end_header").ok_or("not a .ply file, or its header is cut short")?;
     let body =
         end + bytes[end..].iter().position(|&byte| byte == b'\n').ok_or("the .ply header is cut short")? + 1;
@@ -40,11 +40,15 @@ pub(super) fn parse(bytes: &[u8]) -> Result<TriMesh, String> {
     let (format, elements) = parse_header(header)?;
     check_coordinates(&elements)?;
     let mut reader = Reader { format, bytes: &bytes[body..], at: 0 };
-    let mut mesh = TriMesh::default();
+    let mut mesh = PolygonMesh::default();
     for element in &elements {
         for row in 0..element.count {
-            let cut = || format!("the .ply file ends in {} {} of {}", element.name, row + 1, element.count);
-            read_row(&mut reader, element, &mut mesh).ok_or_else(cut)?;
+            let place = format_args!("{} {} of {}", element.name, row + 1, element.count);
+            read_row(&mut reader, element, &mut mesh).map_err(|fault| match fault {
+                Fault::End => format!("the .ply file ends in {place}"),
+                Fault::Text(text) => format!("{place}: \"{text}\" is no number"),
+                Fault::Count(count) => format!("{place} cannot have {count} entries"),
+            })?;
         }
     }
     Ok(mesh)
@@ -121,17 +125,25 @@ struct Reader<'a> {
     at: usize,
 }
 
+/// Why a row cannot be read.
+enum Fault {
+    End,
+    Text(String),
+    Count(f64),
+}
+
 impl Reader<'_> {
-    fn number(&mut self, kind: Kind) -> Option<f64> {
+    fn number(&mut self, kind: Kind) -> Result<f64, Fault> {
         if self.format == Format::Ascii {
             let rest = &self.bytes[self.at..];
-            let start = rest.iter().position(|byte| !byte.is_ascii_whitespace())?;
+            let start = rest.iter().position(|byte| !byte.is_ascii_whitespace()).ok_or(Fault::End)?;
             let length = rest[start..].iter().position(u8::is_ascii_whitespace).unwrap_or(rest.len() - start);
             self.at += start + length;
-            return std::str::from_utf8(&rest[start..start + length]).ok()?.parse().ok();
+            let text = String::from_utf8_lossy(&rest[start..start + length]);
+            return text.parse().map_err(|_| Fault::Text(text.chars().take(40).collect()));
         }
         let (Kind::Int(size) | Kind::Unsigned(size) | Kind::Float(size)) = kind;
-        let raw = self.bytes.get(self.at..self.at + size)?;
+        let raw = self.bytes.get(self.at..self.at + size).ok_or(Fault::End)?;
         self.at += size;
         let mut wide = [0u8; 8];
         wide[..size].copy_from_slice(raw);
@@ -140,7 +152,7 @@ impl Reader<'_> {
         }
         let bits = u64::from_le_bytes(wide);
         let unused = 64 - 8 * size as u32;
-        Some(match kind {
+        Ok(match kind {
             Kind::Unsigned(_) => bits as f64,
             Kind::Int(_) => ((bits << unused) as i64 >> unused) as f64,
             Kind::Float(4) => f64::from(f32::from_bits(bits as u32)),
@@ -149,8 +161,8 @@ impl Reader<'_> {
     }
 }
 
-/// Reads one row of an element; none when the file ends in it.
-fn read_row(reader: &mut Reader<'_>, element: &Element, mesh: &mut TriMesh) -> Option<()> {
+/// Reads one row of an element.
+fn read_row(reader: &mut Reader<'_>, element: &Element, mesh: &mut PolygonMesh) -> Result<(), Fault> {
     let mut position = [0.0f64; 3];
     for property in &element.properties {
         match property.list {
@@ -164,13 +176,15 @@ fn read_row(reader: &mut Reader<'_>, element: &Element, mesh: &mut TriMesh) -> O
                 let count = reader.number(count)?;
                 // A damaged count must not ask for memory beyond the file.
                 if !(0.0..=reader.bytes.len() as f64).contains(&count) {
-                    return None;
+                    return Err(Fault::Count(count));
                 }
                 let values = (0..count as usize)
                     .map(|_| reader.number(property.kind))
-                    .collect::<Option<Vec<f64>>>()?;
+                    .collect::<Result<Vec<f64>, Fault>>()?;
                 match (element.name.as_str(), property.name.as_str()) {
-                    ("face", "vertex_indices" | "vertex_index") => add_polygon(&values, mesh),
+                    ("face", "vertex_indices" | "vertex_index") => {
+                        mesh.push(values.into_iter().map(index));
+                    }
                     ("tristrips", _) => add_strips(&values, mesh),
                     _ => {}
                 }
@@ -180,7 +194,7 @@ fn read_row(reader: &mut Reader<'_>, element: &Element, mesh: &mut TriMesh) -> O
     if element.name == "vertex" {
         mesh.positions.push(Vec3::from(position.map(|value| value as f32)));
     }
-    Some(())
+    Ok(())
 }
 
 /// Indices that are no whole number from 0 become one that validation refuses.
@@ -188,18 +202,12 @@ fn index(value: f64) -> u32 {
     if (0.0..f64::from(u32::MAX)).contains(&value) && value.fract() == 0.0 { value as u32 } else { u32::MAX }
 }
 
-fn add_polygon(values: &[f64], mesh: &mut TriMesh) {
-    for pair in values.windows(2).skip(1) {
-        mesh.triangles.push([index(values[0]), index(pair[0]), index(pair[1])]);
-    }
-}
-
 /// Strips end at -1; every other triangle is turned round.
-fn add_strips(values: &[f64], mesh: &mut TriMesh) {
+fn add_strips(values: &[f64], mesh: &mut PolygonMesh) {
     for strip in values.split(|&value| value < 0.0) {
         for (number, three) in strip.windows(3).enumerate() {
             let [a, b, c] = [index(three[0]), index(three[1]), index(three[2])];
-            mesh.triangles.push(if number % 2 == 0 { [a, b, c] } else { [b, a, c] });
+            mesh.push(if number % 2 == 0 { [a, b, c] } else { [b, a, c] });
         }
     }
 }
@@ -239,7 +247,7 @@ mod tests {
         };
         let mut bytes = Vec::new();
         write(&mut bytes, &mesh).unwrap();
-        assert_eq!(parse(&bytes).unwrap(), mesh);
+        assert_eq!(parse(&bytes).unwrap().into_triangles(), mesh);
         for length in 0..bytes.len() {
             assert!(parse(&bytes[..length]).is_err(), "{length} of {} bytes were accepted", bytes.len());
         }
@@ -251,6 +259,6 @@ mod tests {
                     element face 1\nproperty list uchar int vertex_indices\nelement tristrips 1\n\
                     property list int int vertex_indices\nend_header\n0 0 0\n1 0 0\n1 1 0\n0 1 0\n4 0 1 2 3\n5 0 1 2 3 -1\n";
         let mesh = parse(text.as_bytes()).unwrap();
-        assert_eq!(mesh.triangles, [[0, 1, 2], [0, 2, 3], [0, 1, 2], [2, 1, 3]]);
+        assert_eq!(mesh.triangles(), [[0, 1, 2], [0, 2, 3], [0, 1, 2], [2, 1, 3]]);
     }
 }

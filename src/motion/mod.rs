@@ -23,6 +23,19 @@ pub trait Motion: Send + Sync {
     /// What a file read on demand reports.
     fn pose(&self, time: f64, out: &mut Vec<DVec3>) -> Result<()>;
 
+    /// Writes the vertices' mean velocities (m/s) from `time` to `time + step` (s) into `out` (cleared first):
+    /// what carries each vertex from one pose to the other. `step` may be negative, not 0.
+    ///
+    /// # Errors
+    /// As [`Motion::pose`].
+    fn velocities(&self, time: f64, step: f64, out: &mut Vec<DVec3>) -> Result<()> {
+        let mut before = Vec::new();
+        self.pose(time, &mut before)?;
+        self.pose(time + step, out)?;
+        out.iter_mut().zip(&before).for_each(|(after, before)| *after = (*after - before) / step);
+        Ok(())
+    }
+
     /// Times inside (from, to) where the motion has a kink: keys, frames of a sequence. Ascending.
     fn breaks(&self, from: f64, to: f64) -> Vec<f64>;
 }

@@ -136,6 +136,7 @@ impl Motion for Placed {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::base::Vec3;
 
     #[test]
     fn turns_are_about_x_then_y_then_z() {
@@ -144,6 +145,18 @@ mod tests {
         let (rotation, at) = keys.at(5.0);
         // z goes to x about y, then to y about z.
         assert!((rotation * DVec3::z() + at - DVec3::new(1.0, 1.0, 0.0)).norm() < 1e-12);
+    }
+
+    #[test]
+    fn a_wheel_that_rolls_does_not_slip_where_it_touches() {
+        let wheel =
+            TriMesh { positions: vec![-Vec3::y(), Vec3::zeros(), Vec3::y()], triangles: vec![[0, 1, 2]] };
+        let key = |time: f64| Key { time, at: DVec3::z() * time, turn: DVec3::x() * time };
+        let wheel = Rigid::new(wheel, Keys::new(vec![key(-1.0), key(1.0)]).unwrap());
+        let mut velocity = Vec::new();
+        wheel.velocities(-0.5e-3, 1e-3, &mut velocity).unwrap();
+        let expected = [DVec3::zeros(), DVec3::z(), DVec3::z() * 2.0];
+        velocity.iter().zip(expected).for_each(|(v, e)| assert!((v - e).norm() < 1e-6, "{v} is not {e}"));
     }
 
     #[test]

@@ -4,7 +4,7 @@ use std::path::PathBuf;
 use std::sync::{Arc, Mutex};
 
 use super::Motion;
-use crate::base::{DVec3, TriMesh};
+use crate::base::{DVec3, PolygonMesh, Vec3};
 use crate::error::{Error, Result};
 use crate::io::mesh;
 use crate::io::sequence::Pattern;
@@ -12,7 +12,7 @@ use crate::io::sequence::Pattern;
 /// Frames kept in memory: the two around the time that is asked for.
 const KEPT: usize = 2;
 
-/// A sequence of mesh files with the same triangles, read when they are needed.
+/// A sequence of mesh files with the same faces, read when they are needed.
 pub struct MeshSequence {
     pattern: Pattern,
     first: i32,
@@ -20,10 +20,11 @@ pub struct MeshSequence {
     fps: f64,
     /// Shot frame = file frame + offset.
     offset: f64,
+    /// Polygons of the first frame, and their triangles: those of all frames.
+    polygons: PolygonMesh,
     triangles: Vec<[u32; 3]>,
-    vertices: usize,
     first_path: PathBuf,
-    kept: Mutex<Vec<(i32, Arc<TriMesh>)>>,
+    kept: Mutex<Vec<(i32, Arc<Vec<Vec3>>)>>,
 }
 
 impl MeshSequence {
@@ -36,38 +37,38 @@ impl MeshSequence {
             return Err(Error::file(missing, "the frame is missing from the sequence"));
         }
         let first_path = pattern.path(first);
-        let start = mesh::read(&first_path)?;
-        let (triangles, vertices) = (start.triangles.clone(), start.positions.len());
-        let kept = Mutex::new(vec![(first, Arc::new(start))]);
-        Ok(Self { pattern, first, last, fps, offset, triangles, vertices, first_path, kept })
+        let polygons = mesh::read_polygons(&first_path)?;
+        let triangles = polygons.triangles();
+        let kept = Mutex::new(vec![(first, Arc::new(polygons.positions.clone()))]);
+        Ok(Self { pattern, first, last, fps, offset, polygons, triangles, first_path, kept })
     }
 
-    fn frame(&self, frame: i32) -> Result<Arc<TriMesh>> {
+    fn frame(&self, frame: i32) -> Result<Arc<Vec<Vec3>>> {
         let mut kept = self.kept.lock().expect("nobody panics with this lock");
-        if let Some((_, mesh)) = kept.iter().find(|(number, _)| *number == frame) {
-            return Ok(mesh.clone());
+        if let Some((_, positions)) = kept.iter().find(|(number, _)| *number == frame) {
+            return Ok(positions.clone());
         }
         let path = self.pattern.path(frame);
-        let mesh = mesh::read(&path)?;
-        if mesh.positions.len() != self.vertices || mesh.triangles != self.triangles {
+        let mesh = mesh::read_polygons(&path)?;
+        if !mesh.has_faces_of(&self.polygons) {
             return Err(Error::file(
                 path,
                 format!(
-                    "has {} vertices and {} triangles, not those of {} ({} and {}): a sequence must keep its triangles",
+                    "has {} vertices and {} faces, not those of {} ({} and {}): a sequence must keep its faces",
                     mesh.positions.len(),
-                    mesh.triangles.len(),
+                    mesh.ends.len(),
                     self.first_path.display(),
-                    self.vertices,
-                    self.triangles.len()
+                    self.polygons.positions.len(),
+                    self.polygons.ends.len()
                 ),
             ));
         }
-        let mesh = Arc::new(mesh);
-        kept.push((frame, mesh.clone()));
+        let positions = Arc::new(mesh.positions);
+        kept.push((frame, positions.clone()));
         if kept.len() > KEPT {
             kept.remove(0);
         }
-        Ok(mesh)
+        Ok(positions)
     }
 }
 
@@ -77,7 +78,7 @@ impl Motion for MeshSequence {
     }
 
     fn vertex_count(&self) -> usize {
-        self.vertices
+        self.polygons.positions.len()
     }
 
     fn pose(&self, time: f64, out: &mut Vec<DVec3>) -> Result<()> {
@@ -88,10 +89,10 @@ impl Motion for MeshSequence {
         let a = self.frame(below)?;
         out.clear();
         if part == 0.0 {
-            out.extend(a.positions.iter().map(|p| p.cast::<f64>()));
+            out.extend(a.iter().map(|p| p.cast::<f64>()));
         } else {
             let b = self.frame(below + 1)?;
-            let between = a.positions.iter().zip(&b.positions);
+            let between = a.iter().zip(b.iter());
             out.extend(between.map(|(p, q)| p.cast::<f64>().lerp(&q.cast(), part)));
         }
         Ok(())

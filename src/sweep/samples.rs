@@ -29,6 +29,16 @@ impl SamplesSettings {
     pub fn new(voxel: f64) -> Self {
         Self { voxel, half_width: 3.0, samples: 8, dilate: 1.0, smooth: 1, scheme: level_set::Scheme::Weno5 }
     }
+
+    /// One step a frame (Fig. 3.3a): the poses at both ends and nothing between.
+    pub fn one_step(voxel: f64) -> Self {
+        Self::sub_steps(voxel, 1)
+    }
+
+    /// Many sub-steps a frame (Fig. 3.3b): their poses as they are, dents included.
+    pub fn sub_steps(voxel: f64, steps: u32) -> Self {
+        Self { samples: steps, dilate: 0.0, smooth: 0, ..Self::new(voxel) }
+    }
 }
 
 /// Level set of the union of sampled poses, dilated and smoothed.

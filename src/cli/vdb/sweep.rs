@@ -81,11 +81,14 @@ pub fn run(args: &Args, session: &Session) -> Result<(), Failure> {
             if args.method == Method::Samples {
                 return Err(Failure::refused("--method samples needs a sequence or one mesh, not two"));
             }
-            let (from, to) = (args.space.read(from).before()?, args.space.read(to).before()?);
-            if from.triangles != to.triangles {
-                let [first, second] = [&args.mesh[0], &args.mesh[1]].map(|path| path.display());
-                return Err(Failure::refused(format!("{second}: has other triangles than {first}")));
+            let [first, second] = [from, to].map(|path| args.space.read_polygons(path));
+            let (first, second) = (first.before()?, second.before()?);
+            if !first.has_faces_of(&second) {
+                let (from, to) = (from.display(), to.display());
+                return Err(Failure::refused(format!("{to}: has other faces than {from}")));
             }
+            let to = TriMesh { triangles: first.triangles(), positions: second.positions };
+            let from = first.into_triangles();
             args.check_memory(session, [&from, &to])?;
             sweep::chain_meshes(&session.ctx, &from, &to, &settings).during()?
         }
