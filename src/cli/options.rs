@@ -2,7 +2,8 @@
 
 use super::machine;
 use frazil::Result;
-use frazil::base::{DVec3, PolygonMesh, TriMesh};
+use frazil::base::{DVec3, TriMesh};
+use frazil::motion::{Space, Up};
 use frazil::render::Size;
 use std::path::Path;
 use std::str::FromStr;
@@ -69,22 +70,20 @@ pub enum Axis {
 }
 
 impl MeshSpace {
-    /// Reads a mesh into metres, Y up.
-    pub fn read(&self, path: &Path) -> Result<TriMesh> {
-        self.read_polygons(path).map(PolygonMesh::into_triangles)
+    /// As the library wants it.
+    pub fn space(&self) -> Space {
+        let up = match self.up {
+            Axis::Y => Up::Y,
+            Axis::Z => Up::Z,
+        };
+        Space { scale: self.scale, up }
     }
 
-    /// As [`MeshSpace::read`], with the file's polygons.
-    pub fn read_polygons(&self, path: &Path) -> Result<PolygonMesh> {
-        let mut mesh = frazil::io::mesh::read_polygons(path)?;
-        for position in &mut mesh.positions {
-            let scaled = position.cast::<f64>() * self.scale;
-            let turned = match self.up {
-                Axis::Y => scaled,
-                Axis::Z => DVec3::new(scaled.x, scaled.z, -scaled.y),
-            };
-            *position = turned.cast();
-        }
+    /// Reads a mesh into metres, Y up.
+    pub fn read(&self, path: &Path) -> Result<TriMesh> {
+        let mut mesh = frazil::io::mesh::read(path)?;
+        let space = self.space();
+        mesh.positions.iter_mut().for_each(|position| *position = space.place(position.cast()).cast());
         Ok(mesh)
     }
 }

@@ -1,10 +1,14 @@
 //! Things that move: a fixed set of triangles whose vertices have a position at every time.
 
+mod morph;
 mod rigid;
 mod sequence;
+mod space;
 
+pub use morph::Morph;
 pub use rigid::{Key, Keys, Placed, Rigid};
 pub use sequence::MeshSequence;
+pub use space::{InSpace, Space, Up};
 
 use crate::base::DVec3;
 use crate::error::Result;

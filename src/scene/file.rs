@@ -1,8 +1,9 @@
 //! Reads a scene file: keys to fields, defaults filled in, ranges checked.
 
 use super::table::{Document, Table};
-use super::{Frames, Ground, Key, Layer, Object, Output, Role, Scene, Shot, Snow, Up};
+use super::{Frames, Ground, Key, Layer, Object, Output, Role, Scene, Shot, Snow};
 use crate::error::{Error, Result};
+use crate::motion::{Space, Up};
 use crate::snow::base_layer::NoiseParams;
 use std::path::{Path, PathBuf};
 use toml::de::DeTable;
@@ -164,8 +165,10 @@ fn object(table: &Table, folder: &Path) -> Result<Object> {
     Ok(Object {
         file: folder.join(file),
         offset: table.number_in("offset", -1.0e7..=1.0e7, "frames")?.unwrap_or(0.0),
-        scale: table.number_in("scale", 1.0e-9..=1.0e9, "")?.unwrap_or(1.0),
-        up: table.choice("up", &[("y", Up::Y), ("z", Up::Z)])?.unwrap_or(Up::Y),
+        space: Space {
+            scale: table.number_in("scale", 1.0e-9..=1.0e9, "")?.unwrap_or(1.0),
+            up: table.choice("up", &[("y", Up::Y), ("z", Up::Z)])?.unwrap_or(Up::Y),
+        },
         role: table.choice("role", &ROLES)?.unwrap_or(Role::Collide),
         noise: table.flag("noise")?.unwrap_or(true),
         keys: keys(table)?,

@@ -2,13 +2,13 @@
 
 use std::path::Path;
 
-use super::{Ground, Layer, Object, Role, Scene, Up};
+use super::{Ground, Layer, Object, Role, Scene};
 use crate::base::{DVec3, TriMesh};
 use crate::context::Context;
 use crate::error::{Error, Result};
 use crate::io::mesh;
 use crate::io::sequence::Pattern;
-use crate::motion::{Key, Keys, MeshSequence, Motion, Placed, Rigid};
+use crate::motion::{InSpace, Key, Keys, MeshSequence, Motion, Placed, Rigid};
 use crate::snow::base_layer::initial::{self, Cover};
 use crate::sweep::Body;
 use crate::vdb::{FloatGrid, GridClass, file};
@@ -128,11 +128,7 @@ fn motion(scene: &Scene, object: &Object) -> Result<Box<dyn Motion>> {
             Box::new(MeshSequence::open(pattern, first, last, fps, object.offset)?)
         }
     };
-    let own: Box<dyn Motion> = if object.scale == 1.0 && object.up == Up::Y {
-        own
-    } else {
-        Box::new(Transformed { inner: own, scale: object.scale, up: object.up })
-    };
+    let own = Box::new(InSpace::new(own, object.space));
     Ok(Box::new(Placed::new(own, keys)))
 }
 
@@ -140,36 +136,4 @@ fn posed(motion: &dyn Motion, time: f64) -> Result<TriMesh> {
     let mut pose = Vec::new();
     motion.pose(time, &mut pose)?;
     Ok(TriMesh { positions: pose.iter().map(|p| p.cast()).collect(), triangles: motion.triangles().to_vec() })
-}
-
-/// A motion in another unit, or with another axis up.
-struct Transformed {
-    inner: Box<dyn Motion>,
-    scale: f64,
-    up: Up,
-}
-
-impl Motion for Transformed {
-    fn triangles(&self) -> &[[u32; 3]] {
-        self.inner.triangles()
-    }
-
-    fn vertex_count(&self) -> usize {
-        self.inner.vertex_count()
-    }
-
-    fn pose(&self, time: f64, out: &mut Vec<DVec3>) -> Result<()> {
-        self.inner.pose(time, out)?;
-        for p in out {
-            *p *= self.scale;
-            if self.up == Up::Z {
-                *p = DVec3::new(p.x, p.z, -p.y);
-            }
-        }
-        Ok(())
-    }
-
-    fn breaks(&self, from: f64, to: f64) -> Vec<f64> {
-        self.inner.breaks(from, to)
-    }
 }

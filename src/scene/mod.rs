@@ -14,6 +14,7 @@ pub use frames::{FrameChoice, Frames};
 pub use inputs::Inputs;
 pub use memory::{check as check_memory, estimate};
 
+use crate::motion::Space;
 use crate::snow::base_layer::NoiseParams;
 use std::path::PathBuf;
 
@@ -86,10 +87,8 @@ pub struct Object {
     pub file: PathBuf,
     /// Its sequence starts this many frames later.
     pub offset: f64,
-    /// Factor from the file's unit to metres, over 0.
-    pub scale: f64,
-    /// The file's upward axis.
-    pub up: Up,
+    /// The file's unit and upward axis.
+    pub space: Space,
     /// What it does to the snow.
     pub role: Role,
     /// Whether its cuts have ragged edges.
@@ -107,15 +106,6 @@ pub struct Key {
     pub at: [f64; 3],
     /// Turns about the x, then the y, then the z axis (degrees).
     pub turn_deg: [f64; 3],
-}
-
-/// The upward axis of a file.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Up {
-    /// As frazil, Houdini, Maya.
-    Y,
-    /// As Blender, 3ds Max.
-    Z,
 }
 
 /// What an object does to the snow.

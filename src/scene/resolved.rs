@@ -1,6 +1,7 @@
 //! Writes a scene with every default filled in and commented: the file beside the output that reproduces it.
 
-use super::{Ground, Layer, Object, Role, Scene, Up};
+use super::{Ground, Layer, Object, Role, Scene};
+use crate::motion::Up;
 use std::fmt::Write;
 use std::path::Path;
 
@@ -65,8 +66,8 @@ fn write_object(out: &mut String, object: &Object) -> std::fmt::Result {
     writeln!(out, "\n[[object]]")?;
     line(out, "file", &file(&object.file), "mesh or sequence")?;
     line(out, "offset", &number(object.offset), "frames that a sequence starts later")?;
-    line(out, "scale", &number(object.scale), "from the file's unit to metres")?;
-    let up = match object.up {
+    line(out, "scale", &number(object.space.scale), "from the file's unit to metres")?;
+    let up = match object.space.up {
         Up::Y => "y",
         Up::Z => "z",
     };

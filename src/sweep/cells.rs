@@ -4,7 +4,7 @@ use rayon::prelude::*;
 
 use super::chain::Face;
 use super::lattice::{Fixed, UNITS};
-use super::prism::Prism;
+use super::prism::{Crossing, Prism};
 use super::region::{Region, each_block, extent};
 use super::winding::Lines;
 
@@ -17,19 +17,22 @@ const GRAIN: usize = 1024;
 const FEW: usize = 8;
 /// No slot.
 const NONE: u32 = u32::MAX;
-/// Where a voxel is taken to be, off its centre (cells): the scan lines' side of faces and edges through it.
-const NUDGE: [f32; 3] = [1e-3, 3e-4, -1e-4];
-/// A voxel nearer than this (cells) to a plane is told its side of it exactly.
-const CLEAR: f32 = 1e-3;
+/// Where a voxel is taken to be, off its centre (units): down, far less to the right, and least of all forward, as
+/// the scan lines move it. Less than a unit, lest a face lies between.
+const NUDGE: Point = [0.25 / 64.0, 0.25 / 4096.0, -0.25];
 /// Room for rounding where a plane touches a cell's corner (cells).
 const TOUCH: f64 = 1e-5;
 
 /// Faces sorted into the unit cells around the voxels of some blocks.
-pub struct Cells<'a> {
-    faces: &'a [Face],
-    normals: &'a [Point],
-    region: &'a Region,
-    lines: &'a Lines,
+pub struct Cells {
+    /// Every face near the blocks.
+    pub faces: Vec<Face>,
+    /// Their normals, as long as twice their areas (units^2).
+    pub normals: Vec<Point>,
+    /// The region that the blocks are of.
+    pub region: Region,
+    /// Winding numbers at the region's voxels.
+    pub lines: Lines,
     /// Place of each block of the region in `blocks`.
     slots: Vec<u32>,
     blocks: Vec<Block>,
@@ -65,21 +68,16 @@ impl Lists {
     }
 }
 
-impl<'a> Cells<'a> {
+impl Cells {
     /// Sorts faces into the cells of the marked blocks.
-    pub fn new(
-        faces: &'a [Face],
-        normals: &'a [Point],
-        region: &'a Region,
-        marked: &[bool],
-        lines: &'a Lines,
-    ) -> Self {
+    pub fn new(faces: Vec<Face>, region: Region, marked: &[bool], lines: Lines) -> Self {
+        let normals: Vec<Point> = faces.par_iter().map(normal).collect();
         let mut slots = vec![NONE; marked.len()];
         let places: Vec<[i32; 3]> =
             (0..marked.len()).filter(|&block| marked[block]).map(|block| region.place(block)).collect();
         places.iter().enumerate().for_each(|(slot, &block)| slots[region.index(block)] = slot as u32);
-        let lists = by_block(faces, normals, region, &slots, places.len());
-        let sort = |(&place, ids): (&[i32; 3], Vec<u32>)| Block::new(place, ids, faces, normals);
+        let lists = by_block(&faces, &normals, &region, &slots, places.len());
+        let sort = |(&place, ids): (&[i32; 3], Vec<u32>)| Block::new(place, ids, &faces, &normals);
         let mut blocks: Vec<Block> = places.par_iter().zip(lists).map(sort).collect();
         let mut count = 0;
         for block in &mut blocks {
@@ -121,31 +119,44 @@ impl<'a> Cells<'a> {
         let voxel = point.map(|value| (value / f64::from(UNITS)).round() as i32);
         let mut winding = self.lines.winding(voxel);
         let Some(block) = self.block_of(voxel) else { return winding };
-        let from = voxel.map(|value| f64::from(value) * f64::from(UNITS));
-        let way = [0, 1, 2].map(|axis| ((point[axis] - from[axis]) / f64::from(UNITS)) as f32);
-        let local = voxel.map(|value| (value & 7) as f32);
-        let nudged = [0, 1, 2].map(|axis| local[axis] + NUDGE[axis]);
-        let end = [0, 1, 2].map(|axis| local[axis] + way[axis]);
+        let begin = voxel.map(|value| (value & 7) as f32);
+        let end = [0, 1, 2]
+            .map(|axis| begin[axis] + (point[axis] / f64::from(UNITS) - f64::from(voxel[axis])) as f32);
         for &place in block.cells.get(block.cell(voxel)) {
-            let prism = &block.prisms[place as usize];
-            let (begin, end) = (prism.heights_mixed(local, nudged), prism.heights(end));
-            let one_side = (begin[0] > CLEAR) & (end[0] > 0.0) | (begin[0] < -CLEAR) & (end[0] < 0.0);
-            if one_side || !Prism::is_inside(begin, end) {
-                continue;
-            }
-            let id = block.ids[place as usize] as usize;
-            let begin_in_front = if begin[0].abs() > CLEAR {
-                begin[0] > 0.0
-            } else {
-                let (normal, corner) = (&self.normals[id], self.faces[id].v[0].map(f64::from));
-                in_front(dot(normal, &sub(from, corner)), normal)
+            let crossing = match block.prisms[place as usize].crossing(begin, end) {
+                Crossing::None => continue,
+                Crossing::Outward => -1,
+                Crossing::Inward => 1,
+                Crossing::Unclear => self.exact_crossing(block.ids[place as usize] as usize, voxel, point),
             };
-            if begin_in_front != (end[0] > 0.0) {
-                let coef = self.faces[id].coef;
-                winding += if begin_in_front { coef } else { -coef };
-            }
+            winding += crossing * self.faces[block.ids[place as usize] as usize].coef;
         }
         winding
+    }
+
+    /// 1 when the way from a voxel to a point enters the chain through a face, -1 when it leaves it, else 0.
+    ///
+    /// A voxel in the plane of a face, or of an edge, is where the scan lines take it to be: see [`NUDGE`].
+    fn exact_crossing(&self, id: usize, voxel: [i32; 3], end: Point) -> i32 {
+        let (normal, v) = (&self.normals[id], self.faces[id].v.map(|p| p.map(f64::from)));
+        let centre = voxel.map(|value| f64::from(value) * f64::from(UNITS));
+        let begin = [0, 1, 2].map(|axis| centre[axis] + NUDGE[axis]);
+        let [first, last] = [begin, end].map(|p| dot(normal, &sub(p, v[0])));
+        let in_front = in_front(dot(normal, &sub(centre, v[0])), normal);
+        if in_front == (last > 0.0) {
+            return 0;
+        }
+        let t = (first / (first - last)).clamp(0.0, 1.0);
+        let at = [0, 1, 2].map(|axis| begin[axis] + t * (end[axis] - begin[axis]));
+        let inside = (0..3).all(|i| {
+            let edge = sub(v[(i + 1) % 3], v[i]);
+            dot(&cross(*normal, edge), &sub(at, v[i])) > 0.0
+        });
+        match (inside, in_front) {
+            (false, _) => 0,
+            (true, true) => 1,
+            (true, false) => -1,
+        }
     }
 }
 

@@ -213,20 +213,22 @@ pub fn near_lanes(offsets: &[Offsets], radius: f32, reach: f32, out: &mut Vec<u8
     dispatch!(body(offsets: &[Offsets], radius: f32, reach: f32, out: &mut Vec<u8>) -> [bool; LANES])
 }
 
-/// Squared distance (cells^2) of each of eight points from the nearest of the listed triangles.
-pub fn nearest(triangles: &[Triangle], list: &[u32], points: &Points) -> [f32; LANES] {
+/// Squared distance (cells^2) of each of eight points from the nearest of the listed triangles, and which it is.
+pub fn nearest(triangles: &[Triangle], list: &[u32], points: &Points) -> ([f32; LANES], [u32; LANES]) {
     #[inline(always)]
-    fn body(triangles: &[Triangle], list: &[u32], points: &Points) -> [f32; LANES] {
-        let mut best = [f32::INFINITY; LANES];
+    fn body(triangles: &[Triangle], list: &[u32], points: &Points) -> ([f32; LANES], [u32; LANES]) {
+        let (mut best, mut ids) = ([f32::INFINITY; LANES], [0; LANES]);
         for &triangle in list {
             let squared = triangles[triangle as usize].offsets(points).squared;
             for lane in 0..LANES {
-                best[lane] = if squared[lane] < best[lane] { squared[lane] } else { best[lane] };
+                let nearer = squared[lane] < best[lane];
+                best[lane] = if nearer { squared[lane] } else { best[lane] };
+                ids[lane] = if nearer { triangle } else { ids[lane] };
             }
         }
-        best
+        (best, ids)
     }
-    dispatch!(body(triangles: &[Triangle], list: &[u32], points: &Points) -> [f32; LANES])
+    dispatch!(body(triangles: &[Triangle], list: &[u32], points: &Points) -> ([f32; LANES], [u32; LANES]))
 }
 
 /// Leaves in `list` the triangles that can be nearest to one of the eight voxels around a centre;

@@ -2,16 +2,16 @@
 
 use rayon::prelude::*;
 
-use super::chain::{Face, Weights, Window, boundary};
-use super::lattice::{Fixed, Lattice};
+use super::chain::{Face, Window};
+use super::lattice::Lattice;
 use super::nearest::Scratch;
-use super::topology::Topology;
 use super::voxelise::{ALL, Band, Piece, Voxeliser};
 use super::{Body, Settings};
+use crate::base::TriMesh;
 use crate::base::blocks::{Block, BlockEdit, Values};
-use crate::base::{DVec3, TriMesh};
 use crate::context::Context;
 use crate::error::{Error, Result};
+use crate::motion::{Keys, Rigid};
 use crate::vdb::FloatGrid;
 
 /// Blocks that are made before they are handed to the grid: bounds the memory beside it.
@@ -41,46 +41,13 @@ pub fn chain(ctx: &Context, bodies: &[Body], from: f64, to: f64, settings: &Sett
     fill(ctx, faces, lattice, settings.half_width)
 }
 
-/// Level set of the volume swept by vertices that move straight from one mesh to another with the same triangles.
-///
-/// # Errors
-/// As [`chain`]; and when the meshes differ in their number of vertices.
-pub fn chain_meshes(ctx: &Context, from: &TriMesh, to: &TriMesh, settings: &Settings) -> Result<FloatGrid> {
-    settings.validate()?;
-    if from.positions.len() != to.positions.len() {
-        return Err(Error::argument(format!(
-            "a sweep needs the same vertices at both ends: {} and {}",
-            from.positions.len(),
-            to.positions.len()
-        )));
-    }
-    let (lattice, faces) = mesh_faces(settings.voxel, &from.triangles, &[from, to])?;
-    fill(ctx, faces, lattice, settings.half_width)
-}
-
-/// Level set of the solid that a mesh bounds: winding number > 0, open loops closed.
+/// Level set of the solid that a mesh bounds: winding number > 0, vertices that coincide welded, open loops closed.
 ///
 /// # Errors
 /// As [`chain`].
-pub fn voxelise(ctx: &Context, mesh: &TriMesh, settings: &Settings) -> Result<FloatGrid> {
-    settings.validate()?;
-    let (lattice, faces) = mesh_faces(settings.voxel, &mesh.triangles, &[mesh])?;
-    fill(ctx, faces, lattice, settings.half_width)
-}
-
-/// The chain's boundary of poses of a mesh.
-fn mesh_faces(voxel: f64, triangles: &[[u32; 3]], poses: &[&TriMesh]) -> Result<(Lattice, Vec<Face>)> {
-    let first = poses[0].positions.first().ok_or_else(|| Error::argument("a mesh has no vertices"))?;
-    let lattice = Lattice::near(voxel, first.cast())?;
-    let count = poses[0].positions.len();
-    let topology = Topology::new(triangles, count, &(0..count as u32).collect::<Vec<_>>(), true);
-    let level = |mesh: &&TriMesh| -> Result<Vec<Fixed>> {
-        let mut pose: Vec<DVec3> = mesh.positions.iter().map(|p| lattice.to_cells(p.cast())).collect();
-        topology.complete(&mut pose);
-        pose.into_iter().map(|cells| lattice.fix(cells)).collect()
-    };
-    let levels: Vec<Vec<Fixed>> = poses.iter().map(level).collect::<Result<_>>()?;
-    Ok((lattice, boundary(&topology, &levels, Weights { solid: 1, swept: 1 }, &EVERYWHERE)))
+pub fn voxelise(ctx: &Context, mesh: TriMesh, settings: &Settings) -> Result<FloatGrid> {
+    let still = Body::new(Box::new(Rigid::new(mesh, Keys::default())), 0.0)?;
+    chain(ctx, &[still], 0.0, 0.0, settings)
 }
 
 /// Level set of the points that a closed chain winds around at least once.

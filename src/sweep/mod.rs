@@ -73,4 +73,4 @@ impl Settings {
 #[cfg(feature = "vdb")]
 mod grid;
 #[cfg(feature = "vdb")]
-pub use grid::{chain, chain_meshes, fill, voxelise};
+pub use grid::{chain, fill, voxelise};

@@ -7,7 +7,7 @@ use crate::base::blocks::{Mask, offset};
 /// Working memory of one thread.
 #[derive(Default)]
 pub struct Scratch {
-    lists: [Vec<u32>; 3],
+    lists: [Vec<u32>; 4],
     offsets: [Vec<Offsets>; 2],
     /// For each triangle the sub-blocks in which it can be nearest to a voxel, a bit each.
     lanes: [Vec<u8>; 2],
@@ -17,16 +17,29 @@ pub struct Scratch {
 /// Half diagonals between the voxel centres of a 4^3 and of a 2^3 sub-block, with room for rounding.
 const RADII: [f32; 2] = [2.599, 0.867];
 
-/// Gives `see` every wanted voxel of a block that may be nearer than `reach` cells to a triangle, with the
-/// distance (cells).
+/// A voxel and the triangle nearest to it.
+pub struct Found<'a> {
+    /// Number of the voxel in its block.
+    pub voxel: usize,
+    /// Distance (cells).
+    pub distance: f32,
+    /// Number of the nearest triangle.
+    pub nearest: u32,
+    /// All triangles within `complete` cells, and some farther away.
+    pub near: &'a [u32],
+    /// See `near`.
+    pub complete: f32,
+}
+
+/// Gives `see` every wanted voxel of a block that may be nearer than `reach` cells to a triangle.
 pub fn search(
     triangles: &[Triangle],
     reach: f32,
     wanted: &Mask,
     scratch: &mut Scratch,
-    mut see: impl FnMut(usize, f32),
+    mut see: impl FnMut(Found<'_>),
 ) {
-    let Scratch { lists: [all, some, few], offsets: [far, mid], lanes, centre } = scratch;
+    let Scratch { lists: [all, some, near, few], offsets: [far, mid], lanes, centre } = scratch;
     all.clear();
     all.extend(0..triangles.len() as u32);
     to_each(triangles, all, &points([0.0; 3], 4.0, 1.5), far);
@@ -45,20 +58,23 @@ pub fn search(
             if !in_reach || !any_wanted(wanted, corner, 2) {
                 continue;
             }
-            few.clear();
+            near.clear();
             centre.clear();
             for (at, _) in lanes[1].iter().enumerate().filter(|(_, bits)| **bits >> lane & 1 == 1) {
                 let offset = &mid[at];
-                few.push(some[at]);
+                near.push(some[at]);
                 centre.push([offset.x[lane], offset.y[lane], offset.z[lane], offset.squared[lane]]);
             }
+            let least = centre.iter().map(|offset| offset[3]).fold(f32::INFINITY, f32::min).sqrt();
+            let complete = (least + RADII[1]).min(reach);
+            few.clone_from(near);
             prune(few, centre);
-            let squared = nearest(triangles, few, &points(corner, 1.0, 0.0));
-            for (lane, squared) in squared.into_iter().enumerate() {
+            let (squared, ids) = nearest(triangles, few, &points(corner, 1.0, 0.0));
+            for (lane, (squared, id)) in squared.into_iter().zip(ids).enumerate() {
                 let at = corner_of(corner, 1.0, lane).map(|value| value as usize);
                 let voxel = offset(at[0], at[1], at[2]);
                 if wanted[voxel >> 6] >> (voxel & 63) & 1 == 1 {
-                    see(voxel, squared.sqrt());
+                    see(Found { voxel, distance: squared.sqrt(), nearest: id, near, complete });
                 }
             }
         }

@@ -30,28 +30,46 @@ impl Prism {
         prism
     }
 
-    /// The four functions at a position.
-    #[inline(always)]
-    pub fn heights(&self, p: [f32; 3]) -> [f32; 4] {
-        self.heights_mixed(p, p)
+    /// How a segment between two positions (cells) passes the triangle.
+    pub fn crossing(&self, begin: [f32; 3], end: [f32; 3]) -> Crossing {
+        let (begin, end) = (self.heights(begin), self.heights(end));
+        if (begin[0] > CLEAR) & (end[0] > 0.0) | (begin[0] < -CLEAR) & (end[0] < 0.0) {
+            return Crossing::None;
+        }
+        let t = begin[0] / (begin[0] - end[0]);
+        let inward = |i: usize| begin[i] + t * (end[i] - begin[i]);
+        let least = inward(1).min(inward(2)).min(inward(3));
+        match begin[0] {
+            _ if least < -CLEAR && begin[0].abs() > CLEAR => Crossing::None,
+            height if height > CLEAR && least > CLEAR => Crossing::Inward,
+            height if height < -CLEAR && least > CLEAR => Crossing::Outward,
+            _ => Crossing::Unclear,
+        }
     }
 
-    /// Height over the plane at `p`, and over the edges at `q`.
+    /// The four functions at a position.
     #[inline(always)]
-    pub fn heights_mixed(&self, p: [f32; 3], q: [f32; 3]) -> [f32; 4] {
-        let [x, y, z] = [0, 1, 2].map(|axis| [p[axis], q[axis], q[axis], q[axis]]);
+    fn heights(&self, p: [f32; 3]) -> [f32; 4] {
         let mut out = self.constant;
-        for i in 0..4 {
-            out[i] += self.x[i] * x[i] + self.y[i] * y[i] + self.z[i] * z[i];
+        for (i, out) in out.iter_mut().enumerate() {
+            *out += self.x[i] * p[0] + self.y[i] * p[1] + self.z[i] * p[2];
         }
         out
     }
-
-    /// Whether a segment meets the plane inside the triangle, from the functions at its ends.
-    #[inline(always)]
-    pub fn is_inside(begin: [f32; 4], end: [f32; 4]) -> bool {
-        let t = (begin[0] / (begin[0] - end[0])).clamp(0.0, 1.0);
-        let over = |i: usize| begin[i] + t * (end[i] - begin[i]) > 0.0;
-        over(1) & over(2) & over(3)
-    }
 }
+
+/// How a segment passes a triangle.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Crossing {
+    /// It does not pass through it.
+    None,
+    /// From its front to its back.
+    Inward,
+    /// From its back to its front.
+    Outward,
+    /// It begins too near to the plane, or passes too near to an edge, to tell in 32 bits.
+    Unclear,
+}
+
+/// Nearer than this (cells), sides are told in 64 bits.
+const CLEAR: f32 = 1e-3;

@@ -9,16 +9,28 @@ use std::sync::atomic::{AtomicU8, Ordering};
 
 use rayon::prelude::*;
 
-use super::cells::{Cells, Point, cross, difference, dot, each_voxel, normal, sub};
-use super::chain::Face;
+use super::cells::{Cells, Point, cross, difference, dot, each_voxel, sub};
 use super::lattice::{Fixed, UNITS};
-use super::region::{Region, extent};
-use super::winding::Lines;
+use super::region::extent;
 use crate::context::Context;
 use crate::error::Result;
 
 /// A triangle that bounds the volume.
-pub type Facet = [Fixed; 3];
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Facet {
+    /// Corners, counter-clockwise seen from outside.
+    pub v: Corners,
+    /// The face of the chain that it is a part of.
+    pub face: u32,
+    /// Whether it is open throughout; else only where it was asked, and buried sheets pass nearby.
+    pub sure: bool,
+}
+
+/// A part of a face, and whether it is sure.
+type Part = (Corners, bool);
+
+/// Corners of a triangle.
+pub type Corners = [Fixed; 3];
 
 /// Depth (fixed-point units) up to which a sheet counts as surface: sides of a sweep are folds of many
 /// sheets, closer together than the sweep's own tolerance.
@@ -38,31 +50,19 @@ const GRAIN: usize = 128;
 const OPEN: u8 = 1;
 const BURIED: u8 = 2;
 
-/// A chain's faces, and how to ask for the winding number near them.
-struct Chain<'a> {
-    faces: &'a [Face],
-    normals: &'a [Point],
-    cells: Cells<'a>,
-    region: &'a Region,
+/// Asks where a chain's faces are open.
+struct Surface<'a> {
+    cells: &'a Cells,
 }
 
-/// The surface of a chain in the marked blocks, where all faces there are given.
+/// The surface of a chain near the blocks of its cells.
 ///
 /// # Errors
 /// Cancel.
-pub fn surface(
-    ctx: &Context,
-    faces: &[Face],
-    region: &Region,
-    marked: &[bool],
-    lines: &Lines,
-) -> Result<Vec<Facet>> {
-    let normals: Vec<Point> = faces.par_iter().map(normal).collect();
-    let cells = Cells::new(faces, &normals, region, marked, lines);
-    ctx.check()?;
-    let chain = Chain { faces, normals: &normals, cells, region };
+pub fn surface(ctx: &Context, cells: &Cells) -> Result<Vec<Facet>> {
+    let chain = Surface { cells };
     let verdict = |id| if ctx.is_cancelled() { BURIED } else { chain.verdict(id) };
-    let verdicts: Vec<u8> = (0..faces.len()).into_par_iter().with_min_len(GRAIN).map(verdict).collect();
+    let verdicts: Vec<u8> = (0..cells.faces.len()).into_par_iter().with_min_len(GRAIN).map(verdict).collect();
     ctx.check()?;
     let (around, seen) = chain.neighbourhoods(&verdicts);
     let parts: Vec<Vec<Facet>> = seen
@@ -72,10 +72,11 @@ pub fn surface(
             if ctx.is_cancelled() {
                 return Vec::new();
             }
-            let mut out = Vec::with_capacity(seen.len());
+            let (mut out, mut parts) = (Vec::with_capacity(seen.len()), Vec::new());
             for (index, &seen) in seen.iter().enumerate() {
                 let id = chunk * GRAIN + index;
-                chain.open_parts(id, seen, &around, &mut out);
+                chain.open_parts(id, seen, &around, &mut parts);
+                out.extend(parts.drain(..).map(|(v, sure)| Facet { v, face: id as u32, sure }));
             }
             out
         })
@@ -84,14 +85,20 @@ pub fn surface(
     Ok(parts.concat())
 }
 
-impl Chain<'_> {
+/// Whether a point of a face (fixed-point units), moved a hair along its normal, is outside the chain.
+pub fn is_open(cells: &Cells, face: u32, at: Point) -> bool {
+    let chain = Surface { cells };
+    chain.ahead(face as usize).is_some_and(|ahead| chain.ask(at, ahead) == OPEN)
+}
+
+impl Surface<'_> {
     /// Whether a face is open or buried at its middle; a long one where it passes voxels.
     fn verdict(&self, id: usize) -> u8 {
-        self.ahead(id).map_or(BURIED, |ahead| self.said(&self.faces[id].v, ahead))
+        self.ahead(id).map_or(BURIED, |ahead| self.said(&self.cells.faces[id].v, ahead))
     }
 
     /// What the samples of a part of a face say.
-    fn said(&self, v: &Facet, ahead: Point) -> u8 {
+    fn said(&self, v: &Corners, ahead: Point) -> u8 {
         let mut said = 0;
         each_sample(v, |at| said |= if self.is_known(at) { self.ask(at, ahead) } else { 0 });
         said
@@ -113,10 +120,10 @@ impl Chain<'_> {
     }
 
     /// Adds the open parts of a face, from what was said in its cells.
-    fn open_parts(&self, id: usize, seen: u8, around: &[u8], out: &mut Vec<Facet>) {
-        let (v, Some(ahead)) = (self.faces[id].v, self.ahead(id)) else { return };
+    fn open_parts(&self, id: usize, seen: u8, around: &[u8], out: &mut Vec<Part>) {
+        let (v, Some(ahead)) = (self.cells.faces[id].v, self.ahead(id)) else { return };
         match seen {
-            OPEN => out.push(v),
+            OPEN => out.push((v, true)),
             BURIED => {}
             _ => {
                 self.dice(id, v, ahead, around, out);
@@ -125,9 +132,9 @@ impl Chain<'_> {
     }
 
     /// What all faces said in the cells that a part of a face passes through.
-    fn seen_around(&self, id: usize, v: Facet, around: &[u8]) -> u8 {
+    fn seen_around(&self, id: usize, v: Corners, around: &[u8]) -> u8 {
         let mut seen = 0;
-        each_voxel(&v, &self.normals[id], self.region, |voxel| {
+        each_voxel(&v, &self.cells.normals[id], &self.cells.region, |voxel| {
             if let Some(cell) = self.cells.of_voxel(voxel) {
                 seen |= around[cell];
             }
@@ -135,16 +142,19 @@ impl Chain<'_> {
         seen
     }
 
-    /// Adds the open parts of a long part of a face; says whether it is open throughout.
-    fn dice(&self, id: usize, v: Facet, ahead: Point, around: &[u8], out: &mut Vec<Facet>) -> bool {
+    /// Adds the open parts of a part of a face; says whether it is open throughout, as far as it was asked.
+    fn dice(&self, id: usize, v: Corners, ahead: Point, around: &[u8], out: &mut Vec<Part>) -> bool {
         let begin = out.len();
         let open = match self.seen_around(id, v, around) {
             // Nothing was said where no distance is wanted.
-            0 | OPEN => true,
+            0 | OPEN => {
+                out.push((v, true));
+                return true;
+            }
             BURIED => false,
             _ if is_small(&v) => {
                 self.clip(v, ahead, out);
-                out[begin..] == [v]
+                out[begin..] == [(v, true)]
             }
             _ => match self.said(&v, ahead) {
                 OPEN => true,
@@ -153,25 +163,26 @@ impl Chain<'_> {
             },
         };
         if open {
+            let sure = begin < out.len() && out[begin..].iter().all(|(_, sure)| *sure);
             out.truncate(begin);
-            out.push(v);
+            out.push((v, sure));
         }
         open
     }
 
-    fn corners(&self, v: Facet, ahead: Point) -> [u8; 3] {
+    fn corners(&self, v: Corners, ahead: Point) -> [u8; 3] {
         let centre = middle(&v);
         v.map(|p| self.ask(between(p.map(f64::from), centre, INSET), ahead))
     }
 
     /// Adds the open parts of a small triangle.
-    fn clip(&self, v: Facet, ahead: Point, out: &mut Vec<Facet>) {
+    fn clip(&self, v: Corners, ahead: Point, out: &mut Vec<Part>) {
         let open = self.corners(v, ahead).map(|corner| corner == OPEN);
         let centre = middle(&v);
         let count = open.iter().filter(|open| **open).count();
         if count % 3 == 0 && (self.ask(centre, ahead) == OPEN) == open[0] {
             if open[0] {
-                out.push(v);
+                out.push((v, true));
             }
             return;
         }
@@ -185,15 +196,15 @@ impl Chain<'_> {
     }
 
     /// Adds the part of a triangle with open and buried corners that is open, its rim a straight line.
-    fn clip_by(&self, v: Facet, open: [bool; 3], ahead: Point, out: &mut Vec<Facet>) {
+    fn clip_by(&self, v: Corners, open: [bool; 3], ahead: Point, out: &mut Vec<Part>) {
         let alone = (0..3).find(|&i| open[i] != open[(i + 1) % 3] && open[i] != open[(i + 2) % 3]);
         let turn = alone.unwrap_or(0);
         let [a, b, c] = [0, 1, 2].map(|i| v[(turn + i) % 3]);
         let [ab, ac] = [b, c].map(|other| self.rim(a, other, open[turn], ahead));
         if open[turn] {
-            out.push([a, ab, ac]);
+            out.push(([a, ab, ac], true));
         } else {
-            out.extend([[ab, b, c], [ab, c, ac]]);
+            out.extend([([ab, b, c], true), ([ab, c, ac], true)]);
         }
     }
 
@@ -223,20 +234,20 @@ impl Chain<'_> {
 
     /// A hair along a face's normal; none for a face without area.
     fn ahead(&self, id: usize) -> Option<Point> {
-        let normal = self.normals[id];
+        let normal = self.cells.normals[id];
         let length = dot(&normal, &normal).sqrt();
         (length > 0.0).then(|| normal.map(|value| value * HAIR / length))
     }
 }
 
-fn is_small(v: &Facet) -> bool {
+fn is_small(v: &Corners) -> bool {
     let (low, high) = extent(v);
     (0..3).all(|axis| high[axis] - low[axis] <= SMALL)
 }
 
 /// Calls `see` with the middle of a small triangle; with points about [`SPACING`] apart in rows along its
 /// longest edge otherwise.
-fn each_sample(v: &Facet, mut see: impl FnMut(Point)) {
+fn each_sample(v: &Corners, mut see: impl FnMut(Point)) {
     if is_small(v) {
         return see(middle(v));
     }
@@ -255,7 +266,7 @@ fn each_sample(v: &Facet, mut see: impl FnMut(Point)) {
 }
 
 /// A triangle turned so that its first edge is the longest.
-fn from_longest(v: &Facet) -> Facet {
+fn from_longest(v: &Corners) -> Corners {
     let length = |i: usize| {
         let d = difference(&v[(i + 1) % 3], &v[i]);
         dot(&d, &d)
@@ -264,7 +275,7 @@ fn from_longest(v: &Facet) -> Facet {
     [0, 1, 2].map(|i| v[(longest + i) % 3])
 }
 
-fn middle(v: &Facet) -> Point {
+fn middle(v: &Corners) -> Point {
     [0, 1, 2].map(|axis| v.iter().map(|p| f64::from(p[axis])).sum::<f64>() / 3.0)
 }
 
@@ -273,7 +284,7 @@ fn between(a: Point, b: Point, t: f64) -> Point {
 }
 
 /// A triangle cut across its longest edge.
-fn halves(v: Facet) -> [Facet; 2] {
+fn halves(v: Corners) -> [Corners; 2] {
     let [a, b, c] = from_longest(&v);
     let m = between(a.map(f64::from), b.map(f64::from), 0.5).map(|value| value.round() as i32);
     [[a, m, c], [m, b, c]]

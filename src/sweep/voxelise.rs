@@ -4,12 +4,13 @@ use std::sync::atomic::{AtomicBool, Ordering};
 
 use rayon::prelude::*;
 
+use super::cells::Cells;
 use super::chain::Face;
 use super::distance::Triangle;
-use super::lattice::Lattice;
-use super::nearest::{Scratch, search};
+use super::lattice::{Lattice, UNITS};
+use super::nearest::{Found, Scratch, search};
 use super::region::{Region, each_block, extent};
-use super::surface::{Facet, surface};
+use super::surface::{Facet, is_open, surface};
 use super::winding::Lines;
 use crate::base::blocks::{Mask, Origin, Values};
 use crate::context::Context;
@@ -52,9 +53,7 @@ impl Piece {
 pub struct Voxeliser {
     lattice: Lattice,
     band: Band,
-    region: Region,
-    lines: Lines,
-    face_count: usize,
+    cells: Cells,
     facets: Vec<Facet>,
     /// Wanted blocks with facets in reach, in units of blocks from the base voxel; ascending.
     near: Vec<[i32; 3]>,
@@ -72,6 +71,8 @@ const GRAIN: usize = 1024;
 const BLOCK_RADIUS: f32 = 6.07;
 /// Radius of a small facet (cells).
 const SMALL: f32 = 1.0;
+/// How far a nearest point is moved into its facet (cells), away from what it shares with neighbours.
+const INSET: f64 = 0.02;
 /// All voxels of a block.
 pub const ALL: Mask = [u64::MAX; 8];
 
@@ -109,13 +110,13 @@ impl Voxeliser {
             let (first, last) = region.touched(extent(&face.v), 0.0);
             each_block(first, last).any(|block| relevant[region.index(block)])
         });
-        let facets = surface(ctx, &faces, &region, &relevant, &lines)?;
+        let cells = Cells::new(faces, region, &relevant, lines);
+        ctx.check()?;
+        let facets = surface(ctx, &cells)?;
         let mut voxeliser = Self {
             lattice,
             band,
-            region,
-            lines,
-            face_count: faces.len(),
+            cells,
             facets,
             near: Vec::new(),
             start: vec![0],
@@ -143,7 +144,7 @@ impl Voxeliser {
 
     /// Number of faces of the chain's boundary near the wanted blocks.
     pub fn face_count(&self) -> usize {
-        self.face_count
+        self.cells.faces.len()
     }
 
     fn origin(&self, block: [i32; 3]) -> Origin {
@@ -171,7 +172,7 @@ impl Voxeliser {
         let mut slots = vec![NONE; count.len()];
         for (block, &count) in count.iter().enumerate().filter(|(_, count)| **count > 0) {
             slots[block] = self.near.len() as u32;
-            self.near.push(self.region.place(block));
+            self.near.push(self.cells.region.place(block));
             self.start.push(self.start[self.start.len() - 1] + count);
         }
         let mut place = self.start.clone();
@@ -187,17 +188,17 @@ impl Voxeliser {
     /// Calls `see` with each marked block that the facet may be nearest in.
     fn blocks_of(&self, facet: &Facet, marked: &[bool], mut see: impl FnMut(usize)) {
         let reach = self.band.reach() + 0.01;
-        let (first, last) = self.region.touched(extent(facet), reach);
+        let (first, last) = self.cells.region.touched(extent(&facet.v), reach);
         if (0..3).any(|axis| first[axis] > last[axis]) {
             return;
         }
         // Small facets are told by a ball around them.
-        let (low, high) = extent(facet);
+        let (low, high) = extent(&facet.v);
         let centre = [0, 1, 2].map(|axis| (low[axis] + high[axis]) / 2.0);
         let radius = gap(low, high) / 2.0;
-        let triangle = (radius > SMALL).then(|| Triangle::new(facet, [0; 3]));
+        let triangle = (radius > SMALL).then(|| Triangle::new(&facet.v, [0; 3]));
         for block in each_block(first, last) {
-            let index = self.region.index(block);
+            let index = self.cells.region.index(block);
             if !marked[index] {
                 continue;
             }
@@ -215,13 +216,13 @@ impl Voxeliser {
     /// Finds the blocks without facets whose first voxel is inside.
     fn find_inside(&self, slots: &[u32]) -> Vec<[i32; 3]> {
         let mut inside = Vec::new();
-        let Region { low, high } = self.region;
+        let Region { low, high } = self.cells.region;
         for [x, y, _] in each_block([low[0], low[1], 0], [high[0], high[1], 0]) {
-            let line = self.lines.line(x * 8, y * 8);
+            let line = self.cells.lines.line(x * 8, y * 8);
             for pair in line.windows(2).filter(|pair| pair[0].1 >= 1) {
                 let first = (pair[0].0 / 8.0).ceil().max(f64::from(low[2])) as i32;
                 let last = (pair[1].0 / 8.0).floor().min(f64::from(high[2])) as i32;
-                let empty = |z: &i32| slots[self.region.index([x, y, *z])] == NONE;
+                let empty = |z: &i32| slots[self.cells.region.index([x, y, *z])] == NONE;
                 inside.extend((first..=last).filter(empty).map(|z| [x, y, z]));
             }
         }
@@ -238,16 +239,21 @@ impl Voxeliser {
         let corner = block.map(|b| b * 8);
         let ids = &self.ids[self.start[index] as usize..self.start[index + 1] as usize];
         let triangles: Vec<Triangle> =
-            ids.iter().map(|&id| Triangle::new(&self.facets[id as usize], corner)).collect();
+            ids.iter().map(|&id| Triangle::new(&self.facets[id as usize].v, corner)).collect();
         let inside = self.inside_voxels(corner);
         let is_inside = |voxel: usize| inside[voxel >> 6] >> (voxel & 63) & 1 == 1;
         let limit = |voxel: usize| if is_inside(voxel) { self.band.inside } else { self.band.outside };
         let signed = |voxel: usize, distance: f32| if is_inside(voxel) { -distance } else { distance };
         let mut values: Box<Values> = Box::new(std::array::from_fn(|voxel| signed(voxel, limit(voxel))));
         let mut uniform = true;
-        search(&triangles, self.band.reach(), wanted, scratch, |voxel, distance| {
-            uniform &= distance >= limit(voxel);
-            values[voxel] = signed(voxel, distance.min(limit(voxel)));
+        search(&triangles, self.band.reach(), wanted, scratch, |found| {
+            let voxel = found.voxel;
+            let depth = match is_inside(voxel) && found.distance < limit(voxel) {
+                true => self.depth(&found, corner, ids, &triangles),
+                false => found.distance,
+            };
+            uniform &= depth >= limit(voxel);
+            values[voxel] = signed(voxel, depth.min(limit(voxel)));
         });
         let all = |bits: &dyn Fn(usize) -> u64| (0..8).all(|x| bits(x) & wanted[x] == wanted[x]);
         match (uniform && all(&|x| inside[x]), uniform && all(&|x| !inside[x])) {
@@ -257,11 +263,47 @@ impl Voxeliser {
         }
     }
 
+    /// Depth (cells) of a voxel inside: the distance to its nearest facet; where that one's nearest point is not
+    /// open, because the facet was clipped too wide, to the nearest that is.
+    fn depth(&self, found: &Found<'_>, corner: [i32; 3], ids: &[u32], triangles: &[Triangle]) -> f32 {
+        let p = [found.voxel >> 6, found.voxel >> 3 & 7, found.voxel & 7].map(|value| value as f32);
+        let is_open = |index: u32, at: [f32; 3]| {
+            let facet = &self.facets[ids[index as usize] as usize];
+            facet.sure || self.is_open(facet, at, corner)
+        };
+        if is_open(found.nearest, triangles[found.nearest as usize].closest(p)) {
+            return found.distance;
+        }
+        let nearest_open = |candidates: &mut dyn Iterator<Item = u32>| -> f32 {
+            let mut others: Vec<(f32, u32, [f32; 3])> = candidates
+                .map(|index| (index, triangles[index as usize].closest(p)))
+                .map(|(index, at)| (gap(p, at), index, at))
+                .filter(|(distance, index, _)| *distance < self.band.inside && *index != found.nearest)
+                .collect();
+            others.sort_unstable_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
+            let open = others.into_iter().find(|(_, index, at)| is_open(*index, *at));
+            open.map_or(self.band.inside, |(distance, ..)| distance)
+        };
+        let near = nearest_open(&mut found.near.iter().copied());
+        if near <= found.complete { near } else { nearest_open(&mut (0..triangles.len() as u32)) }
+    }
+
+    /// Whether a point of a facet (cells from a block's corner) is open.
+    fn is_open(&self, Facet { v, face, .. }: &Facet, at: [f32; 3], corner: [i32; 3]) -> bool {
+        let at = [0, 1, 2].map(|axis| f64::from(corner[axis]) + f64::from(at[axis]));
+        let middle =
+            [0, 1, 2].map(|a| v.iter().map(|p| f64::from(p[a])).sum::<f64>() / (3.0 * f64::from(UNITS)));
+        let way = [0, 1, 2].map(|axis| middle[axis] - at[axis]);
+        let length = way.iter().map(|value| value * value).sum::<f64>().sqrt();
+        let part = if length > INSET { INSET / length } else { 1.0 };
+        is_open(&self.cells, *face, [0, 1, 2].map(|axis| (at[axis] + part * way[axis]) * f64::from(UNITS)))
+    }
+
     /// The voxels of a block that the chain winds around.
     fn inside_voxels(&self, corner: [i32; 3]) -> Mask {
         let mut inside = [0; 8];
         for column in 0..64 {
-            let line = self.lines.line(corner[0] + (column >> 3), corner[1] + (column & 7));
+            let line = self.cells.lines.line(corner[0] + (column >> 3), corner[1] + (column & 7));
             let mut next = line.partition_point(|(height, _)| *height < f64::from(corner[2]));
             for z in 0..8 {
                 while next < line.len() && line[next].0 < f64::from(corner[2] + z) {

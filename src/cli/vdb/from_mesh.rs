@@ -32,6 +32,6 @@ pub fn run(args: &Args, session: &Session) -> Result<(), Failure> {
     args.output.check()?;
     let mesh = args.space.read(&args.mesh).before()?;
     session.check_surface(mesh.area(), args.cell).before()?;
-    let grid = sweep::voxelise(&session.ctx, &mesh, &settings).during()?;
+    let grid = sweep::voxelise(&session.ctx, mesh, &settings).during()?;
     args.output.write(session, grid).during()
 }

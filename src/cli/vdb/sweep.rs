@@ -5,17 +5,18 @@ use crate::cli::exit::{Failure, Phase};
 use crate::cli::options::{MeshSpace, positive, triple};
 use crate::cli::session::Session;
 use frazil::base::{DVec3, TriMesh};
+use frazil::io;
 use frazil::io::sequence::Pattern;
-use frazil::motion::{Key, Keys, MeshSequence, Motion, Rigid};
+use frazil::motion::{InSpace, Key, Keys, MeshSequence, Morph, Motion, Placed, Rigid};
 use frazil::scene::Frames;
 use frazil::sweep::{self, Body, SamplesSettings, Settings};
 use frazil::vdb::FloatGrid;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 /// Make a level set of all the space that a moving mesh passes through
 ///
 /// The motion is a sequence of meshes over some frames; or one mesh that moves and turns; or one mesh that
-/// becomes another with the same triangles.
+/// becomes another with the same faces.
 #[derive(clap::Args)]
 #[command(after_help = "\
 Examples:
@@ -75,41 +76,11 @@ pub fn run(args: &Args, session: &Session) -> Result<(), Failure> {
         return Err(Failure::refused("--dilate must lie in 0 to 100 cells"));
     }
     args.output.check()?;
-    let grid = match &args.mesh[..] {
-        [from, to] => {
-            args.refuse_motion("two meshes")?;
-            if args.method == Method::Samples {
-                return Err(Failure::refused("--method samples needs a sequence or one mesh, not two"));
-            }
-            let [first, second] = [from, to].map(|path| args.space.read_polygons(path));
-            let (first, second) = (first.before()?, second.before()?);
-            if !first.has_faces_of(&second) {
-                let (from, to) = (from.display(), to.display());
-                return Err(Failure::refused(format!("{to}: has other faces than {from}")));
-            }
-            let to = TriMesh { triangles: first.triangles(), positions: second.positions };
-            let from = first.into_triangles();
-            args.check_memory(session, [&from, &to])?;
-            sweep::chain_meshes(&session.ctx, &from, &to, &settings).during()?
-        }
-        _ => args.sweep_one(session, &settings)?,
-    };
+    let grid = args.sweep(session, &settings)?;
     args.output.write(session, grid).during()
 }
 
 impl Args {
-    fn refuse_motion(&self, with: &str) -> Result<(), Failure> {
-        let given = [
-            ("--frames", self.frames.is_some()),
-            ("--move", self.by.is_some()),
-            ("--turn-deg", self.turn_deg.is_some()),
-        ];
-        match given.iter().find(|option| option.1) {
-            Some((name, _)) => Err(Failure::refused(format!("{name} is of no use with {with}"))),
-            None => Ok(()),
-        }
-    }
-
     /// Refuses a sweep between two poses that would need too much memory.
     fn check_memory(&self, session: &Session, [from, to]: [&TriMesh; 2]) -> Result<(), Failure> {
         let path = from.positions.iter().zip(&to.positions).map(|(p, q)| (q - p).norm()).fold(0.0, f32::max);
@@ -119,7 +90,7 @@ impl Args {
         session.check_surface(area, self.cell).before()
     }
 
-    fn sweep_one(&self, session: &Session, settings: &Settings) -> Result<FloatGrid, Failure> {
+    fn sweep(&self, session: &Session, settings: &Settings) -> Result<FloatGrid, Failure> {
         let (motion, from, to) = self.motion()?;
         let posed = |time: f64| -> frazil::Result<TriMesh> {
             let mut pose = Vec::new();
@@ -144,34 +115,68 @@ impl Args {
         }
     }
 
-    /// The motion with its first and last time; frames and the whole of a move count as seconds here.
+    /// The motion with its first and last time; frames, and the whole of a move or change, count as seconds here.
     fn motion(&self) -> Result<(Box<dyn Motion>, f64, f64), Failure> {
-        let path = &self.mesh[0];
-        if let Some(pattern) = Pattern::parse(path) {
-            let Some(frames) = self.frames else {
-                return Err(Failure::refused(format!("{}: a sequence needs --frames A-B", path.display())));
-            };
-            if self.by.is_some() || self.turn_deg.is_some() {
-                return Err(Failure::refused("--move and --turn-deg are of no use with a sequence"));
+        let (motion, from, to) = match &self.mesh[..] {
+            [from, to] => {
+                self.refuse_motion("two meshes", ["--frames", "--move", "--turn-deg"])?;
+                (morph(from, to)?, 0.0, 1.0)
             }
-            if self.space.scale != 1.0 || self.space.up != crate::cli::options::Axis::Y {
-                return Err(Failure::refused("--scale and --up are of no use with a sequence"));
-            }
-            let motion = MeshSequence::open(pattern, frames.first, frames.last, 1.0, 0.0).before()?;
-            return Ok((Box::new(motion), frames.first.into(), frames.last.into()));
-        }
-        if self.frames.is_some() {
-            return Err(Failure::refused("--frames needs a sequence such as body.%04d.obj"));
-        }
+            [path, ..] => match Pattern::parse(path) {
+                Some(pattern) => {
+                    self.refuse_motion("a sequence", ["--move", "--turn-deg"])?;
+                    let needed = format!("{}: a sequence needs --frames A-B", path.display());
+                    let frames = self.frames.ok_or_else(|| Failure::refused(needed))?;
+                    let (first, last) = (frames.first, frames.last);
+                    let sequence = MeshSequence::open(pattern, first, last, 1.0, 0.0).before()?;
+                    (Box::new(sequence) as Box<dyn Motion>, first.into(), last.into())
+                }
+                None => {
+                    self.refuse_motion("one mesh", ["--frames"])?;
+                    let still = Rigid::new(io::mesh::read(path).before()?, Keys::default());
+                    (Box::new(still) as Box<dyn Motion>, 0.0, 1.0)
+                }
+            },
+            [] => return Err(Failure::refused("a sweep needs a mesh")),
+        };
+        let motion: Box<dyn Motion> = Box::new(InSpace::new(motion, self.space.space()));
+        Ok((Box::new(Placed::new(motion, self.keys()?)), from, to))
+    }
+
+    /// The keys of `--move` and `--turn-deg`.
+    fn keys(&self) -> Result<Keys, Failure> {
         if self.by.is_none() && self.turn_deg.is_none() {
-            let what = format!("{}: one mesh needs --move or --turn-deg", path.display());
-            return Err(Failure::refused(what));
+            return Ok(Keys::default());
         }
-        let mesh = self.space.read(path).before()?;
         let turn = self.turn_deg.unwrap_or_default().map(f64::to_radians);
         let start = Key { time: 0.0, at: DVec3::zeros(), turn: DVec3::zeros() };
         let end = Key { time: 1.0, at: self.by.unwrap_or_default(), turn };
-        let keys = Keys::new(vec![start, end]).before()?;
-        Ok((Box::new(Rigid::new(mesh, keys)), 0.0, 1.0))
+        Keys::new(vec![start, end]).before()
     }
+
+    fn refuse_motion<const N: usize>(&self, with: &str, refused: [&str; N]) -> Result<(), Failure> {
+        let given = [
+            ("--frames", self.frames.is_some()),
+            ("--move", self.by.is_some()),
+            ("--turn-deg", self.turn_deg.is_some()),
+        ];
+        match given.iter().find(|(name, given)| *given && refused.contains(name)) {
+            Some((name, _)) => Err(Failure::refused(format!("{name} is of no use with {with}"))),
+            None if with == "one mesh" && !given[1].1 && !given[2].1 => {
+                let what = format!("{}: one mesh needs --move or --turn-deg", self.mesh[0].display());
+                Err(Failure::refused(what))
+            }
+            None => Ok(()),
+        }
+    }
+}
+
+/// One mesh that becomes another with the same faces.
+fn morph(from: &Path, to: &Path) -> Result<Box<dyn Motion>, Failure> {
+    let [first, second] = [from, to].map(io::mesh::read_polygons);
+    let (first, second) = (first.before()?, second.before()?);
+    if !first.has_faces_of(&second) {
+        return Err(Failure::refused(format!("{}: has other faces than {}", to.display(), from.display())));
+    }
+    Ok(Box::new(Morph::new(first.into_triangles(), second.positions).before()?))
 }

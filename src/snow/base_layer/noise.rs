@@ -142,7 +142,7 @@ pub fn displace(ctx: &Context, grid: &mut FloatGrid, params: &NoiseParams) -> Re
     // Rebuilt with a band that holds the displaced surface and still three cells around it.
     let mesh = level_set::to_mesh(ctx, grid, 0.0, 0.0)?;
     let settings = Settings { half_width: half_width + noise.amplitude.ceil(), ..Settings::new(cell) };
-    let wide = crate::sweep::voxelise(ctx, &mesh, &settings)?;
+    let wide = crate::sweep::voxelise(ctx, mesh, &settings)?;
     let mut pieces: Vec<Piece> = wide
         .leaves()?
         .iter()

@@ -1,0 +1,50 @@
+//! One mesh that becomes another.
+
+use super::Motion;
+use crate::base::{DVec3, TriMesh, Vec3};
+use crate::error::{Error, Result};
+
+/// Vertices that move straight from one mesh's places to another's.
+pub struct Morph {
+    from: TriMesh,
+    to: Vec<Vec3>,
+}
+
+impl Morph {
+    /// Moves from `from` at 0 s to the places of `to` (m) at 1 s; it rests before and after.
+    ///
+    /// # Errors
+    /// Another number of places than `from` has vertices.
+    pub fn new(from: TriMesh, to: Vec<Vec3>) -> Result<Self> {
+        if from.positions.len() != to.len() {
+            return Err(Error::argument(format!(
+                "a mesh of {} vertices cannot become one of {}",
+                from.positions.len(),
+                to.len()
+            )));
+        }
+        Ok(Self { from, to })
+    }
+}
+
+impl Motion for Morph {
+    fn triangles(&self) -> &[[u32; 3]] {
+        &self.from.triangles
+    }
+
+    fn vertex_count(&self) -> usize {
+        self.to.len()
+    }
+
+    fn pose(&self, time: f64, out: &mut Vec<DVec3>) -> Result<()> {
+        let part = time.clamp(0.0, 1.0);
+        let ends = self.from.positions.iter().zip(&self.to);
+        out.clear();
+        out.extend(ends.map(|(p, q)| p.cast::<f64>().lerp(&q.cast(), part)));
+        Ok(())
+    }
+
+    fn breaks(&self, from: f64, to: f64) -> Vec<f64> {
+        [0.0, 1.0].into_iter().filter(|&time| time > from && time < to).collect()
+    }
+}
