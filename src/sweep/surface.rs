@@ -126,7 +126,7 @@ impl Surface<'_> {
             OPEN => out.push((v, true)),
             BURIED => {}
             _ => {
-                self.dice(id, v, ahead, around, out);
+                self.cut(id, v, ahead, around, out);
             }
         }
     }
@@ -144,23 +144,28 @@ impl Surface<'_> {
 
     /// Adds the open parts of a part of a face; says whether it is open throughout, as far as it was asked.
     fn dice(&self, id: usize, v: Corners, ahead: Point, around: &[u8], out: &mut Vec<Part>) -> bool {
-        let begin = out.len();
-        let open = match self.seen_around(id, v, around) {
+        match self.seen_around(id, v, around) {
             // Nothing was said where no distance is wanted.
             0 | OPEN => {
                 out.push((v, true));
-                return true;
+                true
             }
             BURIED => false,
-            _ if is_small(&v) => {
-                self.clip(v, ahead, out);
-                out[begin..] == [(v, true)]
-            }
-            _ => match self.said(&v, ahead) {
-                OPEN => true,
-                BURIED => false,
-                _ => halves(v).map(|half| self.dice(id, half, ahead, around, out)) == [true; 2],
-            },
+            _ => self.cut(id, v, ahead, around, out),
+        }
+    }
+
+    /// As [`Surface::dice`], for a part with open and with buried faces around it.
+    fn cut(&self, id: usize, v: Corners, ahead: Point, around: &[u8], out: &mut Vec<Part>) -> bool {
+        let begin = out.len();
+        if is_small(&v) {
+            self.clip(v, ahead, out);
+            return out[begin..] == [(v, true)];
+        }
+        let open = match self.said(&v, ahead) {
+            OPEN => true,
+            BURIED => false,
+            _ => halves(v).map(|half| self.dice(id, half, ahead, around, out)) == [true; 2],
         };
         if open {
             let sure = begin < out.len() && out[begin..].iter().all(|(_, sure)| *sure);
