@@ -17,27 +17,36 @@ pub struct Scratch {
 /// Half diagonals between the voxel centres of a 4^3 and of a 2^3 sub-block, with room for rounding.
 const RADII: [f32; 2] = [2.599, 0.867];
 
-/// A voxel and the triangle nearest to it.
-pub struct Found<'a> {
-    /// Number of the voxel in its block.
-    pub voxel: usize,
-    /// Distance (cells).
-    pub distance: f32,
-    /// Number of the nearest triangle.
-    pub nearest: u32,
-    /// All triangles within `complete` cells, and some farther away.
+/// Eight voxels, 2^3, and the triangles nearest to them.
+pub struct Group<'a> {
+    /// Positions from the block's corner (cells).
+    pub points: Points,
+    /// Squared distances (cells^2).
+    pub squared: [f32; LANES],
+    /// Number of each one's nearest triangle.
+    pub nearest: [u32; LANES],
+    /// All triangles within `complete` cells of a voxel, and some farther away.
     pub near: &'a [u32],
     /// See `near`.
     pub complete: f32,
 }
 
-/// Gives `see` every wanted voxel of a block that may be nearer than `reach` cells to a triangle.
+impl Group<'_> {
+    /// Number of a voxel in its block.
+    pub fn voxel(&self, lane: usize) -> usize {
+        let [x, y, z] = [self.points.x, self.points.y, self.points.z].map(|axis| axis[lane] as usize);
+        offset(x, y, z)
+    }
+}
+
+/// Gives `see` the voxels of a block that may be nearer than `reach` cells to a triangle, where one of eight is
+/// wanted.
 pub fn search(
     triangles: &[Triangle],
     reach: f32,
     wanted: &Mask,
     scratch: &mut Scratch,
-    mut see: impl FnMut(Found<'_>),
+    mut see: impl FnMut(&Group<'_>),
 ) {
     let Scratch { lists: [all, some, near, few], offsets: [far, mid], lanes, centre } = scratch;
     all.clear();
@@ -69,14 +78,9 @@ pub fn search(
             let complete = (least + RADII[1]).min(reach);
             few.clone_from(near);
             prune(few, centre);
-            let (squared, ids) = nearest(triangles, few, &points(corner, 1.0, 0.0));
-            for (lane, (squared, id)) in squared.into_iter().zip(ids).enumerate() {
-                let at = corner_of(corner, 1.0, lane).map(|value| value as usize);
-                let voxel = offset(at[0], at[1], at[2]);
-                if wanted[voxel >> 6] >> (voxel & 63) & 1 == 1 {
-                    see(Found { voxel, distance: squared.sqrt(), nearest: id, near, complete });
-                }
-            }
+            let points = points(corner, 1.0, 0.0);
+            let (squared, nearest) = nearest(triangles, few, &points);
+            see(&Group { points, squared, nearest, near, complete });
         }
     }
 }

@@ -6,9 +6,9 @@ use rayon::prelude::*;
 
 use super::cells::Cells;
 use super::chain::Face;
-use super::distance::Triangle;
+use super::distance::{LANES, Offsets, Points, Triangle, to_each};
 use super::lattice::{Lattice, UNITS};
-use super::nearest::{Found, Scratch, search};
+use super::nearest::{Group, Scratch, search};
 use super::region::{Region, each_block, extent};
 use super::surface::{Facet, is_open, surface};
 use super::winding::Lines;
@@ -71,8 +71,8 @@ const GRAIN: usize = 1024;
 const BLOCK_RADIUS: f32 = 6.07;
 /// Radius of a small facet (cells).
 const SMALL: f32 = 1.0;
-/// How far a nearest point is moved into its facet (cells), away from what it shares with neighbours.
-const INSET: f64 = 0.02;
+/// How far a nearest point is moved into its facet (units), away from what it shares with neighbours.
+const INSET: f64 = 0.02 * UNITS as f64;
 /// All voxels of a block.
 pub const ALL: Mask = [u64::MAX; 8];
 
@@ -246,14 +246,22 @@ impl Voxeliser {
         let signed = |voxel: usize, distance: f32| if is_inside(voxel) { -distance } else { distance };
         let mut values: Box<Values> = Box::new(std::array::from_fn(|voxel| signed(voxel, limit(voxel))));
         let mut uniform = true;
-        search(&triangles, self.band.reach(), wanted, scratch, |found| {
-            let voxel = found.voxel;
-            let depth = match is_inside(voxel) && found.distance < limit(voxel) {
-                true => self.depth(&found, corner, ids, &triangles),
-                false => found.distance,
-            };
-            uniform &= depth >= limit(voxel);
-            values[voxel] = signed(voxel, depth.min(limit(voxel)));
+        let near = Near { voxeliser: self, corner, ids, triangles: &triangles };
+        search(&triangles, self.band.reach(), wanted, scratch, |group| {
+            let mut depths = Depths::new(&near, group);
+            for lane in 0..LANES {
+                let voxel = group.voxel(lane);
+                if wanted[voxel >> 6] >> (voxel & 63) & 1 == 0 {
+                    continue;
+                }
+                let limit = limit(voxel);
+                let mut distance = group.squared[lane].sqrt();
+                if is_inside(voxel) && distance < limit {
+                    distance = depths.at(lane, distance);
+                }
+                uniform &= distance >= limit;
+                values[voxel] = signed(voxel, distance.min(limit));
+            }
         });
         let all = |bits: &dyn Fn(usize) -> u64| (0..8).all(|x| bits(x) & wanted[x] == wanted[x]);
         match (uniform && all(&|x| inside[x]), uniform && all(&|x| !inside[x])) {
@@ -261,42 +269,6 @@ impl Voxeliser {
             (_, true) => None,
             _ => Some(Piece::Near(self.origin(block), values)),
         }
-    }
-
-    /// Depth (cells) of a voxel inside: the distance to its nearest facet; where that one's nearest point is not
-    /// open, because the facet was clipped too wide, to the nearest that is.
-    fn depth(&self, found: &Found<'_>, corner: [i32; 3], ids: &[u32], triangles: &[Triangle]) -> f32 {
-        let p = [found.voxel >> 6, found.voxel >> 3 & 7, found.voxel & 7].map(|value| value as f32);
-        let is_open = |index: u32, at: [f32; 3]| {
-            let facet = &self.facets[ids[index as usize] as usize];
-            facet.sure || self.is_open(facet, at, corner)
-        };
-        if is_open(found.nearest, triangles[found.nearest as usize].closest(p)) {
-            return found.distance;
-        }
-        let nearest_open = |candidates: &mut dyn Iterator<Item = u32>| -> f32 {
-            let mut others: Vec<(f32, u32, [f32; 3])> = candidates
-                .map(|index| (index, triangles[index as usize].closest(p)))
-                .map(|(index, at)| (gap(p, at), index, at))
-                .filter(|(distance, index, _)| *distance < self.band.inside && *index != found.nearest)
-                .collect();
-            others.sort_unstable_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
-            let open = others.into_iter().find(|(_, index, at)| is_open(*index, *at));
-            open.map_or(self.band.inside, |(distance, ..)| distance)
-        };
-        let near = nearest_open(&mut found.near.iter().copied());
-        if near <= found.complete { near } else { nearest_open(&mut (0..triangles.len() as u32)) }
-    }
-
-    /// Whether a point of a facet (cells from a block's corner) is open.
-    fn is_open(&self, Facet { v, face, .. }: &Facet, at: [f32; 3], corner: [i32; 3]) -> bool {
-        let at = [0, 1, 2].map(|axis| f64::from(corner[axis]) + f64::from(at[axis]));
-        let middle =
-            [0, 1, 2].map(|a| v.iter().map(|p| f64::from(p[a])).sum::<f64>() / (3.0 * f64::from(UNITS)));
-        let way = [0, 1, 2].map(|axis| middle[axis] - at[axis]);
-        let length = way.iter().map(|value| value * value).sum::<f64>().sqrt();
-        let part = if length > INSET { INSET / length } else { 1.0 };
-        is_open(&self.cells, *face, [0, 1, 2].map(|axis| (at[axis] + part * way[axis]) * f64::from(UNITS)))
     }
 
     /// The voxels of a block that the chain winds around.
@@ -314,6 +286,77 @@ impl Voxeliser {
             }
         }
         inside
+    }
+}
+
+/// The facets in reach of a block.
+struct Near<'a> {
+    voxeliser: &'a Voxeliser,
+    corner: [i32; 3],
+    ids: &'a [u32],
+    triangles: &'a [Triangle],
+}
+
+impl Near<'_> {
+    /// Whether a point of a facet (cells from the block's corner) bounds the volume.
+    fn is_open(&self, index: u32, at: [f32; 3]) -> bool {
+        let Facet { v, face, sure } = &self.voxeliser.facets[self.ids[index as usize] as usize];
+        if *sure {
+            return true;
+        }
+        let cells = f64::from(UNITS);
+        let at = [0, 1, 2].map(|axis| (f64::from(self.corner[axis]) + f64::from(at[axis])) * cells);
+        let way = [0, 1, 2].map(|axis| v.iter().map(|p| f64::from(p[axis])).sum::<f64>() / 3.0 - at[axis]);
+        let length = way.iter().map(|value| value * value).sum::<f64>().sqrt();
+        let part = if length > INSET { INSET / length } else { 1.0 };
+        is_open(&self.voxeliser.cells, *face, [0, 1, 2].map(|axis| at[axis] + part * way[axis]))
+    }
+}
+
+/// Depths of a group's voxels: distances to their nearest facets; where a facet's nearest point does not bound the
+/// volume, because it was clipped too wide, to the nearest that does.
+struct Depths<'a> {
+    near: &'a Near<'a>,
+    group: &'a Group<'a>,
+    /// Offsets of the voxels from the near triangles, and from all, once they are needed.
+    offsets: [Vec<Offsets>; 2],
+}
+
+impl<'a> Depths<'a> {
+    fn new(near: &'a Near<'a>, group: &'a Group<'a>) -> Self {
+        Self { near, group, offsets: [Vec::new(), Vec::new()] }
+    }
+
+    fn at(&mut self, lane: usize, distance: f32) -> f32 {
+        let Points { x, y, z } = &self.group.points;
+        let p = [x[lane], y[lane], z[lane]];
+        let nearest = self.group.nearest[lane];
+        if self.near.is_open(nearest, self.near.triangles[nearest as usize].closest(p)) {
+            return distance;
+        }
+        let depth = self.nearest_open(lane, p, 0, self.group.near);
+        if depth <= self.group.complete {
+            return depth;
+        }
+        let all: Vec<u32> = (0..self.near.triangles.len() as u32).collect();
+        self.nearest_open(lane, p, 1, &all)
+    }
+
+    /// Distance (cells) of a voxel at `p` from the nearest point that bounds the volume, of the listed triangles.
+    fn nearest_open(&mut self, lane: usize, p: [f32; 3], which: usize, list: &[u32]) -> f32 {
+        let offsets = &mut self.offsets[which];
+        if offsets.is_empty() {
+            to_each(self.near.triangles, list, &self.group.points, offsets);
+        }
+        let limit = self.near.voxeliser.band.inside;
+        let squares = offsets.iter().map(|offset| offset.squared[lane]).zip(0..);
+        let mut order: Vec<(f32, usize)> = squares.filter(|(square, _)| *square < limit * limit).collect();
+        order.sort_unstable_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
+        let open = |(_, place): &(f32, usize)| {
+            let Offsets { x, y, z, .. } = &offsets[*place];
+            self.near.is_open(list[*place], [p[0] - x[lane], p[1] - y[lane], p[2] - z[lane]])
+        };
+        order.into_iter().find(open).map_or(limit, |(square, _)| square.sqrt())
     }
 }
 
