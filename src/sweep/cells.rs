@@ -116,7 +116,7 @@ impl Cells {
 
     /// Winding number of the chain at a point (fixed-point units): the nearest voxel's, and the faces between.
     pub fn winding(&self, point: Point) -> i32 {
-        let voxel = point.map(|value| (value / f64::from(UNITS)).round() as i32);
+        let voxel = voxel_of(point);
         let mut winding = self.lines.winding(voxel);
         let Some(block) = self.block_of(voxel) else { return winding };
         let begin = voxel.map(|value| (value & 7) as f32);
@@ -195,6 +195,14 @@ fn by_cell(corner: [i32; 3], ids: &[u32], faces: &[Face], normals: &[Point]) -> 
         next[cell as usize] += 1;
     }
     Lists { start, items }
+}
+
+/// The voxel nearest to a point (fixed-point units).
+pub fn voxel_of(point: Point) -> [i32; 3] {
+    // Far above 0, cutting off is rounding down: no call as for `round`.
+    const ABOVE: i64 = 1 << 40;
+    let unit = i64::from(UNITS);
+    point.map(|value| (((value + ABOVE as f64) as i64 + unit / 2).div_euclid(unit) - ABOVE / unit) as i32)
 }
 
 /// A voxel's number in its block.

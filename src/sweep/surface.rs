@@ -9,7 +9,7 @@ use std::sync::atomic::{AtomicU8, Ordering};
 
 use rayon::prelude::*;
 
-use super::cells::{Cells, Point, cross, difference, dot, each_voxel, sub};
+use super::cells::{Cells, Point, cross, difference, dot, each_voxel, sub, voxel_of};
 use super::lattice::{Fixed, UNITS};
 use super::region::extent;
 use crate::context::Context;
@@ -75,7 +75,7 @@ pub fn surface(ctx: &Context, cells: &Cells) -> Result<Vec<Facet>> {
             let (mut out, mut parts) = (Vec::with_capacity(seen.len()), Vec::new());
             for (index, &seen) in seen.iter().enumerate() {
                 let id = chunk * GRAIN + index;
-                chain.open_parts(id, seen, &around, &mut parts);
+                chain.open_parts(id, verdicts[id], seen, &around, &mut parts);
                 out.extend(parts.drain(..).map(|(v, sure)| Facet { v, face: id as u32, sure }));
             }
             out
@@ -119,14 +119,14 @@ impl Surface<'_> {
         (plain(around), plain(seen))
     }
 
-    /// Adds the open parts of a face, from what was said in its cells.
-    fn open_parts(&self, id: usize, seen: u8, around: &[u8], out: &mut Vec<Part>) {
+    /// Adds the open parts of a face, from what it and what all faces in its cells said.
+    fn open_parts(&self, id: usize, said: u8, seen: u8, around: &[u8], out: &mut Vec<Part>) {
         let (v, Some(ahead)) = (self.cells.faces[id].v, self.ahead(id)) else { return };
         match seen {
             OPEN => out.push((v, true)),
             BURIED => {}
             _ => {
-                self.cut(id, v, ahead, around, out);
+                self.cut(id, v, said, ahead, around, out);
             }
         }
     }
@@ -151,18 +151,21 @@ impl Surface<'_> {
                 true
             }
             BURIED => false,
-            _ => self.cut(id, v, ahead, around, out),
+            _ => {
+                let said = self.said(&v, ahead);
+                self.cut(id, v, said, ahead, around, out)
+            }
         }
     }
 
-    /// As [`Surface::dice`], for a part with open and with buried faces around it.
-    fn cut(&self, id: usize, v: Corners, ahead: Point, around: &[u8], out: &mut Vec<Part>) -> bool {
+    /// As [`Surface::dice`], for a part that said this and has open and buried faces around it.
+    fn cut(&self, id: usize, v: Corners, said: u8, ahead: Point, around: &[u8], out: &mut Vec<Part>) -> bool {
         let begin = out.len();
         if is_small(&v) {
-            self.clip(v, ahead, out);
+            self.clip(v, said, ahead, out);
             return out[begin..] == [(v, true)];
         }
-        let open = match self.said(&v, ahead) {
+        let open = match said {
             OPEN => true,
             BURIED => false,
             _ => halves(v).map(|half| self.dice(id, half, ahead, around, out)) == [true; 2],
@@ -180,12 +183,13 @@ impl Surface<'_> {
         v.map(|p| self.ask(between(p.map(f64::from), centre, INSET), ahead))
     }
 
-    /// Adds the open parts of a small triangle.
-    fn clip(&self, v: Corners, ahead: Point, out: &mut Vec<Part>) {
+    /// Adds the open parts of a small triangle that said this of its middle.
+    fn clip(&self, v: Corners, said: u8, ahead: Point, out: &mut Vec<Part>) {
         let open = self.corners(v, ahead).map(|corner| corner == OPEN);
         let centre = middle(&v);
         let count = open.iter().filter(|open| **open).count();
-        if count % 3 == 0 && (self.ask(centre, ahead) == OPEN) == open[0] {
+        let middle_open = || if said == 0 { self.ask(centre, ahead) == OPEN } else { said == OPEN };
+        if count % 3 == 0 && middle_open() == open[0] {
             if open[0] {
                 out.push((v, true));
             }
@@ -233,8 +237,7 @@ impl Surface<'_> {
 
     /// Whether distances may be wanted near a point.
     fn is_known(&self, at: Point) -> bool {
-        let voxel = at.map(|value| (value / f64::from(UNITS)).round() as i32);
-        self.cells.of_voxel(voxel).is_some()
+        self.cells.of_voxel(voxel_of(at)).is_some()
     }
 
     /// A hair along a face's normal; none for a face without area.
