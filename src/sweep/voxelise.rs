@@ -1,5 +1,6 @@
 //! From the boundary of a chain to blocks of signed distances: winding number first, distance second.
 
+use std::cell::RefCell;
 use std::sync::atomic::{AtomicBool, Ordering};
 
 use rayon::prelude::*;
@@ -71,6 +72,8 @@ const GRAIN: usize = 1024;
 const BLOCK_RADIUS: f32 = 6.07;
 /// Radius of a small facet (cells).
 const SMALL: f32 = 1.0;
+/// Points of a facet nearer together than this (cells) say the same.
+const SAME: f32 = 0.05;
 /// How far a nearest point is moved into its facet (units), away from what it shares with neighbours.
 const INSET: f64 = 0.02 * UNITS as f64;
 /// All voxels of a block.
@@ -246,7 +249,8 @@ impl Voxeliser {
         let signed = |voxel: usize, distance: f32| if is_inside(voxel) { -distance } else { distance };
         let mut values: Box<Values> = Box::new(std::array::from_fn(|voxel| signed(voxel, limit(voxel))));
         let mut uniform = true;
-        let near = Near { voxeliser: self, corner, ids, triangles: &triangles };
+        let asked = RefCell::new(vec![([f32::INFINITY; 3], false); triangles.len()]);
+        let near = Near { voxeliser: self, corner, ids, triangles: &triangles, asked };
         search(&triangles, self.band.reach(), wanted, scratch, |group| {
             let mut depths = Depths::new(&near, group);
             for lane in 0..LANES {
@@ -295,6 +299,8 @@ struct Near<'a> {
     corner: [i32; 3],
     ids: &'a [u32],
     triangles: &'a [Triangle],
+    /// Where each triangle was asked last, and what it said.
+    asked: RefCell<Vec<([f32; 3], bool)>>,
 }
 
 impl Near<'_> {
@@ -304,12 +310,19 @@ impl Near<'_> {
         if *sure {
             return true;
         }
+        let (before, said) = self.asked.borrow()[index as usize];
+        if gap(before, at) < SAME {
+            return said;
+        }
+        let place = at;
         let cells = f64::from(UNITS);
         let at = [0, 1, 2].map(|axis| (f64::from(self.corner[axis]) + f64::from(at[axis])) * cells);
         let way = [0, 1, 2].map(|axis| v.iter().map(|p| f64::from(p[axis])).sum::<f64>() / 3.0 - at[axis]);
         let length = way.iter().map(|value| value * value).sum::<f64>().sqrt();
         let part = if length > INSET { INSET / length } else { 1.0 };
-        is_open(&self.voxeliser.cells, *face, [0, 1, 2].map(|axis| at[axis] + part * way[axis]))
+        let open = is_open(&self.voxeliser.cells, *face, [0, 1, 2].map(|axis| at[axis] + part * way[axis]));
+        self.asked.borrow_mut()[index as usize] = (place, open);
+        open
     }
 }
 
