@@ -198,3 +198,15 @@ fn centred(edge: f32) -> TriMesh {
     mesh.positions.iter_mut().for_each(|p| *p -= (low + high) / 2.0);
     mesh
 }
+
+#[test]
+fn a_box_whose_faces_lie_on_voxels_is_one_piece() {
+    let ctx = context();
+    let mut mesh = shapes::cuboid([0.6, 0.2, 0.4]);
+    let (low, _) = mesh.bounds().unwrap();
+    mesh.positions.iter_mut().for_each(|p| *p -= low);
+    let grid = sweep::voxelise(&ctx, mesh, &Settings::new(CELL)).unwrap();
+    let mesh = level_set::to_mesh(&ctx, &grid, 0.0, 0.0).unwrap();
+    assert_eq!(mesh.euler_characteristic(), 2);
+    assert!((mesh.volume() / 0.048 - 1.0).abs() < 0.01, "{}", mesh.volume());
+}

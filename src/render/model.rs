@@ -62,18 +62,16 @@ impl Model {
     pub(super) fn hit(&self, origin: DVec3, toward: DVec3) -> Option<Hit> {
         let hit = self.tree.ray(origin, toward, f64::INFINITY)?;
         let corners = self.mesh.triangles[hit.triangle].map(|index| index as usize);
-        let normal = match &self.normals {
-            None => {
-                let [a, b, c] = corners.map(|index| self.mesh.positions[index].cast::<f64>());
-                (b - a).cross(&(c - a))
-            }
-            Some(normals) => {
-                let [a, b, c] = corners.map(|index| normals[index].cast::<f64>());
-                a * (1.0 - hit.u - hit.v) + b * hit.u + c * hit.v
-            }
-        };
-        let normal = normal.try_normalize(0.0).unwrap_or(-toward);
-        let normal = if normal.dot(&toward) > 0.0 { -normal } else { normal };
+        let [a, b, c] = corners.map(|index| self.mesh.positions[index].cast::<f64>());
+        let flat = (b - a).cross(&(c - a));
+        let smooth = self.normals.as_ref().map_or(flat, |normals| {
+            let [a, b, c] = corners.map(|index| normals[index].cast::<f64>());
+            a * (1.0 - hit.u - hit.v) + b * hit.u + c * hit.v
+        });
+        // A triangle seen from behind is turned round; a smooth normal never leaves the side that is seen.
+        let normal = if flat.dot(&toward) > 0.0 { -smooth } else { smooth };
+        let away = normal.dot(&toward).max(0.0);
+        let normal = (normal - toward * away).try_normalize(0.0).unwrap_or(-toward);
         Some(Hit { distance: hit.distance, normal, albedo: self.albedo, skin: self.skin })
     }
 

@@ -76,6 +76,8 @@ const SMALL: f32 = 1.0;
 const SAME: f32 = 0.05;
 /// How far a nearest point is moved into its facet (units), away from what it shares with neighbours.
 const INSET: f64 = 0.02 * UNITS as f64;
+/// A voxel nearer than this (cells) lies on the surface.
+const ON_FACE: f32 = 1e-4;
 /// All voxels of a block.
 pub const ALL: Mask = [u64::MAX; 8];
 
@@ -246,7 +248,12 @@ impl Voxeliser {
         let inside = self.inside_voxels(corner);
         let is_inside = |voxel: usize| inside[voxel >> 6] >> (voxel & 63) & 1 == 1;
         let limit = |voxel: usize| if is_inside(voxel) { self.band.inside } else { self.band.outside };
-        let signed = |voxel: usize, distance: f32| if is_inside(voxel) { -distance } else { distance };
+        let signed = |voxel: usize, distance: f32| match distance {
+            // Else rounding would scatter specks of volume over a face that lies on voxels.
+            _ if distance < ON_FACE => 0.0,
+            _ if is_inside(voxel) => -distance,
+            _ => distance,
+        };
         let mut values: Box<Values> = Box::new(std::array::from_fn(|voxel| signed(voxel, limit(voxel))));
         let mut uniform = true;
         let asked = RefCell::new(vec![([f32::INFINITY; 3], false); triangles.len()]);
