@@ -16,7 +16,7 @@ demo: setup
 	target/release/examples/make_scenes $(DEMO)
 	target/release/frazil snow $(DEMO)/walker.toml -o $(DEMO)/walker
 	target/release/frazil preview $(DEMO)/walker/base/base.0048.vdb -o $(DEMO)/walker.png
-	target/release/frazil preview $(DEMO)/walker/base/base.0048.vdb -o $(DEMO)/print.png --eye -0.05,1.1,1.2 --target 0.085,0.15,1.67 --fov 26 --sun 160,60
+	target/release/frazil preview $(DEMO)/walker/base/base.0048.vdb -o $(DEMO)/print.png --eye -0.05,1.1,1.2 --target 0.085,0.15,1.67 --fov 21 --sun 160,60
 	target/release/frazil snow $(DEMO)/box.toml -o $(DEMO)/box
 	target/release/frazil preview $(DEMO)/box/base/base.0005.vdb -o $(DEMO)/box.png
 	target/release/frazil snow $(DEMO)/cube.toml -o $(DEMO)/cube
