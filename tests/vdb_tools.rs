@@ -127,3 +127,15 @@ fn a_file_cut_at_any_of_20_places_is_refused_in_a_sentence() {
     std::fs::write(&path, &bytes).unwrap();
     assert_eq!(file::read(&path).unwrap().len(), 1);
 }
+
+#[test]
+fn values_that_are_not_finite_are_refused_with_the_grid() {
+    let ctx = context(2);
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("nan.vdb");
+    let mut grid = level_set::from_mesh(&ctx, &sphere(0.2, 6), 0.05, 3.0).unwrap();
+    grid.leaves_mut().unwrap()[1].values[77] = f32::NAN;
+    file::write(&path, &[&grid], &WriteOptions::default()).unwrap();
+    let what = file::read_named(&path, None).map(|_| ()).unwrap_err().to_string();
+    assert!(what.contains("nan.vdb") && what.contains("not finite"), "{what}");
+}

@@ -131,7 +131,7 @@ fn cannot_read(path: &Path, error: &cxx::Exception) -> Error {
     Error::file(path, format!("the .vdb file cannot be read, it is cut short or damaged{reason}"))
 }
 
-/// What a file says of its grids, of any type; values are not read.
+/// What a file says of its grids, of any type, in the order of their names; values are not read.
 ///
 /// # Errors
 /// A missing, empty, cut or damaged file.
@@ -159,7 +159,7 @@ fn info(header: ffi::GridHeader) -> GridInfo {
 /// OpenVDB's name of a float grid's type; a suffix says that values are stored in 16 bits.
 const FLOAT_TYPE: &str = "Tree_float_5_4_3";
 
-/// Every grid of a file, all of which must be float grids.
+/// Every grid of a file, in the order of their names; all must be float grids.
 ///
 /// # Errors
 /// As [`describe`]; a grid of another type (named); no grid at all.
@@ -174,7 +174,7 @@ pub fn read(path: &Path) -> Result<Vec<FloatGrid>> {
 /// The float grid of that name; without a name the first level set, else the first float grid.
 ///
 /// # Errors
-/// As [`describe`]; no such grid (the file's grids are named).
+/// As [`describe`]; no such grid (the file's grids are named); values that are not finite.
 pub fn read_named(path: &Path, name: Option<&str>) -> Result<FloatGrid> {
     let headers = describe(path)?;
     let is_float = |header: &&GridInfo| header.value_type.starts_with(FLOAT_TYPE);
@@ -206,5 +206,10 @@ fn load(path: &Path, header: &GridInfo) -> Result<FloatGrid> {
         ));
     }
     let inner = ffi::read_float_grid(text(path)?, &header.name).map_err(|error| cannot_read(path, &error))?;
-    Ok(FloatGrid { inner })
+    let grid = FloatGrid { inner };
+    let finite = grid.leaves()?.iter().all(|leaf| leaf.values.iter().all(|value| value.is_finite()));
+    if !finite || !grid.background().is_finite() {
+        return Err(Error::file(path, format!("grid \"{}\" has values that are not finite", header.name)));
+    }
+    Ok(grid)
 }
