@@ -1,5 +1,7 @@
 //! Triangle meshes.
 
+use std::collections::HashMap;
+
 use super::{DVec3, Vec3};
 use crate::error::{Error, Result};
 
@@ -85,12 +87,26 @@ impl TriMesh {
         used.len() as i64 - edges as i64 + self.triangles.len() as i64
     }
 
+    /// The mesh with its triangles turned round.
+    pub fn reversed(mut self) -> Self {
+        self.triangles.iter_mut().for_each(|[_, b, c]| std::mem::swap(b, c));
+        self
+    }
+
     /// Adds another mesh's triangles.
     pub fn append(&mut self, other: &Self) {
         let first = self.positions.len() as u32;
         self.positions.extend_from_slice(&other.positions);
         self.triangles.extend(other.triangles.iter().map(|triangle| triangle.map(|index| index + first)));
     }
+}
+
+/// For each place the number of the first one that is the same.
+pub fn coincident(places: impl Iterator<Item = DVec3>) -> Vec<u32> {
+    let mut first: HashMap<[u64; 3], u32> = HashMap::with_capacity(places.size_hint().0);
+    // Adding zero makes -0 and 0 the same.
+    let key = |p: DVec3| [p.x + 0.0, p.y + 0.0, p.z + 0.0].map(f64::to_bits);
+    places.zip(0..).map(|(p, number)| *first.entry(key(p)).or_insert(number)).collect()
 }
 
 /// Checks the vertices and faces of a mesh.

@@ -1,7 +1,5 @@
 //! A moving body as the chain wants it: closed triangles, and poses at well-chosen times.
 
-use std::collections::HashMap;
-
 use rayon::prelude::*;
 
 use super::chain::{Face, Weights, Window, boundary};
@@ -9,6 +7,7 @@ use super::lattice::{Fixed, Lattice, UNITS};
 use super::refine::{edge_error, refine};
 use super::topology::Topology;
 use crate::base::DVec3;
+use crate::base::mesh::coincident;
 use crate::error::{Error, Result};
 use crate::motion::Motion;
 
@@ -39,7 +38,7 @@ impl Body {
         }
         let mut pose = Vec::new();
         motion.pose(time, &mut pose)?;
-        let same = coincident(&pose);
+        let same = coincident(pose.iter().copied());
         let mut topology = Topology::new(motion.triangles(), motion.vertex_count(), &same, true);
         topology.complete(&mut pose);
         if volume(&topology, &pose) < 0.0 {
@@ -203,14 +202,6 @@ impl Near {
     fn sees(&self, poses: &[impl AsRef<[DVec3]>], edge: &[u32; 2]) -> bool {
         self.touches(poses.iter().flat_map(|pose| edge.map(|vertex| pose.as_ref()[vertex as usize])), 1.0)
     }
-}
-
-/// For each vertex the first one with the same position.
-fn coincident(pose: &[DVec3]) -> Vec<u32> {
-    let mut first: HashMap<[u64; 3], u32> = HashMap::with_capacity(pose.len());
-    // Adding zero makes -0 and 0 the same.
-    let key = |p: &DVec3| [p.x + 0.0, p.y + 0.0, p.z + 0.0].map(f64::to_bits);
-    pose.iter().enumerate().map(|(index, p)| *first.entry(key(p)).or_insert(index as u32)).collect()
 }
 
 fn volume(topology: &Topology, pose: &[DVec3]) -> f64 {

@@ -15,6 +15,8 @@ pub type Point = [f64; 3];
 const GRAIN: usize = 1024;
 /// A block with at most this many faces is one cell.
 const FEW: usize = 8;
+/// How far apart two points may be whose winding numbers are told together (cells).
+pub const BESIDE: f32 = 0.02;
 /// No slot.
 const NONE: u32 = u32::MAX;
 /// Where a voxel is taken to be, off its centre (units): down, far less to the right, and least of all forward, as
@@ -114,24 +116,35 @@ impl Cells {
         (slot != NONE).then(|| &self.blocks[slot as usize])
     }
 
-    /// Winding number of the chain at a point (fixed-point units): the nearest voxel's, and the faces between.
-    pub fn winding(&self, point: Point) -> i32 {
+    /// Winding numbers of the chain at a point and at another at most [`BESIDE`] cells away (fixed-point units): the
+    /// nearest voxel's, and the faces between.
+    pub fn windings(&self, point: Point, beside: Point) -> [i32; 2] {
         let voxel = voxel_of(point);
         let mut winding = self.lines.winding(voxel);
-        let Some(block) = self.block_of(voxel) else { return winding };
+        let Some(block) = self.block_of(voxel) else { return [winding; 2] };
         let begin = voxel.map(|value| (value & 7) as f32);
-        let end = [0, 1, 2]
-            .map(|axis| begin[axis] + (point[axis] / f64::from(UNITS) - f64::from(voxel[axis])) as f32);
+        let local = |p: Point| {
+            [0, 1, 2].map(|axis| begin[axis] + (p[axis] / f64::from(UNITS) - f64::from(voxel[axis])) as f32)
+        };
+        let (end, beside) = (local(point), local(beside));
+        let mut change = 0;
         for &place in block.cells.get(block.cell(voxel)) {
-            let crossing = match block.prisms[place as usize].crossing(begin, end) {
-                Crossing::None => continue,
-                Crossing::Outward => -1,
-                Crossing::Inward => 1,
-                Crossing::Unclear => self.exact_crossing(block.ids[place as usize] as usize, voxel, point),
-            };
-            winding += crossing * self.faces[block.ids[place as usize] as usize].coef;
+            let prism = &block.prisms[place as usize];
+            let coef = || self.faces[block.ids[place as usize] as usize].coef;
+            let (crossing, height) = prism.crossing(begin, end);
+            match crossing {
+                Crossing::None => {}
+                Crossing::Outward => winding -= coef(),
+                Crossing::Inward => winding += coef(),
+                Crossing::Unclear => {
+                    winding += coef() * self.exact_crossing(block.ids[place as usize] as usize, voxel, point);
+                }
+            }
+            if height.abs() <= BESIDE {
+                change += prism.short_crossing(end, beside) * coef();
+            }
         }
-        winding
+        [winding, winding + change]
     }
 
     /// 1 when the way from a voxel to a point enters the chain through a face, -1 when it leaves it, else 0.

@@ -26,23 +26,34 @@ impl Prism {
         Self { plane: along(*normal, &v[0]), edges: [edge(0), edge(1), edge(2)] }
     }
 
-    /// How a segment between two positions (cells) passes the triangle.
+    /// How a segment between two positions (cells) passes the triangle, and the height of its end over the plane.
     #[inline]
-    pub fn crossing(&self, begin: [f32; 3], end: [f32; 3]) -> Crossing {
+    pub fn crossing(&self, begin: [f32; 3], end: [f32; 3]) -> (Crossing, f32) {
         let (first, last) = (value(&self.plane, begin), value(&self.plane, end));
         if (first > CLEAR) & (last > 0.0) | (first < -CLEAR) & (last < 0.0) {
-            return Crossing::None;
+            return (Crossing::None, last);
         }
         let t = first / (first - last);
         let at = [0, 1, 2].map(|axis| begin[axis] + t * (end[axis] - begin[axis]));
         let [a, b, c] = [0, 1, 2].map(|i| value(&self.edges[i], at));
         let least = a.min(b).min(c);
-        match first {
+        let crossing = match first {
             _ if least < -CLEAR && first.abs() > CLEAR => Crossing::None,
             height if height > CLEAR && least > CLEAR => Crossing::Inward,
             height if height < -CLEAR && least > CLEAR => Crossing::Outward,
             _ => Crossing::Unclear,
+        };
+        (crossing, last)
+    }
+
+    /// 1 when a segment too short for doubt enters through the triangle's front, -1 when it leaves, else 0.
+    #[inline]
+    pub fn short_crossing(&self, begin: [f32; 3], end: [f32; 3]) -> i32 {
+        let (first, last) = (value(&self.plane, begin), value(&self.plane, end));
+        if (first > 0.0) == (last > 0.0) || !self.edges.iter().all(|edge| value(edge, end) > 0.0) {
+            return 0;
         }
+        if first > 0.0 { 1 } else { -1 }
     }
 }
 

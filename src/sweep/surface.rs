@@ -229,10 +229,11 @@ impl Surface<'_> {
         between(a, b, (first + last) / 2.0).map(|value| value.round() as i32)
     }
 
-    /// Whether a point is open, with the way `ahead` of its face.
+    /// Whether a point of a face is open: the chain is absent a hair in front of it, and not behind.
     fn ask(&self, at: Point, ahead: Point) -> u8 {
-        let point = [0, 1, 2].map(|axis| at[axis] + ahead[axis]);
-        if self.cells.winding(point) < 1 { OPEN } else { BURIED }
+        let moved = |side: f64| [0, 1, 2].map(|axis| at[axis] + side * ahead[axis]);
+        let [front, back] = self.cells.windings(moved(1.0), moved(-1.0));
+        if front < 1 && back >= 1 { OPEN } else { BURIED }
     }
 
     /// Whether distances may be wanted near a point.

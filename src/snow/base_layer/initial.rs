@@ -4,6 +4,7 @@
 //! a chain that count +1, solids count so far below zero that no prism fills them: one pass of winding
 //! numbers then gives the layer, without the ghost surfaces that CSG of coincident faces leaves.
 
+use crate::base::mesh::coincident;
 use crate::base::{DVec3, TriMesh, Vec3};
 use crate::context::Context;
 use crate::error::{Error, Result};
@@ -47,7 +48,8 @@ pub fn layer(
     cell: f64,
     half_width: f32,
 ) -> Result<FloatGrid> {
-    let ground = ground_mesh(ground)?;
+    let ground = upright(ground_mesh(ground)?);
+    let statics: Vec<TriMesh> = statics.iter().map(|mesh| upright(mesh.clone())).collect();
     let lattice = Lattice::near(cell, centre(&ground)?)?;
     let faces = ctx.stage("prisms", || {
         let mut faces = Vec::new();
@@ -56,20 +58,21 @@ pub fn layer(
                 if !(*depth > 0.0 && depth.is_finite()) {
                     return Err(Error::argument(format!("depth = {depth} m is not above 0")));
                 }
-                for mesh in std::iter::once(&ground).chain(statics) {
+                for mesh in std::iter::once(&ground).chain(&statics) {
                     let raised = |p: DVec3| p + DVec3::y() * *depth;
                     prisms(&lattice, mesh, |p| p, raised, 1, &mut faces)?;
                 }
             }
             Cover::Top(top) => {
                 centre(top)?;
+                let top = &upright(top.clone());
                 let floor = lowest(&ground).min(lowest(top)) - 16.0 * cell;
                 let sunk = |p: DVec3| DVec3::new(p.x, floor, p.z);
                 prisms(&lattice, top, sunk, |p| p, 1, &mut faces)?;
                 prisms(&lattice, &ground, sunk, |p| p, SOLID, &mut faces)?;
             }
         }
-        for mesh in std::iter::once(&ground).filter(|mesh| is_solid(mesh)).chain(statics) {
+        for mesh in std::iter::once(&ground).filter(|mesh| is_solid(mesh)).chain(&statics) {
             solid(&lattice, mesh, &mut faces)?;
         }
         Ok(faces)
@@ -115,8 +118,18 @@ fn lowest(mesh: &TriMesh) -> f64 {
 }
 
 fn topology(mesh: &TriMesh, close: bool) -> Topology {
-    let count = mesh.positions.len();
-    Topology::new(&mesh.triangles, count, &(0..count as u32).collect::<Vec<_>>(), close)
+    let same = coincident(mesh.positions.iter().map(|p| p.cast()));
+    Topology::new(&mesh.triangles, mesh.positions.len(), &same, close)
+}
+
+/// A mesh as it is meant: a solid with its faces outward, a sheet with its faces upward.
+fn upright(mesh: TriMesh) -> TriMesh {
+    let up: f64 = (0..mesh.triangles.len())
+        .map(|triangle| mesh.corners(triangle))
+        .map(|[a, b, c]| (b - a).cross(&(c - a)).y)
+        .sum();
+    let inward = if is_solid(&mesh) { mesh.volume() < 0.0 } else { up < 0.0 };
+    if inward { mesh.reversed() } else { mesh }
 }
 
 fn is_solid(mesh: &TriMesh) -> bool {
