@@ -1,7 +1,7 @@
 //! The parts of a chain's faces that bound its volume. The chain's boundary also has sheets inside the
 //! volume, where layers overlap: distances must not see them.
 //!
-//! A point of a face is open when the chain is absent a hair in front of it. Faces are small against
+//! A point of a face is open when the chain is absent a hair in front of it, and present behind it. Faces are small against
 //! what they bound, so one sample speaks for a face unless its neighbourhood disagrees; then its corners
 //! are asked, and the face is clipped where it dives into the volume.
 
