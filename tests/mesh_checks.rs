@@ -11,7 +11,7 @@ use frazil::base::bvh::Bvh;
 use frazil::base::{DVec3, TriMesh, Vec3};
 use frazil::io::mesh;
 use frazil::io::sequence::Pattern;
-use frazil::motion::{Key, Keys, MeshSequence, Motion, Placed, Rigid};
+use frazil::motion::{Key, Keys, MeshSequence, Motion, Placed, Rigid, Space, Up};
 use proptest::prelude::*;
 
 /// A torus about Y: closed, genus 1.
@@ -123,8 +123,11 @@ fn rigid_keys_move_on_arcs_and_compose() {
         assert!((out[0] - DVec3::new(x, 0.0, 0.0)).norm() < 1e-12, "{time}");
     }
     assert_eq!(rigid.breaks(0.0, 2.0), [1.0]);
-    let placed =
-        Placed::new(Box::new(rigid), Keys::new(vec![key(1.5, 10.0, PI / 2.0), key(3.0, 0.0, 0.0)]).unwrap());
+    let placed = Placed::new(
+        Box::new(rigid),
+        Space::OWN,
+        Keys::new(vec![key(1.5, 10.0, PI / 2.0), key(3.0, 0.0, 0.0)]).unwrap(),
+    );
     placed.pose(1.5, &mut out).unwrap();
     assert!((out[0] - DVec3::new(9.0, 2.0, 0.0)).norm() < 1e-12);
     assert_eq!(placed.breaks(0.0, 3.0), [1.0, 1.5, 2.0]);
@@ -215,4 +218,18 @@ fn meshes_from_the_wild_load_whole() {
         assert!(igea.triangles.len() > 200_000, "{}", igea.triangles.len());
         assert!(igea.volume() > 0.0);
     }
+}
+
+#[test]
+fn a_file_in_centimetres_with_z_up_is_turned_before_its_keys() {
+    let triangle = TriMesh {
+        positions: vec![Vec3::new(100.0, 200.0, 300.0), Vec3::zeros(), Vec3::x()],
+        triangles: vec![[0, 1, 2]],
+    };
+    let key = Key { time: 0.0, at: DVec3::y(), turn: DVec3::zeros() };
+    let space = Space { scale: 0.01, up: Up::Z };
+    let own = Box::new(Rigid::new(triangle, Keys::default()));
+    let mut pose = Vec::new();
+    Placed::new(own, space, Keys::new(vec![key]).unwrap()).pose(0.0, &mut pose).unwrap();
+    assert!((pose[0] - DVec3::new(1.0, 4.0, -2.0)).norm() < 1e-6, "{}", pose[0]);
 }

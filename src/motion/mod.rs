@@ -8,7 +8,7 @@ mod space;
 pub use morph::Morph;
 pub use rigid::{Key, Keys, Placed, Rigid};
 pub use sequence::MeshSequence;
-pub use space::{InSpace, Space, Up};
+pub use space::{Space, Up};
 
 use crate::base::DVec3;
 use crate::error::Result;

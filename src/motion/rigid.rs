@@ -2,7 +2,7 @@
 
 use nalgebra::Rotation3;
 
-use super::Motion;
+use super::{Motion, Space};
 use crate::base::{DVec3, TriMesh};
 use crate::error::{Error, Result};
 
@@ -95,16 +95,17 @@ impl Motion for Rigid {
     }
 }
 
-/// Another motion carried along by keys.
+/// Another motion, brought into metres with Y up and carried along by keys.
 pub struct Placed {
     inner: Box<dyn Motion>,
+    space: Space,
     keys: Keys,
 }
 
 impl Placed {
-    /// `inner` as it moves, then turned and moved by the keys.
-    pub fn new(inner: Box<dyn Motion>, keys: Keys) -> Self {
-        Self { inner, keys }
+    /// `inner` as it moves in `space`, then turned and moved by the keys.
+    pub fn new(inner: Box<dyn Motion>, space: Space, keys: Keys) -> Self {
+        Self { inner, space, keys }
     }
 }
 
@@ -120,7 +121,7 @@ impl Motion for Placed {
     fn pose(&self, time: f64, out: &mut Vec<DVec3>) -> Result<()> {
         self.inner.pose(time, out)?;
         let (rotation, at) = self.keys.at(time);
-        out.iter_mut().for_each(|p| *p = rotation * *p + at);
+        out.iter_mut().for_each(|p| *p = rotation * self.space.place(*p) + at);
         Ok(())
     }
 

@@ -1,8 +1,6 @@
-//! A motion whose file has another unit or upward axis.
+//! The unit and upward axis of a file.
 
-use super::Motion;
 use crate::base::DVec3;
-use crate::error::Result;
 
 /// The upward axis of a file.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -33,40 +31,5 @@ impl Space {
             Up::Y => p,
             Up::Z => DVec3::new(p.x, p.z, -p.y),
         }
-    }
-}
-
-/// A motion brought into metres, Y up.
-pub struct InSpace {
-    inner: Box<dyn Motion>,
-    space: Space,
-}
-
-impl InSpace {
-    /// `inner`, which moves in `space`.
-    pub fn new(inner: Box<dyn Motion>, space: Space) -> Self {
-        Self { inner, space }
-    }
-}
-
-impl Motion for InSpace {
-    fn triangles(&self) -> &[[u32; 3]] {
-        self.inner.triangles()
-    }
-
-    fn vertex_count(&self) -> usize {
-        self.inner.vertex_count()
-    }
-
-    fn pose(&self, time: f64, out: &mut Vec<DVec3>) -> Result<()> {
-        self.inner.pose(time, out)?;
-        if self.space != Space::OWN {
-            out.iter_mut().for_each(|p| *p = self.space.place(*p));
-        }
-        Ok(())
-    }
-
-    fn breaks(&self, from: f64, to: f64) -> Vec<f64> {
-        self.inner.breaks(from, to)
     }
 }

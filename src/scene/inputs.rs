@@ -8,7 +8,7 @@ use crate::context::Context;
 use crate::error::{Error, Result};
 use crate::io::mesh;
 use crate::io::sequence::Pattern;
-use crate::motion::{InSpace, Key, Keys, MeshSequence, Motion, Placed, Rigid};
+use crate::motion::{Key, Keys, MeshSequence, Motion, Placed, Rigid};
 use crate::snow::base_layer::initial::{self, Cover};
 use crate::sweep::Body;
 use crate::vdb::{FloatGrid, GridClass, file};
@@ -128,8 +128,7 @@ fn motion(scene: &Scene, object: &Object) -> Result<Box<dyn Motion>> {
             Box::new(MeshSequence::open(pattern, first, last, fps, object.offset)?)
         }
     };
-    let own = Box::new(InSpace::new(own, object.space));
-    Ok(Box::new(Placed::new(own, keys)))
+    Ok(Box::new(Placed::new(own, object.space, keys)))
 }
 
 fn posed(motion: &dyn Motion, time: f64) -> Result<TriMesh> {

@@ -41,7 +41,7 @@ const SMALL: f32 = 1.5;
 const SPACING: f64 = 1.2 * UNITS as f64;
 /// A corner is asked for this part of the way to the middle, away from what it shares with neighbours.
 const INSET: f64 = 0.05;
-/// Halvings that find where an edge dives: to 1/64 of its length.
+/// Halvings that find where an edge dives: to 1/16 of its length.
 const HALVINGS: usize = 3;
 /// Faces a task handles: fixed, so that nothing depends on the number of threads.
 const GRAIN: usize = 128;

@@ -7,7 +7,7 @@ use crate::cli::session::Session;
 use frazil::base::{DVec3, TriMesh};
 use frazil::io;
 use frazil::io::sequence::Pattern;
-use frazil::motion::{InSpace, Key, Keys, MeshSequence, Morph, Motion, Placed, Rigid};
+use frazil::motion::{Key, Keys, MeshSequence, Morph, Motion, Placed, Rigid};
 use frazil::scene::Frames;
 use frazil::sweep::{self, Body, SamplesSettings, Settings};
 use frazil::vdb::FloatGrid;
@@ -133,14 +133,17 @@ impl Args {
                 }
                 None => {
                     self.refuse_motion("one mesh", ["--frames"])?;
+                    if self.by.is_none() && self.turn_deg.is_none() {
+                        let what = format!("{}: one mesh needs --move or --turn-deg", path.display());
+                        return Err(Failure::refused(what));
+                    }
                     let still = Rigid::new(io::mesh::read(path).before()?, Keys::default());
                     (Box::new(still) as Box<dyn Motion>, 0.0, 1.0)
                 }
             },
             [] => return Err(Failure::refused("a sweep needs a mesh")),
         };
-        let motion: Box<dyn Motion> = Box::new(InSpace::new(motion, self.space.space()));
-        Ok((Box::new(Placed::new(motion, self.keys()?)), from, to))
+        Ok((Box::new(Placed::new(motion, self.space.space(), self.keys()?)), from, to))
     }
 
     /// The keys of `--move` and `--turn-deg`.
@@ -162,10 +165,6 @@ impl Args {
         ];
         match given.iter().find(|(name, given)| *given && refused.contains(name)) {
             Some((name, _)) => Err(Failure::refused(format!("{name} is of no use with {with}"))),
-            None if with == "one mesh" && !given[1].1 && !given[2].1 => {
-                let what = format!("{}: one mesh needs --move or --turn-deg", self.mesh[0].display());
-                Err(Failure::refused(what))
-            }
             None => Ok(()),
         }
     }
