@@ -1,7 +1,7 @@
 # frazil: `make demo` shows what it does, `make test` checks it.
 
 PACKAGES := libopenvdb-dev libboost-dev libboost-iostreams-dev g++ cmake pkg-config clang-format python3-openvdb libopenvdb-tools
-RUST_NEEDED := 1.88
+RUST_NEEDED := 1.89
 DEMO := target/demo
 
 .PHONY: setup demo test lint gates bench

@@ -1,10 +1,13 @@
-//! Meshes in files, by extension: Wavefront .obj, Stanford .ply.
+//! Meshes in files, by extension: Wavefront .obj, Stanford .ply, .stl.
 
 use std::path::Path;
 
-use super::{atomic, obj, ply};
+use super::{atomic, obj, ply, stl};
 use crate::base::{PolygonMesh, TriMesh};
 use crate::error::{Error, Result};
+
+/// What is read and written, by extension.
+pub const EXTENSIONS: [&str; 3] = ["obj", "ply", "stl"];
 
 /// Reads a mesh in triangles.
 ///
@@ -26,7 +29,8 @@ pub fn read_polygons(path: &Path) -> Result<PolygonMesh> {
     let mesh = match extension(path).as_str() {
         "obj" => obj::parse(&bytes),
         "ply" => ply::parse(&bytes),
-        other => Err(format!("a mesh file must be .obj or .ply, not \".{other}\"")),
+        "stl" => stl::parse(&bytes),
+        other => Err(format!("a mesh file must be {}, not \".{other}\"", EXTENSIONS.map(|e| format!(".{e}")).join(", "))),
     };
     let mesh = mesh.map_err(|what| Error::file(path, what))?;
     mesh.validate().map_err(|error| Error::file(path, error.to_string()))?;
@@ -36,12 +40,13 @@ pub fn read_polygons(path: &Path) -> Result<PolygonMesh> {
 /// Writes a mesh, whole or not at all.
 ///
 /// # Errors
-/// Another extension than .obj or .ply; what the operating system reports.
+/// Another extension than .obj, .ply or .stl; what the operating system reports.
 pub fn write(path: &Path, mesh: &TriMesh) -> Result<()> {
     match extension(path).as_str() {
         "obj" => atomic::write(path, |out| obj::write(out, mesh)),
         "ply" => atomic::write(path, |out| ply::write(out, mesh)),
-        _ => Err(Error::file(path, "a mesh file must be .obj or .ply")),
+        "stl" => atomic::write(path, |out| stl::write(out, mesh)),
+        _ => Err(Error::file(path, "a mesh file must be .obj, .ply or .stl")),
     }
 }
 

@@ -1,7 +1,12 @@
 //! Files that are not .vdb.
 
 pub mod atomic;
+pub mod hash;
+pub mod manifest;
 pub mod mesh;
 mod obj;
 mod ply;
+pub mod sealed;
 pub mod sequence;
+mod stl;
+pub mod usd;

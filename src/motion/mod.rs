@@ -1,10 +1,12 @@
 //! Things that move: a fixed set of triangles whose vertices have a position at every time.
 
+mod gltf;
 mod morph;
 mod rigid;
 mod sequence;
 mod space;
 
+pub use gltf::{Character, Play};
 pub use morph::Morph;
 pub use rigid::{Key, Keys, Placed, Rigid};
 pub use sequence::MeshSequence;
@@ -42,4 +44,9 @@ pub trait Motion: Send + Sync {
 
     /// Times inside (from, to) where the motion has a kink: keys, frames of a sequence. Ascending.
     fn breaks(&self, from: f64, to: f64) -> Vec<f64>;
+
+    /// Whether vertices that always move together are one vertex already: others that meet at some time stay apart.
+    fn keeps_its_welds(&self) -> bool {
+        false
+    }
 }

@@ -132,6 +132,10 @@ impl Motion for Placed {
         breaks.dedup();
         breaks
     }
+
+    fn keeps_its_welds(&self) -> bool {
+        self.inner.keeps_its_welds()
+    }
 }
 
 #[cfg(test)]

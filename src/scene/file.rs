@@ -1,15 +1,17 @@
 //! Reads a scene file: keys to fields, defaults filled in, ranges checked.
 
 use super::table::{Document, Table};
-use super::{Frames, Ground, Key, Layer, Object, Output, Role, Scene, Shot, Snow};
+use super::objects::objects;
+use super::overrides::Override;
+use super::{BaseMode, Frames, Ground, Layer, Output, Scene, Shot, Snow};
 use crate::error::{Error, Result};
-use crate::motion::{Space, Up};
+use crate::io::mesh::EXTENSIONS;
 use crate::snow::base_layer::NoiseParams;
 use std::path::{Path, PathBuf};
 use toml::de::DeTable;
 
 /// Farthest coordinate that a scene may name (m): f32 positions keep millimetres up to here.
-const FAR: f64 = 1.0e5;
+pub(super) const FAR: f64 = 1.0e5;
 
 impl Scene {
     /// Reads a scene file. Relative paths in it are taken from its own folder.
@@ -18,34 +20,68 @@ impl Scene {
     /// An unreadable file, a TOML mistake, an unknown key, a wrong type or a value outside its range, each
     /// with file and line.
     pub fn read(path: &Path) -> Result<Self> {
+        Self::read_with(path, &[])
+    }
+
+    /// Reads a scene file with settings of the command line put over its own; relative paths in those are taken
+    /// from the current folder.
+    ///
+    /// # Errors
+    /// As [`Scene::read`].
+    pub fn read_with(path: &Path, overrides: &[Override]) -> Result<Self> {
         let bytes = std::fs::read(path).map_err(|error| Error::io(path, "read", error))?;
         let text = String::from_utf8(bytes).map_err(|_| Error::file(path, "is not a text file"))?;
-        Self::parse(&text, path)
+        Self::parse(&text, path, overrides)
     }
 
     /// Reads a scene from text; `path` names it in messages and gives the folder of its relative paths.
     ///
     /// # Errors
     /// As [`Scene::read`].
-    pub fn parse(text: &str, path: &Path) -> Result<Self> {
-        let document = Document { path, text };
-        let root = DeTable::parse(text).map_err(|error| {
+    pub fn parse(text: &str, path: &Path, overrides: &[Override]) -> Result<Self> {
+        let document = Document { path, text, folder: folder_of(path)?, overrides };
+        let mut root = DeTable::parse(text).map_err(|error| {
             let offset = error.span().map_or(0, |span| span.start);
             document.error(offset, error.message().trim().replace('\n', ", "))
         })?;
+        for (index, setting) in overrides.iter().enumerate() {
+            setting.apply(root.get_mut(), document.place_of(index), path)?;
+        }
         let known = ["shot", "snow", "object", "output"];
         let root = Table::open(&document, "", root.get_ref(), 0, &known)?;
-        let folder = folder_of(path)?;
         let snow = root.table("snow", "[snow]", &["ground", "area", "depth", "top", "cell", "noise"])?;
         Ok(Self {
             path: path.to_path_buf(),
             shot: shot(&root)?,
-            snow: snow_layer(&snow.ok_or_else(|| root.error("snow", "is missing"))?, &folder)?,
-            objects: objects(&root, &folder)?,
+            snow: snow_layer(&snow.ok_or_else(|| root.error("snow", "is missing"))?)?,
+            objects: objects(&root)?,
             output: output(&root)?,
         })
     }
+
+    /// Makes the cells `factor` times as large, for a quick look; noise too fine for them becomes coarser.
+    ///
+    /// # Errors
+    /// A layer from a .vdb file, whose cells are what they are; a cell out of range.
+    pub fn coarsen(&mut self, factor: f64) -> Result<()> {
+        let refused = |what: String| Error::argument(format!("{}: {what}", self.path.display()));
+        if let Layer::Grid(path) = &self.snow.layer {
+            return Err(refused(format!("a preview needs other cells than those of {}", path.display())));
+        }
+        let cell = self.snow.cell * factor;
+        if !CELLS.contains(&cell) {
+            return Err(refused(format!("a preview would have cells of {cell} m")));
+        }
+        let noise = &mut self.snow.noise;
+        noise.size = noise.size.max(*NoiseParams::sizes(cell).start());
+        noise.amplitude = noise.amplitude.min(noise.steepest());
+        self.snow.cell = cell;
+        Ok(())
+    }
 }
+
+/// Edges of voxels that a scene may have (m).
+const CELLS: std::ops::RangeInclusive<f64> = 1.0e-5..=10.0;
 
 /// The absolute folder that a scene's relative paths start from.
 fn folder_of(path: &Path) -> Result<PathBuf> {
@@ -62,11 +98,11 @@ fn shot(root: &Table) -> Result<Shot> {
     Ok(Shot { frames, fps })
 }
 
-fn snow_layer(snow: &Table, folder: &Path) -> Result<Snow> {
-    let cell = snow.number_in("cell", 1.0e-5..=10.0, "m")?;
+fn snow_layer(snow: &Table) -> Result<Snow> {
+    let cell = snow.number_in("cell", CELLS, "m")?;
     let cell = cell.ok_or_else(|| snow.error("cell", "is missing"))?;
-    let layer = layer(snow, folder)?;
-    let ground = ground(snow, folder)?;
+    let layer = layer(snow)?;
+    let ground = ground(snow)?;
     match layer {
         Layer::Grid(_) if ground.is_some() => {
             return Err(snow.error("ground", "is of no use beside a .vdb layer in `top`: leave it out"));
@@ -79,23 +115,20 @@ fn snow_layer(snow: &Table, folder: &Path) -> Result<Snow> {
     Ok(Snow { ground, layer, cell, noise: noise(snow, cell)? })
 }
 
-fn layer(snow: &Table, folder: &Path) -> Result<Layer> {
-    match (snow.number_in("depth", 1.0e-4..=1000.0, "m")?, snow.text("top")?) {
+fn layer(snow: &Table) -> Result<Layer> {
+    match (snow.number_in("depth", 1.0e-4..=1000.0, "m")?, snow.path("top")?) {
         (Some(depth), None) => Ok(Layer::Depth(depth)),
-        (None, Some(top)) => {
-            let path = folder.join(top);
-            match extension(&path).as_str() {
-                "vdb" => Ok(Layer::Grid(path)),
-                "obj" | "ply" => Ok(Layer::Top(path)),
-                _ => Err(snow.error("top", format!("must be a .vdb, .obj or .ply file, not \"{top}\""))),
-            }
-        }
+        (None, Some(top)) => match extension(&top).as_str() {
+            "vdb" => Ok(Layer::Grid(top)),
+            known if EXTENSIONS.contains(&known) => Ok(Layer::Top(top)),
+            _ => Err(snow.error("top", format!("must be a .vdb, .obj, .ply or .stl file, not \"{}\"", name(&top)))),
+        },
         (Some(_), Some(_)) => Err(snow.error("top", "excludes `depth`: give one of them")),
         (None, None) => Err(snow.error("depth", "is missing (or `top`, a mesh or .vdb file)")),
     }
 }
 
-fn ground(snow: &Table, folder: &Path) -> Result<Option<Ground>> {
+fn ground(snow: &Table) -> Result<Option<Ground>> {
     let area = snow.numbers::<4>("area")?;
     if !snow.has("ground") {
         return match area {
@@ -103,10 +136,9 @@ fn ground(snow: &Table, folder: &Path) -> Result<Option<Ground>> {
             None => Ok(None),
         };
     }
-    if let Ok(Some(text)) = snow.text("ground") {
-        let path = folder.join(text);
-        if !matches!(extension(&path).as_str(), "obj" | "ply") {
-            let what = format!("must be a number or a .obj or .ply file, not \"{text}\"");
+    if let Ok(Some(path)) = snow.path("ground") {
+        if !EXTENSIONS.contains(&extension(&path).as_str()) {
+            let what = format!("must be a number or a .obj, .ply or .stl file, not \"{}\"", name(&path));
             return Err(snow.error("ground", what));
         }
         if area.is_some() {
@@ -151,64 +183,34 @@ fn noise(snow: &Table, cell: f64) -> Result<NoiseParams> {
     Ok(noise)
 }
 
-fn objects(root: &Table, folder: &Path) -> Result<Vec<Object>> {
-    let known = ["file", "offset", "scale", "up", "role", "noise", "keys"];
-    let tables = root.tables("object", "[[object]]", &known)?;
-    tables.iter().map(|table| object(table, folder)).collect()
-}
-
-fn object(table: &Table, folder: &Path) -> Result<Object> {
-    let file = table.text("file")?.ok_or_else(|| table.error("file", "is missing"))?;
-    if !matches!(extension(Path::new(file)).as_str(), "obj" | "ply") {
-        return Err(table.error("file", format!("must be a .obj or .ply file, not \"{file}\"")));
-    }
-    Ok(Object {
-        file: folder.join(file),
-        offset: table.number_in("offset", -1.0e7..=1.0e7, "frames")?.unwrap_or(0.0),
-        space: Space {
-            scale: table.number_in("scale", 1.0e-9..=1.0e9, "")?.unwrap_or(1.0),
-            up: table.choice("up", &[("y", Up::Y), ("z", Up::Z)])?.unwrap_or(Up::Y),
-        },
-        role: table.choice("role", &ROLES)?.unwrap_or(Role::Collide),
-        noise: table.flag("noise")?.unwrap_or(true),
-        keys: keys(table)?,
-    })
-}
-
-/// The roles by name.
-pub(super) const ROLES: [(&str, Role); 3] =
-    [("collide", Role::Collide), ("static", Role::Static), ("ignore", Role::Ignore)];
-
-fn keys(object: &Table) -> Result<Vec<Key>> {
-    let mut keys: Vec<Key> = Vec::new();
-    for table in object.tables("keys", "keys of [[object]]", &["frame", "at", "turn_deg"])? {
-        let frame = table.number_in("frame", -1.0e8..=1.0e8, "")?;
-        let frame = frame.ok_or_else(|| table.error("frame", "is missing"))?;
-        if keys.last().is_some_and(|before| before.frame >= frame) {
-            return Err(table.error("frame", "must be greater than the key's before it"));
-        }
-        let at = table.numbers("at")?.unwrap_or([0.0; 3]);
-        if at.iter().any(|value: &f64| value.abs() > FAR) {
-            return Err(table.error("at", format!("must lie within {FAR} m of the origin")));
-        }
-        let turn_deg = table.numbers("turn_deg")?.unwrap_or([0.0; 3]);
-        if turn_deg.iter().any(|value: &f64| value.abs() > 1.0e6) {
-            return Err(table.error("turn_deg", "must lie in -1000000 to 1000000 degrees"));
-        }
-        keys.push(Key { frame, at, turn_deg });
-    }
-    Ok(keys)
-}
-
 fn output(root: &Table) -> Result<Output> {
-    let Some(table) = root.table("output", "[output]", &["base", "removed"])? else {
-        return Ok(Output { base: true, removed: true });
+    let known = ["base", "base_mode", "half", "removed", "objects", "usd"];
+    let Some(table) = root.table("output", "[output]", &known)? else { return Ok(Output::default()) };
+    let defaults = Output::default();
+    let written = |key, kind, default| -> Result<bool> {
+        Ok(table.choices(key, &[(kind, ())])?.map_or(default, |kinds| !kinds.is_empty()))
     };
-    let written = |key| Ok(table.choices(key, &[("vdb", ())])?.is_none_or(|kinds| !kinds.is_empty()));
-    Ok(Output { base: written("base")?, removed: written("removed")? })
+    let modes = [("full", BaseMode::Full), ("delta", BaseMode::Delta)];
+    let output = Output {
+        base: written("base", "vdb", defaults.base)?,
+        base_mode: table.choice("base_mode", &modes)?.unwrap_or(defaults.base_mode),
+        half: table.flag("half")?.unwrap_or(defaults.half),
+        removed: written("removed", "vdb", defaults.removed)?,
+        objects: written("objects", "usd", defaults.objects)?,
+        usd: table.flag("usd")?.unwrap_or(defaults.usd),
+    };
+    if output.half && output.base && output.base_mode == BaseMode::Delta {
+        return Err(table.error("half", "goes with `base_mode = \"full\"` only: changes must be exact"));
+    }
+    Ok(output)
 }
 
 /// A file's extension in lower case, empty when it has none.
-fn extension(path: &Path) -> String {
+pub(super) fn extension(path: &Path) -> String {
     path.extension().and_then(|text| text.to_str()).unwrap_or("").to_lowercase()
+}
+
+/// A file's name without its folder.
+pub(super) fn name(path: &Path) -> String {
+    path.file_name().unwrap_or(path.as_os_str()).to_string_lossy().into_owned()
 }

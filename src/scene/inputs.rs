@@ -2,13 +2,14 @@
 
 use std::path::Path;
 
+use super::objects::is_character;
 use super::{Ground, Layer, Object, Role, Scene};
 use crate::base::{DVec3, TriMesh};
 use crate::context::Context;
 use crate::error::{Error, Result};
 use crate::io::mesh;
 use crate::io::sequence::Pattern;
-use crate::motion::{Key, Keys, MeshSequence, Motion, Placed, Rigid};
+use crate::motion::{Character, Key, Keys, MeshSequence, Motion, Placed, Play, Rigid};
 use crate::snow::base_layer::initial::{self, Cover};
 use crate::sweep::Body;
 use crate::vdb::{FloatGrid, GridClass, file};
@@ -121,6 +122,7 @@ fn motion(scene: &Scene, object: &Object) -> Result<Box<dyn Motion>> {
     });
     let keys = Keys::new(keys.collect())?;
     let own: Box<dyn Motion> = match Pattern::parse(&object.file) {
+        None if is_character(&object.file) => Box::new(character(scene, object)?),
         None => Box::new(Rigid::new(mesh::read(&object.file)?, Keys::default())),
         Some(pattern) => {
             let first = (f64::from(scene.shot.frames.first) - object.offset).floor() as i32;
@@ -129,6 +131,24 @@ fn motion(scene: &Scene, object: &Object) -> Result<Box<dyn Motion>> {
         }
     };
     Ok(Box::new(Placed::new(own, object.space, keys)))
+}
+
+fn character(scene: &Scene, object: &Object) -> Result<Character> {
+    let play = Play {
+        node: object.node.clone(),
+        clip: object.clip.clone(),
+        repeat: object.repeat,
+        start: (f64::from(scene.shot.frames.first) + object.offset) / scene.shot.fps,
+    };
+    let character = Character::open(&object.file, play)?;
+    if let Some(jump) = character.jump() {
+        let metres = jump * object.space.scale;
+        log::warn!(
+            "{}: the clip does not end as it begins: each round starts with a jump of {metres:.3} m",
+            object.file.display()
+        );
+    }
+    Ok(character)
 }
 
 fn posed(motion: &dyn Motion, time: f64) -> Result<TriMesh> {

@@ -6,6 +6,8 @@ mod file;
 mod frames;
 mod inputs;
 mod memory;
+mod objects;
+mod overrides;
 mod resolved;
 pub mod shot;
 mod table;
@@ -13,6 +15,7 @@ mod table;
 pub use frames::{FrameChoice, Frames};
 pub use inputs::Inputs;
 pub use memory::{check as check_memory, estimate};
+pub use overrides::Override;
 
 use crate::motion::Space;
 use crate::snow::base_layer::NoiseParams;
@@ -83,9 +86,15 @@ pub enum Layer {
 /// One object of the scene.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Object {
-    /// A mesh file, or the pattern of a sequence of them (`body.%04d.obj`).
+    /// A glTF character, a mesh file, or the pattern of a sequence of them (`body.%04d.obj`).
     pub file: PathBuf,
-    /// Its sequence starts this many frames later.
+    /// Of a character only the nodes of this name (`*` stands for any letters) and what hangs on them.
+    pub node: Option<String>,
+    /// The character's clip; none: its only one.
+    pub clip: Option<String>,
+    /// Whether the clip starts again when it ends.
+    pub repeat: bool,
+    /// Its sequence, or its clip, starts this many frames later; a clip starts at the shot's first frame.
     pub offset: f64,
     /// The file's unit and upward axis.
     pub space: Space,
@@ -124,6 +133,36 @@ pub enum Role {
 pub struct Output {
     /// `base/base.%04d.vdb`.
     pub base: bool,
+    /// How much of the base each frame's file holds.
+    pub base_mode: BaseMode,
+    /// 16-bit values in `base` and `removed`: for rendering only; `state/` then keeps what continuing needs.
+    pub half: bool,
     /// `removed/removed.%04d.vdb`.
     pub removed: bool,
+    /// `objects/objects.%04d.usda`: the objects as they moved, with velocities.
+    pub objects: bool,
+    /// `shot.usda`.
+    pub usd: bool,
+}
+
+/// How much of the base a frame's file holds.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum BaseMode {
+    /// All of it.
+    Full,
+    /// All of it at the first frame, then the blocks that changed.
+    Delta,
+}
+
+impl Default for Output {
+    fn default() -> Self {
+        Self { base: true, base_mode: BaseMode::Full, half: false, removed: true, objects: false, usd: true }
+    }
+}
+
+impl Output {
+    /// Whether the base's own files are what a run can go on from.
+    pub fn base_restarts(&self) -> bool {
+        self.base && !self.half
+    }
 }

@@ -1,6 +1,7 @@
 //! Writes a scene with every default filled in and commented: the file beside the output that reproduces it.
 
-use super::{Ground, Layer, Object, Role, Scene};
+use super::objects::is_character;
+use super::{BaseMode, Ground, Layer, Object, Role, Scene};
 use crate::motion::Up;
 use std::fmt::Write;
 use std::path::Path;
@@ -24,13 +25,17 @@ impl Scene {
             write_object(out, object)?;
         }
         writeln!(out, "\n[output]")?;
-        line(out, "base", kinds(self.output.base), "base/base.%04d.vdb: surface, compression, touched")?;
-        line(
-            out,
-            "removed",
-            kinds(self.output.removed),
-            "removed/removed.%04d.vdb: what each frame took away",
-        )
+        let output = &self.output;
+        let mode = match output.base_mode {
+            BaseMode::Full => "full",
+            BaseMode::Delta => "delta",
+        };
+        line(out, "base", kinds(output.base, "vdb"), "base/base.%04d.vdb: surface, compression, touched")?;
+        line(out, "base_mode", &quoted(mode), "full, or delta: first frame whole, then what changed")?;
+        line(out, "half", &output.half.to_string(), "16-bit values, for rendering only")?;
+        line(out, "removed", kinds(output.removed, "vdb"), "removed/removed.%04d.vdb: what each frame took away")?;
+        line(out, "objects", kinds(output.objects, "usd"), "objects/objects.%04d.usda: as they moved, with velocities")?;
+        line(out, "usd", &output.usd.to_string(), "shot.usda: the whole shot for programs that read USD")
     }
 
     fn write_snow(&self, out: &mut String) -> std::fmt::Result {
@@ -64,8 +69,17 @@ const VERSION: &str = env!("CARGO_PKG_VERSION");
 
 fn write_object(out: &mut String, object: &Object) -> std::fmt::Result {
     writeln!(out, "\n[[object]]")?;
-    line(out, "file", &file(&object.file), "mesh or sequence")?;
-    line(out, "offset", &number(object.offset), "frames that a sequence starts later")?;
+    line(out, "file", &file(&object.file), "character, mesh or sequence")?;
+    if is_character(&object.file) {
+        if let Some(node) = &object.node {
+            line(out, "node", &quoted(node), "only nodes of this name and what hangs on them")?;
+        }
+        if let Some(clip) = &object.clip {
+            line(out, "clip", &quoted(clip), "empty: the pose at rest")?;
+        }
+        line(out, "loop", &object.repeat.to_string(), "the clip starts again when it ends")?;
+    }
+    line(out, "offset", &number(object.offset), "frames that a sequence or clip starts later")?;
     line(out, "scale", &number(object.space.scale), "from the file's unit to metres")?;
     let up = match object.space.up {
         Up::Y => "y",
@@ -98,8 +112,12 @@ fn line(out: &mut String, key: &str, value: &str, meaning: &str) -> std::fmt::Re
     writeln!(out, "{assignment:<32} # {meaning}")
 }
 
-fn kinds(written: bool) -> &'static str {
-    if written { "[\"vdb\"]" } else { "[]" }
+fn kinds(written: bool, kind: &str) -> &'static str {
+    match (written, kind) {
+        (false, _) => "[]",
+        (true, "usd") => "[\"usd\"]",
+        (true, _) => "[\"vdb\"]",
+    }
 }
 
 /// The shortest text that reads back as the same number.

@@ -3,8 +3,9 @@
 //! serde's own errors know neither the table nor the nearest key, and say nothing useful of a key that may be
 //! a number or a text; this reader walks the parsed document instead.
 
+use super::overrides::Override;
 use crate::error::{Error, Result};
-use std::path::Path;
+use std::path::{Path, PathBuf};
 use toml::Spanned;
 use toml::de::{DeTable, DeValue};
 
@@ -12,13 +13,37 @@ use toml::de::{DeTable, DeValue};
 pub(super) struct Document<'a> {
     pub path: &'a Path,
     pub text: &'a str,
+    /// The absolute folder that relative paths start from.
+    pub folder: PathBuf,
+    /// Settings of the command line; the one of index i has its place behind the text, at [`Document::place_of`].
+    pub overrides: &'a [Override],
 }
 
 impl Document<'_> {
     /// An error at a byte offset of the text: `shot.toml:12: ...`.
     pub fn error(&self, offset: usize, what: impl std::fmt::Display) -> Error {
+        if let Some(typed) = self.override_at(offset) {
+            return Error::argument(format!("{}: --set {}: {what}", self.path.display(), typed.text()));
+        }
         let line = 1 + self.text.bytes().take(offset).filter(|&byte| byte == b'\n').count();
         Error::argument(format!("{}:{line}: {what}", self.path.display()))
+    }
+
+    /// Where the values of a setting of the command line lie.
+    pub fn place_of(&self, index: usize) -> usize {
+        self.text.len() + 1 + index
+    }
+
+    fn override_at(&self, offset: usize) -> Option<&Override> {
+        self.overrides.get(offset.checked_sub(self.text.len() + 1)?)
+    }
+
+    /// The absolute path of a file named at an offset: from the scene's folder, or the current one for the command line.
+    fn path_at(&self, offset: usize, name: &str) -> PathBuf {
+        match self.override_at(offset) {
+            Some(_) => std::path::absolute(name).unwrap_or_else(|_| name.into()),
+            None => self.folder.join(name),
+        }
     }
 }
 
@@ -83,6 +108,12 @@ impl<'a, 'i> Table<'a, 'i> {
             Some(DeValue::String(text)) => Ok(Some(text)),
             Some(other) => Err(self.wrong_type(key, "a text", other)),
         }
+    }
+
+    /// The absolute path of a file.
+    pub fn path(&self, key: &str) -> Result<Option<PathBuf>> {
+        let offset = self.entry(key).map_or(0, |value| value.span().start);
+        Ok(self.text(key)?.map(|name| self.document.path_at(offset, name)))
     }
 
     /// A finite number, written with or without a decimal point.

@@ -38,7 +38,11 @@ impl Body {
         }
         let mut pose = Vec::new();
         motion.pose(time, &mut pose)?;
-        let same = coincident(pose.iter().copied());
+        let same = if motion.keeps_its_welds() {
+            (0..pose.len() as u32).collect()
+        } else {
+            coincident(pose.iter().copied())
+        };
         let mut topology = Topology::new(motion.triangles(), motion.vertex_count(), &same, true);
         topology.complete(&mut pose);
         if volume(&topology, &pose) < 0.0 {

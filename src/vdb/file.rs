@@ -5,6 +5,7 @@ use std::path::Path;
 use super::bridge::ffi;
 use super::grid::{FloatGrid, MetaValue, from_meta, to_meta};
 use crate::error::{Error, Result};
+use crate::io::hash::Hasher;
 
 /// How values are packed.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
@@ -86,16 +87,12 @@ pub fn to_bytes(grids: &[&FloatGrid], options: &WriteOptions) -> Result<Vec<u8>>
     Ok(bytes)
 }
 
-/// Replaces the random identifier by one made from the rest of the file (FNV-1a, twice 64 bits).
+/// Replaces the random identifier by one made from the rest of the file.
 fn name_by_content(bytes: &mut [u8]) {
     if bytes.len() < UUID.end {
         return;
     }
-    let hash = |seed: u64| {
-        let rest = bytes[..UUID.start].iter().chain(&bytes[UUID.end..]);
-        rest.fold(seed, |hash, &byte| (hash ^ u64::from(byte)).wrapping_mul(0x0000_0100_0000_01b3))
-    };
-    let digits = format!("{:016x}{:016x}", hash(0xcbf2_9ce4_8422_2325), hash(0x6c62_272e_07bb_0142));
+    let digits = Hasher::default().add(&bytes[..UUID.start]).add(&bytes[UUID.end..]).finish();
     let name = [&digits[..8], &digits[8..12], &digits[12..16], &digits[16..20], &digits[20..]].join("-");
     bytes[UUID].copy_from_slice(name.as_bytes());
 }

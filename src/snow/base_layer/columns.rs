@@ -1,7 +1,8 @@
 //! Heights of the snow's columns: what compression is measured against.
 //!
 //! A column of cells (8 x 8 of them make a column block) remembers how much snow stood in it before
-//! anything touched it, found when it is first touched: nothing is stored for untouched snow.
+//! anything touched it: nothing is stored for untouched snow. What stands in it now is read off the snow itself,
+//! so that a layer that goes on from its grids has the same numbers as one that never stopped.
 
 use std::collections::{BTreeSet, HashMap};
 
@@ -14,25 +15,54 @@ use crate::vdb::{FloatGrid, Probe};
 /// Cells of a column block, at `x << 3 | z`.
 pub const CELLS: usize = 64;
 
-/// Heights (cells) in one column block.
+/// Snow (cells) that stands in each column of a block.
+#[derive(Clone, Copy, PartialEq)]
+pub struct Heights([f32; CELLS]);
+
+/// A column block that was touched.
 #[derive(Clone, PartialEq)]
 pub struct Column {
     /// Snow before the first touch.
-    pub original: [f32; CELLS],
-    /// Snow removed since.
-    pub removed: [f32; CELLS],
-    /// y of the touched blocks' origins.
-    pub blocks: BTreeSet<i32>,
+    pub original: Heights,
+}
+
+impl Default for Heights {
+    fn default() -> Self {
+        Self([0.0; CELLS])
+    }
+}
+
+impl Heights {
+    /// Adds a block's snow.
+    pub fn add(&mut self, values: &Values, cell: f32) {
+        for index in 0..VOXELS {
+            self.0[cell_of(index)] += filled(values[index], cell);
+        }
+    }
+
+    /// Adds a block that is all snow or none.
+    pub fn add_constant(&mut self, value: f32) {
+        if value < 0.0 {
+            self.0.iter_mut().for_each(|height| *height += 8.0);
+        }
+    }
+
+    /// Adds what a grid holds at a block.
+    pub fn add_probe(&mut self, probe: &Probe<'_>, cell: f32) {
+        match probe {
+            Probe::Leaf(leaf) => self.add(leaf.values, cell),
+            Probe::Tile { value, .. } => self.add_constant(*value),
+        }
+    }
 }
 
 impl Column {
-    /// Part of the original height that is gone, 0..=1, of cell `x << 3 | z`.
-    pub fn compression(&self, cell: usize) -> f32 {
-        if self.original[cell] > 0.0 {
-            (self.removed[cell] / self.original[cell]).clamp(0.0, 1.0)
-        } else {
-            0.0
-        }
+    /// Part of the original height that is gone, 0..=1, of each cell, when `now` is left.
+    pub fn compression(&self, now: &Heights) -> [f32; CELLS] {
+        std::array::from_fn(|cell| {
+            let (original, now) = (self.original.0[cell], now.0[cell]);
+            if original > 0.0 { ((original - now) / original).clamp(0.0, 1.0) } else { 0.0 }
+        })
     }
 }
 
@@ -49,19 +79,35 @@ pub fn cell_of(index: usize) -> usize {
     index >> 3 & !7 | index & 7
 }
 
-/// Snow (cells) that stands in a column block now, between two heights (voxels).
-pub fn heights(surface: &FloatGrid, [x, z]: [i32; 2], low: i32, high: i32) -> Result<[f32; CELLS]> {
-    let origins: Vec<Origin> = (low.div_euclid(8)..=high.div_euclid(8)).map(|y| [x, y * 8, z]).collect();
+/// y of the blocks between two heights (voxels).
+pub fn levels(low: i32, high: i32) -> impl Iterator<Item = i32> + Clone {
+    (low.div_euclid(8)..=high.div_euclid(8)).map(|block| block * 8)
+}
+
+/// Snow that stands in a column block now, between two heights (voxels).
+pub fn heights(surface: &FloatGrid, [x, z]: [i32; 2], low: i32, high: i32) -> Result<Heights> {
+    let origins: Vec<Origin> = levels(low, high).map(|y| [x, y, z]).collect();
+    let mut heights = Heights::default();
     let cell = surface.voxel_size() as f32;
-    let mut heights = [0.0; CELLS];
-    for probe in surface.probe(&origins)? {
-        match probe {
-            Probe::Leaf(leaf) => add_filled(leaf.values, cell, &mut heights),
-            Probe::Tile { value, .. } if value < 0.0 => heights.iter_mut().for_each(|height| *height += 8.0),
-            Probe::Tile { .. } => {}
-        }
-    }
+    surface.probe(&origins)?.iter().for_each(|probe| heights.add_probe(probe, cell));
     Ok(heights)
+}
+
+/// The column blocks in which the snow is not what it was before the first step.
+pub fn touched(initial: &FloatGrid, now: &FloatGrid, low: i32, high: i32) -> Result<Columns> {
+    let mut places: BTreeSet<[i32; 2]> = BTreeSet::new();
+    for [one, other] in [[initial, now], [now, initial]] {
+        let leaves = one.leaves()?;
+        let origins: Vec<Origin> = leaves.iter().map(|leaf| leaf.origin).collect();
+        let probes = other.probe(&origins)?;
+        let differs = leaves.par_iter().zip(&probes).map(|(leaf, probe)| match probe {
+            Probe::Leaf(there) => leaf.values != there.values,
+            Probe::Tile { .. } => true,
+        });
+        let differs: Vec<bool> = differs.collect();
+        places.extend(origins.iter().zip(differs).filter(|(_, differs)| *differs).map(|(o, _)| [o[0], o[2]]));
+    }
+    places.into_iter().map(|place| Ok((place, Column { original: heights(initial, place, low, high)? }))).collect()
 }
 
 /// Volume of a level set's solid (m3): filled parts of cells, summed leaf by leaf in the tree's order.
@@ -85,12 +131,6 @@ pub fn volume(surface: &FloatGrid, low: [i32; 3], high: [i32; 3]) -> Result<f64>
         }
     }
     Ok(cells * surface.voxel_size().powi(3))
-}
-
-fn add_filled(values: &Values, cell: f32, heights: &mut [f32; CELLS]) {
-    for index in 0..VOXELS {
-        heights[cell_of(index)] += filled(values[index], cell);
-    }
 }
 
 #[cfg(test)]

@@ -4,23 +4,25 @@
 
 mod columns;
 mod edit;
+mod grids;
 pub mod initial;
 mod noise;
 mod wanted;
 
-use std::collections::{BTreeMap, BTreeSet, HashMap};
+use std::collections::{BTreeSet, HashMap};
 
 use rayon::prelude::*;
 
+pub use grids::{Changes, Grids};
 pub use noise::{NoiseParams, displace};
 
 use crate::base::DVec3;
-use crate::base::blocks::{Block, BlockEdit, Mask, Origin, VOXELS};
+use crate::base::blocks::{Block, BlockEdit, Mask, Origin, VOXELS, Values};
 use crate::context::{Context, StageTime};
 use crate::error::{Error, Result};
 use crate::sweep::{Band, Body, Face, Lattice, Piece, Scratch, Settings, UNITS, Voxeliser, Window};
 use crate::vdb::{FloatGrid, GridClass, MetaValue, Probe};
-use columns::{Column, Columns};
+use columns::{Column, Columns, Heights};
 use edit::{Edit, Scale};
 use noise::Displacement;
 use wanted::snow_masks;
@@ -59,12 +61,10 @@ pub struct StepReport {
 /// A layer of snow and what has happened to it.
 pub struct BaseLayer {
     params: Params,
-    surface: FloatGrid,
-    removed: FloatGrid,
-    compression: FloatGrid,
-    touched: FloatGrid,
+    grids: Grids,
+    /// The last step's, the removed level set among them.
+    changes: Changes,
     columns: Columns,
-    volume: f64,
     /// Voxels that snow can be in.
     low: [i32; 3],
     high: [i32; 3],
@@ -76,7 +76,7 @@ impl BaseLayer {
     ///
     /// # Errors
     /// When `surface` is no level set, holds nothing or is not world-fixed, or a parameter is out of range.
-    pub fn new(ctx: &Context, mut surface: FloatGrid, params: Params) -> Result<Self> {
+    pub fn new(ctx: &Context, surface: FloatGrid, params: Params) -> Result<Self> {
         let cell = surface.voxel_size();
         if surface.class() != GridClass::LevelSet {
             return Err(Error::argument("the snow is not a level set"));
@@ -90,42 +90,66 @@ impl BaseLayer {
             noise.validate(cell)?;
         }
         let (low, high) = surface.active_bbox().ok_or_else(|| Error::argument("the snow is empty"))?;
-        surface.set_name("surface")?;
         let volume = ctx.pool().install(|| columns::volume(&surface, low, high))?;
-        let plain = |name: &str| -> Result<FloatGrid> {
-            let mut grid = FloatGrid::new(cell, 0.0)?;
-            grid.set_name(name)?;
-            Ok(grid)
-        };
-        let removed = empty_removed(cell, half_width)?;
-        let (compression, touched) = (plain("compression")?, plain("touched")?);
-        let columns = HashMap::new();
-        Ok(Self { params, surface, removed, compression, touched, columns, volume, low, high, half_width })
+        let grids = Grids::new(surface, volume)?;
+        let changes = Changes::none(&grids, half_width)?;
+        Ok(Self { params, grids, changes, columns: HashMap::new(), low, high, half_width })
+    }
+
+    /// Goes on from the grids that an earlier step left; `initial` is the layer before the first step.
+    ///
+    /// # Errors
+    /// As [`BaseLayer::new`]; grids of another layer.
+    pub fn resume(ctx: &Context, initial: FloatGrid, grids: Grids, params: Params) -> Result<Self> {
+        let mut layer = Self::new(ctx, initial, params)?;
+        let initial = std::mem::replace(&mut layer.grids, grids).surface;
+        let same = layer.grids.surface.voxel_size() == initial.voxel_size()
+            && layer.grids.surface.background() == initial.background();
+        if !same {
+            return Err(Error::argument("the layer to go on from has other cells than the first one"));
+        }
+        layer.changes = Changes::none(&layer.grids, layer.half_width)?;
+        layer.columns = columns::touched(&initial, &layer.grids.surface, layer.low[1], layer.high[1])?;
+        Ok(layer)
+    }
+
+    /// The grids: all that the next step depends on, besides the layer before the first step.
+    pub fn grids(&self) -> &Grids {
+        &self.grids
+    }
+
+    /// Takes what the last step changed; [`BaseLayer::removed`] is empty afterwards.
+    ///
+    /// # Errors
+    /// When memory runs out.
+    pub fn take_changes(&mut self) -> Result<Changes> {
+        let none = Changes::none(&self.grids, self.half_width)?;
+        Ok(std::mem::replace(&mut self.changes, none))
     }
 
     /// The snow (level set).
     pub fn surface(&self) -> &FloatGrid {
-        &self.surface
+        &self.grids.surface
     }
 
     /// What the last step removed (level set).
     pub fn removed(&self) -> &FloatGrid {
-        &self.removed
+        &self.changes.removed
     }
 
     /// Part of its column's height that was removed, at touched surface voxels, 0..=1.
     pub fn compression(&self) -> &FloatGrid {
-        &self.compression
+        &self.grids.compression
     }
 
     /// Frame of the last change, at touched surface voxels.
     pub fn touched(&self) -> &FloatGrid {
-        &self.touched
+        &self.grids.touched
     }
 
     /// Snow (m3).
     pub fn volume(&self) -> f64 {
-        self.volume
+        self.changes.volume
     }
 
     /// Removes what bodies sweep from `from` to `to` (s), or their pose where the two are equal.
@@ -143,18 +167,18 @@ impl BaseLayer {
     ) -> Result<StepReport> {
         ctx.take_timings();
         let displacement =
-            self.params.noise.map(|noise| Displacement::new(&noise, self.surface.voxel_size()));
+            self.params.noise.map(|noise| Displacement::new(&noise, self.grids.surface.voxel_size()));
         let (ragged, exact): (Vec<&Body>, Vec<&Body>) = bodies.iter().partition(|body| body.has_noise());
         let (ragged, ragged_faces) = self.sweep(ctx, &ragged, from, to, displacement.as_ref())?;
         let (exact, exact_faces) = self.sweep(ctx, &exact, from, to, None)?;
         let pieces = united(ragged, exact);
         let edits = ctx.stage("subtract", || self.edits(&pieces))?;
-        let change = ctx.stage("columns", || self.change(ctx, edits, frame))?;
-        let (removed_volume, touched_blocks) = (change.volume, change.surface.len());
-        self.commit(ctx, change)?;
+        let (changes, columns, removed_volume) = ctx.stage("columns", || self.changes(ctx, edits, frame))?;
+        let touched_blocks = changes.surface.len();
+        self.commit(ctx, changes, columns)?;
         Ok(StepReport {
             removed_volume,
-            base_volume: self.volume,
+            base_volume: self.changes.volume,
             touched_blocks,
             sweep_faces: ragged_faces + exact_faces,
             stages: ctx.take_timings(),
@@ -162,7 +186,7 @@ impl BaseLayer {
     }
 
     fn scale(&self) -> Scale {
-        Scale { cell: self.surface.voxel_size() as f32, background: self.surface.background() }
+        Scale { cell: self.grids.surface.voxel_size() as f32, background: self.grids.surface.background() }
     }
 
     /// Distances of the volume that bodies sweep, displaced, in the blocks that hold snow; and its faces.
@@ -197,7 +221,7 @@ impl BaseLayer {
         to: f64,
         noise: Option<&Displacement>,
     ) -> Result<Voxeliser> {
-        let cell = self.surface.voxel_size();
+        let cell = self.grids.surface.voxel_size();
         let middle = [0, 1, 2].map(|a| (f64::from(self.low[a]) + f64::from(self.high[a])) * 0.5 * cell);
         let lattice = Lattice::near(cell, DVec3::from(middle))?;
         let outside = self.half_width + noise.map_or(0.0, |noise| noise.amplitude);
@@ -216,7 +240,7 @@ impl BaseLayer {
             .collect::<Result<_>>()?;
         let band = Band { inside: self.half_width, outside };
         let snowy =
-            |origins: &[Origin]| Ok(self.surface.probe(origins)?.iter().map(edit::has_snow).collect());
+            |origins: &[Origin]| Ok(self.grids.surface.probe(origins)?.iter().map(edit::has_snow).collect());
         let bounds = [relative(self.low, 0), relative(self.high, 0)];
         Voxeliser::new(ctx, parts.concat(), lattice, band, bounds, snowy)
     }
@@ -224,7 +248,7 @@ impl BaseLayer {
     /// Distances where there is snow.
     fn pieces(&self, ctx: &Context, voxeliser: &Voxeliser, margin: bool) -> Result<Vec<Piece>> {
         let near = voxeliser.near_blocks();
-        let wanted = snow_masks(&self.surface, &near, margin)?;
+        let wanted = snow_masks(&self.grids.surface, &near, margin)?;
         let mut pieces: Vec<Piece> = (0..near.len())
             .into_par_iter()
             .map_init(Scratch::default, |scratch, index| {
@@ -239,7 +263,7 @@ impl BaseLayer {
 
     fn edits(&self, pieces: &[Piece]) -> Result<Vec<Edit>> {
         let origins: Vec<Origin> = pieces.iter().map(Piece::origin).collect();
-        let snow: Vec<Probe<'_>> = self.surface.probe(&origins)?;
+        let snow: Vec<Probe<'_>> = self.grids.surface.probe(&origins)?;
         let scale = self.scale();
         Ok(pieces
             .par_iter()
@@ -248,50 +272,38 @@ impl BaseLayer {
             .collect())
     }
 
-    /// Everything that the commit puts in place.
-    fn change(&self, ctx: &Context, edits: Vec<Edit>, frame: i32) -> Result<Change> {
-        let cell = self.surface.voxel_size();
+    /// Everything that the commit puts in place, and the volume removed (m3).
+    fn changes(&self, ctx: &Context, edits: Vec<Edit>, frame: i32) -> Result<(Changes, Columns, f64)> {
+        let cell = self.grids.surface.voxel_size();
         let mut removed = empty_removed(cell, self.half_width)?;
         let volume = edits.iter().map(Edit::volume).sum::<f64>() * cell.powi(3);
-        let columns = self.updated_columns(&edits)?;
+        let fresh = self.new_columns(&edits)?;
         let touched = self.touched_edits(&edits, frame)?;
-        let compression = self.compression_edits(&columns, &edits, &touched)?;
+        let compression = self.compression_edits(&fresh, &edits, &touched)?;
         let (surface, taken): (Vec<BlockEdit>, Vec<Option<BlockEdit>>) =
             edits.into_iter().map(|edit| (edit.surface, edit.removed)).unzip();
         removed.replace_blocks(ctx, &taken.into_iter().flatten().collect::<Vec<_>>())?;
         // Shells thinner than a cell leave no trace in the level set: the sum over the columns has them.
         removed.set_metadata("volume_m3", MetaValue::Double(volume))?;
-        Ok(Change { surface, touched, compression, removed, columns, volume })
+        let left = self.changes.volume - volume;
+        Ok((Changes { surface, touched, compression, removed, volume: left }, fresh, volume))
     }
 
-    /// The column blocks that the edits touch, with what they remove.
-    fn updated_columns(&self, edits: &[Edit]) -> Result<BTreeMap<[i32; 2], Column>> {
-        let mut columns = BTreeMap::new();
-        for edit in edits {
-            let [x, y, z] = edit.surface.origin();
-            let column: &mut Column = match columns.entry([x, z]) {
-                std::collections::btree_map::Entry::Occupied(entry) => entry.into_mut(),
-                std::collections::btree_map::Entry::Vacant(entry) => {
-                    entry.insert(match self.columns.get(&[x, z]) {
-                        Some(column) => column.clone(),
-                        None => Column {
-                            original: columns::heights(&self.surface, [x, z], self.low[1], self.high[1])?,
-                            removed: [0.0; columns::CELLS],
-                            blocks: BTreeSet::new(),
-                        },
-                    })
-                }
-            };
-            column.blocks.insert(y);
-            column.removed.iter_mut().zip(edit.heights).for_each(|(removed, height)| *removed += height);
-        }
-        Ok(columns)
+    /// Heights before the first touch of the column blocks that nothing touched before these edits.
+    fn new_columns(&self, edits: &[Edit]) -> Result<Columns> {
+        let places: BTreeSet<[i32; 2]> = edits.iter().map(|edit| column_of(edit.surface.origin())).collect();
+        let new = places.into_iter().filter(|place| !self.columns.contains_key(place));
+        new.map(|place| {
+            let original = columns::heights(&self.grids.surface, place, self.low[1], self.high[1])?;
+            Ok((place, Column { original }))
+        })
+        .collect()
     }
 
     /// Frame numbers at the surface voxels of the changed blocks.
     fn touched_edits(&self, edits: &[Edit], frame: i32) -> Result<Vec<BlockEdit>> {
         let origins: Vec<Origin> = edits.iter().map(|edit| edit.surface.origin()).collect();
-        let before = self.touched.probe(&origins)?;
+        let before = self.grids.touched.probe(&origins)?;
         let edit_one = |(edit, before): (&Edit, &Probe<'_>)| {
             let BlockEdit::Dense(surface) = &edit.surface else {
                 return BlockEdit::Constant(edit.surface.origin(), 0.0);
@@ -304,61 +316,79 @@ impl BaseLayer {
                 values[index] = frame as f32;
             }
             let mask: Mask = std::array::from_fn(|x| surface.mask[x] & (known[x] | edit.changed[x]));
-            BlockEdit::Dense(Block { origin: surface.origin, values, mask })
+            masked(surface.origin, values, mask)
         };
         Ok(edits.par_iter().zip(&before).map(edit_one).collect())
     }
 
-    /// Compression at every touched surface voxel of the columns that changed.
+    /// Compression at every touched surface voxel of the columns that the edits change.
     fn compression_edits(
         &self,
-        columns: &BTreeMap<[i32; 2], Column>,
+        fresh: &Columns,
         edits: &[Edit],
         touched: &[BlockEdit],
     ) -> Result<Vec<BlockEdit>> {
-        let fresh: HashMap<Origin, &BlockEdit> =
-            edits.iter().map(|edit| edit.surface.origin()).zip(touched).collect();
-        let mut out = Vec::new();
-        for (&[x, z], column) in columns {
-            let origins: Vec<Origin> = column.blocks.iter().map(|&y| [x, y, z]).collect();
-            for (origin, before) in origins.iter().zip(self.touched.probe(&origins)?) {
-                let mask = match (fresh.get(origin), before) {
-                    (Some(BlockEdit::Dense(block)), _) => block.mask,
-                    (Some(BlockEdit::Constant(..)), _) | (None, Probe::Tile { .. }) => [0; 8],
-                    (None, Probe::Leaf(leaf)) => *leaf.mask,
-                };
-                if mask == [0; 8] {
-                    out.push(BlockEdit::Constant(*origin, 0.0));
-                    continue;
+        let now: HashMap<Origin, (&Edit, &BlockEdit)> =
+            edits.iter().zip(touched).map(|(edit, touched)| (edit.surface.origin(), (edit, touched))).collect();
+        let places: BTreeSet<[i32; 2]> = now.keys().map(|origin| column_of(*origin)).collect();
+        let cell = self.grids.surface.voxel_size() as f32;
+        let levels = columns::levels(self.low[1], self.high[1]);
+        let column_edits = |&[x, z]: &[i32; 2]| -> Result<Vec<BlockEdit>> {
+            let column = fresh.get(&[x, z]).or_else(|| self.columns.get(&[x, z]));
+            let column = column.ok_or_else(|| Error::Internal("a changed column is not known".into()))?;
+            let origins: Vec<Origin> = levels.clone().map(|y| [x, y, z]).collect();
+            let mut heights = Heights::default();
+            for (origin, before) in origins.iter().zip(self.grids.surface.probe(&origins)?) {
+                match now.get(origin).map(|(edit, _)| &edit.surface) {
+                    Some(BlockEdit::Dense(block)) => heights.add(&block.values, cell),
+                    Some(BlockEdit::Constant(_, value)) => heights.add_constant(*value),
+                    None => heights.add_probe(&before, cell),
                 }
-                let values =
-                    Box::new(std::array::from_fn(|index| column.compression(columns::cell_of(index))));
-                out.push(BlockEdit::Dense(Block { origin: *origin, values, mask }));
             }
-        }
-        Ok(out)
+            let compression = column.compression(&heights);
+            let mut out = Vec::new();
+            for (origin, before) in origins.iter().zip(self.grids.touched.probe(&origins)?) {
+                let mask = match (now.get(origin).map(|(_, touched)| touched), before) {
+                    (Some(BlockEdit::Dense(block)), _) => block.mask,
+                    (Some(BlockEdit::Constant(..)), _) => [0; 8],
+                    (None, Probe::Leaf(leaf)) => *leaf.mask,
+                    (None, Probe::Tile { .. }) => continue,
+                };
+                let values = std::array::from_fn(|index| compression[columns::cell_of(index)]);
+                out.push(masked(*origin, Box::new(values), mask));
+            }
+            Ok(out)
+        };
+        let places: Vec<[i32; 2]> = places.into_iter().collect();
+        let parts: Vec<Vec<BlockEdit>> = places.par_iter().map(column_edits).collect::<Result<_>>()?;
+        Ok(parts.into_iter().flatten().collect())
     }
 
-    /// Puts a change in place.
-    fn commit(&mut self, ctx: &Context, change: Change) -> Result<()> {
-        self.surface.replace_blocks(ctx, &change.surface)?;
-        self.touched.replace_blocks(ctx, &change.touched)?;
-        self.compression.replace_blocks(ctx, &change.compression)?;
-        self.removed = change.removed;
-        self.columns.extend(change.columns);
-        self.volume -= change.volume;
+    /// Puts a step's changes in place.
+    fn commit(&mut self, ctx: &Context, changes: Changes, columns: Columns) -> Result<()> {
+        self.grids.apply(ctx, &changes)?;
+        self.columns.extend(columns);
+        self.changes = changes;
         Ok(())
     }
 }
 
-/// A step's results before they are put in place.
-struct Change {
-    surface: Vec<BlockEdit>,
-    touched: Vec<BlockEdit>,
-    compression: Vec<BlockEdit>,
-    removed: FloatGrid,
-    columns: BTreeMap<[i32; 2], Column>,
-    volume: f64,
+/// x and z of the column block that a block stands in.
+fn column_of([x, _, z]: Origin) -> [i32; 2] {
+    [x, z]
+}
+
+/// A block whose inactive values are 0; constant when no voxel is active.
+fn masked(origin: Origin, mut values: Box<Values>, mask: Mask) -> BlockEdit {
+    if mask == [0; 8] {
+        return BlockEdit::Constant(origin, 0.0);
+    }
+    for (index, value) in values.iter_mut().enumerate() {
+        if mask[index >> 6] >> (index & 63) & 1 == 0 {
+            *value = 0.0;
+        }
+    }
+    BlockEdit::Dense(Block { origin, values, mask })
 }
 
 /// The union of two sweeps, block by block.

@@ -1,0 +1,75 @@
+//! Manifests: what a frame's output is, written after it. A frame is done when its manifest is there and matches.
+
+use std::path::{Path, PathBuf};
+
+use serde::{Deserialize, Serialize};
+
+use super::{hash, sealed};
+use crate::error::Result;
+
+/// A file of a frame.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Written {
+    /// Where it is, from the output folder, with `/`.
+    pub path: String,
+    /// Its length.
+    pub bytes: u64,
+    /// Its content's hash.
+    pub hash: String,
+}
+
+/// What a frame was made from, and its files.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Manifest {
+    /// Which frame.
+    pub frame: i32,
+    /// Hash of all settings and inputs that it depends on, those of the frames before it included.
+    pub inputs: String,
+    /// Its files.
+    pub files: Vec<Written>,
+}
+
+impl Written {
+    /// A file of these bytes.
+    pub fn new(path: String, bytes: &[u8]) -> Self {
+        Self { path, bytes: bytes.len() as u64, hash: hash::of_bytes(bytes) }
+    }
+
+    /// Whether the file is there with its length.
+    pub fn is_there(&self, folder: &Path) -> bool {
+        std::fs::metadata(folder.join(&self.path)).is_ok_and(|file| file.is_file() && file.len() == self.bytes)
+    }
+
+    /// Whether the file is there with its content; reads it.
+    pub fn is_whole(&self, folder: &Path) -> bool {
+        self.is_there(folder) && hash::of_file(&folder.join(&self.path)).is_ok_and(|hash| hash == self.hash)
+    }
+}
+
+impl Manifest {
+    /// Where the manifest of a stage's frame is: `state/base.0012.json`.
+    pub fn path(folder: &Path, stage: &str, frame: i32) -> PathBuf {
+        folder.join("state").join(format!("{stage}.{frame:04}.json"))
+    }
+
+    /// Reads a frame's manifest; none when there is none.
+    ///
+    /// # Errors
+    /// A damaged one, or one of a newer version.
+    pub fn read(folder: &Path, stage: &str, frame: i32) -> Result<Option<Self>> {
+        sealed::read(&Self::path(folder, stage, frame))
+    }
+
+    /// Writes it: the frame is done.
+    ///
+    /// # Errors
+    /// What the operating system reports.
+    pub fn write(&self, folder: &Path, stage: &str) -> Result<()> {
+        sealed::write(&Self::path(folder, stage, self.frame), self)
+    }
+
+    /// Whether all its files are there with their lengths.
+    pub fn files_are_there(&self, folder: &Path) -> bool {
+        self.files.iter().all(|file| file.is_there(folder))
+    }
+}

@@ -1,0 +1,73 @@
+//! Small JSON files that tell whether they are whole and whether this version can read them.
+
+use std::path::Path;
+
+use serde::Serialize;
+use serde::de::DeserializeOwned;
+use serde_json::{Value, json};
+
+use super::{atomic, hash};
+use crate::error::{Error, Result};
+
+/// The format that this version writes, and the newest that it reads.
+const FORMAT: u64 = 1;
+
+/// Writes a value, whole or not at all.
+///
+/// # Errors
+/// What the operating system reports.
+pub fn write(path: &Path, content: &impl Serialize) -> Result<()> {
+    let content = serde_json::to_value(content).map_err(|error| Error::Internal(error.to_string()))?;
+    let file = json!({ "format": FORMAT, "check": hash::of_bytes(content.to_string().as_bytes()), "content": content });
+    atomic::write_bytes(path, format!("{file:#}\n").as_bytes())
+}
+
+/// Reads a value; none when there is no such file.
+///
+/// # Errors
+/// A file that was cut short or changed, or that a newer version wrote.
+pub fn read<T: DeserializeOwned>(path: &Path) -> Result<Option<T>> {
+    let bytes = match std::fs::read(path) {
+        Err(error) if error.kind() == std::io::ErrorKind::NotFound => return Ok(None),
+        other => other.map_err(|error| Error::io(path, "read", error))?,
+    };
+    let damaged = || {
+        Error::file(path, "the record is damaged, cut short or changed by hand: remove it to make what it stands for again")
+    };
+    let file: Value = serde_json::from_slice(&bytes).map_err(|_| damaged())?;
+    match file["format"].as_u64() {
+        None => return Err(damaged()),
+        Some(format) if format > FORMAT => {
+            let what = format!("was written by a newer frazil (format {format}; this one reads up to {FORMAT})");
+            return Err(Error::file(path, what));
+        }
+        Some(_) => {}
+    }
+    let content = &file["content"];
+    if file["check"].as_str() != Some(&hash::of_bytes(content.to_string().as_bytes())) {
+        return Err(damaged());
+    }
+    serde_json::from_value(content.clone()).map(Some).map_err(|_| damaged())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_is_sealed_is_read_and_what_is_changed_is_refused() {
+        let folder = std::env::temp_dir().join(format!("frazil-sealed-{}", std::process::id()));
+        std::fs::create_dir_all(&folder).unwrap();
+        let path = folder.join("a.json");
+        assert_eq!(read::<Vec<i32>>(&path).unwrap(), None);
+        write(&path, &vec![1, 2, 3]).unwrap();
+        assert_eq!(read::<Vec<i32>>(&path).unwrap(), Some(vec![1, 2, 3]));
+        let text = std::fs::read_to_string(&path).unwrap();
+        for (from, to, word) in [("2,", "4,", "damaged"), ("\"format\": 1", "\"format\": 9", "newer"), ("]", "", "damaged")] {
+            std::fs::write(&path, text.replace(from, to)).unwrap();
+            let error = read::<Vec<i32>>(&path).unwrap_err().to_string();
+            assert!(error.contains(word) && error.contains("a.json"), "{error}");
+        }
+        std::fs::remove_dir_all(&folder).unwrap();
+    }
+}

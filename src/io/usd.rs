@@ -1,0 +1,234 @@
+//! USD as text (.usda): what a shot made, for any program that reads USD; no library is needed.
+
+use std::fmt::Write;
+
+use crate::base::{DVec3, Vec3};
+
+/// A moving mesh at one frame.
+pub struct MeshFrame<'a> {
+    /// Name of its prim: see [`prim_name`].
+    pub name: &'a str,
+    /// Places (m).
+    pub points: &'a [Vec3],
+    /// Velocities (m/s) over the coming frame, one a point.
+    pub velocities: &'a [Vec3],
+    /// Triangles.
+    pub triangles: &'a [[u32; 3]],
+}
+
+/// A kind of volume with its .vdb files.
+pub struct VolumeFiles<'a> {
+    /// Name of its prim.
+    pub name: &'a str,
+    /// Its grids: name and whether it is a level set.
+    pub grids: &'a [(&'a str, bool)],
+    /// Frames with their files, relative to the .usda file.
+    pub files: &'a [(i32, String)],
+}
+
+/// Frames and units of a stage.
+#[derive(Debug, Clone, Copy)]
+pub struct StageTime {
+    /// First frame.
+    pub first: i32,
+    /// Last frame.
+    pub last: i32,
+    /// Frames a second.
+    pub fps: f64,
+}
+
+/// A name that USD allows, made from any text: letters, digits, underscores.
+pub fn prim_name(text: &str) -> String {
+    let mut name: String =
+        text.chars().map(|letter| if letter.is_ascii_alphanumeric() { letter } else { '_' }).collect();
+    if !name.starts_with(|letter: char| letter.is_ascii_alphabetic() || letter == '_') {
+        name.insert(0, '_');
+    }
+    name
+}
+
+/// A text in quotes, or an asset path between `@`.
+fn quoted(text: &str) -> String {
+    let escaped: String = text
+        .chars()
+        .flat_map(|letter| match letter {
+            '"' | '\\' => vec!['\\', letter],
+            '\n' => vec!['\\', 'n'],
+            _ => vec![letter],
+        })
+        .collect();
+    format!("\"{escaped}\"")
+}
+
+fn asset(path: &str) -> String {
+    // Three at signs allow one inside.
+    if path.contains('@') { format!("@@@{path}@@@") } else { format!("@{path}@") }
+}
+
+const HEAD: &str = "    metersPerUnit = 1\n    upAxis = \"Y\"\n";
+
+/// A stage with the shot's volumes, and the objects' meshes under value clips when `clips` gives the pattern of
+/// their files and the names of their prims.
+pub fn stage(comment: &str, time: StageTime, volumes: &[VolumeFiles], clips: Option<(&Clips, &[String])>) -> String {
+    let mut out = String::new();
+    let StageTime { first, last, fps } = time;
+    let _ = write!(
+        out,
+        "#usda 1.0\n(\n    {}\n    defaultPrim = \"shot\"\n    startTimeCode = {first}\n    endTimeCode = {last}\n    \
+         timeCodesPerSecond = {fps}\n    framesPerSecond = {fps}\n{HEAD})\n\ndef Xform \"shot\"\n{{\n",
+        quoted(comment)
+    );
+    volumes.iter().filter(|volume| !volume.files.is_empty()).for_each(|volume| write_volume(&mut out, volume));
+    if let Some((clips, names)) = clips {
+        write_clips(&mut out, clips, names);
+    }
+    out.push_str("}\n");
+    out
+}
+
+fn write_volume(out: &mut String, volume: &VolumeFiles) {
+    let _ = writeln!(out, "    def Volume \"{}\"\n    {{", volume.name);
+    for (grid, _) in volume.grids {
+        let _ = writeln!(out, "        rel field:{grid} = </shot/{}/{grid}>", volume.name);
+    }
+    for (grid, is_level_set) in volume.grids {
+        let class = if *is_level_set { "\n            token fieldClass = \"levelSet\"" } else { "" };
+        let _ = write!(
+            out,
+            "\n        def OpenVDBAsset \"{grid}\"\n        {{\n            token fieldName = \"{grid}\"\n            \
+             token fieldDataType = \"float\"{class}\n            asset filePath.timeSamples = {{\n"
+        );
+        for (frame, file) in volume.files {
+            let _ = writeln!(out, "                {frame}: {},", asset(file));
+        }
+        out.push_str("            }\n        }\n");
+    }
+    out.push_str("    }\n");
+}
+
+/// Files of one frame each that hold the moving meshes.
+pub struct Clips {
+    /// Folder and kind: `./objects/objects.0001.usda` for `objects`.
+    pub kind: &'static str,
+    /// The frames that are there, ascending.
+    pub frames: Vec<i32>,
+}
+
+fn write_clips(out: &mut String, clips: &Clips, names: &[String]) {
+    let kind = clips.kind;
+    let file = |frame: &i32| asset(&format!("./{kind}/{kind}.{frame:04}.usda"));
+    let files: Vec<String> = clips.frames.iter().map(file).collect();
+    let pairs = |pair: &dyn Fn(usize, i32) -> String| {
+        let pairs: Vec<String> = clips.frames.iter().enumerate().map(|(clip, frame)| pair(clip, *frame)).collect();
+        pairs.join(", ")
+    };
+    let _ = write!(
+        out,
+        "    def Xform \"{kind}\" (\n        clips = {{\n            dictionary default = {{\n                \
+         asset[] assetPaths = [{}]\n                asset manifestAssetPath = @./{kind}/{kind}.manifest.usda@\n                \
+         string primPath = \"/{kind}\"\n                double2[] active = [{}]\n                double2[] times = [{}]\n            \
+         }}\n        }}\n    )\n    {{\n",
+        files.join(", "),
+        pairs(&|clip, frame| format!("({frame}, {clip})")),
+        pairs(&|_, frame| format!("({frame}, {frame})")),
+    );
+    for name in names {
+        let _ = writeln!(
+            out,
+            "        def Mesh \"{name}\"\n        {{\n            uniform token subdivisionScheme = \"none\"\n        }}"
+        );
+    }
+    out.push_str("    }\n");
+}
+
+/// Attributes of a mesh that change from frame to frame.
+const ATTRIBUTES: [(&str, &str); 5] = [
+    ("float3[]", "extent"),
+    ("int[]", "faceVertexCounts"),
+    ("int[]", "faceVertexIndices"),
+    ("point3f[]", "points"),
+    ("vector3f[]", "velocities"),
+];
+
+/// What the clips hold: the manifest that USD asks for.
+pub fn clip_manifest(kind: &str, names: &[String]) -> String {
+    let mut out = format!("#usda 1.0\n(\n    defaultPrim = \"{kind}\"\n)\n\nover \"{kind}\"\n{{\n");
+    for name in names {
+        let _ = writeln!(out, "    over \"{name}\"\n    {{");
+        ATTRIBUTES.iter().for_each(|(class, attribute)| {
+            let _ = writeln!(out, "        {class} {attribute}");
+        });
+        out.push_str("    }\n");
+    }
+    out.push_str("}\n");
+    out
+}
+
+/// The meshes of one frame; as a file by itself it opens as those meshes.
+pub fn clip(kind: &str, frame: i32, fps: f64, meshes: &[MeshFrame]) -> String {
+    let mut out = format!(
+        "#usda 1.0\n(\n    defaultPrim = \"{kind}\"\n    startTimeCode = {frame}\n    endTimeCode = {frame}\n    \
+         timeCodesPerSecond = {fps}\n{HEAD})\n\ndef Xform \"{kind}\"\n{{\n"
+    );
+    for mesh in meshes {
+        let _ = writeln!(
+            out,
+            "    def Mesh \"{}\"\n    {{\n        uniform token subdivisionScheme = \"none\"",
+            mesh.name
+        );
+        let zero = (Vec3::zeros(), Vec3::zeros());
+        let bounds = mesh.points.iter().map(|p| (*p, *p)).reduce(|a, b| (a.0.inf(&b.0), a.1.sup(&b.1)));
+        let (low, high) = bounds.unwrap_or(zero);
+        let values = [
+            list([low, high].iter(), row),
+            list(mesh.triangles.iter(), |out, _| out.push('3')),
+            list(mesh.triangles.iter(), |out, [a, b, c]| {
+                let _ = write!(out, "{a}, {b}, {c}");
+            }),
+            list(mesh.points.iter(), row),
+            list(mesh.velocities.iter(), row),
+        ];
+        for ((class, attribute), value) in ATTRIBUTES.iter().zip(values) {
+            let _ = writeln!(out, "        {class} {attribute}.timeSamples = {{ {frame}: {value} }}");
+        }
+        out.push_str("    }\n");
+    }
+    out.push_str("}\n");
+    out
+}
+
+fn row(out: &mut String, p: &Vec3) {
+    let _ = write!(out, "({}, {}, {})", p.x, p.y, p.z);
+}
+
+fn list<T>(items: impl ExactSizeIterator<Item = T>, write: impl Fn(&mut String, T)) -> String {
+    let mut out = String::with_capacity(items.len() * 32);
+    out.push('[');
+    for (index, item) in items.enumerate() {
+        if index > 0 {
+            out.push_str(", ");
+        }
+        write(&mut out, item);
+    }
+    out.push(']');
+    out
+}
+
+/// Places as 32-bit floats.
+pub fn to_floats(places: &[DVec3]) -> Vec<Vec3> {
+    places.iter().map(|place| place.cast()).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn names_are_what_usd_allows() {
+        assert_eq!(prim_name("hero.v02"), "hero_v02");
+        assert_eq!(prim_name("2nd man"), "_2nd_man");
+        assert_eq!(prim_name(""), "_");
+        assert_eq!(quoted("a\"b\\"), "\"a\\\"b\\\\\"");
+        assert_eq!(asset("a@b.vdb"), "@@@a@b.vdb@@@");
+    }
+}

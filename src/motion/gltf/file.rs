@@ -1,0 +1,173 @@
+//! The file: its buffers, and the numbers that its accessors point at.
+
+use std::path::Path;
+
+use gltf::accessor::{DataType, Dimensions};
+use gltf::{Accessor, Document};
+
+use crate::error::{Error, Result};
+
+/// A parsed file with its binary data.
+pub(super) struct File {
+    pub document: Document,
+    buffers: Vec<gltf::buffer::Data>,
+}
+
+impl File {
+    /// Reads a .gltf or .glb file and the buffers that it names; textures are not touched.
+    ///
+    /// # Errors
+    /// A file that is missing, cut short or malformed; a buffer that is missing (named); an extension that is
+    /// required and unknown.
+    pub fn open(path: &Path) -> Result<Self> {
+        let bytes = std::fs::read(path).map_err(|error| Error::io(path, "read", error))?;
+        check_length(&bytes).map_err(|what| Error::file(path, what))?;
+        let parsed = gltf::Gltf::from_slice(&bytes)
+            .map_err(|error| Error::file(path, format!("not a whole glTF file ({error})")))?;
+        let known = ["KHR_mesh_quantization", "KHR_texture_transform", "KHR_materials_unlit"];
+        if let Some(needed) = parsed.extensions_required().find(|name| !known.contains(name)) {
+            return Err(Error::file(path, format!("needs the glTF extension {needed}, which frazil does not read")));
+        }
+        let gltf::Gltf { document, blob } = parsed;
+        let folder = path.parent().unwrap_or(Path::new("."));
+        // Each by itself, so that the message can name the one at fault.
+        let mut blob = blob;
+        let buffers = document.buffers().map(|buffer| {
+            let name = match buffer.source() {
+                gltf::buffer::Source::Uri(uri) if !uri.starts_with("data:") => format!("\"{uri}\""),
+                _ => (buffer.index() + 1).to_string(),
+            };
+            let wrong = |what: String| Error::file(path, format!("buffer {name} {what}"));
+            let data = gltf::buffer::Data::from_source_and_blob(buffer.source(), Some(folder), &mut blob)
+                .map_err(|error| wrong(format!("cannot be read ({error})")))?;
+            if data.len() < buffer.length() {
+                return Err(wrong(format!("has {} bytes, not {}", data.len(), buffer.length())));
+            }
+            Ok(data)
+        });
+        let buffers = buffers.collect::<Result<_>>()?;
+        Ok(Self { document, buffers })
+    }
+
+    /// The elements of an accessor as rows of `N` numbers; normalised integers become 0..=1 or -1..=1.
+    ///
+    /// # Errors
+    /// Another number of components; data that lies beyond its buffer; a number that is not finite.
+    pub fn rows<const N: usize>(&self, accessor: &Accessor) -> std::result::Result<Vec<[f32; N]>, String> {
+        let place = format!("accessor {}", accessor.index());
+        if components(accessor.dimensions()) != N {
+            return Err(format!("{place} has not {N} components"));
+        }
+        let scale = |value: f64| match (accessor.normalized(), accessor.data_type()) {
+            (true, DataType::I8) => (value / 127.0).max(-1.0),
+            (true, DataType::U8) => value / 255.0,
+            (true, DataType::I16) => (value / 32767.0).max(-1.0),
+            (true, DataType::U16) => value / 65535.0,
+            _ => value,
+        };
+        let row = |values: [f64; N]| values.map(|value| scale(value) as f32);
+        let beyond = || format!("{place} reaches beyond its buffer");
+        let mut rows: Vec<[f32; N]> = match accessor.view() {
+            Some(view) => self
+                .numbers::<N>(&view, accessor.offset(), accessor.count(), accessor.data_type())
+                .ok_or_else(beyond)?
+                .into_iter()
+                .map(row)
+                .collect(),
+            // A count without data must not ask for memory beyond reason.
+            None if accessor.count() > 1 << 28 => return Err(beyond()),
+            None => vec![[0.0; N]; accessor.count()],
+        };
+        if let Some(sparse) = accessor.sparse() {
+            let kind = match sparse.indices().index_type() {
+                gltf::accessor::sparse::IndexType::U8 => DataType::U8,
+                gltf::accessor::sparse::IndexType::U16 => DataType::U16,
+                gltf::accessor::sparse::IndexType::U32 => DataType::U32,
+            };
+            let (indices, values) = (sparse.indices(), sparse.values());
+            let at = self.numbers::<1>(&indices.view(), indices.offset(), sparse.count(), kind);
+            let new =
+                self.numbers::<N>(&values.view(), values.offset(), sparse.count(), accessor.data_type());
+            for ([index], values) in at.ok_or_else(beyond)?.into_iter().zip(new.ok_or_else(beyond)?) {
+                *rows.get_mut(index as usize).ok_or_else(beyond)? = row(values);
+            }
+        }
+        if rows.as_flattened().iter().any(|value| !value.is_finite()) {
+            return Err(format!("{place} has numbers that are not finite"));
+        }
+        Ok(rows)
+    }
+
+    /// The whole numbers of an accessor in rows of `N`: indices, joints.
+    ///
+    /// # Errors
+    /// As [`File::rows`].
+    pub fn indices<const N: usize>(&self, accessor: &Accessor) -> std::result::Result<Vec<[u32; N]>, String> {
+        let place = format!("accessor {}", accessor.index());
+        if components(accessor.dimensions()) != N {
+            return Err(format!("{place} has not {N} components"));
+        }
+        let numbers = accessor.view().and_then(|view| {
+            self.numbers::<N>(&view, accessor.offset(), accessor.count(), accessor.data_type())
+        });
+        let numbers = numbers.ok_or_else(|| format!("{place} reaches beyond its buffer"))?;
+        Ok(numbers.into_iter().map(|row| row.map(|value| value as u32)).collect())
+    }
+
+    /// Reads packed or strided numbers; none when they lie beyond the data.
+    fn numbers<const N: usize>(
+        &self,
+        view: &gltf::buffer::View,
+        offset: usize,
+        count: usize,
+        kind: DataType,
+    ) -> Option<Vec<[f64; N]>> {
+        if count == 0 {
+            return Some(Vec::new());
+        }
+        let size = kind.size();
+        let stride = view.stride().unwrap_or(size * N);
+        let buffer = self.buffers.get(view.buffer().index())?;
+        let data = buffer.get(view.offset()..view.offset().checked_add(view.length())?)?;
+        let length = stride.checked_mul(count - 1)?.checked_add(size * N)?;
+        let data = data.get(offset..offset.checked_add(length)?)?;
+        let number = |at: usize| -> f64 {
+            let raw = &data[at..at + size];
+            match kind {
+                DataType::I8 => f64::from(raw[0] as i8),
+                DataType::U8 => f64::from(raw[0]),
+                DataType::I16 => f64::from(i16::from_le_bytes([raw[0], raw[1]])),
+                DataType::U16 => f64::from(u16::from_le_bytes([raw[0], raw[1]])),
+                DataType::U32 => f64::from(u32::from_le_bytes([raw[0], raw[1], raw[2], raw[3]])),
+                DataType::F32 => f64::from(f32::from_le_bytes([raw[0], raw[1], raw[2], raw[3]])),
+            }
+        };
+        let row = |index: usize| std::array::from_fn(|column| number(index * stride + column * size));
+        Some((0..count).map(row).collect())
+    }
+}
+
+/// A .glb says its own length.
+fn check_length(bytes: &[u8]) -> std::result::Result<(), String> {
+    if bytes.is_empty() {
+        return Err("the file is empty".into());
+    }
+    if bytes.starts_with(b"glTF") {
+        let told = bytes.get(8..12).map(|b| u32::from_le_bytes([b[0], b[1], b[2], b[3]]) as usize);
+        if told.is_none_or(|told| bytes.len() < told) {
+            return Err(format!("the .glb file is cut short at {} bytes", bytes.len()));
+        }
+    }
+    Ok(())
+}
+
+fn components(dimensions: Dimensions) -> usize {
+    match dimensions {
+        Dimensions::Scalar => 1,
+        Dimensions::Vec2 => 2,
+        Dimensions::Vec3 => 3,
+        Dimensions::Vec4 | Dimensions::Mat2 => 4,
+        Dimensions::Mat3 => 9,
+        Dimensions::Mat4 => 16,
+    }
+}

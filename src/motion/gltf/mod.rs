@@ -1,0 +1,284 @@
+//! Animated characters in glTF 2.0 files (.gltf, .glb): node animation, skins, morph targets.
+//!
+//! The file's own rules apply (Khronos, glTF 2.0 specification, sections 3.7 and 3.11): a skinned vertex is the weighted sum
+//! of its joints' matrices, its own node's place does not count; rotations are interpolated along the shorter arc.
+
+mod clip;
+mod file;
+mod nodes;
+mod skin;
+
+use std::path::Path;
+
+use super::Motion;
+use crate::base::DVec3;
+use crate::error::{Error, Result};
+use clip::{Clip, JUMP};
+use file::File;
+use nodes::Node;
+use skin::Vertices;
+
+/// A round whose ends differ by more than this part of the character's size starts with a jump.
+const SAME_POSE: f64 = 1e-3;
+/// Kinks this close to the ends of an interval (s) are those ends: times in files are 32-bit floats.
+const AT_END: f64 = 2e-5;
+
+/// What of a file is wanted, and when it plays.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Play {
+    /// Only nodes of this name, and what hangs on them; `*` stands for any letters. None: all.
+    pub node: Option<String>,
+    /// The clip's name; an empty one for the pose at rest. None: the only clip, or the rest pose without any.
+    pub clip: Option<String>,
+    /// Whether the clip starts again when it ends.
+    pub repeat: bool,
+    /// When the clip's first key is (s).
+    pub start: f64,
+}
+
+impl Default for Play {
+    fn default() -> Self {
+        Self { node: None, clip: None, repeat: true, start: 0.0 }
+    }
+}
+
+/// The moving meshes of a glTF file.
+pub struct Character {
+    nodes: Vec<Node>,
+    /// Node numbers, parents first.
+    order: Vec<usize>,
+    vertices: Vertices,
+    clip: Option<Clip>,
+    play: Play,
+    kinks: Vec<f64>,
+    /// Length of a round's last step, when its ends differ (the file's unit).
+    jump: Option<f64>,
+}
+
+impl Character {
+    /// Opens a file. Vertices are welded when they agree in place, joints, weights and morph targets.
+    ///
+    /// # Errors
+    /// A file that is cut short, malformed, or names a buffer that is not there; a clip or node that does not
+    /// exist (those that do are named); several clips and none chosen; no triangles.
+    pub fn open(path: &Path, play: Play) -> Result<Self> {
+        let file = File::open(path)?;
+        let wrong = |what: String| Error::file(path, what);
+        let nodes = nodes::read(&file.document);
+        let order = nodes::parents_first(&nodes).ok_or_else(|| wrong("a node is its own ancestor".into()))?;
+        let shown = chosen(&file, &nodes, play.node.as_deref()).map_err(wrong)?;
+        let vertices = Vertices::read(&file, |node| shown[node]).map_err(wrong)?;
+        if vertices.triangles.is_empty() {
+            return Err(wrong("holds no triangles".into()));
+        }
+        let clip = clip(&file, play.clip.as_deref()).map_err(wrong)?;
+        let kinks = clip.as_ref().map(Clip::kinks).unwrap_or_default();
+        let mut character = Self { nodes, order, vertices, clip, play, kinks, jump: None };
+        let rest: Vec<_> = character.nodes.iter().map(|node| node.rest.clone()).collect();
+        character.vertices.face_outward(&nodes::globals(&character.nodes, &character.order, &rest));
+        character.jump = character.find_jump();
+        Ok(character)
+    }
+
+    /// Names of the clips in a file, in its order.
+    ///
+    /// # Errors
+    /// As [`Character::open`].
+    pub fn clips(path: &Path) -> Result<Vec<String>> {
+        Ok(clip_names(&File::open(path)?))
+    }
+
+    /// How far a vertex jumps when the clip starts again (the file's unit), if its ends differ.
+    pub fn jump(&self) -> Option<f64> {
+        self.jump
+    }
+
+    /// Length of the clip (s): from its first key to its last.
+    pub fn duration(&self) -> f64 {
+        self.clip.as_ref().map_or(0.0, |clip| clip.end - clip.start)
+    }
+
+    /// Whether the clip plays more than once.
+    fn repeats(&self) -> bool {
+        self.play.repeat && self.duration() > 0.0
+    }
+
+    /// The clip's own time (s) at a time of the shot.
+    fn own_time(&self, time: f64) -> f64 {
+        let Some(clip) = &self.clip else { return 0.0 };
+        let (played, duration) = (time - self.play.start, self.duration());
+        let own = if self.repeats() { played.rem_euclid(duration) } else { played.clamp(0.0, duration) };
+        clip.start + own
+    }
+
+    fn pose_at_own(&self, own: f64, out: &mut Vec<DVec3>) {
+        let mut locals: Vec<_> = self.nodes.iter().map(|node| node.rest.clone()).collect();
+        if let Some(clip) = &self.clip {
+            clip.apply(own, &mut locals);
+        }
+        let globals = nodes::globals(&self.nodes, &self.order, &locals);
+        self.vertices.pose(&locals, &globals, out);
+    }
+
+    fn find_jump(&self) -> Option<f64> {
+        let clip = self.clip.as_ref().filter(|_| self.repeats())?;
+        let (mut first, mut last) = (Vec::new(), Vec::new());
+        self.pose_at_own(clip.start, &mut first);
+        self.pose_at_own(clip.end, &mut last);
+        let size = first.iter().fold((first[0], first[0]), |(l, h), p| (l.inf(p), h.sup(p)));
+        let farthest = first.iter().zip(&last).map(|(a, b)| (a - b).norm()).fold(0.0, f64::max);
+        (farthest > SAME_POSE * (size.1 - size.0).norm()).then_some(farthest)
+    }
+}
+
+impl Motion for Character {
+    fn triangles(&self) -> &[[u32; 3]] {
+        &self.vertices.triangles
+    }
+
+    fn vertex_count(&self) -> usize {
+        self.vertices.count
+    }
+
+    fn pose(&self, time: f64, out: &mut Vec<DVec3>) -> Result<()> {
+        self.pose_at_own(self.own_time(time), out);
+        Ok(())
+    }
+
+    fn breaks(&self, from: f64, to: f64) -> Vec<f64> {
+        let Some(clip) = &self.clip else { return Vec::new() };
+        let duration = self.duration();
+        let rounds = if self.repeats() {
+            let round = |time: f64| ((time - self.play.start) / duration).floor() as i64;
+            round(from)..=round(to)
+        } else {
+            0..=0
+        };
+        let mut out = Vec::new();
+        for round in rounds {
+            let begin = self.play.start + round as f64 * duration;
+            out.extend(self.kinks.iter().map(|kink| begin + kink - clip.start));
+            if self.jump.is_some() {
+                out.extend([begin - JUMP, begin]);
+            }
+        }
+        out.retain(|&time| time > from + AT_END && time < to - AT_END);
+        out.sort_unstable_by(f64::total_cmp);
+        out.dedup_by(|later, earlier| *later - *earlier < AT_END);
+        out
+    }
+
+    fn keeps_its_welds(&self) -> bool {
+        true
+    }
+}
+
+/// Whether each node is part of the scene and of what was asked for.
+fn chosen(file: &File, nodes: &[Node], pattern: Option<&str>) -> std::result::Result<Vec<bool>, String> {
+    let mut shown = vec![false; nodes.len()];
+    let scene = file.document.default_scene().or_else(|| file.document.scenes().next());
+    match &scene {
+        Some(scene) => scene.nodes().for_each(|root| shown[root.index()] = true),
+        None => nodes.iter().zip(&mut shown).for_each(|(node, shown)| *shown = node.parent.is_none()),
+    }
+    let roots = shown.clone();
+    let mut picked: Vec<bool> = nodes.iter().map(|node| pattern.is_none_or(|p| matches(p, &node.name))).collect();
+    let named = picked.clone();
+    for index in 0..nodes.len() {
+        let mut at = Some(index);
+        while let Some(node) = at {
+            shown[index] |= roots[node];
+            picked[index] |= named[node];
+            at = nodes[node].parent;
+        }
+    }
+    let meshes: Vec<usize> =
+        file.document.nodes().filter(|n| n.mesh().is_some() && shown[n.index()]).map(|n| n.index()).collect();
+    if !meshes.iter().any(|&node| picked[node]) {
+        let names = meshes.iter().map(|&node| nodes[node].name.as_str());
+        return Err(match pattern {
+            Some(pattern) => format!("no node \"{pattern}\" has a mesh; those with one are {}", listed(names)),
+            None => "no node of its scene has a mesh".into(),
+        });
+    }
+    Ok(shown.iter().zip(&picked).map(|(shown, picked)| *shown && *picked).collect())
+}
+
+fn clip_names(file: &File) -> Vec<String> {
+    let name = |clip: gltf::Animation| clip.name().map_or_else(|| format!("clip {}", clip.index()), str::to_string);
+    file.document.animations().map(name).collect()
+}
+
+fn clip(file: &File, name: Option<&str>) -> std::result::Result<Option<Clip>, String> {
+    let names = clip_names(file);
+    let there = || listed(names.iter().map(String::as_str));
+    let number = match (name, names.len()) {
+        (Some(""), _) | (None, 0) => return Ok(None),
+        (None, 1) => 0,
+        (None, count) => return Err(format!("has {count} clips and none is chosen; they are {}", there())),
+        (Some(name), 0) => return Err(format!("has no clip \"{name}\", and no other")),
+        (Some(name), _) => names
+            .iter()
+            .position(|own| own == name)
+            .ok_or_else(|| format!("has no clip \"{name}\"; its clips are {}", there()))?,
+    };
+    let animation = file.document.animations().nth(number).ok_or("has no such clip")?;
+    let clip = Clip::read(file, &animation).map_err(|what| format!("clip \"{}\": {what}", names[number]))?;
+    Ok(Some(clip))
+}
+
+/// Names in quotes, at most a dozen.
+fn listed<'a>(names: impl Iterator<Item = &'a str>) -> String {
+    const MOST: usize = 24;
+    let names: Vec<&str> = names.collect();
+    let mut text: Vec<String> = names.iter().take(MOST).map(|name| format!("\"{name}\"")).collect();
+    if names.len() > MOST {
+        text.push(format!("{} more", names.len() - MOST));
+    }
+    text.join(", ")
+}
+
+/// Whether a name fits a pattern in which `*` stands for any letters and `?` for one.
+fn matches(pattern: &str, name: &str) -> bool {
+    let (pattern, name): (Vec<char>, Vec<char>) = (pattern.chars().collect(), name.chars().collect());
+    let (mut p, mut n, mut star) = (0, 0, None);
+    while n < name.len() {
+        match pattern.get(p) {
+            Some('*') => {
+                star = Some((p, n));
+                p += 1;
+            }
+            Some(&letter) if letter == '?' || letter == name[n] => (p, n) = (p + 1, n + 1),
+            _ => match star {
+                // The last star takes one letter more.
+                Some((at, taken)) => {
+                    star = Some((at, taken + 1));
+                    (p, n) = (at + 1, taken + 1);
+                }
+                None => return false,
+            },
+        }
+    }
+    pattern[p..].iter().all(|&letter| letter == '*')
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn stars_stand_for_any_letters() {
+        for (pattern, name, fits) in [
+            ("hero*", "hero_body", true),
+            ("*body", "hero_body", true),
+            ("h*o*y", "hero_body", true),
+            ("hero", "hero_body", false),
+            ("h?ro", "hero", true),
+            ("*", "", true),
+            ("?", "", false),
+            ("a*b", "a*bc", false),
+        ] {
+            assert_eq!(matches(pattern, name), fits, "{pattern} {name}");
+        }
+    }
+}

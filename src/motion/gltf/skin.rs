@@ -1,0 +1,243 @@
+//! The vertices: morphed by their targets, carried by their joints or by their node.
+
+use std::collections::HashMap;
+
+use gltf::Semantic;
+use gltf::mesh::Mode;
+use nalgebra::{Matrix3x4, Matrix4};
+
+use super::file::File;
+use super::nodes::{Local, matrix4};
+use crate::base::{DVec3, Vec3};
+
+/// A skin: nodes that carry vertices, and from where.
+struct Skin {
+    joints: Vec<usize>,
+    inverse_bind: Vec<Matrix4<f64>>,
+}
+
+/// Vertices of one node that move alike: all by joints of one skin, or all by the node.
+struct Part {
+    node: usize,
+    skin: Option<usize>,
+    /// Numbers of its vertices in the whole: `first..first + rest.len()`.
+    first: usize,
+    rest: Vec<DVec3>,
+    /// One list for each morph target.
+    deltas: Vec<Vec<DVec3>>,
+    /// Joints of each vertex and their weights, which add up to 1: `spans[v]..spans[v + 1]` of `influences`.
+    spans: Vec<u32>,
+    influences: Vec<(u32, f64)>,
+}
+
+/// What a corner of the file is made of: corners that agree in all of it are one vertex.
+#[derive(PartialEq, Eq, Hash)]
+struct Corner {
+    place: [u32; 3],
+    joints: Vec<(u32, u32)>,
+    deltas: Vec<[u32; 3]>,
+}
+
+/// All vertices of the chosen nodes.
+#[derive(Default)]
+pub(super) struct Vertices {
+    skins: Vec<Skin>,
+    parts: Vec<Part>,
+    pub triangles: Vec<[u32; 3]>,
+    pub count: usize,
+}
+
+impl Vertices {
+    /// Reads the meshes of the chosen nodes.
+    ///
+    /// # Errors
+    /// Numbers that are missing, out of range or not finite.
+    pub fn read(file: &File, wanted: impl Fn(usize) -> bool) -> Result<Self, String> {
+        let mut out = Self::default();
+        for skin in file.document.skins() {
+            let joints: Vec<usize> = skin.joints().map(|joint| joint.index()).collect();
+            let inverse_bind = match skin.inverse_bind_matrices() {
+                None => vec![Matrix4::identity(); joints.len()],
+                Some(accessor) => {
+                    let columns = |m: [f32; 16]| std::array::from_fn(|c| std::array::from_fn(|r| m[4 * c + r]));
+                    file.rows::<16>(&accessor)?.into_iter().map(|m| matrix4(&columns(m))).collect()
+                }
+            };
+            if inverse_bind.len() < joints.len() {
+                return Err(format!("skin {} has {} joints but {} matrices", skin.index(), joints.len(), inverse_bind.len()));
+            }
+            out.skins.push(Skin { joints, inverse_bind });
+        }
+        for node in file.document.nodes().filter(|node| wanted(node.index())) {
+            let Some(mesh) = node.mesh() else { continue };
+            let part = Part {
+                node: node.index(),
+                skin: node.skin().map(|skin| skin.index()),
+                first: out.count,
+                rest: Vec::new(),
+                deltas: Vec::new(),
+                spans: vec![0],
+                influences: Vec::new(),
+            };
+            out.parts.push(part);
+            let mut known = HashMap::new();
+            for primitive in mesh.primitives() {
+                out.add(file, &primitive, &mut known).map_err(|what| {
+                    format!("mesh \"{}\": {what}", mesh.name().or(node.name()).unwrap_or("without a name"))
+                })?;
+            }
+        }
+        Ok(out)
+    }
+
+    /// Adds a primitive's corners and triangles to the last part.
+    fn add(
+        &mut self,
+        file: &File,
+        primitive: &gltf::Primitive,
+        known: &mut HashMap<Corner, u32>,
+    ) -> Result<(), String> {
+        if matches!(primitive.mode(), Mode::Points | Mode::Lines | Mode::LineLoop | Mode::LineStrip) {
+            return Ok(());
+        }
+        let positions = primitive.get(&Semantic::Positions).ok_or("a primitive has no positions")?;
+        let positions = file.rows::<3>(&positions)?;
+        let targets = primitive.morph_targets().map(|target| match target.positions() {
+            Some(accessor) => file.rows::<3>(&accessor),
+            None => Ok(vec![[0.0; 3]; positions.len()]),
+        });
+        let targets = targets.collect::<Result<Vec<_>, String>>()?;
+        let part = self.parts.last_mut().expect("the caller made one");
+        let joint_count = part.skin.map_or(0, |skin| self.skins[skin].joints.len());
+        let joints = joints(file, primitive, part.skin.is_some(), positions.len(), joint_count)?;
+        if targets.iter().any(|target| target.len() != positions.len()) {
+            return Err("a morph target has another number of vertices".into());
+        }
+        // Primitives with fewer targets stay where they are under the others.
+        while part.deltas.len() < targets.len() {
+            part.deltas.push(vec![DVec3::zeros(); part.rest.len()]);
+        }
+        let bits = |p: [f32; 3]| p.map(|value| (value + 0.0).to_bits());
+        let mut numbers = Vec::with_capacity(positions.len());
+        for (vertex, &place) in positions.iter().enumerate() {
+            let corner = Corner {
+                place: bits(place),
+                joints: joints[vertex].iter().map(|&(joint, weight)| (joint, weight.to_bits())).collect(),
+                deltas: targets.iter().map(|target| bits(target[vertex])).collect(),
+            };
+            let next = (part.first + part.rest.len()) as u32;
+            let number = *known.entry(corner).or_insert(next);
+            if number == next {
+                part.rest.push(Vec3::from(place).cast());
+                let at = |target: usize| targets.get(target).map_or([0.0; 3], |target| target[vertex]);
+                part.deltas.iter_mut().enumerate().for_each(|(t, list)| list.push(Vec3::from(at(t)).cast()));
+                let sum: f64 = joints[vertex].iter().map(|&(_, weight)| f64::from(weight)).sum();
+                let share = |&(joint, weight): &(u32, f32)| (joint, f64::from(weight) / sum);
+                part.influences.extend(joints[vertex].iter().map(share));
+                part.spans.push(part.influences.len() as u32);
+            }
+            numbers.push(number);
+        }
+        self.count = part.first + part.rest.len();
+        let indices: Vec<u32> = match primitive.indices() {
+            Some(accessor) => file.indices::<1>(&accessor)?.into_iter().map(|[index]| index).collect(),
+            None => (0..positions.len() as u32).collect(),
+        };
+        let corners: Vec<u32> = indices
+            .into_iter()
+            .map(|index| numbers.get(index as usize).copied())
+            .collect::<Option<_>>()
+            .ok_or("an index names a vertex that is not there")?;
+        self.triangles.extend(triangles(primitive.mode(), &corners));
+        Ok(())
+    }
+
+    /// Turns round the triangles of parts whose node mirrors them, as glTF asks.
+    pub fn face_outward(&mut self, globals: &[Matrix4<f64>]) {
+        for part in self.parts.iter().filter(|part| part.skin.is_none()) {
+            if globals[part.node].fixed_view::<3, 3>(0, 0).determinant() < 0.0 {
+                let own = part.first as u32..(part.first + part.rest.len()) as u32;
+                let mirrored = self.triangles.iter_mut().filter(|triangle| own.contains(&triangle[0]));
+                mirrored.for_each(|triangle| triangle.swap(1, 2));
+            }
+        }
+    }
+
+    /// World positions of all vertices (the file's unit).
+    pub fn pose(&self, locals: &[Local], globals: &[Matrix4<f64>], out: &mut Vec<DVec3>) {
+        out.clear();
+        out.reserve(self.count);
+        let upper = |matrix: Matrix4<f64>| -> Matrix3x4<f64> { matrix.fixed_rows::<3>(0).into_owned() };
+        let skins: Vec<Vec<Matrix3x4<f64>>> = self
+            .skins
+            .iter()
+            .map(|skin| {
+                let pairs = skin.joints.iter().zip(&skin.inverse_bind);
+                pairs.map(|(&joint, inverse)| upper(globals[joint] * inverse)).collect()
+            })
+            .collect();
+        for part in &self.parts {
+            let weights = &locals[part.node].weights;
+            let node = [upper(globals[part.node])];
+            let matrices = part.skin.map_or(&node[..], |skin| &skins[skin]);
+            for (vertex, rest) in part.rest.iter().enumerate() {
+                let moved = part.deltas.iter().zip(weights).filter(|(_, weight)| **weight != 0.0);
+                let place = moved.fold(*rest, |place, (deltas, weight)| place + deltas[vertex] * *weight);
+                let place = place.push(1.0);
+                let span = part.spans[vertex] as usize..part.spans[vertex + 1] as usize;
+                out.push(match &part.influences[span] {
+                    [] => matrices[0] * place,
+                    [(joint, _)] => matrices[*joint as usize] * place,
+                    many => many
+                        .iter()
+                        .map(|&(joint, weight)| matrices[joint as usize] * place * weight)
+                        .sum::<DVec3>(),
+                });
+            }
+        }
+    }
+}
+
+/// The joints and weights over 0 of each vertex; a skinned vertex without any hangs on the first joint.
+fn joints(
+    file: &File,
+    primitive: &gltf::Primitive,
+    skinned: bool,
+    count: usize,
+    joint_count: usize,
+) -> Result<Vec<Vec<(u32, f32)>>, String> {
+    let mut out = vec![Vec::new(); count];
+    if !skinned {
+        return Ok(out);
+    }
+    for set in 0.. {
+        let accessors = (primitive.get(&Semantic::Joints(set)), primitive.get(&Semantic::Weights(set)));
+        let (Some(joints), Some(weights)) = accessors else { break };
+        let (joints, weights) = (file.indices::<4>(&joints)?, file.rows::<4>(&weights)?);
+        if joints.len() != count || weights.len() != count {
+            return Err("has not joints and weights for every vertex".into());
+        }
+        for (vertex, (joints, weights)) in out.iter_mut().zip(joints.iter().zip(&weights)) {
+            vertex.extend(joints.iter().copied().zip(weights.iter().copied()).filter(|(_, w)| *w > 0.0));
+        }
+    }
+    for vertex in &mut out {
+        if vertex.is_empty() {
+            vertex.push((0, 1.0));
+        }
+        vertex.sort_unstable_by_key(|(joint, _)| *joint);
+        if vertex.iter().any(|&(joint, _)| joint as usize >= joint_count) {
+            return Err(format!("names a joint beyond the {joint_count} of its skin"));
+        }
+    }
+    Ok(out)
+}
+
+fn triangles(mode: Mode, corners: &[u32]) -> Vec<[u32; 3]> {
+    let strip = |(number, c): (usize, &[u32])| if number % 2 == 0 { [c[0], c[1], c[2]] } else { [c[1], c[0], c[2]] };
+    match mode {
+        Mode::TriangleStrip => corners.windows(3).enumerate().map(strip).collect(),
+        Mode::TriangleFan => corners.windows(2).skip(1).map(|c| [corners[0], c[0], c[1]]).collect(),
+        _ => corners.chunks_exact(3).map(|c| [c[0], c[1], c[2]]).collect(),
+    }
+}

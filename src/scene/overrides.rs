@@ -1,0 +1,90 @@
+//! Settings from the command line (`--set snow.noise.seed=2`) put over those of a scene file.
+
+use std::path::Path;
+
+use toml::Spanned;
+use toml::de::{DeArray, DeTable, DeValue};
+
+use crate::error::{Error, Result};
+
+/// One setting: a dotted key and its value, `object.1.scale=0.01` for the first object.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Override {
+    key: Vec<String>,
+    value: String,
+    text: String,
+}
+
+impl std::str::FromStr for Override {
+    type Err = String;
+
+    fn from_str(text: &str) -> std::result::Result<Self, String> {
+        let wrong = || format!("\"{text}\" is no setting such as snow.noise.seed=2");
+        let (key, value) = text.split_once('=').ok_or_else(wrong)?;
+        let key: Vec<String> = key.split('.').map(|part| part.trim().to_string()).collect();
+        if key.iter().any(String::is_empty) || value.trim().is_empty() {
+            return Err(wrong());
+        }
+        Ok(Self { key, value: value.trim().to_string(), text: text.to_string() })
+    }
+}
+
+impl Override {
+    /// As it was typed.
+    pub(super) fn text(&self) -> &str {
+        &self.text
+    }
+
+    /// Puts the value into a document; `place` is where messages find it.
+    pub(super) fn apply<'i>(&'i self, root: &mut DeTable<'i>, place: usize, path: &Path) -> Result<()> {
+        // What is no TOML is meant as a text: names of files and choices need no quotes.
+        let value = match DeValue::parse(&self.value) {
+            Ok(value) => moved(value.into_inner(), place),
+            Err(_) => Spanned::new(place..place, DeValue::String(self.value.as_str().into())),
+        };
+        let refused = |what: String| Error::argument(format!("{}: --set {}: {what}", path.display(), self.text));
+        let (last, parents) = self.key.split_last().expect("a setting has a key");
+        let mut table = root;
+        let mut parts = parents.iter();
+        while let Some(part) = parts.next() {
+            let name: std::borrow::Cow<'i, str> = part.as_str().into();
+            let empty = || Spanned::new(place..place, DeValue::Table(DeTable::new()));
+            let entry = table.entry(Spanned::new(place..place, name)).or_insert_with(empty);
+            table = match entry.get_mut() {
+                DeValue::Table(inner) => inner,
+                DeValue::Array(items) => {
+                    let number = parts.next().map_or("", String::as_str);
+                    let count = items.len();
+                    let item = number.parse::<usize>().ok().and_then(|n| n.checked_sub(1)).and_then(|n| items.get_mut(n));
+                    match item.map(Spanned::get_mut) {
+                        Some(DeValue::Table(inner)) => inner,
+                        _ => return Err(refused(format!("`{part}` needs a number from 1 to {count}"))),
+                    }
+                }
+                _ => return Err(refused(format!("`{part}` is no table"))),
+            };
+        }
+        table.insert(Spanned::new(place..place, last.as_str().into()), value);
+        Ok(())
+    }
+}
+
+/// A value whose parts all lie at one place.
+fn moved(value: DeValue<'_>, place: usize) -> Spanned<DeValue<'_>> {
+    let value = match value {
+        DeValue::Table(table) => {
+            let mut out = DeTable::new();
+            for (key, value) in table {
+                out.insert(Spanned::new(place..place, key.into_inner()), moved(value.into_inner(), place));
+            }
+            DeValue::Table(out)
+        }
+        DeValue::Array(items) => {
+            let mut out = DeArray::new();
+            items.into_iter().for_each(|item| out.push(moved(item.into_inner(), place)));
+            DeValue::Array(out)
+        }
+        other => other,
+    };
+    Spanned::new(place..place, value)
+}

@@ -1,0 +1,169 @@
+//! The grids of a layer, whole or as the blocks that a step changed.
+
+use super::empty_removed;
+use crate::base::blocks::{Block, BlockEdit, Origin, VOXELS};
+use crate::context::Context;
+use crate::error::{Error, Result};
+use crate::vdb::{FloatGrid, Leaf, MetaValue};
+
+/// Metadata of `surface`: the snow's volume (m3), exactly as the layer counts it.
+const VOLUME: &str = "volume_m3";
+
+/// What a layer is made of: all that its next step depends on, besides the layer before the first step.
+pub struct Grids {
+    /// The snow (level set, m).
+    pub surface: FloatGrid,
+    /// Part of its column's height that was removed, at touched surface voxels, 0..=1.
+    pub compression: FloatGrid,
+    /// Frame of the last change, at touched surface voxels.
+    pub touched: FloatGrid,
+}
+
+/// What a step changed, block by block: enough to follow a layer from its grids before the step.
+pub struct Changes {
+    pub(super) surface: Vec<BlockEdit>,
+    pub(super) compression: Vec<BlockEdit>,
+    pub(super) touched: Vec<BlockEdit>,
+    /// What the step removed (level set).
+    pub removed: FloatGrid,
+    /// Snow left (m3).
+    pub volume: f64,
+}
+
+impl Grids {
+    /// Untouched snow.
+    ///
+    /// # Errors
+    /// When memory runs out.
+    pub(super) fn new(mut surface: FloatGrid, volume: f64) -> Result<Self> {
+        surface.set_name("surface")?;
+        surface.set_metadata(VOLUME, MetaValue::Double(volume))?;
+        let cell = surface.voxel_size();
+        Ok(Self { surface, compression: plain(cell, "compression")?, touched: plain(cell, "touched")? })
+    }
+
+    /// A copy that shares no memory.
+    ///
+    /// # Errors
+    /// When memory runs out.
+    pub fn deep_copy(&self) -> Result<Self> {
+        Ok(Self {
+            surface: self.surface.deep_copy()?,
+            compression: self.compression.deep_copy()?,
+            touched: self.touched.deep_copy()?,
+        })
+    }
+
+    /// Takes the grids out of those of a file, by name.
+    ///
+    /// # Errors
+    /// Names the grid that is missing or has no volume.
+    pub fn from_named(grids: Vec<FloatGrid>) -> Result<Self> {
+        let mut grids: Vec<Option<FloatGrid>> = grids.into_iter().map(Some).collect();
+        let mut take = |name: &str| {
+            let found = grids.iter_mut().find(|grid| grid.as_ref().is_some_and(|grid| grid.name() == name));
+            found.and_then(Option::take).ok_or_else(|| Error::argument(format!("there is no grid \"{name}\"")))
+        };
+        let all = Self { surface: take("surface")?, compression: take("compression")?, touched: take("touched")? };
+        all.volume()?;
+        Ok(all)
+    }
+
+    /// The grids, in the order of a file.
+    pub fn list(&self) -> [&FloatGrid; 3] {
+        [&self.surface, &self.compression, &self.touched]
+    }
+
+    /// The snow's volume (m3).
+    ///
+    /// # Errors
+    /// When the metadata of `surface` does not hold it.
+    pub fn volume(&self) -> Result<f64> {
+        let metadata = self.surface.metadata()?;
+        match metadata.iter().find(|(key, _)| key == VOLUME) {
+            Some((_, MetaValue::Double(volume))) => Ok(*volume),
+            _ => Err(Error::argument(format!("grid \"surface\" has no metadata {VOLUME}"))),
+        }
+    }
+
+    /// Puts a step's changes in place.
+    ///
+    /// # Errors
+    /// When memory runs out.
+    pub fn apply(&mut self, ctx: &Context, changes: &Changes) -> Result<()> {
+        self.surface.replace_blocks(ctx, &changes.surface)?;
+        self.compression.replace_blocks(ctx, &changes.compression)?;
+        self.touched.replace_blocks(ctx, &changes.touched)?;
+        self.surface.set_metadata(VOLUME, MetaValue::Double(changes.volume))
+    }
+
+    /// A step's changes as grids that hold a leaf for every block that changed, and nothing else.
+    ///
+    /// # Errors
+    /// When memory runs out.
+    pub fn delta(ctx: &Context, cell: f64, half_width: f32, changes: &Changes) -> Result<Self> {
+        let mut delta = Self::new(FloatGrid::level_set(cell, half_width)?, changes.volume)?;
+        for (grid, edits) in [
+            (&mut delta.surface, &changes.surface),
+            (&mut delta.compression, &changes.compression),
+            (&mut delta.touched, &changes.touched),
+        ] {
+            // A constant block becomes a leaf without active voxels: a tile could not be told from nothing.
+            let (constant, dense): (Vec<&BlockEdit>, Vec<&BlockEdit>) =
+                edits.iter().partition(|edit| matches!(edit, BlockEdit::Constant(..)));
+            let as_leaf = |edit: &&BlockEdit| match edit {
+                BlockEdit::Constant(origin, value) => {
+                    BlockEdit::Dense(Block { origin: *origin, values: Box::new([*value; VOXELS]), mask: [0; 8] })
+                }
+                BlockEdit::Dense(block) => BlockEdit::Dense(block.clone()),
+            };
+            let leaves: Vec<BlockEdit> = constant.iter().chain(&dense).map(as_leaf).collect();
+            grid.replace_blocks(ctx, &leaves)?;
+        }
+        Ok(delta)
+    }
+
+    /// Puts a delta's blocks in place.
+    ///
+    /// # Errors
+    /// Another cell size; no volume; when memory runs out.
+    pub fn apply_delta(&mut self, ctx: &Context, delta: &Self) -> Result<()> {
+        if delta.surface.voxel_size() != self.surface.voxel_size() {
+            return Err(Error::argument("the changes have cells of another size"));
+        }
+        for (grid, changed) in [
+            (&mut self.surface, &delta.surface),
+            (&mut self.compression, &delta.compression),
+            (&mut self.touched, &delta.touched),
+        ] {
+            let edits: Vec<BlockEdit> = changed.leaves()?.iter().map(block_of).collect();
+            grid.replace_blocks(ctx, &edits)?;
+        }
+        self.surface.set_metadata(VOLUME, MetaValue::Double(delta.volume()?))
+    }
+}
+
+impl Changes {
+    /// Nothing changed.
+    pub(super) fn none(grids: &Grids, half_width: f32) -> Result<Self> {
+        let removed = empty_removed(grids.surface.voxel_size(), half_width)?;
+        let (surface, compression, touched) = Default::default();
+        Ok(Self { surface, compression, touched, removed, volume: grids.volume()? })
+    }
+}
+
+/// A leaf as a block; one without active voxels is constant.
+fn block_of(leaf: &Leaf<'_>) -> BlockEdit {
+    let origin: Origin = leaf.origin;
+    let uniform = leaf.values.iter().all(|value| *value == leaf.values[0]);
+    if *leaf.mask == [0; 8] && uniform {
+        return BlockEdit::Constant(origin, leaf.values[0]);
+    }
+    BlockEdit::Dense(Block { origin, values: Box::new(*leaf.values), mask: *leaf.mask })
+}
+
+fn plain(cell: f64, name: &str) -> Result<FloatGrid> {
+    let mut grid = FloatGrid::new(cell, 0.0)?;
+    grid.set_name(name)?;
+    Ok(grid)
+}
