@@ -14,8 +14,12 @@ pub struct FrameProgress {
 }
 
 impl FrameProgress {
-    /// Starts the display of `total` frames.
-    pub fn new(total: usize, quiet: bool) -> Self {
+    /// Starts the display of `total` frames to be made, besides those that are `there`.
+    pub fn new(total: usize, there: usize, quiet: bool) -> Self {
+        if there > 0 && !quiet {
+            // Progress is a courtesy: a closed stderr is no reason to stop.
+            let _ = writeln!(std::io::stderr(), "{there} frames are there, {total} are to be made");
+        }
         let terminal = std::io::stderr().is_terminal();
         let bar = (terminal && !quiet).then(|| {
             let bar = ProgressBar::with_draw_target(Some(total as u64), ProgressDrawTarget::stderr());
@@ -27,23 +31,16 @@ impl FrameProgress {
         Self { bar, lines: !terminal && !quiet, total, done: 0, start: Instant::now() }
     }
 
-    /// A frame is about to be made.
-    pub fn begin(&self, frame: i32) {
-        if let Some(bar) = &self.bar {
-            bar.set_message(format!("frame {frame} stage base"));
-        }
-    }
-
     /// A frame is written.
     pub fn finished(&mut self, frame: i32) {
         self.done += 1;
         if let Some(bar) = &self.bar {
+            bar.set_message(format!("frame {frame} stage base"));
             bar.inc(1);
         }
         if self.lines {
             let percent = 100 * self.done / self.total.max(1);
             let eta = clock(self.start.elapsed(), self.done, self.total);
-            // Progress is a courtesy: a closed stderr is no reason to stop.
             let _ = writeln!(std::io::stderr(), "frame {frame} stage base {percent}% eta {eta}");
         }
     }

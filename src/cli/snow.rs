@@ -2,7 +2,7 @@
 
 use std::path::PathBuf;
 
-use frazil::scene::{FrameChoice, Inputs, Scene, check_memory, shot};
+use frazil::scene::{FrameChoice, Inputs, Override, Scene, check_memory, shot};
 
 use super::exit::{Failure, Phase};
 use super::output;
@@ -11,10 +11,15 @@ use super::session::Session;
 
 /// Press moving objects into a layer of snow.
 ///
-/// Writes base/base.%04d.vdb (surface, compression, touched), removed/removed.%04d.vdb, report/%04d.json
-/// and scene.toml, the scene with every default filled in.
+/// Writes base/base.%04d.vdb (surface, compression, touched), removed/removed.%04d.vdb, report/%04d.json, shot.usda
+/// and scene.toml, the scene with every default filled in. Frames that are there and match are not made again; a
+/// folder with frames of other settings is refused.
 #[derive(clap::Args)]
-#[command(after_help = "Example:\n  frazil snow walker.toml -o cache/ --frames 1-24")]
+#[command(after_help = "\
+Examples:
+  frazil snow walker.toml -o cache/
+  frazil snow walker.toml -o cache/ --from 40 --set snow.noise.seed=2
+  frazil snow walker.toml -o look/ --preview 3 --frames 1-24")]
 pub struct Args {
     /// Scene file (TOML).
     scene: PathBuf,
@@ -24,9 +29,18 @@ pub struct Args {
     /// Parts to make.
     #[arg(long, value_enum, default_value = "base")]
     stage: Stage,
-    /// Write these frames only; the frames before them are still computed.
+    /// Write these frames only; frames before them are computed when no file has them.
     #[arg(long, value_name = "A-B|A-BxN|A,B,C", allow_hyphen_values = true)]
     frames: Option<FrameChoice>,
+    /// Keep the frames before N, whatever they were made with, and make all others again.
+    #[arg(long, value_name = "N", allow_hyphen_values = true)]
+    from: Option<i32>,
+    /// Put a setting over the scene's, for instance snow.noise.seed=2 or object.1.file=hero.glb.
+    #[arg(long, value_name = "KEY=VALUE")]
+    set: Vec<Override>,
+    /// Make the cells N times as large: a quick look, into a folder of its own.
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..=100))]
+    preview: Option<u16>,
 }
 
 #[derive(Clone, Copy, PartialEq, clap::ValueEnum)]
@@ -38,7 +52,10 @@ enum Stage {
 /// Runs the command.
 pub fn run(args: Args, session: &Session) -> Result<(), Failure> {
     let Stage::Base = args.stage;
-    let scene = Scene::read(&args.scene).before()?;
+    let mut scene = Scene::read_with(&args.scene, &args.set).before()?;
+    if let Some(factor) = args.preview {
+        scene.coarsen(factor.into()).before()?;
+    }
     let shot_frames = scene.shot.frames;
     let frames = args.frames.unwrap_or_else(|| shot_frames.into());
     if frames.first() < shot_frames.first || frames.last() > shot_frames.last {
@@ -48,22 +65,23 @@ pub fn run(args: Args, session: &Session) -> Result<(), Failure> {
             frames.last()
         )));
     }
+    if let Some(from) = args.from.filter(|from| !shot_frames.contains(*from)) {
+        return Err(Failure::refused(format!("--from {from} is not within the shot's {shot_frames}")));
+    }
     let inputs = Inputs::load(&scene).before()?;
     check_memory(&scene, &inputs, session.max_memory()).before()?;
-    shot::prepare(&scene, &args.output).before()?;
+    let run = shot::Run::prepare(&scene, &inputs, &args.output, &frames, args.from).before()?;
     output::check_folder(&args.output).before()?;
-    let mut progress = FrameProgress::new(frames.count(), session.is_quiet());
-    progress.begin(frames.first());
+    let (made, there) = (run.to_make(), run.there());
+    let mut progress = FrameProgress::new(made, there, session.is_quiet());
     let mut removed = 0.0;
-    shot::run(&session.ctx, &scene, &inputs, &args.output, &frames, |frame, report| {
+    run.make(&session.ctx, |frame, report| {
         removed += report.removed_volume;
         progress.finished(frame);
-        if frame < frames.last() {
-            progress.begin(frame + 1);
-        }
     })
     .during()?;
-    session.record("frames", frames.count().into());
+    session.record("frames", made.into());
+    session.record("frames_there", there.into());
     session.record("removed_m3", removed.into());
     Ok(())
 }

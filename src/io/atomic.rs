@@ -6,6 +6,9 @@ use std::sync::atomic::{AtomicU64, Ordering};
 
 use crate::error::{Error, Result};
 
+/// Extension of files that are not finished.
+pub const PART: &str = "part";
+
 /// Files begun by this process.
 static TURN: AtomicU64 = AtomicU64::new(0);
 
@@ -25,7 +28,7 @@ pub fn write(path: &Path, content: impl FnOnce(&mut dyn Write) -> std::io::Resul
     let mut name = path.file_name().unwrap_or_default().to_os_string();
     // Two processes or threads that write the same file do not share a neighbour.
     let turn = TURN.fetch_add(1, Ordering::Relaxed);
-    name.push(format!(".{}-{turn}.part", std::process::id()));
+    name.push(format!(".{}-{turn}.{PART}", std::process::id()));
     let part = path.with_file_name(name);
     let attempt = || -> std::io::Result<()> {
         let mut out = std::io::BufWriter::new(std::fs::File::create(&part)?);

@@ -21,6 +21,11 @@ impl Frames {
         (i64::from(self.last) - i64::from(self.first) + 1) as usize
     }
 
+    /// Whether a frame is among them.
+    pub fn contains(&self, frame: i32) -> bool {
+        self.iter().contains(&frame)
+    }
+
     /// The frames in order.
     pub fn iter(&self) -> std::ops::RangeInclusive<i32> {
         self.first..=self.last
@@ -70,6 +75,11 @@ impl FrameChoice {
     /// The greatest frame.
     pub fn last(&self) -> i32 {
         self.frames[self.frames.len() - 1]
+    }
+
+    /// The frames, ascending.
+    pub fn iter(&self) -> impl Iterator<Item = i32> + '_ {
+        self.frames.iter().copied()
     }
 
     /// Number of frames, at least 1.

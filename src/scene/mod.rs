@@ -1,7 +1,8 @@
 //! Scene files (TOML): what a shot is made of, read with every default filled in ([`Scene::read`]), checked
 //! against its inputs and run frame by frame ([`shot`]).
 
-mod changes;
+mod cache;
+mod chain;
 mod file;
 mod frames;
 mod inputs;
@@ -9,8 +10,10 @@ mod memory;
 mod objects;
 mod overrides;
 mod resolved;
+mod settings;
 pub mod shot;
 mod table;
+mod writer;
 
 pub use frames::{FrameChoice, Frames};
 pub use inputs::Inputs;

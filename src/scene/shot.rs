@@ -1,76 +1,237 @@
-//! The frame loop: from one frame to the next, and each frame's files.
+//! The frame loop: from one frame to the next, on from where an earlier run stopped.
 
-use std::path::{Path, PathBuf};
+use std::path::Path;
+use std::sync::mpsc::{Receiver, sync_channel};
 
-use serde_json::json;
-
-use super::changes::changed_keys;
-use super::{FrameChoice, Inputs, Scene};
+use super::cache::Cache;
+use super::writer::{Job, Step, Writer, object_names};
+use super::{BaseMode, FrameChoice, Inputs, Scene};
 use crate::context::{Context, StageTime};
 use crate::error::{Error, Result};
-use crate::io::atomic;
+use crate::io::manifest::Manifest;
+use crate::io::{atomic, usd};
 use crate::snow::base_layer::{BaseLayer, Params, StepReport};
-use crate::vdb::file::{WriteOptions, write};
-use crate::vdb::{FloatGrid, MetaValue};
 
-/// Prepares a folder for a scene: makes it, and writes the resolved scene into it.
-///
-/// # Errors
-/// A folder that cannot be made or written, or that holds another scene's output.
-pub fn prepare(scene: &Scene, folder: &Path) -> Result<()> {
-    let resolved = scene.to_toml();
-    let path = folder.join("scene.toml");
-    if let Ok(before) = std::fs::read_to_string(&path) {
-        let changed = changed_keys(&before, &resolved);
-        if !changed.is_empty() {
-            let what = format!(
-                "the folder holds the output of other settings ({}): choose another -o or remove it",
-                changed.join(", ")
-            );
-            return Err(Error::file(path, what));
-        }
-    }
-    for name in ["", "base", "removed", "report"] {
-        let folder = folder.join(name);
-        std::fs::create_dir_all(&folder).map_err(|error| Error::io(folder, "create the folder", error))?;
-    }
-    atomic::write_bytes(&path, resolved.as_bytes())
+/// Steps that wait for the writer at most: a step's changes are a few MB.
+const WAITING: usize = 2;
+
+/// A shot with its folder, ready to run.
+pub struct Run<'a> {
+    scene: &'a Scene,
+    inputs: &'a Inputs,
+    cache: Cache<'a>,
+    /// Frames that are wanted and not done, ascending.
+    todo: Vec<i32>,
+    /// Frames that are wanted and done.
+    there: usize,
 }
 
-/// Runs the frames up to the last of `frames`, writes those in `frames`, and tells `done` after each.
-///
-/// # Errors
-/// What a step or a file reports; whole frames are left behind.
-pub fn run(
-    ctx: &Context,
-    scene: &Scene,
-    inputs: &Inputs,
-    folder: &Path,
-    frames: &FrameChoice,
-    mut done: impl FnMut(i32, &StepReport),
-) -> Result<()> {
-    let noise = (scene.snow.noise.amplitude > 0.0).then_some(scene.snow.noise);
-    let params = Params { noise, tolerance: 0.02 };
-    let mut base = BaseLayer::new(ctx, inputs.layer(ctx, scene.snow.cell)?, params)?;
-    log::info!(
-        "snow: {} active voxels, {:.1} MB, {:.6} m3",
-        base.surface().active_voxels(),
-        base.surface().memory_bytes() as f64 / 1e6,
-        base.volume()
-    );
-    let first = scene.shot.frames.first;
-    for frame in first..=frames.last() {
-        let time = |frame: i32| f64::from(frame) / scene.shot.fps;
-        // The first frame's poses are cut out; nothing has moved yet.
-        let from = if frame == first { frame } else { frame - 1 };
-        let report = base.step(ctx, &inputs.bodies, time(from), time(frame), frame)?;
-        log_step(frame, &report);
-        if frames.contains(frame) {
-            write_frame(scene, &base, folder, frame, &report)?;
-            done(frame, &report);
+impl<'a> Run<'a> {
+    /// Opens or makes the folder, finds what is done, and writes the resolved scene into it.
+    ///
+    /// `from` keeps the frames before it, whatever they were made with, and makes all others again.
+    ///
+    /// # Errors
+    /// A folder that cannot be written, that another run writes into, or whose frames were made with other settings
+    /// or inputs; a damaged record; frames that would leave a gap in a cache of changes.
+    pub fn prepare(
+        scene: &'a Scene,
+        inputs: &'a Inputs,
+        folder: &Path,
+        frames: &FrameChoice,
+        from: Option<i32>,
+    ) -> Result<Self> {
+        let cache = Cache::open(scene, inputs, folder, from)?;
+        let (there, todo): (Vec<i32>, Vec<i32>) = frames.iter().partition(|frame| cache.is_done(*frame));
+        let delta = scene.output.base && scene.output.base_mode == BaseMode::Delta;
+        let gap = (scene.shot.frames.first..frames.last()).find(|f| !cache.is_done(*f) && !frames.contains(*f));
+        match gap {
+            Some(gap) if delta => Err(Error::file(
+                folder,
+                format!("with base_mode = \"delta\" every frame is needed, but frame {gap} is neither there nor asked for"),
+            )),
+            _ => Ok(Self { scene, inputs, cache, todo, there: there.len() }),
         }
     }
-    Ok(())
+
+    /// Number of frames to be made.
+    pub fn to_make(&self) -> usize {
+        self.todo.len()
+    }
+
+    /// Number of frames that were wanted and are there.
+    pub fn there(&self) -> usize {
+        self.there
+    }
+
+    /// Makes the frames, and tells `done` when the files of one are written.
+    ///
+    /// # Errors
+    /// What a step or a file reports; whole frames are left behind, from which another run goes on.
+    pub fn make(mut self, ctx: &Context, done: impl FnMut(i32, &StepReport) + Send) -> Result<()> {
+        let todo = std::mem::take(&mut self.todo);
+        if let Some(&first) = todo.first() {
+            let params = Params { noise: self.noise(), tolerance: 0.02 };
+            let base = self.layer_before(ctx, first, params)?;
+            self.make_frames(ctx, base, params, &todo, done)?;
+        }
+        if self.scene.output.usd {
+            self.write_stage()?;
+        }
+        Ok(())
+    }
+
+    fn noise(&self) -> Option<crate::snow::base_layer::NoiseParams> {
+        Some(self.scene.snow.noise).filter(|noise| noise.amplitude > 0.0)
+    }
+
+    fn make_frames(
+        &mut self,
+        ctx: &Context,
+        mut at: LayerAt,
+        params: Params,
+        todo: &[i32],
+        mut done: impl FnMut(i32, &StepReport) + Send,
+    ) -> Result<()> {
+        let half_width = at.layer.half_width();
+        let mut writer =
+            Writer::new(ctx, self.scene, &self.inputs.bodies, self.cache.folder(), half_width);
+        let (jobs, waiting) = sync_channel(WAITING);
+        let (made, finished) = std::thread::scope(|scope| {
+            let writing = scope.spawn(move || write_all(&mut writer, waiting, &mut done));
+            let made = self.step_all(ctx, &mut at, params, todo, |job| jobs.send(job).is_ok());
+            drop(jobs);
+            (made, writing.join())
+        });
+        let (manifests, written) = finished.map_err(|_| Error::Internal("the writer stopped".into()))?;
+        manifests.into_iter().for_each(|manifest| self.cache.add(manifest));
+        // What stopped the writer stopped the steps too, and is the reason to tell.
+        written.and(made)
+    }
+
+    /// Steps to every wanted frame; `send` gives the work to the writer and says whether it still listens.
+    fn step_all(
+        &mut self,
+        ctx: &Context,
+        at: &mut LayerAt,
+        params: Params,
+        todo: &[i32],
+        mut send: impl FnMut(Job) -> bool,
+    ) -> Result<()> {
+        let first = self.scene.shot.frames.first;
+        let mut follows = false;
+        for &wanted in todo {
+            if at.frame < wanted - 1 && self.cache.latest_state(at.frame + 1..=wanted - 1).is_some() {
+                *at = self.layer_before(ctx, wanted, params)?;
+                follows = false;
+            }
+            while at.frame < wanted {
+                let frame = at.frame + 1;
+                if !follows && (Writer::follows(self.scene) || frame == first) {
+                    if !send(Job::Start(Box::new(at.layer.grids().deep_copy()?))) {
+                        return Ok(());
+                    }
+                }
+                follows = true;
+                let report = self.step(ctx, &mut at.layer, frame)?;
+                let inputs = if frame == wanted { Some(self.cache.inputs(frame)?) } else { None };
+                let changes = at.layer.take_changes()?;
+                at.frame = frame;
+                if !send(Job::Step(Box::new(Step { frame, changes, report, inputs }))) {
+                    return Ok(());
+                }
+            }
+        }
+        Ok(())
+    }
+
+    fn step(&self, ctx: &Context, layer: &mut BaseLayer, frame: i32) -> Result<StepReport> {
+        let time = |frame: i32| f64::from(frame) / self.scene.shot.fps;
+        // The first frame's poses are cut out; nothing has moved yet.
+        let from = if frame == self.scene.shot.frames.first { frame } else { frame - 1 };
+        let report = layer.step(ctx, &self.inputs.bodies, time(from), time(frame), frame)?;
+        log_step(frame, &report);
+        Ok(report)
+    }
+
+    /// The layer from which a frame can be reached in the fewest steps.
+    fn layer_before(&self, ctx: &Context, frame: i32, params: Params) -> Result<LayerAt> {
+        let first = self.scene.shot.frames.first;
+        let initial = self.inputs.layer(ctx, self.scene.snow.cell)?;
+        let at = match self.cache.latest_state(first..=frame - 1) {
+            None => LayerAt { frame: first - 1, layer: BaseLayer::new(ctx, initial, params)? },
+            Some(state) => {
+                let grids = self.cache.load(ctx, state)?;
+                LayerAt { frame: state, layer: BaseLayer::resume(ctx, initial, grids, params)? }
+            }
+        };
+        log::info!(
+            "snow: {} active voxels, {:.1} MB, {:.6} m3; goes on after frame {}",
+            at.layer.surface().active_voxels(),
+            at.layer.surface().memory_bytes() as f64 / 1e6,
+            at.layer.volume(),
+            at.frame
+        );
+        Ok(at)
+    }
+
+    /// Writes `shot.usda`, with the frames that are there.
+    fn write_stage(&self) -> Result<()> {
+        let (frames, fps) = (self.scene.shot.frames, self.scene.shot.fps);
+        let relative = |kind: &str| -> Vec<(i32, String)> {
+            let files = self.cache.files(kind).into_iter();
+            files.filter(|(frame, _)| frames.contains(*frame)).map(|(frame, path)| (frame, format!("./{path}"))).collect()
+        };
+        let whole = self.scene.output.base_mode == BaseMode::Full;
+        let base = if whole { relative("base") } else { Vec::new() };
+        let removed = relative("removed");
+        let volumes = [
+            usd::VolumeFiles {
+                name: "base",
+                grids: &[("surface", true), ("compression", false), ("touched", false)],
+                files: &base,
+            },
+            usd::VolumeFiles { name: "removed", grids: &[("removed", true)], files: &removed },
+        ];
+        let names = object_names(self.scene);
+        let clips = usd::Clips { kind: "objects", frames: relative("objects").into_iter().map(|f| f.0).collect() };
+        let folder = self.cache.folder();
+        let clips = (!clips.frames.is_empty()).then_some((&clips, &names[..]));
+        if clips.is_some() {
+            let text = usd::clip_manifest("objects", &names);
+            atomic::write_bytes(&folder.join("objects/objects.manifest.usda"), text.as_bytes())?;
+        }
+        let time = usd::StageTime { first: frames.first, last: frames.last, fps };
+        let comment = format!("made by frazil {}", env!("CARGO_PKG_VERSION"));
+        let text = usd::stage(&comment, time, &volumes, clips);
+        atomic::write_bytes(&folder.join("shot.usda"), text.as_bytes())
+    }
+}
+
+/// A layer as it is after a frame.
+struct LayerAt {
+    frame: i32,
+    layer: BaseLayer,
+}
+
+/// Writes until there is no more work or a file fails; gives what was written besides.
+fn write_all(
+    writer: &mut Writer,
+    waiting: Receiver<Job>,
+    done: &mut impl FnMut(i32, &StepReport),
+) -> (Vec<Manifest>, Result<()>) {
+    let mut manifests = Vec::new();
+    for job in waiting {
+        match writer.work(job) {
+            Ok(None) => {}
+            Ok(Some((manifest, report))) => {
+                done(manifest.frame, &report);
+                manifests.push(manifest);
+            }
+            Err(error) => return (manifests, Err(error)),
+        }
+    }
+    (manifests, Ok(()))
 }
 
 fn log_step(frame: i32, report: &StepReport) {
@@ -83,50 +244,4 @@ fn log_step(frame: i32, report: &StepReport) {
         report.touched_blocks,
         stages.join(", ")
     );
-}
-
-/// The file of a frame: `base/base.0012.vdb`.
-pub fn frame_path(folder: &Path, kind: &str, frame: i32, extension: &str) -> PathBuf {
-    folder.join(kind).join(format!("{kind}.{frame:04}.{extension}"))
-}
-
-fn write_frame(
-    scene: &Scene,
-    base: &BaseLayer,
-    folder: &Path,
-    frame: i32,
-    report: &StepReport,
-) -> Result<()> {
-    let metadata = vec![
-        ("frazil:frame".into(), MetaValue::Int(frame.into())),
-        ("frazil:fps".into(), MetaValue::Double(scene.shot.fps)),
-        ("frazil:units".into(), MetaValue::Text("metres".into())),
-        ("frazil:up".into(), MetaValue::Text("y".into())),
-        ("frazil:version".into(), MetaValue::Text(env!("CARGO_PKG_VERSION").into())),
-    ];
-    let options = WriteOptions { metadata, ..WriteOptions::default() };
-    let save =
-        |kind: &str, grids: &[&FloatGrid]| write(&frame_path(folder, kind, frame, "vdb"), grids, &options);
-    if scene.output.removed {
-        save("removed", &[base.removed()])?;
-    }
-    if scene.output.base {
-        save("base", &[base.surface(), base.compression(), base.touched()])?;
-    }
-    let stages: Vec<_> = report
-        .stages
-        .iter()
-        .map(|stage| json!({ "name": stage.name, "seconds": stage.time.as_secs_f64() }))
-        .collect();
-    let text = json!({
-        "frame": frame,
-        "removed_m3": report.removed_volume,
-        "base_m3": report.base_volume,
-        "touched_blocks": report.touched_blocks,
-        "sweep_faces": report.sweep_faces,
-        "base_bytes": base.surface().memory_bytes(),
-        "stages": stages,
-    });
-    let path = folder.join("report").join(format!("{frame:04}.json"));
-    atomic::write_bytes(&path, format!("{text:#}\n").as_bytes())
 }

@@ -6,11 +6,14 @@ use gltf::accessor::{DataType, Dimensions};
 use gltf::{Accessor, Document};
 
 use crate::error::{Error, Result};
+use crate::io::hash::Hasher;
 
 /// A parsed file with its binary data.
 pub(super) struct File {
     pub document: Document,
     buffers: Vec<gltf::buffer::Data>,
+    /// Hash of the file and of its buffers.
+    pub content: String,
 }
 
 impl File {
@@ -45,8 +48,13 @@ impl File {
             }
             Ok(data)
         });
-        let buffers = buffers.collect::<Result<_>>()?;
-        Ok(Self { document, buffers })
+        let buffers = buffers.collect::<Result<Vec<_>>>()?;
+        let mut content = Hasher::default();
+        content.add(&bytes);
+        buffers.iter().for_each(|buffer| {
+            content.add(buffer);
+        });
+        Ok(Self { document, buffers, content: content.finish() })
     }
 
     /// The elements of an accessor as rows of `N` numbers; normalised integers become 0..=1 or -1..=1.

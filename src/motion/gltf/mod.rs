@@ -80,6 +80,14 @@ impl Character {
         Ok(character)
     }
 
+    /// Hash of a file and the buffers that it names.
+    ///
+    /// # Errors
+    /// As [`Character::open`].
+    pub fn content(path: &Path) -> Result<String> {
+        File::open(path).map(|file| file.content)
+    }
+
     /// Names of the clips in a file, in its order.
     ///
     /// # Errors

@@ -113,6 +113,11 @@ impl BaseLayer {
         Ok(layer)
     }
 
+    /// Half width of the snow's narrow band (cells).
+    pub fn half_width(&self) -> f32 {
+        self.half_width
+    }
+
     /// The grids: all that the next step depends on, besides the layer before the first step.
     pub fn grids(&self) -> &Grids {
         &self.grids

@@ -1,0 +1,202 @@
+//! A frame's files, written on a thread of their own while the next frame is computed.
+
+use std::path::{Path, PathBuf};
+
+use serde_json::json;
+
+use super::cache::{STAGE, state_path};
+use super::{BaseMode, Scene};
+use crate::base::DVec3;
+use crate::context::{Context, StageTime};
+use crate::error::{Error, Result};
+use crate::io::manifest::{Manifest, Written};
+use crate::io::{atomic, usd};
+use crate::snow::base_layer::{Changes, Grids, StepReport};
+use crate::sweep::Body;
+use crate::vdb::file::{WriteOptions, to_bytes};
+use crate::vdb::{FloatGrid, MetaValue};
+
+/// Exact states that are kept where the base's own files are not enough.
+const STATES_KEPT: i32 = 2;
+
+/// What the writer is told, in the order of the frames.
+pub(super) enum Job {
+    /// The grids from which the next steps start.
+    Start(Box<Grids>),
+    /// A step that was made.
+    Step(Box<Step>),
+}
+
+/// A step with what it changed.
+pub(super) struct Step {
+    pub frame: i32,
+    pub changes: Changes,
+    pub report: StepReport,
+    /// Hash of what the frame is made from, when it is to be written.
+    pub inputs: Option<String>,
+}
+
+/// Writes frames, following the layer by its changes.
+pub(super) struct Writer<'a> {
+    ctx: Context,
+    scene: &'a Scene,
+    bodies: &'a [Body],
+    names: Vec<String>,
+    folder: PathBuf,
+    half_width: f32,
+    /// The layer as it was after the last step, where whole grids are written.
+    copy: Option<Grids>,
+}
+
+impl<'a> Writer<'a> {
+    /// A writer into a folder; `ctx` gives the threads, its cancel flag does not matter: a frame begun is finished.
+    pub fn new(ctx: &Context, scene: &'a Scene, bodies: &'a [Body], folder: &Path, half_width: f32) -> Self {
+        let (ctx, folder) = (Context::new(ctx.pool().clone()), folder.to_path_buf());
+        Self { ctx, scene, bodies, names: object_names(scene), folder, half_width, copy: None }
+    }
+
+    /// Whether frames after the first need the whole grids.
+    pub fn follows(scene: &Scene) -> bool {
+        !scene.output.base_restarts() || scene.output.base_mode == BaseMode::Full
+    }
+
+    /// Does a job; gives the manifest of a frame that was written.
+    ///
+    /// # Errors
+    /// What the operating system or OpenVDB reports; the frame is then not done.
+    pub fn work(&mut self, job: Job) -> Result<Option<(Manifest, StepReport)>> {
+        match job {
+            Job::Start(grids) => {
+                self.copy = Some(*grids);
+                Ok(None)
+            }
+            Job::Step(step) => {
+                if let Some(copy) = &mut self.copy {
+                    copy.apply(&self.ctx, &step.changes)?;
+                }
+                let Step { frame, changes, report, inputs } = *step;
+                let Some(inputs) = inputs else { return Ok(None) };
+                let manifest = self.write_frame(frame, &changes, &report, inputs)?;
+                Ok(Some((manifest, report)))
+            }
+        }
+    }
+
+    fn write_frame(&mut self, frame: i32, changes: &Changes, report: &StepReport, inputs: String) -> Result<Manifest> {
+        let output = self.scene.output;
+        let mut files = Vec::new();
+        if output.removed {
+            let bytes = self.vdb_bytes(frame, &[&changes.removed], output.half, &inputs)?;
+            files.push(self.save("removed", frame, "vdb", &bytes)?);
+        }
+        if output.base {
+            let bytes = self.base_bytes(frame, changes, &inputs)?;
+            files.push(self.save("base", frame, "vdb", &bytes)?);
+        }
+        if output.objects {
+            let bytes = self.objects_text(frame)?;
+            files.push(self.save("objects", frame, "usda", bytes.as_bytes())?);
+        }
+        if !output.base_restarts() {
+            let grids = self.copy()?.list();
+            atomic::write_bytes(&state_path(&self.folder, frame), &self.vdb_bytes(frame, &grids, false, &inputs)?)?;
+        }
+        self.write_report(frame, report)?;
+        let manifest = Manifest { frame, inputs, files };
+        manifest.write(&self.folder, STAGE)?;
+        if !output.base_restarts() {
+            // An older state that cannot be removed does no harm.
+            let _ = std::fs::remove_file(state_path(&self.folder, frame - STATES_KEPT));
+        }
+        Ok(manifest)
+    }
+
+    fn copy(&self) -> Result<&Grids> {
+        self.copy.as_ref().ok_or_else(|| Error::Internal("the writer has no grids".into()))
+    }
+
+    /// The whole layer, or what changed of it.
+    fn base_bytes(&mut self, frame: i32, changes: &Changes, inputs: &str) -> Result<Vec<u8>> {
+        let half = self.scene.output.half;
+        if self.scene.output.base_mode == BaseMode::Full || frame == self.scene.shot.frames.first {
+            let bytes = self.vdb_bytes(frame, &self.copy()?.list(), half, inputs)?;
+            if !Self::follows(self.scene) {
+                self.copy = None;
+            }
+            return Ok(bytes);
+        }
+        let delta = Grids::delta(&self.ctx, self.scene.snow.cell, self.half_width, changes)?;
+        self.vdb_bytes(frame, &delta.list(), half, inputs)
+    }
+
+    fn vdb_bytes(&self, frame: i32, grids: &[&FloatGrid], half: bool, inputs: &str) -> Result<Vec<u8>> {
+        let fps = self.scene.shot.fps;
+        let text = |text: &str| MetaValue::Text(text.into());
+        let metadata = vec![
+            ("frazil:frame".into(), MetaValue::Int(frame.into())),
+            ("frazil:fps".into(), MetaValue::Double(fps)),
+            ("frazil:seconds".into(), MetaValue::Double(f64::from(frame) / fps)),
+            ("frazil:units".into(), text("metres")),
+            ("frazil:up".into(), text("y")),
+            ("frazil:version".into(), text(env!("CARGO_PKG_VERSION"))),
+            ("frazil:inputs".into(), text(inputs)),
+        ];
+        to_bytes(grids, &WriteOptions { metadata, half, ..WriteOptions::default() })
+    }
+
+    fn save(&self, kind: &str, frame: i32, extension: &str, bytes: &[u8]) -> Result<Written> {
+        let path = format!("{kind}/{kind}.{frame:04}.{extension}");
+        atomic::write_bytes(&self.folder.join(&path), bytes)?;
+        Ok(Written::new(path, bytes))
+    }
+
+    /// The objects as they are at a frame, with their velocities over the coming one.
+    fn objects_text(&self, frame: i32) -> Result<String> {
+        let fps = self.scene.shot.fps;
+        let (mut pose, mut velocities) = (Vec::<DVec3>::new(), Vec::<DVec3>::new());
+        let mut meshes = Vec::new();
+        for body in self.bodies {
+            body.motion().pose(f64::from(frame) / fps, &mut pose)?;
+            body.motion().velocities(f64::from(frame) / fps, 1.0 / fps, &mut velocities)?;
+            meshes.push((usd::to_floats(&pose), usd::to_floats(&velocities)));
+        }
+        let frames: Vec<usd::MeshFrame> = meshes
+            .iter()
+            .zip(self.bodies.iter().zip(&self.names))
+            .map(|((points, velocities), (body, name))| usd::MeshFrame {
+                name,
+                points,
+                velocities,
+                triangles: body.motion().triangles(),
+            })
+            .collect();
+        Ok(usd::clip("objects", frame, fps, &frames))
+    }
+
+    fn write_report(&self, frame: i32, report: &StepReport) -> Result<()> {
+        let stage = |stage: &StageTime| json!({ "name": stage.name, "seconds": stage.time.as_secs_f64() });
+        let stages: Vec<_> = report.stages.iter().map(stage).collect();
+        let text = json!({
+            "frame": frame,
+            "removed_m3": report.removed_volume,
+            "base_m3": report.base_volume,
+            "touched_blocks": report.touched_blocks,
+            "sweep_faces": report.sweep_faces,
+            "stages": stages,
+        });
+        let path = self.folder.join("report").join(format!("{frame:04}.json"));
+        atomic::write_bytes(&path, format!("{text:#}\n").as_bytes())
+    }
+}
+
+/// Names of the moving objects' prims, each once.
+pub(super) fn object_names(scene: &Scene) -> Vec<String> {
+    let mut names: Vec<String> = Vec::new();
+    for object in scene.objects.iter().filter(|object| object.role == super::Role::Collide) {
+        let stem = object.file.file_stem().unwrap_or_default().to_string_lossy().into_owned();
+        let stem = usd::prim_name(stem.split(['%', '#', '$']).next().unwrap_or("").trim_end_matches(['.', '_']));
+        let count = names.iter().filter(|name| **name == stem || name.starts_with(&format!("{stem}_"))).count();
+        names.push(if count == 0 { stem } else { format!("{stem}_{}", count + 1) });
+    }
+    names
+}
