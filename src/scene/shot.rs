@@ -4,7 +4,7 @@ use std::path::Path;
 use std::sync::mpsc::{Receiver, sync_channel};
 
 use super::cache::Cache;
-use super::writer::{Job, Step, Writer, object_names};
+use super::writer::{Job, Step, Writer, object_names, vdb_bytes};
 use super::{BaseMode, FrameChoice, Inputs, Scene};
 use crate::context::{Context, StageTime};
 use crate::error::{Error, Result};
@@ -118,31 +118,39 @@ impl<'a> Run<'a> {
         todo: &[i32],
         mut send: impl FnMut(Job) -> bool,
     ) -> Result<()> {
-        let first = self.scene.shot.frames.first;
-        let mut follows = false;
+        let mut follows = !Writer::follows(self.scene);
         for &wanted in todo {
             if at.frame < wanted - 1 && self.cache.latest_state(at.frame + 1..=wanted - 1).is_some() {
                 *at = self.layer_before(ctx, wanted, params)?;
-                follows = false;
+                follows = !Writer::follows(self.scene);
             }
             while at.frame < wanted {
                 let frame = at.frame + 1;
-                if !follows && (Writer::follows(self.scene) || frame == first) {
-                    if !send(Job::Start(Box::new(at.layer.grids().deep_copy()?))) {
-                        return Ok(());
-                    }
+                if !follows && !send(Job::Start(Box::new(at.layer.grids().deep_copy()?))) {
+                    return Ok(());
                 }
                 follows = true;
                 let report = self.step(ctx, &mut at.layer, frame)?;
                 let inputs = if frame == wanted { Some(self.cache.inputs(frame)?) } else { None };
                 let changes = at.layer.take_changes()?;
                 at.frame = frame;
-                if !send(Job::Step(Box::new(Step { frame, changes, report, inputs }))) {
+                let whole = self.whole_base(&at.layer, frame, inputs.as_deref())?;
+                if !send(Job::Step(Box::new(Step { frame, changes, report, inputs, whole }))) {
                     return Ok(());
                 }
             }
         }
         Ok(())
+    }
+
+    /// The base's file at the first frame of a cache of changes: no copy of the layer is needed for it.
+    fn whole_base(&self, layer: &BaseLayer, frame: i32, inputs: Option<&str>) -> Result<Option<Vec<u8>>> {
+        match inputs {
+            Some(inputs) if frame == self.scene.shot.frames.first && !Writer::follows(self.scene) => {
+                vdb_bytes(self.scene, frame, &layer.grids().list(), inputs).map(Some)
+            }
+            _ => Ok(None),
+        }
     }
 
     fn step(&self, ctx: &Context, layer: &mut BaseLayer, frame: i32) -> Result<StepReport> {

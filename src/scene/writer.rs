@@ -34,6 +34,8 @@ pub(super) struct Step {
     pub report: StepReport,
     /// Hash of what the frame is made from, when it is to be written.
     pub inputs: Option<String>,
+    /// The base's file, where it is whole and the writer has no copy of the layer.
+    pub whole: Option<Vec<u8>>,
 }
 
 /// Writes frames, following the layer by its changes.
@@ -55,7 +57,7 @@ impl<'a> Writer<'a> {
         Self { ctx, scene, bodies, names: object_names(scene), folder, half_width, copy: None }
     }
 
-    /// Whether frames after the first need the whole grids.
+    /// Whether it needs a copy of the layer.
     pub fn follows(scene: &Scene) -> bool {
         !scene.output.base_restarts() || scene.output.base_mode == BaseMode::Full
     }
@@ -74,24 +76,28 @@ impl<'a> Writer<'a> {
                 if let Some(copy) = &mut self.copy {
                     copy.apply(&self.ctx, &step.changes)?;
                 }
-                let Step { frame, changes, report, inputs } = *step;
-                let Some(inputs) = inputs else { return Ok(None) };
-                let manifest = self.write_frame(frame, &changes, &report, inputs)?;
-                Ok(Some((manifest, report)))
+                if step.inputs.is_none() {
+                    return Ok(None);
+                }
+                let manifest = self.write_frame(&step)?;
+                Ok(Some((manifest, step.report)))
             }
         }
     }
 
-    fn write_frame(&mut self, frame: i32, changes: &Changes, report: &StepReport, inputs: String) -> Result<Manifest> {
-        let output = self.scene.output;
+    fn write_frame(&self, step: &Step) -> Result<Manifest> {
+        let (output, frame) = (self.scene.output, step.frame);
+        let inputs = step.inputs.as_deref().unwrap_or_default();
         let mut files = Vec::new();
         if output.removed {
-            let bytes = self.vdb_bytes(frame, &[&changes.removed], output.half, &inputs)?;
+            let bytes = vdb_bytes(self.scene, frame, &[&step.changes.removed], inputs)?;
             files.push(self.save("removed", frame, "vdb", &bytes)?);
         }
         if output.base {
-            let bytes = self.base_bytes(frame, changes, &inputs)?;
-            files.push(self.save("base", frame, "vdb", &bytes)?);
+            files.push(match &step.whole {
+                Some(bytes) => self.save("base", frame, "vdb", bytes)?,
+                None => self.save("base", frame, "vdb", &self.base_bytes(step)?)?,
+            });
         }
         if output.objects {
             let bytes = self.objects_text(frame)?;
@@ -99,10 +105,11 @@ impl<'a> Writer<'a> {
         }
         if !output.base_restarts() {
             let grids = self.copy()?.list();
-            atomic::write_bytes(&state_path(&self.folder, frame), &self.vdb_bytes(frame, &grids, false, &inputs)?)?;
+            let bytes = to_bytes(&grids, &WriteOptions::default())?;
+            atomic::write_bytes(&state_path(&self.folder, frame), &bytes)?;
         }
-        self.write_report(frame, report)?;
-        let manifest = Manifest { frame, inputs, files };
+        self.write_report(frame, &step.report)?;
+        let manifest = Manifest { frame, inputs: inputs.to_string(), files };
         manifest.write(&self.folder, STAGE)?;
         if !output.base_restarts() {
             // An older state that cannot be removed does no harm.
@@ -116,32 +123,13 @@ impl<'a> Writer<'a> {
     }
 
     /// The whole layer, or what changed of it.
-    fn base_bytes(&mut self, frame: i32, changes: &Changes, inputs: &str) -> Result<Vec<u8>> {
-        let half = self.scene.output.half;
-        if self.scene.output.base_mode == BaseMode::Full || frame == self.scene.shot.frames.first {
-            let bytes = self.vdb_bytes(frame, &self.copy()?.list(), half, inputs)?;
-            if !Self::follows(self.scene) {
-                self.copy = None;
-            }
-            return Ok(bytes);
+    fn base_bytes(&self, step: &Step) -> Result<Vec<u8>> {
+        let inputs = step.inputs.as_deref().unwrap_or_default();
+        if self.scene.output.base_mode == BaseMode::Full {
+            return vdb_bytes(self.scene, step.frame, &self.copy()?.list(), inputs);
         }
-        let delta = Grids::delta(&self.ctx, self.scene.snow.cell, self.half_width, changes)?;
-        self.vdb_bytes(frame, &delta.list(), half, inputs)
-    }
-
-    fn vdb_bytes(&self, frame: i32, grids: &[&FloatGrid], half: bool, inputs: &str) -> Result<Vec<u8>> {
-        let fps = self.scene.shot.fps;
-        let text = |text: &str| MetaValue::Text(text.into());
-        let metadata = vec![
-            ("frazil:frame".into(), MetaValue::Int(frame.into())),
-            ("frazil:fps".into(), MetaValue::Double(fps)),
-            ("frazil:seconds".into(), MetaValue::Double(f64::from(frame) / fps)),
-            ("frazil:units".into(), text("metres")),
-            ("frazil:up".into(), text("y")),
-            ("frazil:version".into(), text(env!("CARGO_PKG_VERSION"))),
-            ("frazil:inputs".into(), text(inputs)),
-        ];
-        to_bytes(grids, &WriteOptions { metadata, half, ..WriteOptions::default() })
+        let delta = Grids::delta(&self.ctx, self.scene.snow.cell, self.half_width, &step.changes)?;
+        vdb_bytes(self.scene, step.frame, &delta.list(), inputs)
     }
 
     fn save(&self, kind: &str, frame: i32, extension: &str, bytes: &[u8]) -> Result<Written> {
@@ -187,6 +175,25 @@ impl<'a> Writer<'a> {
         let path = self.folder.join("report").join(format!("{frame:04}.json"));
         atomic::write_bytes(&path, format!("{text:#}\n").as_bytes())
     }
+}
+
+/// A frame's .vdb file.
+///
+/// # Errors
+/// What OpenVDB reports.
+pub(super) fn vdb_bytes(scene: &Scene, frame: i32, grids: &[&FloatGrid], inputs: &str) -> Result<Vec<u8>> {
+    let fps = scene.shot.fps;
+    let text = |text: &str| MetaValue::Text(text.into());
+    let metadata = vec![
+        ("frazil:frame".into(), MetaValue::Int(frame.into())),
+        ("frazil:fps".into(), MetaValue::Double(fps)),
+        ("frazil:seconds".into(), MetaValue::Double(f64::from(frame) / fps)),
+        ("frazil:units".into(), text("metres")),
+        ("frazil:up".into(), text("y")),
+        ("frazil:version".into(), text(env!("CARGO_PKG_VERSION"))),
+        ("frazil:inputs".into(), text(inputs)),
+    ];
+    to_bytes(grids, &WriteOptions { metadata, half: scene.output.half, ..WriteOptions::default() })
 }
 
 /// Names of the moving objects' prims, each once.
