@@ -18,6 +18,18 @@ pub struct Written {
     pub hash: String,
 }
 
+/// From what another run can go on after a frame.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Keeps {
+    /// Its file holds everything.
+    Whole,
+    /// Its file holds what changed since the frame before.
+    Changes,
+    /// A file of its own holds everything, as long as it is kept.
+    State,
+}
+
 /// What a frame was made from, and its files.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Manifest {
@@ -25,6 +37,8 @@ pub struct Manifest {
     pub frame: i32,
     /// Hash of all settings and inputs that it depends on, those of the frames before it included.
     pub inputs: String,
+    /// From what another run can go on.
+    pub keeps: Keeps,
     /// Its files.
     pub files: Vec<Written>,
 }
@@ -66,6 +80,11 @@ impl Manifest {
     /// What the operating system reports.
     pub fn write(&self, folder: &Path, stage: &str) -> Result<()> {
         sealed::write(&Self::path(folder, stage, self.frame), self)
+    }
+
+    /// Its file of a kind: the one in the folder of that name.
+    pub fn file_of(&self, kind: &str) -> Option<&Written> {
+        self.files.iter().find(|file| file.path.split('/').next() == Some(kind))
     }
 
     /// Whether all its files are there with their lengths.

@@ -12,6 +12,7 @@ mod overrides;
 mod resolved;
 mod settings;
 pub mod shot;
+mod stored;
 mod table;
 mod writer;
 
@@ -19,6 +20,7 @@ pub use frames::{FrameChoice, Frames};
 pub use inputs::Inputs;
 pub use memory::{check as check_memory, estimate};
 pub use overrides::Override;
+pub use stored::{Rebuild, Stored};
 
 use crate::motion::Space;
 use crate::snow::base_layer::NoiseParams;

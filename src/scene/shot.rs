@@ -19,7 +19,7 @@ const WAITING: usize = 2;
 pub struct Run<'a> {
     scene: &'a Scene,
     inputs: &'a Inputs,
-    cache: Cache<'a>,
+    cache: Cache,
     /// Frames that are wanted and not done, ascending.
     todo: Vec<i32>,
     /// Frames that are wanted and done.
@@ -42,9 +42,9 @@ impl<'a> Run<'a> {
         from: Option<i32>,
     ) -> Result<Self> {
         let cache = Cache::open(scene, inputs, folder, from)?;
-        let (there, todo): (Vec<i32>, Vec<i32>) = frames.iter().partition(|frame| cache.is_done(*frame));
+        let (there, todo): (Vec<i32>, Vec<i32>) = frames.iter().partition(|frame| cache.stored.is_done(*frame));
         let delta = scene.output.base && scene.output.base_mode == BaseMode::Delta;
-        let gap = (scene.shot.frames.first..frames.last()).find(|f| !cache.is_done(*f) && !frames.contains(*f));
+        let gap = (scene.shot.frames.first..frames.last()).find(|f| !cache.stored.is_done(*f) && !frames.contains(*f));
         match gap {
             Some(gap) if delta => Err(Error::file(
                 folder,
@@ -95,7 +95,7 @@ impl<'a> Run<'a> {
     ) -> Result<()> {
         let half_width = at.layer.half_width();
         let mut writer =
-            Writer::new(ctx, self.scene, &self.inputs.bodies, self.cache.folder(), half_width);
+            Writer::new(ctx, self.scene, &self.inputs.bodies, self.cache.stored.folder(), half_width);
         let (jobs, waiting) = sync_channel(WAITING);
         let (made, finished) = std::thread::scope(|scope| {
             let writing = scope.spawn(move || write_all(&mut writer, waiting, &mut done));
@@ -104,7 +104,7 @@ impl<'a> Run<'a> {
             (made, writing.join())
         });
         let (manifests, written) = finished.map_err(|_| Error::Internal("the writer stopped".into()))?;
-        manifests.into_iter().for_each(|manifest| self.cache.add(manifest));
+        manifests.into_iter().for_each(|manifest| self.cache.stored.add(manifest));
         // What stopped the writer stopped the steps too, and is the reason to tell.
         written.and(made)
     }
@@ -120,7 +120,7 @@ impl<'a> Run<'a> {
     ) -> Result<()> {
         let mut follows = !Writer::follows(self.scene);
         for &wanted in todo {
-            if at.frame < wanted - 1 && self.cache.latest_state(at.frame + 1..=wanted - 1).is_some() {
+            if at.frame < wanted - 1 && self.cache.stored.latest_layer(at.frame + 1..=wanted - 1).is_some() {
                 *at = self.layer_before(ctx, wanted, params)?;
                 follows = !Writer::follows(self.scene);
             }
@@ -166,10 +166,10 @@ impl<'a> Run<'a> {
     fn layer_before(&self, ctx: &Context, frame: i32, params: Params) -> Result<LayerAt> {
         let first = self.scene.shot.frames.first;
         let initial = self.inputs.layer(ctx, self.scene.snow.cell)?;
-        let at = match self.cache.latest_state(first..=frame - 1) {
+        let at = match self.cache.stored.latest_layer(first..=frame - 1) {
             None => LayerAt { frame: first - 1, layer: BaseLayer::new(ctx, initial, params)? },
             Some(state) => {
-                let grids = self.cache.load(ctx, state)?;
+                let grids = self.cache.stored.layer(ctx, state)?;
                 LayerAt { frame: state, layer: BaseLayer::resume(ctx, initial, grids, params)? }
             }
         };
@@ -187,7 +187,7 @@ impl<'a> Run<'a> {
     fn write_stage(&self) -> Result<()> {
         let (frames, fps) = (self.scene.shot.frames, self.scene.shot.fps);
         let relative = |kind: &str| -> Vec<(i32, String)> {
-            let files = self.cache.files(kind).into_iter();
+            let files = self.cache.stored.files(kind).into_iter();
             files.filter(|(frame, _)| frames.contains(*frame)).map(|(frame, path)| (frame, format!("./{path}"))).collect()
         };
         let whole = self.scene.output.base_mode == BaseMode::Full;
@@ -203,7 +203,7 @@ impl<'a> Run<'a> {
         ];
         let names = object_names(self.scene);
         let clips = usd::Clips { kind: "objects", frames: relative("objects").into_iter().map(|f| f.0).collect() };
-        let folder = self.cache.folder();
+        let folder = self.cache.stored.folder();
         let clips = (!clips.frames.is_empty()).then_some((&clips, &names[..]));
         if clips.is_some() {
             let text = usd::clip_manifest("objects", &names);

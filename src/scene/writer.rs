@@ -4,12 +4,12 @@ use std::path::{Path, PathBuf};
 
 use serde_json::json;
 
-use super::cache::{STAGE, state_path};
+use super::stored::{STAGE, state_path};
 use super::{BaseMode, Scene};
 use crate::base::DVec3;
 use crate::context::{Context, StageTime};
 use crate::error::{Error, Result};
-use crate::io::manifest::{Manifest, Written};
+use crate::io::manifest::{Keeps, Manifest, Written};
 use crate::io::{atomic, usd};
 use crate::snow::base_layer::{Changes, Grids, StepReport};
 use crate::sweep::Body;
@@ -109,13 +109,22 @@ impl<'a> Writer<'a> {
             atomic::write_bytes(&state_path(&self.folder, frame), &bytes)?;
         }
         self.write_report(frame, &step.report)?;
-        let manifest = Manifest { frame, inputs: inputs.to_string(), files };
+        let manifest = Manifest { frame, inputs: inputs.to_string(), keeps: self.keeps(frame), files };
         manifest.write(&self.folder, STAGE)?;
         if !output.base_restarts() {
             // An older state that cannot be removed does no harm.
             let _ = std::fs::remove_file(state_path(&self.folder, frame - STATES_KEPT));
         }
         Ok(manifest)
+    }
+
+    fn keeps(&self, frame: i32) -> Keeps {
+        let output = self.scene.output;
+        match (output.base_restarts(), output.base_mode) {
+            (false, _) => Keeps::State,
+            (true, BaseMode::Delta) if frame > self.scene.shot.frames.first => Keeps::Changes,
+            (true, _) => Keeps::Whole,
+        }
     }
 
     fn copy(&self) -> Result<&Grids> {

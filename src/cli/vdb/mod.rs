@@ -4,6 +4,7 @@ mod combine;
 mod displace;
 mod filter;
 mod from_mesh;
+mod rebuild;
 mod sweep;
 mod to_mesh;
 
@@ -40,6 +41,7 @@ enum Command {
     Smooth(filter::SmoothArgs),
     Displace(displace::Args),
     ToMesh(to_mesh::Args),
+    Rebuild(rebuild::Args),
 }
 
 /// Runs the command.
@@ -54,6 +56,7 @@ pub fn run(args: Args, session: &Session) -> std::result::Result<(), Failure> {
         Command::Smooth(args) => filter::smooth(&args, session),
         Command::Displace(args) => displace::run(&args, session),
         Command::ToMesh(args) => to_mesh::run(&args, session),
+        Command::Rebuild(args) => rebuild::run(&args, session),
     }
 }
 
@@ -66,12 +69,31 @@ struct VdbOutput {
     /// Name of the grid in the file
     #[arg(long, value_name = "NAME", default_value = "surface")]
     name: String,
+    #[command(flatten)]
+    packing: Packing,
+}
+
+/// How values are packed.
+#[derive(clap::Args)]
+struct Packing {
     /// Codec of the file
     #[arg(long, value_enum, default_value = "blosc")]
     compression: Codec,
     /// Store 16-bit values: smaller, for rendering only
     #[arg(long)]
     half: bool,
+}
+
+impl Packing {
+    /// As the library wants it.
+    fn options(&self) -> WriteOptions {
+        let compression = match self.compression {
+            Codec::Blosc => Compression::Blosc,
+            Codec::Zip => Compression::Zip,
+            Codec::None => Compression::None,
+        };
+        WriteOptions { compression, half: self.half, metadata: Vec::new() }
+    }
 }
 
 #[derive(Clone, Copy, ValueEnum)]
@@ -94,14 +116,8 @@ impl VdbOutput {
     /// Writes the grid and records what it holds.
     fn write(&self, session: &Session, mut grid: FloatGrid) -> Result<()> {
         grid.set_name(&self.name)?;
-        let compression = match self.compression {
-            Codec::Blosc => Compression::Blosc,
-            Codec::Zip => Compression::Zip,
-            Codec::None => Compression::None,
-        };
-        let options = WriteOptions { compression, half: self.half, metadata: Vec::new() };
         session.ctx.check()?;
-        file::write(&self.output, &[&grid], &options)?;
+        file::write(&self.output, &[&grid], &self.packing.options())?;
         session.record("active_voxels", json!(grid.active_voxels()));
         session.record("memory_bytes", json!(grid.memory_bytes()));
         Ok(())

@@ -1,0 +1,54 @@
+//! `frazil vdb rebuild`.
+
+use std::path::PathBuf;
+
+use super::{Packing, check_name};
+use crate::cli::exit::{Failure, Phase};
+use crate::cli::output;
+use crate::cli::session::Session;
+use frazil::io::sequence::Pattern;
+use frazil::scene::{FrameChoice, Rebuild};
+use frazil::vdb::file;
+use serde_json::json;
+
+/// Make whole frames of a snow cache that holds changes (base_mode = "delta")
+#[derive(clap::Args)]
+#[command(after_help = "\
+Examples:
+  frazil vdb rebuild cache/ --frame 48 -o base.0048.vdb
+  frazil vdb rebuild cache/ --frame 1-48 -o base.%04d.vdb")]
+pub struct Args {
+    /// Output folder of `frazil snow`
+    folder: PathBuf,
+    /// Frames to make
+    #[arg(long, value_name = "N|A-B|A-BxN", allow_hyphen_values = true)]
+    frame: FrameChoice,
+    /// File to write (.vdb); for several frames their pattern, base.%04d.vdb
+    #[arg(short, long, value_name = "FILE")]
+    output: PathBuf,
+    #[command(flatten)]
+    packing: Packing,
+}
+
+/// Runs the command.
+pub fn run(args: &Args, session: &Session) -> Result<(), Failure> {
+    check_name(&args.output, &["vdb"])?;
+    output::check_writable(&args.output).before()?;
+    let pattern = Pattern::parse(&args.output);
+    if pattern.is_none() && args.frame.count() > 1 {
+        let what = format!("{}: several frames need a pattern such as base.%04d.vdb", args.output.display());
+        return Err(Failure::refused(what));
+    }
+    let mut cache = Rebuild::open(&args.folder).before()?;
+    if let Some(missing) = args.frame.iter().find(|frame| !cache.stored().is_done(*frame)) {
+        return Err(Failure::refused(format!("{}: frame {missing} is not there", args.folder.display())));
+    }
+    for frame in args.frame.iter() {
+        let path = pattern.as_ref().map_or_else(|| args.output.clone(), |pattern| pattern.path(frame));
+        let grids = cache.layer(&session.ctx, frame).during()?;
+        session.ctx.check().during()?;
+        file::write(&path, &grids.list(), &args.packing.options()).during()?;
+    }
+    session.record("frames", json!(args.frame.count()));
+    Ok(())
+}
