@@ -1,4 +1,4 @@
-//! A tree of boxes over a mesh's triangles, for rays.
+//! A tree of boxes over a mesh's triangles, for rays and for what lies in a box.
 
 use super::{DVec3, TriMesh, Vec3};
 
@@ -81,6 +81,28 @@ impl Bvh {
             Some(hit.distance)
         });
         best
+    }
+
+    /// Shows the triangles whose boxes touch a box.
+    pub fn in_box(&self, low: Vec3, high: Vec3, mut see: impl FnMut(usize)) {
+        let apart = |a: Vec3, b: Vec3| (0..3).any(|axis| a[axis] > high[axis] || b[axis] < low[axis]);
+        let mut stack: Vec<u32> = if self.nodes.is_empty() { Vec::new() } else { vec![0] };
+        while let Some(index) = stack.pop() {
+            let node = &self.nodes[index as usize];
+            if apart(node.low, node.high) {
+                continue;
+            }
+            if node.count == 0 {
+                stack.extend([node.right, index + 1]);
+                continue;
+            }
+            for &triangle in &self.order[node.first as usize..(node.first + node.count) as usize] {
+                let [a, b, c] = self.corners[triangle as usize];
+                if !apart(a.inf(&b).inf(&c), a.sup(&b).sup(&c)) {
+                    see(triangle as usize);
+                }
+            }
+        }
     }
 
     /// Whether a ray meets any triangle before `limit`.

@@ -10,7 +10,7 @@ use super::exit::{Failure, Phase};
 use super::output;
 use super::session::Session;
 
-/// Say what .vdb, .obj and .ply files hold.
+/// Say what .vdb, .obj, .ply and .stl files hold.
 #[derive(clap::Args)]
 #[command(after_help = "Example:\n  frazil info cache/base/base.0048.vdb --measure")]
 pub struct Args {

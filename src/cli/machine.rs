@@ -1,4 +1,4 @@
-//! The machine's memory, as Linux tells it.
+//! The machine's memory and disks, as Linux tells them.
 
 /// Bytes that this process may use: the machine's memory or its control group's limit.
 pub fn memory() -> Option<u64> {
@@ -11,6 +11,12 @@ pub fn memory() -> Option<u64> {
 /// The most bytes of memory that this process has held, if the system says.
 pub fn peak_memory() -> Option<u64> {
     kilobytes_of(&std::fs::read_to_string("/proc/self/status").ok()?, "VmHWM:")
+}
+
+/// Bytes that this user may still write where a folder is.
+pub fn free_space(folder: &std::path::Path) -> Option<u64> {
+    let file_system = rustix::fs::statvfs(folder).ok()?;
+    Some(file_system.f_bavail * file_system.f_frsize)
 }
 
 /// The line `NAME   1234 kB` in bytes.

@@ -1,8 +1,12 @@
 //! The command line: one file per command.
 
+mod check;
+mod convert;
 mod exit;
 mod info;
 mod machine;
+mod mesh;
+mod new;
 mod options;
 mod output;
 mod preview;
@@ -35,8 +39,12 @@ struct Cli {
 
 #[derive(Subcommand)]
 enum Command {
+    New(new::Args),
+    Check(check::Args),
     Snow(snow::Args),
     Vdb(vdb::Args),
+    Mesh(mesh::Args),
+    Convert(convert::Args),
     Info(info::Args),
     Preview(preview::Args),
 }
@@ -44,8 +52,12 @@ enum Command {
 impl Command {
     fn run(self, session: &Session) -> Result<(), Failure> {
         match self {
+            Self::New(args) => new::run(&args),
+            Self::Check(args) => check::run(&args, session),
             Self::Snow(args) => snow::run(args, session),
             Self::Vdb(args) => vdb::run(args, session),
+            Self::Mesh(args) => mesh::run(&args, session),
+            Self::Convert(args) => convert::run(&args, session),
             Self::Info(args) => info::run(args, session),
             Self::Preview(args) => preview::run(args, session),
         }

@@ -17,7 +17,7 @@ use super::{options, output};
     after_help = "Example:\n  frazil preview cache/base/base.0048.vdb boot.obj -o print.png --eye 1,1.5,2 --target 0,0,1"
 )]
 pub struct Args {
-    /// .vdb (its first level set), .obj or .ply files.
+    /// .vdb (its first level set), .obj, .ply or .stl files.
     #[arg(required = true)]
     files: Vec<PathBuf>,
     /// The picture.

@@ -65,7 +65,24 @@ fn asset(path: &str) -> String {
     if path.contains('@') { format!("@@@{path}@@@") } else { format!("@{path}@") }
 }
 
-const HEAD: &str = "    metersPerUnit = 1\n    upAxis = \"Y\"\n";
+/// Unit and upward axis of a stage.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Units {
+    /// Metres in a unit.
+    pub metres: f64,
+    /// Whether Z is up, else Y.
+    pub z_up: bool,
+}
+
+impl Units {
+    /// Metres, Y up.
+    pub const OWN: Self = Self { metres: 1.0, z_up: false };
+
+    fn head(self) -> String {
+        let axis = if self.z_up { "Z" } else { "Y" };
+        format!("    metersPerUnit = {}\n    upAxis = \"{axis}\"\n", self.metres)
+    }
+}
 
 /// A stage with the shot's volumes, and the objects' meshes under value clips when `clips` gives the pattern of
 /// their files and the names of their prims.
@@ -75,8 +92,9 @@ pub fn stage(comment: &str, time: StageTime, volumes: &[VolumeFiles], clips: Opt
     let _ = write!(
         out,
         "#usda 1.0\n(\n    {}\n    defaultPrim = \"shot\"\n    startTimeCode = {first}\n    endTimeCode = {last}\n    \
-         timeCodesPerSecond = {fps}\n    framesPerSecond = {fps}\n{HEAD})\n\ndef Xform \"shot\"\n{{\n",
-        quoted(comment)
+         timeCodesPerSecond = {fps}\n    framesPerSecond = {fps}\n{})\n\ndef Xform \"shot\"\n{{\n",
+        quoted(comment),
+        Units::OWN.head()
     );
     volumes.iter().filter(|volume| !volume.files.is_empty()).for_each(|volume| write_volume(&mut out, volume));
     if let Some((clips, names)) = clips {
@@ -165,10 +183,11 @@ pub fn clip_manifest(kind: &str, names: &[String]) -> String {
 }
 
 /// The meshes of one frame; as a file by itself it opens as those meshes.
-pub fn clip(kind: &str, frame: i32, fps: f64, meshes: &[MeshFrame]) -> String {
+pub fn clip(kind: &str, frame: i32, fps: f64, units: Units, meshes: &[MeshFrame]) -> String {
     let mut out = format!(
         "#usda 1.0\n(\n    defaultPrim = \"{kind}\"\n    startTimeCode = {frame}\n    endTimeCode = {frame}\n    \
-         timeCodesPerSecond = {fps}\n{HEAD})\n\ndef Xform \"{kind}\"\n{{\n"
+         timeCodesPerSecond = {fps}\n{})\n\ndef Xform \"{kind}\"\n{{\n",
+        units.head()
     );
     for mesh in meshes {
         let _ = writeln!(

@@ -44,10 +44,25 @@ impl MeshSequence {
     }
 
     fn frame(&self, frame: i32) -> Result<Arc<Vec<Vec3>>> {
-        let mut kept = self.kept.lock().expect("nobody panics with this lock");
-        if let Some((_, positions)) = kept.iter().find(|(number, _)| *number == frame) {
-            return Ok(positions.clone());
+        let known = |kept: &[(i32, Arc<Vec<Vec3>>)]| {
+            kept.iter().find(|(number, _)| *number == frame).map(|(_, positions)| positions.clone())
+        };
+        if let Some(positions) = known(&self.kept.lock().expect("nobody panics with this lock")) {
+            return Ok(positions);
         }
+        // Not with the lock held: several frames may be read at once.
+        let positions = Arc::new(self.read(frame)?);
+        let mut kept = self.kept.lock().expect("nobody panics with this lock");
+        if known(&kept).is_none() {
+            kept.push((frame, positions.clone()));
+            if kept.len() > KEPT {
+                kept.remove(0);
+            }
+        }
+        Ok(positions)
+    }
+
+    fn read(&self, frame: i32) -> Result<Vec<Vec3>> {
         let path = self.pattern.path(frame);
         let mesh = mesh::read_polygons(&path)?;
         if !mesh.has_faces_of(&self.polygons) {
@@ -63,12 +78,7 @@ impl MeshSequence {
                 ),
             ));
         }
-        let positions = Arc::new(mesh.positions);
-        kept.push((frame, positions.clone()));
-        if kept.len() > KEPT {
-            kept.remove(0);
-        }
-        Ok(positions)
+        Ok(mesh.positions)
     }
 }
 

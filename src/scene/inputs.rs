@@ -104,6 +104,23 @@ impl Inputs {
         }
     }
 
+    /// Height of the snow's highest point (m), as far as it is known before it is made; static objects left out.
+    pub fn top(&self, scene: &Scene) -> Option<f64> {
+        let highest = |mesh: &TriMesh| mesh.bounds().map(|(_, high)| f64::from(high.y));
+        match (&self.snow, &scene.snow.layer) {
+            (Snow::Made { cover: Cover::Top(top), .. }, _) => highest(top),
+            (Snow::Made { ground, .. }, Layer::Depth(depth)) => {
+                let ground = match ground {
+                    initial::Ground::Plane { height, .. } => Some(*height),
+                    initial::Ground::Mesh(mesh) => highest(mesh),
+                };
+                let statics = self.statics.iter().filter_map(highest).fold(f64::NEG_INFINITY, f64::max);
+                Some(ground?.max(statics) + depth)
+            }
+            _ => None,
+        }
+    }
+
     /// The snow before the first frame.
     ///
     /// # Errors

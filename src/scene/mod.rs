@@ -3,6 +3,7 @@
 
 mod cache;
 mod chain;
+pub mod check;
 mod file;
 mod frames;
 mod inputs;
@@ -14,6 +15,7 @@ mod settings;
 pub mod shot;
 mod stored;
 mod table;
+pub mod template;
 mod writer;
 
 pub use frames::{FrameChoice, Frames};

@@ -167,7 +167,7 @@ impl<'a> Writer<'a> {
                 triangles: body.motion().triangles(),
             })
             .collect();
-        Ok(usd::clip("objects", frame, fps, &frames))
+        Ok(usd::clip("objects", frame, fps, usd::Units::OWN, &frames))
     }
 
     fn write_report(&self, frame: i32, report: &StepReport) -> Result<()> {

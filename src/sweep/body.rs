@@ -23,6 +23,7 @@ pub struct Body {
     same: Vec<u32>,
     topology: Topology,
     longest_edge: f64,
+    contradictions: usize,
     noise: bool,
 }
 
@@ -50,7 +51,8 @@ impl Body {
         }
         let length = |&[i, j]: &[u32; 2]| (pose[i as usize] - pose[j as usize]).norm();
         let longest_edge = topology.edges.iter().map(length).fold(0.0, f64::max);
-        Ok(Self { motion, same, topology, longest_edge, noise: true })
+        let contradictions = Topology::new(motion.triangles(), motion.vertex_count(), &same, false).contradictions();
+        Ok(Self { motion, same, topology, longest_edge, contradictions, noise: true })
     }
 
     /// Says whether its imprints have ragged edges (they do unless this says no).
@@ -61,6 +63,12 @@ impl Body {
     /// Number of open loops (joined ones count once) that were closed.
     pub fn closed_loops(&self) -> usize {
         self.topology.derived.len()
+    }
+
+    /// Number of edges where the triangles do not agree about inside and outside: more run along them one way than the
+    /// other, by two or more.
+    pub fn contradictions(&self) -> usize {
+        self.contradictions
     }
 
     /// Whether its imprints have ragged edges.

@@ -126,6 +126,11 @@ impl Topology {
         (0..self.edges.len()).all(|edge| self.imbalance(edge) == 0)
     }
 
+    /// Edges along which two triangles or more run one way without any that run the other.
+    pub fn contradictions(&self) -> usize {
+        (0..self.edges.len()).filter(|&edge| self.imbalance(edge).abs() > 1).count()
+    }
+
     /// Triangles beside an edge.
     pub fn beside(&self, edge: usize) -> &[Incidence] {
         &self.incidences[self.edge_start[edge] as usize..self.edge_start[edge + 1] as usize]

@@ -11,7 +11,7 @@ use std::path::PathBuf;
 #[derive(clap::Args)]
 #[command(after_help = "Example:\n  frazil vdb from-mesh boot.obj --cell 0.002 -o boot.vdb")]
 pub struct Args {
-    /// Mesh (.obj, .ply)
+    /// Mesh (.obj, .ply, .stl)
     mesh: PathBuf,
     /// Edge of a voxel (m)
     #[arg(long, value_name = "M", value_parser = positive)]

@@ -24,7 +24,7 @@ pub struct Args {
     /// Larger triangles where the surface is flat, 0 to 1
     #[arg(long, value_name = "PART", default_value = "0", value_parser = finite)]
     adaptivity: f64,
-    /// File to write (.ply, .obj)
+    /// File to write (.ply, .obj, .stl)
     #[arg(short, long, value_name = "FILE")]
     output: PathBuf,
 }
@@ -34,7 +34,7 @@ pub fn run(args: &Args, session: &Session) -> Result<(), Failure> {
     if !(0.0..=1.0).contains(&args.adaptivity) {
         return Err(Failure::refused("--adaptivity must lie in 0 to 1"));
     }
-    check_name(&args.output, &["ply", "obj"])?;
+    check_name(&args.output, &["ply", "obj", "stl"])?;
     output::check_writable(&args.output).before()?;
     let grid = read_level_set(&args.input, args.grid.as_deref()).before()?;
     if args.iso.abs() >= f64::from(grid.background()) {

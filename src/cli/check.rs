@@ -1,0 +1,109 @@
+//! `frazil check`: every input of every frame, before a night on the farm.
+
+use std::fmt::Write;
+use std::path::{Path, PathBuf};
+
+use frazil::scene::check::{ObjectReport, Report, check};
+use frazil::scene::{Inputs, Override, Scene, check_memory};
+
+use super::exit::{Failure, Phase};
+use super::session::Session;
+use super::{machine, output};
+
+/// Read every input of every frame of a scene, and say its sizes, memory and disk; nothing is computed.
+#[derive(clap::Args)]
+#[command(after_help = "Example:\n  frazil check walker.toml -o cache/")]
+pub struct Args {
+    /// Scene file (TOML).
+    scene: PathBuf,
+    /// Where the output is to go: its free space is told too.
+    #[arg(short, long, value_name = "DIR")]
+    output: Option<PathBuf>,
+    /// Put a setting over the scene's, for instance snow.noise.seed=2 or object.1.file=hero.glb.
+    #[arg(long, value_name = "KEY=VALUE")]
+    set: Vec<Override>,
+    /// Print JSON.
+    #[arg(long)]
+    json: bool,
+}
+
+/// Runs the command.
+pub fn run(args: &Args, session: &Session) -> Result<(), Failure> {
+    let scene = Scene::read_with(&args.scene, &args.set).before()?;
+    let inputs = Inputs::load(&scene).before()?;
+    let mut report = check(&session.ctx, &scene, &inputs).before()?;
+    let limit = session.max_memory();
+    if let Err(error) = check_memory(&scene, &inputs, limit) {
+        report.warnings.push(error.to_string());
+    }
+    let free = args.output.as_deref().and_then(free_space);
+    if let (Some(free), Some(needed)) = (free, report.disk_bytes.filter(|needed| Some(*needed) > free)) {
+        let (needed, free) = (size(needed), size(free));
+        report.warnings.push(format!("the files need about {needed}, but only {free} are free"));
+    }
+    let text = if args.json {
+        format!("{:#}\n", serde_json::to_value(&report).expect("plain values become JSON"))
+    } else {
+        told(&report, limit, free)
+    };
+    output::print(&text).during()
+}
+
+/// Free bytes where a folder is, or is to be.
+fn free_space(folder: &Path) -> Option<u64> {
+    let absolute = std::path::absolute(folder).ok()?;
+    let there = absolute.ancestors().find(|folder| folder.exists())?;
+    machine::free_space(there)
+}
+
+fn size(bytes: u64) -> String {
+    let units = [(1e12, "TB"), (1e9, "GB"), (1e6, "MB"), (1e3, "kB")];
+    let bytes = bytes as f64;
+    match units.iter().find(|(unit, _)| bytes >= *unit) {
+        Some((unit, name)) => format!("{:.1} {name}", bytes / unit),
+        None => format!("{bytes} B"),
+    }
+}
+
+fn told(report: &Report, limit: u64, free: Option<u64>) -> String {
+    let mut out = String::new();
+    let [first, last] = report.frames;
+    let count = i64::from(last) - i64::from(first) + 1;
+    let seconds = count as f64 / report.fps;
+    let _ = writeln!(out, "frames    {first}-{last}: {count}, {seconds:.2} s at {} a second", report.fps);
+    let area = report.area_m.map_or(String::new(), |[x0, z0, x1, z1]| {
+        let columns = [(x1 - x0) / report.cell_m, (z1 - z0) / report.cell_m].map(|cells| cells.round());
+        format!("{:.2} x {:.2} m, {} x {} columns, ", x1 - x0, z1 - z0, columns[0], columns[1])
+    });
+    let _ = writeln!(out, "snow      {area}cells of {} m", report.cell_m);
+    report.objects.iter().for_each(|object| tell_object(&mut out, report, object));
+    let _ = writeln!(out, "memory    about {} of {}", size(report.memory_bytes), size(limit));
+    if let Some(disk) = report.disk_bytes {
+        let free = free.map_or(String::new(), |free| format!(" of {} free", size(free)));
+        let _ = writeln!(out, "disk      about {}{free}", size(disk));
+    }
+    report.warnings.iter().for_each(|warning| {
+        let _ = writeln!(out, "warning   {warning}");
+    });
+    out
+}
+
+fn tell_object(out: &mut String, report: &Report, object: &ObjectReport) {
+    let [width, height, depth] = object.size_m;
+    let loops = match object.closed_loops {
+        0 => String::new(),
+        count => format!(", {count} open loops closed"),
+    };
+    let _ = writeln!(out, "object    {}: {} triangles{loops}", object.file, object.triangles);
+    let _ = writeln!(out, "          {width:.3} x {height:.3} x {depth:.3} m (x, y, z) at the first frame");
+    let [low, high] = object.bounds_m.map(|p| format!("({:.2}, {:.2}, {:.2})", p[0], p[1], p[2]));
+    let cells = object.fastest_m_per_s / report.fps / report.cell_m;
+    let _ = writeln!(
+        out,
+        "          from {low} to {high} over the shot; at most {:.2} m/s, {cells:.1} cells, at frame {}",
+        object.fastest_m_per_s, object.fastest_frame
+    );
+    if let Some([first, last]) = object.touches {
+        let _ = writeln!(out, "          in reach of the snow in frames {first}-{last}");
+    }
+}

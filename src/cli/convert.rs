@@ -1,0 +1,146 @@
+//! `frazil convert`: meshes, sequences and characters from one file to another.
+
+use std::path::{Path, PathBuf};
+
+use frazil::base::TriMesh;
+use frazil::io::sequence::Pattern;
+use frazil::io::{self, atomic, usd};
+use frazil::motion::{Character, Keys, MeshSequence, Motion, Placed, Play, Rigid};
+use frazil::scene::{FrameChoice, Frames};
+use serde_json::json;
+
+use super::exit::{Failure, Phase};
+use super::options::{Axis, MeshSpace, positive};
+use super::output;
+use super::session::Session;
+
+/// Turn meshes, sequences of them and characters into other files.
+///
+/// What moves needs a pattern for its output (hero.%04d.ply) and --frames.
+#[derive(clap::Args)]
+#[command(after_help = "\
+Examples:
+  frazil convert boot.obj boot.stl --up z
+  frazil convert body.%04d.obj posed.%04d.usda --frames 1-2 --scale 0.01")]
+pub struct Args {
+    /// Mesh (.obj, .ply, .stl), a sequence of them (body.%04d.obj), or a character (.glb, .gltf).
+    input: PathBuf,
+    /// Mesh (.obj, .ply, .stl, .usda), or their pattern.
+    output: PathBuf,
+    /// Frames of a sequence or a character.
+    #[arg(long, value_name = "A-B|A-BxN", allow_hyphen_values = true)]
+    frames: Option<FrameChoice>,
+    /// Frames a second.
+    #[arg(long, default_value = "24", value_parser = positive)]
+    fps: f64,
+    /// A character's clip; it begins at the first of --frames.
+    #[arg(long, value_name = "NAME")]
+    clip: Option<String>,
+    /// Of a character only the nodes of this name and what hangs on them; * stands for any letters.
+    #[arg(long, value_name = "NAME")]
+    node: Option<String>,
+    #[command(flatten)]
+    space: MeshSpace,
+    /// Upward axis of the output.
+    #[arg(long, value_name = "AXIS", default_value = "y")]
+    to_up: Axis,
+    /// Factor from metres to the output's unit.
+    #[arg(long, value_name = "FACTOR", default_value = "1", value_parser = positive)]
+    to_scale: f64,
+}
+
+/// Runs the command.
+pub fn run(args: &Args, session: &Session) -> Result<(), Failure> {
+    check_output(&args.output)?;
+    let (motion, frames) = args.motion()?;
+    let pattern = Pattern::parse(&args.output);
+    if pattern.is_none() && frames.count() > 1 {
+        let what = format!("{}: several frames need a pattern such as hero.%04d.ply", args.output.display());
+        return Err(Failure::refused(what));
+    }
+    output::check_writable(&args.output).before()?;
+    for frame in frames.iter() {
+        session.ctx.check().during()?;
+        let path = pattern.as_ref().map_or_else(|| args.output.clone(), |pattern| pattern.path(frame));
+        args.write(&path, &*motion, frame).during()?;
+    }
+    session.record("frames", json!(frames.count()));
+    session.record("triangles", json!(motion.triangles().len()));
+    Ok(())
+}
+
+fn extension(path: &Path) -> String {
+    path.extension().and_then(|text| text.to_str()).unwrap_or("").to_lowercase()
+}
+
+fn check_output(path: &Path) -> Result<(), Failure> {
+    let extension = extension(path);
+    if extension == "usda" || io::mesh::EXTENSIONS.contains(&extension.as_str()) {
+        return Ok(());
+    }
+    Err(Failure::refused(format!("{}: the output must be a .obj, .ply, .stl or .usda file", path.display())))
+}
+
+impl Args {
+    /// What is converted, in metres with Y up, and at which frames.
+    fn motion(&self) -> Result<(Box<dyn Motion>, FrameChoice), Failure> {
+        let is_character = matches!(extension(&self.input).as_str(), "glb" | "gltf");
+        if !is_character && (self.clip.is_some() || self.node.is_some()) {
+            return Err(Failure::refused("--clip and --node are for .glb and .gltf files"));
+        }
+        let one = FrameChoice::from(Frames { first: 1, last: 1 });
+        let (motion, frames): (Box<dyn Motion>, FrameChoice) = match Pattern::parse(&self.input) {
+            None if is_character => {
+                let frames = self.frames.clone().unwrap_or(one);
+                let (node, clip) = (self.node.clone(), self.clip.clone());
+                let start = f64::from(frames.first()) / self.fps;
+                let play = Play { node, clip, repeat: true, start };
+                (Box::new(Character::open(&self.input, play).before()?), frames)
+            }
+            None => {
+                if self.frames.is_some() {
+                    return Err(Failure::refused("--frames is of no use with one mesh"));
+                }
+                (Box::new(Rigid::new(io::mesh::read(&self.input).before()?, Keys::default())), one)
+            }
+            Some(pattern) => {
+                let needed = || Failure::refused(format!("{}: a sequence needs --frames A-B", self.input.display()));
+                let frames = self.frames.clone().ok_or_else(needed)?;
+                let (first, last) = (frames.first(), frames.last());
+                (Box::new(MeshSequence::open(pattern, first, last, self.fps, 0.0).before()?), frames)
+            }
+        };
+        Ok((Box::new(Placed::new(motion, self.space.space(), Keys::default())), frames))
+    }
+
+    fn write(&self, path: &Path, motion: &dyn Motion, frame: i32) -> frazil::Result<()> {
+        let time = f64::from(frame) / self.fps;
+        let (mut pose, mut velocities) = (Vec::new(), Vec::new());
+        motion.pose(time, &mut pose)?;
+        let out = |places: &mut Vec<frazil::base::DVec3>| {
+            places.iter_mut().for_each(|p| {
+                *p *= self.to_scale;
+                if self.to_up == Axis::Z {
+                    *p = frazil::base::DVec3::new(p.x, -p.z, p.y);
+                }
+            });
+        };
+        out(&mut pose);
+        let positions = usd::to_floats(&pose);
+        if extension(path) != "usda" {
+            return io::mesh::write(path, &TriMesh { positions, triangles: motion.triangles().to_vec() });
+        }
+        motion.velocities(time, 1.0 / self.fps, &mut velocities)?;
+        out(&mut velocities);
+        let stem = self.input.file_stem().unwrap_or_default().to_string_lossy().into_owned();
+        let name = usd::prim_name(stem.split(['%', '#', '$', '.']).next().unwrap_or_default());
+        let mesh = usd::MeshFrame {
+            name: &name,
+            points: &positions,
+            velocities: &usd::to_floats(&velocities),
+            triangles: motion.triangles(),
+        };
+        let units = usd::Units { metres: 1.0 / self.to_scale, z_up: self.to_up == Axis::Z };
+        atomic::write_bytes(path, usd::clip("meshes", frame, self.fps, units, &[mesh]).as_bytes())
+    }
+}

@@ -1,0 +1,27 @@
+//! `frazil new`: a scene to begin with.
+
+use frazil::scene::template;
+
+use super::exit::{Failure, Phase};
+use super::output;
+
+/// Print a commented scene to begin with.
+#[derive(clap::Args)]
+#[command(after_help = "Example:\n  frazil new snow > shot.toml")]
+pub struct Args {
+    /// What the scene is about.
+    #[arg(value_enum)]
+    system: System,
+}
+
+#[derive(Clone, Copy, clap::ValueEnum)]
+enum System {
+    /// Objects that press into snow.
+    Snow,
+}
+
+/// Runs the command.
+pub fn run(args: &Args) -> Result<(), Failure> {
+    let System::Snow = args.system;
+    output::print(template::SNOW).during()
+}

@@ -1,0 +1,225 @@
+//! Looks at every input of every frame of a scene, and computes nothing else.
+
+use rayon::prelude::*;
+use serde::Serialize;
+
+use super::{BaseMode, Inputs, Object, Role, Scene, memory};
+use crate::base::DVec3;
+use crate::context::Context;
+use crate::error::Result;
+use crate::sweep::Body;
+
+/// Frames that one task poses, one after another.
+const RUN: usize = 12;
+/// Bytes of a whole base file for each column of cells, and of what a frame changes and removes besides.
+const BYTES_PER_COLUMN: f64 = 20.0;
+const BYTES_PER_CHANGE: f64 = 4e5;
+/// Bytes for each vertex of an object in a .usda file.
+const BYTES_PER_VERTEX: f64 = 110.0;
+/// A character taller than this (m), or smaller, is likely in another unit.
+const TALL: f64 = 20.0;
+const SMALL: f64 = 0.02;
+
+/// What a scene will do.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Report {
+    /// First and last frame.
+    pub frames: [i32; 2],
+    /// Frames a second.
+    pub fps: f64,
+    /// Least and greatest x and z of the snow (m), where it is known before it is made.
+    pub area_m: Option<[f64; 4]>,
+    /// Edge of a voxel (m).
+    pub cell_m: f64,
+    /// The objects.
+    pub objects: Vec<ObjectReport>,
+    /// Memory that the run needs, about (bytes).
+    pub memory_bytes: u64,
+    /// Space that its files need, about (bytes), where the snow's area is known.
+    pub disk_bytes: Option<u64>,
+    /// What looks wrong, one sentence each.
+    pub warnings: Vec<String>,
+}
+
+/// What an object does over the shot.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct ObjectReport {
+    /// Its file.
+    pub file: String,
+    /// collide or static.
+    pub role: &'static str,
+    /// Its triangles.
+    pub triangles: usize,
+    /// Open loops that are closed.
+    pub closed_loops: usize,
+    /// Edges where its triangles do not agree about inside and outside.
+    pub contradictions: usize,
+    /// Width, height and depth at the first frame (m).
+    pub size_m: [f64; 3],
+    /// Least and greatest place over the shot (m).
+    pub bounds_m: [[f64; 3]; 2],
+    /// Greatest speed of a vertex from frame to frame (m/s), and the frame that ends that step.
+    pub fastest_m_per_s: f64,
+    /// See [`ObjectReport::fastest_m_per_s`].
+    pub fastest_frame: i32,
+    /// First and last frame at which its bounds touch the snow's.
+    pub touches: Option<[i32; 2]>,
+}
+
+/// An object's extent at one frame.
+#[derive(Clone, Copy)]
+struct Extent {
+    frame: i32,
+    low: DVec3,
+    high: DVec3,
+    /// Greatest distance that a vertex moved since the frame before (m).
+    moved: f64,
+}
+
+/// Checks a scene whose inputs are open.
+///
+/// # Errors
+/// A frame that cannot be read or fits no other; cancel.
+pub fn check(ctx: &Context, scene: &Scene, inputs: &Inputs) -> Result<Report> {
+    let mut warnings = Vec::new();
+    let area = inputs.area();
+    let top = inputs.top(scene);
+    let colliders = scene.objects.iter().enumerate().filter(|(_, object)| object.role == Role::Collide);
+    let mut objects = Vec::new();
+    for ((index, object), body) in colliders.zip(&inputs.bodies) {
+        let extents = ctx.stage("inputs", || extents(ctx, scene, body))?;
+        objects.push(report(scene, index, object, body, &extents, area.zip(top), &mut warnings));
+    }
+    let columns = area.map(|[x0, z0, x1, z1]| (x1 - x0) * (z1 - z0) / (scene.snow.cell * scene.snow.cell));
+    if objects.is_empty() {
+        warnings.push("nothing moves through the snow: no object has the role collide".into());
+    }
+    Ok(Report {
+        frames: [scene.shot.frames.first, scene.shot.frames.last],
+        fps: scene.shot.fps,
+        area_m: area,
+        cell_m: scene.snow.cell,
+        objects,
+        memory_bytes: memory::estimate(scene, inputs)?,
+        disk_bytes: columns.map(|columns| disk(scene, inputs, columns)),
+        warnings,
+    })
+}
+
+/// Poses a body at every frame.
+fn extents(ctx: &Context, scene: &Scene, body: &Body) -> Result<Vec<Extent>> {
+    let frames: Vec<i32> = scene.shot.frames.iter().collect();
+    let of_run = |run: &[i32]| -> Result<Vec<Extent>> {
+        let (mut pose, mut before) = (Vec::new(), Vec::new());
+        let at = |frame: i32| f64::from(frame) / scene.shot.fps;
+        // Its first frame is compared with the one before it, if the shot has that.
+        body.motion().pose(at((run[0] - 1).max(scene.shot.frames.first)), &mut before)?;
+        let mut out = Vec::with_capacity(run.len());
+        for &frame in run {
+            ctx.check()?;
+            body.motion().pose(at(frame), &mut pose)?;
+            let start = (DVec3::repeat(f64::INFINITY), DVec3::repeat(f64::NEG_INFINITY));
+            let (low, high) = pose.iter().fold(start, |(low, high), p| (low.inf(p), high.sup(p)));
+            let pairs = pose.iter().zip(&before);
+            let moved = pairs.map(|(p, q): (&DVec3, &DVec3)| (p - q).norm_squared()).fold(0.0, f64::max).sqrt();
+            out.push(Extent { frame, low, high, moved });
+            std::mem::swap(&mut pose, &mut before);
+        }
+        Ok(out)
+    };
+    let runs: Vec<Vec<Extent>> = frames.par_chunks(RUN).map(of_run).collect::<Result<_>>()?;
+    Ok(runs.concat())
+}
+
+fn report(
+    scene: &Scene,
+    index: usize,
+    object: &Object,
+    body: &Body,
+    extents: &[Extent],
+    snow: Option<([f64; 4], f64)>,
+    warnings: &mut Vec<String>,
+) -> ObjectReport {
+    let name = format!("object {} ({})", index + 1, super::file::name(&object.file));
+    let first = &extents[0];
+    let size = first.high - first.low;
+    let (low, high) = extents.iter().fold((first.low, first.high), |(l, h), e| (l.inf(&e.low), h.sup(&e.high)));
+    let fastest = extents.iter().fold(first, |best, extent| if extent.moved > best.moved { extent } else { best });
+    let touching = |extent: &&Extent| match snow {
+        Some(([x0, z0, x1, z1], top)) => {
+            let beside = extent.high.x < x0 || extent.low.x > x1 || extent.high.z < z0 || extent.low.z > z1;
+            !beside && extent.low.y < top
+        }
+        None => true,
+    };
+    let touches = extents.iter().find(touching).zip(extents.iter().rev().find(touching));
+    let tallest = size.max();
+    if let Some(factor) = likely_scale(tallest) {
+        let scale = object.space.scale * factor;
+        warnings.push(format!("{name} is {tallest:.3} m large: scale = {scale}?"));
+    }
+    if let (None, Some((area, top))) = (touches, snow) {
+        let what = if low.y >= top {
+            format!("it stays {:.3} m above it", low.y - top)
+        } else {
+            format!("it stays beside the area {area:?}")
+        };
+        warnings.push(format!("{name} never touches the snow: {what}"));
+    }
+    if body.contradictions() > 0 {
+        warnings.push(format!(
+            "{name}: its triangles disagree about inside and outside at {} edges; holes are closed by cones, look at its prints",
+            body.contradictions()
+        ));
+    }
+    ObjectReport {
+        file: object.file.display().to_string(),
+        role: "collide",
+        triangles: body.motion().triangles().len(),
+        closed_loops: body.closed_loops(),
+        contradictions: body.contradictions(),
+        size_m: size.into(),
+        bounds_m: [low.into(), high.into()],
+        fastest_m_per_s: fastest.moved * scene.shot.fps,
+        fastest_frame: fastest.frame,
+        touches: touches.map(|(first, last)| [first.frame, last.frame]),
+    }
+}
+
+/// The factor that a size (m) asks for when the file is likely in centimetres, millimetres, or in a unit too large.
+fn likely_scale(size: f64) -> Option<f64> {
+    let plausible = |factor: f64| (0.3..=5.0).contains(&(size * factor));
+    match size {
+        size if size > TALL => [0.01, 0.001].into_iter().find(|factor| plausible(*factor)),
+        size if size < SMALL => [100.0, 1000.0].into_iter().find(|factor| plausible(*factor)),
+        _ => None,
+    }
+}
+
+/// Space that the files need, about (bytes).
+fn disk(scene: &Scene, inputs: &Inputs, columns: f64) -> u64 {
+    let (output, frames) = (scene.output, scene.shot.frames.count() as f64);
+    let whole = columns * BYTES_PER_COLUMN * if output.half { 0.6 } else { 1.0 };
+    let base = match (output.base, output.base_mode) {
+        (false, _) => 0.0,
+        (true, BaseMode::Full) => whole * frames,
+        (true, BaseMode::Delta) => whole,
+    };
+    let vertices: usize = inputs.bodies.iter().map(|body| body.motion().vertex_count()).sum();
+    let objects = if output.objects { vertices as f64 * BYTES_PER_VERTEX * frames } else { 0.0 };
+    (base + objects + frames * BYTES_PER_CHANGE) as u64
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn sizes_in_other_units_are_recognised() {
+        assert_eq!(likely_scale(172.0), Some(0.01));
+        assert_eq!(likely_scale(1720.0), Some(0.001));
+        assert_eq!(likely_scale(1.72), None);
+        assert_eq!(likely_scale(0.0172), Some(100.0));
+        assert_eq!(likely_scale(1e6), None);
+    }
+}
