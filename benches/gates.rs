@@ -8,10 +8,14 @@ mod common;
 mod harness;
 #[path = "gates/oracle.rs"]
 mod oracle;
+#[path = "gates/poses.rs"]
+mod poses;
 #[path = "gates/readers.rs"]
 mod readers;
 #[path = "gates/scenes.rs"]
 mod scenes;
+#[path = "gates/shot.rs"]
+mod shot;
 #[path = "gates/snow.rs"]
 mod snow;
 #[path = "gates/speed.rs"]
@@ -34,5 +38,6 @@ fn main() {
     speed::run(&mut h);
     bytes::run(&mut h);
     readers::run(&mut h);
+    shot::run(&mut h);
     h.finish();
 }

@@ -2,6 +2,7 @@
 #![allow(dead_code)]
 
 pub mod boot;
+pub mod character;
 pub mod shapes;
 pub mod tools;
 pub mod walk;
