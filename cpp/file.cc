@@ -5,7 +5,9 @@
 #include <openvdb/io/Compression.h>
 #include <openvdb/io/File.h>
 
-#include <sstream>
+#include <algorithm>
+#include <ostream>
+#include <streambuf>
 
 namespace frazil {
 
@@ -54,6 +56,45 @@ public:
     using openvdb::io::Archive::write;
 };
 
+/// A stream into one string that grows by doubling: std::ostringstream would hold the bytes twice.
+class Bytes : public std::streambuf {
+public:
+    std::unique_ptr<std::string> take() { return std::make_unique<std::string>(std::move(data_)); }
+
+protected:
+    int_type overflow(int_type letter) override {
+        const char byte = traits_type::to_char_type(letter);
+        xsputn(&byte, 1);
+        return letter;
+    }
+
+    std::streamsize xsputn(const char* bytes, std::streamsize count) override {
+        const size_t length = static_cast<size_t>(count);
+        // Sizes and offsets are filled in afterwards: what lies there is written over.
+        const size_t over = std::min(length, data_.size() - at_);
+        data_.replace(at_, over, bytes, length);
+        at_ += length;
+        return count;
+    }
+
+    pos_type seekoff(off_type by, std::ios_base::seekdir from, std::ios_base::openmode) override {
+        const off_type start =
+            from == std::ios_base::beg ? 0 : static_cast<off_type>(from == std::ios_base::cur ? at_ : data_.size());
+        return seekpos(start + by, std::ios_base::out);
+    }
+
+    pos_type seekpos(pos_type to, std::ios_base::openmode) override {
+        const off_type place = to;
+        if (place < 0 || static_cast<size_t>(place) > data_.size()) return pos_type(off_type(-1));
+        at_ = static_cast<size_t>(place);
+        return to;
+    }
+
+private:
+    std::string data_;
+    size_t at_ = 0;
+};
+
 /// Opens a file for reading; delayed loading would keep it mapped.
 void open(openvdb::io::File& file) {
     initialise();
@@ -85,11 +126,13 @@ std::unique_ptr<std::string> grids_to_bytes(rust::Slice<const size_t> grids, int
     openvdb::MetaMap map;
     for (const auto& entry : meta) map.insertMeta(std::string(entry.key), *from_meta(entry));
     constexpr uint32_t schemes[] = {openvdb::io::COMPRESS_NONE, openvdb::io::COMPRESS_ZIP, openvdb::io::COMPRESS_BLOSC};
-    std::ostringstream bytes(std::ios_base::binary);
+    Bytes bytes;
+    std::ostream out(&bytes);
     InMemory archive;
     archive.setCompression(schemes[compression] | openvdb::io::COMPRESS_ACTIVE_MASK);
-    archive.write(bytes, list, /*seekable=*/true, map);
-    return std::make_unique<std::string>(bytes.str());
+    archive.write(out, list, /*seekable=*/true, map);
+    if (!out) throw std::runtime_error("the bytes of a file cannot be put together");
+    return bytes.take();
 }
 
 rust::Vec<GridHeader> describe_file(rust::Str path) {

@@ -81,8 +81,9 @@ fn ticks() -> Option<(f64, f64)> {
     let own = std::fs::read_to_string("/proc/self/stat").ok()?;
     let own: Vec<f64> = own.rsplit(')').next()?.split_whitespace().filter_map(|n| n.parse().ok()).collect();
     let busy: f64 = all.iter().take(3).sum();
-    // After the name's parenthesis and the state letter: utime and stime are numbers 10 and 11.
-    Some((busy - own.get(10)? - own.get(11)?, Instant::now().elapsed().as_secs_f64()))
+    // After the name's parenthesis and the state letter: utime and stime are numbers 11 and 12, the children's follow.
+    let own: f64 = own.get(10..14)?.iter().sum();
+    Some((busy - own, Instant::now().elapsed().as_secs_f64()))
 }
 
 /// Times what `work` does, and says what else the machine did meanwhile.
