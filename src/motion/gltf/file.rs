@@ -3,6 +3,7 @@
 use std::path::Path;
 
 use gltf::accessor::{DataType, Dimensions};
+use gltf::json::validation::Checked;
 use gltf::{Accessor, Document};
 
 use crate::error::{Error, Result};
@@ -25,13 +26,12 @@ impl File {
     pub fn open(path: &Path) -> Result<Self> {
         let bytes = std::fs::read(path).map_err(|error| Error::io(path, "read", error))?;
         check_length(&bytes).map_err(|what| Error::file(path, what))?;
-        let parsed = gltf::Gltf::from_slice(&bytes)
+        let (document, blob) = parse(&bytes)
             .map_err(|error| Error::file(path, format!("not a whole glTF file ({error})")))?;
         let known = ["KHR_mesh_quantization", "KHR_texture_transform", "KHR_materials_unlit"];
-        if let Some(needed) = parsed.extensions_required().find(|name| !known.contains(name)) {
+        if let Some(needed) = document.extensions_required().find(|name| !known.contains(name)) {
             return Err(Error::file(path, format!("needs the glTF extension {needed}, which frazil does not read")));
         }
-        let gltf::Gltf { document, blob } = parsed;
         let folder = path.parent().unwrap_or(Path::new("."));
         // Each by itself, so that the message can name the one at fault.
         let mut blob = blob;
@@ -153,6 +153,29 @@ impl File {
         let row = |index: usize| std::array::from_fn(|column| number(index * stride + column * size));
         Some((0..count).map(row).collect())
     }
+}
+
+/// Reads the JSON and checks that what it names is there.
+fn parse(bytes: &[u8]) -> std::result::Result<(Document, Option<Vec<u8>>), String> {
+    let said = |error: gltf::Error| error.to_string();
+    let gltf::Gltf { document, blob } = gltf::Gltf::from_slice_without_validation(bytes).map_err(said)?;
+    let mut root = document.into_json();
+    // The check below looks at the bounds of positions before it knows that they are there, and insists on them;
+    // nothing here needs the bounds.
+    for attribute in root.meshes.iter().flat_map(|mesh| &mesh.primitives).flat_map(|p| p.attributes.values()) {
+        let accessor = root.accessors.get_mut(attribute.value()).ok_or("an attribute names no accessor")?;
+        accessor.min = Some(vec![0.0; 3].into());
+        accessor.max = Some(vec![0.0; 3].into());
+    }
+    for animation in &mut root.animations {
+        // Extensions animate other properties than a node's: they move no vertex.
+        animation.channels.retain(|channel| matches!(channel.target.path, Checked::Valid(_)));
+        let samplers = animation.samplers.len();
+        if animation.channels.iter().any(|channel| channel.sampler.value() >= samplers) {
+            return Err("a channel names no sampler".into());
+        }
+    }
+    Ok((Document::from_json(root).map_err(said)?, blob))
 }
 
 /// A .glb says its own length.
