@@ -12,9 +12,14 @@ const README: &str = include_str!("../README.md");
 #[track_caller]
 fn works(folder: &Path, line: &str) -> String {
     let line = line.split(" #").next().unwrap();
+    // A shell would put the output into the file behind `>`.
+    let (line, file) = line.split_once(" > ").map_or((line, None), |(line, file)| (line, Some(file.trim())));
     let arguments = line.split_whitespace().skip(1);
     let output = Command::cargo_bin("frazil").unwrap().current_dir(folder).args(arguments).output().unwrap();
     assert!(output.status.success(), "{line}: {}", String::from_utf8_lossy(&output.stderr));
+    if let Some(file) = file {
+        fs::write(folder.join(file), &output.stdout).unwrap();
+    }
     String::from_utf8(output.stdout).unwrap()
 }
 
@@ -59,7 +64,6 @@ fn every_command_has_help_with_an_example_that_runs() {
                  cell = 0.05\n[[object]]\nfile = \"boot.obj\"\nkeys = [{ frame = 1 }, { frame = 48, at = [0, 0, 1] }]\n";
     fs::write(folder.join("walker.toml"), scene).unwrap();
     works(folder, "frazil snow walker.toml -o cache -q");
-    fs::remove_file(folder.join("cache/scene.toml")).unwrap();
     for (name, by) in [("left", "0.1,0,0"), ("snow", "0,0.1,0")] {
         works(folder, &format!("frazil vdb sweep box.obj --move {by} --cell 0.02 -o {name}.vdb -q"));
     }
@@ -67,8 +71,10 @@ fn every_command_has_help_with_an_example_that_runs() {
     works(folder, "frazil vdb from-mesh box.obj --cell 0.02 -o right.vdb");
     let mut commands = vec!["frazil".to_string()];
     commands.extend(commands_of(folder, "frazil"));
-    commands.extend(commands_of(folder, "frazil vdb"));
-    assert!(commands.len() >= 1 + 4 + 9, "{commands:?}");
+    for group in ["frazil vdb", "frazil mesh"] {
+        commands.extend(commands_of(folder, group));
+    }
+    assert!(commands.len() >= 1 + 8 + 10 + 1, "{commands:?}");
     for command in commands {
         let help = works(folder, &format!("{command} --help"));
         let examples: Vec<&str> = help.lines().filter_map(|line| line.strip_prefix("  frazil ")).collect();

@@ -70,7 +70,7 @@ pub fn run(args: Args, session: &Session) -> Result<(), Failure> {
     }
     let inputs = Inputs::load(&scene).before()?;
     check_memory(&scene, &inputs, session.max_memory()).before()?;
-    let run = shot::Run::prepare(&scene, &inputs, &args.output, &frames, args.from).before()?;
+    let run = shot::Run::prepare(&session.ctx, &scene, &inputs, &args.output, &frames, args.from).before()?;
     output::check_folder(&args.output).before()?;
     let (made, there) = (run.to_make(), run.there());
     let mut progress = FrameProgress::new(made, there, session.is_quiet());

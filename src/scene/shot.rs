@@ -24,17 +24,22 @@ pub struct Run<'a> {
     todo: Vec<i32>,
     /// Frames that are wanted and done.
     there: usize,
+    params: Params,
+    /// The layer from which the first of them is reached.
+    start: Option<LayerAt>,
 }
 
 impl<'a> Run<'a> {
-    /// Opens or makes the folder, finds what is done, and writes the resolved scene into it.
+    /// Opens or makes the folder, finds what is done, writes the resolved scene into it, and makes or loads the layer that
+    /// the first frame starts from.
     ///
     /// `from` keeps the frames before it, whatever they were made with, and makes all others again.
     ///
     /// # Errors
     /// A folder that cannot be written, that another run writes into, or whose frames were made with other settings
-    /// or inputs; a damaged record; frames that would leave a gap in a cache of changes.
+    /// or inputs; a damaged record or frame; frames that would leave a gap in a cache of changes.
     pub fn prepare(
+        ctx: &Context,
         scene: &'a Scene,
         inputs: &'a Inputs,
         folder: &Path,
@@ -45,13 +50,17 @@ impl<'a> Run<'a> {
         let (there, todo): (Vec<i32>, Vec<i32>) = frames.iter().partition(|frame| cache.stored.is_done(*frame));
         let delta = scene.output.base && scene.output.base_mode == BaseMode::Delta;
         let gap = (scene.shot.frames.first..frames.last()).find(|f| !cache.stored.is_done(*f) && !frames.contains(*f));
-        match gap {
-            Some(gap) if delta => Err(Error::file(
-                folder,
-                format!("with base_mode = \"delta\" every frame is needed, but frame {gap} is neither there nor asked for"),
-            )),
-            _ => Ok(Self { scene, inputs, cache, todo, there: there.len() }),
+        if let Some(gap) = gap.filter(|_| delta) {
+            let what = format!("base_mode = \"delta\" needs every frame, but frame {gap} is neither there nor asked for");
+            return Err(Error::file(folder, what));
         }
+        let noise = Some(scene.snow.noise).filter(|noise| noise.amplitude > 0.0);
+        let params = Params { noise, tolerance: 0.02 };
+        let mut run = Self { scene, inputs, cache, todo, there: there.len(), params, start: None };
+        if let Some(&first) = run.todo.first() {
+            run.start = Some(run.layer_before(ctx, first)?);
+        }
+        Ok(run)
     }
 
     /// Number of frames to be made.
@@ -70,10 +79,8 @@ impl<'a> Run<'a> {
     /// What a step or a file reports; whole frames are left behind, from which another run goes on.
     pub fn make(mut self, ctx: &Context, done: impl FnMut(i32, &StepReport) + Send) -> Result<()> {
         let todo = std::mem::take(&mut self.todo);
-        if let Some(&first) = todo.first() {
-            let params = Params { noise: self.noise(), tolerance: 0.02 };
-            let base = self.layer_before(ctx, first, params)?;
-            self.make_frames(ctx, base, params, &todo, done)?;
+        if let Some(start) = self.start.take() {
+            self.make_frames(ctx, start, &todo, done)?;
         }
         if self.scene.output.usd {
             self.write_stage()?;
@@ -81,15 +88,10 @@ impl<'a> Run<'a> {
         Ok(())
     }
 
-    fn noise(&self) -> Option<crate::snow::base_layer::NoiseParams> {
-        Some(self.scene.snow.noise).filter(|noise| noise.amplitude > 0.0)
-    }
-
     fn make_frames(
         &mut self,
         ctx: &Context,
         mut at: LayerAt,
-        params: Params,
         todo: &[i32],
         mut done: impl FnMut(i32, &StepReport) + Send,
     ) -> Result<()> {
@@ -99,7 +101,7 @@ impl<'a> Run<'a> {
         let (jobs, waiting) = sync_channel(WAITING);
         let (made, finished) = std::thread::scope(|scope| {
             let writing = scope.spawn(move || write_all(&mut writer, waiting, &mut done));
-            let made = self.step_all(ctx, &mut at, params, todo, |job| jobs.send(job).is_ok());
+            let made = self.step_all(ctx, &mut at, todo, |job| jobs.send(job).is_ok());
             drop(jobs);
             (made, writing.join())
         });
@@ -114,14 +116,13 @@ impl<'a> Run<'a> {
         &mut self,
         ctx: &Context,
         at: &mut LayerAt,
-        params: Params,
         todo: &[i32],
         mut send: impl FnMut(Job) -> bool,
     ) -> Result<()> {
         let mut follows = !Writer::follows(self.scene);
         for &wanted in todo {
             if at.frame < wanted - 1 && self.cache.stored.latest_layer(at.frame + 1..=wanted - 1).is_some() {
-                *at = self.layer_before(ctx, wanted, params)?;
+                *at = self.layer_before(ctx, wanted)?;
                 follows = !Writer::follows(self.scene);
             }
             while at.frame < wanted {
@@ -163,7 +164,8 @@ impl<'a> Run<'a> {
     }
 
     /// The layer from which a frame can be reached in the fewest steps.
-    fn layer_before(&self, ctx: &Context, frame: i32, params: Params) -> Result<LayerAt> {
+    fn layer_before(&self, ctx: &Context, frame: i32) -> Result<LayerAt> {
+        let params = self.params;
         let first = self.scene.shot.frames.first;
         let initial = self.inputs.layer(ctx, self.scene.snow.cell)?;
         let at = match self.cache.stored.latest_layer(first..=frame - 1) {
