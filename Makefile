@@ -4,7 +4,7 @@ PACKAGES := libopenvdb-dev libboost-dev libboost-iostreams-dev g++ cmake pkg-con
 RUST_NEEDED := 1.89
 DEMO := target/demo
 
-.PHONY: setup demo test lint gates bench
+.PHONY: setup demo test test-clients skinning-numbers lint gates bench
 
 # Everything a build needs, from Debian's packages; quick when it is there.
 setup:
@@ -34,6 +34,16 @@ test: setup lint
 	cargo test --release
 	RUSTDOCFLAGS="-D warnings" cargo doc --release --no-deps --lib
 	cargo check --release --no-default-features --lib
+
+# Blender and usd-core open what frazil writes; installs them (apt-get, and PyPI into target/clients).
+test-clients: setup
+	@./tools/clients
+	cargo test --release --test clients --test motion_gltf -- --nocapture
+
+# Blender's poses of CesiumMan, which tests/motion_gltf.rs and a gate compare with.
+skinning-numbers:
+	@./tools/clients
+	blender -b --factory-startup -noaudio --python-exit-code 7 --python tests/clients/skinning.py -- "$${FRAZIL_DATA:-../shared/data}/character/CesiumMan.glb" tests/clients/cesium_man.txt
 
 # make gates [ONLY=snow.base.wall,...]
 gates: setup

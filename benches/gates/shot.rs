@@ -12,6 +12,7 @@ use frazil::sweep::{self, Body, Settings};
 use frazil::vdb::file;
 
 use crate::common::character::{self, data};
+use crate::common::clients;
 use crate::harness::{Bound, Harness, median, timed};
 use crate::poses::Union;
 use crate::scenes::context;
@@ -41,6 +42,7 @@ pub fn run(h: &mut Harness) {
     check(h, &man);
     continued(h, &man);
     changed(h, &man);
+    clients(h, &man);
 }
 
 /// A character 1.7 m tall that walks along z.
@@ -262,4 +264,24 @@ fn changed(h: &mut Harness, man: &Path) {
     };
     let yes = again.status.success() && (1..100).all(kept) && !(100..=120).any(kept);
     h.holds("snow.shot.changed_from", yes, "frames 1-99 keep their bytes, 100-120 are new");
+}
+
+/// Other programs open the shot, where they are installed.
+fn clients(h: &mut Harness, man: &Path) {
+    if !h.wants("snow.shot.clients") {
+        return;
+    }
+    let folder = tempfile::tempdir().expect("a folder");
+    let scene = character::walk_scene(folder.path(), man, 24, 0.02, "objects = [\"usd\"]");
+    let out = folder.path().join("out");
+    assert!(frazil(&["snow", text(&scene), "-o", text(&out)]).status().expect("frazil").success());
+    let blender = clients::blender().map(|blender| clients::blender_opens(&blender, &out, 1, 24));
+    let usd = clients::usd_python().map(|python| clients::usd_composes(&python, &out, 1, 24));
+    for (name, answer) in [("snow.shot.clients_blender", blender), ("snow.shot.clients_usd", usd)] {
+        match answer {
+            None => println!("gate {name} skipped # not installed: make test-clients"),
+            Some(Ok(said)) => h.holds(name, true, &said),
+            Some(Err(said)) => h.holds(name, false, said.lines().last().unwrap_or_default()),
+        }
+    }
 }

@@ -3,6 +3,7 @@
 
 pub mod boot;
 pub mod character;
+pub mod clients;
 pub mod shapes;
 pub mod tools;
 pub mod walk;

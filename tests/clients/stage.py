@@ -1,0 +1,44 @@
+"""usd-core composes a shot: volumes with their files, meshes with velocities, at three frames.
+
+python stage.py FOLDER FIRST LAST
+"""
+
+import pathlib
+import sys
+
+from pxr import Usd, UsdGeom, UsdVol
+
+folder, first, last = pathlib.Path(sys.argv[1]).resolve(), int(sys.argv[2]), int(sys.argv[3])
+stage = Usd.Stage.Open(str(folder / "shot.usda"))
+assert UsdGeom.GetStageMetersPerUnit(stage) == 1.0
+assert UsdGeom.GetStageUpAxis(stage) == UsdGeom.Tokens.y
+assert stage.GetTimeCodesPerSecond() == 24.0
+assert (stage.GetStartTimeCode(), stage.GetEndTimeCode()) == (first, last)
+assert stage.GetDefaultPrim().GetPath() == "/shot"
+
+volume = UsdVol.Volume(stage.GetPrimAtPath("/shot/base"))
+assert volume and set(volume.GetFieldPaths()) == {"surface", "compression", "touched"}
+meshes = [UsdGeom.Mesh(prim) for prim in stage.Traverse() if prim.IsA(UsdGeom.Mesh)]
+assert meshes, "no mesh"
+checked = 0
+for frame in (first, (first + last) // 2, last):
+    for name, path in volume.GetFieldPaths().items():
+        asset = UsdVol.OpenVDBAsset(stage.GetPrimAtPath(path))
+        assert asset.GetFieldNameAttr().Get() == name
+        file = asset.GetFilePathAttr().Get(frame)
+        assert pathlib.Path(file.resolvedPath) == folder / "base" / f"base.{frame:04d}.vdb", file
+    for mesh in meshes:
+        points, velocities = mesh.GetPointsAttr().Get(frame), mesh.GetVelocitiesAttr().Get(frame)
+        counts, indices = mesh.GetFaceVertexCountsAttr().Get(frame), mesh.GetFaceVertexIndicesAttr().Get(frame)
+        assert len(points) == len(velocities) > 0 and sum(counts) == len(indices) and max(indices) < len(points)
+        low, high = mesh.GetExtentAttr().Get(frame)
+        for axis in range(3):
+            values = [point[axis] for point in points]
+            assert (min(values), max(values)) == (low[axis], high[axis])
+        if frame < last:
+            # Velocities carry the points to the next frame.
+            after = mesh.GetPointsAttr().Get(frame + 1)
+            worst = max((points[i] + velocities[i] / 24.0 - after[i]).GetLength() for i in range(len(points)))
+            assert worst < 1e-4, worst
+        checked += 1
+print(f"frazil: {checked} meshes at 3 frames, {len(volume.GetFieldPaths())} grids")

@@ -1,0 +1,50 @@
+//! Other programs that open what frazil writes, where they are installed: `make test-clients` installs them.
+
+use std::path::{Path, PathBuf};
+use std::process::Command;
+
+fn root() -> &'static Path {
+    Path::new(env!("CARGO_MANIFEST_DIR"))
+}
+
+/// Runs a script and gives what it says of itself; its errors when it fails.
+fn run(mut command: Command) -> Result<String, String> {
+    let output = command.output().map_err(|error| error.to_string())?;
+    let said = String::from_utf8_lossy(&output.stdout).into_owned();
+    if output.status.success() {
+        let line = said.lines().find_map(|line| line.strip_prefix("frazil: "));
+        return line.map(str::to_string).ok_or(format!("it ended early: {said}"));
+    }
+    Err(format!("{said}\n{}", String::from_utf8_lossy(&output.stderr)))
+}
+
+/// Blender, if it is installed.
+pub fn blender() -> Option<PathBuf> {
+    let paths = std::env::var_os("PATH")?;
+    std::env::split_paths(&paths).map(|folder| folder.join("blender")).find(|path| path.is_file())
+}
+
+/// Blender imports the base of a shot as one volume, meshes two of its frames and renders one.
+pub fn blender_opens(blender: &Path, folder: &Path, first: i32, last: i32) -> Result<String, String> {
+    let mut command = Command::new(blender);
+    command.args(["-b", "--factory-startup", "-noaudio", "--python-exit-code", "7", "--python"]);
+    command.arg(root().join("tests/clients/sequence.py")).arg("--").arg(folder);
+    command.args([first.to_string(), last.to_string()]).arg(folder.join("blender.png"));
+    run(command)
+}
+
+/// A Python with usd-core, if there is one.
+pub fn usd_python() -> Option<PathBuf> {
+    let has_usd = |python: &PathBuf| {
+        let tried = Command::new(python).args(["-c", "from pxr import Usd"]).output();
+        tried.is_ok_and(|output| output.status.success())
+    };
+    [root().join("target/clients/bin/python"), "python3".into()].into_iter().find(has_usd)
+}
+
+/// usd-core composes a shot.
+pub fn usd_composes(python: &Path, folder: &Path, first: i32, last: i32) -> Result<String, String> {
+    let mut command = Command::new(python);
+    command.arg(root().join("tests/clients/stage.py")).arg(folder).args([first.to_string(), last.to_string()]);
+    run(command)
+}
