@@ -2,6 +2,7 @@
 
 use std::path::{Path, PathBuf};
 
+use frazil::motion::{Character, Motion, Play};
 use frazil::vdb::{MetaValue, file, level_set};
 use frazil::{Context, io};
 use serde_json::{Map, Value, json};
@@ -10,7 +11,7 @@ use super::exit::{Failure, Phase};
 use super::output;
 use super::session::Session;
 
-/// Say what .vdb, .obj, .ply and .stl files hold.
+/// Say what .vdb, .obj, .ply, .stl, .glb and .gltf files hold.
 #[derive(clap::Args)]
 #[command(after_help = "Example:\n  frazil info cache/base/base.0048.vdb --measure")]
 pub struct Args {
@@ -29,8 +30,12 @@ pub struct Args {
 pub fn run(args: Args, session: &Session) -> Result<(), Failure> {
     let mut all = Vec::new();
     for path in &args.files {
-        let is_vdb = path.extension().is_some_and(|extension| extension.eq_ignore_ascii_case("vdb"));
-        let told = if is_vdb { grids(path, args.measure, &session.ctx) } else { mesh(path) };
+        let extension = path.extension().unwrap_or_default().to_string_lossy().to_lowercase();
+        let told = match extension.as_str() {
+            "vdb" => grids(path, args.measure, &session.ctx),
+            "glb" | "gltf" => character(path),
+            _ => mesh(path),
+        };
         all.push(json!({ "file": path.display().to_string(), "holds": told.before()? }));
     }
     let text = if args.json { format!("{:#}\n", json!(all)) } else { all.iter().map(lines).collect() };
@@ -87,6 +92,28 @@ fn mesh(path: &Path) -> frazil::Result<Vec<Value>> {
         "euler_characteristic": mesh.euler_characteristic(),
         "area_m2": mesh.area(),
         "volume_m3": mesh.volume(),
+    })])
+}
+
+fn character(path: &Path) -> frazil::Result<Vec<Value>> {
+    let contents = Character::describe(path)?;
+    let rest = Character::open(path, Play { clip: Some(String::new()), ..Play::default() })?;
+    let mut pose = Vec::new();
+    rest.pose(0.0, &mut pose)?;
+    let first = (pose[0], pose[0]);
+    let (low, high) = pose.iter().fold(first, |(low, high), p| (low.inf(p), high.sup(p)));
+    let mut clips = Map::new();
+    contents.clips.into_iter().for_each(|(name, seconds)| {
+        clips.insert(name, json!(seconds));
+    });
+    Ok(vec![json!({
+        "type": "character",
+        "vertices": rest.vertex_count(),
+        "triangles": rest.triangles().len(),
+        "skins": contents.skins,
+        "bounds_m": (<[f64; 3]>::from(low), <[f64; 3]>::from(high)),
+        "clips_s": clips,
+        "nodes": contents.mesh_nodes,
     })])
 }
 

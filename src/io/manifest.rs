@@ -82,9 +82,9 @@ impl Manifest {
         sealed::write(&Self::path(folder, stage, self.frame), self)
     }
 
-    /// Its file of a kind: the one in the folder of that name.
-    pub fn file_of(&self, kind: &str) -> Option<&Written> {
-        self.files.iter().find(|file| file.path.split('/').next() == Some(kind))
+    /// Its files of a kind: those in the folder of that name.
+    pub fn files_of(&self, kind: &str) -> impl Iterator<Item = &Written> {
+        self.files.iter().filter(move |file| file.path.split('/').next() == Some(kind))
     }
 
     /// Whether all its files are there with their lengths.

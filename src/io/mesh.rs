@@ -3,7 +3,7 @@
 use std::path::Path;
 
 use super::{atomic, obj, ply, stl};
-use crate::base::{PolygonMesh, TriMesh};
+use crate::base::{PolygonMesh, TriMesh, Vec3};
 use crate::error::{Error, Result};
 
 /// What is read and written, by extension.
@@ -44,10 +44,17 @@ pub fn read_polygons(path: &Path) -> Result<PolygonMesh> {
 pub fn write(path: &Path, mesh: &TriMesh) -> Result<()> {
     match extension(path).as_str() {
         "obj" => atomic::write(path, |out| obj::write(out, mesh)),
-        "ply" => atomic::write(path, |out| ply::write(out, mesh)),
+        "ply" => atomic::write(path, |out| ply::write(out, mesh, &[])),
         "stl" => atomic::write(path, |out| stl::write(out, mesh)),
         _ => Err(Error::file(path, "a mesh file must be .obj, .ply or .stl")),
     }
+}
+
+/// The bytes of a .ply file with velocities (m/s), one a vertex, as vx, vy, vz; or without any.
+pub fn ply_bytes(mesh: &TriMesh, velocities: &[Vec3]) -> Vec<u8> {
+    let mut bytes = Vec::new();
+    ply::write(&mut bytes, mesh, velocities).expect("memory takes all bytes");
+    bytes
 }
 
 fn extension(path: &Path) -> String {

@@ -212,17 +212,17 @@ fn add_strips(values: &[f64], mesh: &mut PolygonMesh) {
     }
 }
 
-/// Writes binary little-endian PLY.
-pub(super) fn write(out: &mut dyn Write, mesh: &TriMesh) -> std::io::Result<()> {
-    write!(
-        out,
-        "ply\nformat binary_little_endian 1.0\ncomment frazil\nelement vertex {}\nproperty float x\nproperty float y\n\
-         property float z\nelement face {}\nproperty list uchar uint vertex_indices\nend_header\n",
-        mesh.positions.len(),
-        mesh.triangles.len()
-    )?;
-    for p in &mesh.positions {
-        for value in p {
+/// Writes binary little-endian PLY, with velocities when there is one for each vertex.
+pub(super) fn write(out: &mut dyn Write, mesh: &TriMesh, velocities: &[Vec3]) -> std::io::Result<()> {
+    let moving = velocities.len() == mesh.positions.len();
+    let names = if moving { &["x", "y", "z", "vx", "vy", "vz"][..] } else { &["x", "y", "z"] };
+    writeln!(out, "ply\nformat binary_little_endian 1.0\ncomment frazil\nelement vertex {}", mesh.positions.len())?;
+    names.iter().try_for_each(|name| writeln!(out, "property float {name}"))?;
+    let faces = mesh.triangles.len();
+    writeln!(out, "element face {faces}\nproperty list uchar uint vertex_indices\nend_header")?;
+    for (vertex, p) in mesh.positions.iter().enumerate() {
+        let velocity = velocities.get(vertex).filter(|_| moving);
+        for value in p.iter().chain(velocity.into_iter().flatten()) {
             out.write_all(&value.to_le_bytes())?;
         }
     }
@@ -246,7 +246,7 @@ mod tests {
             triangles: vec![[0, 1, 2], [2, 1, 0]],
         };
         let mut bytes = Vec::new();
-        write(&mut bytes, &mesh).unwrap();
+        write(&mut bytes, &mesh, &[]).unwrap();
         assert_eq!(parse(&bytes).unwrap().into_triangles(), mesh);
         for length in 0..bytes.len() {
             assert!(parse(&bytes[..length]).is_err(), "{length} of {} bytes were accepted", bytes.len());

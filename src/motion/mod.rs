@@ -6,7 +6,7 @@ mod rigid;
 mod sequence;
 mod space;
 
-pub use gltf::{Character, Play};
+pub use gltf::{Character, Contents, Play};
 pub use morph::Morph;
 pub use rigid::{Key, Keys, Placed, Rigid};
 pub use sequence::MeshSequence;

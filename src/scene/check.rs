@@ -14,8 +14,9 @@ const RUN: usize = 12;
 /// Bytes of a whole base file for each column of cells, and of what a frame changes and removes besides.
 const BYTES_PER_COLUMN: f64 = 20.0;
 const BYTES_PER_CHANGE: f64 = 4e5;
-/// Bytes for each vertex of an object in a .usda file.
-const BYTES_PER_VERTEX: f64 = 110.0;
+/// Bytes for each vertex of an object in a .usda and a .ply file.
+const USDA_PER_VERTEX: f64 = 110.0;
+const PLY_PER_VERTEX: f64 = 50.0;
 /// A character taller than this (m), or smaller, is likely in another unit.
 const TALL: f64 = 20.0;
 const SMALL: f64 = 0.02;
@@ -206,7 +207,8 @@ fn disk(scene: &Scene, inputs: &Inputs, columns: f64) -> u64 {
         (true, BaseMode::Delta) => whole,
     };
     let vertices: usize = inputs.bodies.iter().map(|body| body.motion().vertex_count()).sum();
-    let objects = if output.objects { vertices as f64 * BYTES_PER_VERTEX * frames } else { 0.0 };
+    let per_vertex = if output.objects_usd { USDA_PER_VERTEX } else { 0.0 } + if output.objects_ply { PLY_PER_VERTEX } else { 0.0 };
+    let objects = vertices as f64 * per_vertex * frames;
     (base + objects + frames * BYTES_PER_CHANGE) as u64
 }
 

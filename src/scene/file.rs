@@ -190,13 +190,15 @@ fn output(root: &Table) -> Result<Output> {
     let written = |key, kind, default| -> Result<bool> {
         Ok(table.choices(key, &[(kind, ())])?.map_or(default, |kinds| !kinds.is_empty()))
     };
+    let objects = table.choices("objects", &[("usd", "usd"), ("ply", "ply")])?.unwrap_or_default();
     let modes = [("full", BaseMode::Full), ("delta", BaseMode::Delta)];
     let output = Output {
         base: written("base", "vdb", defaults.base)?,
         base_mode: table.choice("base_mode", &modes)?.unwrap_or(defaults.base_mode),
         half: table.flag("half")?.unwrap_or(defaults.half),
         removed: written("removed", "vdb", defaults.removed)?,
-        objects: written("objects", "usd", defaults.objects)?,
+        objects_usd: objects.contains(&"usd"),
+        objects_ply: objects.contains(&"ply"),
         usd: table.flag("usd")?.unwrap_or(defaults.usd),
     };
     if output.half && output.base && output.base_mode == BaseMode::Delta {

@@ -55,6 +55,13 @@ impl Inputs {
                         body.motion().triangles().len(),
                         body.closed_loops()
                     );
+                    if body.contradictions() > 0 {
+                        log::warn!(
+                            "{}: the triangles disagree about inside and outside at {} edges; look at its prints",
+                            object.file.display(),
+                            body.contradictions()
+                        );
+                    }
                     bodies.push(body);
                 }
             }

@@ -147,7 +147,9 @@ pub struct Output {
     /// `removed/removed.%04d.vdb`.
     pub removed: bool,
     /// `objects/objects.%04d.usda`: the objects as they moved, with velocities.
-    pub objects: bool,
+    pub objects_usd: bool,
+    /// `objects/objects.%04d.ply`: the same, all in one mesh.
+    pub objects_ply: bool,
     /// `shot.usda`.
     pub usd: bool,
 }
@@ -163,7 +165,7 @@ pub enum BaseMode {
 
 impl Default for Output {
     fn default() -> Self {
-        Self { base: true, base_mode: BaseMode::Full, half: false, removed: true, objects: false, usd: true }
+        Self { base: true, base_mode: BaseMode::Full, half: false, removed: true, objects_usd: false, objects_ply: false, usd: true }
     }
 }
 

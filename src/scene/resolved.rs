@@ -30,11 +30,16 @@ impl Scene {
             BaseMode::Full => "full",
             BaseMode::Delta => "delta",
         };
-        line(out, "base", kinds(output.base, "vdb"), "base/base.%04d.vdb: surface, compression, touched")?;
+        line(out, "base", kinds(output.base), "base/base.%04d.vdb: surface, compression, touched")?;
         line(out, "base_mode", &quoted(mode), "full, or delta: first frame whole, then what changed")?;
         line(out, "half", &output.half.to_string(), "16-bit values, for rendering only")?;
-        line(out, "removed", kinds(output.removed, "vdb"), "removed/removed.%04d.vdb: what each frame took away")?;
-        line(out, "objects", kinds(output.objects, "usd"), "objects/objects.%04d.usda: as they moved, with velocities")?;
+        line(out, "removed", kinds(output.removed), "removed/removed.%04d.vdb: what each frame took away")?;
+        let objects: Vec<&str> = [("usd", output.objects_usd), ("ply", output.objects_ply)]
+            .into_iter()
+            .filter(|(_, written)| *written)
+            .map(|(kind, _)| kind)
+            .collect();
+        line(out, "objects", &format!("{objects:?}"), "\"usd\", \"ply\": objects/, as they moved, with velocities")?;
         line(out, "usd", &output.usd.to_string(), "shot.usda: the whole shot for programs that read USD")
     }
 
@@ -112,12 +117,8 @@ fn line(out: &mut String, key: &str, value: &str, meaning: &str) -> std::fmt::Re
     writeln!(out, "{assignment:<32} # {meaning}")
 }
 
-fn kinds(written: bool, kind: &str) -> &'static str {
-    match (written, kind) {
-        (false, _) => "[]",
-        (true, "usd") => "[\"usd\"]",
-        (true, _) => "[\"vdb\"]",
-    }
+fn kinds(written: bool) -> &'static str {
+    if written { "[\"vdb\"]" } else { "[]" }
 }
 
 /// The shortest text that reads back as the same number.

@@ -204,7 +204,8 @@ impl<'a> Run<'a> {
             usd::VolumeFiles { name: "removed", grids: &[("removed", true)], files: &removed },
         ];
         let names = object_names(self.scene);
-        let clips = usd::Clips { kind: "objects", frames: relative("objects").into_iter().map(|f| f.0).collect() };
+        let objects = relative("objects").into_iter().filter(|(_, file)| file.ends_with(".usda"));
+        let clips = usd::Clips { kind: "objects", frames: objects.map(|(frame, _)| frame).collect() };
         let folder = self.cache.stored.folder();
         let clips = (!clips.frames.is_empty()).then_some((&clips, &names[..]));
         if clips.is_some() {

@@ -69,10 +69,12 @@ impl Stored {
         self.done.insert(manifest.frame, manifest);
     }
 
-    /// The frames that hold a kind of file, ascending, with its path from the folder.
+    /// The files of a kind, ascending by frame, with their paths from the folder.
     pub fn files(&self, kind: &str) -> Vec<(i32, String)> {
-        let path = |manifest: &Manifest| manifest.file_of(kind).map(|written| written.path.clone());
-        self.done.iter().filter_map(|(frame, manifest)| Some((*frame, path(manifest)?))).collect()
+        let of_frame = |(frame, manifest): (&i32, &Manifest)| -> Vec<(i32, String)> {
+            manifest.files_of(kind).map(|written| (*frame, written.path.clone())).collect()
+        };
+        self.done.iter().flat_map(of_frame).collect()
     }
 
     /// Removes the frames from one on: first what says that they are done, then their files.
@@ -145,7 +147,7 @@ impl Stored {
         if manifest.keeps == Keeps::State {
             return read_grids(&state_path(&self.folder, frame));
         }
-        let written = manifest.file_of("base").ok_or_else(missing)?;
+        let written = manifest.files_of("base").next().ok_or_else(missing)?;
         let path = self.folder.join(&written.path);
         if !written.is_whole(&self.folder) {
             return Err(Error::file(path, "is not the file that was written: remove it, and it is made again"));

@@ -42,6 +42,6 @@ keys = [                         # composed over the file's own motion: a walk i
 # base_mode = "full"             # or "delta": the first frame whole, then what changed; see `frazil vdb rebuild`
 # half = false                   # 16-bit values, for rendering only
 # removed = ["vdb"]              # removed/removed.%04d.vdb: what each frame took away
-# objects = []                   # ["usd"]: objects/objects.%04d.usda, the objects as they moved, with velocities
+# objects = []                   # "usd", "ply": objects/, the objects as they moved, with velocities
 # usd = true                     # shot.usda
 "##;

@@ -6,11 +6,11 @@ use serde_json::json;
 
 use super::stored::{STAGE, state_path};
 use super::{BaseMode, Scene};
-use crate::base::DVec3;
+use crate::base::{DVec3, TriMesh};
 use crate::context::{Context, StageTime};
 use crate::error::{Error, Result};
 use crate::io::manifest::{Keeps, Manifest, Written};
-use crate::io::{atomic, usd};
+use crate::io::{atomic, mesh, usd};
 use crate::snow::base_layer::{Changes, Grids, StepReport};
 use crate::sweep::Body;
 use crate::vdb::file::{WriteOptions, to_bytes};
@@ -99,9 +99,8 @@ impl<'a> Writer<'a> {
                 None => self.save("base", frame, "vdb", &self.base_bytes(step)?)?,
             });
         }
-        if output.objects {
-            let bytes = self.objects_text(frame)?;
-            files.push(self.save("objects", frame, "usda", bytes.as_bytes())?);
+        if output.objects_usd || output.objects_ply {
+            self.save_objects(frame, &mut files)?;
         }
         if !output.base_restarts() {
             let grids = self.copy()?.list();
@@ -148,7 +147,7 @@ impl<'a> Writer<'a> {
     }
 
     /// The objects as they are at a frame, with their velocities over the coming one.
-    fn objects_text(&self, frame: i32) -> Result<String> {
+    fn save_objects(&self, frame: i32, files: &mut Vec<Written>) -> Result<()> {
         let fps = self.scene.shot.fps;
         let (mut pose, mut velocities) = (Vec::<DVec3>::new(), Vec::<DVec3>::new());
         let mut meshes = Vec::new();
@@ -157,17 +156,29 @@ impl<'a> Writer<'a> {
             body.motion().velocities(f64::from(frame) / fps, 1.0 / fps, &mut velocities)?;
             meshes.push((usd::to_floats(&pose), usd::to_floats(&velocities)));
         }
-        let frames: Vec<usd::MeshFrame> = meshes
-            .iter()
-            .zip(self.bodies.iter().zip(&self.names))
-            .map(|((points, velocities), (body, name))| usd::MeshFrame {
-                name,
-                points,
-                velocities,
-                triangles: body.motion().triangles(),
-            })
-            .collect();
-        Ok(usd::clip("objects", frame, fps, usd::Units::OWN, &frames))
+        if self.scene.output.objects_ply {
+            let (mut all, mut velocities) = (TriMesh::default(), Vec::new());
+            for (body, (positions, speeds)) in self.bodies.iter().zip(&meshes) {
+                let triangles = body.motion().triangles().to_vec();
+                all.append(&TriMesh { positions: positions.clone(), triangles });
+                velocities.extend_from_slice(speeds);
+            }
+            files.push(self.save("objects", frame, "ply", &mesh::ply_bytes(&all, &velocities))?);
+        }
+        if self.scene.output.objects_usd {
+            let frames = meshes.iter().zip(self.bodies.iter().zip(&self.names));
+            let frames: Vec<usd::MeshFrame> = frames
+                .map(|((points, velocities), (body, name))| usd::MeshFrame {
+                    name,
+                    points,
+                    velocities,
+                    triangles: body.motion().triangles(),
+                })
+                .collect();
+            let text = usd::clip("objects", frame, fps, usd::Units::OWN, &frames);
+            files.push(self.save("objects", frame, "usda", text.as_bytes())?);
+        }
+        Ok(())
     }
 
     fn write_report(&self, frame: i32, report: &StepReport) -> Result<()> {

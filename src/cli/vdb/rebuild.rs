@@ -8,7 +8,8 @@ use crate::cli::output;
 use crate::cli::session::Session;
 use frazil::io::sequence::Pattern;
 use frazil::scene::{FrameChoice, Rebuild};
-use frazil::vdb::file;
+use frazil::vdb::MetaValue;
+use frazil::vdb::file::{self, WriteOptions};
 use serde_json::json;
 
 /// Make whole frames of a snow cache that holds changes (base_mode = "delta")
@@ -47,7 +48,9 @@ pub fn run(args: &Args, session: &Session) -> Result<(), Failure> {
         let path = pattern.as_ref().map_or_else(|| args.output.clone(), |pattern| pattern.path(frame));
         let grids = cache.layer(&session.ctx, frame).during()?;
         session.ctx.check().during()?;
-        file::write(&path, &grids.list(), &args.packing.options()).during()?;
+        let metadata = vec![("frazil:frame".to_string(), MetaValue::Int(frame.into()))];
+        let options = WriteOptions { metadata, ..args.packing.options() };
+        file::write(&path, &grids.list(), &options).during()?;
     }
     session.record("frames", json!(args.frame.count()));
     Ok(())

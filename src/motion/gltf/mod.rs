@@ -23,6 +23,9 @@ const SAME_POSE: f64 = 1e-3;
 /// Kinks this close to the ends of an interval (s) are those ends: times in files are 32-bit floats.
 const AT_END: f64 = 2e-5;
 
+/// A clip shorter than this (s) is a pose: it does not repeat.
+const SHORTEST_ROUND: f64 = 1e-3;
+
 /// What of a file is wanted, and when it plays.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Play {
@@ -40,6 +43,17 @@ impl Default for Play {
     fn default() -> Self {
         Self { node: None, clip: None, repeat: true, start: 0.0 }
     }
+}
+
+/// What a glTF file holds.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Contents {
+    /// Clips with their lengths (s).
+    pub clips: Vec<(String, f64)>,
+    /// Names of the nodes with a mesh.
+    pub mesh_nodes: Vec<String>,
+    /// Number of skins.
+    pub skins: usize,
 }
 
 /// The moving meshes of a glTF file.
@@ -88,12 +102,24 @@ impl Character {
         File::open(path).map(|file| file.content)
     }
 
-    /// Names of the clips in a file, in its order.
+    /// What a file holds.
     ///
     /// # Errors
-    /// As [`Character::open`].
-    pub fn clips(path: &Path) -> Result<Vec<String>> {
-        Ok(clip_names(&File::open(path)?))
+    /// A file that is cut short or malformed; a clip whose keys are.
+    pub fn describe(path: &Path) -> Result<Contents> {
+        let file = File::open(path)?;
+        let wrong = |what: String| Error::file(path, what);
+        let clips = clip_names(&file).into_iter().zip(file.document.animations()).map(|(name, animation)| {
+            let clip = Clip::read(&file, &animation).map_err(wrong)?;
+            Ok((name, clip.end - clip.start))
+        });
+        let nodes = nodes::read(&file.document);
+        let meshes = file.document.nodes().filter(|node| node.mesh().is_some());
+        Ok(Contents {
+            clips: clips.collect::<Result<_>>()?,
+            mesh_nodes: meshes.map(|node| nodes[node.index()].name.clone()).collect(),
+            skins: file.document.skins().count(),
+        })
     }
 
     /// How far a vertex jumps when the clip starts again (the file's unit), if its ends differ.
@@ -108,7 +134,7 @@ impl Character {
 
     /// Whether the clip plays more than once.
     fn repeats(&self) -> bool {
-        self.play.repeat && self.duration() > 0.0
+        self.play.repeat && self.duration() > SHORTEST_ROUND
     }
 
     /// The clip's own time (s) at a time of the shot.
