@@ -7,6 +7,7 @@ use std::fmt::Write;
 use std::path::Path;
 
 use common::boot::{left_boot, right_boot};
+use common::hero;
 use common::shapes::{cuboid, sphere};
 use common::walk::{Step, walk};
 use frazil::io::{atomic, mesh};
@@ -20,9 +21,14 @@ fn main() -> frazil::Result<()> {
     mesh::write(&folder.join("box.obj"), &cuboid([0.2; 3]))?;
     mesh::write(&folder.join("cube.obj"), &cuboid([0.4; 3]))?;
     mesh::write(&folder.join("ball.obj"), &sphere(0.18, 32))?;
-    for (name, text) in
-        [("walker", walker()), ("box", sliding_box()), ("cube", turning_cube()), ("ball", rolling_ball())]
-    {
+    atomic::write_bytes(&folder.join("hero.glb"), &hero::glb())?;
+    for (name, text) in [
+        ("hero", hero()),
+        ("walker", walker()),
+        ("box", sliding_box()),
+        ("cube", turning_cube()),
+        ("ball", rolling_ball()),
+    ] {
         atomic::write_bytes(&folder.join(format!("{name}.toml")), text.as_bytes())?;
     }
     Ok(())
@@ -42,6 +48,20 @@ fn object(text: &mut String, file: &str, keys: &[Step]) {
         let _ = writeln!(text, "    {{ frame = {}, at = {at:?}, turn_deg = {turn:?} }},", key.frame);
     }
     text.push_str("]\n");
+}
+
+/// A skinned figure that crosses the snow at the speed of its feet.
+fn hero() -> String {
+    let mut text = head("1-96", [-0.8, -2.5, 0.8, 2.5], 0.006);
+    text.push_str("noise = { amplitude = 0.008, size = 0.06 }\n\n[output]\nbase_mode = \"full\"\nobjects = [\"ply\", \"usd\"]\n");
+    let last = 1.1 * 95.0 / 24.0;
+    let _ = write!(
+        text,
+        "\n[[object]]\nfile = \"hero.glb\"\nclip = \"walk\"\nkeys = [\n    {{ frame = 1, at = [0.0, 0.12, -2.2] }},\n    \
+         {{ frame = 96, at = [0.0, 0.12, {:.4}] }},\n]\n",
+        last - 2.2
+    );
+    text
 }
 
 /// Two treaded boots, 48 frames: heel strike, roll, toe-off.

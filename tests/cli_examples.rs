@@ -1,5 +1,9 @@
 //! Every example in the README and in `--help` runs as it stands.
 
+#[path = "common/hero.rs"]
+#[allow(dead_code)]
+mod hero;
+
 use assert_cmd::Command;
 use std::fs;
 use std::path::Path;
@@ -7,6 +11,7 @@ use std::path::Path;
 const CUBE: &str = "v -.2 0 -.2\nv .2 0 -.2\nv .2 .4 -.2\nv -.2 .4 -.2\nv -.2 0 .2\nv .2 0 .2\nv .2 .4 .2\nv -.2 .4 .2\n\
 f 1 4 3 2\nf 5 6 7 8\nf 1 2 6 5\nf 3 4 8 7\nf 1 5 8 4\nf 2 3 7 6\n";
 const README: &str = include_str!("../README.md");
+const CLI: &str = include_str!("../docs/cli.md");
 
 /// Runs a line `frazil ...` in a folder and gives what it says on stdout.
 #[track_caller]
@@ -23,10 +28,15 @@ fn works(folder: &Path, line: &str) -> String {
     String::from_utf8(output.stdout).unwrap()
 }
 
-/// The first block of a kind in the README: "toml", "sh" after the heading "Commands".
-fn block(kind: &str) -> &'static str {
-    let commands = README.split("## Commands").nth(1).unwrap();
-    commands.split(&format!("```{kind}\n")).nth(1).unwrap().split("```").next().unwrap()
+/// The first block of a kind behind a heading.
+fn block(text: &'static str, heading: &str, kind: &str) -> &'static str {
+    let behind = text.split(heading).nth(1).unwrap();
+    behind.split(&format!("```{kind}\n")).nth(1).unwrap().split("```").next().unwrap()
+}
+
+/// The commands of a block.
+fn lines(block: &'static str) -> Vec<&'static str> {
+    block.lines().filter(|line| line.starts_with("frazil ")).collect()
 }
 
 #[test]
@@ -34,14 +44,86 @@ fn the_readme_runs() {
     let folder = tempfile::tempdir().unwrap();
     fs::write(folder.path().join("boot.obj"), CUBE).unwrap();
     // As in the README but for the cells: a test need not be fine.
-    let scene = block("toml").replace("cell = 0.005", "cell = 0.02");
+    let scene = block(README, "## Commands", "toml").replace("cell = 0.005", "cell = 0.02");
     assert!(scene.contains("cell = 0.02"));
     fs::write(folder.path().join("shot.toml"), scene).unwrap();
-    let lines: Vec<&str> = block("sh").lines().filter(|line| line.starts_with("frazil ")).collect();
-    assert!(lines.len() >= 4, "{lines:?}");
+    let lines = lines(block(README, "## Commands", "sh"));
+    assert!(lines.len() >= 8, "{lines:?}");
     lines.iter().for_each(|line| {
         works(folder.path(), line);
     });
+}
+
+/// Puts the example scenes into a folder, with coarse cells and a walk named as in the file.
+fn write_scenes(folder: &Path) {
+    let scenes = folder.join("examples/scenes");
+    fs::create_dir_all(&scenes).unwrap();
+    for entry in fs::read_dir(Path::new(env!("CARGO_MANIFEST_DIR")).join("examples/scenes")).unwrap() {
+        let path = entry.unwrap().path();
+        let text = fs::read_to_string(&path).unwrap();
+        let coarse: Vec<&str> =
+            text.lines().map(|line| if line.starts_with("cell =") { "cell = 0.03" } else { line }).collect();
+        fs::write(scenes.join(path.file_name().unwrap()), coarse.join("\n")).unwrap();
+    }
+}
+
+#[test]
+fn the_readme_takes_a_character_through_snow() {
+    let folder = tempfile::tempdir().unwrap();
+    write_scenes(folder.path());
+    // Our own figure in the place of CesiumMan: it has two clips.
+    let path = folder.path().join("examples/scenes/walking_character.toml");
+    let text = fs::read_to_string(&path).unwrap().replace("scale =", "clip = \"walk\"\nscale =");
+    fs::write(&path, text).unwrap();
+    fs::write(folder.path().join("CesiumMan.glb"), hero::glb()).unwrap();
+    let lines = lines(block(README, "## A character walks", "sh"));
+    assert_eq!(lines.len(), 4, "{lines:?}");
+    lines.iter().for_each(|line| {
+        works(folder.path(), line);
+    });
+}
+
+#[test]
+fn the_example_scenes_are_sound() {
+    for name in ["walking_character", "walking_robot", "bunny_imprint", "bunny_slide"] {
+        let path = Path::new(env!("CARGO_MANIFEST_DIR")).join(format!("examples/scenes/{name}.toml"));
+        let scene = frazil::scene::Scene::read(&path).unwrap();
+        // The command in the comment is the one that the README gives, with this scene's file.
+        let text = fs::read_to_string(&path).unwrap();
+        let file = scene.objects[0].file.file_name().unwrap().to_string_lossy().into_owned();
+        let command = format!("frazil snow examples/scenes/{name}.toml --set object.1.file={file} -o cache/");
+        assert!(text.contains(&command), "{text}");
+    }
+}
+
+#[test]
+fn the_page_of_the_command_line_runs() {
+    let folder = tempfile::tempdir().unwrap();
+    fs::write(folder.path().join("hero.glb"), hero::glb()).unwrap();
+    let (shot, rebuild) = ("## A shot from beginning", "## What a folder holds");
+    let mut count = 0;
+    for line in lines(block(CLI, shot, "sh")) {
+        if line.starts_with("frazil preview") {
+            // What comes next asks for a cache of changes.
+            works(folder.path(), "frazil snow shot.toml -o changes -q --set output.base_mode=delta");
+        }
+        works(folder.path(), line);
+        if line.starts_with("frazil new") {
+            // As one would edit it.
+            let path = folder.path().join("shot.toml");
+            let text = fs::read_to_string(&path).unwrap();
+            let edited =
+                text.replace("# clip = \"Walk\"", "clip = \"walk\"").replace("cell = 0.0075", "cell = 0.03");
+            assert!(edited.len() < text.len() + 4 && edited.contains("cell = 0.03"));
+            fs::write(&path, edited).unwrap();
+        }
+        count += 1;
+    }
+    for line in lines(block(CLI, rebuild, "sh")) {
+        works(folder.path(), &line.replace("cache/", "changes/"));
+        count += 1;
+    }
+    assert_eq!(count, 9);
 }
 
 /// The commands that a help text lists, each with the command before it.
@@ -74,7 +156,7 @@ fn every_command_has_help_with_an_example_that_runs() {
     for group in ["frazil vdb", "frazil mesh"] {
         commands.extend(commands_of(folder, group));
     }
-    assert!(commands.len() >= 1 + 8 + 10 + 1, "{commands:?}");
+    assert!(commands.len() > 1 + 8 + 10, "{commands:?}");
     for command in commands {
         let help = works(folder, &format!("{command} --help"));
         let examples: Vec<&str> = help.lines().filter_map(|line| line.strip_prefix("  frazil ")).collect();

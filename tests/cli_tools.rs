@@ -176,7 +176,8 @@ fn mesh_check_of_real_meshes_finds_their_known_faults() {
     };
     let folder = folder();
     let told: Value =
-        serde_json::from_str(&works(folder.path(), &format!("mesh check {} --json", bunny.display()))).unwrap();
+        serde_json::from_str(&works(folder.path(), &format!("mesh check {} --json", bunny.display())))
+            .unwrap();
     assert_eq!((&told[0]["triangles"], &told[0]["holes"]), (&69_451.into(), &5.into()));
 }
 
@@ -186,7 +187,8 @@ fn meshes_pass_through_every_format() {
     for (from, to) in [("box.obj", "a.stl"), ("a.stl", "b.ply"), ("b.ply", "c.obj")] {
         works(folder.path(), &format!("convert {from} {to}"));
     }
-    let (before, after) = (mesh::read(&folder.path().join("box.obj")), mesh::read(&folder.path().join("c.obj")));
+    let (before, after) =
+        (mesh::read(&folder.path().join("box.obj")), mesh::read(&folder.path().join("c.obj")));
     let (before, after) = (before.unwrap(), after.unwrap());
     assert!((before.volume() - after.volume()).abs() < 1e-9 && after.is_manifold());
     assert_eq!(before.triangles.len(), after.triangles.len());

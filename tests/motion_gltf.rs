@@ -3,13 +3,16 @@
 #[path = "common/character.rs"]
 #[allow(dead_code)]
 mod character;
+#[path = "common/hero.rs"]
+#[allow(dead_code)]
+mod hero;
 
 use std::f64::consts::PI;
 use std::fs;
 use std::path::{Path, PathBuf};
 
 use frazil::base::DVec3;
-use frazil::motion::{Character, Motion, Play};
+use frazil::motion::{Character, Key, Keys, Motion, Placed, Play, Space};
 use frazil::sweep::Body;
 use proptest::prelude::*;
 use serde_json::{Value, json};
@@ -32,14 +35,13 @@ impl Maker {
     }
 
     fn accessor(&mut self, kind: u32, shape: &str, count: usize, bytes: &[u8]) -> usize {
-        while self.bytes.len() % 4 != 0 {
-            self.bytes.push(0);
-        }
+        self.bytes.resize(self.bytes.len().next_multiple_of(4), 0);
         let list = |name: &str, json: &Value| json[name].as_array().unwrap().len();
         let view = list("bufferViews", &self.json);
         let number = list("accessors", &self.json);
         let view_json = json!({ "buffer": 0, "byteOffset": self.bytes.len(), "byteLength": bytes.len() });
-        let mut accessor = json!({ "bufferView": view, "componentType": kind, "type": shape, "count": count });
+        let mut accessor =
+            json!({ "bufferView": view, "componentType": kind, "type": shape, "count": count });
         // The specification asks for the bounds of positions.
         accessor["min"] = json!([0, 0, 0]);
         accessor["max"] = json!([1, 1, 1]);
@@ -58,16 +60,16 @@ impl Maker {
         self.json[list].as_array_mut().unwrap().push(value);
     }
 
-    /// A channel of clip 0.
-    fn channel(&mut self, clip: usize, node: usize, path: &str, how: &str, times: &[f32], shape: &str, values: &[f32]) {
-        let width = match shape {
-            "SCALAR" => 1,
-            "VEC3" => 3,
-            _ => 4,
+    /// A channel of the last clip.
+    fn channel(&mut self, node: usize, path: &str, how: &str, times: &[f32], values: &[f32]) {
+        let (shape, width) = match path {
+            "weights" => ("SCALAR", 1),
+            "rotation" => ("VEC4", 4),
+            _ => ("VEC3", 3),
         };
         let input = self.floats("SCALAR", times.len(), times);
         let output = self.floats(shape, values.len() / width, values);
-        let animation = &mut self.json["animations"][clip];
+        let animation = self.json["animations"].as_array_mut().unwrap().last_mut().unwrap();
         let sampler = animation["samplers"].as_array().unwrap().len();
         let samplers = animation["samplers"].as_array_mut().unwrap();
         samplers.push(json!({ "input": input, "output": output, "interpolation": how }));
@@ -75,9 +77,8 @@ impl Maker {
         channels.push(json!({ "sampler": sampler, "target": { "node": node, "path": path } }));
     }
 
-    fn clip(&mut self, name: &str) -> usize {
+    fn clip(&mut self, name: &str) {
         self.push("animations", json!({ "name": name, "samplers": [], "channels": [] }));
-        self.json["animations"].as_array().unwrap().len() - 1
     }
 
     /// A mesh of one triangle (0 0 0), (1 0 0), (0 1 0).
@@ -97,9 +98,7 @@ impl Maker {
             }
         }
         let padded = |mut bytes: Vec<u8>, with: u8| {
-            while bytes.len() % 4 != 0 {
-                bytes.push(with);
-            }
+            bytes.resize(bytes.len().next_multiple_of(4), with);
             bytes
         };
         let (json, bytes) = (padded(json.to_string().into_bytes(), b' '), padded(self.bytes.clone(), 0));
@@ -144,7 +143,8 @@ fn step_linear_and_cubic_keys_follow_their_formulas() {
     let times = [1.0, 2.0, 4.0];
     let flat = |x: [f32; 3]| x.iter().flat_map(|x| [*x, 0.0, 0.0]).collect::<Vec<f32>>();
     // In-tangent, value, out-tangent of each key: x = t^3 on all of them.
-    let cubic: Vec<f32> = times.iter().flat_map(|t: &f32| flat([3.0 * t * t, t * t * t, 3.0 * t * t])).collect();
+    let cubic: Vec<f32> =
+        times.iter().flat_map(|t: &f32| flat([3.0 * t * t, t * t * t, 3.0 * t * t])).collect();
     for (how, values, expected) in [
         ("STEP", flat([5.0, 6.0, 7.0]), [(0.0, 5.0), (1.9, 5.0), (2.0, 6.0), (3.9, 6.0), (9.0, 7.0)]),
         ("LINEAR", flat([5.0, 6.0, 8.0]), [(0.0, 5.0), (1.25, 5.25), (2.0, 6.0), (3.0, 7.0), (9.0, 8.0)]),
@@ -153,8 +153,8 @@ fn step_linear_and_cubic_keys_follow_their_formulas() {
         let mut maker = Maker::new();
         let mesh = maker.triangle();
         maker.push("nodes", json!({ "mesh": mesh }));
-        let clip = maker.clip("move");
-        maker.channel(clip, 0, "translation", how, &times, "VEC3", &values);
+        maker.clip("move");
+        maker.channel(0, "translation", how, &times, &values);
         let character = open(&maker.write(&folder));
         for (time, x) in expected {
             // The clip's first key is at its start.
@@ -170,10 +170,10 @@ fn rotations_take_the_shorter_way_and_nodes_carry_their_children() {
     let mesh = maker.triangle();
     maker.push("nodes", json!({ "children": [1], "translation": [0, 0, 2], "scale": [2, 2, 2] }));
     maker.push("nodes", json!({ "mesh": mesh, "translation": [1, 0, 0] }));
-    let clip = maker.clip("turn");
+    maker.clip("turn");
     // From 0 to 90 degrees about y, the second key with its sign turned round.
     let half = (PI / 4.0).sin() as f32;
-    maker.channel(clip, 0, "rotation", "LINEAR", &[0.0, 1.0], "VEC4", &[0., 0., 0., 1., 0., -half, 0., -half]);
+    maker.channel(0, "rotation", "LINEAR", &[0.0, 1.0], &[0., 0., 0., 1., 0., -half, 0., -half]);
     let character = open(&maker.write(&folder));
     close(pose(&character, 0.0)[0], [2.0, 0.0, 2.0]);
     let (sine, cosine) = (PI / 8.0).sin_cos();
@@ -196,8 +196,8 @@ fn morph_targets_add_their_parts() {
         }] }),
     );
     maker.push("nodes", json!({ "mesh": 0 }));
-    let clip = maker.clip("morph");
-    maker.channel(clip, 0, "weights", "LINEAR", &[0.0, 1.0], "SCALAR", &[0.5, 0.0, 1.0, 3.0]);
+    maker.clip("morph");
+    maker.channel(0, "weights", "LINEAR", &[0.0, 1.0], &[0.5, 0.0, 1.0, 3.0]);
     let path = maker.write(&folder);
     close(pose(&open(&path), 0.5)[0], [0.0, 1.5, 3.0]);
     let rest = Character::open(&path, Play { clip: Some(String::new()), ..Play::default() }).unwrap();
@@ -227,8 +227,8 @@ fn strip(weights_differ: bool) -> Maker {
     maker.push("nodes", json!({ "name": "still" }));
     maker.push("nodes", json!({ "name": "moving" }));
     maker.push("skins", json!({ "joints": [2, 3] }));
-    let clip = maker.clip("slide");
-    maker.channel(clip, 3, "translation", "LINEAR", &[0.0, 1.0], "VEC3", &[0., 0., 0., 4., 0., 0.]);
+    maker.clip("slide");
+    maker.channel(3, "translation", "LINEAR", &[0.0, 1.0], &[0., 0., 0., 4., 0., 0.]);
     maker
 }
 
@@ -251,8 +251,8 @@ fn clips_start_where_they_are_told_and_repeat() {
     let mut maker = Maker::new();
     let mesh = maker.triangle();
     maker.push("nodes", json!({ "mesh": mesh }));
-    let clip = maker.clip("sway");
-    maker.channel(clip, 0, "translation", "LINEAR", &[3., 4., 5.], "VEC3", &[0., 0., 0., 1., 0., 0., 0., 0., 0.]);
+    maker.clip("sway");
+    maker.channel(0, "translation", "LINEAR", &[3., 4., 5.], &[0., 0., 0., 1., 0., 0., 0., 0., 0.]);
     let path = maker.write(&folder);
     let play = Play { start: 10.0, ..Play::default() };
     let character = Character::open(&path, play.clone()).unwrap();
@@ -273,8 +273,8 @@ fn a_round_that_does_not_close_says_so_and_jumps_at_once() {
     let mut maker = Maker::new();
     let mesh = maker.triangle();
     maker.push("nodes", json!({ "mesh": mesh }));
-    let clip = maker.clip("walk");
-    maker.channel(clip, 0, "translation", "LINEAR", &[0., 1.], "VEC3", &[0., 0., 0., 3., 0., 0.]);
+    maker.clip("walk");
+    maker.channel(0, "translation", "LINEAR", &[0., 1.], &[0., 0., 0., 3., 0., 0.]);
     let character = Character::open(&maker.write(&folder), Play::default()).unwrap();
     assert!((character.jump().unwrap() - 3.0).abs() < 1e-6);
     let breaks = character.breaks(0.5, 1.5);
@@ -373,6 +373,29 @@ proptest! {
             }
         });
     }
+}
+
+#[test]
+fn the_foot_that_stands_does_not_slip_when_keys_carry_the_figure_at_its_speed() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("hero.glb");
+    fs::write(&path, hero::glb()).unwrap();
+    let play = Play { clip: Some("walk".into()), ..Play::default() };
+    let inner = Character::open(&path, play).unwrap();
+    assert_eq!(inner.jump(), None);
+    let key = |time: f64| Key { time, at: DVec3::z() * f64::from(hero::SPEED) * time, turn: DVec3::zeros() };
+    let keys = Keys::new(vec![key(0.0), key(4.0)]).unwrap();
+    let walker = Placed::new(Box::new(inner), Space::OWN, keys);
+    let at = |step: i32| pose(&walker, f64::from(step) / 48.0);
+    // The left sole stands in the first half of each round.
+    let (start, middle, end) = (at(48), at(59), at(71));
+    let sole: Vec<usize> = (0..start.len()).filter(|&v| start[v].y < 0.02 && start[v].x > 0.0).collect();
+    assert!(sole.len() > 20);
+    for &vertex in &sole {
+        let slip = [&middle, &end].map(|pose| (pose[vertex] - start[vertex]).norm());
+        assert!(slip.iter().all(|slip| *slip < 2e-3), "{slip:?}");
+    }
+    assert!(sole.iter().all(|&vertex| at(84)[vertex].y > 0.15), "then it is lifted");
 }
 
 #[test]

@@ -80,13 +80,9 @@ fn kill_at(folder: &Path, arguments: &str, file: &str) {
 
 #[test]
 fn a_killed_run_goes_on_to_the_same_bytes_whatever_is_written() {
-    for written in [
-        "",
-        "base_mode = \"delta\"",
-        "half = true",
-        "base = []",
-        "objects = [\"usd\"]\nremoved = []",
-    ] {
+    for written in
+        ["", "base_mode = \"delta\"", "half = true", "base = []", "objects = [\"usd\"]\nremoved = []"]
+    {
         let folder = folder(12, 0.02, written);
         works(folder.path(), "snow shot.toml -o once -q");
         for frame in [1, 4, 9] {
@@ -136,7 +132,12 @@ fn frames_in_pieces_are_those_of_a_whole_run() {
     }
     let [whole, pieces] = ["whole", "pieces"].map(|name| output(&folder.path().join(name)));
     assert_eq!(differences(&whole, &pieces), Vec::<String>::new());
-    fails(folder.path(), "snow shot.toml -o d --set output.base_mode=delta --frames 5-7", 2, &["frame 1", "delta"]);
+    fails(
+        folder.path(),
+        "snow shot.toml -o d --set output.base_mode=delta --frames 5-7",
+        2,
+        &["frame 1", "delta"],
+    );
 }
 
 #[test]
@@ -196,7 +197,12 @@ fn a_frame_of_a_sequence_that_changed_is_named() {
     works(folder.path(), &format!("snow shot.toml -o out -q {set}"));
     let before = output(&folder.path().join("out"));
     mesh(4, ".5");
-    fails(folder.path(), &format!("snow shot.toml -o out {set}"), 2, &["body.0004.obj", "frame 4", "--from 4"]);
+    fails(
+        folder.path(),
+        &format!("snow shot.toml -o out {set}"),
+        2,
+        &["body.0004.obj", "frame 4", "--from 4"],
+    );
     works(folder.path(), &format!("snow shot.toml -o out -q {set} --from 4"));
     works(folder.path(), &format!("snow shot.toml -o fresh -q {set}"));
     let [after, fresh] = ["out", "fresh"].map(|name| output(&folder.path().join(name)));
@@ -260,7 +266,9 @@ fn no_space_ends_the_run_and_space_lets_it_go_on() {
     let folder = folder(12, 0.02, "base_mode = \"delta\"");
     // Files may grow to what the first frames need: a later one, larger, finds no space.
     works(folder.path(), "snow shot.toml -o once -q");
-    let size = |frame: i32| fs::metadata(folder.path().join(format!("once/base/base.{frame:04}.vdb"))).unwrap().len();
+    let size = |frame: i32| {
+        fs::metadata(folder.path().join(format!("once/base/base.{frame:04}.vdb"))).unwrap().len()
+    };
     works(folder.path(), "snow shot.toml -o full -q --frames 1-2");
     let blocks = (3..=12).map(size).max().unwrap() / 512 - 2;
     let script = format!("ulimit -f {blocks}; exec \"$0\" snow shot.toml -o full -q");
@@ -295,7 +303,8 @@ fn whole_frames_are_rebuilt_from_changes() {
             assert!(a.iter().zip(&b).all(same), "frame {frame}, {}", whole.name());
         }
     }
-    let [five, rebuilt] = ["five.vdb", "rebuilt.0005.vdb"].map(|name| fs::read(folder.path().join(name)).unwrap());
+    let [five, rebuilt] =
+        ["five.vdb", "rebuilt.0005.vdb"].map(|name| fs::read(folder.path().join(name)).unwrap());
     assert!(five == rebuilt);
     fails(folder.path(), "vdb rebuild delta --frame 9 -o nine.vdb", 2, &["frame 9", "not there"]);
     fails(folder.path(), "vdb rebuild delta --frame 1-2 -o two.vdb", 2, &["pattern"]);

@@ -79,7 +79,8 @@ impl Union {
                 // Coming from below, a face that looks up is left behind: the solid ends.
                 winding -= pair[0].2;
                 if winding > 0 {
-                    let [first, end] = [pair[0].1, pair[1].1].map(|z| ((z - self.low.z) / self.step).ceil() as usize);
+                    let [first, end] =
+                        [pair[0].1, pair[1].1].map(|z| ((z - self.low.z) / self.step).ceil() as usize);
                     let row = column[0].0 as usize * nz;
                     slab[row + first..row + end.min(nz)].fill(true);
                 }
@@ -111,7 +112,9 @@ impl Union {
         Some(ball.map(move |[i, j, k]| {
             let at = [x + i, y + j, z + k];
             let within = (0..3).all(|axis| at[axis] >= 0 && at[axis] < self.size[axis] as i64);
-            within && self.inside[(at[0] as usize * self.size[1] + at[1] as usize) * self.size[2] + at[2] as usize]
+            within
+                && self.inside
+                    [(at[0] as usize * self.size[1] + at[1] as usize) * self.size[2] + at[2] as usize]
         }))
     }
 }

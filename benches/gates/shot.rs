@@ -1,6 +1,6 @@
 //! Gates of characters and shots: skinned sweeps, whole passes with files, continuing.
 
-use std::path::{Path, PathBuf};
+use std::path::Path;
 use std::process::{Command, Stdio};
 use std::time::{Duration, Instant};
 
@@ -85,8 +85,22 @@ fn sweeps(h: &mut Harness, man: &Path) {
             });
         }
         let note = format!("{:.0} mm in a frame", frames[0].0 * 1000.0);
-        h.gate(&format!("snow.shot.sweep_{name}_missed"), missed as f64, "voxels", Bound::Most(0.0), Bound::Open, &note);
-        h.gate(&format!("snow.shot.sweep_{name}_fat"), fat as f64, "voxels", Bound::Most(0.0), Bound::Open, &note);
+        h.gate(
+            &format!("snow.shot.sweep_{name}_missed"),
+            missed as f64,
+            "voxels",
+            Bound::Most(0.0),
+            Bound::Open,
+            &note,
+        );
+        h.gate(
+            &format!("snow.shot.sweep_{name}_fat"),
+            fat as f64,
+            "voxels",
+            Bound::Most(0.0),
+            Bound::Open,
+            &note,
+        );
     }
 }
 
@@ -128,7 +142,8 @@ fn edit(h: &mut Harness, man: &Path) {
     let mut base = BaseLayer::new(&ctx, layer, Params::for_cell(CELL)).expect("a layer");
     let time = |frame: i32| f64::from(frame) / FPS;
     base.step(&ctx, &inputs.bodies, time(1), time(1), 1).expect("first pose");
-    let step = |frame: i32| timed(|| drop(base.step(&ctx, &inputs.bodies, time(frame - 1), time(frame), frame))).0;
+    let step =
+        |frame: i32| timed(|| drop(base.step(&ctx, &inputs.bodies, time(frame - 1), time(frame), frame))).0;
     let times: Vec<f64> = (2..=97).map(step).collect();
     let worst = times.iter().copied().fold(0.0, f64::max);
     let note = format!("median of 96 frames, worst {worst:.3} s; threads=2 thesis=3.15-4.59 s on 6 cores");
@@ -148,15 +163,19 @@ fn text(path: &Path) -> &str {
 
 /// The whole pass with its files, in both modes.
 fn pass(h: &mut Harness, man: &Path) {
-    for (mode, seconds, megabytes) in [("full", (75.0, 60.0), (450.0, 350.0)), ("delta", (20.0, 12.0), (300.0, 200.0))] {
+    for (mode, seconds, megabytes) in
+        [("full", (75.0, 60.0), (450.0, 350.0)), ("delta", (20.0, 12.0), (300.0, 200.0))]
+    {
         let (pass, memory) = (format!("snow.shot.pass_{mode}"), format!("snow.shot.memory_{mode}"));
         if !h.wants(&pass) && !h.wants(&memory) {
             continue;
         }
         let folder = tempfile::tempdir().expect("a folder");
-        let scene = character::walk_scene(folder.path(), man, 240, 0.0075, &format!("base_mode = \"{mode}\""));
+        let scene =
+            character::walk_scene(folder.path(), man, 240, 0.0075, &format!("base_mode = \"{mode}\""));
         let (out, report) = (folder.path().join("out"), folder.path().join("report.json"));
-        let arguments = ["snow", text(&scene), "-o", text(&out), "--threads", "2", "-q", "--report", text(&report)];
+        let arguments =
+            ["snow", text(&scene), "-o", text(&out), "--threads", "2", "-q", "--report", text(&report)];
         let (took, noisy) = timed(|| assert!(frazil(&arguments).status().expect("frazil").success()));
         let told = std::fs::read_to_string(&report).expect("a report");
         let told: serde_json::Value = serde_json::from_str(&told).expect("JSON");
@@ -180,7 +199,14 @@ fn check(h: &mut Harness, man: &Path) {
     }
     if h.wants("snow.shot.check_sequence") {
         let scene = character::sequence_scene(folder.path(), 240, 158);
-        h.gate("snow.shot.check_sequence", seconds(&scene), "s", Bound::Most(15.0), Bound::Most(8.0), "50,000 triangles a frame");
+        h.gate(
+            "snow.shot.check_sequence",
+            seconds(&scene),
+            "s",
+            Bound::Most(15.0),
+            Bound::Most(8.0),
+            "50,000 triangles a frame",
+        );
     }
 }
 
@@ -195,7 +221,9 @@ fn continued(h: &mut Harness, man: &Path) {
         let name = format!("snow.shot.continued_{mode}");
         let scene = character::walk_scene(folder.path(), man, 120, 0.015, &format!("base_mode = \"{mode}\""));
         let [once, killed] = ["once", "killed"].map(|name| folder.path().join(format!("{name}_{mode}")));
-        let (took, _) = timed(|| assert!(frazil(&["snow", text(&scene), "-o", text(&once)]).status().expect("frazil").success()));
+        let (took, _) = timed(|| {
+            assert!(frazil(&["snow", text(&scene), "-o", text(&once)]).status().expect("frazil").success())
+        });
         whole.push(once.clone());
         let mut kills = 0;
         for moment in character::moments(10) {
@@ -229,10 +257,11 @@ fn continued(h: &mut Harness, man: &Path) {
 type Leaves = Vec<([i32; 3], Vec<u32>, [u64; 8])>;
 
 /// All that the grids of a file hold in their leaves.
-fn voxels(path: &PathBuf) -> Vec<(String, u64, Leaves)> {
+fn voxels(path: &Path) -> Vec<(String, u64, Leaves)> {
     let of_grid = |grid: frazil::vdb::FloatGrid| {
         let leaves = grid.leaves().expect("leaves");
-        let leaf = |leaf: &frazil::vdb::Leaf<'_>| (leaf.origin, leaf.values.map(f32::to_bits).to_vec(), *leaf.mask);
+        let leaf =
+            |leaf: &frazil::vdb::Leaf<'_>| (leaf.origin, leaf.values.map(f32::to_bits).to_vec(), *leaf.mask);
         (grid.name(), grid.active_voxels(), leaves.iter().map(leaf).collect())
     };
     file::read(path).expect("a file").into_iter().map(of_grid).collect()
@@ -260,7 +289,7 @@ fn changed(h: &mut Harness, man: &Path) {
     let after = character::output(&out);
     let kept = |frame: i32| {
         let name = format!("base/base.{frame:04}.vdb");
-        before.get(&name).is_some() && before.get(&name) == after.get(&name)
+        before.contains_key(&name) && before.get(&name) == after.get(&name)
     };
     let yes = again.status.success() && (1..100).all(kept) && !(100..=120).any(kept);
     h.holds("snow.shot.changed_from", yes, "frames 1-99 keep their bytes, 100-120 are new");

@@ -42,7 +42,8 @@ impl Faults {
     /// Surveys a mesh whose indices are in range.
     pub fn of(mesh: &TriMesh) -> Self {
         let same = coincident(mesh.positions.iter().map(|p| p.cast()));
-        let doubled_vertices = same.iter().enumerate().filter(|(vertex, same)| **same as usize != *vertex).count();
+        let doubled_vertices =
+            same.iter().enumerate().filter(|(vertex, same)| **same as usize != *vertex).count();
         let used: HashSet<u32> = mesh.triangles.iter().flatten().copied().collect();
         let area = |triangle: usize| {
             let [a, b, c] = mesh.corners(triangle);

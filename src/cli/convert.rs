@@ -104,7 +104,8 @@ impl Args {
                 (Box::new(Rigid::new(io::mesh::read(&self.input).before()?, Keys::default())), one)
             }
             Some(pattern) => {
-                let needed = || Failure::refused(format!("{}: a sequence needs --frames A-B", self.input.display()));
+                let needed =
+                    || Failure::refused(format!("{}: a sequence needs --frames A-B", self.input.display()));
                 let frames = self.frames.clone().ok_or_else(needed)?;
                 let (first, last) = (frames.first(), frames.last());
                 (Box::new(MeshSequence::open(pattern, first, last, self.fps, 0.0).before()?), frames)

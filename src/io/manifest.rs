@@ -51,7 +51,8 @@ impl Written {
 
     /// Whether the file is there with its length.
     pub fn is_there(&self, folder: &Path) -> bool {
-        std::fs::metadata(folder.join(&self.path)).is_ok_and(|file| file.is_file() && file.len() == self.bytes)
+        std::fs::metadata(folder.join(&self.path))
+            .is_ok_and(|file| file.is_file() && file.len() == self.bytes)
     }
 
     /// Whether the file is there with its content; reads it.

@@ -30,7 +30,10 @@ pub fn read_polygons(path: &Path) -> Result<PolygonMesh> {
         "obj" => obj::parse(&bytes),
         "ply" => ply::parse(&bytes),
         "stl" => stl::parse(&bytes),
-        other => Err(format!("a mesh file must be {}, not \".{other}\"", EXTENSIONS.map(|e| format!(".{e}")).join(", "))),
+        other => Err(format!(
+            "a mesh file must be {}, not \".{other}\"",
+            EXTENSIONS.map(|e| format!(".{e}")).join(", ")
+        )),
     };
     let mesh = mesh.map_err(|what| Error::file(path, what))?;
     mesh.validate().map_err(|error| Error::file(path, error.to_string()))?;

@@ -216,7 +216,11 @@ fn add_strips(values: &[f64], mesh: &mut PolygonMesh) {
 pub(super) fn write(out: &mut dyn Write, mesh: &TriMesh, velocities: &[Vec3]) -> std::io::Result<()> {
     let moving = velocities.len() == mesh.positions.len();
     let names = if moving { &["x", "y", "z", "vx", "vy", "vz"][..] } else { &["x", "y", "z"] };
-    writeln!(out, "ply\nformat binary_little_endian 1.0\ncomment frazil\nelement vertex {}", mesh.positions.len())?;
+    writeln!(
+        out,
+        "ply\nformat binary_little_endian 1.0\ncomment frazil\nelement vertex {}",
+        mesh.positions.len()
+    )?;
     names.iter().try_for_each(|name| writeln!(out, "property float {name}"))?;
     let faces = mesh.triangles.len();
     writeln!(out, "element face {faces}\nproperty list uchar uint vertex_indices\nend_header")?;

@@ -32,13 +32,17 @@ pub fn read<T: DeserializeOwned>(path: &Path) -> Result<Option<T>> {
         other => other.map_err(|error| Error::io(path, "read", error))?,
     };
     let damaged = || {
-        Error::file(path, "the record is damaged, cut short or changed by hand: remove it to make what it stands for again")
+        Error::file(
+            path,
+            "the record is damaged, cut short or changed by hand: remove it to make what it stands for again",
+        )
     };
     let file: Value = serde_json::from_slice(&bytes).map_err(|_| damaged())?;
     match file["format"].as_u64() {
         None => return Err(damaged()),
         Some(format) if format > FORMAT => {
-            let what = format!("was written by a newer frazil (format {format}; this one reads up to {FORMAT})");
+            let what =
+                format!("was written by a newer frazil (format {format}; this one reads up to {FORMAT})");
             return Err(Error::file(path, what));
         }
         Some(_) => {}
@@ -63,7 +67,9 @@ mod tests {
         write(&path, &vec![1, 2, 3]).unwrap();
         assert_eq!(read::<Vec<i32>>(&path).unwrap(), Some(vec![1, 2, 3]));
         let text = std::fs::read_to_string(&path).unwrap();
-        for (from, to, word) in [("2,", "4,", "damaged"), ("\"format\": 1", "\"format\": 9", "newer"), ("]", "", "damaged")] {
+        for (from, to, word) in
+            [("2,", "4,", "damaged"), ("\"format\": 1", "\"format\": 9", "newer"), ("]", "", "damaged")]
+        {
             std::fs::write(&path, text.replace(from, to)).unwrap();
             let error = read::<Vec<i32>>(&path).unwrap_err().to_string();
             assert!(error.contains(word) && error.contains("a.json"), "{error}");

@@ -15,7 +15,10 @@ pub(super) fn parse(bytes: &[u8]) -> Result<PolygonMesh, String> {
     let length = HEADER + told * TRIANGLE;
     let is_text = bytes.starts_with(b"solid") && bytes.len() != length;
     if !is_text && (bytes.len() < HEADER || bytes.len() < length) {
-        return Err(format!("the .stl file is cut short: {told} triangles need {length} bytes, not {}", bytes.len()));
+        return Err(format!(
+            "the .stl file is cut short: {told} triangles need {length} bytes, not {}",
+            bytes.len()
+        ));
     }
     let mut copy = bytes.to_vec();
     if !is_text {
@@ -28,7 +31,8 @@ pub(super) fn parse(bytes: &[u8]) -> Result<PolygonMesh, String> {
     let mut mesh = PolygonMesh::default();
     let mut known: HashMap<[u32; 3], u32> = HashMap::new();
     for (number, triangle) in triangles.enumerate() {
-        let triangle = triangle.map_err(|error| format!("triangle {} cannot be read ({error})", number + 1))?;
+        let triangle =
+            triangle.map_err(|error| format!("triangle {} cannot be read ({error})", number + 1))?;
         let corners = triangle.vertices.map(|vertex| {
             // Adding zero makes -0 and 0 the same.
             let place = vertex.0.map(|value| value + 0.0);

@@ -86,7 +86,12 @@ impl Units {
 
 /// A stage with the shot's volumes, and the objects' meshes under value clips when `clips` gives the pattern of
 /// their files and the names of their prims.
-pub fn stage(comment: &str, time: StageTime, volumes: &[VolumeFiles], clips: Option<(&Clips, &[String])>) -> String {
+pub fn stage(
+    comment: &str,
+    time: StageTime,
+    volumes: &[VolumeFiles],
+    clips: Option<(&Clips, &[String])>,
+) -> String {
     let mut out = String::new();
     let StageTime { first, last, fps } = time;
     let _ = write!(
@@ -96,7 +101,10 @@ pub fn stage(comment: &str, time: StageTime, volumes: &[VolumeFiles], clips: Opt
         quoted(comment),
         Units::OWN.head()
     );
-    volumes.iter().filter(|volume| !volume.files.is_empty()).for_each(|volume| write_volume(&mut out, volume));
+    volumes
+        .iter()
+        .filter(|volume| !volume.files.is_empty())
+        .for_each(|volume| write_volume(&mut out, volume));
     if let Some((clips, names)) = clips {
         write_clips(&mut out, clips, names);
     }
@@ -137,7 +145,8 @@ fn write_clips(out: &mut String, clips: &Clips, names: &[String]) {
     let file = |frame: &i32| asset(&format!("./{kind}/{kind}.{frame:04}.usda"));
     let files: Vec<String> = clips.frames.iter().map(file).collect();
     let pairs = |pair: &dyn Fn(usize, i32) -> String| {
-        let pairs: Vec<String> = clips.frames.iter().enumerate().map(|(clip, frame)| pair(clip, *frame)).collect();
+        let pairs: Vec<String> =
+            clips.frames.iter().enumerate().map(|(clip, frame)| pair(clip, *frame)).collect();
         pairs.join(", ")
     };
     let _ = write!(

@@ -123,7 +123,11 @@ fn record_path(folder: &Path) -> PathBuf {
 
 fn make_folders(scene: &Scene, folder: &Path) -> Result<()> {
     let output = &scene.output;
-    let kinds = [("base", output.base), ("removed", output.removed), ("objects", output.objects_usd || output.objects_ply)];
+    let kinds = [
+        ("base", output.base),
+        ("removed", output.removed),
+        ("objects", output.objects_usd || output.objects_ply),
+    ];
     let wanted = kinds.iter().filter(|(_, written)| *written).map(|(name, _)| *name);
     for name in ["", "state", "report"].into_iter().chain(wanted) {
         let folder = folder.join(name);

@@ -20,7 +20,8 @@ impl Chain {
     /// A chain whose first link is for frame `first` and depends on `seed`.
     pub fn new(scene: &Scene, first: i32, seed: &str) -> Self {
         let moving = scene.objects.iter().filter(|object| object.role == Role::Collide);
-        let sequences = moving.filter_map(|object| Some((Pattern::parse(&object.file)?, object.offset))).collect();
+        let sequences =
+            moving.filter_map(|object| Some((Pattern::parse(&object.file)?, object.offset))).collect();
         let mut start = Hasher::default();
         start.add_text(seed).add(&first.to_le_bytes());
         Self { first, links: vec![start.finish()], sequences, contents: HashMap::new() }

@@ -122,7 +122,8 @@ fn extents(ctx: &Context, scene: &Scene, body: &Body) -> Result<Vec<Extent>> {
             let start = (DVec3::repeat(f64::INFINITY), DVec3::repeat(f64::NEG_INFINITY));
             let (low, high) = pose.iter().fold(start, |(low, high), p| (low.inf(p), high.sup(p)));
             let pairs = pose.iter().zip(&before);
-            let moved = pairs.map(|(p, q): (&DVec3, &DVec3)| (p - q).norm_squared()).fold(0.0, f64::max).sqrt();
+            let moved =
+                pairs.map(|(p, q): (&DVec3, &DVec3)| (p - q).norm_squared()).fold(0.0, f64::max).sqrt();
             out.push(Extent { frame, low, high, moved });
             std::mem::swap(&mut pose, &mut before);
         }
@@ -144,8 +145,10 @@ fn report(
     let name = format!("object {} ({})", index + 1, super::file::name(&object.file));
     let first = &extents[0];
     let size = first.high - first.low;
-    let (low, high) = extents.iter().fold((first.low, first.high), |(l, h), e| (l.inf(&e.low), h.sup(&e.high)));
-    let fastest = extents.iter().fold(first, |best, extent| if extent.moved > best.moved { extent } else { best });
+    let (low, high) =
+        extents.iter().fold((first.low, first.high), |(l, h), e| (l.inf(&e.low), h.sup(&e.high)));
+    let fastest =
+        extents.iter().fold(first, |best, extent| if extent.moved > best.moved { extent } else { best });
     let touching = |extent: &&Extent| match snow {
         Some(([x0, z0, x1, z1], top)) => {
             let beside = extent.high.x < x0 || extent.low.x > x1 || extent.high.z < z0 || extent.low.z > z1;
@@ -207,7 +210,8 @@ fn disk(scene: &Scene, inputs: &Inputs, columns: f64) -> u64 {
         (true, BaseMode::Delta) => whole,
     };
     let vertices: usize = inputs.bodies.iter().map(|body| body.motion().vertex_count()).sum();
-    let per_vertex = if output.objects_usd { USDA_PER_VERTEX } else { 0.0 } + if output.objects_ply { PLY_PER_VERTEX } else { 0.0 };
+    let per_vertex = if output.objects_usd { USDA_PER_VERTEX } else { 0.0 }
+        + if output.objects_ply { PLY_PER_VERTEX } else { 0.0 };
     let objects = vertices as f64 * per_vertex * frames;
     (base + objects + frames * BYTES_PER_CHANGE) as u64
 }

@@ -1,8 +1,8 @@
 //! Reads a scene file: keys to fields, defaults filled in, ranges checked.
 
-use super::table::{Document, Table};
 use super::objects::objects;
 use super::overrides::Override;
+use super::table::{Document, Table};
 use super::{BaseMode, Frames, Ground, Layer, Output, Scene, Shot, Snow};
 use crate::error::{Error, Result};
 use crate::io::mesh::EXTENSIONS;
@@ -121,7 +121,10 @@ fn layer(snow: &Table) -> Result<Layer> {
         (None, Some(top)) => match extension(&top).as_str() {
             "vdb" => Ok(Layer::Grid(top)),
             known if EXTENSIONS.contains(&known) => Ok(Layer::Top(top)),
-            _ => Err(snow.error("top", format!("must be a .vdb, .obj, .ply or .stl file, not \"{}\"", name(&top)))),
+            _ => {
+                Err(snow
+                    .error("top", format!("must be a .vdb, .obj, .ply or .stl file, not \"{}\"", name(&top))))
+            }
         },
         (Some(_), Some(_)) => Err(snow.error("top", "excludes `depth`: give one of them")),
         (None, None) => Err(snow.error("depth", "is missing (or `top`, a mesh or .vdb file)")),

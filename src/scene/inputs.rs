@@ -7,8 +7,8 @@ use super::{Ground, Layer, Object, Role, Scene};
 use crate::base::{DVec3, TriMesh};
 use crate::context::Context;
 use crate::error::{Error, Result};
-use crate::io::{hash, mesh};
 use crate::io::sequence::Pattern;
+use crate::io::{hash, mesh};
 use crate::motion::{Character, Key, Keys, MeshSequence, Motion, Placed, Play, Rigid};
 use crate::snow::base_layer::initial::{self, Cover};
 use crate::sweep::Body;
@@ -88,7 +88,8 @@ impl Inputs {
                 (None, _) => hash::of_file(&object.file)?,
                 (Some(pattern), Role::Static) => {
                     let at = f64::from(scene.shot.frames.first) - object.offset;
-                    let frames = [at.floor(), at.ceil()].map(|frame| hash::of_file(&pattern.path(frame as i32)));
+                    let frames =
+                        [at.floor(), at.ceil()].map(|frame| hash::of_file(&pattern.path(frame as i32)));
                     let [below, above] = frames;
                     below? + &above?
                 }

@@ -165,7 +165,15 @@ pub enum BaseMode {
 
 impl Default for Output {
     fn default() -> Self {
-        Self { base: true, base_mode: BaseMode::Full, half: false, removed: true, objects_usd: false, objects_ply: false, usd: true }
+        Self {
+            base: true,
+            base_mode: BaseMode::Full,
+            half: false,
+            removed: true,
+            objects_usd: false,
+            objects_ply: false,
+            usd: true,
+        }
     }
 }
 

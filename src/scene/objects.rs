@@ -72,4 +72,3 @@ fn keys(object: &Table) -> Result<Vec<Key>> {
     }
     Ok(keys)
 }
-

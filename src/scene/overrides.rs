@@ -42,7 +42,8 @@ impl Override {
             Ok(value) => moved(value.into_inner(), place),
             Err(_) => Spanned::new(place..place, DeValue::String(self.value.as_str().into())),
         };
-        let refused = |what: String| Error::argument(format!("{}: --set {}: {what}", path.display(), self.text));
+        let refused =
+            |what: String| Error::argument(format!("{}: --set {}: {what}", path.display(), self.text));
         let (last, parents) = self.key.split_last().expect("a setting has a key");
         let mut table = root;
         let mut parts = parents.iter();
@@ -55,7 +56,11 @@ impl Override {
                 DeValue::Array(items) => {
                     let number = parts.next().map_or("", String::as_str);
                     let count = items.len();
-                    let item = number.parse::<usize>().ok().and_then(|n| n.checked_sub(1)).and_then(|n| items.get_mut(n));
+                    let item = number
+                        .parse::<usize>()
+                        .ok()
+                        .and_then(|n| n.checked_sub(1))
+                        .and_then(|n| items.get_mut(n));
                     match item.map(Spanned::get_mut) {
                         Some(DeValue::Table(inner)) => inner,
                         _ => return Err(refused(format!("`{part}` needs a number from 1 to {count}"))),

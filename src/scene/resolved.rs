@@ -39,7 +39,12 @@ impl Scene {
             .filter(|(_, written)| *written)
             .map(|(kind, _)| kind)
             .collect();
-        line(out, "objects", &format!("{objects:?}"), "\"usd\", \"ply\": objects/, as they moved, with velocities")?;
+        line(
+            out,
+            "objects",
+            &format!("{objects:?}"),
+            "\"usd\", \"ply\": objects/, as they moved, with velocities",
+        )?;
         line(out, "usd", &output.usd.to_string(), "shot.usda: the whole shot for programs that read USD")
     }
 

@@ -77,11 +77,13 @@ mod tests {
     #[test]
     fn differences_are_named_with_the_former_value() {
         let settings = |text: &str| flattened(text).unwrap();
-        let before = settings("[snow]\ndepth = 0.3\ncell = 0.1\n[[object]]\nscale = 1.0\n[[object]]\nup = \"z\"\n");
+        let before =
+            settings("[snow]\ndepth = 0.3\ncell = 0.1\n[[object]]\nscale = 1.0\n[[object]]\nup = \"z\"\n");
         assert_eq!(changed(&before, &before), Vec::<String>::new());
         let after = settings("# Other words.\n[snow]\ndepth = 0.2\ncell = 0.1\n[[object]]\nscale = 1.0\n");
         assert_eq!(changed(&before, &after), ["object[2].up was \"z\"", "snow.depth was 0.3"]);
-        let file = |content: &str| BTreeMap::from([("object[1].file".to_string(), format!("{CONTENT}{content}"))]);
+        let file =
+            |content: &str| BTreeMap::from([("object[1].file".to_string(), format!("{CONTENT}{content}"))]);
         assert_eq!(changed(&file("a"), &file("b")), ["object[1].file had another content"]);
     }
 }

@@ -47,11 +47,15 @@ impl<'a> Run<'a> {
         from: Option<i32>,
     ) -> Result<Self> {
         let cache = Cache::open(scene, inputs, folder, from)?;
-        let (there, todo): (Vec<i32>, Vec<i32>) = frames.iter().partition(|frame| cache.stored.is_done(*frame));
+        let (there, todo): (Vec<i32>, Vec<i32>) =
+            frames.iter().partition(|frame| cache.stored.is_done(*frame));
         let delta = scene.output.base && scene.output.base_mode == BaseMode::Delta;
-        let gap = (scene.shot.frames.first..frames.last()).find(|f| !cache.stored.is_done(*f) && !frames.contains(*f));
+        let gap = (scene.shot.frames.first..frames.last())
+            .find(|f| !cache.stored.is_done(*f) && !frames.contains(*f));
         if let Some(gap) = gap.filter(|_| delta) {
-            let what = format!("base_mode = \"delta\" needs every frame, but frame {gap} is neither there nor asked for");
+            let what = format!(
+                "base_mode = \"delta\" needs every frame, but frame {gap} is neither there nor asked for"
+            );
             return Err(Error::file(folder, what));
         }
         let noise = Some(scene.snow.noise).filter(|noise| noise.amplitude > 0.0);
@@ -190,7 +194,10 @@ impl<'a> Run<'a> {
         let (frames, fps) = (self.scene.shot.frames, self.scene.shot.fps);
         let relative = |kind: &str| -> Vec<(i32, String)> {
             let files = self.cache.stored.files(kind).into_iter();
-            files.filter(|(frame, _)| frames.contains(*frame)).map(|(frame, path)| (frame, format!("./{path}"))).collect()
+            files
+                .filter(|(frame, _)| frames.contains(*frame))
+                .map(|(frame, path)| (frame, format!("./{path}")))
+                .collect()
         };
         let whole = self.scene.output.base_mode == BaseMode::Full;
         let base = if whole { relative("base") } else { Vec::new() };

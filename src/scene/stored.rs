@@ -123,11 +123,13 @@ impl Stored {
     /// # Errors
     /// A frame that is not there; a file that is not what was written.
     pub fn layer(&self, ctx: &Context, frame: i32) -> Result<Grids> {
-        let whole = (0..).map(|back| frame - back).find(|&f| {
-            self.done.get(&f).is_none_or(|manifest| manifest.keeps != Keeps::Changes)
-        });
+        let whole = (0..)
+            .map(|back| frame - back)
+            .find(|&f| self.done.get(&f).is_none_or(|manifest| manifest.keeps != Keeps::Changes));
         let whole = whole.filter(|whole| self.is_done(*whole));
-        let whole = whole.ok_or_else(|| Error::file(&self.folder, format!("frame {frame} cannot be had from its files")))?;
+        let whole = whole.ok_or_else(|| {
+            Error::file(&self.folder, format!("frame {frame} cannot be had from its files"))
+        })?;
         let mut grids = self.grids(whole)?;
         for later in whole + 1..=frame {
             self.follow(ctx, &mut grids, later)?;
@@ -150,7 +152,10 @@ impl Stored {
         let written = manifest.files_of("base").next().ok_or_else(missing)?;
         let path = self.folder.join(&written.path);
         if !written.is_whole(&self.folder) {
-            return Err(Error::file(path, "is not the file that was written: remove it, and it is made again"));
+            return Err(Error::file(
+                path,
+                "is not the file that was written: remove it, and it is made again",
+            ));
         }
         read_grids(&path)
     }

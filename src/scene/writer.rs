@@ -221,8 +221,10 @@ pub(super) fn object_names(scene: &Scene) -> Vec<String> {
     let mut names: Vec<String> = Vec::new();
     for object in scene.objects.iter().filter(|object| object.role == super::Role::Collide) {
         let stem = object.file.file_stem().unwrap_or_default().to_string_lossy().into_owned();
-        let stem = usd::prim_name(stem.split(['%', '#', '$']).next().unwrap_or("").trim_end_matches(['.', '_']));
-        let count = names.iter().filter(|name| **name == stem || name.starts_with(&format!("{stem}_"))).count();
+        let stem =
+            usd::prim_name(stem.split(['%', '#', '$']).next().unwrap_or("").trim_end_matches(['.', '_']));
+        let count =
+            names.iter().filter(|name| **name == stem || name.starts_with(&format!("{stem}_"))).count();
         names.push(if count == 0 { stem } else { format!("{stem}_{}", count + 1) });
     }
     names

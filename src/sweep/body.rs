@@ -51,7 +51,8 @@ impl Body {
         }
         let length = |&[i, j]: &[u32; 2]| (pose[i as usize] - pose[j as usize]).norm();
         let longest_edge = topology.edges.iter().map(length).fold(0.0, f64::max);
-        let contradictions = Topology::new(motion.triangles(), motion.vertex_count(), &same, false).contradictions();
+        let contradictions =
+            Topology::new(motion.triangles(), motion.vertex_count(), &same, false).contradictions();
         Ok(Self { motion, same, topology, longest_edge, contradictions, noise: true })
     }
 

@@ -59,7 +59,10 @@ pub fn walk_scene(folder: &Path, man: &Path, frames: i32, cell: f64, output: &st
         let angle = 2.0 * std::f64::consts::PI * f64::from(key) / 24.0;
         let (x, z) = (-1.83 * angle.cos(), 1.83 * angle.sin());
         let (frame, turn) = (1 + 10 * key, angle.to_degrees());
-        let _ = writeln!(text, "{{ frame = {frame}, at = [{x:.5}, 0.12, {z:.5}], turn_deg = [0, {turn:.3}, 0] }},");
+        let _ = writeln!(
+            text,
+            "{{ frame = {frame}, at = [{x:.5}, 0.12, {z:.5}], turn_deg = [0, {turn:.3}, 0] }},"
+        );
     }
     text.push_str("]\n");
     let path = folder.join("walk.toml");

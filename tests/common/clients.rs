@@ -45,6 +45,9 @@ pub fn usd_python() -> Option<PathBuf> {
 /// usd-core composes a shot.
 pub fn usd_composes(python: &Path, folder: &Path, first: i32, last: i32) -> Result<String, String> {
     let mut command = Command::new(python);
-    command.arg(root().join("tests/clients/stage.py")).arg(folder).args([first.to_string(), last.to_string()]);
+    command
+        .arg(root().join("tests/clients/stage.py"))
+        .arg(folder)
+        .args([first.to_string(), last.to_string()]);
     run(command)
 }

@@ -73,7 +73,11 @@ impl Clip {
         let ends = |pick: fn(&Channel) -> f64| channels.iter().map(pick);
         let start = ends(|c| c.times[0]).fold(f64::INFINITY, f64::min);
         let end = ends(|c| c.times[c.times.len() - 1]).fold(f64::NEG_INFINITY, f64::max);
-        if channels.is_empty() { Ok(Self { channels, start: 0.0, end: 0.0 }) } else { Ok(Self { channels, start, end }) }
+        if channels.is_empty() {
+            Ok(Self { channels, start: 0.0, end: 0.0 })
+        } else {
+            Ok(Self { channels, start, end })
+        }
     }
 
     /// Sets the places that the clip animates to those at a time of its own (s).

@@ -26,11 +26,14 @@ impl File {
     pub fn open(path: &Path) -> Result<Self> {
         let bytes = std::fs::read(path).map_err(|error| Error::io(path, "read", error))?;
         check_length(&bytes).map_err(|what| Error::file(path, what))?;
-        let (document, blob) = parse(&bytes)
-            .map_err(|error| Error::file(path, format!("not a whole glTF file ({error})")))?;
+        let (document, blob) =
+            parse(&bytes).map_err(|error| Error::file(path, format!("not a whole glTF file ({error})")))?;
         let known = ["KHR_mesh_quantization", "KHR_texture_transform", "KHR_materials_unlit"];
         if let Some(needed) = document.extensions_required().find(|name| !known.contains(name)) {
-            return Err(Error::file(path, format!("needs the glTF extension {needed}, which frazil does not read")));
+            return Err(Error::file(
+                path,
+                format!("needs the glTF extension {needed}, which frazil does not read"),
+            ));
         }
         let folder = path.parent().unwrap_or(Path::new("."));
         // Each by itself, so that the message can name the one at fault.
@@ -162,7 +165,8 @@ fn parse(bytes: &[u8]) -> std::result::Result<(Document, Option<Vec<u8>>), Strin
     let mut root = document.into_json();
     // The check below looks at the bounds of positions before it knows that they are there, and insists on them;
     // nothing here needs the bounds.
-    for attribute in root.meshes.iter().flat_map(|mesh| &mesh.primitives).flat_map(|p| p.attributes.values()) {
+    for attribute in root.meshes.iter().flat_map(|mesh| &mesh.primitives).flat_map(|p| p.attributes.values())
+    {
         let accessor = root.accessors.get_mut(attribute.value()).ok_or("an attribute names no accessor")?;
         accessor.min = Some(vec![0.0; 3].into());
         accessor.max = Some(vec![0.0; 3].into());

@@ -216,7 +216,8 @@ fn chosen(file: &File, nodes: &[Node], pattern: Option<&str>) -> std::result::Re
         None => nodes.iter().zip(&mut shown).for_each(|(node, shown)| *shown = node.parent.is_none()),
     }
     let roots = shown.clone();
-    let mut picked: Vec<bool> = nodes.iter().map(|node| pattern.is_none_or(|p| matches(p, &node.name))).collect();
+    let mut picked: Vec<bool> =
+        nodes.iter().map(|node| pattern.is_none_or(|p| matches(p, &node.name))).collect();
     let named = picked.clone();
     for index in 0..nodes.len() {
         let mut at = Some(index);
@@ -231,7 +232,9 @@ fn chosen(file: &File, nodes: &[Node], pattern: Option<&str>) -> std::result::Re
     if !meshes.iter().any(|&node| picked[node]) {
         let names = meshes.iter().map(|&node| nodes[node].name.as_str());
         return Err(match pattern {
-            Some(pattern) => format!("no node \"{pattern}\" has a mesh; those with one are {}", listed(names)),
+            Some(pattern) => {
+                format!("no node \"{pattern}\" has a mesh; those with one are {}", listed(names))
+            }
             None => "no node of its scene has a mesh".into(),
         });
     }
@@ -239,7 +242,8 @@ fn chosen(file: &File, nodes: &[Node], pattern: Option<&str>) -> std::result::Re
 }
 
 fn clip_names(file: &File) -> Vec<String> {
-    let name = |clip: gltf::Animation| clip.name().map_or_else(|| format!("clip {}", clip.index()), str::to_string);
+    let name =
+        |clip: gltf::Animation| clip.name().map_or_else(|| format!("clip {}", clip.index()), str::to_string);
     file.document.animations().map(name).collect()
 }
 

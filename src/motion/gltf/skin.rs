@@ -59,12 +59,18 @@ impl Vertices {
             let inverse_bind = match skin.inverse_bind_matrices() {
                 None => vec![Matrix4::identity(); joints.len()],
                 Some(accessor) => {
-                    let columns = |m: [f32; 16]| std::array::from_fn(|c| std::array::from_fn(|r| m[4 * c + r]));
+                    let columns =
+                        |m: [f32; 16]| std::array::from_fn(|c| std::array::from_fn(|r| m[4 * c + r]));
                     file.rows::<16>(&accessor)?.into_iter().map(|m| matrix4(&columns(m))).collect()
                 }
             };
             if inverse_bind.len() < joints.len() {
-                return Err(format!("skin {} has {} joints but {} matrices", skin.index(), joints.len(), inverse_bind.len()));
+                return Err(format!(
+                    "skin {} has {} joints but {} matrices",
+                    skin.index(),
+                    joints.len(),
+                    inverse_bind.len()
+                ));
             }
             out.skins.push(Skin { joints, inverse_bind });
         }
@@ -234,7 +240,8 @@ fn joints(
 }
 
 fn triangles(mode: Mode, corners: &[u32]) -> Vec<[u32; 3]> {
-    let strip = |(number, c): (usize, &[u32])| if number % 2 == 0 { [c[0], c[1], c[2]] } else { [c[1], c[0], c[2]] };
+    let strip =
+        |(number, c): (usize, &[u32])| if number % 2 == 0 { [c[0], c[1], c[2]] } else { [c[1], c[0], c[2]] };
     match mode {
         Mode::TriangleStrip => corners.windows(3).enumerate().map(strip).collect(),
         Mode::TriangleFan => corners.windows(2).skip(1).map(|c| [corners[0], c[0], c[1]]).collect(),

@@ -35,9 +35,7 @@ impl Default for Heights {
 impl Heights {
     /// Adds a block's snow.
     pub fn add(&mut self, values: &Values, cell: f32) {
-        for index in 0..VOXELS {
-            self.0[cell_of(index)] += filled(values[index], cell);
-        }
+        values.iter().enumerate().for_each(|(index, value)| self.0[cell_of(index)] += filled(*value, cell));
     }
 
     /// Adds a block that is all snow or none.
@@ -107,7 +105,10 @@ pub fn touched(initial: &FloatGrid, now: &FloatGrid, low: i32, high: i32) -> Res
         let differs: Vec<bool> = differs.collect();
         places.extend(origins.iter().zip(differs).filter(|(_, differs)| *differs).map(|(o, _)| [o[0], o[2]]));
     }
-    places.into_iter().map(|place| Ok((place, Column { original: heights(initial, place, low, high)? }))).collect()
+    places
+        .into_iter()
+        .map(|place| Ok((place, Column { original: heights(initial, place, low, high)? })))
+        .collect()
 }
 
 /// Volume of a level set's solid (m3): filled parts of cells, summed leaf by leaf in the tree's order.

@@ -62,9 +62,12 @@ impl Grids {
         let mut grids: Vec<Option<FloatGrid>> = grids.into_iter().map(Some).collect();
         let mut take = |name: &str| {
             let found = grids.iter_mut().find(|grid| grid.as_ref().is_some_and(|grid| grid.name() == name));
-            found.and_then(Option::take).ok_or_else(|| Error::argument(format!("there is no grid \"{name}\"")))
+            found
+                .and_then(Option::take)
+                .ok_or_else(|| Error::argument(format!("there is no grid \"{name}\"")))
         };
-        let all = Self { surface: take("surface")?, compression: take("compression")?, touched: take("touched")? };
+        let all =
+            Self { surface: take("surface")?, compression: take("compression")?, touched: take("touched")? };
         all.volume()?;
         Ok(all)
     }
@@ -112,9 +115,11 @@ impl Grids {
             let (constant, dense): (Vec<&BlockEdit>, Vec<&BlockEdit>) =
                 edits.iter().partition(|edit| matches!(edit, BlockEdit::Constant(..)));
             let as_leaf = |edit: &&BlockEdit| match edit {
-                BlockEdit::Constant(origin, value) => {
-                    BlockEdit::Dense(Block { origin: *origin, values: Box::new([*value; VOXELS]), mask: [0; 8] })
-                }
+                BlockEdit::Constant(origin, value) => BlockEdit::Dense(Block {
+                    origin: *origin,
+                    values: Box::new([*value; VOXELS]),
+                    mask: [0; 8],
+                }),
                 BlockEdit::Dense(block) => BlockEdit::Dense(block.clone()),
             };
             let leaves: Vec<BlockEdit> = constant.iter().chain(&dense).map(as_leaf).collect();

@@ -333,8 +333,11 @@ impl BaseLayer {
         edits: &[Edit],
         touched: &[BlockEdit],
     ) -> Result<Vec<BlockEdit>> {
-        let now: HashMap<Origin, (&Edit, &BlockEdit)> =
-            edits.iter().zip(touched).map(|(edit, touched)| (edit.surface.origin(), (edit, touched))).collect();
+        let now: HashMap<Origin, (&Edit, &BlockEdit)> = edits
+            .iter()
+            .zip(touched)
+            .map(|(edit, touched)| (edit.surface.origin(), (edit, touched)))
+            .collect();
         let places: BTreeSet<[i32; 2]> = now.keys().map(|origin| column_of(*origin)).collect();
         let cell = self.grids.surface.voxel_size() as f32;
         let levels = columns::levels(self.low[1], self.high[1]);
