@@ -12,13 +12,15 @@ mod scenes;
 #[allow(dead_code)]
 mod speed;
 
+use common::character::{data, walk_scene};
 use frazil::Context;
-use frazil::snow::base_layer::BaseLayer;
+use frazil::scene::{Inputs, Scene};
+use frazil::snow::base_layer::{BaseLayer, Params};
 use frazil::sweep::Body;
 use harness::{median, timed};
 use scenes::context;
 
-type Scene = fn(&Context, f64) -> (BaseLayer, Body);
+type Make = fn(&Context, f64) -> (BaseLayer, Body);
 
 fn main() {
     let cores = std::thread::available_parallelism().map_or(1, usize::from);
@@ -30,7 +32,7 @@ fn main() {
     );
     println!("| scene | thesis | stock, {cores} threads | frazil, 1 thread | frazil, {cores} threads |");
     println!("|---|---|---|---|---|");
-    let scenes: [(&str, &str, Scene, f64); 3] = [
+    let scenes: [(&str, &str, Make, f64); 3] = [
         ("0.4 m object, 2 x 2 m, 5 mm", "1.68-1.84", scenes::small, 2.0),
         ("1.7 m body, 6 x 6 m, 7.5 mm", "3.15-4.59", scenes::large, 6.0),
         ("1.7 m body, 20 x 20 m, 7.5 mm", "-", scenes::large, 20.0),
@@ -46,5 +48,51 @@ fn main() {
         let (stock, _) = timed(|| speed::stock(&ctx, &body, &base));
         drop(base);
         println!("| {name} | {thesis} | {stock:.2} | {:.3} | {:.3} |", run(1), run(cores));
+    }
+    walk(cores);
+}
+
+/// CesiumMan walks over 6 x 6 m for 240 frames, 7.5 mm: steps alone, and the program with its files.
+fn walk(cores: usize) {
+    let Some(man) = data("character/CesiumMan.glb") else {
+        return println!("\nThe walk of a character is skipped: no data.");
+    };
+    let folder = tempfile::tempdir().expect("a folder");
+    println!(
+        "\nA character walks, 6 x 6 m, 7.5 mm, 240 frames: seconds a frame (average, worst), then of the whole pass with files.\n"
+    );
+    println!("| | thesis | frazil, 1 thread | frazil, {cores} threads |");
+    println!("|---|---|---|---|");
+    let steps = |threads: usize| {
+        let ctx = context(threads);
+        let scene = Scene::read(&walk_scene(folder.path(), &man, 240, 0.0075, "")).expect("a scene");
+        let inputs = Inputs::load(&scene).expect("inputs");
+        let layer = inputs.layer(&ctx, scene.snow.cell).expect("a layer");
+        let mut base = BaseLayer::new(&ctx, layer, Params::for_cell(scene.snow.cell)).expect("a layer");
+        let at = |frame: i32| f64::from(frame) / 24.0;
+        let step =
+            |frame: i32| timed(|| drop(base.step(&ctx, &inputs.bodies, at(frame - 1), at(frame), frame))).0;
+        let times: Vec<f64> = (2..=240).map(step).collect();
+        let (sum, worst) =
+            times.iter().fold((0.0, 0.0f64), |(sum, worst), time| (sum + time, worst.max(*time)));
+        format!("{:.3}, {worst:.3}", sum / times.len() as f64)
+    };
+    println!("| a step | 3.15, 4.59 | {} | {} |", steps(1), steps(cores));
+    for mode in ["full", "delta"] {
+        let pass = |threads: usize| {
+            let output = format!("base_mode = \"{mode}\"");
+            let scene = walk_scene(folder.path(), &man, 240, 0.0075, &output);
+            let out = folder.path().join(format!("{mode}{threads}"));
+            let mut command = std::process::Command::new(env!("CARGO_BIN_EXE_frazil"));
+            command.arg("snow").arg(scene).arg("-o").arg(&out).args([
+                "-q",
+                "--threads",
+                &threads.to_string(),
+            ]);
+            let (seconds, _) = timed(|| assert!(command.status().expect("frazil").success()));
+            std::fs::remove_dir_all(out).expect("the output");
+            seconds
+        };
+        println!("| the pass, {mode} | 756 | {:.1} | {:.1} |", pass(1), pass(cores));
     }
 }

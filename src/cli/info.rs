@@ -2,7 +2,7 @@
 
 use std::path::{Path, PathBuf};
 
-use frazil::motion::{Character, Motion, Play};
+use frazil::motion::Character;
 use frazil::vdb::{MetaValue, file, level_set};
 use frazil::{Context, io};
 use serde_json::{Map, Value, json};
@@ -97,21 +97,18 @@ fn mesh(path: &Path) -> frazil::Result<Vec<Value>> {
 
 fn character(path: &Path) -> frazil::Result<Vec<Value>> {
     let contents = Character::describe(path)?;
-    let rest = Character::open(path, Play { clip: Some(String::new()), ..Play::default() })?;
-    let mut pose = Vec::new();
-    rest.pose(0.0, &mut pose)?;
-    let first = (pose[0], pose[0]);
-    let (low, high) = pose.iter().fold(first, |(low, high), p| (low.inf(p), high.sup(p)));
+    let rest = Character::at_rest(path)?;
+    let bounds = rest.bounds().map(|(low, high)| (<[f32; 3]>::from(low), <[f32; 3]>::from(high)));
     let mut clips = Map::new();
     contents.clips.into_iter().for_each(|(name, seconds)| {
         clips.insert(name, json!(seconds));
     });
     Ok(vec![json!({
         "type": "character",
-        "vertices": rest.vertex_count(),
-        "triangles": rest.triangles().len(),
+        "vertices": rest.positions.len(),
+        "triangles": rest.triangles.len(),
         "skins": contents.skins,
-        "bounds_m": (<[f64; 3]>::from(low), <[f64; 3]>::from(high)),
+        "bounds": bounds,
         "clips_s": clips,
         "nodes": contents.mesh_nodes,
     })])

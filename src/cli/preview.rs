@@ -3,6 +3,7 @@
 use std::path::{Path, PathBuf};
 
 use frazil::base::DVec3;
+use frazil::motion::Character;
 use frazil::render::{Camera, Light, Model, Size, Stage};
 use frazil::vdb::file;
 use frazil::{Context, io};
@@ -17,7 +18,7 @@ use super::{options, output};
     after_help = "Example:\n  frazil preview cache/base/base.0048.vdb boot.obj -o print.png --eye 1,1.5,2 --target 0,0,1"
 )]
 pub struct Args {
-    /// .vdb (its first level set), .obj, .ply or .stl files.
+    /// .vdb (its first level set), a mesh or a character at rest.
     #[arg(required = true)]
     files: Vec<PathBuf>,
     /// The picture.
@@ -77,9 +78,11 @@ pub fn run(args: Args, session: &Session) -> Result<(), Failure> {
 }
 
 fn model(path: &Path, ctx: &Context) -> frazil::Result<Model> {
-    let is_vdb = path.extension().is_some_and(|extension| extension.eq_ignore_ascii_case("vdb"));
-    if is_vdb {
-        return Model::level_set(ctx, &file::read_named(path, None)?);
-    }
-    Ok(Model::mesh(&io::mesh::read(path)?, [0.35, 0.16, 0.08]))
+    let extension = path.extension().unwrap_or_default().to_string_lossy().to_lowercase();
+    let mesh = match extension.as_str() {
+        "vdb" => return Model::level_set(ctx, &file::read_named(path, None)?),
+        "glb" | "gltf" => Character::at_rest(path)?,
+        _ => io::mesh::read(path)?,
+    };
+    Ok(Model::mesh(&mesh, [0.35, 0.16, 0.08]))
 }

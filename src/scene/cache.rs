@@ -8,7 +8,7 @@ use serde::{Deserialize, Serialize};
 use super::chain::Chain;
 use super::settings::{self, Settings};
 use super::stored::{STAGE, Stored};
-use super::{Inputs, Scene};
+use super::{BaseMode, FrameChoice, Inputs, Scene};
 use crate::error::{Error, Result};
 use crate::io::hash::Hasher;
 use crate::io::manifest::Manifest;
@@ -43,8 +43,14 @@ impl Cache {
     ///
     /// # Errors
     /// A folder that cannot be made or written, that another run writes into, or that holds frames of other settings or
-    /// inputs; a record that is damaged; no frame to go on from.
-    pub fn open(scene: &Scene, inputs: &Inputs, folder: &Path, from: Option<i32>) -> Result<Self> {
+    /// inputs; a record that is damaged; no frame to go on from; frames that would leave a gap in a cache of changes.
+    pub fn open(
+        scene: &Scene,
+        inputs: &Inputs,
+        folder: &Path,
+        frames: &FrameChoice,
+        from: Option<i32>,
+    ) -> Result<Self> {
         let settings = settings::of_base(scene, inputs)?;
         make_folders(scene, folder)?;
         let lock = lock(folder)?;
@@ -52,6 +58,9 @@ impl Cache {
         let first = scene.shot.frames.first;
         let mut record: Record = sealed::read(&record_path(folder))?.unwrap_or_default();
         let mut stored = Stored::read(folder)?;
+        refuse_gaps(scene, frames, folder, |frame| {
+            stored.is_done(frame) && from.is_none_or(|from| frame < from)
+        })?;
         match from {
             Some(from) if from > first => {
                 if !stored.is_done(from - 1) {
@@ -114,6 +123,28 @@ impl Cache {
     /// A file of a sequence that cannot be read.
     pub fn inputs(&mut self, frame: i32) -> Result<String> {
         Ok(self.chain.at(frame)?.to_string())
+    }
+}
+
+/// Refuses frames that are asked for when changes could not be followed up to them.
+fn refuse_gaps(
+    scene: &Scene,
+    frames: &FrameChoice,
+    folder: &Path,
+    is_there: impl Fn(i32) -> bool,
+) -> Result<()> {
+    if !scene.output.base || scene.output.base_mode == BaseMode::Full {
+        return Ok(());
+    }
+    let mut before = scene.shot.frames.first..frames.last();
+    match before.find(|frame| !is_there(*frame) && !frames.contains(*frame)) {
+        None => Ok(()),
+        Some(gap) => Err(Error::file(
+            folder,
+            format!(
+                "base_mode = \"delta\" needs every frame, but frame {gap} is neither there nor asked for"
+            ),
+        )),
     }
 }
 

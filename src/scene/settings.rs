@@ -24,6 +24,8 @@ pub(super) fn of_base(scene: &Scene, inputs: &Inputs) -> Result<Settings> {
     let mut settings = flattened(&scene.to_toml()).ok_or_else(unreadable)?;
     settings.insert("shot.frames".into(), scene.shot.frames.first.to_string());
     settings.remove("output.usd");
+    // Another version may compute another layer.
+    settings.insert("frazil".into(), env!("CARGO_PKG_VERSION").into());
     for (key, content) in inputs.contents(scene)? {
         settings.insert(key, format!("{CONTENT}{content}"));
     }

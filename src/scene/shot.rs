@@ -46,18 +46,9 @@ impl<'a> Run<'a> {
         frames: &FrameChoice,
         from: Option<i32>,
     ) -> Result<Self> {
-        let cache = Cache::open(scene, inputs, folder, from)?;
+        let cache = Cache::open(scene, inputs, folder, frames, from)?;
         let (there, todo): (Vec<i32>, Vec<i32>) =
             frames.iter().partition(|frame| cache.stored.is_done(*frame));
-        let delta = scene.output.base && scene.output.base_mode == BaseMode::Delta;
-        let gap = (scene.shot.frames.first..frames.last())
-            .find(|f| !cache.stored.is_done(*f) && !frames.contains(*f));
-        if let Some(gap) = gap.filter(|_| delta) {
-            let what = format!(
-                "base_mode = \"delta\" needs every frame, but frame {gap} is neither there nor asked for"
-            );
-            return Err(Error::file(folder, what));
-        }
         let noise = Some(scene.snow.noise).filter(|noise| noise.amplitude > 0.0);
         let params = Params { noise, tolerance: 0.02 };
         let mut run = Self { scene, inputs, cache, todo, there: there.len(), params, start: None };

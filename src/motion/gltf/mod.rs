@@ -11,7 +11,7 @@ mod skin;
 use std::path::Path;
 
 use super::Motion;
-use crate::base::DVec3;
+use crate::base::{DVec3, TriMesh};
 use crate::error::{Error, Result};
 use clip::{Clip, JUMP};
 use file::File;
@@ -119,6 +119,20 @@ impl Character {
             clips: clips.collect::<Result<_>>()?,
             mesh_nodes: meshes.map(|node| nodes[node.index()].name.clone()).collect(),
             skins: file.document.skins().count(),
+        })
+    }
+
+    /// The meshes of a file in their pose at rest (the file's unit).
+    ///
+    /// # Errors
+    /// As [`Character::open`].
+    pub fn at_rest(path: &Path) -> Result<TriMesh> {
+        let rest = Self::open(path, Play { clip: Some(String::new()), ..Play::default() })?;
+        let mut pose = Vec::new();
+        rest.pose_at_own(0.0, &mut pose);
+        Ok(TriMesh {
+            positions: pose.iter().map(|place| place.cast()).collect(),
+            triangles: rest.vertices.triangles,
         })
     }
 
