@@ -175,7 +175,7 @@ fn missing_files_other_formats_and_folders_are_refused() {
     assert!(missing.contains("no/such/body.obj"), "{missing}");
     refusal("scene.fbx", b"x");
     let cube = cuboid([1.0; 3]);
-    assert!(mesh::write(Path::new("cube.stl"), &cube).is_err());
+    assert!(mesh::write(Path::new("cube.fbx"), &cube).is_err());
     assert!(mesh::write(Path::new("no/such/cube.ply"), &cube).is_err());
 }
 
