@@ -3,13 +3,16 @@
 #[path = "common/hero.rs"]
 #[allow(dead_code)]
 mod hero;
+#[path = "common/program.rs"]
+#[allow(dead_code)]
+mod program;
 
 use assert_cmd::Command;
 use std::fs;
 use std::path::Path;
 
-const CUBE: &str = "v -.2 0 -.2\nv .2 0 -.2\nv .2 .4 -.2\nv -.2 .4 -.2\nv -.2 0 .2\nv .2 0 .2\nv .2 .4 .2\nv -.2 .4 .2\n\
-f 1 4 3 2\nf 5 6 7 8\nf 1 2 6 5\nf 3 4 8 7\nf 1 5 8 4\nf 2 3 7 6\n";
+use program::CUBE;
+
 const README: &str = include_str!("../README.md");
 const CLI: &str = include_str!("../docs/cli.md");
 

@@ -1,15 +1,17 @@
 //! Full disks, forbidden folders, too little memory, damaged files, signals: one sentence, the right exit
 //! code, whole frames only.
 
+#[path = "common/program.rs"]
+#[allow(dead_code)]
+mod program;
+
 use assert_cmd::Command;
+use program::{CUBE, frazil, told};
 use std::fs;
 use std::path::Path;
 use std::process::{Output, Stdio};
 use std::time::{Duration, Instant};
 use tempfile::TempDir;
-
-const CUBE: &str = "v -.2 0 -.2\nv .2 0 -.2\nv .2 .4 -.2\nv -.2 .4 -.2\nv -.2 0 .2\nv .2 0 .2\nv .2 .4 .2\nv -.2 .4 .2\n\
-f 1 4 3 2\nf 5 6 7 8\nf 1 2 6 5\nf 3 4 8 7\nf 1 5 8 4\nf 2 3 7 6\n";
 
 fn scene(frames: u32, cell: f64, file: &str) -> String {
     format!(
@@ -23,20 +25,6 @@ fn folder() -> TempDir {
     fs::write(folder.path().join("cube.obj"), CUBE).unwrap();
     fs::write(folder.path().join("shot.toml"), scene(2, 0.05, "cube.obj")).unwrap();
     folder
-}
-
-fn frazil(folder: &Path, arguments: &str) -> Output {
-    let mut command = Command::cargo_bin("frazil").unwrap();
-    command.current_dir(folder).args(arguments.split_whitespace()).output().unwrap()
-}
-
-#[track_caller]
-fn fails(output: &Output, code: i32, words: &[&str]) {
-    let stderr = String::from_utf8_lossy(&output.stderr);
-    assert_eq!(output.status.code(), Some(code), "{stderr}");
-    let sentences: Vec<&str> = stderr.lines().filter(|line| line.starts_with("frazil: ")).collect();
-    assert_eq!(sentences.len(), 1, "{stderr}");
-    words.iter().for_each(|word| assert!(sentences[0].contains(word), "no {word:?} in {stderr}"));
 }
 
 /// Files that were begun and not finished.
@@ -59,7 +47,7 @@ fn a_missing_frame_of_a_sequence_is_named_before_the_first_frame() {
         fs::write(folder.path().join(format!("cube.{frame:04}.obj")), CUBE).unwrap();
     }
     fs::write(folder.path().join("shot.toml"), scene(4, 0.05, "cube.%04d.obj")).unwrap();
-    fails(&frazil(folder.path(), "snow shot.toml -o out"), 2, &["cube.0003.obj", "missing"]);
+    told(&frazil(folder.path(), "snow shot.toml -o out"), 2, &["cube.0003.obj", "missing"]);
     assert!(!folder.path().join("out").exists());
 }
 
@@ -68,11 +56,11 @@ fn a_cell_too_small_for_the_memory_is_refused_before_it_is_taken() {
     let folder = folder();
     fs::write(folder.path().join("shot.toml"), scene(2, 0.00002, "cube.obj")).unwrap();
     let start = Instant::now();
-    fails(&frazil(folder.path(), "snow shot.toml -o out"), 2, &["cell", "MB"]);
-    fails(&frazil(folder.path(), "vdb from-mesh cube.obj --cell 0.00001 -o out.vdb"), 2, &["--cell", "MB"]);
+    told(&frazil(folder.path(), "snow shot.toml -o out"), 2, &["cell", "MB"]);
+    told(&frazil(folder.path(), "vdb from-mesh cube.obj --cell 0.00001 -o out.vdb"), 2, &["--cell", "MB"]);
     assert!(start.elapsed() < Duration::from_secs(5));
     let output = frazil(folder.path(), "vdb from-mesh cube.obj --cell 0.01 -o out.vdb --max-memory 100K");
-    fails(&output, 2, &["--cell"]);
+    told(&output, 2, &["--cell"]);
 }
 
 #[test]
@@ -80,10 +68,10 @@ fn a_folder_that_cannot_be_written_is_refused_before_the_first_frame() {
     let folder = folder();
     fs::write(folder.path().join("file"), "").unwrap();
     for out in ["file", "file/out", "/proc/out"] {
-        fails(&frazil(folder.path(), &format!("snow shot.toml -o {out}")), 2, &[out]);
+        told(&frazil(folder.path(), &format!("snow shot.toml -o {out}")), 2, &[out]);
     }
     for out in ["file/out.vdb", "/proc/out.vdb", "none/out.vdb"] {
-        fails(&frazil(folder.path(), &format!("vdb from-mesh cube.obj --cell 0.05 -o {out}")), 2, &[out]);
+        told(&frazil(folder.path(), &format!("vdb from-mesh cube.obj --cell 0.05 -o {out}")), 2, &[out]);
     }
 }
 
@@ -95,10 +83,10 @@ fn damaged_and_foreign_vdb_files_are_named() {
     let whole = fs::read(folder.path().join("cube.vdb")).unwrap();
     for part in 1..20 {
         fs::write(folder.path().join("cut.vdb"), &whole[..whole.len() * part / 20]).unwrap();
-        fails(&frazil(folder.path(), "vdb to-mesh cut.vdb -o cut.ply"), 2, &["cut.vdb"]);
+        told(&frazil(folder.path(), "vdb to-mesh cut.vdb -o cut.ply"), 2, &["cut.vdb"]);
     }
     fs::write(folder.path().join("text.vdb"), CUBE).unwrap();
-    fails(&frazil(folder.path(), "vdb to-mesh text.vdb -o cut.ply"), 2, &["text.vdb", "not a .vdb file"]);
+    told(&frazil(folder.path(), "vdb to-mesh text.vdb -o cut.ply"), 2, &["text.vdb", "not a .vdb file"]);
     assert!(!folder.path().join("cut.ply").exists());
     assert_eq!(begun(folder.path()), Vec::<String>::new());
 }
@@ -114,7 +102,7 @@ fn a_grid_of_another_type_is_named_with_its_type() {
         eprintln!("skipped: no pyopenvdb");
         return;
     }
-    fails(&frazil(folder.path(), "vdb to-mesh mask.vdb -o out.ply"), 2, &["mask.vdb", "\"mask\"", "bool"]);
+    told(&frazil(folder.path(), "vdb to-mesh mask.vdb -o out.ply"), 2, &["mask.vdb", "\"mask\"", "bool"]);
     assert!(frazil(folder.path(), "info mask.vdb").status.success());
 }
 
@@ -131,11 +119,11 @@ fn a_full_disk_ends_the_run_with_nothing_half_written() {
     let folder = folder();
     fs::write(folder.path().join("shot.toml"), scene(3, 0.01, "cube.obj")).unwrap();
     let output = with_file_limit(folder.path(), 16, "snow shot.toml -o out -q");
-    fails(&output, 1, &["cannot write"]);
+    told(&output, 1, &["cannot write"]);
     let made = frazil(folder.path(), "vdb from-mesh cube.obj --cell 0.005 -o whole.vdb");
     assert!(made.status.success());
     let output = with_file_limit(folder.path(), 16, "vdb from-mesh cube.obj --cell 0.005 -o out.vdb");
-    fails(&output, 1, &["out.vdb", "cannot write"]);
+    told(&output, 1, &["out.vdb", "cannot write"]);
     assert!(!folder.path().join("out.vdb").exists());
     assert_eq!(begun(folder.path()), Vec::<String>::new());
 }
@@ -157,7 +145,7 @@ fn a_signal_leaves_whole_frames_and_its_exit_code() {
         let kill = std::process::Command::new("kill").args(["-s", signal, &child.id().to_string()]).status();
         assert!(kill.unwrap().success());
         let asked = Instant::now();
-        fails(&child.wait_with_output().unwrap(), code, &["frazil: "]);
+        told(&child.wait_with_output().unwrap(), code, &["frazil: "]);
         assert!(asked.elapsed() < Duration::from_secs(5), "it went on for {:?}", asked.elapsed());
         assert_eq!(begun(folder.path()), Vec::<String>::new());
         assert!(frazil(folder.path(), "info out/base/base.0002.vdb").status.success());

@@ -1,12 +1,14 @@
 //! What works, what a stopped run leaves, and what a full disk does.
 
-use assert_cmd::Command;
+#[path = "common/program.rs"]
+#[allow(dead_code)]
+mod program;
+
 use std::fs;
 use std::path::Path;
-use tempfile::TempDir;
 
-const CUBE: &str = "v -.2 0 -.2\nv .2 0 -.2\nv .2 .4 -.2\nv -.2 .4 -.2\nv -.2 0 .2\nv .2 0 .2\nv .2 .4 .2\nv -.2 .4 .2\n\
-f 1 4 3 2\nf 5 6 7 8\nf 1 2 6 5\nf 3 4 8 7\nf 1 5 8 4\nf 2 3 7 6\n";
+use program::{CUBE, frazil, works};
+use tempfile::TempDir;
 
 /// A folder with a cube that slides through snow for so many frames.
 fn folder(frames: u32, cell: f64, mesh: &str) -> TempDir {
@@ -19,19 +21,6 @@ fn folder(frames: u32, cell: f64, mesh: &str) -> TempDir {
     );
     fs::write(folder.path().join("shot.toml"), scene).unwrap();
     folder
-}
-
-fn frazil(folder: &Path, arguments: &str) -> std::process::Output {
-    let mut command = Command::cargo_bin("frazil").unwrap();
-    command.current_dir(folder).args(arguments.split_whitespace()).output().unwrap()
-}
-
-#[track_caller]
-fn works(folder: &Path, arguments: &str) -> String {
-    let output = frazil(folder, arguments);
-    let stderr = String::from_utf8(output.stderr).unwrap();
-    assert!(output.status.success(), "{arguments}: {stderr}");
-    String::from_utf8(output.stdout).unwrap() + &stderr
 }
 
 fn removed(folder: &Path, frame: u32) -> f64 {

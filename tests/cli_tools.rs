@@ -3,39 +3,25 @@
 #[path = "common/character.rs"]
 #[allow(dead_code)]
 mod character;
+#[path = "common/program.rs"]
+#[allow(dead_code)]
+mod program;
 #[path = "common/shapes.rs"]
 #[allow(dead_code)]
 mod shapes;
 
 use std::fs;
 use std::path::Path;
-use std::process::{Command, Output};
 
 use frazil::base::TriMesh;
 use frazil::io::mesh;
+use program::works;
 use serde_json::Value;
 use tempfile::TempDir;
 
-fn frazil(folder: &Path, arguments: &str) -> Output {
-    let mut command = Command::new(env!("CARGO_BIN_EXE_frazil"));
-    command.current_dir(folder).args(arguments.split_whitespace()).output().unwrap()
-}
-
-#[track_caller]
-fn works(folder: &Path, arguments: &str) -> String {
-    let output = frazil(folder, arguments);
-    let stderr = String::from_utf8(output.stderr).unwrap();
-    assert!(output.status.success(), "{arguments}: {stderr}");
-    String::from_utf8(output.stdout).unwrap() + &stderr
-}
-
 #[track_caller]
 fn fails(folder: &Path, arguments: &str, words: &[&str]) {
-    let output = frazil(folder, arguments);
-    let stderr = String::from_utf8_lossy(&output.stderr);
-    assert_eq!(output.status.code(), Some(2), "{stderr}");
-    assert_eq!(stderr.lines().count(), 1, "{stderr}");
-    words.iter().for_each(|word| assert!(stderr.contains(word), "no {word:?} in {stderr}"));
+    program::fails(folder, arguments, 2, words);
 }
 
 /// A folder with a box of 0.4 m and a scene in which it crosses the snow.

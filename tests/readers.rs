@@ -1,16 +1,19 @@
 //! Programs and libraries that nobody here wrote read what the command writes: they see the same grids.
 
+#[path = "common/program.rs"]
+#[allow(dead_code)]
+mod program;
+
 use std::fs::File;
 use std::io::BufReader;
 use std::path::Path;
 use std::process::Command;
 
+use program::CUBE;
 use serde_json::Value;
 use tempfile::TempDir;
 use vdb_rs::{Map, MetadataValue, VdbReader};
 
-const CUBE: &str = "v -.2 0 -.2\nv .2 0 -.2\nv .2 .4 -.2\nv -.2 .4 -.2\nv -.2 0 .2\nv .2 0 .2\nv .2 .4 .2\nv -.2 .4 .2\n\
-f 1 4 3 2\nf 5 6 7 8\nf 1 2 6 5\nf 3 4 8 7\nf 1 5 8 4\nf 2 3 7 6\n";
 const SCENE: &str = "[shot]\nframes = \"1-3\"\n[snow]\nground = 0.0\narea = [-0.5, -0.5, 0.5, 1.5]\ndepth = 0.3\n\
 cell = 0.02\n[[object]]\nfile = \"cube.obj\"\nkeys = [{ frame = 1, at = [0, 0.1, 0] }, { frame = 3, at = [0, 0.1, 0.9] }]\n";
 

@@ -3,18 +3,19 @@
 #[path = "common/character.rs"]
 #[allow(dead_code)]
 mod character;
+#[path = "common/program.rs"]
+#[allow(dead_code)]
+mod program;
 
 use std::collections::BTreeMap;
 use std::fs;
 use std::path::Path;
-use std::process::{Command, Output, Stdio};
+use std::process::{Command, Stdio};
 use std::time::Duration;
 
 use character::output;
+use program::{CUBE, command, fails, works};
 use tempfile::TempDir;
-
-const CUBE: &str = "v -.2 0 -.2\nv .2 0 -.2\nv .2 .4 -.2\nv -.2 .4 -.2\nv -.2 0 .2\nv .2 0 .2\nv .2 .4 .2\nv -.2 .4 .2\n\
-f 1 4 3 2\nf 5 6 7 8\nf 1 2 6 5\nf 3 4 8 7\nf 1 5 8 4\nf 2 3 7 6\n";
 
 /// A folder with a cube that slides through snow for so many frames; `output` stands in the scene's table.
 fn folder(frames: i32, cell: f64, output: &str) -> TempDir {
@@ -31,35 +32,6 @@ fn write_scene(folder: &Path, frames: i32, cell: f64, output: &str) {
          {{ frame = 12, at = [0, 0.1, 0.9], turn_deg = [0, 40, 0] }}]\n"
     );
     fs::write(folder.join("shot.toml"), scene).unwrap();
-}
-
-fn command(folder: &Path, arguments: &str) -> Command {
-    let mut command = Command::new(env!("CARGO_BIN_EXE_frazil"));
-    command.current_dir(folder).args(arguments.split_whitespace());
-    command
-}
-
-fn frazil(folder: &Path, arguments: &str) -> Output {
-    command(folder, arguments).output().unwrap()
-}
-
-#[track_caller]
-fn works(folder: &Path, arguments: &str) -> String {
-    let output = frazil(folder, arguments);
-    let stderr = String::from_utf8(output.stderr).unwrap();
-    assert!(output.status.success(), "{arguments}: {stderr}");
-    String::from_utf8(output.stdout).unwrap() + &stderr
-}
-
-/// One sentence on stderr, this exit code, these words in it.
-#[track_caller]
-fn fails(folder: &Path, arguments: &str, code: i32, words: &[&str]) {
-    let output = frazil(folder, arguments);
-    let stderr = String::from_utf8_lossy(&output.stderr);
-    assert_eq!(output.status.code(), Some(code), "{stderr}");
-    let sentences = stderr.lines().filter(|line| line.starts_with("frazil: ")).count();
-    assert_eq!(sentences, 1, "{stderr}");
-    words.iter().for_each(|word| assert!(stderr.contains(word), "no {word:?} in {stderr}"));
 }
 
 /// Names of the files that are not the same in two outputs.

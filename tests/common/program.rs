@@ -1,0 +1,48 @@
+//! The program as a user runs it.
+
+use std::path::Path;
+use std::process::{Command, Output};
+
+/// A cube of 0.4 m that stands on the ground, as an .obj file.
+pub const CUBE: &str = "v -.2 0 -.2\nv .2 0 -.2\nv .2 .4 -.2\nv -.2 .4 -.2\nv -.2 0 .2\nv .2 0 .2\nv .2 .4 .2\nv -.2 .4 .2\n\
+f 1 4 3 2\nf 5 6 7 8\nf 1 2 6 5\nf 3 4 8 7\nf 1 5 8 4\nf 2 3 7 6\n";
+
+/// The program in a folder, with arguments that have no spaces.
+pub fn command(folder: &Path, arguments: &str) -> Command {
+    let mut command = Command::new(env!("CARGO_BIN_EXE_frazil"));
+    command.current_dir(folder).args(arguments.split_whitespace());
+    command
+}
+
+/// Runs it.
+pub fn frazil(folder: &Path, arguments: &str) -> Output {
+    command(folder, arguments).output().unwrap()
+}
+
+/// Runs it, which must go well; what it says on stdout, then on stderr.
+#[track_caller]
+pub fn works(folder: &Path, arguments: &str) -> String {
+    let output = frazil(folder, arguments);
+    let stderr = String::from_utf8(output.stderr).unwrap();
+    assert!(output.status.success(), "{arguments}: {stderr}");
+    String::from_utf8(output.stdout).unwrap() + &stderr
+}
+
+/// One sentence on stderr besides warnings, with these words, and this exit code.
+#[track_caller]
+pub fn told(output: &Output, code: i32, words: &[&str]) {
+    let stderr = String::from_utf8_lossy(&output.stderr);
+    assert_eq!(output.status.code(), Some(code), "{stderr}");
+    let sentences: Vec<&str> = stderr
+        .lines()
+        .filter(|line| line.starts_with("frazil: ") && !line.starts_with("frazil: warn: "))
+        .collect();
+    assert_eq!(sentences.len(), 1, "{stderr}");
+    words.iter().for_each(|word| assert!(sentences[0].contains(word), "no {word:?} in {stderr}"));
+}
+
+/// Runs it, which must end with this exit code and one sentence with these words.
+#[track_caller]
+pub fn fails(folder: &Path, arguments: &str, code: i32, words: &[&str]) {
+    told(&frazil(folder, arguments), code, words);
+}
