@@ -131,6 +131,9 @@ fn other_settings_are_refused_by_name_and_from_keeps_what_is_before() {
     works(folder.path(), &format!("snow shot.toml -o out -q {set}"));
     fails(folder.path(), "snow shot.toml -o out", 2, &["snow.noise.seed was 2"]);
     assert_eq!(differences(&after, &output(&folder.path().join("out"))), Vec::<String>::new());
+    let deeper = format!("snow shot.toml -o out {set} --set snow.depth=0.2 --from 3");
+    fails(folder.path(), &deeper, 2, &["--from 3", "another layer", "snow.depth was 0.3"]);
+    assert_eq!(differences(&after, &output(&folder.path().join("out"))), Vec::<String>::new());
     fails(folder.path(), "snow shot.toml -o new --from 4", 2, &["frame 3", "not there"]);
     fails(folder.path(), "snow shot.toml -o new --from 9", 2, &["--from 9", "1-6"]);
 }

@@ -67,6 +67,7 @@ impl Cache {
                     let what = format!("--from {from} needs frame {}, which is not there", from - 1);
                     return Err(Error::file(folder, what));
                 }
+                refuse_other_layer(folder, from, &record, &settings)?;
                 stored.forget_from(from)?;
                 record.segments.retain(|segment| segment.from < from);
                 record.segments.push(Segment { from, settings });
@@ -124,6 +125,26 @@ impl Cache {
     pub fn inputs(&mut self, frame: i32) -> Result<String> {
         Ok(self.chain.at(frame)?.to_string())
     }
+}
+
+/// Keys that make the layer before the first frame: what was kept cannot go on as another layer.
+const LAYER: [&str; 6] = ["shot.frames", "snow.ground", "snow.area", "snow.depth", "snow.top", "snow.cell"];
+
+/// Refuses to keep frames of another layer.
+fn refuse_other_layer(folder: &Path, from: i32, record: &Record, settings: &Settings) -> Result<()> {
+    let Some(kept) = record.segments.iter().rev().find(|segment| segment.from < from) else { return Ok(()) };
+    let of_layer = |all: &Settings| -> Settings {
+        LAYER.iter().filter_map(|key| Some((key.to_string(), all.get(*key)?.clone()))).collect()
+    };
+    let changed = settings::changed(&of_layer(&kept.settings), &of_layer(settings));
+    if changed.is_empty() {
+        return Ok(());
+    }
+    let what = format!(
+        "--from {from} cannot keep frames of another layer of snow ({}): choose another -o",
+        changed.join(", ")
+    );
+    Err(Error::file(folder, what))
 }
 
 /// Refuses frames that are asked for when changes could not be followed up to them.

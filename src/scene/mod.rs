@@ -13,6 +13,7 @@ mod overrides;
 mod resolved;
 mod settings;
 pub mod shot;
+mod stage;
 mod stored;
 mod table;
 pub mod template;

@@ -4,12 +4,11 @@ use std::path::Path;
 use std::sync::mpsc::{Receiver, sync_channel};
 
 use super::cache::Cache;
-use super::writer::{Job, Step, Writer, object_names, vdb_bytes};
-use super::{BaseMode, FrameChoice, Inputs, Scene};
+use super::writer::{Job, Step, Writer, vdb_bytes};
+use super::{FrameChoice, Inputs, Scene, stage};
 use crate::context::{Context, StageTime};
 use crate::error::{Error, Result};
 use crate::io::manifest::Manifest;
-use crate::io::{atomic, usd};
 use crate::snow::base_layer::{BaseLayer, Params, StepReport};
 
 /// Steps that wait for the writer at most: a step's changes are a few MB.
@@ -78,7 +77,7 @@ impl<'a> Run<'a> {
             self.make_frames(ctx, start, &todo, done)?;
         }
         if self.scene.output.usd {
-            self.write_stage()?;
+            stage::write(self.scene, &self.cache.stored)?;
         }
         Ok(())
     }
@@ -178,42 +177,6 @@ impl<'a> Run<'a> {
             at.frame
         );
         Ok(at)
-    }
-
-    /// Writes `shot.usda`, with the frames that are there.
-    fn write_stage(&self) -> Result<()> {
-        let (frames, fps) = (self.scene.shot.frames, self.scene.shot.fps);
-        let relative = |kind: &str| -> Vec<(i32, String)> {
-            let files = self.cache.stored.files(kind).into_iter();
-            files
-                .filter(|(frame, _)| frames.contains(*frame))
-                .map(|(frame, path)| (frame, format!("./{path}")))
-                .collect()
-        };
-        let whole = self.scene.output.base_mode == BaseMode::Full;
-        let base = if whole { relative("base") } else { Vec::new() };
-        let removed = relative("removed");
-        let volumes = [
-            usd::VolumeFiles {
-                name: "base",
-                grids: &[("surface", true), ("compression", false), ("touched", false)],
-                files: &base,
-            },
-            usd::VolumeFiles { name: "removed", grids: &[("removed", true)], files: &removed },
-        ];
-        let names = object_names(self.scene);
-        let objects = relative("objects").into_iter().filter(|(_, file)| file.ends_with(".usda"));
-        let clips = usd::Clips { kind: "objects", frames: objects.map(|(frame, _)| frame).collect() };
-        let folder = self.cache.stored.folder();
-        let clips = (!clips.frames.is_empty()).then_some((&clips, &names[..]));
-        if clips.is_some() {
-            let text = usd::clip_manifest("objects", &names);
-            atomic::write_bytes(&folder.join("objects/objects.manifest.usda"), text.as_bytes())?;
-        }
-        let time = usd::StageTime { first: frames.first, last: frames.last, fps };
-        let comment = format!("made by frazil {}", env!("CARGO_PKG_VERSION"));
-        let text = usd::stage(&comment, time, &volumes, clips);
-        atomic::write_bytes(&folder.join("shot.usda"), text.as_bytes())
     }
 }
 

@@ -4,6 +4,7 @@ use std::path::{Path, PathBuf};
 
 use serde_json::json;
 
+use super::stage::object_names;
 use super::stored::{STAGE, state_path};
 use super::{BaseMode, Scene};
 use crate::base::{DVec3, TriMesh};
@@ -214,18 +215,4 @@ pub(super) fn vdb_bytes(scene: &Scene, frame: i32, grids: &[&FloatGrid], inputs:
         ("frazil:inputs".into(), text(inputs)),
     ];
     to_bytes(grids, &WriteOptions { metadata, half: scene.output.half, ..WriteOptions::default() })
-}
-
-/// Names of the moving objects' prims, each once.
-pub(super) fn object_names(scene: &Scene) -> Vec<String> {
-    let mut names: Vec<String> = Vec::new();
-    for object in scene.objects.iter().filter(|object| object.role == super::Role::Collide) {
-        let stem = object.file.file_stem().unwrap_or_default().to_string_lossy().into_owned();
-        let stem =
-            usd::prim_name(stem.split(['%', '#', '$']).next().unwrap_or("").trim_end_matches(['.', '_']));
-        let count =
-            names.iter().filter(|name| **name == stem || name.starts_with(&format!("{stem}_"))).count();
-        names.push(if count == 0 { stem } else { format!("{stem}_{}", count + 1) });
-    }
-    names
 }
