@@ -131,6 +131,14 @@ fn other_settings_are_refused_by_name_and_from_keeps_what_is_before() {
     works(folder.path(), &format!("snow shot.toml -o out -q {set}"));
     fails(folder.path(), "snow shot.toml -o out", 2, &["snow.noise.seed was 2"]);
     assert_eq!(differences(&after, &output(&folder.path().join("out"))), Vec::<String>::new());
+    // A kept frame that is gone cannot be made again: its settings are not those of now.
+    let kept = folder.path().join("out/base/base.0003.vdb");
+    let bytes = fs::read(&kept).unwrap();
+    fs::remove_file(&kept).unwrap();
+    works(folder.path(), &format!("snow shot.toml -o out -q {set} --frames 4-6"));
+    fails(folder.path(), &format!("snow shot.toml -o out {set}"), 2, &["frame 3", "other settings", "gone"]);
+    fs::write(&kept, bytes).unwrap();
+    works(folder.path(), &format!("snow shot.toml -o out -q {set}"));
     let deeper = format!("snow shot.toml -o out {set} --set snow.depth=0.2 --from 3");
     fails(folder.path(), &deeper, 2, &["--from 3", "another layer", "snow.depth was 0.3"]);
     assert_eq!(differences(&after, &output(&folder.path().join("out"))), Vec::<String>::new());

@@ -19,6 +19,21 @@ use crate::io::{atomic, sealed};
 struct Segment {
     from: i32,
     settings: Settings,
+    /// Hash of the settings, and of the frame before as it was then.
+    seed: String,
+}
+
+impl Segment {
+    fn new(from: i32, settings: Settings, before: Option<&Manifest>) -> Self {
+        let mut hasher = Hasher::default();
+        settings.iter().for_each(|(key, value)| {
+            hasher.add_text(key).add_text(value);
+        });
+        before.into_iter().flat_map(|manifest| &manifest.files).for_each(|file| {
+            hasher.add_text(&file.hash);
+        });
+        Self { from, settings, seed: hasher.finish() }
+    }
 }
 
 /// With which settings a folder's frames were made: `state/base.json`.
@@ -70,11 +85,11 @@ impl Cache {
                 refuse_other_layer(folder, from, &record, &settings)?;
                 stored.forget_from(from)?;
                 record.segments.retain(|segment| segment.from < from);
-                record.segments.push(Segment { from, settings });
+                record.segments.push(Segment::new(from, settings, stored.manifest(from - 1)));
             }
             Some(_) => {
                 stored.forget_from(first)?;
-                record.segments = vec![Segment { from: first, settings }];
+                record.segments = vec![Segment::new(first, settings, None)];
             }
             None => match record.segments.last() {
                 Some(last) => {
@@ -83,11 +98,17 @@ impl Cache {
                         return Err(other_settings(folder, &changed));
                     }
                 }
-                None => record.segments.push(Segment { from: first, settings }),
+                None => record.segments.push(Segment::new(first, settings, None)),
             },
         }
         let last = record.segments.last().ok_or_else(|| Error::Internal("a record has no segment".into()))?;
-        let chain = Chain::new(scene, last.from, &seed(last, stored.manifest(last.from - 1)));
+        if let Some(gone) = frames.iter().find(|frame| *frame < last.from && !stored.is_done(*frame)) {
+            let what = format!(
+                "frame {gone} was made with other settings and is gone: choose another -o, or --from {first}"
+            );
+            return Err(Error::file(folder, what));
+        }
+        let chain = Chain::new(scene, last.from, &last.seed);
         sealed::write(&record_path(folder), &record)?;
         atomic::write_bytes(&folder.join("scene.toml"), scene.to_toml().as_bytes())?;
         let mut cache = Self { stored, record, chain, _lock: lock };
@@ -216,18 +237,6 @@ fn remove_unfinished(folder: &Path) -> Result<()> {
         }
     }
     Ok(())
-}
-
-/// What the first frame of a segment depends on: its settings, and the frame before it.
-fn seed(segment: &Segment, before: Option<&Manifest>) -> String {
-    let mut hasher = Hasher::default();
-    segment.settings.iter().for_each(|(key, value)| {
-        hasher.add_text(key).add_text(value);
-    });
-    before.into_iter().flat_map(|manifest| &manifest.files).for_each(|file| {
-        hasher.add_text(&file.hash);
-    });
-    hasher.finish()
 }
 
 fn other_settings(folder: &Path, changed: &[String]) -> Error {
