@@ -8,7 +8,7 @@ use serde::{Deserialize, Serialize};
 use super::chain::Chain;
 use super::settings::{self, Settings};
 use super::stored::{STAGE, Stored};
-use super::{BaseMode, FrameChoice, Inputs, Scene};
+use super::{BaseMode, FrameChoice, Scene};
 use crate::error::{Error, Result};
 use crate::io::hash::Hasher;
 use crate::io::manifest::Manifest;
@@ -59,14 +59,8 @@ impl Cache {
     /// # Errors
     /// A folder that cannot be made or written, that another run writes into, or that holds frames of other settings or
     /// inputs; a record that is damaged; no frame to go on from; frames that would leave a gap in a cache of changes.
-    pub fn open(
-        scene: &Scene,
-        inputs: &Inputs,
-        folder: &Path,
-        frames: &FrameChoice,
-        from: Option<i32>,
-    ) -> Result<Self> {
-        let settings = settings::of_base(scene, inputs)?;
+    pub fn open(scene: &Scene, folder: &Path, frames: &FrameChoice, from: Option<i32>) -> Result<Self> {
+        let settings = settings::of_base(scene)?;
         make_folders(scene, folder)?;
         let lock = lock(folder)?;
         remove_unfinished(folder)?;

@@ -7,8 +7,8 @@ use super::{Ground, Layer, Object, Role, Scene};
 use crate::base::{DVec3, TriMesh};
 use crate::context::Context;
 use crate::error::{Error, Result};
+use crate::io::mesh;
 use crate::io::sequence::Pattern;
-use crate::io::{hash, mesh};
 use crate::motion::{Character, Key, Keys, MeshSequence, Motion, Placed, Play, Rigid};
 use crate::snow::base_layer::initial::{self, Cover};
 use crate::sweep::Body;
@@ -67,37 +67,6 @@ impl Inputs {
             }
         }
         Ok(Self { snow, statics, bodies })
-    }
-
-    /// Hashes of the files that settings name, by key; of a moving sequence none, since its frames count one by one.
-    ///
-    /// # Errors
-    /// A file that cannot be read.
-    pub(super) fn contents(&self, scene: &Scene) -> Result<Vec<(String, String)>> {
-        let mut out = Vec::new();
-        if let Some(Ground::Mesh(path)) = &scene.snow.ground {
-            out.push(("snow.ground".to_string(), hash::of_file(path)?));
-        }
-        if let Layer::Top(path) | Layer::Grid(path) = &scene.snow.layer {
-            out.push(("snow.top".to_string(), hash::of_file(path)?));
-        }
-        for (index, object) in scene.objects.iter().enumerate() {
-            let content = match (Pattern::parse(&object.file), object.role) {
-                (_, Role::Ignore) => "ignored".to_string(),
-                (None, _) if is_character(&object.file) => Character::content(&object.file)?,
-                (None, _) => hash::of_file(&object.file)?,
-                (Some(pattern), Role::Static) => {
-                    let at = f64::from(scene.shot.frames.first) - object.offset;
-                    let frames =
-                        [at.floor(), at.ceil()].map(|frame| hash::of_file(&pattern.path(frame as i32)));
-                    let [below, above] = frames;
-                    below? + &above?
-                }
-                (Some(_), Role::Collide) => "of each frame".to_string(),
-            };
-            out.push((format!("object[{}].file", index + 1), content));
-        }
-        Ok(out)
     }
 
     /// Least and greatest x and z of the snow (m), as far as they are known before it is made.

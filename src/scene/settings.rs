@@ -4,8 +4,12 @@ use std::collections::{BTreeMap, BTreeSet};
 
 use toml::Value;
 
-use super::{Inputs, Scene};
+use super::objects::is_character;
+use super::{Ground, Layer, Role, Scene};
 use crate::error::{Error, Result};
+use crate::io::hash;
+use crate::io::sequence::Pattern;
+use crate::motion::Character;
 
 /// Former values longer than this are not told.
 const LONG: usize = 80;
@@ -19,17 +23,47 @@ pub(super) type Settings = BTreeMap<String, String>;
 ///
 /// # Errors
 /// An input that cannot be read.
-pub(super) fn of_base(scene: &Scene, inputs: &Inputs) -> Result<Settings> {
+pub(super) fn of_base(scene: &Scene) -> Result<Settings> {
     let unreadable = || Error::Internal("the resolved scene cannot be read".into());
     let mut settings = flattened(&scene.to_toml()).ok_or_else(unreadable)?;
     settings.insert("shot.frames".into(), scene.shot.frames.first.to_string());
     settings.remove("output.usd");
     // Another version may compute another layer.
     settings.insert("frazil".into(), env!("CARGO_PKG_VERSION").into());
-    for (key, content) in inputs.contents(scene)? {
+    for (key, content) in contents(scene)? {
         settings.insert(key, format!("{CONTENT}{content}"));
     }
     Ok(settings)
+}
+
+/// Hashes of the files that settings name, by key; of a moving sequence none, since its frames count one by one.
+///
+/// # Errors
+/// A file that cannot be read.
+fn contents(scene: &Scene) -> Result<Vec<(String, String)>> {
+    let mut out = Vec::new();
+    if let Some(Ground::Mesh(path)) = &scene.snow.ground {
+        out.push(("snow.ground".to_string(), hash::of_file(path)?));
+    }
+    if let Layer::Top(path) | Layer::Grid(path) = &scene.snow.layer {
+        out.push(("snow.top".to_string(), hash::of_file(path)?));
+    }
+    for (index, object) in scene.objects.iter().enumerate() {
+        let content = match (Pattern::parse(&object.file), object.role) {
+            (_, Role::Ignore) => "ignored".to_string(),
+            (None, _) if is_character(&object.file) => Character::content(&object.file)?,
+            (None, _) => hash::of_file(&object.file)?,
+            (Some(pattern), Role::Static) => {
+                let at = f64::from(scene.shot.frames.first) - object.offset;
+                let frames = [at.floor(), at.ceil()].map(|frame| hash::of_file(&pattern.path(frame as i32)));
+                let [below, above] = frames;
+                below? + &above?
+            }
+            (Some(_), Role::Collide) => "of each frame".to_string(),
+        };
+        out.push((format!("object[{}].file", index + 1), content));
+    }
+    Ok(out)
 }
 
 /// The keys whose values differ, each with the former value.

@@ -45,7 +45,7 @@ impl<'a> Run<'a> {
         frames: &FrameChoice,
         from: Option<i32>,
     ) -> Result<Self> {
-        let cache = Cache::open(scene, inputs, folder, frames, from)?;
+        let cache = Cache::open(scene, folder, frames, from)?;
         let (there, todo): (Vec<i32>, Vec<i32>) =
             frames.iter().partition(|frame| cache.stored.is_done(*frame));
         let noise = Some(scene.snow.noise).filter(|noise| noise.amplitude > 0.0);
