@@ -61,21 +61,17 @@ impl Cache {
     /// inputs; a record that is damaged; no frame to go on from; frames that would leave a gap in a cache of changes.
     pub fn open(scene: &Scene, folder: &Path, frames: &FrameChoice, from: Option<i32>) -> Result<Self> {
         let settings = settings::of_base(scene)?;
+        // What is refused leaves no folder behind; what another run did meanwhile is looked at again below.
+        refuse_asked(scene, frames, from, &Stored::read(folder)?)?;
         make_folders(scene, folder)?;
         let lock = lock(folder)?;
         remove_unfinished(folder)?;
         let first = scene.shot.frames.first;
         let mut record: Record = sealed::read(&record_path(folder))?.unwrap_or_default();
         let mut stored = Stored::read(folder)?;
-        refuse_gaps(scene, frames, folder, |frame| {
-            stored.is_done(frame) && from.is_none_or(|from| frame < from)
-        })?;
+        refuse_asked(scene, frames, from, &stored)?;
         match from {
             Some(from) if from > first => {
-                if !stored.is_done(from - 1) {
-                    let what = format!("--from {from} needs frame {}, which is not there", from - 1);
-                    return Err(Error::file(folder, what));
-                }
                 refuse_other_layer(folder, from, &record, &settings)?;
                 stored.forget_from(from)?;
                 record.segments.retain(|segment| segment.from < from);
@@ -162,25 +158,25 @@ fn refuse_other_layer(folder: &Path, from: i32, record: &Record, settings: &Sett
     Err(Error::file(folder, what))
 }
 
-/// Refuses frames that are asked for when changes could not be followed up to them.
-fn refuse_gaps(
-    scene: &Scene,
-    frames: &FrameChoice,
-    folder: &Path,
-    is_there: impl Fn(i32) -> bool,
-) -> Result<()> {
+/// Refuses a `from` without the frame before it, and frames that changes could not be followed up to.
+fn refuse_asked(scene: &Scene, frames: &FrameChoice, from: Option<i32>, stored: &Stored) -> Result<()> {
+    let first = scene.shot.frames.first;
+    if let Some(from) = from.filter(|from| *from > first && !stored.is_done(from - 1)) {
+        let what = format!("--from {from} needs frame {}, which is not there", from - 1);
+        return Err(Error::file(stored.folder(), what));
+    }
     if !scene.output.base || scene.output.base_mode == BaseMode::Full {
         return Ok(());
     }
-    let mut before = scene.shot.frames.first..frames.last();
-    match before.find(|frame| !is_there(*frame) && !frames.contains(*frame)) {
+    let is_there = |frame: i32| stored.is_done(frame) && from.is_none_or(|from| frame < from);
+    match (first..frames.last()).find(|frame| !is_there(*frame) && !frames.contains(*frame)) {
         None => Ok(()),
-        Some(gap) => Err(Error::file(
-            folder,
-            format!(
+        Some(gap) => {
+            let what = format!(
                 "base_mode = \"delta\" needs every frame, but frame {gap} is neither there nor asked for"
-            ),
-        )),
+            );
+            Err(Error::file(stored.folder(), what))
+        }
     }
 }
 

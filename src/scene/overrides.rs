@@ -22,7 +22,7 @@ impl std::str::FromStr for Override {
         let wrong = || format!("\"{text}\" is no setting such as snow.noise.seed=2");
         let (key, value) = text.split_once('=').ok_or_else(wrong)?;
         let key: Vec<String> = key.split('.').map(|part| part.trim().to_string()).collect();
-        if key.iter().any(String::is_empty) || value.trim().is_empty() {
+        if key.iter().any(String::is_empty) {
             return Err(wrong());
         }
         Ok(Self { key, value: value.trim().to_string(), text: text.to_string() })

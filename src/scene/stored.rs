@@ -20,14 +20,20 @@ pub struct Stored {
 }
 
 impl Stored {
-    /// Reads the records of a folder; frames whose files are not there with their lengths are not done.
+    /// Reads the records of a folder; frames whose files are not there with their lengths are not done, and a folder
+    /// without records has none.
     ///
     /// # Errors
     /// A folder that cannot be read; a record that is damaged or of a newer version.
     pub fn read(folder: &Path) -> Result<Self> {
         let state = folder.join("state");
-        let entries = std::fs::read_dir(&state).map_err(|error| Error::io(&state, "read", error))?;
         let mut done = BTreeMap::new();
+        let entries = match std::fs::read_dir(&state) {
+            Err(error) if error.kind() == std::io::ErrorKind::NotFound => {
+                return Ok(Self { folder: folder.to_path_buf(), done });
+            }
+            other => other.map_err(|error| Error::io(&state, "read", error))?,
+        };
         for entry in entries {
             let name = entry.map_err(|error| Error::io(&state, "read", error))?.file_name();
             let number = name.to_str().and_then(|name| name.strip_prefix("base.")?.strip_suffix(".json"));
