@@ -22,6 +22,17 @@ public:
     std::unique_ptr<Impl> impl;
 };
 
+/// Leaves and tiles that are ready to be put into a grid.
+class Blocks {
+public:
+    struct Ready;
+    explicit Blocks(std::unique_ptr<Ready> ready);
+    ~Blocks();
+    Blocks(const Blocks&) = delete;
+    Blocks& operator=(const Blocks&) = delete;
+    std::unique_ptr<Ready> ready;
+};
+
 struct LeafView;
 struct Meta;
 struct GridHeader;
@@ -45,11 +56,14 @@ void set_metadata(Grid& grid, const Meta& meta);
 uint64_t active_voxels(const Grid& grid) noexcept;
 size_t leaf_count(const Grid& grid) noexcept;
 uint64_t memory_bytes(const Grid& grid) noexcept;
+uint64_t file_bound(const Grid& grid) noexcept;
 bool active_bbox(const Grid& grid, std::array<int32_t, 3>& low, std::array<int32_t, 3>& high);
 rust::Vec<LeafView> leaves(const Grid& grid);
 rust::Vec<LeafView> probe(const Grid& grid, rust::Slice<const int32_t> origins);
-void replace_blocks(Grid& grid, const Call& call, rust::Slice<const int32_t> origins, rust::Slice<const size_t> values,
-                    rust::Slice<const size_t> masks, rust::Slice<const float> constants);
+std::unique_ptr<Blocks> make_blocks(const Call& call, rust::Slice<const int32_t> origins,
+                                    rust::Slice<const size_t> values, rust::Slice<const size_t> masks,
+                                    rust::Slice<const float> constants);
+void put_blocks(Grid& grid, Blocks& blocks);
 float value_at(const Grid& grid, int32_t x, int32_t y, int32_t z) noexcept;
 void sample(const Grid& grid, const Call& call, rust::Slice<const double> world, bool linear, rust::Slice<float> out);
 void prune(Grid& grid, const Call& call, bool level_set, float tolerance);
@@ -60,6 +74,8 @@ std::unique_ptr<std::string> grids_to_bytes(rust::Slice<const size_t> grids, int
                                             const rust::Vec<Meta>& meta);
 rust::Vec<GridHeader> describe_file(rust::Str path);
 std::unique_ptr<Grid> read_float_grid(rust::Str path, rust::Str name);
+std::unique_ptr<Grid> float_grid_from_bytes(rust::Slice<const uint8_t> bytes, rust::Str name);
+void end_workers() noexcept;
 
 void csg(Grid& a, Grid& b, const Call& call, int32_t operation);
 std::unique_ptr<Grid> csg_copy(const Grid& a, const Grid& b, const Call& call, int32_t operation);
@@ -71,6 +87,8 @@ void advect_outward(Grid& grid, const Call& call, const Grid& speed);
 
 std::unique_ptr<Grid> from_mesh(const Call& call, rust::Slice<const float> points, rust::Slice<const uint32_t> indices,
                                 double voxel, float half_width);
+std::unique_ptr<Grid> from_particles(const Call& call, rust::Slice<const double> positions,
+                                     rust::Slice<const float> radii, double voxel, float half_width);
 Triangles to_mesh(const Grid& grid, const Call& call, double iso, double adaptivity);
 void measure(const Grid& grid, const Call& call, double& area, double& volume);
 void cast_rays(const Grid& grid, const Call& call, rust::Slice<const double> rays, rust::Slice<Hit> hits);

@@ -4,8 +4,10 @@
 #include <openvdb/io/Archive.h>
 #include <openvdb/io/Compression.h>
 #include <openvdb/io/File.h>
+#include <openvdb/io/Stream.h>
 
 #include <algorithm>
+#include <istream>
 #include <ostream>
 #include <streambuf>
 
@@ -104,6 +106,45 @@ void open(openvdb::io::File& file) {
     file.open(/*delayLoad=*/false);
 }
 
+/// A float grid out of a file, without what the file says of itself.
+std::unique_ptr<Grid> loaded(const openvdb::GridBase::Ptr& base) {
+    auto grid = openvdb::gridPtrCast<openvdb::FloatGrid>(base);
+    if (!grid) throw std::runtime_error("grid \"" + base->getName() + "\" is of type " + base->type());
+    if (grid->tree().leafCount() > 0 && grid->tree().cbeginLeaf()->buffer().isOutOfCore())
+        grid->tree().readNonresidentBuffers();
+    for (const char* key : {openvdb::GridBase::META_FILE_BBOX_MIN, openvdb::GridBase::META_FILE_BBOX_MAX,
+                            openvdb::GridBase::META_FILE_COMPRESSION, openvdb::GridBase::META_FILE_MEM_BYTES,
+                            openvdb::GridBase::META_FILE_VOXEL_COUNT, openvdb::GridBase::META_FILE_DELAYED_LOAD}) {
+        grid->removeMeta(key);
+    }
+    return wrap(grid);
+}
+
+/// Bytes that somebody else holds, to read.
+class View : public std::streambuf {
+public:
+    explicit View(rust::Slice<const uint8_t> bytes) {
+        // A stream's buffer is not const, but this one is only read.
+        char* begin = const_cast<char*>(reinterpret_cast<const char*>(bytes.data()));
+        setg(begin, begin, begin + bytes.size());
+    }
+
+protected:
+    pos_type seekoff(off_type by, std::ios_base::seekdir from, std::ios_base::openmode) override {
+        const off_type start = from == std::ios_base::beg   ? 0
+                               : from == std::ios_base::cur ? gptr() - eback()
+                                                            : egptr() - eback();
+        return seekpos(start + by, std::ios_base::in);
+    }
+
+    pos_type seekpos(pos_type to, std::ios_base::openmode) override {
+        const off_type place = to;
+        if (place < 0 || place > egptr() - eback()) return pos_type(off_type(-1));
+        setg(eback(), eback() + place, egptr());
+        return to;
+    }
+};
+
 }  // namespace
 
 rust::Vec<Meta> metadata(const Grid& grid) { return list(*grid.impl->grid); }
@@ -175,16 +216,33 @@ std::unique_ptr<Grid> read_float_grid(rust::Str path, rust::Str name) {
     open(file);
     const auto base = file.readGrid(std::string(name));
     file.close();
-    auto grid = openvdb::gridPtrCast<openvdb::FloatGrid>(base);
-    if (!grid) throw std::runtime_error("grid \"" + std::string(name) + "\" is of type " + base->type());
-    if (grid->tree().leafCount() > 0 && grid->tree().cbeginLeaf()->buffer().isOutOfCore())
-        grid->tree().readNonresidentBuffers();
-    for (const char* key : {openvdb::GridBase::META_FILE_BBOX_MIN, openvdb::GridBase::META_FILE_BBOX_MAX,
-                            openvdb::GridBase::META_FILE_COMPRESSION, openvdb::GridBase::META_FILE_MEM_BYTES,
-                            openvdb::GridBase::META_FILE_VOXEL_COUNT, openvdb::GridBase::META_FILE_DELAYED_LOAD}) {
-        grid->removeMeta(key);
+    return loaded(base);
+}
+
+std::unique_ptr<Grid> float_grid_from_bytes(rust::Slice<const uint8_t> bytes, rust::Str name) {
+    initialise();
+    View view(bytes);
+    std::istream in(&view);
+    openvdb::io::Stream stream(in, /*delayLoad=*/false);
+    const auto grids = stream.getGrids();
+    openvdb::GridBase::Ptr found;
+    std::string there;
+    for (const auto& grid : *grids) {
+        there += (there.empty() ? "\"" : ", \"") + grid->getName() + "\" (" + grid->type() + ")";
+        if (name.empty()) {
+            const bool better = grid->getGridClass() == openvdb::GRID_LEVEL_SET &&
+                                (!found || found->getGridClass() != openvdb::GRID_LEVEL_SET);
+            if (grid->isType<openvdb::FloatGrid>() && (!found || better)) found = grid;
+        } else if (grid->getName() == std::string(name)) {
+            found = grid;
+            break;
+        }
     }
-    return wrap(grid);
+    if (!found) {
+        throw std::runtime_error((name.empty() ? "no float grid" : "no grid \"" + std::string(name) + "\"") +
+                                 " in the file, which holds " + (there.empty() ? "no grid at all" : there));
+    }
+    return loaded(found);
 }
 
 }  // namespace frazil

@@ -6,6 +6,7 @@
 #include <openvdb/tools/Prune.h>
 #include <openvdb/tools/SignedFloodFill.h>
 #include <tbb/blocked_range.h>
+#include <tbb/global_control.h>
 #include <tbb/parallel_for.h>
 
 #include <algorithm>
@@ -23,6 +24,12 @@ Grid::~Grid() = default;
 void initialise() {
     static std::once_flag once;
     std::call_once(once, [] { openvdb::initialize(); });
+}
+
+void end_workers() noexcept {
+    // Refused while another part of the process works with TBB: its threads are then left to it.
+    tbb::task_scheduler_handle handle{tbb::attach{}};
+    tbb::finalize(handle, std::nothrow);
 }
 
 std::unique_ptr<Grid> wrap(openvdb::FloatGrid::Ptr grid) {
@@ -120,33 +127,60 @@ rust::Vec<LeafView> probe(const Grid& grid, rust::Slice<const int32_t> origins) 
     return out;
 }
 
-void replace_blocks(Grid& grid, const Call& call, rust::Slice<const int32_t> origins, rust::Slice<const size_t> values,
-                    rust::Slice<const size_t> masks, rust::Slice<const float> constants) {
+struct Blocks::Ready {
+    std::vector<openvdb::Coord> origins;
+    /// A leaf, or none where the constant counts.
+    std::vector<std::unique_ptr<Leaf>> leaves;
+    std::vector<float> constants;
+};
+
+Blocks::Blocks(std::unique_ptr<Ready> ready) : ready(std::move(ready)) {}
+Blocks::~Blocks() = default;
+
+std::unique_ptr<Blocks> make_blocks(const Call& call, rust::Slice<const int32_t> origins,
+                                    rust::Slice<const size_t> values, rust::Slice<const size_t> masks,
+                                    rust::Slice<const float> constants) {
     const size_t count = values.size();
-    auto& tree = grid.impl->grid->tree();
-    // Every leaf exists before the first is put in: running out of memory then changes nothing.
-    std::vector<std::unique_ptr<Leaf>> fresh(count);
+    auto ready = std::make_unique<Blocks::Ready>();
+    ready->leaves.resize(count);
+    ready->origins.resize(count);
+    ready->constants.assign(constants.begin(), constants.end());
     run(call, [&] {
         tbb::parallel_for(tbb::blocked_range<size_t>(0, count), [&](const tbb::blocked_range<size_t>& range) {
             for (size_t i = range.begin(); i != range.end(); ++i) {
-                if (values[i] == 0) continue;
                 const openvdb::Coord at(origins[3 * i], origins[3 * i + 1], origins[3 * i + 2]);
-                fresh[i] = std::make_unique<Leaf>(at, 0.0f, false);
-                std::memcpy(fresh[i]->buffer().data(), reinterpret_cast<const float*>(values[i]), 512 * sizeof(float));
+                ready->origins[i] = at;
+                if (values[i] == 0) continue;
+                auto leaf = std::make_unique<Leaf>(at, 0.0f, false);
+                std::memcpy(leaf->buffer().data(), reinterpret_cast<const float*>(values[i]), 512 * sizeof(float));
                 Leaf::NodeMaskType mask;
                 std::memcpy(reinterpret_cast<void*>(&mask), reinterpret_cast<const void*>(masks[i]), sizeof mask);
-                fresh[i]->setValueMask(mask);
+                leaf->setValueMask(mask);
+                ready->leaves[i] = std::move(leaf);
             }
         });
     });
-    for (size_t i = 0; i < count; ++i) {
-        if (fresh[i]) {
-            tree.addLeaf(fresh[i].release());
+    return std::make_unique<Blocks>(std::move(ready));
+}
+
+void put_blocks(Grid& grid, Blocks& blocks) {
+    auto& tree = grid.impl->grid->tree();
+    auto& ready = *blocks.ready;
+    for (size_t i = 0; i < ready.leaves.size(); ++i) {
+        if (ready.leaves[i]) {
+            tree.addLeaf(ready.leaves[i].release());
         } else {
-            const openvdb::Coord at(origins[3 * i], origins[3 * i + 1], origins[3 * i + 2]);
-            tree.addTile(1, at, constants[i], false);
+            tree.addTile(1, ready.origins[i], ready.constants[i], false);
         }
     }
+}
+
+uint64_t file_bound(const Grid& grid) noexcept {
+    // What a file holds of a leaf and of the nodes above it, none of it packed, with room for the codec's own words.
+    const auto counts = grid.impl->grid->tree().nodeCount();
+    constexpr uint64_t leaf = 2048 + 3 * 64 + 64, lower = 4096 * 4 + 2 * 512 + 256, upper = 32768 * 4 + 2 * 4096 + 256;
+    constexpr uint64_t rest = 1 << 16;
+    return counts[0] * leaf + counts[1] * lower + counts[2] * upper + rest;
 }
 
 float value_at(const Grid& grid, int32_t x, int32_t y, int32_t z) noexcept {

@@ -1,7 +1,5 @@
 //! Triangle meshes.
 
-use std::collections::HashMap;
-
 use super::{DVec3, Vec3};
 use crate::error::{Error, Result};
 
@@ -103,10 +101,32 @@ impl TriMesh {
 
 /// For each place the number of the first one that is the same.
 pub fn coincident(places: impl Iterator<Item = DVec3>) -> Vec<u32> {
-    let mut first: HashMap<[u64; 3], u32> = HashMap::with_capacity(places.size_hint().0);
     // Adding zero makes -0 and 0 the same.
-    let key = |p: DVec3| [p.x + 0.0, p.y + 0.0, p.z + 0.0].map(f64::to_bits);
-    places.zip(0..).map(|(p, number)| *first.entry(key(p)).or_insert(number)).collect()
+    let keys: Vec<[u64; 3]> = places.map(|p| [p.x + 0.0, p.y + 0.0, p.z + 0.0].map(f64::to_bits)).collect();
+    // Open addressing, at most half full: several times faster than a map, and every step of a host asks.
+    let bits = (2 * keys.len().max(1)).next_power_of_two().ilog2().max(1);
+    let mut slots = vec![u32::MAX; 1 << bits];
+    let home = |key: &[u64; 3]| {
+        let mixed = key.iter().fold(0u64, |hash, part| {
+            let hash = (hash.rotate_left(23) ^ part).wrapping_mul(0x9e37_79b9_7f4a_7c15);
+            hash ^ hash >> 32
+        });
+        (mixed.wrapping_mul(0x9e37_79b9_7f4a_7c15) >> (64 - bits)) as usize
+    };
+    let first = |(key, number): (&[u64; 3], u32)| {
+        let mut slot = home(key);
+        loop {
+            match slots[slot] {
+                u32::MAX => {
+                    slots[slot] = number;
+                    return number;
+                }
+                there if keys[there as usize] == *key => return there,
+                _ => slot = (slot + 1) & ((1 << bits) - 1),
+            }
+        }
+    };
+    keys.iter().zip(0..).map(first).collect()
 }
 
 /// Checks the vertices and faces of a mesh.

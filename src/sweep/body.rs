@@ -1,6 +1,9 @@
 //! A moving body as the chain wants it: closed triangles, and poses at well-chosen times.
 
+use std::sync::Arc;
+
 use rayon::prelude::*;
+use xxhash_rust::xxh3::Xxh3;
 
 use super::chain::{Face, Weights, Window, boundary};
 use super::lattice::{Fixed, Lattice, UNITS};
@@ -19,12 +22,21 @@ const GRAIN: usize = 2048;
 /// A motion with its topology, prepared once and used for many intervals.
 pub struct Body {
     motion: Box<dyn Motion>,
+    shape: Arc<Shape>,
+    longest_edge: f64,
+    noise: bool,
+}
+
+/// What of a body stays the same while its vertices move: how its triangles hang together, and which way they look.
+pub struct Shape {
+    /// Hash of the triangles.
+    triangles: u128,
     /// For each vertex the first one at the same place; itself when there is none before it.
     same: Vec<u32>,
+    /// Whether the triangles were turned round.
+    reversed: bool,
     topology: Topology,
-    longest_edge: f64,
     contradictions: usize,
-    noise: bool,
 }
 
 impl Body {
@@ -34,26 +46,41 @@ impl Body {
     /// # Errors
     /// When the motion has no triangles, or its pose cannot be had.
     pub fn new(motion: Box<dyn Motion>, time: f64) -> Result<Self> {
+        Self::shaped(motion, time, None)
+    }
+
+    /// As [`Body::new`]; `known` is the shape of an earlier body, which spares the work where it is the same.
+    /// The body is the same with and without.
+    ///
+    /// # Errors
+    /// As [`Body::new`].
+    pub fn shaped(motion: Box<dyn Motion>, time: f64, known: Option<Arc<Shape>>) -> Result<Self> {
         if motion.triangles().is_empty() {
             return Err(Error::argument("an object has no triangles"));
         }
         let mut pose = Vec::new();
         motion.pose(time, &mut pose)?;
+        let triangles = hash_of(motion.triangles());
         let same = if motion.keeps_its_welds() {
             (0..pose.len() as u32).collect()
         } else {
             coincident(pose.iter().copied())
         };
-        let mut topology = Topology::new(motion.triangles(), motion.vertex_count(), &same, true);
-        topology.complete(&mut pose);
-        if volume(&topology, &pose) < 0.0 {
-            topology.simplices.iter_mut().for_each(|simplex| simplex.sign = -simplex.sign);
-        }
+        let known = known.filter(|known| known.triangles == triangles && known.same == same);
+        let shape = known.unwrap_or_else(|| Arc::new(Shape::new(&*motion, triangles, same)));
+        shape.topology.complete(&mut pose);
+        let volume = volume(&shape.topology, &pose);
+        let inside_out = if shape.reversed { volume > 0.0 } else { volume < 0.0 };
+        let shape = if inside_out != shape.reversed { Arc::new(shape.turned_round()) } else { shape };
         let length = |&[i, j]: &[u32; 2]| (pose[i as usize] - pose[j as usize]).norm();
-        let longest_edge = topology.edges.iter().map(length).fold(0.0, f64::max);
-        let contradictions =
-            Topology::new(motion.triangles(), motion.vertex_count(), &same, false).contradictions();
-        Ok(Self { motion, same, topology, longest_edge, contradictions, noise: true })
+        let edges = shape.topology.edges.par_iter().with_min_len(GRAIN);
+        let longest_edge = edges.map(length).reduce(|| 0.0, f64::max);
+        Ok(Self { motion, shape, longest_edge, noise: true })
+    }
+
+    /// How its triangles hang together.
+    pub fn shape(&self) -> &Arc<Shape> {
+        &self.shape
     }
 
     /// Says whether its imprints have ragged edges (they do unless this says no).
@@ -63,13 +90,13 @@ impl Body {
 
     /// Number of open loops (joined ones count once) that were closed.
     pub fn closed_loops(&self) -> usize {
-        self.topology.derived.len()
+        self.shape.topology.derived.len()
     }
 
     /// Number of edges where the triangles do not agree about inside and outside: more run along them one way than the
     /// other, by two or more.
     pub fn contradictions(&self) -> usize {
-        self.contradictions
+        self.shape.contradictions
     }
 
     /// Whether its imprints have ragged edges.
@@ -104,7 +131,7 @@ impl Body {
             separate = Topology::new(self.motion.triangles(), identity.len(), &identity, true);
             &separate
         } else {
-            &self.topology
+            &self.shape.topology
         };
         poses.iter_mut().for_each(|pose| topology.complete(pose));
         let refined = refine(topology, &mut poses, tolerance, |poses, edge| near.sees(poses, &edge));
@@ -168,12 +195,12 @@ impl Body {
         let bend = vertices.map(bend).reduce(|| 0.0, f64::max);
         let arcs = (bend.sqrt() / tolerance).sqrt();
         let ends = [probes[0], probes[4]];
-        let own = self.topology.own_vertices as u32;
+        let own = self.shape.topology.own_vertices as u32;
         let twist = |edge: &[u32; 2]| {
             let error = if edge[1] < own { edge_error(&ends, *edge) } else { 0.0 };
             if error > tolerance && near.sees(&ends, edge) { error } else { 0.0 }
         };
-        let twist = self.topology.edges.par_iter().with_min_len(GRAIN).map(twist).reduce(|| 0.0, f64::max);
+        let twist = self.shape.topology.edges.par_iter().with_min_len(GRAIN).map(twist).reduce(|| 0.0, f64::max);
         // As many steps as pieces an edge: faces then keep a good shape.
         let twists = (twist / tolerance).sqrt();
         arcs.max(twists).ceil().clamp(1.0, MOST_STEPS) as usize
@@ -181,7 +208,7 @@ impl Body {
 
     /// Whether vertices that were welded have moved apart.
     fn welds_part(&self, poses: &[Vec<DVec3>]) -> bool {
-        self.same.iter().enumerate().any(|(vertex, &same)| {
+        self.shape.same.iter().enumerate().any(|(vertex, &same)| {
             same as usize != vertex && poses.iter().any(|pose| pose[vertex] != pose[same as usize])
         })
     }
@@ -217,10 +244,39 @@ impl Near {
     }
 }
 
+impl Shape {
+    fn new(motion: &dyn Motion, triangles: u128, same: Vec<u32>) -> Self {
+        let made = |close| Topology::new(motion.triangles(), motion.vertex_count(), &same, close);
+        let (topology, contradictions) = (made(true), made(false).contradictions());
+        Self { triangles, same, reversed: false, topology, contradictions }
+    }
+
+    fn turned_round(&self) -> Self {
+        let mut topology = self.topology.clone();
+        topology.simplices.iter_mut().for_each(|simplex| simplex.sign = -simplex.sign);
+        Self { same: self.same.clone(), reversed: !self.reversed, topology, ..*self }
+    }
+}
+
+fn hash_of(triangles: &[[u32; 3]]) -> u128 {
+    let mut hash = Xxh3::new();
+    let mut bytes = [0; 12 * 256];
+    for part in triangles.chunks(256) {
+        let indices = part.as_flattened();
+        let used = bytes.chunks_exact_mut(4).zip(indices);
+        used.for_each(|(to, index)| to.copy_from_slice(&index.to_le_bytes()));
+        hash.update(&bytes[..4 * indices.len()]);
+    }
+    hash.digest128()
+}
+
+/// Volume of the solid (m3), summed in an order that does not depend on threads.
 fn volume(topology: &Topology, pose: &[DVec3]) -> f64 {
     let six = |simplex: &super::topology::Simplex| {
         let [a, b, c] = simplex.v.map(|vertex| pose[vertex as usize]);
         a.dot(&b.cross(&c)) * f64::from(simplex.sign)
     };
-    topology.simplices.iter().map(six).sum::<f64>() / 6.0
+    let parts: Vec<f64> =
+        topology.simplices.par_chunks(GRAIN).map(|part| part.iter().map(six).sum()).collect();
+    parts.iter().sum::<f64>() / 6.0
 }

@@ -22,7 +22,7 @@ mod topology;
 mod voxelise;
 mod winding;
 
-pub use body::Body;
+pub use body::{Body, Shape};
 pub use chain::{Face, Weights, Window, boundary};
 pub use lattice::{Fixed, Lattice, UNITS};
 pub use nearest::Scratch;

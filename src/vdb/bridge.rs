@@ -80,15 +80,18 @@ pub(super) mod ffi {
         fn active_bbox(grid: &Grid, low: &mut [i32; 3], high: &mut [i32; 3]) -> Result<bool>;
         fn leaves(grid: &Grid) -> Result<Vec<LeafView>>;
         fn probe(grid: &Grid, origins: &[i32]) -> Result<Vec<LeafView>>;
+        type Blocks;
         /// `values[i]` is the address of 512 floats, or 0 for a constant block of value `constants[i]`.
-        fn replace_blocks(
-            grid: Pin<&mut Grid>,
+        fn make_blocks(
             call: &Call,
             origins: &[i32],
             values: &[usize],
             masks: &[usize],
             constants: &[f32],
-        ) -> Result<()>;
+        ) -> Result<UniquePtr<Blocks>>;
+        fn put_blocks(grid: Pin<&mut Grid>, blocks: Pin<&mut Blocks>) -> Result<()>;
+        /// Bytes that a file of this grid takes at most.
+        fn file_bound(grid: &Grid) -> u64;
         fn value_at(grid: &Grid, x: i32, y: i32, z: i32) -> f32;
         fn sample(grid: &Grid, call: &Call, world: &[f64], linear: bool, out: &mut [f32]) -> Result<()>;
         fn prune(grid: Pin<&mut Grid>, call: &Call, level_set: bool, tolerance: f32) -> Result<()>;
@@ -103,6 +106,10 @@ pub(super) mod ffi {
         ) -> Result<UniquePtr<CxxString>>;
         fn describe_file(path: &str) -> Result<Vec<GridHeader>>;
         fn read_float_grid(path: &str, name: &str) -> Result<UniquePtr<Grid>>;
+        /// An empty name stands for the first level set, else the first float grid.
+        fn float_grid_from_bytes(bytes: &[u8], name: &str) -> Result<UniquePtr<Grid>>;
+        /// Ends TBB's worker threads, unless somebody else uses them.
+        fn end_workers();
 
         /// 0 union, 1 difference, 2 intersection; both grids are consumed into the first.
         fn csg(a: Pin<&mut Grid>, b: Pin<&mut Grid>, call: &Call, operation: i32) -> Result<()>;
@@ -125,6 +132,13 @@ pub(super) mod ffi {
             call: &Call,
             points: &[f32],
             indices: &[u32],
+            voxel: f64,
+            half_width: f32,
+        ) -> Result<UniquePtr<Grid>>;
+        fn from_particles(
+            call: &Call,
+            positions: &[f64],
+            radii: &[f32],
             voxel: f64,
             half_width: f32,
         ) -> Result<UniquePtr<Grid>>;

@@ -118,13 +118,18 @@ fn text(path: &Path) -> Result<&str> {
     path.to_str().ok_or_else(|| Error::file(path, "the name is not valid UTF-8"))
 }
 
-fn cannot_read(path: &Path, error: &cxx::Exception) -> Error {
+/// OpenVDB's own words.
+fn reason(error: &cxx::Exception) -> String {
     let what = error.what();
     // OpenVDB's texts begin with the exception's name.
     let what = what.split_once(": ").map_or(what, |(_, rest)| rest);
     // A damaged name can be long and anything but text.
-    let what: String = what.chars().filter(|letter| !letter.is_control()).take(LONGEST_REASON).collect();
-    let reason = if what.trim().is_empty() { String::new() } else { format!(" ({})", what.trim()) };
+    what.chars().filter(|letter| !letter.is_control()).take(LONGEST_REASON).collect::<String>().trim().to_string()
+}
+
+fn cannot_read(path: &Path, error: &cxx::Exception) -> Error {
+    let what = reason(error);
+    let reason = if what.is_empty() { String::new() } else { format!(" ({what})") };
     Error::file(path, format!("the .vdb file cannot be read, it is cut short or damaged{reason}"))
 }
 
@@ -204,9 +209,32 @@ fn load(path: &Path, header: &GridInfo) -> Result<FloatGrid> {
     }
     let inner = ffi::read_float_grid(text(path)?, &header.name).map_err(|error| cannot_read(path, &error))?;
     let grid = FloatGrid { inner };
-    let finite = grid.leaves()?.iter().all(|leaf| leaf.values.iter().all(|value| value.is_finite()));
-    if !finite || !grid.background().is_finite() {
+    if !is_finite(&grid)? {
         return Err(Error::file(path, format!("grid \"{}\" has values that are not finite", header.name)));
+    }
+    Ok(grid)
+}
+
+fn is_finite(grid: &FloatGrid) -> Result<bool> {
+    let finite = grid.leaves()?.iter().all(|leaf| leaf.values.iter().all(|value| value.is_finite()));
+    Ok(finite && grid.background().is_finite())
+}
+
+/// The float grid of that name out of the bytes of a .vdb file; without a name the first level set, else the first
+/// float grid.
+///
+/// # Errors
+/// Bytes of another kind, cut short or damaged; no such grid; values that are not finite.
+pub fn from_bytes(bytes: &[u8], name: Option<&str>) -> Result<FloatGrid> {
+    if !bytes.starts_with(&MAGIC) {
+        return Err(Error::argument("these are not the bytes of a .vdb file"));
+    }
+    let inner = ffi::float_grid_from_bytes(bytes, name.unwrap_or("")).map_err(|error| {
+        Error::argument(format!("the bytes of the .vdb file cannot be read ({})", reason(&error)))
+    })?;
+    let grid = FloatGrid { inner };
+    if !is_finite(&grid)? {
+        return Err(Error::argument(format!("grid \"{}\" has values that are not finite", grid.name())));
     }
     Ok(grid)
 }

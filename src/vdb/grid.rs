@@ -45,6 +45,34 @@ pub struct FloatGrid {
     pub(super) inner: UniquePtr<ffi::Grid>,
 }
 
+/// Blocks with their memory, ready to be put into a grid.
+pub struct Ready(UniquePtr<ffi::Blocks>);
+
+impl Ready {
+    /// Copies blocks into leaves.
+    ///
+    /// # Errors
+    /// When memory runs out.
+    pub fn new(ctx: &Context, edits: &[BlockEdit]) -> Result<Self> {
+        let origins: Vec<Origin> = edits.iter().map(BlockEdit::origin).collect();
+        let parts = edits.iter().map(|edit| match edit {
+            BlockEdit::Dense(block) => (block.values.as_ptr() as usize, block.mask.as_ptr() as usize, 0.0),
+            BlockEdit::Constant(_, constant) => (0, 0, *constant),
+        });
+        let (mut values, mut masks, mut constants) = (Vec::new(), Vec::new(), Vec::new());
+        for (value, mask, constant) in parts {
+            values.push(value);
+            masks.push(mask);
+            constants.push(constant);
+        }
+        let (mut call, _flag) = call(ctx);
+        // The last step of an edit cannot be cancelled.
+        call.cancel = 0;
+        let blocks = ffi::make_blocks(&call, origins.as_flattened(), &values, &masks, &constants);
+        Ok(Self(blocks.map_err(fail)?))
+    }
+}
+
 // SAFETY: the C++ grid has no thread affinity, and nobody else holds its tree.
 unsafe impl Send for FloatGrid {}
 // SAFETY: `&` methods only read the tree; OpenVDB allows any number of readers.
@@ -216,31 +244,25 @@ impl FloatGrid {
         Ok(lent.collect())
     }
 
-    /// Puts blocks in the place of leaves or tiles. All memory is had before the first is put in.
+    /// Puts blocks in the place of leaves or tiles. All memory for leaves is had before the first is put in.
     ///
     /// # Errors
     /// When memory runs out; the grid is then as it was.
     pub fn replace_blocks(&mut self, ctx: &Context, edits: &[BlockEdit]) -> Result<()> {
-        let origins: Vec<Origin> = edits.iter().map(BlockEdit::origin).collect();
-        let mut values = Vec::with_capacity(edits.len());
-        let mut masks = Vec::with_capacity(edits.len());
-        let mut constants = Vec::with_capacity(edits.len());
-        for edit in edits {
-            let (value, mask, constant) = match edit {
-                BlockEdit::Dense(block) => {
-                    (block.values.as_ptr() as usize, block.mask.as_ptr() as usize, 0.0)
-                }
-                BlockEdit::Constant(_, constant) => (0, 0, *constant),
-            };
-            values.push(value);
-            masks.push(mask);
-            constants.push(constant);
-        }
-        let (mut call, _flag) = call(ctx);
-        // The last step of an edit cannot be cancelled.
-        call.cancel = 0;
-        let grid = self.inner.pin_mut();
-        ffi::replace_blocks(grid, &call, origins.as_flattened(), &values, &masks, &constants).map_err(fail)
+        self.put(Ready::new(ctx, edits)?)
+    }
+
+    /// Puts blocks in the place of leaves or tiles.
+    ///
+    /// # Errors
+    /// When memory for the nodes above leaves runs out.
+    pub fn put(&mut self, mut blocks: Ready) -> Result<()> {
+        ffi::put_blocks(self.inner.pin_mut(), blocks.0.pin_mut()).map_err(fail)
+    }
+
+    /// Bytes that a .vdb file of this grid takes at most.
+    pub fn file_bound(&self) -> u64 {
+        ffi::file_bound(&self.inner)
     }
 
     /// Value of a voxel.

@@ -40,6 +40,27 @@ pub fn from_mesh(ctx: &Context, mesh: &TriMesh, voxel: f64, half_width: f32) -> 
     Ok(FloatGrid { inner })
 }
 
+/// Level set of the union of spheres (m), `half_width` cells on each side; spheres smaller than a cell and a half
+/// are left out, as the grid cannot hold them.
+///
+/// # Errors
+/// Another number of radii than of positions, cancel, or what OpenVDB reports.
+pub fn from_particles(
+    ctx: &Context,
+    positions: &[DVec3],
+    radii: &[f32],
+    voxel: f64,
+    half_width: f32,
+) -> Result<FloatGrid> {
+    if positions.len() != radii.len() {
+        return Err(Error::argument(format!("{} positions, but {} radii", positions.len(), radii.len())));
+    }
+    let flat: Vec<f64> = positions.iter().flat_map(|p| [p.x, p.y, p.z]).collect();
+    let (call, _flag) = call(ctx);
+    let inner = ffi::from_particles(&call, &flat, radii, voxel, half_width).map_err(fail)?;
+    Ok(FloatGrid { inner })
+}
+
 /// Triangles of the surface at `iso` (m), counter-clockwise seen from outside. `adaptivity` in 0..=1
 /// merges flat regions.
 ///

@@ -10,7 +10,7 @@ mod leaf;
 pub mod level_set;
 pub mod ray;
 
-pub use grid::{FloatGrid, GridClass, MetaValue};
+pub use grid::{FloatGrid, GridClass, MetaValue, Ready};
 pub use leaf::{Leaf, LeafMut, Probe};
 
 use crate::context::Context;
@@ -31,6 +31,12 @@ fn call(ctx: &Context) -> (bridge::ffi::Call, std::sync::Arc<std::sync::atomic::
     let flag = ctx.cancel_flag();
     let call = bridge::ffi::Call { threads: ctx.pool().threads() as i32, cancel: flag.as_ptr() as usize };
     (call, flag)
+}
+
+/// Ends the worker threads that OpenVDB's tools have started in this process; they start again when they are needed.
+/// Threads that somebody else in the process uses are left alone. No tool may be at work meanwhile.
+pub fn end_workers() {
+    bridge::ffi::end_workers();
 }
 
 /// A call on the caller's thread that nobody can cancel.

@@ -4,7 +4,7 @@
 //! anything touched it: nothing is stored for untouched snow. What stands in it now is read off the snow itself,
 //! so that a layer that goes on from its grids has the same numbers as one that never stopped.
 
-use std::collections::{BTreeSet, HashMap};
+use std::collections::{BTreeSet, HashMap, HashSet};
 
 use rayon::prelude::*;
 
@@ -91,9 +91,9 @@ pub fn heights(surface: &FloatGrid, [x, z]: [i32; 2], low: i32, high: i32) -> Re
     Ok(heights)
 }
 
-/// The column blocks in which the snow is not what it was before the first step.
-pub fn touched(initial: &FloatGrid, now: &FloatGrid, low: i32, high: i32) -> Result<Columns> {
-    let mut places: BTreeSet<[i32; 2]> = BTreeSet::new();
+/// The blocks in which the snow is not what it was before the first step.
+pub fn changed(initial: &FloatGrid, now: &FloatGrid) -> Result<HashSet<Origin>> {
+    let mut places = HashSet::new();
     for [one, other] in [[initial, now], [now, initial]] {
         let leaves = one.leaves()?;
         let origins: Vec<Origin> = leaves.iter().map(|leaf| leaf.origin).collect();
@@ -103,8 +103,14 @@ pub fn touched(initial: &FloatGrid, now: &FloatGrid, low: i32, high: i32) -> Res
             Probe::Tile { .. } => true,
         });
         let differs: Vec<bool> = differs.collect();
-        places.extend(origins.iter().zip(differs).filter(|(_, differs)| *differs).map(|(o, _)| [o[0], o[2]]));
+        places.extend(origins.iter().zip(differs).filter(|(_, differs)| *differs).map(|(origin, _)| *origin));
     }
+    Ok(places)
+}
+
+/// The column blocks of blocks that changed.
+pub fn touched(initial: &FloatGrid, changed: &HashSet<Origin>, low: i32, high: i32) -> Result<Columns> {
+    let places: BTreeSet<[i32; 2]> = changed.iter().map(|[x, _, z]| [*x, *z]).collect();
     places
         .into_iter()
         .map(|place| Ok((place, Column { original: heights(initial, place, low, high)? })))

@@ -4,7 +4,7 @@ use super::empty_removed;
 use crate::base::blocks::{Block, BlockEdit, Origin, VOXELS};
 use crate::context::Context;
 use crate::error::{Error, Result};
-use crate::vdb::{FloatGrid, Leaf, MetaValue};
+use crate::vdb::{FloatGrid, Leaf, MetaValue, Ready};
 
 /// Metadata of `surface`: the snow's volume (m3), exactly as the layer counts it.
 const VOLUME: &str = "volume_m3";
@@ -94,9 +94,13 @@ impl Grids {
     /// # Errors
     /// When memory runs out.
     pub fn apply(&mut self, ctx: &Context, changes: &Changes) -> Result<()> {
-        self.surface.replace_blocks(ctx, &changes.surface)?;
-        self.compression.replace_blocks(ctx, &changes.compression)?;
-        self.touched.replace_blocks(ctx, &changes.touched)?;
+        // Nothing is put in place before all of it is there.
+        let surface = Ready::new(ctx, &changes.surface)?;
+        let compression = Ready::new(ctx, &changes.compression)?;
+        let touched = Ready::new(ctx, &changes.touched)?;
+        self.surface.put(surface)?;
+        self.compression.put(compression)?;
+        self.touched.put(touched)?;
         self.surface.set_metadata(VOLUME, MetaValue::Double(changes.volume))
     }
 

@@ -6,10 +6,12 @@ mod columns;
 mod edit;
 mod grids;
 pub mod initial;
+mod marks;
 mod noise;
+mod state;
 mod wanted;
 
-use std::collections::{BTreeSet, HashMap};
+use std::collections::{BTreeSet, HashMap, HashSet};
 
 use rayon::prelude::*;
 
@@ -17,13 +19,14 @@ pub use grids::{Changes, Grids};
 pub use noise::{NoiseParams, displace};
 
 use crate::base::DVec3;
-use crate::base::blocks::{Block, BlockEdit, Mask, Origin, VOXELS, Values};
+use crate::base::blocks::{BlockEdit, Origin};
 use crate::context::{Context, StageTime};
 use crate::error::{Error, Result};
 use crate::sweep::{Band, Body, Face, Lattice, Piece, Scratch, Settings, UNITS, Voxeliser, Window};
 use crate::vdb::{FloatGrid, GridClass, MetaValue, Probe};
-use columns::{Column, Columns, Heights};
+use columns::Columns;
 use edit::{Edit, Scale};
+use marks::Mark;
 use noise::Displacement;
 use wanted::snow_masks;
 
@@ -40,6 +43,16 @@ impl Params {
     /// The thesis' look: noise of two cells.
     pub fn for_cell(cell: f64) -> Self {
         Self { noise: Some(NoiseParams::for_cell(cell)), tolerance: 0.02 }
+    }
+
+    /// Checks every field for a layer's cells.
+    ///
+    /// # Errors
+    /// Names the field and its range.
+    fn validate(&self, surface: &FloatGrid) -> Result<()> {
+        let (voxel, half_width) = (surface.voxel_size(), half_width(surface).round());
+        Settings { voxel, half_width, tolerance: self.tolerance }.validate()?;
+        self.noise.as_ref().map_or(Ok(()), |noise| noise.validate(voxel))
     }
 }
 
@@ -65,6 +78,10 @@ pub struct BaseLayer {
     /// The last step's, the removed level set among them.
     changes: Changes,
     columns: Columns,
+    /// Blocks that are not what they were before the first step.
+    changed: HashSet<Origin>,
+    /// Which layer that was.
+    initial: u128,
     /// Voxels that snow can be in.
     low: [i32; 3],
     high: [i32; 3],
@@ -77,23 +94,22 @@ impl BaseLayer {
     /// # Errors
     /// When `surface` is no level set, holds nothing or is not world-fixed, or a parameter is out of range.
     pub fn new(ctx: &Context, surface: FloatGrid, params: Params) -> Result<Self> {
-        let cell = surface.voxel_size();
+        params.validate(&surface)?;
         if surface.class() != GridClass::LevelSet {
             return Err(Error::argument("the snow is not a level set"));
         }
         if !surface.is_world_fixed() {
             return Err(Error::argument("the snow's grid is rotated or shifted against the world's axes"));
         }
-        let half_width = (f64::from(surface.background()) / cell) as f32;
-        Settings { voxel: cell, half_width: half_width.round(), tolerance: params.tolerance }.validate()?;
-        if let Some(noise) = &params.noise {
-            noise.validate(cell)?;
-        }
+        let half_width = half_width(&surface);
         let (low, high) = surface.active_bbox().ok_or_else(|| Error::argument("the snow is empty"))?;
-        let volume = ctx.pool().install(|| columns::volume(&surface, low, high))?;
+        let (volume, initial) = ctx.stage("measure", || {
+            Ok((columns::volume(&surface, low, high)?, state::fingerprint(&surface)?))
+        })?;
         let grids = Grids::new(surface, volume)?;
         let changes = Changes::none(&grids, half_width)?;
-        Ok(Self { params, grids, changes, columns: HashMap::new(), low, high, half_width })
+        let (columns, changed) = Default::default();
+        Ok(Self { params, grids, changes, columns, changed, initial, low, high, half_width })
     }
 
     /// Goes on from the grids that an earlier step left; `initial` is the layer before the first step.
@@ -109,8 +125,25 @@ impl BaseLayer {
             return Err(Error::argument("the layer to go on from has other cells than the first one"));
         }
         layer.changes = Changes::none(&layer.grids, layer.half_width)?;
-        layer.columns = columns::touched(&initial, &layer.grids.surface, layer.low[1], layer.high[1])?;
+        let [low, high] = [layer.low[1], layer.high[1]];
+        layer.changed = columns::changed(&initial, &layer.grids.surface)?;
+        layer.columns = columns::touched(&initial, &layer.changed, low, high)?;
         Ok(layer)
+    }
+
+    /// How objects press into the snow from the next step on.
+    ///
+    /// # Errors
+    /// A parameter out of range; the old ones then stay.
+    pub fn set_params(&mut self, params: Params) -> Result<()> {
+        params.validate(&self.grids.surface)?;
+        self.params = params;
+        Ok(())
+    }
+
+    /// How objects press into the snow.
+    pub fn params(&self) -> &Params {
+        &self.params
     }
 
     /// Half width of the snow's narrow band (cells).
@@ -135,6 +168,12 @@ impl BaseLayer {
     /// The snow (level set).
     pub fn surface(&self) -> &FloatGrid {
         &self.grids.surface
+    }
+
+    /// Blocks (their least corners) that the last step changed, in any of the grids.
+    pub fn dirty(&self) -> impl Iterator<Item = Origin> {
+        // Frames change where the snow changes; compression in the whole columns there.
+        self.changes.surface.iter().chain(&self.changes.compression).map(BlockEdit::origin).collect::<BTreeSet<_>>().into_iter()
     }
 
     /// What the last step removed (level set).
@@ -177,7 +216,7 @@ impl BaseLayer {
         let (ragged, ragged_faces) = self.sweep(ctx, &ragged, from, to, displacement.as_ref())?;
         let (exact, exact_faces) = self.sweep(ctx, &exact, from, to, None)?;
         let pieces = united(ragged, exact);
-        let edits = ctx.stage("subtract", || self.edits(&pieces))?;
+        let edits = ctx.stage("subtract", || self.edits(ctx, &pieces))?;
         let (changes, columns, removed_volume) = ctx.stage("columns", || self.changes(ctx, edits, frame))?;
         let touched_blocks = changes.surface.len();
         self.commit(ctx, changes, columns)?;
@@ -257,23 +296,25 @@ impl BaseLayer {
         let mut pieces: Vec<Piece> = (0..near.len())
             .into_par_iter()
             .map_init(Scratch::default, |scratch, index| {
-                if ctx.is_cancelled() { None } else { voxeliser.piece(index, &wanted[index], scratch) }
+                if ctx.check().is_err() { None } else { voxeliser.piece(index, &wanted[index], scratch) }
             })
             .flatten_iter()
             .collect();
-        ctx.check()?;
         pieces.extend(voxeliser.inside_blocks().into_iter().map(Piece::Inside));
         Ok(pieces)
     }
 
-    fn edits(&self, pieces: &[Piece]) -> Result<Vec<Edit>> {
+    /// What the snow becomes; nothing is put in place yet.
+    fn edits(&self, ctx: &Context, pieces: &[Piece]) -> Result<Vec<Edit>> {
         let origins: Vec<Origin> = pieces.iter().map(Piece::origin).collect();
         let snow: Vec<Probe<'_>> = self.grids.surface.probe(&origins)?;
         let scale = self.scale();
         Ok(pieces
             .par_iter()
             .zip(&snow)
-            .filter_map(|(piece, snow)| edit::subtract(piece, snow, scale))
+            .filter_map(|(piece, snow)| {
+                if ctx.check().is_err() { None } else { edit::subtract(piece, snow, scale) }
+            })
             .collect())
     }
 
@@ -282,9 +323,12 @@ impl BaseLayer {
         let cell = self.grids.surface.voxel_size();
         let mut removed = empty_removed(cell, self.half_width)?;
         let volume = edits.iter().map(Edit::volume).sum::<f64>() * cell.powi(3);
-        let fresh = self.new_columns(&edits)?;
-        let touched = self.touched_edits(&edits, frame)?;
-        let compression = self.compression_edits(&fresh, &edits, &touched)?;
+        let fresh = self.new_columns(edits.iter().map(|edit| edit.surface.origin()))?;
+        let marks: Vec<Mark<'_>> =
+            edits.iter().map(|edit| Mark { surface: &edit.surface, changed: &edit.changed }).collect();
+        let touched = self.touched_edits(&marks, frame)?;
+        let surfaces: Vec<&BlockEdit> = edits.iter().map(|edit| &edit.surface).collect();
+        let compression = self.compression_edits(ctx, &fresh, &surfaces, &touched)?;
         let (surface, taken): (Vec<BlockEdit>, Vec<Option<BlockEdit>>) =
             edits.into_iter().map(|edit| (edit.surface, edit.removed)).unzip();
         removed.replace_blocks(ctx, &taken.into_iter().flatten().collect::<Vec<_>>())?;
@@ -294,109 +338,19 @@ impl BaseLayer {
         Ok((Changes { surface, touched, compression, removed, volume: left }, fresh, volume))
     }
 
-    /// Heights before the first touch of the column blocks that nothing touched before these edits.
-    fn new_columns(&self, edits: &[Edit]) -> Result<Columns> {
-        let places: BTreeSet<[i32; 2]> = edits.iter().map(|edit| column_of(edit.surface.origin())).collect();
-        let new = places.into_iter().filter(|place| !self.columns.contains_key(place));
-        new.map(|place| {
-            let original = columns::heights(&self.grids.surface, place, self.low[1], self.high[1])?;
-            Ok((place, Column { original }))
-        })
-        .collect()
-    }
-
-    /// Frame numbers at the surface voxels of the changed blocks.
-    fn touched_edits(&self, edits: &[Edit], frame: i32) -> Result<Vec<BlockEdit>> {
-        let origins: Vec<Origin> = edits.iter().map(|edit| edit.surface.origin()).collect();
-        let before = self.grids.touched.probe(&origins)?;
-        let edit_one = |(edit, before): (&Edit, &Probe<'_>)| {
-            let BlockEdit::Dense(surface) = &edit.surface else {
-                return BlockEdit::Constant(edit.surface.origin(), 0.0);
-            };
-            let (mut values, known) = match before {
-                Probe::Leaf(leaf) => (Box::new(*leaf.values), *leaf.mask),
-                Probe::Tile { .. } => (Box::new([0.0; VOXELS]), [0; 8]),
-            };
-            for index in (0..VOXELS).filter(|&index| edit.changed[index >> 6] >> (index & 63) & 1 == 1) {
-                values[index] = frame as f32;
-            }
-            let mask: Mask = std::array::from_fn(|x| surface.mask[x] & (known[x] | edit.changed[x]));
-            masked(surface.origin, values, mask)
-        };
-        Ok(edits.par_iter().zip(&before).map(edit_one).collect())
-    }
-
-    /// Compression at every touched surface voxel of the columns that the edits change.
-    fn compression_edits(
-        &self,
-        fresh: &Columns,
-        edits: &[Edit],
-        touched: &[BlockEdit],
-    ) -> Result<Vec<BlockEdit>> {
-        let now: HashMap<Origin, (&Edit, &BlockEdit)> = edits
-            .iter()
-            .zip(touched)
-            .map(|(edit, touched)| (edit.surface.origin(), (edit, touched)))
-            .collect();
-        let places: BTreeSet<[i32; 2]> = now.keys().map(|origin| column_of(*origin)).collect();
-        let cell = self.grids.surface.voxel_size() as f32;
-        let levels = columns::levels(self.low[1], self.high[1]);
-        let column_edits = |&[x, z]: &[i32; 2]| -> Result<Vec<BlockEdit>> {
-            let column = fresh.get(&[x, z]).or_else(|| self.columns.get(&[x, z]));
-            let column = column.ok_or_else(|| Error::Internal("a changed column is not known".into()))?;
-            let origins: Vec<Origin> = levels.clone().map(|y| [x, y, z]).collect();
-            let mut heights = Heights::default();
-            for (origin, before) in origins.iter().zip(self.grids.surface.probe(&origins)?) {
-                match now.get(origin).map(|(edit, _)| &edit.surface) {
-                    Some(BlockEdit::Dense(block)) => heights.add(&block.values, cell),
-                    Some(BlockEdit::Constant(_, value)) => heights.add_constant(*value),
-                    None => heights.add_probe(&before, cell),
-                }
-            }
-            let compression = column.compression(&heights);
-            let mut out = Vec::new();
-            for (origin, before) in origins.iter().zip(self.grids.touched.probe(&origins)?) {
-                let mask = match (now.get(origin).map(|(_, touched)| touched), before) {
-                    (Some(BlockEdit::Dense(block)), _) => block.mask,
-                    (Some(BlockEdit::Constant(..)), _) => [0; 8],
-                    (None, Probe::Leaf(leaf)) => *leaf.mask,
-                    (None, Probe::Tile { .. }) => continue,
-                };
-                let values = std::array::from_fn(|index| compression[columns::cell_of(index)]);
-                out.push(masked(*origin, Box::new(values), mask));
-            }
-            Ok(out)
-        };
-        let places: Vec<[i32; 2]> = places.into_iter().collect();
-        let parts: Vec<Vec<BlockEdit>> = places.par_iter().map(column_edits).collect::<Result<_>>()?;
-        Ok(parts.into_iter().flatten().collect())
-    }
-
     /// Puts a step's changes in place.
     fn commit(&mut self, ctx: &Context, changes: Changes, columns: Columns) -> Result<()> {
-        self.grids.apply(ctx, &changes)?;
+        ctx.commit(|| self.grids.apply(ctx, &changes))?;
         self.columns.extend(columns);
+        self.changed.extend(changes.surface.iter().map(BlockEdit::origin));
         self.changes = changes;
         Ok(())
     }
 }
 
-/// x and z of the column block that a block stands in.
-fn column_of([x, _, z]: Origin) -> [i32; 2] {
-    [x, z]
-}
-
-/// A block whose inactive values are 0; constant when no voxel is active.
-fn masked(origin: Origin, mut values: Box<Values>, mask: Mask) -> BlockEdit {
-    if mask == [0; 8] {
-        return BlockEdit::Constant(origin, 0.0);
-    }
-    for (index, value) in values.iter_mut().enumerate() {
-        if mask[index >> 6] >> (index & 63) & 1 == 0 {
-            *value = 0.0;
-        }
-    }
-    BlockEdit::Dense(Block { origin, values, mask })
+/// Half width of a level set's narrow band (cells).
+fn half_width(surface: &FloatGrid) -> f32 {
+    (f64::from(surface.background()) / surface.voxel_size()) as f32
 }
 
 /// The union of two sweeps, block by block.

@@ -1,0 +1,149 @@
+//! Worker threads that several computations share.
+
+use std::cell::Cell;
+use std::sync::{Arc, Mutex};
+use std::thread::JoinHandle;
+
+use crate::base::cpu::FlushDenormals;
+use crate::error::{Error, Result};
+
+/// Most threads of a pool.
+pub const MOST_THREADS: usize = 1024;
+
+/// Worker threads, shared by any number of contexts; joined when dropped.
+pub struct Pool {
+    /// None: everything runs on the thread that asks for it.
+    rayon: Option<rayon::ThreadPool>,
+    workers: Mutex<Vec<JoinHandle<()>>>,
+}
+
+impl Pool {
+    /// Starts `threads` workers, at most [`MOST_THREADS`]; 0 runs everything on the caller's thread.
+    ///
+    /// # Errors
+    /// Too many threads, or the system refuses to start them.
+    pub fn new(threads: usize) -> Result<Arc<Self>> {
+        if threads > MOST_THREADS {
+            return Err(Error::argument(format!("threads = {threads} is not within 0 to {MOST_THREADS}")));
+        }
+        if threads == 0 {
+            return Ok(Arc::new(Self { rayon: None, workers: Mutex::default() }));
+        }
+        let workers = Arc::new(Mutex::new(Vec::new()));
+        let spawned = workers.clone();
+        let rayon = rayon::ThreadPoolBuilder::new()
+            .num_threads(threads)
+            .thread_name(|index| format!("frazil-{index}"))
+            .spawn_handler(move |worker| {
+                let name = worker.name().unwrap_or("frazil").to_string();
+                let work = || {
+                    let _flush = FlushDenormals::begin();
+                    worker.run();
+                };
+                let handle = std::thread::Builder::new().name(name).spawn(work)?;
+                spawned.lock().expect("no panic while spawning").push(handle);
+                Ok(())
+            })
+            .build()
+            .map_err(|error| Error::argument(format!("cannot start {threads} threads: {error}")))?;
+        let workers = Mutex::new(std::mem::take(&mut *workers.lock().expect("no panic while spawning")));
+        Ok(Arc::new(Self { rayon: Some(rayon), workers }))
+    }
+
+    /// A pool with one worker per core that this process may use.
+    ///
+    /// # Errors
+    /// As [`Pool::new`].
+    pub fn all_cores() -> Result<Arc<Self>> {
+        Self::new(std::thread::available_parallelism().map_or(1, |count| count.get()).min(MOST_THREADS))
+    }
+
+    /// Number of threads that work at once (at least 1).
+    pub fn threads(&self) -> usize {
+        self.rayon.as_ref().map_or(1, rayon::ThreadPool::current_num_threads)
+    }
+
+    /// Runs `work` on a worker thread, or on this one when there are no workers; its parallel loops use this
+    /// pool. Denormal numbers count as 0 meanwhile.
+    pub fn install<R: Send>(&self, work: impl FnOnce() -> R + Send) -> R {
+        match &self.rayon {
+            Some(pool) => pool.install(work),
+            None => {
+                let _flush = FlushDenormals::begin();
+                match this_thread() {
+                    Some(pool) => pool.install(work),
+                    None => work(),
+                }
+            }
+        }
+    }
+
+    /// The workers, if the calling thread is none of them and can look on while they work.
+    pub(super) fn workers(&self) -> Option<&rayon::ThreadPool> {
+        self.rayon.as_ref().filter(|pool| pool.current_thread_index().is_none())
+    }
+
+    /// Whether everything runs on the thread that asks for it.
+    pub(super) fn is_inline(&self) -> bool {
+        self.rayon.is_none()
+    }
+}
+
+impl Drop for Pool {
+    fn drop(&mut self) {
+        // Dropping a rayon pool only asks its threads to end: wait until they have.
+        self.rayon = None;
+        let workers = self.workers.get_mut().map(std::mem::take).unwrap_or_default();
+        for worker in workers {
+            let _ = worker.join();
+        }
+    }
+}
+
+/// A pool of this thread alone: without one, rayon's loops would start a pool of the whole process. It is made
+/// once for a thread and stays until the process ends, as rayon wants it. None on a thread that is another
+/// pool's worker: loops then run there.
+fn this_thread() -> Option<&'static rayon::ThreadPool> {
+    thread_local! {
+        static POOL: Cell<Option<&'static rayon::ThreadPool>> = const { Cell::new(None) };
+    }
+    if POOL.get().is_none() {
+        let made = rayon::ThreadPoolBuilder::new().num_threads(1).use_current_thread().build();
+        POOL.set(made.ok().map(|pool| &*Box::leak(Box::new(pool))));
+    }
+    POOL.get()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use rayon::prelude::*;
+
+    #[test]
+    fn a_pool_without_workers_stays_on_the_callers_thread() {
+        let pool = Pool::new(0).unwrap();
+        let here = std::thread::current().id();
+        for _ in 0..2 {
+            let all_here = pool.install(|| {
+                (0..10_000).into_par_iter().map(|_| std::thread::current().id() == here).reduce(|| true, |a, b| a & b)
+            });
+            assert!(all_here);
+        }
+        assert_eq!(pool.threads(), 1);
+    }
+
+    #[test]
+    fn denormals_are_zero_in_a_pool_and_come_back() {
+        let tiny = std::hint::black_box(f32::MIN_POSITIVE);
+        let halved = || std::hint::black_box(tiny) * 0.5;
+        for threads in [0, 2] {
+            assert_eq!(Pool::new(threads).unwrap().install(halved) > 0.0, !cfg!(target_arch = "x86_64"));
+            assert!(halved() > 0.0);
+        }
+    }
+
+    #[test]
+    fn more_threads_than_any_machine_has_are_refused() {
+        assert!(Pool::new(MOST_THREADS + 1).is_err());
+    }
+}

@@ -1,0 +1,329 @@
+//! A layer as bytes, for a host's own cache: what differs from the layer before the first step, packed.
+//!
+//! Blocks go in groups that are packed and unpacked in parallel. Of each block the narrow band's values are kept
+//! bit for bit, their bytes sorted by significance before LZ4 sees them; what follows from the snow itself
+//! (compression, heights, tiles) is not kept. The bytes are the same on any number of threads.
+
+use rayon::prelude::*;
+use xxhash_rust::xxh3::{Xxh3, xxh3_64, xxh3_128};
+
+use super::{BaseLayer, Changes, Params};
+use crate::base::blocks::{Block, BlockEdit, Mask, Origin, VOXELS};
+use crate::context::Context;
+use crate::error::{Error, Result};
+use crate::vdb::{FloatGrid, Leaf, Probe};
+
+const MAGIC: [u8; 8] = *b"frz base";
+const VERSION: u32 = 1;
+/// Bytes before the groups.
+const HEADER: usize = 80;
+/// Blocks packed together.
+const GROUP: usize = 256;
+/// Most bytes of a block before packing: values and frames of every voxel, three masks, origin, kind.
+const BLOCK: usize = 2 * 4 * VOXELS + 3 * 64 + 16;
+
+/// How a block is kept; [`TOUCHED`] is added where it has frames of its last change.
+const CONSTANT: u8 = 0;
+/// The narrow band's values; all others are the background, with a sign.
+const BAND: u8 = 1;
+/// All 512 values.
+const WHOLE: u8 = 2;
+const TOUCHED: u8 = 4;
+
+impl BaseLayer {
+    /// The state between two steps.
+    ///
+    /// # Errors
+    /// Cancel; when memory runs out.
+    pub fn save(&self, ctx: &Context) -> Result<Vec<u8>> {
+        ctx.stage("save", || {
+            let mut origins: Vec<Origin> = self.changed.iter().copied().collect();
+            origins.par_sort_unstable();
+            let surface = self.grids.surface.probe(&origins)?;
+            let touched = self.grids.touched.probe(&origins)?;
+            let background = self.grids.surface.background();
+            let groups: Vec<Vec<u8>> = (0..origins.len().div_ceil(GROUP))
+                .into_par_iter()
+                .map(|group| {
+                    ctx.check()?;
+                    let range = group * GROUP..((group + 1) * GROUP).min(origins.len());
+                    let [surface, touched] = [&surface, &touched].map(|probes| &probes[range.clone()]);
+                    Ok(pack(&origins[range.clone()], surface, touched, background))
+                })
+                .collect::<Result<_>>()?;
+            let mut bytes = self.header(&groups.iter().map(Vec::len).sum::<usize>());
+            groups.iter().for_each(|group| bytes.extend_from_slice(group));
+            let seal = seal(&bytes);
+            bytes[HEADER - 16..HEADER].copy_from_slice(&seal);
+            Ok(bytes)
+        })
+    }
+
+    /// Bytes that suffice for [`BaseLayer::save`].
+    pub fn save_bound(&self) -> usize {
+        let groups = self.changed.len().div_ceil(GROUP);
+        HEADER + groups * (12 + lz4_flex::block::get_maximum_output_size(GROUP * BLOCK))
+    }
+
+    /// The layer that [`BaseLayer::save`] saw; `initial` is the layer before the first step, as it was given to
+    /// [`BaseLayer::new`].
+    ///
+    /// # Errors
+    /// As [`BaseLayer::new`]; bytes that are damaged, of another version, or of another initial layer.
+    pub fn restore(ctx: &Context, initial: FloatGrid, params: Params, state: &[u8]) -> Result<Self> {
+        let mut layer = Self::new(ctx, initial, params)?;
+        let (surface, touched) = ctx.stage("unpack", || layer.unpack(ctx, state))?;
+        let columns = ctx.stage("columns", || layer.new_columns(surface.iter().map(BlockEdit::origin)))?;
+        let surfaces: Vec<&BlockEdit> = surface.iter().collect();
+        let compression =
+            ctx.stage("compression", || layer.compression_edits(ctx, &columns, &surfaces, &touched))?;
+        let removed = super::empty_removed(layer.surface().voxel_size(), layer.half_width)?;
+        let volume = f64::from_le_bytes(array(&state[44..52]));
+        layer.commit(ctx, Changes { surface, touched, compression, removed, volume }, columns)?;
+        // Nothing has changed since this state.
+        layer.take_changes()?;
+        Ok(layer)
+    }
+
+    /// 0 magic, 8 version, 12 blocks, 16 cell, 24 background, 28 initial layer, 44 volume, 52 bytes that follow,
+    /// 60 nothing, 64 seal.
+    fn header(&self, following: &usize) -> Vec<u8> {
+        let mut out = Vec::with_capacity(HEADER + following);
+        out.extend(MAGIC);
+        out.extend(VERSION.to_le_bytes());
+        out.extend((self.changed.len() as u32).to_le_bytes());
+        out.extend(self.grids.surface.voxel_size().to_le_bytes());
+        out.extend(self.grids.surface.background().to_le_bytes());
+        out.extend(self.initial.to_le_bytes());
+        out.extend(self.changes.volume.to_le_bytes());
+        out.extend((*following as u64).to_le_bytes());
+        out.resize(HEADER, 0);
+        out
+    }
+
+    /// The blocks of a state: the snow, and the frames of its last changes.
+    fn unpack(&self, ctx: &Context, state: &[u8]) -> Result<(Vec<BlockEdit>, Vec<BlockEdit>)> {
+        let refused = |what: &str| Error::argument(format!("the saved state {what}"));
+        if state.len() < HEADER || state[..8] != MAGIC {
+            return Err(refused("is none of a base layer"));
+        }
+        let version = u32::from_le_bytes(array(&state[8..12]));
+        if version != VERSION {
+            return Err(refused(&format!("has format {version}, this library reads {VERSION}")));
+        }
+        let following = u64::from_le_bytes(array(&state[52..60]));
+        if following != (state.len() - HEADER) as u64 || seal(state) != state[HEADER - 16..HEADER] {
+            return Err(refused("is cut short or damaged"));
+        }
+        let same = state[16..24] == self.grids.surface.voxel_size().to_le_bytes()
+            && state[24..28] == self.grids.surface.background().to_le_bytes()
+            && state[28..44] == self.initial.to_le_bytes();
+        if !same {
+            return Err(refused("belongs to another initial layer"));
+        }
+        let damaged = || refused("is damaged");
+        let mut reader = Reader(&state[HEADER..]);
+        let mut groups = Vec::new();
+        while !reader.0.is_empty() {
+            let [blocks, length] = [reader.number(), reader.number()].map(|n| n.map(|n| n as usize));
+            let packed = reader.take(length.ok_or_else(damaged)?).ok_or_else(damaged)?;
+            groups.push((blocks.filter(|&blocks| blocks <= GROUP).ok_or_else(damaged)?, packed));
+        }
+        let background = self.grids.surface.background();
+        let unpacked: Vec<(Vec<BlockEdit>, Vec<BlockEdit>)> = groups
+            .into_par_iter()
+            .map(|(blocks, packed)| {
+                ctx.check()?;
+                let raw = lz4_flex::block::decompress(packed, blocks * BLOCK).map_err(|_| damaged())?;
+                read_group(&mut Reader(&raw), blocks, background).ok_or_else(damaged)
+            })
+            .collect::<Result<_>>()?;
+        let (surface, touched): (Vec<_>, Vec<_>) = unpacked.into_iter().unzip();
+        Ok((surface.into_iter().flatten().collect(), touched.into_iter().flatten().collect()))
+    }
+}
+
+/// What tells a layer from others: a hash of its leaves.
+pub fn fingerprint(surface: &FloatGrid) -> Result<u128> {
+    let leaf = |leaf: &Leaf<'_>| {
+        let mut bytes = [0u8; 12 + 4 * VOXELS + 64];
+        let (origin, rest) = bytes.split_at_mut(12);
+        let (values, mask) = rest.split_at_mut(4 * VOXELS);
+        origin.chunks_exact_mut(4).zip(leaf.origin).for_each(|(to, from)| to.copy_from_slice(&from.to_le_bytes()));
+        values.chunks_exact_mut(4).zip(leaf.values).for_each(|(to, from)| to.copy_from_slice(&from.to_le_bytes()));
+        mask.chunks_exact_mut(8).zip(leaf.mask).for_each(|(to, from)| to.copy_from_slice(&from.to_le_bytes()));
+        xxh3_64(&bytes)
+    };
+    let leaves: Vec<u64> = surface.leaves()?.par_iter().map(leaf).collect();
+    Ok(xxh3_128(&leaves.iter().flat_map(|hash| hash.to_le_bytes()).collect::<Vec<u8>>()))
+}
+
+/// Hash of all but its own place.
+fn seal(state: &[u8]) -> [u8; 16] {
+    let mut hash = Xxh3::new();
+    hash.update(&state[..HEADER - 16]);
+    hash.update(&state[HEADER..]);
+    hash.digest128().to_le_bytes()
+}
+
+/// A group with its number of blocks and its length before it.
+fn pack(origins: &[Origin], surface: &[Probe<'_>], touched: &[Probe<'_>], background: f32) -> Vec<u8> {
+    let packed = lz4_flex::block::compress(&write_group(origins, surface, touched, background));
+    let mut out = Vec::with_capacity(8 + packed.len());
+    out.extend((origins.len() as u32).to_le_bytes());
+    out.extend((packed.len() as u32).to_le_bytes());
+    out.extend(packed);
+    out
+}
+
+fn write_group(origins: &[Origin], surface: &[Probe<'_>], touched: &[Probe<'_>], background: f32) -> Vec<u8> {
+    let (mut head, mut masks) = (Vec::new(), Vec::new());
+    let (mut values, mut frames) = (Vec::new(), Vec::new());
+    let mut put_mask = |mask: &Mask| masks.extend(mask.iter().flat_map(|word| word.to_le_bytes()));
+    for ((origin, surface), touched) in origins.iter().zip(surface).zip(touched) {
+        let marked = matches!(touched, Probe::Leaf(_));
+        let kind = match surface {
+            Probe::Tile { .. } => CONSTANT,
+            Probe::Leaf(leaf) if outside_band(leaf).all(|value| value.abs() == background) => BAND,
+            Probe::Leaf(_) => WHOLE,
+        };
+        head.extend(origin.iter().flat_map(|index| index.to_le_bytes()));
+        head.push(kind | if marked { TOUCHED } else { 0 });
+        match surface {
+            Probe::Tile { value, .. } => values.push(*value),
+            Probe::Leaf(leaf) => {
+                put_mask(leaf.mask);
+                if kind == BAND {
+                    put_mask(&std::array::from_fn(|x| (0..64).fold(0, |word, at| word | negative(leaf, x, at))));
+                    values.extend(active(leaf.mask).map(|index| leaf.values[index]));
+                } else {
+                    values.extend(leaf.values);
+                }
+            }
+        }
+        if let Probe::Leaf(leaf) = touched {
+            put_mask(leaf.mask);
+            frames.extend(active(leaf.mask).map(|index| leaf.values[index]));
+        }
+    }
+    let mut out = head;
+    out.append(&mut masks);
+    for numbers in [&values, &frames] {
+        for byte in (0..4).rev() {
+            out.extend(numbers.iter().map(|number| number.to_le_bytes()[byte]));
+        }
+    }
+    out
+}
+
+/// A bit where an inactive value is negative.
+fn negative(leaf: &Leaf<'_>, x: usize, at: usize) -> u64 {
+    u64::from(leaf.mask[x] >> at & 1 == 0 && leaf.values[x << 6 | at] < 0.0) << at
+}
+
+fn outside_band<'a>(leaf: &'a Leaf<'_>) -> impl Iterator<Item = f32> + 'a {
+    (0..VOXELS).filter(|index| leaf.mask[index >> 6] >> (index & 63) & 1 == 0).map(|index| leaf.values[index])
+}
+
+/// Indices of the voxels that a mask has, ascending.
+fn active(mask: &Mask) -> impl Iterator<Item = usize> + '_ {
+    mask.iter().enumerate().flat_map(|(x, &word)| {
+        std::iter::successors((word != 0).then_some(word), |word| Some(word & (word - 1)).filter(|left| *left != 0))
+            .map(move |word| x << 6 | word.trailing_zeros() as usize)
+    })
+}
+
+/// What [`write_group`] wrote; none where the bytes do not hold it.
+fn read_group(
+    reader: &mut Reader<'_>,
+    blocks: usize,
+    background: f32,
+) -> Option<(Vec<BlockEdit>, Vec<BlockEdit>)> {
+    let heads: Vec<(Origin, u8)> = (0..blocks)
+        .map(|_| {
+            let origin = [reader.number()?, reader.number()?, reader.number()?].map(|index| index as i32);
+            Some((origin, reader.take(1)?[0]))
+        })
+        .collect::<Option<_>>()?;
+    if heads.iter().any(|(origin, kind)| kind & !TOUCHED > WHOLE || origin.iter().any(|index| index & 7 != 0)) {
+        return None;
+    }
+    let (mut value_count, mut frame_count) = (0, 0);
+    let mut all_masks = Vec::with_capacity(blocks);
+    for (_, kind) in &heads {
+        let mut mask = |wanted: bool| if wanted { reader.mask() } else { Some([0; 8]) };
+        let (plain, touched) = (kind & !TOUCHED, kind & TOUCHED != 0);
+        let masks = [mask(plain != CONSTANT)?, mask(plain == BAND)?, mask(touched)?];
+        value_count += match plain {
+            CONSTANT => 1,
+            BAND => count(&masks[0]),
+            _ => VOXELS,
+        };
+        frame_count += count(&masks[2]);
+        all_masks.push(masks);
+    }
+    let values = reader.numbers(value_count)?;
+    let frames = reader.numbers(frame_count)?;
+    let (mut values, mut frames) = (values.into_iter(), frames.into_iter());
+    let (mut surface, mut touched) = (Vec::with_capacity(blocks), Vec::with_capacity(blocks));
+    for (&(origin, kind), [mask, signs, marked]) in heads.iter().zip(all_masks) {
+        surface.push(match kind & !TOUCHED {
+            CONSTANT => BlockEdit::Constant(origin, values.next()?),
+            BAND => {
+                let sign = |index: usize| signs[index >> 6] >> (index & 63) & 1 == 1;
+                let mut all =
+                    Box::new(std::array::from_fn(|index| if sign(index) { -background } else { background }));
+                active(&mask).zip(&mut values).for_each(|(index, value)| all[index] = value);
+                BlockEdit::Dense(Block { origin, values: all, mask })
+            }
+            _ => {
+                let all = Box::new(std::array::from_fn(|_| values.next().unwrap_or(0.0)));
+                BlockEdit::Dense(Block { origin, values: all, mask })
+            }
+        });
+        touched.push(if kind & TOUCHED == 0 {
+            BlockEdit::Constant(origin, 0.0)
+        } else {
+            let mut all = Box::new([0.0; VOXELS]);
+            active(&marked).zip(&mut frames).for_each(|(index, frame)| all[index] = frame);
+            BlockEdit::Dense(Block { origin, values: all, mask: marked })
+        });
+    }
+    reader.0.is_empty().then_some((surface, touched))
+}
+
+fn count(mask: &Mask) -> usize {
+    mask.iter().map(|word| word.count_ones() as usize).sum()
+}
+
+/// Bytes that are taken from the front.
+struct Reader<'a>(&'a [u8]);
+
+impl<'a> Reader<'a> {
+    fn take(&mut self, count: usize) -> Option<&'a [u8]> {
+        let (taken, rest) = self.0.split_at_checked(count)?;
+        self.0 = rest;
+        Some(taken)
+    }
+
+    fn number(&mut self) -> Option<u32> {
+        Some(u32::from_le_bytes(array(self.take(4)?)))
+    }
+
+    fn mask(&mut self) -> Option<Mask> {
+        let bytes = self.take(64)?;
+        Some(std::array::from_fn(|x| u64::from_le_bytes(array(&bytes[8 * x..8 * x + 8]))))
+    }
+
+    /// Numbers whose bytes are sorted by significance, the highest first.
+    fn numbers(&mut self, count: usize) -> Option<Vec<f32>> {
+        let bytes = self.take(count.checked_mul(4)?)?;
+        let number = |index: usize| f32::from_le_bytes([3, 2, 1, 0].map(|byte: usize| bytes[byte * count + index]));
+        Some((0..count).map(number).collect())
+    }
+}
+
+/// A slice of known length as an array.
+fn array<const N: usize>(bytes: &[u8]) -> [u8; N] {
+    bytes.try_into().expect("the slice has this length")
+}
