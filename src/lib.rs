@@ -3,6 +3,7 @@
 //! Rooms are layered; a room uses only the rooms below it (see `CONTRIBUTING.md`).
 
 pub mod base;
+pub mod capi;
 pub mod context;
 pub mod error;
 pub mod io;

@@ -27,10 +27,10 @@ fn ball() -> Body {
     let key = |frame: i32, at: [f64; 3]| Key {
         time: f64::from(frame),
         at: DVec3::from(at),
-        turn: DVec3::new(0.1, 0.9, 0.4) * f64::from(frame),
+        turn: DVec3::new(0.1, 0.9, 0.4) * f64::from(frame) * 0.5,
     };
     let keys = vec![key(0, [-0.4, 0.35, 0.0]), key(3, [0.0, 0.2, 0.1]), key(8, [0.4, 0.3, -0.1])];
-    Body::new(Box::new(Rigid::new(sphere(0.15, 40), Keys::new(keys).unwrap())), 0.0).unwrap()
+    Body::new(Box::new(Rigid::new(sphere(0.15, 12), Keys::new(keys).unwrap())), 0.0).unwrap()
 }
 
 fn step(ctx: &Context, base: &mut BaseLayer, frame: i32) {

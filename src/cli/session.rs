@@ -5,6 +5,7 @@ use super::machine;
 use super::options::Amount;
 use super::output;
 use super::signals::Signals;
+use frazil::sweep::surface_bytes;
 use frazil::{Context, Error, Pool};
 use serde_json::{Map, Value, json};
 use std::path::PathBuf;
@@ -65,10 +66,7 @@ impl Session {
 
     /// Refuses level sets of so much surface (m2) with such a cell (m).
     pub fn check_surface(&self, area: f64, cell: f64) -> frazil::Result<()> {
-        // A band of six voxels crosses 1.6 blocks of 8 voxels on average, of four bytes and a bit each; a
-        // surface that is not level crosses more; a file in the making takes as much again.
-        let needed = (area / (cell * cell) * 128.0).min(1.0e18) as u64;
-        let limit = self.max_memory();
+        let (needed, limit) = (surface_bytes(area, cell), self.max_memory());
         if needed <= limit {
             return Ok(());
         }

@@ -152,7 +152,7 @@ impl Context {
         self.check()?;
         lock(&self.progress).stage = name;
         self.begin();
-        let result = if self.is_cancelled() { Err(Error::Cancelled) } else { self.run(name, work) };
+        let result = if self.is_cancelled() { Err(Error::Cancelled) } else { self.timed(name, work) };
         lock(&self.progress).stage = "";
         let value = result?;
         lock(&self.progress).stages_done += 1;
@@ -167,7 +167,7 @@ impl Context {
     pub fn commit<R: Send>(&self, work: impl FnOnce() -> Result<R> + Send) -> Result<R> {
         const NAME: &str = "commit";
         lock(&self.progress).stage = NAME;
-        let value = self.run(NAME, work);
+        let value = self.timed(NAME, work);
         let mut progress = lock(&self.progress);
         progress.stage = "";
         progress.stages_done += 1;
@@ -200,9 +200,25 @@ impl Context {
         watch.asked = Instant::now();
     }
 
-    fn run<R: Send>(&self, name: &'static str, work: impl FnOnce() -> R + Send) -> R {
+    /// Runs work of several stages on the pool while this thread polls: what lies between the stages is looked on too.
+    ///
+    /// # Errors
+    /// `Cancelled` when the context was cancelled before, else what `work` returns.
+    pub fn polled<R: Send>(&self, work: impl FnOnce() -> Result<R> + Send) -> Result<R> {
+        self.begin();
+        self.check()?;
+        self.run(work)
+    }
+
+    fn timed<R: Send>(&self, name: &'static str, work: impl FnOnce() -> R + Send) -> R {
         let start = Instant::now();
-        let value = match (self.poll.try_lock(), self.pool.workers()) {
+        let value = self.run(work);
+        lock(&self.timings).push(StageTime { name, time: start.elapsed() });
+        value
+    }
+
+    fn run<R: Send>(&self, work: impl FnOnce() -> R + Send) -> R {
+        match (self.poll.try_lock(), self.pool.workers()) {
             (Ok(mut watch), Some(workers)) if watch.is_some() => {
                 let watch = watch.as_mut().expect("it is there");
                 self.watched(workers, watch, work)
@@ -212,9 +228,7 @@ impl Context {
                 drop(watch);
                 self.pool.install(work)
             }
-        };
-        lock(&self.timings).push(StageTime { name, time: start.elapsed() });
-        value
+        }
     }
 
     /// Runs `work` on the workers while this thread polls.

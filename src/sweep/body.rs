@@ -11,11 +11,14 @@ use super::refine::{edge_error, refine};
 use super::topology::Topology;
 use crate::base::DVec3;
 use crate::base::mesh::coincident;
+use crate::context::Context;
 use crate::error::{Error, Result};
 use crate::motion::Motion;
 
 /// Most steps that an interval between two kinks of a motion is split into.
 const MOST_STEPS: f64 = 1024.0;
+/// Bytes of a vertex in a pose: in cells, in fixed point, and what it sweeps.
+const BYTES_PER_POSITION: usize = 100;
 /// Vertices or edges a task looks at.
 const GRAIN: usize = 2048;
 
@@ -116,6 +119,7 @@ impl Body {
     /// When a pose cannot be had or a vertex is too far away for the lattice.
     pub fn chain(
         &self,
+        ctx: &Context,
         from: f64,
         to: f64,
         lattice: &Lattice,
@@ -123,7 +127,8 @@ impl Body {
         window: &Window,
     ) -> Result<Vec<Face>> {
         let near = Near::new(window, self.longest_edge / lattice.voxel);
-        let mut poses = self.poses(from, to, lattice, tolerance, &near)?;
+        let mut poses = self.poses(ctx, from, to, lattice, tolerance, &near)?;
+        ctx.check()?;
         let apart = self.welds_part(&poses);
         let separate;
         let topology = if apart {
@@ -135,6 +140,7 @@ impl Body {
         };
         poses.iter_mut().for_each(|pose| topology.complete(pose));
         let refined = refine(topology, &mut poses, tolerance, |poses, edge| near.sees(poses, &edge));
+        ctx.check()?;
         let levels: Vec<Vec<Fixed>> = poses
             .par_iter()
             .map(|pose| pose.iter().map(|&cells| lattice.fix(cells)).collect())
@@ -146,6 +152,7 @@ impl Body {
     /// Poses (cells) at times so dense that straight steps stay within `tolerance` of the motion.
     fn poses(
         &self,
+        ctx: &Context,
         from: f64,
         to: f64,
         lattice: &Lattice,
@@ -153,6 +160,7 @@ impl Body {
         near: &Near,
     ) -> Result<Vec<Vec<DVec3>>> {
         let at = |time: f64| -> Result<Vec<DVec3>> {
+            ctx.check()?;
             let mut pose = Vec::new();
             self.motion.pose(time, &mut pose)?;
             pose.iter_mut().for_each(|position| *position = lattice.to_cells(*position));
@@ -173,6 +181,9 @@ impl Body {
                 [0.25, 0.5, 0.75].par_iter().map(quarter).collect::<Result<_>>()?;
             let steps =
                 self.steps(&[&first, &quarters[0], &quarters[1], &quarters[2], &last], tolerance, near);
+            let count = poses.len() + steps;
+            let bytes = (count * self.shape.topology.vertex_count() * BYTES_PER_POSITION) as u64;
+            ctx.allow("the poses of a body (a shorter motion or larger cells need fewer)", bytes)?;
             let step = |step: usize| at(begin + (end - begin) * step as f64 / steps as f64);
             poses.extend((1..steps).into_par_iter().map(step).collect::<Result<Vec<_>>>()?);
             poses.push(last);

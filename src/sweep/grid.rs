@@ -34,7 +34,7 @@ pub fn chain(ctx: &Context, bodies: &[Body], from: f64, to: f64, settings: &Sett
     let faces = ctx.stage("chain", || {
         let parts: Vec<Vec<Face>> = bodies
             .iter()
-            .map(|body| body.chain(from, to, &lattice, settings.tolerance, &EVERYWHERE))
+            .map(|body| body.chain(ctx, from, to, &lattice, settings.tolerance, &EVERYWHERE))
             .collect::<Result<_>>()?;
         Ok(parts.concat())
     })?;
@@ -86,7 +86,7 @@ fn pieces(
     batch
         .par_iter()
         .map_init(Scratch::default, |scratch, &index| {
-            if ctx.is_cancelled() { None } else { voxeliser.piece(index, &ALL, scratch) }
+            if ctx.check().is_err() { None } else { voxeliser.piece(index, &ALL, scratch) }
         })
         .filter_map(|piece| {
             Some(match piece? {

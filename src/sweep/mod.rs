@@ -71,6 +71,13 @@ impl Settings {
     }
 }
 
+/// Memory (bytes) that a level set of a surface of `area` m2 takes while it is made.
+pub fn surface_bytes(area: f64, cell: f64) -> u64 {
+    // A band of six voxels crosses 1.6 blocks of 8 voxels on average, of four bytes and a bit each; a surface that is
+    // not level crosses more; a file in the making takes as much again.
+    (area / (cell * cell) * 128.0).min(1.0e18) as u64
+}
+
 #[cfg(feature = "vdb")]
 mod grid;
 #[cfg(feature = "vdb")]

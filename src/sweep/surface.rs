@@ -69,7 +69,7 @@ pub fn surface(ctx: &Context, cells: &Cells) -> Result<Vec<Facet>> {
         .par_chunks(GRAIN)
         .enumerate()
         .map(|(chunk, seen)| {
-            if ctx.is_cancelled() {
+            if ctx.check().is_err() {
                 return Vec::new();
             }
             let (mut out, mut parts) = (Vec::with_capacity(seen.len()), Vec::new());

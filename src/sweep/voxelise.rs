@@ -64,6 +64,12 @@ pub struct Voxeliser {
     inside: Vec<[i32; 3]>,
 }
 
+/// What memory is asked for, with what makes it less.
+const REGION: &str = "what the objects sweep (larger cells or a shorter motion need less)";
+/// Bytes of a block of the region: marks and places.
+const BYTES_PER_BLOCK: usize = 16;
+/// Bytes of a block near the surface: its distances, and what they are found with.
+const BYTES_PER_NEAR_BLOCK: usize = 6000;
 /// No block.
 const NONE: u32 = u32::MAX;
 /// Faces a task sorts into blocks: fixed, so that nothing depends on the number of threads.
@@ -98,6 +104,7 @@ impl Voxeliser {
         // Sides of faces are told with the voxels around them.
         let reach = band.reach() + 2.0;
         let region = Region::around(&faces, reach, low, high)?;
+        ctx.allow(REGION, (region.blocks() * BYTES_PER_BLOCK) as u64)?;
         let origin = |block: [i32; 3]| [0, 1, 2].map(|axis| lattice.base[axis] + block[axis] * 8);
         let candidates = candidates(&faces, &region, band.reach() + 0.01);
         let places: Vec<[i32; 3]> =
@@ -109,6 +116,8 @@ impl Voxeliser {
         }
         let relevant = region.dilated(&marked, (reach / 8.0).ceil() as i32);
         ctx.check()?;
+        let near = marked.iter().filter(|&&marked| marked).count();
+        ctx.allow(REGION, (region.blocks() * BYTES_PER_BLOCK + near * BYTES_PER_NEAR_BLOCK) as u64)?;
         let lines = Lines::scan(&faces, &region);
         ctx.check()?;
         retain(&mut faces, |face| {

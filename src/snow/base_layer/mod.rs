@@ -279,7 +279,7 @@ impl BaseLayer {
             .iter()
             .map(|body| {
                 ctx.check()?;
-                body.chain(from, to, &lattice, self.params.tolerance, &window)
+                body.chain(ctx, from, to, &lattice, self.params.tolerance, &window)
             })
             .collect::<Result<_>>()?;
         let band = Band { inside: self.half_width, outside };

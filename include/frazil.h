@@ -1,0 +1,1504 @@
+/*
+ * frazil: volumetric tools for visual effects. C99 and C++17.
+ *
+ * Made by cbindgen from src/capi: change the texts there. docs/c-api.md is the manual, examples/c has programs.
+ *
+ * Units and axes: metres, seconds, radians; right-handed, Y up. Faces are counter-clockwise seen from outside.
+ *
+ * Answers: functions that can fail answer a frz_status; frz_last_error() then tells in one sentence what is at fault.
+ * After a failure, what a call was to change is as it was, and what it was to hand out is NULL or zero. Enums come in
+ * as uint32_t and are checked. Without a word to the contrary no pointer may be NULL.
+ *
+ * Handles: what comes through an out-pointer is the caller's, and goes back by the destroy function of its kind, which
+ * takes NULL too. A returned const pointer is lent. Nothing of frazil is ever given to free(). A handle is used by one
+ * call at a time (else FRZ_ERROR_BUSY), but any number may read one; it may move between threads, and distinct
+ * handles work in parallel. A handle that saw FRZ_ERROR_INTERNAL answers FRZ_ERROR_POISONED and can only be destroyed.
+ *
+ * Arrays in: frz_view, lent for the call. Arrays out: frz_span, memory of the caller; ask for the count first.
+ * Counts, strides, indices and numbers that are not finite are checked once, at the door.
+ *
+ * Structs with a struct_size: set it to sizeof, or call the init function. The library may be newer than the header
+ * (fields that the header does not have get their usual values) and, within a major version of the interface, may
+ * not be older: frz_context_create tells. The major version changes only when an existing function or field does.
+ *
+ * A guest's manners: frazil never prints, exits, installs signal handlers, or changes the locale, the working folder
+ * or the floating-point flags of a thread after a call (inside, denormal numbers count as 0). It starts no thread
+ * before the first pool and ends all with the last. Results are the same bytes on any number of threads.
+ */
+
+
+#ifndef FRAZIL_H
+#define FRAZIL_H
+
+#include <stddef.h>
+#include <stdint.h>
+
+/**
+ * Version of the interface that this header describes: major << 16 | minor.
+ */
+#define FRZ_ABI_VERSION 65536
+
+/**
+ * Version of frazil that this header belongs to.
+ */
+#define FRZ_VERSION_MAJOR 0
+
+/**
+ * Second number of that version.
+ */
+#define FRZ_VERSION_MINOR 1
+
+/**
+ * Third number of that version.
+ */
+#define FRZ_VERSION_PATCH 0
+
+/**
+ * Flag of frz_grid_save and frz_grid_to_bytes: values in 16 bits, for files that are only rendered.
+ */
+#define FRZ_HALF 1
+
+/**
+ * Flag of a body: its imprints have no noise.
+ */
+#define FRZ_BODY_EXACT 1
+
+/**
+ * What a function answers. Numbers never change; new ones are added at the end.
+ */
+enum frz_status
+#if defined(__cplusplus) || __STDC_VERSION__ >= 202311L
+  : uint32_t
+#endif // defined(__cplusplus) || __STDC_VERSION__ >= 202311L
+ {
+    /**
+     * Done.
+     */
+    FRZ_OK = 0,
+    /**
+     * An argument is NULL, out of range or not finite: the caller mends it.
+     */
+    FRZ_ERROR_ARGUMENT = 1,
+    /**
+     * What a file, or bytes in its place, holds cannot be used.
+     */
+    FRZ_ERROR_FILE = 2,
+    /**
+     * The operating system refused to read or write.
+     */
+    FRZ_ERROR_IO = 3,
+    /**
+     * More memory would be needed than the context allows, or than there is.
+     */
+    FRZ_ERROR_MEMORY = 4,
+    /**
+     * The context was cancelled; everything is as it was before the call.
+     */
+    FRZ_CANCELLED = 5,
+    /**
+     * OpenVDB reported an error.
+     */
+    FRZ_ERROR_OPENVDB = 6,
+    /**
+     * A promise inside the library does not hold: a bug of frazil. What the call worked on is poisoned.
+     */
+    FRZ_ERROR_INTERNAL = 7,
+    /**
+     * The handle saw FRZ_ERROR_INTERNAL before: it can only be destroyed.
+     */
+    FRZ_ERROR_POISONED = 8,
+    /**
+     * The handle is in use by another call, in another thread or around this one.
+     */
+    FRZ_ERROR_BUSY = 9,
+    /**
+     * The caller's buffer is too small.
+     */
+    FRZ_ERROR_CAPACITY = 10,
+    /**
+     * The caller's header and this library do not fit together.
+     */
+    FRZ_ERROR_VERSION = 11,
+    /**
+     * The pointer is no handle of the kind that is wanted.
+     */
+    FRZ_ERROR_HANDLE = 12,
+};
+#ifndef __cplusplus
+#if __STDC_VERSION__ >= 202311L
+typedef enum frz_status frz_status;
+#else
+typedef uint32_t frz_status;
+#endif // __STDC_VERSION__ >= 202311L
+#endif // __cplusplus
+
+/**
+ * How the values of a .vdb file are packed.
+ */
+enum frz_compression
+#if defined(__cplusplus) || __STDC_VERSION__ >= 202311L
+  : uint32_t
+#endif // defined(__cplusplus) || __STDC_VERSION__ >= 202311L
+ {
+    /**
+     * Blosc: fast.
+     */
+    FRZ_COMPRESSION_BLOSC = 0,
+    /**
+     * Zip: small, slow.
+     */
+    FRZ_COMPRESSION_ZIP = 1,
+    /**
+     * None.
+     */
+    FRZ_COMPRESSION_NONE = 2,
+};
+#ifndef __cplusplus
+#if __STDC_VERSION__ >= 202311L
+typedef enum frz_compression frz_compression;
+#else
+typedef uint32_t frz_compression;
+#endif // __STDC_VERSION__ >= 202311L
+#endif // __cplusplus
+
+/**
+ * What frz_levelset_csg makes.
+ */
+enum frz_csg
+#if defined(__cplusplus) || __STDC_VERSION__ >= 202311L
+  : uint32_t
+#endif // defined(__cplusplus) || __STDC_VERSION__ >= 202311L
+ {
+    /**
+     * Points in one or the other.
+     */
+    FRZ_CSG_UNION = 0,
+    /**
+     * Points in the first and not in the second.
+     */
+    FRZ_CSG_DIFFERENCE = 1,
+    /**
+     * Points in both.
+     */
+    FRZ_CSG_INTERSECTION = 2,
+};
+#ifndef __cplusplus
+#if __STDC_VERSION__ >= 202311L
+typedef enum frz_csg frz_csg;
+#else
+typedef uint32_t frz_csg;
+#endif // __STDC_VERSION__ >= 202311L
+#endif // __cplusplus
+
+/**
+ * What a grid's values mean.
+ */
+enum frz_grid_class
+#if defined(__cplusplus) || __STDC_VERSION__ >= 202311L
+  : uint32_t
+#endif // defined(__cplusplus) || __STDC_VERSION__ >= 202311L
+ {
+    /**
+     * Nothing said.
+     */
+    FRZ_GRID_UNKNOWN = 0,
+    /**
+     * Signed distances (m), negative inside, cut off at the background.
+     */
+    FRZ_GRID_LEVEL_SET = 1,
+    /**
+     * A density.
+     */
+    FRZ_GRID_FOG = 2,
+};
+#ifndef __cplusplus
+#if __STDC_VERSION__ >= 202311L
+typedef enum frz_grid_class frz_grid_class;
+#else
+typedef uint32_t frz_grid_class;
+#endif // __STDC_VERSION__ >= 202311L
+#endif // __cplusplus
+
+/**
+ * What frz_mesh_read reads.
+ */
+enum frz_mesh_part
+#if defined(__cplusplus) || __STDC_VERSION__ >= 202311L
+  : uint32_t
+#endif // defined(__cplusplus) || __STDC_VERSION__ >= 202311L
+ {
+    /**
+     * float[3] for each vertex (m).
+     */
+    FRZ_MESH_POSITIONS = 0,
+    /**
+     * uint32_t for each face: its number of corners.
+     */
+    FRZ_MESH_FACE_COUNTS = 1,
+    /**
+     * uint32_t for each corner: a vertex.
+     */
+    FRZ_MESH_INDICES = 2,
+    /**
+     * uint32_t[3] for each triangle that the faces are cut into: vertices.
+     */
+    FRZ_MESH_TRIANGLES = 3,
+};
+#ifndef __cplusplus
+#if __STDC_VERSION__ >= 202311L
+typedef enum frz_mesh_part frz_mesh_part;
+#else
+typedef uint32_t frz_mesh_part;
+#endif // __STDC_VERSION__ >= 202311L
+#endif // __cplusplus
+
+/**
+ * How values between voxels are found.
+ */
+enum frz_sampling
+#if defined(__cplusplus) || __STDC_VERSION__ >= 202311L
+  : uint32_t
+#endif // defined(__cplusplus) || __STDC_VERSION__ >= 202311L
+ {
+    /**
+     * The value of the voxel that holds the position.
+     */
+    FRZ_SAMPLE_NEAREST = 0,
+    /**
+     * Trilinear between voxel centres.
+     */
+    FRZ_SAMPLE_LINEAR = 1,
+};
+#ifndef __cplusplus
+#if __STDC_VERSION__ >= 202311L
+typedef enum frz_sampling frz_sampling;
+#else
+typedef uint32_t frz_sampling;
+#endif // __STDC_VERSION__ >= 202311L
+#endif // __cplusplus
+
+/**
+ * Accuracy of the tools that make distances true again as they go.
+ */
+enum frz_scheme
+#if defined(__cplusplus) || __STDC_VERSION__ >= 202311L
+  : uint32_t
+#endif // defined(__cplusplus) || __STDC_VERSION__ >= 202311L
+ {
+    /**
+     * First order in space and time: about seven times faster.
+     */
+    FRZ_SCHEME_FIRST_ORDER = 0,
+    /**
+     * Fifth-order WENO.
+     */
+    FRZ_SCHEME_WENO5 = 1,
+};
+#ifndef __cplusplus
+#if __STDC_VERSION__ >= 202311L
+typedef enum frz_scheme frz_scheme;
+#else
+typedef uint32_t frz_scheme;
+#endif // __STDC_VERSION__ >= 202311L
+#endif // __cplusplus
+
+/**
+ * What frz_levelset_smooth does.
+ */
+enum frz_smoothing
+#if defined(__cplusplus) || __STDC_VERSION__ >= 202311L
+  : uint32_t
+#endif // defined(__cplusplus) || __STDC_VERSION__ >= 202311L
+ {
+    /**
+     * Means over cubes.
+     */
+    FRZ_SMOOTH_MEAN = 0,
+    /**
+     * Means, four times in a row.
+     */
+    FRZ_SMOOTH_GAUSSIAN = 1,
+};
+#ifndef __cplusplus
+#if __STDC_VERSION__ >= 202311L
+typedef enum frz_smoothing frz_smoothing;
+#else
+typedef uint32_t frz_smoothing;
+#endif // __STDC_VERSION__ >= 202311L
+#endif // __cplusplus
+
+/**
+ * A layer of snow that bodies press into.
+ */
+typedef struct frz_base frz_base;
+
+/**
+ * One computation: cancel flag, progress, polls, warnings, stage times. Cheap: make one for every cook.
+ */
+typedef struct frz_context frz_context;
+
+/**
+ * A sparse grid of 32-bit floats; voxel (i, j, k) has its centre at (i, j, k) x voxel size, unless a file brought
+ * another transform.
+ */
+typedef struct frz_grid frz_grid;
+
+/**
+ * A mesh of polygons with attributes of its vertices.
+ */
+typedef struct frz_mesh frz_mesh;
+
+/**
+ * Worker threads, shared by any number of contexts.
+ */
+typedef struct frz_pool frz_pool;
+
+/**
+ * What is being done.
+ */
+typedef struct {
+    /**
+     * The stage's verb, for instance "distance"; empty between stages. It ends with a zero.
+     */
+    char stage[32];
+    /**
+     * Stages finished since the context was made or reset.
+     */
+    uint64_t stages_done;
+    /**
+     * Seconds since the running call began; 0 between calls.
+     */
+    double seconds;
+} frz_progress;
+
+/**
+ * Looks on while the library works; an answer other than 0 cancels. It must return, not throw or jump.
+ *
+ * user: what was given with it.
+ * progress: what is being done; it is the library's, and gone after the answer.
+ */
+typedef int (*frz_poll_function)(void *user, const frz_progress *progress);
+
+/**
+ * Takes a warning. It must return, not throw or jump.
+ *
+ * user: what was given with it.
+ * text: one sentence in UTF-8; it is the library's, and gone afterwards.
+ */
+typedef void (*frz_log_function)(void *user, const char *text);
+
+/**
+ * Memory of the caller that is written in the time of the call.
+ */
+typedef struct {
+    /**
+     * First element; NULL where the function says so. It need not be aligned.
+     */
+    void *data;
+    /**
+     * Elements that there is room for.
+     */
+    size_t count;
+    /**
+     * Bytes from one element to the next; 0: they are packed. Bytes between elements are not touched.
+     */
+    size_t stride;
+} frz_span;
+
+/**
+ * An array that the caller lends for the time of the call.
+ */
+typedef struct {
+    /**
+     * First element; NULL when there is none. It need not be aligned.
+     */
+    const void *data;
+    /**
+     * Number of elements.
+     */
+    size_t count;
+    /**
+     * Bytes from one element to the next; 0: they are packed.
+     */
+    size_t stride;
+} frz_view;
+
+/**
+ * Numbers of each vertex under a name.
+ */
+typedef struct {
+    /**
+     * Name in UTF-8, not empty.
+     */
+    const char *name;
+    /**
+     * Floats of each vertex, 1 to 4.
+     */
+    uint32_t components;
+    /**
+     * So many floats for each vertex of the mesh, finite or not.
+     */
+    frz_view values;
+} frz_attribute;
+
+/**
+ * What a mesh is made of.
+ */
+typedef struct {
+    /**
+     * sizeof(frz_mesh_desc).
+     */
+    uint32_t struct_size;
+    /**
+     * 0.
+     */
+    uint32_t flags;
+    /**
+     * float[3] for each vertex (m), finite.
+     */
+    frz_view positions;
+    /**
+     * uint32_t for each face: its number of corners. data NULL: all faces are triangles. Faces of fewer than three
+     * corners are passed over.
+     */
+    frz_view face_counts;
+    /**
+     * uint32_t for each corner of each face, counter-clockwise seen from outside: a vertex.
+     */
+    frz_view indices;
+    /**
+     * Attributes; NULL for none.
+     */
+    const frz_attribute *attributes;
+    /**
+     * Number of attributes.
+     */
+    size_t attribute_count;
+} frz_mesh_desc;
+
+/**
+ * What a mesh is.
+ */
+typedef struct {
+    /**
+     * sizeof(frz_mesh_info), set by the caller.
+     */
+    uint32_t struct_size;
+    /**
+     * 1 when every edge is used as often in one direction as in the other, else 0.
+     */
+    uint32_t closed;
+    /**
+     * Vertices.
+     */
+    uint64_t vertex_count;
+    /**
+     * Faces.
+     */
+    uint64_t face_count;
+    /**
+     * Corners of all faces.
+     */
+    uint64_t corner_count;
+    /**
+     * Triangles that the faces are cut into.
+     */
+    uint64_t triangle_count;
+    /**
+     * Attributes.
+     */
+    uint64_t attribute_count;
+    /**
+     * Least corner of the box around the vertices (m).
+     */
+    float box_min[3];
+    /**
+     * Greatest corner (m).
+     */
+    float box_max[3];
+    /**
+     * Surface (m2).
+     */
+    double area;
+    /**
+     * Enclosed volume (m3); it means something for closed meshes only.
+     */
+    double volume;
+} frz_mesh_info;
+
+/**
+ * A block of 8 x 8 x 8 voxels. Voxel (x, y, z) of the block has its value at x * 64 + y * 8 + z, and its bit in
+ * mask[x] at y * 8 + z.
+ */
+typedef struct {
+    /**
+     * Voxel of the least corner, multiples of 8.
+     */
+    int32_t origin[3];
+    /**
+     * The value of all voxels where values is NULL.
+     */
+    float tile;
+    /**
+     * 512 values, or NULL.
+     */
+    const float *values;
+    /**
+     * 8 words: which voxels are active; NULL where values is NULL.
+     */
+    const uint64_t *mask;
+} frz_leaf;
+
+/**
+ * What a grid is made of.
+ */
+typedef struct {
+    /**
+     * sizeof(frz_grid_desc).
+     */
+    uint32_t struct_size;
+    /**
+     * A frz_grid_class. A level set gets the sign of its band everywhere outside the leaves.
+     */
+    uint32_t grid_class;
+    /**
+     * Edge of a voxel (m), 1e-6 to 1000.
+     */
+    double voxel_size;
+    /**
+     * Value where nothing is stored, finite. For a level set the half width of its band (m), at least 3 voxels.
+     */
+    float background;
+    /**
+     * 0.
+     */
+    uint32_t flags;
+    /**
+     * Leaves, at different places; NULL for none. Values are finite. A mask of NULL makes all voxels active, of a
+     * level set those nearer than the background.
+     */
+    const frz_leaf *leaves;
+    /**
+     * Number of leaves.
+     */
+    size_t leaf_count;
+    /**
+     * Name in files, UTF-8; NULL for none.
+     */
+    const char *name;
+} frz_grid_desc;
+
+/**
+ * What a grid is.
+ */
+typedef struct {
+    /**
+     * sizeof(frz_grid_info), set by the caller.
+     */
+    uint32_t struct_size;
+    /**
+     * A frz_grid_class.
+     */
+    uint32_t grid_class;
+    /**
+     * Edge of a voxel (m).
+     */
+    double voxel_size;
+    /**
+     * Value where nothing is stored.
+     */
+    float background;
+    /**
+     * 1 when voxel (0, 0, 0) lies at the origin and the axes are the world's, else 0.
+     */
+    uint32_t world_fixed;
+    /**
+     * Active voxels, constant blocks counted in full.
+     */
+    uint64_t active_voxels;
+    /**
+     * Leaves.
+     */
+    uint64_t leaf_count;
+    /**
+     * Memory (bytes).
+     */
+    uint64_t memory_bytes;
+    /**
+     * Least active voxel on each axis; all zeroes when there is none.
+     */
+    int32_t voxel_min[3];
+    /**
+     * Greatest active voxel on each axis, included; all zeroes when there is none.
+     */
+    int32_t voxel_max[3];
+} frz_grid_info;
+
+/**
+ * Irregularity of a surface: where the noise is positive it moves outward.
+ */
+typedef struct {
+    /**
+     * Farthest displacement (m), 0 to 32 voxels; 0: none; -1: two voxels. So much that islands would be left is
+     * refused, with the greatest that is not.
+     */
+    double amplitude;
+    /**
+     * Size of the largest clumps (m), 2 to 10000 voxels; -1: eight voxels.
+     */
+    double size;
+    /**
+     * Octaves, each of half the size and a quarter of the strength, 1 to 8.
+     */
+    uint32_t octaves;
+    /**
+     * Seed of the pattern, which is fixed in the world.
+     */
+    int32_t seed;
+} frz_noise;
+
+/**
+ * A mesh that moves in the time of one step. All arrays are lent for the call.
+ */
+typedef struct {
+    /**
+     * sizeof(frz_body), the same in all bodies of a call.
+     */
+    uint32_t struct_size;
+    /**
+     * 0 or FRZ_BODY_EXACT.
+     */
+    uint32_t flags;
+    /**
+     * A number of the host that stays with the body from step to step, different in all bodies of a call. It saves
+     * work where a body keeps its faces; results do not depend on it.
+     */
+    uint64_t id;
+    /**
+     * float[3] for each vertex (m): where it is at the step's beginning. Finite.
+     */
+    frz_view positions;
+    /**
+     * float[3] for each vertex (m): where it is at the step's end. data NULL: the body rests.
+     */
+    frz_view positions_end;
+    /**
+     * Poses at equal times between the two, each float[3] for each vertex; vertices move straight from pose to pose.
+     * NULL for none.
+     */
+    const frz_view *between;
+    /**
+     * Number of poses between.
+     */
+    size_t between_count;
+    /**
+     * As in frz_mesh_desc.
+     */
+    frz_view face_counts;
+    /**
+     * As in frz_mesh_desc. Open meshes are closed, and a warning says so.
+     */
+    frz_view indices;
+} frz_body;
+
+/**
+ * A layer of snow: what it lies on, and how deep.
+ */
+typedef struct {
+    /**
+     * sizeof(frz_snow_desc).
+     */
+    uint32_t struct_size;
+    /**
+     * 0.
+     */
+    uint32_t flags;
+    /**
+     * Edge of a voxel (m), 1e-6 to 1000.
+     */
+    double voxel_size;
+    /**
+     * Half width of the band of distances on each side (voxels), 3 to 64.
+     */
+    double half_width;
+    /**
+     * Vertical depth above the ground and above static objects (m), above 0; not used with a top.
+     */
+    double depth;
+    /**
+     * The snow's top, a surface; what lies between it and the ground is snow. NULL: the depth counts.
+     */
+    const frz_mesh *top;
+    /**
+     * The ground, a surface or a solid; NULL: a horizontal rectangle.
+     */
+    const frz_mesh *ground;
+    /**
+     * Height of the rectangle, its y (m).
+     */
+    double ground_height;
+    /**
+     * x0, z0, x1, z1 of the rectangle (m), x0 < x1, z0 < z1.
+     */
+    double area[4];
+    /**
+     * Objects that do not move and that snow lies on: pointers to solids; NULL for none.
+     */
+    const frz_mesh *const *statics;
+    /**
+     * Number of static objects.
+     */
+    size_t static_count;
+} frz_snow_desc;
+
+/**
+ * How bodies press into the snow. All of it may change between steps.
+ */
+typedef struct {
+    /**
+     * sizeof(frz_base_params).
+     */
+    uint32_t struct_size;
+    /**
+     * 0.
+     */
+    uint32_t flags;
+    /**
+     * Largest error of the swept volume (voxels), 0.001 to 1.
+     */
+    double tolerance;
+    /**
+     * Ragged edges of imprints.
+     */
+    frz_noise noise;
+} frz_base_params;
+
+/**
+ * What a step did.
+ */
+typedef struct {
+    /**
+     * sizeof(frz_base_report), set by the caller.
+     */
+    uint32_t struct_size;
+    /**
+     * Nothing.
+     */
+    uint32_t reserved;
+    /**
+     * Snow removed in this step (m3).
+     */
+    double removed_volume;
+    /**
+     * Snow left (m3).
+     */
+    double base_volume;
+    /**
+     * Blocks of 8 x 8 x 8 voxels in which the snow changed.
+     */
+    uint64_t touched_blocks;
+    /**
+     * Triangles of the swept volume's boundary near the snow.
+     */
+    uint64_t sweep_faces;
+} frz_base_report;
+
+#ifdef __cplusplus
+extern "C" {
+#endif // __cplusplus
+
+/**
+ * Tells the version of the library that is linked: major * 1000000 + minor * 1000 + patch.
+ *
+ * Any thread, any time.
+ */
+uint32_t frz_version(void);
+
+/**
+ * Names a status: "FRZ_OK", "FRZ_ERROR_ARGUMENT" and so on; "unknown status" for other numbers.
+ *
+ * Any thread, any time. The text is never to be freed.
+ *
+ * status: a frz_status.
+ */
+const char *frz_status_name(uint32_t status);
+
+/**
+ * Tells what went wrong in the last call of this thread that did not answer FRZ_OK: one sentence in UTF-8 that names
+ * what is at fault; empty before the first.
+ *
+ * Any thread, any time. The text is the library's, and stays until the next call of this thread that fails. Calls
+ * that succeed leave it alone: ask only after a failure.
+ */
+const char *frz_last_error(void);
+
+/**
+ * Starts worker threads.
+ *
+ * Work of any number of contexts may share a pool. Results do not depend on the number of threads.
+ *
+ * threads: number of workers, 0 to 1024. 0: there are none, all work is done by the thread that calls; polls then
+ *     fall between pieces of work, with no interval promised.
+ * out: receives the pool, to be destroyed with frz_pool_destroy; NULL after a failure.
+ *
+ * Any thread.
+ */
+frz_status frz_pool_create(uint32_t threads,
+                           frz_pool **out);
+
+/**
+ * Gives a pool back; NULL is fine.
+ *
+ * Its threads end, and are joined, when the contexts that were made on it are destroyed too. At the end of the last
+ * pool OpenVDB's threads end as well, unless the host works with TBB itself: they are then left to the host.
+ *
+ * pool: may be NULL. Not within a poll or log function.
+ *
+ * Any thread.
+ */
+void frz_pool_destroy(frz_pool *pool);
+
+/**
+ * Makes a context on a pool.
+ *
+ * abi: FRZ_ABI_VERSION, as the caller's header has it: FRZ_ERROR_VERSION when the major numbers differ, or the
+ *     library is older than the header.
+ * pool: whose threads do the work; it may be destroyed before the context.
+ * out: receives the context, to be destroyed with frz_context_destroy; NULL after a failure.
+ *
+ * Any thread. A context serves one call at a time (FRZ_ERROR_BUSY), but for frz_context_cancel, _reset and _progress.
+ */
+frz_status frz_context_create(uint32_t abi,
+                              frz_pool *pool,
+                              frz_context **out);
+
+/**
+ * Destroys a context; NULL is fine.
+ *
+ * context: may be NULL. Not while a call with it runs: it then stays.
+ *
+ * Any thread.
+ */
+void frz_context_destroy(frz_context *context);
+
+/**
+ * Sets what looks on while the library works, for a progress bar and an escape key.
+ *
+ * It is called on the thread that called the library: at the beginning of each stage, then every 10 to 50 ms, also
+ * inside long stages. Without worker threads (a pool of 0) it is called between pieces of work, with no interval
+ * promised. Within it frz_context_cancel and frz_context_progress may be called, and nothing else with this context.
+ *
+ * poll: NULL for none.
+ * user: handed to it; may be NULL.
+ *
+ * One thread at a time.
+ */
+frz_status frz_context_set_poll(frz_context *context,
+                                frz_poll_function poll,
+                                void *user);
+
+/**
+ * Sets what takes warnings: what a user should know though the call succeeds, for instance that a mesh is open.
+ *
+ * It is called on the thread that called the library. The library itself never prints. Within it nothing else may be
+ * called with this context.
+ *
+ * log: NULL for none; warnings are then dropped.
+ * user: handed to it; may be NULL.
+ *
+ * One thread at a time.
+ */
+frz_status frz_context_set_log(frz_context *context,
+                               frz_log_function log,
+                               void *user);
+
+/**
+ * Sets how much memory an object may take that is made or changed with this context.
+ *
+ * The need is estimated before memory is taken; a call that would need more answers FRZ_ERROR_MEMORY and changes
+ * nothing. It is a guard against a wrong voxel size, not an account of every byte.
+ *
+ * bytes: 0 for no limit, which is also the limit of a new context.
+ *
+ * One thread at a time.
+ */
+frz_status frz_context_set_memory_limit(frz_context *context,
+                                        uint64_t bytes);
+
+/**
+ * Cancels the call that runs with the context, and every later one until frz_context_reset: they answer
+ * FRZ_CANCELLED and change nothing.
+ *
+ * context: may be NULL.
+ *
+ * Any thread, any time.
+ */
+void frz_context_cancel(frz_context *context);
+
+/**
+ * Forgets a cancel, and counts stages from 0 again.
+ *
+ * context: may be NULL.
+ *
+ * Any thread, any time.
+ */
+void frz_context_reset(frz_context *context);
+
+/**
+ * Tells what the context is doing.
+ *
+ * out: receives it; all zeroes after a failure.
+ *
+ * Any thread, any time.
+ */
+frz_status frz_context_progress(const frz_context *context, frz_progress *out);
+
+/**
+ * Tells how long the stages of the last call took that had any, in order.
+ *
+ * dst: room for frz_stage_time; with data NULL only the number is told. FRZ_ERROR_CAPACITY when it is too small.
+ * count: receives the number of stages; 0 after other failures.
+ *
+ * One thread at a time.
+ */
+frz_status frz_context_timings(const frz_context *context,
+                               frz_span dst,
+                               size_t *count);
+
+/**
+ * Makes a mesh from a host's arrays, which are copied.
+ *
+ * Faces may have any number of corners, convex or not, and meshes may be open, cross themselves and repeat vertices;
+ * they are cut into triangles once.
+ *
+ * desc: what it is made of. Counts, strides, indices and positions are checked: the error names the first at fault,
+ *     counted from 0.
+ * out: receives the mesh, to be destroyed with frz_mesh_destroy; NULL after a failure.
+ *
+ * One thread at a time for each context.
+ */
+frz_status frz_mesh_create(frz_context *context,
+                           const frz_mesh_desc *desc,
+                           frz_mesh **out);
+
+/**
+ * Destroys a mesh; NULL is fine.
+ *
+ * mesh: may be NULL.
+ *
+ * One thread at a time.
+ */
+void frz_mesh_destroy(frz_mesh *mesh);
+
+/**
+ * Tells what a mesh is: the counts that frz_mesh_read needs room for, its box, area and volume.
+ *
+ * info: receives it; its struct_size says how much of it the caller knows.
+ *
+ * Any number of threads may read a mesh.
+ */
+frz_status frz_mesh_get_info(const frz_mesh *mesh, frz_mesh_info *info);
+
+/**
+ * Copies a part of a mesh into the caller's memory.
+ *
+ * part: a frz_mesh_part.
+ * dst: room for as many elements as frz_mesh_get_info tells, of the type that the part has: FRZ_ERROR_CAPACITY when
+ *     it is too small, and nothing is written.
+ *
+ * Any number of threads may read a mesh.
+ */
+frz_status frz_mesh_read(const frz_mesh *mesh,
+                         uint32_t part,
+                         frz_span dst);
+
+/**
+ * Copies an attribute of a mesh into the caller's memory.
+ *
+ * name: its name. FRZ_ERROR_ARGUMENT names those that there are when there is none of this name.
+ * dst: room for an element of so many floats for each vertex; with data NULL only the number of floats is told.
+ * components: receives the floats of each vertex, 1 to 4; 0 after a failure. May be NULL.
+ *
+ * Any number of threads may read a mesh.
+ */
+frz_status frz_mesh_attribute(const frz_mesh *mesh,
+                              const char *name,
+                              frz_span dst,
+                              uint32_t *components);
+
+/**
+ * Makes a grid from blocks of voxels, which are copied.
+ *
+ * desc: what it is made of.
+ * out: receives the grid, to be destroyed with frz_grid_destroy; NULL after a failure.
+ *
+ * One thread at a time for each context.
+ */
+frz_status frz_grid_create(frz_context *context, const frz_grid_desc *desc, frz_grid **out);
+
+/**
+ * Destroys a grid; NULL is fine. A grid that belongs to another object stays.
+ *
+ * grid: may be NULL.
+ *
+ * One thread at a time.
+ */
+void frz_grid_destroy(frz_grid *grid);
+
+/**
+ * Copies a grid; the copy shares no memory and belongs to the caller.
+ *
+ * grid: of the caller or of another object.
+ * out: receives the copy, to be destroyed with frz_grid_destroy; NULL after a failure.
+ *
+ * Any number of threads may read a grid; one thread at a time for each context.
+ */
+frz_status frz_grid_copy(frz_context *context, const frz_grid *grid, frz_grid **out);
+
+/**
+ * Tells what a grid is.
+ *
+ * info: receives it; its struct_size says how much of it the caller knows.
+ *
+ * Any number of threads may read a grid.
+ */
+frz_status frz_grid_get_info(const frz_grid *grid, frz_grid_info *info);
+
+/**
+ * Copies a grid's name, in UTF-8 with a zero at its end.
+ *
+ * dst: room for capacity bytes; NULL only asks for the size. FRZ_ERROR_CAPACITY when it is too small.
+ * capacity: bytes at dst.
+ * size: receives the bytes that are needed, the zero counted; 0 after other failures.
+ *
+ * Any number of threads may read a grid.
+ */
+frz_status frz_grid_name(const frz_grid *grid, char *dst, size_t capacity, size_t *size);
+
+/**
+ * Names a grid, as files know it.
+ *
+ * grid: of the caller.
+ * name: UTF-8; NULL for none.
+ *
+ * One thread at a time.
+ */
+frz_status frz_grid_set_name(frz_grid *grid, const char *name);
+
+/**
+ * Lends a grid's leaves without copying them, in an order that does not change while the grid does not.
+ *
+ * Blocks without a leaf have one value: the background, or for a level set plus or minus the background. Values of a
+ * level set are distances (m).
+ *
+ * dst: room for leaf_count elements of frz_leaf; with data NULL only the number is told. FRZ_ERROR_CAPACITY when it
+ *     is too small. The pointers in it are the grid's: they stay until it is changed or destroyed, those of a base
+ *     layer until its next step.
+ * count: receives the number of leaves; 0 after other failures.
+ *
+ * Any number of threads may read a grid.
+ */
+frz_status frz_grid_leaves(const frz_grid *grid,
+                           frz_span dst,
+                           size_t *count);
+
+/**
+ * Lends what a grid holds at some places: leaves, or the value of all 512 voxels.
+ *
+ * origins: int32_t[3] for each place, multiples of 8, for instance those of frz_base_dirty.
+ * dst: room for as many elements of frz_leaf, whose pointers stay as those of frz_grid_leaves do.
+ *
+ * Any number of threads may read a grid.
+ */
+frz_status frz_grid_probe(const frz_grid *grid, frz_view origins, frz_span dst);
+
+/**
+ * Values of a grid at world positions.
+ *
+ * positions: float[3] for each (m), finite.
+ * sampling: a frz_sampling.
+ * dst: room for as many floats.
+ *
+ * Any number of threads may read a grid; one thread at a time for each context.
+ */
+frz_status frz_grid_sample(frz_context *context,
+                           const frz_grid *grid,
+                           frz_view positions,
+                           uint32_t sampling,
+                           frz_span dst);
+
+/**
+ * Gives a mesh's vertices an attribute of one float: a grid's values there.
+ *
+ * mesh: gets the attribute, in the place of one of the same name.
+ * sampling: a frz_sampling.
+ * name: of the attribute, UTF-8; NULL for the grid's own.
+ *
+ * Any number of threads may read a grid; one thread at a time for each mesh and context.
+ */
+frz_status frz_grid_sample_mesh(frz_context *context,
+                                const frz_grid *grid,
+                                frz_mesh *mesh,
+                                uint32_t sampling,
+                                const char *name);
+
+/**
+ * Makes a mesh of triangles along a grid's surface, counter-clockwise seen from outside.
+ *
+ * iso: the value at the surface; of a level set a distance (m), 0 for its surface. Finite.
+ * adaptivity: 0 to 1; above 0 flat regions get fewer and larger triangles.
+ * out: receives the mesh, to be destroyed with frz_mesh_destroy; NULL after a failure. It has no faces where there
+ *     is no surface.
+ *
+ * Any number of threads may read a grid; one thread at a time for each context.
+ */
+frz_status frz_grid_to_mesh(frz_context *context,
+                            const frz_grid *grid,
+                            float iso,
+                            float adaptivity,
+                            frz_mesh **out);
+
+/**
+ * Reads a grid of floats from a .vdb file.
+ *
+ * path: UTF-8.
+ * name: which grid; NULL for the first level set, else the first grid of floats. FRZ_ERROR_FILE names those that
+ *     there are when it is not found.
+ * out: receives the grid, to be destroyed with frz_grid_destroy; NULL after a failure.
+ *
+ * One thread at a time for each context.
+ */
+frz_status frz_grid_load(frz_context *context,
+                         const char *path,
+                         const char *name,
+                         frz_grid **out);
+
+/**
+ * Writes grids into one .vdb file. The file is there when it is whole: it is written under another name first.
+ *
+ * grids: count pointers to grids of different names.
+ * path: UTF-8; an existing file is replaced.
+ * compression: a frz_compression.
+ * flags: 0 or FRZ_HALF.
+ *
+ * Any number of threads may read a grid; one thread at a time for each context.
+ */
+frz_status frz_grid_save(frz_context *context,
+                         const frz_grid *const *grids,
+                         size_t count,
+                         const char *path,
+                         uint32_t compression,
+                         uint32_t flags);
+
+/**
+ * Reads a grid of floats from the bytes of a .vdb file.
+ *
+ * Bytes must come from a .vdb file: OpenVDB does not survive every kind of damage.
+ *
+ * bytes: size bytes.
+ * name: as in frz_grid_load.
+ * out: receives the grid, to be destroyed with frz_grid_destroy; NULL after a failure.
+ *
+ * One thread at a time for each context.
+ */
+frz_status frz_grid_from_bytes(frz_context *context,
+                               const void *bytes,
+                               size_t size,
+                               const char *name,
+                               frz_grid **out);
+
+/**
+ * Writes grids as the bytes of one .vdb file, the same bytes for the same grids.
+ *
+ * grids: count pointers to grids of different names.
+ * compression: a frz_compression.
+ * flags: 0 or FRZ_HALF.
+ * dst: room for capacity bytes. NULL: size receives a number that certainly suffices, and nothing is written.
+ * capacity: bytes at dst. FRZ_ERROR_CAPACITY when they are too few.
+ * size: receives the bytes that were written, or are needed; 0 after other failures.
+ *
+ * Any number of threads may read a grid; one thread at a time for each context.
+ */
+frz_status frz_grid_to_bytes(frz_context *context,
+                             const frz_grid *const *grids,
+                             size_t count,
+                             uint32_t compression,
+                             uint32_t flags,
+                             void *dst,
+                             size_t capacity,
+                             size_t *size);
+
+/**
+ * Makes a level set of the solid that a mesh bounds: points that its faces wind around.
+ *
+ * The mesh may be open (open loops are closed), cross itself, and have faces that are doubled or reversed.
+ *
+ * mesh: with at least one face.
+ * voxel_size: edge of a voxel (m), 1e-6 to 1000.
+ * half_width: of the band of distances on each side (voxels), 3 to 64.
+ * out: receives the grid, to be destroyed with frz_grid_destroy; NULL after a failure.
+ *
+ * Any number of threads may read a mesh; one thread at a time for each context.
+ */
+frz_status frz_levelset_from_mesh(frz_context *context,
+                                  const frz_mesh *mesh,
+                                  double voxel_size,
+                                  float half_width,
+                                  frz_grid **out);
+
+/**
+ * Makes a level set of the union of spheres.
+ *
+ * positions: float[3] for each sphere (m), finite.
+ * radii: float for each sphere (m), finite, above 0. Spheres smaller than a voxel and a half are left out: the grid
+ *     cannot hold them.
+ * voxel_size: edge of a voxel (m), 1e-6 to 1000.
+ * half_width: of the band of distances on each side (voxels), 3 to 64.
+ * out: receives the grid, to be destroyed with frz_grid_destroy; NULL after a failure.
+ *
+ * One thread at a time for each context.
+ */
+frz_status frz_levelset_from_particles(frz_context *context,
+                                       frz_view positions,
+                                       frz_view radii,
+                                       double voxel_size,
+                                       float half_width,
+                                       frz_grid **out);
+
+/**
+ * Joins two level sets.
+ *
+ * operation: a frz_csg.
+ * inout: of the caller; becomes the result, and stays as it was after a failure.
+ * other: with voxels of the same size and place; it stays as it is.
+ *
+ * One thread at a time.
+ */
+frz_status frz_levelset_csg(frz_context *context, uint32_t operation, frz_grid *inout, const frz_grid *other);
+
+/**
+ * Moves the surface of a level set along its normals.
+ *
+ * inout: of the caller; stays as it was after a failure.
+ * distance: outward (m), negative inward; at most 1000 voxels.
+ * scheme: a frz_scheme.
+ *
+ * One thread at a time.
+ */
+frz_status frz_levelset_offset(frz_context *context, frz_grid *inout, float distance, uint32_t scheme);
+
+/**
+ * Smooths a level set.
+ *
+ * inout: of the caller; stays as it was after a failure.
+ * smoothing: a frz_smoothing.
+ * width: means are over cubes of 2 width + 1 voxels, 1 to 32.
+ * times: how often, 1 to 1000.
+ * scheme: a frz_scheme.
+ *
+ * One thread at a time.
+ */
+frz_status frz_levelset_smooth(frz_context *context,
+                               frz_grid *inout,
+                               uint32_t smoothing,
+                               uint32_t width,
+                               uint32_t times,
+                               uint32_t scheme);
+
+/**
+ * Moves the surface of a level set outward by noise.
+ *
+ * inout: of the caller, with voxels fixed in the world; stays as it was after a failure.
+ * noise: how.
+ *
+ * One thread at a time.
+ */
+frz_status frz_levelset_displace(frz_context *context, frz_grid *inout, const frz_noise *noise);
+
+/**
+ * Makes a level set of all the space that bodies pass through in a step.
+ *
+ * It is exact up to 0.02 voxel: no dents between poses, no ripples.
+ *
+ * bodies: count bodies, at least one.
+ * dt: length of the step (s); 0: the bodies where they are at its beginning.
+ * voxel_size: edge of a voxel (m), 1e-6 to 1000.
+ * half_width: of the band of distances on each side (voxels), 3 to 64.
+ * out: receives the grid, to be destroyed with frz_grid_destroy; NULL after a failure.
+ *
+ * One thread at a time for each context.
+ */
+frz_status frz_levelset_sweep(frz_context *context,
+                              const frz_body *bodies,
+                              size_t count,
+                              double dt,
+                              double voxel_size,
+                              float half_width,
+                              frz_grid **out);
+
+/**
+ * Fills a description with the usual values: voxels of 1 cm, 0.3 m of snow on a square of 2 m at y = 0.
+ *
+ * desc: receives them.
+ * size: sizeof(frz_snow_desc).
+ *
+ * Any thread.
+ */
+frz_status frz_snow_desc_init(frz_snow_desc *desc, size_t size);
+
+/**
+ * Makes a layer of snow as a level set named "surface", for frz_base_create.
+ *
+ * desc: what it lies on and how deep it is. Y is up.
+ * out: receives the grid, to be destroyed with frz_grid_destroy; NULL after a failure.
+ *
+ * Any number of threads may read a mesh; one thread at a time for each context.
+ */
+frz_status frz_snow_layer(frz_context *context, const frz_snow_desc *desc, frz_grid **out);
+
+/**
+ * Fills parameters with the usual values, those of the thesis' look.
+ *
+ * params: receives them.
+ * size: sizeof(frz_base_params).
+ *
+ * Any thread.
+ */
+frz_status frz_base_params_init(frz_base_params *params, size_t size);
+
+/**
+ * Makes a base layer: untouched, or in a state that frz_base_save wrote.
+ *
+ * params: NULL for the usual ones.
+ * snow: a level set with voxels fixed in the world, for instance from frz_snow_layer or frz_grid_load; it is copied.
+ * restart: restart_bytes bytes of frz_base_save of a layer made from the same snow: what it held comes back bit for
+ *     bit, on any number of threads. NULL: untouched.
+ * restart_bytes: 0 without a restart.
+ * out: receives the layer, to be destroyed with frz_base_destroy; NULL after a failure.
+ *
+ * Any number of threads may read a grid; one thread at a time for each context.
+ */
+frz_status frz_base_create(frz_context *context,
+                           const frz_base_params *params,
+                           const frz_grid *snow,
+                           const void *restart,
+                           size_t restart_bytes,
+                           frz_base **out);
+
+/**
+ * Destroys a base layer, and the grids that it lent; NULL is fine.
+ *
+ * base: may be NULL.
+ *
+ * One thread at a time.
+ */
+void frz_base_destroy(frz_base *base);
+
+/**
+ * Sets how bodies press from the next step on. All parameters may change between steps; what cannot change, the
+ * voxels and the snow itself, is none of them.
+ *
+ * params: FRZ_ERROR_ARGUMENT names the field at fault and its range; the old ones then stay.
+ *
+ * One thread at a time.
+ */
+frz_status frz_base_set_params(frz_base *base,
+                               const frz_base_params *params);
+
+/**
+ * Removes from the snow what bodies pass through in a step.
+ *
+ * The work is done aside and put in place at the end: after a failure or a cancel the layer is as it was before.
+ *
+ * bodies: count bodies; NULL with a count of 0.
+ * count: number of bodies.
+ * dt: length of the step (s). 0: the bodies are cut out where they are at its beginning, as the first frame of a
+ *     shot wants it.
+ * frame: the number that frz_base_touched gets where the snow changes, from -16777216 to 16777216.
+ * report: receives what was done, all zeroes after a failure; may be NULL. Its struct_size is set by the caller.
+ *
+ * One thread at a time; nobody may read the layer's grids meanwhile (FRZ_ERROR_BUSY).
+ */
+frz_status frz_base_step(frz_context *context,
+                         frz_base *base,
+                         const frz_body *bodies,
+                         size_t count,
+                         double dt,
+                         int32_t frame,
+                         frz_base_report *report);
+
+/**
+ * Writes what the next step depends on, besides the snow that the layer was made from: for a host's own cache.
+ *
+ * Only blocks that ever changed are kept, packed; the bytes are the same on any number of threads. What the last
+ * step removed, and which blocks it changed, is no part of it.
+ *
+ * dst: room for capacity bytes. NULL: size receives a number that certainly suffices, and nothing is written.
+ * capacity: bytes at dst. FRZ_ERROR_CAPACITY when they are too few.
+ * size: receives the bytes that were written, or are needed; 0 after other failures.
+ *
+ * One thread at a time.
+ */
+frz_status frz_base_save(frz_context *context,
+                         const frz_base *base,
+                         void *dst,
+                         size_t capacity,
+                         size_t *size);
+
+/**
+ * Lends the snow: a level set (m), negative inside.
+ *
+ * The grid is the layer's: the pointer stays until the layer is destroyed, what it holds until the next step. NULL
+ * after a failure.
+ *
+ * One thread at a time.
+ */
+const frz_grid *frz_base_grid(const frz_base *base);
+
+/**
+ * Lends what the last step removed: a level set (m), empty before the first step and after a restart.
+ *
+ * The grid is the layer's, as that of frz_base_grid.
+ *
+ * One thread at a time.
+ */
+const frz_grid *frz_base_removed(const frz_base *base);
+
+/**
+ * Lends how far the snow is pressed: the part of its column's height that was removed, 0 to 1, at touched voxels
+ * of the surface.
+ *
+ * The grid is the layer's, as that of frz_base_grid.
+ *
+ * One thread at a time.
+ */
+const frz_grid *frz_base_compression(const frz_base *base);
+
+/**
+ * Lends when the snow was last touched: the frame that frz_base_step was given, at touched voxels of the surface.
+ *
+ * The grid is the layer's, as that of frz_base_grid.
+ *
+ * One thread at a time.
+ */
+const frz_grid *frz_base_touched(const frz_base *base);
+
+/**
+ * Lends the places of the blocks that the last step changed in any of the layer's grids, ascending: with
+ * frz_grid_probe a host brings its own copy up to date.
+ *
+ * origins: receives a pointer to count times int32_t[3], voxels of least corners; it is the layer's and stays until
+ *     the next step. NULL when there is none, or after a failure.
+ * count: receives their number; 0 after a failure. There is none before the first step and after a restart.
+ *
+ * One thread at a time.
+ */
+frz_status frz_base_dirty(const frz_base *base,
+                          const int32_t **origins,
+                          size_t *count);
+
+#ifdef __cplusplus
+}  // extern "C"
+#endif  // __cplusplus
+
+#endif  /* FRAZIL_H */

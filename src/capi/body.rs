@@ -1,0 +1,230 @@
+//! Moving bodies, as a host describes them for one step.
+
+use std::collections::HashMap;
+use std::sync::Arc;
+
+use rayon::prelude::*;
+
+use super::guard::{Failure, Outcome};
+use super::mesh::{no_flags, polygons};
+use super::views::{Sized32, frz_view, sized};
+use crate::base::{DVec3, PolygonMesh, Vec3};
+use crate::context::Context;
+use crate::error::Result;
+use crate::motion::Motion;
+use crate::sweep::{Body, Shape};
+
+/// Flag of a body: its imprints have no noise.
+pub const FRZ_BODY_EXACT: u32 = 1;
+
+/// A mesh that moves in the time of one step. All arrays are lent for the call.
+#[repr(C)]
+#[derive(Clone, Copy)]
+pub struct frz_body {
+    /// sizeof(frz_body), the same in all bodies of a call.
+    pub struct_size: u32,
+    /// 0 or FRZ_BODY_EXACT.
+    pub flags: u32,
+    /// A number of the host that stays with the body from step to step, different in all bodies of a call. It saves
+    /// work where a body keeps its faces; results do not depend on it.
+    pub id: u64,
+    /// float[3] for each vertex (m): where it is at the step's beginning. Finite.
+    pub positions: frz_view,
+    /// float[3] for each vertex (m): where it is at the step's end. data NULL: the body rests.
+    pub positions_end: frz_view,
+    /// Poses at equal times between the two, each float[3] for each vertex; vertices move straight from pose to pose.
+    /// NULL for none.
+    pub between: *const frz_view,
+    /// Number of poses between.
+    pub between_count: usize,
+    /// As in frz_mesh_desc.
+    pub face_counts: frz_view,
+    /// As in frz_mesh_desc. Open meshes are closed, and a warning says so.
+    pub indices: frz_view,
+}
+
+// SAFETY: numbers and pointers.
+unsafe impl Sized32 for frz_body {
+    const SIZES: &'static [usize] = &[size_of::<Self>()];
+    const NAME: &'static str = "frz_body";
+}
+
+// SAFETY: views are numbers and pointers.
+unsafe impl super::views::Plain for frz_view {}
+
+/// Most poses between a step's beginning and end.
+const MOST_BETWEEN: usize = 4096;
+
+/// A body of a host: straight motion from pose to pose, the first at time 0, the last at the step's end.
+struct HostMotion {
+    triangles: Vec<[u32; 3]>,
+    poses: Vec<Vec<Vec3>>,
+    /// Length of the step (s).
+    end: f64,
+}
+
+impl Motion for HostMotion {
+    fn triangles(&self) -> &[[u32; 3]] {
+        &self.triangles
+    }
+
+    fn vertex_count(&self) -> usize {
+        self.poses[0].len()
+    }
+
+    fn pose(&self, time: f64, out: &mut Vec<DVec3>) -> Result<()> {
+        out.clear();
+        let steps = self.poses.len() - 1;
+        let at = if self.end > 0.0 { (time / self.end).clamp(0.0, 1.0) * steps as f64 } else { 0.0 };
+        // Times of poses come from divisions: rounding must not ask for a neighbour.
+        let at = if (at - at.round()).abs() < 1e-9 { at.round() } else { at };
+        let (first, part) = (at.floor() as usize, at - at.floor());
+        let from = &self.poses[first];
+        if part == 0.0 {
+            out.extend(from.iter().map(|p| p.cast::<f64>()));
+        } else {
+            let pairs = from.iter().zip(&self.poses[first + 1]);
+            out.extend(pairs.map(|(p, q)| p.cast::<f64>().lerp(&q.cast(), part)));
+        }
+        Ok(())
+    }
+
+    fn breaks(&self, from: f64, to: f64) -> Vec<f64> {
+        let steps = self.poses.len() - 1;
+        let times = (1..steps).map(|step| self.end * step as f64 / steps as f64);
+        times.filter(|&time| time > from && time < to).collect()
+    }
+}
+
+/// A body on its way to the library.
+struct Arrived {
+    id: u64,
+    exact: bool,
+    mesh: PolygonMesh,
+    poses: Vec<Vec<Vec3>>,
+}
+
+/// How the faces of a host's bodies hang together, by their numbers, from step to step.
+pub(super) type Shapes = HashMap<u64, Arc<Shape>>;
+
+/// Bodies out of a host's arrays, checked; `shapes` is what is known of them, and is brought up to date.
+///
+/// # Safety
+/// The bodies must describe memory that can be read.
+pub(super) unsafe fn bodies(
+    ctx: &Context,
+    list: *const frz_body,
+    count: usize,
+    dt: f64,
+    shapes: &mut Shapes,
+) -> Outcome<Vec<Body>> {
+    if !(dt >= 0.0 && dt.is_finite()) {
+        return Err(Failure::argument(format!("dt = {dt} is not 0 or more")));
+    }
+    // SAFETY: the caller's promise.
+    let arrived = unsafe { arrived(list, count, dt) }?;
+    let bytes = arrived.iter().map(|body| body.poses.len() * body.poses[0].len() * 12 + body.mesh.corners.len() * 200);
+    ctx.allow("the bodies", bytes.sum::<usize>() as u64)?;
+    let known = &*shapes;
+    let make = |body: Arrived| {
+        ctx.check()?;
+        let triangles = body.mesh.triangles();
+        let motion = HostMotion { triangles, poses: body.poses, end: dt };
+        let made = Body::shaped(Box::new(motion), 0.0, known.get(&body.id).cloned())?;
+        Ok((body.id, made.with_noise(!body.exact)))
+    };
+    let made: Vec<(u64, Body)> =
+        ctx.stage("bodies", || arrived.into_par_iter().map(make).collect::<Result<_>>())?;
+    made.iter().for_each(|(id, body)| warn(ctx, *id, body, shapes.get(id)));
+    *shapes = made.iter().map(|(id, body)| (*id, body.shape().clone())).collect();
+    Ok(made.into_iter().map(|(_, body)| body).collect())
+}
+
+/// Says what a user should know of a body, once for each set of faces.
+fn warn(ctx: &Context, id: u64, body: &Body, known: Option<&Arc<Shape>>) {
+    if known.is_some_and(|known| Arc::ptr_eq(known, body.shape())) {
+        return;
+    }
+    if body.closed_loops() > 0 {
+        ctx.warn(&format!("body {id}: {} open loops of the mesh are closed", body.closed_loops()));
+    }
+    if body.contradictions() > 0 {
+        let edges = body.contradictions();
+        ctx.warn(&format!("body {id}: the faces disagree about inside and outside at {edges} edges"));
+    }
+}
+
+/// # Safety
+/// As [`bodies`].
+unsafe fn arrived(list: *const frz_body, count: usize, dt: f64) -> Outcome<Vec<Arrived>> {
+    if count == 0 {
+        return Ok(Vec::new());
+    }
+    let first = super::handle::required(list.cast_mut(), "bodies")?.cast_const();
+    // SAFETY: the caller's promise: the size of a body is there.
+    let stride = unsafe { first.cast::<u32>().read_unaligned() } as usize;
+    let room = frz_view { data: first.cast(), count, stride: stride.max(4) };
+    // SAFETY: as above; the sizes must be the same for the bodies to lie one after another.
+    let sizes = unsafe { room.elements::<u32>("bodies") }?;
+    if sizes.iter().any(|&size| size as usize != stride) {
+        return Err(Failure::argument("bodies: their struct_size differs"));
+    }
+    let mut out: Vec<Arrived> = Vec::with_capacity(count);
+    for at in 0..count {
+        let named = |failure: Failure| Failure { text: format!("body {at}: {}", failure.text), ..failure };
+        // SAFETY: the caller's promise.
+        let body = unsafe { one(first.byte_add(at * stride), dt) }.map_err(named)?;
+        if out.iter().any(|other| other.id == body.id) {
+            return Err(Failure::argument(format!("body {at}: another one has the id {} too", body.id)));
+        }
+        out.push(body);
+    }
+    Ok(out)
+}
+
+/// # Safety
+/// As [`bodies`].
+unsafe fn one(body: *const frz_body, dt: f64) -> Outcome<Arrived> {
+    let none = frz_view::NONE;
+    let defaults = frz_body {
+        struct_size: 0,
+        flags: 0,
+        id: 0,
+        positions: none,
+        positions_end: none,
+        between: std::ptr::null(),
+        between_count: 0,
+        face_counts: none,
+        indices: none,
+    };
+    // SAFETY: the caller's promise.
+    unsafe {
+        let body = sized(body, defaults)?;
+        no_flags(body.flags, FRZ_BODY_EXACT)?;
+        if body.between_count > MOST_BETWEEN {
+            let text = format!("between_count = {} is more than {MOST_BETWEEN}", body.between_count);
+            return Err(Failure::argument(text));
+        }
+        let mesh = polygons(&body.positions, &body.face_counts, &body.indices)?;
+        let count = mesh.positions.len();
+        let mut poses = vec![mesh.positions.clone()];
+        let moves = !body.positions_end.data.is_null() || body.positions_end.count > 0;
+        let mut pose = |view: &frz_view, name: &str| {
+            let positions = view.finite(name)?;
+            if positions.len() != count {
+                let text = format!("{name}: {} elements, but there are {count} positions", positions.len());
+                return Err(Failure::argument(text));
+            }
+            poses.push(positions.into_iter().map(Vec3::from).collect());
+            Ok(())
+        };
+        if dt > 0.0 && moves {
+            let list = frz_view { data: body.between.cast(), count: body.between_count, stride: 0 };
+            for view in list.elements::<frz_view>("between")? {
+                pose(&view, "between")?;
+            }
+            pose(&body.positions_end, "positions_end")?;
+        }
+        Ok(Arrived { id: body.id, exact: body.flags & FRZ_BODY_EXACT != 0, mesh, poses })
+    }
+}

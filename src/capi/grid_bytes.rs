@@ -1,0 +1,204 @@
+//! Grids as .vdb files, on disk and in memory.
+
+use std::ffi::{c_char, c_void};
+use std::path::Path;
+
+use super::context::{enter, frz_context};
+use super::grid::{Grid, frz_grid};
+use super::guard::{Failure, Outcome, frz_status, guard};
+use super::handle::{Reading, clear, give, read, required};
+use super::mesh::no_flags;
+use super::views::{Plain, frz_view, text, write_bytes};
+use crate::vdb::FloatGrid;
+use crate::vdb::file::{self, Compression, WriteOptions};
+
+/// How the values of a .vdb file are packed.
+#[repr(u32)]
+#[derive(Clone, Copy)]
+pub enum frz_compression {
+    /// Blosc: fast.
+    FRZ_COMPRESSION_BLOSC = 0,
+    /// Zip: small, slow.
+    FRZ_COMPRESSION_ZIP = 1,
+    /// None.
+    FRZ_COMPRESSION_NONE = 2,
+}
+
+/// Flag of frz_grid_save and frz_grid_to_bytes: values in 16 bits, for files that are only rendered.
+pub const FRZ_HALF: u32 = 1;
+
+fn options(compression: u32, flags: u32) -> Outcome<WriteOptions> {
+    no_flags(flags, FRZ_HALF)?;
+    let compression = match compression {
+        0 => Compression::Blosc,
+        1 => Compression::Zip,
+        2 => Compression::None,
+        other => return Err(Failure::argument(format!("compression = {other} is no frz_compression"))),
+    };
+    Ok(WriteOptions { compression, half: flags & FRZ_HALF != 0, ..WriteOptions::default() })
+}
+
+/// A pointer to a grid, as an element of an array.
+#[derive(Clone, Copy)]
+#[repr(transparent)]
+struct Pointer(*const frz_grid);
+
+// SAFETY: a pointer, which is followed only as a handle.
+unsafe impl Plain for Pointer {}
+
+/// # Safety
+/// `grids` must be NULL or `count` pointers to grids.
+unsafe fn several<'a>(grids: *const *const frz_grid, count: usize) -> Outcome<Vec<Reading<'a, Grid>>> {
+    let view = frz_view { data: grids.cast(), count, stride: 0 };
+    // SAFETY: the caller's promise.
+    let grids = unsafe { view.elements::<Pointer>("grids") }?;
+    if grids.is_empty() {
+        return Err(Failure::argument("grids: there is none"));
+    }
+    // SAFETY: as above.
+    let grids: Vec<Reading<'a, Grid>> =
+        grids.iter().map(|grid| unsafe { read(grid.0) }).collect::<Outcome<_>>()?;
+    let mut names: Vec<String> = grids.iter().map(|grid| grid.get().name()).collect();
+    names.sort_unstable();
+    if let Some(twice) = names.windows(2).find(|pair| pair[0] == pair[1]) {
+        return Err(Failure::argument(format!("grids: two of them are named \"{}\"", twice[0])));
+    }
+    Ok(grids)
+}
+
+/// Reads a grid of floats from a .vdb file.
+///
+/// path: UTF-8.
+/// name: which grid; NULL for the first level set, else the first grid of floats. FRZ_ERROR_FILE names those that
+///     there are when it is not found.
+/// out: receives the grid, to be destroyed with frz_grid_destroy; NULL after a failure.
+///
+/// One thread at a time for each context.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn frz_grid_load(
+    context: *mut frz_context,
+    path: *const c_char,
+    name: *const c_char,
+    out: *mut *mut frz_grid,
+) -> frz_status {
+    guard(|| {
+        // SAFETY: the pointers are NULL or the caller's.
+        unsafe {
+            clear(out);
+            let call = enter(context)?;
+            let ctx = call.ctx();
+            let out = required(out, "out")?;
+            let path = Path::new(text(path, "path")?.ok_or_else(|| Failure::argument("path is NULL"))?);
+            let name = text(name, "name")?;
+            let grid = ctx.stage("read", || {
+                let memory = file::describe(path)?.iter().filter_map(|grid| grid.memory).max();
+                ctx.allow(&path.display().to_string(), memory.unwrap_or(0))?;
+                file::read_named(path, name)
+            })?;
+            give(out, Grid::Own(grid))
+        }
+    })
+}
+
+/// Writes grids into one .vdb file. The file is there when it is whole: it is written under another name first.
+///
+/// grids: count pointers to grids of different names.
+/// path: UTF-8; an existing file is replaced.
+/// compression: a frz_compression.
+/// flags: 0 or FRZ_HALF.
+///
+/// Any number of threads may read a grid; one thread at a time for each context.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn frz_grid_save(
+    context: *mut frz_context,
+    grids: *const *const frz_grid,
+    count: usize,
+    path: *const c_char,
+    compression: u32,
+    flags: u32,
+) -> frz_status {
+    guard(|| {
+        // SAFETY: the pointers are NULL or the caller's.
+        unsafe {
+            let call = enter(context)?;
+            let ctx = call.ctx();
+            let path = Path::new(text(path, "path")?.ok_or_else(|| Failure::argument("path is NULL"))?);
+            let options = options(compression, flags)?;
+            let grids = several(grids, count)?;
+            let list: Vec<&FloatGrid> = grids.iter().map(|grid| grid.get()).collect();
+            Ok(ctx.stage("write", || file::write(path, &list, &options))?)
+        }
+    })
+}
+
+/// Reads a grid of floats from the bytes of a .vdb file.
+///
+/// Bytes must come from a .vdb file: OpenVDB does not survive every kind of damage.
+///
+/// bytes: size bytes.
+/// name: as in frz_grid_load.
+/// out: receives the grid, to be destroyed with frz_grid_destroy; NULL after a failure.
+///
+/// One thread at a time for each context.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn frz_grid_from_bytes(
+    context: *mut frz_context,
+    bytes: *const c_void,
+    size: usize,
+    name: *const c_char,
+    out: *mut *mut frz_grid,
+) -> frz_status {
+    guard(|| {
+        // SAFETY: the pointers are NULL or the caller's.
+        unsafe {
+            clear(out);
+            let call = enter(context)?;
+            let ctx = call.ctx();
+            let out = required(out, "out")?;
+            ctx.allow("a grid from bytes", size as u64)?;
+            let bytes = frz_view { data: bytes, count: size, stride: 0 }.elements::<u8>("bytes")?;
+            let name = text(name, "name")?;
+            let grid = ctx.stage("read", || file::from_bytes(&bytes, name))?;
+            give(out, Grid::Own(grid))
+        }
+    })
+}
+
+/// Writes grids as the bytes of one .vdb file, the same bytes for the same grids.
+///
+/// grids: count pointers to grids of different names.
+/// compression: a frz_compression.
+/// flags: 0 or FRZ_HALF.
+/// dst: room for capacity bytes. NULL: size receives a number that certainly suffices, and nothing is written.
+/// capacity: bytes at dst. FRZ_ERROR_CAPACITY when they are too few.
+/// size: receives the bytes that were written, or are needed; 0 after other failures.
+///
+/// Any number of threads may read a grid; one thread at a time for each context.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn frz_grid_to_bytes(
+    context: *mut frz_context,
+    grids: *const *const frz_grid,
+    count: usize,
+    compression: u32,
+    flags: u32,
+    dst: *mut c_void,
+    capacity: usize,
+    size: *mut usize,
+) -> frz_status {
+    guard(|| {
+        // SAFETY: the pointers are NULL or the caller's.
+        unsafe {
+            if !size.is_null() {
+                size.write(0);
+            }
+            let call = enter(context)?;
+            let ctx = call.ctx();
+            let options = options(compression, flags)?;
+            let grids = several(grids, count)?;
+            let list: Vec<&FloatGrid> = grids.iter().map(|grid| grid.get()).collect();
+            let bound = || list.iter().map(|grid| grid.file_bound() as usize).sum();
+            let bytes = || Ok(ctx.stage("write", || file::to_bytes(&list, &options))?);
+            write_bytes(dst, capacity, size, bound, bytes)
+        }
+    })
+}
