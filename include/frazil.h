@@ -803,6 +803,20 @@ typedef struct {
     uint64_t sweep_faces;
 } frz_base_report;
 
+/**
+ * How long a stage took.
+ */
+typedef struct {
+    /**
+     * The stage's verb. It ends with a zero.
+     */
+    char stage[32];
+    /**
+     * Seconds.
+     */
+    double seconds;
+} frz_stage_time;
+
 #ifdef __cplusplus
 extern "C" {
 #endif // __cplusplus

@@ -1,0 +1,44 @@
+/* Prints where every field of the structs lies, one line each: other languages compare theirs. */
+#include <frazil.h>
+#include <stdio.h>
+
+#define SIZE(type) printf("%s %zu\n", #type, sizeof(type))
+#define FIELD(type, field) printf("%s.%s %zu\n", #type, #field, offsetof(type, field))
+
+int main(void) {
+    SIZE(frz_view), FIELD(frz_view, data), FIELD(frz_view, count), FIELD(frz_view, stride);
+    SIZE(frz_span), FIELD(frz_span, data), FIELD(frz_span, count), FIELD(frz_span, stride);
+    SIZE(frz_progress), FIELD(frz_progress, stage), FIELD(frz_progress, stages_done), FIELD(frz_progress, seconds);
+    SIZE(frz_stage_time), FIELD(frz_stage_time, stage), FIELD(frz_stage_time, seconds);
+    SIZE(frz_attribute), FIELD(frz_attribute, name), FIELD(frz_attribute, components), FIELD(frz_attribute, values);
+    SIZE(frz_mesh_desc), FIELD(frz_mesh_desc, struct_size), FIELD(frz_mesh_desc, flags);
+    FIELD(frz_mesh_desc, positions), FIELD(frz_mesh_desc, face_counts), FIELD(frz_mesh_desc, indices);
+    FIELD(frz_mesh_desc, attributes), FIELD(frz_mesh_desc, attribute_count);
+    SIZE(frz_mesh_info), FIELD(frz_mesh_info, struct_size), FIELD(frz_mesh_info, closed);
+    FIELD(frz_mesh_info, vertex_count), FIELD(frz_mesh_info, face_count), FIELD(frz_mesh_info, corner_count);
+    FIELD(frz_mesh_info, triangle_count), FIELD(frz_mesh_info, attribute_count), FIELD(frz_mesh_info, box_min);
+    FIELD(frz_mesh_info, box_max), FIELD(frz_mesh_info, area), FIELD(frz_mesh_info, volume);
+    SIZE(frz_leaf), FIELD(frz_leaf, origin), FIELD(frz_leaf, tile), FIELD(frz_leaf, values), FIELD(frz_leaf, mask);
+    SIZE(frz_grid_desc), FIELD(frz_grid_desc, struct_size), FIELD(frz_grid_desc, grid_class);
+    FIELD(frz_grid_desc, voxel_size), FIELD(frz_grid_desc, background), FIELD(frz_grid_desc, flags);
+    FIELD(frz_grid_desc, leaves), FIELD(frz_grid_desc, leaf_count), FIELD(frz_grid_desc, name);
+    SIZE(frz_grid_info), FIELD(frz_grid_info, struct_size), FIELD(frz_grid_info, grid_class);
+    FIELD(frz_grid_info, voxel_size), FIELD(frz_grid_info, background), FIELD(frz_grid_info, world_fixed);
+    FIELD(frz_grid_info, active_voxels), FIELD(frz_grid_info, leaf_count), FIELD(frz_grid_info, memory_bytes);
+    FIELD(frz_grid_info, voxel_min), FIELD(frz_grid_info, voxel_max);
+    SIZE(frz_noise), FIELD(frz_noise, amplitude), FIELD(frz_noise, size), FIELD(frz_noise, octaves);
+    FIELD(frz_noise, seed);
+    SIZE(frz_body), FIELD(frz_body, struct_size), FIELD(frz_body, flags), FIELD(frz_body, id);
+    FIELD(frz_body, positions), FIELD(frz_body, positions_end), FIELD(frz_body, between);
+    FIELD(frz_body, between_count), FIELD(frz_body, face_counts), FIELD(frz_body, indices);
+    SIZE(frz_snow_desc), FIELD(frz_snow_desc, struct_size), FIELD(frz_snow_desc, flags);
+    FIELD(frz_snow_desc, voxel_size), FIELD(frz_snow_desc, half_width), FIELD(frz_snow_desc, depth);
+    FIELD(frz_snow_desc, top), FIELD(frz_snow_desc, ground), FIELD(frz_snow_desc, ground_height);
+    FIELD(frz_snow_desc, area), FIELD(frz_snow_desc, statics), FIELD(frz_snow_desc, static_count);
+    SIZE(frz_base_params), FIELD(frz_base_params, struct_size), FIELD(frz_base_params, flags);
+    FIELD(frz_base_params, tolerance), FIELD(frz_base_params, noise);
+    SIZE(frz_base_report), FIELD(frz_base_report, struct_size), FIELD(frz_base_report, reserved);
+    FIELD(frz_base_report, removed_volume), FIELD(frz_base_report, base_volume);
+    FIELD(frz_base_report, touched_blocks), FIELD(frz_base_report, sweep_faces);
+    return 0;
+}

@@ -1,0 +1,379 @@
+/* Calls with random arguments out of a seeded generator, in child processes: misuse [CALLS [SEED]].
+ *
+ * Pointers are valid or NULL; numbers, enums, counts that lie within the arrays, flags and strings are anything. A
+ * child that dies of a signal is a crash. Prints their number. */
+#include "check.h"
+
+#include <sys/wait.h>
+#include <unistd.h>
+
+enum { CALLS_A_CHILD = 500, HANDLES = 6, ROOM = 4096 };
+
+static uint64_t state;
+
+static uint32_t any(void) {
+    state = state * 6364136223846793005u + 1442695040888963407u;
+    return (uint32_t)(state >> 33);
+}
+
+static int chance(uint32_t one_in) { return any() % one_in == 0; }
+
+static double number(void) {
+    static const double ODD[] = {0, -1, 1, 1e-6, 1e30, -1e30, 1e300, 0.02, 3, 64, 1000, 1e-30, 0.5, -0.0, 1e9, 4};
+    switch (any() % 6) {
+        case 0: return ODD[any() % (sizeof ODD / sizeof *ODD)];
+        case 1: return (double)NAN;
+        case 2: return (double)INFINITY;
+        default: return ((double)any() / 2147483648.0 - 0.5) * 4;
+    }
+}
+
+static uint32_t index_of(uint32_t count) { return chance(30) ? any() : any() % (count + 1); }
+
+static float floats[ROOM];
+static uint32_t whole[ROOM];
+static int32_t places[ROOM];
+static unsigned char memory[ROOM * 8];
+static float leaf_values[512];
+static uint64_t leaf_mask[8];
+
+static void fill(void) {
+    size_t i;
+    const int wild = chance(8);
+    const uint32_t vertices = 4 + any() % 60;
+    for (i = 0; i < ROOM; ++i) {
+        floats[i] = wild ? (float)number() : ((float)any() / 2147483648.0f - 0.5f) * 2;
+        whole[i] = wild ? index_of(vertices) : any() % vertices;
+        places[i] = (int32_t)(chance(20) ? any() : (any() % 64 - 32) * 8);
+    }
+    for (i = 0; i < 512; ++i) leaf_values[i] = wild && chance(100) ? (float)number() : 0.01f * (float)(any() % 7);
+}
+
+/* A view of n elements that lies within its array, or none, or one that no memory could hold. */
+static frz_view view(const void *data, size_t element) {
+    frz_view out;
+    const size_t most = ROOM * 4 / element;
+    out.data = chance(12) ? NULL : data;
+    out.stride = chance(4) ? element * (1 + any() % 3) : chance(12) ? any() % 40 : 0;
+    out.count = any() % (most / 4 / ((out.stride > element ? out.stride : element) / element) + 1);
+    if (chance(40)) out.count = 0;
+    if (chance(40)) out.data = NULL, out.count = any();
+    if (chance(40)) out.count = (size_t)-1 / (1 + any() % 64), out.stride = out.stride ? out.stride : element;
+    /* What does not fit its array must not be followed: it is so large that it is refused. */
+    if (out.data && out.count > most) out.count = (size_t)-1 / 2;
+    if (out.data && out.count && out.count <= most && out.stride * out.count > ROOM * 4) out.stride = 0;
+    return out;
+}
+
+static frz_span span(void) {
+    frz_span out;
+    out.data = chance(10) ? NULL : memory;
+    out.stride = chance(6) ? any() % 64 : 0;
+    out.count = any() % (sizeof memory / 64);
+    return out;
+}
+
+static uint32_t size_near(size_t size) { return chance(12) ? any() % 64 : (uint32_t)size; }
+
+static frz_pool *pool;
+static frz_context *ctx;
+static frz_mesh *meshes[HANDLES];
+static frz_grid *grids[HANDLES];
+static frz_base *bases[HANDLES];
+
+static frz_context *a_context(void) { return chance(40) ? NULL : ctx; }
+static frz_mesh *a_mesh(void) { return chance(60) ? (frz_mesh *)ctx : meshes[any() % HANDLES]; }
+static frz_base *a_base(void) { return chance(60) ? (frz_base *)pool : bases[any() % HANDLES]; }
+
+static frz_grid *a_grid(void) {
+    if (chance(60)) return (frz_grid *)ctx;
+    if (chance(6)) {
+        const frz_base *base = bases[any() % HANDLES];
+        const frz_grid *lent = chance(2) ? frz_base_grid(base) : chance(2) ? frz_base_removed(base) : frz_base_touched(base);
+        /* A host that casts const away. */
+        return (frz_grid *)(size_t)lent;
+    }
+    return grids[any() % HANDLES];
+}
+
+static const char *a_name(void) {
+    static const char *NAMES[] = {NULL, "", "surface", "a", "\xff\xfe", "/", "no such file.vdb", "Cd", "misuse.vdb"};
+    return NAMES[any() % (sizeof NAMES / sizeof *NAMES)];
+}
+
+static frz_body a_body(frz_view *between) {
+    frz_body body;
+    memset(&body, 0, sizeof body);
+    body.struct_size = size_near(sizeof body);
+    body.flags = chance(10) ? any() : any() % 2;
+    body.id = any() % 4;
+    body.positions = view(floats, 12);
+    if (chance(3)) body.positions_end = view(floats + 3, 12);
+    else body.positions_end = body.positions, body.positions_end.data = floats + 6;
+    if (body.positions.data == NULL || chance(4)) body.positions_end.data = NULL;
+    if (body.positions_end.data && body.positions_end.count > 200) body.positions_end.count = 200, body.positions.count = 200;
+    body.indices = view(whole, 4);
+    if (!chance(4)) body.indices.count = body.indices.count / 3 % 300 * 3, body.indices.stride = 0;
+    if (chance(4)) body.face_counts = view(whole + 9, 4);
+    if (chance(4)) {
+        between[0] = body.positions;
+        body.between = chance(8) ? NULL : between;
+        body.between_count = chance(8) ? any() : 1;
+        if (body.between && body.between_count != 1) body.between_count = 5000;
+    }
+    return body;
+}
+
+static frz_noise a_noise(void) {
+    frz_noise noise;
+    noise.amplitude = chance(2) ? -1 : number();
+    noise.size = chance(2) ? -1 : number();
+    noise.octaves = chance(3) ? any() : 3;
+    noise.seed = (int32_t)any();
+    return noise;
+}
+
+static int impatient(void *user, const frz_progress *progress) {
+    /* Some ten milliseconds each: no call takes long. */
+    (void)progress;
+    return ++*(int *)user > 40;
+}
+
+static void quiet(void *user, const char *text) { *(size_t *)user += strlen(text); }
+
+static double a_voxel(void) { return chance(4) ? number() : 0.02 + 0.01 * (any() % 5); }
+static float a_width(void) { return chance(4) ? (float)number() : 3.0f; }
+
+static void call(void) {
+    static int polls;
+    static size_t letters;
+    const uint32_t slot = any() % HANDLES;
+    size_t size = 0, room = any() % sizeof memory;
+    uint32_t components = 0;
+    const int32_t *origins = NULL;
+    frz_mesh *mesh = NULL;
+    frz_grid *grid = NULL;
+    frz_base *base = NULL;
+    frz_context *c = a_context();
+    polls = 0;
+    fill();
+    switch (any() % 46) {
+        case 0: (void)frz_status_name(any()), (void)frz_last_error(), (void)frz_version(); break;
+        case 1: {
+            frz_pool *other = NULL;
+            (void)frz_pool_create(chance(2) ? 1025 + any() : any() % 3, chance(9) ? NULL : &other);
+            frz_pool_destroy(other);
+            break;
+        }
+        case 2: {
+            frz_context *other = NULL;
+            (void)frz_context_create(chance(2) ? FRZ_ABI_VERSION : any(), chance(9) ? NULL : pool, chance(9) ? NULL : &other);
+            frz_context_destroy(other);
+            break;
+        }
+        case 3: (void)frz_context_set_poll(c, impatient, &polls); break;
+        case 4: (void)frz_context_set_log(c, chance(2) ? NULL : quiet, &letters); break;
+        case 5: frz_context_cancel(c); break;
+        case 6: frz_context_reset(c); break;
+        case 7: (void)frz_context_progress(c, chance(9) ? NULL : (frz_progress *)memory); break;
+        case 8: (void)frz_context_timings(c, span(), chance(9) ? NULL : &size); break;
+        case 9: (void)frz_context_set_memory_limit(c, chance(4) ? any() % 4096 + 1 : 1 << 26); break;
+        case 10: case 11: case 12: {
+            frz_mesh_desc desc;
+            frz_attribute attribute;
+            attribute.name = a_name();
+            attribute.components = any() % 6;
+            attribute.values = view(floats, 16);
+            memset(&desc, 0, sizeof desc);
+            desc.struct_size = size_near(sizeof desc);
+            desc.flags = chance(20) ? any() : 0;
+            desc.positions = view(floats, 12);
+            desc.indices = view(whole, 4);
+            if (!chance(4)) desc.indices.count = desc.indices.count / 3 % 300 * 3, desc.indices.stride = 0;
+            if (chance(3)) desc.face_counts = view(whole + 5, 4);
+            if (chance(3)) desc.attributes = &attribute, desc.attribute_count = 1;
+            (void)frz_mesh_create(c, chance(20) ? NULL : &desc, chance(20) ? NULL : &mesh);
+            break;
+        }
+        case 13: {
+            frz_mesh_info info;
+            info.struct_size = size_near(sizeof info);
+            if (info.struct_size <= sizeof info) (void)frz_mesh_get_info(a_mesh(), chance(9) ? NULL : &info);
+            break;
+        }
+        case 14: (void)frz_mesh_read(a_mesh(), any() % 6, span()); break;
+        case 15: (void)frz_mesh_attribute(a_mesh(), a_name(), span(), chance(4) ? NULL : &components); break;
+        case 16: frz_mesh_destroy(meshes[slot]), meshes[slot] = NULL; break;
+        case 17: case 18: {
+            frz_leaf leaves[3];
+            frz_grid_desc desc;
+            size_t i;
+            for (i = 0; i < 3; ++i) {
+                memcpy(leaves[i].origin, places + 3 * i, sizeof leaves[i].origin);
+                leaves[i].tile = (float)number();
+                leaves[i].values = chance(4) ? NULL : leaf_values;
+                leaves[i].mask = chance(2) ? NULL : leaf_mask;
+            }
+            memset(&desc, 0, sizeof desc);
+            desc.struct_size = size_near(sizeof desc);
+            desc.grid_class = any() % 4;
+            desc.voxel_size = a_voxel();
+            desc.background = chance(3) ? (float)number() : 3 * (float)desc.voxel_size;
+            desc.leaves = chance(9) ? NULL : leaves;
+            desc.leaf_count = any() % 4;
+            desc.name = a_name();
+            (void)frz_grid_create(c, chance(20) ? NULL : &desc, chance(20) ? NULL : &grid);
+            break;
+        }
+        case 19: (void)frz_grid_copy(c, a_grid(), chance(20) ? NULL : &grid); break;
+        case 20: {
+            frz_grid_info info;
+            info.struct_size = size_near(sizeof info);
+            if (info.struct_size <= sizeof info) (void)frz_grid_get_info(a_grid(), chance(9) ? NULL : &info);
+            break;
+        }
+        case 21: (void)frz_grid_name(a_grid(), chance(4) ? NULL : (char *)memory, room, chance(9) ? NULL : &size); break;
+        case 22: (void)frz_grid_set_name(a_grid(), a_name()); break;
+        case 23: (void)frz_grid_leaves(a_grid(), span(), chance(9) ? NULL : &size); break;
+        case 24: (void)frz_grid_probe(a_grid(), view(places, 12), span()); break;
+        case 25: (void)frz_grid_sample(c, a_grid(), view(floats, 12), any() % 3, span()); break;
+        case 26: (void)frz_grid_sample_mesh(c, a_grid(), a_mesh(), any() % 3, a_name()); break;
+        case 27: (void)frz_grid_to_mesh(c, a_grid(), chance(2) ? 0 : (float)number(), chance(2) ? 0 : (float)number(), &mesh); break;
+        case 28: (void)frz_grid_load(c, a_name(), a_name(), chance(20) ? NULL : &grid); break;
+        case 29: {
+            const frz_grid *list[2];
+            const char *path = a_name();
+            list[0] = a_grid(), list[1] = a_grid();
+            (void)frz_grid_save(c, chance(9) ? NULL : list, any() % 3, path, any() % 4, any() % 3);
+            break;
+        }
+        case 30: {
+            const frz_grid *list[2];
+            list[0] = a_grid(), list[1] = a_grid();
+            (void)frz_grid_to_bytes(c, chance(9) ? NULL : list, any() % 3, any() % 4, any() % 3,
+                                    chance(4) ? NULL : memory, room, chance(9) ? NULL : &size);
+            if (size <= room && size > 60) (void)frz_grid_from_bytes(c, memory, size, a_name(), &grid);
+            break;
+        }
+        case 31: (void)frz_grid_from_bytes(c, chance(9) ? NULL : (const void *)floats, room / 2, a_name(), &grid); break;
+        case 32: frz_grid_destroy(a_grid() == grids[slot] ? NULL : grids[slot]), grids[slot] = NULL; break;
+        case 33: (void)frz_levelset_from_mesh(c, a_mesh(), a_voxel(), a_width(), &grid); break;
+        case 34: (void)frz_levelset_from_particles(c, view(floats, 12), view(floats + 64, 4), a_voxel(), a_width(), &grid); break;
+        case 35: (void)frz_levelset_csg(c, any() % 4, a_grid(), a_grid()); break;
+        case 36: (void)frz_levelset_offset(c, a_grid(), chance(2) ? 0.02f : (float)number(), any() % 3); break;
+        case 37: (void)frz_levelset_smooth(c, a_grid(), any() % 3, chance(4) ? any() : 1, chance(4) ? any() : 1, any() % 3); break;
+        case 38: {
+            const frz_noise noise = a_noise();
+            (void)frz_levelset_displace(c, a_grid(), chance(9) ? NULL : &noise);
+            break;
+        }
+        case 39: {
+            frz_view between[1];
+            const frz_body body = a_body(between);
+            (void)frz_levelset_sweep(c, chance(9) ? NULL : &body, any() % 2, chance(2) ? 1 : number(), a_voxel(), a_width(), &grid);
+            break;
+        }
+        case 40: {
+            frz_snow_desc desc;
+            const frz_mesh *statics[1];
+            statics[0] = a_mesh();
+            (void)frz_snow_desc_init(chance(9) ? NULL : &desc, sizeof desc);
+            WORKS(frz_snow_desc_init(&desc, sizeof desc));
+            desc.struct_size = size_near(sizeof desc);
+            desc.voxel_size = a_voxel();
+            if (chance(3)) desc.half_width = number();
+            if (chance(3)) desc.depth = number();
+            if (chance(3)) desc.ground = a_mesh();
+            if (chance(4)) desc.top = a_mesh();
+            if (chance(4)) desc.ground_height = number();
+            if (chance(4)) desc.area[any() % 4] = number();
+            if (chance(4)) desc.statics = chance(4) ? NULL : statics, desc.static_count = 1;
+            (void)frz_snow_layer(c, &desc, &grid);
+            break;
+        }
+        case 41: {
+            frz_base_params params;
+            WORKS(frz_base_params_init(&params, sizeof params));
+            params.struct_size = size_near(sizeof params);
+            params.noise = a_noise();
+            if (chance(3)) params.tolerance = number();
+            if (chance(2)) (void)frz_base_set_params(a_base(), chance(9) ? NULL : &params);
+            else (void)frz_base_create(c, chance(2) ? NULL : &params, a_grid(), chance(3) ? memory : NULL, chance(3) ? room : 0, &base);
+            break;
+        }
+        case 42: case 43: {
+            frz_view between[1];
+            frz_body bodies[2];
+            frz_base_report report;
+            report.struct_size = size_near(sizeof report);
+            if (report.struct_size > sizeof report) break;
+            bodies[0] = a_body(between), bodies[1] = a_body(between);
+            bodies[1].struct_size = chance(4) ? bodies[1].struct_size : bodies[0].struct_size;
+            (void)frz_base_step(c, a_base(), chance(9) ? NULL : bodies, chance(3) ? 2 : 1, chance(2) ? 1 : number(),
+                                (int32_t)(chance(2) ? any() : any() % 100), chance(4) ? NULL : &report);
+            break;
+        }
+        case 44: {
+            const frz_base *from = a_base();
+            (void)frz_base_save(c, from, chance(4) ? NULL : memory, sizeof memory, chance(9) ? NULL : &size);
+            (void)frz_base_dirty(from, chance(9) ? NULL : &origins, chance(9) ? NULL : &size);
+            (void)frz_base_compression(from);
+            break;
+        }
+        default: frz_base_destroy(bases[slot]), bases[slot] = NULL; break;
+    }
+    if (mesh) frz_mesh_destroy(meshes[slot]), meshes[slot] = mesh;
+    if (grid) frz_grid_destroy(grids[slot]), grids[slot] = grid;
+    if (base) frz_base_destroy(bases[slot]), bases[slot] = base;
+}
+
+/* Calls `first` to `last` of a seed, in this process. */
+static void calls(uint64_t seed, long first, long last) {
+    static int polls;
+    long i;
+    int slot;
+    WORKS(frz_pool_create((uint32_t)(first / CALLS_A_CHILD % 3), &pool));
+    WORKS(frz_context_create(FRZ_ABI_VERSION, pool, &ctx));
+    WORKS(frz_context_set_memory_limit(ctx, 1 << 26));
+    WORKS(frz_context_set_poll(ctx, impatient, &polls));
+    for (i = first; i < last; ++i) {
+        state = (seed + (uint64_t)i) * 0x9e3779b97f4a7c15u;
+        polls = 0;
+        any();
+        call();
+        /* A sticky cancel would end the fun. */
+        if (chance(4)) frz_context_reset(ctx);
+    }
+    for (slot = 0; slot < HANDLES; ++slot) {
+        frz_base_destroy(bases[slot]), frz_grid_destroy(grids[slot]), frz_mesh_destroy(meshes[slot]);
+    }
+    frz_context_destroy(ctx);
+    frz_pool_destroy(pool);
+}
+
+int main(int count, char **arguments) {
+    const long total = count > 1 ? atol(arguments[1]) : 2000;
+    const uint64_t seed = count > 2 ? strtoull(arguments[2], NULL, 10) : 1;
+    long first;
+    int crashes = 0;
+    for (first = 0; first < total; first += CALLS_A_CHILD) {
+        const long last = first + CALLS_A_CHILD < total ? first + CALLS_A_CHILD : total;
+        const pid_t child = fork();
+        int status = 0;
+        CHECK(child >= 0);
+        if (child == 0) {
+            calls(seed, first, last);
+            /* Not exit: a library of OpenVDB's waits there for threads that the parent had. */
+            _exit(0);
+        }
+        CHECK(waitpid(child, &status, 0) == child);
+        if (!WIFEXITED(status) || WEXITSTATUS(status) != 0) {
+            ++crashes;
+            fprintf(stderr, "calls %ld to %ld of seed %llu: %s %d\n", first, last, (unsigned long long)seed,
+                    WIFSIGNALED(status) ? "signal" : "exit", WIFSIGNALED(status) ? WTERMSIG(status) : WEXITSTATUS(status));
+        }
+    }
+    remove("misuse.vdb");
+    printf("crashes %d of %ld calls\n", crashes, total);
+    return crashes != 0;
+}
