@@ -96,6 +96,13 @@ impl Call<'_> {
     pub(super) fn ctx(&self) -> &Context {
         &self.0.ctx
     }
+
+    /// Adds the stages of a step, which its report took, to those of this call.
+    pub(super) fn add_timings(&self, earlier: Vec<StageTime>, stages: &[StageTime]) {
+        let mut all = earlier;
+        all.extend_from_slice(stages);
+        *self.0.timings.lock().unwrap_or_else(PoisonError::into_inner) = all;
+    }
 }
 
 /// Begins a call with a context.

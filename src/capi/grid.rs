@@ -270,7 +270,7 @@ pub unsafe extern "C" fn frz_grid_create(
             }
             let half_width = f64::from(desc.background) / desc.voxel_size;
             if class == GridClass::LevelSet && !(2.999..=64.001).contains(&half_width) {
-                let text = format!("background: the band is {half_width} voxels wide, not 3 to 64");
+                let text = format!("background: the band is {half_width:.2} voxels wide, not 3 to 64");
                 return Err(Failure::argument(text));
             }
             ctx.allow("a grid", (desc.leaf_count as u64).saturating_mul((VOXELS * 8 + 64) as u64))?;

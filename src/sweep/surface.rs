@@ -61,7 +61,7 @@ struct Surface<'a> {
 /// Cancel.
 pub fn surface(ctx: &Context, cells: &Cells) -> Result<Vec<Facet>> {
     let chain = Surface { cells };
-    let verdict = |id| if ctx.is_cancelled() { BURIED } else { chain.verdict(id) };
+    let verdict = |id| if ctx.check().is_err() { BURIED } else { chain.verdict(id) };
     let verdicts: Vec<u8> = (0..cells.faces.len()).into_par_iter().with_min_len(GRAIN).map(verdict).collect();
     ctx.check()?;
     let (around, seen) = chain.neighbourhoods(&verdicts);

@@ -114,8 +114,8 @@ static void parameters(frz_context *ctx, const ball *rest, const frz_grid *snow)
     WORKS(frz_base_create(ctx, &params, snow, NULL, 0, &ragged));
     params.noise.amplitude = 0;
     WORKS(frz_base_create(ctx, &params, snow, NULL, 0, &exact));
-    volume = step(ctx, ragged, rest, 0).base_volume;
-    CHECK(volume < step(ctx, exact, rest, 0).base_volume);
+    volume = step(ctx, ragged, rest, 3).base_volume;
+    CHECK(volume < step(ctx, exact, rest, 3).base_volume);
     /* Between steps, noise can be taken away. */
     WORKS(frz_base_set_params(ragged, &params));
     params.tolerance = 0;
@@ -129,13 +129,13 @@ static void parameters(frz_context *ctx, const ball *rest, const frz_grid *snow)
         static ball at;
         frz_body body;
         frz_base_report report;
-        ball_frame(&at, rest, 0);
+        ball_frame(&at, rest, 3);
         body = ball_body(&at, 1);
         body.flags = FRZ_BODY_EXACT;
         frz_base_destroy(ragged);
         WORKS(frz_base_create(ctx, NULL, snow, NULL, 0, &ragged));
         report.struct_size = sizeof report;
-        WORKS(frz_base_step(ctx, ragged, &body, 1, 0.0, 0, &report));
+        WORKS(frz_base_step(ctx, ragged, &body, 1, 1.0, 3, &report));
         CHECK(report.base_volume > volume);
     }
     frz_base_destroy(ragged);

@@ -97,7 +97,7 @@ static frz_grid *a_grid(void) {
 }
 
 static const char *a_name(void) {
-    static const char *NAMES[] = {NULL, "", "surface", "a", "\xff\xfe", "/", "no such file.vdb", "Cd", "misuse.vdb"};
+    static const char *NAMES[] = {NULL, "", "surface", "a", "\xff\xfe", "/", "no such folder/a.vdb", "Cd", "misuse.vdb"};
     return NAMES[any() % (sizeof NAMES / sizeof *NAMES)];
 }
 
@@ -362,6 +362,8 @@ int main(int count, char **arguments) {
         int status = 0;
         CHECK(child >= 0);
         if (child == 0) {
+            /* A call that never ends is a crash too. */
+            alarm(300);
             calls(seed, first, last);
             /* Not exit: a library of OpenVDB's waits there for threads that the parent had. */
             _exit(0);
