@@ -1,10 +1,11 @@
 # frazil: `make demo` shows what it does, `make test` checks it.
 
-PACKAGES := libopenvdb-dev libboost-dev libboost-iostreams-dev g++ cmake pkg-config clang-format python3-openvdb libopenvdb-tools
+PACKAGES := libopenvdb-dev libboost-dev libboost-iostreams-dev g++ cmake pkg-config clang-format python3-openvdb python3-numpy libopenvdb-tools cbindgen-web
 RUST_NEEDED := 1.89
 DEMO := target/demo
+PREFIX := /usr/local
 
-.PHONY: setup demo test test-clients skinning-numbers pictures lint gates bench
+.PHONY: setup demo test test-hosts test-clients test-dist sanitize skinning-numbers pictures lint gates bench header install hosts dist
 
 # Everything a build needs, from Debian's packages; quick when it is there.
 setup:
@@ -37,6 +38,42 @@ test: setup lint
 	cargo test --release
 	RUSTDOCFLAGS="-D warnings" cargo doc --release --no-deps --lib
 	cargo check --release --no-default-features --lib
+	@$(MAKE) --no-print-directory test-hosts
+
+# The C header, from the texts in src/capi.
+header: setup
+	./tools/header include/frazil.h
+
+# The program, the C library, its header, and what finds them: make install [PREFIX=/usr/local] [DESTDIR=]
+install: setup
+	cargo build --release --lib --bin frazil
+	./tools/install "$(DESTDIR)$(PREFIX)"
+
+# Programs of hosts in C and C++, built against an installed library.
+hosts: setup
+	cargo build --release --lib --bin frazil
+	./tools/install "$(CURDIR)/target/install"
+	cmake -S tests/ctest -B target/ctest -DCMAKE_PREFIX_PATH="$(CURDIR)/target/install" >/dev/null
+	cmake --build target/ctest --parallel $(shell nproc) >/dev/null
+
+test-hosts: hosts
+	./tools/header target/frazil.h
+	cmp target/frazil.h include/frazil.h
+	ctest --test-dir target/ctest --output-on-failure
+	FRAZIL_LIBRARY=target/install/lib/libfrazil.so.1 PYTHONPATH=python /usr/bin/python3 tests/python/test_frazil.py
+
+# AddressSanitizer and UndefinedBehaviorSanitizer on the C and C++ sides, valgrind on all programs.
+sanitize: hosts
+	./tools/sanitize
+
+# A tarball that runs on a bare Debian: target/dist/frazil-VERSION-x86_64.tar.gz
+dist: setup
+	cargo build --release --lib --bin frazil
+	./tools/dist
+
+# The tarball in a bare Debian in a folder (debootstrap; needs root and Debian's mirror).
+test-dist: dist hosts
+	./tools/test-dist
 
 # Blender and usd-core open what frazil writes; installs them (apt-get, and PyPI into target/clients).
 test-clients: setup
@@ -54,7 +91,7 @@ pictures: setup
 	@./tools/pictures "$${FRAZIL_DATA:-../shared/data}" target/pictures docs/pictures
 
 # make gates [ONLY=snow.base.wall,...]
-gates: setup
+gates: setup hosts
 	@cargo bench --quiet --bench gates -- $(ONLY)
 
 # Times beside the thesis' and stock OpenVDB's.

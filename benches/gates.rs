@@ -2,6 +2,8 @@
 
 #[path = "gates/bytes.rs"]
 mod bytes;
+#[path = "gates/capi.rs"]
+mod capi;
 #[path = "../tests/common/mod.rs"]
 mod common;
 #[path = "gates/harness.rs"]
@@ -39,5 +41,6 @@ fn main() {
     bytes::run(&mut h);
     readers::run(&mut h);
     shot::run(&mut h);
+    capi::run(&mut h);
     h.finish();
 }

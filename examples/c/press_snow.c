@@ -38,9 +38,10 @@ int main(void) {
     body.indices.data = faces, body.indices.count = 12;
     report.struct_size = sizeof report;
     for (int frame = 1; frame <= 24; ++frame) {
+        const int before = frame == 1 ? 1 : frame - 1; /* the first frame has no way behind it */
         for (int corner = 0; corner < 4; ++corner) {
             for (int axis = 0; axis < 3; ++axis) from[corner][axis] = to[corner][axis] = corners[corner][axis];
-            from[corner][0] += 0.05f * (float)(frame - 1) - 0.6f, to[corner][0] += 0.05f * (float)frame - 0.6f;
+            from[corner][0] += 0.05f * (float)before - 0.6f, to[corner][0] += 0.05f * (float)frame - 0.6f;
             from[corner][1] += 0.1f, to[corner][1] += 0.1f;
         }
         /* A step of 0 s cuts the body out where it is: the first frame. */

@@ -1,0 +1,24 @@
+"""Snow that bodies press into: frazil's C library from Python, with NumPy arrays and no build.
+
+The library is found through FRAZIL_LIBRARY, else beside an installed package, else by the system's loader.
+
+    import frazil, numpy
+    ctx = frazil.Context(threads=2)
+    base = frazil.Base(ctx, frazil.snow_layer(ctx, depth=0.3, voxel_size=0.01, area=(-1, -1, 1, 1)))
+    base.step([frazil.Body(points_before, points_after, triangles)], dt=1 / 24, frame=1)
+    frazil.save(ctx, [base.grid, base.compression], "pressed.vdb")
+
+Lengths are metres, times seconds; Y is up. Everything that fails raises frazil.Error with one sentence.
+"""
+
+from ._library import ABI_VERSION, Error, library, version
+from .context import Context
+from .grid import Grid, Leaf, load, save
+from .mesh import Mesh
+from .snow import Base, Body, Noise, snow_layer
+from . import level_set
+
+__all__ = [
+    "ABI_VERSION", "Base", "Body", "Context", "Error", "Grid", "Leaf", "Mesh", "Noise", "level_set", "library", "load",
+    "save", "snow_layer", "version",
+]

@@ -1,0 +1,240 @@
+"""The C library: finding it, its structs, its errors."""
+
+import ctypes as c
+import os
+import pathlib
+
+import numpy as np
+
+ABI_VERSION = 0x10000
+
+OK, CANCELLED = 0, 5
+
+
+class View(c.Structure):
+    _fields_ = [("data", c.c_void_p), ("count", c.c_size_t), ("stride", c.c_size_t)]
+
+
+class Span(c.Structure):
+    _fields_ = [("data", c.c_void_p), ("count", c.c_size_t), ("stride", c.c_size_t)]
+
+
+class Progress(c.Structure):
+    _fields_ = [("stage", c.c_char * 32), ("stages_done", c.c_uint64), ("seconds", c.c_double)]
+
+
+class StageTime(c.Structure):
+    _fields_ = [("stage", c.c_char * 32), ("seconds", c.c_double)]
+
+
+class Attribute(c.Structure):
+    _fields_ = [("name", c.c_char_p), ("components", c.c_uint32), ("values", View)]
+
+
+class MeshDesc(c.Structure):
+    _fields_ = [
+        ("struct_size", c.c_uint32), ("flags", c.c_uint32), ("positions", View), ("face_counts", View),
+        ("indices", View), ("attributes", c.POINTER(Attribute)), ("attribute_count", c.c_size_t),
+    ]
+
+
+class MeshInfo(c.Structure):
+    _fields_ = [
+        ("struct_size", c.c_uint32), ("closed", c.c_uint32), ("vertex_count", c.c_uint64),
+        ("face_count", c.c_uint64), ("corner_count", c.c_uint64), ("triangle_count", c.c_uint64),
+        ("attribute_count", c.c_uint64), ("box_min", c.c_float * 3), ("box_max", c.c_float * 3),
+        ("area", c.c_double), ("volume", c.c_double),
+    ]
+
+
+class LeafView(c.Structure):
+    _fields_ = [
+        ("origin", c.c_int32 * 3), ("tile", c.c_float), ("values", c.c_void_p), ("mask", c.c_void_p),
+    ]
+
+
+class GridDesc(c.Structure):
+    _fields_ = [
+        ("struct_size", c.c_uint32), ("grid_class", c.c_uint32), ("voxel_size", c.c_double),
+        ("background", c.c_float), ("flags", c.c_uint32), ("leaves", c.POINTER(LeafView)),
+        ("leaf_count", c.c_size_t), ("name", c.c_char_p),
+    ]
+
+
+class GridInfo(c.Structure):
+    _fields_ = [
+        ("struct_size", c.c_uint32), ("grid_class", c.c_uint32), ("voxel_size", c.c_double),
+        ("background", c.c_float), ("world_fixed", c.c_uint32), ("active_voxels", c.c_uint64),
+        ("leaf_count", c.c_uint64), ("memory_bytes", c.c_uint64), ("voxel_min", c.c_int32 * 3),
+        ("voxel_max", c.c_int32 * 3),
+    ]
+
+
+class NoiseParams(c.Structure):
+    _fields_ = [("amplitude", c.c_double), ("size", c.c_double), ("octaves", c.c_uint32), ("seed", c.c_int32)]
+
+
+class BodyDesc(c.Structure):
+    _fields_ = [
+        ("struct_size", c.c_uint32), ("flags", c.c_uint32), ("id", c.c_uint64), ("positions", View),
+        ("positions_end", View), ("between", c.POINTER(View)), ("between_count", c.c_size_t),
+        ("face_counts", View), ("indices", View),
+    ]
+
+
+class SnowDesc(c.Structure):
+    _fields_ = [
+        ("struct_size", c.c_uint32), ("flags", c.c_uint32), ("voxel_size", c.c_double),
+        ("half_width", c.c_double), ("depth", c.c_double), ("top", c.c_void_p), ("ground", c.c_void_p),
+        ("ground_height", c.c_double), ("area", c.c_double * 4), ("statics", c.POINTER(c.c_void_p)),
+        ("static_count", c.c_size_t),
+    ]
+
+
+class BaseParams(c.Structure):
+    _fields_ = [
+        ("struct_size", c.c_uint32), ("flags", c.c_uint32), ("tolerance", c.c_double), ("noise", NoiseParams),
+    ]
+
+
+class BaseReport(c.Structure):
+    _fields_ = [
+        ("struct_size", c.c_uint32), ("reserved", c.c_uint32), ("removed_volume", c.c_double),
+        ("base_volume", c.c_double), ("touched_blocks", c.c_uint64), ("sweep_faces", c.c_uint64),
+    ]
+
+
+# The structs by their names in the header: a test compares every field's place.
+STRUCTS = {
+    "frz_view": View, "frz_span": Span, "frz_progress": Progress, "frz_stage_time": StageTime,
+    "frz_attribute": Attribute, "frz_mesh_desc": MeshDesc, "frz_mesh_info": MeshInfo, "frz_leaf": LeafView,
+    "frz_grid_desc": GridDesc, "frz_grid_info": GridInfo, "frz_noise": NoiseParams, "frz_body": BodyDesc,
+    "frz_snow_desc": SnowDesc, "frz_base_params": BaseParams, "frz_base_report": BaseReport,
+}
+
+POLL = c.CFUNCTYPE(c.c_int, c.c_void_p, c.POINTER(Progress))
+LOG = c.CFUNCTYPE(None, c.c_void_p, c.c_char_p)
+
+_P, _Z, _U, _D, _F, _S = c.c_void_p, c.c_size_t, c.c_uint32, c.c_double, c.c_float, c.c_char_p
+_FUNCTIONS = {
+    "pool_create": [_U, _P], "context_create": [_U, _P, _P], "context_set_poll": [_P, _P, _P],
+    "context_set_log": [_P, _P, _P], "context_set_memory_limit": [_P, c.c_uint64],
+    "context_progress": [_P, _P], "context_timings": [_P, Span, _P], "mesh_create": [_P, _P, _P],
+    "mesh_get_info": [_P, _P], "mesh_read": [_P, _U, Span], "mesh_attribute": [_P, _S, Span, _P],
+    "grid_create": [_P, _P, _P], "grid_copy": [_P, _P, _P], "grid_get_info": [_P, _P],
+    "grid_name": [_P, _P, _Z, _P], "grid_set_name": [_P, _S], "grid_leaves": [_P, Span, _P],
+    "grid_probe": [_P, View, Span], "grid_sample": [_P, _P, View, _U, Span],
+    "grid_sample_mesh": [_P, _P, _P, _U, _S], "grid_to_mesh": [_P, _P, _F, _F, _P],
+    "grid_load": [_P, _S, _S, _P], "grid_save": [_P, _P, _Z, _S, _U, _U],
+    "grid_from_bytes": [_P, _P, _Z, _S, _P], "grid_to_bytes": [_P, _P, _Z, _U, _U, _P, _Z, _P],
+    "levelset_from_mesh": [_P, _P, _D, _F, _P], "levelset_from_particles": [_P, View, View, _D, _F, _P],
+    "levelset_csg": [_P, _U, _P, _P], "levelset_offset": [_P, _P, _F, _U],
+    "levelset_smooth": [_P, _P, _U, _U, _U, _U], "levelset_displace": [_P, _P, _P],
+    "levelset_sweep": [_P, _P, _Z, _D, _D, _F, _P], "snow_desc_init": [_P, _Z], "snow_layer": [_P, _P, _P],
+    "base_params_init": [_P, _Z], "base_create": [_P, _P, _P, _P, _Z, _P], "base_set_params": [_P, _P],
+    "base_step": [_P, _P, _P, _Z, _D, c.c_int32, _P], "base_save": [_P, _P, _P, _Z, _P],
+    "base_dirty": [_P, _P, _P],
+}
+_VOID = ["pool_destroy", "context_destroy", "context_cancel", "context_reset", "mesh_destroy", "grid_destroy",
+         "base_destroy"]
+_LENT = ["base_grid", "base_removed", "base_compression", "base_touched"]
+
+
+class Error(Exception):
+    """A call failed: one sentence that names what is at fault; `status` is the C interface's number."""
+
+    def __init__(self, status, text):
+        super().__init__(text)
+        self.status = status
+
+    @property
+    def cancelled(self):
+        """Whether the call was cancelled: everything is as it was before."""
+        return self.status == CANCELLED
+
+
+def _find():
+    named = os.environ.get("FRAZIL_LIBRARY")
+    if named:
+        return named
+    # PREFIX/share/frazil/python/frazil/_library.py and PREFIX/lib/libfrazil.so.1
+    installed = pathlib.Path(__file__).resolve().parents[4] / "lib" / "libfrazil.so.1"
+    return str(installed) if installed.exists() else "libfrazil.so.1"
+
+
+def _load():
+    lib = c.CDLL(_find())
+    lib.frz_version.restype = c.c_uint32
+    lib.frz_last_error.restype = c.c_char_p
+    for name, arguments in _FUNCTIONS.items():
+        function = getattr(lib, "frz_" + name)
+        function.argtypes, function.restype = arguments, c.c_uint32
+    for name in _VOID:
+        function = getattr(lib, "frz_" + name)
+        function.argtypes, function.restype = [_P], None
+    for name in _LENT:
+        function = getattr(lib, "frz_" + name)
+        function.argtypes, function.restype = [_P], _P
+    return lib
+
+
+library = _load()
+
+
+def version():
+    """The library's version, for instance (0, 1, 0)."""
+    number = library.frz_version()
+    return number // 1000000, number // 1000 % 1000, number % 1000
+
+
+def call(name, *arguments):
+    """Calls frz_<name>; raises Error where it fails."""
+    status = getattr(library, "frz_" + name)(*arguments)
+    if status != OK:
+        raise Error(status, library.frz_last_error().decode("utf-8", "replace"))
+
+
+def made(name, *arguments):
+    """Calls frz_<name> with an out-pointer at the end; the new handle."""
+    out = c.c_void_p()
+    call(name, *arguments, c.byref(out))
+    return out.value
+
+
+def rows(array, kind, width):
+    """An array of rows of `width` numbers, C-contiguous."""
+    out = np.ascontiguousarray(array, dtype=kind)
+    if out.ndim != 2 or out.shape[1] != width:
+        raise ValueError(f"an array of shape (n, {width}) is needed, not {out.shape}")
+    return out
+
+
+def view(array):
+    """A view of an array's rows; the array must outlive it."""
+    return View(array.ctypes.data if len(array) else None, len(array), 0)
+
+
+def span(array):
+    """Room for an array's rows; the array must outlive it."""
+    return Span(array.ctypes.data if len(array) else None, len(array), 0)
+
+
+def text(value):
+    """A text for C; None stays."""
+    return None if value is None else os.fsencode(value)
+
+
+class Handle:
+    """What a C handle is wrapped in: destroyed with it."""
+
+    _destroy = None
+
+    def __init__(self, pointer, owner=None):
+        self.pointer = pointer
+        # What is lent keeps its owner alive.
+        self._owner = owner
+
+    def __del__(self):
+        if getattr(self, "pointer", None) and getattr(self, "_owner", None) is None:
+            getattr(library, self._destroy)(self.pointer)
+            self.pointer = None

@@ -1,0 +1,127 @@
+"""Sparse grids of floats."""
+
+import ctypes as c
+from typing import NamedTuple
+
+import numpy as np
+
+from ._library import GridDesc, GridInfo, Handle, LeafView, Span, call, made, rows, span, text, view
+from .mesh import Mesh
+
+UNKNOWN, LEVEL_SET, FOG = 0, 1, 2
+BLOSC, ZIP, NONE = 0, 1, 2
+
+
+class Leaf(NamedTuple):
+    """A block of 8 x 8 x 8 voxels: its least corner, its values [x, y, z] and which are active."""
+
+    origin: tuple
+    values: np.ndarray
+    active: np.ndarray
+
+
+class Grid(Handle):
+    """A sparse grid; voxel (i, j, k) has its centre at (i, j, k) x voxel size."""
+
+    _destroy = "frz_grid_destroy"
+
+    @classmethod
+    def from_leaves(cls, ctx, leaves, voxel_size, background, grid_class=LEVEL_SET, name=None):
+        """Makes a grid of (origin, values[8, 8, 8]) or Leaf tuples; without `active` OpenVDB's rule decides."""
+        views, kept = (LeafView * max(len(leaves), 1))(), []
+        for at, leaf in enumerate(leaves):
+            values = np.ascontiguousarray(leaf[1], np.float32).reshape(512)
+            kept.append(values)
+            mask = None
+            if len(leaf) > 2:
+                bits = np.packbits(np.asarray(leaf[2], bool).reshape(8, 64), axis=1, bitorder="little")
+                kept.append(bits)
+                mask = bits.ctypes.data
+            views[at] = LeafView((c.c_int32 * 3)(*leaf[0]), 0.0, values.ctypes.data, mask)
+        desc = GridDesc(c.sizeof(GridDesc), grid_class, voxel_size, background, 0, views, len(leaves), text(name))
+        return cls(made("grid_create", ctx.pointer, c.byref(desc)))
+
+    @classmethod
+    def from_bytes(cls, ctx, data, name=None):
+        """Reads a grid out of the bytes of a .vdb file."""
+        return cls(made("grid_from_bytes", ctx.pointer, data, len(data), text(name)))
+
+    def copy(self, ctx):
+        """A copy of its own."""
+        return Grid(made("grid_copy", ctx.pointer, self.pointer))
+
+    @property
+    def info(self):
+        """Class, voxel size, counts and box, as frz_grid_info has them."""
+        info = GridInfo(c.sizeof(GridInfo))
+        call("grid_get_info", self.pointer, c.byref(info))
+        return info
+
+    @property
+    def name(self):
+        """The name in files."""
+        size = c.c_size_t()
+        call("grid_name", self.pointer, None, 0, c.byref(size))
+        out = c.create_string_buffer(size.value)
+        call("grid_name", self.pointer, out, size.value, c.byref(size))
+        return out.value.decode()
+
+    @name.setter
+    def name(self, name):
+        call("grid_set_name", self.pointer, text(name))
+
+    def leaves(self):
+        """All leaves, copied."""
+        count = c.c_size_t()
+        call("grid_leaves", self.pointer, Span(None, 0, 0), c.byref(count))
+        views = (LeafView * max(count.value, 1))()
+        call("grid_leaves", self.pointer, Span(c.addressof(views), count.value, 0), c.byref(count))
+        return [_leaf(leaf) for leaf in views[: count.value]]
+
+    def probe(self, origins):
+        """What lies at block origins (n, 3): a Leaf each, or the one value of the block."""
+        origins = rows(origins, np.int32, 3)
+        views = (LeafView * max(len(origins), 1))()
+        call("grid_probe", self.pointer, view(origins), Span(c.addressof(views), len(origins), 0))
+        return [_leaf(leaf) if leaf.values else leaf.tile for leaf in views[: len(origins)]]
+
+    def sample(self, ctx, positions, linear=True):
+        """Values at world positions (n, 3)."""
+        positions = rows(positions, np.float32, 3)
+        out = np.empty(len(positions), np.float32)
+        call("grid_sample", ctx.pointer, self.pointer, view(positions), int(linear), span(out))
+        return out
+
+    def to_mesh(self, ctx, iso=0.0, adaptivity=0.0):
+        """Triangles along the surface."""
+        return Mesh._of(made("grid_to_mesh", ctx.pointer, self.pointer, iso, adaptivity))
+
+    def sample_mesh(self, ctx, mesh, name=None, linear=True):
+        """Gives a mesh's vertices the grid's values as an attribute."""
+        call("grid_sample_mesh", ctx.pointer, self.pointer, mesh.pointer, int(linear), text(name))
+
+    def to_bytes(self, ctx, compression=BLOSC, half=False):
+        """The bytes of a .vdb file."""
+        grids, size = (c.c_void_p * 1)(self.pointer), c.c_size_t()
+        call("grid_to_bytes", ctx.pointer, grids, 1, compression, int(half), None, 0, c.byref(size))
+        out = c.create_string_buffer(size.value)
+        call("grid_to_bytes", ctx.pointer, grids, 1, compression, int(half), out, size.value, c.byref(size))
+        return out.raw[: size.value]
+
+
+def _leaf(leaf):
+    values = np.ctypeslib.as_array(c.cast(leaf.values, c.POINTER(c.c_float)), (8, 8, 8)).copy()
+    bits = np.ctypeslib.as_array(c.cast(leaf.mask, c.POINTER(c.c_uint8)), (64,))
+    active = np.unpackbits(bits, bitorder="little").reshape(8, 8, 8).astype(bool)
+    return Leaf(tuple(leaf.origin), values, active)
+
+
+def load(ctx, path, name=None):
+    """Reads a grid from a .vdb file; without a name the first level set, else the first grid of floats."""
+    return Grid(made("grid_load", ctx.pointer, text(path), text(name)))
+
+
+def save(ctx, grids, path, compression=BLOSC, half=False):
+    """Writes grids of different names into one .vdb file."""
+    pointers = (c.c_void_p * len(grids))(*[grid.pointer for grid in grids])
+    call("grid_save", ctx.pointer, pointers, len(grids), text(path), compression, int(half))
