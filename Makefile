@@ -1,6 +1,6 @@
 # frazil: `make demo` shows what it does, `make test` checks it.
 
-PACKAGES := libopenvdb-dev libboost-dev libboost-iostreams-dev g++ cmake pkg-config clang-format python3-openvdb python3-numpy libopenvdb-tools cbindgen-web
+PACKAGES := libopenvdb-dev libboost-dev libboost-iostreams-dev g++ cmake pkg-config clang-format python3-openvdb python3-numpy libopenvdb-tools cbindgen-web patchelf
 RUST_NEEDED := 1.89
 DEMO := target/demo
 PREFIX := /usr/local

@@ -64,7 +64,10 @@ fn a_restored_layer_goes_on_with_the_same_bytes_on_any_number_of_threads() {
             assert_eq!(base.save(&ctx).unwrap(), states[first as usize], "{threads} threads, before {first}");
             for frame in first..=6 {
                 step(&ctx, &mut base, frame);
-                assert!(bytes(&base) == frames[frame as usize], "{threads} threads, from {first}, frame {frame}");
+                assert!(
+                    bytes(&base) == frames[frame as usize],
+                    "{threads} threads, from {first}, frame {frame}"
+                );
             }
             assert_eq!(base.volume(), straight.volume());
             assert_eq!(base.save(&ctx).unwrap(), states[7]);

@@ -36,10 +36,7 @@ impl Poses {
             body.motion().pose(f64::from(frame), &mut pose).expect("pose");
             pose.iter().map(|p| [p.x as f32, p.y as f32, p.z as f32]).collect()
         };
-        Self {
-            frames: (0..=FRAMES).map(&mut frame).collect(),
-            triangles: body.motion().triangles().to_vec(),
-        }
+        Self { frames: (0..=FRAMES).map(&mut frame).collect(), triangles: body.motion().triangles().to_vec() }
     }
 
     fn body(&self, frame: i32) -> frz_body {
@@ -129,7 +126,9 @@ impl Host {
         let mut base = null_mut();
         let restart = if state.is_empty() { std::ptr::null() } else { state.as_ptr().cast() };
         // SAFETY: the pointers are valid.
-        unsafe { works(frz_base_create(self.ctx, std::ptr::null(), self.snow, restart, state.len(), &mut base)) };
+        unsafe {
+            works(frz_base_create(self.ctx, std::ptr::null(), self.snow, restart, state.len(), &mut base))
+        };
         base
     }
 
@@ -167,11 +166,21 @@ impl Host {
         let mut size = 0;
         // SAFETY: the pointers are valid.
         unsafe {
-            let grids = [frz_base_grid(self.base), frz_base_removed(self.base), frz_base_compression(self.base)];
+            let grids =
+                [frz_base_grid(self.base), frz_base_removed(self.base), frz_base_compression(self.base)];
             let none = frz_compression::FRZ_COMPRESSION_NONE as u32;
             works(frz_grid_to_bytes(self.ctx, grids.as_ptr(), 3, none, 0, null_mut(), 0, &mut size));
             let mut out = vec![0u8; size];
-            works(frz_grid_to_bytes(self.ctx, grids.as_ptr(), 3, none, 0, out.as_mut_ptr().cast(), size, &mut size));
+            works(frz_grid_to_bytes(
+                self.ctx,
+                grids.as_ptr(),
+                3,
+                none,
+                0,
+                out.as_mut_ptr().cast(),
+                size,
+                &mut size,
+            ));
             out.truncate(size);
             out
         }
@@ -346,8 +355,9 @@ fn border(h: &mut Harness) {
         let (mut c, mut rust) = (0.0, 0.0);
         for frame in 0..=FRAMES {
             let time = f64::from(frame);
-            let mut rust_step =
-                || timed(|| drop(base.step(&ctx, bodies, (time - 1.0).max(0.0), time, frame).expect("step"))).0;
+            let mut rust_step = || {
+                timed(|| drop(base.step(&ctx, bodies, (time - 1.0).max(0.0), time, frame).expect("step"))).0
+            };
             let c_step = || timed(|| works(host.step(frame))).0;
             let (one, other) = match (round + frame) % 2 {
                 0 => (rust_step(), c_step()),
@@ -389,7 +399,11 @@ fn programs(h: &mut Harness) {
     if h.wants("capi.fake_host") {
         let runs = ["fake_host", "fake_host_static", "fake_host_pkgconfig"].map(|program| said(program, &[]));
         let all = runs.iter().all(|run| run.as_ref().is_some_and(|(worked, _)| *worked));
-        h.holds("capi.fake_host", all, "frames 1 2 3 9 4, two nodes, random cancels; shared, static, pkg-config");
+        h.holds(
+            "capi.fake_host",
+            all,
+            "frames 1 2 3 9 4, two nodes, random cancels; shared, static, pkg-config",
+        );
     }
     if h.wants("capi.load") {
         let (_, text) = said("load_cycles", &[]).unwrap_or_default();
@@ -402,7 +416,8 @@ fn programs(h: &mut Harness) {
     if h.wants("capi.symbols") {
         let library = built("install/lib/libfrazil.so");
         let output = Command::new("nm").args(["-D", "--defined-only"]).arg(&library).output();
-        let text = output.map(|output| String::from_utf8_lossy(&output.stdout).into_owned()).unwrap_or_default();
+        let text =
+            output.map(|output| String::from_utf8_lossy(&output.stdout).into_owned()).unwrap_or_default();
         let names = text.lines().filter_map(|line| line.split_whitespace().last());
         let (ours, others): (Vec<&str>, Vec<&str>) = names.partition(|name| name.starts_with("frz_"));
         let count = if ours.is_empty() { f64::INFINITY } else { others.len() as f64 };
@@ -422,7 +437,8 @@ fn programs(h: &mut Harness) {
     if h.wants("capi.sanitizers") {
         let script = Path::new(env!("CARGO_MANIFEST_DIR")).join("tools/sanitize");
         let text = Command::new(script).output();
-        let text = text.map(|output| String::from_utf8_lossy(&output.stdout).into_owned()).unwrap_or_default();
+        let text =
+            text.map(|output| String::from_utf8_lossy(&output.stdout).into_owned()).unwrap_or_default();
         let errors = number_after(&text, "errors").unwrap_or(f64::INFINITY);
         let note = if errors.is_finite() { "ASan, UBSan, valgrind" } else { none };
         h.gate("capi.sanitizers_errors", errors, "errors", Bound::Most(0.0), Bound::Most(0.0), note);

@@ -60,11 +60,14 @@ impl PolygonMesh {
     }
 
     fn cut(&self, polygon: &[u32], out: &mut Vec<[u32; 3]>) {
+        if let &[a, b, c] = polygon {
+            return out.push([a, b, c]);
+        }
         let fan = || (1..polygon.len() - 1).map(|i| [polygon[0], polygon[i], polygon[i + 1]]);
         // Indices beyond the vertices are left for the check of the whole mesh to refuse.
         let places: Option<Vec<DVec3>> =
             polygon.iter().map(|&i| self.positions.get(i as usize).map(|p| p.cast())).collect();
-        let Some(places) = places.filter(|_| polygon.len() > 3) else { return out.extend(fan()) };
+        let Some(places) = places else { return out.extend(fan()) };
         let flat = flattened(&places);
         let count = polygon.len();
         if (0..count).all(|i| turn(flat[(i + count - 1) % count], flat[i], flat[(i + 1) % count]) >= 0.0) {

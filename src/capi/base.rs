@@ -69,7 +69,8 @@ pub struct frz_base_report {
 
 // SAFETY: numbers.
 unsafe impl Sized32 for frz_base_report {
-    const SIZES: &'static [usize] = &[std::mem::offset_of!(frz_base_report, touched_blocks), size_of::<Self>()];
+    const SIZES: &'static [usize] =
+        &[std::mem::offset_of!(frz_base_report, touched_blocks), size_of::<Self>()];
     const NAME: &'static str = "frz_base_report";
 }
 
@@ -175,10 +176,15 @@ pub unsafe extern "C" fn frz_base_create(
             let out = required(out, "out")?;
             let held = read(snow)?;
             let snow = held.get();
-            let params = if params.is_null() { frz_base_params::USUAL } else { sized(params, frz_base_params::USUAL)? };
+            let params = if params.is_null() {
+                frz_base_params::USUAL
+            } else {
+                sized(params, frz_base_params::USUAL)?
+            };
             no_flags(params.flags, 0)?;
             let params = params.params(snow.voxel_size());
-            let state = frz_view { data: restart, count: restart_bytes, stride: 0 }.elements::<u8>("restart")?;
+            let state =
+                frz_view { data: restart, count: restart_bytes, stride: 0 }.elements::<u8>("restart")?;
             ctx.allow("the base layer", snow.memory_bytes().saturating_add(state.len() as u64))?;
             let ctx = call.ctx();
             let untouched = restart.is_null();
@@ -209,7 +215,10 @@ pub unsafe extern "C" fn frz_base_destroy(base: *mut frz_base) {
 ///
 /// One thread at a time.
 #[unsafe(no_mangle)]
-pub unsafe extern "C" fn frz_base_set_params(base: *mut frz_base, params: *const frz_base_params) -> frz_status {
+pub unsafe extern "C" fn frz_base_set_params(
+    base: *mut frz_base,
+    params: *const frz_base_params,
+) -> frz_status {
     guard(|| {
         // SAFETY: the pointers are NULL or the caller's.
         unsafe {
@@ -247,8 +256,14 @@ pub unsafe extern "C" fn frz_base_step(
     guard(|| {
         // SAFETY: the pointers are NULL or the caller's.
         unsafe {
-            let mut told =
-                frz_base_report { struct_size: 0, reserved: 0, removed_volume: 0.0, base_volume: 0.0, touched_blocks: 0, sweep_faces: 0 };
+            let mut told = frz_base_report {
+                struct_size: 0,
+                reserved: 0,
+                removed_volume: 0.0,
+                base_volume: 0.0,
+                touched_blocks: 0,
+                sweep_faces: 0,
+            };
             if !report.is_null() {
                 fill(report, None, told)?;
             }
@@ -256,7 +271,9 @@ pub unsafe extern "C" fn frz_base_step(
             let ctx = call.ctx();
             let mut base = change(base)?;
             if frame.unsigned_abs() > 1 << 24 {
-                return Err(Failure::argument(format!("frame = {frame} is not within -16777216 to 16777216")));
+                return Err(Failure::argument(format!(
+                    "frame = {frame} is not within -16777216 to 16777216"
+                )));
             }
             let done = base.alone(|state| {
                 let mut shapes = std::mem::take(&mut state.shapes);

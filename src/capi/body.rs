@@ -123,7 +123,9 @@ pub(super) unsafe fn bodies(
     }
     // SAFETY: the caller's promise.
     let arrived = unsafe { arrived(list, count, dt) }?;
-    let bytes = arrived.iter().map(|body| body.poses.len() * body.poses[0].len() * 12 + body.mesh.corners.len() * 200);
+    let bytes = arrived
+        .iter()
+        .map(|body| body.poses.len() * body.poses[0].len() * 12 + body.mesh.corners.len() * 200);
     ctx.allow("the bodies", bytes.sum::<usize>() as u64)?;
     let known = &*shapes;
     let make = |body: Arrived| {

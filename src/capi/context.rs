@@ -44,7 +44,8 @@ pub struct frz_stage_time {
 ///
 /// user: what was given with it.
 /// progress: what is being done; it is the library's, and gone after the answer.
-pub type frz_poll_function = Option<unsafe extern "C" fn(user: *mut c_void, progress: *const frz_progress) -> c_int>;
+pub type frz_poll_function =
+    Option<unsafe extern "C" fn(user: *mut c_void, progress: *const frz_progress) -> c_int>;
 
 /// Takes a warning. It must return, not throw or jump.
 ///
@@ -186,7 +187,8 @@ pub unsafe extern "C" fn frz_context_create(
             if abi >> 16 != FRZ_ABI_VERSION >> 16 || abi & 0xffff > FRZ_ABI_VERSION & 0xffff {
                 let [major, minor] = [abi >> 16, abi & 0xffff];
                 let [own, own_minor] = [FRZ_ABI_VERSION >> 16, FRZ_ABI_VERSION & 0xffff];
-                let text = format!("the header has interface {major}.{minor}, this library {own}.{own_minor}");
+                let text =
+                    format!("the header has interface {major}.{minor}, this library {own}.{own_minor}");
                 return Err(Failure::new(FRZ_ERROR_VERSION, text));
             }
             let threads = read(pool.cast_const())?.share();

@@ -167,7 +167,10 @@ pub unsafe extern "C" fn frz_levelset_from_particles(
             let positions = positions.finite("positions")?;
             let radii = radii.elements::<f32>("radii")?;
             if let Some(at) = radii.iter().position(|radius| !(*radius > 0.0 && radius.is_finite())) {
-                return Err(Failure::argument(format!("radii: element {at} = {} m is not above 0", radii[at])));
+                return Err(Failure::argument(format!(
+                    "radii: element {at} = {} m is not above 0",
+                    radii[at]
+                )));
             }
             let area: f64 =
                 radii.iter().map(|&radius| 4.0 * std::f64::consts::PI * f64::from(radius).powi(2)).sum();
@@ -335,7 +338,9 @@ pub unsafe extern "C" fn frz_levelset_displace(
             let grid = held.own()?;
             level_set_of(grid)?;
             if !grid.is_world_fixed() {
-                return Err(Failure::argument("the grid's voxels are rotated or shifted against the world's axes"));
+                return Err(Failure::argument(
+                    "the grid's voxels are rotated or shifted against the world's axes",
+                ));
             }
             let noise = required(noise.cast_mut(), "noise")?.read_unaligned();
             let Some(params) = noise.params(grid.voxel_size()) else { return Ok(()) };

@@ -143,12 +143,20 @@ impl Mesh {
 ///
 /// # Safety
 /// The views must describe memory that can be read.
-pub(super) unsafe fn polygons(positions: &frz_view, counts: &frz_view, indices: &frz_view) -> Outcome<PolygonMesh> {
+pub(super) unsafe fn polygons(
+    positions: &frz_view,
+    counts: &frz_view,
+    indices: &frz_view,
+) -> Outcome<PolygonMesh> {
     // SAFETY: the caller's promise.
     let (positions, counts_, corners) = unsafe {
         (
             positions.finite("positions")?,
-            if counts.data.is_null() && counts.count == 0 { None } else { Some(counts.elements::<u32>("face_counts")?) },
+            if counts.data.is_null() && counts.count == 0 {
+                None
+            } else {
+                Some(counts.elements::<u32>("face_counts")?)
+            },
             indices.elements::<u32>("indices")?,
         )
     };
@@ -157,7 +165,10 @@ pub(super) unsafe fn polygons(positions: &frz_view, counts: &frz_view, indices: 
     }
     let count = positions.len();
     if let Some(at) = corners.iter().position(|&vertex| vertex as usize >= count) {
-        return Err(Failure::argument(format!("indices: corner {at} names vertex {} of {count}", corners[at])));
+        return Err(Failure::argument(format!(
+            "indices: corner {at} names vertex {} of {count}",
+            corners[at]
+        )));
     }
     let mut mesh =
         PolygonMesh { positions: positions.into_iter().map(Vec3::from).collect(), ..PolygonMesh::default() };
@@ -225,7 +236,8 @@ pub unsafe extern "C" fn frz_mesh_create(
             };
             let desc = sized(desc, defaults)?;
             no_flags(desc.flags, 0)?;
-            let bytes = (desc.positions.count as u64).saturating_add(desc.indices.count as u64).saturating_mul(28);
+            let bytes =
+                (desc.positions.count as u64).saturating_add(desc.indices.count as u64).saturating_mul(28);
             ctx.allow("a mesh", bytes)?;
             let polygons = polygons(&desc.positions, &desc.face_counts, &desc.indices)?;
             let attributes = attributes(&desc, polygons.positions.len())?;
@@ -261,7 +273,8 @@ unsafe fn attributes(desc: &frz_mesh_desc, vertices: usize) -> Outcome<Vec<Attri
         }
         let values = attribute.values;
         if values.count != vertices {
-            let text = format!("attribute \"{name}\" has {} elements, the mesh {vertices} vertices", values.count);
+            let text =
+                format!("attribute \"{name}\" has {} elements, the mesh {vertices} vertices", values.count);
             return Err(Failure::argument(text));
         }
         let components = attribute.components as usize;
@@ -347,7 +360,9 @@ pub unsafe extern "C" fn frz_mesh_read(mesh: *const frz_mesh, part: u32, dst: fr
                     let counts: Vec<u32> = mesh.polygons.polygons().map(|face| face.len() as u32).collect();
                     dst.fill("dst", &counts)
                 }
-                part if part == frz_mesh_part::FRZ_MESH_INDICES as u32 => dst.fill("dst", &mesh.polygons.corners),
+                part if part == frz_mesh_part::FRZ_MESH_INDICES as u32 => {
+                    dst.fill("dst", &mesh.polygons.corners)
+                }
                 part if part == frz_mesh_part::FRZ_MESH_TRIANGLES as u32 => {
                     dst.fill("dst", &mesh.triangles.triangles)
                 }
@@ -385,7 +400,11 @@ pub unsafe extern "C" fn frz_mesh_attribute(
             let found = mesh.attributes.iter().find(|attribute| attribute.name == name);
             let attribute = found.ok_or_else(|| {
                 let names: Vec<&str> = mesh.attributes.iter().map(|other| other.name.as_str()).collect();
-                let there = if names.is_empty() { "it has none".into() } else { format!("it has {}", names.join(", ")) };
+                let there = if names.is_empty() {
+                    "it has none".into()
+                } else {
+                    format!("it has {}", names.join(", "))
+                };
                 Failure::argument(format!("the mesh has no attribute \"{name}\": {there}"))
             })?;
             if !dst.data.is_null() {

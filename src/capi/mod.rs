@@ -22,6 +22,9 @@ pub mod mesh;
 pub mod grid;
 
 #[cfg(feature = "vdb")]
+pub mod grid_sample;
+
+#[cfg(feature = "vdb")]
 pub mod grid_bytes;
 
 #[cfg(feature = "vdb")]

@@ -1,7 +1,7 @@
 //! Threads.
 
-use std::sync::atomic::{AtomicUsize, Ordering};
 use std::sync::Arc;
+use std::sync::atomic::{AtomicUsize, Ordering};
 
 use super::guard::{Outcome, frz_status, guard};
 use super::handle::{Noun, clear, destroy, give};

@@ -102,7 +102,10 @@ pub unsafe extern "C" fn frz_snow_layer(
             no_flags(desc.flags, 0)?;
             check_voxel(desc.voxel_size)?;
             if !(3.0..=64.0).contains(&desc.half_width) {
-                return Err(Failure::argument(format!("half_width = {} is not within 3 to 64", desc.half_width)));
+                return Err(Failure::argument(format!(
+                    "half_width = {} is not within 3 to 64",
+                    desc.half_width
+                )));
             }
             let list = frz_view { data: desc.statics.cast(), count: desc.static_count, stride: 0 };
             let list = list.elements::<Pointer>("statics")?;
@@ -117,11 +120,13 @@ pub unsafe extern "C" fn frz_snow_layer(
                 true => Cover::Depth(desc.depth),
                 false => Cover::Top(read(desc.top)?.triangles.clone()),
             };
-            ctx.allow("the layer of snow", surface_bytes(surfaces(&ground, &cover, &statics), desc.voxel_size))?;
+            ctx.allow(
+                "the layer of snow",
+                surface_bytes(surfaces(&ground, &cover, &statics), desc.voxel_size),
+            )?;
             let half_width = desc.half_width as f32;
-            let grid = call
-                .ctx()
-                .polled(|| layer(ctx, &ground, &statics, &cover, desc.voxel_size, half_width))?;
+            let grid =
+                call.ctx().polled(|| layer(ctx, &ground, &statics, &cover, desc.voxel_size, half_width))?;
             give(out, Grid::Own(grid))
         }
     })

@@ -64,11 +64,15 @@ fn stride<T>(name: &str, data: *const c_void, count: usize, stride: usize) -> Ou
     let size = size_of::<T>();
     let stride = if stride == 0 { size } else { stride };
     if stride < size {
-        return Err(Failure::argument(format!("{name}: the stride of {stride} bytes is less than an element's {size}")));
+        return Err(Failure::argument(format!(
+            "{name}: the stride of {stride} bytes is less than an element's {size}"
+        )));
     }
     let span = (count.max(1) - 1).checked_mul(stride).and_then(|bytes| bytes.checked_add(size));
     if span.is_none_or(|span| span > MOST || (data as usize).checked_add(span).is_none()) {
-        return Err(Failure::argument(format!("{name}: {count} elements of {stride} bytes are more than a memory holds")));
+        return Err(Failure::argument(format!(
+            "{name}: {count} elements of {stride} bytes are more than a memory holds"
+        )));
     }
     if data.is_null() && count > 0 {
         return Err(Failure::argument(format!("{name}: the data is NULL, but the count is {count}")));
@@ -88,7 +92,8 @@ impl frz_view {
         let stride = stride::<T>(name, self.data, self.count, self.stride)?;
         let first = self.data.cast::<u8>();
         let mut out = Vec::new();
-        out.try_reserve_exact(self.count).map_err(|_| Failure::argument(format!("{name}: {} elements do not fit", self.count)))?;
+        out.try_reserve_exact(self.count)
+            .map_err(|_| Failure::argument(format!("{name}: {} elements do not fit", self.count)))?;
         // SAFETY: the caller's promise, and the whole span was checked to be one that pointers can reach.
         let element = |index: usize| unsafe { first.add(index * stride).cast::<T>().read_unaligned() };
         out.extend((0..self.count).map(element));
@@ -116,7 +121,8 @@ impl frz_span {
     /// The span must describe memory that can be written.
     pub(super) unsafe fn fill<T: Plain>(&self, name: &str, elements: &[T]) -> Outcome {
         if self.count < elements.len() {
-            let text = format!("{name}: there is room for {} elements, {} are needed", self.count, elements.len());
+            let text =
+                format!("{name}: there is room for {} elements, {} are needed", self.count, elements.len());
             return Err(Failure::new(FRZ_ERROR_CAPACITY, text));
         }
         let stride = stride::<T>(name, self.data, elements.len(), self.stride)?;
@@ -195,13 +201,20 @@ pub(super) unsafe fn sized<T: Sized32>(pointer: *const T, mut defaults: T) -> Ou
     check_size::<T>(size)?;
     // SAFETY: so many bytes are there, and no more than the struct has are copied.
     unsafe {
-        std::ptr::copy_nonoverlapping(pointer.cast::<u8>(), (&raw mut defaults).cast::<u8>(), size.min(size_of::<T>()));
+        std::ptr::copy_nonoverlapping(
+            pointer.cast::<u8>(),
+            (&raw mut defaults).cast::<u8>(),
+            size.min(size_of::<T>()),
+        );
     }
     let beyond = size.saturating_sub(size_of::<T>());
     // SAFETY: as above: the bytes up to the size that the struct says.
     let newer = unsafe { std::slice::from_raw_parts(pointer.cast::<u8>().add(size - beyond), beyond) };
     if newer.iter().any(|&byte| byte != 0) {
-        let text = format!("{}: fields are set that this library does not have; it is older than the header", T::NAME);
+        let text = format!(
+            "{}: fields are set that this library does not have; it is older than the header",
+            T::NAME
+        );
         return Err(Failure::new(FRZ_ERROR_VERSION, text));
     }
     Ok(defaults)
@@ -219,7 +232,11 @@ pub(super) unsafe fn fill<T: Sized32>(pointer: *mut T, size: Option<usize>, valu
     // SAFETY: as many bytes are there.
     unsafe {
         pointer.cast::<u8>().write_bytes(0, size);
-        std::ptr::copy_nonoverlapping((&raw const value).cast::<u8>(), pointer.cast::<u8>(), size.min(size_of::<T>()));
+        std::ptr::copy_nonoverlapping(
+            (&raw const value).cast::<u8>(),
+            pointer.cast::<u8>(),
+            size.min(size_of::<T>()),
+        );
         pointer.cast::<u32>().write_unaligned(size as u32);
     }
     Ok(())
@@ -263,7 +280,10 @@ mod tests {
         // SAFETY: all structs have the bytes that they say.
         unsafe {
             let older = Params { struct_size: 8, first: 5.0, second: u64::MAX };
-            assert_eq!(sized(&older, DEFAULTS).ok().unwrap(), Params { struct_size: 8, first: 5.0, second: 2 });
+            assert_eq!(
+                sized(&older, DEFAULTS).ok().unwrap(),
+                Params { struct_size: 8, first: 5.0, second: 2 }
+            );
             let mut newer = [0u64; 4];
             newer[0] = 32;
             newer[1] = 9;
@@ -282,10 +302,14 @@ mod tests {
     #[test]
     fn views_are_read_with_their_stride_and_wild_ones_are_refused() {
         let bytes: Vec<u8> = (0..64).collect();
-        let view = |offset: usize, count, stride| frz_view { data: bytes[offset..].as_ptr().cast(), count, stride };
+        let view =
+            |offset: usize, count, stride| frz_view { data: bytes[offset..].as_ptr().cast(), count, stride };
         // SAFETY: the good views lie within the bytes; the others are refused before they are followed.
         unsafe {
-            assert_eq!(view(1, 3, 16).elements::<u32>("n").ok().unwrap(), [0x0403_0201, 0x1413_1211, 0x2423_2221]);
+            assert_eq!(
+                view(1, 3, 16).elements::<u32>("n").ok().unwrap(),
+                [0x0403_0201, 0x1413_1211, 0x2423_2221]
+            );
             assert_eq!(view(0, 2, 0).elements::<u32>("n").ok().unwrap().len(), 2);
             assert!(view(0, 2, 3).elements::<u32>("n").is_err());
             assert!(view(0, usize::MAX, 8).elements::<u32>("n").is_err());

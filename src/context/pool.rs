@@ -125,7 +125,10 @@ mod tests {
         let here = std::thread::current().id();
         for _ in 0..2 {
             let all_here = pool.install(|| {
-                (0..10_000).into_par_iter().map(|_| std::thread::current().id() == here).reduce(|| true, |a, b| a & b)
+                (0..10_000)
+                    .into_par_iter()
+                    .map(|_| std::thread::current().id() == here)
+                    .reduce(|| true, |a, b| a & b)
             });
             assert!(all_here);
         }

@@ -211,7 +211,8 @@ impl Body {
             let error = if edge[1] < own { edge_error(&ends, *edge) } else { 0.0 };
             if error > tolerance && near.sees(&ends, edge) { error } else { 0.0 }
         };
-        let twist = self.shape.topology.edges.par_iter().with_min_len(GRAIN).map(twist).reduce(|| 0.0, f64::max);
+        let twist =
+            self.shape.topology.edges.par_iter().with_min_len(GRAIN).map(twist).reduce(|| 0.0, f64::max);
         // As many steps as pieces an edge: faces then keep a good shape.
         let twists = (twist / tolerance).sqrt();
         arcs.max(twists).ceil().clamp(1.0, MOST_STEPS) as usize

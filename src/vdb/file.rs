@@ -124,7 +124,12 @@ fn reason(error: &cxx::Exception) -> String {
     // OpenVDB's texts begin with the exception's name.
     let what = what.split_once(": ").map_or(what, |(_, rest)| rest);
     // A damaged name can be long and anything but text.
-    what.chars().filter(|letter| !letter.is_control()).take(LONGEST_REASON).collect::<String>().trim().to_string()
+    what.chars()
+        .filter(|letter| !letter.is_control())
+        .take(LONGEST_REASON)
+        .collect::<String>()
+        .trim()
+        .to_string()
 }
 
 fn cannot_read(path: &Path, error: &cxx::Exception) -> Error {

@@ -32,7 +32,9 @@ pub fn bare_functions() -> Vec<String> {
     for entry in fs::read_dir(folder).expect("tests/ctest").flatten() {
         let name = entry.file_name().into_string().unwrap_or_default();
         // What makes random calls tells nothing of what they should do.
-        if !(name.ends_with(".c") || name.ends_with(".cpp") || name.ends_with(".h")) || name.starts_with("misuse") {
+        if !(name.ends_with(".c") || name.ends_with(".cpp") || name.ends_with(".h"))
+            || name.starts_with("misuse")
+        {
             continue;
         }
         let text = fs::read_to_string(entry.path()).expect("a program");

@@ -62,8 +62,11 @@ impl BaseLayer {
         surfaces: &[&BlockEdit],
         touched: &[BlockEdit],
     ) -> Result<Vec<BlockEdit>> {
-        let now: HashMap<Origin, (&BlockEdit, &BlockEdit)> =
-            surfaces.iter().zip(touched).map(|(surface, touched)| (surface.origin(), (*surface, touched))).collect();
+        let now: HashMap<Origin, (&BlockEdit, &BlockEdit)> = surfaces
+            .iter()
+            .zip(touched)
+            .map(|(surface, touched)| (surface.origin(), (*surface, touched)))
+            .collect();
         let places: BTreeSet<[i32; 2]> = now.keys().map(|origin| column_of(*origin)).collect();
         let cell = self.grids.surface.voxel_size() as f32;
         let levels = columns::levels(self.low[1], self.high[1]);

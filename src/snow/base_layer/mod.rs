@@ -173,7 +173,13 @@ impl BaseLayer {
     /// Blocks (their least corners) that the last step changed, in any of the grids.
     pub fn dirty(&self) -> impl Iterator<Item = Origin> {
         // Frames change where the snow changes; compression in the whole columns there.
-        self.changes.surface.iter().chain(&self.changes.compression).map(BlockEdit::origin).collect::<BTreeSet<_>>().into_iter()
+        self.changes
+            .surface
+            .iter()
+            .chain(&self.changes.compression)
+            .map(BlockEdit::origin)
+            .collect::<BTreeSet<_>>()
+            .into_iter()
     }
 
     /// What the last step removed (level set).
@@ -312,9 +318,11 @@ impl BaseLayer {
         Ok(pieces
             .par_iter()
             .zip(&snow)
-            .filter_map(|(piece, snow)| {
-                if ctx.check().is_err() { None } else { edit::subtract(piece, snow, scale) }
-            })
+            .filter_map(
+                |(piece, snow)| {
+                    if ctx.check().is_err() { None } else { edit::subtract(piece, snow, scale) }
+                },
+            )
             .collect())
     }
 

@@ -149,9 +149,17 @@ pub fn fingerprint(surface: &FloatGrid) -> Result<u128> {
         let mut bytes = [0u8; 12 + 4 * VOXELS + 64];
         let (origin, rest) = bytes.split_at_mut(12);
         let (values, mask) = rest.split_at_mut(4 * VOXELS);
-        origin.chunks_exact_mut(4).zip(leaf.origin).for_each(|(to, from)| to.copy_from_slice(&from.to_le_bytes()));
-        values.chunks_exact_mut(4).zip(leaf.values).for_each(|(to, from)| to.copy_from_slice(&from.to_le_bytes()));
-        mask.chunks_exact_mut(8).zip(leaf.mask).for_each(|(to, from)| to.copy_from_slice(&from.to_le_bytes()));
+        origin
+            .chunks_exact_mut(4)
+            .zip(leaf.origin)
+            .for_each(|(to, from)| to.copy_from_slice(&from.to_le_bytes()));
+        values
+            .chunks_exact_mut(4)
+            .zip(leaf.values)
+            .for_each(|(to, from)| to.copy_from_slice(&from.to_le_bytes()));
+        mask.chunks_exact_mut(8)
+            .zip(leaf.mask)
+            .for_each(|(to, from)| to.copy_from_slice(&from.to_le_bytes()));
         xxh3_64(&bytes)
     };
     let leaves: Vec<u64> = surface.leaves()?.par_iter().map(leaf).collect();
@@ -194,7 +202,9 @@ fn write_group(origins: &[Origin], surface: &[Probe<'_>], touched: &[Probe<'_>],
             Probe::Leaf(leaf) => {
                 put_mask(leaf.mask);
                 if kind == BAND {
-                    put_mask(&std::array::from_fn(|x| (0..64).fold(0, |word, at| word | negative(leaf, x, at))));
+                    put_mask(&std::array::from_fn(|x| {
+                        (0..64).fold(0, |word, at| word | negative(leaf, x, at))
+                    }));
                     values.extend(active(leaf.mask).map(|index| leaf.values[index]));
                 } else {
                     values.extend(leaf.values);
@@ -228,8 +238,10 @@ fn outside_band<'a>(leaf: &'a Leaf<'_>) -> impl Iterator<Item = f32> + 'a {
 /// Indices of the voxels that a mask has, ascending.
 fn active(mask: &Mask) -> impl Iterator<Item = usize> + '_ {
     mask.iter().enumerate().flat_map(|(x, &word)| {
-        std::iter::successors((word != 0).then_some(word), |word| Some(word & (word - 1)).filter(|left| *left != 0))
-            .map(move |word| x << 6 | word.trailing_zeros() as usize)
+        std::iter::successors((word != 0).then_some(word), |word| {
+            Some(word & (word - 1)).filter(|left| *left != 0)
+        })
+        .map(move |word| x << 6 | word.trailing_zeros() as usize)
     })
 }
 
@@ -245,7 +257,8 @@ fn read_group(
             Some((origin, reader.take(1)?[0]))
         })
         .collect::<Option<_>>()?;
-    if heads.iter().any(|(origin, kind)| kind & !TOUCHED > WHOLE || origin.iter().any(|index| index & 7 != 0)) {
+    if heads.iter().any(|(origin, kind)| kind & !TOUCHED > WHOLE || origin.iter().any(|index| index & 7 != 0))
+    {
         return None;
     }
     let (mut value_count, mut frame_count) = (0, 0);
@@ -318,7 +331,8 @@ impl<'a> Reader<'a> {
     /// Numbers whose bytes are sorted by significance, the highest first.
     fn numbers(&mut self, count: usize) -> Option<Vec<f32>> {
         let bytes = self.take(count.checked_mul(4)?)?;
-        let number = |index: usize| f32::from_le_bytes([3, 2, 1, 0].map(|byte: usize| bytes[byte * count + index]));
+        let number =
+            |index: usize| f32::from_le_bytes([3, 2, 1, 0].map(|byte: usize| bytes[byte * count + index]));
         Some((0..count).map(number).collect())
     }
 }

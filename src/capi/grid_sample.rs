@@ -1,0 +1,143 @@
+//! Grids as numbers and meshes: samples, and the triangles along their surface.
+
+use std::ffi::c_char;
+
+use super::context::{enter, frz_context};
+use super::grid::frz_grid;
+use super::guard::{Failure, Outcome, frz_status, guard};
+use super::handle::{Changing, change, clear, give, read, required};
+use super::mesh::{Mesh, frz_mesh};
+use super::views::{frz_span, frz_view, text};
+use crate::base::DVec3;
+use crate::context::Context;
+use crate::vdb::{FloatGrid, level_set};
+
+/// How values between voxels are found.
+#[repr(u32)]
+#[derive(Clone, Copy)]
+pub enum frz_sampling {
+    /// The value of the voxel that holds the position.
+    FRZ_SAMPLE_NEAREST = 0,
+    /// Trilinear between voxel centres.
+    FRZ_SAMPLE_LINEAR = 1,
+}
+
+fn sampled(ctx: &Context, grid: &FloatGrid, positions: &[DVec3], sampling: u32) -> Outcome<Vec<f32>> {
+    let linear = match sampling {
+        0 => false,
+        1 => true,
+        other => return Err(Failure::argument(format!("sampling = {other} is no frz_sampling"))),
+    };
+    ctx.allow("the samples", (positions.len() as u64).saturating_mul(28))?;
+    let mut values = Vec::new();
+    ctx.polled(|| match linear {
+        true => grid.sample_linear(ctx, positions, &mut values),
+        false => grid.sample_nearest(ctx, positions, &mut values),
+    })?;
+    Ok(values)
+}
+
+/// Values of a grid at world positions.
+///
+/// positions: float[3] for each (m), finite.
+/// sampling: a frz_sampling.
+/// dst: room for as many floats.
+///
+/// Any number of threads may read a grid; one thread at a time for each context.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn frz_grid_sample(
+    context: *mut frz_context,
+    grid: *const frz_grid,
+    positions: frz_view,
+    sampling: u32,
+    dst: frz_span,
+) -> frz_status {
+    guard(|| {
+        // SAFETY: the pointers are NULL or the caller's.
+        unsafe {
+            let call = enter(context)?;
+            let ctx = call.ctx();
+            let held = read(grid)?;
+            let positions = positions.finite("positions")?;
+            let positions: Vec<DVec3> = positions.iter().map(|&p| DVec3::from(p.map(f64::from))).collect();
+            dst.fill("dst", &sampled(ctx, held.get(), &positions, sampling)?)
+        }
+    })
+}
+
+/// Gives a mesh's vertices an attribute of one float: a grid's values there.
+///
+/// mesh: gets the attribute, in the place of one of the same name.
+/// sampling: a frz_sampling.
+/// name: of the attribute, UTF-8; NULL for the grid's own.
+///
+/// Any number of threads may read a grid; one thread at a time for each mesh and context.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn frz_grid_sample_mesh(
+    context: *mut frz_context,
+    grid: *const frz_grid,
+    mesh: *mut frz_mesh,
+    sampling: u32,
+    name: *const c_char,
+) -> frz_status {
+    guard(|| {
+        // SAFETY: the pointers are NULL or the caller's.
+        unsafe {
+            let call = enter(context)?;
+            let ctx = call.ctx();
+            let held = read(grid)?;
+            let mut mesh: Changing<'_, Mesh> = change(mesh)?;
+            let name = match text(name, "name")? {
+                Some(name) => name.to_string(),
+                None => held.get().name(),
+            };
+            if name.is_empty() {
+                return Err(Failure::argument("name: neither it nor the grid has one"));
+            }
+            let positions: Vec<DVec3> = mesh.triangles.positions.iter().map(|p| p.cast()).collect();
+            let values = sampled(ctx, held.get(), &positions, sampling)?;
+            mesh.set_attribute(&name, 1, values);
+            Ok(())
+        }
+    })
+}
+
+/// Makes a mesh of triangles along a grid's surface, counter-clockwise seen from outside.
+///
+/// iso: the value at the surface; of a level set a distance (m), 0 for its surface. Finite.
+/// adaptivity: 0 to 1; above 0 flat regions get fewer and larger triangles.
+/// out: receives the mesh, to be destroyed with frz_mesh_destroy; NULL after a failure. It has no faces where there
+///     is no surface.
+///
+/// Any number of threads may read a grid; one thread at a time for each context.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn frz_grid_to_mesh(
+    context: *mut frz_context,
+    grid: *const frz_grid,
+    iso: f32,
+    adaptivity: f32,
+    out: *mut *mut frz_mesh,
+) -> frz_status {
+    /// Bytes of a leaf's part of a mesh, while it is made.
+    const BYTES_PER_LEAF: u64 = 6000;
+    guard(|| {
+        // SAFETY: the pointers are NULL or the caller's.
+        unsafe {
+            clear(out);
+            let call = enter(context)?;
+            let ctx = call.ctx();
+            let out = required(out, "out")?;
+            let held = read(grid)?;
+            if !iso.is_finite() {
+                return Err(Failure::argument("iso is not finite"));
+            }
+            if !(0.0..=1.0).contains(&adaptivity) {
+                return Err(Failure::argument(format!("adaptivity = {adaptivity} is not within 0 to 1")));
+            }
+            let grid = held.get();
+            ctx.allow("a mesh of the grid", grid.leaf_count() as u64 * BYTES_PER_LEAF)?;
+            let mesh = ctx.stage("mesh", || level_set::to_mesh(ctx, grid, iso, adaptivity))?;
+            give(out, Mesh::of_triangles(mesh))
+        }
+    })
+}
