@@ -139,7 +139,7 @@ impl Body {
             &self.shape.topology
         };
         poses.iter_mut().for_each(|pose| topology.complete(pose));
-        let refined = refine(topology, &mut poses, tolerance, |poses, edge| near.sees(poses, &edge));
+        let refined = refine(ctx, topology, &mut poses, tolerance, |poses, edge| near.sees(poses, &edge))?;
         ctx.check()?;
         let levels: Vec<Vec<Fixed>> = poses
             .par_iter()
@@ -164,6 +164,8 @@ impl Body {
             let mut pose = Vec::new();
             self.motion.pose(time, &mut pose)?;
             pose.iter_mut().for_each(|position| *position = lattice.to_cells(*position));
+            // Before anything is sized by how far the vertices lie apart.
+            pose.iter().try_for_each(|&cells| lattice.fix(cells).map(drop))?;
             Ok(pose)
         };
         let mut poses = vec![at(from)?];

@@ -7,11 +7,23 @@ use rayon::prelude::*;
 
 use super::topology::{Derived, Simplex, Topology};
 use crate::base::DVec3;
+use crate::context::Context;
+use crate::error::{Error, Result};
 
 /// Most pieces that an edge is cut into at once.
 const MOST_PIECES: f64 = 4096.0;
 /// Most rounds: the edges that one round adds are cut by the next.
 const MOST_ROUNDS: usize = 12;
+
+/// What memory is asked for, with what makes it less.
+const WHAT: &str =
+    "a body's edges, cut where their ends move differently (larger cells or a shorter motion need less)";
+/// Bytes of a new vertex in each pose: in 64 bits, in fixed point.
+const BYTES_PER_POSITION: u64 = 36;
+/// Bytes of a new vertex, and of the two triangles and three edges that come with it.
+const BYTES_PER_VERTEX: u64 = 150;
+/// Most of them in one round, whatever the context allows.
+const MOST_BYTES: u64 = 8 << 30;
 
 /// Largest difference (cells) between the patch that an edge sweeps in one step and its two triangles.
 pub fn edge_error(poses: &[impl AsRef<[DVec3]>], [i, j]: [u32; 2]) -> f64 {
@@ -23,12 +35,16 @@ pub fn edge_error(poses: &[impl AsRef<[DVec3]>], [i, j]: [u32; 2]) -> f64 {
 
 /// Cuts edges into equal pieces until each error is within `tolerance` (cells), extending the poses; none when
 /// no edge needs it. `wanted` tells which edges matter.
+///
+/// # Errors
+/// Cancel; more pieces than memory should hold.
 pub fn refine(
+    ctx: &Context,
     topology: &Topology,
     poses: &mut [Vec<DVec3>],
     tolerance: f64,
     wanted: impl Fn(&[Vec<DVec3>], [u32; 2]) -> bool + Sync,
-) -> Option<Topology> {
+) -> Result<Option<Topology>> {
     let mut refined: Option<Topology> = None;
     for _ in 0..MOST_ROUNDS {
         let current = refined.as_ref().unwrap_or(topology);
@@ -41,6 +57,13 @@ pub fn refine(
         if pieces.iter().all(|&pieces| pieces == 1) {
             break;
         }
+        ctx.check()?;
+        let added: u64 = pieces.iter().map(|&pieces| u64::from(pieces - 1)).sum();
+        let needed = added * (poses.len() as u64 * BYTES_PER_POSITION + BYTES_PER_VERTEX);
+        ctx.allow(WHAT, needed)?;
+        if needed > MOST_BYTES {
+            return Err(Error::Memory { what: WHAT.into(), needed, limit: MOST_BYTES });
+        }
         let cut = Cut::new(current, &pieces);
         let simplices = cut.triangles(current);
         let mut derived = current.derived.clone();
@@ -48,7 +71,7 @@ pub fn refine(
         poses.iter_mut().for_each(|pose| cut.added.iter().for_each(|added| pose.push(added.position(pose))));
         refined = Some(Topology::from_parts(topology.own_vertices, derived, simplices));
     }
-    refined
+    Ok(refined)
 }
 
 /// Edges cut into pieces.
