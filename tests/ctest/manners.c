@@ -36,7 +36,7 @@ static int threads_in_the_end(int wanted) {
 static void work(uint32_t count) {
     static ball rest, at;
     frz_context *ctx = context_on(count);
-    frz_grid *snow = small_snow(ctx), *copy = NULL;
+    frz_grid *snow = small_snow(ctx), *copy = NULL, *none = NULL;
     const frz_grid *one[1];
     frz_mesh *mesh = NULL;
     frz_base *base = NULL;
@@ -51,11 +51,12 @@ static void work(uint32_t count) {
     WORKS(frz_levelset_offset(ctx, copy, 0.01f, FRZ_SCHEME_FIRST_ORDER));
     one[0] = copy;
     WORKS(frz_grid_save(ctx, one, 1, "manners.vdb", 0, 0));
-    CHECK(frz_grid_load(ctx, "there is no such file", NULL, &snow) == FRZ_ERROR_IO);
-    CHECK(snow == NULL);
+    CHECK(frz_grid_load(ctx, "there is no such file", NULL, &none) == FRZ_ERROR_IO);
+    CHECK(none == NULL);
     frz_mesh_destroy(mesh);
     frz_base_destroy(base);
     frz_grid_destroy(copy);
+    frz_grid_destroy(snow);
     frz_context_destroy(ctx);
     remove("manners.vdb");
 }
