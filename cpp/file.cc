@@ -223,6 +223,8 @@ std::unique_ptr<Grid> float_grid_from_bytes(rust::Slice<const uint8_t> bytes, ru
     initialise();
     View view(bytes);
     std::istream in(&view);
+    // Bytes that are cut short end the reading at once: OpenVDB would unpack what was never read.
+    in.exceptions(std::ios_base::failbit | std::ios_base::badbit);
     openvdb::io::Stream stream(in, /*delayLoad=*/false);
     const auto grids = stream.getGrids();
     openvdb::GridBase::Ptr found;
