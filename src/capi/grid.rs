@@ -290,12 +290,10 @@ pub unsafe extern "C" fn frz_grid_create(
 pub unsafe extern "C" fn frz_grid_destroy(grid: *mut frz_grid) {
     // SAFETY: the grid is NULL or was not destroyed.
     guard(|| unsafe {
-        if !grid.is_null()
-            && let Ok(held) = read(grid.cast_const())
+        if let Ok(held) = read(grid.cast_const())
+            && matches!(*held, Grid::Lent(_))
         {
-            if matches!(*held, Grid::Lent(_)) {
-                return Err(Failure::argument("the grid belongs to another object"));
-            }
+            return Err(Failure::argument("the grid belongs to another object"));
         }
         destroy(grid)
     });

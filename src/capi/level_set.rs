@@ -257,7 +257,7 @@ pub unsafe extern "C" fn frz_levelset_offset(
             level_set_of(grid)?;
             let scheme = self::scheme(scheme)?;
             let voxels = f64::from(distance) / grid.voxel_size();
-            if !(voxels.abs() <= 1000.0) {
+            if !(-1000.0..=1000.0).contains(&voxels) {
                 return Err(Failure::argument(format!("distance = {distance} m is more than 1000 voxels")));
             }
             ctx.allow("the moved level set", grown_bytes(grid, voxels))?;

@@ -3,7 +3,12 @@
 //!
 //! One file for each noun. Raw pointers are followed in `views.rs` and `handle.rs` only; every function runs inside
 //! [`guard::guard`]. The texts of this room are the header's: cbindgen copies them.
-#![allow(non_camel_case_types)]
+//!
+//! # Safety
+//! Every function asks the same of its caller, and the header's preamble says it: pointers are NULL or point to what
+//! their parameter says, handles were not destroyed, views describe memory that may be read, spans such that may be
+//! written.
+#![allow(non_camel_case_types, clippy::missing_safety_doc, clippy::too_many_arguments)]
 
 // In the header's order.
 mod guard;

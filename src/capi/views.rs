@@ -256,7 +256,6 @@ fn check_size<T: Sized32>(size: usize) -> Outcome {
 
 #[cfg(test)]
 mod tests {
-    use super::super::guard::frz_status::*;
     use super::*;
 
     #[repr(C)]
