@@ -88,7 +88,7 @@ enum frz_status
      */
     FRZ_ERROR_IO = 3,
     /**
-     * More memory would be needed than the context allows, or than there is.
+     * More memory would be needed than the context allows.
      */
     FRZ_ERROR_MEMORY = 4,
     /**
@@ -932,7 +932,7 @@ frz_status frz_context_set_log(frz_context *context,
  * The need is estimated before memory is taken; a call that would need more answers FRZ_ERROR_MEMORY and changes
  * nothing. It is a guard against a wrong voxel size, not an account of every byte.
  *
- * bytes: 0 for no limit, which is also the limit of a new context.
+ * bytes: 0 for the limit of a new context, the machine's memory; UINT64_MAX for none.
  *
  * One thread at a time.
  */

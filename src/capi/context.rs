@@ -11,7 +11,7 @@ use super::handle::{Noun, Reading, clear, destroy, give, read, required};
 use super::library::FRZ_ABI_VERSION;
 use super::pool::{Threads, frz_pool};
 use super::views::{Plain, frz_span};
-use crate::context::{Context, Progress, StageTime};
+use crate::context::{Context, Progress, StageTime, machine_memory};
 
 /// One computation: cancel flag, progress, polls, warnings, stage times. Cheap: make one for every cook.
 pub struct frz_context {
@@ -160,6 +160,11 @@ fn letters(verb: &str) -> [c_char; 32] {
     out
 }
 
+/// What a new context allows (bytes).
+fn usual_limit() -> u64 {
+    machine_memory().unwrap_or(u64::MAX)
+}
+
 fn progress_of(progress: &Progress, began: &Began) -> frz_progress {
     let Progress { stage, stages_done } = *progress;
     frz_progress { stage: letters(stage), stages_done: stages_done as u64, seconds: began.seconds() }
@@ -192,10 +197,12 @@ pub unsafe extern "C" fn frz_context_create(
                 return Err(Failure::new(FRZ_ERROR_VERSION, text));
             }
             let threads = read(pool.cast_const())?.share();
+            let ctx = Context::new(threads.0.clone());
+            ctx.set_memory_limit(usual_limit());
             give(
                 out,
                 State {
-                    ctx: Context::new(threads.0.clone()),
+                    ctx,
                     _threads: threads,
                     entered: AtomicBool::new(false),
                     poisoned: AtomicBool::new(false),
@@ -287,7 +294,7 @@ pub unsafe extern "C" fn frz_context_set_log(
 /// The need is estimated before memory is taken; a call that would need more answers FRZ_ERROR_MEMORY and changes
 /// nothing. It is a guard against a wrong voxel size, not an account of every byte.
 ///
-/// bytes: 0 for no limit, which is also the limit of a new context.
+/// bytes: 0 for the limit of a new context, the machine's memory; UINT64_MAX for none.
 ///
 /// One thread at a time.
 #[unsafe(no_mangle)]
@@ -295,7 +302,7 @@ pub unsafe extern "C" fn frz_context_set_memory_limit(context: *mut frz_context,
     guard(|| {
         // SAFETY: the context is NULL or was not destroyed.
         let call = unsafe { enter(context) }?;
-        call.ctx().set_memory_limit(if bytes == 0 { u64::MAX } else { bytes });
+        call.ctx().set_memory_limit(if bytes == 0 { usual_limit() } else { bytes });
         Ok(())
     })
 }

@@ -20,7 +20,7 @@ pub enum frz_status {
     FRZ_ERROR_FILE = 2,
     /// The operating system refused to read or write.
     FRZ_ERROR_IO = 3,
-    /// More memory would be needed than the context allows, or than there is.
+    /// More memory would be needed than the context allows.
     FRZ_ERROR_MEMORY = 4,
     /// The context was cancelled; everything is as it was before the call.
     FRZ_CANCELLED = 5,

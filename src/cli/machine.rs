@@ -1,26 +1,7 @@
-//! The machine's memory and disks, as Linux tells them.
-
-/// Bytes that this process may use: the machine's memory or its control group's limit.
-pub fn memory() -> Option<u64> {
-    let machine = kilobytes_of(&std::fs::read_to_string("/proc/meminfo").ok()?, "MemTotal:")?;
-    let group = std::fs::read_to_string("/sys/fs/cgroup/memory.max").ok();
-    let group = group.and_then(|text| text.trim().parse::<u64>().ok());
-    Some(group.map_or(machine, |limit| limit.min(machine)))
-}
-
-/// The most bytes of memory that this process has held, if the system says.
-pub fn peak_memory() -> Option<u64> {
-    kilobytes_of(&std::fs::read_to_string("/proc/self/status").ok()?, "VmHWM:")
-}
+//! The machine's disks.
 
 /// Bytes that this user may still write where a folder is.
 pub fn free_space(folder: &std::path::Path) -> Option<u64> {
     let file_system = rustix::fs::statvfs(folder).ok()?;
     Some(file_system.f_bavail * file_system.f_frsize)
-}
-
-/// The line `NAME   1234 kB` in bytes.
-fn kilobytes_of(text: &str, name: &str) -> Option<u64> {
-    let line = text.lines().find_map(|line| line.strip_prefix(name))?;
-    line.split_whitespace().next()?.parse::<u64>().ok().map(|kilobytes| kilobytes * 1024)
 }

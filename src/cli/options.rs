@@ -1,8 +1,8 @@
 //! Options that several commands share, and how their values are written.
 
-use super::machine;
 use frazil::Result;
 use frazil::base::{DVec3, TriMesh};
+use frazil::context::machine_memory;
 use frazil::motion::{Space, Up};
 use frazil::render::Size;
 use std::path::Path;
@@ -22,7 +22,7 @@ impl Amount {
     pub fn bytes(self) -> u64 {
         match self {
             Self::Bytes(bytes) => bytes,
-            Self::Part(part) => machine::memory().map_or(u64::MAX, |bytes| (bytes as f64 * part) as u64),
+            Self::Part(part) => machine_memory().map_or(u64::MAX, |bytes| (bytes as f64 * part) as u64),
         }
     }
 }

@@ -1,10 +1,10 @@
 //! What all commands share: threads, signals, verbosity, the report of a run.
 
 use super::exit::{self, Failure, Phase};
-use super::machine;
 use super::options::Amount;
 use super::output;
 use super::signals::Signals;
+use frazil::context::peak_memory;
 use frazil::sweep::surface_bytes;
 use frazil::{Context, Error, Pool};
 use serde_json::{Map, Value, json};
@@ -107,7 +107,7 @@ impl Session {
         report.insert("version".into(), json!(env!("CARGO_PKG_VERSION")));
         report.insert("threads".into(), json!(self.ctx.pool().threads()));
         report.insert("seconds".into(), json!(self.start.elapsed().as_secs_f64()));
-        report.insert("peak_memory_bytes".into(), json!(machine::peak_memory()));
+        report.insert("peak_memory_bytes".into(), json!(peak_memory()));
         if !stages.is_empty() {
             report.insert("stages".into(), json!(stages));
         }

@@ -1,12 +1,14 @@
 //! Threads that several computations share ([`Pool`]) and the side channel of one of them
 //! ([`Context`]: cancel flag, progress, warnings, stage times, memory limit).
 
+mod memory;
 mod pool;
 
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError};
 use std::time::{Duration, Instant};
 
+pub use memory::{machine_memory, peak_memory};
 pub use pool::{MOST_THREADS, Pool};
 
 use crate::error::{Error, Result};
