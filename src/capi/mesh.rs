@@ -236,10 +236,9 @@ pub unsafe extern "C" fn frz_mesh_create(
             };
             let desc = sized(desc, defaults)?;
             no_flags(desc.flags, 0)?;
-            let bytes =
-                (desc.positions.count as u64).saturating_add(desc.indices.count as u64).saturating_mul(28);
-            ctx.allow("a mesh", bytes)?;
             let polygons = polygons(&desc.positions, &desc.face_counts, &desc.indices)?;
+            let bytes = (polygons.positions.len() + polygons.corners.len()) as u64 * 28;
+            ctx.allow("a mesh", bytes)?;
             let attributes = attributes(&desc, polygons.positions.len())?;
             give(out, made(ctx, polygons, attributes)?)
         }

@@ -2,13 +2,16 @@
 //! results are handed out; nothing is computed here.
 //!
 //! One file for each noun. Raw pointers are followed in `views.rs` and `handle.rs` only; every function runs inside
-//! [`guard::guard`]. The texts of this room are the header's: cbindgen copies them.
+//! `guard::guard`. The texts of this room are the header's: cbindgen copies them, and `float[3]` is no link.
 //!
 //! # Safety
 //! Every function asks the same of its caller, and the header's preamble says it: pointers are NULL or point to what
 //! their parameter says, handles were not destroyed, views describe memory that may be read, spans such that may be
 //! written.
 #![allow(non_camel_case_types, clippy::missing_safety_doc, clippy::too_many_arguments)]
+#![allow(rustdoc::broken_intra_doc_links)]
+// What only grids and the systems need.
+#![cfg_attr(not(feature = "vdb"), allow(dead_code, unused_imports))]
 
 // In the header's order.
 mod guard;

@@ -120,10 +120,11 @@ pub unsafe extern "C" fn frz_snow_layer(
                 true => Cover::Depth(desc.depth),
                 false => Cover::Top(read(desc.top)?.triangles.clone()),
             };
-            ctx.allow(
-                "the layer of snow",
-                surface_bytes(surfaces(&ground, &cover, &statics), desc.voxel_size),
-            )?;
+            let area = surfaces(&ground, &cover, &statics);
+            // What is no number is refused with its name below.
+            if !area.is_nan() {
+                ctx.allow("the layer of snow", surface_bytes(area, desc.voxel_size))?;
+            }
             let half_width = desc.half_width as f32;
             let grid =
                 call.ctx().polled(|| layer(ctx, &ground, &statics, &cover, desc.voxel_size, half_width))?;
