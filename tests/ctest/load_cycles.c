@@ -2,6 +2,7 @@
  * threads and in resident memory (kB) from the 10th cycle to the last. */
 #include <dlfcn.h>
 #include <frazil.h>
+#include <malloc.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
@@ -17,6 +18,12 @@ static long status_of(const char *key) {
     }
     fclose(file);
     return value;
+}
+
+/* Resident memory (kB) without what is free and only kept by malloc. */
+static long resident(void) {
+    malloc_trim(0);
+    return status_of("VmRSS:");
 }
 
 static void *symbol(void *library, const char *name) {
@@ -103,10 +110,10 @@ int main(int count, char **arguments) {
     for (i = 1; i <= cycles; ++i) {
         cycle();
         /* The first cycles fill caches that stay: libopenvdb remains mapped. */
-        if (i == (cycles < 10 ? 1 : 10)) threads = status_of("Threads:"), memory = status_of("VmRSS:");
+        if (i == (cycles < 10 ? 1 : 10)) threads = status_of("Threads:"), memory = resident();
     }
     wait.tv_sec = 0, wait.tv_nsec = 100000000;
     nanosleep(&wait, NULL);
-    printf("threads %ld memory_kB %ld\n", status_of("Threads:") - threads, status_of("VmRSS:") - memory);
+    printf("threads %ld memory_kB %ld\n", status_of("Threads:") - threads, resident() - memory);
     return status_of("Threads:") > threads;
 }
