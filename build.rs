@@ -3,7 +3,7 @@
 use std::path::{Path, PathBuf};
 
 /// Sources, one for each group of heavy templates, compiled in parallel.
-const SOURCES: [&str; 5] = ["grid.cc", "file.cc", "csg.cc", "filters.cc", "meshing.cc"];
+const SOURCES: [&str; 6] = ["grid.cc", "file.cc", "csg.cc", "filters.cc", "meshing.cc", "particles.cc"];
 
 fn main() {
     println!("cargo:rerun-if-env-changed=OPENVDB_ROOT");

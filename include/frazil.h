@@ -684,7 +684,7 @@ typedef struct {
     frz_view positions_end;
     /**
      * Poses at equal times between the two, each float[3] for each vertex; vertices move straight from pose to pose.
-     * NULL for none.
+     * NULL for none, as it must be without positions_end.
      */
     const frz_view *between;
     /**

@@ -4,7 +4,7 @@ use std::ffi::c_void;
 use std::ptr::NonNull;
 
 use super::body::{Shapes, bodies, frz_body};
-use super::context::{enter, frz_context};
+use super::context::{creates, enter, frz_context};
 use super::grid::{Grid, frz_grid};
 use super::guard::{Failure, Outcome, frz_status, guard};
 use super::handle::{Noun, change, clear, destroy, give, read, required};
@@ -167,13 +167,9 @@ pub unsafe extern "C" fn frz_base_create(
     restart_bytes: usize,
     out: *mut *mut frz_base,
 ) -> frz_status {
-    guard(|| {
-        // SAFETY: the pointers are NULL or the caller's.
-        unsafe {
-            clear(out);
-            let call = enter(context)?;
-            let ctx = call.ctx();
-            let out = required(out, "out")?;
+    // SAFETY: the pointers are NULL or the caller's.
+    unsafe {
+        creates(context, out, |ctx| {
             let held = read(snow)?;
             let snow = held.get();
             let params = if params.is_null() {
@@ -186,15 +182,14 @@ pub unsafe extern "C" fn frz_base_create(
             let state =
                 frz_view { data: restart, count: restart_bytes, stride: 0 }.elements::<u8>("restart")?;
             ctx.allow("the base layer", snow.memory_bytes().saturating_add(state.len() as u64))?;
-            let ctx = call.ctx();
             let untouched = restart.is_null();
             let layer = ctx.polled(|| match untouched {
                 true => BaseLayer::new(ctx, snow.deep_copy()?, params),
                 false => BaseLayer::restore(ctx, snow.deep_copy()?, params, &state),
             })?;
-            give(out, Layer::new(layer)?)
-        }
-    })
+            Layer::new(layer)
+        })
+    }
 }
 
 /// Destroys a base layer, and the grids that it lent; NULL is fine.
@@ -315,9 +310,7 @@ pub unsafe extern "C" fn frz_base_save(
     guard(|| {
         // SAFETY: the pointers are NULL or the caller's.
         unsafe {
-            if !size.is_null() {
-                size.write(0);
-            }
+            clear(size);
             let call = enter(context)?;
             let ctx = call.ctx();
             let base = read(base)?;
@@ -393,11 +386,9 @@ pub unsafe extern "C" fn frz_base_dirty(
     guard(|| {
         // SAFETY: the pointers are NULL or the caller's.
         unsafe {
-            if !origins.is_null() {
-                origins.write(std::ptr::null());
-            }
+            clear(origins);
+            clear(count);
             let count = required(count, "count")?;
-            count.write(0);
             let origins = required(origins, "origins")?;
             let base = read(base)?;
             if !base.dirty.is_empty() {

@@ -33,7 +33,7 @@ pub struct frz_body {
     /// float[3] for each vertex (m): where it is at the step's end. data NULL: the body rests.
     pub positions_end: frz_view,
     /// Poses at equal times between the two, each float[3] for each vertex; vertices move straight from pose to pose.
-    /// NULL for none.
+    /// NULL for none, as it must be without positions_end.
     pub between: *const frz_view,
     /// Number of poses between.
     pub between_count: usize,
@@ -211,6 +211,11 @@ unsafe fn one(body: *const frz_body, dt: f64) -> Outcome<Arrived> {
         let count = mesh.positions.len();
         let mut poses = vec![mesh.positions.clone()];
         let moves = !body.positions_end.data.is_null() || body.positions_end.count > 0;
+        if body.between_count > 0 && !moves {
+            return Err(Failure::argument(
+                "between: there are poses, but no positions_end that they lead to",
+            ));
+        }
         let mut pose = |view: &frz_view, name: &str| {
             let positions = view.finite(name)?;
             if positions.len() != count {

@@ -126,6 +126,26 @@ pub(super) unsafe fn enter<'a>(context: *const frz_context) -> Outcome<Call<'a>>
     Ok(call)
 }
 
+/// A function of the interface that makes an object: `out` receives it, or NULL after a failure.
+///
+/// # Safety
+/// As [`enter`] and [`give`].
+pub(super) unsafe fn creates<N: Noun>(
+    context: *const frz_context,
+    out: *mut *mut N,
+    make: impl FnOnce(&Context) -> Outcome<N::Value>,
+) -> frz_status {
+    guard(|| {
+        // SAFETY: the caller's promise.
+        unsafe {
+            clear(out);
+            let call = enter(context)?;
+            required(out, "out")?;
+            give(out, make(call.ctx())?)
+        }
+    })
+}
+
 impl Drop for Call<'_> {
     fn drop(&mut self) {
         if std::thread::panicking() {
@@ -188,7 +208,7 @@ pub unsafe extern "C" fn frz_context_create(
         // SAFETY: the pointers are NULL or the caller's.
         unsafe {
             clear(out);
-            let out = required(out, "out")?;
+            required(out, "out")?;
             if abi >> 16 != FRZ_ABI_VERSION >> 16 || abi & 0xffff > FRZ_ABI_VERSION & 0xffff {
                 let [major, minor] = [abi >> 16, abi & 0xffff];
                 let [own, own_minor] = [FRZ_ABI_VERSION >> 16, FRZ_ABI_VERSION & 0xffff];

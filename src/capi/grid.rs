@@ -4,11 +4,11 @@ use std::collections::HashSet;
 use std::ffi::{c_char, c_void};
 use std::ptr::NonNull;
 
-use super::context::{enter, frz_context};
+use super::context::{creates, frz_context};
 use super::guard::{Failure, Outcome, frz_status, guard};
-use super::handle::{Noun, change, clear, destroy, give, read, required};
+use super::handle::{Noun, change, clear, destroy, read, required};
 use super::mesh::no_flags;
-use super::views::{Plain, Sized32, fill, frz_span, frz_view, sized, text, write_bytes};
+use super::views::{Plain, Sized32, fill, frz_span, frz_view, meaning, sized, text, write_bytes};
 use crate::base::blocks::{Block, BlockEdit, Mask, Origin, VOXELS, Values};
 use crate::vdb::{FloatGrid, GridClass, Leaf, Probe};
 
@@ -144,21 +144,14 @@ impl Grid {
     }
 }
 
-fn class_of(number: u32) -> Outcome<GridClass> {
-    match number {
-        0 => Ok(GridClass::Unknown),
-        1 => Ok(GridClass::LevelSet),
-        2 => Ok(GridClass::Fog),
-        other => Err(Failure::argument(format!("grid_class = {other} is no frz_grid_class"))),
-    }
-}
+const CLASSES: [(u32, GridClass); 3] = [
+    (frz_grid_class::FRZ_GRID_UNKNOWN as u32, GridClass::Unknown),
+    (frz_grid_class::FRZ_GRID_LEVEL_SET as u32, GridClass::LevelSet),
+    (frz_grid_class::FRZ_GRID_FOG as u32, GridClass::Fog),
+];
 
 fn number_of(class: GridClass) -> u32 {
-    match class {
-        GridClass::Unknown => frz_grid_class::FRZ_GRID_UNKNOWN as u32,
-        GridClass::LevelSet => frz_grid_class::FRZ_GRID_LEVEL_SET as u32,
-        GridClass::Fog => frz_grid_class::FRZ_GRID_FOG as u32,
-    }
+    CLASSES.iter().find(|(_, known)| *known == class).map_or(0, |(number, _)| *number)
 }
 
 /// Checks the edge of a voxel (m).
@@ -234,13 +227,9 @@ pub unsafe extern "C" fn frz_grid_create(
     desc: *const frz_grid_desc,
     out: *mut *mut frz_grid,
 ) -> frz_status {
-    guard(|| {
-        // SAFETY: the pointers are NULL or the caller's.
-        unsafe {
-            clear(out);
-            let call = enter(context)?;
-            let ctx = call.ctx();
-            let out = required(out, "out")?;
+    // SAFETY: the pointers are NULL or the caller's.
+    unsafe {
+        creates(context, out, |ctx| {
             let defaults = frz_grid_desc {
                 struct_size: 0,
                 grid_class: 0,
@@ -253,7 +242,7 @@ pub unsafe extern "C" fn frz_grid_create(
             };
             let desc = sized(desc, defaults)?;
             no_flags(desc.flags, 0)?;
-            let class = class_of(desc.grid_class)?;
+            let class = meaning("grid_class", "frz_grid_class", desc.grid_class, &CLASSES)?;
             check_voxel(desc.voxel_size)?;
             if !desc.background.is_finite() {
                 return Err(Failure::argument("background is not finite"));
@@ -276,9 +265,9 @@ pub unsafe extern "C" fn frz_grid_create(
                 }
                 Ok(grid)
             })?;
-            give(out, Grid::Own(grid))
-        }
-    })
+            Ok(Grid::Own(grid))
+        })
+    }
 }
 
 /// Destroys a grid; NULL is fine. A grid that belongs to another object stays.
@@ -311,19 +300,15 @@ pub unsafe extern "C" fn frz_grid_copy(
     grid: *const frz_grid,
     out: *mut *mut frz_grid,
 ) -> frz_status {
-    guard(|| {
-        // SAFETY: the pointers are NULL or the caller's.
-        unsafe {
-            clear(out);
-            let call = enter(context)?;
-            let ctx = call.ctx();
-            let out = required(out, "out")?;
+    // SAFETY: the pointers are NULL or the caller's.
+    unsafe {
+        creates(context, out, |ctx| {
             let held = read(grid)?;
             let source = held.get();
             ctx.allow("a copy of the grid", source.memory_bytes())?;
-            give(out, Grid::Own(ctx.polled(|| source.deep_copy())?))
-        }
-    })
+            Ok(Grid::Own(ctx.polled(|| source.deep_copy())?))
+        })
+    }
 }
 
 /// Tells what a grid is.
@@ -373,9 +358,7 @@ pub unsafe extern "C" fn frz_grid_name(
     guard(|| {
         // SAFETY: the pointers are NULL or the caller's.
         unsafe {
-            if !size.is_null() {
-                size.write(0);
-            }
+            clear(size);
             let mut name = read(grid)?.get().name().into_bytes();
             name.push(0);
             let needed = name.len();

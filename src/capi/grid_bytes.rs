@@ -3,12 +3,12 @@
 use std::ffi::{c_char, c_void};
 use std::path::Path;
 
-use super::context::{enter, frz_context};
+use super::context::{creates, enter, frz_context};
 use super::grid::{Grid, frz_grid};
 use super::guard::{Failure, Outcome, frz_status, guard};
-use super::handle::{Reading, clear, give, read, required};
+use super::handle::{Reading, clear, read};
 use super::mesh::no_flags;
-use super::views::{Plain, frz_view, text, write_bytes};
+use super::views::{Plain, frz_view, meaning, text, write_bytes};
 use crate::vdb::FloatGrid;
 use crate::vdb::file::{self, Compression, WriteOptions};
 
@@ -29,12 +29,12 @@ pub const FRZ_HALF: u32 = 1;
 
 fn options(compression: u32, flags: u32) -> Outcome<WriteOptions> {
     no_flags(flags, FRZ_HALF)?;
-    let compression = match compression {
-        0 => Compression::Blosc,
-        1 => Compression::Zip,
-        2 => Compression::None,
-        other => return Err(Failure::argument(format!("compression = {other} is no frz_compression"))),
-    };
+    let known = [
+        (frz_compression::FRZ_COMPRESSION_BLOSC as u32, Compression::Blosc),
+        (frz_compression::FRZ_COMPRESSION_ZIP as u32, Compression::Zip),
+        (frz_compression::FRZ_COMPRESSION_NONE as u32, Compression::None),
+    ];
+    let compression = meaning("compression", "frz_compression", compression, &known)?;
     Ok(WriteOptions { compression, half: flags & FRZ_HALF != 0, ..WriteOptions::default() })
 }
 
@@ -81,13 +81,9 @@ pub unsafe extern "C" fn frz_grid_load(
     name: *const c_char,
     out: *mut *mut frz_grid,
 ) -> frz_status {
-    guard(|| {
-        // SAFETY: the pointers are NULL or the caller's.
-        unsafe {
-            clear(out);
-            let call = enter(context)?;
-            let ctx = call.ctx();
-            let out = required(out, "out")?;
+    // SAFETY: the pointers are NULL or the caller's.
+    unsafe {
+        creates(context, out, |ctx| {
             let path = Path::new(text(path, "path")?.ok_or_else(|| Failure::argument("path is NULL"))?);
             let name = text(name, "name")?;
             let grid = ctx.stage("read", || {
@@ -95,9 +91,9 @@ pub unsafe extern "C" fn frz_grid_load(
                 ctx.allow(&path.display().to_string(), memory.unwrap_or(0))?;
                 file::read_named(path, name)
             })?;
-            give(out, Grid::Own(grid))
-        }
-    })
+            Ok(Grid::Own(grid))
+        })
+    }
 }
 
 /// Writes grids into one .vdb file. The file is there when it is whole: it is written under another name first.
@@ -148,20 +144,16 @@ pub unsafe extern "C" fn frz_grid_from_bytes(
     name: *const c_char,
     out: *mut *mut frz_grid,
 ) -> frz_status {
-    guard(|| {
-        // SAFETY: the pointers are NULL or the caller's.
-        unsafe {
-            clear(out);
-            let call = enter(context)?;
-            let ctx = call.ctx();
-            let out = required(out, "out")?;
+    // SAFETY: the pointers are NULL or the caller's.
+    unsafe {
+        creates(context, out, |ctx| {
             ctx.allow("a grid from bytes", size as u64)?;
             let bytes = frz_view { data: bytes, count: size, stride: 0 }.elements::<u8>("bytes")?;
             let name = text(name, "name")?;
             let grid = ctx.stage("read", || file::from_bytes(&bytes, name))?;
-            give(out, Grid::Own(grid))
-        }
-    })
+            Ok(Grid::Own(grid))
+        })
+    }
 }
 
 /// Writes grids as the bytes of one .vdb file, the same bytes for the same grids.
@@ -188,9 +180,7 @@ pub unsafe extern "C" fn frz_grid_to_bytes(
     guard(|| {
         // SAFETY: the pointers are NULL or the caller's.
         unsafe {
-            if !size.is_null() {
-                size.write(0);
-            }
+            clear(size);
             let call = enter(context)?;
             let ctx = call.ctx();
             let options = options(compression, flags)?;

@@ -2,12 +2,12 @@
 
 use std::ffi::c_char;
 
-use super::context::{enter, frz_context};
+use super::context::{creates, enter, frz_context};
 use super::grid::frz_grid;
 use super::guard::{Failure, Outcome, frz_status, guard};
-use super::handle::{Changing, change, clear, give, read, required};
+use super::handle::{Changing, change, read};
 use super::mesh::{Mesh, frz_mesh};
-use super::views::{frz_span, frz_view, text};
+use super::views::{frz_span, frz_view, meaning, text};
 use crate::base::DVec3;
 use crate::context::Context;
 use crate::vdb::{FloatGrid, level_set};
@@ -23,16 +23,13 @@ pub enum frz_sampling {
 }
 
 fn sampled(ctx: &Context, grid: &FloatGrid, positions: &[DVec3], sampling: u32) -> Outcome<Vec<f32>> {
-    let linear = match sampling {
-        0 => false,
-        1 => true,
-        other => return Err(Failure::argument(format!("sampling = {other} is no frz_sampling"))),
-    };
+    let known = [frz_sampling::FRZ_SAMPLE_NEAREST, frz_sampling::FRZ_SAMPLE_LINEAR].map(|s| (s as u32, s));
+    let sampling = meaning("sampling", "frz_sampling", sampling, &known)?;
     ctx.allow("the samples", (positions.len() as u64).saturating_mul(28))?;
     let mut values = Vec::new();
-    ctx.polled(|| match linear {
-        true => grid.sample_linear(ctx, positions, &mut values),
-        false => grid.sample_nearest(ctx, positions, &mut values),
+    ctx.polled(|| match sampling {
+        frz_sampling::FRZ_SAMPLE_NEAREST => grid.sample_nearest(ctx, positions, &mut values),
+        frz_sampling::FRZ_SAMPLE_LINEAR => grid.sample_linear(ctx, positions, &mut values),
     })?;
     Ok(values)
 }
@@ -120,13 +117,9 @@ pub unsafe extern "C" fn frz_grid_to_mesh(
 ) -> frz_status {
     /// Bytes of a leaf's part of a mesh, while it is made.
     const BYTES_PER_LEAF: u64 = 6000;
-    guard(|| {
-        // SAFETY: the pointers are NULL or the caller's.
-        unsafe {
-            clear(out);
-            let call = enter(context)?;
-            let ctx = call.ctx();
-            let out = required(out, "out")?;
+    // SAFETY: the pointers are NULL or the caller's.
+    unsafe {
+        creates(context, out, |ctx| {
             let held = read(grid)?;
             if !iso.is_finite() {
                 return Err(Failure::argument("iso is not finite"));
@@ -137,7 +130,7 @@ pub unsafe extern "C" fn frz_grid_to_mesh(
             let grid = held.get();
             ctx.allow("a mesh of the grid", grid.leaf_count() as u64 * BYTES_PER_LEAF)?;
             let mesh = ctx.stage("mesh", || level_set::to_mesh(ctx, grid, iso, adaptivity))?;
-            give(out, Mesh::of_triangles(mesh))
-        }
-    })
+            Ok(Mesh::of_triangles(mesh))
+        })
+    }
 }

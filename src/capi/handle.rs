@@ -57,14 +57,14 @@ pub(super) unsafe fn give<N: Noun>(out: *mut *mut N, value: N::Value) -> Outcome
     Ok(())
 }
 
-/// Zeroes an out-pointer, if it is there: so it is after every failure.
+/// Zeroes what a call tells besides its status, if it is asked for: so it is after every failure.
 ///
 /// # Safety
-/// As [`give`].
-pub(super) unsafe fn clear<T>(out: *mut *mut T) {
+/// `out` must be NULL or point to memory for a number or pointer.
+pub(super) unsafe fn clear<T>(out: *mut T) {
     if !out.is_null() {
-        // SAFETY: the caller's promise.
-        unsafe { out.write(std::ptr::null_mut()) };
+        // SAFETY: the caller's promise; all zeroes are 0 and NULL.
+        unsafe { out.write_bytes(0, 1) };
     }
 }
 

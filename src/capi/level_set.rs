@@ -1,13 +1,14 @@
 //! Level sets: made from meshes, particles and motion, and changed.
 
 use super::body::{Shapes, bodies, frz_body};
-use super::context::{enter, frz_context};
+use super::context::{creates, enter, frz_context};
 use super::grid::{Grid, check_voxel, frz_grid};
 use super::guard::{Failure, Outcome, frz_status, guard};
-use super::handle::{change, clear, give, read, required};
+use super::handle::{change, read, required};
 use super::mesh::frz_mesh;
-use super::views::frz_view;
+use super::views::{frz_view, meaning};
 use crate::base::DVec3;
+use crate::context::Context;
 use crate::error::Result;
 use crate::snow::base_layer::{self, NoiseParams};
 use crate::sweep::{self, Settings, surface_bytes};
@@ -86,13 +87,16 @@ fn settings(voxel: f64, half_width: f32) -> Outcome<Settings> {
     Ok(settings)
 }
 
-fn scheme(number: u32) -> Outcome<Scheme> {
-    match number {
-        0 => Ok(Scheme::FirstOrder),
-        1 => Ok(Scheme::Weno5),
-        other => Err(Failure::argument(format!("scheme = {other} is no frz_scheme"))),
-    }
+fn scheme_of(number: u32) -> Outcome<Scheme> {
+    let known = [
+        (frz_scheme::FRZ_SCHEME_FIRST_ORDER as u32, Scheme::FirstOrder),
+        (frz_scheme::FRZ_SCHEME_WENO5 as u32, Scheme::Weno5),
+    ];
+    meaning("scheme", "frz_scheme", number, &known)
 }
+
+type Join = fn(&Context, &FloatGrid, &FloatGrid) -> Result<FloatGrid>;
+type Filter = fn(&Context, &mut FloatGrid, u32, u32, Scheme) -> Result<()>;
 
 /// Refuses what is no level set.
 fn level_set_of(grid: &FloatGrid) -> Outcome<&FloatGrid> {
@@ -100,6 +104,27 @@ fn level_set_of(grid: &FloatGrid) -> Outcome<&FloatGrid> {
         return Err(Failure::argument("the grid is no level set"));
     }
     Ok(grid)
+}
+
+/// A function of the interface that changes a level set of the caller.
+///
+/// # Safety
+/// The pointers must be NULL or those of handles that were not destroyed.
+unsafe fn changes(
+    context: *const frz_context,
+    inout: *mut frz_grid,
+    work: impl FnOnce(&Context, &mut FloatGrid) -> Outcome,
+) -> frz_status {
+    guard(|| {
+        // SAFETY: the caller's promise.
+        unsafe {
+            let call = enter(context)?;
+            let mut held = change(inout)?;
+            let grid = held.own()?;
+            level_set_of(grid)?;
+            work(call.ctx(), grid)
+        }
+    })
 }
 
 /// Makes a level set of the solid that a mesh bounds: points that its faces wind around.
@@ -120,21 +145,17 @@ pub unsafe extern "C" fn frz_levelset_from_mesh(
     half_width: f32,
     out: *mut *mut frz_grid,
 ) -> frz_status {
-    guard(|| {
-        // SAFETY: the pointers are NULL or the caller's.
-        unsafe {
-            clear(out);
-            let call = enter(context)?;
-            let ctx = call.ctx();
-            let out = required(out, "out")?;
+    // SAFETY: the pointers are NULL or the caller's.
+    unsafe {
+        creates(context, out, |ctx| {
             let mesh = read(mesh)?;
             let settings = settings(voxel_size, half_width)?;
             ctx.allow("a level set of the mesh", surface_bytes(mesh.triangles.area(), voxel_size))?;
             let solid = mesh.triangles.clone();
             let grid = ctx.polled(|| sweep::voxelise(ctx, solid, &settings))?;
-            give(out, Grid::Own(grid))
-        }
-    })
+            Ok(Grid::Own(grid))
+        })
+    }
 }
 
 /// Makes a level set of the union of spheres.
@@ -156,13 +177,9 @@ pub unsafe extern "C" fn frz_levelset_from_particles(
     half_width: f32,
     out: *mut *mut frz_grid,
 ) -> frz_status {
-    guard(|| {
-        // SAFETY: the pointers are NULL or the caller's.
-        unsafe {
-            clear(out);
-            let call = enter(context)?;
-            let ctx = call.ctx();
-            let out = required(out, "out")?;
+    // SAFETY: the pointers are NULL or the caller's.
+    unsafe {
+        creates(context, out, |ctx| {
             let settings = settings(voxel_size, half_width)?;
             let positions = positions.finite("positions")?;
             let radii = radii.elements::<f32>("radii")?;
@@ -180,9 +197,9 @@ pub unsafe extern "C" fn frz_levelset_from_particles(
             let grid = ctx.stage("spheres", || {
                 level_set::from_particles(ctx, &positions, &radii, voxel_size, settings.half_width)
             })?;
-            give(out, Grid::Own(grid))
-        }
-    })
+            Ok(Grid::Own(grid))
+        })
+    }
 }
 
 /// Refuses positions whose voxels have no number.
@@ -208,29 +225,24 @@ pub unsafe extern "C" fn frz_levelset_csg(
     inout: *mut frz_grid,
     other: *const frz_grid,
 ) -> frz_status {
-    guard(|| {
-        // SAFETY: the pointers are NULL or the caller's.
-        unsafe {
-            let call = enter(context)?;
-            let ctx = call.ctx();
-            let mut held = change(inout)?;
-            let first = held.own()?;
-            level_set_of(first)?;
+    // SAFETY: the pointers are NULL or the caller's.
+    unsafe {
+        changes(context, inout, |ctx, first| {
             let other = read(other)?;
             let second = level_set_of(other.get())?;
             ctx.allow("the joined level sets", first.memory_bytes().saturating_add(second.memory_bytes()))?;
-            let tool: fn(&crate::Context, &FloatGrid, &FloatGrid) -> Result<FloatGrid> = match operation {
-                0 => level_set::union_copy,
-                1 => level_set::difference_copy,
-                2 => level_set::intersection_copy,
-                other => return Err(Failure::argument(format!("operation = {other} is no frz_csg"))),
-            };
+            let known: [(u32, Join); 3] = [
+                (frz_csg::FRZ_CSG_UNION as u32, level_set::union_copy),
+                (frz_csg::FRZ_CSG_DIFFERENCE as u32, level_set::difference_copy),
+                (frz_csg::FRZ_CSG_INTERSECTION as u32, level_set::intersection_copy),
+            ];
+            let tool = meaning("operation", "frz_csg", operation, &known)?;
             let mut joined = ctx.stage("csg", || tool(ctx, first, second))?;
             joined.set_name(&first.name())?;
             *first = joined;
             Ok(())
-        }
-    })
+        })
+    }
 }
 
 /// Moves the surface of a level set along its normals.
@@ -247,23 +259,18 @@ pub unsafe extern "C" fn frz_levelset_offset(
     distance: f32,
     scheme: u32,
 ) -> frz_status {
-    guard(|| {
-        // SAFETY: the pointers are NULL or the caller's.
-        unsafe {
-            let call = enter(context)?;
-            let ctx = call.ctx();
-            let mut held = change(inout)?;
-            let grid = held.own()?;
-            level_set_of(grid)?;
-            let scheme = self::scheme(scheme)?;
+    // SAFETY: the pointers are NULL or the caller's.
+    unsafe {
+        changes(context, inout, |ctx, grid| {
+            let scheme = scheme_of(scheme)?;
             let voxels = f64::from(distance) / grid.voxel_size();
             if !(-1000.0..=1000.0).contains(&voxels) {
                 return Err(Failure::argument(format!("distance = {distance} m is more than 1000 voxels")));
             }
             ctx.allow("the moved level set", grown_bytes(grid, voxels))?;
             Ok(ctx.stage("offset", || level_set::offset(ctx, grid, distance, scheme))?)
-        }
-    })
+        })
+    }
 }
 
 /// Memory (bytes) of a level set whose surface moved outward by some voxels: that of the box around it, at most.
@@ -292,29 +299,24 @@ pub unsafe extern "C" fn frz_levelset_smooth(
     times: u32,
     scheme: u32,
 ) -> frz_status {
-    guard(|| {
-        // SAFETY: the pointers are NULL or the caller's.
-        unsafe {
-            let call = enter(context)?;
-            let ctx = call.ctx();
-            let mut held = change(inout)?;
-            let grid = held.own()?;
-            level_set_of(grid)?;
-            let scheme = self::scheme(scheme)?;
+    // SAFETY: the pointers are NULL or the caller's.
+    unsafe {
+        changes(context, inout, |ctx, grid| {
+            let scheme = scheme_of(scheme)?;
             for (name, value, most) in [("width", width, 32), ("times", times, 1000)] {
                 if !(1..=most).contains(&value) {
                     return Err(Failure::argument(format!("{name} = {value} is not within 1 to {most}")));
                 }
             }
             ctx.allow("the smoothed level set", grid.memory_bytes())?;
-            let filter = match smoothing {
-                0 => level_set::mean_filter,
-                1 => level_set::gaussian_filter,
-                other => return Err(Failure::argument(format!("smoothing = {other} is no frz_smoothing"))),
-            };
+            let known: [(u32, Filter); 2] = [
+                (frz_smoothing::FRZ_SMOOTH_MEAN as u32, level_set::mean_filter),
+                (frz_smoothing::FRZ_SMOOTH_GAUSSIAN as u32, level_set::gaussian_filter),
+            ];
+            let filter = meaning("smoothing", "frz_smoothing", smoothing, &known)?;
             Ok(ctx.stage("smooth", || filter(ctx, grid, width, times, scheme))?)
-        }
-    })
+        })
+    }
 }
 
 /// Moves the surface of a level set outward by noise.
@@ -329,14 +331,9 @@ pub unsafe extern "C" fn frz_levelset_displace(
     inout: *mut frz_grid,
     noise: *const frz_noise,
 ) -> frz_status {
-    guard(|| {
-        // SAFETY: the pointers are NULL or the caller's.
-        unsafe {
-            let call = enter(context)?;
-            let ctx = call.ctx();
-            let mut held = change(inout)?;
-            let grid = held.own()?;
-            level_set_of(grid)?;
+    // SAFETY: the pointers are NULL or the caller's.
+    unsafe {
+        changes(context, inout, |ctx, grid| {
             if !grid.is_world_fixed() {
                 return Err(Failure::argument(
                     "the grid's voxels are rotated or shifted against the world's axes",
@@ -347,8 +344,8 @@ pub unsafe extern "C" fn frz_levelset_displace(
             params.validate(grid.voxel_size())?;
             ctx.allow("the displaced level set", grid.memory_bytes().saturating_mul(4))?;
             Ok(ctx.polled(|| base_layer::displace(ctx, grid, &params))?)
-        }
-    })
+        })
+    }
 }
 
 /// Makes a level set of all the space that bodies pass through in a step.
@@ -372,17 +369,13 @@ pub unsafe extern "C" fn frz_levelset_sweep(
     half_width: f32,
     out: *mut *mut frz_grid,
 ) -> frz_status {
-    guard(|| {
-        // SAFETY: the pointers are NULL or the caller's.
-        unsafe {
-            clear(out);
-            let call = enter(context)?;
-            let ctx = call.ctx();
-            let out = required(out, "out")?;
+    // SAFETY: the pointers are NULL or the caller's.
+    unsafe {
+        creates(context, out, |ctx| {
             let settings = settings(voxel_size, half_width)?;
             let bodies = self::bodies(ctx, bodies, count, dt, &mut Shapes::new())?;
             let grid = ctx.polled(|| sweep::chain(ctx, &bodies, 0.0, dt, &settings))?;
-            give(out, Grid::Own(grid))
-        }
-    })
+            Ok(Grid::Own(grid))
+        })
+    }
 }

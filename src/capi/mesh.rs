@@ -2,10 +2,10 @@
 
 use std::ffi::c_char;
 
-use super::context::{enter, frz_context};
+use super::context::{creates, frz_context};
 use super::guard::{Failure, Outcome, frz_status, guard};
-use super::handle::{Noun, clear, destroy, give, read, required};
-use super::views::{Plain, Sized32, fill, frz_span, frz_view, sized, text};
+use super::handle::{Noun, destroy, read};
+use super::views::{Plain, Sized32, fill, frz_span, frz_view, meaning, sized, text};
 use crate::base::{PolygonMesh, TriMesh, Vec3};
 use crate::context::Context;
 
@@ -217,13 +217,9 @@ pub unsafe extern "C" fn frz_mesh_create(
     desc: *const frz_mesh_desc,
     out: *mut *mut frz_mesh,
 ) -> frz_status {
-    guard(|| {
-        // SAFETY: the pointers are NULL or the caller's.
-        unsafe {
-            clear(out);
-            let call = enter(context)?;
-            let ctx = call.ctx();
-            let out = required(out, "out")?;
+    // SAFETY: the pointers are NULL or the caller's.
+    unsafe {
+        creates(context, out, |ctx| {
             let none = frz_view::NONE;
             let defaults = frz_mesh_desc {
                 struct_size: 0,
@@ -240,9 +236,9 @@ pub unsafe extern "C" fn frz_mesh_create(
             let bytes = (polygons.positions.len() + polygons.corners.len()) as u64 * 28;
             ctx.allow("a mesh", bytes)?;
             let attributes = attributes(&desc, polygons.positions.len())?;
-            give(out, made(ctx, polygons, attributes)?)
-        }
-    })
+            made(ctx, polygons, attributes)
+        })
+    }
 }
 
 fn made(ctx: &Context, polygons: PolygonMesh, attributes: Vec<Attribute>) -> Outcome<Mesh> {
@@ -346,26 +342,24 @@ pub unsafe extern "C" fn frz_mesh_get_info(mesh: *const frz_mesh, info: *mut frz
 /// Any number of threads may read a mesh.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn frz_mesh_read(mesh: *const frz_mesh, part: u32, dst: frz_span) -> frz_status {
+    use frz_mesh_part::*;
     guard(|| {
         // SAFETY: the pointers are NULL or the caller's.
         unsafe {
             let mesh = read(mesh)?;
-            match part {
-                part if part == frz_mesh_part::FRZ_MESH_POSITIONS as u32 => {
+            let known = [FRZ_MESH_POSITIONS, FRZ_MESH_FACE_COUNTS, FRZ_MESH_INDICES, FRZ_MESH_TRIANGLES]
+                .map(|part| (part as u32, part));
+            match meaning("part", "frz_mesh_part", part, &known)? {
+                FRZ_MESH_POSITIONS => {
                     let positions = &mesh.polygons.positions;
                     dst.fill("dst", &positions.iter().map(|p| [p.x, p.y, p.z]).collect::<Vec<_>>())
                 }
-                part if part == frz_mesh_part::FRZ_MESH_FACE_COUNTS as u32 => {
+                FRZ_MESH_FACE_COUNTS => {
                     let counts: Vec<u32> = mesh.polygons.polygons().map(|face| face.len() as u32).collect();
                     dst.fill("dst", &counts)
                 }
-                part if part == frz_mesh_part::FRZ_MESH_INDICES as u32 => {
-                    dst.fill("dst", &mesh.polygons.corners)
-                }
-                part if part == frz_mesh_part::FRZ_MESH_TRIANGLES as u32 => {
-                    dst.fill("dst", &mesh.triangles.triangles)
-                }
-                other => Err(Failure::argument(format!("part = {other} is no frz_mesh_part"))),
+                FRZ_MESH_INDICES => dst.fill("dst", &mesh.polygons.corners),
+                FRZ_MESH_TRIANGLES => dst.fill("dst", &mesh.triangles.triangles),
             }
         }
     })

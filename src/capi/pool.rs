@@ -63,7 +63,7 @@ pub unsafe extern "C" fn frz_pool_create(threads: u32, out: *mut *mut frz_pool) 
         // SAFETY: `out` is NULL or the caller's.
         unsafe {
             clear(out);
-            let out = super::handle::required(out, "out")?;
+            super::handle::required(out, "out")?;
             give(out, Threads::start(threads)?)
         }
     })

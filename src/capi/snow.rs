@@ -1,9 +1,9 @@
 //! Snow before anything moves.
 
-use super::context::{enter, frz_context};
+use super::context::{creates, frz_context};
 use super::grid::{Grid, check_voxel, frz_grid};
 use super::guard::{Failure, Outcome, frz_status, guard};
-use super::handle::{Reading, clear, give, read, required};
+use super::handle::{Reading, read};
 use super::mesh::{Mesh, frz_mesh, no_flags};
 use super::views::{Plain, Sized32, fill, frz_view, sized};
 use crate::base::TriMesh;
@@ -91,13 +91,9 @@ pub unsafe extern "C" fn frz_snow_layer(
     desc: *const frz_snow_desc,
     out: *mut *mut frz_grid,
 ) -> frz_status {
-    guard(|| {
-        // SAFETY: the pointers are NULL or the caller's.
-        unsafe {
-            clear(out);
-            let call = enter(context)?;
-            let ctx = call.ctx();
-            let out = required(out, "out")?;
+    // SAFETY: the pointers are NULL or the caller's.
+    unsafe {
+        creates(context, out, |ctx| {
             let desc = sized(desc, frz_snow_desc::USUAL)?;
             no_flags(desc.flags, 0)?;
             check_voxel(desc.voxel_size)?;
@@ -126,11 +122,10 @@ pub unsafe extern "C" fn frz_snow_layer(
                 ctx.allow("the layer of snow", surface_bytes(area, desc.voxel_size))?;
             }
             let half_width = desc.half_width as f32;
-            let grid =
-                call.ctx().polled(|| layer(ctx, &ground, &statics, &cover, desc.voxel_size, half_width))?;
-            give(out, Grid::Own(grid))
-        }
-    })
+            let grid = ctx.polled(|| layer(ctx, &ground, &statics, &cover, desc.voxel_size, half_width))?;
+            Ok(Grid::Own(grid))
+        })
+    }
 }
 
 /// Surface (m2) of the layer: its bottom and its top.

@@ -165,6 +165,14 @@ pub(super) unsafe fn write_bytes(
     Ok(())
 }
 
+/// What a number of a host's enum means.
+pub(super) fn meaning<T: Copy>(name: &str, kind: &str, number: u32, known: &[(u32, T)]) -> Outcome<T> {
+    let found = known.iter().find(|(known, _)| *known == number);
+    found
+        .map(|(_, meaning)| *meaning)
+        .ok_or_else(|| Failure::argument(format!("{name} = {number} is no {kind}")))
+}
+
 /// A text of the host; none for NULL.
 ///
 /// # Safety

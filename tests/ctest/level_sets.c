@@ -108,6 +108,9 @@ int main(void) {
         frz_grid_destroy(b);
         between[0].count = 5;
         FAILS(frz_levelset_sweep(ctx, &body, 1, 1.0, 0.01, 3.0f, &b), FRZ_ERROR_ARGUMENT, "body 0: between: 5 elements");
+        body.positions_end.data = NULL, body.positions_end.count = 0;
+        FAILS(frz_levelset_sweep(ctx, &body, 1, 1.0, 0.01, 3.0f, &b), FRZ_ERROR_ARGUMENT,
+              "body 0: between: there are poses, but no positions_end");
     }
     body = ball_body(&moved, 1);
     WORKS(frz_levelset_sweep(ctx, &body, 1, 0.0, 0.01, 3.0f, &b));
