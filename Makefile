@@ -49,9 +49,10 @@ install: setup
 	cargo build --release --lib --bin frazil
 	./tools/install "$(DESTDIR)$(PREFIX)"
 
-# Programs of hosts in C and C++, built against an installed library.
+# Programs of hosts in C and C++, built against an installed library. With the examples packages have the features
+# that the tests build them with: nothing is built twice.
 hosts: setup
-	cargo build --release --lib --bin frazil
+	cargo build --release --lib --bin frazil --examples
 	./tools/install "$(CURDIR)/target/install"
 	cmake -S tests/ctest -B target/ctest -DCMAKE_PREFIX_PATH="$(CURDIR)/target/install" >/dev/null
 	cmake --build target/ctest --parallel $(shell nproc) >/dev/null

@@ -35,7 +35,7 @@ impl Default for Heights {
 impl Heights {
     /// Adds a block's snow.
     pub fn add(&mut self, values: &Values, cell: f32) {
-        values.iter().enumerate().for_each(|(index, value)| self.0[cell_of(index)] += filled(*value, cell));
+        add_by_cell(&mut self.0, |index| filled(values[index], cell));
     }
 
     /// Adds a block that is all snow or none.
@@ -70,6 +70,16 @@ pub type Columns = HashMap<[i32; 2], Column>;
 /// Part of a cell that a level set's solid fills, from the distance at its centre (both in metres).
 pub fn filled(distance: f32, cell: f32) -> f32 {
     (0.5 - distance / cell).clamp(0.0, 1.0)
+}
+
+/// Adds a number of each voxel of a block to its column's sum, upwards.
+pub fn add_by_cell(sums: &mut [f32; CELLS], number: impl Fn(usize) -> f32) {
+    // Eight columns side by side, as the values lie in memory.
+    for (x, sums) in sums.chunks_exact_mut(8).enumerate() {
+        for y in 0..8 {
+            sums.iter_mut().enumerate().for_each(|(z, sum)| *sum += number(x << 6 | y << 3 | z));
+        }
+    }
 }
 
 /// Cell of the column block that voxel `index` of a block stands in.

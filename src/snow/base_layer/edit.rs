@@ -3,7 +3,7 @@
 //! The intersection is taken before the subtraction: base(t) minus base(t + dt) would leave a ghost
 //! surface of no thickness wherever nothing moved.
 
-use super::columns::{CELLS, cell_of, filled};
+use super::columns::{CELLS, add_by_cell, filled};
 use crate::base::blocks::{Block, BlockEdit, Mask, Origin, VOXELS, Values};
 use crate::sweep::Piece;
 use crate::vdb::Probe;
@@ -66,7 +66,7 @@ fn remove_all(origin: Origin, before: &Values, mask: Mask, snow: &Probe<'_>, sca
         Probe::Tile { .. } => BlockEdit::Constant(origin, -scale.background),
     };
     let mut heights = [0.0; CELLS];
-    (0..VOXELS).for_each(|index| heights[cell_of(index)] += filled(before[index], scale.cell));
+    add_by_cell(&mut heights, |index| filled(before[index], scale.cell));
     Edit {
         surface: BlockEdit::Constant(origin, scale.background),
         removed: Some(removed),
@@ -87,11 +87,11 @@ fn remove_part(origin: Origin, before: &Values, cells: &Values, scale: Scale) ->
         after[index] = left;
         removed[index] = taken.clamp(-scale.background, scale.background);
         changed[index >> 6] |= u64::from(left != snow) << (index & 63);
-        heights[cell_of(index)] += filled(snow, scale.cell) - filled(left, scale.cell);
     }
     if changed == [0; 8] {
         return None;
     }
+    add_by_cell(&mut heights, |index| filled(before[index], scale.cell) - filled(after[index], scale.cell));
     let removed = pack(origin, removed, scale);
     let outside = matches!(removed, BlockEdit::Constant(_, value) if value > 0.0);
     Some(Edit {

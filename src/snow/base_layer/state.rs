@@ -8,7 +8,7 @@ use rayon::prelude::*;
 use xxhash_rust::xxh3::{Xxh3, xxh3_64, xxh3_128};
 
 use super::{BaseLayer, Changes, Params};
-use crate::base::blocks::{Block, BlockEdit, Mask, Origin, VOXELS};
+use crate::base::blocks::{Block, BlockEdit, Mask, Origin, VOXELS, Values};
 use crate::context::Context;
 use crate::error::{Error, Result};
 use crate::vdb::{FloatGrid, Leaf, Probe};
@@ -192,7 +192,7 @@ fn write_group(origins: &[Origin], surface: &[Probe<'_>], touched: &[Probe<'_>],
         let marked = matches!(touched, Probe::Leaf(_));
         let kind = match surface {
             Probe::Tile { .. } => CONSTANT,
-            Probe::Leaf(leaf) if outside_band(leaf).all(|value| value.abs() == background) => BAND,
+            Probe::Leaf(leaf) if is_band(leaf, background) => BAND,
             Probe::Leaf(_) => WHOLE,
         };
         head.extend(origin.iter().flat_map(|index| index.to_le_bytes()));
@@ -231,8 +231,12 @@ fn negative(leaf: &Leaf<'_>, x: usize, at: usize) -> u64 {
     u64::from(leaf.mask[x] >> at & 1 == 0 && leaf.values[x << 6 | at] < 0.0) << at
 }
 
-fn outside_band<'a>(leaf: &'a Leaf<'_>) -> impl Iterator<Item = f32> + 'a {
-    (0..VOXELS).filter(|index| leaf.mask[index >> 6] >> (index & 63) & 1 == 0).map(|index| leaf.values[index])
+/// Whether all inactive values are the background, with a sign.
+fn is_band(leaf: &Leaf<'_>, background: f32) -> bool {
+    leaf.mask.iter().zip(leaf.values.chunks_exact(64)).all(|(&word, values)| {
+        let other = |at: usize| u64::from(values[at].abs() != background) << at;
+        (0..64).fold(0, |others, at| others | other(at)) & !word == 0
+    })
 }
 
 /// Indices of the voxels that a mask has, ascending.
@@ -277,20 +281,20 @@ fn read_group(
     }
     let values = reader.numbers(value_count)?;
     let frames = reader.numbers(frame_count)?;
-    let (mut values, mut frames) = (values.into_iter(), frames.into_iter());
+    let (mut values, mut frames) = (values.as_slice(), frames.as_slice());
     let (mut surface, mut touched) = (Vec::with_capacity(blocks), Vec::with_capacity(blocks));
     for (&(origin, kind), [mask, signs, marked]) in heads.iter().zip(all_masks) {
         surface.push(match kind & !TOUCHED {
-            CONSTANT => BlockEdit::Constant(origin, values.next()?),
+            CONSTANT => BlockEdit::Constant(origin, values.split_off_first().copied()?),
             BAND => {
                 let sign = |index: usize| signs[index >> 6] >> (index & 63) & 1 == 1;
                 let mut all =
                     Box::new(std::array::from_fn(|index| if sign(index) { -background } else { background }));
-                active(&mask).zip(&mut values).for_each(|(index, value)| all[index] = value);
+                put(&mut all, &mask, &mut values);
                 BlockEdit::Dense(Block { origin, values: all, mask })
             }
             _ => {
-                let all = Box::new(std::array::from_fn(|_| values.next().unwrap_or(0.0)));
+                let all = Box::new(*values.split_off(..VOXELS)?.first_chunk()?);
                 BlockEdit::Dense(Block { origin, values: all, mask })
             }
         });
@@ -298,11 +302,22 @@ fn read_group(
             BlockEdit::Constant(origin, 0.0)
         } else {
             let mut all = Box::new([0.0; VOXELS]);
-            active(&marked).zip(&mut frames).for_each(|(index, frame)| all[index] = frame);
+            put(&mut all, &marked, &mut frames);
             BlockEdit::Dense(Block { origin, values: all, mask: marked })
         });
     }
     reader.0.is_empty().then_some((surface, touched))
+}
+
+/// Puts as many numbers from the front of `numbers` as the mask has voxels, there.
+fn put(values: &mut Values, mask: &Mask, numbers: &mut &[f32]) {
+    let (taken, rest) = numbers.split_at(count(mask));
+    let mut at = 0;
+    active(mask).for_each(|index| {
+        values[index] = taken[at];
+        at += 1;
+    });
+    *numbers = rest;
 }
 
 fn count(mask: &Mask) -> usize {
@@ -330,10 +345,8 @@ impl<'a> Reader<'a> {
 
     /// Numbers whose bytes are sorted by significance, the highest first.
     fn numbers(&mut self, count: usize) -> Option<Vec<f32>> {
-        let bytes = self.take(count.checked_mul(4)?)?;
-        let number =
-            |index: usize| f32::from_le_bytes([3, 2, 1, 0].map(|byte: usize| bytes[byte * count + index]));
-        Some((0..count).map(number).collect())
+        let [a, b, c, d] = [self.take(count)?, self.take(count)?, self.take(count)?, self.take(count)?];
+        Some((0..count).map(|index| f32::from_be_bytes([a[index], b[index], c[index], d[index]])).collect())
     }
 }
 
