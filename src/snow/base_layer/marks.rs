@@ -113,9 +113,11 @@ fn masked(origin: Origin, mut values: Box<Values>, mask: Mask) -> BlockEdit {
     if mask == [0; 8] {
         return BlockEdit::Constant(origin, 0.0);
     }
-    for (index, value) in values.iter_mut().enumerate() {
-        if mask[index >> 6] >> (index & 63) & 1 == 0 {
-            *value = 0.0;
+    for (word, values) in mask.iter().zip(values.chunks_exact_mut(64)) {
+        let mut inactive = !word;
+        while inactive != 0 {
+            values[inactive.trailing_zeros() as usize] = 0.0;
+            inactive &= inactive - 1;
         }
     }
     BlockEdit::Dense(Block { origin, values, mask })

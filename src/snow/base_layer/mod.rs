@@ -94,6 +94,11 @@ impl BaseLayer {
     /// # Errors
     /// When `surface` is no level set, holds nothing or is not world-fixed, or a parameter is out of range.
     pub fn new(ctx: &Context, surface: FloatGrid, params: Params) -> Result<Self> {
+        Self::with_volume(ctx, surface, params, None)
+    }
+
+    /// As [`BaseLayer::new`]; the volume (m3) may be known.
+    fn with_volume(ctx: &Context, surface: FloatGrid, params: Params, known: Option<f64>) -> Result<Self> {
         params.validate(&surface)?;
         if surface.class() != GridClass::LevelSet {
             return Err(Error::argument("the snow is not a level set"));
@@ -104,7 +109,8 @@ impl BaseLayer {
         let half_width = half_width(&surface);
         let (low, high) = surface.active_bbox().ok_or_else(|| Error::argument("the snow is empty"))?;
         let (volume, initial) = ctx.stage("measure", || {
-            Ok((columns::volume(&surface, low, high)?, state::fingerprint(&surface)?))
+            let volume = known.map_or_else(|| columns::volume(&surface, low, high), Ok)?;
+            Ok((volume, state::fingerprint(&surface)?))
         })?;
         let grids = Grids::new(surface, volume)?;
         let changes = Changes::none(&grids, half_width)?;

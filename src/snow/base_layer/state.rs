@@ -71,14 +71,16 @@ impl BaseLayer {
     /// # Errors
     /// As [`BaseLayer::new`]; bytes that are damaged, of another version, or of another initial layer.
     pub fn restore(ctx: &Context, initial: FloatGrid, params: Params, state: &[u8]) -> Result<Self> {
-        let mut layer = Self::new(ctx, initial, params)?;
+        // Bytes that are too few for it are refused below.
+        let volume = state.get(44..52).map(|bytes| f64::from_le_bytes(array(bytes)));
+        let mut layer = Self::with_volume(ctx, initial, params, volume)?;
         let (surface, touched) = ctx.stage("unpack", || layer.unpack(ctx, state))?;
         let columns = ctx.stage("columns", || layer.new_columns(surface.iter().map(BlockEdit::origin)))?;
         let surfaces: Vec<&BlockEdit> = surface.iter().collect();
         let compression =
             ctx.stage("compression", || layer.compression_edits(ctx, &columns, &surfaces, &touched))?;
         let removed = super::empty_removed(layer.surface().voxel_size(), layer.half_width)?;
-        let volume = f64::from_le_bytes(array(&state[44..52]));
+        let volume = layer.changes.volume;
         layer.commit(ctx, Changes { surface, touched, compression, removed, volume }, columns)?;
         // Nothing has changed since this state.
         layer.take_changes()?;
