@@ -4,7 +4,7 @@ use rayon::prelude::*;
 
 use super::chain::Face;
 use super::lattice::{Fixed, UNITS};
-use super::prism::{Crossing, Prism};
+use super::prism::{Bundle, Prism};
 use super::region::{Region, each_block, extent};
 use super::winding::Lines;
 
@@ -15,8 +15,6 @@ pub type Point = [f64; 3];
 const GRAIN: usize = 1024;
 /// A block with at most this many faces is one cell.
 const FEW: usize = 8;
-/// How far apart two points may be whose winding numbers are told together (cells).
-pub const BESIDE: f32 = 0.02;
 /// No slot.
 const NONE: u32 = u32::MAX;
 /// Where a voxel is taken to be, off its centre (units): down, far less to the right, and least of all forward, as
@@ -116,9 +114,9 @@ impl Cells {
         (slot != NONE).then(|| &self.blocks[slot as usize])
     }
 
-    /// Winding numbers of the chain at a point and at another at most [`BESIDE`] cells away (fixed-point units): the
-    /// nearest voxel's, and the faces between.
-    pub fn windings(&self, point: Point, beside: Point) -> [i32; 2] {
+    /// Winding numbers of the chain at a point and at another at most [`super::prism::BESIDE`] cells away
+    /// (fixed-point units): the nearest voxel's, and the faces between.
+    pub fn windings(&self, point: Point, beside: Point, bundle: &mut Bundle) -> [i32; 2] {
         let voxel = voxel_of(point);
         let mut winding = self.lines.winding(voxel);
         let Some(block) = self.block_of(voxel) else { return [winding; 2] };
@@ -126,25 +124,18 @@ impl Cells {
         let local = |p: Point| {
             [0, 1, 2].map(|axis| begin[axis] + (p[axis] / f64::from(UNITS) - f64::from(voxel[axis])) as f32)
         };
-        let (end, beside) = (local(point), local(beside));
-        let mut change = 0;
-        for &place in block.cells.get(block.cell(voxel)) {
-            let prism = &block.prisms[place as usize];
-            let coef = || self.faces[block.ids[place as usize] as usize].coef;
-            let (crossing, height) = prism.crossing(begin, end);
-            match crossing {
-                Crossing::None => {}
-                Crossing::Outward => winding -= coef(),
-                Crossing::Inward => winding += coef(),
-                Crossing::Unclear => {
-                    winding += coef() * self.exact_crossing(block.ids[place as usize] as usize, voxel, point);
-                }
-            }
-            if height.abs() <= BESIDE {
-                change += prism.short_crossing(end, beside) * coef();
-            }
+        let cell = block.cell(voxel);
+        let prism = |&place: &u32| {
+            let id = block.ids[place as usize];
+            (block.prisms[place as usize], id, self.faces[id as usize].coef)
+        };
+        bundle.take(block.first + cell, block.cells.get(cell).iter().map(prism));
+        let change = bundle.ask(begin, local(point), local(beside));
+        winding += change.along;
+        for (id, coef) in bundle.unclear() {
+            winding += coef * self.exact_crossing(id as usize, voxel, point);
         }
-        [winding, winding + change]
+        [winding, winding + change.beside]
     }
 
     /// 1 when the way from a voxel to a point enters the chain through a face, -1 when it leaves it, else 0.

@@ -2,6 +2,7 @@
 //! sub-blocks leave few triangles for the exact distances.
 
 use super::distance::{LANES, Offsets, Points, Triangle, near_lanes, nearest, prune, to_each};
+use super::prism::Bundle;
 use crate::base::blocks::{Mask, offset};
 
 /// Working memory of one thread.
@@ -12,6 +13,8 @@ pub struct Scratch {
     /// For each triangle the sub-blocks in which it can be nearest to a voxel, a bit each.
     lanes: [Vec<u8>; 2],
     centre: Vec<[f32; 4]>,
+    /// What [`super::voxelise`] asks whether points bound the volume with.
+    pub bundle: Bundle,
 }
 
 /// Half diagonals between the voxel centres of a 4^3 and of a 2^3 sub-block, with room for rounding.
@@ -48,7 +51,7 @@ pub fn search(
     scratch: &mut Scratch,
     mut see: impl FnMut(&Group<'_>),
 ) {
-    let Scratch { lists: [all, some, near, few], offsets: [far, mid], lanes, centre } = scratch;
+    let Scratch { lists: [all, some, near, few], offsets: [far, mid], lanes, centre, .. } = scratch;
     all.clear();
     all.extend(0..triangles.len() as u32);
     to_each(triangles, all, &points([0.0; 3], 4.0, 1.5), far);

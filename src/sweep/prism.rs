@@ -1,16 +1,22 @@
-//! The unbounded prism over a triangle: four linear functions that tell where a segment passes the triangle.
+//! The unbounded prism over a triangle: four linear functions that tell where a segment passes the triangle. The
+//! prisms of a cell are asked eight at a time.
 
 use super::cells::{Point, cross, difference, dot, sub};
 use super::lattice::{Fixed, UNITS};
+use crate::base::cpu::dispatch;
+
+/// Prisms asked at once.
+const LANES: usize = 8;
+/// Nearer than this (cells), sides are told in 64 bits.
+const CLEAR: f32 = 1e-3;
+/// How far apart two points may be whose winding numbers are told together (cells).
+pub const BESIDE: f32 = 0.02;
 
 /// Height over the triangle's plane, then for each edge how far inward of it (cells), as linear functions of a
 /// position: `f[0] * p.x + f[1] * p.y + f[2] * p.z + f[3]`. One line of cache.
 #[repr(align(64))]
 #[derive(Debug, Clone, Copy)]
-pub struct Prism {
-    plane: [f32; 4],
-    edges: [[f32; 4]; 3],
-}
+pub struct Prism([[f32; 4]; 4]);
 
 impl Prism {
     /// The prism of a triangle with this normal (of any length), for positions in cells from a voxel.
@@ -23,58 +29,143 @@ impl Prism {
             [unit[0], unit[1], unit[2], constant].map(|value| value as f32)
         };
         let edge = |i: usize| along(cross(*normal, difference(&v[(i + 1) % 3], &v[i])), &v[i]);
-        Self { plane: along(*normal, &v[0]), edges: [edge(0), edge(1), edge(2)] }
+        Self([along(*normal, &v[0]), edge(0), edge(1), edge(2)])
     }
+}
 
-    /// How a segment between two positions (cells) passes the triangle, and the height of its end over the plane.
-    #[inline]
-    pub fn crossing(&self, begin: [f32; 3], end: [f32; 3]) -> (Crossing, f32) {
-        let (first, last) = (value(&self.plane, begin), value(&self.plane, end));
-        if (first > CLEAR) & (last > 0.0) | (first < -CLEAR) & (last < 0.0) {
-            return (Crossing::None, last);
+/// The prisms of one cell side by side, as one thread asks them: those of the cell that it asked last.
+#[derive(Default)]
+pub struct Bundle {
+    cell: Option<usize>,
+    groups: Vec<Group>,
+    /// Each one's face, lane after lane.
+    faces: Vec<u32>,
+    unclear: Vec<u32>,
+}
+
+/// Eight prisms.
+struct Group {
+    /// The four numbers of the plane's function, then of each edge's.
+    functions: [[f32; LANES]; 16],
+    /// How many layers of the chain end at each face; 0 where there is none.
+    coef: [i32; LANES],
+}
+
+/// How winding numbers change along a way.
+pub struct Change {
+    /// From its begin to its end, as far as 32 bits tell.
+    pub along: i32,
+    /// From its end to the point beside it.
+    pub beside: i32,
+}
+
+impl Bundle {
+    /// Takes the prisms of a cell, each with its face's number and coefficient, unless it has them.
+    pub fn take(&mut self, cell: usize, prisms: impl Iterator<Item = (Prism, u32, i32)>) {
+        if self.cell == Some(cell) {
+            return;
         }
-        let t = first / (first - last);
-        let at = [0, 1, 2].map(|axis| begin[axis] + t * (end[axis] - begin[axis]));
-        let [a, b, c] = [0, 1, 2].map(|i| value(&self.edges[i], at));
-        let least = a.min(b).min(c);
-        let crossing = match first {
-            _ if least < -CLEAR && first.abs() > CLEAR => Crossing::None,
-            height if height > CLEAR && least > CLEAR => Crossing::Inward,
-            height if height < -CLEAR && least > CLEAR => Crossing::Outward,
-            _ => Crossing::Unclear,
-        };
-        (crossing, last)
-    }
-
-    /// 1 when a segment too short for doubt enters through the triangle's front, -1 when it leaves, else 0.
-    #[inline]
-    pub fn short_crossing(&self, begin: [f32; 3], end: [f32; 3]) -> i32 {
-        let (first, last) = (value(&self.plane, begin), value(&self.plane, end));
-        if (first > 0.0) == (last > 0.0) || !self.edges.iter().all(|edge| value(edge, end) > 0.0) {
-            return 0;
+        self.cell = Some(cell);
+        self.groups.clear();
+        self.faces.clear();
+        for (Prism(functions), face, coef) in prisms {
+            let lane = self.faces.len() % LANES;
+            if lane == 0 {
+                // What no face is in is far in front of a plane.
+                let mut none = [[0.0; LANES]; 16];
+                none[3] = [1e9; LANES];
+                self.groups.push(Group { functions: none, coef: [0; LANES] });
+            }
+            let group = self.groups.last_mut().expect("one was pushed");
+            group.functions.iter_mut().zip(functions.as_flattened()).for_each(|(to, from)| to[lane] = *from);
+            group.coef[lane] = coef;
+            self.faces.push(face);
         }
-        if first > 0.0 { 1 } else { -1 }
+    }
+
+    /// How winding numbers change from `begin` to `end` and from there to `beside`, at most [`BESIDE`] away.
+    pub fn ask(&mut self, begin: [f32; 3], end: [f32; 3], beside: [f32; 3]) -> Change {
+        self.unclear.clear();
+        let [along, beside] = pass(&self.groups, begin, end, beside, &mut self.unclear);
+        Change { along, beside }
+    }
+
+    /// The faces, and their coefficients, that the way of the last question begins too near to the plane of, or
+    /// passes too near to an edge of, to tell in 32 bits.
+    pub fn unclear(&self) -> impl Iterator<Item = (u32, i32)> {
+        self.unclear.iter().map(|&at| {
+            let at = at as usize;
+            (self.faces[at], self.groups[at / LANES].coef[at % LANES])
+        })
     }
 }
 
-/// A linear function at a position.
-#[inline(always)]
-fn value(f: &[f32; 4], p: [f32; 3]) -> f32 {
-    f[0] * p[0] + f[1] * p[1] + f[2] * p[2] + f[3]
+/// Sums what the prisms say of the two ways, and lists those that are not clear about the first.
+fn pass(
+    groups: &[Group],
+    begin: [f32; 3],
+    end: [f32; 3],
+    beside: [f32; 3],
+    unclear: &mut Vec<u32>,
+) -> [i32; 2] {
+    #[inline(always)]
+    fn value(f: &[[f32; LANES]; 16], function: usize, lane: usize, p: [f32; 3]) -> f32 {
+        let k = 4 * function;
+        f[k][lane] * p[0] + f[k + 1][lane] * p[1] + f[k + 2][lane] * p[2] + f[k + 3][lane]
+    }
+    #[inline(always)]
+    fn least_inward(f: &[[f32; LANES]; 16], lane: usize, p: [f32; 3]) -> f32 {
+        let (a, b, c) = (value(f, 1, lane, p), value(f, 2, lane, p), value(f, 3, lane, p));
+        let least = if a < b { a } else { b };
+        if c < least { c } else { least }
+    }
+    #[inline(always)]
+    fn body(
+        groups: &[Group],
+        begin: [f32; 3],
+        end: [f32; 3],
+        beside: [f32; 3],
+        unclear: &mut Vec<u32>,
+    ) -> [i32; 2] {
+        let (mut along, mut aside) = ([0; LANES], [0; LANES]);
+        for at in 0..groups.len() {
+            let Group { functions: f, coef } = &groups[at];
+            let mut doubts = [0; LANES];
+            for lane in 0..LANES {
+                let (first, last) = (value(f, 0, lane, begin), value(f, 0, lane, end));
+                let after = value(f, 0, lane, beside);
+                let t = first / (first - last);
+                let meeting = [
+                    begin[0] + t * (end[0] - begin[0]),
+                    begin[1] + t * (end[1] - begin[1]),
+                    begin[2] + t * (end[2] - begin[2]),
+                ];
+                let least = least_inward(f, lane, meeting);
+                let sure = (first > CLEAR) | (first < -CLEAR);
+                let same_side = (first > 0.0) & (last > 0.0) | (first < 0.0) & (last < 0.0);
+                let misses = sure & (same_side | (least < -CLEAR));
+                let passes = sure & !same_side & (least > CLEAR);
+                let way = if first > 0.0 { coef[lane] } else { -coef[lane] };
+                along[lane] += if passes { way } else { 0 };
+                doubts[lane] = i32::from(!(misses | passes));
+                let near = (last <= BESIDE) & (last >= -BESIDE) & (least_inward(f, lane, beside) > 0.0);
+                let way = if last > 0.0 { coef[lane] } else { -coef[lane] };
+                aside[lane] += if near & ((last > 0.0) != (after > 0.0)) { way } else { 0 };
+            }
+            if doubts != [0; LANES] {
+                for lane in 0..LANES {
+                    if doubts[lane] != 0 {
+                        unclear.push((at * LANES + lane) as u32);
+                    }
+                }
+            }
+        }
+        let (mut sums, mut lane) = ([0; 2], 0);
+        while lane < LANES {
+            sums = [sums[0] + along[lane], sums[1] + aside[lane]];
+            lane += 1;
+        }
+        sums
+    }
+    dispatch!(body(groups: &[Group], begin: [f32; 3], end: [f32; 3], beside: [f32; 3], unclear: &mut Vec<u32>) -> [i32; 2])
 }
-
-/// How a segment passes a triangle.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Crossing {
-    /// It does not pass through it.
-    None,
-    /// From its front to its back.
-    Inward,
-    /// From its back to its front.
-    Outward,
-    /// It begins too near to the plane, or passes too near to an edge, to tell in 32 bits.
-    Unclear,
-}
-
-/// Nearer than this (cells), sides are told in 64 bits.
-const CLEAR: f32 = 1e-3;

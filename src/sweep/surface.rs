@@ -11,6 +11,7 @@ use rayon::prelude::*;
 
 use super::cells::{Cells, Point, cross, difference, dot, each_voxel, sub, voxel_of};
 use super::lattice::{Fixed, UNITS};
+use super::prism::Bundle;
 use super::region::extent;
 use crate::context::Context;
 use crate::error::Result;
@@ -50,9 +51,10 @@ const GRAIN: usize = 128;
 const OPEN: u8 = 1;
 const BURIED: u8 = 2;
 
-/// Asks where a chain's faces are open.
+/// Asks where a chain's faces are open, on one thread.
 struct Surface<'a> {
     cells: &'a Cells,
+    bundle: Bundle,
 }
 
 /// The surface of a chain near the blocks of its cells.
@@ -60,68 +62,90 @@ struct Surface<'a> {
 /// # Errors
 /// Cancel.
 pub fn surface(ctx: &Context, cells: &Cells) -> Result<Vec<Facet>> {
-    let chain = Surface { cells };
-    let verdict = |id| if ctx.check().is_err() { BURIED } else { chain.verdict(id) };
-    let verdicts: Vec<u8> = (0..cells.faces.len()).into_par_iter().with_min_len(GRAIN).map(verdict).collect();
+    let chain = || Surface { cells, bundle: Bundle::default() };
+    let order = order(cells);
+    let verdict = |chain: &mut Surface<'_>, &id: &u32| {
+        if ctx.check().is_err() { BURIED } else { chain.verdict(id as usize) }
+    };
+    let sorted: Vec<u8> = order.par_iter().with_min_len(GRAIN).map_init(chain, verdict).collect();
     ctx.check()?;
-    let (around, seen) = chain.neighbourhoods(&verdicts);
-    let parts: Vec<Vec<Facet>> = seen
-        .par_chunks(GRAIN)
-        .enumerate()
-        .map(|(chunk, seen)| {
-            if ctx.check().is_err() {
-                return Vec::new();
-            }
-            let (mut out, mut parts) = (Vec::with_capacity(seen.len()), Vec::new());
-            for (index, &seen) in seen.iter().enumerate() {
-                let id = chunk * GRAIN + index;
-                chain.open_parts(id, verdicts[id], seen, &around, &mut parts);
-                out.extend(parts.drain(..).map(|(v, sure)| Facet { v, face: id as u32, sure }));
-            }
-            out
-        })
-        .collect();
+    let mut verdicts = vec![0; sorted.len()];
+    order.iter().zip(sorted).for_each(|(&id, verdict)| verdicts[id as usize] = verdict);
+    let (around, seen) = neighbourhoods(cells, &verdicts);
+    let open_parts = |chain: &mut Surface<'_>, ids: &[u32]| {
+        let (mut out, mut parts) = (Vec::with_capacity(ids.len()), Vec::new());
+        for &face in ids.iter().take_while(|_| ctx.check().is_ok()) {
+            let id = face as usize;
+            chain.open_parts(id, verdicts[id], seen[id], &around, &mut parts);
+            out.extend(parts.drain(..).map(|(v, sure)| Facet { v, face, sure }));
+        }
+        out
+    };
+    let parts: Vec<Vec<Facet>> = order.par_chunks(GRAIN).map_init(chain, open_parts).collect();
     ctx.check()?;
-    Ok(parts.concat())
+    let mut facets = parts.concat();
+    facets.par_sort_by_key(|facet| facet.face);
+    Ok(facets)
+}
+
+/// The faces, those of one cell after another: what is asked there is then at hand.
+fn order(cells: &Cells) -> Vec<u32> {
+    let place = |id: usize| (cells.of_voxel(voxel_of(middle(&cells.faces[id].v))), id as u32);
+    let mut places: Vec<(Option<usize>, u32)> = (0..cells.faces.len()).into_par_iter().map(place).collect();
+    places.par_sort_unstable();
+    places.into_iter().map(|(_, id)| id).collect()
+}
+
+/// For each cell what its faces said, and for each face what was said in its cells.
+fn neighbourhoods(cells: &Cells, verdicts: &[u8]) -> (Vec<u8>, Vec<u8>) {
+    let seen: Vec<AtomicU8> = verdicts.iter().map(|_| AtomicU8::new(0)).collect();
+    let around: Vec<AtomicU8> = (0..cells.count()).map(|_| AtomicU8::new(0)).collect();
+    cells.for_each(|cell, ids| {
+        let said = ids.iter().fold(0, |said, &id| said | verdicts[id as usize]);
+        around[cell].store(said, Ordering::Relaxed);
+        for &id in ids {
+            seen[id as usize].fetch_or(said, Ordering::Relaxed);
+        }
+    });
+    let plain = |flags: Vec<AtomicU8>| flags.into_iter().map(AtomicU8::into_inner).collect();
+    (plain(around), plain(seen))
 }
 
 /// Whether a point of a face (fixed-point units), moved a hair along its normal, is outside the chain.
-pub fn is_open(cells: &Cells, face: u32, at: Point) -> bool {
-    let chain = Surface { cells };
-    chain.ahead(face as usize).is_some_and(|ahead| chain.ask(at, ahead) == OPEN)
+pub fn is_open(cells: &Cells, face: u32, at: Point, bundle: &mut Bundle) -> bool {
+    ahead(cells, face as usize).is_some_and(|ahead| ask(cells, at, ahead, bundle) == OPEN)
+}
+
+/// Whether a point of a face is open: the chain is absent a hair in front of it, and not behind.
+fn ask(cells: &Cells, at: Point, ahead: Point, bundle: &mut Bundle) -> u8 {
+    let moved = |side: f64| [0, 1, 2].map(|axis| at[axis] + side * ahead[axis]);
+    let [front, back] = cells.windings(moved(1.0), moved(-1.0), bundle);
+    if front < 1 && back >= 1 { OPEN } else { BURIED }
+}
+
+/// A hair along a face's normal; none for a face without area.
+fn ahead(cells: &Cells, id: usize) -> Option<Point> {
+    let normal = cells.normals[id];
+    let length = dot(&normal, &normal).sqrt();
+    (length > 0.0).then(|| normal.map(|value| value * HAIR / length))
 }
 
 impl Surface<'_> {
     /// Whether a face is open or buried at its middle; a long one where it passes voxels.
-    fn verdict(&self, id: usize) -> u8 {
-        self.ahead(id).map_or(BURIED, |ahead| self.said(&self.cells.faces[id].v, ahead))
+    fn verdict(&mut self, id: usize) -> u8 {
+        ahead(self.cells, id).map_or(BURIED, |ahead| self.said(&self.cells.faces[id].v, ahead))
     }
 
     /// What the samples of a part of a face say.
-    fn said(&self, v: &Corners, ahead: Point) -> u8 {
+    fn said(&mut self, v: &Corners, ahead: Point) -> u8 {
         let mut said = 0;
         each_sample(v, |at| said |= if self.is_known(at) { self.ask(at, ahead) } else { 0 });
         said
     }
 
-    /// For each cell what its faces said, and for each face what was said in its cells.
-    fn neighbourhoods(&self, verdicts: &[u8]) -> (Vec<u8>, Vec<u8>) {
-        let seen: Vec<AtomicU8> = verdicts.iter().map(|_| AtomicU8::new(0)).collect();
-        let around: Vec<AtomicU8> = (0..self.cells.count()).map(|_| AtomicU8::new(0)).collect();
-        self.cells.for_each(|cell, ids| {
-            let said = ids.iter().fold(0, |said, &id| said | verdicts[id as usize]);
-            around[cell].store(said, Ordering::Relaxed);
-            for &id in ids {
-                seen[id as usize].fetch_or(said, Ordering::Relaxed);
-            }
-        });
-        let plain = |flags: Vec<AtomicU8>| flags.into_iter().map(AtomicU8::into_inner).collect();
-        (plain(around), plain(seen))
-    }
-
     /// Adds the open parts of a face, from what it and what all faces in its cells said.
-    fn open_parts(&self, id: usize, said: u8, seen: u8, around: &[u8], out: &mut Vec<Part>) {
-        let (v, Some(ahead)) = (self.cells.faces[id].v, self.ahead(id)) else { return };
+    fn open_parts(&mut self, id: usize, said: u8, seen: u8, around: &[u8], out: &mut Vec<Part>) {
+        let (v, Some(ahead)) = (self.cells.faces[id].v, ahead(self.cells, id)) else { return };
         match seen {
             OPEN => out.push((v, true)),
             BURIED => {}
@@ -143,7 +167,7 @@ impl Surface<'_> {
     }
 
     /// Adds the open parts of a part of a face; says whether it is open throughout, as far as it was asked.
-    fn dice(&self, id: usize, v: Corners, ahead: Point, around: &[u8], out: &mut Vec<Part>) -> bool {
+    fn dice(&mut self, id: usize, v: Corners, ahead: Point, around: &[u8], out: &mut Vec<Part>) -> bool {
         match self.seen_around(id, v, around) {
             // Nothing was said where no distance is wanted.
             0 | OPEN => {
@@ -159,7 +183,15 @@ impl Surface<'_> {
     }
 
     /// As [`Surface::dice`], for a part that said this and has open and buried faces around it.
-    fn cut(&self, id: usize, v: Corners, said: u8, ahead: Point, around: &[u8], out: &mut Vec<Part>) -> bool {
+    fn cut(
+        &mut self,
+        id: usize,
+        v: Corners,
+        said: u8,
+        ahead: Point,
+        around: &[u8],
+        out: &mut Vec<Part>,
+    ) -> bool {
         let begin = out.len();
         if is_small(&v) {
             self.clip(v, said, ahead, out);
@@ -178,17 +210,17 @@ impl Surface<'_> {
         open
     }
 
-    fn corners(&self, v: Corners, ahead: Point) -> [u8; 3] {
+    fn corners(&mut self, v: Corners, ahead: Point) -> [u8; 3] {
         let centre = middle(&v);
         v.map(|p| self.ask(between(p.map(f64::from), centre, INSET), ahead))
     }
 
     /// Adds the open parts of a small triangle that said this of its middle.
-    fn clip(&self, v: Corners, said: u8, ahead: Point, out: &mut Vec<Part>) {
+    fn clip(&mut self, v: Corners, said: u8, ahead: Point, out: &mut Vec<Part>) {
         let open = self.corners(v, ahead).map(|corner| corner == OPEN);
         let centre = middle(&v);
         let count = open.iter().filter(|open| **open).count();
-        let middle_open = || if said == 0 { self.ask(centre, ahead) == OPEN } else { said == OPEN };
+        let mut middle_open = || if said == 0 { self.ask(centre, ahead) == OPEN } else { said == OPEN };
         if count % 3 == 0 && middle_open() == open[0] {
             if open[0] {
                 out.push((v, true));
@@ -205,7 +237,7 @@ impl Surface<'_> {
     }
 
     /// Adds the part of a triangle with open and buried corners that is open, its rim a straight line.
-    fn clip_by(&self, v: Corners, open: [bool; 3], ahead: Point, out: &mut Vec<Part>) {
+    fn clip_by(&mut self, v: Corners, open: [bool; 3], ahead: Point, out: &mut Vec<Part>) {
         let alone = (0..3).find(|&i| open[i] != open[(i + 1) % 3] && open[i] != open[(i + 2) % 3]);
         let turn = alone.unwrap_or(0);
         let [a, b, c] = [0, 1, 2].map(|i| v[(turn + i) % 3]);
@@ -218,7 +250,7 @@ impl Surface<'_> {
     }
 
     /// Where an edge changes between open and buried: `a` is open or not as said, `b` the other.
-    fn rim(&self, a: Fixed, b: Fixed, open: bool, ahead: Point) -> Fixed {
+    fn rim(&mut self, a: Fixed, b: Fixed, open: bool, ahead: Point) -> Fixed {
         let (a, b) = (a.map(f64::from), b.map(f64::from));
         let (mut first, mut last) = (0.0, 1.0);
         for _ in 0..HALVINGS {
@@ -229,23 +261,13 @@ impl Surface<'_> {
         between(a, b, (first + last) / 2.0).map(|value| value.round() as i32)
     }
 
-    /// Whether a point of a face is open: the chain is absent a hair in front of it, and not behind.
-    fn ask(&self, at: Point, ahead: Point) -> u8 {
-        let moved = |side: f64| [0, 1, 2].map(|axis| at[axis] + side * ahead[axis]);
-        let [front, back] = self.cells.windings(moved(1.0), moved(-1.0));
-        if front < 1 && back >= 1 { OPEN } else { BURIED }
+    fn ask(&mut self, at: Point, ahead: Point) -> u8 {
+        ask(self.cells, at, ahead, &mut self.bundle)
     }
 
     /// Whether distances may be wanted near a point.
     fn is_known(&self, at: Point) -> bool {
         self.cells.of_voxel(voxel_of(at)).is_some()
-    }
-
-    /// A hair along a face's normal; none for a face without area.
-    fn ahead(&self, id: usize) -> Option<Point> {
-        let normal = self.cells.normals[id];
-        let length = dot(&normal, &normal).sqrt();
-        (length > 0.0).then(|| normal.map(|value| value * HAIR / length))
     }
 }
 

@@ -10,6 +10,7 @@ use super::chain::Face;
 use super::distance::{LANES, Offsets, Points, Triangle, to_each};
 use super::lattice::{Lattice, UNITS};
 use super::nearest::{Group, Scratch, search};
+use super::prism::Bundle;
 use super::region::{Region, each_block, extent};
 use super::surface::{Facet, is_open, surface};
 use super::winding::Lines;
@@ -266,7 +267,8 @@ impl Voxeliser {
         let mut values: Box<Values> = Box::new(std::array::from_fn(|voxel| signed(voxel, limit(voxel))));
         let mut uniform = true;
         let asked = RefCell::new(vec![([f32::INFINITY; 3], false); triangles.len()]);
-        let near = Near { voxeliser: self, corner, ids, triangles: &triangles, asked };
+        let bundle = RefCell::new(std::mem::take(&mut scratch.bundle));
+        let near = Near { voxeliser: self, corner, ids, triangles: &triangles, asked, bundle };
         search(&triangles, self.band.reach(), wanted, scratch, |group| {
             let mut depths = Depths::new(&near, group);
             for lane in 0..LANES {
@@ -283,6 +285,7 @@ impl Voxeliser {
                 values[voxel] = signed(voxel, distance.min(limit));
             }
         });
+        scratch.bundle = near.bundle.into_inner();
         let all = |bits: &dyn Fn(usize) -> u64| (0..8).all(|x| bits(x) & wanted[x] == wanted[x]);
         match (uniform && all(&|x| inside[x]), uniform && all(&|x| !inside[x])) {
             (true, _) => Some(Piece::Inside(self.origin(block))),
@@ -317,6 +320,7 @@ struct Near<'a> {
     triangles: &'a [Triangle],
     /// Where each triangle was asked last, and what it said.
     asked: RefCell<Vec<([f32; 3], bool)>>,
+    bundle: RefCell<Bundle>,
 }
 
 impl Near<'_> {
@@ -336,7 +340,8 @@ impl Near<'_> {
         let way = [0, 1, 2].map(|axis| v.iter().map(|p| f64::from(p[axis])).sum::<f64>() / 3.0 - at[axis]);
         let length = way.iter().map(|value| value * value).sum::<f64>().sqrt();
         let part = if length > INSET { INSET / length } else { 1.0 };
-        let open = is_open(&self.voxeliser.cells, *face, [0, 1, 2].map(|axis| at[axis] + part * way[axis]));
+        let at = [0, 1, 2].map(|axis| at[axis] + part * way[axis]);
+        let open = is_open(&self.voxeliser.cells, *face, at, &mut self.bundle.borrow_mut());
         self.asked.borrow_mut()[index as usize] = (place, open);
         open
     }
