@@ -60,6 +60,11 @@ pub struct Change {
 }
 
 impl Bundle {
+    /// Forgets which cell it has: the next may be of another chain.
+    pub fn forget(&mut self) {
+        self.cell = None;
+    }
+
     /// Takes the prisms of a cell, each with its face's number and coefficient, unless it has them.
     pub fn take(&mut self, cell: usize, prisms: impl Iterator<Item = (Prism, u32, i32)>) {
         if self.cell == Some(cell) {
@@ -128,8 +133,7 @@ fn pass(
         unclear: &mut Vec<u32>,
     ) -> [i32; 2] {
         let (mut along, mut aside) = ([0; LANES], [0; LANES]);
-        for at in 0..groups.len() {
-            let Group { functions: f, coef } = &groups[at];
+        for (at, Group { functions: f, coef }) in groups.iter().enumerate() {
             let mut doubts = [0; LANES];
             for lane in 0..LANES {
                 let (first, last) = (value(f, 0, lane, begin), value(f, 0, lane, end));
@@ -141,23 +145,20 @@ fn pass(
                     begin[2] + t * (end[2] - begin[2]),
                 ];
                 let least = least_inward(f, lane, meeting);
-                let sure = (first > CLEAR) | (first < -CLEAR);
+                let sure = first.abs() > CLEAR;
                 let same_side = (first > 0.0) & (last > 0.0) | (first < 0.0) & (last < 0.0);
                 let misses = sure & (same_side | (least < -CLEAR));
                 let passes = sure & !same_side & (least > CLEAR);
                 let way = if first > 0.0 { coef[lane] } else { -coef[lane] };
                 along[lane] += if passes { way } else { 0 };
                 doubts[lane] = i32::from(!(misses | passes));
-                let near = (last <= BESIDE) & (last >= -BESIDE) & (least_inward(f, lane, beside) > 0.0);
+                let near = (last.abs() <= BESIDE) & (least_inward(f, lane, beside) > 0.0);
                 let way = if last > 0.0 { coef[lane] } else { -coef[lane] };
                 aside[lane] += if near & ((last > 0.0) != (after > 0.0)) { way } else { 0 };
             }
             if doubts != [0; LANES] {
-                for lane in 0..LANES {
-                    if doubts[lane] != 0 {
-                        unclear.push((at * LANES + lane) as u32);
-                    }
-                }
+                let lanes = doubts.iter().zip(0..).filter(|(doubt, _)| **doubt != 0);
+                unclear.extend(lanes.map(|(_, lane): (_, u32)| (at * LANES) as u32 + lane));
             }
         }
         let (mut sums, mut lane) = ([0; 2], 0);

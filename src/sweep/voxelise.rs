@@ -267,7 +267,9 @@ impl Voxeliser {
         let mut values: Box<Values> = Box::new(std::array::from_fn(|voxel| signed(voxel, limit(voxel))));
         let mut uniform = true;
         let asked = RefCell::new(vec![([f32::INFINITY; 3], false); triangles.len()]);
-        let bundle = RefCell::new(std::mem::take(&mut scratch.bundle));
+        let mut bundle = std::mem::take(&mut scratch.bundle);
+        bundle.forget();
+        let bundle = RefCell::new(bundle);
         let near = Near { voxeliser: self, corner, ids, triangles: &triangles, asked, bundle };
         search(&triangles, self.band.reach(), wanted, scratch, |group| {
             let mut depths = Depths::new(&near, group);
