@@ -161,12 +161,7 @@ fn pass(
                 unclear.extend(lanes.map(|(_, lane): (_, u32)| (at * LANES) as u32 + lane));
             }
         }
-        let (mut sums, mut lane) = ([0; 2], 0);
-        while lane < LANES {
-            sums = [sums[0] + along[lane], sums[1] + aside[lane]];
-            lane += 1;
-        }
-        sums
+        [along.iter().sum(), aside.iter().sum()]
     }
     dispatch!(body(groups: &[Group], begin: [f32; 3], end: [f32; 3], beside: [f32; 3], unclear: &mut Vec<u32>) -> [i32; 2])
 }
