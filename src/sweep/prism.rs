@@ -165,3 +165,51 @@ fn pass(
     }
     dispatch!(body(groups: &[Group], begin: [f32; 3], end: [f32; 3], beside: [f32; 3], unclear: &mut Vec<u32>) -> [i32; 2])
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Eleven sheets, one cell apart, that face up; the one at height k counts k + 1 times.
+    fn sheets() -> Bundle {
+        let sheet = |k: i32| {
+            let v = [[0, 0, k], [8, 0, k], [0, 8, k]].map(|p| p.map(|cells| cells * UNITS));
+            (Prism::new(&v, &[0.0, 0.0, 1.0], [0; 3]), 100 + k as u32, k + 1)
+        };
+        let mut bundle = Bundle::default();
+        bundle.take(7, (0..11).map(sheet));
+        bundle
+    }
+
+    #[test]
+    fn a_way_counts_the_sheets_that_it_passes() {
+        let mut bundle = sheets();
+        let mut along = |begin, end| {
+            let change = bundle.ask(begin, end, end);
+            assert_eq!((change.beside, bundle.unclear().count()), (0, 0));
+            change.along
+        };
+        assert_eq!(along([1.0, 1.0, 10.5], [1.0, 1.0, -0.5]), 66);
+        assert_eq!(along([1.0, 1.0, -0.5], [1.0, 1.0, 10.5]), -66);
+        assert_eq!(along([1.0, 1.0, 10.5], [1.0, 1.0, 4.5]), 51);
+        assert_eq!(along([6.0, 6.0, 10.5], [6.0, 6.0, -0.5]), 0);
+        assert_eq!(along([1.0, 1.0, 4.5], [3.0, 3.0, 4.6]), 0);
+    }
+
+    #[test]
+    fn a_point_beside_counts_the_sheet_between() {
+        let mut bundle = sheets();
+        assert_eq!(bundle.ask([1.0, 1.0, 4.4], [1.0, 1.0, 4.005], [1.0, 1.0, 3.995]).beside, 5);
+        assert_eq!(bundle.ask([1.0, 1.0, 3.6], [1.0, 1.0, 3.995], [1.0, 1.0, 4.005]).beside, -5);
+        assert_eq!(bundle.ask([6.0, 6.0, 4.4], [6.0, 6.0, 4.005], [6.0, 6.0, 3.995]).beside, 0);
+    }
+
+    #[test]
+    fn ways_along_edges_and_from_within_a_plane_are_told_to_be_unclear() {
+        let mut bundle = sheets();
+        assert_eq!(bundle.ask([4.0, 4.0, 9.5], [4.0, 4.0, 8.5], [4.0, 4.0, 8.5]).along, 0);
+        assert_eq!(bundle.unclear().collect::<Vec<_>>(), [(109, 10)]);
+        bundle.ask([1.0, 1.0, 2.0], [1.0, 1.0, 2.3], [1.0, 1.0, 2.3]);
+        assert_eq!(bundle.unclear().collect::<Vec<_>>(), [(102, 3)]);
+    }
+}
