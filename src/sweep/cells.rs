@@ -43,6 +43,8 @@ pub struct Cells {
 struct Block {
     /// Number of its first cell, among all.
     first: usize,
+    /// Its first voxel.
+    corner: [i32; 3],
     /// Faces near the block, ascending.
     ids: Vec<u32>,
     /// Their prisms, seen from the block's first voxel.
@@ -106,6 +108,16 @@ impl Cells {
     /// The cell around a voxel.
     pub fn of_voxel(&self, voxel: [i32; 3]) -> Option<usize> {
         self.block_of(voxel).map(|block| block.first + block.cell(voxel))
+    }
+
+    /// Calls `see` with the index and voxel of each cell that `crowd` faces or more may pass through, in parallel.
+    pub fn for_each_crowd(&self, crowd: usize, see: impl Fn(usize, [i32; 3]) + Sync) {
+        self.blocks.par_iter().filter(|block| block.cells.count() > 1).for_each(|block| {
+            for cell in (0..512).filter(|&cell| block.cells.get(cell).len() >= crowd) {
+                let at = [cell >> 6, cell >> 3 & 7, cell & 7];
+                see(block.first + cell, [0, 1, 2].map(|axis| block.corner[axis] + at[axis] as i32));
+            }
+        });
     }
 
     fn block_of(&self, voxel: [i32; 3]) -> Option<&Block> {
@@ -174,7 +186,7 @@ impl Block {
         } else {
             by_cell(corner, &ids, faces, normals)
         };
-        Self { first: 0, ids, prisms, cells }
+        Self { first: 0, corner, ids, prisms, cells }
     }
 
     fn cell(&self, voxel: [i32; 3]) -> usize {
@@ -293,7 +305,7 @@ pub fn normal(face: &Face) -> Point {
 }
 
 /// Which side of a face a voxel is on; the scan lines move a voxel in a face's plane down, then right.
-fn in_front(height: f64, normal: &Point) -> bool {
+pub fn in_front(height: f64, normal: &Point) -> bool {
     let towards = [height, -normal[2], normal[0], normal[1]];
     towards.into_iter().find(|value| *value != 0.0).is_some_and(|value| value > 0.0)
 }

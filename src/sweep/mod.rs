@@ -10,6 +10,7 @@ mod body;
 mod cells;
 mod chain;
 mod distance;
+mod exposure;
 mod lattice;
 mod nearest;
 mod prism;

@@ -9,6 +9,7 @@ use std::sync::atomic::{AtomicU8, Ordering};
 
 use rayon::prelude::*;
 
+use super::exposure::{BURIED, Exposure, OPEN, THIN};
 use super::cells::{Cells, Point, cross, difference, dot, each_voxel, sub, voxel_of};
 use super::lattice::{Fixed, UNITS};
 use super::prism::Bundle;
@@ -36,6 +37,8 @@ pub type Corners = [Fixed; 3];
 /// Depth (fixed-point units) up to which a sheet counts as surface: sides of a sweep are folds of many
 /// sheets, closer together than the sweep's own tolerance.
 const HAIR: f64 = 0.005 * UNITS as f64;
+/// [`THIN`], in hairs.
+const THIN_HAIRS: f64 = THIN * UNITS as f64 / HAIR;
 /// Faces longer than this (cells) are asked at more than one point.
 const SMALL: f32 = 1.5;
 /// Distance of the points that a long face is asked at (fixed-point units).
@@ -47,13 +50,10 @@ const HALVINGS: usize = 3;
 /// Faces a task handles: fixed, so that nothing depends on the number of threads.
 const GRAIN: usize = 128;
 
-/// What the samples of a face or a cell said.
-const OPEN: u8 = 1;
-const BURIED: u8 = 2;
-
 /// Asks where a chain's faces are open, on one thread.
 struct Surface<'a> {
     cells: &'a Cells,
+    exposure: &'a Exposure,
     bundle: Bundle,
 }
 
@@ -61,8 +61,8 @@ struct Surface<'a> {
 ///
 /// # Errors
 /// Cancel.
-pub fn surface(ctx: &Context, cells: &Cells) -> Result<Vec<Facet>> {
-    let chain = || Surface { cells, bundle: Bundle::default() };
+pub fn surface(ctx: &Context, cells: &Cells, exposure: &Exposure) -> Result<Vec<Facet>> {
+    let chain = || Surface { cells, exposure, bundle: Bundle::default() };
     let order = order(cells);
     let verdict = |chain: &mut Surface<'_>, &id: &u32| {
         if ctx.check().is_err() { BURIED } else { chain.verdict(id as usize) }
@@ -120,7 +120,11 @@ pub fn is_open(cells: &Cells, face: u32, at: Point, bundle: &mut Bundle) -> bool
 fn ask(cells: &Cells, at: Point, ahead: Point, bundle: &mut Bundle) -> u8 {
     let moved = |side: f64| [0, 1, 2].map(|axis| at[axis] + side * ahead[axis]);
     let [front, back] = cells.windings(moved(1.0), moved(-1.0), bundle);
-    if front < 1 && back >= 1 { OPEN } else { BURIED }
+    match (front < 1, back >= 1) {
+        (true, true) => OPEN,
+        (false, true) if cells.windings(moved(THIN_HAIRS), at, bundle)[0] < 1 => OPEN,
+        _ => BURIED,
+    }
 }
 
 /// A hair along a face's normal; none for a face without area.
@@ -131,9 +135,14 @@ fn ahead(cells: &Cells, id: usize) -> Option<Point> {
 }
 
 impl Surface<'_> {
-    /// Whether a face is open or buried at its middle; a long one where it passes voxels.
+    /// Whether a face is open or buried where lines through voxels meet it, and at its middle (a long one where it
+    /// passes voxels). Of a stack only the lines are asked.
     fn verdict(&mut self, id: usize) -> u8 {
-        ahead(self.cells, id).map_or(BURIED, |ahead| self.said(&self.cells.faces[id].v, ahead))
+        let (v, seen) = (self.cells.faces[id].v, self.exposure.faces[id]);
+        if self.exposure.is_stack(self.cells, voxel_of(middle(&v))) {
+            return seen;
+        }
+        seen | ahead(self.cells, id).map_or(BURIED, |ahead| self.said(&v, ahead))
     }
 
     /// What the samples of a part of a face say.
@@ -176,7 +185,9 @@ impl Surface<'_> {
             }
             BURIED => false,
             _ => {
-                let said = self.said(&v, ahead);
+                let stack = self.exposure.is_stack(self.cells, voxel_of(middle(&v)));
+                let exposed = self.exposure.within(id as u32, extent(&v));
+                let said = if stack { 0 } else { self.said(&v, ahead) | if exposed { OPEN } else { 0 } };
                 self.cut(id, v, said, ahead, around, out)
             }
         }
@@ -193,13 +204,25 @@ impl Surface<'_> {
         out: &mut Vec<Part>,
     ) -> bool {
         let begin = out.len();
+        let stack = self.exposure.is_stack(self.cells, voxel_of(middle(&v)));
         if is_small(&v) {
-            self.clip(v, said, ahead, out);
-            return out[begin..] == [(v, true)];
+            if !stack {
+                self.clip(v, ahead, out);
+                if out.len() == begin && self.exposure.within(id as u32, extent(&v)) {
+                    out.push((v, false));
+                }
+                return out[begin..] == [(v, true)];
+            }
+            // Of a stack only the outermost sheets are kept, whole: which side of a crease a point of them lies on is
+            // asked where it matters.
+            if self.exposure.within(id as u32, extent(&v)) {
+                out.push((v, self.exposure.faces[id] == OPEN));
+            }
+            return false;
         }
         let open = match said {
-            OPEN => true,
-            BURIED => false,
+            OPEN if !stack => true,
+            BURIED if !stack => false,
             _ => halves(v).map(|half| self.dice(id, half, ahead, around, out)) == [true; 2],
         };
         if open {
@@ -215,12 +238,12 @@ impl Surface<'_> {
         v.map(|p| self.ask(between(p.map(f64::from), centre, INSET), ahead))
     }
 
-    /// Adds the open parts of a small triangle that said this of its middle.
-    fn clip(&mut self, v: Corners, said: u8, ahead: Point, out: &mut Vec<Part>) {
+    /// Adds the open parts of a small triangle.
+    fn clip(&mut self, v: Corners, ahead: Point, out: &mut Vec<Part>) {
         let open = self.corners(v, ahead).map(|corner| corner == OPEN);
         let centre = middle(&v);
         let count = open.iter().filter(|open| **open).count();
-        let mut middle_open = || if said == 0 { self.ask(centre, ahead) == OPEN } else { said == OPEN };
+        let mut middle_open = || self.ask(centre, ahead) == OPEN;
         if count % 3 == 0 && middle_open() == open[0] {
             if open[0] {
                 out.push((v, true));

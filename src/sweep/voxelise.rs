@@ -8,6 +8,7 @@ use rayon::prelude::*;
 use super::cells::Cells;
 use super::chain::Face;
 use super::distance::{LANES, Offsets, Points, Triangle, to_each};
+use super::exposure::Exposure;
 use super::lattice::{Lattice, UNITS};
 use super::nearest::{Group, Scratch, search};
 use super::prism::Bundle;
@@ -56,6 +57,7 @@ pub struct Voxeliser {
     lattice: Lattice,
     band: Band,
     cells: Cells,
+    exposure: Exposure,
     facets: Vec<Facet>,
     /// Wanted blocks with facets in reach, in units of blocks from the base voxel; ascending.
     near: Vec<[i32; 3]>,
@@ -85,6 +87,8 @@ const SAME: f32 = 0.05;
 const INSET: f64 = 0.02 * UNITS as f64;
 /// A voxel nearer than this (cells) lies on the surface.
 const ON_FACE: f32 = 1e-4;
+/// Distance (cells) of a voxel from a surface that touches it or its neighbour, where rounding hid on which side.
+const UNSEEN: f32 = 0.65;
 /// All voxels of a block.
 pub const ALL: Mask = [u64::MAX; 8];
 
@@ -127,11 +131,14 @@ impl Voxeliser {
         });
         let cells = Cells::new(faces, region, &relevant, lines);
         ctx.check()?;
-        let facets = surface(ctx, &cells)?;
+        let exposure = Exposure::scan(&cells);
+        ctx.check()?;
+        let facets = surface(ctx, &cells, &exposure)?;
         let mut voxeliser = Self {
             lattice,
             band,
             cells,
+            exposure,
             facets,
             near: Vec::new(),
             start: vec![0],
@@ -255,7 +262,8 @@ impl Voxeliser {
         let ids = &self.ids[self.start[index] as usize..self.start[index + 1] as usize];
         let triangles: Vec<Triangle> =
             ids.iter().map(|&id| Triangle::new(&self.facets[id as usize].v, corner)).collect();
-        let inside = self.inside_voxels(corner);
+        let signs = self.signs(corner);
+        let inside = signs.inside();
         let is_inside = |voxel: usize| inside[voxel >> 6] >> (voxel & 63) & 1 == 1;
         let limit = |voxel: usize| if is_inside(voxel) { self.band.inside } else { self.band.outside };
         let signed = |voxel: usize, distance: f32| match distance {
@@ -288,6 +296,14 @@ impl Voxeliser {
             }
         });
         scratch.bundle = near.bundle.into_inner();
+        // Voxels next to a change of sign: lines between them have met the surface.
+        signs.each_change(|voxel, axis, above| {
+            if wanted[voxel >> 6] >> (voxel & 63) & 1 == 1 {
+                let most = self.most_distance(corner, voxel, axis, above);
+                values[voxel] = signed(voxel, values[voxel].abs().min(most));
+                uniform = false;
+            }
+        });
         let all = |bits: &dyn Fn(usize) -> u64| (0..8).all(|x| bits(x) & wanted[x] == wanted[x]);
         match (uniform && all(&|x| inside[x]), uniform && all(&|x| !inside[x])) {
             (true, _) => Some(Piece::Inside(self.origin(block))),
@@ -296,21 +312,65 @@ impl Voxeliser {
         }
     }
 
-    /// The voxels of a block that the chain winds around.
-    fn inside_voxels(&self, corner: [i32; 3]) -> Mask {
-        let mut inside = [0; 8];
-        for column in 0..64 {
-            let line = self.cells.lines.line(corner[0] + (column >> 3), corner[1] + (column & 7));
-            let mut next = line.partition_point(|(height, _)| *height < f64::from(corner[2]));
-            for z in 0..8 {
-                while next < line.len() && line[next].0 < f64::from(corner[2] + z) {
-                    next += 1;
+    /// How far (cells) a voxel can be from the surface, where its neighbour along an axis, above or below, is on the
+    /// other side.
+    fn most_distance(&self, corner: [i32; 3], voxel: usize, axis: usize, above: bool) -> f32 {
+        let mut lower = [0, 1, 2].map(|a| corner[a] + (voxel >> (6 - 3 * a) & 7) as i32);
+        lower[axis] -= i32::from(!above);
+        self.exposure.between(lower, axis).map_or(UNSEEN, |distances| distances[usize::from(!above)])
+    }
+
+    /// Which voxels of a block, and around it, the chain winds around.
+    fn signs(&self, corner: [i32; 3]) -> Signs {
+        let mut columns = [[0; 10]; 10];
+        for (x, row) in (-1..).zip(&mut columns) {
+            for (y, bits) in (-1..).zip(row) {
+                let line = self.cells.lines.line(corner[0] + x, corner[1] + y);
+                let mut next = line.partition_point(|(height, _)| *height < f64::from(corner[2] - 1));
+                for z in -1..9 {
+                    while next < line.len() && line[next].0 < f64::from(corner[2] + z) {
+                        next += 1;
+                    }
+                    let solid = next > 0 && line[next - 1].1 >= 1;
+                    *bits |= u16::from(solid) << (z + 1);
                 }
-                let solid = next > 0 && line[next - 1].1 >= 1;
-                inside[column as usize >> 3] |= u64::from(solid) << ((column & 7) << 3 | z);
             }
         }
-        inside
+        Signs(columns)
+    }
+}
+
+/// The voxels inside the volume, of a block and one further on each side: bit z + 1 of `[x + 1][y + 1]`.
+struct Signs([[u16; 10]; 10]);
+
+impl Signs {
+    /// Those of the block.
+    fn inside(&self) -> Mask {
+        let row = |x: usize, y: usize| u64::from(self.0[x + 1][y + 1] >> 1 & 0xff) << (8 * y);
+        std::array::from_fn(|x| (0..8).fold(0, |bits, y| bits | row(x, y)))
+    }
+
+    /// Calls `see` with each voxel of the block whose neighbour along an axis, above or not, is on the other side.
+    fn each_change(&self, mut see: impl FnMut(usize, usize, bool)) {
+        for (x, y) in (1..9).flat_map(|x| (1..9).map(move |y| (x, y))) {
+            let own = self.0[x][y];
+            let changes = [
+                (self.0[x - 1][y] ^ own, 0, false),
+                (self.0[x + 1][y] ^ own, 0, true),
+                (self.0[x][y - 1] ^ own, 1, false),
+                (self.0[x][y + 1] ^ own, 1, true),
+                (own << 1 ^ own, 2, false),
+                (own >> 1 ^ own, 2, true),
+            ];
+            for (bits, axis, above) in changes {
+                let mut bits = bits >> 1 & 0xff;
+                while bits != 0 {
+                    let z = bits.trailing_zeros() as usize;
+                    see((x - 1) << 6 | (y - 1) << 3 | z, axis, above);
+                    bits &= bits - 1;
+                }
+            }
+        }
     }
 }
 

@@ -1,13 +1,15 @@
-//! Winding number of the chain at every voxel, by counting signed crossings along lines parallel to z.
+//! Winding number of the chain at every voxel, by counting signed crossings along lines parallel to z; and crossings
+//! along the lines through voxels parallel to any axis.
 //!
-//! Crossings are decided in exact integers. A line through a vertex or an edge is moved by an
-//! infinitesimal (e, e^2), so that it meets each closed surface a consistent number of times.
+//! Crossings are decided in exact integers, under one symbolic shift of all voxels: mostly -z, then +x, then +y, each
+//! infinitesimal against the last. A line therefore meets each closed surface a consistent number of times, and
+//! lines of different axes agree about the voxels that they share.
 
 use rayon::prelude::*;
 
 use super::chain::Face;
-use super::lattice::UNITS;
-use super::region::Region;
+use super::lattice::{Fixed, UNITS};
+use super::region::{Region, each_block, extent};
 
 /// One crossing: where along the line (cells from the base voxel), and by how much the winding
 /// number changes when it is passed upward.
@@ -18,12 +20,13 @@ struct Crossing {
     z: f64,
 }
 
-/// Lines (x, y) over a rectangle of voxels, each with its sorted crossings.
+/// Lines (x, y) through the voxels of a region, each with its sorted crossings; none where no face is above or below.
 pub struct Lines {
-    x0: i32,
-    y0: i32,
-    nx: i32,
-    ny: i32,
+    /// Least and greatest block column.
+    low: [i32; 2],
+    high: [i32; 2],
+    /// For each block column of the region the index of its 64 lines, or [`NONE`].
+    columns: Vec<u32>,
     start: Vec<u32>,
     /// Where a crossing is, and the winding number above it.
     crossings: Vec<(f64, i32)>,
@@ -31,13 +34,31 @@ pub struct Lines {
 
 /// Faces a task scans: fixed, so that nothing depends on the number of threads.
 const GRAIN: usize = 2048;
+/// Crossings nearer than this to a voxel (cells) are on it.
+const SAME: f64 = 1e-9;
+/// No lines.
+const NONE: u32 = u32::MAX;
 
 impl Lines {
     /// Scans faces along the lines through the voxels of a region.
     pub fn scan(faces: &[Face], region: &Region) -> Self {
-        let [x0, y0] = [region.low[0] * 8, region.low[1] * 8];
-        let (nx, ny) = (((region.high[0] + 1) * 8 - x0).max(0), ((region.high[1] + 1) * 8 - y0).max(0));
-        let mut lines = Self { x0, y0, nx, ny, start: Vec::new(), crossings: Vec::new() };
+        let [low, high] = [region.low, region.high].map(|p| [p[0], p[1]]);
+        let mut lines = Self { low, high, columns: Vec::new(), start: vec![0], crossings: Vec::new() };
+        if region.blocks() == 0 {
+            return lines;
+        }
+        lines.columns = vec![NONE; ((high[0] - low[0] + 1) * (high[1] - low[1] + 1)) as usize];
+        let mut count = 0;
+        for face in faces {
+            let (first, last) = region.touched(extent(&face.v), 0.01);
+            for [x, y, _] in each_block([first[0], first[1], 0], [last[0], last[1], 0]) {
+                let column = lines.column(x, y).expect("within the region");
+                if lines.columns[column] == NONE {
+                    lines.columns[column] = count;
+                    count += 1;
+                }
+            }
+        }
         let parts: Vec<Vec<Crossing>> = faces
             .par_chunks(GRAIN)
             .map(|chunk| {
@@ -46,7 +67,7 @@ impl Lines {
                 out
             })
             .collect();
-        lines.gather(parts);
+        lines.gather(count as usize * 64, parts);
         lines
     }
 
@@ -59,43 +80,36 @@ impl Lines {
 
     /// The crossings of line (x, y) upward: position in cells and winding number above; empty outside.
     pub fn line(&self, x: i32, y: i32) -> &[(f64, i32)] {
-        let (i, j) = (x - self.x0, y - self.y0);
-        if i < 0 || j < 0 || i >= self.nx || j >= self.ny {
-            return &[];
+        match self.index(x, y) {
+            Some(line) => &self.crossings[self.start[line] as usize..self.start[line + 1] as usize],
+            None => &[],
         }
-        let line = (i * self.ny + j) as usize;
-        &self.crossings[self.start[line] as usize..self.start[line + 1] as usize]
+    }
+
+    fn column(&self, x: i32, y: i32) -> Option<usize> {
+        let within = (self.low[0]..=self.high[0]).contains(&x) && (self.low[1]..=self.high[1]).contains(&y);
+        let [i, j, width] = [x - self.low[0], y - self.low[1], self.high[1] - self.low[1] + 1].map(i64::from);
+        within.then(|| (i * width + j) as usize)
+    }
+
+    /// Index of a line, if it has any.
+    fn index(&self, x: i32, y: i32) -> Option<usize> {
+        let column = self.columns[self.column(x >> 3, y >> 3)?];
+        (column != NONE).then(|| column as usize * 64 + ((x & 7) << 3 | (y & 7)) as usize)
     }
 
     /// Appends the lines that a face crosses.
     fn cross(&self, face: &Face, out: &mut Vec<Crossing>) {
-        let v = face.v.map(|p| [i64::from(p[0]), i64::from(p[1])]);
-        let area = edge_function(v[0], v[1], v[2]);
-        if area == 0 {
-            return;
-        }
-        let unit = i64::from(UNITS);
-        let (low, high) = extent(v.map(|p| p[1]));
-        let first = low.div_euclid(unit).max(i64::from(self.y0));
-        let last = (high.div_euclid(unit) + 1).min(i64::from(self.y0 + self.ny - 1));
-        // Facing up (area > 0) the chain is left when the face is passed upward.
-        let change = if area > 0 { -face.coef } else { face.coef };
-        for y in first..=last {
-            let Some((left, right)) = row_extent(v, y * unit) else { continue };
-            let left = (left / UNITS as f64).floor() as i64 - 1;
-            let right = (right / UNITS as f64).ceil() as i64 + 1;
-            for x in left.max(i64::from(self.x0))..=right.min(i64::from(self.x0 + self.nx - 1)) {
-                if let Some(z) = crossing_height(face, v, area, [x * unit, y * unit]) {
-                    let line = (x as i32 - self.x0) * self.ny + (y as i32 - self.y0);
-                    out.push(Crossing { line: line as u32, change, z });
-                }
+        let bounds = [0, 1].map(|axis| [i64::from(self.low[axis]) * 8, i64::from(self.high[axis]) * 8 + 7]);
+        each_crossing(face, Axis::Z, bounds, |[x, y], z, change| {
+            if let Some(line) = self.index(x as i32, y as i32) {
+                out.push(Crossing { line: line as u32, change, z });
             }
-        }
+        });
     }
 
     /// Sorts crossings by line and height and sums the winding numbers.
-    fn gather(&mut self, parts: Vec<Vec<Crossing>>) {
-        let lines = (self.nx * self.ny) as usize;
+    fn gather(&mut self, lines: usize, parts: Vec<Vec<Crossing>>) {
         let mut start = vec![0u32; lines + 1];
         parts.iter().flatten().for_each(|crossing| start[crossing.line as usize + 1] += 1);
         (0..lines).for_each(|line| start[line + 1] += start[line]);
@@ -120,7 +134,91 @@ impl Lines {
     }
 }
 
-fn extent(values: [i64; 3]) -> (i64, i64) {
+/// Direction of scan lines.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Axis {
+    /// Along x.
+    X,
+    /// Along y.
+    Y,
+    /// Along z.
+    Z,
+}
+
+impl Axis {
+    /// All of them.
+    pub const ALL: [Self; 3] = [Self::X, Self::Y, Self::Z];
+
+    /// 0, 1 or 2.
+    pub fn index(self) -> usize {
+        self as usize
+    }
+
+    /// A position in right-handed coordinates whose third axis runs along the lines (downward for y), and whose first
+    /// two are shifted by positive infinitesimals, the first the greater.
+    fn turned(self, [x, y, z]: Fixed) -> [i64; 3] {
+        let [x, y, z] = [x, y, z].map(i64::from);
+        match self {
+            Self::X => [-z, y, x],
+            Self::Y => [-z, x, -y],
+            Self::Z => [x, y, z],
+        }
+    }
+
+    /// The voxel at coordinates (p, q) of a line, and at this place on its own axis.
+    pub fn voxel(self, [p, q]: [i64; 2], along: i32) -> [i32; 3] {
+        match self {
+            Self::X => [along, q as i32, -p as i32],
+            Self::Y => [q as i32, along, -p as i32],
+            Self::Z => [p as i32, q as i32, along],
+        }
+    }
+
+    /// Bounds of the lines' coordinates p and q for voxels within a box.
+    pub fn bounds(self, low: [i32; 3], high: [i32; 3]) -> [[i64; 2]; 2] {
+        let [low, high] = [low, high].map(|p| p.map(i64::from));
+        match self {
+            Self::X => [[-high[2], -low[2]], [low[1], high[1]]],
+            Self::Y => [[-high[2], -low[2]], [low[0], high[0]]],
+            Self::Z => [[low[0], high[0]], [low[1], high[1]]],
+        }
+    }
+}
+
+/// Calls `see` with each line through voxels that a face crosses: the line's coordinates, the place on its axis
+/// (cells), and how the winding number changes there in the direction of the axis.
+pub fn each_crossing(face: &Face, axis: Axis, bounds: [[i64; 2]; 2], mut see: impl FnMut([i64; 2], f64, i32)) {
+    let v = face.v.map(|p| axis.turned(p));
+    let flat = v.map(|p| [p[0], p[1]]);
+    let area = edge_function(flat[0], flat[1], flat[2]);
+    if area == 0 {
+        return;
+    }
+    let unit = i64::from(UNITS);
+    let (low, high) = least_and_most(flat.map(|p| p[1]));
+    let [[p0, p1], [q0, q1]] = bounds;
+    // Facing along the line (area > 0) the chain is left when the face is passed.
+    let mut change = if area > 0 { -face.coef } else { face.coef };
+    let mirror = if axis == Axis::Y { -1.0 } else { 1.0 };
+    if axis == Axis::Y {
+        change = -change;
+    }
+    let heights = v.map(|p| p[2] as f64);
+    for q in low.div_euclid(unit).max(q0)..=(high.div_euclid(unit) + 1).min(q1) {
+        let Some((left, right)) = row_extent(flat, q * unit) else { continue };
+        let left = (left / UNITS as f64).floor() as i64 - 1;
+        let right = (right / UNITS as f64).ceil() as i64 + 1;
+        for p in left.max(p0)..=right.min(p1) {
+            if let Some(height) = crossing_height(heights, flat, area, [p * unit, q * unit]) {
+                // A crossing on a voxel is one, whatever rounding says.
+                let on_voxel = (height - height.round()).abs() < SAME;
+                see([p, q], mirror * if on_voxel { height.round() } else { height }, change);
+            }
+        }
+    }
+}
+
+fn least_and_most(values: [i64; 3]) -> (i64, i64) {
     (values[0].min(values[1]).min(values[2]), values[0].max(values[1]).max(values[2]))
 }
 
@@ -157,15 +255,13 @@ fn left_of(p: [i64; 2], q: [i64; 2], value: i64) -> bool {
     }
 }
 
-/// Height (cells) at which the line through s crosses the face, if it does.
-fn crossing_height(face: &Face, v: [[i64; 2]; 3], area: i64, s: [i64; 2]) -> Option<f64> {
+/// Height (cells) at which the line through s crosses the triangle, if it does.
+fn crossing_height(heights: [f64; 3], v: [[i64; 2]; 3], area: i64, s: [i64; 2]) -> Option<f64> {
     let w = [edge_function(v[1], v[2], s), edge_function(v[2], v[0], s), edge_function(v[0], v[1], s)];
     let left = [left_of(v[1], v[2], w[0]), left_of(v[2], v[0], w[1]), left_of(v[0], v[1], w[2])];
     if left != [area > 0; 3] {
         return None;
     }
-    let z = w[0] as f64 * f64::from(face.v[0][2])
-        + w[1] as f64 * f64::from(face.v[1][2])
-        + w[2] as f64 * f64::from(face.v[2][2]);
+    let z = w[0] as f64 * heights[0] + w[1] as f64 * heights[1] + w[2] as f64 * heights[2];
     Some(z / area as f64 / f64::from(UNITS))
 }

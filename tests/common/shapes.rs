@@ -95,3 +95,62 @@ pub fn figure(n: usize) -> TriMesh {
     parts.iter().for_each(|&(a, b, radius)| mesh.append(&capsule(a, b, radius, n)));
     mesh
 }
+
+/// A sphere of meridians and parallels about the y axis (m): `n` around, `m` from pole to pole.
+pub fn globe(radius: f32, n: usize, m: usize) -> TriMesh {
+    let ring = |i: usize| {
+        let (height, across) = (std::f32::consts::PI * i as f32 / m as f32).sin_cos();
+        (0..n).map(move |j| {
+            let (sin, cos) = (std::f32::consts::TAU * j as f32 / n as f32).sin_cos();
+            Vec3::new(height * cos, across, height * sin) * radius
+        })
+    };
+    let mut positions: Vec<Vec3> = (1..m).flat_map(ring).collect();
+    let at = |i: usize, j: usize| ((i - 1) * n + j % n) as u32;
+    let [top, bottom] = [positions.len() as u32, positions.len() as u32 + 1];
+    positions.extend([Vec3::y() * radius, -Vec3::y() * radius]);
+    let mut triangles = Vec::new();
+    for j in 0..n {
+        triangles.extend([[top, at(1, j + 1), at(1, j)], [bottom, at(m - 1, j), at(m - 1, j + 1)]]);
+        for i in 1..m - 1 {
+            triangles.extend([[at(i, j), at(i, j + 1), at(i + 1, j + 1)]]);
+            triangles.extend([[at(i, j), at(i + 1, j + 1), at(i + 1, j)]]);
+        }
+    }
+    TriMesh { positions, triangles }
+}
+
+/// A wheel of `n` sides about the y axis (m).
+pub fn wheel(radius: f32, width: f32, n: usize) -> TriMesh {
+    let rim = |y: f32| {
+        let spoke = move |j: usize| {
+            let (sin, cos) = (std::f32::consts::TAU * j as f32 / n as f32).sin_cos();
+            Vec3::new(cos * radius, y, sin * radius)
+        };
+        std::iter::once(Vec3::new(0.0, y, 0.0)).chain((0..n).map(spoke))
+    };
+    let positions = rim(-width / 2.0).chain(rim(width / 2.0)).collect();
+    let other = n as u32 + 1;
+    let side = |j: u32| {
+        let (a, b) = (1 + j, 1 + (j + 1) % n as u32);
+        [[0, a, b], [other, other + b, other + a], [a, other + a, other + b], [a, other + b, b]]
+    };
+    TriMesh { positions, triangles: (0..n as u32).flat_map(side).collect() }
+}
+
+/// A ring about the y axis (m): `radius` to the middle of a tube of radius `tube`.
+pub fn torus(radius: f32, tube: f32, n: usize, m: usize) -> TriMesh {
+    let point = |i: usize, j: usize| {
+        let (sin, cos) = (std::f32::consts::TAU * i as f32 / n as f32).sin_cos();
+        let (up, out) = (std::f32::consts::TAU * j as f32 / m as f32).sin_cos();
+        Vec3::new((radius + tube * out) * cos, tube * up, (radius + tube * out) * sin)
+    };
+    let at = |i: usize, j: usize| ((i % n) * m + j % m) as u32;
+    let square = |i: usize, j: usize| {
+        [[at(i, j), at(i, j + 1), at(i + 1, j + 1)], [at(i, j), at(i + 1, j + 1), at(i + 1, j)]]
+    };
+    TriMesh {
+        positions: (0..n).flat_map(|i| (0..m).map(move |j| point(i, j))).collect(),
+        triangles: (0..n).flat_map(|i| (0..m).flat_map(move |j| square(i, j))).collect(),
+    }
+}
