@@ -190,8 +190,10 @@ float value_at(const Grid& grid, int32_t x, int32_t y, int32_t z) noexcept {
 void sample(const Grid& grid, const Call& call, rust::Slice<const double> world, bool linear, rust::Slice<float> out) {
     const auto& source = *grid.impl->grid;
     run(call, [&] {
+        Interrupter interrupter(call);
         tbb::parallel_for(
             tbb::blocked_range<size_t>(0, out.size(), 1024), [&](const tbb::blocked_range<size_t>& range) {
+                if (interrupter.wasInterrupted()) return;
                 auto tree = source.getConstAccessor();
                 for (size_t i = range.begin(); i != range.end(); ++i) {
                     const auto at =
@@ -200,6 +202,7 @@ void sample(const Grid& grid, const Call& call, rust::Slice<const double> world,
                                     : openvdb::tools::PointSampler::sample(tree, at);
                 }
             });
+        interrupter.check();
     });
 }
 
