@@ -21,7 +21,7 @@ use crate::harness::{Bound, Harness};
 
 /// Rounds for each function.
 const ROUNDS: usize = 2000;
-const VOXEL: f64 = 0.02;
+const VOXEL: f64 = 0.04;
 
 /// What a call answered, and all bytes of what it made or changed; none where it made nothing.
 type Answer = (frz_status, Vec<u8>);
@@ -70,7 +70,7 @@ fn view<T>(elements: &[T]) -> frz_view {
 
 impl Host {
     fn new() -> Self {
-        let mut ball = shapes::sphere(0.15, 12);
+        let mut ball = shapes::sphere(0.15, 8);
         ball.positions.iter_mut().for_each(|p| p.y += 0.3);
         let moved = |p: &frazil::base::Vec3| [p.x + 0.1, p.y - 0.05, p.z + 0.05];
         let spread = |n: usize, step: usize| (n * step % 97) as f32 / 97.0;
@@ -83,7 +83,7 @@ impl Host {
             ball_end: ball.positions.iter().map(moved).collect(),
             ball,
             centres: (0..60).map(|n| [spread(n, 13), spread(n, 29), spread(n, 53)]).collect(),
-            radii: (0..60).map(|n| 0.05 + 0.05 * spread(n, 71)).collect(),
+            radii: (0..60).map(|n| 0.08 + 0.08 * spread(n, 71)).collect(),
         };
         // SAFETY: the pointers are valid, and the arrays outlive the host.
         unsafe {
