@@ -154,8 +154,9 @@ mod tests {
         }
         assert_eq!(pool.threads(), 1);
         assert_eq!(rayon::current_thread_index(), None, "afterwards it is no worker any more");
-        let caught = std::panic::catch_unwind(|| pool.install(|| panic!("on purpose")));
-        assert_eq!(caught.unwrap_err().downcast_ref(), Some(&"on purpose"));
+        let fall = || -> usize { panic!("on purpose") };
+        let caught = catch_unwind(AssertUnwindSafe(|| pool.install(fall)));
+        assert_eq!(caught.unwrap_err().downcast_ref::<&str>(), Some(&"on purpose"));
         assert_eq!(pool.install(|| pool.install(|| 7)), 7);
     }
 
