@@ -2,6 +2,8 @@
 
 #[path = "gates/bytes.rs"]
 mod bytes;
+#[path = "gates/cancel.rs"]
+mod cancel;
 #[path = "gates/capi.rs"]
 mod capi;
 #[path = "../tests/common/mod.rs"]
@@ -42,5 +44,6 @@ fn main() {
     readers::run(&mut h);
     shot::run(&mut h);
     capi::run(&mut h);
+    cancel::run(&mut h);
     h.finish();
 }

@@ -38,6 +38,7 @@ struct Meta;
 struct GridHeader;
 struct Call;
 struct Triangles;
+struct Part;
 struct Hit;
 
 std::unique_ptr<Grid> make_grid(double voxel, float background, bool level_set);
@@ -89,7 +90,7 @@ std::unique_ptr<Grid> from_mesh(const Call& call, rust::Slice<const float> point
                                 double voxel, float half_width);
 std::unique_ptr<Grid> from_particles(const Call& call, rust::Slice<const double> positions,
                                      rust::Slice<const float> radii, double voxel, float half_width);
-Triangles to_mesh(const Grid& grid, const Call& call, double iso, double adaptivity);
+Triangles to_mesh(const Grid& grid, const Call& call, double iso, double adaptivity, const Part& part);
 void measure(const Grid& grid, const Call& call, double& area, double& volume);
 void cast_rays(const Grid& grid, const Call& call, rust::Slice<const double> rays, rust::Slice<Hit> hits);
 

@@ -18,8 +18,23 @@ namespace frazil {
 using Leaf = openvdb::FloatTree::LeafNodeType;
 static_assert(Leaf::SIZE == 512 && sizeof(Leaf::NodeMaskType) == 64, "a leaf is 8 x 8 x 8 with a 64-byte mask");
 
+namespace {
+
+/// Runs what has no call with threads of its own on this thread alone: outside of an arena TBB would start workers, as
+/// many as there are cores, for a host that asked for none.
+template <typename Work>
+auto here(Work&& work) {
+    tbb::task_arena arena(1);
+    return arena.execute(std::forward<Work>(work));
+}
+
+}  // namespace
+
 Grid::Grid(std::unique_ptr<Impl> impl) : impl(std::move(impl)) {}
-Grid::~Grid() = default;
+Grid::~Grid() {
+    // OpenVDB takes trees down in parallel.
+    if (impl) here([&] { impl.reset(); });
+}
 
 void initialise() {
     static std::once_flag once;
@@ -46,7 +61,9 @@ std::unique_ptr<Grid> make_grid(double voxel, float background, bool level_set) 
     return wrap(grid);
 }
 
-std::unique_ptr<Grid> copy_grid(const Grid& grid) { return wrap(grid.impl->grid->deepCopy()); }
+std::unique_ptr<Grid> copy_grid(const Grid& grid) {
+    return here([&] { return wrap(grid.impl->grid->deepCopy()); });
+}
 
 double voxel_size(const Grid& grid) noexcept { return grid.impl->grid->voxelSize()[0]; }
 
@@ -72,12 +89,18 @@ void set_grid_class(Grid& grid, int32_t value) {
 }
 rust::String name(const Grid& grid) noexcept { return rust::String::lossy(grid.impl->grid->getName()); }
 void set_name(Grid& grid, rust::Str name) { grid.impl->grid->setName(std::string(name)); }
-uint64_t active_voxels(const Grid& grid) noexcept { return grid.impl->grid->activeVoxelCount(); }
-size_t leaf_count(const Grid& grid) noexcept { return grid.impl->grid->tree().leafCount(); }
-uint64_t memory_bytes(const Grid& grid) noexcept { return grid.impl->grid->memUsage(); }
+uint64_t active_voxels(const Grid& grid) noexcept {
+    return here([&] { return grid.impl->grid->activeVoxelCount(); });
+}
+size_t leaf_count(const Grid& grid) noexcept {
+    return here([&] { return grid.impl->grid->tree().leafCount(); });
+}
+uint64_t memory_bytes(const Grid& grid) noexcept {
+    return here([&] { return grid.impl->grid->memUsage(); });
+}
 
 bool active_bbox(const Grid& grid, std::array<int32_t, 3>& low, std::array<int32_t, 3>& high) {
-    const auto box = grid.impl->grid->evalActiveVoxelBoundingBox();
+    const auto box = here([&] { return grid.impl->grid->evalActiveVoxelBoundingBox(); });
     if (box.empty()) return false;
     for (int axis = 0; axis < 3; ++axis) {
         low[axis] = box.min()[axis];
@@ -105,7 +128,7 @@ LeafView view(const Leaf& leaf) {
 rust::Vec<LeafView> leaves(const Grid& grid) {
     const auto& tree = grid.impl->grid->tree();
     rust::Vec<LeafView> out;
-    out.reserve(tree.leafCount());
+    out.reserve(leaf_count(grid));
     for (auto leaf = tree.cbeginLeaf(); leaf; ++leaf) out.push_back(view(*leaf));
     return out;
 }
@@ -177,7 +200,7 @@ void put_blocks(Grid& grid, Blocks& blocks) {
 
 uint64_t file_bound(const Grid& grid) noexcept {
     // What a file holds of a leaf and of the nodes above it, none of it packed, with room for the codec's own words.
-    const auto counts = grid.impl->grid->tree().nodeCount();
+    const auto counts = here([&] { return grid.impl->grid->tree().nodeCount(); });
     constexpr uint64_t leaf = 2048 + 3 * 64 + 64, lower = 4096 * 4 + 2 * 512 + 256, upper = 32768 * 4 + 2 * 4096 + 256;
     constexpr uint64_t rest = 1 << 16;
     return counts[0] * leaf + counts[1] * lower + counts[2] * upper + rest;
@@ -190,8 +213,10 @@ float value_at(const Grid& grid, int32_t x, int32_t y, int32_t z) noexcept {
 void sample(const Grid& grid, const Call& call, rust::Slice<const double> world, bool linear, rust::Slice<float> out) {
     const auto& source = *grid.impl->grid;
     run(call, [&] {
+        Interrupter interrupter(call);
         tbb::parallel_for(
             tbb::blocked_range<size_t>(0, out.size(), 1024), [&](const tbb::blocked_range<size_t>& range) {
+                if (interrupter.wasInterrupted()) return;
                 auto tree = source.getConstAccessor();
                 for (size_t i = range.begin(); i != range.end(); ++i) {
                     const auto at =
@@ -200,6 +225,7 @@ void sample(const Grid& grid, const Call& call, rust::Slice<const double> world,
                                     : openvdb::tools::PointSampler::sample(tree, at);
                 }
             });
+        interrupter.check();
     });
 }
 

@@ -31,7 +31,7 @@ struct Cancelled : std::runtime_error {
     Cancelled() : std::runtime_error("frazil: cancelled") {}
 };
 
-/// Stops OpenVDB's tools when the context's cancel flag is set.
+/// Stops OpenVDB's tools when the call is cancelled; the flag stays up until the call has ended.
 class Interrupter : public openvdb::util::NullInterrupter {
 public:
     explicit Interrupter(const Call& call) : flag_(reinterpret_cast<const volatile bool*>(call.cancel)) {}

@@ -8,6 +8,8 @@
 #include <tbb/blocked_range.h>
 #include <tbb/parallel_for.h>
 
+#include <vector>
+
 namespace frazil {
 
 namespace {
@@ -27,6 +29,57 @@ struct IndexMesh {
     }
 };
 
+constexpr int32_t LEAF = 8;
+
+/// Voxels whose part of the surface is wanted, and the blocks that hold them.
+struct Wanted {
+    openvdb::BoolGrid::Ptr mask;
+    std::vector<openvdb::Coord> blocks;
+};
+
+Wanted wanted_of(const openvdb::FloatGrid& grid, const Part& part) {
+    Wanted out{openvdb::BoolGrid::create(false), {}};
+    out.mask->setTransform(grid.transform().copy());
+    for (size_t i = 0; i + 2 < part.origins.size(); i += 3) {
+        const openvdb::Coord origin(part.origins[i], part.origins[i + 1], part.origins[i + 2]);
+        out.mask->fill(openvdb::CoordBBox(origin, origin.offsetBy(LEAF - 1)), true);
+        out.blocks.push_back(origin);
+    }
+    openvdb::CoordBBox box(part.low[0], part.low[1], part.low[2], part.high[0], part.high[1], part.high[2]);
+    // No farther than the grid reaches: a box may be as large as it likes.
+    openvdb::CoordBBox reach = grid.evalActiveVoxelBoundingBox();
+    if (reach.empty() || !part.origins.empty()) return out;
+    reach.expand(LEAF);
+    box.intersect(reach);
+    if (box.empty()) return out;
+    out.mask->fill(box, true);
+    for (auto leaf = grid.tree().cbeginLeaf(); leaf; ++leaf) {
+        if (leaf->getNodeBoundingBox().hasOverlap(box)) out.blocks.push_back(leaf->origin());
+    }
+    return out;
+}
+
+/// Some blocks of a grid and those around them: all that a mesh of their voxels depends on.
+openvdb::FloatGrid::Ptr around(const openvdb::FloatGrid& grid, const std::vector<openvdb::Coord>& blocks) {
+    const auto out = openvdb::FloatGrid::create(grid.background());
+    out->setTransform(grid.transform().copy());
+    out->setGridClass(grid.getGridClass());
+    auto from = grid.getConstAccessor();
+    auto to = out->getAccessor();
+    for (const auto& block : blocks) {
+        for (int n = 0; n < 27; ++n) {
+            const auto at = block.offsetBy((n / 9 - 1) * LEAF, (n / 3 % 3 - 1) * LEAF, (n % 3 - 1) * LEAF);
+            if (to.probeConstLeaf(at) != nullptr) continue;
+            if (const auto* leaf = from.probeConstLeaf(at)) {
+                to.addLeaf(new openvdb::FloatTree::LeafNodeType(*leaf));
+            } else {
+                to.addTile(1, at, from.getValue(at), false);
+            }
+        }
+    }
+    return out;
+}
+
 }  // namespace
 
 std::unique_ptr<Grid> from_mesh(const Call& call, rust::Slice<const float> points, rust::Slice<const uint32_t> indices,
@@ -43,10 +96,19 @@ std::unique_ptr<Grid> from_mesh(const Call& call, rust::Slice<const float> point
     });
 }
 
-Triangles to_mesh(const Grid& grid, const Call& call, double iso, double adaptivity) {
+Triangles to_mesh(const Grid& grid, const Call& call, double iso, double adaptivity, const Part& part) {
     return run(call, [&] {
         openvdb::tools::VolumeToMesh mesher(iso, adaptivity);
-        mesher(*grid.impl->grid);
+        const openvdb::FloatGrid& whole = *grid.impl->grid;
+        if (part.whole) {
+            mesher(whole);
+        } else {
+            const Wanted wanted = wanted_of(whole, part);
+            mesher.setSurfaceMask(wanted.mask);
+            mesher(*around(whole, wanted.blocks));
+        }
+        // A transform that mirrors turns the polygons round.
+        const bool mirrored = whole.transform().baseMap()->determinant() < 0.0;
         Interrupter(call).check();
         Triangles out;
         out.points.reserve(mesher.pointListSize() * 3);
@@ -57,8 +119,8 @@ Triangles to_mesh(const Grid& grid, const Call& call, double iso, double adaptiv
         const auto add = [&](openvdb::Index32 a, openvdb::Index32 b, openvdb::Index32 c) {
             // OpenVDB's polygons are clockwise seen from outside.
             out.indices.push_back(a);
-            out.indices.push_back(c);
-            out.indices.push_back(b);
+            out.indices.push_back(mirrored ? b : c);
+            out.indices.push_back(mirrored ? c : b);
         };
         for (size_t n = 0; n < mesher.polygonPoolListSize(); ++n) {
             const auto& pool = mesher.polygonPoolList()[n];

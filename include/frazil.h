@@ -36,7 +36,7 @@
 /**
  * Version of the interface that this header describes: major << 16 | minor.
  */
-#define FRZ_ABI_VERSION 65536
+#define FRZ_ABI_VERSION 65537
 
 /**
  * Version of frazil that this header belongs to.
@@ -243,6 +243,11 @@ enum frz_mesh_part
      * uint32_t[3] for each triangle that the faces are cut into: vertices.
      */
     FRZ_MESH_TRIANGLES = 3,
+    /**
+     * float[3] for each vertex: the outward unit normal, a mean over the triangles around it weighted by their areas;
+     * zeroes where there is none.
+     */
+    FRZ_MESH_NORMALS = 4,
 };
 #ifndef __cplusplus
 #if __STDC_VERSION__ >= 202311L
@@ -369,6 +374,11 @@ typedef struct {
      * Seconds since the running call began; 0 between calls.
      */
     double seconds;
+    /**
+     * Part of the running stage that is done, 0 to 1; -1 where it is not known. Since interface 1.1: a header of 1.0 has
+     * no such field, and what it was compiled into gets none.
+     */
+    double fraction;
 } frz_progress;
 
 /**
@@ -941,7 +951,7 @@ frz_status frz_context_set_memory_limit(frz_context *context,
 
 /**
  * Cancels the call that runs with the context, and every later one until frz_context_reset: they answer
- * FRZ_CANCELLED and change nothing.
+ * FRZ_CANCELLED and change nothing. A call whose work is done when the cancel comes answers as if there were none.
  *
  * context: may be NULL.
  *
@@ -950,7 +960,8 @@ frz_status frz_context_set_memory_limit(frz_context *context,
 void frz_context_cancel(frz_context *context);
 
 /**
- * Forgets a cancel, and counts stages from 0 again.
+ * Forgets a cancel, and counts stages from 0 again, for the calls that follow. A call that runs meanwhile keeps its
+ * cancel: it never goes on with half of its work left out.
  *
  * context: may be NULL.
  *
@@ -961,7 +972,7 @@ void frz_context_reset(frz_context *context);
 /**
  * Tells what the context is doing.
  *
- * out: receives it; all zeroes after a failure.
+ * out: receives it; all zeroes after a failure, but for the fraction.
  *
  * Any thread, any time.
  */
@@ -1157,7 +1168,10 @@ frz_status frz_grid_sample_mesh(frz_context *context,
                                 const char *name);
 
 /**
- * Makes a mesh of triangles along a grid's surface, counter-clockwise seen from outside.
+ * Makes a mesh of triangles along a grid's surface, counter-clockwise seen from outside, also where the grid's transform
+ * mirrors.
+ *
+ * A cancel is heeded before and after the work, not within.
  *
  * iso: the value at the surface; of a level set a distance (m), 0 for its surface. Finite.
  * adaptivity: 0 to 1; above 0 flat regions get fewer and larger triangles.
@@ -1173,7 +1187,40 @@ frz_status frz_grid_to_mesh(frz_context *context,
                             frz_mesh **out);
 
 /**
- * Reads a grid of floats from a .vdb file.
+ * As frz_grid_to_mesh, of the voxels in a box. The meshes of boxes beside each other meet; each triangle is in one.
+ *
+ * voxel_min: int32_t[3]: the least voxel on each axis.
+ * voxel_max: int32_t[3]: the greatest voxel on each axis, included; not less than voxel_min.
+ * out: receives the mesh, to be destroyed with frz_mesh_destroy; NULL after a failure.
+ *
+ * Any number of threads may read a grid; one thread at a time for each context.
+ */
+frz_status frz_grid_to_mesh_box(frz_context *context,
+                                const frz_grid *grid,
+                                float iso,
+                                float adaptivity,
+                                const int32_t *voxel_min,
+                                const int32_t *voxel_max,
+                                frz_mesh **out);
+
+/**
+ * As frz_grid_to_mesh, of some blocks only, for instance those of frz_base_dirty: what it costs grows with their number.
+ * The meshes of different blocks meet; each triangle is in one.
+ *
+ * origins: int32_t[3] for each block, multiples of 8.
+ * out: receives the mesh, to be destroyed with frz_mesh_destroy; NULL after a failure.
+ *
+ * Any number of threads may read a grid; one thread at a time for each context.
+ */
+frz_status frz_grid_to_mesh_blocks(frz_context *context,
+                                   const frz_grid *grid,
+                                   float iso,
+                                   float adaptivity,
+                                   frz_view origins,
+                                   frz_mesh **out);
+
+/**
+ * Reads a grid of floats from a .vdb file. A cancel is heeded before and after the work, not within.
  *
  * path: UTF-8.
  * name: which grid; NULL for the first level set, else the first grid of floats. FRZ_ERROR_FILE names those that
@@ -1188,7 +1235,8 @@ frz_status frz_grid_load(frz_context *context,
                          frz_grid **out);
 
 /**
- * Writes grids into one .vdb file. The file is there when it is whole: it is written under another name first.
+ * Writes grids into one .vdb file. The file is there when it is whole: it is written under another name first. A cancel is
+ * heeded before it is begun, not within.
  *
  * grids: count pointers to grids of different names.
  * path: UTF-8; an existing file is replaced.
@@ -1207,7 +1255,8 @@ frz_status frz_grid_save(frz_context *context,
 /**
  * Reads a grid of floats from the bytes of a .vdb file.
  *
- * Bytes must come from a .vdb file: OpenVDB does not survive every kind of damage.
+ * Bytes must come from a .vdb file: OpenVDB does not survive every kind of damage. What cannot be used is
+ * FRZ_ERROR_FILE. A cancel is heeded before and after the work, not within.
  *
  * bytes: size bytes.
  * name: as in frz_grid_load.
@@ -1222,7 +1271,8 @@ frz_status frz_grid_from_bytes(frz_context *context,
                                frz_grid **out);
 
 /**
- * Writes grids as the bytes of one .vdb file, the same bytes for the same grids.
+ * Writes grids as the bytes of one .vdb file, the same bytes for the same grids. A cancel is heeded before and after the
+ * work, not within.
  *
  * grids: count pointers to grids of different names.
  * compression: a frz_compression.
@@ -1264,8 +1314,8 @@ frz_status frz_levelset_from_mesh(frz_context *context,
  * Makes a level set of the union of spheres.
  *
  * positions: float[3] for each sphere (m), finite.
- * radii: float for each sphere (m), finite, above 0. Spheres smaller than a voxel and a half are left out: the grid
- *     cannot hold them.
+ * radii: float for each sphere (m), finite, above 0, as large as memory allows. Spheres smaller than a voxel and a half
+ *     are left out: the grid cannot hold them.
  * voxel_size: edge of a voxel (m), 1e-6 to 1000.
  * half_width: of the band of distances on each side (voxels), 3 to 64.
  * out: receives the grid, to be destroyed with frz_grid_destroy; NULL after a failure.
@@ -1334,7 +1384,8 @@ frz_status frz_levelset_displace(frz_context *context, frz_grid *inout, const fr
  *
  * It is exact up to 0.02 voxel: no dents between poses, no ripples.
  *
- * bodies: count bodies, at least one.
+ * bodies: count bodies, at least one. A vertex farther than 131064 voxels from the first vertex of the first body is out of
+ *     reach: FRZ_ERROR_ARGUMENT names its body, counted from 0.
  * dt: length of the step (s); 0: the bodies where they are at its beginning.
  * voxel_size: edge of a voxel (m), 1e-6 to 1000.
  * half_width: of the band of distances on each side (voxels), 3 to 64.
@@ -1386,7 +1437,8 @@ frz_status frz_base_params_init(frz_base_params *params, size_t size);
  * params: NULL for the usual ones.
  * snow: a level set with voxels fixed in the world, for instance from frz_snow_layer or frz_grid_load; it is copied.
  * restart: restart_bytes bytes of frz_base_save of a layer made from the same snow: what it held comes back bit for
- *     bit, on any number of threads. NULL: untouched.
+ *     bit, on any number of threads. NULL: untouched. Bytes that are damaged, of another version or of other snow are
+ *     FRZ_ERROR_FILE.
  * restart_bytes: 0 without a restart.
  * out: receives the layer, to be destroyed with frz_base_destroy; NULL after a failure.
  *
@@ -1402,7 +1454,7 @@ frz_status frz_base_create(frz_context *context,
 /**
  * Destroys a base layer, and the grids that it lent; NULL is fine.
  *
- * base: may be NULL.
+ * base: may be NULL. Not while a call uses it or one of its grids: it then stays, with all of them.
  *
  * One thread at a time.
  */
@@ -1424,7 +1476,8 @@ frz_status frz_base_set_params(frz_base *base,
  *
  * The work is done aside and put in place at the end: after a failure or a cancel the layer is as it was before.
  *
- * bodies: count bodies; NULL with a count of 0.
+ * bodies: count bodies; NULL with a count of 0. A vertex farther than 131072 voxels from the middle of the snow is out of
+ *     reach: FRZ_ERROR_ARGUMENT names its body, counted from 0, and nothing is changed.
  * count: number of bodies.
  * dt: length of the step (s). 0: the bodies are cut out where they are at its beginning, as the first frame of a
  *     shot wants it.
@@ -1496,6 +1549,16 @@ const frz_grid *frz_base_compression(const frz_base *base);
  * One thread at a time.
  */
 const frz_grid *frz_base_touched(const frz_base *base);
+
+/**
+ * Tells the box that the snow lies in: no step makes it larger.
+ *
+ * min: receives double[3], its least corner (m); zeroes after a failure.
+ * max: receives double[3], its greatest corner (m); zeroes after a failure.
+ *
+ * One thread at a time.
+ */
+frz_status frz_base_bounds(const frz_base *base, double *min, double *max);
 
 /**
  * Lends the places of the blocks that the last step changed in any of the layer's grids, ascending: with

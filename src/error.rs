@@ -18,6 +18,9 @@ pub enum Error {
         /// What is wrong with it, with the line or element where known.
         what: String,
     },
+    /// What bytes in the place of a file hold, a saved state for instance, cannot be used.
+    #[error("{0}")]
+    Bytes(String),
     /// The operating system refused an operation on a file.
     #[error("{}: cannot {action}: {}", path.display(), os_reason(source))]
     Io {

@@ -1,6 +1,7 @@
 """Snow that bodies press into: frazil's C library from Python, with NumPy arrays and no build.
 
-The library is found through FRAZIL_LIBRARY, else beside an installed package, else by the system's loader.
+The library is found through FRAZIL_LIBRARY, else beside the module, else in the tree that it was installed with, else
+by the system's loader.
 
     import frazil, numpy
     ctx = frazil.Context(threads=2)
@@ -9,16 +10,17 @@ The library is found through FRAZIL_LIBRARY, else beside an installed package, e
     frazil.save(ctx, [base.grid, base.compression], "pressed.vdb")
 
 Lengths are metres, times seconds; Y is up. Everything that fails raises frazil.Error with one sentence.
+Handles have close(), and work in with blocks.
 """
 
 from ._library import ABI_VERSION, Error, library, version
-from .context import Context
+from .context import Context, Pool
 from .grid import Grid, Leaf, load, save
 from .mesh import Mesh
 from .snow import Base, Body, Noise, snow_layer
 from . import level_set
 
 __all__ = [
-    "ABI_VERSION", "Base", "Body", "Context", "Error", "Grid", "Leaf", "Mesh", "Noise", "level_set", "library", "load",
-    "save", "snow_layer", "version",
+    "ABI_VERSION", "Base", "Body", "Context", "Error", "Grid", "Leaf", "Mesh", "Noise", "Pool", "level_set", "library",
+    "load", "save", "snow_layer", "version",
 ]

@@ -1,14 +1,26 @@
 """The C library: finding it, its structs, its errors."""
 
+import contextlib
 import ctypes as c
 import os
 import pathlib
+import signal
+import threading
 
 import numpy as np
 
-ABI_VERSION = 0x10000
+ABI_VERSION = 0x10001
 
 OK, CANCELLED = 0, 5
+
+
+class Struct(c.Structure):
+    """A struct that shows its fields."""
+
+    def __repr__(self):
+        named = [(name, getattr(self, name)) for name, *_ in self._fields_ if name not in ("struct_size", "reserved")]
+        listed = [(name, tuple(value) if isinstance(value, c.Array) else value) for name, value in named]
+        return f"<{type(self).__name__} {' '.join(f'{name}={value!r}' for name, value in listed)}>"
 
 
 class View(c.Structure):
@@ -19,11 +31,12 @@ class Span(c.Structure):
     _fields_ = [("data", c.c_void_p), ("count", c.c_size_t), ("stride", c.c_size_t)]
 
 
-class Progress(c.Structure):
-    _fields_ = [("stage", c.c_char * 32), ("stages_done", c.c_uint64), ("seconds", c.c_double)]
+class Progress(Struct):
+    _fields_ = [("stage", c.c_char * 32), ("stages_done", c.c_uint64), ("seconds", c.c_double),
+                ("fraction", c.c_double)]
 
 
-class StageTime(c.Structure):
+class StageTime(Struct):
     _fields_ = [("stage", c.c_char * 32), ("seconds", c.c_double)]
 
 
@@ -38,7 +51,7 @@ class MeshDesc(c.Structure):
     ]
 
 
-class MeshInfo(c.Structure):
+class MeshInfo(Struct):
     _fields_ = [
         ("struct_size", c.c_uint32), ("closed", c.c_uint32), ("vertex_count", c.c_uint64),
         ("face_count", c.c_uint64), ("corner_count", c.c_uint64), ("triangle_count", c.c_uint64),
@@ -61,7 +74,7 @@ class GridDesc(c.Structure):
     ]
 
 
-class GridInfo(c.Structure):
+class GridInfo(Struct):
     _fields_ = [
         ("struct_size", c.c_uint32), ("grid_class", c.c_uint32), ("voxel_size", c.c_double),
         ("background", c.c_float), ("world_fixed", c.c_uint32), ("active_voxels", c.c_uint64),
@@ -70,7 +83,7 @@ class GridInfo(c.Structure):
     ]
 
 
-class NoiseParams(c.Structure):
+class NoiseParams(Struct):
     _fields_ = [("amplitude", c.c_double), ("size", c.c_double), ("octaves", c.c_uint32), ("seed", c.c_int32)]
 
 
@@ -91,13 +104,13 @@ class SnowDesc(c.Structure):
     ]
 
 
-class BaseParams(c.Structure):
+class BaseParams(Struct):
     _fields_ = [
         ("struct_size", c.c_uint32), ("flags", c.c_uint32), ("tolerance", c.c_double), ("noise", NoiseParams),
     ]
 
 
-class BaseReport(c.Structure):
+class BaseReport(Struct):
     _fields_ = [
         ("struct_size", c.c_uint32), ("reserved", c.c_uint32), ("removed_volume", c.c_double),
         ("base_volume", c.c_double), ("touched_blocks", c.c_uint64), ("sweep_faces", c.c_uint64),
@@ -133,7 +146,8 @@ _FUNCTIONS = {
     "levelset_sweep": [_P, _P, _Z, _D, _D, _F, _P], "snow_desc_init": [_P, _Z], "snow_layer": [_P, _P, _P],
     "base_params_init": [_P, _Z], "base_create": [_P, _P, _P, _P, _Z, _P], "base_set_params": [_P, _P],
     "base_step": [_P, _P, _P, _Z, _D, c.c_int32, _P], "base_save": [_P, _P, _P, _Z, _P],
-    "base_dirty": [_P, _P, _P],
+    "base_dirty": [_P, _P, _P], "base_bounds": [_P, _P, _P], "grid_to_mesh_box": [_P, _P, _F, _F, _P, _P, _P],
+    "grid_to_mesh_blocks": [_P, _P, _F, _F, View, _P],
 }
 _VOID = ["pool_destroy", "context_destroy", "context_cancel", "context_reset", "mesh_destroy", "grid_destroy",
          "base_destroy"]
@@ -153,17 +167,28 @@ class Error(Exception):
         return self.status == CANCELLED
 
 
+LIBRARY = "libfrazil.so.1"
+
+
 def _find():
+    """Where the library is: FRAZIL_LIBRARY, beside this module, in the tree that it was installed with, or wherever the
+    system's loader looks."""
     named = os.environ.get("FRAZIL_LIBRARY")
     if named:
         return named
-    # PREFIX/share/frazil/python/frazil/_library.py and PREFIX/lib/libfrazil.so.1
-    installed = pathlib.Path(__file__).resolve().parents[4] / "lib" / "libfrazil.so.1"
-    return str(installed) if installed.exists() else "libfrazil.so.1"
+    here = pathlib.Path(__file__).resolve()
+    # The second: PREFIX/share/frazil/python/frazil/_library.py and PREFIX/lib/libfrazil.so.1
+    near = [folder / LIBRARY for folder in (here.parent, *(top / "lib" for top in here.parents[4:5]))]
+    return next((str(path) for path in near if path.exists()), LIBRARY)
 
 
 def _load():
-    lib = c.CDLL(_find())
+    path = _find()
+    try:
+        lib = c.CDLL(path)
+    except OSError as error:
+        raise ImportError(f"frazil's C library was not found ({error}): set FRAZIL_LIBRARY to the path of {LIBRARY}, or "
+                          f"put it beside {pathlib.Path(__file__).parent}") from None
     lib.frz_version.restype = c.c_uint32
     lib.frz_last_error.restype = c.c_char_p
     for name, arguments in _FUNCTIONS.items():
@@ -187,17 +212,84 @@ def version():
     return number // 1000000, number // 1000 % 1000, number % 1000
 
 
+class _Calls(threading.local):
+    """What callbacks raised in this thread's running call: it is raised again when the call has ended, for nothing may
+    be thrown through C."""
+
+    raised = None
+    # The contexts that were cancelled because of it.
+    stopped = ()
+
+
+_calls = _Calls()
+
+
+def keep(error):
+    """Keeps what a callback raised, the first of a call; the call should be cancelled."""
+    if _calls.raised is None:
+        _calls.raised = error
+
+
+def stops(context):
+    """Whether something was raised in this call, so that its context has to stop."""
+    if _calls.raised is None:
+        return False
+    _calls.stopped = (*_calls.stopped, context)
+    return True
+
+
+@contextlib.contextmanager
+def _interruptible():
+    """Keeps what a handler of Ctrl-C raises within C: Python runs it in whatever callback comes next, and would lose an
+    exception that it raises before the callback's first line."""
+    before = signal.getsignal(signal.SIGINT) if threading.current_thread() is threading.main_thread() else None
+    if not callable(before):
+        yield
+        return
+
+    def handler(number, frame):
+        try:
+            before(number, frame)
+        except BaseException as error:  # KeyboardInterrupt is none of Exception
+            keep(error)
+
+    signal.signal(signal.SIGINT, handler)
+    try:
+        yield
+    finally:
+        signal.signal(signal.SIGINT, before)
+
+
 def call(name, *arguments):
-    """Calls frz_<name>; raises Error where it fails."""
-    status = getattr(library, "frz_" + name)(*arguments)
+    """Calls frz_<name>; raises what a callback raised in it, or Error where it fails."""
+    outer = _calls.raised, _calls.stopped
+    _calls.raised, _calls.stopped = None, ()
+    try:
+        with _interruptible():
+            status = getattr(library, "frz_" + name)(*arguments)
+            said = library.frz_last_error() if status != OK else b""
+        raised, stopped = _calls.raised, _calls.stopped
+    finally:
+        _calls.raised, _calls.stopped = outer
+    if raised is not None:
+        for context in stopped:
+            context.go_on()
+        raise raised
     if status != OK:
-        raise Error(status, library.frz_last_error().decode("utf-8", "replace"))
+        raise Error(status, said.decode("utf-8", "replace"))
 
 
 def made(name, *arguments):
     """Calls frz_<name> with an out-pointer at the end; the new handle."""
     out = c.c_void_p()
-    call(name, *arguments, c.byref(out))
+    try:
+        call(name, *arguments, c.byref(out))
+    except BaseException:
+        # A callback raised at the end of a call that went well.
+        if out.value:
+            kind = "mesh" if name.startswith("grid_to_mesh") else name.split("_")[0] if name.endswith("_create") else "grid"
+            getattr(library, f"frz_{kind}_destroy")(out.value)
+        raise
     return out.value
 
 
@@ -225,16 +317,50 @@ def text(value):
 
 
 class Handle:
-    """What a C handle is wrapped in: destroyed with it."""
+    """What a C handle is wrapped in: destroyed by close(), at the end of a with block, or when nobody holds it."""
 
     _destroy = None
 
     def __init__(self, pointer, owner=None):
-        self.pointer = pointer
-        # What is lent keeps its owner alive.
+        self._pointer = pointer
+        # What is lent keeps its owner alive, and ends with it.
         self._owner = owner
 
+    @property
+    def pointer(self):
+        """The C handle."""
+        if self.closed:
+            raise ValueError(f"the {type(self).__name__} is closed")
+        return self._pointer
+
+    @property
+    def closed(self):
+        """Whether close() was called, here or on what lends it."""
+        owner = getattr(self, "_owner", None)
+        return not getattr(self, "_pointer", None) or (owner is not None and owner.closed)
+
+    def close(self):
+        """Gives the memory back now; closing twice is fine. Not within a call that uses it."""
+        pointer, self._pointer = getattr(self, "_pointer", None), None
+        if pointer and getattr(self, "_owner", None) is None and library is not None:
+            getattr(library, self._destroy)(pointer)
+
+    def __enter__(self):
+        return self
+
+    def __exit__(self, *_):
+        self.close()
+
     def __del__(self):
-        if getattr(self, "pointer", None) and getattr(self, "_owner", None) is None:
-            getattr(library, self._destroy)(self.pointer)
-            self.pointer = None
+        self.close()
+
+    def __repr__(self):
+        try:
+            words = "closed" if self.closed else self._words()
+        except Error as error:
+            words = str(error)
+        return f"<frazil.{type(self).__name__} {words}>"
+
+    def _words(self):
+        """What tells it from others."""
+        raise NotImplementedError

@@ -1,47 +1,93 @@
 """Threads, cancel, progress, warnings."""
 
 import ctypes as c
+import weakref
 
-from ._library import ABI_VERSION, LOG, POLL, Handle, Progress, Span, StageTime, call, library, made
+from ._library import ABI_VERSION, LOG, POLL, Handle, Progress, Span, StageTime, call, keep, library, made, stops
+
+
+class Pool(Handle):
+    """Worker threads that any number of contexts share. 0: all work is done by the thread that calls."""
+
+    _destroy = "frz_pool_destroy"
+
+    def __init__(self, threads=0):
+        self.threads = threads
+        super().__init__(made("pool_create", threads))
+
+    def _words(self):
+        return f"of {self.threads} threads"
 
 
 class Context(Handle):
-    """One computation's side channel, on worker threads of its own or on those of another context.
+    """One computation's side channel, on worker threads of its own or on those of a Pool.
 
     poll(stage, stages_done, seconds) is called on this thread some ten times a second at least; a true answer
-    cancels. log(text) takes warnings. Neither may raise: Python prints such exceptions and goes on.
+    cancels. log(text) takes warnings. What either of them raises, and Ctrl-C, ends the running call, which changes
+    nothing, and is raised by it.
     """
 
     _destroy = "frz_context_destroy"
 
-    def __init__(self, threads=0, poll=None, log=None, memory_limit=0):
-        pool = made("pool_create", threads)
-        try:
-            super().__init__(made("context_create", ABI_VERSION, pool))
-        finally:
-            # The context keeps the threads.
-            library.frz_pool_destroy(pool)
-        self._callbacks = []
-        if poll:
-            self._callbacks.append(POLL(lambda _, progress: self._ask(poll, progress.contents)))
-            call("context_set_poll", self.pointer, c.cast(self._callbacks[-1], c.c_void_p), None)
+    def __init__(self, threads=0, poll=None, log=None, memory_limit=0, pool=None):
+        if pool is not None and threads:
+            raise ValueError("threads are the pool's: give one of the two")
+        self._shares = pool is not None
+        self.pool = pool if self._shares else Pool(threads)
+        super().__init__(made("context_create", ABI_VERSION, self.pool.pointer))
+        self._asked = False
+        # A reference from here to itself would keep its threads until the garbage collector comes.
+        me = weakref.ref(self)
+        # Kept here as long as C may call them. There is always a poll: Ctrl-C is heard in it.
+        self._poll = POLL(lambda _, progress: me()._ask(poll, progress))
+        call("context_set_poll", self.pointer, c.cast(self._poll, c.c_void_p), None)
         if log:
-            self._callbacks.append(LOG(lambda _, said: log(said.decode("utf-8", "replace"))))
-            call("context_set_log", self.pointer, c.cast(self._callbacks[-1], c.c_void_p), None)
+            self._log = LOG(lambda _, said: me()._tell(log, said))
+            call("context_set_log", self.pointer, c.cast(self._log, c.c_void_p), None)
         if memory_limit:
             call("context_set_memory_limit", self.pointer, memory_limit)
 
-    @staticmethod
-    def _ask(poll, progress):
-        return 1 if poll(progress.stage.decode(), progress.stages_done, progress.seconds) else 0
+    def close(self):
+        """Gives the context back, and its threads if they are its own."""
+        super().close()
+        if not getattr(self, "_shares", True):
+            self.pool.close()
+
+    def _ask(self, poll, progress):
+        try:
+            now = progress.contents
+            answer = poll is not None and poll(now.stage.decode(), now.stages_done, now.seconds)
+            self._asked |= bool(answer)
+        except BaseException as error:  # KeyboardInterrupt is none of Exception
+            keep(error)
+            answer = False
+        return int(stops(self) or bool(answer))
+
+    def _tell(self, log, said):
+        try:
+            log(said.decode("utf-8", "replace"))
+        except BaseException as error:
+            keep(error)
+        if stops(self):
+            library.frz_context_cancel(self.pointer)
+
+    def go_on(self):
+        """Forgets the cancel of a call that an exception ended, unless somebody asked for one besides."""
+        if not self._asked:
+            library.frz_context_reset(self.pointer)
 
     def cancel(self):
         """Cancels the running call and later ones until reset(); from any thread."""
+        self._asked = True
         library.frz_context_cancel(self.pointer)
 
     def reset(self):
-        """Forgets a cancel."""
+        """Forgets a cancel, for the calls that follow."""
+        self._asked = False
         library.frz_context_reset(self.pointer)
+
+    def _words(self):
+        return f"on {self.pool.threads} threads"
 
     def progress(self):
         """What is being done: (stage, stages done, seconds); from any thread."""

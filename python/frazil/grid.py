@@ -46,6 +46,11 @@ class Grid(Handle):
         """Reads a grid out of the bytes of a .vdb file."""
         return cls(made("grid_from_bytes", ctx.pointer, data, len(data), text(name)))
 
+    def _words(self):
+        info = self.info
+        kind = ("grid", "level set", "fog")[info.grid_class] if info.grid_class < 3 else "grid"
+        return f"\"{self.name}\", {kind} of {info.active_voxels} active voxels of {info.voxel_size:g} m"
+
     def copy(self, ctx):
         """A copy of its own."""
         return Grid(made("grid_copy", ctx.pointer, self.pointer))
@@ -92,9 +97,17 @@ class Grid(Handle):
         call("grid_sample", ctx.pointer, self.pointer, view(positions), int(linear), span(out))
         return out
 
-    def to_mesh(self, ctx, iso=0.0, adaptivity=0.0):
-        """Triangles along the surface."""
-        return Mesh._of(made("grid_to_mesh", ctx.pointer, self.pointer, iso, adaptivity))
+    def to_mesh(self, ctx, iso=0.0, adaptivity=0.0, box=None, blocks=None):
+        """Triangles along the surface: all of it, in a box of voxels (least, greatest), or in blocks (n, 3), for instance
+        those of Base.dirty()."""
+        start = ctx.pointer, self.pointer, iso, adaptivity
+        if blocks is not None:
+            origins = rows(blocks, np.int32, 3)
+            return Mesh._of(made("grid_to_mesh_blocks", *start, view(origins)))
+        if box is not None:
+            low, high = ((c.c_int32 * 3)(*corner) for corner in box)
+            return Mesh._of(made("grid_to_mesh_box", *start, low, high))
+        return Mesh._of(made("grid_to_mesh", *start))
 
     def sample_mesh(self, ctx, mesh, name=None, linear=True):
         """Gives a mesh's vertices the grid's values as an attribute."""

@@ -34,6 +34,10 @@ class Mesh(Handle):
         Handle.__init__(mesh, pointer)
         return mesh
 
+    def _words(self):
+        info = self.info
+        return f"of {info.vertex_count} vertices and {info.face_count} faces"
+
     @property
     def info(self):
         """Counts, box, area and volume, as frz_mesh_info has them."""
@@ -65,6 +69,11 @@ class Mesh(Handle):
     def triangles(self):
         """(t, 3) vertices of the triangles that the faces are cut into."""
         return self._read(3, np.uint32, (self.info.triangle_count, 3))
+
+    @property
+    def normals(self):
+        """(n, 3) outward unit normals of the vertices."""
+        return self._read(4, np.float32, (self.info.vertex_count, 3))
 
     def attribute(self, name):
         """(n, k) floats."""

@@ -90,6 +90,10 @@ class Base(Handle):
                 library.frz_base_touched)
         self._pointers = [function(self.pointer) for function in lent]
 
+    def _words(self):
+        info = self.grid.info
+        return f"of {info.active_voxels} active voxels of {info.voxel_size:g} m"
+
     @staticmethod
     def _params(tolerance, noise):
         params = BaseParams()
@@ -124,6 +128,13 @@ class Base(Handle):
         if not count.value:
             return np.empty((0, 3), np.int32)
         return np.ctypeslib.as_array(c.cast(origins, c.POINTER(c.c_int32)), (count.value, 3)).copy()
+
+    @property
+    def bounds(self):
+        """The box that the snow lies in (m): its least and greatest corner."""
+        low, high = (c.c_double * 3)(), (c.c_double * 3)()
+        call("base_bounds", self.pointer, low, high)
+        return tuple(low), tuple(high)
 
     @property
     def grid(self):

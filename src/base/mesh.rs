@@ -32,6 +32,18 @@ impl TriMesh {
         Some(self.positions.iter().fold((first, first), |(low, high), p| (low.inf(p), high.sup(p))))
     }
 
+    /// Unit normals of the vertices: means over the triangles around, weighted by their areas; zero where there is none.
+    pub fn normals(&self) -> Vec<Vec3> {
+        let mut sums = vec![DVec3::zeros(); self.positions.len()];
+        for (triangle, corners) in self.triangles.iter().enumerate() {
+            let [a, b, c] = self.corners(triangle);
+            let doubled = (b - a).cross(&(c - a));
+            corners.iter().for_each(|&corner| sums[corner as usize] += doubled);
+        }
+        let unit = |sum: &DVec3| sum.try_normalize(0.0).unwrap_or_default().cast();
+        sums.iter().map(unit).collect()
+    }
+
     /// Enclosed volume by the divergence theorem (m3); exact for a closed mesh.
     pub fn volume(&self) -> f64 {
         let Some((low, _)) = self.bounds() else { return 0.0 };

@@ -7,10 +7,10 @@ use super::body::{Shapes, bodies, frz_body};
 use super::context::{creates, enter, frz_context};
 use super::grid::{Grid, frz_grid};
 use super::guard::{Failure, Outcome, frz_status, guard};
-use super::handle::{Noun, change, clear, destroy, give, read, required};
+use super::handle::{Noun, change, clear, destroy_whole, free, give, read, required};
 use super::level_set::frz_noise;
 use super::mesh::no_flags;
-use super::views::{Sized32, fill, frz_view, sized, write_bytes};
+use super::views::{Sized32, fill, finite, frz_view, sized, write_bytes};
 use crate::base::blocks::Origin;
 use crate::snow::base_layer::{BaseLayer, Params};
 use crate::vdb::FloatGrid;
@@ -42,6 +42,13 @@ unsafe impl Sized32 for frz_base_params {
 
 impl frz_base_params {
     const USUAL: Self = Self { struct_size: 0, flags: 0, tolerance: 0.02, noise: frz_noise::USUAL };
+
+    /// Refuses flags without a meaning, and what is no number.
+    fn check(&self) -> Outcome {
+        no_flags(self.flags, 0)?;
+        finite("tolerance", self.tolerance)?;
+        self.noise.check()
+    }
 
     /// The library's own parameters for voxels of a size (m).
     fn params(&self, cell: f64) -> Params {
@@ -130,8 +137,8 @@ impl Layer {
 impl Drop for Layer {
     fn drop(&mut self) {
         for grid in self.lent {
-            // SAFETY: made in `new`, and nobody may use a lent grid after its owner.
-            let _ = unsafe { destroy(grid) };
+            // SAFETY: made in `new`; whoever destroys the layer has seen that nobody uses them.
+            unsafe { free(grid) };
         }
     }
 }
@@ -153,7 +160,8 @@ pub unsafe extern "C" fn frz_base_params_init(params: *mut frz_base_params, size
 /// params: NULL for the usual ones.
 /// snow: a level set with voxels fixed in the world, for instance from frz_snow_layer or frz_grid_load; it is copied.
 /// restart: restart_bytes bytes of frz_base_save of a layer made from the same snow: what it held comes back bit for
-///     bit, on any number of threads. NULL: untouched.
+///     bit, on any number of threads. NULL: untouched. Bytes that are damaged, of another version or of other snow are
+///     FRZ_ERROR_FILE.
 /// restart_bytes: 0 without a restart.
 /// out: receives the layer, to be destroyed with frz_base_destroy; NULL after a failure.
 ///
@@ -177,7 +185,7 @@ pub unsafe extern "C" fn frz_base_create(
             } else {
                 sized(params, frz_base_params::USUAL)?
             };
-            no_flags(params.flags, 0)?;
+            params.check()?;
             let params = params.params(snow.voxel_size());
             let state =
                 frz_view { data: restart, count: restart_bytes, stride: 0 }.elements::<u8>("restart")?;
@@ -194,13 +202,13 @@ pub unsafe extern "C" fn frz_base_create(
 
 /// Destroys a base layer, and the grids that it lent; NULL is fine.
 ///
-/// base: may be NULL.
+/// base: may be NULL. Not while a call uses it or one of its grids: it then stays, with all of them.
 ///
 /// One thread at a time.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn frz_base_destroy(base: *mut frz_base) {
     // SAFETY: the layer is NULL or was not destroyed.
-    guard(|| unsafe { destroy(base) });
+    guard(|| unsafe { destroy_whole(base, |layer: &Layer| layer.lent.to_vec()) });
 }
 
 /// Sets how bodies press from the next step on. All parameters may change between steps; what cannot change, the
@@ -219,7 +227,7 @@ pub unsafe extern "C" fn frz_base_set_params(
         unsafe {
             let mut base = change(base)?;
             let params = sized(params, frz_base_params::USUAL)?;
-            no_flags(params.flags, 0)?;
+            params.check()?;
             let params = params.params(base.layer.surface().voxel_size());
             Ok(base.layer.set_params(params)?)
         }
@@ -230,7 +238,8 @@ pub unsafe extern "C" fn frz_base_set_params(
 ///
 /// The work is done aside and put in place at the end: after a failure or a cancel the layer is as it was before.
 ///
-/// bodies: count bodies; NULL with a count of 0.
+/// bodies: count bodies; NULL with a count of 0. A vertex farther than 131072 voxels from the middle of the snow is out of
+///     reach: FRZ_ERROR_ARGUMENT names its body, counted from 0, and nothing is changed.
 /// count: number of bodies.
 /// dt: length of the step (s). 0: the bodies are cut out where they are at its beginning, as the first frame of a
 ///     shot wants it.
@@ -367,6 +376,29 @@ pub unsafe extern "C" fn frz_base_compression(base: *const frz_base) -> *const f
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn frz_base_touched(base: *const frz_base) -> *const frz_grid {
     lent(base, 3)
+}
+
+/// Tells the box that the snow lies in: no step makes it larger.
+///
+/// min: receives double[3], its least corner (m); zeroes after a failure.
+/// max: receives double[3], its greatest corner (m); zeroes after a failure.
+///
+/// One thread at a time.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn frz_base_bounds(base: *const frz_base, min: *mut f64, max: *mut f64) -> frz_status {
+    guard(|| {
+        // SAFETY: the pointers are NULL or the caller's.
+        unsafe {
+            let [min, max] = [min.cast::<[f64; 3]>(), max.cast::<[f64; 3]>()];
+            clear(min);
+            clear(max);
+            let [min, max] = [required(min, "min")?, required(max, "max")?];
+            let (low, high) = read(base)?.layer.bounds();
+            min.write_unaligned(low.into());
+            max.write_unaligned(high.into());
+            Ok(())
+        }
+    })
 }
 
 /// Lends the places of the blocks that the last step changed in any of the layer's grids, ascending: with

@@ -1,13 +1,13 @@
 //! Moving bodies, as a host describes them for one step.
 
-use std::collections::HashMap;
+use std::collections::{HashMap, HashSet};
 use std::sync::Arc;
 
 use rayon::prelude::*;
 
 use super::guard::{Failure, Outcome};
 use super::mesh::{no_flags, polygons};
-use super::views::{Sized32, frz_view, sized};
+use super::views::{Sized32, check_size, finite, frz_view, sized};
 use crate::base::{DVec3, PolygonMesh, Vec3};
 use crate::context::Context;
 use crate::error::Result;
@@ -118,7 +118,8 @@ pub(super) unsafe fn bodies(
     dt: f64,
     shapes: &mut Shapes,
 ) -> Outcome<Vec<Body>> {
-    if !(dt >= 0.0 && dt.is_finite()) {
+    finite("dt", dt)?;
+    if dt < 0.0 {
         return Err(Failure::argument(format!("dt = {dt} is not 0 or more")));
     }
     // SAFETY: the caller's promise.
@@ -130,13 +131,16 @@ pub(super) unsafe fn bodies(
     let known = &*shapes;
     let make = |body: Arrived| {
         ctx.check()?;
+        ctx.advance();
         let triangles = body.mesh.triangles();
         let motion = HostMotion { triangles, poses: body.poses, end: dt };
         let made = Body::shaped(Box::new(motion), 0.0, known.get(&body.id).cloned())?;
         Ok((body.id, made.with_noise(!body.exact)))
     };
-    let made: Vec<(u64, Body)> =
-        ctx.stage("bodies", || arrived.into_par_iter().map(make).collect::<Result<_>>())?;
+    let made: Vec<(u64, Body)> = ctx.stage("bodies", || {
+        ctx.expect(arrived.len());
+        arrived.into_par_iter().map(make).collect::<Result<_>>()
+    })?;
     made.iter().for_each(|(id, body)| warn(ctx, *id, body, shapes.get(id)));
     *shapes = made.iter().map(|(id, body)| (*id, body.shape().clone())).collect();
     Ok(made.into_iter().map(|(_, body)| body).collect())
@@ -165,23 +169,30 @@ unsafe fn arrived(list: *const frz_body, count: usize, dt: f64) -> Outcome<Vec<A
     let first = super::handle::required(list.cast_mut(), "bodies")?.cast_const();
     // SAFETY: the caller's promise: the size of a body is there.
     let stride = unsafe { first.cast::<u32>().read_unaligned() } as usize;
-    let room = frz_view { data: first.cast(), count, stride: stride.max(4) };
+    // Before it is believed: it says where the next body is.
+    check_size::<frz_body>(stride).map_err(|failure| named(0, failure))?;
+    let room = frz_view { data: first.cast(), count, stride };
     // SAFETY: as above; the sizes must be the same for the bodies to lie one after another.
     let sizes = unsafe { room.elements::<u32>("bodies") }?;
     if sizes.iter().any(|&size| size as usize != stride) {
         return Err(Failure::argument("bodies: their struct_size differs"));
     }
     let mut out: Vec<Arrived> = Vec::with_capacity(count);
+    let mut ids = HashSet::with_capacity(count);
     for at in 0..count {
-        let named = |failure: Failure| Failure { text: format!("body {at}: {}", failure.text), ..failure };
         // SAFETY: the caller's promise.
-        let body = unsafe { one(first.byte_add(at * stride), dt) }.map_err(named)?;
-        if out.iter().any(|other| other.id == body.id) {
+        let body = unsafe { one(first.byte_add(at * stride), dt) }.map_err(|failure| named(at, failure))?;
+        if !ids.insert(body.id) {
             return Err(Failure::argument(format!("body {at}: another one has the id {} too", body.id)));
         }
         out.push(body);
     }
     Ok(out)
+}
+
+/// A failure of one body.
+fn named(at: usize, failure: Failure) -> Failure {
+    Failure { text: format!("body {at}: {}", failure.text), ..failure }
 }
 
 /// # Safety

@@ -11,7 +11,7 @@ use super::handle::{Noun, Reading, clear, destroy, give, read, required};
 use super::library::FRZ_ABI_VERSION;
 use super::pool::{Threads, frz_pool};
 use super::views::{Plain, frz_span};
-use crate::context::{Context, Progress, StageTime, machine_memory};
+use crate::context::{Context, Progress, Running, StageTime, machine_memory};
 
 /// One computation: cancel flag, progress, polls, warnings, stage times. Cheap: make one for every cook.
 pub struct frz_context {
@@ -28,7 +28,13 @@ pub struct frz_progress {
     pub stages_done: u64,
     /// Seconds since the running call began; 0 between calls.
     pub seconds: f64,
+    /// Part of the running stage that is done, 0 to 1; -1 where it is not known. Since interface 1.1: a header of 1.0 has
+    /// no such field, and what it was compiled into gets none.
+    pub fraction: f64,
 }
+
+/// Bytes of frz_progress in the header of interface 1.0.
+const FIRST_PROGRESS: usize = std::mem::offset_of!(frz_progress, fraction);
 
 /// How long a stage took.
 #[repr(C)]
@@ -77,6 +83,8 @@ pub(super) struct State {
     pub ctx: Context,
     /// Dropped last: its threads.
     _threads: Threads,
+    /// Room that the caller's header has for frz_progress (bytes).
+    progress_room: usize,
     entered: AtomicBool,
     poisoned: AtomicBool,
     began: Began,
@@ -90,7 +98,7 @@ impl Noun for frz_context {
 }
 
 /// A call that has a context to itself, but for cancel, reset and progress.
-pub(super) struct Call<'a>(Reading<'a, State>);
+pub(super) struct Call<'a>(Reading<'a, State>, Option<Running>);
 
 impl Call<'_> {
     /// The library's own context.
@@ -116,11 +124,12 @@ pub(super) unsafe fn enter<'a>(context: *const frz_context) -> Outcome<Call<'a>>
     if state.entered.swap(true, Ordering::AcqRel) {
         return Err(Failure::new(FRZ_ERROR_BUSY, "the context is in use by another call"));
     }
-    let call = Call(state);
+    let mut call = Call(state, None);
     if call.0.poisoned.load(Ordering::Acquire) {
         let text = "the context saw an internal error before and can only be destroyed";
         return Err(Failure::new(FRZ_ERROR_POISONED, text));
     }
+    call.1 = Some(call.ctx().begin());
     call.ctx().take_timings();
     call.0.began.set(Some(Instant::now()));
     Ok(call)
@@ -156,6 +165,8 @@ impl Drop for Call<'_> {
             *self.0.timings.lock().unwrap_or_else(PoisonError::into_inner) = timings;
         }
         self.0.began.set(None);
+        // The next call must not begin within this one: it would have its cancel.
+        self.1.take();
         self.0.entered.store(false, Ordering::Release);
     }
 }
@@ -186,8 +197,14 @@ fn usual_limit() -> u64 {
 }
 
 fn progress_of(progress: &Progress, began: &Began) -> frz_progress {
-    let Progress { stage, stages_done } = *progress;
-    frz_progress { stage: letters(stage), stages_done: stages_done as u64, seconds: began.seconds() }
+    let Progress { stage, stages_done, part } = *progress;
+    let fraction = part.map_or(-1.0, f64::from);
+    frz_progress {
+        stage: letters(stage),
+        stages_done: stages_done as u64,
+        seconds: began.seconds(),
+        fraction,
+    }
 }
 
 /// Makes a context on a pool.
@@ -224,6 +241,7 @@ pub unsafe extern "C" fn frz_context_create(
                 State {
                     ctx,
                     _threads: threads,
+                    progress_room: if abi & 0xffff == 0 { FIRST_PROGRESS } else { size_of::<frz_progress>() },
                     entered: AtomicBool::new(false),
                     poisoned: AtomicBool::new(false),
                     began: Began::default(),
@@ -328,7 +346,7 @@ pub unsafe extern "C" fn frz_context_set_memory_limit(context: *mut frz_context,
 }
 
 /// Cancels the call that runs with the context, and every later one until frz_context_reset: they answer
-/// FRZ_CANCELLED and change nothing.
+/// FRZ_CANCELLED and change nothing. A call whose work is done when the cancel comes answers as if there were none.
 ///
 /// context: may be NULL.
 ///
@@ -341,7 +359,8 @@ pub unsafe extern "C" fn frz_context_cancel(context: *mut frz_context) {
     }
 }
 
-/// Forgets a cancel, and counts stages from 0 again.
+/// Forgets a cancel, and counts stages from 0 again, for the calls that follow. A call that runs meanwhile keeps its
+/// cancel: it never goes on with half of its work left out.
 ///
 /// context: may be NULL.
 ///
@@ -357,7 +376,7 @@ pub unsafe extern "C" fn frz_context_reset(context: *mut frz_context) {
 
 /// Tells what the context is doing.
 ///
-/// out: receives it; all zeroes after a failure.
+/// out: receives it; all zeroes after a failure, but for the fraction.
 ///
 /// Any thread, any time.
 #[unsafe(no_mangle)]
@@ -366,12 +385,13 @@ pub unsafe extern "C" fn frz_context_progress(
     out: *mut frz_progress,
 ) -> frz_status {
     guard(|| {
-        let out = required(out, "out")?;
-        // SAFETY: the pointers are NULL or the caller's.
+        let out = required(out, "out")?.cast::<u8>();
+        // SAFETY: the pointers are NULL or the caller's, who has as much room as the header of its context says.
         unsafe {
-            out.write_bytes(0, 1);
+            out.write_bytes(0, FIRST_PROGRESS);
             let state = read(context)?;
-            out.write(progress_of(&state.ctx.progress(), &state.began));
+            let told = progress_of(&state.ctx.progress(), &state.began);
+            std::ptr::copy_nonoverlapping((&raw const told).cast::<u8>(), out, state.progress_room);
         }
         Ok(())
     })

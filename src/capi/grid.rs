@@ -8,7 +8,7 @@ use super::context::{creates, frz_context};
 use super::guard::{Failure, Outcome, frz_status, guard};
 use super::handle::{Noun, change, clear, destroy, read, required};
 use super::mesh::no_flags;
-use super::views::{Plain, Sized32, fill, frz_span, frz_view, meaning, sized, text, write_bytes};
+use super::views::{Plain, Sized32, fill, finite, frz_span, frz_view, meaning, sized, text, write_bytes};
 use crate::base::blocks::{Block, BlockEdit, Mask, Origin, VOXELS, Values};
 use crate::vdb::{FloatGrid, GridClass, Leaf, Probe};
 
@@ -156,6 +156,7 @@ fn number_of(class: GridClass) -> u32 {
 
 /// Checks the edge of a voxel (m).
 pub(super) fn check_voxel(voxel: f64) -> Outcome {
+    finite("voxel_size", voxel)?;
     if !(1e-6..=1e3).contains(&voxel) {
         return Err(Failure::argument(format!("voxel_size = {voxel} is not within 1e-6 to 1000 m")));
     }
@@ -165,7 +166,8 @@ pub(super) fn check_voxel(voxel: f64) -> Outcome {
 /// Farthest voxel of a leaf from the origin.
 const FARTHEST: i32 = 1 << 30;
 
-fn check_origin(origin: Origin) -> Outcome<Origin> {
+/// Checks the place of a block.
+pub(super) fn check_origin(origin: Origin) -> Outcome<Origin> {
     if origin.iter().any(|&index| index & 7 != 0 || !(-FARTHEST..=FARTHEST).contains(&index)) {
         let text = format!("origin {origin:?} is no block's: multiples of 8 within -2^30 to 2^30");
         return Err(Failure::argument(text));
@@ -244,9 +246,7 @@ pub unsafe extern "C" fn frz_grid_create(
             no_flags(desc.flags, 0)?;
             let class = meaning("grid_class", "frz_grid_class", desc.grid_class, &CLASSES)?;
             check_voxel(desc.voxel_size)?;
-            if !desc.background.is_finite() {
-                return Err(Failure::argument("background is not finite"));
-            }
+            finite("background", f64::from(desc.background))?;
             let half_width = f64::from(desc.background) / desc.voxel_size;
             if class == GridClass::LevelSet && !(2.999..=64.001).contains(&half_width) {
                 let text = format!("background: the band is {half_width:.2} voxels wide, not 3 to 64");

@@ -9,6 +9,7 @@ use super::guard::{Failure, Outcome, frz_status, guard};
 use super::handle::{Reading, clear, read};
 use super::mesh::no_flags;
 use super::views::{Plain, frz_view, meaning, text, write_bytes};
+use crate::error::Error;
 use crate::vdb::FloatGrid;
 use crate::vdb::file::{self, Compression, WriteOptions};
 
@@ -66,7 +67,7 @@ unsafe fn several<'a>(grids: *const *const frz_grid, count: usize) -> Outcome<Ve
     Ok(grids)
 }
 
-/// Reads a grid of floats from a .vdb file.
+/// Reads a grid of floats from a .vdb file. A cancel is heeded before and after the work, not within.
 ///
 /// path: UTF-8.
 /// name: which grid; NULL for the first level set, else the first grid of floats. FRZ_ERROR_FILE names those that
@@ -96,7 +97,8 @@ pub unsafe extern "C" fn frz_grid_load(
     }
 }
 
-/// Writes grids into one .vdb file. The file is there when it is whole: it is written under another name first.
+/// Writes grids into one .vdb file. The file is there when it is whole: it is written under another name first. A cancel is
+/// heeded before it is begun, not within.
 ///
 /// grids: count pointers to grids of different names.
 /// path: UTF-8; an existing file is replaced.
@@ -122,14 +124,15 @@ pub unsafe extern "C" fn frz_grid_save(
             let options = options(compression, flags)?;
             let grids = several(grids, count)?;
             let list: Vec<&FloatGrid> = grids.iter().map(|grid| grid.get()).collect();
-            Ok(ctx.stage("write", || file::write(path, &list, &options))?)
+            Ok(ctx.stage_in_place("write", || file::write(path, &list, &options))?)
         }
     })
 }
 
 /// Reads a grid of floats from the bytes of a .vdb file.
 ///
-/// Bytes must come from a .vdb file: OpenVDB does not survive every kind of damage.
+/// Bytes must come from a .vdb file: OpenVDB does not survive every kind of damage. What cannot be used is
+/// FRZ_ERROR_FILE. A cancel is heeded before and after the work, not within.
 ///
 /// bytes: size bytes.
 /// name: as in frz_grid_load.
@@ -150,13 +153,20 @@ pub unsafe extern "C" fn frz_grid_from_bytes(
             ctx.allow("a grid from bytes", size as u64)?;
             let bytes = frz_view { data: bytes, count: size, stride: 0 }.elements::<u8>("bytes")?;
             let name = text(name, "name")?;
-            let grid = ctx.stage("read", || file::from_bytes(&bytes, name))?;
+            let grid = ctx.stage("read", || {
+                // What is wrong with them is no matter of how the function was called.
+                file::from_bytes(&bytes, name).map_err(|error| match error {
+                    Error::Argument(what) => Error::Bytes(what),
+                    other => other,
+                })
+            })?;
             Ok(Grid::Own(grid))
         })
     }
 }
 
-/// Writes grids as the bytes of one .vdb file, the same bytes for the same grids.
+/// Writes grids as the bytes of one .vdb file, the same bytes for the same grids. A cancel is heeded before and after the
+/// work, not within.
 ///
 /// grids: count pointers to grids of different names.
 /// compression: a frz_compression.

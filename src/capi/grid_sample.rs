@@ -3,12 +3,12 @@
 use std::ffi::c_char;
 
 use super::context::{creates, enter, frz_context};
-use super::grid::frz_grid;
+use super::grid::{check_origin, frz_grid};
 use super::guard::{Failure, Outcome, frz_status, guard};
-use super::handle::{Changing, change, read};
+use super::handle::{Changing, change, read, required};
 use super::mesh::{Mesh, frz_mesh};
-use super::views::{frz_span, frz_view, meaning, text};
-use crate::base::DVec3;
+use super::views::{frz_span, frz_view, meaning, text, within};
+use crate::base::{DVec3, TriMesh};
 use crate::context::Context;
 use crate::vdb::{FloatGrid, level_set};
 
@@ -99,7 +99,37 @@ pub unsafe extern "C" fn frz_grid_sample_mesh(
     })
 }
 
-/// Makes a mesh of triangles along a grid's surface, counter-clockwise seen from outside.
+/// Bytes of a leaf's part of a mesh, while it is made.
+const BYTES_PER_LEAF: u64 = 6000;
+
+/// A function of the interface that makes a mesh of a grid.
+///
+/// # Safety
+/// The pointers must be NULL or the caller's.
+unsafe fn meshes(
+    context: *mut frz_context,
+    grid: *const frz_grid,
+    [iso, adaptivity]: [f32; 2],
+    out: *mut *mut frz_mesh,
+    make: impl FnOnce(&Context, &FloatGrid) -> Outcome<TriMesh>,
+) -> frz_status {
+    // SAFETY: the caller's promise.
+    unsafe {
+        creates(context, out, |ctx| {
+            let held = read(grid)?;
+            if !iso.is_finite() {
+                return Err(Failure::argument("iso is not finite"));
+            }
+            within("adaptivity", f64::from(adaptivity), 0.0..=1.0, "")?;
+            Ok(Mesh::of_triangles(make(ctx, held.get())?))
+        })
+    }
+}
+
+/// Makes a mesh of triangles along a grid's surface, counter-clockwise seen from outside, also where the grid's transform
+/// mirrors.
+///
+/// A cancel is heeded before and after the work, not within.
 ///
 /// iso: the value at the surface; of a level set a distance (m), 0 for its surface. Finite.
 /// adaptivity: 0 to 1; above 0 flat regions get fewer and larger triangles.
@@ -115,22 +145,73 @@ pub unsafe extern "C" fn frz_grid_to_mesh(
     adaptivity: f32,
     out: *mut *mut frz_mesh,
 ) -> frz_status {
-    /// Bytes of a leaf's part of a mesh, while it is made.
-    const BYTES_PER_LEAF: u64 = 6000;
     // SAFETY: the pointers are NULL or the caller's.
     unsafe {
-        creates(context, out, |ctx| {
-            let held = read(grid)?;
-            if !iso.is_finite() {
-                return Err(Failure::argument("iso is not finite"));
-            }
-            if !(0.0..=1.0).contains(&adaptivity) {
-                return Err(Failure::argument(format!("adaptivity = {adaptivity} is not within 0 to 1")));
-            }
-            let grid = held.get();
+        meshes(context, grid, [iso, adaptivity], out, |ctx, grid| {
             ctx.allow("a mesh of the grid", grid.leaf_count() as u64 * BYTES_PER_LEAF)?;
-            let mesh = ctx.stage("mesh", || level_set::to_mesh(ctx, grid, iso, adaptivity))?;
-            Ok(Mesh::of_triangles(mesh))
+            Ok(ctx.stage("mesh", || level_set::to_mesh(ctx, grid, iso, adaptivity))?)
+        })
+    }
+}
+
+/// As frz_grid_to_mesh, of the voxels in a box. The meshes of boxes beside each other meet; each triangle is in one.
+///
+/// voxel_min: int32_t[3]: the least voxel on each axis.
+/// voxel_max: int32_t[3]: the greatest voxel on each axis, included; not less than voxel_min.
+/// out: receives the mesh, to be destroyed with frz_mesh_destroy; NULL after a failure.
+///
+/// Any number of threads may read a grid; one thread at a time for each context.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn frz_grid_to_mesh_box(
+    context: *mut frz_context,
+    grid: *const frz_grid,
+    iso: f32,
+    adaptivity: f32,
+    voxel_min: *const i32,
+    voxel_max: *const i32,
+    out: *mut *mut frz_mesh,
+) -> frz_status {
+    // SAFETY: the pointers are NULL or the caller's.
+    unsafe {
+        meshes(context, grid, [iso, adaptivity], out, |ctx, grid| {
+            let corner = |pointer: *const i32, name: &str| -> Outcome<[i32; 3]> {
+                let pointer = required(pointer.cast_mut(), name)?;
+                Ok(pointer.cast::<[i32; 3]>().read_unaligned())
+            };
+            let corners = [corner(voxel_min, "voxel_min")?, corner(voxel_max, "voxel_max")?];
+            if (0..3).any(|axis| corners[0][axis] > corners[1][axis]) {
+                let text = format!("voxel_max = {:?} is less than voxel_min = {:?}", corners[1], corners[0]);
+                return Err(Failure::argument(text));
+            }
+            ctx.allow("a mesh of the grid", grid.leaf_count() as u64 * BYTES_PER_LEAF)?;
+            Ok(ctx.stage("mesh", || level_set::box_to_mesh(ctx, grid, iso, adaptivity, corners))?)
+        })
+    }
+}
+
+/// As frz_grid_to_mesh, of some blocks only, for instance those of frz_base_dirty: what it costs grows with their number.
+/// The meshes of different blocks meet; each triangle is in one.
+///
+/// origins: int32_t[3] for each block, multiples of 8.
+/// out: receives the mesh, to be destroyed with frz_mesh_destroy; NULL after a failure.
+///
+/// Any number of threads may read a grid; one thread at a time for each context.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn frz_grid_to_mesh_blocks(
+    context: *mut frz_context,
+    grid: *const frz_grid,
+    iso: f32,
+    adaptivity: f32,
+    origins: frz_view,
+    out: *mut *mut frz_mesh,
+) -> frz_status {
+    // SAFETY: the pointers are NULL or the caller's.
+    unsafe {
+        meshes(context, grid, [iso, adaptivity], out, |ctx, grid| {
+            let origins = origins.elements::<[i32; 3]>("origins")?;
+            origins.iter().try_for_each(|&origin| check_origin(origin).map(drop))?;
+            ctx.allow("a mesh of the blocks", origins.len() as u64 * BYTES_PER_LEAF)?;
+            Ok(ctx.stage("mesh", || level_set::blocks_to_mesh(ctx, grid, iso, adaptivity, &origins))?)
         })
     }
 }

@@ -69,7 +69,7 @@ impl From<Error> for Failure {
     fn from(error: Error) -> Self {
         let status = match &error {
             Error::Argument(_) => FRZ_ERROR_ARGUMENT,
-            Error::File { .. } => FRZ_ERROR_FILE,
+            Error::File { .. } | Error::Bytes(_) => FRZ_ERROR_FILE,
             Error::Io { .. } => FRZ_ERROR_IO,
             Error::Memory { .. } => FRZ_ERROR_MEMORY,
             Error::Cancelled => FRZ_CANCELLED,

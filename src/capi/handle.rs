@@ -133,18 +133,67 @@ pub(super) unsafe fn change<'a, N: Noun>(pointer: *mut N) -> Outcome<Changing<'a
 /// # Safety
 /// As [`read`]; nobody may use the handle afterwards.
 pub(super) unsafe fn destroy<N: Noun>(pointer: *mut N) -> Outcome {
+    // SAFETY: the caller's promise; there are no parts.
+    unsafe { destroy_whole::<N, N>(pointer, |_| Vec::new()) }
+}
+
+/// Destroys a handle whose value lends handles of its own, which its drop has to [`free`]; NULL is fine. Where one of
+/// all these is in use, all stay as they are.
+///
+/// # Safety
+/// As [`destroy`], also for the lent ones.
+pub(super) unsafe fn destroy_whole<N: Noun, P: Noun>(
+    pointer: *mut N,
+    lent: impl FnOnce(&N::Value) -> Vec<*mut P>,
+) -> Outcome {
     if pointer.is_null() {
         return Ok(());
     }
     // SAFETY: the caller's promise.
     let handle = unsafe { look(pointer.cast_const()) }?;
+    let whole = seize::<N>(handle)?;
+    // SAFETY: nobody else uses it.
+    let lent = lent(unsafe { &*handle.value.get() });
+    // SAFETY: they live as long as the value.
+    let take = |part: &*mut P| seize::<P>(unsafe { look(part.cast_const()) }?);
+    let parts = lent.iter().map(take).collect::<Outcome<Vec<Seized<'_, P::Value>>>>()?;
+    // All of them are nobody's now, and stay so.
+    std::mem::forget((whole, parts));
+    // SAFETY: made by `give`, and nobody uses it.
+    unsafe { free(pointer) };
+    Ok(())
+}
+
+/// Destroys a handle that nobody can use any more.
+///
+/// # Safety
+/// It must come from [`give`], and nobody may use it now or afterwards.
+pub(super) unsafe fn free<N: Noun>(pointer: *mut N) {
+    if pointer.is_null() {
+        return;
+    }
+    let handle = pointer.cast::<Handle<N::Value>>();
+    // SAFETY: the caller's promise.
+    unsafe {
+        (*handle).tag.store(GONE, Ordering::Release);
+        drop(Box::from_raw(handle));
+    }
+}
+
+/// A handle that nobody else may begin to use; poisoned or not.
+struct Seized<'a, T>(&'a Handle<T>);
+
+fn seize<N: Noun>(handle: &Handle<N::Value>) -> Outcome<Seized<'_, N::Value>> {
     if handle.users.compare_exchange(0, CHANGING, Ordering::AcqRel, Ordering::Relaxed).is_err() {
         return Err(busy::<N>());
     }
-    handle.tag.store(GONE, Ordering::Release);
-    // SAFETY: made by `give`, and nobody uses it.
-    drop(unsafe { Box::from_raw(pointer.cast::<Handle<N::Value>>()) });
-    Ok(())
+    Ok(Seized(handle))
+}
+
+impl<T> Drop for Seized<'_, T> {
+    fn drop(&mut self) {
+        self.0.users.store(0, Ordering::Release);
+    }
 }
 
 fn busy<N: Noun>() -> Failure {
@@ -240,6 +289,44 @@ mod tests {
             assert_eq!(read::<Jar>(std::ptr::null()).err().unwrap().text, "the jar is NULL");
             assert!(destroy(jar).is_ok());
             assert!(destroy::<Jar>(std::ptr::null_mut()).is_ok());
+        }
+    }
+
+    /// Lends a jar.
+    struct Shelf(*mut Jar);
+
+    impl Noun for Shelf {
+        type Value = Shelf;
+        const NAME: &'static str = "shelf";
+        const TAG: u32 = 3;
+    }
+
+    impl Drop for Shelf {
+        fn drop(&mut self) {
+            // SAFETY: the test lets nobody use it then.
+            unsafe { free(self.0) };
+        }
+    }
+
+    #[test]
+    fn what_lends_a_handle_in_use_stays_with_all_that_it_lends() {
+        let lent = jar(7);
+        let mut shelf: *mut Shelf = std::ptr::null_mut();
+        // SAFETY: jar and shelf live until the shelf is destroyed.
+        unsafe {
+            assert!(give(&mut shelf, Shelf(lent)).is_ok());
+            let destroyed = || destroy_whole(shelf, |shelf| vec![shelf.0]);
+            let reading = read(lent.cast_const()).ok().unwrap();
+            let refused = destroyed().err().unwrap();
+            assert_eq!(
+                (refused.status, refused.text.as_str()),
+                (FRZ_ERROR_BUSY, "the jar is in use by another call")
+            );
+            assert_eq!(*reading, 7);
+            drop(reading);
+            assert!(read(shelf.cast_const()).is_ok(), "the shelf is as it was");
+            *change(lent).ok().unwrap() += 1;
+            assert!(destroyed().is_ok());
         }
     }
 

@@ -6,12 +6,12 @@ use super::grid::{Grid, check_voxel, frz_grid};
 use super::guard::{Failure, Outcome, frz_status, guard};
 use super::handle::{change, read, required};
 use super::mesh::frz_mesh;
-use super::views::{frz_view, meaning};
+use super::views::{finite, frz_view, meaning};
 use crate::base::DVec3;
 use crate::context::Context;
-use crate::error::Result;
+use crate::error::{Error, Result};
 use crate::snow::base_layer::{self, NoiseParams};
-use crate::sweep::{self, Settings, surface_bytes};
+use crate::sweep::{self, Body, Settings, surface_bytes};
 use crate::vdb::level_set::{self, Scheme};
 use crate::vdb::{FloatGrid, GridClass};
 
@@ -66,6 +66,12 @@ impl frz_noise {
     /// What a host gets that asks for nothing.
     pub(super) const USUAL: Self = Self { amplitude: -1.0, size: -1.0, octaves: 3, seed: 0 };
 
+    /// Refuses what is no number.
+    pub(super) fn check(&self) -> Outcome {
+        finite("noise amplitude", self.amplitude)?;
+        finite("noise size", self.size)
+    }
+
     /// The library's own parameters for voxels of a size (m); none for no noise.
     pub(super) fn params(&self, cell: f64) -> Option<NoiseParams> {
         let usual = NoiseParams::for_cell(cell);
@@ -81,9 +87,10 @@ impl frz_noise {
 }
 
 fn settings(voxel: f64, half_width: f32) -> Outcome<Settings> {
+    check_voxel(voxel)?;
+    finite("half_width", f64::from(half_width))?;
     let settings = Settings { half_width, ..Settings::new(voxel) };
     settings.validate()?;
-    check_voxel(voxel)?;
     Ok(settings)
 }
 
@@ -161,8 +168,8 @@ pub unsafe extern "C" fn frz_levelset_from_mesh(
 /// Makes a level set of the union of spheres.
 ///
 /// positions: float[3] for each sphere (m), finite.
-/// radii: float for each sphere (m), finite, above 0. Spheres smaller than a voxel and a half are left out: the grid
-///     cannot hold them.
+/// radii: float for each sphere (m), finite, above 0, as large as memory allows. Spheres smaller than a voxel and a half
+///     are left out: the grid cannot hold them.
 /// voxel_size: edge of a voxel (m), 1e-6 to 1000.
 /// half_width: of the band of distances on each side (voxels), 3 to 64.
 /// out: receives the grid, to be destroyed with frz_grid_destroy; NULL after a failure.
@@ -183,7 +190,10 @@ pub unsafe extern "C" fn frz_levelset_from_particles(
             let settings = settings(voxel_size, half_width)?;
             let positions = positions.finite("positions")?;
             let radii = radii.elements::<f32>("radii")?;
-            if let Some(at) = radii.iter().position(|radius| !(*radius > 0.0 && radius.is_finite())) {
+            if let Some(at) = radii.iter().position(|radius| !radius.is_finite()) {
+                return Err(Failure::argument(format!("radii: element {at} is not finite")));
+            }
+            if let Some(at) = radii.iter().position(|radius| *radius <= 0.0) {
                 return Err(Failure::argument(format!(
                     "radii: element {at} = {} m is not above 0",
                     radii[at]
@@ -192,7 +202,7 @@ pub unsafe extern "C" fn frz_levelset_from_particles(
             let area: f64 =
                 radii.iter().map(|&radius| 4.0 * std::f64::consts::PI * f64::from(radius).powi(2)).sum();
             ctx.allow("a level set of the spheres", surface_bytes(area, voxel_size))?;
-            reachable(&positions, voxel_size)?;
+            reachable(&positions, &radii, voxel_size)?;
             let positions: Vec<DVec3> = positions.iter().map(|&p| DVec3::from(p.map(f64::from))).collect();
             let grid = ctx.stage("spheres", || {
                 level_set::from_particles(ctx, &positions, &radii, voxel_size, settings.half_width)
@@ -202,10 +212,12 @@ pub unsafe extern "C" fn frz_levelset_from_particles(
     }
 }
 
-/// Refuses positions whose voxels have no number.
-fn reachable(positions: &[[f32; 3]], voxel: f64) -> Outcome {
-    let far = |p: &[f32; 3]| p.iter().any(|&x| (f64::from(x) / voxel).abs() > f64::from(1 << 29));
-    match positions.iter().position(far) {
+/// Refuses spheres whose voxels have no number.
+fn reachable(positions: &[[f32; 3]], radii: &[f32], voxel: f64) -> Outcome {
+    let far = |(p, &radius): (&[f32; 3], &f32)| {
+        p.iter().any(|&x| (f64::from(x).abs() + f64::from(radius)) / voxel > f64::from(1 << 29))
+    };
+    match positions.iter().zip(radii).position(far) {
         Some(at) => Err(Failure::argument(format!("positions: element {at} is too far from the origin"))),
         None => Ok(()),
     }
@@ -263,12 +275,13 @@ pub unsafe extern "C" fn frz_levelset_offset(
     unsafe {
         changes(context, inout, |ctx, grid| {
             let scheme = scheme_of(scheme)?;
+            finite("distance", f64::from(distance))?;
             let voxels = f64::from(distance) / grid.voxel_size();
             if !(-1000.0..=1000.0).contains(&voxels) {
                 return Err(Failure::argument(format!("distance = {distance} m is more than 1000 voxels")));
             }
             ctx.allow("the moved level set", grown_bytes(grid, voxels))?;
-            Ok(ctx.stage("offset", || level_set::offset(ctx, grid, distance, scheme))?)
+            Ok(ctx.stage_in_place("offset", || level_set::offset(ctx, grid, distance, scheme))?)
         })
     }
 }
@@ -314,7 +327,7 @@ pub unsafe extern "C" fn frz_levelset_smooth(
                 (frz_smoothing::FRZ_SMOOTH_GAUSSIAN as u32, level_set::gaussian_filter),
             ];
             let filter = meaning("smoothing", "frz_smoothing", smoothing, &known)?;
-            Ok(ctx.stage("smooth", || filter(ctx, grid, width, times, scheme))?)
+            Ok(ctx.stage_in_place("smooth", || filter(ctx, grid, width, times, scheme))?)
         })
     }
 }
@@ -340,6 +353,7 @@ pub unsafe extern "C" fn frz_levelset_displace(
                 ));
             }
             let noise = required(noise.cast_mut(), "noise")?.read_unaligned();
+            noise.check()?;
             let Some(params) = noise.params(grid.voxel_size()) else { return Ok(()) };
             params.validate(grid.voxel_size())?;
             ctx.allow("the displaced level set", grid.memory_bytes().saturating_mul(4))?;
@@ -352,7 +366,8 @@ pub unsafe extern "C" fn frz_levelset_displace(
 ///
 /// It is exact up to 0.02 voxel: no dents between poses, no ripples.
 ///
-/// bodies: count bodies, at least one.
+/// bodies: count bodies, at least one. A vertex farther than 131064 voxels from the first vertex of the first body is out of
+///     reach: FRZ_ERROR_ARGUMENT names its body, counted from 0.
 /// dt: length of the step (s); 0: the bodies where they are at its beginning.
 /// voxel_size: edge of a voxel (m), 1e-6 to 1000.
 /// half_width: of the band of distances on each side (voxels), 3 to 64.
@@ -374,8 +389,34 @@ pub unsafe extern "C" fn frz_levelset_sweep(
         creates(context, out, |ctx| {
             let settings = settings(voxel_size, half_width)?;
             let bodies = self::bodies(ctx, bodies, count, dt, &mut Shapes::new())?;
+            ctx.polled(|| check_reach(&bodies, dt, voxel_size))?;
             let grid = ctx.polled(|| sweep::chain(ctx, &bodies, 0.0, dt, &settings))?;
             Ok(Grid::Own(grid))
         })
     }
+}
+
+/// Farthest a sweep reaches from its first vertex (voxels): what a lattice does, less the block that its base lies in.
+const REACH: f64 = 131_064.0;
+
+/// Refuses bodies that go farther than a sweep's lattice reaches, by their number.
+fn check_reach(bodies: &[Body], dt: f64, voxel: f64) -> Result<()> {
+    let mut pose = Vec::new();
+    let mut first = None;
+    for (index, body) in bodies.iter().enumerate() {
+        let times = [vec![0.0], body.motion().breaks(0.0, dt), vec![dt]].concat();
+        for time in times {
+            body.motion().pose(time, &mut pose)?;
+            let first = *first.get_or_insert(pose[0]);
+            let far = pose.iter().map(|p| (p - first).amax()).fold(0.0, f64::max);
+            if far > REACH * voxel {
+                let reach = REACH * voxel;
+                return Err(Error::argument(format!(
+                    "body {index}: a vertex lies {far:.0} m from the first one, farther than {reach:.0} m, the reach of \
+                     voxels of {voxel} m"
+                )));
+            }
+        }
+    }
+    Ok(())
 }

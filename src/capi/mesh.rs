@@ -102,6 +102,9 @@ pub enum frz_mesh_part {
     FRZ_MESH_INDICES = 2,
     /// uint32_t[3] for each triangle that the faces are cut into: vertices.
     FRZ_MESH_TRIANGLES = 3,
+    /// float[3] for each vertex: the outward unit normal, a mean over the triangles around it weighted by their areas;
+    /// zeroes where there is none.
+    FRZ_MESH_NORMALS = 4,
 }
 
 /// What a mesh's handle holds.
@@ -333,6 +336,13 @@ pub unsafe extern "C" fn frz_mesh_get_info(mesh: *const frz_mesh, info: *mut frz
     })
 }
 
+/// # Safety
+/// The span must describe memory that can be written.
+unsafe fn triples(dst: &frz_span, triples: &[Vec3]) -> Outcome {
+    // SAFETY: the caller's promise.
+    unsafe { dst.fill("dst", &triples.iter().map(|p| [p.x, p.y, p.z]).collect::<Vec<_>>()) }
+}
+
 /// Copies a part of a mesh into the caller's memory.
 ///
 /// part: a frz_mesh_part.
@@ -347,13 +357,17 @@ pub unsafe extern "C" fn frz_mesh_read(mesh: *const frz_mesh, part: u32, dst: fr
         // SAFETY: the pointers are NULL or the caller's.
         unsafe {
             let mesh = read(mesh)?;
-            let known = [FRZ_MESH_POSITIONS, FRZ_MESH_FACE_COUNTS, FRZ_MESH_INDICES, FRZ_MESH_TRIANGLES]
-                .map(|part| (part as u32, part));
+            let known = [
+                FRZ_MESH_POSITIONS,
+                FRZ_MESH_FACE_COUNTS,
+                FRZ_MESH_INDICES,
+                FRZ_MESH_TRIANGLES,
+                FRZ_MESH_NORMALS,
+            ]
+            .map(|part| (part as u32, part));
             match meaning("part", "frz_mesh_part", part, &known)? {
-                FRZ_MESH_POSITIONS => {
-                    let positions = &mesh.polygons.positions;
-                    dst.fill("dst", &positions.iter().map(|p| [p.x, p.y, p.z]).collect::<Vec<_>>())
-                }
+                FRZ_MESH_POSITIONS => triples(&dst, &mesh.polygons.positions),
+                FRZ_MESH_NORMALS => triples(&dst, &mesh.triangles.normals()),
                 FRZ_MESH_FACE_COUNTS => {
                     let counts: Vec<u32> = mesh.polygons.polygons().map(|face| face.len() as u32).collect();
                     dst.fill("dst", &counts)

@@ -2,10 +2,10 @@
 
 use super::context::{creates, frz_context};
 use super::grid::{Grid, check_voxel, frz_grid};
-use super::guard::{Failure, Outcome, frz_status, guard};
+use super::guard::{Outcome, frz_status, guard};
 use super::handle::{Reading, read};
 use super::mesh::{Mesh, frz_mesh, no_flags};
-use super::views::{Plain, Sized32, fill, frz_view, sized};
+use super::views::{Plain, Sized32, fill, finite, frz_view, sized, within};
 use crate::base::TriMesh;
 use crate::snow::base_layer::initial::{Cover, Ground, layer};
 use crate::sweep::surface_bytes;
@@ -97,11 +97,11 @@ pub unsafe extern "C" fn frz_snow_layer(
             let desc = sized(desc, frz_snow_desc::USUAL)?;
             no_flags(desc.flags, 0)?;
             check_voxel(desc.voxel_size)?;
-            if !(3.0..=64.0).contains(&desc.half_width) {
-                return Err(Failure::argument(format!(
-                    "half_width = {} is not within 3 to 64",
-                    desc.half_width
-                )));
+            within("half_width", desc.half_width, 3.0..=64.0, "")?;
+            finite("depth", desc.depth)?;
+            finite("ground_height", desc.ground_height)?;
+            for (at, &side) in desc.area.iter().enumerate() {
+                finite(&format!("area: element {at}"), side)?;
             }
             let list = frz_view { data: desc.statics.cast(), count: desc.static_count, stride: 0 };
             let list = list.elements::<Pointer>("statics")?;
@@ -117,10 +117,7 @@ pub unsafe extern "C" fn frz_snow_layer(
                 false => Cover::Top(read(desc.top)?.triangles.clone()),
             };
             let area = surfaces(&ground, &cover, &statics);
-            // What is no number is refused with its name below.
-            if !area.is_nan() {
-                ctx.allow("the layer of snow", surface_bytes(area, desc.voxel_size))?;
-            }
+            ctx.allow("the layer of snow", surface_bytes(area, desc.voxel_size))?;
             let half_width = desc.half_width as f32;
             let grid = ctx.polled(|| layer(ctx, &ground, &statics, &cover, desc.voxel_size, half_width))?;
             Ok(Grid::Own(grid))

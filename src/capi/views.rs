@@ -1,6 +1,7 @@
 //! Arrays and structs that cross the border: the only place that follows a host's pointers.
 
 use std::ffi::{CStr, c_char, c_void};
+use std::ops::RangeInclusive;
 
 use super::guard::frz_status::FRZ_ERROR_CAPACITY;
 use super::guard::frz_status::FRZ_ERROR_VERSION;
@@ -165,6 +166,21 @@ pub(super) unsafe fn write_bytes(
     Ok(())
 }
 
+/// Refuses what is no number, by its name.
+pub(super) fn finite(name: &str, value: f64) -> Outcome {
+    if value.is_finite() { Ok(()) } else { Err(Failure::argument(format!("{name} is not finite"))) }
+}
+
+/// Refuses a number that is not finite, or outside its range.
+pub(super) fn within(name: &str, value: f64, range: RangeInclusive<f64>, unit: &str) -> Outcome {
+    finite(name, value)?;
+    if !range.contains(&value) {
+        let (low, high) = range.into_inner();
+        return Err(Failure::argument(format!("{name} = {value} is not within {low} to {high}{unit}")));
+    }
+    Ok(())
+}
+
 /// What a number of a host's enum means.
 pub(super) fn meaning<T: Copy>(name: &str, kind: &str, number: u32, known: &[(u32, T)]) -> Outcome<T> {
     let found = known.iter().find(|(known, _)| *known == number);
@@ -253,7 +269,8 @@ pub(super) unsafe fn fill<T: Sized32>(pointer: *mut T, size: Option<usize>, valu
 /// Largest struct that a newer header is believed to have (bytes).
 const LARGEST: usize = 4096;
 
-fn check_size<T: Sized32>(size: usize) -> Outcome {
+/// Refuses sizes that no version of a struct has.
+pub(super) fn check_size<T: Sized32>(size: usize) -> Outcome {
     let known = T::SIZES.contains(&size) || (size > size_of::<T>() && size <= LARGEST);
     if !known {
         let text = format!("{}: struct_size = {size} is that of no version", T::NAME);

@@ -51,7 +51,7 @@ impl Session {
             None => Pool::all_cores(),
         };
         let ctx = Context::new(pool.before()?);
-        let signals = Signals::install(ctx.cancel_flag())
+        let signals = Signals::install(ctx.cancel_flags())
             .map_err(|error| Failure::refused(format!("cannot install signal handlers: {error}")))?;
         if let Some(path) = &globals.report {
             output::check_writable(path).before()?;

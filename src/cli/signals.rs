@@ -1,4 +1,4 @@
-//! Ctrl-C and SIGTERM raise the cancel flag; a second one ends the program at once.
+//! Ctrl-C and SIGTERM raise the cancel flags; a second one ends the program at once.
 
 use signal_hook::consts::signal::{SIGINT, SIGTERM, SIGXFSZ};
 use signal_hook::flag;
@@ -11,8 +11,8 @@ pub struct Signals {
 }
 
 impl Signals {
-    /// Installs the handlers; they set `cancel` and nothing else.
-    pub fn install(cancel: Arc<AtomicBool>) -> std::io::Result<Self> {
+    /// Installs the handlers; they set the flags of `cancel`, one after the other, and nothing else.
+    pub fn install(cancel: [Arc<AtomicBool>; 2]) -> std::io::Result<Self> {
         let code = Arc::new(AtomicUsize::new(0));
         let again = Arc::new(AtomicBool::new(false));
         for (signal, exit_code) in [(SIGINT, 130), (SIGTERM, 143)] {
@@ -20,7 +20,9 @@ impl Signals {
             flag::register_conditional_shutdown(signal, exit_code, again.clone())?;
             flag::register(signal, again.clone())?;
             flag::register_usize(signal, code.clone(), exit_code as usize)?;
-            flag::register(signal, cancel.clone())?;
+            for flag in &cancel {
+                flag::register(signal, flag.clone())?;
+            }
         }
         // A file over the shell's size limit is to be a failed write, not the end of the program.
         flag::register(SIGXFSZ, Arc::new(AtomicBool::new(false)))?;

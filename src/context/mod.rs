@@ -1,17 +1,20 @@
 //! Threads that several computations share ([`Pool`]) and the side channel of one of them
 //! ([`Context`]: cancel flag, progress, warnings, stage times, memory limit).
 
+mod cancel;
 mod memory;
 mod pool;
 
-use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
+use std::sync::atomic::{AtomicBool, AtomicU64, AtomicUsize, Ordering};
 use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError};
 use std::time::{Duration, Instant};
 
+pub use cancel::Running;
 pub use memory::{machine_memory, peak_memory};
 pub use pool::{MOST_THREADS, Pool};
 
 use crate::error::{Error, Result};
+use cancel::Cancel;
 
 /// Time between two polls.
 const POLL_EVERY: Duration = Duration::from_millis(10);
@@ -32,6 +35,8 @@ pub struct Progress {
     pub stage: &'static str,
     /// Stages finished since the context was made or reset.
     pub stages_done: usize,
+    /// Part of the running stage that is done, 0 to 1; none where it is not known.
+    pub part: Option<f32>,
 }
 
 /// Looks at the progress, some 10 ms apart; true cancels.
@@ -39,11 +44,15 @@ pub type Poll = Box<dyn FnMut(&Progress) -> bool + Send>;
 /// Takes a warning.
 pub type Log = Box<dyn Fn(&str) + Send>;
 
-/// Cancel flag, progress, warnings, stage times and memory limit of one computation; cheap to make.
+/// Cancel, progress, warnings, stage times and memory limit of one computation; cheap to make.
 pub struct Context {
     pool: Arc<Pool>,
-    cancelled: Arc<AtomicBool>,
+    cancel: Arc<Cancel>,
     progress: Mutex<Progress>,
+    /// Whether the next call counts stages from 0.
+    recount: AtomicBool,
+    /// Pieces of work of the running stage that are done, and all of them; 0 where that is not known.
+    pieces: [AtomicUsize; 2],
     timings: Mutex<Vec<StageTime>>,
     poll: Mutex<Option<Watch>>,
     log: Mutex<Option<Log>>,
@@ -62,8 +71,10 @@ impl Context {
     pub fn new(pool: Arc<Pool>) -> Self {
         Self {
             pool,
-            cancelled: Arc::new(AtomicBool::new(false)),
+            cancel: Arc::default(),
             progress: Mutex::new(Progress::default()),
+            recount: AtomicBool::new(false),
+            pieces: Default::default(),
             timings: Mutex::new(Vec::new()),
             poll: Mutex::new(None),
             log: Mutex::new(None),
@@ -76,25 +87,36 @@ impl Context {
         &self.pool
     }
 
-    /// Asks the running and all following stages to stop; sticky until [`Context::reset`].
+    /// Begins a call, of which everything that runs with this context is a part until the answer is dropped. Stages and
+    /// tools do so themselves; what has several of them and is to be cancelled as a whole holds one around all.
+    pub fn begin(&self) -> Running {
+        let outermost = !self.cancel.is_running();
+        if outermost && self.recount.swap(false, Ordering::SeqCst) {
+            *lock(&self.progress) = Progress::default();
+        }
+        self.cancel.begin()
+    }
+
+    /// Cancels the running call and all later ones until [`Context::reset`].
     pub fn cancel(&self) {
-        self.cancelled.store(true, Ordering::Relaxed);
+        self.cancel.ask();
     }
 
-    /// Forgets a cancel, and counts stages from 0 again.
+    /// Forgets a cancel, and counts stages from 0 again. A call that runs keeps its cancel and its count: both are those
+    /// of the calls that follow.
     pub fn reset(&self) {
-        self.cancelled.store(false, Ordering::Relaxed);
-        *lock(&self.progress) = Progress::default();
+        self.cancel.forget();
+        self.recount.store(true, Ordering::SeqCst);
     }
 
-    /// Whether it was cancelled.
+    /// Whether the running call is cancelled; between calls, whether the next one will be.
     pub fn is_cancelled(&self) -> bool {
-        self.cancelled.load(Ordering::Relaxed)
+        self.cancel.is_asked()
     }
 
-    /// The flag itself, for a signal handler or a C++ interrupter.
-    pub fn cancel_flag(&self) -> Arc<AtomicBool> {
-        self.cancelled.clone()
+    /// The flags that a signal handler raises, one after the other, to cancel.
+    pub fn cancel_flags(&self) -> [Arc<AtomicBool>; 2] {
+        self.cancel.flags().map(Arc::clone)
     }
 
     /// Sets what looks on while stages run, on the thread that called them: at the beginning of each, then every
@@ -151,14 +173,32 @@ impl Context {
     /// # Errors
     /// `Cancelled` when the context was cancelled before or during the stage, else what `work` returns.
     pub fn stage<R: Send>(&self, name: &'static str, work: impl FnOnce() -> Result<R> + Send) -> Result<R> {
+        let _running = self.begin();
+        let value = self.stage_in_place(name, work)?;
+        self.check()?;
+        Ok(value)
+    }
+
+    /// As [`Context::stage`], for work that puts its result in place itself, as the last thing that it does: a cancel
+    /// that comes after that came too late.
+    ///
+    /// # Errors
+    /// `Cancelled` when the context was cancelled before the stage, else what `work` returns.
+    pub fn stage_in_place<R: Send>(
+        &self,
+        name: &'static str,
+        work: impl FnOnce() -> Result<R> + Send,
+    ) -> Result<R> {
+        let _running = self.begin();
         self.check()?;
         lock(&self.progress).stage = name;
-        self.begin();
+        self.expect(0);
+        self.look();
         let result = if self.is_cancelled() { Err(Error::Cancelled) } else { self.timed(name, work) };
         lock(&self.progress).stage = "";
+        self.expect(0);
         let value = result?;
         lock(&self.progress).stages_done += 1;
-        self.check()?;
         Ok(value)
     }
 
@@ -168,7 +208,9 @@ impl Context {
     /// What `work` returns.
     pub fn commit<R: Send>(&self, work: impl FnOnce() -> Result<R> + Send) -> Result<R> {
         const NAME: &str = "commit";
+        let _running = self.begin();
         lock(&self.progress).stage = NAME;
+        self.expect(0);
         let value = self.timed(NAME, work);
         let mut progress = lock(&self.progress);
         progress.stage = "";
@@ -178,7 +220,23 @@ impl Context {
 
     /// What is being done now.
     pub fn progress(&self) -> Progress {
-        *lock(&self.progress)
+        if self.recount.load(Ordering::SeqCst) && !self.cancel.is_running() {
+            return Progress::default();
+        }
+        let [done, all] = self.pieces.each_ref().map(|count| count.load(Ordering::Relaxed));
+        let part = (all > 0).then(|| (done as f32 / all as f32).min(1.0));
+        Progress { part, ..*lock(&self.progress) }
+    }
+
+    /// Says how many pieces of work the running stage has; [`Context::advance`] counts them.
+    pub fn expect(&self, pieces: usize) {
+        self.pieces[0].store(0, Ordering::Relaxed);
+        self.pieces[1].store(pieces, Ordering::Relaxed);
+    }
+
+    /// One more piece of the running stage's work is done.
+    pub fn advance(&self) {
+        self.pieces[0].fetch_add(1, Ordering::Relaxed);
     }
 
     /// Stage times since the last call, in order.
@@ -187,7 +245,7 @@ impl Context {
     }
 
     /// The poll at a stage's beginning.
-    fn begin(&self) {
+    fn look(&self) {
         if let Ok(mut watch) = self.poll.try_lock()
             && let Some(watch) = watch.as_mut()
         {
@@ -207,7 +265,8 @@ impl Context {
     /// # Errors
     /// `Cancelled` when the context was cancelled before, else what `work` returns.
     pub fn polled<R: Send>(&self, work: impl FnOnce() -> Result<R> + Send) -> Result<R> {
-        self.begin();
+        let _running = self.begin();
+        self.look();
         self.check()?;
         self.run(work)
     }
@@ -329,6 +388,20 @@ mod tests {
     }
 
     #[test]
+    fn progress_has_the_part_of_a_stage_that_is_done() {
+        let ctx = Context::new(Pool::new(1).unwrap());
+        let work = || {
+            assert_eq!(ctx.progress().part, None);
+            ctx.expect(4);
+            (0..3).for_each(|_| ctx.advance());
+            assert_eq!(ctx.progress().part, Some(0.75));
+            Ok(())
+        };
+        ctx.stage("work", work).unwrap();
+        assert_eq!(ctx.progress().part, None);
+    }
+
+    #[test]
     fn a_commit_is_polled_but_not_stopped() {
         let ctx = Context::new(Pool::new(1).unwrap());
         let count = counting(&ctx, 1);
@@ -339,6 +412,38 @@ mod tests {
         assert_eq!(ctx.commit(slow).unwrap(), 7);
         assert!(count.load(Ordering::Relaxed) > 1);
         assert!(ctx.is_cancelled());
+    }
+
+    #[test]
+    fn a_reset_during_a_call_is_for_the_calls_that_follow() {
+        let ctx = Context::new(Pool::new(1).unwrap());
+        let forgetful = || {
+            ctx.cancel();
+            ctx.reset();
+            Ok(())
+        };
+        // Work that does not look itself: the stage does when it is done.
+        assert!(matches!(ctx.stage("forget", forgetful), Err(Error::Cancelled)));
+        assert!(ctx.stage("next", || Ok(())).is_ok());
+        let call = ctx.begin();
+        assert!(ctx.stage("first", || Ok(())).is_ok());
+        forgetful().unwrap();
+        assert_eq!(ctx.progress().stages_done, 2, "the running call's count");
+        assert!(matches!(ctx.stage("second", || Ok(())), Err(Error::Cancelled)));
+        drop(call);
+        assert_eq!(ctx.progress().stages_done, 0);
+        assert!(ctx.stage("next", || Ok(())).is_ok());
+    }
+
+    #[test]
+    fn a_cancel_after_work_that_is_in_place_comes_too_late_for_it() {
+        let ctx = Context::new(Pool::new(1).unwrap());
+        let late = || {
+            ctx.cancel();
+            Ok(7)
+        };
+        assert_eq!(ctx.stage_in_place("put", late).unwrap(), 7);
+        assert!(matches!(ctx.stage_in_place("put", late), Err(Error::Cancelled)));
     }
 
     #[test]

@@ -1,7 +1,7 @@
 //! Worker threads that several computations share.
 
-use std::cell::Cell;
-use std::sync::{Arc, Mutex};
+use std::panic::{AssertUnwindSafe, catch_unwind, resume_unwind};
+use std::sync::{Arc, Mutex, PoisonError};
 use std::thread::JoinHandle;
 
 use crate::base::cpu::FlushDenormals;
@@ -70,10 +70,7 @@ impl Pool {
             Some(pool) => pool.install(work),
             None => {
                 let _flush = FlushDenormals::begin();
-                match this_thread() {
-                    Some(pool) => pool.install(work),
-                    None => work(),
-                }
+                on_this_thread(work)
             }
         }
     }
@@ -100,18 +97,41 @@ impl Drop for Pool {
     }
 }
 
-/// A pool of this thread alone: without one, rayon's loops would start a pool of the whole process. It is made
-/// once for a thread and stays until the process ends, as rayon wants it. None on a thread that is another
-/// pool's worker: loops then run there.
-fn this_thread() -> Option<&'static rayon::ThreadPool> {
-    thread_local! {
-        static POOL: Cell<Option<&'static rayon::ThreadPool>> = const { Cell::new(None) };
+/// Runs `work` while this thread is the one worker of a pool that ends with it: without a pool around them rayon's loops
+/// would start one of the whole process. On a thread that is some pool's worker already they run there.
+fn on_this_thread<R: Send>(work: impl FnOnce() -> R + Send) -> R {
+    if rayon::current_thread_index().is_some() {
+        return work();
     }
-    if POOL.get().is_none() {
-        let made = rayon::ThreadPoolBuilder::new().num_threads(1).use_current_thread().build();
-        POOL.set(made.ok().map(|pool| &*Box::leak(Box::new(pool))));
+    let mut seat = None;
+    let spawn = |worker| {
+        seat = Some(worker);
+        Ok(())
+    };
+    let pool = rayon::ThreadPoolBuilder::new().num_threads(1).spawn_handler(spawn).build();
+    let (Ok(pool), Some(seat)) = (pool, seat) else { return work() };
+    let mut result = None;
+    let owner = Arc::new(Mutex::new(Some(pool)));
+    {
+        let (slot, owned) = (&mut result, owner.clone());
+        let job: Box<dyn FnOnce() + Send + '_> = Box::new(move || {
+            *slot = Some(catch_unwind(AssertUnwindSafe(work)));
+            // The worker goes home when its pool is dropped and this job is done.
+            drop(owned.lock().unwrap_or_else(PoisonError::into_inner).take());
+        });
+        // SAFETY: the job is run and gone before `run` returns below: the worker ends only when its pool was dropped,
+        // which nobody but the job does, and when no job is left. Until then all that it borrows is there.
+        let job =
+            unsafe { std::mem::transmute::<Box<dyn FnOnce() + Send + '_>, Box<dyn FnOnce() + Send>>(job) };
+        if let Some(pool) = &*owner.lock().unwrap_or_else(PoisonError::into_inner) {
+            pool.spawn(job);
+        }
+        seat.run();
     }
-    POOL.get()
+    match result.expect("the job was run") {
+        Ok(value) => value,
+        Err(panic) => resume_unwind(panic),
+    }
 }
 
 #[cfg(test)]
@@ -133,6 +153,11 @@ mod tests {
             assert!(all_here);
         }
         assert_eq!(pool.threads(), 1);
+        assert_eq!(rayon::current_thread_index(), None, "afterwards it is no worker any more");
+        let fall = || -> usize { panic!("on purpose") };
+        let caught = catch_unwind(AssertUnwindSafe(|| pool.install(fall)));
+        assert_eq!(caught.unwrap_err().downcast_ref::<&str>(), Some(&"on purpose"));
+        assert_eq!(pool.install(|| pool.install(|| 7)), 7);
     }
 
     #[test]

@@ -43,13 +43,23 @@ pub(super) mod ffi {
     /// Threads and cancel flag of a call.
     struct Call {
         threads: i32,
-        /// Address of the context's cancel flag (one byte), or 0.
+        /// Address of the call's cancel flag (one byte), or 0.
         cancel: usize,
     }
 
     struct Triangles {
         points: Vec<f32>,
         indices: Vec<u32>,
+    }
+
+    /// What of a grid becomes a mesh: all, the blocks at some origins, or without any the voxels of a box.
+    struct Part {
+        whole: bool,
+        /// Three numbers each.
+        origins: Vec<i32>,
+        /// Least and greatest voxel, both included.
+        low: [i32; 3],
+        high: [i32; 3],
     }
 
     struct Hit {
@@ -142,7 +152,7 @@ pub(super) mod ffi {
             voxel: f64,
             half_width: f32,
         ) -> Result<UniquePtr<Grid>>;
-        fn to_mesh(grid: &Grid, call: &Call, iso: f64, adaptivity: f64) -> Result<Triangles>;
+        fn to_mesh(grid: &Grid, call: &Call, iso: f64, adaptivity: f64, part: &Part) -> Result<Triangles>;
         fn measure(grid: &Grid, call: &Call, area: &mut f64, volume: &mut f64) -> Result<()>;
         fn cast_rays(grid: &Grid, call: &Call, rays: &[f64], hits: &mut [Hit]) -> Result<()>;
     }

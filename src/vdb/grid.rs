@@ -65,7 +65,7 @@ impl Ready {
             masks.push(mask);
             constants.push(constant);
         }
-        let (mut call, _flag) = call(ctx);
+        let (mut call, _running) = call(ctx);
         // The last step of an edit cannot be cancelled.
         call.cancel = 0;
         let blocks = ffi::make_blocks(&call, origins.as_flattened(), &values, &masks, &constants);
@@ -290,7 +290,7 @@ impl FloatGrid {
         let flat: Vec<f64> = world.iter().flat_map(|p| [p.x, p.y, p.z]).collect();
         out.clear();
         out.resize(world.len(), 0.0);
-        let (call, _flag) = call(ctx);
+        let (call, _running) = call(ctx);
         ffi::sample(&self.inner, &call, &flat, linear, out).map_err(fail)
     }
 

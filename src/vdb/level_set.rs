@@ -2,6 +2,7 @@
 
 use super::bridge::ffi;
 use super::{FloatGrid, call, fail};
+use crate::base::blocks::Origin;
 use crate::base::{DVec3, TriMesh, Vec3};
 use crate::context::Context;
 use crate::error::{Error, Result};
@@ -34,7 +35,7 @@ pub fn from_mesh(ctx: &Context, mesh: &TriMesh, voxel: f64, half_width: f32) -> 
         return Err(Error::argument(format!("a triangle names vertex {bad} of {count}")));
     }
     let points: Vec<f32> = mesh.positions.iter().flat_map(|p| [p.x, p.y, p.z]).collect();
-    let (call, _flag) = call(ctx);
+    let (call, _running) = call(ctx);
     let inner =
         ffi::from_mesh(&call, &points, mesh.triangles.as_flattened(), voxel, half_width).map_err(fail)?;
     Ok(FloatGrid { inner })
@@ -56,7 +57,7 @@ pub fn from_particles(
         return Err(Error::argument(format!("{} positions, but {} radii", positions.len(), radii.len())));
     }
     let flat: Vec<f64> = positions.iter().flat_map(|p| [p.x, p.y, p.z]).collect();
-    let (call, _flag) = call(ctx);
+    let (call, _running) = call(ctx);
     let inner = ffi::from_particles(&call, &flat, radii, voxel, half_width).map_err(fail)?;
     Ok(FloatGrid { inner })
 }
@@ -67,8 +68,45 @@ pub fn from_particles(
 /// # Errors
 /// Cancel, or what OpenVDB reports.
 pub fn to_mesh(ctx: &Context, grid: &FloatGrid, iso: f32, adaptivity: f32) -> Result<TriMesh> {
-    let (call, _flag) = call(ctx);
-    let mesh = ffi::to_mesh(&grid.inner, &call, f64::from(iso), f64::from(adaptivity)).map_err(fail)?;
+    let part = ffi::Part { whole: true, origins: Vec::new(), low: [0; 3], high: [0; 3] };
+    mesh_of(ctx, grid, iso, adaptivity, &part)
+}
+
+/// As [`to_mesh`], of the voxels of a box (least and greatest, both included). Boxes beside each other give meshes that
+/// meet, each triangle in one of them.
+///
+/// # Errors
+/// As [`to_mesh`].
+pub fn box_to_mesh(
+    ctx: &Context,
+    grid: &FloatGrid,
+    iso: f32,
+    adaptivity: f32,
+    [low, high]: [[i32; 3]; 2],
+) -> Result<TriMesh> {
+    mesh_of(ctx, grid, iso, adaptivity, &ffi::Part { whole: false, origins: Vec::new(), low, high })
+}
+
+/// As [`to_mesh`], of the blocks at some origins: what it costs grows with their number, not with the grid.
+///
+/// # Errors
+/// As [`to_mesh`].
+pub fn blocks_to_mesh(
+    ctx: &Context,
+    grid: &FloatGrid,
+    iso: f32,
+    adaptivity: f32,
+    origins: &[Origin],
+) -> Result<TriMesh> {
+    let origins = origins.as_flattened().to_vec();
+    // Without any: a box without voxels.
+    let part = ffi::Part { whole: false, origins, low: [1; 3], high: [0; 3] };
+    mesh_of(ctx, grid, iso, adaptivity, &part)
+}
+
+fn mesh_of(ctx: &Context, grid: &FloatGrid, iso: f32, adaptivity: f32, part: &ffi::Part) -> Result<TriMesh> {
+    let (call, _running) = call(ctx);
+    let mesh = ffi::to_mesh(&grid.inner, &call, f64::from(iso), f64::from(adaptivity), part).map_err(fail)?;
     Ok(TriMesh {
         positions: mesh.points.chunks_exact(3).map(|p| Vec3::new(p[0], p[1], p[2])).collect(),
         triangles: mesh.indices.chunks_exact(3).map(|t| [t[0], t[1], t[2]]).collect(),
@@ -100,13 +138,13 @@ fn same_lattice(a: &FloatGrid, b: &FloatGrid) -> Result<()> {
 
 fn csg(ctx: &Context, a: &mut FloatGrid, mut b: FloatGrid, operation: Operation) -> Result<()> {
     same_lattice(a, &b)?;
-    let (call, _flag) = call(ctx);
+    let (call, _running) = call(ctx);
     ffi::csg(a.inner.pin_mut(), b.inner.pin_mut(), &call, operation as i32).map_err(fail)
 }
 
 fn csg_copy(ctx: &Context, a: &FloatGrid, b: &FloatGrid, operation: Operation) -> Result<FloatGrid> {
     same_lattice(a, b)?;
-    let (call, _flag) = call(ctx);
+    let (call, _running) = call(ctx);
     let inner = ffi::csg_copy(&a.inner, &b.inner, &call, operation as i32).map_err(fail)?;
     Ok(FloatGrid { inner })
 }
@@ -164,7 +202,7 @@ pub fn intersection_copy(ctx: &Context, a: &FloatGrid, b: &FloatGrid) -> Result<
 /// # Errors
 /// Cancel, or what OpenVDB reports.
 pub fn offset(ctx: &Context, grid: &mut FloatGrid, metres: f32, scheme: Scheme) -> Result<()> {
-    let (call, _flag) = call(ctx);
+    let (call, _running) = call(ctx);
     ffi::offset(grid.inner.pin_mut(), &call, metres, scheme == Scheme::Weno5).map_err(fail)
 }
 
@@ -204,7 +242,7 @@ fn smooth(
     times: u32,
     scheme: Scheme,
 ) -> Result<()> {
-    let (call, _flag) = call(ctx);
+    let (call, _running) = call(ctx);
     let weno = scheme == Scheme::Weno5;
     ffi::smooth(grid.inner.pin_mut(), &call, kind, width as i32, times as i32, weno).map_err(fail)
 }
@@ -214,7 +252,7 @@ fn smooth(
 /// # Errors
 /// As [`offset`].
 pub fn renormalise(ctx: &Context, grid: &mut FloatGrid, scheme: Scheme, times: u32) -> Result<()> {
-    let (call, _flag) = call(ctx);
+    let (call, _running) = call(ctx);
     ffi::renormalise(grid.inner.pin_mut(), &call, scheme == Scheme::Weno5, times as i32).map_err(fail)
 }
 
@@ -224,7 +262,7 @@ pub fn renormalise(ctx: &Context, grid: &mut FloatGrid, scheme: Scheme, times: u
 /// # Errors
 /// As [`offset`].
 pub fn advect_outward(ctx: &Context, grid: &mut FloatGrid, speed: &FloatGrid) -> Result<()> {
-    let (call, _flag) = call(ctx);
+    let (call, _running) = call(ctx);
     ffi::advect_outward(grid.inner.pin_mut(), &call, &speed.inner).map_err(fail)
 }
 
@@ -234,7 +272,7 @@ pub fn advect_outward(ctx: &Context, grid: &mut FloatGrid, speed: &FloatGrid) ->
 /// # Errors
 /// As [`offset`].
 pub fn measure(ctx: &Context, grid: &FloatGrid) -> Result<Measure> {
-    let (call, _flag) = call(ctx);
+    let (call, _running) = call(ctx);
     let mut measure = Measure { area: 0.0, volume: 0.0 };
     ffi::measure(&grid.inner, &call, &mut measure.area, &mut measure.volume).map_err(fail)?;
     Ok(measure)
@@ -245,7 +283,7 @@ pub fn measure(ctx: &Context, grid: &FloatGrid) -> Result<Measure> {
 /// # Errors
 /// As [`offset`].
 pub fn components(ctx: &Context, grid: &FloatGrid) -> Result<Vec<u64>> {
-    let (call, _flag) = call(ctx);
+    let (call, _running) = call(ctx);
     let mut sizes = ffi::components(&grid.inner, &call).map_err(fail)?;
     sizes.sort_unstable_by(|a, b| b.cmp(a));
     Ok(sizes)

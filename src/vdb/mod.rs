@@ -13,7 +13,7 @@ pub mod ray;
 pub use grid::{FloatGrid, GridClass, MetaValue, Ready};
 pub use leaf::{Leaf, LeafMut, Probe};
 
-use crate::context::Context;
+use crate::context::{Context, Running};
 use crate::error::Error;
 
 /// Exception text of the C++ side's `Cancelled`.
@@ -26,11 +26,11 @@ fn fail(error: cxx::Exception) -> Error {
     }
 }
 
-/// Threads and cancel flag for a call into C++; the flag must outlive the call.
-fn call(ctx: &Context) -> (bridge::ffi::Call, std::sync::Arc<std::sync::atomic::AtomicBool>) {
-    let flag = ctx.cancel_flag();
-    let call = bridge::ffi::Call { threads: ctx.pool().threads() as i32, cancel: flag.as_ptr() as usize };
-    (call, flag)
+/// Threads and cancel flag for a call into C++, which is part of the second answer and must not outlive it.
+fn call(ctx: &Context) -> (bridge::ffi::Call, Running) {
+    let running = ctx.begin();
+    let cancel = running.latch().as_ptr() as usize;
+    (bridge::ffi::Call { threads: ctx.pool().threads() as i32, cancel }, running)
 }
 
 /// Ends the worker threads that OpenVDB's tools have started in this process; they start again when they are needed.

@@ -37,7 +37,7 @@ pub fn cast(ctx: &Context, grid: &FloatGrid, rays: &[Ray]) -> Result<Vec<Option<
         .collect();
     let mut hits: Vec<ffi::Hit> =
         rays.iter().map(|_| ffi::Hit { distance: f32::INFINITY, normal: [0.0; 3] }).collect();
-    let (call, _flag) = call(ctx);
+    let (call, _running) = call(ctx);
     ffi::cast_rays(&grid.inner, &call, &flat, &mut hits).map_err(fail)?;
     let found = |hit: ffi::Hit| {
         hit.distance.is_finite().then(|| Hit { distance: hit.distance, normal: Vec3::from(hit.normal) })

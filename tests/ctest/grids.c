@@ -148,9 +148,9 @@ static void files_and_bytes(frz_context *ctx, const frz_grid *grid) {
     WORKS(frz_grid_leaves(back, SPAN(leaves, 2), &count));
     CHECK(count == 2 && memcmp(leaves[0].values, values[0], sizeof values[0]) == 0);
     frz_grid_destroy(back);
-    FAILS(frz_grid_from_bytes(ctx, data, size, "third", &back), FRZ_ERROR_ARGUMENT, "\"other\"");
-    FAILS(frz_grid_from_bytes(ctx, data, size / 2, NULL, &back), FRZ_ERROR_ARGUMENT, "cannot be read");
-    FAILS(frz_grid_from_bytes(ctx, "hello, world", 12, NULL, &back), FRZ_ERROR_ARGUMENT, "not the bytes of a .vdb");
+    FAILS(frz_grid_from_bytes(ctx, data, size, "third", &back), FRZ_ERROR_FILE, "\"other\"");
+    FAILS(frz_grid_from_bytes(ctx, data, size / 2, NULL, &back), FRZ_ERROR_FILE, "cannot be read");
+    FAILS(frz_grid_from_bytes(ctx, "hello, world", 12, NULL, &back), FRZ_ERROR_FILE, "not the bytes of a .vdb");
     WORKS(frz_grid_to_bytes(ctx, one, 1, FRZ_COMPRESSION_NONE, FRZ_HALF, data, bound, &size));
     WORKS(frz_grid_from_bytes(ctx, data, size, NULL, &back));
     frz_grid_destroy(back);

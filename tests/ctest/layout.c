@@ -9,6 +9,7 @@ int main(void) {
     SIZE(frz_view), FIELD(frz_view, data), FIELD(frz_view, count), FIELD(frz_view, stride);
     SIZE(frz_span), FIELD(frz_span, data), FIELD(frz_span, count), FIELD(frz_span, stride);
     SIZE(frz_progress), FIELD(frz_progress, stage), FIELD(frz_progress, stages_done), FIELD(frz_progress, seconds);
+    FIELD(frz_progress, fraction);
     SIZE(frz_stage_time), FIELD(frz_stage_time, stage), FIELD(frz_stage_time, seconds);
     SIZE(frz_attribute), FIELD(frz_attribute, name), FIELD(frz_attribute, components), FIELD(frz_attribute, values);
     SIZE(frz_mesh_desc), FIELD(frz_mesh_desc, struct_size), FIELD(frz_mesh_desc, flags);

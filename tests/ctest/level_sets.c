@@ -35,7 +35,7 @@ int main(void) {
     polyhedron = volume(ctx, a);
     CHECK(near(polyhedron, sphere, 0.03));
     FAILS(frz_levelset_from_mesh(ctx, mesh, 0.01, 2.0f, &b), FRZ_ERROR_ARGUMENT, "half width = 2");
-    FAILS(frz_levelset_from_mesh(ctx, mesh, -0.01, 3.0f, &b), FRZ_ERROR_ARGUMENT, "cell = -0.01");
+    FAILS(frz_levelset_from_mesh(ctx, mesh, -0.01, 3.0f, &b), FRZ_ERROR_ARGUMENT, "voxel_size = -0.01");
     WORKS(frz_context_set_memory_limit(ctx, (uint64_t)1 << 28));
     FAILS(frz_levelset_from_mesh(ctx, mesh, 0.00001, 3.0f, &b), FRZ_ERROR_MEMORY, "a level set of the mesh");
     WORKS(frz_context_set_memory_limit(ctx, 0));

@@ -1,10 +1,16 @@
 """The Python module against the library that FRAZIL_LIBRARY names, and against pyopenvdb."""
 
+import gc
+import importlib.util
 import os
 import pathlib
+import shutil
+import signal
 import subprocess
+import sys
 import tempfile
 import threading
+import time
 import unittest
 
 import numpy as np
@@ -31,6 +37,19 @@ def moved_box(frame):
     step = np.array([0.08, 0, 0], np.float32)
     # The first frame has no way behind it.
     return frazil.Body(corners + max(frame - 1, 1) * step, corners + frame * step, faces, id=5)
+
+
+def threads_of_ours():
+    names = [(task / "comm").read_text() for task in pathlib.Path("/proc/self/task").iterdir()]
+    return sum(name.startswith("frazil-") for name in names)
+
+
+def threads_in_the_end(wanted):
+    """A thread gives itself its name a moment after it began, and leaves /proc a moment after it was joined."""
+    until = time.monotonic() + 5
+    while threads_of_ours() != wanted and time.monotonic() < until:
+        time.sleep(0.01)
+    return threads_of_ours()
 
 
 class Structs(unittest.TestCase):
@@ -127,6 +146,42 @@ class Snow(unittest.TestCase):
         self.assertAlmostEqual(swept.to_mesh(ctx).info.volume, 0.2 * 0.2 * 0.5, delta=0.0004)
 
 
+    def test_a_mesh_of_a_mirrored_grid_is_seen_from_outside(self):
+        try:
+            import pyopenvdb
+        except ImportError:
+            self.skipTest("no pyopenvdb")
+        ctx = frazil.Context(threads=1)
+        ball = frazil.level_set.from_particles(ctx, [[0.1, 0, 0]], [0.3], 0.02)
+        ball.name = "ball"
+        with tempfile.TemporaryDirectory() as folder:
+            path, mirrored = os.path.join(folder, "ball.vdb"), os.path.join(folder, "mirrored.vdb")
+            frazil.save(ctx, [ball], path)
+            grid = pyopenvdb.read(path, "ball")
+            grid.transform = pyopenvdb.createLinearTransform(
+                [[-0.02, 0, 0, 0], [0, 0.02, 0, 0], [0, 0, 0.02, 0], [0, 0, 0, 1]])
+            pyopenvdb.write(mirrored, grids=[grid])
+            mesh = frazil.load(ctx, mirrored).to_mesh(ctx)
+        self.assertAlmostEqual(mesh.info.volume, 4 / 3 * np.pi * 0.3**3, delta=0.002)
+        self.assertLess(mesh.info.box_max[0], 0.25)
+
+    def test_parts_of_a_grid_become_meshes_with_normals(self):
+        ctx = frazil.Context(threads=2)
+        base = frazil.Base(ctx, snow(ctx), noise=frazil.Noise(amplitude=0))
+        base.step([moved_box(1)], 0.0, 1)
+        whole = base.grid.to_mesh(ctx)
+        changed = base.grid.to_mesh(ctx, blocks=base.dirty())
+        self.assertLess(0, changed.info.triangle_count)
+        self.assertLess(changed.info.triangle_count, whole.info.triangle_count / 2)
+        left = base.grid.to_mesh(ctx, box=((-100, -100, -100), (0, 100, 100)))
+        right = base.grid.to_mesh(ctx, box=((1, -100, -100), (100, 100, 100)))
+        self.assertEqual(left.info.triangle_count + right.info.triangle_count, whole.info.triangle_count)
+        np.testing.assert_allclose(np.linalg.norm(whole.normals, axis=1), 1, atol=1e-5)
+        low, high = base.bounds
+        self.assertLess(low[1], 0)
+        self.assertGreater(high[1], 0.2)
+
+
 class Manners(unittest.TestCase):
     def test_polls_cancels_and_warnings(self):
         said, seen = [], []
@@ -157,6 +212,98 @@ class Manners(unittest.TestCase):
         self.assertEqual(base.save(), before)
         self.assertEqual(ctx.progress()[0], "")
 
+    def test_an_exception_in_a_poll_ends_the_call_and_is_raised_by_it(self):
+        def poll(stage, done, seconds):
+            if broken:
+                raise LookupError(f"in {stage or 'between'}")
+
+        for threads in (0, 2):
+            broken = []
+            ctx = frazil.Context(threads=threads, poll=poll)
+            base = frazil.Base(ctx, snow(ctx))
+            before = base.save()
+            broken.append(True)
+            with self.assertRaisesRegex(LookupError, "in "):
+                base.step([moved_box(1)], 0.0, 1)
+            # Nothing has changed, and the context is not cancelled: nobody has asked for it.
+            broken.clear()
+            self.assertEqual(base.save(), before)
+            self.assertGreater(base.step([moved_box(1)], 0.0, 1).removed_volume, 0)
+            # A cancel besides stays.
+            ctx.cancel()
+            with self.assertRaises(frazil.Error):
+                base.step([moved_box(2)], 1 / 24, 2)
+
+    def test_an_exception_in_a_log_is_raised_too(self):
+        def log(text):
+            raise LookupError(text)
+
+        quiet = frazil.Context()
+        layer = snow(quiet)
+        ctx = frazil.Context(threads=1, log=log)
+        corners, faces = box((-0.1, 0.1, -0.1), (0.1, 0.4, 0.1))
+        with self.assertRaisesRegex(LookupError, "1 open loops"):
+            frazil.Base(ctx, layer).step([frazil.Body(corners, None, faces[1:])], 0.0, 1)
+        frazil.Base(ctx, layer).step([frazil.Body(corners, None, faces)], 0.0, 1)
+
+    def test_a_call_within_a_poll_has_its_own_exceptions(self):
+        inner = frazil.Context()
+        seen = []
+
+        def poll(stage, done, seconds):
+            try:
+                frazil.load(inner, "no.vdb")
+            except frazil.Error as error:
+                seen.append(str(error))
+
+        ctx = frazil.Context(threads=1, poll=poll)
+        self.assertGreater(snow(ctx).info.active_voxels, 0)
+        self.assertIn("no.vdb", seen[0])
+
+    def test_ctrl_c_ends_the_call_with_or_without_a_poll(self):
+        for poll in (None, lambda stage, done, seconds: False):
+            ctx = frazil.Context(threads=2, poll=poll)
+            timer = threading.Timer(0.3, os.kill, (os.getpid(), signal.SIGINT))
+            timer.start()
+            start = time.monotonic()
+            with self.assertRaises(KeyboardInterrupt):
+                # Far longer than the test takes; where it is done first, it begins again.
+                while time.monotonic() < start + 30:
+                    frazil.snow_layer(ctx, depth=0.3, voxel_size=0.002)
+            self.assertLess(time.monotonic() - start, 10)
+            timer.join()
+            self.assertIs(signal.getsignal(signal.SIGINT), signal.default_int_handler)
+            self.assertGreater(snow(ctx).info.active_voxels, 0)
+
+    def test_handles_are_closed_and_say_what_they_are(self):
+        with frazil.Pool(2) as pool, frazil.Context(pool=pool) as ctx, frazil.Context(pool=pool) as other:
+            self.assertEqual(repr(pool), "<frazil.Pool of 2 threads>")
+            self.assertEqual(repr(ctx), "<frazil.Context on 2 threads>")
+            with snow(ctx) as layer:
+                self.assertRegex(repr(layer), r'^<frazil.Grid "surface", level set of \d+ active voxels of 0.02 m>$')
+                self.assertRegex(repr(layer.info), "^<GridInfo grid_class=1 voxel_size=0.02 .*voxel_max=")
+                base = frazil.Base(other, layer)
+            self.assertEqual(repr(layer), "<frazil.Grid closed>")
+            with self.assertRaisesRegex(ValueError, "the Grid is closed"):
+                layer.copy(ctx)
+            lent = base.grid
+            self.assertGreater(lent.info.active_voxels, 0)
+            base.close()
+            base.close()
+            with self.assertRaisesRegex(ValueError, "is closed"):
+                lent.info
+            corners, faces = box((0, 0, 0), (1, 1, 1))
+            self.assertEqual(repr(frazil.Mesh(ctx, corners, faces)), "<frazil.Mesh of 8 vertices and 6 faces>")
+        with self.assertRaises(ValueError):
+            frazil.Context(threads=1, pool=pool)
+        # Without a reference left its threads end at once.
+        gc.collect()
+        before = threads_of_ours()
+        ctx = frazil.Context(threads=3)
+        self.assertEqual(threads_in_the_end(before + 3), before + 3)
+        del ctx
+        self.assertEqual(threads_in_the_end(before), before)
+
     def test_errors_are_sentences(self):
         ctx = frazil.Context()
         with self.assertRaisesRegex(frazil.Error, "depth = -1"):
@@ -168,6 +315,36 @@ class Manners(unittest.TestCase):
         with self.assertRaisesRegex(frazil.Error, "belongs to another object"):
             frazil.Base(ctx, snow(ctx)).grid.name = "mine"
         self.assertEqual(len(frazil.version()), 3)
+
+
+class Packaging(unittest.TestCase):
+    def test_pip_installs_it_and_it_finds_its_library(self):
+        version = (ROOT / "Cargo.toml").read_text().split('version = "')[1].split('"')[0]
+        self.assertIn(f'version = "{version}"', (ROOT / "python/pyproject.toml").read_text())
+        pip = [sys.executable, "-m", "pip", "install", "--no-build-isolation", "--no-deps", "--no-index", "--quiet",
+               "--root-user-action=ignore"]
+        for needed in ("pip", "setuptools", "wheel"):
+            if importlib.util.find_spec(needed) is None:
+                self.skipTest(f"pip cannot build here: there is no {needed}")
+        program = "import frazil; print(frazil.version(), frazil.__file__)"
+        named = os.environ["FRAZIL_LIBRARY"]
+        with tempfile.TemporaryDirectory() as folder:
+            # pip leaves files beside what it builds: a copy.
+            source, target = os.path.join(folder, "python"), os.path.join(folder, "target")
+            shutil.copytree(ROOT / "python", source, ignore=shutil.ignore_patterns("__pycache__"))
+            subprocess.run([*pip, "--target", target, source], check=True)
+            place = {"PYTHONPATH": target, "PATH": os.environ["PATH"]}
+
+            def run(**more):
+                words = [sys.executable, "-c", program]
+                return subprocess.run(words, env=place | more, cwd=folder, capture_output=True, text=True)
+
+            self.assertIn(target, run(FRAZIL_LIBRARY=os.path.abspath(named)).stdout)
+            missing = run().stderr
+            self.assertIn("frazil's C library was not found", missing)
+            self.assertIn("FRAZIL_LIBRARY", missing)
+            shutil.copy(named, os.path.join(target, "frazil", "libfrazil.so.1"))
+            self.assertIn(target, run().stdout)
 
 
 if __name__ == "__main__":

@@ -157,6 +157,13 @@ impl BaseLayer {
         self.half_width
     }
 
+    /// Least and greatest corner (m) of the voxels that snow can be in.
+    pub fn bounds(&self) -> (DVec3, DVec3) {
+        let cell = self.grids.surface.voxel_size();
+        let corner = |voxel: [i32; 3], half: f64| DVec3::from(voxel.map(|at| (f64::from(at) + half) * cell));
+        (corner(self.low, -0.5), corner(self.high, 0.5))
+    }
+
     /// The grids: all that the next step depends on, besides the layer before the first step.
     pub fn grids(&self) -> &Grids {
         &self.grids
@@ -224,7 +231,8 @@ impl BaseLayer {
         ctx.take_timings();
         let displacement =
             self.params.noise.map(|noise| Displacement::new(&noise, self.grids.surface.voxel_size()));
-        let (ragged, exact): (Vec<&Body>, Vec<&Body>) = bodies.iter().partition(|body| body.has_noise());
+        let (ragged, exact): (Vec<(usize, &Body)>, Vec<(usize, &Body)>) =
+            bodies.iter().enumerate().partition(|(_, body)| body.has_noise());
         let (ragged, ragged_faces) = self.sweep(ctx, &ragged, from, to, displacement.as_ref())?;
         let (exact, exact_faces) = self.sweep(ctx, &exact, from, to, None)?;
         let pieces = united(ragged, exact);
@@ -249,7 +257,7 @@ impl BaseLayer {
     fn sweep(
         &self,
         ctx: &Context,
-        bodies: &[&Body],
+        bodies: &[(usize, &Body)],
         from: f64,
         to: f64,
         noise: Option<&Displacement>,
@@ -272,7 +280,7 @@ impl BaseLayer {
     fn voxeliser(
         &self,
         ctx: &Context,
-        bodies: &[&Body],
+        bodies: &[(usize, &Body)],
         from: f64,
         to: f64,
         noise: Option<&Displacement>,
@@ -287,11 +295,17 @@ impl BaseLayer {
         let fixed = |voxel: [i32; 3]| voxel.map(|cells| cells.saturating_mul(UNITS));
         let window =
             Window { min: fixed(relative(self.low, -margin)), max: fixed(relative(self.high, margin)) };
+        ctx.expect(bodies.len());
         let parts: Vec<Vec<Face>> = bodies
             .iter()
-            .map(|body| {
+            .map(|(index, body)| {
                 ctx.check()?;
-                body.chain(ctx, from, to, &lattice, self.params.tolerance, &window)
+                let faces = body.chain(ctx, from, to, &lattice, self.params.tolerance, &window);
+                ctx.advance();
+                faces.map_err(|error| match error {
+                    Error::Argument(what) => Error::Argument(format!("body {index}: {what}")),
+                    other => other,
+                })
             })
             .collect::<Result<_>>()?;
         let band = Band { inside: self.half_width, outside };
@@ -305,9 +319,11 @@ impl BaseLayer {
     fn pieces(&self, ctx: &Context, voxeliser: &Voxeliser, margin: bool) -> Result<Vec<Piece>> {
         let near = voxeliser.near_blocks();
         let wanted = snow_masks(&self.grids.surface, &near, margin)?;
+        ctx.expect(near.len());
         let mut pieces: Vec<Piece> = (0..near.len())
             .into_par_iter()
             .map_init(Scratch::default, |scratch, index| {
+                ctx.advance();
                 if ctx.check().is_err() { None } else { voxeliser.piece(index, &wanted[index], scratch) }
             })
             .flatten_iter()
@@ -321,14 +337,14 @@ impl BaseLayer {
         let origins: Vec<Origin> = pieces.iter().map(Piece::origin).collect();
         let snow: Vec<Probe<'_>> = self.grids.surface.probe(&origins)?;
         let scale = self.scale();
+        ctx.expect(pieces.len());
         Ok(pieces
             .par_iter()
             .zip(&snow)
-            .filter_map(
-                |(piece, snow)| {
-                    if ctx.check().is_err() { None } else { edit::subtract(piece, snow, scale) }
-                },
-            )
+            .filter_map(|(piece, snow)| {
+                ctx.advance();
+                if ctx.check().is_err() { None } else { edit::subtract(piece, snow, scale) }
+            })
             .collect())
     }
 

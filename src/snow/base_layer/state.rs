@@ -105,7 +105,7 @@ impl BaseLayer {
 
     /// The blocks of a state: the snow, and the frames of its last changes.
     fn unpack(&self, ctx: &Context, state: &[u8]) -> Result<(Vec<BlockEdit>, Vec<BlockEdit>)> {
-        let refused = |what: &str| Error::argument(format!("the saved state {what}"));
+        let refused = |what: &str| Error::Bytes(format!("the saved state {what}"));
         if state.len() < HEADER || state[..8] != MAGIC {
             return Err(refused("is none of a base layer"));
         }
