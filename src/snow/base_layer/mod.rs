@@ -8,6 +8,7 @@ mod grids;
 pub mod initial;
 mod marks;
 mod noise;
+mod reach;
 mod state;
 mod wanted;
 
@@ -17,6 +18,7 @@ use rayon::prelude::*;
 
 pub use grids::{Changes, Grids};
 pub use noise::{NoiseParams, displace};
+pub use reach::Reach;
 
 use crate::base::DVec3;
 use crate::base::blocks::{BlockEdit, Origin};
@@ -291,7 +293,7 @@ impl BaseLayer {
             .iter()
             .map(|body| {
                 ctx.check()?;
-                body.chain(ctx, from, to, &lattice, self.params.tolerance, &window)
+                self.chain(ctx, body, (from, to), &lattice, &window)
             })
             .collect::<Result<_>>()?;
         let band = Band { inside: self.half_width, outside };
@@ -299,6 +301,28 @@ impl BaseLayer {
             |origins: &[Origin]| Ok(self.grids.surface.probe(origins)?.iter().map(edit::has_snow).collect());
         let bounds = [relative(self.low, 0), relative(self.high, 0)];
         Voxeliser::new(ctx, parts.concat(), lattice, band, bounds, snowy)
+    }
+
+    /// The boundary of what a body sweeps, near the snow; what passes far from it is left out.
+    fn chain(
+        &self,
+        ctx: &Context,
+        body: &Body,
+        (from, to): (f64, f64),
+        lattice: &Lattice,
+        window: &Window,
+    ) -> Result<Vec<Face>> {
+        let chain = |from: f64, to: f64| body.chain(ctx, from, to, lattice, self.params.tolerance, window);
+        match chain(from, to) {
+            // A vertex may be out of reach.
+            Err(Error::Argument(_)) => {
+                let spans = Reach::new(*lattice, window).spans(ctx, body, from, to)?;
+                let parts: Vec<Vec<Face>> =
+                    spans.into_iter().map(|(from, to)| chain(from, to)).collect::<Result<_>>()?;
+                Ok(parts.concat())
+            }
+            other => other,
+        }
     }
 
     /// Distances where there is snow.
@@ -336,7 +360,8 @@ impl BaseLayer {
     fn changes(&self, ctx: &Context, edits: Vec<Edit>, frame: i32) -> Result<(Changes, Columns, f64)> {
         let cell = self.grids.surface.voxel_size();
         let mut removed = empty_removed(cell, self.half_width)?;
-        let volume = edits.iter().map(Edit::volume).sum::<f64>() * cell.powi(3);
+        // The sum of nothing is -0, which is no volume.
+        let volume = edits.iter().map(Edit::volume).sum::<f64>() * cell.powi(3) + 0.0;
         let fresh = self.new_columns(edits.iter().map(|edit| edit.surface.origin()))?;
         let marks: Vec<Mark<'_>> =
             edits.iter().map(|edit| Mark { surface: &edit.surface, changed: &edit.changed }).collect();
