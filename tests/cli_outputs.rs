@@ -126,16 +126,26 @@ fn a_number_of_a_hundred_thousand_digits_is_no_panic() {
     fails(folder.path(), "vdb rebuild out --frame 1-2 -o b.%99999d.vdb", 2, &["pattern"]);
 }
 
-/// Starts the program, sends SIGTERM after a while, and gives its exit code with the time that it took to answer.
-fn terminate(folder: &Path, arguments: &str, after: Duration) -> (Option<i32>, Duration) {
+/// Starts the program, sends SIGTERM once it is `ready`, and gives its exit code with the time that it took to answer.
+fn terminate(folder: &Path, arguments: &str, ready: impl Fn() -> bool) -> (Option<i32>, Duration) {
     let mut child = command(folder, arguments).stdout(Stdio::null()).stderr(Stdio::null()).spawn().unwrap();
-    std::thread::sleep(after);
-    assert!(child.try_wait().unwrap().is_none(), "{arguments} ended by itself");
+    while !ready() {
+        assert!(child.try_wait().unwrap().is_none(), "{arguments} ended by itself");
+        std::thread::sleep(Duration::from_millis(5));
+    }
     let sent = Instant::now();
     assert!(Command::new("kill").arg(child.id().to_string()).status().unwrap().success());
-    let code = child.wait().unwrap().code();
-    (code, sent.elapsed())
+    while child.try_wait().unwrap().is_none() && sent.elapsed() < Duration::from_secs(20) {
+        std::thread::sleep(Duration::from_millis(5));
+    }
+    let took = sent.elapsed();
+    // One that does not hear must not hold up the tests.
+    let _ = child.kill();
+    (child.wait().unwrap().code(), took)
 }
+
+/// The most that an answer may take (a second is promised; the machine may be busy).
+const ANSWER: Duration = Duration::from_secs(3);
 
 #[test]
 fn a_signal_is_answered_while_the_program_waits_for_a_file() {
@@ -147,16 +157,17 @@ fn a_signal_is_answered_while_the_program_waits_for_a_file() {
     for line in ["snow waits.toml -o out", "check waits.toml", "convert pipe.obj a.stl", "check pipe.toml"] {
         // A reader of models may refuse a pipe at once.
         let mut child = command(folder.path(), line).stderr(Stdio::null()).spawn().unwrap();
-        std::thread::sleep(Duration::from_millis(400));
+        std::thread::sleep(Duration::from_millis(800));
         let ended = child.try_wait().unwrap();
         child.kill().unwrap();
         child.wait().unwrap();
         if ended.is_some_and(|ended| ended.code() == Some(2)) {
             continue;
         }
-        let (code, took) = terminate(folder.path(), line, Duration::from_millis(400));
+        let start = Instant::now();
+        let (code, took) = terminate(folder.path(), line, || start.elapsed() > Duration::from_millis(800));
         assert_eq!(code, Some(143), "{line}");
-        assert!(took < Duration::from_millis(1500), "{line}: {took:?}");
+        assert!(took < ANSWER, "{line}: {took:?}");
     }
 }
 
@@ -164,11 +175,12 @@ fn a_signal_is_answered_while_the_program_waits_for_a_file() {
 fn a_signal_in_the_middle_of_a_shot_leaves_whole_frames_and_nothing_begun() {
     let folder = folder();
     let fine = "--set snow.cell=0.003 --set shot.frames=1-400 --set object.1.keys=[{frame=1,at=[-0.4,0.1,0]},{frame=400,at=[0.4,0.1,0]}]";
-    for after in [150, 400, 900] {
+    for file in ["state", "base/base.0001.vdb", "base/base.0004.vdb"] {
         let line = format!("snow shot.toml -o out -q {fine}");
-        let (code, took) = terminate(folder.path(), &line, Duration::from_millis(after));
-        assert_eq!(code, Some(143));
-        assert!(took < Duration::from_millis(1500), "{took:?}");
+        let path = folder.path().join("out").join(file);
+        let (code, took) = terminate(folder.path(), &line, || path.exists());
+        assert_eq!(code, Some(143), "{file}");
+        assert!(took < ANSWER, "{file}: {took:?}");
     }
     for kind in ["", "base", "removed", "state", "report"] {
         let Ok(entries) = fs::read_dir(folder.path().join("out").join(kind)) else { continue };
