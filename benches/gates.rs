@@ -8,6 +8,8 @@ mod cancel;
 mod capi;
 #[path = "../tests/common/mod.rs"]
 mod common;
+#[path = "gates/flip.rs"]
+mod flip;
 #[path = "gates/harness.rs"]
 mod harness;
 #[path = "gates/oracle.rs"]
@@ -45,5 +47,6 @@ fn main() {
     shot::run(&mut h);
     capi::run(&mut h);
     cancel::run(&mut h);
+    flip::run(&mut h);
     h.finish();
 }

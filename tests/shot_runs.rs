@@ -133,7 +133,7 @@ fn other_settings_are_refused_by_name_and_from_keeps_what_is_before() {
     let folder = folder(6, 0.04, "");
     works(folder.path(), "snow shot.toml -o out -q");
     let before = output(&folder.path().join("out"));
-    let words = ["snow.noise.seed was 0", "object[1].scale was 1.0", "--from N", "another -o"];
+    let words = ["snow.noise.seed was 0", "object.1.scale was 1.0", "--from N", "another -o"];
     let set = "--set snow.noise.seed=2 --set object.1.scale=1.1";
     fails(folder.path(), &format!("snow shot.toml -o out {set}"), 2, &words);
     assert_eq!(differences(&before, &output(&folder.path().join("out"))), Vec::<String>::new());
@@ -182,7 +182,7 @@ fn a_mesh_that_changed_is_noticed_wherever_it_lies() {
     fs::rename(folder.path().join("cube.obj"), folder.path().join("moved/box.obj")).unwrap();
     works(folder.path(), "snow shot.toml -o out -q --set object.1.file=moved/box.obj");
     fs::write(folder.path().join("cube.obj"), CUBE.replace(".4", ".5")).unwrap();
-    fails(folder.path(), "snow shot.toml -o out", 2, &["object[1].file had another content"]);
+    fails(folder.path(), "snow shot.toml -o out", 2, &["object.1.file had another content"]);
 }
 
 #[test]

@@ -5,6 +5,8 @@ use std::time::Instant;
 /// Prints gates and remembers whether one fell short.
 pub struct Harness {
     only: Vec<String>,
+    /// Which of them named a gate.
+    found: Vec<bool>,
     short: bool,
 }
 
@@ -42,7 +44,18 @@ impl Harness {
     pub fn from_arguments() -> Self {
         let names = std::env::args().skip(1).filter(|argument| !argument.starts_with('-'));
         let only = names.flat_map(|text| text.split(',').map(str::to_string).collect::<Vec<_>>()).collect();
-        Self { only, short: false }
+        Self::of(only)
+    }
+
+    /// Runs the gates whose names begin with one of these; all without any.
+    pub fn of(only: Vec<String>) -> Self {
+        Self { found: vec![false; only.len()], only, short: false }
+    }
+
+    /// Names that were asked for and that no gate has.
+    pub fn unknown(&self) -> Vec<&str> {
+        let asked = self.only.iter().zip(&self.found);
+        asked.filter(|(_, found)| !**found).map(|(only, _)| only.as_str()).collect()
     }
 
     /// Whether any gate whose name begins so is wanted.
@@ -50,8 +63,24 @@ impl Harness {
         self.only.is_empty() || self.only.iter().any(|only| name.starts_with(only) || only.starts_with(name))
     }
 
+    /// Notes that a gate was there.
+    fn note(&mut self, name: &str) {
+        let found = self.only.iter().zip(&mut self.found);
+        found.filter(|(only, _)| name.starts_with(only.as_str())).for_each(|(_, found)| *found = true);
+    }
+
+    /// Prints that a gate, or all gates whose names begin so, cannot be measured here.
+    pub fn skipped(&mut self, name: &str, reason: &str) {
+        // What was asked for may be one of those gates.
+        let found = self.only.iter().zip(&mut self.found);
+        found.filter(|(only, _)| only.starts_with(name)).for_each(|(_, found)| *found = true);
+        self.note(name);
+        println!("gate {name} skipped # {reason}");
+    }
+
     /// Prints a gate.
     pub fn gate(&mut self, name: &str, value: f64, unit: &str, must: Bound, aim: Bound, note: &str) {
+        self.note(name);
         let state = match (must.holds(value), aim.holds(value)) {
             (true, true) => "aim",
             (true, false) => "ok",
@@ -67,8 +96,13 @@ impl Harness {
         self.gate(name, f64::from(u8::from(yes)), "bool", Bound::Least(1.0), Bound::Open, note);
     }
 
-    /// Ends the program.
+    /// Ends the program: 1 when a gate fell short, 2 when a name was asked for that no gate has.
     pub fn finish(self) -> ! {
+        let unknown = self.unknown();
+        if !unknown.is_empty() {
+            eprintln!("no gate is named {}", unknown.join(", "));
+            std::process::exit(2);
+        }
         std::process::exit(i32::from(self.short))
     }
 }

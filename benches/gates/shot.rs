@@ -25,13 +25,24 @@ const THESIS: &str = "thesis=756 s";
 
 /// All of them.
 pub fn run(h: &mut Harness) {
-    let names = ["sweep", "skinning", "edit", "pass", "memory", "check", "continued", "changed", "clients"];
+    let names = [
+        "sweep",
+        "skinning",
+        "edit",
+        "pass",
+        "memory",
+        "check",
+        "continued",
+        "rebuilt",
+        "changed",
+        "clients",
+    ];
     if !names.iter().any(|name| h.wants(&format!("snow.shot.{name}"))) {
         return;
     }
     let Some(man) = data("character/CesiumMan.glb") else {
         for name in names {
-            println!("gate snow.shot.{name} skipped # no data");
+            h.skipped(&format!("snow.shot.{name}"), "no data");
         }
         return;
     };
@@ -68,7 +79,7 @@ fn sweeps(h: &mut Harness, man: &Path) {
     let characters = [("cesium", Some(man.to_path_buf()), "Anim_0", 1.15), ("robot", robot, "Walking", 1.8)];
     for (name, path, clip, speed) in characters {
         let Some(path) = path else {
-            println!("gate snow.shot.sweep_{name} skipped # no data");
+            h.skipped(&format!("snow.shot.sweep_{name}"), "no data");
             continue;
         };
         let body = Body::new(walker(&path, clip, speed), 0.0).expect("a body");
@@ -308,7 +319,7 @@ fn clients(h: &mut Harness, man: &Path) {
     let usd = clients::usd_python().map(|python| clients::usd_composes(&python, &out, 1, 24));
     for (name, answer) in [("snow.shot.clients_blender", blender), ("snow.shot.clients_usd", usd)] {
         match answer {
-            None => println!("gate {name} skipped # not installed: make test-clients"),
+            None => h.skipped(name, "not installed: make test-clients"),
             Some(Ok(said)) => h.holds(name, true, &said),
             Some(Err(said)) => h.holds(name, false, said.lines().last().unwrap_or_default()),
         }

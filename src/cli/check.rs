@@ -4,6 +4,7 @@ use std::fmt::Write;
 use std::path::{Path, PathBuf};
 
 use frazil::scene::check::{ObjectReport, Report, check};
+use frazil::scene::verify::{Verified, verify};
 use frazil::scene::{Inputs, Override, Scene, check_memory};
 
 use super::exit::{Failure, Phase};
@@ -11,10 +12,12 @@ use super::session::Session;
 use super::{machine, output};
 
 /// Read every input of every frame of a scene, and say its sizes, memory and disk; nothing is computed.
+///
+/// Of an output folder: read every file that a run wrote there, and name those that are not what was written.
 #[derive(clap::Args)]
-#[command(after_help = "Example:\n  frazil check walker.toml -o cache/")]
+#[command(after_help = "Examples:\n  frazil check walker.toml -o cache/\n  frazil check cache/")]
 pub struct Args {
-    /// Scene file (TOML).
+    /// Scene file (TOML), or an output folder.
     scene: PathBuf,
     /// Where the output is to go: its free space is told too.
     #[arg(short, long, value_name = "DIR")]
@@ -29,6 +32,9 @@ pub struct Args {
 
 /// Runs the command.
 pub fn run(args: &Args, session: &Session) -> Result<(), Failure> {
+    if args.scene.is_dir() {
+        return check_folder(args, session);
+    }
     let scene = Scene::read_with(&args.scene, &args.set).before()?;
     let inputs = Inputs::load(&scene).before()?;
     let mut report = check(&session.ctx, &scene, &inputs).before()?;
@@ -47,6 +53,43 @@ pub fn run(args: &Args, session: &Session) -> Result<(), Failure> {
         told(&report, limit, free)
     };
     output::print(&text).during()
+}
+
+/// Compares an output folder with what was written into it.
+fn check_folder(args: &Args, session: &Session) -> Result<(), Failure> {
+    if args.output.is_some() || !args.set.is_empty() {
+        return Err(Failure::refused("-o and --set are of no use with an output folder"));
+    }
+    let verified = verify(&session.ctx, &args.scene).before()?;
+    let text = if args.json {
+        format!("{:#}\n", serde_json::to_value(&verified).expect("plain values become JSON"))
+    } else {
+        verified_in_words(&verified)
+    };
+    output::print(&text).during()?;
+    session.record("frames", verified.frames.into());
+    match &verified.damaged[..] {
+        [] => Ok(()),
+        [first, rest @ ..] => {
+            let more = if rest.is_empty() { String::new() } else { format!(", and {} more", rest.len()) };
+            let path = args.scene.join(&first.file);
+            Err(Failure::failed(format!("{}: {}{more}", path.display(), first.what)))
+        }
+    }
+}
+
+fn verified_in_words(verified: &Verified) -> String {
+    let mut out = format!("{} frames, {} files, {}\n", verified.frames, verified.files, size(verified.bytes));
+    verified.damaged.iter().for_each(|damage| {
+        let _ = writeln!(out, "damaged   {}: {}", damage.file, damage.what);
+    });
+    verified.unknown.iter().for_each(|file| {
+        let _ = writeln!(out, "unknown   {file}: no record names it");
+    });
+    if verified.damaged.is_empty() {
+        out.push_str("all of them are what was written\n");
+    }
+    out
 }
 
 /// Free bytes where a folder is, or is to be.

@@ -59,6 +59,14 @@ pub fn run(args: &Args, session: &Session) -> Result<(), Failure> {
         return Err(Failure::refused(what));
     }
     output::check_writable(&args.output).before()?;
+    let input = Pattern::parse(&args.input);
+    for frame in frames.iter() {
+        // The frame after the last is read for velocities.
+        let read = |frame| input.as_ref().map_or_else(|| args.input.clone(), |input| input.path(frame));
+        let path = pattern.as_ref().map_or_else(|| args.output.clone(), |pattern| pattern.path(frame));
+        let inputs = [read(frame), read(frame.saturating_add(1))];
+        output::refuse_input(&path, inputs.iter().map(PathBuf::as_path)).before()?;
+    }
     for frame in frames.iter() {
         session.ctx.check().during()?;
         let path = pattern.as_ref().map_or_else(|| args.output.clone(), |pattern| pattern.path(frame));
@@ -131,7 +139,7 @@ impl Args {
         if extension(path) != "usda" {
             return io::mesh::write(path, &TriMesh { positions, triangles: motion.triangles().to_vec() });
         }
-        motion.velocities(time, 1.0 / self.fps, &mut velocities)?;
+        motion.velocities_ahead(time, 1.0 / self.fps, &mut velocities)?;
         out(&mut velocities);
         let stem = self.input.file_stem().unwrap_or_default().to_string_lossy().into_owned();
         let name = usd::prim_name(stem.split(['%', '#', '$', '.']).next().unwrap_or_default());

@@ -64,6 +64,15 @@ pub fn say_error(message: &str) {
     let _ = writeln!(std::io::stderr(), "frazil: {}", sentence.join(" "));
 }
 
+/// Says that a signal stopped the program; its exit code tells which.
+pub fn say_stopped(code: u8) {
+    static SAID: AtomicBool = AtomicBool::new(false);
+    if SAID.swap(true, Ordering::Relaxed) {
+        return;
+    }
+    say_error(if code == 130 { "interrupted" } else { "terminated" });
+}
+
 /// Turns a panic, in any thread, into one sentence.
 pub fn install_panic_hook() {
     static TOLD: AtomicBool = AtomicBool::new(false);

@@ -15,9 +15,13 @@ pub fn print(text: &str) -> Result<()> {
 }
 
 /// Whether a file can be written at a path, found out before any work: its folder takes a new file.
+/// A device or a pipe is looked at when it is written.
 pub fn check_writable(path: &Path) -> Result<()> {
     if path.is_dir() {
         return Err(Error::file(path, "is a folder, not a file to write"));
+    }
+    if frazil::io::atomic::is_stream(path) {
+        return Ok(());
     }
     let folder = match path.parent() {
         Some(folder) if !folder.as_os_str().is_empty() => folder,
@@ -27,6 +31,35 @@ pub fn check_writable(path: &Path) -> Result<()> {
         Error::Io { source, .. } => Error::io(path, "write", source),
         other => other,
     })
+}
+
+/// Refuses to write over one of the files that are read.
+pub fn refuse_input<'a>(path: &Path, inputs: impl IntoIterator<Item = &'a Path>) -> Result<()> {
+    // What is not there yet is no input; a device is not written over.
+    let Ok(output) = std::fs::canonicalize(path) else { return Ok(()) };
+    let is_output = |input: &&Path| std::fs::canonicalize(input).is_ok_and(|input| input == output);
+    match inputs.into_iter().find(is_output) {
+        Some(_) if output.is_file() => {
+            Err(Error::file(path, "is an input too and would be written over: choose another output"))
+        }
+        _ => Ok(()),
+    }
+}
+
+/// Refuses to write a report over something else than a report.
+pub fn check_report(path: &Path) -> Result<()> {
+    check_writable(path)?;
+    if !path.is_file() || frazil::io::atomic::is_stream(path) {
+        return Ok(());
+    }
+    let bytes = std::fs::read(path).map_err(|error| Error::io(path, "read", error))?;
+    let value: Option<serde_json::Value> = serde_json::from_slice(&bytes).ok();
+    let is_report = value
+        .is_some_and(|value| ["arguments", "version", "seconds"].iter().all(|key| !value[key].is_null()));
+    if bytes.is_empty() || is_report {
+        return Ok(());
+    }
+    Err(Error::file(path, "is there and is no report of a run: choose another name for --report"))
 }
 
 /// Whether a folder takes new files.

@@ -54,6 +54,7 @@ fn sun(text: &str) -> Result<(f64, f64), String> {
 /// Runs the command.
 pub fn run(args: Args, session: &Session) -> Result<(), Failure> {
     output::check_writable(&args.output).before()?;
+    output::refuse_input(&args.output, args.files.iter().map(PathBuf::as_path)).before()?;
     if !(1.0..=170.0).contains(&args.fov) {
         return Err(Failure::refused(format!("--fov {} is not within 1 to 170 degrees", args.fov)));
     }

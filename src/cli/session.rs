@@ -54,7 +54,7 @@ impl Session {
         let signals = Signals::install(ctx.cancel_flags())
             .map_err(|error| Failure::refused(format!("cannot install signal handlers: {error}")))?;
         if let Some(path) = &globals.report {
-            output::check_writable(path).before()?;
+            output::check_report(path).before()?;
         }
         Ok(Self { ctx, globals, signals, start: Instant::now(), results: Mutex::default() })
     }
@@ -92,7 +92,7 @@ impl Session {
         match (result, self.signals.received()) {
             (Ok(()), _) => exit::DONE,
             (Err(_), Some(code)) => {
-                exit::say_error(if code == 130 { "interrupted" } else { "terminated" });
+                exit::say_stopped(code);
                 code
             }
             (Err(failure), None) => failure.report(),

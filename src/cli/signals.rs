@@ -1,9 +1,18 @@
-//! Ctrl-C and SIGTERM raise the cancel flags; a second one ends the program at once.
+//! Ctrl-C and SIGTERM raise the cancel flags; a second one ends the program at once, and so does the first when the work
+//! does not stop by itself: it may be waiting for a file.
 
 use signal_hook::consts::signal::{SIGINT, SIGTERM, SIGXFSZ};
 use signal_hook::flag;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
+use std::time::Duration;
+
+use super::exit;
+
+/// How long the work may take to stop.
+const GRACE: Duration = Duration::from_millis(700);
+/// How often it is looked whether a signal came.
+const LOOK: Duration = Duration::from_millis(50);
 
 /// Which signal came, if one did.
 pub struct Signals {
@@ -26,7 +35,26 @@ impl Signals {
         }
         // A file over the shell's size limit is to be a failed write, not the end of the program.
         flag::register(SIGXFSZ, Arc::new(AtomicBool::new(false)))?;
-        Ok(Self { code })
+        let signals = Self { code };
+        signals.watch()?;
+        Ok(signals)
+    }
+
+    /// Ends the program some time after a signal, whatever it is doing: files are whole or not there at any moment.
+    fn watch(&self) -> std::io::Result<()> {
+        let code = self.code.clone();
+        let watch = move || {
+            while code.load(Ordering::Relaxed) == 0 {
+                std::thread::sleep(LOOK);
+            }
+            std::thread::sleep(GRACE);
+            let code = code.load(Ordering::Relaxed) as u8;
+            frazil::io::atomic::abandon();
+            exit::say_stopped(code);
+            // Destructors of other threads' data must not run.
+            signal_hook::low_level::exit(code.into());
+        };
+        std::thread::Builder::new().name("signals".into()).spawn(watch).map(drop)
     }
 
     /// The exit code of the signal that came: 130 or 143.

@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 use serde::{Deserialize, Serialize};
 
 use super::{hash, sealed};
-use crate::error::Result;
+use crate::error::{Error, Result};
 
 /// A file of a frame.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
@@ -41,6 +41,12 @@ pub struct Manifest {
     pub keeps: Keeps,
     /// Its files.
     pub files: Vec<Written>,
+    /// The file of its own that holds everything, where it [`Keeps::State`]; it may have been removed since.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub state: Option<Written>,
+    /// Hash of what its velocities over the coming frame were made from, where that is a file of the coming frame.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub next: Option<String>,
 }
 
 impl Written {
@@ -57,7 +63,21 @@ impl Written {
 
     /// Whether the file is there with its content; reads it.
     pub fn is_whole(&self, folder: &Path) -> bool {
-        self.is_there(folder) && hash::of_file(&folder.join(&self.path)).is_ok_and(|hash| hash == self.hash)
+        self.fault(folder).is_none()
+    }
+
+    /// What keeps the file from being the one that was written; reads it.
+    pub fn fault(&self, folder: &Path) -> Option<String> {
+        let path = folder.join(&self.path);
+        let Ok(file) = std::fs::metadata(&path) else { return Some("is missing".into()) };
+        if !file.is_file() || file.len() != self.bytes {
+            return Some(format!("has {} bytes, not the {} that were written", file.len(), self.bytes));
+        }
+        match hash::of_file(&path) {
+            Err(error) => Some(error.to_string()),
+            Ok(hash) if hash == self.hash => None,
+            Ok(_) => Some("is not the file that was written".into()),
+        }
     }
 }
 
@@ -70,9 +90,22 @@ impl Manifest {
     /// Reads a frame's manifest; none when there is none.
     ///
     /// # Errors
-    /// A damaged one, or one of a newer version.
+    /// A damaged one, or one of a newer version; one of another frame, or that names files of no frame's: what a record
+    /// names is removed when its frame is made again.
     pub fn read(folder: &Path, stage: &str, frame: i32) -> Result<Option<Self>> {
-        sealed::read(&Self::path(folder, stage, frame))
+        let path = Self::path(folder, stage, frame);
+        let Some(manifest): Option<Self> = sealed::read(&path)? else { return Ok(None) };
+        if manifest.frame != frame {
+            return Err(Error::file(path, format!("is the record of frame {}", manifest.frame)));
+        }
+        let state = format!("state/{stage}.{frame:04}.vdb");
+        let foreign = manifest.files.iter().find(|file| !is_of_frame(&file.path, frame));
+        match foreign.or(manifest.state.as_ref().filter(|file| file.path != state)) {
+            Some(foreign) => {
+                Err(Error::file(path, format!("names a file that no frame has: {:?}", foreign.path)))
+            }
+            None => Ok(Some(manifest)),
+        }
     }
 
     /// Writes it: the frame is done.
@@ -91,5 +124,39 @@ impl Manifest {
     /// Whether all its files are there with their lengths.
     pub fn files_are_there(&self, folder: &Path) -> bool {
         self.files.iter().all(|file| file.is_there(folder))
+    }
+}
+
+/// Whether a path is one that a frame's files have: `base/base.0012.vdb`.
+fn is_of_frame(path: &str, frame: i32) -> bool {
+    let is_word = |text: &str| !text.is_empty() && text.bytes().all(|letter| letter.is_ascii_lowercase());
+    path.split_once('/').is_some_and(|(kind, name)| {
+        let extension = name.strip_prefix(&format!("{kind}.{frame:04}."));
+        is_word(kind) && extension.is_some_and(is_word)
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_frame_has_files_of_its_own_number_in_folders_of_their_own_kind() {
+        assert!(is_of_frame("base/base.0012.vdb", 12) && is_of_frame("objects/objects.-003.usda", -3));
+        for foreign in [
+            "../base.0012.vdb",
+            "base/../base.0012.vdb",
+            "/base/base.0012.vdb",
+            "base/base.0013.vdb",
+            "base.0012.vdb",
+            "base/base.0012.",
+            "base/removed.0012.vdb",
+            "base/base.0012.vdb/../x",
+            "",
+            "/",
+            "../../etc/passwd",
+        ] {
+            assert!(!is_of_frame(foreign, 12), "{foreign}");
+        }
     }
 }

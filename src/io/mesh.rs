@@ -23,13 +23,21 @@ pub fn read(path: &Path) -> Result<TriMesh> {
 /// As [`read`].
 pub fn read_polygons(path: &Path) -> Result<PolygonMesh> {
     let bytes = std::fs::read(path).map_err(|error| Error::io(path, "read", error))?;
+    parse_polygons(path, &bytes)
+}
+
+/// As [`read_polygons`], from the bytes of the file.
+///
+/// # Errors
+/// As [`read`].
+pub fn parse_polygons(path: &Path, bytes: &[u8]) -> Result<PolygonMesh> {
     if bytes.is_empty() {
         return Err(Error::file(path, "the file is empty"));
     }
     let mesh = match extension(path).as_str() {
-        "obj" => obj::parse(&bytes),
-        "ply" => ply::parse(&bytes),
-        "stl" => stl::parse(&bytes),
+        "obj" => obj::parse(bytes),
+        "ply" => ply::parse(bytes),
+        "stl" => stl::parse(bytes),
         other => Err(format!(
             "a mesh file must be {}, not \".{other}\"",
             EXTENSIONS.map(|e| format!(".{e}")).join(", ")

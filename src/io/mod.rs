@@ -7,6 +7,7 @@ pub mod mesh;
 mod obj;
 mod ply;
 pub mod sealed;
+pub mod seen;
 pub mod sequence;
 mod stl;
 pub mod usd;

@@ -17,9 +17,41 @@ const FORMAT: u64 = 1;
 /// # Errors
 /// What the operating system reports.
 pub fn write(path: &Path, content: &impl Serialize) -> Result<()> {
+    atomic::write_bytes(path, sealed(content)?.as_bytes())
+}
+
+/// The text of a file that holds a value.
+///
+/// # Errors
+/// A value that JSON cannot hold.
+pub fn sealed(content: &impl Serialize) -> Result<String> {
     let content = serde_json::to_value(content).map_err(|error| Error::Internal(error.to_string()))?;
-    let file = json!({ "format": FORMAT, "check": hash::of_bytes(content.to_string().as_bytes()), "content": content });
-    atomic::write_bytes(path, format!("{file:#}\n").as_bytes())
+    let check = hash::of_bytes(content.to_string().as_bytes());
+    Ok(text_of(&json!({ "format": FORMAT, "check": check, "content": content })))
+}
+
+fn text_of(file: &Value) -> String {
+    format!("{file:#}\n")
+}
+
+/// What stands in place of a stamp while it is computed.
+pub const UNSTAMPED: &str = "00000000000000000000000000000000";
+/// What stands before a stamp.
+const BEFORE_STAMP: &str = "\"check\": \"";
+
+/// Puts the hash of a text into it, in place of [`UNSTAMPED`] as the value of its key \"check\".
+pub fn stamp(text: &str) -> String {
+    let hash = hash::of_bytes(text.as_bytes());
+    text.replacen(&format!("{BEFORE_STAMP}{UNSTAMPED}"), &format!("{BEFORE_STAMP}{hash}"), 1)
+}
+
+/// Whether a stamped text is what it was when it was stamped.
+pub fn is_stamped(bytes: &[u8]) -> bool {
+    let Ok(text) = std::str::from_utf8(bytes) else { return false };
+    let Some(start) = text.find(BEFORE_STAMP).map(|at| at + BEFORE_STAMP.len()) else { return false };
+    let Some(hash) = text.get(start..start + UNSTAMPED.len()) else { return false };
+    let unstamped = [&text[..start], UNSTAMPED, &text[start + UNSTAMPED.len()..]].concat();
+    hash::of_bytes(unstamped.as_bytes()) == hash
 }
 
 /// Reads a value; none when there is no such file.
@@ -45,10 +77,15 @@ pub fn read<T: DeserializeOwned>(path: &Path) -> Result<Option<T>> {
                 format!("was written by a newer frazil (format {format}; this one reads up to {FORMAT})");
             return Err(Error::file(path, what));
         }
+        Some(0) => return Err(damaged()),
         Some(_) => {}
     }
     let content = &file["content"];
     if file["check"].as_str() != Some(&hash::of_bytes(content.to_string().as_bytes())) {
+        return Err(damaged());
+    }
+    // What this version wrote reads back to the letter.
+    if file["format"].as_u64() == Some(FORMAT) && text_of(&file).as_bytes() != bytes {
         return Err(damaged());
     }
     serde_json::from_value(content.clone()).map(Some).map_err(|_| damaged())
@@ -75,5 +112,18 @@ mod tests {
             assert!(error.contains(word) && error.contains("a.json"), "{error}");
         }
         std::fs::remove_dir_all(&folder).unwrap();
+    }
+
+    #[test]
+    fn a_stamp_tells_every_change_of_a_letter() {
+        let text = stamp(&format!("{{\n  \"check\": \"{UNSTAMPED}\",\n  \"frame\": 1\n}}\n"));
+        assert!(is_stamped(text.as_bytes()) && !text.contains(UNSTAMPED));
+        for at in 0..text.len() {
+            for bit in 0..8 {
+                let mut bytes = text.clone().into_bytes();
+                bytes[at] ^= 1 << bit;
+                assert!(!is_stamped(&bytes), "bit {bit} of byte {at}");
+            }
+        }
     }
 }

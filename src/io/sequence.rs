@@ -2,20 +2,31 @@
 
 use std::path::{Path, PathBuf};
 
-/// A name with a place for the frame number.
+/// Most digits that a frame number is written with.
+const MOST_DIGITS: usize = 32;
+
+/// A file's name with a place for the frame number, in a folder.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Pattern {
+    folder: PathBuf,
     before: String,
     digits: usize,
     after: String,
 }
 
 impl Pattern {
-    /// Finds the frame number's place in a name; none when the name is of one file.
+    /// Finds the frame number's place in a file's name; none when the name is of one file, as every name of a file that
+    /// is there. Names of folders are never looked at.
     pub fn parse(path: &Path) -> Option<Self> {
-        let text = path.to_str()?;
+        let text = path.file_name()?.to_str()?;
         let part = |start: usize, end: usize, digits: usize| {
-            Some(Self { before: text[..start].into(), digits, after: text[end..].into() })
+            // After the folder was looked at: most names have no place for a number.
+            (digits <= MOST_DIGITS && !path.is_file()).then(|| Self {
+                folder: path.parent().unwrap_or(Path::new("")).to_path_buf(),
+                before: text[..start].into(),
+                digits,
+                after: text[end..].into(),
+            })
         };
         if let Some(start) = text.rfind('%') {
             let end = start + text[start..].find('d')? + 1;
@@ -25,7 +36,9 @@ impl Pattern {
         }
         if let Some(start) = text.rfind("$F") {
             let length = text[start + 2..].bytes().take_while(u8::is_ascii_digit).count();
-            return part(start, start + 2 + length, text[start + 2..start + 2 + length].parse().unwrap_or(1));
+            let width = &text[start + 2..start + 2 + length];
+            let digits = if width.is_empty() { 1 } else { width.parse().ok()? };
+            return part(start, start + 2 + length, digits);
         }
         let end = text.rfind('#')? + 1;
         let start = text[..end].trim_end_matches('#').len();
@@ -36,7 +49,8 @@ impl Pattern {
     pub fn path(&self, frame: i32) -> PathBuf {
         let sign = if frame < 0 { "-" } else { "" };
         let number = frame.unsigned_abs();
-        format!("{}{sign}{number:0width$}{}", self.before, self.after, width = self.digits).into()
+        let name = format!("{}{sign}{number:0width$}{}", self.before, self.after, width = self.digits);
+        self.folder.join(name)
     }
 }
 
@@ -51,5 +65,35 @@ mod tests {
         }
         assert_eq!(Pattern::parse("b.%d.obj".as_ref()).unwrap().path(-3), PathBuf::from("b.-3.obj"));
         assert!(Pattern::parse("boot.obj".as_ref()).is_none());
+    }
+
+    #[test]
+    fn names_of_folders_are_no_patterns() {
+        for name in ["proj#3/boot.obj", "50%d x/boot.obj", "%04d/boot.obj", "$F4/boot.obj", "##/b.obj", ".."]
+        {
+            assert_eq!(Pattern::parse(name.as_ref()), None, "{name}");
+        }
+        let pattern = Pattern::parse("/proj#3/%d/b.##.obj".as_ref()).unwrap();
+        assert_eq!(pattern.path(7), PathBuf::from("/proj#3/%d/b.07.obj"));
+    }
+
+    #[test]
+    fn a_file_that_is_there_is_no_pattern() {
+        let folder = std::env::temp_dir().join(format!("frazil-pattern-{}", std::process::id()));
+        std::fs::create_dir_all(&folder).unwrap();
+        let path = folder.join("take#3.obj");
+        assert!(Pattern::parse(&path).is_some());
+        std::fs::write(&path, "").unwrap();
+        assert!(Pattern::parse(&path).is_none());
+        std::fs::remove_dir_all(&folder).unwrap();
+    }
+
+    #[test]
+    fn numbers_of_more_digits_than_any_frame_has_are_no_patterns() {
+        let long = "#".repeat(70_000);
+        for name in ["%99999d", "%65536d", "%4294967296d", "$F99999", "$F99999999999999999999", &long] {
+            assert_eq!(Pattern::parse(format!("b.{name}.obj").as_ref()), None);
+        }
+        assert!(Pattern::parse("b.%032d.obj".as_ref()).is_some());
     }
 }

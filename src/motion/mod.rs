@@ -42,6 +42,21 @@ pub trait Motion: Send + Sync {
         Ok(())
     }
 
+    /// Whether the motion's own data end before a time (s), so that it rests then for want of them.
+    fn ends_before(&self, _time: f64) -> bool {
+        false
+    }
+
+    /// As [`Motion::velocities`] over the coming `step` (s, above 0) or, where the motion's own data end sooner, over the
+    /// step before: what moved until then does not stop at once.
+    ///
+    /// # Errors
+    /// As [`Motion::pose`].
+    fn velocities_ahead(&self, time: f64, step: f64, out: &mut Vec<DVec3>) -> Result<()> {
+        let ends = self.ends_before(time + 0.999 * step);
+        self.velocities(time, if ends { -step } else { step }, out)
+    }
+
     /// Times inside (from, to) where the motion has a kink: keys, frames of a sequence. Ascending.
     fn breaks(&self, from: f64, to: f64) -> Vec<f64>;
 

@@ -125,6 +125,10 @@ impl Motion for Placed {
         Ok(())
     }
 
+    fn ends_before(&self, time: f64) -> bool {
+        self.inner.ends_before(time)
+    }
+
     fn breaks(&self, from: f64, to: f64) -> Vec<f64> {
         let mut breaks = self.inner.breaks(from, to);
         breaks.extend(self.keys.breaks(from, to));

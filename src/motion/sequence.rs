@@ -1,12 +1,13 @@
 //! A mesh a frame: vertices move straight from frame to frame.
 
 use std::path::PathBuf;
-use std::sync::{Arc, Mutex};
+use std::sync::{Arc, Mutex, OnceLock};
 
 use super::Motion;
 use crate::base::{DVec3, PolygonMesh, Vec3};
 use crate::error::{Error, Result};
 use crate::io::mesh;
+use crate::io::seen::Seen;
 use crate::io::sequence::Pattern;
 
 /// Frames kept in memory: the two around the time that is asked for.
@@ -24,6 +25,10 @@ pub struct MeshSequence {
     polygons: PolygonMesh,
     triangles: Vec<[u32; 3]>,
     first_path: PathBuf,
+    /// What the files held when they were read.
+    seen: Arc<Seen>,
+    /// Whether the frame after the last can be used: velocities over the last frame's coming step want it.
+    goes_on: OnceLock<bool>,
     kept: Mutex<Vec<(i32, Arc<Vec<Vec3>>)>>,
 }
 
@@ -33,14 +38,30 @@ impl MeshSequence {
     /// # Errors
     /// A frame that is missing (named), or a first frame that cannot be read.
     pub fn open(pattern: Pattern, first: i32, last: i32, fps: f64, offset: f64) -> Result<Self> {
+        Self::open_seen(pattern, first, last, fps, offset, Arc::default())
+    }
+
+    /// As [`MeshSequence::open`]; `seen` notes what the files held when they were read.
+    ///
+    /// # Errors
+    /// As [`MeshSequence::open`]; later, from a pose, a file that is no longer what was seen.
+    pub fn open_seen(
+        pattern: Pattern,
+        first: i32,
+        last: i32,
+        fps: f64,
+        offset: f64,
+        seen: Arc<Seen>,
+    ) -> Result<Self> {
         if let Some(missing) = (first..=last).map(|frame| pattern.path(frame)).find(|path| !path.is_file()) {
             return Err(Error::file(missing, "the frame is missing from the sequence"));
         }
         let first_path = pattern.path(first);
-        let polygons = mesh::read_polygons(&first_path)?;
+        let polygons = mesh::parse_polygons(&first_path, &seen.read(&first_path)?)?;
         let triangles = polygons.triangles();
         let kept = Mutex::new(vec![(first, Arc::new(polygons.positions.clone()))]);
-        Ok(Self { pattern, first, last, fps, offset, polygons, triangles, first_path, kept })
+        let goes_on = OnceLock::new();
+        Ok(Self { pattern, first, last, fps, offset, polygons, triangles, first_path, seen, goes_on, kept })
     }
 
     fn frame(&self, frame: i32) -> Result<Arc<Vec<Vec3>>> {
@@ -64,7 +85,7 @@ impl MeshSequence {
 
     fn read(&self, frame: i32) -> Result<Vec<Vec3>> {
         let path = self.pattern.path(frame);
-        let mesh = mesh::read_polygons(&path)?;
+        let mesh = mesh::parse_polygons(&path, &self.seen.read(&path)?)?;
         if !mesh.has_faces_of(&self.polygons) {
             return Err(Error::file(
                 path,
@@ -80,6 +101,22 @@ impl MeshSequence {
         }
         Ok(mesh.positions)
     }
+
+    /// Last frame that can be posed.
+    fn end(&self) -> i32 {
+        let goes_on = self.goes_on.get_or_init(|| {
+            let Some(next) = self.last.checked_add(1).filter(|next| self.pattern.path(*next).is_file())
+            else {
+                return false;
+            };
+            let read = self.frame(next);
+            if let Err(error) = &read {
+                log::warn!("{error}; the last frame has the velocities of the one before");
+            }
+            read.is_ok()
+        });
+        self.last + i32::from(*goes_on)
+    }
 }
 
 impl Motion for MeshSequence {
@@ -92,7 +129,10 @@ impl Motion for MeshSequence {
     }
 
     fn pose(&self, time: f64, out: &mut Vec<DVec3>) -> Result<()> {
-        let frame = (time * self.fps - self.offset).clamp(f64::from(self.first), f64::from(self.last));
+        let frame = time * self.fps - self.offset;
+        // The frame after the last is looked at only when it is asked for.
+        let last = if frame > f64::from(self.last) + 1e-6 { self.end() } else { self.last };
+        let frame = frame.clamp(f64::from(self.first), f64::from(last));
         // Times come from whole frames divided by fps: rounding must not ask for a neighbour.
         let frame = if (frame - frame.round()).abs() < 1e-6 { frame.round() } else { frame };
         let (below, part) = (frame.floor() as i32, frame - frame.floor());
@@ -106,6 +146,11 @@ impl Motion for MeshSequence {
             out.extend(between.map(|(p, q)| p.cast::<f64>().lerp(&q.cast(), part)));
         }
         Ok(())
+    }
+
+    fn ends_before(&self, time: f64) -> bool {
+        let frame = time * self.fps - self.offset;
+        frame > f64::from(self.last) && frame > f64::from(self.end())
     }
 
     fn breaks(&self, from: f64, to: f64) -> Vec<f64> {

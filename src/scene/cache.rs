@@ -6,9 +6,11 @@ use std::path::{Path, PathBuf};
 use serde::{Deserialize, Serialize};
 
 use super::chain::Chain;
+use super::own::{self, Own};
 use super::settings::{self, Settings};
 use super::stored::{STAGE, Stored};
-use super::{BaseMode, FrameChoice, Scene};
+use super::writer::Made;
+use super::{BaseMode, FrameChoice, Inputs, Scene};
 use crate::error::{Error, Result};
 use crate::io::hash::Hasher;
 use crate::io::manifest::Manifest;
@@ -29,9 +31,11 @@ impl Segment {
         settings.iter().for_each(|(key, value)| {
             hasher.add_text(key).add_text(value);
         });
-        before.into_iter().flat_map(|manifest| &manifest.files).for_each(|file| {
-            hasher.add_text(&file.hash);
-        });
+        before.into_iter().flat_map(|manifest| manifest.files.iter().chain(&manifest.state)).for_each(
+            |file| {
+                hasher.add_text(&file.hash);
+            },
+        );
         Self { from, settings, seed: hasher.finish() }
     }
 }
@@ -44,25 +48,37 @@ struct Record {
 
 /// An output folder, held by one run at a time.
 pub(super) struct Cache {
-    /// The frames that are done.
+    /// The frames that are done, those left out that are to be made again.
     pub stored: Stored,
+    /// The files that are the folder's own.
+    pub own: Own,
     record: Record,
     chain: Chain,
+    /// Frames that are to be made again, removed by [`Cache::commit`].
+    forgotten: Vec<Manifest>,
     /// Held until the run ends, however it ends.
     _lock: File,
 }
 
 impl Cache {
-    /// Opens or makes a folder for a scene. With `from`, frames before that one are kept as they are, and all others
-    /// forgotten.
+    /// Opens or makes a folder for a scene. With `from`, frames before that one are kept as they are, and all others are
+    /// to be forgotten. Nothing of the folder is changed before [`Cache::commit`].
     ///
     /// # Errors
     /// A folder that cannot be made or written, that another run writes into, or that holds frames of other settings or
-    /// inputs; a record that is damaged; no frame to go on from; frames that would leave a gap in a cache of changes.
-    pub fn open(scene: &Scene, folder: &Path, frames: &FrameChoice, from: Option<i32>) -> Result<Self> {
-        let settings = settings::of_base(scene)?;
+    /// inputs; files that are not its own in the way; a record that is damaged; no frame to go on from; frames that would
+    /// leave a gap in a cache of changes.
+    pub fn open(
+        scene: &Scene,
+        inputs: &Inputs,
+        folder: &Path,
+        frames: &FrameChoice,
+        from: Option<i32>,
+    ) -> Result<Self> {
+        let settings = settings::of_base(scene, &inputs.seen)?;
         // What is refused leaves no folder behind; what another run did meanwhile is looked at again below.
         refuse_asked(scene, frames, from, &Stored::read(folder)?)?;
+        Own::read(folder, Some(scene))?.refuse_foreign(scene, frames)?;
         make_folders(scene, folder)?;
         let lock = lock(folder)?;
         remove_unfinished(folder)?;
@@ -70,20 +86,31 @@ impl Cache {
         let mut record: Record = sealed::read(&record_path(folder))?.unwrap_or_default();
         let mut stored = Stored::read(folder)?;
         refuse_asked(scene, frames, from, &stored)?;
+        let own = Own::read(folder, Some(scene))?;
+        own.refuse_foreign(scene, frames)?;
+        let mut forgotten = Vec::new();
         match from {
             Some(from) if from > first => {
                 refuse_other_layer(folder, from, &record, &settings)?;
-                stored.forget_from(from)?;
+                forgotten = stored.leave_out_from(from);
                 record.segments.retain(|segment| segment.from < from);
                 record.segments.push(Segment::new(from, settings, stored.manifest(from - 1)));
             }
             Some(_) => {
-                stored.forget_from(first)?;
+                forgotten = stored.leave_out_from(first);
                 record.segments = vec![Segment::new(first, settings, None)];
             }
             None => match record.segments.last() {
                 Some(last) => {
                     let changed = settings::changed(&last.settings, &settings);
+                    // A sealed record may still be one that no run wrote.
+                    if last.from < first {
+                        let what = format!(
+                            "says that frames from {} on were made, before the shot's first",
+                            last.from
+                        );
+                        return Err(Error::file(record_path(folder), what));
+                    }
                     if !changed.is_empty() {
                         return Err(other_settings(folder, &changed));
                     }
@@ -94,60 +121,86 @@ impl Cache {
         let last = record.segments.last().ok_or_else(|| Error::Internal("a record has no segment".into()))?;
         if let Some(gone) = frames.iter().find(|frame| *frame < last.from && !stored.is_done(*frame)) {
             let what = format!(
-                "frame {gone} was made with other settings and is gone: choose another -o, or --from {first}"
+                "frame {gone} is gone or was never made, and the frames before {} were made with other settings: \
+                 ask for --frames from {} on, choose another -o, or --from {first}",
+                last.from, last.from
             );
             return Err(Error::file(folder, what));
         }
-        let chain = Chain::new(scene, last.from, &last.seed);
-        sealed::write(&record_path(folder), &record)?;
-        atomic::write_bytes(&folder.join("scene.toml"), scene.to_toml().as_bytes())?;
-        let mut cache = Self { stored, record, chain, _lock: lock };
-        cache.check_inputs()?;
+        let chain = Chain::new(scene, &inputs.seen, last.from, &last.seed);
+        let mut cache = Self { stored, own, record, chain, forgotten, _lock: lock };
+        cache.check_inputs(frames)?;
         Ok(cache)
     }
 
+    /// Removes the frames that are to be made again, and says in the folder what it is for and which frames are begun.
+    ///
+    /// # Errors
+    /// What the operating system reports.
+    pub fn commit(&mut self, scene: &Scene, todo: &[i32]) -> Result<()> {
+        for manifest in std::mem::take(&mut self.forgotten) {
+            self.stored.remove(&manifest)?;
+        }
+        if let [first, .., last] | [first @ last] = todo {
+            self.own.begin(*first, *last)?;
+        }
+        let path = record_path(self.stored.folder());
+        if sealed::read(&path)?.as_ref() != Some(&self.record) {
+            sealed::write(&path, &self.record)?;
+        }
+        self.own.write(own::SCENE, scene.to_toml().as_bytes())
+    }
+
     /// First frame that was made with the settings of now.
-    fn own_from(&self) -> i32 {
+    pub fn own_from(&self) -> i32 {
         self.record.segments.last().map_or(i32::MIN, |segment| segment.from)
     }
 
-    /// Refuses frames whose inputs have changed since.
-    fn check_inputs(&mut self) -> Result<()> {
+    /// Refuses frames whose inputs have changed since. A last frame whose velocities can now be had from the frame after
+    /// it is to be made again, if it is asked for.
+    fn check_inputs(&mut self, asked: &FrameChoice) -> Result<()> {
         let own = self.own_from();
-        for frame in self.stored.frames().filter(|frame| *frame >= own) {
-            let made_from = self.stored.manifest(frame).map(|manifest| manifest.inputs.as_str());
-            if made_from != Some(self.chain.at(frame)?) {
-                let files = self.chain.files(frame);
-                let names: Vec<String> = files.iter().map(|file| file.display().to_string()).collect();
-                let what = format!(
-                    "the inputs of frame {frame} have changed since it was made ({}): --from {frame} keeps the frames before it",
-                    names.join(" or ")
-                );
-                return Err(Error::file(self.stored.folder(), what));
+        let frames: Vec<i32> = self.stored.frames().filter(|frame| *frame >= own).collect();
+        for frame in frames {
+            let Some(manifest) = self.stored.manifest(frame).cloned() else { continue };
+            if manifest.inputs != self.chain.at(frame)? {
+                return Err(self.changed_inputs(frame, self.chain.files(frame)));
+            }
+            if manifest.next == self.chain.next(frame)? {
+                continue;
+            }
+            match (self.stored.is_done(frame + 1), &manifest.next) {
+                (false, _) if asked.contains(frame) => self.stored.leave_out(frame),
+                // An earlier frazil did not look.
+                (false, _) | (true, None) => {}
+                (true, Some(_)) => return Err(self.changed_inputs(frame, self.chain.next_files(frame))),
             }
         }
         Ok(())
     }
 
-    /// Hash of what a frame is made from.
+    fn changed_inputs(&self, frame: i32, files: Vec<PathBuf>) -> Error {
+        let names: Vec<String> = files.iter().map(|file| file.display().to_string()).collect();
+        let what = format!(
+            "the inputs of frame {frame} have changed since it was made ({}): --from {frame} keeps the frames before it",
+            names.join(" or ")
+        );
+        Error::file(self.stored.folder(), what)
+    }
+
+    /// Hash of what a frame is made from, and of what its velocities are besides.
     ///
     /// # Errors
     /// A file of a sequence that cannot be read.
-    pub fn inputs(&mut self, frame: i32) -> Result<String> {
-        Ok(self.chain.at(frame)?.to_string())
+    pub fn inputs(&mut self, frame: i32) -> Result<Made> {
+        Ok(Made { from: self.chain.at(frame)?.to_string(), next: self.chain.next(frame)? })
     }
 }
-
-/// Keys that make the layer before the first frame: what was kept cannot go on as another layer.
-const LAYER: [&str; 6] = ["shot.frames", "snow.ground", "snow.area", "snow.depth", "snow.top", "snow.cell"];
 
 /// Refuses to keep frames of another layer.
 fn refuse_other_layer(folder: &Path, from: i32, record: &Record, settings: &Settings) -> Result<()> {
     let Some(kept) = record.segments.iter().rev().find(|segment| segment.from < from) else { return Ok(()) };
-    let of_layer = |all: &Settings| -> Settings {
-        LAYER.iter().filter_map(|key| Some((key.to_string(), all.get(*key)?.clone()))).collect()
-    };
-    let changed = settings::changed(&of_layer(&kept.settings), &of_layer(settings));
+    let changed = settings::changed(&settings::of_layer(&kept.settings), &settings::of_layer(settings));
     if changed.is_empty() {
         return Ok(());
     }
@@ -158,12 +211,12 @@ fn refuse_other_layer(folder: &Path, from: i32, record: &Record, settings: &Sett
     Err(Error::file(folder, what))
 }
 
-/// Refuses a `from` without the frame before it, and frames that changes could not be followed up to.
+/// Refuses a `from` that cannot go on from the frame before it or that the asked frames have no part in, and frames that
+/// changes could not be followed up to.
 fn refuse_asked(scene: &Scene, frames: &FrameChoice, from: Option<i32>, stored: &Stored) -> Result<()> {
     let first = scene.shot.frames.first;
-    if let Some(from) = from.filter(|from| *from > first && !stored.is_done(from - 1)) {
-        let what = format!("--from {from} needs frame {}, which is not there", from - 1);
-        return Err(Error::file(stored.folder(), what));
+    if let Some(from) = from {
+        refuse_from(frames, first, from, stored)?;
     }
     if !scene.output.base || scene.output.base_mode == BaseMode::Full {
         return Ok(());
@@ -177,6 +230,42 @@ fn refuse_asked(scene: &Scene, frames: &FrameChoice, from: Option<i32>, stored: 
             );
             Err(Error::file(stored.folder(), what))
         }
+    }
+}
+
+fn refuse_from(frames: &FrameChoice, first: i32, from: i32, stored: &Stored) -> Result<()> {
+    let refused = |what: String| Err(Error::file(stored.folder(), what));
+    if frames.last() < from {
+        let (low, high) = (frames.first(), frames.last());
+        return refused(format!(
+            "--from {from} makes nothing of --frames {low}-{high}: ask for frames from {from} on"
+        ));
+    }
+    if from <= first {
+        return Ok(());
+    }
+    let before = from - 1;
+    if !stored.is_done(before) {
+        return refused(format!("--from {from} needs frame {before}, which is not there"));
+    }
+    if stored.latest_layer(before..=before).is_none() {
+        let kept: Vec<String> = stored
+            .frames()
+            .filter(|frame| stored.latest_layer(*frame..=*frame).is_some())
+            .map(|frame| format!("--from {}", i64::from(frame) + 1))
+            .collect();
+        let ways = if kept.is_empty() { String::new() } else { format!("{}, ", kept.join(", ")) };
+        return refused(format!(
+            "--from {from} needs the exact layer after frame {before}, which the folder does not keep (`half` and \
+             `base = []` keep the last ones only): {ways}--from {first} or another -o"
+        ));
+    }
+    match frames.iter().find(|frame| *frame < from && !stored.is_done(*frame)) {
+        Some(gap) => refused(format!(
+            "frame {gap} is not there, and --from {from} keeps the frames before {from} as they are: ask for --frames from \
+             {from} on"
+        )),
+        None => Ok(()),
     }
 }
 
@@ -209,7 +298,8 @@ fn lock(folder: &Path) -> Result<File> {
         }
         // A file system without locks is no reason to stop.
         Err(std::fs::TryLockError::Error(error)) => {
-            log::debug!("{}: no lock ({error})", path.display());
+            let why = Error::io(&path, "lock", error);
+            log::warn!("{why}; nothing keeps another run from writing into this folder");
             Ok(file)
         }
         Ok(()) => Ok(file),
@@ -218,12 +308,16 @@ fn lock(folder: &Path) -> Result<File> {
 
 /// Removes what a killed run had begun to write; the lock says that nobody writes now.
 fn remove_unfinished(folder: &Path) -> Result<()> {
-    for name in ["", "state", "report", "base", "removed", "objects"] {
+    for name in own::FOLDERS {
         // Folders of kinds that are not written need not be there.
         let Ok(entries) = std::fs::read_dir(folder.join(name)) else { continue };
-        let paths = entries.filter_map(|entry| Some(entry.ok()?.path()));
-        for path in paths.filter(|path| path.extension().is_some_and(|extension| extension == atomic::PART)) {
-            std::fs::remove_file(&path).map_err(|error| Error::io(path, "remove", error))?;
+        for entry in entries.filter_map(|entry| entry.ok()) {
+            let part = entry.file_name();
+            let finished = part.to_str().and_then(atomic::finished_name);
+            if finished.is_some_and(|finished| own::is_own(name, finished)) {
+                let path = entry.path();
+                std::fs::remove_file(&path).map_err(|error| Error::io(path, "remove", error))?;
+            }
         }
     }
     Ok(())

@@ -3,11 +3,12 @@
 use rayon::prelude::*;
 use serde::Serialize;
 
-use super::{BaseMode, Inputs, Object, Role, Scene, memory};
+use super::{BaseMode, Inputs, Object, Role, Scene, inputs, memory};
 use crate::base::DVec3;
 use crate::context::Context;
-use crate::error::Result;
-use crate::sweep::Body;
+use crate::error::{Error, Result};
+use crate::snow::base_layer::Reach;
+use crate::sweep::{Body, REACH};
 
 /// Frames that one task poses, one after another.
 const RUN: usize = 12;
@@ -89,8 +90,10 @@ pub fn check(ctx: &Context, scene: &Scene, inputs: &Inputs) -> Result<Report> {
     let mut objects = Vec::new();
     for ((index, object), body) in colliders.zip(&inputs.bodies) {
         let extents = ctx.stage("inputs", || extents(ctx, scene, body))?;
+        warnings.extend(out_of_reach(ctx, scene, inputs, body, &extents)?);
         objects.push(report(scene, index, object, body, &extents, area.zip(top), &mut warnings));
     }
+    warnings.extend(inputs.far_static(scene).map(|(index, far)| inputs::too_far(scene, index, far)));
     let columns = area.map(|[x0, z0, x1, z1]| (x1 - x0) * (z1 - z0) / (scene.snow.cell * scene.snow.cell));
     if objects.is_empty() {
         warnings.push("nothing moves through the snow: no object has the role collide".into());
@@ -131,6 +134,35 @@ fn extents(ctx: &Context, scene: &Scene, body: &Body) -> Result<Vec<Extent>> {
     };
     let runs: Vec<Vec<Extent>> = frames.par_chunks(RUN).map(of_run).collect::<Result<_>>()?;
     Ok(runs.concat())
+}
+
+/// The first frame that a run could not make because a body that touches the snow reaches too far from it.
+fn out_of_reach(
+    ctx: &Context,
+    scene: &Scene,
+    inputs: &Inputs,
+    body: &Body,
+    extents: &[Extent],
+) -> Result<Option<String>> {
+    let Some((low, high)) = inputs.bounds(scene) else { return Ok(None) };
+    let (middle, cell) = (0.5 * (low + high), scene.snow.cell);
+    // The snow's own middle, known when it is made, may be another.
+    let near = (0.5 * REACH * cell).min(REACH * cell - (high - low).norm());
+    let is_far = |extent: &Extent| {
+        let far = (extent.low - middle).abs().sup(&(extent.high - middle).abs()).max();
+        far + extent.moved > near
+    };
+    let reach = Reach::of_snow(cell, low, high)?;
+    let time = |frame: i32| f64::from(frame) / scene.shot.fps;
+    for frame in extents.iter().filter(|extent| is_far(extent)).map(|extent| extent.frame) {
+        let before = (frame - 1).max(scene.shot.frames.first);
+        match reach.spans(ctx, body, time(before), time(frame)) {
+            Ok(_) => {}
+            Err(Error::Argument(what)) => return Ok(Some(format!("frame {frame} cannot be made: {what}"))),
+            Err(other) => return Err(other),
+        }
+    }
+    Ok(None)
 }
 
 fn report(

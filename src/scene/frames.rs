@@ -6,6 +6,9 @@ use std::str::FromStr;
 /// Most frames of a shot.
 const MOST: i64 = 10_000_000;
 
+/// Greatest number of a frame, either way.
+const FARTHEST: i32 = 1_000_000_000;
+
 /// First and last frame of a shot, both included.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Frames {
@@ -37,7 +40,8 @@ impl FromStr for Frames {
 
     fn from_str(text: &str) -> Result<Self, String> {
         let refused = || format!("\"{text}\" is no range of frames such as \"1001-1120\"");
-        let number = |text: &str| text.trim().parse::<i32>().map_err(|_| refused());
+        let within = |frame: &i32| (-FARTHEST..=FARTHEST).contains(frame);
+        let number = |text: &str| text.trim().parse::<i32>().ok().filter(within).ok_or_else(refused);
         // A minus at the start is a sign.
         let (first, last) = match text.char_indices().skip(1).find(|(_, letter)| *letter == '-') {
             None => (number(text)?, number(text)?),
@@ -116,6 +120,9 @@ impl FromStr for FrameChoice {
                 return Err(refused());
             }
             frames.extend(range.iter().step_by(step));
+            if frames.len() as i64 > 2 * MOST {
+                return Err(format!("\"{text}\" asks for more than {MOST} frames"));
+            }
         }
         frames.sort_unstable();
         frames.dedup();
@@ -134,7 +141,9 @@ mod tests {
         assert_eq!("-5--2".parse(), Ok(Frames { first: -5, last: -2 }));
         assert_eq!("-5-2".parse(), Ok(Frames { first: -5, last: 2 }));
         assert_eq!(Frames { first: 1, last: 3 }.to_string(), "1-3");
-        for wrong in ["", "-", "a-b", "3-1", "1-", "1-2-3", "1001-99999999999"] {
+        for wrong in
+            ["", "-", "a-b", "3-1", "1-", "1-2-3", "1001-99999999999", "2147483640-2147483647", "-2147483648"]
+        {
             assert!(wrong.parse::<Frames>().is_err(), "{wrong}");
         }
     }

@@ -1,17 +1,19 @@
 //! Everything a scene reads before its first frame.
 
 use std::path::Path;
+use std::sync::Arc;
 
 use super::objects::is_character;
 use super::{Ground, Layer, Object, Role, Scene};
-use crate::base::{DVec3, TriMesh};
+use crate::base::{DVec3, PolygonMesh, TriMesh};
 use crate::context::Context;
 use crate::error::{Error, Result};
-use crate::io::mesh;
+use crate::io::seen::Seen;
 use crate::io::sequence::Pattern;
+use crate::io::{hash, mesh};
 use crate::motion::{Character, Key, Keys, MeshSequence, Motion, Placed, Play, Rigid};
 use crate::snow::base_layer::initial::{self, Cover};
-use crate::sweep::Body;
+use crate::sweep::{Body, REACH};
 use crate::vdb::{FloatGrid, GridClass, file};
 
 /// Half width of the snow's narrow band (cells).
@@ -23,6 +25,8 @@ pub struct Inputs {
     statics: Vec<TriMesh>,
     /// The objects that move through the snow.
     pub bodies: Vec<Body>,
+    /// What the files held when they were read.
+    pub(super) seen: Arc<Seen>,
 }
 
 enum Snow {
@@ -36,19 +40,26 @@ impl Inputs {
     /// # Errors
     /// What the files or keys have wrong, with file and key.
     pub fn load(scene: &Scene) -> Result<Self> {
+        let seen = Arc::new(Seen::default());
         let snow = match &scene.snow.layer {
-            Layer::Grid(path) => Snow::Given(layer_grid(path, scene.snow.cell)?),
-            Layer::Depth(depth) => Snow::Made { ground: ground(scene)?, cover: Cover::Depth(*depth) },
-            Layer::Top(path) => Snow::Made { ground: ground(scene)?, cover: Cover::Top(mesh::read(path)?) },
+            Layer::Grid(path) => Snow::Given(layer_grid(path, scene.snow.cell, &seen)?),
+            Layer::Depth(depth) => Snow::Made { ground: ground(scene, &seen)?, cover: Cover::Depth(*depth) },
+            Layer::Top(path) => {
+                Snow::Made { ground: ground(scene, &seen)?, cover: Cover::Top(read_mesh(path, &seen)?) }
+            }
         };
         let start = f64::from(scene.shot.frames.first) / scene.shot.fps;
         let (mut statics, mut bodies) = (Vec::new(), Vec::new());
-        for object in scene.objects.iter().filter(|object| object.role != Role::Ignore) {
-            let motion = motion(scene, object)?;
+        for (index, object) in scene.objects.iter().enumerate() {
+            if object.role == Role::Ignore {
+                continue;
+            }
+            let motion = motion(scene, object, &seen)?;
             match object.role {
                 Role::Static => statics.push(posed(&*motion, start)?),
                 _ => {
-                    let body = Body::new(motion, start)?.with_noise(object.noise);
+                    let name = format!("object {} ({})", index + 1, super::file::name(&object.file));
+                    let body = Body::new(motion, start)?.with_noise(object.noise).with_name(name);
                     log::info!(
                         "{}: {} triangles, {} open loops closed",
                         object.file.display(),
@@ -66,7 +77,7 @@ impl Inputs {
                 }
             }
         }
-        Ok(Self { snow, statics, bodies })
+        Ok(Self { snow, statics, bodies, seen })
     }
 
     /// Least and greatest x and z of the snow (m), as far as they are known before it is made.
@@ -98,6 +109,57 @@ impl Inputs {
         }
     }
 
+    /// Least and greatest corner of what the snow's ground, top and static objects span (m); of a given layer, of its
+    /// active voxels.
+    pub fn bounds(&self, scene: &Scene) -> Option<(DVec3, DVec3)> {
+        let of_mesh =
+            |mesh: &TriMesh| mesh.bounds().map(|(low, high)| (low.cast::<f64>(), high.cast::<f64>()));
+        let (ground, top) = match &self.snow {
+            Snow::Given(grid) => {
+                let (low, high) = grid.active_bbox()?;
+                let corner = |voxel: [i32; 3]| DVec3::from(voxel.map(f64::from)) * grid.voxel_size();
+                return Some((corner(low), corner(high)));
+            }
+            Snow::Made { ground, cover } => {
+                (ground, if let Cover::Top(top) = cover { of_mesh(top) } else { None })
+            }
+        };
+        let ground = match ground {
+            initial::Ground::Plane { height, area: [x0, z0, x1, z1] } => {
+                Some((DVec3::new(*x0, *height, *z0), DVec3::new(*x1, *height, *z1)))
+            }
+            initial::Ground::Mesh(mesh) => of_mesh(mesh),
+        };
+        let all = self.statics.iter().map(of_mesh).chain([top]).flatten();
+        let (low, mut high) = all.fold(ground?, |(low, high), (l, h)| (low.inf(&l), high.sup(&h)));
+        if let Layer::Depth(depth) = &scene.snow.layer {
+            high.y += depth;
+        }
+        Some((low, high))
+    }
+
+    /// A static object that lies too far from the snow's ground, by its place among the objects, with how far it reaches
+    /// (m).
+    pub(super) fn far_static(&self, scene: &Scene) -> Option<(usize, f64)> {
+        let Snow::Made { ground, .. } = &self.snow else { return None };
+        let middle = match ground {
+            initial::Ground::Plane { height, area: [x0, z0, x1, z1] } => {
+                DVec3::new(0.5 * (x0 + x1), *height, 0.5 * (z0 + z1))
+            }
+            initial::Ground::Mesh(mesh) => {
+                let (low, high) = mesh.bounds()?;
+                (low + high).cast::<f64>() * 0.5
+            }
+        };
+        let statics = scene.objects.iter().enumerate().filter(|(_, object)| object.role == Role::Static);
+        statics.zip(&self.statics).find_map(|((index, _), mesh)| {
+            let (low, high) = mesh.bounds()?;
+            let far = (low.cast::<f64>() - middle).abs().sup(&(high.cast::<f64>() - middle).abs()).max();
+            // The layer's own lattice begins at the mean of the ground's vertices, which may lie off its middle.
+            (far > 0.9 * REACH * scene.snow.cell).then_some((index, far))
+        })
+    }
+
     /// The snow before the first frame.
     ///
     /// # Errors
@@ -112,16 +174,34 @@ impl Inputs {
     }
 }
 
-fn ground(scene: &Scene) -> Result<initial::Ground> {
+/// Says that a static object lies too far away.
+pub(super) fn too_far(scene: &Scene, index: usize, far: f64) -> String {
+    let (cell, name) = (scene.snow.cell, super::file::name(&scene.objects[index].file));
+    format!(
+        "object {} ({name}), static, reaches {far:.0} m from the middle of the ground; cells of {cell} m have a reach of \
+         {:.0} m",
+        index + 1,
+        REACH * cell
+    )
+}
+
+fn read_mesh(path: &Path, seen: &Seen) -> Result<TriMesh> {
+    mesh::parse_polygons(path, &seen.read(path)?).map(PolygonMesh::into_triangles)
+}
+
+fn ground(scene: &Scene, seen: &Seen) -> Result<initial::Ground> {
     match &scene.snow.ground {
         Some(Ground::Plane { height, area }) => Ok(initial::Ground::Plane { height: *height, area: *area }),
-        Some(Ground::Mesh(path)) => Ok(initial::Ground::Mesh(mesh::read(path)?)),
+        Some(Ground::Mesh(path)) => Ok(initial::Ground::Mesh(read_mesh(path, seen)?)),
         None => Err(Error::argument("the snow has no ground")),
     }
 }
 
-fn layer_grid(path: &Path, cell: f64) -> Result<FloatGrid> {
+fn layer_grid(path: &Path, cell: f64, seen: &Seen) -> Result<FloatGrid> {
+    // OpenVDB reads the file itself: it must be the same before and after.
+    seen.hash(path)?;
     let grid = file::read_named(path, None)?;
+    seen.note(path, hash::of_file(path)?)?;
     if grid.class() != GridClass::LevelSet {
         return Err(Error::file(path, format!("grid \"{}\" is not a level set", grid.name())));
     }
@@ -136,7 +216,7 @@ fn layer_grid(path: &Path, cell: f64) -> Result<FloatGrid> {
 }
 
 /// An object's motion: its file, its own frames, scale and axis, and the keys over them.
-fn motion(scene: &Scene, object: &Object) -> Result<Box<dyn Motion>> {
+fn motion(scene: &Scene, object: &Object, seen: &Arc<Seen>) -> Result<Box<dyn Motion>> {
     let fps = scene.shot.fps;
     let radians = |turn: [f64; 3]| DVec3::from(turn.map(f64::to_radians));
     let keys = object.keys.iter().map(|key| Key {
@@ -146,18 +226,18 @@ fn motion(scene: &Scene, object: &Object) -> Result<Box<dyn Motion>> {
     });
     let keys = Keys::new(keys.collect())?;
     let own: Box<dyn Motion> = match Pattern::parse(&object.file) {
-        None if is_character(&object.file) => Box::new(character(scene, object)?),
-        None => Box::new(Rigid::new(mesh::read(&object.file)?, Keys::default())),
+        None if is_character(&object.file) => Box::new(character(scene, object, seen)?),
+        None => Box::new(Rigid::new(read_mesh(&object.file, seen)?, Keys::default())),
         Some(pattern) => {
             let first = (f64::from(scene.shot.frames.first) - object.offset).floor() as i32;
             let last = (f64::from(scene.shot.frames.last) - object.offset).ceil() as i32;
-            Box::new(MeshSequence::open(pattern, first, last, fps, object.offset)?)
+            Box::new(MeshSequence::open_seen(pattern, first, last, fps, object.offset, seen.clone())?)
         }
     };
     Ok(Box::new(Placed::new(own, object.space, keys)))
 }
 
-fn character(scene: &Scene, object: &Object) -> Result<Character> {
+fn character(scene: &Scene, object: &Object, seen: &Seen) -> Result<Character> {
     let play = Play {
         node: object.node.clone(),
         clip: object.clip.clone(),
@@ -165,6 +245,7 @@ fn character(scene: &Scene, object: &Object) -> Result<Character> {
         start: (f64::from(scene.shot.frames.first) + object.offset) / scene.shot.fps,
     };
     let character = Character::open(&object.file, play)?;
+    seen.note(&object.file, character.content().to_string())?;
     if let Some(jump) = character.jump() {
         let metres = jump * object.space.scale;
         log::warn!(

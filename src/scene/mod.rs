@@ -10,6 +10,7 @@ mod inputs;
 mod memory;
 mod objects;
 mod overrides;
+mod own;
 mod resolved;
 mod settings;
 pub mod shot;
@@ -17,6 +18,7 @@ mod stage;
 mod stored;
 mod table;
 pub mod template;
+pub mod verify;
 mod writer;
 
 pub use frames::{FrameChoice, Frames};

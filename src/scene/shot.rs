@@ -4,8 +4,8 @@ use std::path::Path;
 use std::sync::mpsc::{Receiver, sync_channel};
 
 use super::cache::Cache;
-use super::writer::{Job, Step, Writer, vdb_bytes};
-use super::{FrameChoice, Inputs, Scene, stage};
+use super::writer::{Job, Made, Step, Writer, vdb_bytes};
+use super::{FrameChoice, Inputs, Scene, inputs, stage};
 use crate::context::{Context, StageTime};
 use crate::error::{Error, Result};
 use crate::io::manifest::Manifest;
@@ -45,7 +45,7 @@ impl<'a> Run<'a> {
         frames: &FrameChoice,
         from: Option<i32>,
     ) -> Result<Self> {
-        let cache = Cache::open(scene, folder, frames, from)?;
+        let cache = Cache::open(scene, inputs, folder, frames, from)?;
         let (there, todo): (Vec<i32>, Vec<i32>) =
             frames.iter().partition(|frame| cache.stored.is_done(*frame));
         let noise = Some(scene.snow.noise).filter(|noise| noise.amplitude > 0.0);
@@ -54,6 +54,8 @@ impl<'a> Run<'a> {
         if let Some(&first) = run.todo.first() {
             run.start = Some(run.layer_before(ctx, first)?);
         }
+        // All that can be refused was.
+        run.cache.commit(scene, &run.todo)?;
         Ok(run)
     }
 
@@ -77,9 +79,9 @@ impl<'a> Run<'a> {
             self.make_frames(ctx, start, &todo, done)?;
         }
         if self.scene.output.usd {
-            stage::write(self.scene, &self.cache.stored)?;
+            stage::write(self.scene, &self.cache.stored, &mut self.cache.own)?;
         }
-        Ok(())
+        self.cache.own.finish()
     }
 
     fn make_frames(
@@ -129,7 +131,7 @@ impl<'a> Run<'a> {
                 let inputs = if frame == wanted { Some(self.cache.inputs(frame)?) } else { None };
                 let changes = at.layer.take_changes()?;
                 at.frame = frame;
-                let whole = self.whole_base(&at.layer, frame, inputs.as_deref())?;
+                let whole = self.whole_base(&at.layer, frame, inputs.as_ref())?;
                 if !send(Job::Step(Box::new(Step { frame, changes, report, inputs, whole }))) {
                     return Ok(());
                 }
@@ -139,10 +141,10 @@ impl<'a> Run<'a> {
     }
 
     /// The base's file at the first frame of a cache of changes: no copy of the layer is needed for it.
-    fn whole_base(&self, layer: &BaseLayer, frame: i32, inputs: Option<&str>) -> Result<Option<Vec<u8>>> {
-        match inputs {
-            Some(inputs) if frame == self.scene.shot.frames.first && !Writer::follows(self.scene) => {
-                vdb_bytes(self.scene, frame, &layer.grids().list(), inputs).map(Some)
+    fn whole_base(&self, layer: &BaseLayer, frame: i32, made: Option<&Made>) -> Result<Option<Vec<u8>>> {
+        match made {
+            Some(made) if frame == self.scene.shot.frames.first && !Writer::follows(self.scene) => {
+                vdb_bytes(self.scene, frame, &layer.grids().list(), &made.from).map(Some)
             }
             _ => Ok(None),
         }
@@ -152,7 +154,11 @@ impl<'a> Run<'a> {
         let time = |frame: i32| f64::from(frame) / self.scene.shot.fps;
         // The first frame's poses are cut out; nothing has moved yet.
         let from = if frame == self.scene.shot.frames.first { frame } else { frame - 1 };
-        let report = layer.step(ctx, &self.inputs.bodies, time(from), time(frame), frame)?;
+        let report = layer.step(ctx, &self.inputs.bodies, time(from), time(frame), frame);
+        let report = report.map_err(|error| match error {
+            Error::Argument(what) => Error::file(&self.scene.path, format!("frame {frame}: {what}")),
+            other => other,
+        })?;
         log_step(frame, &report);
         Ok(report)
     }
@@ -161,8 +167,22 @@ impl<'a> Run<'a> {
     fn layer_before(&self, ctx: &Context, frame: i32) -> Result<LayerAt> {
         let params = self.params;
         let first = self.scene.shot.frames.first;
-        let initial = self.inputs.layer(ctx, self.scene.snow.cell)?;
-        let at = match self.cache.stored.latest_layer(first..=frame - 1) {
+        let (own, latest) = (self.cache.own_from(), self.cache.stored.latest_layer(first..=frame - 1));
+        if own > first && latest.is_none_or(|latest| latest < own - 1) {
+            let what = format!(
+                "the layer after frame {}, from which these settings go on, is gone: choose another -o, or --from {first}",
+                own - 1
+            );
+            return Err(Error::file(self.cache.stored.folder(), what));
+        }
+        let initial = self.inputs.layer(ctx, self.scene.snow.cell);
+        let initial = initial.map_err(|error| match (error, self.inputs.far_static(self.scene)) {
+            (Error::Argument(_), Some((index, far))) => {
+                Error::file(&self.scene.path, inputs::too_far(self.scene, index, far))
+            }
+            (other, _) => other,
+        })?;
+        let at = match latest {
             None => LayerAt { frame: first - 1, layer: BaseLayer::new(ctx, initial, params)? },
             Some(state) => {
                 let grids = self.cache.stored.layer(ctx, state)?;

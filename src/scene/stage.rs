@@ -1,16 +1,17 @@
 //! `shot.usda`: everything that a shot made, for programs that read USD.
 
+use super::own::{self, Own};
 use super::stored::Stored;
 use super::{BaseMode, Role, Scene};
 use crate::error::Result;
-use crate::io::{atomic, usd};
+use crate::io::usd;
 
 /// Writes the stage with the frames that are there, by relative paths. The base of a cache of changes is left out: its
 /// files are no whole volumes.
 ///
 /// # Errors
 /// What the operating system reports.
-pub(super) fn write(scene: &Scene, stored: &Stored) -> Result<()> {
+pub(super) fn write(scene: &Scene, stored: &Stored, files: &mut Own) -> Result<()> {
     let (frames, fps) = (scene.shot.frames, scene.shot.fps);
     let relative = |kind: &str| -> Vec<(i32, String)> {
         let files = stored.files(kind).into_iter().filter(|(frame, _)| frames.contains(*frame));
@@ -33,12 +34,12 @@ pub(super) fn write(scene: &Scene, stored: &Stored) -> Result<()> {
     let clips = (!clips.frames.is_empty()).then_some((&clips, &names[..]));
     if clips.is_some() {
         let text = usd::clip_manifest("objects", &names);
-        atomic::write_bytes(&stored.folder().join("objects/objects.manifest.usda"), text.as_bytes())?;
+        files.write(own::OBJECTS, text.as_bytes())?;
     }
     let time = usd::StageTime { first: frames.first, last: frames.last, fps };
     let comment = format!("made by frazil {}", env!("CARGO_PKG_VERSION"));
     let text = usd::stage(&comment, time, &volumes, clips);
-    atomic::write_bytes(&stored.folder().join("shot.usda"), text.as_bytes())
+    files.write(own::SHOT, text.as_bytes())
 }
 
 /// Names of the moving objects' prims, each once.
@@ -50,7 +51,10 @@ pub(super) fn object_names(scene: &Scene) -> Vec<String> {
             usd::prim_name(stem.split(['%', '#', '$']).next().unwrap_or("").trim_end_matches(['.', '_']));
         let count =
             names.iter().filter(|name| **name == stem || name.starts_with(&format!("{stem}_"))).count();
-        names.push(if count == 0 { stem } else { format!("{stem}_{}", count + 1) });
+        let numbered = |number: usize| if number == 1 { stem.clone() } else { format!("{stem}_{number}") };
+        // Another file may bear the name that the number gives.
+        let name = (count + 1..).map(numbered).find(|name| !names.contains(name)).unwrap_or_default();
+        names.push(name);
     }
     names
 }

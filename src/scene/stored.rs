@@ -39,10 +39,6 @@ impl Stored {
             let number = name.to_str().and_then(|name| name.strip_prefix("base.")?.strip_suffix(".json"));
             let Some(frame) = number.and_then(|number| number.parse::<i32>().ok()) else { continue };
             let Some(manifest) = Manifest::read(folder, STAGE, frame)? else { continue };
-            if manifest.frame != frame {
-                let path = Manifest::path(folder, STAGE, frame);
-                return Err(Error::file(path, format!("is the record of frame {}", manifest.frame)));
-            }
             if manifest.files_are_there(folder) {
                 done.insert(frame, manifest);
             }
@@ -83,22 +79,30 @@ impl Stored {
         self.done.iter().flat_map(of_frame).collect()
     }
 
-    /// Removes the frames from one on: first what says that they are done, then their files.
+    /// Leaves out the frames from one on, as if they were not done; they stay where they are.
+    pub(super) fn leave_out_from(&mut self, from: i32) -> Vec<Manifest> {
+        self.done.split_off(&from).into_values().collect()
+    }
+
+    /// Leaves out a frame.
+    pub(super) fn leave_out(&mut self, frame: i32) {
+        self.done.remove(&frame);
+    }
+
+    /// Removes a frame that was left out: first what says that it is done, then its files.
     ///
     /// # Errors
     /// What the operating system reports.
-    pub(super) fn forget_from(&mut self, from: i32) -> Result<()> {
-        for (frame, manifest) in self.done.split_off(&from) {
-            let files = manifest.files.iter().map(|file| self.folder.join(&file.path));
-            let state = state_path(&self.folder, frame);
-            let record = Manifest::path(&self.folder, STAGE, frame);
-            for path in std::iter::once(record).chain(files).chain([state]) {
-                match std::fs::remove_file(&path) {
-                    Err(error) if error.kind() != std::io::ErrorKind::NotFound => {
-                        return Err(Error::io(path, "remove", error));
-                    }
-                    _ => {}
+    pub(super) fn remove(&self, manifest: &Manifest) -> Result<()> {
+        let files = manifest.files.iter().map(|file| self.folder.join(&file.path));
+        let state = state_path(&self.folder, manifest.frame);
+        let record = Manifest::path(&self.folder, STAGE, manifest.frame);
+        for path in std::iter::once(record).chain(files).chain([state]) {
+            match std::fs::remove_file(&path) {
+                Err(error) if error.kind() != std::io::ErrorKind::NotFound => {
+                    return Err(Error::io(path, "remove", error));
                 }
+                _ => {}
             }
         }
         Ok(())
@@ -114,7 +118,7 @@ impl Stored {
             let loads = match manifest.keeps {
                 Keeps::Whole => true,
                 Keeps::Changes => before == Some(frame - 1),
-                Keeps::State => state_path(&self.folder, frame).is_file(),
+                Keeps::State => manifest.state.as_ref().is_some_and(|state| state.is_there(&self.folder)),
             };
             if loads {
                 before = Some(frame);
@@ -152,16 +156,14 @@ impl Stored {
     fn grids(&self, frame: i32) -> Result<Grids> {
         let missing = || Error::file(&self.folder, format!("frame {frame} is not there"));
         let manifest = self.done.get(&frame).ok_or_else(missing)?;
-        if manifest.keeps == Keeps::State {
-            return read_grids(&state_path(&self.folder, frame));
-        }
-        let written = manifest.files_of("base").next().ok_or_else(missing)?;
+        let written = match manifest.keeps {
+            Keeps::State => manifest.state.as_ref(),
+            Keeps::Whole | Keeps::Changes => manifest.files_of("base").next(),
+        };
+        let written = written.ok_or_else(missing)?;
         let path = self.folder.join(&written.path);
-        if !written.is_whole(&self.folder) {
-            return Err(Error::file(
-                path,
-                "is not the file that was written: remove it, and it is made again",
-            ));
+        if let Some(fault) = written.fault(&self.folder) {
+            return Err(Error::file(path, format!("{fault}: remove it, and it is made again")));
         }
         read_grids(&path)
     }

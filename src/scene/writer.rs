@@ -11,7 +11,7 @@ use crate::base::{DVec3, TriMesh};
 use crate::context::{Context, StageTime};
 use crate::error::{Error, Result};
 use crate::io::manifest::{Keeps, Manifest, Written};
-use crate::io::{atomic, mesh, usd};
+use crate::io::{atomic, mesh, sealed, usd};
 use crate::snow::base_layer::{Changes, Grids, StepReport};
 use crate::sweep::Body;
 use crate::vdb::file::{WriteOptions, to_bytes};
@@ -33,10 +33,18 @@ pub(super) struct Step {
     pub frame: i32,
     pub changes: Changes,
     pub report: StepReport,
-    /// Hash of what the frame is made from, when it is to be written.
-    pub inputs: Option<String>,
+    /// What the frame is made from, when it is to be written.
+    pub inputs: Option<Made>,
     /// The base's file, where it is whole and the writer has no copy of the layer.
     pub whole: Option<Vec<u8>>,
+}
+
+/// Hashes of what a frame is made from.
+pub(super) struct Made {
+    /// The settings, and the files that it and the frames before it read.
+    pub from: String,
+    /// The files that only its velocities read.
+    pub next: Option<String>,
 }
 
 /// Writes frames, following the layer by its changes.
@@ -88,7 +96,7 @@ impl<'a> Writer<'a> {
 
     fn write_frame(&self, step: &Step) -> Result<Manifest> {
         let (output, frame) = (self.scene.output, step.frame);
-        let inputs = step.inputs.as_deref().unwrap_or_default();
+        let inputs = step.inputs.as_ref().map_or("", |made| &made.from);
         let mut files = Vec::new();
         if output.removed {
             let bytes = vdb_bytes(self.scene, frame, &[&step.changes.removed], inputs)?;
@@ -103,13 +111,17 @@ impl<'a> Writer<'a> {
         if output.objects_usd || output.objects_ply {
             self.save_objects(frame, &mut files)?;
         }
+        let mut state = None;
         if !output.base_restarts() {
             let grids = self.copy()?.list();
             let bytes = to_bytes(&grids, &WriteOptions::default())?;
             atomic::write_bytes(&state_path(&self.folder, frame), &bytes)?;
+            state = Some(Written::new(format!("state/{STAGE}.{frame:04}.vdb"), &bytes));
         }
         self.write_report(frame, &step.report)?;
-        let manifest = Manifest { frame, inputs: inputs.to_string(), keeps: self.keeps(frame), files };
+        let next = step.inputs.as_ref().and_then(|made| made.next.clone());
+        let keeps = self.keeps(frame);
+        let manifest = Manifest { frame, inputs: inputs.to_string(), keeps, files, state, next };
         manifest.write(&self.folder, STAGE)?;
         if !output.base_restarts() {
             // An older state that cannot be removed does no harm.
@@ -133,7 +145,7 @@ impl<'a> Writer<'a> {
 
     /// The whole layer, or what changed of it.
     fn base_bytes(&self, step: &Step) -> Result<Vec<u8>> {
-        let inputs = step.inputs.as_deref().unwrap_or_default();
+        let inputs = step.inputs.as_ref().map_or("", |made| &made.from);
         if self.scene.output.base_mode == BaseMode::Full {
             return vdb_bytes(self.scene, step.frame, &self.copy()?.list(), inputs);
         }
@@ -154,7 +166,7 @@ impl<'a> Writer<'a> {
         let mut meshes = Vec::new();
         for body in self.bodies {
             body.motion().pose(f64::from(frame) / fps, &mut pose)?;
-            body.motion().velocities(f64::from(frame) / fps, 1.0 / fps, &mut velocities)?;
+            body.motion().velocities_ahead(f64::from(frame) / fps, 1.0 / fps, &mut velocities)?;
             meshes.push((usd::to_floats(&pose), usd::to_floats(&velocities)));
         }
         if self.scene.output.objects_ply {
@@ -186,6 +198,7 @@ impl<'a> Writer<'a> {
         let stage = |stage: &StageTime| json!({ "name": stage.name, "seconds": stage.time.as_secs_f64() });
         let stages: Vec<_> = report.stages.iter().map(stage).collect();
         let text = json!({
+            "check": sealed::UNSTAMPED,
             "frame": frame,
             "removed_m3": report.removed_volume,
             "base_m3": report.base_volume,
@@ -194,7 +207,7 @@ impl<'a> Writer<'a> {
             "stages": stages,
         });
         let path = self.folder.join("report").join(format!("{frame:04}.json"));
-        atomic::write_bytes(&path, format!("{text:#}\n").as_bytes())
+        atomic::write_bytes(&path, sealed::stamp(&format!("{text:#}\n")).as_bytes())
     }
 }
 

@@ -28,6 +28,7 @@ pub struct Body {
     shape: Arc<Shape>,
     longest_edge: f64,
     noise: bool,
+    name: Option<String>,
 }
 
 /// What of a body stays the same while its vertices move: how its triangles hang together, and which way they look.
@@ -78,7 +79,7 @@ impl Body {
         let length = |&[i, j]: &[u32; 2]| (pose[i as usize] - pose[j as usize]).norm();
         let edges = shape.topology.edges.par_iter().with_min_len(GRAIN);
         let longest_edge = edges.map(length).reduce(|| 0.0, f64::max);
-        Ok(Self { motion, shape, longest_edge, noise: true })
+        Ok(Self { motion, shape, longest_edge, noise: true, name: None })
     }
 
     /// How its triangles hang together.
@@ -89,6 +90,16 @@ impl Body {
     /// Says whether its imprints have ragged edges (they do unless this says no).
     pub fn with_noise(self, noise: bool) -> Self {
         Self { noise, ..self }
+    }
+
+    /// Gives it a name for messages.
+    pub fn with_name(self, name: String) -> Self {
+        Self { name: Some(name), ..self }
+    }
+
+    /// Its name, where it was given one.
+    pub fn name(&self) -> Option<&str> {
+        self.name.as_deref()
     }
 
     /// Number of open loops (joined ones count once) that were closed.

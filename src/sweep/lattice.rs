@@ -11,6 +11,8 @@ pub type Fixed = [i32; 3];
 
 /// Farthest coordinate, in units: products of two differences then fit 64 bits.
 const LIMIT: f64 = (1 << 29) as f64;
+/// Farthest coordinate, in cells from the lattice's base voxel.
+pub const REACH: f64 = LIMIT / UNITS as f64;
 
 /// World-fixed voxel lattice (voxel (i, j, k) has its centre at (i, j, k) x cell) with a base voxel
 /// near the work, so that coordinates are small.

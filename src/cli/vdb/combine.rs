@@ -68,7 +68,7 @@ fn combine(
     stage: &'static str,
     operation: impl FnOnce(&Context, &mut FloatGrid, FloatGrid) -> Result<()> + Send,
 ) -> std::result::Result<(), Failure> {
-    operands.output.check()?;
+    operands.output.check(&[&operands.a, &operands.b])?;
     let mut a = read_level_set(&operands.a, operands.grid_a.as_deref()).before()?;
     let b = read_level_set(&operands.b, operands.grid_b.as_deref()).before()?;
     session.ctx.stage(stage, || operation(&session.ctx, &mut a, b)).during()?;

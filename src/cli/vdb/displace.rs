@@ -33,7 +33,7 @@ pub struct Args {
 
 /// Runs the command.
 pub fn run(args: &Args, session: &Session) -> Result<(), Failure> {
-    args.output.check()?;
+    args.output.check(&[&args.input])?;
     let mut grid = read_level_set(&args.input, args.grid.as_deref()).before()?;
     let defaults = NoiseParams::for_cell(grid.voxel_size());
     let amplitude = args.amplitude.unwrap_or(defaults.amplitude);

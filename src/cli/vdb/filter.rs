@@ -78,7 +78,7 @@ enum Filter {
 /// Runs `offset`.
 pub fn offset(args: &OffsetArgs, session: &Session) -> Result<(), Failure> {
     let source = &args.source;
-    source.output.check()?;
+    source.output.check(&[&source.input])?;
     let mut grid = read_level_set(&source.input, source.grid.as_deref()).before()?;
     let cells = args.by.abs() / grid.voxel_size();
     if cells > 1000.0 {
@@ -95,7 +95,7 @@ pub fn offset(args: &OffsetArgs, session: &Session) -> Result<(), Failure> {
 /// Runs `smooth`.
 pub fn smooth(args: &SmoothArgs, session: &Session) -> Result<(), Failure> {
     let source = &args.source;
-    source.output.check()?;
+    source.output.check(&[&source.input])?;
     let mut grid = read_level_set(&source.input, source.grid.as_deref()).before()?;
     let (width, times, scheme) = (args.width, args.times, source.scheme.into());
     let work = || match args.filter {

@@ -29,7 +29,7 @@ pub struct Args {
 pub fn run(args: &Args, session: &Session) -> Result<(), Failure> {
     let settings = Settings { half_width: args.half_width as f32, ..Settings::new(args.cell) };
     settings.validate().before()?;
-    args.output.check()?;
+    args.output.check(&[&args.mesh])?;
     let mesh = args.space.read(&args.mesh).before()?;
     session.check_surface(mesh.area(), args.cell).before()?;
     let grid = sweep::voxelise(&session.ctx, mesh, &settings).during()?;

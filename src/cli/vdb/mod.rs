@@ -107,10 +107,11 @@ enum Codec {
 }
 
 impl VdbOutput {
-    /// Refuses a name or a folder that cannot be written, before any work.
-    fn check(&self) -> std::result::Result<(), Failure> {
+    /// Refuses a name or a folder that cannot be written, or one of the inputs, before any work.
+    fn check(&self, inputs: &[&Path]) -> std::result::Result<(), Failure> {
         check_name(&self.output, &["vdb"])?;
-        output::check_writable(&self.output).before()
+        output::check_writable(&self.output).before()?;
+        output::refuse_input(&self.output, inputs.iter().copied()).before()
     }
 
     /// Writes the grid and records what it holds.

@@ -44,6 +44,16 @@ pub fn run(args: &Args, session: &Session) -> Result<(), Failure> {
     if let Some(missing) = args.frame.iter().find(|frame| !cache.stored().is_done(*frame)) {
         return Err(Failure::refused(format!("{}: frame {missing} is not there", args.folder.display())));
     }
+    let folders = [args.folder.join("base"), args.folder.join("removed"), args.folder.join("state")];
+    let own: Vec<PathBuf> = folders.iter().filter_map(|folder| std::fs::canonicalize(folder).ok()).collect();
+    let there = match args.output.parent() {
+        Some(folder) if !folder.as_os_str().is_empty() => std::fs::canonicalize(folder).ok(),
+        _ => std::env::current_dir().ok(),
+    };
+    if there.is_some_and(|there| own.contains(&there)) {
+        let what = format!("{}: would be written among the cache's own files", args.output.display());
+        return Err(Failure::refused(what));
+    }
     for frame in args.frame.iter() {
         let path = pattern.as_ref().map_or_else(|| args.output.clone(), |pattern| pattern.path(frame));
         let grids = cache.layer(&session.ctx, frame).during()?;

@@ -75,7 +75,8 @@ pub fn run(args: &Args, session: &Session) -> Result<(), Failure> {
     if !(0.0..=100.0).contains(&args.dilate) {
         return Err(Failure::refused("--dilate must lie in 0 to 100 cells"));
     }
-    args.output.check()?;
+    let inputs: Vec<&Path> = args.mesh.iter().map(PathBuf::as_path).collect();
+    args.output.check(&inputs)?;
     let grid = args.sweep(session, &settings)?;
     args.output.write(session, grid).during()
 }

@@ -36,6 +36,7 @@ pub fn run(args: &Args, session: &Session) -> Result<(), Failure> {
     }
     check_name(&args.output, &["ply", "obj", "stl"])?;
     output::check_writable(&args.output).before()?;
+    output::refuse_input(&args.output, [args.input.as_path()]).before()?;
     let grid = read_level_set(&args.input, args.grid.as_deref()).before()?;
     if args.iso.abs() >= f64::from(grid.background()) {
         let band = grid.background();

@@ -67,6 +67,8 @@ pub struct Character {
     kinks: Vec<f64>,
     /// Length of a round's last step, when its ends differ (the file's unit).
     jump: Option<f64>,
+    /// Hash of the file and its buffers.
+    content: String,
 }
 
 impl Character {
@@ -87,19 +89,17 @@ impl Character {
         }
         let clip = clip(&file, play.clip.as_deref()).map_err(wrong)?;
         let kinks = clip.as_ref().map(Clip::kinks).unwrap_or_default();
-        let mut character = Self { nodes, order, vertices, clip, play, kinks, jump: None };
+        let mut character =
+            Self { nodes, order, vertices, clip, play, kinks, jump: None, content: file.content };
         let rest: Vec<_> = character.nodes.iter().map(|node| node.rest.clone()).collect();
         character.vertices.face_outward(&nodes::globals(&character.nodes, &character.order, &rest));
         character.jump = character.find_jump();
         Ok(character)
     }
 
-    /// Hash of a file and the buffers that it names.
-    ///
-    /// # Errors
-    /// As [`Character::open`].
-    pub fn content(path: &Path) -> Result<String> {
-        File::open(path).map(|file| file.content)
+    /// Hash of the file and the buffers that it names, as they were read.
+    pub fn content(&self) -> &str {
+        &self.content
     }
 
     /// What a file holds.

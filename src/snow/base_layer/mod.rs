@@ -8,6 +8,7 @@ mod grids;
 pub mod initial;
 mod marks;
 mod noise;
+mod reach;
 mod state;
 mod wanted;
 
@@ -17,6 +18,7 @@ use rayon::prelude::*;
 
 pub use grids::{Changes, Grids};
 pub use noise::{NoiseParams, displace};
+pub use reach::Reach;
 
 use crate::base::DVec3;
 use crate::base::blocks::{BlockEdit, Origin};
@@ -300,10 +302,12 @@ impl BaseLayer {
             .iter()
             .map(|(index, body)| {
                 ctx.check()?;
-                let faces = body.chain(ctx, from, to, &lattice, self.params.tolerance, &window);
+                let faces = self.chain(ctx, body, (from, to), &lattice, &window);
                 ctx.advance();
                 faces.map_err(|error| match error {
-                    Error::Argument(what) => Error::Argument(format!("body {index}: {what}")),
+                    Error::Argument(what) if body.name().is_none() => {
+                        Error::Argument(format!("body {index}: {what}"))
+                    }
                     other => other,
                 })
             })
@@ -313,6 +317,28 @@ impl BaseLayer {
             |origins: &[Origin]| Ok(self.grids.surface.probe(origins)?.iter().map(edit::has_snow).collect());
         let bounds = [relative(self.low, 0), relative(self.high, 0)];
         Voxeliser::new(ctx, parts.concat(), lattice, band, bounds, snowy)
+    }
+
+    /// The boundary of what a body sweeps, near the snow; what passes far from it is left out.
+    fn chain(
+        &self,
+        ctx: &Context,
+        body: &Body,
+        (from, to): (f64, f64),
+        lattice: &Lattice,
+        window: &Window,
+    ) -> Result<Vec<Face>> {
+        let chain = |from: f64, to: f64| body.chain(ctx, from, to, lattice, self.params.tolerance, window);
+        match chain(from, to) {
+            // A vertex may be out of reach.
+            Err(Error::Argument(_)) => {
+                let spans = Reach::new(*lattice, window).spans(ctx, body, from, to)?;
+                let parts: Vec<Vec<Face>> =
+                    spans.into_iter().map(|(from, to)| chain(from, to)).collect::<Result<_>>()?;
+                Ok(parts.concat())
+            }
+            other => other,
+        }
     }
 
     /// Distances where there is snow.
@@ -352,7 +378,8 @@ impl BaseLayer {
     fn changes(&self, ctx: &Context, edits: Vec<Edit>, frame: i32) -> Result<(Changes, Columns, f64)> {
         let cell = self.grids.surface.voxel_size();
         let mut removed = empty_removed(cell, self.half_width)?;
-        let volume = edits.iter().map(Edit::volume).sum::<f64>() * cell.powi(3);
+        // The sum of nothing is -0, which is no volume.
+        let volume = edits.iter().map(Edit::volume).sum::<f64>() * cell.powi(3) + 0.0;
         let fresh = self.new_columns(edits.iter().map(|edit| edit.surface.origin()))?;
         let marks: Vec<Mark<'_>> =
             edits.iter().map(|edit| Mark { surface: &edit.surface, changed: &edit.changed }).collect();

@@ -1,0 +1,76 @@
+//! What the input files of a run held when they were read: each must stay the same until its end.
+
+use std::collections::HashMap;
+use std::path::{Path, PathBuf};
+use std::sync::Mutex;
+
+use super::hash;
+use crate::error::{Error, Result};
+
+/// Hashes of files by path, each of the bytes that were used first.
+#[derive(Default)]
+pub struct Seen(Mutex<HashMap<PathBuf, String>>);
+
+impl Seen {
+    /// Reads a file for use.
+    ///
+    /// # Errors
+    /// What the operating system reports; other bytes than an earlier look at this file found.
+    pub fn read(&self, path: &Path) -> Result<Vec<u8>> {
+        let bytes = std::fs::read(path).map_err(|error| Error::io(path, "read", error))?;
+        self.note(path, hash::of_bytes(&bytes))?;
+        Ok(bytes)
+    }
+
+    /// Notes the hash of what was read of a file in another way.
+    ///
+    /// # Errors
+    /// Another hash than an earlier look at this file found.
+    pub fn note(&self, path: &Path, hash: String) -> Result<()> {
+        let mut known = self.0.lock().expect("nobody panics with this lock");
+        match known.get(path) {
+            Some(before) if *before != hash => {
+                Err(Error::file(path, "was changed while it was in use: run again when it stays as it is"))
+            }
+            Some(_) => Ok(()),
+            None => {
+                known.insert(path.to_path_buf(), hash);
+                Ok(())
+            }
+        }
+    }
+
+    /// The hash of a file: of the bytes that were used, or of those that will have to be.
+    ///
+    /// # Errors
+    /// What the operating system reports.
+    pub fn hash(&self, path: &Path) -> Result<String> {
+        if let Some(hash) = self.0.lock().expect("nobody panics with this lock").get(path) {
+            return Ok(hash.clone());
+        }
+        let hash = hash::of_file(path)?;
+        self.note(path, hash.clone())?;
+        Ok(hash)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_file_that_changes_between_two_looks_is_named() {
+        let folder = std::env::temp_dir().join(format!("frazil-seen-{}", std::process::id()));
+        std::fs::create_dir_all(&folder).unwrap();
+        let path = folder.join("a.obj");
+        let seen = Seen::default();
+        std::fs::write(&path, "one").unwrap();
+        let hash = seen.hash(&path).unwrap();
+        assert_eq!(seen.read(&path).unwrap(), b"one");
+        std::fs::write(&path, "two").unwrap();
+        assert_eq!(seen.hash(&path).unwrap(), hash, "what was used counts");
+        let error = seen.read(&path).unwrap_err().to_string();
+        assert!(error.contains("a.obj") && error.contains("changed"), "{error}");
+        std::fs::remove_dir_all(&folder).unwrap();
+    }
+}

@@ -1,0 +1,139 @@
+//! Reads everything that an output folder holds and compares it with what was written.
+
+use std::collections::BTreeSet;
+use std::path::Path;
+
+use rayon::prelude::*;
+use serde::Serialize;
+
+use super::own::{self, Own};
+use super::stored::STAGE;
+use crate::context::Context;
+use crate::error::{Error, Result};
+use crate::io::manifest::{Manifest, Written};
+use crate::io::sealed;
+
+/// What a folder holds.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize)]
+pub struct Verified {
+    /// Frames that are done.
+    pub frames: usize,
+    /// Files that were compared, records among them.
+    pub files: usize,
+    /// Bytes of the frames' files.
+    pub bytes: u64,
+    /// What is not what was written, in the order of the names.
+    pub damaged: Vec<Damage>,
+    /// Files with names of a run's that no record knows: begun and not finished, or not a run's.
+    pub unknown: Vec<String>,
+}
+
+/// A file that is not what was written.
+#[derive(Debug, Clone, PartialEq, Eq, PartialOrd, Ord, Serialize)]
+pub struct Damage {
+    /// Its path from the folder.
+    pub file: String,
+    /// What is wrong.
+    pub what: String,
+}
+
+/// Verifies a folder.
+///
+/// # Errors
+/// A folder that cannot be read or that no run wrote into; cancel.
+pub fn verify(ctx: &Context, folder: &Path) -> Result<Verified> {
+    std::fs::read_dir(folder).map_err(|error| Error::io(folder, "read", error))?;
+    let names: BTreeSet<String> = own::names(folder)?.into_keys().collect();
+    let mut damaged = Vec::new();
+    let mut known: BTreeSet<String> = BTreeSet::new();
+    let record = format!("state/{STAGE}.json");
+    let manifests: Vec<Manifest> =
+        names.iter().filter_map(|name| manifest(folder, name, &mut damaged)).collect();
+    if !names.contains(&record) {
+        if manifests.is_empty() && damaged.is_empty() {
+            return Err(Error::file(folder, "holds no frames: no run wrote into it"));
+        }
+        damaged.push(Damage { file: record.clone(), what: "is missing".into() });
+    } else if let Err(error) = sealed::read::<serde_json::Value>(&folder.join(&record)) {
+        damaged.push(told(&record, error));
+    }
+    known.insert(record);
+    let (own_files, faults) = own_faults(folder);
+    damaged.extend(faults);
+    known.extend([own::SCENE, own::SHOT, own::OBJECTS, "state/files.json"].map(String::from));
+    let files: Vec<&Written> = manifests
+        .iter()
+        .flat_map(|manifest| manifest.files.iter().chain(state_of(folder, manifest)))
+        .collect();
+    let faults = ctx.stage("verify", || {
+        let fault = |file: &&Written| -> Result<Option<Damage>> {
+            ctx.check()?;
+            Ok(file.fault(folder).map(|what| Damage { file: file.path.clone(), what }))
+        };
+        files.par_iter().map(fault).collect::<Result<Vec<_>>>()
+    })?;
+    damaged.extend(faults.into_iter().flatten());
+    known.extend(files.iter().map(|file| file.path.clone()));
+    let reports: Vec<&String> = names.iter().filter(|name| name.starts_with("report/")).collect();
+    damaged.extend(reports.iter().filter_map(|name| report_fault(folder, name)));
+    damaged.sort();
+    known.extend(damaged.iter().map(|damage| damage.file.clone()));
+    known.extend(manifests.iter().map(|manifest| record_of(manifest.frame)));
+    let is_known = |name: &&String| known.contains(*name) || name.starts_with("report/");
+    Ok(Verified {
+        frames: manifests.iter().filter(|manifest| manifest.files_are_there(folder)).count(),
+        files: files.len() + manifests.len() + reports.len() + own_files,
+        bytes: files.iter().map(|file| file.bytes).sum(),
+        damaged,
+        unknown: names.iter().filter(|name| !is_known(name)).cloned().collect(),
+    })
+}
+
+fn record_of(frame: i32) -> String {
+    format!("state/{STAGE}.{frame:04}.json")
+}
+
+fn told(file: &str, error: Error) -> Damage {
+    let what = match error {
+        Error::File { what, .. } => what,
+        other => other.to_string(),
+    };
+    Damage { file: file.to_string(), what }
+}
+
+/// The record of a frame, where a name is one's.
+fn manifest(folder: &Path, name: &str, damaged: &mut Vec<Damage>) -> Option<Manifest> {
+    let frame = name.strip_prefix(&format!("state/{STAGE}."))?.strip_suffix(".json")?.parse().ok()?;
+    match Manifest::read(folder, STAGE, frame) {
+        Ok(manifest) => manifest,
+        Err(error) => {
+            damaged.push(told(name, error));
+            None
+        }
+    }
+}
+
+/// A frame's exact layer, as long as it is kept.
+fn state_of<'a>(folder: &Path, manifest: &'a Manifest) -> Option<&'a Written> {
+    manifest.state.as_ref().filter(|state| folder.join(&state.path).exists())
+}
+
+/// How many files belong to no frame, and what is wrong with them and with their record.
+fn own_faults(folder: &Path) -> (usize, Vec<Damage>) {
+    match Own::read(folder, None) {
+        Err(error) => (1, vec![told("state/files.json", error)]),
+        Ok(own) => {
+            let (count, faults) = own.faults();
+            (count + 1, faults.into_iter().map(|(file, what)| Damage { file, what }).collect())
+        }
+    }
+}
+
+fn report_fault(folder: &Path, name: &str) -> Option<Damage> {
+    let what = match std::fs::read(folder.join(name)) {
+        Ok(bytes) if sealed::is_stamped(&bytes) => return None,
+        Ok(_) => "is not the report that was written".to_string(),
+        Err(error) => Error::io(folder.join(name), "read", error).to_string(),
+    };
+    Some(Damage { file: name.to_string(), what })
+}

@@ -1,0 +1,115 @@
+//! Bodies far from the snow: the exact arithmetic of a sweep reaches 131,072 cells from the snow's middle.
+//!
+//! What passes out there leaves no trace in the snow: only the parts of a step in which a body may touch it are swept.
+
+use crate::base::DVec3;
+use crate::context::Context;
+use crate::error::{Error, Result};
+use crate::sweep::{Body, Lattice, REACH, UNITS, Window};
+
+/// Parts of an interval at which poses are looked at; no motion that turns evenly looks the same at all of them.
+const MOMENTS: [f64; 12] = [0.0, 0.07, 0.19, 0.26, 0.38, 0.45, 0.57, 0.64, 0.76, 0.83, 0.95, 1.0];
+/// How often an interval between two kinks of a motion is halved.
+const HALVINGS: u32 = 16;
+
+/// Where the snow is, for bodies that may be far from it.
+pub struct Reach {
+    lattice: Lattice,
+    /// Cells from the lattice's base voxel.
+    low: DVec3,
+    high: DVec3,
+}
+
+impl Reach {
+    /// Of a sweep that is wanted in a window.
+    pub(super) fn new(lattice: Lattice, window: &Window) -> Self {
+        let cells = |p: [i32; 3]| DVec3::from(p.map(|value| f64::from(value) / f64::from(UNITS)));
+        Self { lattice, low: cells(window.min), high: cells(window.max) }
+    }
+
+    /// Of snow between two corners (m) with cells of `cell` m.
+    ///
+    /// # Errors
+    /// Snow that is too far from the world's origin.
+    pub fn of_snow(cell: f64, low: DVec3, high: DVec3) -> Result<Self> {
+        let lattice = Lattice::near(cell, (low + high) * 0.5)?;
+        // As far as noise and the band reach.
+        let margin = DVec3::repeat(64.0);
+        Ok(Self { lattice, low: lattice.to_cells(low) - margin, high: lattice.to_cells(high) + margin })
+    }
+
+    /// The parts of `from..=to` (s), in order, in which a body may touch the snow; the whole of it when the body stays in
+    /// reach.
+    ///
+    /// # Errors
+    /// A body, named, that touches the snow while a part of it is out of reach; a pose that cannot be had; cancel.
+    pub fn spans(&self, ctx: &Context, body: &Body, from: f64, to: f64) -> Result<Vec<(f64, f64)>> {
+        let mut ends = vec![from];
+        ends.extend(body.motion().breaks(from, to));
+        ends.push(to);
+        let mut out: Vec<(f64, f64)> = Vec::new();
+        for pair in ends.windows(2) {
+            self.parts(ctx, body, (pair[0], pair[1]), HALVINGS, &mut out)?;
+        }
+        Ok(out)
+    }
+
+    /// Adds the parts of an interval, joined to those before where they meet.
+    fn parts(
+        &self,
+        ctx: &Context,
+        body: &Body,
+        (from, to): (f64, f64),
+        halvings: u32,
+        out: &mut Vec<(f64, f64)>,
+    ) -> Result<()> {
+        let (mut pose, mut before) = (Vec::new(), Vec::new());
+        let (mut low, mut high) = (DVec3::repeat(f64::INFINITY), DVec3::repeat(f64::NEG_INFINITY));
+        let mut moved = 0.0f64;
+        let moments: &[f64] = if from == to { &MOMENTS[..1] } else { &MOMENTS };
+        for part in moments {
+            ctx.check()?;
+            body.motion().pose(from + (to - from) * part, &mut pose)?;
+            pose.iter_mut().for_each(|place| *place = self.lattice.to_cells(*place));
+            for (place, before) in pose.iter().zip(&before) {
+                let step: DVec3 = place - before;
+                moved = moved.max(step.norm());
+            }
+            (low, high) =
+                pose.iter().fold((low, high), |(low, high), place| (low.inf(place), high.sup(place)));
+            std::mem::swap(&mut pose, &mut before);
+        }
+        // Between two looks nothing strays farther from both than it moves from one to the other.
+        let misses =
+            (0..3).any(|axis| low[axis] - moved > self.high[axis] || high[axis] + moved < self.low[axis]);
+        let farthest = low.abs().sup(&high.abs()).max();
+        // A vertex that is no number is left to those who name it.
+        if misses && farthest.is_finite() {
+            return Ok(());
+        }
+        if !farthest.is_finite() || farthest + moved < REACH || (from == to && farthest < REACH) {
+            match out.last_mut() {
+                Some(last) if last.1 == from => last.1 = to,
+                _ => out.push((from, to)),
+            }
+            return Ok(());
+        }
+        let middle = 0.5 * (from + to);
+        if halvings == 0 || middle <= from || middle >= to {
+            return Err(self.too_far(body, farthest));
+        }
+        self.parts(ctx, body, (from, middle), halvings - 1, out)?;
+        self.parts(ctx, body, (middle, to), halvings - 1, out)
+    }
+
+    fn too_far(&self, body: &Body, farthest: f64) -> Error {
+        let cell = self.lattice.voxel;
+        Error::argument(format!(
+            "{} touches the snow while a part of it lies {:.0} m from the snow's middle, farther than {:.0} m, the reach \
+             of cells of {cell} m",
+            body.name().unwrap_or("a body"),
+            farthest * cell,
+            REACH * cell,
+        ))
+    }
+}
