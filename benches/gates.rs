@@ -6,6 +6,8 @@ mod bytes;
 mod capi;
 #[path = "../tests/common/mod.rs"]
 mod common;
+#[path = "gates/far.rs"]
+mod far;
 #[path = "gates/harness.rs"]
 mod harness;
 #[path = "gates/oracle.rs"]
@@ -42,5 +44,6 @@ fn main() {
     readers::run(&mut h);
     shot::run(&mut h);
     capi::run(&mut h);
+    far::run(&mut h);
     h.finish();
 }
