@@ -100,7 +100,7 @@ impl Cache {
         }
         let chain = Chain::new(scene, last.from, &last.seed);
         sealed::write(&record_path(folder), &record)?;
-        atomic::write_bytes(&folder.join("scene.toml"), scene.to_toml().as_bytes())?;
+        atomic::write_bytes(&folder.join("scene.toml"), scene.to_toml_in(folder).as_bytes())?;
         let mut cache = Self { stored, record, chain, _lock: lock };
         cache.check_inputs()?;
         Ok(cache)
@@ -209,7 +209,10 @@ fn lock(folder: &Path) -> Result<File> {
         }
         // A file system without locks is no reason to stop.
         Err(std::fs::TryLockError::Error(error)) => {
-            log::debug!("{}: no lock ({error})", path.display());
+            log::warn!(
+                "{}: cannot be locked ({error}): see to it that no other run writes into this folder",
+                path.display()
+            );
             Ok(file)
         }
         Ok(()) => Ok(file),

@@ -4,6 +4,7 @@ use std::path::Path;
 
 use super::objects::is_character;
 use super::{Ground, Layer, Object, Role, Scene};
+use crate::base::mesh::{farthest, too_far};
 use crate::base::{DVec3, TriMesh};
 use crate::context::Context;
 use crate::error::{Error, Result};
@@ -23,6 +24,8 @@ pub struct Inputs {
     statics: Vec<TriMesh>,
     /// The objects that move through the snow.
     pub bodies: Vec<Body>,
+    /// What about the files should be told, a sentence each; the log has it too.
+    pub warnings: Vec<String>,
 }
 
 enum Snow {
@@ -41,10 +44,16 @@ impl Inputs {
             Layer::Depth(depth) => Snow::Made { ground: ground(scene)?, cover: Cover::Depth(*depth) },
             Layer::Top(path) => Snow::Made { ground: ground(scene)?, cover: Cover::Top(mesh::read(path)?) },
         };
+        let mut warnings = Vec::new();
+        if let Snow::Made { ground, cover } = &snow {
+            initial::fits(ground, cover, scene.snow.cell)
+                .map_err(|error| Error::argument(format!("{}: {error}", scene.path.display())))?;
+            warnings.extend(far_meshes(scene, ground, cover));
+        }
         let start = f64::from(scene.shot.frames.first) / scene.shot.fps;
         let (mut statics, mut bodies) = (Vec::new(), Vec::new());
         for object in scene.objects.iter().filter(|object| object.role != Role::Ignore) {
-            let motion = motion(scene, object)?;
+            let motion = motion(scene, object, &mut warnings)?;
             match object.role {
                 Role::Static => statics.push(posed(&*motion, start)?),
                 _ => {
@@ -66,7 +75,8 @@ impl Inputs {
                 }
             }
         }
-        Ok(Self { snow, statics, bodies })
+        warnings.iter().for_each(|warning| log::warn!("{warning}"));
+        Ok(Self { snow, statics, bodies, warnings })
     }
 
     /// Least and greatest x and z of the snow (m), as far as they are known before it is made.
@@ -98,6 +108,22 @@ impl Inputs {
         }
     }
 
+    /// What the snow lies on and how much of it there is, where it is not given as a level set.
+    pub(super) fn made(&self) -> Option<(&initial::Ground, &Cover)> {
+        match &self.snow {
+            Snow::Made { ground, cover } => Some((ground, cover)),
+            Snow::Given(_) => None,
+        }
+    }
+
+    /// The snow where it is given as a level set.
+    pub(super) fn given(&self) -> Option<&FloatGrid> {
+        match &self.snow {
+            Snow::Given(grid) => Some(grid),
+            Snow::Made { .. } => None,
+        }
+    }
+
     /// The snow before the first frame.
     ///
     /// # Errors
@@ -120,6 +146,25 @@ fn ground(scene: &Scene) -> Result<initial::Ground> {
     }
 }
 
+/// What to say of a ground's or top's mesh that lies far from the origin.
+fn far_meshes(scene: &Scene, ground: &initial::Ground, cover: &Cover) -> Vec<String> {
+    let told = |path: &Path, mesh: &TriMesh| {
+        let farthest = mesh.positions.iter().map(|p| f64::from(p.amax())).fold(0.0, f64::max);
+        too_far(&path.display().to_string(), farthest, 1.0, scene.snow.cell)
+    };
+    let mut out = Vec::new();
+    if let (Some(Ground::Mesh(path)), initial::Ground::Mesh(mesh)) = (&scene.snow.ground, ground) {
+        out.extend(told(path, mesh));
+    }
+    if let (Layer::Top(path), Cover::Top(mesh)) = (&scene.snow.layer, cover) {
+        out.extend(told(path, mesh));
+    }
+    // No key moves these.
+    out.iter_mut()
+        .for_each(|what| *what = what.replace("bring it there by keys", "move the scene there too"));
+    out
+}
+
 fn layer_grid(path: &Path, cell: f64) -> Result<FloatGrid> {
     let grid = file::read_named(path, None)?;
     if grid.class() != GridClass::LevelSet {
@@ -136,7 +181,7 @@ fn layer_grid(path: &Path, cell: f64) -> Result<FloatGrid> {
 }
 
 /// An object's motion: its file, its own frames, scale and axis, and the keys over them.
-fn motion(scene: &Scene, object: &Object) -> Result<Box<dyn Motion>> {
+fn motion(scene: &Scene, object: &Object, warnings: &mut Vec<String>) -> Result<Box<dyn Motion>> {
     let fps = scene.shot.fps;
     let radians = |turn: [f64; 3]| DVec3::from(turn.map(f64::to_radians));
     let keys = object.keys.iter().map(|key| Key {
@@ -144,7 +189,7 @@ fn motion(scene: &Scene, object: &Object) -> Result<Box<dyn Motion>> {
         at: DVec3::from(key.at),
         turn: radians(key.turn_deg),
     });
-    let keys = Keys::new(keys.collect())?;
+    let keys = Keys::new(keys.collect())?.with_ease(object.ease);
     let own: Box<dyn Motion> = match Pattern::parse(&object.file) {
         None if is_character(&object.file) => Box::new(character(scene, object)?),
         None => Box::new(Rigid::new(mesh::read(&object.file)?, Keys::default())),
@@ -154,6 +199,10 @@ fn motion(scene: &Scene, object: &Object) -> Result<Box<dyn Motion>> {
             Box::new(MeshSequence::open(pattern, first, last, fps, object.offset)?)
         }
     };
+    let mut pose = Vec::new();
+    own.pose(f64::from(scene.shot.frames.first) / fps, &mut pose)?;
+    let name = object.file.display().to_string();
+    warnings.extend(too_far(&name, farthest(pose.iter()), object.space.scale, scene.snow.cell));
     Ok(Box::new(Placed::new(own, object.space, keys)))
 }
 

@@ -162,13 +162,14 @@ impl<'a> Run<'a> {
         let params = self.params;
         let first = self.scene.shot.frames.first;
         let initial = self.inputs.layer(ctx, self.scene.snow.cell)?;
-        let at = match self.cache.stored.latest_layer(first..=frame - 1) {
+        let mut at = match self.cache.stored.latest_layer(first..=frame - 1) {
             None => LayerAt { frame: first - 1, layer: BaseLayer::new(ctx, initial, params)? },
             Some(state) => {
                 let grids = self.cache.stored.layer(ctx, state)?;
                 LayerAt { frame: state, layer: BaseLayer::resume(ctx, initial, grids, params)? }
             }
         };
+        at.layer.set_min_crumb(self.scene.snow.min_crumb);
         log::info!(
             "snow: {} active voxels, {:.1} MB, {:.6} m3; goes on after frame {}",
             at.layer.surface().active_voxels(),
