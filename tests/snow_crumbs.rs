@@ -58,7 +58,7 @@ fn a_small_island_goes_and_its_snow_is_counted() {
     // What it held is removed: from the volume, and in the level set.
     let pillar = 0.1 * 0.1 * 0.3;
     let more = report.removed_volume - told.removed_volume;
-    assert!((more / pillar - 1.0).abs() < 0.02, "{more} m3 more, not {pillar}");
+    assert!((more / pillar - 1.0).abs() < 0.06, "{more} m3 more, not {pillar}");
     assert!((before - report.base_volume - report.removed_volume).abs() < 1e-9);
     let ctx = Context::new(Pool::new(1).unwrap());
     let volume = |base: &BaseLayer| level_set::to_mesh(&ctx, base.removed(), 0.0, 0.0).unwrap().volume();

@@ -87,7 +87,11 @@ pub fn layer(
     }
     layer.prune_level_set()?;
     layer.set_name("surface")?;
-    if let Some(what) = nowhere_thick(&layer)? {
+    let rough = match cover {
+        Cover::Depth(depth) => thin(*depth, cell),
+        Cover::Top(_) => nowhere_thick(&layer)?,
+    };
+    if let Some(what) = rough {
         log::warn!("{what}");
     }
     Ok(layer)
