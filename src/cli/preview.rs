@@ -16,7 +16,7 @@ use super::{options, output};
 #[derive(clap::Args)]
 #[command(
     after_help = "Examples:\n  frazil preview cache/base/base.0048.vdb boot.obj -o print.png --eye 1,1.5,2 --target 0,0,1\n  \
-                  frazil preview hero.glb --clip Walk --frame 12 -o pose.png"
+                  frazil preview hero.glb --clip walk --frame 12 -o pose.png"
 )]
 pub struct Args {
     /// .vdb (its first level set, else a fog volume), a mesh or a character.
