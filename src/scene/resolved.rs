@@ -14,21 +14,20 @@ impl Scene {
         text
     }
 
-    /// The same for a file in `folder`: what lies in the scene's own folder, with `folder` itself in there too, is named
-    /// relative to it, so that the whole may be moved; all other paths are absolute.
+    /// The same for a file in `folder`: what lies in the scene's own folder, with `folder` in there too, is named
+    /// relative to it, so that the whole may be moved; so is what lies around two output folders side by side, when the
+    /// scene is the other one's. All other paths are absolute.
     pub fn to_toml_in(&self, folder: &Path) -> String {
         let mut scene = self.clone();
-        let here = Path::new(".");
-        let home = self.path.parent().filter(|home| !home.as_os_str().is_empty()).unwrap_or(here);
+        let home = self.path.parent().filter(|home| !home.as_os_str().is_empty()).unwrap_or(Path::new("."));
         // Links are followed: `..` goes up from where a folder really is.
         if let (Ok(home), Ok(folder)) = (home.canonicalize(), folder.canonicalize()) {
-            if let Ok(inner) = folder.strip_prefix(&home) {
-                let up: PathBuf = inner.components().map(|_| "..").collect();
-                scene.paths_mut().for_each(|path| {
-                    if let Some(inside) = inside(path, &home) {
-                        *path = up.join(inside);
-                    }
-                });
+            let around =
+                home.parent().filter(|around| folder.parent() == Some(around) && *around != Path::new("/"));
+            let homes: Vec<&Path> = std::iter::once(home.as_path()).chain(around).collect();
+            for path in scene.paths_mut() {
+                let near = homes.iter().find_map(|home| relative(path, &folder, home));
+                *path = near.unwrap_or_else(|| path.clone());
             }
         }
         scene.to_toml()
@@ -150,10 +149,11 @@ fn write_object(out: &mut String, object: &Object) -> std::fmt::Result {
     writeln!(out, "]")
 }
 
-/// A file's path from a folder that it lies in; the folder and the file's own are free of links.
-fn inside(path: &Path, folder: &Path) -> Option<PathBuf> {
+/// A file's path from a folder, where both lie in `home`; folder and home are free of links.
+fn relative(path: &Path, folder: &Path, home: &Path) -> Option<PathBuf> {
+    let up: PathBuf = folder.strip_prefix(home).ok()?.components().map(|_| "..").collect();
     let parent = path.parent()?.canonicalize().ok()?;
-    Some(parent.strip_prefix(folder).ok()?.join(path.file_name()?))
+    Some(up.join(parent.strip_prefix(home).ok()?).join(path.file_name()?))
 }
 
 fn line(out: &mut String, key: &str, value: &str, meaning: &str) -> std::fmt::Result {

@@ -106,8 +106,8 @@ pub fn fits(ground: &Ground, cover: &Cover, cell: f64) -> Result<()> {
         // What is no positive number is refused where it is used.
         if size > 0.0 && size < cell {
             return Err(Error::argument(format!(
-                "{name} = {size} m is less than a cell of {cell} m, which cannot hold it: take cells of {:.2e} m or less",
-                size / THICK
+                "{name} = {size} m is less than a cell of {cell} m, which cannot hold it: take cells of {} m or less",
+                told(size / THICK)
             )));
         }
         Ok(())
@@ -125,13 +125,18 @@ pub fn fits(ground: &Ground, cover: &Cover, cell: f64) -> Result<()> {
 /// Cells that a layer should be thick, or prints in it are rough.
 const THICK: f64 = 3.0;
 
+/// A length with two digits that count.
+fn told(length: f64) -> f64 {
+    format!("{length:.1e}").parse().unwrap_or(length)
+}
+
 /// A sentence about a vertical depth (m) that is only a few cells.
 pub fn thin(depth: f64, cell: f64) -> Option<String> {
     let cells = depth / cell;
     (cells < THICK).then(|| {
         format!(
-            "the snow is {cells:.1} cells thick: its volume and its prints are rough; cells of {:.2e} m or less hold it well",
-            depth / THICK
+            "the snow is {cells:.1} cells thick: its volume and its prints are rough; cells of {} m or less hold it well",
+            told(depth / THICK)
         )
     })
 }
