@@ -8,6 +8,8 @@ mod cancel;
 mod capi;
 #[path = "../tests/common/mod.rs"]
 mod common;
+#[path = "gates/far.rs"]
+mod far;
 #[path = "gates/flip.rs"]
 mod flip;
 #[path = "gates/harness.rs"]
@@ -48,5 +50,6 @@ fn main() {
     capi::run(&mut h);
     cancel::run(&mut h);
     flip::run(&mut h);
+    far::run(&mut h);
     h.finish();
 }

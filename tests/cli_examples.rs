@@ -148,6 +148,7 @@ fn every_command_has_help_with_an_example_that_runs() {
     let scene = "[shot]\nframes = \"1-48\"\n[snow]\nground = 0.0\narea = [-0.5, -0.5, 0.5, 1.5]\ndepth = 0.3\n\
                  cell = 0.05\n[[object]]\nfile = \"boot.obj\"\nkeys = [{ frame = 1 }, { frame = 48, at = [0, 0, 1] }]\n";
     fs::write(folder.join("walker.toml"), scene).unwrap();
+    fs::write(folder.join("hero.glb"), hero::glb()).unwrap();
     works(folder, "frazil snow walker.toml -o cache -q");
     for (name, by) in [("left", "0.1,0,0"), ("snow", "0,0.1,0")] {
         works(folder, &format!("frazil vdb sweep box.obj --move {by} --cell 0.02 -o {name}.vdb -q"));

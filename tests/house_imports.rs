@@ -82,3 +82,32 @@ fn words_stay_in_their_rooms() {
         assert!(text.lines().count() <= 500, "{} is over 500 lines", path.display());
     }
 }
+
+#[test]
+fn sines_powers_and_logarithms_are_those_of_libm() {
+    // The C library's differ from one to the next in the last bit, and so would the files.
+    let methods = "sin cos tan sin_cos asin acos atan atan2 sinh cosh tanh asinh acosh atanh exp exp2 exp_m1 ln ln_1p \
+                   log log2 log10 powf cbrt hypot slerp";
+    // nalgebra's that call them.
+    let makers = "from_euler_angles euler_angles from_axis_angle from_scaled_axis new_perspective angle_to";
+    for path in all_sources() {
+        let text = fs::read_to_string(&path).unwrap();
+        // Behind the tests' beginning nothing reaches a file.
+        let code = text.split("#[cfg(test)]").next().unwrap();
+        for name in methods.split_whitespace() {
+            for form in [format!(".{name}("), format!("f64::{name}"), format!("f32::{name}")] {
+                let mut rest = code;
+                while let Some(at) = rest.find(&form) {
+                    rest = &rest[at + form.len()..];
+                    // `f64::sin` is std's, `f64::singular` is not.
+                    let whole =
+                        form.ends_with('(') || !rest.starts_with(|c: char| c.is_alphanumeric() || c == '_');
+                    assert!(!whole, "{}: {form} is the C library's: take libm::{name}", path.display());
+                }
+            }
+        }
+        for name in makers.split_whitespace() {
+            assert!(!code.contains(name), "{}: {name} calls the C library's sine", path.display());
+        }
+    }
+}

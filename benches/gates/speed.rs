@@ -106,8 +106,7 @@ fn noise(ctx: &frazil::Context, swept: &FloatGrid) -> FloatGrid {
     let block = |leaf: &frazil::vdb::Leaf<'_>| {
         let values = Box::new(std::array::from_fn(|index| {
             let at = [index >> 6, index >> 3 & 7, index & 7];
-            let [x, y, z] =
-                [0, 1, 2].map(|axis| ((leaf.origin[axis] + at[axis] as i32) as f64 * cell) as f32);
+            let [x, y, z] = [0, 1, 2].map(|axis| f64::from(leaf.origin[axis] + at[axis] as i32) * cell);
             2.0 * cell as f32 * noise.get_noise_3d(x, y, z).max(0.0)
         }));
         BlockEdit::Dense(Block { origin: leaf.origin, values, mask: [u64::MAX; 8] })

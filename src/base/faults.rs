@@ -45,25 +45,8 @@ impl Faults {
         let doubled_vertices =
             same.iter().enumerate().filter(|(vertex, same)| **same as usize != *vertex).count();
         let used: HashSet<u32> = mesh.triangles.iter().flatten().copied().collect();
-        let area = |triangle: usize| {
-            let [a, b, c] = mesh.corners(triangle);
-            (b - a).cross(&(c - a)).norm_squared()
-        };
-        let mut seen = HashSet::new();
-        let (mut degenerate, mut doubled_triangles) = (0, 0);
-        let mut kept: Vec<[u32; 3]> = Vec::with_capacity(mesh.triangles.len());
-        for (number, triangle) in mesh.triangles.iter().enumerate() {
-            let corners = triangle.map(|vertex| same[vertex as usize]);
-            let mut sorted = corners;
-            sorted.sort_unstable();
-            if sorted[0] == sorted[1] || sorted[1] == sorted[2] || area(number) == 0.0 {
-                degenerate += 1;
-            } else if seen.insert(sorted) {
-                kept.push(corners);
-            } else {
-                doubled_triangles += 1;
-            }
-        }
+        let places: Vec<DVec3> = mesh.positions.iter().map(|p| p.cast()).collect();
+        let Kept { kept, degenerate, doubled_triangles } = kept(&places, &mesh.triangles, &same);
         let edges = edges(&kept);
         let (mut open, mut crowded_edges, mut turned_edges) = (Vec::new(), 0, 0);
         for (edge, ways) in &edges {
@@ -96,6 +79,40 @@ impl Faults {
     pub fn is_solid(&self) -> bool {
         self.open_edges == 0 && self.crowded_edges == 0 && self.turned_edges == 0 && self.parts > 0
     }
+}
+
+/// Holes of a mesh: connected sets of edges with one triangle, as [`Faults::holes`].
+pub fn holes(places: &[DVec3], triangles: &[[u32; 3]]) -> usize {
+    let same = coincident(places.iter().copied());
+    let edges = edges(&kept(places, triangles, &same).kept);
+    groups(edges.iter().filter(|(_, ways)| ways.len() == 1).map(|(edge, _)| *edge))
+}
+
+/// The triangles that count, with joined corners, and how many do not.
+struct Kept {
+    kept: Vec<[u32; 3]>,
+    degenerate: usize,
+    doubled_triangles: usize,
+}
+
+fn kept(places: &[DVec3], triangles: &[[u32; 3]], same: &[u32]) -> Kept {
+    let mut seen = HashSet::new();
+    let mut out = Kept { kept: Vec::with_capacity(triangles.len()), degenerate: 0, doubled_triangles: 0 };
+    for triangle in triangles {
+        let [a, b, c] = triangle.map(|vertex| places[vertex as usize]);
+        let corners = triangle.map(|vertex| same[vertex as usize]);
+        let mut sorted = corners;
+        sorted.sort_unstable();
+        let flat = (b - a).cross(&(c - a)).norm_squared() == 0.0;
+        if sorted[0] == sorted[1] || sorted[1] == sorted[2] || flat {
+            out.degenerate += 1;
+        } else if seen.insert(sorted) {
+            out.kept.push(corners);
+        } else {
+            out.doubled_triangles += 1;
+        }
+    }
+    out
 }
 
 /// Edges (lesser vertex first) with the way that each of their triangles runs along them.

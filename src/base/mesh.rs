@@ -111,6 +111,32 @@ impl TriMesh {
     }
 }
 
+/// How far apart the 32-bit numbers lie that stand for a coordinate: what a mesh file can tell there.
+pub fn spacing(coordinate: f64) -> f64 {
+    let at = coordinate.abs() as f32;
+    f64::from(at.next_up()) - f64::from(at)
+}
+
+/// A sentence about vertices so far from the origin (in a file's unit of `scale` m) that their 32-bit coordinates are
+/// coarse against a cell (m).
+pub fn too_far(name: &str, farthest: f64, scale: f64, cell: f64) -> Option<String> {
+    // Rounding by half the gap may cost what a sweep may be off by: 0.02 cell.
+    let gap = spacing(farthest) * scale;
+    (gap > 0.04 * cell).then(|| {
+        format!(
+            "{name}: its vertices lie up to {:.0} m from the origin, where the file's 32-bit numbers are {:.1} mm apart: \
+             save it near the origin and bring it there by keys",
+            farthest * scale,
+            gap * 1e3
+        )
+    })
+}
+
+/// Farthest coordinate of places from the origin along an axis.
+pub fn farthest<'a>(places: impl Iterator<Item = &'a DVec3>) -> f64 {
+    places.map(|p| p.amax()).fold(0.0, f64::max)
+}
+
 /// For each place the number of the first one that is the same.
 pub fn coincident(places: impl Iterator<Item = DVec3>) -> Vec<u32> {
     // Adding zero makes -0 and 0 the same.
@@ -178,6 +204,15 @@ mod tests {
         assert!((mesh.area() - (1.5 + 0.75f64.sqrt())).abs() < 1e-7);
         assert!(mesh.is_manifold());
         assert_eq!(mesh.euler_characteristic(), 2);
+    }
+
+    #[test]
+    fn coordinates_far_from_the_origin_are_told() {
+        assert_eq!(spacing(60_000.0), 1.0 / 256.0);
+        assert_eq!(too_far("a.obj", 1_200.0, 1.0, 0.0075), None);
+        let said = too_far("a.obj", 60_000.0, 1.0, 0.0075).unwrap();
+        assert!(said.contains("a.obj") && said.contains("60000 m") && said.contains("3.9 mm"), "{said}");
+        assert!(too_far("a.obj", 6_000_000.0, 0.01, 0.0075).is_some());
     }
 
     #[test]

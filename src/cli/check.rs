@@ -133,9 +133,11 @@ fn told(report: &Report, limit: u64, free: Option<u64>) -> String {
 
 fn tell_object(out: &mut String, report: &Report, object: &ObjectReport) {
     let [width, height, depth] = object.size_m;
-    let loops = match object.closed_loops {
-        0 => String::new(),
-        count => format!(", {count} open loops closed"),
+    let loops = match (object.holes, object.closed_loops) {
+        (0, 0) => String::new(),
+        (0, count) => format!(", {count} open loops closed"),
+        (1, _) => ", 1 hole closed".to_string(),
+        (count, _) => format!(", {count} holes closed"),
     };
     let _ = writeln!(out, "object    {}: {} triangles{loops}", object.file, object.triangles);
     let _ = writeln!(out, "          {width:.3} x {height:.3} x {depth:.3} m (x, y, z) at the first frame");
@@ -146,6 +148,26 @@ fn tell_object(out: &mut String, report: &Report, object: &ObjectReport) {
         "          from {low} to {high} over the shot; at most {:.2} m/s, {cells:.1} cells, at frame {}",
         object.fastest_m_per_s, object.fastest_frame
     );
+    if let Some(deep) = &object.deepest {
+        let part = |metres: f64, one: &str, other: &str| {
+            format!("{:.3} m {}", metres.abs(), if metres < 0.0 { other } else { one })
+        };
+        let _ = writeln!(
+            out,
+            "          lowest at frame {}: {}, {}",
+            deep.frame,
+            part(deep.below_top_m, "deep in the snow", "above the snow"),
+            part(deep.above_ground_m, "above the ground", "below the ground")
+        );
+    }
+    if let Some(walk) = &object.walk {
+        let speed = walk.stride_m / walk.round_s;
+        let _ = writeln!(
+            out,
+            "          walks at {speed:.2} m/s, {:.2} m a round of {:.2} s; its feet slip at {:.2} m/s",
+            walk.stride_m, walk.round_s, walk.slips_m_per_s
+        );
+    }
     if let Some([first, last]) = object.touches {
         let _ = writeln!(out, "          in reach of the snow in frames {first}-{last}");
     }

@@ -9,6 +9,7 @@ use frazil::motion::{Character, Keys, MeshSequence, Motion, Placed, Play, Rigid}
 use frazil::scene::{FrameChoice, Frames};
 use serde_json::json;
 
+use super::dropped::dropped;
 use super::exit::{Failure, Phase};
 use super::options::{Axis, MeshSpace, positive};
 use super::output;
@@ -66,6 +67,11 @@ pub fn run(args: &Args, session: &Session) -> Result<(), Failure> {
         let path = pattern.as_ref().map_or_else(|| args.output.clone(), |pattern| pattern.path(frame));
         let inputs = [read(frame), read(frame.saturating_add(1))];
         output::refuse_input(&path, inputs.iter().map(PathBuf::as_path)).before()?;
+    }
+    let first = Pattern::parse(&args.input)
+        .map_or_else(|| args.input.clone(), |pattern| pattern.path(frames.first()));
+    if let Some(what) = dropped(&first) {
+        log::warn!("{}: {what} are left out: only places and faces are kept", args.input.display());
     }
     for frame in frames.iter() {
         session.ctx.check().during()?;

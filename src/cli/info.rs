@@ -2,7 +2,7 @@
 
 use std::path::{Path, PathBuf};
 
-use frazil::motion::Character;
+use frazil::motion::{Character, Play, gait};
 use frazil::vdb::{MetaValue, file, level_set};
 use frazil::{Context, io};
 use serde_json::{Map, Value, json};
@@ -99,11 +99,13 @@ fn character(path: &Path) -> frazil::Result<Vec<Value>> {
     let contents = Character::describe(path)?;
     let rest = Character::at_rest(path)?;
     let bounds = rest.bounds().map(|(low, high)| (<[f32; 3]>::from(low), <[f32; 3]>::from(high)));
-    let mut clips = Map::new();
-    contents.clips.into_iter().for_each(|(name, seconds)| {
-        clips.insert(name, json!(seconds));
-    });
-    Ok(vec![json!({
+    let (mut clips, mut gaits) = (Map::new(), Map::new());
+    for (name, seconds) in contents.clips {
+        let told = clip_gait(path, &name, seconds)?;
+        clips.insert(name.clone(), json!(seconds));
+        gaits.insert(name, told);
+    }
+    let mut entry = json!({
         "type": "character",
         "vertices": rest.positions.len(),
         "triangles": rest.triangles.len(),
@@ -111,17 +113,86 @@ fn character(path: &Path) -> frazil::Result<Vec<Value>> {
         "bounds": bounds,
         "clips_s": clips,
         "nodes": contents.mesh_nodes,
-    })])
+    });
+    let mut set = |key: &str, value: Value| entry.as_object_mut().expect("a map").insert(key.into(), value);
+    if !gaits.is_empty() {
+        set("gaits", Value::Object(gaits));
+    }
+    if contents.mesh_nodes.len() > FEW_NODES {
+        let line = |(name, depth, has_mesh): &(String, usize, bool)| {
+            format!("{}{name}{}", "  ".repeat(*depth), if *has_mesh { " (mesh)" } else { "" })
+        };
+        set("node_tree", json!(contents.tree.iter().map(line).collect::<Vec<_>>()));
+    }
+    Ok(vec![entry])
+}
+
+/// Nodes that are told in one line.
+const FEW_NODES: usize = 6;
+
+/// How a clip's lowest parts move while they stand (the file's unit, Y up).
+fn clip_gait(path: &Path, clip: &str, seconds: f64) -> frazil::Result<Value> {
+    let play = Play { clip: Some(clip.into()), repeat: false, ..Play::default() };
+    let Some(gait) = gait(&Character::open(path, play)?, 0.0, seconds)? else {
+        return Ok(json!({ "says": "nothing stands for long" }));
+    };
+    let (carry, speed) = (gait.carry(), gait.velocity.norm());
+    let says = if speed * seconds < 0.02 * gait.height {
+        "stands where it is: no keys are needed".to_string()
+    } else if gait.is_steady() {
+        format!(
+            "carry it by [{:.3}, 0, {:.3}] a round of {seconds:.3} s ({speed:.3} a second), or its feet slip",
+            carry.x * seconds,
+            carry.z * seconds
+        )
+    } else {
+        "its lowest parts move too unevenly for one speed".to_string()
+    };
+    Ok(json!({
+        "carry_per_s": [carry.x, 0.0, carry.z],
+        "stride": speed * seconds,
+        "steady": gait.is_steady(),
+        "standing": gait.standing,
+        "lowest": gait.lowest,
+        "says": says,
+    }))
 }
 
 fn lines(entry: &Value) -> String {
     let mut text = format!("{}\n", entry["file"].as_str().unwrap_or_default());
     for part in entry["holds"].as_array().into_iter().flatten() {
         for (key, value) in part.as_object().into_iter().flatten() {
-            let value = value.as_str().map_or_else(|| value.to_string(), str::to_string);
-            text += &format!("  {key:<22} {value}\n");
+            text += &told(key, value, part);
         }
         text += "\n";
     }
     text
+}
+
+/// One entry in words; clips and trees in a line each.
+fn told(key: &str, value: &Value, part: &Value) -> String {
+    let line = |name: &str, text: &str| format!("  {name:<22} {text}\n");
+    let rows = |rows: Vec<String>| -> String {
+        rows.iter().enumerate().map(|(row, text)| line(if row == 0 { key } else { "" }, text)).collect()
+    };
+    match (key, value) {
+        ("gaits", Value::Object(gaits)) => rows(
+            gaits
+                .iter()
+                .map(|(clip, gait)| {
+                    let lowest =
+                        gait["lowest"].as_f64().map_or(String::new(), |y| format!("; lowest y = {y:.4}"));
+                    format!("\"{clip}\": {}{lowest}", gait["says"].as_str().unwrap_or_default())
+                })
+                .collect(),
+        ),
+        ("node_tree", Value::Array(nodes)) => {
+            rows(nodes.iter().map(|node| node.as_str().unwrap_or_default().to_string()).collect())
+        }
+        // The tree has them.
+        ("nodes", Value::Array(nodes)) if part.get("node_tree").is_some() => {
+            line(key, &format!("{} with a mesh", nodes.len()))
+        }
+        _ => line(key, &value.as_str().map_or_else(|| value.to_string(), str::to_string)),
+    }
 }

@@ -1,9 +1,11 @@
 //! `frazil mesh`: what is wrong with a mesh.
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 use clap::Subcommand;
+use frazil::base::TriMesh;
 use frazil::base::faults::Faults;
+use frazil::motion::Character;
 use serde_json::{Value, json};
 
 use super::exit::{Failure, Phase};
@@ -24,11 +26,11 @@ enum Command {
     Check(CheckArgs),
 }
 
-/// Say whether meshes bound a solid, and what keeps them from it.
+/// Say whether meshes bound a solid, and what keeps them from it; characters in their pose at rest.
 #[derive(clap::Args)]
 #[command(after_help = "Example:\n  frazil mesh check boot.obj box.obj --json")]
 struct CheckArgs {
-    /// Meshes (.obj, .ply, .stl).
+    /// Meshes (.obj, .ply, .stl) and characters (.glb, .gltf).
     #[arg(required = true)]
     files: Vec<PathBuf>,
     #[command(flatten)]
@@ -43,7 +45,7 @@ pub fn run(args: &Args, session: &Session) -> Result<(), Failure> {
     let Command::Check(args) = &args.command;
     let mut all = Vec::new();
     for path in &args.files {
-        let mesh = args.space.read(path).before()?;
+        let mesh = args.read(path).before()?;
         let faults = session.ctx.stage("faults", || Ok(Faults::of(&mesh))).during()?;
         let size = mesh.bounds().map(|(low, high)| <[f32; 3]>::from(high - low));
         all.push(json!({
@@ -69,6 +71,18 @@ pub fn run(args: &Args, session: &Session) -> Result<(), Failure> {
     }
     let text = if args.json { format!("{:#}\n", json!(all)) } else { all.iter().map(told).collect() };
     output::print(&text).during()
+}
+
+impl CheckArgs {
+    fn read(&self, path: &Path) -> frazil::Result<TriMesh> {
+        let extension = path.extension().unwrap_or_default().to_string_lossy().to_lowercase();
+        if !matches!(extension.as_str(), "glb" | "gltf") {
+            return self.space.read(path);
+        }
+        let (mut mesh, space) = (Character::at_rest(path)?, self.space.space());
+        mesh.positions.iter_mut().for_each(|p| *p = space.place(p.cast()).cast());
+        Ok(mesh)
+    }
 }
 
 /// A mesh in words: what it is, then only the faults that it has.

@@ -2,6 +2,7 @@
 
 mod check;
 mod convert;
+mod dropped;
 mod exit;
 mod info;
 mod machine;

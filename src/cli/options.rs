@@ -1,6 +1,7 @@
 //! Options that several commands share, and how their values are written.
 
 use frazil::Result;
+use frazil::base::mesh::too_far;
 use frazil::base::{DVec3, TriMesh};
 use frazil::context::machine_memory;
 use frazil::motion::{Space, Up};
@@ -86,6 +87,12 @@ impl MeshSpace {
         mesh.positions.iter_mut().for_each(|position| *position = space.place(position.cast()).cast());
         Ok(mesh)
     }
+}
+
+/// A sentence about a mesh (m) whose file cannot tell its places well against a cell (m), so far away it lies.
+pub fn far_mesh(path: &Path, mesh: &TriMesh, cell: f64) -> Option<String> {
+    let farthest = mesh.positions.iter().map(|p| f64::from(p.amax())).fold(0.0, f64::max);
+    too_far(&path.display().to_string(), farthest, 1.0, cell)
 }
 
 /// A picture's size: `1280x720`.

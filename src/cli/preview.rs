@@ -3,10 +3,10 @@
 use std::path::{Path, PathBuf};
 
 use frazil::base::DVec3;
-use frazil::motion::Character;
+use frazil::motion::{Character, Play};
 use frazil::render::{Camera, Light, Model, Size, Stage};
-use frazil::vdb::file;
-use frazil::{Context, io};
+use frazil::vdb::{GridClass, file};
+use frazil::{Context, Error, io};
 
 use super::exit::{Failure, Phase};
 use super::session::Session;
@@ -15,15 +15,25 @@ use super::{options, output};
 /// Draw meshes and level sets into a PNG.
 #[derive(clap::Args)]
 #[command(
-    after_help = "Example:\n  frazil preview cache/base/base.0048.vdb boot.obj -o print.png --eye 1,1.5,2 --target 0,0,1"
+    after_help = "Examples:\n  frazil preview cache/base/base.0048.vdb boot.obj -o print.png --eye 1,1.5,2 --target 0,0,1\n  \
+                  frazil preview hero.glb --clip walk --frame 12 -o pose.png"
 )]
 pub struct Args {
-    /// .vdb (its first level set), a mesh or a character at rest.
+    /// .vdb (its first level set, else a fog volume), a mesh or a character.
     #[arg(required = true)]
     files: Vec<PathBuf>,
     /// The picture.
     #[arg(short, long, value_name = "PNG")]
     output: PathBuf,
+    /// Clip that characters play [default: they are at rest, or play their only clip with --frame].
+    #[arg(long, value_name = "NAME")]
+    clip: Option<String>,
+    /// Frame of a shot that begins at 1, where the clip begins too.
+    #[arg(long, value_name = "N", value_parser = options::finite, allow_hyphen_values = true)]
+    frame: Option<f64>,
+    /// Frames a second of --frame.
+    #[arg(long, value_name = "N", default_value = "24", value_parser = options::positive, requires = "frame")]
+    fps: f64,
     /// Pixels.
     #[arg(long, default_value = "1280x720", value_parser = options::size)]
     size: Size,
@@ -58,8 +68,12 @@ pub fn run(args: Args, session: &Session) -> Result<(), Failure> {
     if !(1.0..=170.0).contains(&args.fov) {
         return Err(Failure::refused(format!("--fov {} is not within 1 to 170 degrees", args.fov)));
     }
+    let posed = args.clip.is_some() || args.frame.is_some();
+    if posed && !args.files.iter().any(|path| is_character(path)) {
+        return Err(Failure::refused("--clip and --frame are for .glb and .gltf files, and none is given"));
+    }
     let models =
-        args.files.iter().map(|path| model(path, &session.ctx)).collect::<frazil::Result<Vec<Model>>>();
+        args.files.iter().map(|path| model(path, &args, &session.ctx)).collect::<frazil::Result<Vec<_>>>();
     let stage = Stage::new(models.before()?);
     let bounds =
         stage.bounds().ok_or_else(|| Failure::refused("there is nothing to draw: the files are empty"))?;
@@ -78,12 +92,39 @@ pub fn run(args: Args, session: &Session) -> Result<(), Failure> {
     picture.write(&args.output).during()
 }
 
-fn model(path: &Path, ctx: &Context) -> frazil::Result<Model> {
+fn is_character(path: &Path) -> bool {
+    let extension = path.extension().unwrap_or_default().to_string_lossy().to_lowercase();
+    matches!(extension.as_str(), "glb" | "gltf")
+}
+
+fn model(path: &Path, args: &Args, ctx: &Context) -> frazil::Result<Model> {
     let extension = path.extension().unwrap_or_default().to_string_lossy().to_lowercase();
     let mesh = match extension.as_str() {
-        "vdb" => return Model::level_set(ctx, &file::read_named(path, None)?),
-        "glb" | "gltf" => Character::at_rest(path)?,
+        "vdb" => return grid(path, ctx),
+        _ if is_character(path) && args.clip.is_none() && args.frame.is_none() => Character::at_rest(path)?,
+        _ if is_character(path) => {
+            let play = Play { clip: args.clip.clone(), ..Play::default() };
+            Character::posed(path, play, (args.frame.unwrap_or(1.0) - 1.0) / args.fps)?
+        }
         _ => io::mesh::read(path)?,
     };
     Ok(Model::mesh(&mesh, [0.35, 0.16, 0.08]))
+}
+
+/// The level set of a file, or its fog volume.
+fn grid(path: &Path, ctx: &Context) -> frazil::Result<Model> {
+    let grid = file::read_named(path, None)?;
+    if grid.class() == GridClass::LevelSet {
+        return Model::level_set(ctx, &grid);
+    }
+    let (model, density) = Model::fog(ctx, &grid)?;
+    if model.bounds().is_none() {
+        return Err(Error::file(path, format!("grid \"{}\" has no density above 0 to draw", grid.name())));
+    }
+    log::warn!(
+        "{}: grid \"{}\" is no level set: drawn is where its values are {density}, half of the greatest",
+        path.display(),
+        grid.name()
+    );
+    Ok(model)
 }

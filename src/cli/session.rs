@@ -102,7 +102,9 @@ impl Session {
     fn write_report(&self, path: &std::path::Path) -> frazil::Result<()> {
         let stages: Vec<Value> = self.ctx.take_timings().iter().map(stage_json).collect();
         let mut report = self.results.lock().expect("nobody panics with this lock").clone();
-        let arguments: Vec<String> = std::env::args().skip(1).collect();
+        // A file's name need not be UTF-8.
+        let told = |argument: std::ffi::OsString| argument.to_string_lossy().into_owned();
+        let arguments: Vec<String> = std::env::args_os().skip(1).map(told).collect();
         report.insert("arguments".into(), json!(arguments));
         report.insert("version".into(), json!(env!("CARGO_PKG_VERSION")));
         report.insert("threads".into(), json!(self.ctx.pool().threads()));

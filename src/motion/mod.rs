@@ -1,11 +1,13 @@
 //! Things that move: a fixed set of triangles whose vertices have a position at every time.
 
+mod gait;
 mod gltf;
 mod morph;
 mod rigid;
 mod sequence;
 mod space;
 
+pub use gait::{Gait, gait};
 pub use gltf::{Character, Contents, Play};
 pub use morph::Morph;
 pub use rigid::{Key, Keys, Placed, Rigid};

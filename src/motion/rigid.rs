@@ -1,6 +1,6 @@
 //! Rigid motion by keys, of a mesh or over another motion.
 
-use nalgebra::Rotation3;
+use nalgebra::{Matrix3, Rotation3};
 
 use super::{Motion, Space};
 use crate::base::{DVec3, TriMesh};
@@ -17,9 +17,12 @@ pub struct Key {
     pub turn: DVec3,
 }
 
-/// Keys in ascending order: place and angles change linearly between them, and rest outside.
+/// Keys in ascending order: place and angles change linearly between them, or with ease, and rest outside.
 #[derive(Debug, Clone, PartialEq, Default)]
-pub struct Keys(Vec<Key>);
+pub struct Keys {
+    keys: Vec<Key>,
+    ease: bool,
+}
 
 impl Keys {
     /// Checks the order of the keys; none at all is the identity.
@@ -34,14 +37,22 @@ impl Keys {
         }
         match keys.windows(2).position(|pair| pair[0].time >= pair[1].time) {
             Some(bad) => Err(Error::argument(format!("key {} is not later than the key before it", bad + 2))),
-            None => Ok(Self(keys)),
+            None => Ok(Self { keys, ease: false }),
         }
+    }
+
+    /// The same keys with or without ease. With it the motion starts and ends at rest and passes the keys between
+    /// without a jerk: a cubic in each number, which never leaves the range of the two keys around it. Where a number
+    /// turns back, or is the same at two keys, it rests there.
+    pub fn with_ease(self, ease: bool) -> Self {
+        Self { ease, ..self }
     }
 
     /// Rotation and place at a time.
     pub fn at(&self, time: f64) -> (Rotation3<f64>, DVec3) {
-        let next = self.0.partition_point(|key| key.time <= time);
-        let (at, turn) = match (next.checked_sub(1).map(|index| self.0[index]), self.0.get(next)) {
+        let next = self.keys.partition_point(|key| key.time <= time);
+        let (at, turn) = match (next.checked_sub(1).map(|index| self.keys[index]), self.keys.get(next)) {
+            (Some(_), Some(_)) if self.ease => self.eased(next, time),
             (None, None) => (DVec3::zeros(), DVec3::zeros()),
             (Some(key), None) => (key.at, key.turn),
             (None, Some(key)) => (key.at, key.turn),
@@ -50,13 +61,63 @@ impl Keys {
                 (a.at.lerp(&b.at, part), a.turn.lerp(&b.turn, part))
             }
         };
-        (Rotation3::from_euler_angles(turn.x, turn.y, turn.z), at)
+        (turned(turn), at)
+    }
+
+    /// Place and angles on the cubic before key `next`.
+    fn eased(&self, next: usize, time: f64) -> (DVec3, DVec3) {
+        let (a, b) = (self.keys[next - 1], self.keys[next]);
+        let (span, part) = (b.time - a.time, (time - a.time) / (b.time - a.time));
+        let (square, cube) = (part * part, part * part * part);
+        let number = |of: &dyn Fn(&Key) -> f64| {
+            let [begin, end] = [next - 1, next].map(|key| self.slope(key, of) * span);
+            // Hermite's basis.
+            of(&a)
+                + (of(&b) - of(&a)) * (3.0 * square - 2.0 * cube)
+                + begin * (cube - 2.0 * square + part)
+                + end * (cube - square)
+        };
+        let at = [0, 1, 2].map(|axis| number(&|key| key.at[axis]));
+        let turn = [0, 1, 2].map(|axis| number(&|key| key.turn[axis]));
+        (at.into(), turn.into())
+    }
+
+    /// How fast a number changes at a key: 0 at the ends, else the weighted harmonic mean of both sides (Fritsch and
+    /// Butland 1984), which keeps the curve between its keys.
+    fn slope(&self, key: usize, of: &dyn Fn(&Key) -> f64) -> f64 {
+        if key == 0 || key + 1 == self.keys.len() {
+            return 0.0;
+        }
+        let [before, here, after] = [key - 1, key, key + 1].map(|index| &self.keys[index]);
+        let (left, right) = (here.time - before.time, after.time - here.time);
+        let (below, above) = ((of(here) - of(before)) / left, (of(after) - of(here)) / right);
+        if below * above <= 0.0 {
+            return 0.0;
+        }
+        let (first, second) = (2.0 * right + left, right + 2.0 * left);
+        (first + second) / (first / below + second / above)
     }
 
     /// Key times inside an interval.
     pub fn breaks(&self, from: f64, to: f64) -> Vec<f64> {
-        self.0.iter().map(|key| key.time).filter(|&time| time > from && time < to).collect()
+        self.keys.iter().map(|key| key.time).filter(|&time| time > from && time < to).collect()
     }
+}
+
+/// Turned about x, then y, then z. The sines are those of crate `libm`: a C library's differ from one to the next.
+fn turned(turn: DVec3) -> Rotation3<f64> {
+    let [(sx, cx), (sy, cy), (sz, cz)] = [turn.x, turn.y, turn.z].map(libm::sincos);
+    Rotation3::from_matrix_unchecked(Matrix3::new(
+        cz * cy,
+        cz * sy * sx - sz * cx,
+        cz * sy * cx + sz * sx,
+        sz * cy,
+        sz * sy * sx + cz * cx,
+        sz * sy * cx - cz * sx,
+        -sy,
+        cy * sx,
+        cy * cx,
+    ))
 }
 
 /// A mesh that moves rigidly.
@@ -157,6 +218,17 @@ mod tests {
     }
 
     #[test]
+    fn sines_are_not_the_machines_own() {
+        for step in 0..40_000 {
+            let angle = f64::from(step) * 0.000_37 - 3.0;
+            let key = Key { time: 0.0, at: DVec3::zeros(), turn: DVec3::new(angle, 0.0, 0.0) };
+            let (rotation, _) = Keys::new(vec![key]).unwrap().at(0.0);
+            let found = [rotation.matrix()[(2, 1)], rotation.matrix()[(2, 2)]].map(f64::to_bits);
+            assert_eq!(found, [libm::sin(angle), libm::cos(angle)].map(f64::to_bits), "at {angle}");
+        }
+    }
+
+    #[test]
     fn a_wheel_that_rolls_does_not_slip_where_it_touches() {
         let wheel =
             TriMesh { positions: vec![-Vec3::y(), Vec3::zeros(), Vec3::y()], triangles: vec![[0, 1, 2]] };
@@ -166,6 +238,26 @@ mod tests {
         wheel.velocities(-0.5e-3, 1e-3, &mut velocity).unwrap();
         let expected = [DVec3::zeros(), DVec3::z(), DVec3::z() * 2.0];
         velocity.iter().zip(expected).for_each(|(v, e)| assert!((v - e).norm() < 1e-6, "{v} is not {e}"));
+    }
+
+    #[test]
+    fn ease_starts_and_ends_at_rest_and_has_no_jerk_between() {
+        let key = |time: f64, x: f64| Key { time, at: DVec3::x() * x, turn: DVec3::y() * x };
+        let keys = vec![key(0.0, 0.0), key(1.0, 1.0), key(3.0, 2.0), key(4.0, 2.0), key(5.0, 1.5)];
+        let eased = Keys::new(keys.clone()).unwrap().with_ease(true);
+        let x = |time: f64| eased.at(time).1.x;
+        keys.iter().for_each(|key| assert!((x(key.time) - key.at.x).abs() < 1e-12));
+        let speed = |time: f64| (x(time + 1e-5) - x(time - 1e-5)) / 2e-5;
+        for rest in [0.0, 3.0, 4.0, 5.0] {
+            assert!(speed(rest).abs() < 1e-3, "{rest}: {}", speed(rest));
+        }
+        assert!((x(0.5) - 0.5).abs() < 0.1 && x(0.1) < 0.05 && speed(1.0) > 0.3);
+        // Neither side of a key is faster than the other, and nothing overshoots.
+        assert!((speed(1.0 - 1e-4) - speed(1.0 + 1e-4)).abs() < 1e-3);
+        assert!((0..=500).all(|step| (0.0..2.0 + 1e-12).contains(&x(f64::from(step) * 0.01))));
+        assert!((300..400).all(|step| x(f64::from(step) * 0.01) == 2.0));
+        let two = Keys::new(vec![key(0.0, 0.0), key(1.0, 1.0)]).unwrap().with_ease(true);
+        assert!((two.at(0.25).1.x - 0.15625).abs() < 1e-12, "the smooth step");
     }
 
     #[test]

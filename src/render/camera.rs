@@ -48,7 +48,7 @@ impl Camera {
         let corners: Vec<DVec3> = (0..8).map(|index| corner(bounds, index)).collect();
         let reach = ((bounds.1 - bounds.0).norm() * 0.5).max(1.0e-6);
         let aspect = f64::from(size.width) / f64::from(size.height);
-        let tangent = (self.fov_deg.to_radians() * 0.5).tan() * (1.0 - 2.0 * MARGIN);
+        let tangent = libm::tan(self.fov_deg.to_radians() * 0.5) * (1.0 - 2.0 * MARGIN);
         self.target = (bounds.0 + bounds.1) * 0.5;
         // Perspective shifts the middle of what is seen: centring and fitting settle in a few rounds.
         for _ in 0..8 {
@@ -90,7 +90,7 @@ impl Camera {
     /// Unit direction through a point of the picture, in pixels from its upper left corner.
     pub fn through(&self, x: f64, y: f64, size: Size) -> DVec3 {
         let [right, up, ahead] = self.axes();
-        let half = (self.fov_deg.to_radians() * 0.5).tan();
+        let half = libm::tan(self.fov_deg.to_radians() * 0.5);
         let (width, height) = (f64::from(size.width), f64::from(size.height));
         let across = (2.0 * x - width) / height * half;
         let upward = (height - 2.0 * y) / height * half;
@@ -101,7 +101,8 @@ impl Camera {
 /// Unit vector at an azimuth (from +z towards +x) and an elevation above the horizon (degrees).
 pub(super) fn direction(azimuth_deg: f64, elevation_deg: f64) -> DVec3 {
     let (azimuth, elevation) = (azimuth_deg.to_radians(), elevation_deg.to_radians());
-    DVec3::new(azimuth.sin() * elevation.cos(), elevation.sin(), azimuth.cos() * elevation.cos())
+    let ((side, ahead), (up, level)) = (libm::sincos(azimuth), libm::sincos(elevation));
+    DVec3::new(side * level, up, ahead * level)
 }
 
 fn corner(bounds: (DVec3, DVec3), index: usize) -> DVec3 {
@@ -122,7 +123,7 @@ mod tests {
             let bounds = (low, low + DVec3::from(extent));
             let camera = Camera::framing(bounds, size);
             let [right, up, ahead] = camera.axes();
-            let half = (camera.fov_deg.to_radians() * 0.5).tan();
+            let half = libm::tan(camera.fov_deg.to_radians() * 0.5);
             let mut most: f64 = 0.0;
             for index in 0..8 {
                 let offset = corner(bounds, index) - camera.eye;

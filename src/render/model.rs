@@ -47,6 +47,23 @@ impl Model {
         Ok(Self::new(mesh, Some(normals), SNOW, 0.5 * grid.voxel_size()))
     }
 
+    /// A fog volume with the colour of snow: the surface where its density is half of the greatest; and that density.
+    ///
+    /// # Errors
+    /// A cancel, or what OpenVDB reports.
+    pub fn fog(ctx: &Context, grid: &FloatGrid) -> Result<(Self, f32)> {
+        let leaves = grid.leaves()?;
+        let stored = leaves.iter().map(|leaf| leaf.values.iter().copied().fold(0.0, f32::max));
+        let half = 0.5 * stored.fold(0.0, f32::max);
+        if half == 0.0 {
+            return Ok((Self::new(TriMesh::default(), None, SNOW, grid.voxel_size()), half));
+        }
+        // Densities fall outward where distances rise: the triangles look inward.
+        let mesh = crate::vdb::level_set::to_mesh(ctx, grid, half, 0.0)?.reversed();
+        let normals = smooth_normals(&mesh);
+        Ok((Self::new(mesh, Some(normals), SNOW, 0.5 * grid.voxel_size()), half))
+    }
+
     fn new(mesh: TriMesh, normals: Option<Vec<Vec3>>, albedo: [f32; 3], skin: f64) -> Self {
         let tree = Bvh::new(&mesh);
         let albedo = Colour::from(albedo.map(f64::from));

@@ -39,7 +39,7 @@ impl Light {
     /// A low sun that comes from the camera's left and a little from ahead: relief shows best so.
     pub fn beside(camera: &Camera) -> Self {
         let back = camera.eye - camera.target;
-        let azimuth = back.x.atan2(back.z).to_degrees();
+        let azimuth = libm::atan2(back.x, back.z).to_degrees();
         Self::from_degrees(azimuth - 112.0, 27.0)
     }
 
@@ -89,7 +89,7 @@ fn disc(index: usize) -> (f64, f64) {
     let step = index as f64 + 1.0;
     let radius = (step / PLASTIC).fract().sqrt();
     let angle = std::f64::consts::TAU * (step / (PLASTIC * PLASTIC)).fract();
-    (radius * angle.cos(), radius * angle.sin())
+    (radius * libm::cos(angle), radius * libm::sin(angle))
 }
 
 /// Two unit vectors at right angles to a unit vector and to each other.
@@ -111,7 +111,8 @@ pub(super) fn to_bytes(light: Colour) -> [u8; 3] {
             let over = (value - shoulder) / (1.0 - shoulder);
             shoulder + (1.0 - shoulder) * (over / (1.0 + over))
         };
-        let coded = if value <= 0.003_130_8 { 12.92 * value } else { 1.055 * value.powf(1.0 / 2.4) - 0.055 };
+        let coded =
+            if value <= 0.003_130_8 { 12.92 * value } else { 1.055 * libm::pow(value, 1.0 / 2.4) - 0.055 };
         (coded.clamp(0.0, 1.0) * 255.0).round() as u8
     };
     [byte(light.x), byte(light.y), byte(light.z)]

@@ -148,7 +148,7 @@ impl Cache {
         if sealed::read(&path)?.as_ref() != Some(&self.record) {
             sealed::write(&path, &self.record)?;
         }
-        self.own.write(own::SCENE, scene.to_toml().as_bytes())
+        self.own.write(own::SCENE, scene.to_toml_in(self.stored.folder()).as_bytes())
     }
 
     /// First frame that was made with the settings of now.

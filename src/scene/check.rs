@@ -3,11 +3,14 @@
 use rayon::prelude::*;
 use serde::Serialize;
 
-use super::{BaseMode, Inputs, Object, Role, Scene, inputs, memory};
-use crate::base::DVec3;
+use super::relief::Relief;
+use super::walks::{Walk, walk};
+use super::{BaseMode, Inputs, Layer, Object, Role, Scene, inputs, memory};
+use crate::base::{DVec3, faults};
 use crate::context::Context;
 use crate::error::{Error, Result};
 use crate::snow::base_layer::Reach;
+use crate::snow::base_layer::initial::thin;
 use crate::sweep::{Body, REACH};
 
 /// Frames that one task poses, one after another.
@@ -15,6 +18,8 @@ const RUN: usize = 12;
 /// Bytes of a whole base file for each column of cells, and of what a frame changes and removes besides.
 const BYTES_PER_COLUMN: f64 = 20.0;
 const BYTES_PER_CHANGE: f64 = 4e5;
+/// Bytes of a whole base file for each leaf: two surfaces cross 3.2 leaves of 64 columns.
+const BYTES_PER_LEAF: f64 = BYTES_PER_COLUMN * 64.0 / 3.2;
 /// Bytes for each vertex of an object in a .usda and a .ply file.
 const USDA_PER_VERTEX: f64 = 110.0;
 const PLY_PER_VERTEX: f64 = 50.0;
@@ -37,7 +42,7 @@ pub struct Report {
     pub objects: Vec<ObjectReport>,
     /// Memory that the run needs, about (bytes).
     pub memory_bytes: u64,
-    /// Space that its files need, about (bytes), where the snow's area is known.
+    /// Space that its files need, about (bytes).
     pub disk_bytes: Option<u64>,
     /// What looks wrong, one sentence each.
     pub warnings: Vec<String>,
@@ -52,8 +57,10 @@ pub struct ObjectReport {
     pub role: &'static str,
     /// Its triangles.
     pub triangles: usize,
-    /// Open loops that are closed.
+    /// Open loops that are closed; those that share a vertex count once.
     pub closed_loops: usize,
+    /// Holes at the first frame, counted as `frazil mesh check` does.
+    pub holes: usize,
     /// Edges where its triangles do not agree about inside and outside.
     pub contradictions: usize,
     /// Width, height and depth at the first frame (m).
@@ -66,6 +73,23 @@ pub struct ObjectReport {
     pub fastest_frame: i32,
     /// First and last frame at which its bounds touch the snow's.
     pub touches: Option<[i32; 2]>,
+    /// How deep it goes, where the ground is known and it comes over it.
+    pub deepest: Option<Deepest>,
+    /// How its clip must be carried.
+    pub walk: Option<Walk>,
+}
+
+/// The place of an object that lies lowest against the ground.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct Deepest {
+    /// Frame at which it is there.
+    pub frame: i32,
+    /// Its y (m).
+    pub y_m: f64,
+    /// How far it is above the ground (m); negative below it.
+    pub above_ground_m: f64,
+    /// How deep it is under the snow's top (m); negative above it.
+    pub below_top_m: f64,
 }
 
 /// An object's extent at one frame.
@@ -74,6 +98,8 @@ struct Extent {
     frame: i32,
     low: DVec3,
     high: DVec3,
+    /// Its lowest vertex.
+    lowest: DVec3,
     /// Greatest distance that a vertex moved since the frame before (m).
     moved: f64,
 }
@@ -83,15 +109,24 @@ struct Extent {
 /// # Errors
 /// A frame that cannot be read or fits no other; cancel.
 pub fn check(ctx: &Context, scene: &Scene, inputs: &Inputs) -> Result<Report> {
-    let mut warnings = Vec::new();
+    let mut warnings = inputs.warnings.clone();
+    if let Layer::Depth(depth) = scene.snow.layer {
+        warnings.extend(thin(depth, scene.snow.cell));
+    }
     let area = inputs.area();
     let top = inputs.top(scene);
     let colliders = scene.objects.iter().enumerate().filter(|(_, object)| object.role == Role::Collide);
+    let relief = Relief::new(inputs);
     let mut objects = Vec::new();
     for ((index, object), body) in colliders.zip(&inputs.bodies) {
         let extents = ctx.stage("inputs", || extents(ctx, scene, body))?;
         warnings.extend(out_of_reach(ctx, scene, inputs, body, &extents)?);
-        objects.push(report(scene, index, object, body, &extents, area.zip(top), &mut warnings));
+        let mut told = report(scene, index, object, body, &extents, area.zip(top), &mut warnings);
+        told.holes = holes(scene, body)?;
+        told.deepest = relief.as_ref().and_then(|relief| deepest(relief, &extents));
+        told.walk = walk(scene, object, body.motion())?;
+        warn_of_feet(scene, &name_of(index, object), &told, &mut warnings);
+        objects.push(told);
     }
     warnings.extend(inputs.far_static(scene).map(|(index, far)| inputs::too_far(scene, index, far)));
     let columns = area.map(|[x0, z0, x1, z1]| (x1 - x0) * (z1 - z0) / (scene.snow.cell * scene.snow.cell));
@@ -105,7 +140,7 @@ pub fn check(ctx: &Context, scene: &Scene, inputs: &Inputs) -> Result<Report> {
         cell_m: scene.snow.cell,
         objects,
         memory_bytes: memory::estimate(scene, inputs)?,
-        disk_bytes: columns.map(|columns| disk(scene, inputs, columns)),
+        disk_bytes: Some(disk(scene, inputs, whole_base(inputs, columns))),
         warnings,
     })
 }
@@ -124,10 +159,12 @@ fn extents(ctx: &Context, scene: &Scene, body: &Body) -> Result<Vec<Extent>> {
             body.motion().pose(at(frame), &mut pose)?;
             let start = (DVec3::repeat(f64::INFINITY), DVec3::repeat(f64::NEG_INFINITY));
             let (low, high) = pose.iter().fold(start, |(low, high), p| (low.inf(p), high.sup(p)));
+            let lower = |a: DVec3, b: &DVec3| if b.y < a.y { *b } else { a };
+            let lowest = pose.iter().fold(DVec3::repeat(f64::INFINITY), lower);
             let pairs = pose.iter().zip(&before);
             let moved =
                 pairs.map(|(p, q): (&DVec3, &DVec3)| (p - q).norm_squared()).fold(0.0, f64::max).sqrt();
-            out.push(Extent { frame, low, high, moved });
+            out.push(Extent { frame, low, high, lowest, moved });
             std::mem::swap(&mut pose, &mut before);
         }
         Ok(out)
@@ -174,7 +211,7 @@ fn report(
     snow: Option<([f64; 4], f64)>,
     warnings: &mut Vec<String>,
 ) -> ObjectReport {
-    let name = format!("object {} ({})", index + 1, super::file::name(&object.file));
+    let name = name_of(index, object);
     let first = &extents[0];
     let size = first.high - first.low;
     let (low, high) =
@@ -213,12 +250,54 @@ fn report(
         role: "collide",
         triangles: body.motion().triangles().len(),
         closed_loops: body.closed_loops(),
+        holes: 0,
         contradictions: body.contradictions(),
         size_m: size.into(),
         bounds_m: [low.into(), high.into()],
         fastest_m_per_s: fastest.moved * scene.shot.fps,
         fastest_frame: fastest.frame,
         touches: touches.map(|(first, last)| [first.frame, last.frame]),
+        deepest: None,
+        walk: None,
+    }
+}
+
+fn name_of(index: usize, object: &Object) -> String {
+    format!("object {} ({})", index + 1, super::file::name(&object.file))
+}
+
+/// Holes of a body at the first frame.
+fn holes(scene: &Scene, body: &Body) -> Result<usize> {
+    let mut pose = Vec::new();
+    body.motion().pose(f64::from(scene.shot.frames.first) / scene.shot.fps, &mut pose)?;
+    Ok(faults::holes(&pose, body.motion().triangles()))
+}
+
+/// The lowest place against the ground, of the lowest vertices of all frames.
+fn deepest(relief: &Relief, extents: &[Extent]) -> Option<Deepest> {
+    let of = |extent: &Extent| {
+        let (ground, top) = relief.at(extent.lowest.x, extent.lowest.z)?;
+        let y = extent.lowest.y;
+        Some(Deepest { frame: extent.frame, y_m: y, above_ground_m: y - ground, below_top_m: top - y })
+    };
+    extents.iter().filter_map(of).min_by(|a, b| a.above_ground_m.total_cmp(&b.above_ground_m))
+}
+
+/// What is wrong with where an object's lowest parts go.
+fn warn_of_feet(scene: &Scene, name: &str, told: &ObjectReport, warnings: &mut Vec<String>) {
+    if let Some(deep) = told.deepest.filter(|deep| deep.above_ground_m < -0.5 * scene.snow.cell) {
+        warnings.push(format!(
+            "{name} goes {:.3} m below the ground at frame {}: raise it by its keys, or its prints go through the snow",
+            -deep.above_ground_m, deep.frame
+        ));
+    }
+    if let Some(walk) = told.walk.as_ref().filter(|walk| walk.slips) {
+        warnings.push(format!(
+            "{name}: its feet slip at {:.2} m/s while they stand; its clip walks at {:.2} m/s: {}",
+            walk.slips_m_per_s,
+            DVec3::from(walk.carry_m_per_s).norm(),
+            walk.keys
+        ));
     }
 }
 
@@ -232,10 +311,18 @@ fn likely_scale(size: f64) -> Option<f64> {
     }
 }
 
-/// Space that the files need, about (bytes).
-fn disk(scene: &Scene, inputs: &Inputs, columns: f64) -> u64 {
+/// Bytes of a whole base file: by its columns, or by the leaves of a layer that is given.
+fn whole_base(inputs: &Inputs, columns: Option<f64>) -> f64 {
+    match (inputs.given(), columns) {
+        (Some(grid), _) => grid.leaf_count() as f64 * BYTES_PER_LEAF,
+        (None, columns) => columns.unwrap_or(0.0) * BYTES_PER_COLUMN,
+    }
+}
+
+/// Space that the files need, about (bytes), where a whole base takes so many.
+fn disk(scene: &Scene, inputs: &Inputs, whole: f64) -> u64 {
     let (output, frames) = (scene.output, scene.shot.frames.count() as f64);
-    let whole = columns * BYTES_PER_COLUMN * if output.half { 0.6 } else { 1.0 };
+    let whole = whole * if output.half { 0.6 } else { 1.0 };
     let base = match (output.base, output.base_mode) {
         (false, _) => 0.0,
         (true, BaseMode::Full) => whole * frames,

@@ -49,7 +49,7 @@ impl Scene {
         }
         let known = ["shot", "snow", "object", "output"];
         let root = Table::open(&document, "", root.get_ref(), 0, &known)?;
-        let snow = root.table("snow", "[snow]", &["ground", "area", "depth", "top", "cell", "noise"])?;
+        let snow = root.table("snow", "[snow]", &SNOW_KEYS)?;
         Ok(Self {
             path: path.to_path_buf(),
             shot: shot(&root)?,
@@ -80,6 +80,7 @@ impl Scene {
     }
 }
 
+const SNOW_KEYS: [&str; 7] = ["ground", "area", "depth", "top", "cell", "noise", "min_crumb"];
 /// Edges of voxels that a scene may have (m).
 const CELLS: std::ops::RangeInclusive<f64> = 1.0e-5..=10.0;
 
@@ -112,7 +113,8 @@ fn snow_layer(snow: &Table) -> Result<Snow> {
         }
         _ => {}
     }
-    Ok(Snow { ground, layer, cell, noise: noise(snow, cell)? })
+    let min_crumb = snow.integer_in("min_crumb", 0..=10_000)?.unwrap_or(0) as usize;
+    Ok(Snow { ground, layer, cell, noise: noise(snow, cell)?, min_crumb })
 }
 
 fn layer(snow: &Table) -> Result<Layer> {

@@ -5,6 +5,7 @@ use std::sync::Arc;
 
 use super::objects::is_character;
 use super::{Ground, Layer, Object, Role, Scene};
+use crate::base::mesh::{farthest, too_far as far_mesh};
 use crate::base::{DVec3, PolygonMesh, TriMesh};
 use crate::context::Context;
 use crate::error::{Error, Result};
@@ -27,6 +28,8 @@ pub struct Inputs {
     pub bodies: Vec<Body>,
     /// What the files held when they were read.
     pub(super) seen: Arc<Seen>,
+    /// What about the files should be told, a sentence each; the log has it too.
+    pub warnings: Vec<String>,
 }
 
 enum Snow {
@@ -48,13 +51,19 @@ impl Inputs {
                 Snow::Made { ground: ground(scene, &seen)?, cover: Cover::Top(read_mesh(path, &seen)?) }
             }
         };
+        let mut warnings = Vec::new();
+        if let Snow::Made { ground, cover } = &snow {
+            initial::fits(ground, cover, scene.snow.cell)
+                .map_err(|error| Error::argument(format!("{}: {error}", scene.path.display())))?;
+            warnings.extend(far_meshes(scene, ground, cover));
+        }
         let start = f64::from(scene.shot.frames.first) / scene.shot.fps;
         let (mut statics, mut bodies) = (Vec::new(), Vec::new());
         for (index, object) in scene.objects.iter().enumerate() {
             if object.role == Role::Ignore {
                 continue;
             }
-            let motion = motion(scene, object, &seen)?;
+            let motion = motion(scene, object, &seen, &mut warnings)?;
             match object.role {
                 Role::Static => statics.push(posed(&*motion, start)?),
                 _ => {
@@ -77,7 +86,8 @@ impl Inputs {
                 }
             }
         }
-        Ok(Self { snow, statics, bodies, seen })
+        warnings.iter().for_each(|warning| log::warn!("{warning}"));
+        Ok(Self { snow, statics, bodies, seen, warnings })
     }
 
     /// Least and greatest x and z of the snow (m), as far as they are known before it is made.
@@ -160,6 +170,22 @@ impl Inputs {
         })
     }
 
+    /// What the snow lies on and how much of it there is, where it is not given as a level set.
+    pub(super) fn made(&self) -> Option<(&initial::Ground, &Cover)> {
+        match &self.snow {
+            Snow::Made { ground, cover } => Some((ground, cover)),
+            Snow::Given(_) => None,
+        }
+    }
+
+    /// The snow where it is given as a level set.
+    pub(super) fn given(&self) -> Option<&FloatGrid> {
+        match &self.snow {
+            Snow::Given(grid) => Some(grid),
+            Snow::Made { .. } => None,
+        }
+    }
+
     /// The snow before the first frame.
     ///
     /// # Errors
@@ -197,6 +223,25 @@ fn ground(scene: &Scene, seen: &Seen) -> Result<initial::Ground> {
     }
 }
 
+/// What to say of a ground's or top's mesh that lies far from the origin.
+fn far_meshes(scene: &Scene, ground: &initial::Ground, cover: &Cover) -> Vec<String> {
+    let told = |path: &Path, mesh: &TriMesh| {
+        let farthest = mesh.positions.iter().map(|p| f64::from(p.amax())).fold(0.0, f64::max);
+        far_mesh(&path.display().to_string(), farthest, 1.0, scene.snow.cell)
+    };
+    let mut out = Vec::new();
+    if let (Some(Ground::Mesh(path)), initial::Ground::Mesh(mesh)) = (&scene.snow.ground, ground) {
+        out.extend(told(path, mesh));
+    }
+    if let (Layer::Top(path), Cover::Top(mesh)) = (&scene.snow.layer, cover) {
+        out.extend(told(path, mesh));
+    }
+    // No key moves these.
+    out.iter_mut()
+        .for_each(|what| *what = what.replace("bring it there by keys", "move the scene there too"));
+    out
+}
+
 fn layer_grid(path: &Path, cell: f64, seen: &Seen) -> Result<FloatGrid> {
     // OpenVDB reads the file itself: it must be the same before and after.
     seen.hash(path)?;
@@ -216,7 +261,12 @@ fn layer_grid(path: &Path, cell: f64, seen: &Seen) -> Result<FloatGrid> {
 }
 
 /// An object's motion: its file, its own frames, scale and axis, and the keys over them.
-fn motion(scene: &Scene, object: &Object, seen: &Arc<Seen>) -> Result<Box<dyn Motion>> {
+fn motion(
+    scene: &Scene,
+    object: &Object,
+    seen: &Arc<Seen>,
+    warnings: &mut Vec<String>,
+) -> Result<Box<dyn Motion>> {
     let fps = scene.shot.fps;
     let radians = |turn: [f64; 3]| DVec3::from(turn.map(f64::to_radians));
     let keys = object.keys.iter().map(|key| Key {
@@ -224,7 +274,7 @@ fn motion(scene: &Scene, object: &Object, seen: &Arc<Seen>) -> Result<Box<dyn Mo
         at: DVec3::from(key.at),
         turn: radians(key.turn_deg),
     });
-    let keys = Keys::new(keys.collect())?;
+    let keys = Keys::new(keys.collect())?.with_ease(object.ease);
     let own: Box<dyn Motion> = match Pattern::parse(&object.file) {
         None if is_character(&object.file) => Box::new(character(scene, object, seen)?),
         None => Box::new(Rigid::new(read_mesh(&object.file, seen)?, Keys::default())),
@@ -234,6 +284,10 @@ fn motion(scene: &Scene, object: &Object, seen: &Arc<Seen>) -> Result<Box<dyn Mo
             Box::new(MeshSequence::open_seen(pattern, first, last, fps, object.offset, seen.clone())?)
         }
     };
+    let mut pose = Vec::new();
+    own.pose(f64::from(scene.shot.frames.first) / fps, &mut pose)?;
+    let name = object.file.display().to_string();
+    warnings.extend(far_mesh(&name, farthest(pose.iter()), object.space.scale, scene.snow.cell));
     Ok(Box::new(Placed::new(own, object.space, keys)))
 }
 

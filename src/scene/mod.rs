@@ -11,6 +11,7 @@ mod memory;
 mod objects;
 mod overrides;
 mod own;
+mod relief;
 mod resolved;
 mod settings;
 pub mod shot;
@@ -19,6 +20,7 @@ mod stored;
 mod table;
 pub mod template;
 pub mod verify;
+mod walks;
 mod writer;
 
 pub use frames::{FrameChoice, Frames};
@@ -26,6 +28,7 @@ pub use inputs::Inputs;
 pub use memory::{check as check_memory, estimate};
 pub use overrides::Override;
 pub use stored::{Rebuild, Stored};
+pub use walks::Walk;
 
 use crate::motion::Space;
 use crate::snow::base_layer::NoiseParams;
@@ -66,6 +69,8 @@ pub struct Snow {
     pub cell: f64,
     /// Raggedness of the edges; an amplitude of 0 switches it off.
     pub noise: NoiseParams,
+    /// Islands of fewer voxels are taken away, 0..=10,000; 0: all stay.
+    pub min_crumb: usize,
 }
 
 /// What the snow lies on.
@@ -114,9 +119,11 @@ pub struct Object {
     pub noise: bool,
     /// Rigid motion composed over the file's own; ascending frames; may be empty.
     pub keys: Vec<Key>,
+    /// Whether the keys are joined smoothly: see [`crate::motion::Keys::with_ease`].
+    pub ease: bool,
 }
 
-/// A rigid pose at a frame; linear in between, constant before the first and after the last.
+/// A rigid pose at a frame; linear in between (or with ease), constant before the first and after the last.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Key {
     /// Frame of the shot.

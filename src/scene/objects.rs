@@ -11,7 +11,7 @@ use crate::motion::{Space, Up};
 
 /// Every `[[object]]`, in the file's order.
 pub(super) fn objects(root: &Table) -> Result<Vec<Object>> {
-    let known = ["file", "node", "clip", "loop", "offset", "scale", "up", "role", "noise", "keys"];
+    let known = ["file", "node", "clip", "loop", "offset", "scale", "up", "role", "noise", "keys", "ease"];
     let tables = root.tables("object", "[[object]]", &known)?;
     tables.iter().map(object).collect()
 }
@@ -40,6 +40,7 @@ fn object(table: &Table) -> Result<Object> {
         role: table.choice("role", &ROLES)?.unwrap_or(Role::Collide),
         noise: table.flag("noise")?.unwrap_or(true),
         keys: keys(table)?,
+        ease: table.flag("ease")?.unwrap_or(false),
     })
 }
 

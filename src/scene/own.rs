@@ -72,7 +72,7 @@ impl Own {
                 return Err(Error::file(input, what));
             }
         }
-        let new = hash::of_bytes(scene.to_toml().as_bytes());
+        let new = hash::of_bytes(scene.to_toml_in(&self.folder).as_bytes());
         if is_same(&scene.path, &self.folder.join(SCENE)) && hash::of_file(&scene.path)? != new {
             let what = "is the scene that is read and would be written over: choose another -o";
             return Err(Error::file(&scene.path, what));

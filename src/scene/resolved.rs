@@ -4,14 +4,46 @@ use super::objects::is_character;
 use super::{BaseMode, Ground, Layer, Object, Role, Scene};
 use crate::motion::Up;
 use std::fmt::Write;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 impl Scene {
-    /// The scene as TOML with every key, its meaning and absolute paths.
+    /// The scene as TOML with every key, its meaning and absolute paths: for any folder.
     pub fn to_toml(&self) -> String {
         let mut text = String::new();
         self.write_toml(&mut text).expect("writing to a String does not fail");
         text
+    }
+
+    /// The same for a file in `folder`: what lies in the scene's own folder, with `folder` in there too, is named
+    /// relative to it, so that the whole may be moved; so is what lies around two output folders side by side, when the
+    /// scene is the other one's. All other paths are absolute.
+    pub fn to_toml_in(&self, folder: &Path) -> String {
+        let mut scene = self.clone();
+        let home = self.path.parent().filter(|home| !home.as_os_str().is_empty()).unwrap_or(Path::new("."));
+        // Links are followed: `..` goes up from where a folder really is.
+        if let (Ok(home), Ok(folder)) = (home.canonicalize(), folder.canonicalize()) {
+            let around =
+                home.parent().filter(|around| folder.parent() == Some(around) && *around != Path::new("/"));
+            let homes: Vec<&Path> = std::iter::once(home.as_path()).chain(around).collect();
+            for path in scene.paths_mut() {
+                let near = homes.iter().find_map(|home| relative(path, &folder, home));
+                *path = near.unwrap_or_else(|| path.clone());
+            }
+        }
+        scene.to_toml()
+    }
+
+    /// Every file that the scene names.
+    fn paths_mut(&mut self) -> impl Iterator<Item = &mut PathBuf> {
+        let ground = self.snow.ground.as_mut().and_then(|ground| match ground {
+            Ground::Mesh(path) => Some(path),
+            Ground::Plane { .. } => None,
+        });
+        let layer = match &mut self.snow.layer {
+            Layer::Top(path) | Layer::Grid(path) => Some(path),
+            Layer::Depth(_) => None,
+        };
+        ground.into_iter().chain(layer).chain(self.objects.iter_mut().map(|object| &mut object.file))
     }
 
     fn write_toml(&self, out: &mut String) -> std::fmt::Result {
@@ -66,6 +98,8 @@ impl Scene {
             Layer::Grid(path) => line(out, "top", &file(path), "the layer as a level set")?,
         }
         line(out, "cell", &number(self.snow.cell), "edge of a voxel (m)")?;
+        let crumb = self.snow.min_crumb.to_string();
+        line(out, "min_crumb", &crumb, "islands of fewer voxels are taken away; 0 = none")?;
         let noise = &self.snow.noise;
         writeln!(out, "\n[snow.noise]")?;
         line(out, "amplitude", &number(noise.amplitude), "greatest displacement, outward only (m); 0 = off")?;
@@ -103,6 +137,7 @@ fn write_object(out: &mut String, object: &Object) -> std::fmt::Result {
     };
     line(out, "role", &quoted(role), "collide, static or ignore")?;
     line(out, "noise", &object.noise.to_string(), "ragged edges")?;
+    line(out, "ease", &object.ease.to_string(), "smooth between keys, else straight")?;
     if object.keys.is_empty() {
         return line(out, "keys", "[]", "rigid motion over the file's own");
     }
@@ -112,6 +147,13 @@ fn write_object(out: &mut String, object: &Object) -> std::fmt::Result {
         writeln!(out, "    {{ frame = {}, at = {at}, turn_deg = {turn} }},", number(key.frame))?;
     }
     writeln!(out, "]")
+}
+
+/// A file's path from a folder, where both lie in `home`; folder and home are free of links.
+fn relative(path: &Path, folder: &Path, home: &Path) -> Option<PathBuf> {
+    let up: PathBuf = folder.strip_prefix(home).ok()?.components().map(|_| "..").collect();
+    let parent = path.parent()?.canonicalize().ok()?;
+    Some(up.join(parent.strip_prefix(home).ok()?).join(path.file_name()?))
 }
 
 fn line(out: &mut String, key: &str, value: &str, meaning: &str) -> std::fmt::Result {

@@ -182,13 +182,14 @@ impl<'a> Run<'a> {
             }
             (other, _) => other,
         })?;
-        let at = match latest {
+        let mut at = match latest {
             None => LayerAt { frame: first - 1, layer: BaseLayer::new(ctx, initial, params)? },
             Some(state) => {
                 let grids = self.cache.stored.layer(ctx, state)?;
                 LayerAt { frame: state, layer: BaseLayer::resume(ctx, initial, grids, params)? }
             }
         };
+        at.layer.set_min_crumb(self.scene.snow.min_crumb);
         log::info!(
             "snow: {} active voxels, {:.1} MB, {:.6} m3; goes on after frame {}",
             at.layer.surface().active_voxels(),

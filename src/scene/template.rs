@@ -15,6 +15,7 @@ area = [-3.0, -3.0, 3.0, 3.0]    # of the plane: x0, z0, x1, z1 (m)
 depth = 0.30                     # above the ground and static objects (m)
 # top = "snow_top.ply"           # in place of depth: a mesh of the snow's top, or a .vdb level set of all the snow
 cell = 0.0075                    # edge of a voxel (m)
+# min_crumb = 0                  # islands of fewer voxels, left by ragged edges and thin walls, are taken away; 0 = none
 
 # [snow.noise]                   # ragged edges, outward only
 # amplitude = 0.015              # m; two cells; 0 = off
@@ -32,6 +33,7 @@ file = "hero.glb"                # .glb or .gltf; a mesh (.obj, .ply, .stl); or 
 # up = "y"                       # the file's upward axis: y or z
 # role = "collide"               # collide, static (the snow lies on it) or ignore
 # noise = true                   # ragged edges of its prints
+# ease = false                   # true: keys are joined smoothly, starting and ending at rest; else straight lines
 keys = [                         # composed over the file's own motion: a walk in place goes somewhere
     { frame = 1, at = [0.0, 0.1, -2.5] },
     { frame = 120, at = [0.0, 0.1, 2.5], turn_deg = [0.0, 0.0, 0.0] },

@@ -204,6 +204,7 @@ impl<'a> Writer<'a> {
             "base_m3": report.base_volume,
             "touched_blocks": report.touched_blocks,
             "sweep_faces": report.sweep_faces,
+            "crumbs": report.crumbs,
             "stages": stages,
         });
         let path = self.folder.join("report").join(format!("{frame:04}.json"));

@@ -2,7 +2,7 @@
 
 use super::VdbOutput;
 use crate::cli::exit::{Failure, Phase};
-use crate::cli::options::{MeshSpace, positive, triple};
+use crate::cli::options::{self, MeshSpace, positive, triple};
 use crate::cli::session::Session;
 use frazil::base::{DVec3, TriMesh};
 use frazil::io;
@@ -99,7 +99,11 @@ impl Args {
             let positions = pose.iter().map(|at| at.cast()).collect();
             Ok(TriMesh { positions, triangles: motion.triangles().to_vec() })
         };
-        self.check_memory(session, [&posed(from).before()?, &posed(to).before()?])?;
+        let ends = [posed(from).before()?, posed(to).before()?];
+        if let Some(what) = options::far_mesh(&self.mesh[0], &ends[0], self.cell) {
+            log::warn!("{what}");
+        }
+        self.check_memory(session, [&ends[0], &ends[1]])?;
         let bodies = [Body::new(motion, from).before()?];
         match self.method {
             Method::Chain => sweep::chain(&session.ctx, &bodies, from, to, settings).during(),

@@ -52,6 +52,8 @@ pub struct Contents {
     pub clips: Vec<(String, f64)>,
     /// Names of the nodes with a mesh.
     pub mesh_nodes: Vec<String>,
+    /// Those and all that they hang on, parents first: name, depth in the tree, whether it has a mesh.
+    pub tree: Vec<(String, usize, bool)>,
     /// Number of skins.
     pub skins: usize,
 }
@@ -118,8 +120,21 @@ impl Character {
         Ok(Contents {
             clips: clips.collect::<Result<_>>()?,
             mesh_nodes: meshes.map(|node| nodes[node.index()].name.clone()).collect(),
+            tree: tree(&file, &nodes),
             skins: file.document.skins().count(),
         })
+    }
+
+    /// The meshes of a file as they are at a time (s) of a shot (the file's unit).
+    ///
+    /// # Errors
+    /// As [`Character::open`].
+    pub fn posed(path: &Path, play: Play, time: f64) -> Result<TriMesh> {
+        let character = Self::open(path, play)?;
+        let mut pose = Vec::new();
+        character.pose(time, &mut pose)?;
+        let positions = pose.iter().map(|place| place.cast()).collect();
+        Ok(TriMesh { positions, triangles: character.vertices.triangles })
     }
 
     /// The meshes of a file in their pose at rest (the file's unit).
@@ -253,6 +268,37 @@ fn chosen(file: &File, nodes: &[Node], pattern: Option<&str>) -> std::result::Re
         });
     }
     Ok(shown.iter().zip(&picked).map(|(shown, picked)| *shown && *picked).collect())
+}
+
+/// The nodes with a mesh and their ancestors, as [`Contents::tree`].
+fn tree(file: &File, nodes: &[Node]) -> Vec<(String, usize, bool)> {
+    let mut has_mesh = vec![false; nodes.len()];
+    file.document.nodes().for_each(|node| has_mesh[node.index()] = node.mesh().is_some());
+    let mut shown = has_mesh.clone();
+    let mut children = vec![Vec::new(); nodes.len()];
+    let mut roots = Vec::new();
+    for (index, node) in nodes.iter().enumerate() {
+        match node.parent {
+            Some(parent) => children[parent].push(index),
+            None => roots.push(index),
+        }
+        let mut at = node.parent.filter(|_| has_mesh[index]);
+        // As many steps as there are nodes: a tree that runs in a circle ends too.
+        for _ in 0..nodes.len() {
+            let Some(parent) = at else { break };
+            shown[parent] = true;
+            at = nodes[parent].parent;
+        }
+    }
+    let mut out = Vec::new();
+    let mut stack: Vec<(usize, usize)> = roots.into_iter().rev().map(|root| (root, 0)).collect();
+    while let Some((index, depth)) = stack.pop() {
+        if shown[index] {
+            out.push((nodes[index].name.clone(), depth, has_mesh[index]));
+            stack.extend(children[index].iter().rev().map(|&child| (child, depth + 1)));
+        }
+    }
+    out
 }
 
 fn clip_names(file: &File) -> Vec<String> {

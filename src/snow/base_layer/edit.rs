@@ -110,7 +110,7 @@ pub fn from_cells(origin: Origin, mut cells: Box<Values>, scale: Scale) -> Block
 }
 
 /// A leaf, or a constant where no value lies within the band.
-fn pack(origin: Origin, values: Box<Values>, scale: Scale) -> BlockEdit {
+pub fn pack(origin: Origin, values: Box<Values>, scale: Scale) -> BlockEdit {
     let mask = band_mask(&values, scale.background);
     let uniform = values.iter().all(|value| (*value > 0.0) == (values[0] > 0.0));
     if mask == [0; 8] && uniform {

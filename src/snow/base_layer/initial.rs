@@ -5,7 +5,7 @@
 //! numbers then gives the layer, without the ghost surfaces that CSG of coincident faces leaves.
 
 use crate::base::mesh::coincident;
-use crate::base::{DVec3, TriMesh, Vec3};
+use crate::base::{DVec3, TriMesh};
 use crate::context::Context;
 use crate::error::{Error, Result};
 use crate::sweep::{Face, Fixed, Lattice, Topology, Weights, Window, boundary, fill};
@@ -39,7 +39,8 @@ const EVERYWHERE: Window = Window { min: [i32::MIN; 3], max: [i32::MAX; 3] };
 /// Level set of the snow on a ground and on static objects.
 ///
 /// # Errors
-/// A depth or an area that is not positive, an empty mesh, no snow at all, a layer too large, cancel.
+/// A depth or an area that is not positive or less than a cell, an empty mesh, no snow at all, a layer too large,
+/// cancel.
 pub fn layer(
     ctx: &Context,
     ground: &Ground,
@@ -48,8 +49,9 @@ pub fn layer(
     cell: f64,
     half_width: f32,
 ) -> Result<FloatGrid> {
-    let ground = upright(ground_mesh(ground)?);
-    let statics: Vec<TriMesh> = statics.iter().map(|mesh| upright(mesh.clone())).collect();
+    fits(ground, cover, cell)?;
+    let ground = upright(sheet_of(ground)?);
+    let statics: Vec<Sheet> = statics.iter().map(|mesh| upright(Sheet::of(mesh))).collect();
     let lattice = Lattice::near(cell, centre(&ground)?)?;
     let faces = ctx.stage("prisms", || {
         let mut faces = Vec::new();
@@ -64,15 +66,15 @@ pub fn layer(
                 }
             }
             Cover::Top(top) => {
+                let top = &upright(Sheet::of(top));
                 centre(top)?;
-                let top = &upright(top.clone());
-                let floor = lowest(&ground).min(lowest(top)) - 16.0 * cell;
+                let floor = ground.lowest().min(top.lowest()) - 16.0 * cell;
                 let sunk = |p: DVec3| DVec3::new(p.x, floor, p.z);
                 prisms(&lattice, top, sunk, |p| p, 1, &mut faces)?;
                 prisms(&lattice, &ground, sunk, |p| p, SOLID, &mut faces)?;
             }
         }
-        for mesh in std::iter::once(&ground).filter(|mesh| is_solid(mesh)).chain(&statics) {
+        for mesh in std::iter::once(&ground).filter(|mesh| mesh.is_solid()).chain(&statics) {
             solid(&lattice, mesh, &mut faces)?;
         }
         Ok(faces)
@@ -85,12 +87,106 @@ pub fn layer(
     }
     layer.prune_level_set()?;
     layer.set_name("surface")?;
+    let rough = match cover {
+        Cover::Depth(depth) => thin(*depth, cell),
+        Cover::Top(_) => nowhere_thick(&layer)?,
+    };
+    if let Some(what) = rough {
+        log::warn!("{what}");
+    }
     Ok(layer)
 }
 
-fn ground_mesh(ground: &Ground) -> Result<TriMesh> {
+/// Whether cells can hold a layer: below a cell a level set has no true volume.
+///
+/// # Errors
+/// A depth, or a plane, that is less than a cell; the message names it.
+pub fn fits(ground: &Ground, cover: &Cover, cell: f64) -> Result<()> {
+    let least = |name: &str, size: f64| {
+        // What is no positive number is refused where it is used.
+        if size > 0.0 && size < cell {
+            return Err(Error::argument(format!(
+                "{name} = {size} m is less than a cell of {cell} m, which cannot hold it: take cells of {} m or less",
+                told(size / THICK)
+            )));
+        }
+        Ok(())
+    };
+    if let Cover::Depth(depth) = cover {
+        least("depth", *depth)?;
+    }
+    if let Ground::Plane { area: [x0, z0, x1, z1], .. } = ground {
+        least("the area's extent in x", x1 - x0)?;
+        least("the area's extent in z", z1 - z0)?;
+    }
+    Ok(())
+}
+
+/// Cells that a layer should be thick, or prints in it are rough.
+const THICK: f64 = 3.0;
+
+/// A length with two digits that count.
+fn told(length: f64) -> f64 {
+    format!("{length:.1e}").parse().unwrap_or(length)
+}
+
+/// A sentence about a vertical depth (m) that is only a few cells.
+pub fn thin(depth: f64, cell: f64) -> Option<String> {
+    let cells = depth / cell;
+    (cells < THICK).then(|| {
+        format!(
+            "the snow is {cells:.1} cells thick: its volume and its prints are rough; cells of {} m or less hold it well",
+            told(depth / THICK)
+        )
+    })
+}
+
+/// A sentence about a layer that no voxel is deep in.
+fn nowhere_thick(layer: &FloatGrid) -> Result<Option<String>> {
+    let cell = layer.voxel_size() as f32;
+    let least = |values: &[f32; 512]| values.iter().copied().fold(f32::INFINITY, f32::min);
+    let deepest = layer.leaves()?.iter().map(|leaf| least(leaf.values)).fold(f32::INFINITY, f32::min);
+    // A layer of three cells has voxels a cell or more below its surface, wherever the voxels lie.
+    Ok((deepest > -(THICK as f32 - 1.0) / 2.0 * cell).then(|| {
+        format!(
+            "the snow is nowhere {THICK} cells of {cell} m thick: its volume and its prints are rough; take smaller cells"
+        )
+    }))
+}
+
+/// A mesh whose places are 64-bit: a plane's corners lie where they were said to be, however far from the origin.
+struct Sheet {
+    positions: Vec<DVec3>,
+    triangles: Vec<[u32; 3]>,
+}
+
+impl Sheet {
+    fn of(mesh: &TriMesh) -> Self {
+        let positions = mesh.positions.iter().map(|p| p.cast()).collect();
+        Self { positions, triangles: mesh.triangles.clone() }
+    }
+
+    fn corners(&self) -> impl Iterator<Item = [DVec3; 3]> + '_ {
+        self.triangles.iter().map(|triangle| triangle.map(|index| self.positions[index as usize]))
+    }
+
+    fn topology(&self, close: bool) -> Topology {
+        let same = coincident(self.positions.iter().copied());
+        Topology::new(&self.triangles, self.positions.len(), &same, close)
+    }
+
+    fn is_solid(&self) -> bool {
+        self.topology(false).is_closed()
+    }
+
+    fn lowest(&self) -> f64 {
+        self.positions.iter().map(|p| p.y).fold(f64::INFINITY, f64::min)
+    }
+}
+
+fn sheet_of(ground: &Ground) -> Result<Sheet> {
     let (height, [x0, z0, x1, z1]) = match ground {
-        Ground::Mesh(mesh) => return Ok(mesh.clone()),
+        Ground::Mesh(mesh) => return Ok(Sheet::of(mesh)),
         Ground::Plane { height, area } => (*height, *area),
     };
     if !(x1 > x0 && z1 > z0 && height.is_finite() && (x1 - x0).is_finite() && (z1 - z0).is_finite()) {
@@ -98,65 +194,60 @@ fn ground_mesh(ground: &Ground) -> Result<TriMesh> {
             "area = [{x0}, {z0}, {x1}, {z1}] is not [x0, z0, x1, z1] with x1 > x0, z1 > z0"
         )));
     }
-    let at = |x: f64, z: f64| Vec3::new(x as f32, height as f32, z as f32);
-    Ok(TriMesh {
+    let at = |x: f64, z: f64| DVec3::new(x, height, z);
+    Ok(Sheet {
         positions: vec![at(x0, z0), at(x1, z0), at(x1, z1), at(x0, z1)],
         triangles: vec![[0, 2, 1], [0, 3, 2]],
     })
 }
 
-fn centre(mesh: &TriMesh) -> Result<DVec3> {
-    if mesh.positions.is_empty() || mesh.triangles.is_empty() {
+fn centre(sheet: &Sheet) -> Result<DVec3> {
+    if sheet.positions.is_empty() || sheet.triangles.is_empty() {
         return Err(Error::argument("a mesh of the snow's ground or top is empty"));
     }
-    let sum: DVec3 = mesh.positions.iter().map(|p| p.cast::<f64>()).sum();
-    Ok(sum / mesh.positions.len() as f64)
-}
-
-fn lowest(mesh: &TriMesh) -> f64 {
-    mesh.positions.iter().map(|p| f64::from(p.y)).fold(f64::INFINITY, f64::min)
-}
-
-fn topology(mesh: &TriMesh, close: bool) -> Topology {
-    let same = coincident(mesh.positions.iter().map(|p| p.cast()));
-    Topology::new(&mesh.triangles, mesh.positions.len(), &same, close)
+    Ok(sheet.positions.iter().sum::<DVec3>() / sheet.positions.len() as f64)
 }
 
 /// A mesh as it is meant: a solid with its faces outward, a sheet with its faces upward.
-fn upright(mesh: TriMesh) -> TriMesh {
-    let up: f64 = (0..mesh.triangles.len())
-        .map(|triangle| mesh.corners(triangle))
-        .map(|[a, b, c]| (b - a).cross(&(c - a)).y)
-        .sum();
-    let inward = if is_solid(&mesh) { mesh.volume() < 0.0 } else { up < 0.0 };
-    if inward { mesh.reversed() } else { mesh }
-}
-
-fn is_solid(mesh: &TriMesh) -> bool {
-    topology(mesh, false).is_closed()
+fn upright(mut sheet: Sheet) -> Sheet {
+    let inward = if sheet.is_solid() {
+        // Near its own places, so that nothing is lost far from the world's origin.
+        let origin = sheet.positions.first().copied().unwrap_or_default();
+        let six = |corners: [DVec3; 3]| {
+            let [a, b, c] = corners.map(|p| p - origin);
+            a.dot(&b.cross(&c))
+        };
+        sheet.corners().map(six).sum::<f64>() < 0.0
+    } else {
+        sheet.corners().map(|[a, b, c]| (b - a).cross(&(c - a)).y).sum::<f64>() < 0.0
+    };
+    if inward {
+        sheet.triangles.iter_mut().for_each(|[_, b, c]| std::mem::swap(b, c));
+    }
+    sheet
 }
 
 /// Prisms between two places of each triangle that moves along its normal from the first to the second.
 fn prisms(
     lattice: &Lattice,
-    mesh: &TriMesh,
+    sheet: &Sheet,
     from: impl Fn(DVec3) -> DVec3,
     to: impl Fn(DVec3) -> DVec3,
     layers: i32,
     faces: &mut Vec<Face>,
 ) -> Result<()> {
-    let topology = topology(mesh, false);
-    let first = level(lattice, &topology, mesh, from)?;
-    let last = level(lattice, &topology, mesh, to)?;
+    let topology = sheet.topology(false);
+    let first = level(lattice, &topology, sheet, from)?;
+    let last = level(lattice, &topology, sheet, to)?;
     let mut made = boundary(&topology, &[first, last], Weights { solid: 0, swept: 1 }, &EVERYWHERE);
     made.iter_mut().for_each(|face| weigh(face, layers));
     faces.extend(made);
     Ok(())
 }
 
-fn solid(lattice: &Lattice, mesh: &TriMesh, faces: &mut Vec<Face>) -> Result<()> {
-    let topology = topology(mesh, true);
-    let pose = level(lattice, &topology, mesh, |p| p)?;
+fn solid(lattice: &Lattice, sheet: &Sheet, faces: &mut Vec<Face>) -> Result<()> {
+    let topology = sheet.topology(true);
+    let pose = level(lattice, &topology, sheet, |p| p)?;
     faces.extend(boundary(&topology, &[pose], Weights { solid: SOLID, swept: 0 }, &EVERYWHERE));
     Ok(())
 }
@@ -173,10 +264,10 @@ fn weigh(face: &mut Face, factor: i32) {
 fn level(
     lattice: &Lattice,
     topology: &Topology,
-    mesh: &TriMesh,
+    sheet: &Sheet,
     place: impl Fn(DVec3) -> DVec3,
 ) -> Result<Vec<Fixed>> {
-    let mut pose: Vec<DVec3> = mesh.positions.iter().map(|p| lattice.to_cells(place(p.cast()))).collect();
+    let mut pose: Vec<DVec3> = sheet.positions.iter().map(|&p| lattice.to_cells(place(p))).collect();
     topology.complete(&mut pose);
     pose.into_iter().map(|cells| lattice.fix(cells)).collect()
 }

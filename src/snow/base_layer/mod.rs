@@ -3,6 +3,7 @@
 //! A step costs what moves: only blocks that hold snow and lie near the swept volume are looked at.
 
 mod columns;
+mod crumbs;
 mod edit;
 mod grids;
 pub mod initial;
@@ -69,6 +70,8 @@ pub struct StepReport {
     pub touched_blocks: usize,
     /// Triangles of the swept volume's boundary near the snow.
     pub sweep_faces: usize,
+    /// Islands that were taken away: see [`BaseLayer::set_min_crumb`].
+    pub crumbs: usize,
     /// Wall-clock time of each stage.
     pub stages: Vec<StageTime>,
 }
@@ -88,6 +91,8 @@ pub struct BaseLayer {
     low: [i32; 3],
     high: [i32; 3],
     half_width: f32,
+    /// Islands of fewer voxels are taken away.
+    min_crumb: usize,
 }
 
 impl BaseLayer {
@@ -117,7 +122,7 @@ impl BaseLayer {
         let grids = Grids::new(surface, volume)?;
         let changes = Changes::none(&grids, half_width)?;
         let (columns, changed) = Default::default();
-        Ok(Self { params, grids, changes, columns, changed, initial, low, high, half_width })
+        Ok(Self { params, grids, changes, columns, changed, initial, low, high, half_width, min_crumb: 0 })
     }
 
     /// Goes on from the grids that an earlier step left; `initial` is the layer before the first step.
@@ -147,6 +152,12 @@ impl BaseLayer {
         params.validate(&self.grids.surface)?;
         self.params = params;
         Ok(())
+    }
+
+    /// From the next step on, islands of fewer voxels than this that a step leaves where it changed the snow are taken
+    /// away with it: crumbs of ragged edges and thin walls. At first 0: all stay.
+    pub fn set_min_crumb(&mut self, voxels: usize) {
+        self.min_crumb = voxels;
     }
 
     /// How objects press into the snow.
@@ -238,7 +249,13 @@ impl BaseLayer {
         let (ragged, ragged_faces) = self.sweep(ctx, &ragged, from, to, displacement.as_ref())?;
         let (exact, exact_faces) = self.sweep(ctx, &exact, from, to, None)?;
         let pieces = united(ragged, exact);
-        let edits = ctx.stage("subtract", || self.edits(ctx, &pieces))?;
+        let mut edits = ctx.stage("subtract", || self.edits(ctx, &pieces))?;
+        let crumbs = match self.min_crumb {
+            0 | 1 => 0,
+            least => ctx.stage("crumbs", || {
+                crumbs::remove(ctx, &mut edits, &self.grids.surface, self.scale(), least)
+            })?,
+        };
         let (changes, columns, removed_volume) = ctx.stage("columns", || self.changes(ctx, edits, frame))?;
         let touched_blocks = changes.surface.len();
         self.commit(ctx, changes, columns)?;
@@ -247,6 +264,7 @@ impl BaseLayer {
             base_volume: self.changes.volume,
             touched_blocks,
             sweep_faces: ragged_faces + exact_faces,
+            crumbs,
             stages: ctx.take_timings(),
         })
     }

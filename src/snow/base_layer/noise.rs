@@ -7,15 +7,15 @@
 use std::collections::HashMap;
 use std::ops::RangeInclusive;
 
-use fastnoise_lite::{FastNoiseLite, FractalType, NoiseType};
+use fastnoise_lite::{FastNoiseLite, NoiseType};
 use rayon::prelude::*;
 
 use super::edit::{self, Scale};
-use crate::base::blocks::{BlockEdit, Origin, Values, offset};
+use crate::base::blocks::{Block, BlockEdit, Origin, Values, offset};
 use crate::context::Context;
 use crate::error::{Error, Result};
 use crate::sweep::{Piece, Settings};
-use crate::vdb::{FloatGrid, level_set};
+use crate::vdb::{FloatGrid, Leaf, level_set};
 
 /// Irregularity of an imprint's surface.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -85,30 +85,51 @@ impl NoiseParams {
     }
 }
 
+/// Strength of an octave over that of the one before it.
+const GAIN: f32 = 0.25;
+/// Noise cells after which the pattern comes again: the library numbers them with 32 bits.
+const PERIOD: f64 = 4_294_967_296.0;
+
 /// The displacement field of a layer.
 pub struct Displacement {
-    noise: FastNoiseLite,
+    /// Each with the part of the sum that it has.
+    octaves: Vec<(FastNoiseLite, f32)>,
     /// Greatest displacement (cells).
     pub amplitude: f32,
-    cell: f64,
+    /// Cells of the largest octave's noise in a voxel.
+    step: f64,
 }
 
 impl Displacement {
     /// A field for parameters that were validated.
     pub fn new(params: &NoiseParams, cell: f64) -> Self {
-        let mut noise = FastNoiseLite::with_seed(params.seed);
-        noise.set_noise_type(Some(NoiseType::Perlin));
-        noise.set_fractal_type(if params.octaves > 1 { Some(FractalType::FBm) } else { None });
-        noise.set_fractal_octaves(Some(params.octaves as i32));
-        noise.set_fractal_gain(Some(0.25));
-        noise.set_frequency(Some((1.0 / params.size) as f32));
-        Self { noise, amplitude: (params.amplitude / cell) as f32, cell }
+        let mut strengths = vec![1.0; params.octaves as usize];
+        (1..strengths.len()).for_each(|octave| strengths[octave] = strengths[octave - 1] * GAIN);
+        let sum: f32 = strengths.iter().sum();
+        let octave = |(strength, number): (f32, i32)| {
+            let mut noise = FastNoiseLite::with_seed(params.seed.wrapping_add(number));
+            noise.set_noise_type(Some(NoiseType::Perlin));
+            noise.set_fractal_type(None);
+            noise.set_frequency(Some(1.0));
+            (noise, strength / sum)
+        };
+        let octaves = strengths.into_iter().zip(0..).map(octave).collect();
+        Self { octaves, amplitude: (params.amplitude / cell) as f32, step: cell / params.size }
     }
 
-    /// Outward displacement (cells) at a voxel, 0..=amplitude.
+    /// Outward displacement (cells) at a voxel of the world's lattice, 0..=amplitude.
+    ///
+    /// Voxels are whole numbers, and the noise takes the whole part of a place apart from its fraction, both from
+    /// 64 bits: the pattern is as fine 100 km from the origin as near it.
     fn at(&self, voxel: [i32; 3]) -> f32 {
-        let [x, y, z] = voxel.map(|index| (f64::from(index) * self.cell) as f32);
-        self.amplitude * self.noise.get_noise_3d(x, y, z).clamp(0.0, 1.0)
+        let mut place = voxel.map(|index| f64::from(index) * self.step);
+        let mut sum = 0.0;
+        for (noise, strength) in &self.octaves {
+            let [x, y, z] = place.map(|along| along - PERIOD * (along / PERIOD).round());
+            sum += noise.get_noise_3d(x, y, z) * strength;
+            place = place.map(|along| 2.0 * along);
+        }
+        self.amplitude * sum.clamp(0.0, 1.0)
     }
 
     /// Displaces pieces outward, then scales their values back to distances (first order).
@@ -139,14 +160,17 @@ pub fn displace(ctx: &Context, grid: &mut FloatGrid, params: &NoiseParams) -> Re
     params.validate(cell)?;
     let noise = Displacement::new(params, cell);
     let half_width = (f64::from(grid.background()) / cell) as f32;
-    // Rebuilt with a band that holds the displaced surface and still three cells around it.
-    let mesh = level_set::to_mesh(ctx, grid, 0.0, 0.0)?;
+    // Rebuilt with a band that holds the displaced surface and still three cells around it; from a mesh, whose places
+    // are 32-bit, and so near the world's origin.
+    let (near, moved) = near_origin(ctx, grid)?;
+    let mesh = level_set::to_mesh(ctx, near.as_ref().unwrap_or(grid), 0.0, 0.0)?;
     let settings = Settings { half_width: half_width + noise.amplitude.ceil(), ..Settings::new(cell) };
     let wide = crate::sweep::voxelise(ctx, mesh, &settings)?;
+    let back = |origin: Origin| [0, 1, 2].map(|axis| origin[axis] + moved[axis]);
     let mut pieces: Vec<Piece> = wide
         .leaves()?
         .iter()
-        .map(|leaf| Piece::Near(leaf.origin, Box::new(leaf.values.map(|value| value / cell as f32))))
+        .map(|leaf| Piece::Near(back(leaf.origin), Box::new(leaf.values.map(|value| value / cell as f32))))
         .collect();
     noise.apply(&mut pieces, half_width);
     let scale = Scale { cell: cell as f32, background: half_width * cell as f32 };
@@ -162,6 +186,26 @@ pub fn displace(ctx: &Context, grid: &mut FloatGrid, params: &NoiseParams) -> Re
     displaced.flood_fill()?;
     *grid = displaced;
     Ok(())
+}
+
+/// A level set of the world's lattice moved by whole blocks so that its middle lies at the origin, and the voxels that
+/// it was away from it; none where it need not be moved, or lies on another lattice.
+fn near_origin(ctx: &Context, grid: &FloatGrid) -> Result<(Option<FloatGrid>, [i32; 3])> {
+    let nothing = (None, [0; 3]);
+    let Some((low, high)) = grid.active_bbox().filter(|_| grid.is_world_fixed()) else { return Ok(nothing) };
+    let moved = [0, 1, 2].map(|axis| ((i64::from(low[axis]) + i64::from(high[axis])) / 2) as i32 & !7);
+    if moved == [0; 3] {
+        return Ok(nothing);
+    }
+    let cell = grid.voxel_size();
+    let mut near = FloatGrid::level_set(cell, (f64::from(grid.background()) / cell) as f32)?;
+    let leaf = |leaf: &Leaf<'_>| {
+        let origin = [0, 1, 2].map(|axis| leaf.origin[axis] - moved[axis]);
+        BlockEdit::Dense(Block { origin, values: Box::new(*leaf.values), mask: *leaf.mask })
+    };
+    near.replace_blocks(ctx, &grid.leaves()?.iter().map(leaf).collect::<Vec<_>>())?;
+    near.flood_fill()?;
+    Ok((Some(near), moved))
 }
 
 /// Divides each value by the field's steepness there, so that distances near the surface are true again.
@@ -235,20 +279,54 @@ mod tests {
         let mut noise = FastNoiseLite::with_seed(3);
         noise.set_noise_type(Some(NoiseType::Perlin));
         noise.set_frequency(Some(1.0));
-        let (mut steepest, step): (f32, f32) = (0.0, 1e-2);
+        let (mut steepest, step) = (0.0f32, 1e-2);
         for index in 0..400_000u32 {
             let at = [7919, 104_729, 1_299_709]
-                .map(|prime: u32| (index.wrapping_mul(prime) % 20_000) as f32 * 1e-3);
-            let sample = |d: [f32; 3]| noise.get_noise_3d(at[0] + d[0], at[1] + d[1], at[2] + d[2]);
+                .map(|prime: u32| f64::from(index.wrapping_mul(prime) % 20_000) * 1e-3);
+            let sample = |d: [f64; 3]| noise.get_noise_3d(at[0] + d[0], at[1] + d[1], at[2] + d[2]);
             let here = sample([0.0; 3]);
             let slope: f32 = [[step, 0.0, 0.0], [0.0, step, 0.0], [0.0, 0.0, step]]
-                .map(|d| ((sample(d) - here) / step).powi(2))
+                .map(|d| ((sample(d) - here) / step as f32).powi(2))
                 .iter()
                 .sum();
             steepest = steepest.max(slope.sqrt());
         }
         assert!(f64::from(steepest) < STEEPEST, "{steepest}");
         assert!(f64::from(steepest) > STEEPEST * 0.6, "the bound is far from tight: {steepest}");
+    }
+
+    /// Values along x at voxels around a place, of clumps of 100 cells: neighbours differ by little, and always.
+    fn line(at: i32) -> Vec<f32> {
+        let cell = 0.0075;
+        let params = NoiseParams { amplitude: 2.0 * cell, size: 100.0 * cell, octaves: 1, seed: 0 };
+        let noise = Displacement::new(&params, cell);
+        (0..20_000).map(|x| noise.at([at + x, 40, -at + 37])).collect()
+    }
+
+    #[test]
+    fn the_noise_is_as_smooth_far_away_as_near_the_origin() {
+        // 0, 1.2 km, 100 km and as far as voxels have numbers.
+        for at in [0, 160_000, 13_333_333, i32::MAX / 2, -i32::MAX / 2] {
+            let line = line(at);
+            let bent = line.windows(3).map(|v| (v[0] - 2.0 * v[1] + v[2]).abs());
+            let open = line.windows(3).map(|v| v.iter().all(|v| *v > 0.0));
+            let bend =
+                bent.zip(open).filter(|(_, open)| *open).fold(0.0, |most: f32, (bend, _)| most.max(bend));
+            assert!(bend < 0.005, "at {at} it bends by {bend} of a cell");
+            let still = line.windows(2).filter(|v| v[0] > 0.05 && v[0] == v[1]).count();
+            assert!(still < 20, "at {at}, {still} voxels have their neighbour's value");
+        }
+    }
+
+    #[test]
+    fn one_octave_has_the_whole_strength_and_octaves_share_it() {
+        let strengths = |octaves| {
+            let field = Displacement::new(&NoiseParams { octaves, ..NoiseParams::for_cell(0.01) }, 0.01);
+            field.octaves.iter().map(|octave| octave.1).collect::<Vec<f32>>()
+        };
+        assert_eq!(strengths(1), [1.0]);
+        let three = strengths(3);
+        assert!((three.iter().sum::<f32>() - 1.0).abs() < 1e-6 && three[1] == three[0] * 0.25, "{three:?}");
     }
 
     #[test]

@@ -1,0 +1,159 @@
+//! How a figure stands: its lowest parts, and how they move while they stand on the ground.
+//!
+//! A walk cycle usually walks in its place: its standing foot goes back under it. Carried at that speed the other way, the
+//! foot stays where it stands.
+
+use super::Motion;
+use crate::base::DVec3;
+use crate::error::Result;
+
+/// Poses a second of the motion that are looked at, and the least and greatest number of them.
+const RATE: f64 = 60.0;
+const POSES: (f64, f64) = (24.0, 240.0);
+/// Vertices that are posed at most, over all poses: a look must not take minutes.
+const MOST_VERTICES: f64 = 5e7;
+/// Part of a figure's height that standing parts may be above the lowest one of their pose, and that one above the level
+/// that so great a part of the poses reach down to: a toe that digs, or a jump, must not hide a walk.
+const STANDS: f64 = 0.015;
+const REACHED: f64 = 0.4;
+/// What rises or falls more than this part of its way along does not stand, but for this part of the above.
+const LEVEL: f64 = 0.25;
+const STILL: f64 = 0.1;
+/// Spread of the velocities that is steady, as a part of the speed: walks have up to 0.22, runs 0.45.
+const STEADY: f64 = 0.33;
+/// Part of the time that something must stand, or the motion is no gait.
+const LEAST_TIME: f64 = 0.2;
+
+/// How a motion's lowest parts move.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Gait {
+    /// Mean velocity of what stands (m/s, level): the median over the times at which something does.
+    pub velocity: DVec3,
+    /// How far the velocity at those times is from that (m/s): the median.
+    pub spread: f64,
+    /// Part of the time that something stands, 0..=1.
+    pub standing: f64,
+    /// y of the lowest place (m).
+    pub lowest: f64,
+    /// Greatest height of the figure (m).
+    pub height: f64,
+}
+
+impl Gait {
+    /// Whether standing parts move steadily enough, all one way, for one speed to carry the figure.
+    pub fn is_steady(&self) -> bool {
+        self.standing >= LEAST_TIME && self.spread <= STEADY * self.velocity.norm()
+    }
+
+    /// Velocity (m/s) that the figure must be carried at so that what stands stays where it is.
+    pub fn carry(&self) -> DVec3 {
+        -self.velocity
+    }
+}
+
+/// Looks at a motion (m, Y up) from one time to another (s); none where nothing stands for a while.
+///
+/// # Errors
+/// A pose that cannot be had.
+pub fn gait(motion: &dyn Motion, from: f64, to: f64) -> Result<Option<Gait>> {
+    let vertices = motion.vertex_count().max(1) as f64;
+    let most = (MOST_VERTICES / vertices).clamp(POSES.0, POSES.1);
+    let count = ((to - from) * RATE).ceil().clamp(POSES.0, most) as usize;
+    let step = (to - from) / count as f64;
+    if step.is_nan() || step <= 0.0 || motion.vertex_count() == 0 {
+        return Ok(None);
+    }
+    let mut pose = Vec::new();
+    let (mut lows, mut height) = (Vec::with_capacity(count + 1), 0.0f64);
+    for number in 0..=count {
+        motion.pose(from + step * number as f64, &mut pose)?;
+        let (low, high) = extent(&pose);
+        lows.push(low);
+        height = height.max(high - low);
+    }
+    let near = STANDS * height;
+    let level = part_of(lows.clone(), REACHED) + near;
+    let mut velocities = Vec::new();
+    let mut before = Vec::new();
+    motion.pose(from, &mut before)?;
+    for number in 1..=count {
+        motion.pose(from + step * number as f64, &mut pose)?;
+        let (low, lower) = (lows[number - 1], lows[number]);
+        let stands = |(p, q): &(&DVec3, &DVec3)| {
+            let way = *q - *p;
+            let along = DVec3::new(way.x, 0.0, way.z).norm();
+            p.y <= low + near && q.y <= lower + near && way.y.abs() <= (LEVEL * along).max(STILL * near)
+        };
+        if low.max(lower) <= level {
+            let standing = before.iter().zip(&pose).filter(stands);
+            let (sum, parts) = standing.fold((DVec3::zeros(), 0), |(sum, n), (p, q)| (sum + (q - p), n + 1));
+            if parts > 0 {
+                let mean = sum / (f64::from(parts) * step);
+                velocities.push(DVec3::new(mean.x, 0.0, mean.z));
+            }
+        }
+        std::mem::swap(&mut before, &mut pose);
+    }
+    let lowest = lows.into_iter().fold(f64::INFINITY, f64::min);
+    let standing = velocities.len() as f64 / count as f64;
+    if standing < LEAST_TIME {
+        return Ok(None);
+    }
+    let middle = |pick: fn(&DVec3) -> f64| part_of(velocities.iter().map(pick).collect(), 0.5);
+    let velocity = DVec3::new(middle(|v| v.x), 0.0, middle(|v| v.z));
+    let spread = part_of(velocities.iter().map(|v| (v - velocity).norm()).collect(), 0.5);
+    Ok(Some(Gait { velocity, spread, standing, lowest, height }))
+}
+
+fn extent(pose: &[DVec3]) -> (f64, f64) {
+    pose.iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), p| (low.min(p.y), high.max(p.y)))
+}
+
+/// The number that a part of some numbers is not above: the median for a half.
+fn part_of(mut values: Vec<f64>, part: f64) -> f64 {
+    values.sort_unstable_by(f64::total_cmp);
+    values.get((values.len() as f64 * part) as usize).copied().unwrap_or(0.0)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::base::{TriMesh, Vec3};
+    use crate::motion::{Key, Keys, Morph, Rigid};
+
+    /// A foot that stands for half a second while it goes back 0.6 m, then swings to where it was.
+    fn walk() -> Rigid {
+        let foot = TriMesh {
+            positions: vec![Vec3::zeros(), Vec3::new(0.1, 0.0, 0.3), Vec3::new(0.0, 1.7, 0.0)],
+            triangles: vec![[0, 1, 2]],
+        };
+        let key = |time: f64, y: f64, z: f64| Key { time, at: DVec3::new(0.0, y, z), turn: DVec3::zeros() };
+        let keys = vec![
+            key(0.0, 0.0, 0.3),
+            key(0.5, 0.0, -0.3),
+            key(0.6, 0.3, -0.1),
+            key(0.9, 0.3, 0.2),
+            key(1.0, 0.0, 0.3),
+        ];
+        Rigid::new(foot, Keys::new(keys).unwrap())
+    }
+
+    #[test]
+    fn a_foot_that_goes_back_asks_to_be_carried_forward() {
+        let gait = gait(&walk(), 0.0, 1.0).unwrap().unwrap();
+        assert!((gait.carry() - DVec3::z() * 1.2).norm() < 0.02, "{gait:?}");
+        assert!(gait.is_steady() && gait.lowest == 0.0 && (0.45..0.6).contains(&gait.standing), "{gait:?}");
+    }
+
+    #[test]
+    fn what_flies_or_rests_has_no_speed() {
+        let at = |y: f32| vec![Vec3::new(0.0, y, 0.0), Vec3::new(0.0, y + 1.0, 0.0), Vec3::new(1.0, y, 0.0)];
+        let mesh = TriMesh { positions: at(0.0), triangles: vec![[0, 1, 2]] };
+        let rises = Morph::new(mesh.clone(), at(5.0)).unwrap();
+        assert_eq!(gait(&rises, 0.0, 1.0).unwrap(), None);
+        let still = Rigid::new(mesh, Keys::default());
+        let found = gait(&still, 0.0, 1.0).unwrap().unwrap();
+        assert_eq!((found.velocity, found.standing), (DVec3::zeros(), 1.0));
+        assert_eq!(gait(&still, 1.0, 1.0).unwrap(), None);
+    }
+}

@@ -1,0 +1,75 @@
+//! Heights of the ground and of the snow's top, for `check`: what an object goes into.
+
+use super::Inputs;
+use crate::base::bvh::Bvh;
+use crate::base::{DVec3, TriMesh};
+use crate::snow::base_layer::initial::{Cover, Ground};
+
+/// The ground and the snow on it, as far as heights at a place are known before the layer is made.
+pub(super) struct Relief<'a> {
+    ground: Surface<'a>,
+    /// Depth of the snow above the ground (m), or its top.
+    snow: Snow<'a>,
+}
+
+enum Surface<'a> {
+    Plane { height: f64, area: [f64; 4] },
+    Mesh(Heights<'a>),
+}
+
+enum Snow<'a> {
+    Depth(f64),
+    Top(Heights<'a>),
+}
+
+/// Heights of a mesh seen from above.
+struct Heights<'a> {
+    mesh: &'a TriMesh,
+    tree: Bvh,
+    above: f64,
+}
+
+impl<'a> Heights<'a> {
+    fn new(mesh: &'a TriMesh) -> Self {
+        let above =
+            mesh.bounds().map_or(0.0, |(low, high)| f64::from(high.y) + f64::from((high - low).norm()) + 1.0);
+        Self { mesh, tree: Bvh::new(mesh), above }
+    }
+
+    fn at(&self, x: f64, z: f64) -> Option<f64> {
+        let hit = self.tree.ray(DVec3::new(x, self.above, z), -DVec3::y(), f64::INFINITY)?;
+        debug_assert!(hit.triangle < self.mesh.triangles.len());
+        Some(self.above - hit.distance)
+    }
+}
+
+impl<'a> Relief<'a> {
+    /// The relief of a scene; none when the snow is given as a level set.
+    pub fn new(inputs: &'a Inputs) -> Option<Self> {
+        let (ground, cover) = inputs.made()?;
+        let ground = match ground {
+            Ground::Plane { height, area } => Surface::Plane { height: *height, area: *area },
+            Ground::Mesh(mesh) => Surface::Mesh(Heights::new(mesh)),
+        };
+        let snow = match cover {
+            Cover::Depth(depth) => Snow::Depth(*depth),
+            Cover::Top(mesh) => Snow::Top(Heights::new(mesh)),
+        };
+        Some(Self { ground, snow })
+    }
+
+    /// Heights (m) of the ground and of the snow's top at a place; none beside them. Static objects are left out.
+    pub fn at(&self, x: f64, z: f64) -> Option<(f64, f64)> {
+        let ground = match &self.ground {
+            Surface::Plane { height, area: [x0, z0, x1, z1] } => {
+                ((*x0..=*x1).contains(&x) && (*z0..=*z1).contains(&z)).then_some(*height)?
+            }
+            Surface::Mesh(heights) => heights.at(x, z)?,
+        };
+        let top = match &self.snow {
+            Snow::Depth(depth) => ground + depth,
+            Snow::Top(heights) => heights.at(x, z)?,
+        };
+        Some((ground, top))
+    }
+}

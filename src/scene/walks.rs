@@ -1,0 +1,80 @@
+//! Whether a character's feet stand where they are put: its clip's own speed, and that of its keys.
+
+use serde::Serialize;
+
+use super::objects::is_character;
+use super::{Object, Scene};
+use crate::base::DVec3;
+use crate::error::Result;
+use crate::motion::{Character, Keys, Motion, Placed, Play, gait};
+
+/// Feet that slip slower than this (m/s), or than this part of their clip's speed, are let be.
+const SLOW: f64 = 0.05;
+const PART: f64 = 0.25;
+
+/// How a clip must be carried, and how it is.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Walk {
+    /// Velocity (m/s) that keeps its standing parts where they are, before any turn of the keys.
+    pub carry_m_per_s: [f64; 3],
+    /// How far that is in one round of the clip (m), and how long a round is (s).
+    pub stride_m: f64,
+    /// See [`Walk::stride_m`].
+    pub round_s: f64,
+    /// Part of the time that something stands.
+    pub standing: f64,
+    /// Speed (m/s) of what stands as the scene's keys carry it.
+    pub slips_m_per_s: f64,
+    /// Keys that carry it so, straight on from the scene's first key.
+    pub keys: String,
+    /// Whether the feet slip enough to tell.
+    pub slips: bool,
+}
+
+/// Looks at a character's clip; none for what has none, or stands nowhere for long, or too unevenly.
+///
+/// # Errors
+/// As [`Character::open`].
+pub(super) fn walk(scene: &Scene, object: &Object, moved: &dyn Motion) -> Result<Option<Walk>> {
+    if !is_character(&object.file) {
+        return Ok(None);
+    }
+    let play = Play { node: object.node.clone(), clip: object.clip.clone(), repeat: false, start: 0.0 };
+    let own = Character::open(&object.file, play)?;
+    let round = own.duration();
+    let own = Placed::new(Box::new(own), object.space, Keys::default());
+    let Some(own) = gait(&own, 0.0, round)?.filter(|gait| gait.is_steady()) else { return Ok(None) };
+    let (frames, fps) = (scene.shot.frames, scene.shot.fps);
+    let start = f64::from(frames.first) / fps;
+    let end = (start + round).min(f64::from(frames.last) / fps);
+    let Some(carried) = gait(moved, start, end)? else { return Ok(None) };
+    let (speed, slips) = (own.velocity.norm(), carried.velocity.norm());
+    Ok(Some(Walk {
+        carry_m_per_s: own.carry().into(),
+        stride_m: speed * round,
+        round_s: round,
+        standing: own.standing,
+        slips_m_per_s: slips,
+        keys: keys(scene, object, own.carry())?,
+        slips: slips > SLOW && slips > PART * speed,
+    }))
+}
+
+/// Keys at the first and last frame that carry a figure at a velocity (m/s, before the first key's turn).
+fn keys(scene: &Scene, object: &Object, carry: DVec3) -> Result<String> {
+    let (frames, fps) = (scene.shot.frames, scene.shot.fps);
+    let first = object.keys.first();
+    let (at, turn) = first.map_or(([0.0; 3], [0.0; 3]), |key| (key.at, key.turn_deg));
+    let turned =
+        crate::motion::Key { time: 0.0, at: DVec3::zeros(), turn: DVec3::from(turn.map(f64::to_radians)) };
+    let (rotation, _) = Keys::new(vec![turned])?.at(0.0);
+    let seconds = (f64::from(frames.last) - f64::from(frames.first)) / fps;
+    let last = DVec3::from(at) + rotation * carry * seconds;
+    let key = |frame: i32, at: DVec3| {
+        // Adding 0 makes -0 a 0.
+        let [x, y, z] = <[f64; 3]>::from(at.map(|v| (v * 1e4).round() / 1e4 + 0.0));
+        let turn = if turn == [0.0; 3] { String::new() } else { format!(", turn_deg = {turn:?}") };
+        format!("{{ frame = {frame}, at = [{x}, {y}, {z}]{turn} }}")
+    };
+    Ok(format!("keys = [{}, {}]", key(frames.first, at.into()), key(frames.last, last)))
+}
