@@ -6,6 +6,8 @@ mod bytes;
 mod capi;
 #[path = "../tests/common/mod.rs"]
 mod common;
+#[path = "gates/damage.rs"]
+mod damage;
 #[path = "gates/harness.rs"]
 mod harness;
 #[path = "gates/oracle.rs"]
@@ -32,6 +34,7 @@ fn main() {
     match first.as_deref() {
         Some(speed::PEAK) => return speed::print_peak(),
         Some(bytes::HASH) => return bytes::print_hash(),
+        Some(damage::FUZZ) => return damage::read_mutated(),
         _ => {}
     }
     let mut h = Harness::from_arguments();
@@ -42,5 +45,6 @@ fn main() {
     readers::run(&mut h);
     shot::run(&mut h);
     capi::run(&mut h);
+    damage::run(&mut h);
     h.finish();
 }

@@ -59,6 +59,7 @@ pub fn run(args: &Args, session: &Session) -> Result<(), Failure> {
         return Err(Failure::refused(what));
     }
     output::check_writable(&args.output).before()?;
+    args.tell_losses(frames.first()).before()?;
     for frame in frames.iter() {
         session.ctx.check().during()?;
         let path = pattern.as_ref().map_or_else(|| args.output.clone(), |pattern| pattern.path(frame));
@@ -73,6 +74,14 @@ fn extension(path: &Path) -> String {
     path.extension().and_then(|text| text.to_str()).unwrap_or("").to_lowercase()
 }
 
+/// "UVs, normals and materials".
+fn listed(names: &[&str]) -> String {
+    match names {
+        [first @ .., last] if !first.is_empty() => format!("{} and {last}", first.join(", ")),
+        _ => names.concat(),
+    }
+}
+
 fn check_output(path: &Path) -> Result<(), Failure> {
     let extension = extension(path);
     if extension == "usda" || io::mesh::EXTENSIONS.contains(&extension.as_str()) {
@@ -82,6 +91,20 @@ fn check_output(path: &Path) -> Result<(), Failure> {
 }
 
 impl Args {
+    /// Says what the input holds that no output of ours does.
+    fn tell_losses(&self, frame: i32) -> frazil::Result<()> {
+        let one =
+            Pattern::parse(&self.input).map_or_else(|| self.input.clone(), |pattern| pattern.path(frame));
+        let lost = match extension(&one).as_str() {
+            "glb" | "gltf" => Character::extras(&one)?,
+            _ => io::extras::of(&one)?,
+        };
+        if !lost.is_empty() {
+            log::warn!("{}: {} are not carried over", one.display(), listed(&lost));
+        }
+        Ok(())
+    }
+
     /// What is converted, in metres with Y up, and at which frames.
     fn motion(&self) -> Result<(Box<dyn Motion>, FrameChoice), Failure> {
         let is_character = matches!(extension(&self.input).as_str(), "glb" | "gltf");

@@ -6,6 +6,7 @@ use super::output;
 use super::signals::Signals;
 use frazil::context::peak_memory;
 use frazil::sweep::surface_bytes;
+use frazil::vdb::guard::{self, Guard};
 use frazil::{Context, Error, Pool};
 use serde_json::{Map, Value, json};
 use std::path::PathBuf;
@@ -53,6 +54,14 @@ impl Session {
         let ctx = Context::new(pool.before()?);
         let signals = Signals::install(ctx.cancel_flag())
             .map_err(|error| Failure::refused(format!("cannot install signal handlers: {error}")))?;
+        frazil::io::source::stop_when(ctx.cancel_flag());
+        guard::install(Guard {
+            // The program as it runs, even if its file was replaced meanwhile.
+            program: "/proc/self/exe".into(),
+            memory: globals.max_memory.bytes(),
+            threads: ctx.pool().threads(),
+            cancel: ctx.cancel_flag(),
+        });
         if let Some(path) = &globals.report {
             output::check_writable(path).before()?;
         }
@@ -102,7 +111,8 @@ impl Session {
     fn write_report(&self, path: &std::path::Path) -> frazil::Result<()> {
         let stages: Vec<Value> = self.ctx.take_timings().iter().map(stage_json).collect();
         let mut report = self.results.lock().expect("nobody panics with this lock").clone();
-        let arguments: Vec<String> = std::env::args().skip(1).collect();
+        let arguments: Vec<String> =
+            std::env::args_os().skip(1).map(|word| word.to_string_lossy().into_owned()).collect();
         report.insert("arguments".into(), json!(arguments));
         report.insert("version".into(), json!(env!("CARGO_PKG_VERSION")));
         report.insert("threads".into(), json!(self.ctx.pool().threads()));
@@ -130,7 +140,8 @@ fn start_log(globals: &Globals) {
         .filter_level(level)
         .format(|out, record| {
             use std::io::Write;
-            writeln!(out, "frazil: {}: {}", record.level().as_str().to_lowercase(), record.args())
+            let text = frazil::error::visible(&record.args().to_string()).replace('\n', " ");
+            writeln!(out, "frazil: {}: {text}", record.level().as_str().to_lowercase())
         })
         .init();
 }
