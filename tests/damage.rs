@@ -17,6 +17,7 @@ use std::process::{Command, Output, Stdio};
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 
+use frazil::base::blocks::{Block, BlockEdit};
 use frazil::vdb::file::{Compression, WriteOptions};
 use frazil::vdb::guard::Guard;
 use frazil::vdb::{FloatGrid, MetaValue, file, layout, level_set};
@@ -74,11 +75,15 @@ fn known_breakers_of_openvdb_are_refused_in_a_sentence() {
             let start = Instant::now();
             let output = on(folder.path(), command, &path, after);
             assert!(start.elapsed() < Duration::from_secs(30), "{name}: {:?}", start.elapsed());
-            told(&output, 2, &[name]);
+            // Damage of what a command does not read is not seen by it.
+            if !output.status.success() {
+                told(&output, 2, &[name]);
+            }
             if name.starts_with("trunc") {
                 told(&output, 2, &["cut short"]);
             }
         }
+        assert!(guard().read(&path).is_err(), "{name}");
         if name.starts_with("trunc") {
             let bytes = fs::read(&path).unwrap();
             assert!(layout::read(std::io::Cursor::new(bytes)).is_err(), "{name}");
@@ -168,9 +173,42 @@ fn a_program_that_is_not_frazil_is_named() {
         let error = guard.describe(&path).unwrap_err().to_string();
         assert!(error.contains(word), "{error}");
     }
+}
+
+#[test]
+fn a_file_that_needs_more_memory_than_it_may_is_refused() {
+    let ctx = Context::new(Pool::new(1).unwrap());
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("large.vdb");
+    let mut grid = FloatGrid::new(0.1, 0.0).unwrap();
+    let block =
+        |i: i32| Block { origin: [i % 400 * 8, i / 400 * 8, 0], values: Box::new([1.5; 512]), mask: [1; 8] };
+    grid.replace_blocks(&ctx, &(0..60_000).map(|i| BlockEdit::Dense(block(i))).collect::<Vec<_>>()).unwrap();
+    file::write(&path, &[&grid], &WriteOptions::default()).unwrap();
+    assert_eq!(guard().read_named(&path, None).unwrap().leaf_count(), 60_000);
     let guard = Guard { memory: 1 << 20, ..guard() };
     let error = guard.read_named(&path, None).err().unwrap().to_string();
     assert!(error.contains("memory"), "{error}");
+}
+
+#[test]
+fn a_cancel_ends_a_decoder_that_hangs() {
+    use std::os::unix::fs::PermissionsExt;
+    let ctx = Context::new(Pool::new(1).unwrap());
+    let folder = tempfile::tempdir().unwrap();
+    let (path, program) = (folder.path().join("ball.vdb"), folder.path().join("program"));
+    file::write(&path, &[&ball(&ctx)], &WriteOptions::default()).unwrap();
+    fs::write(&program, "#!/bin/sh\nexec sleep 100\n").unwrap();
+    fs::set_permissions(&program, fs::Permissions::from_mode(0o755)).unwrap();
+    let guard = Guard { program, ..guard() };
+    let cancel = guard.cancel.clone();
+    let start = Instant::now();
+    std::thread::spawn(move || {
+        std::thread::sleep(Duration::from_millis(300));
+        cancel.store(true, std::sync::atomic::Ordering::Relaxed);
+    });
+    assert!(matches!(guard.describe(&path), Err(frazil::Error::Cancelled)));
+    assert!(start.elapsed() < Duration::from_secs(1), "{:?}", start.elapsed());
 }
 
 #[test]
@@ -204,12 +242,6 @@ fn interrupted(folder: &Path, arguments: &str, path: &Path, after: Duration) -> 
 #[test]
 fn a_signal_is_answered_while_a_file_is_read() {
     let folder = tempfile::tempdir().unwrap();
-    if let Some(path) = outside("broken/vdb_hang_240.vdb") {
-        let (output, waited) =
-            interrupted(folder.path(), "info --measure", &path, Duration::from_millis(700));
-        assert!(waited < Duration::from_secs(1), "{waited:?}");
-        told(&output, 143, &["terminated"]);
-    }
     let path = folder.path().join("large.obj");
     let mut text = String::new();
     (0..6_000_000).for_each(|i| text += &format!("v {i} 0 0\n"));
@@ -287,14 +319,17 @@ fn numbers_without_data_take_no_memory() {
     let folder = tempfile::tempdir().unwrap();
     let data: Vec<u8> = vec![0; 36];
     fs::write(folder.path().join("a.bin"), data).unwrap();
+    let sparse = r#""sparse":{"count":1,"indices":{"bufferView":0,"componentType":5125},"values":{"bufferView":0}},"#;
     let without_view =
-        model("a.bin").replace("\"bufferView\":0,", "").replace("\"count\":3", "\"count\":268435456");
+        model("a.bin").replacen("\"bufferView\":0,", sparse, 1).replace("\"count\":3", "\"count\":268435456");
     let one_on_another = model("a.bin")
         .replace("\"byteLength\":36}],\"buffers\"", "\"byteLength\":36,\"byteStride\":4}],\"buffers\"")
         .replace("\"count\":3", "\"count\":7");
     for text in [without_view, one_on_another] {
         fs::write(folder.path().join("model.gltf"), text).unwrap();
-        fails(folder.path(), "info model.gltf", 2, &["model.gltf", "accessor 0"]);
+        let start = Instant::now();
+        fails(folder.path(), "info model.gltf", 2, &["model.gltf", "accessor"]);
+        assert!(start.elapsed() < Duration::from_secs(2), "{:?}", start.elapsed());
     }
     let animated = model("a.bin").replace(
         "\"accessors\"",
@@ -372,7 +407,6 @@ fn names_out_of_files_do_not_command_a_terminal() {
 
 #[test]
 fn a_stray_leaf_far_away_costs_no_memory() {
-    use frazil::base::blocks::{Block, BlockEdit};
     use frazil::snow::base_layer::{BaseLayer, Params};
     let ctx = Context::new(Pool::new(2).unwrap());
     let solid = level_set::from_mesh(&ctx, &shapes::cuboid([2.0, 0.5, 2.0]), 0.02, 3.0).unwrap();

@@ -49,7 +49,11 @@ impl std::io::Read for Stoppable<'_> {
 /// begins, which would open it, and refuses a comment behind a face.
 fn geometry(bytes: &[u8]) -> Vec<u8> {
     let mut kept = Vec::with_capacity(bytes.len());
-    for line in bytes.split(|&byte| byte == b'\n') {
+    for (number, line) in bytes.split(|&byte| byte == b'\n').enumerate() {
+        // The reader behind this one stops too.
+        if number % PIECE == 0 && source::is_stopped() {
+            break;
+        }
         let line = line.split(|&byte| byte == b'#').next().unwrap_or(line).trim_ascii();
         let word = line.split(u8::is_ascii_whitespace).next().unwrap_or(line);
         if matches!(word, b"v" | b"vt" | b"vn" | b"f") {

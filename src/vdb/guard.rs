@@ -188,8 +188,10 @@ impl Guard {
 
     /// Why a child left no parcel.
     fn fall(&self, path: &Path, status: Option<ExitStatus>, words: &str, limits: Limits) -> Error {
-        const CPU_TIME: i32 = 24;
+        const ENDED: [i32; 3] = [1, 2, 15];
         const KILLED: i32 = 9;
+        const CPU_TIME: i32 = 24;
+        const FILE_SIZE: i32 = 25;
         let memory = ["bad_alloc", "memory allocation of", "Cannot allocate memory", "No space left"];
         if memory.iter().any(|text| words.contains(text)) {
             let what = format!(
@@ -199,12 +201,17 @@ impl Guard {
             return Error::file(path, what);
         }
         let signal = status.and_then(|status| status.signal());
+        // Ctrl-C reaches every process of a terminal.
+        if signal.is_some_and(|signal| ENDED.contains(&signal)) {
+            return Error::Cancelled;
+        }
         Error::file(
             path,
             match signal {
                 Some(CPU_TIME | KILLED) => {
                     format!("the .vdb file is damaged: decoding it does not end within {} s", limits.seconds)
                 }
+                Some(FILE_SIZE) => "decoding it takes larger files than `ulimit -f` allows".to_string(),
                 Some(_) => "the .vdb file is damaged: decoding it makes OpenVDB crash".to_string(),
                 None => format!(
                     "cannot be decoded by {}, which is no frazil of version {}",
