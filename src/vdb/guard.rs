@@ -195,7 +195,7 @@ impl Guard {
         let memory = ["bad_alloc", "memory allocation of", "Cannot allocate memory", "No space left"];
         if memory.iter().any(|text| words.contains(text)) {
             let what = format!(
-                "the .vdb file is damaged, or needs more than the {} MB that decoding it may take",
+                "the .vdb file is damaged, or needs more memory than the {} MB that decoding it may take",
                 limits.memory >> 20
             );
             return Error::file(path, what);

@@ -290,7 +290,7 @@ mod tests {
     fn offsets_that_contradict_each_other_are_refused() {
         let bytes = file(224, true);
         let at = bytes.len() - 50 - 24;
-        for (offset, value) in [(0, 0i64), (0, i64::MAX), (8, 1), (16, -1), (16, i64::MAX), (16, 200)] {
+        for (offset, value) in [(0, 0i64), (0, i64::MAX), (8, 1), (16, -1), (16, i64::MAX), (16, 10)] {
             let mut wrong = bytes.clone();
             wrong[at + offset..at + offset + 8].copy_from_slice(&value.to_le_bytes());
             assert!(matches!(read(Cursor::new(wrong)), Err(Fault::Content(_))), "{offset} {value}");
