@@ -351,7 +351,7 @@ fn cut(h: &mut Harness) {
 
 fn child_cost(h: &mut Harness) {
     let ctx = context(2);
-    let layer = scenes::snow(&ctx, 6.6, 0.005, scenes::EXACT);
+    let layer = scenes::snow(&ctx, 3.1, 0.005, scenes::EXACT);
     let mut surface = layer.surface().deep_copy().expect("a copy");
     // A layer as it is after some steps does not pack as well as a flat one.
     let mut dice = Dice::new(7);
