@@ -21,16 +21,16 @@ static frz_grid *two_blocks(frz_context *ctx, float values[2][512]) {
     return grid;
 }
 
-static char bytes[1 << 16];
+static char content[1 << 16];
 
 /* Writes the first part of what was read, with one byte changed. */
 static void damage(size_t length, size_t at, char byte) {
     FILE *file = fopen("damaged.vdb", "wb");
-    const char kept = bytes[at];
+    const char kept = content[at];
     CHECK(file != NULL);
-    bytes[at] = byte;
-    CHECK(fwrite(bytes, 1, length, file) == length);
-    bytes[at] = kept;
+    content[at] = byte;
+    CHECK(fwrite(content, 1, length, file) == length);
+    content[at] = kept;
     CHECK(fclose(file) == 0);
 }
 
@@ -56,14 +56,14 @@ int main(void) {
 
     file = fopen("guarded.vdb", "rb");
     CHECK(file != NULL);
-    length = fread(bytes, 1, sizeof bytes, file);
+    length = fread(content, 1, sizeof content, file);
     fclose(file);
-    damage(length / 2, 0, bytes[0]);
+    damage(length / 2, 0, content[0]);
     FAILS(frz_grid_load_guarded(ctx, FRAZIL_PROGRAM, "damaged.vdb", NULL, &back), FRZ_ERROR_FILE, "cut short");
     /* Whatever one byte does to OpenVDB, this program goes on. */
     for (count = 150; count < length; count += length / 24) {
         frz_status status;
-        damage(length, count, (char)(bytes[count] ^ 0x55));
+        damage(length, count, (char)(content[count] ^ 0x55));
         status = frz_grid_load_guarded(ctx, FRAZIL_PROGRAM, "damaged.vdb", NULL, &back);
         CHECK(status == FRZ_OK || status == FRZ_ERROR_FILE);
         frz_grid_destroy(back);
