@@ -3,7 +3,8 @@
 use std::path::{Path, PathBuf};
 
 /// Sources, one for each group of heavy templates, compiled in parallel.
-const SOURCES: [&str; 6] = ["grid.cc", "file.cc", "csg.cc", "filters.cc", "meshing.cc", "particles.cc"];
+const SOURCES: [&str; 7] =
+    ["grid.cc", "file.cc", "parts.cc", "csg.cc", "filters.cc", "meshing.cc", "particles.cc"];
 
 fn main() {
     println!("cargo:rerun-if-env-changed=OPENVDB_ROOT");

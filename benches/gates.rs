@@ -8,6 +8,8 @@ mod cancel;
 mod capi;
 #[path = "../tests/common/mod.rs"]
 mod common;
+#[path = "gates/damage.rs"]
+mod damage;
 #[path = "gates/far.rs"]
 mod far;
 #[path = "gates/flip.rs"]
@@ -38,6 +40,7 @@ fn main() {
     match first.as_deref() {
         Some(speed::PEAK) => return speed::print_peak(),
         Some(bytes::HASH) => return bytes::print_hash(),
+        Some(damage::FUZZ) => return damage::read_mutated(),
         _ => {}
     }
     let mut h = Harness::from_arguments();
@@ -51,5 +54,6 @@ fn main() {
     cancel::run(&mut h);
     flip::run(&mut h);
     far::run(&mut h);
+    damage::run(&mut h);
     h.finish();
 }

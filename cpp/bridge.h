@@ -37,6 +37,7 @@ struct LeafView;
 struct Meta;
 struct GridHeader;
 struct Call;
+struct Tile;
 struct Triangles;
 struct Part;
 struct Hit;
@@ -74,8 +75,12 @@ rust::Vec<uint64_t> components(const Grid& grid, const Call& call);
 std::unique_ptr<std::string> grids_to_bytes(rust::Slice<const size_t> grids, int32_t compression, bool half,
                                             const rust::Vec<Meta>& meta);
 rust::Vec<GridHeader> describe_file(rust::Str path);
+rust::Vec<GridHeader> describe_bytes(rust::Slice<const uint8_t> bytes);
 std::unique_ptr<Grid> read_float_grid(rust::Str path, rust::Str name);
 std::unique_ptr<Grid> float_grid_from_bytes(rust::Slice<const uint8_t> bytes, rust::Str name);
+std::unique_ptr<std::string> grid_head(const Grid& grid);
+rust::Vec<Tile> tiles(const Grid& grid);
+std::unique_ptr<Grid> assemble(rust::Slice<const uint8_t> head, float background, rust::Slice<const Tile> tiles);
 void end_workers() noexcept;
 
 void csg(Grid& a, Grid& b, const Call& call, int32_t operation);

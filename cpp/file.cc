@@ -145,6 +145,41 @@ protected:
     }
 };
 
+/// All grids of a file's bytes.
+openvdb::GridPtrVecPtr streamed(rust::Slice<const uint8_t> bytes) {
+    initialise();
+    View view(bytes);
+    std::istream in(&view);
+    // Bytes that are cut short end the reading at once: OpenVDB would unpack what was never read.
+    in.exceptions(std::ios_base::failbit | std::ios_base::badbit);
+    return openvdb::io::Stream(in, /*delayLoad=*/false).getGrids();
+}
+
+rust::Vec<GridHeader> describe(const openvdb::GridPtrVec& grids) {
+    rust::Vec<GridHeader> out;
+    for (const auto& grid : grids) {
+        GridHeader header;
+        header.name = rust::String::lossy(grid->getName());
+        header.value_type = grid->type();
+        header.class_name = openvdb::GridBase::gridClassToString(grid->getGridClass());
+        header.voxel = grid->voxelSize()[0];
+        header.active = count_of(*grid, openvdb::GridBase::META_FILE_VOXEL_COUNT);
+        header.memory = count_of(*grid, openvdb::GridBase::META_FILE_MEM_BYTES);
+        const auto low = grid->getMetadata<openvdb::Vec3IMetadata>(openvdb::GridBase::META_FILE_BBOX_MIN);
+        const auto high = grid->getMetadata<openvdb::Vec3IMetadata>(openvdb::GridBase::META_FILE_BBOX_MAX);
+        for (int axis = 0; axis < 3; ++axis) {
+            header.low[axis] = low ? low->value()[axis] : 0;
+            header.high[axis] = high ? high->value()[axis] : -1;
+        }
+        header.half = grid->saveFloatAsHalf();
+        const auto codec = grid->getMetadata<openvdb::StringMetadata>(openvdb::GridBase::META_FILE_COMPRESSION);
+        header.compression = codec ? codec->value() : std::string();
+        header.meta = list(*grid);
+        out.push_back(std::move(header));
+    }
+    return out;
+}
+
 }  // namespace
 
 rust::Vec<Meta> metadata(const Grid& grid) { return list(*grid.impl->grid); }
@@ -185,31 +220,12 @@ std::unique_ptr<std::string> grids_to_bytes(rust::Slice<const size_t> grids, int
 rust::Vec<GridHeader> describe_file(rust::Str path) {
     openvdb::io::File file{std::string(path)};
     open(file);
-    rust::Vec<GridHeader> out;
-    const auto grids = file.readAllGridMetadata();
-    for (const auto& grid : *grids) {
-        GridHeader header;
-        header.name = rust::String::lossy(grid->getName());
-        header.value_type = grid->type();
-        header.class_name = openvdb::GridBase::gridClassToString(grid->getGridClass());
-        header.voxel = grid->voxelSize()[0];
-        header.active = count_of(*grid, openvdb::GridBase::META_FILE_VOXEL_COUNT);
-        header.memory = count_of(*grid, openvdb::GridBase::META_FILE_MEM_BYTES);
-        const auto low = grid->getMetadata<openvdb::Vec3IMetadata>(openvdb::GridBase::META_FILE_BBOX_MIN);
-        const auto high = grid->getMetadata<openvdb::Vec3IMetadata>(openvdb::GridBase::META_FILE_BBOX_MAX);
-        for (int axis = 0; axis < 3; ++axis) {
-            header.low[axis] = low ? low->value()[axis] : 0;
-            header.high[axis] = high ? high->value()[axis] : -1;
-        }
-        header.half = grid->saveFloatAsHalf();
-        const auto codec = grid->getMetadata<openvdb::StringMetadata>(openvdb::GridBase::META_FILE_COMPRESSION);
-        header.compression = codec ? codec->value() : std::string();
-        header.meta = list(*grid);
-        out.push_back(std::move(header));
-    }
+    const auto headers = describe(*file.readAllGridMetadata());
     file.close();
-    return out;
+    return headers;
 }
+
+rust::Vec<GridHeader> describe_bytes(rust::Slice<const uint8_t> bytes) { return describe(*streamed(bytes)); }
 
 std::unique_ptr<Grid> read_float_grid(rust::Str path, rust::Str name) {
     openvdb::io::File file{std::string(path)};
@@ -220,13 +236,7 @@ std::unique_ptr<Grid> read_float_grid(rust::Str path, rust::Str name) {
 }
 
 std::unique_ptr<Grid> float_grid_from_bytes(rust::Slice<const uint8_t> bytes, rust::Str name) {
-    initialise();
-    View view(bytes);
-    std::istream in(&view);
-    // Bytes that are cut short end the reading at once: OpenVDB would unpack what was never read.
-    in.exceptions(std::ios_base::failbit | std::ios_base::badbit);
-    openvdb::io::Stream stream(in, /*delayLoad=*/false);
-    const auto grids = stream.getGrids();
+    const auto grids = streamed(bytes);
     openvdb::GridBase::Ptr found;
     std::string there;
     for (const auto& grid : *grids) {

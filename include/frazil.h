@@ -1293,6 +1293,28 @@ frz_status frz_grid_to_bytes(frz_context *context,
                              size_t *size);
 
 /**
+ * Reads a grid of floats from a .vdb file that may be damaged, as frz_grid_load does, but in another process.
+ *
+ * OpenVDB does not survive every kind of damage: a file with a flipped bit can crash frz_grid_load, and the host with
+ * it, or never end. Here the frazil program reads the file, within a limit of time and memory that goes by the file's
+ * size and the context's memory limit, and hands the grid over in shared memory. Reading takes some 10 % longer, and
+ * 20 to 50 ms to start the program. A crash, a loop without end or a hunger for memory is FRZ_ERROR_FILE. A cancel is
+ * heeded within 10 ms.
+ *
+ * program: UTF-8; the frazil program, of this library's version. FRZ_ERROR_IO when it cannot be started.
+ * path: UTF-8.
+ * name: as in frz_grid_load.
+ * out: receives the grid, to be destroyed with frz_grid_destroy; NULL after a failure.
+ *
+ * One thread at a time for each context.
+ */
+frz_status frz_grid_load_guarded(frz_context *context,
+                                 const char *program,
+                                 const char *path,
+                                 const char *name,
+                                 frz_grid **out);
+
+/**
  * Makes a level set of the solid that a mesh bounds: points that its faces wind around.
  *
  * The mesh may be open (open loops are closed), cross itself, and have faces that are doubled or reversed.

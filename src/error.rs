@@ -58,7 +58,7 @@ pub type Result<T> = std::result::Result<T, Error>;
 impl Error {
     /// A file whose content cannot be used.
     pub fn file(path: impl AsRef<Path>, what: impl Into<String>) -> Self {
-        Self::File { path: path.as_ref().to_path_buf(), what: what.into() }
+        Self::File { path: path.as_ref().to_path_buf(), what: visible(&what.into()) }
     }
 
     /// A file operation that the operating system refused.
@@ -70,6 +70,28 @@ impl Error {
     pub fn argument(what: impl Into<String>) -> Self {
         Self::Argument(what.into())
     }
+}
+
+/// Letters of a text from outside that a message repeats.
+const LONGEST: usize = 400;
+
+/// A text from outside on one line, cut when it is long, that a terminal shows as it is.
+pub fn one_line(text: &str) -> String {
+    let cut: String = text.chars().take(LONGEST).collect();
+    visible(&cut).split_whitespace().collect::<Vec<_>>().join(" ")
+}
+
+/// A text that a terminal shows as it is: other control characters than line ends become spaces.
+pub fn visible(text: &str) -> String {
+    let letter = |letter: char| if letter != '\n' && is_obeyed(letter) { ' ' } else { letter };
+    text.chars().map(letter).collect()
+}
+
+/// Whether a terminal obeys a character instead of showing it, or changes what is around it.
+fn is_obeyed(letter: char) -> bool {
+    let turns =
+        ['\u{200b}'..='\u{200f}', '\u{2028}'..='\u{202e}', '\u{2060}'..='\u{2069}', '\u{feff}'..='\u{feff}'];
+    letter.is_control() || turns.iter().any(|range| range.contains(&letter))
 }
 
 /// The system's reason without Rust's "(os error 2)" tail.

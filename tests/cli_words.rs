@@ -16,7 +16,7 @@ fn convert_says_what_it_leaves_out() {
     fs::write(folder.path().join("rich.obj"), format!("vt 0 0\nusemtl wood\n{CUBE}")).unwrap();
     assert_eq!(works(folder.path(), "convert plain.obj plain.ply"), "");
     let said = works(folder.path(), "convert rich.obj rich.ply");
-    assert!(said.contains("rich.obj: texture coordinates and materials are left out"), "{said}");
+    assert!(said.contains("rich.obj: UVs and materials are not carried over"), "{said}");
     assert_eq!(works(folder.path(), "convert rich.obj rich.ply -q"), "");
 }
 

@@ -3,6 +3,7 @@
 pub mod blocks;
 pub mod bvh;
 pub mod cpu;
+mod ears;
 pub mod faults;
 pub mod mesh;
 pub mod polygons;

@@ -1,5 +1,6 @@
 //! Meshes of polygons, and their triangles.
 
+use super::ears::{self, turn};
 use super::mesh::validate;
 use super::{DVec3, TriMesh, Vec3};
 use crate::error::Result;
@@ -73,16 +74,7 @@ impl PolygonMesh {
         if (0..count).all(|i| turn(flat[(i + count - 1) % count], flat[i], flat[(i + 1) % count]) >= 0.0) {
             return out.extend(fan());
         }
-        let mut left: Vec<usize> = (0..count).collect();
-        while left.len() > 3 {
-            // A polygon that crosses itself may have no ear: the corner that comes nearest to one then goes.
-            let ear =
-                (0..left.len()).find(|&at| is_ear(&flat, &left, at)).unwrap_or_else(|| widest(&flat, &left));
-            let [before, _, after] = around(&left, ear);
-            out.push([before, left[ear], after].map(|i| polygon[i]));
-            left.remove(ear);
-        }
-        out.push([left[0], left[1], left[2]].map(|i| polygon[i]));
+        out.extend(ears::triangles(&flat).into_iter().map(|triangle| triangle.map(|i| polygon[i])));
     }
 }
 
@@ -99,31 +91,6 @@ fn flattened(places: &[DVec3]) -> Vec<[f64; 2]> {
     let across = normal.cross(&DVec3::ith(least, 1.0)).normalize();
     let up = normal.cross(&across);
     places.iter().map(|p| [(p - places[0]).dot(&across), (p - places[0]).dot(&up)]).collect()
-}
-
-/// Twice the area of a triangle, positive when it is counter-clockwise.
-fn turn(a: [f64; 2], b: [f64; 2], c: [f64; 2]) -> f64 {
-    (b[0] - a[0]) * (c[1] - a[1]) - (b[1] - a[1]) * (c[0] - a[0])
-}
-
-/// The corners before, at and after a place.
-fn around(left: &[usize], at: usize) -> [usize; 3] {
-    [left[(at + left.len() - 1) % left.len()], left[at], left[(at + 1) % left.len()]]
-}
-
-fn is_ear(flat: &[[f64; 2]], left: &[usize], at: usize) -> bool {
-    let [a, b, c] = around(left, at).map(|i| flat[i]);
-    let holds = |p: [f64; 2]| turn(a, b, p) >= 0.0 && turn(b, c, p) >= 0.0 && turn(c, a, p) >= 0.0;
-    let others = left.iter().map(|&i| flat[i]).filter(|p| ![a, b, c].contains(p));
-    turn(a, b, c) > 0.0 && !others.into_iter().any(holds)
-}
-
-fn widest(flat: &[[f64; 2]], left: &[usize]) -> usize {
-    let area = |at: usize| {
-        let [a, b, c] = around(left, at).map(|i| flat[i]);
-        turn(a, b, c)
-    };
-    (1..left.len()).fold(0, |best, at| if area(at) > area(best) { at } else { best })
 }
 
 #[cfg(test)]
@@ -162,6 +129,61 @@ mod tests {
                 .sum();
             assert!((area.norm() - mesh.area()).abs() < 1e-6, "from {start}: {area} and {}", mesh.area());
         }
+    }
+
+    /// A star of so many corners, every other one nearer to the centre, in a turned plane.
+    fn star(count: usize) -> PolygonMesh {
+        let corner = |i: usize| {
+            let (angle, radius) = (i as f64 / count as f64 * std::f64::consts::TAU, [1.0, 0.6][i % 2]);
+            [(radius * angle.cos()) as f32, (radius * angle.sin()) as f32]
+        };
+        flat(&(0..count).map(corner).collect::<Vec<_>>())
+    }
+
+    /// A wall that winds inward and back out: whatever is cut, long thin triangles are left.
+    fn spiral(count: usize) -> PolygonMesh {
+        let half = count / 2;
+        let corner = |i: usize| {
+            let (along, thick) = if i < half { (i, 0.0) } else { (count - 1 - i, 0.4) };
+            let part = along as f64 / half as f64;
+            let (angle, radius) = (part * 200.0, 100.0 - part * 95.0 + thick);
+            [(radius * angle.cos()) as f32, (radius * angle.sin()) as f32]
+        };
+        flat(&(0..count).map(corner).collect::<Vec<_>>())
+    }
+
+    #[test]
+    fn a_face_of_a_hundred_thousand_corners_takes_no_time() {
+        for (name, polygon) in [("star", star(100_000)), ("spiral", spiral(100_000))] {
+            let start = std::time::Instant::now();
+            let mesh = polygon.into_triangles();
+            assert_eq!(mesh.triangles.len(), 99_998);
+            let seconds = start.elapsed().as_secs_f64();
+            assert!(seconds < 10.0, "{name}: {seconds} s");
+            let area: DVec3 = (0..mesh.triangles.len())
+                .map(|t| mesh.corners(t))
+                .map(|[a, b, c]| (b - a).cross(&(c - a)) / 2.0)
+                .sum();
+            assert!(
+                (area.norm() / mesh.area() - 1.0).abs() < 1e-4,
+                "{name}: {} of {}",
+                area.norm(),
+                mesh.area()
+            );
+        }
+    }
+
+    #[test]
+    fn a_face_that_crosses_itself_everywhere_takes_no_time() {
+        let mut at = 1u32;
+        let mut random = || {
+            at = at.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
+            (at >> 8) as f32
+        };
+        let tangle: Vec<[f32; 2]> = (0..100_000).map(|_| [random(), random()]).collect();
+        let start = std::time::Instant::now();
+        assert_eq!(flat(&tangle).triangles().len(), 99_998);
+        assert!(start.elapsed().as_secs_f64() < 10.0);
     }
 
     #[test]

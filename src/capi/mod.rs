@@ -34,6 +34,8 @@ pub mod grid_sample;
 
 #[cfg(feature = "vdb")]
 pub mod grid_bytes;
+#[cfg(feature = "vdb")]
+pub mod grid_guarded;
 
 #[cfg(feature = "vdb")]
 pub mod body;

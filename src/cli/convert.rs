@@ -9,7 +9,6 @@ use frazil::motion::{Character, Keys, MeshSequence, Motion, Placed, Play, Rigid}
 use frazil::scene::{FrameChoice, Frames};
 use serde_json::json;
 
-use super::dropped::dropped;
 use super::exit::{Failure, Phase};
 use super::options::{Axis, MeshSpace, positive};
 use super::output;
@@ -68,11 +67,7 @@ pub fn run(args: &Args, session: &Session) -> Result<(), Failure> {
         let inputs = [read(frame), read(frame.saturating_add(1))];
         output::refuse_input(&path, inputs.iter().map(PathBuf::as_path)).before()?;
     }
-    let first = Pattern::parse(&args.input)
-        .map_or_else(|| args.input.clone(), |pattern| pattern.path(frames.first()));
-    if let Some(what) = dropped(&first) {
-        log::warn!("{}: {what} are left out: only places and faces are kept", args.input.display());
-    }
+    args.tell_losses(frames.first()).before()?;
     for frame in frames.iter() {
         session.ctx.check().during()?;
         let path = pattern.as_ref().map_or_else(|| args.output.clone(), |pattern| pattern.path(frame));
@@ -87,6 +82,14 @@ fn extension(path: &Path) -> String {
     path.extension().and_then(|text| text.to_str()).unwrap_or("").to_lowercase()
 }
 
+/// "UVs, normals and materials".
+fn listed(names: &[&str]) -> String {
+    match names {
+        [first @ .., last] if !first.is_empty() => format!("{} and {last}", first.join(", ")),
+        _ => names.concat(),
+    }
+}
+
 fn check_output(path: &Path) -> Result<(), Failure> {
     let extension = extension(path);
     if extension == "usda" || io::mesh::EXTENSIONS.contains(&extension.as_str()) {
@@ -96,6 +99,20 @@ fn check_output(path: &Path) -> Result<(), Failure> {
 }
 
 impl Args {
+    /// Says what the input holds that no output of ours does.
+    fn tell_losses(&self, frame: i32) -> frazil::Result<()> {
+        let one =
+            Pattern::parse(&self.input).map_or_else(|| self.input.clone(), |pattern| pattern.path(frame));
+        let lost = match extension(&one).as_str() {
+            "glb" | "gltf" => Character::extras(&one)?,
+            _ => io::extras::of(&one)?,
+        };
+        if !lost.is_empty() {
+            log::warn!("{}: {} are not carried over", one.display(), listed(&lost));
+        }
+        Ok(())
+    }
+
     /// What is converted, in metres with Y up, and at which frames.
     fn motion(&self) -> Result<(Box<dyn Motion>, FrameChoice), Failure> {
         let is_character = matches!(extension(&self.input).as_str(), "glb" | "gltf");

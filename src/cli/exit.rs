@@ -59,6 +59,7 @@ impl<T> Phase<T> for frazil::Result<T> {
 
 /// One sentence on stderr, whatever line breaks its parts had.
 pub fn say_error(message: &str) {
+    let message = frazil::error::visible(message);
     let sentence: Vec<&str> = message.split_whitespace().collect();
     // Nobody is left to tell when stderr is closed.
     let _ = writeln!(std::io::stderr(), "frazil: {}", sentence.join(" "));

@@ -2,7 +2,6 @@
 
 mod check;
 mod convert;
-mod dropped;
 mod exit;
 mod info;
 mod machine;
@@ -67,6 +66,9 @@ impl Command {
 
 /// Runs the program; nothing that a user can do makes it panic or print a trace.
 pub fn run() -> ExitCode {
+    if let Some(code) = frazil::vdb::guard::serve(std::env::args_os().skip(1)) {
+        return code.into();
+    }
     exit::install_panic_hook();
     let ended = std::panic::catch_unwind(|| {
         let cli = match Cli::try_parse() {

@@ -7,7 +7,8 @@ use std::path::Path;
 /// Prints text on stdout; a reader that closed the pipe has seen enough.
 pub fn print(text: &str) -> Result<()> {
     let mut stdout = std::io::stdout().lock();
-    match stdout.write_all(text.as_bytes()).and_then(|()| stdout.flush()) {
+    // Names out of files must not command a terminal.
+    match stdout.write_all(frazil::error::visible(text).as_bytes()).and_then(|()| stdout.flush()) {
         Err(error) if error.kind() == std::io::ErrorKind::BrokenPipe => Ok(()),
         Err(error) => Err(Error::io("stdout", "write", error)),
         Ok(()) => Ok(()),

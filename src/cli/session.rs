@@ -6,6 +6,7 @@ use super::output;
 use super::signals::Signals;
 use frazil::context::peak_memory;
 use frazil::sweep::surface_bytes;
+use frazil::vdb::guard::{self, Guard};
 use frazil::{Context, Error, Pool};
 use serde_json::{Map, Value, json};
 use std::path::PathBuf;
@@ -53,6 +54,15 @@ impl Session {
         let ctx = Context::new(pool.before()?);
         let signals = Signals::install(ctx.cancel_flags())
             .map_err(|error| Failure::refused(format!("cannot install signal handlers: {error}")))?;
+        let [asked, _] = ctx.cancel_flags();
+        frazil::io::source::stop_when(asked.clone());
+        guard::install(Guard {
+            // The program as it runs, even if its file was replaced meanwhile.
+            program: "/proc/self/exe".into(),
+            memory: globals.max_memory.bytes(),
+            threads: ctx.pool().threads(),
+            cancel: asked,
+        });
         if let Some(path) = &globals.report {
             output::check_report(path).before()?;
         }
@@ -132,7 +142,8 @@ fn start_log(globals: &Globals) {
         .filter_level(level)
         .format(|out, record| {
             use std::io::Write;
-            writeln!(out, "frazil: {}: {}", record.level().as_str().to_lowercase(), record.args())
+            let text = frazil::error::visible(&record.args().to_string()).replace('\n', " ");
+            writeln!(out, "frazil: {}: {text}", record.level().as_str().to_lowercase())
         })
         .init();
 }

@@ -142,6 +142,11 @@ impl Context {
         self.memory_limit.store(bytes, Ordering::Relaxed);
     }
 
+    /// How much memory (bytes) an object made with this context may need.
+    pub fn memory_limit(&self) -> u64 {
+        self.memory_limit.load(Ordering::Relaxed)
+    }
+
     /// Asks for memory before it is taken.
     ///
     /// # Errors

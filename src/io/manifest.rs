@@ -30,6 +30,21 @@ pub enum Keeps {
     State,
 }
 
+/// Whether a file is one of a shot's, with the content that its frame's record names; reads it.
+pub fn knows(path: &Path) -> bool {
+    let of_record = || {
+        let path = std::path::absolute(path).ok()?;
+        let (kind, folder) = (path.parent()?.file_name()?.to_str()?, path.parent()?.parent()?);
+        let name = path.file_name()?.to_str()?;
+        let frame = name.split('.').rev().find_map(|part| part.parse::<i32>().ok())?;
+        // The stage that all files of today are of.
+        let manifest = Manifest::read(folder, "base", frame).ok()??;
+        let relative = format!("{kind}/{name}");
+        Some(manifest.files.iter().any(|file| file.path == relative && file.is_whole(folder)))
+    };
+    of_record().unwrap_or(false)
+}
+
 /// What a frame was made from, and its files.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Manifest {

@@ -2,7 +2,8 @@
 
 use std::path::Path;
 
-use super::{atomic, obj, ply, stl};
+use super::caught::caught;
+use super::{atomic, obj, ply, source, stl};
 use crate::base::{PolygonMesh, TriMesh, Vec3};
 use crate::error::{Error, Result};
 
@@ -22,8 +23,7 @@ pub fn read(path: &Path) -> Result<TriMesh> {
 /// # Errors
 /// As [`read`].
 pub fn read_polygons(path: &Path) -> Result<PolygonMesh> {
-    let bytes = std::fs::read(path).map_err(|error| Error::io(path, "read", error))?;
-    parse_polygons(path, &bytes)
+    parse_polygons(path, &source::read(path)?)
 }
 
 /// As [`read_polygons`], from the bytes of the file.
@@ -34,7 +34,7 @@ pub fn parse_polygons(path: &Path, bytes: &[u8]) -> Result<PolygonMesh> {
     if bytes.is_empty() {
         return Err(Error::file(path, "the file is empty"));
     }
-    let mesh = match extension(path).as_str() {
+    let parse = || match extension(path).as_str() {
         "obj" => obj::parse(bytes),
         "ply" => ply::parse(bytes),
         "stl" => stl::parse(bytes),
@@ -43,7 +43,7 @@ pub fn parse_polygons(path: &Path, bytes: &[u8]) -> Result<PolygonMesh> {
             EXTENSIONS.map(|e| format!(".{e}")).join(", ")
         )),
     };
-    let mesh = mesh.map_err(|what| Error::file(path, what))?;
+    let mesh = caught(path, || parse().map_err(|what| Error::file(path, what)))?;
     mesh.validate().map_err(|error| Error::file(path, error.to_string()))?;
     Ok(mesh)
 }

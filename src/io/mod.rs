@@ -1,6 +1,8 @@
 //! Files that are not .vdb.
 
 pub mod atomic;
+pub mod caught;
+pub mod extras;
 pub mod hash;
 pub mod manifest;
 pub mod mesh;
@@ -9,5 +11,6 @@ mod ply;
 pub mod sealed;
 pub mod seen;
 pub mod sequence;
+pub mod source;
 mod stl;
 pub mod usd;

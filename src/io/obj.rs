@@ -2,14 +2,24 @@
 
 use std::io::Write;
 
+use super::source;
 use crate::base::{PolygonMesh, TriMesh, Vec3};
+use crate::error::one_line;
+
+/// Lines between two looks at whether to stop.
+const PIECE: usize = 1 << 14;
+/// Letters of a word that a message repeats.
+const LONGEST_WORD: usize = 40;
+/// What some programs put before the first line of a text in UTF-8.
+const BYTE_ORDER_MARK: &[u8] = b"\xef\xbb\xbf";
 
 /// Reads positions and faces.
 pub(super) fn parse(bytes: &[u8]) -> Result<PolygonMesh, String> {
+    let bytes = bytes.strip_prefix(BYTE_ORDER_MARK).unwrap_or(bytes);
     check_numbers(bytes)?;
     let options = tobj::LoadOptions { ignore_points: true, ignore_lines: true, ..Default::default() };
     let geometry = geometry(bytes);
-    let mut reader = std::io::BufReader::new(geometry.as_slice());
+    let mut reader = std::io::BufReader::new(Stoppable(geometry.as_slice()));
     let no_materials = |_: &std::path::Path| Ok((Vec::new(), Default::default()));
     let (models, _) = tobj::load_obj_buf(&mut reader, &options, no_materials)
         .map_err(|error| format!("the .obj file cannot be read ({error})"))?;
@@ -26,11 +36,24 @@ pub(super) fn parse(bytes: &[u8]) -> Result<PolygonMesh, String> {
     Ok(mesh)
 }
 
+/// Bytes whose reader fails once it is to stop.
+struct Stoppable<'a>(&'a [u8]);
+
+impl std::io::Read for Stoppable<'_> {
+    fn read(&mut self, out: &mut [u8]) -> std::io::Result<usize> {
+        if source::is_stopped() { Err(std::io::Error::other("stopped")) } else { self.0.read(out) }
+    }
+}
+
 /// The lines of vertices and faces without comments: tobj doubles the vertices of a mesh wherever a group or a material
 /// begins, which would open it, and refuses a comment behind a face.
 fn geometry(bytes: &[u8]) -> Vec<u8> {
     let mut kept = Vec::with_capacity(bytes.len());
-    for line in bytes.split(|&byte| byte == b'\n') {
+    for (number, line) in bytes.split(|&byte| byte == b'\n').enumerate() {
+        // The reader behind this one stops too.
+        if number % PIECE == 0 && source::is_stopped() {
+            break;
+        }
         let line = line.split(|&byte| byte == b'#').next().unwrap_or(line).trim_ascii();
         let word = line.split(u8::is_ascii_whitespace).next().unwrap_or(line);
         if matches!(word, b"v" | b"vt" | b"vn" | b"f") {
@@ -41,11 +64,19 @@ fn geometry(bytes: &[u8]) -> Vec<u8> {
     kept
 }
 
-/// Finds what tobj would pass over or report without a line: bad numbers, vertices out of range.
+/// Finds what tobj would pass over or report without a line: bad numbers, vertices out of range. Other lines may be of
+/// any encoding.
 fn check_numbers(bytes: &[u8]) -> Result<(), String> {
-    let text = std::str::from_utf8(bytes).map_err(|_| "the .obj file is not text".to_string())?;
     let mut vertices = 0i64;
-    for (number, line) in text.lines().enumerate() {
+    for (number, line) in bytes.split(|&byte| byte == b'\n').enumerate() {
+        if number % PIECE == 0 && source::is_stopped() {
+            return Err("stopped".into());
+        }
+        let line = line.trim_ascii();
+        if !matches!(line.first(), Some(b'v' | b'f')) {
+            continue;
+        }
+        let line = String::from_utf8_lossy(line);
         let mut words = line.split_whitespace();
         match words.next() {
             Some("v") => {
@@ -62,8 +93,9 @@ fn check_numbers(bytes: &[u8]) -> Result<(), String> {
                         index.is_some_and(|i| (1..=vertices).contains(&i) || (-vertices..=-1).contains(&i));
                     if !known {
                         return Err(format!(
-                            "line {}: the face names vertex {word}, but there are {vertices} before it",
-                            number + 1
+                            "line {}: the face names vertex {}, but there are {vertices} before it",
+                            number + 1,
+                            one_line(&word.chars().take(LONGEST_WORD).collect::<String>())
                         ));
                     }
                 }

@@ -2,7 +2,11 @@
 
 use std::io::Write;
 
+use super::source;
 use crate::base::{PolygonMesh, TriMesh, Vec3};
+
+/// Rows between two looks at whether to stop.
+const PIECE: usize = 1 << 14;
 
 #[derive(Clone, Copy, PartialEq)]
 enum Format {
@@ -41,8 +45,12 @@ pub(super) fn parse(bytes: &[u8]) -> Result<PolygonMesh, String> {
     check_coordinates(&elements)?;
     let mut reader = Reader { format, bytes: &bytes[body..], at: 0 };
     let mut mesh = PolygonMesh::default();
-    for element in &elements {
+    // An element without properties has no rows in the file, however many it says.
+    for element in elements.iter().filter(|element| !element.properties.is_empty()) {
         for row in 0..element.count {
+            if row % PIECE == 0 && source::is_stopped() {
+                return Err("stopped".into());
+            }
             let place = format_args!("{} {} of {}", element.name, row + 1, element.count);
             read_row(&mut reader, element, &mut mesh).map_err(|fault| match fault {
                 Fault::End => format!("the .ply file ends in {place}"),

@@ -17,7 +17,7 @@ impl Seen {
     /// # Errors
     /// What the operating system reports; other bytes than an earlier look at this file found.
     pub fn read(&self, path: &Path) -> Result<Vec<u8>> {
-        let bytes = std::fs::read(path).map_err(|error| Error::io(path, "read", error))?;
+        let bytes = super::source::read(path)?;
         self.note(path, hash::of_bytes(&bytes))?;
         Ok(bytes)
     }

@@ -3,8 +3,11 @@
 use std::collections::HashMap;
 use std::io::{Cursor, Write};
 
+use super::source;
 use crate::base::{PolygonMesh, TriMesh, Vec3};
 
+/// Triangles between two looks at whether to stop.
+const PIECE: usize = 1 << 14;
 /// Bytes of a binary file before its triangles, and of each of them.
 const HEADER: usize = 84;
 const TRIANGLE: usize = 50;
@@ -31,6 +34,9 @@ pub(super) fn parse(bytes: &[u8]) -> Result<PolygonMesh, String> {
     let mut mesh = PolygonMesh::default();
     let mut known: HashMap<[u32; 3], u32> = HashMap::new();
     for (number, triangle) in triangles.enumerate() {
+        if number % PIECE == 0 && source::is_stopped() {
+            return Err("stopped".into());
+        }
         let triangle =
             triangle.map_err(|error| format!("triangle {} cannot be read ({error})", number + 1))?;
         let corners = triangle.vertices.map(|vertex| {

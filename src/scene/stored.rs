@@ -212,7 +212,7 @@ pub(super) fn state_path(folder: &Path, frame: i32) -> PathBuf {
 }
 
 fn read_grids(path: &Path) -> Result<Grids> {
-    Grids::from_named(file::read(path)?).map_err(|error| match error {
+    Grids::from_named(file::read_own(path)?).map_err(|error| match error {
         Error::Argument(what) => Error::file(path, what),
         other => other,
     })

@@ -40,6 +40,17 @@ pub(super) mod ffi {
         meta: Vec<Meta>,
     }
 
+    /// A value above the leaves.
+    struct Tile {
+        x: i32,
+        y: i32,
+        z: i32,
+        /// 1 for a place of 8 voxels along an edge, 2 for 128, 3 for 4096.
+        level: u32,
+        active: bool,
+        value: f32,
+    }
+
     /// Threads and cancel flag of a call.
     struct Call {
         threads: i32,
@@ -115,9 +126,16 @@ pub(super) mod ffi {
             meta: &Vec<Meta>,
         ) -> Result<UniquePtr<CxxString>>;
         fn describe_file(path: &str) -> Result<Vec<GridHeader>>;
+        fn describe_bytes(bytes: &[u8]) -> Result<Vec<GridHeader>>;
         fn read_float_grid(path: &str, name: &str) -> Result<UniquePtr<Grid>>;
         /// An empty name stands for the first level set, else the first float grid.
         fn float_grid_from_bytes(bytes: &[u8], name: &str) -> Result<UniquePtr<Grid>>;
+        /// Transform and metadata, in OpenVDB's own coding.
+        fn grid_head(grid: &Grid) -> Result<UniquePtr<CxxString>>;
+        /// Every value above the leaves that is not an inactive background.
+        fn tiles(grid: &Grid) -> Result<Vec<Tile>>;
+        /// A grid without leaves.
+        fn assemble(head: &[u8], background: f32, tiles: &[Tile]) -> Result<UniquePtr<Grid>>;
         /// Ends TBB's worker threads, unless somebody else uses them.
         fn end_workers();
 

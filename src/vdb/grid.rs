@@ -45,6 +45,19 @@ pub struct FloatGrid {
     pub(super) inner: UniquePtr<ffi::Grid>,
 }
 
+/// One value for a cube of voxels, larger than a leaf or in the place of one.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Tile {
+    /// Least corner, in voxels.
+    pub origin: Origin,
+    /// Voxels along an edge: 8, 128 or 4096.
+    pub edge: i32,
+    /// The value.
+    pub value: f32,
+    /// Whether it is active.
+    pub active: bool,
+}
+
 /// Blocks with their memory, ready to be put into a grid.
 pub struct Ready(UniquePtr<ffi::Blocks>);
 
@@ -228,6 +241,21 @@ impl FloatGrid {
         let views = ffi::leaves(&self.inner).map_err(fail)?;
         // SAFETY: the views are of this grid, which stays borrowed mutably; each leaf occurs once.
         Ok(views.iter().map(|view| unsafe { lend_mut(view, PhantomData) }).collect())
+    }
+
+    /// Every value above the leaves, but where a grid says its background and nothing else.
+    ///
+    /// # Errors
+    /// When memory runs out.
+    pub fn tiles(&self) -> Result<Vec<Tile>> {
+        const EDGES: [i32; 4] = [1, 8, 128, 4096];
+        let tile = |tile: ffi::Tile| Tile {
+            origin: [tile.x, tile.y, tile.z],
+            edge: EDGES[(tile.level as usize).min(3)],
+            value: tile.value,
+            active: tile.active,
+        };
+        Ok(ffi::tiles(&self.inner).map_err(fail)?.into_iter().map(tile).collect())
     }
 
     /// What lies at the given block origins (multiples of 8); nothing is copied.

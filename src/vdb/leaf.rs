@@ -16,6 +16,20 @@ pub struct Leaf<'a> {
     pub mask: &'a Mask,
 }
 
+impl<'a> Leaf<'a> {
+    /// Its values as they lie in memory.
+    pub(super) fn value_bytes(&self) -> &'a [u8] {
+        // SAFETY: every byte of a float can be read; the array stays borrowed.
+        unsafe { std::slice::from_raw_parts(self.values.as_ptr().cast(), size_of::<Values>()) }
+    }
+
+    /// Its mask as it lies in memory.
+    pub(super) fn mask_bytes(&self) -> &'a [u8] {
+        // SAFETY: every byte of a whole number can be read; the array stays borrowed.
+        unsafe { std::slice::from_raw_parts(self.mask.as_ptr().cast(), size_of::<Mask>()) }
+    }
+}
+
 /// A leaf to change; no two of them share memory.
 pub struct LeafMut<'a> {
     /// Least corner, in voxels.

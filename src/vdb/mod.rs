@@ -4,13 +4,19 @@
 //! (i, j, k) has its centre at (i, j, k) x voxel size, unless a file brings another transform.
 
 mod bridge;
+mod child;
+mod decode;
 pub mod file;
 mod grid;
+pub mod guard;
+pub mod layout;
 mod leaf;
 pub mod level_set;
+mod mapping;
+mod parcel;
 pub mod ray;
 
-pub use grid::{FloatGrid, GridClass, MetaValue, Ready};
+pub use grid::{FloatGrid, GridClass, MetaValue, Ready, Tile};
 pub use leaf::{Leaf, LeafMut, Probe};
 
 use crate::context::{Context, Running};

@@ -6,13 +6,15 @@ use gltf::accessor::{DataType, Dimensions};
 use gltf::json::validation::Checked;
 use gltf::{Accessor, Document};
 
-use crate::error::{Error, Result};
+use super::uri;
+use crate::error::{Error, Result, one_line};
 use crate::io::hash::Hasher;
+use crate::io::source;
 
 /// A parsed file with its binary data.
 pub(super) struct File {
     pub document: Document,
-    buffers: Vec<gltf::buffer::Data>,
+    buffers: Vec<Vec<u8>>,
     /// Hash of the file and of its buffers.
     pub content: String,
 }
@@ -24,7 +26,7 @@ impl File {
     /// A file that is missing, cut short or malformed; a buffer that is missing (named); an extension that is
     /// required and unknown.
     pub fn open(path: &Path) -> Result<Self> {
-        let bytes = std::fs::read(path).map_err(|error| Error::io(path, "read", error))?;
+        let bytes = source::read(path)?;
         check_length(&bytes).map_err(|what| Error::file(path, what))?;
         let (document, blob) =
             parse(&bytes).map_err(|error| Error::file(path, format!("not a whole glTF file ({error})")))?;
@@ -40,12 +42,13 @@ impl File {
         let mut blob = blob;
         let buffers = document.buffers().map(|buffer| {
             let name = match buffer.source() {
-                gltf::buffer::Source::Uri(uri) if !uri.starts_with("data:") => format!("\"{uri}\""),
+                gltf::buffer::Source::Uri(uri) if !uri.starts_with("data:") => {
+                    format!("\"{}\"", one_line(uri))
+                }
                 _ => (buffer.index() + 1).to_string(),
             };
             let wrong = |what: String| Error::file(path, format!("buffer {name} {what}"));
-            let data = gltf::buffer::Data::from_source_and_blob(buffer.source(), Some(folder), &mut blob)
-                .map_err(|error| wrong(format!("cannot be read ({error})")))?;
+            let data = uri::read(&buffer, folder, &mut blob)?.map_err(wrong)?;
             if data.len() < buffer.length() {
                 return Err(wrong(format!("has {} bytes, not {}", data.len(), buffer.length())));
             }
@@ -85,8 +88,8 @@ impl File {
                 .into_iter()
                 .map(row)
                 .collect(),
-            // A count without data must not ask for memory beyond reason.
-            None if accessor.count() > 1 << 28 => return Err(beyond()),
+            // Zeros that no data stands for: as many as there are vertices, and each of those has bytes somewhere.
+            None if accessor.count() > self.buffers.iter().map(Vec::len).sum() => return Err(beyond()),
             None => vec![[0.0; N]; accessor.count()],
         };
         if let Some(sparse) = accessor.sparse() {
@@ -133,11 +136,16 @@ impl File {
         count: usize,
         kind: DataType,
     ) -> Option<Vec<[f64; N]>> {
-        if count == 0 {
+        // Nothing is made of the numbers once readers are to stop.
+        if count == 0 || source::is_stopped() {
             return Some(Vec::new());
         }
         let size = kind.size();
         let stride = view.stride().unwrap_or(size * N);
+        // Rows that overlap could be any number of them.
+        if stride < size * N {
+            return None;
+        }
         let buffer = self.buffers.get(view.buffer().index())?;
         let data = buffer.get(view.offset()..view.offset().checked_add(view.length())?)?;
         let length = stride.checked_mul(count - 1)?.checked_add(size * N)?;
@@ -160,7 +168,7 @@ impl File {
 
 /// Reads the JSON and checks that what it names is there.
 fn parse(bytes: &[u8]) -> std::result::Result<(Document, Option<Vec<u8>>), String> {
-    let said = |error: gltf::Error| error.to_string();
+    let said = |error: gltf::Error| one_line(&error.to_string());
     let gltf::Gltf { document, blob } = gltf::Gltf::from_slice_without_validation(bytes).map_err(said)?;
     let mut root = document.into_json();
     // The check below looks at the bounds of positions before it knows that they are there, and insists on them;
@@ -171,6 +179,7 @@ fn parse(bytes: &[u8]) -> std::result::Result<(Document, Option<Vec<u8>>), Strin
         accessor.min = Some(vec![0.0; 3].into());
         accessor.max = Some(vec![0.0; 3].into());
     }
+    let (nodes, accessors) = (root.nodes.len(), root.accessors.len());
     for animation in &mut root.animations {
         // Extensions animate other properties than a node's: they move no vertex.
         animation.channels.retain(|channel| matches!(channel.target.path, Checked::Valid(_)));
@@ -178,6 +187,19 @@ fn parse(bytes: &[u8]) -> std::result::Result<(Document, Option<Vec<u8>>), Strin
         if animation.channels.iter().any(|channel| channel.sampler.value() >= samplers) {
             return Err("a channel names no sampler".into());
         }
+        if animation.channels.iter().any(|channel| channel.target.node.value() >= nodes) {
+            return Err("a channel names no node".into());
+        }
+        let keys = animation.samplers.iter().flat_map(|sampler| [sampler.input, sampler.output]);
+        if keys.into_iter().any(|accessor| accessor.value() >= accessors) {
+            return Err("the sampler of an animation names no accessor".into());
+        }
+    }
+    let targets =
+        root.meshes.iter().flat_map(|mesh| &mesh.primitives).flat_map(|p| p.targets.iter().flatten());
+    let mut named = targets.flat_map(|target| [target.positions, target.normals, target.tangents]).flatten();
+    if named.any(|accessor| accessor.value() >= accessors) {
+        return Err("a morph target names no accessor".into());
     }
     Ok((Document::from_json(root).map_err(said)?, blob))
 }
@@ -191,6 +213,10 @@ fn check_length(bytes: &[u8]) -> std::result::Result<(), String> {
         let told = bytes.get(8..12).map(|b| u32::from_le_bytes([b[0], b[1], b[2], b[3]]) as usize);
         if told.is_none_or(|told| bytes.len() < told) {
             return Err(format!("the .glb file is cut short at {} bytes", bytes.len()));
+        }
+        // A header of 12 bytes, and one of 8 for the JSON that must follow.
+        if told.is_some_and(|told| told < 20) {
+            return Err("the .glb file is damaged: it says that it is shorter than its own header".into());
         }
     }
     Ok(())

@@ -7,12 +7,14 @@ mod clip;
 mod file;
 mod nodes;
 mod skin;
+mod uri;
 
 use std::path::Path;
 
 use super::Motion;
 use crate::base::{DVec3, TriMesh};
 use crate::error::{Error, Result};
+use crate::io::caught::caught;
 use clip::{Clip, JUMP};
 use file::File;
 use nodes::Node;
@@ -80,6 +82,10 @@ impl Character {
     /// A file that is cut short, malformed, or names a buffer that is not there; a clip or node that does not
     /// exist (those that do are named); several clips and none chosen; no triangles.
     pub fn open(path: &Path, play: Play) -> Result<Self> {
+        caught(path, || Self::read(path, play))
+    }
+
+    fn read(path: &Path, play: Play) -> Result<Self> {
         let file = File::open(path)?;
         let wrong = |what: String| Error::file(path, what);
         let nodes = nodes::read(&file.document);
@@ -109,6 +115,10 @@ impl Character {
     /// # Errors
     /// A file that is cut short or malformed; a clip whose keys are.
     pub fn describe(path: &Path) -> Result<Contents> {
+        caught(path, || Self::contents(path))
+    }
+
+    fn contents(path: &Path) -> Result<Contents> {
         let file = File::open(path)?;
         let wrong = |what: String| Error::file(path, what);
         let clips = clip_names(&file).into_iter().zip(file.document.animations()).map(|(name, animation)| {
@@ -135,6 +145,27 @@ impl Character {
         character.pose(time, &mut pose)?;
         let positions = pose.iter().map(|place| place.cast()).collect();
         Ok(TriMesh { positions, triangles: character.vertices.triangles })
+    }
+
+    /// Names of what a file holds besides places, triangles and motion, in the plural: "UVs", "materials" ...
+    ///
+    /// # Errors
+    /// A file that is cut short or malformed.
+    pub fn extras(path: &Path) -> Result<Vec<&'static str>> {
+        caught(path, || {
+            let document = File::open(path)?.document;
+            let has = |wanted: fn(&gltf::Semantic) -> bool| {
+                let mut parts = document.meshes().flat_map(|mesh| mesh.primitives());
+                parts.any(|part| part.attributes().any(|(name, _)| wanted(&name)))
+            };
+            let there = [
+                (has(|name| matches!(name, gltf::Semantic::TexCoords(_))), "UVs"),
+                (has(|name| matches!(name, gltf::Semantic::Normals)), "normals"),
+                (has(|name| matches!(name, gltf::Semantic::Colors(_))), "colours"),
+                (document.materials().next().is_some(), "materials"),
+            ];
+            Ok(there.into_iter().filter(|(there, _)| *there).map(|(_, name)| name).collect())
+        })
     }
 
     /// The meshes of a file in their pose at rest (the file's unit).

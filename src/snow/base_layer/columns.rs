@@ -8,7 +8,7 @@ use std::collections::{BTreeSet, HashMap, HashSet};
 
 use rayon::prelude::*;
 
-use crate::base::blocks::{Origin, VOXELS, Values};
+use crate::base::blocks::{Origin, Values};
 use crate::error::Result;
 use crate::vdb::{FloatGrid, Probe};
 
@@ -127,8 +127,8 @@ pub fn touched(initial: &FloatGrid, changed: &HashSet<Origin>, low: i32, high: i
         .collect()
 }
 
-/// Volume of a level set's solid (m3): filled parts of cells, summed leaf by leaf in the tree's order.
-/// Blocks without a leaf are looked up between two voxels.
+/// Volume of a level set's solid (m3): filled parts of cells, summed leaf by leaf in the tree's order, and whole blocks
+/// without a leaf inside it, as far as they lie in the blocks from one voxel to another.
 pub fn volume(surface: &FloatGrid, low: [i32; 3], high: [i32; 3]) -> Result<f64> {
     let cell = surface.voxel_size() as f32;
     let leaves = surface.leaves()?;
@@ -137,15 +137,14 @@ pub fn volume(surface: &FloatGrid, low: [i32; 3], high: [i32; 3]) -> Result<f64>
         .map(|leaf| leaf.values.iter().map(|&value| f64::from(filled(value, cell))).sum())
         .collect();
     let mut cells: f64 = parts.iter().sum();
-    let [bx, by, bz] = [0, 1, 2].map(|axis| low[axis].div_euclid(8)..=high[axis].div_euclid(8));
-    for x in bx {
-        let origins: Vec<Origin> =
-            by.clone().flat_map(|y| bz.clone().map(move |z| [x * 8, y * 8, z * 8])).collect();
-        for probe in surface.probe(&origins)? {
-            if matches!(probe, Probe::Tile { value, .. } if value < 0.0) {
-                cells += VOXELS as f64;
-            }
-        }
+    // The blocks of a box around a stray leaf can be too many to look at one by one: the tree's own tiles are few.
+    for tile in surface.tiles()?.iter().filter(|tile| tile.value < 0.0) {
+        let along = |axis: usize| {
+            let (begin, end) = (i64::from(low[axis]) & !7, (i64::from(high[axis]) & !7) + 8);
+            let own = i64::from(tile.origin[axis]);
+            (end.min(own + i64::from(tile.edge)) - begin.max(own)).max(0) as f64
+        };
+        cells += along(0) * along(1) * along(2);
     }
     Ok(cells * surface.voxel_size().powi(3))
 }

@@ -1,0 +1,51 @@
+//! The last resort of readers: a panic in code of others becomes an error.
+
+use std::cell::Cell;
+use std::panic::{AssertUnwindSafe, catch_unwind};
+use std::path::Path;
+use std::sync::Once;
+
+use super::source;
+use crate::error::{Error, Result};
+
+thread_local! {
+    static DEPTH: Cell<u32> = const { Cell::new(0) };
+}
+
+/// Reads a file with code that may panic at damage that nobody thought of.
+///
+/// # Errors
+/// What `read` returns; for a panic, that the file is damaged; [`Error::Cancelled`] once readers are to stop.
+pub fn caught<T>(path: &Path, read: impl FnOnce() -> Result<T>) -> Result<T> {
+    keep_quiet();
+    DEPTH.set(DEPTH.get() + 1);
+    let outcome = catch_unwind(AssertUnwindSafe(read));
+    DEPTH.set(DEPTH.get() - 1);
+    // A reader that was told to stop ends with whatever words.
+    source::check()?;
+    outcome.unwrap_or_else(|_| Err(Error::file(path, "the file is damaged: it contradicts itself")))
+}
+
+/// Panics of readers are told as errors, never printed; others are left to whoever told them before.
+fn keep_quiet() {
+    static ONCE: Once = Once::new();
+    ONCE.call_once(|| {
+        let before = std::panic::take_hook();
+        std::panic::set_hook(Box::new(move |panic| {
+            if DEPTH.get() == 0 {
+                before(panic);
+            }
+        }));
+    });
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_panic_becomes_an_error_that_names_the_file() {
+        let error = caught::<()>(Path::new("a.glb"), || panic!("on purpose")).unwrap_err();
+        assert_eq!(error.to_string(), "a.glb: the file is damaged: it contradicts itself");
+    }
+}

@@ -1,0 +1,58 @@
+//! What a mesh file holds that frazil passes over.
+
+use std::path::Path;
+
+use super::source;
+use crate::error::Result;
+
+/// Names of what a mesh file holds besides places and faces, in the plural: "UVs", "normals" ... Empty for a kind of file
+/// that has no such thing.
+///
+/// # Errors
+/// A file that cannot be read.
+pub fn of(path: &Path) -> Result<Vec<&'static str>> {
+    let kind = path.extension().and_then(|text| text.to_str()).unwrap_or("").to_lowercase();
+    Ok(match kind.as_str() {
+        "obj" => obj(&source::read(path)?),
+        "ply" => ply(&source::read(path)?),
+        _ => Vec::new(),
+    })
+}
+
+fn obj(bytes: &[u8]) -> Vec<&'static str> {
+    let names = [
+        (&[&b"vt"[..]][..], "UVs"),
+        (&[b"vn"], "normals"),
+        (&[b"usemtl", b"mtllib"], "materials"),
+        (&[b"g", b"o"], "groups"),
+        (&[b"l", b"p", b"curv", b"surf"], "lines and points"),
+    ];
+    let mut found = [false; 5];
+    for line in bytes.split(|&byte| byte == b'\n') {
+        let word = line.trim_ascii().split(u8::is_ascii_whitespace).next().unwrap_or(line);
+        if let Some(at) = names.iter().position(|(words, _)| words.contains(&word)) {
+            found[at] = true;
+        }
+    }
+    names.iter().zip(found).filter(|(_, found)| *found).map(|((_, name), _)| *name).collect()
+}
+
+fn ply(bytes: &[u8]) -> Vec<&'static str> {
+    let head = bytes.split(|&byte| byte == b'\n').take_while(|line| line.trim_ascii() != b"end_header");
+    let names = [
+        (&["s", "t", "u", "v", "texture_u", "texture_v"][..], "UVs"),
+        (&["nx", "ny", "nz"], "normals"),
+        (&["red", "green", "blue", "alpha"], "colours"),
+        (&["vx", "vy", "vz"], "velocities"),
+    ];
+    let mut found = [false; 4];
+    for line in head {
+        let line = String::from_utf8_lossy(line);
+        let mut words = line.split_whitespace();
+        let (Some("property"), Some(last)) = (words.next(), words.last()) else { continue };
+        if let Some(at) = names.iter().position(|(words, _)| words.contains(&last)) {
+            found[at] = true;
+        }
+    }
+    names.iter().zip(found).filter(|(_, found)| *found).map(|((_, name), _)| *name).collect()
+}

@@ -1,0 +1,121 @@
+//! The process that decodes a foreign file: it limits itself, reads, and leaves a parcel in the file that is its input.
+
+use std::ffi::OsString;
+use std::fs::File;
+use std::os::fd::AsFd;
+use std::path::{Path, PathBuf};
+
+use rustix::process::{Resource, Rlimit, Signal, getrlimit, set_parent_process_death_signal, setrlimit};
+
+use super::decode;
+use super::parcel::{Contents, pack};
+use crate::error::{Error, Result, one_line};
+
+/// The first argument of a program that is to decode.
+pub(super) const COMMAND: &str = "decode-vdb-for-another-process";
+/// The form of the arguments and of parcels: both sides must be of one version.
+pub(super) const PROTOCOL: &str = concat!("1-", env!("CARGO_PKG_VERSION"));
+
+/// What is wanted of a file.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) enum Wanted<'a> {
+    Infos,
+    All,
+    First,
+    Named(&'a str),
+}
+
+impl Wanted<'_> {
+    /// As two arguments.
+    pub(super) fn arguments(&self) -> [&str; 2] {
+        match self {
+            Self::Infos => ["infos", ""],
+            Self::All => ["all", ""],
+            Self::First => ["first", ""],
+            Self::Named(name) => ["named", name],
+        }
+    }
+}
+
+/// What the process may take.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct Limits {
+    /// Address space beyond what the program has when it begins (bytes).
+    pub memory: u64,
+    /// Time of a core (s).
+    pub seconds: u64,
+}
+
+/// Decodes, if the program was started for it: call it first of all, with the arguments behind the program's name.
+/// What it returns is the exit code of the program, which then has nothing else to do.
+pub fn serve(arguments: impl Iterator<Item = OsString>) -> Option<u8> {
+    let arguments: Vec<OsString> = arguments.take(7).collect();
+    let (command, rest) = arguments.split_first()?;
+    if command != COMMAND {
+        return None;
+    }
+    let [protocol, memory, seconds, kind, name, path] = rest else { return Some(2) };
+    let number = |text: &OsString| text.to_str()?.parse::<u64>().ok();
+    let (Some(memory), Some(seconds), Some(kind), Some(name)) =
+        (number(memory), number(seconds), kind.to_str(), name.to_str())
+    else {
+        return Some(2);
+    };
+    let wanted = match kind {
+        "infos" => Wanted::Infos,
+        "all" => Wanted::All,
+        "first" => Wanted::First,
+        "named" => Wanted::Named(name),
+        _ => return Some(2),
+    };
+    if protocol != PROTOCOL || limit(Limits { memory, seconds }).is_err() {
+        return Some(2);
+    }
+    let contents = match contents(&PathBuf::from(path), wanted) {
+        Ok(contents) => contents,
+        Err(Error::File { what, .. }) => Contents::Refusal(what),
+        Err(error) => Contents::Refusal(error.to_string()),
+    };
+    let packed = deliver(&contents);
+    // The process ends: nobody needs the memory back leaf by leaf.
+    std::mem::forget(contents);
+    Some(if packed.is_ok() { 0 } else { 1 })
+}
+
+/// Address space that a thread may take: its stack. OpenVDB's helpers start one for each core.
+const SPACE_OF_A_THREAD: u64 = 16 << 20;
+
+fn limit(limits: Limits) -> std::io::Result<()> {
+    // Not one process that decodes outlives the one that asked for it.
+    set_parent_process_death_signal(Some(Signal::KILL))?;
+    let own = std::fs::read_to_string("/proc/self/statm")?;
+    let pages: u64 = own.split(' ').next().and_then(|pages| pages.parse().ok()).unwrap_or(0);
+    let threads = std::thread::available_parallelism().map_or(1, |count| count.get() as u64);
+    let own = pages * rustix::param::page_size() as u64 + threads * SPACE_OF_A_THREAD;
+    let space = own.saturating_add(limits.memory);
+    for (resource, most) in [(Resource::As, space), (Resource::Cpu, limits.seconds), (Resource::Core, 0)] {
+        let there = getrlimit(resource).maximum;
+        let most = Some(there.map_or(most, |there| there.min(most)));
+        setrlimit(resource, Rlimit { current: most, maximum: there })?;
+    }
+    Ok(())
+}
+
+fn contents(path: &Path, wanted: Wanted<'_>) -> Result<Contents> {
+    Ok(match wanted {
+        Wanted::Infos => Contents::Infos(decode::describe(path)?),
+        Wanted::All => Contents::Grids(decode::read(path)?),
+        Wanted::First => Contents::Grids(vec![decode::read_named(path, None)?]),
+        Wanted::Named(name) => Contents::Grids(vec![decode::read_named(path, Some(name))?]),
+    })
+}
+
+fn deliver(contents: &Contents) -> std::result::Result<(), String> {
+    let input = std::io::stdin().as_fd().try_clone_to_owned().map_err(|error| error.to_string())?;
+    let file = File::from(input);
+    let packed = pack(&file, contents);
+    if let Err(what) = &packed {
+        eprint!("{}", one_line(what));
+    }
+    packed
+}
