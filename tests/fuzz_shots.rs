@@ -227,8 +227,11 @@ fn ten_thousand_changed_records_are_used_or_refused() {
     fs::write(&path, SCENES[0]).unwrap();
     works(folder.path(), "snow shot.toml -o out -q --set output.half=true --set output.base_mode=full");
     let (scene, out) = (folder.path().join("out/scene.toml"), folder.path().join("out"));
-    fs::copy(&scene, folder.path().join("half.toml")).unwrap();
-    let scene = Scene::read(&folder.path().join("half.toml")).unwrap();
+    // Beside the first folder: the paths in it are relative.
+    let half = folder.path().join("half");
+    fs::create_dir(&half).unwrap();
+    fs::copy(&scene, half.join("half.toml")).unwrap();
+    let scene = Scene::read(&half.join("half.toml")).unwrap();
     let inputs = Inputs::load(&scene).unwrap();
     let ctx = Context::new(Pool::new(1).unwrap());
     let mut random = Random(2);
@@ -276,7 +279,7 @@ fn ten_thousand_changed_records_are_used_or_refused() {
         {
             // A run that could go on from N has forgotten what comes after.
             let _ = fs::remove_dir_all(&out);
-            works(folder.path(), "snow half.toml -o out -q");
+            works(folder.path(), "snow half/half.toml -o out -q");
         }
     }
     assert!(refused > ROUNDS / 8, "{refused}");

@@ -80,3 +80,28 @@ fn a_wheel_that_spins_has_the_volume_of_a_cylinder() {
         assert!((volume / exact - 1.0).abs() < 0.02, "{degrees} degrees: {volume}, not {exact}");
     }
 }
+
+#[test]
+fn a_bar_that_turns_once_and_more_sweeps_a_disc() {
+    let (length, width) = (0.4f64, 0.06f64);
+    let radius = (length * length + width * width).sqrt() / 2.0;
+    let exact = std::f64::consts::PI * radius * radius * 0.1;
+    let ctx = Context::new(Pool::new(2).unwrap());
+    for degrees in [180.0, 350.0, 360.0, 370.0, 719.0, 1440.0] {
+        let bar = shapes::cuboid([length as f32, 0.1, width as f32]);
+        let grid = swept(bar, DVec3::y() * degrees, DVec3::zeros());
+        let volume = level_set::measure(&ctx, &grid).unwrap().volume;
+        assert!((volume / exact - 1.0).abs() < 0.02, "{degrees} degrees: {volume}, not {exact}");
+    }
+}
+
+#[test]
+fn more_turns_than_a_step_can_have_are_refused() {
+    let ctx = Context::new(Pool::new(1).unwrap());
+    let key = |time: f64| Key { time, at: DVec3::zeros(), turn: DVec3::x() * time * 1e4 };
+    let keys = Keys::new(vec![key(0.0), key(1.0)]).unwrap();
+    let body = Body::new(Box::new(Rigid::new(shapes::cuboid([0.1; 3]), keys)), 0.0).unwrap();
+    let swept = sweep::chain(&ctx, &[body], 0.0, 1.0, &Settings::new(CELL));
+    let error = swept.err().expect("an error").to_string();
+    assert!(error.contains("turns by 572958 degrees in a step"), "{error}");
+}

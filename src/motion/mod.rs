@@ -62,6 +62,12 @@ pub trait Motion: Send + Sync {
     /// Times inside (from, to) where the motion has a kink: keys, frames of a sequence. Ascending.
     fn breaks(&self, from: f64, to: f64) -> Vec<f64>;
 
+    /// How far any part turns between two times (radians), at most, where turning is how the motion is given; 0 where
+    /// vertices move straight, or along arcs of less than half a turn between two kinks.
+    fn turning(&self, _from: f64, _to: f64) -> f64 {
+        0.0
+    }
+
     /// Whether vertices that always move together are one vertex already: others that meet at some time stay apart.
     fn keeps_its_welds(&self) -> bool {
         false

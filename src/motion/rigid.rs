@@ -50,8 +50,24 @@ impl Keys {
 
     /// Rotation and place at a time.
     pub fn at(&self, time: f64) -> (Rotation3<f64>, DVec3) {
+        let (at, turn) = self.numbers(time);
+        (turned(turn), at)
+    }
+
+    /// How far they turn a body between two times (radians), at most: the angles about all three axes, added up.
+    pub fn turning(&self, from: f64, to: f64) -> f64 {
+        let mut times = vec![from];
+        times.extend(self.breaks(from, to));
+        times.push(to);
+        // Between two keys each angle rises or falls all the way.
+        let turns: Vec<DVec3> = times.into_iter().map(|time| self.numbers(time).1).collect();
+        turns.windows(2).map(|pair| (pair[1] - pair[0]).abs().sum()).sum()
+    }
+
+    /// Place and angles at a time.
+    fn numbers(&self, time: f64) -> (DVec3, DVec3) {
         let next = self.keys.partition_point(|key| key.time <= time);
-        let (at, turn) = match (next.checked_sub(1).map(|index| self.keys[index]), self.keys.get(next)) {
+        match (next.checked_sub(1).map(|index| self.keys[index]), self.keys.get(next)) {
             (Some(_), Some(_)) if self.ease => self.eased(next, time),
             (None, None) => (DVec3::zeros(), DVec3::zeros()),
             (Some(key), None) => (key.at, key.turn),
@@ -60,8 +76,7 @@ impl Keys {
                 let part = (time - a.time) / (b.time - a.time);
                 (a.at.lerp(&b.at, part), a.turn.lerp(&b.turn, part))
             }
-        };
-        (turned(turn), at)
+        }
     }
 
     /// Place and angles on the cubic before key `next`.
@@ -154,6 +169,10 @@ impl Motion for Rigid {
     fn breaks(&self, from: f64, to: f64) -> Vec<f64> {
         self.keys.breaks(from, to)
     }
+
+    fn turning(&self, from: f64, to: f64) -> f64 {
+        self.keys.turning(from, to)
+    }
 }
 
 /// Another motion, brought into metres with Y up and carried along by keys.
@@ -196,6 +215,10 @@ impl Motion for Placed {
         breaks.sort_unstable_by(f64::total_cmp);
         breaks.dedup();
         breaks
+    }
+
+    fn turning(&self, from: f64, to: f64) -> f64 {
+        self.inner.turning(from, to) + self.keys.turning(from, to)
     }
 
     fn keeps_its_welds(&self) -> bool {

@@ -17,6 +17,10 @@ use crate::motion::Motion;
 
 /// Most steps that an interval between two kinks of a motion is split into.
 const MOST_STEPS: f64 = 1024.0;
+/// How far a body turns at most while five poses show its arcs (radians): a quarter turn.
+const TURNING: f64 = std::f64::consts::FRAC_PI_2;
+/// How far it may turn in a step (radians): 64 times round.
+const MOST_TURNING: f64 = 64.0 * std::f64::consts::TAU;
 /// Bytes of a vertex in a pose: in cells, in fixed point, and what it sweeps.
 const BYTES_PER_POSITION: usize = 100;
 /// Vertices or edges a task looks at.
@@ -183,8 +187,7 @@ impl Body {
         if to <= from {
             return Ok(poses);
         }
-        let mut ends = self.motion.breaks(from, to);
-        ends.push(to);
+        let ends = self.ends(from, to)?;
         let mut begin = from;
         for end in ends {
             let first = poses.last().expect("the first pose is there").clone();
@@ -203,6 +206,29 @@ impl Body {
             begin = end;
         }
         Ok(poses)
+    }
+
+    /// Ends of the parts of an interval that poses are chosen in: the motion's kinks, and times between which it turns
+    /// so little that a few looks at it show how far it strays from straight lines.
+    fn ends(&self, from: f64, to: f64) -> Result<Vec<f64>> {
+        let turning = self.motion.turning(from, to);
+        if turning > MOST_TURNING {
+            let what = format!(
+                "an object turns by {:.0} degrees in a step, more than {:.0}",
+                turning.to_degrees(),
+                MOST_TURNING.to_degrees()
+            );
+            return Err(Error::argument(what));
+        }
+        let mut ends = Vec::new();
+        let mut begin = from;
+        for end in self.motion.breaks(from, to).into_iter().chain([to]) {
+            let parts = (self.motion.turning(begin, end) / TURNING).ceil().max(1.0);
+            ends.extend((1..parts as usize).map(|part| begin + (end - begin) * part as f64 / parts));
+            ends.push(end);
+            begin = end;
+        }
+        Ok(ends)
     }
 
     /// Number of equal steps an interval needs, from five poses at its quarters.

@@ -26,9 +26,9 @@ pub const THIN: f64 = 0.05;
 const GRAIN: usize = 2048;
 /// Crossings near a voxel and its six neighbours from which on its cell is a stack of sheets: a single one meets
 /// at most some ten of their lines.
-const STACK: u32 = 96;
+const STACK: u32 = 64;
 /// Faces in a cell from which on a stack is crowded.
-const CROWD: usize = 96;
+const CROWD: usize = 64;
 /// Room for rounding where a surface lies on a voxel (cells).
 const TOUCH: f32 = 1e-3;
 /// How far a crossing on a voxel is moved to the side that it counts for (cells).

@@ -9,8 +9,8 @@ use std::sync::atomic::{AtomicU8, Ordering};
 
 use rayon::prelude::*;
 
-use super::exposure::{BURIED, Exposure, OPEN, THIN};
 use super::cells::{Cells, Point, cross, difference, dot, each_voxel, sub, voxel_of};
+use super::exposure::{BURIED, Exposure, OPEN, THIN};
 use super::lattice::{Fixed, UNITS};
 use super::prism::Bundle;
 use super::region::extent;
@@ -112,19 +112,21 @@ fn neighbourhoods(cells: &Cells, verdicts: &[u8]) -> (Vec<u8>, Vec<u8>) {
 }
 
 /// Whether a point of a face (fixed-point units), moved a hair along its normal, is outside the chain.
-pub fn is_open(cells: &Cells, face: u32, at: Point, bundle: &mut Bundle) -> bool {
-    ahead(cells, face as usize).is_some_and(|ahead| ask(cells, at, ahead, bundle) == OPEN)
+pub fn is_open(cells: &Cells, exposure: &Exposure, face: u32, at: Point, bundle: &mut Bundle) -> bool {
+    ahead(cells, face as usize).is_some_and(|ahead| ask(cells, exposure, at, ahead, bundle) == OPEN)
 }
 
-/// Whether a point of a face is open: the chain is absent a hair in front of it, and not behind.
-fn ask(cells: &Cells, at: Point, ahead: Point, bundle: &mut Bundle) -> u8 {
+/// Whether a point of a face is open: the chain is absent a hair in front of it, and not behind; of a stack, [`THIN`] in
+/// front of it.
+fn ask(cells: &Cells, exposure: &Exposure, at: Point, ahead: Point, bundle: &mut Bundle) -> u8 {
     let moved = |side: f64| [0, 1, 2].map(|axis| at[axis] + side * ahead[axis]);
     let [front, back] = cells.windings(moved(1.0), moved(-1.0), bundle);
-    match (front < 1, back >= 1) {
-        (true, true) => OPEN,
-        (false, true) if cells.windings(moved(THIN_HAIRS), at, bundle)[0] < 1 => OPEN,
-        _ => BURIED,
+    if back < 1 {
+        return BURIED;
     }
+    let open = front < 1
+        || exposure.is_stack(cells, voxel_of(at)) && cells.windings(moved(THIN_HAIRS), at, bundle)[0] < 1;
+    if open { OPEN } else { BURIED }
 }
 
 /// A hair along a face's normal; none for a face without area.
@@ -285,7 +287,7 @@ impl Surface<'_> {
     }
 
     fn ask(&mut self, at: Point, ahead: Point) -> u8 {
-        ask(self.cells, at, ahead, &mut self.bundle)
+        ask(self.cells, self.exposure, at, ahead, &mut self.bundle)
     }
 
     /// Whether distances may be wanted near a point.

@@ -403,7 +403,13 @@ impl Near<'_> {
         let length = way.iter().map(|value| value * value).sum::<f64>().sqrt();
         let part = if length > INSET { INSET / length } else { 1.0 };
         let at = [0, 1, 2].map(|axis| at[axis] + part * way[axis]);
-        let open = is_open(&self.voxeliser.cells, *face, at, &mut self.bundle.borrow_mut());
+        let open = is_open(
+            &self.voxeliser.cells,
+            &self.voxeliser.exposure,
+            *face,
+            at,
+            &mut self.bundle.borrow_mut(),
+        );
         self.asked.borrow_mut()[index as usize] = (place, open);
         open
     }

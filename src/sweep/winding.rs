@@ -187,7 +187,12 @@ impl Axis {
 
 /// Calls `see` with each line through voxels that a face crosses: the line's coordinates, the place on its axis
 /// (cells), and how the winding number changes there in the direction of the axis.
-pub fn each_crossing(face: &Face, axis: Axis, bounds: [[i64; 2]; 2], mut see: impl FnMut([i64; 2], f64, i32)) {
+pub fn each_crossing(
+    face: &Face,
+    axis: Axis,
+    bounds: [[i64; 2]; 2],
+    mut see: impl FnMut([i64; 2], f64, i32),
+) {
     let v = face.v.map(|p| axis.turned(p));
     let flat = v.map(|p| [p[0], p[1]]);
     let area = edge_function(flat[0], flat[1], flat[2]);

@@ -244,7 +244,7 @@ impl BaseLayer {
         ctx.take_timings();
         let displacement =
             self.params.noise.map(|noise| Displacement::new(&noise, self.grids.surface.voxel_size()));
-        let (ragged, exact): (Vec<(usize, &Body)>, Vec<(usize, &Body)>) =
+        let (ragged, exact): (Vec<_>, Vec<_>) =
             bodies.iter().enumerate().partition(|(_, body)| body.has_noise());
         let (ragged, ragged_faces) = self.sweep(ctx, &ragged, from, to, displacement.as_ref())?;
         let (exact, exact_faces) = self.sweep(ctx, &exact, from, to, None)?;
