@@ -107,9 +107,6 @@ fn bounds(levels: &[Vec<Fixed>], vertices: &[u32]) -> (Fixed, Fixed) {
 }
 
 /// Sets bit i - 1 of each step's byte when the surface moves outward through tetrahedron Ti.
-///
-/// A triangle that stays in its plane but for rounding moves nowhere. One that leaves it in any step, or in all of them
-/// together, moves in each step by however little: else slits would be left inside the volume.
 fn mark_outward(
     topology: &Topology,
     levels: &[Vec<Fixed>],
@@ -123,29 +120,18 @@ fn mark_outward(
         return;
     }
     let sign = f64::from(simplex.sign);
-    let (mut moves, mut height, mut lowest) = (false, 0.0, 0.0f64);
     for (step, bits) in bits.iter_mut().enumerate() {
         let a = simplex.v.map(|vertex| levels[step][vertex as usize]);
         let b = simplex.v.map(|vertex| levels[step + 1][vertex as usize]);
         let [edge1, edge2] = [difference(a[1], a[0]), difference(a[2], a[0])];
         let normal = cross(edge1, edge2);
-        let volumes = [
-            dot(normal, difference(b[2], a[0])),
-            -determinant(edge1, difference(b[1], a[0]), difference(b[2], a[0])),
-            determinant(difference(b[0], a[0]), difference(b[1], a[0]), difference(b[2], a[0])),
-        ]
-        .map(|volume| sign * volume);
-        *bits = (0..3).fold(0, |bits, i| bits | u8::from(volumes[i] > 0.0) << i);
-        let area = dot(normal, normal).sqrt();
-        moves |= volumes.iter().any(|volume| *volume > STILL * area);
-        if area > 0.0 {
-            height += volumes.iter().sum::<f64>() / (3.0 * area);
-            lowest = lowest.min(height);
-            moves |= height - lowest > STILL;
-        }
-    }
-    if !moves {
-        bits.fill(0);
+        let still = STILL * dot(normal, normal).sqrt();
+        let volume1 = dot(normal, difference(b[2], a[0]));
+        let volume2 = -determinant(edge1, difference(b[1], a[0]), difference(b[2], a[0]));
+        let volume3 = determinant(difference(b[0], a[0]), difference(b[1], a[0]), difference(b[2], a[0]));
+        *bits = u8::from(sign * volume1 > still)
+            | u8::from(sign * volume2 > still) << 1
+            | u8::from(sign * volume3 > still) << 2;
     }
 }
 

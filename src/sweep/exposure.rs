@@ -26,11 +26,9 @@ pub const THIN: f64 = 0.05;
 const GRAIN: usize = 2048;
 /// Crossings near a voxel and its six neighbours from which on its cell is a stack of sheets: a single one meets
 /// at most some ten of their lines.
-const STACK: u32 = 64;
+const STACK: u32 = 96;
 /// Faces in a cell from which on a stack is crowded.
-const CROWD: usize = 64;
-/// Room for rounding where a surface lies on a voxel (cells).
-const TOUCH: f32 = 1e-3;
+const CROWD: usize = 96;
 /// How far a crossing on a voxel is moved to the side that it counts for (cells).
 const ON_VOXEL: f64 = 1e-7;
 
@@ -38,7 +36,7 @@ const ON_VOXEL: f64 = 1e-7;
 pub struct Exposure {
     /// [`OPEN`] and [`BURIED`], for each face; 0 for one that no line meets.
     pub faces: Vec<u8>,
-    /// Where faces are [`OPEN`] (cells from the base voxel), in the order of faces.
+    /// Where faces are exposed (cells from the base voxel), in the order of faces.
     points: Vec<(u32, [f32; 3])>,
     /// For each pair of neighbour voxels with surface between them, how far the first and the second one are from it.
     pairs: Vec<(Pair, [f32; 2])>,
@@ -95,7 +93,7 @@ impl Exposure {
         cells.of_voxel(voxel).is_some_and(|cell| self.stacks[cell])
     }
 
-    /// Whether a face is [`OPEN`] on a line through a box (cells).
+    /// Whether a face is exposed on a line through a box (cells).
     pub fn within(&self, face: u32, (low, high): ([f32; 3], [f32; 3])) -> bool {
         let first = self.points.partition_point(|(other, _)| *other < face);
         let mut own = self.points[first..].iter().take_while(|(other, _)| *other == face);
@@ -105,16 +103,8 @@ impl Exposure {
     /// Distances (cells) of a voxel, and of its neighbour above along an axis, from the surface between them; none
     /// where no line saw any.
     pub fn between(&self, voxel: [i32; 3], axis: usize) -> Option<[f32; 2]> {
-        let pair = |step: i32| {
-            let mut place = voxel;
-            place[axis] += step;
-            let key = (place, axis as u8);
-            self.pairs.binary_search_by_key(&key, |(pair, _)| *pair).ok().map(|index| self.pairs[index].1)
-        };
-        // A surface on a voxel may have been seen on its other side.
-        let on_first = || pair(-1).filter(|[_, after]| *after <= TOUCH).map(|_| [0.0, 1.0]);
-        let on_second = || pair(1).filter(|[before, _]| *before <= TOUCH).map(|_| [1.0, 0.0]);
-        pair(0).or_else(on_first).or_else(on_second)
+        let key = (voxel, axis as u8);
+        self.pairs.binary_search_by_key(&key, |(pair, _)| *pair).ok().map(|index| self.pairs[index].1)
     }
 }
 
@@ -194,6 +184,9 @@ fn walk(cells: &Cells, axis: Axis, line: &[Crossing], faces: &[AtomicU8], seen: 
             let after = winding + crossing.change;
             if (winding < 1) != (after < 1) {
                 places.push(crossing.at);
+                let mut point = axis.voxel(coordinates, 0).map(|value| value as f32);
+                point[axis.index()] = crossing.at as f32;
+                seen.points.push((crossing.face, point));
             }
             winding = after;
         }
@@ -203,11 +196,6 @@ fn walk(cells: &Cells, axis: Axis, line: &[Crossing], faces: &[AtomicU8], seen: 
             let depth = |place: &f64| (crossing.at - place).abs() * slope;
             let shallow = places.iter().any(|place| depth(place) <= THIN);
             faces[crossing.face as usize].fetch_or(if shallow { OPEN } else { BURIED }, Ordering::Relaxed);
-            if shallow {
-                let mut point = axis.voxel(coordinates, 0).map(|value| value as f32);
-                point[axis.index()] = crossing.at as f32;
-                seen.points.push((crossing.face, point));
-            }
         }
         if let (Some(first), Some(last)) = (places.first(), places.last()) {
             let distances = [first - f64::from(edge), f64::from(edge) + 1.0 - last];

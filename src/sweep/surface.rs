@@ -218,7 +218,7 @@ impl Surface<'_> {
             // Of a stack only the outermost sheets are kept, whole: which side of a crease a point of them lies on is
             // asked where it matters.
             if self.exposure.within(id as u32, extent(&v)) {
-                out.push((v, self.exposure.faces[id] == OPEN));
+                out.push((v, false));
             }
             return false;
         }

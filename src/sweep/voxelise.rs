@@ -87,8 +87,12 @@ const SAME: f32 = 0.05;
 const INSET: f64 = 0.02 * UNITS as f64;
 /// A voxel nearer than this (cells) lies on the surface.
 const ON_FACE: f32 = 1e-4;
-/// Distance (cells) of a voxel from a surface that touches it or its neighbour, where rounding hid on which side.
-const UNSEEN: f32 = 0.65;
+/// How far (cells) a voxel can be from a surface between it and its neighbour that no line has placed: one that touches
+/// either of them.
+const UNSEEN: f32 = 1.0;
+/// How far (cells) two neighbours of opposite sign may be from the surface between them, added up: 1, with room for
+/// what the faces and the motion are approximated by.
+const MOST_APART: f32 = 1.2;
 /// All voxels of a block.
 pub const ALL: Mask = [u64::MAX; 8];
 
@@ -296,9 +300,12 @@ impl Voxeliser {
             }
         });
         scratch.bundle = near.bundle.into_inner();
-        // Voxels next to a change of sign: lines between them have met the surface.
+        // Neighbours of opposite sign that are too far from the surface between them: lines have met it.
+        let before = values.clone();
         signs.each_change(|voxel, axis, above| {
-            if wanted[voxel >> 6] >> (voxel & 63) & 1 == 1 {
+            let beside = beside(voxel, axis, above).map_or(0.0, |other| before[other].abs());
+            let is_wanted = wanted[voxel >> 6] >> (voxel & 63) & 1 == 1;
+            if is_wanted && before[voxel].abs() + beside > MOST_APART {
                 let most = self.most_distance(corner, voxel, axis, above);
                 values[voxel] = signed(voxel, values[voxel].abs().min(most));
                 uniform = false;
@@ -371,6 +378,16 @@ impl Signs {
                 }
             }
         }
+    }
+}
+
+/// The voxel beside one of a block along an axis, above or below; none in another block.
+fn beside(voxel: usize, axis: usize, above: bool) -> Option<usize> {
+    let shift = 6 - 3 * axis;
+    match (voxel >> shift & 7, above) {
+        (7, true) | (0, false) => None,
+        (_, true) => Some(voxel + (1 << shift)),
+        (_, false) => Some(voxel - (1 << shift)),
     }
 }
 
