@@ -37,7 +37,7 @@ struct Function {
 const FUNCTIONS: [Function; 8] = [
     Function { name: "base_step", call: Host::base_step, before: Host::untouched },
     Function { name: "snow_layer", call: Host::snow_layer, before: Host::nothing },
-    Function { name: "from_mesh", call: Host::from_mesh, before: Host::nothing },
+    Function { name: "from_mesh", call: Host::mesh_to_grid, before: Host::nothing },
     Function { name: "sweep", call: Host::sweep, before: Host::nothing },
     Function { name: "offset", call: Host::offset, before: Host::snow_bytes },
     Function { name: "particles", call: Host::particles, before: Host::nothing },
@@ -210,7 +210,7 @@ impl Host {
         self.made(|out| unsafe { frz_snow_layer(ctx, &self.layer(), out) })
     }
 
-    fn from_mesh(&self, ctx: *mut frz_context) -> Answer {
+    fn mesh_to_grid(&self, ctx: *mut frz_context) -> Answer {
         // SAFETY: the pointers are valid.
         self.made(|out| unsafe { frz_levelset_from_mesh(ctx, self.mesh, VOXEL, 3.0, out) })
     }
