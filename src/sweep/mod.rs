@@ -18,6 +18,7 @@ mod refine;
 mod region;
 #[cfg(feature = "vdb")]
 mod samples;
+mod signs;
 mod surface;
 mod topology;
 mod voxelise;

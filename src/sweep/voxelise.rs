@@ -13,6 +13,7 @@ use super::lattice::{Lattice, UNITS};
 use super::nearest::{Group, Scratch, search};
 use super::prism::Bundle;
 use super::region::{Region, each_block, extent};
+use super::signs::{Signs, beside};
 use super::surface::{Facet, is_open, surface};
 use super::winding::Lines;
 use crate::base::blocks::{Mask, Origin, Values};
@@ -266,7 +267,7 @@ impl Voxeliser {
         let ids = &self.ids[self.start[index] as usize..self.start[index + 1] as usize];
         let triangles: Vec<Triangle> =
             ids.iter().map(|&id| Triangle::new(&self.facets[id as usize].v, corner)).collect();
-        let signs = self.signs(corner);
+        let signs = Signs::new(&self.cells.lines, corner);
         let inside = signs.inside();
         let is_inside = |voxel: usize| inside[voxel >> 6] >> (voxel & 63) & 1 == 1;
         let limit = |voxel: usize| if is_inside(voxel) { self.band.inside } else { self.band.outside };
@@ -325,69 +326,6 @@ impl Voxeliser {
         let mut lower = [0, 1, 2].map(|a| corner[a] + (voxel >> (6 - 3 * a) & 7) as i32);
         lower[axis] -= i32::from(!above);
         self.exposure.between(lower, axis).map_or(UNSEEN, |distances| distances[usize::from(!above)])
-    }
-
-    /// Which voxels of a block, and around it, the chain winds around.
-    fn signs(&self, corner: [i32; 3]) -> Signs {
-        let mut columns = [[0; 10]; 10];
-        for (x, row) in (-1..).zip(&mut columns) {
-            for (y, bits) in (-1..).zip(row) {
-                let line = self.cells.lines.line(corner[0] + x, corner[1] + y);
-                let mut next = line.partition_point(|(height, _)| *height < f64::from(corner[2] - 1));
-                for z in -1..9 {
-                    while next < line.len() && line[next].0 < f64::from(corner[2] + z) {
-                        next += 1;
-                    }
-                    let solid = next > 0 && line[next - 1].1 >= 1;
-                    *bits |= u16::from(solid) << (z + 1);
-                }
-            }
-        }
-        Signs(columns)
-    }
-}
-
-/// The voxels inside the volume, of a block and one further on each side: bit z + 1 of `[x + 1][y + 1]`.
-struct Signs([[u16; 10]; 10]);
-
-impl Signs {
-    /// Those of the block.
-    fn inside(&self) -> Mask {
-        let row = |x: usize, y: usize| u64::from(self.0[x + 1][y + 1] >> 1 & 0xff) << (8 * y);
-        std::array::from_fn(|x| (0..8).fold(0, |bits, y| bits | row(x, y)))
-    }
-
-    /// Calls `see` with each voxel of the block whose neighbour along an axis, above or not, is on the other side.
-    fn each_change(&self, mut see: impl FnMut(usize, usize, bool)) {
-        for (x, y) in (1..9).flat_map(|x| (1..9).map(move |y| (x, y))) {
-            let own = self.0[x][y];
-            let changes = [
-                (self.0[x - 1][y] ^ own, 0, false),
-                (self.0[x + 1][y] ^ own, 0, true),
-                (self.0[x][y - 1] ^ own, 1, false),
-                (self.0[x][y + 1] ^ own, 1, true),
-                (own << 1 ^ own, 2, false),
-                (own >> 1 ^ own, 2, true),
-            ];
-            for (bits, axis, above) in changes {
-                let mut bits = bits >> 1 & 0xff;
-                while bits != 0 {
-                    let z = bits.trailing_zeros() as usize;
-                    see((x - 1) << 6 | (y - 1) << 3 | z, axis, above);
-                    bits &= bits - 1;
-                }
-            }
-        }
-    }
-}
-
-/// The voxel beside one of a block along an axis, above or below; none in another block.
-fn beside(voxel: usize, axis: usize, above: bool) -> Option<usize> {
-    let shift = 6 - 3 * axis;
-    match (voxel >> shift & 7, above) {
-        (7, true) | (0, false) => None,
-        (_, true) => Some(voxel + (1 << shift)),
-        (_, false) => Some(voxel - (1 << shift)),
     }
 }
 
