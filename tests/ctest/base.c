@@ -168,7 +168,7 @@ static void what_cannot_be_stepped(frz_context *ctx, const ball *rest, const frz
     FAILS(frz_base_step(ctx, base, bodies, 1, 1.0, 1, NULL), FRZ_ERROR_ARGUMENT, "body 0: flags");
     bodies[0].flags = 0;
     at.positions[5][2] = 1e9f;
-    FAILS(frz_base_step(ctx, base, bodies, 1, 1.0, 1, NULL), FRZ_ERROR_ARGUMENT, "m from the work");
+    FAILS(frz_base_step(ctx, base, bodies, 1, 1.0, 1, NULL), FRZ_ERROR_ARGUMENT, "m from the snow's middle");
     at.positions[5][2] = (float)INFINITY;
     FAILS(frz_base_step(ctx, base, bodies, 1, 1.0, 1, NULL), FRZ_ERROR_ARGUMENT, "element 5 is not finite");
     WORKS(frz_context_set_memory_limit(ctx, 1000));

@@ -108,9 +108,10 @@ static void out_of_reach(frz_context *ctx, const ball *rest, frz_grid *snow) {
     bodies[0].flags = FRZ_BODY_EXACT;
     WORKS(frz_base_create(ctx, NULL, snow, NULL, 0, &base));
     before = base_state(ctx, base);
-    FAILS(frz_base_step(ctx, base, bodies, 3, 1.0, 1, NULL), FRZ_ERROR_ARGUMENT, "body 1: ");
+    /* What passes out of reach leaves no trace in the snow; where it crosses the snow it is in reach. */
+    WORKS(frz_base_step(ctx, base, bodies, 3, 1.0, 1, NULL));
     after = base_state(ctx, base);
-    CHECK(same_bytes(before, after));
+    CHECK(!same_bytes(before, after));
     free(before.data), free(after.data);
     frz_base_destroy(base);
     {
