@@ -10,7 +10,7 @@ use std::sync::atomic::{AtomicBool, AtomicU8, AtomicU16, Ordering};
 
 use rayon::prelude::*;
 
-use super::cells::{Cells, Point, dot, in_front};
+use super::cells::{Cells, Point, dot};
 use super::winding::{Axis, each_crossing};
 
 /// A face is exposed, or less than [`THIN`] below one that is, somewhere.
@@ -29,15 +29,19 @@ const GRAIN: usize = 2048;
 const STACK: u32 = 96;
 /// Faces in a cell from which on a stack is crowded.
 const CROWD: usize = 96;
-/// How far a crossing on a voxel is moved to the side that it counts for (cells).
-const ON_VOXEL: f64 = 1e-7;
+/// Gaps between sheets that are narrower than this (cells), and do not hold a voxel, are none.
+const CLOSED: f64 = 0.01;
+/// Least cosine between a line and the normal of a face whose plane it speaks for: one of three axes has it.
+const STEEP: f64 = 0.57;
 
 /// What lines through voxels see of a chain.
 pub struct Exposure {
     /// [`OPEN`] and [`BURIED`], for each face; 0 for one that no line meets.
     pub faces: Vec<u8>,
-    /// Where faces are exposed (cells from the base voxel), in the order of faces.
-    points: Vec<(u32, [f32; 3])>,
+    /// Where faces are exposed, line after line.
+    spots: Vec<Spot>,
+    /// Places in `spots`, in the order of faces.
+    by_face: Vec<u32>,
     /// For each pair of neighbour voxels with surface between them, how far the first and the second one are from it.
     pairs: Vec<(Pair, [f32; 2])>,
     /// Whether each cell holds a stack.
@@ -46,6 +50,35 @@ pub struct Exposure {
 
 /// A voxel and its neighbour above along an axis.
 type Pair = ([i32; 3], u8);
+
+/// Where a line meets the surface.
+#[derive(Debug, Clone, Copy)]
+pub struct Spot {
+    /// Direction of the line.
+    pub axis: Axis,
+    /// The line's coordinates.
+    pub line: [i64; 2],
+    /// The place along it (cells from the base voxel).
+    pub place: f64,
+    /// Whether the line enters the volume there, going upward.
+    pub enters: bool,
+    /// The face that is outermost there.
+    pub face: u32,
+}
+
+impl Spot {
+    /// Position (cells from the base voxel).
+    pub fn at(&self) -> Point {
+        let mut at = self.axis.voxel(self.line, 0).map(f64::from);
+        at[self.axis.index()] = self.place;
+        at
+    }
+
+    /// What spots are sorted by.
+    fn key(&self) -> (usize, [i64; 2]) {
+        (self.axis.index(), self.line)
+    }
+}
 
 /// A face crossing a line.
 struct Crossing {
@@ -58,7 +91,7 @@ struct Crossing {
 /// What the lines of one axis saw.
 #[derive(Default)]
 struct Seen {
-    points: Vec<(u32, [f32; 3])>,
+    spots: Vec<Spot>,
     pairs: Vec<(Pair, [f32; 2])>,
 }
 
@@ -67,7 +100,7 @@ impl Exposure {
     pub fn scan(cells: &Cells) -> Self {
         let faces: Vec<AtomicU8> = cells.faces.iter().map(|_| AtomicU8::new(0)).collect();
         let counts: Vec<AtomicU16> = (0..cells.count()).map(|_| AtomicU16::new(0)).collect();
-        let (mut points, mut pairs) = (Vec::new(), Vec::new());
+        let (mut spots, mut pairs) = (Vec::new(), Vec::new());
         for axis in Axis::ALL {
             let crossings = crossings(cells, axis, &counts);
             let same_line = |a: &Crossing, b: &Crossing| a.line == b.line;
@@ -77,15 +110,16 @@ impl Exposure {
             };
             let parts: Vec<Seen> = crossings.par_chunk_by(same_line).fold(Seen::default, walk).collect();
             for seen in parts {
-                points.extend(seen.points);
+                spots.extend(seen.spots);
                 pairs.extend(seen.pairs);
             }
         }
-        points.par_sort_unstable_by(|a, b| a.0.cmp(&b.0).then_with(|| order(a.1, b.1)));
+        let mut by_face: Vec<u32> = (0..spots.len() as u32).collect();
+        by_face.par_sort_by_key(|&spot| spots[spot as usize].face);
         pairs.par_sort_unstable_by_key(|(pair, _)| *pair);
         let faces = faces.into_iter().map(AtomicU8::into_inner).collect();
         let counts: Vec<u16> = counts.into_iter().map(AtomicU16::into_inner).collect();
-        Self { faces, points, pairs, stacks: stacks(cells, &counts) }
+        Self { faces, spots, by_face, pairs, stacks: stacks(cells, &counts) }
     }
 
     /// Whether the cell around a voxel holds so many sheets, one behind the other, that only exposed ones are kept.
@@ -95,9 +129,39 @@ impl Exposure {
 
     /// Whether a face is exposed on a line through a box (cells).
     pub fn within(&self, face: u32, (low, high): ([f32; 3], [f32; 3])) -> bool {
-        let first = self.points.partition_point(|(other, _)| *other < face);
-        let mut own = self.points[first..].iter().take_while(|(other, _)| *other == face);
-        own.any(|(_, p)| (0..3).all(|a| p[a] >= low[a] - 0.01 && p[a] <= high[a] + 0.01))
+        let spot = |&index: &u32| &self.spots[index as usize];
+        let first = self.by_face.partition_point(|index| spot(index).face < face);
+        let mut own = self.by_face[first..].iter().map(spot).take_while(|spot| spot.face == face);
+        own.any(|spot| {
+            let at = spot.at().map(|value| value as f32);
+            (0..3).all(|a| at[a] >= low[a] - 0.01 && at[a] <= high[a] + 0.01)
+        })
+    }
+
+    /// The spots in stacks where lines meet their faces steeply, cell after cell.
+    pub fn spots_of_stacks(&self, cells: &Cells) -> Vec<Spot> {
+        let cell = |spot: &Spot| cells.of_voxel(spot.at().map(|value| value.round() as i32));
+        let is_steep = |spot: &Spot| {
+            let normal = &cells.normals[spot.face as usize];
+            normal[spot.axis.index()].abs() >= STEEP * dot(normal, normal).sqrt()
+        };
+        let wanted = |spot: &Spot| {
+            let cell = cell(spot).filter(|&cell| self.stacks[cell])?;
+            is_steep(spot).then_some((cell, *spot))
+        };
+        let mut spots: Vec<(usize, Spot)> = self.spots.par_iter().filter_map(wanted).collect();
+        spots.par_sort_by_key(|(cell, _)| *cell);
+        spots.into_iter().map(|(_, spot)| spot).collect()
+    }
+
+    /// Whether some spot on a line parallel to that of another faces the same way and lies within `off` cells of a
+    /// place on it.
+    pub fn agrees(&self, spot: &Spot, line: [i64; 2], place: f64, off: f64) -> bool {
+        let key = (spot.axis.index(), line);
+        let first = self.spots.partition_point(|other| other.key() < key);
+        let on_line = self.spots[first..].iter().take_while(|other| other.key() == key);
+        let mut near = on_line.filter(|other| (other.place - place).abs() <= off);
+        near.any(|other| other.enters == spot.enters)
     }
 
     /// Distances (cells) of a voxel, and of its neighbour above along an axis, from the surface between them; none
@@ -124,10 +188,6 @@ fn stacks(cells: &Cells, counts: &[u16]) -> Vec<bool> {
     stacks.into_iter().map(AtomicBool::into_inner).collect()
 }
 
-fn order(a: [f32; 3], b: [f32; 3]) -> std::cmp::Ordering {
-    a[0].total_cmp(&b[0]).then(a[1].total_cmp(&b[1])).then(a[2].total_cmp(&b[2]))
-}
-
 /// Every crossing of the lines along an axis within the cells' blocks, line after line, upward.
 fn crossings(cells: &Cells, axis: Axis, counts: &[AtomicU16]) -> Vec<Crossing> {
     let corner = |block: [i32; 3], more: i32| block.map(|place| place * 8 + more);
@@ -139,9 +199,7 @@ fn crossings(cells: &Cells, axis: Axis, counts: &[AtomicU16]) -> Vec<Crossing> {
         .map(|(chunk, faces)| {
             let mut out = Vec::with_capacity(faces.len());
             for (index, face) in faces.iter().enumerate() {
-                let normal = &cells.normals[chunk * GRAIN + index];
                 each_crossing(face, axis, bounds, |line, at, change| {
-                    let at = beside_voxel(at, axis, normal);
                     let nearest = axis.voxel(line, at.round() as i32);
                     if let Some(cell) = cells.of_voxel(nearest) {
                         let count = &counts[cell];
@@ -163,15 +221,6 @@ fn crossings(cells: &Cells, axis: Axis, counts: &[AtomicU16]) -> Vec<Crossing> {
     out
 }
 
-/// Where a crossing lies that may be on a voxel itself: below or above it, as the symbolic shift of the voxels says.
-fn beside_voxel(at: f64, axis: Axis, normal: &Point) -> f64 {
-    if at != at.round() {
-        return at;
-    }
-    let voxel_is_above = in_front(0.0, normal) == (normal[axis.index()] > 0.0);
-    if voxel_is_above { at - ON_VOXEL } else { at + ON_VOXEL }
-}
-
 /// Goes along one line: marks faces, and notes where the winding number passes between 0 and 1.
 fn walk(cells: &Cells, axis: Axis, line: &[Crossing], faces: &[AtomicU8], seen: &mut Seen) {
     let coordinates = line[0].line;
@@ -179,26 +228,33 @@ fn walk(cells: &Cells, axis: Axis, line: &[Crossing], faces: &[AtomicU8], seen: 
         let edge = run[0].at.floor() as i32;
         let voxel = axis.voxel(coordinates, edge);
         let mut winding = cells.lines.winding(voxel);
-        let mut places: Vec<f64> = Vec::new();
-        for crossing in run {
-            let after = winding + crossing.change;
-            if (winding < 1) != (after < 1) {
-                places.push(crossing.at);
-                let mut point = axis.voxel(coordinates, 0).map(|value| value as f32);
-                point[axis.index()] = crossing.at as f32;
-                seen.points.push((crossing.face, point));
-            }
+        let begin = seen.spots.len();
+        for &Crossing { at, change, face, .. } in run {
+            let (before, after) = (winding, winding + change);
             winding = after;
+            let enters = after >= 1;
+            if (before >= 1) == enters {
+                continue;
+            }
+            // What is entered here was left at the last passage.
+            if enters && seen.spots[begin..].last().is_some_and(|last| at - last.place < CLOSED) {
+                seen.spots.pop();
+            } else {
+                seen.spots.push(Spot { axis, line: coordinates, place: at, enters, face });
+            }
         }
+        let slope = |face: u32| {
+            let normal = &cells.normals[face as usize];
+            normal[axis.index()].abs() / dot(normal, normal).sqrt()
+        };
+        let passages = &seen.spots[begin..];
         for crossing in run {
-            let normal = &cells.normals[crossing.face as usize];
-            let slope = normal[axis.index()].abs() / dot(normal, normal).sqrt();
-            let depth = |place: &f64| (crossing.at - place).abs() * slope;
-            let shallow = places.iter().any(|place| depth(place) <= THIN);
+            let slope = slope(crossing.face);
+            let shallow = passages.iter().any(|passage| (crossing.at - passage.place).abs() * slope <= THIN);
             faces[crossing.face as usize].fetch_or(if shallow { OPEN } else { BURIED }, Ordering::Relaxed);
         }
-        if let (Some(first), Some(last)) = (places.first(), places.last()) {
-            let distances = [first - f64::from(edge), f64::from(edge) + 1.0 - last];
+        if let (Some(first), Some(last)) = (passages.first(), passages.last()) {
+            let distances = [first.place - f64::from(edge), f64::from(edge) + 1.0 - last.place];
             seen.pairs.push(((voxel, axis.index() as u8), distances.map(|value| value as f32)));
         }
     }

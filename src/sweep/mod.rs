@@ -13,6 +13,7 @@ mod distance;
 mod exposure;
 mod lattice;
 mod nearest;
+mod patch;
 mod prism;
 mod refine;
 mod region;

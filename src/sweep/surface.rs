@@ -12,6 +12,7 @@ use rayon::prelude::*;
 use super::cells::{Cells, Point, cross, difference, dot, each_voxel, sub, voxel_of};
 use super::exposure::{BURIED, Exposure, OPEN, THIN};
 use super::lattice::{Fixed, UNITS};
+use super::patch::patches;
 use super::prism::Bundle;
 use super::region::extent;
 use crate::context::Context;
@@ -84,6 +85,7 @@ pub fn surface(ctx: &Context, cells: &Cells, exposure: &Exposure) -> Result<Vec<
     let parts: Vec<Vec<Facet>> = order.par_chunks(GRAIN).map_init(chain, open_parts).collect();
     ctx.check()?;
     let mut facets = parts.concat();
+    facets.extend(patches(ctx, cells, exposure)?);
     facets.par_sort_by_key(|facet| facet.face);
     Ok(facets)
 }
@@ -215,11 +217,7 @@ impl Surface<'_> {
                 }
                 return out[begin..] == [(v, true)];
             }
-            // Of a stack only the outermost sheets are kept, whole: which side of a crease a point of them lies on is
-            // asked where it matters.
-            if self.exposure.within(id as u32, extent(&v)) {
-                out.push((v, false));
-            }
+            // See [`super::patch`].
             return false;
         }
         let open = match said {

@@ -34,8 +34,10 @@ pub struct Lines {
 
 /// Faces a task scans: fixed, so that nothing depends on the number of threads.
 const GRAIN: usize = 2048;
-/// Crossings nearer than this to a voxel (cells) are on it.
-const SAME: f64 = 1e-9;
+/// Crossings nearer than this to a voxel (cells) are told to be above or below it in exact integers.
+const NEAR: f64 = 1e-6;
+/// Where they are then put: so far above or below (cells).
+const BESIDE: f64 = 1e-7;
 /// No lines.
 const NONE: u32 = u32::MAX;
 
@@ -165,12 +167,32 @@ impl Axis {
         }
     }
 
+    /// Whether a plane with this normal (turned) passes below a voxel in it, as the voxel is shifted.
+    fn is_below(self, [p, q, along]: [i64; 3]) -> bool {
+        let shifts = match self {
+            Self::X => [p, along, q],
+            Self::Y => [p, q, -along],
+            Self::Z => [-along, p, q],
+        };
+        let towards = shifts.into_iter().find(|shift| *shift != 0).unwrap_or(0);
+        (towards > 0) == (along > 0)
+    }
+
     /// The voxel at coordinates (p, q) of a line, and at this place on its own axis.
     pub fn voxel(self, [p, q]: [i64; 2], along: i32) -> [i32; 3] {
         match self {
             Self::X => [along, q as i32, -p as i32],
             Self::Y => [q as i32, along, -p as i32],
             Self::Z => [p as i32, q as i32, along],
+        }
+    }
+
+    /// The way to a line whose coordinates differ by this much.
+    pub fn beside(self, [p, q]: [f64; 2]) -> [f64; 3] {
+        match self {
+            Self::X => [0.0, q, -p],
+            Self::Y => [q, 0.0, -p],
+            Self::Z => [p, q, 0.0],
         }
     }
 
@@ -186,7 +208,7 @@ impl Axis {
 }
 
 /// Calls `see` with each line through voxels that a face crosses: the line's coordinates, the place on its axis
-/// (cells), and how the winding number changes there in the direction of the axis.
+/// (cells; never on a voxel, but beside it), and how the winding number changes there in the direction of the axis.
 pub fn each_crossing(
     face: &Face,
     axis: Axis,
@@ -215,11 +237,30 @@ pub fn each_crossing(
         let right = (right / UNITS as f64).ceil() as i64 + 1;
         for p in left.max(p0)..=right.min(p1) {
             if let Some(height) = crossing_height(heights, flat, area, [p * unit, q * unit]) {
-                // A crossing on a voxel is one, whatever rounding says.
-                let on_voxel = (height - height.round()).abs() < SAME;
-                see([p, q], mirror * if on_voxel { height.round() } else { height }, change);
+                let height = if (height - height.round()).abs() < NEAR {
+                    let voxel = [p, q, height.round() as i64];
+                    height.round() + if passes_below(&v, axis, voxel) { -BESIDE } else { BESIDE }
+                } else {
+                    height
+                };
+                see([p, q], mirror * height, change);
             }
         }
+    }
+}
+
+/// Whether the plane of a face (turned) passes below a voxel (turned, in cells), exactly.
+fn passes_below(v: &[[i64; 3]; 3], axis: Axis, voxel: [i64; 3]) -> bool {
+    let [e, f] = [1, 2].map(|corner| [0, 1, 2].map(|a| v[corner][a] - v[0][a]));
+    let normal = [0, 1, 2].map(|a| {
+        let (b, c) = ((a + 1) % 3, (a + 2) % 3);
+        e[b] * f[c] - e[c] * f[b]
+    });
+    let off = |a: usize| i128::from(voxel[a] * i64::from(UNITS) - v[0][a]);
+    let height: i128 = (0..3).map(|a| i128::from(normal[a]) * off(a)).sum();
+    match height {
+        0 => axis.is_below(normal),
+        _ => (height > 0) == (normal[2] > 0),
     }
 }
 

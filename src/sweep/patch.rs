@@ -1,0 +1,153 @@
+//! The surface of a stack of sheets.
+//!
+//! What turns about an axis of near symmetry sweeps hundreds of sheets that nearly coincide; its surface is a mosaic
+//! of slivers, too small for each to be asked. But it is smooth but for its edges, and lines through voxels meet it
+//! at least once a cell: there the plane of the outermost face is the surface, as far around as the volume lies
+//! close behind it and nothing in front.
+
+use rayon::prelude::*;
+
+use super::cells::{Cells, Point, cross, difference, dot};
+use super::exposure::{Exposure, Spot};
+use super::lattice::{Fixed, UNITS};
+use super::prism::Bundle;
+use super::surface::Facet;
+use crate::context::Context;
+use crate::error::Result;
+
+/// How far (cells) the surface may lie from a patch.
+const OFF: f64 = 0.04;
+/// How far the surface may lie from a patch's plane on the lines beside its own: then it is nearer between them.
+const OFF_BESIDE: f64 = 2.0 * OFF;
+/// Half the edge of a patch (cells, seen along its line), where the lines beside it carry on.
+const HALF: f64 = 0.51;
+/// How far (cells) a patch reaches where they do not.
+const REACH: f64 = 1.0;
+/// Halvings that find where the surface leaves a patch's plane: to 1/16 of its reach.
+const HALVINGS: usize = 3;
+/// A patch that reaches less far than this on average leaves its face to speak for itself.
+const LEAST: f64 = 0.25;
+/// Spots that a task handles: fixed, so that nothing depends on the number of threads.
+const GRAIN: usize = 128;
+/// The ways that a patch reaches, in its plane.
+const WAYS: [[f64; 2]; 8] =
+    [[1.0, 0.0], [0.7, 0.7], [0.0, 1.0], [-0.7, 0.7], [-1.0, 0.0], [-0.7, -0.7], [0.0, -1.0], [0.7, -0.7]];
+
+/// Asks how far the planes of faces are the surface, on one thread.
+struct Patches<'a> {
+    cells: &'a Cells,
+    exposure: &'a Exposure,
+    bundle: Bundle,
+}
+
+/// Patches of the surface around the spots of stacks.
+///
+/// # Errors
+/// Cancel.
+pub fn patches(ctx: &Context, cells: &Cells, exposure: &Exposure) -> Result<Vec<Facet>> {
+    let asks = || Patches { cells, exposure, bundle: Bundle::default() };
+    let make = |asks: &mut Patches<'_>, spots: &[Spot]| {
+        let mut out = Vec::with_capacity(spots.len() * 2);
+        spots.iter().take_while(|_| ctx.check().is_ok()).for_each(|spot| asks.patch(spot, &mut out));
+        out
+    };
+    let parts: Vec<Vec<Facet>> = exposure.spots_of_stacks(cells).par_chunks(GRAIN).map_init(asks, make).collect();
+    ctx.check()?;
+    Ok(parts.concat())
+}
+
+impl Patches<'_> {
+    /// Adds the patch around a spot.
+    fn patch(&mut self, spot: &Spot, out: &mut Vec<Facet>) {
+        let face = spot.face;
+        let normal = unit(self.cells.normals[face as usize]);
+        if self.carries_on(spot, &normal) {
+            let corner = |[p, q]: [f64; 2]| fixed(on_plane(spot, &normal, [p * HALF, q * HALF]));
+            let [a, b, c, d] = [[-1.0, -1.0], [1.0, -1.0], [1.0, 1.0], [-1.0, 1.0]].map(corner);
+            let facets = [[a, b, c], [a, c, d]];
+            out.extend(facets.map(|v| Facet { v: facing(v, &normal), face, sure: true }));
+            return;
+        }
+        let (centre, [u, v]) = (spot.at(), across(normal));
+        let place = |[a, b]: [f64; 2], part: f64| {
+            [0, 1, 2].map(|axis| centre[axis] + (a * u[axis] + b * v[axis]) * part * REACH)
+        };
+        let reaches = WAYS.map(|way| self.reach(&normal, |part| place(way, part)));
+        let rim: [Point; 8] = std::array::from_fn(|index| place(WAYS[index], reaches[index]));
+        let facet = |index: usize| [centre, rim[index], rim[(index + 1) % 8]].map(fixed);
+        out.extend((0..8).map(|index| Facet { v: facet(index), face, sure: true }));
+        if reaches.iter().sum::<f64>() < LEAST * 8.0 {
+            out.push(Facet { v: self.cells.faces[face as usize].v, face, sure: false });
+        }
+    }
+
+    /// Whether all lines around that of a spot meet the surface in the plane of its face.
+    fn carries_on(&self, spot: &Spot, normal: &Point) -> bool {
+        let slope = normal[spot.axis.index()].abs();
+        let beside = (-1..=1).flat_map(|p| (-1..=1).map(move |q| [p, q])).filter(|beside| *beside != [0, 0]);
+        beside.into_iter().all(|[p, q]| {
+            let place = on_plane(spot, normal, [p as f64, q as f64])[spot.axis.index()];
+            self.exposure.agrees(spot, [spot.line[0] + p, spot.line[1] + q], place, OFF_BESIDE / slope)
+        })
+    }
+
+    /// How far (0 to 1) along a way from the spot its plane is the surface.
+    fn reach(&mut self, normal: &Point, place: impl Fn(f64) -> Point) -> f64 {
+        let (mut first, mut last) = (0.0, 0.5);
+        if self.is_surface(place(0.5), normal) {
+            if self.is_surface(place(1.0), normal) {
+                return 1.0;
+            }
+            (first, last) = (0.5, 1.0);
+        }
+        for _ in 0..HALVINGS {
+            let half = (first + last) / 2.0;
+            let good = self.is_surface(place(half), normal);
+            (first, last) = if good { (half, last) } else { (first, half) };
+        }
+        first
+    }
+
+    /// Whether the volume lies close behind a point of a plane, and not in front.
+    fn is_surface(&mut self, at: Point, normal: &Point) -> bool {
+        let mut winding = |side: f64| {
+            let place = [0, 1, 2].map(|axis| (at[axis] + side * OFF * normal[axis]) * f64::from(UNITS));
+            self.cells.windings(place, place, &mut self.bundle)[0]
+        };
+        winding(1.0) < 1 && winding(-1.0) >= 1
+    }
+}
+
+/// The point of a spot's plane on the line that lies so far beside its own (cells).
+fn on_plane(spot: &Spot, normal: &Point, [p, q]: [f64; 2]) -> Point {
+    let way = spot.axis.beside([p, q]);
+    let mut at = spot.at();
+    let rise = -dot(normal, &way) / normal[spot.axis.index()];
+    (0..3).for_each(|axis| at[axis] += way[axis]);
+    at[spot.axis.index()] += rise;
+    at
+}
+
+fn fixed(at: Point) -> Fixed {
+    at.map(|cells| (cells * f64::from(UNITS)).round() as i32)
+}
+
+/// A triangle, turned so that it faces along a normal.
+fn facing([a, b, c]: [Fixed; 3], normal: &Point) -> [Fixed; 3] {
+    let own = cross(difference(&b, &a), difference(&c, &a));
+    if dot(&own, normal) < 0.0 { [a, c, b] } else { [a, b, c] }
+}
+
+fn unit(v: Point) -> Point {
+    let length = dot(&v, &v).sqrt();
+    v.map(|value| value / length)
+}
+
+/// Two unit vectors at right angles to a third and to each other.
+fn across(normal: Point) -> [Point; 2] {
+    let least = (1..3).fold(0, |least, axis| if normal[axis].abs() < normal[least].abs() { axis } else { least });
+    let mut axis = [0.0; 3];
+    axis[least] = 1.0;
+    let u = unit(cross(normal, axis));
+    [u, cross(normal, u)]
+}
