@@ -246,14 +246,20 @@ impl Body {
         let arcs = (bend.sqrt() / tolerance).sqrt();
         let ends = [probes[0], probes[4]];
         let own = self.shape.topology.own_vertices as u32;
+        // As many as give the faces that edges sweep, cut into as many pieces as they then need, a good shape: pieces as
+        // long as a step's way.
         let twist = |edge: &[u32; 2]| {
             let error = if edge[1] < own { edge_error(&ends, *edge) } else { 0.0 };
-            if error > tolerance && near.sees(&ends, edge) { error } else { 0.0 }
+            if error <= tolerance || !near.sees(&ends, edge) {
+                return 0.0;
+            }
+            let [i, j] = edge.map(|vertex| vertex as usize);
+            let way = (ends[1][i] - ends[0][i]).norm().max((ends[1][j] - ends[0][j]).norm());
+            let length = (ends[0][i] - ends[0][j]).norm().max((ends[1][i] - ends[1][j]).norm());
+            (error / tolerance * way / length).sqrt()
         };
-        let twist =
+        let twists =
             self.shape.topology.edges.par_iter().with_min_len(GRAIN).map(twist).reduce(|| 0.0, f64::max);
-        // As many steps as pieces an edge: faces then keep a good shape.
-        let twists = (twist / tolerance).sqrt();
         arcs.max(twists).ceil().clamp(1.0, MOST_STEPS) as usize
     }
 

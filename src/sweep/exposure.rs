@@ -26,9 +26,13 @@ pub const THIN: f64 = 0.05;
 const GRAIN: usize = 2048;
 /// Crossings near a voxel and its six neighbours from which on its cell is a stack of sheets: a single one meets
 /// at most some ten of their lines.
-const STACK: u32 = 96;
+const STACK: u32 = 40;
+/// Sheets this close together (cells) count as a stack.
+const CLOSE: f64 = 0.1;
+/// How many of them do.
+const BUNDLE: usize = 3;
 /// Faces in a cell from which on a stack is crowded.
-const CROWD: usize = 96;
+const CROWD: usize = 32;
 /// Gaps between sheets that are narrower than this (cells), and do not hold a voxel, are none.
 const CLOSED: f64 = 0.01;
 /// Least cosine between a line and the normal of a face whose plane it speaks for: one of three axes has it.
@@ -44,8 +48,8 @@ pub struct Exposure {
     by_face: Vec<u32>,
     /// For each pair of neighbour voxels with surface between them, how far the first and the second one are from it.
     pairs: Vec<(Pair, [f32; 2])>,
-    /// Whether each cell holds a stack.
-    stacks: Vec<bool>,
+    /// Whether each cell holds a stack: so many sheets, or sheets so close together, that its surface is made of patches.
+    pub stacks: Vec<bool>,
 }
 
 /// A voxel and its neighbour above along an axis.
@@ -100,12 +104,13 @@ impl Exposure {
     pub fn scan(cells: &Cells) -> Self {
         let faces: Vec<AtomicU8> = cells.faces.iter().map(|_| AtomicU8::new(0)).collect();
         let counts: Vec<AtomicU16> = (0..cells.count()).map(|_| AtomicU16::new(0)).collect();
+        let stacks: Vec<AtomicBool> = (0..cells.count()).map(|_| AtomicBool::new(false)).collect();
         let (mut spots, mut pairs) = (Vec::new(), Vec::new());
         for axis in Axis::ALL {
             let crossings = crossings(cells, axis, &counts);
             let same_line = |a: &Crossing, b: &Crossing| a.line == b.line;
             let walk = |mut seen: Seen, line: &[Crossing]| {
-                walk(cells, axis, line, &faces, &mut seen);
+                walk(cells, axis, line, &faces, &stacks, &mut seen);
                 seen
             };
             let parts: Vec<Seen> = crossings.par_chunk_by(same_line).fold(Seen::default, walk).collect();
@@ -118,8 +123,9 @@ impl Exposure {
         by_face.par_sort_by_key(|&spot| spots[spot as usize].face);
         pairs.par_sort_unstable_by_key(|(pair, _)| *pair);
         let faces = faces.into_iter().map(AtomicU8::into_inner).collect();
-        let counts: Vec<u16> = counts.into_iter().map(AtomicU16::into_inner).collect();
-        Self { faces, spots, by_face, pairs, stacks: stacks(cells, &counts) }
+        mark_crowds(cells, &counts, &stacks);
+        let stacks = stacks.into_iter().map(AtomicBool::into_inner).collect();
+        Self { faces, spots, by_face, pairs, stacks }
     }
 
     /// Whether the cell around a voxel holds so many sheets, one behind the other, that only exposed ones are kept.
@@ -172,20 +178,20 @@ impl Exposure {
     }
 }
 
-/// Which cells hold many sheets one behind the other, from the number of crossings near each.
-fn stacks(cells: &Cells, counts: &[u16]) -> Vec<bool> {
-    let stacks: Vec<AtomicBool> = counts.iter().map(|_| AtomicBool::new(false)).collect();
+/// Marks the cells that hold many sheets one behind the other, from the number of crossings near each.
+fn mark_crowds(cells: &Cells, counts: &[AtomicU16], stacks: &[AtomicBool]) {
     cells.for_each_crowd(CROWD, |cell, voxel| {
-        let count = |voxel| cells.of_voxel(voxel).map_or(0, |cell| u32::from(counts[cell]));
+        let count = |voxel| cells.of_voxel(voxel).map_or(0, |cell| u32::from(counts[cell].load(Ordering::Relaxed)));
         let beside = |axis: usize, step: i32| {
             let mut place = voxel;
             place[axis] += step;
             count(place)
         };
         let around: u32 = (0..3).map(|axis| beside(axis, -1) + beside(axis, 1)).sum();
-        stacks[cell].store(count(voxel) + around >= STACK, Ordering::Relaxed);
+        if count(voxel) + around >= STACK {
+            stacks[cell].store(true, Ordering::Relaxed);
+        }
     });
-    stacks.into_iter().map(AtomicBool::into_inner).collect()
 }
 
 /// Every crossing of the lines along an axis within the cells' blocks, line after line, upward.
@@ -222,7 +228,14 @@ fn crossings(cells: &Cells, axis: Axis, counts: &[AtomicU16]) -> Vec<Crossing> {
 }
 
 /// Goes along one line: marks faces, and notes where the winding number passes between 0 and 1.
-fn walk(cells: &Cells, axis: Axis, line: &[Crossing], faces: &[AtomicU8], seen: &mut Seen) {
+fn walk(
+    cells: &Cells,
+    axis: Axis,
+    line: &[Crossing],
+    faces: &[AtomicU8],
+    stacks: &[AtomicBool],
+    seen: &mut Seen,
+) {
     let coordinates = line[0].line;
     for run in line.chunk_by(|a, b| a.at.floor() == b.at.floor()) {
         let edge = run[0].at.floor() as i32;
@@ -248,6 +261,14 @@ fn walk(cells: &Cells, axis: Axis, line: &[Crossing], faces: &[AtomicU8], seen: 
             normal[axis.index()].abs() / dot(normal, normal).sqrt()
         };
         let passages = &seen.spots[begin..];
+        for spot in passages {
+            let slope = slope(spot.face);
+            let close = run.iter().filter(|crossing| (crossing.at - spot.place).abs() * slope <= CLOSE);
+            if close.count() >= BUNDLE {
+                let ends = [edge, edge + 1].map(|along| cells.of_voxel(axis.voxel(coordinates, along)));
+                ends.into_iter().flatten().for_each(|cell| stacks[cell].store(true, Ordering::Relaxed));
+            }
+        }
         for crossing in run {
             let slope = slope(crossing.face);
             let shallow = passages.iter().any(|passage| (crossing.at - passage.place).abs() * slope <= THIN);

@@ -42,12 +42,19 @@ const HAIR: f64 = 0.005 * UNITS as f64;
 const THIN_HAIRS: f64 = THIN * UNITS as f64 / HAIR;
 /// Faces longer than this (cells) are asked at more than one point.
 const SMALL: f32 = 1.5;
+/// Parts that are open only in part are cut down to this (cells) before they are clipped.
+const FINE: f32 = 0.75;
 /// Distance of the points that a long face is asked at (fixed-point units).
 const SPACING: f64 = 1.2 * UNITS as f64;
 /// A corner is asked for this part of the way to the middle, away from what it shares with neighbours.
 const INSET: f64 = 0.05;
 /// Halvings that find where an edge dives: to 1/16 of its length.
 const HALVINGS: usize = 3;
+/// A cell holds a stack, whose surface is made of patches.
+const STACK: u8 = 4;
+/// A cell holds none.
+const LOOSE: u8 = 8;
+const OPEN_AND_LOOSE: u8 = OPEN | LOOSE;
 /// Faces a task handles: fixed, so that nothing depends on the number of threads.
 const GRAIN: usize = 128;
 
@@ -72,7 +79,7 @@ pub fn surface(ctx: &Context, cells: &Cells, exposure: &Exposure) -> Result<Vec<
     ctx.check()?;
     let mut verdicts = vec![0; sorted.len()];
     order.iter().zip(sorted).for_each(|(&id, verdict)| verdicts[id as usize] = verdict);
-    let (around, seen) = neighbourhoods(cells, &verdicts);
+    let (around, seen) = neighbourhoods(cells, exposure, &verdicts);
     let open_parts = |chain: &mut Surface<'_>, ids: &[u32]| {
         let (mut out, mut parts) = (Vec::with_capacity(ids.len()), Vec::new());
         for &face in ids.iter().take_while(|_| ctx.check().is_ok()) {
@@ -98,12 +105,13 @@ fn order(cells: &Cells) -> Vec<u32> {
     places.into_iter().map(|(_, id)| id).collect()
 }
 
-/// For each cell what its faces said, and for each face what was said in its cells.
-fn neighbourhoods(cells: &Cells, verdicts: &[u8]) -> (Vec<u8>, Vec<u8>) {
+/// For each cell what its faces said and whether it holds a stack, and for each face that of all its cells.
+fn neighbourhoods(cells: &Cells, exposure: &Exposure, verdicts: &[u8]) -> (Vec<u8>, Vec<u8>) {
     let seen: Vec<AtomicU8> = verdicts.iter().map(|_| AtomicU8::new(0)).collect();
     let around: Vec<AtomicU8> = (0..cells.count()).map(|_| AtomicU8::new(0)).collect();
     cells.for_each(|cell, ids| {
-        let said = ids.iter().fold(0, |said, &id| said | verdicts[id as usize]);
+        let kind = if exposure.stacks[cell] { STACK } else { LOOSE };
+        let said = ids.iter().fold(kind, |said, &id| said | verdicts[id as usize]);
         around[cell].store(said, Ordering::Relaxed);
         for &id in ids {
             seen[id as usize].fetch_or(said, Ordering::Relaxed);
@@ -160,8 +168,8 @@ impl Surface<'_> {
     fn open_parts(&mut self, id: usize, said: u8, seen: u8, around: &[u8], out: &mut Vec<Part>) {
         let (v, Some(ahead)) = (self.cells.faces[id].v, ahead(self.cells, id)) else { return };
         match seen {
-            OPEN => out.push((v, true)),
-            BURIED => {}
+            OPEN_AND_LOOSE => out.push((v, true)),
+            _ if seen & LOOSE == 0 || seen & !(STACK | LOOSE) == BURIED => {}
             _ => {
                 self.cut(id, v, said, ahead, around, out);
             }
@@ -183,15 +191,14 @@ impl Surface<'_> {
     fn dice(&mut self, id: usize, v: Corners, ahead: Point, around: &[u8], out: &mut Vec<Part>) -> bool {
         match self.seen_around(id, v, around) {
             // Nothing was said where no distance is wanted.
-            0 | OPEN => {
+            0 | LOOSE | OPEN_AND_LOOSE => {
                 out.push((v, true));
                 true
             }
-            BURIED => false,
+            seen if seen & LOOSE == 0 || seen & !(STACK | LOOSE) == BURIED => false,
             _ => {
-                let stack = self.exposure.is_stack(self.cells, voxel_of(middle(&v)));
                 let exposed = self.exposure.within(id as u32, extent(&v));
-                let said = if stack { 0 } else { self.said(&v, ahead) | if exposed { OPEN } else { 0 } };
+                let said = self.said(&v, ahead) | if exposed { OPEN } else { 0 };
                 self.cut(id, v, said, ahead, around, out)
             }
         }
@@ -221,7 +228,6 @@ impl Surface<'_> {
             return false;
         }
         let open = match said {
-            OPEN if !stack => true,
             BURIED if !stack => false,
             _ => halves(v).map(|half| self.dice(id, half, ahead, around, out)) == [true; 2],
         };
@@ -249,6 +255,9 @@ impl Surface<'_> {
                 out.push((v, true));
             }
             return;
+        }
+        if !is_within(&v, FINE) {
+            return halves(v).into_iter().for_each(|half| self.clip(half, ahead, out));
         }
         if count % 3 == 0 {
             let centre = centre.map(|value| value.round() as i32);
@@ -295,8 +304,13 @@ impl Surface<'_> {
 }
 
 fn is_small(v: &Corners) -> bool {
+    is_within(v, SMALL)
+}
+
+/// Whether a triangle's box has no longer side (cells).
+fn is_within(v: &Corners, side: f32) -> bool {
     let (low, high) = extent(v);
-    (0..3).all(|axis| high[axis] - low[axis] <= SMALL)
+    (0..3).all(|axis| high[axis] - low[axis] <= side)
 }
 
 /// Calls `see` with the middle of a small triangle; with points about [`SPACING`] apart in rows along its
