@@ -84,7 +84,7 @@ pub fn surface(ctx: &Context, cells: &Cells, exposure: &Exposure) -> Result<Vec<
         let (mut out, mut parts) = (Vec::with_capacity(ids.len()), Vec::new());
         for &face in ids.iter().take_while(|_| ctx.check().is_ok()) {
             let id = face as usize;
-            chain.open_parts(id, verdicts[id], seen[id], &around, &mut parts);
+            chain.open_parts(id, seen[id], &around, &mut parts);
             out.extend(parts.drain(..).map(|(v, sure)| Facet { v, face, sure }));
         }
         out
@@ -160,18 +160,18 @@ impl Surface<'_> {
     /// What the samples of a part of a face say.
     fn said(&mut self, v: &Corners, ahead: Point) -> u8 {
         let mut said = 0;
-        each_sample(v, |at| said |= if self.is_known(at) { self.ask(at, ahead) } else { 0 });
+        each_sample(v, |at| said |= if self.is_asked(at) { self.ask(at, ahead) } else { 0 });
         said
     }
 
-    /// Adds the open parts of a face, from what it and what all faces in its cells said.
-    fn open_parts(&mut self, id: usize, said: u8, seen: u8, around: &[u8], out: &mut Vec<Part>) {
+    /// Adds the open parts of a face, from what all faces in its cells said.
+    fn open_parts(&mut self, id: usize, seen: u8, around: &[u8], out: &mut Vec<Part>) {
         let (v, Some(ahead)) = (self.cells.faces[id].v, ahead(self.cells, id)) else { return };
         match seen {
             OPEN_AND_LOOSE => out.push((v, true)),
             _ if seen & LOOSE == 0 || seen & !(STACK | LOOSE) == BURIED => {}
             _ => {
-                self.cut(id, v, said, ahead, around, out);
+                self.cut(id, v, ahead, around, out);
             }
         }
     }
@@ -196,47 +196,30 @@ impl Surface<'_> {
                 true
             }
             seen if seen & LOOSE == 0 || seen & !(STACK | LOOSE) == BURIED => false,
-            _ => {
-                let exposed = self.exposure.within(id as u32, extent(&v));
-                let said = self.said(&v, ahead) | if exposed { OPEN } else { 0 };
-                self.cut(id, v, said, ahead, around, out)
-            }
+            _ => self.cut(id, v, ahead, around, out),
         }
     }
 
-    /// As [`Surface::dice`], for a part that said this and has open and buried faces around it.
-    fn cut(
-        &mut self,
-        id: usize,
-        v: Corners,
-        said: u8,
-        ahead: Point,
-        around: &[u8],
-        out: &mut Vec<Part>,
-    ) -> bool {
+    /// As [`Surface::dice`], for a part that has open and buried faces, or stacks, around it.
+    fn cut(&mut self, id: usize, v: Corners, ahead: Point, around: &[u8], out: &mut Vec<Part>) -> bool {
         let begin = out.len();
-        let stack = self.exposure.is_stack(self.cells, voxel_of(middle(&v)));
-        if is_small(&v) {
-            if !stack {
-                self.clip(v, ahead, out);
-                if out.len() == begin && self.exposure.within(id as u32, extent(&v)) {
-                    out.push((v, false));
-                }
-                return out[begin..] == [(v, true)];
+        if !is_small(&v) {
+            let open = halves(v).map(|half| self.dice(id, half, ahead, around, out)) == [true; 2];
+            if open {
+                let sure = out[begin..].iter().all(|(_, sure)| *sure);
+                out.truncate(begin);
+                out.push((v, sure));
             }
-            // See [`super::patch`].
+            return open;
+        }
+        if self.exposure.is_stack(self.cells, voxel_of(middle(&v))) {
             return false;
         }
-        let open = match said {
-            BURIED if !stack => false,
-            _ => halves(v).map(|half| self.dice(id, half, ahead, around, out)) == [true; 2],
-        };
-        if open {
-            let sure = begin < out.len() && out[begin..].iter().all(|(_, sure)| *sure);
-            out.truncate(begin);
-            out.push((v, sure));
+        self.clip(v, ahead, out);
+        if out.len() == begin && self.exposure.within(id as u32, extent(&v)) {
+            out.push((v, false));
         }
-        open
+        out[begin..] == [(v, true)]
     }
 
     fn corners(&mut self, v: Corners, ahead: Point) -> [u8; 3] {
@@ -297,9 +280,9 @@ impl Surface<'_> {
         ask(self.cells, self.exposure, at, ahead, &mut self.bundle)
     }
 
-    /// Whether distances may be wanted near a point.
-    fn is_known(&self, at: Point) -> bool {
-        self.cells.of_voxel(voxel_of(at)).is_some()
+    /// Whether distances may be wanted near a point, and no stack's patches give them.
+    fn is_asked(&self, at: Point) -> bool {
+        self.cells.of_voxel(voxel_of(at)).is_some_and(|cell| !self.exposure.stacks[cell])
     }
 }
 
