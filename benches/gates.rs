@@ -1,5 +1,7 @@
 //! Every promise with a number: `make gates [ONLY=prefix,...]`.
 
+#[path = "gates/band.rs"]
+mod band;
 #[path = "gates/bytes.rs"]
 mod bytes;
 #[path = "gates/cancel.rs"]
@@ -10,6 +12,8 @@ mod capi;
 mod common;
 #[path = "gates/damage.rs"]
 mod damage;
+#[path = "gates/dense.rs"]
+mod dense;
 #[path = "gates/far.rs"]
 mod far;
 #[path = "gates/flip.rs"]
@@ -30,6 +34,8 @@ mod shot;
 mod snow;
 #[path = "gates/speed.rs"]
 mod speed;
+#[path = "gates/spin.rs"]
+mod spin;
 #[path = "gates/sweeps.rs"]
 mod sweeps;
 
@@ -54,6 +60,8 @@ fn main() {
     cancel::run(&mut h);
     flip::run(&mut h);
     far::run(&mut h);
+    band::run(&mut h);
+    spin::run(&mut h);
     damage::run(&mut h);
     h.finish();
 }

@@ -3,12 +3,14 @@
 //! Between two poses each triangle sweeps a prism, split into three tetrahedra by ascending vertex
 //! number so that neighbours match: T1 = (a0 a1 a2 b2), T2 = (a0 a1 b1 b2), T3 = (a0 b0 b1 b2), a the
 //! earlier and b the later pose. The chain is the solid at the first pose plus every tetrahedron
-//! through which the surface moves outward; points with winding number > 0 are the swept volume.
+//! through which the surface moves outward (but see [`super::folds`]); points with winding number > 0 are the swept
+//! volume.
 //! Only the boundary of the chain is made: faces between two tetrahedra that are both in the chain,
 //! or both out of it, cancel by counting and are never built.
 
 use rayon::prelude::*;
 
+use super::folds::drop_returns;
 use super::lattice::{Fixed, UNITS};
 use super::topology::Topology;
 
@@ -51,7 +53,7 @@ impl Window {
 }
 
 /// Outward motion below this (fixed-point units) counts as none: rounding would else decide it.
-const STILL: f64 = 4.0 / 4096.0 * UNITS as f64;
+pub const STILL: f64 = 4.0 / 4096.0 * UNITS as f64;
 /// Triangles or edges a task handles: fixed, so that the order of faces never depends on threads.
 const GRAIN: usize = 2048;
 
@@ -68,6 +70,7 @@ pub fn boundary(topology: &Topology, levels: &[Vec<Fixed>], weights: Weights, wi
                 mark_outward(topology, levels, chunk * GRAIN + index, window, bits);
             }
         });
+        drop_returns(topology, levels, window, &mut outward);
         chunks(triangles, |triangle, out| {
             let bits = &outward[triangle * steps..(triangle + 1) * steps];
             caps(topology, levels, triangle, bits, weights, window, out);

@@ -27,7 +27,7 @@ const GRAIN: usize = 2048;
 /// Crossings near a voxel and its six neighbours from which on its cell is a stack of sheets: a single one meets
 /// at most some ten of their lines.
 const STACK: u32 = 40;
-/// Sheets this close together (cells) count as a stack.
+/// Sheets this close together (cells) are a bundle.
 const CLOSE: f64 = 0.1;
 /// How many of them do.
 const BUNDLE: usize = 3;
@@ -48,8 +48,10 @@ pub struct Exposure {
     by_face: Vec<u32>,
     /// For each pair of neighbour voxels with surface between them, how far the first and the second one are from it.
     pairs: Vec<(Pair, [f32; 2])>,
-    /// Whether each cell holds a stack: so many sheets, or sheets so close together, that its surface is made of patches.
+    /// Whether each cell holds a stack: so many sheets that its surface is made of patches alone.
     pub stacks: Vec<bool>,
+    /// Whether each cell holds a stack, or a bundle: sheets so close together that patches are added.
+    bundles: Vec<bool>,
 }
 
 /// A voxel and its neighbour above along an axis.
@@ -104,13 +106,14 @@ impl Exposure {
     pub fn scan(cells: &Cells) -> Self {
         let faces: Vec<AtomicU8> = cells.faces.iter().map(|_| AtomicU8::new(0)).collect();
         let counts: Vec<AtomicU16> = (0..cells.count()).map(|_| AtomicU16::new(0)).collect();
-        let stacks: Vec<AtomicBool> = (0..cells.count()).map(|_| AtomicBool::new(false)).collect();
+        let none = || -> Vec<AtomicBool> { (0..cells.count()).map(|_| AtomicBool::new(false)).collect() };
+        let (stacks, bundles) = (none(), none());
         let (mut spots, mut pairs) = (Vec::new(), Vec::new());
         for axis in Axis::ALL {
             let crossings = crossings(cells, axis, &counts);
             let same_line = |a: &Crossing, b: &Crossing| a.line == b.line;
             let walk = |mut seen: Seen, line: &[Crossing]| {
-                walk(cells, axis, line, &faces, &stacks, &mut seen);
+                walk(cells, axis, line, &faces, &bundles, &mut seen);
                 seen
             };
             let parts: Vec<Seen> = crossings.par_chunk_by(same_line).fold(Seen::default, walk).collect();
@@ -124,8 +127,10 @@ impl Exposure {
         pairs.par_sort_unstable_by_key(|(pair, _)| *pair);
         let faces = faces.into_iter().map(AtomicU8::into_inner).collect();
         mark_crowds(cells, &counts, &stacks);
-        let stacks = stacks.into_iter().map(AtomicBool::into_inner).collect();
-        Self { faces, spots, by_face, pairs, stacks }
+        let plain = |flags: Vec<AtomicBool>| flags.into_iter().map(AtomicBool::into_inner);
+        let stacks: Vec<bool> = plain(stacks).collect();
+        let bundles = plain(bundles).zip(&stacks).map(|(bundle, stack)| bundle | stack).collect();
+        Self { faces, spots, by_face, pairs, stacks, bundles }
     }
 
     /// Whether the cell around a voxel holds so many sheets, one behind the other, that only exposed ones are kept.
@@ -144,15 +149,15 @@ impl Exposure {
         })
     }
 
-    /// The spots in stacks where lines meet their faces steeply, cell after cell.
-    pub fn spots_of_stacks(&self, cells: &Cells) -> Vec<Spot> {
+    /// The spots in stacks and bundles where lines meet their faces steeply, cell after cell.
+    pub fn spots_of_bundles(&self, cells: &Cells) -> Vec<Spot> {
         let cell = |spot: &Spot| cells.of_voxel(spot.at().map(|value| value.round() as i32));
         let is_steep = |spot: &Spot| {
             let normal = &cells.normals[spot.face as usize];
             normal[spot.axis.index()].abs() >= STEEP * dot(normal, normal).sqrt()
         };
         let wanted = |spot: &Spot| {
-            let cell = cell(spot).filter(|&cell| self.stacks[cell])?;
+            let cell = cell(spot).filter(|&cell| self.bundles[cell])?;
             is_steep(spot).then_some((cell, *spot))
         };
         let mut spots: Vec<(usize, Spot)> = self.spots.par_iter().filter_map(wanted).collect();
@@ -181,7 +186,8 @@ impl Exposure {
 /// Marks the cells that hold many sheets one behind the other, from the number of crossings near each.
 fn mark_crowds(cells: &Cells, counts: &[AtomicU16], stacks: &[AtomicBool]) {
     cells.for_each_crowd(CROWD, |cell, voxel| {
-        let count = |voxel| cells.of_voxel(voxel).map_or(0, |cell| u32::from(counts[cell].load(Ordering::Relaxed)));
+        let count =
+            |voxel| cells.of_voxel(voxel).map_or(0, |cell| u32::from(counts[cell].load(Ordering::Relaxed)));
         let beside = |axis: usize, step: i32| {
             let mut place = voxel;
             place[axis] += step;
@@ -233,7 +239,7 @@ fn walk(
     axis: Axis,
     line: &[Crossing],
     faces: &[AtomicU8],
-    stacks: &[AtomicBool],
+    bundles: &[AtomicBool],
     seen: &mut Seen,
 ) {
     let coordinates = line[0].line;
@@ -266,7 +272,7 @@ fn walk(
             let close = run.iter().filter(|crossing| (crossing.at - spot.place).abs() * slope <= CLOSE);
             if close.count() >= BUNDLE {
                 let ends = [edge, edge + 1].map(|along| cells.of_voxel(axis.voxel(coordinates, along)));
-                ends.into_iter().flatten().for_each(|cell| stacks[cell].store(true, Ordering::Relaxed));
+                ends.into_iter().flatten().for_each(|cell| bundles[cell].store(true, Ordering::Relaxed));
             }
         }
         for crossing in run {

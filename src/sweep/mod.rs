@@ -11,6 +11,7 @@ mod cells;
 mod chain;
 mod distance;
 mod exposure;
+mod folds;
 mod lattice;
 mod nearest;
 mod patch;

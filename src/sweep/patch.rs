@@ -23,15 +23,14 @@ const OFF_BESIDE: f64 = 2.0 * OFF;
 const HALF: f64 = 0.51;
 /// How far (cells) a patch reaches where they do not.
 const REACH: f64 = 1.0;
-/// Halvings that find where the surface leaves a patch's plane: to 1/16 of its reach.
-const HALVINGS: usize = 3;
+/// Halvings that find where the surface leaves a patch's plane: to 1/64 of its reach.
+const HALVINGS: usize = 4;
 /// A patch that reaches less far than this on average leaves its face to speak for itself.
 const LEAST: f64 = 0.25;
 /// Spots that a task handles: fixed, so that nothing depends on the number of threads.
 const GRAIN: usize = 128;
-/// The ways that a patch reaches, in its plane.
-const WAYS: [[f64; 2]; 8] =
-    [[1.0, 0.0], [0.7, 0.7], [0.0, 1.0], [-0.7, 0.7], [-1.0, 0.0], [-0.7, -0.7], [0.0, -1.0], [0.7, -0.7]];
+/// In how many ways a patch reaches, in its plane.
+const WAYS: usize = 12;
 
 /// Asks how far the planes of faces are the surface, on one thread.
 struct Patches<'a> {
@@ -51,7 +50,8 @@ pub fn patches(ctx: &Context, cells: &Cells, exposure: &Exposure) -> Result<Vec<
         spots.iter().take_while(|_| ctx.check().is_ok()).for_each(|spot| asks.patch(spot, &mut out));
         out
     };
-    let parts: Vec<Vec<Facet>> = exposure.spots_of_stacks(cells).par_chunks(GRAIN).map_init(asks, make).collect();
+    let parts: Vec<Vec<Facet>> =
+        exposure.spots_of_bundles(cells).par_chunks(GRAIN).map_init(asks, make).collect();
     ctx.check()?;
     Ok(parts.concat())
 }
@@ -72,11 +72,15 @@ impl Patches<'_> {
         let place = |[a, b]: [f64; 2], part: f64| {
             [0, 1, 2].map(|axis| centre[axis] + (a * u[axis] + b * v[axis]) * part * REACH)
         };
-        let reaches = WAYS.map(|way| self.reach(&normal, |part| place(way, part)));
-        let rim: [Point; 8] = std::array::from_fn(|index| place(WAYS[index], reaches[index]));
-        let facet = |index: usize| [centre, rim[index], rim[(index + 1) % 8]].map(fixed);
-        out.extend((0..8).map(|index| Facet { v: facet(index), face, sure: true }));
-        if reaches.iter().sum::<f64>() < LEAST * 8.0 {
+        let ways: [[f64; 2]; WAYS] = std::array::from_fn(|way| {
+            let (sin, cos) = libm::sincos(std::f64::consts::TAU * way as f64 / WAYS as f64);
+            [cos, sin]
+        });
+        let reaches = ways.map(|way| self.reach(&normal, |part| place(way, part)));
+        let rim: [Point; WAYS] = std::array::from_fn(|index| place(ways[index], reaches[index]));
+        let facet = |index: usize| [centre, rim[index], rim[(index + 1) % WAYS]].map(fixed);
+        out.extend((0..WAYS).map(|index| Facet { v: facet(index), face, sure: true }));
+        if reaches.iter().sum::<f64>() < LEAST * WAYS as f64 {
             out.push(Facet { v: self.cells.faces[face as usize].v, face, sure: false });
         }
     }
@@ -105,7 +109,7 @@ impl Patches<'_> {
             let good = self.is_surface(place(half), normal);
             (first, last) = if good { (half, last) } else { (first, half) };
         }
-        first
+        (first + last) / 2.0
     }
 
     /// Whether the volume lies close behind a point of a plane, and not in front.
@@ -145,7 +149,8 @@ fn unit(v: Point) -> Point {
 
 /// Two unit vectors at right angles to a third and to each other.
 fn across(normal: Point) -> [Point; 2] {
-    let least = (1..3).fold(0, |least, axis| if normal[axis].abs() < normal[least].abs() { axis } else { least });
+    let least =
+        (1..3).fold(0, |least, axis| if normal[axis].abs() < normal[least].abs() { axis } else { least });
     let mut axis = [0.0; 3];
     axis[least] = 1.0;
     let u = unit(cross(normal, axis));

@@ -42,8 +42,6 @@ const HAIR: f64 = 0.005 * UNITS as f64;
 const THIN_HAIRS: f64 = THIN * UNITS as f64 / HAIR;
 /// Faces longer than this (cells) are asked at more than one point.
 const SMALL: f32 = 1.5;
-/// Parts that are open only in part are cut down to this (cells) before they are clipped.
-const FINE: f32 = 0.75;
 /// Distance of the points that a long face is asked at (fixed-point units).
 const SPACING: f64 = 1.2 * UNITS as f64;
 /// A corner is asked for this part of the way to the middle, away from what it shares with neighbours.
@@ -239,9 +237,6 @@ impl Surface<'_> {
             }
             return;
         }
-        if !is_within(&v, FINE) {
-            return halves(v).into_iter().for_each(|half| self.clip(half, ahead, out));
-        }
         if count % 3 == 0 {
             let centre = centre.map(|value| value.round() as i32);
             let fan = [[v[0], v[1], centre], [v[1], v[2], centre], [v[2], v[0], centre]];
@@ -287,13 +282,8 @@ impl Surface<'_> {
 }
 
 fn is_small(v: &Corners) -> bool {
-    is_within(v, SMALL)
-}
-
-/// Whether a triangle's box has no longer side (cells).
-fn is_within(v: &Corners, side: f32) -> bool {
     let (low, high) = extent(v);
-    (0..3).all(|axis| high[axis] - low[axis] <= side)
+    (0..3).all(|axis| high[axis] - low[axis] <= SMALL)
 }
 
 /// Calls `see` with the middle of a small triangle; with points about [`SPACING`] apart in rows along its

@@ -1,0 +1,178 @@
+//! Exact distances from the union of dense poses of a moving mesh: nothing of the sweep is used.
+
+use frazil::base::bvh::Bvh;
+use frazil::base::{DVec3, TriMesh, Vec3};
+use frazil::motion::Motion;
+use nalgebra::Rotation3;
+use rayon::prelude::*;
+
+/// Directions that a depth is looked for in.
+const DIRECTIONS: usize = 256;
+/// Halvings of the greatest depth.
+const HALVINGS: usize = 6;
+/// Directions of rays that tell inside from outside: two of three decide.
+const RAYS: [[f64; 3]; 3] = [[0.5377, 0.8339, -0.2259], [-0.8622, 0.3188, 0.4336], [0.3426, -0.4925, 0.8003]];
+
+/// Poses of a mesh; inside is where any of them winds around.
+pub struct Dense {
+    shapes: Vec<Shape>,
+    poses: Vec<Pose>,
+    directions: Vec<DVec3>,
+}
+
+/// A mesh in a tree, and the ball around it.
+struct Shape {
+    tree: Bvh,
+    corners: Vec<[DVec3; 3]>,
+    centre: DVec3,
+    radius: f64,
+}
+
+/// Where a shape is.
+struct Pose {
+    back: Rotation3<f64>,
+    at: DVec3,
+    shape: usize,
+}
+
+impl Dense {
+    /// One mesh at each of these rotations and places (m).
+    pub fn rigid(mesh: &TriMesh, poses: impl Iterator<Item = (Rotation3<f64>, DVec3)>) -> Self {
+        let poses = poses.map(|(rotation, at)| Pose { back: rotation.inverse(), at, shape: 0 });
+        Self { shapes: vec![Shape::new(mesh)], poses: poses.collect(), directions: directions() }
+    }
+
+    /// A motion at `count` times from 0 to 1.
+    pub fn posed(motion: &dyn Motion, count: usize) -> Self {
+        let shape = |index: usize| {
+            let mut pose = Vec::new();
+            motion.pose(index as f64 / (count - 1) as f64, &mut pose).expect("a pose");
+            let positions = pose.iter().map(|p| p.cast::<f32>()).collect();
+            Shape::new(&TriMesh { positions, triangles: motion.triangles().to_vec() })
+        };
+        let pose = |shape| Pose { back: Rotation3::identity(), at: DVec3::zeros(), shape };
+        Self {
+            shapes: (0..count).into_par_iter().map(shape).collect(),
+            poses: (0..count).map(pose).collect(),
+            directions: directions(),
+        }
+    }
+
+    /// Signed distance (m) of a point from the union, cut off at `limit`.
+    pub fn distance(&self, p: DVec3, limit: f64) -> f64 {
+        let mut hint = 0;
+        if self.is_inside(p, &mut hint) { -self.depth(p, limit, hint) } else { self.gap(p, limit) }
+    }
+
+    /// Whether a point lies in any pose; `hint` is the one that was right last.
+    fn is_inside(&self, p: DVec3, hint: &mut usize) -> bool {
+        let holds = |pose: &Pose| self.shapes[pose.shape].holds(pose.local(p));
+        if holds(&self.poses[*hint]) {
+            return true;
+        }
+        // From the hint outward: neighbours in time are likely.
+        let count = self.poses.len();
+        let order = (1..count).flat_map(|step| [hint.checked_sub(step), Some(*hint + step)]);
+        let found = order.flatten().filter(|&index| index < count).find(|&index| holds(&self.poses[index]));
+        *hint = found.unwrap_or(*hint);
+        found.is_some()
+    }
+
+    /// Distance (m) of a point outside from the nearest pose.
+    fn gap(&self, p: DVec3, limit: f64) -> f64 {
+        self.poses.iter().fold(limit, |best, pose| self.shapes[pose.shape].gap(pose.local(p), best))
+    }
+
+    /// Radius (m) of the largest ball around a point that lies inside.
+    fn depth(&self, p: DVec3, limit: f64, mut hint: usize) -> f64 {
+        let mut within =
+            |radius: f64| self.directions.iter().all(|way| self.is_inside(p + way * radius, &mut hint));
+        if within(limit) {
+            return limit;
+        }
+        let (mut low, mut high) = (0.0, limit);
+        for _ in 0..HALVINGS {
+            let middle = (low + high) / 2.0;
+            (low, high) = if within(middle) { (middle, high) } else { (low, middle) };
+        }
+        (low + high) / 2.0
+    }
+}
+
+impl Pose {
+    fn local(&self, p: DVec3) -> DVec3 {
+        self.back * (p - self.at)
+    }
+}
+
+impl Shape {
+    fn new(mesh: &TriMesh) -> Self {
+        let corners: Vec<[DVec3; 3]> = (0..mesh.triangles.len()).map(|index| mesh.corners(index)).collect();
+        let start = (DVec3::repeat(f64::INFINITY), DVec3::repeat(f64::NEG_INFINITY));
+        let (low, high) = corners.iter().flatten().fold(start, |(low, high), p| (low.inf(p), high.sup(p)));
+        let centre = (low + high) / 2.0;
+        let radius = corners.iter().flatten().map(|p| (p - centre).norm()).fold(0.0, f64::max);
+        Self { tree: Bvh::new(mesh), corners, centre, radius }
+    }
+
+    fn holds(&self, p: DVec3) -> bool {
+        if (p - self.centre).norm() > self.radius {
+            return false;
+        }
+        let winds = |ray: [f64; 3]| self.winding(p, DVec3::from(ray)) > 0;
+        let [first, second] = [winds(RAYS[0]), winds(RAYS[1])];
+        if first == second { first } else { winds(RAYS[2]) }
+    }
+
+    /// How often the mesh winds around a point, by the faces that a ray leaves and enters it through.
+    fn winding(&self, mut p: DVec3, way: DVec3) -> i32 {
+        let mut winding = 0;
+        while let Some(hit) = self.tree.ray(p, way, 4.0 * self.radius) {
+            let [a, b, c] = self.corners[hit.triangle];
+            winding += if (b - a).cross(&(c - a)).dot(&way) > 0.0 { 1 } else { -1 };
+            p += way * (hit.distance + 1e-9);
+        }
+        winding
+    }
+
+    /// Distance (m) from the nearest triangle, if it is less than `best`.
+    fn gap(&self, p: DVec3, best: f64) -> f64 {
+        if (p - self.centre).norm() > self.radius + best {
+            return best;
+        }
+        let reach = Vec3::repeat(best as f32 * 1.001);
+        let near: Vec3 = p.cast();
+        let mut least = best;
+        self.tree.in_box(near - reach, near + reach, |index| {
+            least = least.min(triangle_distance(p, &self.corners[index]));
+        });
+        least
+    }
+}
+
+fn triangle_distance(p: DVec3, [a, b, c]: &[DVec3; 3]) -> f64 {
+    let normal = (b - a).cross(&(c - a));
+    let edges = [(a, b), (b, c), (c, a)];
+    let over = edges.iter().all(|(s, t)| normal.dot(&(*t - *s).cross(&(p - *s))) >= 0.0);
+    if over && normal.norm() > 0.0 {
+        return (normal.dot(&(p - a)) / normal.norm()).abs();
+    }
+    let from_edge = |(s, t): (&DVec3, &DVec3)| {
+        let edge = t - s;
+        let part = ((p - s).dot(&edge) / edge.norm_squared().max(1e-30)).clamp(0.0, 1.0);
+        (p - s - edge * part).norm()
+    };
+    edges.into_iter().map(from_edge).fold(f64::INFINITY, f64::min)
+}
+
+/// Unit vectors spread evenly: a spiral.
+fn directions() -> Vec<DVec3> {
+    let golden = std::f64::consts::PI * (3.0 - 5.0f64.sqrt());
+    let way = |index: usize| {
+        let z = 1.0 - (2.0 * index as f64 + 1.0) / DIRECTIONS as f64;
+        let (sin, cos) = (golden * index as f64).sin_cos();
+        let across = (1.0 - z * z).sqrt();
+        DVec3::new(across * cos, across * sin, z)
+    };
+    (0..DIRECTIONS).map(way).collect()
+}
