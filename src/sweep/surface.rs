@@ -42,6 +42,8 @@ const HAIR: f64 = 0.005 * UNITS as f64;
 const THIN_HAIRS: f64 = THIN * UNITS as f64 / HAIR;
 /// Faces longer than this (cells) are asked at more than one point.
 const SMALL: f32 = 1.5;
+/// Lines that are a cell apart meet most faces that are longer than this (cells).
+const LONG: f32 = 3.0;
 /// Distance of the points that a long face is asked at (fixed-point units).
 const SPACING: f64 = 1.2 * UNITS as f64;
 /// A corner is asked for this part of the way to the middle, away from what it shares with neighbours.
@@ -52,6 +54,8 @@ const HALVINGS: usize = 3;
 const STACK: u8 = 4;
 /// A cell holds none.
 const LOOSE: u8 = 8;
+/// No line meets the face, though it is long.
+const SLIVER: u8 = 16;
 const OPEN_AND_LOOSE: u8 = OPEN | LOOSE;
 /// Faces a task handles: fixed, so that nothing depends on the number of threads.
 const GRAIN: usize = 128;
@@ -82,7 +86,7 @@ pub fn surface(ctx: &Context, cells: &Cells, exposure: &Exposure) -> Result<Vec<
         let (mut out, mut parts) = (Vec::with_capacity(ids.len()), Vec::new());
         for &face in ids.iter().take_while(|_| ctx.check().is_ok()) {
             let id = face as usize;
-            chain.open_parts(id, seen[id], &around, &mut parts);
+            chain.open_parts(id, verdicts[id], seen[id], &around, &mut parts);
             out.extend(parts.drain(..).map(|(v, sure)| Facet { v, face, sure }));
         }
         out
@@ -109,7 +113,7 @@ fn neighbourhoods(cells: &Cells, exposure: &Exposure, verdicts: &[u8]) -> (Vec<u
     let around: Vec<AtomicU8> = (0..cells.count()).map(|_| AtomicU8::new(0)).collect();
     cells.for_each(|cell, ids| {
         let kind = if exposure.stacks[cell] { STACK } else { LOOSE };
-        let said = ids.iter().fold(kind, |said, &id| said | verdicts[id as usize]);
+        let said = ids.iter().fold(kind, |said, &id| said | verdicts[id as usize] & (OPEN | BURIED));
         around[cell].store(said, Ordering::Relaxed);
         for &id in ids {
             seen[id as usize].fetch_or(said, Ordering::Relaxed);
@@ -146,13 +150,23 @@ fn ahead(cells: &Cells, id: usize) -> Option<Point> {
 
 impl Surface<'_> {
     /// Whether a face is open or buried where lines through voxels meet it, and at its middle (a long one where it
-    /// passes voxels). Of a stack only the lines are asked.
+    /// passes voxels). Of a stack only the lines are asked, and long faces between them.
     fn verdict(&mut self, id: usize) -> u8 {
         let (v, seen) = (self.cells.faces[id].v, self.exposure.faces[id]);
-        if self.exposure.is_stack(self.cells, voxel_of(middle(&v))) {
-            return seen;
+        let Some(ahead) = ahead(self.cells, id) else { return seen | BURIED };
+        if self.is_sliver(id) {
+            let mut said = SLIVER;
+            each_sample(&v, |at| said |= self.ask(at, ahead));
+            return said;
         }
-        seen | ahead(self.cells, id).map_or(BURIED, |ahead| self.said(&v, ahead))
+        let stack = self.exposure.is_stack(self.cells, voxel_of(middle(&v)));
+        if stack { seen } else { seen | self.said(&v, ahead) }
+    }
+
+    /// Whether a face passes between the lines though it is long: patches do not know of it.
+    fn is_sliver(&self, id: usize) -> bool {
+        let (low, high) = extent(&self.cells.faces[id].v);
+        self.exposure.faces[id] == 0 && (0..3).any(|axis| high[axis] - low[axis] > LONG)
     }
 
     /// What the samples of a part of a face say.
@@ -162,11 +176,12 @@ impl Surface<'_> {
         said
     }
 
-    /// Adds the open parts of a face, from what all faces in its cells said.
-    fn open_parts(&mut self, id: usize, seen: u8, around: &[u8], out: &mut Vec<Part>) {
+    /// Adds the open parts of a face, from what it and what all faces in its cells said.
+    fn open_parts(&mut self, id: usize, said: u8, seen: u8, around: &[u8], out: &mut Vec<Part>) {
         let (v, Some(ahead)) = (self.cells.faces[id].v, ahead(self.cells, id)) else { return };
         match seen {
             OPEN_AND_LOOSE => out.push((v, true)),
+            _ if said == SLIVER | OPEN && seen & STACK != 0 => out.push((v, false)),
             _ if seen & LOOSE == 0 || seen & !(STACK | LOOSE) == BURIED => {}
             _ => {
                 self.cut(id, v, ahead, around, out);

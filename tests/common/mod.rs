@@ -4,6 +4,7 @@
 pub mod boot;
 pub mod character;
 pub mod clients;
+pub mod elbow;
 pub mod header;
 pub mod hero;
 pub mod shapes;

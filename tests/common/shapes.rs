@@ -154,3 +154,27 @@ pub fn torus(radius: f32, tube: f32, n: usize, m: usize) -> TriMesh {
         triangles: (0..n).flat_map(|i| (0..m).flat_map(move |j| square(i, j))).collect(),
     }
 }
+
+/// A closed tube along y (m) of `rings` + 1 rings of `n` vertices, and the cones that close its ends.
+pub fn tube(radius: f32, length: f32, n: usize, rings: usize) -> TriMesh {
+    let ring = |i: usize| {
+        let y = length * (i as f32 / rings as f32 - 0.5);
+        (0..n).map(move |j| {
+            let (sin, cos) = (std::f32::consts::TAU * j as f32 / n as f32).sin_cos();
+            Vec3::new(radius * cos, y, radius * sin)
+        })
+    };
+    let mut positions: Vec<Vec3> = (0..=rings).flat_map(ring).collect();
+    let [bottom, top] = [positions.len() as u32, positions.len() as u32 + 1];
+    positions.extend([Vec3::y() * (-length / 2.0), Vec3::y() * (length / 2.0)]);
+    let at = |i: usize, j: usize| (i * n + j % n) as u32;
+    let mut triangles = Vec::new();
+    for j in 0..n {
+        triangles.extend([[bottom, at(0, j), at(0, j + 1)], [top, at(rings, j + 1), at(rings, j)]]);
+        for i in 0..rings {
+            triangles.push([at(i, j), at(i + 1, j), at(i + 1, j + 1)]);
+            triangles.push([at(i, j), at(i + 1, j + 1), at(i, j + 1)]);
+        }
+    }
+    TriMesh { positions, triangles }
+}
