@@ -370,6 +370,38 @@ class Manners(unittest.TestCase):
         self.assertGreater(snow(ctx).info.active_voxels, 0)
         self.assertIn("no.vdb", seen[0])
 
+    def test_what_was_raised_first_is_kept(self):
+        # A call within a later callback does not lose it.
+        inner, quiet = frazil.Context(), frazil.Context()
+
+        def log(text):
+            if "body 0" in text:
+                raise LookupError(text)
+            with self.assertRaises(frazil.Error):
+                frazil.load(inner, "no.vdb")
+            said.append(text)
+
+        said = []
+        ctx = frazil.Context(threads=1, log=log)
+        corners, faces = box((-0.1, 0.1, -0.1), (0.1, 0.4, 0.1))
+        bodies = [frazil.Body(corners, None, faces[1:], id=n) for n in (0, 1)]
+        with self.assertRaisesRegex(LookupError, "body 0"):
+            frazil.Base(ctx, snow(quiet)).step(bodies, 0.0, 1)
+        self.assertEqual(len(said), 1)
+
+        # Nor is a cancel forgotten that was asked for in the same call.
+        def poll(stage, done, seconds):
+            ctx.cancel()
+            raise LookupError("now")
+
+        layer = snow(quiet)
+        ctx = frazil.Context(threads=1, poll=poll)
+        with self.assertRaisesRegex(LookupError, "now"):
+            layer.to_mesh(ctx)
+        with self.assertRaises(frazil.Error) as caught:
+            layer.to_mesh(ctx)
+        self.assertTrue(caught.exception.cancelled)
+
     def test_ctrl_c_ends_the_call_with_or_without_a_poll(self):
         for poll in (None, lambda stage, done, seconds: False):
             ctx = frazil.Context(threads=2, poll=poll)
