@@ -281,10 +281,11 @@ pub unsafe extern "C" fn frz_grid_set_name(grid: *mut frz_grid, name: *const c_c
         // SAFETY: the pointers are NULL or the caller's.
         unsafe {
             let name = text(name, "name")?.unwrap_or("");
-            Ok(match change(grid)?.own()? {
+            match change(grid)?.own()? {
                 AnyGrid::Floats(grid) => grid.set_name(name)?,
                 AnyGrid::Vectors(grid) => grid.set_name(name)?,
-            })
+            }
+            Ok(())
         }
     })
 }
