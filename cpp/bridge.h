@@ -11,6 +11,7 @@
 namespace frazil {
 
 struct Impl;
+struct VectorImpl;
 
 /// A float grid whose tree nobody else shares.
 class Grid {
@@ -20,6 +21,16 @@ public:
     Grid(const Grid&) = delete;
     Grid& operator=(const Grid&) = delete;
     std::unique_ptr<Impl> impl;
+};
+
+/// A grid of vectors of three floats whose tree nobody else shares.
+class VectorGrid {
+public:
+    explicit VectorGrid(std::unique_ptr<VectorImpl> impl);
+    ~VectorGrid();
+    VectorGrid(const VectorGrid&) = delete;
+    VectorGrid& operator=(const VectorGrid&) = delete;
+    std::unique_ptr<VectorImpl> impl;
 };
 
 /// Leaves and tiles that are ready to be put into a grid.
@@ -33,7 +44,30 @@ public:
     std::unique_ptr<Ready> ready;
 };
 
+/// The same for a grid of vectors.
+class VectorBlocks {
+public:
+    struct Ready;
+    explicit VectorBlocks(std::unique_ptr<Ready> ready);
+    ~VectorBlocks();
+    VectorBlocks(const VectorBlocks&) = delete;
+    VectorBlocks& operator=(const VectorBlocks&) = delete;
+    std::unique_ptr<Ready> ready;
+};
+
+/// The grids that the bytes of a file hold, of any type.
+class Stored {
+public:
+    struct Grids;
+    explicit Stored(std::unique_ptr<Grids> grids);
+    ~Stored();
+    Stored(const Stored&) = delete;
+    Stored& operator=(const Stored&) = delete;
+    std::unique_ptr<Grids> grids;
+};
+
 struct LeafView;
+struct Found;
 struct Meta;
 struct GridHeader;
 struct Call;
@@ -43,44 +77,74 @@ struct Part;
 struct Hit;
 
 std::unique_ptr<Grid> make_grid(double voxel, float background, bool level_set);
-std::unique_ptr<Grid> copy_grid(const Grid& grid);
-double voxel_size(const Grid& grid) noexcept;
-bool is_uniform(const Grid& grid) noexcept;
-std::array<double, 3> index_to_world(const Grid& grid, std::array<double, 3> index) noexcept;
-std::array<double, 3> world_to_index(const Grid& grid, std::array<double, 3> world) noexcept;
+std::unique_ptr<VectorGrid> make_vector_grid(double voxel, std::array<float, 3> background);
 float background(const Grid& grid) noexcept;
-int32_t grid_class(const Grid& grid) noexcept;
-void set_grid_class(Grid& grid, int32_t grid_class);
-rust::String name(const Grid& grid) noexcept;
-void set_name(Grid& grid, rust::Str name);
+std::array<float, 3> vector_background(const VectorGrid& grid) noexcept;
+
+// Of both kinds of grid.
+template <typename G>
+std::unique_ptr<G> copy_grid(const G& grid);
+template <typename G>
+double voxel_size(const G& grid) noexcept;
+template <typename G>
+std::array<double, 3> index_to_world(const G& grid, std::array<double, 3> index) noexcept;
+template <typename G>
+int32_t grid_class(const G& grid) noexcept;
+template <typename G>
+void set_grid_class(G& grid, int32_t grid_class);
+template <typename G>
+rust::String name(const G& grid) noexcept;
+template <typename G>
+void set_name(G& grid, rust::Str name);
+template <typename G>
+uint64_t active_voxels(const G& grid) noexcept;
+template <typename G>
+size_t leaf_count(const G& grid) noexcept;
+template <typename G>
+uint64_t memory_bytes(const G& grid) noexcept;
+template <typename G>
+uint64_t file_bound(const G& grid) noexcept;
+template <typename G>
+bool active_bbox(const G& grid, std::array<int32_t, 3>& low, std::array<int32_t, 3>& high);
+template <typename G>
+rust::Vec<LeafView> leaves(const G& grid);
+template <typename G>
+rust::Vec<LeafView> probe(const G& grid, rust::Slice<const int32_t> origins);
+template <typename G>
+std::unique_ptr<std::string> grid_head(const G& grid);
+template <typename G>
+rust::Vec<Tile> tiles(const G& grid);
+
+bool is_uniform(const Grid& grid) noexcept;
+std::array<double, 3> world_to_index(const Grid& grid, std::array<double, 3> world) noexcept;
 rust::Vec<Meta> metadata(const Grid& grid);
 void set_metadata(Grid& grid, const Meta& meta);
-uint64_t active_voxels(const Grid& grid) noexcept;
-size_t leaf_count(const Grid& grid) noexcept;
-uint64_t memory_bytes(const Grid& grid) noexcept;
-uint64_t file_bound(const Grid& grid) noexcept;
-bool active_bbox(const Grid& grid, std::array<int32_t, 3>& low, std::array<int32_t, 3>& high);
-rust::Vec<LeafView> leaves(const Grid& grid);
-rust::Vec<LeafView> probe(const Grid& grid, rust::Slice<const int32_t> origins);
 std::unique_ptr<Blocks> make_blocks(const Call& call, rust::Slice<const int32_t> origins,
                                     rust::Slice<const size_t> values, rust::Slice<const size_t> masks,
                                     rust::Slice<const float> constants);
 void put_blocks(Grid& grid, Blocks& blocks);
+std::unique_ptr<VectorBlocks> make_vector_blocks(const Call& call, rust::Slice<const int32_t> origins,
+                                                 rust::Slice<const size_t> values, rust::Slice<const size_t> masks,
+                                                 rust::Slice<const float> constants);
+void put_vector_blocks(VectorGrid& grid, VectorBlocks& blocks);
 float value_at(const Grid& grid, int32_t x, int32_t y, int32_t z) noexcept;
 void sample(const Grid& grid, const Call& call, rust::Slice<const double> world, bool linear, rust::Slice<float> out);
+void sample_vectors(const VectorGrid& grid, const Call& call, rust::Slice<const double> world, bool linear,
+                    rust::Slice<float> out);
 void prune(Grid& grid, const Call& call, bool level_set, float tolerance);
 void flood_fill(Grid& grid, const Call& call);
 rust::Vec<uint64_t> components(const Grid& grid, const Call& call);
 
-std::unique_ptr<std::string> grids_to_bytes(rust::Slice<const size_t> grids, int32_t compression, bool half,
-                                            const rust::Vec<Meta>& meta);
+std::unique_ptr<std::string> grids_to_bytes(rust::Slice<const size_t> grids, rust::Slice<const bool> vectors,
+                                            int32_t compression, bool half, const rust::Vec<Meta>& meta);
 rust::Vec<GridHeader> describe_file(rust::Str path);
-rust::Vec<GridHeader> describe_bytes(rust::Slice<const uint8_t> bytes);
-std::unique_ptr<Grid> read_float_grid(rust::Str path, rust::Str name);
-std::unique_ptr<Grid> float_grid_from_bytes(rust::Slice<const uint8_t> bytes, rust::Str name);
-std::unique_ptr<std::string> grid_head(const Grid& grid);
-rust::Vec<Tile> tiles(const Grid& grid);
+Found read_grid(rust::Str path, rust::Str name);
+std::unique_ptr<Stored> read_bytes(rust::Slice<const uint8_t> bytes);
+rust::Vec<GridHeader> describe_stored(const Stored& stored);
+Found take_stored(Stored& stored, size_t index);
 std::unique_ptr<Grid> assemble(rust::Slice<const uint8_t> head, float background, rust::Slice<const Tile> tiles);
+std::unique_ptr<VectorGrid> assemble_vectors(rust::Slice<const uint8_t> head, std::array<float, 3> background,
+                                             rust::Slice<const Tile> tiles);
 void end_workers() noexcept;
 
 void csg(Grid& a, Grid& b, const Call& call, int32_t operation);

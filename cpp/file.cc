@@ -106,10 +106,12 @@ void open(openvdb::io::File& file) {
     file.open(/*delayLoad=*/false);
 }
 
-/// A float grid out of a file, without what the file says of itself.
-std::unique_ptr<Grid> loaded(const openvdb::GridBase::Ptr& base) {
-    auto grid = openvdb::gridPtrCast<openvdb::FloatGrid>(base);
-    if (!grid) throw std::runtime_error("grid \"" + base->getName() + "\" is of type " + base->type());
+/// A grid of a kind, without what its file says of itself.
+template <typename GridType>
+auto loaded(const openvdb::GridBase::Ptr& base) {
+    auto grid = openvdb::gridPtrCast<GridType>(base);
+    // Grids of a file may share their values; ours do not.
+    if (grid->treePtr().use_count() > 2) grid = grid->deepCopy();
     if (grid->tree().leafCount() > 0 && grid->tree().cbeginLeaf()->buffer().isOutOfCore())
         grid->tree().readNonresidentBuffers();
     for (const char* key : {openvdb::GridBase::META_FILE_BBOX_MIN, openvdb::GridBase::META_FILE_BBOX_MAX,
@@ -118,6 +120,14 @@ std::unique_ptr<Grid> loaded(const openvdb::GridBase::Ptr& base) {
         grid->removeMeta(key);
     }
     return wrap(grid);
+}
+
+/// Nothing for grids of other types.
+Found found(const openvdb::GridBase::Ptr& base) {
+    Found out;
+    if (base->isType<openvdb::FloatGrid>()) out.floats = loaded<openvdb::FloatGrid>(base);
+    if (base->isType<openvdb::Vec3SGrid>()) out.vectors = loaded<openvdb::Vec3SGrid>(base);
+    return out;
 }
 
 /// Bytes that somebody else holds, to read.
@@ -190,25 +200,22 @@ void set_metadata(Grid& grid, const Meta& meta) {
     grid.impl->grid->insertMeta(key, *from_meta(meta));
 }
 
-std::unique_ptr<std::string> grids_to_bytes(rust::Slice<const size_t> grids, int32_t compression, bool half,
-                                            const rust::Vec<Meta>& meta) {
-    initialise();
-    openvdb::GridCPtrVec list;
-    // A packed leaf of a level set takes some 370 bytes, a plain one 900: growing in steps would copy them all.
-    const size_t bytes_per_leaf = compression == 2 ? 400 : 1000;
-    size_t leaves = 64;
-    for (const size_t address : grids) {
-        const auto& source = reinterpret_cast<const Grid*>(address)->impl->grid;
-        // A shallow copy carries its own metadata: statistics and precision stay out of the caller's grid.
-        auto copy = source->copy();
-        copy->setSaveFloatAsHalf(half);
-        leaves += source->tree().leafCount();
-        list.push_back(copy);
-    }
-    openvdb::MetaMap map;
-    for (const auto& entry : meta) map.insertMeta(std::string(entry.key), *from_meta(entry));
+struct Stored::Grids {
+    openvdb::GridPtrVecPtr list;
+};
+
+Stored::Stored(std::unique_ptr<Grids> grids) : grids(std::move(grids)) {}
+Stored::~Stored() {
+    here([&] { grids.reset(); });
+}
+
+namespace {
+
+/// The bytes of a file, with the room that it is expected to take.
+std::unique_ptr<std::string> written(const openvdb::GridCPtrVec& list, size_t expected, int32_t compression,
+                                     const openvdb::MetaMap& map) {
     constexpr uint32_t schemes[] = {openvdb::io::COMPRESS_NONE, openvdb::io::COMPRESS_ZIP, openvdb::io::COMPRESS_BLOSC};
-    Bytes bytes(leaves * bytes_per_leaf);
+    Bytes bytes(expected);
     std::ostream out(&bytes);
     InMemory archive;
     archive.setCompression(schemes[compression] | openvdb::io::COMPRESS_ACTIVE_MASK);
@@ -217,44 +224,70 @@ std::unique_ptr<std::string> grids_to_bytes(rust::Slice<const size_t> grids, int
     return bytes.take();
 }
 
-rust::Vec<GridHeader> describe_file(rust::Str path) {
-    openvdb::io::File file{std::string(path)};
-    open(file);
-    const auto headers = describe(*file.readAllGridMetadata());
-    file.close();
-    return headers;
-}
+}  // namespace
 
-rust::Vec<GridHeader> describe_bytes(rust::Slice<const uint8_t> bytes) { return describe(*streamed(bytes)); }
-
-std::unique_ptr<Grid> read_float_grid(rust::Str path, rust::Str name) {
-    openvdb::io::File file{std::string(path)};
-    open(file);
-    const auto base = file.readGrid(std::string(name));
-    file.close();
-    return loaded(base);
-}
-
-std::unique_ptr<Grid> float_grid_from_bytes(rust::Slice<const uint8_t> bytes, rust::Str name) {
-    const auto grids = streamed(bytes);
-    openvdb::GridBase::Ptr found;
-    std::string there;
-    for (const auto& grid : *grids) {
-        there += (there.empty() ? "\"" : ", \"") + grid->getName() + "\" (" + grid->type() + ")";
-        if (name.empty()) {
-            const bool better = grid->getGridClass() == openvdb::GRID_LEVEL_SET &&
-                                (!found || found->getGridClass() != openvdb::GRID_LEVEL_SET);
-            if (grid->isType<openvdb::FloatGrid>() && (!found || better)) found = grid;
-        } else if (grid->getName() == std::string(name)) {
-            found = grid;
-            break;
+std::unique_ptr<std::string> grids_to_bytes(rust::Slice<const size_t> grids, rust::Slice<const bool> vectors,
+                                            int32_t compression, bool half, const rust::Vec<Meta>& meta) {
+    initialise();
+    openvdb::MetaMap map;
+    for (const auto& entry : meta) map.insertMeta(std::string(entry.key), *from_meta(entry));
+    return here([&] {
+        openvdb::GridCPtrVec list;
+        // A packed leaf of a level set takes some 370 bytes, a plain one 900: growing in steps would copy them all.
+        const size_t bytes_per_leaf = compression == 2 ? 400 : 1000;
+        size_t leaves = 64;
+        const auto add = [&](const auto& source, size_t values) {
+            // A shallow copy carries its own metadata: statistics and precision stay out of the caller's grid.
+            auto copy = source->copy();
+            copy->setSaveFloatAsHalf(half);
+            leaves += source->tree().leafCount() * values;
+            list.push_back(copy);
+        };
+        for (size_t i = 0; i < grids.size(); ++i) {
+            if (vectors[i]) {
+                add(reinterpret_cast<const VectorGrid*>(grids[i])->impl->grid, 3);
+            } else {
+                add(reinterpret_cast<const Grid*>(grids[i])->impl->grid, 1);
+            }
         }
-    }
-    if (!found) {
-        throw std::runtime_error((name.empty() ? "no float grid" : "no grid \"" + std::string(name) + "\"") +
-                                 " in the file, which holds " + (there.empty() ? "no grid at all" : there));
-    }
-    return loaded(found);
+        return written(list, leaves * bytes_per_leaf, compression, map);
+    });
+}
+
+rust::Vec<GridHeader> describe_file(rust::Str path) {
+    return here([&] {
+        openvdb::io::File file{std::string(path)};
+        open(file);
+        const auto headers = describe(*file.readAllGridMetadata());
+        file.close();
+        return headers;
+    });
+}
+
+Found read_grid(rust::Str path, rust::Str name) {
+    return here([&] {
+        openvdb::io::File file{std::string(path)};
+        open(file);
+        const auto base = file.readGrid(std::string(name));
+        file.close();
+        return found(base);
+    });
+}
+
+std::unique_ptr<Stored> read_bytes(rust::Slice<const uint8_t> bytes) {
+    return here([&] {
+        auto grids = std::make_unique<Stored::Grids>();
+        grids->list = streamed(bytes);
+        return std::make_unique<Stored>(std::move(grids));
+    });
+}
+
+rust::Vec<GridHeader> describe_stored(const Stored& stored) {
+    return here([&] { return describe(*stored.grids->list); });
+}
+
+Found take_stored(Stored& stored, size_t index) {
+    return here([&] { return found(std::move(stored.grids->list->at(index))); });
 }
 
 }  // namespace frazil

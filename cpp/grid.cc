@@ -16,23 +16,18 @@
 namespace frazil {
 
 using Leaf = openvdb::FloatTree::LeafNodeType;
+using VectorLeaf = openvdb::Vec3STree::LeafNodeType;
 static_assert(Leaf::SIZE == 512 && sizeof(Leaf::NodeMaskType) == 64, "a leaf is 8 x 8 x 8 with a 64-byte mask");
+static_assert(VectorLeaf::SIZE == 512 && sizeof(VectorLeaf::NodeMaskType) == 64, "a leaf of vectors is as large");
+static_assert(sizeof(openvdb::Vec3s) == 3 * sizeof(float), "vectors are packed");
 
-namespace {
-
-/// Runs what has no call with threads of its own on this thread alone: outside of an arena TBB would start workers, as
-/// many as there are cores, for a host that asked for none.
-template <typename Work>
-auto here(Work&& work) {
-    tbb::task_arena arena(1);
-    return arena.execute(std::forward<Work>(work));
-}
-
-}  // namespace
-
+// OpenVDB takes trees down in parallel.
 Grid::Grid(std::unique_ptr<Impl> impl) : impl(std::move(impl)) {}
 Grid::~Grid() {
-    // OpenVDB takes trees down in parallel.
+    if (impl) here([&] { impl.reset(); });
+}
+VectorGrid::VectorGrid(std::unique_ptr<VectorImpl> impl) : impl(std::move(impl)) {}
+VectorGrid::~VectorGrid() {
     if (impl) here([&] { impl.reset(); });
 }
 
@@ -53,6 +48,12 @@ std::unique_ptr<Grid> wrap(openvdb::FloatGrid::Ptr grid) {
     return std::make_unique<Grid>(std::move(impl));
 }
 
+std::unique_ptr<VectorGrid> wrap(openvdb::Vec3SGrid::Ptr grid) {
+    auto impl = std::make_unique<VectorImpl>();
+    impl->grid = std::move(grid);
+    return std::make_unique<VectorGrid>(std::move(impl));
+}
+
 std::unique_ptr<Grid> make_grid(double voxel, float background, bool level_set) {
     initialise();
     auto grid = openvdb::FloatGrid::create(background);
@@ -61,20 +62,21 @@ std::unique_ptr<Grid> make_grid(double voxel, float background, bool level_set) 
     return wrap(grid);
 }
 
-std::unique_ptr<Grid> copy_grid(const Grid& grid) {
-    return here([&] { return wrap(grid.impl->grid->deepCopy()); });
+std::unique_ptr<VectorGrid> make_vector_grid(double voxel, std::array<float, 3> background) {
+    initialise();
+    auto grid = openvdb::Vec3SGrid::create(openvdb::Vec3s(background.data()));
+    grid->setTransform(openvdb::math::Transform::createLinearTransform(voxel));
+    return wrap(grid);
 }
 
-double voxel_size(const Grid& grid) noexcept { return grid.impl->grid->voxelSize()[0]; }
+float background(const Grid& grid) noexcept { return grid.impl->grid->background(); }
+std::array<float, 3> vector_background(const VectorGrid& grid) noexcept {
+    return triple(grid.impl->grid->background());
+}
 
 bool is_uniform(const Grid& grid) noexcept {
     const auto& transform = grid.impl->grid->transform();
     return transform.isLinear() && transform.hasUniformScale();
-}
-
-std::array<double, 3> index_to_world(const Grid& grid, std::array<double, 3> p) noexcept {
-    const auto w = grid.impl->grid->indexToWorld(openvdb::Vec3d(p[0], p[1], p[2]));
-    return {w[0], w[1], w[2]};
 }
 
 std::array<double, 3> world_to_index(const Grid& grid, std::array<double, 3> p) noexcept {
@@ -82,24 +84,70 @@ std::array<double, 3> world_to_index(const Grid& grid, std::array<double, 3> p) 
     return {i[0], i[1], i[2]};
 }
 
-float background(const Grid& grid) noexcept { return grid.impl->grid->background(); }
-int32_t grid_class(const Grid& grid) noexcept { return static_cast<int32_t>(grid.impl->grid->getGridClass()); }
-void set_grid_class(Grid& grid, int32_t value) {
+template <typename G>
+std::unique_ptr<G> copy_grid(const G& grid) {
+    return here([&] { return wrap(grid.impl->grid->deepCopy()); });
+}
+
+template <typename G>
+double voxel_size(const G& grid) noexcept {
+    return grid.impl->grid->voxelSize()[0];
+}
+
+template <typename G>
+std::array<double, 3> index_to_world(const G& grid, std::array<double, 3> p) noexcept {
+    const auto w = grid.impl->grid->indexToWorld(openvdb::Vec3d(p[0], p[1], p[2]));
+    return {w[0], w[1], w[2]};
+}
+
+template <typename G>
+int32_t grid_class(const G& grid) noexcept {
+    return static_cast<int32_t>(grid.impl->grid->getGridClass());
+}
+
+template <typename G>
+void set_grid_class(G& grid, int32_t value) {
     grid.impl->grid->setGridClass(static_cast<openvdb::GridClass>(value));
 }
-rust::String name(const Grid& grid) noexcept { return rust::String::lossy(grid.impl->grid->getName()); }
-void set_name(Grid& grid, rust::Str name) { grid.impl->grid->setName(std::string(name)); }
-uint64_t active_voxels(const Grid& grid) noexcept {
+
+template <typename G>
+rust::String name(const G& grid) noexcept {
+    return rust::String::lossy(grid.impl->grid->getName());
+}
+
+template <typename G>
+void set_name(G& grid, rust::Str name) {
+    grid.impl->grid->setName(std::string(name));
+}
+
+template <typename G>
+uint64_t active_voxels(const G& grid) noexcept {
     return here([&] { return grid.impl->grid->activeVoxelCount(); });
 }
-size_t leaf_count(const Grid& grid) noexcept {
+
+template <typename G>
+size_t leaf_count(const G& grid) noexcept {
     return here([&] { return grid.impl->grid->tree().leafCount(); });
 }
-uint64_t memory_bytes(const Grid& grid) noexcept {
+
+template <typename G>
+uint64_t memory_bytes(const G& grid) noexcept {
     return here([&] { return grid.impl->grid->memUsage(); });
 }
 
-bool active_bbox(const Grid& grid, std::array<int32_t, 3>& low, std::array<int32_t, 3>& high) {
+template <typename G>
+uint64_t file_bound(const G& grid) noexcept {
+    // What a file holds of a leaf and of the nodes above it, none of it packed, with room for the codec's own words.
+    const auto counts = here([&] { return grid.impl->grid->tree().nodeCount(); });
+    constexpr uint64_t value = sizeof(grid.impl->grid->background());
+    constexpr uint64_t leaf = 512 * value + 3 * 64 + 64;
+    constexpr uint64_t lower = 4096 * value + 2 * 512 + 256, upper = 32768 * value + 2 * 4096 + 256;
+    constexpr uint64_t rest = 1 << 16;
+    return counts[0] * leaf + counts[1] * lower + counts[2] * upper + rest;
+}
+
+template <typename G>
+bool active_bbox(const G& grid, std::array<int32_t, 3>& low, std::array<int32_t, 3>& high) {
     const auto box = here([&] { return grid.impl->grid->evalActiveVoxelBoundingBox(); });
     if (box.empty()) return false;
     for (int axis = 0; axis < 3; ++axis) {
@@ -111,21 +159,23 @@ bool active_bbox(const Grid& grid, std::array<int32_t, 3>& low, std::array<int32
 
 namespace {
 
-LeafView view(const Leaf& leaf) {
+template <typename LeafType>
+LeafView view(const LeafType& leaf) {
     const auto& at = leaf.origin();
     return {at[0],
             at[1],
             at[2],
             true,
             false,
-            0.0f,
+            triple(0.0f),
             reinterpret_cast<size_t>(leaf.buffer().data()),
             reinterpret_cast<size_t>(&leaf.getValueMask())};
 }
 
 }  // namespace
 
-rust::Vec<LeafView> leaves(const Grid& grid) {
+template <typename G>
+rust::Vec<LeafView> leaves(const G& grid) {
     const auto& tree = grid.impl->grid->tree();
     rust::Vec<LeafView> out;
     out.reserve(leaf_count(grid));
@@ -133,99 +183,163 @@ rust::Vec<LeafView> leaves(const Grid& grid) {
     return out;
 }
 
-rust::Vec<LeafView> probe(const Grid& grid, rust::Slice<const int32_t> origins) {
-    openvdb::FloatGrid::ConstAccessor tree = grid.impl->grid->getConstAccessor();
+template <typename G>
+rust::Vec<LeafView> probe(const G& grid, rust::Slice<const int32_t> origins) {
+    auto tree = grid.impl->grid->getConstAccessor();
     rust::Vec<LeafView> out;
     out.reserve(origins.size() / 3);
     for (size_t i = 0; i + 2 < origins.size(); i += 3) {
         const openvdb::Coord at(origins[i], origins[i + 1], origins[i + 2]);
-        if (const Leaf* leaf = tree.probeConstLeaf(at)) {
+        if (const auto* leaf = tree.probeConstLeaf(at)) {
             out.push_back(view(*leaf));
         } else {
-            float value = 0.0f;
+            auto value = grid.impl->grid->background();
             const bool active = tree.probeValue(at, value);
-            out.push_back({at[0], at[1], at[2], false, active, value, 0, 0});
+            out.push_back({at[0], at[1], at[2], false, active, triple(value), 0, 0});
         }
     }
     return out;
 }
 
-struct Blocks::Ready {
+#define FRAZIL_FUNCTIONS_OF(G)                                                               \
+    template std::unique_ptr<G> copy_grid(const G&);                                         \
+    template double voxel_size(const G&) noexcept;                                           \
+    template std::array<double, 3> index_to_world(const G&, std::array<double, 3>) noexcept; \
+    template int32_t grid_class(const G&) noexcept;                                          \
+    template void set_grid_class(G&, int32_t);                                               \
+    template rust::String name(const G&) noexcept;                                           \
+    template void set_name(G&, rust::Str);                                                   \
+    template uint64_t active_voxels(const G&) noexcept;                                      \
+    template size_t leaf_count(const G&) noexcept;                                           \
+    template uint64_t memory_bytes(const G&) noexcept;                                       \
+    template uint64_t file_bound(const G&) noexcept;                                         \
+    template bool active_bbox(const G&, std::array<int32_t, 3>&, std::array<int32_t, 3>&);   \
+    template rust::Vec<LeafView> leaves(const G&);                                           \
+    template rust::Vec<LeafView> probe(const G&, rust::Slice<const int32_t>)
+FRAZIL_FUNCTIONS_OF(Grid);
+FRAZIL_FUNCTIONS_OF(VectorGrid);
+#undef FRAZIL_FUNCTIONS_OF
+
+namespace {
+
+/// Leaves and tiles of a kind of tree, outside of any tree.
+template <typename Tree>
+struct Parts {
     std::vector<openvdb::Coord> origins;
     /// A leaf, or none where the constant counts.
-    std::vector<std::unique_ptr<Leaf>> leaves;
-    std::vector<float> constants;
+    std::vector<std::unique_ptr<typename Tree::LeafNodeType>> leaves;
+    std::vector<typename Tree::ValueType> constants;
+
+    void fill(const Call& call, rust::Slice<const int32_t> places, rust::Slice<const size_t> values,
+              rust::Slice<const size_t> masks) {
+        using Node = typename Tree::LeafNodeType;
+        const size_t count = values.size();
+        leaves.resize(count);
+        origins.resize(count);
+        run(call, [&] {
+            tbb::parallel_for(tbb::blocked_range<size_t>(0, count), [&](const tbb::blocked_range<size_t>& range) {
+                for (size_t i = range.begin(); i != range.end(); ++i) {
+                    const openvdb::Coord at(places[3 * i], places[3 * i + 1], places[3 * i + 2]);
+                    origins[i] = at;
+                    if (values[i] == 0) continue;
+                    auto leaf = std::make_unique<Node>(at, typename Tree::ValueType(0.0f), false);
+                    std::memcpy(reinterpret_cast<void*>(leaf->buffer().data()),
+                                reinterpret_cast<const void*>(values[i]), 512 * sizeof(typename Tree::ValueType));
+                    typename Node::NodeMaskType mask;
+                    std::memcpy(reinterpret_cast<void*>(&mask), reinterpret_cast<const void*>(masks[i]), sizeof mask);
+                    leaf->setValueMask(mask);
+                    leaves[i] = std::move(leaf);
+                }
+            });
+        });
+    }
+
+    void put_into(Tree& tree) {
+        for (size_t i = 0; i < leaves.size(); ++i) {
+            if (leaves[i]) {
+                tree.addLeaf(leaves[i].release());
+            } else {
+                tree.addTile(1, origins[i], constants[i], false);
+            }
+        }
+    }
 };
+
+}  // namespace
+
+struct Blocks::Ready : Parts<openvdb::FloatTree> {};
+struct VectorBlocks::Ready : Parts<openvdb::Vec3STree> {};
 
 Blocks::Blocks(std::unique_ptr<Ready> ready) : ready(std::move(ready)) {}
 Blocks::~Blocks() = default;
+VectorBlocks::VectorBlocks(std::unique_ptr<Ready> ready) : ready(std::move(ready)) {}
+VectorBlocks::~VectorBlocks() = default;
 
 std::unique_ptr<Blocks> make_blocks(const Call& call, rust::Slice<const int32_t> origins,
                                     rust::Slice<const size_t> values, rust::Slice<const size_t> masks,
                                     rust::Slice<const float> constants) {
-    const size_t count = values.size();
     auto ready = std::make_unique<Blocks::Ready>();
-    ready->leaves.resize(count);
-    ready->origins.resize(count);
     ready->constants.assign(constants.begin(), constants.end());
-    run(call, [&] {
-        tbb::parallel_for(tbb::blocked_range<size_t>(0, count), [&](const tbb::blocked_range<size_t>& range) {
-            for (size_t i = range.begin(); i != range.end(); ++i) {
-                const openvdb::Coord at(origins[3 * i], origins[3 * i + 1], origins[3 * i + 2]);
-                ready->origins[i] = at;
-                if (values[i] == 0) continue;
-                auto leaf = std::make_unique<Leaf>(at, 0.0f, false);
-                std::memcpy(leaf->buffer().data(), reinterpret_cast<const float*>(values[i]), 512 * sizeof(float));
-                Leaf::NodeMaskType mask;
-                std::memcpy(reinterpret_cast<void*>(&mask), reinterpret_cast<const void*>(masks[i]), sizeof mask);
-                leaf->setValueMask(mask);
-                ready->leaves[i] = std::move(leaf);
-            }
-        });
-    });
+    ready->fill(call, origins, values, masks);
     return std::make_unique<Blocks>(std::move(ready));
 }
 
-void put_blocks(Grid& grid, Blocks& blocks) {
-    auto& tree = grid.impl->grid->tree();
-    auto& ready = *blocks.ready;
-    for (size_t i = 0; i < ready.leaves.size(); ++i) {
-        if (ready.leaves[i]) {
-            tree.addLeaf(ready.leaves[i].release());
-        } else {
-            tree.addTile(1, ready.origins[i], ready.constants[i], false);
-        }
-    }
+void put_blocks(Grid& grid, Blocks& blocks) { blocks.ready->put_into(grid.impl->grid->tree()); }
+
+std::unique_ptr<VectorBlocks> make_vector_blocks(const Call& call, rust::Slice<const int32_t> origins,
+                                                 rust::Slice<const size_t> values, rust::Slice<const size_t> masks,
+                                                 rust::Slice<const float> constants) {
+    auto ready = std::make_unique<VectorBlocks::Ready>();
+    for (size_t i = 0; i + 2 < constants.size(); i += 3) ready->constants.emplace_back(&constants[i]);
+    ready->fill(call, origins, values, masks);
+    return std::make_unique<VectorBlocks>(std::move(ready));
 }
 
-uint64_t file_bound(const Grid& grid) noexcept {
-    // What a file holds of a leaf and of the nodes above it, none of it packed, with room for the codec's own words.
-    const auto counts = here([&] { return grid.impl->grid->tree().nodeCount(); });
-    constexpr uint64_t leaf = 2048 + 3 * 64 + 64, lower = 4096 * 4 + 2 * 512 + 256, upper = 32768 * 4 + 2 * 4096 + 256;
-    constexpr uint64_t rest = 1 << 16;
-    return counts[0] * leaf + counts[1] * lower + counts[2] * upper + rest;
-}
+void put_vector_blocks(VectorGrid& grid, VectorBlocks& blocks) { blocks.ready->put_into(grid.impl->grid->tree()); }
 
 float value_at(const Grid& grid, int32_t x, int32_t y, int32_t z) noexcept {
     return grid.impl->grid->tree().getValue(openvdb::Coord(x, y, z));
 }
 
-void sample(const Grid& grid, const Call& call, rust::Slice<const double> world, bool linear, rust::Slice<float> out) {
-    const auto& source = *grid.impl->grid;
+namespace {
+
+/// Calls `one` for each of so many world positions, with the tree, the place in index space and its number.
+template <typename Source, typename One>
+void at_each(const Source& source, const Call& call, rust::Slice<const double> world, One&& one) {
     run(call, [&] {
         Interrupter interrupter(call);
-        tbb::parallel_for(
-            tbb::blocked_range<size_t>(0, out.size(), 1024), [&](const tbb::blocked_range<size_t>& range) {
-                if (interrupter.wasInterrupted()) return;
-                auto tree = source.getConstAccessor();
-                for (size_t i = range.begin(); i != range.end(); ++i) {
-                    const auto at =
-                        source.worldToIndex(openvdb::Vec3d(world[3 * i], world[3 * i + 1], world[3 * i + 2]));
-                    out[i] = linear ? openvdb::tools::BoxSampler::sample(tree, at)
-                                    : openvdb::tools::PointSampler::sample(tree, at);
-                }
-            });
+        tbb::parallel_for(tbb::blocked_range<size_t>(0, world.size() / 3, 1024),
+                          [&](const tbb::blocked_range<size_t>& range) {
+                              if (interrupter.wasInterrupted()) return;
+                              auto tree = source.getConstAccessor();
+                              for (size_t i = range.begin(); i != range.end(); ++i) {
+                                  const openvdb::Vec3d place(world[3 * i], world[3 * i + 1], world[3 * i + 2]);
+                                  one(tree, source.worldToIndex(place), i);
+                              }
+                          });
         interrupter.check();
+    });
+}
+
+}  // namespace
+
+void sample(const Grid& grid, const Call& call, rust::Slice<const double> world, bool linear, rust::Slice<float> out) {
+    at_each(*grid.impl->grid, call, world, [&](const auto& tree, const openvdb::Vec3d& at, size_t i) {
+        out[i] = linear ? openvdb::tools::BoxSampler::sample(tree, at) : openvdb::tools::PointSampler::sample(tree, at);
+    });
+}
+
+void sample_vectors(const VectorGrid& grid, const Call& call, rust::Slice<const double> world, bool linear,
+                    rust::Slice<float> out) {
+    using namespace openvdb::tools;
+    const auto& source = *grid.impl->grid;
+    // Components of a staggered grid lie on the faces of voxels.
+    const bool staggered = source.getGridClass() == openvdb::GRID_STAGGERED;
+    at_each(source, call, world, [&](const auto& tree, const openvdb::Vec3d& at, size_t i) {
+        const openvdb::Vec3s value =
+            staggered ? (linear ? StaggeredBoxSampler::sample(tree, at) : StaggeredPointSampler::sample(tree, at))
+                      : (linear ? BoxSampler::sample(tree, at) : PointSampler::sample(tree, at));
+        for (int axis = 0; axis < 3; ++axis) out[3 * i + static_cast<size_t>(axis)] = value[axis];
     });
 }
 

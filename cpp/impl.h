@@ -20,11 +20,20 @@ struct Impl {
     openvdb::FloatGrid::Ptr grid;
 };
 
+struct VectorImpl {
+    openvdb::Vec3SGrid::Ptr grid;
+};
+
 /// Registers OpenVDB's types once.
 void initialise();
 
 /// A grid of ours around a grid that nobody else holds.
 std::unique_ptr<Grid> wrap(openvdb::FloatGrid::Ptr grid);
+std::unique_ptr<VectorGrid> wrap(openvdb::Vec3SGrid::Ptr grid);
+
+/// A value as the bridge carries it: of a float the first number counts.
+inline std::array<float, 3> triple(float value) { return {value, 0.0f, 0.0f}; }
+inline std::array<float, 3> triple(const openvdb::Vec3s& value) { return {value[0], value[1], value[2]}; }
 
 /// The text that the Rust side turns into Error::Cancelled.
 struct Cancelled : std::runtime_error {
@@ -43,6 +52,14 @@ public:
 private:
     const volatile bool* flag_;
 };
+
+/// Runs what has no call with threads of its own on this thread alone: outside of an arena TBB would start workers, as
+/// many as there are cores, for a host that asked for none.
+template <typename Work>
+auto here(Work&& work) {
+    tbb::task_arena arena(1);
+    return arena.execute(std::forward<Work>(work));
+}
 
 /// Runs `work` with as many threads as the call may use, and reports a cancel afterwards.
 template <typename Work>

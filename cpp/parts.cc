@@ -3,6 +3,7 @@
 
 #include <openvdb/io/io.h>
 
+#include <cstring>
 #include <istream>
 #include <sstream>
 
@@ -10,12 +11,32 @@ namespace frazil {
 
 namespace {
 
-/// Whether a tile says what its place says without it.
-bool is_empty(float value, bool active, float background) { return !active && value == background; }
+/// A grid without leaves.
+template <typename GridType>
+typename GridType::Ptr put_together(rust::Slice<const uint8_t> head, const typename GridType::ValueType& background,
+                                    rust::Slice<const Tile> tiles) {
+    initialise();
+    std::istringstream in(std::string(reinterpret_cast<const char*>(head.data()), head.size()));
+    in.exceptions(std::ios_base::failbit | std::ios_base::badbit);
+    openvdb::io::setCurrentVersion(in);
+    auto grid = GridType::create(background);
+    auto transform = openvdb::math::Transform::createLinearTransform();
+    transform->read(in);
+    grid->setTransform(transform);
+    grid->readMeta(in);
+    auto tree = grid->getAccessor();
+    for (const auto& tile : tiles) {
+        typename GridType::ValueType value;
+        std::memcpy(reinterpret_cast<void*>(&value), tile.value.data(), sizeof value);
+        tree.addTile(tile.level, openvdb::Coord(tile.x, tile.y, tile.z), value, tile.active);
+    }
+    return grid;
+}
 
 }  // namespace
 
-std::unique_ptr<std::string> grid_head(const Grid& grid) {
+template <typename G>
+std::unique_ptr<std::string> grid_head(const G& grid) {
     const auto& base = *grid.impl->grid;
     std::ostringstream out;
     base.transform().write(out);
@@ -23,35 +44,35 @@ std::unique_ptr<std::string> grid_head(const Grid& grid) {
     return std::make_unique<std::string>(out.str());
 }
 
-rust::Vec<Tile> tiles(const Grid& grid) {
+template <typename G>
+rust::Vec<Tile> tiles(const G& grid) {
     const auto& tree = grid.impl->grid->tree();
+    using Values = typename std::decay_t<decltype(tree)>::ValueAllCIter;
     rust::Vec<Tile> out;
     auto tile = tree.cbeginValueAll();
-    tile.setMaxDepth(openvdb::FloatTree::ValueAllCIter::LEAF_DEPTH - 1);
+    tile.setMaxDepth(Values::LEAF_DEPTH - 1);
     for (; tile; ++tile) {
         const bool active = tile.isValueOn();
-        const float value = *tile;
-        if (is_empty(value, active, tree.background())) continue;
+        // What its place says without it.
+        if (!active && *tile == tree.background()) continue;
         const auto at = tile.getCoord();
-        out.push_back({at[0], at[1], at[2], static_cast<uint32_t>(tile.getLevel()), active, value});
+        out.push_back({at[0], at[1], at[2], static_cast<uint32_t>(tile.getLevel()), active, triple(*tile)});
     }
     return out;
 }
 
+template std::unique_ptr<std::string> grid_head(const Grid&);
+template std::unique_ptr<std::string> grid_head(const VectorGrid&);
+template rust::Vec<Tile> tiles(const Grid&);
+template rust::Vec<Tile> tiles(const VectorGrid&);
+
 std::unique_ptr<Grid> assemble(rust::Slice<const uint8_t> head, float background, rust::Slice<const Tile> tiles) {
-    initialise();
-    std::istringstream in(std::string(reinterpret_cast<const char*>(head.data()), head.size()));
-    in.exceptions(std::ios_base::failbit | std::ios_base::badbit);
-    openvdb::io::setCurrentVersion(in);
-    auto grid = openvdb::FloatGrid::create(background);
-    auto transform = openvdb::math::Transform::createLinearTransform();
-    transform->read(in);
-    grid->setTransform(transform);
-    grid->readMeta(in);
-    openvdb::FloatGrid::Accessor tree = grid->getAccessor();
-    for (const auto& tile : tiles)
-        tree.addTile(tile.level, openvdb::Coord(tile.x, tile.y, tile.z), tile.value, tile.active);
-    return wrap(grid);
+    return here([&] { return wrap(put_together<openvdb::FloatGrid>(head, background, tiles)); });
+}
+
+std::unique_ptr<VectorGrid> assemble_vectors(rust::Slice<const uint8_t> head, std::array<float, 3> background,
+                                             rust::Slice<const Tile> tiles) {
+    return here([&] { return wrap(put_together<openvdb::Vec3SGrid>(head, openvdb::Vec3s(background.data()), tiles)); });
 }
 
 }  // namespace frazil

@@ -88,7 +88,7 @@ enum frz_status
      */
     FRZ_ERROR_IO = 3,
     /**
-     * More memory would be needed than the context allows.
+     * More memory would be needed than the context allows, or than there is.
      */
     FRZ_ERROR_MEMORY = 4,
     /**
@@ -96,7 +96,7 @@ enum frz_status
      */
     FRZ_CANCELLED = 5,
     /**
-     * OpenVDB reported an error.
+     * OpenVDB cannot do what is wanted, for a reason that no other status stands for.
      */
     FRZ_ERROR_OPENVDB = 6,
     /**
@@ -210,6 +210,10 @@ enum frz_grid_class
      * A density.
      */
     FRZ_GRID_FOG = 2,
+    /**
+     * Of vectors: component x of voxel (i, j, k) is that at (i - 1/2, j, k), on the voxel's face, y and z likewise.
+     */
+    FRZ_GRID_STAGGERED = 3,
 };
 #ifndef __cplusplus
 #if __STDC_VERSION__ >= 202311L
@@ -333,6 +337,31 @@ typedef uint32_t frz_smoothing;
 #endif // __cplusplus
 
 /**
+ * What a voxel of a grid holds.
+ */
+enum frz_value_type
+#if defined(__cplusplus) || __STDC_VERSION__ >= 202311L
+  : uint32_t
+#endif // defined(__cplusplus) || __STDC_VERSION__ >= 202311L
+ {
+    /**
+     * A float.
+     */
+    FRZ_VALUE_FLOAT = 0,
+    /**
+     * float[3]: a velocity, a wind, a colour. Functions that say nothing of vectors refuse such a grid.
+     */
+    FRZ_VALUE_VECTOR = 1,
+};
+#ifndef __cplusplus
+#if __STDC_VERSION__ >= 202311L
+typedef enum frz_value_type frz_value_type;
+#else
+typedef uint32_t frz_value_type;
+#endif // __STDC_VERSION__ >= 202311L
+#endif // __cplusplus
+
+/**
  * A layer of snow that bodies press into.
  */
 typedef struct frz_base frz_base;
@@ -343,8 +372,8 @@ typedef struct frz_base frz_base;
 typedef struct frz_context frz_context;
 
 /**
- * A sparse grid of 32-bit floats; voxel (i, j, k) has its centre at (i, j, k) x voxel size, unless a file brought
- * another transform.
+ * A sparse grid of 32-bit floats, or of vectors of three of them; voxel (i, j, k) has its centre at (i, j, k) x voxel
+ * size, unless a file brought another transform.
  */
 typedef struct frz_grid frz_grid;
 
@@ -537,68 +566,6 @@ typedef struct {
 } frz_mesh_info;
 
 /**
- * A block of 8 x 8 x 8 voxels. Voxel (x, y, z) of the block has its value at x * 64 + y * 8 + z, and its bit in
- * mask[x] at y * 8 + z.
- */
-typedef struct {
-    /**
-     * Voxel of the least corner, multiples of 8.
-     */
-    int32_t origin[3];
-    /**
-     * The value of all voxels where values is NULL.
-     */
-    float tile;
-    /**
-     * 512 values, or NULL.
-     */
-    const float *values;
-    /**
-     * 8 words: which voxels are active; NULL where values is NULL.
-     */
-    const uint64_t *mask;
-} frz_leaf;
-
-/**
- * What a grid is made of.
- */
-typedef struct {
-    /**
-     * sizeof(frz_grid_desc).
-     */
-    uint32_t struct_size;
-    /**
-     * A frz_grid_class. A level set gets the sign of its band everywhere outside the leaves.
-     */
-    uint32_t grid_class;
-    /**
-     * Edge of a voxel (m), 1e-6 to 1000.
-     */
-    double voxel_size;
-    /**
-     * Value where nothing is stored, finite. For a level set the half width of its band (m), at least 3 voxels.
-     */
-    float background;
-    /**
-     * 0.
-     */
-    uint32_t flags;
-    /**
-     * Leaves, at different places; NULL for none. Values are finite. A mask of NULL makes all voxels active, of a
-     * level set those nearer than the background.
-     */
-    const frz_leaf *leaves;
-    /**
-     * Number of leaves.
-     */
-    size_t leaf_count;
-    /**
-     * Name in files, UTF-8; NULL for none.
-     */
-    const char *name;
-} frz_grid_desc;
-
-/**
  * What a grid is.
  */
 typedef struct {
@@ -615,7 +582,7 @@ typedef struct {
      */
     double voxel_size;
     /**
-     * Value where nothing is stored.
+     * Value where nothing is stored; 0 for vectors.
      */
     float background;
     /**
@@ -642,7 +609,114 @@ typedef struct {
      * Greatest active voxel on each axis, included; all zeroes when there is none.
      */
     int32_t voxel_max[3];
+    /**
+     * A frz_value_type.
+     */
+    uint32_t value_type;
+    /**
+     * Of vectors the value where nothing is stored; else zeroes.
+     */
+    float background_vector[3];
 } frz_grid_info;
+
+/**
+ * A block of 8 x 8 x 8 voxels. Voxel (x, y, z) of the block has its value at x * 64 + y * 8 + z, and its bit in
+ * mask[x] at y * 8 + z.
+ */
+typedef struct {
+    /**
+     * Voxel of the least corner, multiples of 8.
+     */
+    int32_t origin[3];
+    /**
+     * The value of all voxels where values is NULL.
+     */
+    float tile;
+    /**
+     * 512 values, or NULL.
+     */
+    const float *values;
+    /**
+     * 8 words: which voxels are active; NULL where values is NULL.
+     */
+    const uint64_t *mask;
+} frz_leaf;
+
+/**
+ * A block of 8 x 8 x 8 voxels of vectors. Voxel (x, y, z) of the block has its float[3] at x * 64 + y * 8 + z, and its
+ * bit in mask[x] at y * 8 + z.
+ */
+typedef struct {
+    /**
+     * Voxel of the least corner, multiples of 8.
+     */
+    int32_t origin[3];
+    /**
+     * The value of all voxels where values is NULL.
+     */
+    float tile[3];
+    /**
+     * 512 times float[3], or NULL.
+     */
+    const float *values;
+    /**
+     * 8 words: which voxels are active; NULL where values is NULL.
+     */
+    const uint64_t *mask;
+} frz_vector_leaf;
+
+/**
+ * What a grid is made of.
+ */
+typedef struct {
+    /**
+     * sizeof(frz_grid_desc).
+     */
+    uint32_t struct_size;
+    /**
+     * A frz_grid_class. A level set gets the sign of its band everywhere outside the leaves. Of vectors FRZ_GRID_UNKNOWN
+     * or FRZ_GRID_STAGGERED.
+     */
+    uint32_t grid_class;
+    /**
+     * Edge of a voxel (m), 1e-6 to 1000.
+     */
+    double voxel_size;
+    /**
+     * Value where nothing is stored, finite. For a level set the half width of its band (m), at least 3 voxels. 0 for
+     * vectors.
+     */
+    float background;
+    /**
+     * 0.
+     */
+    uint32_t flags;
+    /**
+     * Leaves, at different places; NULL for none. Values are finite. A mask of NULL makes all voxels active, of a
+     * level set those nearer than the background.
+     */
+    const frz_leaf *leaves;
+    /**
+     * Number of leaves, or of vector_leaves.
+     */
+    size_t leaf_count;
+    /**
+     * Name in files, UTF-8; NULL for none.
+     */
+    const char *name;
+    /**
+     * A frz_value_type.
+     */
+    uint32_t value_type;
+    /**
+     * Of vectors the value where nothing is stored, finite; else zeroes.
+     */
+    float background_vector[3];
+    /**
+     * As leaves, which are NULL then, of a grid of vectors; else NULL.
+     */
+    const frz_vector_leaf *vector_leaves;
+} frz_grid_desc;
 
 /**
  * Irregularity of a surface: where the noise is positive it moves outward.
@@ -1052,16 +1126,6 @@ frz_status frz_mesh_attribute(const frz_mesh *mesh,
                               uint32_t *components);
 
 /**
- * Makes a grid from blocks of voxels, which are copied.
- *
- * desc: what it is made of.
- * out: receives the grid, to be destroyed with frz_grid_destroy; NULL after a failure.
- *
- * One thread at a time for each context.
- */
-frz_status frz_grid_create(frz_context *context, const frz_grid_desc *desc, frz_grid **out);
-
-/**
  * Destroys a grid; NULL is fine. A grid that belongs to another object stays.
  *
  * grid: may be NULL.
@@ -1111,7 +1175,17 @@ frz_status frz_grid_name(const frz_grid *grid, char *dst, size_t capacity, size_
 frz_status frz_grid_set_name(frz_grid *grid, const char *name);
 
 /**
- * Lends a grid's leaves without copying them, in an order that does not change while the grid does not.
+ * Makes a grid from blocks of voxels, which are copied.
+ *
+ * desc: what it is made of.
+ * out: receives the grid, to be destroyed with frz_grid_destroy; NULL after a failure.
+ *
+ * One thread at a time for each context.
+ */
+frz_status frz_grid_create(frz_context *context, const frz_grid_desc *desc, frz_grid **out);
+
+/**
+ * Lends the leaves of a grid of floats without copying them, in an order that does not change while the grid does not.
  *
  * Blocks without a leaf have one value: the background, or for a level set plus or minus the background. Values of a
  * level set are distances (m).
@@ -1128,7 +1202,7 @@ frz_status frz_grid_leaves(const frz_grid *grid,
                            size_t *count);
 
 /**
- * Lends what a grid holds at some places: leaves, or the value of all 512 voxels.
+ * Lends what a grid of floats holds at some places: leaves, or the value of all 512 voxels.
  *
  * origins: int32_t[3] for each place, multiples of 8, for instance those of frz_base_dirty.
  * dst: room for as many elements of frz_leaf, whose pointers stay as those of frz_grid_leaves do.
@@ -1138,7 +1212,34 @@ frz_status frz_grid_leaves(const frz_grid *grid,
 frz_status frz_grid_probe(const frz_grid *grid, frz_view origins, frz_span dst);
 
 /**
- * Values of a grid at world positions.
+ * Lends the leaves of a grid of vectors without copying them, in an order that does not change while the grid does not.
+ *
+ * Blocks without a leaf have one value: the background, or what frz_grid_vector_probe finds.
+ *
+ * dst: room for leaf_count elements of frz_vector_leaf; with data NULL only the number is told. FRZ_ERROR_CAPACITY when
+ *     it is too small. The pointers in it are the grid's: they stay until it is destroyed.
+ * count: receives the number of leaves; 0 after other failures.
+ *
+ * Any number of threads may read a grid.
+ */
+frz_status frz_grid_vector_leaves(const frz_grid *grid,
+                                  frz_span dst,
+                                  size_t *count);
+
+/**
+ * Lends what a grid of vectors holds at some places: leaves, or the value of all 512 voxels.
+ *
+ * origins: int32_t[3] for each place, multiples of 8.
+ * dst: room for as many elements of frz_vector_leaf, whose pointers stay as those of frz_grid_vector_leaves do.
+ *
+ * Any number of threads may read a grid.
+ */
+frz_status frz_grid_vector_probe(const frz_grid *grid,
+                                 frz_view origins,
+                                 frz_span dst);
+
+/**
+ * Values of a grid of floats at world positions.
  *
  * positions: float[3] for each (m), finite.
  * sampling: a frz_sampling.
@@ -1153,7 +1254,22 @@ frz_status frz_grid_sample(frz_context *context,
                            frz_span dst);
 
 /**
- * Gives a mesh's vertices an attribute of one float: a grid's values there.
+ * Vectors of a grid at world positions. Components of a staggered grid are found where they lie.
+ *
+ * positions: float[3] for each (m), finite.
+ * sampling: a frz_sampling.
+ * dst: room for as many float[3].
+ *
+ * Any number of threads may read a grid; one thread at a time for each context.
+ */
+frz_status frz_grid_sample_vectors(frz_context *context,
+                                   const frz_grid *grid,
+                                   frz_view positions,
+                                   uint32_t sampling,
+                                   frz_span dst);
+
+/**
+ * Gives a mesh's vertices an attribute: a grid's values there, one float each, or three of a grid of vectors.
  *
  * mesh: gets the attribute, in the place of one of the same name.
  * sampling: a frz_sampling.
@@ -1168,7 +1284,7 @@ frz_status frz_grid_sample_mesh(frz_context *context,
                                 const char *name);
 
 /**
- * Makes a mesh of triangles along a grid's surface, counter-clockwise seen from outside, also where the grid's transform
+ * Makes a mesh of triangles along the surface of a grid of floats, counter-clockwise seen from outside, also where the grid's transform
  * mirrors.
  *
  * A cancel is heeded before and after the work, not within.
@@ -1220,11 +1336,11 @@ frz_status frz_grid_to_mesh_blocks(frz_context *context,
                                    frz_mesh **out);
 
 /**
- * Reads a grid of floats from a .vdb file. A cancel is heeded before and after the work, not within.
+ * Reads a grid of floats or of vectors from a .vdb file. A cancel is heeded before and after the work, not within.
  *
  * path: UTF-8.
- * name: which grid; NULL for the first level set, else the first grid of floats. FRZ_ERROR_FILE names those that
- *     there are when it is not found.
+ * name: which grid; NULL for the first level set, else the first grid of floats, else the first of vectors.
+ *     FRZ_ERROR_FILE names those that there are when it is not found, and the type when it is another.
  * out: receives the grid, to be destroyed with frz_grid_destroy; NULL after a failure.
  *
  * One thread at a time for each context.
@@ -1253,7 +1369,7 @@ frz_status frz_grid_save(frz_context *context,
                          uint32_t flags);
 
 /**
- * Reads a grid of floats from the bytes of a .vdb file.
+ * Reads a grid of floats or of vectors from the bytes of a .vdb file.
  *
  * Bytes must come from a .vdb file: OpenVDB does not survive every kind of damage. What cannot be used is
  * FRZ_ERROR_FILE. A cancel is heeded before and after the work, not within.
@@ -1293,7 +1409,7 @@ frz_status frz_grid_to_bytes(frz_context *context,
                              size_t *size);
 
 /**
- * Reads a grid of floats from a .vdb file that may be damaged, as frz_grid_load does, but in another process.
+ * Reads a grid of floats or of vectors from a .vdb file that may be damaged, as frz_grid_load does, but in another process.
  *
  * OpenVDB does not survive every kind of damage: a file with a flipped bit can crash frz_grid_load, and the host with
  * it, or never end. Here the frazil program reads the file, within a limit of time and memory that goes by the file's

@@ -44,8 +44,11 @@ pub enum Error {
     /// The context was cancelled; the state is as it was before the call.
     #[error("cancelled")]
     Cancelled,
-    /// OpenVDB threw an exception.
-    #[error("OpenVDB: {0}")]
+    /// Memory ran out in the middle of the work.
+    #[error("there is not enough memory left for this")]
+    OutOfMemory,
+    /// OpenVDB refused what no other kind stands for.
+    #[error("{0}")]
     OpenVdb(String),
     /// A promise inside the library does not hold: a bug of ours.
     #[error("internal error: {0}")]

@@ -66,11 +66,18 @@ class LeafView(c.Structure):
     ]
 
 
+class VectorLeafView(c.Structure):
+    _fields_ = [
+        ("origin", c.c_int32 * 3), ("tile", c.c_float * 3), ("values", c.c_void_p), ("mask", c.c_void_p),
+    ]
+
+
 class GridDesc(c.Structure):
     _fields_ = [
         ("struct_size", c.c_uint32), ("grid_class", c.c_uint32), ("voxel_size", c.c_double),
         ("background", c.c_float), ("flags", c.c_uint32), ("leaves", c.POINTER(LeafView)),
-        ("leaf_count", c.c_size_t), ("name", c.c_char_p),
+        ("leaf_count", c.c_size_t), ("name", c.c_char_p), ("value_type", c.c_uint32),
+        ("background_vector", c.c_float * 3), ("vector_leaves", c.POINTER(VectorLeafView)),
     ]
 
 
@@ -79,7 +86,7 @@ class GridInfo(Struct):
         ("struct_size", c.c_uint32), ("grid_class", c.c_uint32), ("voxel_size", c.c_double),
         ("background", c.c_float), ("world_fixed", c.c_uint32), ("active_voxels", c.c_uint64),
         ("leaf_count", c.c_uint64), ("memory_bytes", c.c_uint64), ("voxel_min", c.c_int32 * 3),
-        ("voxel_max", c.c_int32 * 3),
+        ("voxel_max", c.c_int32 * 3), ("value_type", c.c_uint32), ("background_vector", c.c_float * 3),
     ]
 
 
@@ -121,6 +128,7 @@ class BaseReport(Struct):
 STRUCTS = {
     "frz_view": View, "frz_span": Span, "frz_progress": Progress, "frz_stage_time": StageTime,
     "frz_attribute": Attribute, "frz_mesh_desc": MeshDesc, "frz_mesh_info": MeshInfo, "frz_leaf": LeafView,
+    "frz_vector_leaf": VectorLeafView,
     "frz_grid_desc": GridDesc, "frz_grid_info": GridInfo, "frz_noise": NoiseParams, "frz_body": BodyDesc,
     "frz_snow_desc": SnowDesc, "frz_base_params": BaseParams, "frz_base_report": BaseReport,
 }
@@ -136,7 +144,8 @@ _FUNCTIONS = {
     "mesh_get_info": [_P, _P], "mesh_read": [_P, _U, Span], "mesh_attribute": [_P, _S, Span, _P],
     "grid_create": [_P, _P, _P], "grid_copy": [_P, _P, _P], "grid_get_info": [_P, _P],
     "grid_name": [_P, _P, _Z, _P], "grid_set_name": [_P, _S], "grid_leaves": [_P, Span, _P],
-    "grid_probe": [_P, View, Span], "grid_sample": [_P, _P, View, _U, Span],
+    "grid_vector_leaves": [_P, Span, _P], "grid_vector_probe": [_P, View, Span],
+    "grid_sample_vectors": [_P, _P, View, _U, Span], "grid_probe": [_P, View, Span], "grid_sample": [_P, _P, View, _U, Span],
     "grid_sample_mesh": [_P, _P, _P, _U, _S], "grid_to_mesh": [_P, _P, _F, _F, _P],
     "grid_load": [_P, _S, _S, _P], "grid_save": [_P, _P, _Z, _S, _U, _U],
     "grid_from_bytes": [_P, _P, _Z, _S, _P], "grid_to_bytes": [_P, _P, _Z, _U, _U, _P, _Z, _P],

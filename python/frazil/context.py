@@ -95,6 +95,13 @@ class Context(Handle):
         call("context_progress", self.pointer, c.byref(out))
         return out.stage.decode(), out.stages_done, out.seconds
 
+    @property
+    def fraction(self):
+        """Part of the running stage that is done, 0 to 1; None where that is not known. For a poll, or any thread."""
+        out = Progress()
+        call("context_progress", self.pointer, c.byref(out))
+        return None if out.fraction < 0 else out.fraction
+
     def timings(self):
         """The stages of the last call: a list of (stage, seconds)."""
         count = c.c_size_t()

@@ -1,19 +1,21 @@
-"""Sparse grids of floats."""
+"""Sparse grids of floats, and of vectors of three: their arrays have one axis more, of length 3."""
 
 import ctypes as c
 from typing import NamedTuple
 
 import numpy as np
 
-from ._library import GridDesc, GridInfo, Handle, LeafView, Span, call, made, rows, span, text, view
+from ._library import GridDesc, GridInfo, Handle, LeafView, Span, VectorLeafView, call, made, rows, span, text, view
 from .mesh import Mesh
 
-UNKNOWN, LEVEL_SET, FOG = 0, 1, 2
+UNKNOWN, LEVEL_SET, FOG, STAGGERED = 0, 1, 2, 3
+FLOAT, VECTOR = 0, 1
 BLOSC, ZIP, NONE = 0, 1, 2
 
 
 class Leaf(NamedTuple):
-    """A block of 8 x 8 x 8 voxels: its least corner, its values [x, y, z] and which are active."""
+    """A block of 8 x 8 x 8 voxels: its least corner, its values [x, y, z], or [x, y, z, component], and which are
+    active."""
 
     origin: tuple
     values: np.ndarray
@@ -26,19 +28,33 @@ class Grid(Handle):
     _destroy = "frz_grid_destroy"
 
     @classmethod
-    def from_leaves(cls, ctx, leaves, voxel_size, background, grid_class=LEVEL_SET, name=None):
-        """Makes a grid of (origin, values[8, 8, 8]) or Leaf tuples; without `active` OpenVDB's rule decides."""
-        views, kept = (LeafView * max(len(leaves), 1))(), []
+    def from_leaves(cls, ctx, leaves, voxel_size, background, grid_class=None, name=None):
+        """Makes a grid of (origin, values[8, 8, 8]) or Leaf tuples; without `active` OpenVDB's rule decides.
+
+        A background of three numbers makes a grid of vectors, of values[8, 8, 8, 3]. Without a grid_class floats are a
+        level set, and vectors UNKNOWN.
+        """
+        background = np.asarray(background, np.float32)
+        vectors = background.shape == (3,)
+        kind, shape = (VectorLeafView, (8, 8, 8, 3)) if vectors else (LeafView, (8, 8, 8))
+        views, kept = (kind * max(len(leaves), 1))(), []
         for at, leaf in enumerate(leaves):
-            values = np.ascontiguousarray(leaf[1], np.float32).reshape(512)
+            values = np.ascontiguousarray(leaf[1], np.float32)
+            if values.size != np.prod(shape):
+                raise ValueError(f"leaf {at}: values of shape {shape} are needed, not {values.shape}")
             kept.append(values)
-            mask = None
+            views[at].origin, views[at].values = (c.c_int32 * 3)(*leaf[0]), values.ctypes.data
             if len(leaf) > 2:
                 bits = np.packbits(np.asarray(leaf[2], bool).reshape(8, 64), axis=1, bitorder="little")
                 kept.append(bits)
-                mask = bits.ctypes.data
-            views[at] = LeafView((c.c_int32 * 3)(*leaf[0]), 0.0, values.ctypes.data, mask)
-        desc = GridDesc(c.sizeof(GridDesc), grid_class, voxel_size, background, 0, views, len(leaves), text(name))
+                views[at].mask = bits.ctypes.data
+        if grid_class is None:
+            grid_class = UNKNOWN if vectors else LEVEL_SET
+        desc = GridDesc(c.sizeof(GridDesc), grid_class, voxel_size, leaf_count=len(leaves), name=text(name))
+        if vectors:
+            desc.value_type, desc.background_vector, desc.vector_leaves = VECTOR, (c.c_float * 3)(*background), views
+        else:
+            desc.background, desc.leaves = float(background), views
         return cls(made("grid_create", ctx.pointer, c.byref(desc)))
 
     @classmethod
@@ -48,7 +64,8 @@ class Grid(Handle):
 
     def _words(self):
         info = self.info
-        kind = ("grid", "level set", "fog")[info.grid_class] if info.grid_class < 3 else "grid"
+        kind = ("grid", "level set", "fog", "staggered grid")[info.grid_class] if info.grid_class < 4 else "grid"
+        kind += " of vectors," if info.value_type == VECTOR else ""
         return f"\"{self.name}\", {kind} of {info.active_voxels} active voxels of {info.voxel_size:g} m"
 
     def copy(self, ctx):
@@ -75,26 +92,35 @@ class Grid(Handle):
     def name(self, name):
         call("grid_set_name", self.pointer, text(name))
 
+    @property
+    def is_vectors(self):
+        """Whether it holds vectors: only what says so takes them."""
+        return self.info.value_type == VECTOR
+
     def leaves(self):
         """All leaves, copied."""
-        count = c.c_size_t()
-        call("grid_leaves", self.pointer, Span(None, 0, 0), c.byref(count))
-        views = (LeafView * max(count.value, 1))()
-        call("grid_leaves", self.pointer, Span(c.addressof(views), count.value, 0), c.byref(count))
-        return [_leaf(leaf) for leaf in views[: count.value]]
+        vectors, count = self.is_vectors, c.c_size_t()
+        name, kind = ("grid_vector_leaves", VectorLeafView) if vectors else ("grid_leaves", LeafView)
+        call(name, self.pointer, Span(None, 0, 0), c.byref(count))
+        views = (kind * max(count.value, 1))()
+        call(name, self.pointer, Span(c.addressof(views), count.value, 0), c.byref(count))
+        return [_leaf(leaf, vectors) for leaf in views[: count.value]]
 
     def probe(self, origins):
-        """What lies at block origins (n, 3): a Leaf each, or the one value of the block."""
-        origins = rows(origins, np.int32, 3)
-        views = (LeafView * max(len(origins), 1))()
-        call("grid_probe", self.pointer, view(origins), Span(c.addressof(views), len(origins), 0))
-        return [_leaf(leaf) if leaf.values else leaf.tile for leaf in views[: len(origins)]]
+        """What lies at block origins (n, 3): a Leaf each, or the one value of the block, of vectors an array of 3."""
+        origins, vectors = rows(origins, np.int32, 3), self.is_vectors
+        name, kind = ("grid_vector_probe", VectorLeafView) if vectors else ("grid_probe", LeafView)
+        views = (kind * max(len(origins), 1))()
+        call(name, self.pointer, view(origins), Span(c.addressof(views), len(origins), 0))
+        one = (lambda tile: np.array(tile, np.float32)) if vectors else float
+        return [_leaf(leaf, vectors) if leaf.values else one(leaf.tile) for leaf in views[: len(origins)]]
 
     def sample(self, ctx, positions, linear=True):
-        """Values at world positions (n, 3)."""
-        positions = rows(positions, np.float32, 3)
-        out = np.empty(len(positions), np.float32)
-        call("grid_sample", ctx.pointer, self.pointer, view(positions), int(linear), span(out))
+        """Values at world positions (n, 3): (n,), of vectors (n, 3)."""
+        positions, vectors = rows(positions, np.float32, 3), self.is_vectors
+        out = np.empty((len(positions), 3) if vectors else len(positions), np.float32)
+        name = "grid_sample_vectors" if vectors else "grid_sample"
+        call(name, ctx.pointer, self.pointer, view(positions), int(linear), span(out))
         return out
 
     def to_mesh(self, ctx, iso=0.0, adaptivity=0.0, box=None, blocks=None):
@@ -122,15 +148,17 @@ class Grid(Handle):
         return out.raw[: size.value]
 
 
-def _leaf(leaf):
-    values = np.ctypeslib.as_array(c.cast(leaf.values, c.POINTER(c.c_float)), (8, 8, 8)).copy()
+def _leaf(leaf, vectors):
+    shape = (8, 8, 8, 3) if vectors else (8, 8, 8)
+    values = np.ctypeslib.as_array(c.cast(leaf.values, c.POINTER(c.c_float)), shape).copy()
     bits = np.ctypeslib.as_array(c.cast(leaf.mask, c.POINTER(c.c_uint8)), (64,))
     active = np.unpackbits(bits, bitorder="little").reshape(8, 8, 8).astype(bool)
     return Leaf(tuple(leaf.origin), values, active)
 
 
 def load(ctx, path, name=None):
-    """Reads a grid from a .vdb file; without a name the first level set, else the first grid of floats."""
+    """Reads a grid from a .vdb file; without a name the first level set, else the first grid of floats, else
+    the first of vectors."""
     return Grid(made("grid_load", ctx.pointer, text(path), text(name)))
 
 

@@ -179,7 +179,7 @@ pub unsafe extern "C" fn frz_base_create(
     unsafe {
         creates(context, out, |ctx| {
             let held = read(snow)?;
-            let snow = held.get();
+            let snow = held.floats()?;
             let params = if params.is_null() {
                 frz_base_params::USUAL
             } else {

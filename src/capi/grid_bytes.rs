@@ -8,10 +8,10 @@ use super::grid::{Grid, frz_grid};
 use super::guard::{Failure, Outcome, frz_status, guard};
 use super::handle::{Reading, clear, read};
 use super::mesh::no_flags;
-use super::views::{Plain, frz_view, meaning, text, write_bytes};
-use crate::error::Error;
-use crate::vdb::FloatGrid;
+use super::views::{Plain, frz_view, meaning, required_text, text, write_bytes};
+use crate::context::Context;
 use crate::vdb::file::{self, Compression, WriteOptions};
+use crate::vdb::{AnyGrid, GridRef};
 
 /// How the values of a .vdb file are packed.
 #[repr(u32)]
@@ -59,7 +59,7 @@ unsafe fn several<'a>(grids: *const *const frz_grid, count: usize) -> Outcome<Ve
     // SAFETY: as above.
     let grids: Vec<Reading<'a, Grid>> =
         grids.iter().map(|grid| unsafe { read(grid.0) }).collect::<Outcome<_>>()?;
-    let mut names: Vec<String> = grids.iter().map(|grid| grid.get().name()).collect();
+    let mut names: Vec<String> = grids.iter().map(|grid| grid.any().name()).collect();
     names.sort_unstable();
     if let Some(twice) = names.windows(2).find(|pair| pair[0] == pair[1]) {
         return Err(Failure::argument(format!("grids: two of them are named \"{}\"", twice[0])));
@@ -67,11 +67,30 @@ unsafe fn several<'a>(grids: *const *const frz_grid, count: usize) -> Outcome<Ve
     Ok(grids)
 }
 
-/// Reads a grid of floats from a .vdb file. A cancel is heeded before and after the work, not within.
+/// A function of the interface that reads a grid from a file.
+///
+/// # Safety
+/// The pointers must be NULL or the caller's.
+pub(super) unsafe fn loads(
+    context: *mut frz_context,
+    [path, name]: [*const c_char; 2],
+    out: *mut *mut frz_grid,
+    load: impl FnOnce(&Context, &Path, Option<&str>) -> Outcome<AnyGrid>,
+) -> frz_status {
+    // SAFETY: the caller's promise.
+    unsafe {
+        creates(context, out, |ctx| {
+            let path = Path::new(required_text(path, "path")?);
+            Ok(Grid::Own(load(ctx, path, text(name, "name")?)?))
+        })
+    }
+}
+
+/// Reads a grid of floats or of vectors from a .vdb file. A cancel is heeded before and after the work, not within.
 ///
 /// path: UTF-8.
-/// name: which grid; NULL for the first level set, else the first grid of floats. FRZ_ERROR_FILE names those that
-///     there are when it is not found.
+/// name: which grid; NULL for the first level set, else the first grid of floats, else the first of vectors.
+///     FRZ_ERROR_FILE names those that there are when it is not found, and the type when it is another.
 /// out: receives the grid, to be destroyed with frz_grid_destroy; NULL after a failure.
 ///
 /// One thread at a time for each context.
@@ -82,19 +101,15 @@ pub unsafe extern "C" fn frz_grid_load(
     name: *const c_char,
     out: *mut *mut frz_grid,
 ) -> frz_status {
+    let load = |ctx: &Context, path: &Path, name: Option<&str>| {
+        Ok(ctx.stage("read", || {
+            let memory = file::describe(path)?.iter().filter_map(|grid| grid.memory).max();
+            ctx.allow(&path.display().to_string(), memory.unwrap_or(0))?;
+            file::read_any(path, name)
+        })?)
+    };
     // SAFETY: the pointers are NULL or the caller's.
-    unsafe {
-        creates(context, out, |ctx| {
-            let path = Path::new(text(path, "path")?.ok_or_else(|| Failure::argument("path is NULL"))?);
-            let name = text(name, "name")?;
-            let grid = ctx.stage("read", || {
-                let memory = file::describe(path)?.iter().filter_map(|grid| grid.memory).max();
-                ctx.allow(&path.display().to_string(), memory.unwrap_or(0))?;
-                file::read_named(path, name)
-            })?;
-            Ok(Grid::Own(grid))
-        })
-    }
+    unsafe { loads(context, [path, name], out, load) }
 }
 
 /// Writes grids into one .vdb file. The file is there when it is whole: it is written under another name first. A cancel is
@@ -120,16 +135,16 @@ pub unsafe extern "C" fn frz_grid_save(
         unsafe {
             let call = enter(context)?;
             let ctx = call.ctx();
-            let path = Path::new(text(path, "path")?.ok_or_else(|| Failure::argument("path is NULL"))?);
+            let path = Path::new(required_text(path, "path")?);
             let options = options(compression, flags)?;
             let grids = several(grids, count)?;
-            let list: Vec<&FloatGrid> = grids.iter().map(|grid| grid.get()).collect();
-            Ok(ctx.stage_in_place("write", || file::write(path, &list, &options))?)
+            let list: Vec<GridRef<'_>> = grids.iter().map(|grid| grid.any()).collect();
+            Ok(ctx.stage_in_place("write", || file::write_any(path, &list, &options))?)
         }
     })
 }
 
-/// Reads a grid of floats from the bytes of a .vdb file.
+/// Reads a grid of floats or of vectors from the bytes of a .vdb file.
 ///
 /// Bytes must come from a .vdb file: OpenVDB does not survive every kind of damage. What cannot be used is
 /// FRZ_ERROR_FILE. A cancel is heeded before and after the work, not within.
@@ -153,14 +168,7 @@ pub unsafe extern "C" fn frz_grid_from_bytes(
             ctx.allow("a grid from bytes", size as u64)?;
             let bytes = frz_view { data: bytes, count: size, stride: 0 }.elements::<u8>("bytes")?;
             let name = text(name, "name")?;
-            let grid = ctx.stage("read", || {
-                // What is wrong with them is no matter of how the function was called.
-                file::from_bytes(&bytes, name).map_err(|error| match error {
-                    Error::Argument(what) => Error::Bytes(what),
-                    other => other,
-                })
-            })?;
-            Ok(Grid::Own(grid))
+            Ok(Grid::Own(ctx.stage("read", || file::any_from_bytes(&bytes, name))?))
         })
     }
 }
@@ -195,9 +203,9 @@ pub unsafe extern "C" fn frz_grid_to_bytes(
             let ctx = call.ctx();
             let options = options(compression, flags)?;
             let grids = several(grids, count)?;
-            let list: Vec<&FloatGrid> = grids.iter().map(|grid| grid.get()).collect();
+            let list: Vec<GridRef<'_>> = grids.iter().map(|grid| grid.any()).collect();
             let bound = || list.iter().map(|grid| grid.file_bound() as usize).sum();
-            let bytes = || Ok(ctx.stage("write", || file::to_bytes(&list, &options))?);
+            let bytes = || Ok(ctx.stage("write", || file::any_to_bytes(&list, &options))?);
             write_bytes(dst, capacity, size, bound, bytes)
         }
     })

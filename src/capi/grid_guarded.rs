@@ -1,15 +1,15 @@
 //! Grids out of files that may be damaged: another process reads them.
 
 use std::ffi::c_char;
-use std::path::Path;
 
-use super::context::{creates, frz_context};
-use super::grid::{Grid, frz_grid};
-use super::guard::{Failure, frz_status};
-use super::views::text;
+use super::context::frz_context;
+use super::grid::frz_grid;
+use super::grid_bytes::loads;
+use super::guard::frz_status;
+use super::views::required_text;
 use crate::vdb::guard::Guard;
 
-/// Reads a grid of floats from a .vdb file that may be damaged, as frz_grid_load does, but in another process.
+/// Reads a grid of floats or of vectors from a .vdb file that may be damaged, as frz_grid_load does, but in another process.
 ///
 /// OpenVDB does not survive every kind of damage: a file with a flipped bit can crash frz_grid_load, and the host with
 /// it, or never end. Here the frazil program reads the file, within a limit of time and memory that goes by the file's
@@ -33,20 +33,16 @@ pub unsafe extern "C" fn frz_grid_load_guarded(
 ) -> frz_status {
     // SAFETY: the pointers are NULL or the caller's.
     unsafe {
-        creates(context, out, |ctx| {
-            let given = |pointer, what: &str| {
-                text(pointer, what)?.ok_or_else(|| Failure::argument(format!("{what} is NULL")))
-            };
+        loads(context, [path, name], out, |ctx, path, name| {
             let guard = Guard {
-                program: given(program, "program")?.into(),
+                program: required_text(program, "program")?.into(),
                 memory: ctx.memory_limit(),
                 threads: ctx.pool().threads(),
                 cancel: ctx.cancel_flags()[1].clone(),
             };
-            let (path, name) = (Path::new(given(path, "path")?), text(name, "name")?);
-            let grid = ctx.stage("read", || guard.read_named(path, name))?;
-            ctx.allow(&path.display().to_string(), grid.memory_bytes())?;
-            Ok(Grid::Own(grid))
+            let grid = ctx.stage("read", || guard.read_any(path, name))?;
+            ctx.allow(&path.display().to_string(), grid.borrow().memory_bytes())?;
+            Ok(grid)
         })
     }
 }

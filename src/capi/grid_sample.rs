@@ -3,14 +3,16 @@
 use std::ffi::c_char;
 
 use super::context::{creates, enter, frz_context};
-use super::grid::{check_origin, frz_grid};
+use super::grid::frz_grid;
+use super::grid_leaves::check_origin;
 use super::guard::{Failure, Outcome, frz_status, guard};
 use super::handle::{Changing, change, read, required};
 use super::mesh::{Mesh, frz_mesh};
 use super::views::{frz_span, frz_view, meaning, text, within};
 use crate::base::{DVec3, TriMesh};
 use crate::context::Context;
-use crate::vdb::{FloatGrid, level_set};
+use crate::error::Result;
+use crate::vdb::{FloatGrid, GridRef, VectorGrid, level_set};
 
 /// How values between voxels are found.
 #[repr(u32)]
@@ -22,19 +24,69 @@ pub enum frz_sampling {
     FRZ_SAMPLE_LINEAR = 1,
 }
 
-fn sampled(ctx: &Context, grid: &FloatGrid, positions: &[DVec3], sampling: u32) -> Outcome<Vec<f32>> {
-    let known = [frz_sampling::FRZ_SAMPLE_NEAREST, frz_sampling::FRZ_SAMPLE_LINEAR].map(|s| (s as u32, s));
-    let sampling = meaning("sampling", "frz_sampling", sampling, &known)?;
-    ctx.allow("the samples", (positions.len() as u64).saturating_mul(28))?;
-    let mut values = Vec::new();
-    ctx.polled(|| match sampling {
-        frz_sampling::FRZ_SAMPLE_NEAREST => grid.sample_nearest(ctx, positions, &mut values),
-        frz_sampling::FRZ_SAMPLE_LINEAR => grid.sample_linear(ctx, positions, &mut values),
-    })?;
-    Ok(values)
+/// Whether values are to be trilinear.
+fn sampling_of(sampling: u32) -> Outcome<bool> {
+    let known =
+        [(frz_sampling::FRZ_SAMPLE_NEAREST as u32, false), (frz_sampling::FRZ_SAMPLE_LINEAR as u32, true)];
+    meaning("sampling", "frz_sampling", sampling, &known)
 }
 
-/// Values of a grid at world positions.
+/// Positions (m), all finite.
+///
+/// # Safety
+/// The view must describe memory that can be read.
+unsafe fn positions_of(positions: &frz_view) -> Outcome<Vec<DVec3>> {
+    // SAFETY: the caller's promise.
+    let positions = unsafe { positions.finite("positions") }?;
+    Ok(positions.iter().map(|&p| DVec3::from(p.map(f64::from))).collect())
+}
+
+/// Positions that are sampled at once: between them a cancel is heeded, and the part that is done is known.
+const PIECE: usize = 1 << 16;
+
+/// Values at positions (m), piece by piece.
+fn in_pieces<T: Clone + Send>(
+    ctx: &Context,
+    positions: &[DVec3],
+    sample: impl Fn(&[DVec3]) -> Result<Vec<T>> + Send + Sync,
+) -> Outcome<Vec<T>> {
+    let bytes = size_of::<DVec3>() + size_of::<T>();
+    ctx.allow("the samples", (positions.len() as u64).saturating_mul(bytes as u64))?;
+    Ok(ctx.stage("sample", || {
+        ctx.expect(positions.len().div_ceil(PIECE));
+        let mut out = Vec::with_capacity(positions.len());
+        for piece in positions.chunks(PIECE) {
+            ctx.check()?;
+            out.extend(sample(piece)?);
+            ctx.advance();
+        }
+        Ok(out)
+    })?)
+}
+
+fn sampled(ctx: &Context, grid: &FloatGrid, positions: &[DVec3], sampling: u32) -> Outcome<Vec<f32>> {
+    let linear = sampling_of(sampling)?;
+    in_pieces(ctx, positions, |piece| {
+        let mut values = Vec::new();
+        match linear {
+            false => grid.sample_nearest(ctx, piece, &mut values)?,
+            true => grid.sample_linear(ctx, piece, &mut values)?,
+        }
+        Ok(values)
+    })
+}
+
+fn sampled_vectors(
+    ctx: &Context,
+    grid: &VectorGrid,
+    positions: &[DVec3],
+    sampling: u32,
+) -> Outcome<Vec<[f32; 3]>> {
+    let linear = sampling_of(sampling)?;
+    in_pieces(ctx, positions, |piece| grid.sample(ctx, piece, linear))
+}
+
+/// Values of a grid of floats at world positions.
 ///
 /// positions: float[3] for each (m), finite.
 /// sampling: a frz_sampling.
@@ -55,14 +107,41 @@ pub unsafe extern "C" fn frz_grid_sample(
             let call = enter(context)?;
             let ctx = call.ctx();
             let held = read(grid)?;
-            let positions = positions.finite("positions")?;
-            let positions: Vec<DVec3> = positions.iter().map(|&p| DVec3::from(p.map(f64::from))).collect();
-            dst.fill("dst", &sampled(ctx, held.get(), &positions, sampling)?)
+            let grid = held.floats()?;
+            let positions = positions_of(&positions)?;
+            dst.fill("dst", &sampled(ctx, grid, &positions, sampling)?)
         }
     })
 }
 
-/// Gives a mesh's vertices an attribute of one float: a grid's values there.
+/// Vectors of a grid at world positions. Components of a staggered grid are found where they lie.
+///
+/// positions: float[3] for each (m), finite.
+/// sampling: a frz_sampling.
+/// dst: room for as many float[3].
+///
+/// Any number of threads may read a grid; one thread at a time for each context.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn frz_grid_sample_vectors(
+    context: *mut frz_context,
+    grid: *const frz_grid,
+    positions: frz_view,
+    sampling: u32,
+    dst: frz_span,
+) -> frz_status {
+    guard(|| {
+        // SAFETY: the pointers are NULL or the caller's.
+        unsafe {
+            let call = enter(context)?;
+            let held = read(grid)?;
+            let grid = held.vectors()?;
+            let positions = positions_of(&positions)?;
+            dst.fill("dst", &sampled_vectors(call.ctx(), grid, &positions, sampling)?)
+        }
+    })
+}
+
+/// Gives a mesh's vertices an attribute: a grid's values there, one float each, or three of a grid of vectors.
 ///
 /// mesh: gets the attribute, in the place of one of the same name.
 /// sampling: a frz_sampling.
@@ -86,14 +165,19 @@ pub unsafe extern "C" fn frz_grid_sample_mesh(
             let mut mesh: Changing<'_, Mesh> = change(mesh)?;
             let name = match text(name, "name")? {
                 Some(name) => name.to_string(),
-                None => held.get().name(),
+                None => held.any().name(),
             };
             if name.is_empty() {
                 return Err(Failure::argument("name: neither it nor the grid has one"));
             }
             let positions: Vec<DVec3> = mesh.triangles.positions.iter().map(|p| p.cast()).collect();
-            let values = sampled(ctx, held.get(), &positions, sampling)?;
-            mesh.set_attribute(&name, 1, values);
+            let (components, values) = match held.any() {
+                GridRef::Floats(grid) => (1, sampled(ctx, grid, &positions, sampling)?),
+                GridRef::Vectors(grid) => {
+                    (3, sampled_vectors(ctx, grid, &positions, sampling)?.into_flattened())
+                }
+            };
+            mesh.set_attribute(&name, components, values);
             Ok(())
         }
     })
@@ -117,16 +201,17 @@ unsafe fn meshes(
     unsafe {
         creates(context, out, |ctx| {
             let held = read(grid)?;
+            let grid = held.floats()?;
             if !iso.is_finite() {
                 return Err(Failure::argument("iso is not finite"));
             }
             within("adaptivity", f64::from(adaptivity), 0.0..=1.0, "")?;
-            Ok(Mesh::of_triangles(make(ctx, held.get())?))
+            Ok(Mesh::of_triangles(make(ctx, grid)?))
         })
     }
 }
 
-/// Makes a mesh of triangles along a grid's surface, counter-clockwise seen from outside, also where the grid's transform
+/// Makes a mesh of triangles along the surface of a grid of floats, counter-clockwise seen from outside, also where the grid's transform
 /// mirrors.
 ///
 /// A cancel is heeded before and after the work, not within.

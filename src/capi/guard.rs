@@ -20,11 +20,11 @@ pub enum frz_status {
     FRZ_ERROR_FILE = 2,
     /// The operating system refused to read or write.
     FRZ_ERROR_IO = 3,
-    /// More memory would be needed than the context allows.
+    /// More memory would be needed than the context allows, or than there is.
     FRZ_ERROR_MEMORY = 4,
     /// The context was cancelled; everything is as it was before the call.
     FRZ_CANCELLED = 5,
-    /// OpenVDB reported an error.
+    /// OpenVDB cannot do what is wanted, for a reason that no other status stands for.
     FRZ_ERROR_OPENVDB = 6,
     /// A promise inside the library does not hold: a bug of frazil. What the call worked on is poisoned.
     FRZ_ERROR_INTERNAL = 7,
@@ -71,9 +71,8 @@ impl From<Error> for Failure {
             Error::Argument(_) => FRZ_ERROR_ARGUMENT,
             Error::File { .. } | Error::Bytes(_) => FRZ_ERROR_FILE,
             Error::Io { .. } => FRZ_ERROR_IO,
-            Error::Memory { .. } => FRZ_ERROR_MEMORY,
+            Error::Memory { .. } | Error::OutOfMemory => FRZ_ERROR_MEMORY,
             Error::Cancelled => FRZ_CANCELLED,
-            Error::OpenVdb(what) if what.contains("bad_alloc") => FRZ_ERROR_MEMORY,
             Error::OpenVdb(_) => FRZ_ERROR_OPENVDB,
             Error::Internal(_) => FRZ_ERROR_INTERNAL,
         };

@@ -127,7 +127,7 @@ unsafe fn changes(
         unsafe {
             let call = enter(context)?;
             let mut held = change(inout)?;
-            let grid = held.own()?;
+            let grid = held.own_floats()?;
             level_set_of(grid)?;
             work(call.ctx(), grid)
         }
@@ -160,7 +160,7 @@ pub unsafe extern "C" fn frz_levelset_from_mesh(
             ctx.allow("a level set of the mesh", surface_bytes(mesh.triangles.area(), voxel_size))?;
             let solid = mesh.triangles.clone();
             let grid = ctx.polled(|| sweep::voxelise(ctx, solid, &settings))?;
-            Ok(Grid::Own(grid))
+            Ok(Grid::from(grid))
         })
     }
 }
@@ -207,7 +207,7 @@ pub unsafe extern "C" fn frz_levelset_from_particles(
             let grid = ctx.stage("spheres", || {
                 level_set::from_particles(ctx, &positions, &radii, voxel_size, settings.half_width)
             })?;
-            Ok(Grid::Own(grid))
+            Ok(Grid::from(grid))
         })
     }
 }
@@ -241,7 +241,7 @@ pub unsafe extern "C" fn frz_levelset_csg(
     unsafe {
         changes(context, inout, |ctx, first| {
             let other = read(other)?;
-            let second = level_set_of(other.get())?;
+            let second = level_set_of(other.floats()?)?;
             ctx.allow("the joined level sets", first.memory_bytes().saturating_add(second.memory_bytes()))?;
             let known: [(u32, Join); 3] = [
                 (frz_csg::FRZ_CSG_UNION as u32, level_set::union_copy),
@@ -391,7 +391,7 @@ pub unsafe extern "C" fn frz_levelset_sweep(
             let bodies = self::bodies(ctx, bodies, count, dt, &mut Shapes::new())?;
             ctx.polled(|| check_reach(&bodies, dt, voxel_size))?;
             let grid = ctx.polled(|| sweep::chain(ctx, &bodies, 0.0, dt, &settings))?;
-            Ok(Grid::Own(grid))
+            Ok(Grid::from(grid))
         })
     }
 }

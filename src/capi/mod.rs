@@ -30,6 +30,12 @@ pub mod mesh;
 pub mod grid;
 
 #[cfg(feature = "vdb")]
+pub mod grid_create;
+
+#[cfg(feature = "vdb")]
+pub mod grid_leaves;
+
+#[cfg(feature = "vdb")]
 pub mod grid_sample;
 
 #[cfg(feature = "vdb")]

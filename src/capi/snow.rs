@@ -120,7 +120,7 @@ pub unsafe extern "C" fn frz_snow_layer(
             ctx.allow("the layer of snow", surface_bytes(area, desc.voxel_size))?;
             let half_width = desc.half_width as f32;
             let grid = ctx.polled(|| layer(ctx, &ground, &statics, &cover, desc.voxel_size, half_width))?;
-            Ok(Grid::Own(grid))
+            Ok(Grid::from(grid))
         })
     }
 }

@@ -53,6 +53,8 @@ unsafe impl Plain for [i32; 3] {}
 // SAFETY: as above.
 unsafe impl Plain for [f32; 512] {}
 // SAFETY: as above.
+unsafe impl Plain for [[f32; 3]; 512] {}
+// SAFETY: as above.
 unsafe impl Plain for [u64; 8] {}
 // SAFETY: as above.
 unsafe impl Plain for [u32; 3] {}
@@ -200,6 +202,15 @@ pub(super) unsafe fn text<'a>(pointer: *const c_char, name: &str) -> Outcome<Opt
     // SAFETY: the caller's promise.
     let text = unsafe { CStr::from_ptr(pointer) };
     text.to_str().map(Some).map_err(|_| Failure::argument(format!("{name} is not valid UTF-8")))
+}
+
+/// A text that the host must give.
+///
+/// # Safety
+/// As [`text`].
+pub(super) unsafe fn required_text<'a>(pointer: *const c_char, name: &str) -> Outcome<&'a str> {
+    // SAFETY: the caller's promise.
+    unsafe { text(pointer, name) }?.ok_or_else(|| Failure::argument(format!("{name} is NULL")))
 }
 
 /// A struct that begins with its own size: a host's header may be older or newer than this library.

@@ -10,7 +10,8 @@ pub(super) mod ffi {
         /// 1 when `values` and `mask` are set; else the tile below counts.
         is_leaf: bool,
         tile_active: bool,
-        tile: f32,
+        /// Of a float the first number.
+        tile: [f32; 3],
         values: usize,
         mask: usize,
     }
@@ -48,7 +49,14 @@ pub(super) mod ffi {
         /// 1 for a place of 8 voxels along an edge, 2 for 128, 3 for 4096.
         level: u32,
         active: bool,
-        value: f32,
+        /// Of a float the first number.
+        value: [f32; 3],
+    }
+
+    /// A grid out of a file: one of the two, or none when it is of another type.
+    struct Found {
+        floats: UniquePtr<Grid>,
+        vectors: UniquePtr<VectorGrid>,
     }
 
     /// Threads and cancel flag of a call.
@@ -119,23 +127,87 @@ pub(super) mod ffi {
         fn flood_fill(grid: Pin<&mut Grid>, call: &Call) -> Result<()>;
         fn components(grid: &Grid, call: &Call) -> Result<Vec<u64>>;
 
+        /// `vectors[i]` says that `grids[i]` is the address of a `VectorGrid`, not of a `Grid`.
         fn grids_to_bytes(
             grids: &[usize],
+            vectors: &[bool],
             compression: i32,
             half: bool,
             meta: &Vec<Meta>,
         ) -> Result<UniquePtr<CxxString>>;
         fn describe_file(path: &str) -> Result<Vec<GridHeader>>;
-        fn describe_bytes(bytes: &[u8]) -> Result<Vec<GridHeader>>;
-        fn read_float_grid(path: &str, name: &str) -> Result<UniquePtr<Grid>>;
-        /// An empty name stands for the first level set, else the first float grid.
-        fn float_grid_from_bytes(bytes: &[u8], name: &str) -> Result<UniquePtr<Grid>>;
+        fn read_grid(path: &str, name: &str) -> Result<Found>;
+        type Stored;
+        fn read_bytes(bytes: &[u8]) -> Result<UniquePtr<Stored>>;
+        fn describe_stored(stored: &Stored) -> Result<Vec<GridHeader>>;
+        /// The grid with this number in the description; it can be taken once.
+        fn take_stored(stored: Pin<&mut Stored>, index: usize) -> Result<Found>;
         /// Transform and metadata, in OpenVDB's own coding.
         fn grid_head(grid: &Grid) -> Result<UniquePtr<CxxString>>;
         /// Every value above the leaves that is not an inactive background.
         fn tiles(grid: &Grid) -> Result<Vec<Tile>>;
         /// A grid without leaves.
         fn assemble(head: &[u8], background: f32, tiles: &[Tile]) -> Result<UniquePtr<Grid>>;
+
+        type VectorGrid;
+        fn make_vector_grid(voxel: f64, background: [f32; 3]) -> Result<UniquePtr<VectorGrid>>;
+        fn vector_background(grid: &VectorGrid) -> [f32; 3];
+        #[cxx_name = "copy_grid"]
+        fn copy_vector_grid(grid: &VectorGrid) -> Result<UniquePtr<VectorGrid>>;
+        #[cxx_name = "voxel_size"]
+        fn vector_voxel_size(grid: &VectorGrid) -> f64;
+        #[cxx_name = "index_to_world"]
+        fn vector_index_to_world(grid: &VectorGrid, index: [f64; 3]) -> [f64; 3];
+        #[cxx_name = "grid_class"]
+        fn vector_class(grid: &VectorGrid) -> i32;
+        #[cxx_name = "set_grid_class"]
+        fn set_vector_class(grid: Pin<&mut VectorGrid>, number: i32) -> Result<()>;
+        #[cxx_name = "name"]
+        fn vector_name(grid: &VectorGrid) -> String;
+        #[cxx_name = "set_name"]
+        fn set_vector_name(grid: Pin<&mut VectorGrid>, name: &str) -> Result<()>;
+        #[cxx_name = "active_voxels"]
+        fn vector_active_voxels(grid: &VectorGrid) -> u64;
+        #[cxx_name = "leaf_count"]
+        fn vector_leaf_count(grid: &VectorGrid) -> usize;
+        #[cxx_name = "memory_bytes"]
+        fn vector_memory_bytes(grid: &VectorGrid) -> u64;
+        #[cxx_name = "file_bound"]
+        fn vector_file_bound(grid: &VectorGrid) -> u64;
+        #[cxx_name = "active_bbox"]
+        fn vector_active_bbox(grid: &VectorGrid, low: &mut [i32; 3], high: &mut [i32; 3]) -> Result<bool>;
+        #[cxx_name = "leaves"]
+        fn vector_leaves(grid: &VectorGrid) -> Result<Vec<LeafView>>;
+        #[cxx_name = "probe"]
+        fn vector_probe(grid: &VectorGrid, origins: &[i32]) -> Result<Vec<LeafView>>;
+        #[cxx_name = "grid_head"]
+        fn vector_head(grid: &VectorGrid) -> Result<UniquePtr<CxxString>>;
+        #[cxx_name = "tiles"]
+        fn vector_tiles(grid: &VectorGrid) -> Result<Vec<Tile>>;
+        type VectorBlocks;
+        /// As `make_blocks`: 512 x 3 floats, and three for a constant.
+        fn make_vector_blocks(
+            call: &Call,
+            origins: &[i32],
+            values: &[usize],
+            masks: &[usize],
+            constants: &[f32],
+        ) -> Result<UniquePtr<VectorBlocks>>;
+        fn put_vector_blocks(grid: Pin<&mut VectorGrid>, blocks: Pin<&mut VectorBlocks>) -> Result<()>;
+        /// Three floats for each position.
+        fn sample_vectors(
+            grid: &VectorGrid,
+            call: &Call,
+            world: &[f64],
+            linear: bool,
+            out: &mut [f32],
+        ) -> Result<()>;
+        fn assemble_vectors(
+            head: &[u8],
+            background: [f32; 3],
+            tiles: &[Tile],
+        ) -> Result<UniquePtr<VectorGrid>>;
+
         /// Ends TBB's worker threads, unless somebody else uses them.
         fn end_workers();
 

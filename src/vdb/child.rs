@@ -9,20 +9,27 @@ use rustix::process::{Resource, Rlimit, Signal, getrlimit, set_parent_process_de
 
 use super::decode;
 use super::parcel::{Contents, pack};
+use super::vectors::AnyGrid;
 use crate::error::{Error, Result, one_line};
 
 /// The first argument of a program that is to decode.
 pub(super) const COMMAND: &str = "decode-vdb-for-another-process";
 /// The form of the arguments and of parcels: both sides must be of one version.
-pub(super) const PROTOCOL: &str = concat!("1-", env!("CARGO_PKG_VERSION"));
+pub(super) const PROTOCOL: &str = concat!("2-", env!("CARGO_PKG_VERSION"));
 
 /// What is wanted of a file.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) enum Wanted<'a> {
     Infos,
     All,
+    /// Of floats.
     First,
+    /// Of floats.
     Named(&'a str),
+    /// Of floats or vectors.
+    FirstAny,
+    /// Of floats or vectors.
+    NamedAny(&'a str),
 }
 
 impl Wanted<'_> {
@@ -33,6 +40,8 @@ impl Wanted<'_> {
             Self::All => ["all", ""],
             Self::First => ["first", ""],
             Self::Named(name) => ["named", name],
+            Self::FirstAny => ["first-any", ""],
+            Self::NamedAny(name) => ["named-any", name],
         }
     }
 }
@@ -66,6 +75,8 @@ pub fn serve(arguments: impl Iterator<Item = OsString>) -> Option<u8> {
         "all" => Wanted::All,
         "first" => Wanted::First,
         "named" => Wanted::Named(name),
+        "first-any" => Wanted::FirstAny,
+        "named-any" => Wanted::NamedAny(name),
         _ => return Some(2),
     };
     if protocol != PROTOCOL || limit(Limits { memory, seconds }).is_err() {
@@ -104,9 +115,11 @@ fn limit(limits: Limits) -> std::io::Result<()> {
 fn contents(path: &Path, wanted: Wanted<'_>) -> Result<Contents> {
     Ok(match wanted {
         Wanted::Infos => Contents::Infos(decode::describe(path)?),
-        Wanted::All => Contents::Grids(decode::read(path)?),
-        Wanted::First => Contents::Grids(vec![decode::read_named(path, None)?]),
-        Wanted::Named(name) => Contents::Grids(vec![decode::read_named(path, Some(name))?]),
+        Wanted::All => Contents::Grids(decode::read(path)?.into_iter().map(AnyGrid::Floats).collect()),
+        Wanted::First => Contents::Grids(vec![AnyGrid::Floats(decode::read_named(path, None)?)]),
+        Wanted::Named(name) => Contents::Grids(vec![AnyGrid::Floats(decode::read_named(path, Some(name))?)]),
+        Wanted::FirstAny => Contents::Grids(vec![decode::read_any(path, None)?]),
+        Wanted::NamedAny(name) => Contents::Grids(vec![decode::read_any(path, Some(name))?]),
     })
 }
 

@@ -4,24 +4,70 @@
 use std::io::{BufReader, Cursor};
 use std::path::Path;
 
+use cxx::UniquePtr;
+
 use super::bridge::ffi;
 use super::file::GridInfo;
 use super::grid::{FloatGrid, from_meta};
 use super::layout::{self, Fault, Layout};
+use super::refusal::is_of_memory;
+use super::vectors::AnyGrid;
 use crate::error::{Error, Result};
 
-/// OpenVDB's name of a float grid's type; a suffix says that values are stored in 16 bits.
+/// OpenVDB's names of the types of grids that are read; a suffix says that values are stored in 16 bits.
 const FLOAT_TYPE: &str = "Tree_float_5_4_3";
+const VECTOR_TYPE: &str = "Tree_vec3s_5_4_3";
+
+/// What kinds of grids a caller takes.
+#[derive(Debug, Clone, Copy, PartialEq)]
+enum Kinds {
+    Floats,
+    FloatsAndVectors,
+}
+
+impl Kinds {
+    /// What they are called.
+    fn words(self) -> &'static str {
+        match self {
+            Self::Floats => "floats",
+            Self::FloatsAndVectors => "floats or vectors of floats",
+        }
+    }
+
+    /// Whether a grid is one of them.
+    fn take(self, header: &GridInfo) -> bool {
+        let kind = &header.value_type;
+        kind.starts_with(FLOAT_TYPE) || (self == Self::FloatsAndVectors && kind.starts_with(VECTOR_TYPE))
+    }
+}
+
+/// What the values of a grid are, in words.
+fn kind_of(header: &GridInfo) -> &str {
+    let known = [
+        ("Tree_float", "floats"),
+        ("Tree_vec3s", "vectors of floats"),
+        ("Tree_double", "64-bit floats"),
+        ("Tree_vec3d", "vectors of 64-bit floats"),
+        ("Tree_int32", "whole numbers"),
+        ("Tree_int64", "64-bit whole numbers"),
+        ("Tree_vec3i", "vectors of whole numbers"),
+        ("Tree_bool", "yes or no"),
+        ("Tree_mask", "voxels without values"),
+        ("Tree_ptdataidx", "points"),
+    ];
+    let found = known.iter().find(|(start, _)| header.value_type.starts_with(start));
+    found.map_or(header.value_type.as_str(), |(_, words)| words)
+}
 
 /// A result whose error text goes behind the file's name.
 type Told<T> = std::result::Result<T, String>;
 
-/// Where the bytes of a file are.
+/// Where the grids of a file are.
 enum Source<'a> {
     /// In a file of this name, whose structure is known to be whole: OpenVDB may skip in it.
     File(&'a str),
-    /// In memory: read from the first byte to the last.
-    Bytes(Vec<u8>),
+    /// In memory: the bytes were read from the first to the last.
+    Stored(UniquePtr<ffi::Stored>),
 }
 
 /// Checks the structure of a file.
@@ -40,10 +86,15 @@ fn source(path: &Path) -> Result<Source<'_>> {
     let layout = check(path)?;
     // A stream is read from memory, where its end is noticed.
     if layout.is_stream() {
-        return Ok(Source::Bytes(crate::io::source::read(path)?));
+        let stored = stored(&crate::io::source::read(path)?);
+        return stored.map_err(|what| Error::file(path, what));
     }
     let name = path.to_str().ok_or_else(|| Error::file(path, "the name is not valid UTF-8"))?;
     Ok(Source::File(name))
+}
+
+fn stored(bytes: &[u8]) -> Told<Source<'static>> {
+    ffi::read_bytes(bytes).map(Source::Stored).map_err(|error| cannot_read(&error))
 }
 
 /// What OpenVDB could not read, in our words.
@@ -51,7 +102,7 @@ fn cannot_read(error: &cxx::Exception) -> String {
     let what = error.what();
     log::info!("OpenVDB: {}", crate::error::one_line(what));
     let told = |words: &[&str]| words.iter().any(|word| what.contains(word));
-    if told(&["bad_alloc", "length_error", "vector::", "basic_string::", "array new length"]) {
+    if is_of_memory(what) {
         "the .vdb file is damaged, or needs more memory than it may take".into()
     } else if told(&["LookupError", "non-registered", "not registered", "unregistered"]) {
         "the .vdb file is damaged, or holds a kind of grid that frazil does not know".into()
@@ -69,42 +120,52 @@ pub(super) fn describe(path: &Path) -> Result<Vec<GridInfo>> {
 
 /// As [`super::file::read`].
 pub(super) fn read(path: &Path) -> Result<Vec<FloatGrid>> {
-    let source = source(path)?;
-    let all = || {
+    let mut source = source(path)?;
+    let mut all = || {
         let headers = headers(&source)?;
         if headers.is_empty() {
             return Err("the .vdb file holds no grid".to_string());
         }
-        headers.iter().map(|header| load(&source, header)).collect()
+        let load = |(at, header)| floats(load(&mut source, at, header, Kinds::Floats)?);
+        headers.iter().enumerate().map(load).collect()
     };
     all().map_err(|what| Error::file(path, what))
 }
 
 /// As [`super::file::read_named`].
 pub(super) fn read_named(path: &Path, name: Option<&str>) -> Result<FloatGrid> {
-    named(&source(path)?, name).map_err(|what| Error::file(path, what))
+    let found = named(source(path)?, name, Kinds::Floats).and_then(floats);
+    found.map_err(|what| Error::file(path, what))
+}
+
+/// As [`super::file::read_any`].
+pub(super) fn read_any(path: &Path, name: Option<&str>) -> Result<AnyGrid> {
+    named(source(path)?, name, Kinds::FloatsAndVectors).map_err(|what| Error::file(path, what))
 }
 
 /// As [`super::file::from_bytes`]; the error goes behind what the bytes are called.
 pub(super) fn from_bytes(bytes: &[u8], name: Option<&str>) -> Told<FloatGrid> {
+    named(whole(bytes)?, name, Kinds::Floats).and_then(floats)
+}
+
+/// As [`super::file::any_from_bytes`]; the error goes behind what the bytes are called.
+pub(super) fn any_from_bytes(bytes: &[u8], name: Option<&str>) -> Told<AnyGrid> {
+    named(whole(bytes)?, name, Kinds::FloatsAndVectors)
+}
+
+/// The grids of bytes whose structure is whole.
+fn whole(bytes: &[u8]) -> Told<Source<'static>> {
     layout::read(Cursor::new(bytes)).map_err(|fault| match fault {
         Fault::Io(error) => error.to_string(),
         Fault::Content(what) => what,
     })?;
-    let inner = ffi::float_grid_from_bytes(bytes, name.unwrap_or("")).map_err(|error| no_grid(&error))?;
-    finite(FloatGrid { inner })
-}
-
-/// The C++ side names the grids that are there when the one that is wanted is not.
-fn no_grid(error: &cxx::Exception) -> String {
-    let what = error.what();
-    if what.contains("in the file, which holds") { crate::error::one_line(what) } else { cannot_read(error) }
+    stored(bytes)
 }
 
 fn headers(source: &Source<'_>) -> Told<Vec<GridInfo>> {
     let headers = match source {
         Source::File(name) => ffi::describe_file(name),
-        Source::Bytes(bytes) => ffi::describe_bytes(bytes),
+        Source::Stored(stored) => ffi::describe_stored(stored),
     };
     Ok(headers.map_err(|error| cannot_read(&error))?.into_iter().map(info).collect())
 }
@@ -124,46 +185,49 @@ fn info(header: ffi::GridHeader) -> GridInfo {
     }
 }
 
-fn named(source: &Source<'_>, name: Option<&str>) -> Told<FloatGrid> {
-    let headers = headers(source)?;
-    let is_float = |header: &&GridInfo| header.value_type.starts_with(FLOAT_TYPE);
+fn named(mut source: Source<'_>, name: Option<&str>, kinds: Kinds) -> Told<AnyGrid> {
+    let headers = headers(&source)?;
+    let first = |wanted: &dyn Fn(&GridInfo) -> bool| headers.iter().position(wanted);
+    let floats = |header: &GridInfo| Kinds::Floats.take(header);
     let found = match name {
-        Some(name) => headers.iter().find(|header| header.name == name),
-        None => headers
-            .iter()
-            .filter(is_float)
-            .find(|header| header.class == "level set")
-            .or_else(|| headers.iter().find(is_float)),
+        Some(name) => first(&|header| header.name == name),
+        None => first(&|header| floats(header) && header.class == "level set")
+            .or_else(|| first(&floats))
+            .or_else(|| first(&|header| kinds.take(header))),
     };
     match found {
-        Some(header) => load(source, header),
+        Some(at) => load(&mut source, at, &headers[at], kinds),
         None => {
             let list: Vec<String> =
-                headers.iter().map(|header| format!("\"{}\" ({})", header.name, header.value_type)).collect();
-            let wanted = name.map_or("no float grid".to_string(), |name| format!("no grid \"{name}\""));
+                headers.iter().map(|header| format!("\"{}\" ({})", header.name, kind_of(header))).collect();
+            let wanted =
+                name.map_or(format!("no grid of {}", kinds.words()), |name| format!("no grid \"{name}\""));
             let there = if list.is_empty() { "no grid at all".to_string() } else { list.join(", ") };
             Err(format!("{wanted} in the file, which holds {there}"))
         }
     }
 }
 
-fn load(source: &Source<'_>, header: &GridInfo) -> Told<FloatGrid> {
-    if !header.value_type.starts_with(FLOAT_TYPE) {
-        let (name, kind) = (&header.name, &header.value_type);
-        return Err(format!("grid \"{name}\" is of type {kind}, but a float grid is needed"));
+/// The grid with a number in the description of its file.
+fn load(source: &mut Source<'_>, at: usize, header: &GridInfo, kinds: Kinds) -> Told<AnyGrid> {
+    if !kinds.take(header) {
+        let (name, kind, wanted) = (&header.name, kind_of(header), kinds.words());
+        return Err(format!("grid \"{name}\" holds {kind}, but {wanted} are needed"));
     }
-    let inner = match source {
-        Source::File(name) => ffi::read_float_grid(name, &header.name),
-        Source::Bytes(bytes) => ffi::float_grid_from_bytes(bytes, &header.name),
+    let found = match source {
+        Source::File(name) => ffi::read_grid(name, &header.name),
+        Source::Stored(stored) => ffi::take_stored(stored.pin_mut(), at),
     };
-    finite(FloatGrid { inner: inner.map_err(|error| cannot_read(&error))? })
-}
-
-fn finite(grid: FloatGrid) -> Told<FloatGrid> {
-    let leaves = grid.leaves().map_err(|error| error.to_string())?;
-    let finite = leaves.iter().all(|leaf| leaf.values.iter().all(|value| value.is_finite()));
-    if finite && grid.background().is_finite() {
+    let grid = AnyGrid::of(found.map_err(|error| cannot_read(&error))?).ok_or(ASTRAY)?;
+    if grid.is_finite().map_err(|error| error.to_string())? {
         return Ok(grid);
     }
-    Err(format!("grid \"{}\" has values that are not finite", grid.name()))
+    Err(format!("grid \"{}\" has values that are not finite", grid.borrow().name()))
+}
+
+/// What is said of a grid that is another than its file says.
+const ASTRAY: &str = "the .vdb file is damaged: a grid is not of the type that the file says";
+
+fn floats(grid: AnyGrid) -> Told<FloatGrid> {
+    grid.floats().ok_or_else(|| ASTRAY.to_string())
 }

@@ -4,6 +4,7 @@ use std::path::Path;
 
 use super::bridge::ffi;
 use super::grid::{FloatGrid, MetaValue, to_meta};
+use super::vectors::{AnyGrid, GridRef};
 use super::{decode, guard, layout};
 use crate::error::{Error, Result};
 use crate::io::hash::Hasher;
@@ -62,25 +63,41 @@ const UUID: std::ops::Range<usize> = 21..57;
 /// Writes grids to a file; the file is there when it is whole.
 ///
 /// # Errors
-/// What OpenVDB or the operating system reports.
+/// When memory runs out, or what the operating system reports.
 pub fn write(path: &Path, grids: &[&FloatGrid], options: &WriteOptions) -> Result<()> {
     crate::io::atomic::write_bytes(path, &to_bytes(grids, options)?)
+}
+
+/// As [`write`], of grids of any kind.
+///
+/// # Errors
+/// As there.
+pub fn write_any(path: &Path, grids: &[GridRef<'_>], options: &WriteOptions) -> Result<()> {
+    crate::io::atomic::write_bytes(path, &any_to_bytes(grids, options)?)
 }
 
 /// The bytes of a .vdb file.
 ///
 /// # Errors
-/// What OpenVDB reports.
+/// When memory runs out.
 pub fn to_bytes(grids: &[&FloatGrid], options: &WriteOptions) -> Result<Vec<u8>> {
-    let pointers: Vec<usize> =
-        grids.iter().map(|grid| std::ptr::from_ref::<ffi::Grid>(&grid.inner) as usize).collect();
+    let grids: Vec<GridRef<'_>> = grids.iter().map(|grid| GridRef::Floats(grid)).collect();
+    any_to_bytes(&grids, options)
+}
+
+/// As [`to_bytes`], of grids of any kind.
+///
+/// # Errors
+/// As there.
+pub fn any_to_bytes(grids: &[GridRef<'_>], options: &WriteOptions) -> Result<Vec<u8>> {
+    let (pointers, vectors): (Vec<usize>, Vec<bool>) = grids.iter().map(GridRef::address).unzip();
     let codec = match options.compression {
         Compression::None => 0,
         Compression::Zip => 1,
         Compression::Blosc => 2,
     };
     let meta: Vec<ffi::Meta> = options.metadata.iter().map(|(key, value)| to_meta(key, value)).collect();
-    let bytes = ffi::grids_to_bytes(&pointers, codec, options.half, &meta).map_err(super::fail)?;
+    let bytes = ffi::grids_to_bytes(&pointers, &vectors, codec, options.half, &meta).map_err(super::fail)?;
     let mut bytes = bytes.as_bytes().to_vec();
     name_by_content(&mut bytes);
     Ok(bytes)
@@ -140,15 +157,43 @@ pub fn read_named(path: &Path, name: Option<&str>) -> Result<FloatGrid> {
     }
 }
 
-/// The float grid of that name out of the bytes of a .vdb file; without a name the first level set, else the first
-/// float grid.
+/// The grid of that name, of floats or of vectors; without a name the first level set, else the first float grid, else
+/// the first grid of vectors.
 ///
 /// # Errors
-/// Bytes of another kind, cut short or damaged; no such grid; values that are not finite.
-pub fn from_bytes(bytes: &[u8], name: Option<&str>) -> Result<FloatGrid> {
-    if !bytes.starts_with(&layout::MAGIC) {
-        return Err(Error::argument("these are not the bytes of a .vdb file"));
+/// As [`read_named`].
+pub fn read_any(path: &Path, name: Option<&str>) -> Result<AnyGrid> {
+    match guard::of(path) {
+        Some(guard) => guard.read_any(path, name),
+        None => decode::read_any(path, name),
     }
-    let told = |what| Error::argument(format!("the bytes of the .vdb file cannot be read ({what})"));
-    decode::from_bytes(bytes, name).map_err(told)
+}
+
+/// As [`read_named`], out of the bytes of a .vdb file.
+///
+/// # Errors
+/// [`Error::Bytes`]: bytes of another kind, cut short or damaged; no such grid; values that are not finite.
+pub fn from_bytes(bytes: &[u8], name: Option<&str>) -> Result<FloatGrid> {
+    check_magic(bytes)?;
+    decode::from_bytes(bytes, name).map_err(unreadable)
+}
+
+/// As [`read_any`], out of the bytes of a .vdb file.
+///
+/// # Errors
+/// As [`from_bytes`].
+pub fn any_from_bytes(bytes: &[u8], name: Option<&str>) -> Result<AnyGrid> {
+    check_magic(bytes)?;
+    decode::any_from_bytes(bytes, name).map_err(unreadable)
+}
+
+fn check_magic(bytes: &[u8]) -> Result<()> {
+    if bytes.starts_with(&layout::MAGIC) {
+        return Ok(());
+    }
+    Err(Error::Bytes("these are not the bytes of a .vdb file".into()))
+}
+
+fn unreadable(what: String) -> Error {
+    Error::Bytes(format!("the bytes of the .vdb file cannot be read ({what})"))
 }

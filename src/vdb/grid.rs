@@ -21,6 +21,30 @@ pub enum GridClass {
     LevelSet,
     /// A density.
     Fog,
+    /// Vectors whose components lie in the middle of the faces of voxels.
+    Staggered,
+}
+
+impl GridClass {
+    /// What OpenVDB's number stands for.
+    pub(super) fn of(number: i32) -> Self {
+        match number {
+            1 => Self::LevelSet,
+            2 => Self::Fog,
+            3 => Self::Staggered,
+            _ => Self::Unknown,
+        }
+    }
+
+    /// OpenVDB's number.
+    pub(super) fn number(self) -> i32 {
+        match self {
+            Self::Unknown => 0,
+            Self::LevelSet => 1,
+            Self::Fog => 2,
+            Self::Staggered => 3,
+        }
+    }
 }
 
 /// A metadata value.
@@ -128,12 +152,7 @@ impl FloatGrid {
 
     /// Whether voxel (0, 0, 0) lies at the origin and the axes are the world's: what our own grids are.
     pub fn is_world_fixed(&self) -> bool {
-        let voxel = self.voxel_size();
-        let at = |index: [f64; 3]| DVec3::from(ffi::index_to_world(&self.inner, index));
-        let expected = [[0.0; 3], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]];
-        expected
-            .into_iter()
-            .all(|index| (at(index) - DVec3::from(index) * voxel).norm() < 1e-9 * voxel.max(1e-9))
+        is_world_fixed(self.voxel_size(), |index| ffi::index_to_world(&self.inner, index))
     }
 
     /// World position (m) of a point in index space.
@@ -153,11 +172,7 @@ impl FloatGrid {
 
     /// What the values mean.
     pub fn class(&self) -> GridClass {
-        match ffi::grid_class(&self.inner) {
-            1 => GridClass::LevelSet,
-            2 => GridClass::Fog,
-            _ => GridClass::Unknown,
-        }
+        GridClass::of(ffi::grid_class(&self.inner))
     }
 
     /// Says what the values mean.
@@ -165,12 +180,7 @@ impl FloatGrid {
     /// # Errors
     /// When memory runs out.
     pub fn set_class(&mut self, class: GridClass) -> Result<()> {
-        let number = match class {
-            GridClass::Unknown => 0,
-            GridClass::LevelSet => 1,
-            GridClass::Fog => 2,
-        };
-        ffi::set_grid_class(self.inner.pin_mut(), number).map_err(fail)
+        ffi::set_grid_class(self.inner.pin_mut(), class.number()).map_err(fail)
     }
 
     /// The grid's name in a file.
@@ -252,7 +262,7 @@ impl FloatGrid {
         let tile = |tile: ffi::Tile| Tile {
             origin: [tile.x, tile.y, tile.z],
             edge: EDGES[(tile.level as usize).min(3)],
-            value: tile.value,
+            value: tile.value[0],
             active: tile.active,
         };
         Ok(ffi::tiles(&self.inner).map_err(fail)?.into_iter().map(tile).collect())
@@ -267,7 +277,7 @@ impl FloatGrid {
         let lent = views.iter().map(|view| match view.is_leaf {
             // SAFETY: the views are of this grid, which stays borrowed.
             true => Probe::Leaf(unsafe { lend(view, PhantomData) }),
-            false => Probe::Tile { value: view.tile, active: view.tile_active },
+            false => Probe::Tile { value: view.tile[0], active: view.tile_active },
         });
         Ok(lent.collect())
     }
@@ -345,6 +355,13 @@ impl FloatGrid {
     pub fn flood_fill(&mut self) -> Result<()> {
         ffi::flood_fill(self.inner.pin_mut(), &alone()).map_err(fail)
     }
+}
+
+/// Whether a map from index space puts voxel (i, j, k) at (i, j, k) times the voxel size.
+pub(super) fn is_world_fixed(voxel: f64, at: impl Fn([f64; 3]) -> [f64; 3]) -> bool {
+    let expected = [[0.0; 3], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]];
+    let off = |index: [f64; 3]| (DVec3::from(at(index)) - DVec3::from(index) * voxel).norm();
+    expected.into_iter().all(|index| off(index) < 1e-9 * voxel.max(1e-9))
 }
 
 pub(super) fn from_meta(meta: ffi::Meta) -> (String, MetaValue) {

@@ -24,6 +24,7 @@ use super::file::GridInfo;
 use super::grid::FloatGrid;
 use super::mapping::Mapping;
 use super::parcel::{Contents, unpack};
+use super::vectors::AnyGrid;
 use crate::error::{Error, Result, one_line};
 use crate::io::manifest;
 
@@ -85,7 +86,7 @@ impl Guard {
     /// # Errors
     /// As [`Guard::describe`].
     pub fn read(&self, path: &Path) -> Result<Vec<FloatGrid>> {
-        self.grids(path, Wanted::All)
+        self.grids(path, Wanted::All)?.into_iter().map(|grid| floats(path, grid)).collect()
     }
 
     /// As [`super::file::read_named`].
@@ -93,11 +94,22 @@ impl Guard {
     /// # Errors
     /// As [`Guard::describe`].
     pub fn read_named(&self, path: &Path, name: Option<&str>) -> Result<FloatGrid> {
-        let grids = self.grids(path, name.map_or(Wanted::First, Wanted::Named))?;
-        grids.into_iter().next().ok_or_else(|| astray(path))
+        floats(path, self.one(path, name.map_or(Wanted::First, Wanted::Named))?)
     }
 
-    fn grids(&self, path: &Path, wanted: Wanted<'_>) -> Result<Vec<FloatGrid>> {
+    /// As [`super::file::read_any`].
+    ///
+    /// # Errors
+    /// As [`Guard::describe`].
+    pub fn read_any(&self, path: &Path, name: Option<&str>) -> Result<AnyGrid> {
+        self.one(path, name.map_or(Wanted::FirstAny, Wanted::NamedAny))
+    }
+
+    fn one(&self, path: &Path, wanted: Wanted<'_>) -> Result<AnyGrid> {
+        self.grids(path, wanted)?.into_iter().next().ok_or_else(|| astray(path))
+    }
+
+    fn grids(&self, path: &Path, wanted: Wanted<'_>) -> Result<Vec<AnyGrid>> {
         match self.ask(path, wanted)? {
             Contents::Grids(grids) => Ok(grids),
             _ => Err(astray(path)),
@@ -229,6 +241,11 @@ fn first_words(mut pipe: impl Read) -> String {
     let _ = pipe.by_ref().take(MOST_WORDS).read_to_end(&mut kept);
     let _ = std::io::copy(&mut pipe, &mut std::io::sink());
     String::from_utf8_lossy(&kept).into_owned()
+}
+
+/// Refuses another grid than one of floats.
+fn floats(path: &Path, grid: AnyGrid) -> Result<FloatGrid> {
+    grid.floats().ok_or_else(|| astray(path))
 }
 
 /// What is said of a parcel that is whole but holds something else.

@@ -3,24 +3,37 @@
 use std::marker::PhantomData;
 
 use super::bridge::ffi::LeafView;
-use crate::base::blocks::{Mask, Origin, Values};
+use crate::base::blocks::{Mask, Origin, VOXELS, Values};
 
-/// A leaf to read.
+/// A leaf to read, of floats where nothing else is said.
 #[derive(Clone, Copy)]
-pub struct Leaf<'a> {
+pub struct Leaf<'a, V = Values> {
     /// Least corner, in voxels.
     pub origin: Origin,
     /// The 512 values.
-    pub values: &'a Values,
+    pub values: &'a V,
     /// Which of them are active.
     pub mask: &'a Mask,
 }
 
-impl<'a> Leaf<'a> {
+/// Values of a leaf of vectors; voxel (x, y, z) lies at `x << 6 | y << 3 | z`.
+pub type Vectors = [[f32; 3]; VOXELS];
+
+/// Values of a leaf, as a grid of their kind holds them.
+///
+/// # Safety
+/// They must be floats without room between them, as many as a leaf of such a grid has.
+pub unsafe trait LeafValues: Copy {}
+// SAFETY: a leaf of a grid of floats has 512 of them.
+unsafe impl LeafValues for Values {}
+// SAFETY: a leaf of a grid of vectors has 512 times three floats.
+unsafe impl LeafValues for Vectors {}
+
+impl<'a, V: LeafValues> Leaf<'a, V> {
     /// Its values as they lie in memory.
     pub(super) fn value_bytes(&self) -> &'a [u8] {
         // SAFETY: every byte of a float can be read; the array stays borrowed.
-        unsafe { std::slice::from_raw_parts(self.values.as_ptr().cast(), size_of::<Values>()) }
+        unsafe { std::slice::from_raw_parts(std::ptr::from_ref(self.values).cast(), size_of::<V>()) }
     }
 
     /// Its mask as it lies in memory.
@@ -42,13 +55,13 @@ pub struct LeafMut<'a> {
 
 /// What a grid holds at a block position.
 #[derive(Clone, Copy)]
-pub enum Probe<'a> {
+pub enum Probe<'a, V = Values, T = f32> {
     /// A leaf.
-    Leaf(Leaf<'a>),
+    Leaf(Leaf<'a, V>),
     /// One value for the whole block.
     Tile {
         /// The value.
-        value: f32,
+        value: T,
         /// Whether it is active.
         active: bool,
     },
@@ -57,12 +70,12 @@ pub enum Probe<'a> {
 /// Lends the leaf that a view points at.
 ///
 /// # Safety
-/// The view must come from a grid that is borrowed for `'a` and not changed meanwhile.
-pub(super) unsafe fn lend<'a>(view: &LeafView, _grid: PhantomData<&'a ()>) -> Leaf<'a> {
+/// The view must come from a grid of such values that is borrowed for `'a` and not changed meanwhile.
+pub(super) unsafe fn lend<'a, V: LeafValues>(view: &LeafView, _grid: PhantomData<&'a ()>) -> Leaf<'a, V> {
     Leaf {
         origin: [view.x, view.y, view.z],
         // SAFETY: the caller keeps the grid borrowed; the C++ side asserts the leaf's layout.
-        values: unsafe { &*(view.values as *const Values) },
+        values: unsafe { &*(view.values as *const V) },
         // SAFETY: as above.
         mask: unsafe { &*(view.mask as *const Mask) },
     }

@@ -1,4 +1,4 @@
-//! The only door to OpenVDB: float grids, level-set tools and .vdb files.
+//! The only door to OpenVDB: grids of floats and of vectors, level-set tools and .vdb files.
 //!
 //! Grids own their trees alone; leaves are lent without copying. Index space is world-fixed: voxel
 //! (i, j, k) has its centre at (i, j, k) x voxel size, unless a file brings another transform.
@@ -15,21 +15,18 @@ pub mod level_set;
 mod mapping;
 mod parcel;
 pub mod ray;
+mod refusal;
+mod vectors;
 
 pub use grid::{FloatGrid, GridClass, MetaValue, Ready, Tile};
-pub use leaf::{Leaf, LeafMut, Probe};
+pub use leaf::{Leaf, LeafMut, Probe, Vectors};
+pub use vectors::{AnyGrid, GridRef, VectorEdit, VectorGrid, VectorLeaf, VectorProbe};
 
 use crate::context::{Context, Running};
 use crate::error::Error;
 
-/// Exception text of the C++ side's `Cancelled`.
-const CANCELLED: &str = "frazil: cancelled";
-
 fn fail(error: cxx::Exception) -> Error {
-    match error.what() {
-        CANCELLED => Error::Cancelled,
-        what => Error::OpenVdb(what.to_string()),
-    }
+    refusal::told(error.what())
 }
 
 /// Threads and cancel flag for a call into C++, which is part of the second answer and must not outlive it.

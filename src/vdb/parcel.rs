@@ -11,16 +11,19 @@ use std::os::unix::fs::FileExt;
 use super::bridge::ffi;
 use super::file::GridInfo;
 use super::grid::{FloatGrid, MetaValue};
-use super::leaf::Leaf;
+use super::leaf::{Leaf, LeafValues, Vectors};
 use super::mapping::Mapping;
+use super::vectors::{AnyGrid, VectorGrid};
 use crate::base::blocks::{Mask, Values};
 
 /// The first bytes of a parcel; they change with its form.
-const MAGIC: [u8; 8] = *b"frzpack1";
+const MAGIC: [u8; 8] = *b"frzpack2";
 /// Arrays begin at multiples of this.
 const ALIGN: usize = 64;
-/// Bytes of a leaf in each of the three arrays.
-const SIZES: [usize; 3] = [12, size_of::<Mask>(), size_of::<Values>()];
+/// Bytes of a leaf of such values in each of the three arrays.
+const fn sizes<V>() -> [usize; 3] {
+    [12, size_of::<Mask>(), size_of::<V>()]
+}
 /// Leaves that one write takes.
 const BATCH: usize = 512;
 
@@ -29,7 +32,7 @@ pub(super) enum Contents {
     /// What a file says of its grids.
     Infos(Vec<GridInfo>),
     /// Grids.
-    Grids(Vec<FloatGrid>),
+    Grids(Vec<AnyGrid>),
     /// Why there is neither; the text goes behind the file's name.
     Refusal(String),
 }
@@ -40,7 +43,7 @@ pub(super) enum Contents {
 /// What the operating system reports, or OpenVDB when memory runs out.
 pub(super) fn pack(mut file: &File, contents: &Contents) -> Result<(), String> {
     let mut head = Head::default();
-    let mut lists = Vec::new();
+    let mut lists: Vec<Leaves<'_>> = Vec::new();
     match contents {
         Contents::Refusal(text) => {
             head.number(0);
@@ -55,8 +58,12 @@ pub(super) fn pack(mut file: &File, contents: &Contents) -> Result<(), String> {
             head.number(2);
             head.number(grids.len() as u64);
             for grid in grids {
-                let leaves = grid.leaves().map_err(|error| error.to_string())?;
-                head.grid(grid, leaves.len()).map_err(|error| error.what().to_string())?;
+                let leaves = match grid {
+                    AnyGrid::Floats(grid) => grid.leaves().map(Leaves::Floats),
+                    AnyGrid::Vectors(grid) => grid.leaves().map(Leaves::Vectors),
+                };
+                let leaves = leaves.map_err(|error| error.to_string())?;
+                head.grid(grid, leaves.count()).map_err(|error| error.what().to_string())?;
                 lists.push(leaves);
             }
         }
@@ -66,13 +73,36 @@ pub(super) fn pack(mut file: &File, contents: &Contents) -> Result<(), String> {
     let mut at = start.len();
     file.write_all(&start).map_err(io)?;
     for leaves in &lists {
-        write_leaves(file, &mut at, leaves).map_err(io)?;
+        let written = match leaves {
+            Leaves::Floats(leaves) => write_leaves(file, &mut at, leaves),
+            Leaves::Vectors(leaves) => write_leaves(file, &mut at, leaves),
+        };
+        written.map_err(io)?;
     }
     file.write_all_at(&MAGIC, 0).map_err(io)
 }
 
-fn write_leaves(mut file: &File, at: &mut usize, leaves: &[Leaf<'_>]) -> std::io::Result<()> {
-    for (array, size) in SIZES.into_iter().enumerate() {
+/// The leaves of a grid.
+enum Leaves<'a> {
+    Floats(Vec<Leaf<'a>>),
+    Vectors(Vec<Leaf<'a, Vectors>>),
+}
+
+impl Leaves<'_> {
+    fn count(&self) -> usize {
+        match self {
+            Self::Floats(leaves) => leaves.len(),
+            Self::Vectors(leaves) => leaves.len(),
+        }
+    }
+}
+
+fn write_leaves<V: LeafValues>(
+    mut file: &File,
+    at: &mut usize,
+    leaves: &[Leaf<'_, V>],
+) -> std::io::Result<()> {
+    for (array, size) in sizes::<V>().into_iter().enumerate() {
         file.write_all(&[0; ALIGN][..at.next_multiple_of(ALIGN) - *at])?;
         *at = at.next_multiple_of(ALIGN) + size * leaves.len();
         for batch in leaves.chunks(BATCH) {
@@ -119,13 +149,42 @@ pub(super) fn unpack(parcel: &Mapping, threads: usize) -> Option<Contents> {
 }
 
 /// Builds a grid: a copy for each leaf, nothing more.
-fn grid(head: &mut Cursor<'_>, parcel: &[u8], at: &mut usize, threads: usize) -> Option<FloatGrid> {
+fn grid(head: &mut Cursor<'_>, parcel: &[u8], at: &mut usize, threads: usize) -> Option<AnyGrid> {
+    let call = ffi::Call { threads: threads as i32, cancel: 0 };
+    let is_vectors = head.number()? != 0;
     let own = head.bytes()?;
-    let background = f32::from_bits(head.number()? as u32);
+    let mut component = || Some(f32::from_bits(head.number()? as u32));
+    let background = [component()?, component()?, component()?];
     let tiles = (0..head.number()?).map(|_| head.tile()).collect::<Option<Vec<_>>>()?;
     let count = usize::try_from(head.number()?).ok()?;
+    if is_vectors {
+        let Arrays { origins, values, masks } = arrays::<Vectors>(parcel, at, count)?;
+        let mut inner = ffi::assemble_vectors(own, background, &tiles).ok()?;
+        let constants = vec![0.0; 3 * count];
+        let mut blocks = ffi::make_vector_blocks(&call, &origins, &values, &masks, &constants).ok()?;
+        ffi::put_vector_blocks(inner.pin_mut(), blocks.pin_mut()).ok()?;
+        return Some(AnyGrid::Vectors(VectorGrid { inner }));
+    }
+    let Arrays { origins, values, masks } = arrays::<Values>(parcel, at, count)?;
+    let mut inner = ffi::assemble(own, background[0], &tiles).ok()?;
+    let mut blocks = ffi::make_blocks(&call, &origins, &values, &masks, &vec![0.0; count]).ok()?;
+    ffi::put_blocks(inner.pin_mut(), blocks.pin_mut()).ok()?;
+    Some(AnyGrid::Floats(FloatGrid { inner }))
+}
+
+/// Where the leaves of a grid lie.
+struct Arrays {
+    origins: Vec<i32>,
+    /// Addresses.
+    values: Vec<usize>,
+    masks: Vec<usize>,
+}
+
+/// The arrays of so many leaves, from a place in the parcel on; the place goes behind them.
+fn arrays<V>(parcel: &[u8], at: &mut usize, count: usize) -> Option<Arrays> {
+    let sizes = sizes::<V>();
     let mut arrays = [&parcel[..0]; 3];
-    for (array, size) in arrays.iter_mut().zip(SIZES) {
+    for (array, size) in arrays.iter_mut().zip(sizes) {
         let begin = at.next_multiple_of(ALIGN);
         *at = begin.checked_add(size.checked_mul(count)?)?;
         *array = parcel.get(begin..*at)?;
@@ -134,15 +193,10 @@ fn grid(head: &mut Cursor<'_>, parcel: &[u8], at: &mut usize, threads: usize) ->
     let whole = |four: &[u8]| i32::from_ne_bytes([four[0], four[1], four[2], four[3]]);
     let origins: Vec<i32> = origins.chunks_exact(4).map(whole).collect();
     origins.iter().all(|place| place % 8 == 0).then_some(())?;
-    let mut inner = ffi::assemble(own, background, &tiles).ok()?;
     let addresses = |array: &[u8], size: usize| -> Vec<usize> {
         (0..count).map(|leaf| array.as_ptr() as usize + leaf * size).collect()
     };
-    let call = ffi::Call { threads: threads as i32, cancel: 0 };
-    let (values, masks) = (addresses(values, SIZES[2]), addresses(masks, SIZES[1]));
-    let mut blocks = ffi::make_blocks(&call, &origins, &values, &masks, &vec![0.0; count]).ok()?;
-    ffi::put_blocks(inner.pin_mut(), blocks.pin_mut()).ok()?;
-    Some(FloatGrid { inner })
+    Some(Arrays { origins, values: addresses(values, sizes[2]), masks: addresses(masks, sizes[1]) })
 }
 
 /// A head in the making.
@@ -196,20 +250,24 @@ impl Head {
         }
     }
 
-    fn grid(&mut self, grid: &FloatGrid, leaves: usize) -> Result<(), cxx::Exception> {
-        self.bytes(ffi::grid_head(&grid.inner)?.as_bytes());
-        self.number(grid.background().to_bits().into());
-        let tiles = ffi::tiles(&grid.inner)?;
+    fn grid(&mut self, grid: &AnyGrid, leaves: usize) -> Result<(), cxx::Exception> {
+        let (own, background, tiles) = match grid {
+            AnyGrid::Floats(grid) => {
+                let background = [grid.background(), 0.0, 0.0];
+                (ffi::grid_head(&grid.inner)?, background, ffi::tiles(&grid.inner)?)
+            }
+            AnyGrid::Vectors(grid) => {
+                (ffi::vector_head(&grid.inner)?, grid.background(), ffi::vector_tiles(&grid.inner)?)
+            }
+        };
+        self.number(matches!(grid, AnyGrid::Vectors(_)).into());
+        self.bytes(own.as_bytes());
+        background.iter().for_each(|component| self.number(component.to_bits().into()));
         self.number(tiles.len() as u64);
         for tile in tiles {
-            let words = [
-                tile.x as u32,
-                tile.y as u32,
-                tile.z as u32,
-                tile.level,
-                tile.active.into(),
-                tile.value.to_bits(),
-            ];
+            let [x, y, z] = [tile.x, tile.y, tile.z].map(|place| place as u32);
+            let [a, b, c] = tile.value.map(f32::to_bits);
+            let words = [x, y, z, tile.level, tile.active.into(), a, b, c];
             self.0.extend(words.iter().flat_map(|word| word.to_ne_bytes()));
         }
         self.number(leaves as u64);
@@ -247,10 +305,11 @@ impl<'a> Cursor<'a> {
 
     fn tile(&mut self) -> Option<ffi::Tile> {
         let mut word = || Some(u32::from_ne_bytes(self.take(4)?.try_into().ok()?));
-        let [x, y, z, level, active, value] = [word()?, word()?, word()?, word()?, word()?, word()?];
+        let [x, y, z, level, active] = [word()?, word()?, word()?, word()?, word()?];
+        let value = [word()?, word()?, word()?].map(f32::from_bits);
         let [x, y, z] = [x, y, z].map(|place| place as i32);
         let known = (1..=3).contains(&level);
-        known.then_some(ffi::Tile { x, y, z, level, active: active != 0, value: f32::from_bits(value) })
+        known.then_some(ffi::Tile { x, y, z, level, active: active != 0, value })
     }
 
     fn info(&mut self) -> Option<GridInfo> {

@@ -1,6 +1,9 @@
 /* Files that may be damaged, read by another process. FRAZIL_PROGRAM is the installed program. */
 #include "check.h"
 
+#include <sys/stat.h>
+#include <time.h>
+
 static frz_grid *two_blocks(frz_context *ctx, float values[2][512]) {
     frz_leaf leaves[2];
     frz_grid_desc desc;
@@ -19,6 +22,29 @@ static frz_grid *two_blocks(frz_context *ctx, float values[2][512]) {
     desc.name = "two";
     WORKS(frz_grid_create(ctx, &desc, &grid));
     return grid;
+}
+
+/* A program that would take half a minute, and a cancel a moment after it was started. */
+static int cancel_soon(void *user, const frz_progress *progress) {
+    (void)progress;
+    return ++*(int *)user == 3;
+}
+
+static void cancelled_while_it_waits(frz_context *ctx) {
+    frz_grid *grid = NULL;
+    int polls = 0;
+    struct timespec start, end;
+    FILE *file = fopen("slow.sh", "w");
+    CHECK(file != NULL && fputs("#!/bin/sh\nexec sleep 30\n", file) >= 0 && fclose(file) == 0);
+    CHECK(chmod("slow.sh", 0755) == 0);
+    WORKS(frz_context_set_poll(ctx, cancel_soon, &polls));
+    clock_gettime(CLOCK_MONOTONIC, &start);
+    FAILS(frz_grid_load_guarded(ctx, "./slow.sh", "guarded.vdb", NULL, &grid), FRZ_CANCELLED, "cancelled");
+    clock_gettime(CLOCK_MONOTONIC, &end);
+    CHECK(polls >= 3 && end.tv_sec - start.tv_sec < 5);
+    WORKS(frz_context_set_poll(ctx, NULL, NULL));
+    frz_context_reset(ctx);
+    remove("slow.sh");
 }
 
 static char content[1 << 16];
@@ -68,6 +94,7 @@ int main(void) {
         CHECK(status == FRZ_OK || status == FRZ_ERROR_FILE);
         frz_grid_destroy(back);
     }
+    cancelled_while_it_waits(ctx);
     frz_context_cancel(ctx);
     FAILS(frz_grid_load_guarded(ctx, FRAZIL_PROGRAM, "guarded.vdb", NULL, &back), FRZ_CANCELLED, "");
     remove("guarded.vdb");

@@ -41,12 +41,73 @@ static void *work(void *user) {
     return NULL;
 }
 
+/* Files and bytes, of a grid that is large enough for OpenVDB to share it out. */
+static void *files(void *user) {
+    static const float centre[1][3] = {{0, 0, 0}}, radius = 0.8f;
+    frz_context *ctx = user;
+    const int before = threads();
+    frz_grid *grid = NULL, *back = NULL, *copy = NULL;
+    const frz_grid *one[1];
+    frz_grid_info info;
+    frz_vector_leaf *leaves;
+    frz_grid_desc desc;
+    size_t size = 0, bound, i;
+    void *data;
+    WORKS(frz_levelset_from_particles(ctx, VIEW(centre, 1), VIEW(&radius, 1), 0.01, 3, &grid));
+    info.struct_size = sizeof info;
+    WORKS(frz_grid_get_info(grid, &info));
+    CHECK(info.leaf_count > 2000 && threads() == before);
+    one[0] = grid;
+    WORKS(frz_grid_save(ctx, one, 1, "inline.vdb", FRZ_COMPRESSION_BLOSC, 0));
+    CHECK(threads() == before);
+    WORKS(frz_grid_load(ctx, "inline.vdb", NULL, &back));
+    CHECK(threads() == before);
+    WORKS(frz_grid_to_bytes(ctx, one, 1, FRZ_COMPRESSION_NONE, 0, NULL, 0, &bound));
+    data = malloc(bound);
+    CHECK(data != NULL);
+    WORKS(frz_grid_to_bytes(ctx, one, 1, FRZ_COMPRESSION_ZIP, 0, data, bound, &size));
+    CHECK(threads() == before);
+    frz_grid_destroy(back);
+    WORKS(frz_grid_from_bytes(ctx, data, size, NULL, &back));
+    CHECK(threads() == before);
+    WORKS(frz_grid_copy(ctx, back, &copy));
+    frz_grid_destroy(copy);
+    frz_grid_destroy(back);
+    frz_grid_destroy(grid);
+    free(data);
+    /* The same of vectors. */
+    leaves = calloc(2000, sizeof *leaves);
+    data = calloc(512, 3 * sizeof(float));
+    CHECK(leaves != NULL && data != NULL);
+    for (i = 0; i < 2000; ++i) leaves[i].origin[0] = (int32_t)(8 * i), leaves[i].values = data;
+    memset(&desc, 0, sizeof desc);
+    desc.struct_size = sizeof desc, desc.voxel_size = 0.01, desc.value_type = FRZ_VALUE_VECTOR;
+    desc.vector_leaves = leaves, desc.leaf_count = 2000;
+    WORKS(frz_grid_create(ctx, &desc, &grid));
+    WORKS(frz_grid_copy(ctx, grid, &copy));
+    one[0] = copy;
+    WORKS(frz_grid_save(ctx, one, 1, "inline.vdb", FRZ_COMPRESSION_BLOSC, 0));
+    WORKS(frz_grid_load(ctx, "inline.vdb", NULL, &back));
+    WORKS(frz_grid_get_info(back, &info));
+    CHECK(info.leaf_count == 2000 && info.active_voxels == 2000 * 512);
+    frz_grid_destroy(back);
+    frz_grid_destroy(copy);
+    frz_grid_destroy(grid);
+    CHECK(threads() == before);
+    free(leaves), free(data);
+    remove("inline.vdb");
+    return NULL;
+}
+
 int main(void) {
     frz_context *ctx = context_on(0);
+    /* What OpenVDB's logger started when it was loaded is there already. */
     const int before = threads();
     long held = 0;
     int i;
     work(ctx);
+    CHECK(threads() == before);
+    files(ctx);
     CHECK(threads() == before);
     for (i = 0; i < 2 * CALLERS; ++i) {
         pthread_t thread;

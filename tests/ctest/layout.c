@@ -20,13 +20,17 @@ int main(void) {
     FIELD(frz_mesh_info, triangle_count), FIELD(frz_mesh_info, attribute_count), FIELD(frz_mesh_info, box_min);
     FIELD(frz_mesh_info, box_max), FIELD(frz_mesh_info, area), FIELD(frz_mesh_info, volume);
     SIZE(frz_leaf), FIELD(frz_leaf, origin), FIELD(frz_leaf, tile), FIELD(frz_leaf, values), FIELD(frz_leaf, mask);
+    SIZE(frz_vector_leaf), FIELD(frz_vector_leaf, origin), FIELD(frz_vector_leaf, tile);
+    FIELD(frz_vector_leaf, values), FIELD(frz_vector_leaf, mask);
     SIZE(frz_grid_desc), FIELD(frz_grid_desc, struct_size), FIELD(frz_grid_desc, grid_class);
     FIELD(frz_grid_desc, voxel_size), FIELD(frz_grid_desc, background), FIELD(frz_grid_desc, flags);
     FIELD(frz_grid_desc, leaves), FIELD(frz_grid_desc, leaf_count), FIELD(frz_grid_desc, name);
+    FIELD(frz_grid_desc, value_type), FIELD(frz_grid_desc, background_vector), FIELD(frz_grid_desc, vector_leaves);
     SIZE(frz_grid_info), FIELD(frz_grid_info, struct_size), FIELD(frz_grid_info, grid_class);
     FIELD(frz_grid_info, voxel_size), FIELD(frz_grid_info, background), FIELD(frz_grid_info, world_fixed);
     FIELD(frz_grid_info, active_voxels), FIELD(frz_grid_info, leaf_count), FIELD(frz_grid_info, memory_bytes);
-    FIELD(frz_grid_info, voxel_min), FIELD(frz_grid_info, voxel_max);
+    FIELD(frz_grid_info, voxel_min), FIELD(frz_grid_info, voxel_max), FIELD(frz_grid_info, value_type);
+    FIELD(frz_grid_info, background_vector);
     SIZE(frz_noise), FIELD(frz_noise, amplitude), FIELD(frz_noise, size), FIELD(frz_noise, octaves);
     FIELD(frz_noise, seed);
     SIZE(frz_body), FIELD(frz_body, struct_size), FIELD(frz_body, flags), FIELD(frz_body, id);

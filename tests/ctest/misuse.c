@@ -34,7 +34,7 @@ static float floats[ROOM];
 static uint32_t whole[ROOM];
 static int32_t places[ROOM];
 static unsigned char memory[ROOM * 8];
-static float leaf_values[512];
+static float leaf_values[512], vector_values[3 * 512];
 static uint64_t leaf_mask[8];
 
 static void fill(void) {
@@ -46,7 +46,7 @@ static void fill(void) {
         whole[i] = wild ? index_of(vertices) : any() % vertices;
         places[i] = (int32_t)(chance(20) ? any() : (any() % 64 - 32) * 8);
     }
-    for (i = 0; i < 512; ++i) leaf_values[i] = wild && chance(100) ? (float)number() : 0.01f * (float)(any() % 7);
+    for (i = 0; i < 512; ++i) vector_values[3 * i + any() % 3] = leaf_values[i] = wild && chance(100) ? (float)number() : 0.01f * (float)(any() % 7);
 }
 
 /* A view of n elements that lies within its array, or none, or one that no memory could hold. */
@@ -157,7 +157,7 @@ static void call(void) {
     frz_context *c = a_context();
     polls = 0;
     fill();
-    switch (any() % 46) {
+    switch (any() % 49) {
         case 0: (void)frz_status_name(any()), (void)frz_last_error(), (void)frz_version(); break;
         case 1: {
             frz_pool *other = NULL;
@@ -216,7 +216,7 @@ static void call(void) {
             }
             memset(&desc, 0, sizeof desc);
             desc.struct_size = size_near(sizeof desc);
-            desc.grid_class = any() % 4;
+            desc.grid_class = any() % 5;
             desc.voxel_size = a_voxel();
             desc.background = chance(3) ? (float)number() : 3 * (float)desc.voxel_size;
             desc.leaves = chance(9) ? NULL : leaves;
@@ -314,6 +314,34 @@ static void call(void) {
             break;
         }
         case 44: {
+            frz_vector_leaf leaves[3];
+            frz_grid_desc desc;
+            size_t i;
+            for (i = 0; i < 3; ++i) {
+                memcpy(leaves[i].origin, places + 3 * i, sizeof leaves[i].origin);
+                leaves[i].tile[0] = leaves[i].tile[1] = 1, leaves[i].tile[2] = (float)number();
+                leaves[i].values = chance(4) ? NULL : vector_values;
+                leaves[i].mask = chance(2) ? NULL : leaf_mask;
+            }
+            memset(&desc, 0, sizeof desc);
+            desc.struct_size = size_near(sizeof desc);
+            desc.value_type = chance(9) ? any() % 3 : FRZ_VALUE_VECTOR;
+            desc.grid_class = chance(4) ? any() % 5 : 3 * (any() % 2);
+            desc.voxel_size = a_voxel();
+            desc.background = chance(9) ? (float)number() : 0;
+            desc.background_vector[any() % 3] = chance(3) ? (float)number() : 1;
+            desc.vector_leaves = chance(9) ? NULL : leaves;
+            desc.leaf_count = any() % 4;
+            desc.name = a_name();
+            (void)frz_grid_create(c, &desc, chance(20) ? NULL : &grid);
+            break;
+        }
+        case 45:
+            (void)frz_grid_vector_leaves(a_grid(), span(), chance(9) ? NULL : &size);
+            (void)frz_grid_vector_probe(a_grid(), view(places, 12), span());
+            break;
+        case 46: (void)frz_grid_sample_vectors(c, a_grid(), view(floats, 12), any() % 3, span()); break;
+        case 47: {
             const frz_base *from = a_base();
             (void)frz_base_save(c, from, chance(4) ? NULL : memory, sizeof memory, chance(9) ? NULL : &size);
             (void)frz_base_dirty(from, chance(9) ? NULL : &origins, chance(9) ? NULL : &size);

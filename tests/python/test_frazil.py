@@ -182,6 +182,105 @@ class Snow(unittest.TestCase):
         self.assertGreater(high[1], 0.2)
 
 
+class Vectors(unittest.TestCase):
+    """Grids of vectors."""
+
+    def wind(self, ctx, **more):
+        places = np.stack(np.meshgrid(*[np.arange(8)] * 3, indexing="ij"), axis=-1).astype(np.float32)
+        active = places[..., 1] > 2
+        leaves = [frazil.Leaf((0, 0, 0), places, active), ((8, 0, 0), places + (8, 0, 0))]
+        return leaves, frazil.Grid.from_leaves(ctx, leaves, 0.1, (0, -1, 2), name="vel", **more)
+
+    def test_arrays_go_in_and_come_back_through_files_and_bytes(self):
+        ctx = frazil.Context(threads=2)
+        leaves, grid = self.wind(ctx)
+        self.assertRegex(repr(grid), r'"vel", grid of vectors, of \d+ active voxels of 0.1 m')
+        self.assertEqual((grid.info.value_type, grid.info.active_voxels), (1, 5 * 64 + 512))
+        self.assertEqual(tuple(grid.info.background_vector), (0, -1, 2))
+        with tempfile.TemporaryDirectory() as folder:
+            path = os.path.join(folder, "vel.vdb")
+            frazil.save(ctx, [grid, snow(ctx)], path)
+            loaded = frazil.load(ctx, path, "vel")
+        for other in (grid, grid.copy(ctx), loaded, frazil.Grid.from_bytes(ctx, grid.to_bytes(ctx))):
+            self.assertTrue(other.is_vectors)
+            back = other.leaves()
+            self.assertEqual([leaf.origin for leaf in back], [(0, 0, 0), (8, 0, 0)])
+            self.assertEqual(back[0].values.shape, (8, 8, 8, 3))
+            for leaf, want in zip(back, leaves):
+                np.testing.assert_array_equal(leaf.values, want[1])
+            np.testing.assert_array_equal(back[0].active, leaves[0].active)
+            probed = other.probe([[8, 0, 0], [800, 0, 0]])
+            np.testing.assert_array_equal(probed[0].values, leaves[1][1])
+            np.testing.assert_array_equal(probed[1], [0, -1, 2])
+            np.testing.assert_allclose(other.sample(ctx, [[0.35, 0.2, 0.41]]), [[3.5, 2, 4.1]], atol=1e-5)
+        staggered = self.wind(ctx, grid_class=frazil.grid.STAGGERED)[1]
+        np.testing.assert_allclose(staggered.sample(ctx, [[0.35, 0.2, 0.41]]), [[4, 2.5, 4.6]], atol=1e-5)
+        mesh = frazil.Mesh(ctx, [[0.3, 0.2, 0.1], [0, 0, 0], [1, 0, 0]], [[0, 1, 2]])
+        grid.sample_mesh(ctx, mesh)
+        np.testing.assert_allclose(mesh.attribute("vel")[0], [3, 2, 1], atol=1e-5)
+
+    def test_what_takes_floats_refuses_vectors(self):
+        ctx = frazil.Context()
+        _, grid = self.wind(ctx)
+        for call in (grid.to_mesh, lambda ctx: frazil.level_set.offset(ctx, grid, 0.1), lambda ctx: frazil.Base(ctx, grid)):
+            with self.assertRaisesRegex(frazil.Error, 'the grid "vel" holds vectors, but one of floats is needed'):
+                call(ctx)
+        with self.assertRaisesRegex(ValueError, r"leaf 0: values of shape \(8, 8, 8, 3\)"):
+            frazil.Grid.from_leaves(ctx, [((0, 0, 0), np.zeros((8, 8, 8)))], 0.1, (0, 0, 0))
+
+    def test_openvdb_reads_and_writes_the_same_vectors(self):
+        try:
+            import pyopenvdb
+        except ImportError:
+            self.skipTest("no pyopenvdb")
+        ctx = frazil.Context()
+        leaves, grid = self.wind(ctx)
+        with tempfile.TemporaryDirectory() as folder:
+            ours, theirs = os.path.join(folder, "ours.vdb"), os.path.join(folder, "theirs.vdb")
+            frazil.save(ctx, [grid], ours)
+            read = pyopenvdb.read(ours, "vel")
+            self.assertEqual((type(read).__name__, read.activeVoxelCount()), ("Vec3SGrid", 5 * 64 + 512))
+            self.assertEqual(read.background, (0, -1, 2))
+            values = np.empty((16, 8, 8, 3), np.float32)
+            read.copyToArray(values)
+            np.testing.assert_array_equal(values, np.concatenate([leaves[0].values, leaves[1][1]]))
+            # What a host writes: values in 16 bits, and a kind of vector that we know nothing of.
+            read.vectorType, read.saveFloatAsHalf = "contravariant relative", True
+            mask = pyopenvdb.BoolGrid(False)
+            mask.name = "mask"
+            pyopenvdb.write(theirs, grids=[read, mask])
+            back = frazil.load(ctx, theirs, "vel")
+            np.testing.assert_array_equal(back.leaves()[1].values, leaves[1][1])
+            with self.assertRaisesRegex(frazil.Error, "holds yes or no, but floats or vectors of floats are needed"):
+                frazil.load(ctx, theirs, "mask")
+            frazil.save(ctx, [back], ours)
+            self.assertEqual(pyopenvdb.read(ours, "vel").vectorType, "contravariant relative")
+
+
+class Words(unittest.TestCase):
+    """OpenVDB's own words reach nobody."""
+
+    def test_tools_refuse_grids_in_our_words(self):
+        try:
+            import pyopenvdb
+        except ImportError:
+            self.skipTest("no pyopenvdb")
+        ctx = frazil.Context()
+        with tempfile.TemporaryDirectory() as folder:
+            path = os.path.join(folder, "flat.vdb")
+            grid = pyopenvdb.createLevelSetSphere(radius=0.3, voxelSize=0.05)
+            grid.name = "flat"
+            grid.transform = pyopenvdb.createLinearTransform(
+                [[0.05, 0, 0, 0], [0, 0.1, 0, 0], [0, 0, 0.05, 0], [0, 0, 0, 1]])
+            pyopenvdb.write(path, grids=[grid])
+            flat = frazil.load(ctx, path)
+        for call in (lambda: frazil.level_set.offset(ctx, flat, 0.01), lambda: frazil.level_set.smooth(ctx, flat)):
+            with self.assertRaises(frazil.Error) as caught:
+                call()
+            self.assertEqual(str(caught.exception),
+                             "the grid's voxels are no cubes: this needs the same length on each axis")
+
+
 class Manners(unittest.TestCase):
     def test_polls_cancels_and_warnings(self):
         said, seen = [], []
@@ -211,6 +310,17 @@ class Manners(unittest.TestCase):
         ctx.reset()
         self.assertEqual(base.save(), before)
         self.assertEqual(ctx.progress()[0], "")
+        self.assertIsNone(ctx.fraction)
+
+    def test_a_poll_sees_the_fraction_of_a_stage(self):
+        parts = []
+        ctx = frazil.Context(threads=1, poll=lambda *_: parts.append(ctx.fraction))
+        layer = snow(ctx)
+        del parts[:]
+        layer.sample(ctx, np.random.default_rng(1).uniform(-0.3, 0.3, (2000000, 3)))
+        known = [part for part in parts if part is not None]
+        self.assertTrue(any(0 < part < 1 for part in known))
+        self.assertEqual(known, sorted(known))
 
     def test_an_exception_in_a_poll_ends_the_call_and_is_raised_by_it(self):
         def poll(stage, done, seconds):
@@ -259,6 +369,38 @@ class Manners(unittest.TestCase):
         ctx = frazil.Context(threads=1, poll=poll)
         self.assertGreater(snow(ctx).info.active_voxels, 0)
         self.assertIn("no.vdb", seen[0])
+
+    def test_what_was_raised_first_is_kept(self):
+        # A call within a later callback does not lose it.
+        inner, quiet = frazil.Context(), frazil.Context()
+
+        def log(text):
+            if "body 0" in text:
+                raise LookupError(text)
+            with self.assertRaises(frazil.Error):
+                frazil.load(inner, "no.vdb")
+            said.append(text)
+
+        said = []
+        ctx = frazil.Context(threads=1, log=log)
+        corners, faces = box((-0.1, 0.1, -0.1), (0.1, 0.4, 0.1))
+        bodies = [frazil.Body(corners, None, faces[1:], id=n) for n in (0, 1)]
+        with self.assertRaisesRegex(LookupError, "body 0"):
+            frazil.Base(ctx, snow(quiet)).step(bodies, 0.0, 1)
+        self.assertEqual(len(said), 1)
+
+        # Nor is a cancel forgotten that was asked for in the same call.
+        def poll(stage, done, seconds):
+            ctx.cancel()
+            raise LookupError("now")
+
+        layer = snow(quiet)
+        ctx = frazil.Context(threads=1, poll=poll)
+        with self.assertRaisesRegex(LookupError, "now"):
+            layer.to_mesh(ctx)
+        with self.assertRaises(frazil.Error) as caught:
+            layer.to_mesh(ctx)
+        self.assertTrue(caught.exception.cancelled)
 
     def test_ctrl_c_ends_the_call_with_or_without_a_poll(self):
         for poll in (None, lambda stage, done, seconds: False):

@@ -289,7 +289,7 @@ impl BaseLayer {
         let mut pieces = ctx.stage("distance", || self.pieces(ctx, &voxeliser, noise.is_some()))?;
         if let Some(noise) = noise {
             ctx.stage("noise", || {
-                noise.apply(&mut pieces, self.half_width);
+                noise.apply(ctx, &mut pieces, self.half_width);
                 Ok(())
             })?;
         }
@@ -315,7 +315,8 @@ impl BaseLayer {
         let fixed = |voxel: [i32; 3]| voxel.map(|cells| cells.saturating_mul(UNITS));
         let window =
             Window { min: fixed(relative(self.low, -margin)), max: fixed(relative(self.high, margin)) };
-        ctx.expect(bodies.len());
+        // The last piece of work sorts the faces of all of them.
+        ctx.expect(bodies.len() + 1);
         let parts: Vec<Vec<Face>> = bodies
             .iter()
             .map(|(index, body)| {

@@ -132,13 +132,20 @@ impl Displacement {
         self.amplitude * sum.clamp(0.0, 1.0)
     }
 
-    /// Displaces pieces outward, then scales their values back to distances (first order).
-    pub fn apply(&self, pieces: &mut [Piece], half_width: f32) {
+    /// Displaces pieces outward, then scales their values back to distances (first order): the work of a stage, which a
+    /// cancel leaves half done.
+    pub fn apply(&self, ctx: &Context, pieces: &mut [Piece], half_width: f32) {
         if self.amplitude == 0.0 {
             return;
         }
         let reach = half_width + self.amplitude;
+        // The last piece of work scales all of them.
+        ctx.expect(pieces.len() + 1);
         pieces.par_iter_mut().for_each(|piece| {
+            ctx.advance();
+            if ctx.check().is_err() {
+                return;
+            }
             let Piece::Near(origin, values) = piece else { return };
             for (index, value) in values.iter_mut().enumerate() {
                 if *value > -half_width && *value < reach {
@@ -172,7 +179,10 @@ pub fn displace(ctx: &Context, grid: &mut FloatGrid, params: &NoiseParams) -> Re
         .iter()
         .map(|leaf| Piece::Near(back(leaf.origin), Box::new(leaf.values.map(|value| value / cell as f32))))
         .collect();
-    noise.apply(&mut pieces, half_width);
+    ctx.stage("noise", || {
+        noise.apply(ctx, &mut pieces, half_width);
+        Ok(())
+    })?;
     let scale = Scale { cell: cell as f32, background: half_width * cell as f32 };
     let mut displaced = FloatGrid::level_set(cell, half_width)?;
     let edits: Vec<BlockEdit> = pieces

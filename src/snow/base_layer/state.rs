@@ -42,10 +42,13 @@ impl BaseLayer {
             let surface = self.grids.surface.probe(&origins)?;
             let touched = self.grids.touched.probe(&origins)?;
             let background = self.grids.surface.background();
-            let groups: Vec<Vec<u8>> = (0..origins.len().div_ceil(GROUP))
+            let count = origins.len().div_ceil(GROUP);
+            ctx.expect(count);
+            let groups: Vec<Vec<u8>> = (0..count)
                 .into_par_iter()
                 .map(|group| {
                     ctx.check()?;
+                    ctx.advance();
                     let range = group * GROUP..((group + 1) * GROUP).min(origins.len());
                     let [surface, touched] = [&surface, &touched].map(|probes| &probes[range.clone()]);
                     Ok(pack(&origins[range.clone()], surface, touched, background))
