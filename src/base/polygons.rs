@@ -2,7 +2,7 @@
 
 use super::ears::{self, turn};
 use super::mesh::validate;
-use super::{DVec3, TriMesh, Vec3};
+use super::{DVec3, TriMesh, Uvs, Vec3};
 use crate::error::Result;
 
 /// Polygons as files hold them: with any number of corners, convex or not, hardly ever quite flat.
@@ -14,6 +14,8 @@ pub struct PolygonMesh {
     pub corners: Vec<u32>,
     /// Where each polygon ends in `corners`.
     pub ends: Vec<u32>,
+    /// Texture coordinates, where the file has any.
+    pub uvs: Option<Uvs>,
 }
 
 impl PolygonMesh {
@@ -50,8 +52,8 @@ impl PolygonMesh {
 
     /// The polygons as triangles: a fan where the polygon is convex, else ears cut off one after another.
     pub fn triangles(&self) -> Vec<[u32; 3]> {
-        let mut out = Vec::with_capacity(self.corners.len().saturating_sub(2 * self.ends.len()));
-        self.polygons().for_each(|polygon| self.cut(polygon, &mut out));
+        let mut out = Vec::with_capacity(self.triangle_count());
+        self.cut_all(|_, polygon, triangle| out.push(triangle.map(|corner| polygon[corner])));
         out
     }
 
@@ -60,21 +62,47 @@ impl PolygonMesh {
         TriMesh { triangles: self.triangles(), positions: self.positions }
     }
 
-    fn cut(&self, polygon: &[u32], out: &mut Vec<[u32; 3]>) {
-        if let &[a, b, c] = polygon {
-            return out.push([a, b, c]);
+    /// The mesh in triangles, with its texture coordinates.
+    pub fn into_textured(mut self) -> (TriMesh, Option<Uvs>) {
+        let uvs = self.uvs.take().map(|uvs| match uvs.corners {
+            Some(_) => {
+                let mut corners = Vec::with_capacity(self.triangle_count());
+                self.cut_all(|begin, _, triangle| corners.push(triangle.map(|corner| begin + corner)));
+                uvs.of_triangles(&corners)
+            }
+            None => uvs,
+        });
+        (self.into_triangles(), uvs)
+    }
+
+    fn triangle_count(&self) -> usize {
+        self.corners.len().saturating_sub(2 * self.ends.len())
+    }
+
+    /// Cuts all polygons: where each begins in `corners`, its vertices, and a triangle of its corners.
+    fn cut_all(&self, mut each: impl FnMut(usize, &[u32], [usize; 3])) {
+        let mut begin = 0;
+        for polygon in self.polygons() {
+            self.cut(polygon, |triangle| each(begin, polygon, triangle));
+            begin += polygon.len();
         }
-        let fan = || (1..polygon.len() - 1).map(|i| [polygon[0], polygon[i], polygon[i + 1]]);
+    }
+
+    fn cut(&self, polygon: &[u32], mut each: impl FnMut([usize; 3])) {
+        if polygon.len() == 3 {
+            return each([0, 1, 2]);
+        }
+        let fan = |each: &mut dyn FnMut([usize; 3])| (1..polygon.len() - 1).for_each(|i| each([0, i, i + 1]));
         // Indices beyond the vertices are left for the check of the whole mesh to refuse.
         let places: Option<Vec<DVec3>> =
             polygon.iter().map(|&i| self.positions.get(i as usize).map(|p| p.cast())).collect();
-        let Some(places) = places else { return out.extend(fan()) };
+        let Some(places) = places else { return fan(&mut each) };
         let flat = flattened(&places);
         let count = polygon.len();
         if (0..count).all(|i| turn(flat[(i + count - 1) % count], flat[i], flat[(i + 1) % count]) >= 0.0) {
-            return out.extend(fan());
+            return fan(&mut each);
         }
-        out.extend(ears::triangles(&flat).into_iter().map(|triangle| triangle.map(|i| polygon[i])));
+        ears::triangles(&flat).into_iter().for_each(each);
     }
 }
 

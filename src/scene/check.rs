@@ -23,6 +23,10 @@ const BYTES_PER_LEAF: f64 = BYTES_PER_COLUMN * 64.0 / 3.2;
 /// Bytes for each vertex of an object in a .usda and a .ply file.
 const USDA_PER_VERTEX: f64 = 110.0;
 const PLY_PER_VERTEX: f64 = 50.0;
+/// Bytes for texture coordinates, and for a corner's index into them.
+const USDA_PER_PLACE: f64 = 20.0;
+const USDA_PER_INDEX: f64 = 7.0;
+const PLY_PER_PLACE: f64 = 8.0;
 /// A character taller than this (m), or smaller, is likely in another unit.
 const TALL: f64 = 20.0;
 const SMALL: f64 = 0.02;
@@ -328,10 +332,17 @@ fn disk(scene: &Scene, inputs: &Inputs, whole: f64) -> u64 {
         (true, BaseMode::Full) => whole * frames,
         (true, BaseMode::Delta) => whole,
     };
-    let vertices: usize = inputs.bodies.iter().map(|body| body.motion().vertex_count()).sum();
-    let per_vertex = if output.objects_usd { USDA_PER_VERTEX } else { 0.0 }
-        + if output.objects_ply { PLY_PER_VERTEX } else { 0.0 };
-    let objects = vertices as f64 * per_vertex * frames;
+    let objects = inputs.bodies.iter().map(|body| {
+        let drawn = body.motion().drawn();
+        let vertices = drawn.vertices as f64;
+        let (places, corners) = drawn.uvs.map_or((0.0, 0.0), |uvs| {
+            (uvs.places.len() as f64, uvs.corners.as_ref().map_or(0.0, |corners| corners.len() as f64))
+        });
+        let usda = vertices * USDA_PER_VERTEX + places * USDA_PER_PLACE + corners * USDA_PER_INDEX;
+        let ply = vertices * PLY_PER_VERTEX + places.max(corners) * PLY_PER_PLACE;
+        f64::from(output.objects_usd) * usda + f64::from(output.objects_ply) * ply
+    });
+    let objects = objects.sum::<f64>() * frames;
     (base + objects + frames * BYTES_PER_CHANGE) as u64
 }
 
