@@ -6,6 +6,7 @@ pub mod cpu;
 mod ears;
 pub mod faults;
 pub mod mesh;
+mod monotone;
 pub mod polygons;
 pub mod uvs;
 
