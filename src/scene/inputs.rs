@@ -14,7 +14,7 @@ use crate::io::sequence::Pattern;
 use crate::io::{hash, mesh};
 use crate::motion::{Character, Key, Keys, MeshSequence, Motion, Placed, Play, Rigid, missing_uvs};
 use crate::snow::base_layer::initial::{self, Cover};
-use crate::sweep::{Body, REACH};
+use crate::sweep::{self, Body, REACH};
 use crate::vdb::{FloatGrid, GridClass, file};
 
 /// Half width of the snow's narrow band (cells).
@@ -202,13 +202,9 @@ impl Inputs {
 
 /// Says that a static object lies too far away.
 pub(super) fn too_far(scene: &Scene, index: usize, far: f64) -> String {
-    let (cell, name) = (scene.snow.cell, super::file::name(&scene.objects[index].file));
-    format!(
-        "object {} ({name}), static, reaches {far:.0} m from the middle of the ground; cells of {cell} m have a reach of \
-         {:.0} m",
-        index + 1,
-        REACH * cell
-    )
+    let name = super::file::name(&scene.objects[index].file);
+    let what = format!("object {} ({name}), static, reaches", index + 1);
+    sweep::too_far(&what, far, "the middle of the ground", scene.snow.cell)
 }
 
 fn read_mesh(path: &Path, seen: &Seen) -> Result<TriMesh> {
