@@ -217,7 +217,7 @@ mod tests {
     fn a_face_of_a_hundred_thousand_corners_takes_no_time() {
         let combs = [1, 2].into_iter().flat_map(|sides| {
             let comb = move |angle: f64| (format!("comb {sides} {angle}"), comb(100_000, sides, angle));
-            [0.0, 0.4, 1.0, 1.570796, 2.5].map(comb)
+            [0.0, 0.4, 1.0, std::f64::consts::FRAC_PI_2, 2.5].map(comb)
         });
         let named = [("star".to_string(), star(100_000)), ("spiral".into(), spiral(100_000))];
         for (name, polygon) in named.into_iter().chain(combs) {
@@ -289,7 +289,8 @@ mod tests {
             let points: Vec<[f64; 2]> = (0..count)
                 .map(|i| match round % 3 {
                     0 => {
-                        let (angle, radius) = (i as f64 / count as f64 * 6.28, 0.1 + random());
+                        let (angle, radius) =
+                            (i as f64 / count as f64 * std::f64::consts::TAU, 0.1 + random());
                         [radius * angle.cos(), radius * angle.sin()]
                     }
                     1 => [random(), random()],

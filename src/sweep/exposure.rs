@@ -181,7 +181,8 @@ impl Exposure {
 /// Marks the cells that hold many sheets one behind the other, from the number of crossings near each.
 fn mark_crowds(cells: &Cells, counts: &[AtomicU16], stacks: &[AtomicBool]) {
     cells.for_each_crowd(CROWD, |cell, voxel| {
-        let count = |voxel| cells.of_voxel(voxel).map_or(0, |cell| u32::from(counts[cell].load(Ordering::Relaxed)));
+        let count =
+            |voxel| cells.of_voxel(voxel).map_or(0, |cell| u32::from(counts[cell].load(Ordering::Relaxed)));
         let beside = |axis: usize, step: i32| {
             let mut place = voxel;
             place[axis] += step;

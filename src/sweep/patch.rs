@@ -51,7 +51,8 @@ pub fn patches(ctx: &Context, cells: &Cells, exposure: &Exposure) -> Result<Vec<
         spots.iter().take_while(|_| ctx.check().is_ok()).for_each(|spot| asks.patch(spot, &mut out));
         out
     };
-    let parts: Vec<Vec<Facet>> = exposure.spots_of_stacks(cells).par_chunks(GRAIN).map_init(asks, make).collect();
+    let parts: Vec<Vec<Facet>> =
+        exposure.spots_of_stacks(cells).par_chunks(GRAIN).map_init(asks, make).collect();
     ctx.check()?;
     Ok(parts.concat())
 }
@@ -145,7 +146,8 @@ fn unit(v: Point) -> Point {
 
 /// Two unit vectors at right angles to a third and to each other.
 fn across(normal: Point) -> [Point; 2] {
-    let least = (1..3).fold(0, |least, axis| if normal[axis].abs() < normal[least].abs() { axis } else { least });
+    let least =
+        (1..3).fold(0, |least, axis| if normal[axis].abs() < normal[least].abs() { axis } else { least });
     let mut axis = [0.0; 3];
     axis[least] = 1.0;
     let u = unit(cross(normal, axis));
