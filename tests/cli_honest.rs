@@ -125,7 +125,8 @@ fn a_fog_volume_is_drawn_and_said_to_be_one() {
 
 #[test]
 fn the_disk_is_told_for_a_layer_from_a_file() {
-    let folder = folder("ground = 0.0\narea = [-1, -1, 1, 1]\ndepth = 0.3\ncell = 0.02");
+    // So large that the layer takes most of the disk.
+    let folder = folder("ground = 0.0\narea = [-3, -3, 3, 3]\ndepth = 0.3\ncell = 0.02");
     works(folder.path(), "snow shot.toml -o out -q");
     let scene = "[shot]\nframes = \"1-10\"\n[snow]\ntop = \"out/base/base.0001.vdb\"\ncell = 0.02\n[[object]]\nfile = \"cube.obj\"\n";
     fs::write(folder.path().join("next.toml"), scene).unwrap();

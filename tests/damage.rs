@@ -225,9 +225,11 @@ fn a_stream_without_offsets_is_read_and_its_end_is_noticed() {
     assert!(layout::read(std::io::Cursor::new(&bytes)).unwrap().is_stream());
     assert_eq!(file::describe(&path).unwrap()[0].name, "ball");
     same(&path, &["ball"]);
-    for part in 1..20 {
-        fs::write(&path, &bytes[..bytes.len() * part / 20]).unwrap();
-        assert!(file::read(&path).is_err() && guard().read(&path).is_err(), "{part}/20");
+    let cuts = (1..60).map(|part| bytes.len() * part / 60).chain(bytes.len() - 40..bytes.len());
+    for length in cuts {
+        fs::write(&path, &bytes[..length]).unwrap();
+        assert!(file::read(&path).is_err(), "cut at {length} of {}", bytes.len());
+        assert!(length % 10 != 0 || guard().read(&path).is_err(), "cut at {length} of {}", bytes.len());
     }
 }
 

@@ -2,7 +2,7 @@
 //!
 //! A corner is an ear when its triangle turns the polygon's way round and holds no other corner. Corners lie in a tree of
 //! boxes, so that a triangle is compared with those near it, and cutting an ear changes only whether its two neighbours
-//! are ears: n corners take some n log n steps, at worst n^1.5.
+//! are ears: n corners take some n log n steps, or n^2 where most triangles are long and thin. A limit of steps ends that.
 
 use std::cmp::{Ordering, Reverse};
 use std::collections::BinaryHeap;
@@ -12,6 +12,9 @@ pub(super) type Point = [f64; 2];
 
 /// Corners of a box of the tree that are compared one by one.
 const LEAF: usize = 8;
+/// Boxes that are looked at, for each corner, before no more ears are looked for: more than a polygon of so many corners
+/// can take.
+const LOOKS: usize = 1200;
 
 /// Twice the area of a triangle, positive when it is counter-clockwise.
 pub(super) fn turn(a: Point, b: Point, c: Point) -> f64 {
@@ -51,6 +54,8 @@ struct Ring<'a> {
     /// Corners with the turn that they had when they were put in.
     wide: BinaryHeap<Wide>,
     turns: Vec<f64>,
+    /// Boxes that may still be looked at.
+    looks: usize,
 }
 
 /// A corner by its turn, then by its index.
@@ -84,6 +89,7 @@ impl<'a> Ring<'a> {
             is_ear: vec![false; count],
             wide: BinaryHeap::new(),
             turns: vec![0.0; count],
+            looks: LOOKS * count,
         };
         (0..count).for_each(|corner| ring.look(corner));
         ring
@@ -100,7 +106,8 @@ impl<'a> Ring<'a> {
         let turn = turn(a, b, c);
         self.turns[corner] = turn;
         self.wide.push(Wide(turn, Reverse(corner)));
-        self.is_ear[corner] = turn > 0.0 && !self.near.any_within(self.points, [a, b, c]);
+        self.is_ear[corner] =
+            turn > 0.0 && self.looks > 0 && !self.near.any_within(self.points, [a, b, c], &mut self.looks);
         if self.is_ear[corner] {
             self.ears.push(Reverse(corner));
         }
@@ -205,12 +212,13 @@ impl Boxes {
     }
 
     /// Whether a counter-clockwise triangle holds a point that is left, on its sides too, other than its corners.
-    fn any_within(&self, points: &[Point], triangle: [Point; 3]) -> bool {
+    fn any_within(&self, points: &[Point], triangle: [Point; 3], looks: &mut usize) -> bool {
         let sides = [0, 1, 2].map(|i| (triangle[i], triangle[(i + 1) % 3]));
         let holds = |p: Point| sides.iter().all(|&(a, b)| turn(a, b, p) >= 0.0) && !triangle.contains(&p);
         let mut todo = vec![0];
         while let Some(index) = todo.pop() {
             let node = &self.nodes[index];
+            *looks = looks.saturating_sub(1);
             if node.left == 0 {
                 continue;
             }

@@ -103,12 +103,34 @@ impl TriMesh {
         self
     }
 
+    /// The mesh without the vertices that no triangle names; the others keep their order.
+    pub fn without_unused(self) -> Self {
+        let Some(used) = used(self.positions.len(), &self.triangles) else { return self };
+        let positions = used.iter().map(|&vertex| self.positions[vertex as usize]).collect();
+        Self { positions, triangles: renumbered(&self.triangles, &used) }
+    }
+
     /// Adds another mesh's triangles.
     pub fn append(&mut self, other: &Self) {
         let first = self.positions.len() as u32;
         self.positions.extend_from_slice(&other.positions);
         self.triangles.extend(other.triangles.iter().map(|triangle| triangle.map(|index| index + first)));
     }
+}
+
+/// The vertices out of so many that triangles name, ascending; none when they name all.
+pub fn used(count: usize, triangles: &[[u32; 3]]) -> Option<Vec<u32>> {
+    let mut named = vec![false; count];
+    triangles.as_flattened().iter().for_each(|&vertex| named[vertex as usize] = true);
+    let used = || (0..count as u32).filter(|&vertex| named[vertex as usize]).collect();
+    named.contains(&false).then(used)
+}
+
+/// Triangles over some of their vertices, `used`, which ascend and hold all that they name.
+pub fn renumbered(triangles: &[[u32; 3]], used: &[u32]) -> Vec<[u32; 3]> {
+    let mut places = vec![0; used.last().map_or(0, |&last| last as usize + 1)];
+    used.iter().zip(0..).for_each(|(&vertex, place)| places[vertex as usize] = place);
+    triangles.iter().map(|triangle| triangle.map(|vertex| places[vertex as usize])).collect()
 }
 
 /// How far apart the 32-bit numbers lie that stand for a coordinate: what a mesh file can tell there.

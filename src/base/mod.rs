@@ -6,7 +6,9 @@ pub mod cpu;
 mod ears;
 pub mod faults;
 pub mod mesh;
+mod monotone;
 pub mod polygons;
+pub mod uvs;
 
 /// A point, direction or velocity in 32 bits: fields and mesh vertices (m, m/s).
 pub type Vec3 = nalgebra::Vector3<f32>;
@@ -15,3 +17,4 @@ pub type DVec3 = nalgebra::Vector3<f64>;
 
 pub use mesh::TriMesh;
 pub use polygons::PolygonMesh;
+pub use uvs::Uvs;

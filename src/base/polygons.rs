@@ -2,8 +2,13 @@
 
 use super::ears::{self, turn};
 use super::mesh::validate;
-use super::{DVec3, TriMesh, Vec3};
-use crate::error::Result;
+use super::{DVec3, TriMesh, Uvs, Vec3, monotone};
+use crate::error::{Error, Result};
+
+/// Most corners of a polygon: cutting it takes some 300 bytes for each, which no limit of memory sees.
+const MOST_CORNERS: usize = 1 << 22;
+/// Corners of a polygon that is cut ear by ear: of larger ones the worst would take minutes.
+const FEW_CORNERS: usize = 500;
 
 /// Polygons as files hold them: with any number of corners, convex or not, hardly ever quite flat.
 #[derive(Debug, Clone, Default, PartialEq)]
@@ -14,6 +19,8 @@ pub struct PolygonMesh {
     pub corners: Vec<u32>,
     /// Where each polygon ends in `corners`.
     pub ends: Vec<u32>,
+    /// Texture coordinates, where the file has any.
+    pub uvs: Option<Uvs>,
 }
 
 impl PolygonMesh {
@@ -30,9 +37,15 @@ impl PolygonMesh {
     /// Checks that there is a polygon, that positions are finite and indices in range.
     ///
     /// # Errors
-    /// Names the first vertex or face at fault, counted from 1.
+    /// Names the first vertex or face at fault, counted from 1; a face of more than 4,194,304 corners is one.
     pub fn validate(&self) -> Result<()> {
-        validate(&self.positions, self.polygons())
+        validate(&self.positions, self.polygons())?;
+        match self.polygons().position(|polygon| polygon.len() > MOST_CORNERS) {
+            Some(face) => {
+                Err(Error::argument(format!("face {} has more than {MOST_CORNERS} corners", face + 1)))
+            }
+            None => Ok(()),
+        }
     }
 
     /// The vertex indices of each polygon.
@@ -48,10 +61,11 @@ impl PolygonMesh {
             && self.ends == other.ends
     }
 
-    /// The polygons as triangles: a fan where the polygon is convex, else ears cut off one after another.
+    /// The polygons as triangles: a fan where the polygon is convex, else ears cut off one after another,
+    /// or of large polygons pieces that rise along an axis.
     pub fn triangles(&self) -> Vec<[u32; 3]> {
-        let mut out = Vec::with_capacity(self.corners.len().saturating_sub(2 * self.ends.len()));
-        self.polygons().for_each(|polygon| self.cut(polygon, &mut out));
+        let mut out = Vec::with_capacity(self.triangle_count());
+        self.cut_all(|_, polygon, triangle| out.push(triangle.map(|corner| polygon[corner])));
         out
     }
 
@@ -60,21 +74,48 @@ impl PolygonMesh {
         TriMesh { triangles: self.triangles(), positions: self.positions }
     }
 
-    fn cut(&self, polygon: &[u32], out: &mut Vec<[u32; 3]>) {
-        if let &[a, b, c] = polygon {
-            return out.push([a, b, c]);
+    /// The mesh in triangles, with its texture coordinates.
+    pub fn into_textured(mut self) -> (TriMesh, Option<Uvs>) {
+        let uvs = self.uvs.take().map(|uvs| match uvs.corners {
+            Some(_) => {
+                let mut corners = Vec::with_capacity(self.triangle_count());
+                self.cut_all(|begin, _, triangle| corners.push(triangle.map(|corner| begin + corner)));
+                uvs.of_triangles(&corners)
+            }
+            None => uvs,
+        });
+        (self.into_triangles(), uvs)
+    }
+
+    fn triangle_count(&self) -> usize {
+        self.corners.len().saturating_sub(2 * self.ends.len())
+    }
+
+    /// Cuts all polygons: where each begins in `corners`, its vertices, and a triangle of its corners.
+    fn cut_all(&self, mut each: impl FnMut(usize, &[u32], [usize; 3])) {
+        let mut begin = 0;
+        for polygon in self.polygons() {
+            self.cut(polygon, |triangle| each(begin, polygon, triangle));
+            begin += polygon.len();
         }
-        let fan = || (1..polygon.len() - 1).map(|i| [polygon[0], polygon[i], polygon[i + 1]]);
+    }
+
+    fn cut(&self, polygon: &[u32], mut each: impl FnMut([usize; 3])) {
+        if polygon.len() == 3 {
+            return each([0, 1, 2]);
+        }
+        let fan = |each: &mut dyn FnMut([usize; 3])| (1..polygon.len() - 1).for_each(|i| each([0, i, i + 1]));
         // Indices beyond the vertices are left for the check of the whole mesh to refuse.
         let places: Option<Vec<DVec3>> =
             polygon.iter().map(|&i| self.positions.get(i as usize).map(|p| p.cast())).collect();
-        let Some(places) = places else { return out.extend(fan()) };
+        let Some(places) = places else { return fan(&mut each) };
         let flat = flattened(&places);
         let count = polygon.len();
         if (0..count).all(|i| turn(flat[(i + count - 1) % count], flat[i], flat[(i + 1) % count]) >= 0.0) {
-            return out.extend(fan());
+            return fan(&mut each);
         }
-        out.extend(ears::triangles(&flat).into_iter().map(|triangle| triangle.map(|i| polygon[i])));
+        let cut = if count > FEW_CORNERS { monotone::triangles } else { ears::triangles };
+        cut(&flat).into_iter().for_each(each);
     }
 }
 
@@ -152,14 +193,40 @@ mod tests {
         flat(&(0..count).map(corner).collect::<Vec<_>>())
     }
 
+    /// A square wave over a bar, whose teeth reach up from y = 1, and down from -1 if on both sides; turned by an angle.
+    fn comb(count: usize, sides: usize, angle: f64) -> PolygonMesh {
+        let teeth = count / 4 / sides;
+        // Every other two corners are on the same tooth's or gap's side.
+        let across = |k: usize| k as f64 * 0.5 + 0.03 * (k % 7) as f64;
+        let wave = |i: usize| [across(i.div_ceil(2)), 1.0 + 200.0 * (i % 4 / 2) as f64];
+        let mut points: Vec<[f64; 2]> = (0..4 * teeth).map(|i| wave(i + 1)).collect();
+        match sides {
+            1 => points.extend([[teeth as f64 * 1.0 + 1.0, 0.0], [0.0, 0.0]]),
+            _ => points.extend((0..4 * teeth).rev().map(|i| wave(i + 1)).map(|[x, y]| [x, -y])),
+        }
+        points.reverse();
+        let (sin, cos) = angle.sin_cos();
+        let turned = |p: &[f64; 2]| [(p[0] * cos - p[1] * sin) as f32, (p[0] * sin + p[1] * cos) as f32];
+        let mut mesh = flat(&points.iter().map(turned).collect::<Vec<_>>());
+        // In a sloping plane 32-bit numbers would tilt its long slivers.
+        mesh.positions.iter_mut().for_each(|p| p.y = 0.0);
+        mesh
+    }
+
     #[test]
     fn a_face_of_a_hundred_thousand_corners_takes_no_time() {
-        for (name, polygon) in [("star", star(100_000)), ("spiral", spiral(100_000))] {
+        let combs = [1, 2].into_iter().flat_map(|sides| {
+            let comb = move |angle: f64| (format!("comb {sides} {angle}"), comb(100_000, sides, angle));
+            [0.0, 0.4, 1.0, std::f64::consts::FRAC_PI_2, 2.5].map(comb)
+        });
+        let named = [("star".to_string(), star(100_000)), ("spiral".into(), spiral(100_000))];
+        for (name, polygon) in named.into_iter().chain(combs) {
             let start = std::time::Instant::now();
+            let count = polygon.positions.len();
             let mesh = polygon.into_triangles();
-            assert_eq!(mesh.triangles.len(), 99_998);
+            assert_eq!(mesh.triangles.len(), count - 2);
             let seconds = start.elapsed().as_secs_f64();
-            assert!(seconds < 10.0, "{name}: {seconds} s");
+            assert!(seconds < 2.0, "{name}: {seconds} s");
             let area: DVec3 = (0..mesh.triangles.len())
                 .map(|t| mesh.corners(t))
                 .map(|[a, b, c]| (b - a).cross(&(c - a)) / 2.0)
@@ -183,7 +250,64 @@ mod tests {
         let tangle: Vec<[f32; 2]> = (0..100_000).map(|_| [random(), random()]).collect();
         let start = std::time::Instant::now();
         assert_eq!(flat(&tangle).triangles().len(), 99_998);
-        assert!(start.elapsed().as_secs_f64() < 10.0);
+        assert!(start.elapsed().as_secs_f64() < 10.0, "{} s", start.elapsed().as_secs_f64());
+    }
+
+    /// Area of a polygon by its corners, with its sign, and of its triangles without.
+    fn areas(points: &[[f64; 2]], triangles: &[[usize; 3]]) -> (f64, f64) {
+        let around = (0..points.len()).map(|i| turn(points[0], points[i], points[(i + 1) % points.len()]));
+        let parts = triangles.iter().map(|t| turn(points[t[0]], points[t[1]], points[t[2]]).abs());
+        (around.sum(), parts.sum())
+    }
+
+    /// Whether the triangles' sides, but for those inside, are the polygon's.
+    fn has_its_sides(count: usize, triangles: &[[usize; 3]]) -> bool {
+        let mut sides = std::collections::HashMap::new();
+        for [a, b, c] in triangles {
+            for (from, to) in [(a, b), (b, c), (c, a)] {
+                *sides.entry((*from.min(to), *from.max(to))).or_insert(0) += if from < to { 1 } else { -1 };
+            }
+        }
+        let own = |i: usize| sides.get(&(i.min((i + 1) % count), i.max((i + 1) % count)));
+        let inner = sides.values().filter(|way| **way == 0).count();
+        (0..count).all(|i| own(i) == Some(&if i + 1 < count { 1 } else { -1 }))
+            && sides.len() == count + inner
+    }
+
+    #[test]
+    fn large_polygons_of_every_kind_keep_their_sides_and_simple_ones_their_area() {
+        let mut at = 7u64;
+        let mut random = || {
+            at = at.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+            (at >> 40) as f64 / (1u64 << 24) as f64
+        };
+        for round in 0..300 {
+            let count = 3 + (random() * 60.0) as usize;
+            // Around a centre at growing angles it is simple; on few places many corners are doubled.
+            let simple = round % 3 == 0;
+            let few = |value: f64| (value * 5.0).floor();
+            let points: Vec<[f64; 2]> = (0..count)
+                .map(|i| match round % 3 {
+                    0 => {
+                        let (angle, radius) =
+                            (i as f64 / count as f64 * std::f64::consts::TAU, 0.1 + random());
+                        [radius * angle.cos(), radius * angle.sin()]
+                    }
+                    1 => [random(), random()],
+                    _ => [few(random()), few(random())],
+                })
+                .collect();
+            let triangles = monotone::triangles(&points);
+            assert_eq!(triangles.len(), count - 2, "{points:?}");
+            assert!(has_its_sides(count, &triangles), "{points:?}: {triangles:?}");
+            if simple {
+                let (around, parts) = areas(&points, &triangles);
+                assert!((around - parts).abs() < 1e-6, "{around} {parts} {points:?}");
+            }
+        }
+        for points in [vec![[0.0; 2]; 700], vec![[f64::NAN; 2]; 700], vec![[f64::INFINITY, 1.0]; 700]] {
+            assert_eq!(monotone::triangles(&points).len(), 698);
+        }
     }
 
     #[test]
@@ -192,6 +316,9 @@ mod tests {
         assert_eq!(square.triangles(), [[0, 1, 2], [0, 2, 3]]);
         assert_eq!(flat(&[[0.0, 0.0], [1.0, 1.0], [1.0, 0.0], [0.0, 1.0]]).triangles().len(), 2);
         assert_eq!(flat(&[[0.0, 0.0]; 5]).triangles().len(), 3);
+        let mut vast = square.clone();
+        vast.push((0..=MOST_CORNERS as u32).map(|i| i % 4));
+        assert_eq!(vast.validate().unwrap_err().to_string(), "face 2 has more than 4194304 corners");
         let mut beyond = square;
         beyond.push([0, 1, 2, 9]);
         assert_eq!(beyond.triangles().len(), 4);

@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 use frazil::base::TriMesh;
 use frazil::io::sequence::Pattern;
 use frazil::io::{self, atomic, usd};
-use frazil::motion::{Character, Keys, MeshSequence, Motion, Placed, Play, Rigid};
+use frazil::motion::{Character, Keys, MeshSequence, Motion, Placed, Play, Rigid, missing_uvs};
 use frazil::scene::{FrameChoice, Frames};
 use serde_json::json;
 
@@ -67,7 +67,7 @@ pub fn run(args: &Args, session: &Session) -> Result<(), Failure> {
         let inputs = [read(frame), read(frame.saturating_add(1))];
         output::refuse_input(&path, inputs.iter().map(PathBuf::as_path)).before()?;
     }
-    args.tell_losses(frames.first()).before()?;
+    args.tell_losses(frames.first(), &*motion).before()?;
     for frame in frames.iter() {
         session.ctx.check().during()?;
         let path = pattern.as_ref().map_or_else(|| args.output.clone(), |pattern| pattern.path(frame));
@@ -99,14 +99,19 @@ fn check_output(path: &Path) -> Result<(), Failure> {
 }
 
 impl Args {
-    /// Says what the input holds that no output of ours does.
-    fn tell_losses(&self, frame: i32) -> frazil::Result<()> {
+    /// Says what the input holds that the output does not.
+    fn tell_losses(&self, frame: i32, motion: &dyn Motion) -> frazil::Result<()> {
         let one =
             Pattern::parse(&self.input).map_or_else(|| self.input.clone(), |pattern| pattern.path(frame));
-        let lost = match extension(&one).as_str() {
+        let mut lost = match extension(&one).as_str() {
             "glb" | "gltf" => Character::extras(&one)?,
             _ => io::extras::of(&one)?,
         };
+        let uvs = motion.drawn().uvs.filter(|_| io::mesh::holds_uvs(&self.output));
+        lost.retain(|name| *name != "UVs" || uvs.is_none());
+        if let Some(missing) = uvs.map(|uvs| uvs.missing).filter(|missing| *missing > 0) {
+            log::warn!("{}", missing_uvs(&one.display().to_string(), missing));
+        }
         if !lost.is_empty() {
             log::warn!("{}: {} are not carried over", one.display(), listed(&lost));
         }
@@ -132,7 +137,13 @@ impl Args {
                 if self.frames.is_some() {
                     return Err(Failure::refused("--frames is of no use with one mesh"));
                 }
-                (Box::new(Rigid::new(io::mesh::read(&self.input).before()?, Keys::default())), one)
+                (
+                    Box::new(Rigid::of_polygons(
+                        io::mesh::read_polygons(&self.input).before()?,
+                        Keys::default(),
+                    )),
+                    one,
+                )
             }
             Some(pattern) => {
                 let needed =
@@ -148,7 +159,7 @@ impl Args {
     fn write(&self, path: &Path, motion: &dyn Motion, frame: i32) -> frazil::Result<()> {
         let time = f64::from(frame) / self.fps;
         let (mut pose, mut velocities) = (Vec::new(), Vec::new());
-        motion.pose(time, &mut pose)?;
+        motion.drawn_pose(time, &mut pose)?;
         let out = |places: &mut Vec<frazil::base::DVec3>| {
             places.iter_mut().for_each(|p| {
                 *p *= self.to_scale;
@@ -158,9 +169,10 @@ impl Args {
             });
         };
         out(&mut pose);
-        let positions = usd::to_floats(&pose);
+        let (positions, drawn) = (usd::to_floats(&pose), motion.drawn());
         if extension(path) != "usda" {
-            return io::mesh::write(path, &TriMesh { positions, triangles: motion.triangles().to_vec() });
+            let mesh = TriMesh { positions, triangles: drawn.triangles.to_vec() };
+            return io::mesh::write_textured(path, &mesh, drawn.uvs);
         }
         motion.velocities_ahead(time, 1.0 / self.fps, &mut velocities)?;
         out(&mut velocities);
@@ -170,7 +182,8 @@ impl Args {
             name: &name,
             points: &positions,
             velocities: &usd::to_floats(&velocities),
-            triangles: motion.triangles(),
+            triangles: drawn.triangles,
+            uvs: drawn.uvs,
         };
         let units = usd::Units { metres: 1.0 / self.to_scale, z_up: self.to_up == Axis::Z };
         atomic::write_bytes(path, usd::clip("meshes", frame, self.fps, units, &[mesh]).as_bytes())

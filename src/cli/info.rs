@@ -81,10 +81,12 @@ fn meta(value: &MetaValue) -> Value {
 
 fn mesh(path: &Path) -> frazil::Result<Vec<Value>> {
     let mesh = io::mesh::read(path)?;
+    let vertices = mesh.positions.len();
+    let mesh = mesh.without_unused();
     let bounds = mesh.bounds().map(|(low, high)| (<[f32; 3]>::from(low), <[f32; 3]>::from(high)));
     Ok(vec![json!({
         "type": "mesh",
-        "vertices": mesh.positions.len(),
+        "vertices": vertices,
         "triangles": mesh.triangles.len(),
         "bounds_m": bounds,
         "closed": mesh.is_closed(),

@@ -106,7 +106,7 @@ fn model(path: &Path, args: &Args, ctx: &Context) -> frazil::Result<Model> {
             let play = Play { clip: args.clip.clone(), ..Play::default() };
             Character::posed(path, play, (args.frame.unwrap_or(1.0) - 1.0) / args.fps)?
         }
-        _ => io::mesh::read(path)?,
+        _ => io::mesh::read(path)?.without_unused(),
     };
     Ok(Model::mesh(&mesh, [0.35, 0.16, 0.08]))
 }

@@ -1,4 +1,4 @@
-//! What a mesh file holds that frazil passes over.
+//! What a mesh file holds besides its shape.
 
 use std::path::Path;
 
@@ -40,7 +40,7 @@ fn obj(bytes: &[u8]) -> Vec<&'static str> {
 fn ply(bytes: &[u8]) -> Vec<&'static str> {
     let head = bytes.split(|&byte| byte == b'\n').take_while(|line| line.trim_ascii() != b"end_header");
     let names = [
-        (&["s", "t", "u", "v", "texture_u", "texture_v"][..], "UVs"),
+        (&["s", "t", "u", "v", "texture_u", "texture_v", "texcoord"][..], "UVs"),
         (&["nx", "ny", "nz"], "normals"),
         (&["red", "green", "blue", "alpha"], "colours"),
         (&["vx", "vy", "vz"], "velocities"),

@@ -4,13 +4,13 @@ use std::path::Path;
 
 use super::caught::caught;
 use super::{atomic, obj, ply, source, stl};
-use crate::base::{PolygonMesh, TriMesh, Vec3};
+use crate::base::{PolygonMesh, TriMesh, Uvs, Vec3};
 use crate::error::{Error, Result};
 
 /// What is read and written, by extension.
 pub const EXTENSIONS: [&str; 3] = ["obj", "ply", "stl"];
 
-/// Reads a mesh in triangles.
+/// Reads a mesh in triangles: all its vertices, in the file's order.
 ///
 /// # Errors
 /// A missing, empty, cut or malformed file; no faces; vertices that are not finite; indices out of range.
@@ -53,18 +53,31 @@ pub fn parse_polygons(path: &Path, bytes: &[u8]) -> Result<PolygonMesh> {
 /// # Errors
 /// Another extension than .obj, .ply or .stl; what the operating system reports.
 pub fn write(path: &Path, mesh: &TriMesh) -> Result<()> {
+    write_textured(path, mesh, None)
+}
+
+/// As [`write`], with texture coordinates, which .stl cannot hold: see [`holds_uvs`].
+///
+/// # Errors
+/// As [`write`].
+pub fn write_textured(path: &Path, mesh: &TriMesh, uvs: Option<&Uvs>) -> Result<()> {
     match extension(path).as_str() {
-        "obj" => atomic::write(path, |out| obj::write(out, mesh)),
-        "ply" => atomic::write(path, |out| ply::write(out, mesh, &[])),
+        "obj" => atomic::write(path, |out| obj::write(out, mesh, uvs)),
+        "ply" => atomic::write(path, |out| ply::write(out, mesh, &[], uvs)),
         "stl" => atomic::write(path, |out| stl::write(out, mesh)),
         _ => Err(Error::file(path, "a mesh file must be .obj, .ply or .stl")),
     }
 }
 
-/// The bytes of a .ply file with velocities (m/s), one a vertex, as vx, vy, vz; or without any.
-pub fn ply_bytes(mesh: &TriMesh, velocities: &[Vec3]) -> Vec<u8> {
+/// Whether a file of this name can hold texture coordinates.
+pub fn holds_uvs(path: &Path) -> bool {
+    matches!(extension(path).as_str(), "obj" | "ply" | "usda")
+}
+
+/// The bytes of a .ply file with velocities (m/s), one a vertex, as vx, vy, vz, and texture coordinates; or without any.
+pub fn ply_bytes(mesh: &TriMesh, velocities: &[Vec3], uvs: Option<&Uvs>) -> Vec<u8> {
     let mut bytes = Vec::new();
-    ply::write(&mut bytes, mesh, velocities).expect("memory takes all bytes");
+    ply::write(&mut bytes, mesh, velocities, uvs).expect("memory takes all bytes");
     bytes
 }
 

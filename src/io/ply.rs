@@ -1,9 +1,14 @@
-//! Stanford PLY: ascii and binary of both byte orders; faces as lists or as triangle strips.
+//! Stanford PLY: ascii and binary of both byte orders; faces as lists or as triangle strips; texture coordinates of vertices
+//! (s and t, u and v, texture_u and texture_v) or of the corners of faces (a list texcoord).
 
+use std::collections::HashMap;
 use std::io::Write;
 
 use super::source;
-use crate::base::{PolygonMesh, TriMesh, Vec3};
+use crate::base::{PolygonMesh, TriMesh, Uvs, Vec3, uvs};
+
+/// Names of a vertex' texture coordinates.
+const PLACES: [[&str; 2]; 3] = [["s", "t"], ["u", "v"], ["texture_u", "texture_v"]];
 
 /// Rows between two looks at whether to stop.
 const PIECE: usize = 1 << 14;
@@ -44,7 +49,7 @@ pub(super) fn parse(bytes: &[u8]) -> Result<PolygonMesh, String> {
     let (format, elements) = parse_header(header)?;
     check_coordinates(&elements)?;
     let mut reader = Reader { format, bytes: &bytes[body..], at: 0 };
-    let mut mesh = PolygonMesh::default();
+    let mut parsed = Parsed::new(&elements);
     // An element without properties has no rows in the file, however many it says.
     for element in elements.iter().filter(|element| !element.properties.is_empty()) {
         for row in 0..element.count {
@@ -52,14 +57,80 @@ pub(super) fn parse(bytes: &[u8]) -> Result<PolygonMesh, String> {
                 return Err("stopped".into());
             }
             let place = format_args!("{} {} of {}", element.name, row + 1, element.count);
-            read_row(&mut reader, element, &mut mesh).map_err(|fault| match fault {
+            read_row(&mut reader, element, &mut parsed).map_err(|fault| match fault {
                 Fault::End => format!("the .ply file ends in {place}"),
                 Fault::Text(text) => format!("{place}: \"{text}\" is no number"),
                 Fault::Count(count) => format!("{place} cannot have {count} entries"),
             })?;
         }
     }
-    Ok(mesh)
+    Ok(parsed.finish())
+}
+
+/// The mesh so far, and the texture coordinates of its vertices or corners.
+struct Parsed {
+    mesh: PolygonMesh,
+    /// Names of the vertices' texture coordinates, where they have any.
+    names: Option<[&'static str; 2]>,
+    of_vertices: Vec<[f32; 2]>,
+    /// Of the corners: the different ones, and each corner's index or none.
+    of_corners: Vec<[f32; 2]>,
+    known: HashMap<[u32; 2], u32>,
+    at: Vec<u32>,
+}
+
+impl Parsed {
+    fn new(elements: &[Element]) -> Self {
+        let vertex = elements.iter().find(|element| element.name == "vertex");
+        let has = |name: &&str| {
+            vertex.is_some_and(|vertex| vertex.properties.iter().any(|p| p.name == *name && p.list.is_none()))
+        };
+        Self {
+            mesh: PolygonMesh::default(),
+            names: PLACES.into_iter().find(|pair| pair.iter().all(has)),
+            of_vertices: Vec::new(),
+            of_corners: Vec::new(),
+            known: HashMap::new(),
+            at: Vec::new(),
+        }
+    }
+
+    /// Adds a face, with two texture coordinates for each corner, one after another, or none.
+    fn face(&mut self, corners: Vec<u32>, places: &[f64]) {
+        let has = places.len() == 2 * corners.len();
+        for corner in 0..corners.len() {
+            let place = [0, 1].map(|axis| if has { places[2 * corner + axis] as f32 } else { f32::NAN });
+            let index = if uvs::is_finite(place) { self.index(place) } else { uvs::NONE };
+            self.at.push(index);
+        }
+        self.mesh.push(corners);
+        // A face of fewer than three corners is none.
+        self.at.truncate(self.mesh.corners.len());
+    }
+
+    fn index(&mut self, place: [f32; 2]) -> u32 {
+        let next = self.of_corners.len() as u32;
+        let index = *self.known.entry(place.map(|value| (value + 0.0).to_bits())).or_insert(next);
+        if index == next {
+            self.of_corners.push(place);
+        }
+        index
+    }
+
+    fn finish(self) -> PolygonMesh {
+        let (corners, count) = (&self.mesh.corners, self.mesh.positions.len());
+        let uvs = match Uvs::of_corners(self.of_corners, self.at, corners, count) {
+            None if self.names.is_some() => {
+                let is_missing = |place: &[f32; 2]| !uvs::is_finite(*place);
+                let missing = self.of_vertices.iter().filter(|place| is_missing(place)).count();
+                let known = |place: [f32; 2]| if uvs::is_finite(place) { place } else { [0.0; 2] };
+                let places = self.of_vertices.into_iter().map(known).collect();
+                Some(Uvs { places, corners: None, missing })
+            }
+            of_corners => of_corners,
+        };
+        PolygonMesh { uvs, ..self.mesh }
+    }
 }
 
 fn find(bytes: &[u8], needle: &[u8]) -> Option<usize> {
@@ -170,14 +241,20 @@ impl Reader<'_> {
 }
 
 /// Reads one row of an element.
-fn read_row(reader: &mut Reader<'_>, element: &Element, mesh: &mut PolygonMesh) -> Result<(), Fault> {
-    let mut position = [0.0f64; 3];
+fn read_row(reader: &mut Reader<'_>, element: &Element, parsed: &mut Parsed) -> Result<(), Fault> {
+    let (mut position, mut place) = ([0.0f64; 3], [0.0f64; 2]);
+    let (mut corners, mut places) = (Vec::new(), Vec::new());
     for property in &element.properties {
+        let name = property.name.as_str();
         match property.list {
             None => {
                 let value = reader.number(property.kind)?;
-                if let Some(axis) = ["x", "y", "z"].iter().position(|axis| *axis == property.name) {
+                if let Some(axis) = ["x", "y", "z"].iter().position(|axis| *axis == name) {
                     position[axis] = value;
+                } else if let Some(axis) =
+                    parsed.names.and_then(|names| names.iter().position(|n| *n == name))
+                {
+                    place[axis] = value;
                 }
             }
             Some(count) => {
@@ -189,18 +266,26 @@ fn read_row(reader: &mut Reader<'_>, element: &Element, mesh: &mut PolygonMesh) 
                 let values = (0..count as usize)
                     .map(|_| reader.number(property.kind))
                     .collect::<Result<Vec<f64>, Fault>>()?;
-                match (element.name.as_str(), property.name.as_str()) {
+                match (element.name.as_str(), name) {
                     ("face", "vertex_indices" | "vertex_index") => {
-                        mesh.push(values.into_iter().map(index));
+                        corners = values.into_iter().map(index).collect();
                     }
-                    ("tristrips", _) => add_strips(&values, mesh),
+                    ("face", "texcoord") => places = values,
+                    ("tristrips", _) => add_strips(&values, parsed),
                     _ => {}
                 }
             }
         }
     }
-    if element.name == "vertex" {
-        mesh.positions.push(Vec3::from(position.map(|value| value as f32)));
+    match element.name.as_str() {
+        "vertex" => {
+            parsed.mesh.positions.push(Vec3::from(position.map(|value| value as f32)));
+            if parsed.names.is_some() {
+                parsed.of_vertices.push(place.map(|value| value as f32));
+            }
+        }
+        "face" => parsed.face(corners, &places),
+        _ => {}
     }
     Ok(())
 }
@@ -211,19 +296,29 @@ fn index(value: f64) -> u32 {
 }
 
 /// Strips end at -1; every other triangle is turned round.
-fn add_strips(values: &[f64], mesh: &mut PolygonMesh) {
+fn add_strips(values: &[f64], parsed: &mut Parsed) {
     for strip in values.split(|&value| value < 0.0) {
         for (number, three) in strip.windows(3).enumerate() {
             let [a, b, c] = [index(three[0]), index(three[1]), index(three[2])];
-            mesh.push(if number % 2 == 0 { [a, b, c] } else { [b, a, c] });
+            parsed.face(if number % 2 == 0 { vec![a, b, c] } else { vec![b, a, c] }, &[]);
         }
     }
 }
 
-/// Writes binary little-endian PLY, with velocities when there is one for each vertex.
-pub(super) fn write(out: &mut dyn Write, mesh: &TriMesh, velocities: &[Vec3]) -> std::io::Result<()> {
+/// Writes binary little-endian PLY, with velocities when there is one for each vertex, and texture coordinates: s and t of
+/// the vertices, or where there are seams a list texcoord of the faces.
+pub(super) fn write(
+    out: &mut dyn Write,
+    mesh: &TriMesh,
+    velocities: &[Vec3],
+    uvs: Option<&Uvs>,
+) -> std::io::Result<()> {
     let moving = velocities.len() == mesh.positions.len();
-    let names = if moving { &["x", "y", "z", "vx", "vy", "vz"][..] } else { &["x", "y", "z"] };
+    let of_vertices = uvs.filter(|uvs| uvs.corners.is_none());
+    let of_corners = uvs.filter(|uvs| uvs.corners.is_some());
+    let mut names = vec!["x", "y", "z"];
+    names.extend(moving.then_some(["vx", "vy", "vz"]).into_iter().flatten());
+    names.extend(of_vertices.map(|_| PLACES[0]).into_iter().flatten());
     writeln!(
         out,
         "ply\nformat binary_little_endian 1.0\ncomment frazil\nelement vertex {}",
@@ -231,17 +326,31 @@ pub(super) fn write(out: &mut dyn Write, mesh: &TriMesh, velocities: &[Vec3]) ->
     )?;
     names.iter().try_for_each(|name| writeln!(out, "property float {name}"))?;
     let faces = mesh.triangles.len();
-    writeln!(out, "element face {faces}\nproperty list uchar uint vertex_indices\nend_header")?;
+    writeln!(out, "element face {faces}\nproperty list uchar uint vertex_indices")?;
+    if of_corners.is_some() {
+        writeln!(out, "property list uchar float texcoord")?;
+    }
+    writeln!(out, "end_header")?;
     for (vertex, p) in mesh.positions.iter().enumerate() {
         let velocity = velocities.get(vertex).filter(|_| moving);
-        for value in p.iter().chain(velocity.into_iter().flatten()) {
+        let place = of_vertices.map(|uvs| uvs.places[vertex]);
+        let values = p.iter().chain(velocity.into_iter().flatten()).chain(place.iter().flatten());
+        for value in values {
             out.write_all(&value.to_le_bytes())?;
         }
     }
-    for triangle in &mesh.triangles {
+    for (number, triangle) in mesh.triangles.iter().enumerate() {
         out.write_all(&[3])?;
         for index in triangle {
             out.write_all(&index.to_le_bytes())?;
+        }
+        if let Some(uvs) = of_corners {
+            out.write_all(&[6])?;
+            for index in uvs.indices(&mesh.triangles, number) {
+                for value in uvs.places[index as usize] {
+                    out.write_all(&value.to_le_bytes())?;
+                }
+            }
         }
     }
     Ok(())
@@ -258,7 +367,7 @@ mod tests {
             triangles: vec![[0, 1, 2], [2, 1, 0]],
         };
         let mut bytes = Vec::new();
-        write(&mut bytes, &mesh, &[]).unwrap();
+        write(&mut bytes, &mesh, &[], None).unwrap();
         assert_eq!(parse(&bytes).unwrap().into_triangles(), mesh);
         for length in 0..bytes.len() {
             assert!(parse(&bytes[..length]).is_err(), "{length} of {} bytes were accepted", bytes.len());

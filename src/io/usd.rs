@@ -2,7 +2,7 @@
 
 use std::fmt::Write;
 
-use crate::base::{DVec3, Vec3};
+use crate::base::{DVec3, Uvs, Vec3};
 
 /// A moving mesh at one frame.
 pub struct MeshFrame<'a> {
@@ -14,6 +14,16 @@ pub struct MeshFrame<'a> {
     pub velocities: &'a [Vec3],
     /// Triangles.
     pub triangles: &'a [[u32; 3]],
+    /// Their texture coordinates.
+    pub uvs: Option<&'a Uvs>,
+}
+
+/// What stays of a moving mesh from frame to frame.
+pub struct MeshPrim<'a> {
+    /// Name of its prim: see [`prim_name`].
+    pub name: &'a str,
+    /// The texture coordinates of its frames, where they have any.
+    pub uvs: Option<&'a Uvs>,
 }
 
 /// A kind of volume with its .vdb files.
@@ -85,12 +95,12 @@ impl Units {
 }
 
 /// A stage with the shot's volumes, and the objects' meshes under value clips when `clips` gives the pattern of
-/// their files and the names of their prims.
+/// their files and the meshes in them.
 pub fn stage(
     comment: &str,
     time: StageTime,
     volumes: &[VolumeFiles],
-    clips: Option<(&Clips, &[String])>,
+    clips: Option<(&Clips, &[MeshPrim])>,
 ) -> String {
     let mut out = String::new();
     let StageTime { first, last, fps } = time;
@@ -105,8 +115,8 @@ pub fn stage(
         .iter()
         .filter(|volume| !volume.files.is_empty())
         .for_each(|volume| write_volume(&mut out, volume));
-    if let Some((clips, names)) = clips {
-        write_clips(&mut out, clips, names);
+    if let Some((clips, meshes)) = clips {
+        write_clips(&mut out, clips, meshes);
     }
     out.push_str("}\n");
     out
@@ -140,7 +150,7 @@ pub struct Clips {
     pub frames: Vec<i32>,
 }
 
-fn write_clips(out: &mut String, clips: &Clips, names: &[String]) {
+fn write_clips(out: &mut String, clips: &Clips, meshes: &[MeshPrim]) {
     let kind = clips.kind;
     let file = |frame: &i32| asset(&format!("./{kind}/{kind}.{frame:04}.usda"));
     let files: Vec<String> = clips.frames.iter().map(file).collect();
@@ -159,11 +169,13 @@ fn write_clips(out: &mut String, clips: &Clips, names: &[String]) {
         pairs(&|clip, frame| format!("({frame}, {clip})")),
         pairs(&|_, frame| format!("({frame}, {frame})")),
     );
-    for name in names {
+    for MeshPrim { name, uvs } in meshes {
         let _ = writeln!(
             out,
-            "        def Mesh \"{name}\"\n        {{\n            uniform token subdivisionScheme = \"none\"\n        }}"
+            "        def Mesh \"{name}\"\n        {{\n            uniform token subdivisionScheme = \"none\""
         );
+        declare_uvs(out, "            ", *uvs);
+        out.push_str("        }\n");
     }
     out.push_str("    }\n");
 }
@@ -177,14 +189,29 @@ const ATTRIBUTES: [(&str, &str); 5] = [
     ("vector3f[]", "velocities"),
 ];
 
+/// Texture coordinates: the places, and where there are seams an index for each corner.
+const PLACES: &str = "texCoord2f[] primvars:st";
+const PLACE_INDICES: &str = "int[] primvars:st:indices";
+
+/// Says what the values of texture coordinates, elsewhere, belong to: the vertices, or the corners of faces.
+fn declare_uvs(out: &mut String, indent: &str, uvs: Option<&Uvs>) {
+    let Some(uvs) = uvs else { return };
+    let interpolation = if uvs.corners.is_some() { "faceVarying" } else { "vertex" };
+    let _ = write!(out, "{indent}{PLACES} (\n{indent}    interpolation = \"{interpolation}\"\n{indent})\n");
+    if uvs.corners.is_some() {
+        let _ = writeln!(out, "{indent}{PLACE_INDICES}");
+    }
+}
+
 /// What the clips hold: the manifest that USD asks for.
-pub fn clip_manifest(kind: &str, names: &[String]) -> String {
+pub fn clip_manifest(kind: &str, meshes: &[MeshPrim]) -> String {
     let mut out = format!("#usda 1.0\n(\n    defaultPrim = \"{kind}\"\n)\n\nover \"{kind}\"\n{{\n");
-    for name in names {
+    for MeshPrim { name, uvs } in meshes {
         let _ = writeln!(out, "    over \"{name}\"\n    {{");
         ATTRIBUTES.iter().for_each(|(class, attribute)| {
             let _ = writeln!(out, "        {class} {attribute}");
         });
+        declare_uvs(&mut out, "        ", *uvs);
         out.push_str("    }\n");
     }
     out.push_str("}\n");
@@ -218,6 +245,19 @@ pub fn clip(kind: &str, frame: i32, fps: f64, units: Units, meshes: &[MeshFrame]
         ];
         for ((class, attribute), value) in ATTRIBUTES.iter().zip(values) {
             let _ = writeln!(out, "        {class} {attribute}.timeSamples = {{ {frame}: {value} }}");
+        }
+        declare_uvs(&mut out, "        ", mesh.uvs);
+        if let Some(uvs) = mesh.uvs {
+            let places = list(uvs.places.iter(), |out, [u, v]| {
+                let _ = write!(out, "({u}, {v})");
+            });
+            let _ = writeln!(out, "        {PLACES}.timeSamples = {{ {frame}: {places} }}");
+            if let Some(corners) = &uvs.corners {
+                let indices = list(corners.iter(), |out, index| {
+                    let _ = write!(out, "{index}");
+                });
+                let _ = writeln!(out, "        {PLACE_INDICES}.timeSamples = {{ {frame}: {indices} }}");
+            }
         }
         out.push_str("    }\n");
     }

@@ -3,7 +3,7 @@
 //! A walk cycle usually walks in its place: its standing foot goes back under it. Carried at that speed the other way, the
 //! foot stays where it stands.
 
-use super::Motion;
+use super::{Motion, Poses, span};
 use crate::base::DVec3;
 use crate::error::Result;
 
@@ -63,21 +63,20 @@ pub fn gait(motion: &dyn Motion, from: f64, to: f64) -> Result<Option<Gait>> {
     if step.is_nan() || step <= 0.0 || motion.vertex_count() == 0 {
         return Ok(None);
     }
-    let mut pose = Vec::new();
+    let time = |number: usize| from + step * number as f64;
+    let mut poses = Poses::start(motion, from)?;
     let (mut lows, mut height) = (Vec::with_capacity(count + 1), 0.0f64);
     for number in 0..=count {
-        motion.pose(from + step * number as f64, &mut pose)?;
-        let (low, high) = extent(&pose);
-        lows.push(low);
-        height = height.max(high - low);
+        let (low, high) = span(poses.go_to(time(number))?.1);
+        lows.push(low.y);
+        height = height.max(high.y - low.y);
     }
     let near = STANDS * height;
     let level = part_of(lows.clone(), REACHED) + near;
     let mut velocities = Vec::new();
-    let mut before = Vec::new();
-    motion.pose(from, &mut before)?;
+    poses.go_to(from)?;
     for number in 1..=count {
-        motion.pose(from + step * number as f64, &mut pose)?;
+        let (before, pose) = poses.go_to(time(number))?;
         let (low, lower) = (lows[number - 1], lows[number]);
         let stands = |(p, q): &(&DVec3, &DVec3)| {
             let way = *q - *p;
@@ -85,14 +84,13 @@ pub fn gait(motion: &dyn Motion, from: f64, to: f64) -> Result<Option<Gait>> {
             p.y <= low + near && q.y <= lower + near && way.y.abs() <= (LEVEL * along).max(STILL * near)
         };
         if low.max(lower) <= level {
-            let standing = before.iter().zip(&pose).filter(stands);
+            let standing = before.iter().zip(pose).filter(stands);
             let (sum, parts) = standing.fold((DVec3::zeros(), 0), |(sum, n), (p, q)| (sum + (q - p), n + 1));
             if parts > 0 {
                 let mean = sum / (f64::from(parts) * step);
                 velocities.push(DVec3::new(mean.x, 0.0, mean.z));
             }
         }
-        std::mem::swap(&mut before, &mut pose);
     }
     let lowest = lows.into_iter().fold(f64::INFINITY, f64::min);
     let standing = velocities.len() as f64 / count as f64;
@@ -103,10 +101,6 @@ pub fn gait(motion: &dyn Motion, from: f64, to: f64) -> Result<Option<Gait>> {
     let velocity = DVec3::new(middle(|v| v.x), 0.0, middle(|v| v.z));
     let spread = part_of(velocities.iter().map(|v| (v - velocity).norm()).collect(), 0.5);
     Ok(Some(Gait { velocity, spread, standing, lowest, height }))
-}
-
-fn extent(pose: &[DVec3]) -> (f64, f64) {
-    pose.iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), p| (low.min(p.y), high.max(p.y)))
 }
 
 /// The number that a part of some numbers is not above: the median for a half.

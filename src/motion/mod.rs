@@ -1,15 +1,19 @@
 //! Things that move: a fixed set of triangles whose vertices have a position at every time.
 
+mod drawn;
 mod gait;
 mod gltf;
 mod morph;
+mod poses;
 mod rigid;
 mod sequence;
 mod space;
 
+pub use drawn::{Drawn, missing_uvs};
 pub use gait::{Gait, gait};
 pub use gltf::{Character, Contents, Play};
 pub use morph::Morph;
+pub use poses::{Poses, span};
 pub use rigid::{Key, Keys, Placed, Rigid};
 pub use sequence::MeshSequence;
 pub use space::{Space, Up};
@@ -31,15 +35,29 @@ pub trait Motion: Send + Sync {
     /// What a file read on demand reports.
     fn pose(&self, time: f64, out: &mut Vec<DVec3>) -> Result<()>;
 
-    /// Writes the vertices' mean velocities (m/s) from `time` to `time + step` (s) into `out` (cleared first):
+    /// The mesh as its file has it: what is written, while the triangles above are what sweeps the snow. They may join
+    /// vertices that always move together, and leave out those without a triangle.
+    fn drawn(&self) -> Drawn<'_> {
+        Drawn { vertices: self.vertex_count(), triangles: self.triangles(), uvs: None }
+    }
+
+    /// As [`Motion::pose`], for the vertices of [`Motion::drawn`].
+    ///
+    /// # Errors
+    /// As [`Motion::pose`].
+    fn drawn_pose(&self, time: f64, out: &mut Vec<DVec3>) -> Result<()> {
+        self.pose(time, out)
+    }
+
+    /// Writes the mean velocities (m/s) of the drawn vertices from `time` to `time + step` (s) into `out` (cleared first):
     /// what carries each vertex from one pose to the other. `step` may be negative, not 0.
     ///
     /// # Errors
     /// As [`Motion::pose`].
     fn velocities(&self, time: f64, step: f64, out: &mut Vec<DVec3>) -> Result<()> {
         let mut before = Vec::new();
-        self.pose(time, &mut before)?;
-        self.pose(time + step, out)?;
+        self.drawn_pose(time, &mut before)?;
+        self.drawn_pose(time + step, out)?;
         out.iter_mut().zip(&before).for_each(|(after, before)| *after = (*after - before) / step);
         Ok(())
     }

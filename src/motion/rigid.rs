@@ -2,8 +2,9 @@
 
 use nalgebra::{Matrix3, Rotation3};
 
-use super::{Motion, Space};
-use crate::base::{DVec3, TriMesh};
+use super::drawn::Faces;
+use super::{Drawn, Motion, Space};
+use crate::base::{DVec3, PolygonMesh, TriMesh};
 use crate::error::{Error, Result};
 
 /// A pose at a time: turned about x, then y, then z through the object's origin, then moved.
@@ -137,7 +138,8 @@ fn turned(turn: DVec3) -> Rotation3<f64> {
 
 /// A mesh that moves rigidly.
 pub struct Rigid {
-    triangles: Vec<[u32; 3]>,
+    faces: Faces,
+    /// All vertices of the mesh.
     positions: Vec<DVec3>,
     keys: Keys,
 }
@@ -145,21 +147,38 @@ pub struct Rigid {
 impl Rigid {
     /// A mesh (m, in its own space) and its keys; without keys it stands still.
     pub fn new(mesh: TriMesh, keys: Keys) -> Self {
-        let positions = mesh.positions.iter().map(|p| p.cast()).collect();
-        Self { triangles: mesh.triangles, positions, keys }
+        let mut polygons = PolygonMesh { positions: mesh.positions, ..PolygonMesh::default() };
+        mesh.triangles.iter().for_each(|triangle| polygons.push(*triangle));
+        Self::of_polygons(polygons, keys)
+    }
+
+    /// As [`Rigid::new`], for the mesh of a file: vertices without a face move too, but sweep nothing.
+    pub fn of_polygons(polygons: PolygonMesh, keys: Keys) -> Self {
+        let (faces, positions) = Faces::new(polygons);
+        Self { faces, positions: positions.iter().map(|p| p.cast()).collect(), keys }
     }
 }
 
 impl Motion for Rigid {
     fn triangles(&self) -> &[[u32; 3]] {
-        &self.triangles
+        self.faces.triangles()
     }
 
     fn vertex_count(&self) -> usize {
-        self.positions.len()
+        self.faces.count()
     }
 
     fn pose(&self, time: f64, out: &mut Vec<DVec3>) -> Result<()> {
+        self.drawn_pose(time, out)?;
+        self.faces.keep_moving(out);
+        Ok(())
+    }
+
+    fn drawn(&self) -> Drawn<'_> {
+        self.faces.drawn()
+    }
+
+    fn drawn_pose(&self, time: f64, out: &mut Vec<DVec3>) -> Result<()> {
         let (rotation, at) = self.keys.at(time);
         out.clear();
         out.extend(self.positions.iter().map(|p| rotation * p + at));
@@ -187,6 +206,11 @@ impl Placed {
     pub fn new(inner: Box<dyn Motion>, space: Space, keys: Keys) -> Self {
         Self { inner, space, keys }
     }
+
+    fn place(&self, time: f64, places: &mut [DVec3]) {
+        let (rotation, at) = self.keys.at(time);
+        places.iter_mut().for_each(|p| *p = rotation * self.space.place(*p) + at);
+    }
 }
 
 impl Motion for Placed {
@@ -200,8 +224,17 @@ impl Motion for Placed {
 
     fn pose(&self, time: f64, out: &mut Vec<DVec3>) -> Result<()> {
         self.inner.pose(time, out)?;
-        let (rotation, at) = self.keys.at(time);
-        out.iter_mut().for_each(|p| *p = rotation * self.space.place(*p) + at);
+        self.place(time, out);
+        Ok(())
+    }
+
+    fn drawn(&self) -> Drawn<'_> {
+        self.inner.drawn()
+    }
+
+    fn drawn_pose(&self, time: f64, out: &mut Vec<DVec3>) -> Result<()> {
+        self.inner.drawn_pose(time, out)?;
+        self.place(time, out);
         Ok(())
     }
 

@@ -3,7 +3,8 @@
 use std::path::PathBuf;
 use std::sync::{Arc, Mutex, OnceLock};
 
-use super::Motion;
+use super::drawn::Faces;
+use super::{Drawn, Motion};
 use crate::base::{DVec3, PolygonMesh, Vec3};
 use crate::error::{Error, Result};
 use crate::io::mesh;
@@ -21,9 +22,9 @@ pub struct MeshSequence {
     fps: f64,
     /// Shot frame = file frame + offset.
     offset: f64,
-    /// Polygons of the first frame, and their triangles: those of all frames.
+    /// Polygons of the first frame: those of all frames, with their texture coordinates.
     polygons: PolygonMesh,
-    triangles: Vec<[u32; 3]>,
+    faces: Faces,
     first_path: PathBuf,
     /// What the files held when they were read.
     seen: Arc<Seen>,
@@ -57,11 +58,12 @@ impl MeshSequence {
             return Err(Error::file(missing, "the frame is missing from the sequence"));
         }
         let first_path = pattern.path(first);
-        let polygons = mesh::parse_polygons(&first_path, &seen.read(&first_path)?)?;
-        let triangles = polygons.triangles();
-        let kept = Mutex::new(vec![(first, Arc::new(polygons.positions.clone()))]);
+        let mut polygons = mesh::parse_polygons(&first_path, &seen.read(&first_path)?)?;
+        let (faces, positions) = Faces::new(polygons.clone());
+        polygons.uvs = None;
+        let kept = Mutex::new(vec![(first, Arc::new(positions))]);
         let goes_on = OnceLock::new();
-        Ok(Self { pattern, first, last, fps, offset, polygons, triangles, first_path, seen, goes_on, kept })
+        Ok(Self { pattern, first, last, fps, offset, polygons, faces, first_path, seen, goes_on, kept })
     }
 
     fn frame(&self, frame: i32) -> Result<Arc<Vec<Vec3>>> {
@@ -121,14 +123,24 @@ impl MeshSequence {
 
 impl Motion for MeshSequence {
     fn triangles(&self) -> &[[u32; 3]] {
-        &self.triangles
+        self.faces.triangles()
     }
 
     fn vertex_count(&self) -> usize {
-        self.polygons.positions.len()
+        self.faces.count()
     }
 
     fn pose(&self, time: f64, out: &mut Vec<DVec3>) -> Result<()> {
+        self.drawn_pose(time, out)?;
+        self.faces.keep_moving(out);
+        Ok(())
+    }
+
+    fn drawn(&self) -> Drawn<'_> {
+        self.faces.drawn()
+    }
+
+    fn drawn_pose(&self, time: f64, out: &mut Vec<DVec3>) -> Result<()> {
         let frame = time * self.fps - self.offset;
         // The frame after the last is looked at only when it is asked for.
         let last = if frame > f64::from(self.last) + 1e-6 { self.end() } else { self.last };

@@ -9,6 +9,7 @@ use super::{BaseMode, Inputs, Layer, Object, Role, Scene, inputs, memory};
 use crate::base::{DVec3, faults};
 use crate::context::Context;
 use crate::error::{Error, Result};
+use crate::motion::{Motion, Poses, span};
 use crate::snow::base_layer::Reach;
 use crate::snow::base_layer::initial::thin;
 use crate::sweep::{Body, REACH};
@@ -23,6 +24,13 @@ const BYTES_PER_LEAF: f64 = BYTES_PER_COLUMN * 64.0 / 3.2;
 /// Bytes for each vertex of an object in a .usda and a .ply file.
 const USDA_PER_VERTEX: f64 = 110.0;
 const PLY_PER_VERTEX: f64 = 50.0;
+/// Bytes for texture coordinates, and for a corner's index into them.
+const USDA_PER_PLACE: f64 = 20.0;
+const USDA_PER_INDEX: f64 = 7.0;
+const PLY_PER_PLACE: f64 = 8.0;
+/// How far a body turns between two looks at its way (radians), and most looks between two of its kinks.
+const TURN: f64 = std::f64::consts::PI / 6.0;
+const MOST_PARTS: f64 = 1000.0;
 /// A character taller than this (m), or smaller, is likely in another unit.
 const TALL: f64 = 20.0;
 const SMALL: f64 = 0.02;
@@ -67,7 +75,7 @@ pub struct ObjectReport {
     pub size_m: [f64; 3],
     /// Least and greatest place over the shot (m).
     pub bounds_m: [[f64; 3]; 2],
-    /// Greatest speed of a vertex from frame to frame (m/s), and the frame that ends that step.
+    /// Greatest speed of a vertex on its way from frame to frame (m/s), and the frame that ends that step.
     pub fastest_m_per_s: f64,
     /// See [`ObjectReport::fastest_m_per_s`].
     pub fastest_frame: i32,
@@ -100,7 +108,7 @@ struct Extent {
     high: DVec3,
     /// Its lowest vertex.
     lowest: DVec3,
-    /// Greatest distance that a vertex moved since the frame before (m).
+    /// Longest way of a vertex since the frame before (m).
     moved: f64,
 }
 
@@ -121,6 +129,7 @@ pub fn check(ctx: &Context, scene: &Scene, inputs: &Inputs) -> Result<Report> {
     for ((index, object), body) in colliders.zip(&inputs.bodies) {
         let extents = ctx.stage("inputs", || extents(ctx, scene, body))?;
         warnings.extend(out_of_reach(ctx, scene, inputs, body, &extents)?);
+        warnings.extend(too_fast(scene, body));
         let mut told = report(scene, index, object, body, &extents, area.zip(top), &mut warnings);
         told.holes = holes(scene, body)?;
         told.deepest = relief.as_ref().and_then(|relief| deepest(relief, &extents));
@@ -149,28 +158,53 @@ pub fn check(ctx: &Context, scene: &Scene, inputs: &Inputs) -> Result<Report> {
 fn extents(ctx: &Context, scene: &Scene, body: &Body) -> Result<Vec<Extent>> {
     let frames: Vec<i32> = scene.shot.frames.iter().collect();
     let of_run = |run: &[i32]| -> Result<Vec<Extent>> {
-        let (mut pose, mut before) = (Vec::new(), Vec::new());
         let at = |frame: i32| f64::from(frame) / scene.shot.fps;
         // Its first frame is compared with the one before it, if the shot has that.
-        body.motion().pose(at((run[0] - 1).max(scene.shot.frames.first)), &mut before)?;
+        let mut time = at((run[0] - 1).max(scene.shot.frames.first));
+        let mut poses = Poses::start(body.motion(), time)?;
+        let mut ways = vec![0.0; body.motion().vertex_count()];
         let mut out = Vec::with_capacity(run.len());
         for &frame in run {
-            ctx.check()?;
-            body.motion().pose(at(frame), &mut pose)?;
-            let start = (DVec3::repeat(f64::INFINITY), DVec3::repeat(f64::NEG_INFINITY));
-            let (low, high) = pose.iter().fold(start, |(low, high), p| (low.inf(p), high.sup(p)));
+            ways.fill(0.0);
+            for moment in moments(body.motion(), time, at(frame)) {
+                ctx.check()?;
+                let (before, pose) = poses.go_to(moment)?;
+                let pairs = ways.iter_mut().zip(pose.iter().zip(before));
+                pairs.for_each(|(way, (p, q))| *way += (p - q).norm());
+            }
+            time = at(frame);
+            let (low, high) = span(poses.now());
             let lower = |a: DVec3, b: &DVec3| if b.y < a.y { *b } else { a };
-            let lowest = pose.iter().fold(DVec3::repeat(f64::INFINITY), lower);
-            let pairs = pose.iter().zip(&before);
-            let moved =
-                pairs.map(|(p, q): (&DVec3, &DVec3)| (p - q).norm_squared()).fold(0.0, f64::max).sqrt();
+            let lowest = poses.now().iter().fold(DVec3::repeat(f64::INFINITY), lower);
+            let moved = ways.iter().copied().fold(0.0, f64::max);
             out.push(Extent { frame, low, high, lowest, moved });
-            std::mem::swap(&mut pose, &mut before);
         }
         Ok(out)
     };
     let runs: Vec<Vec<Extent>> = frames.par_chunks(RUN).map(of_run).collect::<Result<_>>()?;
     Ok(runs.concat())
+}
+
+/// Times up to `to` (s) at which a motion is looked at after `from`: its kinks, and between them as many as its turns need.
+fn moments(motion: &dyn Motion, from: f64, to: f64) -> Vec<f64> {
+    let mut out = Vec::new();
+    let mut begin = from;
+    for end in motion.breaks(from, to).into_iter().chain([to]) {
+        let parts = (motion.turning(begin, end) / TURN).ceil().clamp(1.0, MOST_PARTS);
+        out.extend((1..parts as usize).map(|part| begin + (end - begin) * part as f64 / parts));
+        out.push(end);
+        begin = end;
+    }
+    out
+}
+
+/// The first frame whose step turns a body too far to be made.
+fn too_fast(scene: &Scene, body: &Body) -> Option<String> {
+    let time = |frame: i32| f64::from(frame) / scene.shot.fps;
+    scene.shot.frames.iter().skip(1).find_map(|frame| {
+        let error = body.turning(time(frame - 1), time(frame)).err()?;
+        Some(format!("frame {frame} cannot be made: {error}"))
+    })
 }
 
 /// The first frame that a run could not make because a body that touches the snow reaches too far from it.
@@ -328,10 +362,17 @@ fn disk(scene: &Scene, inputs: &Inputs, whole: f64) -> u64 {
         (true, BaseMode::Full) => whole * frames,
         (true, BaseMode::Delta) => whole,
     };
-    let vertices: usize = inputs.bodies.iter().map(|body| body.motion().vertex_count()).sum();
-    let per_vertex = if output.objects_usd { USDA_PER_VERTEX } else { 0.0 }
-        + if output.objects_ply { PLY_PER_VERTEX } else { 0.0 };
-    let objects = vertices as f64 * per_vertex * frames;
+    let objects = inputs.bodies.iter().map(|body| {
+        let drawn = body.motion().drawn();
+        let vertices = drawn.vertices as f64;
+        let (places, corners) = drawn.uvs.map_or((0.0, 0.0), |uvs| {
+            (uvs.places.len() as f64, uvs.corners.as_ref().map_or(0.0, |corners| corners.len() as f64))
+        });
+        let usda = vertices * USDA_PER_VERTEX + places * USDA_PER_PLACE + corners * USDA_PER_INDEX;
+        let ply = vertices * PLY_PER_VERTEX + places.max(corners) * PLY_PER_PLACE;
+        f64::from(output.objects_usd) * usda + f64::from(output.objects_ply) * ply
+    });
+    let objects = objects.sum::<f64>() * frames;
     (base + objects + frames * BYTES_PER_CHANGE) as u64
 }
 

@@ -6,15 +6,15 @@ use std::sync::Arc;
 use super::objects::is_character;
 use super::{Ground, Layer, Object, Role, Scene};
 use crate::base::mesh::{farthest, too_far as far_mesh};
-use crate::base::{DVec3, PolygonMesh, TriMesh};
+use crate::base::{DVec3, TriMesh};
 use crate::context::Context;
 use crate::error::{Error, Result};
 use crate::io::seen::Seen;
 use crate::io::sequence::Pattern;
 use crate::io::{hash, mesh};
-use crate::motion::{Character, Key, Keys, MeshSequence, Motion, Placed, Play, Rigid};
+use crate::motion::{Character, Key, Keys, MeshSequence, Motion, Placed, Play, Rigid, missing_uvs};
 use crate::snow::base_layer::initial::{self, Cover};
-use crate::sweep::{Body, REACH};
+use crate::sweep::{self, Body, REACH};
 use crate::vdb::{FloatGrid, GridClass, file};
 
 /// Half width of the snow's narrow band (cells).
@@ -202,17 +202,14 @@ impl Inputs {
 
 /// Says that a static object lies too far away.
 pub(super) fn too_far(scene: &Scene, index: usize, far: f64) -> String {
-    let (cell, name) = (scene.snow.cell, super::file::name(&scene.objects[index].file));
-    format!(
-        "object {} ({name}), static, reaches {far:.0} m from the middle of the ground; cells of {cell} m have a reach of \
-         {:.0} m",
-        index + 1,
-        REACH * cell
-    )
+    let name = super::file::name(&scene.objects[index].file);
+    let what = format!("object {} ({name}), static, reaches", index + 1);
+    sweep::too_far(&what, far, "the middle of the ground", scene.snow.cell)
 }
 
 fn read_mesh(path: &Path, seen: &Seen) -> Result<TriMesh> {
-    mesh::parse_polygons(path, &seen.read(path)?).map(PolygonMesh::into_triangles)
+    // Vertices that no face names are no part of the snow.
+    mesh::parse_polygons(path, &seen.read(path)?).map(|mesh| mesh.into_triangles().without_unused())
 }
 
 fn ground(scene: &Scene, seen: &Seen) -> Result<initial::Ground> {
@@ -277,7 +274,10 @@ fn motion(
     let keys = Keys::new(keys.collect())?.with_ease(object.ease);
     let own: Box<dyn Motion> = match Pattern::parse(&object.file) {
         None if is_character(&object.file) => Box::new(character(scene, object, seen)?),
-        None => Box::new(Rigid::new(read_mesh(&object.file, seen)?, Keys::default())),
+        None => {
+            let polygons = mesh::parse_polygons(&object.file, &seen.read(&object.file)?)?;
+            Box::new(Rigid::of_polygons(polygons, Keys::default()))
+        }
         Some(pattern) => {
             let first = (f64::from(scene.shot.frames.first) - object.offset).floor() as i32;
             let last = (f64::from(scene.shot.frames.last) - object.offset).ceil() as i32;
@@ -288,6 +288,10 @@ fn motion(
     own.pose(f64::from(scene.shot.frames.first) / fps, &mut pose)?;
     let name = object.file.display().to_string();
     warnings.extend(far_mesh(&name, farthest(pose.iter()), object.space.scale, scene.snow.cell));
+    if scene.output.objects_usd || scene.output.objects_ply {
+        let missing = own.drawn().uvs.map_or(0, |uvs| uvs.missing);
+        warnings.extend((missing > 0).then(|| missing_uvs(&name, missing)));
+    }
     Ok(Box::new(Placed::new(own, object.space, keys)))
 }
 

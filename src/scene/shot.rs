@@ -79,7 +79,7 @@ impl<'a> Run<'a> {
             self.make_frames(ctx, start, &todo, done)?;
         }
         if self.scene.output.usd {
-            stage::write(self.scene, &self.cache.stored, &mut self.cache.own)?;
+            stage::write(self.scene, &self.inputs.bodies, &self.cache.stored, &mut self.cache.own)?;
         }
         self.cache.own.finish()
     }

@@ -5,13 +5,14 @@ use super::stored::Stored;
 use super::{BaseMode, Role, Scene};
 use crate::error::Result;
 use crate::io::usd;
+use crate::sweep::Body;
 
 /// Writes the stage with the frames that are there, by relative paths. The base of a cache of changes is left out: its
 /// files are no whole volumes.
 ///
 /// # Errors
 /// What the operating system reports.
-pub(super) fn write(scene: &Scene, stored: &Stored, files: &mut Own) -> Result<()> {
+pub(super) fn write(scene: &Scene, bodies: &[Body], stored: &Stored, files: &mut Own) -> Result<()> {
     let (frames, fps) = (scene.shot.frames, scene.shot.fps);
     let relative = |kind: &str| -> Vec<(i32, String)> {
         let files = stored.files(kind).into_iter().filter(|(frame, _)| frames.contains(*frame));
@@ -31,9 +32,12 @@ pub(super) fn write(scene: &Scene, stored: &Stored, files: &mut Own) -> Result<(
     let names = object_names(scene);
     let objects = relative("objects").into_iter().filter(|(_, file)| file.ends_with(".usda"));
     let clips = usd::Clips { kind: "objects", frames: objects.map(|(frame, _)| frame).collect() };
-    let clips = (!clips.frames.is_empty()).then_some((&clips, &names[..]));
+    let meshes = names.iter().zip(bodies);
+    let meshes: Vec<usd::MeshPrim> =
+        meshes.map(|(name, body)| usd::MeshPrim { name, uvs: body.motion().drawn().uvs }).collect();
+    let clips = (!clips.frames.is_empty()).then_some((&clips, &meshes[..]));
     if clips.is_some() {
-        let text = usd::clip_manifest("objects", &names);
+        let text = usd::clip_manifest("objects", &meshes);
         files.write(own::OBJECTS, text.as_bytes())?;
     }
     let time = usd::StageTime { first: frames.first, last: frames.last, fps };

@@ -7,11 +7,12 @@ use serde_json::json;
 use super::stage::object_names;
 use super::stored::{STAGE, state_path};
 use super::{BaseMode, Scene};
-use crate::base::{DVec3, TriMesh};
+use crate::base::{DVec3, TriMesh, Uvs};
 use crate::context::{Context, StageTime};
 use crate::error::{Error, Result};
 use crate::io::manifest::{Keeps, Manifest, Written};
 use crate::io::{atomic, mesh, sealed, usd};
+use crate::motion::Drawn;
 use crate::snow::base_layer::{Changes, Grids, StepReport};
 use crate::sweep::Body;
 use crate::vdb::file::{WriteOptions, to_bytes};
@@ -165,27 +166,30 @@ impl<'a> Writer<'a> {
         let (mut pose, mut velocities) = (Vec::<DVec3>::new(), Vec::<DVec3>::new());
         let mut meshes = Vec::new();
         for body in self.bodies {
-            body.motion().pose(f64::from(frame) / fps, &mut pose)?;
+            body.motion().drawn_pose(f64::from(frame) / fps, &mut pose)?;
             body.motion().velocities_ahead(f64::from(frame) / fps, 1.0 / fps, &mut velocities)?;
             meshes.push((usd::to_floats(&pose), usd::to_floats(&velocities)));
         }
+        let drawn: Vec<Drawn> = self.bodies.iter().map(|body| body.motion().drawn()).collect();
         if self.scene.output.objects_ply {
             let (mut all, mut velocities) = (TriMesh::default(), Vec::new());
-            for (body, (positions, speeds)) in self.bodies.iter().zip(&meshes) {
-                let triangles = body.motion().triangles().to_vec();
-                all.append(&TriMesh { positions: positions.clone(), triangles });
+            for (drawn, (positions, speeds)) in drawn.iter().zip(&meshes) {
+                all.append(&TriMesh { positions: positions.clone(), triangles: drawn.triangles.to_vec() });
                 velocities.extend_from_slice(speeds);
             }
-            files.push(self.save("objects", frame, "ply", &mesh::ply_bytes(&all, &velocities))?);
+            let uvs = Uvs::joined(drawn.iter().map(|drawn| (drawn.uvs, drawn.vertices, drawn.triangles)));
+            let bytes = mesh::ply_bytes(&all, &velocities, uvs.as_ref());
+            files.push(self.save("objects", frame, "ply", &bytes)?);
         }
         if self.scene.output.objects_usd {
-            let frames = meshes.iter().zip(self.bodies.iter().zip(&self.names));
+            let frames = meshes.iter().zip(drawn.iter().zip(&self.names));
             let frames: Vec<usd::MeshFrame> = frames
-                .map(|((points, velocities), (body, name))| usd::MeshFrame {
+                .map(|((points, velocities), (drawn, name))| usd::MeshFrame {
                     name,
                     points,
                     velocities,
-                    triangles: body.motion().triangles(),
+                    triangles: drawn.triangles,
+                    uvs: drawn.uvs,
                 })
                 .collect();
             let text = usd::clip("objects", frame, fps, usd::Units::OWN, &frames);

@@ -208,18 +208,27 @@ impl Body {
         Ok(poses)
     }
 
+    /// How far it turns in a step from `from` to `to` (s), at most (radians).
+    ///
+    /// # Errors
+    /// More than 64 times round.
+    pub fn turning(&self, from: f64, to: f64) -> Result<f64> {
+        let turning = self.motion.turning(from, to);
+        if turning > MOST_TURNING {
+            return Err(Error::argument(format!(
+                "{} turns by {:.0} degrees in a step, more than {:.0}",
+                self.name().unwrap_or("an object"),
+                turning.to_degrees(),
+                MOST_TURNING.to_degrees()
+            )));
+        }
+        Ok(turning)
+    }
+
     /// Ends of the parts of an interval that poses are chosen in: the motion's kinks, and times between which it turns
     /// so little that a few looks at it show how far it strays from straight lines.
     fn ends(&self, from: f64, to: f64) -> Result<Vec<f64>> {
-        let turning = self.motion.turning(from, to);
-        if turning > MOST_TURNING {
-            let what = format!(
-                "an object turns by {:.0} degrees in a step, more than {:.0}",
-                turning.to_degrees(),
-                MOST_TURNING.to_degrees()
-            );
-            return Err(Error::argument(what));
-        }
+        self.turning(from, to)?;
         let mut ends = Vec::new();
         let mut begin = from;
         for end in self.motion.breaks(from, to).into_iter().chain([to]) {

@@ -60,13 +60,15 @@ impl Lattice {
     pub fn fix(&self, cells: DVec3) -> Result<Fixed> {
         let scaled = cells * f64::from(UNITS);
         if !(scaled.x.abs() < LIMIT && scaled.y.abs() < LIMIT && scaled.z.abs() < LIMIT) {
-            return Err(Error::argument(format!(
-                "a vertex lies {:.0} m from the work, farther than {:.0} m, the reach of cells of {} m",
-                cells.amax() * self.voxel,
-                LIMIT / f64::from(UNITS) * self.voxel,
-                self.voxel
-            )));
+            let far = cells.amax() * self.voxel;
+            return Err(Error::argument(too_far("a vertex lies", far, "the work", self.voxel)));
         }
         Ok([scaled.x.round() as i32, scaled.y.round() as i32, scaled.z.round() as i32])
     }
+}
+
+/// A sentence about what lies so far (m) from something, farther than the reach of cells of `voxel` m: "a vertex lies".
+pub fn too_far(what: &str, far: f64, from: &str, voxel: f64) -> String {
+    let reach = REACH * voxel;
+    format!("{what} {far:.0} m from {from}, farther than {reach:.0} m, the reach of cells of {voxel} m")
 }

@@ -28,7 +28,7 @@ mod winding;
 
 pub use body::{Body, Shape};
 pub use chain::{Face, Weights, Window, boundary};
-pub use lattice::{Fixed, Lattice, REACH, UNITS};
+pub use lattice::{Fixed, Lattice, REACH, UNITS, too_far};
 pub use nearest::Scratch;
 #[cfg(feature = "vdb")]
 pub use samples::{SamplesSettings, samples};

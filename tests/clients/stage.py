@@ -1,4 +1,4 @@
-"""usd-core composes a shot: volumes with their files, meshes with velocities, at three frames.
+"""usd-core composes a shot: volumes with their files, meshes with velocities and UVs, at three frames.
 
 python stage.py FOLDER FIRST LAST
 """
@@ -20,7 +20,7 @@ volume = UsdVol.Volume(stage.GetPrimAtPath("/shot/base"))
 assert volume and set(volume.GetFieldPaths()) == {"surface", "compression", "touched"}
 meshes = [UsdGeom.Mesh(prim) for prim in stage.Traverse() if prim.IsA(UsdGeom.Mesh)]
 assert meshes, "no mesh"
-checked = 0
+checked = textured = 0
 for frame in (first, (first + last) // 2, last):
     for name, path in volume.GetFieldPaths().items():
         asset = UsdVol.OpenVDBAsset(stage.GetPrimAtPath(path))
@@ -35,10 +35,20 @@ for frame in (first, (first + last) // 2, last):
         for axis in range(3):
             values = [point[axis] for point in points]
             assert (min(values), max(values)) == (low[axis], high[axis])
+        st = UsdGeom.PrimvarsAPI(mesh).GetPrimvar("st")
+        if st:
+            places = st.ComputeFlattened(frame)
+            seams = st.GetInterpolation() == UsdGeom.Tokens.faceVarying
+            assert seams or st.GetInterpolation() == UsdGeom.Tokens.vertex
+            assert len(places) == len(indices if seams else points)
+            # Those of tests/clients.rs.
+            corners = [(0.0, 0.0), (0.75, 0.0), (0.5, 1.0), (0.25, -2.0)]
+            assert not seams or all(tuple(place) == corners[i % 4] for i, place in enumerate(places)), places
+            textured += 1
         if frame < last:
             # Velocities carry the points to the next frame.
             after = mesh.GetPointsAttr().Get(frame + 1)
             worst = max((points[i] + velocities[i] / 24.0 - after[i]).GetLength() for i in range(len(points)))
             assert worst < 1e-4, worst
         checked += 1
-print(f"frazil: {checked} meshes at 3 frames, {len(volume.GetFieldPaths())} grids")
+print(f"frazil: {checked} meshes at 3 frames, {textured} with UVs, {len(volume.GetFieldPaths())} grids")

@@ -142,7 +142,7 @@ impl Args {
                         let what = format!("{}: one mesh needs --move or --turn-deg", path.display());
                         return Err(Failure::refused(what));
                     }
-                    let still = Rigid::new(io::mesh::read(path).before()?, Keys::default());
+                    let still = Rigid::of_polygons(io::mesh::read_polygons(path).before()?, Keys::default());
                     (Box::new(still) as Box<dyn Motion>, 0.0, 1.0)
                 }
             },

@@ -11,7 +11,7 @@ mod uri;
 
 use std::path::Path;
 
-use super::Motion;
+use super::{Drawn, Motion};
 use crate::base::{DVec3, TriMesh};
 use crate::error::{Error, Result};
 use crate::io::caught::caught;
@@ -159,7 +159,8 @@ impl Character {
                 parts.any(|part| part.attributes().any(|(name, _)| wanted(&name)))
             };
             let there = [
-                (has(|name| matches!(name, gltf::Semantic::TexCoords(_))), "UVs"),
+                (has(|name| matches!(name, gltf::Semantic::TexCoords(0))), "UVs"),
+                (has(|name| matches!(name, gltf::Semantic::TexCoords(1..))), "further UVs"),
                 (has(|name| matches!(name, gltf::Semantic::Normals)), "normals"),
                 (has(|name| matches!(name, gltf::Semantic::Colors(_))), "colours"),
                 (document.materials().next().is_some(), "materials"),
@@ -236,6 +237,19 @@ impl Motion for Character {
 
     fn pose(&self, time: f64, out: &mut Vec<DVec3>) -> Result<()> {
         self.pose_at_own(self.own_time(time), out);
+        Ok(())
+    }
+
+    fn drawn(&self) -> Drawn<'_> {
+        let drawn = &self.vertices.drawn;
+        Drawn { vertices: drawn.vertices.len(), triangles: &drawn.triangles, uvs: drawn.uvs.as_ref() }
+    }
+
+    fn drawn_pose(&self, time: f64, out: &mut Vec<DVec3>) -> Result<()> {
+        let mut moving = Vec::new();
+        self.pose(time, &mut moving)?;
+        out.clear();
+        out.extend(self.vertices.drawn.vertices.iter().map(|&vertex| moving[vertex as usize]));
         Ok(())
     }
 

@@ -8,7 +8,7 @@ use nalgebra::{Matrix3x4, Matrix4};
 
 use super::file::File;
 use super::nodes::{Local, matrix4};
-use crate::base::{DVec3, Vec3};
+use crate::base::{DVec3, Uvs, Vec3};
 
 /// A skin: nodes that carry vertices, and from where.
 struct Skin {
@@ -45,6 +45,20 @@ pub(super) struct Vertices {
     parts: Vec<Part>,
     pub triangles: Vec<[u32; 3]>,
     pub count: usize,
+    pub drawn: Sheet,
+}
+
+/// The vertices as the file has them: those of each primitive of each node, in its accessor's order.
+#[derive(Default)]
+pub(super) struct Sheet {
+    /// For each the vertex that moves like it.
+    pub vertices: Vec<u32>,
+    /// As many as above, in the same order, over these vertices.
+    pub triangles: Vec<[u32; 3]>,
+    /// One pair for each vertex, once a primitive has any.
+    pub uvs: Option<Uvs>,
+    /// Vertices of the node at hand that primitives share: their accessors, and where they begin.
+    shared: Vec<(Vec<usize>, usize)>,
 }
 
 impl Vertices {
@@ -86,6 +100,7 @@ impl Vertices {
                 influences: Vec::new(),
             };
             out.parts.push(part);
+            out.drawn.shared.clear();
             let mut known = HashMap::new();
             for primitive in mesh.primitives() {
                 out.add(file, &primitive, &mut known).map_err(|what| {
@@ -149,13 +164,12 @@ impl Vertices {
             Some(accessor) => file.indices::<1>(&accessor)?.into_iter().map(|[index]| index).collect(),
             None => (0..positions.len() as u32).collect(),
         };
-        let corners: Vec<u32> = indices
-            .into_iter()
-            .map(|index| numbers.get(index as usize).copied())
-            .collect::<Option<_>>()
-            .ok_or("an index names a vertex that is not there")?;
-        self.triangles.extend(triangles(primitive.mode(), &corners));
-        Ok(())
+        if indices.iter().any(|&index| index as usize >= numbers.len()) {
+            return Err("an index names a vertex that is not there".into());
+        }
+        let own = triangles(primitive.mode(), &indices);
+        self.triangles.extend(own.iter().map(|triangle| triangle.map(|index| numbers[index as usize])));
+        self.drawn.add(file, primitive, &numbers, &own)
     }
 
     /// Turns round the triangles of parts whose node mirrors them, as glTF asks.
@@ -163,8 +177,11 @@ impl Vertices {
         for part in self.parts.iter().filter(|part| part.skin.is_none()) {
             if globals[part.node].fixed_view::<3, 3>(0, 0).determinant() < 0.0 {
                 let own = part.first as u32..(part.first + part.rest.len()) as u32;
-                let mirrored = self.triangles.iter_mut().filter(|triangle| own.contains(&triangle[0]));
-                mirrored.for_each(|triangle| triangle.swap(1, 2));
+                let both = self.triangles.iter_mut().zip(&mut self.drawn.triangles);
+                both.filter(|(triangle, _)| own.contains(&triangle[0])).for_each(|(triangle, drawn)| {
+                    triangle.swap(1, 2);
+                    drawn.swap(1, 2);
+                });
             }
         }
     }
@@ -201,6 +218,61 @@ impl Vertices {
                 });
             }
         }
+    }
+}
+
+impl Sheet {
+    /// Adds a primitive: its vertices, by what moves like them, and its triangles over those.
+    fn add(
+        &mut self,
+        file: &File,
+        primitive: &gltf::Primitive,
+        numbers: &[u32],
+        triangles: &[[u32; 3]],
+    ) -> Result<(), String> {
+        let places = primitive.get(&Semantic::TexCoords(0));
+        let named = [primitive.get(&Semantic::Positions), places.clone()];
+        let accessors: Vec<usize> = named.iter().flatten().map(gltf::Accessor::index).collect();
+        let is_same = |(others, begin): &&(Vec<usize>, usize)| {
+            *others == accessors && self.vertices.get(*begin..*begin + numbers.len()) == Some(numbers)
+        };
+        let first = match self.shared.iter().find(is_same) {
+            Some((_, begin)) => *begin,
+            None => {
+                let begin = self.vertices.len();
+                self.vertices.extend_from_slice(numbers);
+                self.add_places(file, places, begin)?;
+                self.shared.push((accessors, begin));
+                begin
+            }
+        };
+        self.triangles.extend(triangles.iter().map(|triangle| triangle.map(|index| index + first as u32)));
+        Ok(())
+    }
+
+    /// Texture coordinates of the vertices from `begin` on: their own ones point down from the top.
+    fn add_places(
+        &mut self,
+        file: &File,
+        places: Option<gltf::Accessor>,
+        begin: usize,
+    ) -> Result<(), String> {
+        let count = self.vertices.len() - begin;
+        let Some(places) = places else {
+            if let Some(uvs) = &mut self.uvs {
+                uvs.places.resize(self.vertices.len(), [0.0; 2]);
+                uvs.missing += count;
+            }
+            return Ok(());
+        };
+        let places = file.rows::<2>(&places)?;
+        if places.len() != count {
+            return Err("has not texture coordinates for every vertex".into());
+        }
+        let before = || Uvs { places: vec![[0.0; 2]; begin], corners: None, missing: begin };
+        let uvs = self.uvs.get_or_insert_with(before);
+        uvs.places.extend(places.into_iter().map(|[u, v]| [u, 1.0 - v]));
+        Ok(())
     }
 }
 

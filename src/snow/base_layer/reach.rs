@@ -5,7 +5,7 @@
 use crate::base::DVec3;
 use crate::context::Context;
 use crate::error::{Error, Result};
-use crate::sweep::{Body, Lattice, REACH, UNITS, Window};
+use crate::sweep::{Body, Lattice, REACH, UNITS, Window, too_far};
 
 /// Parts of an interval at which poses are looked at; no motion that turns evenly looks the same at all of them.
 const MOMENTS: [f64; 12] = [0.0, 0.07, 0.19, 0.26, 0.38, 0.45, 0.57, 0.64, 0.76, 0.83, 0.95, 1.0];
@@ -104,12 +104,7 @@ impl Reach {
 
     fn too_far(&self, body: &Body, farthest: f64) -> Error {
         let cell = self.lattice.voxel;
-        Error::argument(format!(
-            "{} touches the snow while a part of it lies {:.0} m from the snow's middle, farther than {:.0} m, the reach \
-             of cells of {cell} m",
-            body.name().unwrap_or("a body"),
-            farthest * cell,
-            REACH * cell,
-        ))
+        let what = format!("{} touches the snow while a part of it lies", body.name().unwrap_or("a body"),);
+        Error::argument(too_far(&what, farthest * cell, "the snow's middle", cell))
     }
 }
