@@ -247,8 +247,11 @@ fn plys_keep_the_uvs_of_their_vertices_and_of_their_faces() {
     same_objects(folder, "seams", &read, true);
 }
 
+type Places = Vec<[f32; 3]>;
+type TextureCoordinates = Vec<[f32; 2]>;
+
 /// A cube in a .gltf file: four vertices for each face, whose triangles name them backwards; every face its own UVs.
-fn gltf(folder: &Path) -> (Vec<[f32; 3]>, Vec<[f32; 2]>, Vec<[usize; 3]>) {
+fn gltf(folder: &Path) -> (Places, TextureCoordinates, Vec<[usize; 3]>) {
     let (mut places, mut uvs, mut triangles) = (Vec::new(), Vec::new(), Vec::new());
     for axis in 0..3 {
         for side in [-0.2f32, 0.2] {

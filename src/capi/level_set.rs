@@ -410,11 +410,8 @@ fn check_reach(bodies: &[Body], dt: f64, voxel: f64) -> Result<()> {
             let first = *first.get_or_insert(pose[0]);
             let far = pose.iter().map(|p| (p - first).amax()).fold(0.0, f64::max);
             if far > REACH * voxel {
-                let reach = REACH * voxel;
-                return Err(Error::argument(format!(
-                    "body {index}: a vertex lies {far:.0} m from the first one, farther than {reach:.0} m, the reach of \
-                     voxels of {voxel} m"
-                )));
+                let what = format!("body {index}: a vertex lies");
+                return Err(Error::argument(too_far(&what, far, "the first one", voxel)));
             }
         }
     }

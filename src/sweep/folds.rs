@@ -251,7 +251,7 @@ impl Passage {
         let [u, v, w] = self.weights.map(|row| row.dot(&way));
         let first = 1.0 - u - v - w;
         let [a, b, c, d] = self.later;
-        (u >= 0.0 && v >= 0.0 && w >= 0.0 && first >= 0.0).then(|| first * a + u * b + v * c + w * d)
+        (u >= 0.0 && v >= 0.0 && w >= 0.0 && first >= 0.0).then_some(first * a + u * b + v * c + w * d)
     }
 }
 
