@@ -411,7 +411,7 @@ fn check_reach(bodies: &[Body], dt: f64, voxel: f64) -> Result<()> {
             let far = pose.iter().map(|p| (p - first).amax()).fold(0.0, f64::max);
             if far > REACH * voxel {
                 let what = format!("body {index}: a vertex lies");
-                return Err(Error::argument(too_far(&what, far, "the first one", voxel)));
+                return Err(Error::argument(sweep::too_far(&what, far, "the first one", voxel)));
             }
         }
     }
