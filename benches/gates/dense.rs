@@ -64,6 +64,17 @@ impl Dense {
         if self.is_inside(p, &mut hint) { -self.depth(p, limit, hint) } else { self.gap(p, limit) }
     }
 
+    /// Whether a point lies inside by more than a depth (m).
+    pub fn is_deep(&self, p: DVec3, depth: f64) -> bool {
+        let mut hint = 0;
+        self.is_inside(p, &mut hint) && self.depth(p, 2.0 * depth, hint) > depth
+    }
+
+    /// Whether a point lies outside by more than a gap (m).
+    pub fn is_far(&self, p: DVec3, gap: f64) -> bool {
+        !self.is_inside(p, &mut 0) && self.gap(p, 2.0 * gap) > gap
+    }
+
     /// Whether a point lies in any pose; `hint` is the one that was right last.
     fn is_inside(&self, p: DVec3, hint: &mut usize) -> bool {
         let holds = |pose: &Pose| self.shapes[pose.shape].holds(pose.local(p));

@@ -3,10 +3,13 @@
 use std::time::Instant;
 
 use frazil::base::{DVec3, cpu};
-use frazil::sweep::{self, Settings};
+use frazil::sweep::{self, Body, Settings};
+use frazil::vdb::{FloatGrid, level_set};
 use rayon::prelude::*;
 
+use crate::common::elbow::Elbow;
 use crate::common::shapes::globe;
+use crate::dense::Dense;
 use crate::harness::{Bound, Harness, median};
 use crate::oracle::MovingBox;
 use crate::scenes::{self, context};
@@ -16,11 +19,16 @@ const DEGREES: [f64; 9] = [30.0, 90.0, 180.0, 270.0, 350.0, 360.0, 370.0, 719.0,
 const CELLS: [f64; 2] = [0.005, 0.02];
 /// Poses of one turn.
 const POSES: f64 = 4096.0;
+/// Poses of a bend.
+const FOLDED_POSES: usize = 193;
 
 /// All of them.
 pub fn run(h: &mut Harness) {
     if h.wants("reliability.spin_missed") || h.wants("reliability.spin_fat") {
         spin(h);
+    }
+    if h.wants("reliability.spin_folds") {
+        folds(h);
     }
     for (degrees, must, aim) in [(45.0, 2.0, 0.7), (90.0, 4.0, 1.3), (360.0, 16.0, 5.0)] {
         let name = format!("reliability.spin_cost_{degrees}");
@@ -67,6 +75,45 @@ fn spin(h: &mut Harness) {
     let note = format!("{voxels} voxels; a bar and a box by 30 to 1440 degrees, cells of 5 and 20 mm");
     h.gate("reliability.spin_missed", missed as f64, "voxels", Bound::Most(0.0), Bound::Open, &note);
     h.gate("reliability.spin_fat", fat as f64, "voxels", Bound::Most(0.0), Bound::Open, &note);
+}
+
+/// A skin whose elbow folds inside out while it bends: against where a pose winds around, and in sub-steps.
+fn folds(h: &mut Harness) {
+    const CELL: f64 = 0.004;
+    const HALF: f64 = 0.5 * CELL;
+    let ctx = context(2);
+    let (mut missed, mut fat, mut inside, mut apart) = (0, 0, 0, 0.0f64);
+    for bend in [[0.0, 2.4], [2.4, 0.6], [1.4, 2.5]] {
+        let body = || [Body::new(Box::new(Elbow::new(bend, 0.02)), 0.0).expect("a body")];
+        let sweep = |from: f64, to: f64| {
+            sweep::chain(&ctx, &body(), from, to, &Settings::new(CELL)).expect("a sweep")
+        };
+        let swept = sweep(0.0, 1.0);
+        let dense = Dense::posed(&Elbow::new(bend, 0.02), FOLDED_POSES);
+        let mut all = Vec::new();
+        each_voxel(&swept, |p, ours| all.push((p, ours)));
+        let wrong = |&(p, ours): &(DVec3, f64)| match ours > 0.0 {
+            true => [u64::from(ours < 2.9 && dense.is_deep(p, HALF)), 0, 0],
+            false => [0, u64::from(dense.is_far(p, HALF)), 1],
+        };
+        let sum = |a: [u64; 3], b: [u64; 3]| [0, 1, 2].map(|i| a[i] + b[i]);
+        let count = || Ok(all.par_iter().map(wrong).reduce(|| [0; 3], sum));
+        let [less, more, own] = ctx.stage("oracle", count).expect("no cancel");
+        (missed, fat, inside) = (missed + less, fat + more, inside + own);
+        let volume = |grid: &FloatGrid| level_set::measure(&ctx, grid).expect("a volume").volume;
+        let mut parts = sweep(0.0, 1.0 / 16.0);
+        for part in 1..16 {
+            let next = sweep(f64::from(part) / 16.0, f64::from(part + 1) / 16.0);
+            level_set::union(&ctx, &mut parts, next).expect("a union");
+        }
+        apart = apart.max((volume(&swept) / volume(&parts) - 1.0).abs());
+    }
+    let note = format!("{inside} voxels inside the bands; three bends of a tube");
+    h.gate("reliability.spin_folds_missed", missed as f64, "voxels", Bound::Most(0.0), Bound::Open, &note);
+    let share = fat as f64 / inside as f64 * 100.0;
+    h.gate("reliability.spin_folds_fat", share, "%", Bound::Most(0.5), Bound::Most(0.0), &note);
+    let note = "volume in one step against sixteen";
+    h.gate("reliability.spin_folds_steps", apart * 100.0, "%", Bound::Most(1.0), Bound::Most(0.1), note);
 }
 
 /// Seconds that a sphere takes to turn about its axis.

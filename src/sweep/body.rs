@@ -15,6 +15,8 @@ use crate::context::Context;
 use crate::error::{Error, Result};
 use crate::motion::Motion;
 
+/// A step's way against the length of the pieces that edges are cut into: measured, the fewest faces and the least time.
+const SHORTER: f64 = 1.5;
 /// Most steps that an interval between two kinks of a motion is split into.
 const MOST_STEPS: f64 = 1024.0;
 /// How far a body turns at most while five poses show its arcs (radians): a quarter turn.
@@ -255,8 +257,7 @@ impl Body {
         let arcs = (bend.sqrt() / tolerance).sqrt();
         let ends = [probes[0], probes[4]];
         let own = self.shape.topology.own_vertices as u32;
-        // As many as give the faces that edges sweep, cut into as many pieces as they then need, a good shape: pieces as
-        // long as a step's way.
+        // As many as give the faces that edges sweep, cut into as many pieces as they then need, a good shape.
         let twist = |edge: &[u32; 2]| {
             let error = if edge[1] < own { edge_error(&ends, *edge) } else { 0.0 };
             if error <= tolerance || !near.sees(&ends, edge) {
@@ -265,7 +266,7 @@ impl Body {
             let [i, j] = edge.map(|vertex| vertex as usize);
             let way = (ends[1][i] - ends[0][i]).norm().max((ends[1][j] - ends[0][j]).norm());
             let length = (ends[0][i] - ends[0][j]).norm().max((ends[1][i] - ends[1][j]).norm());
-            (error / tolerance * way / length).sqrt()
+            SHORTER * (error / tolerance * way / length).sqrt()
         };
         let twists =
             self.shape.topology.edges.par_iter().with_min_len(GRAIN).map(twist).reduce(|| 0.0, f64::max);

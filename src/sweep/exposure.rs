@@ -35,8 +35,8 @@ const BUNDLE: usize = 3;
 const CROWD: usize = 32;
 /// Gaps between sheets that are narrower than this (cells), and do not hold a voxel, are none.
 const CLOSED: f64 = 0.01;
-/// Least cosine between a line and the normal of a face whose plane it speaks for: one of three axes has it.
-const STEEP: f64 = 0.57;
+/// How steeply a line meets a face whose plane it speaks for, against the steepest of the three axes.
+const STEEPEST: f64 = 0.9;
 
 /// What lines through voxels see of a chain.
 pub struct Exposure {
@@ -153,8 +153,9 @@ impl Exposure {
     pub fn spots_of_bundles(&self, cells: &Cells) -> Vec<Spot> {
         let cell = |spot: &Spot| cells.of_voxel(spot.at().map(|value| value.round() as i32));
         let is_steep = |spot: &Spot| {
-            let normal = &cells.normals[spot.face as usize];
-            normal[spot.axis.index()].abs() >= STEEP * dot(normal, normal).sqrt()
+            let normal = cells.normals[spot.face as usize].map(f64::abs);
+            let most = normal.into_iter().fold(0.0, f64::max);
+            normal[spot.axis.index()] >= STEEPEST * most
         };
         let wanted = |spot: &Spot| {
             let cell = cell(spot).filter(|&cell| self.bundles[cell])?;

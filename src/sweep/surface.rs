@@ -155,9 +155,7 @@ impl Surface<'_> {
         let (v, seen) = (self.cells.faces[id].v, self.exposure.faces[id]);
         let Some(ahead) = ahead(self.cells, id) else { return seen | BURIED };
         if self.is_sliver(id) {
-            let mut said = SLIVER;
-            each_sample(&v, |at| said |= self.ask(at, ahead));
-            return said;
+            return SLIVER | self.ask(middle(&v), ahead);
         }
         let stack = self.exposure.is_stack(self.cells, voxel_of(middle(&v)));
         if stack { seen } else { seen | self.said(&v, ahead) }

@@ -51,7 +51,7 @@ fn kind_of(header: &GridInfo) -> &str {
         ("Tree_int32", "whole numbers"),
         ("Tree_int64", "64-bit whole numbers"),
         ("Tree_vec3i", "vectors of whole numbers"),
-        ("Tree_bool", "yes or no"),
+        ("Tree_bool", "booleans"),
         ("Tree_mask", "voxels without values"),
         ("Tree_ptdataidx", "points"),
     ];

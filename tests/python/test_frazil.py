@@ -251,7 +251,7 @@ class Vectors(unittest.TestCase):
             pyopenvdb.write(theirs, grids=[read, mask])
             back = frazil.load(ctx, theirs, "vel")
             np.testing.assert_array_equal(back.leaves()[1].values, leaves[1][1])
-            with self.assertRaisesRegex(frazil.Error, "holds yes or no, but floats or vectors of floats are needed"):
+            with self.assertRaisesRegex(frazil.Error, "holds booleans, but floats or vectors of floats are needed"):
                 frazil.load(ctx, theirs, "mask")
             frazil.save(ctx, [back], ours)
             self.assertEqual(pyopenvdb.read(ours, "vel").vectorType, "contravariant relative")
