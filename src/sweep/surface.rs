@@ -128,6 +128,18 @@ pub fn is_open(cells: &Cells, exposure: &Exposure, face: u32, at: Point, bundle:
     ahead(cells, face as usize).is_some_and(|ahead| ask(cells, exposure, at, ahead, bundle) == OPEN)
 }
 
+/// The parts of a facet that is not sure where they are open.
+pub fn clipped(cells: &Cells, exposure: &Exposure, facet: &Facet, bundle: &mut Bundle) -> Vec<Corners> {
+    let Some(ahead) = ahead(cells, facet.face as usize) else { return Vec::new() };
+    let mut surface = Surface { cells, exposure, bundle: std::mem::take(bundle) };
+    let (mut parts, mut out) = (vec![facet.v], Vec::new());
+    while let Some(part) = parts.pop() {
+        if is_small(&part) { surface.clip(part, ahead, &mut out) } else { parts.extend(halves(part)) }
+    }
+    *bundle = surface.bundle;
+    out.into_iter().map(|(v, _)| v).collect()
+}
+
 /// Whether a point of a face is open: the chain is absent a hair in front of it, and not behind; of a stack, [`THIN`] in
 /// front of it.
 fn ask(cells: &Cells, exposure: &Exposure, at: Point, ahead: Point, bundle: &mut Bundle) -> u8 {
@@ -182,7 +194,7 @@ impl Surface<'_> {
             _ if said == SLIVER | OPEN && seen & STACK != 0 => out.push((v, false)),
             _ if seen & LOOSE == 0 || seen & !(STACK | LOOSE) == BURIED => {}
             _ => {
-                self.cut(id, v, ahead, around, out);
+                self.cut(id, v, said & (OPEN | BURIED), ahead, around, out);
             }
         }
     }
@@ -207,17 +219,33 @@ impl Surface<'_> {
                 true
             }
             seen if seen & LOOSE == 0 || seen & !(STACK | LOOSE) == BURIED => false,
-            _ => self.cut(id, v, ahead, around, out),
+            _ => {
+                let exposed = self.exposure.within(id as u32, extent(&v));
+                let said = self.said(&v, ahead) | if exposed { OPEN } else { 0 };
+                self.cut(id, v, said, ahead, around, out)
+            }
         }
     }
 
-    /// As [`Surface::dice`], for a part that has open and buried faces, or stacks, around it.
-    fn cut(&mut self, id: usize, v: Corners, ahead: Point, around: &[u8], out: &mut Vec<Part>) -> bool {
+    /// As [`Surface::dice`], for a part that said this and has open and buried faces, or stacks, around it.
+    fn cut(
+        &mut self,
+        id: usize,
+        v: Corners,
+        said: u8,
+        ahead: Point,
+        around: &[u8],
+        out: &mut Vec<Part>,
+    ) -> bool {
         let begin = out.len();
         if !is_small(&v) {
-            let open = halves(v).map(|half| self.dice(id, half, ahead, around, out)) == [true; 2];
+            let open = match said {
+                OPEN => true,
+                BURIED => false,
+                _ => halves(v).map(|half| self.dice(id, half, ahead, around, out)) == [true; 2],
+            };
             if open {
-                let sure = out[begin..].iter().all(|(_, sure)| *sure);
+                let sure = begin < out.len() && out[begin..].iter().all(|(_, sure)| *sure);
                 out.truncate(begin);
                 out.push((v, sure));
             }

@@ -1,6 +1,7 @@
 //! From the boundary of a chain to blocks of signed distances: winding number first, distance second.
 
 use std::cell::RefCell;
+use std::collections::HashMap;
 use std::sync::atomic::{AtomicBool, Ordering};
 
 use rayon::prelude::*;
@@ -14,7 +15,7 @@ use super::nearest::{Group, Scratch, search};
 use super::prism::Bundle;
 use super::region::{Region, each_block, extent};
 use super::signs::{Signs, beside};
-use super::surface::{Facet, is_open, surface};
+use super::surface::{Facet, clipped, is_open, surface};
 use super::winding::Lines;
 use crate::base::blocks::{Mask, Origin, Values};
 use crate::context::Context;
@@ -86,6 +87,9 @@ const SMALL: f32 = 1.0;
 const SAME: f32 = 0.05;
 /// How far a nearest point is moved into its facet (units), away from what it shares with neighbours.
 const INSET: f64 = 0.02 * UNITS as f64;
+/// Up to here (cells) depths are told from clipped facets, where that may change them by more than [`SLACK`].
+const CLIPPED: f32 = 1.0;
+const SLACK: f32 = 0.08;
 /// A voxel nearer than this (cells) lies on the surface.
 const ON_FACE: f32 = 1e-4;
 /// How far (cells) a voxel can be from a surface between it and its neighbour that no line has placed: one that touches
@@ -283,7 +287,15 @@ impl Voxeliser {
         let mut bundle = std::mem::take(&mut scratch.bundle);
         bundle.forget();
         let bundle = RefCell::new(bundle);
-        let near = Near { voxeliser: self, corner, ids, triangles: &triangles, asked, bundle };
+        let near = Near {
+            voxeliser: self,
+            corner,
+            ids,
+            triangles: &triangles,
+            asked,
+            clipped: RefCell::default(),
+            bundle,
+        };
         search(&triangles, self.band.reach(), wanted, scratch, |group| {
             let mut depths = Depths::new(&near, group);
             for lane in 0..LANES {
@@ -337,6 +349,8 @@ struct Near<'a> {
     triangles: &'a [Triangle],
     /// Where each triangle was asked last, and what it said.
     asked: RefCell<Vec<([f32; 3], bool)>>,
+    /// The open parts of those that said no.
+    clipped: RefCell<HashMap<u32, Vec<Triangle>>>,
     bundle: RefCell<Bundle>,
 }
 
@@ -367,6 +381,20 @@ impl Near<'_> {
         );
         self.asked.borrow_mut()[index as usize] = (place, open);
         open
+    }
+}
+
+impl Near<'_> {
+    /// Distance (cells) of a place from the open parts of a facet.
+    fn distance_of_open(&self, index: u32, p: [f32; 3]) -> f32 {
+        let mut all = self.clipped.borrow_mut();
+        let parts = all.entry(index).or_insert_with(|| {
+            let Voxeliser { cells, exposure, facets, .. } = self.voxeliser;
+            let facet = &facets[self.ids[index as usize] as usize];
+            let parts = clipped(cells, exposure, facet, &mut self.bundle.borrow_mut());
+            parts.iter().map(|part| Triangle::new(part, self.corner)).collect()
+        });
+        parts.iter().map(|part| gap(p, part.closest(p))).fold(f32::INFINITY, f32::min)
     }
 }
 
@@ -413,7 +441,17 @@ impl<'a> Depths<'a> {
             let Offsets { x, y, z, .. } = &offsets[*place];
             self.near.is_open(list[*place], [p[0] - x[lane], p[1] - y[lane], p[2] - z[lane]])
         };
-        order.into_iter().find(open).map_or(limit, |(square, _)| square.sqrt())
+        let first = order.iter().position(open).unwrap_or(order.len());
+        let mut best = order.get(first).map_or(limit, |(square, _)| square.sqrt());
+        // Those before it are open elsewhere.
+        for (square, place) in &order[..first] {
+            let distance = square.sqrt();
+            if distance > CLIPPED || distance > best - SLACK {
+                break;
+            }
+            best = best.min(self.near.distance_of_open(list[*place], p));
+        }
+        best
     }
 }
 
