@@ -2,8 +2,9 @@
 //!
 //! [`chain`] is exact up to a tolerance: signed space-time tetrahedra (`chain.rs`), poses dense enough
 //! for arcs (`body.rs`), edges cut where their ends move differently (`refine.rs`), winding numbers by
-//! exact line crossings (`winding.rs`), the parts of faces that bound the volume (`cells.rs`,
-//! `surface.rs`), then exact distances in the narrow band (`nearest.rs`, `voxelise.rs`).
+//! exact line crossings (`winding.rs`, `exposure.rs`), order in time where a skin folds inside out (`folds.rs`), the parts
+//! of faces that bound the volume (`cells.rs`, `surface.rs`; `patch.rs` where many sheets nearly coincide), then exact
+//! distances in the narrow band (`nearest.rs`, `voxelise.rs`).
 //! [`samples`] is the thesis' way (section 3.2): the union of N + 1 poses, dilated and smoothed.
 
 mod body;

@@ -88,8 +88,8 @@ const SAME: f32 = 0.05;
 /// How far a nearest point is moved into its facet (units), away from what it shares with neighbours.
 const INSET: f64 = 0.02 * UNITS as f64;
 /// Up to here (cells) depths are told from clipped facets, where that may change them by more than [`SLACK`].
-const CLIPPED: f32 = 1.0;
-const SLACK: f32 = 0.08;
+const CLIPPED: f32 = 0.6;
+const SLACK: f32 = 0.1;
 /// A voxel nearer than this (cells) lies on the surface.
 const ON_FACE: f32 = 1e-4;
 /// How far (cells) a voxel can be from a surface between it and its neighbour that no line has placed: one that touches
