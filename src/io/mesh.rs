@@ -56,10 +56,10 @@ pub fn write(path: &Path, mesh: &TriMesh) -> Result<()> {
     write_textured(path, mesh, None)
 }
 
-/// As [`write`], with texture coordinates, which .stl cannot hold: see [`holds_uvs`].
+/// As [`write()`], with texture coordinates, which .stl cannot hold: see [`holds_uvs`].
 ///
 /// # Errors
-/// As [`write`].
+/// As [`write()`].
 pub fn write_textured(path: &Path, mesh: &TriMesh, uvs: Option<&Uvs>) -> Result<()> {
     match extension(path).as_str() {
         "obj" => atomic::write(path, |out| obj::write(out, mesh, uvs)),

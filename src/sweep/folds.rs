@@ -101,17 +101,14 @@ fn negative_blocks(faces: &[Face], window: &Window) -> Vec<[i32; 3]> {
     let Ok(region) = Region::around(faces, 0.0, cells(window.min), cells(window.max)) else {
         return Vec::new();
     };
-    let lines = Lines::scan(faces, &region);
     let mut out = Vec::new();
-    let [low, high] = [region.low, region.high];
-    for [x, y, _] in each_block([low[0] * 8, low[1] * 8, 0], [high[0] * 8 + 7, high[1] * 8 + 7, 0]) {
-        let line = lines.line(x, y);
+    Lines::scan(faces, &region).each_line(|[x, y], line| {
         let negative = line.windows(2).filter(|pair| pair[0].1 < 0 && pair[1].0 - pair[0].0 > SHORT);
         for pair in negative {
             let [first, last] = [pair[0].0, pair[1].0].map(|z| (z / 8.0).floor() as i32);
             out.extend((first..=last).map(|z| [x >> 3, y >> 3, z]));
         }
-    }
+    });
     out.dedup();
     out
 }

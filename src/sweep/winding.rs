@@ -88,6 +88,20 @@ impl Lines {
         }
     }
 
+    /// Calls `see` with the coordinates of each line that has crossings, and with those.
+    pub fn each_line(&self, mut see: impl FnMut([i32; 2], &[(f64, i32)])) {
+        let width = i64::from(self.high[1] - self.low[1] + 1);
+        for (place, _) in (0i64..).zip(&self.columns).filter(|(_, column)| **column != NONE) {
+            let [x, y] = [self.low[0] + (place / width) as i32, self.low[1] + (place % width) as i32];
+            for [i, j, _] in each_block([x * 8, y * 8, 0], [x * 8 + 7, y * 8 + 7, 0]) {
+                let line = self.line(i, j);
+                if !line.is_empty() {
+                    see([i, j], line);
+                }
+            }
+        }
+    }
+
     fn column(&self, x: i32, y: i32) -> Option<usize> {
         let within = (self.low[0]..=self.high[0]).contains(&x) && (self.low[1]..=self.high[1]).contains(&y);
         let [i, j, width] = [x - self.low[0], y - self.low[1], self.high[1] - self.low[1] + 1].map(i64::from);

@@ -68,7 +68,7 @@ pub fn write(path: &Path, grids: &[&FloatGrid], options: &WriteOptions) -> Resul
     crate::io::atomic::write_bytes(path, &to_bytes(grids, options)?)
 }
 
-/// As [`write`], of grids of any kind.
+/// As [`write()`], of grids of any kind.
 ///
 /// # Errors
 /// As there.
