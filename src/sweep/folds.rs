@@ -19,7 +19,7 @@ use crate::base::DVec3;
 /// Negative stretches of a line that are shorter than this (cells) are none.
 const SHORT: f64 = 1e-3;
 /// Edge of the boxes that tetrahedra are sorted into (cells).
-const BOX: f64 = 2.0;
+const BOX: f64 = 1.0;
 /// Where a tetrahedron is asked: barycentric weights, off all symmetries.
 const SAMPLES: [[f64; 4]; 5] = [
     [0.252, 0.249, 0.251, 0.248],
@@ -40,8 +40,6 @@ struct Passage {
     corners: [DVec3; 4],
     /// Three rows that give the weights of the second to fourth corner from a way from the first.
     weights: [DVec3; 3],
-    /// For each corner 1 when it is of the later pose, else 0.
-    later: [f64; 4],
 }
 
 /// Clears the bits (see [`super::chain`]) of tetrahedra through which the surface only comes back from inside out.
@@ -196,12 +194,12 @@ fn passages(topology: &Topology, levels: &[Vec<Fixed>], folded: &HashSet<[i32; 3
         for step in 0..levels.len() - 1 {
             let [a, b] =
                 [step, step + 1].map(|level| simplex.v.map(|vertex| place(levels[level][vertex as usize])));
-            for (part, tetrahedron) in tetrahedra(a, b).into_iter().enumerate() {
-                let (low, high) = bounds(&tetrahedron.corners);
+            for (part, corners) in tetrahedra(a, b).into_iter().enumerate() {
+                let (low, high) = bounds(&corners);
                 if each_block(block(low), block(high)).any(|block| folded.contains(&block)) {
                     let still = STILL * (a[1] - a[0]).cross(&(a[2] - a[0])).norm();
                     let at = [triangle as u32, step as u32, part as u32];
-                    out.extend(Passage::new(at, tetrahedron, i32::from(simplex.sign), still));
+                    out.extend(Passage::new(at, corners, i32::from(simplex.sign), still));
                 }
             }
         }
@@ -211,44 +209,32 @@ fn passages(topology: &Topology, levels: &[Vec<Fixed>], folded: &HashSet<[i32; 3
     parts.into_iter().flatten().collect()
 }
 
-/// A third of the prism between two poses of a triangle.
-struct Tetrahedron {
-    corners: [DVec3; 4],
-    /// For each corner 1 when it is of the later pose, else 0.
-    later: [f64; 4],
-    /// Whether its volume is above 0 when a triangle of sign 1 moves outward.
-    forward: bool,
-}
-
-fn tetrahedra([a0, a1, a2]: [DVec3; 3], [b0, b1, b2]: [DVec3; 3]) -> [Tetrahedron; 3] {
-    [
-        Tetrahedron { corners: [a0, a1, a2, b2], later: [0.0, 0.0, 0.0, 1.0], forward: true },
-        Tetrahedron { corners: [a0, a1, b1, b2], later: [0.0, 0.0, 1.0, 1.0], forward: false },
-        Tetrahedron { corners: [a0, b0, b1, b2], later: [0.0, 1.0, 1.0, 1.0], forward: true },
-    ]
+/// Corners of the three tetrahedra of a prism, as [`super::chain`] has them: of the second, one that is passed outward by
+/// a triangle of sign 1 has a volume below 0.
+fn tetrahedra([a0, a1, a2]: [DVec3; 3], [b0, b1, b2]: [DVec3; 3]) -> [[DVec3; 4]; 3] {
+    [[a0, a1, a2, b2], [a0, a1, b1, b2], [a0, b0, b1, b2]]
 }
 
 impl Passage {
     /// A tetrahedron of a triangle of this sign; none when the surface stands still in it.
-    fn new([triangle, step, part]: [u32; 3], of: Tetrahedron, sign: i32, still: f64) -> Option<Self> {
-        let Tetrahedron { corners, later, forward } = of;
+    fn new([triangle, step, part]: [u32; 3], corners: [DVec3; 4], sign: i32, still: f64) -> Option<Self> {
         let [u, v, w] = [1, 2, 3].map(|corner| corners[corner] - corners[0]);
         let volume = u.cross(&v).dot(&w);
         if volume.abs() <= still || volume == 0.0 {
             return None;
         }
-        let outward = ((volume > 0.0) == forward) == (sign > 0);
+        let outward = ((volume > 0.0) == (part != 1)) == (sign > 0);
         let weights = [v.cross(&w) / volume, w.cross(&u) / volume, u.cross(&v) / volume];
-        Some(Self { triangle, step, part, sign: if outward { 1 } else { -1 }, weights, later, corners })
+        Some(Self { triangle, step, part, sign: if outward { 1 } else { -1 }, corners, weights })
     }
 
-    /// When the surface passes a point (0 to 1 within the step), if it does here.
+    /// When the surface passes a point (0 to 1 within the step), if it does here: the weight of the later pose's corners,
+    /// which are the last one, two or three.
     fn time(&self, p: &DVec3) -> Option<f64> {
         let way = p - self.corners[0];
         let [u, v, w] = self.weights.map(|row| row.dot(&way));
-        let first = 1.0 - u - v - w;
-        let [a, b, c, d] = self.later;
-        (u >= 0.0 && v >= 0.0 && w >= 0.0 && first >= 0.0).then_some(first * a + u * b + v * c + w * d)
+        let is_within = u >= 0.0 && v >= 0.0 && w >= 0.0 && u + v + w <= 1.0;
+        is_within.then_some([w, v + w, u + v + w][self.part as usize])
     }
 }
 
