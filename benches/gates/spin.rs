@@ -3,11 +3,12 @@
 use std::time::Instant;
 
 use frazil::base::{DVec3, cpu};
+use frazil::motion::Motion;
 use frazil::sweep::{self, Body, Settings};
 use frazil::vdb::{FloatGrid, level_set};
 use rayon::prelude::*;
 
-use crate::common::elbow::Elbow;
+use crate::common::folded::{Elbow, Mirrored};
 use crate::common::shapes::globe;
 use crate::dense::Dense;
 use crate::harness::{Bound, Harness, median};
@@ -19,7 +20,7 @@ const DEGREES: [f64; 9] = [30.0, 90.0, 180.0, 270.0, 350.0, 360.0, 370.0, 719.0,
 const CELLS: [f64; 2] = [0.005, 0.02];
 /// Poses of one turn.
 const POSES: f64 = 4096.0;
-/// Poses of a bend.
+/// Poses of a skin.
 const FOLDED_POSES: usize = 193;
 
 /// All of them.
@@ -77,19 +78,26 @@ fn spin(h: &mut Harness) {
     h.gate("reliability.spin_fat", fat as f64, "voxels", Bound::Most(0.0), Bound::Open, &note);
 }
 
-/// A skin whose elbow folds inside out while it bends: against where a pose winds around, and in sub-steps.
+/// Skins that fold inside out: against where a pose winds around, and in sub-steps.
 fn folds(h: &mut Harness) {
     const CELL: f64 = 0.004;
     const HALF: f64 = 0.5 * CELL;
     let ctx = context(2);
     let (mut missed, mut fat, mut inside, mut apart) = (0, 0, 0, 0.0f64);
-    for bend in [[0.0, 2.4], [2.4, 0.6], [1.4, 2.5]] {
-        let body = || [Body::new(Box::new(Elbow::new(bend, 0.02)), 0.0).expect("a body")];
+    let bends = [[0.0, 2.4], [2.4, 0.6], [1.4, 2.5]];
+    for number in 0..=bends.len() {
+        let skin = || -> Box<dyn Motion> {
+            match bends.get(number) {
+                Some(bend) => Box::new(Elbow::new(*bend)),
+                None => Box::new(Mirrored::new()),
+            }
+        };
+        let body = || [Body::new(skin(), 0.0).expect("a body")];
         let sweep = |from: f64, to: f64| {
             sweep::chain(&ctx, &body(), from, to, &Settings::new(CELL)).expect("a sweep")
         };
         let swept = sweep(0.0, 1.0);
-        let dense = Dense::posed(&Elbow::new(bend, 0.02), FOLDED_POSES);
+        let dense = Dense::posed(&*skin(), FOLDED_POSES);
         let mut all = Vec::new();
         each_voxel(&swept, |p, ours| all.push((p, ours)));
         let wrong = |&(p, ours): &(DVec3, f64)| match ours > 0.0 {
@@ -108,7 +116,9 @@ fn folds(h: &mut Harness) {
         }
         apart = apart.max((volume(&swept) / volume(&parts) - 1.0).abs());
     }
-    let note = format!("{inside} voxels inside the bands; three bends of a tube");
+    let note = format!(
+        "{inside} voxels inside the bands; three bends of a tube, and a ball turned inside out and back"
+    );
     h.gate("reliability.spin_folds_missed", missed as f64, "voxels", Bound::Most(0.0), Bound::Open, &note);
     let share = fat as f64 / inside as f64 * 100.0;
     h.gate("reliability.spin_folds_fat", share, "%", Bound::Most(0.5), Bound::Most(0.0), &note);

@@ -4,7 +4,7 @@
 pub mod boot;
 pub mod character;
 pub mod clients;
-pub mod elbow;
+pub mod folded;
 pub mod header;
 pub mod hero;
 pub mod shapes;
