@@ -416,15 +416,11 @@ pub unsafe extern "C" fn frz_context_timings(
             count.write(0);
             let call = enter(context)?;
             let timings = call.0.timings.lock().unwrap_or_else(PoisonError::into_inner);
-            count.write(timings.len());
-            if dst.data.is_null() {
-                return Ok(());
-            }
             let time = |time: &StageTime| frz_stage_time {
                 stage: letters(time.name),
                 seconds: time.time.as_secs_f64(),
             };
-            dst.fill("dst", &timings.iter().map(time).collect::<Vec<_>>())
+            dst.list(count, timings.len(), || Ok(timings.iter().map(time).collect()))
         }
     })
 }

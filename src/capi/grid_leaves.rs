@@ -82,13 +82,8 @@ pub unsafe extern "C" fn frz_grid_leaves(
         unsafe {
             count.write(0);
             let held = read(grid)?;
-            if dst.data.is_null() {
-                count.write(held.floats()?.leaf_count());
-                return Ok(());
-            }
-            let leaves: Vec<frz_leaf> = held.floats()?.leaves()?.iter().map(leaf_view).collect();
-            count.write(leaves.len());
-            dst.fill("dst", &leaves)
+            let grid = held.floats()?;
+            dst.list(count, grid.leaf_count(), || Ok(grid.leaves()?.iter().map(leaf_view).collect()))
         }
     })
 }
@@ -150,13 +145,7 @@ pub unsafe extern "C" fn frz_grid_vector_leaves(
             count.write(0);
             let held = read(grid)?;
             let grid = held.vectors()?;
-            if dst.data.is_null() {
-                count.write(grid.leaf_count());
-                return Ok(());
-            }
-            let leaves: Vec<frz_vector_leaf> = grid.leaves()?.iter().map(vector_leaf_view).collect();
-            count.write(leaves.len());
-            dst.fill("dst", &leaves)
+            dst.list(count, grid.leaf_count(), || Ok(grid.leaves()?.iter().map(vector_leaf_view).collect()))
         }
     })
 }

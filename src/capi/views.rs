@@ -136,6 +136,28 @@ impl frz_span {
         }
         Ok(())
     }
+
+    /// Tells how many elements there are, and writes them unless the span's data are NULL.
+    ///
+    /// # Safety
+    /// As [`frz_span::fill`]; `count` must be writable.
+    pub(super) unsafe fn list<T: Plain>(
+        &self,
+        count: *mut usize,
+        total: usize,
+        elements: impl FnOnce() -> Outcome<Vec<T>>,
+    ) -> Outcome {
+        // SAFETY: the caller's promise.
+        unsafe {
+            if self.data.is_null() {
+                count.write(total);
+                return Ok(());
+            }
+            let elements = elements()?;
+            count.write(elements.len());
+            self.fill("dst", &elements)
+        }
+    }
 }
 
 /// Writes bytes to the host, or tells it how many there are: with `dst` NULL, `size` becomes `bound` at least.
