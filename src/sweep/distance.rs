@@ -105,6 +105,12 @@ impl Triangle {
     }
 }
 
+/// Distance of two points.
+pub fn gap(p: [f32; 3], q: [f32; 3]) -> f32 {
+    let d = [p[0] - q[0], p[1] - q[1], p[2] - q[2]];
+    (d[0] * d[0] + d[1] * d[1] + d[2] * d[2]).sqrt()
+}
+
 /// For eight points: the vector from the nearest point of a triangle (cells), and its squared length.
 #[derive(Debug, Clone, Copy, Default)]
 pub struct Offsets {

@@ -1,21 +1,19 @@
 //! From the boundary of a chain to blocks of signed distances: winding number first, distance second.
 
-use std::cell::RefCell;
-use std::collections::HashMap;
 use std::sync::atomic::{AtomicBool, Ordering};
 
 use rayon::prelude::*;
 
 use super::cells::Cells;
 use super::chain::Face;
-use super::distance::{LANES, Offsets, Points, Triangle, to_each};
+use super::depth::{Chain, Depths, Near};
+use super::distance::{LANES, Triangle, gap};
 use super::exposure::Exposure;
-use super::lattice::{Lattice, UNITS};
-use super::nearest::{Group, Scratch, search};
-use super::prism::Bundle;
+use super::lattice::Lattice;
+use super::nearest::{Scratch, search};
 use super::region::{Region, each_block, extent};
 use super::signs::{Signs, beside};
-use super::surface::{Facet, clipped, is_open, surface};
+use super::surface::{Facet, surface};
 use super::winding::Lines;
 use crate::base::blocks::{Mask, Origin, Values};
 use crate::context::Context;
@@ -83,13 +81,6 @@ const GRAIN: usize = 1024;
 const BLOCK_RADIUS: f32 = 6.07;
 /// Radius of a small facet (cells).
 const SMALL: f32 = 1.0;
-/// Points of a facet nearer together than this (cells) say the same.
-const SAME: f32 = 0.05;
-/// How far a nearest point is moved into its facet (units), away from what it shares with neighbours.
-const INSET: f64 = 0.02 * UNITS as f64;
-/// Up to here (cells) depths are told from clipped facets, where that may change them by more than [`SLACK`].
-const CLIPPED: f32 = 0.6;
-const SLACK: f32 = 0.1;
 /// A voxel nearer than this (cells) lies on the surface.
 const ON_FACE: f32 = 1e-4;
 /// How far (cells) a voxel can be from a surface between it and its neighbour that no line has placed: one that touches
@@ -267,69 +258,84 @@ impl Voxeliser {
             return None;
         }
         let block = self.near[index];
-        let corner = block.map(|b| b * 8);
+        let signs = Signs::new(&self.cells.lines, block.map(|b| b * 8));
+        let inside = signs.inside();
+        let limits = [self.band.outside, self.band.inside];
+        let mut distances: Box<Values> =
+            Box::new(std::array::from_fn(|voxel| limits[usize::from(holds(&inside, voxel))]));
+        let found = self.find_distances(index, wanted, &inside, &mut distances, scratch);
+        let mended = self.mend_changes(block, wanted, &signs, &mut distances);
+        let all = |bits: &dyn Fn(usize) -> u64| (0..8).all(|x| bits(x) & wanted[x] == wanted[x]);
+        if !found && !mended && all(&|x| inside[x]) {
+            return Some(Piece::Inside(self.origin(block)));
+        }
+        if !found && !mended && all(&|x| !inside[x]) {
+            return None;
+        }
+        for (voxel, value) in distances.iter_mut().enumerate() {
+            *value = match *value {
+                // Else rounding would scatter specks of volume over a face that lies on voxels.
+                distance if distance < ON_FACE => 0.0,
+                distance if holds(&inside, voxel) => -distance,
+                distance => distance,
+            };
+        }
+        Some(Piece::Near(self.origin(block), distances))
+    }
+
+    /// Lowers distances from the band's limits to those of the nearest facets; whether any is lower.
+    fn find_distances(
+        &self,
+        index: usize,
+        wanted: &Mask,
+        inside: &Mask,
+        distances: &mut Values,
+        scratch: &mut Scratch,
+    ) -> bool {
+        let corner = self.near[index].map(|b| b * 8);
         let ids = &self.ids[self.start[index] as usize..self.start[index + 1] as usize];
         let triangles: Vec<Triangle> =
             ids.iter().map(|&id| Triangle::new(&self.facets[id as usize].v, corner)).collect();
-        let signs = Signs::new(&self.cells.lines, corner);
-        let inside = signs.inside();
-        let is_inside = |voxel: usize| inside[voxel >> 6] >> (voxel & 63) & 1 == 1;
-        let limit = |voxel: usize| if is_inside(voxel) { self.band.inside } else { self.band.outside };
-        let signed = |voxel: usize, distance: f32| match distance {
-            // Else rounding would scatter specks of volume over a face that lies on voxels.
-            _ if distance < ON_FACE => 0.0,
-            _ if is_inside(voxel) => -distance,
-            _ => distance,
-        };
-        let mut values: Box<Values> = Box::new(std::array::from_fn(|voxel| signed(voxel, limit(voxel))));
-        let mut uniform = true;
-        let asked = RefCell::new(vec![([f32::INFINITY; 3], false); triangles.len()]);
-        let mut bundle = std::mem::take(&mut scratch.bundle);
-        bundle.forget();
-        let bundle = RefCell::new(bundle);
-        let near = Near {
-            voxeliser: self,
-            corner,
-            ids,
-            triangles: &triangles,
-            asked,
-            clipped: RefCell::default(),
-            bundle,
-        };
+        let (cells, exposure, facets) = (&self.cells, &self.exposure, &self.facets[..]);
+        let reach = self.band.inside;
+        let near =
+            Near::new(Chain { cells, exposure, facets }, corner, ids, &triangles, reach, &mut scratch.bundle);
+        let mut found = false;
         search(&triangles, self.band.reach(), wanted, scratch, |group| {
             let mut depths = Depths::new(&near, group);
             for lane in 0..LANES {
                 let voxel = group.voxel(lane);
-                if wanted[voxel >> 6] >> (voxel & 63) & 1 == 0 {
+                if !holds(wanted, voxel) {
                     continue;
                 }
-                let limit = limit(voxel);
                 let mut distance = group.squared[lane].sqrt();
-                if is_inside(voxel) && distance < limit {
+                if holds(inside, voxel) && distance < distances[voxel] {
                     distance = depths.at(lane, distance);
                 }
-                uniform &= distance >= limit;
-                values[voxel] = signed(voxel, distance.min(limit));
+                found |= distance < distances[voxel];
+                distances[voxel] = distances[voxel].min(distance);
             }
         });
-        scratch.bundle = near.bundle.into_inner();
-        // Neighbours of opposite sign that are too far from the surface between them: lines have met it.
-        let before = values.clone();
+        scratch.bundle = near.into_bundle();
+        found
+    }
+
+    /// Lowers the distances of neighbours of opposite sign that are too far from the surface between them, as far as
+    /// is known here, to where lines have met it; whether there were any.
+    fn mend_changes(&self, block: [i32; 3], wanted: &Mask, signs: &Signs, distances: &mut Values) -> bool {
+        let before = *distances;
+        let mut mended = false;
         signs.each_change(|voxel, axis, above| {
-            let beside = beside(voxel, axis, above).map_or(0.0, |other| before[other].abs());
-            let is_wanted = wanted[voxel >> 6] >> (voxel & 63) & 1 == 1;
-            if is_wanted && before[voxel].abs() + beside > MOST_APART {
-                let most = self.most_distance(corner, voxel, axis, above);
-                values[voxel] = signed(voxel, values[voxel].abs().min(most));
-                uniform = false;
+            // What a neighbour in another block has is not known: lines decide.
+            let are_near =
+                beside(voxel, axis, above).is_some_and(|other| before[voxel] + before[other] <= MOST_APART);
+            if !are_near && holds(wanted, voxel) {
+                let most = self.most_distance(block.map(|b| b * 8), voxel, axis, above);
+                mended |= most < distances[voxel];
+                distances[voxel] = distances[voxel].min(most);
             }
         });
-        let all = |bits: &dyn Fn(usize) -> u64| (0..8).all(|x| bits(x) & wanted[x] == wanted[x]);
-        match (uniform && all(&|x| inside[x]), uniform && all(&|x| !inside[x])) {
-            (true, _) => Some(Piece::Inside(self.origin(block))),
-            (_, true) => None,
-            _ => Some(Piece::Near(self.origin(block), values)),
-        }
+        mended
     }
 
     /// How far (cells) a voxel can be from the surface, where its neighbour along an axis, above or below, is on the
@@ -338,120 +344,6 @@ impl Voxeliser {
         let mut lower = [0, 1, 2].map(|a| corner[a] + (voxel >> (6 - 3 * a) & 7) as i32);
         lower[axis] -= i32::from(!above);
         self.exposure.between(lower, axis).map_or(UNSEEN, |distances| distances[usize::from(!above)])
-    }
-}
-
-/// The facets in reach of a block.
-struct Near<'a> {
-    voxeliser: &'a Voxeliser,
-    corner: [i32; 3],
-    ids: &'a [u32],
-    triangles: &'a [Triangle],
-    /// Where each triangle was asked last, and what it said.
-    asked: RefCell<Vec<([f32; 3], bool)>>,
-    /// The open parts of those that said no.
-    clipped: RefCell<HashMap<u32, Vec<Triangle>>>,
-    bundle: RefCell<Bundle>,
-}
-
-impl Near<'_> {
-    /// Whether a point of a facet (cells from the block's corner) bounds the volume.
-    fn is_open(&self, index: u32, at: [f32; 3]) -> bool {
-        let Facet { v, face, sure } = &self.voxeliser.facets[self.ids[index as usize] as usize];
-        if *sure {
-            return true;
-        }
-        let (before, said) = self.asked.borrow()[index as usize];
-        if gap(before, at) < SAME {
-            return said;
-        }
-        let place = at;
-        let cells = f64::from(UNITS);
-        let at = [0, 1, 2].map(|axis| (f64::from(self.corner[axis]) + f64::from(at[axis])) * cells);
-        let way = [0, 1, 2].map(|axis| v.iter().map(|p| f64::from(p[axis])).sum::<f64>() / 3.0 - at[axis]);
-        let length = way.iter().map(|value| value * value).sum::<f64>().sqrt();
-        let part = if length > INSET { INSET / length } else { 1.0 };
-        let at = [0, 1, 2].map(|axis| at[axis] + part * way[axis]);
-        let open = is_open(
-            &self.voxeliser.cells,
-            &self.voxeliser.exposure,
-            *face,
-            at,
-            &mut self.bundle.borrow_mut(),
-        );
-        self.asked.borrow_mut()[index as usize] = (place, open);
-        open
-    }
-}
-
-impl Near<'_> {
-    /// Distance (cells) of a place from the open parts of a facet.
-    fn distance_of_open(&self, index: u32, p: [f32; 3]) -> f32 {
-        let mut all = self.clipped.borrow_mut();
-        let parts = all.entry(index).or_insert_with(|| {
-            let Voxeliser { cells, exposure, facets, .. } = self.voxeliser;
-            let facet = &facets[self.ids[index as usize] as usize];
-            let parts = clipped(cells, exposure, facet, &mut self.bundle.borrow_mut());
-            parts.iter().map(|part| Triangle::new(part, self.corner)).collect()
-        });
-        parts.iter().map(|part| gap(p, part.closest(p))).fold(f32::INFINITY, f32::min)
-    }
-}
-
-/// Depths of a group's voxels: distances to their nearest facets; where a facet's nearest point does not bound the
-/// volume, because it was clipped too wide, to the nearest that does.
-struct Depths<'a> {
-    near: &'a Near<'a>,
-    group: &'a Group<'a>,
-    /// Offsets of the voxels from the near triangles, and from all, once they are needed.
-    offsets: [Vec<Offsets>; 2],
-}
-
-impl<'a> Depths<'a> {
-    fn new(near: &'a Near<'a>, group: &'a Group<'a>) -> Self {
-        Self { near, group, offsets: [Vec::new(), Vec::new()] }
-    }
-
-    fn at(&mut self, lane: usize, distance: f32) -> f32 {
-        let Points { x, y, z } = &self.group.points;
-        let p = [x[lane], y[lane], z[lane]];
-        let nearest = self.group.nearest[lane];
-        if self.near.is_open(nearest, self.near.triangles[nearest as usize].closest(p)) {
-            return distance;
-        }
-        let depth = self.nearest_open(lane, p, 0, self.group.near);
-        if depth <= self.group.complete {
-            return depth;
-        }
-        let all: Vec<u32> = (0..self.near.triangles.len() as u32).collect();
-        self.nearest_open(lane, p, 1, &all)
-    }
-
-    /// Distance (cells) of a voxel at `p` from the nearest point that bounds the volume, of the listed triangles.
-    fn nearest_open(&mut self, lane: usize, p: [f32; 3], which: usize, list: &[u32]) -> f32 {
-        let offsets = &mut self.offsets[which];
-        if offsets.is_empty() {
-            to_each(self.near.triangles, list, &self.group.points, offsets);
-        }
-        let limit = self.near.voxeliser.band.inside;
-        let squares = offsets.iter().map(|offset| offset.squared[lane]).zip(0..);
-        let mut order: Vec<(f32, usize)> = squares.filter(|(square, _)| *square < limit * limit).collect();
-        order.sort_unstable_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
-        let open = |(_, place): &(f32, usize)| {
-            let Offsets { x, y, z, .. } = &offsets[*place];
-            self.near.is_open(list[*place], [p[0] - x[lane], p[1] - y[lane], p[2] - z[lane]])
-        };
-        let first = order.iter().position(open).unwrap_or(order.len());
-        let mut best = order.get(first).map_or(limit, |(square, _)| square.sqrt());
-        // Those before it are open elsewhere.
-        for (square, place) in &order[..first] {
-            let distance = square.sqrt();
-            if distance > CLIPPED || distance > best - SLACK {
-                break;
-            }
-            best = best.min(self.near.distance_of_open(list[*place], p));
-        }
-        best
     }
 }
 
@@ -472,7 +364,7 @@ fn retain(faces: &mut Vec<Face>, keep: impl Fn(&Face) -> bool + Send + Sync) {
     faces.retain(|_| kept.next().unwrap_or(false));
 }
 
-fn gap(p: [f32; 3], q: [f32; 3]) -> f32 {
-    let d = [p[0] - q[0], p[1] - q[1], p[2] - q[2]];
-    (d[0] * d[0] + d[1] * d[1] + d[2] * d[2]).sqrt()
+/// Whether a voxel's bit is set.
+fn holds(mask: &Mask, voxel: usize) -> bool {
+    mask[voxel >> 6] >> (voxel & 63) & 1 == 1
 }
