@@ -135,6 +135,7 @@ void prune(Grid& grid, const Call& call, bool level_set, float tolerance);
 void flood_fill(Grid& grid, const Call& call);
 rust::Vec<uint64_t> components(const Grid& grid, const Call& call);
 
+bool fits_half(size_t grid, bool vectors);
 std::unique_ptr<std::string> grids_to_bytes(rust::Slice<const size_t> grids, rust::Slice<const bool> vectors,
                                             int32_t compression, bool half, const rust::Vec<Meta>& meta);
 rust::Vec<GridHeader> describe_file(rust::Str path);

@@ -224,7 +224,38 @@ std::unique_ptr<std::string> written(const openvdb::GridCPtrVec& list, size_t ex
     return bytes.take();
 }
 
+/// Numbers from here on are rounded to infinity in 16 bits.
+constexpr float OVER_HALF = 65520.0f;
+
+bool fits_half(float value) { return std::abs(value) < OVER_HALF; }
+bool fits_half(const openvdb::Vec3f& value) {
+    return fits_half(value[0]) && fits_half(value[1]) && fits_half(value[2]);
+}
+
+template <typename Tree>
+bool fits_half(const Tree& tree) {
+    if (!fits_half(tree.background())) return false;
+    for (auto leaf = tree.cbeginLeaf(); leaf; ++leaf) {
+        const auto* values = leaf->buffer().data();
+        const auto fits = [](const auto& value) { return fits_half(value); };
+        if (!std::all_of(values, values + leaf->buffer().size(), fits)) return false;
+    }
+    auto tile = tree.cbeginValueAll();
+    tile.setMaxDepth(Tree::ValueAllCIter::LEAF_DEPTH - 1);
+    for (; tile; ++tile) {
+        if (!fits_half(*tile)) return false;
+    }
+    return true;
+}
+
 }  // namespace
+
+bool fits_half(size_t grid, bool vectors) {
+    return here([&] {
+        if (vectors) return fits_half(reinterpret_cast<const VectorGrid*>(grid)->impl->grid->tree());
+        return fits_half(reinterpret_cast<const Grid*>(grid)->impl->grid->tree());
+    });
+}
 
 std::unique_ptr<std::string> grids_to_bytes(rust::Slice<const size_t> grids, rust::Slice<const bool> vectors,
                                             int32_t compression, bool half, const rust::Vec<Meta>& meta) {

@@ -1357,7 +1357,7 @@ frz_status frz_grid_load(frz_context *context,
  * grids: count pointers to grids of different names.
  * path: UTF-8; an existing file is replaced.
  * compression: a frz_compression.
- * flags: 0 or FRZ_HALF.
+ * flags: 0 or FRZ_HALF, which is refused for numbers over 65,504.
  *
  * Any number of threads may read a grid; one thread at a time for each context.
  */
@@ -1392,7 +1392,7 @@ frz_status frz_grid_from_bytes(frz_context *context,
  *
  * grids: count pointers to grids of different names.
  * compression: a frz_compression.
- * flags: 0 or FRZ_HALF.
+ * flags: 0 or FRZ_HALF, which is refused for numbers over 65,504.
  * dst: room for capacity bytes. NULL: size receives a number that certainly suffices, and nothing is written.
  * capacity: bytes at dst. FRZ_ERROR_CAPACITY when they are too few.
  * size: receives the bytes that were written, or are needed; 0 after other failures.

@@ -75,6 +75,11 @@ fn a_killed_run_goes_on_to_the_same_bytes_whatever_is_written() {
         works(folder.path(), "snow shot.toml -o once -q");
         for frame in [1, 4, 9] {
             kill_at(folder.path(), "snow shot.toml -o killed", &format!("killed/state/base.{frame:04}.json"));
+            // As when it is killed before it has removed an old state.
+            let state = |frame: i32| folder.path().join(format!("killed/state/base.{frame:04}.vdb"));
+            if frame > 2 && state(frame).exists() {
+                fs::copy(state(frame), state(frame - 2)).unwrap();
+            }
         }
         works(folder.path(), "snow shot.toml -o killed -q --threads 1");
         let [once, killed] = ["once", "killed"].map(|name| output(&folder.path().join(name)));

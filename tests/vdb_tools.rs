@@ -6,6 +6,7 @@ mod common;
 use common::shapes::{cuboid, sphere};
 use common::tools;
 use frazil::base::TriMesh;
+use frazil::base::blocks::{Block, BlockEdit};
 use frazil::vdb::file::{self, WriteOptions, to_bytes};
 use frazil::vdb::level_set::{self, Scheme};
 use frazil::vdb::{FloatGrid, MetaValue};
@@ -26,6 +27,32 @@ fn near(value: f64, expected: f64, part: f64) {
 
 fn volume(ctx: &Context, grid: &FloatGrid) -> f64 {
     level_set::measure(ctx, grid).unwrap().volume
+}
+
+#[test]
+fn numbers_that_16_bits_do_not_hold_are_refused() {
+    let half = WriteOptions { half: true, ..WriteOptions::default() };
+    let grid = |background: f32, value: f32, edit: fn(f32) -> BlockEdit| {
+        let mut grid = FloatGrid::new(0.1, background).unwrap();
+        grid.set_name("heat").unwrap();
+        grid.replace_blocks(&context(1), &[edit(value)]).unwrap();
+        grid
+    };
+    let dense: fn(f32) -> BlockEdit = |value| {
+        let values = Box::new(std::array::from_fn(|voxel| if voxel == 77 { value } else { 1.0 }));
+        BlockEdit::Dense(Block { origin: [8, 0, 0], values, mask: [u64::MAX; 8] })
+    };
+    let tile: fn(f32) -> BlockEdit = |value| BlockEdit::Constant([8, 0, 0], value);
+    for (background, value, edit) in [(0.0, -65_520.0, dense), (0.0, 70_000.0, tile), (70_000.0, 1.0, dense)]
+    {
+        let grid = grid(background, value, edit);
+        let error = to_bytes(&[&grid], &half).unwrap_err().to_string();
+        assert_eq!(error, "grid \"heat\" has numbers over 65,504, which 16 bits do not hold");
+        to_bytes(&[&grid], &WriteOptions::default()).unwrap();
+    }
+    for edit in [dense, tile] {
+        to_bytes(&[&grid(65_504.0, -65_519.0, edit)], &half).unwrap();
+    }
 }
 
 #[test]

@@ -1,5 +1,6 @@
 //! Gates of narrow bands: what turns, rolls and twists, its values against the union of dense poses. With `FRAZIL_BAND`
-//! set, a line for each course gives the largest error (cells) at each cell size.
+//! set to a part of a name, only bodies of that name are swept (all when it is empty), and a line for each course gives
+//! the largest error (cells) at each cell size.
 
 use std::collections::HashMap;
 use std::path::{Path, PathBuf};
@@ -26,6 +27,8 @@ const APART: f64 = 0.1;
 const MOST_POSES: usize = 2048;
 const MOST_SHAPES: usize = 192;
 const LEAST_POSES: usize = 48;
+/// Errors (cells) from which on it is told where they are.
+const TOLD: f64 = 0.1;
 /// Values of neighbours of opposite sign that differ by more (cells) jump.
 const JUMP: f64 = 1.3;
 
@@ -58,12 +61,14 @@ pub fn run(h: &mut Harness) {
     }
     let folder = std::env::temp_dir().join(format!("frazil-band-{}", std::process::id()));
     std::fs::create_dir_all(&folder).expect("a folder");
-    let shapes = bodies(&folder);
+    let only = std::env::var("FRAZIL_BAND").ok();
+    let mut shapes = bodies(&folder);
+    shapes.retain(|shape| only.as_ref().is_none_or(|part| shape.name.contains(part.as_str())));
     let (mut found, mut in_snow) = (Found::default(), Found::default());
     for shape in &shapes {
         for course in &courses() {
             let most = course_of(shape, course, &mut found, &mut in_snow);
-            if std::env::var_os("FRAZIL_BAND").is_some() {
+            if only.is_some() {
                 println!("# {} {}: {most}", shape.name, course.name);
             }
         }
@@ -102,7 +107,7 @@ fn course_of(shape: &Shape, course: &Course, found: &mut Found, in_snow: &mut Fo
         let place = format!("{} {} radius of {cells} cells", shape.name, course.name);
         found.count_jumps(&leaves, &place);
         let error = found.compare(&ctx, &leaves, &dense, &place);
-        text += &format!("{error:.3} ");
+        text += &error;
         found.sweeps += 1;
         if cells == CELLS[1] {
             let mut base = scenes::snow(&ctx, 6.0 * shape.radius, cell, scenes::EXACT);
@@ -136,8 +141,8 @@ impl Found {
         });
     }
 
-    /// Compares values within a cell of the surface; returns the largest error (cells).
-    fn compare(&mut self, ctx: &Context, leaves: &Leaves, dense: &Dense, place: &str) -> f64 {
+    /// Compares values within a cell of the surface; tells the largest error (cells), and where a large one is.
+    fn compare(&mut self, ctx: &Context, leaves: &Leaves, dense: &Dense, place: &str) -> String {
         let mut near = Vec::new();
         leaves.each_voxel(|at, value| {
             if value.abs() < 1.0 {
@@ -155,11 +160,12 @@ impl Found {
             ctx.stage("oracle", || Ok(sample.par_iter().map(error).collect::<Vec<_>>())).expect("no cancel");
         self.values += errors.len();
         let worst = errors.into_iter().max_by(|a, b| a.1.total_cmp(&b.1));
-        let Some((truth, error, at, value)) = worst else { return 0.0 };
+        let Some((truth, error, at, value)) = worst else { return String::new() };
+        let told = format!("{value:.3} for {truth:.3} at {at:?}");
         if error > self.worst.0 {
-            self.worst = (error, format!("{value:.3} for {truth:.3} at {at:?} of {place}"));
+            self.worst = (error, format!("{told} of {place}"));
         }
-        error
+        if error > TOLD { format!("{error:.3} ({told}) ") } else { format!("{error:.3} ") }
     }
 }
 
@@ -232,7 +238,8 @@ fn motion(shape: &Shape, course: &Course, from: DVec3) -> Box<dyn Motion> {
             // From its hips, a quarter of a round in the second.
             let space = Space { scale: 0.2, ..Space::OWN };
             let place = Keys::new(vec![Key { time: 0.0, at: DVec3::y() * -0.18, turn: DVec3::zeros() }]);
-            let figure = Character::open(path, Play::default()).expect("the figure");
+            let figure = Character::open(path, Play { clip: Some("walk".into()), ..Play::default() })
+                .expect("the figure");
             Box::new(Placed::new(Box::new(Slow(figure)), space, place.expect("a key")))
         }
     };

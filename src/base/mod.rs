@@ -5,6 +5,7 @@ pub mod bvh;
 pub mod cpu;
 mod ears;
 pub mod faults;
+pub mod lanes;
 pub mod mesh;
 mod monotone;
 pub mod polygons;

@@ -118,7 +118,7 @@ pub unsafe extern "C" fn frz_grid_load(
 /// grids: count pointers to grids of different names.
 /// path: UTF-8; an existing file is replaced.
 /// compression: a frz_compression.
-/// flags: 0 or FRZ_HALF.
+/// flags: 0 or FRZ_HALF, which is refused for numbers over 65,504.
 ///
 /// Any number of threads may read a grid; one thread at a time for each context.
 #[unsafe(no_mangle)]
@@ -178,7 +178,7 @@ pub unsafe extern "C" fn frz_grid_from_bytes(
 ///
 /// grids: count pointers to grids of different names.
 /// compression: a frz_compression.
-/// flags: 0 or FRZ_HALF.
+/// flags: 0 or FRZ_HALF, which is refused for numbers over 65,504.
 /// dst: room for capacity bytes. NULL: size receives a number that certainly suffices, and nothing is written.
 /// capacity: bytes at dst. FRZ_ERROR_CAPACITY when they are too few.
 /// size: receives the bytes that were written, or are needed; 0 after other failures.

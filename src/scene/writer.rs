@@ -125,8 +125,11 @@ impl<'a> Writer<'a> {
         let manifest = Manifest { frame, inputs: inputs.to_string(), keeps, files, state, next };
         manifest.write(&self.folder, STAGE)?;
         if !output.base_restarts() {
-            // An older state that cannot be removed does no harm.
-            let _ = std::fs::remove_file(state_path(&self.folder, frame - STATES_KEPT));
+            // And those that a run was killed before it removed. One that cannot be removed does no harm.
+            let mut passed = (self.scene.shot.frames.first..=frame - STATES_KEPT).rev();
+            while passed.next().is_some_and(|old| std::fs::remove_file(state_path(&self.folder, old)).is_ok())
+            {
+            }
         }
         Ok(manifest)
     }

@@ -17,6 +17,9 @@ use crate::motion::Motion;
 
 /// A step's way against the length of the pieces that edges are cut into: measured, the fewest faces and the least time.
 const SHORTER: f64 = 1.5;
+/// But steps need be no shorter than this (cells), nor more than so many times those that arcs need: measured too.
+const LEAST_WAY: f64 = 4.0;
+const MOST_OF_ARCS: f64 = 1.5;
 /// Most steps that an interval between two kinks of a motion is split into.
 const MOST_STEPS: f64 = 1024.0;
 /// How far a body turns at most while five poses show its arcs (radians): a quarter turn.
@@ -266,7 +269,8 @@ impl Body {
             let [i, j] = edge.map(|vertex| vertex as usize);
             let way = (ends[1][i] - ends[0][i]).norm().max((ends[1][j] - ends[0][j]).norm());
             let length = (ends[0][i] - ends[0][j]).norm().max((ends[1][i] - ends[1][j]).norm());
-            SHORTER * (error / tolerance * way / length).sqrt()
+            let steps = SHORTER * (error / tolerance * way / length).sqrt();
+            steps.min((way / LEAST_WAY).max(MOST_OF_ARCS * arcs))
         };
         let twists =
             self.shape.topology.edges.par_iter().with_min_len(GRAIN).map(twist).reduce(|| 0.0, f64::max);

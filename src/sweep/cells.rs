@@ -1,10 +1,13 @@
 //! Which faces pass through the unit cell around each voxel, and the winding number at any point.
 
+use std::sync::atomic::{AtomicU64, Ordering};
+
 use rayon::prelude::*;
 
 use super::chain::Face;
 use super::lattice::{Fixed, UNITS};
-use super::prism::{Bundle, Prism};
+use super::lists::Lists;
+use super::prism::{Prism, Prisms};
 use super::region::{Region, each_block, extent};
 use super::winding::Lines;
 
@@ -37,6 +40,8 @@ pub struct Cells {
     slots: Vec<u32>,
     blocks: Vec<Block>,
     count: usize,
+    /// No others have this number.
+    id: u64,
 }
 
 /// The faces of one block.
@@ -50,24 +55,7 @@ struct Block {
     /// Their prisms, seen from the block's first voxel.
     prisms: Vec<Prism>,
     /// Which of them pass through each cell: 512 cells, or one.
-    cells: Lists,
-}
-
-/// Lists of places in a block's faces.
-struct Lists {
-    /// `items[start[i]..start[i + 1]]` are list i.
-    start: Vec<u32>,
-    items: Vec<u32>,
-}
-
-impl Lists {
-    fn count(&self) -> usize {
-        self.start.len() - 1
-    }
-
-    fn get(&self, list: usize) -> &[u32] {
-        &self.items[self.start[list] as usize..self.start[list + 1] as usize]
-    }
+    cells: Lists<u32>,
 }
 
 impl Cells {
@@ -79,19 +67,26 @@ impl Cells {
             (0..marked.len()).filter(|&block| marked[block]).map(|block| region.place(block)).collect();
         places.iter().enumerate().for_each(|(slot, &block)| slots[region.index(block)] = slot as u32);
         let lists = by_block(&faces, &normals, &region, &slots, places.len());
-        let sort = |(&place, ids): (&[i32; 3], Vec<u32>)| Block::new(place, ids, &faces, &normals);
-        let mut blocks: Vec<Block> = places.par_iter().zip(lists).map(sort).collect();
+        let sort = |(slot, &place)| Block::new(place, lists.get(slot).to_vec(), &faces, &normals);
+        let mut blocks: Vec<Block> = places.par_iter().enumerate().map(sort).collect();
         let mut count = 0;
         for block in &mut blocks {
             block.first = count;
             count += block.cells.count();
         }
-        Self { faces, normals, region, lines, slots, blocks, count }
+        static LAST: AtomicU64 = AtomicU64::new(0);
+        let id = LAST.fetch_add(1, Ordering::Relaxed) + 1;
+        Self { faces, normals, region, lines, slots, blocks, count, id }
     }
 
     /// Number of cells.
     pub fn count(&self) -> usize {
         self.count
+    }
+
+    /// The blocks.
+    pub fn places(&self) -> impl Iterator<Item = [i32; 3]> {
+        self.blocks.iter().map(|block| block.corner.map(|corner| corner >> 3))
     }
 
     /// Calls `see` with each cell's number and faces, in parallel.
@@ -128,7 +123,7 @@ impl Cells {
 
     /// Winding numbers of the chain at a point and at another at most [`super::prism::BESIDE`] cells away
     /// (fixed-point units): the nearest voxel's, and the faces between.
-    pub fn windings(&self, point: Point, beside: Point, bundle: &mut Bundle) -> [i32; 2] {
+    pub fn windings(&self, point: Point, beside: Point, prisms: &mut Prisms) -> [i32; 2] {
         let voxel = voxel_of(point);
         let mut winding = self.lines.winding(voxel);
         let Some(block) = self.block_of(voxel) else { return [winding; 2] };
@@ -141,7 +136,7 @@ impl Cells {
             let id = block.ids[place as usize];
             (block.prisms[place as usize], id, self.faces[id as usize].coef)
         };
-        bundle.take(block.first + cell, block.cells.get(cell).iter().map(prism));
+        let bundle = prisms.of(self.id, block.first + cell, || block.cells.get(cell).iter().map(prism));
         let change = bundle.ask(begin, local(point), local(beside));
         winding += change.along;
         for (id, coef) in bundle.unclear() {
@@ -182,7 +177,7 @@ impl Block {
         let prism = |&id: &u32| Prism::new(&faces[id as usize].v, &normals[id as usize], corner);
         let prisms = ids.iter().map(prism).collect();
         let cells = if ids.len() <= FEW {
-            Lists { start: vec![0, ids.len() as u32], items: (0..ids.len() as u32).collect() }
+            Lists::one((0..ids.len() as u32).collect())
         } else {
             by_cell(corner, &ids, faces, normals)
         };
@@ -195,22 +190,13 @@ impl Block {
 }
 
 /// For each unit cell around a block's voxels which of the block's faces may pass through it.
-fn by_cell(corner: [i32; 3], ids: &[u32], faces: &[Face], normals: &[Point]) -> Lists {
-    let mut pairs: Vec<(u16, u32)> = Vec::with_capacity(ids.len() * 4);
+fn by_cell(corner: [i32; 3], ids: &[u32], faces: &[Face], normals: &[Point]) -> Lists<u32> {
+    let mut pairs = Vec::with_capacity(ids.len() * 4);
     for (place, &id) in ids.iter().enumerate() {
         let (v, normal) = (&faces[id as usize].v, &normals[id as usize]);
-        each_cell(v, normal, corner, |voxel| pairs.push((inner(voxel) as u16, place as u32)));
+        each_cell(v, normal, corner, |voxel| pairs.push((inner(voxel) as u32, place as u32)));
     }
-    let mut start = vec![0u32; 513];
-    pairs.iter().for_each(|&(cell, _)| start[cell as usize + 1] += 1);
-    (1..513).for_each(|cell| start[cell] += start[cell - 1]);
-    let mut items = vec![0; pairs.len()];
-    let mut next = start.clone();
-    for &(cell, place) in &pairs {
-        items[next[cell as usize] as usize] = place;
-        next[cell as usize] += 1;
-    }
-    Lists { start, items }
+    Lists::new(512, &[pairs])
 }
 
 /// The voxel nearest to a point (fixed-point units).
@@ -228,13 +214,7 @@ fn inner(voxel: [i32; 3]) -> usize {
 }
 
 /// For each block in `slots` the faces that may pass through the unit cells of its voxels, ascending.
-fn by_block(
-    faces: &[Face],
-    normals: &[Point],
-    region: &Region,
-    slots: &[u32],
-    count: usize,
-) -> Vec<Vec<u32>> {
+fn by_block(faces: &[Face], normals: &[Point], region: &Region, slots: &[u32], count: usize) -> Lists<u32> {
     let pairs: Vec<Vec<(u32, u32)>> = faces
         .par_chunks(GRAIN)
         .enumerate()
@@ -252,9 +232,7 @@ fn by_block(
             out
         })
         .collect();
-    let mut lists = vec![Vec::new(); count];
-    pairs.iter().flatten().for_each(|&(slot, id)| lists[slot as usize].push(id));
-    lists
+    Lists::new(count, &pairs)
 }
 
 /// Calls `see` with the blocks of a region whose unit cells a triangle may pass through.

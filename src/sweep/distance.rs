@@ -1,14 +1,11 @@
 //! Exact distance from points to triangles, eight points at a time.
 //!
-//! The loop over eight lanes is plain Rust that the compiler turns into vector code; it is compiled
-//! once for each instruction set and gives the same bits in all of them (no fused multiply-add).
+//! Compiled once for each instruction set, with the same bits in all of them (no fused multiply-add).
 
 use crate::base::cpu::dispatch;
+use crate::base::lanes::{LANES, Lanes};
 
 use super::lattice::{Fixed, UNITS};
-
-/// Points handled at once.
-pub const LANES: usize = 8;
 
 /// Eight positions, in cells from the block's corner.
 #[derive(Debug, Clone, Copy)]
@@ -72,37 +69,52 @@ impl Triangle {
     /// Offsets from the nearest points to eight points: the kernel, inlined into each instruction set's copy.
     #[inline(always)]
     fn offsets(&self, points: &Points) -> Offsets {
-        let mut out = Offsets { x: [0.0; LANES], y: [0.0; LANES], z: [0.0; LANES], squared: [0.0; LANES] };
-        for lane in 0..LANES {
-            let p = [points.x[lane], points.y[lane], points.z[lane]];
-            let mut nearest = f32::INFINITY;
-            let mut offset = [0.0; 3];
-            let mut least_inward = f32::INFINITY;
-            for i in 0..3 {
-                let d = sub(p, self.corner[i]);
-                let t = dot(d, self.edge[i]) * self.inverse[i];
-                let t = if t > 0.0 { t } else { 0.0 };
-                let t = if t < 1.0 { t } else { 1.0 };
-                let e = self.edge[i];
-                let q = [d[0] - t * e[0], d[1] - t * e[1], d[2] - t * e[2]];
-                let squared = dot(q, q);
-                let nearer = squared < nearest;
-                nearest = if nearer { squared } else { nearest };
-                for axis in 0..3 {
-                    offset[axis] = if nearer { q[axis] } else { offset[axis] };
-                }
-                let inward = dot(d, self.inward[i]);
-                least_inward = if inward < least_inward { inward } else { least_inward };
+        let p = [Lanes(points.x), Lanes(points.y), Lanes(points.z)];
+        let mut nearest = Lanes::all(f32::INFINITY);
+        let mut offset = [Lanes::all(0.0); 3];
+        let mut inward = Lanes::all(f32::INFINITY);
+        for i in 0..3 {
+            let (d, e) = (away(p, self.corner[i]), all(self.edge[i]));
+            let t = inner(d, e) * Lanes::all(self.inverse[i]);
+            let t = t.max(Lanes::all(0.0)).min(Lanes::all(1.0));
+            let q = [d[0] - t * e[0], d[1] - t * e[1], d[2] - t * e[2]];
+            let squared = inner(q, q);
+            let nearer = squared.is_less(nearest);
+            nearest = nearer.choose(squared, nearest);
+            for axis in 0..3 {
+                offset[axis] = nearer.choose(q[axis], offset[axis]);
             }
-            let height = dot(sub(p, self.corner[0]), self.normal);
-            let over = least_inward > 0.0;
-            out.squared[lane] = if over { height * height } else { nearest };
-            out.x[lane] = if over { height * self.normal[0] } else { offset[0] };
-            out.y[lane] = if over { height * self.normal[1] } else { offset[1] };
-            out.z[lane] = if over { height * self.normal[2] } else { offset[2] };
+            inward = inner(d, all(self.inward[i])).min(inward);
         }
-        out
+        let normal = all(self.normal);
+        let height = inner(away(p, self.corner[0]), normal);
+        let over = Lanes::all(0.0).is_less(inward);
+        Offsets {
+            x: over.choose(height * normal[0], offset[0]).0,
+            y: over.choose(height * normal[1], offset[1]).0,
+            z: over.choose(height * normal[2], offset[2]).0,
+            squared: over.choose(height * height, nearest).0,
+        }
     }
+}
+
+/// A position or direction eight times.
+#[inline(always)]
+fn all(v: [f32; 3]) -> [Lanes; 3] {
+    [Lanes::all(v[0]), Lanes::all(v[1]), Lanes::all(v[2])]
+}
+
+/// Eight positions seen from another one.
+#[inline(always)]
+fn away(p: [Lanes; 3], from: [f32; 3]) -> [Lanes; 3] {
+    let from = all(from);
+    [p[0] - from[0], p[1] - from[1], p[2] - from[2]]
+}
+
+/// Inner products.
+#[inline(always)]
+fn inner(a: [Lanes; 3], b: [Lanes; 3]) -> Lanes {
+    a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
 }
 
 /// Distance of two points.
@@ -223,16 +235,14 @@ pub fn near_lanes(offsets: &[Offsets], radius: f32, reach: f32, out: &mut Vec<u8
 pub fn nearest(triangles: &[Triangle], list: &[u32], points: &Points) -> ([f32; LANES], [u32; LANES]) {
     #[inline(always)]
     fn body(triangles: &[Triangle], list: &[u32], points: &Points) -> ([f32; LANES], [u32; LANES]) {
-        let (mut best, mut ids) = ([f32::INFINITY; LANES], [0; LANES]);
+        let (mut best, mut ids) = (Lanes::all(f32::INFINITY), [0; LANES]);
         for &triangle in list {
-            let squared = triangles[triangle as usize].offsets(points).squared;
-            for lane in 0..LANES {
-                let nearer = squared[lane] < best[lane];
-                best[lane] = if nearer { squared[lane] } else { best[lane] };
-                ids[lane] = if nearer { triangle } else { ids[lane] };
-            }
+            let squared = Lanes(triangles[triangle as usize].offsets(points).squared);
+            let nearer = squared.is_less(best);
+            best = nearer.choose(squared, best);
+            ids = nearer.choose_number(triangle, ids);
         }
-        (best, ids)
+        (best.0, ids)
     }
     dispatch!(body(triangles: &[Triangle], list: &[u32], points: &Points) -> ([f32; LANES], [u32; LANES]))
 }

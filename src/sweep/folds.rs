@@ -20,6 +20,8 @@ use crate::base::DVec3;
 const SHORT: f64 = 1e-3;
 /// Edge of the boxes that tetrahedra are sorted into (cells).
 const BOX: f64 = 1.0;
+/// Triangles or edges that a task handles.
+const GRAIN: usize = 4096;
 /// Where a tetrahedron is asked: barycentric weights, off all symmetries.
 const SAMPLES: [[f64; 4]; 5] = [
     [0.252, 0.249, 0.251, 0.248],
@@ -65,7 +67,8 @@ fn folded_blocks(topology: &Topology, levels: &[Vec<Fixed>], window: &Window) ->
     let blocks: Vec<Vec<[i32; 3]>> = levels
         .par_iter()
         .map(|level| {
-            let faces: Vec<Face> = topology.simplices.iter().map(|simplex| face(simplex, level)).collect();
+            let simplices = topology.simplices.par_iter().with_min_len(GRAIN);
+            let faces: Vec<Face> = simplices.map(|simplex| face(simplex, level)).collect();
             negative_blocks(&faces, window)
         })
         .collect();
@@ -89,7 +92,7 @@ fn is_rigid(topology: &Topology, levels: &[Vec<Fixed>]) -> bool {
     };
     levels[1..].iter().all(|level| {
         let same = |edge: &[u32; 2]| (length(level, *edge) - length(&levels[0], *edge)).abs() < 4.0;
-        topology.edges.par_iter().with_min_len(4096).all(same)
+        topology.edges.par_iter().with_min_len(GRAIN).all(same)
     })
 }
 
@@ -100,7 +103,11 @@ fn negative_blocks(faces: &[Face], window: &Window) -> Vec<[i32; 3]> {
         return Vec::new();
     };
     let mut out = Vec::new();
-    Lines::scan(faces, &region).each_line(|[x, y], line| {
+    let lines = Lines::scan(faces, &region);
+    if lines.least_winding() >= 0 {
+        return out;
+    }
+    lines.each_line(|[x, y], line| {
         let negative = line.windows(2).filter(|pair| pair[0].1 < 0 && pair[1].0 - pair[0].0 > SHORT);
         for pair in negative {
             let [first, last] = [pair[0].0, pair[1].0].map(|z| (z / 8.0).floor() as i32);

@@ -32,10 +32,13 @@ pub fn chain(ctx: &Context, bodies: &[Body], from: f64, to: f64, settings: &Sett
     first.motion().pose(from, &mut pose)?;
     let lattice = Lattice::near(settings.voxel, pose[0])?;
     let faces = ctx.stage("chain", || {
-        let parts: Vec<Vec<Face>> = bodies
-            .iter()
-            .map(|body| body.chain(ctx, from, to, &lattice, settings.tolerance, &EVERYWHERE))
-            .collect::<Result<_>>()?;
+        ctx.expect(bodies.len());
+        let faces = |body: &Body| {
+            let faces = body.chain(ctx, from, to, &lattice, settings.tolerance, &EVERYWHERE);
+            ctx.advance();
+            faces
+        };
+        let parts: Vec<Vec<Face>> = bodies.iter().map(faces).collect::<Result<_>>()?;
         Ok(parts.concat())
     })?;
     fill(ctx, faces, lattice, settings.half_width)
@@ -57,6 +60,7 @@ pub fn voxelise(ctx: &Context, mesh: TriMesh, settings: &Settings) -> Result<Flo
 pub fn fill(ctx: &Context, faces: Vec<Face>, lattice: Lattice, half_width: f32) -> Result<FloatGrid> {
     let band = Band { inside: half_width, outside: half_width };
     let voxeliser = ctx.stage("winding", || {
+        ctx.expect(Voxeliser::PARTS);
         Voxeliser::new(ctx, faces, lattice, band, ALL_VOXELS, |blocks| Ok(vec![true; blocks.len()]))
     })?;
     let mut grid = FloatGrid::level_set(lattice.voxel, half_width)?;
@@ -83,9 +87,11 @@ fn pieces(
     voxel: f64,
     half_width: f32,
 ) -> Vec<BlockEdit> {
+    ctx.expect(batch.len());
     batch
         .par_iter()
         .map_init(Scratch::default, |scratch, &index| {
+            ctx.advance();
             if ctx.check().is_err() { None } else { voxeliser.piece(index, &ALL, scratch) }
         })
         .filter_map(|piece| {

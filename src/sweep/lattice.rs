@@ -24,6 +24,12 @@ pub struct Lattice {
     pub base: [i32; 3],
 }
 
+/// The whole number below a value, as `floor` gives it, which is a call where a processor has no instruction for it.
+pub fn floor(value: f64) -> i32 {
+    let cut = value as i32;
+    cut.saturating_sub(i32::from(value < f64::from(cut)))
+}
+
 impl Lattice {
     /// A lattice whose base lies at the block nearest to a world position (m).
     ///
@@ -71,4 +77,16 @@ impl Lattice {
 pub fn too_far(what: &str, far: f64, from: &str, voxel: f64) -> String {
     let reach = REACH * voxel;
     format!("{what} {far:.0} m from {from}, farther than {reach:.0} m, the reach of cells of {voxel} m")
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn floor_rounds_down_on_both_sides_of_zero() {
+        for value in [-3.0, -2.5, -1e-9, 0.0, 1e-9, 2.5, 7.0, -1e12, 1e12, f64::INFINITY, f64::NEG_INFINITY] {
+            assert_eq!(floor(value), value.floor() as i32, "{value}");
+        }
+    }
 }

@@ -4,18 +4,19 @@
 //! for arcs (`body.rs`), edges cut where their ends move differently (`refine.rs`), winding numbers by
 //! exact line crossings (`winding.rs`, `exposure.rs`), order in time where a skin folds inside out (`folds.rs`), the parts
 //! of faces that bound the volume (`cells.rs`, `surface.rs`; `patch.rs` where many sheets nearly coincide), then exact
-//! distances in the narrow band (`nearest.rs`, `depth.rs`,
-//! `voxelise.rs`).
+//! distances in the narrow band (`nearest.rs`, `depth.rs`, `voxelise.rs`).
 //! [`samples`] is the thesis' way (section 3.2): the union of N + 1 poses, dilated and smoothed.
 
 mod body;
 mod cells;
 mod chain;
+mod columns;
 mod depth;
 mod distance;
 mod exposure;
 mod folds;
 mod lattice;
+mod lists;
 mod nearest;
 mod patch;
 mod prism;

@@ -1,20 +1,26 @@
 //! Nearest triangle of every voxel of a block, by halving: bounds at the centres of 4^3 and 2^3
 //! sub-blocks leave few triangles for the exact distances.
 
-use super::distance::{LANES, Offsets, Points, Triangle, near_lanes, nearest, prune, to_each};
-use super::prism::Bundle;
+use super::distance::{Offsets, Points, Triangle, near_lanes, nearest, prune, to_each};
+use super::prism::Prisms;
 use crate::base::blocks::{Mask, offset};
+use crate::base::lanes::LANES;
 
 /// Working memory of one thread.
 #[derive(Default)]
 pub struct Scratch {
+    pub(super) search: Search,
+    pub(super) prisms: Prisms,
+}
+
+/// Working memory of [`search`].
+#[derive(Default)]
+pub struct Search {
     lists: [Vec<u32>; 4],
     offsets: [Vec<Offsets>; 2],
     /// For each triangle the sub-blocks in which it can be nearest to a voxel, a bit each.
     lanes: [Vec<u8>; 2],
     centre: Vec<[f32; 4]>,
-    /// What [`super::voxelise`] asks whether points bound the volume with.
-    pub bundle: Bundle,
 }
 
 /// Half diagonals between the voxel centres of a 4^3 and of a 2^3 sub-block, with room for rounding.
@@ -22,6 +28,8 @@ const RADII: [f32; 2] = [2.599, 0.867];
 
 /// Eight voxels, 2^3, and the triangles nearest to them.
 pub struct Group<'a> {
+    /// The number of the first one in its block.
+    first: usize,
     /// Positions from the block's corner (cells).
     pub points: Points,
     /// Squared distances (cells^2).
@@ -32,13 +40,22 @@ pub struct Group<'a> {
     pub near: &'a [u32],
     /// See `near`.
     pub complete: f32,
+    /// Offsets of eight sub-blocks' middles from all triangles, and which of them the voxels are in.
+    far: (&'a [Offsets], usize),
 }
 
 impl Group<'_> {
     /// Number of a voxel in its block.
     pub fn voxel(&self, lane: usize) -> usize {
-        let [x, y, z] = [self.points.x, self.points.y, self.points.z].map(|axis| axis[lane] as usize);
-        offset(x, y, z)
+        self.first + offset(lane >> 2, lane >> 1 & 1, lane & 1)
+    }
+
+    /// All triangles within so many cells of a voxel, and some farther away.
+    pub fn within(&self, cells: f32) -> Vec<u32> {
+        let (far, sub_block) = self.far;
+        let most = (cells + RADII[0]).powi(2);
+        let near = far.iter().zip(0..).filter(|(offset, _)| offset.squared[sub_block] <= most);
+        near.map(|(_, id)| id).collect()
     }
 }
 
@@ -48,21 +65,21 @@ pub fn search(
     triangles: &[Triangle],
     reach: f32,
     wanted: &Mask,
-    scratch: &mut Scratch,
+    scratch: &mut Search,
     mut see: impl FnMut(&Group<'_>),
 ) {
-    let Scratch { lists: [all, some, near, few], offsets: [far, mid], lanes, centre, .. } = scratch;
+    let Search { lists: [all, some, near, few], offsets: [far, mid], lanes, centre } = scratch;
     all.clear();
     all.extend(0..triangles.len() as u32);
     to_each(triangles, all, &points([0.0; 3], 4.0, 1.5), far);
     let far_near = near_lanes(far, RADII[0], reach, &mut lanes[0]);
-    for (lane, in_reach) in far_near.into_iter().enumerate() {
-        let corner = corner_of([0.0; 3], 4.0, lane);
+    for (sub_block, in_reach) in far_near.into_iter().enumerate() {
+        let corner = corner_of([0.0; 3], 4.0, sub_block);
         if !in_reach || !any_wanted(wanted, corner, 4) {
             continue;
         }
         some.clear();
-        some.extend(all.iter().zip(&lanes[0]).filter(|(_, bits)| **bits >> lane & 1 == 1).map(|(&id, _)| id));
+        each_near(&lanes[0], sub_block, |at| some.push(at as u32));
         to_each(triangles, some, &points(corner, 2.0, 0.5), mid);
         let mid_near = near_lanes(mid, RADII[1], reach, &mut lanes[1]);
         for (lane, in_reach) in mid_near.into_iter().enumerate() {
@@ -72,18 +89,40 @@ pub fn search(
             }
             near.clear();
             centre.clear();
-            for (at, _) in lanes[1].iter().enumerate().filter(|(_, bits)| **bits >> lane & 1 == 1) {
+            each_near(&lanes[1], lane, |at| {
                 let offset = &mid[at];
                 near.push(some[at]);
                 centre.push([offset.x[lane], offset.y[lane], offset.z[lane], offset.squared[lane]]);
-            }
+            });
             let least = centre.iter().map(|offset| offset[3]).fold(f32::INFINITY, f32::min).sqrt();
             let complete = (least + RADII[1]).min(reach);
             few.clone_from(near);
             prune(few, centre);
             let points = points(corner, 1.0, 0.0);
             let (squared, nearest) = nearest(triangles, few, &points);
-            see(&Group { points, squared, nearest, near, complete });
+            let [x, y, z] = corner.map(|value| value as usize);
+            see(&Group {
+                first: offset(x, y, z),
+                points,
+                squared,
+                nearest,
+                near,
+                complete,
+                far: (far, sub_block),
+            });
+        }
+    }
+}
+
+/// Calls `see` with the place of each byte in which the bit of a sub-block is set: most have none, eight are seen at once.
+fn each_near(bits: &[u8], sub_block: usize, mut see: impl FnMut(usize)) {
+    for (eight, begin) in bits.chunks(8).zip((0..).step_by(8)) {
+        let mut bytes = [0; 8];
+        bytes[..eight.len()].copy_from_slice(eight);
+        let mut set = u64::from_le_bytes(bytes) >> sub_block & 0x0101_0101_0101_0101;
+        while set != 0 {
+            see(begin + set.trailing_zeros() as usize / 8);
+            set &= set - 1;
         }
     }
 }

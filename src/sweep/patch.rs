@@ -7,10 +7,10 @@
 
 use rayon::prelude::*;
 
-use super::cells::{Cells, Point, cross, difference, dot, voxel_of};
+use super::cells::{Cells, Point, cross, difference, dot};
 use super::exposure::{Exposure, Spot};
 use super::lattice::{Fixed, UNITS};
-use super::prism::Bundle;
+use super::prism::Prisms;
 use super::surface::Facet;
 use crate::context::Context;
 use crate::error::Result;
@@ -27,10 +27,8 @@ const REACH: f64 = 1.0;
 const HALVINGS: usize = 4;
 /// A patch that reaches less far than this on average leaves its face to speak for itself.
 const LEAST: f64 = 0.25;
-/// Cells around a patch whose prisms are kept at hand.
-const KEPT: usize = 12;
 /// Spots that a task handles: fixed, so that nothing depends on the number of threads.
-const GRAIN: usize = 128;
+const GRAIN: usize = 32;
 /// In how many ways a patch reaches, in its plane.
 const WAYS: usize = 12;
 
@@ -38,10 +36,7 @@ const WAYS: usize = 12;
 struct Patches<'a> {
     cells: &'a Cells,
     exposure: &'a Exposure,
-    /// The cells that were asked last.
-    bundles: Vec<(usize, Bundle)>,
-    /// The one to give up next.
-    oldest: usize,
+    prisms: Prisms,
 }
 
 /// Patches of the surface around the spots of stacks.
@@ -49,7 +44,7 @@ struct Patches<'a> {
 /// # Errors
 /// Cancel.
 pub fn patches(ctx: &Context, cells: &Cells, exposure: &Exposure) -> Result<Vec<Facet>> {
-    let asks = || Patches { cells, exposure, bundles: Vec::new(), oldest: 0 };
+    let asks = || Patches { cells, exposure, prisms: Prisms::default() };
     let make = |asks: &mut Patches<'_>, spots: &[Spot]| {
         let mut out = Vec::with_capacity(spots.len() * 2);
         spots.iter().take_while(|_| ctx.check().is_ok()).for_each(|spot| asks.patch(spot, &mut out));
@@ -95,7 +90,7 @@ impl Patches<'_> {
         let slope = normal[spot.axis.index()].abs();
         let beside = (-1..=1).flat_map(|p| (-1..=1).map(move |q| [p, q])).filter(|beside| *beside != [0, 0]);
         beside.into_iter().all(|[p, q]| {
-            let place = on_plane(spot, normal, [p as f64, q as f64])[spot.axis.index()];
+            let place = on_plane(spot, normal, [p, q].map(f64::from))[spot.axis.index()];
             self.exposure.agrees(spot, [spot.line[0] + p, spot.line[1] + q], place, OFF_BESIDE / slope)
         })
     }
@@ -117,27 +112,11 @@ impl Patches<'_> {
         (first + last) / 2.0
     }
 
-    /// The prisms of a cell, if they were asked lately.
-    fn bundle(&mut self, cell: Option<usize>) -> &mut Bundle {
-        let cell = cell.unwrap_or(usize::MAX);
-        let place = self.bundles.iter().position(|(other, _)| *other == cell).unwrap_or_else(|| {
-            if self.bundles.len() < KEPT {
-                self.bundles.push((cell, Bundle::default()));
-                return self.bundles.len() - 1;
-            }
-            self.oldest = (self.oldest + 1) % KEPT;
-            self.bundles[self.oldest].0 = cell;
-            self.oldest
-        });
-        &mut self.bundles[place].1
-    }
-
     /// Whether the volume lies close behind a point of a plane, and not in front.
     fn is_surface(&mut self, at: Point, normal: &Point) -> bool {
         let mut winding = |side: f64| {
             let place = [0, 1, 2].map(|axis| (at[axis] + side * OFF * normal[axis]) * f64::from(UNITS));
-            let cells = self.cells;
-            cells.windings(place, place, self.bundle(cells.of_voxel(voxel_of(place))))[0]
+            self.cells.windings(place, place, &mut self.prisms)[0]
         };
         winding(1.0) < 1 && winding(-1.0) >= 1
     }

@@ -33,10 +33,53 @@ impl Prism {
     }
 }
 
-/// The prisms of one cell side by side, as one thread asks them: those of the cell that it asked last.
+/// Cells whose prisms are kept at hand.
+const KEPT: usize = 12;
+
+/// The prisms of the cells that one thread asked last.
+#[derive(Default)]
+pub struct Prisms {
+    /// The chain that they are of.
+    chain: u64,
+    /// Numbers of the cells.
+    cells: Vec<usize>,
+    bundles: Vec<Bundle>,
+    /// The one to give up next.
+    oldest: usize,
+}
+
+impl Prisms {
+    /// The prisms of a chain's cell, each made with its face's number and coefficient if it is not at hand.
+    pub fn of<I>(&mut self, chain: u64, cell: usize, prisms: impl FnOnce() -> I) -> &mut Bundle
+    where
+        I: Iterator<Item = (Prism, u32, i32)>,
+    {
+        if self.chain != chain {
+            self.chain = chain;
+            self.cells.clear();
+        }
+        if let Some(place) = self.cells.iter().position(|&other| other == cell) {
+            return &mut self.bundles[place];
+        }
+        let place = if self.cells.len() < KEPT {
+            self.cells.push(cell);
+            self.cells.len() - 1
+        } else {
+            self.oldest = (self.oldest + 1) % KEPT;
+            self.cells[self.oldest] = cell;
+            self.oldest
+        };
+        if place == self.bundles.len() {
+            self.bundles.push(Bundle::default());
+        }
+        self.bundles[place].take(prisms());
+        &mut self.bundles[place]
+    }
+}
+
+/// The prisms of one cell side by side.
 #[derive(Default)]
 pub struct Bundle {
-    cell: Option<usize>,
     groups: Vec<Group>,
     /// Each one's face, lane after lane.
     faces: Vec<u32>,
@@ -60,17 +103,8 @@ pub struct Change {
 }
 
 impl Bundle {
-    /// Forgets which cell it has: the next may be of another chain.
-    pub fn forget(&mut self) {
-        self.cell = None;
-    }
-
-    /// Takes the prisms of a cell, each with its face's number and coefficient, unless it has them.
-    pub fn take(&mut self, cell: usize, prisms: impl Iterator<Item = (Prism, u32, i32)>) {
-        if self.cell == Some(cell) {
-            return;
-        }
-        self.cell = Some(cell);
+    /// Takes the prisms of a cell, each with its face's number and coefficient.
+    fn take(&mut self, prisms: impl Iterator<Item = (Prism, u32, i32)>) {
         self.groups.clear();
         self.faces.clear();
         for (Prism(functions), face, coef) in prisms {
@@ -177,7 +211,7 @@ mod tests {
             (Prism::new(&v, &[0.0, 0.0, 1.0], [0; 3]), 100 + k as u32, k + 1)
         };
         let mut bundle = Bundle::default();
-        bundle.take(7, (0..11).map(sheet));
+        bundle.take((0..11).map(sheet));
         bundle
     }
 

@@ -1,7 +1,7 @@
 //! A box of blocks around the work, and sets of its blocks.
 
 use super::chain::Face;
-use super::lattice::{Fixed, UNITS};
+use super::lattice::{Fixed, UNITS, floor};
 use crate::error::{Error, Result};
 
 /// Most blocks a region may span: its index then fits 1 GiB.
@@ -116,5 +116,5 @@ pub fn each_block(first: [i32; 3], last: [i32; 3]) -> impl Iterator<Item = [i32;
 
 /// Block of a coordinate (cells), saturating where there is none.
 fn block_of(cells: f32) -> i32 {
-    (cells / 8.0).floor() as i32
+    floor(f64::from(cells) / 8.0)
 }

@@ -3,6 +3,11 @@
 use super::winding::Lines;
 use crate::base::blocks::Mask;
 
+/// The voxels of a line.
+const LINE: u16 = (1 << 10) - 1;
+/// Those of them in the block.
+const OWN: u16 = LINE >> 1 & !1;
+
 /// The voxels inside the volume, of a block and one further on each side: bit z + 1 of `[x + 1][y + 1]`.
 pub struct Signs([[u16; 10]; 10]);
 
@@ -12,15 +17,7 @@ impl Signs {
         let mut columns = [[0; 10]; 10];
         for (x, row) in (-1..).zip(&mut columns) {
             for (y, bits) in (-1..).zip(row) {
-                let line = lines.line(corner[0] + x, corner[1] + y);
-                let mut next = line.partition_point(|(height, _)| *height < f64::from(corner[2] - 1));
-                for z in -1..9 {
-                    while next < line.len() && line[next].0 < f64::from(corner[2] + z) {
-                        next += 1;
-                    }
-                    let solid = next > 0 && line[next - 1].1 >= 1;
-                    *bits |= u16::from(solid) << (z + 1);
-                }
+                *bits = inside(lines.line(corner[0] + x, corner[1] + y), corner[2] - 1);
             }
         }
         Self(columns)
@@ -36,6 +33,11 @@ impl Signs {
     pub fn each_change(&self, mut see: impl FnMut(usize, usize, bool)) {
         for (x, y) in (1..9).flat_map(|x| (1..9).map(move |y| (x, y))) {
             let own = self.0[x][y];
+            let around = [self.0[x - 1][y], self.0[x + 1][y], self.0[x][y - 1], self.0[x][y + 1]];
+            let same = |other: u16| (own ^ other) & OWN == 0;
+            if around.into_iter().all(same) && [0, LINE].contains(&own) {
+                continue;
+            }
             let changes = [
                 (self.0[x - 1][y] ^ own, 0, false),
                 (self.0[x + 1][y] ^ own, 0, true),
@@ -56,12 +58,21 @@ impl Signs {
     }
 }
 
-/// The voxel beside one of a block along an axis, above or below; none in another block.
-pub fn beside(voxel: usize, axis: usize, above: bool) -> Option<usize> {
-    let shift = 6 - 3 * axis;
-    match (voxel >> shift & 7, above) {
-        (7, true) | (0, false) => None,
-        (_, true) => Some(voxel + (1 << shift)),
-        (_, false) => Some(voxel - (1 << shift)),
+/// Which of the voxels of a line are inside: a bit each, from a height upward.
+fn inside(line: &[(f64, i32)], first: i32) -> u16 {
+    let first = f64::from(first);
+    let above = line.partition_point(|(height, _)| *height < first);
+    let mut is_inside = above > 0 && line[above - 1].1 >= 1;
+    let mut bits = if is_inside { LINE } else { 0 };
+    for (height, winding) in &line[above..] {
+        let next = (*height - first) as usize + 1;
+        if next >= 10 {
+            break;
+        }
+        if (*winding >= 1) != is_inside {
+            is_inside = !is_inside;
+            bits ^= LINE & (LINE << next);
+        }
     }
+    bits
 }

@@ -13,7 +13,7 @@ use super::cells::{Cells, Point, cross, difference, dot, each_voxel, sub, voxel_
 use super::exposure::{BURIED, Exposure, OPEN, THIN};
 use super::lattice::{Fixed, UNITS};
 use super::patch::patches;
-use super::prism::Bundle;
+use super::prism::Prisms;
 use super::region::extent;
 use crate::context::Context;
 use crate::error::Result;
@@ -64,7 +64,7 @@ const GRAIN: usize = 128;
 struct Surface<'a> {
     cells: &'a Cells,
     exposure: &'a Exposure,
-    bundle: Bundle,
+    prisms: Prisms,
 }
 
 /// The surface of a chain near the blocks of its cells.
@@ -72,7 +72,7 @@ struct Surface<'a> {
 /// # Errors
 /// Cancel.
 pub fn surface(ctx: &Context, cells: &Cells, exposure: &Exposure) -> Result<Vec<Facet>> {
-    let chain = || Surface { cells, exposure, bundle: Bundle::default() };
+    let chain = || Surface { cells, exposure, prisms: Prisms::default() };
     let order = order(cells);
     let verdict = |chain: &mut Surface<'_>, &id: &u32| {
         if ctx.check().is_err() { BURIED } else { chain.verdict(id as usize) }
@@ -95,7 +95,6 @@ pub fn surface(ctx: &Context, cells: &Cells, exposure: &Exposure) -> Result<Vec<
     ctx.check()?;
     let mut facets = parts.concat();
     facets.extend(patches(ctx, cells, exposure)?);
-    facets.par_sort_by_key(|facet| facet.face);
     Ok(facets)
 }
 
@@ -124,32 +123,36 @@ fn neighbourhoods(cells: &Cells, exposure: &Exposure, verdicts: &[u8]) -> (Vec<u
 }
 
 /// Whether a point of a face (fixed-point units), moved a hair along its normal, is outside the chain.
-pub fn is_open(cells: &Cells, exposure: &Exposure, face: u32, at: Point, bundle: &mut Bundle) -> bool {
-    ahead(cells, face as usize).is_some_and(|ahead| ask(cells, exposure, at, ahead, bundle) == OPEN)
+pub fn is_open(cells: &Cells, exposure: &Exposure, face: u32, at: Point, prisms: &mut Prisms) -> bool {
+    ahead(cells, face as usize).is_some_and(|ahead| ask(cells, exposure, at, ahead, prisms) == OPEN)
 }
 
-/// The parts of a facet that is not sure where they are open.
-pub fn clipped(cells: &Cells, exposure: &Exposure, facet: &Facet, bundle: &mut Bundle) -> Vec<Corners> {
-    let Some(ahead) = ahead(cells, facet.face as usize) else { return Vec::new() };
-    let mut surface = Surface { cells, exposure, bundle: std::mem::take(bundle) };
-    let (mut parts, mut out) = (vec![facet.v], Vec::new());
-    while let Some(part) = parts.pop() {
-        if is_small(&part) { surface.clip(part, ahead, &mut out) } else { parts.extend(halves(part)) }
-    }
-    *bundle = surface.bundle;
+/// What of a small part of a face is open.
+pub fn open_parts(
+    cells: &Cells,
+    exposure: &Exposure,
+    face: u32,
+    v: &Corners,
+    prisms: &mut Prisms,
+) -> Vec<Corners> {
+    let Some(ahead) = ahead(cells, face as usize) else { return Vec::new() };
+    let mut surface = Surface { cells, exposure, prisms: std::mem::take(prisms) };
+    let mut out = Vec::new();
+    surface.clip(*v, ahead, &mut out);
+    *prisms = surface.prisms;
     out.into_iter().map(|(v, _)| v).collect()
 }
 
 /// Whether a point of a face is open: the chain is absent a hair in front of it, and not behind; of a stack, [`THIN`] in
 /// front of it.
-fn ask(cells: &Cells, exposure: &Exposure, at: Point, ahead: Point, bundle: &mut Bundle) -> u8 {
+fn ask(cells: &Cells, exposure: &Exposure, at: Point, ahead: Point, prisms: &mut Prisms) -> u8 {
     let moved = |side: f64| [0, 1, 2].map(|axis| at[axis] + side * ahead[axis]);
-    let [front, back] = cells.windings(moved(1.0), moved(-1.0), bundle);
+    let [front, back] = cells.windings(moved(1.0), moved(-1.0), prisms);
     if back < 1 {
         return BURIED;
     }
     let open = front < 1
-        || exposure.is_stack(cells, voxel_of(at)) && cells.windings(moved(THIN_HAIRS), at, bundle)[0] < 1;
+        || exposure.is_stack(cells, voxel_of(at)) && cells.windings(moved(THIN_HAIRS), at, prisms)[0] < 1;
     if open { OPEN } else { BURIED }
 }
 
@@ -313,7 +316,7 @@ impl Surface<'_> {
     }
 
     fn ask(&mut self, at: Point, ahead: Point) -> u8 {
-        ask(self.cells, self.exposure, at, ahead, &mut self.bundle)
+        ask(self.cells, self.exposure, at, ahead, &mut self.prisms)
     }
 
     /// Whether distances may be wanted near a point, and no stack's patches give them.
@@ -322,7 +325,8 @@ impl Surface<'_> {
     }
 }
 
-fn is_small(v: &Corners) -> bool {
+/// Whether a part of a face is asked as one.
+pub fn is_small(v: &Corners) -> bool {
     let (low, high) = extent(v);
     (0..3).all(|axis| high[axis] - low[axis] <= SMALL)
 }
@@ -366,7 +370,7 @@ fn between(a: Point, b: Point, t: f64) -> Point {
 }
 
 /// A triangle cut across its longest edge.
-fn halves(v: Corners) -> [Corners; 2] {
+pub fn halves(v: Corners) -> [Corners; 2] {
     let [a, b, c] = from_longest(&v);
     let m = between(a.map(f64::from), b.map(f64::from), 0.5).map(|value| value.round() as i32);
     [[a, m, c], [m, b, c]]

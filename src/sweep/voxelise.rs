@@ -7,15 +7,16 @@ use rayon::prelude::*;
 use super::cells::Cells;
 use super::chain::Face;
 use super::depth::{Chain, Depths, Near};
-use super::distance::{LANES, Triangle, gap};
+use super::distance::{Triangle, gap};
 use super::exposure::Exposure;
 use super::lattice::Lattice;
 use super::nearest::{Scratch, search};
 use super::region::{Region, each_block, extent};
-use super::signs::{Signs, beside};
+use super::signs::Signs;
 use super::surface::{Facet, surface};
 use super::winding::Lines;
 use crate::base::blocks::{Mask, Origin, Values};
+use crate::base::lanes::LANES;
 use crate::context::Context;
 use crate::error::Result;
 
@@ -86,13 +87,13 @@ const ON_FACE: f32 = 1e-4;
 /// How far (cells) a voxel can be from a surface between it and its neighbour that no line has placed: one that touches
 /// either of them.
 const UNSEEN: f32 = 1.0;
-/// How far (cells) two neighbours of opposite sign may be from the surface between them, added up: 1, with room for
-/// what the faces and the motion are approximated by.
-const MOST_APART: f32 = 1.2;
 /// All voxels of a block.
 pub const ALL: Mask = [u64::MAX; 8];
 
 impl Voxeliser {
+    /// Pieces of work that [`Voxeliser::new`] tells a context of.
+    pub const PARTS: usize = 4;
+
     /// Sorts the faces into blocks and scans the winding numbers, inside the voxel box `low..=high`
     /// (from the lattice's base voxel). `wanted` says of blocks, by origin, whether distances are wanted.
     ///
@@ -124,16 +125,20 @@ impl Voxeliser {
         let near = marked.iter().filter(|&&marked| marked).count();
         ctx.allow(REGION, (region.blocks() * BYTES_PER_BLOCK + near * BYTES_PER_NEAR_BLOCK) as u64)?;
         let lines = Lines::scan(&faces, &region);
+        ctx.advance();
         ctx.check()?;
         retain(&mut faces, |face| {
             let (first, last) = region.touched(extent(&face.v), 0.0);
             each_block(first, last).any(|block| relevant[region.index(block)])
         });
         let cells = Cells::new(faces, region, &relevant, lines);
+        ctx.advance();
         ctx.check()?;
         let exposure = Exposure::scan(&cells);
+        ctx.advance();
         ctx.check()?;
         let facets = surface(ctx, &cells, &exposure)?;
+        ctx.advance();
         let mut voxeliser = Self {
             lattice,
             band,
@@ -298,10 +303,10 @@ impl Voxeliser {
             ids.iter().map(|&id| Triangle::new(&self.facets[id as usize].v, corner)).collect();
         let (cells, exposure, facets) = (&self.cells, &self.exposure, &self.facets[..]);
         let reach = self.band.inside;
-        let near =
-            Near::new(Chain { cells, exposure, facets }, corner, ids, &triangles, reach, &mut scratch.bundle);
+        let Scratch { search: memory, prisms } = scratch;
+        let near = Near::new(Chain { cells, exposure, facets }, corner, ids, &triangles, reach, prisms);
         let mut found = false;
-        search(&triangles, self.band.reach(), wanted, scratch, |group| {
+        search(&triangles, self.band.reach(), wanted, memory, |group| {
             let mut depths = Depths::new(&near, group);
             for lane in 0..LANES {
                 let voxel = group.voxel(lane);
@@ -316,20 +321,15 @@ impl Voxeliser {
                 distances[voxel] = distances[voxel].min(distance);
             }
         });
-        scratch.bundle = near.into_bundle();
         found
     }
 
-    /// Lowers the distances of neighbours of opposite sign that are too far from the surface between them, as far as
-    /// is known here, to where lines have met it; whether there were any.
+    /// Lowers the distances of neighbours of opposite sign to where lines meet the surface between them; whether any
+    /// was larger.
     fn mend_changes(&self, block: [i32; 3], wanted: &Mask, signs: &Signs, distances: &mut Values) -> bool {
-        let before = *distances;
         let mut mended = false;
         signs.each_change(|voxel, axis, above| {
-            // What a neighbour in another block has is not known: lines decide.
-            let are_near =
-                beside(voxel, axis, above).is_some_and(|other| before[voxel] + before[other] <= MOST_APART);
-            if !are_near && holds(wanted, voxel) {
+            if holds(wanted, voxel) {
                 let most = self.most_distance(block.map(|b| b * 8), voxel, axis, above);
                 mended |= most < distances[voxel];
                 distances[voxel] = distances[voxel].min(most);

@@ -8,28 +8,16 @@
 use rayon::prelude::*;
 
 use super::chain::Face;
-use super::lattice::{Fixed, UNITS};
+use super::columns::Columns;
+use super::lattice::{Fixed, UNITS, floor};
+use super::lists::Lists;
 use super::region::{Region, each_block, extent};
-
-/// One crossing: where along the line (cells from the base voxel), and by how much the winding
-/// number changes when it is passed upward.
-#[derive(Debug, Clone, Copy)]
-struct Crossing {
-    line: u32,
-    change: i32,
-    z: f64,
-}
 
 /// Lines (x, y) through the voxels of a region, each with its sorted crossings; none where no face is above or below.
 pub struct Lines {
-    /// Least and greatest block column.
-    low: [i32; 2],
-    high: [i32; 2],
-    /// For each block column of the region the index of its 64 lines, or [`NONE`].
-    columns: Vec<u32>,
-    start: Vec<u32>,
+    columns: Columns,
     /// Where a crossing is, and the winding number above it.
-    crossings: Vec<(f64, i32)>,
+    crossings: Lists<(f64, i32)>,
 }
 
 /// Faces a task scans: fixed, so that nothing depends on the number of threads.
@@ -38,39 +26,38 @@ const GRAIN: usize = 2048;
 const NEAR: f64 = 1e-6;
 /// Where they are then put: so far above or below (cells).
 const BESIDE: f64 = 1e-7;
-/// No lines.
-const NONE: u32 = u32::MAX;
 
 impl Lines {
     /// Scans faces along the lines through the voxels of a region.
     pub fn scan(faces: &[Face], region: &Region) -> Self {
         let [low, high] = [region.low, region.high].map(|p| [p[0], p[1]]);
-        let mut lines = Self { low, high, columns: Vec::new(), start: vec![0], crossings: Vec::new() };
-        if region.blocks() == 0 {
-            return lines;
-        }
-        lines.columns = vec![NONE; ((high[0] - low[0] + 1) * (high[1] - low[1] + 1)) as usize];
-        let mut count = 0;
+        let mut columns = Columns::new(low, high);
         for face in faces {
             let (first, last) = region.touched(extent(&face.v), 0.01);
-            for [x, y, _] in each_block([first[0], first[1], 0], [last[0], last[1], 0]) {
-                let column = lines.column(x, y).expect("within the region");
-                if lines.columns[column] == NONE {
-                    lines.columns[column] = count;
-                    count += 1;
-                }
-            }
+            each_block([first[0], first[1], 0], [last[0], last[1], 0])
+                .for_each(|[x, y, _]| columns.add([x, y]));
         }
-        let parts: Vec<Vec<Crossing>> = faces
-            .par_chunks(GRAIN)
-            .map(|chunk| {
-                let mut out = Vec::new();
-                chunk.iter().for_each(|face| lines.cross(face, &mut out));
-                out
-            })
-            .collect();
-        lines.gather(count as usize * 64, parts);
-        lines
+        let bounds = [0, 1].map(|axis| [i64::from(low[axis]) * 8, i64::from(high[axis]) * 8 + 7]);
+        let cross = |chunk: &[Face]| {
+            let mut out = Vec::with_capacity(chunk.len());
+            for face in chunk {
+                each_crossing(face, Axis::Z, bounds, |line, z, change| {
+                    out.extend(columns.line(line).map(|line| (line as u32, (z, change))));
+                });
+            }
+            out
+        };
+        let parts: Vec<Vec<(u32, (f64, i32))>> = faces.par_chunks(GRAIN).map(cross).collect();
+        let mut crossings = Lists::new(columns.lines(), &parts);
+        crossings.each_mut(|line| {
+            line.sort_unstable_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
+            let mut winding = 0;
+            for (_, change) in line {
+                winding += *change;
+                *change = winding;
+            }
+        });
+        Self { columns, crossings }
     }
 
     /// Winding number at a voxel; 0 outside the region.
@@ -82,71 +69,19 @@ impl Lines {
 
     /// The crossings of line (x, y) upward: position in cells and winding number above; empty outside.
     pub fn line(&self, x: i32, y: i32) -> &[(f64, i32)] {
-        match self.index(x, y) {
-            Some(line) => &self.crossings[self.start[line] as usize..self.start[line + 1] as usize],
-            None => &[],
-        }
+        self.columns.line([x, y]).map_or(&[], |line| self.crossings.get(line))
+    }
+
+    /// The least winding number on any line, or 0.
+    pub fn least_winding(&self) -> i32 {
+        self.crossings.items().iter().fold(0, |least, (_, winding)| least.min(*winding))
     }
 
     /// Calls `see` with the coordinates of each line that has crossings, and with those.
     pub fn each_line(&self, mut see: impl FnMut([i32; 2], &[(f64, i32)])) {
-        let width = i64::from(self.high[1] - self.low[1] + 1);
-        for (place, _) in (0i64..).zip(&self.columns).filter(|(_, column)| **column != NONE) {
-            let [x, y] = [self.low[0] + (place / width) as i32, self.low[1] + (place % width) as i32];
-            for [i, j, _] in each_block([x * 8, y * 8, 0], [x * 8 + 7, y * 8 + 7, 0]) {
-                let line = self.line(i, j);
-                if !line.is_empty() {
-                    see([i, j], line);
-                }
-            }
+        for line in (0..self.crossings.count()).filter(|&line| !self.crossings.get(line).is_empty()) {
+            see(self.columns.coordinates(line), self.crossings.get(line));
         }
-    }
-
-    fn column(&self, x: i32, y: i32) -> Option<usize> {
-        let within = (self.low[0]..=self.high[0]).contains(&x) && (self.low[1]..=self.high[1]).contains(&y);
-        let [i, j, width] = [x - self.low[0], y - self.low[1], self.high[1] - self.low[1] + 1].map(i64::from);
-        within.then(|| (i * width + j) as usize)
-    }
-
-    /// Index of a line, if it has any.
-    fn index(&self, x: i32, y: i32) -> Option<usize> {
-        let column = self.columns[self.column(x >> 3, y >> 3)?];
-        (column != NONE).then(|| column as usize * 64 + ((x & 7) << 3 | (y & 7)) as usize)
-    }
-
-    /// Appends the lines that a face crosses.
-    fn cross(&self, face: &Face, out: &mut Vec<Crossing>) {
-        let bounds = [0, 1].map(|axis| [i64::from(self.low[axis]) * 8, i64::from(self.high[axis]) * 8 + 7]);
-        each_crossing(face, Axis::Z, bounds, |[x, y], z, change| {
-            if let Some(line) = self.index(x as i32, y as i32) {
-                out.push(Crossing { line: line as u32, change, z });
-            }
-        });
-    }
-
-    /// Sorts crossings by line and height and sums the winding numbers.
-    fn gather(&mut self, lines: usize, parts: Vec<Vec<Crossing>>) {
-        let mut start = vec![0u32; lines + 1];
-        parts.iter().flatten().for_each(|crossing| start[crossing.line as usize + 1] += 1);
-        (0..lines).for_each(|line| start[line + 1] += start[line]);
-        let mut place = start.clone();
-        let mut crossings = vec![(0.0, 0); start[lines] as usize];
-        for crossing in parts.iter().flatten() {
-            let slot = &mut place[crossing.line as usize];
-            crossings[*slot as usize] = (crossing.z, crossing.change);
-            *slot += 1;
-        }
-        for line in 0..lines {
-            let line = &mut crossings[start[line] as usize..start[line + 1] as usize];
-            line.sort_unstable_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
-            let mut winding = 0;
-            for crossing in line {
-                winding += crossing.1;
-                crossing.1 = winding;
-            }
-        }
-        self.start = start;
-        self.crossings = crossings;
     }
 }
 
@@ -193,24 +128,33 @@ impl Axis {
     }
 
     /// The voxel at coordinates (p, q) of a line, and at this place on its own axis.
-    pub fn voxel(self, [p, q]: [i64; 2], along: i32) -> [i32; 3] {
+    pub fn voxel(self, [p, q]: [i32; 2], along: i32) -> [i32; 3] {
         match self {
-            Self::X => [along, q as i32, -p as i32],
-            Self::Y => [q as i32, along, -p as i32],
-            Self::Z => [p as i32, q as i32, along],
+            Self::X => [along, q, p],
+            Self::Y => [q, along, p],
+            Self::Z => [p, q, along],
+        }
+    }
+
+    /// The coordinates of the line through a voxel.
+    pub fn line(self, [x, y, z]: [i32; 3]) -> [i32; 2] {
+        match self {
+            Self::X => [z, y],
+            Self::Y => [z, x],
+            Self::Z => [x, y],
         }
     }
 
     /// The way to a line whose coordinates differ by this much.
     pub fn beside(self, [p, q]: [f64; 2]) -> [f64; 3] {
         match self {
-            Self::X => [0.0, q, -p],
-            Self::Y => [q, 0.0, -p],
+            Self::X => [0.0, q, p],
+            Self::Y => [q, 0.0, p],
             Self::Z => [p, q, 0.0],
         }
     }
 
-    /// Bounds of the lines' coordinates p and q for voxels within a box.
+    /// Bounds of turned coordinates p and q of the lines through voxels within a box.
     pub fn bounds(self, low: [i32; 3], high: [i32; 3]) -> [[i64; 2]; 2] {
         let [low, high] = [low, high].map(|p| p.map(i64::from));
         match self {
@@ -227,7 +171,7 @@ pub fn each_crossing(
     face: &Face,
     axis: Axis,
     bounds: [[i64; 2]; 2],
-    mut see: impl FnMut([i64; 2], f64, i32),
+    mut see: impl FnMut([i32; 2], f64, i32),
 ) {
     let v = face.v.map(|p| axis.turned(p));
     let flat = v.map(|p| [p[0], p[1]]);
@@ -251,13 +195,16 @@ pub fn each_crossing(
         let right = (right / UNITS as f64).ceil() as i64 + 1;
         for p in left.max(p0)..=right.min(p1) {
             if let Some(height) = crossing_height(heights, flat, area, [p * unit, q * unit]) {
-                let height = if (height - height.round()).abs() < NEAR {
-                    let voxel = [p, q, height.round() as i64];
-                    height.round() + if passes_below(&v, axis, voxel) { -BESIDE } else { BESIDE }
+                let nearest = floor(height + 0.5);
+                let height = if (height - f64::from(nearest)).abs() < NEAR {
+                    let below = passes_below(&v, axis, [p, q, i64::from(nearest)]);
+                    f64::from(nearest) + if below { -BESIDE } else { BESIDE }
                 } else {
                     height
                 };
-                see([p, q], mirror * height, change);
+                // Turned lines along x and y have -z for their first coordinate.
+                let line = [if axis == Axis::Z { p } else { -p }, q].map(|value| value as i32);
+                see(line, mirror * height, change);
             }
         }
     }

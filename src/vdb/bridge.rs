@@ -127,6 +127,8 @@ pub(super) mod ffi {
         fn flood_fill(grid: Pin<&mut Grid>, call: &Call) -> Result<()>;
         fn components(grid: &Grid, call: &Call) -> Result<Vec<u64>>;
 
+        /// Whether every value of the grid at an address is finite in 16 bits.
+        fn fits_half(grid: usize, vectors: bool) -> Result<bool>;
         /// `vectors[i]` says that `grids[i]` is the address of a `VectorGrid`, not of a `Grid`.
         fn grids_to_bytes(
             grids: &[usize],

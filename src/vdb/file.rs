@@ -63,7 +63,7 @@ const UUID: std::ops::Range<usize> = 21..57;
 /// Writes grids to a file; the file is there when it is whole.
 ///
 /// # Errors
-/// When memory runs out, or what the operating system reports.
+/// As [`to_bytes`], or what the operating system reports.
 pub fn write(path: &Path, grids: &[&FloatGrid], options: &WriteOptions) -> Result<()> {
     crate::io::atomic::write_bytes(path, &to_bytes(grids, options)?)
 }
@@ -79,7 +79,7 @@ pub fn write_any(path: &Path, grids: &[GridRef<'_>], options: &WriteOptions) -> 
 /// The bytes of a .vdb file.
 ///
 /// # Errors
-/// When memory runs out.
+/// When memory runs out; numbers that 16 bits do not hold, where they are wanted in 16 bits (the grid is named).
 pub fn to_bytes(grids: &[&FloatGrid], options: &WriteOptions) -> Result<Vec<u8>> {
     let grids: Vec<GridRef<'_>> = grids.iter().map(|grid| GridRef::Floats(grid)).collect();
     any_to_bytes(&grids, options)
@@ -91,6 +91,14 @@ pub fn to_bytes(grids: &[&FloatGrid], options: &WriteOptions) -> Result<Vec<u8>>
 /// As there.
 pub fn any_to_bytes(grids: &[GridRef<'_>], options: &WriteOptions) -> Result<Vec<u8>> {
     let (pointers, vectors): (Vec<usize>, Vec<bool>) = grids.iter().map(GridRef::address).unzip();
+    for (grid, (&address, &vectors)) in grids.iter().zip(pointers.iter().zip(&vectors)) {
+        if options.half && !ffi::fits_half(address, vectors).map_err(super::fail)? {
+            let name = grid.name();
+            return Err(Error::argument(format!(
+                "grid {name:?} has numbers over 65,504, which 16 bits do not hold"
+            )));
+        }
+    }
     let codec = match options.compression {
         Compression::None => 0,
         Compression::Zip => 1,

@@ -150,7 +150,7 @@ static void fraction(const ball *rest) {
         char after[16];
     } room;
     WORKS(frz_snow_desc_init(&desc, sizeof desc));
-    desc.voxel_size = 0.004;
+    desc.voxel_size = 0.0015;
     WORKS(frz_snow_layer(ctx, &desc, &snow));
     WORKS(frz_base_create(ctx, NULL, snow, NULL, 0, &base));
     WORKS(frz_context_set_poll(ctx, look, &state));

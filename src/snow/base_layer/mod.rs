@@ -315,8 +315,7 @@ impl BaseLayer {
         let fixed = |voxel: [i32; 3]| voxel.map(|cells| cells.saturating_mul(UNITS));
         let window =
             Window { min: fixed(relative(self.low, -margin)), max: fixed(relative(self.high, margin)) };
-        // The last piece of work sorts the faces of all of them.
-        ctx.expect(bodies.len() + 1);
+        ctx.expect(bodies.len() + Voxeliser::PARTS);
         let parts: Vec<Vec<Face>> = bodies
             .iter()
             .map(|(index, body)| {

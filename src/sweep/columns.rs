@@ -1,0 +1,81 @@
+//! Numbers for the lines through voxels that are parallel to an axis: those of some columns of 8 x 8.
+
+/// Lines in a column.
+const LINES: usize = 64;
+/// No column.
+const NONE: u32 = u32::MAX;
+
+/// Columns of lines with two coordinates.
+pub struct Columns {
+    /// Least and greatest column.
+    low: [i32; 2],
+    high: [i32; 2],
+    /// The number of each column between them, or [`NONE`].
+    numbers: Vec<u32>,
+    /// The column of each number.
+    places: Vec<[i32; 2]>,
+}
+
+impl Columns {
+    /// None yet of those from `low` to `high`.
+    pub fn new(low: [i32; 2], high: [i32; 2]) -> Self {
+        let size = [0, 1].map(|axis| (i64::from(high[axis]) - i64::from(low[axis]) + 1).max(0) as usize);
+        Self { low, high, numbers: vec![NONE; size[0] * size[1]], places: Vec::new() }
+    }
+
+    /// Adds a column, unless it is there; it lies between the least and the greatest one.
+    pub fn add(&mut self, column: [i32; 2]) {
+        let place = self.place(column).expect("between the least and the greatest");
+        if self.numbers[place] == NONE {
+            self.numbers[place] = self.places.len() as u32;
+            self.places.push(column);
+        }
+    }
+
+    /// Number of lines.
+    pub fn lines(&self) -> usize {
+        self.places.len() * LINES
+    }
+
+    /// The number of the line with these coordinates (voxels).
+    pub fn line(&self, [p, q]: [i32; 2]) -> Option<usize> {
+        let number = self.numbers[self.place([p >> 3, q >> 3])?];
+        (number != NONE).then(|| number as usize * LINES + ((p & 7) << 3 | (q & 7)) as usize)
+    }
+
+    /// The coordinates of a line.
+    pub fn coordinates(&self, line: usize) -> [i32; 2] {
+        let ([p, q], inner) = (self.places[line / LINES], (line % LINES) as i32);
+        [p * 8 + (inner >> 3), q * 8 + (inner & 7)]
+    }
+
+    fn place(&self, column: [i32; 2]) -> Option<usize> {
+        let within = (0..2).all(|axis| (self.low[axis]..=self.high[axis]).contains(&column[axis]));
+        let [i, j, width] =
+            [column[0] - self.low[0], column[1] - self.low[1], self.high[1] - self.low[1] + 1].map(i64::from);
+        within.then(|| (i * width + j) as usize)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn lines_of_added_columns_are_numbered_on_both_sides_of_zero() {
+        let mut columns = Columns::new([-2, -1], [0, 1]);
+        for column in [[0, 1], [-2, -1], [0, 1]] {
+            columns.add(column);
+        }
+        assert_eq!(columns.lines(), 128);
+        assert_eq!((columns.line([0, 8]), columns.line([7, 15])), (Some(0), Some(63)));
+        assert_eq!((columns.line([-16, -8]), columns.line([-15, -7])), (Some(64), Some(73)));
+        assert_eq!(
+            (columns.line([-8, 0]), columns.line([8, 8]), columns.line([-17, -8])),
+            (None, None, None)
+        );
+        for line in 0..128 {
+            assert_eq!(columns.line(columns.coordinates(line)), Some(line));
+        }
+    }
+}
