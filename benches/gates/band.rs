@@ -213,13 +213,15 @@ fn dense(shape: &Shape, course: &Course, finest: f64) -> Dense {
     };
     let way: f64 = course.keys.windows(2).map(way).sum::<f64>() + course.twist.abs() * shape.radius;
     let count = (way / finest / APART) as usize;
+    let many = count.clamp(LEAST_POSES, MOST_POSES);
+    let keys = keys(shape, course, DVec3::zeros());
+    let places = (0..many).map(|index| keys.at(index as f64 / (many - 1) as f64));
     match &shape.kind {
-        Kind::Mesh(mesh) if course.twist == 0.0 => {
-            let count = count.clamp(LEAST_POSES, MOST_POSES);
-            let keys = keys(shape, course, DVec3::zeros());
-            Dense::rigid(mesh, (0..count).map(|index| keys.at(index as f64 / (count - 1) as f64)))
+        _ if course.twist != 0.0 => {
+            Dense::posed(&*motion(shape, course, DVec3::zeros()), count.clamp(LEAST_POSES, MOST_SHAPES))
         }
-        _ => Dense::posed(&*motion(shape, course, DVec3::zeros()), count.clamp(LEAST_POSES, MOST_SHAPES)),
+        Kind::Mesh(mesh) => Dense::rigid(mesh, places),
+        Kind::Figure(path) => Dense::moved(&*walking(path), count.clamp(LEAST_POSES, MOST_SHAPES), places),
     }
 }
 
@@ -234,17 +236,20 @@ fn motion(shape: &Shape, course: &Course, from: DVec3) -> Box<dyn Motion> {
     let inner: Box<dyn Motion> = match &shape.kind {
         Kind::Mesh(mesh) if course.twist == 0.0 => return Box::new(Rigid::new(mesh.clone(), keys)),
         Kind::Mesh(mesh) => Box::new(Rigid::new(mesh.clone(), Keys::new(Vec::new()).expect("no keys"))),
-        Kind::Figure(path) => {
-            // From its hips, a quarter of a round in the second.
-            let space = Space { scale: 0.2, ..Space::OWN };
-            let place = Keys::new(vec![Key { time: 0.0, at: DVec3::y() * -0.18, turn: DVec3::zeros() }]);
-            let figure = Character::open(path, Play { clip: Some("walk".into()), ..Play::default() })
-                .expect("the figure");
-            Box::new(Placed::new(Box::new(Slow(figure)), space, place.expect("a key")))
-        }
+        Kind::Figure(path) => walking(path),
     };
     let twisted = Twisted { inner, rate: course.twist / (2.0 * shape.radius) };
     Box::new(Placed::new(Box::new(twisted), Space::OWN, keys))
+}
+
+/// A figure that walks about the origin.
+fn walking(path: &Path) -> Box<dyn Motion> {
+    // From its hips, a quarter of a round in the second.
+    let space = Space { scale: 0.2, ..Space::OWN };
+    let place = Keys::new(vec![Key { time: 0.0, at: DVec3::y() * -0.18, turn: DVec3::zeros() }]);
+    let figure =
+        Character::open(path, Play { clip: Some("walk".into()), ..Play::default() }).expect("the figure");
+    Box::new(Placed::new(Box::new(Slow(figure)), space, place.expect("a key")))
 }
 
 /// A figure that takes its time.

@@ -8,8 +8,10 @@ use rayon::prelude::*;
 
 /// Directions that a depth is looked for in.
 const DIRECTIONS: usize = 256;
-/// Halvings of the greatest depth.
-const HALVINGS: usize = 6;
+/// Balls of growing radius that are asked.
+const RINGS: usize = 16;
+/// Halvings between two of them.
+const HALVINGS: usize = 2;
 /// Directions of rays that tell inside from outside: two of three decide.
 const RAYS: [[f64; 3]; 3] = [[0.5377, 0.8339, -0.2259], [-0.8622, 0.3188, 0.4336], [0.3426, -0.4925, 0.8003]];
 
@@ -44,16 +46,31 @@ impl Dense {
 
     /// A motion at `count` times from 0 to 1.
     pub fn posed(motion: &dyn Motion, count: usize) -> Self {
+        let still = (0..count).map(|_| (Rotation3::identity(), DVec3::zeros()));
+        Self::moved(motion, count, still)
+    }
+
+    /// A motion at `count` times from 0 to 1, carried to rotations and places (m) that follow each other evenly in time.
+    pub fn moved(
+        motion: &dyn Motion,
+        count: usize,
+        places: impl ExactSizeIterator<Item = (Rotation3<f64>, DVec3)>,
+    ) -> Self {
         let shape = |index: usize| {
             let mut pose = Vec::new();
             motion.pose(index as f64 / (count - 1) as f64, &mut pose).expect("a pose");
             let positions = pose.iter().map(|p| p.cast::<f32>()).collect();
             Shape::new(&TriMesh { positions, triangles: motion.triangles().to_vec() })
         };
-        let pose = |shape| Pose { back: Rotation3::identity(), at: DVec3::zeros(), shape };
+        let last = places.len() - 1;
+        let pose = |(index, (rotation, at)): (usize, (Rotation3<f64>, DVec3))| Pose {
+            back: rotation.inverse(),
+            at,
+            shape: (index * (count - 1) + last / 2) / last,
+        };
         Self {
             shapes: (0..count).into_par_iter().map(shape).collect(),
-            poses: (0..count).map(pose).collect(),
+            poses: places.enumerate().map(pose).collect(),
             directions: directions(),
         }
     }
@@ -98,10 +115,10 @@ impl Dense {
     fn depth(&self, p: DVec3, limit: f64, mut hint: usize) -> f64 {
         let mut within =
             |radius: f64| self.directions.iter().all(|way| self.is_inside(p + way * radius, &mut hint));
-        if within(limit) {
-            return limit;
-        }
-        let (mut low, mut high) = (0.0, limit);
+        // Outward: a slit may lie inside a larger ball of which all directions are inside.
+        let radius = |ring: usize| limit * ring as f64 / RINGS as f64;
+        let Some(ring) = (1..=RINGS).find(|&ring| !within(radius(ring))) else { return limit };
+        let (mut low, mut high) = (radius(ring - 1), radius(ring));
         for _ in 0..HALVINGS {
             let middle = (low + high) / 2.0;
             (low, high) = if within(middle) { (middle, high) } else { (low, middle) };

@@ -105,6 +105,11 @@ impl Cells {
         self.block_of(voxel).map(|block| block.first + block.cell(voxel))
     }
 
+    /// How many faces may pass through the cell around a voxel.
+    pub fn crowd(&self, voxel: [i32; 3]) -> usize {
+        self.block_of(voxel).map_or(0, |block| block.cells.get(block.cell(voxel)).len())
+    }
+
     /// Calls `see` with the index and voxel of each cell that `crowd` faces or more may pass through, in parallel.
     pub fn for_each_crowd(&self, crowd: usize, see: impl Fn(usize, [i32; 3]) + Sync) {
         self.blocks.par_iter().filter(|block| block.cells.count() > 1).for_each(|block| {

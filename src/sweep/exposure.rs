@@ -16,6 +16,7 @@ use super::columns::Columns;
 use super::lattice::floor;
 use super::lists::Lists;
 use super::winding::{Axis, each_crossing};
+use crate::base::blocks::offset;
 
 /// A face is exposed, or less than [`THIN`] below one that is, somewhere.
 pub const OPEN: u8 = 1;
@@ -172,15 +173,24 @@ impl Exposure {
         meetings.any(|other| (other.place - place).abs() <= off && other.enters == spot.enters)
     }
 
-    /// Distances (cells) of a voxel, and of its neighbour above along an axis, from the surface between them; none
-    /// where no line saw any.
-    pub fn between(&self, voxel: [i32; 3], axis: usize) -> Option<[f32; 2]> {
-        let edge = f64::from(voxel[axis]);
-        let line = self.along[axis].line(Axis::ALL[axis].line(voxel));
-        let line = &line[line.partition_point(|meeting| meeting.place < edge)..];
-        let line = &line[..line.partition_point(|meeting| meeting.place < edge + 1.0)];
-        let (first, last) = (line.first()?, line.last()?);
-        Some([first.place - edge, edge + 1.0 - last.place].map(|value| value as f32))
+    /// Calls `see` with the voxels of a block beside which lines meet the surface, and how far from them (cells, at most 1).
+    pub fn each_meeting(&self, corner: [i32; 3], mut see: impl FnMut(usize, f32)) {
+        for along in &self.along {
+            let axis = along.axis;
+            let (first, [p, q]) = (corner[axis.index()], axis.line(corner));
+            for line in (0..8).flat_map(|i| (0..8).map(move |j| [p + i, q + j])) {
+                let meetings = along.line(line);
+                let begin = meetings.partition_point(|meeting| meeting.place < f64::from(first - 1));
+                let end = f64::from(first + 8);
+                for meeting in meetings[begin..].iter().take_while(|meeting| meeting.place < end) {
+                    let below = floor(meeting.place);
+                    for place in (below..=below + 1).filter(|place| (first..first + 8).contains(place)) {
+                        let [x, y, z] = axis.voxel(line, place).map(|value| (value & 7) as usize);
+                        see(offset(x, y, z), (meeting.place - f64::from(place)).abs() as f32);
+                    }
+                }
+            }
+        }
     }
 }
 

@@ -1,7 +1,7 @@
 //! Which voxels of a block lie inside the volume, and where that changes from one voxel to the next.
 
 use super::winding::Lines;
-use crate::base::blocks::Mask;
+use crate::base::blocks::{Mask, offset};
 
 /// The voxels of a line.
 const LINE: u16 = (1 << 10) - 1;
@@ -29,30 +29,16 @@ impl Signs {
         std::array::from_fn(|x| (0..8).fold(0, |bits, y| bits | row(x, y)))
     }
 
-    /// Calls `see` with each voxel of the block whose neighbour along an axis, above or not, is on the other side.
-    pub fn each_change(&self, mut see: impl FnMut(usize, usize, bool)) {
+    /// Calls `see` with each voxel of the block that has a neighbour along an axis on the other side.
+    pub fn each_change(&self, mut see: impl FnMut(usize)) {
         for (x, y) in (1..9).flat_map(|x| (1..9).map(move |y| (x, y))) {
             let own = self.0[x][y];
             let around = [self.0[x - 1][y], self.0[x + 1][y], self.0[x][y - 1], self.0[x][y + 1]];
-            let same = |other: u16| (own ^ other) & OWN == 0;
-            if around.into_iter().all(same) && [0, LINE].contains(&own) {
-                continue;
-            }
-            let changes = [
-                (self.0[x - 1][y] ^ own, 0, false),
-                (self.0[x + 1][y] ^ own, 0, true),
-                (self.0[x][y - 1] ^ own, 1, false),
-                (self.0[x][y + 1] ^ own, 1, true),
-                (own << 1 ^ own, 2, false),
-                (own >> 1 ^ own, 2, true),
-            ];
-            for (bits, axis, above) in changes {
-                let mut bits = bits >> 1 & 0xff;
-                while bits != 0 {
-                    let z = bits.trailing_zeros() as usize;
-                    see((x - 1) << 6 | (y - 1) << 3 | z, axis, above);
-                    bits &= bits - 1;
-                }
+            let beside = around.into_iter().fold(0, |changes, other| changes | own ^ other);
+            let mut bits = (beside | own << 1 ^ own | own >> 1 ^ own) & OWN;
+            while bits != 0 {
+                see(offset(x - 1, y - 1, bits.trailing_zeros() as usize - 1));
+                bits &= bits - 1;
             }
         }
     }

@@ -46,6 +46,8 @@ const SMALL: f32 = 1.5;
 const LONG: f32 = 3.0;
 /// Distance of the points that a long face is asked at (fixed-point units).
 const SPACING: f64 = 1.2 * UNITS as f64;
+/// And of those that it is asked at again, where it is buried among open ones.
+const CLOSER: f64 = 0.6 * UNITS as f64;
 /// A corner is asked for this part of the way to the middle, away from what it shares with neighbours.
 const INSET: f64 = 0.05;
 /// Halvings that find where an edge dives: to 1/16 of its length.
@@ -56,6 +58,12 @@ const STACK: u8 = 4;
 const LOOSE: u8 = 8;
 /// No line meets the face, though it is long.
 const SLIVER: u8 = 16;
+/// The face is small, in a stack, and open: patches may not reach it.
+const SPECK: u8 = 32;
+/// Faces in a cell up to which small ones of a stack are asked.
+const MANY: usize = 2000;
+/// What lies in front of them is wider than this (hairs): sheets of a stack leave slits, as narrow as the motion's tolerance.
+const SLIT: f64 = 4.0;
 const OPEN_AND_LOOSE: u8 = OPEN | LOOSE;
 /// Faces a task handles: fixed, so that nothing depends on the number of threads.
 const GRAIN: usize = 128;
@@ -173,7 +181,21 @@ impl Surface<'_> {
             return SLIVER | self.ask(middle(&v), ahead);
         }
         let stack = self.exposure.is_stack(self.cells, voxel_of(middle(&v)));
-        if stack { seen } else { seen | self.said(&v, ahead) }
+        match stack {
+            true if is_small(&v) && self.is_speck(middle(&v), ahead) => seen | SPECK,
+            true => seen,
+            false => seen | self.said(&v, ahead),
+        }
+    }
+
+    /// Whether a small face of a stack is open at its middle, and not on a slit.
+    fn is_speck(&mut self, at: Point, ahead: Point) -> bool {
+        if self.cells.crowd(voxel_of(at)) > MANY {
+            return false;
+        }
+        let moved = |side: f64| [0, 1, 2].map(|axis| at[axis] + side * ahead[axis]);
+        let [front, back] = self.cells.windings(moved(1.0), moved(-1.0), &mut self.prisms);
+        front < 1 && back >= 1 && self.cells.windings(moved(SLIT), at, &mut self.prisms)[0] < 1
     }
 
     /// Whether a face passes between the lines though it is long: patches do not know of it.
@@ -185,7 +207,7 @@ impl Surface<'_> {
     /// What the samples of a part of a face say.
     fn said(&mut self, v: &Corners, ahead: Point) -> u8 {
         let mut said = 0;
-        each_sample(v, |at| said |= if self.is_asked(at) { self.ask(at, ahead) } else { 0 });
+        each_sample(v, SPACING, |at| said |= if self.is_asked(at) { self.ask(at, ahead) } else { 0 });
         said
     }
 
@@ -194,6 +216,7 @@ impl Surface<'_> {
         let (v, Some(ahead)) = (self.cells.faces[id].v, ahead(self.cells, id)) else { return };
         match seen {
             OPEN_AND_LOOSE => out.push((v, true)),
+            _ if said & SPECK != 0 => out.push((v, false)),
             _ if said == SLIVER | OPEN && seen & STACK != 0 => out.push((v, false)),
             _ if seen & LOOSE == 0 || seen & !(STACK | LOOSE) == BURIED => {}
             _ => {
@@ -244,13 +267,12 @@ impl Surface<'_> {
         if !is_small(&v) {
             let open = match said {
                 OPEN => true,
-                BURIED => false,
+                BURIED if !self.is_missed(&v, ahead, around) => false,
                 _ => halves(v).map(|half| self.dice(id, half, ahead, around, out)) == [true; 2],
             };
             if open {
-                let sure = begin < out.len() && out[begin..].iter().all(|(_, sure)| *sure);
                 out.truncate(begin);
-                out.push((v, sure));
+                out.push((v, false));
             }
             return open;
         }
@@ -262,6 +284,17 @@ impl Surface<'_> {
             out.push((v, false));
         }
         out[begin..] == [(v, true)]
+    }
+
+    /// Whether a part of a face that is buried where it was asked is open between, in cells with open ones.
+    fn is_missed(&mut self, v: &Corners, ahead: Point, around: &[u8]) -> bool {
+        let mut missed = false;
+        each_sample(v, CLOSER, |at| {
+            let cell = self.cells.of_voxel(voxel_of(at)).filter(|_| !missed);
+            let is_mixed = cell.is_some_and(|cell| around[cell] & (OPEN | STACK) == OPEN);
+            missed |= is_mixed && self.ask(at, ahead) == OPEN;
+        });
+        missed
     }
 
     fn corners(&mut self, v: Corners, ahead: Point) -> [u8; 3] {
@@ -331,9 +364,9 @@ pub fn is_small(v: &Corners) -> bool {
     (0..3).all(|axis| high[axis] - low[axis] <= SMALL)
 }
 
-/// Calls `see` with the middle of a small triangle; with points about [`SPACING`] apart in rows along its
-/// longest edge otherwise.
-fn each_sample(v: &Corners, mut see: impl FnMut(Point)) {
+/// Calls `see` with the middle of a small triangle; with points about `spacing` apart in rows along its longest edge
+/// otherwise.
+fn each_sample(v: &Corners, spacing: f64, mut see: impl FnMut(Point)) {
     if is_small(v) {
         return see(middle(v));
     }
@@ -342,11 +375,11 @@ fn each_sample(v: &Corners, mut see: impl FnMut(Point)) {
     let length = dot(&along, &along).sqrt();
     let area = cross(along, up);
     let height = dot(&area, &area).sqrt() / length;
-    let rows = (height / SPACING).ceil().max(1.0);
+    let rows = (height / spacing).ceil().max(1.0);
     for row in 0..rows as usize {
         let t = (row as f64 + 0.5) / rows;
         let (begin, end) = (between(a, c, t), between(b, c, t));
-        let count = (length * (1.0 - t) / SPACING).ceil().max(1.0);
+        let count = (length * (1.0 - t) / spacing).ceil().max(1.0);
         (0..count as usize).for_each(|index| see(between(begin, end, (index as f64 + 0.5) / count)));
     }
 }

@@ -269,12 +269,12 @@ impl Voxeliser {
         let mut distances: Box<Values> =
             Box::new(std::array::from_fn(|voxel| limits[usize::from(holds(&inside, voxel))]));
         let found = self.find_distances(index, wanted, &inside, &mut distances, scratch);
-        let mended = self.mend_changes(block, wanted, &signs, &mut distances);
+        let lowered = self.lower_by_lines(block, wanted, &signs, &mut distances);
         let all = |bits: &dyn Fn(usize) -> u64| (0..8).all(|x| bits(x) & wanted[x] == wanted[x]);
-        if !found && !mended && all(&|x| inside[x]) {
+        if !found && !lowered && all(&|x| inside[x]) {
             return Some(Piece::Inside(self.origin(block)));
         }
-        if !found && !mended && all(&|x| !inside[x]) {
+        if !found && !lowered && all(&|x| !inside[x]) {
             return None;
         }
         for (voxel, value) in distances.iter_mut().enumerate() {
@@ -324,26 +324,18 @@ impl Voxeliser {
         found
     }
 
-    /// Lowers the distances of neighbours of opposite sign to where lines meet the surface between them; whether any
-    /// was larger.
-    fn mend_changes(&self, block: [i32; 3], wanted: &Mask, signs: &Signs, distances: &mut Values) -> bool {
-        let mut mended = false;
-        signs.each_change(|voxel, axis, above| {
-            if holds(wanted, voxel) {
-                let most = self.most_distance(block.map(|b| b * 8), voxel, axis, above);
-                mended |= most < distances[voxel];
-                distances[voxel] = distances[voxel].min(most);
+    /// Lowers distances to where lines through the voxels meet the surface beside them; whether any was larger.
+    fn lower_by_lines(&self, block: [i32; 3], wanted: &Mask, signs: &Signs, distances: &mut Values) -> bool {
+        let mut lowered = false;
+        let mut lower = |voxel: usize, most: f32| {
+            if holds(wanted, voxel) && most < distances[voxel] {
+                distances[voxel] = most;
+                lowered = true;
             }
-        });
-        mended
-    }
-
-    /// How far (cells) a voxel can be from the surface, where its neighbour along an axis, above or below, is on the
-    /// other side.
-    fn most_distance(&self, corner: [i32; 3], voxel: usize, axis: usize, above: bool) -> f32 {
-        let mut lower = [0, 1, 2].map(|a| corner[a] + (voxel >> (6 - 3 * a) & 7) as i32);
-        lower[axis] -= i32::from(!above);
-        self.exposure.between(lower, axis).map_or(UNSEEN, |distances| distances[usize::from(!above)])
+        };
+        self.exposure.each_meeting(block.map(|b| b * 8), &mut lower);
+        signs.each_change(|voxel| lower(voxel, UNSEEN));
+        lowered
     }
 }
 
