@@ -70,10 +70,10 @@ pub struct Voxeliser {
 
 /// What memory is asked for, with what makes it less.
 const REGION: &str = "what the objects sweep (larger cells or a shorter motion need less)";
-/// Bytes of a block of the region: marks and places.
-const BYTES_PER_BLOCK: usize = 16;
-/// Bytes of a block near the surface: its distances, and what they are found with.
-const BYTES_PER_NEAR_BLOCK: usize = 6000;
+/// Bytes of a block of the region: marks, places, and the tables of the columns of lines.
+const BYTES_PER_BLOCK: usize = 24;
+/// Bytes of a block near the surface: its distances, its cells with their faces, and what lines see of them.
+const BYTES_PER_NEAR_BLOCK: usize = 12_000;
 /// No block.
 const NONE: u32 = u32::MAX;
 /// Faces a task sorts into blocks: fixed, so that nothing depends on the number of threads.
