@@ -403,6 +403,8 @@ class Manners(unittest.TestCase):
         self.assertTrue(caught.exception.cancelled)
 
     def test_ctrl_c_ends_the_call_with_or_without_a_poll(self):
+        # What a shell starts in the background has it ignored.
+        self.addCleanup(signal.signal, signal.SIGINT, signal.signal(signal.SIGINT, signal.default_int_handler))
         for poll in (None, lambda stage, done, seconds: False):
             ctx = frazil.Context(threads=2, poll=poll)
             timer = threading.Timer(0.3, os.kill, (os.getpid(), signal.SIGINT))
