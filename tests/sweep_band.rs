@@ -96,6 +96,71 @@ fn a_bar_that_turns_once_and_more_sweeps_a_disc() {
     }
 }
 
+/// A cuboid about the origin whose faces are cut into n x n squares of two triangles.
+fn fine_cuboid(size: DVec3, n: usize) -> TriMesh {
+    let mut mesh = TriMesh::default();
+    for (axis, side) in (0..3).flat_map(|axis| [(axis, -0.5), (axis, 0.5)]) {
+        let first = mesh.positions.len() as u32;
+        for (i, j) in (0..=n).flat_map(|i| (0..=n).map(move |j| (i, j))) {
+            let mut p = DVec3::zeros();
+            p[axis] = side;
+            p[(axis + 1) % 3] = i as f64 / n as f64 - 0.5;
+            p[(axis + 2) % 3] = j as f64 / n as f64 - 0.5;
+            mesh.positions.push(p.component_mul(&size).cast());
+        }
+        let row = n as u32 + 1;
+        for (i, j) in (0..n as u32).flat_map(|i| (0..n as u32).map(move |j| (i, j))) {
+            let [a, b, c, d] = [0, row, row + 1, 1].map(|step| first + i * row + j + step);
+            let both = [[a, b, c], [a, c, d]];
+            mesh.triangles.extend(both.map(|[a, b, c]| if side > 0.0 { [a, b, c] } else { [a, c, b] }));
+        }
+    }
+    mesh
+}
+
+#[test]
+fn a_small_body_of_many_faces_has_exact_distances_outside() {
+    let size = DVec3::new(3.1, 4.3, 2.3) * CELL;
+    let mut worst = (0.0, String::new());
+    for (turn, by) in [
+        (DVec3::new(40.0, 28.0, -24.0), DVec3::zeros()),
+        (DVec3::y() * 120.0, DVec3::zeros()),
+        (DVec3::x() * 25.0, DVec3::new(3.0, 1.0, 0.5) * CELL),
+    ] {
+        let grid = swept(fine_cuboid(size, 16), turn, by);
+        let poses: Vec<_> = (0..=600)
+            .map(|step| {
+                let (time, turn) = (
+                    f64::from(step) / 600.0,
+                    turn * std::f64::consts::PI / 180.0 * (f64::from(step) / 600.0),
+                );
+                (nalgebra::Rotation3::from_euler_angles(turn.x, turn.y, turn.z).inverse(), by * time)
+            })
+            .collect();
+        let outside = |p: DVec3| {
+            let gap = |(back, at): &(nalgebra::Rotation3<f64>, DVec3)| {
+                let q = (back * (p - at)).abs() - size / 2.0;
+                q.sup(&DVec3::zeros()).norm() + q.max().min(0.0)
+            };
+            poses.iter().map(gap).fold(f64::INFINITY, f64::min)
+        };
+        for leaf in grid.leaves().unwrap() {
+            for index in 0..512 {
+                let at = [0, 1, 2].map(|axis| leaf.origin[axis] + (index >> (6 - 3 * axis) & 7) as i32);
+                let value = f64::from(leaf.values[index]) / CELL;
+                if value > 0.0 && value < 1.5 {
+                    let truth = outside(DVec3::from(at.map(f64::from)) * CELL) / CELL;
+                    let error = (value - truth).abs();
+                    if error > worst.0 {
+                        worst = (error, format!("{value:.3} for {truth:.3} at {at:?}, turned by {turn:?}"));
+                    }
+                }
+            }
+        }
+    }
+    assert!(worst.0 < 0.06, "{worst:?}");
+}
+
 #[test]
 fn more_turns_than_a_step_can_have_are_refused() {
     let ctx = Context::new(Pool::new(1).unwrap());
