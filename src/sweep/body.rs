@@ -159,7 +159,7 @@ impl Body {
             &self.shape.topology
         };
         poses.iter_mut().for_each(|pose| topology.complete(pose));
-        let refined = refine(ctx, topology, &mut poses, tolerance, |poses, edge| near.sees(poses, &edge))?;
+        let refined = refine(ctx, topology, &mut poses, tolerance, |step, edge| near.sees(step, &edge))?;
         ctx.check()?;
         let levels: Vec<Vec<Fixed>> = poses
             .par_iter()
@@ -258,12 +258,12 @@ impl Body {
         let vertices = (0..probes[0].len()).into_par_iter().with_min_len(GRAIN);
         let bend = vertices.map(bend).reduce(|| 0.0, f64::max);
         let arcs = (bend.sqrt() / tolerance).sqrt();
-        let ends = [probes[0], probes[4]];
+        let ends = [&probes[0][..], &probes[4][..]];
         let own = self.shape.topology.own_vertices as u32;
         // As many as give the faces that edges sweep, cut into as many pieces as they then need, a good shape.
         let twist = |edge: &[u32; 2]| {
-            let error = if edge[1] < own { edge_error(&ends, *edge) } else { 0.0 };
-            if error <= tolerance || !near.sees(&ends, edge) {
+            let error = if edge[1] < own { edge_error(ends, *edge) } else { 0.0 };
+            if error <= tolerance || !near.sees(ends, edge) {
                 return 0.0;
             }
             let [i, j] = edge.map(|vertex| vertex as usize);
@@ -309,9 +309,9 @@ impl Near {
         self.touches(path.iter().copied(), self.longest)
     }
 
-    /// Whether an edge's sweep can touch the window.
-    fn sees(&self, poses: &[impl AsRef<[DVec3]>], edge: &[u32; 2]) -> bool {
-        self.touches(poses.iter().flat_map(|pose| edge.map(|vertex| pose.as_ref()[vertex as usize])), 1.0)
+    /// Whether what an edge sweeps in a step can touch the window.
+    fn sees(&self, step: [&[DVec3]; 2], edge: &[u32; 2]) -> bool {
+        self.touches(step.into_iter().flat_map(|pose| edge.map(|vertex| pose[vertex as usize])), 1.0)
     }
 }
 

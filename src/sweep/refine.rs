@@ -25,16 +25,14 @@ const BYTES_PER_VERTEX: u64 = 150;
 /// Most of them in one round, whatever the context allows.
 const MOST_BYTES: u64 = 8 << 30;
 
-/// Largest difference (cells) between the patch that an edge sweeps in one step and its two triangles.
-pub fn edge_error(poses: &[impl AsRef<[DVec3]>], [i, j]: [u32; 2]) -> f64 {
-    let (i, j) = (i as usize, j as usize);
-    let edge = |pose: &dyn AsRef<[DVec3]>| pose.as_ref()[i] - pose.as_ref()[j];
-    poses.windows(2).map(|pair| (edge(&pair[1]) - edge(&pair[0])).norm_squared()).fold(0.0, f64::max).sqrt()
-        / 4.0
+/// Difference (cells) between the patch that an edge sweeps in a step and its two triangles.
+pub fn edge_error([before, after]: [&[DVec3]; 2], [i, j]: [u32; 2]) -> f64 {
+    let edge = |pose: &[DVec3]| pose[i as usize] - pose[j as usize];
+    (edge(after) - edge(before)).norm() / 4.0
 }
 
 /// Cuts edges into equal pieces until each error is within `tolerance` (cells), extending the poses; none when
-/// no edge needs it. `wanted` tells which edges matter.
+/// no edge needs it. `wanted` tells in which steps, from pose to pose, an edge matters.
 ///
 /// # Errors
 /// Cancel; more pieces than memory should hold.
@@ -43,15 +41,19 @@ pub fn refine(
     topology: &Topology,
     poses: &mut [Vec<DVec3>],
     tolerance: f64,
-    wanted: impl Fn(&[Vec<DVec3>], [u32; 2]) -> bool + Sync,
+    wanted: impl Fn([&[DVec3]; 2], [u32; 2]) -> bool + Sync,
 ) -> Result<Option<Topology>> {
     let mut refined: Option<Topology> = None;
     for _ in 0..MOST_ROUNDS {
         let current = refined.as_ref().unwrap_or(topology);
         debug_assert!(poses.iter().all(|pose| pose.len() == current.vertex_count()));
         let pieces = |edge: &[u32; 2]| {
-            let pieces = (edge_error(poses, *edge) / tolerance).min(MOST_PIECES).ceil();
-            if pieces > 1.0 && wanted(poses, *edge) { pieces as u32 } else { 1 }
+            let steps = poses.windows(2).map(|pair| [&pair[0][..], &pair[1][..]]);
+            let error = steps.fold(tolerance, |most, step| {
+                let error = edge_error(step, *edge);
+                if error > most && wanted(step, *edge) { error } else { most }
+            });
+            (error / tolerance).min(MOST_PIECES).ceil() as u32
         };
         let pieces: Vec<u32> = current.edges.par_iter().with_min_len(2048).map(pieces).collect();
         if pieces.iter().all(|&pieces| pieces == 1) {
