@@ -7,7 +7,8 @@ mod folded;
 mod shapes;
 
 use folded::{Elbow, Mirrored};
-use frazil::motion::Motion;
+use frazil::base::{DVec3, TriMesh, Vec3};
+use frazil::motion::{Key, Keys, Motion, Rigid};
 use frazil::sweep::{self, Body, Settings};
 use frazil::vdb::{FloatGrid, level_set};
 use frazil::{Context, Pool};
@@ -50,4 +51,27 @@ fn what_only_winds_backward_is_not_swept() {
     };
     let (rest, moved) = (volume(0.0), volume(1.0));
     assert!((moved / rest - 1.0).abs() < 0.01, "{moved}, not {rest}");
+}
+
+/// A ball with a smaller one beside it that is inside out.
+fn with_a_pocket() -> TriMesh {
+    let [mut ball, pocket] = [0.05, 0.015].map(|radius| shapes::sphere(radius, 8));
+    let first = ball.positions.len() as u32;
+    ball.positions.extend(pocket.positions.iter().map(|p| p + Vec3::new(0.0, 0.08, 0.0)));
+    ball.triangles.extend(pocket.triangles.iter().map(|&[a, b, c]| [a, c, b].map(|vertex| first + vertex)));
+    ball
+}
+
+#[test]
+fn a_pocket_that_winds_backward_sweeps_nothing_wherever_it_is_carried() {
+    let volume = |mesh: TriMesh, at: DVec3, degrees: f64| {
+        let key = |time: f64| Key { time, at: at * time, turn: DVec3::x() * (degrees.to_radians() * time) };
+        volume(Rigid::new(mesh, Keys::new(vec![key(0.0), key(1.0)]).unwrap()), 1)
+    };
+    for (at, degrees) in
+        [(DVec3::x() * 0.3, 0.0), (DVec3::x() * 0.1, 720.0), (DVec3::new(0.1, 0.2, 0.1), 300.0)]
+    {
+        let [ball, both] = [shapes::sphere(0.05, 8), with_a_pocket()].map(|mesh| volume(mesh, at, degrees));
+        assert!((both / ball - 1.0).abs() < 0.01, "{at:?}, {degrees} degrees: {both}, not {ball}");
+    }
 }
