@@ -1,13 +1,16 @@
 //! Exact distances from the union of dense poses of a moving mesh: nothing of the sweep is used.
 
+use std::collections::BTreeMap;
+
 use frazil::base::bvh::Bvh;
 use frazil::base::{DVec3, TriMesh, Vec3};
 use frazil::motion::Motion;
 use nalgebra::Rotation3;
 use rayon::prelude::*;
 
-/// Directions that a depth is looked for in.
+/// Directions that a depth is looked for in, at first and closely.
 const DIRECTIONS: usize = 256;
+const CLOSELY: usize = 16_384;
 /// Balls of growing radius that are asked.
 const RINGS: usize = 16;
 /// Halvings between two of them.
@@ -20,12 +23,15 @@ pub struct Dense {
     shapes: Vec<Shape>,
     poses: Vec<Pose>,
     directions: Vec<DVec3>,
+    closely: Vec<DVec3>,
 }
 
 /// A mesh in a tree, and the ball around it.
 struct Shape {
     tree: Bvh,
     corners: Vec<[DVec3; 3]>,
+    /// How many faces lie there, those that face the other way less.
+    layers: Vec<i32>,
     centre: DVec3,
     radius: f64,
 }
@@ -41,7 +47,7 @@ impl Dense {
     /// One mesh at each of these rotations and places (m).
     pub fn rigid(mesh: &TriMesh, poses: impl Iterator<Item = (Rotation3<f64>, DVec3)>) -> Self {
         let poses = poses.map(|(rotation, at)| Pose { back: rotation.inverse(), at, shape: 0 });
-        Self { shapes: vec![Shape::new(mesh)], poses: poses.collect(), directions: directions() }
+        Self::of(vec![Shape::new(mesh)], poses.collect())
     }
 
     /// A motion at `count` times from 0 to 1.
@@ -68,23 +74,38 @@ impl Dense {
             at,
             shape: (index * (count - 1) + last / 2) / last,
         };
-        Self {
-            shapes: (0..count).into_par_iter().map(shape).collect(),
-            poses: places.enumerate().map(pose).collect(),
-            directions: directions(),
-        }
+        let shapes = (0..count).into_par_iter().map(shape).collect();
+        Self::of(shapes, places.enumerate().map(pose).collect())
     }
 
-    /// Signed distance (m) of a point from the union, cut off at `limit`.
+    fn of(shapes: Vec<Shape>, poses: Vec<Pose>) -> Self {
+        Self { shapes, poses, directions: directions(DIRECTIONS), closely: directions(CLOSELY) }
+    }
+
+    /// Signed distance (m) of a point from the union, cut off at `limit`; pits and slits may be missed that are narrower
+    /// than a fifth of their distance.
     pub fn distance(&self, p: DVec3, limit: f64) -> f64 {
+        self.looked_for(p, limit, &self.directions)
+    }
+
+    /// As [`Dense::distance`], but what is wider than a fortieth of its distance is seen: slow.
+    pub fn distance_closely(&self, p: DVec3, limit: f64) -> f64 {
+        self.looked_for(p, limit, &self.closely)
+    }
+
+    fn looked_for(&self, p: DVec3, limit: f64, directions: &[DVec3]) -> f64 {
         let mut hint = 0;
-        if self.is_inside(p, &mut hint) { -self.depth(p, limit, hint) } else { self.gap(p, limit) }
+        if self.is_inside(p, &mut hint) {
+            -self.depth(p, limit, directions, hint)
+        } else {
+            self.gap(p, limit)
+        }
     }
 
     /// Whether a point lies inside by more than a depth (m).
     pub fn is_deep(&self, p: DVec3, depth: f64) -> bool {
         let mut hint = 0;
-        self.is_inside(p, &mut hint) && self.depth(p, 2.0 * depth, hint) > depth
+        self.is_inside(p, &mut hint) && self.depth(p, 2.0 * depth, &self.directions, hint) > depth
     }
 
     /// Whether a point lies outside by more than a gap (m).
@@ -112,9 +133,9 @@ impl Dense {
     }
 
     /// Radius (m) of the largest ball around a point that lies inside.
-    fn depth(&self, p: DVec3, limit: f64, mut hint: usize) -> f64 {
+    fn depth(&self, p: DVec3, limit: f64, directions: &[DVec3], mut hint: usize) -> f64 {
         let mut within =
-            |radius: f64| self.directions.iter().all(|way| self.is_inside(p + way * radius, &mut hint));
+            |radius: f64| directions.iter().all(|way| self.is_inside(p + way * radius, &mut hint));
         // Outward: a slit may lie inside a larger ball of which all directions are inside.
         let radius = |ring: usize| limit * ring as f64 / RINGS as f64;
         let Some(ring) = (1..=RINGS).find(|&ring| !within(radius(ring))) else { return limit };
@@ -135,12 +156,14 @@ impl Pose {
 
 impl Shape {
     fn new(mesh: &TriMesh) -> Self {
+        let (triangles, layers): (Vec<[u32; 3]>, Vec<i32>) = distinct(&mesh.triangles).into_iter().unzip();
+        let mesh = &TriMesh { positions: mesh.positions.clone(), triangles };
         let corners: Vec<[DVec3; 3]> = (0..mesh.triangles.len()).map(|index| mesh.corners(index)).collect();
         let start = (DVec3::repeat(f64::INFINITY), DVec3::repeat(f64::NEG_INFINITY));
         let (low, high) = corners.iter().flatten().fold(start, |(low, high), p| (low.inf(p), high.sup(p)));
         let centre = (low + high) / 2.0;
         let radius = corners.iter().flatten().map(|p| (p - centre).norm()).fold(0.0, f64::max);
-        Self { tree: Bvh::new(mesh), corners, centre, radius }
+        Self { tree: Bvh::new(mesh), corners, layers, centre, radius }
     }
 
     fn holds(&self, p: DVec3) -> bool {
@@ -157,7 +180,8 @@ impl Shape {
         let mut winding = 0;
         while let Some(hit) = self.tree.ray(p, way, 4.0 * self.radius) {
             let [a, b, c] = self.corners[hit.triangle];
-            winding += if (b - a).cross(&(c - a)).dot(&way) > 0.0 { 1 } else { -1 };
+            let leaves = (b - a).cross(&(c - a)).dot(&way) > 0.0;
+            winding += self.layers[hit.triangle] * if leaves { 1 } else { -1 };
             p += way * (hit.distance + 1e-9);
         }
         winding
@@ -178,6 +202,27 @@ impl Shape {
     }
 }
 
+/// Triangles with other corners each, and how many of them there are, those turned round less; none that cancel.
+fn distinct(triangles: &[[u32; 3]]) -> Vec<([u32; 3], i32)> {
+    let mut layers: BTreeMap<[u32; 3], i32> = BTreeMap::new();
+    for &[a, b, c] in triangles {
+        let least = a.min(b).min(c);
+        let [_, second, third] = if least == a {
+            [a, b, c]
+        } else if least == b {
+            [b, c, a]
+        } else {
+            [c, a, b]
+        };
+        if second < third {
+            *layers.entry([least, second, third]).or_default() += 1;
+        } else {
+            *layers.entry([least, third, second]).or_default() -= 1;
+        }
+    }
+    layers.into_iter().filter(|(_, count)| *count != 0).collect()
+}
+
 fn triangle_distance(p: DVec3, [a, b, c]: &[DVec3; 3]) -> f64 {
     let normal = (b - a).cross(&(c - a));
     let edges = [(a, b), (b, c), (c, a)];
@@ -194,13 +239,13 @@ fn triangle_distance(p: DVec3, [a, b, c]: &[DVec3; 3]) -> f64 {
 }
 
 /// Unit vectors spread evenly: a spiral.
-fn directions() -> Vec<DVec3> {
+fn directions(count: usize) -> Vec<DVec3> {
     let golden = std::f64::consts::PI * (3.0 - 5.0f64.sqrt());
     let way = |index: usize| {
-        let z = 1.0 - (2.0 * index as f64 + 1.0) / DIRECTIONS as f64;
+        let z = 1.0 - (2.0 * index as f64 + 1.0) / count as f64;
         let (sin, cos) = (golden * index as f64).sin_cos();
         let across = (1.0 - z * z).sqrt();
         DVec3::new(across * cos, across * sin, z)
     };
-    (0..DIRECTIONS).map(way).collect()
+    (0..count).map(way).collect()
 }

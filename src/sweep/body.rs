@@ -166,7 +166,7 @@ impl Body {
             .map(|pose| pose.iter().map(|&cells| lattice.fix(cells)).collect())
             .collect::<Result<_>>()?;
         let weights = Weights { solid: 1, swept: 1 };
-        Ok(boundary(refined.as_ref().unwrap_or(topology), &levels, weights, window))
+        boundary(ctx, refined.as_ref().unwrap_or(topology), &levels, weights, window)
     }
 
     /// Poses (cells) at times so dense that straight steps stay within `tolerance` of the motion.

@@ -13,6 +13,8 @@ use rayon::prelude::*;
 use super::folds::drop_returns;
 use super::lattice::{Fixed, UNITS};
 use super::topology::Topology;
+use crate::context::Context;
+use crate::error::Result;
 
 /// An oriented triangle of the chain's boundary; the chain lies behind it (`coef` times).
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -58,41 +60,57 @@ pub const STILL: f64 = 4.0 / 4096.0 * UNITS as f64;
 const GRAIN: usize = 2048;
 
 /// Boundary of the chain that sweeps `topology` through `levels` (poses in time order, at least one).
-pub fn boundary(topology: &Topology, levels: &[Vec<Fixed>], weights: Weights, window: &Window) -> Vec<Face> {
+///
+/// # Errors
+/// Cancel.
+pub fn boundary(
+    ctx: &Context,
+    topology: &Topology,
+    levels: &[Vec<Fixed>],
+    weights: Weights,
+    window: &Window,
+) -> Result<Vec<Face>> {
     let steps = levels.len() - 1;
     let triangles = topology.simplices.len();
     let mut outward = vec![0u8; triangles * steps];
     let mut faces: Vec<Face> = if steps == 0 {
-        chunks(triangles, |triangle, out| caps(topology, levels, triangle, &[], weights, window, out))
+        chunks(ctx, triangles, |triangle, out| caps(topology, levels, triangle, &[], weights, window, out))?
     } else {
         outward.par_chunks_mut(steps * GRAIN).enumerate().for_each(|(chunk, bits)| {
+            if ctx.check().is_err() {
+                return;
+            }
             for (index, bits) in bits.chunks_mut(steps).enumerate() {
                 mark_outward(topology, levels, chunk * GRAIN + index, window, bits);
             }
         });
-        drop_returns(topology, levels, window, &mut outward);
-        chunks(triangles, |triangle, out| {
+        drop_returns(ctx, topology, levels, window, &mut outward)?;
+        chunks(ctx, triangles, |triangle, out| {
             let bits = &outward[triangle * steps..(triangle + 1) * steps];
             caps(topology, levels, triangle, bits, weights, window, out);
-        })
+        })?
     };
-    faces.extend(chunks(if steps == 0 { 0 } else { topology.edges.len() }, |edge, out| {
+    let edges = if steps == 0 { 0 } else { topology.edges.len() };
+    faces.extend(chunks(ctx, edges, |edge, out| {
         sides(topology, levels, edge, &outward, weights, window, out);
-    }));
-    faces
+    })?);
+    Ok(faces)
 }
 
 /// Runs `make` for 0..count in tasks of fixed size and joins what they append, in order.
-fn chunks(count: usize, make: impl Fn(usize, &mut Vec<Face>) + Sync) -> Vec<Face> {
+fn chunks(ctx: &Context, count: usize, make: impl Fn(usize, &mut Vec<Face>) + Sync) -> Result<Vec<Face>> {
     let parts: Vec<Vec<Face>> = (0..count.div_ceil(GRAIN))
         .into_par_iter()
         .map(|chunk| {
             let mut out = Vec::new();
-            (chunk * GRAIN..((chunk + 1) * GRAIN).min(count)).for_each(|index| make(index, &mut out));
+            if ctx.check().is_ok() {
+                (chunk * GRAIN..((chunk + 1) * GRAIN).min(count)).for_each(|index| make(index, &mut out));
+            }
             out
         })
         .collect();
-    parts.concat()
+    ctx.check()?;
+    Ok(parts.concat())
 }
 
 fn bounds(levels: &[Vec<Fixed>], vertices: &[u32]) -> (Fixed, Fixed) {

@@ -18,6 +18,8 @@ use super::region::{Region, each_block, extent};
 use super::topology::{Simplex, Topology};
 use super::winding::Lines;
 use crate::base::DVec3;
+use crate::context::Context;
+use crate::error::Result;
 
 /// Negative stretches of a line that are shorter than this (cells) are none.
 const SHORT: f64 = 1e-3;
@@ -39,19 +41,29 @@ const SAMPLES: [[f64; 4]; 5] = [
 ];
 
 /// Clears the bits (see [`super::chain`]) of tetrahedra through which the surface only comes back from inside out.
-pub fn drop_returns(topology: &Topology, levels: &[Vec<Fixed>], window: &Window, outward: &mut [u8]) {
-    let Some(folded) = Folded::find(topology, levels, window) else { return };
-    let poses = Poses { topology, levels };
+///
+/// # Errors
+/// Cancel.
+pub fn drop_returns(
+    ctx: &Context,
+    topology: &Topology,
+    levels: &[Vec<Fixed>],
+    window: &Window,
+    outward: &mut [u8],
+) -> Result<()> {
+    let Some(folded) = Folded::find(ctx, topology, levels, window)? else { return Ok(()) };
+    let poses = Poses { ctx, topology, levels };
     let steps = levels.len() - 1;
     let found: Vec<Returns> = (0..steps)
         .into_par_iter()
         .map(|step| poses.returns(step, &folded.triangles(topology, levels, step)))
-        .collect();
+        .collect::<Result<_>>()?;
     let early: Vec<Early> = found.iter().flat_map(|found| found.early.iter().copied()).collect();
-    let first: HashSet<Place> = poses.first_ones(early).into_iter().collect();
+    let first: HashSet<Place> = poses.first_ones(early)?.into_iter().collect();
     for place in found.iter().flat_map(|found| &found.places).filter(|place| !first.contains(place)) {
         outward[place.triangle as usize * steps + place.step as usize] &= !(1 << place.part);
     }
+    Ok(())
 }
 
 /// Where to look for passages that come back from inside out.
@@ -64,20 +76,27 @@ enum Folded {
 
 impl Folded {
     /// None when nothing folds.
-    fn find(topology: &Topology, levels: &[Vec<Fixed>], window: &Window) -> Option<Self> {
+    fn find(
+        ctx: &Context,
+        topology: &Topology,
+        levels: &[Vec<Fixed>],
+        window: &Window,
+    ) -> Result<Option<Self>> {
         let rigid = is_rigid(topology, levels);
         let (asked, window) =
             if rigid { (&levels[..1], &come_from(levels, window)) } else { (levels, window) };
-        let blocks: Vec<HashSet<[i32; 3]>> =
-            asked.par_iter().map(|level| folded_blocks(topology, level, window)).collect();
+        let blocks: Vec<HashSet<[i32; 3]>> = asked
+            .par_iter()
+            .map(|level| folded_blocks(ctx, topology, level, window))
+            .collect::<Result<_>>()?;
         if blocks.iter().all(HashSet::is_empty) {
-            return None;
+            return Ok(None);
         }
-        Some(if rigid {
+        Ok(Some(if rigid {
             Self::Rigid(touching(topology, &levels[0], &blocks[0]))
         } else {
             Self::Blocks(blocks)
-        })
+        }))
     }
 
     /// The triangles that may come back in a step, ascending.
@@ -126,14 +145,20 @@ fn touching(topology: &Topology, level: &[Fixed], blocks: &HashSet<[i32; 3]>) ->
 }
 
 /// The blocks in which a pose winds negatively, and those around them.
-fn folded_blocks(topology: &Topology, level: &[Fixed], window: &Window) -> HashSet<[i32; 3]> {
+fn folded_blocks(
+    ctx: &Context,
+    topology: &Topology,
+    level: &[Fixed],
+    window: &Window,
+) -> Result<HashSet<[i32; 3]>> {
+    ctx.check()?;
     let simplices = topology.simplices.par_iter().with_min_len(GRAIN);
     let faces: Vec<Face> = simplices.map(|simplex| face(simplex, level)).collect();
     let around = |block: [i32; 3]| {
         let [low, high] = [-1, 1].map(|by| block.map(|place| place + by));
         each_block(low, high)
     };
-    negative_blocks(&faces, window).into_iter().flat_map(around).collect()
+    Ok(negative_blocks(&faces, window).into_iter().flat_map(around).collect())
 }
 
 fn face(simplex: &Simplex, level: &[Fixed]) -> Face {
@@ -222,20 +247,22 @@ enum Change {
 
 /// The poses of a moving mesh.
 struct Poses<'a> {
+    ctx: &'a Context,
     topology: &'a Topology,
     levels: &'a [Vec<Fixed>],
 }
 
 impl Poses<'_> {
     /// The outward passages of some triangles in a step that do not count anywhere.
-    fn returns(&self, step: usize, triangles: &[u32]) -> Returns {
+    fn returns(&self, step: usize, triangles: &[u32]) -> Result<Returns> {
+        self.ctx.check()?;
         let passages: Vec<Passage> = triangles
             .iter()
             .flat_map(|&triangle| self.passages(step, triangle))
             .filter(|passage| passage.sign > 0)
             .collect();
         if passages.is_empty() {
-            return Returns::default();
+            return Ok(Returns::default());
         }
         let points: Vec<DVec3> = passages.iter().flat_map(Passage::samples).collect();
         let (during, first) = (Step::new(self, step, &points), Still::new(self, 0, &points));
@@ -252,11 +279,11 @@ impl Poses<'_> {
         };
         let found: Vec<_> = passages.par_iter().with_min_len(FEW).filter_map(ask).collect();
         let places = found.iter().map(|(place, _)| *place).collect();
-        Returns { places, early: found.into_iter().flat_map(|(_, early)| early).collect() }
+        Ok(Returns { places, early: found.into_iter().flat_map(|(_, early)| early).collect() })
     }
 
     /// Those whose points no earlier step brings to 0.
-    fn first_ones(&self, mut early: Vec<Early>) -> Vec<Place> {
+    fn first_ones(&self, mut early: Vec<Early>) -> Result<Vec<Place>> {
         let mut first = Vec::new();
         for step in 0..self.levels.len() - 1 {
             early.retain(|point| {
@@ -267,12 +294,13 @@ impl Poses<'_> {
             if early.is_empty() {
                 break;
             }
+            self.ctx.check()?;
             let points: Vec<DVec3> = early.iter().map(|point| point.at).collect();
             let during = Step::new(self, step, &points);
             early =
                 early.into_par_iter().with_min_len(FEW).filter(|point| during.is_below(&point.at)).collect();
         }
-        first
+        Ok(first)
     }
 
     /// The tetrahedra that a triangle passes in a step.

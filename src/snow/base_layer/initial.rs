@@ -62,7 +62,7 @@ pub fn layer(
                 }
                 for mesh in std::iter::once(&ground).chain(&statics) {
                     let raised = |p: DVec3| p + DVec3::y() * *depth;
-                    prisms(&lattice, mesh, |p| p, raised, 1, &mut faces)?;
+                    prisms(ctx, &lattice, mesh, |p| p, raised, 1, &mut faces)?;
                 }
             }
             Cover::Top(top) => {
@@ -70,12 +70,12 @@ pub fn layer(
                 centre(top)?;
                 let floor = ground.lowest().min(top.lowest()) - 16.0 * cell;
                 let sunk = |p: DVec3| DVec3::new(p.x, floor, p.z);
-                prisms(&lattice, top, sunk, |p| p, 1, &mut faces)?;
-                prisms(&lattice, &ground, sunk, |p| p, SOLID, &mut faces)?;
+                prisms(ctx, &lattice, top, sunk, |p| p, 1, &mut faces)?;
+                prisms(ctx, &lattice, &ground, sunk, |p| p, SOLID, &mut faces)?;
             }
         }
         for mesh in std::iter::once(&ground).filter(|mesh| mesh.is_solid()).chain(&statics) {
-            solid(&lattice, mesh, &mut faces)?;
+            solid(ctx, &lattice, mesh, &mut faces)?;
         }
         Ok(faces)
     })?;
@@ -229,6 +229,7 @@ fn upright(mut sheet: Sheet) -> Sheet {
 
 /// Prisms between two places of each triangle that moves along its normal from the first to the second.
 fn prisms(
+    ctx: &Context,
     lattice: &Lattice,
     sheet: &Sheet,
     from: impl Fn(DVec3) -> DVec3,
@@ -239,16 +240,16 @@ fn prisms(
     let topology = sheet.topology(false);
     let first = level(lattice, &topology, sheet, from)?;
     let last = level(lattice, &topology, sheet, to)?;
-    let mut made = boundary(&topology, &[first, last], Weights { solid: 0, swept: 1 }, &EVERYWHERE);
+    let mut made = boundary(ctx, &topology, &[first, last], Weights { solid: 0, swept: 1 }, &EVERYWHERE)?;
     made.iter_mut().for_each(|face| weigh(face, layers));
     faces.extend(made);
     Ok(())
 }
 
-fn solid(lattice: &Lattice, sheet: &Sheet, faces: &mut Vec<Face>) -> Result<()> {
+fn solid(ctx: &Context, lattice: &Lattice, sheet: &Sheet, faces: &mut Vec<Face>) -> Result<()> {
     let topology = sheet.topology(true);
     let pose = level(lattice, &topology, sheet, |p| p)?;
-    faces.extend(boundary(&topology, &[pose], Weights { solid: SOLID, swept: 0 }, &EVERYWHERE));
+    faces.extend(boundary(ctx, &topology, &[pose], Weights { solid: SOLID, swept: 0 }, &EVERYWHERE)?);
     Ok(())
 }
 
