@@ -1,10 +1,10 @@
 //! The volume that moving meshes sweep in an interval of time.
 //!
 //! [`chain`] is exact up to a tolerance: signed space-time tetrahedra (`chain.rs`), poses dense enough
-//! for arcs (`body.rs`), edges cut where their ends move differently (`refine.rs`), winding numbers by
-//! exact line crossings (`winding.rs`, `exposure.rs`), order in time where a skin folds inside out (`folds.rs`), the parts
-//! of faces that bound the volume (`cells.rs`, `surface.rs`; `patch.rs` where many sheets nearly coincide), then exact
-//! distances in the narrow band (`nearest.rs`, `depth.rs`, `voxelise.rs`).
+//! for arcs (`body.rs`), edges cut where their ends move differently (`refine.rs`), order in time where a skin folds
+//! inside out (`folds.rs`, `passages.rs`), winding numbers by exact line crossings (`winding.rs`, `exposure.rs`), the
+//! parts of faces that bound the volume (`cells.rs`, `surface.rs`; `patch.rs` where many sheets nearly coincide), then
+//! exact distances in the narrow band (`nearest.rs`, `depth.rs`, `voxelise.rs`).
 //! [`samples`] is the thesis' way (section 3.2): the union of N + 1 poses, dilated and smoothed.
 
 mod body;
@@ -18,6 +18,7 @@ mod folds;
 mod lattice;
 mod lists;
 mod nearest;
+mod passages;
 mod patch;
 mod prism;
 mod refine;
