@@ -30,7 +30,7 @@ pub struct Dense {
 struct Shape {
     tree: Bvh,
     corners: Vec<[DVec3; 3]>,
-    /// How many faces lie there, those that face the other way less.
+    /// How often each face is there: those turned round count below 0.
     layers: Vec<i32>,
     centre: DVec3,
     radius: f64,
@@ -202,7 +202,7 @@ impl Shape {
     }
 }
 
-/// Triangles with other corners each, and how many of them there are, those turned round less; none that cancel.
+/// Unique triangles, each with how often it is there: those turned round count below 0. Those that cancel are left out.
 fn distinct(triangles: &[[u32; 3]]) -> Vec<([u32; 3], i32)> {
     let mut layers: BTreeMap<[u32; 3], i32> = BTreeMap::new();
     for &[a, b, c] in triangles {
