@@ -43,6 +43,13 @@ impl Columns {
         (number != NONE).then(|| number as usize * LINES + ((p & 7) << 3 | (q & 7)) as usize)
     }
 
+    /// The numbers of the lines whose coordinates (voxels) lie from `first` to `last`.
+    pub fn between(&self, first: [i32; 2], last: [i32; 2]) -> impl Iterator<Item = usize> + '_ {
+        let range =
+            move |axis: usize| first[axis].max(self.low[axis] * 8)..=last[axis].min(self.high[axis] * 8 + 7);
+        range(0).flat_map(move |p| range(1).filter_map(move |q| self.line([p, q])))
+    }
+
     /// The coordinates of a line.
     pub fn coordinates(&self, line: usize) -> [i32; 2] {
         let ([p, q], inner) = (self.places[line / LINES], (line % LINES) as i32);
@@ -74,6 +81,7 @@ mod tests {
             (columns.line([-8, 0]), columns.line([8, 8]), columns.line([-17, -8])),
             (None, None, None)
         );
+        assert_eq!(columns.between([-100, 6], [1, 9]).collect::<Vec<_>>(), [0, 1, 8, 9]);
         for line in 0..128 {
             assert_eq!(columns.line(columns.coordinates(line)), Some(line));
         }

@@ -49,8 +49,6 @@ pub struct Exposure {
     pub faces: Vec<u8>,
     /// What lines see along each axis.
     along: Vec<Along>,
-    /// Where each face is exposed (cells).
-    places: Lists<[f32; 3]>,
     /// Whether each cell holds a stack: so many sheets that its surface is made of patches alone.
     pub stacks: Vec<bool>,
     /// Whether each cell holds a stack, or a bundle: sheets so close together that patches are added.
@@ -123,15 +121,11 @@ impl Exposure {
         };
         let along: Vec<Along> =
             Axis::ALL.into_par_iter().map(|axis| Along::new(cells, axis, &marks)).collect();
-        let place = |spot: Spot| (spot.face, spot.at().map(|value| value as f32));
-        let places: Vec<Vec<(u32, [f32; 3])>> =
-            along.iter().map(|along| along.spots().map(place).collect()).collect();
         let stacks = stacks(cells, &marks.counts);
         let bundles = marks.bundles.into_iter().map(AtomicBool::into_inner);
         Self {
             faces: marks.faces.into_iter().map(AtomicU8::into_inner).collect(),
             along,
-            places: Lists::new(cells.faces.len(), &places),
             bundles: bundles.zip(&stacks).map(|(bundle, stack)| bundle | stack).collect(),
             stacks,
         }
@@ -144,8 +138,8 @@ impl Exposure {
 
     /// Whether a face is exposed on a line through a box (cells).
     pub fn within(&self, face: u32, (low, high): ([f32; 3], [f32; 3])) -> bool {
-        let inside = |at: &[f32; 3]| (0..3).all(|a| at[a] >= low[a] - 0.01 && at[a] <= high[a] + 0.01);
-        self.places.get(face as usize).iter().any(inside)
+        let (low, high) = (low.map(|value| value - 0.01), high.map(|value| value + 0.01));
+        self.along.iter().any(|along| along.exposes(face, low, high))
     }
 
     /// The spots in stacks and bundles where lines meet their faces steeply, cell after cell.
@@ -212,6 +206,18 @@ impl Along {
     /// What a line meets.
     fn line(&self, line: [i32; 2]) -> &[Meeting] {
         self.columns.line(line).map_or(&[], |line| self.meetings.get(line))
+    }
+
+    /// Whether a face is exposed within a box (cells).
+    fn exposes(&self, face: u32, low: [f32; 3], high: [f32; 3]) -> bool {
+        let (first, last) =
+            (self.axis.line(low.map(|v| v.ceil() as i32)), self.axis.line(high.map(|v| v.floor() as i32)));
+        let along = self.axis.index();
+        let inside = |meeting: &Meeting| {
+            let place = meeting.place as f32;
+            meeting.face == face && place >= low[along] && place <= high[along]
+        };
+        self.columns.between(first, last).any(|line| self.meetings.get(line).iter().any(inside))
     }
 
     /// All spots, line after line.

@@ -15,7 +15,7 @@ use crate::motion::{Keys, Rigid};
 use crate::vdb::FloatGrid;
 
 /// Blocks that are made before they are handed to the grid: bounds the memory beside it.
-const BATCH: usize = 8192;
+const BATCH: usize = 2048;
 /// A window without bounds.
 const EVERYWHERE: Window = Window { min: [i32::MIN; 3], max: [i32::MAX; 3] };
 /// All voxels within the lattice's reach.
