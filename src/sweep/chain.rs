@@ -45,7 +45,7 @@ pub struct Window {
 
 impl Window {
     /// Whether a triangle between these corners can matter: near in x and y, not above in z.
-    fn wants(&self, low: Fixed, high: Fixed) -> bool {
+    pub fn wants(&self, low: Fixed, high: Fixed) -> bool {
         high[0] >= self.min[0]
             && low[0] <= self.max[0]
             && high[1] >= self.min[1]

@@ -139,8 +139,14 @@ fn folded_blocks(
     window: &Window,
 ) -> Result<HashSet<[i32; 3]>> {
     ctx.check()?;
+    let wanted = |face: &Face| {
+        let [a, b, c] = face.v;
+        let of_corners =
+            |pick: fn(i32, i32) -> i32| [0, 1, 2].map(|axis| pick(pick(a[axis], b[axis]), c[axis]));
+        window.wants(of_corners(i32::min), of_corners(i32::max))
+    };
     let simplices = topology.simplices.par_iter().with_min_len(GRAIN);
-    let faces: Vec<Face> = simplices.map(|simplex| face(simplex, level)).collect();
+    let faces: Vec<Face> = simplices.map(|simplex| face(simplex, level)).filter(wanted).collect();
     let around = |block: [i32; 3]| {
         let [low, high] = [-1, 1].map(|by| block.map(|place| place + by));
         each_block(low, high)
@@ -154,10 +160,11 @@ fn is_rigid(topology: &Topology, levels: &[Vec<Fixed>]) -> bool {
         let [a, b] = [i, j].map(|vertex| place(level[vertex as usize]));
         (a - b).norm()
     };
-    levels[1..].iter().all(|level| {
-        let same = |edge: &[u32; 2]| (length(level, *edge) - length(&levels[0], *edge)).abs() < 4.0;
-        topology.edges.par_iter().with_min_len(GRAIN).all(same)
-    })
+    let keeps_length = |edge: &[u32; 2]| {
+        let first = length(&levels[0], *edge);
+        levels[1..].iter().all(|level| (length(level, *edge) - first).abs() < 4.0)
+    };
+    topology.edges.par_iter().with_min_len(GRAIN).all(keeps_length)
 }
 
 /// The blocks in which closed faces wind negatively around points on lines through voxels.
