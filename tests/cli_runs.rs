@@ -24,7 +24,7 @@ fn folder(frames: u32, cell: f64, mesh: &str) -> TempDir {
 }
 
 fn removed(folder: &Path, frame: u32) -> f64 {
-    let text = fs::read_to_string(folder.join(format!("out/report/{frame:04}.json"))).unwrap();
+    let text = fs::read_to_string(folder.join(format!("out/report/base.{frame:04}.json"))).unwrap();
     let report: serde_json::Value = serde_json::from_str(&text).unwrap();
     report["removed_m3"].as_f64().unwrap()
 }

@@ -14,8 +14,9 @@ use std::time::{Duration, Instant};
 
 use frazil::io::{sealed, sequence::Pattern};
 use frazil::scene::shot::Run;
-use frazil::scene::verify::verify;
-use frazil::scene::{FrameChoice, Inputs, Rebuild, Scene, check, check_memory};
+use frazil::scene::shot::verify::verify;
+use frazil::scene::snow::{self, check};
+use frazil::scene::{FrameChoice, Inputs, Rebuild, Scene, check_memory};
 use frazil::{Context, Pool};
 use program::{CUBE, fails, works};
 use serde_json::Value;
@@ -269,7 +270,7 @@ fn ten_thousand_changed_records_are_used_or_refused() {
             }
             let frames = if round % 3 == 0 { &some } else { &all };
             let from = [3, 4].get(random.below(40)).copied();
-            drop(Run::prepare(&ctx, &scene, &inputs, &out, frames, from));
+            drop(Run::prepare(&ctx, &snow::plan(&scene, &inputs), &out, &[], frames, from));
         });
         assert!(precious.exists());
         fs::write(&record, &whole).unwrap();

@@ -162,7 +162,7 @@ fn a_user_s_own_files_are_never_written_over() {
     assert_eq!(fs::read(folder.path().join("scene.toml")).unwrap(), scene);
     assert!(!folder.path().join("state").exists());
     for foreign in
-        ["scene.toml", "shot.usda", "base/base.0001.vdb", "removed/removed.0002.vdb", "report/0002.json"]
+        ["scene.toml", "shot.usda", "base/base.0001.vdb", "removed/removed.0002.vdb", "report/base.0002.json"]
     {
         let path = folder.path().join("out").join(foreign);
         fs::create_dir_all(path.parent().unwrap()).unwrap();
@@ -241,5 +241,5 @@ fn a_folder_that_cannot_be_locked_is_told() {
     let mut run = program::command(folder.path(), "snow shot.toml -o out");
     let run = run.env("LD_PRELOAD", folder.path().join("shim.so")).output().unwrap();
     let said = String::from_utf8_lossy(&run.stderr);
-    assert!(run.status.success() && said.contains("base.lock: cannot lock: no locks available"), "{said}");
+    assert!(run.status.success() && said.contains("run.lock: cannot lock: no locks available"), "{said}");
 }

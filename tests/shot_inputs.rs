@@ -138,7 +138,7 @@ fn a_frame_that_removes_nothing_has_a_volume_of_nought() {
     let objects = "[[object]]\nfile = \"cube.obj\"\nkeys = [{ frame = 1, at = [0, 3, 0] }]\n";
     let folder = folder(1, 0.1, objects);
     works(folder.path(), "snow shot.toml -o out -q");
-    let report = fs::read_to_string(folder.path().join("out/report/0001.json")).unwrap();
+    let report = fs::read_to_string(folder.path().join("out/report/base.0001.json")).unwrap();
     assert!(report.contains("\"removed_m3\": 0.0"), "{report}");
     let grids = frazil::vdb::file::read(&folder.path().join("out/removed/removed.0001.vdb")).unwrap();
     let metadata = grids[0].metadata().unwrap();
@@ -184,7 +184,7 @@ fn what_is_out_of_reach_leaves_no_trace_and_what_passes_through_leaves_its_own()
         works(folder.path(), &format!("snow shot.toml -o {name} -q {set}"));
     }
     let volume = |name: &str| -> f64 {
-        let report = fs::read_to_string(folder.path().join(format!("{name}/report/0002.json"))).unwrap();
+        let report = fs::read_to_string(folder.path().join(format!("{name}/report/base.0002.json"))).unwrap();
         let report: serde_json::Value = serde_json::from_str(&report).unwrap();
         report["removed_m3"].as_f64().unwrap()
     };

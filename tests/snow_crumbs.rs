@@ -115,7 +115,7 @@ fn a_scene_counts_its_crumbs() {
         .output()
         .unwrap();
     assert!(run.status.success(), "{}", String::from_utf8_lossy(&run.stderr));
-    let report = std::fs::read_to_string(folder.path().join("out/report/0001.json")).unwrap();
+    let report = std::fs::read_to_string(folder.path().join("out/report/base.0001.json")).unwrap();
     let report: serde_json::Value = serde_json::from_str(&report).unwrap();
     assert_eq!(report["crumbs"], 1);
     assert!(

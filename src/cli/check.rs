@@ -3,8 +3,8 @@
 use std::fmt::Write;
 use std::path::{Path, PathBuf};
 
-use frazil::scene::check::{ObjectReport, Report, check};
-use frazil::scene::verify::{Verified, verify};
+use frazil::scene::shot::verify::{Verified, verify};
+use frazil::scene::snow::check::{ObjectReport, Report, check};
 use frazil::scene::{Inputs, Override, Scene, check_memory};
 
 use super::exit::{Failure, Phase};

@@ -31,17 +31,17 @@ impl FrameProgress {
         Self { bar, lines: !terminal && !quiet, total, done: 0, start: Instant::now() }
     }
 
-    /// A frame is written.
-    pub fn finished(&mut self, frame: i32) {
+    /// A frame of a stage is written.
+    pub fn finished(&mut self, stage: &str, frame: i32) {
         self.done += 1;
         if let Some(bar) = &self.bar {
-            bar.set_message(format!("frame {frame} stage base"));
+            bar.set_message(format!("frame {frame} stage {stage}"));
             bar.inc(1);
         }
         if self.lines {
             let percent = 100 * self.done / self.total.max(1);
             let eta = clock(self.start.elapsed(), self.done, self.total);
-            let _ = writeln!(std::io::stderr(), "frame {frame} stage base {percent}% eta {eta}");
+            let _ = writeln!(std::io::stderr(), "frame {frame} stage {stage} {percent}% eta {eta}");
         }
     }
 }

@@ -1,8 +1,10 @@
 //! `frazil snow`: objects press into a layer of snow, frame by frame.
 
 use std::path::PathBuf;
+use std::sync::Mutex;
 
-use frazil::scene::{FrameChoice, Inputs, Override, Scene, check_memory, shot};
+use frazil::scene::shot::Run;
+use frazil::scene::{FrameChoice, Inputs, Override, Scene, check_memory, snow};
 
 use super::exit::{Failure, Phase};
 use super::output;
@@ -11,9 +13,9 @@ use super::session::Session;
 
 /// Press moving objects into a layer of snow.
 ///
-/// Writes base/base.%04d.vdb (surface, compression, touched), removed/removed.%04d.vdb, report/%04d.json, shot.usda
-/// and scene.toml, the scene with every default filled in. Frames that are there and match are not made again; a
-/// folder with frames of other settings is refused.
+/// Writes base/base.%04d.vdb (surface, compression, touched), removed/removed.%04d.vdb, objects/ where the scene asks for
+/// it, report/base.%04d.json, shot.usda and scene.toml, the scene with every default filled in. Frames that are there
+/// and match are not made again; a folder with frames of other settings is refused.
 #[derive(clap::Args)]
 #[command(after_help = "\
 Examples:
@@ -26,13 +28,13 @@ pub struct Args {
     /// Folder for the output; made if it is not there.
     #[arg(short, long, value_name = "DIR")]
     output: PathBuf,
-    /// Parts to make.
-    #[arg(long, value_enum, default_value = "base")]
-    stage: Stage,
+    /// Make these stages of the scene only, of base and objects; all without it.
+    #[arg(long, value_name = "A,B", value_delimiter = ',')]
+    stage: Vec<String>,
     /// Write these frames only; frames before them are computed when no file has them.
     #[arg(long, value_name = "A-B|A-BxN|A,B,C", allow_hyphen_values = true)]
     frames: Option<FrameChoice>,
-    /// Keep the frames before N, whatever they were made with, and make all others again.
+    /// Keep the frames before N, whatever they were made with, and make all others of these stages again.
     #[arg(long, value_name = "N", allow_hyphen_values = true)]
     from: Option<i32>,
     /// Put a setting over the scene's, for instance snow.noise.seed=2 or object.1.file=hero.glb.
@@ -43,15 +45,8 @@ pub struct Args {
     preview: Option<u16>,
 }
 
-#[derive(Clone, Copy, PartialEq, clap::ValueEnum)]
-enum Stage {
-    /// The base layer.
-    Base,
-}
-
 /// Runs the command.
 pub fn run(args: Args, session: &Session) -> Result<(), Failure> {
-    let Stage::Base = args.stage;
     let mut scene = Scene::read_with(&args.scene, &args.set).before()?;
     if let Some(factor) = args.preview {
         scene.coarsen(factor.into()).before()?;
@@ -70,18 +65,20 @@ pub fn run(args: Args, session: &Session) -> Result<(), Failure> {
     }
     let inputs = Inputs::load(&scene).before()?;
     check_memory(&scene, &inputs, session.max_memory()).before()?;
-    let run = shot::Run::prepare(&session.ctx, &scene, &inputs, &args.output, &frames, args.from).before()?;
+    let plan = snow::plan(&scene, &inputs);
+    let run = Run::prepare(&session.ctx, &plan, &args.output, &args.stage, &frames, args.from).before()?;
     output::check_folder(&args.output).before()?;
     let (made, there) = (run.to_make(), run.there());
-    let mut progress = FrameProgress::new(made, there, session.is_quiet());
-    let mut removed = 0.0;
-    run.make(&session.ctx, |frame, report| {
-        removed += report.removed_volume;
-        progress.finished(frame);
+    let progress = Mutex::new(FrameProgress::new(made, there, session.is_quiet()));
+    let removed = Mutex::new(0.0);
+    run.make(&session.ctx, |stage, frame, report| {
+        let of_frame = report.results.get("removed_m3").and_then(|value| value.as_f64());
+        *removed.lock().expect("nobody panics with this lock") += of_frame.unwrap_or(0.0);
+        progress.lock().expect("nobody panics with this lock").finished(stage, frame);
     })
     .during()?;
     session.record("frames", made.into());
     session.record("frames_there", there.into());
-    session.record("removed_m3", removed.into());
+    session.record("removed_m3", removed.into_inner().expect("nobody panics with this lock").into());
     Ok(())
 }

@@ -37,12 +37,26 @@ pub fn knows(path: &Path) -> bool {
         let (kind, folder) = (path.parent()?.file_name()?.to_str()?, path.parent()?.parent()?);
         let name = path.file_name()?.to_str()?;
         let frame = name.split('.').rev().find_map(|part| part.parse::<i32>().ok())?;
-        // The stage that all files of today are of.
-        let manifest = Manifest::read(folder, "base", frame).ok()??;
         let relative = format!("{kind}/{name}");
-        Some(manifest.files.iter().any(|file| file.path == relative && file.is_whole(folder)))
+        let names_it = |stage: &String| {
+            let manifest = Manifest::read(folder, stage, frame).ok().flatten();
+            let files = manifest.map(|manifest| manifest.files).unwrap_or_default();
+            files.iter().any(|file| file.path == relative && file.is_whole(folder))
+        };
+        Some(stages(folder, frame)?.iter().any(names_it))
     };
     of_record().unwrap_or(false)
+}
+
+/// The stages that have a record of a frame in a folder.
+fn stages(folder: &Path, frame: i32) -> Option<Vec<String>> {
+    let entries = std::fs::read_dir(folder.join("state")).ok()?;
+    let stage = |entry: std::fs::DirEntry| {
+        let name = entry.file_name();
+        let stage = name.to_str()?.strip_suffix(&format!(".{frame:04}.json"))?;
+        is_word(stage).then(|| stage.to_string())
+    };
+    Some(entries.filter_map(|entry| stage(entry.ok()?)).collect())
 }
 
 /// What a frame was made from, and its files.
@@ -113,9 +127,12 @@ impl Manifest {
         if manifest.frame != frame {
             return Err(Error::file(path, format!("is the record of frame {}", manifest.frame)));
         }
-        let state = format!("state/{stage}.{frame:04}.vdb");
         let foreign = manifest.files.iter().find(|file| !is_of_frame(&file.path, frame));
-        match foreign.or(manifest.state.as_ref().filter(|file| file.path != state)) {
+        let is_state = |path: &str| {
+            let extension = path.strip_prefix(&format!("state/{stage}.{frame:04}."));
+            extension.is_some_and(|extension| is_word(extension) && extension != "json")
+        };
+        match foreign.or(manifest.state.as_ref().filter(|file| !is_state(&file.path))) {
             Some(foreign) => {
                 Err(Error::file(path, format!("names a file that no frame has: {:?}", foreign.path)))
             }
@@ -142,9 +159,13 @@ impl Manifest {
     }
 }
 
+/// Whether a text is one lower-case word, as names of stages and extensions are.
+fn is_word(text: &str) -> bool {
+    !text.is_empty() && text.bytes().all(|letter| letter.is_ascii_lowercase())
+}
+
 /// Whether a path is one that a frame's files have: `base/base.0012.vdb`.
 fn is_of_frame(path: &str, frame: i32) -> bool {
-    let is_word = |text: &str| !text.is_empty() && text.bytes().all(|letter| letter.is_ascii_lowercase());
     path.split_once('/').is_some_and(|(kind, name)| {
         let extension = name.strip_prefix(&format!("{kind}.{frame:04}."));
         is_word(kind) && extension.is_some_and(is_word)

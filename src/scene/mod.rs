@@ -1,35 +1,20 @@
-//! Scene files (TOML): what a shot is made of, read with every default filled in ([`Scene::read`]), checked
-//! against its inputs and run frame by frame ([`shot`]).
+//! Scene files (TOML): what a shot is made of, read with every default filled in ([`Scene::read`], `text/`), checked
+//! against its inputs and run frame by frame.
+//!
+//! [`shot`] runs any stage; [`snow`] has the inputs, the check and the stage of the base layer; the stage `objects` writes
+//! the objects as they move. A new stage is a type with the traits [`shot::Stage`] and [`shot::Stepping`] beside its
+//! system, named in the system's plan ([`snow::plan`]), with the scopes of the keys that it depends on in `text/keys.rs`.
 
-mod cache;
-mod chain;
-pub mod check;
-mod file;
-mod frames;
-mod inputs;
-mod memory;
+mod moving;
 mod objects;
-mod overrides;
-mod own;
-mod relief;
-mod resolved;
-mod settings;
 pub mod shot;
-mod stage;
-mod stored;
-mod table;
-pub mod template;
-pub mod verify;
-mod walks;
-mod writer;
+pub mod snow;
+mod text;
 
-pub use frames::{FrameChoice, Frames};
-pub use inputs::Inputs;
-pub use memory::{check as check_memory, estimate};
-pub use overrides::Override;
-pub use stored::{Rebuild, Stored};
-pub use walks::Walk;
+pub use snow::{Inputs, Rebuild, Walk, check_memory, estimate};
+pub use text::{FrameChoice, Frames, Override, template};
 
+use crate::io::sequence::Pattern;
 use crate::motion::Space;
 use crate::snow::base_layer::NoiseParams;
 use std::path::PathBuf;
@@ -171,6 +156,27 @@ pub enum BaseMode {
     Full,
     /// All of it at the first frame, then the blocks that changed.
     Delta,
+}
+
+impl Scene {
+    /// The files that it reads; of sequences those of its own first frame.
+    pub(crate) fn files(&self) -> Vec<PathBuf> {
+        let mut out = Vec::new();
+        if let Some(Ground::Mesh(path)) = &self.snow.ground {
+            out.push(path.clone());
+        }
+        if let Layer::Top(path) | Layer::Grid(path) = &self.snow.layer {
+            out.push(path.clone());
+        }
+        for object in &self.objects {
+            let first = f64::from(self.shot.frames.first) - object.offset;
+            out.push(match Pattern::parse(&object.file) {
+                Some(pattern) => pattern.path(first.floor() as i32),
+                None => object.file.clone(),
+            });
+        }
+        out
+    }
 }
 
 impl Default for Output {

@@ -1,75 +1,155 @@
-//! Reads the objects of a scene file.
+//! The stage `objects`: the objects as they move, with their velocities over the coming frame.
 
-use std::path::Path;
+use std::sync::Arc;
 
-use super::file::{FAR, extension, name};
-use super::table::Table;
-use super::{Key, Object, Role};
+use super::shot::{Clip, FrameFiles, Kind, Reads, Report, Settings, Stage, Stepped, Stepping, Stored};
+use super::text::keys::settings_of;
+use super::{Role, Scene, moving};
+use crate::base::{DVec3, TriMesh, Uvs, Vec3};
+use crate::context::Context;
 use crate::error::Result;
-use crate::io::mesh::EXTENSIONS;
-use crate::motion::{Space, Up};
+use crate::io::manifest::Keeps;
+use crate::io::seen::Seen;
+use crate::io::{mesh, usd};
+use crate::motion::Drawn;
+use crate::sweep::Body;
 
-/// Every `[[object]]`, in the file's order.
-pub(super) fn objects(root: &Table) -> Result<Vec<Object>> {
-    let known = ["file", "node", "clip", "loop", "offset", "scale", "up", "role", "noise", "keys", "ease"];
-    let tables = root.tables("object", "[[object]]", &known)?;
-    tables.iter().map(object).collect()
+/// The moving objects of a scene.
+pub struct Objects<'a> {
+    scene: &'a Scene,
+    bodies: &'a [Body],
+    seen: &'a Arc<Seen>,
+    names: Vec<String>,
 }
 
-fn object(table: &Table) -> Result<Object> {
-    let file = table.path("file")?.ok_or_else(|| table.error("file", "is missing"))?;
-    let is_character = is_character(&file);
-    if !is_character && !EXTENSIONS.contains(&extension(&file).as_str()) {
-        let what = format!("must be a .glb, .gltf, .obj, .ply or .stl file, not \"{}\"", name(&file));
-        return Err(table.error("file", what));
-    }
-    if let Some(key) = ["node", "clip", "loop"].into_iter().find(|key| table.has(key) && !is_character) {
-        return Err(table.error(key, "is for .glb and .gltf files: leave it out"));
-    }
-    let text = |key| Ok(table.text(key)?.map(str::to_string));
-    Ok(Object {
-        file,
-        node: text("node")?,
-        clip: text("clip")?,
-        repeat: table.flag("loop")?.unwrap_or(true),
-        offset: table.number_in("offset", -1.0e7..=1.0e7, "frames")?.unwrap_or(0.0),
-        space: Space {
-            scale: table.number_in("scale", 1.0e-9..=1.0e9, "")?.unwrap_or(1.0),
-            up: table.choice("up", &[("y", Up::Y), ("z", Up::Z)])?.unwrap_or(Up::Y),
-        },
-        role: table.choice("role", &ROLES)?.unwrap_or(Role::Collide),
-        noise: table.flag("noise")?.unwrap_or(true),
-        keys: keys(table)?,
-        ease: table.flag("ease")?.unwrap_or(false),
-    })
+/// The objects at a frame: places (m) and velocities (m/s) of each one's vertices.
+pub struct Poses {
+    frame: i32,
+    meshes: Vec<(Vec<Vec3>, Vec<Vec3>)>,
 }
 
-/// Whether a file is a glTF character.
-pub(super) fn is_character(file: &Path) -> bool {
-    matches!(extension(file).as_str(), "glb" | "gltf")
+impl<'a> Objects<'a> {
+    /// Those of a scene; `bodies` are in its order.
+    pub fn new(scene: &'a Scene, bodies: &'a [Body], seen: &'a Arc<Seen>) -> Self {
+        Self { scene, bodies, seen, names: moving::prim_names(scene) }
+    }
+
+    /// All objects in one mesh.
+    fn ply(&self, poses: &Poses, drawn: &[Drawn<'_>]) -> Vec<u8> {
+        let (mut all, mut velocities) = (TriMesh::default(), Vec::new());
+        for (drawn, (positions, speeds)) in drawn.iter().zip(&poses.meshes) {
+            all.append(&TriMesh { positions: positions.clone(), triangles: drawn.triangles.to_vec() });
+            velocities.extend_from_slice(speeds);
+        }
+        let uvs = Uvs::joined(drawn.iter().map(|drawn| (drawn.uvs, drawn.vertices, drawn.triangles)));
+        mesh::ply_bytes(&all, &velocities, uvs.as_ref())
+    }
+
+    /// A value clip with a mesh for each object.
+    fn usda(&self, poses: &Poses, drawn: &[Drawn<'_>]) -> String {
+        let frames = poses.meshes.iter().zip(drawn.iter().zip(&self.names));
+        let frames: Vec<usd::MeshFrame> = frames
+            .map(|((points, velocities), (drawn, name))| usd::MeshFrame {
+                name,
+                points,
+                velocities,
+                triangles: drawn.triangles,
+                uvs: drawn.uvs,
+            })
+            .collect();
+        usd::clip("objects", poses.frame, self.scene.shot.fps, usd::Units::OWN, &frames)
+    }
 }
 
-/// The roles by name.
-pub(super) const ROLES: [(&str, Role); 3] =
-    [("collide", Role::Collide), ("static", Role::Static), ("ignore", Role::Ignore)];
-
-fn keys(object: &Table) -> Result<Vec<Key>> {
-    let mut keys: Vec<Key> = Vec::new();
-    for table in object.tables("keys", "keys of [[object]]", &["frame", "at", "turn_deg"])? {
-        let frame = table.number_in("frame", -1.0e8..=1.0e8, "")?;
-        let frame = frame.ok_or_else(|| table.error("frame", "is missing"))?;
-        if keys.last().is_some_and(|before| before.frame >= frame) {
-            return Err(table.error("frame", "must be greater than the key's before it"));
-        }
-        let at = table.numbers("at")?.unwrap_or([0.0; 3]);
-        if at.iter().any(|value: &f64| value.abs() > FAR) {
-            return Err(table.error("at", format!("must lie within {FAR} m of the origin")));
-        }
-        let turn_deg = table.numbers("turn_deg")?.unwrap_or([0.0; 3]);
-        if turn_deg.iter().any(|value: &f64| value.abs() > 1.0e6) {
-            return Err(table.error("turn_deg", "must lie in -1000000 to 1000000 degrees"));
-        }
-        keys.push(Key { frame, at, turn_deg });
+impl Stage for Objects<'_> {
+    fn name(&self) -> &'static str {
+        "objects"
     }
-    Ok(keys)
+
+    fn kinds(&self) -> &'static [Kind] {
+        &[Kind { name: "objects", extensions: &["usda", "ply"] }]
+    }
+
+    fn writes(&self, _kind: &str) -> bool {
+        true
+    }
+
+    fn loose_files(&self) -> &'static [&'static str] {
+        if self.scene.output.objects_usd { &[MANIFEST] } else { &[] }
+    }
+
+    fn settings(&self) -> Result<Settings> {
+        settings_of(self.scene, self.name(), self.seen, &[Role::Collide])
+    }
+
+    fn of_first_state(&self, _settings: &Settings) -> Settings {
+        Settings::new()
+    }
+
+    fn remembers(&self) -> bool {
+        false
+    }
+
+    fn reads(&self, frame: i32) -> Reads {
+        Reads { files: moving::files(self.scene, frame), ahead: moving::files_ahead(self.scene, frame) }
+    }
+
+    fn keeps(&self, _frame: i32) -> Keeps {
+        Keeps::Whole
+    }
+
+    fn clip(&self) -> Option<Clip<'_>> {
+        let uvs = self.bodies.iter().map(|body| body.motion().drawn().uvs);
+        let meshes = self.names.iter().cloned().zip(uvs).collect();
+        Some(Clip { kind: "objects", manifest: MANIFEST, meshes })
+    }
+}
+
+/// What the clips of `objects/` share.
+const MANIFEST: &str = "objects/objects.manifest.usda";
+
+impl Stepping for Objects<'_> {
+    type State = ();
+    type Step = Option<Poses>;
+    type Writer = ();
+
+    fn load(&self, _ctx: &Context, _done: &Stored, _after: Option<i32>) -> Result<()> {
+        Ok(())
+    }
+
+    fn step(
+        &self,
+        ctx: &Context,
+        _state: &mut (),
+        frame: i32,
+        made_from: Option<&str>,
+    ) -> Result<Stepped<Option<Poses>>> {
+        let fps = self.scene.shot.fps;
+        let mut meshes = Vec::with_capacity(self.bodies.len());
+        let (mut pose, mut velocities) = (Vec::<DVec3>::new(), Vec::<DVec3>::new());
+        for body in self.bodies.iter().filter(|_| made_from.is_some()) {
+            ctx.check()?;
+            body.motion().drawn_pose(f64::from(frame) / fps, &mut pose)?;
+            body.motion().velocities_ahead(f64::from(frame) / fps, 1.0 / fps, &mut velocities)?;
+            meshes.push((usd::to_floats(&pose), usd::to_floats(&velocities)));
+        }
+        let step = made_from.map(|_| Poses { frame, meshes });
+        Ok(Stepped { step, report: Report::default() })
+    }
+
+    fn writer(&self, _ctx: &Context, _state: &()) -> Result<()> {
+        Ok(())
+    }
+
+    fn write(&self, _writer: &mut (), step: Option<Poses>, files: Option<&mut FrameFiles>) -> Result<()> {
+        let (Some(poses), Some(files)) = (step, files) else { return Ok(()) };
+        let drawn: Vec<Drawn> = self.bodies.iter().map(|body| body.motion().drawn()).collect();
+        if self.scene.output.objects_ply {
+            files.save("objects", "ply", &self.ply(&poses, &drawn))?;
+        }
+        if self.scene.output.objects_usd {
+            files.save("objects", "usda", self.usda(&poses, &drawn).as_bytes())?;
+        }
+        Ok(())
+    }
 }

@@ -2,11 +2,11 @@
 
 use serde::Serialize;
 
-use super::objects::is_character;
-use super::{Object, Scene};
 use crate::base::DVec3;
 use crate::error::Result;
 use crate::motion::{Character, Keys, Motion, Placed, Play, gait};
+use crate::scene::text::is_character;
+use crate::scene::{Object, Scene};
 
 /// Feet that slip slower than this (m/s), or than this part of their clip's speed, are let be.
 const SLOW: f64 = 0.05;

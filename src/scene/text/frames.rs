@@ -97,6 +97,13 @@ impl FrameChoice {
     }
 }
 
+impl FrameChoice {
+    /// No frame at all.
+    pub(in crate::scene) fn none() -> Self {
+        Self { frames: Vec::new() }
+    }
+}
+
 impl From<Frames> for FrameChoice {
     fn from(frames: Frames) -> Self {
         Self { frames: frames.iter().collect() }

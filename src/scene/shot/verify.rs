@@ -7,16 +7,20 @@ use rayon::prelude::*;
 use serde::Serialize;
 
 use super::own::{self, Own};
-use super::stored::STAGE;
+use super::stored::record_of;
+use super::usd;
 use crate::context::Context;
 use crate::error::{Error, Result};
 use crate::io::manifest::{Manifest, Written};
 use crate::io::sealed;
 
+/// What a folder's runs wrote besides the records of frames.
+const FILES: &str = "state/files.json";
+
 /// What a folder holds.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize)]
 pub struct Verified {
-    /// Frames that are done.
+    /// Frames that are done, of all stages together.
     pub frames: usize,
     /// Files that were compared, records among them.
     pub files: usize,
@@ -43,27 +47,35 @@ pub struct Damage {
 /// A folder that cannot be read or that no run wrote into; cancel.
 pub fn verify(ctx: &Context, folder: &Path) -> Result<Verified> {
     std::fs::read_dir(folder).map_err(|error| Error::io(folder, "read", error))?;
-    let names: BTreeSet<String> = own::names(folder)?.into_keys().collect();
-    let mut damaged = Vec::new();
-    let mut known: BTreeSet<String> = BTreeSet::new();
-    let record = format!("state/{STAGE}.json");
-    let manifests: Vec<Manifest> =
-        names.iter().filter_map(|name| manifest(folder, name, &mut damaged)).collect();
-    if !names.contains(&record) {
-        if manifests.is_empty() && damaged.is_empty() {
-            return Err(Error::file(folder, "holds no frames: no run wrote into it"));
-        }
-        damaged.push(Damage { file: record.clone(), what: "is missing".into() });
-    } else if let Err(error) = sealed::read::<serde_json::Value>(&folder.join(&record)) {
-        damaged.push(told(&record, error));
-    }
-    known.insert(record);
-    let (own_files, faults) = own_faults(folder);
+    let (mut damaged, mut known) = (Vec::new(), BTreeSet::new());
+    let (own, faults) = match Own::read(folder, std::iter::empty()) {
+        Ok(own) => (own, Vec::new()),
+        Err(error) => (Own::unknown(folder), vec![told(FILES, error)]),
+    };
     damaged.extend(faults);
-    known.extend([own::SCENE, own::SHOT, own::OBJECTS, "state/files.json"].map(String::from));
+    let stages = own.stages_there()?;
+    if stages.is_empty() && damaged.is_empty() {
+        return Err(Error::file(folder, "holds no frames: no run wrote into it"));
+    }
+    let names: BTreeSet<String> = own.names_of(&stages)?;
+    let manifests: Vec<(String, Manifest)> =
+        names.iter().filter_map(|name| manifest(folder, name, &mut damaged)).collect();
+    for stage in &stages {
+        let record = format!("state/{stage}.json");
+        if !folder.join(&record).exists() {
+            damaged.push(Damage { file: record.clone(), what: "is missing".into() });
+        } else if let Err(error) = sealed::read::<serde_json::Value>(&folder.join(&record)) {
+            damaged.push(told(&record, error));
+        }
+        known.insert(record);
+    }
+    let (own_files, faults) = own.faults();
+    damaged.extend(faults.into_iter().map(|(file, what)| Damage { file, what }));
+    known.extend([own::SCENE, usd::SHOT, FILES].map(String::from));
+    known.extend(own.loose().map(String::from));
     let files: Vec<&Written> = manifests
         .iter()
-        .flat_map(|manifest| manifest.files.iter().chain(state_of(folder, manifest)))
+        .flat_map(|(_, manifest)| manifest.files.iter().chain(state_of(folder, manifest)))
         .collect();
     let faults = ctx.stage("verify", || {
         let fault = |file: &&Written| -> Result<Option<Damage>> {
@@ -78,19 +90,15 @@ pub fn verify(ctx: &Context, folder: &Path) -> Result<Verified> {
     damaged.extend(reports.iter().filter_map(|name| report_fault(folder, name)));
     damaged.sort();
     known.extend(damaged.iter().map(|damage| damage.file.clone()));
-    known.extend(manifests.iter().map(|manifest| record_of(manifest.frame)));
+    known.extend(manifests.iter().map(|(name, _)| name.clone()));
     let is_known = |name: &&String| known.contains(*name) || name.starts_with("report/");
     Ok(Verified {
-        frames: manifests.iter().filter(|manifest| manifest.files_are_there(folder)).count(),
-        files: files.len() + manifests.len() + reports.len() + own_files,
+        frames: manifests.iter().filter(|(_, manifest)| manifest.files_are_there(folder)).count(),
+        files: files.len() + manifests.len() + reports.len() + own_files + 1,
         bytes: files.iter().map(|file| file.bytes).sum(),
         damaged,
         unknown: names.iter().filter(|name| !is_known(name)).cloned().collect(),
     })
-}
-
-fn record_of(frame: i32) -> String {
-    format!("state/{STAGE}.{frame:04}.json")
 }
 
 fn told(file: &str, error: Error) -> Damage {
@@ -101,11 +109,11 @@ fn told(file: &str, error: Error) -> Damage {
     Damage { file: file.to_string(), what }
 }
 
-/// The record of a frame, where a name is one's.
-fn manifest(folder: &Path, name: &str, damaged: &mut Vec<Damage>) -> Option<Manifest> {
-    let frame = name.strip_prefix(&format!("state/{STAGE}."))?.strip_suffix(".json")?.parse().ok()?;
-    match Manifest::read(folder, STAGE, frame) {
-        Ok(manifest) => manifest,
+/// The record of a frame, where a name is one's, with that name.
+fn manifest(folder: &Path, name: &str, damaged: &mut Vec<Damage>) -> Option<(String, Manifest)> {
+    let (stage, frame) = record_of(name.strip_prefix("state/")?)?;
+    match Manifest::read(folder, stage, frame) {
+        Ok(manifest) => manifest.map(|manifest| (name.to_string(), manifest)),
         Err(error) => {
             damaged.push(told(name, error));
             None
@@ -113,20 +121,9 @@ fn manifest(folder: &Path, name: &str, damaged: &mut Vec<Damage>) -> Option<Mani
     }
 }
 
-/// A frame's exact layer, as long as it is kept.
+/// A frame's exact state, as long as it is kept.
 fn state_of<'a>(folder: &Path, manifest: &'a Manifest) -> Option<&'a Written> {
     manifest.state.as_ref().filter(|state| folder.join(&state.path).exists())
-}
-
-/// How many files belong to no frame, and what is wrong with them and with their record.
-fn own_faults(folder: &Path) -> (usize, Vec<Damage>) {
-    match Own::read(folder, None) {
-        Err(error) => (1, vec![told("state/files.json", error)]),
-        Ok(own) => {
-            let (count, faults) = own.faults();
-            (count + 1, faults.into_iter().map(|(file, what)| Damage { file, what }).collect())
-        }
-    }
 }
 
 fn report_fault(folder: &Path, name: &str) -> Option<Damage> {

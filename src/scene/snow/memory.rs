@@ -1,7 +1,8 @@
 //! How much memory a scene will need, before any of it is taken.
 
-use super::{BaseMode, Inputs, Layer, Scene};
+use super::Inputs;
 use crate::error::{Error, Result};
+use crate::scene::{BaseMode, Layer, Scene};
 use crate::vdb::file;
 
 /// Bytes for each column of cells: two surfaces, each across two leaves, and what making them takes.

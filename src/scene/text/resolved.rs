@@ -1,8 +1,9 @@
 //! Writes a scene with every default filled in and commented: the file beside the output that reproduces it.
 
+use super::keys;
 use super::objects::is_character;
-use super::{BaseMode, Ground, Layer, Object, Role, Scene};
 use crate::motion::Up;
+use crate::scene::{BaseMode, Ground, Layer, Object, Role, Scene};
 use std::fmt::Write;
 use std::path::{Path, PathBuf};
 
@@ -50,8 +51,8 @@ impl Scene {
         writeln!(out, "# Every setting of this output, defaults filled in, made by frazil {VERSION}.")?;
         writeln!(out, "# SI units; `frazil snow` on this file makes the same output again.\n")?;
         writeln!(out, "[shot]")?;
-        line(out, "frames", &quoted(&self.shot.frames.to_string()), "first and last")?;
-        line(out, "fps", &number(self.shot.fps), "frames per second")?;
+        line(out, "shot.frames", &quoted(&self.shot.frames.to_string()))?;
+        line(out, "shot.fps", &number(self.shot.fps))?;
         self.write_snow(out)?;
         for object in &self.objects {
             write_object(out, object)?;
@@ -62,50 +63,41 @@ impl Scene {
             BaseMode::Full => "full",
             BaseMode::Delta => "delta",
         };
-        line(out, "base", kinds(output.base), "base/base.%04d.vdb: surface, compression, touched")?;
-        line(out, "base_mode", &quoted(mode), "full, or delta: first frame whole, then what changed")?;
-        line(out, "half", &output.half.to_string(), "16-bit values, for rendering only")?;
-        line(out, "removed", kinds(output.removed), "removed/removed.%04d.vdb: what each frame took away")?;
+        line(out, "output.base", kinds(output.base))?;
+        line(out, "output.base_mode", &quoted(mode))?;
+        line(out, "output.half", &output.half.to_string())?;
+        line(out, "output.removed", kinds(output.removed))?;
         let objects: Vec<&str> = [("usd", output.objects_usd), ("ply", output.objects_ply)]
             .into_iter()
             .filter(|(_, written)| *written)
             .map(|(kind, _)| kind)
             .collect();
-        line(
-            out,
-            "objects",
-            &format!("{objects:?}"),
-            "\"usd\", \"ply\": objects/, as they moved, with velocities",
-        )?;
-        line(out, "usd", &output.usd.to_string(), "shot.usda: the whole shot for programs that read USD")
+        line(out, "output.objects", &format!("{objects:?}"))?;
+        line(out, "output.usd", &output.usd.to_string())
     }
 
     fn write_snow(&self, out: &mut String) -> std::fmt::Result {
         writeln!(out, "\n[snow]")?;
         match &self.snow.ground {
             Some(Ground::Plane { height, area }) => {
-                line(out, "ground", &number(*height), "height of a level plane (m)")?;
-                line(out, "area", &numbers(area), "x0, z0, x1, z1 (m)")?;
+                line(out, "snow.ground", &number(*height))?;
+                line(out, "snow.area", &numbers(area))?;
             }
-            Some(Ground::Mesh(path)) => line(out, "ground", &file(path), "mesh")?,
+            Some(Ground::Mesh(path)) => line(out, "snow.ground", &file(path))?,
             None => {}
         }
         match &self.snow.layer {
-            Layer::Depth(depth) => {
-                line(out, "depth", &number(*depth), "above ground and static objects (m)")?
-            }
-            Layer::Top(path) => line(out, "top", &file(path), "mesh of the top surface")?,
-            Layer::Grid(path) => line(out, "top", &file(path), "the layer as a level set")?,
+            Layer::Depth(depth) => line(out, "snow.depth", &number(*depth))?,
+            Layer::Top(path) | Layer::Grid(path) => line(out, "snow.top", &file(path))?,
         }
-        line(out, "cell", &number(self.snow.cell), "edge of a voxel (m)")?;
-        let crumb = self.snow.min_crumb.to_string();
-        line(out, "min_crumb", &crumb, "islands of fewer voxels are taken away; 0 = none")?;
+        line(out, "snow.cell", &number(self.snow.cell))?;
+        line(out, "snow.min_crumb", &self.snow.min_crumb.to_string())?;
         let noise = &self.snow.noise;
         writeln!(out, "\n[snow.noise]")?;
-        line(out, "amplitude", &number(noise.amplitude), "greatest displacement, outward only (m); 0 = off")?;
-        line(out, "size", &number(noise.size), "size of the largest features (m)")?;
-        line(out, "octaves", &noise.octaves.to_string(), "each of half the size of the one before")?;
-        line(out, "seed", &noise.seed.to_string(), "")
+        line(out, "snow.noise.amplitude", &number(noise.amplitude))?;
+        line(out, "snow.noise.size", &number(noise.size))?;
+        line(out, "snow.noise.octaves", &noise.octaves.to_string())?;
+        line(out, "snow.noise.seed", &noise.seed.to_string())
     }
 }
 
@@ -113,35 +105,35 @@ const VERSION: &str = env!("CARGO_PKG_VERSION");
 
 fn write_object(out: &mut String, object: &Object) -> std::fmt::Result {
     writeln!(out, "\n[[object]]")?;
-    line(out, "file", &file(&object.file), "character, mesh or sequence")?;
+    line(out, "object.file", &file(&object.file))?;
     if is_character(&object.file) {
         if let Some(node) = &object.node {
-            line(out, "node", &quoted(node), "only nodes of this name and what hangs on them")?;
+            line(out, "object.node", &quoted(node))?;
         }
         if let Some(clip) = &object.clip {
-            line(out, "clip", &quoted(clip), "empty: the pose at rest")?;
+            line(out, "object.clip", &quoted(clip))?;
         }
-        line(out, "loop", &object.repeat.to_string(), "the clip starts again when it ends")?;
+        line(out, "object.loop", &object.repeat.to_string())?;
     }
-    line(out, "offset", &number(object.offset), "frames that a sequence or clip starts later")?;
-    line(out, "scale", &number(object.space.scale), "from the file's unit to metres")?;
+    line(out, "object.offset", &number(object.offset))?;
+    line(out, "object.scale", &number(object.space.scale))?;
     let up = match object.space.up {
         Up::Y => "y",
         Up::Z => "z",
     };
-    line(out, "up", &quoted(up), "the file's upward axis: y or z")?;
+    line(out, "object.up", &quoted(up))?;
     let role = match object.role {
         Role::Collide => "collide",
         Role::Static => "static",
         Role::Ignore => "ignore",
     };
-    line(out, "role", &quoted(role), "collide, static or ignore")?;
-    line(out, "noise", &object.noise.to_string(), "ragged edges")?;
-    line(out, "ease", &object.ease.to_string(), "smooth between keys, else straight")?;
+    line(out, "object.role", &quoted(role))?;
+    line(out, "object.noise", &object.noise.to_string())?;
+    line(out, "object.ease", &object.ease.to_string())?;
     if object.keys.is_empty() {
-        return line(out, "keys", "[]", "rigid motion over the file's own");
+        return line(out, "object.keys", "[]");
     }
-    writeln!(out, "keys = [  # rigid motion over the file's own: m, degrees about x, then y, then z")?;
+    writeln!(out, "keys = [  # {}: m, degrees about x, then y, then z", meaning("object.keys"))?;
     for key in &object.keys {
         let (at, turn) = (numbers(&key.at), numbers(&key.turn_deg));
         writeln!(out, "    {{ frame = {}, at = {at}, turn_deg = {turn} }},", number(key.frame))?;
@@ -156,12 +148,18 @@ fn relative(path: &Path, folder: &Path, home: &Path) -> Option<PathBuf> {
     Some(up.join(parent.strip_prefix(home).ok()?).join(path.file_name()?))
 }
 
-fn line(out: &mut String, key: &str, value: &str, meaning: &str) -> std::fmt::Result {
-    let assignment = format!("{key} = {value}");
-    if meaning.is_empty() {
-        return writeln!(out, "{assignment}");
+/// A key by its path, with its value and meaning.
+fn line(out: &mut String, path: &str, value: &str) -> std::fmt::Result {
+    let name = path.rsplit('.').next().unwrap_or(path);
+    let assignment = format!("{name} = {value}");
+    match meaning(path) {
+        "" => writeln!(out, "{assignment}"),
+        meaning => writeln!(out, "{assignment:<32} # {meaning}"),
     }
-    writeln!(out, "{assignment:<32} # {meaning}")
+}
+
+fn meaning(path: &str) -> &'static str {
+    keys::find(path).map_or("", |key| key.meaning)
 }
 
 fn kinds(written: bool) -> &'static str {

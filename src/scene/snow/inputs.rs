@@ -3,8 +3,6 @@
 use std::path::Path;
 use std::sync::Arc;
 
-use super::objects::is_character;
-use super::{Ground, Layer, Object, Role, Scene};
 use crate::base::mesh::{farthest, too_far as far_mesh};
 use crate::base::{DVec3, TriMesh};
 use crate::context::Context;
@@ -13,6 +11,8 @@ use crate::io::seen::Seen;
 use crate::io::sequence::Pattern;
 use crate::io::{hash, mesh};
 use crate::motion::{Character, Key, Keys, MeshSequence, Motion, Placed, Play, Rigid, missing_uvs};
+use crate::scene::text::is_character;
+use crate::scene::{Ground, Layer, Object, Role, Scene};
 use crate::snow::base_layer::initial::{self, Cover};
 use crate::sweep::{self, Body, REACH};
 use crate::vdb::{FloatGrid, GridClass, file};
@@ -27,7 +27,7 @@ pub struct Inputs {
     /// The objects that move through the snow.
     pub bodies: Vec<Body>,
     /// What the files held when they were read.
-    pub(super) seen: Arc<Seen>,
+    pub(in crate::scene) seen: Arc<Seen>,
     /// What about the files should be told, a sentence each; the log has it too.
     pub warnings: Vec<String>,
 }
@@ -67,7 +67,7 @@ impl Inputs {
             match object.role {
                 Role::Static => statics.push(posed(&*motion, start)?),
                 _ => {
-                    let name = format!("object {} ({})", index + 1, super::file::name(&object.file));
+                    let name = format!("object {} ({})", index + 1, crate::scene::text::name(&object.file));
                     let body = Body::new(motion, start)?.with_noise(object.noise).with_name(name);
                     log::info!(
                         "{}: {} triangles, {} open loops closed",
@@ -202,7 +202,7 @@ impl Inputs {
 
 /// Says that a static object lies too far away.
 pub(super) fn too_far(scene: &Scene, index: usize, far: f64) -> String {
-    let name = super::file::name(&scene.objects[index].file);
+    let name = crate::scene::text::name(&scene.objects[index].file);
     let what = format!("object {} ({name}), static, reaches", index + 1);
     sweep::too_far(&what, far, "the middle of the ground", scene.snow.cell)
 }

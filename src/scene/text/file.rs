@@ -1,11 +1,12 @@
 //! Reads a scene file: keys to fields, defaults filled in, ranges checked.
 
+use super::keys::names;
 use super::objects::objects;
 use super::overrides::Override;
 use super::table::{Document, Table};
-use super::{BaseMode, Frames, Ground, Layer, Output, Scene, Shot, Snow};
 use crate::error::{Error, Result};
 use crate::io::mesh::EXTENSIONS;
+use crate::scene::{BaseMode, Frames, Ground, Layer, Output, Scene, Shot, Snow};
 use crate::snow::base_layer::NoiseParams;
 use std::path::{Path, PathBuf};
 use toml::de::DeTable;
@@ -49,7 +50,7 @@ impl Scene {
         }
         let known = ["shot", "snow", "object", "output"];
         let root = Table::open(&document, "", root.get_ref(), 0, &known)?;
-        let snow = root.table("snow", "[snow]", &SNOW_KEYS)?;
+        let snow = root.table("snow", "[snow]", &known_with("snow", &["noise"]))?;
         Ok(Self {
             path: path.to_path_buf(),
             shot: shot(&root)?,
@@ -80,7 +81,11 @@ impl Scene {
     }
 }
 
-const SNOW_KEYS: [&str; 7] = ["ground", "area", "depth", "top", "cell", "noise", "min_crumb"];
+/// The names of a table's keys, and of the tables in it.
+fn known_with(table: &str, tables: &[&'static str]) -> Vec<&'static str> {
+    names(table).into_iter().chain(tables.iter().copied()).collect()
+}
+
 /// Edges of voxels that a scene may have (m).
 const CELLS: std::ops::RangeInclusive<f64> = 1.0e-5..=10.0;
 
@@ -91,7 +96,7 @@ fn folder_of(path: &Path) -> Result<PathBuf> {
 }
 
 fn shot(root: &Table) -> Result<Shot> {
-    let shot = root.table("shot", "[shot]", &["frames", "fps"])?;
+    let shot = root.table("shot", "[shot]", &names("shot"))?;
     let shot = shot.ok_or_else(|| root.error("shot", "is missing"))?;
     let frames = shot.text("frames")?.ok_or_else(|| shot.error("frames", "is missing"))?;
     let frames: Frames = frames.parse().map_err(|what| shot.error("frames", format!("is wrong: {what}")))?;
@@ -167,7 +172,7 @@ fn ground(snow: &Table) -> Result<Option<Ground>> {
 
 fn noise(snow: &Table, cell: f64) -> Result<NoiseParams> {
     let defaults = NoiseParams::for_cell(cell);
-    let table = snow.table("noise", "[snow.noise]", &["amplitude", "size", "octaves", "seed"])?;
+    let table = snow.table("noise", "[snow.noise]", &names("snow.noise"))?;
     let Some(table) = table else { return Ok(defaults) };
     let (amplitudes, sizes) = (NoiseParams::amplitudes(cell), NoiseParams::sizes(cell));
     let noise = NoiseParams {
@@ -189,8 +194,9 @@ fn noise(snow: &Table, cell: f64) -> Result<NoiseParams> {
 }
 
 fn output(root: &Table) -> Result<Output> {
-    let known = ["base", "base_mode", "half", "removed", "objects", "usd"];
-    let Some(table) = root.table("output", "[output]", &known)? else { return Ok(Output::default()) };
+    let Some(table) = root.table("output", "[output]", &names("output"))? else {
+        return Ok(Output::default());
+    };
     let defaults = Output::default();
     let written = |key, kind, default| -> Result<bool> {
         Ok(table.choices(key, &[(kind, ())])?.map_or(default, |kinds| !kinds.is_empty()))
@@ -213,11 +219,11 @@ fn output(root: &Table) -> Result<Output> {
 }
 
 /// A file's extension in lower case, empty when it has none.
-pub(super) fn extension(path: &Path) -> String {
+pub(in crate::scene) fn extension(path: &Path) -> String {
     path.extension().and_then(|text| text.to_str()).unwrap_or("").to_lowercase()
 }
 
 /// A file's name without its folder.
-pub(super) fn name(path: &Path) -> String {
+pub(in crate::scene) fn name(path: &Path) -> String {
     path.file_name().unwrap_or(path.as_os_str()).to_string_lossy().into_owned()
 }

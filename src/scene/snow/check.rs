@@ -5,11 +5,12 @@ use serde::Serialize;
 
 use super::relief::Relief;
 use super::walks::{Walk, walk};
-use super::{BaseMode, Inputs, Layer, Object, Role, Scene, inputs, memory};
+use super::{Inputs, inputs, memory};
 use crate::base::{DVec3, faults};
 use crate::context::Context;
 use crate::error::{Error, Result};
 use crate::motion::{Motion, Poses, span};
+use crate::scene::{BaseMode, Layer, Object, Role, Scene};
 use crate::snow::base_layer::Reach;
 use crate::snow::base_layer::initial::thin;
 use crate::sweep::{Body, REACH};
@@ -297,7 +298,7 @@ fn report(
 }
 
 fn name_of(index: usize, object: &Object) -> String {
-    format!("object {} ({})", index + 1, super::file::name(&object.file))
+    format!("object {} ({})", index + 1, crate::scene::text::name(&object.file))
 }
 
 /// Holes of a body at the first frame.

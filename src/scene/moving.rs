@@ -1,0 +1,47 @@
+//! Objects that move: the files of their sequences, and their names.
+
+use std::path::PathBuf;
+
+use super::{Role, Scene};
+use crate::io::sequence::Pattern;
+use crate::io::usd;
+
+/// The sequences of the objects that move, each with its offset (frames).
+fn sequences(scene: &Scene) -> impl Iterator<Item = (Pattern, f64)> + '_ {
+    let moving = scene.objects.iter().filter(|object| object.role == Role::Collide);
+    moving.filter_map(|object| Some((Pattern::parse(&object.file)?, object.offset)))
+}
+
+/// The files of sequences that a frame's step reads: all it needs for its interval of time.
+pub(super) fn files(scene: &Scene, frame: i32) -> Vec<PathBuf> {
+    let mut out = Vec::new();
+    for (pattern, offset) in sequences(scene) {
+        let at = |frame: i32| f64::from(frame) - offset;
+        let from = if frame == scene.shot.frames.first { at(frame) } else { at(frame - 1) };
+        out.extend((from.floor() as i32..=at(frame).ceil() as i32).map(|number| pattern.path(number)));
+    }
+    out
+}
+
+/// The files of sequences that only a frame's velocities over the coming frame read.
+pub(super) fn files_ahead(scene: &Scene, frame: i32) -> Vec<PathBuf> {
+    let number = |offset: f64| (f64::from(frame) + 1.0 - offset).ceil() as i32;
+    sequences(scene).map(|(pattern, offset)| pattern.path(number(offset))).collect()
+}
+
+/// Names of the moving objects' prims, each once.
+pub(super) fn prim_names(scene: &Scene) -> Vec<String> {
+    let mut names: Vec<String> = Vec::new();
+    for object in scene.objects.iter().filter(|object| object.role == Role::Collide) {
+        let stem = object.file.file_stem().unwrap_or_default().to_string_lossy().into_owned();
+        let stem =
+            usd::prim_name(stem.split(['%', '#', '$']).next().unwrap_or("").trim_end_matches(['.', '_']));
+        let count =
+            names.iter().filter(|name| **name == stem || name.starts_with(&format!("{stem}_"))).count();
+        let numbered = |number: usize| if number == 1 { stem.clone() } else { format!("{stem}_{number}") };
+        // Another file may bear the name that the number gives.
+        let name = (count + 1..).map(numbered).find(|name| !names.contains(name)).unwrap_or_default();
+        names.push(name);
+    }
+    names
+}

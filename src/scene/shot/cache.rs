@@ -1,0 +1,301 @@
+//! The frames of a stage in the output folder: with which settings they were made, which of them are to be made again.
+
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+
+use serde::{Deserialize, Serialize};
+
+use super::chain::{Chain, Made};
+use super::settings::{self, Settings};
+use super::stage::Stage;
+use super::stored::Stored;
+use crate::error::{Error, Result};
+use crate::io::hash::Hasher;
+use crate::io::manifest::Manifest;
+use crate::io::sealed;
+use crate::io::seen::Seen;
+use crate::scene::FrameChoice;
+
+/// Frames from one on were made with these settings.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+struct Segment {
+    from: i32,
+    settings: Settings,
+    /// Hash of the settings, and of the frame before as it was then.
+    seed: String,
+}
+
+impl Segment {
+    fn new(from: i32, settings: Settings, before: Option<&Manifest>) -> Self {
+        let mut hasher = Hasher::default();
+        settings.iter().for_each(|(key, value)| {
+            hasher.add_text(key).add_text(value);
+        });
+        before.into_iter().flat_map(|manifest| manifest.files.iter().chain(&manifest.state)).for_each(
+            |file| {
+                hasher.add_text(&file.hash);
+            },
+        );
+        Self { from, settings, seed: hasher.finish() }
+    }
+}
+
+/// With which settings a stage's frames were made: `state/base.json`.
+#[derive(Debug, Default, PartialEq, Serialize, Deserialize)]
+struct Record {
+    segments: Vec<Segment>,
+}
+
+/// Which frames are asked for.
+#[derive(Clone, Copy)]
+pub struct Asked<'a> {
+    /// The shot's first.
+    pub first: i32,
+    /// Those that are wanted.
+    pub frames: &'a FrameChoice,
+    /// The first that is to be made again; frames before it are kept as they are.
+    pub from: Option<i32>,
+}
+
+impl Asked<'_> {
+    /// What is asked of a stage: one that was never made and needs no frame before another makes all that are wanted.
+    fn of(self, stage: &dyn Stage, stored: &Stored) -> Self {
+        let is_new = !stage.remembers() && stored.frames().next().is_none();
+        Self { from: self.from.filter(|_| !is_new), ..self }
+    }
+}
+
+/// The frames of a stage, held by one run at a time.
+pub struct Cache {
+    /// The frames that are done, those left out that are to be made again.
+    pub stored: Stored,
+    record: Record,
+    chain: Chain,
+    /// Frames that are to be made again, removed by [`Cache::commit`].
+    forgotten: Vec<Manifest>,
+}
+
+impl Cache {
+    /// Opens the frames of a stage. Nothing of the folder is changed before [`Cache::commit`].
+    ///
+    /// # Errors
+    /// A folder that cannot be read or that holds frames of other settings; a record that is damaged; no frame to go on
+    /// from; frames that would leave a gap where none may be.
+    pub fn open(stage: &dyn Stage, seen: &Arc<Seen>, folder: &Path, asked: Asked<'_>) -> Result<Self> {
+        let settings = stage.settings()?;
+        let path = record_path(folder, stage);
+        let mut record: Record = sealed::read(&path)?.unwrap_or_default();
+        let mut stored = Stored::read(folder, stage.name())?;
+        refuse_asked(stage, asked, &stored)?;
+        let Asked { first, frames, from } = asked.of(stage, &stored);
+        let mut forgotten = Vec::new();
+        match from {
+            Some(from) if from > first => {
+                refuse_other_start(stage, folder, from, &record, &settings)?;
+                forgotten = stored.leave_out_from(from);
+                record.segments.retain(|segment| segment.from < from);
+                record.segments.push(Segment::new(from, settings, stored.manifest(from - 1)));
+            }
+            Some(_) => {
+                forgotten = stored.leave_out_from(first);
+                record.segments = vec![Segment::new(first, settings, None)];
+            }
+            None => match record.segments.last() {
+                Some(last) => {
+                    let changed = settings::changed(&last.settings, &settings);
+                    // A sealed record may still be one that no run wrote.
+                    if last.from < first {
+                        let what = format!(
+                            "says that frames from {} on were made, before the shot's first",
+                            last.from
+                        );
+                        return Err(Error::file(path, what));
+                    }
+                    if !changed.is_empty() {
+                        return Err(other_settings(stage, folder, &changed));
+                    }
+                }
+                None => record.segments.push(Segment::new(first, settings, None)),
+            },
+        }
+        let last = record.segments.last().ok_or_else(|| Error::Internal("a record has no segment".into()))?;
+        if let Some(gone) = frames.iter().find(|frame| *frame < last.from && !stored.is_done(*frame)) {
+            let what = format!(
+                "frame {gone} is gone or was never made, and the frames before {} were made with other settings: \
+                 ask for --frames from {} on, choose another -o, or --from {first}",
+                last.from, last.from
+            );
+            return Err(Error::file(folder, what));
+        }
+        let chain = Chain::new(seen, last.from, &last.seed);
+        Ok(Self { stored, record, chain, forgotten })
+    }
+
+    /// Removes the frames that are to be made again, and says in the folder what it is for.
+    ///
+    /// # Errors
+    /// What the operating system reports.
+    pub fn commit(&mut self, stage: &dyn Stage) -> Result<()> {
+        for manifest in std::mem::take(&mut self.forgotten) {
+            self.stored.remove(&manifest)?;
+        }
+        let path = record_path(self.stored.folder(), stage);
+        if sealed::read(&path)?.as_ref() != Some(&self.record) {
+            sealed::write(&path, &self.record)?;
+        }
+        Ok(())
+    }
+
+    /// First frame that was made with the settings of now.
+    pub fn own_from(&self) -> i32 {
+        self.record.segments.last().map_or(i32::MIN, |segment| segment.from)
+    }
+
+    /// Refuses frames whose inputs have changed since. One whose files of the coming frame have changed or appeared is to
+    /// be made again, if it is asked for.
+    ///
+    /// # Errors
+    /// The frame; a file that cannot be read.
+    pub fn check_inputs(
+        &mut self,
+        stage: &dyn Stage,
+        asked: &FrameChoice,
+        upstream: &[&Stored],
+    ) -> Result<()> {
+        let own = self.own_from();
+        let frames: Vec<i32> = self.stored.frames().filter(|frame| *frame >= own).collect();
+        for frame in frames {
+            let Some(manifest) = self.stored.manifest(frame).cloned() else { continue };
+            // What is upstream may be on the point of being made: it is looked at again when it is there.
+            if upstream.iter().any(|upstream| !upstream.is_done(frame)) {
+                continue;
+            }
+            let made = self.inputs(stage, frame, upstream)?;
+            if manifest.inputs != made.from {
+                return Err(self.changed_inputs(stage, frame));
+            }
+            if manifest.next != made.next && asked.contains(frame) {
+                self.stored.leave_out(frame);
+            }
+        }
+        Ok(())
+    }
+
+    fn changed_inputs(&self, stage: &dyn Stage, frame: i32) -> Error {
+        let mut names: Vec<String> =
+            stage.reads(frame).files.iter().map(|file| file.display().to_string()).collect();
+        names.extend(stage.upstream().iter().map(|upstream| format!("stage {upstream}")));
+        let what = format!(
+            "the inputs of frame {frame} have changed since it was made ({}): --from {frame} keeps the frames before it",
+            names.join(" or ")
+        );
+        Error::file(self.stored.folder(), what)
+    }
+
+    /// Hashes of what a frame is made from.
+    ///
+    /// # Errors
+    /// A file that cannot be read.
+    pub fn inputs(&mut self, stage: &dyn Stage, frame: i32, upstream: &[&Stored]) -> Result<Made> {
+        self.chain.at(stage, frame, |frame| upstream.iter().map(|stored| stored.manifest(frame)).collect())
+    }
+}
+
+/// Refuses to keep frames that began with another first state.
+fn refuse_other_start(
+    stage: &dyn Stage,
+    folder: &Path,
+    from: i32,
+    record: &Record,
+    settings: &Settings,
+) -> Result<()> {
+    let Some(kept) = record.segments.iter().rev().find(|segment| segment.from < from) else { return Ok(()) };
+    let changed = settings::changed(&stage.of_first_state(&kept.settings), &stage.of_first_state(settings));
+    if changed.is_empty() {
+        return Ok(());
+    }
+    let what = format!(
+        "--from {from} cannot keep frames of another {} ({}): choose another -o",
+        stage.noun(),
+        changed.join(", ")
+    );
+    Err(Error::file(folder, what))
+}
+
+/// Refuses a `from` that cannot go on from the frame before it or that the asked frames have no part in, and frames that
+/// would leave a gap where the stage needs all.
+///
+/// # Errors
+/// Why.
+pub(super) fn refuse_asked(stage: &dyn Stage, asked: Asked<'_>, stored: &Stored) -> Result<()> {
+    let Asked { first, frames, from } = asked.of(stage, stored);
+    if let Some(from) = from {
+        refuse_from(stage, frames, first, from, stored)?;
+    }
+    let Some(why) = stage.needs_every_frame() else { return Ok(()) };
+    let is_there = |frame: i32| stored.is_done(frame) && from.is_none_or(|from| frame < from);
+    match (first..frames.last()).find(|frame| !is_there(*frame) && !frames.contains(*frame)) {
+        None => Ok(()),
+        Some(gap) => {
+            let what = format!("{why} needs every frame, but frame {gap} is neither there nor asked for");
+            Err(Error::file(stored.folder(), what))
+        }
+    }
+}
+
+fn refuse_from(
+    stage: &dyn Stage,
+    frames: &FrameChoice,
+    first: i32,
+    from: i32,
+    stored: &Stored,
+) -> Result<()> {
+    let refused = |what: String| Err(Error::file(stored.folder(), what));
+    if frames.last() < from {
+        let (low, high) = (frames.first(), frames.last());
+        return refused(format!(
+            "--from {from} makes nothing of --frames {low}-{high}: ask for frames from {from} on"
+        ));
+    }
+    if from <= first {
+        return Ok(());
+    }
+    let before = from - 1;
+    if stage.remembers() && !stored.is_done(before) {
+        return refused(format!("--from {from} needs frame {before}, which is not there"));
+    }
+    if stage.remembers() && stored.latest_state(before..=before).is_none() {
+        let kept: Vec<String> = stored
+            .frames()
+            .filter(|frame| stored.latest_state(*frame..=*frame).is_some())
+            .map(|frame| format!("--from {}", i64::from(frame) + 1))
+            .collect();
+        let ways = if kept.is_empty() { String::new() } else { format!("{}, ", kept.join(", ")) };
+        return refused(format!(
+            "--from {from} needs the exact {} after frame {before}, which the folder does not keep (`half` and \
+             `base = []` keep the last ones only): {ways}--from {first} or another -o",
+            stage.noun()
+        ));
+    }
+    match frames.iter().find(|frame| *frame < from && !stored.is_done(*frame)) {
+        Some(gap) => refused(format!(
+            "frame {gap} is not there, and --from {from} keeps the frames before {from} as they are: ask for --frames from \
+             {from} on"
+        )),
+        None => Ok(()),
+    }
+}
+
+fn record_path(folder: &Path, stage: &dyn Stage) -> PathBuf {
+    folder.join("state").join(format!("{}.json", stage.name()))
+}
+
+fn other_settings(stage: &dyn Stage, folder: &Path, changed: &[String]) -> Error {
+    let what = format!(
+        "the folder holds frames of stage {} made with other settings ({}): --from N keeps the frames before N, another \
+         -o starts anew",
+        stage.name(),
+        changed.join(", ")
+    );
+    Error::file(folder, what)
+}

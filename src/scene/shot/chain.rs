@@ -1,0 +1,89 @@
+//! What each frame of a stage was made from: a hash of the settings, of every file that it reads, of the upstream frames
+//! and, where a stage remembers, of the frames before it.
+
+use std::path::PathBuf;
+use std::sync::Arc;
+
+use super::stage::{Reads, Stage};
+use crate::error::Result;
+use crate::io::hash::Hasher;
+use crate::io::manifest::Manifest;
+use crate::io::seen::Seen;
+
+/// Hashes of the frames from a start on.
+pub(super) struct Chain {
+    first: i32,
+    /// That of the start, then of each frame that was asked for.
+    links: Vec<String>,
+    seen: Arc<Seen>,
+}
+
+/// Hashes of what a frame is made from.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Made {
+    /// The settings, the files and upstream frames that it reads, and the frames before it.
+    pub from: String,
+    /// The files of the coming frame that it reads, as far as they are there; none where it reads no such files.
+    pub next: Option<String>,
+}
+
+impl Chain {
+    /// A chain whose first link is for frame `first` and depends on `seed`.
+    pub fn new(seen: &Arc<Seen>, first: i32, seed: &str) -> Self {
+        let mut start = Hasher::default();
+        start.add_text(seed).add(&first.to_le_bytes());
+        Self { first, links: vec![start.finish()], seen: seen.clone() }
+    }
+
+    /// What a frame is made from; a frame before the first depends on the seed alone. `upstream` gives the records of the
+    /// frames upstream.
+    ///
+    /// # Errors
+    /// A file that cannot be read.
+    pub fn at<'r>(
+        &mut self,
+        stage: &dyn Stage,
+        frame: i32,
+        upstream: impl Fn(i32) -> Vec<Option<&'r Manifest>>,
+    ) -> Result<Made> {
+        let from = if stage.remembers() {
+            let wanted = (i64::from(frame) - i64::from(self.first)).max(-1) + 1;
+            while (self.links.len() as i64) <= wanted {
+                let next = self.first + (self.links.len() - 1) as i32;
+                let before = self.links[self.links.len() - 1].clone();
+                self.links.push(self.link(&before, &stage.reads(next), &upstream(next))?);
+            }
+            self.links[wanted as usize].clone()
+        } else {
+            self.link(&self.links[0], &stage.reads(frame), &upstream(frame))?
+        };
+        Ok(Made { from, next: self.next(&stage.reads(frame).ahead)? })
+    }
+
+    fn link(&self, before: &str, reads: &Reads, upstream: &[Option<&Manifest>]) -> Result<String> {
+        let mut link = Hasher::default();
+        link.add_text(before);
+        for file in &reads.files {
+            link.add_text(&self.seen.hash(file)?);
+        }
+        for manifest in upstream {
+            let files = manifest.iter().flat_map(|manifest| manifest.files.iter().chain(&manifest.state));
+            files.for_each(|file| {
+                link.add_text(&file.hash);
+            });
+        }
+        Ok(link.finish())
+    }
+
+    fn next(&self, files: &[PathBuf]) -> Result<Option<String>> {
+        if files.is_empty() {
+            return Ok(None);
+        }
+        let mut hasher = Hasher::default();
+        for file in files {
+            let hash = if file.is_file() { self.seen.hash(file)? } else { String::new() };
+            hasher.add_text(&hash);
+        }
+        Ok(Some(hasher.finish()))
+    }
+}

@@ -1,0 +1,397 @@
+//! Which files of an output folder are its own: nothing else there is ever written over or removed.
+
+use std::collections::{BTreeMap, BTreeSet};
+use std::path::{Path, PathBuf};
+
+use serde::{Deserialize, Serialize};
+
+use super::run::Plan;
+use super::stage::Stage;
+use super::stored::record_of;
+use super::usd;
+use crate::error::{Error, Result};
+use crate::io::{atomic, hash, sealed};
+use crate::scene::FrameChoice;
+
+/// The scene with its defaults.
+pub(super) const SCENE: &str = "scene.toml";
+/// What this module writes: see [`Files`].
+const FILES: &str = "files.json";
+
+/// What a folder's runs have written besides the records of frames: `state/files.json`.
+#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
+struct Files {
+    /// The stages that runs have begun, by name.
+    stages: BTreeMap<String, Begun>,
+    /// Hashes of the files that belong to no frame, by path: the content of now, then the one before while it is replaced.
+    files: BTreeMap<String, Vec<String>>,
+}
+
+/// A stage that runs have begun.
+#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
+struct Begun {
+    /// Its folders, with the extensions of their files.
+    kinds: BTreeMap<String, Vec<String>>,
+    /// Extension of its exact states.
+    state: String,
+    /// First and last of the frames that runs have begun to write.
+    frames: Option<[i32; 2]>,
+}
+
+impl Begun {
+    fn of(stage: &dyn Stage) -> Self {
+        let extensions = |all: &[&str]| all.iter().map(|extension| extension.to_string()).collect();
+        let kinds = stage.kinds().iter().map(|kind| (kind.name.to_string(), extensions(kind.extensions)));
+        Self { kinds: kinds.collect(), state: stage.state_extension().to_string(), frames: None }
+    }
+
+    fn holds(&self, frame: i32) -> bool {
+        self.frames.is_some_and(|[low, high]| (low..=high).contains(&frame))
+    }
+}
+
+/// The files of a folder that are its own.
+pub(super) struct Own {
+    folder: PathBuf,
+    /// What is known of the folder: what it says of itself, and the stages of the run.
+    known: Files,
+    written: Option<Files>,
+}
+
+impl Own {
+    /// Reads what a folder says of itself; `stages` are those of the run that asks.
+    ///
+    /// # Errors
+    /// A record that is damaged.
+    pub fn read<'s>(folder: &Path, stages: impl Iterator<Item = &'s dyn Stage>) -> Result<Self> {
+        let folder = folder.to_path_buf();
+        let written: Option<Files> = sealed::read(&folder.join("state").join(FILES))?;
+        let mut known = written.clone().unwrap_or_default();
+        for stage in stages {
+            let before = known.stages.remove(stage.name()).and_then(|begun| begun.frames);
+            known.stages.insert(stage.name().to_string(), Begun { frames: before, ..Begun::of(stage) });
+        }
+        Ok(Self { folder, known, written })
+    }
+
+    /// A folder of which nothing is known.
+    pub fn unknown(folder: &Path) -> Self {
+        Self { folder: folder.to_path_buf(), known: Files::default(), written: None }
+    }
+
+    /// Where it is.
+    pub fn folder(&self) -> &Path {
+        &self.folder
+    }
+
+    /// The files that belong to no frame, by their paths from the folder.
+    pub fn loose(&self) -> impl Iterator<Item = &str> {
+        self.known.files.keys().map(String::as_str)
+    }
+
+    /// The stages that runs have begun.
+    fn stages(&self) -> impl Iterator<Item = &str> {
+        self.known.stages.keys().map(String::as_str)
+    }
+
+    /// Refuses to begin frames, or to write files that belong to no frame, over files that are not the folder's own;
+    /// inputs of the scene are not.
+    ///
+    /// # Errors
+    /// The file that stands in the way.
+    pub fn refuse_foreign(&self, plan: &Plan, frames: &FrameChoice) -> Result<()> {
+        for input in plan.scene.files() {
+            if input.parent().is_some_and(|folder| self.holds(folder, &input)) {
+                let what = "is an input of the scene and would be written over: choose another -o";
+                return Err(Error::file(input, what));
+            }
+        }
+        let scene = plan.scene;
+        let new = hash::of_bytes(scene.to_toml_in(&self.folder).as_bytes());
+        if is_same(&scene.path, &self.folder.join(SCENE)) && hash::of_file(&scene.path)? != new {
+            let what = "is the scene that is read and would be written over: choose another -o";
+            return Err(Error::file(&scene.path, what));
+        }
+        if scene.output.usd {
+            let of_stages = plan.stages().flat_map(|stage| stage.loose_files().iter().copied());
+            std::iter::once(usd::SHOT)
+                .chain(of_stages)
+                .try_for_each(|name| self.refuse_changed(name, None))?;
+        }
+        self.refuse_changed(SCENE, Some(&new))?;
+        let asked = frames.first()..=frames.last();
+        let is_foreign = |own: &OfFrame| {
+            let is_begun = self.known.stages.get(&own.stage).is_some_and(|begun| begun.holds(own.frame));
+            asked.contains(&own.frame) && !is_begun
+        };
+        let names = self.names()?;
+        let foreign = names.iter().find(|(_, frame)| frame.as_ref().is_some_and(is_foreign));
+        foreign.map_or(Ok(()), |(path, _)| Err(self.foreign(path)))
+    }
+
+    /// Refuses a file that is there and neither what was written nor, where given, what is to be written.
+    fn refuse_changed(&self, name: &str, new: Option<&str>) -> Result<()> {
+        let path = self.folder.join(name);
+        if !path.exists() {
+            return Ok(());
+        }
+        let there = hash::of_file(&path)?;
+        let own = self.known.files.get(name).is_some_and(|hashes| hashes.contains(&there));
+        if own || new == Some(there.as_str()) { Ok(()) } else { Err(self.foreign(name)) }
+    }
+
+    fn foreign(&self, name: &str) -> Error {
+        let what = "is not what a run wrote here, or was changed since: move it away, or choose another -o";
+        Error::file(self.folder.join(name), what)
+    }
+
+    /// Whether a path in a folder is one that runs write.
+    fn holds(&self, folder: &Path, path: &Path) -> bool {
+        let name = path.file_name().unwrap_or_default().to_string_lossy();
+        let mut folders = self.folders().into_iter();
+        folders.any(|kind| self.is_own(&kind, &name) && is_same(folder, &self.folder.join(kind)))
+    }
+
+    /// Notes that frames of a stage are begun.
+    ///
+    /// # Errors
+    /// What the operating system reports.
+    pub fn begin(&mut self, stage: &str, first: i32, last: i32) -> Result<()> {
+        let begun = self.known.stages.entry(stage.to_string()).or_default();
+        let [low, high] = begun.frames.unwrap_or([first, last]);
+        begun.frames = Some([low.min(first), high.max(last)]);
+        self.save()
+    }
+
+    /// Writes a file that belongs to no frame, if it is not there with this content.
+    ///
+    /// # Errors
+    /// What the operating system reports.
+    pub fn write(&mut self, name: &str, bytes: &[u8]) -> Result<()> {
+        let (path, new) = (self.folder.join(name), hash::of_bytes(bytes));
+        let hashes = self.known.files.entry(name.to_string()).or_default();
+        if hashes.first() != Some(&new) {
+            // Killed at any moment, the folder knows what is there as its own.
+            hashes.retain(|hash| *hash != new);
+            hashes.insert(0, new.clone());
+            self.save()?;
+        }
+        if hash::of_file(&path).is_ok_and(|there| there == new) {
+            return Ok(());
+        }
+        atomic::write_bytes(&path, bytes)
+    }
+
+    /// Forgets what files held before they were replaced: the run is over.
+    ///
+    /// # Errors
+    /// What the operating system reports.
+    pub fn finish(&mut self) -> Result<()> {
+        self.known.files.values_mut().for_each(|hashes| hashes.truncate(1));
+        self.save()
+    }
+
+    fn save(&mut self) -> Result<()> {
+        if self.written.as_ref() != Some(&self.known) {
+            sealed::write(&self.folder.join("state").join(FILES), &self.known)?;
+            self.written = Some(self.known.clone());
+        }
+        Ok(())
+    }
+
+    /// What keeps the files that belong to no frame from being what was written, by path; and how many there are.
+    pub fn faults(&self) -> (usize, Vec<(String, String)>) {
+        let fault = |(name, hashes): (&String, &Vec<String>)| {
+            let path = self.folder.join(name);
+            match hash::of_file(&path) {
+                _ if !path.exists() => None,
+                Ok(hash) if hashes.contains(&hash) => None,
+                Ok(_) => Some((name.clone(), "is not the file that was written".to_string())),
+                Err(error) => Some((name.clone(), error.to_string())),
+            }
+        };
+        (self.known.files.len(), self.known.files.iter().filter_map(fault).collect())
+    }
+
+    /// Folders that runs write into, from the output folder; its own is empty.
+    fn folders(&self) -> Vec<String> {
+        let kinds = self.known.stages.values().flat_map(|begun| begun.kinds.keys().cloned());
+        ["", "state", "report"].into_iter().map(String::from).chain(kinds).collect()
+    }
+
+    /// Whether runs write files of this name into one of the folders.
+    fn is_own(&self, folder: &str, name: &str) -> bool {
+        let alone = match folder {
+            "" => [SCENE, usd::SHOT].contains(&name),
+            "state" => name == FILES || name.strip_suffix(".json").is_some_and(|name| self.has_stage(name)),
+            kind => self.known.files.contains_key(&format!("{kind}/{name}")),
+        };
+        alone || self.frame_of(folder, name).is_some()
+    }
+
+    fn has_stage(&self, name: &str) -> bool {
+        self.known.stages.contains_key(name)
+    }
+
+    /// The frame of a file in one of the folders, where its name is one that runs give to a frame's.
+    fn frame_of(&self, folder: &str, name: &str) -> Option<OfFrame> {
+        let (before, rest) = name.split_once('.')?;
+        let (number, extension) = rest.rsplit_once('.')?;
+        let frame = number.parse::<i32>().ok().filter(|frame| format!("{frame:04}") == number)?;
+        let stage = match folder {
+            "state" => {
+                let begun = self.known.stages.get(before)?;
+                (extension == "json" || extension == begun.state).then_some(before)?
+            }
+            "report" => (extension == "json" && self.has_stage(before)).then_some(before)?,
+            kind if kind == before => {
+                let writes = |begun: &Begun| {
+                    begun.kinds.get(kind).is_some_and(|known| known.iter().any(|known| known == extension))
+                };
+                self.known.stages.iter().find(|(_, begun)| writes(begun))?.0
+            }
+            _ => return None,
+        };
+        Some(OfFrame { stage: stage.to_string(), frame })
+    }
+
+    /// All files that are there with names that runs give, from the folder; those of frames with their frames.
+    ///
+    /// # Errors
+    /// A folder that cannot be read.
+    pub fn names(&self) -> Result<BTreeMap<String, Option<OfFrame>>> {
+        let mut out = BTreeMap::new();
+        for kind in self.folders() {
+            for name in self.entries(&kind)? {
+                if self.is_own(&kind, &name) {
+                    let path = if kind.is_empty() { name.clone() } else { format!("{kind}/{name}") };
+                    out.insert(path, self.frame_of(&kind, &name));
+                }
+            }
+        }
+        Ok(out)
+    }
+
+    /// The names of [`Own::names`], and those of these stages' records where the folder does not know the stages.
+    ///
+    /// # Errors
+    /// A folder that cannot be read.
+    pub fn names_of(&self, stages: &[String]) -> Result<BTreeSet<String>> {
+        let is_of = |name: &String| {
+            record_of(name).is_some_and(|(stage, _)| stages.iter().any(|known| known == stage))
+        };
+        let records = self.entries("state")?.into_iter().filter(is_of);
+        Ok(self.names()?.into_keys().chain(records.map(|name| format!("state/{name}"))).collect())
+    }
+
+    /// Names of the files in one of the folders.
+    fn entries(&self, kind: &str) -> Result<Vec<String>> {
+        let path = self.folder.join(kind);
+        let entries = match std::fs::read_dir(&path) {
+            // Folders of kinds that are not written need not be there.
+            Err(error) if error.kind() == std::io::ErrorKind::NotFound => return Ok(Vec::new()),
+            other => other.map_err(|error| Error::io(&path, "read", error))?,
+        };
+        let mut out = Vec::new();
+        for entry in entries {
+            let name = entry.map_err(|error| Error::io(&path, "read", error))?.file_name();
+            out.extend(name.to_str().map(String::from));
+        }
+        Ok(out)
+    }
+
+    /// Removes what a killed run had begun to write: nobody else writes now.
+    ///
+    /// # Errors
+    /// What the operating system reports.
+    pub fn remove_unfinished(&self) -> Result<()> {
+        for kind in self.folders() {
+            for part in self.entries(&kind)? {
+                if atomic::finished_name(&part).is_some_and(|finished| self.is_own(&kind, finished)) {
+                    let path = self.folder.join(&kind).join(&part);
+                    std::fs::remove_file(&path).map_err(|error| Error::io(path, "remove", error))?;
+                }
+            }
+        }
+        Ok(())
+    }
+
+    /// The stages of which a folder has records, those included that it does not say it has.
+    ///
+    /// # Errors
+    /// A folder that cannot be read.
+    pub fn stages_there(&self) -> Result<Vec<String>> {
+        let of_records = self.entries("state")?;
+        let of_records = of_records.iter().filter_map(|name| record_of(name)).map(|(stage, _)| stage);
+        let mut out: Vec<String> = self.stages().chain(of_records).map(String::from).collect();
+        out.sort();
+        out.dedup();
+        Ok(out)
+    }
+}
+
+/// A file of a frame.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub(super) struct OfFrame {
+    /// The stage that writes it.
+    pub stage: String,
+    /// Which frame.
+    pub frame: i32,
+}
+
+/// Whether two paths lead to the same file or folder.
+fn is_same(a: &Path, b: &Path) -> bool {
+    let there = |path| std::fs::canonicalize(path).ok();
+    there(a).is_some_and(|a| there(b) == Some(a))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn only_names_that_runs_give_are_their_own() {
+        let begun = |kinds: &[(&str, &[&str])], state: &str| Begun {
+            kinds: kinds
+                .iter()
+                .map(|(kind, all)| (kind.to_string(), all.iter().map(|name| name.to_string()).collect()))
+                .collect(),
+            state: state.into(),
+            frames: None,
+        };
+        let stages = BTreeMap::from([
+            ("base".to_string(), begun(&[("base", &["vdb"])], "vdb")),
+            ("objects".to_string(), begun(&[("objects", &["usda", "ply"])], "txt")),
+        ]);
+        let files = BTreeMap::from([("objects/objects.manifest.usda".to_string(), Vec::new())]);
+        let own = Own { folder: PathBuf::new(), known: Files { stages, files }, written: None };
+        for (folder, name) in [
+            ("", "scene.toml"),
+            ("state", "files.json"),
+            ("state", "base.json"),
+            ("state", "base.0001.vdb"),
+            ("state", "base.-001.json"),
+            ("state", "objects.0001.txt"),
+            ("report", "base.0012.json"),
+            ("base", "base.123456.vdb"),
+            ("objects", "objects.0001.ply"),
+            ("objects", "objects.manifest.usda"),
+        ] {
+            assert!(own.is_own(folder, name), "{folder}/{name}");
+        }
+        for (folder, name) in [
+            ("", "film.mkv"),
+            ("", "base.0001.vdb"),
+            ("state", "grains.json"),
+            ("state", "base.1.vdb"),
+            ("state", "objects.0001.vdb"),
+            ("report", "a.json"),
+            ("report", "0012.json"),
+            ("base", "base.0001.obj"),
+            ("objects", "hero.0001.ply"),
+            ("objects", "objects.other.usda"),
+        ] {
+            assert!(!own.is_own(folder, name), "{folder}/{name}");
+        }
+    }
+}

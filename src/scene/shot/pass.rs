@@ -1,0 +1,275 @@
+//! A stage's pass over the frames: steps, and the files of one frame written while the next is computed.
+
+use std::path::Path;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::mpsc::{Receiver, sync_channel};
+
+use serde_json::json;
+
+use super::cache::Cache;
+use super::chain::Made;
+use super::stage::{FrameFiles, Report, Stage, Stepped, Stepping};
+use super::stored::Stored;
+use crate::context::{Context, StageTime};
+use crate::error::{Error, Result};
+use crate::io::manifest::{Keeps, Manifest};
+use crate::io::{atomic, sealed};
+
+/// Steps that wait for the writer at most: a step's changes are a few MB.
+const WAITING: usize = 2;
+/// Exact states that are kept of a stage that no other one reads, where its own files are not enough to go on from.
+const STATES_KEPT: i32 = 2;
+
+/// Is told of each frame whose files are written: the stage, the frame, what was reported. From several threads.
+pub type Done<'a> = &'a (dyn Fn(&'static str, i32, &Report) + Sync);
+
+/// What the passes of a run share.
+#[derive(Clone, Copy)]
+pub struct Shared<'a> {
+    /// Threads and cancel.
+    pub ctx: &'a Context,
+    /// The shot's first frame.
+    pub first: i32,
+    /// Raised when a pass has failed: the others stop after their frame.
+    pub stop: &'a AtomicBool,
+    /// Told of each frame.
+    pub done: Done<'a>,
+}
+
+/// Any stage, with the pass that makes it.
+pub trait AnyStage: Stage {
+    /// As the trait that says what it is.
+    fn as_stage(&self) -> &dyn Stage;
+
+    /// The state from which a frame is reached in the fewest steps.
+    #[doc(hidden)]
+    fn before<'a>(
+        &'a self,
+        ctx: &Context,
+        first: i32,
+        frame: i32,
+        own_from: i32,
+        done: &Stored,
+    ) -> Result<Box<dyn Pass + 'a>>;
+}
+
+impl<S: Stepping> AnyStage for S {
+    fn as_stage(&self) -> &dyn Stage {
+        self
+    }
+
+    fn before<'a>(
+        &'a self,
+        ctx: &Context,
+        first: i32,
+        frame: i32,
+        own_from: i32,
+        done: &Stored,
+    ) -> Result<Box<dyn Pass + 'a>> {
+        Ok(Box::new(At::before(self, ctx, first, frame, own_from, done)?))
+    }
+}
+
+/// A pass that is ready to begin.
+pub trait Pass: Send {
+    /// Makes frames, ascending; gives the records of those that were written, also where the pass fails.
+    #[doc(hidden)]
+    fn make(
+        self: Box<Self>,
+        shared: &Shared<'_>,
+        cache: &mut Cache,
+        upstream: &[&Stored],
+        todo: &[i32],
+        every_state: bool,
+    ) -> Result<()>;
+}
+
+/// A stage's state after a frame.
+struct At<'a, S: Stepping> {
+    stage: &'a S,
+    frame: i32,
+    state: S::State,
+}
+
+/// What the writing thread is told, in the order of the frames.
+enum Job<S: Stepping> {
+    /// From what the next steps start.
+    Start(S::Writer),
+    /// A step that was made.
+    Step(Box<Frame<S::Step>>),
+}
+
+/// A step, with what its frame is made from where its files are wanted.
+struct Frame<T> {
+    frame: i32,
+    made: Option<Made>,
+    stepped: Stepped<T>,
+}
+
+impl<'a, S: Stepping> At<'a, S> {
+    fn before(
+        stage: &'a S,
+        ctx: &Context,
+        first: i32,
+        frame: i32,
+        own_from: i32,
+        done: &Stored,
+    ) -> Result<Self> {
+        if !stage.remembers() {
+            return Ok(Self { stage, frame: frame - 1, state: stage.load(ctx, done, None)? });
+        }
+        let latest = done.latest_state(first..=frame - 1);
+        if own_from > first && latest.is_none_or(|latest| latest < own_from - 1) {
+            let what = format!(
+                "the {} after frame {}, from which these settings go on, is gone: choose another -o, or --from {first}",
+                stage.noun(),
+                own_from - 1
+            );
+            return Err(Error::file(done.folder(), what));
+        }
+        Ok(Self { stage, frame: latest.unwrap_or(first - 1), state: stage.load(ctx, done, latest)? })
+    }
+
+    /// Steps to every wanted frame; `send` gives the work to the writing thread and says whether it still listens.
+    fn step_all(
+        mut self,
+        shared: &Shared<'_>,
+        cache: &mut Cache,
+        upstream: &[&Stored],
+        todo: &[i32],
+        send: impl Fn(Job<S>) -> bool,
+    ) -> Result<()> {
+        let (stage, ctx) = (self.stage, shared.ctx);
+        let mut follows = false;
+        for &wanted in todo {
+            let is_nearer = || cache.stored.latest_state(self.frame + 1..=wanted - 1).is_some();
+            if self.frame < wanted - 1 && (!stage.remembers() || is_nearer()) {
+                self = Self::before(stage, ctx, shared.first, wanted, cache.own_from(), &cache.stored)?;
+                follows = false;
+            }
+            while self.frame < wanted {
+                if shared.stop.load(Ordering::Relaxed) {
+                    return Ok(());
+                }
+                let frame = self.frame + 1;
+                if !follows && !send(Job::Start(stage.writer(ctx, &self.state)?)) {
+                    return Ok(());
+                }
+                follows = true;
+                let made = if frame == wanted { Some(cache.inputs(stage, frame, upstream)?) } else { None };
+                let made_from = made.as_ref().map(|made| &made.from[..]);
+                let stepped = stage.step(ctx, &mut self.state, frame, made_from)?;
+                self.frame = frame;
+                if !send(Job::Step(Box::new(Frame { frame, made, stepped }))) {
+                    return Ok(());
+                }
+            }
+        }
+        Ok(())
+    }
+}
+
+impl<S: Stepping> Pass for At<'_, S> {
+    fn make(
+        self: Box<Self>,
+        shared: &Shared<'_>,
+        cache: &mut Cache,
+        upstream: &[&Stored],
+        todo: &[i32],
+        every_state: bool,
+    ) -> Result<()> {
+        let folder = cache.stored.folder().to_path_buf();
+        let files = Files { stage: self.stage, folder: &folder, first: shared.first, every_state };
+        let (jobs, waiting) = sync_channel(WAITING);
+        let (made, finished) = std::thread::scope(|scope| {
+            let writing = scope.spawn(|| files.write_all(waiting, shared.done));
+            let made = self.step_all(shared, cache, upstream, todo, |job| jobs.send(job).is_ok());
+            drop(jobs);
+            (made, writing.join())
+        });
+        let (manifests, written) = finished.map_err(|_| Error::Internal("the writer stopped".into()))?;
+        manifests.into_iter().for_each(|manifest| cache.stored.add(manifest));
+        // What stopped the writer stopped the steps too, and is the reason to report.
+        written.and(made)
+    }
+}
+
+/// The files of a stage's frames.
+struct Files<'a, S> {
+    stage: &'a S,
+    folder: &'a Path,
+    first: i32,
+    /// Whether another stage reads the exact states of all frames.
+    every_state: bool,
+}
+
+impl<S: Stepping> Files<'_, S> {
+    /// Writes until there is no more work or a file fails; gives the records of what was written besides.
+    fn write_all(&self, waiting: Receiver<Job<S>>, done: Done<'_>) -> (Vec<Manifest>, Result<()>) {
+        let mut manifests = Vec::new();
+        let mut writer = None;
+        for job in waiting {
+            let frame = match job {
+                Job::Start(start) => {
+                    writer = Some(start);
+                    continue;
+                }
+                Job::Step(frame) => frame,
+            };
+            let Some(writer) = &mut writer else {
+                return (manifests, Err(Error::Internal("a step came before its start".into())));
+            };
+            match self.write(writer, *frame, done) {
+                Ok(manifest) => manifests.extend(manifest),
+                Err(error) => return (manifests, Err(error)),
+            }
+        }
+        (manifests, Ok(()))
+    }
+
+    /// Writes a frame, or passes through it.
+    fn write(
+        &self,
+        writer: &mut S::Writer,
+        frame: Frame<S::Step>,
+        done: Done<'_>,
+    ) -> Result<Option<Manifest>> {
+        let Frame { frame, made, stepped: Stepped { step, report } } = frame;
+        let Some(made) = made else {
+            self.stage.write(writer, step, None)?;
+            return Ok(None);
+        };
+        let mut files = FrameFiles::new(self.folder, self.stage, frame, &made.from);
+        self.stage.write(writer, step, Some(&mut files))?;
+        let (files, state) = files.written();
+        self.write_report(frame, &report)?;
+        let keeps = self.stage.keeps(frame);
+        let manifest = Manifest { frame, inputs: made.from, keeps, files, state, next: made.next };
+        manifest.write(self.folder, self.stage.name())?;
+        if keeps == Keeps::State && !self.every_state {
+            self.remove_states_before(frame);
+        }
+        done(self.stage.name(), frame, &report);
+        Ok(Some(manifest))
+    }
+
+    /// Removes the exact states that nothing goes on from any more, and those that a run was killed before it removed. One
+    /// that cannot be removed does no harm.
+    fn remove_states_before(&self, frame: i32) {
+        let (stage, extension) = (self.stage.name(), self.stage.state_extension());
+        let path = |old: i32| self.folder.join("state").join(format!("{stage}.{old:04}.{extension}"));
+        let mut passed = (self.first..=frame - STATES_KEPT).rev();
+        while passed.next().is_some_and(|old| std::fs::remove_file(path(old)).is_ok()) {}
+    }
+
+    fn write_report(&self, frame: i32, report: &Report) -> Result<()> {
+        let time = |time: &StageTime| json!({ "name": time.name, "seconds": time.time.as_secs_f64() });
+        let mut text = report.results.clone();
+        text.insert("check".into(), sealed::UNSTAMPED.into());
+        text.insert("frame".into(), frame.into());
+        text.insert("stages".into(), report.times.iter().map(time).collect());
+        let text = serde_json::Value::Object(text);
+        let path = self.folder.join("report").join(format!("{}.{frame:04}.json", self.stage.name()));
+        atomic::write_bytes(&path, sealed::stamp(&format!("{text:#}\n")).as_bytes())
+    }
+}

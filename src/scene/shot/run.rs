@@ -1,0 +1,351 @@
+//! Runs the stages of a scene into a folder: on from where an earlier run stopped.
+
+use std::fs::File;
+use std::path::Path;
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
+
+use super::cache::{Asked, Cache, refuse_asked};
+use super::own::{self, Own};
+use super::pass::{AnyStage, Pass, Shared};
+use super::stage::{Report, Stage};
+use super::stored::Stored;
+use super::usd;
+use crate::context::Context;
+use crate::error::{Error, Result};
+use crate::io::manifest::Manifest;
+use crate::io::seen::Seen;
+use crate::scene::{FrameChoice, Scene};
+
+/// A scene with its stages, those that others read first.
+pub struct Plan<'a> {
+    /// The scene.
+    pub scene: &'a Scene,
+    /// What its files held when they were read.
+    pub seen: &'a Arc<Seen>,
+    /// Its stages.
+    pub stages: Vec<Box<dyn AnyStage + 'a>>,
+}
+
+impl Plan<'_> {
+    /// What the stages say of themselves.
+    pub fn stages(&self) -> impl Iterator<Item = &dyn Stage> {
+        self.stages.iter().map(|stage| stage.as_stage())
+    }
+
+    /// Names of all stages, in their order.
+    pub fn names(&self) -> Vec<&'static str> {
+        self.stages().map(|stage| stage.name()).collect()
+    }
+
+    /// The stages with these names, by place; all without any.
+    fn chosen(&self, only: &[String]) -> Result<Vec<usize>> {
+        if let Some(unknown) = only.iter().find(|name| !self.names().contains(&&name[..])) {
+            let names = self.names().join(", ");
+            let what = format!("has no stage \"{unknown}\": its stages are {names}");
+            return Err(Error::file(&self.scene.path, what));
+        }
+        let wanted = |stage: &dyn Stage| only.is_empty() || only.iter().any(|name| name == stage.name());
+        Ok(self.stages().enumerate().filter(|(_, stage)| wanted(*stage)).map(|(place, _)| place).collect())
+    }
+
+    /// The stages that read the frames of some, or of those that do, by place.
+    fn downstream(&self, of: &[usize]) -> Vec<usize> {
+        let mut names: Vec<&str> = of.iter().map(|place| self.stages[*place].name()).collect();
+        let mut out = Vec::new();
+        for (place, stage) in self.stages().enumerate() {
+            if stage.upstream().iter().any(|upstream| names.contains(upstream)) {
+                names.push(stage.name());
+                out.push(place);
+            }
+        }
+        out
+    }
+
+    /// Whether another stage reads a stage's frames.
+    fn is_read(&self, name: &str) -> bool {
+        self.stages().any(|stage| stage.upstream().contains(&name))
+    }
+}
+
+/// A shot with its folder, ready to run.
+pub struct Run<'a> {
+    plan: &'a Plan<'a>,
+    /// All stages, those that are not to be made too.
+    stages: Vec<StageRun<'a>>,
+    own: Own,
+    /// Held until the run ends, however it ends.
+    _lock: File,
+}
+
+/// A stage in a run.
+struct StageRun<'a> {
+    stage: &'a dyn AnyStage,
+    /// Its frames; none when it is not to be made.
+    cache: Option<Cache>,
+    /// Frames that are wanted and not done, ascending.
+    todo: Vec<i32>,
+    /// Frames that are wanted and done.
+    there: usize,
+    /// Ready to make the first of them, where that can be had before the stages upstream have run.
+    start: Option<Box<dyn Pass + 'a>>,
+    /// Frames that go because stages upstream are made again.
+    forgotten: Vec<Manifest>,
+}
+
+impl<'a> Run<'a> {
+    /// Opens or makes the folder, finds what is done, loads the states that the first frames start from, and writes the
+    /// resolved scene into the folder. Of the stages those named in `only` are made, or all.
+    ///
+    /// `from` keeps the frames before it, whatever they were made with, and makes all others of these stages again; those
+    /// of stages downstream of them go too.
+    ///
+    /// # Errors
+    /// A folder that cannot be written, that another run writes into, or whose frames were made with other settings
+    /// or inputs; a damaged record or frame; frames that would leave a gap where none may be. Nothing is then changed.
+    pub fn prepare(
+        ctx: &Context,
+        plan: &'a Plan<'a>,
+        folder: &Path,
+        only: &[String],
+        frames: &FrameChoice,
+        from: Option<i32>,
+    ) -> Result<Self> {
+        let chosen = plan.chosen(only)?;
+        let asked = Asked { first: plan.scene.shot.frames.first, frames, from };
+        // What is refused leaves no folder behind; what another run did meanwhile is looked at again below.
+        let of_run = || chosen.iter().map(|place| plan.stages[*place].as_stage());
+        for stage in of_run() {
+            refuse_asked(stage, asked, &Stored::read(folder, stage.name())?)?;
+        }
+        Own::read(folder, of_run())?.refuse_foreign(plan, frames)?;
+        make_folders(of_run(), folder)?;
+        let lock = lock(folder)?;
+        let own = Own::read(folder, of_run())?;
+        own.remove_unfinished()?;
+        own.refuse_foreign(plan, frames)?;
+        let mut run = Self { plan, stages: Vec::new(), own, _lock: lock };
+        let downstream = if from.is_some() { plan.downstream(&chosen) } else { Vec::new() };
+        for (place, stage) in plan.stages.iter().enumerate() {
+            let is_chosen = chosen.contains(&place);
+            let from = asked.from.filter(|_| !is_chosen && downstream.contains(&place));
+            let own_stage = run.open(&**stage, folder, asked, is_chosen, from)?;
+            run.stages.push(own_stage);
+        }
+        run.load(ctx)?;
+        // All that can be refused was.
+        run.commit()?;
+        Ok(run)
+    }
+
+    /// Opens a stage's frames and checks them against what they are made from.
+    fn open(
+        &self,
+        stage: &'a dyn AnyStage,
+        folder: &Path,
+        asked: Asked<'_>,
+        is_chosen: bool,
+        forget_from: Option<i32>,
+    ) -> Result<StageRun<'a>> {
+        let mut run =
+            StageRun { stage, cache: None, todo: Vec::new(), there: 0, start: None, forgotten: Vec::new() };
+        if !is_chosen {
+            if let Some(from) = forget_from {
+                run.forgotten = Stored::read(folder, stage.name())?.leave_out_from(from);
+            }
+            return Ok(run);
+        }
+        let mut cache = Cache::open(stage.as_stage(), self.plan.seen, folder, asked)?;
+        let upstream = self.upstream(stage.as_stage(), folder)?;
+        cache.check_inputs(stage.as_stage(), asked.frames, &upstream.iter().collect::<Vec<_>>())?;
+        let (there, todo): (Vec<i32>, Vec<i32>) =
+            asked.frames.iter().partition(|frame| cache.stored.is_done(*frame));
+        // Frames between are stepped through: they read what is upstream too.
+        self.refuse_missing(stage.as_stage(), &todo, &upstream)?;
+        (run.there, run.todo, run.cache) = (there.len(), todo, Some(cache));
+        Ok(run)
+    }
+
+    /// Refuses frames whose upstream frames neither are there nor will be made.
+    fn refuse_missing(&self, stage: &dyn Stage, todo: &[i32], upstream: &[Stored]) -> Result<()> {
+        for (name, stored) in stage.upstream().iter().zip(upstream) {
+            let made = self.stages.iter().find(|run| run.stage.name() == *name).map(|run| &run.todo[..]);
+            let is_there = |frame: &i32| {
+                stored.is_done(*frame) || made.is_some_and(|made| made.binary_search(frame).is_ok())
+            };
+            if let Some(missing) = todo.iter().find(|frame| !is_there(frame)) {
+                let what = format!(
+                    "frame {missing} of stage {} needs that of stage {name}, which is not there: make it too",
+                    stage.name()
+                );
+                return Err(Error::file(stored.folder(), what));
+            }
+        }
+        Ok(())
+    }
+
+    /// The frames of the stages upstream of one, as they are now, in its order; those that this run will make again are
+    /// left out.
+    fn upstream(&self, stage: &dyn Stage, folder: &Path) -> Result<Vec<Stored>> {
+        let of = |name: &&str| {
+            let mut stored = Stored::read(folder, name)?;
+            if let Some(run) = self.stages.iter().find(|run| run.stage.name() == *name) {
+                run.todo.iter().for_each(|frame| stored.leave_out(*frame));
+            }
+            Ok(stored)
+        };
+        stage.upstream().iter().map(of).collect()
+    }
+
+    /// Loads what the first frames start from, of stages whose upstream frames are all there.
+    fn load(&mut self, ctx: &Context) -> Result<()> {
+        let first = self.plan.scene.shot.frames.first;
+        let busy: Vec<&str> =
+            self.stages.iter().filter(|run| !run.todo.is_empty()).map(|run| run.stage.name()).collect();
+        for run in &mut self.stages {
+            let waits = run.stage.upstream().iter().any(|name| busy.contains(name));
+            if let (Some(&frame), Some(cache), false) = (run.todo.first(), &run.cache, waits) {
+                run.start = Some(run.stage.before(ctx, first, frame, cache.own_from(), &cache.stored)?);
+            }
+        }
+        Ok(())
+    }
+
+    /// Removes the frames that are to be made again, those that read them first, and says in the folder what it is for and
+    /// which frames are begun.
+    fn commit(&mut self) -> Result<()> {
+        for run in self.stages.iter_mut().rev() {
+            let stored = Stored::read(self.own.folder(), run.stage.name())?;
+            run.forgotten.drain(..).try_for_each(|manifest| stored.remove(&manifest))?;
+            if let [first, .., last] | [first @ last] = run.todo[..] {
+                self.own.begin(run.stage.name(), first, last)?;
+            }
+            if let Some(cache) = &mut run.cache {
+                cache.commit(run.stage.as_stage())?;
+            }
+        }
+        self.own.write(own::SCENE, self.plan.scene.to_toml_in(self.own.folder()).as_bytes())
+    }
+
+    /// Number of frames to be made, of all stages together.
+    pub fn to_make(&self) -> usize {
+        self.stages.iter().map(|run| run.todo.len()).sum()
+    }
+
+    /// Number of frames that were wanted and are there, of all stages together.
+    pub fn there(&self) -> usize {
+        self.stages.iter().map(|run| run.there).sum()
+    }
+
+    /// Makes the frames, and tells `done` the stage, the frame and its report when the files of one are written; from
+    /// several threads where stages do not depend on each other.
+    ///
+    /// # Errors
+    /// What a step or a file reports; whole frames are left behind, from which another run goes on.
+    pub fn make(mut self, ctx: &Context, done: impl Fn(&'static str, i32, &Report) + Sync) -> Result<()> {
+        while let Some(ready) = self.ready() {
+            self.make_stages(ctx, &ready, &done)?;
+        }
+        if self.plan.scene.output.usd {
+            let folder = self.own.folder().to_path_buf();
+            let stored: Vec<Stored> =
+                self.plan.stages().map(|stage| Stored::read(&folder, stage.name())).collect::<Result<_>>()?;
+            usd::write(self.plan, self.plan.stages().zip(&stored), &mut self.own)?;
+        }
+        self.own.finish()
+    }
+
+    /// The stages, by place, that have frames to make and wait for no other; none when all is done.
+    fn ready(&self) -> Option<Vec<usize>> {
+        let busy: Vec<&str> =
+            self.stages.iter().filter(|run| !run.todo.is_empty()).map(|run| run.stage.name()).collect();
+        let waits = |run: &StageRun<'_>| run.stage.upstream().iter().any(|name| busy.contains(name));
+        let places = self.stages.iter().enumerate().filter(|(_, run)| !run.todo.is_empty() && !waits(run));
+        let ready: Vec<usize> = places.map(|(place, _)| place).collect();
+        (!ready.is_empty()).then_some(ready)
+    }
+
+    /// Makes the frames of some stages, side by side.
+    fn make_stages(
+        &mut self,
+        ctx: &Context,
+        ready: &[usize],
+        done: &(dyn Fn(&'static str, i32, &Report) + Sync),
+    ) -> Result<()> {
+        let stop = AtomicBool::new(false);
+        let shared = Shared { ctx, first: self.plan.scene.shot.frames.first, stop: &stop, done };
+        let folder = self.own.folder().to_path_buf();
+        let upstream: Vec<Vec<Stored>> = ready
+            .iter()
+            .map(|place| self.upstream(self.stages[*place].stage.as_stage(), &folder))
+            .collect::<Result<_>>()?;
+        let plan = self.plan;
+        let runs = self.stages.iter_mut().enumerate().filter(|(place, _)| ready.contains(place));
+        let results: Vec<Result<()>> = std::thread::scope(|scope| {
+            let threads: Vec<_> = runs
+                .zip(&upstream)
+                .map(|((_, run), upstream)| {
+                    let every_state = plan.is_read(run.stage.name());
+                    scope.spawn(move || {
+                        let result = run.make(&shared, upstream, every_state);
+                        if result.is_err() {
+                            shared.stop.store(true, Ordering::Relaxed);
+                        }
+                        result
+                    })
+                })
+                .collect();
+            let stopped = |_| Err(Error::Internal("a stage stopped".into()));
+            threads.into_iter().map(|thread| thread.join().unwrap_or_else(stopped)).collect()
+        });
+        results.into_iter().collect()
+    }
+}
+
+impl StageRun<'_> {
+    fn make(&mut self, shared: &Shared<'_>, upstream: &[Stored], every_state: bool) -> Result<()> {
+        let todo = std::mem::take(&mut self.todo);
+        let upstream: Vec<&Stored> = upstream.iter().collect();
+        let Some(cache) = &mut self.cache else { return Ok(()) };
+        let start = match self.start.take() {
+            Some(start) => start,
+            None => {
+                // What is upstream was made only now.
+                cache.check_inputs(self.stage.as_stage(), &FrameChoice::none(), &upstream)?;
+                self.stage.before(shared.ctx, shared.first, todo[0], cache.own_from(), &cache.stored)?
+            }
+        };
+        start.make(shared, cache, &upstream, &todo, every_state)
+    }
+}
+
+fn make_folders<'s>(stages: impl Iterator<Item = &'s dyn Stage>, folder: &Path) -> Result<()> {
+    let written = stages.flat_map(|stage| {
+        let kinds = stage.kinds().iter().map(|kind| kind.name);
+        kinds.filter(|kind| stage.writes(kind)).collect::<Vec<_>>()
+    });
+    for name in ["", "state", "report"].into_iter().chain(written) {
+        let folder = folder.join(name);
+        std::fs::create_dir_all(&folder).map_err(|error| Error::io(folder, "create the folder", error))?;
+    }
+    Ok(())
+}
+
+/// Keeps other runs from writing into a folder.
+fn lock(folder: &Path) -> Result<File> {
+    let path = folder.join("state").join("run.lock");
+    let file = File::options().create(true).append(true).open(&path);
+    let file = file.map_err(|error| Error::io(&path, "write", error))?;
+    match file.try_lock() {
+        Err(std::fs::TryLockError::WouldBlock) => {
+            Err(Error::file(folder, "another run writes into this folder: wait for it, or choose another -o"))
+        }
+        // A file system without locks is no reason to stop.
+        Err(std::fs::TryLockError::Error(error)) => {
+            let why = Error::io(&path, "lock", error);
+            log::warn!("{why}; nothing keeps another run from writing into this folder");
+            Ok(file)
+        }
+        Ok(()) => Ok(file),
+    }
+}

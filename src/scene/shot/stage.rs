@@ -1,0 +1,211 @@
+//! What a part of a shot has to bring along so that the frame loop can make it.
+
+use std::path::{Path, PathBuf};
+
+use serde_json::{Map, Value};
+
+use super::settings::Settings;
+use super::stored::Stored;
+use super::usd::{Clip, Volume};
+use crate::context::{Context, StageTime};
+use crate::error::Result;
+use crate::io::atomic;
+use crate::io::manifest::{Keeps, Written};
+
+/// A folder of a stage's files: `base/base.0012.vdb`.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Kind {
+    /// Its name, lower-case letters, and that of the files in it.
+    pub name: &'static str,
+    /// Extensions of the files, lower-case letters.
+    pub extensions: &'static [&'static str],
+}
+
+/// The files that a stage reads for a frame.
+#[derive(Debug, Clone, Default, PartialEq, Eq)]
+pub struct Reads {
+    /// Those that it cannot do without.
+    pub files: Vec<PathBuf>,
+    /// Those of the coming frame, which may not be there yet: when they appear, the frame is made again.
+    pub ahead: Vec<PathBuf>,
+}
+
+/// What a stage says of itself: names, settings and inputs.
+pub trait Stage: Sync {
+    /// Its name, lower-case letters: `--stage base`, `state/base.0012.json`, `report/base.0012.json`.
+    fn name(&self) -> &'static str;
+
+    /// What messages call that which it carries from frame to frame.
+    fn noun(&self) -> &'static str {
+        "state"
+    }
+
+    /// Its folders. A frame that [`Keeps::Whole`] or [`Keeps::Changes`] keeps them in the folder of the stage's own name.
+    fn kinds(&self) -> &'static [Kind];
+
+    /// Whether this scene has files of a kind.
+    fn writes(&self, kind: &str) -> bool;
+
+    /// Extension of its exact states, lower-case letters but not `json`: `state/base.0012.vdb`.
+    fn state_extension(&self) -> &'static str {
+        "vdb"
+    }
+
+    /// Files of its that belong to no frame, by their paths from the folder.
+    fn loose_files(&self) -> &'static [&'static str] {
+        &[]
+    }
+
+    /// The settings that its frames depend on.
+    ///
+    /// # Errors
+    /// An input that cannot be read.
+    fn settings(&self) -> Result<Settings>;
+
+    /// Those of its settings that make the state before the first frame: a run cannot go on from a state of others.
+    fn of_first_state(&self, settings: &Settings) -> Settings;
+
+    /// The stages whose frames it reads, each earlier in the scene's order.
+    fn upstream(&self) -> &'static [&'static str] {
+        &[]
+    }
+
+    /// Whether a frame depends on the frames before it.
+    fn remembers(&self) -> bool {
+        true
+    }
+
+    /// The files that it reads for a frame.
+    fn reads(&self, _frame: i32) -> Reads {
+        Reads::default()
+    }
+
+    /// From what another run can go on after a frame.
+    fn keeps(&self, frame: i32) -> Keeps;
+
+    /// The setting that lets no frame be left out, where one does.
+    fn needs_every_frame(&self) -> Option<&'static str> {
+        None
+    }
+
+    /// Its volumes for `shot.usda`.
+    fn volumes(&self) -> Vec<Volume> {
+        Vec::new()
+    }
+
+    /// Its moving meshes for `shot.usda`.
+    fn clip(&self) -> Option<Clip<'_>> {
+        None
+    }
+}
+
+/// How a stage goes from frame to frame.
+pub trait Stepping: Stage {
+    /// What it carries from frame to frame.
+    type State: Send;
+    /// What a step hands to the thread that writes its files.
+    type Step: Send;
+    /// What that thread carries from frame to frame.
+    type Writer: Send;
+
+    /// The state after a frame that `done` keeps, or the one before the first.
+    ///
+    /// # Errors
+    /// Files that are not what was written; whatever the first state cannot be made from.
+    fn load(&self, ctx: &Context, done: &Stored, after: Option<i32>) -> Result<Self::State>;
+
+    /// Takes the state to a frame from the one before it. `made_from` is the hash of all that the frame depends on, where
+    /// its files are wanted.
+    ///
+    /// # Errors
+    /// Whatever keeps the frame from being made; cancel.
+    fn step(
+        &self,
+        ctx: &Context,
+        state: &mut Self::State,
+        frame: i32,
+        made_from: Option<&str>,
+    ) -> Result<Stepped<Self::Step>>;
+
+    /// What the writing thread starts from, beside a state from which steps will follow.
+    ///
+    /// # Errors
+    /// What copying the state reports.
+    fn writer(&self, ctx: &Context, state: &Self::State) -> Result<Self::Writer>;
+
+    /// Writes what a step made; without `files` the frame is passed through only.
+    ///
+    /// # Errors
+    /// What the operating system or a library reports; the frame is then not done.
+    fn write(
+        &self,
+        writer: &mut Self::Writer,
+        step: Self::Step,
+        files: Option<&mut FrameFiles>,
+    ) -> Result<()>;
+}
+
+/// A step that was made.
+pub struct Stepped<T> {
+    /// What the writing thread needs.
+    pub step: T,
+    /// What is told of it.
+    pub report: Report,
+}
+
+/// What is told of a frame: `report/base.0012.json`.
+#[derive(Debug, Clone, Default)]
+pub struct Report {
+    /// Results by name; units stand in the names.
+    pub results: Map<String, Value>,
+    /// How long its parts took.
+    pub times: Vec<StageTime>,
+}
+
+/// The files of a frame while they are written.
+pub struct FrameFiles<'a> {
+    folder: &'a Path,
+    stage: &'static str,
+    state_extension: &'static str,
+    /// Which frame.
+    pub frame: i32,
+    /// Hash of all that it depends on.
+    pub made_from: &'a str,
+    files: Vec<Written>,
+    state: Option<Written>,
+}
+
+impl<'a> FrameFiles<'a> {
+    /// None yet, of a stage's frame.
+    pub(super) fn new(folder: &'a Path, stage: &dyn Stage, frame: i32, made_from: &'a str) -> Self {
+        let (stage, state_extension) = (stage.name(), stage.state_extension());
+        Self { folder, stage, state_extension, frame, made_from, files: Vec::new(), state: None }
+    }
+
+    /// Writes a file of a kind, whole or not at all.
+    ///
+    /// # Errors
+    /// What the operating system reports.
+    pub fn save(&mut self, kind: &str, extension: &str, bytes: &[u8]) -> Result<()> {
+        let path = format!("{kind}/{kind}.{:04}.{extension}", self.frame);
+        atomic::write_bytes(&self.folder.join(&path), bytes)?;
+        self.files.push(Written::new(path, bytes));
+        Ok(())
+    }
+
+    /// Writes the exact state after the frame, whole or not at all.
+    ///
+    /// # Errors
+    /// What the operating system reports.
+    pub fn save_state(&mut self, bytes: &[u8]) -> Result<()> {
+        let path = format!("state/{}.{:04}.{}", self.stage, self.frame, self.state_extension);
+        atomic::write_bytes(&self.folder.join(&path), bytes)?;
+        self.state = Some(Written::new(path, bytes));
+        Ok(())
+    }
+
+    /// What was written: files, and the exact state.
+    pub(super) fn written(self) -> (Vec<Written>, Option<Written>) {
+        (self.files, self.state)
+    }
+}

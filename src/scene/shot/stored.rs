@@ -1,0 +1,169 @@
+//! The frames of a stage that a folder holds: which are done, and from which files the state after one can be had.
+
+use std::collections::BTreeMap;
+use std::ops::RangeInclusive;
+use std::path::{Path, PathBuf};
+
+use crate::error::{Error, Result};
+use crate::io::manifest::{Keeps, Manifest, Written};
+
+/// The frames of a stage that a folder holds.
+pub struct Stored {
+    folder: PathBuf,
+    stage: String,
+    done: BTreeMap<i32, Manifest>,
+}
+
+impl Stored {
+    /// Reads the records of a stage in a folder; frames whose files are not there with their lengths are not done, and a folder
+    /// without records has none.
+    ///
+    /// # Errors
+    /// A folder that cannot be read; a record that is damaged or of a newer version.
+    pub fn read(folder: &Path, stage: &str) -> Result<Self> {
+        let state = folder.join("state");
+        let mut done = BTreeMap::new();
+        let stored = |done| Self { folder: folder.to_path_buf(), stage: stage.to_string(), done };
+        let entries = match std::fs::read_dir(&state) {
+            Err(error) if error.kind() == std::io::ErrorKind::NotFound => {
+                return Ok(stored(done));
+            }
+            other => other.map_err(|error| Error::io(&state, "read", error))?,
+        };
+        for entry in entries {
+            let name = entry.map_err(|error| Error::io(&state, "read", error))?.file_name();
+            let Some((of, frame)) = name.to_str().and_then(record_of) else { continue };
+            let Some(manifest) = (if of == stage { Manifest::read(folder, stage, frame)? } else { None })
+            else {
+                continue;
+            };
+            if manifest.files_are_there(folder) {
+                done.insert(frame, manifest);
+            }
+        }
+        Ok(stored(done))
+    }
+
+    /// Where they are.
+    pub fn folder(&self) -> &Path {
+        &self.folder
+    }
+
+    /// Whether a frame is done.
+    pub fn is_done(&self, frame: i32) -> bool {
+        self.done.contains_key(&frame)
+    }
+
+    /// The frames that are done, ascending.
+    pub fn frames(&self) -> impl Iterator<Item = i32> + '_ {
+        self.done.keys().copied()
+    }
+
+    /// The record of a frame that is done.
+    pub(super) fn manifest(&self, frame: i32) -> Option<&Manifest> {
+        self.done.get(&frame)
+    }
+
+    /// Adds a frame that was written.
+    pub(super) fn add(&mut self, manifest: Manifest) {
+        self.done.insert(manifest.frame, manifest);
+    }
+
+    /// The files of a kind, ascending by frame, with their paths from the folder.
+    pub fn files(&self, kind: &str) -> Vec<(i32, String)> {
+        let of_frame = |(frame, manifest): (&i32, &Manifest)| -> Vec<(i32, String)> {
+            manifest.files_of(kind).map(|written| (*frame, written.path.clone())).collect()
+        };
+        self.done.iter().flat_map(of_frame).collect()
+    }
+
+    /// Leaves out the frames from one on, as if they were not done; they stay where they are.
+    pub(super) fn leave_out_from(&mut self, from: i32) -> Vec<Manifest> {
+        self.done.split_off(&from).into_values().collect()
+    }
+
+    /// Leaves out a frame.
+    pub(super) fn leave_out(&mut self, frame: i32) {
+        self.done.remove(&frame);
+    }
+
+    /// Removes a frame that was left out: first what says that it is done, then its files.
+    ///
+    /// # Errors
+    /// What the operating system reports.
+    pub(super) fn remove(&self, manifest: &Manifest) -> Result<()> {
+        let files = manifest.files.iter().map(|file| self.folder.join(&file.path));
+        let state = manifest.state.iter().map(|state| self.folder.join(&state.path));
+        let record = Manifest::path(&self.folder, &self.stage, manifest.frame);
+        for path in std::iter::once(record).chain(files).chain(state) {
+            match std::fs::remove_file(&path) {
+                Err(error) if error.kind() != std::io::ErrorKind::NotFound => {
+                    return Err(Error::io(path, "remove", error));
+                }
+                _ => {}
+            }
+        }
+        Ok(())
+    }
+
+    /// The latest frame in a range after which the state can be had.
+    pub fn latest_state(&self, frames: RangeInclusive<i32>) -> Option<i32> {
+        if frames.is_empty() {
+            return None;
+        }
+        let (mut latest, mut before) = (None, None);
+        for (&frame, manifest) in self.done.range(..=frames.end()) {
+            let loads = match manifest.keeps {
+                Keeps::Whole => true,
+                Keeps::Changes => before == Some(frame - 1),
+                Keeps::State => manifest.state.as_ref().is_some_and(|state| state.is_there(&self.folder)),
+            };
+            if loads {
+                before = Some(frame);
+                latest = before.filter(|frame| frames.contains(frame)).or(latest);
+            }
+        }
+        latest
+    }
+
+    /// Whether a frame keeps only what it changed.
+    pub fn keeps_changes(&self, frame: i32) -> bool {
+        self.done.get(&frame).is_some_and(|manifest| manifest.keeps == Keeps::Changes)
+    }
+
+    /// The frames whose files make up the state after a frame: a whole one, and those that keep their changes since.
+    ///
+    /// # Errors
+    /// A frame that is not there.
+    pub fn frames_to(&self, frame: i32) -> Result<RangeInclusive<i32>> {
+        let whole = (0..).map(|back| frame - back).find(|&frame| !self.keeps_changes(frame));
+        let whole = whole.filter(|whole| self.is_done(*whole));
+        let missing = || Error::file(&self.folder, format!("frame {frame} cannot be had from its files"));
+        Ok(whole.ok_or_else(missing)?..=frame)
+    }
+
+    /// The file from which the state after a frame, or what the frame changed, is read; its content was compared.
+    ///
+    /// # Errors
+    /// A frame that is not there; a file that is not what was written.
+    pub fn state_file(&self, frame: i32) -> Result<PathBuf> {
+        let missing = || Error::file(&self.folder, format!("frame {frame} is not there"));
+        let manifest = self.done.get(&frame).ok_or_else(missing)?;
+        let written: Option<&Written> = match manifest.keeps {
+            Keeps::State => manifest.state.as_ref(),
+            Keeps::Whole | Keeps::Changes => manifest.files_of(&self.stage).next(),
+        };
+        let written = written.ok_or_else(missing)?;
+        let path = self.folder.join(&written.path);
+        match written.fault(&self.folder) {
+            Some(fault) => Err(Error::file(path, format!("{fault}: remove it, and it is made again"))),
+            None => Ok(path),
+        }
+    }
+}
+
+/// The stage and frame of a record, by its name in `state/`: `base.0012.json`.
+pub(super) fn record_of(name: &str) -> Option<(&str, i32)> {
+    let (stage, number) = name.strip_suffix(".json")?.split_once('.')?;
+    Some((stage, number.parse().ok()?))
+}

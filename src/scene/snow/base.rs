@@ -1,0 +1,278 @@
+//! The stage `base`: objects press into the layer of snow.
+
+use serde_json::json;
+
+use super::inputs::{self, Inputs};
+use super::settings;
+use crate::context::{Context, StageTime};
+use crate::error::{Error, Result};
+use crate::io::manifest::Keeps;
+use crate::scene::shot::{
+    FrameFiles, Kind, Reads, Report, Settings, Stage, Stepped, Stepping, Stored, Volume,
+};
+use crate::scene::{BaseMode, Scene, moving};
+use crate::snow::base_layer::{BaseLayer, Changes, Grids, Params, StepReport};
+use crate::vdb::file::{self, WriteOptions, to_bytes};
+use crate::vdb::{FloatGrid, MetaValue};
+
+/// The layer of a scene, pressed by its objects.
+pub struct Base<'a> {
+    scene: &'a Scene,
+    inputs: &'a Inputs,
+}
+
+/// What a step hands to the writer.
+pub struct Step {
+    frame: i32,
+    changes: Changes,
+    /// The base's file, where it is whole and the writer has no copy of the layer.
+    whole: Option<Vec<u8>>,
+}
+
+/// What writes frames.
+pub struct Writer {
+    /// Gives the threads; its cancel flag does not matter: a frame begun is finished.
+    ctx: Context,
+    half_width: f32,
+    /// The layer as it was after the last step, where whole grids are written.
+    copy: Option<Grids>,
+}
+
+impl<'a> Base<'a> {
+    /// That of a scene.
+    pub fn new(scene: &'a Scene, inputs: &'a Inputs) -> Self {
+        Self { scene, inputs }
+    }
+
+    /// Whether writing needs a copy of the layer.
+    fn copies(&self) -> bool {
+        !self.scene.output.base_restarts() || self.scene.output.base_mode == BaseMode::Full
+    }
+
+    fn is_first(&self, frame: i32) -> bool {
+        frame == self.scene.shot.frames.first
+    }
+
+    /// The whole layer, or what changed of it.
+    fn base_bytes(&self, writer: &Writer, step: &Step, made_from: &str) -> Result<Vec<u8>> {
+        if self.scene.output.base_mode == BaseMode::Full {
+            return vdb_bytes(self.scene, step.frame, &writer.copy()?.list(), made_from);
+        }
+        let delta = Grids::delta(&writer.ctx, self.scene.snow.cell, writer.half_width, &step.changes)?;
+        vdb_bytes(self.scene, step.frame, &delta.list(), made_from)
+    }
+}
+
+impl Stage for Base<'_> {
+    fn name(&self) -> &'static str {
+        "base"
+    }
+
+    fn noun(&self) -> &'static str {
+        "layer"
+    }
+
+    fn kinds(&self) -> &'static [Kind] {
+        &[Kind { name: "base", extensions: &["vdb"] }, Kind { name: "removed", extensions: &["vdb"] }]
+    }
+
+    fn writes(&self, kind: &str) -> bool {
+        if kind == "base" { self.scene.output.base } else { self.scene.output.removed }
+    }
+
+    fn settings(&self) -> Result<Settings> {
+        settings::of_base(self.scene, &self.inputs.seen)
+    }
+
+    fn of_first_state(&self, settings: &Settings) -> Settings {
+        settings::of_layer(settings)
+    }
+
+    fn reads(&self, frame: i32) -> Reads {
+        Reads { files: moving::files(self.scene, frame), ahead: Vec::new() }
+    }
+
+    fn keeps(&self, frame: i32) -> Keeps {
+        let output = self.scene.output;
+        match (output.base_restarts(), output.base_mode) {
+            (false, _) => Keeps::State,
+            (true, BaseMode::Delta) if !self.is_first(frame) => Keeps::Changes,
+            (true, _) => Keeps::Whole,
+        }
+    }
+
+    fn needs_every_frame(&self) -> Option<&'static str> {
+        let output = self.scene.output;
+        (output.base && output.base_mode == BaseMode::Delta).then_some("base_mode = \"delta\"")
+    }
+
+    /// The base of a cache of changes is left out: its files are no whole volumes.
+    fn volumes(&self) -> Vec<Volume> {
+        const GRIDS: &[(&str, bool)] = &[("surface", true), ("compression", false), ("touched", false)];
+        let base = Volume { kind: "base", grids: GRIDS };
+        let whole = self.scene.output.base_mode == BaseMode::Full;
+        let removed = Volume { kind: "removed", grids: &[("removed", true)] };
+        whole.then_some(base).into_iter().chain([removed]).collect()
+    }
+}
+
+impl Stepping for Base<'_> {
+    type State = BaseLayer;
+    type Step = Step;
+    type Writer = Writer;
+
+    fn load(&self, ctx: &Context, done: &Stored, after: Option<i32>) -> Result<BaseLayer> {
+        let scene = self.scene;
+        let noise = Some(scene.snow.noise).filter(|noise| noise.amplitude > 0.0);
+        let params = Params { noise, ..Params::for_cell(scene.snow.cell) };
+        let initial = self.inputs.layer(ctx, scene.snow.cell);
+        let initial = initial.map_err(|error| match (error, self.inputs.far_static(scene)) {
+            (Error::Argument(_), Some((index, far))) => {
+                Error::file(&scene.path, inputs::too_far(scene, index, far))
+            }
+            (other, _) => other,
+        })?;
+        let mut layer = match after {
+            None => BaseLayer::new(ctx, initial, params)?,
+            Some(frame) => BaseLayer::resume(ctx, initial, grids(ctx, done, frame)?, params)?,
+        };
+        layer.set_min_crumb(scene.snow.min_crumb);
+        log::info!(
+            "snow: {} active voxels, {:.1} MB, {:.6} m3; {}",
+            layer.surface().active_voxels(),
+            layer.surface().memory_bytes() as f64 / 1e6,
+            layer.volume(),
+            after.map_or("at rest".into(), |frame| format!("goes on after frame {frame}"))
+        );
+        Ok(layer)
+    }
+
+    fn step(
+        &self,
+        ctx: &Context,
+        layer: &mut BaseLayer,
+        frame: i32,
+        made_from: Option<&str>,
+    ) -> Result<Stepped<Step>> {
+        let time = |frame: i32| f64::from(frame) / self.scene.shot.fps;
+        // The first frame's poses are cut out; nothing has moved yet.
+        let from = if self.is_first(frame) { frame } else { frame - 1 };
+        let report = layer.step(ctx, &self.inputs.bodies, time(from), time(frame), frame);
+        let report = report.map_err(|error| match error {
+            Error::Argument(what) => Error::file(&self.scene.path, format!("frame {frame}: {what}")),
+            other => other,
+        })?;
+        log_step(frame, &report);
+        let changes = layer.take_changes()?;
+        // No copy of the layer is needed for the whole file at the first frame of a cache of changes.
+        let whole = match made_from {
+            Some(made_from) if self.scene.output.base && self.is_first(frame) && !self.copies() => {
+                Some(vdb_bytes(self.scene, frame, &layer.grids().list(), made_from)?)
+            }
+            _ => None,
+        };
+        Ok(Stepped { step: Step { frame, changes, whole }, report: told(report) })
+    }
+
+    fn writer(&self, ctx: &Context, layer: &BaseLayer) -> Result<Writer> {
+        let copy = if self.copies() { Some(layer.grids().deep_copy()?) } else { None };
+        Ok(Writer { ctx: Context::new(ctx.pool().clone()), half_width: layer.half_width(), copy })
+    }
+
+    fn write(&self, writer: &mut Writer, step: Step, files: Option<&mut FrameFiles>) -> Result<()> {
+        if let Some(copy) = &mut writer.copy {
+            copy.apply(&writer.ctx, &step.changes)?;
+        }
+        let Some(files) = files else { return Ok(()) };
+        let output = self.scene.output;
+        if output.removed {
+            let bytes = vdb_bytes(self.scene, step.frame, &[&step.changes.removed], files.made_from)?;
+            files.save("removed", "vdb", &bytes)?;
+        }
+        if output.base {
+            match &step.whole {
+                Some(bytes) => files.save("base", "vdb", bytes)?,
+                None => files.save("base", "vdb", &self.base_bytes(writer, &step, files.made_from)?)?,
+            }
+        }
+        if !output.base_restarts() {
+            files.save_state(&to_bytes(&writer.copy()?.list(), &WriteOptions::default())?)?;
+        }
+        Ok(())
+    }
+}
+
+impl Writer {
+    fn copy(&self) -> Result<&Grids> {
+        self.copy.as_ref().ok_or_else(|| Error::Internal("the writer has no grids".into()))
+    }
+}
+
+/// The layer after a frame: from its own file, or from the last whole one and the changes since.
+///
+/// # Errors
+/// A frame that is not there; a file that is not what was written.
+pub(super) fn grids(ctx: &Context, done: &Stored, frame: i32) -> Result<Grids> {
+    let mut frames = done.frames_to(frame)?;
+    let whole = frames.next().unwrap_or(frame);
+    let mut grids = read_grids(done, whole)?;
+    for later in frames {
+        follow(ctx, done, &mut grids, later)?;
+    }
+    Ok(grids)
+}
+
+/// Takes a layer from the frame before to a frame that keeps its changes.
+pub(super) fn follow(ctx: &Context, done: &Stored, grids: &mut Grids, frame: i32) -> Result<()> {
+    ctx.check()?;
+    grids.apply_delta(ctx, &read_grids(done, frame)?)
+}
+
+fn read_grids(done: &Stored, frame: i32) -> Result<Grids> {
+    let path = done.state_file(frame)?;
+    Grids::from_named(file::read_own(&path)?).map_err(|error| match error {
+        Error::Argument(what) => Error::file(path, what),
+        other => other,
+    })
+}
+
+/// A frame's .vdb file.
+fn vdb_bytes(scene: &Scene, frame: i32, grids: &[&FloatGrid], made_from: &str) -> Result<Vec<u8>> {
+    let fps = scene.shot.fps;
+    let text = |text: &str| MetaValue::Text(text.into());
+    let metadata = vec![
+        ("frazil:frame".into(), MetaValue::Int(frame.into())),
+        ("frazil:fps".into(), MetaValue::Double(fps)),
+        ("frazil:seconds".into(), MetaValue::Double(f64::from(frame) / fps)),
+        ("frazil:units".into(), text("metres")),
+        ("frazil:up".into(), text("y")),
+        ("frazil:version".into(), text(env!("CARGO_PKG_VERSION"))),
+        ("frazil:inputs".into(), text(made_from)),
+    ];
+    to_bytes(grids, &WriteOptions { metadata, half: scene.output.half, ..WriteOptions::default() })
+}
+
+fn told(report: StepReport) -> Report {
+    let serde_json::Value::Object(results) = json!({
+        "removed_m3": report.removed_volume,
+        "base_m3": report.base_volume,
+        "touched_blocks": report.touched_blocks,
+        "sweep_faces": report.sweep_faces,
+        "crumbs": report.crumbs,
+    }) else {
+        unreachable!("it is written as an object")
+    };
+    Report { results, times: report.stages }
+}
+
+fn log_step(frame: i32, report: &StepReport) {
+    let time = |time: &StageTime| format!("{} {:.1} ms", time.name, time.time.as_secs_f64() * 1e3);
+    let times: Vec<String> = report.stages.iter().map(time).collect();
+    log::info!(
+        "frame {frame}: {:.6} m3 removed, {} faces, {} blocks; {}",
+        report.removed_volume,
+        report.sweep_faces,
+        report.touched_blocks,
+        times.join(", ")
+    );
+}

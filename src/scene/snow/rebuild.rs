@@ -1,0 +1,45 @@
+//! Whole layers from a cache of changes.
+
+use std::path::Path;
+
+use super::base;
+use crate::context::Context;
+use crate::error::Result;
+use crate::scene::shot::Stored;
+use crate::snow::base_layer::Grids;
+
+/// The whole layers of a cache, one frame after another.
+pub struct Rebuild {
+    stored: Stored,
+    at: Option<(i32, Grids)>,
+}
+
+impl Rebuild {
+    /// Opens a cache.
+    ///
+    /// # Errors
+    /// As [`Stored::read`].
+    pub fn open(folder: &Path) -> Result<Self> {
+        Ok(Self { stored: Stored::read(folder, "base")?, at: None })
+    }
+
+    /// The frames that are there.
+    pub fn stored(&self) -> &Stored {
+        &self.stored
+    }
+
+    /// The layer after a frame; frames in ascending order cost one file each.
+    ///
+    /// # Errors
+    /// A frame that is not there; a file that is not what was written.
+    pub fn layer(&mut self, ctx: &Context, frame: i32) -> Result<&Grids> {
+        let grids = match self.at.take() {
+            Some((before, mut grids)) if before == frame - 1 && self.stored.keeps_changes(frame) => {
+                base::follow(ctx, &self.stored, &mut grids, frame)?;
+                grids
+            }
+            _ => base::grids(ctx, &self.stored, frame)?,
+        };
+        Ok(&self.at.insert((frame, grids)).1)
+    }
+}
