@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use super::shot::{Clip, FrameFiles, Kind, Reads, Report, Settings, Stage, Stepped, Stepping, Stored};
+use super::shot::{Clip, FrameFiles, Kind, Reads, Report, Settings, Stage, Stepped, Stepping, Stored, To};
 use super::text::keys::settings_of;
 use super::{Role, Scene, moving};
 use crate::base::{DVec3, TriMesh, Uvs, Vec3};
@@ -117,13 +117,8 @@ impl Stepping for Objects<'_> {
         Ok(())
     }
 
-    fn step(
-        &self,
-        ctx: &Context,
-        _state: &mut (),
-        frame: i32,
-        made_from: Option<&str>,
-    ) -> Result<Stepped<Option<Poses>>> {
+    fn step(&self, ctx: &Context, _state: &mut (), to: &To<'_>) -> Result<Stepped<Option<Poses>>> {
+        let To { frame, made_from, .. } = *to;
         let fps = self.scene.shot.fps;
         let mut meshes = Vec::with_capacity(self.bodies.len());
         let (mut pose, mut velocities) = (Vec::<DVec3>::new(), Vec::<DVec3>::new());

@@ -126,12 +126,12 @@ impl Cells {
         (slot != NONE).then(|| &self.blocks[slot as usize])
     }
 
-    /// Winding numbers of the chain at a point, at another at most [`super::prism::BESIDE`] cells away, and at the one as
-    /// far on the opposite side (fixed-point units): the nearest voxel's, and the faces between.
-    pub fn windings(&self, point: Point, beside: Point, prisms: &mut Prisms) -> [i32; 3] {
+    /// Winding numbers of the chain at a point and at another at most [`super::prism::BESIDE`] cells away
+    /// (fixed-point units): the nearest voxel's, and the faces between.
+    pub fn windings(&self, point: Point, beside: Point, prisms: &mut Prisms) -> [i32; 2] {
         let voxel = voxel_of(point);
         let mut winding = self.lines.winding(voxel);
-        let Some(block) = self.block_of(voxel) else { return [winding; 3] };
+        let Some(block) = self.block_of(voxel) else { return [winding; 2] };
         let begin = voxel.map(|value| (value & 7) as f32);
         let local = |p: Point| {
             [0, 1, 2].map(|axis| begin[axis] + (p[axis] / f64::from(UNITS) - f64::from(voxel[axis])) as f32)
@@ -147,7 +147,7 @@ impl Cells {
         for (id, coef) in bundle.unclear() {
             winding += coef * self.exact_crossing(id as usize, voxel, point);
         }
-        [winding, winding + change.beside, winding + change.opposite]
+        [winding, winding + change.beside]
     }
 
     /// 1 when the way from a voxel to a point enters the chain through a face, -1 when it leaves it, else 0.

@@ -9,7 +9,7 @@ use crate::base::cpu::dispatch;
 const LANES: usize = 8;
 /// Nearer than this (cells), sides are told in 64 bits.
 const CLEAR: f32 = 1e-3;
-/// How far from a point others may be whose winding numbers are told with its own (cells).
+/// How far apart two points may be whose winding numbers are told together (cells).
 pub const BESIDE: f32 = 0.02;
 
 /// Height over the triangle's plane, then for each edge how far inward of it (cells), as linear functions of a
@@ -100,8 +100,6 @@ pub struct Change {
     pub along: i32,
     /// From its end to the point beside it.
     pub beside: i32,
-    /// From its end to the point as far on the other side.
-    pub opposite: i32,
 }
 
 impl Bundle {
@@ -124,12 +122,11 @@ impl Bundle {
         }
     }
 
-    /// How winding numbers change from `begin` to `end`, and from there to `beside`, at most [`BESIDE`] away, and as far
-    /// the opposite way.
+    /// How winding numbers change from `begin` to `end` and from there to `beside`, at most [`BESIDE`] away.
     pub fn ask(&mut self, begin: [f32; 3], end: [f32; 3], beside: [f32; 3]) -> Change {
         self.unclear.clear();
-        let [along, beside, opposite] = pass(&self.groups, begin, end, beside, &mut self.unclear);
-        Change { along, beside, opposite }
+        let [along, beside] = pass(&self.groups, begin, end, beside, &mut self.unclear);
+        Change { along, beside }
     }
 
     /// The faces, and their coefficients, that the way of the last question begins too near to the plane of, or
@@ -142,14 +139,14 @@ impl Bundle {
     }
 }
 
-/// Sums what the prisms say of the three ways, and lists those that are not clear about the first.
+/// Sums what the prisms say of the two ways, and lists those that are not clear about the first.
 fn pass(
     groups: &[Group],
     begin: [f32; 3],
     end: [f32; 3],
     beside: [f32; 3],
     unclear: &mut Vec<u32>,
-) -> [i32; 3] {
+) -> [i32; 2] {
     #[inline(always)]
     fn value(f: &[[f32; LANES]; 16], function: usize, lane: usize, p: [f32; 3]) -> f32 {
         let k = 4 * function;
@@ -168,13 +165,13 @@ fn pass(
         end: [f32; 3],
         beside: [f32; 3],
         unclear: &mut Vec<u32>,
-    ) -> [i32; 3] {
-        let [mut along, mut aside, mut across] = [[0; LANES]; 3];
-        let opposite = [0, 1, 2].map(|axis| 2.0 * end[axis] - beside[axis]);
+    ) -> [i32; 2] {
+        let (mut along, mut aside) = ([0; LANES], [0; LANES]);
         for (at, Group { functions: f, coef }) in groups.iter().enumerate() {
             let mut doubts = [0; LANES];
             for lane in 0..LANES {
                 let (first, last) = (value(f, 0, lane, begin), value(f, 0, lane, end));
+                let after = value(f, 0, lane, beside);
                 let t = first / (first - last);
                 let meeting = [
                     begin[0] + t * (end[0] - begin[0]),
@@ -189,23 +186,18 @@ fn pass(
                 let way = if first > 0.0 { coef[lane] } else { -coef[lane] };
                 along[lane] += if passes { way } else { 0 };
                 doubts[lane] = i32::from(!(misses | passes));
-                let near = last.abs() <= BESIDE;
+                let near = (last.abs() <= BESIDE) & (least_inward(f, lane, beside) > 0.0);
                 let way = if last > 0.0 { coef[lane] } else { -coef[lane] };
-                let passes = |p| {
-                    let leaves = (last > 0.0) != (value(f, 0, lane, p) > 0.0);
-                    near & leaves & (least_inward(f, lane, p) > 0.0)
-                };
-                aside[lane] += if passes(beside) { way } else { 0 };
-                across[lane] += if passes(opposite) { way } else { 0 };
+                aside[lane] += if near & ((last > 0.0) != (after > 0.0)) { way } else { 0 };
             }
             if doubts != [0; LANES] {
                 let lanes = doubts.iter().zip(0..).filter(|(doubt, _)| **doubt != 0);
                 unclear.extend(lanes.map(|(_, lane): (_, u32)| (at * LANES) as u32 + lane));
             }
         }
-        [along, aside, across].map(|changes| changes.iter().sum())
+        [along.iter().sum(), aside.iter().sum()]
     }
-    dispatch!(body(groups: &[Group], begin: [f32; 3], end: [f32; 3], beside: [f32; 3], unclear: &mut Vec<u32>) -> [i32; 3])
+    dispatch!(body(groups: &[Group], begin: [f32; 3], end: [f32; 3], beside: [f32; 3], unclear: &mut Vec<u32>) -> [i32; 2])
 }
 
 #[cfg(test)]
@@ -244,17 +236,6 @@ mod tests {
         assert_eq!(bundle.ask([1.0, 1.0, 4.4], [1.0, 1.0, 4.005], [1.0, 1.0, 3.995]).beside, 5);
         assert_eq!(bundle.ask([1.0, 1.0, 3.6], [1.0, 1.0, 3.995], [1.0, 1.0, 4.005]).beside, -5);
         assert_eq!(bundle.ask([6.0, 6.0, 4.4], [6.0, 6.0, 4.005], [6.0, 6.0, 3.995]).beside, 0);
-    }
-
-    #[test]
-    fn a_point_opposite_counts_the_sheet_between() {
-        let mut bundle = sheets();
-        let change = bundle.ask([1.0, 1.0, 4.4], [1.0, 1.0, 4.005], [1.0, 1.0, 4.015]);
-        assert_eq!((change.beside, change.opposite), (0, 5));
-        let change = bundle.ask([1.0, 1.0, 3.6], [1.0, 1.0, 3.985], [1.0, 1.0, 3.98]);
-        assert_eq!((change.beside, change.opposite), (0, 0));
-        let change = bundle.ask([1.0, 1.0, 4.4], [1.0, 1.0, 4.005], [1.0, 1.0, 3.995]);
-        assert_eq!((change.beside, change.opposite), (5, 0));
     }
 
     #[test]

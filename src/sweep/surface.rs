@@ -62,6 +62,9 @@ const SLIVER: u8 = 16;
 const SPECK: u8 = 32;
 /// Faces in a cell up to which small ones of a stack are asked.
 const MANY: usize = 2000;
+/// What lies in front of an open face is wider than this (hairs): sheets of successive poses leave slits, narrower than the
+/// motion's tolerance.
+const SLIT: f64 = 3.0;
 const OPEN_AND_LOOSE: u8 = OPEN | LOOSE;
 /// Faces a task handles: fixed, so that nothing depends on the number of threads.
 const GRAIN: usize = 128;
@@ -149,17 +152,17 @@ pub fn open_parts(
     out.into_iter().map(|(v, _)| v).collect()
 }
 
-/// Whether a point of a face is open: the chain is absent one and three hairs in front of it, and not behind; of a
-/// stack, [`THIN`] in front of it. What is narrower is no gap: sheets of successive poses leave slits, narrower than the
-/// motion's tolerance.
+/// Whether a point of a face is open: the chain is absent a hair in front of it, and not behind, and not in a slit; of a
+/// stack, [`THIN`] in front of it.
 fn ask(cells: &Cells, exposure: &Exposure, at: Point, ahead: Point, prisms: &mut Prisms) -> u8 {
     let moved = |side: f64| [0, 1, 2].map(|axis| at[axis] + side * ahead[axis]);
-    let [front, back, third] = cells.windings(moved(1.0), moved(-1.0), prisms);
+    let [front, back] = cells.windings(moved(1.0), moved(-1.0), prisms);
     if back < 1 {
         return BURIED;
     }
     let mut is_absent = |hairs: f64| cells.windings(moved(hairs), at, prisms)[0] < 1;
-    let is_open = front < 1 && third < 1 || exposure.is_stack(cells, voxel_of(at)) && is_absent(THIN_HAIRS);
+    let is_open =
+        front < 1 && is_absent(SLIT) || exposure.is_stack(cells, voxel_of(at)) && is_absent(THIN_HAIRS);
     if is_open { OPEN } else { BURIED }
 }
 
@@ -193,8 +196,8 @@ impl Surface<'_> {
             return false;
         }
         let moved = |side: f64| [0, 1, 2].map(|axis| at[axis] + side * ahead[axis]);
-        let [front, back, third] = self.cells.windings(moved(1.0), moved(-1.0), &mut self.prisms);
-        front < 1 && back >= 1 && third < 1
+        let [front, back] = self.cells.windings(moved(1.0), moved(-1.0), &mut self.prisms);
+        front < 1 && back >= 1 && self.cells.windings(moved(SLIT), at, &mut self.prisms)[0] < 1
     }
 
     /// Whether a face passes between the lines though it is long: patches do not know of it.

@@ -22,6 +22,6 @@ pub use run::{Plan, Run};
 #[cfg(test)]
 pub(in crate::scene) use settings::changed;
 pub use settings::{CONTENT, Settings};
-pub use stage::{FrameFiles, Kind, Reads, Report, Stage, Stepped, Stepping};
+pub use stage::{FrameFiles, Kind, Reads, Report, Stage, Stepped, Stepping, To};
 pub use stored::Stored;
 pub use usd::{Clip, Volume};

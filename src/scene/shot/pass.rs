@@ -8,7 +8,7 @@ use serde_json::json;
 
 use super::cache::Cache;
 use super::chain::Made;
-use super::stage::{FrameFiles, Report, Stage, Stepped, Stepping};
+use super::stage::{FrameFiles, Report, Stage, Stepped, Stepping, To};
 use super::stored::Stored;
 use crate::context::{Context, StageTime};
 use crate::error::{Error, Result};
@@ -158,7 +158,7 @@ impl<'a, S: Stepping> At<'a, S> {
                 follows = true;
                 let made = if frame == wanted { Some(cache.inputs(stage, frame, upstream)?) } else { None };
                 let made_from = made.as_ref().map(|made| &made.from[..]);
-                let stepped = stage.step(ctx, &mut self.state, frame, made_from)?;
+                let stepped = stage.step(ctx, &mut self.state, &To { frame, made_from, upstream })?;
                 self.frame = frame;
                 if !send(Job::Step(Box::new(Frame { frame, made, stepped }))) {
                     return Ok(());

@@ -114,18 +114,11 @@ pub trait Stepping: Stage {
     /// Files that are not what was written; whatever the first state cannot be made from.
     fn load(&self, ctx: &Context, done: &Stored, after: Option<i32>) -> Result<Self::State>;
 
-    /// Takes the state to a frame from the one before it. `made_from` is the hash of all that the frame depends on, where
-    /// its files are wanted.
+    /// Takes the state to a frame from the one before it.
     ///
     /// # Errors
     /// Whatever keeps the frame from being made; cancel.
-    fn step(
-        &self,
-        ctx: &Context,
-        state: &mut Self::State,
-        frame: i32,
-        made_from: Option<&str>,
-    ) -> Result<Stepped<Self::Step>>;
+    fn step(&self, ctx: &Context, state: &mut Self::State, to: &To<'_>) -> Result<Stepped<Self::Step>>;
 
     /// What the writing thread starts from, beside a state from which steps will follow.
     ///
@@ -143,6 +136,17 @@ pub trait Stepping: Stage {
         step: Self::Step,
         files: Option<&mut FrameFiles>,
     ) -> Result<()>;
+}
+
+/// The frame that a step leads to.
+#[derive(Clone, Copy)]
+pub struct To<'a> {
+    /// Which.
+    pub frame: i32,
+    /// Hash of all that the frame depends on, where its files are wanted.
+    pub made_from: Option<&'a str>,
+    /// The frames of the stages upstream, in the order of [`Stage::upstream`].
+    pub upstream: &'a [&'a Stored],
 }
 
 /// A step that was made.

@@ -153,7 +153,21 @@ impl Stored {
             Keeps::State => manifest.state.as_ref(),
             Keeps::Whole | Keeps::Changes => manifest.files_of(&self.stage).next(),
         };
-        let written = written.ok_or_else(missing)?;
+        self.compared(written.ok_or_else(missing)?)
+    }
+
+    /// A frame's file of a kind; its content was compared.
+    ///
+    /// # Errors
+    /// A frame that is not there or has none; a file that is not what was written.
+    pub fn file(&self, frame: i32, kind: &str) -> Result<PathBuf> {
+        let written = self.done.get(&frame).and_then(|manifest| manifest.files_of(kind).next());
+        let missing = || Error::file(&self.folder, format!("frame {frame} has no file in {kind}/"));
+        self.compared(written.ok_or_else(missing)?)
+    }
+
+    /// Where a file is whose content is what was written.
+    fn compared(&self, written: &Written) -> Result<PathBuf> {
         let path = self.folder.join(&written.path);
         match written.fault(&self.folder) {
             Some(fault) => Err(Error::file(path, format!("{fault}: remove it, and it is made again"))),

@@ -20,7 +20,7 @@ const FILES: &str = "state/files.json";
 /// What a folder holds.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize)]
 pub struct Verified {
-    /// Frames that are done, of all stages together.
+    /// Frames of which some stage is done.
     pub frames: usize,
     /// Files that were compared, records among them.
     pub files: usize,
@@ -89,11 +89,13 @@ pub fn verify(ctx: &Context, folder: &Path) -> Result<Verified> {
     let reports: Vec<&String> = names.iter().filter(|name| name.starts_with("report/")).collect();
     damaged.extend(reports.iter().filter_map(|name| report_fault(folder, name)));
     damaged.sort();
+    let done = manifests.iter().filter(|(_, manifest)| manifest.files_are_there(folder));
+    let done: BTreeSet<i32> = done.map(|(_, manifest)| manifest.frame).collect();
     known.extend(damaged.iter().map(|damage| damage.file.clone()));
     known.extend(manifests.iter().map(|(name, _)| name.clone()));
     let is_known = |name: &&String| known.contains(*name) || name.starts_with("report/");
     Ok(Verified {
-        frames: manifests.iter().filter(|(_, manifest)| manifest.files_are_there(folder)).count(),
+        frames: done.len(),
         files: files.len() + manifests.len() + reports.len() + own_files + 1,
         bytes: files.iter().map(|file| file.bytes).sum(),
         damaged,

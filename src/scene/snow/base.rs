@@ -8,7 +8,7 @@ use crate::context::{Context, StageTime};
 use crate::error::{Error, Result};
 use crate::io::manifest::Keeps;
 use crate::scene::shot::{
-    FrameFiles, Kind, Reads, Report, Settings, Stage, Stepped, Stepping, Stored, Volume,
+    FrameFiles, Kind, Reads, Report, Settings, Stage, Stepped, Stepping, Stored, To, Volume,
 };
 use crate::scene::{BaseMode, Scene, moving};
 use crate::snow::base_layer::{BaseLayer, Changes, Grids, Params, StepReport};
@@ -147,13 +147,8 @@ impl Stepping for Base<'_> {
         Ok(layer)
     }
 
-    fn step(
-        &self,
-        ctx: &Context,
-        layer: &mut BaseLayer,
-        frame: i32,
-        made_from: Option<&str>,
-    ) -> Result<Stepped<Step>> {
+    fn step(&self, ctx: &Context, layer: &mut BaseLayer, to: &To<'_>) -> Result<Stepped<Step>> {
+        let frame = to.frame;
         let time = |frame: i32| f64::from(frame) / self.scene.shot.fps;
         // The first frame's poses are cut out; nothing has moved yet.
         let from = if self.is_first(frame) { frame } else { frame - 1 };
@@ -165,7 +160,7 @@ impl Stepping for Base<'_> {
         log_step(frame, &report);
         let changes = layer.take_changes()?;
         // No copy of the layer is needed for the whole file at the first frame of a cache of changes.
-        let whole = match made_from {
+        let whole = match to.made_from {
             Some(made_from) if self.scene.output.base && self.is_first(frame) && !self.copies() => {
                 Some(vdb_bytes(self.scene, frame, &layer.grids().list(), made_from)?)
             }
