@@ -4,6 +4,8 @@ PACKAGES := libopenvdb-dev libboost-dev libboost-iostreams-dev g++ cmake pkg-con
 RUST_NEEDED := 1.89
 DEMO := target/demo
 PREFIX := /usr/local
+# Chosen together, packages have the features that the tests build them with: nothing is built twice.
+BUILD := cargo build --release -p frazil -p make_scenes --lib --bin frazil --bin make_scenes
 
 .PHONY: setup demo test test-hosts test-clients test-dist sanitize skinning-numbers pictures lint gates bench header install hosts dist
 
@@ -13,8 +15,8 @@ setup:
 
 demo: setup
 	rm -rf $(DEMO)
-	cargo build --release --bin frazil --example make_scenes
-	target/release/examples/make_scenes $(DEMO)
+	$(BUILD)
+	target/release/make_scenes $(DEMO)
 	target/release/frazil check $(DEMO)/hero.toml
 	target/release/frazil snow $(DEMO)/hero.toml -o $(DEMO)/hero
 	target/release/frazil preview $(DEMO)/hero/base/base.0070.vdb $(DEMO)/hero/objects/objects.0070.ply -o $(DEMO)/hero.png --eye 1.9,1.9,-3.0 --target 0,0.7,0.2 --fov 39 --sun 250,35
@@ -30,8 +32,8 @@ demo: setup
 	@echo "Pictures: $(DEMO)/hero.png $(DEMO)/walker.png $(DEMO)/print.png $(DEMO)/box.png $(DEMO)/cube.png $(DEMO)/ball.png; volumes: $(DEMO)/hero/base/*.vdb; the whole shot: $(DEMO)/hero/shot.usda"
 
 lint:
-	@if cargo fmt --version >/dev/null 2>&1; then cargo fmt --check; else echo "lint: rustfmt is not installed, skipped"; fi
-	@if cargo clippy --version >/dev/null 2>&1; then cargo clippy --release --all-targets -- -D warnings; else echo "lint: clippy is not installed, skipped"; fi
+	@if cargo fmt --version >/dev/null 2>&1; then cargo fmt --all --check; else echo "lint: rustfmt is not installed, skipped"; fi
+	@if cargo clippy --version >/dev/null 2>&1; then cargo clippy --release --workspace --all-targets -- -D warnings; else echo "lint: clippy is not installed, skipped"; fi
 	clang-format --dry-run -Werror cpp/*.cc cpp/*.h
 
 test: setup lint
@@ -46,13 +48,12 @@ header: setup
 
 # The program, the C library, its header, and what finds them: make install [PREFIX=/usr/local] [DESTDIR=]
 install: setup
-	cargo build --release --lib --bin frazil
+	$(BUILD)
 	./tools/install "$(DESTDIR)$(PREFIX)"
 
-# Programs of hosts in C and C++, built against an installed library. With the examples packages have the features
-# that the tests build them with: nothing is built twice.
+# Programs of hosts in C and C++, built against an installed library.
 hosts: setup
-	cargo build --release --lib --bin frazil --examples
+	$(BUILD)
 	./tools/install "$(CURDIR)/target/install"
 	cmake -S tests/ctest -B target/ctest -DCMAKE_PREFIX_PATH="$(CURDIR)/target/install" >/dev/null
 	cmake --build target/ctest --parallel $(shell nproc) >/dev/null
@@ -69,7 +70,7 @@ sanitize: hosts
 
 # A tarball that runs on a bare Debian: target/dist/frazil-VERSION-x86_64.tar.gz
 dist: setup
-	cargo build --release --lib --bin frazil
+	$(BUILD)
 	./tools/dist
 
 # The tarball in a bare Debian in a folder (debootstrap; needs root and Debian's mirror).
@@ -88,7 +89,7 @@ skinning-numbers:
 
 # The pictures of characters in docs/, from models in FRAZIL_DATA; those of the walker come from `make demo`.
 pictures: setup
-	cargo build --release --bin frazil
+	$(BUILD)
 	@./tools/pictures "$${FRAZIL_DATA:-../shared/data}" target/pictures docs/pictures
 
 # make gates [ONLY=snow.base.wall,...]

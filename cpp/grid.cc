@@ -220,8 +220,6 @@ FRAZIL_FUNCTIONS_OF(Grid);
 FRAZIL_FUNCTIONS_OF(VectorGrid);
 #undef FRAZIL_FUNCTIONS_OF
 
-namespace {
-
 /// Leaves and tiles of a kind of tree, outside of any tree.
 template <typename Tree>
 struct Parts {
@@ -264,8 +262,6 @@ struct Parts {
         }
     }
 };
-
-}  // namespace
 
 struct Blocks::Ready : Parts<openvdb::FloatTree> {};
 struct VectorBlocks::Ready : Parts<openvdb::Vec3STree> {};

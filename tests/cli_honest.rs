@@ -1,5 +1,8 @@
 //! What cannot be right is refused or told: thin layers, far offsets, far meshes, fog.
 
+#[path = "common/picture.rs"]
+#[allow(dead_code)]
+mod picture;
 #[path = "common/program.rs"]
 #[allow(dead_code)]
 mod program;
@@ -12,6 +15,7 @@ use frazil::vdb::file::{self, WriteOptions};
 use frazil::vdb::level_set::{self, Scheme};
 use frazil::vdb::{FloatGrid, GridClass};
 use frazil::{Context, Pool};
+use picture::Picture;
 use program::{CUBE, fails, works};
 use std::fs;
 
@@ -116,8 +120,8 @@ fn a_fog_volume_is_drawn_and_said_to_be_one() {
     file::write(&path, &[&fog], &WriteOptions::default()).unwrap();
     let said = works(folder.path(), "preview cloud.vdb -o out.png --size 90x60");
     assert!(said.contains("cloud.vdb") && said.contains("no level set"), "{said}");
-    let picture = image::open(folder.path().join("out.png")).unwrap().into_rgb8();
-    assert!(picture.get_pixel(45, 30) != picture.get_pixel(2, 2), "nothing is drawn");
+    let picture = Picture::open(&folder.path().join("out.png"));
+    assert!(picture.pixel(45, 30) != picture.pixel(2, 2), "nothing is drawn");
     fog.replace_blocks(&ctx, &[block(0.0)]).unwrap();
     file::write(&path, &[&fog], &WriteOptions::default()).unwrap();
     fails(folder.path(), "preview cloud.vdb -o out.png", 2, &["cloud.vdb", "\"density\"", "no density"]);

@@ -1,14 +1,17 @@
 //! Pictures: what is there shows, where the camera looks, and the depth of a print reads.
 
+#[path = "common/picture.rs"]
+#[allow(dead_code)]
+mod picture;
 #[path = "common/program.rs"]
 #[allow(dead_code)]
 mod program;
 
 use assert_cmd::Command;
-use image::RgbImage;
 use std::fs;
 use std::path::Path;
 
+use picture::Picture;
 use program::CUBE;
 
 #[track_caller]
@@ -18,16 +21,16 @@ fn frazil(folder: &Path, arguments: &str) {
     assert!(output.status.success(), "{arguments}: {}", String::from_utf8_lossy(&output.stderr));
 }
 
-fn picture(folder: &Path, files: &str, options: &str) -> RgbImage {
+fn picture(folder: &Path, files: &str, options: &str) -> Picture {
     frazil(folder, &format!("preview {files} -o out.png --size 160x90 {options}"));
-    image::open(folder.join("out.png")).unwrap().into_rgb8()
+    Picture::open(&folder.join("out.png"))
 }
 
 /// Mean brightness (0 to 255) of the pixels around a place (parts of width and height).
-fn brightness(picture: &RgbImage, x: f32, y: f32) -> f32 {
-    let (cx, cy) = ((x * picture.width() as f32) as u32, (y * picture.height() as f32) as u32);
+fn brightness(picture: &Picture, x: f32, y: f32) -> f32 {
+    let (cx, cy) = ((x * picture.width as f32) as usize, (y * picture.height as f32) as usize);
     let near = (cx - 3..cx + 3).flat_map(|x| (cy - 3..cy + 3).map(move |y| (x, y)));
-    near.map(|(x, y)| picture.get_pixel(x, y).0.map(f32::from).iter().sum::<f32>() / 3.0).sum::<f32>() / 36.0
+    near.map(|(x, y)| picture.pixel(x, y).map(f32::from).iter().sum::<f32>() / 3.0).sum::<f32>() / 36.0
 }
 
 /// A folder with snow that a cube was pressed into, 0.2 m deep.
@@ -64,7 +67,7 @@ fn the_automatic_camera_shows_the_whole_and_a_given_one_what_it_looks_at() {
     assert!((brightness(&whole, 0.5, 0.5) - background).abs() > 25.0, "nothing in the middle");
     let away = picture(folder.path(), "cube.obj", "--eye 0,1,3 --target 0,5,9");
     let is_brown =
-        |picture: &RgbImage| picture.pixels().filter(|p| p.0[0] > p.0[2].saturating_add(10)).count();
+        |picture: &Picture| picture.pixels.iter().filter(|p| p[0] > p[2].saturating_add(10)).count();
     assert_eq!(is_brown(&away), 0, "a camera that looks away sees the cube");
     let towards = picture(folder.path(), "cube.obj", "--eye 0,1,3 --target 0,0.2,0");
     assert!(is_brown(&towards) > 100, "one that looks at it does not");
@@ -75,9 +78,9 @@ fn a_mesh_hides_what_is_behind_it() {
     let folder = pressed();
     let snow = picture(folder.path(), "cache/base/base.0001.vdb", ABOVE);
     let both = picture(folder.path(), "cache/base/base.0001.vdb cube.obj", ABOVE);
-    assert_eq!(snow.get_pixel(110, 45), both.get_pixel(110, 45), "the cube changes the snow towards the sun");
+    assert_eq!(snow.pixel(110, 45), both.pixel(110, 45), "the cube changes the snow towards the sun");
     // Brown over bluish shade.
-    let [[r, _, b], [red, _, blue]] = [&snow, &both].map(|picture| picture.get_pixel(80, 45).0);
+    let [[r, _, b], [red, _, blue]] = [&snow, &both].map(|picture| picture.pixel(80, 45));
     assert!(r < b && red > blue + 30, "the cube is not seen: {r} {b}, {red} {blue}");
 }
 

@@ -2,8 +2,6 @@
 
 use super::camera::Size;
 use crate::error::{Error, Result};
-use image::ImageEncoder;
-use image::codecs::png::PngEncoder;
 use std::path::Path;
 
 /// 8-bit red, green, blue, row by row from the upper left.
@@ -21,10 +19,19 @@ impl Picture {
     /// # Errors
     /// What the system refuses.
     pub fn write(&self, path: &Path) -> Result<()> {
-        let mut bytes = Vec::new();
-        PngEncoder::new(&mut bytes)
-            .write_image(&self.rgb, self.size.width, self.size.height, image::ExtendedColorType::Rgb8)
-            .map_err(|error| Error::file(path, format!("cannot be made a PNG: {error}")))?;
+        let bytes =
+            self.encoded().map_err(|error| Error::file(path, format!("cannot be made a PNG: {error}")))?;
         crate::io::atomic::write_bytes(path, &bytes)
+    }
+
+    fn encoded(&self) -> std::result::Result<Vec<u8>, png::EncodingError> {
+        let mut bytes = Vec::new();
+        let mut encoder = png::Encoder::new(&mut bytes, self.size.width, self.size.height);
+        encoder.set_color(png::ColorType::Rgb);
+        encoder.set_depth(png::BitDepth::Eight);
+        encoder.set_compression(png::Compression::Fast);
+        encoder.set_filter(png::Filter::Adaptive);
+        encoder.write_header()?.write_image_data(&self.rgb)?;
+        Ok(bytes)
     }
 }

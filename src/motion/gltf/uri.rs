@@ -17,12 +17,10 @@ pub(super) fn read(
     folder: &Path,
     blob: &mut Option<Vec<u8>>,
 ) -> Result<Told<Vec<u8>>> {
-    let inside =
-        |data: gltf::Result<gltf::buffer::Data>| Ok(data.map(|data| data.0).map_err(|_| "is damaged".into()));
     let uri = match buffer.source() {
         gltf::buffer::Source::Bin => return Ok(blob.take().ok_or_else(|| "is missing".to_string())),
         gltf::buffer::Source::Uri(uri) if uri.starts_with("data:") => {
-            return inside(gltf::buffer::Data::from_source(buffer.source(), None));
+            return Ok(written_out(uri).ok_or_else(|| "is damaged".into()));
         }
         gltf::buffer::Source::Uri(uri) => uri,
     };
@@ -39,6 +37,40 @@ pub(super) fn read(
         Err(error) => Ok(Err(format!("cannot be read ({error})"))),
         Ok(bytes) => Ok(Ok(bytes)),
     }
+}
+
+/// The bytes of a buffer whose URI holds them; none when they are no base64.
+fn written_out(uri: &str) -> Option<Vec<u8>> {
+    let text = uri.split_once(";base64,")?.1;
+    let mut bytes = base64(text.strip_suffix("==").or(text.strip_suffix('=')).unwrap_or(text))?;
+    // As long as the chunk of a .glb would be.
+    bytes.resize(bytes.len().next_multiple_of(4), 0);
+    Some(bytes)
+}
+
+/// Decodes base64 (RFC 4648, section 4) without its padding.
+fn base64(text: &str) -> Option<Vec<u8>> {
+    let mut bytes = Vec::with_capacity(text.len() / 4 * 3 + 2);
+    let (mut held, mut bits) = (0u32, 0);
+    for letter in text.bytes() {
+        let six = match letter {
+            b'A'..=b'Z' => letter - b'A',
+            b'a'..=b'z' => letter - b'a' + 26,
+            b'0'..=b'9' => letter - b'0' + 52,
+            b'+' => 62,
+            b'/' => 63,
+            _ => return None,
+        };
+        held = held << 6 | u32::from(six);
+        bits += 6;
+        if bits >= 8 {
+            bits -= 8;
+            bytes.push((held >> bits) as u8);
+            held &= (1 << bits) - 1;
+        }
+    }
+    // What is left over is less than a letter's worth, of zeros.
+    (bits < 6 && held == 0).then_some(bytes)
 }
 
 /// A URI without its percent signs; none when it is no text.
@@ -62,6 +94,22 @@ fn decoded(uri: &str) -> Option<String> {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn base64_is_decoded_with_its_padding_and_without() {
+        let cases: [(&str, &[u8]); 5] =
+            [("", b""), ("Zg==", b"f"), ("Zm8=", b"fo"), ("Zm9v", b"foo"), ("Zm9vYmFyZm8", b"foobarfo")];
+        for (text, bytes) in cases {
+            let read = written_out(&format!("data:application/octet-stream;base64,{text}")).unwrap();
+            assert_eq!(&read[..bytes.len()], bytes, "{text}");
+            assert!(read.len() % 4 == 0 && read[bytes.len()..].iter().all(|&byte| byte == 0), "{text}");
+        }
+        // A letter too many, bits that say nothing, signs of another alphabet, a line's end, padding inside.
+        for wrong in ["Z", "Zm9vY", "Zh==", "Zm9=", "Zm-v", "Zm9v\n", "Zg==Zm9v", "Zg==="] {
+            assert_eq!(written_out(&format!("data:;base64,{wrong}")), None, "{wrong}");
+        }
+        assert_eq!(written_out("data:text/plain,Zm9v"), None);
+    }
 
     #[test]
     fn percent_signs_are_decoded_and_nothing_else_is_text() {

@@ -1,7 +1,13 @@
 //! Writes the demonstration scenes and their meshes, all made by code: `make_scenes DIR`.
 
-#[path = "../tests/common/mod.rs"]
-mod common;
+#[path = "../../../tests/common"]
+#[allow(dead_code)]
+mod common {
+    pub mod boot;
+    pub mod hero;
+    pub mod shapes;
+    pub mod walk;
+}
 
 use std::fmt::Write;
 use std::path::Path;
