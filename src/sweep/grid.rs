@@ -14,7 +14,7 @@ use crate::error::{Error, Result};
 use crate::motion::{Keys, Rigid};
 use crate::vdb::FloatGrid;
 
-/// Blocks that are made before they are handed to the grid: bounds the memory beside it.
+/// Blocks per batch that is handed to the grid; bounds the memory besides the grid.
 const BATCH: usize = 2048;
 /// A window without bounds.
 const EVERYWHERE: Window = Window { min: [i32::MIN; 3], max: [i32::MAX; 3] };
@@ -24,7 +24,7 @@ const ALL_VOXELS: [[i32; 3]; 2] = [[-(1 << 18); 3], [1 << 18; 3]];
 /// Level set of the volume that bodies sweep from `from` to `to` (s); of the pose when they are equal.
 ///
 /// # Errors
-/// Settings out of range, a pose that cannot be had, a region too large, cancel.
+/// Settings out of range, a pose that cannot be computed, a region too large, cancel.
 pub fn chain(ctx: &Context, bodies: &[Body], from: f64, to: f64, settings: &Settings) -> Result<FloatGrid> {
     settings.validate()?;
     let mut pose = Vec::new();
@@ -34,7 +34,7 @@ pub fn chain(ctx: &Context, bodies: &[Body], from: f64, to: f64, settings: &Sett
     let faces = ctx.stage("chain", || {
         ctx.expect(bodies.len());
         let faces = |body: &Body| {
-            let faces = body.chain(ctx, from, to, &lattice, settings.tolerance, &EVERYWHERE);
+            let faces = body.faces(ctx, from, to, &lattice, settings.tolerance, &EVERYWHERE);
             ctx.advance();
             faces
         };
@@ -44,7 +44,7 @@ pub fn chain(ctx: &Context, bodies: &[Body], from: f64, to: f64, settings: &Sett
     fill(ctx, faces, lattice, settings.half_width)
 }
 
-/// Level set of the solid that a mesh bounds: winding number > 0, vertices that coincide welded, open loops closed.
+/// Level set of the solid that a mesh bounds: winding number > 0, coincident vertices welded, open loops closed.
 ///
 /// # Errors
 /// As [`chain`].
@@ -53,7 +53,7 @@ pub fn voxelise(ctx: &Context, mesh: TriMesh, settings: &Settings) -> Result<Flo
     chain(ctx, &[still], 0.0, 0.0, settings)
 }
 
-/// Level set of the points that a closed chain winds around at least once.
+/// Level set of the points where the winding number of a closed chain is at least 1.
 ///
 /// # Errors
 /// A region too large; cancel.

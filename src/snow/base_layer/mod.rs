@@ -311,7 +311,7 @@ impl BaseLayer {
         let outside = self.half_width + noise.map_or(0.0, |noise| noise.amplitude);
         // Sides of faces in reach are told with the voxels around them.
         let margin = outside.ceil() as i32 + 3;
-        let relative = |voxel: [i32; 3], grow: i32| [0, 1, 2].map(|a| voxel[a] - lattice.base[a] + grow);
+        let relative = |voxel: [i32; 3], grow: i32| [0, 1, 2].map(|a| voxel[a] - lattice.origin[a] + grow);
         let fixed = |voxel: [i32; 3]| voxel.map(|cells| cells.saturating_mul(UNITS));
         let window =
             Window { min: fixed(relative(self.low, -margin)), max: fixed(relative(self.high, margin)) };
@@ -346,7 +346,7 @@ impl BaseLayer {
         lattice: &Lattice,
         window: &Window,
     ) -> Result<Vec<Face>> {
-        let chain = |from: f64, to: f64| body.chain(ctx, from, to, lattice, self.params.tolerance, window);
+        let chain = |from: f64, to: f64| body.faces(ctx, from, to, lattice, self.params.tolerance, window);
         match chain(from, to) {
             // A vertex may be out of reach.
             Err(Error::Argument(_)) => {
