@@ -283,9 +283,7 @@ pub unsafe extern "C" fn frz_base_step(
                 let mut shapes = std::mem::take(&mut state.shapes);
                 let bodies = self::bodies(ctx, bodies, count, dt, &mut shapes);
                 state.shapes = shapes;
-                let earlier = ctx.take_timings();
                 let done = state.layer.step(ctx, &bodies?, 0.0, dt, frame)?;
-                call.add_timings(earlier, &done.stages);
                 state.dirty = state.layer.dirty().collect();
                 Ok(done)
             })?;

@@ -137,7 +137,7 @@ pub(super) unsafe fn bodies(
         let made = Body::shaped(Box::new(motion), 0.0, known.get(&body.id).cloned())?;
         Ok((body.id, made.with_noise(!body.exact)))
     };
-    let made: Vec<(u64, Body)> = ctx.stage("bodies", || {
+    let made: Vec<(u64, Body)> = ctx.phase("bodies", || {
         ctx.expect(arrived.len());
         arrived.into_par_iter().map(make).collect::<Result<_>>()
     })?;

@@ -204,7 +204,7 @@ pub unsafe extern "C" fn frz_levelset_from_particles(
             ctx.allow("a level set of the spheres", surface_bytes(area, voxel_size))?;
             reachable(&positions, &radii, voxel_size)?;
             let positions: Vec<DVec3> = positions.iter().map(|&p| DVec3::from(p.map(f64::from))).collect();
-            let grid = ctx.stage("spheres", || {
+            let grid = ctx.phase("spheres", || {
                 level_set::from_particles(ctx, &positions, &radii, voxel_size, settings.half_width)
             })?;
             Ok(Grid::from(grid))
@@ -249,7 +249,7 @@ pub unsafe extern "C" fn frz_levelset_csg(
                 (frz_csg::FRZ_CSG_INTERSECTION as u32, level_set::intersection_copy),
             ];
             let tool = meaning("operation", "frz_csg", operation, &known)?;
-            let mut joined = ctx.stage("csg", || tool(ctx, first, second))?;
+            let mut joined = ctx.phase("csg", || tool(ctx, first, second))?;
             joined.set_name(&first.name())?;
             *first = joined;
             Ok(())
@@ -281,7 +281,7 @@ pub unsafe extern "C" fn frz_levelset_offset(
                 return Err(Failure::argument(format!("distance = {distance} m is more than 1000 voxels")));
             }
             ctx.allow("the moved level set", grown_bytes(grid, voxels))?;
-            Ok(ctx.stage_in_place("offset", || level_set::offset(ctx, grid, distance, scheme))?)
+            Ok(ctx.phase_in_place("offset", || level_set::offset(ctx, grid, distance, scheme))?)
         })
     }
 }
@@ -327,7 +327,7 @@ pub unsafe extern "C" fn frz_levelset_smooth(
                 (frz_smoothing::FRZ_SMOOTH_GAUSSIAN as u32, level_set::gaussian_filter),
             ];
             let filter = meaning("smoothing", "frz_smoothing", smoothing, &known)?;
-            Ok(ctx.stage_in_place("smooth", || filter(ctx, grid, width, times, scheme))?)
+            Ok(ctx.phase_in_place("smooth", || filter(ctx, grid, width, times, scheme))?)
         })
     }
 }

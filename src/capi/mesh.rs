@@ -245,7 +245,7 @@ pub unsafe extern "C" fn frz_mesh_create(
 }
 
 fn made(ctx: &Context, polygons: PolygonMesh, attributes: Vec<Attribute>) -> Outcome<Mesh> {
-    let triangles = ctx.stage("triangles", || Ok(polygons.clone().into_triangles()))?;
+    let triangles = ctx.phase("triangles", || Ok(polygons.clone().into_triangles()))?;
     Ok(Mesh { polygons, triangles, attributes })
 }
 

@@ -46,7 +46,7 @@ pub fn run(args: &Args, session: &Session) -> Result<(), Failure> {
     let mut all = Vec::new();
     for path in &args.files {
         let mesh = args.read(path).before()?;
-        let faults = session.ctx.stage("faults", || Ok(Faults::of(&mesh))).during()?;
+        let faults = session.ctx.phase("faults", || Ok(Faults::of(&mesh))).during()?;
         let size = mesh.bounds().map(|(low, high)| <[f32; 3]>::from(high - low));
         all.push(json!({
             "file": path.display().to_string(),

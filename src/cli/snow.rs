@@ -73,7 +73,7 @@ pub fn run(args: Args, session: &Session) -> Result<(), Failure> {
     let run = shot::Run::prepare(&session.ctx, &scene, &inputs, &args.output, &frames, args.from).before()?;
     output::check_folder(&args.output).before()?;
     let (made, there) = (run.to_make(), run.there());
-    let mut progress = FrameProgress::new(made, there, session.is_quiet());
+    let mut progress = FrameProgress::new(&session.ctx, made, there, session.is_quiet());
     let mut removed = 0.0;
     run.make(&session.ctx, |frame, report| {
         removed += report.removed_volume;

@@ -40,7 +40,7 @@ impl Stage {
             let what = format!("a picture must have 1 to {LONGEST} pixels along each edge");
             return Err(Error::argument(what));
         }
-        ctx.stage("draw", || {
+        ctx.phase("draw", || {
             let row_bytes = 3 * size.width as usize;
             let mut rgb = vec![0; row_bytes * size.height as usize];
             rgb.par_chunks_mut(row_bytes).enumerate().try_for_each(|(y, row)| {

@@ -31,7 +31,7 @@ pub fn chain(ctx: &Context, bodies: &[Body], from: f64, to: f64, settings: &Sett
     let first = bodies.first().ok_or_else(|| Error::argument("a sweep needs at least one object"))?;
     first.motion().pose(from, &mut pose)?;
     let lattice = Lattice::near(settings.voxel, pose[0])?;
-    let faces = ctx.stage("chain", || {
+    let faces = ctx.phase("chain", || {
         ctx.expect(bodies.len());
         let faces = |body: &Body| {
             let faces = body.faces(ctx, from, to, &lattice, settings.tolerance, &EVERYWHERE);
@@ -59,7 +59,7 @@ pub fn voxelise(ctx: &Context, mesh: TriMesh, settings: &Settings) -> Result<Flo
 /// A region too large; cancel.
 pub fn fill(ctx: &Context, faces: Vec<Face>, lattice: Lattice, half_width: f32) -> Result<FloatGrid> {
     let band = Band { inside: half_width, outside: half_width };
-    let voxeliser = ctx.stage("winding", || {
+    let voxeliser = ctx.phase("winding", || {
         ctx.expect(Voxeliser::PARTS);
         Voxeliser::new(ctx, faces, lattice, band, ALL_VOXELS, |blocks| Ok(vec![true; blocks.len()]))
     })?;
@@ -67,7 +67,7 @@ pub fn fill(ctx: &Context, faces: Vec<Face>, lattice: Lattice, half_width: f32) 
     let blocks: Vec<usize> = (0..voxeliser.near_blocks().len()).collect();
     for batch in blocks.chunks(BATCH) {
         let edits =
-            ctx.stage("distance", || Ok(pieces(ctx, &voxeliser, batch, lattice.voxel, half_width)))?;
+            ctx.phase("distance", || Ok(pieces(ctx, &voxeliser, batch, lattice.voxel, half_width)))?;
         grid.replace_blocks(ctx, &edits)?;
     }
     let background = half_width * lattice.voxel as f32;

@@ -71,6 +71,6 @@ fn combine(
     operands.output.check(&[&operands.a, &operands.b])?;
     let mut a = read_level_set(&operands.a, operands.grid_a.as_deref()).before()?;
     let b = read_level_set(&operands.b, operands.grid_b.as_deref()).before()?;
-    session.ctx.stage(stage, || operation(&session.ctx, &mut a, b)).during()?;
+    session.ctx.phase(stage, || operation(&session.ctx, &mut a, b)).during()?;
     operands.output.write(session, a).during()
 }

@@ -53,7 +53,7 @@ pub fn layer(
     let ground = upright(sheet_of(ground)?);
     let statics: Vec<Sheet> = statics.iter().map(|mesh| upright(Sheet::of(mesh))).collect();
     let lattice = Lattice::near(cell, centre(&ground)?)?;
-    let faces = ctx.stage("prisms", || {
+    let faces = ctx.phase("prisms", || {
         let mut faces = Vec::new();
         match cover {
             Cover::Depth(depth) => {

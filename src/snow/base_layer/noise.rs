@@ -179,7 +179,7 @@ pub fn displace(ctx: &Context, grid: &mut FloatGrid, params: &NoiseParams) -> Re
         .iter()
         .map(|leaf| Piece::Near(back(leaf.origin), Box::new(leaf.values.map(|value| value / cell as f32))))
         .collect();
-    ctx.stage("noise", || {
+    ctx.phase("noise", || {
         noise.apply(ctx, &mut pieces, half_width);
         Ok(())
     })?;

@@ -36,7 +36,7 @@ impl BaseLayer {
     /// # Errors
     /// Cancel; when memory runs out.
     pub fn save(&self, ctx: &Context) -> Result<Vec<u8>> {
-        ctx.stage("save", || {
+        ctx.phase("save", || {
             let mut origins: Vec<Origin> = self.changed.iter().copied().collect();
             origins.par_sort_unstable();
             let surface = self.grids.surface.probe(&origins)?;
@@ -77,11 +77,11 @@ impl BaseLayer {
         // Bytes that are too few for it are refused below.
         let volume = state.get(44..52).map(|bytes| f64::from_le_bytes(array(bytes)));
         let mut layer = Self::with_volume(ctx, initial, params, volume)?;
-        let (surface, touched) = ctx.stage("unpack", || layer.unpack(ctx, state))?;
-        let columns = ctx.stage("columns", || layer.new_columns(surface.iter().map(BlockEdit::origin)))?;
+        let (surface, touched) = ctx.phase("unpack", || layer.unpack(ctx, state))?;
+        let columns = ctx.phase("columns", || layer.new_columns(surface.iter().map(BlockEdit::origin)))?;
         let surfaces: Vec<&BlockEdit> = surface.iter().collect();
         let compression =
-            ctx.stage("compression", || layer.compression_edits(ctx, &columns, &surfaces, &touched))?;
+            ctx.phase("compression", || layer.compression_edits(ctx, &columns, &surfaces, &touched))?;
         let removed = super::empty_removed(layer.surface().voxel_size(), layer.half_width)?;
         let volume = layer.changes.volume;
         layer.commit(ctx, Changes { surface, touched, compression, removed, volume }, columns)?;
