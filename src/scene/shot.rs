@@ -6,7 +6,7 @@ use std::sync::mpsc::{Receiver, sync_channel};
 use super::cache::Cache;
 use super::writer::{Job, Made, Step, Writer, vdb_bytes};
 use super::{FrameChoice, Inputs, Scene, inputs, stage};
-use crate::context::{Context, StageTime};
+use crate::context::{Context, PhaseTime};
 use crate::error::{Error, Result};
 use crate::io::manifest::Manifest;
 use crate::snow::base_layer::{BaseLayer, Params, StepReport};
@@ -228,13 +228,13 @@ fn write_all(
 }
 
 fn log_step(frame: i32, report: &StepReport) {
-    let stage = |stage: &StageTime| format!("{} {:.1} ms", stage.name, stage.time.as_secs_f64() * 1e3);
-    let stages: Vec<String> = report.stages.iter().map(stage).collect();
+    let phase = |phase: &PhaseTime| format!("{} {:.1} ms", phase.name, phase.time.as_secs_f64() * 1e3);
+    let phases: Vec<String> = report.phases.iter().map(phase).collect();
     log::info!(
         "frame {frame}: {:.6} m3 removed, {} faces, {} blocks; {}",
         report.removed_volume,
         report.sweep_faces,
         report.touched_blocks,
-        stages.join(", ")
+        phases.join(", ")
     );
 }

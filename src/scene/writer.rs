@@ -8,7 +8,7 @@ use super::stage::object_names;
 use super::stored::{STAGE, state_path};
 use super::{BaseMode, Scene};
 use crate::base::{DVec3, TriMesh, Uvs};
-use crate::context::{Context, StageTime};
+use crate::context::{Context, PhaseTime};
 use crate::error::{Error, Result};
 use crate::io::manifest::{Keeps, Manifest, Written};
 use crate::io::{atomic, mesh, sealed, usd};
@@ -202,8 +202,8 @@ impl<'a> Writer<'a> {
     }
 
     fn write_report(&self, frame: i32, report: &StepReport) -> Result<()> {
-        let stage = |stage: &StageTime| json!({ "name": stage.name, "seconds": stage.time.as_secs_f64() });
-        let stages: Vec<_> = report.stages.iter().map(stage).collect();
+        let phase = |phase: &PhaseTime| json!({ "name": phase.name, "seconds": phase.time.as_secs_f64() });
+        let phases: Vec<_> = report.phases.iter().map(phase).collect();
         let text = json!({
             "check": sealed::UNSTAMPED,
             "frame": frame,
@@ -212,7 +212,7 @@ impl<'a> Writer<'a> {
             "touched_blocks": report.touched_blocks,
             "sweep_faces": report.sweep_faces,
             "crumbs": report.crumbs,
-            "stages": stages,
+            "phases": phases,
         });
         let path = self.folder.join("report").join(format!("{frame:04}.json"));
         atomic::write_bytes(&path, sealed::stamp(&format!("{text:#}\n")).as_bytes())
