@@ -76,7 +76,7 @@ enum frz_status
      */
     FRZ_OK = 0,
     /**
-     * An argument is NULL, out of range or not finite: the caller mends it.
+     * An argument is NULL, out of range or not finite.
      */
     FRZ_ERROR_ARGUMENT = 1,
     /**
@@ -120,7 +120,7 @@ enum frz_status
      */
     FRZ_ERROR_VERSION = 11,
     /**
-     * The pointer is no handle of the kind that is wanted.
+     * The pointer is not a handle of the required kind.
      */
     FRZ_ERROR_HANDLE = 12,
 };
@@ -199,7 +199,7 @@ enum frz_grid_class
 #endif // defined(__cplusplus) || __STDC_VERSION__ >= 202311L
  {
     /**
-     * Nothing said.
+     * Not specified.
      */
     FRZ_GRID_UNKNOWN = 0,
     /**
@@ -367,7 +367,7 @@ typedef uint32_t frz_value_type;
 typedef struct frz_base frz_base;
 
 /**
- * One computation: cancel flag, progress, polls, warnings, stage times. Cheap: make one for every cook.
+ * One computation: cancel flag, progress, polls, warnings, phase times. Cheap: make one for every cook.
  */
 typedef struct frz_context frz_context;
 
@@ -392,11 +392,11 @@ typedef struct frz_pool frz_pool;
  */
 typedef struct {
     /**
-     * The stage's verb, for instance "distance"; empty between stages. It ends with a zero.
+     * The verb of the phase that runs, for instance "distance"; empty between phases. It ends with a zero.
      */
     char stage[32];
     /**
-     * Stages finished since the context was made or reset.
+     * Phases finished since the context was made or reset.
      */
     uint64_t stages_done;
     /**
@@ -404,25 +404,25 @@ typedef struct {
      */
     double seconds;
     /**
-     * Part of the running stage that is done, 0 to 1; -1 where it is not known. Since interface 1.1: a header of 1.0 has
-     * no such field, and what it was compiled into gets none.
+     * Fraction of the running phase that is done, 0 to 1; -1 where it is not known. Since interface 1.1: programs that
+     * were compiled with a header of 1.0 have no such field, and it is not written.
      */
     double fraction;
 } frz_progress;
 
 /**
- * Looks on while the library works; an answer other than 0 cancels. It must return, not throw or jump.
+ * Called while the library works; returning other than 0 cancels. It must return, not throw or jump.
  *
  * user: what was given with it.
- * progress: what is being done; it is the library's, and gone after the answer.
+ * progress: what is being done; it is the library's, and valid until the function returns.
  */
 typedef int (*frz_poll_function)(void *user, const frz_progress *progress);
 
 /**
- * Takes a warning. It must return, not throw or jump.
+ * Receives a warning. It must return, not throw or jump.
  *
  * user: what was given with it.
- * text: one sentence in UTF-8; it is the library's, and gone afterwards.
+ * text: one sentence in UTF-8; it is the library's, and valid until the function returns.
  */
 typedef void (*frz_log_function)(void *user, const char *text);
 
@@ -888,15 +888,15 @@ typedef struct {
 } frz_base_report;
 
 /**
- * How long a stage took.
+ * How long a phase took.
  */
 typedef struct {
     /**
-     * The stage's verb. It ends with a zero.
+     * The phase's verb. It ends with a zero.
      */
     char stage[32];
     /**
-     * Seconds.
+     * Seconds; the sum of all its runs in the call.
      */
     double seconds;
 } frz_stage_time;
@@ -926,7 +926,7 @@ const char *frz_status_name(uint32_t status);
  * what is at fault; empty before the first.
  *
  * Any thread, any time. The text is the library's, and stays until the next call of this thread that fails. Calls
- * that succeed leave it alone: ask only after a failure.
+ * that succeed do not change it: query it only after a failure.
  */
 const char *frz_last_error(void);
 
@@ -980,10 +980,10 @@ frz_status frz_context_create(uint32_t abi,
 void frz_context_destroy(frz_context *context);
 
 /**
- * Sets what looks on while the library works, for a progress bar and an escape key.
+ * Sets the function that is called while the library works, for a progress bar and an escape key.
  *
- * It is called on the thread that called the library: at the beginning of each stage, then every 10 to 50 ms, also
- * inside long stages. Without worker threads (a pool of 0) it is called between pieces of work, with no interval
+ * It is called on the thread that called the library: at the beginning of each phase, then every 10 to 50 ms, also
+ * inside long phases. Without worker threads (a pool of 0) it is called between pieces of work, with no interval
  * promised. Within it frz_context_cancel and frz_context_progress may be called, and nothing else with this context.
  *
  * poll: NULL for none.
@@ -1034,8 +1034,8 @@ frz_status frz_context_set_memory_limit(frz_context *context,
 void frz_context_cancel(frz_context *context);
 
 /**
- * Forgets a cancel, and counts stages from 0 again, for the calls that follow. A call that runs meanwhile keeps its
- * cancel: it never goes on with half of its work left out.
+ * Clears a cancel and restarts the count of phases, for the calls that follow. A call that runs meanwhile keeps its
+ * cancel: it never continues with half of its work left out.
  *
  * context: may be NULL.
  *
@@ -1044,7 +1044,7 @@ void frz_context_cancel(frz_context *context);
 void frz_context_reset(frz_context *context);
 
 /**
- * Tells what the context is doing.
+ * Reports what the context is doing.
  *
  * out: receives it; all zeroes after a failure, but for the fraction.
  *
@@ -1053,10 +1053,11 @@ void frz_context_reset(frz_context *context);
 frz_status frz_context_progress(const frz_context *context, frz_progress *out);
 
 /**
- * Tells how long the stages of the last call took that had any, in order.
+ * Reports how long the phases of the last call with phases took, in the order of their first runs; a phase that ran
+ * several times is one entry with the sum.
  *
- * dst: room for frz_stage_time; with data NULL only the number is told. FRZ_ERROR_CAPACITY when it is too small.
- * count: receives the number of stages; 0 after other failures.
+ * dst: room for frz_stage_time; with data NULL only the count is reported. FRZ_ERROR_CAPACITY when it is too small.
+ * count: receives the number of phases; 0 after other failures.
  *
  * One thread at a time.
  */
@@ -1102,7 +1103,7 @@ frz_status frz_mesh_get_info(const frz_mesh *mesh, frz_mesh_info *info);
  * Copies a part of a mesh into the caller's memory.
  *
  * part: a frz_mesh_part.
- * dst: room for as many elements as frz_mesh_get_info tells, of the type that the part has: FRZ_ERROR_CAPACITY when
+ * dst: room for as many elements as frz_mesh_get_info reports, of the type that the part has: FRZ_ERROR_CAPACITY when
  *     it is too small, and nothing is written.
  *
  * Any number of threads may read a mesh.
@@ -1114,8 +1115,8 @@ frz_status frz_mesh_read(const frz_mesh *mesh,
 /**
  * Copies an attribute of a mesh into the caller's memory.
  *
- * name: its name. FRZ_ERROR_ARGUMENT names those that there are when there is none of this name.
- * dst: room for an element of so many floats for each vertex; with data NULL only the number of floats is told.
+ * name: its name. FRZ_ERROR_ARGUMENT, with a list of the names, when there is none of this name.
+ * dst: room for an element of so many floats for each vertex; with data NULL only the number of floats is reported.
  * components: receives the floats of each vertex, 1 to 4; 0 after a failure. May be NULL.
  *
  * Any number of threads may read a mesh.
@@ -1156,7 +1157,7 @@ frz_status frz_grid_get_info(const frz_grid *grid, frz_grid_info *info);
 /**
  * Copies a grid's name, in UTF-8 with a zero at its end.
  *
- * dst: room for capacity bytes; NULL only asks for the size. FRZ_ERROR_CAPACITY when it is too small.
+ * dst: room for capacity bytes; NULL only queries the size. FRZ_ERROR_CAPACITY when it is too small.
  * capacity: bytes at dst.
  * size: receives the bytes that are needed, the zero counted; 0 after other failures.
  *
@@ -1190,7 +1191,7 @@ frz_status frz_grid_create(frz_context *context, const frz_grid_desc *desc, frz_
  * Blocks without a leaf have one value: the background, or for a level set plus or minus the background. Values of a
  * level set are distances (m).
  *
- * dst: room for leaf_count elements of frz_leaf; with data NULL only the number is told. FRZ_ERROR_CAPACITY when it
+ * dst: room for leaf_count elements of frz_leaf; with data NULL only the count is reported. FRZ_ERROR_CAPACITY when it
  *     is too small. The pointers in it are the grid's: they stay until it is changed or destroyed, those of a base
  *     layer until its next step.
  * count: receives the number of leaves; 0 after other failures.
@@ -1216,7 +1217,7 @@ frz_status frz_grid_probe(const frz_grid *grid, frz_view origins, frz_span dst);
  *
  * Blocks without a leaf have one value: the background, or what frz_grid_vector_probe finds.
  *
- * dst: room for leaf_count elements of frz_vector_leaf; with data NULL only the number is told. FRZ_ERROR_CAPACITY when
+ * dst: room for leaf_count elements of frz_vector_leaf; with data NULL only the count is reported. FRZ_ERROR_CAPACITY when
  *     it is too small. The pointers in it are the grid's: they stay until it is destroyed.
  * count: receives the number of leaves; 0 after other failures.
  *
@@ -1636,7 +1637,7 @@ frz_status frz_base_step(frz_context *context,
  * Writes what the next step depends on, besides the snow that the layer was made from: for a host's own cache.
  *
  * Only blocks that ever changed are kept, packed; the bytes are the same on any number of threads. What the last
- * step removed, and which blocks it changed, is no part of it.
+ * step removed, and which blocks it changed, is not part of it.
  *
  * dst: room for capacity bytes. NULL: size receives a number that certainly suffices, and nothing is written.
  * capacity: bytes at dst. FRZ_ERROR_CAPACITY when they are too few.

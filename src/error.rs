@@ -4,13 +4,13 @@ use std::path::{Path, PathBuf};
 
 /// What went wrong, in one sentence.
 ///
-/// The kinds are those of the C status numbers; a kind says who can mend it.
+/// The kinds are those of the C status numbers; a kind says who can fix it.
 #[derive(Debug, thiserror::Error)]
 pub enum Error {
-    /// A parameter or argument is outside its range: the caller mends it.
+    /// A parameter or argument is outside its range: the caller can fix it.
     #[error("{0}")]
     Argument(String),
-    /// What a file holds cannot be used: the file is to be mended.
+    /// The contents of a file cannot be used: the file must be fixed.
     #[error("{}: {what}", path.display())]
     File {
         /// The file at fault.

@@ -133,7 +133,7 @@ pub fn renumbered(triangles: &[[u32; 3]], used: &[u32]) -> Vec<[u32; 3]> {
     triangles.iter().map(|triangle| triangle.map(|vertex| places[vertex as usize])).collect()
 }
 
-/// How far apart the 32-bit numbers lie that stand for a coordinate: what a mesh file can tell there.
+/// Spacing of 32-bit numbers at a coordinate: the resolution of a mesh file there.
 pub fn spacing(coordinate: f64) -> f64 {
     let at = coordinate.abs() as f32;
     f64::from(at.next_up()) - f64::from(at)
@@ -142,7 +142,7 @@ pub fn spacing(coordinate: f64) -> f64 {
 /// A sentence about vertices so far from the origin (in a file's unit of `scale` m) that their 32-bit coordinates are
 /// coarse against a cell (m).
 pub fn too_far(name: &str, farthest: f64, scale: f64, cell: f64) -> Option<String> {
-    // Rounding by half the gap may cost what a sweep may be off by: 0.02 cell.
+    // Rounding by half the gap may cost as much as the default tolerance of a sweep: 0.02 cell.
     let gap = spacing(farthest) * scale;
     (gap > 0.04 * cell).then(|| {
         format!(
@@ -163,7 +163,7 @@ pub fn farthest<'a>(places: impl Iterator<Item = &'a DVec3>) -> f64 {
 pub fn coincident(places: impl Iterator<Item = DVec3>) -> Vec<u32> {
     // Adding zero makes -0 and 0 the same.
     let keys: Vec<[u64; 3]> = places.map(|p| [p.x + 0.0, p.y + 0.0, p.z + 0.0].map(f64::to_bits)).collect();
-    // Open addressing, at most half full: several times faster than a map, and every step of a host asks.
+    // Open addressing, at most half full: several times faster than a map, and needed in every step of a host.
     let bits = (2 * keys.len().max(1)).next_power_of_two().ilog2().max(1);
     let mut slots = vec![u32::MAX; 1 << bits];
     let home = |key: &[u64; 3]| {

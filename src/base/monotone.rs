@@ -45,7 +45,7 @@ fn rounded(points: &[Point]) -> Vec<[i64; 2]> {
     let high = [0, 1].map(|axis| end(axis, f64::max));
     let extent = (high[0] - low[0]).max(high[1] - low[1]);
     let scale = if extent > 0.0 { SQUARE / extent } else { 0.0 };
-    // What is no number becomes 0.
+    // NaN becomes 0.
     points.iter().map(|p| [0, 1].map(|axis| ((p[axis] - low[axis]) * scale).round() as i64)).collect()
 }
 
@@ -237,7 +237,7 @@ fn pieces(count: usize, diagonals: Vec<[usize; 2]>) -> Vec<Vec<usize>> {
     cuts.sort_unstable_by_key(|&(low, high)| (low, count - high));
     cuts.dedup();
     let mut out = Vec::new();
-    // The cuts that the corner at hand is within, with their pieces so far; the whole polygon is the first.
+    // The cuts that the current corner is within, with their pieces so far; the whole polygon is the first.
     let mut open: Vec<(usize, Vec<usize>)> = vec![(count, Vec::new())];
     let mut cuts = cuts.into_iter().peekable();
     for corner in 0..count {

@@ -13,6 +13,7 @@ use super::mesh::no_flags;
 use super::views::{Sized32, fill, finite, frz_view, sized, write_bytes};
 use crate::base::blocks::Origin;
 use crate::snow::base_layer::{BaseLayer, Params};
+use crate::sweep::TOLERANCE;
 use crate::vdb::FloatGrid;
 
 /// A layer of snow that bodies press into.
@@ -41,9 +42,9 @@ unsafe impl Sized32 for frz_base_params {
 }
 
 impl frz_base_params {
-    const USUAL: Self = Self { struct_size: 0, flags: 0, tolerance: 0.02, noise: frz_noise::USUAL };
+    const USUAL: Self = Self { struct_size: 0, flags: 0, tolerance: TOLERANCE, noise: frz_noise::USUAL };
 
-    /// Refuses flags without a meaning, and what is no number.
+    /// Refuses unknown flags, and values that are not finite.
     fn check(&self) -> Outcome {
         no_flags(self.flags, 0)?;
         finite("tolerance", self.tolerance)?;
@@ -137,7 +138,7 @@ impl Layer {
 impl Drop for Layer {
     fn drop(&mut self) {
         for grid in self.lent {
-            // SAFETY: made in `new`; whoever destroys the layer has seen that nobody uses them.
+            // SAFETY: made in `new`; the layer is destroyed only when they are not in use.
             unsafe { free(grid) };
         }
     }
@@ -299,7 +300,7 @@ pub unsafe extern "C" fn frz_base_step(
 /// Writes what the next step depends on, besides the snow that the layer was made from: for a host's own cache.
 ///
 /// Only blocks that ever changed are kept, packed; the bytes are the same on any number of threads. What the last
-/// step removed, and which blocks it changed, is no part of it.
+/// step removed, and which blocks it changed, is not part of it.
 ///
 /// dst: room for capacity bytes. NULL: size receives a number that certainly suffices, and nothing is written.
 /// capacity: bytes at dst. FRZ_ERROR_CAPACITY when they are too few.

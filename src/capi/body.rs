@@ -11,7 +11,7 @@ use super::views::{Sized32, check_size, finite, frz_view, sized};
 use crate::base::{DVec3, PolygonMesh, Vec3};
 use crate::context::Context;
 use crate::error::Result;
-use crate::motion::Motion;
+use crate::motion::{Motion, between};
 use crate::sweep::{Body, Shape};
 
 /// Flag of a body: its imprints have no noise.
@@ -73,19 +73,12 @@ impl Motion for HostMotion {
     }
 
     fn pose(&self, time: f64, out: &mut Vec<DVec3>) -> Result<()> {
-        out.clear();
         let steps = self.poses.len() - 1;
         let at = if self.end > 0.0 { (time / self.end).clamp(0.0, 1.0) * steps as f64 } else { 0.0 };
-        // Times of poses come from divisions: rounding must not ask for a neighbour.
+        // Times of poses come from divisions: rounding must not need a neighbour.
         let at = if (at - at.round()).abs() < 1e-9 { at.round() } else { at };
         let (first, part) = (at.floor() as usize, at - at.floor());
-        let from = &self.poses[first];
-        if part == 0.0 {
-            out.extend(from.iter().map(|p| p.cast::<f64>()));
-        } else {
-            let pairs = from.iter().zip(&self.poses[first + 1]);
-            out.extend(pairs.map(|(p, q)| p.cast::<f64>().lerp(&q.cast(), part)));
-        }
+        between(&self.poses[first], &self.poses[(first + 1).min(steps)], part, out);
         Ok(())
     }
 

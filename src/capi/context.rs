@@ -255,10 +255,10 @@ pub unsafe extern "C" fn frz_context_destroy(context: *mut frz_context) {
     guard(|| unsafe { destroy(context) });
 }
 
-/// Sets what looks on while the library works, for a progress bar and an escape key.
+/// Sets the function that is called while the library works, for a progress bar and an escape key.
 ///
-/// It is called on the thread that called the library: at the beginning of each stage, then every 10 to 50 ms, also
-/// inside long stages. Without worker threads (a pool of 0) it is called between pieces of work, with no interval
+/// It is called on the thread that called the library: at the beginning of each phase, then every 10 to 50 ms, also
+/// inside long phases. Without worker threads (a pool of 0) it is called between pieces of work, with no interval
 /// promised. Within it frz_context_cancel and frz_context_progress may be called, and nothing else with this context.
 ///
 /// poll: NULL for none.

@@ -19,7 +19,7 @@ pub struct frz_grid {
 #[repr(u32)]
 #[derive(Clone, Copy)]
 pub enum frz_grid_class {
-    /// Nothing said.
+    /// Not specified.
     FRZ_GRID_UNKNOWN = 0,
     /// Signed distances (m), negative inside, cut off at the background.
     FRZ_GRID_LEVEL_SET = 1,
@@ -95,7 +95,7 @@ impl From<FloatGrid> for Grid {
     }
 }
 
-/// What is said of a grid with other values than a function takes.
+/// The error for a grid whose values a function does not accept.
 fn of_another_kind(name: &str, holds: &str, needed: &str) -> Failure {
     let name = if name.is_empty() { String::new() } else { format!(" \"{name}\"") };
     Failure::argument(format!("the grid{name} holds {holds}, but one of {needed} is needed"))
@@ -245,7 +245,7 @@ pub unsafe extern "C" fn frz_grid_get_info(grid: *const frz_grid, info: *mut frz
 
 /// Copies a grid's name, in UTF-8 with a zero at its end.
 ///
-/// dst: room for capacity bytes; NULL only asks for the size. FRZ_ERROR_CAPACITY when it is too small.
+/// dst: room for capacity bytes; NULL only queries the size. FRZ_ERROR_CAPACITY when it is too small.
 /// capacity: bytes at dst.
 /// size: receives the bytes that are needed, the zero counted; 0 after other failures.
 ///

@@ -86,7 +86,7 @@ impl Places {
     }
 }
 
-/// Refuses values of a leaf that are no numbers.
+/// Refuses values of a leaf that are not finite.
 fn check_values(at: usize, values: &[f32]) -> Outcome {
     if values.iter().all(|value| value.is_finite()) {
         return Ok(());
@@ -184,7 +184,7 @@ unsafe fn of_vectors(ctx: &Context, desc: &frz_grid_desc, class: GridClass) -> O
         return Err(Failure::argument("background_vector is not finite"));
     }
     if !matches!(class, GridClass::Unknown | GridClass::Staggered) {
-        return Err(Failure::argument("grid_class: vectors are no level set and no fog"));
+        return Err(Failure::argument("grid_class: vectors are neither a level set nor fog"));
     }
     let bytes = (VOXELS * 2 * size_of::<[f32; 3]>() + 64) as u64;
     ctx.allow("a grid", (desc.leaf_count as u64).saturating_mul(bytes))?;

@@ -49,7 +49,7 @@ const FARTHEST: i32 = 1 << 30;
 /// Checks the place of a block.
 pub(super) fn check_origin(origin: Origin) -> Outcome<Origin> {
     if origin.iter().any(|&index| index & 7 != 0 || !(-FARTHEST..=FARTHEST).contains(&index)) {
-        let text = format!("origin {origin:?} is no block's: multiples of 8 within -2^30 to 2^30");
+        let text = format!("origin {origin:?} is not a block's: multiples of 8 within -2^30 to 2^30");
         return Err(Failure::argument(text));
     }
     Ok(origin)
@@ -64,7 +64,7 @@ fn leaf_view(leaf: &Leaf<'_>) -> frz_leaf {
 /// Blocks without a leaf have one value: the background, or for a level set plus or minus the background. Values of a
 /// level set are distances (m).
 ///
-/// dst: room for leaf_count elements of frz_leaf; with data NULL only the number is told. FRZ_ERROR_CAPACITY when it
+/// dst: room for leaf_count elements of frz_leaf; with data NULL only the count is reported. FRZ_ERROR_CAPACITY when it
 ///     is too small. The pointers in it are the grid's: they stay until it is changed or destroyed, those of a base
 ///     layer until its next step.
 /// count: receives the number of leaves; 0 after other failures.
@@ -127,7 +127,7 @@ fn vector_leaf_view(leaf: &VectorLeaf<'_>) -> frz_vector_leaf {
 ///
 /// Blocks without a leaf have one value: the background, or what frz_grid_vector_probe finds.
 ///
-/// dst: room for leaf_count elements of frz_vector_leaf; with data NULL only the number is told. FRZ_ERROR_CAPACITY when
+/// dst: room for leaf_count elements of frz_vector_leaf; with data NULL only the count is reported. FRZ_ERROR_CAPACITY when
 ///     it is too small. The pointers in it are the grid's: they stay until it is destroyed.
 /// count: receives the number of leaves; 0 after other failures.
 ///

@@ -14,7 +14,7 @@ use crate::error::Error;
 pub enum frz_status {
     /// Done.
     FRZ_OK = 0,
-    /// An argument is NULL, out of range or not finite: the caller mends it.
+    /// An argument is NULL, out of range or not finite.
     FRZ_ERROR_ARGUMENT = 1,
     /// What a file, or bytes in its place, holds cannot be used.
     FRZ_ERROR_FILE = 2,
@@ -36,7 +36,7 @@ pub enum frz_status {
     FRZ_ERROR_CAPACITY = 10,
     /// The caller's header and this library do not fit together.
     FRZ_ERROR_VERSION = 11,
-    /// The pointer is no handle of the kind that is wanted.
+    /// The pointer is not a handle of the required kind.
     FRZ_ERROR_HANDLE = 12,
 }
 
@@ -59,7 +59,7 @@ impl Failure {
         Self { status, text: text.into() }
     }
 
-    /// An argument that the caller has to mend.
+    /// Invalid argument.
     pub(super) fn argument(text: impl Into<String>) -> Self {
         Self::new(FRZ_ERROR_ARGUMENT, text)
     }
@@ -146,7 +146,7 @@ fn words(panic: &(dyn Any + Send)) -> &str {
     text.or_else(|| panic.downcast_ref::<String>().map(String::as_str)).unwrap_or("a panic without words")
 }
 
-/// Panics inside calls are told by status, never printed; others are left to whoever told them before.
+/// Panics inside calls are reported by status and not printed; others go to the previous panic hook.
 fn keep_quiet() {
     static ONCE: Once = Once::new();
     ONCE.call_once(|| {

@@ -1,4 +1,4 @@
-//! Handles: what a host holds by pointer. A pointer that is NULL, of another kind, in use or poisoned is told so.
+//! Handles: objects that a host holds by pointer. A pointer that is NULL, of another kind, in use or poisoned is an error.
 
 use std::cell::UnsafeCell;
 use std::ops::{Deref, DerefMut};
@@ -15,7 +15,7 @@ pub(super) trait Noun {
     type Value;
     /// Its name in messages.
     const NAME: &'static str;
-    /// What tells its memory from that of others.
+    /// Identifies its memory.
     const TAG: u32;
 }
 
@@ -57,7 +57,7 @@ pub(super) unsafe fn give<N: Noun>(out: *mut *mut N, value: N::Value) -> Outcome
     Ok(())
 }
 
-/// Zeroes what a call tells besides its status, if it is asked for: so it is after every failure.
+/// Zeroes the output of a call, if requested: its value after every failure.
 ///
 /// # Safety
 /// `out` must be NULL or point to memory for a number or pointer.
@@ -86,14 +86,14 @@ unsafe fn look<'a, N: Noun>(pointer: *const N) -> Outcome<&'a Handle<N::Value>> 
         return Err(Failure::argument(format!("the {} is NULL", N::NAME)));
     }
     if !handle.is_aligned() {
-        return Err(Failure::new(FRZ_ERROR_HANDLE, format!("the pointer is no {}", N::NAME)));
+        return Err(Failure::new(FRZ_ERROR_HANDLE, format!("the pointer is not a {}", N::NAME)));
     }
     // SAFETY: the caller's promise; handles of all kinds begin with their tag.
     match unsafe { &(*handle).tag }.load(Ordering::Acquire) {
         // SAFETY: the tag says that it is a handle of this kind.
         tag if tag == N::TAG => Ok(unsafe { &*handle }),
         GONE => Err(Failure::new(FRZ_ERROR_HANDLE, format!("the {} was destroyed", N::NAME))),
-        _ => Err(Failure::new(FRZ_ERROR_HANDLE, format!("the pointer is no {}", N::NAME))),
+        _ => Err(Failure::new(FRZ_ERROR_HANDLE, format!("the pointer is not a {}", N::NAME))),
     }
 }
 

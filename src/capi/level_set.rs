@@ -63,10 +63,10 @@ pub struct frz_noise {
 }
 
 impl frz_noise {
-    /// What a host gets that asks for nothing.
+    /// The defaults of a host.
     pub(super) const USUAL: Self = Self { amplitude: -1.0, size: -1.0, octaves: 3, seed: 0 };
 
-    /// Refuses what is no number.
+    /// Refuses values that are not finite.
     pub(super) fn check(&self) -> Outcome {
         finite("noise amplitude", self.amplitude)?;
         finite("noise size", self.size)
@@ -105,10 +105,10 @@ fn scheme_of(number: u32) -> Outcome<Scheme> {
 type Join = fn(&Context, &FloatGrid, &FloatGrid) -> Result<FloatGrid>;
 type Filter = fn(&Context, &mut FloatGrid, u32, u32, Scheme) -> Result<()>;
 
-/// Refuses what is no level set.
+/// Refuses a grid that is not a level set.
 fn level_set_of(grid: &FloatGrid) -> Outcome<&FloatGrid> {
     if grid.class() != GridClass::LevelSet {
-        return Err(Failure::argument("the grid is no level set"));
+        return Err(Failure::argument("the grid is not a level set"));
     }
     Ok(grid)
 }

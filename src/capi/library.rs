@@ -50,7 +50,7 @@ pub extern "C" fn frz_status_name(status: u32) -> *const c_char {
 /// what is at fault; empty before the first.
 ///
 /// Any thread, any time. The text is the library's, and stays until the next call of this thread that fails. Calls
-/// that succeed leave it alone: ask only after a failure.
+/// that succeed do not change it: query it only after a failure.
 #[unsafe(no_mangle)]
 pub extern "C" fn frz_last_error() -> *const c_char {
     last_error()

@@ -160,7 +160,7 @@ impl frz_span {
     }
 }
 
-/// Writes bytes to the host, or tells it how many there are: with `dst` NULL, `size` becomes `bound` at least.
+/// Writes bytes to the host, or reports how many there are: with `dst` NULL, `size` becomes `bound` at least.
 ///
 /// # Safety
 /// `dst` must be NULL or have room for `capacity` bytes; `size` must be NULL or point to a number.
@@ -190,7 +190,7 @@ pub(super) unsafe fn write_bytes(
     Ok(())
 }
 
-/// Refuses what is no number, by its name.
+/// Refuses a value that is not finite, by its name.
 pub(super) fn finite(name: &str, value: f64) -> Outcome {
     if value.is_finite() { Ok(()) } else { Err(Failure::argument(format!("{name} is not finite"))) }
 }
@@ -210,7 +210,7 @@ pub(super) fn meaning<T: Copy>(name: &str, kind: &str, number: u32, known: &[(u3
     let found = known.iter().find(|(known, _)| *known == number);
     found
         .map(|(_, meaning)| *meaning)
-        .ok_or_else(|| Failure::argument(format!("{name} = {number} is no {kind}")))
+        .ok_or_else(|| Failure::argument(format!("{name} = {number} is not a value of {kind}")))
 }
 
 /// A text of the host; none for NULL.

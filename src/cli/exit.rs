@@ -61,11 +61,11 @@ impl<T> Phase<T> for frazil::Result<T> {
 pub fn say_error(message: &str) {
     let message = frazil::error::visible(message);
     let sentence: Vec<&str> = message.split_whitespace().collect();
-    // Nobody is left to tell when stderr is closed.
+    // There is nobody to report to when stderr is closed.
     let _ = writeln!(std::io::stderr(), "frazil: {}", sentence.join(" "));
 }
 
-/// Says that a signal stopped the program; its exit code tells which.
+/// Reports that a signal stopped the program; its exit code shows which.
 pub fn say_stopped(code: u8) {
     static SAID: AtomicBool = AtomicBool::new(false);
     if SAID.swap(true, Ordering::Relaxed) {

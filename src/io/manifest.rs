@@ -18,7 +18,7 @@ pub struct Written {
     pub hash: String,
 }
 
-/// From what another run can go on after a frame.
+/// What another run can resume from after a frame.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Keeps {
@@ -52,7 +52,7 @@ pub struct Manifest {
     pub frame: i32,
     /// Hash of all settings and inputs that it depends on, those of the frames before it included.
     pub inputs: String,
-    /// From what another run can go on.
+    /// What another run can resume from.
     pub keeps: Keeps,
     /// Its files.
     pub files: Vec<Written>,

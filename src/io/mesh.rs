@@ -81,6 +81,7 @@ pub fn ply_bytes(mesh: &TriMesh, velocities: &[Vec3], uvs: Option<&Uvs>) -> Vec<
     bytes
 }
 
-fn extension(path: &Path) -> String {
+/// The extension of a file's name in lower case; empty without one.
+pub fn extension(path: &Path) -> String {
     path.extension().and_then(|text| text.to_str()).unwrap_or("").to_lowercase()
 }

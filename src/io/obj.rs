@@ -56,7 +56,7 @@ impl Reader {
         Ok(())
     }
 
-    /// Texture coordinates: v may be left out. Those that are no finite numbers count as none when a face names them.
+    /// Texture coordinates: v may be left out. Those that are not finite count as missing when a face names them.
     fn place<'a>(&mut self, mut words: impl Iterator<Item = &'a [u8]>) -> Result<(), String> {
         let mut next = |default: f32| words.next().map_or(Some(default), number).unwrap_or(f32::NAN);
         self.places.push([next(f32::NAN), next(0.0)]);

@@ -1,4 +1,4 @@
-//! Small JSON files that tell whether they are whole and whether this version can read them.
+//! Small JSON files that show whether they are complete and whether this version can read them.
 
 use std::path::Path;
 

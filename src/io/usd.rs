@@ -203,7 +203,7 @@ fn declare_uvs(out: &mut String, indent: &str, uvs: Option<&Uvs>) {
     }
 }
 
-/// What the clips hold: the manifest that USD asks for.
+/// The manifest of the clips that USD requires.
 pub fn clip_manifest(kind: &str, meshes: &[MeshPrim]) -> String {
     let mut out = format!("#usda 1.0\n(\n    defaultPrim = \"{kind}\"\n)\n\nover \"{kind}\"\n{{\n");
     for MeshPrim { name, uvs } in meshes {

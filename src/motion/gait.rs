@@ -21,7 +21,7 @@ const LEVEL: f64 = 0.25;
 const STILL: f64 = 0.1;
 /// Spread of the velocities that is steady, as a part of the speed: walks have up to 0.22, runs 0.45.
 const STEADY: f64 = 0.33;
-/// Part of the time that something must stand, or the motion is no gait.
+/// Part of the time that something must stand, or the motion is not a gait.
 const LEAST_TIME: f64 = 0.2;
 
 /// How a motion's lowest parts move.
@@ -54,7 +54,7 @@ impl Gait {
 /// Looks at a motion (m, Y up) from one time to another (s); none where nothing stands for a while.
 ///
 /// # Errors
-/// A pose that cannot be had.
+/// A pose that cannot be computed.
 pub fn gait(motion: &dyn Motion, from: f64, to: f64) -> Result<Option<Gait>> {
     let vertices = motion.vertex_count().max(1) as f64;
     let most = (MOST_VERTICES / vertices).clamp(POSES.0, POSES.1);

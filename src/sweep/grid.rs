@@ -8,7 +8,7 @@ use super::nearest::Scratch;
 use super::voxelise::{ALL, Band, Piece, Voxeliser};
 use super::{Body, Settings};
 use crate::base::TriMesh;
-use crate::base::blocks::{Block, BlockEdit, Values};
+use crate::base::blocks::{Block, BlockEdit};
 use crate::context::Context;
 use crate::error::{Error, Result};
 use crate::motion::{Keys, Rigid};
@@ -87,6 +87,7 @@ fn pieces(
     voxel: f64,
     half_width: f32,
 ) -> Vec<BlockEdit> {
+    let background = half_width * voxel as f32;
     ctx.expect(batch.len());
     batch
         .par_iter()
@@ -96,20 +97,11 @@ fn pieces(
         })
         .filter_map(|piece| {
             Some(match piece? {
-                Piece::Inside(origin) => BlockEdit::Constant(origin, -half_width * voxel as f32),
-                Piece::Near(origin, cells) => BlockEdit::Dense(to_block(origin, cells, voxel, half_width)),
+                Piece::Inside(origin) => BlockEdit::Constant(origin, -background),
+                Piece::Near(origin, cells) => {
+                    BlockEdit::Dense(Block::of_cells(origin, cells, voxel as f32, background))
+                }
             })
         })
         .collect()
-}
-
-/// Distances in cells to a leaf of a level set in metres.
-fn to_block(origin: [i32; 3], mut values: Box<Values>, voxel: f64, half_width: f32) -> Block {
-    let background = half_width * voxel as f32;
-    let mut mask = [0u64; 8];
-    for (voxel_index, value) in values.iter_mut().enumerate() {
-        *value = (*value * voxel as f32).clamp(-background, background);
-        mask[voxel_index >> 6] |= u64::from(value.abs() < background) << (voxel_index & 63);
-    }
-    Block { origin, values, mask }
 }

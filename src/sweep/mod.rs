@@ -64,7 +64,7 @@ pub use voxelise::{ALL, Band, Piece, Voxeliser};
 
 use crate::error::{Error, Result};
 
-/// Default of [`Settings::tolerance`] (cells).
+/// Default of [`Settings::tolerance`] (cells): the error of a sweep is far below what a level set can show.
 pub const TOLERANCE: f64 = 0.02;
 
 /// Parameters of a swept volume.

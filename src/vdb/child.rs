@@ -88,7 +88,7 @@ pub fn serve(arguments: impl Iterator<Item = OsString>) -> Option<u8> {
         Err(error) => Contents::Refusal(error.to_string()),
     };
     let packed = deliver(&contents);
-    // The process ends: nobody needs the memory back leaf by leaf.
+    // The process ends: no need to free the memory leaf by leaf.
     std::mem::forget(contents);
     Some(if packed.is_ok() { 0 } else { 1 })
 }
@@ -97,7 +97,7 @@ pub fn serve(arguments: impl Iterator<Item = OsString>) -> Option<u8> {
 const SPACE_OF_A_THREAD: u64 = 16 << 20;
 
 fn limit(limits: Limits) -> std::io::Result<()> {
-    // Not one process that decodes outlives the one that asked for it.
+    // No decoding process outlives the one that started it.
     set_parent_process_death_signal(Some(Signal::KILL))?;
     let own = std::fs::read_to_string("/proc/self/statm")?;
     let pages: u64 = own.split(' ').next().and_then(|pages| pages.parse().ok()).unwrap_or(0);

@@ -73,7 +73,7 @@ enum Source<'a> {
 /// Checks the structure of a file.
 ///
 /// # Errors
-/// A file that cannot be read, is no regular file, is cut short or contradicts itself.
+/// A file that cannot be read, is not a regular file, is cut short or contradicts itself.
 pub(super) fn check(path: &Path) -> Result<Layout> {
     let file = crate::io::source::open(path)?;
     layout::read(BufReader::new(file)).map_err(|fault| match fault {
@@ -225,7 +225,7 @@ fn load(source: &mut Source<'_>, at: usize, header: &GridInfo, kinds: Kinds) -> 
     Err(format!("grid \"{}\" has values that are not finite", grid.borrow().name()))
 }
 
-/// What is said of a grid that is another than its file says.
+/// The error for a grid that is not of the type in the file.
 const ASTRAY: &str = "the .vdb file is damaged: a grid is not of the type that the file says";
 
 fn floats(grid: AnyGrid) -> Told<FloatGrid> {

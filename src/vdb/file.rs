@@ -32,7 +32,7 @@ pub struct WriteOptions {
     pub metadata: Vec<(String, MetaValue)>,
 }
 
-/// What a file says of one of its grids.
+/// The description of a grid in a file.
 #[derive(Debug, Clone, PartialEq)]
 pub struct GridInfo {
     /// Name.
@@ -43,11 +43,11 @@ pub struct GridInfo {
     pub class: String,
     /// Edge of a cell along x (m).
     pub voxel: f64,
-    /// Active voxels, where the file says.
+    /// Active voxels, if the file has them.
     pub active_voxels: Option<u64>,
-    /// Least and greatest active voxel, where the file says.
+    /// Least and greatest active voxel, if the file has them.
     pub bbox: Option<([i32; 3], [i32; 3])>,
-    /// Memory when loaded (bytes), where the file says.
+    /// Memory when loaded (bytes), if the file has them.
     pub memory: Option<u64>,
     /// Whether values are stored in 16 bits.
     pub half: bool,

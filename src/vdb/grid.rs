@@ -15,7 +15,7 @@ use crate::error::Result;
 /// What a grid's values mean.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum GridClass {
-    /// Nothing said.
+    /// Not specified.
     Unknown,
     /// Signed distances (m), negative inside.
     LevelSet,

@@ -39,7 +39,7 @@ const SECONDS_PER_MB: f64 = 0.5;
 const WAITING: f64 = 8.0;
 /// Time between two looks at a child: at first, and later.
 const LOOKS: [Duration; 2] = [Duration::from_micros(500), Duration::from_millis(5)];
-/// Bytes that are kept of what a child says on stderr.
+/// Bytes that are kept of a child's stderr.
 const MOST_WORDS: u64 = 1 << 14;
 
 /// The guard of this program.
@@ -145,7 +145,7 @@ impl Guard {
         }
     }
 
-    /// Runs a child to its end; how it ended, and what it said.
+    /// Runs a child to its end; returns its exit status and output.
     fn run(
         &self,
         path: &Path,
@@ -226,7 +226,7 @@ impl Guard {
                 Some(FILE_SIZE) => "decoding it takes larger files than `ulimit -f` allows".to_string(),
                 Some(_) => "the .vdb file is damaged: decoding it makes OpenVDB crash".to_string(),
                 None => format!(
-                    "cannot be decoded by {}, which is no frazil of version {}",
+                    "cannot be decoded by {}, which is not frazil of version {}",
                     self.program.display(),
                     env!("CARGO_PKG_VERSION")
                 ),
@@ -248,7 +248,7 @@ fn floats(path: &Path, grid: AnyGrid) -> Result<FloatGrid> {
     grid.floats().ok_or_else(|| astray(path))
 }
 
-/// What is said of a parcel that is whole but holds something else.
+/// The error for a parcel that is complete but contains something else.
 fn astray(path: &Path) -> Error {
     Error::file(path, "the .vdb file is damaged: decoding it came to nothing")
 }

@@ -1,7 +1,7 @@
 //! The structure of a .vdb file, read without OpenVDB: header, metadata, and where each grid lies.
 //!
 //! OpenVDB does not notice the end of a file while it reads one: it takes what was never read for an empty grid, or
-//! goes on for ever. A file that says where its grids lie (all but streams do) is checked here first.
+//! never ends. A file that says where its grids lie (all but streams do) is checked here first.
 
 use std::io::{Read, Seek, SeekFrom};
 
@@ -22,7 +22,7 @@ const GRID_COMPRESSION: u32 = 222;
 /// Longest name that is read (bytes).
 const LONGEST_NAME: u64 = 1 << 16;
 
-/// What the structure of a file says.
+/// The structure of a file.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Layout {
     /// Version of the format.

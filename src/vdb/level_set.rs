@@ -127,7 +127,7 @@ fn same_lattice(a: &FloatGrid, b: &FloatGrid) -> Result<()> {
             format!("the level sets have cells of {cell_a} m and of {cell_b} m: they must be the same");
         return Err(Error::argument(what));
     }
-    // A cell's corner and its neighbours along the axes tell everything of an affine map.
+    // A cell's corner and its neighbours along the axes determine an affine map.
     let places = [DVec3::zeros(), DVec3::x(), DVec3::y(), DVec3::z()];
     let apart = |place: DVec3| (a.index_to_world(place) - b.index_to_world(place)).amax();
     if places.into_iter().map(apart).fold(0.0, f64::max) > 1e-6 * cell_a {

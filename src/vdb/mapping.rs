@@ -22,7 +22,7 @@ impl Mapping {
     pub(super) unsafe fn new(file: &File) -> std::io::Result<Self> {
         let length = usize::try_from(file.metadata()?.len()).map_err(std::io::Error::other)?;
         let flags = MapFlags::PRIVATE | MapFlags::POPULATE;
-        // SAFETY: the system chooses a place that nobody uses.
+        // SAFETY: the system chooses an unused address.
         let address = unsafe { mmap(std::ptr::null_mut(), length, ProtFlags::READ, flags, file, 0) }?;
         Ok(Self { address, length })
     }

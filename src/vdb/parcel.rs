@@ -1,4 +1,4 @@
-//! What one process hands to another: what a file says of its grids, or grids, their leaves as plain blocks.
+//! Data passed from one process to another: descriptions of a file's grids, or grids, with their leaves as plain blocks.
 //!
 //! A parcel is `MAGIC`, the length of its head, the head, and for each grid three arrays: origins, masks, values of its
 //! leaves. The magic number is written last: without it a parcel is not whole. Whoever opens one checks every length,
@@ -29,7 +29,7 @@ const BATCH: usize = 512;
 
 /// What is handed over.
 pub(super) enum Contents {
-    /// What a file says of its grids.
+    /// Descriptions of a file's grids.
     Infos(Vec<GridInfo>),
     /// Grids.
     Grids(Vec<AnyGrid>),

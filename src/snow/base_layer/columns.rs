@@ -2,7 +2,7 @@
 //!
 //! A column of cells (8 x 8 of them make a column block) remembers how much snow stood in it before
 //! anything touched it: nothing is stored for untouched snow. What stands in it now is read off the snow itself,
-//! so that a layer that goes on from its grids has the same numbers as one that never stopped.
+//! so that a layer resumed from its grids has the same numbers as one that never stopped.
 
 use std::collections::{BTreeSet, HashMap, HashSet};
 

@@ -237,11 +237,7 @@ impl Near {
 /// An edit that changes nothing yet.
 fn untouched(origin: Origin, surface: &FloatGrid) -> Result<Edit> {
     let surface = match &surface.probe(&[origin])?[0] {
-        Probe::Leaf(leaf) => BlockEdit::Dense(crate::base::blocks::Block {
-            origin,
-            values: Box::new(*leaf.values),
-            mask: *leaf.mask,
-        }),
+        Probe::Leaf(leaf) => BlockEdit::Dense(leaf.to_block()),
         Probe::Tile { value, .. } => BlockEdit::Constant(origin, *value),
     };
     Ok(Edit { surface, removed: None, changed: [0; 8], heights: [0.0; CELLS] })

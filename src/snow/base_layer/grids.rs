@@ -1,7 +1,7 @@
 //! The grids of a layer, whole or as the blocks that a step changed.
 
 use super::empty_removed;
-use crate::base::blocks::{Block, BlockEdit, Origin, VOXELS};
+use crate::base::blocks::{Block, BlockEdit, VOXELS};
 use crate::context::Context;
 use crate::error::{Error, Result};
 use crate::vdb::{FloatGrid, Leaf, MetaValue, Ready};
@@ -115,7 +115,7 @@ impl Grids {
             (&mut delta.compression, &changes.compression),
             (&mut delta.touched, &changes.touched),
         ] {
-            // A constant block becomes a leaf without active voxels: a tile could not be told from nothing.
+            // A constant block becomes a leaf without active voxels: a tile looks the same as nothing stored.
             let (constant, dense): (Vec<&BlockEdit>, Vec<&BlockEdit>) =
                 edits.iter().partition(|edit| matches!(edit, BlockEdit::Constant(..)));
             let as_leaf = |edit: &&BlockEdit| match edit {
@@ -163,12 +163,11 @@ impl Changes {
 
 /// A leaf as a block; one without active voxels is constant.
 fn block_of(leaf: &Leaf<'_>) -> BlockEdit {
-    let origin: Origin = leaf.origin;
     let uniform = leaf.values.iter().all(|value| *value == leaf.values[0]);
     if *leaf.mask == [0; 8] && uniform {
-        return BlockEdit::Constant(origin, leaf.values[0]);
+        return BlockEdit::Constant(leaf.origin, leaf.values[0]);
     }
-    BlockEdit::Dense(Block { origin, values: Box::new(*leaf.values), mask: *leaf.mask })
+    BlockEdit::Dense(leaf.to_block())
 }
 
 fn plain(cell: f64, name: &str) -> Result<FloatGrid> {

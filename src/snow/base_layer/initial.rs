@@ -103,7 +103,7 @@ pub fn layer(
 /// A depth, or a plane, that is less than a cell; the message names it.
 pub fn fits(ground: &Ground, cover: &Cover, cell: f64) -> Result<()> {
     let least = |name: &str, size: f64| {
-        // What is no positive number is refused where it is used.
+        // Values that are not positive are refused where they are used.
         if size > 0.0 && size < cell {
             return Err(Error::argument(format!(
                 "{name} = {size} m is less than a cell of {cell} m, which cannot hold it: take cells of {} m or less",
@@ -154,7 +154,7 @@ fn nowhere_thick(layer: &FloatGrid) -> Result<Option<String>> {
     }))
 }
 
-/// A mesh whose places are 64-bit: a plane's corners lie where they were said to be, however far from the origin.
+/// A mesh with 64-bit positions: the corners of a plane are exact, however far from the origin.
 struct Sheet {
     positions: Vec<DVec3>,
     triangles: Vec<[u32; 3]>,

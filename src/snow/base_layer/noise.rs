@@ -132,7 +132,7 @@ impl Displacement {
         self.amplitude * sum.clamp(0.0, 1.0)
     }
 
-    /// Displaces pieces outward, then scales their values back to distances (first order): the work of a stage, which a
+    /// Displaces pieces outward, then scales their values back to distances (first order): the work of a phase, which a
     /// cancel leaves half done.
     pub fn apply(&self, ctx: &Context, pieces: &mut [Piece], half_width: f32) {
         if self.amplitude == 0.0 {
@@ -211,7 +211,7 @@ fn near_origin(ctx: &Context, grid: &FloatGrid) -> Result<(Option<FloatGrid>, [i
     let mut near = FloatGrid::level_set(cell, (f64::from(grid.background()) / cell) as f32)?;
     let leaf = |leaf: &Leaf<'_>| {
         let origin = [0, 1, 2].map(|axis| leaf.origin[axis] - moved[axis]);
-        BlockEdit::Dense(Block { origin, values: Box::new(*leaf.values), mask: *leaf.mask })
+        BlockEdit::Dense(Block { origin, ..leaf.to_block() })
     };
     near.replace_blocks(ctx, &grid.leaves()?.iter().map(leaf).collect::<Vec<_>>())?;
     near.flood_fill()?;

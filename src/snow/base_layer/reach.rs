@@ -42,7 +42,7 @@ impl Reach {
     /// reach.
     ///
     /// # Errors
-    /// A body, named, that touches the snow while a part of it is out of reach; a pose that cannot be had; cancel.
+    /// A body, named, that touches the snow while a part of it is out of reach; a pose that cannot be computed; cancel.
     pub fn spans(&self, ctx: &Context, body: &Body, from: f64, to: f64) -> Result<Vec<(f64, f64)>> {
         let mut ends = vec![from];
         ends.extend(body.motion().breaks(from, to));
@@ -83,7 +83,7 @@ impl Reach {
         let misses =
             (0..3).any(|axis| low[axis] - moved > self.high[axis] || high[axis] + moved < self.low[axis]);
         let farthest = low.abs().sup(&high.abs()).max();
-        // A vertex that is no number is left to those who name it.
+        // A vertex that is not finite is reported by later checks.
         if misses && farthest.is_finite() {
             return Ok(());
         }

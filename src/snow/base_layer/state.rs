@@ -110,7 +110,7 @@ impl BaseLayer {
     fn unpack(&self, ctx: &Context, state: &[u8]) -> Result<(Vec<BlockEdit>, Vec<BlockEdit>)> {
         let refused = |what: &str| Error::Bytes(format!("the saved state {what}"));
         if state.len() < HEADER || state[..8] != MAGIC {
-            return Err(refused("is none of a base layer"));
+            return Err(refused("is not of a base layer"));
         }
         let version = u32::from_le_bytes(array(&state[8..12]));
         if version != VERSION {
@@ -148,7 +148,7 @@ impl BaseLayer {
     }
 }
 
-/// What tells a layer from others: a hash of its leaves.
+/// Identifies a layer: a hash of its leaves.
 pub fn fingerprint(surface: &FloatGrid) -> Result<u128> {
     let leaf = |leaf: &Leaf<'_>| {
         let mut bytes = [0u8; 12 + 4 * VOXELS + 64];

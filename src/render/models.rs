@@ -14,12 +14,12 @@ const SAMPLES: usize = 3;
 /// Longest edge of a picture (pixels).
 const LONGEST: u32 = 16_384;
 
-/// Models in one picture.
-pub struct Stage {
+/// The models in one picture.
+pub struct Models {
     models: Vec<Model>,
 }
 
-impl Stage {
+impl Models {
     /// Puts models together.
     pub fn new(models: Vec<Model>) -> Self {
         Self { models }
