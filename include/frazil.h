@@ -64,7 +64,7 @@
 #define FRZ_BODY_EXACT 1
 
 /**
- * What a function answers. Numbers never change; new ones are added at the end.
+ * Status codes. Numbers never change; new ones are added at the end.
  */
 enum frz_status
 #if defined(__cplusplus) || __STDC_VERSION__ >= 202311L
@@ -80,7 +80,7 @@ enum frz_status
      */
     FRZ_ERROR_ARGUMENT = 1,
     /**
-     * What a file, or bytes in its place, holds cannot be used.
+     * The contents of a file, or of bytes in its place, cannot be used.
      */
     FRZ_ERROR_FILE = 2,
     /**
@@ -96,11 +96,11 @@ enum frz_status
      */
     FRZ_CANCELLED = 5,
     /**
-     * OpenVDB cannot do what is wanted, for a reason that no other status stands for.
+     * OpenVDB cannot do this, for a reason that no other status covers.
      */
     FRZ_ERROR_OPENVDB = 6,
     /**
-     * A promise inside the library does not hold: a bug of frazil. What the call worked on is poisoned.
+     * An invariant of the library does not hold: a bug of frazil. The objects of the call are poisoned.
      */
     FRZ_ERROR_INTERNAL = 7,
     /**
@@ -162,7 +162,7 @@ typedef uint32_t frz_compression;
 #endif // __cplusplus
 
 /**
- * What frz_levelset_csg makes.
+ * Operations of frz_levelset_csg.
  */
 enum frz_csg
 #if defined(__cplusplus) || __STDC_VERSION__ >= 202311L
@@ -191,7 +191,7 @@ typedef uint32_t frz_csg;
 #endif // __cplusplus
 
 /**
- * What a grid's values mean.
+ * The meaning of a grid's values.
  */
 enum frz_grid_class
 #if defined(__cplusplus) || __STDC_VERSION__ >= 202311L
@@ -224,7 +224,7 @@ typedef uint32_t frz_grid_class;
 #endif // __cplusplus
 
 /**
- * What frz_mesh_read reads.
+ * Arrays that frz_mesh_read reads.
  */
 enum frz_mesh_part
 #if defined(__cplusplus) || __STDC_VERSION__ >= 202311L
@@ -312,7 +312,7 @@ typedef uint32_t frz_scheme;
 #endif // __cplusplus
 
 /**
- * What frz_levelset_smooth does.
+ * Filters of frz_levelset_smooth.
  */
 enum frz_smoothing
 #if defined(__cplusplus) || __STDC_VERSION__ >= 202311L
@@ -337,7 +337,7 @@ typedef uint32_t frz_smoothing;
 #endif // __cplusplus
 
 /**
- * What a voxel of a grid holds.
+ * The type of a grid's values.
  */
 enum frz_value_type
 #if defined(__cplusplus) || __STDC_VERSION__ >= 202311L
@@ -481,7 +481,7 @@ typedef struct {
 } frz_attribute;
 
 /**
- * What a mesh is made of.
+ * Description of a new mesh.
  */
 typedef struct {
     /**
@@ -516,7 +516,7 @@ typedef struct {
 } frz_mesh_desc;
 
 /**
- * What a mesh is.
+ * Properties of a mesh.
  */
 typedef struct {
     /**
@@ -566,7 +566,7 @@ typedef struct {
 } frz_mesh_info;
 
 /**
- * What a grid is.
+ * Properties of a grid.
  */
 typedef struct {
     /**
@@ -666,7 +666,7 @@ typedef struct {
 } frz_vector_leaf;
 
 /**
- * What a grid is made of.
+ * Description of a new grid.
  */
 typedef struct {
     /**
@@ -692,7 +692,7 @@ typedef struct {
      */
     uint32_t flags;
     /**
-     * Leaves, at different places; NULL for none. Values are finite. A mask of NULL makes all voxels active, of a
+     * Leaves, with different origins; NULL for none. Values are finite. A mask of NULL makes all voxels active, of a
      * level set those nearer than the background.
      */
     const frz_leaf *leaves;
@@ -786,7 +786,7 @@ typedef struct {
 } frz_body;
 
 /**
- * A layer of snow: what it lies on, and how deep.
+ * Description of a layer of snow: the ground and the depth.
  */
 typedef struct {
     /**
@@ -810,7 +810,7 @@ typedef struct {
      */
     double depth;
     /**
-     * The snow's top, a surface; what lies between it and the ground is snow. NULL: the depth counts.
+     * The snow's top surface; the space between it and the ground is snow. NULL: the depth is used.
      */
     const frz_mesh *top;
     /**
@@ -906,7 +906,7 @@ extern "C" {
 #endif // __cplusplus
 
 /**
- * Tells the version of the library that is linked: major * 1000000 + minor * 1000 + patch.
+ * Reports the version of the library that is linked: major * 1000000 + minor * 1000 + patch.
  *
  * Any thread, any time.
  */
@@ -922,7 +922,7 @@ uint32_t frz_version(void);
 const char *frz_status_name(uint32_t status);
 
 /**
- * Tells what went wrong in the last call of this thread that did not answer FRZ_OK: one sentence in UTF-8 that names
+ * Returns the message of the last call of this thread that did not return FRZ_OK: one sentence in UTF-8 that names
  * what is at fault; empty before the first.
  *
  * Any thread, any time. The text is the library's, and stays until the next call of this thread that fails. Calls
@@ -964,7 +964,7 @@ void frz_pool_destroy(frz_pool *pool);
  * pool: whose threads do the work; it may be destroyed before the context.
  * out: receives the context, to be destroyed with frz_context_destroy; NULL after a failure.
  *
- * Any thread. A context serves one call at a time (FRZ_ERROR_BUSY), but for frz_context_cancel, _reset and _progress.
+ * Any thread. A context serves one call at a time (FRZ_ERROR_BUSY), except frz_context_cancel, _reset and _progress.
  */
 frz_status frz_context_create(uint32_t abi,
                               frz_pool *pool,
@@ -996,7 +996,8 @@ frz_status frz_context_set_poll(frz_context *context,
                                 void *user);
 
 /**
- * Sets what takes warnings: what a user should know though the call succeeds, for instance that a mesh is open.
+ * Sets the function that receives warnings: what a user should know though the call succeeds, for instance that a mesh
+ * is open.
  *
  * It is called on the thread that called the library. The library itself never prints. Within it nothing else may be
  * called with this context.
@@ -1013,7 +1014,7 @@ frz_status frz_context_set_log(frz_context *context,
 /**
  * Sets how much memory an object may take that is made or changed with this context.
  *
- * The need is estimated before memory is taken; a call that would need more answers FRZ_ERROR_MEMORY and changes
+ * The need is estimated before memory is taken; a call that would need more returns FRZ_ERROR_MEMORY and changes
  * nothing. It is a guard against a wrong voxel size, not an account of every byte.
  *
  * bytes: 0 for the limit of a new context, the machine's memory; UINT64_MAX for none.
@@ -1024,8 +1025,8 @@ frz_status frz_context_set_memory_limit(frz_context *context,
                                         uint64_t bytes);
 
 /**
- * Cancels the call that runs with the context, and every later one until frz_context_reset: they answer
- * FRZ_CANCELLED and change nothing. A call whose work is done when the cancel comes answers as if there were none.
+ * Cancels the call that runs with the context, and every later one until frz_context_reset: they return
+ * FRZ_CANCELLED and change nothing. A call whose work is done when the cancel comes returns as if there were none.
  *
  * context: may be NULL.
  *
@@ -1046,7 +1047,7 @@ void frz_context_reset(frz_context *context);
 /**
  * Reports what the context is doing.
  *
- * out: receives it; all zeroes after a failure, but for the fraction.
+ * out: receives it; all zeroes after a failure, except the fraction.
  *
  * Any thread, any time.
  */
@@ -1071,7 +1072,7 @@ frz_status frz_context_timings(const frz_context *context,
  * Faces may have any number of corners, convex or not, and meshes may be open, cross themselves and repeat vertices;
  * they are cut into triangles once.
  *
- * desc: what it is made of. Counts, strides, indices and positions are checked: the error names the first at fault,
+ * desc: its description. Counts, strides, indices and positions are checked: the error names the first at fault,
  *     counted from 0.
  * out: receives the mesh, to be destroyed with frz_mesh_destroy; NULL after a failure.
  *
@@ -1091,7 +1092,7 @@ frz_status frz_mesh_create(frz_context *context,
 void frz_mesh_destroy(frz_mesh *mesh);
 
 /**
- * Tells what a mesh is: the counts that frz_mesh_read needs room for, its box, area and volume.
+ * Reports the properties of a mesh: the counts that frz_mesh_read needs room for, its box, area and volume.
  *
  * info: receives it; its struct_size says how much of it the caller knows.
  *
@@ -1146,7 +1147,7 @@ void frz_grid_destroy(frz_grid *grid);
 frz_status frz_grid_copy(frz_context *context, const frz_grid *grid, frz_grid **out);
 
 /**
- * Tells what a grid is.
+ * Reports the properties of a grid.
  *
  * info: receives it; its struct_size says how much of it the caller knows.
  *
@@ -1178,7 +1179,7 @@ frz_status frz_grid_set_name(frz_grid *grid, const char *name);
 /**
  * Makes a grid from blocks of voxels, which are copied.
  *
- * desc: what it is made of.
+ * desc: its description.
  * out: receives the grid, to be destroyed with frz_grid_destroy; NULL after a failure.
  *
  * One thread at a time for each context.
@@ -1203,7 +1204,7 @@ frz_status frz_grid_leaves(const frz_grid *grid,
                            size_t *count);
 
 /**
- * Lends what a grid of floats holds at some places: leaves, or the value of all 512 voxels.
+ * Lends the leaves of a grid of floats at some origins, or the value of all 512 voxels there.
  *
  * origins: int32_t[3] for each place, multiples of 8, for instance those of frz_base_dirty.
  * dst: room for as many elements of frz_leaf, whose pointers stay as those of frz_grid_leaves do.
@@ -1215,7 +1216,7 @@ frz_status frz_grid_probe(const frz_grid *grid, frz_view origins, frz_span dst);
 /**
  * Lends the leaves of a grid of vectors without copying them, in an order that does not change while the grid does not.
  *
- * Blocks without a leaf have one value: the background, or what frz_grid_vector_probe finds.
+ * Blocks without a leaf have one value: the background, or that of frz_grid_vector_probe.
  *
  * dst: room for leaf_count elements of frz_vector_leaf; with data NULL only the count is reported. FRZ_ERROR_CAPACITY when
  *     it is too small. The pointers in it are the grid's: they stay until it is destroyed.
@@ -1228,7 +1229,7 @@ frz_status frz_grid_vector_leaves(const frz_grid *grid,
                                   size_t *count);
 
 /**
- * Lends what a grid of vectors holds at some places: leaves, or the value of all 512 voxels.
+ * Lends the leaves of a grid of vectors at some origins, or the value of all 512 voxels there.
  *
  * origins: int32_t[3] for each place, multiples of 8.
  * dst: room for as many elements of frz_vector_leaf, whose pointers stay as those of frz_grid_vector_leaves do.
@@ -1321,7 +1322,7 @@ frz_status frz_grid_to_mesh_box(frz_context *context,
                                 frz_mesh **out);
 
 /**
- * As frz_grid_to_mesh, of some blocks only, for instance those of frz_base_dirty: what it costs grows with their number.
+ * As frz_grid_to_mesh, of some blocks only, for instance those of frz_base_dirty: the cost grows with their number.
  * The meshes of different blocks meet; each triangle is in one.
  *
  * origins: int32_t[3] for each block, multiples of 8.
@@ -1352,7 +1353,7 @@ frz_status frz_grid_load(frz_context *context,
                          frz_grid **out);
 
 /**
- * Writes grids into one .vdb file. The file is there when it is whole: it is written under another name first. A cancel is
+ * Writes grids into one .vdb file. The file appears only when complete: it is written under another name first. A cancel is
  * heeded before it is begun, not within.
  *
  * grids: count pointers to grids of different names.
@@ -1553,7 +1554,7 @@ frz_status frz_snow_desc_init(frz_snow_desc *desc, size_t size);
 /**
  * Makes a layer of snow as a level set named "surface", for frz_base_create.
  *
- * desc: what it lies on and how deep it is. Y is up.
+ * desc: its ground and depth. Y is up.
  * out: receives the grid, to be destroyed with frz_grid_destroy; NULL after a failure.
  *
  * Any number of threads may read a mesh; one thread at a time for each context.
@@ -1575,7 +1576,7 @@ frz_status frz_base_params_init(frz_base_params *params, size_t size);
  *
  * params: NULL for the usual ones.
  * snow: a level set with voxels fixed in the world, for instance from frz_snow_layer or frz_grid_load; it is copied.
- * restart: restart_bytes bytes of frz_base_save of a layer made from the same snow: what it held comes back bit for
+ * restart: restart_bytes bytes of frz_base_save of a layer made from the same snow: its grids come back bit for
  *     bit, on any number of threads. NULL: untouched. Bytes that are damaged, of another version or of other snow are
  *     FRZ_ERROR_FILE.
  * restart_bytes: 0 without a restart.
@@ -1623,7 +1624,7 @@ frz_status frz_base_set_params(frz_base *base,
  * frame: the number that frz_base_touched gets where the snow changes, from -16777216 to 16777216.
  * report: receives what was done, all zeroes after a failure; may be NULL. Its struct_size is set by the caller.
  *
- * One thread at a time; nobody may read the layer's grids meanwhile (FRZ_ERROR_BUSY).
+ * One thread at a time; the layer's grids must not be in use meanwhile (FRZ_ERROR_BUSY).
  */
 frz_status frz_base_step(frz_context *context,
                          frz_base *base,
@@ -1654,7 +1655,7 @@ frz_status frz_base_save(frz_context *context,
 /**
  * Lends the snow: a level set (m), negative inside.
  *
- * The grid is the layer's: the pointer stays until the layer is destroyed, what it holds until the next step. NULL
+ * The grid is the layer's: the pointer is valid until the layer is destroyed, its contents until the next step. NULL
  * after a failure.
  *
  * One thread at a time.
@@ -1690,7 +1691,7 @@ const frz_grid *frz_base_compression(const frz_base *base);
 const frz_grid *frz_base_touched(const frz_base *base);
 
 /**
- * Tells the box that the snow lies in: no step makes it larger.
+ * Reports the box that the snow lies in: no step makes it larger.
  *
  * min: receives double[3], its least corner (m); zeroes after a failure.
  * max: receives double[3], its greatest corner (m); zeroes after a failure.
@@ -1700,7 +1701,7 @@ const frz_grid *frz_base_touched(const frz_base *base);
 frz_status frz_base_bounds(const frz_base *base, double *min, double *max);
 
 /**
- * Lends the places of the blocks that the last step changed in any of the layer's grids, ascending: with
+ * Lends the origins of the blocks that the last step changed in any of the layer's grids, ascending: with
  * frz_grid_probe a host brings its own copy up to date.
  *
  * origins: receives a pointer to count times int32_t[3], voxels of least corners; it is the layer's and stays until

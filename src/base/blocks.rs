@@ -52,7 +52,7 @@ impl Block {
     }
 }
 
-/// What a block position of a grid becomes: dense values, or one value for all 512 voxels.
+/// The new contents of a block position of a grid: dense values, or one value for all 512 voxels.
 #[derive(Clone, PartialEq)]
 pub enum BlockEdit {
     /// Dense values.

@@ -97,7 +97,7 @@ impl TriMesh {
         used.len() as i64 - edges as i64 + self.triangles.len() as i64
     }
 
-    /// The mesh with its triangles turned round.
+    /// The mesh with its triangles flipped.
     pub fn reversed(mut self) -> Self {
         self.triangles.iter_mut().for_each(|[_, b, c]| std::mem::swap(b, c));
         self
@@ -126,7 +126,7 @@ pub fn used(count: usize, triangles: &[[u32; 3]]) -> Option<Vec<u32>> {
     named.contains(&false).then(used)
 }
 
-/// Triangles over some of their vertices, `used`, which ascend and hold all that they name.
+/// Triangles re-indexed to the vertices `used`, which ascend and include all that they name.
 pub fn renumbered(triangles: &[[u32; 3]], used: &[u32]) -> Vec<[u32; 3]> {
     let mut places = vec![0; used.last().map_or(0, |&last| last as usize + 1)];
     used.iter().zip(0..).for_each(|(&vertex, place)| places[vertex as usize] = place);
@@ -154,12 +154,12 @@ pub fn too_far(name: &str, farthest: f64, scale: f64, cell: f64) -> Option<Strin
     })
 }
 
-/// Farthest coordinate of places from the origin along an axis.
+/// Largest absolute coordinate of positions.
 pub fn farthest<'a>(places: impl Iterator<Item = &'a DVec3>) -> f64 {
     places.map(|p| p.amax()).fold(0.0, f64::max)
 }
 
-/// For each place the number of the first one that is the same.
+/// For each position the index of the first equal one.
 pub fn coincident(places: impl Iterator<Item = DVec3>) -> Vec<u32> {
     // Adding zero makes -0 and 0 the same.
     let keys: Vec<[u64; 3]> = places.map(|p| [p.x + 0.0, p.y + 0.0, p.z + 0.0].map(f64::to_bits)).collect();

@@ -37,7 +37,7 @@ pub(super) fn triangles(points: &[Point]) -> Vec<[usize; 3]> {
     out
 }
 
-/// The points on the whole numbers of a square.
+/// The points on the integer grid of a square.
 fn rounded(points: &[Point]) -> Vec<[i64; 2]> {
     let end =
         |axis: usize, pick: fn(f64, f64) -> f64| points.iter().map(|p| p[axis]).fold(points[0][axis], pick);
@@ -257,7 +257,7 @@ fn pieces(count: usize, diagonals: Vec<[usize; 2]>) -> Vec<Vec<usize>> {
     out
 }
 
-/// Cuts a piece that is monotone; whether it was, and no triangle is turned round.
+/// Cuts a monotone piece; returns whether it was monotone and no triangle is flipped.
 fn cut_monotone(places: &[[i64; 2]], rank: &[usize], piece: &[usize], out: &mut Vec<[usize; 3]>) -> bool {
     let count = piece.len();
     let first = (0..count).min_by_key(|&at| rank[piece[at]]).unwrap_or(0);

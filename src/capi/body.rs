@@ -89,7 +89,7 @@ impl Motion for HostMotion {
     }
 }
 
-/// A body on its way to the library.
+/// A body from a host, checked.
 struct Arrived {
     id: u64,
     exact: bool,
@@ -97,10 +97,10 @@ struct Arrived {
     poses: Vec<Vec<Vec3>>,
 }
 
-/// How the faces of a host's bodies hang together, by their numbers, from step to step.
+/// Shapes of a host's bodies by their ids, kept from step to step.
 pub(super) type Shapes = HashMap<u64, Arc<Shape>>;
 
-/// Bodies out of a host's arrays, checked; `shapes` is what is known of them, and is brought up to date.
+/// Bodies from a host's arrays, checked; `shapes` are those of earlier calls, and are updated.
 ///
 /// # Safety
 /// The bodies must describe memory that can be read.
@@ -139,7 +139,7 @@ pub(super) unsafe fn bodies(
     Ok(made.into_iter().map(|(_, body)| body).collect())
 }
 
-/// Says what a user should know of a body, once for each set of faces.
+/// Warnings about a body, once for each set of faces.
 fn warn(ctx: &Context, id: u64, body: &Body, known: Option<&Arc<Shape>>) {
     if known.is_some_and(|known| Arc::ptr_eq(known, body.shape())) {
         return;
@@ -162,7 +162,7 @@ unsafe fn arrived(list: *const frz_body, count: usize, dt: f64) -> Outcome<Vec<A
     let first = super::handle::required(list.cast_mut(), "bodies")?.cast_const();
     // SAFETY: the caller's promise: the size of a body is there.
     let stride = unsafe { first.cast::<u32>().read_unaligned() } as usize;
-    // Before it is believed: it says where the next body is.
+    // Checked before it is used: it is the stride of the bodies.
     check_size::<frz_body>(stride).map_err(|failure| named(0, failure))?;
     let room = frz_view { data: first.cast(), count, stride };
     // SAFETY: as above; the sizes must be the same for the bodies to lie one after another.

@@ -77,13 +77,13 @@ impl Began {
 // SAFETY: characters and a number, without padding.
 unsafe impl Plain for frz_stage_time {}
 
-/// What a context's handle holds.
+/// The value of a context's handle.
 pub(super) struct State {
     /// The library's own context.
     pub ctx: Context,
     /// Dropped last: its threads.
     _threads: Threads,
-    /// Room that the caller's header has for frz_progress (bytes).
+    /// Size of frz_progress in the caller's header (bytes).
     progress_room: usize,
     entered: AtomicBool,
     poisoned: AtomicBool,
@@ -206,7 +206,7 @@ fn progress_of(progress: &Progress, began: &Began) -> frz_progress {
 /// pool: whose threads do the work; it may be destroyed before the context.
 /// out: receives the context, to be destroyed with frz_context_destroy; NULL after a failure.
 ///
-/// Any thread. A context serves one call at a time (FRZ_ERROR_BUSY), but for frz_context_cancel, _reset and _progress.
+/// Any thread. A context serves one call at a time (FRZ_ERROR_BUSY), except frz_context_cancel, _reset and _progress.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn frz_context_create(
     abi: u32,
@@ -288,7 +288,8 @@ pub unsafe extern "C" fn frz_context_set_poll(
     })
 }
 
-/// Sets what takes warnings: what a user should know though the call succeeds, for instance that a mesh is open.
+/// Sets the function that receives warnings: what a user should know though the call succeeds, for instance that a mesh
+/// is open.
 ///
 /// It is called on the thread that called the library. The library itself never prints. Within it nothing else may be
 /// called with this context.
@@ -321,7 +322,7 @@ pub unsafe extern "C" fn frz_context_set_log(
 
 /// Sets how much memory an object may take that is made or changed with this context.
 ///
-/// The need is estimated before memory is taken; a call that would need more answers FRZ_ERROR_MEMORY and changes
+/// The need is estimated before memory is taken; a call that would need more returns FRZ_ERROR_MEMORY and changes
 /// nothing. It is a guard against a wrong voxel size, not an account of every byte.
 ///
 /// bytes: 0 for the limit of a new context, the machine's memory; UINT64_MAX for none.
@@ -337,8 +338,8 @@ pub unsafe extern "C" fn frz_context_set_memory_limit(context: *mut frz_context,
     })
 }
 
-/// Cancels the call that runs with the context, and every later one until frz_context_reset: they answer
-/// FRZ_CANCELLED and change nothing. A call whose work is done when the cancel comes answers as if there were none.
+/// Cancels the call that runs with the context, and every later one until frz_context_reset: they return
+/// FRZ_CANCELLED and change nothing. A call whose work is done when the cancel comes returns as if there were none.
 ///
 /// context: may be NULL.
 ///
@@ -368,7 +369,7 @@ pub unsafe extern "C" fn frz_context_reset(context: *mut frz_context) {
 
 /// Reports what the context is doing.
 ///
-/// out: receives it; all zeroes after a failure, but for the fraction.
+/// out: receives it; all zeroes after a failure, except the fraction.
 ///
 /// Any thread, any time.
 #[unsafe(no_mangle)]

@@ -112,7 +112,7 @@ pub unsafe extern "C" fn frz_grid_load(
     unsafe { loads(context, [path, name], out, load) }
 }
 
-/// Writes grids into one .vdb file. The file is there when it is whole: it is written under another name first. A cancel is
+/// Writes grids into one .vdb file. The file appears only when complete: it is written under another name first. A cancel is
 /// heeded before it is begun, not within.
 ///
 /// grids: count pointers to grids of different names.

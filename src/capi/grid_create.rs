@@ -13,7 +13,7 @@ use crate::base::blocks::{Block, BlockEdit, DIM, Mask, Origin, VOXELS, Values};
 use crate::context::Context;
 use crate::vdb::{AnyGrid, FloatGrid, GridClass, VectorEdit, VectorGrid, Vectors};
 
-/// What a grid is made of.
+/// Description of a new grid.
 #[repr(C)]
 #[derive(Clone, Copy)]
 pub struct frz_grid_desc {
@@ -29,7 +29,7 @@ pub struct frz_grid_desc {
     pub background: f32,
     /// 0.
     pub flags: u32,
-    /// Leaves, at different places; NULL for none. Values are finite. A mask of NULL makes all voxels active, of a
+    /// Leaves, with different origins; NULL for none. Values are finite. A mask of NULL makes all voxels active, of a
     /// level set those nearer than the background.
     pub leaves: *const frz_leaf,
     /// Number of leaves, or of vector_leaves.
@@ -45,7 +45,7 @@ pub struct frz_grid_desc {
 }
 
 impl frz_grid_desc {
-    /// What fields have that a header does not know.
+    /// Values of fields that an older header does not have.
     const NONE: Self = Self {
         struct_size: 0,
         grid_class: 0,
@@ -226,7 +226,7 @@ unsafe fn edits(desc: &frz_grid_desc) -> Outcome<Vec<VectorEdit>> {
 
 /// Makes a grid from blocks of voxels, which are copied.
 ///
-/// desc: what it is made of.
+/// desc: its description.
 /// out: receives the grid, to be destroyed with frz_grid_destroy; NULL after a failure.
 ///
 /// One thread at a time for each context.

@@ -88,7 +88,7 @@ pub unsafe extern "C" fn frz_grid_leaves(
     })
 }
 
-/// Lends what a grid of floats holds at some places: leaves, or the value of all 512 voxels.
+/// Lends the leaves of a grid of floats at some origins, or the value of all 512 voxels there.
 ///
 /// origins: int32_t[3] for each place, multiples of 8, for instance those of frz_base_dirty.
 /// dst: room for as many elements of frz_leaf, whose pointers stay as those of frz_grid_leaves do.
@@ -125,7 +125,7 @@ fn vector_leaf_view(leaf: &VectorLeaf<'_>) -> frz_vector_leaf {
 
 /// Lends the leaves of a grid of vectors without copying them, in an order that does not change while the grid does not.
 ///
-/// Blocks without a leaf have one value: the background, or what frz_grid_vector_probe finds.
+/// Blocks without a leaf have one value: the background, or that of frz_grid_vector_probe.
 ///
 /// dst: room for leaf_count elements of frz_vector_leaf; with data NULL only the count is reported. FRZ_ERROR_CAPACITY when
 ///     it is too small. The pointers in it are the grid's: they stay until it is destroyed.
@@ -150,7 +150,7 @@ pub unsafe extern "C" fn frz_grid_vector_leaves(
     })
 }
 
-/// Lends what a grid of vectors holds at some places: leaves, or the value of all 512 voxels.
+/// Lends the leaves of a grid of vectors at some origins, or the value of all 512 voxels there.
 ///
 /// origins: int32_t[3] for each place, multiples of 8.
 /// dst: room for as many elements of frz_vector_leaf, whose pointers stay as those of frz_grid_vector_leaves do.

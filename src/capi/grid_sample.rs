@@ -274,7 +274,7 @@ pub unsafe extern "C" fn frz_grid_to_mesh_box(
     }
 }
 
-/// As frz_grid_to_mesh, of some blocks only, for instance those of frz_base_dirty: what it costs grows with their number.
+/// As frz_grid_to_mesh, of some blocks only, for instance those of frz_base_dirty: the cost grows with their number.
 /// The meshes of different blocks meet; each triangle is in one.
 ///
 /// origins: int32_t[3] for each block, multiples of 8.

@@ -1,4 +1,4 @@
-//! The border: nothing that goes wrong inside leaves as anything but a status and a text.
+//! The border: every failure inside becomes a status and a message.
 
 use std::any::Any;
 use std::cell::{Cell, RefCell};
@@ -8,7 +8,7 @@ use std::sync::Once;
 
 use crate::error::Error;
 
-/// What a function answers. Numbers never change; new ones are added at the end.
+/// Status codes. Numbers never change; new ones are added at the end.
 #[repr(u32)]
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum frz_status {
@@ -16,7 +16,7 @@ pub enum frz_status {
     FRZ_OK = 0,
     /// An argument is NULL, out of range or not finite.
     FRZ_ERROR_ARGUMENT = 1,
-    /// What a file, or bytes in its place, holds cannot be used.
+    /// The contents of a file, or of bytes in its place, cannot be used.
     FRZ_ERROR_FILE = 2,
     /// The operating system refused to read or write.
     FRZ_ERROR_IO = 3,
@@ -24,9 +24,9 @@ pub enum frz_status {
     FRZ_ERROR_MEMORY = 4,
     /// The context was cancelled; everything is as it was before the call.
     FRZ_CANCELLED = 5,
-    /// OpenVDB cannot do what is wanted, for a reason that no other status stands for.
+    /// OpenVDB cannot do this, for a reason that no other status covers.
     FRZ_ERROR_OPENVDB = 6,
-    /// A promise inside the library does not hold: a bug of frazil. What the call worked on is poisoned.
+    /// An invariant of the library does not hold: a bug of frazil. The objects of the call are poisoned.
     FRZ_ERROR_INTERNAL = 7,
     /// The handle saw FRZ_ERROR_INTERNAL before: it can only be destroyed.
     FRZ_ERROR_POISONED = 8,
@@ -42,7 +42,7 @@ pub enum frz_status {
 
 use frz_status::*;
 
-/// What went wrong, on its way out.
+/// A failure: its status and message.
 pub(super) struct Failure {
     /// The number.
     pub status: frz_status,
@@ -105,7 +105,7 @@ pub(super) fn guard(body: impl FnOnce() -> Outcome) -> frz_status {
     failure.status
 }
 
-/// As [`guard`], for functions that answer something else than a status: `otherwise` when they fail.
+/// As [`guard`], for functions that return something else than a status: `otherwise` when they fail.
 pub(super) fn guard_value<T>(otherwise: T, body: impl FnOnce() -> Outcome<T>) -> T {
     let mut value = otherwise;
     guard(|| {

@@ -15,7 +15,7 @@ use crate::sweep::{self, Body, Settings, surface_bytes};
 use crate::vdb::level_set::{self, Scheme};
 use crate::vdb::{FloatGrid, GridClass};
 
-/// What frz_levelset_csg makes.
+/// Operations of frz_levelset_csg.
 #[repr(u32)]
 #[derive(Clone, Copy)]
 pub enum frz_csg {
@@ -27,7 +27,7 @@ pub enum frz_csg {
     FRZ_CSG_INTERSECTION = 2,
 }
 
-/// What frz_levelset_smooth does.
+/// Filters of frz_levelset_smooth.
 #[repr(u32)]
 #[derive(Clone, Copy)]
 pub enum frz_smoothing {
@@ -396,7 +396,7 @@ pub unsafe extern "C" fn frz_levelset_sweep(
     }
 }
 
-/// Farthest a sweep reaches from its first vertex (voxels): what a lattice does, less the block that its base lies in.
+/// Farthest a sweep reaches from its first vertex (voxels): the reach of the lattice, minus one block for its origin.
 const REACH: f64 = 131_064.0;
 
 /// Refuses bodies that go farther than a sweep's lattice reaches, by their number.

@@ -26,7 +26,7 @@ pub struct frz_attribute {
     pub values: frz_view,
 }
 
-/// What a mesh is made of.
+/// Description of a new mesh.
 #[repr(C)]
 #[derive(Clone, Copy)]
 pub struct frz_mesh_desc {
@@ -56,7 +56,7 @@ unsafe impl Sized32 for frz_mesh_desc {
     const NAME: &'static str = "frz_mesh_desc";
 }
 
-/// What a mesh is.
+/// Properties of a mesh.
 #[repr(C)]
 #[derive(Clone, Copy)]
 pub struct frz_mesh_info {
@@ -90,7 +90,7 @@ unsafe impl Sized32 for frz_mesh_info {
     const NAME: &'static str = "frz_mesh_info";
 }
 
-/// What frz_mesh_read reads.
+/// Arrays that frz_mesh_read reads.
 #[repr(u32)]
 #[derive(Clone, Copy)]
 pub enum frz_mesh_part {
@@ -107,7 +107,7 @@ pub enum frz_mesh_part {
     FRZ_MESH_NORMALS = 4,
 }
 
-/// What a mesh's handle holds.
+/// The value of a mesh's handle.
 pub(super) struct Mesh {
     polygons: PolygonMesh,
     /// Its faces as triangles, cut once.
@@ -142,7 +142,7 @@ impl Mesh {
     }
 }
 
-/// Polygons out of a host's arrays, checked.
+/// Polygons from a host's arrays, checked.
 ///
 /// # Safety
 /// The views must describe memory that can be read.
@@ -223,7 +223,7 @@ fn push_faces(mesh: &mut PolygonMesh, corners: &[u32], counts: Vec<u32>) -> Outc
 /// Faces may have any number of corners, convex or not, and meshes may be open, cross themselves and repeat vertices;
 /// they are cut into triangles once.
 ///
-/// desc: what it is made of. Counts, strides, indices and positions are checked: the error names the first at fault,
+/// desc: its description. Counts, strides, indices and positions are checked: the error names the first at fault,
 ///     counted from 0.
 /// out: receives the mesh, to be destroyed with frz_mesh_destroy; NULL after a failure.
 ///
@@ -319,7 +319,7 @@ pub unsafe extern "C" fn frz_mesh_destroy(mesh: *mut frz_mesh) {
     guard(|| unsafe { destroy(mesh) });
 }
 
-/// Tells what a mesh is: the counts that frz_mesh_read needs room for, its box, area and volume.
+/// Reports the properties of a mesh: the counts that frz_mesh_read needs room for, its box, area and volume.
 ///
 /// info: receives it; its struct_size says how much of it the caller knows.
 ///

@@ -1,4 +1,4 @@
-//! What leaves the program: lines on stdout, files.
+//! Output of the program: lines on stdout, files.
 
 use frazil::{Error, Result};
 use std::io::Write;

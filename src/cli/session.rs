@@ -93,7 +93,7 @@ impl Session {
 
     /// Adds a result to the report of this run.
     pub fn record(&self, key: &str, value: Value) {
-        self.results.lock().expect("nobody panics with this lock").insert(key.to_string(), value);
+        self.results.lock().expect("no panic holds this lock").insert(key.to_string(), value);
     }
 
     /// Writes the report, prints what went wrong, and returns the exit code.
@@ -114,7 +114,7 @@ impl Session {
 
     fn write_report(&self, path: &std::path::Path) -> frazil::Result<()> {
         let phases: Vec<Value> = self.phases.times().iter().map(phase_json).collect();
-        let mut report = self.results.lock().expect("nobody panics with this lock").clone();
+        let mut report = self.results.lock().expect("no panic holds this lock").clone();
         // A file's name need not be UTF-8.
         let readable = |argument: std::ffi::OsString| argument.to_string_lossy().into_owned();
         let arguments: Vec<String> = std::env::args_os().skip(1).map(readable).collect();

@@ -14,7 +14,7 @@ pub struct Progress {
     /// Fraction of the running phase that is done, 0 to 1; none where it is not known.
     pub part: Option<f32>,
     /// Fraction of the running step that is done, 0 to 1, all its phases counting the same; none outside of
-    /// [`Context::step`]. It never decreases within a step.
+    /// [`super::Context::step`]. It never decreases within a step.
     pub fraction: Option<f32>,
 }
 

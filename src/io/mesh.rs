@@ -7,7 +7,7 @@ use super::{atomic, obj, ply, source, stl};
 use crate::base::{PolygonMesh, TriMesh, Uvs, Vec3};
 use crate::error::{Error, Result};
 
-/// What is read and written, by extension.
+/// Formats that are read and written, by extension.
 pub const EXTENSIONS: [&str; 3] = ["obj", "ply", "stl"];
 
 /// Reads a mesh in triangles: all its vertices, in the file's order.

@@ -295,7 +295,7 @@ fn index(value: f64) -> u32 {
     if (0.0..f64::from(u32::MAX)).contains(&value) && value.fract() == 0.0 { value as u32 } else { u32::MAX }
 }
 
-/// Strips end at -1; every other triangle is turned round.
+/// Strips end at -1; every other triangle is flipped.
 fn add_strips(values: &[f64], parsed: &mut Parsed) {
     for strip in values.split(|&value| value < 0.0) {
         for (number, three) in strip.windows(3).enumerate() {

@@ -70,12 +70,12 @@ impl MeshSequence {
         let known = |kept: &[(i32, Arc<Vec<Vec3>>)]| {
             kept.iter().find(|(number, _)| *number == frame).map(|(_, positions)| positions.clone())
         };
-        if let Some(positions) = known(&self.kept.lock().expect("nobody panics with this lock")) {
+        if let Some(positions) = known(&self.kept.lock().expect("no panic holds this lock")) {
             return Ok(positions);
         }
         // Not with the lock held: several frames may be read at once.
         let positions = Arc::new(self.read(frame)?);
-        let mut kept = self.kept.lock().expect("nobody panics with this lock");
+        let mut kept = self.kept.lock().expect("no panic holds this lock");
         if known(&kept).is_none() {
             kept.push((frame, positions.clone()));
             if kept.len() > KEPT {

@@ -1,4 +1,4 @@
-//! .vdb files: written whole or not at all, the same bytes for the same grids.
+//! .vdb files: written atomically, the same bytes for the same grids.
 
 use std::path::Path;
 
@@ -57,10 +57,10 @@ pub struct GridInfo {
     pub metadata: Vec<(String, MetaValue)>,
 }
 
-/// Where a file has its random identifier: 36 characters.
+/// Position of the random identifier in a file: 36 characters.
 const UUID: std::ops::Range<usize> = 21..57;
 
-/// Writes grids to a file; the file is there when it is whole.
+/// Writes grids to a file, atomically.
 ///
 /// # Errors
 /// As [`to_bytes`], or what the operating system reports.
@@ -121,8 +121,8 @@ fn name_by_content(bytes: &mut [u8]) {
     bytes[UUID].copy_from_slice(name.as_bytes());
 }
 
-/// What a file says of its grids, of any type, in the order of their names; values are not read, but of a stream, which
-/// does not say where its grids lie.
+/// Descriptions of a file's grids, of any type, in the order of their names; values are not read, except in a stream, which
+/// has no offsets of its grids.
 ///
 /// In a program that called [`guard::install`], files that are not its own are decoded by another process.
 ///

@@ -60,7 +60,7 @@ pub struct LeafMut<'a> {
     pub mask: &'a mut Mask,
 }
 
-/// What a grid holds at a block position.
+/// The leaf or tile of a grid at a block position.
 #[derive(Clone, Copy)]
 pub enum Probe<'a, V = Values, T = f32> {
     /// A leaf.

@@ -9,17 +9,17 @@ use crate::vdb::{FloatGrid, Leaf, MetaValue, Ready};
 /// Metadata of `surface`: the snow's volume (m3), exactly as the layer counts it.
 const VOLUME: &str = "volume_m3";
 
-/// What a layer is made of: all that its next step depends on, besides the layer before the first step.
+/// The grids of a layer: everything that its next step depends on, besides the layer before the first step.
 pub struct Grids {
     /// The snow (level set, m).
     pub surface: FloatGrid,
-    /// Part of its column's height that was removed, at touched surface voxels, 0..=1.
+    /// Fraction of the column's height that was removed, at touched surface voxels, 0..=1.
     pub compression: FloatGrid,
     /// Frame of the last change, at touched surface voxels.
     pub touched: FloatGrid,
 }
 
-/// What a step changed, block by block: enough to follow a layer from its grids before the step.
+/// The changes of a step, block by block: applied to the grids before the step they give those after it.
 pub struct Changes {
     pub(super) surface: Vec<BlockEdit>,
     pub(super) compression: Vec<BlockEdit>,
@@ -80,7 +80,7 @@ impl Grids {
     /// The snow's volume (m3).
     ///
     /// # Errors
-    /// When the metadata of `surface` does not hold it.
+    /// When it is missing from the metadata of `surface`.
     pub fn volume(&self) -> Result<f64> {
         let metadata = self.surface.metadata()?;
         match metadata.iter().find(|(key, _)| key == VOLUME) {
@@ -94,7 +94,7 @@ impl Grids {
     /// # Errors
     /// When memory runs out.
     pub fn apply(&mut self, ctx: &Context, changes: &Changes) -> Result<()> {
-        // Nothing is put in place before all of it is there.
+        // All memory is allocated before anything is put in place.
         let surface = Ready::new(ctx, &changes.surface)?;
         let compression = Ready::new(ctx, &changes.compression)?;
         let touched = Ready::new(ctx, &changes.touched)?;
