@@ -64,7 +64,7 @@
 #define FRZ_BODY_EXACT 1
 
 /**
- * What a function answers. Numbers never change; new ones are added at the end.
+ * Status codes. Numbers never change; new ones are added at the end.
  */
 enum frz_status
 #if defined(__cplusplus) || __STDC_VERSION__ >= 202311L
@@ -76,11 +76,11 @@ enum frz_status
      */
     FRZ_OK = 0,
     /**
-     * An argument is NULL, out of range or not finite: the caller mends it.
+     * An argument is NULL, out of range or not finite.
      */
     FRZ_ERROR_ARGUMENT = 1,
     /**
-     * What a file, or bytes in its place, holds cannot be used.
+     * The contents of a file, or of bytes in its place, cannot be used.
      */
     FRZ_ERROR_FILE = 2,
     /**
@@ -96,11 +96,11 @@ enum frz_status
      */
     FRZ_CANCELLED = 5,
     /**
-     * OpenVDB cannot do what is wanted, for a reason that no other status stands for.
+     * OpenVDB cannot do this, for a reason that no other status covers.
      */
     FRZ_ERROR_OPENVDB = 6,
     /**
-     * A promise inside the library does not hold: a bug of frazil. What the call worked on is poisoned.
+     * An invariant of the library does not hold: a bug of frazil. The objects of the call are poisoned.
      */
     FRZ_ERROR_INTERNAL = 7,
     /**
@@ -120,7 +120,7 @@ enum frz_status
      */
     FRZ_ERROR_VERSION = 11,
     /**
-     * The pointer is no handle of the kind that is wanted.
+     * The pointer is not a handle of the required kind.
      */
     FRZ_ERROR_HANDLE = 12,
 };
@@ -162,7 +162,7 @@ typedef uint32_t frz_compression;
 #endif // __cplusplus
 
 /**
- * What frz_levelset_csg makes.
+ * Operations of frz_levelset_csg.
  */
 enum frz_csg
 #if defined(__cplusplus) || __STDC_VERSION__ >= 202311L
@@ -191,7 +191,7 @@ typedef uint32_t frz_csg;
 #endif // __cplusplus
 
 /**
- * What a grid's values mean.
+ * The meaning of a grid's values.
  */
 enum frz_grid_class
 #if defined(__cplusplus) || __STDC_VERSION__ >= 202311L
@@ -199,7 +199,7 @@ enum frz_grid_class
 #endif // defined(__cplusplus) || __STDC_VERSION__ >= 202311L
  {
     /**
-     * Nothing said.
+     * Not specified.
      */
     FRZ_GRID_UNKNOWN = 0,
     /**
@@ -224,7 +224,7 @@ typedef uint32_t frz_grid_class;
 #endif // __cplusplus
 
 /**
- * What frz_mesh_read reads.
+ * Arrays that frz_mesh_read reads.
  */
 enum frz_mesh_part
 #if defined(__cplusplus) || __STDC_VERSION__ >= 202311L
@@ -312,7 +312,7 @@ typedef uint32_t frz_scheme;
 #endif // __cplusplus
 
 /**
- * What frz_levelset_smooth does.
+ * Filters of frz_levelset_smooth.
  */
 enum frz_smoothing
 #if defined(__cplusplus) || __STDC_VERSION__ >= 202311L
@@ -337,7 +337,7 @@ typedef uint32_t frz_smoothing;
 #endif // __cplusplus
 
 /**
- * What a voxel of a grid holds.
+ * The type of a grid's values.
  */
 enum frz_value_type
 #if defined(__cplusplus) || __STDC_VERSION__ >= 202311L
@@ -367,7 +367,7 @@ typedef uint32_t frz_value_type;
 typedef struct frz_base frz_base;
 
 /**
- * One computation: cancel flag, progress, polls, warnings, stage times. Cheap: make one for every cook.
+ * One computation: cancel flag, progress, polls, warnings, phase times. Cheap: make one for every cook.
  */
 typedef struct frz_context frz_context;
 
@@ -392,11 +392,11 @@ typedef struct frz_pool frz_pool;
  */
 typedef struct {
     /**
-     * The stage's verb, for instance "distance"; empty between stages. It ends with a zero.
+     * The verb of the phase that runs, for instance "distance"; empty between phases. It ends with a zero.
      */
     char stage[32];
     /**
-     * Stages finished since the context was made or reset.
+     * Phases finished since the context was made or reset.
      */
     uint64_t stages_done;
     /**
@@ -404,25 +404,25 @@ typedef struct {
      */
     double seconds;
     /**
-     * Part of the running stage that is done, 0 to 1; -1 where it is not known. Since interface 1.1: a header of 1.0 has
-     * no such field, and what it was compiled into gets none.
+     * Fraction of the running phase that is done, 0 to 1; -1 where it is not known. Since interface 1.1: programs that
+     * were compiled with a header of 1.0 have no such field, and it is not written.
      */
     double fraction;
 } frz_progress;
 
 /**
- * Looks on while the library works; an answer other than 0 cancels. It must return, not throw or jump.
+ * Called while the library works; returning other than 0 cancels. It must return, not throw or jump.
  *
  * user: what was given with it.
- * progress: what is being done; it is the library's, and gone after the answer.
+ * progress: what is being done; it is the library's, and valid until the function returns.
  */
 typedef int (*frz_poll_function)(void *user, const frz_progress *progress);
 
 /**
- * Takes a warning. It must return, not throw or jump.
+ * Receives a warning. It must return, not throw or jump.
  *
  * user: what was given with it.
- * text: one sentence in UTF-8; it is the library's, and gone afterwards.
+ * text: one sentence in UTF-8; it is the library's, and valid until the function returns.
  */
 typedef void (*frz_log_function)(void *user, const char *text);
 
@@ -481,7 +481,7 @@ typedef struct {
 } frz_attribute;
 
 /**
- * What a mesh is made of.
+ * Description of a new mesh.
  */
 typedef struct {
     /**
@@ -516,7 +516,7 @@ typedef struct {
 } frz_mesh_desc;
 
 /**
- * What a mesh is.
+ * Properties of a mesh.
  */
 typedef struct {
     /**
@@ -566,7 +566,7 @@ typedef struct {
 } frz_mesh_info;
 
 /**
- * What a grid is.
+ * Properties of a grid.
  */
 typedef struct {
     /**
@@ -666,7 +666,7 @@ typedef struct {
 } frz_vector_leaf;
 
 /**
- * What a grid is made of.
+ * Description of a new grid.
  */
 typedef struct {
     /**
@@ -692,7 +692,7 @@ typedef struct {
      */
     uint32_t flags;
     /**
-     * Leaves, at different places; NULL for none. Values are finite. A mask of NULL makes all voxels active, of a
+     * Leaves, with different origins; NULL for none. Values are finite. A mask of NULL makes all voxels active, of a
      * level set those nearer than the background.
      */
     const frz_leaf *leaves;
@@ -786,7 +786,7 @@ typedef struct {
 } frz_body;
 
 /**
- * A layer of snow: what it lies on, and how deep.
+ * Description of a layer of snow: the ground and the depth.
  */
 typedef struct {
     /**
@@ -810,7 +810,7 @@ typedef struct {
      */
     double depth;
     /**
-     * The snow's top, a surface; what lies between it and the ground is snow. NULL: the depth counts.
+     * The snow's top surface; the space between it and the ground is snow. NULL: the depth is used.
      */
     const frz_mesh *top;
     /**
@@ -888,15 +888,15 @@ typedef struct {
 } frz_base_report;
 
 /**
- * How long a stage took.
+ * How long a phase took.
  */
 typedef struct {
     /**
-     * The stage's verb. It ends with a zero.
+     * The phase's verb. It ends with a zero.
      */
     char stage[32];
     /**
-     * Seconds.
+     * Seconds; the sum of all its runs in the call.
      */
     double seconds;
 } frz_stage_time;
@@ -906,7 +906,7 @@ extern "C" {
 #endif // __cplusplus
 
 /**
- * Tells the version of the library that is linked: major * 1000000 + minor * 1000 + patch.
+ * Reports the version of the library that is linked: major * 1000000 + minor * 1000 + patch.
  *
  * Any thread, any time.
  */
@@ -922,11 +922,11 @@ uint32_t frz_version(void);
 const char *frz_status_name(uint32_t status);
 
 /**
- * Tells what went wrong in the last call of this thread that did not answer FRZ_OK: one sentence in UTF-8 that names
+ * Returns the message of the last call of this thread that did not return FRZ_OK: one sentence in UTF-8 that names
  * what is at fault; empty before the first.
  *
  * Any thread, any time. The text is the library's, and stays until the next call of this thread that fails. Calls
- * that succeed leave it alone: ask only after a failure.
+ * that succeed do not change it: query it only after a failure.
  */
 const char *frz_last_error(void);
 
@@ -964,7 +964,7 @@ void frz_pool_destroy(frz_pool *pool);
  * pool: whose threads do the work; it may be destroyed before the context.
  * out: receives the context, to be destroyed with frz_context_destroy; NULL after a failure.
  *
- * Any thread. A context serves one call at a time (FRZ_ERROR_BUSY), but for frz_context_cancel, _reset and _progress.
+ * Any thread. A context serves one call at a time (FRZ_ERROR_BUSY), except frz_context_cancel, _reset and _progress.
  */
 frz_status frz_context_create(uint32_t abi,
                               frz_pool *pool,
@@ -980,10 +980,10 @@ frz_status frz_context_create(uint32_t abi,
 void frz_context_destroy(frz_context *context);
 
 /**
- * Sets what looks on while the library works, for a progress bar and an escape key.
+ * Sets the function that is called while the library works, for a progress bar and an escape key.
  *
- * It is called on the thread that called the library: at the beginning of each stage, then every 10 to 50 ms, also
- * inside long stages. Without worker threads (a pool of 0) it is called between pieces of work, with no interval
+ * It is called on the thread that called the library: at the beginning of each phase, then every 10 to 50 ms, also
+ * inside long phases. Without worker threads (a pool of 0) it is called between pieces of work, with no interval
  * promised. Within it frz_context_cancel and frz_context_progress may be called, and nothing else with this context.
  *
  * poll: NULL for none.
@@ -996,7 +996,8 @@ frz_status frz_context_set_poll(frz_context *context,
                                 void *user);
 
 /**
- * Sets what takes warnings: what a user should know though the call succeeds, for instance that a mesh is open.
+ * Sets the function that receives warnings: what a user should know though the call succeeds, for instance that a mesh
+ * is open.
  *
  * It is called on the thread that called the library. The library itself never prints. Within it nothing else may be
  * called with this context.
@@ -1013,7 +1014,7 @@ frz_status frz_context_set_log(frz_context *context,
 /**
  * Sets how much memory an object may take that is made or changed with this context.
  *
- * The need is estimated before memory is taken; a call that would need more answers FRZ_ERROR_MEMORY and changes
+ * The need is estimated before memory is taken; a call that would need more returns FRZ_ERROR_MEMORY and changes
  * nothing. It is a guard against a wrong voxel size, not an account of every byte.
  *
  * bytes: 0 for the limit of a new context, the machine's memory; UINT64_MAX for none.
@@ -1024,8 +1025,8 @@ frz_status frz_context_set_memory_limit(frz_context *context,
                                         uint64_t bytes);
 
 /**
- * Cancels the call that runs with the context, and every later one until frz_context_reset: they answer
- * FRZ_CANCELLED and change nothing. A call whose work is done when the cancel comes answers as if there were none.
+ * Cancels the call that runs with the context, and every later one until frz_context_reset: they return
+ * FRZ_CANCELLED and change nothing. A call whose work is done when the cancel comes returns as if there were none.
  *
  * context: may be NULL.
  *
@@ -1034,8 +1035,8 @@ frz_status frz_context_set_memory_limit(frz_context *context,
 void frz_context_cancel(frz_context *context);
 
 /**
- * Forgets a cancel, and counts stages from 0 again, for the calls that follow. A call that runs meanwhile keeps its
- * cancel: it never goes on with half of its work left out.
+ * Clears a cancel and restarts the count of phases, for the calls that follow. A call that runs meanwhile keeps its
+ * cancel: it never continues with half of its work left out.
  *
  * context: may be NULL.
  *
@@ -1044,19 +1045,20 @@ void frz_context_cancel(frz_context *context);
 void frz_context_reset(frz_context *context);
 
 /**
- * Tells what the context is doing.
+ * Reports what the context is doing.
  *
- * out: receives it; all zeroes after a failure, but for the fraction.
+ * out: receives it; all zeroes after a failure, except the fraction.
  *
  * Any thread, any time.
  */
 frz_status frz_context_progress(const frz_context *context, frz_progress *out);
 
 /**
- * Tells how long the stages of the last call took that had any, in order.
+ * Reports how long the phases of the last call with phases took, in the order of their first runs; a phase that ran
+ * several times is one entry with the sum.
  *
- * dst: room for frz_stage_time; with data NULL only the number is told. FRZ_ERROR_CAPACITY when it is too small.
- * count: receives the number of stages; 0 after other failures.
+ * dst: room for frz_stage_time; with data NULL only the count is reported. FRZ_ERROR_CAPACITY when it is too small.
+ * count: receives the number of phases; 0 after other failures.
  *
  * One thread at a time.
  */
@@ -1070,7 +1072,7 @@ frz_status frz_context_timings(const frz_context *context,
  * Faces may have any number of corners, convex or not, and meshes may be open, cross themselves and repeat vertices;
  * they are cut into triangles once.
  *
- * desc: what it is made of. Counts, strides, indices and positions are checked: the error names the first at fault,
+ * desc: its description. Counts, strides, indices and positions are checked: the error names the first at fault,
  *     counted from 0.
  * out: receives the mesh, to be destroyed with frz_mesh_destroy; NULL after a failure.
  *
@@ -1090,7 +1092,7 @@ frz_status frz_mesh_create(frz_context *context,
 void frz_mesh_destroy(frz_mesh *mesh);
 
 /**
- * Tells what a mesh is: the counts that frz_mesh_read needs room for, its box, area and volume.
+ * Reports the properties of a mesh: the counts that frz_mesh_read needs room for, its box, area and volume.
  *
  * info: receives it; its struct_size says how much of it the caller knows.
  *
@@ -1102,7 +1104,7 @@ frz_status frz_mesh_get_info(const frz_mesh *mesh, frz_mesh_info *info);
  * Copies a part of a mesh into the caller's memory.
  *
  * part: a frz_mesh_part.
- * dst: room for as many elements as frz_mesh_get_info tells, of the type that the part has: FRZ_ERROR_CAPACITY when
+ * dst: room for as many elements as frz_mesh_get_info reports, of the type that the part has: FRZ_ERROR_CAPACITY when
  *     it is too small, and nothing is written.
  *
  * Any number of threads may read a mesh.
@@ -1114,8 +1116,8 @@ frz_status frz_mesh_read(const frz_mesh *mesh,
 /**
  * Copies an attribute of a mesh into the caller's memory.
  *
- * name: its name. FRZ_ERROR_ARGUMENT names those that there are when there is none of this name.
- * dst: room for an element of so many floats for each vertex; with data NULL only the number of floats is told.
+ * name: its name. FRZ_ERROR_ARGUMENT, with a list of the names, when there is none of this name.
+ * dst: room for an element of so many floats for each vertex; with data NULL only the number of floats is reported.
  * components: receives the floats of each vertex, 1 to 4; 0 after a failure. May be NULL.
  *
  * Any number of threads may read a mesh.
@@ -1145,7 +1147,7 @@ void frz_grid_destroy(frz_grid *grid);
 frz_status frz_grid_copy(frz_context *context, const frz_grid *grid, frz_grid **out);
 
 /**
- * Tells what a grid is.
+ * Reports the properties of a grid.
  *
  * info: receives it; its struct_size says how much of it the caller knows.
  *
@@ -1156,7 +1158,7 @@ frz_status frz_grid_get_info(const frz_grid *grid, frz_grid_info *info);
 /**
  * Copies a grid's name, in UTF-8 with a zero at its end.
  *
- * dst: room for capacity bytes; NULL only asks for the size. FRZ_ERROR_CAPACITY when it is too small.
+ * dst: room for capacity bytes; NULL only queries the size. FRZ_ERROR_CAPACITY when it is too small.
  * capacity: bytes at dst.
  * size: receives the bytes that are needed, the zero counted; 0 after other failures.
  *
@@ -1177,7 +1179,7 @@ frz_status frz_grid_set_name(frz_grid *grid, const char *name);
 /**
  * Makes a grid from blocks of voxels, which are copied.
  *
- * desc: what it is made of.
+ * desc: its description.
  * out: receives the grid, to be destroyed with frz_grid_destroy; NULL after a failure.
  *
  * One thread at a time for each context.
@@ -1190,7 +1192,7 @@ frz_status frz_grid_create(frz_context *context, const frz_grid_desc *desc, frz_
  * Blocks without a leaf have one value: the background, or for a level set plus or minus the background. Values of a
  * level set are distances (m).
  *
- * dst: room for leaf_count elements of frz_leaf; with data NULL only the number is told. FRZ_ERROR_CAPACITY when it
+ * dst: room for leaf_count elements of frz_leaf; with data NULL only the count is reported. FRZ_ERROR_CAPACITY when it
  *     is too small. The pointers in it are the grid's: they stay until it is changed or destroyed, those of a base
  *     layer until its next step.
  * count: receives the number of leaves; 0 after other failures.
@@ -1202,7 +1204,7 @@ frz_status frz_grid_leaves(const frz_grid *grid,
                            size_t *count);
 
 /**
- * Lends what a grid of floats holds at some places: leaves, or the value of all 512 voxels.
+ * Lends the leaves of a grid of floats at some origins, or the value of all 512 voxels there.
  *
  * origins: int32_t[3] for each place, multiples of 8, for instance those of frz_base_dirty.
  * dst: room for as many elements of frz_leaf, whose pointers stay as those of frz_grid_leaves do.
@@ -1214,9 +1216,9 @@ frz_status frz_grid_probe(const frz_grid *grid, frz_view origins, frz_span dst);
 /**
  * Lends the leaves of a grid of vectors without copying them, in an order that does not change while the grid does not.
  *
- * Blocks without a leaf have one value: the background, or what frz_grid_vector_probe finds.
+ * Blocks without a leaf have one value: the background, or that of frz_grid_vector_probe.
  *
- * dst: room for leaf_count elements of frz_vector_leaf; with data NULL only the number is told. FRZ_ERROR_CAPACITY when
+ * dst: room for leaf_count elements of frz_vector_leaf; with data NULL only the count is reported. FRZ_ERROR_CAPACITY when
  *     it is too small. The pointers in it are the grid's: they stay until it is destroyed.
  * count: receives the number of leaves; 0 after other failures.
  *
@@ -1227,7 +1229,7 @@ frz_status frz_grid_vector_leaves(const frz_grid *grid,
                                   size_t *count);
 
 /**
- * Lends what a grid of vectors holds at some places: leaves, or the value of all 512 voxels.
+ * Lends the leaves of a grid of vectors at some origins, or the value of all 512 voxels there.
  *
  * origins: int32_t[3] for each place, multiples of 8.
  * dst: room for as many elements of frz_vector_leaf, whose pointers stay as those of frz_grid_vector_leaves do.
@@ -1320,7 +1322,7 @@ frz_status frz_grid_to_mesh_box(frz_context *context,
                                 frz_mesh **out);
 
 /**
- * As frz_grid_to_mesh, of some blocks only, for instance those of frz_base_dirty: what it costs grows with their number.
+ * As frz_grid_to_mesh, of some blocks only, for instance those of frz_base_dirty: the cost grows with their number.
  * The meshes of different blocks meet; each triangle is in one.
  *
  * origins: int32_t[3] for each block, multiples of 8.
@@ -1351,7 +1353,7 @@ frz_status frz_grid_load(frz_context *context,
                          frz_grid **out);
 
 /**
- * Writes grids into one .vdb file. The file is there when it is whole: it is written under another name first. A cancel is
+ * Writes grids into one .vdb file. The file appears only when complete: it is written under another name first. A cancel is
  * heeded before it is begun, not within.
  *
  * grids: count pointers to grids of different names.
@@ -1552,7 +1554,7 @@ frz_status frz_snow_desc_init(frz_snow_desc *desc, size_t size);
 /**
  * Makes a layer of snow as a level set named "surface", for frz_base_create.
  *
- * desc: what it lies on and how deep it is. Y is up.
+ * desc: its ground and depth. Y is up.
  * out: receives the grid, to be destroyed with frz_grid_destroy; NULL after a failure.
  *
  * Any number of threads may read a mesh; one thread at a time for each context.
@@ -1574,7 +1576,7 @@ frz_status frz_base_params_init(frz_base_params *params, size_t size);
  *
  * params: NULL for the usual ones.
  * snow: a level set with voxels fixed in the world, for instance from frz_snow_layer or frz_grid_load; it is copied.
- * restart: restart_bytes bytes of frz_base_save of a layer made from the same snow: what it held comes back bit for
+ * restart: restart_bytes bytes of frz_base_save of a layer made from the same snow: its grids come back bit for
  *     bit, on any number of threads. NULL: untouched. Bytes that are damaged, of another version or of other snow are
  *     FRZ_ERROR_FILE.
  * restart_bytes: 0 without a restart.
@@ -1622,7 +1624,7 @@ frz_status frz_base_set_params(frz_base *base,
  * frame: the number that frz_base_touched gets where the snow changes, from -16777216 to 16777216.
  * report: receives what was done, all zeroes after a failure; may be NULL. Its struct_size is set by the caller.
  *
- * One thread at a time; nobody may read the layer's grids meanwhile (FRZ_ERROR_BUSY).
+ * One thread at a time; the layer's grids must not be in use meanwhile (FRZ_ERROR_BUSY).
  */
 frz_status frz_base_step(frz_context *context,
                          frz_base *base,
@@ -1636,7 +1638,7 @@ frz_status frz_base_step(frz_context *context,
  * Writes what the next step depends on, besides the snow that the layer was made from: for a host's own cache.
  *
  * Only blocks that ever changed are kept, packed; the bytes are the same on any number of threads. What the last
- * step removed, and which blocks it changed, is no part of it.
+ * step removed, and which blocks it changed, is not part of it.
  *
  * dst: room for capacity bytes. NULL: size receives a number that certainly suffices, and nothing is written.
  * capacity: bytes at dst. FRZ_ERROR_CAPACITY when they are too few.
@@ -1653,7 +1655,7 @@ frz_status frz_base_save(frz_context *context,
 /**
  * Lends the snow: a level set (m), negative inside.
  *
- * The grid is the layer's: the pointer stays until the layer is destroyed, what it holds until the next step. NULL
+ * The grid is the layer's: the pointer is valid until the layer is destroyed, its contents until the next step. NULL
  * after a failure.
  *
  * One thread at a time.
@@ -1689,7 +1691,7 @@ const frz_grid *frz_base_compression(const frz_base *base);
 const frz_grid *frz_base_touched(const frz_base *base);
 
 /**
- * Tells the box that the snow lies in: no step makes it larger.
+ * Reports the box that the snow lies in: no step makes it larger.
  *
  * min: receives double[3], its least corner (m); zeroes after a failure.
  * max: receives double[3], its greatest corner (m); zeroes after a failure.
@@ -1699,7 +1701,7 @@ const frz_grid *frz_base_touched(const frz_base *base);
 frz_status frz_base_bounds(const frz_base *base, double *min, double *max);
 
 /**
- * Lends the places of the blocks that the last step changed in any of the layer's grids, ascending: with
+ * Lends the origins of the blocks that the last step changed in any of the layer's grids, ascending: with
  * frz_grid_probe a host brings its own copy up to date.
  *
  * origins: receives a pointer to count times int32_t[3], voxels of least corners; it is the layer's and stays until

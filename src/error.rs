@@ -4,13 +4,13 @@ use std::path::{Path, PathBuf};
 
 /// What went wrong, in one sentence.
 ///
-/// The kinds are those of the C status numbers; a kind says who can mend it.
+/// The kinds are those of the C status numbers; a kind says who can fix it.
 #[derive(Debug, thiserror::Error)]
 pub enum Error {
-    /// A parameter or argument is outside its range: the caller mends it.
+    /// A parameter or argument is outside its range: the caller can fix it.
     #[error("{0}")]
     Argument(String),
-    /// What a file holds cannot be used: the file is to be mended.
+    /// The contents of a file cannot be used: the file must be fixed.
     #[error("{}: {what}", path.display())]
     File {
         /// The file at fault.
@@ -18,7 +18,7 @@ pub enum Error {
         /// What is wrong with it, with the line or element where known.
         what: String,
     },
-    /// What bytes in the place of a file hold, a saved state for instance, cannot be used.
+    /// The contents of bytes, a saved state for instance, cannot be used.
     #[error("{0}")]
     Bytes(String),
     /// The operating system refused an operation on a file.
@@ -28,7 +28,7 @@ pub enum Error {
         path: PathBuf,
         /// The verb: "read", "write", "create the folder".
         action: &'static str,
-        /// The operating system's answer.
+        /// The operating system's error.
         source: std::io::Error,
     },
     /// The work would need more memory than it may use.
@@ -47,7 +47,7 @@ pub enum Error {
     /// Memory ran out in the middle of the work.
     #[error("there is not enough memory left for this")]
     OutOfMemory,
-    /// OpenVDB refused what no other kind stands for.
+    /// OpenVDB refused for a reason that no other kind covers.
     #[error("{0}")]
     OpenVdb(String),
     /// A promise inside the library does not hold: a bug of ours.

@@ -119,7 +119,7 @@ fn a_fog_volume_is_drawn_and_said_to_be_one() {
     let path = folder.path().join("cloud.vdb");
     file::write(&path, &[&fog], &WriteOptions::default()).unwrap();
     let said = works(folder.path(), "preview cloud.vdb -o out.png --size 90x60");
-    assert!(said.contains("cloud.vdb") && said.contains("no level set"), "{said}");
+    assert!(said.contains("cloud.vdb") && said.contains("not a level set"), "{said}");
     let picture = Picture::open(&folder.path().join("out.png"));
     assert!(picture.pixel(45, 30) != picture.pixel(2, 2), "nothing is drawn");
     fog.replace_blocks(&ctx, &[block(0.0)]).unwrap();

@@ -86,8 +86,8 @@ fn a_report_goes_straight_into_a_device_or_a_pipe_and_over_nothing_but_a_report(
     assert!(text.starts_with("before\n") && text.contains("\"arguments\""), "{text}");
     run("report.json", Stdio::piped());
     run("report.json", Stdio::piped());
-    fails(folder.path(), "check shot.toml --report shot.toml", 2, &["shot.toml", "no report"]);
-    fails(folder.path(), "check shot.toml --report cube.obj", 2, &["cube.obj", "no report"]);
+    fails(folder.path(), "check shot.toml --report shot.toml", 2, &["shot.toml", "not the report"]);
+    fails(folder.path(), "check shot.toml --report cube.obj", 2, &["cube.obj", "not the report"]);
     assert_eq!(fs::read_to_string(folder.path().join("cube.obj")).unwrap(), CUBE);
 }
 

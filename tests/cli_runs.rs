@@ -99,3 +99,35 @@ fn open_non_manifold_and_distant_meshes_work() {
     works(folder_far.path(), "snow shot.toml -o out -q");
     assert_eq!(removed(folder_far.path(), 2), 0.0);
 }
+
+/// Seconds and runs of each phase in a report.
+fn phases(path: &Path) -> std::collections::BTreeMap<String, (f64, Option<u64>)> {
+    let report: serde_json::Value = serde_json::from_str(&fs::read_to_string(path).unwrap()).unwrap();
+    let list = report["phases"].as_array().unwrap();
+    let entry = |phase: &serde_json::Value| {
+        (
+            phase["name"].as_str().unwrap().into(),
+            (phase["seconds"].as_f64().unwrap(), phase["count"].as_u64()),
+        )
+    };
+    let phases: std::collections::BTreeMap<_, _> = list.iter().map(entry).collect();
+    assert_eq!(phases.len(), list.len(), "a phase has one entry: {list:?}");
+    phases
+}
+
+#[test]
+fn the_report_of_a_run_sums_the_phases_of_its_frames() {
+    let folder = folder(3, 0.05, CUBE);
+    works(folder.path(), "snow shot.toml -o out --report run.json");
+    let run = phases(&folder.path().join("run.json"));
+    let frames: Vec<_> =
+        (1..=3).map(|frame| phases(&folder.path().join(format!("out/report/{frame:04}.json")))).collect();
+    for name in ["sweep", "distance", "noise", "subtract", "columns", "commit"] {
+        let (seconds, count) = run[name];
+        assert_eq!(count, Some(3), "{name}: {run:?}");
+        let sum: f64 = frames.iter().map(|frame| frame[name].0).sum();
+        assert!((seconds - sum).abs() < 1e-6, "{name}: {seconds} s, in frames {sum} s");
+    }
+    assert!(frames.iter().all(|frame| !frame.contains_key("measure")), "a step's phases only");
+    assert_eq!(run["measure"].1, Some(1));
+}

@@ -1,4 +1,4 @@
-//! A layer's saved state: what goes on from it is what never stopped, and what is damaged is refused.
+//! A layer's saved state: a layer resumed from it equals one that never stopped, and damaged states are refused.
 
 mod common;
 
@@ -110,7 +110,7 @@ fn what_is_no_state_of_this_layer_is_refused() {
         BaseLayer::restore(&ctx, initial, params, state).err().expect("refused").to_string()
     };
     assert_eq!(refused(snow(&ctx, 0.25), &state), "the saved state belongs to another initial layer");
-    assert_eq!(refused(snow(&ctx, 0.3), &[]), "the saved state is none of a base layer");
+    assert_eq!(refused(snow(&ctx, 0.3), &[]), "the saved state is not of a base layer");
     let mut newer = state.clone();
     newer[8] = 2;
     assert_eq!(refused(snow(&ctx, 0.3), &newer), "the saved state has format 2, this library reads 1");

@@ -21,7 +21,7 @@ fn what_rolls_out_of_the_window_is_cut_no_finer_within() {
     let lattice = Lattice::near(CELL, DVec3::zeros()).unwrap();
     let faces = |cells: i32| {
         let window = Window { min: [-cells * UNITS; 3], max: [cells * UNITS; 3] };
-        body.chain(&ctx, 0.0, 1.0, &lattice, 0.02, &window).unwrap().len()
+        body.faces(&ctx, 0.0, 1.0, &lattice, 0.02, &window).unwrap().len()
     };
     // The first half of the way lies in the smaller one.
     let [part, all] = [faces(30), faces(200)];

@@ -162,7 +162,7 @@ impl Found {
             (truth, (value - truth).abs(), at, value)
         };
         let errors: Vec<_> =
-            ctx.stage("oracle", || Ok(sample.par_iter().map(error).collect::<Vec<_>>())).expect("no cancel");
+            ctx.phase("oracle", || Ok(sample.par_iter().map(error).collect::<Vec<_>>())).expect("no cancel");
         self.values += errors.len();
         let worst = errors.into_iter().max_by(|a, b| a.1.total_cmp(&b.1));
         let Some((truth, error, at, value)) = worst else { return String::new() };

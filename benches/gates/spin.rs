@@ -69,7 +69,7 @@ fn spin(h: &mut Harness) {
             };
             let sum = |a: [u64; 2], b: [u64; 2]| [a[0] + b[0], a[1] + b[1]];
             let count = || Ok(all.par_iter().map(wrong).reduce(|| [0, 0], sum));
-            let [less, more] = ctx.stage("oracle", count).expect("no cancel");
+            let [less, more] = ctx.phase("oracle", count).expect("no cancel");
             (missed, fat, voxels) = (missed + less, fat + more, voxels + all.len());
         }
     }
@@ -106,7 +106,7 @@ fn folds(h: &mut Harness) {
         };
         let sum = |a: [u64; 3], b: [u64; 3]| [0, 1, 2].map(|i| a[i] + b[i]);
         let count = || Ok(all.par_iter().map(wrong).reduce(|| [0; 3], sum));
-        let [less, more, own] = ctx.stage("oracle", count).expect("no cancel");
+        let [less, more, own] = ctx.phase("oracle", count).expect("no cancel");
         (missed, fat, inside) = (missed + less, fat + more, inside + own);
         let volume = |grid: &FloatGrid| level_set::measure(&ctx, grid).expect("a volume").volume;
         let mut parts = sweep(0.0, 1.0 / 16.0);

@@ -22,7 +22,7 @@ class Pool(Handle):
 class Context(Handle):
     """One computation's side channel, on worker threads of its own or on those of a Pool.
 
-    poll(stage, stages_done, seconds) is called on this thread some ten times a second at least; a true answer
+    poll(stage, stages_done, seconds) (stage: the verb of the running phase) is called on this thread some ten times a second at least; a true answer
     cancels. log(text) takes warnings. What either of them raises, and Ctrl-C, ends the running call, which changes
     nothing, and is raised by it.
     """
@@ -90,20 +90,20 @@ class Context(Handle):
         return f"on {self.pool.threads} threads"
 
     def progress(self):
-        """What is being done: (stage, stages done, seconds); from any thread."""
+        """What is being done: (verb of the running phase, phases done, seconds); from any thread."""
         out = Progress()
         call("context_progress", self.pointer, c.byref(out))
         return out.stage.decode(), out.stages_done, out.seconds
 
     @property
     def fraction(self):
-        """Part of the running stage that is done, 0 to 1; None where that is not known. For a poll, or any thread."""
+        """Fraction of the running phase that is done, 0 to 1; None where that is not known. For a poll, or any thread."""
         out = Progress()
         call("context_progress", self.pointer, c.byref(out))
         return None if out.fraction < 0 else out.fraction
 
     def timings(self):
-        """The stages of the last call: a list of (stage, seconds)."""
+        """The phases of the last call: a list of (verb, seconds)."""
         count = c.c_size_t()
         call("context_timings", self.pointer, Span(None, 0, 0), c.byref(count))
         times = (StageTime * max(count.value, 1))()

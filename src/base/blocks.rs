@@ -18,7 +18,7 @@ pub const fn offset(x: usize, y: usize, z: usize) -> usize {
     x << 6 | y << 3 | z
 }
 
-/// Origin of the block that holds a voxel.
+/// Origin of the block that contains a voxel.
 #[inline]
 pub const fn origin_of(voxel: [i32; 3]) -> Origin {
     [voxel[0] & !7, voxel[1] & !7, voxel[2] & !7]
@@ -35,7 +35,24 @@ pub struct Block {
     pub mask: Mask,
 }
 
-/// What a block position of a grid is to become: dense values, or one value for all 512 voxels.
+impl Block {
+    /// A block of a level set, from distances (m) cut off at `background`: the voxels nearer than that are active.
+    pub fn of_band(origin: Origin, values: Box<Values>, background: f32) -> Self {
+        let mut mask = [0; DIM];
+        for (index, value) in values.iter().enumerate() {
+            mask[index >> 6] |= u64::from(value.abs() < background) << (index & 63);
+        }
+        Self { origin, values, mask }
+    }
+
+    /// As [`Block::of_band`], from distances in cells of `cell` m.
+    pub fn of_cells(origin: Origin, mut cells: Box<Values>, cell: f32, background: f32) -> Self {
+        cells.iter_mut().for_each(|value| *value = (*value * cell).clamp(-background, background));
+        Self::of_band(origin, cells, background)
+    }
+}
+
+/// The new contents of a block position of a grid: dense values, or one value for all 512 voxels.
 #[derive(Clone, PartialEq)]
 pub enum BlockEdit {
     /// Dense values.

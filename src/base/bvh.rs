@@ -1,4 +1,4 @@
-//! A tree of boxes over a mesh's triangles, for rays and for what lies in a box.
+//! A tree of boxes over a mesh's triangles, for queries by ray and by box.
 
 use super::{DVec3, TriMesh, Vec3};
 
@@ -115,7 +115,7 @@ impl Bvh {
         found
     }
 
-    /// Shows hits to `see`, which gives the new limit, or none to stop.
+    /// Calls `see` with hits; it returns the new limit, or none to stop.
     fn walk(
         &self,
         origin: DVec3,
@@ -156,7 +156,7 @@ fn enters(node: &Node, origin: DVec3, inverse: DVec3, limit: f64) -> bool {
     for axis in 0..3 {
         let a = (f64::from(node.low[axis]) - origin[axis]) * inverse[axis];
         let b = (f64::from(node.high[axis]) - origin[axis]) * inverse[axis];
-        // A ray inside a slab that it runs along gives NaN, which min and max pass over.
+        // A ray inside a slab that it runs along gives NaN, which min and max ignore.
         near = near.max(a.min(b));
         far = far.min(a.max(b));
     }

@@ -100,7 +100,7 @@ impl<'a> Ring<'a> {
         [self.before[corner], corner, self.after[corner]]
     }
 
-    /// Finds out what a corner is.
+    /// Classifies a corner.
     fn look(&mut self, corner: usize) {
         let [a, b, c] = self.around(corner).map(|i| self.points[i]);
         let turn = turn(a, b, c);

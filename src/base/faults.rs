@@ -1,4 +1,4 @@
-//! What is wrong with a mesh, and what it is: the questions that decide whether it bounds a solid.
+//! Faults and properties of a mesh that decide whether it bounds a solid.
 
 use std::collections::{BTreeMap, HashSet};
 
@@ -11,7 +11,7 @@ use super::{DVec3, TriMesh, Vec3};
 /// Triangles a task looks at.
 const GRAIN: usize = 512;
 
-/// What a survey of a mesh found. Vertices at the same place count as one.
+/// Faults and properties of a mesh. Vertices at the same position count as one.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Faults {
     /// Vertices that no triangle names.

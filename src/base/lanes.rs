@@ -10,7 +10,7 @@ pub const LANES: usize = 8;
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
 pub struct Lanes(pub [f32; LANES]);
 
-/// For each of eight numbers all bits or none.
+/// A mask: for each of eight numbers all bits set or none.
 #[derive(Debug, Clone, Copy)]
 pub struct LaneMask([u32; LANES]);
 

@@ -97,7 +97,7 @@ impl TriMesh {
         used.len() as i64 - edges as i64 + self.triangles.len() as i64
     }
 
-    /// The mesh with its triangles turned round.
+    /// The mesh with its triangles flipped.
     pub fn reversed(mut self) -> Self {
         self.triangles.iter_mut().for_each(|[_, b, c]| std::mem::swap(b, c));
         self
@@ -126,14 +126,14 @@ pub fn used(count: usize, triangles: &[[u32; 3]]) -> Option<Vec<u32>> {
     named.contains(&false).then(used)
 }
 
-/// Triangles over some of their vertices, `used`, which ascend and hold all that they name.
+/// Triangles re-indexed to the vertices `used`, which ascend and include all that they name.
 pub fn renumbered(triangles: &[[u32; 3]], used: &[u32]) -> Vec<[u32; 3]> {
     let mut places = vec![0; used.last().map_or(0, |&last| last as usize + 1)];
     used.iter().zip(0..).for_each(|(&vertex, place)| places[vertex as usize] = place);
     triangles.iter().map(|triangle| triangle.map(|vertex| places[vertex as usize])).collect()
 }
 
-/// How far apart the 32-bit numbers lie that stand for a coordinate: what a mesh file can tell there.
+/// Spacing of 32-bit numbers at a coordinate: the resolution of a mesh file there.
 pub fn spacing(coordinate: f64) -> f64 {
     let at = coordinate.abs() as f32;
     f64::from(at.next_up()) - f64::from(at)
@@ -142,7 +142,7 @@ pub fn spacing(coordinate: f64) -> f64 {
 /// A sentence about vertices so far from the origin (in a file's unit of `scale` m) that their 32-bit coordinates are
 /// coarse against a cell (m).
 pub fn too_far(name: &str, farthest: f64, scale: f64, cell: f64) -> Option<String> {
-    // Rounding by half the gap may cost what a sweep may be off by: 0.02 cell.
+    // Rounding by half the gap may cost as much as the default tolerance of a sweep: 0.02 cell.
     let gap = spacing(farthest) * scale;
     (gap > 0.04 * cell).then(|| {
         format!(
@@ -154,16 +154,16 @@ pub fn too_far(name: &str, farthest: f64, scale: f64, cell: f64) -> Option<Strin
     })
 }
 
-/// Farthest coordinate of places from the origin along an axis.
+/// Largest absolute coordinate of positions.
 pub fn farthest<'a>(places: impl Iterator<Item = &'a DVec3>) -> f64 {
     places.map(|p| p.amax()).fold(0.0, f64::max)
 }
 
-/// For each place the number of the first one that is the same.
+/// For each position the index of the first equal one.
 pub fn coincident(places: impl Iterator<Item = DVec3>) -> Vec<u32> {
     // Adding zero makes -0 and 0 the same.
     let keys: Vec<[u64; 3]> = places.map(|p| [p.x + 0.0, p.y + 0.0, p.z + 0.0].map(f64::to_bits)).collect();
-    // Open addressing, at most half full: several times faster than a map, and every step of a host asks.
+    // Open addressing, at most half full: several times faster than a map, and needed in every step of a host.
     let bits = (2 * keys.len().max(1)).next_power_of_two().ilog2().max(1);
     let mut slots = vec![u32::MAX; 1 << bits];
     let home = |key: &[u64; 3]| {

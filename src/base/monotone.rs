@@ -37,7 +37,7 @@ pub(super) fn triangles(points: &[Point]) -> Vec<[usize; 3]> {
     out
 }
 
-/// The points on the whole numbers of a square.
+/// The points on the integer grid of a square.
 fn rounded(points: &[Point]) -> Vec<[i64; 2]> {
     let end =
         |axis: usize, pick: fn(f64, f64) -> f64| points.iter().map(|p| p[axis]).fold(points[0][axis], pick);
@@ -45,7 +45,7 @@ fn rounded(points: &[Point]) -> Vec<[i64; 2]> {
     let high = [0, 1].map(|axis| end(axis, f64::max));
     let extent = (high[0] - low[0]).max(high[1] - low[1]);
     let scale = if extent > 0.0 { SQUARE / extent } else { 0.0 };
-    // What is no number becomes 0.
+    // NaN becomes 0.
     points.iter().map(|p| [0, 1].map(|axis| ((p[axis] - low[axis]) * scale).round() as i64)).collect()
 }
 
@@ -237,7 +237,7 @@ fn pieces(count: usize, diagonals: Vec<[usize; 2]>) -> Vec<Vec<usize>> {
     cuts.sort_unstable_by_key(|&(low, high)| (low, count - high));
     cuts.dedup();
     let mut out = Vec::new();
-    // The cuts that the corner at hand is within, with their pieces so far; the whole polygon is the first.
+    // The cuts that the current corner is within, with their pieces so far; the whole polygon is the first.
     let mut open: Vec<(usize, Vec<usize>)> = vec![(count, Vec::new())];
     let mut cuts = cuts.into_iter().peekable();
     for corner in 0..count {
@@ -257,7 +257,7 @@ fn pieces(count: usize, diagonals: Vec<[usize; 2]>) -> Vec<Vec<usize>> {
     out
 }
 
-/// Cuts a piece that is monotone; whether it was, and no triangle is turned round.
+/// Cuts a monotone piece; returns whether it was monotone and no triangle is flipped.
 fn cut_monotone(places: &[[i64; 2]], rank: &[usize], piece: &[usize], out: &mut Vec<[usize; 3]>) -> bool {
     let count = piece.len();
     let first = (0..count).min_by_key(|&at| rank[piece[at]]).unwrap_or(0);

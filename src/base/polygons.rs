@@ -10,7 +10,7 @@ const MOST_CORNERS: usize = 1 << 22;
 /// Corners of a polygon that is cut ear by ear: of larger ones the worst would take minutes.
 const FEW_CORNERS: usize = 500;
 
-/// Polygons as files hold them: with any number of corners, convex or not, hardly ever quite flat.
+/// Polygons as in files: with any number of corners, convex or not, hardly ever quite flat.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct PolygonMesh {
     /// Vertex positions (m).

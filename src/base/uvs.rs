@@ -34,7 +34,7 @@ impl Uvs {
         let mut own: Vec<Option<[f32; 2]>> = vec![None; count];
         let agrees = |(&vertex, &index): (&u32, &u32)| {
             let place = places[index as usize];
-            // Vertices out of range are refused by whoever checks the mesh.
+            // Vertices out of range are refused when the mesh is checked.
             own.get_mut(vertex as usize).is_none_or(|own| *own.get_or_insert(place) == place)
         };
         if vertices.iter().zip(&at).all(agrees) {

@@ -13,6 +13,7 @@ use super::mesh::no_flags;
 use super::views::{Sized32, fill, finite, frz_view, sized, write_bytes};
 use crate::base::blocks::Origin;
 use crate::snow::base_layer::{BaseLayer, Params};
+use crate::sweep::TOLERANCE;
 use crate::vdb::FloatGrid;
 
 /// A layer of snow that bodies press into.
@@ -41,9 +42,9 @@ unsafe impl Sized32 for frz_base_params {
 }
 
 impl frz_base_params {
-    const USUAL: Self = Self { struct_size: 0, flags: 0, tolerance: 0.02, noise: frz_noise::USUAL };
+    const USUAL: Self = Self { struct_size: 0, flags: 0, tolerance: TOLERANCE, noise: frz_noise::USUAL };
 
-    /// Refuses flags without a meaning, and what is no number.
+    /// Refuses unknown flags, and values that are not finite.
     fn check(&self) -> Outcome {
         no_flags(self.flags, 0)?;
         finite("tolerance", self.tolerance)?;
@@ -84,7 +85,7 @@ unsafe impl Sized32 for frz_base_report {
 /// Grids that a base layer lends: snow, removed, compression, touched.
 const LENT: usize = 4;
 
-/// What a base layer's handle holds.
+/// The value of a base layer's handle.
 pub(super) struct Layer {
     layer: Box<BaseLayer>,
     shapes: Shapes,
@@ -118,7 +119,7 @@ impl Layer {
         [self.layer.surface(), self.layer.removed(), self.layer.compression(), self.layer.touched()]
     }
 
-    /// Runs `work` while nobody reads the grids, and lends them anew.
+    /// Runs `work` while the grids are not in use, and lends them again.
     fn alone<T>(&mut self, work: impl FnOnce(&mut Self) -> Outcome<T>) -> Outcome<T> {
         // SAFETY: the handles live as long as this.
         let mut held = self.lent.map(|grid| unsafe { change(grid) });
@@ -137,7 +138,7 @@ impl Layer {
 impl Drop for Layer {
     fn drop(&mut self) {
         for grid in self.lent {
-            // SAFETY: made in `new`; whoever destroys the layer has seen that nobody uses them.
+            // SAFETY: made in `new`; the layer is destroyed only when they are not in use.
             unsafe { free(grid) };
         }
     }
@@ -159,7 +160,7 @@ pub unsafe extern "C" fn frz_base_params_init(params: *mut frz_base_params, size
 ///
 /// params: NULL for the usual ones.
 /// snow: a level set with voxels fixed in the world, for instance from frz_snow_layer or frz_grid_load; it is copied.
-/// restart: restart_bytes bytes of frz_base_save of a layer made from the same snow: what it held comes back bit for
+/// restart: restart_bytes bytes of frz_base_save of a layer made from the same snow: its grids come back bit for
 ///     bit, on any number of threads. NULL: untouched. Bytes that are damaged, of another version or of other snow are
 ///     FRZ_ERROR_FILE.
 /// restart_bytes: 0 without a restart.
@@ -246,7 +247,7 @@ pub unsafe extern "C" fn frz_base_set_params(
 /// frame: the number that frz_base_touched gets where the snow changes, from -16777216 to 16777216.
 /// report: receives what was done, all zeroes after a failure; may be NULL. Its struct_size is set by the caller.
 ///
-/// One thread at a time; nobody may read the layer's grids meanwhile (FRZ_ERROR_BUSY).
+/// One thread at a time; the layer's grids must not be in use meanwhile (FRZ_ERROR_BUSY).
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn frz_base_step(
     context: *mut frz_context,
@@ -283,9 +284,7 @@ pub unsafe extern "C" fn frz_base_step(
                 let mut shapes = std::mem::take(&mut state.shapes);
                 let bodies = self::bodies(ctx, bodies, count, dt, &mut shapes);
                 state.shapes = shapes;
-                let earlier = ctx.take_timings();
                 let done = state.layer.step(ctx, &bodies?, 0.0, dt, frame)?;
-                call.add_timings(earlier, &done.stages);
                 state.dirty = state.layer.dirty().collect();
                 Ok(done)
             })?;
@@ -301,7 +300,7 @@ pub unsafe extern "C" fn frz_base_step(
 /// Writes what the next step depends on, besides the snow that the layer was made from: for a host's own cache.
 ///
 /// Only blocks that ever changed are kept, packed; the bytes are the same on any number of threads. What the last
-/// step removed, and which blocks it changed, is no part of it.
+/// step removed, and which blocks it changed, is not part of it.
 ///
 /// dst: room for capacity bytes. NULL: size receives a number that certainly suffices, and nothing is written.
 /// capacity: bytes at dst. FRZ_ERROR_CAPACITY when they are too few.
@@ -338,7 +337,7 @@ fn lent(base: *const frz_base, index: usize) -> *const frz_grid {
 
 /// Lends the snow: a level set (m), negative inside.
 ///
-/// The grid is the layer's: the pointer stays until the layer is destroyed, what it holds until the next step. NULL
+/// The grid is the layer's: the pointer is valid until the layer is destroyed, its contents until the next step. NULL
 /// after a failure.
 ///
 /// One thread at a time.
@@ -378,7 +377,7 @@ pub unsafe extern "C" fn frz_base_touched(base: *const frz_base) -> *const frz_g
     lent(base, 3)
 }
 
-/// Tells the box that the snow lies in: no step makes it larger.
+/// Reports the box that the snow lies in: no step makes it larger.
 ///
 /// min: receives double[3], its least corner (m); zeroes after a failure.
 /// max: receives double[3], its greatest corner (m); zeroes after a failure.
@@ -401,7 +400,7 @@ pub unsafe extern "C" fn frz_base_bounds(base: *const frz_base, min: *mut f64, m
     })
 }
 
-/// Lends the places of the blocks that the last step changed in any of the layer's grids, ascending: with
+/// Lends the origins of the blocks that the last step changed in any of the layer's grids, ascending: with
 /// frz_grid_probe a host brings its own copy up to date.
 ///
 /// origins: receives a pointer to count times int32_t[3], voxels of least corners; it is the layer's and stays until

@@ -11,7 +11,7 @@ use super::views::{Sized32, check_size, finite, frz_view, sized};
 use crate::base::{DVec3, PolygonMesh, Vec3};
 use crate::context::Context;
 use crate::error::Result;
-use crate::motion::Motion;
+use crate::motion::{Motion, between};
 use crate::sweep::{Body, Shape};
 
 /// Flag of a body: its imprints have no noise.
@@ -73,19 +73,12 @@ impl Motion for HostMotion {
     }
 
     fn pose(&self, time: f64, out: &mut Vec<DVec3>) -> Result<()> {
-        out.clear();
         let steps = self.poses.len() - 1;
         let at = if self.end > 0.0 { (time / self.end).clamp(0.0, 1.0) * steps as f64 } else { 0.0 };
-        // Times of poses come from divisions: rounding must not ask for a neighbour.
+        // Times of poses come from divisions: rounding must not need a neighbour.
         let at = if (at - at.round()).abs() < 1e-9 { at.round() } else { at };
         let (first, part) = (at.floor() as usize, at - at.floor());
-        let from = &self.poses[first];
-        if part == 0.0 {
-            out.extend(from.iter().map(|p| p.cast::<f64>()));
-        } else {
-            let pairs = from.iter().zip(&self.poses[first + 1]);
-            out.extend(pairs.map(|(p, q)| p.cast::<f64>().lerp(&q.cast(), part)));
-        }
+        between(&self.poses[first], &self.poses[(first + 1).min(steps)], part, out);
         Ok(())
     }
 
@@ -96,7 +89,7 @@ impl Motion for HostMotion {
     }
 }
 
-/// A body on its way to the library.
+/// A body from a host, checked.
 struct Arrived {
     id: u64,
     exact: bool,
@@ -104,10 +97,10 @@ struct Arrived {
     poses: Vec<Vec<Vec3>>,
 }
 
-/// How the faces of a host's bodies hang together, by their numbers, from step to step.
+/// Shapes of a host's bodies by their ids, kept from step to step.
 pub(super) type Shapes = HashMap<u64, Arc<Shape>>;
 
-/// Bodies out of a host's arrays, checked; `shapes` is what is known of them, and is brought up to date.
+/// Bodies from a host's arrays, checked; `shapes` are those of earlier calls, and are updated.
 ///
 /// # Safety
 /// The bodies must describe memory that can be read.
@@ -137,7 +130,7 @@ pub(super) unsafe fn bodies(
         let made = Body::shaped(Box::new(motion), 0.0, known.get(&body.id).cloned())?;
         Ok((body.id, made.with_noise(!body.exact)))
     };
-    let made: Vec<(u64, Body)> = ctx.stage("bodies", || {
+    let made: Vec<(u64, Body)> = ctx.phase("bodies", || {
         ctx.expect(arrived.len());
         arrived.into_par_iter().map(make).collect::<Result<_>>()
     })?;
@@ -146,7 +139,7 @@ pub(super) unsafe fn bodies(
     Ok(made.into_iter().map(|(_, body)| body).collect())
 }
 
-/// Says what a user should know of a body, once for each set of faces.
+/// Warnings about a body, once for each set of faces.
 fn warn(ctx: &Context, id: u64, body: &Body, known: Option<&Arc<Shape>>) {
     if known.is_some_and(|known| Arc::ptr_eq(known, body.shape())) {
         return;
@@ -169,7 +162,7 @@ unsafe fn arrived(list: *const frz_body, count: usize, dt: f64) -> Outcome<Vec<A
     let first = super::handle::required(list.cast_mut(), "bodies")?.cast_const();
     // SAFETY: the caller's promise: the size of a body is there.
     let stride = unsafe { first.cast::<u32>().read_unaligned() } as usize;
-    // Before it is believed: it says where the next body is.
+    // Checked before it is used: it is the stride of the bodies.
     check_size::<frz_body>(stride).map_err(|failure| named(0, failure))?;
     let room = frz_view { data: first.cast(), count, stride };
     // SAFETY: as above; the sizes must be the same for the bodies to lie one after another.

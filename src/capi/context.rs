@@ -11,9 +11,9 @@ use super::handle::{Noun, Reading, clear, destroy, give, read, required};
 use super::library::FRZ_ABI_VERSION;
 use super::pool::{Threads, frz_pool};
 use super::views::{Plain, frz_span};
-use crate::context::{Context, Progress, Running, StageTime, machine_memory};
+use crate::context::{Context, PhaseTime, Phases, Progress, Running, machine_memory};
 
-/// One computation: cancel flag, progress, polls, warnings, stage times. Cheap: make one for every cook.
+/// One computation: cancel flag, progress, polls, warnings, phase times. Cheap: make one for every cook.
 pub struct frz_context {
     _opaque: [u8; 0],
 }
@@ -22,41 +22,41 @@ pub struct frz_context {
 #[repr(C)]
 #[derive(Clone, Copy)]
 pub struct frz_progress {
-    /// The stage's verb, for instance "distance"; empty between stages. It ends with a zero.
+    /// The verb of the phase that runs, for instance "distance"; empty between phases. It ends with a zero.
     pub stage: [c_char; 32],
-    /// Stages finished since the context was made or reset.
+    /// Phases finished since the context was made or reset.
     pub stages_done: u64,
     /// Seconds since the running call began; 0 between calls.
     pub seconds: f64,
-    /// Part of the running stage that is done, 0 to 1; -1 where it is not known. Since interface 1.1: a header of 1.0 has
-    /// no such field, and what it was compiled into gets none.
+    /// Fraction of the running phase that is done, 0 to 1; -1 where it is not known. Since interface 1.1: programs that
+    /// were compiled with a header of 1.0 have no such field, and it is not written.
     pub fraction: f64,
 }
 
 /// Bytes of frz_progress in the header of interface 1.0.
 const FIRST_PROGRESS: usize = std::mem::offset_of!(frz_progress, fraction);
 
-/// How long a stage took.
+/// How long a phase took.
 #[repr(C)]
 #[derive(Clone, Copy)]
 pub struct frz_stage_time {
-    /// The stage's verb. It ends with a zero.
+    /// The phase's verb. It ends with a zero.
     pub stage: [c_char; 32],
-    /// Seconds.
+    /// Seconds; the sum of all its runs in the call.
     pub seconds: f64,
 }
 
-/// Looks on while the library works; an answer other than 0 cancels. It must return, not throw or jump.
+/// Called while the library works; returning other than 0 cancels. It must return, not throw or jump.
 ///
 /// user: what was given with it.
-/// progress: what is being done; it is the library's, and gone after the answer.
+/// progress: what is being done; it is the library's, and valid until the function returns.
 pub type frz_poll_function =
     Option<unsafe extern "C" fn(user: *mut c_void, progress: *const frz_progress) -> c_int>;
 
-/// Takes a warning. It must return, not throw or jump.
+/// Receives a warning. It must return, not throw or jump.
 ///
 /// user: what was given with it.
-/// text: one sentence in UTF-8; it is the library's, and gone afterwards.
+/// text: one sentence in UTF-8; it is the library's, and valid until the function returns.
 pub type frz_log_function = Option<unsafe extern "C" fn(user: *mut c_void, text: *const c_char)>;
 
 /// When the running call began.
@@ -74,21 +74,21 @@ impl Began {
     }
 }
 
-// SAFETY: letters and a number, without room between.
+// SAFETY: characters and a number, without padding.
 unsafe impl Plain for frz_stage_time {}
 
-/// What a context's handle holds.
+/// The value of a context's handle.
 pub(super) struct State {
     /// The library's own context.
     pub ctx: Context,
     /// Dropped last: its threads.
     _threads: Threads,
-    /// Room that the caller's header has for frz_progress (bytes).
+    /// Size of frz_progress in the caller's header (bytes).
     progress_room: usize,
     entered: AtomicBool,
     poisoned: AtomicBool,
     began: Began,
-    timings: Mutex<Vec<StageTime>>,
+    timings: Mutex<Vec<PhaseTime>>,
 }
 
 impl Noun for frz_context {
@@ -97,20 +97,13 @@ impl Noun for frz_context {
     const TAG: u32 = 0x6672_7a02;
 }
 
-/// A call that has a context to itself, but for cancel, reset and progress.
-pub(super) struct Call<'a>(Reading<'a, State>, Option<Running>);
+/// A call that has a context to itself, except for cancel, reset and progress; and its phases.
+pub(super) struct Call<'a>(Reading<'a, State>, Option<(Running, Phases)>);
 
 impl Call<'_> {
     /// The library's own context.
     pub(super) fn ctx(&self) -> &Context {
         &self.0.ctx
-    }
-
-    /// Adds the stages of a step, which its report took, to those of this call.
-    pub(super) fn add_timings(&self, earlier: Vec<StageTime>, stages: &[StageTime]) {
-        let mut all = earlier;
-        all.extend_from_slice(stages);
-        *self.0.timings.lock().unwrap_or_else(PoisonError::into_inner) = all;
     }
 }
 
@@ -129,8 +122,7 @@ pub(super) unsafe fn enter<'a>(context: *const frz_context) -> Outcome<Call<'a>>
         let text = "the context saw an internal error before and can only be destroyed";
         return Err(Failure::new(FRZ_ERROR_POISONED, text));
     }
-    call.1 = Some(call.ctx().begin());
-    call.ctx().take_timings();
+    call.1 = Some((call.ctx().begin(), call.ctx().collect()));
     call.0.began.set(Some(Instant::now()));
     Ok(call)
 }
@@ -160,7 +152,7 @@ impl Drop for Call<'_> {
         if std::thread::panicking() {
             self.0.poisoned.store(true, Ordering::Release);
         }
-        let timings = self.0.ctx.take_timings();
+        let timings = self.1.as_ref().map_or_else(Vec::new, |(_, phases)| phases.times());
         if !timings.is_empty() {
             *self.0.timings.lock().unwrap_or_else(PoisonError::into_inner) = timings;
         }
@@ -171,11 +163,11 @@ impl Drop for Call<'_> {
     }
 }
 
-/// A host's pointer, which is only ever handed back to it.
+/// A host's pointer, which is only ever passed back to it.
 #[derive(Clone, Copy)]
 struct User(*mut c_void);
 
-// SAFETY: the library never looks behind it, and hands it back on the thread that called.
+// SAFETY: the library never dereferences it, and passes it back on the thread that called.
 unsafe impl Send for User {}
 
 impl User {
@@ -184,24 +176,24 @@ impl User {
     }
 }
 
-/// A verb in a fixed place.
+/// A verb in an array that ends with a zero.
 fn letters(verb: &str) -> [c_char; 32] {
     let mut out = [0; 32];
     out.iter_mut().take(31).zip(verb.bytes()).for_each(|(to, from)| *to = from as c_char);
     out
 }
 
-/// What a new context allows (bytes).
+/// Memory limit of a new context (bytes).
 fn usual_limit() -> u64 {
     machine_memory().unwrap_or(u64::MAX)
 }
 
 fn progress_of(progress: &Progress, began: &Began) -> frz_progress {
-    let Progress { stage, stages_done, part } = *progress;
+    let Progress { phase, phases_done, part, .. } = *progress;
     let fraction = part.map_or(-1.0, f64::from);
     frz_progress {
-        stage: letters(stage),
-        stages_done: stages_done as u64,
+        stage: letters(phase),
+        stages_done: phases_done as u64,
         seconds: began.seconds(),
         fraction,
     }
@@ -214,7 +206,7 @@ fn progress_of(progress: &Progress, began: &Began) -> frz_progress {
 /// pool: whose threads do the work; it may be destroyed before the context.
 /// out: receives the context, to be destroyed with frz_context_destroy; NULL after a failure.
 ///
-/// Any thread. A context serves one call at a time (FRZ_ERROR_BUSY), but for frz_context_cancel, _reset and _progress.
+/// Any thread. A context serves one call at a time (FRZ_ERROR_BUSY), except frz_context_cancel, _reset and _progress.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn frz_context_create(
     abi: u32,
@@ -263,10 +255,10 @@ pub unsafe extern "C" fn frz_context_destroy(context: *mut frz_context) {
     guard(|| unsafe { destroy(context) });
 }
 
-/// Sets what looks on while the library works, for a progress bar and an escape key.
+/// Sets the function that is called while the library works, for a progress bar and an escape key.
 ///
-/// It is called on the thread that called the library: at the beginning of each stage, then every 10 to 50 ms, also
-/// inside long stages. Without worker threads (a pool of 0) it is called between pieces of work, with no interval
+/// It is called on the thread that called the library: at the beginning of each phase, then every 10 to 50 ms, also
+/// inside long phases. Without worker threads (a pool of 0) it is called between pieces of work, with no interval
 /// promised. Within it frz_context_cancel and frz_context_progress may be called, and nothing else with this context.
 ///
 /// poll: NULL for none.
@@ -296,7 +288,8 @@ pub unsafe extern "C" fn frz_context_set_poll(
     })
 }
 
-/// Sets what takes warnings: what a user should know though the call succeeds, for instance that a mesh is open.
+/// Sets the function that receives warnings: what a user should know though the call succeeds, for instance that a mesh
+/// is open.
 ///
 /// It is called on the thread that called the library. The library itself never prints. Within it nothing else may be
 /// called with this context.
@@ -329,7 +322,7 @@ pub unsafe extern "C" fn frz_context_set_log(
 
 /// Sets how much memory an object may take that is made or changed with this context.
 ///
-/// The need is estimated before memory is taken; a call that would need more answers FRZ_ERROR_MEMORY and changes
+/// The need is estimated before memory is taken; a call that would need more returns FRZ_ERROR_MEMORY and changes
 /// nothing. It is a guard against a wrong voxel size, not an account of every byte.
 ///
 /// bytes: 0 for the limit of a new context, the machine's memory; UINT64_MAX for none.
@@ -345,8 +338,8 @@ pub unsafe extern "C" fn frz_context_set_memory_limit(context: *mut frz_context,
     })
 }
 
-/// Cancels the call that runs with the context, and every later one until frz_context_reset: they answer
-/// FRZ_CANCELLED and change nothing. A call whose work is done when the cancel comes answers as if there were none.
+/// Cancels the call that runs with the context, and every later one until frz_context_reset: they return
+/// FRZ_CANCELLED and change nothing. A call whose work is done when the cancel comes returns as if there were none.
 ///
 /// context: may be NULL.
 ///
@@ -359,8 +352,8 @@ pub unsafe extern "C" fn frz_context_cancel(context: *mut frz_context) {
     }
 }
 
-/// Forgets a cancel, and counts stages from 0 again, for the calls that follow. A call that runs meanwhile keeps its
-/// cancel: it never goes on with half of its work left out.
+/// Clears a cancel and restarts the count of phases, for the calls that follow. A call that runs meanwhile keeps its
+/// cancel: it never continues with half of its work left out.
 ///
 /// context: may be NULL.
 ///
@@ -374,9 +367,9 @@ pub unsafe extern "C" fn frz_context_reset(context: *mut frz_context) {
     });
 }
 
-/// Tells what the context is doing.
+/// Reports what the context is doing.
 ///
-/// out: receives it; all zeroes after a failure, but for the fraction.
+/// out: receives it; all zeroes after a failure, except the fraction.
 ///
 /// Any thread, any time.
 #[unsafe(no_mangle)]
@@ -397,10 +390,11 @@ pub unsafe extern "C" fn frz_context_progress(
     })
 }
 
-/// Tells how long the stages of the last call took that had any, in order.
+/// Reports how long the phases of the last call with phases took, in the order of their first runs; a phase that ran
+/// several times is one entry with the sum.
 ///
-/// dst: room for frz_stage_time; with data NULL only the number is told. FRZ_ERROR_CAPACITY when it is too small.
-/// count: receives the number of stages; 0 after other failures.
+/// dst: room for frz_stage_time; with data NULL only the count is reported. FRZ_ERROR_CAPACITY when it is too small.
+/// count: receives the number of phases; 0 after other failures.
 ///
 /// One thread at a time.
 #[unsafe(no_mangle)]
@@ -416,7 +410,7 @@ pub unsafe extern "C" fn frz_context_timings(
             count.write(0);
             let call = enter(context)?;
             let timings = call.0.timings.lock().unwrap_or_else(PoisonError::into_inner);
-            let time = |time: &StageTime| frz_stage_time {
+            let time = |time: &PhaseTime| frz_stage_time {
                 stage: letters(time.name),
                 seconds: time.time.as_secs_f64(),
             };

@@ -1,4 +1,4 @@
-//! Sparse grids: of floats, and what those of vectors share with them.
+//! Sparse grids of floats, and what they have in common with those of vectors.
 
 use std::ffi::{c_char, c_void};
 use std::ptr::NonNull;
@@ -15,11 +15,11 @@ pub struct frz_grid {
     _opaque: [u8; 0],
 }
 
-/// What a grid's values mean.
+/// The meaning of a grid's values.
 #[repr(u32)]
 #[derive(Clone, Copy)]
 pub enum frz_grid_class {
-    /// Nothing said.
+    /// Not specified.
     FRZ_GRID_UNKNOWN = 0,
     /// Signed distances (m), negative inside, cut off at the background.
     FRZ_GRID_LEVEL_SET = 1,
@@ -29,7 +29,7 @@ pub enum frz_grid_class {
     FRZ_GRID_STAGGERED = 3,
 }
 
-/// What a voxel of a grid holds.
+/// The type of a grid's values.
 #[repr(u32)]
 #[derive(Clone, Copy)]
 pub enum frz_value_type {
@@ -39,7 +39,7 @@ pub enum frz_value_type {
     FRZ_VALUE_VECTOR = 1,
 }
 
-/// What a grid is.
+/// Properties of a grid.
 #[repr(C)]
 #[derive(Clone, Copy)]
 pub struct frz_grid_info {
@@ -75,7 +75,7 @@ unsafe impl Sized32 for frz_grid_info {
     const NAME: &'static str = "frz_grid_info";
 }
 
-/// What a grid's handle holds.
+/// The value of a grid's handle.
 pub(super) enum Grid {
     /// The host's own.
     Own(AnyGrid),
@@ -95,7 +95,7 @@ impl From<FloatGrid> for Grid {
     }
 }
 
-/// What is said of a grid with other values than a function takes.
+/// The error for a grid whose values a function does not accept.
 fn of_another_kind(name: &str, holds: &str, needed: &str) -> Failure {
     let name = if name.is_empty() { String::new() } else { format!(" \"{name}\"") };
     Failure::argument(format!("the grid{name} holds {holds}, but one of {needed} is needed"))
@@ -207,7 +207,7 @@ pub unsafe extern "C" fn frz_grid_copy(
     }
 }
 
-/// Tells what a grid is.
+/// Reports the properties of a grid.
 ///
 /// info: receives it; its struct_size says how much of it the caller knows.
 ///
@@ -245,7 +245,7 @@ pub unsafe extern "C" fn frz_grid_get_info(grid: *const frz_grid, info: *mut frz
 
 /// Copies a grid's name, in UTF-8 with a zero at its end.
 ///
-/// dst: room for capacity bytes; NULL only asks for the size. FRZ_ERROR_CAPACITY when it is too small.
+/// dst: room for capacity bytes; NULL only queries the size. FRZ_ERROR_CAPACITY when it is too small.
 /// capacity: bytes at dst.
 /// size: receives the bytes that are needed, the zero counted; 0 after other failures.
 ///

@@ -102,7 +102,7 @@ pub unsafe extern "C" fn frz_grid_load(
     out: *mut *mut frz_grid,
 ) -> frz_status {
     let load = |ctx: &Context, path: &Path, name: Option<&str>| {
-        Ok(ctx.stage("read", || {
+        Ok(ctx.phase("read", || {
             let memory = file::describe(path)?.iter().filter_map(|grid| grid.memory).max();
             ctx.allow(&path.display().to_string(), memory.unwrap_or(0))?;
             file::read_any(path, name)
@@ -112,7 +112,7 @@ pub unsafe extern "C" fn frz_grid_load(
     unsafe { loads(context, [path, name], out, load) }
 }
 
-/// Writes grids into one .vdb file. The file is there when it is whole: it is written under another name first. A cancel is
+/// Writes grids into one .vdb file. The file appears only when complete: it is written under another name first. A cancel is
 /// heeded before it is begun, not within.
 ///
 /// grids: count pointers to grids of different names.
@@ -139,7 +139,7 @@ pub unsafe extern "C" fn frz_grid_save(
             let options = options(compression, flags)?;
             let grids = several(grids, count)?;
             let list: Vec<GridRef<'_>> = grids.iter().map(|grid| grid.any()).collect();
-            Ok(ctx.stage_in_place("write", || file::write_any(path, &list, &options))?)
+            Ok(ctx.phase_in_place("write", || file::write_any(path, &list, &options))?)
         }
     })
 }
@@ -168,7 +168,7 @@ pub unsafe extern "C" fn frz_grid_from_bytes(
             ctx.allow("a grid from bytes", size as u64)?;
             let bytes = frz_view { data: bytes, count: size, stride: 0 }.elements::<u8>("bytes")?;
             let name = text(name, "name")?;
-            Ok(Grid::Own(ctx.stage("read", || file::any_from_bytes(&bytes, name))?))
+            Ok(Grid::Own(ctx.phase("read", || file::any_from_bytes(&bytes, name))?))
         })
     }
 }
@@ -205,7 +205,7 @@ pub unsafe extern "C" fn frz_grid_to_bytes(
             let grids = several(grids, count)?;
             let list: Vec<GridRef<'_>> = grids.iter().map(|grid| grid.any()).collect();
             let bound = || list.iter().map(|grid| grid.file_bound() as usize).sum();
-            let bytes = || Ok(ctx.stage("write", || file::any_to_bytes(&list, &options))?);
+            let bytes = || Ok(ctx.phase("write", || file::any_to_bytes(&list, &options))?);
             write_bytes(dst, capacity, size, bound, bytes)
         }
     })

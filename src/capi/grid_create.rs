@@ -13,7 +13,7 @@ use crate::base::blocks::{Block, BlockEdit, DIM, Mask, Origin, VOXELS, Values};
 use crate::context::Context;
 use crate::vdb::{AnyGrid, FloatGrid, GridClass, VectorEdit, VectorGrid, Vectors};
 
-/// What a grid is made of.
+/// Description of a new grid.
 #[repr(C)]
 #[derive(Clone, Copy)]
 pub struct frz_grid_desc {
@@ -29,7 +29,7 @@ pub struct frz_grid_desc {
     pub background: f32,
     /// 0.
     pub flags: u32,
-    /// Leaves, at different places; NULL for none. Values are finite. A mask of NULL makes all voxels active, of a
+    /// Leaves, with different origins; NULL for none. Values are finite. A mask of NULL makes all voxels active, of a
     /// level set those nearer than the background.
     pub leaves: *const frz_leaf,
     /// Number of leaves, or of vector_leaves.
@@ -45,7 +45,7 @@ pub struct frz_grid_desc {
 }
 
 impl frz_grid_desc {
-    /// What fields have that a header does not know.
+    /// Values of fields that an older header does not have.
     const NONE: Self = Self {
         struct_size: 0,
         grid_class: 0,
@@ -86,7 +86,7 @@ impl Places {
     }
 }
 
-/// Refuses values of a leaf that are no numbers.
+/// Refuses values of a leaf that are not finite.
 fn check_values(at: usize, values: &[f32]) -> Outcome {
     if values.iter().all(|value| value.is_finite()) {
         return Ok(());
@@ -184,7 +184,7 @@ unsafe fn of_vectors(ctx: &Context, desc: &frz_grid_desc, class: GridClass) -> O
         return Err(Failure::argument("background_vector is not finite"));
     }
     if !matches!(class, GridClass::Unknown | GridClass::Staggered) {
-        return Err(Failure::argument("grid_class: vectors are no level set and no fog"));
+        return Err(Failure::argument("grid_class: vectors are neither a level set nor fog"));
     }
     let bytes = (VOXELS * 2 * size_of::<[f32; 3]>() + 64) as u64;
     ctx.allow("a grid", (desc.leaf_count as u64).saturating_mul(bytes))?;
@@ -226,7 +226,7 @@ unsafe fn edits(desc: &frz_grid_desc) -> Outcome<Vec<VectorEdit>> {
 
 /// Makes a grid from blocks of voxels, which are copied.
 ///
-/// desc: what it is made of.
+/// desc: its description.
 /// out: receives the grid, to be destroyed with frz_grid_destroy; NULL after a failure.
 ///
 /// One thread at a time for each context.

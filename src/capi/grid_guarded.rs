@@ -40,7 +40,7 @@ pub unsafe extern "C" fn frz_grid_load_guarded(
                 threads: ctx.pool().threads(),
                 cancel: ctx.cancel_flags()[1].clone(),
             };
-            let grid = ctx.stage("read", || guard.read_any(path, name))?;
+            let grid = ctx.phase("read", || guard.read_any(path, name))?;
             ctx.allow(&path.display().to_string(), grid.borrow().memory_bytes())?;
             Ok(grid)
         })

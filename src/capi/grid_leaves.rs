@@ -49,7 +49,7 @@ const FARTHEST: i32 = 1 << 30;
 /// Checks the place of a block.
 pub(super) fn check_origin(origin: Origin) -> Outcome<Origin> {
     if origin.iter().any(|&index| index & 7 != 0 || !(-FARTHEST..=FARTHEST).contains(&index)) {
-        let text = format!("origin {origin:?} is no block's: multiples of 8 within -2^30 to 2^30");
+        let text = format!("origin {origin:?} is not a block's: multiples of 8 within -2^30 to 2^30");
         return Err(Failure::argument(text));
     }
     Ok(origin)
@@ -64,7 +64,7 @@ fn leaf_view(leaf: &Leaf<'_>) -> frz_leaf {
 /// Blocks without a leaf have one value: the background, or for a level set plus or minus the background. Values of a
 /// level set are distances (m).
 ///
-/// dst: room for leaf_count elements of frz_leaf; with data NULL only the number is told. FRZ_ERROR_CAPACITY when it
+/// dst: room for leaf_count elements of frz_leaf; with data NULL only the count is reported. FRZ_ERROR_CAPACITY when it
 ///     is too small. The pointers in it are the grid's: they stay until it is changed or destroyed, those of a base
 ///     layer until its next step.
 /// count: receives the number of leaves; 0 after other failures.
@@ -88,7 +88,7 @@ pub unsafe extern "C" fn frz_grid_leaves(
     })
 }
 
-/// Lends what a grid of floats holds at some places: leaves, or the value of all 512 voxels.
+/// Lends the leaves of a grid of floats at some origins, or the value of all 512 voxels there.
 ///
 /// origins: int32_t[3] for each place, multiples of 8, for instance those of frz_base_dirty.
 /// dst: room for as many elements of frz_leaf, whose pointers stay as those of frz_grid_leaves do.
@@ -125,9 +125,9 @@ fn vector_leaf_view(leaf: &VectorLeaf<'_>) -> frz_vector_leaf {
 
 /// Lends the leaves of a grid of vectors without copying them, in an order that does not change while the grid does not.
 ///
-/// Blocks without a leaf have one value: the background, or what frz_grid_vector_probe finds.
+/// Blocks without a leaf have one value: the background, or that of frz_grid_vector_probe.
 ///
-/// dst: room for leaf_count elements of frz_vector_leaf; with data NULL only the number is told. FRZ_ERROR_CAPACITY when
+/// dst: room for leaf_count elements of frz_vector_leaf; with data NULL only the count is reported. FRZ_ERROR_CAPACITY when
 ///     it is too small. The pointers in it are the grid's: they stay until it is destroyed.
 /// count: receives the number of leaves; 0 after other failures.
 ///
@@ -150,7 +150,7 @@ pub unsafe extern "C" fn frz_grid_vector_leaves(
     })
 }
 
-/// Lends what a grid of vectors holds at some places: leaves, or the value of all 512 voxels.
+/// Lends the leaves of a grid of vectors at some origins, or the value of all 512 voxels there.
 ///
 /// origins: int32_t[3] for each place, multiples of 8.
 /// dst: room for as many elements of frz_vector_leaf, whose pointers stay as those of frz_grid_vector_leaves do.

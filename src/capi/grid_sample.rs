@@ -52,7 +52,7 @@ fn in_pieces<T: Clone + Send>(
 ) -> Outcome<Vec<T>> {
     let bytes = size_of::<DVec3>() + size_of::<T>();
     ctx.allow("the samples", (positions.len() as u64).saturating_mul(bytes as u64))?;
-    Ok(ctx.stage("sample", || {
+    Ok(ctx.phase("sample", || {
         ctx.expect(positions.len().div_ceil(PIECE));
         let mut out = Vec::with_capacity(positions.len());
         for piece in positions.chunks(PIECE) {
@@ -234,7 +234,7 @@ pub unsafe extern "C" fn frz_grid_to_mesh(
     unsafe {
         meshes(context, grid, [iso, adaptivity], out, |ctx, grid| {
             ctx.allow("a mesh of the grid", grid.leaf_count() as u64 * BYTES_PER_LEAF)?;
-            Ok(ctx.stage("mesh", || level_set::to_mesh(ctx, grid, iso, adaptivity))?)
+            Ok(ctx.phase("mesh", || level_set::to_mesh(ctx, grid, iso, adaptivity))?)
         })
     }
 }
@@ -269,12 +269,12 @@ pub unsafe extern "C" fn frz_grid_to_mesh_box(
                 return Err(Failure::argument(text));
             }
             ctx.allow("a mesh of the grid", grid.leaf_count() as u64 * BYTES_PER_LEAF)?;
-            Ok(ctx.stage("mesh", || level_set::box_to_mesh(ctx, grid, iso, adaptivity, corners))?)
+            Ok(ctx.phase("mesh", || level_set::box_to_mesh(ctx, grid, iso, adaptivity, corners))?)
         })
     }
 }
 
-/// As frz_grid_to_mesh, of some blocks only, for instance those of frz_base_dirty: what it costs grows with their number.
+/// As frz_grid_to_mesh, of some blocks only, for instance those of frz_base_dirty: the cost grows with their number.
 /// The meshes of different blocks meet; each triangle is in one.
 ///
 /// origins: int32_t[3] for each block, multiples of 8.
@@ -296,7 +296,7 @@ pub unsafe extern "C" fn frz_grid_to_mesh_blocks(
             let origins = origins.elements::<[i32; 3]>("origins")?;
             origins.iter().try_for_each(|&origin| check_origin(origin).map(drop))?;
             ctx.allow("a mesh of the blocks", origins.len() as u64 * BYTES_PER_LEAF)?;
-            Ok(ctx.stage("mesh", || level_set::blocks_to_mesh(ctx, grid, iso, adaptivity, &origins))?)
+            Ok(ctx.phase("mesh", || level_set::blocks_to_mesh(ctx, grid, iso, adaptivity, &origins))?)
         })
     }
 }

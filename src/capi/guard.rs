@@ -1,4 +1,4 @@
-//! The border: nothing that goes wrong inside leaves as anything but a status and a text.
+//! The border: every failure inside becomes a status and a message.
 
 use std::any::Any;
 use std::cell::{Cell, RefCell};
@@ -8,15 +8,15 @@ use std::sync::Once;
 
 use crate::error::Error;
 
-/// What a function answers. Numbers never change; new ones are added at the end.
+/// Status codes. Numbers never change; new ones are added at the end.
 #[repr(u32)]
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum frz_status {
     /// Done.
     FRZ_OK = 0,
-    /// An argument is NULL, out of range or not finite: the caller mends it.
+    /// An argument is NULL, out of range or not finite.
     FRZ_ERROR_ARGUMENT = 1,
-    /// What a file, or bytes in its place, holds cannot be used.
+    /// The contents of a file, or of bytes in its place, cannot be used.
     FRZ_ERROR_FILE = 2,
     /// The operating system refused to read or write.
     FRZ_ERROR_IO = 3,
@@ -24,9 +24,9 @@ pub enum frz_status {
     FRZ_ERROR_MEMORY = 4,
     /// The context was cancelled; everything is as it was before the call.
     FRZ_CANCELLED = 5,
-    /// OpenVDB cannot do what is wanted, for a reason that no other status stands for.
+    /// OpenVDB cannot do this, for a reason that no other status covers.
     FRZ_ERROR_OPENVDB = 6,
-    /// A promise inside the library does not hold: a bug of frazil. What the call worked on is poisoned.
+    /// An invariant of the library does not hold: a bug of frazil. The objects of the call are poisoned.
     FRZ_ERROR_INTERNAL = 7,
     /// The handle saw FRZ_ERROR_INTERNAL before: it can only be destroyed.
     FRZ_ERROR_POISONED = 8,
@@ -36,13 +36,13 @@ pub enum frz_status {
     FRZ_ERROR_CAPACITY = 10,
     /// The caller's header and this library do not fit together.
     FRZ_ERROR_VERSION = 11,
-    /// The pointer is no handle of the kind that is wanted.
+    /// The pointer is not a handle of the required kind.
     FRZ_ERROR_HANDLE = 12,
 }
 
 use frz_status::*;
 
-/// What went wrong, on its way out.
+/// A failure: its status and message.
 pub(super) struct Failure {
     /// The number.
     pub status: frz_status,
@@ -59,7 +59,7 @@ impl Failure {
         Self { status, text: text.into() }
     }
 
-    /// An argument that the caller has to mend.
+    /// Invalid argument.
     pub(super) fn argument(text: impl Into<String>) -> Self {
         Self::new(FRZ_ERROR_ARGUMENT, text)
     }
@@ -105,7 +105,7 @@ pub(super) fn guard(body: impl FnOnce() -> Outcome) -> frz_status {
     failure.status
 }
 
-/// As [`guard`], for functions that answer something else than a status: `otherwise` when they fail.
+/// As [`guard`], for functions that return something else than a status: `otherwise` when they fail.
 pub(super) fn guard_value<T>(otherwise: T, body: impl FnOnce() -> Outcome<T>) -> T {
     let mut value = otherwise;
     guard(|| {
@@ -146,7 +146,7 @@ fn words(panic: &(dyn Any + Send)) -> &str {
     text.or_else(|| panic.downcast_ref::<String>().map(String::as_str)).unwrap_or("a panic without words")
 }
 
-/// Panics inside calls are told by status, never printed; others are left to whoever told them before.
+/// Panics inside calls are reported by status and not printed; others go to the previous panic hook.
 fn keep_quiet() {
     static ONCE: Once = Once::new();
     ONCE.call_once(|| {

@@ -1,4 +1,4 @@
-//! Handles: what a host holds by pointer. A pointer that is NULL, of another kind, in use or poisoned is told so.
+//! Handles: objects that a host holds by pointer. A pointer that is NULL, of another kind, in use or poisoned is an error.
 
 use std::cell::UnsafeCell;
 use std::ops::{Deref, DerefMut};
@@ -11,15 +11,15 @@ use super::guard::{Failure, Outcome};
 ///
 /// C knows only its name: a pointer to it is one to a [`Handle`] with its value.
 pub(super) trait Noun {
-    /// What the handle holds.
+    /// The value of the handle.
     type Value;
     /// Its name in messages.
     const NAME: &'static str;
-    /// What tells its memory from that of others.
+    /// Identifies its memory.
     const TAG: u32;
 }
 
-/// Memory of a destroyed handle, as long as nobody else uses it.
+/// Memory of a destroyed handle, until it is used again.
 const GONE: u32 = 0xdead_0fff;
 /// Users of a handle that is being changed.
 const CHANGING: i32 = -1;
@@ -57,7 +57,7 @@ pub(super) unsafe fn give<N: Noun>(out: *mut *mut N, value: N::Value) -> Outcome
     Ok(())
 }
 
-/// Zeroes what a call tells besides its status, if it is asked for: so it is after every failure.
+/// Zeroes the output of a call, if requested: its value after every failure.
 ///
 /// # Safety
 /// `out` must be NULL or point to memory for a number or pointer.
@@ -86,14 +86,14 @@ unsafe fn look<'a, N: Noun>(pointer: *const N) -> Outcome<&'a Handle<N::Value>> 
         return Err(Failure::argument(format!("the {} is NULL", N::NAME)));
     }
     if !handle.is_aligned() {
-        return Err(Failure::new(FRZ_ERROR_HANDLE, format!("the pointer is no {}", N::NAME)));
+        return Err(Failure::new(FRZ_ERROR_HANDLE, format!("the pointer is not a {}", N::NAME)));
     }
     // SAFETY: the caller's promise; handles of all kinds begin with their tag.
     match unsafe { &(*handle).tag }.load(Ordering::Acquire) {
         // SAFETY: the tag says that it is a handle of this kind.
         tag if tag == N::TAG => Ok(unsafe { &*handle }),
         GONE => Err(Failure::new(FRZ_ERROR_HANDLE, format!("the {} was destroyed", N::NAME))),
-        _ => Err(Failure::new(FRZ_ERROR_HANDLE, format!("the pointer is no {}", N::NAME))),
+        _ => Err(Failure::new(FRZ_ERROR_HANDLE, format!("the pointer is not a {}", N::NAME))),
     }
 }
 
@@ -128,10 +128,10 @@ pub(super) unsafe fn change<'a, N: Noun>(pointer: *mut N) -> Outcome<Changing<'a
     Ok(changing)
 }
 
-/// Destroys a handle; NULL is fine, and what is in use stays.
+/// Destroys a handle; NULL is fine, and a handle in use is kept.
 ///
 /// # Safety
-/// As [`read`]; nobody may use the handle afterwards.
+/// As [`read`]; the handle must not be used afterwards.
 pub(super) unsafe fn destroy<N: Noun>(pointer: *mut N) -> Outcome {
     // SAFETY: the caller's promise; there are no parts.
     unsafe { destroy_whole::<N, N>(pointer, |_| Vec::new()) }
@@ -157,17 +157,17 @@ pub(super) unsafe fn destroy_whole<N: Noun, P: Noun>(
     // SAFETY: they live as long as the value.
     let take = |part: &*mut P| seize::<P>(unsafe { look(part.cast_const()) }?);
     let parts = lent.iter().map(take).collect::<Outcome<Vec<Seized<'_, P::Value>>>>()?;
-    // All of them are nobody's now, and stay so.
+    // None of them is in use now, nor can be again.
     std::mem::forget((whole, parts));
     // SAFETY: made by `give`, and nobody uses it.
     unsafe { free(pointer) };
     Ok(())
 }
 
-/// Destroys a handle that nobody can use any more.
+/// Destroys a handle that can no longer be used.
 ///
 /// # Safety
-/// It must come from [`give`], and nobody may use it now or afterwards.
+/// It must come from [`give`], and must not be used now or afterwards.
 pub(super) unsafe fn free<N: Noun>(pointer: *mut N) {
     if pointer.is_null() {
         return;
@@ -180,7 +180,7 @@ pub(super) unsafe fn free<N: Noun>(pointer: *mut N) {
     }
 }
 
-/// A handle that nobody else may begin to use; poisoned or not.
+/// A handle that is locked against use; poisoned or not.
 struct Seized<'a, T>(&'a Handle<T>);
 
 fn seize<N: Noun>(handle: &Handle<N::Value>) -> Outcome<Seized<'_, N::Value>> {

@@ -15,7 +15,7 @@ use crate::sweep::{self, Body, Settings, surface_bytes};
 use crate::vdb::level_set::{self, Scheme};
 use crate::vdb::{FloatGrid, GridClass};
 
-/// What frz_levelset_csg makes.
+/// Operations of frz_levelset_csg.
 #[repr(u32)]
 #[derive(Clone, Copy)]
 pub enum frz_csg {
@@ -27,7 +27,7 @@ pub enum frz_csg {
     FRZ_CSG_INTERSECTION = 2,
 }
 
-/// What frz_levelset_smooth does.
+/// Filters of frz_levelset_smooth.
 #[repr(u32)]
 #[derive(Clone, Copy)]
 pub enum frz_smoothing {
@@ -63,10 +63,10 @@ pub struct frz_noise {
 }
 
 impl frz_noise {
-    /// What a host gets that asks for nothing.
+    /// The defaults of a host.
     pub(super) const USUAL: Self = Self { amplitude: -1.0, size: -1.0, octaves: 3, seed: 0 };
 
-    /// Refuses what is no number.
+    /// Refuses values that are not finite.
     pub(super) fn check(&self) -> Outcome {
         finite("noise amplitude", self.amplitude)?;
         finite("noise size", self.size)
@@ -105,10 +105,10 @@ fn scheme_of(number: u32) -> Outcome<Scheme> {
 type Join = fn(&Context, &FloatGrid, &FloatGrid) -> Result<FloatGrid>;
 type Filter = fn(&Context, &mut FloatGrid, u32, u32, Scheme) -> Result<()>;
 
-/// Refuses what is no level set.
+/// Refuses a grid that is not a level set.
 fn level_set_of(grid: &FloatGrid) -> Outcome<&FloatGrid> {
     if grid.class() != GridClass::LevelSet {
-        return Err(Failure::argument("the grid is no level set"));
+        return Err(Failure::argument("the grid is not a level set"));
     }
     Ok(grid)
 }
@@ -204,7 +204,7 @@ pub unsafe extern "C" fn frz_levelset_from_particles(
             ctx.allow("a level set of the spheres", surface_bytes(area, voxel_size))?;
             reachable(&positions, &radii, voxel_size)?;
             let positions: Vec<DVec3> = positions.iter().map(|&p| DVec3::from(p.map(f64::from))).collect();
-            let grid = ctx.stage("spheres", || {
+            let grid = ctx.phase("spheres", || {
                 level_set::from_particles(ctx, &positions, &radii, voxel_size, settings.half_width)
             })?;
             Ok(Grid::from(grid))
@@ -249,7 +249,7 @@ pub unsafe extern "C" fn frz_levelset_csg(
                 (frz_csg::FRZ_CSG_INTERSECTION as u32, level_set::intersection_copy),
             ];
             let tool = meaning("operation", "frz_csg", operation, &known)?;
-            let mut joined = ctx.stage("csg", || tool(ctx, first, second))?;
+            let mut joined = ctx.phase("csg", || tool(ctx, first, second))?;
             joined.set_name(&first.name())?;
             *first = joined;
             Ok(())
@@ -281,7 +281,7 @@ pub unsafe extern "C" fn frz_levelset_offset(
                 return Err(Failure::argument(format!("distance = {distance} m is more than 1000 voxels")));
             }
             ctx.allow("the moved level set", grown_bytes(grid, voxels))?;
-            Ok(ctx.stage_in_place("offset", || level_set::offset(ctx, grid, distance, scheme))?)
+            Ok(ctx.phase_in_place("offset", || level_set::offset(ctx, grid, distance, scheme))?)
         })
     }
 }
@@ -327,7 +327,7 @@ pub unsafe extern "C" fn frz_levelset_smooth(
                 (frz_smoothing::FRZ_SMOOTH_GAUSSIAN as u32, level_set::gaussian_filter),
             ];
             let filter = meaning("smoothing", "frz_smoothing", smoothing, &known)?;
-            Ok(ctx.stage_in_place("smooth", || filter(ctx, grid, width, times, scheme))?)
+            Ok(ctx.phase_in_place("smooth", || filter(ctx, grid, width, times, scheme))?)
         })
     }
 }
@@ -396,7 +396,7 @@ pub unsafe extern "C" fn frz_levelset_sweep(
     }
 }
 
-/// Farthest a sweep reaches from its first vertex (voxels): what a lattice does, less the block that its base lies in.
+/// Farthest a sweep reaches from its first vertex (voxels): the reach of the lattice, minus one block for its origin.
 const REACH: f64 = 131_064.0;
 
 /// Refuses bodies that go farther than a sweep's lattice reaches, by their number.

@@ -1,4 +1,4 @@
-//! The library itself: versions, names of answers, the last error.
+//! The library itself: versions, names of status codes, the last error.
 
 use std::ffi::{CStr, c_char};
 
@@ -13,7 +13,7 @@ pub const FRZ_VERSION_MINOR: u32 = 1;
 /// Third number of that version.
 pub const FRZ_VERSION_PATCH: u32 = 0;
 
-/// Tells the version of the library that is linked: major * 1000000 + minor * 1000 + patch.
+/// Reports the version of the library that is linked: major * 1000000 + minor * 1000 + patch.
 ///
 /// Any thread, any time.
 #[unsafe(no_mangle)]
@@ -46,11 +46,11 @@ pub extern "C" fn frz_status_name(status: u32) -> *const c_char {
     NAMES.get(status as usize).copied().unwrap_or(c"unknown status").as_ptr()
 }
 
-/// Tells what went wrong in the last call of this thread that did not answer FRZ_OK: one sentence in UTF-8 that names
+/// Returns the message of the last call of this thread that did not return FRZ_OK: one sentence in UTF-8 that names
 /// what is at fault; empty before the first.
 ///
 /// Any thread, any time. The text is the library's, and stays until the next call of this thread that fails. Calls
-/// that succeed leave it alone: ask only after a failure.
+/// that succeed do not change it: query it only after a failure.
 #[unsafe(no_mangle)]
 pub extern "C" fn frz_last_error() -> *const c_char {
     last_error()

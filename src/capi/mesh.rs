@@ -26,7 +26,7 @@ pub struct frz_attribute {
     pub values: frz_view,
 }
 
-/// What a mesh is made of.
+/// Description of a new mesh.
 #[repr(C)]
 #[derive(Clone, Copy)]
 pub struct frz_mesh_desc {
@@ -56,7 +56,7 @@ unsafe impl Sized32 for frz_mesh_desc {
     const NAME: &'static str = "frz_mesh_desc";
 }
 
-/// What a mesh is.
+/// Properties of a mesh.
 #[repr(C)]
 #[derive(Clone, Copy)]
 pub struct frz_mesh_info {
@@ -90,7 +90,7 @@ unsafe impl Sized32 for frz_mesh_info {
     const NAME: &'static str = "frz_mesh_info";
 }
 
-/// What frz_mesh_read reads.
+/// Arrays that frz_mesh_read reads.
 #[repr(u32)]
 #[derive(Clone, Copy)]
 pub enum frz_mesh_part {
@@ -107,7 +107,7 @@ pub enum frz_mesh_part {
     FRZ_MESH_NORMALS = 4,
 }
 
-/// What a mesh's handle holds.
+/// The value of a mesh's handle.
 pub(super) struct Mesh {
     polygons: PolygonMesh,
     /// Its faces as triangles, cut once.
@@ -142,7 +142,7 @@ impl Mesh {
     }
 }
 
-/// Polygons out of a host's arrays, checked.
+/// Polygons from a host's arrays, checked.
 ///
 /// # Safety
 /// The views must describe memory that can be read.
@@ -152,51 +152,15 @@ pub(super) unsafe fn polygons(
     indices: &frz_view,
 ) -> Outcome<PolygonMesh> {
     // SAFETY: the caller's promise.
-    let (positions, counts_, corners) = unsafe {
-        (
-            positions.finite("positions")?,
-            if counts.data.is_null() && counts.count == 0 {
-                None
-            } else {
-                Some(counts.elements::<u32>("face_counts")?)
-            },
-            indices.elements::<u32>("indices")?,
-        )
+    let (positions, counts, corners) = unsafe {
+        (positions.finite("positions")?, face_counts(counts)?, indices.elements::<u32>("indices")?)
     };
-    if u32::try_from(positions.len()).is_err() || u32::try_from(corners.len()).is_err() {
-        return Err(Failure::argument("a mesh has at most 4294967295 vertices and corners"));
-    }
-    let count = positions.len();
-    if let Some(at) = corners.iter().position(|&vertex| vertex as usize >= count) {
-        return Err(Failure::argument(format!(
-            "indices: corner {at} names vertex {} of {count}",
-            corners[at]
-        )));
-    }
-    let mut mesh =
-        PolygonMesh { positions: positions.into_iter().map(Vec3::from).collect(), ..PolygonMesh::default() };
-    match counts_ {
-        None if !corners.len().is_multiple_of(3) => {
-            let text = format!("indices: {} corners are no whole number of triangles", corners.len());
-            return Err(Failure::argument(text));
-        }
-        None => {
-            mesh.ends = (3..=corners.len() as u32).step_by(3).collect();
-            mesh.corners = corners;
-        }
-        Some(counts) => {
-            let sum: u64 = counts.iter().map(|&count| u64::from(count)).sum();
-            if sum != corners.len() as u64 {
-                let text = format!("face_counts: the faces have {sum} corners, indices {}", corners.len());
-                return Err(Failure::argument(text));
-            }
-            let mut rest = corners.as_slice();
-            for count in counts {
-                let (face, left) = rest.split_at(count as usize);
-                mesh.push(face.iter().copied());
-                rest = left;
-            }
-        }
+    check_corners(&corners, positions.len())?;
+    let positions = positions.into_iter().map(Vec3::from).collect();
+    let mut mesh = PolygonMesh { positions, ..PolygonMesh::default() };
+    match counts {
+        None => set_triangles(&mut mesh, corners)?,
+        Some(counts) => push_faces(&mut mesh, &corners, counts)?,
     }
     if mesh.ends.is_empty() {
         return Err(Failure::argument("indices: the mesh has no faces"));
@@ -204,12 +168,62 @@ pub(super) unsafe fn polygons(
     Ok(mesh)
 }
 
+/// The corners of each face; none where all are triangles.
+///
+/// # Safety
+/// As [`polygons`].
+unsafe fn face_counts(counts: &frz_view) -> Outcome<Option<Vec<u32>>> {
+    if counts.data.is_null() && counts.count == 0 {
+        return Ok(None);
+    }
+    // SAFETY: the caller's promise.
+    unsafe { counts.elements::<u32>("face_counts") }.map(Some)
+}
+
+/// Refuses too many vertices or corners, and corners out of range.
+fn check_corners(corners: &[u32], vertices: usize) -> Outcome {
+    if u32::try_from(vertices).is_err() || u32::try_from(corners.len()).is_err() {
+        return Err(Failure::argument("a mesh has at most 4294967295 vertices and corners"));
+    }
+    match corners.iter().position(|&vertex| vertex as usize >= vertices) {
+        None => Ok(()),
+        Some(at) => {
+            Err(Failure::argument(format!("indices: corner {at} names vertex {} of {vertices}", corners[at])))
+        }
+    }
+}
+
+fn set_triangles(mesh: &mut PolygonMesh, corners: Vec<u32>) -> Outcome {
+    if !corners.len().is_multiple_of(3) {
+        let text = format!("indices: {} corners are not a multiple of 3", corners.len());
+        return Err(Failure::argument(text));
+    }
+    mesh.ends = (3..=corners.len() as u32).step_by(3).collect();
+    mesh.corners = corners;
+    Ok(())
+}
+
+fn push_faces(mesh: &mut PolygonMesh, corners: &[u32], counts: Vec<u32>) -> Outcome {
+    let sum: u64 = counts.iter().map(|&count| u64::from(count)).sum();
+    if sum != corners.len() as u64 {
+        let text = format!("face_counts: the faces have {sum} corners, indices {}", corners.len());
+        return Err(Failure::argument(text));
+    }
+    let mut rest = corners;
+    for count in counts {
+        let (face, left) = rest.split_at(count as usize);
+        mesh.push(face.iter().copied());
+        rest = left;
+    }
+    Ok(())
+}
+
 /// Makes a mesh from a host's arrays, which are copied.
 ///
 /// Faces may have any number of corners, convex or not, and meshes may be open, cross themselves and repeat vertices;
 /// they are cut into triangles once.
 ///
-/// desc: what it is made of. Counts, strides, indices and positions are checked: the error names the first at fault,
+/// desc: its description. Counts, strides, indices and positions are checked: the error names the first at fault,
 ///     counted from 0.
 /// out: receives the mesh, to be destroyed with frz_mesh_destroy; NULL after a failure.
 ///
@@ -245,7 +259,7 @@ pub unsafe extern "C" fn frz_mesh_create(
 }
 
 fn made(ctx: &Context, polygons: PolygonMesh, attributes: Vec<Attribute>) -> Outcome<Mesh> {
-    let triangles = ctx.stage("triangles", || Ok(polygons.clone().into_triangles()))?;
+    let triangles = ctx.phase("triangles", || Ok(polygons.clone().into_triangles()))?;
     Ok(Mesh { polygons, triangles, attributes })
 }
 
@@ -305,7 +319,7 @@ pub unsafe extern "C" fn frz_mesh_destroy(mesh: *mut frz_mesh) {
     guard(|| unsafe { destroy(mesh) });
 }
 
-/// Tells what a mesh is: the counts that frz_mesh_read needs room for, its box, area and volume.
+/// Reports the properties of a mesh: the counts that frz_mesh_read needs room for, its box, area and volume.
 ///
 /// info: receives it; its struct_size says how much of it the caller knows.
 ///
@@ -346,7 +360,7 @@ unsafe fn triples(dst: &frz_span, triples: &[Vec3]) -> Outcome {
 /// Copies a part of a mesh into the caller's memory.
 ///
 /// part: a frz_mesh_part.
-/// dst: room for as many elements as frz_mesh_get_info tells, of the type that the part has: FRZ_ERROR_CAPACITY when
+/// dst: room for as many elements as frz_mesh_get_info reports, of the type that the part has: FRZ_ERROR_CAPACITY when
 ///     it is too small, and nothing is written.
 ///
 /// Any number of threads may read a mesh.
@@ -381,8 +395,8 @@ pub unsafe extern "C" fn frz_mesh_read(mesh: *const frz_mesh, part: u32, dst: fr
 
 /// Copies an attribute of a mesh into the caller's memory.
 ///
-/// name: its name. FRZ_ERROR_ARGUMENT names those that there are when there is none of this name.
-/// dst: room for an element of so many floats for each vertex; with data NULL only the number of floats is told.
+/// name: its name. FRZ_ERROR_ARGUMENT, with a list of the names, when there is none of this name.
+/// dst: room for an element of so many floats for each vertex; with data NULL only the number of floats is reported.
 /// components: receives the floats of each vertex, 1 to 4; 0 after a failure. May be NULL.
 ///
 /// Any number of threads may read a mesh.

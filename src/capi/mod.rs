@@ -1,11 +1,11 @@
-//! The C ABI: what `include/frazil.h` declares. Thin: arguments are checked and turned into the library's types,
+//! The C ABI that `include/frazil.h` declares. Thin: arguments are checked and converted to the library's types,
 //! results are handed out; nothing is computed here.
 //!
 //! One file for each noun. Raw pointers are followed in `views.rs` and `handle.rs` only; every function runs inside
 //! `guard::guard`. The texts of this room are the header's: cbindgen copies them, and `float[3]` is no link.
 //!
 //! # Safety
-//! Every function asks the same of its caller, and the header's preamble says it: pointers are NULL or point to what
+//! Every function has the same requirements, as stated in the header's preamble: pointers are NULL or point to what
 //! their parameter says, handles were not destroyed, views describe memory that may be read, spans such that may be
 //! written.
 #![allow(non_camel_case_types, clippy::missing_safety_doc, clippy::too_many_arguments)]

@@ -12,7 +12,7 @@ pub struct frz_pool {
     _opaque: [u8; 0],
 }
 
-/// A pool's threads, as long as the pool or one of its contexts is there.
+/// A pool's threads, as long as the pool or one of its contexts exists.
 pub(super) struct Threads(pub Arc<Pool>, #[allow(dead_code, reason = "counts itself")] Arc<Alive>);
 
 /// Counts the pools that are alive: after the last one no thread of ours is left.

@@ -10,7 +10,7 @@ use crate::base::TriMesh;
 use crate::snow::base_layer::initial::{Cover, Ground, layer};
 use crate::sweep::surface_bytes;
 
-/// A layer of snow: what it lies on, and how deep.
+/// Description of a layer of snow: the ground and the depth.
 #[repr(C)]
 #[derive(Clone, Copy)]
 pub struct frz_snow_desc {
@@ -24,7 +24,7 @@ pub struct frz_snow_desc {
     pub half_width: f64,
     /// Vertical depth above the ground and above static objects (m), above 0; not used with a top.
     pub depth: f64,
-    /// The snow's top, a surface; what lies between it and the ground is snow. NULL: the depth counts.
+    /// The snow's top surface; the space between it and the ground is snow. NULL: the depth is used.
     pub top: *const frz_mesh,
     /// The ground, a surface or a solid; NULL: a horizontal rectangle.
     pub ground: *const frz_mesh,
@@ -81,7 +81,7 @@ pub unsafe extern "C" fn frz_snow_desc_init(desc: *mut frz_snow_desc, size: usiz
 
 /// Makes a layer of snow as a level set named "surface", for frz_base_create.
 ///
-/// desc: what it lies on and how deep it is. Y is up.
+/// desc: its ground and depth. Y is up.
 /// out: receives the grid, to be destroyed with frz_grid_destroy; NULL after a failure.
 ///
 /// Any number of threads may read a mesh; one thread at a time for each context.

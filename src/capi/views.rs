@@ -59,7 +59,7 @@ unsafe impl Plain for [u64; 8] {}
 // SAFETY: as above.
 unsafe impl Plain for [u32; 3] {}
 
-/// Most memory that one array may span (bytes): what a pointer can be moved by.
+/// Most memory that one array may span (bytes): the largest pointer offset.
 const MOST: usize = isize::MAX as usize;
 
 /// Bytes between elements, when all of them can be reached.
@@ -137,7 +137,7 @@ impl frz_span {
         Ok(())
     }
 
-    /// Tells how many elements there are, and writes them unless the span's data are NULL.
+    /// Reports how many elements there are, and writes them unless the span's data are NULL.
     ///
     /// # Safety
     /// As [`frz_span::fill`]; `count` must be writable.
@@ -160,7 +160,7 @@ impl frz_span {
     }
 }
 
-/// Writes bytes to the host, or tells it how many there are: with `dst` NULL, `size` becomes `bound` at least.
+/// Writes bytes to the host, or reports how many there are: with `dst` NULL, `size` becomes `bound` at least.
 ///
 /// # Safety
 /// `dst` must be NULL or have room for `capacity` bytes; `size` must be NULL or point to a number.
@@ -190,7 +190,7 @@ pub(super) unsafe fn write_bytes(
     Ok(())
 }
 
-/// Refuses what is no number, by its name.
+/// Refuses a value that is not finite, by its name.
 pub(super) fn finite(name: &str, value: f64) -> Outcome {
     if value.is_finite() { Ok(()) } else { Err(Failure::argument(format!("{name} is not finite"))) }
 }
@@ -205,12 +205,12 @@ pub(super) fn within(name: &str, value: f64, range: RangeInclusive<f64>, unit: &
     Ok(())
 }
 
-/// What a number of a host's enum means.
+/// The value for a number of a host's enum.
 pub(super) fn meaning<T: Copy>(name: &str, kind: &str, number: u32, known: &[(u32, T)]) -> Outcome<T> {
     let found = known.iter().find(|(known, _)| *known == number);
     found
         .map(|(_, meaning)| *meaning)
-        .ok_or_else(|| Failure::argument(format!("{name} = {number} is no {kind}")))
+        .ok_or_else(|| Failure::argument(format!("{name} = {number} is not a value of {kind}")))
 }
 
 /// A text of the host; none for NULL.
@@ -250,7 +250,7 @@ pub(super) unsafe trait Sized32: Copy {
 /// A host's struct over defaults: fields that its header does not have keep them.
 ///
 /// # Safety
-/// The pointer must be NULL or point to a struct with as many bytes as it says.
+/// The pointer must be NULL or point to a struct of the size in its struct_size.
 pub(super) unsafe fn sized<T: Sized32>(pointer: *const T, mut defaults: T) -> Outcome<T> {
     let pointer = super::handle::required(pointer.cast_mut(), T::NAME)?;
     // SAFETY: the caller's promise: a size is there at least.

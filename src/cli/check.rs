@@ -11,7 +11,7 @@ use super::exit::{Failure, Phase};
 use super::session::Session;
 use super::{machine, output};
 
-/// Read every input of every frame of a scene, and say its sizes, memory and disk; nothing is computed.
+/// Read every input of every frame of a scene, and print its sizes, memory and disk; nothing is computed.
 ///
 /// Of an output folder: read every file that a run wrote there, and name those that are not what was written.
 #[derive(clap::Args)]
@@ -19,7 +19,7 @@ use super::{machine, output};
 pub struct Args {
     /// Scene file (TOML), or an output folder.
     scene: PathBuf,
-    /// Where the output is to go: its free space is told too.
+    /// Where the output is to go: its free space is printed too.
     #[arg(short, long, value_name = "DIR")]
     output: Option<PathBuf>,
     /// Put a setting over the scene's, for instance snow.noise.seed=2 or object.1.file=hero.glb.
@@ -50,7 +50,7 @@ pub fn run(args: &Args, session: &Session) -> Result<(), Failure> {
     let text = if args.json {
         format!("{:#}\n", serde_json::to_value(&report).expect("plain values become JSON"))
     } else {
-        told(&report, limit, free)
+        in_words(&report, limit, free)
     };
     output::print(&text).during()
 }
@@ -108,7 +108,7 @@ fn size(bytes: u64) -> String {
     }
 }
 
-fn told(report: &Report, limit: u64, free: Option<u64>) -> String {
+fn in_words(report: &Report, limit: u64, free: Option<u64>) -> String {
     let mut out = String::new();
     let [first, last] = report.frames;
     let count = i64::from(last) - i64::from(first) + 1;
@@ -119,7 +119,7 @@ fn told(report: &Report, limit: u64, free: Option<u64>) -> String {
         format!("{:.2} x {:.2} m, {} x {} columns, ", x1 - x0, z1 - z0, columns[0], columns[1])
     });
     let _ = writeln!(out, "snow      {area}cells of {} m", report.cell_m);
-    report.objects.iter().for_each(|object| tell_object(&mut out, report, object));
+    report.objects.iter().for_each(|object| describe_object(&mut out, report, object));
     let _ = writeln!(out, "memory    about {} of {}", size(report.memory_bytes), size(limit));
     if let Some(disk) = report.disk_bytes {
         let free = free.map_or(String::new(), |free| format!(" of {} free", size(free)));
@@ -131,7 +131,7 @@ fn told(report: &Report, limit: u64, free: Option<u64>) -> String {
     out
 }
 
-fn tell_object(out: &mut String, report: &Report, object: &ObjectReport) {
+fn describe_object(out: &mut String, report: &Report, object: &ObjectReport) {
     let [width, height, depth] = object.size_m;
     let loops = match (object.holes, object.closed_loops) {
         (0, 0) => String::new(),

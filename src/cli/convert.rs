@@ -3,9 +3,10 @@
 use std::path::{Path, PathBuf};
 
 use frazil::base::TriMesh;
+use frazil::io::mesh::extension;
 use frazil::io::sequence::Pattern;
 use frazil::io::{self, atomic, usd};
-use frazil::motion::{Character, Keys, MeshSequence, Motion, Placed, Play, Rigid, missing_uvs};
+use frazil::motion::{Character, Keys, MeshSequence, Motion, Placed, Play, Rigid, is_gltf, missing_uvs};
 use frazil::scene::{FrameChoice, Frames};
 use serde_json::json;
 
@@ -67,7 +68,7 @@ pub fn run(args: &Args, session: &Session) -> Result<(), Failure> {
         let inputs = [read(frame), read(frame.saturating_add(1))];
         output::refuse_input(&path, inputs.iter().map(PathBuf::as_path)).before()?;
     }
-    args.tell_losses(frames.first(), &*motion).before()?;
+    args.warn_of_losses(frames.first(), &*motion).before()?;
     for frame in frames.iter() {
         session.ctx.check().during()?;
         let path = pattern.as_ref().map_or_else(|| args.output.clone(), |pattern| pattern.path(frame));
@@ -76,10 +77,6 @@ pub fn run(args: &Args, session: &Session) -> Result<(), Failure> {
     session.record("frames", json!(frames.count()));
     session.record("triangles", json!(motion.triangles().len()));
     Ok(())
-}
-
-fn extension(path: &Path) -> String {
-    path.extension().and_then(|text| text.to_str()).unwrap_or("").to_lowercase()
 }
 
 /// "UVs, normals and materials".
@@ -99,14 +96,11 @@ fn check_output(path: &Path) -> Result<(), Failure> {
 }
 
 impl Args {
-    /// Says what the input holds that the output does not.
-    fn tell_losses(&self, frame: i32, motion: &dyn Motion) -> frazil::Result<()> {
+    /// Warns about what the input contains and the output cannot.
+    fn warn_of_losses(&self, frame: i32, motion: &dyn Motion) -> frazil::Result<()> {
         let one =
             Pattern::parse(&self.input).map_or_else(|| self.input.clone(), |pattern| pattern.path(frame));
-        let mut lost = match extension(&one).as_str() {
-            "glb" | "gltf" => Character::extras(&one)?,
-            _ => io::extras::of(&one)?,
-        };
+        let mut lost = if is_gltf(&one) { Character::extras(&one)? } else { io::extras::of(&one)? };
         let uvs = motion.drawn().uvs.filter(|_| io::mesh::holds_uvs(&self.output));
         lost.retain(|name| *name != "UVs" || uvs.is_none());
         if let Some(missing) = uvs.map(|uvs| uvs.missing).filter(|missing| *missing > 0) {
@@ -120,7 +114,7 @@ impl Args {
 
     /// What is converted, in metres with Y up, and at which frames.
     fn motion(&self) -> Result<(Box<dyn Motion>, FrameChoice), Failure> {
-        let is_character = matches!(extension(&self.input).as_str(), "glb" | "gltf");
+        let is_character = is_gltf(&self.input);
         if !is_character && (self.clip.is_some() || self.node.is_some()) {
             return Err(Failure::refused("--clip and --node are for .glb and .gltf files"));
         }

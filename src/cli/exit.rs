@@ -8,7 +8,7 @@ use std::sync::atomic::{AtomicBool, Ordering};
 pub const DONE: u8 = 0;
 /// Exit code: failed after the work had begun.
 pub const FAILED: u8 = 1;
-/// Exit code: refused for what could be known before the work began.
+/// Exit code: refused before the work began.
 pub const REFUSED: u8 = 2;
 
 /// Why a command ends early.
@@ -19,24 +19,24 @@ pub struct Failure {
 }
 
 impl Failure {
-    /// What can be known before the work begins: exit code 2.
+    /// An error before the work begins: exit code 2.
     pub fn refused(message: impl std::fmt::Display) -> Self {
         Self { code: REFUSED, message: message.to_string() }
     }
 
-    /// What went wrong after that: exit code 1.
+    /// An error after that: exit code 1.
     pub fn failed(message: impl std::fmt::Display) -> Self {
         Self { code: FAILED, message: message.to_string() }
     }
 
-    /// Prints the sentence and gives the exit code.
+    /// Prints the message and returns the exit code.
     pub fn report(&self) -> u8 {
         say_error(&self.message);
         self.code
     }
 }
 
-/// Says in which part of a command an error arose.
+/// Adds the part of a command in which an error arose.
 pub trait Phase<T> {
     /// Before the work began: exit code 2.
     fn before(self) -> Result<T, Failure>;
@@ -61,11 +61,11 @@ impl<T> Phase<T> for frazil::Result<T> {
 pub fn say_error(message: &str) {
     let message = frazil::error::visible(message);
     let sentence: Vec<&str> = message.split_whitespace().collect();
-    // Nobody is left to tell when stderr is closed.
+    // There is nobody to report to when stderr is closed.
     let _ = writeln!(std::io::stderr(), "frazil: {}", sentence.join(" "));
 }
 
-/// Says that a signal stopped the program; its exit code tells which.
+/// Reports that a signal stopped the program; its exit code shows which.
 pub fn say_stopped(code: u8) {
     static SAID: AtomicBool = AtomicBool::new(false);
     if SAID.swap(true, Ordering::Relaxed) {

@@ -2,7 +2,7 @@
 
 use std::path::{Path, PathBuf};
 
-use frazil::motion::{Character, Play, gait};
+use frazil::motion::{Character, Play, gait, is_gltf};
 use frazil::vdb::{MetaValue, file, level_set};
 use frazil::{Context, io};
 use serde_json::{Map, Value, json};
@@ -30,13 +30,12 @@ pub struct Args {
 pub fn run(args: Args, session: &Session) -> Result<(), Failure> {
     let mut all = Vec::new();
     for path in &args.files {
-        let extension = path.extension().unwrap_or_default().to_string_lossy().to_lowercase();
-        let told = match extension.as_str() {
+        let holds = match io::mesh::extension(path).as_str() {
             "vdb" => grids(path, args.measure, &session.ctx),
-            "glb" | "gltf" => character(path),
+            _ if is_gltf(path) => character(path),
             _ => mesh(path),
         };
-        all.push(json!({ "file": path.display().to_string(), "holds": told.before()? }));
+        all.push(json!({ "file": path.display().to_string(), "holds": holds.before()? }));
     }
     let text = if args.json { format!("{:#}\n", json!(all)) } else { all.iter().map(lines).collect() };
     output::print(&text).during()
@@ -129,7 +128,7 @@ fn character(path: &Path) -> frazil::Result<Vec<Value>> {
     Ok(vec![entry])
 }
 
-/// Nodes that are told in one line.
+/// Nodes that are listed in one line.
 const FEW_NODES: usize = 6;
 
 /// How a clip's lowest parts move while they stand (the file's unit, Y up).

@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 use clap::Subcommand;
 use frazil::base::TriMesh;
 use frazil::base::faults::Faults;
-use frazil::motion::Character;
+use frazil::motion::{Character, is_gltf};
 use serde_json::{Value, json};
 
 use super::exit::{Failure, Phase};
@@ -46,7 +46,7 @@ pub fn run(args: &Args, session: &Session) -> Result<(), Failure> {
     let mut all = Vec::new();
     for path in &args.files {
         let mesh = args.read(path).before()?;
-        let faults = session.ctx.stage("faults", || Ok(Faults::of(&mesh))).during()?;
+        let faults = session.ctx.phase("faults", || Ok(Faults::of(&mesh))).during()?;
         let size = mesh.bounds().map(|(low, high)| <[f32; 3]>::from(high - low));
         all.push(json!({
             "file": path.display().to_string(),
@@ -69,14 +69,13 @@ pub fn run(args: &Args, session: &Session) -> Result<(), Failure> {
             "unused_vertices": faults.unused_vertices,
         }));
     }
-    let text = if args.json { format!("{:#}\n", json!(all)) } else { all.iter().map(told).collect() };
+    let text = if args.json { format!("{:#}\n", json!(all)) } else { all.iter().map(in_words).collect() };
     output::print(&text).during()
 }
 
 impl CheckArgs {
     fn read(&self, path: &Path) -> frazil::Result<TriMesh> {
-        let extension = path.extension().unwrap_or_default().to_string_lossy().to_lowercase();
-        if !matches!(extension.as_str(), "glb" | "gltf") {
+        if !is_gltf(path) {
             return self.space.read(path);
         }
         let (mut mesh, space) = (Character::at_rest(path)?, self.space.space());
@@ -86,12 +85,12 @@ impl CheckArgs {
 }
 
 /// A mesh in words: what it is, then only the faults that it has.
-fn told(mesh: &Value) -> String {
+fn in_words(mesh: &Value) -> String {
     let count = |key: &str| mesh[key].as_u64().unwrap_or(0);
     let mut out = format!(
         "{}: {}\n  {} vertices, {} triangles, {} parts",
         mesh["file"].as_str().unwrap_or_default(),
-        if mesh["solid"] == json!(true) { "a solid" } else { "no solid as it is" },
+        if mesh["solid"] == json!(true) { "a solid" } else { "not a solid as it is" },
         count("vertices"),
         count("triangles"),
         count("parts"),
@@ -111,16 +110,16 @@ fn told(mesh: &Value) -> String {
         ("crowded_edges", "edges with more than two triangles"),
         ("turned_edges", "edges whose triangles disagree about which side is out"),
         ("crossings", "pairs of triangles cut each other: harmless, what lies in any part is inside"),
-        ("degenerate_triangles", "triangles without area: passed over"),
+        ("degenerate_triangles", "triangles without area: ignored"),
         ("doubled_triangles", "triangles with the corners of another"),
         ("doubled_vertices", "vertices at the place of another: joined"),
-        ("unused_vertices", "vertices that no triangle names: passed over"),
+        ("unused_vertices", "vertices that no triangle names: ignored"),
     ];
     for (key, meaning) in faults.into_iter().filter(|(key, _)| count(key) > 0) {
         out += &format!("  {:>8} {meaning}\n", count(key));
     }
     if number("volume_m3") < 0.0 {
-        out += "           inside out: turned round where it is used\n";
+        out += "           inside out: flipped where it is used\n";
     }
     out
 }

@@ -19,7 +19,7 @@ pub enum Amount {
 }
 
 impl Amount {
-    /// In bytes; without bounds when the machine does not tell its memory.
+    /// In bytes; without a limit when the machine does not report its memory.
     pub fn bytes(self) -> u64 {
         match self {
             Self::Bytes(bytes) => bytes,
@@ -89,7 +89,7 @@ impl MeshSpace {
     }
 }
 
-/// A sentence about a mesh (m) whose file cannot tell its places well against a cell (m), so far away it lies.
+/// The message for a mesh so far away (m) that its file's 32-bit positions are coarse compared with a cell (m).
 pub fn far_mesh(path: &Path, mesh: &TriMesh, cell: f64) -> Option<String> {
     let farthest = mesh.positions.iter().map(|p| f64::from(p.amax())).fold(0.0, f64::max);
     too_far(&path.display().to_string(), farthest, 1.0, cell)

@@ -1,4 +1,4 @@
-//! What leaves the program: lines on stdout, files.
+//! Output of the program: lines on stdout, files.
 
 use frazil::{Error, Result};
 use std::io::Write;
@@ -36,7 +36,7 @@ pub fn check_writable(path: &Path) -> Result<()> {
 
 /// Refuses to write over one of the files that are read.
 pub fn refuse_input<'a>(path: &Path, inputs: impl IntoIterator<Item = &'a Path>) -> Result<()> {
-    // What is not there yet is no input; a device is not written over.
+    // A file that does not exist yet is not an input; a device is not overwritten.
     let Ok(output) = std::fs::canonicalize(path) else { return Ok(()) };
     let is_output = |input: &&Path| std::fs::canonicalize(input).is_ok_and(|input| input == output);
     match inputs.into_iter().find(is_output) {
@@ -60,7 +60,7 @@ pub fn check_report(path: &Path) -> Result<()> {
     if bytes.is_empty() || is_report {
         return Ok(());
     }
-    Err(Error::file(path, "is there and is no report of a run: choose another name for --report"))
+    Err(Error::file(path, "exists and is not the report of a run: choose another name for --report"))
 }
 
 /// Whether a folder takes new files.

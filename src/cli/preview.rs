@@ -3,8 +3,8 @@
 use std::path::{Path, PathBuf};
 
 use frazil::base::DVec3;
-use frazil::motion::{Character, Play};
-use frazil::render::{Camera, Light, Model, Size, Stage};
+use frazil::motion::{Character, Play, is_gltf};
+use frazil::render::{Camera, Light, Model, Models, Size};
 use frazil::vdb::{GridClass, file};
 use frazil::{Context, Error, io};
 
@@ -53,7 +53,7 @@ pub struct Args {
 
 fn sun(text: &str) -> Result<(f64, f64), String> {
     let (azimuth, elevation) = text.split_once(',').ok_or("give azimuth,elevation")?;
-    let number = |text: &str| text.trim().parse::<f64>().map_err(|_| format!("\"{text}\" is no number"));
+    let number = |text: &str| text.trim().parse::<f64>().map_err(|_| format!("\"{text}\" is not a number"));
     let (azimuth, elevation) = (number(azimuth)?, number(elevation)?);
     if !(1.0..=90.0).contains(&elevation) || !azimuth.is_finite() {
         return Err("the elevation must be within 1 to 90 degrees".into());
@@ -69,14 +69,14 @@ pub fn run(args: Args, session: &Session) -> Result<(), Failure> {
         return Err(Failure::refused(format!("--fov {} is not within 1 to 170 degrees", args.fov)));
     }
     let posed = args.clip.is_some() || args.frame.is_some();
-    if posed && !args.files.iter().any(|path| is_character(path)) {
+    if posed && !args.files.iter().any(|path| is_gltf(path)) {
         return Err(Failure::refused("--clip and --frame are for .glb and .gltf files, and none is given"));
     }
     let models =
         args.files.iter().map(|path| model(path, &args, &session.ctx)).collect::<frazil::Result<Vec<_>>>();
-    let stage = Stage::new(models.before()?);
+    let models = Models::new(models.before()?);
     let bounds =
-        stage.bounds().ok_or_else(|| Failure::refused("there is nothing to draw: the files are empty"))?;
+        models.bounds().ok_or_else(|| Failure::refused("there is nothing to draw: the files are empty"))?;
     let mut camera = Camera::framing(bounds, args.size);
     if let (Some(eye), Some(target)) = (args.eye, args.target) {
         if eye == target {
@@ -88,21 +88,15 @@ pub fn run(args: Args, session: &Session) -> Result<(), Failure> {
         Some((azimuth, elevation)) => Light::from_degrees(azimuth, elevation),
         None => Light::beside(&camera),
     };
-    let picture = stage.draw(&session.ctx, &camera, &light, args.size).during()?;
+    let picture = models.draw(&session.ctx, &camera, &light, args.size).during()?;
     picture.write(&args.output).during()
 }
 
-fn is_character(path: &Path) -> bool {
-    let extension = path.extension().unwrap_or_default().to_string_lossy().to_lowercase();
-    matches!(extension.as_str(), "glb" | "gltf")
-}
-
 fn model(path: &Path, args: &Args, ctx: &Context) -> frazil::Result<Model> {
-    let extension = path.extension().unwrap_or_default().to_string_lossy().to_lowercase();
-    let mesh = match extension.as_str() {
+    let mesh = match io::mesh::extension(path).as_str() {
         "vdb" => return grid(path, ctx),
-        _ if is_character(path) && args.clip.is_none() && args.frame.is_none() => Character::at_rest(path)?,
-        _ if is_character(path) => {
+        _ if is_gltf(path) && args.clip.is_none() && args.frame.is_none() => Character::at_rest(path)?,
+        _ if is_gltf(path) => {
             let play = Play { clip: args.clip.clone(), ..Play::default() };
             Character::posed(path, play, (args.frame.unwrap_or(1.0) - 1.0) / args.fps)?
         }
@@ -122,7 +116,7 @@ fn grid(path: &Path, ctx: &Context) -> frazil::Result<Model> {
         return Err(Error::file(path, format!("grid \"{}\" has no density above 0 to draw", grid.name())));
     }
     log::warn!(
-        "{}: grid \"{}\" is no level set: drawn is where its values are {density}, half of the greatest",
+        "{}: grid \"{}\" is not a level set: it is drawn where its values are {density}, half of the greatest",
         path.display(),
         grid.name()
     );

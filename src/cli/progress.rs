@@ -1,57 +1,83 @@
-//! Progress of a shot on stderr: a bar on a terminal, else one line a frame.
+//! Progress of a shot on stderr: a bar on a terminal, otherwise one line per frame.
 
+use frazil::{Context, context::Progress};
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
 use std::io::{IsTerminal, Write};
+use std::sync::Arc;
+use std::sync::atomic::{AtomicUsize, Ordering};
 use std::time::{Duration, Instant};
 
-/// Shows which frame was finished and when the last one will be.
-pub struct FrameProgress {
+/// Length of one frame on the bar.
+const FRAME: u64 = 1000;
+
+/// Shows which frame was finished and when the last one will be; on a terminal also how far the running frame is.
+pub struct FrameProgress<'a> {
+    ctx: &'a Context,
     bar: Option<ProgressBar>,
     lines: bool,
     total: usize,
-    done: usize,
+    done: Arc<AtomicUsize>,
     start: Instant,
 }
 
-impl FrameProgress {
-    /// Starts the display of `total` frames to be made, besides those that are `there`.
-    pub fn new(total: usize, there: usize, quiet: bool) -> Self {
+impl<'a> FrameProgress<'a> {
+    /// Starts the display of `total` frames to be made by steps on `ctx`, besides those that are `there`.
+    pub fn new(ctx: &'a Context, total: usize, there: usize, quiet: bool) -> Self {
         if there > 0 && !quiet {
             // Progress is a courtesy: a closed stderr is no reason to stop.
             let _ = writeln!(std::io::stderr(), "{there} frames are there, {total} are to be made");
         }
         let terminal = std::io::stderr().is_terminal();
+        let done = Arc::new(AtomicUsize::new(0));
         let bar = (terminal && !quiet).then(|| {
-            let bar = ProgressBar::with_draw_target(Some(total as u64), ProgressDrawTarget::stderr());
-            let style = ProgressStyle::with_template("{msg} [{bar:40}] {pos}/{len} eta {eta_precise}");
+            let length = total as u64 * FRAME;
+            let bar = ProgressBar::with_draw_target(Some(length), ProgressDrawTarget::stderr());
+            let style = ProgressStyle::with_template("{msg} [{bar:40}] {percent}% eta {eta_precise}");
             bar.set_style(style.expect("a fixed template").progress_chars("=> "));
             bar.enable_steady_tick(Duration::from_millis(250));
+            ctx.set_poll(Some(watch(bar.clone(), done.clone())));
             bar
         });
-        Self { bar, lines: !terminal && !quiet, total, done: 0, start: Instant::now() }
+        Self { ctx, bar, lines: !terminal && !quiet, total, done, start: Instant::now() }
     }
 
     /// A frame of a stage is written.
     pub fn finished(&mut self, stage: &str, frame: i32) {
-        self.done += 1;
+        let done = self.done.fetch_add(1, Ordering::Relaxed) + 1;
         if let Some(bar) = &self.bar {
-            bar.set_message(format!("frame {frame} stage {stage}"));
-            bar.inc(1);
+            bar.set_message(format!("frame {frame} stage {stage} {done}/{}", self.total));
+            advance(bar, done, None);
         }
         if self.lines {
-            let percent = 100 * self.done / self.total.max(1);
-            let eta = clock(self.start.elapsed(), self.done, self.total);
+            let percent = 100 * done / self.total.max(1);
+            let eta = clock(self.start.elapsed(), done, self.total);
             let _ = writeln!(std::io::stderr(), "frame {frame} stage {stage} {percent}% eta {eta}");
         }
     }
 }
 
-impl Drop for FrameProgress {
+impl Drop for FrameProgress<'_> {
     fn drop(&mut self) {
         if let Some(bar) = &self.bar {
+            self.ctx.set_poll(None);
             bar.finish_and_clear();
         }
     }
+}
+
+/// A poll that moves the bar within the running frame.
+fn watch(bar: ProgressBar, done: Arc<AtomicUsize>) -> frazil::context::Poll {
+    Box::new(move |progress: &Progress| {
+        advance(&bar, done.load(Ordering::Relaxed), progress.fraction);
+        false
+    })
+}
+
+/// Moves the bar to so many frames and a fraction of the next; never backwards, though frames are computed ahead of the
+/// files.
+fn advance(bar: &ProgressBar, done: usize, fraction: Option<f32>) {
+    let position = done as u64 * FRAME + (fraction.unwrap_or(0.0) * FRAME as f32) as u64;
+    bar.set_position(position.max(bar.position()));
 }
 
 /// Time left as `hh:mm:ss`, if the frames to come take as long as those done.
@@ -64,11 +90,30 @@ fn clock(elapsed: Duration, done: usize, total: usize) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use frazil::Pool;
 
     #[test]
     fn the_time_left_is_hours_minutes_seconds() {
         assert_eq!(clock(Duration::from_secs(10), 1, 1), "00:00:00");
         assert_eq!(clock(Duration::from_secs(10), 1, 3), "00:00:20");
         assert_eq!(clock(Duration::from_secs(3600), 1, 3), "02:00:00");
+    }
+
+    #[test]
+    fn the_bar_moves_within_a_frame_and_never_backwards() {
+        let (bar, done) = (ProgressBar::hidden(), Arc::new(AtomicUsize::new(1)));
+        let ctx = Context::new(Pool::new(1).expect("one thread"));
+        ctx.set_poll(Some(watch(bar.clone(), done)));
+        let half = || {
+            ctx.phase("first", || Ok(()))?;
+            assert_eq!(bar.position(), FRAME);
+            ctx.phase("second", || Ok(()))
+        };
+        ctx.step(2, half).expect("no cancel");
+        assert_eq!(bar.position(), FRAME + FRAME / 2);
+        advance(&bar, 1, None);
+        assert_eq!(bar.position(), FRAME + FRAME / 2);
+        advance(&bar, 2, None);
+        assert_eq!(bar.position(), 2 * FRAME);
     }
 }

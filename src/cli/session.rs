@@ -1,10 +1,10 @@
-//! What all commands share: threads, signals, verbosity, the report of a run.
+//! Shared by all commands: threads, signals, verbosity, the report of a run.
 
 use super::exit::{self, Failure, Phase};
 use super::options::Amount;
 use super::output;
 use super::signals::Signals;
-use frazil::context::peak_memory;
+use frazil::context::{PhaseTime, Phases, peak_memory};
 use frazil::sweep::surface_bytes;
 use frazil::vdb::guard::{self, Guard};
 use frazil::{Context, Error, Pool};
@@ -25,7 +25,7 @@ pub struct Globals {
     /// Say nothing but errors.
     #[arg(short, long, global = true, conflicts_with = "verbose")]
     pub quiet: bool,
-    /// Say what is read and how long each stage takes; twice: everything.
+    /// Say what is read and how long each phase takes; twice: everything.
     #[arg(short, long, global = true, action = clap::ArgAction::Count)]
     pub verbose: u8,
     /// Write times, memory and results of this run as JSON.
@@ -35,8 +35,10 @@ pub struct Globals {
 
 /// One run of the program.
 pub struct Session {
-    /// Threads, cancel flag, stage times.
+    /// Threads, cancel flag, phase times.
     pub ctx: Context,
+    /// All phases of the run.
+    phases: Phases,
     globals: Globals,
     signals: Signals,
     start: Instant,
@@ -52,29 +54,30 @@ impl Session {
             None => Pool::all_cores(),
         };
         let ctx = Context::new(pool.before()?);
+        let phases = ctx.collect();
         let signals = Signals::install(ctx.cancel_flags())
             .map_err(|error| Failure::refused(format!("cannot install signal handlers: {error}")))?;
-        let [asked, _] = ctx.cancel_flags();
-        frazil::io::source::stop_when(asked.clone());
+        let [cancel, _] = ctx.cancel_flags();
+        frazil::io::source::stop_when(cancel.clone());
         guard::install(Guard {
             // The program as it runs, even if its file was replaced meanwhile.
             program: "/proc/self/exe".into(),
             memory: globals.max_memory.bytes(),
             threads: ctx.pool().threads(),
-            cancel: asked,
+            cancel,
         });
         if let Some(path) = &globals.report {
             output::check_report(path).before()?;
         }
-        Ok(Self { ctx, globals, signals, start: Instant::now(), results: Mutex::default() })
+        Ok(Self { ctx, phases, globals, signals, start: Instant::now(), results: Mutex::default() })
     }
 
-    /// The most memory that the work may need (bytes).
+    /// Memory limit of the work (bytes).
     pub fn max_memory(&self) -> u64 {
         self.globals.max_memory.bytes()
     }
 
-    /// Refuses level sets of so much surface (m2) with such a cell (m).
+    /// Refuses a level set whose surface (m2) would need too much memory with this cell (m).
     pub fn check_surface(&self, area: f64, cell: f64) -> frazil::Result<()> {
         let (needed, limit) = (surface_bytes(area, cell), self.max_memory());
         if needed <= limit {
@@ -83,17 +86,17 @@ impl Session {
         Err(Error::Memory { what: format!("a level set with --cell {cell}"), needed, limit })
     }
 
-    /// Whether only errors are to be said.
+    /// Whether only errors are printed.
     pub fn is_quiet(&self) -> bool {
         self.globals.quiet
     }
 
     /// Adds a result to the report of this run.
     pub fn record(&self, key: &str, value: Value) {
-        self.results.lock().expect("nobody panics with this lock").insert(key.to_string(), value);
+        self.results.lock().expect("no panic holds this lock").insert(key.to_string(), value);
     }
 
-    /// Writes the report, says what went wrong, gives the exit code.
+    /// Writes the report, prints what went wrong, and returns the exit code.
     pub fn finish(&self, result: Result<(), Failure>) -> u8 {
         let result = match (&self.globals.report, result) {
             (Some(path), Ok(())) => self.write_report(path).during(),
@@ -110,25 +113,25 @@ impl Session {
     }
 
     fn write_report(&self, path: &std::path::Path) -> frazil::Result<()> {
-        let stages: Vec<Value> = self.ctx.take_timings().iter().map(stage_json).collect();
-        let mut report = self.results.lock().expect("nobody panics with this lock").clone();
+        let phases: Vec<Value> = self.phases.times().iter().map(phase_json).collect();
+        let mut report = self.results.lock().expect("no panic holds this lock").clone();
         // A file's name need not be UTF-8.
-        let told = |argument: std::ffi::OsString| argument.to_string_lossy().into_owned();
-        let arguments: Vec<String> = std::env::args_os().skip(1).map(told).collect();
+        let readable = |argument: std::ffi::OsString| argument.to_string_lossy().into_owned();
+        let arguments: Vec<String> = std::env::args_os().skip(1).map(readable).collect();
         report.insert("arguments".into(), json!(arguments));
         report.insert("version".into(), json!(env!("CARGO_PKG_VERSION")));
         report.insert("threads".into(), json!(self.ctx.pool().threads()));
         report.insert("seconds".into(), json!(self.start.elapsed().as_secs_f64()));
         report.insert("peak_memory_bytes".into(), json!(peak_memory()));
-        if !stages.is_empty() {
-            report.insert("stages".into(), json!(stages));
+        if !phases.is_empty() {
+            report.insert("phases".into(), json!(phases));
         }
         output::write_json(path, &Value::Object(report))
     }
 }
 
-fn stage_json(stage: &frazil::context::StageTime) -> Value {
-    json!({ "name": stage.name, "seconds": stage.time.as_secs_f64() })
+fn phase_json(phase: &PhaseTime) -> Value {
+    json!({ "name": phase.name, "seconds": phase.time.as_secs_f64(), "count": phase.count })
 }
 
 fn start_log(globals: &Globals) {

@@ -69,7 +69,7 @@ pub fn run(args: Args, session: &Session) -> Result<(), Failure> {
     let run = Run::prepare(&session.ctx, &plan, &args.output, &args.stage, &frames, args.from).before()?;
     output::check_folder(&args.output).before()?;
     let (made, there) = (run.to_make(), run.there());
-    let progress = Mutex::new(FrameProgress::new(made, there, session.is_quiet()));
+    let progress = Mutex::new(FrameProgress::new(&session.ctx, made, there, session.is_quiet()));
     let removed = Mutex::new(0.0);
     run.make(&session.ctx, |stage, frame, report| {
         let of_frame = report.results.get("removed_m3").and_then(|value| value.as_f64());

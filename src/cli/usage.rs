@@ -1,10 +1,10 @@
-//! What clap has to say: help on stdout, a mistake as one sentence on stderr.
+//! Output of clap: help on stdout, an error as one sentence on stderr.
 
 use super::exit;
 use clap::error::{Error, ErrorKind};
 use std::io::Write;
 
-/// Prints help, version or the mistake; gives the exit code.
+/// Prints help, version or the error; returns the exit code.
 pub fn report(error: &Error) -> u8 {
     if matches!(error.kind(), ErrorKind::DisplayHelp | ErrorKind::DisplayVersion) {
         // A reader that closes the pipe early has seen enough.

@@ -1,6 +1,6 @@
-//! The machine's memory, as Linux tells it.
+//! The machine's memory, as Linux reports it.
 
-/// Bytes that this process may use: the machine's memory or its control group's limit.
+/// Bytes that this process may use: the machine's memory, or its control group's limit if that is less.
 pub fn machine_memory() -> Option<u64> {
     let machine = kilobytes_of(&std::fs::read_to_string("/proc/meminfo").ok()?, "MemTotal:")?;
     let group = std::fs::read_to_string("/sys/fs/cgroup/memory.max").ok();
@@ -8,7 +8,7 @@ pub fn machine_memory() -> Option<u64> {
     Some(group.map_or(machine, |limit| limit.min(machine)))
 }
 
-/// The most bytes of memory that this process has held, if the system says.
+/// Peak memory of this process (bytes), if the system reports it.
 pub fn peak_memory() -> Option<u64> {
     kilobytes_of(&std::fs::read_to_string("/proc/self/status").ok()?, "VmHWM:")
 }

@@ -1,9 +1,11 @@
 //! Threads that several computations share ([`Pool`]) and the side channel of one of them
-//! ([`Context`]: cancel flag, progress, warnings, stage times, memory limit).
+//! ([`Context`]: cancel flag, progress, warnings, phase times, memory limit).
 
 mod cancel;
 mod memory;
+mod phases;
 mod pool;
+mod progress;
 
 use std::sync::atomic::{AtomicBool, AtomicU64, AtomicUsize, Ordering};
 use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError};
@@ -11,59 +13,43 @@ use std::time::{Duration, Instant};
 
 pub use cancel::Running;
 pub use memory::{machine_memory, peak_memory};
+pub use phases::{PhaseTime, Phases};
 pub use pool::{MOST_THREADS, Pool};
+pub use progress::Progress;
 
 use crate::error::{Error, Result};
 use cancel::Cancel;
+use phases::Collectors;
+use progress::{Planned, State};
 
 /// Time between two polls.
 const POLL_EVERY: Duration = Duration::from_millis(10);
 
-/// How long one stage of a step took.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct StageTime {
-    /// The stage's verb.
-    pub name: &'static str,
-    /// Wall-clock time.
-    pub time: Duration,
-}
-
-/// What is being done, for a progress display.
-#[derive(Debug, Clone, Copy, PartialEq, Default)]
-pub struct Progress {
-    /// The stage's verb, empty between stages.
-    pub stage: &'static str,
-    /// Stages finished since the context was made or reset.
-    pub stages_done: usize,
-    /// Part of the running stage that is done, 0 to 1; none where it is not known.
-    pub part: Option<f32>,
-}
-
-/// Looks at the progress, some 10 ms apart; true cancels.
+/// Called with the progress about every 10 ms; returning true cancels.
 pub type Poll = Box<dyn FnMut(&Progress) -> bool + Send>;
-/// Takes a warning.
+/// Receives a warning.
 pub type Log = Box<dyn Fn(&str) + Send>;
 
-/// Cancel, progress, warnings, stage times and memory limit of one computation; cheap to make.
+/// Cancel, progress, warnings, phase times and memory limit of one computation; cheap to make.
 pub struct Context {
     pool: Arc<Pool>,
     cancel: Arc<Cancel>,
-    progress: Mutex<Progress>,
-    /// Whether the next call counts stages from 0.
+    state: Mutex<State>,
+    /// Whether the next call counts phases from 0.
     recount: AtomicBool,
-    /// Pieces of work of the running stage that are done, and all of them; 0 where that is not known.
+    /// Pieces of work of the running phase that are done, and their total; 0 where that is not known.
     pieces: [AtomicUsize; 2],
-    timings: Mutex<Vec<StageTime>>,
+    collectors: Collectors,
     poll: Mutex<Option<Watch>>,
     log: Mutex<Option<Log>>,
     /// Bytes.
     memory_limit: AtomicU64,
 }
 
-/// A poll and when it was last asked.
+/// A poll and when it was last called.
 struct Watch {
     poll: Poll,
-    asked: Instant,
+    called: Instant,
 }
 
 impl Context {
@@ -72,10 +58,10 @@ impl Context {
         Self {
             pool,
             cancel: Arc::default(),
-            progress: Mutex::new(Progress::default()),
+            state: Mutex::default(),
             recount: AtomicBool::new(false),
             pieces: Default::default(),
-            timings: Mutex::new(Vec::new()),
+            collectors: Collectors::default(),
             poll: Mutex::new(None),
             log: Mutex::new(None),
             memory_limit: AtomicU64::new(u64::MAX),
@@ -87,50 +73,50 @@ impl Context {
         &self.pool
     }
 
-    /// Begins a call, of which everything that runs with this context is a part until the answer is dropped. Stages and
-    /// tools do so themselves; what has several of them and is to be cancelled as a whole holds one around all.
+    /// Begins a call; everything that runs with this context is part of it until the returned value is dropped. Phases and
+    /// tools begin one themselves; work of several phases that is to be cancelled as a whole holds one around them.
     pub fn begin(&self) -> Running {
         let outermost = !self.cancel.is_running();
         if outermost && self.recount.swap(false, Ordering::SeqCst) {
-            *lock(&self.progress) = Progress::default();
+            *lock(&self.state) = State::default();
         }
         self.cancel.begin()
     }
 
     /// Cancels the running call and all later ones until [`Context::reset`].
     pub fn cancel(&self) {
-        self.cancel.ask();
+        self.cancel.request();
     }
 
-    /// Forgets a cancel, and counts stages from 0 again. A call that runs keeps its cancel and its count: both are those
-    /// of the calls that follow.
+    /// Clears a cancel and restarts the count of phases, for the calls that follow. A running call keeps its cancel and
+    /// its count.
     pub fn reset(&self) {
-        self.cancel.forget();
+        self.cancel.clear();
         self.recount.store(true, Ordering::SeqCst);
     }
 
     /// Whether the running call is cancelled; between calls, whether the next one will be.
     pub fn is_cancelled(&self) -> bool {
-        self.cancel.is_asked()
+        self.cancel.is_requested()
     }
 
-    /// The flags that a signal handler raises, one after the other, to cancel.
+    /// The flags that a signal handler sets, in this order, to cancel.
     pub fn cancel_flags(&self) -> [Arc<AtomicBool>; 2] {
         self.cancel.flags().map(Arc::clone)
     }
 
-    /// Sets what looks on while stages run, on the thread that called them: at the beginning of each, then every
-    /// 10 ms while the pool's workers are busy. In a pool without workers, where [`Context::check`] is called.
+    /// Sets the function that is called while phases run, on the thread that called them: at the beginning of each, then
+    /// every 10 ms while the pool's workers are busy; in a pool without workers, from [`Context::check`].
     pub fn set_poll(&self, poll: Option<Poll>) {
-        *lock(&self.poll) = poll.map(|poll| Watch { poll, asked: Instant::now() });
+        *lock(&self.poll) = poll.map(|poll| Watch { poll, called: Instant::now() });
     }
 
-    /// Sets what takes warnings; without it they are dropped.
+    /// Sets the function that receives warnings; without one they are dropped.
     pub fn set_log(&self, log: Option<Log>) {
         *lock(&self.log) = log;
     }
 
-    /// Gives a warning to whoever listens, on this thread.
+    /// Passes a warning to the log function, on this thread.
     pub fn warn(&self, text: &str) {
         if let Some(log) = &*lock(&self.log) {
             log(text);
@@ -147,7 +133,7 @@ impl Context {
         self.memory_limit.load(Ordering::Relaxed)
     }
 
-    /// Asks for memory before it is taken.
+    /// Checks an allocation against the limit before it is made.
     ///
     /// # Errors
     /// `Memory`, naming `what`, when `bytes` are more than the limit.
@@ -159,68 +145,91 @@ impl Context {
         Ok(())
     }
 
-    /// `Err(Cancelled)` once cancelled: long loops call it once a block of work.
+    /// `Err(Cancelled)` once cancelled: long loops call it once per block of work.
     ///
     /// # Errors
     /// `Cancelled`.
     pub fn check(&self) -> Result<()> {
         if self.pool.is_inline()
             && let Ok(mut watch) = self.poll.try_lock()
-            && let Some(watch) = watch.as_mut().filter(|watch| watch.asked.elapsed() >= POLL_EVERY)
+            && let Some(watch) = watch.as_mut().filter(|watch| watch.called.elapsed() >= POLL_EVERY)
         {
-            self.ask(watch);
+            self.call(watch);
         }
         if self.is_cancelled() { Err(Error::Cancelled) } else { Ok(()) }
     }
 
-    /// Runs one stage of a step on the pool: progress, poll, cancel and timing at once.
+    /// Runs one step, a sequence of `phases` phases, of which it returns the times besides the result.
     ///
     /// # Errors
-    /// `Cancelled` when the context was cancelled before or during the stage, else what `work` returns.
-    pub fn stage<R: Send>(&self, name: &'static str, work: impl FnOnce() -> Result<R> + Send) -> Result<R> {
+    /// What `work` returns.
+    pub fn step<R>(&self, phases: usize, work: impl FnOnce() -> Result<R>) -> Result<(R, Vec<PhaseTime>)> {
         let _running = self.begin();
-        let value = self.stage_in_place(name, work)?;
+        let collector = self.collect();
+        let _planned = Planned::new(&self.state, phases);
+        Ok((work()?, collector.times()))
+    }
+
+    /// Collects the times of the phases that run from now on, until the returned value is dropped.
+    pub fn collect(&self) -> Phases {
+        self.collectors.collect()
+    }
+
+    /// Runs one phase of a step on the pool: progress, poll, cancel and timing at once.
+    ///
+    /// # Errors
+    /// `Cancelled` when the context was cancelled before or during the phase, else what `work` returns.
+    pub fn phase<R: Send>(&self, name: &'static str, work: impl FnOnce() -> Result<R> + Send) -> Result<R> {
+        let _running = self.begin();
+        let value = self.phase_in_place(name, work)?;
         self.check()?;
         Ok(value)
     }
 
-    /// As [`Context::stage`], for work that puts its result in place itself, as the last thing that it does: a cancel
-    /// that comes after that came too late.
+    /// As [`Context::phase`], for work that puts its result in place itself at its end: a cancel that comes after that is
+    /// too late.
     ///
     /// # Errors
-    /// `Cancelled` when the context was cancelled before the stage, else what `work` returns.
-    pub fn stage_in_place<R: Send>(
+    /// `Cancelled` when the context was cancelled before the phase, else what `work` returns.
+    pub fn phase_in_place<R: Send>(
         &self,
         name: &'static str,
         work: impl FnOnce() -> Result<R> + Send,
     ) -> Result<R> {
         let _running = self.begin();
         self.check()?;
-        lock(&self.progress).stage = name;
-        self.expect(0);
+        self.enter(name);
         self.look();
         let result = if self.is_cancelled() { Err(Error::Cancelled) } else { self.timed(name, work) };
-        lock(&self.progress).stage = "";
-        self.expect(0);
-        let value = result?;
-        lock(&self.progress).stages_done += 1;
-        Ok(value)
+        self.leave(result.is_ok());
+        result
     }
 
-    /// Runs a step's last stage, which a cancel does not stop: what it began is put in place whole.
+    /// Runs the last phase of a step, which a cancel does not stop: changes are put in place completely.
     ///
     /// # Errors
     /// What `work` returns.
     pub fn commit<R: Send>(&self, work: impl FnOnce() -> Result<R> + Send) -> Result<R> {
         const NAME: &str = "commit";
         let _running = self.begin();
-        lock(&self.progress).stage = NAME;
+        self.enter(NAME);
+        let result = self.timed(NAME, work);
+        self.leave(true);
+        result
+    }
+
+    fn enter(&self, name: &'static str) {
+        let mut state = lock(&self.state);
+        state.phase = name;
         self.expect(0);
-        let value = self.timed(NAME, work);
-        let mut progress = lock(&self.progress);
-        progress.stage = "";
-        progress.stages_done += 1;
-        value
+    }
+
+    /// Ends a phase; its last pieces give way to the count of phases at once, so that no fraction decreases.
+    fn leave(&self, done: bool) {
+        let mut state = lock(&self.state);
+        state.phase = "";
+        state.phases_done += usize::from(done);
+        self.expect(0);
     }
 
     /// What is being done now.
@@ -228,44 +237,40 @@ impl Context {
         if self.recount.load(Ordering::SeqCst) && !self.cancel.is_running() {
             return Progress::default();
         }
+        let state = lock(&self.state);
         let [done, all] = self.pieces.each_ref().map(|count| count.load(Ordering::Relaxed));
         let part = (all > 0).then(|| (done as f32 / all as f32).min(1.0));
-        Progress { part, ..*lock(&self.progress) }
+        state.progress(part)
     }
 
-    /// Says how many pieces of work the running stage has; [`Context::advance`] counts them.
+    /// Sets how many pieces of work the running phase has; [`Context::advance`] counts them.
     pub fn expect(&self, pieces: usize) {
         self.pieces[0].store(0, Ordering::Relaxed);
         self.pieces[1].store(pieces, Ordering::Relaxed);
     }
 
-    /// One more piece of the running stage's work is done.
+    /// Counts one more piece of the running phase's work as done.
     pub fn advance(&self) {
         self.pieces[0].fetch_add(1, Ordering::Relaxed);
     }
 
-    /// Stage times since the last call, in order.
-    pub fn take_timings(&self) -> Vec<StageTime> {
-        std::mem::take(&mut *lock(&self.timings))
-    }
-
-    /// The poll at a stage's beginning.
+    /// The poll at the beginning of a phase.
     fn look(&self) {
         if let Ok(mut watch) = self.poll.try_lock()
             && let Some(watch) = watch.as_mut()
         {
-            self.ask(watch);
+            self.call(watch);
         }
     }
 
-    fn ask(&self, watch: &mut Watch) {
+    fn call(&self, watch: &mut Watch) {
         if (watch.poll)(&self.progress()) {
             self.cancel();
         }
-        watch.asked = Instant::now();
+        watch.called = Instant::now();
     }
 
-    /// Runs work of several stages on the pool while this thread polls: what lies between the stages is looked on too.
+    /// Runs work of several phases on the pool while this thread polls, between the phases too.
     ///
     /// # Errors
     /// `Cancelled` when the context was cancelled before, else what `work` returns.
@@ -279,7 +284,7 @@ impl Context {
     fn timed<R: Send>(&self, name: &'static str, work: impl FnOnce() -> R + Send) -> R {
         let start = Instant::now();
         let value = self.run(work);
-        lock(&self.timings).push(StageTime { name, time: start.elapsed() });
+        self.collectors.add(name, start.elapsed());
         value
     }
 
@@ -315,14 +320,14 @@ impl Context {
                 *slot = Some(work());
             });
             while !done.wait(POLL_EVERY) {
-                self.ask(watch);
+                self.call(watch);
             }
         });
         value.expect("the scope passes a panic on")
     }
 }
 
-/// A lock whose holder may have panicked: what these locks guard is whole at every moment.
+/// Locks a mutex whose holder may have panicked: what these guard is consistent at every moment.
 fn lock<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
     mutex.lock().unwrap_or_else(PoisonError::into_inner)
 }
@@ -343,7 +348,7 @@ impl Done {
     }
 }
 
-/// Says that the work has ended when it is dropped.
+/// Signals that the work has ended when it is dropped.
 struct Signal<'a>(&'a Done);
 
 impl Drop for Signal<'_> {
@@ -368,7 +373,7 @@ mod tests {
         count
     }
 
-    /// Work that looks at the flag every millisecond, for at most two seconds.
+    /// Work that checks the flag every millisecond, for at most two seconds.
     fn patient(ctx: &Context) -> Result<()> {
         for _ in 0..2000 {
             ctx.check()?;
@@ -383,17 +388,17 @@ mod tests {
             let ctx = Context::new(Pool::new(threads).unwrap());
             let count = counting(&ctx, 5);
             let start = Instant::now();
-            assert!(matches!(ctx.stage("wait", || patient(&ctx)), Err(Error::Cancelled)));
+            assert!(matches!(ctx.phase("wait", || patient(&ctx)), Err(Error::Cancelled)));
             assert!(start.elapsed() < Duration::from_secs(1));
             assert_eq!(count.load(Ordering::Relaxed), 5);
             assert!(matches!(ctx.check(), Err(Error::Cancelled)), "a cancel is sticky");
             ctx.reset();
-            assert!(ctx.stage("nothing", || Ok(())).is_ok());
+            assert!(ctx.phase("nothing", || Ok(())).is_ok());
         }
     }
 
     #[test]
-    fn progress_has_the_part_of_a_stage_that_is_done() {
+    fn progress_has_the_part_of_a_phase_that_is_done() {
         let ctx = Context::new(Pool::new(1).unwrap());
         let work = || {
             assert_eq!(ctx.progress().part, None);
@@ -402,7 +407,7 @@ mod tests {
             assert_eq!(ctx.progress().part, Some(0.75));
             Ok(())
         };
-        ctx.stage("work", work).unwrap();
+        ctx.phase("work", work).unwrap();
         assert_eq!(ctx.progress().part, None);
     }
 
@@ -427,17 +432,17 @@ mod tests {
             ctx.reset();
             Ok(())
         };
-        // Work that does not look itself: the stage does when it is done.
-        assert!(matches!(ctx.stage("forget", forgetful), Err(Error::Cancelled)));
-        assert!(ctx.stage("next", || Ok(())).is_ok());
+        // Work that does not check itself: the phase does when it is done.
+        assert!(matches!(ctx.phase("forget", forgetful), Err(Error::Cancelled)));
+        assert!(ctx.phase("next", || Ok(())).is_ok());
         let call = ctx.begin();
-        assert!(ctx.stage("first", || Ok(())).is_ok());
+        assert!(ctx.phase("first", || Ok(())).is_ok());
         forgetful().unwrap();
-        assert_eq!(ctx.progress().stages_done, 2, "the running call's count");
-        assert!(matches!(ctx.stage("second", || Ok(())), Err(Error::Cancelled)));
+        assert_eq!(ctx.progress().phases_done, 2, "the running call's count");
+        assert!(matches!(ctx.phase("second", || Ok(())), Err(Error::Cancelled)));
         drop(call);
-        assert_eq!(ctx.progress().stages_done, 0);
-        assert!(ctx.stage("next", || Ok(())).is_ok());
+        assert_eq!(ctx.progress().phases_done, 0);
+        assert!(ctx.phase("next", || Ok(())).is_ok());
     }
 
     #[test]
@@ -447,8 +452,8 @@ mod tests {
             ctx.cancel();
             Ok(7)
         };
-        assert_eq!(ctx.stage_in_place("put", late).unwrap(), 7);
-        assert!(matches!(ctx.stage_in_place("put", late), Err(Error::Cancelled)));
+        assert_eq!(ctx.phase_in_place("put", late).unwrap(), 7);
+        assert!(matches!(ctx.phase_in_place("put", late), Err(Error::Cancelled)));
     }
 
     #[test]
@@ -456,9 +461,9 @@ mod tests {
         let ctx = Context::new(Pool::new(2).unwrap());
         counting(&ctx, usize::MAX);
         let work = || -> Result<()> { panic!("on purpose") };
-        let caught = std::panic::catch_unwind(std::panic::AssertUnwindSafe(|| ctx.stage("fall", work)));
+        let caught = std::panic::catch_unwind(std::panic::AssertUnwindSafe(|| ctx.phase("fall", work)));
         assert!(caught.is_err());
-        assert!(ctx.stage("stand", || Ok(())).is_ok());
+        assert!(ctx.phase("stand", || Ok(())).is_ok());
     }
 
     #[test]

@@ -42,7 +42,7 @@ pub fn is_stream(path: &Path) -> bool {
     matches!(target(path), Target::Stream)
 }
 
-/// What a path leads to.
+/// The kind of file at a path.
 enum Target {
     /// A file that can be replaced, links followed; or nothing yet.
     File(PathBuf),
@@ -79,7 +79,7 @@ fn is_open_file(path: &Path) -> bool {
     false
 }
 
-/// Nothing that is there is lost: an open file grows.
+/// Existing contents are kept: an open file grows.
 fn straight(path: &Path, content: impl FnOnce(&mut dyn Write) -> std::io::Result<()>) -> std::io::Result<()> {
     let mut out = BufWriter::new(File::options().append(true).open(path)?);
     content(&mut out)?;
@@ -95,7 +95,7 @@ fn through_neighbour(
     let turn = TURN.fetch_add(1, Ordering::Relaxed);
     name.push(format!(".{}-{turn}.{PART}", std::process::id()));
     let part = path.with_file_name(name);
-    BEGUN.lock().expect("nobody panics with this lock").push(part.clone());
+    BEGUN.lock().expect("no panic holds this lock").push(part.clone());
     let attempt = || -> std::io::Result<()> {
         let mut out = BufWriter::new(File::create(&part)?);
         content(&mut out)?;
@@ -106,11 +106,11 @@ fn through_neighbour(
     let done = attempt().inspect_err(|_| {
         let _ = std::fs::remove_file(&part);
     });
-    BEGUN.lock().expect("nobody panics with this lock").retain(|begun| *begun != part);
+    BEGUN.lock().expect("no panic holds this lock").retain(|begun| *begun != part);
     done
 }
 
-/// Removes what this process has begun and not finished: for a process that ends at once.
+/// Removes the unfinished files of this process: for a process that ends at once.
 pub fn abandon() {
     // A writer that holds the lock holds it for an instant.
     if let Ok(begun) = BEGUN.lock() {
@@ -152,7 +152,7 @@ mod tests {
         write_bytes(&link, b"after").unwrap();
         assert!(std::fs::symlink_metadata(&link).unwrap().is_symlink());
         assert_eq!(std::fs::read(&file).unwrap(), b"after");
-        // A link of our own: what replaced a device would harm the machine.
+        // Through a link of our own: replacing the real device would harm the machine.
         let null = folder.join("null");
         std::os::unix::fs::symlink("/dev/null", &null).unwrap();
         write_bytes(&null, b"nothing").unwrap();

@@ -12,7 +12,7 @@ thread_local! {
     static DEPTH: Cell<u32> = const { Cell::new(0) };
 }
 
-/// Reads a file with code that may panic at damage that nobody thought of.
+/// Reads a file with code that may panic on unforeseen damage.
 ///
 /// # Errors
 /// What `read` returns; for a panic, that the file is damaged; [`Error::Cancelled`] once readers are to stop.
@@ -21,12 +21,12 @@ pub fn caught<T>(path: &Path, read: impl FnOnce() -> Result<T>) -> Result<T> {
     DEPTH.set(DEPTH.get() + 1);
     let outcome = catch_unwind(AssertUnwindSafe(read));
     DEPTH.set(DEPTH.get() - 1);
-    // A reader that was told to stop ends with whatever words.
+    // The error of a reader that was stopped does not matter.
     source::check()?;
     outcome.unwrap_or_else(|_| Err(Error::file(path, "the file is damaged: it contradicts itself")))
 }
 
-/// Panics of readers are told as errors, never printed; others are left to whoever told them before.
+/// Panics of readers become errors and are not printed; others go to the previous panic hook.
 fn keep_quiet() {
     static ONCE: Once = Once::new();
     ONCE.call_once(|| {

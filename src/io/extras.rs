@@ -1,11 +1,11 @@
-//! What a mesh file holds besides its shape.
+//! What a mesh file contains besides its shape.
 
 use std::path::Path;
 
 use super::source;
 use crate::error::Result;
 
-/// Names of what a mesh file holds besides places and faces, in the plural: "UVs", "normals" ... Empty for a kind of file
+/// Names of what a mesh file contains besides positions and faces, in the plural: "UVs", "normals" ... Empty for a kind of file
 /// that has no such thing.
 ///
 /// # Errors

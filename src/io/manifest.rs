@@ -1,4 +1,4 @@
-//! Manifests: what a frame's output is, written after it. A frame is done when its manifest is there and matches.
+//! Manifests: records of a frame's output, written after it. A frame is done when its manifest exists and matches.
 
 use std::path::{Path, PathBuf};
 
@@ -18,15 +18,15 @@ pub struct Written {
     pub hash: String,
 }
 
-/// From what another run can go on after a frame.
+/// What another run can resume from after a frame.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Keeps {
-    /// Its file holds everything.
+    /// Its file contains everything.
     Whole,
-    /// Its file holds what changed since the frame before.
+    /// Its file contains the changes since the frame before.
     Changes,
-    /// A file of its own holds everything, as long as it is kept.
+    /// A separate file contains everything, as long as it is kept.
     State,
 }
 
@@ -59,14 +59,14 @@ fn stages(folder: &Path, frame: i32) -> Option<Vec<String>> {
     Some(entries.filter_map(|entry| stage(entry.ok()?)).collect())
 }
 
-/// What a frame was made from, and its files.
+/// The inputs of a frame, and its files.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Manifest {
     /// Which frame.
     pub frame: i32,
     /// Hash of all settings and inputs that it depends on, those of the frames before it included.
     pub inputs: String,
-    /// From what another run can go on.
+    /// What another run can resume from.
     pub keeps: Keeps,
     /// Its files.
     pub files: Vec<Written>,
@@ -84,18 +84,18 @@ impl Written {
         Self { path, bytes: bytes.len() as u64, hash: hash::of_bytes(bytes) }
     }
 
-    /// Whether the file is there with its length.
+    /// Whether the file exists with its length.
     pub fn is_there(&self, folder: &Path) -> bool {
         std::fs::metadata(folder.join(&self.path))
             .is_ok_and(|file| file.is_file() && file.len() == self.bytes)
     }
 
-    /// Whether the file is there with its content; reads it.
+    /// Whether the file exists with its contents; reads it.
     pub fn is_whole(&self, folder: &Path) -> bool {
         self.fault(folder).is_none()
     }
 
-    /// What keeps the file from being the one that was written; reads it.
+    /// How the file differs from what was written; reads it.
     pub fn fault(&self, folder: &Path) -> Option<String> {
         let path = folder.join(&self.path);
         let Ok(file) = std::fs::metadata(&path) else { return Some("is missing".into()) };
@@ -153,7 +153,7 @@ impl Manifest {
         self.files.iter().filter(move |file| file.path.split('/').next() == Some(kind))
     }
 
-    /// Whether all its files are there with their lengths.
+    /// Whether all its files exist with their lengths.
     pub fn files_are_there(&self, folder: &Path) -> bool {
         self.files.iter().all(|file| file.is_there(folder))
     }

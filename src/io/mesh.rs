@@ -7,7 +7,7 @@ use super::{atomic, obj, ply, source, stl};
 use crate::base::{PolygonMesh, TriMesh, Uvs, Vec3};
 use crate::error::{Error, Result};
 
-/// What is read and written, by extension.
+/// Formats that are read and written, by extension.
 pub const EXTENSIONS: [&str; 3] = ["obj", "ply", "stl"];
 
 /// Reads a mesh in triangles: all its vertices, in the file's order.
@@ -81,6 +81,7 @@ pub fn ply_bytes(mesh: &TriMesh, velocities: &[Vec3], uvs: Option<&Uvs>) -> Vec<
     bytes
 }
 
-fn extension(path: &Path) -> String {
+/// The extension of a file's name in lower case; empty without one.
+pub fn extension(path: &Path) -> String {
     path.extension().and_then(|text| text.to_str()).unwrap_or("").to_lowercase()
 }

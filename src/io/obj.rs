@@ -10,7 +10,7 @@ use crate::error::one_line;
 const PIECE: usize = 1 << 14;
 /// Letters of a word that a message repeats.
 const LONGEST_WORD: usize = 40;
-/// What some programs put before the first line of a text in UTF-8.
+/// Byte order mark of UTF-8, which some programs write.
 const BYTE_ORDER_MARK: &[u8] = b"\xef\xbb\xbf";
 
 /// Reads positions, faces and texture coordinates. Lines of other kinds may be of any encoding.
@@ -26,7 +26,7 @@ pub(super) fn parse(bytes: &[u8]) -> Result<PolygonMesh, String> {
     Ok(reader.finish())
 }
 
-/// What the lines so far held.
+/// The contents of the lines so far.
 #[derive(Default)]
 struct Reader {
     mesh: PolygonMesh,
@@ -56,7 +56,7 @@ impl Reader {
         Ok(())
     }
 
-    /// Texture coordinates: v may be left out. Those that are no finite numbers count as none when a face names them.
+    /// Texture coordinates: v may be left out. Those that are not finite count as missing when a face names them.
     fn place<'a>(&mut self, mut words: impl Iterator<Item = &'a [u8]>) -> Result<(), String> {
         let mut next = |default: f32| words.next().map_or(Some(default), number).unwrap_or(f32::NAN);
         self.places.push([next(f32::NAN), next(0.0)]);

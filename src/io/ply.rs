@@ -50,7 +50,7 @@ pub(super) fn parse(bytes: &[u8]) -> Result<PolygonMesh, String> {
     check_coordinates(&elements)?;
     let mut reader = Reader { format, bytes: &bytes[body..], at: 0 };
     let mut parsed = Parsed::new(&elements);
-    // An element without properties has no rows in the file, however many it says.
+    // An element without properties has no rows in the file, whatever its count.
     for element in elements.iter().filter(|element| !element.properties.is_empty()) {
         for row in 0..element.count {
             if row % PIECE == 0 && source::is_stopped() {
@@ -59,7 +59,7 @@ pub(super) fn parse(bytes: &[u8]) -> Result<PolygonMesh, String> {
             let place = format_args!("{} {} of {}", element.name, row + 1, element.count);
             read_row(&mut reader, element, &mut parsed).map_err(|fault| match fault {
                 Fault::End => format!("the .ply file ends in {place}"),
-                Fault::Text(text) => format!("{place}: \"{text}\" is no number"),
+                Fault::Text(text) => format!("{place}: \"{text}\" is not a number"),
                 Fault::Count(count) => format!("{place} cannot have {count} entries"),
             })?;
         }
@@ -146,7 +146,7 @@ fn parse_header(header: &str) -> Result<(Format, Vec<Element>), String> {
     let mut elements: Vec<Element> = Vec::new();
     for (number, line) in lines.enumerate() {
         let words: Vec<&str> = line.split_whitespace().collect();
-        let wrong = || format!("line {}: \"{}\" is no line of a .ply header", number + 2, line.trim());
+        let wrong = || format!("line {}: \"{}\" is not a line of a .ply header", number + 2, line.trim());
         match words.as_slice() {
             ["format", "ascii", _] => format = Some(Format::Ascii),
             ["format", "binary_little_endian", _] => format = Some(Format::Little),
@@ -259,7 +259,7 @@ fn read_row(reader: &mut Reader<'_>, element: &Element, parsed: &mut Parsed) -> 
             }
             Some(count) => {
                 let count = reader.number(count)?;
-                // A damaged count must not ask for memory beyond the file.
+                // A damaged count must not allocate more than the file could fill.
                 if !(0.0..=reader.bytes.len() as f64).contains(&count) {
                     return Err(Fault::Count(count));
                 }
@@ -290,12 +290,12 @@ fn read_row(reader: &mut Reader<'_>, element: &Element, parsed: &mut Parsed) -> 
     Ok(())
 }
 
-/// Indices that are no whole number from 0 become one that validation refuses.
+/// Indices that are not integers from 0 become one that validation refuses.
 fn index(value: f64) -> u32 {
     if (0.0..f64::from(u32::MAX)).contains(&value) && value.fract() == 0.0 { value as u32 } else { u32::MAX }
 }
 
-/// Strips end at -1; every other triangle is turned round.
+/// Strips end at -1; every other triangle is flipped.
 fn add_strips(values: &[f64], parsed: &mut Parsed) {
     for strip in values.split(|&value| value < 0.0) {
         for (number, three) in strip.windows(3).enumerate() {

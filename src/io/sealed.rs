@@ -1,4 +1,4 @@
-//! Small JSON files that tell whether they are whole and whether this version can read them.
+//! Small JSON files that show whether they are complete and whether this version can read them.
 
 use std::path::Path;
 
@@ -34,9 +34,9 @@ fn text_of(file: &Value) -> String {
     format!("{file:#}\n")
 }
 
-/// What stands in place of a stamp while it is computed.
+/// Placeholder of a stamp while it is computed.
 pub const UNSTAMPED: &str = "00000000000000000000000000000000";
-/// What stands before a stamp.
+/// The text before a stamp.
 const BEFORE_STAMP: &str = "\"check\": \"";
 
 /// Puts the hash of a text into it, in place of [`UNSTAMPED`] as the value of its key \"check\".
@@ -45,7 +45,7 @@ pub fn stamp(text: &str) -> String {
     text.replacen(&format!("{BEFORE_STAMP}{UNSTAMPED}"), &format!("{BEFORE_STAMP}{hash}"), 1)
 }
 
-/// Whether a stamped text is what it was when it was stamped.
+/// Whether a stamped text is unchanged.
 pub fn is_stamped(bytes: &[u8]) -> bool {
     let Ok(text) = std::str::from_utf8(bytes) else { return false };
     let Some(start) = text.find(BEFORE_STAMP).map(|at| at + BEFORE_STAMP.len()) else { return false };

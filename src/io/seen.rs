@@ -1,4 +1,4 @@
-//! What the input files of a run held when they were read: each must stay the same until its end.
+//! Hashes of a run's input files when they were read: each must stay the same until the run ends.
 
 use std::collections::HashMap;
 use std::path::{Path, PathBuf};
@@ -15,19 +15,19 @@ impl Seen {
     /// Reads a file for use.
     ///
     /// # Errors
-    /// What the operating system reports; other bytes than an earlier look at this file found.
+    /// What the operating system reports; other bytes than when this file was read before.
     pub fn read(&self, path: &Path) -> Result<Vec<u8>> {
         let bytes = super::source::read(path)?;
         self.note(path, hash::of_bytes(&bytes))?;
         Ok(bytes)
     }
 
-    /// Notes the hash of what was read of a file in another way.
+    /// Records the hash of a file that was read in another way.
     ///
     /// # Errors
-    /// Another hash than an earlier look at this file found.
+    /// Another hash than when this file was read before.
     pub fn note(&self, path: &Path, hash: String) -> Result<()> {
-        let mut known = self.0.lock().expect("nobody panics with this lock");
+        let mut known = self.0.lock().expect("no panic holds this lock");
         match known.get(path) {
             Some(before) if *before != hash => {
                 Err(Error::file(path, "was changed while it was in use: run again when it stays as it is"))
@@ -45,7 +45,7 @@ impl Seen {
     /// # Errors
     /// What the operating system reports.
     pub fn hash(&self, path: &Path) -> Result<String> {
-        if let Some(hash) = self.0.lock().expect("nobody panics with this lock").get(path) {
+        if let Some(hash) = self.0.lock().expect("no panic holds this lock").get(path) {
             return Ok(hash.clone());
         }
         let hash = hash::of_file(path)?;

@@ -2,7 +2,7 @@
 
 use std::path::{Path, PathBuf};
 
-/// Most digits that a frame number is written with.
+/// Most digits of a frame number.
 const MOST_DIGITS: usize = 32;
 
 /// A file's name with a place for the frame number, in a folder.
@@ -16,7 +16,7 @@ pub struct Pattern {
 
 impl Pattern {
     /// Finds the frame number's place in a file's name; none when the name is of one file, as every name of a file that
-    /// is there. Names of folders are never looked at.
+    /// is there. Names of folders are not considered.
     pub fn parse(path: &Path) -> Option<Self> {
         let text = path.file_name()?.to_str()?;
         let part = |start: usize, end: usize, digits: usize| {

@@ -25,7 +25,7 @@ pub fn is_stopped() -> bool {
     STOP.get().is_some_and(|flag| flag.load(Ordering::Relaxed))
 }
 
-/// Ends a reader that is to stop; long readers ask once in a while.
+/// Ends a reader that is to stop; long readers check now and then.
 ///
 /// # Errors
 /// [`Error::Cancelled`].

@@ -1,4 +1,4 @@
-//! USD as text (.usda): what a shot made, for any program that reads USD; no library is needed.
+//! USD as text (.usda): the output of a shot, for any program that reads USD; no library is needed.
 
 use std::fmt::Write;
 
@@ -18,7 +18,7 @@ pub struct MeshFrame<'a> {
     pub uvs: Option<&'a Uvs>,
 }
 
-/// What stays of a moving mesh from frame to frame.
+/// The part of a moving mesh that stays the same from frame to frame.
 pub struct MeshPrim<'a> {
     /// Name of its prim: see [`prim_name`].
     pub name: &'a str,
@@ -146,7 +146,7 @@ fn write_volume(out: &mut String, volume: &VolumeFiles) {
 pub struct Clips {
     /// Folder and kind: `./objects/objects.0001.usda` for `objects`.
     pub kind: &'static str,
-    /// The frames that are there, ascending.
+    /// The existing frames, ascending.
     pub frames: Vec<i32>,
 }
 
@@ -203,7 +203,7 @@ fn declare_uvs(out: &mut String, indent: &str, uvs: Option<&Uvs>) {
     }
 }
 
-/// What the clips hold: the manifest that USD asks for.
+/// The manifest of the clips that USD requires.
 pub fn clip_manifest(kind: &str, meshes: &[MeshPrim]) -> String {
     let mut out = format!("#usda 1.0\n(\n    defaultPrim = \"{kind}\"\n)\n\nover \"{kind}\"\n{{\n");
     for MeshPrim { name, uvs } in meshes {

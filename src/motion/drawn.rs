@@ -50,17 +50,17 @@ impl Faces {
         self.moving.as_ref().map_or(self.vertices, |(used, _)| used.len())
     }
 
-    /// Of the places of all vertices those that triangles name.
+    /// Keeps the positions of vertices that triangles name.
     pub fn keep_moving<T: Copy>(&self, places: &mut Vec<T>) {
         if let Some((used, _)) = &self.moving {
-            // They ascend: none is written over before it is read.
+            // They ascend: none is overwritten before it is read.
             used.iter().enumerate().for_each(|(to, &from)| places[to] = places[from as usize]);
             places.truncate(used.len());
         }
     }
 }
 
-/// A sentence about corners without texture coordinates.
+/// The warning for corners without texture coordinates.
 pub fn missing_uvs(name: &str, count: usize) -> String {
     format!("{name}: {count} corners or vertices have no UVs: they are written as 0, 0")
 }

@@ -1,13 +1,13 @@
 //! How a figure stands: its lowest parts, and how they move while they stand on the ground.
 //!
-//! A walk cycle usually walks in its place: its standing foot goes back under it. Carried at that speed the other way, the
+//! A walk cycle usually walks in place: its standing foot moves backwards under it. Carried at that speed the other way, the
 //! foot stays where it stands.
 
 use super::{Motion, Poses, span};
 use crate::base::DVec3;
 use crate::error::Result;
 
-/// Poses a second of the motion that are looked at, and the least and greatest number of them.
+/// Sampled poses per second of the motion, and their least and greatest number.
 const RATE: f64 = 60.0;
 const POSES: (f64, f64) = (24.0, 240.0);
 /// Vertices that are posed at most, over all poses: a look must not take minutes.
@@ -19,9 +19,9 @@ const REACHED: f64 = 0.4;
 /// What rises or falls more than this part of its way along does not stand, but for this part of the above.
 const LEVEL: f64 = 0.25;
 const STILL: f64 = 0.1;
-/// Spread of the velocities that is steady, as a part of the speed: walks have up to 0.22, runs 0.45.
+/// Spread of steady velocities, as a fraction of the speed: walks have up to 0.22, runs 0.45.
 const STEADY: f64 = 0.33;
-/// Part of the time that something must stand, or the motion is no gait.
+/// Fraction of the time that something must stand, or the motion is not a gait.
 const LEAST_TIME: f64 = 0.2;
 
 /// How a motion's lowest parts move.
@@ -31,7 +31,7 @@ pub struct Gait {
     pub velocity: DVec3,
     /// How far the velocity at those times is from that (m/s): the median.
     pub spread: f64,
-    /// Part of the time that something stands, 0..=1.
+    /// Fraction of the time that something stands, 0..=1.
     pub standing: f64,
     /// y of the lowest place (m).
     pub lowest: f64,
@@ -54,7 +54,7 @@ impl Gait {
 /// Looks at a motion (m, Y up) from one time to another (s); none where nothing stands for a while.
 ///
 /// # Errors
-/// A pose that cannot be had.
+/// A pose that cannot be computed.
 pub fn gait(motion: &dyn Motion, from: f64, to: f64) -> Result<Option<Gait>> {
     let vertices = motion.vertex_count().max(1) as f64;
     let most = (MOST_VERTICES / vertices).clamp(POSES.0, POSES.1);
@@ -103,7 +103,7 @@ pub fn gait(motion: &dyn Motion, from: f64, to: f64) -> Result<Option<Gait>> {
     Ok(Some(Gait { velocity, spread, standing, lowest, height }))
 }
 
-/// The number that a part of some numbers is not above: the median for a half.
+/// A quantile of some numbers: the median for a half.
 fn part_of(mut values: Vec<f64>, part: f64) -> f64 {
     values.sort_unstable_by(f64::total_cmp);
     values.get((values.len() as f64 * part) as usize).copied().unwrap_or(0.0)

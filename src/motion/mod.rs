@@ -13,13 +13,21 @@ pub use drawn::{Drawn, missing_uvs};
 pub use gait::{Gait, gait};
 pub use gltf::{Character, Contents, Play};
 pub use morph::Morph;
-pub use poses::{Poses, span};
+pub use poses::{Poses, between, span};
 pub use rigid::{Key, Keys, Placed, Rigid};
 pub use sequence::MeshSequence;
 pub use space::{Space, Up};
 
+use std::path::Path;
+
 use crate::base::DVec3;
 use crate::error::Result;
+use crate::io::mesh::extension;
+
+/// Whether a file is a glTF character, by its name.
+pub fn is_gltf(path: &Path) -> bool {
+    matches!(extension(path).as_str(), "glb" | "gltf")
+}
 
 /// A mesh in motion. The triangles never change; only the vertices move.
 pub trait Motion: Send + Sync {
@@ -35,8 +43,8 @@ pub trait Motion: Send + Sync {
     /// What a file read on demand reports.
     fn pose(&self, time: f64, out: &mut Vec<DVec3>) -> Result<()>;
 
-    /// The mesh as its file has it: what is written, while the triangles above are what sweeps the snow. They may join
-    /// vertices that always move together, and leave out those without a triangle.
+    /// The mesh as its file has it, to write. [`Motion::triangles`], which sweep the snow, may join vertices that always move
+    /// together, and omit vertices without a triangle.
     fn drawn(&self) -> Drawn<'_> {
         Drawn { vertices: self.vertex_count(), triangles: self.triangles(), uvs: None }
     }
@@ -49,8 +57,8 @@ pub trait Motion: Send + Sync {
         self.pose(time, out)
     }
 
-    /// Writes the mean velocities (m/s) of the drawn vertices from `time` to `time + step` (s) into `out` (cleared first):
-    /// what carries each vertex from one pose to the other. `step` may be negative, not 0.
+    /// Writes the mean velocities (m/s) of the drawn vertices from `time` to `time + step` (s) into `out` (cleared first).
+    /// `step` may be negative, not 0.
     ///
     /// # Errors
     /// As [`Motion::pose`].
@@ -62,13 +70,13 @@ pub trait Motion: Send + Sync {
         Ok(())
     }
 
-    /// Whether the motion's own data end before a time (s), so that it rests then for want of them.
+    /// Whether the motion's own data end before a time (s), so that it rests from then on.
     fn ends_before(&self, _time: f64) -> bool {
         false
     }
 
     /// As [`Motion::velocities`] over the coming `step` (s, above 0) or, where the motion's own data end sooner, over the
-    /// step before: what moved until then does not stop at once.
+    /// step before, so that velocities do not drop to 0 at the last frame.
     ///
     /// # Errors
     /// As [`Motion::pose`].
@@ -77,16 +85,16 @@ pub trait Motion: Send + Sync {
         self.velocities(time, if ends { -step } else { step }, out)
     }
 
-    /// Times inside (from, to) where the motion has a kink: keys, frames of a sequence. Ascending.
+    /// Times inside (from, to) where the direction of motion jumps: keys, frames of a sequence. Ascending.
     fn breaks(&self, from: f64, to: f64) -> Vec<f64>;
 
-    /// How far any part turns between two times (radians), at most, where turning is how the motion is given; 0 where
-    /// vertices move straight, or along arcs of less than half a turn between two kinks.
+    /// Upper bound on the rotation (radians) of any part between two times, where the motion is given by rotations; 0 where
+    /// vertices move straight, or along arcs of less than half a turn between two breaks.
     fn turning(&self, _from: f64, _to: f64) -> f64 {
         0.0
     }
 
-    /// Whether vertices that always move together are one vertex already: others that meet at some time stay apart.
+    /// Whether vertices that always move together are already one vertex; others that coincide at some time are not welded.
     fn keeps_its_welds(&self) -> bool {
         false
     }

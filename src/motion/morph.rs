@@ -1,20 +1,20 @@
 //! One mesh that becomes another.
 
-use super::Motion;
+use super::{Motion, between};
 use crate::base::{DVec3, TriMesh, Vec3};
 use crate::error::{Error, Result};
 
-/// Vertices that move straight from one mesh's places to another's.
+/// Vertices that move straight from one mesh's positions to another's.
 pub struct Morph {
     from: TriMesh,
     to: Vec<Vec3>,
 }
 
 impl Morph {
-    /// Moves from `from` at 0 s to the places of `to` (m) at 1 s; it rests before and after.
+    /// Moves from `from` at 0 s to the positions `to` (m) at 1 s; it rests before and after.
     ///
     /// # Errors
-    /// Another number of places than `from` has vertices.
+    /// A different number of positions than `from` has vertices.
     pub fn new(from: TriMesh, to: Vec<Vec3>) -> Result<Self> {
         if from.positions.len() != to.len() {
             return Err(Error::argument(format!(
@@ -37,10 +37,7 @@ impl Motion for Morph {
     }
 
     fn pose(&self, time: f64, out: &mut Vec<DVec3>) -> Result<()> {
-        let part = time.clamp(0.0, 1.0);
-        let ends = self.from.positions.iter().zip(&self.to);
-        out.clear();
-        out.extend(ends.map(|(p, q)| p.cast::<f64>().lerp(&q.cast(), part)));
+        between(&self.from.positions, &self.to, time.clamp(0.0, 1.0), out);
         Ok(())
     }
 

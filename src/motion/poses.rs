@@ -1,10 +1,10 @@
-//! Poses of a motion looked at one after another.
+//! Poses of a motion one after another, and between two given ones.
 
 use super::Motion;
-use crate::base::DVec3;
+use crate::base::{DVec3, Vec3};
 use crate::error::Result;
 
-/// A motion's pose, and the one that was looked at before it.
+/// A motion's pose, and the one that was queried before it.
 pub struct Poses<'a> {
     motion: &'a dyn Motion,
     before: Vec<DVec3>,
@@ -15,14 +15,14 @@ impl<'a> Poses<'a> {
     /// Begins at a time (s).
     ///
     /// # Errors
-    /// A pose that cannot be had.
+    /// A pose that cannot be computed.
     pub fn start(motion: &'a dyn Motion, time: f64) -> Result<Self> {
         let mut out = Self { motion, before: Vec::new(), pose: Vec::new() };
         motion.pose(time, &mut out.pose)?;
         Ok(out)
     }
 
-    /// Goes on to a time (s); gives the pose before and the one there (m).
+    /// Moves on to a time (s); returns the previous pose and the one at that time (m).
     ///
     /// # Errors
     /// As [`Poses::start`].
@@ -32,13 +32,22 @@ impl<'a> Poses<'a> {
         Ok((&self.before, &self.pose))
     }
 
-    /// The pose (m) that was looked at last.
+    /// The current pose (m).
     pub fn now(&self) -> &[DVec3] {
         &self.pose
     }
 }
 
-/// Least and greatest corner of places; infinite, and the other way round, where there are none.
+/// Writes positions on straight lines between two poses (m) into `out` (cleared first): `from` at `part` 0, `to` at 1.
+pub fn between(from: &[Vec3], to: &[Vec3], part: f64, out: &mut Vec<DVec3>) {
+    out.clear();
+    match part {
+        0.0 => out.extend(from.iter().map(|p| p.cast::<f64>())),
+        _ => out.extend(from.iter().zip(to).map(|(p, q)| p.cast::<f64>().lerp(&q.cast(), part))),
+    }
+}
+
+/// Bounding box of positions; without any, infinite and with its corners swapped.
 pub fn span(places: &[DVec3]) -> (DVec3, DVec3) {
     let none = (DVec3::repeat(f64::INFINITY), DVec3::repeat(f64::NEG_INFINITY));
     places.iter().fold(none, |(low, high), place| (low.inf(place), high.sup(place)))

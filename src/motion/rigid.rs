@@ -29,7 +29,7 @@ impl Keys {
     /// Checks the order of the keys; none at all is the identity.
     ///
     /// # Errors
-    /// Times that do not rise, or a number that is not finite.
+    /// Times that do not increase, or a number that is not finite.
     pub fn new(keys: Vec<Key>) -> Result<Self> {
         let finite =
             |key: &Key| key.time.is_finite() && key.at.iter().chain(&key.turn).all(|v| v.is_finite());
@@ -98,7 +98,7 @@ impl Keys {
         (at.into(), turn.into())
     }
 
-    /// How fast a number changes at a key: 0 at the ends, else the weighted harmonic mean of both sides (Fritsch and
+    /// Slope of a number at a key: 0 at the ends, else the weighted harmonic mean of both sides (Fritsch and
     /// Butland 1984), which keeps the curve between its keys.
     fn slope(&self, key: usize, of: &dyn Fn(&Key) -> f64) -> f64 {
         if key == 0 || key + 1 == self.keys.len() {

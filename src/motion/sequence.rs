@@ -1,17 +1,17 @@
-//! A mesh a frame: vertices move straight from frame to frame.
+//! A mesh per frame: vertices move straight from frame to frame.
 
 use std::path::PathBuf;
 use std::sync::{Arc, Mutex, OnceLock};
 
 use super::drawn::Faces;
-use super::{Drawn, Motion};
+use super::{Drawn, Motion, between};
 use crate::base::{DVec3, PolygonMesh, Vec3};
 use crate::error::{Error, Result};
 use crate::io::mesh;
 use crate::io::seen::Seen;
 use crate::io::sequence::Pattern;
 
-/// Frames kept in memory: the two around the time that is asked for.
+/// Frames kept in memory: the two around the current time.
 const KEPT: usize = 2;
 
 /// A sequence of mesh files with the same faces, read when they are needed.
@@ -26,10 +26,10 @@ pub struct MeshSequence {
     polygons: PolygonMesh,
     faces: Faces,
     first_path: PathBuf,
-    /// What the files held when they were read.
+    /// The files' contents when they were read.
     seen: Arc<Seen>,
-    /// Whether the frame after the last can be used: velocities over the last frame's coming step want it.
-    goes_on: OnceLock<bool>,
+    /// Whether the frame after the last can be used: the velocities ahead at the last frame need it.
+    continues: OnceLock<bool>,
     kept: Mutex<Vec<(i32, Arc<Vec<Vec3>>)>>,
 }
 
@@ -42,10 +42,10 @@ impl MeshSequence {
         Self::open_seen(pattern, first, last, fps, offset, Arc::default())
     }
 
-    /// As [`MeshSequence::open`]; `seen` notes what the files held when they were read.
+    /// As [`MeshSequence::open`]; `seen` records the contents of the files when they were read.
     ///
     /// # Errors
-    /// As [`MeshSequence::open`]; later, from a pose, a file that is no longer what was seen.
+    /// As [`MeshSequence::open`]; later, from a pose, a file that has changed.
     pub fn open_seen(
         pattern: Pattern,
         first: i32,
@@ -62,20 +62,20 @@ impl MeshSequence {
         let (faces, positions) = Faces::new(polygons.clone());
         polygons.uvs = None;
         let kept = Mutex::new(vec![(first, Arc::new(positions))]);
-        let goes_on = OnceLock::new();
-        Ok(Self { pattern, first, last, fps, offset, polygons, faces, first_path, seen, goes_on, kept })
+        let continues = OnceLock::new();
+        Ok(Self { pattern, first, last, fps, offset, polygons, faces, first_path, seen, continues, kept })
     }
 
     fn frame(&self, frame: i32) -> Result<Arc<Vec<Vec3>>> {
         let known = |kept: &[(i32, Arc<Vec<Vec3>>)]| {
             kept.iter().find(|(number, _)| *number == frame).map(|(_, positions)| positions.clone())
         };
-        if let Some(positions) = known(&self.kept.lock().expect("nobody panics with this lock")) {
+        if let Some(positions) = known(&self.kept.lock().expect("no panic holds this lock")) {
             return Ok(positions);
         }
         // Not with the lock held: several frames may be read at once.
         let positions = Arc::new(self.read(frame)?);
-        let mut kept = self.kept.lock().expect("nobody panics with this lock");
+        let mut kept = self.kept.lock().expect("no panic holds this lock");
         if known(&kept).is_none() {
             kept.push((frame, positions.clone()));
             if kept.len() > KEPT {
@@ -104,9 +104,9 @@ impl MeshSequence {
         Ok(mesh.positions)
     }
 
-    /// Last frame that can be posed.
+    /// Last frame with a pose.
     fn end(&self) -> i32 {
-        let goes_on = self.goes_on.get_or_init(|| {
+        let continues = self.continues.get_or_init(|| {
             let Some(next) = self.last.checked_add(1).filter(|next| self.pattern.path(*next).is_file())
             else {
                 return false;
@@ -117,7 +117,7 @@ impl MeshSequence {
             }
             read.is_ok()
         });
-        self.last + i32::from(*goes_on)
+        self.last + i32::from(*continues)
     }
 }
 
@@ -142,21 +142,15 @@ impl Motion for MeshSequence {
 
     fn drawn_pose(&self, time: f64, out: &mut Vec<DVec3>) -> Result<()> {
         let frame = time * self.fps - self.offset;
-        // The frame after the last is looked at only when it is asked for.
+        // The frame after the last is read only when it is needed.
         let last = if frame > f64::from(self.last) + 1e-6 { self.end() } else { self.last };
         let frame = frame.clamp(f64::from(self.first), f64::from(last));
-        // Times come from whole frames divided by fps: rounding must not ask for a neighbour.
+        // Times come from whole frames divided by fps: rounding must not need a neighbour.
         let frame = if (frame - frame.round()).abs() < 1e-6 { frame.round() } else { frame };
         let (below, part) = (frame.floor() as i32, frame - frame.floor());
         let a = self.frame(below)?;
-        out.clear();
-        if part == 0.0 {
-            out.extend(a.iter().map(|p| p.cast::<f64>()));
-        } else {
-            let b = self.frame(below + 1)?;
-            let between = a.iter().zip(b.iter());
-            out.extend(between.map(|(p, q)| p.cast::<f64>().lerp(&q.cast(), part)));
-        }
+        let b = if part == 0.0 { a.clone() } else { self.frame(below + 1)? };
+        between(&a, &b, part, out);
         Ok(())
     }
 

@@ -1,24 +1,24 @@
 //! Preview pictures of meshes and level sets: sun, sky and shadows, so that the depth of a print reads.
 //!
 //! ```no_run
-//! # use frazil::{Context, Pool, io, render::{Camera, Light, Model, Size, Stage}};
+//! # use frazil::{Context, Pool, io, render::{Camera, Light, Model, Size, Models}};
 //! let ctx = Context::new(Pool::all_cores()?);
 //! let boot = io::mesh::read("boot.obj".as_ref())?;
-//! let stage = Stage::new(vec![Model::mesh(&boot, [0.6, 0.3, 0.2])]);
+//! let models = Models::new(vec![Model::mesh(&boot, [0.6, 0.3, 0.2])]);
 //! let size = Size { width: 640, height: 360 };
-//! let camera = Camera::framing(stage.bounds().expect("a boot is not empty"), size);
-//! stage.draw(&ctx, &camera, &Light::beside(&camera), size)?.write("boot.png".as_ref())?;
+//! let camera = Camera::framing(models.bounds().expect("a boot is not empty"), size);
+//! models.draw(&ctx, &camera, &Light::beside(&camera), size)?.write("boot.png".as_ref())?;
 //! # Ok::<(), frazil::Error>(())
 //! ```
 
 mod camera;
 mod model;
+mod models;
 mod picture;
 mod shade;
-mod stage;
 
 pub use camera::{Camera, Size};
 pub use model::Model;
+pub use models::Models;
 pub use picture::Picture;
 pub use shade::{Light, SNOW};
-pub use stage::Stage;

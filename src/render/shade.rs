@@ -57,7 +57,7 @@ fn sky(height: f64) -> Colour {
 
 /// Light that leaves a point towards the camera.
 ///
-/// `blocked(direction)` tells whether something hides that direction from the point; `sample` numbers the
+/// `blocked(direction)` returns whether something hides that direction from the point; `sample` numbers the
 /// samples of this pixel.
 pub(super) fn shade(
     light: &Light,

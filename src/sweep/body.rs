@@ -1,4 +1,4 @@
-//! A moving body as the chain wants it: closed triangles, and poses at well-chosen times.
+//! A moving body as the chain needs it: closed triangles, and poses at well-chosen times.
 
 use std::sync::Arc;
 
@@ -15,20 +15,22 @@ use crate::context::Context;
 use crate::error::{Error, Result};
 use crate::motion::Motion;
 
-/// A step's way against the length of the pieces that edges are cut into: measured, the fewest faces and the least time.
+/// Length of a step's path relative to the pieces that edges are split into; this value gave the fewest faces and the
+/// least time.
 const SHORTER: f64 = 1.5;
-/// But steps need be no shorter than this (cells), nor more than so many times those that arcs need: measured too.
+/// Steps need be no shorter than this (cells), and no more than [`MOST_OF_ARCS`] times those that arcs need; measured
+/// too.
 const LEAST_WAY: f64 = 4.0;
 const MOST_OF_ARCS: f64 = 1.5;
-/// Most steps that an interval between two kinks of a motion is split into.
+/// Most steps in an interval between two breaks of a motion.
 const MOST_STEPS: f64 = 1024.0;
-/// How far a body turns at most while five poses show its arcs (radians): a quarter turn.
+/// Greatest rotation (radians) in an interval whose arcs are judged from five poses: a quarter turn.
 const TURNING: f64 = std::f64::consts::FRAC_PI_2;
-/// How far it may turn in a step (radians): 64 times round.
+/// Greatest rotation in a frame (radians): 64 turns.
 const MOST_TURNING: f64 = 64.0 * std::f64::consts::TAU;
-/// Bytes of a vertex in a pose: in cells, in fixed point, and what it sweeps.
+/// Bytes per vertex of a pose: in cells, in fixed point, and its part of the faces.
 const BYTES_PER_POSITION: usize = 100;
-/// Vertices or edges a task looks at.
+/// Vertices or edges per task.
 const GRAIN: usize = 2048;
 
 /// A motion with its topology, prepared once and used for many intervals.
@@ -40,30 +42,30 @@ pub struct Body {
     name: Option<String>,
 }
 
-/// What of a body stays the same while its vertices move: how its triangles hang together, and which way they look.
+/// What stays the same while a body's vertices move: its topology and orientation.
 pub struct Shape {
     /// Hash of the triangles.
     triangles: u128,
-    /// For each vertex the first one at the same place; itself when there is none before it.
+    /// For each vertex the first one at the same position; itself when there is none before it.
     same: Vec<u32>,
-    /// Whether the triangles were turned round.
+    /// Whether the triangles were flipped.
     reversed: bool,
     topology: Topology,
     contradictions: usize,
 }
 
 impl Body {
-    /// Prepares a motion: welds vertices that coincide at `time` (s), closes open loops, and turns the
-    /// triangles round if the solid would have a negative volume.
+    /// Prepares a motion: welds vertices that coincide at `time` (s), closes open loops, and flips
+    /// the triangles if the solid would have a negative volume.
     ///
     /// # Errors
-    /// When the motion has no triangles, or its pose cannot be had.
+    /// When the motion has no triangles, or its pose cannot be computed.
     pub fn new(motion: Box<dyn Motion>, time: f64) -> Result<Self> {
         Self::shaped(motion, time, None)
     }
 
-    /// As [`Body::new`]; `known` is the shape of an earlier body, which spares the work where it is the same.
-    /// The body is the same with and without.
+    /// As [`Body::new`]; `known` is the shape of an earlier body, which is shared if this body has the same one.
+    /// The result is the same with and without.
     ///
     /// # Errors
     /// As [`Body::new`].
@@ -91,33 +93,33 @@ impl Body {
         Ok(Self { motion, shape, longest_edge, noise: true, name: None })
     }
 
-    /// How its triangles hang together.
+    /// Its topology and orientation, to share with later bodies.
     pub fn shape(&self) -> &Arc<Shape> {
         &self.shape
     }
 
-    /// Says whether its imprints have ragged edges (they do unless this says no).
+    /// Sets whether its imprints have ragged edges (by default they do).
     pub fn with_noise(self, noise: bool) -> Self {
         Self { noise, ..self }
     }
 
-    /// Gives it a name for messages.
+    /// Sets its name, for messages.
     pub fn with_name(self, name: String) -> Self {
         Self { name: Some(name), ..self }
     }
 
-    /// Its name, where it was given one.
+    /// Its name, if set.
     pub fn name(&self) -> Option<&str> {
         self.name.as_deref()
     }
 
-    /// Number of open loops (joined ones count once) that were closed.
+    /// Number of open loops that were closed; loops that share a vertex count once.
     pub fn closed_loops(&self) -> usize {
         self.shape.topology.derived.len()
     }
 
-    /// Number of edges where the triangles do not agree about inside and outside: more run along them one way than the
-    /// other, by two or more.
+    /// Number of edges whose triangles disagree about inside and outside: two or more run along the edge one way without a
+    /// counterpart.
     pub fn contradictions(&self) -> usize {
         self.shape.contradictions
     }
@@ -136,8 +138,8 @@ impl Body {
     /// are equal. `tolerance` (cells) bounds the error against true arcs and flat moving triangles.
     ///
     /// # Errors
-    /// When a pose cannot be had or a vertex is too far away for the lattice.
-    pub fn chain(
+    /// When a pose cannot be computed or a vertex is too far away for the lattice.
+    pub fn faces(
         &self,
         ctx: &Context,
         from: f64,
@@ -184,7 +186,7 @@ impl Body {
             let mut pose = Vec::new();
             self.motion.pose(time, &mut pose)?;
             pose.iter_mut().for_each(|position| *position = lattice.to_cells(*position));
-            // Before anything is sized by how far the vertices lie apart.
+            // Check the extent before allocating anything proportional to it.
             pose.iter().try_for_each(|&cells| lattice.fix(cells).map(drop))?;
             Ok(pose)
         };
@@ -213,10 +215,10 @@ impl Body {
         Ok(poses)
     }
 
-    /// How far it turns in a step from `from` to `to` (s), at most (radians).
+    /// Upper bound on its rotation (radians) from `from` to `to` (s).
     ///
     /// # Errors
-    /// More than 64 times round.
+    /// More than 64 turns.
     pub fn turning(&self, from: f64, to: f64) -> Result<f64> {
         let turning = self.motion.turning(from, to);
         if turning > MOST_TURNING {
@@ -230,8 +232,8 @@ impl Body {
         Ok(turning)
     }
 
-    /// Ends of the parts of an interval that poses are chosen in: the motion's kinks, and times between which it turns
-    /// so little that a few looks at it show how far it strays from straight lines.
+    /// Ends of the parts of an interval in which steps are chosen: the motion's breaks, and times between which it turns so
+    /// little that five poses show how far its paths are from straight lines.
     fn ends(&self, from: f64, to: f64) -> Result<Vec<f64>> {
         self.turning(from, to)?;
         let mut ends = Vec::new();
@@ -260,7 +262,7 @@ impl Body {
         let arcs = (bend.sqrt() / tolerance).sqrt();
         let ends = [&probes[0][..], &probes[4][..]];
         let own = self.shape.topology.own_vertices as u32;
-        // As many as give the faces that edges sweep, cut into as many pieces as they then need, a good shape.
+        // Enough that the faces that edges sweep, once the edges are split, are well shaped.
         let twist = |edge: &[u32; 2]| {
             let error = if edge[1] < own { edge_error(ends, *edge) } else { 0.0 };
             if error <= tolerance || !near.sees(ends, edge) {
@@ -277,7 +279,7 @@ impl Body {
         arcs.max(twists).ceil().clamp(1.0, MOST_STEPS) as usize
     }
 
-    /// Whether vertices that were welded have moved apart.
+    /// Whether welded vertices have moved apart.
     fn welds_part(&self, poses: &[Vec<DVec3>]) -> bool {
         self.shape.same.iter().enumerate().any(|(vertex, &same)| {
             same as usize != vertex && poses.iter().any(|pose| pose[vertex] != pose[same as usize])
@@ -285,7 +287,7 @@ impl Body {
     }
 }
 
-/// The window in cells, grown for edges longer than a cell: what can touch it.
+/// Tests whether moving vertices and edges can touch the window.
 struct Near {
     low: DVec3,
     high: DVec3,

@@ -1,18 +1,19 @@
 //! The signed space-time chain of a moving mesh and its boundary.
 //!
 //! Between two poses each triangle sweeps a prism, split into three tetrahedra by ascending vertex
-//! number so that neighbours match: T1 = (a0 a1 a2 b2), T2 = (a0 a1 b1 b2), T3 = (a0 b0 b1 b2), a the
+//! index so that neighbours match: T1 = (a0 a1 a2 b2), T2 = (a0 a1 b1 b2), T3 = (a0 b0 b1 b2), a the
 //! earlier and b the later pose. The chain is the solid at the first pose plus every tetrahedron
 //! through which the surface moves outward (but see [`super::folds`]); points with winding number > 0 are the swept
 //! volume.
-//! Only the boundary of the chain is made: faces between two tetrahedra that are both in the chain,
-//! or both out of it, cancel by counting and are never built.
+//! Only the boundary of the chain is built: faces between two tetrahedra that are both in the chain,
+//! or both out of it, cancel and are never made.
 
 use rayon::prelude::*;
 
 use super::folds::drop_returns;
 use super::lattice::{Fixed, UNITS};
 use super::topology::Topology;
+use super::vectors::{cross, difference, dot};
 use crate::context::Context;
 use crate::error::Result;
 
@@ -21,20 +22,20 @@ use crate::error::Result;
 pub struct Face {
     /// Corners, counter-clockwise seen from outside the chain.
     pub v: [Fixed; 3],
-    /// How many layers of the chain end here; positive.
+    /// Coefficient: how many layers of the chain end here; positive.
     pub coef: i32,
 }
 
-/// What of a moving mesh goes into the chain.
+/// How often the parts of a moving mesh count in the chain.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Weights {
-    /// Layers of the solid at the first pose (1; 0 leaves it out; negative cuts it away).
+    /// Weight of the solid at the first pose (1; 0 leaves it out; negative cuts it away).
     pub solid: i32,
-    /// Layers of what is swept outward (1).
+    /// Weight of what is swept outward (1).
     pub swept: i32,
 }
 
-/// Fixed-point bounds that faces are wanted in: no limit below `max` on the axis of the scan lines.
+/// Fixed-point box in which faces are wanted; along z, the axis of the scan lines, also below `min`.
 #[derive(Debug, Clone, Copy)]
 pub struct Window {
     /// Least corner.
@@ -44,7 +45,7 @@ pub struct Window {
 }
 
 impl Window {
-    /// Whether a triangle between these corners can matter: near in x and y, not above in z.
+    /// Whether a triangle with this bounding box can matter: it overlaps the window in x and y, and is not above it.
     pub fn wants(&self, low: Fixed, high: Fixed) -> bool {
         high[0] >= self.min[0]
             && low[0] <= self.max[0]
@@ -54,9 +55,9 @@ impl Window {
     }
 }
 
-/// Outward motion below this (fixed-point units) counts as none: rounding would else decide it.
+/// Outward motion below this (fixed-point units) counts as none: otherwise rounding would decide it.
 pub const STILL: f64 = 4.0 / 4096.0 * UNITS as f64;
-/// Triangles or edges a task handles: fixed, so that the order of faces never depends on threads.
+/// Triangles or edges per task: fixed, so that the order of faces never depends on the number of threads.
 const GRAIN: usize = 2048;
 
 /// Boundary of the chain that sweeps `topology` through `levels` (poses in time order, at least one).
@@ -97,7 +98,7 @@ pub fn boundary(
     Ok(faces)
 }
 
-/// Runs `make` for 0..count in tasks of fixed size and joins what they append, in order.
+/// Runs `make` for 0..count in tasks of fixed size and concatenates the results, in order.
 fn chunks(ctx: &Context, count: usize, make: impl Fn(usize, &mut Vec<Face>) + Sync) -> Result<Vec<Face>> {
     let parts: Vec<Vec<Face>> = (0..count.div_ceil(GRAIN))
         .into_par_iter()
@@ -127,7 +128,7 @@ fn bounds(levels: &[Vec<Fixed>], vertices: &[u32]) -> (Fixed, Fixed) {
     (low, high)
 }
 
-/// Sets bit i - 1 of each step's byte when the surface moves outward through tetrahedron Ti.
+/// Sets bit i - 1 of each step's byte where the surface moves outward through tetrahedron Ti.
 fn mark_outward(
     topology: &Topology,
     levels: &[Vec<Fixed>],
@@ -156,7 +157,7 @@ fn mark_outward(
     }
 }
 
-/// Faces that belong to one triangle: itself at each pose, and the two cuts inside each prism.
+/// Faces of one triangle: itself at each pose, and the two between the tetrahedra of each prism.
 fn caps(
     topology: &Topology,
     levels: &[Vec<Fixed>],
@@ -229,25 +230,13 @@ fn sides(
     }
 }
 
-/// Adds a face with a positive coefficient, turned round when `coef` is negative.
+/// Adds a face; a negative `coef` flips it to make the coefficient positive.
 fn push(out: &mut Vec<Face>, [a, b, c]: [Fixed; 3], coef: i32) {
     match coef {
         0 => {}
         1.. => out.push(Face { v: [a, b, c], coef }),
         _ => out.push(Face { v: [a, c, b], coef: -coef }),
     }
-}
-
-fn difference(a: Fixed, b: Fixed) -> [f64; 3] {
-    [f64::from(a[0] - b[0]), f64::from(a[1] - b[1]), f64::from(a[2] - b[2])]
-}
-
-fn cross(a: [f64; 3], b: [f64; 3]) -> [f64; 3] {
-    [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]]
-}
-
-fn dot(a: [f64; 3], b: [f64; 3]) -> f64 {
-    a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
 }
 
 fn determinant(a: [f64; 3], b: [f64; 3], c: [f64; 3]) -> f64 {

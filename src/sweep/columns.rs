@@ -1,33 +1,33 @@
-//! Numbers for the lines through voxels that are parallel to an axis: those of some columns of 8 x 8.
+//! Indices for the lines through voxels that are parallel to an axis, in a sparse set of columns of 8 x 8 lines.
 
 /// Lines in a column.
 const LINES: usize = 64;
 /// No column.
 const NONE: u32 = u32::MAX;
 
-/// Columns of lines with two coordinates.
+/// A sparse set of columns of lines; lines and columns have two coordinates.
 pub struct Columns {
     /// Least and greatest column.
     low: [i32; 2],
     high: [i32; 2],
-    /// The number of each column between them, or [`NONE`].
-    numbers: Vec<u32>,
-    /// The column of each number.
+    /// The index of each column between them, or [`NONE`].
+    indices: Vec<u32>,
+    /// The column of each index.
     places: Vec<[i32; 2]>,
 }
 
 impl Columns {
-    /// None yet of those from `low` to `high`.
+    /// An empty set of columns from `low` to `high`.
     pub fn new(low: [i32; 2], high: [i32; 2]) -> Self {
         let size = [0, 1].map(|axis| (i64::from(high[axis]) - i64::from(low[axis]) + 1).max(0) as usize);
-        Self { low, high, numbers: vec![NONE; size[0] * size[1]], places: Vec::new() }
+        Self { low, high, indices: vec![NONE; size[0] * size[1]], places: Vec::new() }
     }
 
-    /// Adds a column, unless it is there; it lies between the least and the greatest one.
+    /// Adds a column between `low` and `high`, unless it is in the set.
     pub fn add(&mut self, column: [i32; 2]) {
         let place = self.place(column).expect("between the least and the greatest");
-        if self.numbers[place] == NONE {
-            self.numbers[place] = self.places.len() as u32;
+        if self.indices[place] == NONE {
+            self.indices[place] = self.places.len() as u32;
             self.places.push(column);
         }
     }
@@ -37,13 +37,13 @@ impl Columns {
         self.places.len() * LINES
     }
 
-    /// The number of the line with these coordinates (voxels).
+    /// The index of the line with these coordinates (voxels).
     pub fn line(&self, [p, q]: [i32; 2]) -> Option<usize> {
-        let number = self.numbers[self.place([p >> 3, q >> 3])?];
-        (number != NONE).then(|| number as usize * LINES + ((p & 7) << 3 | (q & 7)) as usize)
+        let index = self.indices[self.place([p >> 3, q >> 3])?];
+        (index != NONE).then(|| index as usize * LINES + ((p & 7) << 3 | (q & 7)) as usize)
     }
 
-    /// The numbers of the lines whose coordinates (voxels) lie from `first` to `last`.
+    /// The indices of the lines whose coordinates (voxels) lie from `first` to `last`.
     pub fn between(&self, first: [i32; 2], last: [i32; 2]) -> impl Iterator<Item = usize> + '_ {
         let range =
             move |axis: usize| first[axis].max(self.low[axis] * 8)..=last[axis].min(self.high[axis] * 8 + 7);
@@ -69,7 +69,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn lines_of_added_columns_are_numbered_on_both_sides_of_zero() {
+    fn lines_of_added_columns_are_indexed_on_both_sides_of_zero() {
         let mut columns = Columns::new([-2, -1], [0, 1]);
         for column in [[0, 1], [-2, -1], [0, 1]] {
             columns.add(column);

@@ -1,123 +1,124 @@
-//! How deep voxels lie inside a chain. Facets that are clipped too wide reach into the volume: their points there are not
-//! its surface.
+//! Depths of voxels inside the volume. Facets that are clipped too generously reach into the volume: their points in there
+//! do not count as surface.
 
 use std::borrow::Cow;
 use std::cell::RefCell;
 use std::collections::HashMap;
 
-use super::cells::Cells;
-use super::distance::{Offsets, Points, Triangle, gap, to_each};
+use super::bins::Bins;
+use super::distance::{Offsets, Points, Triangle, to_each};
 use super::exposure::Exposure;
+use super::facets::{Corners, Facet, halves, is_open, is_small, open_parts};
 use super::lattice::UNITS;
 use super::nearest::Group;
 use super::prism::Prisms;
-use super::surface::{Corners, Facet, halves, is_open, is_small, open_parts};
+use super::vectors::gap;
 
-/// Points of a facet nearer together than this (cells) say the same.
+/// Two query points on a facet closer than this (cells) share one answer.
 const SAME: f32 = 0.05;
-/// How far a nearest point is moved into its facet (units), away from what it shares with neighbours.
+/// How far a nearest point is moved towards its facet's centre (units), away from the edges shared with neighbours.
 const INSET: f64 = 0.02 * UNITS as f64;
-/// Up to here (cells) depths are told from clipped facets, where that may change them by more than [`SLACK`].
+/// Up to this depth (cells) facets are clipped exactly, where that may change the depth by more than [`SLACK`] (cells).
 const CLIPPED: f32 = 0.6;
 /// See [`CLIPPED`].
 const SLACK: f32 = 0.1;
 
-/// A chain, and the facets that bound it.
+/// A volume to measure depths in.
 #[derive(Clone, Copy)]
-pub struct Chain<'a> {
-    /// Its faces by the cells that they pass through.
-    pub cells: &'a Cells,
-    /// What lines see of it.
+pub struct Volume<'a> {
+    /// The chain's faces.
+    pub bins: &'a Bins,
+    /// What lines find out about them.
     pub exposure: &'a Exposure,
-    /// The parts of its faces that bound it.
+    /// The volume's surface.
     pub facets: &'a [Facet],
 }
 
 /// The facets in reach of a block.
 pub struct Near<'a> {
-    chain: Chain<'a>,
+    volume: Volume<'a>,
     corner: [i32; 3],
     ids: &'a [u32],
     triangles: &'a [Triangle],
-    /// How deep (cells) a voxel is told.
+    /// Greatest depth (cells) of interest.
     limit: f32,
-    /// Where each triangle was asked last, and what it said.
-    asked: RefCell<Vec<([f32; 3], bool)>>,
-    /// Those that said no, in parts.
+    /// For each triangle the last query point, and whether it was open.
+    queried: RefCell<Vec<([f32; 3], bool)>>,
+    /// Facets that were not open at a query, clipped as far as needed.
     parts: RefCell<HashMap<u32, Part>>,
     prisms: RefCell<&'a mut Prisms>,
 }
 
 impl<'a> Near<'a> {
-    /// The facets of a chain with these places in it, and as triangles from the corner.
+    /// `ids` are the facets in reach; `triangles` are the same, relative to the block's corner.
     pub fn new(
-        chain: Chain<'a>,
+        volume: Volume<'a>,
         corner: [i32; 3],
         ids: &'a [u32],
         triangles: &'a [Triangle],
         limit: f32,
         prisms: &'a mut Prisms,
     ) -> Self {
-        let asked = RefCell::new(vec![([f32::INFINITY; 3], false); triangles.len()]);
+        let queried = RefCell::new(vec![([f32::INFINITY; 3], false); triangles.len()]);
         let (parts, prisms) = (RefCell::default(), RefCell::new(prisms));
-        Self { chain, corner, ids, triangles, limit, asked, parts, prisms }
+        Self { volume, corner, ids, triangles, limit, queried, parts, prisms }
     }
 
     /// Whether a point of a facet (cells from the block's corner) bounds the volume.
     fn is_open(&self, index: u32, at: [f32; 3]) -> bool {
-        let Facet { v, face, sure } = &self.chain.facets[self.ids[index as usize] as usize];
+        let Facet { v, face, sure } = &self.volume.facets[self.ids[index as usize] as usize];
         if *sure {
             return true;
         }
-        let (before, said) = self.asked.borrow()[index as usize];
+        let (before, answer) = self.queried.borrow()[index as usize];
         if gap(before, at) < SAME {
-            return said;
+            return answer;
         }
         let place = at;
-        let cells = f64::from(UNITS);
-        let at = [0, 1, 2].map(|axis| (f64::from(self.corner[axis]) + f64::from(at[axis])) * cells);
+        let units = f64::from(UNITS);
+        let at = [0, 1, 2].map(|axis| (f64::from(self.corner[axis]) + f64::from(at[axis])) * units);
         let way = [0, 1, 2].map(|axis| v.iter().map(|p| f64::from(p[axis])).sum::<f64>() / 3.0 - at[axis]);
         let length = way.iter().map(|value| value * value).sum::<f64>().sqrt();
         let part = if length > INSET { INSET / length } else { 1.0 };
         let at = [0, 1, 2].map(|axis| at[axis] + part * way[axis]);
-        let Chain { cells, exposure, .. } = self.chain;
-        let open = is_open(cells, exposure, *face, at, &mut self.prisms.borrow_mut());
-        self.asked.borrow_mut()[index as usize] = (place, open);
+        let Volume { bins, exposure, .. } = self.volume;
+        let open = is_open(bins, exposure, *face, at, &mut self.prisms.borrow_mut());
+        self.queried.borrow_mut()[index as usize] = (place, open);
         open
     }
 
-    /// Distance (cells) of a place from what is open of a facet, where that is less than `most`; else `most`.
+    /// Distance (cells) of a point from the open parts of a facet, or `most` if that is less.
     fn distance_of_open(&self, index: u32, p: [f32; 3], most: f32) -> f32 {
-        let Chain { cells, exposure, facets } = self.chain;
+        let Volume { bins, exposure, facets } = self.volume;
         let facet = &facets[self.ids[index as usize] as usize];
         let mut parts = self.parts.borrow_mut();
         let whole = parts.entry(index).or_insert_with(|| Part::new(facet.v, self.corner));
         let mut prisms = self.prisms.borrow_mut();
-        let mut open = |v: &Corners| open_parts(cells, exposure, facet.face, v, &mut prisms);
+        let mut open = |v: &Corners| open_parts(bins, exposure, facet.face, v, &mut prisms);
         whole.distance_of_open(p, most, self.corner, &mut open)
     }
 }
 
-/// A facet, or a part of one, as far as it was asked where it is open.
+/// A facet, or a part of one, clipped as far as needed.
 struct Part {
     v: Corners,
     triangle: Triangle,
     inner: Inner,
 }
 
-/// What is known of a part.
+/// What is known about a part.
 enum Inner {
     /// Nothing.
-    Unasked,
-    /// It was too large to be asked as one.
+    Unknown,
+    /// It was too large for one sample to decide.
     Halves(Box<[Part; 2]>),
-    /// What of it is open.
+    /// Its open parts.
     Open(Vec<Triangle>),
 }
 
 impl Part {
     fn new(v: Corners, corner: [i32; 3]) -> Self {
-        Self { v, triangle: Triangle::new(&v, corner), inner: Inner::Unasked }
+        Self { v, triangle: Triangle::new(&v, corner), inner: Inner::Unknown }
     }
 
     /// As [`Near::distance_of_open`]; `open` gives the open parts of a small one.
@@ -131,7 +132,7 @@ impl Part {
         if gap(p, self.triangle.closest(p)) >= most {
             return most;
         }
-        if matches!(self.inner, Inner::Unasked) {
+        if matches!(self.inner, Inner::Unknown) {
             self.inner = if is_small(&self.v) {
                 Inner::Open(open(&self.v).iter().map(|part| Triangle::new(part, corner)).collect())
             } else {
@@ -139,7 +140,7 @@ impl Part {
             };
         }
         match &mut self.inner {
-            Inner::Unasked => most,
+            Inner::Unknown => most,
             Inner::Halves(halves) => {
                 halves.iter_mut().fold(most, |most, half| half.distance_of_open(p, most, corner, open))
             }
@@ -148,12 +149,12 @@ impl Part {
     }
 }
 
-/// Depths of a group's voxels: distances to their nearest facets; where a facet's nearest point does not bound the
-/// volume, because it was clipped too wide, to the nearest that does.
+/// Depths of a group's voxels: distances to their nearest facets, or, where a facet's nearest point is not open because
+/// the facet was clipped too generously, to the nearest open point.
 pub struct Depths<'a, 'n> {
     near: &'a Near<'n>,
     group: &'a Group<'a>,
-    /// The near triangles, and those within the limit, with the voxels' offsets from them, once they are needed.
+    /// The near triangles, then all within the limit; made when needed.
     candidates: [Option<Candidates<'a>>; 2],
 }
 
@@ -198,7 +199,7 @@ impl<'a, 'n> Depths<'a, 'n> {
 }
 
 impl Near<'_> {
-    /// Distance (cells) of a voxel at `p` from the nearest point that bounds the volume, of some triangles.
+    /// Distance (cells) of a voxel at `p` from the nearest open point of some triangles.
     fn nearest_open(&self, lane: usize, p: [f32; 3], Candidates { ids, offsets }: &Candidates<'_>) -> f32 {
         let squares = offsets.iter().map(|offset| offset.squared[lane]).zip(0..);
         let mut order: Vec<(f32, usize)> =
@@ -210,7 +211,7 @@ impl Near<'_> {
         };
         let first = order.iter().position(open).unwrap_or(order.len());
         let mut best = order.get(first).map_or(self.limit, |(square, _)| square.sqrt());
-        // Those before it are open elsewhere.
+        // Nearer facets are not open at their nearest point, but may be open elsewhere.
         for (square, place) in &order[..first] {
             let distance = square.sqrt();
             if distance > CLIPPED || distance > best - SLACK {

@@ -1,4 +1,4 @@
-//! Exact distance from points to triangles, eight points at a time.
+//! Distance from points to triangles, eight points at a time.
 //!
 //! Compiled once for each instruction set, with the same bits in all of them (no fused multiply-add).
 
@@ -6,6 +6,7 @@ use crate::base::cpu::dispatch;
 use crate::base::lanes::{LANES, Lanes};
 
 use super::lattice::{Fixed, UNITS};
+use super::vectors::{cross, difference, dot, sub};
 
 /// Eight positions, in cells from the block's corner.
 #[derive(Debug, Clone, Copy)]
@@ -27,22 +28,20 @@ pub struct Triangle {
     inverse: [f32; 3],
     /// Unit normal (0 when the triangle has no area).
     pub normal: [f32; 3],
-    /// Inside the plane, at right angles to each edge, inward.
+    /// For each edge the vector in the plane that is perpendicular to it and points inward.
     inward: [[f32; 3]; 3],
 }
 
 impl Triangle {
-    /// Prepares a fixed-point triangle relative to a block's corner (cells from the base voxel).
+    /// Prepares a fixed-point triangle relative to a block's corner (cells from the origin voxel).
     pub fn new(v: &[Fixed; 3], corner: [i32; 3]) -> Self {
         let place = |p: &Fixed| [0, 1, 2].map(|axis| (p[axis] - corner[axis] * UNITS) as f32 / UNITS as f32);
         let c = [place(&v[0]), place(&v[1]), place(&v[2])];
         let edge = [sub(c[1], c[0]), sub(c[2], c[1]), sub(c[0], c[2])];
         let inverse = edge.map(|e| if dot(e, e) > 0.0 { 1.0 / dot(e, e) } else { 0.0 });
         // Integer differences are exact: the normal of a sliver keeps its direction.
-        let exact = |p: &Fixed| [0, 1, 2].map(|axis| f64::from(p[axis] - v[0][axis]));
-        let (e, f) = (exact(&v[1]), exact(&v[2]));
-        let n = [e[1] * f[2] - e[2] * f[1], e[2] * f[0] - e[0] * f[2], e[0] * f[1] - e[1] * f[0]];
-        let length = (n[0] * n[0] + n[1] * n[1] + n[2] * n[2]).sqrt();
+        let n = cross(difference(v[1], v[0]), difference(v[2], v[0]));
+        let length = dot(n, n).sqrt();
         let normal = if length > 0.0 { n.map(|value| (value / length) as f32) } else { [0.0; 3] };
         Self { corner: c, edge, inverse, normal, inward: edge.map(|e| cross(normal, e)) }
     }
@@ -74,20 +73,20 @@ impl Triangle {
         let mut offset = [Lanes::all(0.0); 3];
         let mut inward = Lanes::all(f32::INFINITY);
         for i in 0..3 {
-            let (d, e) = (away(p, self.corner[i]), all(self.edge[i]));
-            let t = inner(d, e) * Lanes::all(self.inverse[i]);
+            let (d, e) = (sub(p, all(self.corner[i])), all(self.edge[i]));
+            let t = dot(d, e) * Lanes::all(self.inverse[i]);
             let t = t.max(Lanes::all(0.0)).min(Lanes::all(1.0));
             let q = [d[0] - t * e[0], d[1] - t * e[1], d[2] - t * e[2]];
-            let squared = inner(q, q);
+            let squared = dot(q, q);
             let nearer = squared.is_less(nearest);
             nearest = nearer.choose(squared, nearest);
             for axis in 0..3 {
                 offset[axis] = nearer.choose(q[axis], offset[axis]);
             }
-            inward = inner(d, all(self.inward[i])).min(inward);
+            inward = dot(d, all(self.inward[i])).min(inward);
         }
         let normal = all(self.normal);
-        let height = inner(away(p, self.corner[0]), normal);
+        let height = dot(sub(p, all(self.corner[0])), normal);
         let over = Lanes::all(0.0).is_less(inward);
         Offsets {
             x: over.choose(height * normal[0], offset[0]).0,
@@ -98,29 +97,10 @@ impl Triangle {
     }
 }
 
-/// A position or direction eight times.
+/// One vector in all eight lanes.
 #[inline(always)]
 fn all(v: [f32; 3]) -> [Lanes; 3] {
     [Lanes::all(v[0]), Lanes::all(v[1]), Lanes::all(v[2])]
-}
-
-/// Eight positions seen from another one.
-#[inline(always)]
-fn away(p: [Lanes; 3], from: [f32; 3]) -> [Lanes; 3] {
-    let from = all(from);
-    [p[0] - from[0], p[1] - from[1], p[2] - from[2]]
-}
-
-/// Inner products.
-#[inline(always)]
-fn inner(a: [Lanes; 3], b: [Lanes; 3]) -> Lanes {
-    a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
-}
-
-/// Distance of two points.
-pub fn gap(p: [f32; 3], q: [f32; 3]) -> f32 {
-    let d = [p[0] - q[0], p[1] - q[1], p[2] - q[2]];
-    (d[0] * d[0] + d[1] * d[1] + d[2] * d[2]).sqrt()
 }
 
 /// For eight points: the vector from the nearest point of a triangle (cells), and its squared length.
@@ -136,7 +116,7 @@ pub struct Offsets {
     pub squared: [f32; LANES],
 }
 
-/// The eight voxels around a centre, as signs of half a cell.
+/// Offsets (cells) of the eight voxels around a centre.
 const CORNERS: [[f32; LANES]; 3] = [
     [-0.5, -0.5, -0.5, -0.5, 0.5, 0.5, 0.5, 0.5],
     [-0.5, -0.5, 0.5, 0.5, -0.5, -0.5, 0.5, 0.5],
@@ -144,7 +124,7 @@ const CORNERS: [[f32; LANES]; 3] = [
 ];
 /// Squared distance of those voxels from their centre.
 const CORNER_SQUARED: f32 = 0.75;
-/// Room for rounding in squared distances (cells^2).
+/// Tolerance for rounding in squared distances (cells^2).
 const SLACK: f32 = 1e-3;
 
 #[inline(always)]
@@ -175,22 +155,7 @@ fn prune_body(list: &mut Vec<u32>, offsets: &mut Vec<[f32; 4]>) {
     offsets.clear();
 }
 
-#[inline(always)]
-fn sub(a: [f32; 3], b: [f32; 3]) -> [f32; 3] {
-    [a[0] - b[0], a[1] - b[1], a[2] - b[2]]
-}
-
-#[inline(always)]
-fn dot(a: [f32; 3], b: [f32; 3]) -> f32 {
-    a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
-}
-
-#[inline(always)]
-fn cross(a: [f32; 3], b: [f32; 3]) -> [f32; 3] {
-    [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]]
-}
-
-/// Offsets of eight points from each listed triangle, into `out` (one entry a listed triangle).
+/// Offsets of eight points from each listed triangle, into `out` (one entry per listed triangle).
 pub fn to_each(triangles: &[Triangle], list: &[u32], points: &Points, out: &mut Vec<Offsets>) {
     #[inline(always)]
     fn body(triangles: &[Triangle], list: &[u32], points: &Points, out: &mut Vec<Offsets>) {
@@ -204,8 +169,8 @@ pub fn to_each(triangles: &[Triangle], list: &[u32], points: &Points, out: &mut 
     dispatch!(body(triangles: &[Triangle], list: &[u32], points: &Points, out: &mut Vec<Offsets>));
 }
 
-/// For each triangle a bit for each of eight sub-blocks in which it can be nearest to a voxel, from the offsets
-/// of the sub-blocks' centres and their radius (cells); and which sub-blocks are within `reach` cells of any.
+/// For each triangle a mask of the eight sub-blocks in which it can be nearest to a voxel, from the offsets
+/// of the sub-blocks' centres and their radius (cells); returns which sub-blocks are within `reach` cells of a triangle.
 pub fn near_lanes(offsets: &[Offsets], radius: f32, reach: f32, out: &mut Vec<u8>) -> [bool; LANES] {
     #[inline(always)]
     fn body(offsets: &[Offsets], radius: f32, reach: f32, out: &mut Vec<u8>) -> [bool; LANES] {
@@ -231,7 +196,7 @@ pub fn near_lanes(offsets: &[Offsets], radius: f32, reach: f32, out: &mut Vec<u8
     dispatch!(body(offsets: &[Offsets], radius: f32, reach: f32, out: &mut Vec<u8>) -> [bool; LANES])
 }
 
-/// Squared distance (cells^2) of each of eight points from the nearest of the listed triangles, and which it is.
+/// Squared distance (cells^2) of each of eight points from the nearest of the listed triangles, and its index.
 pub fn nearest(triangles: &[Triangle], list: &[u32], points: &Points) -> ([f32; LANES], [u32; LANES]) {
     #[inline(always)]
     fn body(triangles: &[Triangle], list: &[u32], points: &Points) -> ([f32; LANES], [u32; LANES]) {
@@ -247,7 +212,7 @@ pub fn nearest(triangles: &[Triangle], list: &[u32], points: &Points) -> ([f32; 
     dispatch!(body(triangles: &[Triangle], list: &[u32], points: &Points) -> ([f32; LANES], [u32; LANES]))
 }
 
-/// Leaves in `list` the triangles that can be nearest to one of the eight voxels around a centre;
+/// Keeps in `list` the triangles that can be nearest to one of the eight voxels around a centre;
 /// `offsets` holds the centre's offset from each listed triangle (x, y, z, squared length) and is emptied.
 ///
 /// The distance to a convex set is a convex function: at a voxel it is at least its first-order estimate

@@ -1,10 +1,10 @@
 //! Skins that fold inside out.
 //!
-//! Where a pose winds around a point negatively, outward motion only brings the point back to 0: it is not swept, though
-//! the surface passed it outward. Swept is what a winding number reaches 1 at some time, so what passes outward near such
-//! places is asked, at points of it, what the pose before winds around them, and what passes them earlier in the same
-//! step; what comes from below 0 does not count. A point that the first pose winds around negatively starts below 0 in the
-//! chain too: what brings it to 0 for the first time counts.
+//! Where the winding number of a pose is negative, outward motion only brings it back to 0: the point is not swept, though
+//! the surface passed it outward. A point is swept when its winding number reaches 1 at some time. So near such places each
+//! outward passage is tested at sample points: the winding number of the pose before, plus the passages earlier in the same
+//! step, must not be negative, or the passage does not count. Where the first pose has a negative winding number the chain
+//! starts below 0 too: the passage that brings it to 0 for the first time counts.
 
 use std::borrow::Cow;
 use std::collections::HashSet;
@@ -13,7 +13,7 @@ use rayon::prelude::*;
 
 use super::chain::{Face, Window};
 use super::lattice::{Fixed, UNITS};
-use super::passages::{Change, Passage, Place, Poses, Step, Still, face, place};
+use super::passages::{Change, Passage, Place, Poses, Step, Still, face, to_f64};
 use super::region::{Region, each_block, extent};
 use super::topology::{Simplex, Topology};
 use super::winding::Lines;
@@ -21,13 +21,14 @@ use crate::base::DVec3;
 use crate::context::Context;
 use crate::error::Result;
 
-/// Negative stretches of a line that are shorter than this (cells) are none.
+/// Intervals of negative winding number on a line that are shorter than this (cells) are ignored.
 const SHORT: f64 = 1e-3;
-/// Triangles or edges that a task handles.
+/// Triangles or edges per task.
 const GRAIN: usize = 4096;
-/// Points that a task asks.
+/// Passages or points per task.
 const FEW: usize = 64;
-/// Clears the bits (see [`super::chain`]) of tetrahedra through which the surface only comes back from inside out.
+
+/// Clears the bits (see [`super::chain`]) of tetrahedra through which the surface only returns from inside out.
 ///
 /// # Errors
 /// Cancel.
@@ -53,11 +54,11 @@ pub fn drop_returns(
     Ok(())
 }
 
-/// Where to look for passages that come back from inside out.
+/// Where to look for passages that return from inside out.
 enum Folded {
-    /// The poses are the first one, moved as a whole, and these triangles are near what it winds around negatively.
+    /// All poses are rigid motions of the first one; the triangles near its negative winding numbers.
     Rigid(Vec<u32>),
-    /// The blocks near what each pose winds around negatively.
+    /// For each pose the blocks near negative winding numbers.
     Blocks(Vec<HashSet<[i32; 3]>>),
 }
 
@@ -70,9 +71,9 @@ impl Folded {
         window: &Window,
     ) -> Result<Option<Self>> {
         let rigid = is_rigid(topology, levels);
-        let (asked, window) =
-            if rigid { (&levels[..1], &come_from(levels, window)) } else { (levels, window) };
-        let blocks: Vec<HashSet<[i32; 3]>> = asked
+        let (levels_to_scan, window) =
+            if rigid { (&levels[..1], &grown(window, levels)) } else { (levels, window) };
+        let blocks: Vec<HashSet<[i32; 3]>> = levels_to_scan
             .par_iter()
             .map(|level| folded_blocks(ctx, topology, level, window))
             .collect::<Result<_>>()?;
@@ -86,7 +87,7 @@ impl Folded {
         }))
     }
 
-    /// The triangles that may come back in a step, ascending.
+    /// The triangles that may return in a step, ascending.
     fn triangles(&self, topology: &Topology, levels: &[Vec<Fixed>], step: usize) -> Cow<'_, [u32]> {
         match self {
             Self::Rigid(triangles) => Cow::Borrowed(triangles),
@@ -102,8 +103,8 @@ impl Folded {
     }
 }
 
-/// Where what comes into a window is at the first pose.
-fn come_from(levels: &[Vec<Fixed>], window: &Window) -> Window {
+/// A window grown by the largest displacement from the first pose: what enters the window is in it at the first pose.
+fn grown(window: &Window, levels: &[Vec<Fixed>]) -> Window {
     let way = |level: &Vec<Fixed>| {
         let ways =
             levels[0].iter().zip(level).map(|(from, to)| [0, 1, 2].map(|axis| from[axis].abs_diff(to[axis])));
@@ -131,7 +132,7 @@ fn touching(topology: &Topology, level: &[Fixed], blocks: &HashSet<[i32; 3]>) ->
     (0..topology.simplices.len() as u32).filter(|&id| touches(&topology.simplices[id as usize])).collect()
 }
 
-/// The blocks in which a pose winds negatively, and those around them.
+/// The blocks with negative winding numbers of a pose, and those around them.
 fn folded_blocks(
     ctx: &Context,
     topology: &Topology,
@@ -154,10 +155,10 @@ fn folded_blocks(
     Ok(negative_blocks(&faces, window).into_iter().flat_map(around).collect())
 }
 
-/// Whether all poses are the first one, moved as a whole.
+/// Whether all poses are rigid motions of the first one.
 fn is_rigid(topology: &Topology, levels: &[Vec<Fixed>]) -> bool {
     let length = |level: &[Fixed], [i, j]: [u32; 2]| {
-        let [a, b] = [i, j].map(|vertex| place(level[vertex as usize]));
+        let [a, b] = [i, j].map(|vertex| to_f64(level[vertex as usize]));
         (a - b).norm()
     };
     let keeps_length = |edge: &[u32; 2]| {
@@ -167,7 +168,7 @@ fn is_rigid(topology: &Topology, levels: &[Vec<Fixed>]) -> bool {
     topology.edges.par_iter().with_min_len(GRAIN).all(keeps_length)
 }
 
-/// The blocks in which closed faces wind negatively around points on lines through voxels.
+/// The blocks in which the winding number of closed faces is negative on a line through voxels.
 fn negative_blocks(faces: &[Face], window: &Window) -> Vec<[i32; 3]> {
     let cells = |p: Fixed| p.map(|value| value.div_euclid(UNITS));
     let Ok(region) = Region::around(faces, 0.0, cells(window.min), cells(window.max)) else {
@@ -189,11 +190,11 @@ fn negative_blocks(faces: &[Face], window: &Window) -> Vec<[i32; 3]> {
     out
 }
 
-/// What comes back in a step.
+/// The passages of a step that return from inside out.
 #[derive(Default)]
 struct Returns {
     places: Vec<Place>,
-    /// Points of them that the first pose winds around negatively, and that may come to 0 for the first time.
+    /// Sample points of them with a negative winding number at the first pose, which may come to 0 for the first time.
     early: Vec<Early>,
 }
 
@@ -204,7 +205,7 @@ struct Early {
     at: DVec3,
 }
 
-/// The outward passages of some triangles in a step that do not count anywhere.
+/// The outward passages of some triangles in a step that count at none of their sample points.
 fn returns(ctx: &Context, poses: &Poses<'_>, step: usize, triangles: &[u32]) -> Result<Returns> {
     ctx.check()?;
     let passages: Vec<Passage> = triangles
@@ -217,7 +218,7 @@ fn returns(ctx: &Context, poses: &Poses<'_>, step: usize, triangles: &[u32]) -> 
     }
     let points: Vec<DVec3> = passages.iter().flat_map(Passage::samples).collect();
     let (during, first) = (Step::new(poses, step, &points), Still::new(poses, 0, &points));
-    let ask = |passage: &Passage| {
+    let test = |passage: &Passage| {
         let mut early = Vec::new();
         for at in passage.samples() {
             match during.change(passage.place, &at) {
@@ -228,12 +229,12 @@ fn returns(ctx: &Context, poses: &Poses<'_>, step: usize, triangles: &[u32]) -> 
         }
         Some((passage.place, early))
     };
-    let found: Vec<_> = passages.par_iter().with_min_len(FEW).filter_map(ask).collect();
+    let found: Vec<_> = passages.par_iter().with_min_len(FEW).filter_map(test).collect();
     let places = found.iter().map(|(place, _)| *place).collect();
     Ok(Returns { places, early: found.into_iter().flat_map(|(_, early)| early).collect() })
 }
 
-/// Those whose points no earlier step brings to 0.
+/// The passages whose points no earlier step brings to 0.
 fn first_ones(ctx: &Context, poses: &Poses<'_>, mut early: Vec<Early>) -> Result<Vec<Place>> {
     let mut first = Vec::new();
     for step in 0..poses.levels.len() - 1 {

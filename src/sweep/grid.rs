@@ -8,13 +8,13 @@ use super::nearest::Scratch;
 use super::voxelise::{ALL, Band, Piece, Voxeliser};
 use super::{Body, Settings};
 use crate::base::TriMesh;
-use crate::base::blocks::{Block, BlockEdit, Values};
+use crate::base::blocks::{Block, BlockEdit};
 use crate::context::Context;
 use crate::error::{Error, Result};
 use crate::motion::{Keys, Rigid};
 use crate::vdb::FloatGrid;
 
-/// Blocks that are made before they are handed to the grid: bounds the memory beside it.
+/// Blocks per batch that is handed to the grid; bounds the memory besides the grid.
 const BATCH: usize = 2048;
 /// A window without bounds.
 const EVERYWHERE: Window = Window { min: [i32::MIN; 3], max: [i32::MAX; 3] };
@@ -24,17 +24,17 @@ const ALL_VOXELS: [[i32; 3]; 2] = [[-(1 << 18); 3], [1 << 18; 3]];
 /// Level set of the volume that bodies sweep from `from` to `to` (s); of the pose when they are equal.
 ///
 /// # Errors
-/// Settings out of range, a pose that cannot be had, a region too large, cancel.
+/// Settings out of range, a pose that cannot be computed, a region too large, cancel.
 pub fn chain(ctx: &Context, bodies: &[Body], from: f64, to: f64, settings: &Settings) -> Result<FloatGrid> {
     settings.validate()?;
     let mut pose = Vec::new();
     let first = bodies.first().ok_or_else(|| Error::argument("a sweep needs at least one object"))?;
     first.motion().pose(from, &mut pose)?;
     let lattice = Lattice::near(settings.voxel, pose[0])?;
-    let faces = ctx.stage("chain", || {
+    let faces = ctx.phase("chain", || {
         ctx.expect(bodies.len());
         let faces = |body: &Body| {
-            let faces = body.chain(ctx, from, to, &lattice, settings.tolerance, &EVERYWHERE);
+            let faces = body.faces(ctx, from, to, &lattice, settings.tolerance, &EVERYWHERE);
             ctx.advance();
             faces
         };
@@ -44,7 +44,7 @@ pub fn chain(ctx: &Context, bodies: &[Body], from: f64, to: f64, settings: &Sett
     fill(ctx, faces, lattice, settings.half_width)
 }
 
-/// Level set of the solid that a mesh bounds: winding number > 0, vertices that coincide welded, open loops closed.
+/// Level set of the solid that a mesh bounds: winding number > 0, coincident vertices welded, open loops closed.
 ///
 /// # Errors
 /// As [`chain`].
@@ -53,13 +53,13 @@ pub fn voxelise(ctx: &Context, mesh: TriMesh, settings: &Settings) -> Result<Flo
     chain(ctx, &[still], 0.0, 0.0, settings)
 }
 
-/// Level set of the points that a closed chain winds around at least once.
+/// Level set of the points where the winding number of a closed chain is at least 1.
 ///
 /// # Errors
 /// A region too large; cancel.
 pub fn fill(ctx: &Context, faces: Vec<Face>, lattice: Lattice, half_width: f32) -> Result<FloatGrid> {
     let band = Band { inside: half_width, outside: half_width };
-    let voxeliser = ctx.stage("winding", || {
+    let voxeliser = ctx.phase("winding", || {
         ctx.expect(Voxeliser::PARTS);
         Voxeliser::new(ctx, faces, lattice, band, ALL_VOXELS, |blocks| Ok(vec![true; blocks.len()]))
     })?;
@@ -67,7 +67,7 @@ pub fn fill(ctx: &Context, faces: Vec<Face>, lattice: Lattice, half_width: f32) 
     let blocks: Vec<usize> = (0..voxeliser.near_blocks().len()).collect();
     for batch in blocks.chunks(BATCH) {
         let edits =
-            ctx.stage("distance", || Ok(pieces(ctx, &voxeliser, batch, lattice.voxel, half_width)))?;
+            ctx.phase("distance", || Ok(pieces(ctx, &voxeliser, batch, lattice.voxel, half_width)))?;
         grid.replace_blocks(ctx, &edits)?;
     }
     let background = half_width * lattice.voxel as f32;
@@ -87,6 +87,7 @@ fn pieces(
     voxel: f64,
     half_width: f32,
 ) -> Vec<BlockEdit> {
+    let background = half_width * voxel as f32;
     ctx.expect(batch.len());
     batch
         .par_iter()
@@ -96,20 +97,11 @@ fn pieces(
         })
         .filter_map(|piece| {
             Some(match piece? {
-                Piece::Inside(origin) => BlockEdit::Constant(origin, -half_width * voxel as f32),
-                Piece::Near(origin, cells) => BlockEdit::Dense(to_block(origin, cells, voxel, half_width)),
+                Piece::Inside(origin) => BlockEdit::Constant(origin, -background),
+                Piece::Near(origin, cells) => {
+                    BlockEdit::Dense(Block::of_cells(origin, cells, voxel as f32, background))
+                }
             })
         })
         .collect()
-}
-
-/// Distances in cells to a leaf of a level set in metres.
-fn to_block(origin: [i32; 3], mut values: Box<Values>, voxel: f64, half_width: f32) -> Block {
-    let background = half_width * voxel as f32;
-    let mut mask = [0u64; 8];
-    for (voxel_index, value) in values.iter_mut().enumerate() {
-        *value = (*value * voxel as f32).clamp(-background, background);
-        mask[voxel_index >> 6] |= u64::from(value.abs() < background) << (voxel_index & 63);
-    }
-    Block { origin, values, mask }
 }

@@ -1,42 +1,43 @@
 //! Fixed-point coordinates: exact predicates on the voxel lattice need integers.
 
 use crate::base::DVec3;
+use crate::base::blocks::Origin;
 use crate::error::{Error, Result};
 
 /// Fixed-point units in a cell; rounding to them moves a vertex by at most 1/8192 cell an axis.
 pub const UNITS: i32 = 4096;
 
-/// A position in units of 1/4096 cell from the lattice's base voxel.
+/// A position in units of 1/4096 cell from the lattice's origin voxel.
 pub type Fixed = [i32; 3];
 
 /// Farthest coordinate, in units: products of two differences then fit 64 bits.
 const LIMIT: f64 = (1 << 29) as f64;
-/// Farthest coordinate, in cells from the lattice's base voxel.
+/// Farthest coordinate, in cells from the lattice's origin voxel.
 pub const REACH: f64 = LIMIT / UNITS as f64;
 
-/// World-fixed voxel lattice (voxel (i, j, k) has its centre at (i, j, k) x cell) with a base voxel
-/// near the work, so that coordinates are small.
+/// World-fixed voxel lattice (voxel (i, j, k) has its centre at (i, j, k) x cell) with an origin
+/// voxel near the work, so that coordinates are small.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Lattice {
     /// Cell size (m).
     pub voxel: f64,
     /// The voxel whose centre is the origin of the fixed-point coordinates; multiples of 8.
-    pub base: [i32; 3],
+    pub origin: [i32; 3],
 }
 
-/// The whole number below a value, as `floor` gives it, which is a call where a processor has no instruction for it.
+/// `value.floor()` as an integer: the baseline instruction set has no rounding instruction, and `floor` is a call there.
 pub fn floor(value: f64) -> i32 {
     let cut = value as i32;
     cut.saturating_sub(i32::from(value < f64::from(cut)))
 }
 
 impl Lattice {
-    /// A lattice whose base lies at the block nearest to a world position (m).
+    /// A lattice whose origin lies at the block nearest to a world position (m).
     ///
     /// # Errors
-    /// When the position is so far from the world's origin that voxel numbers overflow.
+    /// When the position is so far from the world's origin that voxel indices overflow.
     pub fn near(voxel: f64, position: DVec3) -> Result<Self> {
-        let mut base = [0; 3];
+        let mut origin = [0; 3];
         for axis in 0..3 {
             let cell = (position[axis] / voxel).round();
             if cell.is_nan() || cell.abs() > f64::from(i32::MAX / 2) {
@@ -45,24 +46,29 @@ impl Lattice {
                     position[axis]
                 )));
             }
-            base[axis] = (cell as i32) & !7;
+            origin[axis] = (cell as i32) & !7;
         }
-        Ok(Self { voxel, base })
+        Ok(Self { voxel, origin })
     }
 
-    /// World position (m) to index space: cells from the base voxel.
+    /// The origin (in voxels of the grid) of a block counted from the lattice's origin voxel.
+    pub(super) fn block_origin(&self, block: [i32; 3]) -> Origin {
+        [0, 1, 2].map(|axis| self.origin[axis] + block[axis] * 8)
+    }
+
+    /// World position (m) to index space: cells from the origin voxel.
     pub fn to_cells(&self, world: DVec3) -> DVec3 {
         DVec3::new(
-            world.x / self.voxel - f64::from(self.base[0]),
-            world.y / self.voxel - f64::from(self.base[1]),
-            world.z / self.voxel - f64::from(self.base[2]),
+            world.x / self.voxel - f64::from(self.origin[0]),
+            world.y / self.voxel - f64::from(self.origin[1]),
+            world.z / self.voxel - f64::from(self.origin[2]),
         )
     }
 
-    /// Rounds cells from the base voxel to fixed point.
+    /// Rounds cells from the origin voxel to fixed point.
     ///
     /// # Errors
-    /// When a coordinate is not finite or lies farther than 131,072 cells from the base voxel.
+    /// When a coordinate is not finite or lies farther than 131,072 cells from the origin voxel.
     pub fn fix(&self, cells: DVec3) -> Result<Fixed> {
         let scaled = cells * f64::from(UNITS);
         if !(scaled.x.abs() < LIMIT && scaled.y.abs() < LIMIT && scaled.z.abs() < LIMIT) {
@@ -73,7 +79,8 @@ impl Lattice {
     }
 }
 
-/// A sentence about what lies so far (m) from something, farther than the reach of cells of `voxel` m: "a vertex lies".
+/// The message for something (`what`, such as "a vertex lies") that is `far` m from `from`, out of reach of cells of
+/// `voxel` m.
 pub fn too_far(what: &str, far: f64, from: &str, voxel: f64) -> String {
     let reach = REACH * voxel;
     format!("{what} {far:.0} m from {from}, farther than {reach:.0} m, the reach of cells of {voxel} m")

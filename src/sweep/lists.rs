@@ -2,10 +2,10 @@
 
 use rayon::prelude::*;
 
-/// Lists that a task handles: fixed, so that nothing depends on the number of threads.
+/// Lists per task: fixed, so that nothing depends on the number of threads.
 const GRAIN: usize = 64;
 
-/// Numbered lists, one behind the other.
+/// Lists stored one after the other.
 pub struct Lists<T> {
     /// `items[start[i]..start[i + 1]]` are list i.
     start: Vec<u32>,
@@ -13,7 +13,7 @@ pub struct Lists<T> {
 }
 
 impl<T: Copy + Default + Send + Sync> Lists<T> {
-    /// Sorts items into so many lists, by the number that each comes with; in a list they keep their order.
+    /// Sorts items into `count` lists by the index given with each; within a list they keep their order.
     pub fn new(count: usize, parts: &[Vec<(u32, T)>]) -> Self {
         let mut start = vec![0u32; count + 1];
         parts.iter().flatten().for_each(|&(list, _)| start[list as usize + 1] += 1);
@@ -28,7 +28,7 @@ impl<T: Copy + Default + Send + Sync> Lists<T> {
         Self { start, items }
     }
 
-    /// One list of all these.
+    /// One list with these items.
     pub fn one(items: Vec<T>) -> Self {
         Self { start: vec![0, items.len() as u32], items }
     }
@@ -38,12 +38,12 @@ impl<T: Copy + Default + Send + Sync> Lists<T> {
         self.start.len() - 1
     }
 
-    /// What all lists hold.
+    /// The items of all lists.
     pub fn items(&self) -> &[T] {
         &self.items
     }
 
-    /// A list.
+    /// The items of a list.
     pub fn get(&self, list: usize) -> &[T] {
         &self.items[self.start[list] as usize..self.start[list + 1] as usize]
     }
@@ -65,7 +65,7 @@ impl<T: Copy + Default + Send + Sync> Lists<T> {
         });
     }
 
-    /// Makes another list of each that holds something, in parallel: `make` is given its number and adds to the end.
+    /// Makes a new list from each non-empty one, in parallel: `make` takes its index and items and appends the new ones.
     pub fn map<U: Copy + Send>(&self, make: impl Fn(usize, &[T], &mut Vec<U>) + Sync) -> Lists<U> {
         let part = |first: usize| {
             let last = (first + GRAIN).min(self.count());

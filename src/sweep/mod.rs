@@ -1,19 +1,41 @@
 //! The volume that moving meshes sweep in an interval of time.
 //!
 //! [`chain`] is exact up to a tolerance: signed space-time tetrahedra (`chain.rs`), poses dense enough
-//! for arcs (`body.rs`), edges cut where their ends move differently (`refine.rs`), order in time where a skin folds
-//! inside out (`folds.rs`, `passages.rs`), winding numbers by exact line crossings (`winding.rs`, `exposure.rs`), the
-//! parts of faces that bound the volume (`cells.rs`, `surface.rs`; `patch.rs` where many sheets nearly coincide), then
+//! for arcs (`body.rs`), edges split where their ends move differently (`refine.rs`), order in time where a skin folds
+//! inside out (`folds.rs`, `passages.rs`), winding numbers from exact line crossings (`winding.rs`, `exposure.rs`), the
+//! parts of faces that bound the volume (`bins.rs`, `facets.rs`; `patch.rs` where many sheets nearly coincide), then
 //! exact distances in the narrow band (`nearest.rs`, `depth.rs`, `voxelise.rs`).
-//! [`samples`] is the thesis' way (section 3.2): the union of N + 1 poses, dilated and smoothed.
+//! [`samples`] is the thesis' method (section 3.2): the union of N + 1 poses, dilated and smoothed.
+//!
+//! # Glossary
+//!
+//! | word | meaning |
+//! |---|---|
+//! | cell | the grid spacing, as a unit of length |
+//! | voxel, block | a sample of the grid; 8 x 8 x 8 of them |
+//! | lattice, unit | where the voxels lie, counted from an origin voxel; 1/4096 cell, the step of fixed-point coordinates |
+//! | pose, level, step | all vertices at one time; a pose in fixed point; the interval from one level to the next |
+//! | chain | the solid at the first pose plus the tetrahedra that the surface sweeps outward, each counted with its sign |
+//! | winding number | how many times the chain covers a point; where it is at least 1 is the *volume* |
+//! | face, coefficient | a triangle of the chain's boundary; how many layers of the chain end there |
+//! | open, buried | of a point on a face: the volume lies behind it and not in front; not so |
+//! | facet | a triangle of the volume's surface: an open part of a face, or of a patch; *sure* when known to be open throughout |
+//! | line, crossing | a line through voxels parallel to an axis; where it passes through a face |
+//! | meeting, spot | a crossing at which the line enters or leaves the volume; a meeting together with its line |
+//! | exposed | of a face: outermost at a meeting |
+//! | bin | the unit cube around a voxel, with the faces that may pass through it; a block with few faces is one bin |
+//! | sheet, bundle, stack | adjoining faces; sheets that nearly coincide; so many that only patches make the surface |
+//! | patch | a piece of the plane of an exposed face, around a spot |
+//! | passage | a tetrahedron through which the surface passes in a step |
 
+mod bins;
 mod body;
-mod cells;
 mod chain;
 mod columns;
 mod depth;
 mod distance;
 mod exposure;
+mod facets;
 mod folds;
 mod lattice;
 mod lists;
@@ -26,8 +48,8 @@ mod region;
 #[cfg(feature = "vdb")]
 mod samples;
 mod signs;
-mod surface;
 mod topology;
+mod vectors;
 mod voxelise;
 mod winding;
 
@@ -42,7 +64,10 @@ pub use voxelise::{ALL, Band, Piece, Voxeliser};
 
 use crate::error::{Error, Result};
 
-/// How a swept volume is made.
+/// Default of [`Settings::tolerance`] (cells): the error of a sweep is far below what a level set can show.
+pub const TOLERANCE: f64 = 0.02;
+
+/// Parameters of a swept volume.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Settings {
     /// Cell size (m).
@@ -54,9 +79,9 @@ pub struct Settings {
 }
 
 impl Settings {
-    /// Half width 3 and a tolerance of 0.02 cell.
+    /// Half width 3 and [`TOLERANCE`].
     pub fn new(voxel: f64) -> Self {
-        Self { voxel, half_width: 3.0, tolerance: 0.02 }
+        Self { voxel, half_width: 3.0, tolerance: TOLERANCE }
     }
 
     /// Checks every field.
@@ -80,10 +105,10 @@ impl Settings {
     }
 }
 
-/// Memory (bytes) that a level set of a surface of `area` m2 takes while it is made.
+/// Peak memory (bytes) of making a level set whose surface has an area of `area` m2.
 pub fn surface_bytes(area: f64, cell: f64) -> u64 {
-    // A band of six voxels crosses 1.6 blocks of 8 voxels on average, of four bytes and a bit each; a surface that is
-    // not level crosses more; a file in the making takes as much again.
+    // A band of six voxels crosses 1.6 blocks of 8 voxels on average, at four bytes and a bit a voxel; a surface that is
+    // not level crosses more; writing a file takes as much again.
     (area / (cell * cell) * 128.0).min(1.0e18) as u64
 }
 

@@ -1,4 +1,4 @@
-//! Nearest triangle of every voxel of a block, by halving: bounds at the centres of 4^3 and 2^3
+//! Nearest triangle of every voxel of a block, by subdivision: bounds at the centres of 4^3 and 2^3
 //! sub-blocks leave few triangles for the exact distances.
 
 use super::distance::{Offsets, Points, Triangle, near_lanes, nearest, prune, to_each};
@@ -18,39 +18,39 @@ pub struct Scratch {
 pub struct Search {
     lists: [Vec<u32>; 4],
     offsets: [Vec<Offsets>; 2],
-    /// For each triangle the sub-blocks in which it can be nearest to a voxel, a bit each.
+    /// For each triangle a mask of the sub-blocks in which it can be nearest to a voxel.
     lanes: [Vec<u8>; 2],
     centre: Vec<[f32; 4]>,
 }
 
-/// Half diagonals between the voxel centres of a 4^3 and of a 2^3 sub-block, with room for rounding.
+/// Half diagonals between the voxel centres of a 4^3 and of a 2^3 sub-block (cells), rounded up.
 const RADII: [f32; 2] = [2.599, 0.867];
 
 /// Eight voxels, 2^3, and the triangles nearest to them.
 pub struct Group<'a> {
-    /// The number of the first one in its block.
+    /// Index of the first one in its block.
     first: usize,
     /// Positions from the block's corner (cells).
     pub points: Points,
     /// Squared distances (cells^2).
     pub squared: [f32; LANES],
-    /// Number of each one's nearest triangle.
+    /// Index of the nearest triangle of each.
     pub nearest: [u32; LANES],
-    /// All triangles within `complete` cells of a voxel, and some farther away.
+    /// All triangles within `complete` cells of one of the voxels, and some farther away.
     pub near: &'a [u32],
     /// See `near`.
     pub complete: f32,
-    /// Offsets of eight sub-blocks' middles from all triangles, and which of them the voxels are in.
+    /// Offsets of the eight 4^3 sub-blocks' centres from all triangles, and which of them contains the voxels.
     far: (&'a [Offsets], usize),
 }
 
 impl Group<'_> {
-    /// Number of a voxel in its block.
+    /// Index of a voxel in its block.
     pub fn voxel(&self, lane: usize) -> usize {
         self.first + offset(lane >> 2, lane >> 1 & 1, lane & 1)
     }
 
-    /// All triangles within so many cells of a voxel, and some farther away.
+    /// All triangles within this distance (cells) of one of the voxels, and some farther away.
     pub fn within(&self, cells: f32) -> Vec<u32> {
         let (far, sub_block) = self.far;
         let most = (cells + RADII[0]).powi(2);
@@ -59,8 +59,8 @@ impl Group<'_> {
     }
 }
 
-/// Gives `see` the voxels of a block that may be nearer than `reach` cells to a triangle, where one of eight is
-/// wanted.
+/// Calls `see` with the groups of eight voxels of a block that contain a wanted one and may be within `reach` cells of
+/// a triangle.
 pub fn search(
     triangles: &[Triangle],
     reach: f32,
@@ -114,7 +114,8 @@ pub fn search(
     }
 }
 
-/// Calls `see` with the place of each byte in which the bit of a sub-block is set: most have none, eight are seen at once.
+/// Calls `see` with the index of each byte in which the bit of a sub-block is set. Most have none: eight are tested at
+/// once.
 fn each_near(bits: &[u8], sub_block: usize, mut see: impl FnMut(usize)) {
     for (eight, begin) in bits.chunks(8).zip((0..).step_by(8)) {
         let mut bytes = [0; 8];

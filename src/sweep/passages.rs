@@ -1,4 +1,4 @@
-//! What passes points between the poses of a moving mesh, and when.
+//! When the surface of a moving mesh passes points, between its poses.
 
 use super::chain::{Face, STILL};
 use super::lattice::{Fixed, UNITS};
@@ -7,11 +7,11 @@ use super::region::each_block;
 use super::topology::{Simplex, Topology};
 use crate::base::DVec3;
 
-/// Least edge of the boxes that tetrahedra and faces are sorted into (fixed-point units).
+/// Least edge (fixed-point units) of the boxes that tetrahedra and faces are sorted into.
 const BOX: f64 = UNITS as f64;
-/// Boxes for each thing that is sorted into them, at most.
+/// Most boxes per item that is sorted into them.
 const BOXES: usize = 4;
-/// Where a tetrahedron is asked: barycentric weights, off all symmetries.
+/// Sample points of a tetrahedron: barycentric weights, off all symmetries.
 const SAMPLES: [[f64; 4]; 5] = [
     [0.252, 0.249, 0.251, 0.248],
     [0.703, 0.102, 0.097, 0.098],
@@ -20,20 +20,20 @@ const SAMPLES: [[f64; 4]; 5] = [
     [0.102, 0.097, 0.098, 0.703],
 ];
 
-/// A triangle of a pose, as it faces.
+/// A triangle of a pose, as an oriented face.
 pub fn face(simplex: &Simplex, level: &[Fixed]) -> Face {
     let [a, b, c] = simplex.v.map(|vertex| level[vertex as usize]);
     Face { v: if simplex.sign > 0 { [a, b, c] } else { [a, c, b] }, coef: 1 }
 }
 
-/// One of the tetrahedra that the surface passes through.
+/// Identifies one of the tetrahedra that the surface passes through.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 pub struct Place {
-    /// The triangle whose prism it is of.
+    /// The triangle whose prism it is part of.
     pub triangle: u32,
     /// From this pose to the next.
     pub step: u32,
-    /// Which of the prism's three.
+    /// Which of the prism's three, from 0.
     pub part: u32,
 }
 
@@ -44,18 +44,18 @@ pub struct Passage {
     /// 1 when the surface moves outward, -1 when inward.
     pub sign: i32,
     corners: [DVec3; 4],
-    /// Three rows that give the weights of the second to fourth corner from a way from the first.
+    /// Rows: dot products with an offset from the first corner are the barycentric weights of the other three.
     weights: [DVec3; 3],
 }
 
-/// What a passage brings a point.
+/// What a passage does to the winding number of a point.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Change {
-    /// A winding number above 0.
+    /// It rises above 0.
     Counts,
-    /// Back to 0, or less; it has been there in the same step.
+    /// It returns to 0, or less; it was not negative at some earlier time in the same step.
     Returns,
-    /// To 0 or less, and the step began below 0.
+    /// It rises to 0 or less, and was negative since the step began.
     Rises,
 }
 
@@ -68,7 +68,7 @@ pub struct Poses<'a> {
 }
 
 impl Poses<'_> {
-    /// The tetrahedra that a triangle passes in a step.
+    /// The tetrahedra that a triangle passes through in a step.
     pub fn passages(&self, step: usize, triangle: u32) -> impl Iterator<Item = Passage> {
         let [a, b] = self.prism(step, triangle);
         let still = STILL * (a[1] - a[0]).cross(&(a[2] - a[0])).norm();
@@ -81,19 +81,19 @@ impl Poses<'_> {
     /// A triangle before and after a step.
     fn prism(&self, step: usize, triangle: u32) -> [[DVec3; 3]; 2] {
         let corners = self.topology.simplices[triangle as usize].v;
-        [step, step + 1].map(|level| corners.map(|vertex| place(self.levels[level][vertex as usize])))
+        [step, step + 1].map(|level| corners.map(|vertex| to_f64(self.levels[level][vertex as usize])))
     }
 }
 
-/// A pose, to be asked at points.
+/// A pose, prepared for queries at given points.
 pub struct Still {
     faces: Vec<[DVec3; 3]>,
-    /// Which of them are above and below each box.
+    /// Which of them are above or below each box.
     columns: Boxes,
 }
 
 impl Still {
-    /// The pose, for these points.
+    /// Prepares a pose for these points.
     pub fn new(poses: &Poses<'_>, level: usize, points: &[DVec3]) -> Self {
         let flat = |p: DVec3| DVec3::new(p.x, p.y, 0.0);
         let (least, most) = bounds(points);
@@ -101,21 +101,21 @@ impl Still {
             let (low, high) = bounds(corners);
             low.x <= most.x && high.x >= least.x && low.y <= most.y && high.y >= least.y && high.z >= least.z
         };
-        let corners = |simplex| face(simplex, &poses.levels[level]).v.map(place);
+        let corners = |simplex| face(simplex, &poses.levels[level]).v.map(to_f64);
         let faces: Vec<[DVec3; 3]> = poses.topology.simplices.iter().map(corners).filter(is_near).collect();
         let extents: Vec<_> = faces.iter().map(|corners| bounds(&corners.map(flat))).collect();
         let columns = Boxes::new(points.iter().map(|p| flat(*p)), &extents);
         Self { faces, columns }
     }
 
-    /// How often the pose winds around one of the points.
+    /// Winding number of the pose at one of the points.
     pub fn winding(&self, p: &DVec3) -> i32 {
         let column = self.columns.at(&DVec3::new(p.x, p.y, 0.0)).iter();
         column.map(|&id| self.faces[id as usize]).map(|[a, b, c]| above(p, &a, &b, &c)).sum()
     }
 }
 
-/// A pose and the passages to the next one, to be asked at points.
+/// A pose and the passages to the next one, prepared for queries at given points.
 pub struct Step {
     before: Still,
     passages: Vec<Passage>,
@@ -123,7 +123,7 @@ pub struct Step {
 }
 
 impl Step {
-    /// The step that begins with this pose, for these points.
+    /// Prepares the step that begins at this pose for these points.
     pub fn new(poses: &Poses<'_>, step: usize, points: &[DVec3]) -> Self {
         let (least, most) = bounds(points);
         let is_near = |triangle: &u32| {
@@ -138,35 +138,35 @@ impl Step {
         Self { before: Still::new(poses, step, points), passages, boxes }
     }
 
-    /// What passes one of the points, in order of time.
+    /// The passages at one of the points, with their times, in order of time.
     fn passing(&self, p: &DVec3) -> Vec<(f64, &Passage)> {
         let near = self.boxes.at(p).iter().map(|&id| &self.passages[id as usize]);
         let mut passing: Vec<(f64, &Passage)> =
             near.filter_map(|passage| passage.time(p).map(|time| (time, passage))).collect();
-        // Of the same time, in the order of triangles.
+        // A stable sort: at equal times in the order of triangles.
         passing.sort_by(|a, b| a.0.total_cmp(&b.0));
         passing
     }
 
-    /// What a passage brings one of the points.
+    /// What a passage does at one of the points.
     pub fn change(&self, place: Place, p: &DVec3) -> Change {
         let mut winding = self.before.winding(p);
-        let mut was_back = winding >= 0;
+        let mut was_nonnegative = winding >= 0;
         for (_, passage) in self.passing(p) {
             if passage.place == place {
-                return match (winding >= 0, was_back) {
+                return match (winding >= 0, was_nonnegative) {
                     (true, _) => Change::Counts,
                     (false, true) => Change::Returns,
                     (false, false) => Change::Rises,
                 };
             }
             winding += passage.sign;
-            was_back |= winding >= 0;
+            was_nonnegative |= winding >= 0;
         }
         Change::Counts
     }
 
-    /// Whether one of the points is below 0 throughout.
+    /// Whether the winding number at one of the points is negative throughout the step.
     pub fn is_below(&self, p: &DVec3) -> bool {
         let mut winding = self.before.winding(p);
         winding < 0
@@ -177,51 +177,51 @@ impl Step {
     }
 }
 
-/// Things by the boxes that they touch, where points are asked.
+/// Items sorted into the boxes that they touch; only boxes that contain query points have lists.
 struct Boxes {
     low: DVec3,
     edge: DVec3,
     size: [usize; 3],
-    /// Things that touch each box that holds a point.
-    things: Lists<u32>,
+    /// The items that touch each box with a point.
+    items: Lists<u32>,
 }
 
 impl Boxes {
-    /// Boxes about as large as the things with these bounds.
-    fn new(points: impl Iterator<Item = DVec3> + Clone, things: &[(DVec3, DVec3)]) -> Self {
+    /// Boxes about as large as the items, whose bounds are given.
+    fn new(points: impl Iterator<Item = DVec3> + Clone, items: &[(DVec3, DVec3)]) -> Self {
         let start = (DVec3::repeat(f64::INFINITY), DVec3::repeat(f64::NEG_INFINITY));
         let (low, high) = points.clone().fold(start, |(low, high), p| (low.inf(&p), high.sup(&p)));
-        let count = things.len().max(1);
-        let sum: DVec3 = things.iter().map(|(low, high)| high - low).sum();
+        let count = items.len().max(1);
+        let sum: DVec3 = items.iter().map(|(low, high)| high - low).sum();
         let mut edge = (sum / count as f64).map(|mean| mean.max(BOX));
         let size = |edge: &DVec3| [0, 1, 2].map(|axis| ((high - low)[axis] / edge[axis]).floor() + 1.0);
         while size(&edge).iter().product::<f64>() > (BOXES * count) as f64 {
             edge *= 1.5;
         }
         let mut out =
-            Self { low, edge, size: size(&edge).map(|value| value as usize), things: Lists::one(Vec::new()) };
-        let mut asked = vec![false; out.size.iter().product()];
-        points.for_each(|p| asked[out.number(out.place(&p))] = true);
+            Self { low, edge, size: size(&edge).map(|value| value as usize), items: Lists::one(Vec::new()) };
+        let mut used = vec![false; out.size.iter().product()];
+        points.for_each(|p| used[out.number(out.place(&p))] = true);
         let mut pairs = Vec::new();
-        for ((from, to), id) in things.iter().zip(0..) {
+        for ((from, to), id) in items.iter().zip(0..) {
             if (0..3).any(|axis| to[axis] < low[axis] || from[axis] > high[axis]) {
                 continue;
             }
             let [first, last] = [from, to].map(|p| out.place(p).map(|place| place as i32));
             for at in each_block(first, last) {
                 let number = out.number(at.map(|place| place as usize));
-                if asked[number] {
+                if used[number] {
                     pairs.push((number as u32, id));
                 }
             }
         }
-        out.things = Lists::new(asked.len(), &[pairs]);
+        out.items = Lists::new(used.len(), &[pairs]);
         out
     }
 
-    /// What touches the box around a point.
+    /// The items that touch the box around a point.
     fn at(&self, p: &DVec3) -> &[u32] {
-        self.things.get(self.number(self.place(p)))
+        self.items.get(self.number(self.place(p)))
     }
 
     /// The box around a point, or the nearest one.
@@ -235,14 +235,14 @@ impl Boxes {
     }
 }
 
-/// Corners of the three tetrahedra of a prism, as [`super::chain`] has them: of the second, one that is passed outward by
-/// a triangle of sign 1 has a volume below 0.
+/// Corners of the three tetrahedra of a prism, in the order of [`super::chain`]. Where a triangle of sign 1 moves outward
+/// the second has a negative volume, the others a positive one.
 fn tetrahedra([a0, a1, a2]: [DVec3; 3], [b0, b1, b2]: [DVec3; 3]) -> [[DVec3; 4]; 3] {
     [[a0, a1, a2, b2], [a0, a1, b1, b2], [a0, b0, b1, b2]]
 }
 
 impl Passage {
-    /// A tetrahedron of a triangle of this sign; none when the surface stands still in it.
+    /// The tetrahedron of a triangle of this sign; none when the surface does not move in it.
     fn new(place: Place, corners: [DVec3; 4], sign: i32, still: f64) -> Option<Self> {
         let [u, v, w] = [1, 2, 3].map(|corner| corners[corner] - corners[0]);
         let volume = u.cross(&v).dot(&w);
@@ -254,7 +254,7 @@ impl Passage {
         Some(Self { place, sign: if outward { 1 } else { -1 }, corners, weights })
     }
 
-    /// Where it is asked.
+    /// Its sample points.
     pub fn samples(&self) -> impl Iterator<Item = DVec3> {
         let at = |weights: &[f64; 4]| {
             self.corners.iter().zip(weights).map(|(corner, weight)| corner * *weight).sum()
@@ -262,8 +262,8 @@ impl Passage {
         SAMPLES.iter().map(at)
     }
 
-    /// When the surface passes a point (0 to 1 within the step), if it does here: the weight of the later pose's corners,
-    /// which are the last one, two or three.
+    /// When the surface passes a point (0 to 1 within the step), if the point is inside: the weight of the later pose's
+    /// corners, which are the last one, two or three.
     fn time(&self, p: &DVec3) -> Option<f64> {
         let way = p - self.corners[0];
         let [u, v, w] = self.weights.map(|row| row.dot(&way));
@@ -290,8 +290,8 @@ fn above(p: &DVec3, a: &DVec3, b: &DVec3, c: &DVec3) -> i32 {
     }
 }
 
-/// A position in 64 bits.
-pub fn place(p: Fixed) -> DVec3 {
+/// A fixed-point position as `f64`.
+pub fn to_f64(p: Fixed) -> DVec3 {
     DVec3::from(p.map(f64::from))
 }
 

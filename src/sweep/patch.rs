@@ -1,40 +1,41 @@
 //! The surface of a stack of sheets.
 //!
-//! What turns about an axis of near symmetry sweeps hundreds of sheets that nearly coincide; its surface is a mosaic
-//! of slivers, too small for each to be asked. But it is smooth but for its edges, and lines through voxels meet it
-//! at least once a cell: there the plane of the outermost face is the surface, as far around as the volume lies
-//! close behind it and nothing in front.
+//! A body that turns about an axis of near symmetry sweeps hundreds of sheets that nearly coincide; its surface is a
+//! mosaic of slivers, too small to sample each. But it is smooth except at its edges, and lines through voxels meet it
+//! at least once per cell: around such a spot the plane of the exposed face is the surface, as far as the volume lies
+//! close behind it and not in front.
 
 use rayon::prelude::*;
 
-use super::cells::{Cells, Point, cross, difference, dot};
+use super::bins::{Bins, Point};
 use super::exposure::{Exposure, Spot};
+use super::facets::Facet;
 use super::lattice::{Fixed, UNITS};
 use super::prism::Prisms;
-use super::surface::Facet;
+use super::vectors::{cross, difference, dot};
 use crate::context::Context;
 use crate::error::Result;
 
-/// How far (cells) the surface may lie from a patch.
+/// How far (cells) the surface may lie from a patch's plane.
 const OFF: f64 = 0.04;
-/// How far the surface may lie from a patch's plane on the lines beside its own: then it is nearer between them.
+/// The same on the neighbouring lines: between them the surface is nearer to the plane.
 const OFF_BESIDE: f64 = 2.0 * OFF;
-/// Half the edge of a patch (cells, seen along its line), where the lines beside it carry on.
+/// Half the edge (cells, seen along its line) of a square patch, where the neighbouring lines agree with its plane.
 const HALF: f64 = 0.51;
-/// How far (cells) a patch reaches where they do not.
+/// Radius (cells) of other patches, at most.
 const REACH: f64 = 1.0;
-/// Halvings that find where the surface leaves a patch's plane: to 1/64 of its reach.
+/// Bisections that find where the surface leaves a patch's plane: to 1/64 of its radius.
 const HALVINGS: usize = 4;
-/// A patch that reaches less far than this on average leaves its face to speak for itself.
+/// Where a patch's mean radius, relative to [`REACH`], is less than this, its whole face becomes a facet too.
 const LEAST: f64 = 0.25;
-/// Spots that a task handles: fixed, so that nothing depends on the number of threads.
+/// Spots per task: fixed, so that nothing depends on the number of threads.
 const GRAIN: usize = 32;
-/// In how many ways a patch reaches, in its plane.
+/// Directions, in its plane, in which a patch's radius is found.
 const WAYS: usize = 12;
 
-/// Asks how far the planes of faces are the surface, on one thread.
+/// Makes patches, on one thread.
 struct Patches<'a> {
-    cells: &'a Cells,
+    bins: &'a Bins,
     exposure: &'a Exposure,
     prisms: Prisms,
 }
@@ -43,15 +44,15 @@ struct Patches<'a> {
 ///
 /// # Errors
 /// Cancel.
-pub fn patches(ctx: &Context, cells: &Cells, exposure: &Exposure) -> Result<Vec<Facet>> {
-    let asks = || Patches { cells, exposure, prisms: Prisms::default() };
-    let make = |asks: &mut Patches<'_>, spots: &[Spot]| {
+pub fn patches(ctx: &Context, bins: &Bins, exposure: &Exposure) -> Result<Vec<Facet>> {
+    let patches = || Patches { bins, exposure, prisms: Prisms::default() };
+    let make = |patches: &mut Patches<'_>, spots: &[Spot]| {
         let mut out = Vec::with_capacity(spots.len() * 2);
-        spots.iter().take_while(|_| ctx.check().is_ok()).for_each(|spot| asks.patch(spot, &mut out));
+        spots.iter().take_while(|_| ctx.check().is_ok()).for_each(|spot| patches.patch(spot, &mut out));
         out
     };
     let parts: Vec<Vec<Facet>> =
-        exposure.spots_of_bundles(cells).par_chunks(GRAIN).map_init(asks, make).collect();
+        exposure.spots_of_bundles(bins).par_chunks(GRAIN).map_init(patches, make).collect();
     ctx.check()?;
     Ok(parts.concat())
 }
@@ -60,8 +61,8 @@ impl Patches<'_> {
     /// Adds the patch around a spot.
     fn patch(&mut self, spot: &Spot, out: &mut Vec<Facet>) {
         let face = spot.face;
-        let normal = unit(self.cells.normals[face as usize]);
-        if self.carries_on(spot, &normal) {
+        let normal = unit(self.bins.normals[face as usize]);
+        if self.neighbours_agree(spot, &normal) {
             let corner = |[p, q]: [f64; 2]| fixed(on_plane(spot, &normal, [p * HALF, q * HALF]));
             let [a, b, c, d] = [[-1.0, -1.0], [1.0, -1.0], [1.0, 1.0], [-1.0, 1.0]].map(corner);
             let facets = [[a, b, c], [a, c, d]];
@@ -81,12 +82,12 @@ impl Patches<'_> {
         let facet = |index: usize| [centre, rim[index], rim[(index + 1) % WAYS]].map(fixed);
         out.extend((0..WAYS).map(|index| Facet { v: facet(index), face, sure: true }));
         if reaches.iter().sum::<f64>() < LEAST * WAYS as f64 {
-            out.push(Facet { v: self.cells.faces[face as usize].v, face, sure: false });
+            out.push(Facet { v: self.bins.faces[face as usize].v, face, sure: false });
         }
     }
 
-    /// Whether all lines around that of a spot meet the surface in the plane of its face.
-    fn carries_on(&self, spot: &Spot, normal: &Point) -> bool {
+    /// Whether all eight neighbouring lines meet the surface in the plane of a spot's face.
+    fn neighbours_agree(&self, spot: &Spot, normal: &Point) -> bool {
         let slope = normal[spot.axis.index()].abs();
         let beside = (-1..=1).flat_map(|p| (-1..=1).map(move |q| [p, q])).filter(|beside| *beside != [0, 0]);
         beside.into_iter().all(|[p, q]| {
@@ -95,7 +96,7 @@ impl Patches<'_> {
         })
     }
 
-    /// How far (0 to 1) along a way from the spot its plane is the surface.
+    /// How far (0 to 1) along a path from the spot its plane is the surface.
     fn reach(&mut self, normal: &Point, place: impl Fn(f64) -> Point) -> f64 {
         let (mut first, mut last) = (0.0, 0.5);
         if self.is_surface(place(0.5), normal) {
@@ -116,17 +117,17 @@ impl Patches<'_> {
     fn is_surface(&mut self, at: Point, normal: &Point) -> bool {
         let mut winding = |side: f64| {
             let place = [0, 1, 2].map(|axis| (at[axis] + side * OFF * normal[axis]) * f64::from(UNITS));
-            self.cells.windings(place, place, &mut self.prisms)[0]
+            self.bins.windings(place, place, &mut self.prisms)[0]
         };
         winding(1.0) < 1 && winding(-1.0) >= 1
     }
 }
 
-/// The point of a spot's plane on the line that lies so far beside its own (cells).
+/// The point of a spot's plane on the line at this offset (cells) from its own.
 fn on_plane(spot: &Spot, normal: &Point, [p, q]: [f64; 2]) -> Point {
     let way = spot.axis.beside([p, q]);
     let mut at = spot.at();
-    let rise = -dot(normal, &way) / normal[spot.axis.index()];
+    let rise = -dot(*normal, way) / normal[spot.axis.index()];
     (0..3).for_each(|axis| at[axis] += way[axis]);
     at[spot.axis.index()] += rise;
     at
@@ -136,18 +137,18 @@ fn fixed(at: Point) -> Fixed {
     at.map(|cells| (cells * f64::from(UNITS)).round() as i32)
 }
 
-/// A triangle, turned so that it faces along a normal.
+/// A triangle, flipped if it faces against a normal.
 fn facing([a, b, c]: [Fixed; 3], normal: &Point) -> [Fixed; 3] {
-    let own = cross(difference(&b, &a), difference(&c, &a));
-    if dot(&own, normal) < 0.0 { [a, c, b] } else { [a, b, c] }
+    let own = cross(difference(b, a), difference(c, a));
+    if dot(own, *normal) < 0.0 { [a, c, b] } else { [a, b, c] }
 }
 
 fn unit(v: Point) -> Point {
-    let length = dot(&v, &v).sqrt();
+    let length = dot(v, v).sqrt();
     v.map(|value| value / length)
 }
 
-/// Two unit vectors at right angles to a third and to each other.
+/// Two unit vectors perpendicular to a unit vector and to each other.
 fn across(normal: Point) -> [Point; 2] {
     let least =
         (1..3).fold(0, |least, axis| if normal[axis].abs() < normal[least].abs() { axis } else { least });

@@ -1,4 +1,4 @@
-//! Splitting of edges whose ends move differently.
+//! Splits edges whose ends move differently.
 //!
 //! A moving edge sweeps a bilinear patch; the chain has two triangles in its place, which differ from
 //! it by at most |db - da| / 4 (da, db: the displacements of the edge's ends in a step).
@@ -10,19 +10,19 @@ use crate::base::DVec3;
 use crate::context::Context;
 use crate::error::{Error, Result};
 
-/// Most pieces that an edge is cut into at once.
+/// Most pieces of an edge in one round.
 const MOST_PIECES: f64 = 4096.0;
-/// Most rounds: the edges that one round adds are cut by the next.
+/// Most rounds: the edges that one round adds are split by the next.
 const MOST_ROUNDS: usize = 12;
 
-/// What memory is asked for, with what makes it less.
+/// What needs the memory, and what reduces it, for messages.
 const WHAT: &str =
-    "a body's edges, cut where their ends move differently (larger cells or a shorter motion need less)";
-/// Bytes of a new vertex in each pose: in 64 bits, in fixed point.
+    "a body's edges, split where their ends move differently (larger cells or a shorter motion need less)";
+/// Bytes of a new vertex in each pose: as `f64` and in fixed point.
 const BYTES_PER_POSITION: u64 = 36;
 /// Bytes of a new vertex, and of the two triangles and three edges that come with it.
 const BYTES_PER_VERTEX: u64 = 150;
-/// Most of them in one round, whatever the context allows.
+/// Most bytes added in one round, whatever the context allows.
 const MOST_BYTES: u64 = 8 << 30;
 
 /// Difference (cells) between the patch that an edge sweeps in a step and its two triangles.
@@ -31,8 +31,8 @@ pub fn edge_error([before, after]: [&[DVec3]; 2], [i, j]: [u32; 2]) -> f64 {
     (edge(after) - edge(before)).norm() / 4.0
 }
 
-/// Cuts edges into equal pieces until each error is within `tolerance` (cells), extending the poses; none when
-/// no edge needs it. `wanted` tells in which steps, from pose to pose, an edge matters.
+/// Splits edges into equal pieces until each error is within `tolerance` (cells), extending the poses; none when
+/// no edge needs it. `wanted` returns whether an edge matters in a step, from pose to pose.
 ///
 /// # Errors
 /// Cancel; more pieces than memory should hold.
@@ -66,36 +66,39 @@ pub fn refine(
         if needed > MOST_BYTES {
             return Err(Error::Memory { what: WHAT.into(), needed, limit: MOST_BYTES });
         }
-        let cut = Cut::new(current, &pieces);
-        let simplices = cut.triangles(current);
+        let split = Split::new(current, &pieces);
+        let simplices = split.triangles(current);
         let mut derived = current.derived.clone();
-        derived.extend(cut.added.iter().cloned());
-        poses.iter_mut().for_each(|pose| cut.added.iter().for_each(|added| pose.push(added.position(pose))));
+        derived.extend(split.added.iter().cloned());
+        poses
+            .iter_mut()
+            .for_each(|pose| split.added.iter().for_each(|added| pose.push(added.position(pose))));
         refined = Some(Topology::from_parts(topology.own_vertices, derived, simplices));
     }
     Ok(refined)
 }
 
-/// Edges cut into pieces.
-struct Cut {
+/// Edges split into pieces.
+struct Split {
     /// The vertices between the pieces.
     added: Vec<Derived>,
-    /// The first of each edge's, and the number of its pieces.
+    /// For each edge the index of its first new vertex, and the number of its pieces.
     edges: Vec<(u32, u32)>,
 }
 
-impl Cut {
+impl Split {
     fn new(topology: &Topology, pieces: &[u32]) -> Self {
-        let mut cut = Self { added: Vec::new(), edges: Vec::with_capacity(pieces.len()) };
+        let mut split = Self { added: Vec::new(), edges: Vec::with_capacity(pieces.len()) };
         for (&[i, j], &pieces) in topology.edges.iter().zip(pieces) {
-            cut.edges.push(((topology.vertex_count() + cut.added.len()) as u32, pieces));
-            cut.added
+            split.edges.push(((topology.vertex_count() + split.added.len()) as u32, pieces));
+            split
+                .added
                 .extend((1..pieces).map(|piece| Derived::Along(i, j, f64::from(piece) / f64::from(pieces))));
         }
-        cut
+        split
     }
 
-    /// The triangles, cut where their edges are.
+    /// The triangles, split where their edges are.
     fn triangles(&self, topology: &Topology) -> Vec<Simplex> {
         let mut edges = vec![[0; 3]; topology.simplices.len()];
         for edge in 0..topology.edges.len() {
@@ -109,13 +112,13 @@ impl Cut {
             // Corners counter-clockwise, and the edge that follows each.
             let (corners, edges) =
                 if simplex.sign > 0 { ([a, b, c], [e01, e12, e02]) } else { ([a, c, b], [e02, e12, e01]) };
-            self.cut_triangle(corners, edges, |triangle| out.extend(Simplex::new(triangle)));
+            self.split_triangle(corners, edges, |triangle| out.extend(Simplex::new(triangle)));
         }
         out
     }
 
     /// Joins the two sides of a triangle with the most pieces by a strip from their common corner.
-    fn cut_triangle(&self, v: [u32; 3], edges: [usize; 3], mut emit: impl FnMut([u32; 3])) {
+    fn split_triangle(&self, v: [u32; 3], edges: [usize; 3], mut emit: impl FnMut([u32; 3])) {
         let pieces = edges.map(|edge| self.edges[edge].1);
         let base = (0..3).min_by_key(|&side| pieces[side]).unwrap_or(0);
         let [c, a, b] = [0, 1, 2].map(|i| v[(base + i) % 3]);

@@ -1,13 +1,13 @@
-//! A box of blocks around the work, and sets of its blocks.
+//! A box of blocks, and sets of its blocks.
 
 use super::chain::Face;
 use super::lattice::{Fixed, UNITS, floor};
 use crate::error::{Error, Result};
 
-/// Most blocks a region may span: its index then fits 1 GiB.
+/// Most blocks of a region: a `u32` for each then takes 1 GiB.
 const MOST_BLOCKS: u64 = 1 << 28;
 
-/// A box of blocks of 8^3 voxels; coordinates count blocks from the lattice's base voxel.
+/// A box of blocks of 8^3 voxels; coordinates count blocks from the lattice's origin voxel.
 pub struct Region {
     /// Least block.
     pub low: [i32; 3],
@@ -58,14 +58,14 @@ impl Region {
         (0..3).all(|axis| (self.low[axis]..=self.high[axis]).contains(&block[axis]))
     }
 
-    /// Number of a block of the region.
+    /// Index of a block of the region.
     pub fn index(&self, block: [i32; 3]) -> usize {
         let [x, y, z] = [0, 1, 2].map(|axis| (block[axis] - self.low[axis]) as usize);
         let [_, ny, nz] = self.size();
         (x * ny + y) * nz + z
     }
 
-    /// The block with a number.
+    /// The block with this index.
     pub fn place(&self, index: usize) -> [i32; 3] {
         let [_, ny, nz] = self.size();
         let at = [index / (ny * nz), index / nz % ny, index % nz];
@@ -99,7 +99,7 @@ impl Region {
     }
 }
 
-/// Bounds of a face (cells from the base voxel).
+/// Bounding box of a face (cells from the origin voxel).
 pub fn extent(v: &[Fixed; 3]) -> ([f32; 3], [f32; 3]) {
     let cell = |value: i32| value as f32 / UNITS as f32;
     let low = [0, 1, 2].map(|a| cell(v[0][a].min(v[1][a]).min(v[2][a])));
@@ -114,7 +114,7 @@ pub fn each_block(first: [i32; 3], last: [i32; 3]) -> impl Iterator<Item = [i32;
     })
 }
 
-/// Block of a coordinate (cells), saturating where there is none.
+/// Block of a coordinate (cells); saturates.
 fn block_of(cells: f32) -> i32 {
     floor(f64::from(cells) / 8.0)
 }

@@ -7,7 +7,7 @@ use crate::context::Context;
 use crate::error::{Error, Result};
 use crate::vdb::{FloatGrid, level_set};
 
-/// How the thesis' swept volume is made.
+/// Parameters of the thesis' swept volume.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct SamplesSettings {
     /// Cell size (m).
@@ -30,12 +30,12 @@ impl SamplesSettings {
         Self { voxel, half_width: 3.0, samples: 8, dilate: 1.0, smooth: 1, scheme: level_set::Scheme::Weno5 }
     }
 
-    /// One step a frame (Fig. 3.3a): the poses at both ends and nothing between.
+    /// One step per frame (Fig. 3.3a): the poses at both ends and none between.
     pub fn one_step(voxel: f64) -> Self {
         Self::sub_steps(voxel, 1)
     }
 
-    /// Many sub-steps a frame (Fig. 3.3b): their poses as they are, dents included.
+    /// Many sub-steps per frame (Fig. 3.3b), neither dilated nor smoothed.
     pub fn sub_steps(voxel: f64, steps: u32) -> Self {
         Self { samples: steps, dilate: 0.0, smooth: 0, ..Self::new(voxel) }
     }
@@ -44,7 +44,7 @@ impl SamplesSettings {
 /// Level set of the union of sampled poses, dilated and smoothed.
 ///
 /// # Errors
-/// No object, no sample, a pose that cannot be had, cancel.
+/// No object, no sample, a pose that cannot be computed, cancel.
 pub fn samples(
     ctx: &Context,
     bodies: &[Body],

@@ -1,4 +1,4 @@
-//! What a moving mesh keeps while it moves: triangles that close, and the edges between them.
+//! What stays the same while a mesh moves: closed triangles, and the edges between them.
 //!
 //! The boundary of any set of oriented triangles is a set of cycles. Each cycle is closed by a cone
 //! to the (moving) centroid of its vertices, so that open meshes, non-manifold meshes and soups all
@@ -8,7 +8,7 @@ use std::collections::{BTreeMap, HashMap};
 
 use crate::base::DVec3;
 
-/// A triangle with its vertices in ascending order: the simplex that prisms are split by.
+/// A triangle with its vertices in ascending order: their order decides how prisms are split.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Simplex {
     /// Vertex indices, v0 < v1 < v2.
@@ -44,17 +44,17 @@ pub struct Incidence {
     pub side: u8,
 }
 
-/// A vertex that is made from others at each pose.
+/// A vertex that is computed from others at each pose.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Derived {
     /// Mean of the vertices of an open loop.
     Centroid(Vec<u32>),
-    /// On the way from one vertex to another, this part of it.
+    /// On the edge from one vertex to another, at this fraction.
     Along(u32, u32, f64),
 }
 
 impl Derived {
-    /// Its position, from those of the vertices before it.
+    /// Its position, from a pose of the vertices before it.
     pub fn position(&self, pose: &[DVec3]) -> DVec3 {
         match self {
             Self::Centroid(vertices) => {
@@ -66,14 +66,14 @@ impl Derived {
     }
 }
 
-/// Closed triangles, their unique edges, and the vertices to be made besides the mesh's own.
+/// Closed triangles, their unique edges, and the vertices that are added to the mesh's own.
 #[derive(Debug, Clone, Default)]
 pub struct Topology {
     /// Vertices of the mesh itself.
     pub own_vertices: usize,
-    /// Vertices made at each pose; the first has index `own_vertices`.
+    /// Vertices computed at each pose; the first has index `own_vertices`.
     pub derived: Vec<Derived>,
-    /// The triangles, caps included; degenerate ones left out.
+    /// The triangles, caps included, without degenerate ones.
     pub simplices: Vec<Simplex>,
     /// Unique edges (i < j).
     pub edges: Vec<[u32; 2]>,
@@ -84,7 +84,7 @@ pub struct Topology {
 }
 
 impl Topology {
-    /// Topology of a mesh's triangles; `same[v]` names the vertex that v is welded to (or v itself).
+    /// Topology of a mesh's triangles; `same[v]` is the vertex that v is welded to, or v itself.
     ///
     /// With `close`, open loops are capped.
     pub fn new(triangles: &[[u32; 3]], vertex_count: usize, same: &[u32], close: bool) -> Self {
@@ -100,7 +100,7 @@ impl Topology {
         topology
     }
 
-    /// A topology with these triangles and vertices made from others.
+    /// A topology from its triangles and derived vertices.
     pub fn from_parts(own_vertices: usize, derived: Vec<Derived>, simplices: Vec<Simplex>) -> Self {
         let mut topology = Self { own_vertices, derived, simplices, ..Self::default() };
         topology.index_edges();
@@ -126,7 +126,7 @@ impl Topology {
         (0..self.edges.len()).all(|edge| self.imbalance(edge) == 0)
     }
 
-    /// Edges along which two triangles or more run one way without any that run the other.
+    /// Edges along which two or more triangles run one way without a counterpart.
     pub fn contradictions(&self) -> usize {
         (0..self.edges.len()).filter(|&edge| self.imbalance(edge).abs() > 1).count()
     }
@@ -142,7 +142,7 @@ impl Topology {
 
     fn index_edges(&mut self) {
         const SIDES: [(usize, usize); 3] = [(0, 1), (1, 2), (0, 2)];
-        // Sorted by the lower vertex by counting, then by the other: vertices have few neighbours.
+        // Counting sort by the lower vertex, then a short sort by the other: vertices have few neighbours.
         let mut start = vec![0u32; self.vertex_count() + 1];
         for simplex in &self.simplices {
             SIDES.into_iter().for_each(|(i, _)| start[simplex.v[i] as usize + 1] += 1);
@@ -177,7 +177,7 @@ impl Topology {
         self.edge_start.push(self.incidences.len() as u32);
     }
 
-    /// How often the triangles run along edge (i, j) from i to j, less how often from j to i.
+    /// How many triangles run along edge (i, j) from i to j, minus how many from j to i.
     fn imbalance(&self, edge: usize) -> i32 {
         let along = |at: &Incidence| {
             let sign = i32::from(self.simplices[at.triangle as usize].sign);
@@ -186,7 +186,7 @@ impl Topology {
         self.beside(edge).iter().map(along).sum()
     }
 
-    /// Closes every boundary cycle with a cone to its centroid; whether there was one.
+    /// Closes every boundary cycle with a cone to its centroid; returns whether there was one.
     fn cap_open_loops(&mut self) -> bool {
         let open: Vec<([u32; 2], i32)> = (0..self.edges.len())
             .map(|edge| (self.edges[edge], self.imbalance(edge)))
@@ -207,7 +207,7 @@ impl Topology {
             let apex = self.vertex_count() as u32;
             self.derived.push(Derived::Centroid(rim));
             for ([i, j], imbalance) in edges {
-                // A mesh edge that runs i -> j is met by a cap that runs j -> i.
+                // The cap runs j -> i along an edge that the mesh runs along i -> j.
                 for _ in 0..imbalance.abs() {
                     self.push_triangle(if imbalance > 0 { [j, i, apex] } else { [i, j, apex] });
                 }
@@ -217,7 +217,7 @@ impl Topology {
     }
 }
 
-/// Union-find over vertex numbers; the least vertex names its group.
+/// Union-find over vertex indices; the least vertex represents its group.
 #[derive(Default)]
 struct Groups {
     parent: HashMap<u32, u32>,

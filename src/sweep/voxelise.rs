@@ -1,26 +1,27 @@
-//! From the boundary of a chain to blocks of signed distances: winding number first, distance second.
+//! From the boundary of a chain to blocks of signed distances: winding numbers first, then distances.
 
 use std::sync::atomic::{AtomicBool, Ordering};
 
 use rayon::prelude::*;
 
-use super::cells::Cells;
+use super::bins::Bins;
 use super::chain::Face;
-use super::depth::{Chain, Depths, Near};
-use super::distance::{Triangle, gap};
+use super::depth::{Depths, Near, Volume};
+use super::distance::Triangle;
 use super::exposure::Exposure;
+use super::facets::{Facet, facets};
 use super::lattice::Lattice;
 use super::nearest::{Scratch, search};
 use super::region::{Region, each_block, extent};
 use super::signs::Signs;
-use super::surface::{Facet, surface};
+use super::vectors::gap;
 use super::winding::Lines;
 use crate::base::blocks::{Mask, Origin, Values};
 use crate::base::lanes::LANES;
 use crate::context::Context;
 use crate::error::Result;
 
-/// How far distances are wanted on each side of the surface (cells).
+/// How far from the surface distances are wanted, on each side (cells).
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Band {
     /// Inside the solid.
@@ -38,7 +39,7 @@ impl Band {
 /// A block near the surface, or wholly inside.
 #[derive(Clone, PartialEq)]
 pub enum Piece {
-    /// Signed distances in cells, negative inside, cut off at the band.
+    /// Signed distances in cells, negative inside, clamped to the band.
     Near(Origin, Box<Values>),
     /// Wholly inside, deeper than the band.
     Inside(Origin),
@@ -53,14 +54,14 @@ impl Piece {
     }
 }
 
-/// A chain ready to be turned into blocks.
+/// A chain ready to be converted to blocks.
 pub struct Voxeliser {
     lattice: Lattice,
     band: Band,
-    cells: Cells,
+    bins: Bins,
     exposure: Exposure,
     facets: Vec<Facet>,
-    /// Wanted blocks with facets in reach, in units of blocks from the base voxel; ascending.
+    /// Wanted blocks with facets in reach, counted in blocks from the origin voxel; ascending.
     near: Vec<[i32; 3]>,
     /// `ids[start[i]..start[i + 1]]` are the facets of `near[i]`.
     start: Vec<u32>,
@@ -68,118 +69,85 @@ pub struct Voxeliser {
     inside: Vec<[i32; 3]>,
 }
 
-/// What memory is asked for, with what makes it less.
+/// What needs the memory, and what reduces it, for messages.
 const REGION: &str = "what the objects sweep (larger cells or a shorter motion need less)";
-/// Bytes of a block of the region: marks, places, and the tables of the columns of lines.
+/// Bytes per block of the region: marks, indices, and the tables of the columns of lines.
 const BYTES_PER_BLOCK: usize = 24;
-/// Bytes of a block near the surface: its distances, its cells with their faces, and what lines see of them.
+/// Bytes per block near the surface: its distances, its bins with their faces, and their crossings.
 const BYTES_PER_NEAR_BLOCK: usize = 12_000;
 /// No block.
 const NONE: u32 = u32::MAX;
-/// Faces a task sorts into blocks: fixed, so that nothing depends on the number of threads.
+/// Faces per task: fixed, so that nothing depends on the number of threads.
 const GRAIN: usize = 1024;
-/// Half a block's diagonal between voxel centres (cells), with room for rounding.
+/// Half a block's diagonal between voxel centres (cells), rounded up.
 const BLOCK_RADIUS: f32 = 6.07;
 /// Radius of a small facet (cells).
 const SMALL: f32 = 1.0;
 /// A voxel nearer than this (cells) lies on the surface.
 const ON_FACE: f32 = 1e-4;
-/// How far (cells) a voxel can be from a surface between it and its neighbour that no line has placed: one that touches
-/// either of them.
+/// Upper bound (cells) on the distance of a voxel whose neighbour is on the other side, where no line has a meeting
+/// between them: the surface then touches one of the two.
 const UNSEEN: f32 = 1.0;
 /// All voxels of a block.
 pub const ALL: Mask = [u64::MAX; 8];
 
 impl Voxeliser {
-    /// Pieces of work that [`Voxeliser::new`] tells a context of.
+    /// Pieces of work that [`Voxeliser::new`] reports to the context: see [`Context::advance`].
     pub const PARTS: usize = 4;
 
     /// Sorts the faces into blocks and scans the winding numbers, inside the voxel box `low..=high`
-    /// (from the lattice's base voxel). `wanted` says of blocks, by origin, whether distances are wanted.
+    /// (from the lattice's origin voxel). `wanted` returns for blocks, by origin, whether distances are wanted.
     ///
     /// # Errors
     /// When the box spans more than 2^28 blocks; those of `wanted`; cancel.
     pub fn new(
         ctx: &Context,
-        mut faces: Vec<Face>,
+        faces: Vec<Face>,
         lattice: Lattice,
         band: Band,
         [low, high]: [[i32; 3]; 2],
         wanted: impl Fn(&[Origin]) -> Result<Vec<bool>>,
     ) -> Result<Self> {
-        // Sides of faces are told with the voxels around them.
+        // Whether a face is open is decided from the winding numbers of the voxels around it.
         let reach = band.reach() + 2.0;
         let region = Region::around(&faces, reach, low, high)?;
         ctx.allow(REGION, (region.blocks() * BYTES_PER_BLOCK) as u64)?;
-        let origin = |block: [i32; 3]| [0, 1, 2].map(|axis| lattice.base[axis] + block[axis] * 8);
-        let candidates = candidates(&faces, &region, band.reach() + 0.01);
-        let places: Vec<[i32; 3]> =
-            (0..candidates.len()).filter(|&b| candidates[b]).map(|block| region.place(block)).collect();
-        let origins: Vec<Origin> = places.iter().map(|&block| origin(block)).collect();
-        let mut marked = vec![false; region.blocks()];
-        for (block, wanted) in places.iter().zip(wanted(&origins)?) {
-            marked[region.index(*block)] = wanted;
-        }
-        let relevant = region.dilated(&marked, (reach / 8.0).ceil() as i32);
-        ctx.check()?;
-        let near = marked.iter().filter(|&&marked| marked).count();
-        ctx.allow(REGION, (region.blocks() * BYTES_PER_BLOCK + near * BYTES_PER_NEAR_BLOCK) as u64)?;
-        let lines = Lines::scan(&faces, &region);
+        let marked = mark_wanted(&faces, &region, band.reach() + 0.01, |blocks| {
+            wanted(&blocks.iter().map(|&block| lattice.block_origin(block)).collect::<Vec<_>>())
+        })?;
+        let bins = sort_into_bins(ctx, faces, region, &marked, reach)?;
+        let exposure = Exposure::scan(&bins);
         ctx.advance();
         ctx.check()?;
-        retain(&mut faces, |face| {
-            let (first, last) = region.touched(extent(&face.v), 0.0);
-            each_block(first, last).any(|block| relevant[region.index(block)])
-        });
-        let cells = Cells::new(faces, region, &relevant, lines);
+        let facets = facets(ctx, &bins, &exposure)?;
         ctx.advance();
-        ctx.check()?;
-        let exposure = Exposure::scan(&cells);
-        ctx.advance();
-        ctx.check()?;
-        let facets = surface(ctx, &cells, &exposure)?;
-        ctx.advance();
-        let mut voxeliser = Self {
-            lattice,
-            band,
-            cells,
-            exposure,
-            facets,
-            near: Vec::new(),
-            start: vec![0],
-            ids: Vec::new(),
-            inside: Vec::new(),
-        };
-        let slots = voxeliser.sort(&marked);
+        let (near, start, ids, inside) = (Vec::new(), vec![0], Vec::new(), Vec::new());
+        let mut voxeliser = Self { lattice, band, bins, exposure, facets, near, start, ids, inside };
+        let slots = voxeliser.sort_facets(&marked);
         let inside = voxeliser.find_inside(&slots);
-        let origins: Vec<Origin> = inside.iter().map(|&block| origin(block)).collect();
-        let wanted = wanted(&origins)?;
+        let wanted = wanted(&inside.iter().map(|&block| lattice.block_origin(block)).collect::<Vec<_>>())?;
         voxeliser.inside =
-            inside.into_iter().zip(wanted).filter(|(_, wanted)| *wanted).map(|(b, _)| b).collect();
+            inside.into_iter().zip(wanted).filter(|(_, wanted)| *wanted).map(|(block, _)| block).collect();
         Ok(voxeliser)
     }
 
-    /// Origins of the wanted blocks near the surface, in the order that [`Voxeliser::piece`] counts.
+    /// Origins of the wanted blocks near the surface; [`Voxeliser::piece`] takes their indices.
     pub fn near_blocks(&self) -> Vec<Origin> {
-        self.near.iter().map(|&block| self.origin(block)).collect()
+        self.near.iter().map(|&block| self.lattice.block_origin(block)).collect()
     }
 
     /// Origins of the wanted blocks that have no surface in reach and lie inside.
     pub fn inside_blocks(&self) -> Vec<Origin> {
-        self.inside.iter().map(|&block| self.origin(block)).collect()
+        self.inside.iter().map(|&block| self.lattice.block_origin(block)).collect()
     }
 
     /// Number of faces of the chain's boundary near the wanted blocks.
     pub fn face_count(&self) -> usize {
-        self.cells.faces.len()
+        self.bins.faces.len()
     }
 
-    fn origin(&self, block: [i32; 3]) -> Origin {
-        [0, 1, 2].map(|axis| self.lattice.base[axis] + block[axis] * 8)
-    }
-
-    /// Lists for each marked block the facets in reach; returns each block's place in the list.
-    fn sort(&mut self, marked: &[bool]) -> Vec<u32> {
+    /// Lists for each marked block the facets in reach; returns each block's index in `near`, or [`NONE`].
+    fn sort_facets(&mut self, marked: &[bool]) -> Vec<u32> {
         let pairs: Vec<Vec<(u32, u32)>> = self
             .facets
             .par_chunks(GRAIN)
@@ -199,7 +167,7 @@ impl Voxeliser {
         let mut slots = vec![NONE; count.len()];
         for (block, &count) in count.iter().enumerate().filter(|(_, count)| **count > 0) {
             slots[block] = self.near.len() as u32;
-            self.near.push(self.cells.region.place(block));
+            self.near.push(self.bins.region.place(block));
             self.start.push(self.start[self.start.len() - 1] + count);
         }
         let mut place = self.start.clone();
@@ -212,20 +180,20 @@ impl Voxeliser {
         slots
     }
 
-    /// Calls `see` with each marked block that the facet may be nearest in.
+    /// Calls `see` with each marked block in which the facet may be the nearest.
     fn blocks_of(&self, facet: &Facet, marked: &[bool], mut see: impl FnMut(usize)) {
         let reach = self.band.reach() + 0.01;
-        let (first, last) = self.cells.region.touched(extent(&facet.v), reach);
+        let (first, last) = self.bins.region.touched(extent(&facet.v), reach);
         if (0..3).any(|axis| first[axis] > last[axis]) {
             return;
         }
-        // Small facets are told by a ball around them.
+        // Small facets are tested by their bounding sphere.
         let (low, high) = extent(&facet.v);
         let centre = [0, 1, 2].map(|axis| (low[axis] + high[axis]) / 2.0);
         let radius = gap(low, high) / 2.0;
         let triangle = (radius > SMALL).then(|| Triangle::new(&facet.v, [0; 3]));
         for block in each_block(first, last) {
-            let index = self.cells.region.index(block);
+            let index = self.bins.region.index(block);
             if !marked[index] {
                 continue;
             }
@@ -243,13 +211,13 @@ impl Voxeliser {
     /// Finds the blocks without facets whose first voxel is inside.
     fn find_inside(&self, slots: &[u32]) -> Vec<[i32; 3]> {
         let mut inside = Vec::new();
-        let Region { low, high } = self.cells.region;
+        let Region { low, high } = self.bins.region;
         for [x, y, _] in each_block([low[0], low[1], 0], [high[0], high[1], 0]) {
-            let line = self.cells.lines.line(x * 8, y * 8);
+            let line = self.bins.lines.line(x * 8, y * 8);
             for pair in line.windows(2).filter(|pair| pair[0].1 >= 1) {
                 let first = (pair[0].0 / 8.0).ceil().max(f64::from(low[2])) as i32;
                 let last = (pair[1].0 / 8.0).floor().min(f64::from(high[2])) as i32;
-                let empty = |z: &i32| slots[self.cells.region.index([x, y, *z])] == NONE;
+                let empty = |z: &i32| slots[self.bins.region.index([x, y, *z])] == NONE;
                 inside.extend((first..=last).filter(empty).map(|z| [x, y, z]));
             }
         }
@@ -257,38 +225,36 @@ impl Voxeliser {
     }
 
     /// Distances at the wanted voxels of one of the [`Voxeliser::near_blocks`], the band's limit at the others;
-    /// none when all wanted ones prove to be outside.
+    /// none when all wanted ones are farther outside than the band.
     pub fn piece(&self, index: usize, wanted: &Mask, scratch: &mut Scratch) -> Option<Piece> {
         if *wanted == [0; 8] {
             return None;
         }
         let block = self.near[index];
-        let signs = Signs::new(&self.cells.lines, block.map(|b| b * 8));
+        let signs = Signs::new(&self.bins.lines, block.map(|b| b * 8));
         let inside = signs.inside();
-        let limits = [self.band.outside, self.band.inside];
-        let mut distances: Box<Values> =
-            Box::new(std::array::from_fn(|voxel| limits[usize::from(holds(&inside, voxel))]));
+        let mut distances = self.limits(&inside);
         let found = self.find_distances(index, wanted, &inside, &mut distances, scratch);
         let lowered = self.lower_by_lines(block, wanted, &signs, &mut distances);
-        let all = |bits: &dyn Fn(usize) -> u64| (0..8).all(|x| bits(x) & wanted[x] == wanted[x]);
-        if !found && !lowered && all(&|x| inside[x]) {
-            return Some(Piece::Inside(self.origin(block)));
+        let origin = self.lattice.block_origin(block);
+        if !found && !lowered {
+            match (0..8).map(|x| inside[x] & wanted[x]).eq(wanted.iter().copied()) {
+                true => return Some(Piece::Inside(origin)),
+                false if (0..8).all(|x| inside[x] & wanted[x] == 0) => return None,
+                false => {}
+            }
         }
-        if !found && !lowered && all(&|x| !inside[x]) {
-            return None;
-        }
-        for (voxel, value) in distances.iter_mut().enumerate() {
-            *value = match *value {
-                // Else rounding would scatter specks of volume over a face that lies on voxels.
-                distance if distance < ON_FACE => 0.0,
-                distance if holds(&inside, voxel) => -distance,
-                distance => distance,
-            };
-        }
-        Some(Piece::Near(self.origin(block), distances))
+        set_signs(&mut distances, &inside);
+        Some(Piece::Near(origin, distances))
     }
 
-    /// Lowers distances from the band's limits to those of the nearest facets; whether any is lower.
+    /// The band's limits at the voxels of a block.
+    fn limits(&self, inside: &Mask) -> Box<Values> {
+        let limits = [self.band.outside, self.band.inside];
+        Box::new(std::array::from_fn(|voxel| limits[usize::from(holds(inside, voxel))]))
+    }
+
+    /// Lowers distances from the band's limits to those of the nearest facets; returns whether any was lowered.
     fn find_distances(
         &self,
         index: usize,
@@ -301,10 +267,10 @@ impl Voxeliser {
         let ids = &self.ids[self.start[index] as usize..self.start[index + 1] as usize];
         let triangles: Vec<Triangle> =
             ids.iter().map(|&id| Triangle::new(&self.facets[id as usize].v, corner)).collect();
-        let (cells, exposure, facets) = (&self.cells, &self.exposure, &self.facets[..]);
+        let (bins, exposure, facets) = (&self.bins, &self.exposure, &self.facets[..]);
         let reach = self.band.inside;
         let Scratch { search: memory, prisms } = scratch;
-        let near = Near::new(Chain { cells, exposure, facets }, corner, ids, &triangles, reach, prisms);
+        let near = Near::new(Volume { bins, exposure, facets }, corner, ids, &triangles, reach, prisms);
         let mut found = false;
         search(&triangles, self.band.reach(), wanted, memory, |group| {
             let mut depths = Depths::new(&near, group);
@@ -324,7 +290,7 @@ impl Voxeliser {
         found
     }
 
-    /// Lowers distances to where lines through the voxels meet the surface beside them; whether any was larger.
+    /// Lowers distances to those of the nearest meetings on lines through the voxels; returns whether any was lowered.
     fn lower_by_lines(&self, block: [i32; 3], wanted: &Mask, signs: &Signs, distances: &mut Values) -> bool {
         let mut lowered = false;
         let mut lower = |voxel: usize, most: f32| {
@@ -339,8 +305,50 @@ impl Voxeliser {
     }
 }
 
-/// Marks the blocks within `reach` cells of a face's box.
-fn candidates(faces: &[Face], region: &Region, reach: f32) -> Vec<bool> {
+/// Marks the blocks within `reach` cells of faces for which `wanted` is true.
+fn mark_wanted(
+    faces: &[Face],
+    region: &Region,
+    reach: f32,
+    wanted: impl Fn(&[[i32; 3]]) -> Result<Vec<bool>>,
+) -> Result<Vec<bool>> {
+    let near = mark_near(faces, region, reach);
+    let blocks: Vec<[i32; 3]> =
+        (0..near.len()).filter(|&block| near[block]).map(|block| region.place(block)).collect();
+    let mut marked = vec![false; region.blocks()];
+    for (block, wanted) in blocks.iter().zip(wanted(&blocks)?) {
+        marked[region.index(*block)] = wanted;
+    }
+    Ok(marked)
+}
+
+/// Scans the winding numbers, and sorts the faces within `reach` cells of marked blocks into bins.
+fn sort_into_bins(
+    ctx: &Context,
+    mut faces: Vec<Face>,
+    region: Region,
+    marked: &[bool],
+    reach: f32,
+) -> Result<Bins> {
+    let relevant = region.dilated(marked, (reach / 8.0).ceil() as i32);
+    ctx.check()?;
+    let near = marked.iter().filter(|&&marked| marked).count();
+    ctx.allow(REGION, (region.blocks() * BYTES_PER_BLOCK + near * BYTES_PER_NEAR_BLOCK) as u64)?;
+    let lines = Lines::scan(&faces, &region);
+    ctx.advance();
+    ctx.check()?;
+    retain(&mut faces, |face| {
+        let (first, last) = region.touched(extent(&face.v), 0.0);
+        each_block(first, last).any(|block| relevant[region.index(block)])
+    });
+    let bins = Bins::new(faces, region, &relevant, lines);
+    ctx.advance();
+    ctx.check()?;
+    Ok(bins)
+}
+
+/// Marks the blocks within `reach` cells of a face's bounding box.
+fn mark_near(faces: &[Face], region: &Region, reach: f32) -> Vec<bool> {
     let marks: Vec<AtomicBool> = (0..region.blocks()).map(|_| AtomicBool::new(false)).collect();
     faces.par_iter().with_min_len(GRAIN).for_each(|face| {
         let (first, last) = region.touched(extent(&face.v), reach);
@@ -349,11 +357,23 @@ fn candidates(faces: &[Face], region: &Region, reach: f32) -> Vec<bool> {
     marks.into_iter().map(AtomicBool::into_inner).collect()
 }
 
-/// Keeps the faces for which `keep` holds, in order.
+/// Keeps the faces for which `keep` is true, in order.
 fn retain(faces: &mut Vec<Face>, keep: impl Fn(&Face) -> bool + Send + Sync) {
     let kept: Vec<bool> = faces.par_iter().with_min_len(GRAIN).map(keep).collect();
     let mut kept = kept.into_iter();
     faces.retain(|_| kept.next().unwrap_or(false));
+}
+
+/// Makes the distances of inside voxels negative.
+fn set_signs(distances: &mut Values, inside: &Mask) {
+    for (voxel, value) in distances.iter_mut().enumerate() {
+        *value = match *value {
+            // Otherwise rounding would scatter specks of volume over a face that lies on voxels.
+            distance if distance < ON_FACE => 0.0,
+            distance if holds(inside, voxel) => -distance,
+            distance => distance,
+        };
+    }
 }
 
 /// Whether a voxel's bit is set.

@@ -13,18 +13,18 @@ use super::lattice::{Fixed, UNITS, floor};
 use super::lists::Lists;
 use super::region::{Region, each_block, extent};
 
-/// Lines (x, y) through the voxels of a region, each with its sorted crossings; none where no face is above or below.
+/// The lines along z through the voxels of a region, each with its sorted crossings; only where faces are above or below.
 pub struct Lines {
     columns: Columns,
-    /// Where a crossing is, and the winding number above it.
+    /// The height of each crossing (cells), and the winding number above it.
     crossings: Lists<(f64, i32)>,
 }
 
-/// Faces a task scans: fixed, so that nothing depends on the number of threads.
+/// Faces per task: fixed, so that nothing depends on the number of threads.
 const GRAIN: usize = 2048;
-/// Crossings nearer than this to a voxel (cells) are told to be above or below it in exact integers.
+/// Whether crossings nearer than this to a voxel (cells) are above or below it is decided in exact integers.
 const NEAR: f64 = 1e-6;
-/// Where they are then put: so far above or below (cells).
+/// Distance from the voxel (cells) that they are then given.
 const BESIDE: f64 = 1e-7;
 
 impl Lines {
@@ -67,7 +67,7 @@ impl Lines {
         if below == 0 { 0 } else { line[below - 1].1 }
     }
 
-    /// The crossings of line (x, y) upward: position in cells and winding number above; empty outside.
+    /// The crossings of line (x, y) upward: height in cells and winding number above; empty outside the region.
     pub fn line(&self, x: i32, y: i32) -> &[(f64, i32)] {
         self.columns.line([x, y]).map_or(&[], |line| self.crossings.get(line))
     }
@@ -77,7 +77,7 @@ impl Lines {
         self.crossings.items().iter().fold(0, |least, (_, winding)| least.min(*winding))
     }
 
-    /// Calls `see` with the coordinates of each line that has crossings, and with those.
+    /// Calls `see` with the coordinates and crossings of each line that has any.
     pub fn each_line(&self, mut see: impl FnMut([i32; 2], &[(f64, i32)])) {
         for line in (0..self.crossings.count()).filter(|&line| !self.crossings.get(line).is_empty()) {
             see(self.columns.coordinates(line), self.crossings.get(line));
@@ -105,8 +105,8 @@ impl Axis {
         self as usize
     }
 
-    /// A position in right-handed coordinates whose third axis runs along the lines (downward for y), and whose first
-    /// two are shifted by positive infinitesimals, the first the greater.
+    /// A position in right-handed coordinates whose third axis runs along the lines (downward for y), and in which the
+    /// symbolic shift of the first two is positive and larger in the first.
     fn turned(self, [x, y, z]: Fixed) -> [i64; 3] {
         let [x, y, z] = [x, y, z].map(i64::from);
         match self {
@@ -116,7 +116,7 @@ impl Axis {
         }
     }
 
-    /// Whether a plane with this normal (turned) passes below a voxel in it, as the voxel is shifted.
+    /// Whether a plane with this normal (turned) passes below a voxel that lies in it, after the symbolic shift.
     fn is_below(self, [p, q, along]: [i64; 3]) -> bool {
         let shifts = match self {
             Self::X => [p, along, q],
@@ -127,7 +127,7 @@ impl Axis {
         (towards > 0) == (along > 0)
     }
 
-    /// The voxel at coordinates (p, q) of a line, and at this place on its own axis.
+    /// The voxel at coordinates (p, q) of a line, and at `along` on its own axis.
     pub fn voxel(self, [p, q]: [i32; 2], along: i32) -> [i32; 3] {
         match self {
             Self::X => [along, q, p],
@@ -145,7 +145,7 @@ impl Axis {
         }
     }
 
-    /// The way to a line whose coordinates differ by this much.
+    /// The offset to a line whose coordinates differ by this much.
     pub fn beside(self, [p, q]: [f64; 2]) -> [f64; 3] {
         match self {
             Self::X => [0.0, q, p],
@@ -166,7 +166,7 @@ impl Axis {
 }
 
 /// Calls `see` with each line through voxels that a face crosses: the line's coordinates, the place on its axis
-/// (cells; never on a voxel, but beside it), and how the winding number changes there in the direction of the axis.
+/// (cells; never exactly on a voxel), and the change of the winding number there in the direction of the axis.
 pub fn each_crossing(
     face: &Face,
     axis: Axis,
@@ -180,9 +180,9 @@ pub fn each_crossing(
         return;
     }
     let unit = i64::from(UNITS);
-    let (low, high) = least_and_most(flat.map(|p| p[1]));
+    let (low, high) = range(flat.map(|p| p[1]));
     let [[p0, p1], [q0, q1]] = bounds;
-    // Facing along the line (area > 0) the chain is left when the face is passed.
+    // A line leaves the chain through a face whose normal points along it (area > 0).
     let mut change = if area > 0 { -face.coef } else { face.coef };
     let mirror = if axis == Axis::Y { -1.0 } else { 1.0 };
     if axis == Axis::Y {
@@ -202,7 +202,7 @@ pub fn each_crossing(
                 } else {
                     height
                 };
-                // Turned lines along x and y have -z for their first coordinate.
+                // The first turned coordinate of lines along x and y is -z.
                 let line = [if axis == Axis::Z { p } else { -p }, q].map(|value| value as i32);
                 see(line, mirror * height, change);
             }
@@ -225,7 +225,7 @@ fn passes_below(v: &[[i64; 3]; 3], axis: Axis, voxel: [i64; 3]) -> bool {
     }
 }
 
-fn least_and_most(values: [i64; 3]) -> (i64, i64) {
+fn range(values: [i64; 3]) -> (i64, i64) {
     (values[0].min(values[1]).min(values[2]), values[0].max(values[1]).max(values[2]))
 }
 
@@ -253,7 +253,7 @@ fn edge_function(p: [i64; 2], q: [i64; 2], s: [i64; 2]) -> i64 {
     (q[0] - p[0]) * (s[1] - p[1]) - (q[1] - p[1]) * (s[0] - p[0])
 }
 
-/// Whether s, moved by (e, e^2), lies left of p -> q.
+/// Whether s, shifted by (e, e^2), lies left of p -> q; `value` is the edge function.
 fn left_of(p: [i64; 2], q: [i64; 2], value: i64) -> bool {
     match value {
         0 if p[1] != q[1] => q[1] < p[1],

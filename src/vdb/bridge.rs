@@ -7,7 +7,7 @@ pub(super) mod ffi {
         x: i32,
         y: i32,
         z: i32,
-        /// 1 when `values` and `mask` are set; else the tile below counts.
+        /// 1 when `values` and `mask` are set; otherwise the tile below is valid.
         is_leaf: bool,
         tile_active: bool,
         /// Of a float the first number.
@@ -16,7 +16,7 @@ pub(super) mod ffi {
         mask: usize,
     }
 
-    /// A metadata entry; `kind` says which of the values counts.
+    /// A metadata entry; `kind` selects the valid value.
     struct Meta {
         key: String,
         /// "string", "float", "double", "int", "bool", or another type's name with its text.
@@ -26,7 +26,7 @@ pub(super) mod ffi {
         integer: i64,
     }
 
-    /// What a file says of one of its grids.
+    /// The description of a grid in a file.
     struct GridHeader {
         name: String,
         value_type: String,
@@ -71,7 +71,7 @@ pub(super) mod ffi {
         indices: Vec<u32>,
     }
 
-    /// What of a grid becomes a mesh: all, the blocks at some origins, or without any the voxels of a box.
+    /// The part of a grid that becomes a mesh: all, the blocks at some origins, or without any the voxels of a box.
     struct Part {
         whole: bool,
         /// Three numbers each.
@@ -142,7 +142,7 @@ pub(super) mod ffi {
         type Stored;
         fn read_bytes(bytes: &[u8]) -> Result<UniquePtr<Stored>>;
         fn describe_stored(stored: &Stored) -> Result<Vec<GridHeader>>;
-        /// The grid with this number in the description; it can be taken once.
+        /// The grid with this index in the description; it can be taken once.
         fn take_stored(stored: Pin<&mut Stored>, index: usize) -> Result<Found>;
         /// Transform and metadata, in OpenVDB's own coding.
         fn grid_head(grid: &Grid) -> Result<UniquePtr<CxxString>>;
@@ -210,7 +210,7 @@ pub(super) mod ffi {
             tiles: &[Tile],
         ) -> Result<UniquePtr<VectorGrid>>;
 
-        /// Ends TBB's worker threads, unless somebody else uses them.
+        /// Ends TBB's worker threads, unless others use them.
         fn end_workers();
 
         /// 0 union, 1 difference, 2 intersection; both grids are consumed into the first.

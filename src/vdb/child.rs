@@ -14,10 +14,10 @@ use crate::error::{Error, Result, one_line};
 
 /// The first argument of a program that is to decode.
 pub(super) const COMMAND: &str = "decode-vdb-for-another-process";
-/// The form of the arguments and of parcels: both sides must be of one version.
+/// Version of the arguments and of parcels: both sides must have the same.
 pub(super) const PROTOCOL: &str = concat!("2-", env!("CARGO_PKG_VERSION"));
 
-/// What is wanted of a file.
+/// What to read from a file.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) enum Wanted<'a> {
     Infos,
@@ -46,7 +46,7 @@ impl Wanted<'_> {
     }
 }
 
-/// What the process may take.
+/// Limits of the process.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Limits {
     /// Address space beyond what the program has when it begins (bytes).
@@ -55,8 +55,8 @@ pub(super) struct Limits {
     pub seconds: u64,
 }
 
-/// Decodes, if the program was started for it: call it first of all, with the arguments behind the program's name.
-/// What it returns is the exit code of the program, which then has nothing else to do.
+/// Decodes, if the program was started for it: call it before anything else, with the arguments after the program's name.
+/// It returns the exit code of the program, which must then end.
 pub fn serve(arguments: impl Iterator<Item = OsString>) -> Option<u8> {
     let arguments: Vec<OsString> = arguments.take(7).collect();
     let (command, rest) = arguments.split_first()?;
@@ -88,16 +88,16 @@ pub fn serve(arguments: impl Iterator<Item = OsString>) -> Option<u8> {
         Err(error) => Contents::Refusal(error.to_string()),
     };
     let packed = deliver(&contents);
-    // The process ends: nobody needs the memory back leaf by leaf.
+    // The process ends: no need to free the memory leaf by leaf.
     std::mem::forget(contents);
     Some(if packed.is_ok() { 0 } else { 1 })
 }
 
-/// Address space that a thread may take: its stack. OpenVDB's helpers start one for each core.
+/// Address space of a thread: its stack. OpenVDB's helpers start one for each core.
 const SPACE_OF_A_THREAD: u64 = 16 << 20;
 
 fn limit(limits: Limits) -> std::io::Result<()> {
-    // Not one process that decodes outlives the one that asked for it.
+    // No decoding process outlives the one that started it.
     set_parent_process_death_signal(Some(Signal::KILL))?;
     let own = std::fs::read_to_string("/proc/self/statm")?;
     let pages: u64 = own.split(' ').next().and_then(|pages| pages.parse().ok()).unwrap_or(0);

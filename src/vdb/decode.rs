@@ -1,5 +1,5 @@
 //! Decoding .vdb files in this process. The structure is checked first ([`super::layout`]); damage inside a grid's values
-//! is OpenVDB's to notice, which does not survive all of it: see [`super::guard`].
+//! is left to OpenVDB, which does not survive all of it: see [`super::guard`].
 
 use std::io::{BufReader, Cursor};
 use std::path::Path;
@@ -18,7 +18,7 @@ use crate::error::{Error, Result};
 const FLOAT_TYPE: &str = "Tree_float_5_4_3";
 const VECTOR_TYPE: &str = "Tree_vec3s_5_4_3";
 
-/// What kinds of grids a caller takes.
+/// The kinds of grids that a caller accepts.
 #[derive(Debug, Clone, Copy, PartialEq)]
 enum Kinds {
     Floats,
@@ -26,7 +26,7 @@ enum Kinds {
 }
 
 impl Kinds {
-    /// What they are called.
+    /// Their name in messages.
     fn words(self) -> &'static str {
         match self {
             Self::Floats => "floats",
@@ -41,7 +41,7 @@ impl Kinds {
     }
 }
 
-/// What the values of a grid are, in words.
+/// The values of a grid, in words.
 fn kind_of(header: &GridInfo) -> &str {
     let known = [
         ("Tree_float", "floats"),
@@ -59,12 +59,12 @@ fn kind_of(header: &GridInfo) -> &str {
     found.map_or(header.value_type.as_str(), |(_, words)| words)
 }
 
-/// A result whose error text goes behind the file's name.
+/// A result whose error message follows the file's name.
 type Told<T> = std::result::Result<T, String>;
 
 /// Where the grids of a file are.
 enum Source<'a> {
-    /// In a file of this name, whose structure is known to be whole: OpenVDB may skip in it.
+    /// In a file of this name, whose structure was checked: OpenVDB may seek in it.
     File(&'a str),
     /// In memory: the bytes were read from the first to the last.
     Stored(UniquePtr<ffi::Stored>),
@@ -73,7 +73,7 @@ enum Source<'a> {
 /// Checks the structure of a file.
 ///
 /// # Errors
-/// A file that cannot be read, is no regular file, is cut short or contradicts itself.
+/// A file that cannot be read, is not a regular file, is cut short or contradicts itself.
 pub(super) fn check(path: &Path) -> Result<Layout> {
     let file = crate::io::source::open(path)?;
     layout::read(BufReader::new(file)).map_err(|fault| match fault {
@@ -97,7 +97,7 @@ fn stored(bytes: &[u8]) -> Told<Source<'static>> {
     ffi::read_bytes(bytes).map(Source::Stored).map_err(|error| cannot_read(&error))
 }
 
-/// What OpenVDB could not read, in our words.
+/// The error for what OpenVDB could not read.
 fn cannot_read(error: &cxx::Exception) -> String {
     let what = error.what();
     log::info!("OpenVDB: {}", crate::error::one_line(what));
@@ -143,17 +143,17 @@ pub(super) fn read_any(path: &Path, name: Option<&str>) -> Result<AnyGrid> {
     named(source(path)?, name, Kinds::FloatsAndVectors).map_err(|what| Error::file(path, what))
 }
 
-/// As [`super::file::from_bytes`]; the error goes behind what the bytes are called.
+/// As [`super::file::from_bytes`]; the error message follows the name of the bytes.
 pub(super) fn from_bytes(bytes: &[u8], name: Option<&str>) -> Told<FloatGrid> {
     named(whole(bytes)?, name, Kinds::Floats).and_then(floats)
 }
 
-/// As [`super::file::any_from_bytes`]; the error goes behind what the bytes are called.
+/// As [`super::file::any_from_bytes`]; the error message follows the name of the bytes.
 pub(super) fn any_from_bytes(bytes: &[u8], name: Option<&str>) -> Told<AnyGrid> {
     named(whole(bytes)?, name, Kinds::FloatsAndVectors)
 }
 
-/// The grids of bytes whose structure is whole.
+/// The grids of bytes whose structure was checked.
 fn whole(bytes: &[u8]) -> Told<Source<'static>> {
     layout::read(Cursor::new(bytes)).map_err(|fault| match fault {
         Fault::Io(error) => error.to_string(),
@@ -208,7 +208,7 @@ fn named(mut source: Source<'_>, name: Option<&str>, kinds: Kinds) -> Told<AnyGr
     }
 }
 
-/// The grid with a number in the description of its file.
+/// The grid with an index in the description of its file.
 fn load(source: &mut Source<'_>, at: usize, header: &GridInfo, kinds: Kinds) -> Told<AnyGrid> {
     if !kinds.take(header) {
         let (name, kind, wanted) = (&header.name, kind_of(header), kinds.words());
@@ -225,7 +225,7 @@ fn load(source: &mut Source<'_>, at: usize, header: &GridInfo, kinds: Kinds) -> 
     Err(format!("grid \"{}\" has values that are not finite", grid.borrow().name()))
 }
 
-/// What is said of a grid that is another than its file says.
+/// The error for a grid that is not of the type in the file.
 const ASTRAY: &str = "the .vdb file is damaged: a grid is not of the type that the file says";
 
 fn floats(grid: AnyGrid) -> Told<FloatGrid> {

@@ -1,4 +1,4 @@
-//! .vdb files: written whole or not at all, the same bytes for the same grids.
+//! .vdb files: written atomically, the same bytes for the same grids.
 
 use std::path::Path;
 
@@ -32,7 +32,7 @@ pub struct WriteOptions {
     pub metadata: Vec<(String, MetaValue)>,
 }
 
-/// What a file says of one of its grids.
+/// The description of a grid in a file.
 #[derive(Debug, Clone, PartialEq)]
 pub struct GridInfo {
     /// Name.
@@ -43,11 +43,11 @@ pub struct GridInfo {
     pub class: String,
     /// Edge of a cell along x (m).
     pub voxel: f64,
-    /// Active voxels, where the file says.
+    /// Active voxels, if the file has them.
     pub active_voxels: Option<u64>,
-    /// Least and greatest active voxel, where the file says.
+    /// Least and greatest active voxel, if the file has them.
     pub bbox: Option<([i32; 3], [i32; 3])>,
-    /// Memory when loaded (bytes), where the file says.
+    /// Memory when loaded (bytes), if the file has them.
     pub memory: Option<u64>,
     /// Whether values are stored in 16 bits.
     pub half: bool,
@@ -57,10 +57,10 @@ pub struct GridInfo {
     pub metadata: Vec<(String, MetaValue)>,
 }
 
-/// Where a file has its random identifier: 36 characters.
+/// Position of the random identifier in a file: 36 characters.
 const UUID: std::ops::Range<usize> = 21..57;
 
-/// Writes grids to a file; the file is there when it is whole.
+/// Writes grids to a file, atomically.
 ///
 /// # Errors
 /// As [`to_bytes`], or what the operating system reports.
@@ -121,8 +121,8 @@ fn name_by_content(bytes: &mut [u8]) {
     bytes[UUID].copy_from_slice(name.as_bytes());
 }
 
-/// What a file says of its grids, of any type, in the order of their names; values are not read, but of a stream, which
-/// does not say where its grids lie.
+/// Descriptions of a file's grids, of any type, in the order of their names; values are not read, except in a stream, which
+/// has no offsets of its grids.
 ///
 /// In a program that called [`guard::install`], files that are not its own are decoded by another process.
 ///

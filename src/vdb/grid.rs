@@ -12,10 +12,10 @@ use crate::base::blocks::{BlockEdit, Origin};
 use crate::context::Context;
 use crate::error::Result;
 
-/// What a grid's values mean.
+/// The meaning of a grid's values.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum GridClass {
-    /// Nothing said.
+    /// Not specified.
     Unknown,
     /// Signed distances (m), negative inside.
     LevelSet,
@@ -26,7 +26,7 @@ pub enum GridClass {
 }
 
 impl GridClass {
-    /// What OpenVDB's number stands for.
+    /// The class with OpenVDB's number.
     pub(super) fn of(number: i32) -> Self {
         match number {
             1 => Self::LevelSet,
@@ -56,20 +56,20 @@ pub enum MetaValue {
     Float(f32),
     /// A 64-bit float.
     Double(f64),
-    /// A whole number.
+    /// An integer.
     Int(i64),
-    /// Yes or no.
+    /// A boolean.
     Bool(bool),
     /// Another type, as text; it can be read but not set.
     Other(String, String),
 }
 
-/// A sparse grid of floats with a uniform transform; its memory is its own.
+/// A sparse grid of floats with a uniform transform; it shares no memory.
 pub struct FloatGrid {
     pub(super) inner: UniquePtr<ffi::Grid>,
 }
 
-/// One value for a cube of voxels, larger than a leaf or in the place of one.
+/// One value for a cube of voxels, of a leaf's size or larger.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Tile {
     /// Least corner, in voxels.
@@ -150,7 +150,7 @@ impl FloatGrid {
         ffi::is_uniform(&self.inner)
     }
 
-    /// Whether voxel (0, 0, 0) lies at the origin and the axes are the world's: what our own grids are.
+    /// Whether voxel (0, 0, 0) lies at the origin and the axes are the world's, as in our own grids.
     pub fn is_world_fixed(&self) -> bool {
         is_world_fixed(self.voxel_size(), |index| ffi::index_to_world(&self.inner, index))
     }
@@ -170,12 +170,12 @@ impl FloatGrid {
         ffi::background(&self.inner)
     }
 
-    /// What the values mean.
+    /// The meaning of the values.
     pub fn class(&self) -> GridClass {
         GridClass::of(ffi::grid_class(&self.inner))
     }
 
-    /// Says what the values mean.
+    /// Sets the meaning of the values.
     ///
     /// # Errors
     /// When memory runs out.
@@ -188,7 +188,7 @@ impl FloatGrid {
         ffi::name(&self.inner)
     }
 
-    /// Names the grid.
+    /// Sets the grid's name.
     ///
     /// # Errors
     /// When memory runs out.
@@ -253,7 +253,7 @@ impl FloatGrid {
         Ok(views.iter().map(|view| unsafe { lend_mut(view, PhantomData) }).collect())
     }
 
-    /// Every value above the leaves, but where a grid says its background and nothing else.
+    /// Every tile that is not an inactive background.
     ///
     /// # Errors
     /// When memory runs out.
@@ -268,7 +268,7 @@ impl FloatGrid {
         Ok(ffi::tiles(&self.inner).map_err(fail)?.into_iter().map(tile).collect())
     }
 
-    /// What lies at the given block origins (multiples of 8); nothing is copied.
+    /// The leaf or tile at each of the given block origins (multiples of 8); nothing is copied.
     ///
     /// # Errors
     /// When memory runs out.
@@ -282,7 +282,7 @@ impl FloatGrid {
         Ok(lent.collect())
     }
 
-    /// Puts blocks in the place of leaves or tiles. All memory for leaves is had before the first is put in.
+    /// Replaces leaves or tiles by blocks. All memory for leaves is allocated before the first is replaced.
     ///
     /// # Errors
     /// When memory runs out; the grid is then as it was.
@@ -290,7 +290,7 @@ impl FloatGrid {
         self.put(Ready::new(ctx, edits)?)
     }
 
-    /// Puts blocks in the place of leaves or tiles.
+    /// Replaces leaves or tiles by blocks.
     ///
     /// # Errors
     /// When memory for the nodes above leaves runs out.
@@ -298,7 +298,7 @@ impl FloatGrid {
         ffi::put_blocks(self.inner.pin_mut(), blocks.0.pin_mut()).map_err(fail)
     }
 
-    /// Bytes that a .vdb file of this grid takes at most.
+    /// Upper bound on the bytes of a .vdb file of this grid.
     pub fn file_bound(&self) -> u64 {
         ffi::file_bound(&self.inner)
     }
@@ -332,7 +332,7 @@ impl FloatGrid {
         ffi::sample(&self.inner, &call, &flat, linear, out).map_err(fail)
     }
 
-    /// Turns leaves and nodes of one value (within `tolerance`) into tiles.
+    /// Replaces leaves and nodes of one value (within `tolerance`) by tiles.
     ///
     /// # Errors
     /// When memory runs out.
@@ -340,7 +340,7 @@ impl FloatGrid {
         ffi::prune(self.inner.pin_mut(), &alone(), false, tolerance).map_err(fail)
     }
 
-    /// Turns what is inactive in a level set into inside and outside tiles.
+    /// Replaces inactive parts of a level set by inside and outside tiles.
     ///
     /// # Errors
     /// When memory runs out.
@@ -357,7 +357,7 @@ impl FloatGrid {
     }
 }
 
-/// Whether a map from index space puts voxel (i, j, k) at (i, j, k) times the voxel size.
+/// Whether a map from index space maps voxel (i, j, k) to (i, j, k) times the voxel size.
 pub(super) fn is_world_fixed(voxel: f64, at: impl Fn([f64; 3]) -> [f64; 3]) -> bool {
     let expected = [[0.0; 3], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]];
     let off = |index: [f64; 3]| (DVec3::from(at(index)) - DVec3::from(index) * voxel).norm();

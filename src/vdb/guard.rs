@@ -1,9 +1,9 @@
 //! Foreign .vdb files are decoded by another process: OpenVDB does not survive every kind of damage.
 //!
 //! A program that calls [`install`] is started again for each file that is not its own, with a limit of memory and of
-//! time. The child decodes and hands the grids over in memory that both see; the parent copies each leaf once. A crash,
-//! an endless loop or a hunger for memory of the child becomes one sentence. It is a shield against damage, not against
-//! an attacker who has taken the child over.
+//! time. The child decodes and passes the grids in shared memory; the parent copies each leaf once. A crash, an endless
+//! loop or excessive memory use of the child becomes one error message. This protects against damage, not against an
+//! attacker who controls the child.
 
 use std::fs::File;
 use std::io::Read;
@@ -28,33 +28,33 @@ use super::vectors::AnyGrid;
 use crate::error::{Error, Result, one_line};
 use crate::io::manifest;
 
-/// Memory that a child may take for any file (bytes), and for each byte of the file: what takes most memory for its
-/// bytes is a node above the leaves, 260 kB for at least 8 kB, or a leaf, 2.2 kB for at least 129 bytes.
+/// Memory limit of a child for any file (bytes), and for each byte of the file: the most memory per byte is that of a node
+/// above the leaves, 260 kB for at least 8 kB, or of a leaf, 2.2 kB for at least 129 bytes.
 const FIXED_MEMORY: u64 = 384 << 20;
 const MEMORY_PER_BYTE: u64 = 64;
-/// Time of a core (s) that a child may take for any file, and for each MB.
+/// CPU time (s) of a child for any file, and for each MB.
 const FIXED_SECONDS: f64 = 2.0;
 const SECONDS_PER_MB: f64 = 0.5;
-/// How much longer it may take by the clock: it may wait for a disk or for other work.
+/// Wall-clock time relative to that: a child may wait for a disk or for other work.
 const WAITING: f64 = 8.0;
-/// Time between two looks at a child: at first, and later.
+/// Time between two checks of a child: at first, and later.
 const LOOKS: [Duration; 2] = [Duration::from_micros(500), Duration::from_millis(5)];
-/// Bytes that are kept of what a child says on stderr.
+/// Bytes that are kept of a child's stderr.
 const MOST_WORDS: u64 = 1 << 14;
 
 /// The guard of this program.
 static INSTALLED: OnceLock<Guard> = OnceLock::new();
 
-/// Who decodes foreign files, and what it may take.
+/// The program that decodes foreign files, and its limits.
 #[derive(Debug, Clone)]
 pub struct Guard {
-    /// A program that calls [`serve`] first of all: the `frazil` command.
+    /// A program that calls [`serve`] before anything else: the `frazil` command.
     pub program: PathBuf,
-    /// The most memory that decoding a file may take (bytes).
+    /// Memory limit for decoding a file (bytes).
     pub memory: u64,
-    /// Threads that build grids from what was decoded.
+    /// Threads that build grids from the decoded data.
     pub threads: usize,
-    /// Raised to stop: the child is ended, and the call returns [`Error::Cancelled`].
+    /// Set to stop: the child is ended, and the call returns [`Error::Cancelled`].
     pub cancel: Arc<AtomicBool>,
 }
 
@@ -118,7 +118,7 @@ impl Guard {
 
     /// Lets a child read a file.
     fn ask(&self, path: &Path, wanted: Wanted<'_>) -> Result<Contents> {
-        // What can be known without OpenVDB needs no child.
+        // What can be checked without OpenVDB needs no child.
         decode::check(path)?;
         let length = std::fs::metadata(path).map_err(|error| Error::io(path, "read", error))?.len();
         let memory = FIXED_MEMORY.saturating_add(length.saturating_mul(MEMORY_PER_BYTE)).min(self.memory);
@@ -145,7 +145,7 @@ impl Guard {
         }
     }
 
-    /// Runs a child to its end; how it ended, and what it said.
+    /// Runs a child to its end; returns its exit status and output.
     fn run(
         &self,
         path: &Path,
@@ -172,7 +172,7 @@ impl Guard {
         Ok((ended?, words))
     }
 
-    /// Waits for a child; ends it when it takes too long or the flag is raised. None when somebody else in this process
+    /// Waits for a child; ends it when it takes too long or the flag is set. None when other code in this process
     /// took its status.
     fn wait(&self, child: &mut Child, limits: Limits) -> Result<Option<ExitStatus>> {
         let start = Instant::now();
@@ -226,7 +226,7 @@ impl Guard {
                 Some(FILE_SIZE) => "decoding it takes larger files than `ulimit -f` allows".to_string(),
                 Some(_) => "the .vdb file is damaged: decoding it makes OpenVDB crash".to_string(),
                 None => format!(
-                    "cannot be decoded by {}, which is no frazil of version {}",
+                    "cannot be decoded by {}, which is not frazil of version {}",
                     self.program.display(),
                     env!("CARGO_PKG_VERSION")
                 ),
@@ -235,7 +235,7 @@ impl Guard {
     }
 }
 
-/// The first of what comes through a pipe; the rest is read and dropped, so that the writer never waits.
+/// The first bytes from a pipe; the rest is read and dropped, so that the writer never blocks.
 fn first_words(mut pipe: impl Read) -> String {
     let mut kept = Vec::new();
     let _ = pipe.by_ref().take(MOST_WORDS).read_to_end(&mut kept);
@@ -243,12 +243,12 @@ fn first_words(mut pipe: impl Read) -> String {
     String::from_utf8_lossy(&kept).into_owned()
 }
 
-/// Refuses another grid than one of floats.
+/// Refuses a grid that is not one of floats.
 fn floats(path: &Path, grid: AnyGrid) -> Result<FloatGrid> {
     grid.floats().ok_or_else(|| astray(path))
 }
 
-/// What is said of a parcel that is whole but holds something else.
+/// The error for a parcel that is complete but contains something else.
 fn astray(path: &Path) -> Error {
     Error::file(path, "the .vdb file is damaged: decoding it came to nothing")
 }

@@ -1,7 +1,7 @@
 //! The structure of a .vdb file, read without OpenVDB: header, metadata, and where each grid lies.
 //!
-//! OpenVDB does not notice the end of a file while it reads one: it takes what was never read for an empty grid, or
-//! goes on for ever. A file that says where its grids lie (all but streams do) is checked here first.
+//! OpenVDB does not notice the end of a file while it reads one: it takes missing data for an empty grid, or
+//! never ends. A file with offsets of its grids (all but streams) is checked here first.
 
 use std::io::{Read, Seek, SeekFrom};
 
@@ -9,7 +9,7 @@ use std::io::{Read, Seek, SeekFrom};
 pub(super) const MAGIC: [u8; 8] = [0x20, 0x42, 0x44, 0x56, 0, 0, 0, 0];
 /// Versions of the format whose structure is known here: the newest is the one that OpenVDB 10 writes.
 const KNOWN: std::ops::RangeInclusive<u32> = 211..=224;
-/// First version that says whether offsets are given.
+/// First version with a flag for offsets.
 const OFFSETS_FLAG: u32 = 212;
 /// First version in which grids can share the tree of another.
 const INSTANCES: u32 = 216;
@@ -22,18 +22,18 @@ const GRID_COMPRESSION: u32 = 222;
 /// Longest name that is read (bytes).
 const LONGEST_NAME: u64 = 1 << 16;
 
-/// What the structure of a file says.
+/// The structure of a file.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Layout {
     /// Version of the format.
     pub version: u32,
-    /// The grids in the file's order. None where the file does not say where they lie: a stream, or a version that is
-    /// not known here. Whether such a file is whole shows only when it is decoded.
+    /// The grids in the file's order. None where the file has no offsets: a stream, or an unknown
+    /// version. Whether such a file is complete shows only when it is decoded.
     pub grids: Option<Vec<Place>>,
 }
 
 impl Layout {
-    /// Whether the grids follow each other without a word about where each begins and ends.
+    /// Whether the grids follow each other without offsets.
     pub fn is_stream(&self) -> bool {
         self.grids.is_none() && KNOWN.contains(&self.version)
     }
@@ -59,7 +59,7 @@ pub struct Place {
 pub enum Fault {
     /// The system cannot read.
     Io(std::io::Error),
-    /// Not a .vdb file; the text goes behind the file's name.
+    /// Not a .vdb file; the message follows the file's name.
     Content(String),
 }
 
@@ -76,7 +76,7 @@ fn damaged(what: impl std::fmt::Display) -> Fault {
 /// Reads the structure of a file.
 ///
 /// # Errors
-/// [`Fault::Content`] for a file that is empty, of another kind, shorter than it says, or that contradicts itself.
+/// [`Fault::Content`] for a file that is empty, of another kind, too short for its offsets, or that contradicts itself.
 pub fn read(source: impl Read + Seek) -> Result<Layout, Fault> {
     let mut walk = Walk::new(source)?;
     let start = walk.length.min(8) as usize;
@@ -92,7 +92,7 @@ pub fn read(source: impl Read + Seek) -> Result<Layout, Fault> {
     if !KNOWN.contains(&version) {
         return Ok(Layout { version, grids: None });
     }
-    // The library's version, of no meaning here.
+    // The library's version is not used.
     walk.skip(8, "header")?;
     let has_offsets = version < OFFSETS_FLAG || walk.array::<1>("header")? != [0];
     let identifier = if version < LONG_UUID { 16 } else { 36 };
@@ -178,7 +178,7 @@ impl<R: Read + Seek> Walk<R> {
         Ok(String::from_utf8_lossy(&text).into_owned())
     }
 
-    /// Passes over a list of metadata, which must end before a place.
+    /// Skips a list of metadata, which must end before a place.
     fn metadata(&mut self, before: u64, part: &str) -> Result<(), Fault> {
         let count = self.u32(part)?;
         for _ in 0..count {
@@ -233,7 +233,7 @@ mod tests {
     use super::*;
     use std::io::Cursor;
 
-    /// A file of one grid without a tree worth the name, as versions of the format write it.
+    /// A file of one grid without a tree, as versions of the format write it.
     fn file(version: u32, offsets: bool) -> Vec<u8> {
         let text = |bytes: &mut Vec<u8>, text: &str| {
             bytes.extend((text.len() as u32).to_le_bytes());

@@ -1,11 +1,11 @@
-//! Leaves lent out of a grid: the same memory, seen as Rust arrays.
+//! Leaves lent by a grid: the same memory, as Rust arrays.
 
 use std::marker::PhantomData;
 
 use super::bridge::ffi::LeafView;
-use crate::base::blocks::{Mask, Origin, VOXELS, Values};
+use crate::base::blocks::{Block, Mask, Origin, VOXELS, Values};
 
-/// A leaf to read, of floats where nothing else is said.
+/// A leaf to read, of floats by default.
 #[derive(Clone, Copy)]
 pub struct Leaf<'a, V = Values> {
     /// Least corner, in voxels.
@@ -22,7 +22,7 @@ pub type Vectors = [[f32; 3]; VOXELS];
 /// Values of a leaf, as a grid of their kind holds them.
 ///
 /// # Safety
-/// They must be floats without room between them, as many as a leaf of such a grid has.
+/// They must be floats without padding, as many as a leaf of such a grid has.
 pub unsafe trait LeafValues: Copy {}
 // SAFETY: a leaf of a grid of floats has 512 of them.
 unsafe impl LeafValues for Values {}
@@ -30,16 +30,23 @@ unsafe impl LeafValues for Values {}
 unsafe impl LeafValues for Vectors {}
 
 impl<'a, V: LeafValues> Leaf<'a, V> {
-    /// Its values as they lie in memory.
+    /// The bytes of its values.
     pub(super) fn value_bytes(&self) -> &'a [u8] {
         // SAFETY: every byte of a float can be read; the array stays borrowed.
         unsafe { std::slice::from_raw_parts(std::ptr::from_ref(self.values).cast(), size_of::<V>()) }
     }
 
-    /// Its mask as it lies in memory.
+    /// The bytes of its mask.
     pub(super) fn mask_bytes(&self) -> &'a [u8] {
-        // SAFETY: every byte of a whole number can be read; the array stays borrowed.
+        // SAFETY: every byte of an integer can be read; the array stays borrowed.
         unsafe { std::slice::from_raw_parts(self.mask.as_ptr().cast(), size_of::<Mask>()) }
+    }
+}
+
+impl Leaf<'_> {
+    /// A copy with its own memory.
+    pub fn to_block(&self) -> Block {
+        Block { origin: self.origin, values: Box::new(*self.values), mask: *self.mask }
     }
 }
 
@@ -53,7 +60,7 @@ pub struct LeafMut<'a> {
     pub mask: &'a mut Mask,
 }
 
-/// What a grid holds at a block position.
+/// The leaf or tile of a grid at a block position.
 #[derive(Clone, Copy)]
 pub enum Probe<'a, V = Values, T = f32> {
     /// A leaf.

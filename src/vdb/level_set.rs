@@ -42,10 +42,10 @@ pub fn from_mesh(ctx: &Context, mesh: &TriMesh, voxel: f64, half_width: f32) -> 
 }
 
 /// Level set of the union of spheres (m), `half_width` cells on each side; spheres smaller than a cell and a half
-/// are left out, as the grid cannot hold them.
+/// are omitted, as the grid cannot resolve them.
 ///
 /// # Errors
-/// Another number of radii than of positions, cancel, or what OpenVDB reports.
+/// Different numbers of radii and positions, cancel, or what OpenVDB reports.
 pub fn from_particles(
     ctx: &Context,
     positions: &[DVec3],
@@ -87,7 +87,7 @@ pub fn box_to_mesh(
     mesh_of(ctx, grid, iso, adaptivity, &ffi::Part { whole: false, origins: Vec::new(), low, high })
 }
 
-/// As [`to_mesh`], of the blocks at some origins: what it costs grows with their number, not with the grid.
+/// As [`to_mesh`], of the blocks at some origins: the cost grows with their number, not with the grid.
 ///
 /// # Errors
 /// As [`to_mesh`].
@@ -127,7 +127,7 @@ fn same_lattice(a: &FloatGrid, b: &FloatGrid) -> Result<()> {
             format!("the level sets have cells of {cell_a} m and of {cell_b} m: they must be the same");
         return Err(Error::argument(what));
     }
-    // A cell's corner and its neighbours along the axes tell everything of an affine map.
+    // A cell's corner and its neighbours along the axes determine an affine map.
     let places = [DVec3::zeros(), DVec3::x(), DVec3::y(), DVec3::z()];
     let apart = |place: DVec3| (a.index_to_world(place) - b.index_to_world(place)).amax();
     if places.into_iter().map(apart).fold(0.0, f64::max) > 1e-6 * cell_a {
@@ -197,8 +197,8 @@ pub fn intersection_copy(ctx: &Context, a: &FloatGrid, b: &FloatGrid) -> Result<
     csg_copy(ctx, a, b, Operation::Intersection)
 }
 
-/// Moves the surface outward by `metres` (inward when negative). Beyond the band the surface is walked there in steps;
-/// the first-order scheme loses about a tenth of the way at each, the other one hardly anything.
+/// Moves the surface outward by `metres` (inward when negative). Beyond the band the surface is moved in steps;
+/// the first-order scheme loses about a tenth of the distance at each, the other one hardly anything.
 ///
 /// # Errors
 /// The first-order scheme beyond the narrow band; cancel, or what OpenVDB reports.
@@ -260,7 +260,7 @@ fn smooth(
     ffi::smooth(grid.inner.pin_mut(), &call, kind, width as i32, times as i32, weno).map_err(fail)
 }
 
-/// Makes the values distances again, `times` passes.
+/// Renormalises the values to distances, in `times` passes.
 ///
 /// # Errors
 /// As [`offset`].
@@ -269,7 +269,7 @@ pub fn renormalise(ctx: &Context, grid: &mut FloatGrid, scheme: Scheme, times: u
     ffi::renormalise(grid.inner.pin_mut(), &call, scheme == Scheme::Weno5, times as i32).map_err(fail)
 }
 
-/// Advects the surface along its normals by the distance (m) that `speed` holds where it is: the
+/// Advects the surface along its normals by the distance (m) that `speed` has there: the
 /// thesis' noise step (section 3.2) with OpenVDB's default schemes; a baseline.
 ///
 /// # Errors

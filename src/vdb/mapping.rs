@@ -1,11 +1,11 @@
-//! A file seen as memory.
+//! A file mapped into memory.
 
 use std::fs::File;
 use std::ops::Deref;
 
 use rustix::mm::{MapFlags, ProtFlags, mmap, munmap};
 
-/// The bytes of a file that nobody changes any more.
+/// The bytes of a file that no longer changes.
 pub(super) struct Mapping {
     address: *mut std::ffi::c_void,
     length: usize,
@@ -15,14 +15,14 @@ impl Mapping {
     /// Maps a whole file.
     ///
     /// # Safety
-    /// Nobody may write to the file, or cut it, while the mapping lives.
+    /// The file must not be written or truncated while the mapping lives.
     ///
     /// # Errors
     /// What the operating system reports; an empty file.
     pub(super) unsafe fn new(file: &File) -> std::io::Result<Self> {
         let length = usize::try_from(file.metadata()?.len()).map_err(std::io::Error::other)?;
         let flags = MapFlags::PRIVATE | MapFlags::POPULATE;
-        // SAFETY: the system chooses a place that nobody uses.
+        // SAFETY: the system chooses an unused address.
         let address = unsafe { mmap(std::ptr::null_mut(), length, ProtFlags::READ, flags, file, 0) }?;
         Ok(Self { address, length })
     }

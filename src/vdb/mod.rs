@@ -1,8 +1,9 @@
 //! The only door to OpenVDB: grids of floats and of vectors, level-set tools and .vdb files.
 //!
-//! Grids own their trees alone; leaves are lent without copying. Index space is world-fixed: voxel
-//! (i, j, k) has its centre at (i, j, k) x voxel size, unless a file brings another transform.
+//! Each grid owns its tree; leaves are lent without copying. Index space is world-fixed: voxel
+//! (i, j, k) has its centre at (i, j, k) x voxel size, unless a file has another transform.
 
+#[expect(dead_code, reason = "`cast_rays` and `Hit` are still declared in cpp/bridge.h")]
 mod bridge;
 mod child;
 mod decode;
@@ -14,7 +15,6 @@ mod leaf;
 pub mod level_set;
 mod mapping;
 mod parcel;
-pub mod ray;
 mod refusal;
 mod vectors;
 
@@ -26,23 +26,23 @@ use crate::context::{Context, Running};
 use crate::error::Error;
 
 fn fail(error: cxx::Exception) -> Error {
-    refusal::told(error.what())
+    refusal::error_of(error.what())
 }
 
-/// Threads and cancel flag for a call into C++, which is part of the second answer and must not outlive it.
+/// Threads and cancel flag for a call into C++; the second value must outlive the call.
 fn call(ctx: &Context) -> (bridge::ffi::Call, Running) {
     let running = ctx.begin();
     let cancel = running.latch().as_ptr() as usize;
     (bridge::ffi::Call { threads: ctx.pool().threads() as i32, cancel }, running)
 }
 
-/// Ends the worker threads that OpenVDB's tools have started in this process; they start again when they are needed.
-/// Threads that somebody else in the process uses are left alone. No tool may be at work meanwhile.
+/// Ends the worker threads that OpenVDB's tools have started in this process; they start again when needed.
+/// Threads that other users of TBB in the process hold are kept. No tool may run meanwhile.
 pub fn end_workers() {
     bridge::ffi::end_workers();
 }
 
-/// A call on the caller's thread that nobody can cancel.
+/// A call on the caller's thread that cannot be cancelled.
 fn alone() -> bridge::ffi::Call {
     bridge::ffi::Call { threads: 1, cancel: 0 }
 }

@@ -1,8 +1,8 @@
-//! What one process hands to another: what a file says of its grids, or grids, their leaves as plain blocks.
+//! Data passed from one process to another: descriptions of a file's grids, or grids, with their leaves as plain blocks.
 //!
 //! A parcel is `MAGIC`, the length of its head, the head, and for each grid three arrays: origins, masks, values of its
-//! leaves. The magic number is written last: without it a parcel is not whole. Whoever opens one checks every length,
-//! as the process that packed it may have been led astray by a damaged file.
+//! leaves. The magic number is written last: without it a parcel is incomplete. The reader checks every length,
+//! as a damaged file may have misled the process that wrote it.
 
 use std::fs::File;
 use std::io::{IoSlice, Write};
@@ -16,7 +16,7 @@ use super::mapping::Mapping;
 use super::vectors::{AnyGrid, VectorGrid};
 use crate::base::blocks::{Mask, Values};
 
-/// The first bytes of a parcel; they change with its form.
+/// The first bytes of a parcel; they change with its format.
 const MAGIC: [u8; 8] = *b"frzpack2";
 /// Arrays begin at multiples of this.
 const ALIGN: usize = 64;
@@ -27,13 +27,13 @@ const fn sizes<V>() -> [usize; 3] {
 /// Leaves that one write takes.
 const BATCH: usize = 512;
 
-/// What is handed over.
+/// The contents of a parcel.
 pub(super) enum Contents {
-    /// What a file says of its grids.
+    /// Descriptions of a file's grids.
     Infos(Vec<GridInfo>),
     /// Grids.
     Grids(Vec<AnyGrid>),
-    /// Why there is neither; the text goes behind the file's name.
+    /// Why there is neither; the message follows the file's name.
     Refusal(String),
 }
 
@@ -126,7 +126,7 @@ fn write_leaves<V: LeafValues>(
     Ok(())
 }
 
-/// Opens a parcel; none when it is not whole or contradicts itself.
+/// Opens a parcel; none when it is incomplete or contradicts itself.
 pub(super) fn unpack(parcel: &Mapping, threads: usize) -> Option<Contents> {
     let mut start = Cursor(parcel);
     (start.take(8)? == MAGIC).then_some(())?;
@@ -180,7 +180,7 @@ struct Arrays {
     masks: Vec<usize>,
 }
 
-/// The arrays of so many leaves, from a place in the parcel on; the place goes behind them.
+/// The arrays of so many leaves, from an offset in the parcel; the offset moves past them.
 fn arrays<V>(parcel: &[u8], at: &mut usize, count: usize) -> Option<Arrays> {
     let sizes = sizes::<V>();
     let mut arrays = [&parcel[..0]; 3];
@@ -199,7 +199,7 @@ fn arrays<V>(parcel: &[u8], at: &mut usize, count: usize) -> Option<Arrays> {
     Some(Arrays { origins, values: addresses(values, sizes[2]), masks: addresses(masks, sizes[1]) })
 }
 
-/// A head in the making.
+/// Builds a head.
 #[derive(Default)]
 struct Head(Vec<u8>);
 

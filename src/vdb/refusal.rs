@@ -1,31 +1,31 @@
-//! What OpenVDB's tools refuse, in our own words. Theirs go to the log.
+//! Errors for what OpenVDB's tools refuse, in our own words. Theirs go to the log.
 
 use crate::error::{Error, one_line};
 
 /// Exception text of the C++ side's `Cancelled`.
 const CANCELLED: &str = "frazil: cancelled";
 
-/// What the C++ library and OpenVDB say when memory has run out.
+/// Words in exceptions of the C++ library and OpenVDB when memory has run out.
 const MEMORY: [&str; 5] = ["bad_alloc", "length_error", "vector::", "basic_string::", "array new length"];
 
-/// Whether an exception's text says that memory has run out.
+/// Whether an exception is about memory.
 pub(super) fn is_of_memory(what: &str) -> bool {
     MEMORY.iter().any(|word| what.contains(word))
 }
 
-/// What a user is told of an exception.
-pub(super) fn told(what: &str) -> Error {
+/// The error for an exception.
+pub(super) fn error_of(what: &str) -> Error {
     const KNOWN: [(&[&str], &str); 5] = [
         (
             &["uniform scale", "uniform voxels"],
-            "the grid's voxels are no cubes: this needs the same length on each axis",
+            "the grid's voxels are not cubes: this needs the same length on each axis",
         ),
         (&["empty grid"], "the grid has no active voxels"),
         (&["iso-value"], "the value at the surface is not within the grid's band of distances"),
         (&["NaNs or infs"], "the grid has values that are not finite"),
         (
             &["level set", "background value", "outside value", "inside value"],
-            "the grid is no level set with a band of distances on both sides of its surface",
+            "the grid is not a level set with a band of distances on both sides of its surface",
         ),
     ];
     if what == CANCELLED {
@@ -47,16 +47,16 @@ mod tests {
 
     #[test]
     fn words_of_the_tools_become_sentences() {
-        let said = |what: &str| told(what).to_string();
+        let said = |what: &str| error_of(what).to_string();
         let cubes =
             said("RuntimeError: The transform must have uniform scale for the LevelSetTracker to function");
-        assert!(cubes.contains("no cubes"), "{cubes}");
+        assert!(cubes.contains("not cubes"), "{cubes}");
         assert_eq!(said("RuntimeError: LevelSetRayIntersector only supports uniform voxels!"), cubes);
         let class =
             said("RuntimeError: LevelSetTracker expected a level set, got a grid of class \"unknown\"");
-        assert!(class.contains("no level set"), "{class}");
-        assert!(matches!(told("std::bad_alloc"), Error::OutOfMemory));
-        assert!(matches!(told(CANCELLED), Error::Cancelled));
+        assert!(class.contains("not a level set"), "{class}");
+        assert!(matches!(error_of("std::bad_alloc"), Error::OutOfMemory));
+        assert!(matches!(error_of(CANCELLED), Error::Cancelled));
         let other = said("ValueError: task is undefined - don't call this method directly\n\x1b[31m");
         assert_eq!(other, "OpenVDB cannot do this with the grid");
     }

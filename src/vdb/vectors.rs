@@ -1,5 +1,5 @@
-//! Sparse grids of vectors of three 32-bit floats: velocities, winds, colours. They come from files and hosts and go
-//! there; the tools of level sets take floats only.
+//! Sparse grids of vectors of three 32-bit floats: velocities, winds, colours. They come from files and hosts, and
+//! are written to them; the level-set tools take floats only.
 
 use std::marker::PhantomData;
 
@@ -16,15 +16,15 @@ use crate::error::Result;
 
 /// A leaf of vectors to read.
 pub type VectorLeaf<'a> = Leaf<'a, Vectors>;
-/// What a grid of vectors holds at a block position.
+/// The leaf or tile of a grid of vectors at a block position.
 pub type VectorProbe<'a> = Probe<'a, Vectors, [f32; 3]>;
 
-/// A sparse grid of vectors with a uniform transform; its memory is its own.
+/// A sparse grid of vectors with a uniform transform; it shares no memory.
 pub struct VectorGrid {
     pub(super) inner: UniquePtr<ffi::VectorGrid>,
 }
 
-/// What a block position of a grid of vectors is to become.
+/// The new contents of a block position of a grid of vectors.
 pub enum VectorEdit {
     /// Dense values.
     Dense {
@@ -76,12 +76,12 @@ impl VectorGrid {
         ffi::vector_background(&self.inner)
     }
 
-    /// What the values mean.
+    /// The meaning of the values.
     pub fn class(&self) -> GridClass {
         GridClass::of(ffi::vector_class(&self.inner))
     }
 
-    /// Says what the values mean.
+    /// Sets the meaning of the values.
     ///
     /// # Errors
     /// When memory runs out.
@@ -94,7 +94,7 @@ impl VectorGrid {
         ffi::vector_name(&self.inner)
     }
 
-    /// Names the grid.
+    /// Sets the grid's name.
     ///
     /// # Errors
     /// When memory runs out.
@@ -117,7 +117,7 @@ impl VectorGrid {
         ffi::vector_memory_bytes(&self.inner)
     }
 
-    /// Bytes that a .vdb file of this grid takes at most.
+    /// Upper bound on the bytes of a .vdb file of this grid.
     pub fn file_bound(&self) -> u64 {
         ffi::vector_file_bound(&self.inner)
     }
@@ -138,7 +138,7 @@ impl VectorGrid {
         Ok(views.iter().map(|view| unsafe { lend(view, PhantomData) }).collect())
     }
 
-    /// What lies at the given block origins (multiples of 8); nothing is copied.
+    /// The leaf or tile at each of the given block origins (multiples of 8); nothing is copied.
     ///
     /// # Errors
     /// When memory runs out.
@@ -152,7 +152,7 @@ impl VectorGrid {
         Ok(lent.collect())
     }
 
-    /// Puts blocks in the place of leaves or tiles. All memory for leaves is had before the first is put in.
+    /// Replaces leaves or tiles by blocks. All memory for leaves is allocated before the first is replaced.
     ///
     /// # Errors
     /// When memory runs out, or cancel; the grid is then as it was.
@@ -177,7 +177,7 @@ impl VectorGrid {
     }
 
     /// Values at world positions (m): trilinear between voxel centres, or of the voxels that hold them. Components of a
-    /// staggered grid are found where they lie, on the faces of voxels.
+    /// staggered grid are sampled on the faces of voxels, where they lie.
     ///
     /// # Errors
     /// Cancel.
@@ -190,7 +190,7 @@ impl VectorGrid {
     }
 }
 
-/// A grid of one of the kinds that files are read for.
+/// A grid of a kind that can be read from files.
 pub enum AnyGrid {
     /// Of floats.
     Floats(FloatGrid),
@@ -250,7 +250,7 @@ impl AnyGrid {
     }
 }
 
-/// One function of both kinds of grid.
+/// Functions of both kinds of grid.
 macro_rules! of_both {
     ($($(#[$text:meta])* $name:ident -> $type:ty;)*) => {
         $($(#[$text])* pub fn $name(&self) -> $type {
@@ -268,7 +268,7 @@ impl GridRef<'_> {
         voxel_size -> f64;
         /// Whether voxel (0, 0, 0) lies at the origin and the axes are the world's.
         is_world_fixed -> bool;
-        /// What the values mean.
+        /// The meaning of the values.
         class -> GridClass;
         /// The grid's name in a file.
         name -> String;
@@ -278,7 +278,7 @@ impl GridRef<'_> {
         leaf_count -> usize;
         /// Memory of the tree (bytes).
         memory_bytes -> u64;
-        /// Bytes that a .vdb file of this grid takes at most.
+        /// Upper bound on the bytes of a .vdb file of this grid.
         file_bound -> u64;
         /// Least and greatest active voxel, both included; none when there is none.
         active_bbox -> Option<([i32; 3], [i32; 3])>;
@@ -295,7 +295,7 @@ impl GridRef<'_> {
         })
     }
 
-    /// Where the C++ side has it, and whether it is one of vectors.
+    /// Its address on the C++ side, and whether it is one of vectors.
     pub(super) fn address(&self) -> (usize, bool) {
         match self {
             Self::Floats(grid) => (std::ptr::from_ref::<ffi::Grid>(&grid.inner) as usize, false),

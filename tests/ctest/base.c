@@ -94,7 +94,7 @@ static void states(frz_context *ctx, const ball *rest, const frz_grid *snow) {
     FAILS(frz_base_create(ctx, NULL, snow, again.data, again.size, &back), FRZ_ERROR_FILE, "damaged");
     CHECK(back == NULL);
     FAILS(frz_base_create(ctx, NULL, snow, state.data, state.size - 1, &back), FRZ_ERROR_FILE, "cut short");
-    FAILS(frz_base_create(ctx, NULL, snow, "no", 2, &back), FRZ_ERROR_FILE, "none of a base layer");
+    FAILS(frz_base_create(ctx, NULL, snow, "no", 2, &back), FRZ_ERROR_FILE, "not of a base layer");
     WORKS(frz_snow_desc_init(&desc, sizeof desc));
     desc.voxel_size = 0.02;
     WORKS(frz_snow_layer(ctx, &desc, &deeper));

@@ -120,9 +120,9 @@ static void null_everywhere(frz_context *ctx) {
     frz_grid_destroy(NULL);
     frz_base_destroy(NULL);
     /* The wrong kind of handle is told as such. */
-    FAILS(frz_grid_set_name((frz_grid *)ctx, "a"), FRZ_ERROR_HANDLE, "the pointer is no grid");
-    FAILS(frz_mesh_read((const frz_mesh *)snow, 0, NO_SPAN), FRZ_ERROR_HANDLE, "the pointer is no mesh");
-    FAILS(frz_base_step(ctx, (frz_base *)snow, NULL, 0, 1, 1, NULL), FRZ_ERROR_HANDLE, "the pointer is no base layer");
+    FAILS(frz_grid_set_name((frz_grid *)ctx, "a"), FRZ_ERROR_HANDLE, "the pointer is not a grid");
+    FAILS(frz_mesh_read((const frz_mesh *)snow, 0, NO_SPAN), FRZ_ERROR_HANDLE, "the pointer is not a mesh");
+    FAILS(frz_base_step(ctx, (frz_base *)snow, NULL, 0, 1, 1, NULL), FRZ_ERROR_HANDLE, "the pointer is not a base layer");
     frz_mesh_destroy((frz_mesh *)snow);
     FAILS(frz_grid_get_info((const frz_grid *)((const char *)snow + 1), NULL), FRZ_ERROR_HANDLE, "no grid");
     frz_grid_destroy(snow);

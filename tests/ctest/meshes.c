@@ -98,7 +98,7 @@ static void wrong_ones_are_refused(frz_context *ctx) {
     CHECK(mesh == NULL);
     desc.face_counts = NO_VIEW;
     desc.indices.count = 11;
-    FAILS(frz_mesh_create(ctx, &desc, &mesh), FRZ_ERROR_ARGUMENT, "no whole number of triangles");
+    FAILS(frz_mesh_create(ctx, &desc, &mesh), FRZ_ERROR_ARGUMENT, "not a multiple of 3");
     desc.indices.count = 0;
     FAILS(frz_mesh_create(ctx, &desc, &mesh), FRZ_ERROR_ARGUMENT, "has no faces");
     desc.indices.count = 12;

@@ -115,7 +115,7 @@ int main(void) {
     frz_mesh_destroy(made);
     FAILS(frz_grid_to_mesh_box(ctx, grid, 0, 0, greatest, least, &made), FRZ_ERROR_ARGUMENT, "is less than voxel_min");
     FAILS(frz_grid_to_mesh_box(ctx, grid, 0, 0, NULL, least, &made), FRZ_ERROR_ARGUMENT, "voxel_min is NULL");
-    FAILS(frz_grid_to_mesh_blocks(ctx, grid, 0, 0, VIEW(next, 1), &made), FRZ_ERROR_ARGUMENT, "is no block's");
+    FAILS(frz_grid_to_mesh_blocks(ctx, grid, 0, 0, VIEW(next, 1), &made), FRZ_ERROR_ARGUMENT, "is not a block's");
     /* The box of the snow: that of its active voxels, and no step makes it larger. */
     WORKS(frz_base_create(ctx, NULL, snow, NULL, 0, &base));
     info.struct_size = sizeof info;

@@ -1,4 +1,4 @@
-/* The fraction of a stage: never backwards, never beyond 1, and known where the work is cut into pieces. */
+/* The fraction of a phase (stage, in the interface): never backwards, never beyond 1, and known where the work is cut into pieces. */
 #include "check.h"
 
 enum { STAGES = 32 };

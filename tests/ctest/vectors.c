@@ -231,13 +231,13 @@ static void refused(frz_context *ctx, frz_grid *grid) {
 
     snow = NULL;
     desc = described(leaves), desc.value_type = 2;
-    FAILS(frz_grid_create(ctx, &desc, &snow), wrong, "value_type = 2 is no frz_value_type");
+    FAILS(frz_grid_create(ctx, &desc, &snow), wrong, "value_type = 2 is not a value of frz_value_type");
     desc.value_type = FRZ_VALUE_FLOAT;
     FAILS(frz_grid_create(ctx, &desc, &snow), wrong, "value_type says floats");
     desc = described(leaves), desc.background = 1;
     FAILS(frz_grid_create(ctx, &desc, &snow), wrong, "value_type says vectors");
     desc = described(leaves), desc.grid_class = FRZ_GRID_LEVEL_SET;
-    FAILS(frz_grid_create(ctx, &desc, &snow), wrong, "vectors are no level set");
+    FAILS(frz_grid_create(ctx, &desc, &snow), wrong, "vectors are neither a level set");
     desc = described(leaves), desc.background_vector[2] = (float)NAN;
     FAILS(frz_grid_create(ctx, &desc, &snow), wrong, "background_vector is not finite");
     desc = described(leaves), leaves[2].tile[1] = (float)INFINITY;

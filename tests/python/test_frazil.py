@@ -278,7 +278,7 @@ class Words(unittest.TestCase):
             with self.assertRaises(frazil.Error) as caught:
                 call()
             self.assertEqual(str(caught.exception),
-                             "the grid's voxels are no cubes: this needs the same length on each axis")
+                             "the grid's voxels are not cubes: this needs the same length on each axis")
 
 
 class Manners(unittest.TestCase):

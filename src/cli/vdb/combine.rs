@@ -65,12 +65,12 @@ pub fn intersection(args: &IntersectionArgs, session: &Session) -> std::result::
 fn combine(
     operands: &Operands,
     session: &Session,
-    stage: &'static str,
+    phase: &'static str,
     operation: impl FnOnce(&Context, &mut FloatGrid, FloatGrid) -> Result<()> + Send,
 ) -> std::result::Result<(), Failure> {
     operands.output.check(&[&operands.a, &operands.b])?;
     let mut a = read_level_set(&operands.a, operands.grid_a.as_deref()).before()?;
     let b = read_level_set(&operands.b, operands.grid_b.as_deref()).before()?;
-    session.ctx.stage(stage, || operation(&session.ctx, &mut a, b)).during()?;
+    session.ctx.phase(phase, || operation(&session.ctx, &mut a, b)).during()?;
     operands.output.write(session, a).during()
 }

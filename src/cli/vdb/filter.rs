@@ -98,7 +98,7 @@ pub fn offset(args: &OffsetArgs, session: &Session) -> Result<(), Failure> {
         )));
     }
     let work = || level_set::offset(&session.ctx, &mut grid, args.by as f32, scheme.into());
-    session.ctx.stage("offset", work).during()?;
+    session.ctx.phase("offset", work).during()?;
     if grid.active_voxels() == 0 {
         log::warn!("{}: nothing is left at --by {}", source.input.display(), args.by);
     }
@@ -116,6 +116,6 @@ pub fn smooth(args: &SmoothArgs, session: &Session) -> Result<(), Failure> {
         Filter::Mean => level_set::mean_filter(&session.ctx, &mut grid, width, times, scheme),
         Filter::Gaussian => level_set::gaussian_filter(&session.ctx, &mut grid, width, times, scheme),
     };
-    session.ctx.stage("smooth", work).during()?;
+    session.ctx.phase("smooth", work).during()?;
     source.output.write(session, grid).during()
 }

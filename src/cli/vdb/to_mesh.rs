@@ -44,7 +44,7 @@ pub fn run(args: &Args, session: &Session) -> Result<(), Failure> {
     }
     let (iso, adaptivity) = (args.iso as f32, args.adaptivity as f32);
     let work = || level_set::to_mesh(&session.ctx, &grid, iso, adaptivity);
-    let mesh = session.ctx.stage("mesh", work).during()?;
+    let mesh = session.ctx.phase("mesh", work).during()?;
     frazil::io::mesh::write(&args.output, &mesh).during()?;
     session.record("vertices", json!(mesh.positions.len()));
     session.record("triangles", json!(mesh.triangles.len()));

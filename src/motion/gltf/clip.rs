@@ -1,4 +1,4 @@
-//! A clip: what changes the nodes' places over time.
+//! A clip: the animation of the nodes' transforms.
 
 use gltf::animation::{Interpolation, Property};
 
@@ -80,7 +80,7 @@ impl Clip {
         }
     }
 
-    /// Sets the places that the clip animates to those at a time of its own (s).
+    /// Sets the transforms that the clip animates to those at a time of the clip (s).
     pub fn apply(&self, time: f64, locals: &mut [Local]) {
         let mut row = Vec::new();
         for channel in &self.channels {

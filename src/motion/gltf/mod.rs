@@ -281,7 +281,7 @@ impl Motion for Character {
     }
 }
 
-/// Whether each node is part of the scene and of what was asked for.
+/// Whether each node is part of the scene and of the selection.
 fn chosen(file: &File, nodes: &[Node], pattern: Option<&str>) -> std::result::Result<Vec<bool>, String> {
     let mut shown = vec![false; nodes.len()];
     let scene = file.document.default_scene().or_else(|| file.document.scenes().next());

@@ -19,7 +19,7 @@ pub(super) struct Node {
     pub name: String,
     pub parent: Option<usize>,
     pub rest: Local,
-    /// Its place when the file gives it as a matrix: such a node cannot be animated.
+    /// Its transform when the file has it as a matrix: such a node cannot be animated.
     pub matrix: Option<Matrix4<f64>>,
 }
 
@@ -98,7 +98,7 @@ pub(super) fn parents_first(nodes: &[Node]) -> Option<Vec<usize>> {
     Some(order)
 }
 
-/// World transforms of all nodes from their places; `order` has parents first.
+/// World transforms of all nodes from their own; `order` has parents first.
 pub(super) fn globals(nodes: &[Node], order: &[usize], locals: &[Local]) -> Vec<Matrix4<f64>> {
     let mut out = vec![Matrix4::identity(); nodes.len()];
     for &index in order {

@@ -57,7 +57,7 @@ pub(super) struct Sheet {
     pub triangles: Vec<[u32; 3]>,
     /// One pair for each vertex, once a primitive has any.
     pub uvs: Option<Uvs>,
-    /// Vertices of the node at hand that primitives share: their accessors, and where they begin.
+    /// Vertices of the current node that primitives share: their accessors, and where they begin.
     shared: Vec<(Vec<usize>, usize)>,
 }
 
@@ -172,7 +172,7 @@ impl Vertices {
         self.drawn.add(file, primitive, &numbers, &own)
     }
 
-    /// Turns round the triangles of parts whose node mirrors them, as glTF asks.
+    /// Flips the triangles of parts whose node mirrors them, as glTF requires.
     pub fn face_outward(&mut self, globals: &[Matrix4<f64>]) {
         for part in self.parts.iter().filter(|part| part.skin.is_none()) {
             if globals[part.node].fixed_view::<3, 3>(0, 0).determinant() < 0.0 {

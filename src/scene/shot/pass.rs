@@ -10,7 +10,7 @@ use super::cache::Cache;
 use super::chain::Made;
 use super::stage::{FrameFiles, Report, Stage, Stepped, Stepping, To};
 use super::stored::Stored;
-use crate::context::{Context, StageTime};
+use crate::context::{Context, PhaseTime};
 use crate::error::{Error, Result};
 use crate::io::manifest::{Keeps, Manifest};
 use crate::io::{atomic, sealed};
@@ -263,11 +263,11 @@ impl<S: Stepping> Files<'_, S> {
     }
 
     fn write_report(&self, frame: i32, report: &Report) -> Result<()> {
-        let time = |time: &StageTime| json!({ "name": time.name, "seconds": time.time.as_secs_f64() });
+        let time = |time: &PhaseTime| json!({ "name": time.name, "seconds": time.time.as_secs_f64() });
         let mut text = report.results.clone();
         text.insert("check".into(), sealed::UNSTAMPED.into());
         text.insert("frame".into(), frame.into());
-        text.insert("stages".into(), report.times.iter().map(time).collect());
+        text.insert("phases".into(), report.phases.iter().map(time).collect());
         let text = serde_json::Value::Object(text);
         let path = self.folder.join("report").join(format!("{}.{frame:04}.json", self.stage.name()));
         atomic::write_bytes(&path, sealed::stamp(&format!("{text:#}\n")).as_bytes())

@@ -7,7 +7,7 @@ use serde_json::{Map, Value};
 use super::settings::Settings;
 use super::stored::Stored;
 use super::usd::{Clip, Volume};
-use crate::context::{Context, StageTime};
+use crate::context::{Context, PhaseTime};
 use crate::error::Result;
 use crate::io::atomic;
 use crate::io::manifest::{Keeps, Written};
@@ -162,8 +162,8 @@ pub struct Stepped<T> {
 pub struct Report {
     /// Results by name; units stand in the names.
     pub results: Map<String, Value>,
-    /// How long its parts took.
-    pub times: Vec<StageTime>,
+    /// How long its phases took.
+    pub phases: Vec<PhaseTime>,
 }
 
 /// The files of a frame while they are written.

@@ -77,7 +77,7 @@ pub fn verify(ctx: &Context, folder: &Path) -> Result<Verified> {
         .iter()
         .flat_map(|(_, manifest)| manifest.files.iter().chain(state_of(folder, manifest)))
         .collect();
-    let faults = ctx.stage("verify", || {
+    let faults = ctx.phase("verify", || {
         let fault = |file: &&Written| -> Result<Option<Damage>> {
             ctx.check()?;
             Ok(file.fault(folder).map(|what| Damage { file: file.path.clone(), what }))

@@ -4,7 +4,7 @@ use serde_json::json;
 
 use super::inputs::{self, Inputs};
 use super::settings;
-use crate::context::{Context, StageTime};
+use crate::context::{Context, PhaseTime};
 use crate::error::{Error, Result};
 use crate::io::manifest::Keeps;
 use crate::scene::shot::{
@@ -257,12 +257,12 @@ fn told(report: StepReport) -> Report {
     }) else {
         unreachable!("it is written as an object")
     };
-    Report { results, times: report.stages }
+    Report { results, phases: report.phases }
 }
 
 fn log_step(frame: i32, report: &StepReport) {
-    let time = |time: &StageTime| format!("{} {:.1} ms", time.name, time.time.as_secs_f64() * 1e3);
-    let times: Vec<String> = report.stages.iter().map(time).collect();
+    let time = |time: &PhaseTime| format!("{} {:.1} ms", time.name, time.time.as_secs_f64() * 1e3);
+    let times: Vec<String> = report.phases.iter().map(time).collect();
     log::info!(
         "frame {frame}: {:.6} m3 removed, {} faces, {} blocks; {}",
         report.removed_volume,

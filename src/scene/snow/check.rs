@@ -128,7 +128,7 @@ pub fn check(ctx: &Context, scene: &Scene, inputs: &Inputs) -> Result<Report> {
     let relief = Relief::new(inputs);
     let mut objects = Vec::new();
     for ((index, object), body) in colliders.zip(&inputs.bodies) {
-        let extents = ctx.stage("inputs", || extents(ctx, scene, body))?;
+        let extents = ctx.phase("inputs", || extents(ctx, scene, body))?;
         warnings.extend(out_of_reach(ctx, scene, inputs, body, &extents)?);
         warnings.extend(too_fast(scene, body));
         let mut told = report(scene, index, object, body, &extents, area.zip(top), &mut warnings);

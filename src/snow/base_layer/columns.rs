@@ -1,8 +1,8 @@
 //! Heights of the snow's columns: what compression is measured against.
 //!
 //! A column of cells (8 x 8 of them make a column block) remembers how much snow stood in it before
-//! anything touched it: nothing is stored for untouched snow. What stands in it now is read off the snow itself,
-//! so that a layer that goes on from its grids has the same numbers as one that never stopped.
+//! anything touched it: nothing is stored for untouched snow. The current height is computed from the snow itself,
+//! so that a layer resumed from its grids has the same numbers as one that never stopped.
 
 use std::collections::{BTreeSet, HashMap, HashSet};
 
@@ -55,7 +55,7 @@ impl Heights {
 }
 
 impl Column {
-    /// Part of the original height that is gone, 0..=1, of each cell, when `now` is left.
+    /// Fraction of the original height that is gone, 0..=1, in each cell, when `now` is left.
     pub fn compression(&self, now: &Heights) -> [f32; CELLS] {
         std::array::from_fn(|cell| {
             let (original, now) = (self.original.0[cell], now.0[cell]);
@@ -67,14 +67,14 @@ impl Column {
 /// Column blocks that were touched, by x and z of their origin.
 pub type Columns = HashMap<[i32; 2], Column>;
 
-/// Part of a cell that a level set's solid fills, from the distance at its centre (both in metres).
+/// Fraction of a cell that a level set's solid fills, from the distance at its centre (both in metres).
 pub fn filled(distance: f32, cell: f32) -> f32 {
     (0.5 - distance / cell).clamp(0.0, 1.0)
 }
 
-/// Adds a number of each voxel of a block to its column's sum, upwards.
+/// Adds a value of each voxel of a block to its column's sum, upwards.
 pub fn add_by_cell(sums: &mut [f32; CELLS], number: impl Fn(usize) -> f32) {
-    // Eight columns side by side, as the values lie in memory.
+    // Eight columns at a time, in the order of memory.
     for (x, sums) in sums.chunks_exact_mut(8).enumerate() {
         for y in 0..8 {
             sums.iter_mut().enumerate().for_each(|(z, sum)| *sum += number(x << 6 | y << 3 | z));
@@ -101,7 +101,7 @@ pub fn heights(surface: &FloatGrid, [x, z]: [i32; 2], low: i32, high: i32) -> Re
     Ok(heights)
 }
 
-/// The blocks in which the snow is not what it was before the first step.
+/// The blocks in which the snow differs from that before the first step.
 pub fn changed(initial: &FloatGrid, now: &FloatGrid) -> Result<HashSet<Origin>> {
     let mut places = HashSet::new();
     for [one, other] in [[initial, now], [now, initial]] {
@@ -137,7 +137,7 @@ pub fn volume(surface: &FloatGrid, low: [i32; 3], high: [i32; 3]) -> Result<f64>
         .map(|leaf| leaf.values.iter().map(|&value| f64::from(filled(value, cell))).sum())
         .collect();
     let mut cells: f64 = parts.iter().sum();
-    // The blocks of a box around a stray leaf can be too many to look at one by one: the tree's own tiles are few.
+    // The bounding box of a stray leaf can contain too many blocks to visit one by one; the tree's tiles are few.
     for tile in surface.tiles()?.iter().filter(|tile| tile.value < 0.0) {
         let along = |axis: usize| {
             let (begin, end) = (i64::from(low[axis]) & !7, (i64::from(high[axis]) & !7) + 8);

@@ -1,7 +1,7 @@
-//! Crumbs: islands of few voxels, which ragged edges and thin walls leave, taken away with the step that made them.
+//! Crumbs: islands of few voxels, left by ragged edges and thin walls, and removed in the step that made them.
 //!
-//! Only what hangs together with a block that the step changed can have become an island. An island is removed as if it
-//! were pressed out: what it held goes into `removed` and its columns.
+//! Only snow that is connected to a block that the step changed can have become an island. An island is removed as if it
+//! were pressed out: its snow goes into `removed` and its columns.
 
 use std::collections::{BTreeMap, HashMap, HashSet};
 
@@ -69,7 +69,7 @@ fn neighbours(voxel: Voxel) -> impl Iterator<Item = Voxel> {
     })
 }
 
-/// Takes the islands of fewer than `least` voxels out of what the edits leave; gives their number.
+/// Removes the islands of fewer than `least` voxels from the result of the edits; returns their number.
 ///
 /// # Errors
 /// Cancel; when memory runs out.
@@ -115,7 +115,7 @@ pub fn remove(
     Ok(islands.len())
 }
 
-/// A voxel of each part of a block's snow that hangs together inside the block and has fewer than `least` voxels.
+/// A voxel of each connected part of the snow within a block that has fewer than `least` voxels.
 fn small_parts(block: &BlockEdit, least: usize) -> Vec<Voxel> {
     let BlockEdit::Dense(block) = block else {
         // All snow: 512 voxels at least, or none.
@@ -163,7 +163,7 @@ fn grown(part: &Mask, within: &Mask) -> Mask {
     })
 }
 
-/// Values (m) of the voxels that are an island's, or whose nearest surface it is, when it and all others are gone.
+/// Values (m), once all islands are gone, of the voxels of an island and those whose nearest surface it is.
 fn without(after: &After<'_>, island: &[Voxel], gone: &HashSet<Voxel>, scale: Scale) -> Vec<(Voxel, f32)> {
     let low = island.iter().fold(island[0], |low, v| [0, 1, 2].map(|axis| low[axis].min(v[axis])));
     let high = island.iter().fold(island[0], |high, v| [0, 1, 2].map(|axis| high[axis].max(v[axis])));
@@ -216,8 +216,8 @@ impl Near {
         self.values[self.place(voxel)]
     }
 
-    /// The least that a voxel's distance (m) to islands and to the rest can be told to be at most, from the snow in
-    /// reach: distances never change faster than places.
+    /// Upper bounds on a voxel's distances (m) to islands and to the rest, from the snow in reach: a distance field
+    /// changes no faster than the position.
     fn bounds(&self, voxel: Voxel, scale: Scale) -> [f32; 2] {
         let mut bounds = [f32::INFINITY; 2];
         for other in cube(voxel) {
@@ -237,17 +237,13 @@ impl Near {
 /// An edit that changes nothing yet.
 fn untouched(origin: Origin, surface: &FloatGrid) -> Result<Edit> {
     let surface = match &surface.probe(&[origin])?[0] {
-        Probe::Leaf(leaf) => BlockEdit::Dense(crate::base::blocks::Block {
-            origin,
-            values: Box::new(*leaf.values),
-            mask: *leaf.mask,
-        }),
+        Probe::Leaf(leaf) => BlockEdit::Dense(leaf.to_block()),
         Probe::Tile { value, .. } => BlockEdit::Constant(origin, *value),
     };
     Ok(Edit { surface, removed: None, changed: [0; 8], heights: [0.0; CELLS] })
 }
 
-/// Puts values (m) of cleared voxels into an edit; what they were is removed.
+/// Puts values (m) of cleared voxels into an edit; the previous values go into `removed`.
 fn clear(edit: &mut Edit, cleared: &BTreeMap<usize, f32>, scale: Scale) {
     let origin = edit.surface.origin();
     let mut after = values_of(Some(&edit.surface), scale);

@@ -8,9 +8,9 @@ use crate::base::blocks::{Block, BlockEdit, Mask, Origin, VOXELS, Values};
 use crate::sweep::Piece;
 use crate::vdb::Probe;
 
-/// What one block of the snow becomes.
+/// The change of one block of the snow.
 pub struct Edit {
-    /// The snow.
+    /// The snow afterwards.
     pub surface: BlockEdit,
     /// What was removed from it.
     pub removed: Option<BlockEdit>,
@@ -27,7 +27,7 @@ impl Edit {
     }
 }
 
-/// Lattice of the snow.
+/// Cell and band of the snow.
 #[derive(Debug, Clone, Copy)]
 pub struct Scale {
     /// Cell (m).
@@ -44,7 +44,7 @@ pub fn has_snow(probe: &Probe<'_>) -> bool {
     }
 }
 
-/// Subtracts a piece of the sweep from what the snow holds there; none when nothing changes.
+/// Subtracts a piece of the sweep from the snow there; none when nothing changes.
 pub fn subtract(piece: &Piece, snow: &Probe<'_>, scale: Scale) -> Option<Edit> {
     let tile;
     let (before, mask) = match snow {
@@ -103,30 +103,20 @@ fn remove_part(origin: Origin, before: &Values, cells: &Values, scale: Scale) ->
 }
 
 /// A block of a level set from distances in cells.
-pub fn from_cells(origin: Origin, mut cells: Box<Values>, scale: Scale) -> BlockEdit {
-    let metres = |value: f32| (value * scale.cell).clamp(-scale.background, scale.background);
-    cells.iter_mut().for_each(|value| *value = metres(*value));
-    pack(origin, cells, scale)
+pub fn from_cells(origin: Origin, cells: Box<Values>, scale: Scale) -> BlockEdit {
+    packed(Block::of_cells(origin, cells, scale.cell, scale.background), scale)
 }
 
 /// A leaf, or a constant where no value lies within the band.
 pub fn pack(origin: Origin, values: Box<Values>, scale: Scale) -> BlockEdit {
-    let mask = band_mask(&values, scale.background);
-    let uniform = values.iter().all(|value| (*value > 0.0) == (values[0] > 0.0));
-    if mask == [0; 8] && uniform {
-        return BlockEdit::Constant(
-            origin,
-            if values[0] > 0.0 { scale.background } else { -scale.background },
-        );
-    }
-    BlockEdit::Dense(Block { origin, values, mask })
+    packed(Block::of_band(origin, values, scale.background), scale)
 }
 
-/// Voxels within the narrow band.
-fn band_mask(values: &Values, background: f32) -> Mask {
-    let mut mask = [0; 8];
-    for (index, value) in values.iter().enumerate() {
-        mask[index >> 6] |= u64::from(value.abs() < background) << (index & 63);
+fn packed(block: Block, scale: Scale) -> BlockEdit {
+    let is_outside = block.values[0] > 0.0;
+    if block.mask == [0; 8] && block.values.iter().all(|value| (*value > 0.0) == is_outside) {
+        let value = if is_outside { scale.background } else { -scale.background };
+        return BlockEdit::Constant(block.origin, value);
     }
-    mask
+    BlockEdit::Dense(block)
 }

@@ -1,7 +1,7 @@
 //! The grids of a layer, whole or as the blocks that a step changed.
 
 use super::empty_removed;
-use crate::base::blocks::{Block, BlockEdit, Origin, VOXELS};
+use crate::base::blocks::{Block, BlockEdit, VOXELS};
 use crate::context::Context;
 use crate::error::{Error, Result};
 use crate::vdb::{FloatGrid, Leaf, MetaValue, Ready};
@@ -9,17 +9,17 @@ use crate::vdb::{FloatGrid, Leaf, MetaValue, Ready};
 /// Metadata of `surface`: the snow's volume (m3), exactly as the layer counts it.
 const VOLUME: &str = "volume_m3";
 
-/// What a layer is made of: all that its next step depends on, besides the layer before the first step.
+/// The grids of a layer: everything that its next step depends on, besides the layer before the first step.
 pub struct Grids {
     /// The snow (level set, m).
     pub surface: FloatGrid,
-    /// Part of its column's height that was removed, at touched surface voxels, 0..=1.
+    /// Fraction of the column's height that was removed, at touched surface voxels, 0..=1.
     pub compression: FloatGrid,
     /// Frame of the last change, at touched surface voxels.
     pub touched: FloatGrid,
 }
 
-/// What a step changed, block by block: enough to follow a layer from its grids before the step.
+/// The changes of a step, block by block: applied to the grids before the step they give those after it.
 pub struct Changes {
     pub(super) surface: Vec<BlockEdit>,
     pub(super) compression: Vec<BlockEdit>,
@@ -80,7 +80,7 @@ impl Grids {
     /// The snow's volume (m3).
     ///
     /// # Errors
-    /// When the metadata of `surface` does not hold it.
+    /// When it is missing from the metadata of `surface`.
     pub fn volume(&self) -> Result<f64> {
         let metadata = self.surface.metadata()?;
         match metadata.iter().find(|(key, _)| key == VOLUME) {
@@ -94,7 +94,7 @@ impl Grids {
     /// # Errors
     /// When memory runs out.
     pub fn apply(&mut self, ctx: &Context, changes: &Changes) -> Result<()> {
-        // Nothing is put in place before all of it is there.
+        // All memory is allocated before anything is put in place.
         let surface = Ready::new(ctx, &changes.surface)?;
         let compression = Ready::new(ctx, &changes.compression)?;
         let touched = Ready::new(ctx, &changes.touched)?;
@@ -115,7 +115,7 @@ impl Grids {
             (&mut delta.compression, &changes.compression),
             (&mut delta.touched, &changes.touched),
         ] {
-            // A constant block becomes a leaf without active voxels: a tile could not be told from nothing.
+            // A constant block becomes a leaf without active voxels: a tile looks the same as nothing stored.
             let (constant, dense): (Vec<&BlockEdit>, Vec<&BlockEdit>) =
                 edits.iter().partition(|edit| matches!(edit, BlockEdit::Constant(..)));
             let as_leaf = |edit: &&BlockEdit| match edit {
@@ -163,12 +163,11 @@ impl Changes {
 
 /// A leaf as a block; one without active voxels is constant.
 fn block_of(leaf: &Leaf<'_>) -> BlockEdit {
-    let origin: Origin = leaf.origin;
     let uniform = leaf.values.iter().all(|value| *value == leaf.values[0]);
     if *leaf.mask == [0; 8] && uniform {
-        return BlockEdit::Constant(origin, leaf.values[0]);
+        return BlockEdit::Constant(leaf.origin, leaf.values[0]);
     }
-    BlockEdit::Dense(Block { origin, values: Box::new(*leaf.values), mask: *leaf.mask })
+    BlockEdit::Dense(leaf.to_block())
 }
 
 fn plain(cell: f64, name: &str) -> Result<FloatGrid> {

@@ -11,7 +11,7 @@ use crate::error::{Error, Result};
 use crate::sweep::{Face, Fixed, Lattice, Topology, Weights, Window, boundary, fill};
 use crate::vdb::FloatGrid;
 
-/// What the snow lies on.
+/// The ground under the snow.
 pub enum Ground {
     /// A horizontal plane.
     Plane {
@@ -28,11 +28,11 @@ pub enum Ground {
 pub enum Cover {
     /// Vertical depth above the ground and above static objects (m).
     Depth(f64),
-    /// The snow's top surface; what lies between it and the ground is snow.
+    /// The snow's top surface; the space between it and the ground is snow.
     Top(TriMesh),
 }
 
-/// Layers that a solid takes away: more than prisms can lie over each other.
+/// Layers that a solid subtracts: more than prisms can overlap.
 const SOLID: i32 = -(1 << 20);
 const EVERYWHERE: Window = Window { min: [i32::MIN; 3], max: [i32::MAX; 3] };
 
@@ -53,7 +53,7 @@ pub fn layer(
     let ground = upright(sheet_of(ground)?);
     let statics: Vec<Sheet> = statics.iter().map(|mesh| upright(Sheet::of(mesh))).collect();
     let lattice = Lattice::near(cell, centre(&ground)?)?;
-    let faces = ctx.stage("prisms", || {
+    let faces = ctx.phase("prisms", || {
         let mut faces = Vec::new();
         match cover {
             Cover::Depth(depth) => {
@@ -103,7 +103,7 @@ pub fn layer(
 /// A depth, or a plane, that is less than a cell; the message names it.
 pub fn fits(ground: &Ground, cover: &Cover, cell: f64) -> Result<()> {
     let least = |name: &str, size: f64| {
-        // What is no positive number is refused where it is used.
+        // Values that are not positive are refused where they are used.
         if size > 0.0 && size < cell {
             return Err(Error::argument(format!(
                 "{name} = {size} m is less than a cell of {cell} m, which cannot hold it: take cells of {} m or less",
@@ -122,15 +122,15 @@ pub fn fits(ground: &Ground, cover: &Cover, cell: f64) -> Result<()> {
     Ok(())
 }
 
-/// Cells that a layer should be thick, or prints in it are rough.
+/// Thickness (cells) below which prints in a layer are rough.
 const THICK: f64 = 3.0;
 
-/// A length with two digits that count.
+/// A length rounded to two significant digits.
 fn told(length: f64) -> f64 {
     format!("{length:.1e}").parse().unwrap_or(length)
 }
 
-/// A sentence about a vertical depth (m) that is only a few cells.
+/// The warning for a vertical depth (m) of only a few cells.
 pub fn thin(depth: f64, cell: f64) -> Option<String> {
     let cells = depth / cell;
     (cells < THICK).then(|| {
@@ -141,7 +141,7 @@ pub fn thin(depth: f64, cell: f64) -> Option<String> {
     })
 }
 
-/// A sentence about a layer that no voxel is deep in.
+/// The warning for a layer without deep voxels.
 fn nowhere_thick(layer: &FloatGrid) -> Result<Option<String>> {
     let cell = layer.voxel_size() as f32;
     let least = |values: &[f32; 512]| values.iter().copied().fold(f32::INFINITY, f32::min);
@@ -154,7 +154,7 @@ fn nowhere_thick(layer: &FloatGrid) -> Result<Option<String>> {
     }))
 }
 
-/// A mesh whose places are 64-bit: a plane's corners lie where they were said to be, however far from the origin.
+/// A mesh with 64-bit positions: the corners of a plane are exact, however far from the origin.
 struct Sheet {
     positions: Vec<DVec3>,
     triangles: Vec<[u32; 3]>,
@@ -208,10 +208,10 @@ fn centre(sheet: &Sheet) -> Result<DVec3> {
     Ok(sheet.positions.iter().sum::<DVec3>() / sheet.positions.len() as f64)
 }
 
-/// A mesh as it is meant: a solid with its faces outward, a sheet with its faces upward.
+/// A mesh with its intended orientation: a solid with its faces outward, a sheet with its faces upward.
 fn upright(mut sheet: Sheet) -> Sheet {
     let inward = if sheet.is_solid() {
-        // Near its own places, so that nothing is lost far from the world's origin.
+        // Relative to its own position, so that no precision is lost far from the world's origin.
         let origin = sheet.positions.first().copied().unwrap_or_default();
         let six = |corners: [DVec3; 3]| {
             let [a, b, c] = corners.map(|p| p - origin);
@@ -227,7 +227,7 @@ fn upright(mut sheet: Sheet) -> Sheet {
     sheet
 }
 
-/// Prisms between two places of each triangle that moves along its normal from the first to the second.
+/// Prisms between two positions of each triangle that moves along its normal from the first to the second.
 fn prisms(
     ctx: &Context,
     lattice: &Lattice,
@@ -253,7 +253,7 @@ fn solid(ctx: &Context, lattice: &Lattice, sheet: &Sheet, faces: &mut Vec<Face>)
     Ok(())
 }
 
-/// Multiplies a face's layers, turning it round for a negative factor.
+/// Multiplies a face's coefficient; a negative factor flips the face.
 fn weigh(face: &mut Face, factor: i32) {
     face.coef *= factor;
     if face.coef < 0 {

@@ -1,4 +1,4 @@
-//! What the snow remembers beside its shape: when its surface last changed, and how far its columns are pressed.
+//! Data on the snow besides its shape: when its surface last changed, and how far its columns are pressed.
 
 use std::collections::{BTreeSet, HashMap};
 
@@ -11,7 +11,7 @@ use crate::context::Context;
 use crate::error::{Error, Result};
 use crate::vdb::Probe;
 
-/// What one block of the snow becomes, and where that differs from what it was.
+/// The new snow of one block, and where it differs from the old.
 pub struct Mark<'a> {
     /// The snow.
     pub surface: &'a BlockEdit,
@@ -20,7 +20,7 @@ pub struct Mark<'a> {
 }
 
 impl BaseLayer {
-    /// Heights before the first touch of the column blocks that nothing touched before these blocks changed.
+    /// Heights of the column blocks that these changed blocks touch for the first time.
     pub(super) fn new_columns(&self, origins: impl Iterator<Item = Origin>) -> Result<Columns> {
         let places: BTreeSet<[i32; 2]> = origins.map(column_of).collect();
         let new: Vec<[i32; 2]> =
@@ -54,7 +54,7 @@ impl BaseLayer {
     }
 
     /// Compression at every touched surface voxel of the columns in which blocks change: `surfaces` and `touched`
-    /// are what those blocks become, one for one; `fresh` are the columns that nothing touched before.
+    /// are those blocks after the change, one for one; `fresh` are the columns that are touched for the first time.
     pub(super) fn compression_edits(
         &self,
         ctx: &Context,

@@ -1,6 +1,6 @@
 //! The base layer: snow that nothing has moved yet, a level set that objects press into (thesis section 3.2).
 //!
-//! A step costs what moves: only blocks that hold snow and lie near the swept volume are looked at.
+//! The cost of a step grows with what moves: only blocks that hold snow and lie near the swept volume are processed.
 
 mod columns;
 mod crumbs;
@@ -23,9 +23,11 @@ pub use reach::Reach;
 
 use crate::base::DVec3;
 use crate::base::blocks::{BlockEdit, Origin};
-use crate::context::{Context, StageTime};
+use crate::context::{Context, PhaseTime};
 use crate::error::{Error, Result};
-use crate::sweep::{Band, Body, Face, Lattice, Piece, Scratch, Settings, UNITS, Voxeliser, Window};
+use crate::sweep::{
+    Band, Body, Face, Lattice, Piece, Scratch, Settings, TOLERANCE, UNITS, Voxeliser, Window,
+};
 use crate::vdb::{FloatGrid, GridClass, MetaValue, Probe};
 use columns::Columns;
 use edit::{Edit, Scale};
@@ -36,7 +38,7 @@ use wanted::snow_masks;
 /// How objects press into the snow.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Params {
-    /// Ragged edges; none leaves exact imprints.
+    /// Ragged edges; without them imprints are exact.
     pub noise: Option<NoiseParams>,
     /// Largest error of the swept volume (cells), 0.001..=1.
     pub tolerance: f64,
@@ -45,7 +47,7 @@ pub struct Params {
 impl Params {
     /// The thesis' look: noise of two cells.
     pub fn for_cell(cell: f64) -> Self {
-        Self { noise: Some(NoiseParams::for_cell(cell)), tolerance: 0.02 }
+        Self { noise: Some(NoiseParams::for_cell(cell)), tolerance: TOLERANCE }
     }
 
     /// Checks every field for a layer's cells.
@@ -70,10 +72,10 @@ pub struct StepReport {
     pub touched_blocks: usize,
     /// Triangles of the swept volume's boundary near the snow.
     pub sweep_faces: usize,
-    /// Islands that were taken away: see [`BaseLayer::set_min_crumb`].
+    /// Islands that were removed: see [`BaseLayer::set_min_crumb`].
     pub crumbs: usize,
-    /// Wall-clock time of each stage.
-    pub stages: Vec<StageTime>,
+    /// Wall-clock time of each phase.
+    pub phases: Vec<PhaseTime>,
 }
 
 /// A layer of snow and what has happened to it.
@@ -83,15 +85,15 @@ pub struct BaseLayer {
     /// The last step's, the removed level set among them.
     changes: Changes,
     columns: Columns,
-    /// Blocks that are not what they were before the first step.
+    /// Blocks that changed since before the first step.
     changed: HashSet<Origin>,
-    /// Which layer that was.
+    /// Fingerprint of the layer before the first step.
     initial: u128,
-    /// Voxels that snow can be in.
+    /// Box of the voxels that can hold snow.
     low: [i32; 3],
     high: [i32; 3],
     half_width: f32,
-    /// Islands of fewer voxels are taken away.
+    /// Islands of fewer voxels are removed.
     min_crumb: usize,
 }
 
@@ -99,12 +101,12 @@ impl BaseLayer {
     /// A layer whose snow is the inside of a level set.
     ///
     /// # Errors
-    /// When `surface` is no level set, holds nothing or is not world-fixed, or a parameter is out of range.
+    /// When `surface` is not a level set, is empty or not world-fixed, or a parameter is out of range.
     pub fn new(ctx: &Context, surface: FloatGrid, params: Params) -> Result<Self> {
         Self::with_volume(ctx, surface, params, None)
     }
 
-    /// As [`BaseLayer::new`]; the volume (m3) may be known.
+    /// As [`BaseLayer::new`], with the volume (m3) if it is known.
     fn with_volume(ctx: &Context, surface: FloatGrid, params: Params, known: Option<f64>) -> Result<Self> {
         params.validate(&surface)?;
         if surface.class() != GridClass::LevelSet {
@@ -115,7 +117,7 @@ impl BaseLayer {
         }
         let half_width = half_width(&surface);
         let (low, high) = surface.active_bbox().ok_or_else(|| Error::argument("the snow is empty"))?;
-        let (volume, initial) = ctx.stage("measure", || {
+        let (volume, initial) = ctx.phase("measure", || {
             let volume = known.map_or_else(|| columns::volume(&surface, low, high), Ok)?;
             Ok((volume, state::fingerprint(&surface)?))
         })?;
@@ -125,7 +127,7 @@ impl BaseLayer {
         Ok(Self { params, grids, changes, columns, changed, initial, low, high, half_width, min_crumb: 0 })
     }
 
-    /// Goes on from the grids that an earlier step left; `initial` is the layer before the first step.
+    /// Resumes from the grids of an earlier step; `initial` is the layer before the first step.
     ///
     /// # Errors
     /// As [`BaseLayer::new`]; grids of another layer.
@@ -135,7 +137,7 @@ impl BaseLayer {
         let same = layer.grids.surface.voxel_size() == initial.voxel_size()
             && layer.grids.surface.background() == initial.background();
         if !same {
-            return Err(Error::argument("the layer to go on from has other cells than the first one"));
+            return Err(Error::argument("the layer to resume from has other cells than the first one"));
         }
         layer.changes = Changes::none(&layer.grids, layer.half_width)?;
         let [low, high] = [layer.low[1], layer.high[1]];
@@ -147,15 +149,15 @@ impl BaseLayer {
     /// How objects press into the snow from the next step on.
     ///
     /// # Errors
-    /// A parameter out of range; the old ones then stay.
+    /// A parameter out of range; the old ones are then kept.
     pub fn set_params(&mut self, params: Params) -> Result<()> {
         params.validate(&self.grids.surface)?;
         self.params = params;
         Ok(())
     }
 
-    /// From the next step on, islands of fewer voxels than this that a step leaves where it changed the snow are taken
-    /// away with it: crumbs of ragged edges and thin walls. At first 0: all stay.
+    /// From the next step on, islands of fewer voxels than this that a step leaves where it changed the snow are removed
+    /// too: crumbs of ragged edges and thin walls. Initially 0: all stay.
     pub fn set_min_crumb(&mut self, voxels: usize) {
         self.min_crumb = voxels;
     }
@@ -170,14 +172,14 @@ impl BaseLayer {
         self.half_width
     }
 
-    /// Least and greatest corner (m) of the voxels that snow can be in.
+    /// Least and greatest corner (m) of the box of voxels that can hold snow.
     pub fn bounds(&self) -> (DVec3, DVec3) {
         let cell = self.grids.surface.voxel_size();
         let corner = |voxel: [i32; 3], half: f64| DVec3::from(voxel.map(|at| (f64::from(at) + half) * cell));
         (corner(self.low, -0.5), corner(self.high, 0.5))
     }
 
-    /// The grids: all that the next step depends on, besides the layer before the first step.
+    /// The grids: everything that the next step depends on, besides the layer before the first step.
     pub fn grids(&self) -> &Grids {
         &self.grids
     }
@@ -213,7 +215,7 @@ impl BaseLayer {
         &self.changes.removed
     }
 
-    /// Part of its column's height that was removed, at touched surface voxels, 0..=1.
+    /// Fraction of the column's height that was removed, at touched surface voxels, 0..=1.
     pub fn compression(&self) -> &FloatGrid {
         &self.grids.compression
     }
@@ -232,7 +234,7 @@ impl BaseLayer {
     /// A step that fails or is cancelled leaves the layer as it was.
     ///
     /// # Errors
-    /// A pose that cannot be had, a body too far away, cancel, memory.
+    /// A pose that cannot be computed, a body too far away, cancel, memory.
     pub fn step(
         &mut self,
         ctx: &Context,
@@ -241,39 +243,38 @@ impl BaseLayer {
         to: f64,
         frame: i32,
     ) -> Result<StepReport> {
-        ctx.take_timings();
-        let displacement =
-            self.params.noise.map(|noise| Displacement::new(&noise, self.grids.surface.voxel_size()));
+        let noise = self.params.noise.map(|noise| Displacement::new(&noise, self.grids.surface.voxel_size()));
         let (ragged, exact): (Vec<_>, Vec<_>) =
             bodies.iter().enumerate().partition(|(_, body)| body.has_noise());
-        let (ragged, ragged_faces) = self.sweep(ctx, &ragged, from, to, displacement.as_ref())?;
-        let (exact, exact_faces) = self.sweep(ctx, &exact, from, to, None)?;
-        let pieces = united(ragged, exact);
-        let mut edits = ctx.stage("subtract", || self.edits(ctx, &pieces))?;
-        let crumbs = match self.min_crumb {
-            0 | 1 => 0,
-            least => ctx.stage("crumbs", || {
-                crumbs::remove(ctx, &mut edits, &self.grids.surface, self.scale(), least)
-            })?,
-        };
-        let (changes, columns, removed_volume) = ctx.stage("columns", || self.changes(ctx, edits, frame))?;
-        let touched_blocks = changes.surface.len();
-        self.commit(ctx, changes, columns)?;
-        Ok(StepReport {
-            removed_volume,
-            base_volume: self.changes.volume,
-            touched_blocks,
-            sweep_faces: ragged_faces + exact_faces,
-            crumbs,
-            stages: ctx.take_timings(),
-        })
+        let sweeps = sweep_phases(&ragged, noise.is_some()) + sweep_phases(&exact, false);
+        let phases = sweeps + ["subtract", "columns", "commit"].len() + usize::from(self.min_crumb > 1);
+        let (report, phases) = ctx.step(phases, || {
+            let (ragged, ragged_faces) = self.sweep(ctx, &ragged, from, to, noise.as_ref())?;
+            let (exact, exact_faces) = self.sweep(ctx, &exact, from, to, None)?;
+            let pieces = united(ragged, exact);
+            let mut edits = ctx.phase("subtract", || self.edits(ctx, &pieces))?;
+            let crumbs = match self.min_crumb {
+                0 | 1 => 0,
+                least => ctx.phase("crumbs", || {
+                    crumbs::remove(ctx, &mut edits, &self.grids.surface, self.scale(), least)
+                })?,
+            };
+            let (changes, columns, removed_volume) =
+                ctx.phase("columns", || self.changes(ctx, edits, frame))?;
+            let touched_blocks = changes.surface.len();
+            self.commit(ctx, changes, columns)?;
+            let (base_volume, sweep_faces) = (self.changes.volume, ragged_faces + exact_faces);
+            let phases = Vec::new();
+            Ok(StepReport { removed_volume, base_volume, touched_blocks, sweep_faces, crumbs, phases })
+        })?;
+        Ok(StepReport { phases, ..report })
     }
 
     fn scale(&self) -> Scale {
         Scale { cell: self.grids.surface.voxel_size() as f32, background: self.grids.surface.background() }
     }
 
-    /// Distances of the volume that bodies sweep, displaced, in the blocks that hold snow; and its faces.
+    /// Distances of the volume that bodies sweep, with noise, in the blocks that hold snow; and the number of its faces.
     fn sweep(
         &self,
         ctx: &Context,
@@ -285,10 +286,10 @@ impl BaseLayer {
         if bodies.is_empty() {
             return Ok((Vec::new(), 0));
         }
-        let voxeliser = ctx.stage("sweep", || self.voxeliser(ctx, bodies, from, to, noise))?;
-        let mut pieces = ctx.stage("distance", || self.pieces(ctx, &voxeliser, noise.is_some()))?;
+        let voxeliser = ctx.phase("sweep", || self.voxeliser(ctx, bodies, from, to, noise))?;
+        let mut pieces = ctx.phase("distance", || self.pieces(ctx, &voxeliser, noise.is_some()))?;
         if let Some(noise) = noise {
-            ctx.stage("noise", || {
+            ctx.phase("noise", || {
                 noise.apply(ctx, &mut pieces, self.half_width);
                 Ok(())
             })?;
@@ -309,9 +310,9 @@ impl BaseLayer {
         let middle = [0, 1, 2].map(|a| (f64::from(self.low[a]) + f64::from(self.high[a])) * 0.5 * cell);
         let lattice = Lattice::near(cell, DVec3::from(middle))?;
         let outside = self.half_width + noise.map_or(0.0, |noise| noise.amplitude);
-        // Sides of faces in reach are told with the voxels around them.
+        // Whether a face is open is decided from the winding numbers of the voxels around it.
         let margin = outside.ceil() as i32 + 3;
-        let relative = |voxel: [i32; 3], grow: i32| [0, 1, 2].map(|a| voxel[a] - lattice.base[a] + grow);
+        let relative = |voxel: [i32; 3], grow: i32| [0, 1, 2].map(|a| voxel[a] - lattice.origin[a] + grow);
         let fixed = |voxel: [i32; 3]| voxel.map(|cells| cells.saturating_mul(UNITS));
         let window =
             Window { min: fixed(relative(self.low, -margin)), max: fixed(relative(self.high, margin)) };
@@ -320,7 +321,7 @@ impl BaseLayer {
             .iter()
             .map(|(index, body)| {
                 ctx.check()?;
-                let faces = self.chain(ctx, body, (from, to), &lattice, &window);
+                let faces = self.faces(ctx, body, (from, to), &lattice, &window);
                 ctx.advance();
                 faces.map_err(|error| match error {
                     Error::Argument(what) if body.name().is_none() => {
@@ -337,8 +338,8 @@ impl BaseLayer {
         Voxeliser::new(ctx, parts.concat(), lattice, band, bounds, snowy)
     }
 
-    /// The boundary of what a body sweeps, near the snow; what passes far from it is left out.
-    fn chain(
+    /// Faces of what a body sweeps near the snow.
+    fn faces(
         &self,
         ctx: &Context,
         body: &Body,
@@ -346,13 +347,13 @@ impl BaseLayer {
         lattice: &Lattice,
         window: &Window,
     ) -> Result<Vec<Face>> {
-        let chain = |from: f64, to: f64| body.chain(ctx, from, to, lattice, self.params.tolerance, window);
-        match chain(from, to) {
-            // A vertex may be out of reach.
+        let faces = |from: f64, to: f64| body.faces(ctx, from, to, lattice, self.params.tolerance, window);
+        match faces(from, to) {
+            // A vertex may be out of reach: only the times near the snow then.
             Err(Error::Argument(_)) => {
                 let spans = Reach::new(*lattice, window).spans(ctx, body, from, to)?;
                 let parts: Vec<Vec<Face>> =
-                    spans.into_iter().map(|(from, to)| chain(from, to)).collect::<Result<_>>()?;
+                    spans.into_iter().map(|(from, to)| faces(from, to)).collect::<Result<_>>()?;
                 Ok(parts.concat())
             }
             other => other,
@@ -376,7 +377,7 @@ impl BaseLayer {
         Ok(pieces)
     }
 
-    /// What the snow becomes; nothing is put in place yet.
+    /// The snow without the pieces; nothing is put in place yet.
     fn edits(&self, ctx: &Context, pieces: &[Piece]) -> Result<Vec<Edit>> {
         let origins: Vec<Origin> = pieces.iter().map(Piece::origin).collect();
         let snow: Vec<Probe<'_>> = self.grids.surface.probe(&origins)?;
@@ -396,7 +397,7 @@ impl BaseLayer {
     fn changes(&self, ctx: &Context, edits: Vec<Edit>, frame: i32) -> Result<(Changes, Columns, f64)> {
         let cell = self.grids.surface.voxel_size();
         let mut removed = empty_removed(cell, self.half_width)?;
-        // The sum of nothing is -0, which is no volume.
+        // An empty sum is -0.
         let volume = edits.iter().map(Edit::volume).sum::<f64>() * cell.powi(3) + 0.0;
         let fresh = self.new_columns(edits.iter().map(|edit| edit.surface.origin()))?;
         let marks: Vec<Mark<'_>> =
@@ -407,7 +408,7 @@ impl BaseLayer {
         let (surface, taken): (Vec<BlockEdit>, Vec<Option<BlockEdit>>) =
             edits.into_iter().map(|edit| (edit.surface, edit.removed)).unzip();
         removed.replace_blocks(ctx, &taken.into_iter().flatten().collect::<Vec<_>>())?;
-        // Shells thinner than a cell leave no trace in the level set: the sum over the columns has them.
+        // The sum includes shells thinner than a cell, which leave no trace in the level set.
         removed.set_metadata("volume_m3", MetaValue::Double(volume))?;
         let left = self.changes.volume - volume;
         Ok((Changes { surface, touched, compression, removed, volume: left }, fresh, volume))
@@ -421,6 +422,11 @@ impl BaseLayer {
         self.changes = changes;
         Ok(())
     }
+}
+
+/// Phases that [`BaseLayer::sweep`] has for these bodies.
+fn sweep_phases(bodies: &[(usize, &Body)], noise: bool) -> usize {
+    if bodies.is_empty() { 0 } else { ["sweep", "distance"].len() + usize::from(noise) }
 }
 
 /// Half width of a level set's narrow band (cells).

@@ -1,8 +1,8 @@
 //! Ragged edges: the swept volume is displaced outward by noise that is fixed in world space
 //! (thesis section 3.2: v = grad phi / |grad phi| max(noise, 0)).
 //!
-//! In place of an advection: phi -= max(noise, 0) in the band. Along a normal phi rises with slope 1, so
-//! as long as the noise is less steep, whatever it removes hangs together with the sweep: no islands.
+//! Instead of an advection: phi -= max(noise, 0) in the band. Along a normal phi rises with slope 1, so
+//! as long as the noise is less steep, everything it removes is connected to the sweep: no islands.
 
 use std::collections::HashMap;
 use std::ops::RangeInclusive;
@@ -87,16 +87,16 @@ impl NoiseParams {
 
 /// Strength of an octave over that of the one before it.
 const GAIN: f32 = 0.25;
-/// Noise cells after which the pattern comes again: the library numbers them with 32 bits.
+/// Noise cells after which the pattern repeats: the library indexes them with 32 bits.
 const PERIOD: f64 = 4_294_967_296.0;
 
 /// The displacement field of a layer.
 pub struct Displacement {
-    /// Each with the part of the sum that it has.
+    /// Each octave with its weight in the sum.
     octaves: Vec<(FastNoiseLite, f32)>,
     /// Greatest displacement (cells).
     pub amplitude: f32,
-    /// Cells of the largest octave's noise in a voxel.
+    /// Noise cells of the largest octave per voxel.
     step: f64,
 }
 
@@ -119,7 +119,7 @@ impl Displacement {
 
     /// Outward displacement (cells) at a voxel of the world's lattice, 0..=amplitude.
     ///
-    /// Voxels are whole numbers, and the noise takes the whole part of a place apart from its fraction, both from
+    /// Voxels are integers, and the noise takes the integer part of a position and its fraction separately, both from
     /// 64 bits: the pattern is as fine 100 km from the origin as near it.
     fn at(&self, voxel: [i32; 3]) -> f32 {
         let mut place = voxel.map(|index| f64::from(index) * self.step);
@@ -132,14 +132,14 @@ impl Displacement {
         self.amplitude * sum.clamp(0.0, 1.0)
     }
 
-    /// Displaces pieces outward, then scales their values back to distances (first order): the work of a stage, which a
+    /// Displaces pieces outward, then scales their values back to distances (first order): the work of a phase, which a
     /// cancel leaves half done.
     pub fn apply(&self, ctx: &Context, pieces: &mut [Piece], half_width: f32) {
         if self.amplitude == 0.0 {
             return;
         }
         let reach = half_width + self.amplitude;
-        // The last piece of work scales all of them.
+        // The last piece of work scales them all.
         ctx.expect(pieces.len() + 1);
         pieces.par_iter_mut().for_each(|piece| {
             ctx.advance();
@@ -167,8 +167,8 @@ pub fn displace(ctx: &Context, grid: &mut FloatGrid, params: &NoiseParams) -> Re
     params.validate(cell)?;
     let noise = Displacement::new(params, cell);
     let half_width = (f64::from(grid.background()) / cell) as f32;
-    // Rebuilt with a band that holds the displaced surface and still three cells around it; from a mesh, whose places
-    // are 32-bit, and so near the world's origin.
+    // Rebuilt with a band that contains the displaced surface and three cells around it; from a mesh, whose positions
+    // are 32-bit, and therefore near the world's origin.
     let (near, moved) = near_origin(ctx, grid)?;
     let mesh = level_set::to_mesh(ctx, near.as_ref().unwrap_or(grid), 0.0, 0.0)?;
     let settings = Settings { half_width: half_width + noise.amplitude.ceil(), ..Settings::new(cell) };
@@ -179,7 +179,7 @@ pub fn displace(ctx: &Context, grid: &mut FloatGrid, params: &NoiseParams) -> Re
         .iter()
         .map(|leaf| Piece::Near(back(leaf.origin), Box::new(leaf.values.map(|value| value / cell as f32))))
         .collect();
-    ctx.stage("noise", || {
+    ctx.phase("noise", || {
         noise.apply(ctx, &mut pieces, half_width);
         Ok(())
     })?;
@@ -198,8 +198,8 @@ pub fn displace(ctx: &Context, grid: &mut FloatGrid, params: &NoiseParams) -> Re
     Ok(())
 }
 
-/// A level set of the world's lattice moved by whole blocks so that its middle lies at the origin, and the voxels that
-/// it was away from it; none where it need not be moved, or lies on another lattice.
+/// A level set of the world's lattice moved by whole blocks so that its middle lies at the origin, and its former distance
+/// from there (voxels); none when it need not be moved, or lies on another lattice.
 fn near_origin(ctx: &Context, grid: &FloatGrid) -> Result<(Option<FloatGrid>, [i32; 3])> {
     let nothing = (None, [0; 3]);
     let Some((low, high)) = grid.active_bbox().filter(|_| grid.is_world_fixed()) else { return Ok(nothing) };
@@ -211,14 +211,14 @@ fn near_origin(ctx: &Context, grid: &FloatGrid) -> Result<(Option<FloatGrid>, [i
     let mut near = FloatGrid::level_set(cell, (f64::from(grid.background()) / cell) as f32)?;
     let leaf = |leaf: &Leaf<'_>| {
         let origin = [0, 1, 2].map(|axis| leaf.origin[axis] - moved[axis]);
-        BlockEdit::Dense(Block { origin, values: Box::new(*leaf.values), mask: *leaf.mask })
+        BlockEdit::Dense(Block { origin, ..leaf.to_block() })
     };
     near.replace_blocks(ctx, &grid.leaves()?.iter().map(leaf).collect::<Vec<_>>())?;
     near.flood_fill()?;
     Ok((Some(near), moved))
 }
 
-/// Divides each value by the field's steepness there, so that distances near the surface are true again.
+/// Divides each value by the gradient there, so that values near the surface are distances again.
 fn normalise(pieces: &mut [Piece]) {
     let places: HashMap<Origin, usize> =
         pieces.iter().enumerate().map(|(index, piece)| (piece.origin(), index)).collect();

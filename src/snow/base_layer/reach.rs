@@ -1,21 +1,21 @@
 //! Bodies far from the snow: the exact arithmetic of a sweep reaches 131,072 cells from the snow's middle.
 //!
-//! What passes out there leaves no trace in the snow: only the parts of a step in which a body may touch it are swept.
+//! Motion out there does not change the snow: only the parts of a step in which a body may touch it are swept.
 
 use crate::base::DVec3;
 use crate::context::Context;
 use crate::error::{Error, Result};
 use crate::sweep::{Body, Lattice, REACH, UNITS, Window, too_far};
 
-/// Parts of an interval at which poses are looked at; no motion that turns evenly looks the same at all of them.
+/// Fractions of an interval at which poses are sampled; no steady rotation looks the same at all of them.
 const MOMENTS: [f64; 12] = [0.0, 0.07, 0.19, 0.26, 0.38, 0.45, 0.57, 0.64, 0.76, 0.83, 0.95, 1.0];
-/// How often an interval between two kinks of a motion is halved.
+/// How often an interval between two breaks of a motion is halved.
 const HALVINGS: u32 = 16;
 
-/// Where the snow is, for bodies that may be far from it.
+/// The extent of the snow, for bodies that may be far from it.
 pub struct Reach {
     lattice: Lattice,
-    /// Cells from the lattice's base voxel.
+    /// Cells from the lattice's origin voxel.
     low: DVec3,
     high: DVec3,
 }
@@ -42,7 +42,7 @@ impl Reach {
     /// reach.
     ///
     /// # Errors
-    /// A body, named, that touches the snow while a part of it is out of reach; a pose that cannot be had; cancel.
+    /// A body, named, that touches the snow while a part of it is out of reach; a pose that cannot be computed; cancel.
     pub fn spans(&self, ctx: &Context, body: &Body, from: f64, to: f64) -> Result<Vec<(f64, f64)>> {
         let mut ends = vec![from];
         ends.extend(body.motion().breaks(from, to));
@@ -79,11 +79,11 @@ impl Reach {
                 pose.iter().fold((low, high), |(low, high), place| (low.inf(place), high.sup(place)));
             std::mem::swap(&mut pose, &mut before);
         }
-        // Between two looks nothing strays farther from both than it moves from one to the other.
+        // Between two samples nothing is farther from both than it moves from one to the other.
         let misses =
             (0..3).any(|axis| low[axis] - moved > self.high[axis] || high[axis] + moved < self.low[axis]);
         let farthest = low.abs().sup(&high.abs()).max();
-        // A vertex that is no number is left to those who name it.
+        // A vertex that is not finite is reported by later checks.
         if misses && farthest.is_finite() {
             return Ok(());
         }

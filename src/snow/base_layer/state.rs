@@ -1,7 +1,7 @@
 //! A layer as bytes, for a host's own cache: what differs from the layer before the first step, packed.
 //!
 //! Blocks go in groups that are packed and unpacked in parallel. Of each block the narrow band's values are kept
-//! bit for bit, their bytes sorted by significance before LZ4 sees them; what follows from the snow itself
+//! bit for bit, their bytes sorted by significance before LZ4; what can be computed from the snow itself
 //! (compression, heights, tiles) is not kept. The bytes are the same on any number of threads.
 
 use rayon::prelude::*;
@@ -22,7 +22,7 @@ const GROUP: usize = 256;
 /// Most bytes of a block before packing: values and frames of every voxel, three masks, origin, kind.
 const BLOCK: usize = 2 * 4 * VOXELS + 3 * 64 + 16;
 
-/// How a block is kept; [`TOUCHED`] is added where it has frames of its last change.
+/// How a block is stored; [`TOUCHED`] is added where it has frames of its last change.
 const CONSTANT: u8 = 0;
 /// The narrow band's values; all others are the background, with a sign.
 const BAND: u8 = 1;
@@ -36,7 +36,7 @@ impl BaseLayer {
     /// # Errors
     /// Cancel; when memory runs out.
     pub fn save(&self, ctx: &Context) -> Result<Vec<u8>> {
-        ctx.stage("save", || {
+        ctx.phase("save", || {
             let mut origins: Vec<Origin> = self.changed.iter().copied().collect();
             origins.par_sort_unstable();
             let surface = self.grids.surface.probe(&origins)?;
@@ -68,20 +68,20 @@ impl BaseLayer {
         HEADER + groups * (12 + lz4_flex::block::get_maximum_output_size(GROUP * BLOCK))
     }
 
-    /// The layer that [`BaseLayer::save`] saw; `initial` is the layer before the first step, as it was given to
+    /// The layer that was saved; `initial` is the layer before the first step, as it was given to
     /// [`BaseLayer::new`].
     ///
     /// # Errors
     /// As [`BaseLayer::new`]; bytes that are damaged, of another version, or of another initial layer.
     pub fn restore(ctx: &Context, initial: FloatGrid, params: Params, state: &[u8]) -> Result<Self> {
-        // Bytes that are too few for it are refused below.
+        // Too few bytes are refused below.
         let volume = state.get(44..52).map(|bytes| f64::from_le_bytes(array(bytes)));
         let mut layer = Self::with_volume(ctx, initial, params, volume)?;
-        let (surface, touched) = ctx.stage("unpack", || layer.unpack(ctx, state))?;
-        let columns = ctx.stage("columns", || layer.new_columns(surface.iter().map(BlockEdit::origin)))?;
+        let (surface, touched) = ctx.phase("unpack", || layer.unpack(ctx, state))?;
+        let columns = ctx.phase("columns", || layer.new_columns(surface.iter().map(BlockEdit::origin)))?;
         let surfaces: Vec<&BlockEdit> = surface.iter().collect();
         let compression =
-            ctx.stage("compression", || layer.compression_edits(ctx, &columns, &surfaces, &touched))?;
+            ctx.phase("compression", || layer.compression_edits(ctx, &columns, &surfaces, &touched))?;
         let removed = super::empty_removed(layer.surface().voxel_size(), layer.half_width)?;
         let volume = layer.changes.volume;
         layer.commit(ctx, Changes { surface, touched, compression, removed, volume }, columns)?;
@@ -110,7 +110,7 @@ impl BaseLayer {
     fn unpack(&self, ctx: &Context, state: &[u8]) -> Result<(Vec<BlockEdit>, Vec<BlockEdit>)> {
         let refused = |what: &str| Error::Bytes(format!("the saved state {what}"));
         if state.len() < HEADER || state[..8] != MAGIC {
-            return Err(refused("is none of a base layer"));
+            return Err(refused("is not of a base layer"));
         }
         let version = u32::from_le_bytes(array(&state[8..12]));
         if version != VERSION {
@@ -148,7 +148,7 @@ impl BaseLayer {
     }
 }
 
-/// What tells a layer from others: a hash of its leaves.
+/// Identifies a layer: a hash of its leaves.
 pub fn fingerprint(surface: &FloatGrid) -> Result<u128> {
     let leaf = |leaf: &Leaf<'_>| {
         let mut bytes = [0u8; 12 + 4 * VOXELS + 64];
@@ -171,7 +171,7 @@ pub fn fingerprint(surface: &FloatGrid) -> Result<u128> {
     Ok(xxh3_128(&leaves.iter().flat_map(|hash| hash.to_le_bytes()).collect::<Vec<u8>>()))
 }
 
-/// Hash of all but its own place.
+/// Hash of everything but its own bytes.
 fn seal(state: &[u8]) -> [u8; 16] {
     let mut hash = Xxh3::new();
     hash.update(&state[..HEADER - 16]);
@@ -314,7 +314,7 @@ fn read_group(
     reader.0.is_empty().then_some((surface, touched))
 }
 
-/// Puts as many numbers from the front of `numbers` as the mask has voxels, there.
+/// Moves numbers from the front of `numbers` to the voxels of the mask.
 fn put(values: &mut Values, mask: &Mask, numbers: &mut &[f32]) {
     let (taken, rest) = numbers.split_at(count(mask));
     let mut at = 0;

@@ -1,4 +1,4 @@
-//! Where a sweep can change the snow: only there its distances are computed.
+//! Where a sweep can change the snow: its distances are computed only there.
 
 use rayon::prelude::*;
 

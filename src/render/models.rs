@@ -14,12 +14,12 @@ const SAMPLES: usize = 3;
 /// Longest edge of a picture (pixels).
 const LONGEST: u32 = 16_384;
 
-/// Models in one picture.
-pub struct Stage {
+/// The models in one picture.
+pub struct Models {
     models: Vec<Model>,
 }
 
-impl Stage {
+impl Models {
     /// Puts models together.
     pub fn new(models: Vec<Model>) -> Self {
         Self { models }
@@ -40,7 +40,7 @@ impl Stage {
             let what = format!("a picture must have 1 to {LONGEST} pixels along each edge");
             return Err(Error::argument(what));
         }
-        ctx.stage("draw", || {
+        ctx.phase("draw", || {
             let row_bytes = 3 * size.width as usize;
             let mut rgb = vec![0; row_bytes * size.height as usize];
             rgb.par_chunks_mut(row_bytes).enumerate().try_for_each(|(y, row)| {

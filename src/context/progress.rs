@@ -1,0 +1,60 @@
+//! What a context is doing, and how much of it is done.
+
+use std::sync::Mutex;
+
+use super::lock;
+
+/// What is being done, for a progress display.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct Progress {
+    /// The phase's verb, empty between phases.
+    pub phase: &'static str,
+    /// Phases finished since the context was made or reset.
+    pub phases_done: usize,
+    /// Fraction of the running phase that is done, 0 to 1; none where it is not known.
+    pub part: Option<f32>,
+    /// Fraction of the running step that is done, 0 to 1, all its phases counting the same; none outside of
+    /// [`super::Context::step`]. It never decreases within a step.
+    pub fraction: Option<f32>,
+}
+
+/// What the progress is computed from.
+#[derive(Default)]
+pub(super) struct State {
+    pub(super) phase: &'static str,
+    pub(super) phases_done: usize,
+    /// The running step: the phases done before it, and the phases that it has.
+    step: Option<(usize, usize)>,
+}
+
+impl State {
+    pub(super) fn progress(&self, part: Option<f32>) -> Progress {
+        let &Self { phase, phases_done, step } = self;
+        let fraction = step.map(|(before, phases)| {
+            let done = phases_done.saturating_sub(before) as f32 + part.unwrap_or(0.0);
+            (done / phases.max(1) as f32).min(1.0)
+        });
+        Progress { phase, phases_done, part, fraction }
+    }
+}
+
+/// A running step; the one around it continues when this is dropped.
+pub(super) struct Planned<'a> {
+    state: &'a Mutex<State>,
+    outer: Option<(usize, usize)>,
+}
+
+impl<'a> Planned<'a> {
+    /// Begins a step of so many phases.
+    pub(super) fn new(state: &'a Mutex<State>, phases: usize) -> Self {
+        let mut own = lock(state);
+        let step = Some((own.phases_done, phases));
+        Self { state, outer: std::mem::replace(&mut own.step, step) }
+    }
+}
+
+impl Drop for Planned<'_> {
+    fn drop(&mut self) {
+        lock(self.state).step = self.outer;
+    }
+}
