@@ -122,21 +122,23 @@ mod tests {
         let ctx = context();
         assert_eq!(ctx.progress().fraction, None);
         let seen = Mutex::new(Vec::new());
-        let look = || lock(&seen).push(ctx.progress().fraction.unwrap());
-        let cut = || {
-            look();
-            ctx.expect(2);
-            ctx.advance();
-            look();
+        let look = || -> crate::Result<()> {
+            lock(&seen).push(ctx.progress().fraction.unwrap());
             Ok(())
         };
+        let cut = || {
+            look()?;
+            ctx.expect(2);
+            ctx.advance();
+            look()
+        };
         let step = || {
-            look();
+            look()?;
             ctx.phase("cut", cut)?;
-            look();
-            ctx.phase("whole", || Ok(look()))?;
-            ctx.commit(|| Ok(look()))?;
-            Ok(look())
+            look()?;
+            ctx.phase("whole", look)?;
+            ctx.commit(look)?;
+            look()
         };
         ctx.step(4, step).unwrap();
         assert_eq!(*lock(&seen), [0.0, 0.0, 0.125, 0.25, 0.25, 0.5, 0.75]);
