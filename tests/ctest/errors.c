@@ -124,7 +124,7 @@ static void null_everywhere(frz_context *ctx) {
     FAILS(frz_mesh_read((const frz_mesh *)snow, 0, NO_SPAN), FRZ_ERROR_HANDLE, "the pointer is not a mesh");
     FAILS(frz_base_step(ctx, (frz_base *)snow, NULL, 0, 1, 1, NULL), FRZ_ERROR_HANDLE, "the pointer is not a base layer");
     frz_mesh_destroy((frz_mesh *)snow);
-    FAILS(frz_grid_get_info((const frz_grid *)((const char *)snow + 1), NULL), FRZ_ERROR_HANDLE, "no grid");
+    FAILS(frz_grid_get_info((const frz_grid *)((const char *)snow + 1), NULL), FRZ_ERROR_HANDLE, "not a grid");
     frz_grid_destroy(snow);
 }
 

@@ -39,7 +39,7 @@ static frz_grid *plane(frz_context *ctx, double voxel) {
     desc.background = (float)voxel;
     FAILS(frz_grid_create(ctx, &desc, &(frz_grid *){NULL}), FRZ_ERROR_ARGUMENT, "background: the band is 1.00 voxels");
     desc.grid_class = 9;
-    FAILS(frz_grid_create(ctx, &desc, &(frz_grid *){NULL}), FRZ_ERROR_ARGUMENT, "no frz_grid_class");
+    FAILS(frz_grid_create(ctx, &desc, &(frz_grid *){NULL}), FRZ_ERROR_ARGUMENT, "not a value of frz_grid_class");
     return grid;
 }
 
@@ -95,12 +95,12 @@ static void samples_and_meshes(frz_context *ctx, const frz_grid *grid) {
     CHECK(fabsf(linear[0] + 0.05f) < 1e-6f && fabsf(linear[1] - 0.15f) < 1e-6f && linear[2] == 3 * 0.1f);
     /* Half-way between two voxels either is near. */
     CHECK(fabsf(fabsf(nearest[0] + 0.05f) - 0.05f) < 1e-6f);
-    FAILS(frz_grid_sample(ctx, grid, VIEW(at, 3), 5, SPAN(linear, 3)), FRZ_ERROR_ARGUMENT, "no frz_sampling");
+    FAILS(frz_grid_sample(ctx, grid, VIEW(at, 3), 5, SPAN(linear, 3)), FRZ_ERROR_ARGUMENT, "not a value of frz_sampling");
     WORKS(frz_grid_to_mesh(ctx, grid, 0.0f, 0.0f, &mesh));
     info.struct_size = sizeof info;
     WORKS(frz_mesh_get_info(mesh, &info));
     CHECK(info.vertex_count > 50 && info.vertex_count <= 400 && info.face_count > 0);
-    FAILS(frz_grid_sample_mesh(ctx, grid, mesh, 5, "phi"), FRZ_ERROR_ARGUMENT, "no frz_sampling");
+    FAILS(frz_grid_sample_mesh(ctx, grid, mesh, 5, "phi"), FRZ_ERROR_ARGUMENT, "not a value of frz_sampling");
     WORKS(frz_grid_sample_mesh(ctx, grid, mesh, FRZ_SAMPLE_LINEAR, NULL));
     WORKS(frz_mesh_attribute(mesh, "plane", SPAN(height, 400), &components));
     WORKS(frz_mesh_read(mesh, FRZ_MESH_POSITIONS, SPAN(positions, 400)));
@@ -134,7 +134,7 @@ static void files_and_bytes(frz_context *ctx, const frz_grid *grid) {
     CHECK(back == NULL);
     FAILS(frz_grid_load(ctx, "no such file.vdb", NULL, &back), FRZ_ERROR_IO, "no such file.vdb: cannot read");
     FAILS(frz_grid_save(ctx, one, 1, "no such folder/a.vdb", 0, 0), FRZ_ERROR_IO, "no such folder");
-    FAILS(frz_grid_save(ctx, one, 1, "a.vdb", 7, 0), FRZ_ERROR_ARGUMENT, "no frz_compression");
+    FAILS(frz_grid_save(ctx, one, 1, "a.vdb", 7, 0), FRZ_ERROR_ARGUMENT, "not a value of frz_compression");
     FAILS(frz_grid_save(ctx, one, 1, "a.vdb", 0, 6), FRZ_ERROR_ARGUMENT, "flags");
     FAILS(frz_grid_save(ctx, one, 0, "a.vdb", 0, 0), FRZ_ERROR_ARGUMENT, "there is none");
     WORKS(frz_grid_to_bytes(ctx, both, 2, FRZ_COMPRESSION_BLOSC, 0, NULL, 0, &bound));

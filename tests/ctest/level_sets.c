@@ -63,7 +63,7 @@ int main(void) {
         WORKS(frz_levelset_csg(ctx, FRZ_CSG_DIFFERENCE, b, a));
         CHECK(near(volume(ctx, b), polyhedron - both, 0.01));
     }
-    FAILS(frz_levelset_csg(ctx, 3, b, a), FRZ_ERROR_ARGUMENT, "no frz_csg");
+    FAILS(frz_levelset_csg(ctx, 3, b, a), FRZ_ERROR_ARGUMENT, "not a value of frz_csg");
     FAILS(frz_levelset_csg(ctx, FRZ_CSG_UNION, b, b), FRZ_ERROR_BUSY, "in use");
     frz_grid_destroy(b);
     frz_grid_destroy(c);
@@ -73,11 +73,11 @@ int main(void) {
     WORKS(frz_levelset_offset(ctx, b, 0.03f, FRZ_SCHEME_FIRST_ORDER));
     CHECK(near(volume(ctx, b), polyhedron * pow(0.23 / 0.2, 3), 0.02));
     FAILS(frz_levelset_offset(ctx, b, 100.0f, FRZ_SCHEME_FIRST_ORDER), FRZ_ERROR_ARGUMENT, "1000 voxels");
-    FAILS(frz_levelset_offset(ctx, b, 0.01f, 4), FRZ_ERROR_ARGUMENT, "no frz_scheme");
+    FAILS(frz_levelset_offset(ctx, b, 0.01f, 4), FRZ_ERROR_ARGUMENT, "not a value of frz_scheme");
     WORKS(frz_levelset_smooth(ctx, b, FRZ_SMOOTH_GAUSSIAN, 1, 1, FRZ_SCHEME_FIRST_ORDER));
     WORKS(frz_levelset_smooth(ctx, b, FRZ_SMOOTH_MEAN, 1, 1, FRZ_SCHEME_WENO5));
     CHECK(near(volume(ctx, b), polyhedron * pow(0.23 / 0.2, 3), 0.05));
-    FAILS(frz_levelset_smooth(ctx, b, 9, 1, 1, 0), FRZ_ERROR_ARGUMENT, "no frz_smoothing");
+    FAILS(frz_levelset_smooth(ctx, b, 9, 1, 1, 0), FRZ_ERROR_ARGUMENT, "not a value of frz_smoothing");
     FAILS(frz_levelset_smooth(ctx, b, 0, 0, 1, 0), FRZ_ERROR_ARGUMENT, "width = 0");
     before = volume(ctx, b);
     WORKS(frz_levelset_displace(ctx, b, &noise));

@@ -153,7 +153,7 @@ static void samples(frz_context *ctx, const frz_grid *grid) {
     CHECK(nearest[1][0] == 4 && nearest[1][1] == 20 && nearest[1][2] == 3);
     CHECK(memcmp(linear[2], BACKGROUND, sizeof BACKGROUND) == 0);
     FAILS(frz_grid_sample_vectors(ctx, grid, VIEW(at, 3), FRZ_SAMPLE_LINEAR, SPAN(linear, 2)), FRZ_ERROR_CAPACITY, "3 are needed");
-    FAILS(frz_grid_sample_vectors(ctx, grid, VIEW(at, 3), 9, SPAN(linear, 3)), FRZ_ERROR_ARGUMENT, "no frz_sampling");
+    FAILS(frz_grid_sample_vectors(ctx, grid, VIEW(at, 3), 9, SPAN(linear, 3)), FRZ_ERROR_ARGUMENT, "not a value of frz_sampling");
     /* As an attribute of three floats. */
     memset(&desc, 0, sizeof desc);
     desc.struct_size = sizeof desc, desc.positions = VIEW(at, 3), desc.indices = VIEW(faces, 3);
