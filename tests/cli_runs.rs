@@ -120,8 +120,9 @@ fn the_report_of_a_run_sums_the_phases_of_its_frames() {
     let folder = folder(3, 0.05, CUBE);
     works(folder.path(), "snow shot.toml -o out --report run.json");
     let run = phases(&folder.path().join("run.json"));
-    let frames: Vec<_> =
-        (1..=3).map(|frame| phases(&folder.path().join(format!("out/report/{frame:04}.json")))).collect();
+    let frames: Vec<_> = (1..=3)
+        .map(|frame| phases(&folder.path().join(format!("out/report/base.{frame:04}.json"))))
+        .collect();
     for name in ["sweep", "distance", "noise", "subtract", "columns", "commit"] {
         let (seconds, count) = run[name];
         let sum: f64 = frames.iter().map(|frame| frame[name].0).sum();

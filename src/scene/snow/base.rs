@@ -12,6 +12,7 @@ use crate::scene::shot::{
 };
 use crate::scene::{BaseMode, Scene, moving};
 use crate::snow::base_layer::{BaseLayer, Changes, Grids, Params, StepReport};
+use crate::sweep::TOLERANCE;
 use crate::vdb::file::{self, WriteOptions, to_bytes};
 use crate::vdb::{FloatGrid, MetaValue};
 
@@ -124,7 +125,7 @@ impl Stepping for Base<'_> {
     fn load(&self, ctx: &Context, done: &Stored, after: Option<i32>) -> Result<BaseLayer> {
         let scene = self.scene;
         let noise = Some(scene.snow.noise).filter(|noise| noise.amplitude > 0.0);
-        let params = Params { noise, ..Params::for_cell(scene.snow.cell) };
+        let params = Params { noise, tolerance: TOLERANCE };
         let initial = self.inputs.layer(ctx, scene.snow.cell);
         let initial = initial.map_err(|error| match (error, self.inputs.far_static(scene)) {
             (Error::Argument(_), Some((index, far))) => {

@@ -10,8 +10,7 @@ use crate::error::{Error, Result};
 use crate::io::seen::Seen;
 use crate::io::sequence::Pattern;
 use crate::io::{hash, mesh};
-use crate::motion::{Character, Key, Keys, MeshSequence, Motion, Placed, Play, Rigid, missing_uvs};
-use crate::scene::text::is_character;
+use crate::motion::{Character, Key, Keys, MeshSequence, Motion, Placed, Play, Rigid, is_gltf, missing_uvs};
 use crate::scene::{Ground, Layer, Object, Role, Scene};
 use crate::snow::base_layer::initial::{self, Cover};
 use crate::sweep::{self, Body, REACH};
@@ -273,7 +272,7 @@ fn motion(
     });
     let keys = Keys::new(keys.collect())?.with_ease(object.ease);
     let own: Box<dyn Motion> = match Pattern::parse(&object.file) {
-        None if is_character(&object.file) => Box::new(character(scene, object, seen)?),
+        None if is_gltf(&object.file) => Box::new(character(scene, object, seen)?),
         None => {
             let polygons = mesh::parse_polygons(&object.file, &seen.read(&object.file)?)?;
             Box::new(Rigid::of_polygons(polygons, Keys::default()))

@@ -4,8 +4,7 @@ use serde::Serialize;
 
 use crate::base::DVec3;
 use crate::error::Result;
-use crate::motion::{Character, Keys, Motion, Placed, Play, gait};
-use crate::scene::text::is_character;
+use crate::motion::{Character, Keys, Motion, Placed, Play, gait, is_gltf};
 use crate::scene::{Object, Scene};
 
 /// Feet that slip slower than this (m/s), or than this part of their clip's speed, are let be.
@@ -36,7 +35,7 @@ pub struct Walk {
 /// # Errors
 /// As [`Character::open`].
 pub(super) fn walk(scene: &Scene, object: &Object, moved: &dyn Motion) -> Result<Option<Walk>> {
-    if !is_character(&object.file) {
+    if !is_gltf(&object.file) {
         return Ok(None);
     }
     let play = Play { node: object.node.clone(), clip: object.clip.clone(), repeat: false, start: 0.0 };

@@ -5,7 +5,7 @@ use super::objects::objects;
 use super::overrides::Override;
 use super::table::{Document, Table};
 use crate::error::{Error, Result};
-use crate::io::mesh::EXTENSIONS;
+use crate::io::mesh::{EXTENSIONS, extension};
 use crate::scene::{BaseMode, Frames, Ground, Layer, Output, Scene, Shot, Snow};
 use crate::snow::base_layer::NoiseParams;
 use std::path::{Path, PathBuf};
@@ -216,11 +216,6 @@ fn output(root: &Table) -> Result<Output> {
         return Err(table.error("half", "goes with `base_mode = \"full\"` only: changes must be exact"));
     }
     Ok(output)
-}
-
-/// A file's extension in lower case, empty when it has none.
-pub(in crate::scene) fn extension(path: &Path) -> String {
-    path.extension().and_then(|text| text.to_str()).unwrap_or("").to_lowercase()
 }
 
 /// A file's name without its folder.

@@ -13,4 +13,3 @@ pub use frames::{FrameChoice, Frames};
 pub use overrides::Override;
 
 pub(super) use file::name;
-pub(super) use objects::is_character;

@@ -1,13 +1,12 @@
 //! Reads the objects of a scene file.
 
-use std::path::Path;
 
-use super::file::{FAR, extension, name};
+use super::file::{FAR, name};
 use super::keys::names;
 use super::table::Table;
 use crate::error::Result;
-use crate::io::mesh::EXTENSIONS;
-use crate::motion::{Space, Up};
+use crate::io::mesh::{EXTENSIONS, extension};
+use crate::motion::{Space, Up, is_gltf};
 use crate::scene::{Key, Object, Role};
 
 /// Every `[[object]]`, in the file's order.
@@ -18,7 +17,7 @@ pub(super) fn objects(root: &Table) -> Result<Vec<Object>> {
 
 fn object(table: &Table) -> Result<Object> {
     let file = table.path("file")?.ok_or_else(|| table.error("file", "is missing"))?;
-    let is_character = is_character(&file);
+    let is_character = is_gltf(&file);
     if !is_character && !EXTENSIONS.contains(&extension(&file).as_str()) {
         let what = format!("must be a .glb, .gltf, .obj, .ply or .stl file, not \"{}\"", name(&file));
         return Err(table.error("file", what));
@@ -42,11 +41,6 @@ fn object(table: &Table) -> Result<Object> {
         keys: keys(table)?,
         ease: table.flag("ease")?.unwrap_or(false),
     })
-}
-
-/// Whether a file is a glTF character.
-pub(in crate::scene) fn is_character(file: &Path) -> bool {
-    matches!(extension(file).as_str(), "glb" | "gltf")
 }
 
 /// The roles by name.

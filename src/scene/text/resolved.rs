@@ -1,8 +1,7 @@
 //! Writes a scene with every default filled in and commented: the file beside the output that reproduces it.
 
 use super::keys;
-use super::objects::is_character;
-use crate::motion::Up;
+use crate::motion::{Up, is_gltf};
 use crate::scene::{BaseMode, Ground, Layer, Object, Role, Scene};
 use std::fmt::Write;
 use std::path::{Path, PathBuf};
@@ -106,7 +105,7 @@ const VERSION: &str = env!("CARGO_PKG_VERSION");
 fn write_object(out: &mut String, object: &Object) -> std::fmt::Result {
     writeln!(out, "\n[[object]]")?;
     line(out, "object.file", &file(&object.file))?;
-    if is_character(&object.file) {
+    if is_gltf(&object.file) {
         if let Some(node) = &object.node {
             line(out, "object.node", &quoted(node))?;
         }
