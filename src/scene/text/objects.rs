@@ -1,6 +1,5 @@
 //! Reads the objects of a scene file.
 
-
 use super::file::{FAR, name};
 use super::keys::names;
 use super::table::Table;
