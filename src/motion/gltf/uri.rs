@@ -102,7 +102,10 @@ mod tests {
         for (text, bytes) in cases {
             let read = written_out(&format!("data:application/octet-stream;base64,{text}")).unwrap();
             assert_eq!(&read[..bytes.len()], bytes, "{text}");
-            assert!(read.len() % 4 == 0 && read[bytes.len()..].iter().all(|&byte| byte == 0), "{text}");
+            assert!(
+                read.len().is_multiple_of(4) && read[bytes.len()..].iter().all(|&byte| byte == 0),
+                "{text}"
+            );
         }
         // A letter too many, bits that say nothing, signs of another alphabet, a line's end, padding inside.
         for wrong in ["Z", "Zm9vY", "Zh==", "Zm9=", "Zm-v", "Zm9v\n", "Zg==Zm9v", "Zg==="] {
