@@ -160,7 +160,6 @@ impl<'a> Run<'a> {
         cache.check_inputs(stage.as_stage(), asked.frames, &upstream.iter().collect::<Vec<_>>())?;
         let (there, todo): (Vec<i32>, Vec<i32>) =
             asked.frames.iter().partition(|frame| cache.stored.is_done(*frame));
-        // Frames between are stepped through: they read what is upstream too.
         self.refuse_missing(stage.as_stage(), &todo, &upstream)?;
         (run.there, run.todo, run.cache) = (there.len(), todo, Some(cache));
         Ok(run)
