@@ -149,7 +149,7 @@ fn edit(h: &mut Harness, man: &Path) {
     let scene = character::walk_scene(folder.path(), man, 240, 0.0075, "");
     let scene = Scene::read(&scene).expect("a scene");
     let inputs = Inputs::load(&scene).expect("inputs");
-    let layer = inputs.layer(&ctx, CELL).expect("a layer");
+    let layer = inputs.layer(&ctx).expect("a layer");
     let mut base = BaseLayer::new(&ctx, layer, Params::for_cell(CELL)).expect("a layer");
     let time = |frame: i32| f64::from(frame) / FPS;
     base.step(&ctx, &inputs.bodies, time(1), time(1), 1).expect("first pose");

@@ -10,7 +10,7 @@ use super::views::{finite, frz_view, meaning};
 use crate::base::DVec3;
 use crate::context::Context;
 use crate::error::{Error, Result};
-use crate::snow::base_layer::{self, NoiseParams};
+use crate::snow::{NoiseParams, base_layer};
 use crate::sweep::{self, Body, Settings, surface_bytes};
 use crate::vdb::level_set::{self, Scheme};
 use crate::vdb::{FloatGrid, GridClass};

@@ -1,6 +1,6 @@
 //! `frazil new`: a scene to begin with.
 
-use frazil::scene::template;
+use frazil::scene::{reference, template};
 
 use super::exit::{Failure, Phase};
 use super::output;
@@ -12,6 +12,9 @@ pub struct Args {
     /// What the scene is about.
     #[arg(value_enum)]
     system: System,
+    /// Print a table of all keys in Markdown instead: what they hold, defaults, meaning.
+    #[arg(long)]
+    keys: bool,
 }
 
 #[derive(Clone, Copy, clap::ValueEnum)]
@@ -23,5 +26,5 @@ enum System {
 /// Runs the command.
 pub fn run(args: &Args) -> Result<(), Failure> {
     let System::Snow = args.system;
-    output::print(template::SNOW).during()
+    output::print(&if args.keys { reference() } else { template() }).during()
 }

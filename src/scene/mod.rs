@@ -12,11 +12,12 @@ pub mod snow;
 mod text;
 
 pub use snow::{Inputs, Rebuild, Walk, check_memory, estimate};
-pub use text::{FrameChoice, Frames, Override, template};
+pub use text::{FrameChoice, Frames, Override, Value, Values, reference, template};
 
+use crate::error::{Error, Result};
 use crate::io::sequence::Pattern;
 use crate::motion::Space;
-use crate::snow::base_layer::NoiseParams;
+use crate::snow::NoiseParams;
 use std::path::PathBuf;
 
 /// A scene with every default filled in and every path absolute.
@@ -26,12 +27,14 @@ pub struct Scene {
     pub path: PathBuf,
     /// Which frames, how fast.
     pub shot: Shot,
-    /// The layer of snow.
-    pub snow: Snow,
+    /// The layer of snow, where it has one.
+    pub snow: Option<Snow>,
     /// The objects, in the file's order.
     pub objects: Vec<Object>,
     /// What is written.
     pub output: Output,
+    /// The value of every key, from which the fields above are made.
+    pub values: Values,
 }
 
 /// Which frames are made, how fast.
@@ -103,14 +106,14 @@ pub struct Object {
     /// Whether its cuts have ragged edges.
     pub noise: bool,
     /// Rigid motion composed over the file's own; ascending frames; may be empty.
-    pub keys: Vec<Key>,
+    pub keys: Vec<KeyPose>,
     /// Whether the keys are joined smoothly: see [`crate::motion::Keys::with_ease`].
     pub ease: bool,
 }
 
 /// A rigid pose at a frame; linear in between (or with ease), constant before the first and after the last.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Key {
+#[derive(Debug, Clone, Copy, PartialEq, serde::Serialize)]
+pub struct KeyPose {
     /// Frame of the shot.
     pub frame: f64,
     /// Where the object's origin is (m).
@@ -159,14 +162,21 @@ pub enum BaseMode {
 }
 
 impl Scene {
+    /// Its layer of snow.
+    ///
+    /// # Errors
+    /// It has none.
+    pub fn snow(&self) -> Result<&Snow> {
+        self.snow
+            .as_ref()
+            .ok_or_else(|| Error::argument(format!("{}: `snow` is missing", self.path.display())))
+    }
+
     /// The files that it reads; of sequences those of its own first frame.
     pub(crate) fn files(&self) -> Vec<PathBuf> {
         let mut out = Vec::new();
-        if let Some(Ground::Mesh(path)) = &self.snow.ground {
-            out.push(path.clone());
-        }
-        if let Layer::Top(path) | Layer::Grid(path) = &self.snow.layer {
-            out.push(path.clone());
+        if let Some(snow) = &self.snow {
+            out.extend(snow.files().map(|(_, path)| path.clone()));
         }
         for object in &self.objects {
             let first = f64::from(self.shot.frames.first) - object.offset;
@@ -179,17 +189,18 @@ impl Scene {
     }
 }
 
-impl Default for Output {
-    fn default() -> Self {
-        Self {
-            base: true,
-            base_mode: BaseMode::Full,
-            half: false,
-            removed: true,
-            objects_usd: false,
-            objects_ply: false,
-            usd: true,
-        }
+impl Snow {
+    /// The files that make it, by their keys.
+    pub(crate) fn files(&self) -> impl Iterator<Item = (&'static str, &PathBuf)> {
+        let ground = match &self.ground {
+            Some(Ground::Mesh(path)) => Some(("snow.ground", path)),
+            _ => None,
+        };
+        let top = match &self.layer {
+            Layer::Top(path) | Layer::Grid(path) => Some(("snow.top", path)),
+            Layer::Depth(_) => None,
+        };
+        ground.into_iter().chain(top)
     }
 }
 

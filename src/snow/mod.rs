@@ -1,3 +1,7 @@
 //! A deep layer of snow that objects move through (thesis chapter 3).
 
+#[cfg(feature = "vdb")]
 pub mod base_layer;
+mod noise;
+
+pub use noise::NoiseParams;

@@ -3,7 +3,8 @@
 use super::{VdbOutput, read_level_set};
 use crate::cli::exit::{Failure, Phase};
 use crate::cli::session::Session;
-use frazil::snow::base_layer::{NoiseParams, displace};
+use frazil::snow::NoiseParams;
+use frazil::snow::base_layer::displace;
 use std::path::PathBuf;
 
 /// Displace a level set's surface outward by noise, never inward

@@ -59,7 +59,7 @@ impl<'a> Base<'a> {
         if self.scene.output.base_mode == BaseMode::Full {
             return vdb_bytes(self.scene, step.frame, &writer.copy()?.list(), made_from);
         }
-        let delta = Grids::delta(&writer.ctx, self.scene.snow.cell, writer.half_width, &step.changes)?;
+        let delta = Grids::delta(&writer.ctx, self.inputs.snow.cell, writer.half_width, &step.changes)?;
         vdb_bytes(self.scene, step.frame, &delta.list(), made_from)
     }
 }
@@ -124,12 +124,12 @@ impl Stepping for Base<'_> {
 
     fn load(&self, ctx: &Context, done: &Stored, after: Option<i32>) -> Result<BaseLayer> {
         let scene = self.scene;
-        let noise = Some(scene.snow.noise).filter(|noise| noise.amplitude > 0.0);
+        let noise = Some(self.inputs.snow.noise).filter(|noise| noise.amplitude > 0.0);
         let params = Params { noise, tolerance: TOLERANCE };
-        let initial = self.inputs.layer(ctx, scene.snow.cell);
+        let initial = self.inputs.layer(ctx);
         let initial = initial.map_err(|error| match (error, self.inputs.far_static(scene)) {
             (Error::Argument(_), Some((index, far))) => {
-                Error::file(&scene.path, inputs::too_far(scene, index, far))
+                Error::file(&scene.path, inputs::too_far(scene, index, far, self.inputs.snow.cell))
             }
             (other, _) => other,
         })?;
@@ -137,7 +137,7 @@ impl Stepping for Base<'_> {
             None => BaseLayer::new(ctx, initial, params)?,
             Some(frame) => BaseLayer::resume(ctx, initial, grids(ctx, done, frame)?, params)?,
         };
-        layer.set_min_crumb(scene.snow.min_crumb);
+        layer.set_min_crumb(self.inputs.snow.min_crumb);
         log::info!(
             "snow: {} active voxels, {:.1} MB, {:.6} m3; {}",
             layer.surface().active_voxels(),

@@ -1,5 +1,7 @@
 //! Looks at every input of every frame of a scene, and computes nothing else.
 
+use std::collections::BTreeMap;
+
 use rayon::prelude::*;
 use serde::Serialize;
 
@@ -10,7 +12,7 @@ use crate::base::{DVec3, faults};
 use crate::context::Context;
 use crate::error::{Error, Result};
 use crate::motion::{Motion, Poses, span};
-use crate::scene::{BaseMode, Layer, Object, Role, Scene};
+use crate::scene::{BaseMode, Layer, Object, Role, Scene, Value};
 use crate::snow::base_layer::Reach;
 use crate::snow::base_layer::initial::thin;
 use crate::sweep::{Body, REACH};
@@ -55,6 +57,8 @@ pub struct Report {
     pub disk_bytes: Option<u64>,
     /// What looks wrong, one sentence each.
     pub warnings: Vec<String>,
+    /// Every setting, defaults filled in: `snow.cell`, `object[1].scale`.
+    pub settings: BTreeMap<String, Value>,
 }
 
 /// What an object does over the shot.
@@ -119,11 +123,11 @@ struct Extent {
 /// A frame that cannot be read or fits no other; cancel.
 pub fn check(ctx: &Context, scene: &Scene, inputs: &Inputs) -> Result<Report> {
     let mut warnings = inputs.warnings.clone();
-    if let Layer::Depth(depth) = scene.snow.layer {
-        warnings.extend(thin(depth, scene.snow.cell));
+    if let Layer::Depth(depth) = inputs.snow.layer {
+        warnings.extend(thin(depth, inputs.snow.cell));
     }
     let area = inputs.area();
-    let top = inputs.top(scene);
+    let top = inputs.top();
     let colliders = scene.objects.iter().enumerate().filter(|(_, object)| object.role == Role::Collide);
     let relief = Relief::new(inputs);
     let mut objects = Vec::new();
@@ -135,11 +139,13 @@ pub fn check(ctx: &Context, scene: &Scene, inputs: &Inputs) -> Result<Report> {
         told.holes = holes(scene, body)?;
         told.deepest = relief.as_ref().and_then(|relief| deepest(relief, &extents));
         told.walk = walk(scene, object, body.motion())?;
-        warn_of_feet(scene, &name_of(index, object), &told, &mut warnings);
+        warn_of_feet(inputs.snow.cell, &name_of(index, object), &told, &mut warnings);
         objects.push(told);
     }
-    warnings.extend(inputs.far_static(scene).map(|(index, far)| inputs::too_far(scene, index, far)));
-    let columns = area.map(|[x0, z0, x1, z1]| (x1 - x0) * (z1 - z0) / (scene.snow.cell * scene.snow.cell));
+    warnings.extend(
+        inputs.far_static(scene).map(|(index, far)| inputs::too_far(scene, index, far, inputs.snow.cell)),
+    );
+    let columns = area.map(|[x0, z0, x1, z1]| (x1 - x0) * (z1 - z0) / inputs.snow.cell.powi(2));
     if objects.is_empty() {
         warnings.push("nothing moves through the snow: no object has the role collide".into());
     }
@@ -147,11 +153,12 @@ pub fn check(ctx: &Context, scene: &Scene, inputs: &Inputs) -> Result<Report> {
         frames: [scene.shot.frames.first, scene.shot.frames.last],
         fps: scene.shot.fps,
         area_m: area,
-        cell_m: scene.snow.cell,
+        cell_m: inputs.snow.cell,
         objects,
         memory_bytes: memory::estimate(scene, inputs)?,
         disk_bytes: Some(disk(scene, inputs, whole_base(inputs, columns))),
         warnings,
+        settings: scene.values.by_path(),
     })
 }
 
@@ -216,8 +223,8 @@ fn out_of_reach(
     body: &Body,
     extents: &[Extent],
 ) -> Result<Option<String>> {
-    let Some((low, high)) = inputs.bounds(scene) else { return Ok(None) };
-    let (middle, cell) = (0.5 * (low + high), scene.snow.cell);
+    let Some((low, high)) = inputs.bounds() else { return Ok(None) };
+    let (middle, cell) = (0.5 * (low + high), inputs.snow.cell);
     // The snow's own middle, known when it is made, may be another.
     let near = (0.5 * REACH * cell).min(REACH * cell - (high - low).norm());
     let is_far = |extent: &Extent| {
@@ -319,8 +326,8 @@ fn deepest(relief: &Relief, extents: &[Extent]) -> Option<Deepest> {
 }
 
 /// What is wrong with where an object's lowest parts go.
-fn warn_of_feet(scene: &Scene, name: &str, told: &ObjectReport, warnings: &mut Vec<String>) {
-    if let Some(deep) = told.deepest.filter(|deep| deep.above_ground_m < -0.5 * scene.snow.cell) {
+fn warn_of_feet(cell: f64, name: &str, told: &ObjectReport, warnings: &mut Vec<String>) {
+    if let Some(deep) = told.deepest.filter(|deep| deep.above_ground_m < -0.5 * cell) {
         warnings.push(format!(
             "{name} goes {:.3} m below the ground at frame {}: raise it by its keys, or its prints go through the snow",
             -deep.above_ground_m, deep.frame

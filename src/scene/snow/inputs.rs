@@ -11,7 +11,7 @@ use crate::io::seen::Seen;
 use crate::io::sequence::Pattern;
 use crate::io::{hash, mesh};
 use crate::motion::{Character, Key, Keys, MeshSequence, Motion, Placed, Play, Rigid, is_gltf, missing_uvs};
-use crate::scene::{Ground, Layer, Object, Role, Scene};
+use crate::scene::{Ground, Layer, Object, Role, Scene, Snow};
 use crate::snow::base_layer::initial::{self, Cover};
 use crate::sweep::{self, Body, REACH};
 use crate::vdb::{FloatGrid, GridClass, file};
@@ -21,7 +21,9 @@ const HALF_WIDTH: f32 = 3.0;
 
 /// What a scene's files hold.
 pub struct Inputs {
-    snow: Snow,
+    /// The layer that they make.
+    pub(super) snow: Snow,
+    source: Source,
     statics: Vec<TriMesh>,
     /// The objects that move through the snow.
     pub bodies: Vec<Body>,
@@ -31,7 +33,8 @@ pub struct Inputs {
     pub warnings: Vec<String>,
 }
 
-enum Snow {
+/// What the first layer is made from.
+enum Source {
     Made { ground: initial::Ground, cover: Cover },
     Given(FloatGrid),
 }
@@ -43,18 +46,21 @@ impl Inputs {
     /// What the files or keys have wrong, with file and key.
     pub fn load(scene: &Scene) -> Result<Self> {
         let seen = Arc::new(Seen::default());
-        let snow = match &scene.snow.layer {
-            Layer::Grid(path) => Snow::Given(layer_grid(path, scene.snow.cell, &seen)?),
-            Layer::Depth(depth) => Snow::Made { ground: ground(scene, &seen)?, cover: Cover::Depth(*depth) },
+        let snow = scene.snow()?.clone();
+        let source = match &snow.layer {
+            Layer::Grid(path) => Source::Given(layer_grid(path, snow.cell, &seen)?),
+            Layer::Depth(depth) => {
+                Source::Made { ground: ground(&snow, &seen)?, cover: Cover::Depth(*depth) }
+            }
             Layer::Top(path) => {
-                Snow::Made { ground: ground(scene, &seen)?, cover: Cover::Top(read_mesh(path, &seen)?) }
+                Source::Made { ground: ground(&snow, &seen)?, cover: Cover::Top(read_mesh(path, &seen)?) }
             }
         };
         let mut warnings = Vec::new();
-        if let Snow::Made { ground, cover } = &snow {
-            initial::fits(ground, cover, scene.snow.cell)
+        if let Source::Made { ground, cover } = &source {
+            initial::fits(ground, cover, snow.cell)
                 .map_err(|error| Error::argument(format!("{}: {error}", scene.path.display())))?;
-            warnings.extend(far_meshes(scene, ground, cover));
+            warnings.extend(far_meshes(&snow, ground, cover));
         }
         let start = f64::from(scene.shot.frames.first) / scene.shot.fps;
         let (mut statics, mut bodies) = (Vec::new(), Vec::new());
@@ -86,27 +92,27 @@ impl Inputs {
             }
         }
         warnings.iter().for_each(|warning| log::warn!("{warning}"));
-        Ok(Self { snow, statics, bodies, seen, warnings })
+        Ok(Self { snow, source, statics, bodies, seen, warnings })
     }
 
     /// Least and greatest x and z of the snow (m), as far as they are known before it is made.
     pub fn area(&self) -> Option<[f64; 4]> {
-        match &self.snow {
-            Snow::Made { ground: initial::Ground::Plane { area, .. }, .. } => Some(*area),
-            Snow::Made { ground: initial::Ground::Mesh(mesh), .. } => {
+        match &self.source {
+            Source::Made { ground: initial::Ground::Plane { area, .. }, .. } => Some(*area),
+            Source::Made { ground: initial::Ground::Mesh(mesh), .. } => {
                 let (low, high) = mesh.bounds()?;
                 Some([low.x, low.z, high.x, high.z].map(f64::from))
             }
-            Snow::Given(_) => None,
+            Source::Given(_) => None,
         }
     }
 
     /// Height of the snow's highest point (m), as far as it is known before it is made; static objects left out.
-    pub fn top(&self, scene: &Scene) -> Option<f64> {
+    pub fn top(&self) -> Option<f64> {
         let highest = |mesh: &TriMesh| mesh.bounds().map(|(_, high)| f64::from(high.y));
-        match (&self.snow, &scene.snow.layer) {
-            (Snow::Made { cover: Cover::Top(top), .. }, _) => highest(top),
-            (Snow::Made { ground, .. }, Layer::Depth(depth)) => {
+        match (&self.source, &self.snow.layer) {
+            (Source::Made { cover: Cover::Top(top), .. }, _) => highest(top),
+            (Source::Made { ground, .. }, Layer::Depth(depth)) => {
                 let ground = match ground {
                     initial::Ground::Plane { height, .. } => Some(*height),
                     initial::Ground::Mesh(mesh) => highest(mesh),
@@ -120,16 +126,16 @@ impl Inputs {
 
     /// Least and greatest corner of what the snow's ground, top and static objects span (m); of a given layer, of its
     /// active voxels.
-    pub fn bounds(&self, scene: &Scene) -> Option<(DVec3, DVec3)> {
+    pub fn bounds(&self) -> Option<(DVec3, DVec3)> {
         let of_mesh =
             |mesh: &TriMesh| mesh.bounds().map(|(low, high)| (low.cast::<f64>(), high.cast::<f64>()));
-        let (ground, top) = match &self.snow {
-            Snow::Given(grid) => {
+        let (ground, top) = match &self.source {
+            Source::Given(grid) => {
                 let (low, high) = grid.active_bbox()?;
                 let corner = |voxel: [i32; 3]| DVec3::from(voxel.map(f64::from)) * grid.voxel_size();
                 return Some((corner(low), corner(high)));
             }
-            Snow::Made { ground, cover } => {
+            Source::Made { ground, cover } => {
                 (ground, if let Cover::Top(top) = cover { of_mesh(top) } else { None })
             }
         };
@@ -141,7 +147,7 @@ impl Inputs {
         };
         let all = self.statics.iter().map(of_mesh).chain([top]).flatten();
         let (low, mut high) = all.fold(ground?, |(low, high), (l, h)| (low.inf(&l), high.sup(&h)));
-        if let Layer::Depth(depth) = &scene.snow.layer {
+        if let Layer::Depth(depth) = &self.snow.layer {
             high.y += depth;
         }
         Some((low, high))
@@ -150,7 +156,7 @@ impl Inputs {
     /// A static object that lies too far from the snow's ground, by its place among the objects, with how far it reaches
     /// (m).
     pub(super) fn far_static(&self, scene: &Scene) -> Option<(usize, f64)> {
-        let Snow::Made { ground, .. } = &self.snow else { return None };
+        let Source::Made { ground, .. } = &self.source else { return None };
         let middle = match ground {
             initial::Ground::Plane { height, area: [x0, z0, x1, z1] } => {
                 DVec3::new(0.5 * (x0 + x1), *height, 0.5 * (z0 + z1))
@@ -165,23 +171,23 @@ impl Inputs {
             let (low, high) = mesh.bounds()?;
             let far = (low.cast::<f64>() - middle).abs().sup(&(high.cast::<f64>() - middle).abs()).max();
             // The layer's own lattice begins at the mean of the ground's vertices, which may lie off its middle.
-            (far > 0.9 * REACH * scene.snow.cell).then_some((index, far))
+            (far > 0.9 * REACH * self.snow.cell).then_some((index, far))
         })
     }
 
     /// What the snow lies on and how much of it there is, where it is not given as a level set.
     pub(super) fn made(&self) -> Option<(&initial::Ground, &Cover)> {
-        match &self.snow {
-            Snow::Made { ground, cover } => Some((ground, cover)),
-            Snow::Given(_) => None,
+        match &self.source {
+            Source::Made { ground, cover } => Some((ground, cover)),
+            Source::Given(_) => None,
         }
     }
 
     /// The snow where it is given as a level set.
     pub(super) fn given(&self) -> Option<&FloatGrid> {
-        match &self.snow {
-            Snow::Given(grid) => Some(grid),
-            Snow::Made { .. } => None,
+        match &self.source {
+            Source::Given(grid) => Some(grid),
+            Source::Made { .. } => None,
         }
     }
 
@@ -189,21 +195,21 @@ impl Inputs {
     ///
     /// # Errors
     /// As [`initial::layer`].
-    pub fn layer(&self, ctx: &Context, cell: f64) -> Result<FloatGrid> {
-        match &self.snow {
-            Snow::Given(grid) => grid.deep_copy(),
-            Snow::Made { ground, cover } => {
-                initial::layer(ctx, ground, &self.statics, cover, cell, HALF_WIDTH)
+    pub fn layer(&self, ctx: &Context) -> Result<FloatGrid> {
+        match &self.source {
+            Source::Given(grid) => grid.deep_copy(),
+            Source::Made { ground, cover } => {
+                initial::layer(ctx, ground, &self.statics, cover, self.snow.cell, HALF_WIDTH)
             }
         }
     }
 }
 
 /// Says that a static object lies too far away.
-pub(super) fn too_far(scene: &Scene, index: usize, far: f64) -> String {
+pub(super) fn too_far(scene: &Scene, index: usize, far: f64, cell: f64) -> String {
     let name = crate::scene::text::name(&scene.objects[index].file);
     let what = format!("object {} ({name}), static, reaches", index + 1);
-    sweep::too_far(&what, far, "the middle of the ground", scene.snow.cell)
+    sweep::too_far(&what, far, "the middle of the ground", cell)
 }
 
 fn read_mesh(path: &Path, seen: &Seen) -> Result<TriMesh> {
@@ -211,8 +217,8 @@ fn read_mesh(path: &Path, seen: &Seen) -> Result<TriMesh> {
     mesh::parse_polygons(path, &seen.read(path)?).map(|mesh| mesh.into_triangles().without_unused())
 }
 
-fn ground(scene: &Scene, seen: &Seen) -> Result<initial::Ground> {
-    match &scene.snow.ground {
+fn ground(snow: &Snow, seen: &Seen) -> Result<initial::Ground> {
+    match &snow.ground {
         Some(Ground::Plane { height, area }) => Ok(initial::Ground::Plane { height: *height, area: *area }),
         Some(Ground::Mesh(path)) => Ok(initial::Ground::Mesh(read_mesh(path, seen)?)),
         None => Err(Error::argument("the snow has no ground")),
@@ -220,16 +226,16 @@ fn ground(scene: &Scene, seen: &Seen) -> Result<initial::Ground> {
 }
 
 /// What to say of a ground's or top's mesh that lies far from the origin.
-fn far_meshes(scene: &Scene, ground: &initial::Ground, cover: &Cover) -> Vec<String> {
+fn far_meshes(snow: &Snow, ground: &initial::Ground, cover: &Cover) -> Vec<String> {
     let told = |path: &Path, mesh: &TriMesh| {
         let farthest = mesh.positions.iter().map(|p| f64::from(p.amax())).fold(0.0, f64::max);
-        far_mesh(&path.display().to_string(), farthest, 1.0, scene.snow.cell)
+        far_mesh(&path.display().to_string(), farthest, 1.0, snow.cell)
     };
     let mut out = Vec::new();
-    if let (Some(Ground::Mesh(path)), initial::Ground::Mesh(mesh)) = (&scene.snow.ground, ground) {
+    if let (Some(Ground::Mesh(path)), initial::Ground::Mesh(mesh)) = (&snow.ground, ground) {
         out.extend(told(path, mesh));
     }
-    if let (Layer::Top(path), Cover::Top(mesh)) = (&scene.snow.layer, cover) {
+    if let (Layer::Top(path), Cover::Top(mesh)) = (&snow.layer, cover) {
         out.extend(told(path, mesh));
     }
     // No key moves these.
@@ -286,7 +292,7 @@ fn motion(
     let mut pose = Vec::new();
     own.pose(f64::from(scene.shot.frames.first) / fps, &mut pose)?;
     let name = object.file.display().to_string();
-    warnings.extend(far_mesh(&name, farthest(pose.iter()), object.space.scale, scene.snow.cell));
+    warnings.extend(far_mesh(&name, farthest(pose.iter()), object.space.scale, scene.snow()?.cell));
     if scene.output.objects_usd || scene.output.objects_ply {
         let missing = own.drawn().uvs.map_or(0, |uvs| uvs.missing);
         warnings.extend((missing > 0).then(|| missing_uvs(&name, missing)));

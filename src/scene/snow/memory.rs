@@ -18,12 +18,12 @@ const FIXED: f64 = 64e6;
 /// When the layer's file cannot be read.
 pub fn estimate(scene: &Scene, inputs: &Inputs) -> Result<u64> {
     let triangles: usize = inputs.bodies.iter().map(|body| body.motion().triangles().len()).sum();
-    let layer = match (&scene.snow.layer, inputs.area()) {
+    let layer = match (&inputs.snow.layer, inputs.area()) {
         (Layer::Grid(path), _) => {
             1.5 * file::describe(path)?.iter().filter_map(|grid| grid.memory).sum::<u64>() as f64
         }
         (_, Some([x0, z0, x1, z1])) => {
-            let columns = ((x1 - x0) / scene.snow.cell + 8.0) * ((z1 - z0) / scene.snow.cell + 8.0);
+            let columns = ((x1 - x0) / inputs.snow.cell + 8.0) * ((z1 - z0) / inputs.snow.cell + 8.0);
             columns * BYTES_PER_COLUMN
         }
         (_, None) => 0.0,
@@ -41,7 +41,7 @@ pub fn estimate(scene: &Scene, inputs: &Inputs) -> Result<u64> {
 pub fn check(scene: &Scene, inputs: &Inputs, limit: u64) -> Result<()> {
     let needed = estimate(scene, inputs)?;
     if needed > limit {
-        return Err(Error::Memory { what: format!("cell = {} m", scene.snow.cell), needed, limit });
+        return Err(Error::Memory { what: format!("cell = {} m", inputs.snow.cell), needed, limit });
     }
     Ok(())
 }

@@ -1,14 +1,20 @@
 //! Snow in scenes: what its files hold ([`Inputs`]), what a check says of it ([`check`]), what memory it takes, and its
 //! stages: the base layer (`base.rs`).
 
+#[cfg(feature = "vdb")]
 mod base;
+#[cfg(feature = "vdb")]
 pub mod check;
+#[cfg(feature = "vdb")]
 mod inputs;
+mod keys;
 mod memory;
 mod rebuild;
 mod relief;
 mod settings;
 mod walks;
+
+pub(super) use keys::KEYS;
 
 pub use inputs::Inputs;
 pub use memory::{check as check_memory, estimate};

@@ -3,8 +3,9 @@
 use crate::error::Result;
 use crate::io::seen::Seen;
 use crate::scene::shot::Settings;
-use crate::scene::text::keys::{Scope, scope, settings_of};
-use crate::scene::{Ground, Layer, Role, Scene, shot};
+use crate::scene::text::Scope;
+use crate::scene::text::keys::{self, settings_of};
+use crate::scene::{Role, Scene, shot};
 
 /// The settings that the base depends on. Of the frames only the first counts: a shot may grow.
 ///
@@ -12,15 +13,8 @@ use crate::scene::{Ground, Layer, Role, Scene, shot};
 /// An input that cannot be read.
 pub(super) fn of_base(scene: &Scene, seen: &Seen) -> Result<Settings> {
     let mut settings = settings_of(scene, "base", seen, &[Role::Collide, Role::Static])?;
-    let mut content = |key: &str, path| -> Result<()> {
+    for (key, path) in scene.snow.iter().flat_map(|snow| snow.files()) {
         settings.insert(key.into(), format!("{}{}", shot::CONTENT, seen.hash(path)?));
-        Ok(())
-    };
-    if let Some(Ground::Mesh(path)) = &scene.snow.ground {
-        content("snow.ground", path)?;
-    }
-    if let Layer::Top(path) | Layer::Grid(path) = &scene.snow.layer {
-        content("snow.top", path)?;
     }
     Ok(settings)
 }
@@ -28,7 +22,8 @@ pub(super) fn of_base(scene: &Scene, seen: &Seen) -> Result<Settings> {
 /// The settings that make the layer before the first frame: what was kept cannot go on as another layer. Static objects
 /// are counted by themselves: others may come and go.
 pub(super) fn of_layer(all: &Settings) -> Settings {
-    let is_first = |key: &str| scope(key, "base") == Some(Scope::First);
+    let is_first =
+        |key: &str| keys::find(keys::all(), key).is_some_and(|key| key.scope("base") == Some(Scope::First));
     let of_snow = all.iter().filter(|(key, _)| is_first(key));
     let mut out: Settings = of_snow.map(|(key, value)| (key.clone(), value.clone())).collect();
     let index = |key: &str| key.strip_prefix("object[")?.strip_suffix("].role")?.parse::<usize>().ok();
@@ -53,24 +48,27 @@ pub(super) fn of_layer(all: &Settings) -> Settings {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::scene::text::keys::flattened;
     use shot::changed;
+
+    fn settings(all: &[(&str, &str)]) -> Settings {
+        all.iter().map(|(key, value)| (key.to_string(), value.to_string())).collect()
+    }
 
     #[test]
     fn static_objects_make_the_layer_wherever_they_stand() {
-        let layer = |text: &str| of_layer(&flattened(text).unwrap());
-        let rock = |scale: f64| format!("[[object]]\nrole = \"static\"\nscale = {scale:?}\n");
-        let foot = "[[object]]\nrole = \"collide\"\nscale = 3.0\n";
-        let [one, two] = [layer(&(rock(1.0) + foot)), layer(&(foot.to_string() + foot + &rock(1.0)))];
-        assert_eq!(changed(&one, &two), Vec::<String>::new());
-        assert_eq!(changed(&one, &layer(&(rock(2.0) + foot))), ["static object 1: scale was 1.0"]);
-        assert_eq!(changed(&one, &layer(foot)), ["static object 1: scale was 1.0"]);
-        assert_eq!(changed(&layer(foot), &one), ["static object 1: scale was not there"]);
+        const ROLES: [(&str, &str); 2] = [("object[1].role", "\"static\""), ("object[3].role", "\"static\"")];
+        let rock = |scale| of_layer(&settings(&[ROLES[0], ("object[1].scale", scale)]));
+        let later = of_layer(&settings(&[("object[2].scale", "3.0"), ROLES[1], ("object[3].scale", "1.0")]));
+        let none = of_layer(&settings(&[("object[1].scale", "3.0"), ("object[1].role", "\"collide\"")]));
+        assert_eq!(changed(&rock("1.0"), &later), Vec::<String>::new());
+        assert_eq!(changed(&rock("1.0"), &rock("2.0")), ["static object 1: scale was 1.0"]);
+        assert_eq!(changed(&rock("1.0"), &none), ["static object 1: scale was 1.0"]);
+        assert_eq!(changed(&none, &rock("1.0")), ["static object 1: scale was not there"]);
     }
 
     #[test]
     fn only_what_makes_the_layer_is_of_the_layer() {
-        let all = flattened("[snow]\ndepth = 0.3\nmin_crumb = 0\n[output]\nhalf = true\n").unwrap();
+        let all = settings(&[("snow.depth", "0.3"), ("snow.min_crumb", "0"), ("output.half", "true")]);
         assert_eq!(of_layer(&all).into_keys().collect::<Vec<_>>(), ["snow.depth"]);
     }
 }

@@ -1,18 +1,14 @@
-//! Reads a scene file: keys to fields, defaults filled in, ranges checked.
+//! Reads a scene file: its tables, the values of their keys, and what systems make of them.
 
-use super::keys::names;
-use super::objects::objects;
+use super::key::{Default, Key, OBJECT, heading};
+use super::keys::{self, tables};
 use super::overrides::Override;
 use super::table::{Document, Table};
+use super::values::Values;
 use crate::error::{Error, Result};
-use crate::io::mesh::{EXTENSIONS, extension};
-use crate::scene::{BaseMode, Frames, Ground, Layer, Output, Scene, Shot, Snow};
-use crate::snow::base_layer::NoiseParams;
+use crate::scene::{Object, Output, Scene, Shot, Snow};
 use std::path::{Path, PathBuf};
 use toml::de::DeTable;
-
-/// Farthest coordinate that a scene may name (m): f32 positions keep millimetres up to here.
-pub(super) const FAR: f64 = 1.0e5;
 
 impl Scene {
     /// Reads a scene file. Relative paths in it are taken from its own folder.
@@ -40,6 +36,16 @@ impl Scene {
     /// # Errors
     /// As [`Scene::read`].
     pub fn parse(text: &str, path: &Path, overrides: &[Override]) -> Result<Self> {
+        Self::parse_keys(text, path, overrides, keys::all())
+    }
+
+    /// The same with other keys than those that there are.
+    pub(super) fn parse_keys(
+        text: &str,
+        path: &Path,
+        overrides: &[Override],
+        keys: &'static [Key],
+    ) -> Result<Self> {
         let document = Document { path, text, folder: folder_of(path)?, overrides };
         let mut root = DeTable::parse(text).map_err(|error| {
             let offset = error.span().map_or(0, |span| span.start);
@@ -48,16 +54,28 @@ impl Scene {
         for (index, setting) in overrides.iter().enumerate() {
             setting.apply(root.get_mut(), document.place_of(index), path)?;
         }
-        let known = ["shot", "snow", "object", "output"];
-        let root = Table::open(&document, "", root.get_ref(), 0, &known)?;
-        let snow = root.table("snow", "[snow]", &known_with("snow", &["noise"]))?;
-        Ok(Self {
+        let root = Table::open(&document, "", root.get_ref(), 0, &known(keys, ""))?;
+        let mut values = Values::new(keys);
+        for table in tables(keys).into_iter().filter(|table| !table.contains('.')) {
+            read_table(&document, &root, table, &mut values)?;
+        }
+        let scene = Self::of(path, values);
+        if scene.snow.is_none() {
+            return Err(root.error("snow", "is missing"));
+        }
+        Ok(scene)
+    }
+
+    /// The scene that some values make.
+    fn of(path: &Path, values: Values) -> Self {
+        Self {
             path: path.to_path_buf(),
-            shot: shot(&root)?,
-            snow: snow_layer(&snow.ok_or_else(|| root.error("snow", "is missing"))?)?,
-            objects: objects(&root)?,
-            output: output(&root)?,
-        })
+            shot: Shot::of(&values),
+            snow: Snow::of(&values),
+            objects: Object::all_of(&values),
+            output: Output::of(&values),
+            values,
+        }
     }
 
     /// Makes the cells `factor` times as large, for a quick look; noise too fine for them becomes coarser.
@@ -65,157 +83,77 @@ impl Scene {
     /// # Errors
     /// A layer from a .vdb file, whose cells are what they are; a cell out of range.
     pub fn coarsen(&mut self, factor: f64) -> Result<()> {
-        let refused = |what: String| Error::argument(format!("{}: {what}", self.path.display()));
-        if let Layer::Grid(path) = &self.snow.layer {
-            return Err(refused(format!("a preview needs other cells than those of {}", path.display())));
-        }
-        let cell = self.snow.cell * factor;
-        if !CELLS.contains(&cell) {
-            return Err(refused(format!("a preview would have cells of {cell} m")));
-        }
-        let noise = &mut self.snow.noise;
-        noise.size = noise.size.max(*NoiseParams::sizes(cell).start());
-        noise.amplitude = noise.amplitude.min(noise.steepest());
-        self.snow.cell = cell;
+        let mut values = self.values.clone();
+        self.snow()?
+            .coarsen(factor, &mut values)
+            .map_err(|what| Error::argument(format!("{}: {what}", self.path.display())))?;
+        *self = Self::of(&self.path, values);
         Ok(())
     }
 }
 
-/// The names of a table's keys, and of the tables in it.
-fn known_with(table: &str, tables: &[&'static str]) -> Vec<&'static str> {
-    names(table).into_iter().chain(tables.iter().copied()).collect()
+/// Reads a table, the tables in it, or every one of its name. One whose keys may not be left out is read only where it is.
+fn read_table<'d>(
+    document: &'d Document<'d>,
+    root: &Table<'d, '_>,
+    name: &str,
+    values: &mut Values,
+) -> Result<()> {
+    let keys = values.keys();
+    if name == OBJECT {
+        let tables = root.tables(name, &heading(name), &known(keys, name))?;
+        return tables
+            .iter()
+            .enumerate()
+            .try_for_each(|(index, table)| values.read(name, Some(index), table));
+    }
+    let table = match root.table(name, &heading(name), &known(keys, name))? {
+        Some(table) => table,
+        None if name == "shot" => return Err(root.error(name, "is missing")),
+        None if keys.iter().any(|key| key.table == name && key.default == Default::Required) => return Ok(()),
+        None => Table::absent(document, &heading(name)),
+    };
+    values.read(name, None, &table)?;
+    check(name, &table, values)?;
+    for inner in inner_tables(keys, name) {
+        let path = format!("{name}.{inner}");
+        let inner = table.table(inner, &heading(&path), &known(keys, &path))?;
+        let inner = inner.unwrap_or_else(|| Table::absent(document, &heading(&path)));
+        values.read(&path, None, &inner)?;
+        check(&path, &inner, values)?;
+    }
+    Ok(())
 }
 
-/// Edges of voxels that a scene may have (m).
-const CELLS: std::ops::RangeInclusive<f64> = 1.0e-5..=10.0;
+/// Checks what the keys of a table mean together.
+fn check(name: &str, table: &Table, values: &Values) -> Result<()> {
+    match name {
+        "snow" => Snow::check(table, values),
+        "snow.noise" => Snow::check_noise(table, values),
+        "output" => Output::check(table, values),
+        _ => Ok(()),
+    }
+}
+
+/// The names of a table's keys, and of the tables in it; of the file itself for an empty name.
+fn known(keys: &[Key], table: &str) -> Vec<&'static str> {
+    let own = keys.iter().filter(|key| key.table == table).map(|key| key.name);
+    own.chain(inner_tables(keys, table)).collect()
+}
+
+/// The names of the tables in a table.
+fn inner_tables(keys: &[Key], table: &str) -> Vec<&'static str> {
+    let inner = |name: &'static str| match table {
+        "" => Some(name),
+        _ => name.strip_prefix(table)?.strip_prefix('.'),
+    };
+    tables(keys).into_iter().filter_map(inner).filter(|name| !name.contains('.')).collect()
+}
 
 /// The absolute folder that a scene's relative paths start from.
 fn folder_of(path: &Path) -> Result<PathBuf> {
     let absolute = std::path::absolute(path).map_err(|error| Error::io(path, "find", error))?;
     Ok(absolute.parent().unwrap_or(Path::new("/")).to_path_buf())
-}
-
-fn shot(root: &Table) -> Result<Shot> {
-    let shot = root.table("shot", "[shot]", &names("shot"))?;
-    let shot = shot.ok_or_else(|| root.error("shot", "is missing"))?;
-    let frames = shot.text("frames")?.ok_or_else(|| shot.error("frames", "is missing"))?;
-    let frames: Frames = frames.parse().map_err(|what| shot.error("frames", format!("is wrong: {what}")))?;
-    let fps = shot.number_in("fps", 0.001..=100_000.0, "frames per second")?.unwrap_or(24.0);
-    Ok(Shot { frames, fps })
-}
-
-fn snow_layer(snow: &Table) -> Result<Snow> {
-    let cell = snow.number_in("cell", CELLS, "m")?;
-    let cell = cell.ok_or_else(|| snow.error("cell", "is missing"))?;
-    let layer = layer(snow)?;
-    let ground = ground(snow)?;
-    match layer {
-        Layer::Grid(_) if ground.is_some() => {
-            return Err(snow.error("ground", "is of no use beside a .vdb layer in `top`: leave it out"));
-        }
-        Layer::Depth(_) | Layer::Top(_) if ground.is_none() => {
-            return Err(snow.error("ground", "is missing"));
-        }
-        _ => {}
-    }
-    let min_crumb = snow.integer_in("min_crumb", 0..=10_000)?.unwrap_or(0) as usize;
-    Ok(Snow { ground, layer, cell, noise: noise(snow, cell)?, min_crumb })
-}
-
-fn layer(snow: &Table) -> Result<Layer> {
-    match (snow.number_in("depth", 1.0e-4..=1000.0, "m")?, snow.path("top")?) {
-        (Some(depth), None) => Ok(Layer::Depth(depth)),
-        (None, Some(top)) => match extension(&top).as_str() {
-            "vdb" => Ok(Layer::Grid(top)),
-            known if EXTENSIONS.contains(&known) => Ok(Layer::Top(top)),
-            _ => {
-                Err(snow
-                    .error("top", format!("must be a .vdb, .obj, .ply or .stl file, not \"{}\"", name(&top))))
-            }
-        },
-        (Some(_), Some(_)) => Err(snow.error("top", "excludes `depth`: give one of them")),
-        (None, None) => Err(snow.error("depth", "is missing (or `top`, a mesh or .vdb file)")),
-    }
-}
-
-fn ground(snow: &Table) -> Result<Option<Ground>> {
-    let area = snow.numbers::<4>("area")?;
-    if !snow.has("ground") {
-        return match area {
-            Some(_) => Err(snow.error("area", "needs `ground`, the height of a plane")),
-            None => Ok(None),
-        };
-    }
-    if let Ok(Some(path)) = snow.path("ground") {
-        if !EXTENSIONS.contains(&extension(&path).as_str()) {
-            let what = format!("must be a number or a .obj, .ply or .stl file, not \"{}\"", name(&path));
-            return Err(snow.error("ground", what));
-        }
-        if area.is_some() {
-            return Err(snow.error("area", "is of no use beside a mesh in `ground`: leave it out"));
-        }
-        return Ok(Some(Ground::Mesh(path)));
-    }
-    let height = match snow.number("ground") {
-        Ok(Some(height)) if height.abs() <= FAR => height,
-        Ok(_) => return Err(snow.error("ground", format!("must lie in -{FAR} to {FAR} m"))),
-        Err(_) => return Err(snow.error("ground", "must be a number (m) or the name of a mesh file")),
-    };
-    let area = area.ok_or_else(|| snow.error("area", "is missing: a plane needs [x0, z0, x1, z1] (m)"))?;
-    let [x0, z0, x1, z1] = area;
-    if x1 <= x0 || z1 <= z0 || area.iter().any(|value| value.abs() > FAR) {
-        let what = format!("must be [x0, z0, x1, z1] with x0 < x1 and z0 < z1 within {FAR} m");
-        return Err(snow.error("area", what));
-    }
-    Ok(Some(Ground::Plane { height, area }))
-}
-
-fn noise(snow: &Table, cell: f64) -> Result<NoiseParams> {
-    let defaults = NoiseParams::for_cell(cell);
-    let table = snow.table("noise", "[snow.noise]", &names("snow.noise"))?;
-    let Some(table) = table else { return Ok(defaults) };
-    let (amplitudes, sizes) = (NoiseParams::amplitudes(cell), NoiseParams::sizes(cell));
-    let noise = NoiseParams {
-        amplitude: table.number_in("amplitude", amplitudes, "m (32 cells)")?.unwrap_or(defaults.amplitude),
-        size: table.number_in("size", sizes, "m (2 to 10000 cells)")?.unwrap_or(defaults.size),
-        octaves: table.integer_in("octaves", 1..=8)?.map_or(defaults.octaves, |value| value as u32),
-        seed: table.integer_in("seed", 0..=i64::from(i32::MAX))?.map_or(defaults.seed, |value| value as i32),
-    };
-    let key = if table.has("amplitude") { "amplitude" } else { "size" };
-    let most = noise.steepest();
-    if noise.amplitude > most {
-        let what = format!(
-            "is too steep, {} m over {} m, and would leave islands: an amplitude of at most {most:.4} m goes with this size",
-            noise.amplitude, noise.size
-        );
-        return Err(table.error(key, what));
-    }
-    Ok(noise)
-}
-
-fn output(root: &Table) -> Result<Output> {
-    let Some(table) = root.table("output", "[output]", &names("output"))? else {
-        return Ok(Output::default());
-    };
-    let defaults = Output::default();
-    let written = |key, kind, default| -> Result<bool> {
-        Ok(table.choices(key, &[(kind, ())])?.map_or(default, |kinds| !kinds.is_empty()))
-    };
-    let objects = table.choices("objects", &[("usd", "usd"), ("ply", "ply")])?.unwrap_or_default();
-    let modes = [("full", BaseMode::Full), ("delta", BaseMode::Delta)];
-    let output = Output {
-        base: written("base", "vdb", defaults.base)?,
-        base_mode: table.choice("base_mode", &modes)?.unwrap_or(defaults.base_mode),
-        half: table.flag("half")?.unwrap_or(defaults.half),
-        removed: written("removed", "vdb", defaults.removed)?,
-        objects_usd: objects.contains(&"usd"),
-        objects_ply: objects.contains(&"ply"),
-        usd: table.flag("usd")?.unwrap_or(defaults.usd),
-    };
-    if output.half && output.base && output.base_mode == BaseMode::Delta {
-        return Err(table.error("half", "goes with `base_mode = \"full\"` only: changes must be exact"));
-    }
-    Ok(output)
 }
 
 /// A file's name without its folder.

@@ -1,110 +1,133 @@
-//! The keys of a scene, each declared once: what it means, and what of each stage depends on it.
+//! The keys that every system shares, those of all systems together, and the settings that a stage depends on.
 
-use std::collections::BTreeMap;
+use std::sync::LazyLock;
 
-use toml::Value;
-
-use crate::error::{Error, Result};
+use super::key::Scope::{First, Object, Output, Step};
+use super::key::{Key, Kind, OBJECT, Scope};
+use crate::error::Result;
+use crate::io::mesh::EXTENSIONS;
 use crate::io::seen::Seen;
 use crate::io::sequence::Pattern;
 use crate::scene::shot::{CONTENT, Settings};
-use crate::scene::{Role, Scene};
+use crate::scene::{Role, Scene, snow};
 
-/// What of a stage depends on a key.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Scope {
-    /// The state before the first frame, and all that follows.
-    First,
-    /// Every step.
-    Step,
-    /// What is written of a frame.
-    Output,
-    /// As its object's role has it: the first state for a static one, every step for one that moves.
-    Object,
-}
+/// Farthest coordinate that a scene may name (m): f32 positions keep millimetres up to here.
+pub const FAR: f64 = 1.0e5;
 
-/// A key of a scene.
-pub struct Key {
-    /// Its table, as in `snow.noise`; `object` for all objects.
-    pub table: &'static str,
-    /// Its name in the table.
-    pub name: &'static str,
-    /// What it means, in the resolved scene.
-    pub meaning: &'static str,
-    /// The stages that depend on it.
-    pub scopes: &'static [(&'static str, Scope)],
-}
+type Scopes = &'static [(&'static str, Scope)];
 
-use Scope::{First, Object, Output, Step};
+/// Concerns every stage that knows the objects.
+const MOVES: Scopes = &[("base", Object), ("objects", Step)];
 
-/// Keys of objects that move in every stage that knows them.
-const MOVES: &[(&str, Scope)] = &[("base", Object), ("objects", Step)];
-const FIRST: &[(&str, Scope)] = &[("base", First)];
-const STEP: &[(&str, Scope)] = &[("base", Step)];
-const OUTPUT: &[(&str, Scope)] = &[("base", Output)];
+/// Extensions of what moves: characters and meshes.
+const MOVING: &[&str] = &["glb", "gltf", EXTENSIONS[0], EXTENSIONS[1], EXTENSIONS[2]];
 
-const fn key(
-    table: &'static str,
-    name: &'static str,
-    scopes: &'static [(&'static str, Scope)],
-    meaning: &'static str,
-) -> Key {
-    Key { table, name, meaning, scopes }
-}
-
-/// All of them, in the order in which the resolved scene has them.
-pub const KEYS: &[Key] = &[
-    key("shot", "frames", &[("base", First), ("objects", First)], "first and last"),
-    key("shot", "fps", &[("base", Step), ("objects", Step)], "frames per second"),
-    key("snow", "ground", FIRST, "height of a level plane (m), or a mesh"),
-    key("snow", "area", FIRST, "x0, z0, x1, z1 (m)"),
-    key("snow", "depth", FIRST, "above ground and static objects (m)"),
-    key("snow", "top", FIRST, "mesh of the top surface, or the layer as a level set"),
-    key("snow", "cell", FIRST, "edge of a voxel (m)"),
-    key("snow", "min_crumb", STEP, "islands of fewer voxels are taken away; 0 = none"),
-    key("snow.noise", "amplitude", STEP, "greatest displacement, outward only (m); 0 = off"),
-    key("snow.noise", "size", STEP, "size of the largest features (m)"),
-    key("snow.noise", "octaves", STEP, "each of half the size of the one before"),
-    key("snow.noise", "seed", STEP, ""),
-    key("object", "file", MOVES, "character, mesh or sequence"),
-    key("object", "node", MOVES, "only nodes of this name and what hangs on them"),
-    key("object", "clip", MOVES, "empty: the pose at rest"),
-    key("object", "loop", MOVES, "the clip starts again when it ends"),
-    key("object", "offset", MOVES, "frames that a sequence or clip starts later"),
-    key("object", "scale", MOVES, "from the file's unit to metres"),
-    key("object", "up", MOVES, "the file's upward axis: y or z"),
-    key("object", "role", MOVES, "collide, static or ignore"),
-    key("object", "noise", STEP, "ragged edges"),
-    key("object", "ease", MOVES, "smooth between keys, else straight"),
-    key("object", "keys", MOVES, "rigid motion over the file's own"),
-    key("output", "base", OUTPUT, "base/base.%04d.vdb: surface, compression, touched"),
-    key("output", "base_mode", OUTPUT, "full, or delta: first frame whole, then what changed"),
-    key("output", "half", OUTPUT, "16-bit values, for rendering only"),
-    key("output", "removed", OUTPUT, "removed/removed.%04d.vdb: what each frame took away"),
-    key(
-        "output",
-        "objects",
-        &[("objects", Output)],
-        "\"usd\", \"ply\": objects/, as they moved, with velocities",
-    ),
-    key("output", "usd", &[], "shot.usda: the whole shot for programs that read USD"),
+const SHOT: &[Key] = &[
+    Key::new("shot", "frames", Kind::Frames, "first and last")
+        .begins_with("\"1-120\"")
+        .concerns(&[("base", First), ("objects", First)]),
+    Key::new("shot", "fps", Kind::Number(0.001, 100_000.0, "frames per second"), "frames per second")
+        .or("24.0")
+        .concerns(&[("base", Step), ("objects", Step)]),
 ];
 
-/// The names of a table's keys.
-pub fn names(table: &str) -> Vec<&'static str> {
-    KEYS.iter().filter(|key| key.table == table).map(|key| key.name).collect()
+const OBJECTS: &[Key] = &[
+    Key::new(OBJECT, "file", Kind::File(MOVING), "character, mesh, or sequence \"body.%04d.obj\"")
+        .begins_with("\"hero.glb\"")
+        .concerns(MOVES),
+    Key::new(OBJECT, "node", Kind::Text, "only nodes of this name (* stands for any letters) and what hangs on them")
+        .or_nothing()
+        .of_characters()
+        .such_as("\"hero*\"")
+        .concerns(MOVES),
+    Key::new(OBJECT, "clip", Kind::Text, "needed where there are several; \"\": the pose at rest")
+        .or_nothing()
+        .of_characters()
+        .such_as("\"Walk\"")
+        .concerns(MOVES),
+    Key::new(OBJECT, "loop", Kind::Flag, "the clip starts again when it ends")
+        .or("true")
+        .of_characters()
+        .concerns(MOVES),
+    Key::new(OBJECT, "offset", Kind::Number(-1.0e7, 1.0e7, "frames"), "frames that a sequence or clip starts later")
+        .or("0.0")
+        .concerns(MOVES),
+    Key::new(OBJECT, "scale", Kind::Number(1.0e-9, 1.0e9, ""), "from the file's unit to metres: 0.01 for centimetres")
+        .or("1.0")
+        .concerns(MOVES),
+    Key::new(OBJECT, "up", Kind::Choice(&["y", "z"]), "the file's upward axis").or("\"y\"").concerns(MOVES),
+    Key::new(
+        OBJECT,
+        "role",
+        Kind::Choice(&["collide", "static", "ignore"]),
+        "collide, static (the snow lies on it from the start) or ignore",
+    )
+    .or("\"collide\"")
+    .concerns(MOVES),
+    Key::new(OBJECT, "noise", Kind::Flag, "ragged edges of its prints").or("true").concerns(&[("base", Step)]),
+    Key::new(OBJECT, "ease", Kind::Flag, "joined smoothly between keys, else straight").or("false").concerns(MOVES),
+    Key::new(OBJECT, "keys", Kind::Poses(FAR), "rigid motion over the file's own: m, degrees about x, then y, then z")
+        .or("[]")
+        .begins_with(
+            "[{ frame = 1, at = [0.0, 0.1, -2.5] }, { frame = 120, at = [0.0, 0.1, 2.5], turn_deg = [0.0, 0.0, 0.0] }]",
+        )
+        .concerns(MOVES),
+];
+
+const BASE_OUTPUT: Scopes = &[("base", Output)];
+
+const OUTPUT: &[Key] = &[
+    Key::new(
+        "output",
+        "base",
+        Kind::Choices(&["vdb"]),
+        "base/base.%04d.vdb: surface, compression, touched; [] = none",
+    )
+    .or("[\"vdb\"]")
+    .concerns(BASE_OUTPUT),
+    Key::new(
+        "output",
+        "base_mode",
+        Kind::Choice(&["full", "delta"]),
+        "full, or delta: first frame whole, then what changed (`frazil vdb rebuild`)",
+    )
+    .or("\"full\"")
+    .concerns(BASE_OUTPUT),
+    Key::new("output", "half", Kind::Flag, "16-bit values, for rendering only")
+        .or("false")
+        .concerns(BASE_OUTPUT),
+    Key::new(
+        "output",
+        "removed",
+        Kind::Choices(&["vdb"]),
+        "removed/removed.%04d.vdb: what each frame took away",
+    )
+    .or("[\"vdb\"]")
+    .concerns(BASE_OUTPUT),
+    Key::new("output", "objects", Kind::Choices(&["usd", "ply"]), "objects/, as they moved, with velocities")
+        .or("[]")
+        .concerns(&[("objects", Output)]),
+    Key::new("output", "usd", Kind::Flag, "shot.usda: the whole shot for programs that read USD").or("true"),
+];
+
+/// All keys, in the order in which a scene has them.
+pub fn all() -> &'static [Key] {
+    static ALL: LazyLock<Vec<Key>> = LazyLock::new(|| [SHOT, snow::KEYS, OBJECTS, OUTPUT].concat());
+    &ALL
 }
 
-/// A key's declaration by its path in settings: `snow.noise.size`, `object[1].scale`.
-pub fn find(path: &str) -> Option<&'static Key> {
+/// The tables of some keys, in their order.
+pub fn tables(keys: &[Key]) -> Vec<&'static str> {
+    let mut out: Vec<&str> = keys.iter().map(|key| key.table).collect();
+    out.dedup();
+    out
+}
+
+/// A key by its path in settings: `snow.noise.size`, `object[1].scale`.
+pub fn find<'k>(keys: &'k [Key], path: &str) -> Option<&'k Key> {
     let (table, name) = path.rsplit_once('.')?;
     let table = table.split('[').next().unwrap_or(table);
-    KEYS.iter().find(|key| key.table == table && key.name == name)
-}
-
-/// What of a stage depends on a key.
-pub fn scope(path: &str, stage: &str) -> Option<Scope> {
-    find(path)?.scopes.iter().find(|(name, _)| *name == stage).map(|(_, scope)| *scope)
+    keys.iter().find(|key| key.table == table && key.name == name)
 }
 
 /// The settings that a stage depends on, with the content of the objects' files in place of their names; of the objects
@@ -113,58 +136,33 @@ pub fn scope(path: &str, stage: &str) -> Option<Scope> {
 /// # Errors
 /// A file that cannot be read.
 pub fn settings_of(scene: &Scene, stage: &str, seen: &Seen, roles: &[Role]) -> Result<Settings> {
-    let unreadable = || Error::Internal("the resolved scene cannot be read".into());
-    let mut settings = flattened(&scene.to_toml()).ok_or_else(unreadable)?;
-    settings.retain(|key, _| scope(key, stage).is_some());
-    for (index, object) in scene.objects.iter().enumerate() {
-        let of_object = format!("object[{}].", index + 1);
-        let of_static =
-            |key: &str| key == "role" || scope(&format!("object.{key}"), stage) == Some(Scope::Object);
-        let counts =
-            |key: &str| roles.contains(&object.role) && (object.role != Role::Static || of_static(key));
-        settings.retain(|key, _| key.strip_prefix(&of_object).is_none_or(counts));
-        if roles.contains(&object.role) {
-            let content = match (Pattern::parse(&object.file), object.role) {
-                (None, _) => seen.hash(&object.file)?,
-                (Some(pattern), Role::Static) => {
-                    let at = f64::from(scene.shot.frames.first) - object.offset;
-                    let [below, above] =
-                        [at.floor(), at.ceil()].map(|frame| seen.hash(&pattern.path(frame as i32)));
-                    below? + &above?
-                }
-                (Some(_), _) => "of each frame".to_string(),
-            };
-            settings.insert(format!("{of_object}file"), format!("{CONTENT}{content}"));
-        }
+    let mut settings: Settings = scene
+        .values
+        .iter()
+        .filter(|(key, _, _)| key.scope(stage).is_some())
+        .filter(|(key, object, _)| match object.map(|index| scene.objects[index].role) {
+            None => true,
+            Some(role) if !roles.contains(&role) => false,
+            Some(Role::Static) => key.name == "role" || key.scope(stage) == Some(Object),
+            Some(_) => true,
+        })
+        .map(|(key, object, value)| (super::values::path(key, object), value.to_string()))
+        .collect();
+    for (index, object) in scene.objects.iter().enumerate().filter(|(_, o)| roles.contains(&o.role)) {
+        let content = match (Pattern::parse(&object.file), object.role) {
+            (None, _) => seen.hash(&object.file)?,
+            (Some(pattern), Role::Static) => {
+                let at = f64::from(scene.shot.frames.first) - object.offset;
+                let [below, above] =
+                    [at.floor(), at.ceil()].map(|frame| seen.hash(&pattern.path(frame as i32)));
+                below? + &above?
+            }
+            (Some(_), _) => "of each frame".to_string(),
+        };
+        settings.insert(format!("object[{}].file", index + 1), format!("{CONTENT}{content}"));
     }
     settings.insert("shot.frames".into(), scene.shot.frames.first.to_string());
     // Another version may compute something else.
     settings.insert("frazil".into(), env!("CARGO_PKG_VERSION").into());
     Ok(settings)
-}
-
-/// The values of a scene's text by key: `snow.noise.size`, `object[1].file`.
-pub fn flattened(text: &str) -> Option<Settings> {
-    let mut out = BTreeMap::new();
-    for (key, value) in text.parse::<toml::Table>().ok()? {
-        flatten(key, &value, &mut out);
-    }
-    Some(out)
-}
-
-fn flatten(key: String, value: &Value, out: &mut Settings) {
-    match value {
-        Value::Table(table) => {
-            table.iter().for_each(|(name, value)| flatten(format!("{key}.{name}"), value, out))
-        }
-        Value::Array(items) if key == "object" => {
-            items
-                .iter()
-                .enumerate()
-                .for_each(|(index, item)| flatten(format!("{key}[{}]", index + 1), item, out));
-        }
-        value => {
-            out.insert(key, value.to_string());
-        }
-    }
 }

@@ -10,7 +10,7 @@ use toml::Spanned;
 use toml::de::{DeTable, DeValue};
 
 /// The text of a scene file and its name, for messages.
-pub(super) struct Document<'a> {
+pub struct Document<'a> {
     pub path: &'a Path,
     pub text: &'a str,
     /// The absolute folder that relative paths start from.
@@ -48,11 +48,12 @@ impl Document<'_> {
 }
 
 /// One table: `[shot]`, an `[[object]]`, or the file itself.
-pub(super) struct Table<'a, 'i> {
+pub struct Table<'a, 'i> {
     document: &'a Document<'a>,
     /// As written in the file: `[shot]`; empty for the file itself.
-    name: &'static str,
-    entries: &'a DeTable<'i>,
+    name: String,
+    /// None where the table is not there: it has no keys then.
+    entries: Option<&'a DeTable<'i>>,
     offset: usize,
 }
 
@@ -60,12 +61,12 @@ impl<'a, 'i> Table<'a, 'i> {
     /// Opens a table and refuses keys that are not in `known`.
     pub fn open(
         document: &'a Document<'a>,
-        name: &'static str,
+        name: &str,
         entries: &'a DeTable<'i>,
         offset: usize,
         known: &[&str],
     ) -> Result<Self> {
-        let table = Self { document, name, entries, offset };
+        let table = Self { document, name: name.to_string(), entries: Some(entries), offset };
         let unknown = entries.keys().filter(|key| !known.contains(&&**key.get_ref()));
         match unknown.min_by_key(|key| key.span().start) {
             None => Ok(table),
@@ -81,8 +82,13 @@ impl<'a, 'i> Table<'a, 'i> {
         }
     }
 
+    /// A table that is not there: it has no keys.
+    pub fn absent(document: &'a Document<'a>, name: &str) -> Self {
+        Self { document, name: name.to_string(), entries: None, offset: 0 }
+    }
+
     fn entry(&self, key: &str) -> Option<&'a Spanned<DeValue<'i>>> {
-        self.entries.get(key)
+        self.entries?.get(key)
     }
 
     /// Whether the key is there.
@@ -170,14 +176,14 @@ impl<'a, 'i> Table<'a, 'i> {
         }
     }
 
-    /// A text out of a few, each with its meaning.
-    pub fn choice<T: Copy>(&self, key: &str, choices: &[(&str, T)]) -> Result<Option<T>> {
+    /// A text out of a few.
+    pub fn choice(&self, key: &str, choices: &[&'static str]) -> Result<Option<&'static str>> {
         let Some(text) = self.text(key)? else { return Ok(None) };
         self.chosen(key, text, choices).map(Some)
     }
 
     /// A list of texts out of a few.
-    pub fn choices<T: Copy>(&self, key: &str, choices: &[(&str, T)]) -> Result<Option<Vec<T>>> {
+    pub fn choices(&self, key: &str, choices: &[&'static str]) -> Result<Option<Vec<&'static str>>> {
         let values = match self.entry(key).map(|value| value.get_ref()) {
             None => return Ok(None),
             Some(DeValue::Array(values)) => values,
@@ -187,47 +193,46 @@ impl<'a, 'i> Table<'a, 'i> {
             DeValue::String(text) => self.chosen(key, text, choices),
             other => Err(self.wrong_type(key, "a list of texts", other)),
         };
-        values.iter().map(read).collect::<Result<Vec<T>>>().map(Some)
+        values.iter().map(read).collect::<Result<Vec<_>>>().map(Some)
     }
 
-    fn chosen<T: Copy>(&self, key: &str, text: &str, choices: &[(&str, T)]) -> Result<T> {
-        let names: Vec<&str> = choices.iter().map(|choice| choice.0).collect();
-        match choices.iter().find(|choice| choice.0 == text) {
-            Some(choice) => Ok(choice.1),
+    fn chosen(&self, key: &str, text: &str, choices: &[&'static str]) -> Result<&'static str> {
+        match choices.iter().find(|choice| **choice == text) {
+            Some(choice) => Ok(choice),
             None => {
-                let hint = match nearest(text, &names) {
+                let hint = match nearest(text, choices) {
                     Some(near) => format!("; did you mean \"{near}\"?"),
                     None => String::new(),
                 };
-                let names: Vec<String> = names.iter().map(|name| format!("\"{name}\"")).collect();
+                let names: Vec<String> = choices.iter().map(|name| format!("\"{name}\"")).collect();
                 Err(self.error(key, format!("must be {}, not \"{text}\"{hint}", names.join(" or "))))
             }
         }
     }
 
-    /// A list of exactly `N` finite numbers.
-    pub fn numbers<const N: usize>(&self, key: &str) -> Result<Option<[f64; N]>> {
+    /// A list of so many finite numbers.
+    pub fn numbers(&self, key: &str, count: usize) -> Result<Option<Vec<f64>>> {
         let Some(value) = self.entry(key).map(|value| value.get_ref()) else { return Ok(None) };
-        let read = || -> Option<[f64; N]> {
+        let read = || -> Option<Vec<f64>> {
             let DeValue::Array(values) = value else { return None };
-            let numbers: Option<Vec<f64>> = values.iter().map(|value| number_of(value.get_ref())).collect();
-            numbers?.try_into().ok()
+            let numbers = values.iter().map(|value| number_of(value.get_ref())).collect::<Option<Vec<f64>>>();
+            numbers.filter(|numbers| numbers.len() == count)
         };
         match read() {
             Some(numbers) => Ok(Some(numbers)),
             None => {
                 let found = match value {
-                    DeValue::Array(values) if values.len() != N => format!("a list of {}", values.len()),
+                    DeValue::Array(values) if values.len() != count => format!("a list of {}", values.len()),
                     DeValue::Array(_) => "a list with something else in it".to_string(),
                     other => kind_of(other).to_string(),
                 };
-                Err(self.error(key, format!("must be a list of {N} finite numbers, not {found}")))
+                Err(self.error(key, format!("must be a list of {count} finite numbers, not {found}")))
             }
         }
     }
 
     /// A table inside this one.
-    pub fn table(&self, key: &str, name: &'static str, known: &[&str]) -> Result<Option<Table<'a, 'i>>> {
+    pub fn table(&self, key: &str, name: &str, known: &[&str]) -> Result<Option<Table<'a, 'i>>> {
         let Some(value) = self.entry(key) else { return Ok(None) };
         let DeValue::Table(entries) = value.get_ref() else {
             return Err(self.wrong_type(key, "a table", value.get_ref()));
@@ -236,7 +241,7 @@ impl<'a, 'i> Table<'a, 'i> {
     }
 
     /// A list of tables inside this one.
-    pub fn tables(&self, key: &str, name: &'static str, known: &[&str]) -> Result<Vec<Table<'a, 'i>>> {
+    pub fn tables(&self, key: &str, name: &str, known: &[&str]) -> Result<Vec<Table<'a, 'i>>> {
         let Some(value) = self.entry(key) else { return Ok(Vec::new()) };
         let DeValue::Array(values) = value.get_ref() else {
             return Err(self.wrong_type(key, "a list of tables", value.get_ref()));
@@ -247,6 +252,14 @@ impl<'a, 'i> Table<'a, 'i> {
         };
         values.iter().map(open).collect()
     }
+}
+
+/// Reads a value that no file has, such as a default, from a table with its key only.
+pub fn with_value<T>(key: &str, value: &str, read: impl FnOnce(&Table) -> Result<T>) -> Result<T> {
+    let text = format!("{key} = {value}");
+    let document = Document { path: Path::new(key), text: &text, folder: PathBuf::new(), overrides: &[] };
+    let entries = DeTable::parse(&text).map_err(|error| document.error(0, error.message()))?;
+    read(&Table::open(&document, "", entries.get_ref(), 0, &[key])?)
 }
 
 fn number_of(value: &DeValue) -> Option<f64> {

@@ -1,49 +1,105 @@
-//! A scene to begin with.
+//! What is said of all keys: a scene to begin with, and a table of them.
+
+use super::key::{Default, Example, Key, Kind, OBJECT, heading};
+use super::keys::{self, tables};
+use super::resolved::line;
+use super::table::with_value;
+use super::values::any_of;
+use std::fmt::Write;
 
 /// A commented scene for `frazil snow`: every key there is, those that may be left out behind a `#`.
-pub const SNOW: &str = r##"# Snow that objects press into: `frazil check shot.toml`, then `frazil snow shot.toml -o cache/`.
-# SI units, Y up, degrees where a key ends in _deg; paths are relative to this file.
-# A line behind a # may be left out: what stands there is what is taken.
+pub fn template() -> String {
+    template_of(keys::all())
+}
 
-[shot]
-frames = "1-120"                 # first and last
-# fps = 24
+/// A table of all keys in Markdown: what they hold, unit, range, default and meaning.
+pub fn reference() -> String {
+    reference_of(keys::all())
+}
 
-[snow]
-ground = 0.0                     # height of a level plane (m), or a mesh: "set/ground.obj" (then no area)
-area = [-3.0, -3.0, 3.0, 3.0]    # of the plane: x0, z0, x1, z1 (m)
-depth = 0.30                     # above the ground and static objects (m)
-# top = "snow_top.ply"           # in place of depth: a mesh of the snow's top, or a .vdb level set of all the snow
-cell = 0.0075                    # edge of a voxel (m)
-# min_crumb = 0                  # islands of fewer voxels, left by ragged edges and thin walls, are taken away; 0 = none
+pub(super) fn template_of(keys: &[Key]) -> String {
+    let mut out = String::from(
+        "# Snow that objects press into: `frazil check shot.toml`, then `frazil snow shot.toml -o cache/`.\n\
+         # SI units, Y up, degrees where a key ends in _deg; paths are relative to this file.\n\
+         # A line behind a # may be left out: what stands there is what is taken, or an example.\n",
+    );
+    for table in tables(keys) {
+        let keys_of = || keys.iter().filter(|key| key.table == table);
+        let is_needed = keys_of().any(|key| matches!(key.example, Example::Needed(_)));
+        let many = if table == OBJECT { "  # as many as there are" } else { "" };
+        let _ = writeln!(out, "\n{}{}{many}", if is_needed { "" } else { "# " }, heading(table));
+        keys_of().for_each(|key| out.push_str(&example(key, keys)));
+    }
+    out
+}
 
-# [snow.noise]                   # ragged edges, outward only
-# amplitude = 0.015              # m; two cells; 0 = off
-# size = 0.06                    # m; of the largest features; eight cells
-# octaves = 3                    # each of half the size of the one before
-# seed = 0
+/// A key's line in a scene to begin with.
+fn example(key: &Key, keys: &[Key]) -> String {
+    let (mark, value) = match key.example {
+        Example::Needed(value) => ("", value.to_string()),
+        Example::Other(value) => ("# ", value.to_string()),
+        Example::Default => ("# ", default_value(key, keys)),
+    };
+    let characters = if key.of_characters { "of a .glb: " } else { "" };
+    line(&format!("{mark}{} = {value}", key.name), &format!("{characters}{}{}", key.meaning, cells(key)))
+}
 
-[[object]]                       # as many as there are
-file = "hero.glb"                # .glb or .gltf; a mesh (.obj, .ply, .stl); or a sequence, "body.%04d.obj"
-# node = "hero*"                 # of a .glb: only nodes of this name and what hangs on them; * stands for any letters
-# clip = "Walk"                  # of a .glb: needed when it has several; "" = the pose at rest
-# loop = true                    # of a .glb: the clip starts again when it ends
-# offset = 0                     # frames that the clip or sequence starts later
-# scale = 1.0                    # metres in the file's unit: 0.01 for centimetres
-# up = "y"                       # the file's upward axis: y or z
-# role = "collide"               # collide, static (the snow lies on it) or ignore
-# noise = true                   # ragged edges of its prints
-# ease = false                   # true: keys are joined smoothly, starting and ending at rest; else straight lines
-keys = [                         # composed over the file's own motion: a walk in place goes somewhere
-    { frame = 1, at = [0.0, 0.1, -2.5] },
-    { frame = 120, at = [0.0, 0.1, 2.5], turn_deg = [0.0, 0.0, 0.0] },
-]
+/// Which value is taken, in the cells of the scene to begin with.
+fn default_value(key: &Key, keys: &[Key]) -> String {
+    let cell = || {
+        let example = keys.iter().find(|key| key.table == "snow" && key.name == "cell")?.example;
+        let Example::Needed(value) = example else { return None };
+        with_value("cell", value, |table| table.number("cell")).ok()?
+    };
+    match key.default {
+        Default::Is(value) => value.to_string(),
+        Default::Cells(cells) => cell().map_or(String::new(), |cell| format!("{:?}", cells * cell)),
+        Default::Required | Default::Nothing => String::new(),
+    }
+}
 
-# [output]
-# base = ["vdb"]                 # base/base.%04d.vdb: surface, compression, touched; [] = none
-# base_mode = "full"             # or "delta": the first frame whole, then what changed; see `frazil vdb rebuild`
-# half = false                   # 16-bit values, for rendering only
-# removed = ["vdb"]              # removed/removed.%04d.vdb: what each frame took away
-# objects = []                   # "usd", "ply": objects/, the objects as they moved, with velocities
-# usd = true                     # shot.usda
-"##;
+fn cells(key: &Key) -> String {
+    if let Default::Cells(cells) = key.default { format!("; {cells} cells") } else { String::new() }
+}
+
+pub(super) fn reference_of(keys: &[Key]) -> String {
+    let mut out = String::new();
+    for table in tables(keys) {
+        let many = if table == OBJECT { ", as many as there are" } else { "" };
+        let _ = write!(out, "\n`{}`{many}\n\n", heading(table));
+        out.push_str("| key | holds | default | meaning |\n|---|---|---|---|\n");
+        for key in keys.iter().filter(|key| key.table == table) {
+            let default = match key.default {
+                Default::Required => "required".to_string(),
+                Default::Nothing => String::new(),
+                Default::Is(value) => format!("`{value}`"),
+                Default::Cells(cells) => format!("{cells} cells"),
+            };
+            let _ = writeln!(out, "| `{}` | {} | {default} | {} |", key.name, holds(key), key.meaning);
+        }
+    }
+    out.trim_start().to_string()
+}
+
+/// What a key may hold, with range and unit.
+fn holds(key: &Key) -> String {
+    let texts = |texts: &[&str], or: &str| {
+        texts.iter().map(|text| format!("`\"{text}\"`")).collect::<Vec<_>>().join(or)
+    };
+    let of_unit = |unit: &str| if unit.is_empty() { String::new() } else { format!(" {unit}") };
+    let held = match key.kind {
+        Kind::Frames => "`\"A-B\"`".to_string(),
+        Kind::Flag => "`true` or `false`".to_string(),
+        Kind::Text => "a text".to_string(),
+        Kind::Choice(choices) => texts(choices, " or "),
+        Kind::Choices(choices) => format!("list of {}", texts(choices, ", ")),
+        Kind::Number(low, high, unit) => format!("{low} to {high}{}", of_unit(unit)),
+        Kind::Cells(low, high) => format!("m, {low} to {high} cells"),
+        Kind::Whole(low, high) => format!("whole, {low} to {high}"),
+        Kind::Numbers(count, far, unit) => format!("{count} numbers, each -{far} to {far}{}", of_unit(unit)),
+        Kind::File(extensions) => any_of(extensions),
+        Kind::HeightOrFile(far, extensions) => format!("-{far} to {far} m, or {}", any_of(extensions)),
+        Kind::Poses(_) => "list of `{ frame, at, turn_deg }`".to_string(),
+    };
+    if key.of_characters { format!("{held}; .glb and .gltf") } else { held }
+}

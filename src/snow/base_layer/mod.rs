@@ -18,13 +18,14 @@ use std::collections::{BTreeSet, HashMap, HashSet};
 use rayon::prelude::*;
 
 pub use grids::{Changes, Grids};
-pub use noise::{NoiseParams, displace};
+pub use noise::displace;
 pub use reach::Reach;
 
 use crate::base::DVec3;
 use crate::base::blocks::{BlockEdit, Origin};
 use crate::context::{Context, PhaseTime};
 use crate::error::{Error, Result};
+use crate::snow::NoiseParams;
 use crate::sweep::{
     Band, Body, Face, Lattice, Piece, Scratch, Settings, TOLERANCE, UNITS, Voxeliser, Window,
 };

@@ -5,7 +5,6 @@
 //! as long as the noise is less steep, everything it removes is connected to the sweep: no islands.
 
 use std::collections::HashMap;
-use std::ops::RangeInclusive;
 
 use fastnoise_lite::{FastNoiseLite, NoiseType};
 use rayon::prelude::*;
@@ -13,77 +12,10 @@ use rayon::prelude::*;
 use super::edit::{self, Scale};
 use crate::base::blocks::{Block, BlockEdit, Origin, Values, offset};
 use crate::context::Context;
-use crate::error::{Error, Result};
+use crate::error::Result;
+use crate::snow::NoiseParams;
 use crate::sweep::{Piece, Settings};
 use crate::vdb::{FloatGrid, Leaf, level_set};
-
-/// Irregularity of an imprint's surface.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct NoiseParams {
-    /// Greatest outward displacement (m). 0 switches the noise off.
-    pub amplitude: f64,
-    /// Size of the largest clumps (m).
-    pub size: f64,
-    /// Octaves, each of half the size and a quarter of the strength, 1..=8.
-    pub octaves: u32,
-    /// Seed of the pattern.
-    pub seed: i32,
-}
-
-/// Steepest slope of one octave of unit size and strength (a test samples it).
-const STEEPEST: f64 = 2.95;
-
-impl NoiseParams {
-    /// Two cells of amplitude, clumps of eight cells, three octaves.
-    pub fn for_cell(cell: f64) -> Self {
-        Self { amplitude: 2.0 * cell, size: 8.0 * cell, octaves: 3, seed: 0 }
-    }
-
-    /// Checks every field for a given cell size (m).
-    ///
-    /// # Errors
-    /// Names the field and its range; refuses noise so steep that it would leave islands.
-    pub fn validate(&self, cell: f64) -> Result<()> {
-        let within = |name: &str, value: f64, range: RangeInclusive<f64>| {
-            let (low, high) = (*range.start(), *range.end());
-            if range.contains(&value) {
-                return Ok(());
-            }
-            Err(Error::argument(format!("noise {name} = {value} m is not within {low} to {high} m")))
-        };
-        within("amplitude", self.amplitude, Self::amplitudes(cell))?;
-        within("size", self.size, Self::sizes(cell))?;
-        if !(1..=8).contains(&self.octaves) {
-            return Err(Error::argument(format!("noise octaves = {} is not within 1 to 8", self.octaves)));
-        }
-        let most = self.steepest();
-        if self.amplitude > most {
-            return Err(Error::argument(format!(
-                "noise amplitude = {} m is too steep for size = {} m and would leave islands: at most {most:.4} m",
-                self.amplitude, self.size
-            )));
-        }
-        Ok(())
-    }
-
-    /// Amplitudes (m) that make sense for a cell size (m).
-    pub fn amplitudes(cell: f64) -> RangeInclusive<f64> {
-        0.0..=32.0 * cell
-    }
-
-    /// Sizes (m) that make sense for a cell size (m): below two cells the grid cannot hold the noise.
-    pub fn sizes(cell: f64) -> RangeInclusive<f64> {
-        2.0 * cell..=10_000.0 * cell
-    }
-
-    /// The greatest amplitude (m) that leaves no islands at this size: the displacement's slope stays below 1.
-    ///
-    /// Octave o has strength 4^-o and slope 2^-o, of a sum scaled to 1.
-    pub fn steepest(&self) -> f64 {
-        let sum = |ratio: f64| (0..self.octaves).map(|octave| ratio.powi(octave as i32)).sum::<f64>();
-        self.size * sum(0.25) / (STEEPEST * sum(0.5))
-    }
-}
 
 /// Strength of an octave over that of the one before it.
 const GAIN: f32 = 0.25;
@@ -283,6 +215,7 @@ fn upwind_squared(below: f32, above: f32, outside: bool) -> f32 {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::snow::noise::STEEPEST;
 
     #[test]
     fn one_octave_is_nowhere_steeper_than_the_bound() {

@@ -1,0 +1,178 @@
+//! The keys of `[snow]`, and the layer that they describe.
+
+use crate::error::Result;
+use crate::io::mesh::{EXTENSIONS, extension};
+use crate::scene::text::key::{Key, Kind, Scope};
+use crate::scene::text::{FAR, Table, Value, Values};
+use crate::scene::{Ground, Layer, Snow};
+use crate::snow::NoiseParams;
+
+type Scopes = &'static [(&'static str, Scope)];
+const FIRST: Scopes = &[("base", Scope::First)];
+const STEP: Scopes = &[("base", Scope::Step)];
+
+/// Edges of voxels (m).
+const CELLS: (f64, f64) = (1.0e-5, 10.0);
+/// A mesh of the top, or a level set of the whole layer.
+const TOPS: &[&str] = &["vdb", EXTENSIONS[0], EXTENSIONS[1], EXTENSIONS[2]];
+
+/// All of them.
+pub const KEYS: &[Key] = &[
+    Key::new(
+        "snow",
+        "ground",
+        Kind::HeightOrFile(FAR, &EXTENSIONS),
+        "height of a level plane (m), or a mesh (then no area)",
+    )
+    .or_nothing()
+    .begins_with("0.0")
+    .concerns(FIRST),
+    Key::new("snow", "area", Kind::Numbers(4, FAR, "m"), "of the plane: x0, z0, x1, z1 (m)")
+        .or_nothing()
+        .begins_with("[-3.0, -3.0, 3.0, 3.0]")
+        .concerns(FIRST),
+    Key::new("snow", "depth", Kind::Number(1.0e-4, 1000.0, "m"), "above ground and static objects (m)")
+        .or_nothing()
+        .begins_with("0.3")
+        .concerns(FIRST),
+    Key::new(
+        "snow",
+        "top",
+        Kind::File(TOPS),
+        "in place of depth: mesh of the top surface, or the layer as a level set",
+    )
+    .or_nothing()
+    .such_as("\"snow_top.ply\"")
+    .concerns(FIRST),
+    Key::new("snow", "cell", Kind::Number(CELLS.0, CELLS.1, "m"), "edge of a voxel (m)")
+        .begins_with("0.0075")
+        .concerns(FIRST),
+    Key::new("snow", "min_crumb", Kind::Whole(0, 10_000), "islands of fewer voxels are taken away; 0 = none")
+        .or("0")
+        .concerns(STEP),
+    Key::new(
+        "snow.noise",
+        "amplitude",
+        Kind::Cells(0.0, 32.0),
+        "greatest displacement, outward only (m); 0 = off",
+    )
+    .or_cells(2.0)
+    .concerns(STEP),
+    Key::new("snow.noise", "size", Kind::Cells(2.0, 10_000.0), "size of the largest features (m)")
+        .or_cells(8.0)
+        .concerns(STEP),
+    Key::new("snow.noise", "octaves", Kind::Whole(1, 8), "each of half the size of the one before")
+        .or("3")
+        .concerns(STEP),
+    Key::new("snow.noise", "seed", Kind::Whole(0, i32::MAX as i64), "another one gives another pattern")
+        .or("0")
+        .concerns(STEP),
+];
+
+impl Snow {
+    /// The layer that a scene's values describe; none where it has no snow.
+    pub(in crate::scene) fn of(values: &Values) -> Option<Self> {
+        let cell = values.number("snow.cell")?;
+        let path = |key: &str| values.get(key).and_then(Value::path).map(|path| path.to_path_buf());
+        let layer = match (values.number("snow.depth"), path("snow.top")) {
+            (Some(depth), _) => Layer::Depth(depth),
+            (None, Some(top)) if extension(&top) == "vdb" => Layer::Grid(top),
+            (None, top) => Layer::Top(top?),
+        };
+        let area = values.get("snow.area").and_then(Value::numbers);
+        let plane =
+            values.number("snow.ground").zip(area).map(|(height, area)| Ground::Plane { height, area });
+        let ground = plane.or(path("snow.ground").map(Ground::Mesh));
+        let min_crumb = values.get("snow.min_crumb")?.whole()? as usize;
+        Some(Self { ground, layer, cell, noise: noise(values)?, min_crumb })
+    }
+
+    /// Checks what single keys do not show.
+    ///
+    /// # Errors
+    /// Keys that exclude each other, or one that others need; noise that would leave islands.
+    pub(in crate::scene) fn check(snow: &Table, values: &Values) -> Result<()> {
+        let value = |name: &str| values.get(&format!("snow.{name}"));
+        match (value("depth"), value("top")) {
+            (Some(_), Some(_)) => return Err(snow.error("top", "excludes `depth`: give one of them")),
+            (None, None) => return Err(snow.error("depth", "is missing (or `top`, a mesh or .vdb file)")),
+            _ => {}
+        }
+        match (value("ground"), value("area")) {
+            (None, Some(_)) => return Err(snow.error("area", "needs `ground`, the height of a plane")),
+            (Some(Value::File(_)), Some(_)) => {
+                return Err(snow.error("area", "is of no use beside a mesh in `ground`: leave it out"));
+            }
+            (Some(Value::Number(_)), None) => {
+                return Err(snow.error("area", "is missing: a plane needs [x0, z0, x1, z1] (m)"));
+            }
+            (Some(_), Some(area)) => {
+                let [x0, z0, x1, z1] = area.numbers().unwrap_or_default();
+                if x1 <= x0 || z1 <= z0 {
+                    return Err(snow.error("area", "must be [x0, z0, x1, z1] with x0 < x1 and z0 < z1"));
+                }
+            }
+            _ => {}
+        }
+        let is_grid = value("top").and_then(Value::path).is_some_and(|path| extension(path) == "vdb");
+        if is_grid && value("ground").is_some() {
+            return Err(snow.error("ground", "is of no use beside a .vdb layer in `top`: leave it out"));
+        }
+        if !is_grid && value("ground").is_none() {
+            return Err(snow.error("ground", "is missing"));
+        }
+        Ok(())
+    }
+
+    /// Checks `[snow.noise]`.
+    ///
+    /// # Errors
+    /// Noise that would leave islands.
+    pub(in crate::scene) fn check_noise(table: &Table, values: &Values) -> Result<()> {
+        let Some(noise) = noise(values) else { return Ok(()) };
+        let most = noise.steepest();
+        if noise.amplitude <= most {
+            return Ok(());
+        }
+        let what = format!(
+            "is too steep, {} m over {} m, and would leave islands: an amplitude of at most {most:.4} m goes with this size",
+            noise.amplitude, noise.size
+        );
+        Err(table.error(if table.has("amplitude") { "amplitude" } else { "size" }, what))
+    }
+
+    /// Makes the cells `factor` times as large; noise too fine for them becomes coarser.
+    ///
+    /// # Errors
+    /// Says why it cannot.
+    pub(in crate::scene) fn coarsen(
+        &self,
+        factor: f64,
+        values: &mut Values,
+    ) -> std::result::Result<(), String> {
+        if let Layer::Grid(path) = &self.layer {
+            return Err(format!("a preview needs other cells than those of {}", path.display()));
+        }
+        let cell = self.cell * factor;
+        if !(CELLS.0..=CELLS.1).contains(&cell) {
+            return Err(format!("a preview would have cells of {cell} m"));
+        }
+        let mut noise = self.noise;
+        noise.size = noise.size.max(*NoiseParams::sizes(cell).start());
+        noise.amplitude = noise.amplitude.min(noise.steepest());
+        values.set_number("snow.cell", cell);
+        values.set_number("snow.noise.size", noise.size);
+        values.set_number("snow.noise.amplitude", noise.amplitude);
+        Ok(())
+    }
+}
+
+fn noise(values: &Values) -> Option<NoiseParams> {
+    let whole = |key: &str| values.get(key).and_then(Value::whole);
+    Some(NoiseParams {
+        amplitude: values.number("snow.noise.amplitude")?,
+        size: values.number("snow.noise.size")?,
+        octaves: whole("snow.noise.octaves")? as u32,
+        seed: whole("snow.noise.seed")? as i32,
+    })
+}

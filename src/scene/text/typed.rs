@@ -1,0 +1,77 @@
+//! What every system shares, from the values of a scene: the shot, the objects, the output.
+
+use super::table::Table;
+use super::values::{Value, Values};
+use crate::error::Result;
+use crate::motion::{Space, Up};
+use crate::scene::{BaseMode, Frames, Object, Output, Role, Shot};
+
+impl Shot {
+    pub(super) fn of(values: &Values) -> Self {
+        let frames = match values.get("shot.frames") {
+            Some(Value::Frames(frames)) => *frames,
+            _ => Frames { first: 0, last: 0 },
+        };
+        Self { frames, fps: values.number("shot.fps").unwrap_or(24.0) }
+    }
+}
+
+impl Object {
+    /// Those of a scene, in the file's order.
+    pub(super) fn all_of(values: &Values) -> Vec<Self> {
+        let is_there = |index: &usize| values.of_object(*index, "file").is_some();
+        (0..).take_while(is_there).map(|index| Self::of(values, index)).collect()
+    }
+
+    fn of(values: &Values, index: usize) -> Self {
+        let value = |name: &str| values.of_object(index, name);
+        let text = |name: &str| value(name).and_then(Value::text);
+        let flag = |name: &str| value(name).and_then(Value::flag).unwrap_or(false);
+        let number = |name: &str| value(name).and_then(Value::number).unwrap_or(0.0);
+        Self {
+            file: value("file").and_then(Value::path).map(Into::into).unwrap_or_default(),
+            node: text("node").map(str::to_string),
+            clip: text("clip").map(str::to_string),
+            repeat: value("loop").is_none() || flag("loop"),
+            offset: number("offset"),
+            space: Space { scale: number("scale"), up: if text("up") == Some("z") { Up::Z } else { Up::Y } },
+            role: match text("role") {
+                Some("static") => Role::Static,
+                Some("ignore") => Role::Ignore,
+                _ => Role::Collide,
+            },
+            noise: flag("noise"),
+            keys: if let Some(Value::Poses(poses)) = value("keys") { poses.clone() } else { Vec::new() },
+            ease: flag("ease"),
+        }
+    }
+}
+
+impl Output {
+    pub(super) fn of(values: &Values) -> Self {
+        let holds = |name: &str, text: &str| values.get(name).is_some_and(|value| value.holds(text));
+        let flag = |name: &str| values.get(name).and_then(Value::flag).unwrap_or(false);
+        let mode = values.get("output.base_mode").and_then(Value::text);
+        Self {
+            base: holds("output.base", "vdb"),
+            base_mode: if mode == Some("delta") { BaseMode::Delta } else { BaseMode::Full },
+            half: flag("output.half"),
+            removed: holds("output.removed", "vdb"),
+            objects_usd: holds("output.objects", "usd"),
+            objects_ply: holds("output.objects", "ply"),
+            usd: flag("output.usd"),
+        }
+    }
+
+    /// Checks what single keys do not show.
+    ///
+    /// # Errors
+    /// Values that are not exact where changes are kept.
+    pub(super) fn check(table: &Table, values: &Values) -> Result<()> {
+        let output = Self::of(values);
+        if output.half && output.base && output.base_mode == BaseMode::Delta {
+            return Err(table.error("half", "goes with `base_mode = \"full\"` only: changes must be exact"));
+        }
+        Ok(())
+    }
+}

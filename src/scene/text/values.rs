@@ -1,0 +1,324 @@
+//! The values of a scene: read as their keys are declared, defaults filled in.
+
+use std::collections::BTreeMap;
+use std::fmt;
+use std::path::{Path, PathBuf};
+
+use serde::{Serialize, Serializer};
+
+use super::key::{Default, Key, Kind};
+use super::table::{Table, with_value};
+use crate::error::{Error, Result};
+use crate::io::mesh::extension;
+use crate::motion::is_gltf;
+use crate::scene::{Frames, KeyPose};
+
+/// What a key of a scene holds. As text, it is TOML in one line.
+#[derive(Debug, Clone, PartialEq)]
+pub enum Value {
+    /// See [`Kind::Frames`].
+    Frames(Frames),
+    /// See [`Kind::Flag`].
+    Flag(bool),
+    /// See [`Kind::Text`] and [`Kind::Choice`].
+    Text(String),
+    /// See [`Kind::Choices`]: in the order of the declaration.
+    Choices(Vec<&'static str>),
+    /// See [`Kind::Number`] and [`Kind::Cells`].
+    Number(f64),
+    /// See [`Kind::Whole`].
+    Whole(i64),
+    /// See [`Kind::Numbers`].
+    Numbers(Vec<f64>),
+    /// An absolute path: see [`Kind::File`].
+    File(PathBuf),
+    /// See [`Kind::Poses`]; ascending frames.
+    Poses(Vec<KeyPose>),
+}
+
+/// The values of a scene's keys: those of the tables that it has, and of each object. A key that has none is not there.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Values {
+    keys: &'static [Key],
+    /// By the key's place in `keys` and the object's index.
+    values: BTreeMap<(Option<usize>, usize), Value>,
+}
+
+/// A key's path in settings: `snow.noise.size`, `object[1].scale`.
+pub fn path(key: &Key, object: Option<usize>) -> String {
+    match object {
+        None => format!("{}.{}", key.table, key.name),
+        Some(index) => format!("{}[{}].{}", key.table, index + 1, key.name),
+    }
+}
+
+impl Values {
+    /// None yet, of these keys.
+    pub fn new(keys: &'static [Key]) -> Self {
+        Self { keys, values: BTreeMap::new() }
+    }
+
+    /// The keys that it may have.
+    pub fn keys(&self) -> &'static [Key] {
+        self.keys
+    }
+
+    /// Reads the keys of a table, of an object its index: with their defaults, also where the table is not there.
+    ///
+    /// # Errors
+    /// A key that is missing, a wrong type or a value outside its range, with file and line.
+    pub fn read(&mut self, name: &str, object: Option<usize>, table: &Table) -> Result<()> {
+        for (place, key) in self.keys.iter().enumerate().filter(|(_, key)| key.table == name) {
+            let allowed = !key.of_characters || self.path_of(object, name, "file").is_some_and(is_gltf);
+            if !allowed && table.has(key.name) {
+                return Err(table.error(key.name, "is for .glb and .gltf files: leave it out"));
+            }
+            let cell = self.number("snow.cell");
+            let value = match read(key, table, cell)? {
+                Some(value) => Some(value),
+                None if allowed => default(key, table, cell)?,
+                None => None,
+            };
+            if let Some(value) = value {
+                self.values.insert((object, place), value);
+            }
+        }
+        Ok(())
+    }
+
+    /// Every value with its key and, of an object, its index: in the order of the keys, object by object.
+    pub fn iter(&self) -> impl Iterator<Item = (&'static Key, Option<usize>, &Value)> {
+        self.values.iter().map(|((object, place), value)| (&self.keys[*place], *object, value))
+    }
+
+    fn of(&self, object: Option<usize>, table: &str, name: &str) -> Option<&Value> {
+        let place = self.keys.iter().position(|key| key.table == table && key.name == name)?;
+        self.values.get(&(object, place))
+    }
+
+    /// A value by its key: `snow.cell`.
+    pub fn get(&self, key: &str) -> Option<&Value> {
+        let (table, name) = key.rsplit_once('.')?;
+        self.of(None, table, name)
+    }
+
+    /// An object's value.
+    pub fn of_object(&self, index: usize, name: &str) -> Option<&Value> {
+        self.of(Some(index), super::key::OBJECT, name)
+    }
+
+    /// A number by its key.
+    pub fn number(&self, key: &str) -> Option<f64> {
+        self.get(key)?.number()
+    }
+
+    fn path_of(&self, object: Option<usize>, table: &str, name: &str) -> Option<&Path> {
+        self.of(object, table, name)?.path()
+    }
+
+    /// Puts a number in place of another.
+    pub fn set_number(&mut self, key: &str, number: f64) {
+        let place = self.keys.iter().position(|declared| path(declared, None) == key);
+        let value = place.and_then(|place| self.values.get_mut(&(None, place)));
+        if let Some(value) = value {
+            *value = Value::Number(number);
+        }
+    }
+
+    /// All of them by their paths in settings: `object[1].scale`.
+    pub fn by_path(&self) -> BTreeMap<String, Value> {
+        self.iter().map(|(key, object, value)| (path(key, object), value.clone())).collect()
+    }
+
+    /// Every file that is named.
+    pub fn paths_mut(&mut self) -> impl Iterator<Item = &mut PathBuf> {
+        self.values.values_mut().filter_map(|value| match value {
+            Value::File(path) => Some(path),
+            _ => None,
+        })
+    }
+}
+
+impl Value {
+    /// As a number.
+    pub fn number(&self) -> Option<f64> {
+        if let Self::Number(number) = self { Some(*number) } else { None }
+    }
+
+    /// As a whole number.
+    pub fn whole(&self) -> Option<i64> {
+        if let Self::Whole(number) = self { Some(*number) } else { None }
+    }
+
+    /// As a list of numbers.
+    pub fn numbers<const N: usize>(&self) -> Option<[f64; N]> {
+        if let Self::Numbers(numbers) = self { numbers[..].try_into().ok() } else { None }
+    }
+
+    /// As a flag.
+    pub fn flag(&self) -> Option<bool> {
+        if let Self::Flag(flag) = self { Some(*flag) } else { None }
+    }
+
+    /// As a text.
+    pub fn text(&self) -> Option<&str> {
+        if let Self::Text(text) = self { Some(text) } else { None }
+    }
+
+    /// As a file's path.
+    pub fn path(&self) -> Option<&Path> {
+        if let Self::File(path) = self { Some(path) } else { None }
+    }
+
+    /// Whether a list holds a text.
+    pub fn holds(&self, text: &str) -> bool {
+        matches!(self, Self::Choices(texts) if texts.contains(&text))
+    }
+}
+
+impl Serialize for Value {
+    fn serialize<S: Serializer>(&self, to: S) -> std::result::Result<S::Ok, S::Error> {
+        match self {
+            Self::Frames(frames) => to.collect_str(frames),
+            Self::Flag(flag) => to.serialize_bool(*flag),
+            Self::Text(text) => to.serialize_str(text),
+            Self::Choices(texts) => texts.serialize(to),
+            Self::Number(number) => to.serialize_f64(*number),
+            Self::Whole(number) => to.serialize_i64(*number),
+            Self::Numbers(numbers) => numbers.serialize(to),
+            Self::File(path) => to.serialize_str(&path.to_string_lossy()),
+            Self::Poses(poses) => poses.serialize(to),
+        }
+    }
+}
+
+impl fmt::Display for Value {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Frames(frames) => f.write_str(&quoted(&frames.to_string())),
+            Self::Flag(flag) => write!(f, "{flag}"),
+            Self::Text(text) => f.write_str(&quoted(text)),
+            Self::Choices(texts) => write!(f, "{texts:?}"),
+            // The shortest text that reads back as the same number.
+            Self::Number(number) => write!(f, "{number:?}"),
+            Self::Whole(number) => write!(f, "{number}"),
+            Self::Numbers(numbers) => write!(f, "{numbers:?}"),
+            Self::File(path) => f.write_str(&quoted(&path.to_string_lossy())),
+            Self::Poses(poses) => {
+                let poses: Vec<String> = poses.iter().map(pose).collect();
+                write!(f, "[{}]", poses.join(", "))
+            }
+        }
+    }
+}
+
+/// A pose as a scene writes it.
+pub fn pose(pose: &KeyPose) -> String {
+    let KeyPose { frame, at, turn_deg } = pose;
+    format!("{{ frame = {frame:?}, at = {at:?}, turn_deg = {turn_deg:?} }}")
+}
+
+fn quoted(text: &str) -> String {
+    toml::Value::String(text.to_string()).to_string()
+}
+
+/// Reads a key; none where it is left out.
+fn read(key: &Key, table: &Table, cell: Option<f64>) -> Result<Option<Value>> {
+    let name = key.name;
+    Ok(match key.kind {
+        Kind::Frames => match table.text(name)? {
+            None => None,
+            Some(text) => {
+                let frames = text.parse().map_err(|what| table.error(name, format!("is wrong: {what}")))?;
+                Some(Value::Frames(frames))
+            }
+        },
+        Kind::Flag => table.flag(name)?.map(Value::Flag),
+        Kind::Text => table.text(name)?.map(|text| Value::Text(text.to_string())),
+        Kind::Choice(texts) => table.choice(name, texts)?.map(|text| Value::Text(text.to_string())),
+        Kind::Choices(texts) => table.choices(name, texts)?.map(|chosen| {
+            Value::Choices(texts.iter().copied().filter(|text| chosen.contains(text)).collect())
+        }),
+        Kind::Number(low, high, unit) => table.number_in(name, low..=high, unit)?.map(Value::Number),
+        Kind::Cells(low, high) => {
+            let cell = cell.ok_or_else(|| Error::Internal(format!("{name} comes before the cell")))?;
+            let unit = format!("m ({low} to {high} cells)");
+            table.number_in(name, low * cell..=high * cell, &unit)?.map(Value::Number)
+        }
+        Kind::Whole(low, high) => table.integer_in(name, low..=high)?.map(Value::Whole),
+        Kind::Numbers(count, far, unit) => {
+            let numbers = table.numbers(name, count)?;
+            if numbers.iter().flatten().any(|number| number.abs() > far) {
+                return Err(table.error(name, format!("must lie within {far} {unit} of 0")));
+            }
+            numbers.map(Value::Numbers)
+        }
+        Kind::File(extensions) => match table.path(name)? {
+            None => None,
+            Some(path) => Some(file(key, table, path, extensions, "")?),
+        },
+        Kind::HeightOrFile(far, extensions) => match (table.path(name), table.number(name)) {
+            (Ok(Some(path)), _) => Some(file(key, table, path, extensions, "a number or ")?),
+            (_, Ok(None)) => None,
+            (_, Ok(Some(height))) if height.abs() <= far => Some(Value::Number(height)),
+            (_, Ok(Some(_))) => return Err(table.error(name, format!("must lie in -{far} to {far} m"))),
+            (_, Err(_)) => return Err(table.error(name, "must be a number (m) or the name of a mesh file")),
+        },
+        Kind::Poses(far) => {
+            if table.has(name) {
+                Some(Value::Poses(poses(name, table, far)?))
+            } else {
+                None
+            }
+        }
+    })
+}
+
+fn file(key: &Key, table: &Table, path: PathBuf, extensions: &[&str], or: &str) -> Result<Value> {
+    if extensions.contains(&extension(&path).as_str()) {
+        return Ok(Value::File(path));
+    }
+    let name = super::name(&path);
+    Err(table.error(key.name, format!("must be {or}a {} file, not \"{name}\"", any_of(extensions))))
+}
+
+/// ".glb, .gltf or .obj".
+pub fn any_of(extensions: &[&str]) -> String {
+    let dotted: Vec<String> = extensions.iter().map(|extension| format!(".{extension}")).collect();
+    match dotted.split_last() {
+        Some((last, rest)) if !rest.is_empty() => format!("{} or {last}", rest.join(", ")),
+        _ => dotted.join(""),
+    }
+}
+
+fn poses(name: &str, object: &Table, far: f64) -> Result<Vec<KeyPose>> {
+    let mut poses: Vec<KeyPose> = Vec::new();
+    for table in object.tables(name, "keys of [[object]]", &["frame", "at", "turn_deg"])? {
+        let frame = table.number_in("frame", -1.0e8..=1.0e8, "")?;
+        let frame = frame.ok_or_else(|| table.error("frame", "is missing"))?;
+        if poses.last().is_some_and(|before| before.frame >= frame) {
+            return Err(table.error("frame", "must be greater than the key's before it"));
+        }
+        let triple = |name: &str, far: f64, what: &str| -> Result<[f64; 3]> {
+            let numbers = table.numbers(name, 3)?.unwrap_or_else(|| vec![0.0; 3]);
+            if numbers.iter().any(|number| number.abs() > far) {
+                return Err(table.error(name, what));
+            }
+            Ok([numbers[0], numbers[1], numbers[2]])
+        };
+        let at = triple("at", far, &format!("must lie within {far} m of the origin"))?;
+        let turn_deg = triple("turn_deg", 1.0e6, "must lie in -1000000 to 1000000 degrees")?;
+        poses.push(KeyPose { frame, at, turn_deg });
+    }
+    Ok(poses)
+}
+
+/// What is taken where a key is left out.
+fn default(key: &Key, table: &Table, cell: Option<f64>) -> Result<Option<Value>> {
+    match key.default {
+        Default::Required => Err(table.error(key.name, "is missing")),
+        Default::Nothing => Ok(None),
+        Default::Cells(cells) => Ok(cell.map(|cell| Value::Number(cells * cell))),
+        Default::Is(text) => with_value(key.name, text, |table| read(key, table, cell)),
+    }
+}
