@@ -1,12 +1,17 @@
 //! Builds the C++ side of the bridge to OpenVDB (feature `vdb`).
 
+use std::collections::HashSet;
 use std::path::{Path, PathBuf};
+use std::process::Command;
 
 /// Sources, those of a group compiled as one: each compilation reads OpenVDB's headers and makes the functions of its trees
 /// anew, which takes longer than most of our own. Two groups of about the same time, for two cores; what a group's sources
 /// call their own (`namespace {`) needs different names.
 const SOURCES: [&[&str]; 2] =
     [&["grid.cc", "file.cc", "parts.cc", "csg.cc", "filters.cc", "particles.cc"], &["meshing.cc"]];
+
+/// Take the functions of OpenVDB's trees from its library.
+const TREES: &str = "FRAZIL_TREES_OF_LIBRARY";
 
 fn main() {
     println!("cargo:rerun-if-env-changed=OPENVDB_ROOT");
@@ -29,6 +34,38 @@ fn main() {
         );
         std::process::exit(1);
     }
+    for root in &roots {
+        for folder in ["lib", "lib64"] {
+            println!("cargo:rustc-link-search=native={}", root.join(folder).display());
+        }
+    }
+    for source in SOURCES.concat() {
+        println!("cargo:rerun-if-changed=cpp/{source}");
+    }
+    println!("cargo:rerun-if-changed=cpp/bridge.h");
+    println!("cargo:rerun-if-changed=cpp/impl.h");
+    println!("cargo:rerun-if-changed=src/vdb/bridge.rs");
+    let out = PathBuf::from(std::env::var_os("OUT_DIR").expect("cargo sets it"));
+    let archive = out.join(format!("lib{ARCHIVE}.a"));
+    let of_library = library(&roots).and_then(|library| symbols(&["-D", "--defined-only"], &library));
+    let compiled = of_library.is_some_and(|mut there| {
+        compile(&roots, &out, Some(TREES));
+        there.extend(symbols(&["--defined-only"], &archive).unwrap_or_default());
+        // Another distribution's library may lack some.
+        symbols(&["--undefined-only"], &archive).is_some_and(|needed| needed.is_subset(&there))
+    });
+    if !compiled {
+        compile(&roots, &out, None);
+    }
+    println!("cargo:rustc-link-lib=openvdb");
+    println!("cargo:rustc-link-lib=tbb");
+}
+
+/// Name of what is linked into the crate.
+const ARCHIVE: &str = "frazil_openvdb";
+
+/// Compiles the sources, with a macro defined.
+fn compile(roots: &[PathBuf], out: &Path, defined: Option<&str>) {
     let mut build = cxx_build::bridge("src/vdb/bridge.rs");
     build
         .std("c++17")
@@ -40,26 +77,39 @@ fn main() {
         .flag("-ffp-contract=off")
         .include("cpp")
         .warnings(true);
-    for root in &roots {
+    defined.iter().for_each(|name| {
+        build.define(name, None);
+    });
+    for root in roots {
         build.flag("-isystem").flag(root.join("include").display().to_string());
-        for folder in ["lib", "lib64"] {
-            println!("cargo:rustc-link-search=native={}", root.join(folder).display());
-        }
     }
-    let out = PathBuf::from(std::env::var_os("OUT_DIR").expect("cargo sets it"));
     for group in SOURCES {
         let joined = out.join(format!("with_{}", group[0]));
         let text: String = group.iter().map(|source| format!("#include \"{source}\"\n")).collect();
         std::fs::write(&joined, text).expect("cargo's folder can be written to");
         build.file(joined);
-        for source in group {
-            println!("cargo:rerun-if-changed=cpp/{source}");
-        }
     }
-    println!("cargo:rerun-if-changed=cpp/bridge.h");
-    println!("cargo:rerun-if-changed=cpp/impl.h");
-    println!("cargo:rerun-if-changed=src/vdb/bridge.rs");
-    build.compile("frazil_openvdb");
-    println!("cargo:rustc-link-lib=openvdb");
-    println!("cargo:rustc-link-lib=tbb");
+    build.compile(ARCHIVE);
+}
+
+/// OpenVDB's shared library, as the linker will find it.
+fn library(roots: &[PathBuf]) -> Option<PathBuf> {
+    let system = ["/usr/lib/x86_64-linux-gnu", "/usr/lib64", "/usr/lib", "/usr/local/lib"].map(PathBuf::from);
+    let own = roots.iter().flat_map(|root| ["lib", "lib64"].map(|folder| root.join(folder)));
+    own.chain(system).map(|folder| folder.join("libopenvdb.so")).find(|path| path.exists())
+}
+
+/// OpenVDB's names in an object file, as `nm` lists them.
+fn symbols(options: &[&str], file: &Path) -> Option<HashSet<String>> {
+    let listed =
+        Command::new("nm").args(options).arg(file).output().ok().filter(|listed| listed.status.success())?;
+    let text = String::from_utf8(listed.stdout).ok()?;
+    let names = text.lines().filter_map(|line| line.split_whitespace().last());
+    // Ours name OpenVDB's types too.
+    Some(
+        names
+            .filter(|name| name.contains("openvdb") && !name.contains("frazil"))
+            .map(str::to_string)
+            .collect(),
+    )
 }

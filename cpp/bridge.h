@@ -74,7 +74,6 @@ struct Call;
 struct Tile;
 struct Triangles;
 struct Part;
-struct Hit;
 
 std::unique_ptr<Grid> make_grid(double voxel, float background, bool level_set);
 std::unique_ptr<VectorGrid> make_vector_grid(double voxel, std::array<float, 3> background);
@@ -162,7 +161,6 @@ std::unique_ptr<Grid> from_particles(const Call& call, rust::Slice<const double>
                                      rust::Slice<const float> radii, double voxel, float half_width);
 Triangles to_mesh(const Grid& grid, const Call& call, double iso, double adaptivity, const Part& part);
 void measure(const Grid& grid, const Call& call, double& area, double& volume);
-void cast_rays(const Grid& grid, const Call& call, rust::Slice<const double> rays, rust::Slice<Hit> hits);
 
 }  // namespace frazil
 

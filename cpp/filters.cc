@@ -21,35 +21,22 @@ void configure(Filter& filter, bool weno) {
     filter.setNormCount(1);
 }
 
-/// Velocity along the level set's gradient at the speed that a second grid gives.
-class Outward {
-public:
-    using VectorType = openvdb::Vec3s;
-    using ValueType = float;
+/// The field and the interrupter for which OpenVDB's library has the advection: another field compiles it anew, which
+/// takes a minute.
+using Field = openvdb::tools::DiscreteField<openvdb::Vec3SGrid, openvdb::tools::BoxSampler>;
+using Advection = openvdb::tools::LevelSetAdvection<openvdb::FloatGrid, Field, openvdb::util::NullInterrupter>;
 
-    Outward(const openvdb::FloatGrid& level_set, const openvdb::FloatGrid& speed)
-        : gradient_(openvdb::tools::gradient(level_set)), speed_(speed) {}
-
-    const openvdb::math::Transform& transform() const { return gradient_->transform(); }
-
-    VectorType operator()(const openvdb::Vec3d& world, ValueType) const {
-        openvdb::Vec3s n = openvdb::tools::BoxSampler::sample(gradient_->tree(), gradient_->worldToIndex(world));
-        if (!n.normalize()) return VectorType(0);
-        return n * openvdb::tools::BoxSampler::sample(speed_.tree(), speed_.worldToIndex(world));
+/// Velocities along a level set's gradient, at the speed that a second grid gives.
+openvdb::Vec3SGrid::Ptr outward(const openvdb::FloatGrid& level_set, const openvdb::FloatGrid& speed) {
+    const openvdb::Vec3SGrid::Ptr velocity = openvdb::tools::gradient(level_set);
+    for (auto value = velocity->beginValueOn(); value; ++value) {
+        openvdb::Vec3s n = *value;
+        const openvdb::Vec3d at = speed.worldToIndex(velocity->indexToWorld(value.getCoord()));
+        const float along = openvdb::tools::BoxSampler::sample(speed.tree(), at);
+        value.setValue(n.normalize() ? openvdb::Vec3s(n * along) : openvdb::Vec3s(0));
     }
-
-    VectorType operator()(const openvdb::Coord& at, ValueType) const {
-        openvdb::Vec3s n = gradient_->tree().getValue(at);
-        if (!n.normalize()) return VectorType(0);
-        return n * openvdb::tools::BoxSampler::sample(speed_.tree(), speed_.worldToIndex(transform().indexToWorld(at)));
-    }
-
-private:
-    openvdb::VectorGrid::Ptr gradient_;
-    const openvdb::FloatGrid& speed_;
-};
-
-using Advection = openvdb::tools::LevelSetAdvection<openvdb::FloatGrid, Outward, openvdb::util::NullInterrupter>;
+    return velocity;
+}
 
 /// Runs a tool on a copy, put in the grid's place when it is done: a cancel or an error changes nothing.
 template <typename Work>
@@ -64,26 +51,6 @@ void on_copy(Grid& grid, const Call& call, Work&& work) {
 }
 
 }  // namespace
-
-}  // namespace frazil
-
-// OpenVDB chooses among its schemes when it runs, and so compiles all of them for each velocity: sixty variants, a
-// minute and more. `advect_outward` takes the schemes that an advection begins with; the others are left empty.
-#define FRAZIL_UNUSED(...)                                           \
-    template <>                                                      \
-    template <>                                                      \
-    size_t frazil::Advection::__VA_ARGS__(float, float) {            \
-        OPENVDB_THROW(openvdb::ValueError, "a scheme without code"); \
-    }
-FRAZIL_UNUSED(advect1<openvdb::math::FIRST_BIAS>)
-FRAZIL_UNUSED(advect1<openvdb::math::SECOND_BIAS>)
-FRAZIL_UNUSED(advect1<openvdb::math::THIRD_BIAS>)
-FRAZIL_UNUSED(advect1<openvdb::math::WENO5_BIAS>)
-FRAZIL_UNUSED(advect2<openvdb::math::HJWENO5_BIAS, openvdb::math::TVD_RK1>)
-FRAZIL_UNUSED(advect2<openvdb::math::HJWENO5_BIAS, openvdb::math::TVD_RK3>)
-#undef FRAZIL_UNUSED
-
-namespace frazil {
 
 void offset(Grid& grid, const Call& call, float metres, bool weno) {
     on_copy(grid, call, [&](openvdb::FloatGrid& copy, Interrupter& interrupter) {
@@ -120,11 +87,9 @@ void renormalise(Grid& grid, const Call& call, bool weno, int32_t times) {
 
 void advect_outward(Grid& grid, const Call& call, const Grid& speed) {
     on_copy(grid, call, [&](openvdb::FloatGrid& copy, Interrupter& interrupter) {
-        const Outward field(copy, *speed.impl->grid);
+        const openvdb::Vec3SGrid::Ptr velocity = outward(copy, *speed.impl->grid);
+        const Field field(*velocity);
         Advection advection(copy, field, &interrupter);
-        // Those that have code.
-        advection.setSpatialScheme(openvdb::math::HJWENO5_BIAS);
-        advection.setTemporalScheme(openvdb::math::TVD_RK2);
         advection.advect(0.0, 1.0);
     });
 }

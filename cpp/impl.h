@@ -14,6 +14,19 @@
 #include <optional>
 #include <stdexcept>
 
+#ifdef FRAZIL_TREES_OF_LIBRARY
+// OpenVDB's library has these; making their functions anew in each of our objects takes most of a build. build.rs looks
+// whether the library has all that is then needed.
+#define FRAZIL_IN_LIBRARY(...)                                                                        \
+    extern template class openvdb::tree::Tree<openvdb::tree::Tree4<__VA_ARGS__>::Type::RootNodeType>; \
+    extern template class openvdb::Grid<openvdb::tree::Tree4<__VA_ARGS__>::Type>;
+FRAZIL_IN_LIBRARY(float)
+FRAZIL_IN_LIBRARY(bool)
+FRAZIL_IN_LIBRARY(openvdb::Int32)
+FRAZIL_IN_LIBRARY(openvdb::Vec3f)
+#undef FRAZIL_IN_LIBRARY
+#endif
+
 namespace frazil {
 
 struct Impl {

@@ -1,14 +1,19 @@
-// Between meshes, rays and level sets.
+// Between meshes and level sets.
 #include "impl.h"
 
 #include <openvdb/tools/LevelSetMeasure.h>
 #include <openvdb/tools/MeshToVolume.h>
-#include <openvdb/tools/RayIntersector.h>
 #include <openvdb/tools/VolumeToMesh.h>
-#include <tbb/blocked_range.h>
-#include <tbb/parallel_for.h>
 
 #include <vector>
+
+#ifdef FRAZIL_TREES_OF_LIBRARY
+extern template void openvdb::tools::VolumeToMesh::operator()(const openvdb::FloatGrid&);
+// What `meshToVolume` works with; the library has all of it but this function.
+using Signs = openvdb::tree::Tree<openvdb::tree::Tree4<unsigned char>::Type::RootNodeType>;
+extern template class openvdb::tree::Tree<Signs::RootNodeType>;
+template void Signs::releaseAllAccessors();
+#endif
 
 namespace frazil {
 
@@ -150,30 +155,6 @@ void measure(const Grid& grid, const Call& call, double& area, double& volume) {
         area = tool.area(true);
         volume = tool.volume(true);
         interrupter.check();
-    });
-}
-
-void cast_rays(const Grid& grid, const Call& call, rust::Slice<const double> rays, rust::Slice<Hit> hits) {
-    run(call, [&] {
-        using Intersector = openvdb::tools::LevelSetRayIntersector<openvdb::FloatGrid>;
-        const Intersector source(*grid.impl->grid);
-        tbb::parallel_for(tbb::blocked_range<size_t>(0, hits.size(), 256),
-                          [&](const tbb::blocked_range<size_t>& range) {
-                              Intersector intersector(source);
-                              for (size_t i = range.begin(); i != range.end(); ++i) {
-                                  const openvdb::Vec3d eye(rays[6 * i], rays[6 * i + 1], rays[6 * i + 2]);
-                                  const openvdb::Vec3d direction(rays[6 * i + 3], rays[6 * i + 4], rays[6 * i + 5]);
-                                  const openvdb::math::Ray<double> ray(eye, direction);
-                                  openvdb::Vec3d at, normal;
-                                  if (intersector.intersectsWS(ray, at, normal)) {
-                                      hits[i].distance = static_cast<float>((at - eye).dot(direction));
-                                      for (int axis = 0; axis < 3; ++axis)
-                                          hits[i].normal[axis] = static_cast<float>(normal[axis]);
-                                  } else {
-                                      hits[i].distance = std::numeric_limits<float>::infinity();
-                                  }
-                              }
-                          });
     });
 }
 

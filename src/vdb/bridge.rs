@@ -81,11 +81,6 @@ pub(super) mod ffi {
         high: [i32; 3],
     }
 
-    struct Hit {
-        distance: f32,
-        normal: [f32; 3],
-    }
-
     unsafe extern "C++" {
         include!("bridge.h");
 
@@ -246,6 +241,5 @@ pub(super) mod ffi {
         ) -> Result<UniquePtr<Grid>>;
         fn to_mesh(grid: &Grid, call: &Call, iso: f64, adaptivity: f64, part: &Part) -> Result<Triangles>;
         fn measure(grid: &Grid, call: &Call, area: &mut f64, volume: &mut f64) -> Result<()>;
-        fn cast_rays(grid: &Grid, call: &Call, rays: &[f64], hits: &mut [Hit]) -> Result<()>;
     }
 }

@@ -3,7 +3,6 @@
 //! Each grid owns its tree; leaves are lent without copying. Index space is world-fixed: voxel
 //! (i, j, k) has its centre at (i, j, k) x voxel size, unless a file has another transform.
 
-#[expect(dead_code, reason = "`cast_rays` and `Hit` are still declared in cpp/bridge.h")]
 mod bridge;
 mod child;
 mod decode;
