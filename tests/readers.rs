@@ -1,4 +1,5 @@
-//! Programs and libraries that nobody here wrote read what the command writes: they see the same grids.
+//! Programs and libraries that nobody here wrote read what the command writes: they see the same grids. This program does
+//! not link frazil, which only makes the files, as a command.
 
 #[path = "common/program.rs"]
 #[allow(dead_code)]
@@ -25,6 +26,13 @@ fn frazil(folder: &Path, arguments: &[&str]) -> String {
         .unwrap();
     assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
     String::from_utf8(output.stdout).unwrap()
+}
+
+/// Where the library were linked, OpenVDB would be too.
+#[test]
+fn this_program_does_not_link_ours() {
+    let loaded = std::fs::read_to_string("/proc/self/maps").unwrap();
+    assert!(loaded.contains("libc.so") && !loaded.contains("libopenvdb"), "{loaded}");
 }
 
 /// A folder with three frames of prints, and what the command says of the last.
