@@ -30,6 +30,7 @@ mod cli {
 mod house {
     mod gates;
     mod imports;
+    mod readers;
 }
 mod io {
     mod damage;
