@@ -168,7 +168,7 @@ fn wait_for(path: &Path, child: &mut Child) {
 }
 
 #[test]
-fn killed_in_any_stage_a_run_goes_on_to_the_same_bytes() {
+fn killed_in_any_stage_a_run_resumes_to_the_same_bytes() {
     let _turn = turn();
     let folder = folder();
     run(folder.path(), "once", &ALL).unwrap();
@@ -219,7 +219,7 @@ fn a_stage_is_made_again_alone_and_takes_what_reads_it_along() {
     // All of them again, from the start of the one that has no state left.
     let made = run(folder.path(), "out", &Asked { from: Some(1), stages: &["tally"], ..ALL }).unwrap();
     assert_eq!(of_stage(&made, "tally"), (1..=8).collect::<Vec<_>>());
-    // The base's records tell from where on it was made again; what it holds is the same.
+    // The base's records say from which frame on it was made again; what it holds is the same.
     let of_others = |name: &String| name.starts_with("tally") || name.contains("objects");
     assert_eq!(differences(folder.path(), "once", "out").into_iter().find(of_others), None);
 }
@@ -270,7 +270,7 @@ fn damage_is_named_in_every_stage() {
         assert!(damaged.iter().any(|damage| damage.file == name), "{name}: {damaged:?}");
         fs::write(&path, &whole).unwrap();
     }
-    // A state of another content is refused, one that is cut is passed over: the stage begins anew.
+    // A state of another content is refused, one that is cut is passed over: the stage starts over.
     let (state, record) = (folder.path().join("out/state/tally.0007.txt"), "out/state/tally.0008.json");
     let whole = fs::read_to_string(&state).unwrap();
     fs::remove_file(folder.path().join(record)).unwrap();

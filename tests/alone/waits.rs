@@ -8,7 +8,7 @@ use std::sync::Arc;
 use std::sync::atomic::Ordering;
 use std::time::{Duration, Instant};
 
-use crate::program::{CUBE, command, told, works};
+use crate::program::{CUBE, command, complains, works};
 use crate::turn;
 use frazil::base::{TriMesh, Vec3};
 use frazil::vdb::guard::Guard;
@@ -115,7 +115,7 @@ fn a_signal_is_answered_while_a_file_is_read() {
     fs::write(folder.path().join("large.obj"), text).unwrap();
     let (output, waited) = interrupted(folder.path(), "info large.obj", Duration::from_millis(400));
     assert!(waited < Duration::from_secs(1), "{waited:?}");
-    told(&output, 143, &["terminated"]);
+    complains(&output, 143, &["terminated"]);
 }
 
 #[test]

@@ -9,7 +9,7 @@ fn every_function_has_a_text_and_is_called_by_a_host() {
 }
 
 #[test]
-fn every_parameter_of_an_out_pointer_is_told() {
+fn every_parameter_of_an_out_pointer_is_described() {
     for (name, text) in functions() {
         if name.contains("create") || name.contains("_from_") {
             assert!(text.contains("out: receives"), "{name}: {text}");
@@ -20,7 +20,7 @@ fn every_parameter_of_an_out_pointer_is_told() {
 #[test]
 fn functions_say_which_threads_may_call_them() {
     for (name, text) in functions() {
-        let told = text.contains("thread") || text.contains("Any number of threads");
-        assert!(told, "{name} does not say which threads may call it");
+        let says = text.contains("thread") || text.contains("Any number of threads");
+        assert!(says, "{name} does not say which threads may call it");
     }
 }

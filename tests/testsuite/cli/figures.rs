@@ -31,7 +31,7 @@ fn warnings(report: &Value) -> Vec<&str> {
 }
 
 #[test]
-fn check_tells_the_keys_that_keep_feet_from_slipping_and_they_do() {
+fn check_prints_the_keys_that_keep_feet_from_slipping_and_they_do() {
     let folder = folder("clip = \"walk\"\nkeys = [{ frame = 1, at = [0, 0.06, 0] }]");
     let slips = check(folder.path(), "");
     let walk = &slips["objects"][0]["walk"];
@@ -54,7 +54,7 @@ fn check_tells_the_keys_that_keep_feet_from_slipping_and_they_do() {
 }
 
 #[test]
-fn check_tells_how_deep_feet_go_and_when_something_is_below_the_ground() {
+fn check_prints_how_deep_feet_go_and_when_something_is_below_the_ground() {
     let folder = folder(
         "clip = \"walk\"\nkeys = [{ frame = 1, at = [0, 0.06, 0] }, { frame = 49, at = [0, 0.06, 2.2] }]",
     );
@@ -78,10 +78,10 @@ fn check_tells_how_deep_feet_go_and_when_something_is_below_the_ground() {
 }
 
 #[test]
-fn info_tells_how_a_clip_is_to_be_carried_and_many_nodes_as_a_tree() {
+fn info_prints_how_a_clip_is_to_be_carried_and_many_nodes_as_a_tree() {
     let folder = folder("");
-    let told: Value = serde_json::from_str(&works(folder.path(), "info hero.glb --json")).unwrap();
-    let gait = &told[0]["holds"][0]["gaits"]["walk"];
+    let info: Value = serde_json::from_str(&works(folder.path(), "info hero.glb --json")).unwrap();
+    let gait = &info[0]["holds"][0]["gaits"]["walk"];
     assert!((gait["stride"].as_f64().unwrap() - 1.1).abs() < 0.03 && gait["steady"] == true, "{gait}");
     let words = works(folder.path(), "info hero.glb");
     assert!(words.contains("\"walk\": carry it by [") && words.contains("or its feet slip"), "{words}");

@@ -1,4 +1,4 @@
-//! What cannot be right is refused or told: thin layers, far offsets, far meshes, fog.
+//! What cannot be right is refused or reported: thin layers, far offsets, far meshes, fog.
 
 use crate::common::shapes;
 use crate::picture::Picture;
@@ -19,7 +19,7 @@ fn folder(snow: &str) -> tempfile::TempDir {
 }
 
 #[test]
-fn a_layer_that_cells_cannot_hold_is_refused_and_a_rough_one_is_told() {
+fn a_layer_that_cells_cannot_hold_is_refused_and_a_rough_one_is_reported() {
     let folder = folder("ground = 0.0\narea = [-1, -1, 1, 1]\ndepth = 0.3\ncell = 0.05");
     assert!(!works(folder.path(), "check shot.toml").contains("cells thick"));
     for command in ["check shot.toml", "snow shot.toml -o out"] {
@@ -27,7 +27,7 @@ fn a_layer_that_cells_cannot_hold_is_refused_and_a_rough_one_is_told() {
         fails(folder.path(), &set("snow.cell=10"), 2, &["shot.toml", "depth = 0.3 m", "cell of 10 m"]);
         fails(folder.path(), &set("snow.depth=0.04"), 2, &["depth = 0.04 m", "less than a cell"]);
         fails(folder.path(), &set("snow.area=[-1,0,1,0.02]"), 2, &["extent in z", "less than a cell"]);
-        assert!(works(folder.path(), &set("snow.depth=0.1")).contains("thick"), "two cells are told");
+        assert!(works(folder.path(), &set("snow.depth=0.1")).contains("thick"), "two cells are reported");
     }
     assert!(!folder.path().join("out/base/base.0002.vdb").exists());
 }
@@ -119,7 +119,7 @@ fn a_fog_volume_is_drawn_and_said_to_be_one() {
 }
 
 #[test]
-fn the_disk_is_told_for_a_layer_from_a_file() {
+fn the_disk_space_is_reported_for_a_layer_from_a_file() {
     // So large that the layer takes most of the disk.
     let folder = folder("ground = 0.0\narea = [-3, -3, 3, 3]\ndepth = 0.3\ncell = 0.02");
     works(folder.path(), "snow shot.toml -o out -q");

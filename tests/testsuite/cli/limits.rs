@@ -1,7 +1,7 @@
 //! Full disks, forbidden folders, too little memory, damaged files, signals: one sentence, the right exit
 //! code, whole frames only.
 
-use crate::program::{CUBE, frazil, told};
+use crate::program::{CUBE, complains, frazil};
 use assert_cmd::Command;
 use std::fs;
 use std::path::Path;
@@ -43,7 +43,7 @@ fn a_missing_frame_of_a_sequence_is_named_before_the_first_frame() {
         fs::write(folder.path().join(format!("cube.{frame:04}.obj")), CUBE).unwrap();
     }
     fs::write(folder.path().join("shot.toml"), scene(4, 0.05, "cube.%04d.obj")).unwrap();
-    told(&frazil(folder.path(), "snow shot.toml -o out"), 2, &["cube.0003.obj", "missing"]);
+    complains(&frazil(folder.path(), "snow shot.toml -o out"), 2, &["cube.0003.obj", "missing"]);
     assert!(!folder.path().join("out").exists());
 }
 
@@ -52,11 +52,15 @@ fn a_cell_too_small_for_the_memory_is_refused_before_it_is_taken() {
     let folder = folder();
     fs::write(folder.path().join("shot.toml"), scene(2, 0.00002, "cube.obj")).unwrap();
     let start = Instant::now();
-    told(&frazil(folder.path(), "snow shot.toml -o out"), 2, &["cell", "MB"]);
-    told(&frazil(folder.path(), "vdb from-mesh cube.obj --cell 0.00001 -o out.vdb"), 2, &["--cell", "MB"]);
+    complains(&frazil(folder.path(), "snow shot.toml -o out"), 2, &["cell", "MB"]);
+    complains(
+        &frazil(folder.path(), "vdb from-mesh cube.obj --cell 0.00001 -o out.vdb"),
+        2,
+        &["--cell", "MB"],
+    );
     assert!(start.elapsed() < Duration::from_secs(5));
     let output = frazil(folder.path(), "vdb from-mesh cube.obj --cell 0.01 -o out.vdb --max-memory 100K");
-    told(&output, 2, &["--cell"]);
+    complains(&output, 2, &["--cell"]);
 }
 
 #[test]
@@ -64,10 +68,10 @@ fn a_folder_that_cannot_be_written_is_refused_before_the_first_frame() {
     let folder = folder();
     fs::write(folder.path().join("file"), "").unwrap();
     for out in ["file", "file/out", "/proc/out"] {
-        told(&frazil(folder.path(), &format!("snow shot.toml -o {out}")), 2, &[out]);
+        complains(&frazil(folder.path(), &format!("snow shot.toml -o {out}")), 2, &[out]);
     }
     for out in ["file/out.vdb", "/proc/out.vdb", "none/out.vdb"] {
-        told(&frazil(folder.path(), &format!("vdb from-mesh cube.obj --cell 0.05 -o {out}")), 2, &[out]);
+        complains(&frazil(folder.path(), &format!("vdb from-mesh cube.obj --cell 0.05 -o {out}")), 2, &[out]);
     }
 }
 
@@ -79,10 +83,10 @@ fn damaged_and_foreign_vdb_files_are_named() {
     let whole = fs::read(folder.path().join("cube.vdb")).unwrap();
     for part in 1..20 {
         fs::write(folder.path().join("cut.vdb"), &whole[..whole.len() * part / 20]).unwrap();
-        told(&frazil(folder.path(), "vdb to-mesh cut.vdb -o cut.ply"), 2, &["cut.vdb"]);
+        complains(&frazil(folder.path(), "vdb to-mesh cut.vdb -o cut.ply"), 2, &["cut.vdb"]);
     }
     fs::write(folder.path().join("text.vdb"), CUBE).unwrap();
-    told(&frazil(folder.path(), "vdb to-mesh text.vdb -o cut.ply"), 2, &["text.vdb", "not a .vdb file"]);
+    complains(&frazil(folder.path(), "vdb to-mesh text.vdb -o cut.ply"), 2, &["text.vdb", "not a .vdb file"]);
     assert!(!folder.path().join("cut.ply").exists());
     assert_eq!(begun(folder.path()), Vec::<String>::new());
 }
@@ -98,7 +102,11 @@ fn a_grid_of_another_type_is_named_with_its_type() {
         eprintln!("skipped: no pyopenvdb");
         return;
     }
-    told(&frazil(folder.path(), "vdb to-mesh mask.vdb -o out.ply"), 2, &["mask.vdb", "\"mask\"", "bool"]);
+    complains(
+        &frazil(folder.path(), "vdb to-mesh mask.vdb -o out.ply"),
+        2,
+        &["mask.vdb", "\"mask\"", "bool"],
+    );
     assert!(frazil(folder.path(), "info mask.vdb").status.success());
 }
 
@@ -115,11 +123,11 @@ fn a_full_disk_ends_the_run_with_nothing_half_written() {
     let folder = folder();
     fs::write(folder.path().join("shot.toml"), scene(3, 0.01, "cube.obj")).unwrap();
     let output = with_file_limit(folder.path(), 16, "snow shot.toml -o out -q");
-    told(&output, 1, &["cannot write"]);
+    complains(&output, 1, &["cannot write"]);
     let made = frazil(folder.path(), "vdb from-mesh cube.obj --cell 0.005 -o whole.vdb");
     assert!(made.status.success());
     let output = with_file_limit(folder.path(), 16, "vdb from-mesh cube.obj --cell 0.005 -o out.vdb");
-    told(&output, 1, &["out.vdb", "cannot write"]);
+    complains(&output, 1, &["out.vdb", "cannot write"]);
     assert!(!folder.path().join("out.vdb").exists());
     assert_eq!(begun(folder.path()), Vec::<String>::new());
 }
@@ -141,15 +149,15 @@ fn a_signal_leaves_whole_frames_and_its_exit_code() {
         let kill = std::process::Command::new("kill").args(["-s", signal, &child.id().to_string()]).status();
         assert!(kill.unwrap().success());
         let asked = Instant::now();
-        told(&child.wait_with_output().unwrap(), code, &["frazil: "]);
-        assert!(asked.elapsed() < Duration::from_secs(5), "it went on for {:?}", asked.elapsed());
+        complains(&child.wait_with_output().unwrap(), code, &["frazil: "]);
+        assert!(asked.elapsed() < Duration::from_secs(5), "it ran on for {:?}", asked.elapsed());
         assert_eq!(begun(folder.path()), Vec::<String>::new());
         assert!(frazil(folder.path(), "info out/base/base.0002.vdb").status.success());
     }
 }
 
 #[test]
-fn a_closed_pipe_is_no_error() {
+fn a_closed_pipe_is_not_an_error() {
     let folder = folder();
     let program = Command::cargo_bin("frazil").unwrap().get_program().to_os_string();
     let mut shell = std::process::Command::new("sh");

@@ -37,9 +37,9 @@ fn a_scene_makes_frames_and_its_resolved_file_makes_them_again() {
         assert!(a == b, "{name} differs");
     }
     let json = works(folder.path(), "info out/base/base.0003.vdb --json --measure");
-    let told: serde_json::Value = serde_json::from_str(&json).unwrap();
+    let info: serde_json::Value = serde_json::from_str(&json).unwrap();
     let names: Vec<_> =
-        told[0]["holds"].as_array().unwrap().iter().map(|grid| grid["name"].clone()).collect();
+        info[0]["holds"].as_array().unwrap().iter().map(|grid| grid["name"].clone()).collect();
     assert_eq!(names, ["compression", "surface", "touched"]);
     works(folder.path(), "preview out/base/base.0003.vdb cube.obj -o p.png --size 64x36");
     assert!(folder.path().join("p.png").metadata().unwrap().len() > 500);

@@ -55,7 +55,7 @@ fn a_new_scene_lacks_nothing_but_its_character() {
 }
 
 #[test]
-fn check_tells_sizes_speed_memory_and_disk() {
+fn check_prints_sizes_speed_memory_and_disk() {
     let folder = folder();
     let said = works(folder.path(), "check shot.toml -o out --json");
     let report: Value = serde_json::from_str(&said).unwrap();
@@ -127,24 +127,27 @@ fn settings_of_the_command_line_are_named_when_they_are_wrong() {
 
 fn faults(folder: &Path, mesh: &TriMesh) -> Value {
     mesh::write(&folder.join("mesh.ply"), mesh).unwrap();
-    let told: Value = serde_json::from_str(&works(folder, "mesh check mesh.ply --json")).unwrap();
-    told[0].clone()
+    let report: Value = serde_json::from_str(&works(folder, "mesh check mesh.ply --json")).unwrap();
+    report[0].clone()
 }
 
 #[test]
-fn mesh_check_tells_solids_from_what_is_none() {
+fn mesh_check_tells_solids_from_other_meshes() {
     let folder = folder();
     let said = works(folder.path(), "mesh check box.obj");
     assert!(said.contains("box.obj: a solid") && said.contains("volume 0.064000 m3"), "{said}");
     let mut open = shapes::cuboid([1.0; 3]);
     open.triangles.truncate(10);
-    let told = faults(folder.path(), &open);
-    assert_eq!((&told["solid"], &told["holes"], &told["open_edges"]), (&false.into(), &1.into(), &4.into()));
+    let report = faults(folder.path(), &open);
+    assert_eq!(
+        (&report["solid"], &report["holes"], &report["open_edges"]),
+        (&false.into(), &1.into(), &4.into())
+    );
     let mut cross = shapes::cuboid([1.0, 1.0, 1.0]);
     cross.append(&shapes::cuboid([0.5, 0.5, 3.0]));
-    let told = faults(folder.path(), &cross);
-    assert_eq!((&told["solid"], &told["parts"]), (&true.into(), &2.into()));
-    assert!(told["crossings"].as_u64().unwrap() >= 8, "{told}");
+    let report = faults(folder.path(), &cross);
+    assert_eq!((&report["solid"], &report["parts"]), (&true.into(), &2.into()));
+    assert!(report["crossings"].as_u64().unwrap() >= 8, "{report}");
     fails(folder.path(), "mesh check none.stl", &["none.stl"]);
 }
 
@@ -154,10 +157,10 @@ fn mesh_check_of_real_meshes_finds_their_known_faults() {
         return eprintln!("skipped: no outside data");
     };
     let folder = folder();
-    let told: Value =
+    let report: Value =
         serde_json::from_str(&works(folder.path(), &format!("mesh check {} --json", bunny.display())))
             .unwrap();
-    assert_eq!((&told[0]["triangles"], &told[0]["holes"]), (&69_451.into(), &5.into()));
+    assert_eq!((&report[0]["triangles"], &report[0]["holes"]), (&69_451.into(), &5.into()));
 }
 
 #[test]

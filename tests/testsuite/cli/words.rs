@@ -1,4 +1,4 @@
-//! Words: what a conversion leaves out, and names that are no text.
+//! Words: what a conversion leaves out, and names that are not text.
 
 use crate::program::{CUBE, command, works};
 use std::ffi::OsStr;
@@ -17,7 +17,7 @@ fn convert_says_what_it_leaves_out() {
 }
 
 #[test]
-fn names_that_are_no_text_are_files_like_others() {
+fn names_that_are_not_text_are_files_like_others() {
     let folder = tempfile::tempdir().unwrap();
     let name = OsStr::from_bytes(b"cube\xff.obj");
     fs::write(folder.path().join(name), CUBE).unwrap();

@@ -9,7 +9,7 @@ use std::time::{Duration, Instant};
 
 use crate::common::character;
 use crate::common::shapes;
-use crate::program::{self, CUBE, fails, frazil, told, works};
+use crate::program::{self, CUBE, complains, fails, frazil, works};
 use frazil::base::blocks::{Block, BlockEdit};
 use frazil::vdb::file::{Compression, WriteOptions};
 use frazil::vdb::guard::Guard;
@@ -69,10 +69,10 @@ fn known_breakers_of_openvdb_are_refused_in_a_sentence() {
             assert!(start.elapsed() < Duration::from_secs(30), "{name}: {:?}", start.elapsed());
             // Damage of what a command does not read is not seen by it.
             if !output.status.success() {
-                told(&output, 2, &[name]);
+                complains(&output, 2, &[name]);
             }
             if name.starts_with("trunc") {
-                told(&output, 2, &["cut short"]);
+                complains(&output, 2, &["cut short"]);
             }
         }
         // A byte flipped inside a value may crash OpenVDB or just be another value.
@@ -97,12 +97,12 @@ fn known_breakers_of_other_readers_are_refused_in_a_sentence() {
         assert!(start.elapsed() < Duration::from_secs(5), "{name}");
         match code {
             0 => assert!(output.status.success(), "{name}: {}", String::from_utf8_lossy(&output.stderr)),
-            _ => told(&output, code, &[name]),
+            _ => complains(&output, code, &[name]),
         }
     }
     let Some(path) = outside("broken/min_obj_escape.obj") else { return };
     let output = on(folder.path(), "info", &path, "");
-    told(&output, 2, &["line 4", "[31mX"]);
+    complains(&output, 2, &["line 4", "[31mX"]);
     assert!(!output.stderr.contains(&0x1b), "{:?}", output.stderr);
 }
 
@@ -321,7 +321,7 @@ fn convert_says_what_it_drops() {
 }
 
 #[test]
-fn an_argument_that_is_no_text_is_no_panic() {
+fn an_argument_that_is_not_text_does_not_panic() {
     let folder = tempfile::tempdir().unwrap();
     let name = std::ffi::OsStr::from_bytes(b"caf\xe9.obj");
     fs::write(folder.path().join(name), CUBE).unwrap();
@@ -329,7 +329,7 @@ fn an_argument_that_is_no_text_is_no_panic() {
     let output = command.arg(name).output().unwrap();
     assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
     let mut command = program::command(folder.path(), "snow -o");
-    told(
+    complains(
         &command.arg(std::ffi::OsStr::from_bytes(b"\xff")).arg("none.toml").output().unwrap(),
         2,
         &["none.toml"],

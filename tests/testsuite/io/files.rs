@@ -80,7 +80,7 @@ fn a_concave_face_becomes_triangles_inside_it() {
 }
 
 #[test]
-fn a_ply_word_that_is_no_number_is_told() {
+fn a_ply_word_that_is_not_a_number_is_reported() {
     let what = refusal("word.ply", &ply("ascii", XYZ, b"0 0 0\n1 zero 0\n0 1 0\n3 0 1 2\n"));
     assert!(what.contains("vertex 2 of 3") && what.contains("\"zero\" is not a number"), "{what}");
 }

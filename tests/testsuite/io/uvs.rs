@@ -186,7 +186,7 @@ fn a_seam_opens_nothing_and_a_vertex_without_a_face_sweeps_nothing() {
     assert_eq!(first("far"), first("without"));
 }
 
-/// An .obj whose faces' corners are written anew, from their vertex and what follows its slash.
+/// An .obj whose faces' corners are written again, from their vertex and what follows its slash.
 fn with_faces(text: &str, corner: impl Fn(usize, &str) -> String) -> String {
     let word = |word: &str| {
         let (vertex, rest) = word.split_once('/').unwrap();
@@ -309,7 +309,7 @@ fn a_gltf_keeps_its_vertices_though_those_that_move_alike_are_joined() {
 }
 
 #[test]
-fn corners_without_uvs_are_told_and_bad_ones_are_named() {
+fn corners_without_uvs_are_reported_and_bad_ones_are_named() {
     let folder = tempfile::tempdir().unwrap();
     let folder = folder.path();
     fs::write(folder.join("part.obj"), SEAMS.replace("f 6/5/ 9/6 5/7", "f 6 9//1 5/7")).unwrap();

@@ -241,7 +241,7 @@ fn skins_share_their_joints_and_equal_vertices_are_welded() {
 }
 
 #[test]
-fn clips_start_where_they_are_told_and_repeat() {
+fn clips_start_where_they_are_asked_to_and_repeat() {
     let folder = tempfile::tempdir().unwrap();
     let mut maker = Maker::new();
     let mesh = maker.triangle();

@@ -272,7 +272,7 @@ fn ten_thousand_changed_records_are_used_or_refused() {
             || !out.join("base/base.0004.vdb").exists()
             || !out.join("state/base.0004.vdb").exists()
         {
-            // A run that could go on from N has forgotten what comes after.
+            // A run that could resume from a frame has removed what comes after it.
             let _ = fs::remove_dir_all(&out);
             works(folder.path(), "snow half/half.toml -o out -q");
         }

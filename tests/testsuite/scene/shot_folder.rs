@@ -4,7 +4,7 @@ use std::fs;
 use std::path::Path;
 
 use crate::common::character::{moments, output};
-use crate::program::{self, CUBE, fails, frazil, told, works};
+use crate::program::{self, CUBE, complains, fails, frazil, works};
 use tempfile::TempDir;
 
 /// A folder with a cube that slides through snow for so many frames; `output` stands in the scene's table.
@@ -47,7 +47,7 @@ fn files(folder: &Path) -> Vec<String> {
 }
 
 #[test]
-fn a_state_is_hashed_before_a_run_goes_on_from_it() {
+fn a_state_is_hashed_before_a_run_resumes_from_it() {
     for written in ["half = true", "base = []"] {
         let folder = folder(4, written);
         works(folder.path(), "snow shot.toml -o out -q");
@@ -89,11 +89,11 @@ fn check_reads_all_that_a_folder_holds_and_names_what_is_damaged() {
             let whole = fs::read(&path).unwrap();
             flip(&path, part);
             let checked = frazil(folder.path(), "check out");
-            told(&checked, 1, &[name]);
+            complains(&checked, 1, &[name]);
             let said = String::from_utf8(checked.stdout).unwrap();
             assert!(said.contains(&format!("damaged   {name}")), "{name}: {said}");
             fs::write(&path, &whole[..whole.len() - 1]).unwrap();
-            told(&frazil(folder.path(), "check out"), 1, &[name]);
+            complains(&frazil(folder.path(), "check out"), 1, &[name]);
             fs::write(&path, whole).unwrap();
         }
         works(folder.path(), "check out");
@@ -103,7 +103,7 @@ fn check_reads_all_that_a_folder_holds_and_names_what_is_damaged() {
 }
 
 #[test]
-fn from_refuses_what_it_cannot_go_on_from_before_it_removes_anything() {
+fn from_refuses_what_it_cannot_resume_from_before_it_removes_anything() {
     for written in ["half = true", "base = []"] {
         let folder = folder(10, written);
         works(folder.path(), "snow shot.toml -o out -q");
@@ -117,7 +117,7 @@ fn from_refuses_what_it_cannot_go_on_from_before_it_removes_anything() {
         );
         assert!(before == output(&folder.path().join("out")), "{written}");
         works(folder.path(), &format!("snow shot.toml -o out -q {set} --from 10"));
-        // The layer before frame 10 is needed again, and gone: the past is not made anew with other settings.
+        // The layer before frame 10 is needed again, and gone: earlier frames are not made again with other settings.
         for name in ["state/base.0010.json", "state/base.0009.vdb", "state/base.0010.vdb"] {
             fs::remove_file(folder.path().join("out").join(name)).unwrap();
         }
@@ -221,7 +221,7 @@ fn a_record_names_no_files_outside_its_frame() {
 }
 
 #[test]
-fn a_folder_that_cannot_be_locked_is_told() {
+fn a_folder_that_cannot_be_locked_is_reported() {
     let folder = folder(1, "");
     let shim = "#include <errno.h>\nint flock(int file, int operation) { errno = ENOLCK; return -1; }\n";
     fs::write(folder.path().join("shim.c"), shim).unwrap();

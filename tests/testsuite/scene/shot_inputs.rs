@@ -4,7 +4,7 @@ use std::fs;
 use std::path::Path;
 
 use crate::common::character::output;
-use crate::program::{CUBE, fails, frazil, told, works};
+use crate::program::{CUBE, complains, fails, frazil, works};
 use tempfile::TempDir;
 
 /// A folder with a cube; the scene has an area of 2 x 2 m, and `objects` at its end.
@@ -68,7 +68,7 @@ fn the_last_frame_of_a_sequence_moves_as_the_next_file_says_once_it_is_there() {
     works(folder.path(), "snow shot.toml -o out -q");
     assert!((velocity(&last) - 0.25 * 24.0).abs() < 1e-4, "{}", velocity(&last));
     assert!(base == fs::read(folder.path().join("out/base/base.0005.vdb")).unwrap());
-    // One that does not fit is no reason to stop.
+    // One that does not fit does not stop the run.
     fs::write(folder.path().join("body.0006.obj"), "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n").unwrap();
     let said = works(folder.path(), "snow shot.toml -o out");
     assert!(said.contains("body.0006.obj") && (velocity(&last) - 0.09 * 24.0).abs() < 1e-4, "{said}");
@@ -202,7 +202,7 @@ fn what_reaches_from_the_snow_to_beyond_the_reach_is_named_by_check_and_by_the_r
     };
     assert!(named(&said), "{said}");
     let run = frazil(folder.path(), &format!("snow shot.toml -o out {set}"));
-    told(&run, 1, &["frame 3", "object 2 (pole.obj)"]);
+    complains(&run, 1, &["frame 3", "object 2 (pole.obj)"]);
     assert!(folder.path().join("out/base/base.0002.vdb").exists());
     // A static one.
     let objects = "[[object]]\nfile = \"pole.obj\"\nrole = \"static\"\n";

@@ -1,4 +1,4 @@
-//! Shots that stop and go on: killed, continued, with other settings, damaged records, full disks.
+//! Shots that stop and resume: killed, continued, with other settings, damaged records, full disks.
 
 use std::collections::BTreeMap;
 use std::fs;
@@ -60,7 +60,7 @@ fn same_grids(a: &Path, b: &Path) {
 }
 
 #[test]
-fn a_killed_run_goes_on_to_the_same_bytes_whatever_is_written() {
+fn a_killed_run_resumes_to_the_same_bytes_whatever_is_written() {
     for written in
         ["", "base_mode = \"delta\"", "half = true", "base = []", "objects = [\"usd\"]\nremoved = []"]
     {
@@ -141,7 +141,7 @@ fn other_settings_are_refused_by_name_and_from_keeps_what_is_before() {
         let name = format!("base/base.{frame:04}.vdb");
         assert_eq!(before[&name] == after[&name], frame < 4, "{name}");
     }
-    // What was kept stays kept, and what was made goes on with the settings that made it.
+    // What was kept stays kept, and what was made continues with the settings that made it.
     works(folder.path(), &format!("snow shot.toml -o out -q {set}"));
     fails(folder.path(), "snow shot.toml -o out", 2, &["snow.noise.seed was 2"]);
     assert_eq!(differences(&after, &output(&folder.path().join("out"))), Vec::<String>::new());
@@ -233,7 +233,7 @@ fn damaged_records_and_files_are_named() {
     fs::remove_file(path("state/base.0003.json")).unwrap();
     let said = works(folder.path(), "snow shot.toml -o out");
     assert!(said.contains("3 frames are there, 1 are to be made"), "{said}");
-    // The length is right, the content is not: nobody goes on from it.
+    // The length is right, the content is not: no run resumes from it.
     let mut bytes = fs::read(path("base/base.0003.vdb")).unwrap();
     let middle = bytes.len() / 2;
     bytes[middle] ^= 1;
@@ -264,7 +264,7 @@ fn two_runs_do_not_write_into_one_folder() {
 }
 
 #[test]
-fn no_space_ends_the_run_and_space_lets_it_go_on() {
+fn no_space_ends_the_run_and_space_lets_it_resume() {
     let folder = folder(12, 0.02, "base_mode = \"delta\"");
     // Files may grow to what the first frames need: a later one, larger, finds no space.
     works(folder.path(), "snow shot.toml -o once -q");

@@ -108,7 +108,7 @@ fn the_same_bytes_from_1_2_and_5_threads() {
 }
 
 #[test]
-fn compression_and_touched_are_told_where_the_snow_was_pressed() {
+fn compression_and_touched_show_where_the_snow_was_pressed() {
     let ctx = context(2);
     let mut base = BaseLayer::new(&ctx, snow(&ctx), exact()).unwrap();
     let press = Body::new(Box::new(Rigid::new(cuboid([0.3, 0.4, 0.3]), Keys::default())), 0.0).unwrap();

@@ -45,9 +45,9 @@ fn parts(base: &BaseLayer) -> Vec<u64> {
 
 #[test]
 fn a_small_island_goes_and_its_snow_is_counted() {
-    let (kept, told, before) = pressed(2, 0);
+    let (kept, first, before) = pressed(2, 0);
     let island = parts(&kept)[1] as usize;
-    assert!((300..450).contains(&island) && told.crumbs == 0, "{:?}", parts(&kept));
+    assert!((300..450).contains(&island) && first.crumbs == 0, "{:?}", parts(&kept));
     let (same, report, _) = pressed(2, island);
     assert_eq!((parts(&same).len(), report.crumbs), (2, 0), "as large as it must be");
     assert_eq!(same.volume(), kept.volume());
@@ -55,7 +55,7 @@ fn a_small_island_goes_and_its_snow_is_counted() {
     assert_eq!((parts(&gone).len(), report.crumbs), (1, 1));
     // What it held is removed: from the volume, and in the level set.
     let pillar = 0.1 * 0.1 * 0.3;
-    let more = report.removed_volume - told.removed_volume;
+    let more = report.removed_volume - first.removed_volume;
     assert!((more / pillar - 1.0).abs() < 0.06, "{more} m3 more, not {pillar}");
     assert!((before - report.base_volume - report.removed_volume).abs() < 1e-9);
     let ctx = Context::new(Pool::new(1).unwrap());

@@ -80,7 +80,7 @@ fn snow_lies_on_static_objects_and_not_in_them() {
 }
 
 #[test]
-fn two_static_objects_in_one_another_are_no_snow() {
+fn two_static_objects_inside_each_other_hold_no_snow() {
     let mut other = block();
     other.positions.iter_mut().for_each(|p| p.x += 0.1);
     let grid = holds(&plane(), &[block(), other], &Cover::Depth(0.2), 0.2);

@@ -43,7 +43,7 @@ fn bytes(base: &BaseLayer) -> Vec<u8> {
 }
 
 #[test]
-fn a_restored_layer_goes_on_with_the_same_bytes_on_any_number_of_threads() {
+fn a_restored_layer_continues_with_the_same_bytes_on_any_number_of_threads() {
     let ctx = context(2);
     let params = Params::for_cell(CELL);
     let mut straight = BaseLayer::new(&ctx, snow(&ctx, 0.3), params).unwrap();
@@ -78,7 +78,7 @@ fn a_restored_layer_goes_on_with_the_same_bytes_on_any_number_of_threads() {
 fn blocks_that_go_whole_or_have_odd_values_outside_the_band_come_back() {
     let ctx = context(2);
     let mut odd = snow(&ctx, 0.3);
-    // Inactive values that are no background, as another program may leave them.
+    // Inactive values that differ from the background, as another program may leave them.
     for leaf in odd.leaves_mut().unwrap() {
         let quiet = |index: usize| leaf.mask[index >> 6] >> (index & 63) & 1 == 0;
         for index in (0..512).filter(|&index| quiet(index)) {
@@ -97,7 +97,7 @@ fn blocks_that_go_whole_or_have_odd_values_outside_the_band_come_back() {
 }
 
 #[test]
-fn what_is_no_state_of_this_layer_is_refused() {
+fn a_state_of_another_layer_is_refused() {
     let ctx = context(1);
     let params = Params::for_cell(CELL);
     let mut base = BaseLayer::new(&ctx, snow(&ctx, 0.3), params).unwrap();
