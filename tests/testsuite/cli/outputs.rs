@@ -177,17 +177,18 @@ fn a_signal_is_answered_while_the_program_waits_for_a_file() {
 fn a_signal_in_the_middle_of_a_shot_leaves_whole_frames_and_nothing_begun() {
     let folder = folder();
     let fine = "--set snow.cell=0.003 --set shot.frames=1-400 --set object.1.keys=[{frame=1,at=[-0.4,0.1,0]},{frame=400,at=[0.4,0.1,0]}]";
-    for file in ["state", "base/base.0001.vdb", "base/base.0004.vdb"] {
-        let line = format!("snow shot.toml -o out -q {fine}");
-        let path = folder.path().join("out").join(file);
-        let (code, took) = terminate(folder.path(), &line, || path.exists());
+    // A folder for each: a file of an earlier run would be taken for this one's, and the signal sent before anyone listens.
+    for (out, file) in [("a", "state"), ("b", "base/base.0001.vdb"), ("c", "base/base.0004.vdb")] {
+        let line = format!("snow shot.toml -o {out} -q {fine}");
+        let out = folder.path().join(out);
+        let (code, took) = terminate(folder.path(), &line, || out.join(file).exists());
         assert_eq!(code, Some(143), "{file}");
         assert!(took < ANSWER, "{file}: {took:?}");
-    }
-    for kind in ["", "base", "removed", "state", "report"] {
-        let Ok(entries) = fs::read_dir(folder.path().join("out").join(kind)) else { continue };
-        for name in entries.map(|entry| entry.unwrap().file_name()) {
-            assert!(!name.to_string_lossy().ends_with(".part"), "{name:?}");
+        for kind in ["", "base", "removed", "state", "report"] {
+            let Ok(entries) = fs::read_dir(out.join(kind)) else { continue };
+            for name in entries.map(|entry| entry.unwrap().file_name()) {
+                assert!(!name.to_string_lossy().ends_with(".part"), "{name:?}");
+            }
         }
     }
 }
