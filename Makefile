@@ -80,9 +80,9 @@ test-dist: dist hosts
 # Blender and usd-core open what frazil writes; installs them (apt-get, and PyPI into target/clients).
 test-clients: setup
 	@./tools/clients
-	cargo test --release --test clients --test motion_gltf -- --nocapture
+	cargo test --release --test testsuite -- --nocapture scene::clients:: motion::gltf::
 
-# Blender's poses of CesiumMan, which tests/motion_gltf.rs and a gate compare with.
+# Blender's poses of CesiumMan, which tests/testsuite/motion/gltf.rs and a gate compare with.
 skinning-numbers:
 	@./tools/clients
 	blender -b --factory-startup -noaudio --python-exit-code 7 --python tests/clients/skinning.py -- "$${FRAZIL_DATA:-../shared/data}/character/CesiumMan.glb" tests/clients/cesium_man.txt

@@ -1,4 +1,5 @@
-//! Programs and libraries that nobody here wrote read what the command writes: they see the same grids.
+//! Programs and libraries that nobody here wrote read what the command writes: they see the same grids. This program does
+//! not link frazil, which only makes the files, as a command.
 
 #[path = "common/program.rs"]
 #[allow(dead_code)]
@@ -27,16 +28,23 @@ fn frazil(folder: &Path, arguments: &[&str]) -> String {
     String::from_utf8(output.stdout).unwrap()
 }
 
+/// Where the library were linked, OpenVDB would be too.
+#[test]
+fn this_program_does_not_link_ours() {
+    let loaded = std::fs::read_to_string("/proc/self/maps").unwrap();
+    assert!(loaded.contains("libc.so") && !loaded.contains("libopenvdb"), "{loaded}");
+}
+
 /// A folder with three frames of prints, and what the command says of the last.
 fn frames() -> (TempDir, Vec<Value>) {
     let folder = tempfile::tempdir().unwrap();
     std::fs::write(folder.path().join("cube.obj"), CUBE).unwrap();
     std::fs::write(folder.path().join("shot.toml"), SCENE).unwrap();
     frazil(folder.path(), &["snow", "shot.toml", "-o", "out", "-q"]);
-    let told =
+    let info =
         frazil(folder.path(), &["info", "out/base/base.0003.vdb", "out/removed/removed.0003.vdb", "--json"]);
-    let told: Value = serde_json::from_str(&told).unwrap();
-    let grids = told.as_array().unwrap().iter().flat_map(|file| file["holds"].as_array().unwrap().clone());
+    let info: Value = serde_json::from_str(&info).unwrap();
+    let grids = info.as_array().unwrap().iter().flat_map(|file| file["holds"].as_array().unwrap().clone());
     let grids = grids.collect();
     (folder, grids)
 }
@@ -49,18 +57,18 @@ fn file_of(grid: &Value) -> &'static str {
 fn vdb_rs_sees_the_same_grids() {
     let (folder, grids) = frames();
     assert_eq!(grids.len(), 4);
-    for told in grids {
-        let name = told["name"].as_str().unwrap();
-        let file = BufReader::new(File::open(folder.path().join(file_of(&told))).unwrap());
+    for info in grids {
+        let name = info["name"].as_str().unwrap();
+        let file = BufReader::new(File::open(folder.path().join(file_of(&info))).unwrap());
         let grid = VdbReader::new(file).unwrap().read_grid::<f32>(name).unwrap();
         let active: f64 = grid.iter().map(|(_, _, level)| f64::from(level.scale()).powi(3)).sum();
-        assert_eq!(Some(active), told["active_voxels"].as_f64(), "{name}");
+        assert_eq!(Some(active), info["active_voxels"].as_f64(), "{name}");
         // A grid without a class does not say so.
         let class = match grid.descriptor.meta_data.0.get("class") {
             Some(MetadataValue::String(class)) => class.as_str(),
             _ => "unknown",
         };
-        assert_eq!(Some(class), told["class"].as_str(), "{name}");
+        assert_eq!(Some(class), info["class"].as_str(), "{name}");
         let Map::UniformScaleMap { voxel_size, .. } = grid.transform else { panic!("{:?}", grid.transform) };
         assert_eq!(voxel_size.to_array(), [0.02; 3]);
         if name == "surface" {
@@ -73,7 +81,7 @@ fn vdb_rs_sees_the_same_grids() {
     }
 }
 
-/// Debian's module is for /usr/bin/python3; skipped with a word where it is not installed.
+/// Debian's module is for /usr/bin/python3; skipped, with a message, where it is not installed.
 #[test]
 fn pyopenvdb_sees_the_same_grids() {
     let script = "import sys, pyopenvdb as v\n\
@@ -92,9 +100,9 @@ fn pyopenvdb_sees_the_same_grids() {
         .args(["-c", script, "out/base/base.0003.vdb", "out/removed/removed.0003.vdb"])
         .output()
         .unwrap();
-    let text = |told: &Value| {
-        let class = told["class"].as_str().unwrap();
-        format!("{}|{}|{class}|0.02", told["name"].as_str().unwrap(), told["active_voxels"])
+    let text = |info: &Value| {
+        let class = info["class"].as_str().unwrap();
+        format!("{}|{}|{class}|0.02", info["name"].as_str().unwrap(), info["active_voxels"])
     };
     let mut expected: Vec<String> = grids.iter().map(text).collect();
     let printed = String::from_utf8(output.stdout).unwrap();

@@ -16,7 +16,7 @@ use rayon::prelude::*;
 use crate::common::character::data;
 use crate::common::{hero, shapes};
 use crate::dense::Dense;
-use crate::harness::{Bound, Harness};
+use crate::harness::Harness;
 use crate::scenes::{self, context};
 
 /// Cells from a body's middle to its farthest point.
@@ -28,8 +28,8 @@ const APART: f64 = 0.1;
 const MOST_POSES: usize = 2048;
 const MOST_SHAPES: usize = 192;
 const LEAST_POSES: usize = 48;
-/// Errors (cells) from which on it is told where they are.
-const TOLD: f64 = 0.1;
+/// Larger errors (cells) are printed with their place.
+const PRINTED: f64 = 0.1;
 /// Values of neighbours of opposite sign that differ by more (cells) jump.
 const JUMP: f64 = 1.3;
 
@@ -76,11 +76,11 @@ pub fn run(h: &mut Harness) {
     }
     std::fs::remove_dir_all(&folder).ok();
     let note = format!("{} pairs, {}", found.pairs, found.worst_jump.1);
-    h.gate("reliability.band_jumps", found.jumps as f64, "pairs", Bound::Most(0.0), Bound::Open, &note);
+    h.gate("reliability.band_jumps", found.jumps as f64, &note);
     let note = format!("{} pairs, {}", in_snow.pairs, in_snow.worst_jump.1);
-    h.gate("reliability.band_snow", in_snow.jumps as f64, "pairs", Bound::Most(0.0), Bound::Open, &note);
+    h.gate("reliability.band_snow", in_snow.jumps as f64, &note);
     let note = format!("{} values of {} sweeps, {}", found.values, found.sweeps, found.worst.1);
-    h.gate("reliability.band_error", found.worst.0, "cells", Bound::Most(0.15), Bound::Most(0.06), &note);
+    h.gate("reliability.band_error", found.worst.0, &note);
 }
 
 /// What was found, and where the worst of it.
@@ -142,7 +142,7 @@ impl Found {
         });
     }
 
-    /// Compares values within a cell of the surface; tells the largest error (cells), and where a large one is.
+    /// Compares values within a cell of the surface; returns the largest error (cells), and where a large one is.
     fn compare(&mut self, ctx: &Context, leaves: &Leaves, dense: &Dense, place: &str) -> String {
         let mut near = Vec::new();
         leaves.each_voxel(|at, value| {
@@ -157,7 +157,7 @@ impl Found {
             let limit = 1.4 * leaves.cell;
             let truth = dense.distance(p, limit) / leaves.cell;
             // A pit or slit may have been missed.
-            let is_deeper = truth < 0.0 && value - truth > TOLD;
+            let is_deeper = truth < 0.0 && value - truth > PRINTED;
             let truth = if is_deeper { dense.distance_closely(p, limit) / leaves.cell } else { truth };
             (truth, (value - truth).abs(), at, value)
         };
@@ -166,11 +166,11 @@ impl Found {
         self.values += errors.len();
         let worst = errors.into_iter().max_by(|a, b| a.1.total_cmp(&b.1));
         let Some((truth, error, at, value)) = worst else { return String::new() };
-        let told = format!("{value:.3} for {truth:.3} at {at:?}");
+        let what = format!("{value:.3} for {truth:.3} at {at:?}");
         if error > self.worst.0 {
-            self.worst = (error, format!("{told} of {place}"));
+            self.worst = (error, format!("{what} of {place}"));
         }
-        if error > TOLD { format!("{error:.3} ({told}) ") } else { format!("{error:.3} ") }
+        if error > PRINTED { format!("{error:.3} ({what}) ") } else { format!("{error:.3} ") }
     }
 }
 

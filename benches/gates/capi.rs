@@ -20,7 +20,7 @@ use frazil::motion::Motion;
 use frazil::snow::base_layer::BaseLayer;
 use frazil::sweep::Body;
 
-use crate::harness::{Bound, Harness, median, timed};
+use crate::harness::{Harness, median, timed};
 use crate::scenes::{self, FRAMES, context};
 
 /// A body's poses in 32 bits at whole frames, as a host has them.
@@ -254,7 +254,7 @@ fn cancel(h: &mut Harness) {
     latencies.sort_unstable_by(f64::total_cmp);
     let (p99, count) = (latencies[latencies.len() * 99 / 100], latencies.len());
     let note = format!("{count} cancels of a step of {whole:.3} s; median {:.4} s", median(latencies));
-    h.gate("capi.cancel_latency", p99, "s", Bound::Most(0.2), Bound::Most(0.05), &note);
+    h.gate("capi.cancel_latency", p99, &note);
     h.holds("capi.cancel_state", same, "the state after cancels, and the grids of the step made in the end");
 }
 
@@ -333,9 +333,9 @@ fn measure(h: &mut Harness, host: &Host, name: &str, note: &str) {
     round();
     let seconds = median((0..5).map(|_| round()).collect());
     let note = format!("threads=2, {} bytes {note}", state.len());
-    h.gate(&format!("{name}_seconds"), seconds, "s", Bound::Most(0.5), Bound::Most(0.2), &note);
+    h.gate(&format!("{name}_seconds"), seconds, &note);
     let bytes = state.len() as f64 / host.voxels() as f64;
-    h.gate(&format!("{name}_bytes"), bytes, "B", Bound::Most(6.0), Bound::Most(4.0), &note);
+    h.gate(&format!("{name}_bytes"), bytes, &note);
 }
 
 /// Steps of `small` through C over the same steps in Rust, in turn.
@@ -379,7 +379,7 @@ fn border(h: &mut Harness) {
     }
     let (c, rust) = (median(through_c), median(in_rust));
     let note = format!("threads=2, {} frames in {c:.4} s through C, in {rust:.4} s in Rust", FRAMES - 1);
-    h.gate("capi.border_cost", c / rust, "x", Bound::Most(1.05), Bound::Most(1.01), &note);
+    h.gate("capi.border_cost", c / rust, &note);
 }
 
 /// What a program of tests/ctest says; none when it was not built. The C library keeps one heap for all of its
@@ -412,9 +412,9 @@ fn programs(h: &mut Harness) {
         let (_, text) = said("load_cycles", &[]).unwrap_or_default();
         let threads = number_after(&text, "threads").unwrap_or(f64::INFINITY);
         let kilobytes = number_after(&text, "memory_kB").unwrap_or(f64::INFINITY);
-        h.gate("capi.load_threads", threads, "threads", Bound::Most(0.0), Bound::Most(0.0), "100 cycles");
+        h.gate("capi.load_threads", threads, "100 cycles");
         let note = "100 cycles, growth from the 10th on, in one heap";
-        h.gate("capi.load_memory", kilobytes / 1024.0, "MB", Bound::Most(2.0), Bound::Most(0.0), note);
+        h.gate("capi.load_memory", kilobytes / 1024.0, note);
     }
     if h.wants("capi.symbols") {
         let library = built("install/lib/libfrazil.so");
@@ -425,17 +425,17 @@ fn programs(h: &mut Harness) {
         let (ours, others): (Vec<&str>, Vec<&str>) = names.partition(|name| name.starts_with("frz_"));
         let count = if ours.is_empty() { f64::INFINITY } else { others.len() as f64 };
         let note = format!("{} functions", ours.len());
-        h.gate("capi.symbols", count, "symbols", Bound::Most(0.0), Bound::Most(0.0), &note);
+        h.gate("capi.symbols", count, &note);
     }
     if h.wants("capi.unused") {
         let bare = crate::common::header::bare_functions();
         let note = if bare.is_empty() { String::new() } else { bare.join(" ") };
-        h.gate("capi.unused", bare.len() as f64, "functions", Bound::Most(0.0), Bound::Most(0.0), &note);
+        h.gate("capi.unused", bare.len() as f64, &note);
     }
     if h.wants("capi.misuse") {
         let (_, text) = said("misuse", &["100000", "20261121"]).unwrap_or_default();
         let crashes = number_after(&text, "crashes").unwrap_or(f64::INFINITY);
-        h.gate("capi.misuse_crashes", crashes, "crashes", Bound::Most(0.0), Bound::Most(0.0), "100000 calls");
+        h.gate("capi.misuse_crashes", crashes, "100000 calls");
     }
     if h.wants("capi.sanitizers") {
         let script = Path::new(env!("CARGO_MANIFEST_DIR")).join("tools/sanitize");
@@ -444,6 +444,6 @@ fn programs(h: &mut Harness) {
             text.map(|output| String::from_utf8_lossy(&output.stdout).into_owned()).unwrap_or_default();
         let errors = number_after(&text, "errors").unwrap_or(f64::INFINITY);
         let note = if errors.is_finite() { "ASan, UBSan, valgrind" } else { none };
-        h.gate("capi.sanitizers_errors", errors, "errors", Bound::Most(0.0), Bound::Most(0.0), note);
+        h.gate("capi.sanitizers_errors", errors, note);
     }
 }

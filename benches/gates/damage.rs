@@ -13,7 +13,7 @@ use frazil::vdb::guard::Guard;
 use frazil::vdb::{MetaValue, file, level_set};
 
 use crate::common::{character, hero, shapes};
-use crate::harness::{Bound, Harness, median, timed};
+use crate::harness::{Harness, median, timed};
 use crate::scenes::{self, context};
 
 /// Argument of a run that only reads mutated files: kind, first and last.
@@ -292,7 +292,7 @@ fn fuzz(h: &mut Harness, name: &str, kind: &str) {
         }
     }
     let note = format!("{count} inputs, {accepted} accepted {}", which.join(", "));
-    h.gate(name, failed as f64, "inputs", Bound::Most(0.0), Bound::Open, &note);
+    h.gate(name, failed as f64, &note);
 }
 
 /// The files whose formats say how long they are.
@@ -346,7 +346,7 @@ fn cut(h: &mut Harness) {
     }
     let _ = std::fs::remove_dir_all(&folder);
     let note = format!("{cuts} cuts of {} files", files.len());
-    h.gate("reliability.cut", accepted as f64, "files", Bound::Most(0.0), Bound::Open, &note);
+    h.gate("reliability.cut", accepted as f64, &note);
 }
 
 fn child_cost(h: &mut Harness) {
@@ -376,5 +376,5 @@ fn child_cost(h: &mut Harness) {
     let (direct, child) = (median(direct), median(child));
     let note =
         format!("{megabytes:.1} MB, {} leaves, {direct:.3} s and {child:.3} s{note}", surface.leaf_count());
-    h.gate("reliability.child_cost", child / direct, "x", Bound::Most(2.2), Bound::Most(1.3), &note);
+    h.gate("reliability.child_cost", child / direct, &note);
 }

@@ -1,13 +1,29 @@
-//! One line a number: `gate <name> <value> <unit> must <bound> aim <bound> <aim|ok|short>`.
+//! One line a number: `gate <name> <value> <unit> must <bound> aim <bound> <aim|ok|short>`. Bounds are in `list.rs`.
 
 use std::time::Instant;
 
+mod list;
+
+pub use list::GATES;
+
 /// Prints gates and remembers whether one fell short.
 pub struct Harness {
+    gates: &'static [Gate],
+    /// Which of the gates were measured, or said to be skipped.
+    done: Vec<bool>,
+    /// Prefixes of the names that are wanted; all without any.
     only: Vec<String>,
-    /// Which of them named a gate.
-    found: Vec<bool>,
     short: bool,
+}
+
+/// What is promised of a number.
+pub struct Gate {
+    pub name: &'static str,
+    pub unit: &'static str,
+    /// What the value must keep.
+    pub must: Bound,
+    /// What it aims at.
+    pub aim: Bound,
 }
 
 /// A bound such as `<=0.1` or `>=1`.
@@ -22,7 +38,8 @@ pub enum Bound {
 }
 
 impl Bound {
-    fn holds(self, value: f64) -> bool {
+    /// Whether a value keeps it.
+    pub fn holds(self, value: f64) -> bool {
         match self {
             Self::Most(bound) => value <= bound,
             Self::Least(bound) => value >= bound,
@@ -40,47 +57,66 @@ impl Bound {
 }
 
 impl Harness {
-    /// Takes the names (prefixes, comma-separated) to run from the arguments; all without any.
+    /// Takes the names (prefixes, comma-separated) to run from the arguments; all without any. Ends the program with 2 when no
+    /// gate is named so.
     pub fn from_arguments() -> Self {
-        let names = std::env::args().skip(1).filter(|argument| !argument.starts_with('-'));
-        let only = names.flat_map(|text| text.split(',').map(str::to_string).collect::<Vec<_>>()).collect();
-        Self::of(only)
+        // `cargo bench` adds this one.
+        let names = std::env::args().skip(1).filter(|argument| argument != "--bench");
+        let names = names.flat_map(|text| text.split(',').map(str::to_string).collect::<Vec<_>>());
+        Self::of(GATES, names.filter(|name| !name.is_empty()).collect()).unwrap_or_else(|error| {
+            eprintln!("{error}");
+            std::process::exit(2);
+        })
     }
 
     /// Runs the gates whose names begin with one of these; all without any.
-    pub fn of(only: Vec<String>) -> Self {
-        Self { found: vec![false; only.len()], only, short: false }
-    }
-
-    /// Names that were asked for and that no gate has.
-    pub fn unknown(&self) -> Vec<&str> {
-        let asked = self.only.iter().zip(&self.found);
-        asked.filter(|(_, found)| !**found).map(|(only, _)| only.as_str()).collect()
+    ///
+    /// # Errors
+    /// Names that no gate's name begins with.
+    pub fn of(gates: &'static [Gate], only: Vec<String>) -> Result<Self, String> {
+        let is_unknown = |only: &&String| !gates.iter().any(|gate| gate.name.starts_with(only.as_str()));
+        let unknown: Vec<&str> = only.iter().filter(is_unknown).map(String::as_str).collect();
+        if !unknown.is_empty() {
+            return Err(format!("no gate is named {}", unknown.join(", ")));
+        }
+        Ok(Self { done: vec![false; gates.len()], gates, only, short: false })
     }
 
     /// Whether any gate whose name begins so is wanted.
+    ///
+    /// # Panics
+    /// When there is no such gate.
     pub fn wants(&self, name: &str) -> bool {
-        self.only.is_empty() || self.only.iter().any(|only| name.starts_with(only) || only.starts_with(name))
+        let mut named = self.gates.iter().filter(|gate| gate.name.starts_with(name)).peekable();
+        assert!(named.peek().is_some(), "list.rs has no gate {name}");
+        named.any(|gate| self.is_asked(gate))
     }
 
-    /// Notes that a gate was there.
-    fn note(&mut self, name: &str) {
-        let found = self.only.iter().zip(&mut self.found);
-        found.filter(|(only, _)| name.starts_with(only.as_str())).for_each(|(_, found)| *found = true);
+    fn is_asked(&self, gate: &Gate) -> bool {
+        self.only.is_empty() || self.only.iter().any(|only| gate.name.starts_with(only.as_str()))
     }
 
     /// Prints that a gate, or all gates whose names begin so, cannot be measured here.
+    ///
+    /// # Panics
+    /// When there is no such gate.
     pub fn skipped(&mut self, name: &str, reason: &str) {
-        // What was asked for may be one of those gates.
-        let found = self.only.iter().zip(&mut self.found);
-        found.filter(|(only, _)| only.starts_with(name)).for_each(|(_, found)| *found = true);
-        self.note(name);
+        let named = self.gates.iter().zip(&mut self.done).filter(|(gate, _)| gate.name.starts_with(name));
+        let count = named.map(|(_, done)| *done = true).count();
+        assert!(count > 0, "list.rs has no gate {name}");
         println!("gate {name} skipped # {reason}");
     }
 
     /// Prints a gate.
-    pub fn gate(&mut self, name: &str, value: f64, unit: &str, must: Bound, aim: Bound, note: &str) {
-        self.note(name);
+    ///
+    /// # Panics
+    /// When there is no such gate, or it was printed before.
+    pub fn gate(&mut self, name: &str, value: f64, note: &str) {
+        let index = self.gates.iter().position(|gate| gate.name == name);
+        let index = index.unwrap_or_else(|| panic!("list.rs has no gate {name}"));
+        assert!(!self.done[index], "gate {name} was printed before");
+        self.done[index] = true;
+        let Gate { unit, must, aim, .. } = self.gates[index];
         let state = match (must.holds(value), aim.holds(value)) {
             (true, true) => "aim",
             (true, false) => "ok",
@@ -92,15 +128,24 @@ impl Harness {
     }
 
     /// Prints a yes or no.
+    ///
+    /// # Panics
+    /// As [`Harness::gate`].
     pub fn holds(&mut self, name: &str, yes: bool, note: &str) {
-        self.gate(name, f64::from(u8::from(yes)), "bool", Bound::Least(1.0), Bound::Open, note);
+        self.gate(name, f64::from(u8::from(yes)), note);
     }
 
-    /// Ends the program: 1 when a gate fell short, 2 when a name was asked for that no gate has.
+    /// Gates that were asked for and neither measured nor skipped.
+    pub fn missing(&self) -> Vec<&'static str> {
+        let gates = self.gates.iter().zip(&self.done);
+        gates.filter(|(gate, done)| !**done && self.is_asked(gate)).map(|(gate, _)| gate.name).collect()
+    }
+
+    /// Ends the program: 1 when a gate fell short, 2 when one was not measured.
     pub fn finish(self) -> ! {
-        let unknown = self.unknown();
-        if !unknown.is_empty() {
-            eprintln!("no gate is named {}", unknown.join(", "));
+        let missing = self.missing();
+        if !missing.is_empty() {
+            eprintln!("not measured: {}", missing.join(", "));
             std::process::exit(2);
         }
         std::process::exit(i32::from(self.short))

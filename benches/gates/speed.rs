@@ -7,7 +7,7 @@ use frazil::sweep::{self, Body, SamplesSettings};
 use frazil::vdb::{FloatGrid, level_set};
 use rayon::prelude::*;
 
-use crate::harness::{Bound, Harness, median, timed};
+use crate::harness::{Harness, median, timed};
 use crate::scenes::{self, FRAMES, context};
 
 /// Seconds of each of five frames of a scene, after the first pose and a frame to warm up.
@@ -28,34 +28,27 @@ pub fn run(h: &mut Harness) {
         let (mut base, body) = scenes::small(&ctx, 2.0);
         let seconds = median(frame_times(&ctx, &mut base, &body));
         let note = format!("{cpu} thesis=1.7-1.84 s on 6 cores");
-        h.gate("snow.base.small", seconds, "s", Bound::Most(0.15), Bound::Most(0.04), &note);
+        h.gate("snow.base.small", seconds, &note);
         let (stock, noisy) = timed(|| stock(&ctx, &body, &scenes::snow(&ctx, 2.0, 0.005, scenes::EXACT)));
         let note = format!("stock {stock:.2} s{noisy}");
-        h.gate("snow.base.stock_small", stock / seconds, "x", Bound::Least(20.0), Bound::Least(60.0), &note);
+        h.gate("snow.base.stock_small", stock / seconds, &note);
     }
     if ["large", "area", "stock_large", "memory"].iter().any(|name| h.wants(&format!("snow.base.{name}"))) {
         let (mut base, body) = scenes::large(&ctx, 6.0);
         let seconds = median(frame_times(&ctx, &mut base, &body));
         let note = format!("{cpu} thesis=3.15-4.59 s on 6 cores");
-        h.gate("snow.base.large", seconds, "s", Bound::Most(0.15), Bound::Most(0.05), &note);
+        h.gate("snow.base.large", seconds, &note);
         let bytes = base.surface().memory_bytes() as f64 / base.surface().active_voxels() as f64;
-        h.gate("snow.base.memory_voxel", bytes, "B", Bound::Most(14.0), Bound::Most(12.0), "stock=12-14");
+        h.gate("snow.base.memory_voxel", bytes, "stock=12-14");
         let peak = peak_of_large();
-        h.gate(
-            "snow.base.memory_peak",
-            peak,
-            "MB",
-            Bound::Most(300.0),
-            Bound::Most(200.0),
-            "stock=370; a process of its own, the layer's making included",
-        );
+        h.gate("snow.base.memory_peak", peak, "stock=370; a process of its own, the layer's making included");
         let (stock, noisy) = timed(|| stock(&ctx, &body, &base));
         let note = format!("stock {stock:.2} s{noisy}");
-        h.gate("snow.base.stock_large", stock / seconds, "x", Bound::Least(40.0), Bound::Least(120.0), &note);
+        h.gate("snow.base.stock_large", stock / seconds, &note);
         drop(base);
         let (mut wide, body) = scenes::large(&ctx, 20.0);
         let ratio = median(frame_times(&ctx, &mut wide, &body)) / seconds;
-        h.gate("snow.base.area", ratio, "x", Bound::Most(1.2), Bound::Most(1.05), &cpu);
+        h.gate("snow.base.area", ratio, &cpu);
     }
 }
 

@@ -11,7 +11,7 @@ use rayon::prelude::*;
 use crate::common::folded::{Elbow, Mirrored};
 use crate::common::shapes::globe;
 use crate::dense::Dense;
-use crate::harness::{Bound, Harness, median};
+use crate::harness::{Harness, median};
 use crate::oracle::MovingBox;
 use crate::scenes::{self, context};
 use crate::sweeps::{each_voxel, moving_body};
@@ -31,12 +31,12 @@ pub fn run(h: &mut Harness) {
     if h.wants("reliability.spin_folds") {
         folds(h);
     }
-    for (degrees, must, aim) in [(45.0, 2.0, 0.7), (90.0, 4.0, 1.3), (360.0, 16.0, 5.0)] {
+    for degrees in [45.0, 90.0, 360.0] {
         let name = format!("reliability.spin_cost_{degrees}");
         if h.wants(&name) {
             let level = cpu::cpu_level();
             let note = format!("threads=2 cpu={level:?} globe of 48 x 24, r = 0.2 m, cells of 5 mm");
-            h.gate(&name, cost(degrees), "s", Bound::Most(must), Bound::Most(aim), &note);
+            h.gate(&name, cost(degrees), &note);
         }
     }
 }
@@ -74,8 +74,8 @@ fn spin(h: &mut Harness) {
         }
     }
     let note = format!("{voxels} voxels; a bar and a box by 30 to 1440 degrees, cells of 5 and 20 mm");
-    h.gate("reliability.spin_missed", missed as f64, "voxels", Bound::Most(0.0), Bound::Open, &note);
-    h.gate("reliability.spin_fat", fat as f64, "voxels", Bound::Most(0.0), Bound::Open, &note);
+    h.gate("reliability.spin_missed", missed as f64, &note);
+    h.gate("reliability.spin_fat", fat as f64, &note);
 }
 
 /// Skins that fold inside out: against where a pose winds around, and in sub-steps.
@@ -119,11 +119,11 @@ fn folds(h: &mut Harness) {
     let note = format!(
         "{inside} voxels inside the bands; three bends of a tube, and a ball turned inside out and back"
     );
-    h.gate("reliability.spin_folds_missed", missed as f64, "voxels", Bound::Most(0.0), Bound::Open, &note);
+    h.gate("reliability.spin_folds_missed", missed as f64, &note);
     let share = fat as f64 / inside as f64 * 100.0;
-    h.gate("reliability.spin_folds_fat", share, "%", Bound::Most(0.5), Bound::Most(0.0), &note);
+    h.gate("reliability.spin_folds_fat", share, &note);
     let note = "volume in one step against sixteen";
-    h.gate("reliability.spin_folds_steps", apart * 100.0, "%", Bound::Most(1.0), Bound::Most(0.1), note);
+    h.gate("reliability.spin_folds_steps", apart * 100.0, note);
 }
 
 /// Seconds that a sphere takes to turn about its axis.

@@ -6,7 +6,7 @@ use frazil::sweep::{self, Body, Settings};
 use frazil::vdb::{FloatGrid, level_set};
 
 use crate::common::shapes::{cuboid, sphere};
-use crate::harness::{Bound, Harness};
+use crate::harness::Harness;
 use crate::oracle::{MovingBox, away_from_creases, capsule};
 use crate::scenes::{self, context};
 
@@ -54,8 +54,8 @@ fn wall(h: &mut Harness) {
         }
         let note = format!("vertices={count}");
         let (max, mean) = (format!("snow.base.wall_{name}_max"), format!("snow.base.wall_{name}_mean"));
-        h.gate(&max, most, "cells", Bound::Most(0.1), Bound::Most(0.03), &note);
-        h.gate(&mean, sum / count as f64, "cells", Bound::Most(0.05), Bound::Most(0.01), &note);
+        h.gate(&max, most, &note);
+        h.gate(&mean, sum / count as f64, &note);
     }
 }
 
@@ -100,8 +100,8 @@ fn cube(h: &mut Harness) {
     let swept = sweep::chain(&ctx, &[moving_body(&motion)], 0.0, 1.0, &Settings::new(CELL)).expect("sweep");
     let poses = motion.poses(1024);
     let (missed, fat) = missed_and_fat(&swept, |p| motion.distance(&poses, p));
-    h.gate("snow.base.cube_missed", missed as f64, "voxels", Bound::Most(0.0), Bound::Open, "");
-    h.gate("snow.base.cube_fat", fat as f64, "voxels", Bound::Most(0.0), Bound::Open, "");
+    h.gate("snow.base.cube_missed", missed as f64, "");
+    h.gate("snow.base.cube_fat", fat as f64, "");
 }
 
 /// Distances in the band against exact ones, inside and outside: a box that does not turn, a ball that does.
@@ -134,12 +134,12 @@ fn phi(h: &mut Harness) {
         };
         most = most.max(worst(&swept, &truth));
     }
-    h.gate("snow.base.phi_box", most, "cells", Bound::Most(0.1), Bound::Most(0.05), "all voxels in the band");
+    h.gate("snow.base.phi_box", most, "all voxels in the band");
     let at = [DVec3::new(-0.2, 0.0, 0.0), DVec3::new(0.2, 0.0, 0.0)];
     let body = scenes::body(sphere(0.1, 64), at, [DVec3::zeros(), DVec3::new(0.1, 0.2, 0.2)], 1.0);
     let swept = sweep::chain(&ctx, &[body], 0.0, 1.0, &settings).expect("sweep");
     let most = worst(&swept, &|p| capsule(p, at[0], at[1], 0.1));
-    h.gate("snow.base.phi_ball", most, "cells", Bound::Most(0.1), Bound::Most(0.05), "turns by 0.3 rad");
+    h.gate("snow.base.phi_ball", most, "turns by 0.3 rad");
 }
 
 /// The four fastest frames of the demonstration's walk against the union of 256 poses. A pose's distance is
@@ -186,6 +186,6 @@ fn boots(h: &mut Harness) {
         }
     }
     let note = format!("{:.0} mm in a frame", speeds[0].0 * 1000.0);
-    h.gate("snow.base.boots_missed", missed as f64, "voxels", Bound::Most(0.0), Bound::Open, &note);
-    h.gate("snow.base.boots_fat", fat as f64, "voxels", Bound::Most(0.0), Bound::Open, &note);
+    h.gate("snow.base.boots_missed", missed as f64, &note);
+    h.gate("snow.base.boots_fat", fat as f64, &note);
 }

@@ -1,4 +1,4 @@
-"""Blender poses a skinned character: the numbers that tests/motion_gltf.rs holds frazil against.
+"""Blender poses a skinned character: the numbers that tests/testsuite/motion/gltf.rs holds frazil against.
 
 blender -b --factory-startup -noaudio --python-exit-code 7 --python skinning.py -- IN.glb OUT.txt
 

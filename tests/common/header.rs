@@ -31,7 +31,7 @@ pub fn bare_functions() -> Vec<String> {
     let mut called = BTreeSet::new();
     for entry in fs::read_dir(folder).expect("tests/ctest").flatten() {
         let name = entry.file_name().into_string().unwrap_or_default();
-        // What makes random calls tells nothing of what they should do.
+        // A program of random calls does not show what they should do.
         if !(name.ends_with(".c") || name.ends_with(".cpp") || name.ends_with(".h"))
             || name.starts_with("misuse")
         {

@@ -30,7 +30,7 @@ pub fn works(folder: &Path, arguments: &str) -> String {
 
 /// One sentence on stderr besides warnings, with these words, and this exit code.
 #[track_caller]
-pub fn told(output: &Output, code: i32, words: &[&str]) {
+pub fn complains(output: &Output, code: i32, words: &[&str]) {
     let stderr = String::from_utf8_lossy(&output.stderr);
     assert_eq!(output.status.code(), Some(code), "{stderr}");
     let sentences: Vec<&str> = stderr
@@ -44,5 +44,5 @@ pub fn told(output: &Output, code: i32, words: &[&str]) {
 /// Runs it, which must end with this exit code and one sentence with these words.
 #[track_caller]
 pub fn fails(folder: &Path, arguments: &str, code: i32, words: &[&str]) {
-    told(&frazil(folder, arguments), code, words);
+    complains(&frazil(folder, arguments), code, words);
 }

@@ -119,7 +119,7 @@ static void null_everywhere(frz_context *ctx) {
     frz_mesh_destroy(NULL);
     frz_grid_destroy(NULL);
     frz_base_destroy(NULL);
-    /* The wrong kind of handle is told as such. */
+    /* The wrong kind of handle is reported as such. */
     FAILS(frz_grid_set_name((frz_grid *)ctx, "a"), FRZ_ERROR_HANDLE, "the pointer is not a grid");
     FAILS(frz_mesh_read((const frz_mesh *)snow, 0, NO_SPAN), FRZ_ERROR_HANDLE, "the pointer is not a mesh");
     FAILS(frz_base_step(ctx, (frz_base *)snow, NULL, 0, 1, 1, NULL), FRZ_ERROR_HANDLE, "the pointer is not a base layer");

@@ -86,7 +86,7 @@ int main(void) {
     fclose(file);
     damage(length / 2, 0, content[0]);
     FAILS(frz_grid_load_guarded(ctx, FRAZIL_PROGRAM, "damaged.vdb", NULL, &back), FRZ_ERROR_FILE, "cut short");
-    /* Whatever one byte does to OpenVDB, this program goes on. */
+    /* Whatever one byte does to OpenVDB, this program lives on. */
     for (count = 150; count < length; count += length / 24) {
         frz_status status;
         damage(length, count, (char)(content[count] ^ 0x55));

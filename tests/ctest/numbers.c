@@ -1,4 +1,4 @@
-/* What is no number is named as such; bytes that cannot be used are FRZ_ERROR_FILE; a body out of reach is named; progress
+/* What is not a number is named as such; bytes that cannot be used are FRZ_ERROR_FILE; a body out of reach is named; progress
    has a fraction, for those whose header has room for it. */
 #include "check.h"
 

@@ -1,0 +1,138 @@
+//! All gates: name, unit, what the value must keep and what it aims at. The one in `tools/build-cpu` is not among them: it
+//! builds two commits and needs half an hour.
+
+use super::Bound::{Least, Most, Open};
+use super::{Bound, Gate};
+
+const fn gate(name: &'static str, unit: &'static str, must: Bound, aim: Bound) -> Gate {
+    Gate { name, unit, must, aim }
+}
+
+/// A count that must be 0.
+const fn none(name: &'static str, unit: &'static str) -> Gate {
+    gate(name, unit, Most(0.0), Open)
+}
+
+/// A yes or no.
+const fn yes(name: &'static str) -> Gate {
+    gate(name, "bool", Least(1.0), Open)
+}
+
+pub const GATES: &[Gate] = &[
+    // The walls that a box leaves, against the envelope of its poses.
+    gate("snow.base.wall_translation_max", "cells", Most(0.1), Most(0.03)),
+    gate("snow.base.wall_translation_mean", "cells", Most(0.05), Most(0.01)),
+    gate("snow.base.wall_turn_max", "cells", Most(0.1), Most(0.03)),
+    gate("snow.base.wall_turn_mean", "cells", Most(0.05), Most(0.01)),
+    // A cube that turns about its diagonal: voxels that the sweep misses, and voxels that are too many.
+    none("snow.base.cube_missed", "voxels"),
+    none("snow.base.cube_fat", "voxels"),
+    // Values in the band against exact distances.
+    gate("snow.base.phi_box", "cells", Most(0.1), Most(0.05)),
+    gate("snow.base.phi_ball", "cells", Most(0.1), Most(0.05)),
+    // The fastest frames of the demonstration's walk against dense poses.
+    none("snow.base.boots_missed", "voxels"),
+    none("snow.base.boots_fat", "voxels"),
+    // Snow and removed snow against exact distances.
+    gate("snow.base.exact_base", "cells", Most(0.1), Most(0.05)),
+    gate("snow.base.exact_removed", "cells", Most(0.1), Most(0.05)),
+    // Snow left inside the poses of a box.
+    none("snow.base.left", "voxels"),
+    // Snow before = snow after + removed, along the walk: by the grids alone, which have no shells thinner than a cell, then by
+    // what the step reports, which has them.
+    gate("snow.base.volume_frame", "%", Open, Open),
+    gate("snow.base.volume_walk", "%", Open, Open),
+    gate("snow.base.volume_told_frame", "%", Most(2.0), Most(1.5)),
+    gate("snow.base.volume_told_walk", "%", Most(0.5), Most(0.35)),
+    none("snow.base.monotone_grown", "voxels"),
+    // Parts of the snow that the noise cuts off.
+    none("snow.base.islands", "parts"),
+    // Time and memory; how many times as fast as stock OpenVDB.
+    gate("snow.base.small", "s", Most(0.15), Most(0.04)),
+    gate("snow.base.stock_small", "x", Least(20.0), Least(60.0)),
+    gate("snow.base.large", "s", Most(0.15), Most(0.05)),
+    gate("snow.base.memory_voxel", "B", Most(14.0), Most(12.0)),
+    gate("snow.base.memory_peak", "MB", Most(300.0), Most(200.0)),
+    gate("snow.base.stock_large", "x", Least(40.0), Least(120.0)),
+    gate("snow.base.area", "x", Most(1.2), Most(1.05)),
+    // The same bytes whatever does the work.
+    yes("snow.base.same_bytes_threads"),
+    yes("snow.base.same_bytes_cpu"),
+    yes("snow.base.same_bytes_tools"),
+    // Other readers see the same grid.
+    yes("snow.base.readers_vdb_rs"),
+    yes("snow.base.readers_pyopenvdb"),
+    yes("snow.base.readers_vdb_print"),
+    // Characters: the fastest frames against dense poses, and Blender's skinning.
+    none("snow.shot.sweep_cesium_missed", "voxels"),
+    none("snow.shot.sweep_cesium_fat", "voxels"),
+    none("snow.shot.sweep_robot_missed", "voxels"),
+    none("snow.shot.sweep_robot_fat", "voxels"),
+    gate("snow.shot.skinning", "heights", Most(1e-4), Most(1e-6)),
+    // A step without files; whole passes with them; checks.
+    gate("snow.shot.edit", "s", Most(0.12), Most(0.04)),
+    gate("snow.shot.pass_full", "s", Most(75.0), Most(60.0)),
+    gate("snow.shot.memory_full", "MB", Most(450.0), Most(350.0)),
+    gate("snow.shot.pass_delta", "s", Most(20.0), Most(12.0)),
+    gate("snow.shot.memory_delta", "MB", Most(300.0), Most(200.0)),
+    gate("snow.shot.check_walk", "s", Most(2.0), Most(0.5)),
+    gate("snow.shot.check_sequence", "s", Most(15.0), Most(8.0)),
+    // Killed runs resume to the same bytes; changes add up to whole frames; changed settings.
+    yes("snow.shot.continued_full"),
+    yes("snow.shot.continued_delta"),
+    yes("snow.shot.rebuilt"),
+    yes("snow.shot.changed_refused"),
+    yes("snow.shot.changed_from"),
+    // Other programs open the shot.
+    yes("snow.shot.clients_blender"),
+    yes("snow.shot.clients_usd"),
+    // The C interface: cancels, states, what crossing the border costs.
+    gate("capi.cancel_latency", "s", Most(0.2), Most(0.05)),
+    yes("capi.cancel_state"),
+    gate("capi.state_seconds", "s", Most(0.5), Most(0.2)),
+    gate("capi.state_bytes", "B", Most(6.0), Most(4.0)),
+    gate("capi.state_all_seconds", "s", Most(0.5), Most(0.2)),
+    gate("capi.state_all_bytes", "B", Most(6.0), Most(4.0)),
+    gate("capi.border_cost", "x", Most(1.05), Most(1.01)),
+    // Programs of tests/ctest, and the library as it is installed.
+    yes("capi.fake_host"),
+    gate("capi.load_threads", "threads", Most(0.0), Most(0.0)),
+    gate("capi.load_memory", "MB", Most(2.0), Most(0.0)),
+    gate("capi.symbols", "symbols", Most(0.0), Most(0.0)),
+    gate("capi.unused", "functions", Most(0.0), Most(0.0)),
+    gate("capi.misuse_crashes", "crashes", Most(0.0), Most(0.0)),
+    gate("capi.sanitizers_errors", "errors", Most(0.0), Most(0.0)),
+    // Cancel and reset while a call runs.
+    none("reliability.cancel_reset", "answers"),
+    none("reliability.cancel_reset_changed", "answers"),
+    // A flipped bit in a shot's folder: wrong frames made from it, and files that `check` does not name.
+    none("reliability.flip_wrong", "flips"),
+    none("reliability.flip_unnamed", "flips"),
+    // Scenes far from the origin.
+    gate("reliability.far_noise", "rel", Most(1e-2), Most(1e-3)),
+    gate("reliability.far_noise_removed", "rel", Open, Open),
+    gate("reliability.far_noise_walk", "rel", Most(1e-2), Most(1e-3)),
+    gate("reliability.far", "rel", Most(1e-6), Open),
+    // Narrow bands: neighbours whose values jump, and values against dense poses.
+    none("reliability.band_jumps", "pairs"),
+    none("reliability.band_snow", "pairs"),
+    gate("reliability.band_error", "cells", Most(0.15), Most(0.06)),
+    // Fast turns, skins that fold, and what a turn costs.
+    none("reliability.spin_missed", "voxels"),
+    none("reliability.spin_fat", "voxels"),
+    none("reliability.spin_folds_missed", "voxels"),
+    gate("reliability.spin_folds_fat", "%", Most(0.5), Most(0.0)),
+    gate("reliability.spin_folds_steps", "%", Most(1.0), Most(0.1)),
+    gate("reliability.spin_cost_45", "s", Most(2.0), Most(0.7)),
+    gate("reliability.spin_cost_90", "s", Most(4.0), Most(1.3)),
+    gate("reliability.spin_cost_360", "s", Most(16.0), Most(5.0)),
+    // Mutated and cut files, and the process that decodes foreign ones.
+    none("reliability.fuzz_obj", "inputs"),
+    none("reliability.fuzz_ply", "inputs"),
+    none("reliability.fuzz_stl", "inputs"),
+    none("reliability.fuzz_gltf", "inputs"),
+    none("reliability.fuzz_glb", "inputs"),
+    none("reliability.fuzz_vdb", "inputs"),
+    none("reliability.cut", "files"),
+    gate("reliability.child_cost", "x", Most(2.2), Most(1.3)),
+];

@@ -1,0 +1,168 @@
+//! Every example in the README and in `--help` runs as it stands.
+
+use assert_cmd::Command;
+use std::fs;
+use std::path::Path;
+
+use crate::common::hero;
+use crate::program::CUBE;
+
+const README: &str = include_str!("../../../README.md");
+const CLI: &str = include_str!("../../../docs/cli.md");
+
+/// Runs a line `frazil ...` in a folder and gives what it says on stdout.
+#[track_caller]
+fn works(folder: &Path, line: &str) -> String {
+    let line = line.split(" #").next().unwrap();
+    // A shell would put the output into the file behind `>`.
+    let (line, file) = line.split_once(" > ").map_or((line, None), |(line, file)| (line, Some(file.trim())));
+    let arguments = line.split_whitespace().skip(1);
+    let output = Command::cargo_bin("frazil").unwrap().current_dir(folder).args(arguments).output().unwrap();
+    assert!(output.status.success(), "{line}: {}", String::from_utf8_lossy(&output.stderr));
+    if let Some(file) = file {
+        fs::write(folder.join(file), &output.stdout).unwrap();
+    }
+    String::from_utf8(output.stdout).unwrap()
+}
+
+/// The first block of a kind behind a heading.
+fn block(text: &'static str, heading: &str, kind: &str) -> &'static str {
+    let behind = text.split(heading).nth(1).unwrap();
+    behind.split(&format!("```{kind}\n")).nth(1).unwrap().split("```").next().unwrap()
+}
+
+/// The commands of a block.
+fn lines(block: &'static str) -> Vec<&'static str> {
+    block.lines().filter(|line| line.starts_with("frazil ")).collect()
+}
+
+#[test]
+fn the_readme_runs() {
+    let folder = tempfile::tempdir().unwrap();
+    fs::write(folder.path().join("boot.obj"), CUBE).unwrap();
+    // As in the README but for the cells: a test need not be fine.
+    let scene = block(README, "## Commands", "toml").replace("cell = 0.005", "cell = 0.02");
+    assert!(scene.contains("cell = 0.02"));
+    fs::write(folder.path().join("shot.toml"), scene).unwrap();
+    let lines = lines(block(README, "## Commands", "sh"));
+    assert!(lines.len() >= 8, "{lines:?}");
+    lines.iter().for_each(|line| {
+        works(folder.path(), line);
+    });
+}
+
+/// Puts the example scenes into a folder, with coarse cells and a walk named as in the file.
+fn write_scenes(folder: &Path) {
+    let scenes = folder.join("examples/scenes");
+    fs::create_dir_all(&scenes).unwrap();
+    for entry in fs::read_dir(Path::new(env!("CARGO_MANIFEST_DIR")).join("examples/scenes")).unwrap() {
+        let path = entry.unwrap().path();
+        let text = fs::read_to_string(&path).unwrap();
+        let coarse: Vec<&str> =
+            text.lines().map(|line| if line.starts_with("cell =") { "cell = 0.03" } else { line }).collect();
+        fs::write(scenes.join(path.file_name().unwrap()), coarse.join("\n")).unwrap();
+    }
+}
+
+#[test]
+fn the_readme_takes_a_character_through_snow() {
+    let folder = tempfile::tempdir().unwrap();
+    write_scenes(folder.path());
+    // Our own figure in the place of CesiumMan: it has two clips.
+    let path = folder.path().join("examples/scenes/walking_character.toml");
+    let text = fs::read_to_string(&path).unwrap().replace("scale =", "clip = \"walk\"\nscale =");
+    fs::write(&path, text).unwrap();
+    fs::write(folder.path().join("CesiumMan.glb"), hero::glb()).unwrap();
+    let lines = lines(block(README, "## A character walks", "sh"));
+    assert_eq!(lines.len(), 4, "{lines:?}");
+    lines.iter().for_each(|line| {
+        works(folder.path(), line);
+    });
+}
+
+#[test]
+fn the_example_scenes_are_sound() {
+    for name in ["walking_character", "walking_robot", "bunny_imprint", "bunny_slide"] {
+        let path = Path::new(env!("CARGO_MANIFEST_DIR")).join(format!("examples/scenes/{name}.toml"));
+        let scene = frazil::scene::Scene::read(&path).unwrap();
+        // The command in the comment is the one that the README gives, with this scene's file.
+        let text = fs::read_to_string(&path).unwrap();
+        let file = scene.objects[0].file.file_name().unwrap().to_string_lossy().into_owned();
+        let command = format!("frazil snow examples/scenes/{name}.toml --set object.1.file={file} -o cache/");
+        assert!(text.contains(&command), "{text}");
+    }
+}
+
+#[test]
+fn the_page_of_the_command_line_runs() {
+    let folder = tempfile::tempdir().unwrap();
+    fs::write(folder.path().join("hero.glb"), hero::glb()).unwrap();
+    let (shot, rebuild) = ("## A shot from beginning", "## What a folder holds");
+    let mut count = 0;
+    for line in lines(block(CLI, shot, "sh")) {
+        if line.starts_with("frazil preview") {
+            // What comes next asks for a cache of changes.
+            works(folder.path(), "frazil snow shot.toml -o changes -q --set output.base_mode=delta");
+        }
+        works(folder.path(), line);
+        if line.starts_with("frazil new") {
+            // As one would edit it.
+            let path = folder.path().join("shot.toml");
+            let text = fs::read_to_string(&path).unwrap();
+            let edited =
+                text.replace("# clip = \"Walk\"", "clip = \"walk\"").replace("cell = 0.0075", "cell = 0.03");
+            assert!(edited.len() < text.len() + 4 && edited.contains("cell = 0.03"));
+            fs::write(&path, edited).unwrap();
+        }
+        count += 1;
+    }
+    for line in lines(block(CLI, rebuild, "sh")) {
+        works(folder.path(), &line.replace("cache/", "changes/"));
+        count += 1;
+    }
+    assert_eq!(count, 9);
+}
+
+/// The commands that a help text lists, each with the command before it.
+fn commands_of(folder: &Path, command: &str) -> Vec<String> {
+    let help = works(folder, &format!("{command} --help"));
+    let listed =
+        help.lines().skip_while(|line| *line != "Commands:").skip(1).take_while(|line| !line.is_empty());
+    let names = listed.filter_map(|line| line.split_whitespace().next()).filter(|name| *name != "help");
+    names.map(|name| format!("{command} {name}")).collect()
+}
+
+#[test]
+fn every_command_has_help_with_an_example_that_runs() {
+    let folder = tempfile::tempdir().unwrap();
+    let folder = folder.path();
+    for name in ["boot", "box", "bunny", "before", "after", "body.0001", "body.0002"] {
+        fs::write(folder.join(format!("{name}.obj")), CUBE).unwrap();
+    }
+    let scene = "[shot]\nframes = \"1-48\"\n[snow]\nground = 0.0\narea = [-0.5, -0.5, 0.5, 1.5]\ndepth = 0.3\n\
+                 cell = 0.05\n[[object]]\nfile = \"boot.obj\"\nkeys = [{ frame = 1 }, { frame = 48, at = [0, 0, 1] }]\n";
+    fs::write(folder.join("walker.toml"), scene).unwrap();
+    fs::write(folder.join("hero.glb"), hero::glb()).unwrap();
+    works(folder, "frazil snow walker.toml -o cache -q");
+    for (name, by) in [("left", "0.1,0,0"), ("snow", "0,0.1,0")] {
+        works(folder, &format!("frazil vdb sweep box.obj --move {by} --cell 0.02 -o {name}.vdb -q"));
+    }
+    works(folder, "frazil vdb from-mesh box.obj --cell 0.02 -o boot.vdb");
+    works(folder, "frazil vdb from-mesh box.obj --cell 0.02 -o right.vdb");
+    let mut commands = vec!["frazil".to_string()];
+    commands.extend(commands_of(folder, "frazil"));
+    for group in ["frazil vdb", "frazil mesh"] {
+        commands.extend(commands_of(folder, group));
+    }
+    assert!(commands.len() > 1 + 8 + 10, "{commands:?}");
+    for command in commands {
+        let help = works(folder, &format!("{command} --help"));
+        let examples: Vec<&str> = help.lines().filter_map(|line| line.strip_prefix("  frazil ")).collect();
+        assert!(!examples.is_empty(), "{command} has no example: {help}");
+        for example in examples.iter().flat_map(|line| line.split(" && ")) {
+            // Fine cells take long and prove nothing more.
+            let line = format!("frazil {}", example.strip_prefix("frazil ").unwrap_or(example));
+            works(folder, &line.replace("--cell 0.00", "--cell 0.0"));
+        }
+    }
+}

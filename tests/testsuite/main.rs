@@ -1,0 +1,69 @@
+//! All tests that use the library, in one program; its folders are the rooms of `src/`. Tests run as threads of one process:
+//! those that cannot are in `tests/alone`. What reads our files with other libraries is in `tests/readers.rs`, which does not
+//! link ours.
+
+#[path = "../common/mod.rs"]
+mod common;
+#[path = "../common/picture.rs"]
+mod picture;
+#[path = "../common/program.rs"]
+mod program;
+
+mod base {
+    mod meshes;
+}
+mod capi {
+    mod header;
+}
+mod cli {
+    mod errors;
+    mod examples;
+    mod figures;
+    mod honest;
+    mod limits;
+    mod outputs;
+    mod runs;
+    mod speed;
+    mod tools;
+    mod words;
+}
+mod house {
+    mod gates;
+    mod imports;
+    mod readers;
+}
+mod io {
+    mod damage;
+    mod files;
+    mod uvs;
+}
+mod motion {
+    mod gltf;
+}
+mod render {
+    mod preview;
+}
+mod scene {
+    mod clients;
+    mod demo_walk;
+    mod fuzz;
+    mod shot_folder;
+    mod shot_inputs;
+    mod shot_runs;
+}
+mod snow {
+    mod base;
+    mod crumbs;
+    mod layers;
+    mod state;
+}
+mod sweep {
+    mod band;
+    mod chain;
+    mod folds;
+    mod methods;
+    mod window;
+}
+mod vdb {
+    mod tools;
+}

@@ -1,0 +1,419 @@
+//! glTF characters: against formulas, against Blender, and files that are wrong in every way.
+
+use std::f64::consts::PI;
+use std::fs;
+use std::path::{Path, PathBuf};
+
+use crate::common::character;
+use crate::common::hero;
+use frazil::base::DVec3;
+use frazil::motion::{Character, Key, Keys, Motion, Placed, Play, Space};
+use frazil::sweep::Body;
+use proptest::prelude::*;
+use serde_json::{Value, json};
+use tempfile::TempDir;
+
+/// A glTF file in the making: its JSON and its one buffer.
+struct Maker {
+    json: Value,
+    bytes: Vec<u8>,
+}
+
+impl Maker {
+    /// A file whose scene has node 0.
+    fn new() -> Self {
+        let json = json!({
+            "asset": { "version": "2.0" }, "scene": 0, "scenes": [{ "nodes": [0] }],
+            "nodes": [], "meshes": [], "skins": [], "animations": [], "accessors": [], "bufferViews": [],
+        });
+        Self { json, bytes: Vec::new() }
+    }
+
+    fn accessor(&mut self, kind: u32, shape: &str, count: usize, bytes: &[u8]) -> usize {
+        self.bytes.resize(self.bytes.len().next_multiple_of(4), 0);
+        let list = |name: &str, json: &Value| json[name].as_array().unwrap().len();
+        let view = list("bufferViews", &self.json);
+        let number = list("accessors", &self.json);
+        let view_json = json!({ "buffer": 0, "byteOffset": self.bytes.len(), "byteLength": bytes.len() });
+        let mut accessor =
+            json!({ "bufferView": view, "componentType": kind, "type": shape, "count": count });
+        // The specification asks for the bounds of positions.
+        accessor["min"] = json!([0, 0, 0]);
+        accessor["max"] = json!([1, 1, 1]);
+        self.push("bufferViews", view_json);
+        self.push("accessors", accessor);
+        self.bytes.extend_from_slice(bytes);
+        number
+    }
+
+    fn floats(&mut self, shape: &str, count: usize, values: &[f32]) -> usize {
+        let bytes: Vec<u8> = values.iter().flat_map(|value| value.to_le_bytes()).collect();
+        self.accessor(5126, shape, count, &bytes)
+    }
+
+    fn push(&mut self, list: &str, value: Value) {
+        self.json[list].as_array_mut().unwrap().push(value);
+    }
+
+    /// A channel of the last clip.
+    fn channel(&mut self, node: usize, path: &str, how: &str, times: &[f32], values: &[f32]) {
+        let (shape, width) = match path {
+            "weights" => ("SCALAR", 1),
+            "rotation" => ("VEC4", 4),
+            _ => ("VEC3", 3),
+        };
+        let input = self.floats("SCALAR", times.len(), times);
+        let output = self.floats(shape, values.len() / width, values);
+        let animation = self.json["animations"].as_array_mut().unwrap().last_mut().unwrap();
+        let sampler = animation["samplers"].as_array().unwrap().len();
+        let samplers = animation["samplers"].as_array_mut().unwrap();
+        samplers.push(json!({ "input": input, "output": output, "interpolation": how }));
+        let channels = animation["channels"].as_array_mut().unwrap();
+        channels.push(json!({ "sampler": sampler, "target": { "node": node, "path": path } }));
+    }
+
+    fn clip(&mut self, name: &str) {
+        self.push("animations", json!({ "name": name, "samplers": [], "channels": [] }));
+    }
+
+    /// A mesh of one triangle (0 0 0), (1 0 0), (0 1 0).
+    fn triangle(&mut self) -> usize {
+        let positions = self.floats("VEC3", 3, &[0., 0., 0., 1., 0., 0., 0., 1., 0.]);
+        self.push("meshes", json!({ "primitives": [{ "attributes": { "POSITION": positions } }] }));
+        self.json["meshes"].as_array().unwrap().len() - 1
+    }
+
+    fn glb(&self) -> Vec<u8> {
+        let mut json = self.json.clone();
+        json["buffers"] = json!([{ "byteLength": self.bytes.len() }]);
+        // Empty lists are not allowed.
+        for list in ["skins", "animations", "accessors", "bufferViews", "meshes"] {
+            if json[list].as_array().is_some_and(Vec::is_empty) {
+                json.as_object_mut().unwrap().remove(list);
+            }
+        }
+        let padded = |mut bytes: Vec<u8>, with: u8| {
+            bytes.resize(bytes.len().next_multiple_of(4), with);
+            bytes
+        };
+        let (json, bytes) = (padded(json.to_string().into_bytes(), b' '), padded(self.bytes.clone(), 0));
+        let mut out = b"glTF".to_vec();
+        let total = 12 + 8 + json.len() + 8 + bytes.len();
+        for word in [2, total as u32, json.len() as u32] {
+            out.extend(word.to_le_bytes());
+        }
+        out.extend(b"JSON");
+        out.extend(json);
+        out.extend((bytes.len() as u32).to_le_bytes());
+        out.extend(b"BIN\0");
+        out.extend(bytes);
+        out
+    }
+
+    fn write(&self, folder: &TempDir) -> PathBuf {
+        let path = folder.path().join("made.glb");
+        fs::write(&path, self.glb()).unwrap();
+        path
+    }
+}
+
+fn open(path: &Path) -> Character {
+    Character::open(path, Play { repeat: false, ..Play::default() }).unwrap()
+}
+
+fn pose(character: &dyn Motion, time: f64) -> Vec<DVec3> {
+    let mut out = Vec::new();
+    character.pose(time, &mut out).unwrap();
+    out
+}
+
+#[track_caller]
+fn close(a: DVec3, b: [f64; 3]) {
+    assert!((a - DVec3::from(b)).norm() < 1e-6, "{a} is not {b:?}");
+}
+
+#[test]
+fn step_linear_and_cubic_keys_follow_their_formulas() {
+    let folder = tempfile::tempdir().unwrap();
+    let times = [1.0, 2.0, 4.0];
+    let flat = |x: [f32; 3]| x.iter().flat_map(|x| [*x, 0.0, 0.0]).collect::<Vec<f32>>();
+    // In-tangent, value, out-tangent of each key: x = t^3 on all of them.
+    let cubic: Vec<f32> =
+        times.iter().flat_map(|t: &f32| flat([3.0 * t * t, t * t * t, 3.0 * t * t])).collect();
+    for (how, values, expected) in [
+        ("STEP", flat([5.0, 6.0, 7.0]), [(0.0, 5.0), (1.9, 5.0), (2.0, 6.0), (3.9, 6.0), (9.0, 7.0)]),
+        ("LINEAR", flat([5.0, 6.0, 8.0]), [(0.0, 5.0), (1.25, 5.25), (2.0, 6.0), (3.0, 7.0), (9.0, 8.0)]),
+        ("CUBICSPLINE", cubic, [(0.0, 1.0), (1.5, 3.375), (2.0, 8.0), (3.3, 35.937), (9.0, 64.0)]),
+    ] {
+        let mut maker = Maker::new();
+        let mesh = maker.triangle();
+        maker.push("nodes", json!({ "mesh": mesh }));
+        maker.clip("move");
+        maker.channel(0, "translation", how, &times, &values);
+        let character = open(&maker.write(&folder));
+        for (time, x) in expected {
+            // The clip's first key is at its start.
+            close(pose(&character, time - 1.0)[0], [x, 0.0, 0.0]);
+        }
+    }
+}
+
+#[test]
+fn rotations_take_the_shorter_way_and_nodes_carry_their_children() {
+    let folder = tempfile::tempdir().unwrap();
+    let mut maker = Maker::new();
+    let mesh = maker.triangle();
+    maker.push("nodes", json!({ "children": [1], "translation": [0, 0, 2], "scale": [2, 2, 2] }));
+    maker.push("nodes", json!({ "mesh": mesh, "translation": [1, 0, 0] }));
+    maker.clip("turn");
+    // From 0 to 90 degrees about y, the second key with its sign turned round.
+    let half = (PI / 4.0).sin() as f32;
+    maker.channel(0, "rotation", "LINEAR", &[0.0, 1.0], &[0., 0., 0., 1., 0., -half, 0., -half]);
+    let character = open(&maker.write(&folder));
+    close(pose(&character, 0.0)[0], [2.0, 0.0, 2.0]);
+    let (sine, cosine) = (PI / 8.0).sin_cos();
+    close(pose(&character, 0.25)[0], [2.0 * cosine, 0.0, 2.0 - 2.0 * sine]);
+    close(pose(&character, 1.0)[0], [0.0, 0.0, 0.0]);
+    close(pose(&character, 1.0)[2], [0.0, 2.0, 0.0]);
+}
+
+#[test]
+fn morph_targets_add_their_parts() {
+    let folder = tempfile::tempdir().unwrap();
+    let mut maker = Maker::new();
+    let positions = maker.floats("VEC3", 3, &[0., 0., 0., 1., 0., 0., 0., 1., 0.]);
+    let up = maker.floats("VEC3", 3, &[0., 0., 4., 0., 0., 0., 0., 0., 0.]);
+    let side = maker.floats("VEC3", 3, &[0., 1., 0., 0., 0., 0., 0., 0., 0.]);
+    maker.push(
+        "meshes",
+        json!({ "weights": [0.5, 0], "primitives": [{
+            "attributes": { "POSITION": positions }, "targets": [{ "POSITION": up }, { "POSITION": side }],
+        }] }),
+    );
+    maker.push("nodes", json!({ "mesh": 0 }));
+    maker.clip("morph");
+    maker.channel(0, "weights", "LINEAR", &[0.0, 1.0], &[0.5, 0.0, 1.0, 3.0]);
+    let path = maker.write(&folder);
+    close(pose(&open(&path), 0.5)[0], [0.0, 1.5, 3.0]);
+    let rest = Character::open(&path, Play { clip: Some(String::new()), ..Play::default() }).unwrap();
+    close(pose(&rest, 7.0)[0], [0.0, 0.0, 2.0]);
+}
+
+/// Two triangles side by side whose common corners are written twice; skinned to two joints.
+fn strip(weights_differ: bool) -> Maker {
+    let mut maker = Maker::new();
+    let places = [0., 0., 0., 1., 0., 0., 0., 1., 0., 1., 0., 0., 1., 1., 0., 0., 1., 0.];
+    let positions = maker.floats("VEC3", 6, &places);
+    let joints = maker.accessor(5121, "VEC4", 6, &[0, 1, 0, 0].repeat(6));
+    let mut weights = [0.5, 0.5, 0.0, 0.0].repeat(6);
+    if weights_differ {
+        weights[3 * 4..3 * 4 + 2].copy_from_slice(&[0.25, 0.75]);
+    }
+    // Weights that do not add up to 1 are shares all the same.
+    weights[..2].copy_from_slice(&[2.0, 2.0]);
+    let weights = maker.floats("VEC4", 6, &weights);
+    maker.push(
+        "meshes",
+        json!({ "primitives": [{ "attributes": { "POSITION": positions, "JOINTS_0": joints, "WEIGHTS_0": weights } }] }),
+    );
+    maker.push("nodes", json!({ "children": [1, 2, 3], "translation": [0, 0, 9] }));
+    // A skinned mesh does not follow its own node.
+    maker.push("nodes", json!({ "name": "skinned", "mesh": 0, "skin": 0, "translation": [7, 7, 7] }));
+    maker.push("nodes", json!({ "name": "still" }));
+    maker.push("nodes", json!({ "name": "moving" }));
+    maker.push("skins", json!({ "joints": [2, 3] }));
+    maker.clip("slide");
+    maker.channel(3, "translation", "LINEAR", &[0.0, 1.0], &[0., 0., 0., 4., 0., 0.]);
+    maker
+}
+
+#[test]
+fn skins_share_their_joints_and_equal_vertices_are_welded() {
+    let folder = tempfile::tempdir().unwrap();
+    let whole = open(&strip(false).write(&folder));
+    assert_eq!(whole.vertex_count(), 4);
+    close(pose(&whole, 1.0)[0], [2.0, 0.0, 9.0]);
+    assert_eq!(Body::new(Box::new(whole), 0.0).unwrap().closed_loops(), 1);
+    // One corner that hangs on its joints in another way stays a vertex of its own, though the places are equal.
+    let torn = open(&strip(true).write(&folder));
+    assert_eq!(torn.vertex_count(), 5);
+    close(pose(&torn, 1.0)[3], [1.0 + 3.0, 0.0, 9.0]);
+}
+
+#[test]
+fn clips_start_where_they_are_asked_to_and_repeat() {
+    let folder = tempfile::tempdir().unwrap();
+    let mut maker = Maker::new();
+    let mesh = maker.triangle();
+    maker.push("nodes", json!({ "mesh": mesh }));
+    maker.clip("sway");
+    maker.channel(0, "translation", "LINEAR", &[3., 4., 5.], &[0., 0., 0., 1., 0., 0., 0., 0., 0.]);
+    let path = maker.write(&folder);
+    let play = Play { start: 10.0, ..Play::default() };
+    let character = Character::open(&path, play.clone()).unwrap();
+    assert_eq!((character.duration(), character.jump()), (2.0, None));
+    for (time, x) in [(10.0, 0.0), (10.5, 0.5), (11.0, 1.0), (12.0, 0.0), (12.25, 0.25), (9.5, 0.5)] {
+        close(pose(&character, time)[0], [x, 0.0, 0.0]);
+    }
+    let breaks = character.breaks(10.5, 13.5);
+    assert!(breaks.iter().zip([11.0, 12.0, 13.0]).all(|(a, b)| (a - b).abs() < 1e-9), "{breaks:?}");
+    let once = Character::open(&path, Play { repeat: false, ..play }).unwrap();
+    close(pose(&once, 12.25)[0], [0.0, 0.0, 0.0]);
+    close(pose(&once, 9.5)[0], [0.0, 0.0, 0.0]);
+}
+
+#[test]
+fn a_round_that_does_not_close_says_so_and_jumps_at_once() {
+    let folder = tempfile::tempdir().unwrap();
+    let mut maker = Maker::new();
+    let mesh = maker.triangle();
+    maker.push("nodes", json!({ "mesh": mesh }));
+    maker.clip("walk");
+    maker.channel(0, "translation", "LINEAR", &[0., 1.], &[0., 0., 0., 3., 0., 0.]);
+    let character = Character::open(&maker.write(&folder), Play::default()).unwrap();
+    assert!((character.jump().unwrap() - 3.0).abs() < 1e-6);
+    let breaks = character.breaks(0.5, 1.5);
+    assert_eq!(breaks.len(), 2, "{breaks:?}");
+    assert!(pose(&character, breaks[0])[0].x > 2.99 && pose(&character, breaks[1] + 1e-9)[0].x < 0.01);
+}
+
+#[test]
+fn mirrored_nodes_keep_their_outside_outside() {
+    let folder = tempfile::tempdir().unwrap();
+    let mut maker = Maker::new();
+    let mesh = maker.triangle();
+    maker.push("nodes", json!({ "mesh": mesh, "scale": [-1, 1, 1] }));
+    assert_eq!(open(&maker.write(&folder)).triangles(), [[0, 2, 1]]);
+}
+
+#[test]
+fn nodes_and_clips_that_do_not_exist_are_answered_with_those_that_do() {
+    let folder = tempfile::tempdir().unwrap();
+    let mut maker = strip(false);
+    maker.clip("run");
+    let path = maker.write(&folder);
+    let refused = |node: Option<&str>, clip: Option<&str>| {
+        let play = Play { node: node.map(str::to_string), clip: clip.map(str::to_string), ..Play::default() };
+        Character::open(&path, play).err().map(|error| error.to_string()).unwrap_or_default()
+    };
+    for (node, clip, words) in [
+        (None, None, ["2 clips", "\"run\""]),
+        (None, Some("walk"), ["no clip \"walk\"", "\"slide\", \"run\""]),
+        (Some("hero*"), Some("slide"), ["no node \"hero*\"", "\"skinned\""]),
+    ] {
+        let said = refused(node, clip);
+        assert!(words.iter().all(|word| said.contains(word)) && said.contains("made.glb"), "{said}");
+    }
+    assert_eq!(refused(Some("skin*"), Some("slide")), "");
+    assert_eq!(refused(Some("node 0"), Some("")), "");
+}
+
+#[test]
+fn damaged_files_are_refused_with_their_name() {
+    let folder = tempfile::tempdir().unwrap();
+    let whole = strip(false).glb();
+    let path = folder.path().join("cut.glb");
+    for length in 0..whole.len() {
+        fs::write(&path, &whole[..length]).unwrap();
+        let error = Character::open(&path, Play::default()).err().unwrap().to_string();
+        assert!(error.contains("cut.glb"), "{error}");
+    }
+    let mut json = strip(false).json;
+    json["buffers"] = json!([{ "byteLength": 400, "uri": "arms.bin" }]);
+    for list in ["skins", "animations"] {
+        assert!(!json[list].as_array().unwrap().is_empty());
+    }
+    let gltf = folder.path().join("hero.gltf");
+    fs::write(&gltf, json.to_string()).unwrap();
+    let error = Character::open(&gltf, Play::default()).err().unwrap().to_string();
+    assert!(error.contains("hero.gltf") && error.contains("arms.bin"), "{error}");
+    fs::write(folder.path().join("arms.bin"), [0; 100]).unwrap();
+    let error = Character::open(&gltf, Play::default()).err().unwrap().to_string();
+    assert!(error.contains("100 bytes, not 400"), "{error}");
+    for (list, key, value) in [
+        ("accessors", "count", json!(7_000_000)),
+        ("accessors", "byteOffset", json!(4_000_000_000u64)),
+        ("bufferViews", "byteLength", json!(1_000_000)),
+        ("nodes", "children", json!([0])),
+    ] {
+        let mut maker = strip(false);
+        maker.json[list][0][key] = value;
+        fs::write(&path, maker.glb()).unwrap();
+        assert!(Character::open(&path, Play::default()).is_err(), "{list} {key}");
+    }
+    let mut draco = strip(false);
+    draco.json["extensionsRequired"] = json!(["KHR_draco_mesh_compression"]);
+    draco.json["extensionsUsed"] = json!(["KHR_draco_mesh_compression"]);
+    fs::write(&path, draco.glb()).unwrap();
+    let error = Character::open(&path, Play::default()).err().unwrap().to_string();
+    assert!(error.contains("KHR_draco_mesh_compression"), "{error}");
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig { cases: 2000, failure_persistence: None, ..ProptestConfig::default() })]
+
+    #[test]
+    fn flipped_bytes_never_stop_the_program(at in prop::collection::vec((0usize..6000, any::<u8>()), 1..6)) {
+        thread_local!(static FILE: (TempDir, Vec<u8>) = (tempfile::tempdir().unwrap(), strip(true).glb()));
+        FILE.with(|(folder, whole)| {
+            let mut bytes = whole.clone();
+            for (place, value) in at {
+                let place = place % bytes.len();
+                bytes[place] = value;
+            }
+            let path = folder.path().join("flipped.glb");
+            fs::write(&path, &bytes).unwrap();
+            if let Ok(character) = Character::open(&path, Play::default()) {
+                pose(&character, 0.3);
+            }
+        });
+    }
+}
+
+#[test]
+fn the_foot_that_stands_does_not_slip_when_keys_carry_the_figure_at_its_speed() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("hero.glb");
+    fs::write(&path, hero::glb()).unwrap();
+    let play = Play { clip: Some("walk".into()), ..Play::default() };
+    let inner = Character::open(&path, play).unwrap();
+    assert_eq!(inner.jump(), None);
+    let key = |time: f64| Key { time, at: DVec3::z() * f64::from(hero::SPEED) * time, turn: DVec3::zeros() };
+    let keys = Keys::new(vec![key(0.0), key(4.0)]).unwrap();
+    let walker = Placed::new(Box::new(inner), Space::OWN, keys);
+    let at = |step: i32| pose(&walker, f64::from(step) / 48.0);
+    // The left sole stands in the first half of each round.
+    let (start, middle, end) = (at(48), at(59), at(71));
+    let sole: Vec<usize> = (0..start.len()).filter(|&v| start[v].y < 0.02 && start[v].x > 0.0).collect();
+    assert!(sole.len() > 20);
+    for &vertex in &sole {
+        let slip = [&middle, &end].map(|pose| (pose[vertex] - start[vertex]).norm());
+        assert!(slip.iter().all(|slip| *slip < 2e-3), "{slip:?}");
+    }
+    assert!(sole.iter().all(|&vertex| at(84)[vertex].y > 0.15), "then it is lifted");
+}
+
+#[test]
+fn khronos_simple_skin_bends_as_its_keys_say() {
+    let Some(path) = character::data("character/SimpleSkin.gltf") else {
+        return eprintln!("skipped: no outside data");
+    };
+    let character = open(&path);
+    assert_eq!((character.triangles().len(), character.vertex_count()), (8, 10));
+    let rest = pose(&character, 0.0);
+    close(rest[9], [0.5, 2.0, 0.0]);
+    // At 1.5 s the upper joint, at (0, 1), has turned by 90 degrees about z: the top edge lies to its left.
+    let turned = pose(&character, 1.5);
+    close(turned[8], [-1.0, 0.5, 0.0]);
+    close(turned[9], [-1.0, 1.5, 0.0]);
+    close(turned[0], [-0.5, 0.0, 0.0]);
+}
+
+#[test]
+fn skinning_is_blenders() {
+    let Some(path) = character::data("character/CesiumMan.glb") else {
+        return eprintln!("skipped: no outside data");
+    };
+    let (farthest, height) = character::farthest_from_blender(&path);
+    assert!(farthest < 1e-5 * height, "{farthest} m of {height} m");
+}

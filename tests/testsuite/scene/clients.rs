@@ -1,0 +1,44 @@
+//! Blender and usd-core open a shot; each is skipped where it is not installed.
+
+use std::fs;
+use std::process::Command;
+
+use crate::common::clients;
+use crate::common::shapes;
+use tempfile::TempDir;
+
+/// A shot of a box that crosses the snow, frames 3 to 8.
+fn shot() -> TempDir {
+    let folder = tempfile::tempdir().unwrap();
+    let mesh = shapes::cuboid([0.4; 3]);
+    // Seams at every edge.
+    let corners = (0..3 * mesh.triangles.len() as u32).map(|corner| corner % 4).collect();
+    let places = vec![[0.0, 0.0], [0.75, 0.0], [0.5, 1.0], [0.25, -2.0]];
+    let uvs = frazil::base::Uvs { places, corners: Some(corners), missing: 0 };
+    frazil::io::mesh::write_textured(&folder.path().join("box.obj"), &mesh, Some(&uvs)).unwrap();
+    let scene = "[shot]\nframes = \"3-8\"\n[snow]\nground = 0.0\narea = [-1, -1, 1, 1]\ndepth = 0.3\ncell = 0.02\n\
+                 [output]\nobjects = [\"usd\"]\n[[object]]\nfile = \"box.obj\"\n\
+                 keys = [{ frame = 3, at = [0, 0.4, -0.5] }, { frame = 8, at = [0, 0.25, 0.6], turn_deg = [0, 20, 0] }]\n";
+    fs::write(folder.path().join("shot.toml"), scene).unwrap();
+    let run = Command::new(env!("CARGO_BIN_EXE_frazil"))
+        .current_dir(folder.path())
+        .args(["snow", "shot.toml", "-o", "out", "-q"])
+        .status();
+    assert!(run.unwrap().success());
+    folder
+}
+
+#[test]
+fn blender_imports_the_sequence_as_one_volume_and_renders_it() {
+    let Some(blender) = clients::blender() else { return eprintln!("skipped: no blender") };
+    let folder = shot();
+    clients::blender_opens(&blender, &folder.path().join("out"), 3, 8).unwrap();
+}
+
+#[test]
+fn usd_core_composes_the_stage_with_velocities_and_files() {
+    let Some(python) = clients::usd_python() else { return eprintln!("skipped: no usd-core") };
+    let folder = shot();
+    let said = clients::usd_composes(&python, &folder.path().join("out"), 3, 8).unwrap();
+    assert!(said.contains("3 with UVs"), "{said}");
+}
