@@ -76,6 +76,7 @@ impl Stepping for Tally {
     fn step(&self, ctx: &Context, sum: &mut u64, to: &To<'_>) -> Result<Stepped<u64>> {
         ctx.check()?;
         std::thread::sleep(self.wait);
+        assert!(self.weight < TOO_HEAVY, "the scales broke");
         let file = to.upstream[0].file(to.frame, "base")?;
         let bytes = fs::metadata(&file).map_err(|error| Error::io(&file, "read", error))?.len();
         *sum = sum.wrapping_mul(31).wrapping_add(self.weight * bytes);
@@ -101,16 +102,26 @@ struct Asked<'a> {
     from: Option<i32>,
     weight: u64,
     wait: Duration,
+    /// Seed of the ragged edges, on which the base depends.
+    seed: u32,
+    /// Whether the scene has the third stage.
+    tallies: bool,
 }
 
-const ALL: Asked<'_> = Asked { stages: &[], frames: "1-8", from: None, weight: 1, wait: Duration::ZERO };
+const ALL: Asked<'_> =
+    Asked { stages: &[], frames: "1-8", from: None, weight: 1, wait: Duration::ZERO, seed: 0, tallies: true };
+/// A weight that the third stage does not bear.
+const TOO_HEAVY: u64 = 1000;
 
 /// Runs the three stages; gives what was made, in the order of the files.
 fn run(folder: &Path, out: &str, asked: &Asked<'_>) -> Result<Vec<(&'static str, i32)>> {
-    let scene = Scene::read(&folder.join("shot.toml"))?;
+    let seed = format!("snow.noise.seed={}", asked.seed).parse().unwrap();
+    let scene = Scene::read_with(&folder.join("shot.toml"), &[seed])?;
     let inputs = Inputs::load(&scene)?;
     let mut plan = snow::plan(&scene, &inputs);
-    plan.stages.push(Box::new(Tally { weight: asked.weight, wait: asked.wait }));
+    if asked.tallies {
+        plan.stages.push(Box::new(Tally { weight: asked.weight, wait: asked.wait }));
+    }
     let ctx = Context::new(Pool::new(1)?);
     let stages: Vec<String> = asked.stages.iter().map(|name| name.to_string()).collect();
     let frames: FrameChoice = asked.frames.parse().unwrap();
@@ -242,6 +253,69 @@ fn what_a_stage_reads_must_be_there_and_what_was_written() {
     assert!(damaged.contains("base.0004.vdb"), "{damaged}");
     fs::write(&base, &whole).unwrap();
     assert_eq!(of_stage(&run(folder.path(), "out", &ALL).unwrap(), "tally"), [4, 5, 6, 7, 8]);
+}
+
+#[test]
+fn frames_whose_upstream_frames_have_changed_are_refused() {
+    let _turn = turn();
+    let folder = folder();
+    run(folder.path(), "out", &ALL).unwrap();
+    // A scene without the third stage knows nothing of its frames and leaves them.
+    let other = Asked { seed: 2, ..ALL };
+    run(folder.path(), "out", &Asked { from: Some(5), tallies: false, ..other }).unwrap();
+    assert!(folder.path().join("out/state/tally.0005.json").exists());
+    let refused = run(folder.path(), "out", &other).unwrap_err().to_string();
+    assert!(
+        refused.contains("the inputs of frame 5 have changed") && refused.contains("stage base"),
+        "{refused}"
+    );
+    let made = run(folder.path(), "out", &Asked { from: Some(1), stages: &["tally"], ..other }).unwrap();
+    assert_eq!(of_stage(&made, "tally"), (1..=8).collect::<Vec<_>>());
+    assert!(run(folder.path(), "out", &other).unwrap().is_empty());
+}
+
+#[test]
+fn frames_upstream_may_go_once_they_were_read() {
+    let _turn = turn();
+    let folder = folder();
+    run(folder.path(), "once", &ALL).unwrap();
+    run(folder.path(), "out", &Asked { frames: "1-6", ..ALL }).unwrap();
+    for frame in [2, 3] {
+        for file in [format!("state/base.{frame:04}.json"), format!("base/base.{frame:04}.vdb")] {
+            fs::remove_file(folder.path().join("out").join(file)).unwrap();
+        }
+    }
+    let tally = Asked { stages: &["tally"], ..ALL };
+    let refused = run(folder.path(), "out", &tally).unwrap_err().to_string();
+    assert!(refused.contains("frame 7 of stage tally needs that of stage base"), "{refused}");
+    run(folder.path(), "out", &Asked { stages: &["base", "objects"], frames: "7-8", ..ALL }).unwrap();
+    assert_eq!(run(folder.path(), "out", &tally).unwrap(), [("tally", 7), ("tally", 8)]);
+    // They are made again as they were, and nothing that read them has changed.
+    assert_eq!(run(folder.path(), "out", &ALL).unwrap(), [("base", 2), ("base", 3)]);
+    assert_eq!(differences(folder.path(), "once", "out"), Vec::<String>::new());
+}
+
+#[test]
+fn frames_on_the_way_need_theirs_upstream() {
+    let _turn = turn();
+    let folder = folder();
+    let last = Asked { frames: "8", ..ALL };
+    run(folder.path(), "out", &Asked { stages: &["base"], ..last }).unwrap();
+    let refused = run(folder.path(), "out", &Asked { stages: &["tally"], ..last }).unwrap_err().to_string();
+    assert!(refused.contains("frame 1 of stage tally needs that of stage base"), "{refused}");
+    assert!(!folder.path().join("out/tally/tally.0008.txt").exists());
+}
+
+#[test]
+fn a_stage_that_panics_keeps_its_words_and_stops_the_others() {
+    let _turn = turn();
+    let folder = folder();
+    let broken = std::panic::catch_unwind(|| run(folder.path(), "out", &Asked { weight: TOO_HEAVY, ..ALL }));
+    let words = broken.unwrap_err();
+    assert_eq!(words.downcast_ref::<&str>(), Some(&"the scales broke"));
+    // Whole frames are left, and the lock is not.
+    let made = run(folder.path(), "out", &Asked { from: Some(1), stages: &["tally"], ..ALL }).unwrap();
+    assert_eq!(of_stage(&made, "tally"), (1..=8).collect::<Vec<_>>());
 }
 
 #[test]

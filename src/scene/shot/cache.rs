@@ -6,6 +6,7 @@ use std::sync::Arc;
 use serde::{Deserialize, Serialize};
 
 use super::chain::{Chain, Made};
+use super::pass::Kept;
 use super::settings::{self, Settings};
 use super::stage::Stage;
 use super::stored::Stored;
@@ -151,6 +152,11 @@ impl Cache {
         self.record.segments.last().map_or(i32::MIN, |segment| segment.from)
     }
 
+    /// From what the stage can go on in a shot that begins at frame `first`.
+    pub fn kept(&self, first: i32) -> Kept<'_> {
+        Kept { first, own_from: self.own_from(), done: &self.stored }
+    }
+
     /// Refuses frames whose inputs have changed since. One whose files of the coming frame have changed or appeared is to
     /// be made again, if it is asked for.
     ///
@@ -166,7 +172,8 @@ impl Cache {
         let frames: Vec<i32> = self.stored.frames().filter(|frame| *frame >= own).collect();
         for frame in frames {
             let Some(manifest) = self.stored.manifest(frame).cloned() else { continue };
-            // What is upstream may be on the point of being made: it is looked at again when it is there.
+            // What is upstream may be on the point of being made, and is looked at again when it is there; or it is gone,
+            // and then there is nothing to compare.
             if upstream.iter().any(|upstream| !upstream.is_done(frame)) {
                 continue;
             }
@@ -197,7 +204,7 @@ impl Cache {
     /// # Errors
     /// A file that cannot be read.
     pub fn inputs(&mut self, stage: &dyn Stage, frame: i32, upstream: &[&Stored]) -> Result<Made> {
-        self.chain.at(stage, frame, |frame| upstream.iter().map(|stored| stored.manifest(frame)).collect())
+        self.chain.at(stage, frame, &self.stored, upstream)
     }
 }
 

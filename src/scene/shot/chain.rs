@@ -1,13 +1,13 @@
 //! What each frame of a stage was made from: a hash of the settings, of every file that it reads, of the upstream frames
 //! and, where a stage remembers, of the frames before it.
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
-use super::stage::{Reads, Stage};
-use crate::error::Result;
+use super::stage::Stage;
+use super::stored::Stored;
+use crate::error::{Error, Result};
 use crate::io::hash::Hasher;
-use crate::io::manifest::Manifest;
 use crate::io::seen::Seen;
 
 /// Hashes of the frames from a start on.
@@ -35,42 +35,47 @@ impl Chain {
         Self { first, links: vec![start.finish()], seen: seen.clone() }
     }
 
-    /// What a frame is made from; a frame before the first depends on the seed alone. `upstream` gives the records of the
-    /// frames upstream.
+    /// What a frame is made from; a frame before the first depends on the seed alone. Where a frame upstream is no longer
+    /// there, what the stage's own record says of it counts.
     ///
     /// # Errors
-    /// A file that cannot be read.
-    pub fn at<'r>(
-        &mut self,
-        stage: &dyn Stage,
-        frame: i32,
-        upstream: impl Fn(i32) -> Vec<Option<&'r Manifest>>,
-    ) -> Result<Made> {
+    /// A file that cannot be read; a frame that is neither done nor has all that it is made from.
+    pub fn at(&mut self, stage: &dyn Stage, frame: i32, own: &Stored, upstream: &[&Stored]) -> Result<Made> {
         let from = if stage.remembers() {
             let wanted = (i64::from(frame) - i64::from(self.first)).max(-1) + 1;
             while (self.links.len() as i64) <= wanted {
                 let next = self.first + (self.links.len() - 1) as i32;
                 let before = self.links[self.links.len() - 1].clone();
-                self.links.push(self.link(&before, &stage.reads(next), &upstream(next))?);
+                self.links.push(self.link(&before, stage, next, own, upstream)?);
             }
             self.links[wanted as usize].clone()
         } else {
-            self.link(&self.links[0], &stage.reads(frame), &upstream(frame))?
+            self.link(&self.links[0], stage, frame, own, upstream)?
         };
         Ok(Made { from, next: self.next(&stage.reads(frame).ahead)? })
     }
 
-    fn link(&self, before: &str, reads: &Reads, upstream: &[Option<&Manifest>]) -> Result<String> {
+    fn link(
+        &self,
+        before: &str,
+        stage: &dyn Stage,
+        frame: i32,
+        own: &Stored,
+        upstream: &[&Stored],
+    ) -> Result<String> {
         let mut link = Hasher::default();
         link.add_text(before);
-        for file in &reads.files {
-            link.add_text(&self.seen.hash(file)?);
-        }
-        for manifest in upstream {
-            let files = manifest.iter().flat_map(|manifest| manifest.files.iter().chain(&manifest.state));
-            files.for_each(|file| {
+        for (name, stored) in stage.upstream().iter().zip(upstream) {
+            let Some(manifest) = stored.manifest(frame) else {
+                let recorded = own.manifest(frame).map(|manifest| manifest.inputs.clone());
+                return recorded.ok_or_else(|| missing(stage, frame, name, stored.folder()));
+            };
+            manifest.files.iter().chain(&manifest.state).for_each(|file| {
                 link.add_text(&file.hash);
             });
+        }
+        for file in &stage.reads(frame).files {
+            link.add_text(&self.seen.hash(file)?);
         }
         Ok(link.finish())
     }
@@ -86,4 +91,13 @@ impl Chain {
         }
         Ok(Some(hasher.finish()))
     }
+}
+
+/// Says that a stage's frame lacks that of a stage upstream.
+pub(super) fn missing(stage: &dyn Stage, frame: i32, upstream: &str, folder: &Path) -> Error {
+    let name = stage.name();
+    let what = format!(
+        "frame {frame} of stage {name} needs that of stage {upstream}, which is not there: make it too"
+    );
+    Error::file(folder, what)
 }

@@ -21,8 +21,7 @@ const FILES: &str = "files.json";
 /// What a folder's runs have written besides the records of frames: `state/files.json`.
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
 struct Files {
-    /// The stages that runs have begun, by name; an earlier frazil did not tell them apart.
-    #[serde(default)]
+    /// The stages that runs have begun, by name.
     stages: BTreeMap<String, Begun>,
     /// Hashes of the files that belong to no frame, by path: the content of now, then the one before while it is replaced.
     files: BTreeMap<String, Vec<String>>,

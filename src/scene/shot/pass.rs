@@ -1,5 +1,6 @@
 //! A stage's pass over the frames: steps, and the files of one frame written while the next is computed.
 
+use std::panic::resume_unwind;
 use std::path::Path;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::mpsc::{Receiver, sync_channel};
@@ -36,6 +37,17 @@ pub struct Shared<'a> {
     pub done: Done<'a>,
 }
 
+/// From what a stage can go on.
+#[derive(Clone, Copy)]
+pub struct Kept<'a> {
+    /// The shot's first frame.
+    pub first: i32,
+    /// First frame that was made with the settings of now.
+    pub own_from: i32,
+    /// The frames that are done.
+    pub done: &'a Stored,
+}
+
 /// Any stage, with the pass that makes it.
 pub trait AnyStage: Stage {
     /// As the trait that says what it is.
@@ -43,14 +55,7 @@ pub trait AnyStage: Stage {
 
     /// The state from which a frame is reached in the fewest steps.
     #[doc(hidden)]
-    fn before<'a>(
-        &'a self,
-        ctx: &Context,
-        first: i32,
-        frame: i32,
-        own_from: i32,
-        done: &Stored,
-    ) -> Result<Box<dyn Pass + 'a>>;
+    fn before<'a>(&'a self, ctx: &Context, frame: i32, kept: Kept<'_>) -> Result<Box<dyn Pass + 'a>>;
 }
 
 impl<S: Stepping> AnyStage for S {
@@ -58,15 +63,8 @@ impl<S: Stepping> AnyStage for S {
         self
     }
 
-    fn before<'a>(
-        &'a self,
-        ctx: &Context,
-        first: i32,
-        frame: i32,
-        own_from: i32,
-        done: &Stored,
-    ) -> Result<Box<dyn Pass + 'a>> {
-        Ok(Box::new(At::before(self, ctx, first, frame, own_from, done)?))
+    fn before<'a>(&'a self, ctx: &Context, frame: i32, kept: Kept<'_>) -> Result<Box<dyn Pass + 'a>> {
+        Ok(Box::new(At::before(self, ctx, frame, kept)?))
     }
 }
 
@@ -107,14 +105,8 @@ struct Frame<T> {
 }
 
 impl<'a, S: Stepping> At<'a, S> {
-    fn before(
-        stage: &'a S,
-        ctx: &Context,
-        first: i32,
-        frame: i32,
-        own_from: i32,
-        done: &Stored,
-    ) -> Result<Self> {
+    fn before(stage: &'a S, ctx: &Context, frame: i32, kept: Kept<'_>) -> Result<Self> {
+        let Kept { first, own_from, done } = kept;
         if !stage.remembers() {
             return Ok(Self { stage, frame: frame - 1, state: stage.load(ctx, done, None)? });
         }
@@ -144,7 +136,7 @@ impl<'a, S: Stepping> At<'a, S> {
         for &wanted in todo {
             let is_nearer = || cache.stored.latest_state(self.frame + 1..=wanted - 1).is_some();
             if self.frame < wanted - 1 && (!stage.remembers() || is_nearer()) {
-                self = Self::before(stage, ctx, shared.first, wanted, cache.own_from(), &cache.stored)?;
+                self = Self::before(stage, ctx, wanted, cache.kept(shared.first))?;
                 follows = false;
             }
             while self.frame < wanted {
@@ -187,7 +179,7 @@ impl<S: Stepping> Pass for At<'_, S> {
             drop(jobs);
             (made, writing.join())
         });
-        let (manifests, written) = finished.map_err(|_| Error::Internal("the writer stopped".into()))?;
+        let (manifests, written) = finished.unwrap_or_else(|why| resume_unwind(why));
         manifests.into_iter().for_each(|manifest| cache.stored.add(manifest));
         // What stopped the writer stopped the steps too, and is the reason to report.
         written.and(made)

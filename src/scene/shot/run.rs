@@ -1,11 +1,14 @@
 //! Runs the stages of a scene into a folder: on from where an earlier run stopped.
 
 use std::fs::File;
+use std::panic::resume_unwind;
 use std::path::Path;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
+use std::thread::ScopedJoinHandle;
 
 use super::cache::{Asked, Cache, refuse_asked};
+use super::chain;
 use super::own::{self, Own};
 use super::pass::{AnyStage, Pass, Shared};
 use super::stage::{Report, Stage};
@@ -160,24 +163,33 @@ impl<'a> Run<'a> {
         cache.check_inputs(stage.as_stage(), asked.frames, &upstream.iter().collect::<Vec<_>>())?;
         let (there, todo): (Vec<i32>, Vec<i32>) =
             asked.frames.iter().partition(|frame| cache.stored.is_done(*frame));
-        self.refuse_missing(stage.as_stage(), &todo, &upstream)?;
+        self.refuse_missing(stage.as_stage(), &cache.stored, &todo, &upstream)?;
         (run.there, run.todo, run.cache) = (there.len(), todo, Some(cache));
         Ok(run)
     }
 
-    /// Refuses frames whose upstream frames neither are there nor will be made.
-    fn refuse_missing(&self, stage: &dyn Stage, todo: &[i32], upstream: &[Stored]) -> Result<()> {
+    /// Refuses frames whose upstream frames, or those of a frame on the way to them, neither are there nor will be made.
+    fn refuse_missing(
+        &self,
+        stage: &dyn Stage,
+        own: &Stored,
+        todo: &[i32],
+        upstream: &[Stored],
+    ) -> Result<()> {
+        let first = self.plan.scene.shot.frames.first;
         for (name, stored) in stage.upstream().iter().zip(upstream) {
             let made = self.stages.iter().find(|run| run.stage.name() == *name).map(|run| &run.todo[..]);
             let is_there = |frame: &i32| {
                 stored.is_done(*frame) || made.is_some_and(|made| made.binary_search(frame).is_ok())
             };
-            if let Some(missing) = todo.iter().find(|frame| !is_there(frame)) {
-                let what = format!(
-                    "frame {missing} of stage {} needs that of stage {name}, which is not there: make it too",
-                    stage.name()
-                );
-                return Err(Error::file(stored.folder(), what));
+            let mut at = first - 1;
+            for &wanted in todo {
+                let from = own.latest_state(at + 1..=wanted - 1).unwrap_or(at);
+                let begin = if stage.remembers() { from + 1 } else { wanted };
+                if let Some(frame) = (begin..=wanted).find(|frame| !is_there(frame)) {
+                    return Err(chain::missing(stage, frame, name, stored.folder()));
+                }
+                at = wanted;
             }
         }
         Ok(())
@@ -204,7 +216,7 @@ impl<'a> Run<'a> {
         for run in &mut self.stages {
             let waits = run.stage.upstream().iter().any(|name| busy.contains(name));
             if let (Some(&frame), Some(cache), false) = (run.todo.first(), &run.cache, waits) {
-                run.start = Some(run.stage.before(ctx, first, frame, cache.own_from(), &cache.stored)?);
+                run.start = Some(run.stage.before(ctx, frame, cache.kept(first))?);
             }
         }
         Ok(())
@@ -286,18 +298,29 @@ impl<'a> Run<'a> {
                 .map(|((_, run), upstream)| {
                     let every_state = plan.is_read(run.stage.name());
                     scope.spawn(move || {
+                        let stop = StopOthers(shared.stop);
                         let result = run.make(&shared, upstream, every_state);
-                        if result.is_err() {
-                            shared.stop.store(true, Ordering::Relaxed);
+                        if result.is_ok() {
+                            std::mem::forget(stop);
                         }
                         result
                     })
                 })
                 .collect();
-            let stopped = |_| Err(Error::Internal("a stage stopped".into()));
-            threads.into_iter().map(|thread| thread.join().unwrap_or_else(stopped)).collect()
+            let joined =
+                |thread: ScopedJoinHandle<'_, _>| thread.join().unwrap_or_else(|why| resume_unwind(why));
+            threads.into_iter().map(joined).collect()
         });
         results.into_iter().collect()
+    }
+}
+
+/// Stops the passes beside one that fails, also by a panic, after their frame.
+struct StopOthers<'a>(&'a AtomicBool);
+
+impl Drop for StopOthers<'_> {
+    fn drop(&mut self) {
+        self.0.store(true, Ordering::Relaxed);
     }
 }
 
@@ -311,7 +334,7 @@ impl StageRun<'_> {
             None => {
                 // What is upstream was made only now.
                 cache.check_inputs(self.stage.as_stage(), &FrameChoice::none(), &upstream)?;
-                self.stage.before(shared.ctx, shared.first, todo[0], cache.own_from(), &cache.stored)?
+                self.stage.before(shared.ctx, todo[0], cache.kept(shared.first))?
             }
         };
         start.make(shared, cache, &upstream, &todo, every_state)
