@@ -40,6 +40,7 @@ test: setup lint
 	cargo test --release
 	RUSTDOCFLAGS="-D warnings" cargo doc --release --no-deps --lib
 	cargo check --release --no-default-features --lib
+	./tools/bare-cli
 	@$(MAKE) --no-print-directory test-hosts
 
 # The C header, from the texts in src/capi.

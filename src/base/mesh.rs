@@ -13,6 +13,18 @@ pub struct TriMesh {
 }
 
 impl TriMesh {
+    /// A closed box between two opposite corners (m), the first the lesser one on each axis; triangles are seen from
+    /// outside counter-clockwise.
+    pub fn cuboid(low: [f32; 3], high: [f32; 3]) -> Self {
+        // Bit n of a vertex' index says which end it has on axis n.
+        let position = |n: u32| {
+            Vec3::from([0, 1, 2].map(|axis| if n >> axis & 1 == 0 { low[axis] } else { high[axis] }))
+        };
+        let faces = [[0, 2, 3, 1], [4, 5, 7, 6], [0, 1, 5, 4], [2, 6, 7, 3], [0, 4, 6, 2], [1, 3, 7, 5]];
+        let triangles = faces.iter().flat_map(|&[a, b, c, d]| [[a, b, c], [a, c, d]]).collect();
+        Self { positions: (0..8).map(position).collect(), triangles }
+    }
+
     /// Checks that there is a triangle, that positions are finite and indices in range.
     ///
     /// # Errors
@@ -217,6 +229,13 @@ mod tests {
             positions: vec![Vec3::zeros(), Vec3::x(), Vec3::y(), Vec3::z()],
             triangles: vec![[0, 2, 1], [0, 1, 3], [1, 2, 3], [2, 0, 3]],
         }
+    }
+
+    #[test]
+    fn a_cuboid_is_closed_and_faces_outward() {
+        let cuboid = TriMesh::cuboid([-1.0, 0.0, 2.0], [1.0, 3.0, 2.5]);
+        assert!(cuboid.is_closed() && cuboid.is_manifold());
+        assert_eq!((cuboid.volume(), cuboid.area()), (3.0, 2.0 * (6.0 + 1.0 + 1.5)));
     }
 
     #[test]

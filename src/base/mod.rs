@@ -2,9 +2,11 @@
 
 pub mod blocks;
 pub mod bvh;
+#[doc(hidden)]
 pub mod cpu;
 mod ears;
 pub mod faults;
+#[doc(hidden)]
 pub mod lanes;
 pub mod mesh;
 mod monotone;

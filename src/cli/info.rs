@@ -2,9 +2,8 @@
 
 use std::path::{Path, PathBuf};
 
+use frazil::io;
 use frazil::motion::{Character, Play, gait, is_gltf};
-use frazil::vdb::{MetaValue, file, level_set};
-use frazil::{Context, io};
 use serde_json::{Map, Value, json};
 
 use super::exit::{Failure, Phase};
@@ -27,11 +26,15 @@ pub struct Args {
 }
 
 /// Runs the command.
+#[cfg_attr(not(feature = "vdb"), expect(unused_variables, reason = "only grids are measured by threads"))]
 pub fn run(args: Args, session: &Session) -> Result<(), Failure> {
     let mut all = Vec::new();
     for path in &args.files {
         let holds = match io::mesh::extension(path).as_str() {
-            "vdb" => grids(path, args.measure, &session.ctx),
+            #[cfg(feature = "vdb")]
+            "vdb" => super::vdb::info::grids(path, args.measure, &session.ctx),
+            #[cfg(not(feature = "vdb"))]
+            "vdb" => super::needs_openvdb(path),
             _ if is_gltf(path) => character(path),
             _ => mesh(path),
         };
@@ -39,43 +42,6 @@ pub fn run(args: Args, session: &Session) -> Result<(), Failure> {
     }
     let text = if args.json { format!("{:#}\n", json!(all)) } else { all.iter().map(lines).collect() };
     output::print(&text).during()
-}
-
-fn grids(path: &Path, measure: bool, ctx: &Context) -> frazil::Result<Vec<Value>> {
-    let mut out = Vec::new();
-    for grid in file::describe(path)? {
-        let mut entry = Map::new();
-        let mut set = |key: &str, value: Value| entry.insert(key.into(), value);
-        set("name", json!(grid.name));
-        set("type", json!(grid.value_type));
-        set("class", json!(grid.class));
-        set("voxel_m", json!(grid.voxel));
-        set("active_voxels", json!(grid.active_voxels));
-        set("bbox", json!(grid.bbox));
-        set("memory_bytes", json!(grid.memory));
-        set("half", json!(grid.half));
-        set("compression", json!(grid.compression));
-        if measure && grid.class == "level set" {
-            let size = level_set::measure(ctx, &file::read_named(path, Some(&grid.name))?)?;
-            set("area_m2", json!(size.area));
-            set("volume_m3", json!(size.volume));
-        }
-        for (key, value) in grid.metadata.iter().filter(|(key, _)| !key.starts_with("file_")) {
-            set(key, meta(value));
-        }
-        out.push(Value::Object(entry));
-    }
-    Ok(out)
-}
-
-fn meta(value: &MetaValue) -> Value {
-    match value {
-        MetaValue::Text(text) | MetaValue::Other(_, text) => json!(text),
-        MetaValue::Float(number) => json!(number),
-        MetaValue::Double(number) => json!(number),
-        MetaValue::Int(number) => json!(number),
-        MetaValue::Bool(yes) => json!(yes),
-    }
 }
 
 fn mesh(path: &Path) -> frazil::Result<Vec<Value>> {

@@ -4,17 +4,21 @@ mod check;
 mod convert;
 mod exit;
 mod info;
+#[cfg(feature = "vdb")]
 mod machine;
 mod mesh;
 mod new;
 mod options;
 mod output;
 mod preview;
+#[cfg(feature = "vdb")]
 mod progress;
 mod session;
 mod signals;
+#[cfg(feature = "vdb")]
 mod snow;
 mod usage;
+#[cfg(feature = "vdb")]
 mod vdb;
 
 use clap::{Parser, Subcommand};
@@ -41,7 +45,9 @@ struct Cli {
 enum Command {
     New(new::Args),
     Check(check::Args),
+    #[cfg(feature = "vdb")]
     Snow(snow::Args),
+    #[cfg(feature = "vdb")]
     Vdb(vdb::Args),
     Mesh(mesh::Args),
     Convert(convert::Args),
@@ -54,7 +60,9 @@ impl Command {
         match self {
             Self::New(args) => new::run(&args),
             Self::Check(args) => check::run(&args, session),
+            #[cfg(feature = "vdb")]
             Self::Snow(args) => snow::run(args, session),
+            #[cfg(feature = "vdb")]
             Self::Vdb(args) => vdb::run(args, session),
             Self::Mesh(args) => mesh::run(&args, session),
             Self::Convert(args) => convert::run(&args, session),
@@ -66,6 +74,7 @@ impl Command {
 
 /// Runs the program; nothing that a user can do makes it panic or print a trace.
 pub fn run() -> ExitCode {
+    #[cfg(feature = "vdb")]
     if let Some(code) = frazil::vdb::guard::serve(std::env::args_os().skip(1)) {
         return code.into();
     }
@@ -84,4 +93,10 @@ pub fn run() -> ExitCode {
         }
     });
     ended.unwrap_or(exit::FAILED).into()
+}
+
+/// Says that a file needs what this program was built without.
+#[cfg(not(feature = "vdb"))]
+fn needs_openvdb<T>(path: &std::path::Path) -> frazil::Result<T> {
+    Err(frazil::Error::file(path, "needs OpenVDB, which this frazil was built without"))
 }

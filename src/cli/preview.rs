@@ -5,8 +5,7 @@ use std::path::{Path, PathBuf};
 use frazil::base::DVec3;
 use frazil::motion::{Character, Play, is_gltf};
 use frazil::render::{Camera, Light, Model, Models, Size};
-use frazil::vdb::{GridClass, file};
-use frazil::{Context, Error, io};
+use frazil::{Context, io};
 
 use super::exit::{Failure, Phase};
 use super::session::Session;
@@ -92,9 +91,13 @@ pub fn run(args: Args, session: &Session) -> Result<(), Failure> {
     picture.write(&args.output).during()
 }
 
+#[cfg_attr(not(feature = "vdb"), expect(unused_variables, reason = "meshes of grids are made by threads"))]
 fn model(path: &Path, args: &Args, ctx: &Context) -> frazil::Result<Model> {
     let mesh = match io::mesh::extension(path).as_str() {
-        "vdb" => return grid(path, ctx),
+        #[cfg(feature = "vdb")]
+        "vdb" => return super::vdb::model::of_file(path, ctx),
+        #[cfg(not(feature = "vdb"))]
+        "vdb" => return super::needs_openvdb(path),
         _ if is_gltf(path) && args.clip.is_none() && args.frame.is_none() => Character::at_rest(path)?,
         _ if is_gltf(path) => {
             let play = Play { clip: args.clip.clone(), ..Play::default() };
@@ -103,22 +106,4 @@ fn model(path: &Path, args: &Args, ctx: &Context) -> frazil::Result<Model> {
         _ => io::mesh::read(path)?.without_unused(),
     };
     Ok(Model::mesh(&mesh, [0.35, 0.16, 0.08]))
-}
-
-/// The level set of a file, or its fog volume.
-fn grid(path: &Path, ctx: &Context) -> frazil::Result<Model> {
-    let grid = file::read_named(path, None)?;
-    if grid.class() == GridClass::LevelSet {
-        return Model::level_set(ctx, &grid);
-    }
-    let (model, density) = Model::fog(ctx, &grid)?;
-    if model.bounds().is_none() {
-        return Err(Error::file(path, format!("grid \"{}\" has no density above 0 to draw", grid.name())));
-    }
-    log::warn!(
-        "{}: grid \"{}\" is not a level set: it is drawn where its values are {density}, half of the greatest",
-        path.display(),
-        grid.name()
-    );
-    Ok(model)
 }

@@ -1,13 +1,12 @@
 //! Shared by all commands: threads, signals, verbosity, the report of a run.
 
 use super::exit::{self, Failure, Phase};
-use super::options::Amount;
 use super::output;
 use super::signals::Signals;
 use frazil::context::{PhaseTime, Phases, peak_memory};
-use frazil::sweep::surface_bytes;
+#[cfg(feature = "vdb")]
 use frazil::vdb::guard::{self, Guard};
-use frazil::{Context, Error, Pool};
+use frazil::{Context, Pool};
 use serde_json::{Map, Value, json};
 use std::path::PathBuf;
 use std::sync::Mutex;
@@ -20,8 +19,9 @@ pub struct Globals {
     #[arg(long, value_name = "N", global = true, value_parser = clap::value_parser!(u16).range(1..=1024))]
     pub threads: Option<u16>,
     /// Refuse work that would need more memory, for example 8G, 512M or 50%.
+    #[cfg(feature = "vdb")]
     #[arg(long, value_name = "SIZE", global = true, default_value = "80%")]
-    max_memory: Amount,
+    max_memory: super::machine::Amount,
     /// Say nothing but errors.
     #[arg(short, long, global = true, conflicts_with = "verbose")]
     pub quiet: bool,
@@ -59,6 +59,7 @@ impl Session {
             .map_err(|error| Failure::refused(format!("cannot install signal handlers: {error}")))?;
         let [cancel, _] = ctx.cancel_flags();
         frazil::io::source::stop_when(cancel.clone());
+        #[cfg(feature = "vdb")]
         guard::install(Guard {
             // The program as it runs, even if its file was replaced meanwhile.
             program: "/proc/self/exe".into(),
@@ -73,20 +74,13 @@ impl Session {
     }
 
     /// Memory limit of the work (bytes).
+    #[cfg(feature = "vdb")]
     pub fn max_memory(&self) -> u64 {
         self.globals.max_memory.bytes()
     }
 
-    /// Refuses a level set whose surface (m2) would need too much memory with this cell (m).
-    pub fn check_surface(&self, area: f64, cell: f64) -> frazil::Result<()> {
-        let (needed, limit) = (surface_bytes(area, cell), self.max_memory());
-        if needed <= limit {
-            return Ok(());
-        }
-        Err(Error::Memory { what: format!("a level set with --cell {cell}"), needed, limit })
-    }
-
     /// Whether only errors are printed.
+    #[cfg(feature = "vdb")]
     pub fn is_quiet(&self) -> bool {
         self.globals.quiet
     }

@@ -1,16 +1,20 @@
 //! Files that are not .vdb.
 
 pub mod atomic;
+#[doc(hidden)]
 pub mod caught;
+#[doc(hidden)]
 pub mod extras;
 pub mod hash;
 pub mod manifest;
 pub mod mesh;
 mod obj;
 mod ply;
+#[doc(hidden)]
 pub mod sealed;
 pub mod seen;
 pub mod sequence;
+#[doc(hidden)]
 pub mod source;
 mod stl;
 pub mod usd;

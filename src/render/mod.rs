@@ -16,6 +16,8 @@ mod model;
 mod models;
 mod picture;
 mod shade;
+#[cfg(feature = "vdb")]
+mod volume;
 
 pub use camera::{Camera, Size};
 pub use model::Model;

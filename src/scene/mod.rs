@@ -11,6 +11,8 @@ pub mod shot;
 pub mod snow;
 mod text;
 
+pub use objects::Objects;
+#[cfg(feature = "vdb")]
 pub use snow::{Inputs, Rebuild, Walk, check_memory, estimate};
 pub use text::{FrameChoice, Frames, Override, Value, Values, reference, template};
 

@@ -54,13 +54,19 @@ mod voxelise;
 mod winding;
 
 pub use body::{Body, Shape};
-pub use chain::{Face, Weights, Window, boundary};
-pub use lattice::{Fixed, Lattice, REACH, UNITS, too_far};
-pub use nearest::Scratch;
+pub use lattice::{REACH, too_far};
 #[cfg(feature = "vdb")]
 pub use samples::{SamplesSettings, samples};
-pub use topology::Topology;
-pub use voxelise::{ALL, Band, Piece, Voxeliser};
+
+// For the rooms above, tests and benchmarks.
+#[doc(hidden)]
+pub use {
+    chain::{Face, Weights, Window, boundary},
+    lattice::{Fixed, Lattice, UNITS},
+    nearest::Scratch,
+    topology::Topology,
+    voxelise::{ALL, Band, Piece, Voxeliser},
+};
 
 use crate::error::{Error, Result};
 
@@ -115,4 +121,7 @@ pub fn surface_bytes(area: f64, cell: f64) -> u64 {
 #[cfg(feature = "vdb")]
 mod grid;
 #[cfg(feature = "vdb")]
-pub use grid::{chain, fill, voxelise};
+#[doc(hidden)]
+pub use grid::fill;
+#[cfg(feature = "vdb")]
+pub use grid::{chain, voxelise};

@@ -274,6 +274,7 @@ pub fn renormalise(ctx: &Context, grid: &mut FloatGrid, scheme: Scheme, times: u
 ///
 /// # Errors
 /// As [`offset`].
+#[doc(hidden)]
 pub fn advect_outward(ctx: &Context, grid: &mut FloatGrid, speed: &FloatGrid) -> Result<()> {
     let (call, _running) = call(ctx);
     ffi::advect_outward(grid.inner.pin_mut(), &call, &speed.inner).map_err(fail)

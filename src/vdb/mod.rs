@@ -9,6 +9,7 @@ mod decode;
 pub mod file;
 mod grid;
 pub mod guard;
+#[doc(hidden)]
 pub mod layout;
 mod leaf;
 pub mod level_set;

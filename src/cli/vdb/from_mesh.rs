@@ -2,7 +2,7 @@
 
 use super::VdbOutput;
 use crate::cli::exit::{Failure, Phase};
-use crate::cli::options::{self, MeshSpace, positive};
+use crate::cli::options::{MeshSpace, positive};
 use crate::cli::session::Session;
 use frazil::sweep::{self, Settings};
 use std::path::PathBuf;
@@ -31,10 +31,10 @@ pub fn run(args: &Args, session: &Session) -> Result<(), Failure> {
     settings.validate().before()?;
     args.output.check(&[&args.mesh])?;
     let mesh = args.space.read(&args.mesh).before()?;
-    if let Some(what) = options::far_mesh(&args.mesh, &mesh, args.cell) {
+    if let Some(what) = super::far_mesh(&args.mesh, &mesh, args.cell) {
         log::warn!("{what}");
     }
-    session.check_surface(mesh.area(), args.cell).before()?;
+    super::check_surface(session, mesh.area(), args.cell).before()?;
     let grid = sweep::voxelise(&session.ctx, mesh, &settings).during()?;
     args.output.write(session, grid).during()
 }

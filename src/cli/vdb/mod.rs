@@ -4,6 +4,8 @@ mod combine;
 mod displace;
 mod filter;
 mod from_mesh;
+pub mod info;
+pub mod model;
 mod rebuild;
 mod sweep;
 mod to_mesh;
@@ -12,6 +14,9 @@ use super::exit::{Failure, Phase};
 use super::output;
 use super::session::Session;
 use clap::{Subcommand, ValueEnum};
+use frazil::base::TriMesh;
+use frazil::base::mesh::too_far;
+use frazil::sweep::surface_bytes;
 use frazil::vdb::file::{self, Compression, WriteOptions};
 use frazil::vdb::{FloatGrid, GridClass};
 use frazil::{Error, Result};
@@ -145,4 +150,19 @@ fn read_level_set(path: &Path, name: Option<&str>) -> Result<FloatGrid> {
         return Err(Error::file(path, format!("grid \"{}\" has cells that are not cubes", grid.name())));
     }
     Ok(grid)
+}
+
+/// The message for a mesh so far away (m) that its file's 32-bit positions are coarse compared with a cell (m).
+fn far_mesh(path: &Path, mesh: &TriMesh, cell: f64) -> Option<String> {
+    let farthest = mesh.positions.iter().map(|p| f64::from(p.amax())).fold(0.0, f64::max);
+    too_far(&path.display().to_string(), farthest, 1.0, cell)
+}
+
+/// Refuses a level set whose surface (m2) would need too much memory with this cell (m).
+fn check_surface(session: &Session, area: f64, cell: f64) -> Result<()> {
+    let (needed, limit) = (surface_bytes(area, cell), session.max_memory());
+    if needed <= limit {
+        return Ok(());
+    }
+    Err(Error::Memory { what: format!("a level set with --cell {cell}"), needed, limit })
 }

@@ -2,7 +2,7 @@
 
 use super::VdbOutput;
 use crate::cli::exit::{Failure, Phase};
-use crate::cli::options::{self, MeshSpace, positive, triple};
+use crate::cli::options::{MeshSpace, positive, triple};
 use crate::cli::session::Session;
 use frazil::base::{DVec3, TriMesh};
 use frazil::io;
@@ -88,7 +88,7 @@ impl Args {
         let round = from.bounds().map_or(0.0, |(low, high)| 4.0 * (high - low).norm());
         // Of the surface at both ends, and of what its outline sweeps on the way.
         let area = from.area() + to.area() + f64::from(round * path);
-        session.check_surface(area, self.cell).before()
+        super::check_surface(session, area, self.cell).before()
     }
 
     fn sweep(&self, session: &Session, settings: &Settings) -> Result<FloatGrid, Failure> {
@@ -100,7 +100,7 @@ impl Args {
             Ok(TriMesh { positions, triangles: motion.triangles().to_vec() })
         };
         let ends = [posed(from).before()?, posed(to).before()?];
-        if let Some(what) = options::far_mesh(&self.mesh[0], &ends[0], self.cell) {
+        if let Some(what) = super::far_mesh(&self.mesh[0], &ends[0], self.cell) {
             log::warn!("{what}");
         }
         self.check_memory(session, [&ends[0], &ends[1]])?;

@@ -3,7 +3,7 @@
 use crate::error::Result;
 use crate::io::seen::Seen;
 use crate::scene::shot::Settings;
-use crate::scene::text::Scope;
+use crate::scene::text::key::{Key, Scope};
 use crate::scene::text::keys::{self, settings_of};
 use crate::scene::{Role, Scene, shot};
 
@@ -22,8 +22,7 @@ pub(super) fn of_base(scene: &Scene, seen: &Seen) -> Result<Settings> {
 /// The settings that make the layer before the first frame: what was kept cannot go on as another layer. Static objects
 /// are counted by themselves: others may come and go.
 pub(super) fn of_layer(all: &Settings) -> Settings {
-    let is_first =
-        |key: &str| keys::find(keys::all(), key).is_some_and(|key| key.scope("base") == Some(Scope::First));
+    let is_first = |key: &str| declared(key).is_some_and(|key| key.scope("base") == Some(Scope::First));
     let of_snow = all.iter().filter(|(key, _)| is_first(key));
     let mut out: Settings = of_snow.map(|(key, value)| (key.clone(), value.clone())).collect();
     let index = |key: &str| key.strip_prefix("object[")?.strip_suffix("].role")?.parse::<usize>().ok();
@@ -43,6 +42,13 @@ pub(super) fn of_layer(all: &Settings) -> Settings {
         }
     }
     out
+}
+
+/// The key that a path in settings names: `snow.noise.size`, `object[1].scale`.
+fn declared(path: &str) -> Option<&'static Key> {
+    let (table, name) = path.rsplit_once('.')?;
+    let table = table.split('[').next().unwrap_or(table);
+    keys::all().iter().find(|key| key.table == table && key.name == name)
 }
 
 #[cfg(test)]

@@ -1,6 +1,6 @@
 //! Reads a scene file: its tables, the values of their keys, and what systems make of them.
 
-use super::key::{Default, Key, OBJECT, heading};
+use super::key::{Fallback, Key, OBJECT, heading};
 use super::keys::{self, tables};
 use super::overrides::Override;
 use super::table::{Document, Table};
@@ -110,7 +110,9 @@ fn read_table<'d>(
     let table = match root.table(name, &heading(name), &known(keys, name))? {
         Some(table) => table,
         None if name == "shot" => return Err(root.error(name, "is missing")),
-        None if keys.iter().any(|key| key.table == name && key.default == Default::Required) => return Ok(()),
+        None if keys.iter().any(|key| key.table == name && key.fallback == Fallback::Required) => {
+            return Ok(());
+        }
         None => Table::absent(document, &heading(name)),
     };
     values.read(name, None, &table)?;

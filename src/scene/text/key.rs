@@ -44,7 +44,7 @@ pub enum Kind {
 
 /// What is taken where a key is left out.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub enum Default {
+pub enum Fallback {
     /// It may not be left out.
     Required,
     /// Nothing.
@@ -77,7 +77,7 @@ pub struct Key {
     /// What it may hold.
     pub kind: Kind,
     /// What is taken where it is left out.
-    pub default: Default,
+    pub fallback: Fallback,
     /// Its line in a scene to begin with.
     pub example: Example,
     /// Whether it is for characters only.
@@ -95,7 +95,7 @@ impl Key {
             table,
             name,
             kind,
-            default: Default::Required,
+            fallback: Fallback::Required,
             example: Example::Default,
             of_characters: false,
             meaning,
@@ -105,17 +105,17 @@ impl Key {
 
     /// What is taken where it is left out: a value as a scene writes it.
     pub const fn or(self, value: &'static str) -> Self {
-        Self { default: Default::Is(value), ..self }
+        Self { fallback: Fallback::Is(value), ..self }
     }
 
     /// What is taken where it is left out: so many cells.
     pub const fn or_cells(self, cells: f64) -> Self {
-        Self { default: Default::Cells(cells), ..self }
+        Self { fallback: Fallback::Cells(cells), ..self }
     }
 
     /// It may be left out, and then has no value.
     pub const fn or_nothing(self) -> Self {
-        Self { default: Default::Nothing, ..self }
+        Self { fallback: Fallback::Nothing, ..self }
     }
 
     /// Its value in a scene to begin with, behind a `#`.

@@ -55,7 +55,7 @@ const OBJECTS: &[Key] = &[
     Key::new(OBJECT, "scale", Kind::Number(1.0e-9, 1.0e9, ""), "from the file's unit to metres: 0.01 for centimetres")
         .or("1.0")
         .concerns(MOVES),
-    Key::new(OBJECT, "up", Kind::Choice(&["y", "z"]), "the file's upward axis").or("\"y\"").concerns(MOVES),
+    Key::new(OBJECT, "up", Kind::Choice(&["y", "z"]), "the file's upward axis: y or z").or("\"y\"").concerns(MOVES),
     Key::new(
         OBJECT,
         "role",
@@ -65,11 +65,11 @@ const OBJECTS: &[Key] = &[
     .or("\"collide\"")
     .concerns(MOVES),
     Key::new(OBJECT, "noise", Kind::Flag, "ragged edges of its prints").or("true").concerns(&[("base", Step)]),
-    Key::new(OBJECT, "ease", Kind::Flag, "joined smoothly between keys, else straight").or("false").concerns(MOVES),
+    Key::new(OBJECT, "ease", Kind::Flag, "true: keys are joined smoothly, from rest to rest; else straight").or("false").concerns(MOVES),
     Key::new(OBJECT, "keys", Kind::Poses(FAR), "rigid motion over the file's own: m, degrees about x, then y, then z")
         .or("[]")
         .begins_with(
-            "[{ frame = 1, at = [0.0, 0.1, -2.5] }, { frame = 120, at = [0.0, 0.1, 2.5], turn_deg = [0.0, 0.0, 0.0] }]",
+            "[\n    { frame = 1, at = [0.0, 0.1, -2.5] },\n    { frame = 120, at = [0.0, 0.1, 2.5], turn_deg = [0.0, 0.0, 0.0] },\n]",
         )
         .concerns(MOVES),
 ];
@@ -104,9 +104,14 @@ const OUTPUT: &[Key] = &[
     )
     .or("[\"vdb\"]")
     .concerns(BASE_OUTPUT),
-    Key::new("output", "objects", Kind::Choices(&["usd", "ply"]), "objects/, as they moved, with velocities")
-        .or("[]")
-        .concerns(&[("objects", Output)]),
+    Key::new(
+        "output",
+        "objects",
+        Kind::Choices(&["usd", "ply"]),
+        "\"usd\", \"ply\": objects/, as they moved, with velocities",
+    )
+    .or("[]")
+    .concerns(&[("objects", Output)]),
     Key::new("output", "usd", Kind::Flag, "shot.usda: the whole shot for programs that read USD").or("true"),
 ];
 
@@ -121,13 +126,6 @@ pub fn tables(keys: &[Key]) -> Vec<&'static str> {
     let mut out: Vec<&str> = keys.iter().map(|key| key.table).collect();
     out.dedup();
     out
-}
-
-/// A key by its path in settings: `snow.noise.size`, `object[1].scale`.
-pub fn find<'k>(keys: &'k [Key], path: &str) -> Option<&'k Key> {
-    let (table, name) = path.rsplit_once('.')?;
-    let table = table.split('[').next().unwrap_or(table);
-    keys.iter().find(|key| key.table == table && key.name == name)
 }
 
 /// The settings that a stage depends on, with the content of the objects' files in place of their names; of the objects

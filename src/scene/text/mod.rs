@@ -19,7 +19,6 @@ pub use template::{reference, template};
 pub use values::{Value, Values};
 
 pub(super) use file::name;
-pub(super) use key::Scope;
 pub(super) use keys::FAR;
 pub(super) use table::Table;
 

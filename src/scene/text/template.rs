@@ -1,6 +1,6 @@
 //! What is said of all keys: a scene to begin with, and a table of them.
 
-use super::key::{Default, Example, Key, Kind, OBJECT, heading};
+use super::key::{Example, Fallback, Key, Kind, OBJECT, heading};
 use super::keys::{self, tables};
 use super::resolved::line;
 use super::table::with_value;
@@ -41,7 +41,11 @@ fn example(key: &Key, keys: &[Key]) -> String {
         Example::Default => ("# ", default_value(key, keys)),
     };
     let characters = if key.of_characters { "of a .glb: " } else { "" };
-    line(&format!("{mark}{} = {value}", key.name), &format!("{characters}{}{}", key.meaning, cells(key)))
+    let (first, rest) =
+        value.split_once('\n').map_or((&value[..], None), |(first, rest)| (first, Some(rest)));
+    let meaning = format!("{characters}{}{}", key.meaning, cells(key));
+    let rest = rest.map_or(String::new(), |rest| format!("{rest}\n"));
+    line(&format!("{mark}{} = {first}", key.name), &meaning) + &rest
 }
 
 /// Which value is taken, in the cells of the scene to begin with.
@@ -51,15 +55,15 @@ fn default_value(key: &Key, keys: &[Key]) -> String {
         let Example::Needed(value) = example else { return None };
         with_value("cell", value, |table| table.number("cell")).ok()?
     };
-    match key.default {
-        Default::Is(value) => value.to_string(),
-        Default::Cells(cells) => cell().map_or(String::new(), |cell| format!("{:?}", cells * cell)),
-        Default::Required | Default::Nothing => String::new(),
+    match key.fallback {
+        Fallback::Is(value) => value.to_string(),
+        Fallback::Cells(cells) => cell().map_or(String::new(), |cell| format!("{:?}", cells * cell)),
+        Fallback::Required | Fallback::Nothing => String::new(),
     }
 }
 
 fn cells(key: &Key) -> String {
-    if let Default::Cells(cells) = key.default { format!("; {cells} cells") } else { String::new() }
+    if let Fallback::Cells(cells) = key.fallback { format!("; default {cells} cells") } else { String::new() }
 }
 
 pub(super) fn reference_of(keys: &[Key]) -> String {
@@ -69,11 +73,11 @@ pub(super) fn reference_of(keys: &[Key]) -> String {
         let _ = write!(out, "\n`{}`{many}\n\n", heading(table));
         out.push_str("| key | holds | default | meaning |\n|---|---|---|---|\n");
         for key in keys.iter().filter(|key| key.table == table) {
-            let default = match key.default {
-                Default::Required => "required".to_string(),
-                Default::Nothing => String::new(),
-                Default::Is(value) => format!("`{value}`"),
-                Default::Cells(cells) => format!("{cells} cells"),
+            let default = match key.fallback {
+                Fallback::Required => "required".to_string(),
+                Fallback::Nothing => String::new(),
+                Fallback::Is(value) => format!("`{value}`"),
+                Fallback::Cells(cells) => format!("{cells} cells"),
             };
             let _ = writeln!(out, "| `{}` | {} | {default} | {} |", key.name, holds(key), key.meaning);
         }
@@ -93,13 +97,23 @@ fn holds(key: &Key) -> String {
         Kind::Text => "a text".to_string(),
         Kind::Choice(choices) => texts(choices, " or "),
         Kind::Choices(choices) => format!("list of {}", texts(choices, ", ")),
-        Kind::Number(low, high, unit) => format!("{low} to {high}{}", of_unit(unit)),
+        Kind::Number(low, high, unit) => format!("{} to {}{}", short(low), short(high), of_unit(unit)),
         Kind::Cells(low, high) => format!("m, {low} to {high} cells"),
         Kind::Whole(low, high) => format!("whole, {low} to {high}"),
-        Kind::Numbers(count, far, unit) => format!("{count} numbers, each -{far} to {far}{}", of_unit(unit)),
+        Kind::Numbers(count, far, unit) => {
+            format!("{count} numbers, each -{0} to {0}{1}", short(far), of_unit(unit))
+        }
         Kind::File(extensions) => any_of(extensions),
-        Kind::HeightOrFile(far, extensions) => format!("-{far} to {far} m, or {}", any_of(extensions)),
+        Kind::HeightOrFile(far, extensions) => {
+            format!("-{0} to {0} m, or {1}", short(far), any_of(extensions))
+        }
         Kind::Poses(_) => "list of `{ frame, at, turn_deg }`".to_string(),
     };
     if key.of_characters { format!("{held}; .glb and .gltf") } else { held }
+}
+
+/// A bound of a range, without a row of zeros.
+fn short(bound: f64) -> String {
+    let size = bound.abs();
+    if size != 0.0 && !(1e-3..1e5).contains(&size) { format!("{bound:e}") } else { bound.to_string() }
 }

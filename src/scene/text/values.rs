@@ -6,7 +6,7 @@ use std::path::{Path, PathBuf};
 
 use serde::{Serialize, Serializer};
 
-use super::key::{Default, Key, Kind};
+use super::key::{Fallback, Key, Kind};
 use super::table::{Table, with_value};
 use crate::error::{Error, Result};
 use crate::io::mesh::extension;
@@ -16,23 +16,23 @@ use crate::scene::{Frames, KeyPose};
 /// What a key of a scene holds. As text, it is TOML in one line.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Value {
-    /// See [`Kind::Frames`].
+    /// First and last frame.
     Frames(Frames),
-    /// See [`Kind::Flag`].
+    /// `true` or `false`.
     Flag(bool),
-    /// See [`Kind::Text`] and [`Kind::Choice`].
+    /// A text, or one of a few.
     Text(String),
-    /// See [`Kind::Choices`]: in the order of the declaration.
+    /// Some of a few texts, in the order of the key's declaration.
     Choices(Vec<&'static str>),
-    /// See [`Kind::Number`] and [`Kind::Cells`].
+    /// A number, in the key's unit.
     Number(f64),
-    /// See [`Kind::Whole`].
+    /// A whole number.
     Whole(i64),
-    /// See [`Kind::Numbers`].
+    /// As many numbers as the key has.
     Numbers(Vec<f64>),
-    /// An absolute path: see [`Kind::File`].
+    /// The absolute path of a file.
     File(PathBuf),
-    /// See [`Kind::Poses`]; ascending frames.
+    /// Rigid poses, by ascending frames.
     Poses(Vec<KeyPose>),
 }
 
@@ -315,10 +315,10 @@ fn poses(name: &str, object: &Table, far: f64) -> Result<Vec<KeyPose>> {
 
 /// What is taken where a key is left out.
 fn default(key: &Key, table: &Table, cell: Option<f64>) -> Result<Option<Value>> {
-    match key.default {
-        Default::Required => Err(table.error(key.name, "is missing")),
-        Default::Nothing => Ok(None),
-        Default::Cells(cells) => Ok(cell.map(|cell| Value::Number(cells * cell))),
-        Default::Is(text) => with_value(key.name, text, |table| read(key, table, cell)),
+    match key.fallback {
+        Fallback::Required => Err(table.error(key.name, "is missing")),
+        Fallback::Nothing => Ok(None),
+        Fallback::Cells(cells) => Ok(cell.map(|cell| Value::Number(cells * cell))),
+        Fallback::Is(text) => with_value(key.name, text, |table| read(key, table, cell)),
     }
 }

@@ -166,3 +166,33 @@ fn every_command_has_help_with_an_example_that_runs() {
         }
     }
 }
+
+#[test]
+fn the_docs_have_every_key_of_a_scene() {
+    let folder = tempfile::tempdir().unwrap();
+    let keys = works(folder.path(), "frazil new snow --keys");
+    let text = include_str!("../../../docs/scene.md");
+    assert_eq!(
+        text.split("## Keys\n\n").nth(1),
+        Some(&keys[..]),
+        "docs/scene.md is not what `frazil new snow --keys` says"
+    );
+}
+
+#[test]
+fn a_check_lists_every_setting() {
+    let folder = tempfile::tempdir().unwrap();
+    fs::write(folder.path().join("hero.obj"), CUBE).unwrap();
+    let scene = works(folder.path(), "frazil new snow")
+        .replace("hero.glb", "hero.obj")
+        .replace("cell = 0.0075", "cell = 0.1");
+    fs::write(folder.path().join("shot.toml"), scene).unwrap();
+    let report: serde_json::Value =
+        serde_json::from_str(&works(folder.path(), "frazil check shot.toml --json")).unwrap();
+    let settings = &report["settings"];
+    assert_eq!(settings["snow.noise.amplitude"], 0.2);
+    assert_eq!(settings["shot.frames"], "1-120");
+    assert_eq!(settings["object[1].keys"][1]["frame"], 120.0);
+    assert_eq!(settings["output.base"], serde_json::json!(["vdb"]));
+    assert_eq!(settings["object[1].clip"], serde_json::Value::Null);
+}

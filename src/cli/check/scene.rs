@@ -1,40 +1,18 @@
-//! `frazil check`: every input of every frame, before a night on the farm.
+//! What a scene will do: sizes, speeds, memory, disk, and what looks wrong.
 
 use std::fmt::Write;
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
-use frazil::scene::shot::verify::{Verified, verify};
 use frazil::scene::snow::check::{ObjectReport, Report, check};
-use frazil::scene::{Inputs, Override, Scene, check_memory};
+use frazil::scene::{Inputs, Scene, check_memory};
 
-use super::exit::{Failure, Phase};
-use super::session::Session;
-use super::{machine, output};
+use super::{Args, size};
+use crate::cli::exit::{Failure, Phase};
+use crate::cli::session::Session;
+use crate::cli::{machine, output};
 
-/// Read every input of every frame of a scene, and print its sizes, memory and disk; nothing is computed.
-///
-/// Of an output folder: read every file that a run wrote there, and name those that are not what was written.
-#[derive(clap::Args)]
-#[command(after_help = "Examples:\n  frazil check walker.toml -o cache/\n  frazil check cache/")]
-pub struct Args {
-    /// Scene file (TOML), or an output folder.
-    scene: PathBuf,
-    /// Where the output is to go: its free space is printed too.
-    #[arg(short, long, value_name = "DIR")]
-    output: Option<PathBuf>,
-    /// Put a setting over the scene's, for instance snow.noise.seed=2 or object.1.file=hero.glb.
-    #[arg(long, value_name = "KEY=VALUE")]
-    set: Vec<Override>,
-    /// Print JSON.
-    #[arg(long)]
-    json: bool,
-}
-
-/// Runs the command.
+/// Checks the scene.
 pub fn run(args: &Args, session: &Session) -> Result<(), Failure> {
-    if args.scene.is_dir() {
-        return check_folder(args, session);
-    }
     let scene = Scene::read_with(&args.scene, &args.set).before()?;
     let inputs = Inputs::load(&scene).before()?;
     let mut report = check(&session.ctx, &scene, &inputs).before()?;
@@ -55,57 +33,11 @@ pub fn run(args: &Args, session: &Session) -> Result<(), Failure> {
     output::print(&text).during()
 }
 
-/// Compares an output folder with what was written into it.
-fn check_folder(args: &Args, session: &Session) -> Result<(), Failure> {
-    if args.output.is_some() || !args.set.is_empty() {
-        return Err(Failure::refused("-o and --set are of no use with an output folder"));
-    }
-    let verified = verify(&session.ctx, &args.scene).before()?;
-    let text = if args.json {
-        format!("{:#}\n", serde_json::to_value(&verified).expect("plain values become JSON"))
-    } else {
-        verified_in_words(&verified)
-    };
-    output::print(&text).during()?;
-    session.record("frames", verified.frames.into());
-    match &verified.damaged[..] {
-        [] => Ok(()),
-        [first, rest @ ..] => {
-            let more = if rest.is_empty() { String::new() } else { format!(", and {} more", rest.len()) };
-            let path = args.scene.join(&first.file);
-            Err(Failure::failed(format!("{}: {}{more}", path.display(), first.what)))
-        }
-    }
-}
-
-fn verified_in_words(verified: &Verified) -> String {
-    let mut out = format!("{} frames, {} files, {}\n", verified.frames, verified.files, size(verified.bytes));
-    verified.damaged.iter().for_each(|damage| {
-        let _ = writeln!(out, "damaged   {}: {}", damage.file, damage.what);
-    });
-    verified.unknown.iter().for_each(|file| {
-        let _ = writeln!(out, "unknown   {file}: no record names it");
-    });
-    if verified.damaged.is_empty() {
-        out.push_str("all of them are what was written\n");
-    }
-    out
-}
-
 /// Free bytes where a folder is, or is to be.
 fn free_space(folder: &Path) -> Option<u64> {
     let absolute = std::path::absolute(folder).ok()?;
     let there = absolute.ancestors().find(|folder| folder.exists())?;
     machine::free_space(there)
-}
-
-fn size(bytes: u64) -> String {
-    let units = [(1e12, "TB"), (1e9, "GB"), (1e6, "MB"), (1e3, "kB")];
-    let bytes = bytes as f64;
-    match units.iter().find(|(unit, _)| bytes >= *unit) {
-        Some((unit, name)) => format!("{:.1} {name}", bytes / unit),
-        None => format!("{bytes} B"),
-    }
 }
 
 fn in_words(report: &Report, limit: u64, free: Option<u64>) -> String {

@@ -1,0 +1,25 @@
+//! What `frazil preview` draws of .vdb files.
+
+use std::path::Path;
+
+use frazil::render::Model;
+use frazil::vdb::{GridClass, file};
+use frazil::{Context, Error};
+
+/// The level set of a file, or its fog volume.
+pub fn of_file(path: &Path, ctx: &Context) -> frazil::Result<Model> {
+    let grid = file::read_named(path, None)?;
+    if grid.class() == GridClass::LevelSet {
+        return Model::level_set(ctx, &grid);
+    }
+    let (model, density) = Model::fog(ctx, &grid)?;
+    if model.bounds().is_none() {
+        return Err(Error::file(path, format!("grid \"{}\" has no density above 0 to draw", grid.name())));
+    }
+    log::warn!(
+        "{}: grid \"{}\" is not a level set: it is drawn where its values are {density}, half of the greatest",
+        path.display(),
+        grid.name()
+    );
+    Ok(model)
+}
