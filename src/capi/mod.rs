@@ -2,7 +2,7 @@
 //! results are handed out; nothing is computed here.
 //!
 //! One file for each noun. Raw pointers are followed in `views.rs` and `handle.rs` only; every function runs inside
-//! `guard::guard`. The texts of this room are the header's: cbindgen copies them, and `float[3]` is no link.
+//! `guard::guard`. The texts of this room are the header's: cbindgen copies them, and `float[3]` is not a link.
 //!
 //! # Safety
 //! Every function has the same requirements, as stated in the header's preamble: pointers are NULL or point to what

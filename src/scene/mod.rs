@@ -207,7 +207,7 @@ impl Snow {
 }
 
 impl Output {
-    /// Whether the base's own files are what a run can go on from.
+    /// Whether a run can resume from the base's own files.
     pub fn base_restarts(&self) -> bool {
         self.base && !self.half
     }

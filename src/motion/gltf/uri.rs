@@ -2,6 +2,10 @@
 
 use std::path::{Component, Path};
 
+use base64::Engine;
+use base64::alphabet;
+use base64::engine::{DecodePaddingMode, GeneralPurpose, GeneralPurposeConfig};
+
 use crate::error::Result;
 use crate::io::source;
 
@@ -11,7 +15,7 @@ pub(super) type Told<T> = std::result::Result<T, String>;
 /// Reads a buffer. A file must lie in the model's folder or below: a model is data, and names no other file.
 ///
 /// # Errors
-/// Another place, a missing file, something that is no regular file, base64 that is none.
+/// Another place, a missing file, something that is not a regular file, text that is not base64.
 pub(super) fn read(
     buffer: &gltf::Buffer,
     folder: &Path,
@@ -25,7 +29,7 @@ pub(super) fn read(
         gltf::buffer::Source::Uri(uri) => uri,
     };
     let Some(name) = decoded(uri).filter(|name| !name.contains(':') && !name.contains('\0')) else {
-        return Ok(Err("is no name of a file beside the model".into()));
+        return Ok(Err("is not the name of a file beside the model".into()));
     };
     let relative = Path::new(&name);
     let within = relative.components().all(|part| matches!(part, Component::Normal(_) | Component::CurDir));
@@ -39,41 +43,21 @@ pub(super) fn read(
     }
 }
 
-/// The bytes of a buffer whose URI holds them; none when they are no base64.
+/// Base64 (RFC 4648, section 4), with its padding or without.
+const BASE64: GeneralPurpose = GeneralPurpose::new(
+    &alphabet::STANDARD,
+    GeneralPurposeConfig::new().with_decode_padding_mode(DecodePaddingMode::Indifferent),
+);
+
+/// The bytes of a buffer whose URI holds them; none when they are not base64.
 fn written_out(uri: &str) -> Option<Vec<u8>> {
-    let text = uri.split_once(";base64,")?.1;
-    let mut bytes = base64(text.strip_suffix("==").or(text.strip_suffix('=')).unwrap_or(text))?;
+    let mut bytes = BASE64.decode(uri.split_once(";base64,")?.1).ok()?;
     // As long as the chunk of a .glb would be.
     bytes.resize(bytes.len().next_multiple_of(4), 0);
     Some(bytes)
 }
 
-/// Decodes base64 (RFC 4648, section 4) without its padding.
-fn base64(text: &str) -> Option<Vec<u8>> {
-    let mut bytes = Vec::with_capacity(text.len() / 4 * 3 + 2);
-    let (mut held, mut bits) = (0u32, 0);
-    for letter in text.bytes() {
-        let six = match letter {
-            b'A'..=b'Z' => letter - b'A',
-            b'a'..=b'z' => letter - b'a' + 26,
-            b'0'..=b'9' => letter - b'0' + 52,
-            b'+' => 62,
-            b'/' => 63,
-            _ => return None,
-        };
-        held = held << 6 | u32::from(six);
-        bits += 6;
-        if bits >= 8 {
-            bits -= 8;
-            bytes.push((held >> bits) as u8);
-            held &= (1 << bits) - 1;
-        }
-    }
-    // What is left over is less than a letter's worth, of zeros.
-    (bits < 6 && held == 0).then_some(bytes)
-}
-
-/// A URI without its percent signs; none when it is no text.
+/// A URI without its percent signs; none when it is not text.
 fn decoded(uri: &str) -> Option<String> {
     let mut bytes = Vec::with_capacity(uri.len());
     let mut rest = uri.as_bytes();

@@ -80,7 +80,7 @@ impl Cache {
     /// Opens the frames of a stage. Nothing of the folder is changed before [`Cache::commit`].
     ///
     /// # Errors
-    /// A folder that cannot be read or that holds frames of other settings; a record that is damaged; no frame to go on
+    /// A folder that cannot be read or that holds frames of other settings; a record that is damaged; no frame to resume
     /// from; frames that would leave a gap where none may be.
     pub fn open(stage: &dyn Stage, seen: &Arc<Seen>, folder: &Path, asked: Asked<'_>) -> Result<Self> {
         let settings = stage.settings()?;
@@ -152,7 +152,7 @@ impl Cache {
         self.record.segments.last().map_or(i32::MIN, |segment| segment.from)
     }
 
-    /// From what the stage can go on in a shot that begins at frame `first`.
+    /// From what the stage can resume in a shot that begins at frame `first`.
     pub fn kept(&self, first: i32) -> Kept<'_> {
         Kept { first, own_from: self.own_from(), done: &self.stored }
     }
@@ -229,7 +229,7 @@ fn refuse_other_start(
     Err(Error::file(folder, what))
 }
 
-/// Refuses a `from` that cannot go on from the frame before it or that the asked frames have no part in, and frames that
+/// Refuses a `from` that cannot resume after the frame before it, or beyond all frames that are asked for, and frames that
 /// would leave a gap where the stage needs all.
 ///
 /// # Errors

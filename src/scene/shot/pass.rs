@@ -18,10 +18,10 @@ use crate::io::{atomic, sealed};
 
 /// Steps that wait for the writer at most: a step's changes are a few MB.
 const WAITING: usize = 2;
-/// Exact states that are kept of a stage that no other one reads, where its own files are not enough to go on from.
+/// Exact states that are kept of a stage that no other one reads, where its own files are not enough to resume from.
 const STATES_KEPT: i32 = 2;
 
-/// Is told of each frame whose files are written: the stage, the frame, what was reported. From several threads.
+/// Called for each frame whose files are written, with the stage, the frame and its report; from several threads.
 pub type Done<'a> = &'a (dyn Fn(&'static str, i32, &Report) + Sync);
 
 /// What the passes of a run share.
@@ -33,11 +33,11 @@ pub struct Shared<'a> {
     pub first: i32,
     /// Raised when a pass has failed: the others stop after their frame.
     pub stop: &'a AtomicBool,
-    /// Told of each frame.
+    /// Called for each frame.
     pub done: Done<'a>,
 }
 
-/// From what a stage can go on.
+/// From what a stage can resume.
 #[derive(Clone, Copy)]
 pub struct Kept<'a> {
     /// The shot's first frame.
@@ -113,7 +113,7 @@ impl<'a, S: Stepping> At<'a, S> {
         let latest = done.latest_state(first..=frame - 1);
         if own_from > first && latest.is_none_or(|latest| latest < own_from - 1) {
             let what = format!(
-                "the {} after frame {}, from which these settings go on, is gone: choose another -o, or --from {first}",
+                "the {} after frame {}, from which these settings resume, is gone: choose another -o, or --from {first}",
                 stage.noun(),
                 own_from - 1
             );
@@ -245,7 +245,7 @@ impl<S: Stepping> Files<'_, S> {
         Ok(Some(manifest))
     }
 
-    /// Removes the exact states that nothing goes on from any more, and those that a run was killed before it removed. One
+    /// Removes the exact states from which nothing resumes any more, and those that a run was killed before it removed. One
     /// that cannot be removed does no harm.
     fn remove_states_before(&self, frame: i32) {
         let (stage, extension) = (self.stage.name(), self.stage.state_extension());

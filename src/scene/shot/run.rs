@@ -248,11 +248,11 @@ impl<'a> Run<'a> {
         self.stages.iter().map(|run| run.there).sum()
     }
 
-    /// Makes the frames, and tells `done` the stage, the frame and its report when the files of one are written; from
+    /// Makes the frames, and calls `done` with the stage, the frame and its report when the files of one are written; from
     /// several threads where stages do not depend on each other.
     ///
     /// # Errors
-    /// What a step or a file reports; whole frames are left behind, from which another run goes on.
+    /// What a step or a file reports; whole frames are left behind, from which another run resumes.
     pub fn make(mut self, ctx: &Context, done: impl Fn(&'static str, i32, &Report) + Sync) -> Result<()> {
         while let Some(ready) = self.ready() {
             self.make_stages(ctx, &ready, &done)?;

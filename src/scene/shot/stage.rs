@@ -62,7 +62,7 @@ pub trait Stage: Sync {
     /// An input that cannot be read.
     fn settings(&self) -> Result<Settings>;
 
-    /// Those of its settings that make the state before the first frame: a run cannot go on from a state of others.
+    /// Those of its settings that make the state before the first frame: a run cannot resume from a state of others.
     fn of_first_state(&self, settings: &Settings) -> Settings;
 
     /// The stages whose frames it reads, each earlier in the scene's order.
@@ -80,7 +80,7 @@ pub trait Stage: Sync {
         Reads::default()
     }
 
-    /// From what another run can go on after a frame.
+    /// From what another run can resume after a frame.
     fn keeps(&self, frame: i32) -> Keeps;
 
     /// The setting that lets no frame be left out, where one does.
@@ -153,11 +153,11 @@ pub struct To<'a> {
 pub struct Stepped<T> {
     /// What the writing thread needs.
     pub step: T,
-    /// What is told of it.
+    /// What is reported of it.
     pub report: Report,
 }
 
-/// What is told of a frame: `report/base.0012.json`.
+/// What is reported of a frame: `report/base.0012.json`.
 #[derive(Debug, Clone, Default)]
 pub struct Report {
     /// Results by name; units stand in the names.

@@ -2,7 +2,7 @@
 
 use serde_json::json;
 
-use super::inputs::{self, Inputs};
+use super::inputs::Inputs;
 use super::settings;
 use crate::context::{Context, PhaseTime};
 use crate::error::{Error, Result};
@@ -107,7 +107,7 @@ impl Stage for Base<'_> {
         (output.base && output.base_mode == BaseMode::Delta).then_some("base_mode = \"delta\"")
     }
 
-    /// The base of a cache of changes is left out: its files are no whole volumes.
+    /// The base of a cache of changes is left out: its files are not whole volumes.
     fn volumes(&self) -> Vec<Volume> {
         const GRIDS: &[(&str, bool)] = &[("surface", true), ("compression", false), ("touched", false)];
         let base = Volume { kind: "base", grids: GRIDS };
@@ -128,9 +128,7 @@ impl Stepping for Base<'_> {
         let params = Params { noise, tolerance: TOLERANCE };
         let initial = self.inputs.layer(ctx);
         let initial = initial.map_err(|error| match (error, self.inputs.far_static(scene)) {
-            (Error::Argument(_), Some((index, far))) => {
-                Error::file(&scene.path, inputs::too_far(scene, index, far, self.inputs.snow.cell))
-            }
+            (Error::Argument(_), Some(what)) => Error::file(&scene.path, what),
             (other, _) => other,
         })?;
         let mut layer = match after {
@@ -143,7 +141,7 @@ impl Stepping for Base<'_> {
             layer.surface().active_voxels(),
             layer.surface().memory_bytes() as f64 / 1e6,
             layer.volume(),
-            after.map_or("at rest".into(), |frame| format!("goes on after frame {frame}"))
+            after.map_or("at rest".into(), |frame| format!("resumes after frame {frame}"))
         );
         Ok(layer)
     }

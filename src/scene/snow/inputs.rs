@@ -11,7 +11,7 @@ use crate::io::seen::Seen;
 use crate::io::sequence::Pattern;
 use crate::io::{hash, mesh};
 use crate::motion::{Character, Key, Keys, MeshSequence, Motion, Placed, Play, Rigid, is_gltf, missing_uvs};
-use crate::scene::{Ground, Layer, Object, Role, Scene, Snow};
+use crate::scene::{Ground, Layer, Object, Role, Scene, Snow, text};
 use crate::snow::base_layer::initial::{self, Cover};
 use crate::sweep::{self, Body, REACH};
 use crate::vdb::{FloatGrid, GridClass, file};
@@ -72,7 +72,7 @@ impl Inputs {
             match object.role {
                 Role::Static => statics.push(posed(&*motion, start)?),
                 _ => {
-                    let name = format!("object {} ({})", index + 1, crate::scene::text::name(&object.file));
+                    let name = format!("object {} ({})", index + 1, text::name(&object.file));
                     let body = Body::new(motion, start)?.with_noise(object.noise).with_name(name);
                     log::info!(
                         "{}: {} triangles, {} open loops closed",
@@ -153,9 +153,8 @@ impl Inputs {
         Some((low, high))
     }
 
-    /// A static object that lies too far from the snow's ground, by its place among the objects, with how far it reaches
-    /// (m).
-    pub(super) fn far_static(&self, scene: &Scene) -> Option<(usize, f64)> {
+    /// What is wrong with a static object that lies too far from the snow's ground.
+    pub(super) fn far_static(&self, scene: &Scene) -> Option<String> {
         let Source::Made { ground, .. } = &self.source else { return None };
         let middle = match ground {
             initial::Ground::Plane { height, area: [x0, z0, x1, z1] } => {
@@ -167,11 +166,13 @@ impl Inputs {
             }
         };
         let statics = scene.objects.iter().enumerate().filter(|(_, object)| object.role == Role::Static);
-        statics.zip(&self.statics).find_map(|((index, _), mesh)| {
+        statics.zip(&self.statics).find_map(|((index, object), mesh)| {
             let (low, high) = mesh.bounds()?;
             let far = (low.cast::<f64>() - middle).abs().sup(&(high.cast::<f64>() - middle).abs()).max();
             // The layer's own lattice begins at the mean of the ground's vertices, which may lie off its middle.
-            (far > 0.9 * REACH * self.snow.cell).then_some((index, far))
+            let what = format!("object {} ({}), static, reaches", index + 1, text::name(&object.file));
+            let is_far = far > 0.9 * REACH * self.snow.cell;
+            is_far.then(|| sweep::too_far(&what, far, "the middle of the ground", self.snow.cell))
         })
     }
 
@@ -205,15 +206,8 @@ impl Inputs {
     }
 }
 
-/// Says that a static object lies too far away.
-pub(super) fn too_far(scene: &Scene, index: usize, far: f64, cell: f64) -> String {
-    let name = crate::scene::text::name(&scene.objects[index].file);
-    let what = format!("object {} ({name}), static, reaches", index + 1);
-    sweep::too_far(&what, far, "the middle of the ground", cell)
-}
-
 fn read_mesh(path: &Path, seen: &Seen) -> Result<TriMesh> {
-    // Vertices that no face names are no part of the snow.
+    // Vertices that no face names are not part of the snow.
     mesh::parse_polygons(path, &seen.read(path)?).map(|mesh| mesh.into_triangles().without_unused())
 }
 

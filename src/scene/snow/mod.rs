@@ -6,6 +6,10 @@ mod base;
 #[cfg(feature = "vdb")]
 pub mod check;
 #[cfg(feature = "vdb")]
+mod course;
+#[cfg(feature = "vdb")]
+mod disk;
+#[cfg(feature = "vdb")]
 mod inputs;
 mod keys;
 #[cfg(feature = "vdb")]

@@ -19,7 +19,7 @@ pub(super) fn of_base(scene: &Scene, seen: &Seen) -> Result<Settings> {
     Ok(settings)
 }
 
-/// The settings that make the layer before the first frame: what was kept cannot go on as another layer. Static objects
+/// The settings that make the layer before the first frame: what was kept cannot become another layer. Static objects
 /// are counted by themselves: others may come and go.
 pub(super) fn of_layer(all: &Settings) -> Settings {
     let is_first = |key: &str| declared(key).is_some_and(|key| key.scope("base") == Some(Scope::First));

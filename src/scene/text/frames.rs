@@ -39,7 +39,7 @@ impl FromStr for Frames {
     type Err = String;
 
     fn from_str(text: &str) -> Result<Self, String> {
-        let refused = || format!("\"{text}\" is no range of frames such as \"1001-1120\"");
+        let refused = || format!("\"{text}\" is not a range of frames such as \"1001-1120\"");
         let within = |frame: &i32| (-FARTHEST..=FARTHEST).contains(frame);
         let number = |text: &str| text.trim().parse::<i32>().ok().filter(within).ok_or_else(refused);
         // A minus at the start is a sign.
@@ -115,7 +115,7 @@ impl FromStr for FrameChoice {
 
     fn from_str(text: &str) -> Result<Self, String> {
         let refused =
-            || format!("\"{text}\" is no choice of frames such as \"1-100\", \"1-100x2\" or \"1,5,9\"");
+            || format!("\"{text}\" is not a choice of frames such as \"1-100\", \"1-100x2\" or \"1,5,9\"");
         let mut frames = Vec::new();
         for part in text.split(',') {
             let (range, step) = match part.split_once('x') {

@@ -19,7 +19,7 @@ impl std::str::FromStr for Override {
     type Err = String;
 
     fn from_str(text: &str) -> std::result::Result<Self, String> {
-        let wrong = || format!("\"{text}\" is no setting such as snow.noise.seed=2");
+        let wrong = || format!("\"{text}\" is not a setting such as snow.noise.seed=2");
         let (key, value) = text.split_once('=').ok_or_else(wrong)?;
         let key: Vec<String> = key.split('.').map(|part| part.trim().to_string()).collect();
         if key.iter().any(String::is_empty) {
@@ -37,7 +37,7 @@ impl Override {
 
     /// Puts the value into a document; `place` is where messages find it.
     pub(super) fn apply<'i>(&'i self, root: &mut DeTable<'i>, place: usize, path: &Path) -> Result<()> {
-        // What is no TOML is meant as a text: names of files and choices need no quotes.
+        // What is not TOML is taken as a text: names of files and choices need no quotes.
         let value = match DeValue::parse(&self.value) {
             Ok(value) => moved(value.into_inner(), place),
             Err(_) => Spanned::new(place..place, DeValue::String(self.value.as_str().into())),
@@ -66,7 +66,7 @@ impl Override {
                         _ => return Err(refused(format!("`{part}` needs a number from 1 to {count}"))),
                     }
                 }
-                _ => return Err(refused(format!("`{part}` is no table"))),
+                _ => return Err(refused(format!("`{part}` is not a table"))),
             };
         }
         table.insert(Spanned::new(place..place, last.as_str().into()), value);

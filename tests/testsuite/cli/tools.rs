@@ -110,7 +110,7 @@ fn settings_of_the_command_line_are_named_when_they_are_wrong() {
         ("snow.nois.seed=2", ["--set snow.nois.seed=2", "did you mean `noise`"]),
         ("snow.cell=-1", ["--set snow.cell=-1", "must lie in"]),
         ("object.2.scale=1", ["`object`", "1 to 1"]),
-        ("shot.frames.first=1", ["`frames` is no table", "--set"]),
+        ("shot.frames.first=1", ["`frames` is not a table", "--set"]),
         ("snow.depth=", ["--set snow.depth=", "not a text"]),
         ("snow.depth", ["\"snow.depth\"", "snow.noise.seed=2"]),
         ("object.1.keys=[{frame=3},{frame=2}]", ["--set object.1.keys", "greater"]),

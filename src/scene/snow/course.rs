@@ -1,0 +1,303 @@
+//! Where an object goes over a shot, and what of that looks wrong.
+
+use rayon::prelude::*;
+
+use super::Inputs;
+use super::check::{Deepest, ObjectReport};
+use super::relief::Relief;
+use super::walks::walk;
+use crate::base::{DVec3, faults};
+use crate::context::Context;
+use crate::error::{Error, Result};
+use crate::motion::{Motion, Poses, span};
+use crate::scene::{Object, Role, Scene};
+use crate::snow::base_layer::Reach;
+use crate::sweep::{Body, REACH};
+
+/// Frames that one task poses, one after another.
+const RUN: usize = 12;
+/// How far a body turns between two looks at its way (radians), and most looks between two of its kinks.
+const TURN: f64 = std::f64::consts::PI / 6.0;
+const MOST_PARTS: f64 = 1000.0;
+/// A character taller than this (m), or smaller, is likely in another unit.
+const TALL: f64 = 20.0;
+const SMALL: f64 = 0.02;
+
+/// The way of an object that moves.
+pub struct Course<'a> {
+    scene: &'a Scene,
+    inputs: &'a Inputs,
+    /// As messages call it.
+    name: String,
+    object: &'a Object,
+    body: &'a Body,
+    /// One for each frame.
+    extents: Vec<Extent>,
+}
+
+/// An object's extent at one frame.
+#[derive(Clone, Copy)]
+struct Extent {
+    frame: i32,
+    low: DVec3,
+    high: DVec3,
+    /// Its lowest vertex.
+    lowest: DVec3,
+    /// Longest way of a vertex since the frame before (m).
+    moved: f64,
+}
+
+impl<'a> Course<'a> {
+    /// Those of all objects that move through the snow: each is posed at every frame.
+    ///
+    /// # Errors
+    /// A frame that cannot be read or fits no other; cancel.
+    pub fn all(ctx: &Context, scene: &'a Scene, inputs: &'a Inputs) -> Result<Vec<Self>> {
+        let colliders = scene.objects.iter().enumerate().filter(|(_, object)| object.role == Role::Collide);
+        let of = |((index, object), body): ((usize, &'a Object), &'a Body)| {
+            let name = format!("object {} ({})", index + 1, crate::scene::text::name(&object.file));
+            let extents = ctx.phase("inputs", || extents(ctx, scene, body))?;
+            Ok(Self { scene, inputs, name, object, body, extents })
+        };
+        colliders.zip(&inputs.bodies).map(of).collect()
+    }
+
+    /// What the object does.
+    ///
+    /// # Errors
+    /// A pose that cannot be read.
+    pub fn report(&self, relief: Option<&Relief>) -> Result<ObjectReport> {
+        let first = self.extents[0];
+        let (low, high) = self.bounds();
+        let faster = |best: Extent, extent: &Extent| if extent.moved > best.moved { *extent } else { best };
+        let fastest = self.extents.iter().fold(first, faster);
+        Ok(ObjectReport {
+            file: self.object.file.display().to_string(),
+            role: "collide",
+            triangles: self.body.motion().triangles().len(),
+            closed_loops: self.body.closed_loops(),
+            holes: self.holes()?,
+            contradictions: self.body.contradictions(),
+            size_m: (first.high - first.low).into(),
+            bounds_m: [low.into(), high.into()],
+            fastest_m_per_s: fastest.moved * self.scene.shot.fps,
+            fastest_frame: fastest.frame,
+            touches: self.touches(),
+            deepest: relief.and_then(|relief| self.deepest(relief)),
+            walk: walk(self.scene, self.object, self.body.motion())?,
+        })
+    }
+
+    /// What looks wrong, one sentence each.
+    ///
+    /// # Errors
+    /// Cancel.
+    pub fn warnings(&self, ctx: &Context, report: &ObjectReport) -> Result<Vec<String>> {
+        let all = [
+            self.out_of_reach(ctx)?,
+            self.too_fast(),
+            self.other_unit(),
+            self.untouched(report),
+            self.inside_out(),
+            self.below_ground(report),
+            self.slipping(report),
+        ];
+        Ok(all.into_iter().flatten().collect())
+    }
+
+    /// Least and greatest corner over the shot (m).
+    fn bounds(&self) -> (DVec3, DVec3) {
+        let first = self.extents[0];
+        self.extents.iter().fold((first.low, first.high), |(l, h), e| (l.inf(&e.low), h.sup(&e.high)))
+    }
+
+    /// First and last frame at which its bounds touch the snow's, where those are known; else of the shot.
+    fn touches(&self) -> Option<[i32; 2]> {
+        let snow = self.inputs.area().zip(self.inputs.top());
+        let touching = |extent: &&Extent| match snow {
+            Some(([x0, z0, x1, z1], top)) => {
+                let beside =
+                    extent.high.x < x0 || extent.low.x > x1 || extent.high.z < z0 || extent.low.z > z1;
+                !beside && extent.low.y < top
+            }
+            None => true,
+        };
+        let (first, last) =
+            self.extents.iter().find(touching).zip(self.extents.iter().rev().find(touching))?;
+        Some([first.frame, last.frame])
+    }
+
+    /// Holes at the first frame.
+    fn holes(&self) -> Result<usize> {
+        let mut pose = Vec::new();
+        let shot = self.scene.shot;
+        self.body.motion().pose(f64::from(shot.frames.first) / shot.fps, &mut pose)?;
+        Ok(faults::holes(&pose, self.body.motion().triangles()))
+    }
+
+    /// The lowest place against the ground, of the lowest vertices of all frames.
+    fn deepest(&self, relief: &Relief) -> Option<Deepest> {
+        let of = |extent: &Extent| {
+            let (ground, top) = relief.at(extent.lowest.x, extent.lowest.z)?;
+            let y = extent.lowest.y;
+            Some(Deepest { frame: extent.frame, y_m: y, above_ground_m: y - ground, below_top_m: top - y })
+        };
+        self.extents.iter().filter_map(of).min_by(|a, b| a.above_ground_m.total_cmp(&b.above_ground_m))
+    }
+
+    /// The first frame that a run could not make because a body that touches the snow reaches too far from it.
+    fn out_of_reach(&self, ctx: &Context) -> Result<Option<String>> {
+        let Self { scene, inputs, body, extents, .. } = self;
+        let Some((low, high)) = inputs.bounds() else { return Ok(None) };
+        let (middle, cell) = (0.5 * (low + high), inputs.snow.cell);
+        // The snow's own middle, known when it is made, may be another.
+        let near = (0.5 * REACH * cell).min(REACH * cell - (high - low).norm());
+        let is_far = |extent: &Extent| {
+            let far = (extent.low - middle).abs().sup(&(extent.high - middle).abs()).max();
+            far + extent.moved > near
+        };
+        let reach = Reach::of_snow(cell, low, high)?;
+        let time = |frame: i32| f64::from(frame) / scene.shot.fps;
+        for frame in extents.iter().filter(|extent| is_far(extent)).map(|extent| extent.frame) {
+            let before = (frame - 1).max(scene.shot.frames.first);
+            match reach.spans(ctx, body, time(before), time(frame)) {
+                Ok(_) => {}
+                Err(Error::Argument(what)) => {
+                    return Ok(Some(format!("frame {frame} cannot be made: {what}")));
+                }
+                Err(other) => return Err(other),
+            }
+        }
+        Ok(None)
+    }
+
+    /// The first frame whose step turns a body too far to be made.
+    fn too_fast(&self) -> Option<String> {
+        let Self { scene, body, .. } = self;
+        let time = |frame: i32| f64::from(frame) / scene.shot.fps;
+        scene.shot.frames.iter().skip(1).find_map(|frame| {
+            let error = body.turning(time(frame - 1), time(frame)).err()?;
+            Some(format!("frame {frame} cannot be made: {error}"))
+        })
+    }
+
+    /// A size that another unit explains.
+    fn other_unit(&self) -> Option<String> {
+        let tallest = (self.extents[0].high - self.extents[0].low).max();
+        let scale = self.object.space.scale * likely_scale(tallest)?;
+        Some(format!("{} is {tallest:.3} m large: scale = {scale}?", self.name))
+    }
+
+    /// Where it stays that the snow is not.
+    fn untouched(&self, report: &ObjectReport) -> Option<String> {
+        let (area, top) = self.inputs.area().zip(self.inputs.top()).filter(|_| report.touches.is_none())?;
+        let (low, _) = self.bounds();
+        let what = if low.y >= top {
+            format!("it stays {:.3} m above it", low.y - top)
+        } else {
+            format!("it stays beside the area {area:?}")
+        };
+        Some(format!("{} never touches the snow: {what}", self.name))
+    }
+
+    /// Triangles that do not agree about inside and outside.
+    fn inside_out(&self) -> Option<String> {
+        let edges = self.body.contradictions();
+        (edges > 0).then(|| {
+            format!(
+                "{}: its triangles disagree about inside and outside at {edges} edges; holes are closed by cones, look at \
+                 its prints",
+                self.name
+            )
+        })
+    }
+
+    /// Its lowest place, where it is below the ground.
+    fn below_ground(&self, report: &ObjectReport) -> Option<String> {
+        let deep = report.deepest.filter(|deep| deep.above_ground_m < -0.5 * self.inputs.snow.cell)?;
+        Some(format!(
+            "{} goes {:.3} m below the ground at frame {}: raise it by its keys, or its prints go through the snow",
+            self.name, -deep.above_ground_m, deep.frame
+        ))
+    }
+
+    /// Feet that slip.
+    fn slipping(&self, report: &ObjectReport) -> Option<String> {
+        let walk = report.walk.as_ref().filter(|walk| walk.slips)?;
+        Some(format!(
+            "{}: its feet slip at {:.2} m/s while they stand; its clip walks at {:.2} m/s: {}",
+            self.name,
+            walk.slips_m_per_s,
+            DVec3::from(walk.carry_m_per_s).norm(),
+            walk.keys
+        ))
+    }
+}
+
+/// Poses a body at every frame.
+fn extents(ctx: &Context, scene: &Scene, body: &Body) -> Result<Vec<Extent>> {
+    let frames: Vec<i32> = scene.shot.frames.iter().collect();
+    let of_run = |run: &[i32]| -> Result<Vec<Extent>> {
+        let at = |frame: i32| f64::from(frame) / scene.shot.fps;
+        // Its first frame is compared with the one before it, if the shot has that.
+        let mut time = at((run[0] - 1).max(scene.shot.frames.first));
+        let mut poses = Poses::start(body.motion(), time)?;
+        let mut ways = vec![0.0; body.motion().vertex_count()];
+        let mut out = Vec::with_capacity(run.len());
+        for &frame in run {
+            ways.fill(0.0);
+            for moment in moments(body.motion(), time, at(frame)) {
+                ctx.check()?;
+                let (before, pose) = poses.go_to(moment)?;
+                let pairs = ways.iter_mut().zip(pose.iter().zip(before));
+                pairs.for_each(|(way, (p, q))| *way += (p - q).norm());
+            }
+            time = at(frame);
+            let (low, high) = span(poses.now());
+            let lower = |a: DVec3, b: &DVec3| if b.y < a.y { *b } else { a };
+            let lowest = poses.now().iter().fold(DVec3::repeat(f64::INFINITY), lower);
+            let moved = ways.iter().copied().fold(0.0, f64::max);
+            out.push(Extent { frame, low, high, lowest, moved });
+        }
+        Ok(out)
+    };
+    let runs: Vec<Vec<Extent>> = frames.par_chunks(RUN).map(of_run).collect::<Result<_>>()?;
+    Ok(runs.concat())
+}
+
+/// Times up to `to` (s) at which a motion is looked at after `from`: its kinks, and between them as many as its turns need.
+fn moments(motion: &dyn Motion, from: f64, to: f64) -> Vec<f64> {
+    let mut out = Vec::new();
+    let mut begin = from;
+    for end in motion.breaks(from, to).into_iter().chain([to]) {
+        let parts = (motion.turning(begin, end) / TURN).ceil().clamp(1.0, MOST_PARTS);
+        out.extend((1..parts as usize).map(|part| begin + (end - begin) * part as f64 / parts));
+        out.push(end);
+        begin = end;
+    }
+    out
+}
+
+/// The factor that a size (m) asks for when the file is likely in centimetres, millimetres, or in a unit too large.
+fn likely_scale(size: f64) -> Option<f64> {
+    let plausible = |factor: f64| (0.3..=5.0).contains(&(size * factor));
+    match size {
+        size if size > TALL => [0.01, 0.001].into_iter().find(|factor| plausible(*factor)),
+        size if size < SMALL => [100.0, 1000.0].into_iter().find(|factor| plausible(*factor)),
+        _ => None,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn sizes_in_other_units_are_recognised() {
+        assert_eq!(likely_scale(172.0), Some(0.01));
+        assert_eq!(likely_scale(1720.0), Some(0.001));
+        assert_eq!(likely_scale(1.72), None);
+        assert_eq!(likely_scale(0.0172), Some(100.0));
+        assert_eq!(likely_scale(1e6), None);
+    }
+}

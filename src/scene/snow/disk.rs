@@ -1,0 +1,48 @@
+//! How much space a shot's files will need.
+
+use super::Inputs;
+use crate::scene::{BaseMode, Scene};
+
+/// Bytes of a whole base file for each column of cells, and of what a frame changes and removes besides.
+const BYTES_PER_COLUMN: f64 = 20.0;
+const BYTES_PER_CHANGE: f64 = 4e5;
+/// Bytes of a whole base file for each leaf: two surfaces cross 3.2 leaves of 64 columns.
+const BYTES_PER_LEAF: f64 = BYTES_PER_COLUMN * 64.0 / 3.2;
+/// Bytes for each vertex of an object in a .usda and a .ply file.
+const USDA_PER_VERTEX: f64 = 110.0;
+const PLY_PER_VERTEX: f64 = 50.0;
+/// Bytes for texture coordinates, and for a corner's index into them.
+const USDA_PER_PLACE: f64 = 20.0;
+const USDA_PER_INDEX: f64 = 7.0;
+const PLY_PER_PLACE: f64 = 8.0;
+/// Estimates the space of all files (bytes).
+pub fn estimate(scene: &Scene, inputs: &Inputs) -> u64 {
+    let (output, frames) = (scene.output, scene.shot.frames.count() as f64);
+    let whole = whole_base(inputs) * if output.half { 0.6 } else { 1.0 };
+    let base = match (output.base, output.base_mode) {
+        (false, _) => 0.0,
+        (true, BaseMode::Full) => whole * frames,
+        (true, BaseMode::Delta) => whole,
+    };
+    let objects = inputs.bodies.iter().map(|body| {
+        let drawn = body.motion().drawn();
+        let vertices = drawn.vertices as f64;
+        let (places, corners) = drawn.uvs.map_or((0.0, 0.0), |uvs| {
+            (uvs.places.len() as f64, uvs.corners.as_ref().map_or(0.0, |corners| corners.len() as f64))
+        });
+        let usda = vertices * USDA_PER_VERTEX + places * USDA_PER_PLACE + corners * USDA_PER_INDEX;
+        let ply = vertices * PLY_PER_VERTEX + places.max(corners) * PLY_PER_PLACE;
+        f64::from(output.objects_usd) * usda + f64::from(output.objects_ply) * ply
+    });
+    let objects = objects.sum::<f64>() * frames;
+    (base + objects + frames * BYTES_PER_CHANGE) as u64
+}
+
+/// Bytes of a whole base file: by its columns, or by the leaves of a layer that is given.
+fn whole_base(inputs: &Inputs) -> f64 {
+    match (inputs.given(), inputs.area()) {
+        (Some(grid), _) => grid.leaf_count() as f64 * BYTES_PER_LEAF,
+        (None, Some([x0, z0, x1, z1])) => (x1 - x0) * (z1 - z0) / inputs.snow.cell.powi(2) * BYTES_PER_COLUMN,
+        (None, None) => 0.0,
+    }
+}
