@@ -20,6 +20,8 @@ mod far;
 mod flip;
 #[path = "gates/harness.rs"]
 mod harness;
+#[path = "gates/house.rs"]
+mod house;
 #[path = "gates/oracle.rs"]
 mod oracle;
 #[path = "gates/poses.rs"]
@@ -63,5 +65,6 @@ fn main() {
     band::run(&mut h);
     spin::run(&mut h);
     damage::run(&mut h);
+    house::run(&mut h);
     h.finish();
 }

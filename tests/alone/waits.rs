@@ -8,7 +8,7 @@ use std::sync::Arc;
 use std::sync::atomic::Ordering;
 use std::time::{Duration, Instant};
 
-use crate::program::{CUBE, command, complains, works};
+use crate::program::{CUBE, answer_to_sigterm, command, complains, works};
 use crate::turn;
 use frazil::base::{TriMesh, Vec3};
 use frazil::vdb::guard::Guard;
@@ -25,15 +25,7 @@ fn terminate(folder: &Path, arguments: &str, after: Duration) -> Option<(Option<
     if child.try_wait().unwrap().is_some() {
         return None;
     }
-    let sent = Instant::now();
-    assert!(Command::new("kill").arg(child.id().to_string()).status().unwrap().success());
-    while child.try_wait().unwrap().is_none() && sent.elapsed() < Duration::from_secs(20) {
-        std::thread::sleep(Duration::from_millis(5));
-    }
-    let took = sent.elapsed();
-    // One that does not hear must not hold up the tests.
-    let _ = child.kill();
-    Some((child.wait().unwrap().code(), took))
+    Some(answer_to_sigterm(child))
 }
 
 /// Sends SIGTERM at ever later times, until the program has ended by itself or a while has passed; how often it was sent.

@@ -1,7 +1,8 @@
 //! The program as a user runs it.
 
 use std::path::Path;
-use std::process::{Command, Output};
+use std::process::{Child, Command, Output};
+use std::time::{Duration, Instant};
 
 /// A cube of 0.4 m that stands on the ground, as an .obj file.
 pub const CUBE: &str = "v -.2 0 -.2\nv .2 0 -.2\nv .2 .4 -.2\nv -.2 .4 -.2\nv -.2 0 .2\nv .2 0 .2\nv .2 .4 .2\nv -.2 .4 .2\n\
@@ -45,4 +46,17 @@ pub fn complains(output: &Output, code: i32, words: &[&str]) {
 #[track_caller]
 pub fn fails(folder: &Path, arguments: &str, code: i32, words: &[&str]) {
     complains(&frazil(folder, arguments), code, words);
+}
+
+/// Sends SIGTERM to a program that runs, and gives its exit code with the time that it took to answer.
+pub fn answer_to_sigterm(mut child: Child) -> (Option<i32>, Duration) {
+    let sent = Instant::now();
+    assert!(Command::new("kill").arg(child.id().to_string()).status().unwrap().success());
+    while child.try_wait().unwrap().is_none() && sent.elapsed() < Duration::from_secs(20) {
+        std::thread::sleep(Duration::from_millis(5));
+    }
+    let took = sent.elapsed();
+    // One that does not hear must not hold up the tests.
+    let _ = child.kill();
+    (child.wait().unwrap().code(), took)
 }

@@ -6,7 +6,7 @@ use std::path::Path;
 use std::process::{Command, Stdio};
 use std::time::{Duration, Instant};
 
-use crate::program::{CUBE, command, fails, works};
+use crate::program::{CUBE, answer_to_sigterm, command, fails, works};
 use tempfile::TempDir;
 
 fn folder() -> TempDir {
@@ -135,15 +135,7 @@ fn terminate(folder: &Path, arguments: &str, ready: impl Fn() -> bool) -> (Optio
         assert!(child.try_wait().unwrap().is_none(), "{arguments} ended by itself");
         std::thread::sleep(Duration::from_millis(5));
     }
-    let sent = Instant::now();
-    assert!(Command::new("kill").arg(child.id().to_string()).status().unwrap().success());
-    while child.try_wait().unwrap().is_none() && sent.elapsed() < Duration::from_secs(20) {
-        std::thread::sleep(Duration::from_millis(5));
-    }
-    let took = sent.elapsed();
-    // One that does not hear must not hold up the tests.
-    let _ = child.kill();
-    (child.wait().unwrap().code(), took)
+    answer_to_sigterm(child)
 }
 
 /// The most that an answer may take (a second is promised; the machine may be busy).
