@@ -8,7 +8,7 @@ use std::process::Command;
 /// anew, which takes longer than most of our own. Two groups of about the same time, for two cores; what a group's sources
 /// call their own (`namespace {`) needs different names.
 const SOURCES: [&[&str]; 2] =
-    [&["grid.cc", "file.cc", "parts.cc", "csg.cc", "filters.cc", "particles.cc"], &["meshing.cc"]];
+    [&["grid.cc", "parts.cc", "csg.cc", "filters.cc", "particles.cc"], &["meshing.cc"]];
 
 /// Take the functions of OpenVDB's trees from its library.
 const TREES: &str = "FRAZIL_TREES_OF_LIBRARY";
@@ -42,6 +42,7 @@ fn main() {
     for source in SOURCES.concat() {
         println!("cargo:rerun-if-changed=cpp/{source}");
     }
+    println!("cargo:rerun-if-changed=cpp/{WRITER}");
     println!("cargo:rerun-if-changed=cpp/bridge.h");
     println!("cargo:rerun-if-changed=cpp/impl.h");
     println!("cargo:rerun-if-changed=src/vdb/bridge.rs");
@@ -57,33 +58,24 @@ fn main() {
     if !compiled {
         compile(&roots, &out, None);
     }
+    compile_writer(&roots, &out);
     println!("cargo:rustc-link-lib=openvdb");
     println!("cargo:rustc-link-lib=tbb");
 }
 
+/// Reads and writes files.
+const WRITER: &str = "file.cc";
 /// Name of what is linked into the crate.
 const ARCHIVE: &str = "frazil_openvdb";
 
 /// Compiles the sources, with a macro defined.
 fn compile(roots: &[PathBuf], out: &Path, defined: Option<&str>) {
     let mut build = cxx_build::bridge("src/vdb/bridge.rs");
-    build
-        .std("c++17")
-        // Half the time of 3, and no slower: what takes long is in OpenVDB's library.
-        .opt_level(1)
-        .debug(false)
-        .define("NDEBUG", None)
-        .define("IMATH_HALF_NO_LOOKUP_TABLE", None)
-        // The same bits on every machine: the compiler may not fuse multiply and add.
-        .flag("-ffp-contract=off")
-        .include("cpp")
-        .warnings(true);
+    // Half the time of 3, and no slower: what takes long is in OpenVDB's library.
+    configure(&mut build, roots).opt_level(1);
     defined.iter().for_each(|name| {
         build.define(name, None);
     });
-    for root in roots {
-        build.flag("-isystem").flag(root.join("include").display().to_string());
-    }
     for group in SOURCES {
         let joined = out.join(format!("with_{}", group[0]));
         let text: String = group.iter().map(|source| format!("#include \"{source}\"\n")).collect();
@@ -91,6 +83,31 @@ fn compile(roots: &[PathBuf], out: &Path, defined: Option<&str>) {
         build.file(joined);
     }
     build.compile(ARCHIVE);
+}
+
+/// Compiles the source that reads and writes files, with trees of its own: those of the library write a tenth slower.
+fn compile_writer(roots: &[PathBuf], out: &Path) {
+    let mut build = cc::Build::new();
+    configure(build.cpp(true), roots).opt_level(3);
+    build.include(out.join("cxxbridge/include")).include(out.join("cxxbridge/crate"));
+    build.file(Path::new("cpp").join(WRITER)).compile("frazil_openvdb_files");
+}
+
+/// What all sources are compiled with.
+fn configure<'b>(build: &'b mut cc::Build, roots: &[PathBuf]) -> &'b mut cc::Build {
+    build
+        .std("c++17")
+        .debug(false)
+        .define("NDEBUG", None)
+        .define("IMATH_HALF_NO_LOOKUP_TABLE", None)
+        // The same bits on every machine: the compiler may not fuse multiply and add.
+        .flag("-ffp-contract=off")
+        .include("cpp")
+        .warnings(true);
+    for root in roots {
+        build.flag("-isystem").flag(root.join("include").display().to_string());
+    }
+    build
 }
 
 /// OpenVDB's shared library, as the linker will find it.

@@ -28,7 +28,7 @@ pub struct Args {
     /// Folder for the output; made if it is not there.
     #[arg(short, long, value_name = "DIR")]
     output: PathBuf,
-    /// Make these stages of the scene only, of base and objects; all without it.
+    /// Make these stages of the scene only (base, objects); all without it.
     #[arg(long, value_name = "A,B", value_delimiter = ',')]
     stage: Vec<String>,
     /// Write these frames only; frames before them are computed when no file has them.

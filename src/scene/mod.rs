@@ -3,7 +3,7 @@
 //!
 //! [`shot`] runs any stage; [`snow`] has the inputs, the check and the stage of the base layer; the stage `objects` writes
 //! the objects as they move. A new stage is a type with the traits [`shot::Stage`] and [`shot::Stepping`] beside its
-//! system, named in the system's plan ([`snow::plan`]), with the scopes of the keys that it depends on in `text/keys.rs`.
+//! system, named in the system's plan ([`snow::plan`]) and in the scopes of the keys that it depends on.
 
 mod moving;
 mod objects;

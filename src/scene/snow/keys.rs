@@ -1,8 +1,8 @@
-//! The keys of `[snow]`, and the layer that they describe.
+//! The keys of `[snow]` and those that it has of each object, and the layer that they describe.
 
 use crate::error::Result;
 use crate::io::mesh::{EXTENSIONS, extension};
-use crate::scene::text::key::{Key, Kind, Scope};
+use crate::scene::text::key::{Key, Kind, OBJECT, Scope};
 use crate::scene::text::{FAR, Table, Value, Values};
 use crate::scene::{Ground, Layer, Snow};
 use crate::snow::NoiseParams;
@@ -67,6 +67,7 @@ pub const KEYS: &[Key] = &[
     Key::new("snow.noise", "seed", Kind::Whole(0, i32::MAX as i64), "another one gives another pattern")
         .or("0")
         .concerns(STEP),
+    Key::new(OBJECT, "noise", Kind::Flag, "ragged edges of its prints").or("true").concerns(STEP),
 ];
 
 impl Snow {

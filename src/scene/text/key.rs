@@ -5,7 +5,7 @@
 pub enum Scope {
     /// The state before the first frame, and all that follows.
     First,
-    /// Every step.
+    /// Every step; of an object, where it moves.
     Step,
     /// What is written of a frame.
     Output,

@@ -64,7 +64,6 @@ const OBJECTS: &[Key] = &[
     )
     .or("\"collide\"")
     .concerns(MOVES),
-    Key::new(OBJECT, "noise", Kind::Flag, "ragged edges of its prints").or("true").concerns(&[("base", Step)]),
     Key::new(OBJECT, "ease", Kind::Flag, "true: keys are joined smoothly, from rest to rest; else straight").or("false").concerns(MOVES),
     Key::new(OBJECT, "keys", Kind::Poses(FAR), "rigid motion over the file's own: m, degrees about x, then y, then z")
         .or("[]")
@@ -115,9 +114,19 @@ const OUTPUT: &[Key] = &[
     Key::new("output", "usd", Kind::Flag, "shot.usda: the whole shot for programs that read USD").or("true"),
 ];
 
-/// All keys, in the order in which a scene has them.
+/// All keys, in the order in which a scene has them: the systems' between the shot and the objects, and those that a system
+/// has of each object behind the shared ones.
 pub fn all() -> &'static [Key] {
-    static ALL: LazyLock<Vec<Key>> = LazyLock::new(|| [SHOT, snow::KEYS, OBJECTS, OUTPUT].concat());
+    static ALL: LazyLock<Vec<Key>> = LazyLock::new(|| {
+        let mut keys = [SHOT, OBJECTS, OUTPUT, snow::KEYS].concat();
+        keys.sort_by_key(|key| match key.table {
+            "shot" => 0,
+            OBJECT => 2,
+            "output" => 3,
+            _ => 1,
+        });
+        keys
+    });
     &ALL
 }
 

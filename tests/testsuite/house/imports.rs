@@ -134,3 +134,18 @@ fn sines_powers_and_logarithms_are_those_of_libm() {
         }
     }
 }
+
+#[test]
+fn every_file_of_tests_is_run() {
+    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/testsuite");
+    let main = fs::read_to_string(folder.join("main.rs")).unwrap();
+    let mut files = Vec::new();
+    sources(&folder, &mut files);
+    for file in files.iter().filter(|file| file.parent() != Some(&folder)) {
+        let [room, name] =
+            [file.parent().unwrap(), file].map(|path| path.file_stem().unwrap().to_str().unwrap());
+        let of_room =
+            main.split(&format!("\nmod {room} {{\n")).nth(1).unwrap_or("").split("\n}").next().unwrap();
+        assert!(of_room.contains(&format!("mod {name};")), "{room}/{name}.rs has no line in main.rs");
+    }
+}
