@@ -68,8 +68,8 @@ fn walk(cores: usize) {
         let scene = Scene::read(&walk_scene(folder.path(), &man, 240, 0.0075, "")).expect("a scene");
         let inputs = Inputs::load(&scene).expect("inputs");
         let layer = inputs.layer(&ctx).expect("a layer");
-        let mut base = BaseLayer::new(&ctx, layer, Params::for_cell(scene.snow.as_ref().expect("snow").cell))
-            .expect("a layer");
+        let mut base =
+            BaseLayer::new(&ctx, layer, Params::for_cell(scene.snow().expect("snow").cell)).expect("a layer");
         let at = |frame: i32| f64::from(frame) / 24.0;
         let step =
             |frame: i32| timed(|| drop(base.step(&ctx, &inputs.bodies, at(frame - 1), at(frame), frame))).0;

@@ -74,7 +74,7 @@
 //! let inputs = Inputs::load(&scene)?;
 //! let plan = snow::plan(&scene, &inputs);
 //! let ctx = Context::new(Pool::all_cores()?);
-//! let run = Run::prepare(&ctx, &plan, &folder.join("cache"), &[], &scene.shot.frames.into(), None)?;
+//! let run = Run::prepare(&ctx, &plan, &folder.join("cache"), &[], &scene.shot().frames.into(), None)?;
 //! run.make(&ctx, |stage, frame, report| log::info!("{stage} {frame}: {:?}", report.results))?;
 //! assert!(folder.join("cache/base/base.0003.vdb").exists());
 //! # Ok(())

@@ -51,7 +51,7 @@ pub fn run(args: Args, session: &Session) -> Result<(), Failure> {
     if let Some(factor) = args.preview {
         scene.coarsen(factor.into()).before()?;
     }
-    let shot_frames = scene.shot.frames;
+    let shot_frames = scene.shot().frames;
     let frames = args.frames.unwrap_or_else(|| shot_frames.into());
     if frames.first() < shot_frames.first || frames.last() > shot_frames.last {
         return Err(Failure::refused(format!(

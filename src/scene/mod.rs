@@ -20,23 +20,19 @@ use crate::error::{Error, Result};
 use crate::io::sequence::Pattern;
 use crate::motion::Space;
 use crate::snow::NoiseParams;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
-/// A scene with every default filled in and every path absolute.
+/// A scene with every default filled in and every path absolute. Nothing of it changes but as its text does: what a stage
+/// reads and the settings by which its frames are known again are always the same.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Scene {
-    /// The file it came from.
-    pub path: PathBuf,
-    /// Which frames, how fast.
-    pub shot: Shot,
-    /// The layer of snow, where it has one.
-    pub snow: Option<Snow>,
-    /// The objects, in the file's order.
-    pub objects: Vec<Object>,
-    /// What is written.
-    pub output: Output,
-    /// The value of every key, from which the fields above are made.
-    pub values: Values,
+    pub(crate) path: PathBuf,
+    pub(crate) shot: Shot,
+    pub(crate) snow: Option<Snow>,
+    pub(crate) objects: Vec<Object>,
+    pub(crate) output: Output,
+    /// The value of every key, from which the others are made.
+    pub(crate) values: Values,
 }
 
 /// Which frames are made, how fast.
@@ -164,6 +160,31 @@ pub enum BaseMode {
 }
 
 impl Scene {
+    /// The file it came from.
+    pub fn path(&self) -> &Path {
+        &self.path
+    }
+
+    /// Which frames, how fast.
+    pub fn shot(&self) -> Shot {
+        self.shot
+    }
+
+    /// The objects, in the file's order.
+    pub fn objects(&self) -> &[Object] {
+        &self.objects
+    }
+
+    /// What is written.
+    pub fn output(&self) -> Output {
+        self.output
+    }
+
+    /// The value of every key.
+    pub fn values(&self) -> &Values {
+        &self.values
+    }
+
     /// Its layer of snow.
     ///
     /// # Errors

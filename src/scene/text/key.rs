@@ -138,11 +138,6 @@ impl Key {
         Self { scopes, ..self }
     }
 
-    /// Its table as a scene writes it: `[snow]`, `[[object]]`.
-    pub fn heading(&self) -> String {
-        heading(self.table)
-    }
-
     /// What of a stage depends on it.
     pub fn scope(&self, stage: &str) -> Option<Scope> {
         self.scopes.iter().find(|(name, _)| *name == stage).map(|(_, scope)| *scope)

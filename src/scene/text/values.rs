@@ -54,12 +54,12 @@ pub fn path(key: &Key, object: Option<usize>) -> String {
 
 impl Values {
     /// None yet, of these keys.
-    pub fn new(keys: &'static [Key]) -> Self {
+    pub(super) fn new(keys: &'static [Key]) -> Self {
         Self { keys, values: BTreeMap::new() }
     }
 
     /// The keys that it may have.
-    pub fn keys(&self) -> &'static [Key] {
+    pub(super) fn keys(&self) -> &'static [Key] {
         self.keys
     }
 
@@ -67,7 +67,7 @@ impl Values {
     ///
     /// # Errors
     /// A key that is missing, a wrong type or a value outside its range, with file and line.
-    pub fn read(&mut self, name: &str, object: Option<usize>, table: &Table) -> Result<()> {
+    pub(super) fn read(&mut self, name: &str, object: Option<usize>, table: &Table) -> Result<()> {
         for (place, key) in self.keys.iter().enumerate().filter(|(_, key)| key.table == name) {
             let allowed = !key.of_characters || self.path_of(object, name, "file").is_some_and(is_gltf);
             if !allowed && table.has(key.name) {
@@ -87,7 +87,7 @@ impl Values {
     }
 
     /// Every value with its key and, of an object, its index: in the order of the keys, object by object.
-    pub fn iter(&self) -> impl Iterator<Item = (&'static Key, Option<usize>, &Value)> {
+    pub(in crate::scene) fn iter(&self) -> impl Iterator<Item = (&'static Key, Option<usize>, &Value)> {
         self.values.iter().map(|((object, place), value)| (&self.keys[*place], *object, value))
     }
 
@@ -117,7 +117,7 @@ impl Values {
     }
 
     /// Puts a number in place of another.
-    pub fn set_number(&mut self, key: &str, number: f64) {
+    pub(in crate::scene) fn set_number(&mut self, key: &str, number: f64) {
         let place = self.keys.iter().position(|declared| path(declared, None) == key);
         let value = place.and_then(|place| self.values.get_mut(&(None, place)));
         if let Some(value) = value {
@@ -131,7 +131,7 @@ impl Values {
     }
 
     /// Every file that is named.
-    pub fn paths_mut(&mut self) -> impl Iterator<Item = &mut PathBuf> {
+    pub(super) fn paths_mut(&mut self) -> impl Iterator<Item = &mut PathBuf> {
         self.values.values_mut().filter_map(|value| match value {
             Value::File(path) => Some(path),
             _ => None,

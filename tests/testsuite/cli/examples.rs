@@ -87,7 +87,7 @@ fn the_example_scenes_are_sound() {
         let scene = frazil::scene::Scene::read(&path).unwrap();
         // The command in the comment is the one that the README gives, with this scene's file.
         let text = fs::read_to_string(&path).unwrap();
-        let file = scene.objects[0].file.file_name().unwrap().to_string_lossy().into_owned();
+        let file = scene.objects()[0].file.file_name().unwrap().to_string_lossy().into_owned();
         let command = format!("frazil snow examples/scenes/{name}.toml --set object.1.file={file} -o cache/");
         assert!(text.contains(&command), "{text}");
     }

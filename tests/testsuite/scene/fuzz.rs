@@ -161,7 +161,7 @@ fn ten_thousand_changed_scenes_are_read_or_refused() {
             let resolved = Scene::parse(&scene.to_toml(), &path, &[]).expect(&text);
             assert_eq!(resolved.to_toml(), scene.to_toml());
             // A shot of a million frames may take its time.
-            if scene.shot.frames.count() > 100 {
+            if scene.shot().frames.count() > 100 {
                 return;
             }
             let Ok(inputs) = Inputs::load(&scene) else { return };
@@ -233,7 +233,7 @@ fn ten_thousand_changed_records_are_used_or_refused() {
     let names = ["base.json", "base.0003.json", "files.json", "base.0004.json"];
     let precious = folder.path().join("precious");
     fs::write(&precious, "mine").unwrap();
-    let all: FrameChoice = scene.shot.frames.into();
+    let all: FrameChoice = scene.shot().frames.into();
     let some = FrameChoice::from("2-3".parse::<frazil::scene::Frames>().unwrap());
     let mut refused = 0;
     for round in 0..ROUNDS {
