@@ -10,6 +10,7 @@ pub mod faults;
 pub mod lanes;
 pub mod mesh;
 mod monotone;
+pub mod points;
 pub mod polygons;
 pub mod uvs;
 
@@ -19,5 +20,6 @@ pub type Vec3 = nalgebra::Vector3<f32>;
 pub type DVec3 = nalgebra::Vector3<f64>;
 
 pub use mesh::TriMesh;
+pub use points::Points;
 pub use polygons::PolygonMesh;
 pub use uvs::Uvs;
