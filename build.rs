@@ -8,7 +8,7 @@ use std::process::Command;
 /// anew, which takes longer than most of our own. Two groups of about the same time, for two cores; what a group's sources
 /// call their own (`namespace {`) needs different names.
 const SOURCES: [&[&str]; 2] =
-    [&["grid.cc", "parts.cc", "csg.cc", "filters.cc", "particles.cc"], &["meshing.cc"]];
+    [&["grid.cc", "parts.cc", "csg.cc", "filters.cc", "particles.cc"], &["meshing.cc", "points.cc"]];
 
 /// Take the functions of OpenVDB's trees from its library.
 const TREES: &str = "FRAZIL_TREES_OF_LIBRARY";

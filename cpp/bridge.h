@@ -55,6 +55,17 @@ public:
     std::unique_ptr<Ready> ready;
 };
 
+/// A grid of points, each with its place and attributes.
+class PointGrid {
+public:
+    struct Impl;
+    explicit PointGrid(std::unique_ptr<Impl> impl);
+    ~PointGrid();
+    PointGrid(const PointGrid&) = delete;
+    PointGrid& operator=(const PointGrid&) = delete;
+    std::unique_ptr<Impl> impl;
+};
+
 /// The grids that the bytes of a file hold, of any type.
 class Stored {
 public:
@@ -74,6 +85,8 @@ struct Call;
 struct Tile;
 struct Triangles;
 struct Part;
+struct PointArray;
+struct PointsHead;
 
 std::unique_ptr<Grid> make_grid(double voxel, float background, bool level_set);
 std::unique_ptr<VectorGrid> make_vector_grid(double voxel, std::array<float, 3> background);
@@ -137,6 +150,7 @@ rust::Vec<uint64_t> components(const Grid& grid, const Call& call);
 bool fits_half(size_t grid, bool vectors);
 std::unique_ptr<std::string> grids_to_bytes(rust::Slice<const size_t> grids, rust::Slice<const bool> vectors,
                                             int32_t compression, bool half, const rust::Vec<Meta>& meta);
+std::unique_ptr<std::string> points_to_bytes(const PointGrid& grid, int32_t compression, const rust::Vec<Meta>& meta);
 rust::Vec<GridHeader> describe_file(rust::Str path);
 Found read_grid(rust::Str path, rust::Str name);
 std::unique_ptr<Stored> read_bytes(rust::Slice<const uint8_t> bytes);
@@ -146,6 +160,14 @@ std::unique_ptr<Grid> assemble(rust::Slice<const uint8_t> head, float background
 std::unique_ptr<VectorGrid> assemble_vectors(rust::Slice<const uint8_t> head, std::array<float, 3> background,
                                              rust::Slice<const Tile> tiles);
 void end_workers() noexcept;
+
+std::unique_ptr<PointGrid> make_points(const Call& call, double voxel, rust::Str name,
+                                       rust::Slice<const int32_t> cells, rust::Slice<const PointArray> arrays,
+                                       rust::Slice<const uint32_t> order, rust::Slice<const size_t> starts);
+PointsHead points_head(const PointGrid& grid, const Call& call);
+void point_cells(const PointGrid& grid, const Call& call, rust::Slice<int32_t> out);
+void point_values(const PointGrid& grid, const Call& call, rust::Str attribute, int32_t kind, size_t address,
+                  size_t count);
 
 void csg(Grid& a, Grid& b, const Call& call, int32_t operation);
 std::unique_ptr<Grid> csg_copy(const Grid& a, const Grid& b, const Call& call, int32_t operation);

@@ -127,6 +127,7 @@ Found found(const openvdb::GridBase::Ptr& base) {
     Found out;
     if (base->isType<openvdb::FloatGrid>()) out.floats = loaded<openvdb::FloatGrid>(base);
     if (base->isType<openvdb::Vec3SGrid>()) out.vectors = loaded<openvdb::Vec3SGrid>(base);
+    out.points = wrap_points(base);
     return out;
 }
 
@@ -282,6 +283,19 @@ std::unique_ptr<std::string> grids_to_bytes(rust::Slice<const size_t> grids, rus
             }
         }
         return written(list, leaves * bytes_per_leaf, compression, map);
+    });
+}
+
+std::unique_ptr<std::string> points_to_bytes(const PointGrid& grid, int32_t compression, const rust::Vec<Meta>& meta) {
+    initialise();
+    openvdb::MetaMap map;
+    for (const auto& entry : meta) map.insertMeta(std::string(entry.key), *from_meta(entry));
+    return here([&] {
+        // A shallow copy carries its own metadata: statistics stay out of the caller's grid.
+        const auto copy = points_of(grid)->copyGrid();
+        // Snow grains take some 45 bytes each packed, and stand some 200 to a leaf.
+        const size_t expected = (copy->baseTree().leafCount() + 1) * 10000;
+        return written({copy}, expected, compression, map);
     });
 }
 

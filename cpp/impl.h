@@ -44,6 +44,10 @@ void initialise();
 std::unique_ptr<Grid> wrap(openvdb::FloatGrid::Ptr grid);
 std::unique_ptr<VectorGrid> wrap(openvdb::Vec3SGrid::Ptr grid);
 
+/// The same of points; none when the grid is of another type.
+std::unique_ptr<PointGrid> wrap_points(openvdb::GridBase::Ptr grid);
+openvdb::GridBase::Ptr points_of(const PointGrid& grid);
+
 /// A value as the bridge carries it: of a float the first number counts.
 inline std::array<float, 3> triple(float value) { return {value, 0.0f, 0.0f}; }
 inline std::array<float, 3> triple(const openvdb::Vec3s& value) { return {value[0], value[1], value[2]}; }

@@ -53,10 +53,44 @@ pub(super) mod ffi {
         value: [f32; 3],
     }
 
-    /// A grid out of a file: one of the two, or none when it is of another type.
+    /// An attribute of points to be stored.
+    struct PointArray {
+        name: String,
+        /// Its type, as `kind` of `vdb/points.rs` numbers it.
+        kind: i32,
+        /// Whether one value stands for all points.
+        uniform: bool,
+        /// Address of the values.
+        address: usize,
+    }
+
+    /// An attribute of stored points.
+    struct PointAttribute {
+        name: String,
+        /// OpenVDB's name of its type.
+        type_name: String,
+        /// As in `PointArray`, or -1 for a type that frazil does not hold.
+        kind: i32,
+        uniform: bool,
+    }
+
+    /// What stored points consist of.
+    struct PointsHead {
+        name: String,
+        count: usize,
+        voxel: f64,
+        /// Whether `to_world` is the whole transform.
+        is_linear: bool,
+        /// From index space to the world (m): rows of a matrix that row vectors are multiplied by.
+        to_world: [f64; 16],
+        attributes: Vec<PointAttribute>,
+    }
+
+    /// A grid out of a file: one of the three, or none when it is of another type.
     struct Found {
         floats: UniquePtr<Grid>,
         vectors: UniquePtr<VectorGrid>,
+        points: UniquePtr<PointGrid>,
     }
 
     /// Threads and cancel flag of a call.
@@ -204,6 +238,39 @@ pub(super) mod ffi {
             background: [f32; 3],
             tiles: &[Tile],
         ) -> Result<UniquePtr<VectorGrid>>;
+
+        type PointGrid;
+        /// Points, with the places within their voxels as the first array. `order` lists the points by leaf and voxel, or is
+        /// empty when they are in that order; `starts` are the indices in it of the first point of each leaf.
+        fn make_points(
+            call: &Call,
+            voxel: f64,
+            name: &str,
+            cells: &[i32],
+            arrays: &[PointArray],
+            order: &[u32],
+            starts: &[usize],
+        ) -> Result<UniquePtr<PointGrid>>;
+        fn points_to_bytes(
+            grid: &PointGrid,
+            compression: i32,
+            meta: &Vec<Meta>,
+        ) -> Result<UniquePtr<CxxString>>;
+        fn points_head(grid: &PointGrid, call: &Call) -> Result<PointsHead>;
+        /// Three numbers for each point.
+        fn point_cells(grid: &PointGrid, call: &Call, out: &mut [i32]) -> Result<()>;
+        /// Writes `count` values of an attribute to an address: one for each point, or one when the attribute is uniform.
+        ///
+        /// # Safety
+        /// There must be room for so many values of this kind.
+        unsafe fn point_values(
+            grid: &PointGrid,
+            call: &Call,
+            attribute: &str,
+            kind: i32,
+            address: usize,
+            count: usize,
+        ) -> Result<()>;
 
         /// Ends TBB's worker threads, unless others use them.
         fn end_workers();

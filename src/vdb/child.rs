@@ -15,7 +15,7 @@ use crate::error::{Error, Result, one_line};
 /// The first argument of a program that is to decode.
 pub(super) const COMMAND: &str = "decode-vdb-for-another-process";
 /// Version of the arguments and of parcels: both sides must have the same.
-pub(super) const PROTOCOL: &str = concat!("2-", env!("CARGO_PKG_VERSION"));
+pub(super) const PROTOCOL: &str = concat!("3-", env!("CARGO_PKG_VERSION"));
 
 /// What to read from a file.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -30,6 +30,8 @@ pub(super) enum Wanted<'a> {
     FirstAny,
     /// Of floats or vectors.
     NamedAny(&'a str),
+    FirstPoints,
+    NamedPoints(&'a str),
 }
 
 impl Wanted<'_> {
@@ -42,6 +44,8 @@ impl Wanted<'_> {
             Self::Named(name) => ["named", name],
             Self::FirstAny => ["first-any", ""],
             Self::NamedAny(name) => ["named-any", name],
+            Self::FirstPoints => ["first-points", ""],
+            Self::NamedPoints(name) => ["named-points", name],
         }
     }
 }
@@ -77,6 +81,8 @@ pub fn serve(arguments: impl Iterator<Item = OsString>) -> Option<u8> {
         "named" => Wanted::Named(name),
         "first-any" => Wanted::FirstAny,
         "named-any" => Wanted::NamedAny(name),
+        "first-points" => Wanted::FirstPoints,
+        "named-points" => Wanted::NamedPoints(name),
         _ => return Some(2),
     };
     if protocol != PROTOCOL || limit(Limits { memory, seconds }).is_err() {
@@ -113,7 +119,11 @@ fn limit(limits: Limits) -> std::io::Result<()> {
 }
 
 fn contents(path: &Path, wanted: Wanted<'_>) -> Result<Contents> {
+    let points =
+        |name| decode::read_points(path, name).map(|(points, skipped)| Contents::Points(points, skipped));
     Ok(match wanted {
+        Wanted::FirstPoints => points(None)?,
+        Wanted::NamedPoints(name) => points(Some(name))?,
         Wanted::Infos => Contents::Infos(decode::describe(path)?),
         Wanted::All => Contents::Grids(decode::read(path)?.into_iter().map(AnyGrid::Floats).collect()),
         Wanted::First => Contents::Grids(vec![AnyGrid::Floats(decode::read_named(path, None)?)]),

@@ -10,19 +10,23 @@ use super::bridge::ffi;
 use super::file::GridInfo;
 use super::grid::{FloatGrid, from_meta};
 use super::layout::{self, Fault, Layout};
+use super::points;
 use super::refusal::is_of_memory;
 use super::vectors::AnyGrid;
+use crate::base::Points;
 use crate::error::{Error, Result};
 
 /// OpenVDB's names of the types of grids that are read; a suffix says that values are stored in 16 bits.
 const FLOAT_TYPE: &str = "Tree_float_5_4_3";
 const VECTOR_TYPE: &str = "Tree_vec3s_5_4_3";
+const POINT_TYPE: &str = "Tree_ptdataidx32_5_4_3";
 
 /// The kinds of grids that a caller accepts.
 #[derive(Debug, Clone, Copy, PartialEq)]
 enum Kinds {
     Floats,
     FloatsAndVectors,
+    Points,
 }
 
 impl Kinds {
@@ -31,13 +35,18 @@ impl Kinds {
         match self {
             Self::Floats => "floats",
             Self::FloatsAndVectors => "floats or vectors of floats",
+            Self::Points => "points",
         }
     }
 
     /// Whether a grid is one of them.
     fn take(self, header: &GridInfo) -> bool {
-        let kind = &header.value_type;
-        kind.starts_with(FLOAT_TYPE) || (self == Self::FloatsAndVectors && kind.starts_with(VECTOR_TYPE))
+        let types: &[&str] = match self {
+            Self::Floats => &[FLOAT_TYPE],
+            Self::FloatsAndVectors => &[FLOAT_TYPE, VECTOR_TYPE],
+            Self::Points => &[POINT_TYPE],
+        };
+        types.iter().any(|known| header.value_type.starts_with(known))
     }
 }
 
@@ -98,7 +107,7 @@ fn stored(bytes: &[u8]) -> Told<Source<'static>> {
 }
 
 /// The error for what OpenVDB could not read.
-fn cannot_read(error: &cxx::Exception) -> String {
+pub(super) fn cannot_read(error: &cxx::Exception) -> String {
     let what = error.what();
     log::info!("OpenVDB: {}", crate::error::one_line(what));
     let told = |words: &[&str]| words.iter().any(|word| what.contains(word));
@@ -126,8 +135,8 @@ pub(super) fn read(path: &Path) -> Result<Vec<FloatGrid>> {
         if headers.is_empty() {
             return Err("the .vdb file holds no grid".to_string());
         }
-        let load = |(at, header)| floats(load(&mut source, at, header, Kinds::Floats)?);
-        headers.iter().enumerate().map(load).collect()
+        let load = |chosen| floats(load(&mut source, &chosen, Kinds::Floats)?);
+        headers.into_iter().enumerate().map(load).collect()
     };
     all().map_err(|what| Error::file(path, what))
 }
@@ -141,6 +150,16 @@ pub(super) fn read_named(path: &Path, name: Option<&str>) -> Result<FloatGrid> {
 /// As [`super::file::read_any`].
 pub(super) fn read_any(path: &Path, name: Option<&str>) -> Result<AnyGrid> {
     named(source(path)?, name, Kinds::FloatsAndVectors).map_err(|what| Error::file(path, what))
+}
+
+/// As [`super::points::read`], and what is left out.
+pub(super) fn read_points(path: &Path, name: Option<&str>) -> Result<(Points, Vec<String>)> {
+    let mut source = source(path)?;
+    let read = choose(&source, name, Kinds::Points).and_then(|chosen| {
+        let grid = found(&mut source, &chosen, Kinds::Points)?.points;
+        if grid.is_null() { Err(ASTRAY.to_string()) } else { points::of_grid(&grid) }
+    });
+    read.map_err(|what| Error::file(path, what))
 }
 
 /// As [`super::file::from_bytes`]; the error message follows the name of the bytes.
@@ -186,9 +205,18 @@ fn info(header: ffi::GridHeader) -> GridInfo {
 }
 
 fn named(mut source: Source<'_>, name: Option<&str>, kinds: Kinds) -> Told<AnyGrid> {
-    let headers = headers(&source)?;
+    let chosen = choose(&source, name, kinds)?;
+    load(&mut source, &chosen, kinds)
+}
+
+/// A grid of a file: its index and its description.
+type Chosen = (usize, GridInfo);
+
+/// The grid of that name, or the first of the kinds.
+fn choose(source: &Source<'_>, name: Option<&str>, kinds: Kinds) -> Told<Chosen> {
+    let mut headers = headers(source)?;
     let first = |wanted: &dyn Fn(&GridInfo) -> bool| headers.iter().position(wanted);
-    let floats = |header: &GridInfo| Kinds::Floats.take(header);
+    let floats = |header: &GridInfo| kinds != Kinds::Points && Kinds::Floats.take(header);
     let found = match name {
         Some(name) => first(&|header| header.name == name),
         None => first(&|header| floats(header) && header.class == "level set")
@@ -196,7 +224,7 @@ fn named(mut source: Source<'_>, name: Option<&str>, kinds: Kinds) -> Told<AnyGr
             .or_else(|| first(&|header| kinds.take(header))),
     };
     match found {
-        Some(at) => load(&mut source, at, &headers[at], kinds),
+        Some(at) => Ok((at, headers.swap_remove(at))),
         None => {
             let list: Vec<String> =
                 headers.iter().map(|header| format!("\"{}\" ({})", header.name, kind_of(header))).collect();
@@ -208,21 +236,26 @@ fn named(mut source: Source<'_>, name: Option<&str>, kinds: Kinds) -> Told<AnyGr
     }
 }
 
-/// The grid with an index in the description of its file.
-fn load(source: &mut Source<'_>, at: usize, header: &GridInfo, kinds: Kinds) -> Told<AnyGrid> {
+/// A grid of a file.
+fn load(source: &mut Source<'_>, chosen: &Chosen, kinds: Kinds) -> Told<AnyGrid> {
+    let grid = AnyGrid::of(found(source, chosen, kinds)?).ok_or(ASTRAY)?;
+    if grid.is_finite().map_err(|error| error.to_string())? {
+        return Ok(grid);
+    }
+    Err(format!("grid \"{}\" has values that are not finite", grid.borrow().name()))
+}
+
+/// A grid of a file, as OpenVDB reads it.
+fn found(source: &mut Source<'_>, (at, header): &Chosen, kinds: Kinds) -> Told<ffi::Found> {
     if !kinds.take(header) {
         let (name, kind, wanted) = (&header.name, kind_of(header), kinds.words());
         return Err(format!("grid \"{name}\" holds {kind}, but {wanted} are needed"));
     }
     let found = match source {
         Source::File(name) => ffi::read_grid(name, &header.name),
-        Source::Stored(stored) => ffi::take_stored(stored.pin_mut(), at),
+        Source::Stored(stored) => ffi::take_stored(stored.pin_mut(), *at),
     };
-    let grid = AnyGrid::of(found.map_err(|error| cannot_read(&error))?).ok_or(ASTRAY)?;
-    if grid.is_finite().map_err(|error| error.to_string())? {
-        return Ok(grid);
-    }
-    Err(format!("grid \"{}\" has values that are not finite", grid.borrow().name()))
+    found.map_err(|error| cannot_read(&error))
 }
 
 /// The error for a grid that is not of the type in the file.

@@ -99,26 +99,31 @@ pub fn any_to_bytes(grids: &[GridRef<'_>], options: &WriteOptions) -> Result<Vec
             )));
         }
     }
-    let codec = match options.compression {
+    let codec = codec_number(options.compression);
+    let meta: Vec<ffi::Meta> = options.metadata.iter().map(|(key, value)| to_meta(key, value)).collect();
+    let bytes = ffi::grids_to_bytes(&pointers, &vectors, codec, options.half, &meta).map_err(super::fail)?;
+    Ok(named_by_content(&bytes))
+}
+
+/// The number of a codec on the C++ side.
+pub(super) fn codec_number(compression: Compression) -> i32 {
+    match compression {
         Compression::None => 0,
         Compression::Zip => 1,
         Compression::Blosc => 2,
-    };
-    let meta: Vec<ffi::Meta> = options.metadata.iter().map(|(key, value)| to_meta(key, value)).collect();
-    let bytes = ffi::grids_to_bytes(&pointers, &vectors, codec, options.half, &meta).map_err(super::fail)?;
-    let mut bytes = bytes.as_bytes().to_vec();
-    name_by_content(&mut bytes);
-    Ok(bytes)
+    }
 }
 
-/// Replaces the random identifier by one made from the rest of the file.
-fn name_by_content(bytes: &mut [u8]) {
+/// The bytes of a file, with the random identifier replaced by one made from the rest.
+pub(super) fn named_by_content(bytes: &cxx::CxxString) -> Vec<u8> {
+    let mut bytes = bytes.as_bytes().to_vec();
     if bytes.len() < UUID.end {
-        return;
+        return bytes;
     }
     let digits = Hasher::default().add(&bytes[..UUID.start]).add(&bytes[UUID.end..]).finish();
     let name = [&digits[..8], &digits[8..12], &digits[12..16], &digits[16..20], &digits[20..]].join("-");
     bytes[UUID].copy_from_slice(name.as_bytes());
+    bytes
 }
 
 /// Descriptions of a file's grids, of any type, in the order of their names; values are not read, except in a stream, which

@@ -24,7 +24,9 @@ use super::file::GridInfo;
 use super::grid::FloatGrid;
 use super::mapping::Mapping;
 use super::parcel::{Contents, unpack};
+use super::points;
 use super::vectors::AnyGrid;
+use crate::base::Points;
 use crate::error::{Error, Result, one_line};
 use crate::io::manifest;
 
@@ -103,6 +105,20 @@ impl Guard {
     /// As [`Guard::describe`].
     pub fn read_any(&self, path: &Path, name: Option<&str>) -> Result<AnyGrid> {
         self.one(path, name.map_or(Wanted::FirstAny, Wanted::NamedAny))
+    }
+
+    /// As [`super::points::read`].
+    ///
+    /// # Errors
+    /// As [`Guard::describe`].
+    pub fn read_points(&self, path: &Path, name: Option<&str>) -> Result<Points> {
+        match self.ask(path, name.map_or(Wanted::FirstPoints, Wanted::NamedPoints))? {
+            Contents::Points(points, skipped) => {
+                points::warn_of(path, &skipped);
+                Ok(points)
+            }
+            _ => Err(astray(path)),
+        }
     }
 
     fn one(&self, path: &Path, wanted: Wanted<'_>) -> Result<AnyGrid> {

@@ -1,4 +1,4 @@
-//! The only door to OpenVDB: grids of floats and of vectors, level-set tools and .vdb files.
+//! The only door to OpenVDB: grids of floats and of vectors, points, level-set tools and .vdb files.
 //!
 //! Each grid owns its tree; leaves are lent without copying. Index space is world-fixed: voxel
 //! (i, j, k) has its centre at (i, j, k) x voxel size, unless a file has another transform.
@@ -15,6 +15,8 @@ mod leaf;
 pub mod level_set;
 mod mapping;
 mod parcel;
+mod parcel_points;
+pub mod points;
 mod refusal;
 mod vectors;
 

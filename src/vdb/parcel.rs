@@ -1,4 +1,5 @@
-//! Data passed from one process to another: descriptions of a file's grids, or grids, with their leaves as plain blocks.
+//! Data passed from one process to another: descriptions of a file's grids, or grids, with their leaves as plain
+//! blocks, or points.
 //!
 //! A parcel is `MAGIC`, the length of its head, the head, and for each grid three arrays: origins, masks, values of its
 //! leaves. The magic number is written last: without it a parcel is incomplete. The reader checks every length,
@@ -13,13 +14,15 @@ use super::file::GridInfo;
 use super::grid::{FloatGrid, MetaValue};
 use super::leaf::{Leaf, LeafValues, Vectors};
 use super::mapping::Mapping;
+use super::parcel_points;
 use super::vectors::{AnyGrid, VectorGrid};
+use crate::base::Points;
 use crate::base::blocks::{Mask, Values};
 
 /// The first bytes of a parcel; they change with its format.
-const MAGIC: [u8; 8] = *b"frzpack2";
+const MAGIC: [u8; 8] = *b"frzpack3";
 /// Arrays begin at multiples of this.
-const ALIGN: usize = 64;
+pub(super) const ALIGN: usize = 64;
 /// Bytes of a leaf of such values in each of the three arrays.
 const fn sizes<V>() -> [usize; 3] {
     [12, size_of::<Mask>(), size_of::<V>()]
@@ -33,6 +36,8 @@ pub(super) enum Contents {
     Infos(Vec<GridInfo>),
     /// Grids.
     Grids(Vec<AnyGrid>),
+    /// Points, and the attributes that they are without.
+    Points(Points, Vec<String>),
     /// Why there is neither; the message follows the file's name.
     Refusal(String),
 }
@@ -54,6 +59,8 @@ pub(super) fn pack(mut file: &File, contents: &Contents) -> Result<(), String> {
             head.number(infos.len() as u64);
             infos.iter().for_each(|info| head.info(info));
         }
+        // Below, as they have no leaves.
+        Contents::Points(..) => {}
         Contents::Grids(grids) => {
             head.number(2);
             head.number(grids.len() as u64);
@@ -68,6 +75,10 @@ pub(super) fn pack(mut file: &File, contents: &Contents) -> Result<(), String> {
             }
         }
     }
+    if let Contents::Points(points, skipped) = contents {
+        head.number(3);
+        parcel_points::describe(&mut head, points, skipped);
+    }
     let io = |error: std::io::Error| error.to_string();
     let start = [&[0; 8][..], &(head.0.len() as u64).to_le_bytes(), &head.0].concat();
     let mut at = start.len();
@@ -78,6 +89,9 @@ pub(super) fn pack(mut file: &File, contents: &Contents) -> Result<(), String> {
             Leaves::Vectors(leaves) => write_leaves(file, &mut at, leaves),
         };
         written.map_err(io)?;
+    }
+    if let Contents::Points(points, _) = contents {
+        parcel_points::write(file, &mut at, points).map_err(io)?;
     }
     file.write_all_at(&MAGIC, 0).map_err(io)
 }
@@ -136,6 +150,10 @@ pub(super) fn unpack(parcel: &Mapping, threads: usize) -> Option<Contents> {
     let kind = head.number()?;
     if kind == 0 {
         return Some(Contents::Refusal(head.text()?));
+    }
+    if kind == 3 {
+        let (points, skipped) = parcel_points::read(&mut head, parcel, at)?;
+        return Some(Contents::Points(points, skipped));
     }
     let count = head.number()?;
     match kind {
@@ -201,19 +219,19 @@ fn arrays<V>(parcel: &[u8], at: &mut usize, count: usize) -> Option<Arrays> {
 
 /// Builds a head.
 #[derive(Default)]
-struct Head(Vec<u8>);
+pub(super) struct Head(Vec<u8>);
 
 impl Head {
-    fn number(&mut self, number: u64) {
+    pub(super) fn number(&mut self, number: u64) {
         self.0.extend(number.to_ne_bytes());
     }
 
-    fn bytes(&mut self, bytes: &[u8]) {
+    pub(super) fn bytes(&mut self, bytes: &[u8]) {
         self.number(bytes.len() as u64);
         self.0.extend(bytes);
     }
 
-    fn text(&mut self, text: &str) {
+    pub(super) fn text(&mut self, text: &str) {
         self.bytes(text.as_bytes());
     }
 
@@ -276,7 +294,7 @@ impl Head {
 }
 
 /// The rest of a head.
-struct Cursor<'a>(&'a [u8]);
+pub(super) struct Cursor<'a>(&'a [u8]);
 
 impl<'a> Cursor<'a> {
     fn take(&mut self, count: usize) -> Option<&'a [u8]> {
@@ -285,16 +303,16 @@ impl<'a> Cursor<'a> {
         Some(taken)
     }
 
-    fn number(&mut self) -> Option<u64> {
+    pub(super) fn number(&mut self) -> Option<u64> {
         Some(u64::from_ne_bytes(self.take(8)?.try_into().ok()?))
     }
 
-    fn bytes(&mut self) -> Option<&'a [u8]> {
+    pub(super) fn bytes(&mut self) -> Option<&'a [u8]> {
         let length = usize::try_from(self.number()?).ok()?;
         self.take(length)
     }
 
-    fn text(&mut self) -> Option<String> {
+    pub(super) fn text(&mut self) -> Option<String> {
         Some(String::from_utf8_lossy(self.bytes()?).into_owned())
     }
 

@@ -65,5 +65,6 @@ mod sweep {
     mod window;
 }
 mod vdb {
+    mod points;
     mod tools;
 }
