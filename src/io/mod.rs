@@ -10,6 +10,7 @@ pub mod manifest;
 pub mod mesh;
 mod obj;
 mod ply;
+pub mod points_ply;
 #[doc(hidden)]
 pub mod sealed;
 pub mod seen;
@@ -18,3 +19,4 @@ pub mod sequence;
 pub mod source;
 mod stl;
 pub mod usd;
+pub mod usd_points;

@@ -21,34 +21,78 @@ enum Format {
 }
 
 #[derive(Clone, Copy, PartialEq)]
-enum Kind {
+pub(super) enum Kind {
     Int(usize),
     Unsigned(usize),
     Float(usize),
 }
 
-struct Property {
-    name: String,
+pub(super) struct Property {
+    pub name: String,
     kind: Kind,
     /// Kind of the count, for a list.
-    list: Option<Kind>,
+    pub list: Option<Kind>,
 }
 
-struct Element {
-    name: String,
-    count: usize,
-    properties: Vec<Property>,
+impl Property {
+    /// Whether its numbers are floats.
+    pub fn is_float(&self) -> bool {
+        matches!(self.kind, Kind::Float(_))
+    }
 }
 
-/// Reads the vertices and faces of a PLY file.
-pub(super) fn parse(bytes: &[u8]) -> Result<PolygonMesh, String> {
+pub(super) struct Element {
+    pub name: String,
+    pub count: usize,
+    pub properties: Vec<Property>,
+}
+
+/// A file whose header is read.
+pub(super) struct Body<'a> {
+    pub elements: Vec<Element>,
+    /// The texts of comments.
+    pub comments: Vec<String>,
+    reader: Reader<'a>,
+}
+
+impl Body<'_> {
+    /// Reads the next row of an element; each property that is not a list is handed over by its index.
+    pub fn row(
+        &mut self,
+        element: &Element,
+        row: usize,
+        mut take: impl FnMut(usize, f64),
+    ) -> Result<(), String> {
+        if row % PIECE == 0 && source::is_stopped() {
+            return Err("stopped".into());
+        }
+        for (n, property) in element.properties.iter().enumerate() {
+            let read = match property.list {
+                None => self.reader.number(property.kind).map(|value| take(n, value)),
+                Some(count) => self.reader.list(count, property.kind).map(drop),
+            };
+            read.map_err(|fault| fault.at(element, row))?;
+        }
+        Ok(())
+    }
+}
+
+/// Reads the header of a file that has vertices.
+pub(super) fn open(bytes: &[u8]) -> Result<Body<'_>, String> {
     let end = find(bytes, b"end_header").ok_or("not a .ply file, or its header is cut short")?;
     let body =
         end + bytes[end..].iter().position(|&byte| byte == b'\n').ok_or("the .ply header is cut short")? + 1;
     let header = std::str::from_utf8(&bytes[..end]).map_err(|_| "the .ply header is not text")?;
     let (format, elements) = parse_header(header)?;
     check_coordinates(&elements)?;
-    let mut reader = Reader { format, bytes: &bytes[body..], at: 0 };
+    let comments = header.lines().filter_map(|line| line.strip_prefix("comment "));
+    let comments = comments.map(|text| text.trim().to_string()).collect();
+    Ok(Body { elements, comments, reader: Reader { format, bytes: &bytes[body..], at: 0 } })
+}
+
+/// Reads the vertices and faces of a PLY file.
+pub(super) fn parse(bytes: &[u8]) -> Result<PolygonMesh, String> {
+    let Body { elements, mut reader, .. } = open(bytes)?;
     let mut parsed = Parsed::new(&elements);
     // An element without properties has no rows in the file, whatever its count.
     for element in elements.iter().filter(|element| !element.properties.is_empty()) {
@@ -56,12 +100,7 @@ pub(super) fn parse(bytes: &[u8]) -> Result<PolygonMesh, String> {
             if row % PIECE == 0 && source::is_stopped() {
                 return Err("stopped".into());
             }
-            let place = format_args!("{} {} of {}", element.name, row + 1, element.count);
-            read_row(&mut reader, element, &mut parsed).map_err(|fault| match fault {
-                Fault::End => format!("the .ply file ends in {place}"),
-                Fault::Text(text) => format!("{place}: \"{text}\" is not a number"),
-                Fault::Count(count) => format!("{place} cannot have {count} entries"),
-            })?;
+            read_row(&mut reader, element, &mut parsed).map_err(|fault| fault.at(element, row))?;
         }
     }
     Ok(parsed.finish())
@@ -211,7 +250,29 @@ enum Fault {
     Count(f64),
 }
 
+impl Fault {
+    /// In words.
+    fn at(self, element: &Element, row: usize) -> String {
+        let place = format_args!("{} {} of {}", element.name, row + 1, element.count);
+        match self {
+            Self::End => format!("the .ply file ends in {place}"),
+            Self::Text(text) => format!("{place}: \"{text}\" is not a number"),
+            Self::Count(count) => format!("{place} cannot have {count} entries"),
+        }
+    }
+}
+
 impl Reader<'_> {
+    /// The numbers of a list, after their count.
+    fn list(&mut self, count: Kind, kind: Kind) -> Result<Vec<f64>, Fault> {
+        let count = self.number(count)?;
+        // A damaged count must not allocate more than the file could fill.
+        if !(0.0..=self.bytes.len() as f64).contains(&count) {
+            return Err(Fault::Count(count));
+        }
+        (0..count as usize).map(|_| self.number(kind)).collect()
+    }
+
     fn number(&mut self, kind: Kind) -> Result<f64, Fault> {
         if self.format == Format::Ascii {
             let rest = &self.bytes[self.at..];
@@ -258,14 +319,7 @@ fn read_row(reader: &mut Reader<'_>, element: &Element, parsed: &mut Parsed) -> 
                 }
             }
             Some(count) => {
-                let count = reader.number(count)?;
-                // A damaged count must not allocate more than the file could fill.
-                if !(0.0..=reader.bytes.len() as f64).contains(&count) {
-                    return Err(Fault::Count(count));
-                }
-                let values = (0..count as usize)
-                    .map(|_| reader.number(property.kind))
-                    .collect::<Result<Vec<f64>, Fault>>()?;
+                let values = reader.list(count, property.kind)?;
                 match (element.name.as_str(), name) {
                     ("face", "vertex_indices" | "vertex_index") => {
                         corners = values.into_iter().map(index).collect();

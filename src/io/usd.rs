@@ -58,7 +58,7 @@ pub fn prim_name(text: &str) -> String {
 }
 
 /// A text in quotes, or an asset path between `@`.
-fn quoted(text: &str) -> String {
+pub(super) fn quoted(text: &str) -> String {
     let escaped: String = text
         .chars()
         .flat_map(|letter| match letter {
@@ -88,7 +88,7 @@ impl Units {
     /// Metres, Y up.
     pub const OWN: Self = Self { metres: 1.0, z_up: false };
 
-    fn head(self) -> String {
+    pub(super) fn head(self) -> String {
         let axis = if self.z_up { "Z" } else { "Y" };
         format!("    metersPerUnit = {}\n    upAxis = \"{axis}\"\n", self.metres)
     }
@@ -269,7 +269,7 @@ fn row(out: &mut String, p: &Vec3) {
     let _ = write!(out, "({}, {}, {})", p.x, p.y, p.z);
 }
 
-fn list<T>(items: impl ExactSizeIterator<Item = T>, write: impl Fn(&mut String, T)) -> String {
+pub(super) fn list<T>(items: impl ExactSizeIterator<Item = T>, write: impl Fn(&mut String, T)) -> String {
     let mut out = String::with_capacity(items.len() * 32);
     out.push('[');
     for (index, item) in items.enumerate() {

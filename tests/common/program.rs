@@ -8,6 +8,11 @@ use std::time::{Duration, Instant};
 pub const CUBE: &str = "v -.2 0 -.2\nv .2 0 -.2\nv .2 .4 -.2\nv -.2 .4 -.2\nv -.2 0 .2\nv .2 0 .2\nv .2 .4 .2\nv -.2 .4 .2\n\
 f 1 4 3 2\nf 5 6 7 8\nf 1 2 6 5\nf 3 4 8 7\nf 1 5 8 4\nf 2 3 7 6\n";
 
+/// A few grains with velocities, as a .ply file that any program could have written.
+pub const GRAINS: &str = "ply\nformat ascii 1.0\nelement vertex 3\nproperty float x\nproperty float y\nproperty float z\n\
+property float vx\nproperty float vy\nproperty float vz\nproperty int id\nend_header\n\
+0 0 0 1 0 0 7\n0.5 0 0 0 2 0 8\n0 0.5 0.25 0 0 0 9\n";
+
 /// The program in a folder, with arguments that have no spaces.
 pub fn command(folder: &Path, arguments: &str) -> Command {
     let mut command = Command::new(env!("CARGO_BIN_EXE_frazil"));

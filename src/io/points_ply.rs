@@ -1,0 +1,279 @@
+//! Points as Stanford PLY: vertices without faces.
+//!
+//! An attribute of vectors takes three properties, its name with x, y and z behind it (`v`: vx, vy, vz; `rest`: restx ...).
+//! `bool` becomes `uchar`. PLY has no 64-bit integers: they become `int` where all of them fit, else `double`. A comment
+//! keeps the voxel size. Places are `float`, or `double` where 32 bits would move points by over a thousandth of a voxel.
+
+use std::io::Write;
+use std::path::Path;
+
+use super::ply::{self, Element};
+use super::{atomic, source};
+use crate::base::DVec3;
+use crate::base::mesh::spacing;
+use crate::base::points::{Attribute, Column, Points, Values};
+use crate::error::{Error, Result};
+
+/// The comment before the voxel size (m).
+const VOXEL: &str = "frazil voxel_size";
+/// How far rounding may move a point (voxels) before its place is written in 64 bits.
+const MOST_MOVED: f64 = 1e-3;
+
+/// Points of a file, and whether it says their voxel size.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Cloud {
+    /// Places (m).
+    pub places: Vec<DVec3>,
+    /// Attributes.
+    pub attributes: Vec<Attribute>,
+    /// Edge of a voxel (m), if the file says it.
+    pub voxel_size: Option<f64>,
+}
+
+impl Cloud {
+    /// The points, in voxels of the file's own size, unless another is given (m).
+    ///
+    /// # Errors
+    /// No size, or places that it does not fit: see [`Points::at`].
+    pub fn into_points(self, voxel_size: Option<f64>) -> Result<Points> {
+        let unknown = || Error::argument("the file does not say how large the voxels of its points are");
+        let size = voxel_size.or(self.voxel_size).ok_or_else(unknown)?;
+        let points = Points { attributes: self.attributes, ..Points::at(size, &self.places)? };
+        points.validate()?;
+        Ok(points)
+    }
+}
+
+/// Whether a .ply file has vertices and no faces.
+///
+/// # Errors
+/// A file that cannot be read.
+pub fn holds_points(path: &Path) -> Result<bool> {
+    let bytes = source::read(path)?;
+    let is_face = |element: &Element| element.name == "face" || element.name == "tristrips";
+    Ok(ply::open(&bytes).is_ok_and(|body| !body.elements.iter().any(|e| is_face(e) && e.count > 0)))
+}
+
+/// Reads the vertices of a .ply file as points. `id` becomes 64-bit integers and `active` `bool`; other integers of up to
+/// 32 bits become 32-bit ones, floats 32-bit ones, and three properties that end in x, y and z vectors. Values that are the
+/// same at all points become one. Lists are left out.
+///
+/// # Errors
+/// A missing, cut or malformed file; numbers that are not finite, or too large for their type.
+pub fn read(path: &Path) -> Result<Cloud> {
+    let bytes = source::read(path)?;
+    parse(&bytes).map_err(|what| Error::file(path, what))
+}
+
+fn parse(bytes: &[u8]) -> std::result::Result<Cloud, String> {
+    let mut body = ply::open(bytes)?;
+    let at = body.elements.iter().position(|element| element.name == "vertex").expect("open looks for it");
+    let vertices = body.elements.swap_remove(at);
+    if at > 0 {
+        return Err("the .ply file has something before its vertices".into());
+    }
+    // A count that is damaged must not allocate more than the file could fill.
+    let names: Vec<String> = vertices.properties.iter().map(|property| property.name.clone()).collect();
+    let mut columns: Vec<Vec<f64>> = vec![Vec::new(); names.len()];
+    for row in 0..vertices.count {
+        body.row(&vertices, row, |property, value| columns[property].push(value))?;
+    }
+    let place = |axis: &str| names.iter().position(|name| name == axis).expect("open looks for them");
+    let axes = ["x", "y", "z"].map(place);
+    let places: Vec<DVec3> =
+        (0..vertices.count).map(|row| DVec3::from(axes.map(|axis| columns[axis][row]))).collect();
+    let attributes = attributes(&vertices, &names, &columns)?;
+    let voxel_size = body.comments.iter().find_map(|line| line.strip_prefix(VOXEL)?.trim().parse().ok());
+    Ok(Cloud { places, attributes, voxel_size })
+}
+
+fn attributes(
+    vertices: &Element,
+    names: &[String],
+    columns: &[Vec<f64>],
+) -> std::result::Result<Vec<Attribute>, String> {
+    let mut out = Vec::new();
+    let index = |name: &str| names.iter().position(|other| other == name);
+    for (n, (name, property)) in names.iter().zip(&vertices.properties).enumerate() {
+        let of_vector = |end: char| {
+            let stem = name.strip_suffix(end)?;
+            let axes = ["x", "y", "z"].map(|axis| index(&format!("{stem}{axis}")));
+            let [x, y, z] = [axes[0]?, axes[1]?, axes[2]?];
+            [x, y, z].iter().all(|&axis| vertices.properties[axis].is_float()).then_some((stem, [x, y, z]))
+        };
+        if property.list.is_some() || ["x", "y", "z"].contains(&name.as_str()) {
+            continue;
+        }
+        // The first of the three stands for all.
+        if ['y', 'z'].into_iter().any(|end| of_vector(end).is_some()) {
+            continue;
+        }
+        let column = &columns[n];
+        let (name, values) = match (of_vector('x'), name.as_str()) {
+            (Some((stem, axes)), _) => {
+                let vector = |row: usize| axes.map(|axis| columns[axis][row] as f32);
+                (
+                    stem,
+                    Values::Vector(shared((0..column.len()).map(vector).collect(), |v| v.map(f32::to_bits))),
+                )
+            }
+            (None, "id") => (name.as_str(), Values::Long(shared(whole(name, column)?, |&id| id))),
+            (None, "active") => {
+                let yes = column.iter().map(|&value| value != 0.0).collect();
+                (name.as_str(), Values::Bool(shared(yes, |&yes| yes)))
+            }
+            _ if property.is_float() => {
+                let floats = column.iter().map(|&value| value as f32).collect();
+                (name.as_str(), Values::Float(shared(floats, |value| value.to_bits())))
+            }
+            _ if column.iter().all(|&value| f64::from(value as i32) == value) => {
+                let whole = column.iter().map(|&value| value as i32).collect();
+                (name.as_str(), Values::Int(shared(whole, |&value| value)))
+            }
+            _ => (name.as_str(), Values::Long(shared(whole(name, column)?, |&value| value))),
+        };
+        out.push(Attribute { name: name.to_string(), values });
+    }
+    Ok(out)
+}
+
+/// Numbers as 64-bit integers.
+fn whole(name: &str, column: &[f64]) -> std::result::Result<Vec<i64>, String> {
+    let exact = |(row, &value): (usize, &f64)| {
+        let is_whole = value.fract() == 0.0 && value.abs() <= (1u64 << 53) as f64;
+        is_whole
+            .then_some(value as i64)
+            .ok_or_else(|| format!("{name} of vertex {} is not a whole number", row + 1))
+    };
+    column.iter().enumerate().map(exact).collect()
+}
+
+/// One value where all have the same key.
+fn shared<T: Copy, K: PartialEq>(values: Vec<T>, key: impl Fn(&T) -> K) -> Column<T> {
+    match values.first() {
+        Some(first) if values.len() > 1 && values.iter().all(|value| key(value) == key(first)) => {
+            Column::Uniform(*first)
+        }
+        _ => Column::Each(values),
+    }
+}
+
+/// Writes points as binary little-endian PLY, whole or not at all.
+///
+/// # Errors
+/// 64-bit integers that a `double` does not hold; what the operating system reports.
+pub fn write(path: &Path, points: &Points) -> Result<()> {
+    let plain =
+        points.attributes.iter().map(|attribute| plain(attribute).map_err(|what| Error::file(path, what)));
+    let plain = plain.collect::<Result<Vec<_>>>()?;
+    atomic::write(path, |out| write_to(out, points, &plain))
+}
+
+/// An attribute as PLY holds it.
+struct Plain<'a> {
+    /// Type and names of its properties.
+    kind: &'static str,
+    names: Vec<String>,
+    values: &'a Values,
+}
+
+fn plain(attribute: &Attribute) -> std::result::Result<Plain<'_>, String> {
+    let Attribute { name, values } = attribute;
+    let kind = match values {
+        Values::Float(_) | Values::Vector(_) => "float",
+        Values::Int(_) => "int",
+        Values::Bool(_) => "uchar",
+        Values::Long(column) => {
+            let stored = column.stored();
+            if stored.iter().all(|&value| i32::try_from(value).is_ok()) {
+                "int"
+            } else if stored.iter().all(|value| value.unsigned_abs() <= 1 << 53) {
+                "double"
+            } else {
+                return Err(format!("attribute \"{name}\" has integers over 2^53, which .ply cannot hold"));
+            }
+        }
+    };
+    let names = match values {
+        Values::Vector(_) => ["x", "y", "z"].map(|axis| format!("{name}{axis}")).to_vec(),
+        _ => vec![name.clone()],
+    };
+    // A header's words are separated by spaces.
+    match names.iter().find(|name| name.contains(char::is_whitespace)) {
+        Some(name) => Err(format!("the name \"{name}\" has a space, which .ply cannot hold")),
+        None => Ok(Plain { kind, names, values }),
+    }
+}
+
+fn write_to(out: &mut dyn Write, points: &Points, attributes: &[Plain<'_>]) -> std::io::Result<()> {
+    let farthest = points.bounds().map_or(0.0, |(low, high)| low.amax().max(high.amax()));
+    let is_far = spacing(farthest) > MOST_MOVED * points.voxel_size;
+    let places = if is_far { "double" } else { "float" };
+    let mut head = format!(
+        "ply\nformat binary_little_endian 1.0\ncomment {VOXEL} {}\nelement vertex {}\n",
+        points.voxel_size,
+        points.count()
+    );
+    for axis in ["x", "y", "z"] {
+        head += &format!("property {places} {axis}\n");
+    }
+    for Plain { kind, names, .. } in attributes {
+        names.iter().for_each(|name| head += &format!("property {kind} {name}\n"));
+    }
+    out.write_all((head + "end_header\n").as_bytes())?;
+    let mut row = Vec::new();
+    for point in 0..points.count() {
+        row.clear();
+        for part in points.position(point).iter() {
+            match is_far {
+                true => row.extend(part.to_le_bytes()),
+                false => row.extend((*part as f32).to_le_bytes()),
+            }
+        }
+        for Plain { kind, values, .. } in attributes {
+            match values {
+                Values::Float(column) => row.extend(column.get(point).to_le_bytes()),
+                Values::Int(column) => row.extend(column.get(point).to_le_bytes()),
+                Values::Bool(column) => row.push(column.get(point).into()),
+                Values::Long(column) if *kind == "int" => {
+                    row.extend((column.get(point) as i32).to_le_bytes())
+                }
+                Values::Long(column) => row.extend((column.get(point) as f64).to_le_bytes()),
+                Values::Vector(column) => {
+                    column.get(point).iter().for_each(|part| row.extend(part.to_le_bytes()))
+                }
+            }
+        }
+        out.write_all(&row)?;
+    }
+    Ok(())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_is_written_is_read_and_a_cut_file_is_refused() {
+        for far in [0.0, 1.0e6] {
+            let places = [[0.26 + far, -0.26, 0.0], [1.0 + far, 0.0, -3.0], [far, 0.0, 0.0]].map(DVec3::from);
+            let mut points = Points::at(0.5, &places).unwrap();
+            points.set("v", Values::Vector(Column::Each(vec![[0.0, 1.0, -2.0], [3.0; 3], [4.0; 3]])));
+            points.set("id", Values::Long(Column::Each(vec![5, 1 << 40, 7])));
+            points.set("pscale", Values::Float(Column::Uniform(0.1)));
+            points.set("active", Values::Bool(Column::Each(vec![true, false, true])));
+            points.set("source_frame", Values::Int(Column::Each(vec![-1, 2, 3])));
+            let plain: Vec<Plain<'_>> = points.attributes.iter().map(|a| plain(a).unwrap()).collect();
+            let mut bytes = Vec::new();
+            write_to(&mut bytes, &points, &plain).unwrap();
+            let back = parse(&bytes).unwrap().into_points(None).unwrap();
+            assert_eq!((&back.attributes, back.voxel_size), (&points.attributes, 0.5));
+            for point in 0..3 {
+                assert!((back.position(point) - points.position(point)).norm() < 1e-3 * 0.5);
+            }
+            for length in 0..bytes.len() {
+                assert!(parse(&bytes[..length]).is_err(), "{length} of {} bytes were accepted", bytes.len());
+            }
+        }
+    }
+}
