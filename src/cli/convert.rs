@@ -1,4 +1,4 @@
-//! `frazil convert`: meshes, sequences and characters from one file to another.
+//! `frazil convert`: meshes, sequences, characters and points from one file to another.
 
 use std::path::{Path, PathBuf};
 
@@ -10,23 +10,25 @@ use frazil::motion::{Character, Keys, MeshSequence, Motion, Placed, Play, Rigid,
 use frazil::scene::{FrameChoice, Frames};
 use serde_json::json;
 
+use super::cloud;
 use super::exit::{Failure, Phase};
 use super::options::{Axis, MeshSpace, positive};
 use super::output;
 use super::session::Session;
 
-/// Turn meshes, sequences of them and characters into other files.
+/// Turn meshes, sequences of them, characters and points into other files.
 ///
 /// What moves needs a pattern for its output (hero.%04d.ply) and --frames.
 #[derive(clap::Args)]
 #[command(after_help = "\
 Examples:
   frazil convert boot.obj boot.stl --up z
-  frazil convert body.%04d.obj posed.%04d.usda --frames 1-2 --scale 0.01")]
+  frazil convert body.%04d.obj posed.%04d.usda --frames 1-2 --scale 0.01
+  frazil convert grains.%04d.vdb grains.%04d.usda --frames 1-2")]
 pub struct Args {
-    /// Mesh (.obj, .ply, .stl), a sequence of them (body.%04d.obj), or a character (.glb, .gltf).
+    /// Mesh (.obj, .ply, .stl), a sequence of them (body.%04d.obj), a character (.glb, .gltf), or points (.vdb, .ply).
     input: PathBuf,
-    /// Mesh (.obj, .ply, .stl, .usda), or their pattern.
+    /// Mesh (.obj, .ply, .stl, .usda) or points (.vdb, .ply, .usda), or their pattern.
     output: PathBuf,
     /// Frames of a sequence or a character.
     #[arg(long, value_name = "A-B|A-BxN", allow_hyphen_values = true)]
@@ -48,10 +50,19 @@ pub struct Args {
     /// Factor from metres to the output's unit.
     #[arg(long, value_name = "FACTOR", default_value = "1", value_parser = positive)]
     to_scale: f64,
+    /// Edge of the voxels that points of a .ply get in a .vdb (m) [default: as the .ply says].
+    #[arg(long, value_name = "M", value_parser = positive)]
+    voxel: Option<f64>,
 }
 
 /// Runs the command.
 pub fn run(args: &Args, session: &Session) -> Result<(), Failure> {
+    if cloud::is_one(&args.input, &args.output, args.frames.as_ref()).before()? {
+        return args.points()?.run(session);
+    }
+    if args.voxel.is_some() {
+        return Err(Failure::refused("--voxel is for points"));
+    }
     check_output(&args.output)?;
     let (motion, frames) = args.motion()?;
     let pattern = Pattern::parse(&args.output);
@@ -96,6 +107,24 @@ fn check_output(path: &Path) -> Result<(), Failure> {
 }
 
 impl Args {
+    /// The conversion of points, which have metres and Y up in every file.
+    fn points(&self) -> Result<cloud::Conversion<'_>, Failure> {
+        let is_turned = self.space.scale != 1.0 || self.space.up == Axis::Z;
+        if is_turned || self.to_scale != 1.0 || self.to_up == Axis::Z {
+            return Err(Failure::refused("--scale, --up, --to-scale and --to-up are for meshes"));
+        }
+        if self.clip.is_some() || self.node.is_some() {
+            return Err(Failure::refused("--clip and --node are for .glb and .gltf files"));
+        }
+        Ok(cloud::Conversion {
+            input: &self.input,
+            output: &self.output,
+            frames: self.frames.as_ref(),
+            fps: self.fps,
+            voxel: self.voxel,
+        })
+    }
+
     /// Warns about what the input contains and the output cannot.
     fn warn_of_losses(&self, frame: i32, motion: &dyn Motion) -> frazil::Result<()> {
         let one =

@@ -36,6 +36,7 @@ pub fn run(args: Args, session: &Session) -> Result<(), Failure> {
             #[cfg(not(feature = "vdb"))]
             "vdb" => super::needs_openvdb(path),
             _ if is_gltf(path) => character(path),
+            "ply" if io::points_ply::holds_points(path).is_ok_and(|yes| yes) => super::cloud::info(path),
             _ => mesh(path),
         };
         all.push(json!({ "file": path.display().to_string(), "holds": holds.before()? }));

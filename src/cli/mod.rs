@@ -1,6 +1,7 @@
 //! The command line: one file per command.
 
 mod check;
+mod cloud;
 mod convert;
 mod exit;
 mod info;

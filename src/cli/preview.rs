@@ -1,29 +1,33 @@
-//! `frazil preview`: a picture of meshes and level sets.
+//! `frazil preview`: a picture of meshes, level sets and points.
 
 use std::path::{Path, PathBuf};
 
-use frazil::base::DVec3;
+use frazil::base::{DVec3, Points};
 use frazil::motion::{Character, Play, is_gltf};
-use frazil::render::{Camera, Light, Model, Models, Size};
-use frazil::{Context, io};
+use frazil::render::{Camera, Cloud, Light, Model, Models, Size};
+use frazil::{Context, Error, io};
 
 use super::exit::{Failure, Phase};
 use super::session::Session;
 use super::{options, output};
 
-/// Draw meshes and level sets into a PNG.
+/// Draw meshes, level sets and points into a PNG.
 #[derive(clap::Args)]
 #[command(
     after_help = "Examples:\n  frazil preview cache/base/base.0048.vdb boot.obj -o print.png --eye 1,1.5,2 --target 0,0,1\n  \
-                  frazil preview hero.glb --clip walk --frame 12 -o pose.png"
+                  frazil preview hero.glb --clip walk --frame 12 -o pose.png\n  \
+                  frazil preview grains.0001.vdb -o grains.png --color v"
 )]
 pub struct Args {
-    /// .vdb (its first level set, else a fog volume), a mesh or a character.
+    /// .vdb (its first level set, else a fog volume, else points), a mesh, a character or points (.ply).
     #[arg(required = true)]
     files: Vec<PathBuf>,
     /// The picture.
     #[arg(short, long, value_name = "PNG")]
     output: PathBuf,
+    /// Attribute that gives points their colours, from dark blue to pale yellow over its values.
+    #[arg(long, value_name = "NAME")]
+    color: Option<String>,
     /// Clip that characters play [default: they are at rest, or play their only clip with --frame].
     #[arg(long, value_name = "NAME")]
     clip: Option<String>,
@@ -71,9 +75,20 @@ pub fn run(args: Args, session: &Session) -> Result<(), Failure> {
     if posed && !args.files.iter().any(|path| is_gltf(path)) {
         return Err(Failure::refused("--clip and --frame are for .glb and .gltf files, and none is given"));
     }
-    let models =
-        args.files.iter().map(|path| model(path, &args, &session.ctx)).collect::<frazil::Result<Vec<_>>>();
-    let models = Models::new(models.before()?);
+    let (mut models, mut clouds) = (Vec::new(), Vec::new());
+    for path in &args.files {
+        match points(path).before()? {
+            Some(points) => {
+                let cloud = Cloud::new(&points, args.color.as_deref());
+                clouds.push(cloud.map_err(|error| Error::file(path, error.to_string())).before()?);
+            }
+            None => models.push(model(path, &args, &session.ctx).before()?),
+        }
+    }
+    if clouds.is_empty() && args.color.is_some() {
+        return Err(Failure::refused("--color is for points, and no file holds any"));
+    }
+    let models = Models::new(models).with_clouds(clouds);
     let bounds =
         models.bounds().ok_or_else(|| Failure::refused("there is nothing to draw: the files are empty"))?;
     let mut camera = Camera::framing(bounds, args.size);
@@ -89,6 +104,20 @@ pub fn run(args: Args, session: &Session) -> Result<(), Failure> {
     };
     let picture = models.draw(&session.ctx, &camera, &light, args.size).during()?;
     picture.write(&args.output).during()
+}
+
+/// The points of a file, if that is what it is drawn as.
+fn points(path: &Path) -> frazil::Result<Option<Points>> {
+    match io::mesh::extension(path).as_str() {
+        #[cfg(feature = "vdb")]
+        "vdb" => super::vdb::model::points_of(path),
+        "ply" if io::points_ply::holds_points(path)? => {
+            let cloud = io::points_ply::read(path)?;
+            let voxel = cloud.voxel_size.unwrap_or(0.01);
+            cloud.into_points(Some(voxel)).map(Some).map_err(|error| Error::file(path, error.to_string()))
+        }
+        _ => Ok(None),
+    }
 }
 
 #[cfg_attr(not(feature = "vdb"), expect(unused_variables, reason = "meshes of grids are made by threads"))]

@@ -89,11 +89,31 @@ impl Camera {
 
     /// Unit direction through a point of the picture, in pixels from its upper left corner.
     pub fn through(&self, x: f64, y: f64, size: Size) -> DVec3 {
-        let [right, up, ahead] = self.axes();
+        self.lens(size).through(x, y)
+    }
+
+    /// What all directions through a picture have in common.
+    pub(super) fn lens(&self, size: Size) -> Lens {
         let half = libm::tan(self.fov_deg.to_radians() * 0.5);
-        let (width, height) = (f64::from(size.width), f64::from(size.height));
-        let across = (2.0 * x - width) / height * half;
-        let upward = (height - 2.0 * y) / height * half;
+        Lens { axes: self.axes(), half, size }
+    }
+}
+
+/// A camera and a picture.
+pub(super) struct Lens {
+    axes: [DVec3; 3],
+    /// Tangent of half the angle of view.
+    half: f64,
+    size: Size,
+}
+
+impl Lens {
+    /// As [`Camera::through`].
+    pub fn through(&self, x: f64, y: f64) -> DVec3 {
+        let [right, up, ahead] = self.axes;
+        let (width, height) = (f64::from(self.size.width), f64::from(self.size.height));
+        let across = (2.0 * x - width) / height * self.half;
+        let upward = (height - 2.0 * y) / height * self.half;
         (ahead + right * across + up * upward).normalize()
     }
 }

@@ -1,4 +1,4 @@
-//! Preview pictures of meshes and level sets: sun, sky and shadows, so that the depth of a print reads.
+//! Preview pictures of meshes, level sets and points: sun, sky and shadows, so that the depth of a print reads.
 //!
 //! ```no_run
 //! # use frazil::{Context, Pool, io, render::{Camera, Light, Model, Size, Models}};
@@ -12,14 +12,17 @@
 //! ```
 
 mod camera;
+mod cloud;
 mod model;
 mod models;
 mod picture;
+mod ramp;
 mod shade;
 #[cfg(feature = "vdb")]
 mod volume;
 
 pub use camera::{Camera, Size};
+pub use cloud::Cloud;
 pub use model::Model;
 pub use models::Models;
 pub use picture::Picture;

@@ -1,6 +1,7 @@
 //! Everything that is in the picture, and the drawing of it.
 
-use super::camera::{Camera, Size};
+use super::camera::{Camera, Lens, Size};
+use super::cloud::{Cloud, Splats};
 use super::model::{Hit, Model};
 use super::picture::Picture;
 use super::shade::{Colour, Light, shade, to_bytes};
@@ -17,17 +18,25 @@ const LONGEST: u32 = 16_384;
 /// The models in one picture.
 pub struct Models {
     models: Vec<Model>,
+    clouds: Vec<Cloud>,
 }
 
 impl Models {
     /// Puts models together.
     pub fn new(models: Vec<Model>) -> Self {
-        Self { models }
+        Self { models, clouds: Vec::new() }
+    }
+
+    /// With clouds of points beside them. Points get light from the sun and the sky as far as models let it through;
+    /// they cast no shadows themselves.
+    pub fn with_clouds(self, clouds: Vec<Cloud>) -> Self {
+        Self { clouds, ..self }
     }
 
     /// Least and greatest corner of everything (m); none when all is empty.
     pub fn bounds(&self) -> Option<(DVec3, DVec3)> {
-        let boxes = self.models.iter().filter_map(Model::bounds);
+        let boxes =
+            self.models.iter().filter_map(Model::bounds).chain(self.clouds.iter().filter_map(Cloud::bounds));
         boxes.reduce(|a, b| (a.0.inf(&b.0), a.1.sup(&b.1)))
     }
 
@@ -41,12 +50,14 @@ impl Models {
             return Err(Error::argument(what));
         }
         ctx.phase("draw", || {
+            let splats = Splats::new(ctx, &self.clouds, camera, size, SAMPLES)?;
+            let lens = camera.lens(size);
             let row_bytes = 3 * size.width as usize;
             let mut rgb = vec![0; row_bytes * size.height as usize];
             rgb.par_chunks_mut(row_bytes).enumerate().try_for_each(|(y, row)| {
                 ctx.check()?;
                 for (x, pixel) in row.chunks_mut(3).enumerate() {
-                    pixel.copy_from_slice(&self.pixel(camera, light, size, x as u32, y as u32));
+                    pixel.copy_from_slice(&self.pixel(&splats, &lens, camera.eye, light, [x, y]));
                 }
                 Ok(())
             })?;
@@ -54,21 +65,28 @@ impl Models {
         })
     }
 
-    fn pixel(&self, camera: &Camera, light: &Light, size: Size, x: u32, y: u32) -> [u8; 3] {
+    fn pixel(
+        &self,
+        splats: &Splats<'_>,
+        lens: &Lens,
+        eye: DVec3,
+        light: &Light,
+        [x, y]: [usize; 2],
+    ) -> [u8; 3] {
         let mut sum = Colour::zeros();
         for sample in 0..SAMPLES * SAMPLES {
             let inside = |index: usize| (index as f64 + 0.5) / SAMPLES as f64;
-            let across = f64::from(x) + inside(sample % SAMPLES);
-            let down = f64::from(y) + inside(sample / SAMPLES);
-            let toward = camera.through(across, down, size);
-            sum += self.seen(camera.eye, toward, light, sample);
+            let (right, down) = (sample % SAMPLES, sample / SAMPLES);
+            let toward = lens.through(x as f64 + inside(right), y as f64 + inside(down));
+            let splat = splats.at(x * SAMPLES + right, y * SAMPLES + down, eye, toward);
+            sum += self.seen(eye, toward, light, sample, splat);
         }
         to_bytes(sum / (SAMPLES * SAMPLES) as f64)
     }
 
-    /// Light that comes along a ray.
-    fn seen(&self, eye: DVec3, toward: DVec3, light: &Light, sample: usize) -> Colour {
-        let hits = self.models.iter().filter_map(|model| model.hit(eye, toward));
+    /// Light that comes along a ray, which meets a point of a cloud or none.
+    fn seen(&self, eye: DVec3, toward: DVec3, light: &Light, sample: usize, splat: Option<Hit>) -> Colour {
+        let hits = self.models.iter().filter_map(|model| model.hit(eye, toward)).chain(splat);
         let nearest = hits.reduce(|a: Hit, b| if b.distance < a.distance { b } else { a });
         let Some(hit) = nearest else { return light.background(toward) };
         let point = eye + toward * hit.distance + hit.normal * hit.skin;

@@ -2,6 +2,8 @@
 //!
 //! Everything is a function of the pixel alone, so a picture does not depend on the number of threads.
 
+use std::sync::LazyLock;
+
 use super::camera::{Camera, direction};
 use crate::base::DVec3;
 
@@ -29,6 +31,8 @@ const BOUNCED: Colour = Colour::new(0.085, 0.115, 0.165);
 const SUN_RADIUS: f64 = 0.02;
 /// Sky rays at each sample of a pixel.
 pub(super) const SKY_RAYS: usize = 4;
+/// Points of the disc that are kept: for the 9 samples of a pixel.
+const DISC_POINTS: usize = 9 * SKY_RAYS;
 
 impl Light {
     /// A sun at an azimuth (from +z towards +x) and an elevation above the horizon (degrees).
@@ -86,10 +90,15 @@ pub(super) fn shade(
 /// A point of the unit disc: the plastic sequence (Roberts 2018), the same at each pixel: flat walls stay flat.
 fn disc(index: usize) -> (f64, f64) {
     const PLASTIC: f64 = 1.324_717_957_244_746;
-    let step = index as f64 + 1.0;
-    let radius = (step / PLASTIC).fract().sqrt();
-    let angle = std::f64::consts::TAU * (step / (PLASTIC * PLASTIC)).fract();
-    (radius * libm::cos(angle), radius * libm::sin(angle))
+    static POINTS: LazyLock<[(f64, f64); DISC_POINTS]> = LazyLock::new(|| {
+        std::array::from_fn(|index| {
+            let step = index as f64 + 1.0;
+            let radius = (step / PLASTIC).fract().sqrt();
+            let angle = std::f64::consts::TAU * (step / (PLASTIC * PLASTIC)).fract();
+            (radius * libm::cos(angle), radius * libm::sin(angle))
+        })
+    });
+    POINTS[index % DISC_POINTS]
 }
 
 /// Two unit vectors at right angles to a unit vector and to each other.

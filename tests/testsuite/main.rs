@@ -22,6 +22,7 @@ mod cli {
     mod honest;
     mod limits;
     mod outputs;
+    mod points;
     mod runs;
     mod speed;
     mod tools;
@@ -41,6 +42,7 @@ mod motion {
     mod gltf;
 }
 mod render {
+    mod points;
     mod preview;
 }
 mod scene {

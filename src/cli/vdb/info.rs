@@ -3,7 +3,7 @@
 use std::path::Path;
 
 use frazil::Context;
-use frazil::vdb::{MetaValue, file, level_set};
+use frazil::vdb::{MetaValue, file, level_set, points};
 use serde_json::{Map, Value, json};
 
 /// A .vdb file's grids: what they are, and on request the area and volume of level sets.
@@ -26,6 +26,11 @@ pub fn grids(path: &Path, measure: bool, ctx: &Context) -> frazil::Result<Vec<Va
             set("area_m2", json!(size.area));
             set("volume_m3", json!(size.volume));
         }
+        if grid.value_type.starts_with("Tree_ptdataidx32") {
+            let points = points::read(path, Some(&grid.name))?;
+            entry.extend(crate::cli::cloud::described(&points));
+        }
+        let mut set = |key: &str, value: Value| entry.insert(key.into(), value);
         for (key, value) in grid.metadata.iter().filter(|(key, _)| !key.starts_with("file_")) {
             set(key, meta(value));
         }

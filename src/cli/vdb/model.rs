@@ -2,8 +2,9 @@
 
 use std::path::Path;
 
+use frazil::base::Points;
 use frazil::render::Model;
-use frazil::vdb::{GridClass, file};
+use frazil::vdb::{GridClass, file, points};
 use frazil::{Context, Error};
 
 /// The level set of a file, or its fog volume.
@@ -22,4 +23,14 @@ pub fn of_file(path: &Path, ctx: &Context) -> frazil::Result<Model> {
         grid.name()
     );
     Ok(model)
+}
+
+/// The points of a file that has no grid of floats.
+pub fn points_of(path: &Path) -> frazil::Result<Option<Points>> {
+    let grids = file::describe(path)?;
+    let has = |start: &str| grids.iter().any(|grid| grid.value_type.starts_with(start));
+    if has("Tree_float") || !has("Tree_ptdataidx32") {
+        return Ok(None);
+    }
+    points::read(path, None).map(Some)
 }

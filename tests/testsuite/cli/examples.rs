@@ -5,7 +5,7 @@ use std::fs;
 use std::path::Path;
 
 use crate::common::hero;
-use crate::program::CUBE;
+use crate::program::{CUBE, GRAINS};
 
 const README: &str = include_str!("../../../README.md");
 const CLI: &str = include_str!("../../../docs/cli.md");
@@ -123,6 +123,25 @@ fn the_page_of_the_command_line_runs() {
     assert_eq!(count, 9);
 }
 
+/// Two frames of points.
+fn write_grains(folder: &Path) {
+    fs::write(folder.join("any.ply"), GRAINS).unwrap();
+    for frame in [1, 2] {
+        works(folder, &format!("frazil convert any.ply grains.000{frame}.vdb --voxel 0.1"));
+    }
+}
+
+#[test]
+fn the_page_of_the_command_line_handles_points() {
+    let folder = tempfile::tempdir().unwrap();
+    write_grains(folder.path());
+    let lines = lines(block(CLI, "## Points", "sh"));
+    assert_eq!(lines.len(), 5, "{lines:?}");
+    lines.iter().for_each(|line| {
+        works(folder.path(), line);
+    });
+}
+
 /// The commands that a help text lists, each with the command before it.
 fn commands_of(folder: &Path, command: &str) -> Vec<String> {
     let help = works(folder, &format!("{command} --help"));
@@ -149,6 +168,7 @@ fn every_command_has_help_with_an_example_that_runs() {
     }
     works(folder, "frazil vdb from-mesh box.obj --cell 0.02 -o boot.vdb");
     works(folder, "frazil vdb from-mesh box.obj --cell 0.02 -o right.vdb");
+    write_grains(folder);
     let mut commands = vec!["frazil".to_string()];
     commands.extend(commands_of(folder, "frazil"));
     for group in ["frazil vdb", "frazil mesh"] {

@@ -1,0 +1,178 @@
+//! Points in files, for `frazil info` and `frazil convert`.
+
+use std::path::{Path, PathBuf};
+
+use frazil::base::Points;
+use frazil::base::points::Values;
+use frazil::io::mesh::extension;
+use frazil::io::sequence::Pattern;
+use frazil::io::{atomic, points_ply, usd_points};
+use frazil::scene::{FrameChoice, Frames};
+use frazil::{Error, Result};
+use serde_json::{Map, Value, json};
+
+use super::exit::{Failure, Phase};
+use super::output;
+use super::session::Session;
+
+/// What `frazil info` says of points, without the name of their grid.
+pub fn described(points: &Points) -> Map<String, Value> {
+    let mut out = Map::new();
+    out.insert("points".into(), json!(points.count()));
+    out.insert("voxel_m".into(), json!(points.voxel_size));
+    let bounds = points.bounds().map(|(low, high)| (<[f64; 3]>::from(low), <[f64; 3]>::from(high)));
+    out.insert("bounds_m".into(), json!(bounds));
+    for attribute in &points.attributes {
+        let mut entry =
+            json!({ "type": attribute.values.type_name(), "uniform": attribute.values.is_uniform() });
+        if let Some((low, high)) = attribute.values.range() {
+            let is_whole = !matches!(attribute.values, Values::Float(_) | Values::Vector(_));
+            let plain = |numbers: Vec<f64>| match numbers[..] {
+                [number] if is_whole => json!(number as i64),
+                [number] => json!(number),
+                _ => json!(numbers),
+            };
+            (entry["min"], entry["max"]) = (plain(low), plain(high));
+        }
+        out.insert(format!("attribute {}", attribute.name), entry);
+    }
+    out
+}
+
+/// Points of a .ply file, for `frazil info`.
+pub fn info(path: &Path) -> Result<Vec<Value>> {
+    let cloud = points_ply::read(path)?;
+    // Its voxels are of no use where the file has none.
+    let size = cloud.voxel_size.unwrap_or(1.0);
+    let known = cloud.voxel_size.is_some();
+    let points = cloud.into_points(Some(size)).map_err(|error| Error::file(path, error.to_string()))?;
+    let mut entry = Map::from_iter([("type".to_string(), json!("points"))]);
+    entry.extend(described(&points));
+    if !known {
+        entry.remove("voxel_m");
+    }
+    Ok(vec![Value::Object(entry)])
+}
+
+/// Whether `frazil convert` has points to convert: a .vdb in or out, or a .ply without faces.
+pub fn is_one(input: &Path, output: &Path, frames: Option<&FrameChoice>) -> Result<bool> {
+    if [input, output].iter().any(|path| extension(path) == "vdb") {
+        return Ok(true);
+    }
+    let first = frames.map_or(1, FrameChoice::first);
+    let one = Pattern::parse(input).map_or_else(|| input.to_path_buf(), |pattern| pattern.path(first));
+    Ok(extension(input) == "ply"
+        && ["ply", "usda"].contains(&extension(output).as_str())
+        && one.is_file()
+        && points_ply::holds_points(&one)?)
+}
+
+/// What `frazil convert` does with points.
+pub struct Conversion<'a> {
+    /// File or pattern.
+    pub input: &'a Path,
+    /// File or pattern.
+    pub output: &'a Path,
+    /// Frames of patterns.
+    pub frames: Option<&'a FrameChoice>,
+    /// Frames a second.
+    pub fps: f64,
+    /// Edge of a voxel (m).
+    pub voxel: Option<f64>,
+}
+
+impl Conversion<'_> {
+    /// Converts every frame.
+    pub fn run(&self, session: &Session) -> std::result::Result<(), Failure> {
+        let [input, output] = [self.input, self.output].map(Pattern::parse);
+        if !["vdb", "ply", "usda"].contains(&extension(self.output).as_str()) {
+            let what = "the output for points must be a .vdb, .ply or .usda file";
+            return Err(Failure::refused(format!("{}: {what}", self.output.display())));
+        }
+        if !["vdb", "ply"].contains(&extension(self.input).as_str()) {
+            let what = "points are read from .vdb and .ply files";
+            return Err(Failure::refused(format!("{}: {what}", self.input.display())));
+        }
+        if input.is_some() && self.frames.is_none() {
+            let what = format!("{}: a sequence needs --frames A-B", self.input.display());
+            return Err(Failure::refused(what));
+        }
+        if input.is_none() && self.frames.is_some_and(|frames| frames.count() > 1) {
+            return Err(Failure::refused("several --frames are of no use with one file of points"));
+        }
+        let frames = self.frames.cloned().unwrap_or_else(|| FrameChoice::from(Frames { first: 1, last: 1 }));
+        if output.is_none() && frames.count() > 1 {
+            let what =
+                format!("{}: several frames need a pattern such as grains.%04d.ply", self.output.display());
+            return Err(Failure::refused(what));
+        }
+        let place = |pattern: &Option<Pattern>, path: &Path, frame: i32| -> PathBuf {
+            pattern.as_ref().map_or_else(|| path.to_path_buf(), |pattern| pattern.path(frame))
+        };
+        output::check_writable(self.output).before()?;
+        for frame in frames.iter() {
+            let from = place(&input, self.input, frame);
+            output::refuse_input(&place(&output, self.output, frame), [from.as_path()]).before()?;
+        }
+        let mut count = 0;
+        for (n, frame) in frames.iter().enumerate() {
+            session.ctx.check().during()?;
+            let read = self.read(&place(&input, self.input, frame));
+            // What the first file is without, no frame can be begun with.
+            let points = if n == 0 { read.before()? } else { read.during()? };
+            self.write(&place(&output, self.output, frame), frame, &points, session).during()?;
+            count += points.count();
+        }
+        session.record("frames", json!(frames.count()));
+        session.record("points", json!(count));
+        Ok(())
+    }
+
+    fn read(&self, path: &Path) -> Result<Points> {
+        if extension(path) == "vdb" {
+            return points_of_vdb(path);
+        }
+        // Only .vdb files store voxels.
+        let any = (extension(self.output) != "vdb").then_some(1.0);
+        let cloud = points_ply::read(path)?;
+        let voxel = self.voxel.or(cloud.voxel_size).or(any);
+        if voxel.is_none() {
+            let what = "does not say how large the voxels of its points are: give --voxel";
+            return Err(Error::file(path, what));
+        }
+        cloud.into_points(voxel).map_err(|error| Error::file(path, error.to_string()))
+    }
+
+    #[cfg_attr(not(feature = "vdb"), expect(unused_variables, reason = "grids are made by threads"))]
+    fn write(&self, path: &Path, frame: i32, points: &Points, session: &Session) -> Result<()> {
+        match extension(path).as_str() {
+            #[cfg(feature = "vdb")]
+            "vdb" => {
+                use frazil::vdb::{file::WriteOptions, points};
+                points::write(&session.ctx, path, NAME, points, &WriteOptions::default())
+            }
+            #[cfg(not(feature = "vdb"))]
+            "vdb" => super::needs_openvdb(path),
+            "ply" => points_ply::write(path, points),
+            _ => {
+                let stem = self.input.file_stem().unwrap_or_default().to_string_lossy().into_owned();
+                let name = stem.split(['%', '#', '$', '.']).next().unwrap_or_default();
+                atomic::write_bytes(path, usd_points::frame(name, frame, self.fps, points).as_bytes())
+            }
+        }
+    }
+}
+
+/// Name of the grid of points in files that we write.
+#[cfg(feature = "vdb")]
+const NAME: &str = "grains";
+
+#[cfg(feature = "vdb")]
+fn points_of_vdb(path: &Path) -> Result<Points> {
+    frazil::vdb::points::read(path, None)
+}
+
+#[cfg(not(feature = "vdb"))]
+fn points_of_vdb(path: &Path) -> Result<Points> {
+    super::needs_openvdb(path)
+}
