@@ -161,9 +161,9 @@ std::unique_ptr<VectorGrid> assemble_vectors(rust::Slice<const uint8_t> head, st
                                              rust::Slice<const Tile> tiles);
 void end_workers() noexcept;
 
-std::unique_ptr<PointGrid> make_points(const Call& call, double voxel, rust::Str name,
-                                       rust::Slice<const int32_t> cells, rust::Slice<const PointArray> arrays,
-                                       rust::Slice<const uint32_t> order, rust::Slice<const size_t> starts);
+std::unique_ptr<PointGrid> make_points(const Call& call, double voxel, rust::Str name, rust::Slice<const int32_t> cells,
+                                       rust::Slice<const PointArray> arrays, rust::Slice<const uint32_t> order,
+                                       rust::Slice<const size_t> starts);
 PointsHead points_head(const PointGrid& grid, const Call& call);
 void point_cells(const PointGrid& grid, const Call& call, rust::Slice<int32_t> out);
 void point_values(const PointGrid& grid, const Call& call, rust::Str attribute, int32_t kind, size_t address,

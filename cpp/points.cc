@@ -28,12 +28,23 @@ constexpr const char* POINT_TYPES[POINT_KINDS] = {"float", "int32", "int64", "bo
 template <typename Work>
 void with_type(int32_t kind, Work&& work) {
     switch (kind) {
-        case POINT_FLOAT: work(float()); break;
-        case POINT_INT32: work(int32_t()); break;
-        case POINT_INT64: work(int64_t()); break;
-        case POINT_BOOL: work(bool()); break;
-        case POINT_VEC3: work(openvdb::Vec3f()); break;
-        default: throw std::invalid_argument("an attribute of unknown type");
+        case POINT_FLOAT:
+            work(float());
+            break;
+        case POINT_INT32:
+            work(int32_t());
+            break;
+        case POINT_INT64:
+            work(int64_t());
+            break;
+        case POINT_BOOL:
+            work(bool());
+            break;
+        case POINT_VEC3:
+            work(openvdb::Vec3f());
+            break;
+        default:
+            throw std::invalid_argument("an attribute of unknown type");
     }
 }
 
@@ -80,11 +91,13 @@ struct PointLeaves {
 const AttributeArray& array_of(const PointLeaf& leaf, const std::string& name) {
     const AttributeArray* array = leaf.attributeSet().getConst(name);
     if (array == nullptr) throw std::runtime_error("leaves of points that differ in their attributes");
-    if (array->size() != leaf.getLastValue()) throw std::runtime_error("arrays that differ from their number of points");
+    if (array->size() != leaf.getLastValue())
+        throw std::runtime_error("arrays that differ from their number of points");
     return *array;
 }
 
-/// Copies values, decoded, to where the Rust side holds them; 1 when the array is uniform and `once` asks for that value.
+/// Copies values, decoded, to where the Rust side holds them; 1 when the array is uniform and `once` asks for that
+/// value.
 template <typename T>
 void copy_values(const AttributeArray& array, size_t count, Held<T>* out) {
     using Plain = openvdb::points::TypedAttributeArray<T>;
@@ -137,9 +150,9 @@ std::unique_ptr<PointGrid> wrap_points(openvdb::GridBase::Ptr grid) {
     return std::make_unique<PointGrid>(std::make_unique<PointGrid::Impl>(PointGrid::Impl{std::move(grid)}));
 }
 
-std::unique_ptr<PointGrid> make_points(const Call& call, double voxel, rust::Str name,
-                                       rust::Slice<const int32_t> cells, rust::Slice<const PointArray> arrays,
-                                       rust::Slice<const uint32_t> order, rust::Slice<const size_t> starts) {
+std::unique_ptr<PointGrid> make_points(const Call& call, double voxel, rust::Str name, rust::Slice<const int32_t> cells,
+                                       rust::Slice<const PointArray> arrays, rust::Slice<const uint32_t> order,
+                                       rust::Slice<const size_t> starts) {
     return run(call, [&] {
         using openvdb::Name;
         AttributeSet::Descriptor::Ptr descriptor;
@@ -238,8 +251,8 @@ PointsHead points_head(const PointGrid& grid, const Call& call) {
                     const AttributeArray& other = array_of(*leaf, name);
                     Held<T> there;
                     if (attribute.uniform && other.isUniform()) copy_values<T>(other, 1, &there);
-                    attribute.uniform = attribute.uniform && other.isUniform() &&
-                                        std::memcmp(&expected, &there, sizeof there) == 0;
+                    attribute.uniform =
+                        attribute.uniform && other.isUniform() && std::memcmp(&expected, &there, sizeof there) == 0;
                 }
             });
         }
