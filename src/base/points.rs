@@ -330,7 +330,7 @@ mod tests {
             assert!(error.contains(what), "{error}");
         };
         refused(|points| points.voxel_size = 0.0, "voxel size");
-        refused(|points| drop(points.offsets.pop()), "2 offsets");
+        refused(|points| points.offsets.truncate(2), "2 offsets");
         refused(|points| points.offsets[1][2] = 0.6, "offset of point 2");
         refused(|points| points.offsets[2][0] = f32::NAN, "offset of point 3");
         refused(|points| points.set("m", Values::Int(Column::Each(vec![1]))), "\"m\" has 1 values");

@@ -63,7 +63,7 @@ impl Body<'_> {
         row: usize,
         mut take: impl FnMut(usize, f64),
     ) -> Result<(), String> {
-        if row % PIECE == 0 && source::is_stopped() {
+        if row.is_multiple_of(PIECE) && source::is_stopped() {
             return Err("stopped".into());
         }
         for (n, property) in element.properties.iter().enumerate() {
@@ -97,7 +97,7 @@ pub(super) fn parse(bytes: &[u8]) -> Result<PolygonMesh, String> {
     // An element without properties has no rows in the file, whatever its count.
     for element in elements.iter().filter(|element| !element.properties.is_empty()) {
         for row in 0..element.count {
-            if row % PIECE == 0 && source::is_stopped() {
+            if row.is_multiple_of(PIECE) && source::is_stopped() {
                 return Err("stopped".into());
             }
             read_row(&mut reader, element, &mut parsed).map_err(|fault| fault.at(element, row))?;

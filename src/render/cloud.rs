@@ -12,8 +12,12 @@ use crate::base::points::{Column, Points, Values};
 use crate::context::Context;
 use crate::error::{Error, Result};
 
-/// Rows of samples that a task draws.
-const BAND: usize = 32;
+/// Samples along an edge of a tile, which a task draws.
+const TILE: usize = 32;
+/// Samples of a tile.
+const AREA: usize = TILE * TILE;
+/// Spheres between two looks at whether a tile is full.
+const LOOK: usize = 64;
 /// Least radius of a sphere on the picture (samples): a smaller one could slip between samples.
 const LEAST_SEEN: f64 = 0.75;
 
@@ -86,11 +90,14 @@ impl Cloud {
 /// The nearest sphere at each sample of a picture.
 pub(super) struct Splats<'a> {
     clouds: &'a [Cloud],
-    /// Samples in a row.
-    width: usize,
-    /// For each sample the distance along its ray (m), and cloud and sphere; infinity where there is none.
-    nearest: Vec<(f32, u32, u32)>,
+    /// Tiles in a row.
+    across: usize,
+    /// For each sample, tile by tile, the distance along its ray (m), and cloud and sphere; infinity where there is none.
+    nearest: Vec<Nearest>,
 }
+
+/// Distance (m), cloud, sphere.
+type Nearest = (f32, u32, u32);
 
 /// A sphere on the picture: the samples that it may cover.
 struct Seen {
@@ -105,8 +112,8 @@ struct Seen {
 }
 
 impl<'a> Splats<'a> {
-    /// Draws clouds with `samples` samples along each edge of a pixel: the same at any number of threads, as each band of
-    /// rows takes the spheres in the same order.
+    /// Draws clouds with `samples` samples along each edge of a pixel: the same at any number of threads, as each tile
+    /// takes the spheres in the same order.
     pub fn new(
         ctx: &Context,
         clouds: &'a [Cloud],
@@ -115,8 +122,9 @@ impl<'a> Splats<'a> {
         samples: usize,
     ) -> Result<Self> {
         let (width, height) = (size.width as usize * samples, size.height as usize * samples);
+        let across = width.div_ceil(TILE);
         if clouds.iter().all(|cloud| cloud.spheres.is_empty()) {
-            return Ok(Self { clouds, width, nearest: Vec::new() });
+            return Ok(Self { clouds, across, nearest: Vec::new() });
         }
         let view = View::new(camera, width, height);
         let mut seen: Vec<Seen> = Vec::new();
@@ -129,41 +137,28 @@ impl<'a> Splats<'a> {
         seen.par_sort_unstable_by(|a, b| {
             a.least.total_cmp(&b.least).then((a.cloud, a.sphere).cmp(&(b.cloud, b.sphere)))
         });
-        let mut bands: Vec<Vec<u32>> = vec![Vec::new(); height.div_ceil(BAND)];
+        let mut tiles: Vec<Vec<u32>> = vec![Vec::new(); across * height.div_ceil(TILE)];
         for (seen, n) in seen.iter().zip(0..) {
-            (seen.rows[0] as usize / BAND..=seen.rows[1] as usize / BAND)
-                .for_each(|band| bands[band].push(n));
+            let [rows, columns] =
+                [seen.rows, seen.columns].map(|[low, high]| low as usize / TILE..=high as usize / TILE);
+            for row in rows {
+                columns.clone().for_each(|column| tiles[row * across + column].push(n));
+            }
         }
-        let mut nearest = vec![(f32::INFINITY, 0, 0); width * height];
-        nearest.par_chunks_mut(width * BAND).zip(&bands).enumerate().try_for_each(
-            |(band, (rows, list))| {
-                ctx.check()?;
-                for &n in list {
-                    let seen = &seen[n as usize];
-                    let sphere = &clouds[seen.cloud as usize].spheres[seen.sphere as usize];
-                    let first = (seen.rows[0] as usize).max(band * BAND);
-                    let last = (seen.rows[1] as usize).min(band * BAND + rows.len() / width - 1);
-                    for y in first..=last {
-                        for x in seen.columns[0] as usize..=seen.columns[1] as usize {
-                            let Some(distance) = view.meet(sphere.centre, seen.radius, x, y) else {
-                                continue;
-                            };
-                            let place = &mut rows[(y - band * BAND) * width + x];
-                            if (distance as f32) < place.0 {
-                                *place = (distance as f32, seen.cloud, seen.sphere);
-                            }
-                        }
-                    }
-                }
-                Ok::<(), Error>(())
-            },
-        )?;
-        Ok(Self { clouds, width, nearest })
+        let mut nearest = vec![(f32::INFINITY, 0, 0); tiles.len() * AREA];
+        nearest.par_chunks_mut(AREA).zip(&tiles).enumerate().try_for_each(|(tile, (place, list))| {
+            ctx.check()?;
+            let corner = [tile % across * TILE, tile / across * TILE];
+            draw_tile(&view, clouds, list.iter().map(|&n| &seen[n as usize]), corner, place);
+            Ok::<(), Error>(())
+        })?;
+        Ok(Self { clouds, across, nearest })
     }
 
     /// The sphere that a ray with this unit direction meets first; the ray goes through a sample of the picture.
     pub fn at(&self, x: usize, y: usize, eye: DVec3, toward: DVec3) -> Option<Hit> {
-        let (distance, cloud, sphere) = *self.nearest.get(y * self.width + x)?;
+        let tile = y / TILE * self.across + x / TILE;
+        let (distance, cloud, sphere) = *self.nearest.get(tile * AREA + y % TILE * TILE + x % TILE)?;
         if distance.is_infinite() {
             return None;
         }
@@ -173,6 +168,44 @@ impl<'a> Splats<'a> {
         let normal = (eye + toward * distance - centre).try_normalize(0.0).unwrap_or(-toward);
         let skin = 0.01 * radius.max(1e-9);
         Some(Hit { distance, normal, albedo: Colour::from(albedo.map(f64::from)), skin })
+    }
+}
+
+/// Draws the spheres of a tile, from front to back; it ends when nothing that comes can be seen.
+fn draw_tile<'s>(
+    view: &View,
+    clouds: &[Cloud],
+    list: impl Iterator<Item = &'s Seen>,
+    corner: [usize; 2],
+    tile: &mut [Nearest],
+) {
+    // Samples of the last tiles that lie outside the picture never fill.
+    let [right, bottom] = [(view.width - corner[0]).min(TILE), (view.height - corner[1]).min(TILE)];
+    for (n, seen) in list.enumerate() {
+        if n.is_multiple_of(LOOK) {
+            let rows = tile.chunks(TILE).take(bottom);
+            if rows.flat_map(|row| &row[..right]).all(|place| place.0 <= seen.least) {
+                return;
+            }
+        }
+        let centre = clouds[seen.cloud as usize].spheres[seen.sphere as usize].centre;
+        let inside = |[low, high]: [u32; 2], corner: usize, count: usize| {
+            (low as usize).max(corner) - corner..=(high as usize - corner).min(count - 1)
+        };
+        for y in inside(seen.rows, corner[1], bottom) {
+            for x in inside(seen.columns, corner[0], right) {
+                let place = &mut tile[y * TILE + x];
+                if place.0 <= seen.least {
+                    continue;
+                }
+                let Some(distance) = view.meet(centre, seen.radius, corner[0] + x, corner[1] + y) else {
+                    continue;
+                };
+                if (distance as f32) < place.0 {
+                    *place = (distance as f32, seen.cloud, seen.sphere);
+                }
+            }
+        }
     }
 }
 

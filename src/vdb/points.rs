@@ -230,14 +230,10 @@ fn place(points: &mut Points, head: &ffi::PointsHead) -> std::result::Result<(),
     }
     // Row vectors are multiplied from the left: element (row, column) stands at 4 x row + column.
     let m = &head.to_world;
-    let identity = |n: usize| {
-        if n % 5 != 0 {
-            0.0
-        } else if n == 15 {
-            1.0
-        } else {
-            head.voxel
-        }
+    let identity = |n: usize| match n {
+        0 | 5 | 10 => head.voxel,
+        15 => 1.0,
+        _ => 0.0,
     };
     let is_own = (0..16).all(|n| m[n] == identity(n));
     let inside = |offset: &[f32; 3]| offset.iter().all(|part| (-0.5..=0.5).contains(part));

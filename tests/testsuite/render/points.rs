@@ -43,7 +43,7 @@ fn a_sphere_covers_what_a_sphere_covers() {
             let distance = offset.cross(&toward).norm();
             expected += u32::from(distance <= 1.0);
             // Pixels at the edge are covered in part.
-            if distance < 0.95 || distance > 1.05 {
+            if !(0.95..=1.05).contains(&distance) {
                 assert_eq!(seen.contains(&(x, y)), distance < 1.0, "{centre:?} at {x} {y}");
             }
         }
