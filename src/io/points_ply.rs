@@ -163,10 +163,23 @@ fn shared<T: Copy, K: PartialEq>(values: Vec<T>, key: impl Fn(&T) -> K) -> Colum
 /// # Errors
 /// 64-bit integers that a `double` does not hold; what the operating system reports.
 pub fn write(path: &Path, points: &Points) -> Result<()> {
-    let plain =
-        points.attributes.iter().map(|attribute| plain(attribute).map_err(|what| Error::file(path, what)));
-    let plain = plain.collect::<Result<Vec<_>>>()?;
+    let plain = all_plain(points).map_err(|what| Error::file(path, what))?;
     atomic::write(path, |out| write_to(out, points, &plain))
+}
+
+/// The bytes of such a file.
+///
+/// # Errors
+/// As [`write`].
+pub fn to_bytes(points: &Points) -> Result<Vec<u8>> {
+    let plain = all_plain(points).map_err(Error::Argument)?;
+    let mut out = Vec::new();
+    write_to(&mut out, points, &plain).map_err(|error| Error::Internal(error.to_string()))?;
+    Ok(out)
+}
+
+fn all_plain(points: &Points) -> std::result::Result<Vec<Plain<'_>>, String> {
+    points.attributes.iter().map(plain).collect()
 }
 
 /// An attribute as PLY holds it.

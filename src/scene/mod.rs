@@ -142,6 +142,12 @@ pub struct Output {
     pub half: bool,
     /// `removed/removed.%04d.vdb`.
     pub removed: bool,
+    /// `grains/grains.%04d.vdb`: grains as points.
+    pub grains_vdb: bool,
+    /// `grains/grains.%04d.ply`.
+    pub grains_ply: bool,
+    /// `grains/grains.%04d.usda`.
+    pub grains_usd: bool,
     /// `objects/objects.%04d.usda`: the objects as they moved, with velocities.
     pub objects_usd: bool,
     /// `objects/objects.%04d.ply`: the same, all in one mesh.

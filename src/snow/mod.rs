@@ -2,6 +2,9 @@
 
 #[cfg(feature = "vdb")]
 pub mod base_layer;
+pub mod grain_friction;
+#[cfg(feature = "vdb")]
+pub mod grains;
 mod noise;
 
 pub use noise::NoiseParams;

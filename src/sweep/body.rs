@@ -124,6 +124,11 @@ impl Body {
         self.shape.contradictions
     }
 
+    /// Whether its triangles face inward as its motion has them.
+    pub fn is_reversed(&self) -> bool {
+        self.shape.reversed
+    }
+
     /// Whether its imprints have ragged edges.
     pub fn has_noise(&self) -> bool {
         self.noise

@@ -232,9 +232,15 @@ fn read_grids(done: &Stored, frame: i32) -> Result<Grids> {
 
 /// A frame's .vdb file.
 fn vdb_bytes(scene: &Scene, frame: i32, grids: &[&FloatGrid], made_from: &str) -> Result<Vec<u8>> {
+    let metadata = metadata(scene, frame, made_from);
+    to_bytes(grids, &WriteOptions { metadata, half: scene.output.half, ..WriteOptions::default() })
+}
+
+/// What every .vdb file of a shot says of itself.
+pub(super) fn metadata(scene: &Scene, frame: i32, made_from: &str) -> Vec<(String, MetaValue)> {
     let fps = scene.shot.fps;
     let text = |text: &str| MetaValue::Text(text.into());
-    let metadata = vec![
+    vec![
         ("frazil:frame".into(), MetaValue::Int(frame.into())),
         ("frazil:fps".into(), MetaValue::Double(fps)),
         ("frazil:seconds".into(), MetaValue::Double(f64::from(frame) / fps)),
@@ -242,8 +248,7 @@ fn vdb_bytes(scene: &Scene, frame: i32, grids: &[&FloatGrid], made_from: &str) -
         ("frazil:up".into(), text("y")),
         ("frazil:version".into(), text(env!("CARGO_PKG_VERSION"))),
         ("frazil:inputs".into(), text(made_from)),
-    ];
-    to_bytes(grids, &WriteOptions { metadata, half: scene.output.half, ..WriteOptions::default() })
+    ]
 }
 
 fn told(report: StepReport) -> Report {

@@ -184,6 +184,11 @@ impl Inputs {
         }
     }
 
+    /// What the snow lies on: static objects.
+    pub(super) fn statics(&self) -> &[TriMesh] {
+        &self.statics
+    }
+
     /// The snow where it is given as a level set.
     pub(super) fn given(&self) -> Option<&FloatGrid> {
         match &self.source {

@@ -9,6 +9,8 @@ use crate::snow::NoiseParams;
 
 type Scopes = &'static [(&'static str, Scope)];
 const FIRST: Scopes = &[("base", Scope::First)];
+/// Grains fall on the ground too.
+const GROUND: Scopes = &[("base", Scope::First), ("grains", Scope::First)];
 const STEP: Scopes = &[("base", Scope::Step)];
 
 /// Edges of voxels (m).
@@ -26,11 +28,11 @@ pub const KEYS: &[Key] = &[
     )
     .or_nothing()
     .begins_with("0.0")
-    .concerns(FIRST),
+    .concerns(GROUND),
     Key::new("snow", "area", Kind::Numbers(4, FAR, "m"), "of the plane: x0, z0, x1, z1 (m)")
         .or_nothing()
         .begins_with("[-3.0, -3.0, 3.0, 3.0]")
-        .concerns(FIRST),
+        .concerns(GROUND),
     Key::new("snow", "depth", Kind::Number(1.0e-4, 1000.0, "m"), "above ground and static objects (m)")
         .or_nothing()
         .begins_with("0.3")
@@ -164,6 +166,9 @@ impl Snow {
         values.set_number("snow.cell", cell);
         values.set_number("snow.noise.size", noise.size);
         values.set_number("snow.noise.amplitude", noise.amplitude);
+        if let Some(radius) = values.number("grains.radius") {
+            values.set_number("grains.radius", radius * factor);
+        }
         Ok(())
     }
 }

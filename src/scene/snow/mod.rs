@@ -1,5 +1,5 @@
 //! Snow in scenes: its keys, and with OpenVDB what its files hold ([`Inputs`]), what a check says of it ([`check`]), what memory
-//! it takes, and its stages: the base layer (`base.rs`).
+//! it takes, and its stages: the base layer (`base.rs`) and grains (`grains.rs`).
 
 #[cfg(feature = "vdb")]
 mod base;
@@ -9,6 +9,9 @@ pub mod check;
 mod course;
 #[cfg(feature = "vdb")]
 mod disk;
+mod grain_keys;
+#[cfg(feature = "vdb")]
+mod grains;
 #[cfg(feature = "vdb")]
 mod inputs;
 mod keys;
@@ -25,6 +28,7 @@ mod settings;
 #[cfg(feature = "vdb")]
 mod walks;
 
+pub(super) use grain_keys::{GRAIN_KEYS, has_grains};
 pub(super) use keys::KEYS;
 #[cfg(feature = "vdb")]
 pub use {

@@ -110,6 +110,7 @@ fn read_table<'d>(
     let table = match root.table(name, &heading(name), &known(keys, name))? {
         Some(table) => table,
         None if name == "shot" => return Err(root.error(name, "is missing")),
+        None if keys::OPTIONAL.contains(&name) => return Ok(()),
         None if keys.iter().any(|key| key.table == name && key.fallback == Fallback::Required) => {
             return Ok(());
         }

@@ -4,7 +4,7 @@ use super::table::Table;
 use super::values::{Value, Values};
 use crate::error::Result;
 use crate::motion::{Space, Up};
-use crate::scene::{BaseMode, Frames, Object, Output, Role, Shot};
+use crate::scene::{BaseMode, Frames, Object, Output, Role, Shot, snow};
 
 impl Shot {
     pub(super) fn of(values: &Values) -> Self {
@@ -57,6 +57,9 @@ impl Output {
             base_mode: if mode == Some("delta") { BaseMode::Delta } else { BaseMode::Full },
             half: flag("output.half"),
             removed: holds("output.removed", "vdb"),
+            grains_vdb: holds("output.grains", "vdb"),
+            grains_ply: holds("output.grains", "ply"),
+            grains_usd: holds("output.grains", "usd"),
             objects_usd: holds("output.objects", "usd"),
             objects_ply: holds("output.objects", "ply"),
             usd: flag("output.usd"),
@@ -69,6 +72,12 @@ impl Output {
     /// Values that are not exact where changes are kept.
     pub(super) fn check(table: &Table, values: &Values) -> Result<()> {
         let output = Self::of(values);
+        if snow::has_grains(values) && (output.half || !output.base) {
+            let key = if output.half { "half" } else { "base" };
+            return Err(
+                table.error(key, "leaves out what `[grains]` reads of every frame: exact values of the base")
+            );
+        }
         if output.half && output.base && output.base_mode == BaseMode::Delta {
             return Err(table.error("half", "goes with `base_mode = \"full\"` only: changes must be exact"));
         }

@@ -68,7 +68,7 @@ impl Column {
 pub type Columns = HashMap<[i32; 2], Column>;
 
 /// Fraction of a cell that a level set's solid fills, from the distance at its centre (both in metres).
-pub fn filled(distance: f32, cell: f32) -> f32 {
+pub(in crate::snow) fn filled(distance: f32, cell: f32) -> f32 {
     (0.5 - distance / cell).clamp(0.0, 1.0)
 }
 

@@ -17,6 +17,7 @@ use std::collections::{BTreeSet, HashMap, HashSet};
 
 use rayon::prelude::*;
 
+pub(in crate::snow) use columns::filled;
 pub use grids::{Changes, Grids};
 pub use noise::displace;
 pub use reach::Reach;

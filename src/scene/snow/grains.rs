@@ -1,0 +1,251 @@
+//! The stage `grains`: snow that was removed from the base, pushed, piled and thrown.
+
+use serde_json::json;
+
+use super::base;
+use super::inputs::Inputs;
+use crate::context::Context;
+use crate::error::{Error, Result};
+use crate::io::manifest::Keeps;
+use crate::io::{points_ply, usd_points};
+use crate::scene::shot::{FrameFiles, Kind, Reads, Report, Settings, Stage, Stepped, Stepping, Stored, To};
+use crate::scene::text::key::Scope;
+use crate::scene::text::keys::{self, settings_of};
+use crate::scene::{Role, Scene, moving};
+use crate::snow::base_layer::{Grids, initial};
+use crate::snow::grain_friction;
+use crate::snow::grains::{self, Params, StepReport, Surroundings};
+use crate::vdb::file::WriteOptions;
+use crate::vdb::points;
+
+/// Grains of a scene.
+pub struct Grains<'a> {
+    scene: &'a Scene,
+    inputs: &'a Inputs,
+    /// Friction of each moving object.
+    frictions: Vec<f64>,
+}
+
+/// What the stage carries from frame to frame.
+pub struct State {
+    grains: grains::Grains,
+    /// The layer after a frame.
+    layer: Option<(i32, Grids)>,
+}
+
+/// What a step hands to the writer: the grains after it, where their files are wanted.
+pub struct Step(Option<grains::Grains>);
+
+/// How far below the snow (m) grains are dropped.
+const BELOW: f64 = 1.0;
+
+impl<'a> Grains<'a> {
+    /// Those of a scene.
+    pub fn new(scene: &'a Scene, inputs: &'a Inputs) -> Self {
+        let moving = scene.objects.iter().enumerate().filter(|(_, object)| object.role == Role::Collide);
+        let friction =
+            |index: usize| scene.values.of_object(index, "friction").and_then(|value| value.number());
+        let frictions = moving.map(|(index, _)| friction(index).unwrap_or(0.0)).collect();
+        Self { scene, inputs, frictions }
+    }
+
+    fn params(&self) -> Params {
+        let values = &self.scene.values;
+        let number = |name: &str| values.number(&format!("grains.{name}"));
+        let whole = |name: &str| values.get(&format!("grains.{name}")).and_then(|value| value.whole());
+        let usual = Params::for_cell(self.inputs.snow.cell);
+        let of_repose = || number("repose_angle_deg").map(grain_friction::of_repose);
+        Params {
+            radius: number("radius").unwrap_or(usual.radius),
+            compression: number("compression").unwrap_or(usual.compression),
+            friction: number("friction").or_else(of_repose).unwrap_or(usual.friction),
+            attraction: number("attraction").unwrap_or(usual.attraction),
+            air: number("air").unwrap_or(usual.air),
+            gravity: number("gravity").unwrap_or(usual.gravity),
+            sub_steps: whole("substeps").map(|count| count as u32),
+            most: whole("max").map_or(usual.most, |most| most as usize),
+            seed: whole("seed").unwrap_or(0) as u64,
+        }
+    }
+
+    /// The layer after a frame; from the one before it, where that is at hand and the frame keeps its changes.
+    fn layer(&self, ctx: &Context, stored: &Stored, before: Option<&Grids>, frame: i32) -> Result<Grids> {
+        match before {
+            Some(before) if stored.keeps_changes(frame) => {
+                let mut layer = before.deep_copy()?;
+                base::follow(ctx, stored, &mut layer, frame)?;
+                Ok(layer)
+            }
+            _ => base::grids(ctx, stored, frame),
+        }
+    }
+
+    fn move_grains(
+        &self,
+        ctx: &Context,
+        state: &mut State,
+        layers: [&Grids; 2],
+        frame: i32,
+    ) -> Result<StepReport> {
+        let bodies: Vec<_> = self.inputs.bodies.iter().zip(self.frictions.iter().copied()).collect();
+        let mut statics: Vec<_> = self.inputs.statics().iter().collect();
+        let mut floor = None;
+        match self.inputs.made() {
+            Some((initial::Ground::Plane { height, .. }, _)) => floor = Some(*height),
+            Some((initial::Ground::Mesh(mesh), _)) => statics.push(mesh),
+            None => {}
+        }
+        let surface = &layers[1].surface;
+        let bottom = surface.active_bbox().map_or(0.0, |(low, _)| f64::from(low[1]) * surface.voxel_size());
+        let around = Surroundings {
+            base: [&layers[0].surface, surface],
+            bodies: &bodies,
+            statics: &statics,
+            floor,
+            lowest: floor.map_or(bottom, |floor| floor.min(bottom)) - BELOW,
+        };
+        let time = |frame: i32| f64::from(frame) / self.scene.shot.fps;
+        state.grains.step(ctx, &around, [time(frame - 1), time(frame)], frame).map_err(|error| match error {
+            Error::Argument(what) => Error::file(&self.scene.path, format!("grains: {what}")),
+            other => other,
+        })
+    }
+}
+
+impl Stage for Grains<'_> {
+    fn name(&self) -> &'static str {
+        "grains"
+    }
+
+    fn noun(&self) -> &'static str {
+        "grains"
+    }
+
+    fn kinds(&self) -> &'static [Kind] {
+        &[Kind { name: "grains", extensions: &["vdb", "ply", "usda"] }]
+    }
+
+    fn writes(&self, _kind: &str) -> bool {
+        let output = self.scene.output;
+        output.grains_vdb || output.grains_ply || output.grains_usd
+    }
+
+    fn state_extension(&self) -> &'static str {
+        "grains"
+    }
+
+    fn settings(&self) -> Result<Settings> {
+        let mut settings =
+            settings_of(self.scene, self.name(), &self.inputs.seen, &[Role::Collide, Role::Static])?;
+        let files = self.scene.snow.iter().flat_map(|snow| snow.files());
+        for (key, path) in files.filter(|(key, _)| *key == "snow.ground") {
+            settings.insert(
+                key.into(),
+                format!("{}{}", crate::scene::shot::CONTENT, self.inputs.seen.hash(path)?),
+            );
+        }
+        Ok(settings)
+    }
+
+    fn of_first_state(&self, settings: &Settings) -> Settings {
+        let firsts = keys::all().iter().filter(|key| key.scope("grains") == Some(Scope::First));
+        let firsts: Vec<String> = firsts.map(|key| format!("{}.{}", key.table, key.name)).collect();
+        settings
+            .iter()
+            .filter(|(key, _)| firsts.contains(key))
+            .map(|(key, value)| (key.clone(), value.clone()))
+            .collect()
+    }
+
+    fn upstream(&self) -> &'static [&'static str] {
+        &["base"]
+    }
+
+    fn reads(&self, frame: i32) -> Reads {
+        Reads { files: moving::files(self.scene, frame), ahead: Vec::new() }
+    }
+
+    fn keeps(&self, _frame: i32) -> Keeps {
+        Keeps::State
+    }
+}
+
+impl Stepping for Grains<'_> {
+    type State = State;
+    type Step = Step;
+    type Writer = Context;
+
+    fn load(&self, _ctx: &Context, done: &Stored, after: Option<i32>) -> Result<State> {
+        let grains = match after {
+            None => grains::Grains::new(self.params()),
+            Some(frame) => {
+                let path = done.state_file(frame)?;
+                let bytes = std::fs::read(&path).map_err(|error| Error::io(&path, "read", error))?;
+                grains::Grains::resume(self.params(), &bytes)
+                    .map_err(|error| Error::file(path, error.to_string()))
+            }
+        };
+        let grains = grains.map_err(|error| match error {
+            Error::Argument(what) => Error::file(&self.scene.path, format!("grains: {what}")),
+            other => other,
+        })?;
+        Ok(State { grains, layer: None })
+    }
+
+    fn step(&self, ctx: &Context, state: &mut State, to: &To<'_>) -> Result<Stepped<Step>> {
+        let [stored] = to.upstream else { return Err(Error::Internal("grains read one stage".into())) };
+        let frame = to.frame;
+        let is_first = frame == self.scene.shot.frames.first;
+        let before = match state.layer.take() {
+            Some((at, layer)) if at == frame - 1 => Some(layer),
+            _ if is_first => None,
+            _ => Some(self.layer(ctx, stored, None, frame - 1)?),
+        };
+        let after = self.layer(ctx, stored, before.as_ref(), frame)?;
+        let report = match &before {
+            // What the first poses cut out was gone before the shot began.
+            None => Report::default(),
+            Some(before) => told(&self.move_grains(ctx, state, [before, &after], frame)?),
+        };
+        state.layer = Some((frame, after));
+        Ok(Stepped { step: Step(to.made_from.map(|_| state.grains.clone())), report })
+    }
+
+    fn writer(&self, ctx: &Context, _state: &State) -> Result<Context> {
+        Ok(Context::new(ctx.pool().clone()))
+    }
+
+    fn write(&self, ctx: &mut Context, step: Step, files: Option<&mut FrameFiles>) -> Result<()> {
+        let (Some(grains), Some(files)) = (step.0, files) else { return Ok(()) };
+        let output = self.scene.output;
+        let points = grains.points();
+        if output.grains_vdb {
+            let metadata = base::metadata(self.scene, files.frame, files.made_from);
+            let options = WriteOptions { metadata, ..WriteOptions::default() };
+            files.save("grains", "vdb", &points::to_bytes(ctx, "grains", &points, &options)?)?;
+        }
+        if output.grains_ply {
+            files.save("grains", "ply", &points_ply::to_bytes(&points)?)?;
+        }
+        if output.grains_usd {
+            let text = usd_points::frame("grains", files.frame, self.scene.shot.fps, &points);
+            files.save("grains", "usda", text.as_bytes())?;
+        }
+        files.save_state(&grains.save())
+    }
+}
+
+fn told(report: &StepReport) -> Report {
+    let serde_json::Value::Object(results) = json!({
+        "grains": report.count,
+        "born": report.born,
+        "owed": report.owed,
+        "dropped": report.dropped,
+        "removed_m3": report.removed_volume,
+        "sub_steps": report.sub_steps,
+        "fastest_m_per_s": report.fastest,
+    }) else {
+        unreachable!("it is written as an object")
+    };
+    Report { results, phases: report.phases.clone() }
+}

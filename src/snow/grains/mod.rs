@@ -1,0 +1,263 @@
+//! Grains: snow that is pushed, piled and thrown (thesis section 3.3).
+//!
+//! They are born where the base layer was removed, pushed by what moves, pile up at their angle of repose, and read the base
+//! layer without changing it.
+
+mod contacts;
+mod field;
+#[doc(hidden)]
+pub mod heap;
+mod layout;
+mod params;
+mod rows;
+mod shell;
+#[doc(hidden)]
+pub mod solve;
+mod sourcing;
+mod state;
+mod touch;
+
+use std::collections::BTreeMap;
+
+use crate::base::DVec3;
+use crate::base::blocks::Origin;
+use crate::base::points::{Attribute, Column, Points, Values};
+use crate::context::{Context, PhaseTime};
+use crate::error::{Error, Result};
+use crate::sweep::Body;
+use crate::vdb::FloatGrid;
+
+use field::Field;
+use heap::{Colliders, Division, Floor, Heap};
+use shell::Shell;
+use solve::Coefficients;
+use sourcing::Sourcing;
+
+pub use params::Params;
+pub use sourcing::{PACKING, Removal, removals};
+
+/// Where and when a grain was born.
+#[derive(Debug, Clone, Copy, Default, PartialEq)]
+struct Birth {
+    /// Its place then (m).
+    rest: [f32; 3],
+    /// The frame that removed its snow.
+    frame: i32,
+}
+
+/// Grains of a layer of snow.
+#[derive(Clone)]
+pub struct Grains {
+    params: Params,
+    heap: Heap,
+    /// By identity.
+    births: Vec<Birth>,
+    next_id: u32,
+    /// Grains that blocks of the base have paid for and not got: fractions, mostly.
+    owed: BTreeMap<Origin, f64>,
+}
+
+/// What a step of grains reads.
+pub struct Surroundings<'a> {
+    /// The base layer at the step's start and end; grains collide with the latter.
+    pub base: [&'a FloatGrid; 2],
+    /// What moves, with the friction of grains against it.
+    pub bodies: &'a [(&'a Body, f64)],
+    /// Meshes that do not move, as triangles and places (m).
+    pub statics: &'a [&'a crate::base::TriMesh],
+    /// Height of a level ground (m).
+    pub floor: Option<f64>,
+    /// Grains below this height (m) are dropped.
+    pub lowest: f64,
+}
+
+/// What a step did.
+#[derive(Debug, Clone, PartialEq)]
+pub struct StepReport {
+    /// Grains now.
+    pub count: usize,
+    /// Grains that were born.
+    pub born: usize,
+    /// Snow removed from the base (m3).
+    pub removed_volume: f64,
+    /// Grains that removed snow has paid for and that are not born yet.
+    pub owed: f64,
+    /// Grains that fell below the lowest height or left the range of coordinates.
+    pub dropped: usize,
+    /// Sub-steps.
+    pub sub_steps: usize,
+    /// Largest speed (m/s).
+    pub fastest: f32,
+    /// Wall-clock time of each phase.
+    pub phases: Vec<PhaseTime>,
+}
+
+/// Friction of grains against what does not move, besides the base.
+const GROUND: f32 = 0.5;
+
+impl Grains {
+    /// No grains yet.
+    ///
+    /// # Errors
+    /// A parameter out of range.
+    pub fn new(params: Params) -> Result<Self> {
+        params.validate()?;
+        let heap = Heap::new(2.0 * params.radius);
+        Ok(Self { params, heap, births: Vec::new(), next_id: 0, owed: BTreeMap::new() })
+    }
+
+    /// Resumes from what [`Grains::save`] wrote.
+    ///
+    /// # Errors
+    /// A parameter out of range; bytes that are no such state.
+    pub fn resume(params: Params, bytes: &[u8]) -> Result<Self> {
+        let mut grains = Self::new(params)?;
+        state::load(&mut grains, bytes)?;
+        Ok(grains)
+    }
+
+    /// The exact state as bytes, the same from any number of threads.
+    pub fn save(&self) -> Vec<u8> {
+        state::save(self)
+    }
+
+    /// How many there are.
+    pub fn count(&self) -> usize {
+        self.heap.count()
+    }
+
+    /// Moves the grains from `from` to `to` (s), those born of the snow that this removed from the base among them. A step that
+    /// fails or is cancelled leaves them as they were.
+    ///
+    /// # Errors
+    /// Too many grains; a pose that cannot be computed; cancel; memory.
+    pub fn step(
+        &mut self,
+        ctx: &Context,
+        around: &Surroundings<'_>,
+        [from, to]: [f64; 2],
+        frame: i32,
+    ) -> Result<StepReport> {
+        let before = self.clone();
+        let stepped = ctx.step(["source", "colliders", "move"].len(), || {
+            let (born, removed_volume) = ctx.phase("source", || self.source(around, frame))?;
+            let (mut colliders, way) = ctx.phase("colliders", || self.colliders(around, [from, to]))?;
+            let sub_steps = self.params.sub_steps(to - from, way);
+            let division = Division { dt: to - from, sub_steps };
+            let all = self.heap.count();
+            ctx.phase("move", || {
+                self.heap.step(ctx, division, self.coefficients(&division), &mut colliders)
+            })?;
+            self.heap.drop_below(around.lowest);
+            let (count, owed) = (self.heap.count(), self.owed.values().sum());
+            let dropped = all - count;
+            let (fastest, phases) = (self.heap.fastest(), Vec::new());
+            Ok(StepReport { count, born, removed_volume, owed, dropped, sub_steps, fastest, phases })
+        });
+        match stepped {
+            Ok((report, phases)) => Ok(StepReport { phases, ..report }),
+            Err(error) => {
+                *self = before;
+                Err(error)
+            }
+        }
+    }
+
+    /// Grains where snow was removed; how many, and the snow's volume (m3).
+    fn source(&mut self, around: &Surroundings<'_>, frame: i32) -> Result<(usize, f64)> {
+        let [before, after] = around.base;
+        let removals = removals(before, after)?;
+        let Params { compression, seed, most, .. } = self.params;
+        let sourcing = Sourcing { diameter: self.heap.diameter, compression, seed, frame };
+        let places = sourcing.places(before, after, &removals, &mut self.owed)?;
+        let count = self.heap.count() + places.len();
+        if count > most || self.next_id as usize + places.len() > contacts::MOST {
+            return Err(Error::argument(format!(
+                "frame {frame} would have {count} grains, more than max = {most}: larger grains or more compression make fewer"
+            )));
+        }
+        for place in &places {
+            self.heap.add(self.next_id, *place, [0.0; 3])?;
+            self.births.push(Birth { rest: [place.x as f32, place.y as f32, place.z as f32], frame });
+            self.next_id += 1;
+        }
+        Ok((places.len(), removals.iter().map(|removal| removal.volume).sum()))
+    }
+
+    /// What grains cannot move, and how far objects move in the step (m).
+    fn colliders<'a>(&self, around: &Surroundings<'a>, [from, to]: [f64; 2]) -> Result<(Colliders<'a>, f64)> {
+        let floor = around.floor.map(|height| Floor { height, friction: GROUND });
+        let base = Field { grid: around.base[1], collider: 1, friction: self.params.friction as f32 };
+        let mut colliders = Colliders { floor, fields: vec![base], shells: Vec::new() };
+        let (mut way, mut number) = (0.0f64, 2);
+        for (body, friction) in around.bodies {
+            let (mut first, mut last) = (Vec::new(), Vec::new());
+            body.motion().pose(from, &mut first)?;
+            body.motion().pose(to, &mut last)?;
+            way = first.iter().zip(&last).map(|(a, b)| (b - a).norm()).fold(way, f64::max);
+            let turn = |triangle: &[u32; 3]| {
+                if body.is_reversed() { [triangle[0], triangle[2], triangle[1]] } else { *triangle }
+            };
+            let triangles = body.motion().triangles().iter().map(turn).collect();
+            let closed = body.closed_loops() == 0 && body.contradictions() == 0;
+            let shell = Shell::new(number, *friction as f32, triangles, closed, first);
+            let pose =
+                move |share: f64, out: &mut Vec<DVec3>| body.motion().pose(from + (to - from) * share, out);
+            colliders.shells.push((shell, Box::new(pose)));
+            number += 1;
+        }
+        for mesh in around.statics {
+            let pose: Vec<DVec3> = mesh.positions.iter().map(|place| place.cast::<f64>()).collect();
+            let shell = Shell::new(number, GROUND, mesh.triangles.clone(), false, pose.clone());
+            let rests = move |_: f64, out: &mut Vec<DVec3>| {
+                out.clone_from(&pose);
+                Ok(())
+            };
+            colliders.shells.push((shell, Box::new(rests)));
+            number += 1;
+        }
+        Ok((colliders, way))
+    }
+
+    fn coefficients(&self, division: &Division) -> Coefficients {
+        let Params { gravity, friction, attraction, air, .. } = self.params;
+        let dt = division.dt / division.sub_steps as f64;
+        Coefficients {
+            dt: dt as f32,
+            diameter: self.heap.diameter as f32,
+            gravity: [0.0, gravity as f32, 0.0],
+            up: [0.0, if gravity == 0.0 { 0.0 } else { -gravity.signum() as f32 }, 0.0],
+            kept: libm::pow(air, dt) as f32,
+            friction: friction as f32,
+            attraction: (attraction * gravity.abs() * dt) as f32,
+            band: BAND,
+        }
+    }
+
+    /// The grains as points: `v` (m/s), `id`, `pscale` (radius, m), `source_frame` and `rest` (place of birth, m).
+    pub fn points(&self) -> Points {
+        let (mut cells, mut offsets) = (Vec::new(), Vec::new());
+        for (at, place) in self.heap.located() {
+            // Voxels of one diameter, around whose centres offsets reach half a voxel.
+            let voxel = place.map(|x| (x + 0.5).floor());
+            cells.push([0, 1, 2].map(|axis| at[axis] * layout::EDGE as i32 + voxel[axis] as i32));
+            offsets.push([0, 1, 2].map(|axis| place[axis] - voxel[axis]));
+        }
+        let births = || self.heap.ids().iter().map(|id| &self.births[*id as usize]);
+        let attribute = |name: &str, values: Values| Attribute { name: name.into(), values };
+        let attributes = vec![
+            attribute("v", Values::Vector(Column::Each(self.heap.velocities().collect()))),
+            attribute(
+                "id",
+                Values::Long(Column::Each(self.heap.ids().iter().map(|id| i64::from(*id)).collect())),
+            ),
+            attribute("pscale", Values::Float(Column::Uniform(self.params.radius as f32))),
+            attribute("source_frame", Values::Int(Column::Each(births().map(|birth| birth.frame).collect()))),
+            attribute("rest", Values::Vector(Column::Each(births().map(|birth| birth.rest).collect()))),
+        ];
+        Points { voxel_size: self.heap.diameter, cells, offsets, attributes }
+    }
+}
+
+/// Gap (diameters) up to which grains attract each other.
+const BAND: f32 = 0.05;

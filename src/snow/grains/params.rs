@@ -1,0 +1,87 @@
+//! What grains are made of and how they move.
+
+use crate::error::{Error, Result};
+use crate::snow::grain_friction;
+
+/// How snow becomes grains and how they behave.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Params {
+    /// Radius of a grain (m), 1e-5..=1 (thesis table 3.1: a third of a cell).
+    pub radius: f64,
+    /// Compression ratio r_c (thesis section 3.3.2), 0..=1: the share of removed snow that becomes no grains.
+    pub compression: f64,
+    /// Friction between grains, and between grains and the base layer, 0..=1: see [`grain_friction`].
+    pub friction: f64,
+    /// Greatest attraction between two grains that all but touch, in weights of a grain, 0..=1000.
+    pub attraction: f64,
+    /// Velocity kept in a second (beta, thesis section 3.3.1), 0..=1.
+    pub air: f64,
+    /// Gravity (m/s2), upward negative.
+    pub gravity: f64,
+    /// Sub-steps in a step; none: by the rule of [`Params::sub_steps`].
+    pub sub_steps: Option<u32>,
+    /// Most grains; more are an error.
+    pub most: usize,
+    /// Another one scatters grains otherwise.
+    pub seed: u64,
+}
+
+/// Greatest g dt^2 / d of a sub-step: grains fall by this part of their diameter.
+const FALL: f64 = 0.02;
+/// Farthest that an object moves in a sub-step (diameters).
+const WAY: f64 = 2.0;
+/// Most times that fast objects raise the number of sub-steps.
+const MOST_OF_FALL: usize = 8;
+
+impl Params {
+    /// The thesis' look for a layer's cells (m): a radius of a third of a cell.
+    pub fn for_cell(cell: f64) -> Self {
+        Self {
+            radius: cell / 3.0,
+            compression: 0.75,
+            friction: grain_friction::of_repose(32.0),
+            attraction: 0.0,
+            air: 0.5,
+            gravity: -9.81,
+            sub_steps: None,
+            most: 20_000_000,
+            seed: 0,
+        }
+    }
+
+    /// Checks every field.
+    ///
+    /// # Errors
+    /// Names the field and its range.
+    pub fn validate(&self) -> Result<()> {
+        let checks = [
+            ("radius", self.radius, 1.0e-5, 1.0),
+            ("compression", self.compression, 0.0, 1.0),
+            ("friction", self.friction, 0.0, 1.0),
+            ("attraction", self.attraction, 0.0, 1000.0),
+            ("air", self.air, 0.0, 1.0),
+            ("gravity", self.gravity, -1000.0, 1000.0),
+        ];
+        let wrong = checks.into_iter().find(|(_, value, low, high)| !(*low..=*high).contains(value));
+        if let Some((name, value, low, high)) = wrong {
+            return Err(Error::argument(format!("{name} = {value} must lie in {low} to {high}")));
+        }
+        if self.sub_steps == Some(0) {
+            return Err(Error::argument("sub_steps must be at least 1"));
+        }
+        Ok(())
+    }
+
+    /// Sub-steps of a step of `dt` (s) in which objects move at most so far (m): so many that grains fall by at most 0.02 of
+    /// their diameter in each, which keeps deep heaps dense, and that objects move by at most two diameters, as long as that
+    /// takes no more than eight times as many.
+    pub fn sub_steps(&self, dt: f64, way: f64) -> usize {
+        if let Some(count) = self.sub_steps {
+            return count as usize;
+        }
+        let diameter = 2.0 * self.radius;
+        let of_fall = (dt * (self.gravity.abs() / (FALL * diameter)).sqrt()).ceil().max(1.0) as usize;
+        let of_way = (way / (WAY * diameter)).ceil() as usize;
+        of_way.clamp(of_fall, MOST_OF_FALL * of_fall)
+    }
+}

@@ -1,0 +1,272 @@
+//! Grains beside a mesh that moves during the step: the nearest point of its triangles, as they are in this sub-step.
+//!
+//! A signed distance grid of a deforming mesh would have to be made for each of dozens of sub-steps; the triangles need only
+//! have their boxes fitted again, and give the surface's own velocity, however thin the mesh is. A plane that moves with the
+//! nearest point holds a grain on its side of the surface; inside and outside are told by the orientation of the nearest
+//! triangle, and not at all for open meshes, whose both sides collide.
+
+use rayon::prelude::*;
+
+use super::contacts::SKIN;
+use super::layout::{EDGE, Layout, world};
+use super::rows::{Row, dot};
+use super::touch::Touch;
+use crate::base::DVec3;
+
+/// Triangles in a leaf of the tree.
+const LEAF: usize = 4;
+
+/// A mesh in motion as a collider.
+pub struct Shell {
+    /// Which collider it is.
+    pub collider: u32,
+    /// Friction against it.
+    pub friction: f32,
+    triangles: Vec<[u32; 3]>,
+    /// Whether inside and outside are told apart.
+    closed: bool,
+    now: Vec<DVec3>,
+    next: Vec<DVec3>,
+    /// Boxes of a complete binary tree over leaves of triangles, the root first.
+    boxes: Vec<[DVec3; 2]>,
+    leaves: usize,
+    /// Longest way of a vertex in the sub-step (m).
+    way: f64,
+}
+
+/// A point of the surface.
+struct Nearest {
+    square: f64,
+    point: DVec3,
+    /// Where it goes in the sub-step.
+    motion: DVec3,
+    /// Height over the plane of its triangle.
+    height: f64,
+    normal: DVec3,
+}
+
+impl Shell {
+    /// A mesh of triangles, counter-clockwise seen from outside, at a pose (m).
+    pub fn new(
+        collider: u32,
+        friction: f32,
+        triangles: Vec<[u32; 3]>,
+        closed: bool,
+        pose: Vec<DVec3>,
+    ) -> Self {
+        let leaves = triangles.len().div_ceil(LEAF).max(1).next_power_of_two();
+        let next = pose.clone();
+        let boxes = vec![[DVec3::zeros(); 2]; 2 * leaves - 1];
+        let mut shell =
+            Self { collider, friction, triangles, closed, now: pose, next, boxes, leaves, way: 0.0 };
+        shell.sort();
+        shell
+    }
+
+    /// Sorts triangles along a curve, so that those of a leaf are near each other.
+    fn sort(&mut self) {
+        let spread = |x: u64| (0..16).fold(0u64, |out, bit| out | (x >> bit & 1) << (3 * bit));
+        let (mut low, mut high) = (DVec3::repeat(f64::INFINITY), DVec3::repeat(f64::NEG_INFINITY));
+        for place in &self.now {
+            (low, high) = (low.inf(place), high.sup(place));
+        }
+        let size = (high - low).max().max(1.0e-9);
+        let now = &self.now;
+        self.triangles.par_sort_by_cached_key(|triangle| {
+            let middle = triangle.iter().map(|&index| now[index as usize]).sum::<DVec3>() / 3.0;
+            let cell = ((middle - low) * (65_535.0 / size)).map(|x| x as u64);
+            spread(cell.x) | spread(cell.y) << 1 | spread(cell.z) << 2
+        });
+    }
+
+    /// Moves on: what was next is now. `pose` is the next one.
+    pub fn follow(&mut self, pose: &[DVec3]) {
+        std::mem::swap(&mut self.now, &mut self.next);
+        self.next.clear();
+        self.next.extend_from_slice(pose);
+        self.way =
+            self.now.iter().zip(&self.next).map(|(a, b)| (b - a).norm_squared()).fold(0.0, f64::max).sqrt();
+        let (now, triangles, leaves) = (&self.now, &self.triangles, self.leaves);
+        let (inner, outer) = self.boxes.split_at_mut(leaves - 1);
+        outer.par_iter_mut().enumerate().with_min_len(256).for_each(|(leaf, bounds)| {
+            *bounds = EMPTY;
+            for triangle in triangles.iter().skip(leaf * LEAF).take(LEAF) {
+                for &index in triangle {
+                    let place = now[index as usize];
+                    *bounds = [bounds[0].inf(&place), bounds[1].sup(&place)];
+                }
+            }
+        });
+        for node in (0..inner.len()).rev() {
+            let child = |index: usize| {
+                if index < leaves - 1 { inner[index] } else { outer[index - (leaves - 1)] }
+            };
+            let (a, b) = (child(2 * node + 1), child(2 * node + 2));
+            inner[node] = [a[0].inf(&b[0]), a[1].sup(&b[1])];
+        }
+    }
+
+    /// Longest way of a vertex in the sub-step (m).
+    pub fn way(&self) -> f64 {
+        self.way
+    }
+
+    /// Grains near the surface, each with the plane that the surface is there; `dt` (s) is the sub-step's length.
+    pub fn touches(&self, layout: &Layout, rows: &[Row], diameter: f64, dt: f64) -> Vec<Touch> {
+        let half = 0.5 * f64::from(EDGE) * diameter;
+        let reach = diameter * (0.5 + f64::from(SKIN)) + self.way;
+        let near = layout.blocks.par_iter().filter(|block| {
+            let middle = world(block.at, [EDGE * 0.5; 3], diameter);
+            self.nearest(middle, half * 3f64.sqrt() + reach + 2.0 * diameter).is_some()
+        });
+        let touches = near.flat_map_iter(|block| {
+            block.grains().filter_map(move |slot| {
+                let row = &rows[slot];
+                let place = world(block.at, row.place, diameter);
+                let fast = row.velocity.iter().map(|x| f64::from(*x).powi(2)).sum::<f64>().sqrt() * dt;
+                let nearest = self.nearest(place, reach + fast)?;
+                Some(self.touch(slot, row, place, &nearest, diameter, dt))
+            })
+        });
+        touches.collect()
+    }
+
+    fn touch(
+        &self,
+        slot: usize,
+        row: &Row,
+        place: DVec3,
+        nearest: &Nearest,
+        diameter: f64,
+        dt: f64,
+    ) -> Touch {
+        let distance = nearest.square.sqrt();
+        let inside = self.closed && nearest.height < 0.0;
+        let out = if distance > 1.0e-6 * diameter {
+            (place - nearest.point) * (if inside { -1.0 } else { 1.0 } / distance)
+        } else {
+            nearest.normal
+        };
+        let normal = [out.x as f32, out.y as f32, out.z as f32];
+        let gap = (if inside { -distance } else { distance }) / diameter - 0.5;
+        let velocity = nearest.motion / dt;
+        Touch {
+            grain: slot as u32,
+            collider: self.collider,
+            normal,
+            offset: dot(normal, row.place) - gap as f32,
+            velocity: [velocity.x as f32, velocity.y as f32, velocity.z as f32],
+            friction: self.friction,
+            impulse: 0.0,
+            across: [0.0; 3],
+        }
+    }
+
+    /// The nearest point of the surface within a distance (m).
+    fn nearest(&self, place: DVec3, within: f64) -> Option<Nearest> {
+        let apart = |bounds: &[DVec3; 2]| {
+            let outside = (bounds[0] - place).sup(&(place - bounds[1])).sup(&DVec3::zeros());
+            outside.norm_squared()
+        };
+        let mut best: Option<Nearest> = None;
+        let mut most = within * within;
+        let mut stack = [0usize; 64];
+        let mut depth = 1;
+        while depth > 0 {
+            depth -= 1;
+            let node = stack[depth];
+            if apart(&self.boxes[node]) > most {
+                continue;
+            }
+            if node < self.leaves - 1 {
+                let (a, b) = (2 * node + 1, 2 * node + 2);
+                let first_is_nearer = apart(&self.boxes[a]) <= apart(&self.boxes[b]);
+                (stack[depth], stack[depth + 1]) = if first_is_nearer { (b, a) } else { (a, b) };
+                depth += 2;
+                continue;
+            }
+            let leaf = node - (self.leaves - 1);
+            for triangle in self.triangles.iter().skip(leaf * LEAF).take(LEAF) {
+                let found = self.on_triangle(triangle, place);
+                // At an edge or corner that triangles share, the one that the point is highest over tells its side.
+                let is_better = match &best {
+                    None => found.square <= most,
+                    Some(best) => {
+                        let tie = 1.0e-9 * (found.square + best.square);
+                        found.square < best.square - tie
+                            || (found.square <= best.square + tie && found.height.abs() > best.height.abs())
+                    }
+                };
+                if is_better {
+                    most = most.min(found.square * (1.0 + 1.0e-8));
+                    best = Some(found);
+                }
+            }
+        }
+        best
+    }
+
+    fn on_triangle(&self, triangle: &[u32; 3], place: DVec3) -> Nearest {
+        let [a, b, c] = triangle.map(|index| self.now[index as usize]);
+        let weights = nearest_weights(place, a, b, c);
+        let point = a * weights[0] + b * weights[1] + c * weights[2];
+        let motion = (0..3)
+            .map(|corner| {
+                let index = triangle[corner] as usize;
+                (self.next[index] - self.now[index]) * weights[corner]
+            })
+            .sum();
+        let across = (b - a).cross(&(c - a));
+        let length = across.norm();
+        let normal = if length > 0.0 { across / length } else { DVec3::y() };
+        Nearest {
+            square: (place - point).norm_squared(),
+            point,
+            motion,
+            height: (place - a).dot(&normal),
+            normal,
+        }
+    }
+}
+
+/// A box that contains nothing.
+const EMPTY: [DVec3; 2] = [
+    DVec3::new(f64::INFINITY, f64::INFINITY, f64::INFINITY),
+    DVec3::new(f64::NEG_INFINITY, f64::NEG_INFINITY, f64::NEG_INFINITY),
+];
+
+/// Barycentric weights of the point of a triangle that is nearest to a place (Ericson, Real-Time Collision Detection, 5.1.5).
+fn nearest_weights(place: DVec3, a: DVec3, b: DVec3, c: DVec3) -> [f64; 3] {
+    let (ab, ac, ap) = (b - a, c - a, place - a);
+    let (d1, d2) = (ab.dot(&ap), ac.dot(&ap));
+    if d1 <= 0.0 && d2 <= 0.0 {
+        return [1.0, 0.0, 0.0];
+    }
+    let bp = place - b;
+    let (d3, d4) = (ab.dot(&bp), ac.dot(&bp));
+    if d3 >= 0.0 && d4 <= d3 {
+        return [0.0, 1.0, 0.0];
+    }
+    let vc = d1 * d4 - d3 * d2;
+    if vc <= 0.0 && d1 >= 0.0 && d3 <= 0.0 {
+        let t = d1 / (d1 - d3);
+        return [1.0 - t, t, 0.0];
+    }
+    let cp = place - c;
+    let (d5, d6) = (ab.dot(&cp), ac.dot(&cp));
+    if d6 >= 0.0 && d5 <= d6 {
+        return [0.0, 0.0, 1.0];
+    }
+    let vb = d5 * d2 - d1 * d6;
+    if vb <= 0.0 && d2 >= 0.0 && d6 <= 0.0 {
+        let t = d2 / (d2 - d6);
+        return [1.0 - t, 0.0, t];
+    }
+    let va = d3 * d6 - d5 * d4;
+    if va <= 0.0 && d4 - d3 >= 0.0 && d5 - d6 >= 0.0 {
+        let t = (d4 - d3) / ((d4 - d3) + (d5 - d6));
+        return [0.0, 1.0 - t, t];
+    }
+    let sum = va + vb + vc;
+    if sum <= 0.0 { [1.0, 0.0, 0.0] } else { [va / sum, vb / sum, vc / sum] }
+}

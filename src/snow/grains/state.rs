@@ -1,0 +1,207 @@
+//! The exact state of grains as bytes: what a run resumes from.
+
+use std::collections::BTreeMap;
+
+use super::Grains;
+use super::contacts::{Contacts, MOST, Pair};
+use super::heap::Heap;
+use super::rows::Row;
+use super::touch::Touch;
+use crate::error::{Error, Result};
+
+/// The first bytes: what it is, and its version.
+const MAGIC: &[u8; 8] = b"frzgrn01";
+
+/// Writes little-endian numbers.
+#[derive(Default)]
+struct Writer(Vec<u8>);
+
+impl Writer {
+    fn count(&mut self, count: usize) {
+        self.0.extend((count as u64).to_le_bytes());
+    }
+
+    fn u32(&mut self, number: u32) {
+        self.0.extend(number.to_le_bytes());
+    }
+
+    fn i32s(&mut self, numbers: &[i32]) {
+        numbers.iter().for_each(|number| self.0.extend(number.to_le_bytes()));
+    }
+
+    fn f32s(&mut self, numbers: &[f32]) {
+        numbers.iter().for_each(|number| self.0.extend(number.to_le_bytes()));
+    }
+
+    fn f64(&mut self, number: f64) {
+        self.0.extend(number.to_le_bytes());
+    }
+}
+
+/// Reads what [`Writer`] wrote.
+struct Reader<'a>(&'a [u8]);
+
+impl Reader<'_> {
+    fn take<const N: usize>(&mut self) -> Result<[u8; N]> {
+        let (first, rest) =
+            self.0.split_first_chunk().ok_or_else(|| Error::argument("the state is cut short"))?;
+        self.0 = rest;
+        Ok(*first)
+    }
+
+    /// A count of things of at least so many bytes each.
+    fn count(&mut self, bytes: usize) -> Result<usize> {
+        let count = u64::from_le_bytes(self.take()?) as usize;
+        if count > self.0.len() / bytes {
+            return Err(Error::argument("the state is cut short"));
+        }
+        Ok(count)
+    }
+
+    fn u32(&mut self) -> Result<u32> {
+        Ok(u32::from_le_bytes(self.take()?))
+    }
+
+    fn i32s<const N: usize>(&mut self) -> Result<[i32; N]> {
+        let mut out = [0; N];
+        for number in &mut out {
+            *number = i32::from_le_bytes(self.take()?);
+        }
+        Ok(out)
+    }
+
+    fn f32s<const N: usize>(&mut self) -> Result<[f32; N]> {
+        let mut out = [0.0; N];
+        for number in &mut out {
+            *number = f32::from_le_bytes(self.take()?);
+            if !number.is_finite() {
+                return Err(Error::argument("the state has a number that is not finite"));
+            }
+        }
+        Ok(out)
+    }
+
+    fn f64(&mut self) -> Result<f64> {
+        let number = f64::from_le_bytes(self.take()?);
+        if number.is_finite() {
+            Ok(number)
+        } else {
+            Err(Error::argument("the state has a number that is not finite"))
+        }
+    }
+}
+
+/// The state as bytes; the same from any number of threads.
+pub fn save(grains: &Grains) -> Vec<u8> {
+    let heap = &grains.heap;
+    let mut to = Writer(MAGIC.to_vec());
+    to.f64(heap.diameter);
+    to.u32(grains.next_id);
+    to.count(heap.rows.len());
+    for ((row, id), at) in heap.rows.iter().zip(&heap.ids).zip(&heap.at) {
+        to.u32(*id);
+        to.i32s(at);
+        to.f32s(&row.place);
+        to.f32s(&row.velocity);
+        to.f32s(&row.carried);
+        to.f32s(&[row.supports]);
+        let birth = &grains.births[*id as usize];
+        to.f32s(&birth.rest);
+        to.i32s(&[birth.frame]);
+    }
+    to.count(heap.contacts.starts.len());
+    heap.contacts.starts.iter().for_each(|start| to.u32(*start));
+    to.count(heap.contacts.pairs.len());
+    for pair in &heap.contacts.pairs {
+        to.u32(pair.code);
+        to.f32s(&[pair.normal]);
+        to.f32s(&pair.across);
+    }
+    to.count(heap.touches.len());
+    for touch in &heap.touches {
+        to.u32(touch.grain);
+        to.u32(touch.collider);
+        to.f32s(&[touch.impulse]);
+        to.f32s(&touch.across);
+    }
+    to.count(grains.owed.len());
+    for (origin, owed) in &grains.owed {
+        to.i32s(origin);
+        to.f64(*owed);
+    }
+    lz4_flex::compress_prepend_size(&to.0)
+}
+
+/// Takes the state from bytes into grains that have none yet.
+///
+/// # Errors
+/// Bytes that are no such state, or one of grains of another size.
+pub fn load(grains: &mut Grains, bytes: &[u8]) -> Result<()> {
+    let bytes = lz4_flex::decompress_size_prepended(bytes)
+        .map_err(|error| Error::argument(format!("is not a state of grains: {error}")))?;
+    let mut from = Reader(&bytes);
+    if &from.take::<8>()? != MAGIC {
+        return Err(Error::argument("is not a state of grains, or one of another version"));
+    }
+    let diameter = from.f64()?;
+    if diameter != grains.heap.diameter {
+        return Err(Error::argument(format!("has grains of {diameter} m, not {}", grains.heap.diameter)));
+    }
+    let mut heap = Heap::new(diameter);
+    grains.next_id = from.u32()?;
+    let count = from.count(ROW)?;
+    if count > MOST || grains.next_id as usize > MOST {
+        return Err(Error::argument("has more grains than there may be"));
+    }
+    grains.births = vec![Default::default(); grains.next_id as usize];
+    for _ in 0..count {
+        let id = from.u32()?;
+        heap.ids.push(id);
+        heap.at.push(from.i32s()?);
+        let (place, velocity, carried) = (from.f32s()?, from.f32s()?, from.f32s()?);
+        let [supports] = from.f32s()?;
+        heap.rows.push(Row { place, velocity, carried, supports, weight: 1.0, ..Row::default() });
+        let birth =
+            grains.births.get_mut(id as usize).ok_or_else(|| Error::argument("has a grain without birth"))?;
+        (birth.rest, [birth.frame]) = (from.f32s()?, from.i32s()?);
+    }
+    heap.contacts = contacts(&mut from, count)?;
+    for _ in 0..from.count(24)? {
+        let (grain, collider) = (from.u32()?, from.u32()?);
+        if grain as usize >= count {
+            return Err(Error::argument("has a contact of a grain that is not there"));
+        }
+        let ([impulse], across) = (from.f32s()?, from.f32s()?);
+        heap.touches.push(Touch { grain, collider, impulse, across, ..Touch::default() });
+    }
+    grains.owed = BTreeMap::new();
+    for _ in 0..from.count(20)? {
+        grains.owed.insert(from.i32s()?, from.f64()?);
+    }
+    if !from.0.is_empty() {
+        return Err(Error::argument("has bytes behind its end"));
+    }
+    grains.heap = heap;
+    Ok(())
+}
+
+/// Bytes of a grain.
+const ROW: usize = 4 + 12 + 4 * 12 + 4 + 4;
+
+fn contacts(from: &mut Reader<'_>, grains: usize) -> Result<Contacts> {
+    let mut contacts = Contacts::default();
+    for _ in 0..from.count(4)? {
+        contacts.starts.push(from.u32()?);
+    }
+    for _ in 0..from.count(20)? {
+        let code = from.u32()?;
+        let ([normal], across) = (from.f32s()?, from.f32s()?);
+        contacts.pairs.push(Pair { code, normal, across });
+    }
+    let ends = contacts.starts.last().map_or(0, |end| *end as usize);
+    let fits = contacts.starts.is_sorted()
+        && contacts.starts.len() <= grains + 1
+        && ends == contacts.pairs.len()
+        && contacts.pairs.iter().all(|pair| pair.other() < grains);
+    if fits { Ok(contacts) } else { Err(Error::argument("has contacts that do not fit its grains")) }
+}
