@@ -18,6 +18,8 @@ mod dense;
 mod far;
 #[path = "gates/flip.rs"]
 mod flip;
+#[path = "gates/grains.rs"]
+mod grains;
 #[path = "gates/harness.rs"]
 mod harness;
 #[path = "gates/house.rs"]
@@ -57,6 +59,7 @@ fn main() {
     speed::run(&mut h);
     bytes::run(&mut h);
     readers::run(&mut h);
+    grains::run(&mut h);
     shot::run(&mut h);
     capi::run(&mut h);
     cancel::run(&mut h);

@@ -19,6 +19,21 @@ const fn yes(name: &'static str) -> Gate {
 }
 
 pub const GATES: &[Gate] = &[
+    // Poured piles: error of the angle asked for, its spread over sizes, what becomes of it in 240 frames.
+    gate("snow.grains.pile_10k", "deg", Most(3.0), Most(1.5)),
+    gate("snow.grains.pile_100k", "deg", Most(3.0), Most(1.5)),
+    gate("snow.grains.pile_size", "deg", Most(1.5), Most(0.7)),
+    gate("snow.grains.pile_creep", "deg", Most(0.5), Most(0.1)),
+    // Free motion against formulas, and heaps that nothing holds.
+    gate("snow.grains.fall_speed", "1", Most(1.0e-6), Open),
+    gate("snow.grains.fall_way", "1", Most(1.0e-6), Open),
+    gate("snow.grains.air", "1", Most(1.0e-6), Open),
+    gate("snow.grains.free_momentum", "1", Most(1.0e-5), Open),
+    gate("snow.grains.free_energy", "1", Most(1.0e-5), Open),
+    // Deep beds.
+    gate("snow.grains.bed_overlap", "%", Most(5.0), Most(2.0)),
+    // All grains at work.
+    gate("snow.grains.speed", "k/s", Least(90.0), Least(200.0)),
     // The walls that a box leaves, against the envelope of its poses.
     gate("snow.base.wall_translation_max", "cells", Most(0.1), Most(0.03)),
     gate("snow.base.wall_translation_mean", "cells", Most(0.05), Most(0.01)),

@@ -13,7 +13,7 @@ use super::session::Session;
 
 /// Press moving objects into a layer of snow.
 ///
-/// Writes base/base.%04d.vdb (surface, compression, touched), removed/removed.%04d.vdb, objects/ where the scene asks for
+/// Writes base/base.%04d.vdb (surface, compression, touched), removed/removed.%04d.vdb, grains/ and objects/ where the scene asks for
 /// it, report/base.%04d.json, shot.usda and scene.toml, the scene with every default filled in. Frames that are there
 /// and match are not made again; a folder with frames of other settings is refused.
 #[derive(clap::Args)]
@@ -28,7 +28,7 @@ pub struct Args {
     /// Folder for the output; made if it is not there.
     #[arg(short, long, value_name = "DIR")]
     output: PathBuf,
-    /// Make these stages of the scene only (base, objects); all without it.
+    /// Make these stages of the scene only (base, grains, objects); all without it.
     #[arg(long, value_name = "A,B", value_delimiter = ',')]
     stage: Vec<String>,
     /// Write these frames only; frames before them are computed when no file has them.

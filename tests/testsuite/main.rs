@@ -50,12 +50,14 @@ mod scene {
     mod demo_walk;
     mod fuzz;
     mod shot_folder;
+    mod shot_grains;
     mod shot_inputs;
     mod shot_runs;
 }
 mod snow {
     mod base;
     mod crumbs;
+    mod grains;
     mod layers;
     mod state;
 }

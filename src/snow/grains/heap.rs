@@ -6,7 +6,7 @@ use super::contacts::{Contacts, GONE, MOST, SKIN};
 use super::field::Field;
 use super::layout::{At, Layout, locate, world};
 use super::rows::{Row, V, norm};
-use super::shell::Shell;
+pub use super::shell::Shell;
 use super::solve::{Coefficients, sub_step};
 use super::touch::{self, Touch};
 use crate::base::DVec3;
@@ -22,6 +22,9 @@ pub struct Floor {
     pub friction: f32,
 }
 
+/// Writes the places (m) of a mesh's vertices at a share 0..=1 of a step.
+pub type Pose<'a> = Box<dyn Fn(f64, &mut Vec<DVec3>) -> Result<()> + Send + Sync + 'a>;
+
 /// What grains cannot move.
 #[derive(Default)]
 pub struct Colliders<'a> {
@@ -30,7 +33,7 @@ pub struct Colliders<'a> {
     /// Level sets that rest during the step.
     pub fields: Vec<Field<'a>>,
     /// Meshes that move, each with its pose (m) at a share 0..=1 of the step.
-    pub shells: Vec<(Shell, Box<dyn Fn(f64, &mut Vec<DVec3>) -> Result<()> + Send + Sync + 'a>)>,
+    pub shells: Vec<(Shell, Pose<'a>)>,
 }
 
 /// Collider number of the floor.

@@ -101,10 +101,10 @@ impl Layout {
         let block = |pair: &[usize]| {
             let mut starts = [pair[1] as u32; ALL_CELLS + 1];
             let mut next = 0;
-            for slot in pair[0]..pair[1] {
-                let cell = (keys[slot].cell & 0xff) as usize;
+            for (key, slot) in keys[pair[0]..pair[1]].iter().zip(pair[0] as u32..) {
+                let cell = (key.cell & 0xff) as usize;
                 while next <= cell {
-                    starts[next] = slot as u32;
+                    starts[next] = slot;
                     next += 1;
                 }
             }
@@ -159,15 +159,15 @@ impl Block {
 
 /// Moves a grain to the block that its place lies in.
 fn settle(row: &mut Row, at: &mut At) {
-    for axis in 0..3 {
-        let blocks = (row.place[axis] / EDGE).floor();
+    for (place, at) in row.place.iter_mut().zip(at) {
+        let blocks = (*place / EDGE).floor();
         if blocks != 0.0 {
-            at[axis] = at[axis].saturating_add(blocks as i32);
-            row.place[axis] -= blocks * EDGE;
+            *at = at.saturating_add(blocks as i32);
+            *place -= blocks * EDGE;
             // A place just below 0 becomes the edge itself.
-            if row.place[axis] >= EDGE {
-                at[axis] = at[axis].saturating_add(1);
-                row.place[axis] = 0.0;
+            if *place >= EDGE {
+                *at = at.saturating_add(1);
+                *place = 0.0;
             }
         }
     }

@@ -30,7 +30,6 @@ use crate::vdb::FloatGrid;
 use field::Field;
 use heap::{Colliders, Division, Floor, Heap};
 use shell::Shell;
-use solve::Coefficients;
 use sourcing::Sourcing;
 
 pub use params::Params;
@@ -146,7 +145,7 @@ impl Grains {
             let division = Division { dt: to - from, sub_steps };
             let all = self.heap.count();
             ctx.phase("move", || {
-                self.heap.step(ctx, division, self.coefficients(&division), &mut colliders)
+                self.heap.step(ctx, division, self.params.coefficients(&division), &mut colliders)
             })?;
             self.heap.drop_below(around.lowest);
             let (count, owed) = (self.heap.count(), self.owed.values().sum());
@@ -219,21 +218,6 @@ impl Grains {
         Ok((colliders, way))
     }
 
-    fn coefficients(&self, division: &Division) -> Coefficients {
-        let Params { gravity, friction, attraction, air, .. } = self.params;
-        let dt = division.dt / division.sub_steps as f64;
-        Coefficients {
-            dt: dt as f32,
-            diameter: self.heap.diameter as f32,
-            gravity: [0.0, gravity as f32, 0.0],
-            up: [0.0, if gravity == 0.0 { 0.0 } else { -gravity.signum() as f32 }, 0.0],
-            kept: libm::pow(air, dt) as f32,
-            friction: friction as f32,
-            attraction: (attraction * gravity.abs() * dt) as f32,
-            band: BAND,
-        }
-    }
-
     /// The grains as points: `v` (m/s), `id`, `pscale` (radius, m), `source_frame` and `rest` (place of birth, m).
     pub fn points(&self) -> Points {
         let (mut cells, mut offsets) = (Vec::new(), Vec::new());
@@ -258,6 +242,3 @@ impl Grains {
         Points { voxel_size: self.heap.diameter, cells, offsets, attributes }
     }
 }
-
-/// Gap (diameters) up to which grains attract each other.
-const BAND: f32 = 0.05;

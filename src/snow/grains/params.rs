@@ -1,5 +1,7 @@
 //! What grains are made of and how they move.
 
+use super::heap::Division;
+use super::solve::Coefficients;
 use crate::error::{Error, Result};
 use crate::snow::grain_friction;
 
@@ -84,4 +86,24 @@ impl Params {
         let of_way = (way / (WAY * diameter)).ceil() as usize;
         of_way.clamp(of_fall, MOST_OF_FALL * of_fall)
     }
+
+    /// What a sub-step of a divided step needs.
+    #[doc(hidden)]
+    pub fn coefficients(&self, division: &Division) -> Coefficients {
+        let dt = division.dt / division.sub_steps as f64;
+        let up = if self.gravity == 0.0 { 0.0 } else { -self.gravity.signum() as f32 };
+        Coefficients {
+            dt: dt as f32,
+            diameter: (2.0 * self.radius) as f32,
+            gravity: [0.0, self.gravity as f32, 0.0],
+            up: [0.0, up, 0.0],
+            air: (1.0 - libm::pow(self.air, dt)) as f32,
+            friction: self.friction as f32,
+            attraction: (self.attraction * self.gravity.abs() * dt) as f32,
+            band: BAND,
+        }
+    }
 }
+
+/// Gap (diameters) up to which grains attract each other.
+const BAND: f32 = 0.05;

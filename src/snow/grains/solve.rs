@@ -41,8 +41,8 @@ pub struct Coefficients {
     pub gravity: V,
     /// Opposite of gravity's direction; 0 without gravity.
     pub up: V,
-    /// Velocity kept in a sub-step: beta^dt.
-    pub kept: f32,
+    /// Share of the velocity that air takes in a sub-step: 1 - beta^dt.
+    pub air: f32,
     /// Friction between grains.
     pub friction: f32,
     /// Largest impulse of attraction in a sub-step (m/s).
@@ -149,7 +149,8 @@ fn accelerate(row: &mut Row, c: &Coefficients) {
         (row.velocity, row.carried) = ([0.0; 3], [0.0; 3]);
         return;
     }
-    let before = scaled(add(row.velocity, scaled(c.gravity, c.dt)), c.kept);
+    let before = add(row.velocity, scaled(c.gravity, c.dt));
+    let before = sub(before, scaled(before, c.air));
     (row.velocity, row.carried) = (add(before, row.carried), [0.0; 3]);
 }
 
@@ -177,7 +178,11 @@ fn collide(row: &mut Row, other: &mut Row, pair: &mut Pair, c: &Coefficients, la
         (pair.normal, pair.across) = (total, across);
         row.velocity = add(row.velocity, scaled(impulse, row.weight));
         other.velocity = sub(other.velocity, scaled(impulse, other.weight));
-        if last {
+        let is_held = row.supported.min(other.supported) > 0.0;
+        if last && !is_held {
+            // Two grains that meet in the air do not meet again: what they gave each other says nothing of the next sub-step.
+            (pair.normal, pair.across) = (0.0, [0.0; 3]);
+        } else if last {
             let carried = add(scaled(normal, total), across);
             row.carried = add(row.carried, scaled(carried, row.weight));
             other.carried = sub(other.carried, scaled(carried, other.weight));

@@ -141,7 +141,8 @@ impl Sourcing {
     /// Sites in a block that held snow before and hold none after, each with a random number.
     fn sites(&self, origin: Origin, cell: f64, [before, after]: [&Window<'_>; 2]) -> Vec<(u64, DVec3)> {
         // Half of the lattice's cube: its diagonal is the distance of neighbours.
-        let apart = self.diameter * (std::f64::consts::SQRT_2 * std::f64::consts::PI / 6.0 / PACKING).cbrt();
+        let apart =
+            self.diameter * libm::cbrt(std::f64::consts::SQRT_2 * std::f64::consts::PI / 6.0 / PACKING);
         let half = apart / std::f64::consts::SQRT_2;
         // A voxel reaches half a cell around its centre.
         let low = origin.map(|at| (f64::from(at) - 0.5) * cell);

@@ -1,0 +1,113 @@
+//! The stage `grains` in shots: it reads the base's frames, resumes, and is made again when they change.
+
+use std::fs;
+use std::path::Path;
+use std::process::Stdio;
+use std::time::Duration;
+
+use crate::common::character::output;
+use crate::program::{CUBE, command, fails, works};
+use tempfile::TempDir;
+
+/// A folder with a cube that slides through snow; `grains` and `output` stand in the scene's tables.
+fn folder(grains: &str, output: &str) -> TempDir {
+    let folder = tempfile::tempdir().unwrap();
+    fs::write(folder.path().join("cube.obj"), CUBE).unwrap();
+    let scene = format!(
+        "[shot]\nframes = \"1-10\"\n[snow]\nground = 0.0\narea = [-0.5, -0.5, 0.5, 1.0]\ndepth = 0.2\ncell = 0.02\n\
+         [grains]\n{grains}\n[output]\n{output}\n[[object]]\nfile = \"cube.obj\"\nkeys = [{{ frame = 1, at = [0, 0.1, 0] }}, \
+         {{ frame = 10, at = [0, 0.1, 0.4], turn_deg = [0, 40, 0] }}]\n"
+    );
+    fs::write(folder.path().join("shot.toml"), scene).unwrap();
+    folder
+}
+
+fn grains(folder: &Path, out: &str) -> Vec<(String, Vec<u8>)> {
+    let files = output(&folder.join(out)).into_iter();
+    files.filter(|(name, _)| name.starts_with("grains/")).collect()
+}
+
+#[test]
+fn a_killed_run_resumes_to_the_same_grains() {
+    for written in ["", "base_mode = \"delta\"\ngrains = [\"vdb\", \"ply\", \"usd\"]"] {
+        let folder = folder("compression = 0.4", written);
+        let at = folder.path();
+        works(at, "snow shot.toml -o once -q");
+        for frame in [3, 6] {
+            let mut child = command(at, "snow shot.toml -o killed").stderr(Stdio::null()).spawn().unwrap();
+            let record = at.join(format!("killed/state/grains.{frame:04}.json"));
+            while !record.exists() && child.try_wait().unwrap().is_none() {
+                std::thread::sleep(Duration::from_millis(1));
+            }
+            let _ = child.kill();
+            child.wait().unwrap();
+        }
+        works(at, "snow shot.toml -o killed -q --threads 1");
+        let [once, killed] = ["once", "killed"].map(|out| grains(at, out));
+        assert!(once == killed, "{written}");
+        assert_eq!(once.len(), if written.is_empty() { 10 } else { 30 });
+        let info = works(at, "info once/grains/grains.0010.vdb");
+        assert!(info.contains("source_frame") && info.contains("pscale"), "{info}");
+        assert!(works(at, "snow shot.toml -o once").contains("there"), "nothing is made again");
+    }
+}
+
+#[test]
+fn grains_are_a_pass_of_their_own_over_the_base() {
+    let folder = folder("", "");
+    let at = folder.path();
+    works(at, "snow shot.toml -o cache -q --stage base");
+    assert!(grains(at, "cache").is_empty());
+    works(at, "snow shot.toml -o cache -q --stage grains");
+    let first = grains(at, "cache");
+    assert_eq!(first.len(), 10);
+    // Another setting of theirs leaves the base as it is.
+    fails(at, "snow shot.toml -o cache -q --set grains.friction=0.1", 2, &["grains.friction"]);
+    let base = fs::metadata(at.join("cache/base/base.0005.vdb")).unwrap().modified().unwrap();
+    works(at, "snow shot.toml -o cache -q --stage grains --from 1 --set grains.friction=0.1");
+    assert!(grains(at, "cache") != first);
+    assert_eq!(fs::metadata(at.join("cache/base/base.0005.vdb")).unwrap().modified().unwrap(), base);
+    // Another base takes them with it.
+    works(at, "snow shot.toml -o cache -q --stage base --from 4 --set snow.noise.seed=3");
+    assert_eq!(grains(at, "cache").len(), 3);
+    works(at, "snow shot.toml -o cache -q --set grains.friction=0.1 --set snow.noise.seed=3");
+    assert_eq!(grains(at, "cache").len(), 10);
+}
+
+#[test]
+fn a_scene_without_the_table_has_no_grains() {
+    let folder = folder("", "");
+    let at = folder.path();
+    let scene = fs::read_to_string(at.join("shot.toml")).unwrap().replace("[grains]", "");
+    fs::write(at.join("plain.toml"), scene).unwrap();
+    works(at, "snow plain.toml -o plain -q --frames 1-2");
+    assert!(!at.join("plain/grains").exists());
+    fails(at, "snow plain.toml -o plain -q --stage grains", 2, &["grains"]);
+    assert!(!fs::read_to_string(at.join("plain/scene.toml")).unwrap().contains("[grains]"));
+}
+
+#[test]
+fn what_grains_cannot_be_made_from_is_said_first() {
+    let at = |grains: &str, output: &str, words: &[&str]| {
+        let folder = folder(grains, output);
+        fails(folder.path(), "snow shot.toml -o out -q", 2, words);
+        assert!(!folder.path().join("out/base").exists());
+    };
+    at("", "half = true", &["half", "grains"]);
+    at("", "base = []", &["base", "grains"]);
+    at("radius = 0.05", "", &["radius"]);
+    at("radius = 0.0", "", &["radius"]);
+    at("compression = -0.1", "", &["compression"]);
+    at("repose_angle_deg = 80.0", "", &["repose_angle_deg"]);
+    at("air = nan", "", &["air"]);
+    // A frame of the base that is not there.
+    let folder = folder("", "");
+    works(folder.path(), "snow shot.toml -o cache -q --stage base --frames 1-10x3");
+    fails(folder.path(), "snow shot.toml -o cache -q --stage grains", 2, &["base"]);
+}
+
+#[test]
+fn more_grains_than_max_end_the_run_with_the_frame() {
+    let folder = folder("max = 50\ncompression = 0.0", "");
+    fails(folder.path(), "snow shot.toml -o out -q", 1, &["max = 50", "frame"]);
+}

@@ -1,0 +1,225 @@
+//! Grains of a small layer into which a ball is pressed: balances, the same bytes whatever does the work, damage.
+
+use crate::common::shapes::sphere;
+use frazil::base::DVec3;
+use frazil::base::points::Values;
+use frazil::motion::{Key, Keys, Rigid};
+use frazil::snow::base_layer::initial::{Cover, Ground, layer};
+use frazil::snow::base_layer::{BaseLayer, Params as BaseParams};
+use frazil::snow::grains::heap::{Colliders, Division, Floor, Heap};
+use frazil::snow::grains::{Grains, PACKING, Params, Surroundings, removals};
+use frazil::sweep::Body;
+use frazil::vdb::FloatGrid;
+use frazil::{Context, Pool};
+
+const CELL: f64 = 0.01;
+const FRAMES: i32 = 12;
+
+fn context(threads: usize) -> Context {
+    Context::new(Pool::new(threads).unwrap())
+}
+
+/// A ball that is pressed 6 cm into the snow and drawn through it.
+fn ball() -> Body {
+    let key = |time, at: [f64; 3]| Key { time, at: DVec3::from(at), turn: DVec3::zeros() };
+    let keys =
+        Keys::new(vec![key(0.0, [-0.1, 0.4, 0.0]), key(0.25, [-0.1, 0.19, 0.0]), key(0.5, [0.1, 0.19, 0.0])]);
+    Body::new(Box::new(Rigid::new(sphere(0.1, 24), keys.unwrap())), 0.0).unwrap()
+}
+
+/// What happened to the base: its state after each frame, and the volume that each frame removed.
+struct Story {
+    layers: Vec<FloatGrid>,
+    removed: Vec<f64>,
+    body: Body,
+}
+
+fn story(ctx: &Context) -> Story {
+    let ground = Ground::Plane { height: 0.0, area: [-0.3, -0.25, 0.3, 0.25] };
+    let snow = layer(ctx, &ground, &[], &Cover::Depth(0.15), CELL, 3.0).unwrap();
+    let mut base = BaseLayer::new(ctx, snow, BaseParams::for_cell(CELL)).unwrap();
+    let bodies = [ball()];
+    let (mut layers, mut removed) = (vec![base.surface().deep_copy().unwrap()], Vec::new());
+    for frame in 1..=FRAMES {
+        let time = |frame: i32| f64::from(frame) / 24.0;
+        let report = base.step(ctx, &bodies, time(frame - 1), time(frame), frame).unwrap();
+        layers.push(base.surface().deep_copy().unwrap());
+        removed.push(report.removed_volume);
+    }
+    Story { layers, removed, body: ball() }
+}
+
+fn params() -> Params {
+    Params { compression: 0.5, ..Params::for_cell(CELL) }
+}
+
+/// Steps grains through some frames; born, owed and the removed volume (m3) at the end.
+fn run(
+    ctx: &Context,
+    story: &Story,
+    grains: &mut Grains,
+    frames: std::ops::RangeInclusive<i32>,
+) -> (usize, f64, f64) {
+    let (mut born, mut owed, mut removed) = (0, 0.0, 0.0);
+    for frame in frames {
+        let at = frame as usize;
+        let around = Surroundings {
+            base: [&story.layers[at - 1], &story.layers[at]],
+            bodies: &[(&story.body, 0.3)],
+            statics: &[],
+            floor: Some(0.0),
+            lowest: -1.0,
+        };
+        let time = |frame: i32| f64::from(frame) / 24.0;
+        let report = grains.step(ctx, &around, [time(frame - 1), time(frame)], frame).unwrap();
+        assert_eq!(report.dropped, 0);
+        born += report.born;
+        (owed, removed) = (report.owed, removed + report.removed_volume);
+    }
+    (born, owed, removed)
+}
+
+#[test]
+fn every_grain_is_paid_for_by_removed_snow() {
+    let ctx = context(2);
+    let story = story(&ctx);
+    let mut grains = Grains::new(params()).unwrap();
+    let (born, owed, removed) = run(&ctx, &story, &mut grains, 1..=FRAMES);
+    let reported: f64 = story.removed.iter().sum();
+    assert!((removed / reported - 1.0).abs() < 1e-5, "{removed} {reported}");
+    let grain = std::f64::consts::PI / 6.0 * (2.0 * params().radius).powi(3);
+    let paid = 0.5 * removed * PACKING / grain;
+    assert!((born as f64 + owed - paid).abs() < 1e-6 * paid, "{born} + {owed} of {paid}");
+    assert!(born > 500 && owed < 0.05 * paid, "{born} {owed}");
+    assert_eq!(grains.count(), born);
+}
+
+#[test]
+fn removed_snow_without_a_surface_before_and_after_counts() {
+    let ctx = context(2);
+    let story = story(&ctx);
+    let all: f64 =
+        removals(&story.layers[0], &story.layers[FRAMES as usize]).unwrap().iter().map(|r| r.volume).sum();
+    let reported: f64 = story.removed.iter().sum();
+    assert!((all / reported - 1.0).abs() < 1e-5, "{all} {reported}");
+}
+
+#[test]
+fn the_same_grains_from_one_and_two_threads_and_after_a_resume() {
+    let (one, two) = (context(1), context(2));
+    let story = story(&two);
+    let mut straight = Grains::new(params()).unwrap();
+    run(&two, &story, &mut straight, 1..=FRAMES);
+    let mut stopped = Grains::new(params()).unwrap();
+    run(&one, &story, &mut stopped, 1..=7);
+    let mut resumed = Grains::resume(params(), &stopped.save()).unwrap();
+    run(&one, &story, &mut resumed, 8..=FRAMES);
+    assert!(straight.count() > 500);
+    assert!(straight.save() == resumed.save());
+    assert!(straight.points() == resumed.points());
+}
+
+#[test]
+fn grains_stay_out_of_the_ball_and_the_base() {
+    let ctx = context(2);
+    let story = story(&ctx);
+    let mut grains = Grains::new(params()).unwrap();
+    run(&ctx, &story, &mut grains, 1..=FRAMES);
+    let points = grains.points();
+    points.validate().unwrap();
+    let mut centre = Vec::new();
+    story.body.motion().pose(0.5, &mut centre).unwrap();
+    let middle = centre.iter().sum::<DVec3>() / centre.len() as f64;
+    let places: Vec<DVec3> = (0..points.count()).map(|index| points.position(index)).collect();
+    let radius = params().radius;
+    let mut distances = Vec::new();
+    story.layers[FRAMES as usize].sample_linear(&ctx, &places, &mut distances).unwrap();
+    let apart =
+        places.iter().zip(&distances).map(|(place, base)| [(place - middle).norm() - 0.1, f64::from(*base)]);
+    // Those between the ball and the snow have no room there: no place near theirs is a radius away from both.
+    let (pressed, others): (Vec<_>, Vec<_>) = apart.partition(|[ball, base]| ball + base < 2.0 * radius);
+    let deep = |[ball, base]: &&[f64; 2]| ball.min(*base) < 0.8 * radius;
+    let inside = others.iter().filter(deep).count();
+    assert!(inside <= others.len() / 500, "{inside} of {}", others.len());
+    assert!(
+        pressed.len() < others.len() / 5 && pressed.iter().all(|[ball, _]| *ball > -radius),
+        "{}",
+        pressed.len()
+    );
+    let Some(Values::Float(sizes)) = points.attribute("pscale") else { panic!("no pscale") };
+    assert_eq!(sizes.get(0), radius as f32);
+}
+
+#[test]
+fn too_many_grains_are_refused_and_leave_the_others_as_they_were() {
+    let ctx = context(2);
+    let story = story(&ctx);
+    let mut grains = Grains::new(Params { most: 200, ..params() }).unwrap();
+    run(&ctx, &story, &mut grains, 1..=3);
+    let before = grains.save();
+    let around = Surroundings {
+        base: [&story.layers[3], &story.layers[FRAMES as usize]],
+        bodies: &[],
+        statics: &[],
+        floor: Some(0.0),
+        lowest: -1.0,
+    };
+    let error = grains.step(&ctx, &around, [0.0, 1.0 / 24.0], 4).unwrap_err();
+    assert!(error.to_string().contains("max = 200"), "{error}");
+    assert!(grains.save() == before);
+}
+
+#[test]
+fn damaged_states_are_refused_or_are_states() {
+    let ctx = context(2);
+    let story = story(&ctx);
+    let mut grains = Grains::new(params()).unwrap();
+    run(&ctx, &story, &mut grains, 1..=5);
+    let whole = grains.save();
+    let mut random = 0x2545_f491_4f6c_dd1du64;
+    let mut next = || {
+        random ^= random << 13;
+        random ^= random >> 7;
+        random ^= random << 17;
+        random
+    };
+    let mut refused = 0;
+    for round in 0..10_000 {
+        let mut bytes = whole.clone();
+        if round % 4 == 0 {
+            bytes.truncate(next() as usize % whole.len());
+        } else {
+            for _ in 0..1 + next() % 3 {
+                let at = next() as usize % if round % 2 == 0 { 64 } else { whole.len() };
+                bytes[at] = next() as u8;
+            }
+        }
+        refused += usize::from(Grains::resume(params(), &bytes).is_err());
+    }
+    assert!(refused > 5_000, "{refused}");
+}
+
+/// A grain on a plane that leans, as gravity that leans: it rests below the angle of friction and slides above it.
+#[test]
+fn a_grain_slides_where_the_slope_is_steeper_than_its_friction() {
+    let ctx = context(1);
+    let moved = |degrees: f64| {
+        let params = Params { friction: 0.3, air: 1.0, ..Params::for_cell(CELL) };
+        let mut heap = Heap::new(2.0 * params.radius);
+        heap.add(0, DVec3::new(0.0, params.radius, 0.0), [0.0; 3]).unwrap();
+        let division = Division { dt: 1.0 / 24.0, sub_steps: params.sub_steps(1.0 / 24.0, 0.0) };
+        let mut coefficients = params.coefficients(&division);
+        let (sine, cosine) = degrees.to_radians().sin_cos();
+        coefficients.gravity = [(9.81 * sine) as f32, (-9.81 * cosine) as f32, 0.0];
+        let floor = Some(Floor { height: 0.0, friction: 0.3 });
+        let mut colliders = Colliders { floor, ..Colliders::default() };
+        for _ in 0..24 {
+            ctx.phase("move", || heap.step(&ctx, division, coefficients, &mut colliders)).unwrap();
+        }
+        heap.places().next().unwrap().x
+    };
+    let angle = 0.3f64.atan().to_degrees();
+    assert!(moved(angle - 3.0).abs() < 1e-4, "{}", moved(angle - 3.0));
+    let expected = 0.5 * 9.81 * ((angle + 3.0).to_radians().sin() - 0.3 * (angle + 3.0).to_radians().cos());
+    assert!((moved(angle + 3.0) / expected - 1.0).abs() < 0.1, "{} {expected}", moved(angle + 3.0));
+}
