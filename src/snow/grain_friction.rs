@@ -2,21 +2,19 @@
 
 /// Angles of poured piles of 10,000 grains (degrees) and the friction that gives them, as `make gates ONLY=snow.grains.pile`
 /// measures them. Grains do not turn, so that a little friction holds steep piles.
-const PILES: [(f64, f64); 10] = [
+const PILES: [(f64, f64); 8] = [
     (0.0, 0.0),
-    (8.9, 0.08),
-    (14.1, 0.12),
-    (18.0, 0.15),
-    (21.8, 0.18),
-    (25.1, 0.21),
-    (29.3, 0.25),
-    (32.4, 0.30),
-    (36.4, 0.35),
-    (STEEPEST, 0.40),
+    (9.6, 0.08),
+    (15.2, 0.12),
+    (19.4, 0.15),
+    (26.8, 0.209),
+    (34.4, 0.293),
+    (40.4, 0.372),
+    (STEEPEST, 0.393),
 ];
 
 /// Steepest angle of repose (degrees) that [`of_repose`] knows.
-pub const STEEPEST: f64 = 40.1;
+pub const STEEPEST: f64 = 42.0;
 
 /// The friction whose poured pile has an angle of repose (degrees), 0..=[`STEEPEST`].
 pub fn of_repose(repose: f64) -> f64 {

@@ -5,7 +5,7 @@ use rayon::prelude::*;
 use super::contacts::{Contacts, GONE, MOST, SKIN};
 use super::field::Field;
 use super::layout::{At, Layout, locate, world};
-use super::rows::{Row, V, norm};
+use super::rows::{Row, V, norm, sub};
 pub use super::shell::Shell;
 use super::solve::{Coefficients, sub_step};
 use super::touch::{self, Touch};
@@ -46,6 +46,8 @@ pub struct Heap {
     pub(super) rows: Vec<Row>,
     pub(super) ids: Vec<u32>,
     pub(super) at: Vec<At>,
+    /// Place of each grain when they were sorted (diameters).
+    anchors: Vec<V>,
     layout: Layout,
     pub(super) contacts: Contacts,
     pub(super) touches: Vec<Touch>,
@@ -70,6 +72,7 @@ impl Heap {
             rows: Vec::new(),
             ids: Vec::new(),
             at: Vec::new(),
+            anchors: Vec::new(),
             layout: Layout::default(),
             contacts: Contacts::default(),
             touches: Vec::new(),
@@ -166,7 +169,6 @@ impl Heap {
             if self.is_stale || 2.0 * moved > SKIN {
                 self.sort();
                 still = self.still(colliders, dt)?;
-                moved = 0.0;
             }
             let mut touches = still.clone();
             for (shell, at) in &mut colliders.shells {
@@ -177,16 +179,15 @@ impl Heap {
             touch::carry(&mut touches, &self.touches);
             self.touches = touches;
             sub_step(&mut self.rows, &mut self.contacts, &mut self.touches, &self.layout, &coefficients);
-            moved += self.farthest(&coefficients);
+            moved = self.farthest();
         }
         Ok(())
     }
 
-    /// Largest displacement of a grain in the last sub-step (diameters).
-    fn farthest(&self, c: &Coefficients) -> f32 {
-        let scale = c.dt / c.diameter;
-        let way = |row: &Row| norm(row.velocity) * scale + norm(row.push);
-        self.rows.par_iter().map(way).reduce(|| 0.0, f32::max)
+    /// How far a grain has come since the grains were sorted (diameters), at most.
+    fn farthest(&self) -> f32 {
+        let way = |(row, anchor): (&Row, &V)| norm(sub(row.place, *anchor));
+        self.rows.par_iter().zip(&self.anchors).map(way).reduce(|| 0.0, f32::max)
     }
 
     /// Sorts the grains and finds their neighbours.
@@ -196,6 +197,8 @@ impl Heap {
         from.iter().enumerate().for_each(|(slot, &was)| slots[was as usize] = slot as u32);
         self.contacts.find(&self.layout, &mut self.rows, &slots);
         touch::rename(&mut self.touches, &slots);
+        self.anchors.clear();
+        self.anchors.extend(self.rows.iter().map(|row| row.place));
         self.is_stale = false;
     }
 
