@@ -26,7 +26,11 @@ pub(super) fn template_of(keys: &[Key]) -> String {
     for table in tables(keys) {
         let keys_of = || keys.iter().filter(|key| key.table == table);
         let is_needed = keys_of().any(|key| matches!(key.example, Example::Needed(_)));
-        let many = if table == OBJECT { "  # as many as there are" } else { "" };
+        let many = match table {
+            OBJECT => "  # as many as there are",
+            _ if keys::OPTIONAL.contains(&table) => "  # only with this line are there any",
+            _ => "",
+        };
         let _ = writeln!(out, "\n{}{}{many}", if is_needed { "" } else { "# " }, heading(table));
         keys_of().for_each(|key| out.push_str(&example(key, keys)));
     }

@@ -177,6 +177,7 @@ impl Heap {
                 touches.extend(shell.touches(&self.layout, &self.rows, self.diameter, dt));
             }
             touch::carry(&mut touches, &self.touches);
+            touch::release_pressed(&mut touches);
             self.touches = touches;
             sub_step(&mut self.rows, &mut self.contacts, &mut self.touches, &self.layout, &coefficients);
             moved = self.farthest();

@@ -1,7 +1,17 @@
 //! Grains: snow that is pushed, piled and thrown (thesis section 3.3).
 //!
-//! They are born where the base layer was removed, pushed by what moves, pile up at their angle of repose, and read the base
-//! layer without changing it.
+//! They are born where the base layer was removed (`sourcing`), pushed by what moves (`shell`), lie on the base (`field`), pile up
+//! at their angle of repose (`solve`), and read the base layer without changing it. A step is divided into sub-steps (`heap`).
+//!
+//! | word | meaning |
+//! |---|---|
+//! | row | the part of a grain that every sub-step reads and writes, a cache line |
+//! | pair | two grains that touch or may soon; the higher one owns it |
+//! | touch | a grain beside a plane that it cannot move: ground, base, object |
+//! | impulse | what a contact changes of a velocity; kept from sub-step to sub-step |
+//! | push | a displacement that removes overlap and never becomes velocity |
+//! | block, column | 8 x 8 x 8 diameters; blocks one above the other, the unit of work |
+//! | colour | one of four sets of columns that share no grain |
 
 mod contacts;
 mod field;

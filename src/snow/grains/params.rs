@@ -18,7 +18,7 @@ pub struct Params {
     pub attraction: f64,
     /// Velocity kept in a second (beta, thesis section 3.3.1), 0..=1.
     pub air: f64,
-    /// Gravity (m/s2), upward negative.
+    /// Gravity along y (m/s2), -1000..=1000; downward is negative.
     pub gravity: f64,
     /// Sub-steps in a step; none: by the rule of [`Params::sub_steps`].
     pub sub_steps: Option<u32>,

@@ -1,7 +1,7 @@
 //! Grains that touch what they cannot move: ground, base layer, objects.
 
 use super::contacts::GONE;
-use super::rows::{V, add, scaled};
+use super::rows::{V, add, dot, scaled};
 
 /// A grain beside a plane that nothing moves.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
@@ -53,3 +53,19 @@ pub fn rename(touches: &mut Vec<Touch>, slots: &[u32]) {
     touches.retain(|touch| touch.grain != GONE);
     touches.sort_unstable_by_key(Touch::key);
 }
+
+/// Takes the impulses of grains that are pressed between two sides: those would grow as long as the sides fight over the grain,
+/// and throw it when one of them leaves. The touches are sorted.
+pub fn release_pressed(touches: &mut [Touch]) {
+    for touches in touches.chunk_by_mut(|a, b| a.grain == b.grain) {
+        let is_pressed = touches.iter().enumerate().any(|(index, touch)| {
+            touches[..index].iter().any(|other| dot(touch.normal, other.normal) < OPPOSITE)
+        });
+        if is_pressed {
+            touches.iter_mut().for_each(|touch| (touch.impulse, touch.across) = (0.0, [0.0; 3]));
+        }
+    }
+}
+
+/// Cosine between the normals of two sides that press a grain.
+const OPPOSITE: f32 = -0.5;

@@ -1,12 +1,12 @@
 //! Grains of a small layer into which a ball is pressed: balances, the same bytes whatever does the work, damage.
 
 use crate::common::shapes::sphere;
-use frazil::base::DVec3;
 use frazil::base::points::Values;
+use frazil::base::{DVec3, TriMesh};
 use frazil::motion::{Key, Keys, Rigid};
 use frazil::snow::base_layer::initial::{Cover, Ground, layer};
 use frazil::snow::base_layer::{BaseLayer, Params as BaseParams};
-use frazil::snow::grains::heap::{Colliders, Division, Floor, Heap};
+use frazil::snow::grains::heap::{Colliders, Division, Floor, Heap, Shell};
 use frazil::snow::grains::{Grains, PACKING, Params, Surroundings, removals};
 use frazil::sweep::Body;
 use frazil::vdb::FloatGrid;
@@ -222,4 +222,42 @@ fn a_grain_slides_where_the_slope_is_steeper_than_its_friction() {
     assert!(moved(angle - 3.0).abs() < 1e-4, "{}", moved(angle - 3.0));
     let expected = 0.5 * 9.81 * ((angle + 3.0).to_radians().sin() - 0.3 * (angle + 3.0).to_radians().cos());
     assert!((moved(angle + 3.0) / expected - 1.0).abs() < 0.1, "{} {expected}", moved(angle + 3.0));
+}
+
+/// A plate comes down on a layer of grains until they have no room, and leaves: they are not thrown.
+#[test]
+fn grains_that_are_pressed_are_not_thrown_when_they_are_free() {
+    let ctx = context(1);
+    let params = Params { friction: 0.3, ..Params::for_cell(CELL) };
+    let diameter = 2.0 * params.radius;
+    let mut heap = Heap::new(diameter);
+    for index in 0..36u32 {
+        let at = [f64::from(index % 6), f64::from(index / 6)].map(|x| (x - 2.5) * 1.05 * diameter);
+        heap.add(index, DVec3::new(at[0], 0.5 * diameter, at[1]), [0.0; 3]).unwrap();
+    }
+    let plate = TriMesh::cuboid([-0.2, 0.0, -0.2], [0.2, 0.01, 0.2]);
+    let division = Division { dt: 1.0 / 24.0, sub_steps: 14 };
+    let coefficients = params.coefficients(&division);
+    // Heights of its lower side at the frames.
+    let heights = [2.0, 1.0, 0.3, 0.3, 0.3, 0.3, 4.0, 30.0, 60.0, 60.0].map(|height| height * diameter);
+    let mut fastest: f32 = 0.0;
+    for (frame, ends) in heights.windows(2).enumerate() {
+        let at = |height: f64| -> Vec<DVec3> {
+            plate.positions.iter().map(|place| place.cast::<f64>() + DVec3::new(0.0, height, 0.0)).collect()
+        };
+        let shell = Shell::new(2, 0.3, plate.triangles.clone(), true, at(ends[0]));
+        let pose = |share: f64, out: &mut Vec<DVec3>| {
+            *out = at(ends[0] + (ends[1] - ends[0]) * share);
+            Ok(())
+        };
+        let floor = Some(Floor { height: 0.0, friction: 0.3 });
+        let mut colliders =
+            Colliders { floor, shells: vec![(shell, Box::new(pose))], ..Colliders::default() };
+        ctx.phase("move", || heap.step(&ctx, division, coefficients, &mut colliders)).unwrap();
+        if frame >= 5 {
+            fastest = fastest.max(heap.fastest());
+        }
+    }
+    assert!(fastest < 1.0, "{fastest}");
+    assert!(heap.places().all(|place| place.y < 3.0 * diameter && place.y > 0.0));
 }
