@@ -170,7 +170,7 @@ pub fn write(path: &Path, points: &Points) -> Result<()> {
 /// The bytes of such a file.
 ///
 /// # Errors
-/// As [`write`].
+/// As [`write()`].
 pub fn to_bytes(points: &Points) -> Result<Vec<u8>> {
     let plain = all_plain(points).map_err(Error::Argument)?;
     let mut out = Vec::new();
