@@ -57,6 +57,9 @@ pub const GRAIN_KEYS: &[Key] = &[
     Key::new("grains", "gravity", Kind::Number(-100.0, 100.0, "m/s2"), "along y (m/s2)")
         .or("-9.81")
         .concerns(STEP),
+    Key::new("grains", "rest", Kind::Flag, "whether grains that lie still come to rest until something wakes them")
+        .or("true")
+        .concerns(STEP),
     Key::new(
         "grains",
         "substeps",
@@ -69,7 +72,7 @@ pub const GRAIN_KEYS: &[Key] = &[
     Key::new(
         "grains",
         "max",
-        Kind::Whole(1, 100_000_000),
+        Kind::Whole(1, 60_000_000),
         "most grains: a frame that would have more is an error",
     )
     .or("20000000")

@@ -62,6 +62,7 @@ impl<'a> Grains<'a> {
             attraction: number("attraction").unwrap_or(usual.attraction),
             air: number("air").unwrap_or(usual.air),
             gravity: number("gravity").unwrap_or(usual.gravity),
+            rests: values.get("grains.rest").and_then(|value| value.flag()).unwrap_or(usual.rests),
             sub_steps: whole("substeps").map(|count| count as u32),
             most: whole("max").map_or(usual.most, |most| most as usize),
             seed: whole("seed").unwrap_or(0) as u64,

@@ -5,7 +5,7 @@ use rayon::prelude::*;
 use super::contacts::SKIN;
 use super::layout::{Block, EDGE, Layout};
 use super::rows::{Row, V, dot, norm, scaled};
-use super::touch::Touch;
+use super::touch::{BASE, Touch};
 use crate::base::blocks::{DIM, offset};
 use crate::error::Result;
 use crate::vdb::{FloatGrid, Probe};
@@ -14,38 +14,43 @@ use crate::vdb::{FloatGrid, Probe};
 pub struct Field<'a> {
     /// The level set (m).
     pub grid: &'a FloatGrid,
-    /// Which collider it is.
-    pub collider: u32,
     /// Friction against it.
     pub friction: f32,
 }
 
 impl Field<'_> {
-    /// Grains near the surface, each with the plane that the surface is there.
+    /// Members of some blocks near the surface, each with the plane that the surface is there.
     ///
     /// # Errors
     /// What the grid reports.
-    pub fn touches(&self, layout: &Layout, rows: &[Row], diameter: f64, reach: f32) -> Result<Vec<Touch>> {
-        let windows = self.windows(layout, diameter)?;
-        let near = layout.blocks.par_iter().zip(&windows).filter_map(|(block, window)| {
-            let window = window.as_ref()?;
-            let near = |slot: usize| self.touch(block, slot, &rows[slot], window, diameter, reach);
-            Some(block.grains().filter_map(near).collect::<Vec<_>>())
+    pub fn touches(
+        &self,
+        layout: &Layout,
+        which: &[u32],
+        rows: &[Row],
+        diameter: f64,
+        reach: f32,
+    ) -> Result<Vec<Vec<Touch>>> {
+        let windows = self.windows(layout, which, diameter)?;
+        let near = which.par_iter().zip(&windows).map(|(&index, window)| {
+            let (block, Some(window)) = (&layout.blocks[index as usize], window) else { return Vec::new() };
+            let near = |&slot: &u32| self.touch(block, slot, &rows[slot as usize], window, diameter, reach);
+            block.members.iter().filter_map(near).collect()
         });
-        Ok(near.flatten_iter().collect())
+        Ok(near.collect())
     }
 
     /// The leaves around each block; none where no surface is near.
-    fn windows(&self, layout: &Layout, diameter: f64) -> Result<Vec<Option<Window<'_>>>> {
+    fn windows(&self, layout: &Layout, which: &[u32], diameter: f64) -> Result<Vec<Option<Window<'_>>>> {
         let cell = self.grid.voxel_size();
-        let bounds: Vec<[[i32; 3]; 2]> = layout
-            .blocks
+        let bounds: Vec<[[i32; 3]; 2]> = which
             .par_iter()
-            .map(|block| {
+            .map(|&index| {
+                let at = layout.blocks[index as usize].at;
                 let leaf = |x: f64| (x / DIM as f64).floor() as i32;
                 let edge = f64::from(EDGE) * diameter / cell;
-                let low = block.at.map(|at| leaf(f64::from(at) * edge - MARGIN));
-                let high = block.at.map(|at| leaf(f64::from(at + 1) * edge + MARGIN));
+                let low = at.map(|at| leaf(f64::from(at) * edge - MARGIN));
+                let high = at.map(|at| leaf(f64::from(at + 1) * edge + MARGIN));
                 [low, high]
             })
             .collect();
@@ -56,7 +61,7 @@ impl Field<'_> {
     fn touch(
         &self,
         block: &Block,
-        slot: usize,
+        slot: u32,
         row: &Row,
         window: &Window<'_>,
         diameter: f64,
@@ -75,14 +80,12 @@ impl Field<'_> {
         }
         let normal = scaled(gradient, 1.0 / steep);
         Some(Touch {
-            grain: slot as u32,
-            collider: self.collider,
+            grain: slot,
+            collider: BASE,
             normal,
             offset: dot(normal, row.place) - (distance - 0.5),
-            velocity: [0.0; 3],
             friction: self.friction,
-            impulse: 0.0,
-            across: [0.0; 3],
+            ..Touch::default()
         })
     }
 }

@@ -1,11 +1,12 @@
-//! Grains and how they move: sub-steps of [`super::solve`] between sortings.
+//! Grains and how they move: sub-steps of [`super::solve`], in which neighbours are found again where grains have moved.
 
 use rayon::prelude::*;
 
-use super::contacts::{Contacts, GONE, MOST, SKIN};
+use super::contacts::{Held, MOST};
 use super::field::Field;
-use super::layout::{At, Layout, locate, world};
-use super::rows::{Row, V, norm, sub};
+use super::layout::{At, Layout, NONE, holds, locate, order, settle, world};
+use super::rest;
+use super::rows::{Row, V, norm};
 pub use super::shell::Shell;
 use super::solve::{Coefficients, sub_step};
 use super::touch::{self, Touch};
@@ -36,23 +37,18 @@ pub struct Colliders<'a> {
     pub shells: Vec<(Shell, Pose<'a>)>,
 }
 
-/// Collider number of the floor.
-const FLOOR: u32 = 0;
-
-/// Grains with their contacts.
+/// Grains between two steps.
 #[derive(Clone)]
 pub struct Heap {
     pub(super) diameter: f64,
     pub(super) rows: Vec<Row>,
     pub(super) ids: Vec<u32>,
+    /// Block of each.
     pub(super) at: Vec<At>,
-    /// Place of each grain when they were sorted (diameters).
-    anchors: Vec<V>,
-    layout: Layout,
-    pub(super) contacts: Contacts,
+    /// What pairs carry.
+    pub(super) held: Vec<Held>,
+    /// What grains touch that cannot be moved, by grain and collider.
     pub(super) touches: Vec<Touch>,
-    /// Whether grains were added or have moved so far that neighbours must be found again.
-    is_stale: bool,
 }
 
 /// How a step is divided.
@@ -67,17 +63,8 @@ pub struct Division {
 impl Heap {
     /// No grains yet, of a diameter (m).
     pub fn new(diameter: f64) -> Self {
-        Self {
-            diameter,
-            rows: Vec::new(),
-            ids: Vec::new(),
-            at: Vec::new(),
-            anchors: Vec::new(),
-            layout: Layout::default(),
-            contacts: Contacts::default(),
-            touches: Vec::new(),
-            is_stale: true,
-        }
+        let (rows, ids, at) = (Vec::new(), Vec::new(), Vec::new());
+        Self { diameter, rows, ids, at, held: Vec::new(), touches: Vec::new() }
     }
 
     /// Number of grains.
@@ -85,38 +72,49 @@ impl Heap {
         self.rows.len()
     }
 
-    /// Adds a grain with an identity, at a place (m) with a velocity (m/s).
+    /// Number of grains that rest.
+    pub fn resting(&self) -> usize {
+        self.rows.par_iter().filter(|row| row.rests()).count()
+    }
+
+    /// Adds a grain with an identity of its own, at a place (m) with a velocity (m/s).
     ///
     /// # Errors
     /// A place too far away; too many grains.
     pub fn add(&mut self, id: u32, place: DVec3, velocity: V) -> Result<()> {
         let (at, place) = locate(place, self.diameter);
-        if !Layout::holds(at) {
+        if !holds(at) {
             return Err(Error::argument("a grain is too far from the origin"));
         }
         if self.rows.len() >= MOST {
             return Err(Error::argument(format!("there are more than {MOST} grains")));
         }
-        self.rows.push(Row { place, weight: 1.0, velocity, ..Row::default() });
+        self.rows.push(Row { place, hold: 1.0, velocity, since: place, ..Row::default() });
         self.ids.push(id);
         self.at.push(at);
-        self.is_stale = true;
         Ok(())
     }
 
     /// Leaves out the grains below a height (m).
     pub fn drop_below(&mut self, height: f64) {
+        let is_above = |(row, at): (&Row, &At)| world(*at, row.place, self.diameter).y >= height;
+        let kept: Vec<u32> = (0..)
+            .zip(self.rows.iter().zip(&self.at))
+            .filter_map(|(slot, grain)| is_above(grain).then_some(slot))
+            .collect();
+        if kept.len() < self.rows.len() {
+            self.keep(&kept);
+        }
+    }
+
+    /// Wakes the grains whose places (m) something says yes to.
+    pub fn wake(&mut self, wakes: impl Fn(DVec3) -> bool + Sync) {
         let diameter = self.diameter;
-        let mut is_any = false;
-        for (row, at) in self.rows.iter().zip(&mut self.at) {
-            if world(*at, row.place, diameter).y < height {
-                *at = Layout::NOWHERE;
-                is_any = true;
+        self.rows.par_iter_mut().zip(&self.at).filter(|(row, _)| row.rests()).for_each(|(row, at)| {
+            if wakes(world(*at, row.place, diameter)) {
+                rest::wake(row);
             }
-        }
-        if is_any {
-            self.sort();
-        }
+        });
     }
 
     /// Identities, in the order of the places.
@@ -139,6 +137,11 @@ impl Heap {
         self.rows.iter().zip(&self.at).map(|(row, at)| (*at, row.place))
     }
 
+    /// Whether each is awake.
+    pub fn awake(&self) -> impl Iterator<Item = bool> + '_ {
+        self.rows.iter().map(|row| !row.rests())
+    }
+
     /// Largest speed (m/s).
     pub fn fastest(&self) -> f32 {
         self.rows.par_iter().map(|row| norm(row.velocity)).reduce(|| 0.0, f32::max)
@@ -147,7 +150,7 @@ impl Heap {
     /// Moves the grains through a step.
     ///
     /// # Errors
-    /// Cancel; a pose that cannot be computed; a grid that cannot be read.
+    /// Cancel; a pose that cannot be computed; a grid that cannot be read; numbers that are no longer finite.
     pub fn step(
         &mut self,
         ctx: &Context,
@@ -156,91 +159,135 @@ impl Heap {
         colliders: &mut Colliders<'_>,
     ) -> Result<()> {
         let dt = division.dt / division.sub_steps as f64;
-        let mut still: Vec<Touch> = Vec::new();
         let mut pose = Vec::new();
         for (shell, at) in &mut colliders.shells {
             at(0.0, &mut pose)?;
             shell.follow(&pose);
         }
-        let mut moved = 0.0;
-        self.is_stale = true;
+        let mut layout = self.lay_out();
         for sub in 0..division.sub_steps {
             ctx.check()?;
-            if self.is_stale || 2.0 * moved > SKIN {
-                self.sort();
-                still = self.still(colliders, dt)?;
-            }
-            let mut touches = still.clone();
+            let is_changed = layout.follow(&mut self.rows, &self.ids);
             for (shell, at) in &mut colliders.shells {
                 at((sub + 1) as f64 / division.sub_steps as f64, &mut pose)?;
                 shell.follow(&pose);
-                touches.extend(shell.touches(&self.layout, &self.rows, self.diameter, dt));
             }
-            touch::carry(&mut touches, &self.touches);
-            touch::release_pressed(&mut touches);
-            self.touches = touches;
-            sub_step(&mut self.rows, &mut self.contacts, &mut self.touches, &self.layout, &coefficients);
-            moved = self.farthest();
+            self.touch(&mut layout, colliders, dt)?;
+            if is_changed {
+                layout.find_pairs(&self.held);
+                self.held = Vec::new();
+            }
+            sub_step(&mut self.rows, &mut layout, &coefficients);
+        }
+        self.take_back(layout)
+    }
+
+    /// Sorts the grains into blocks.
+    fn lay_out(&mut self) -> Layout {
+        let from = order(&self.rows, &self.ids, &self.at);
+        self.keep(&from);
+        let mut layout = Layout::new(&mut self.rows, &self.ids, &self.at);
+        for touch in std::mem::take(&mut self.touches) {
+            layout.blocks[layout.of[touch.grain as usize] as usize].touches.push(touch);
+        }
+        let rows = &self.rows;
+        let is_awake = |slot: &u32| !rows[*slot as usize].rests();
+        layout.blocks.par_iter_mut().for_each(|block| block.is_awake = block.members.iter().any(is_awake));
+        layout
+    }
+
+    /// Keeps what the next step needs of a layout, and the grains that have not left it.
+    fn take_back(&mut self, layout: Layout) -> Result<()> {
+        self.held = layout.held();
+        self.touches = layout.blocks.iter().flat_map(|block| block.touches.iter().copied()).collect();
+        self.touches.par_sort_unstable_by_key(Touch::key);
+        self.rows.par_iter_mut().zip(&mut self.at).zip(&layout.of).for_each(|((row, at), &of)| {
+            if of != NONE {
+                *at = layout.blocks[of as usize].at;
+                settle(row, at);
+            }
+        });
+        let is_finite = |row: &Row| row.place.iter().chain(&row.velocity).all(|x| x.is_finite());
+        if !self.rows.par_iter().all(is_finite) {
+            return Err(Error::Internal("grains have places or velocities that are not finite".into()));
+        }
+        let is_there = |slot: &u32| layout.of[*slot as usize] != NONE && holds(self.at[*slot as usize]);
+        let kept: Vec<u32> = (0..self.rows.len() as u32).filter(is_there).collect();
+        if kept.len() < self.rows.len() {
+            self.keep(&kept);
         }
         Ok(())
     }
 
-    /// How far a grain has come since the grains were sorted (diameters), at most.
-    fn farthest(&self) -> f32 {
-        let way = |(row, anchor): (&Row, &V)| norm(sub(row.place, *anchor));
-        self.rows.par_iter().zip(&self.anchors).map(way).reduce(|| 0.0, f32::max)
+    /// Puts the grains into another order, which may leave some out.
+    fn keep(&mut self, from: &[u32]) {
+        let mut slots = vec![NONE; self.rows.len()];
+        from.iter().zip(0..).for_each(|(&was, slot)| slots[was as usize] = slot);
+        self.rows = from.par_iter().map(|&from| self.rows[from as usize]).collect();
+        self.ids = from.par_iter().map(|&from| self.ids[from as usize]).collect();
+        self.at = from.par_iter().map(|&from| self.at[from as usize]).collect();
+        self.held.par_iter_mut().for_each(|held| held.grains = held.grains.map(|grain| slots[grain as usize]));
+        self.held.retain(|held| !held.grains.contains(&NONE));
+        self.touches.iter_mut().for_each(|touch| touch.grain = slots[touch.grain as usize]);
+        self.touches.retain(|touch| touch.grain != NONE);
+        self.touches.par_sort_unstable_by_key(Touch::key);
     }
 
-    /// Sorts the grains and finds their neighbours.
-    fn sort(&mut self) {
-        let mut slots = vec![GONE; self.rows.len()];
-        let from = self.layout.sort(&mut self.rows, &mut self.ids, &mut self.at);
-        from.iter().enumerate().for_each(|(slot, &was)| slots[was as usize] = slot as u32);
-        self.contacts.find(&self.layout, &mut self.rows, &slots);
-        touch::rename(&mut self.touches, &slots);
-        self.anchors.clear();
-        self.anchors.extend(self.rows.iter().map(|row| row.place));
-        self.is_stale = false;
-    }
-
-    /// Touches with what does not move, for as long as the sorting lasts.
-    fn still(&self, colliders: &Colliders<'_>, dt: f64) -> Result<Vec<Touch>> {
+    /// Finds what grains touch that cannot be moved, and wakes those that a moving surface touches.
+    fn touch(&mut self, layout: &mut Layout, colliders: &Colliders<'_>, dt: f64) -> Result<()> {
         let reach = (2.0 * dt / self.diameter) as f32;
-        let mut touches = Vec::new();
-        if let Some(floor) = colliders.floor {
-            let near = self.rows.iter().zip(&self.at).enumerate().filter_map(|(slot, (row, at))| {
-                // From the block's lower side to the floor (diameters).
-                let height =
-                    (floor.height / self.diameter - f64::from(at[1]) * f64::from(super::layout::EDGE)) as f32;
-                let gap = row.place[1] - height - 0.5;
-                (gap < SKIN + norm(row.velocity) * reach).then_some(Touch {
-                    grain: slot as u32,
-                    collider: FLOOR,
-                    normal: [0.0, 1.0, 0.0],
-                    offset: height + 0.5,
-                    velocity: [0.0; 3],
-                    friction: floor.friction,
-                    impulse: 0.0,
-                    across: [0.0; 3],
-                })
-            });
-            touches.extend(near);
+        let changed: Vec<u32> =
+            (0..).zip(&layout.blocks).filter(|(_, block)| block.is_changed).map(|(index, _)| index).collect();
+        let mut fresh: Vec<Vec<Touch>> = vec![Vec::new(); layout.blocks.len()];
+        if let Some(floor) = &colliders.floor {
+            for &index in &changed {
+                fresh[index as usize] =
+                    floor.touches(&layout.blocks[index as usize], &self.rows, self.diameter, reach);
+            }
         }
         for field in &colliders.fields {
-            touches.extend(field.touches(&self.layout, &self.rows, self.diameter, reach)?);
+            let found = field.touches(layout, &changed, &self.rows, self.diameter, reach)?;
+            changed.iter().zip(found).for_each(|(&index, found)| fresh[index as usize].extend(found));
         }
-        Ok(touches)
+        for (shell, _) in &colliders.shells {
+            for (index, found) in shell.touches(layout, &self.rows, self.diameter, dt) {
+                for touch in &found {
+                    rest::wake(&mut self.rows[touch.grain as usize]);
+                }
+                layout.blocks[index as usize].is_awake = true;
+                fresh[index as usize].extend(found);
+            }
+        }
+        touch::renew(&mut layout.blocks, fresh);
+        Ok(())
     }
 
     /// Overlaps (diameters) of the pairs that touch, for tests and reports.
     pub fn overlaps(&self) -> Vec<f32> {
-        let owners = 0..self.contacts.starts.len().saturating_sub(1);
-        let overlap = |owner: usize, at: usize| {
-            let other = self.contacts.pairs[at].other();
-            1.0 - norm(self.layout.apart(&self.rows, owner, other))
+        let mut heap = self.clone();
+        let mut layout = heap.lay_out();
+        layout.find_pairs(&[]);
+        layout.overlaps(&heap.rows)
+    }
+}
+
+impl Floor {
+    /// Members of a block near the floor.
+    fn touches(&self, block: &super::layout::Block, rows: &[Row], diameter: f64, reach: f32) -> Vec<Touch> {
+        // From the block's lower side to the floor (diameters).
+        let height = (self.height / diameter - f64::from(block.at[1]) * f64::from(super::layout::EDGE)) as f32;
+        let near = block.members.iter().filter(|slot| {
+            let row = &rows[**slot as usize];
+            row.place[1] - height - 0.5 < super::contacts::SKIN + norm(row.velocity) * reach
+        });
+        let touch = |&grain: &u32| Touch {
+            grain,
+            collider: touch::FLOOR,
+            normal: [0.0, 1.0, 0.0],
+            offset: height + 0.5,
+            friction: self.friction,
+            ..Touch::default()
         };
-        let all = owners.flat_map(|owner| self.contacts.of(owner).map(move |at| (owner, at)));
-        let near = all.map(|(owner, at)| overlap(owner, at)).filter(|overlap| *overlap > -0.02);
-        near.map(|overlap| overlap.max(0.0)).collect()
+        near.map(touch).collect()
     }
 }

@@ -1,12 +1,17 @@
-//! Grains sorted into blocks of 8 x 8 x 8 diameters and those into columns, so that neighbours are near in memory and columns
-//! two apart never touch the same grain.
+//! Grains in blocks of 8 x 8 x 8 diameters, so that neighbours are near in memory, and those in columns: two columns that are
+//! no neighbours never touch the same grain.
+//!
+//! Within a step grains change blocks without moving in memory: a block has a list of its members.
 
 use std::collections::HashMap;
 
 use rayon::prelude::*;
 
-use super::rows::{Row, V};
+use super::contacts::{Batch, Found};
+use super::rows::{Row, Shared, V};
+use super::touch::Touch;
 use crate::base::DVec3;
+use crate::base::lanes::LANES;
 
 /// Edge of a block (diameters). At least twice the reach of a contact.
 pub const EDGE: f32 = 8.0;
@@ -14,38 +19,61 @@ pub const EDGE: f32 = 8.0;
 pub const CELLS: usize = 6;
 /// Cells of a block.
 pub const ALL_CELLS: usize = CELLS * CELLS * CELLS;
+/// In place of a number: there is none.
+pub const NONE: u32 = u32::MAX;
 
 /// Index of a block along each axis.
 pub type At = [i32; 3];
 
-/// A block with its grains, and those of each of its cells: upward, then along x, then z.
-#[derive(Clone)]
+/// A block of grains, and what they do in a step.
 pub struct Block {
     /// Which.
     pub at: At,
-    /// Its first grain, that of each cell, and the one behind its last.
+    /// The blocks around it, and itself in the middle: along x, then y, then z; [`NONE`] where there is none.
+    pub near: [u32; 27],
+    /// Its grains by cell, in a cell by identity.
+    pub members: Vec<u32>,
+    /// The first member of each cell (upward, then along x, then z), and how many there are.
     pub starts: [u32; ALL_CELLS + 1],
+    /// Where members were when their neighbours were found (diameters, each axis for itself), and some that are nowhere.
+    pub anchors: [Vec<f32>; 3],
+    /// Pairs whose higher grain is a member.
+    pub batches: Vec<Batch>,
+    /// Those pairs while they are looked for.
+    pub found: Option<Found>,
+    /// What members touch that cannot be moved, by member.
+    pub touches: Vec<Touch>,
+    /// Whether a member is awake.
+    pub is_awake: bool,
+    /// Whether contacts of its members can matter: it or a neighbour is awake.
+    pub is_reached: bool,
+    /// Whether a member has moved so far that neighbours must be found again.
+    pub has_strayed: bool,
+    /// Whether its members changed.
+    pub is_changed: bool,
 }
 
 /// Blocks one above the other.
-#[derive(Clone)]
 pub struct Column {
     /// Index along x and z.
     pub at: [i32; 2],
-    /// Its grains.
-    pub grains: std::ops::Range<usize>,
+    /// Its blocks, upward.
+    pub blocks: Vec<u32>,
 }
 
 /// Where the grains are.
-#[derive(Clone, Default)]
+#[derive(Default)]
 pub struct Layout {
-    /// Blocks with grains, by column and upward.
+    /// Blocks with grains, and some that had some.
     pub blocks: Vec<Block>,
-    /// Columns with grains, along x, then z.
+    /// Columns of blocks.
     pub columns: Vec<Column>,
     /// Block of each grain.
     pub of: Vec<u32>,
+    /// Place of each grain among the members of its block.
+    pub rank: Vec<u32>,
     index: HashMap<At, u32>,
+    column_index: HashMap<[i32; 2], u32>,
 }
 
 /// Where a grain goes: column, level and cell, then its identity.
@@ -59,115 +87,201 @@ struct Key {
 /// Blocks are counted from the middle of what a key holds: 2^21 of them along x and z, 2^14 upward.
 const MIDDLE: [i32; 3] = [1 << 20, 1 << 13, 1 << 20];
 
+/// Whether a block index can be sorted.
+pub fn holds(at: At) -> bool {
+    (0..3).all(|axis| (-MIDDLE[axis]..MIDDLE[axis]).contains(&at[axis]))
+}
+
+/// Cell of a block that a place lies in.
+fn cell(place: V) -> usize {
+    let [x, y, z] = place.map(|x| ((x * (CELLS as f32 / EDGE)) as usize).min(CELLS - 1));
+    (y * CELLS + x) * CELLS + z
+}
+
+/// The order of grains by column, level, cell and identity: where each was before. Those in a block that cannot be sorted are
+/// left out.
+pub fn order(rows: &[Row], ids: &[u32], at: &[At]) -> Vec<u32> {
+    let mut keys: Vec<Key> = (rows.par_iter(), ids.par_iter(), at.par_iter())
+        .into_par_iter()
+        .enumerate()
+        .filter(|(_, (_, _, at))| holds(**at))
+        .map(|(from, (row, id, at))| {
+            let [x, y, z] = [0, 1, 2].map(|axis| (at[axis] + MIDDLE[axis]) as u64);
+            Key { cell: ((x << 21 | z) << 14 | y) << 8 | cell(row.place) as u64, id: *id, from: from as u32 }
+        })
+        .collect();
+    keys.par_sort_unstable();
+    keys.par_iter().map(|key| key.from).collect()
+}
+
 impl Layout {
-    /// Whether a block index can be sorted.
-    pub fn holds(at: At) -> bool {
-        (0..3).all(|axis| (-MIDDLE[axis]..MIDDLE[axis]).contains(&at[axis]))
+    /// Blocks of grains in the order of [`order`]; neighbours are not found yet.
+    pub fn new(rows: &mut [Row], ids: &[u32], at: &[At]) -> Self {
+        let mut layout = Self { of: vec![NONE; at.len()], rank: vec![0; at.len()], ..Self::default() };
+        let is_first = |slot: &usize| *slot == 0 || at[*slot] != at[slot - 1];
+        let mut firsts: Vec<usize> = (0..at.len()).into_par_iter().filter(is_first).collect();
+        firsts.push(at.len());
+        for run in firsts.windows(2) {
+            let block = layout.block(at[run[0]]);
+            layout.blocks[block as usize].members.extend(run[0] as u32..run[1] as u32);
+            layout.of[run[0]..run[1]].fill(block);
+        }
+        layout.rank_members(rows, ids);
+        layout
     }
 
-    /// A block that cannot be sorted: grains there are left out.
-    pub const NOWHERE: At = [i32::MAX; 3];
-
-    /// Sorts grains; each lies within or beyond the block that it had. Those in a block that cannot be sorted are left out.
-    /// Returns where each was before.
-    pub fn sort(&mut self, rows: &mut Vec<Row>, ids: &mut Vec<u32>, at: &mut Vec<At>) -> Vec<u32> {
-        let mut keys: Vec<Key> = (rows.par_iter_mut(), ids.par_iter(), at.par_iter_mut())
-            .into_par_iter()
-            .enumerate()
-            .filter_map(|(from, (row, id, at))| {
-                settle(row, at);
-                if !Self::holds(*at) {
-                    return None;
-                }
-                let cell = row.place.map(|x| ((x * (CELLS as f32 / EDGE)) as usize).min(CELLS - 1));
-                let [x, y, z] = [0, 1, 2].map(|axis| (at[axis] + MIDDLE[axis]) as u64);
-                let within = ((cell[1] * CELLS + cell[0]) * CELLS + cell[2]) as u64;
-                Some(Key { cell: ((x << 21 | z) << 14 | y) << 8 | within, id: *id, from: from as u32 })
-            })
-            .collect();
-        keys.par_sort_unstable();
-        let from: Vec<u32> = keys.par_iter().map(|key| key.from).collect();
-        *rows = from.par_iter().map(|&from| rows[from as usize]).collect();
-        *ids = from.par_iter().map(|&from| ids[from as usize]).collect();
-        *at = from.par_iter().map(|&from| at[from as usize]).collect();
-        self.build(&keys, at);
-        from
-    }
-
-    fn build(&mut self, keys: &[Key], at: &[At]) {
-        let is_first = |slot: &usize| *slot == 0 || keys[*slot].cell >> 8 != keys[slot - 1].cell >> 8;
-        let mut firsts: Vec<usize> = (0..keys.len()).into_par_iter().filter(is_first).collect();
-        firsts.push(keys.len());
-        let block = |pair: &[usize]| {
-            let mut starts = [pair[1] as u32; ALL_CELLS + 1];
-            let mut next = 0;
-            for (key, slot) in keys[pair[0]..pair[1]].iter().zip(pair[0] as u32..) {
-                let cell = (key.cell & 0xff) as usize;
-                while next <= cell {
-                    starts[next] = slot;
-                    next += 1;
-                }
-            }
-            Block { at: at[pair[0]], starts }
-        };
-        self.blocks = firsts.par_windows(2).map(block).collect();
-        self.index = self.blocks.iter().enumerate().map(|(index, block)| (block.at, index as u32)).collect();
-        self.of = self
-            .blocks
-            .par_iter()
-            .enumerate()
-            .flat_map_iter(|(index, block)| block.grains().map(move |_| index as u32))
-            .collect();
-        self.columns.clear();
-        for block in &self.blocks {
-            let (at, grains) = ([block.at[0], block.at[2]], block.grains());
-            match self.columns.last_mut() {
-                Some(last) if last.at == at => last.grains.end = grains.end,
-                _ => self.columns.push(Column { at, grains }),
+    /// The block at an index; a new one where there is none yet.
+    pub fn block(&mut self, at: At) -> u32 {
+        if let Some(&index) = self.index.get(&at) {
+            return index;
+        }
+        let index = self.blocks.len() as u32;
+        let mut near = [NONE; 27];
+        near[13] = index;
+        for code in (0..27).filter(|code| *code != 13) {
+            let step = [code / 9, code / 3 % 3, code % 3].map(|digit| digit as i32 - 1);
+            let neighbour = [at[0] + step[0], at[1] + step[1], at[2] + step[2]];
+            if let Some(&other) = self.index.get(&neighbour) {
+                near[code] = other;
+                self.blocks[other as usize].near[26 - code] = index;
             }
         }
+        self.index.insert(at, index);
+        self.blocks.push(Block {
+            at,
+            near,
+            members: Vec::new(),
+            starts: [0; ALL_CELLS + 1],
+            anchors: Default::default(),
+            batches: Vec::new(),
+            found: None,
+            touches: Vec::new(),
+            is_awake: false,
+            is_reached: false,
+            has_strayed: true,
+            is_changed: true,
+        });
+        let (columns, at) = (&mut self.columns, [at[0], at[2]]);
+        let column = *self.column_index.entry(at).or_insert_with(|| {
+            columns.push(Column { at, blocks: Vec::new() });
+            columns.len() as u32 - 1
+        });
+        let column = &mut self.columns[column as usize].blocks;
+        let level = |block: &u32| self.blocks[*block as usize].at[1];
+        let above = column.partition_point(|block| level(block) < level(&index));
+        column.insert(above, index);
+        index
     }
 
-    /// The block at an index.
-    pub fn find(&self, at: At) -> Option<&Block> {
-        self.index.get(&at).map(|&index| &self.blocks[index as usize])
+    /// Moves members of blocks that have strayed to the blocks that they are in, and sorts the members of every block that
+    /// changed. Whether there is one.
+    pub fn follow(&mut self, rows: &mut [Row], ids: &[u32]) -> bool {
+        let shared = Shared::new(rows);
+        let strayed = self.blocks.par_iter_mut().filter(|block| block.has_strayed);
+        let movers: Vec<Vec<(u32, At)>> = strayed
+            .map(|block| {
+                block.is_changed = true;
+                let (mut gone, at) = (Vec::new(), block.at);
+                block.members.retain(|&slot| {
+                    let mut now = at;
+                    // SAFETY: a grain is a member of one block.
+                    settle(unsafe { shared.get(slot as usize) }, &mut now);
+                    if now != at {
+                        gone.push((slot, now));
+                    }
+                    now == at
+                });
+                gone
+            })
+            .collect();
+        for (slot, at) in movers.into_iter().flatten() {
+            self.of[slot as usize] = NONE;
+            if holds(at) {
+                let block = self.block(at);
+                self.of[slot as usize] = block;
+                let block = &mut self.blocks[block as usize];
+                block.members.push(slot);
+                block.is_changed = true;
+                if !block.has_strayed {
+                    let place = rows[slot as usize].place;
+                    block.anchors.iter_mut().zip(place).for_each(|(anchors, place)| {
+                        anchors.insert(anchors.len() - LANES.min(anchors.len()), place);
+                    });
+                }
+            }
+        }
+        self.rank_members(rows, ids);
+        self.blocks.iter().any(|block| block.is_changed)
     }
 
-    /// From one grain to another (diameters).
-    pub fn apart(&self, rows: &[Row], to: usize, from: usize) -> V {
-        let [a, b] = [to, from].map(|slot| self.blocks[self.of[slot] as usize].at);
-        [0, 1, 2]
-            .map(|axis| (a[axis] - b[axis]) as f32 * EDGE + rows[to].place[axis] - rows[from].place[axis])
+    /// Sorts the members of blocks that changed.
+    fn rank_members(&mut self, rows: &mut [Row], ids: &[u32]) {
+        let rows = &*rows;
+        let rank = Shared::new(&mut self.rank);
+        self.blocks.par_iter_mut().filter(|block| block.is_changed).for_each(|block| {
+            let mut keyed: Vec<(usize, u32, u32, V)> = block
+                .members
+                .iter()
+                .enumerate()
+                .map(|(member, &slot)| {
+                    let place = if block.has_strayed {
+                        rows[slot as usize].place
+                    } else {
+                        [0, 1, 2].map(|axis| block.anchors[axis][member])
+                    };
+                    (cell(place), ids[slot as usize], slot, place)
+                })
+                .collect();
+            keyed.sort_unstable_by_key(|(cell, id, _, _)| (*cell, *id));
+            block.anchors.iter_mut().for_each(Vec::clear);
+            let mut next = 0;
+            for (member, (cell, _, slot, place)) in keyed.into_iter().enumerate() {
+                block.members[member] = slot;
+                // SAFETY: a grain is a member of one block.
+                unsafe { *rank.get(slot as usize) = member as u32 };
+                block.starts[next..=cell].fill(member as u32);
+                next = next.max(cell + 1);
+                block.anchors.iter_mut().zip(place).for_each(|(anchors, place)| anchors.push(place));
+            }
+            block.starts[next..].fill(block.members.len() as u32);
+            block.anchors.iter_mut().for_each(|anchors| anchors.extend([f32::INFINITY; LANES]));
+            block.has_strayed = false;
+        });
     }
 
-    /// Columns in four sets: of two columns of one set neither is the other's neighbour.
-    pub fn colours(&self) -> [Vec<usize>; 4] {
-        let mut sets: [Vec<usize>; 4] = Default::default();
+    /// Marks the blocks whose contacts can matter: those that are awake, and their neighbours; all of them on request.
+    pub fn reach(&mut self, all: bool) {
+        let awake: Vec<bool> = self.blocks.par_iter().map(|block| block.is_awake).collect();
+        let is_awake = |&block: &u32| block != NONE && awake[block as usize];
+        self.blocks.par_iter_mut().for_each(|block| block.is_reached = all || block.near.iter().any(is_awake));
+    }
+
+    /// Columns with blocks that are reached in four sets: of two columns of one set neither is the other's neighbour.
+    pub fn colours(&self) -> [Vec<u32>; 4] {
+        let mut sets: [Vec<u32>; 4] = Default::default();
         for (index, column) in self.columns.iter().enumerate() {
-            sets[((column.at[0] & 1) << 1 | column.at[1] & 1) as usize].push(index);
+            if column.blocks.iter().any(|block| self.blocks[*block as usize].is_reached) {
+                sets[((column.at[0] & 1) << 1 | column.at[1] & 1) as usize].push(index as u32);
+            }
         }
         sets
     }
 }
 
-impl Block {
-    /// Its grains.
-    pub fn grains(&self) -> std::ops::Range<usize> {
-        self.starts[0] as usize..self.starts[ALL_CELLS] as usize
-    }
-}
-
 /// Moves a grain to the block that its place lies in.
-fn settle(row: &mut Row, at: &mut At) {
-    for (place, at) in row.place.iter_mut().zip(at) {
+pub fn settle(row: &mut Row, at: &mut At) {
+    for axis in 0..3 {
+        let (place, since, at) = (&mut row.place[axis], &mut row.since[axis], &mut at[axis]);
         let blocks = (*place / EDGE).floor();
         if blocks != 0.0 {
             *at = at.saturating_add(blocks as i32);
             *place -= blocks * EDGE;
+            *since -= blocks * EDGE;
             // A place just below 0 becomes the edge itself.
             if *place >= EDGE {
                 *at = at.saturating_add(1);
                 *place = 0.0;
+                *since -= EDGE;
             }
         }
     }

@@ -19,6 +19,7 @@ mod field;
 pub mod heap;
 mod layout;
 mod params;
+mod rest;
 mod rows;
 mod shell;
 #[doc(hidden)]
@@ -196,9 +197,9 @@ impl Grains {
     /// What grains cannot move, and how far objects move in the step (m).
     fn colliders<'a>(&self, around: &Surroundings<'a>, [from, to]: [f64; 2]) -> Result<(Colliders<'a>, f64)> {
         let floor = around.floor.map(|height| Floor { height, friction: GROUND });
-        let base = Field { grid: around.base[1], collider: 1, friction: self.params.friction as f32 };
+        let base = Field { grid: around.base[1], friction: self.params.friction as f32 };
         let mut colliders = Colliders { floor, fields: vec![base], shells: Vec::new() };
-        let (mut way, mut number) = (0.0f64, 2);
+        let (mut way, mut number) = (0.0f64, touch::FIRST_SHELL);
         for (body, friction) in around.bodies {
             let (mut first, mut last) = (Vec::new(), Vec::new());
             body.motion().pose(from, &mut first)?;

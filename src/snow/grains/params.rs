@@ -1,6 +1,7 @@
 //! What grains are made of and how they move.
 
 use super::heap::Division;
+use super::rest;
 use super::solve::Coefficients;
 use crate::error::{Error, Result};
 use crate::snow::grain_friction;
@@ -20,6 +21,8 @@ pub struct Params {
     pub air: f64,
     /// Gravity along y (m/s2), -1000..=1000; downward is negative.
     pub gravity: f64,
+    /// Whether grains that lie still come to rest.
+    pub rests: bool,
     /// Sub-steps in a step; none: by the rule of [`Params::sub_steps`].
     pub sub_steps: Option<u32>,
     /// Most grains; more are an error.
@@ -45,6 +48,7 @@ impl Params {
             attraction: 0.0,
             air: 0.5,
             gravity: -9.81,
+            rests: true,
             sub_steps: None,
             most: 20_000_000,
             seed: 0,
@@ -101,6 +105,8 @@ impl Params {
             friction: self.friction as f32,
             attraction: (self.attraction * self.gravity.abs() * dt) as f32,
             band: BAND,
+            rest: self.rests.then(|| (rest::PATIENCE / dt).ceil().max(16.0) as f32),
+            visits_all: false,
         }
     }
 }

@@ -1,6 +1,8 @@
-//! The part of a grain that every sub-step reads and writes, and how tasks that touch disjoint grains share it.
+//! The part of a grain that every sub-step reads and writes, and how tasks that change disjoint grains share it.
 
 use std::marker::PhantomData;
+
+use crate::base::lanes::{LANES, Lanes};
 
 /// Three components.
 pub type V = [f32; 3];
@@ -11,20 +13,54 @@ pub type V = [f32; 3];
 pub struct Row {
     /// Place within its block (diameters), from the block's least corner.
     pub place: V,
-    /// Inverse mass: 1, or 0 while it rests.
-    pub weight: f32,
+    /// Inverse mass, 1 or 0 while it rests, and 2 more where a chain of contacts led down to something fixed in the last sub-step.
+    pub hold: f32,
     /// Velocity (m/s).
     pub velocity: V,
-    /// 1 where a chain of contacts led down to something fixed in the last sub-step, else 0.
-    pub supported: f32,
+    /// Sub-steps since it was at `since` or woke.
+    pub still: f32,
     /// Displacement (diameters) of this sub-step that removes overlap and never becomes velocity.
     pub push: V,
-    /// As `supported`, for the running sub-step.
-    pub supports: f32,
-    /// Sum of the impulses of its pairs in the last sub-step (m/s), with which the next one begins.
-    pub carried: V,
+    /// What contacts found in this sub-step: 1 where it is supported, 2 more where something wakes it.
+    pub marks: f32,
+    /// The place that it must leave to count as moving (diameters, as `place`).
+    pub since: V,
     /// Fills the row up to a cache line.
     pub unused: f32,
+}
+
+/// In `hold` and `marks`: supported.
+pub const SUPPORTED: f32 = 2.0;
+
+impl Row {
+    /// Inverse mass: 1, or 0 while it rests.
+    #[inline(always)]
+    pub fn weight(&self) -> f32 {
+        if self.is_supported() { self.hold - SUPPORTED } else { self.hold }
+    }
+
+    /// Whether a chain of contacts led down to something fixed in the last sub-step.
+    #[inline(always)]
+    pub fn is_supported(&self) -> bool {
+        self.hold >= SUPPORTED
+    }
+
+    /// Whether it rests.
+    #[inline(always)]
+    pub fn rests(&self) -> bool {
+        self.weight() == 0.0
+    }
+}
+
+/// The four numbers of a row that begin with its place, velocity or push.
+#[derive(Clone, Copy)]
+pub enum Part {
+    /// `place` and `hold`.
+    Place = 0,
+    /// `velocity` and `still`.
+    Velocity = 4,
+    /// `push` and `marks`.
+    Push = 8,
 }
 
 /// A slice whose elements tasks change at the same time, each its own.
@@ -33,6 +69,14 @@ pub struct Shared<'a, T> {
     count: usize,
     borrowed: PhantomData<&'a mut [T]>,
 }
+
+impl<T> Clone for Shared<'_, T> {
+    fn clone(&self) -> Self {
+        *self
+    }
+}
+
+impl<T> Copy for Shared<'_, T> {}
 
 // SAFETY: it lends elements of a slice that is borrowed mutably; whoever calls `get` keeps them apart.
 unsafe impl<T: Send> Sync for Shared<'_, T> {}
@@ -49,11 +93,76 @@ impl<'a, T> Shared<'a, T> {
     ///
     /// # Safety
     /// No other reference to this element may be in use.
+    #[inline(always)]
     #[expect(clippy::mut_from_ref, reason = "callers keep elements apart")]
     pub unsafe fn get(&self, index: usize) -> &mut T {
         assert!(index < self.count);
         // SAFETY: it lies within the borrowed slice, and the caller holds no other reference to it.
         unsafe { &mut *self.first.add(index) }
+    }
+}
+
+impl Shared<'_, Row> {
+    /// One part of eight rows, component by component.
+    ///
+    /// # Safety
+    /// The rows exist, and nothing else changes them meanwhile.
+    #[inline(always)]
+    pub unsafe fn gather(&self, rows: &[u32; LANES], part: Part) -> [Lanes; 4] {
+        // SAFETY: a row has sixteen numbers, of which the part's are four.
+        let place = |lane: usize| unsafe { self.first.cast::<f32>().add(rows[lane] as usize * 16 + part as usize) };
+        let mut out = [Lanes::default(); 4];
+        #[cfg(target_arch = "x86_64")]
+        for half in [0, 4] {
+            use std::arch::x86_64::{_MM_TRANSPOSE4_PS, _mm_load_ps, _mm_storeu_ps};
+            // SAFETY: rows lie on cache lines, and their parts on quarters of them; SSE2 is part of x86-64.
+            unsafe {
+                let mut all = [0, 1, 2, 3].map(|lane| _mm_load_ps(place(half + lane)));
+                let [a, b, c, d] = &mut all;
+                _MM_TRANSPOSE4_PS(a, b, c, d);
+                for (out, all) in out.iter_mut().zip(all) {
+                    _mm_storeu_ps(out.0.as_mut_ptr().add(half), all);
+                }
+            }
+        }
+        #[cfg(not(target_arch = "x86_64"))]
+        for lane in 0..LANES {
+            for (component, out) in out.iter_mut().enumerate() {
+                // SAFETY: as above.
+                out.0[lane] = unsafe { *place(lane).add(component) };
+            }
+        }
+        out
+    }
+
+    /// Writes back what [`Shared::gather`] read. Where two of the rows are the same, so are their values.
+    ///
+    /// # Safety
+    /// The rows exist, and nothing else uses them meanwhile.
+    #[inline(always)]
+    pub unsafe fn scatter(&self, rows: &[u32; LANES], part: Part, values: &[Lanes; 4]) {
+        // SAFETY: as for `gather`.
+        let place = |lane: usize| unsafe { self.first.cast::<f32>().add(rows[lane] as usize * 16 + part as usize) };
+        #[cfg(target_arch = "x86_64")]
+        for half in [0, 4] {
+            use std::arch::x86_64::{_MM_TRANSPOSE4_PS, _mm_loadu_ps, _mm_store_ps};
+            // SAFETY: as for `gather`.
+            unsafe {
+                let mut all = [0, 1, 2, 3].map(|of: usize| _mm_loadu_ps(values[of].0.as_ptr().add(half)));
+                let [a, b, c, d] = &mut all;
+                _MM_TRANSPOSE4_PS(a, b, c, d);
+                for (lane, all) in all.into_iter().enumerate() {
+                    _mm_store_ps(place(half + lane), all);
+                }
+            }
+        }
+        #[cfg(not(target_arch = "x86_64"))]
+        for lane in 0..LANES {
+            for (component, values) in values.iter().enumerate() {
+                // SAFETY: as above.
+                unsafe { *place(lane).add(component) = values.0[lane] };
+            }
+        }
     }
 }
 

@@ -9,6 +9,7 @@ use rayon::prelude::*;
 
 use super::contacts::SKIN;
 use super::layout::{EDGE, Layout, world};
+use super::rest;
 use super::rows::{Row, dot};
 use super::touch::Touch;
 use crate::base::DVec3;
@@ -111,29 +112,39 @@ impl Shell {
         self.way
     }
 
-    /// Grains near the surface, each with the plane that the surface is there; `dt` (s) is the sub-step's length.
-    pub fn touches(&self, layout: &Layout, rows: &[Row], diameter: f64, dt: f64) -> Vec<Touch> {
+    /// Grains near the surface by block, each with the plane that the surface is there; `dt` (s) is the sub-step's length. Of
+    /// grains that rest, those that the surface touches and moves.
+    pub fn touches(&self, layout: &Layout, rows: &[Row], diameter: f64, dt: f64) -> Vec<(u32, Vec<Touch>)> {
         let half = 0.5 * f64::from(EDGE) * diameter;
         let reach = diameter * (0.5 + f64::from(SKIN)) + self.way;
-        let near = layout.blocks.par_iter().filter(|block| {
+        let blocks = layout.blocks.par_iter().enumerate();
+        let near = blocks.filter(|(_, block)| {
             let middle = world(block.at, [EDGE * 0.5; 3], diameter);
-            self.nearest(middle, half * 3f64.sqrt() + reach + 2.0 * diameter).is_some()
+            let is_near = || self.nearest(middle, half * 3f64.sqrt() + reach + 2.0 * diameter).is_some();
+            (block.is_awake || self.way > 0.0) && !block.members.is_empty() && is_near()
         });
-        let touches = near.flat_map_iter(|block| {
-            block.grains().filter_map(move |slot| {
-                let row = &rows[slot];
+        let touches = near.map(|(index, block)| {
+            let touch = |&slot: &u32| {
+                let row = &rows[slot as usize];
+                if row.rests() && self.way == 0.0 {
+                    return None;
+                }
                 let place = world(block.at, row.place, diameter);
                 let fast = row.velocity.iter().map(|x| f64::from(*x).powi(2)).sum::<f64>().sqrt() * dt;
                 let nearest = self.nearest(place, reach + fast)?;
-                Some(self.touch(slot, row, place, &nearest, diameter, dt))
-            })
+                let touch = self.touch(slot, row, place, &nearest, diameter, dt);
+                let is_near = dot(touch.normal, row.place) - touch.offset < rest::NEAR;
+                let moves = nearest.motion.norm() > 1.0e-6 * diameter;
+                (!row.rests() || is_near && moves).then_some(touch)
+            };
+            (index as u32, block.members.iter().filter_map(touch).collect::<Vec<_>>())
         });
-        touches.collect()
+        touches.filter(|(_, touches)| !touches.is_empty()).collect()
     }
 
     fn touch(
         &self,
-        slot: usize,
+        slot: u32,
         row: &Row,
         place: DVec3,
         nearest: &Nearest,
@@ -151,7 +162,7 @@ impl Shell {
         let gap = (if inside { -distance } else { distance }) / diameter - 0.5;
         let velocity = nearest.motion / dt;
         Touch {
-            grain: slot as u32,
+            grain: slot,
             collider: self.collider,
             normal,
             offset: dot(normal, row.place) - gap as f32,

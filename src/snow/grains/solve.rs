@@ -9,22 +9,22 @@
 //! What a push takes back of a sinking grain's motion, its velocity loses too.
 //!
 //! Columns are swept upward, in four sets that share no grain, in a fixed order: the same bytes from any number of threads.
-
-use std::ops::Range;
+//! Eight pairs are solved at a time (`contacts`).
 
 use rayon::prelude::*;
 
-use super::contacts::{Contacts, Pair, SKIN};
-use super::layout::Layout;
-use super::rows::{Row, Shared, V, add, dot, norm, scaled, sub};
+use super::contacts::{Batch, SKIN};
+use super::layout::{Block, Layout};
+use super::rest;
+use super::rows::{Part, Row, SUPPORTED, Shared, V, add, dot, scaled, sub};
 use super::touch::Touch;
+use crate::base::cpu::dispatch;
+use crate::base::lanes::{LaneMask, Lanes};
 
 /// Share of an overlap that a sub-step removes.
 const REMOVED: f32 = 0.8;
 /// Most that a sub-step moves a grain out of an overlap (diameters).
 const FARTHEST: f32 = 0.5;
-/// Sweeps over the contacts in a sub-step.
-const SWEEPS: usize = 2;
 /// Gap (diameters) up to which a contact still supports and keeps its impulse.
 const TOUCHING: f32 = 0.02;
 /// Least upward part of the direction from a grain to one that it supports.
@@ -49,169 +49,129 @@ pub struct Coefficients {
     pub attraction: f32,
     /// Gap (diameters) up to which grains attract each other.
     pub band: f32,
+    /// Sub-steps that a grain must lie still to rest; none: it never rests.
+    pub rest: Option<f32>,
+    /// Whether all contacts are visited, also where everything rests: the result is the same.
+    pub visits_all: bool,
 }
 
 /// One sub-step: forces, contacts, motion.
-pub fn sub_step(
-    rows: &mut [Row],
-    contacts: &mut Contacts,
-    touches: &mut [Touch],
-    layout: &Layout,
-    c: &Coefficients,
-) {
-    rows.par_iter_mut().with_min_len(1 << 12).for_each(|row| accelerate(row, c));
-    for touch in touches.iter() {
-        let row = &mut rows[touch.grain as usize];
-        row.velocity = add(row.velocity, scaled(touch.total(), row.weight));
-    }
-    let colours = layout.colours().map(|colour| {
-        let with_touches = |&column: &usize| (column, touches_of(touches, &layout.columns[column].grains));
-        colour.iter().map(with_touches).collect::<Vec<_>>()
-    });
-    for sweep in 0..SWEEPS {
-        let last = sweep == SWEEPS - 1;
+pub fn sub_step(rows: &mut [Row], layout: &mut Layout, c: &Coefficients) {
+    layout.reach(c.visits_all);
+    let colours = layout.colours();
+    accelerate(rows, layout, c);
+    for pass in [Pass::Begin, Pass::Solve, Pass::SolveLast] {
         for colour in &colours {
-            let shares = Shares {
-                rows: Shared::new(rows),
-                pairs: Shared::new(&mut contacts.pairs),
-                touches: Shared::new(touches),
-            };
-            let starts = &contacts.starts;
-            colour.par_iter().for_each(|&(column, ref touching)| {
-                let grains = &layout.columns[column].grains;
-                // SAFETY: the columns of a colour are no neighbours.
-                unsafe { shares.column(grains, starts, touching.clone(), c, last) }
-            });
+            sweep(rows, layout, colour, pass, c);
         }
     }
-    // What cannot move has the last word.
-    for touch in touches.iter_mut() {
-        resist(&mut rows[touch.grain as usize], touch, c, true);
-    }
-    rows.par_iter_mut().with_min_len(1 << 12).for_each(|row| advance(row, c));
+    advance(rows, layout, c);
 }
 
-/// The touches of a range of grains.
-fn touches_of(touches: &[Touch], grains: &Range<usize>) -> Range<usize> {
-    let before = |grain: usize| touches.partition_point(|touch| (touch.grain as usize) < grain);
-    before(grains.start)..before(grains.end)
+/// A sweep over the contacts.
+#[derive(Clone, Copy)]
+enum Pass {
+    /// Impulses of the last sub-step.
+    Begin,
+    /// Impulses.
+    Solve,
+    /// Impulses, pushes and what the next sub-step wants to know.
+    SolveLast,
 }
 
-/// What tasks share while they sweep columns of one set.
+/// Visits the contacts of some columns, upward.
 ///
-/// Two columns of a set lie at least two apart. A task changes the grains of its own column and those that its pairs name, which
-/// lay within a contact's reach of it when they were found, less than half a column's width; pairs and touches belong to one grain.
-struct Shares<'a> {
-    rows: Shared<'a, Row>,
-    pairs: Shared<'a, Pair>,
-    touches: Shared<'a, Touch>,
-}
-
-impl Shares<'_> {
-    /// Solves the contacts that a column's grains own, upward.
-    ///
-    /// # Safety
-    /// No column beside this one may be swept at the same time.
-    unsafe fn column(
-        &self,
-        grains: &Range<usize>,
-        starts: &[u32],
-        touching: Range<usize>,
-        c: &Coefficients,
-        last: bool,
-    ) {
-        let mut touching = touching.peekable();
-        for owner in grains.clone() {
-            // SAFETY: the grain is of this column.
-            let row = unsafe { self.rows.get(owner) };
-            // SAFETY: the touch is of this grain.
-            while let Some(touch) = touching.peek().map(|&at| unsafe { self.touches.get(at) })
-                && touch.grain as usize == owner
-            {
-                resist(row, touch, c, last);
-                touching.next();
+/// Two columns of a colour lie at least two apart. A task changes the members of its own column's blocks and the grains that their
+/// pairs name, whose anchors lay within a contact's reach of it, less than half a column's width.
+fn sweep(rows: &mut [Row], layout: &mut Layout, colour: &[u32], pass: Pass, c: &Coefficients) {
+    let rows = Shared::new(rows);
+    let (columns, blocks) = (&layout.columns, Shared::new(&mut layout.blocks));
+    colour.par_iter().with_max_len(1).for_each(|&column| {
+        for &block in &columns[column as usize].blocks {
+            // SAFETY: a block is in one column.
+            let block = unsafe { blocks.get(block as usize) };
+            if !block.is_reached {
+                continue;
             }
-            for at in starts[owner] as usize..starts[owner + 1] as usize {
-                // SAFETY: the pair is of this grain.
-                let pair = unsafe { self.pairs.get(at) };
-                // SAFETY: it is of this column or within reach of it, and another grain than its owner.
-                let other = unsafe { self.rows.get(pair.other()) };
-                collide(row, other, pair, c, last);
+            let (touches, batches) = (&mut block.touches, &mut block.batches);
+            match pass {
+                Pass::Begin => begin(rows, batches),
+                Pass::Solve => {
+                    resist_all(rows, touches, false, c);
+                    solve(rows, batches, c);
+                }
+                Pass::SolveLast => {
+                    resist_all(rows, touches, true, c);
+                    solve_last(rows, batches, c);
+                }
             }
         }
+    });
+}
+
+/// Gravity, air (thesis section 3.3.1), and the impulses that touches had in the last sub-step.
+fn accelerate(rows: &mut [Row], layout: &Layout, c: &Coefficients) {
+    let rows = Shared::new(rows);
+    layout.blocks.par_iter().filter(|block| block.is_awake).for_each(|block| {
+        for &slot in &block.members {
+            // SAFETY: a grain is a member of one block.
+            let row = unsafe { rows.get(slot as usize) };
+            if !row.rests() {
+                let velocity = add(row.velocity, scaled(c.gravity, c.dt));
+                row.velocity = sub(velocity, scaled(velocity, c.air));
+            }
+        }
+        for touch in &block.touches {
+            // SAFETY: a touch's grain is a member of its block.
+            let row = unsafe { rows.get(touch.grain as usize) };
+            row.velocity = add(row.velocity, scaled(touch.total(), row.weight()));
+        }
+    });
+}
+
+/// Moves the grains: what cannot move has the last word.
+fn advance(rows: &mut [Row], layout: &mut Layout, c: &Coefficients) {
+    let rows = Shared::new(rows);
+    layout.blocks.par_iter_mut().filter(|block| block.is_reached).for_each(|block| {
+        resist_all(rows, &mut block.touches, true, c);
+        let Block { members, anchors, .. } = block;
+        (block.is_awake, block.has_strayed) = (false, false);
+        for (member, &slot) in members.iter().enumerate() {
+            // SAFETY: a grain is a member of one block.
+            let row = unsafe { rows.get(slot as usize) };
+            if !row.rests() {
+                move_on(row, c);
+            }
+            rest::judge(row, c.rest);
+            let strayed = [0, 1, 2].map(|axis| row.place[axis] - anchors[axis][member]);
+            block.has_strayed |= dot(strayed, strayed) > (0.5 * SKIN).powi(2);
+            block.is_awake |= !row.rests();
+        }
+    });
+}
+
+/// Moves a grain; what its push took back of its motion, its velocity loses where something holds it.
+fn move_on(row: &mut Row, c: &Coefficients) {
+    row.place = add(add(row.place, scaled(row.velocity, c.dt / c.diameter)), row.push);
+    let square = dot(row.push, row.push);
+    if row.is_supported() && square > 0.0 {
+        let back = scaled(row.push, c.diameter / c.dt);
+        let share = (-dot(row.velocity, back) / dot(back, back)).clamp(0.0, 1.0);
+        row.velocity = add(row.velocity, scaled(back, share));
     }
 }
 
-/// Gravity, air (thesis section 3.3.1), and the impulses of pairs in the last sub-step.
-fn accelerate(row: &mut Row, c: &Coefficients) {
-    (row.supported, row.supports, row.push) = (row.supports, 0.0, [0.0; 3]);
-    if row.weight == 0.0 {
-        (row.velocity, row.carried) = ([0.0; 3], [0.0; 3]);
-        return;
-    }
-    let before = add(row.velocity, scaled(c.gravity, c.dt));
-    let before = sub(before, scaled(before, c.air));
-    (row.velocity, row.carried) = (add(before, row.carried), [0.0; 3]);
-}
-
-/// One correction of a pair: impulses, and in the last sweep the push.
-#[inline(always)]
-fn collide(row: &mut Row, other: &mut Row, pair: &mut Pair, c: &Coefficients, last: bool) {
-    let weights = row.weight + other.weight;
-    let apart = sub(sub(row.place, pair.shift()), other.place);
-    let distance = norm(apart);
-    let gap = distance - 1.0;
-    if weights == 0.0 || (gap > SKIN && pair.normal == 0.0) {
-        return;
-    }
-    let normal = scaled(apart, 1.0 / distance.max(1.0e-6));
-    let relative = sub(row.velocity, other.velocity);
-    let along = dot(relative, normal);
-    let attracts = c.attraction > 0.0 && gap < c.band;
-    let least = if attracts { -c.attraction } else { 0.0 };
-    let wanted = if gap > 0.0 && !attracts { -gap * c.diameter / c.dt } else { 0.0 };
-    let total = (pair.normal + (wanted - along) / weights).max(least);
-    if total != 0.0 || pair.normal != 0.0 {
-        let sliding = sub(relative, scaled(normal, along));
-        let across = bounded(sub(pair.across, scaled(sliding, 1.0 / weights)), c.friction * (total - least));
-        let impulse = add(scaled(normal, total - pair.normal), sub(across, pair.across));
-        (pair.normal, pair.across) = (total, across);
-        row.velocity = add(row.velocity, scaled(impulse, row.weight));
-        other.velocity = sub(other.velocity, scaled(impulse, other.weight));
-        let is_held = row.supported.min(other.supported) > 0.0;
-        if last && !is_held {
-            // Two grains that meet in the air do not meet again: what they gave each other says nothing of the next sub-step.
-            (pair.normal, pair.across) = (0.0, [0.0; 3]);
-        } else if last {
-            let carried = add(scaled(normal, total), across);
-            row.carried = add(row.carried, scaled(carried, row.weight));
-            other.carried = sub(other.carried, scaled(carried, other.weight));
-        }
-    }
-    let upward = dot(normal, c.up);
-    if gap < TOUCHING {
-        if upward > STEEP && (other.supports > 0.0 || other.weight == 0.0) {
-            row.supports = 1.0;
-        }
-        if upward < -STEEP && (row.supports > 0.0 || row.weight == 0.0) {
-            other.supports = 1.0;
-        }
-    }
-    if last {
-        let missing = removed(gap, REMOVED) - dot(sub(row.push, other.push), normal);
-        if missing > 0.0 {
-            let holds = if upward > 0.0 { other.supported } else { row.supported };
-            let share = if row.weight * other.weight > 0.0 { upward * holds } else { 0.0 };
-            let push = scaled(normal, missing / weights);
-            row.push = add(row.push, scaled(push, row.weight * (1.0 + share)));
-            other.push = sub(other.push, scaled(push, other.weight * (1.0 - share)));
-        }
+/// Corrections of the grains that touch something that they cannot move.
+fn resist_all(rows: Shared<'_, Row>, touches: &mut [Touch], last: bool, c: &Coefficients) {
+    for touch in touches {
+        // SAFETY: a touch's grain is a member of its block, which one task has.
+        resist(unsafe { rows.get(touch.grain as usize) }, touch, c, last);
     }
 }
 
-/// One correction of a grain that touches something that it cannot move.
+/// One correction of such a grain.
 fn resist(row: &mut Row, touch: &mut Touch, c: &Coefficients, last: bool) {
-    if row.weight == 0.0 {
+    if row.rests() {
         return;
     }
     let normal = touch.normal;
@@ -225,21 +185,15 @@ fn resist(row: &mut Row, touch: &mut Touch, c: &Coefficients, last: bool) {
     let impulse = add(scaled(normal, total - touch.impulse), sub(across, touch.across));
     (touch.impulse, touch.across) = (total, across);
     row.velocity = add(row.velocity, impulse);
-    if gap < TOUCHING && dot(normal, c.up) > STEEP {
-        row.supports = 1.0;
+    if gap < TOUCHING && dot(normal, c.up) > STEEP && (row.marks == 0.0 || row.marks == rest::WOKEN) {
+        row.marks += 1.0;
     }
     if last {
-        let missing = removed(gap, 1.0) - dot(row.push, normal);
+        let missing = (if gap > 0.0 { -gap } else { (-gap).min(FARTHEST) }) - dot(row.push, normal);
         if missing > 0.0 {
             row.push = add(row.push, scaled(normal, missing));
         }
     }
-}
-
-/// By how much a sub-step widens a gap (diameters), or may narrow it.
-#[inline(always)]
-fn removed(gap: f32, share: f32) -> f32 {
-    if gap > 0.0 { -gap } else { (-share * gap).min(FARTHEST) }
 }
 
 /// A vector of at most a length.
@@ -249,16 +203,222 @@ fn bounded(vector: V, most: f32) -> V {
     if square > most * most { scaled(vector, most / square.sqrt()) } else { vector }
 }
 
-/// Moves a grain; what its push took back of its motion, its velocity loses where something holds it.
-fn advance(row: &mut Row, c: &Coefficients) {
-    if row.weight == 0.0 {
-        return;
+fn begin(rows: Shared<'_, Row>, batches: &[Batch]) {
+    dispatch!(begin_batches(rows: Shared<'_, Row>, batches: &[Batch]))
+}
+
+fn solve(rows: Shared<'_, Row>, batches: &mut [Batch], c: &Coefficients) {
+    dispatch!(solve_batches(rows: Shared<'_, Row>, batches: &mut [Batch], c: &Coefficients))
+}
+
+fn solve_last(rows: Shared<'_, Row>, batches: &mut [Batch], c: &Coefficients) {
+    dispatch!(solve_batches_last(rows: Shared<'_, Row>, batches: &mut [Batch], c: &Coefficients))
+}
+
+/// Gives grains the impulses of the last sub-step.
+#[inline(always)]
+fn begin_batches(rows: Shared<'_, Row>, batches: &[Batch]) {
+    for batch in batches {
+        if batch.impulse == [Lanes::all(0.0); 3] {
+            continue;
+        }
+        // SAFETY: see `sweep`; the pairs of a batch share no grain.
+        unsafe {
+            let others = batch.others();
+            let (a, b) = (Eight::load(rows, &batch.owners), Eight::load(rows, &others));
+            a.kicked(batch.impulse, a.weight).store(rows, &batch.owners);
+            b.kicked(batch.impulse, Lanes::all(0.0) - b.weight).store(rows, &others);
+        }
     }
-    row.place = add(add(row.place, scaled(row.velocity, c.dt / c.diameter)), row.push);
-    let square = dot(row.push, row.push);
-    if row.supported * square > 0.0 {
-        let back = scaled(row.push, c.diameter / c.dt);
-        let share = (-dot(row.velocity, back) / dot(back, back)).clamp(0.0, 1.0);
-        row.velocity = add(row.velocity, scaled(back, share));
+}
+
+#[inline(always)]
+fn solve_batches(rows: Shared<'_, Row>, batches: &mut [Batch], c: &Coefficients) {
+    for batch in batches {
+        let others = batch.others();
+        // SAFETY: as in `begin_batches`.
+        unsafe {
+            let (a, b) = (Eight::load(rows, &batch.owners), Eight::load(rows, &others));
+            let (a, b, ..) = collide(a, b, batch, c);
+            a.store(rows, &batch.owners);
+            b.store(rows, &others);
+        }
+    }
+}
+
+#[inline(always)]
+fn solve_batches_last(rows: Shared<'_, Row>, batches: &mut [Batch], c: &Coefficients) {
+    for batch in batches {
+        let others = batch.others();
+        // SAFETY: as in `begin_batches`.
+        unsafe {
+            let (a, b) = (Eight::load(rows, &batch.owners), Eight::load(rows, &others));
+            let (a, b, contact) = collide(a, b, batch, c);
+            a.store(rows, &batch.owners);
+            b.store(rows, &others);
+            let pushes = [rows.gather(&batch.owners, Part::Push), rows.gather(&others, Part::Push)];
+            let pushes = contact.push(&a, &b, pushes, c);
+            rows.scatter(&batch.owners, Part::Push, &pushes[0]);
+            rows.scatter(&others, Part::Push, &pushes[1]);
+            // Two grains that meet in the air do not meet again: what they gave each other says nothing of the next sub-step.
+            let is_held = a.supported & b.supported;
+            batch.impulse = batch.impulse.map(|impulse| is_held.choose(impulse, Lanes::all(0.0)));
+        }
+    }
+}
+
+type V8 = [Lanes; 3];
+
+#[inline(always)]
+fn add8(a: V8, b: V8) -> V8 {
+    [a[0] + b[0], a[1] + b[1], a[2] + b[2]]
+}
+
+#[inline(always)]
+fn sub8(a: V8, b: V8) -> V8 {
+    [a[0] - b[0], a[1] - b[1], a[2] - b[2]]
+}
+
+#[inline(always)]
+fn scaled8(a: V8, s: Lanes) -> V8 {
+    [a[0] * s, a[1] * s, a[2] * s]
+}
+
+#[inline(always)]
+fn dot8(a: V8, b: V8) -> Lanes {
+    a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
+}
+
+/// Eight grains of a batch.
+#[derive(Clone, Copy)]
+struct Eight {
+    place: V8,
+    weight: Lanes,
+    supported: LaneMask,
+    velocity: V8,
+    still: Lanes,
+}
+
+impl Eight {
+    /// # Safety
+    /// As for [`Shared::gather`].
+    #[inline(always)]
+    unsafe fn load(rows: Shared<'_, Row>, slots: &[u32; 8]) -> Self {
+        // SAFETY: the caller's promise.
+        let ([x, y, z, hold], [u, v, w, still]) =
+            unsafe { (rows.gather(slots, Part::Place), rows.gather(slots, Part::Velocity)) };
+        let free = hold.is_less(Lanes::all(SUPPORTED));
+        let weight = free.choose(hold, hold - Lanes::all(SUPPORTED));
+        let supported = Lanes::all(1.5).is_less(hold);
+        Self { place: [x, y, z], weight, supported, velocity: [u, v, w], still }
+    }
+
+    /// Writes the velocities.
+    ///
+    /// # Safety
+    /// As for [`Shared::scatter`].
+    #[inline(always)]
+    unsafe fn store(&self, rows: Shared<'_, Row>, slots: &[u32; 8]) {
+        let [u, v, w] = self.velocity;
+        // SAFETY: the caller's promise.
+        unsafe { rows.scatter(slots, Part::Velocity, &[u, v, w, self.still]) };
+    }
+
+    /// With an impulse.
+    #[inline(always)]
+    fn kicked(self, impulse: V8, weight: Lanes) -> Self {
+        Self { velocity: add8(self.velocity, scaled8(impulse, weight)), ..self }
+    }
+}
+
+/// How eight pairs lie to each other.
+struct Contact {
+    /// From the others to the owners.
+    normal: V8,
+    gap: Lanes,
+    /// Sum of the weights, and its inverse.
+    weights: Lanes,
+    inverse: Lanes,
+}
+
+/// One correction of the velocities and impulses of eight pairs.
+#[inline(always)]
+fn collide(a: Eight, b: Eight, batch: &mut Batch, c: &Coefficients) -> (Eight, Eight, Contact) {
+    let (zero, one) = (Lanes::all(0.0), Lanes::all(1.0));
+    let weights = a.weight + b.weight;
+    // 1 / weights, of 1 and 2.
+    let inverse = Lanes::all(1.5) - Lanes::all(0.5) * weights;
+    let apart = sub8(sub8(a.place, batch.shift()), b.place);
+    let distance = dot8(apart, apart).sqrt();
+    let gap = distance - one;
+    let normal = scaled8(apart, one / distance.max(Lanes::all(1.0e-6)));
+    let relative = sub8(a.velocity, b.velocity);
+    let along = dot8(relative, normal);
+    let is_apart = zero.is_less(gap);
+    let closing = zero - gap * Lanes::all(c.diameter / c.dt);
+    let (least, wanted) = if c.attraction > 0.0 {
+        let attracts = gap.is_less(Lanes::all(c.band));
+        let least = attracts.choose(Lanes::all(-c.attraction), zero);
+        (least, attracts.choose(zero, is_apart.choose(closing, zero)))
+    } else {
+        (zero, is_apart.choose(closing, zero))
+    };
+    let before = batch.impulse;
+    let before_along = dot8(before, normal);
+    let total = (before_along + (wanted - along) * inverse).max(least);
+    let sliding = sub8(relative, scaled8(normal, along));
+    let across = sub8(sub8(before, scaled8(normal, before_along)), scaled8(sliding, inverse));
+    let most = Lanes::all(c.friction) * (total - least);
+    let square = dot8(across, across);
+    let exceeds = (most * most).is_less(square);
+    let share = exceeds.choose(most / square.sqrt().max(Lanes::all(1.0e-30)), one);
+    let impulse = add8(scaled8(normal, total), scaled8(across, share));
+    let moves = zero.is_less(weights);
+    batch.impulse = [0, 1, 2].map(|axis: usize| moves.choose(impulse[axis], before[axis]));
+    let change = sub8(batch.impulse, before);
+    let (push, back) = (a.weight, zero - b.weight);
+    (a.kicked(change, push), b.kicked(change, back), Contact { normal, gap, weights, inverse })
+}
+
+impl Contact {
+    /// Pushes of eight pairs, and what they find out: which grains are supported, and which something wakes.
+    #[inline(always)]
+    fn push(&self, a: &Eight, b: &Eight, pushes: [[Lanes; 4]; 2], c: &Coefficients) -> [[Lanes; 4]; 2] {
+        let (zero, one) = (Lanes::all(0.0), Lanes::all(1.0));
+        let upward = dot8(self.normal, c.up.map(Lanes::all));
+        let moves = zero.is_less(self.weights);
+        let [[ax, ay, az, a_marks], [bx, by, bz, b_marks]] = pushes;
+        let (a_push, b_push) = ([ax, ay, az], [bx, by, bz]);
+        // Overlap is removed, and a gap stays one.
+        let overlap = zero - self.gap;
+        let some = (overlap * Lanes::all(REMOVED)).min(Lanes::all(FARTHEST));
+        let removed = zero.is_less(self.gap).choose(overlap, some);
+        let missing = removed - dot8(sub8(a_push, b_push), self.normal);
+        let is_up = zero.is_less(upward);
+        let (a_holds, b_holds) = (a.supported.choose(one, zero), b.supported.choose(one, zero));
+        let share = upward * is_up.choose(b_holds, a_holds) * a.weight * b.weight;
+        let amount = (zero.is_less(missing) & moves).choose(missing * self.inverse, zero);
+        let push = scaled8(self.normal, amount);
+        let [ax, ay, az] = add8(a_push, scaled8(push, a.weight * (one + share)));
+        let [bx, by, bz] = sub8(b_push, scaled8(push, b.weight * (one - share)));
+        // Chains of contacts that lead down to something fixed.
+        let (half, rests) = (Lanes::all(0.5), |weight: Lanes| weight.is_less(Lanes::all(0.5)));
+        let wakes = |marks: Lanes| Lanes::all(1.5).is_less(marks);
+        let supports = |marks: Lanes| (wakes(marks)).choose(marks - Lanes::all(rest::WOKEN), marks);
+        let (a_stands, b_stands) = (supports(a_marks), supports(b_marks));
+        let touching = self.gap.is_less(Lanes::all(TOUCHING));
+        let up = touching & Lanes::all(STEEP).is_less(upward) & (half.is_less(b_stands) | rests(b.weight));
+        let down = touching & upward.is_less(Lanes::all(-STEEP)) & (half.is_less(a_stands) | rests(a.weight));
+        let (a_stands, b_stands) = (up.choose(one, a_stands), down.choose(one, b_stands));
+        // A grain that moves wakes its neighbours.
+        let near = self.gap.is_less(Lanes::all(rest::NEAR));
+        let is_moving = |eight: &Eight| half.is_less(eight.weight) & eight.still.is_less(Lanes::all(rest::MOVING));
+        let woken = Lanes::all(rest::WOKEN);
+        let wake = |rests: LaneMask, other: &Eight, marks: Lanes| {
+            (wakes(marks) | (near & rests & is_moving(other))).choose(woken, zero)
+        };
+        let a_marks = a_stands + wake(rests(a.weight), b, a_marks);
+        let b_marks = b_stands + wake(rests(b.weight), a, b_marks);
+        [[ax, ay, az, a_marks], [bx, by, bz, b_marks]]
     }
 }

@@ -3,14 +3,15 @@
 use std::collections::BTreeMap;
 
 use super::Grains;
-use super::contacts::{Contacts, MOST, Pair};
+use super::contacts::{Held, MOST};
 use super::heap::Heap;
+use super::layout::{EDGE, holds};
 use super::rows::Row;
 use super::touch::Touch;
 use crate::error::{Error, Result};
 
 /// The first bytes: what it is, and its version.
-const MAGIC: &[u8; 8] = b"frzgrn01";
+const MAGIC: &[u8; 8] = b"frzgrn02";
 
 /// Writes little-endian numbers.
 #[derive(Default)]
@@ -103,19 +104,16 @@ pub fn save(grains: &Grains) -> Vec<u8> {
         to.i32s(at);
         to.f32s(&row.place);
         to.f32s(&row.velocity);
-        to.f32s(&row.carried);
-        to.f32s(&[row.supports]);
+        to.f32s(&row.since);
+        to.f32s(&[row.hold, row.still]);
         let birth = &grains.births[*id as usize];
         to.f32s(&birth.rest);
         to.i32s(&[birth.frame]);
     }
-    to.count(heap.contacts.starts.len());
-    heap.contacts.starts.iter().for_each(|start| to.u32(*start));
-    to.count(heap.contacts.pairs.len());
-    for pair in &heap.contacts.pairs {
-        to.u32(pair.code);
-        to.f32s(&[pair.normal]);
-        to.f32s(&pair.across);
+    to.count(heap.held.len());
+    for held in &heap.held {
+        held.grains.iter().for_each(|grain| to.u32(*grain));
+        to.f32s(&held.impulse);
     }
     to.count(heap.touches.len());
     for touch in &heap.touches {
@@ -158,14 +156,26 @@ pub fn load(grains: &mut Grains, bytes: &[u8]) -> Result<()> {
         let id = from.u32()?;
         heap.ids.push(id);
         heap.at.push(from.i32s()?);
-        let (place, velocity, carried) = (from.f32s()?, from.f32s()?, from.f32s()?);
-        let [supports] = from.f32s()?;
-        heap.rows.push(Row { place, velocity, carried, supports, weight: 1.0, ..Row::default() });
+        if !heap.at.last().is_some_and(|at| holds(*at)) {
+            return Err(Error::argument("has a grain that is too far from the origin"));
+        }
+        let (place, velocity, since) = (from.f32s()?, from.f32s()?, from.f32s()?);
+        let [hold, still] = from.f32s()?;
+        if ![0.0, 1.0, 2.0, 3.0].contains(&hold) || place.iter().any(|x| !(0.0..=EDGE).contains(x)) {
+            return Err(Error::argument("has a grain that lies in no block"));
+        }
+        heap.rows.push(Row { place, hold, velocity, still, since, ..Row::default() });
         let birth =
             grains.births.get_mut(id as usize).ok_or_else(|| Error::argument("has a grain without birth"))?;
         (birth.rest, [birth.frame]) = (from.f32s()?, from.i32s()?);
     }
-    heap.contacts = contacts(&mut from, count)?;
+    for _ in 0..from.count(20)? {
+        let grains = [from.u32()?, from.u32()?];
+        if grains.iter().any(|grain| *grain as usize >= count) || grains[0] == grains[1] {
+            return Err(Error::argument("has a contact of a grain that is not there"));
+        }
+        heap.held.push(Held { grains, impulse: from.f32s()? });
+    }
     for _ in 0..from.count(24)? {
         let (grain, collider) = (from.u32()?, from.u32()?);
         if grain as usize >= count {
@@ -186,22 +196,4 @@ pub fn load(grains: &mut Grains, bytes: &[u8]) -> Result<()> {
 }
 
 /// Bytes of a grain.
-const ROW: usize = 4 + 12 + 4 * 12 + 4 + 4;
-
-fn contacts(from: &mut Reader<'_>, grains: usize) -> Result<Contacts> {
-    let mut contacts = Contacts::default();
-    for _ in 0..from.count(4)? {
-        contacts.starts.push(from.u32()?);
-    }
-    for _ in 0..from.count(20)? {
-        let code = from.u32()?;
-        let ([normal], across) = (from.f32s()?, from.f32s()?);
-        contacts.pairs.push(Pair { code, normal, across });
-    }
-    let ends = contacts.starts.last().map_or(0, |end| *end as usize);
-    let fits = contacts.starts.is_sorted()
-        && contacts.starts.len() <= grains + 1
-        && ends == contacts.pairs.len()
-        && contacts.pairs.iter().all(|pair| pair.other() < grains);
-    if fits { Ok(contacts) } else { Err(Error::argument("has contacts that do not fit its grains")) }
-}
+const ROW: usize = 4 + 12 + 3 * 12 + 8 + 16;

@@ -1,6 +1,8 @@
 //! Grains that touch what they cannot move: ground, base layer, objects.
 
-use super::contacts::GONE;
+use rayon::prelude::*;
+
+use super::layout::Block;
 use super::rows::{V, add, dot, scaled};
 
 /// A grain beside a plane that nothing moves.
@@ -30,33 +32,55 @@ impl Touch {
         add(scaled(self.normal, self.impulse), self.across)
     }
 
-    fn key(&self) -> (u32, u32) {
+    /// Grain and collider: no two touches have the same.
+    pub fn key(&self) -> (u32, u32) {
         (self.grain, self.collider)
     }
-}
 
-/// Sorts touches by grain and gives them the impulses of those that were there before, sorted too.
-pub fn carry(touches: &mut [Touch], old: &[Touch]) {
-    touches.sort_unstable_by_key(Touch::key);
-    let mut before = old.iter().peekable();
-    for touch in touches {
-        while before.next_if(|old| old.key() < touch.key()).is_some() {}
-        if let Some(old) = before.next_if(|old| old.key() == touch.key()) {
-            (touch.impulse, touch.across) = (old.impulse, old.across);
-        }
+    fn is_of_mesh(&self) -> bool {
+        self.collider >= FIRST_SHELL
     }
 }
 
-/// Renames the grains of sorted touches; `slots` says where they went, [`GONE`] where they were left out.
-pub fn rename(touches: &mut Vec<Touch>, slots: &[u32]) {
-    touches.iter_mut().for_each(|touch| touch.grain = slots[touch.grain as usize]);
-    touches.retain(|touch| touch.grain != GONE);
-    touches.sort_unstable_by_key(Touch::key);
+/// Collider number of the floor.
+pub const FLOOR: u32 = 0;
+/// Collider number of the base layer.
+pub const BASE: u32 = 1;
+/// Collider number of the first mesh.
+pub const FIRST_SHELL: u32 = 2;
+
+/// Gives blocks the touches that were found in this sub-step: all of those whose members changed, meshes of all. They take over
+/// the impulses of those that were there before.
+pub fn renew(blocks: &mut [Block], fresh: Vec<Vec<Touch>>) {
+    let is_renewed = |block: &Block, fresh: &[Touch]| {
+        block.is_changed || !fresh.is_empty() || block.touches.iter().any(Touch::is_of_mesh)
+    };
+    let renewed = blocks.par_iter_mut().zip(&fresh).filter(|(block, fresh)| is_renewed(block, fresh));
+    let mut old: Vec<Touch> = renewed
+        .flat_map_iter(|(block, _)| {
+            let (old, kept) = std::mem::take(&mut block.touches)
+                .into_iter()
+                .partition::<Vec<_>, _>(|touch| block.is_changed || touch.is_of_mesh());
+            block.touches = kept;
+            old
+        })
+        .collect();
+    old.par_sort_unstable_by_key(Touch::key);
+    blocks.par_iter_mut().zip(fresh).filter(|(_, fresh)| !fresh.is_empty()).for_each(|(block, mut fresh)| {
+        for touch in &mut fresh {
+            if let Ok(at) = old.binary_search_by_key(&touch.key(), Touch::key) {
+                (touch.impulse, touch.across) = (old[at].impulse, old[at].across);
+            }
+        }
+        block.touches.extend(fresh);
+        block.touches.sort_unstable_by_key(Touch::key);
+        release_pressed(&mut block.touches);
+    });
 }
 
 /// Takes the impulses of grains that are pressed between two sides: those would grow as long as the sides fight over the grain,
 /// and throw it when one of them leaves. The touches are sorted.
-pub fn release_pressed(touches: &mut [Touch]) {
+fn release_pressed(touches: &mut [Touch]) {
     for touches in touches.chunk_by_mut(|a, b| a.grain == b.grain) {
         let is_pressed = touches.iter().enumerate().any(|(index, touch)| {
             touches[..index].iter().any(|other| dot(touch.normal, other.normal) < OPPOSITE)
