@@ -60,13 +60,23 @@ impl Batch {
     /// The other grains.
     #[inline(always)]
     pub fn others(&self) -> [u32; LANES] {
-        self.codes.map(other)
+        let mut others = self.codes;
+        for code in &mut others {
+            *code = other(*code);
+        }
+        others
     }
 
     /// From the owner's block to the other's (diameters).
     #[inline(always)]
     pub fn shift(&self) -> [Lanes; 3] {
-        [0, 2, 4].map(|axis| Lanes(self.codes.map(|code| ((code >> (INDEX + axis) & 3) as i32 - 1) as f32 * EDGE)))
+        let mut shift = [Lanes::default(); 3];
+        for (axis, shift) in shift.iter_mut().enumerate() {
+            for (lane, shift) in shift.0.iter_mut().enumerate() {
+                *shift = ((self.codes[lane] >> (INDEX + 2 * axis as u32) & 3) as i32 - 1) as f32 * EDGE;
+            }
+        }
+        shift
     }
 
     /// Its pairs that carry an impulse, each once.
@@ -268,14 +278,14 @@ fn find_pairs(blocks: &[Block], index: usize) -> Found {
 #[inline(always)]
 fn scan(place: V, run: &Run<'_>, pairs: &mut Vec<Pair>) {
     let reach = Lanes::all((1.0 + SKIN) * (1.0 + SKIN));
-    let from = [0, 1, 2].map(|axis: usize| Lanes::all(place[axis] - run.shift[axis]));
+    let [x, y, z] = sub(place, run.shift);
+    let [xs, ys, zs] = &run.block.anchors;
     let mut member = run.low;
     while member < run.high {
-        let apart = [0, 1, 2].map(|axis: usize| {
-            let eight = &run.block.anchors[axis][member as usize..member as usize + LANES];
-            from[axis] - Lanes(eight.try_into().expect("eight"))
-        });
-        let square = apart[0] * apart[0] + apart[1] * apart[1] + apart[2] * apart[2];
+        let x = Lanes::all(x) - eight(xs, member);
+        let y = Lanes::all(y) - eight(ys, member);
+        let z = Lanes::all(z) - eight(zs, member);
+        let square = x * x + y * y + z * z;
         let mut near = square.is_less(reach).bits();
         if run.high - member < LANES as u32 {
             near &= (1 << (run.high - member)) - 1;
@@ -288,6 +298,14 @@ fn scan(place: V, run: &Run<'_>, pairs: &mut Vec<Pair>) {
         }
         member += LANES as u32;
     }
+}
+
+/// Eight numbers from one on.
+#[inline(always)]
+fn eight(numbers: &[f32], first: u32) -> Lanes {
+    let mut out = [0.0; LANES];
+    out.copy_from_slice(&numbers[first as usize..first as usize + LANES]);
+    Lanes(out)
 }
 
 impl Found {

@@ -190,9 +190,6 @@ impl Heap {
         for touch in std::mem::take(&mut self.touches) {
             layout.blocks[layout.of[touch.grain as usize] as usize].touches.push(touch);
         }
-        let rows = &self.rows;
-        let is_awake = |slot: &u32| !rows[*slot as usize].rests();
-        layout.blocks.par_iter_mut().for_each(|block| block.is_awake = block.members.iter().any(is_awake));
         layout
     }
 

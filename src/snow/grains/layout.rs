@@ -245,6 +245,7 @@ impl Layout {
             }
             block.starts[next..].fill(block.members.len() as u32);
             block.anchors.iter_mut().for_each(|anchors| anchors.extend([f32::INFINITY; LANES]));
+            block.is_awake = block.members.iter().any(|&slot| !rows[slot as usize].rests());
             block.has_strayed = false;
         });
     }

@@ -103,33 +103,44 @@ impl<'a, T> Shared<'a, T> {
 }
 
 impl Shared<'_, Row> {
+    /// Where a part of a row is.
+    ///
+    /// # Safety
+    /// The row exists.
+    #[inline(always)]
+    unsafe fn part(&self, row: u32, part: Part) -> *mut f32 {
+        // SAFETY: a row has sixteen numbers, of which the part's are four.
+        unsafe { self.first.cast::<f32>().add(row as usize * 16 + part as usize) }
+    }
+
     /// One part of eight rows, component by component.
     ///
     /// # Safety
     /// The rows exist, and nothing else changes them meanwhile.
     #[inline(always)]
     pub unsafe fn gather(&self, rows: &[u32; LANES], part: Part) -> [Lanes; 4] {
-        // SAFETY: a row has sixteen numbers, of which the part's are four.
-        let place = |lane: usize| unsafe { self.first.cast::<f32>().add(rows[lane] as usize * 16 + part as usize) };
         let mut out = [Lanes::default(); 4];
         #[cfg(target_arch = "x86_64")]
         for half in [0, 4] {
             use std::arch::x86_64::{_MM_TRANSPOSE4_PS, _mm_load_ps, _mm_storeu_ps};
             // SAFETY: rows lie on cache lines, and their parts on quarters of them; SSE2 is part of x86-64.
             unsafe {
-                let mut all = [0, 1, 2, 3].map(|lane| _mm_load_ps(place(half + lane)));
-                let [a, b, c, d] = &mut all;
-                _MM_TRANSPOSE4_PS(a, b, c, d);
-                for (out, all) in out.iter_mut().zip(all) {
-                    _mm_storeu_ps(out.0.as_mut_ptr().add(half), all);
-                }
+                let mut a = _mm_load_ps(self.part(rows[half], part));
+                let mut b = _mm_load_ps(self.part(rows[half + 1], part));
+                let mut c = _mm_load_ps(self.part(rows[half + 2], part));
+                let mut d = _mm_load_ps(self.part(rows[half + 3], part));
+                _MM_TRANSPOSE4_PS(&mut a, &mut b, &mut c, &mut d);
+                _mm_storeu_ps(out[0].0.as_mut_ptr().add(half), a);
+                _mm_storeu_ps(out[1].0.as_mut_ptr().add(half), b);
+                _mm_storeu_ps(out[2].0.as_mut_ptr().add(half), c);
+                _mm_storeu_ps(out[3].0.as_mut_ptr().add(half), d);
             }
         }
         #[cfg(not(target_arch = "x86_64"))]
         for lane in 0..LANES {
             for (component, out) in out.iter_mut().enumerate() {
                 // SAFETY: as above.
-                out.0[lane] = unsafe { *place(lane).add(component) };
+                out.0[lane] = unsafe { *self.part(rows[lane], part).add(component) };
             }
         }
         out
@@ -141,26 +152,27 @@ impl Shared<'_, Row> {
     /// The rows exist, and nothing else uses them meanwhile.
     #[inline(always)]
     pub unsafe fn scatter(&self, rows: &[u32; LANES], part: Part, values: &[Lanes; 4]) {
-        // SAFETY: as for `gather`.
-        let place = |lane: usize| unsafe { self.first.cast::<f32>().add(rows[lane] as usize * 16 + part as usize) };
         #[cfg(target_arch = "x86_64")]
         for half in [0, 4] {
             use std::arch::x86_64::{_MM_TRANSPOSE4_PS, _mm_loadu_ps, _mm_store_ps};
             // SAFETY: as for `gather`.
             unsafe {
-                let mut all = [0, 1, 2, 3].map(|of: usize| _mm_loadu_ps(values[of].0.as_ptr().add(half)));
-                let [a, b, c, d] = &mut all;
-                _MM_TRANSPOSE4_PS(a, b, c, d);
-                for (lane, all) in all.into_iter().enumerate() {
-                    _mm_store_ps(place(half + lane), all);
-                }
+                let mut a = _mm_loadu_ps(values[0].0.as_ptr().add(half));
+                let mut b = _mm_loadu_ps(values[1].0.as_ptr().add(half));
+                let mut c = _mm_loadu_ps(values[2].0.as_ptr().add(half));
+                let mut d = _mm_loadu_ps(values[3].0.as_ptr().add(half));
+                _MM_TRANSPOSE4_PS(&mut a, &mut b, &mut c, &mut d);
+                _mm_store_ps(self.part(rows[half], part), a);
+                _mm_store_ps(self.part(rows[half + 1], part), b);
+                _mm_store_ps(self.part(rows[half + 2], part), c);
+                _mm_store_ps(self.part(rows[half + 3], part), d);
             }
         }
         #[cfg(not(target_arch = "x86_64"))]
         for lane in 0..LANES {
             for (component, values) in values.iter().enumerate() {
                 // SAFETY: as above.
-                unsafe { *place(lane).add(component) = values.0[lane] };
+                unsafe { *self.part(rows[lane], part).add(component) = values.0[lane] };
             }
         }
     }

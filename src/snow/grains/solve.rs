@@ -262,7 +262,9 @@ fn solve_batches_last(rows: Shared<'_, Row>, batches: &mut [Batch], c: &Coeffici
             rows.scatter(&others, Part::Push, &pushes[1]);
             // Two grains that meet in the air do not meet again: what they gave each other says nothing of the next sub-step.
             let is_held = a.supported & b.supported;
-            batch.impulse = batch.impulse.map(|impulse| is_held.choose(impulse, Lanes::all(0.0)));
+            for impulse in &mut batch.impulse {
+                *impulse = is_held.choose(*impulse, Lanes::all(0.0));
+            }
         }
     }
 }
@@ -374,7 +376,9 @@ fn collide(a: Eight, b: Eight, batch: &mut Batch, c: &Coefficients) -> (Eight, E
     let share = exceeds.choose(most / square.sqrt().max(Lanes::all(1.0e-30)), one);
     let impulse = add8(scaled8(normal, total), scaled8(across, share));
     let moves = zero.is_less(weights);
-    batch.impulse = [0, 1, 2].map(|axis: usize| moves.choose(impulse[axis], before[axis]));
+    for (axis, impulse) in impulse.into_iter().enumerate() {
+        batch.impulse[axis] = moves.choose(impulse, before[axis]);
+    }
     let change = sub8(batch.impulse, before);
     let (push, back) = (a.weight, zero - b.weight);
     (a.kicked(change, push), b.kicked(change, back), Contact { normal, gap, weights, inverse })
@@ -385,7 +389,8 @@ impl Contact {
     #[inline(always)]
     fn push(&self, a: &Eight, b: &Eight, pushes: [[Lanes; 4]; 2], c: &Coefficients) -> [[Lanes; 4]; 2] {
         let (zero, one) = (Lanes::all(0.0), Lanes::all(1.0));
-        let upward = dot8(self.normal, c.up.map(Lanes::all));
+        let [x, y, z] = c.up;
+        let upward = dot8(self.normal, [Lanes::all(x), Lanes::all(y), Lanes::all(z)]);
         let moves = zero.is_less(self.weights);
         let [[ax, ay, az, a_marks], [bx, by, bz, b_marks]] = pushes;
         let (a_push, b_push) = ([ax, ay, az], [bx, by, bz]);
@@ -402,23 +407,22 @@ impl Contact {
         let [ax, ay, az] = add8(a_push, scaled8(push, a.weight * (one + share)));
         let [bx, by, bz] = sub8(b_push, scaled8(push, b.weight * (one - share)));
         // Chains of contacts that lead down to something fixed.
-        let (half, rests) = (Lanes::all(0.5), |weight: Lanes| weight.is_less(Lanes::all(0.5)));
-        let wakes = |marks: Lanes| Lanes::all(1.5).is_less(marks);
-        let supports = |marks: Lanes| (wakes(marks)).choose(marks - Lanes::all(rest::WOKEN), marks);
-        let (a_stands, b_stands) = (supports(a_marks), supports(b_marks));
+        let (half, woken) = (Lanes::all(0.5), Lanes::all(rest::WOKEN));
+        let (a_rests, b_rests) = (a.weight.is_less(half), b.weight.is_less(half));
+        let (a_wakes, b_wakes) = (Lanes::all(1.5).is_less(a_marks), Lanes::all(1.5).is_less(b_marks));
+        let a_stands = a_wakes.choose(a_marks - woken, a_marks);
+        let b_stands = b_wakes.choose(b_marks - woken, b_marks);
         let touching = self.gap.is_less(Lanes::all(TOUCHING));
-        let up = touching & Lanes::all(STEEP).is_less(upward) & (half.is_less(b_stands) | rests(b.weight));
-        let down = touching & upward.is_less(Lanes::all(-STEEP)) & (half.is_less(a_stands) | rests(a.weight));
+        let up = touching & Lanes::all(STEEP).is_less(upward) & (half.is_less(b_stands) | b_rests);
+        let down = touching & upward.is_less(Lanes::all(-STEEP)) & (half.is_less(a_stands) | a_rests);
         let (a_stands, b_stands) = (up.choose(one, a_stands), down.choose(one, b_stands));
         // A grain that moves wakes its neighbours.
         let near = self.gap.is_less(Lanes::all(rest::NEAR));
-        let is_moving = |eight: &Eight| half.is_less(eight.weight) & eight.still.is_less(Lanes::all(rest::MOVING));
-        let woken = Lanes::all(rest::WOKEN);
-        let wake = |rests: LaneMask, other: &Eight, marks: Lanes| {
-            (wakes(marks) | (near & rests & is_moving(other))).choose(woken, zero)
-        };
-        let a_marks = a_stands + wake(rests(a.weight), b, a_marks);
-        let b_marks = b_stands + wake(rests(b.weight), a, b_marks);
+        let moving = Lanes::all(rest::MOVING);
+        let a_moves = half.is_less(a.weight) & a.still.is_less(moving);
+        let b_moves = half.is_less(b.weight) & b.still.is_less(moving);
+        let a_marks = a_stands + (a_wakes | (near & a_rests & b_moves)).choose(woken, zero);
+        let b_marks = b_stands + (b_wakes | (near & b_rests & a_moves)).choose(woken, zero);
         [[ax, ay, az, a_marks], [bx, by, bz, b_marks]]
     }
 }
