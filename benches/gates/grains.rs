@@ -315,11 +315,13 @@ fn speed(h: &mut Harness) {
         return;
     }
     let mut pile = Experiment::new(1, 0.0015, of_repose(32.0), 1);
+    pile.params.rests = false;
     let mut id = 0;
-    for layer in 0..40u32 {
-        let radius = 60.0 - 1.5 * f64::from(layer);
-        for x in -60..=60 {
-            for z in -60..=60 {
+    let big = std::env::var("BIG").map_or(60, |x| x.parse::<i32>().unwrap());
+    for layer in 0..(big as u32 * 2 / 3) {
+        let radius = f64::from(big) - 1.5 * f64::from(layer);
+        for x in -big..=big {
+            for z in -big..=big {
                 if f64::from(x * x + z * z) < radius * radius {
                     let place =
                         DVec3::new(f64::from(x), f64::from(layer) + 0.5, f64::from(z)) * 1.08 * 0.0015;

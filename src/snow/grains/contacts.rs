@@ -21,7 +21,7 @@ const INDEX: u32 = 26;
 pub const MOST: usize = 1 << INDEX;
 
 /// Eight pairs without a common grain. Lanes that are left over repeat the first one.
-#[derive(Clone, Copy)]
+#[derive(Clone, Copy, Default)]
 pub struct Batch {
     /// The grains that own them: of each pair the one that lies higher, or farther along x, then z.
     pub owners: [u32; LANES],
@@ -312,6 +312,7 @@ impl Found {
     /// Puts the pairs into batches, each into the first one with room behind those of its grains' earlier pairs.
     fn schedule(self, members: &[u32], batches: &mut Vec<Batch>) {
         let locals = self.pairs.iter().map(|pair| pair.local + 1).max().unwrap_or(0).max(members.len() as u32);
+        const APART: usize = 1;
         // The batch behind the last one of each grain.
         let mut behind = vec![0u32; locals as usize];
         let mut counts: Vec<u8> = Vec::new();
@@ -333,11 +334,7 @@ impl Found {
                 while at >= batches.len() {
                     room.push(batches.len() as u32);
                     counts.push(0);
-                    batches.push(Batch {
-                        owners: [slot; LANES],
-                        codes: [pair.code; LANES],
-                        impulse: pair.impulse.map(Lanes::all),
-                    });
+                    batches.push(Batch::default());
                 }
                 let lane = usize::from(counts[at]);
                 let batch = &mut batches[at];
@@ -347,10 +344,18 @@ impl Found {
                 if counts[at] == LANES as u8 {
                     room[at] = at as u32 + 1;
                 }
-                behind[member] = at as u32 + 1;
-                behind[pair.local as usize] = at as u32 + 1;
+                behind[member] = (at + APART) as u32;
+                behind[pair.local as usize] = (at + APART) as u32;
             }
         }
+        for (batch, count) in batches.iter_mut().zip(&mut counts) {
+            for lane in usize::from(*count).max(1)..LANES {
+                (batch.owners[lane], batch.codes[lane]) = (batch.owners[0], batch.codes[0]);
+                batch.impulse.iter_mut().for_each(|impulse| impulse.0[lane] = impulse.0[0]);
+            }
+        }
+        let mut counts = counts.iter();
+        batches.retain(|_| counts.next().is_some_and(|count| *count > 0));
         batches.shrink_to_fit();
     }
 }

@@ -113,6 +113,17 @@ impl Shared<'_, Row> {
         unsafe { self.first.cast::<f32>().add(row as usize * 16 + part as usize) }
     }
 
+    /// Asks for eight rows to be brought near: most of a sweep's time would be spent waiting for them.
+    #[inline(always)]
+    pub fn prefetch(&self, rows: &[u32; LANES]) {
+        #[cfg(target_arch = "x86_64")]
+        for row in rows {
+            use std::arch::x86_64::{_MM_HINT_T0, _mm_prefetch};
+            // SAFETY: a prefetch reads nothing, wherever it points; SSE is part of x86-64.
+            unsafe { _mm_prefetch::<_MM_HINT_T0>(self.first.wrapping_add(*row as usize).cast()) };
+        }
+    }
+
     /// One part of eight rows, component by component.
     ///
     /// # Safety

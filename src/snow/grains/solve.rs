@@ -218,7 +218,8 @@ fn solve_last(rows: Shared<'_, Row>, batches: &mut [Batch], c: &Coefficients) {
 /// Gives grains the impulses of the last sub-step.
 #[inline(always)]
 fn begin_batches(rows: Shared<'_, Row>, batches: &[Batch]) {
-    for batch in batches {
+    for (index, batch) in batches.iter().enumerate() {
+        prefetch(rows, batches.get(index + AHEAD));
         if batch.impulse == [Lanes::all(0.0); 3] {
             continue;
         }
@@ -234,7 +235,9 @@ fn begin_batches(rows: Shared<'_, Row>, batches: &[Batch]) {
 
 #[inline(always)]
 fn solve_batches(rows: Shared<'_, Row>, batches: &mut [Batch], c: &Coefficients) {
-    for batch in batches {
+    for index in 0..batches.len() {
+        prefetch(rows, batches.get(index + AHEAD));
+        let batch = &mut batches[index];
         let others = batch.others();
         // SAFETY: as in `begin_batches`.
         unsafe {
@@ -248,7 +251,9 @@ fn solve_batches(rows: Shared<'_, Row>, batches: &mut [Batch], c: &Coefficients)
 
 #[inline(always)]
 fn solve_batches_last(rows: Shared<'_, Row>, batches: &mut [Batch], c: &Coefficients) {
-    for batch in batches {
+    for index in 0..batches.len() {
+        prefetch(rows, batches.get(index + AHEAD));
+        let batch = &mut batches[index];
         let others = batch.others();
         // SAFETY: as in `begin_batches`.
         unsafe {
@@ -266,6 +271,17 @@ fn solve_batches_last(rows: Shared<'_, Row>, batches: &mut [Batch], c: &Coeffici
                 *impulse = is_held.choose(*impulse, Lanes::all(0.0));
             }
         }
+    }
+}
+
+/// How many batches ahead rows are asked for.
+const AHEAD: usize = 8;
+
+#[inline(always)]
+fn prefetch(rows: Shared<'_, Row>, batch: Option<&Batch>) {
+    if let Some(batch) = batch {
+        rows.prefetch(&batch.owners);
+        rows.prefetch(&batch.others());
     }
 }
 
