@@ -4,10 +4,12 @@
 //! no pair is missed before. They are solved eight at a time: a *batch* has eight pairs that share no grain, and every pair comes
 //! after those before it in the sweep that have a grain in common with it, so that the result is that of one pair after the other.
 
+use std::sync::LazyLock;
+
 use rayon::prelude::*;
 
 use super::layout::{ALL_CELLS, Block, CELLS, EDGE, Layout, NONE};
-use super::rows::{Row, Shared, V, norm, sub};
+use super::rows::{Row, V, norm, sub};
 use crate::base::cpu::dispatch;
 use crate::base::lanes::{LANES, Lanes};
 
@@ -21,7 +23,7 @@ const INDEX: u32 = 26;
 pub const MOST: usize = 1 << INDEX;
 
 /// Eight pairs without a common grain. Lanes that are left over repeat the first one.
-#[derive(Clone, Copy, Default)]
+#[derive(Clone, Copy)]
 pub struct Batch {
     /// The grains that own them: of each pair the one that lies higher, or farther along x, then z.
     pub owners: [u32; LANES],
@@ -38,6 +40,15 @@ pub struct Held {
     pub grains: [u32; 2],
     /// On the first one (m/s).
     pub impulse: V,
+    /// From the first one's block to the second one's, as a code.
+    code: u8,
+}
+
+impl Held {
+    /// The impulse (m/s) that two grains of some blocks carry on the first one.
+    pub fn new(grains: [u32; 2], impulse: V) -> Self {
+        Self { grains, impulse, code: 0 }
+    }
 }
 
 /// A pair that was found.
@@ -49,11 +60,19 @@ struct Pair {
     impulse: V,
 }
 
-/// The pairs of a block by owner.
-pub struct Found {
+/// Working memory of one thread.
+#[derive(Default)]
+struct Scratch {
     /// Where each member's pairs begin, and how many there are.
     starts: Vec<u32>,
+    /// Pairs by owner.
     pairs: Vec<Pair>,
+    /// For each grain around, the batch behind the last one that it is in.
+    behind: Vec<u32>,
+    /// Pairs in each batch.
+    counts: Vec<u8>,
+    /// For each batch one with room, at or behind it.
+    room: Vec<u32>,
 }
 
 impl Batch {
@@ -84,6 +103,10 @@ impl Batch {
         let held = |lane: usize| Held {
             grains: [self.owners[lane], other(self.codes[lane])],
             impulse: [0, 1, 2].map(|axis: usize| self.impulse[axis].0[lane]),
+            code: {
+                let digit = |axis: u32| (self.codes[lane] >> (INDEX + 2 * axis) & 3) as u8;
+                9 * digit(0) + 3 * digit(1) + digit(2)
+            },
         };
         self.lanes().map(held).filter(|held| held.impulse != [0.0; 3])
     }
@@ -108,69 +131,70 @@ fn step_bits(step: [i32; 3]) -> u32 {
 }
 
 impl Layout {
-    /// Finds the pairs of blocks that changed and of those that may have pairs with their grains. What they carry, is taken from
-    /// their old pairs, and from those of `held`.
+    /// Finds the pairs of blocks that changed and of those that own pairs with their grains. What they carry, is taken from their
+    /// old pairs, and from `held`.
     pub fn find_pairs(&mut self, held: &[Held]) {
         let blocks = &self.blocks;
-        // Blocks below, and beside at the same level, may have given a block its pairs.
-        let below = (0..27).filter(|code| code / 3 % 3 < 2).collect::<Vec<usize>>();
-        let is_listed: Vec<bool> = blocks
-            .par_iter()
-            .map(|block| {
-                let near = below.iter().map(|&code| block.near[code]);
-                near.filter(|&other| other != NONE).any(|other| blocks[other as usize].is_changed)
-            })
-            .collect();
-        let listed: Vec<u32> =
-            (0..).zip(&is_listed).filter(|(_, is_listed)| **is_listed).map(|(index, _)| index).collect();
-        let found: Vec<Found> = listed.par_iter().map(|&index| find(blocks, index as usize)).collect();
-        for (&index, found) in listed.iter().zip(found) {
-            self.blocks[index as usize].found = Some(found);
-        }
-        self.carry(&is_listed, held);
-        self.blocks.par_iter_mut().for_each(|block| {
-            if let Some(found) = block.found.take() {
-                found.schedule(&block.members, &mut block.batches);
-            }
-            block.is_changed = false;
+        let is_listed = |block: &Block| {
+            let owned = [&EARLIER[..], &[13]].concat();
+            let near = owned.iter().map(|&code| block.near[code]).filter(|&other| other != NONE);
+            near.into_iter().any(|other| blocks[other as usize].is_changed)
+        };
+        let is_listed: Vec<bool> = blocks.par_iter().map(is_listed).collect();
+        let moved = self.moved(&is_listed, held);
+        let of_block = |block: u32| {
+            let first = moved.partition_point(|(of, _)| *of < block);
+            moved[first..].iter().take_while(move |(of, _)| *of == block).map(|(_, held)| *held)
+        };
+        let (of, rank) = (&self.of, &self.rank);
+        let listed = self.batches.par_iter_mut().enumerate().filter(|(index, _)| is_listed[*index]);
+        listed.for_each_init(Scratch::default, |scratch, (index, batches)| {
+            find(scratch, blocks, index);
+            let block = &blocks[index];
+            let stayed = batches.iter().flat_map(Batch::held).filter(|held| block.has(held, index, of));
+            stayed.chain(of_block(index as u32)).for_each(|held| {
+                let [a, b] = held.grains;
+                let rank = |slot: u32| rank[slot as usize] as usize;
+                let _ = scratch.carry(rank(a), b, held.impulse)
+                    || of[b as usize] == index as u32 && scratch.carry(rank(b), a, held.impulse.map(|x| -x));
+            });
+            scratch.schedule(&block.members, batches);
         });
+        self.blocks.par_iter_mut().for_each(|block| block.is_changed = false);
     }
 
-    /// Gives the pairs that were found the impulses of those that were there before.
-    fn carry(&mut self, is_listed: &[bool], held: &[Held]) {
-        let batches: Vec<Vec<Batch>> = self
-            .blocks
-            .iter_mut()
-            .zip(is_listed)
-            .map(|(block, is_listed)| if *is_listed { std::mem::take(&mut block.batches) } else { Vec::new() })
-            .collect();
-        let (of, rank) = (&self.of, &self.rank);
-        let blocks = Shared::new(&mut self.blocks);
-        let place = |owner: u32, partner: u32, impulse: V| {
-            let block = of[owner as usize];
-            if block == NONE {
-                return false;
+    /// Pairs of grains that have changed blocks, and those of `held`, by the block that owns them now.
+    fn moved(&self, is_listed: &[bool], held: &[Held]) -> Vec<(u32, Held)> {
+        let level = |block: u32| {
+            let [x, y, z] = self.blocks[block as usize].at;
+            [y, x, z]
+        };
+        let owned = |held: Held| {
+            let [a, b] = held.grains.map(|grain| self.of[grain as usize]);
+            if a == NONE || b == NONE {
+                None
+            } else if a == b || level(a) > level(b) {
+                Some((a, held))
+            } else {
+                let [first, second] = held.grains;
+                Some((b, Held::new([second, first], held.impulse.map(|x| -x))))
             }
-            // SAFETY: two grains make one pair, whose impulse is set once; nothing else of a block changes.
-            let Some(found) = (unsafe { &mut blocks.get(block as usize).found }) else { return false };
-            let member = rank[owner as usize] as usize;
-            let pairs = &mut found.pairs[found.starts[member] as usize..found.starts[member + 1] as usize];
-            let pair = pairs.iter_mut().find(|pair| other(pair.code) == partner);
-            let is_there = pair.is_some();
-            pair.into_iter().for_each(|pair| pair.impulse = impulse);
-            is_there
         };
-        let hand_over = |held: &Held| {
-            let [a, b] = held.grains;
-            let _ = place(a, b, held.impulse) || place(b, a, held.impulse.map(|x| -x));
-        };
-        batches.par_iter().for_each(|batches| batches.iter().flat_map(Batch::held).for_each(|held| hand_over(&held)));
-        held.par_iter().for_each(hand_over);
+        let mut moved: Vec<(u32, Held)> = held.par_iter().copied().filter_map(owned).collect();
+        if self.has_moved {
+            let listed = self.batches.par_iter().enumerate().filter(|(index, _)| is_listed[*index]);
+            moved.par_extend(listed.flat_map_iter(|(index, batches)| {
+                let gone = move |held: &Held| !self.blocks[index].has(held, index, &self.of);
+                batches.iter().flat_map(Batch::held).filter(gone).filter_map(owned)
+            }));
+        }
+        moved.par_sort_unstable_by_key(|(block, held)| (*block, held.grains));
+        moved
     }
 
     /// Overlaps (diameters) of the pairs that touch.
     pub fn overlaps(&self, rows: &[Row]) -> Vec<f32> {
-        let pairs = self.blocks.iter().flat_map(|block| &block.batches).flat_map(|batch| {
+        let pairs = self.batches.iter().flatten().flat_map(|batch| {
             batch.lanes().map(|lane| {
                 let (row, other) = (rows[batch.owners[lane] as usize], rows[batch.others()[lane] as usize]);
                 let shift = batch.shift().map(|shift| shift.0[lane]);
@@ -182,7 +206,53 @@ impl Layout {
 
     /// What all pairs carry.
     pub fn held(&self) -> Vec<Held> {
-        self.blocks.par_iter().flat_map_iter(|block| block.batches.iter().flat_map(Batch::held)).collect()
+        self.batches.par_iter().flat_map_iter(|batches| batches.iter().flat_map(Batch::held)).collect()
+    }
+}
+
+/// Cells of a block one behind the other along z, whose grains may be near those of a cell.
+#[derive(Clone, Copy)]
+struct Cells {
+    /// Steps to the block.
+    step: [i8; 3],
+    first: u8,
+    end: u8,
+}
+
+/// For each cell of a block those with whose grains its own have pairs: in the block itself cells that come before it (upward,
+/// then along x, then z), but not the cell itself; in blocks that come before it all that are near.
+static NEAR_CELLS: LazyLock<Vec<Vec<Cells>>> = LazyLock::new(|| {
+    let cells = CELLS as i32;
+    let near = |cell: i32| {
+        let [y, x, z] = [cell / (cells * cells), cell / cells % cells, cell % cells];
+        let mut out = Vec::new();
+        for (dy, dx) in (-1..=1).flat_map(|dy| (-1..=1).map(move |dx| (dy, dx))) {
+            let (there_x, there_y) = (x + dx, y + dy);
+            let row = (there_y.rem_euclid(cells) * cells + there_x.rem_euclid(cells)) * cells;
+            let [step_x, step_y] = [there_x, there_y].map(|at| at.div_euclid(cells));
+            for step_z in -1..=1 {
+                let (first, last) = ((z - 1 - step_z * cells).max(0), (z + 1 - step_z * cells).min(cells - 1));
+                let order = [step_y, step_x, step_z].cmp(&[0; 3]).then([dy, dx].cmp(&[0; 2]));
+                let end = if [step_x, step_y, step_z, dx, dy] == [0; 5] { z } else { last + 1 };
+                if first < end && (order.is_lt() || [step_x, step_y, step_z, dx, dy] == [0; 5]) {
+                    let step = [step_x, step_y, step_z].map(|step| step as i8);
+                    out.push(Cells { step, first: (row + first) as u8, end: (row + end) as u8 });
+                }
+            }
+        }
+        out
+    };
+    (0..ALL_CELLS as i32).map(near).collect()
+});
+
+/// Blocks that come before a block, by code: below it, then along x, then z.
+const EARLIER: [usize; 13] = [0, 1, 2, 9, 10, 11, 18, 19, 20, 3, 4, 5, 12];
+
+impl Block {
+    /// Whether a pair that a block owned is still its own: none of the grains has changed blocks.
+    fn has(&self, held: &Held, index: usize, of: &[u32]) -> bool {
+        let [a, b] = held.grains.map(|grain| of[grain as usize]);
+        a == index as u32 && b == self.near[held.code as usize]
     }
 }
 
@@ -198,80 +268,61 @@ struct Run<'a> {
     first: u32,
 }
 
-fn find(blocks: &[Block], index: usize) -> Found {
-    dispatch!(find_pairs(blocks: &[Block], index: usize) -> Found)
+fn find(scratch: &mut Scratch, blocks: &[Block], index: usize) {
+    dispatch!(find_in(scratch: &mut Scratch, blocks: &[Block], index: usize))
 }
 
-/// The pairs of a block: for each of its cells, those with grains in cells below, then before along x, then along z.
+/// The pairs that a block owns.
 #[inline(always)]
-fn find_pairs(blocks: &[Block], index: usize) -> Found {
+fn find_in(scratch: &mut Scratch, blocks: &[Block], index: usize) {
     let block = &blocks[index];
-    let around: [Option<&Block>; 27] =
-        block.near.map(|other| if other == NONE { None } else { Some(&blocks[other as usize]) });
+    let mut around: [Option<&Block>; 27] = [None; 27];
     let mut firsts = [0; 27];
     let mut total = 0;
     // Its own members come first.
-    for code in std::iter::once(13).chain((0..27).filter(|code| *code != 13)) {
+    for code in [13].into_iter().chain(EARLIER) {
+        if block.near[code] != NONE {
+            around[code] = Some(&blocks[block.near[code] as usize]);
+        }
         firsts[code] = total;
         total += around[code].map_or(0, |block| block.members.len() as u32);
     }
-    let run = |step: [i32; 3], cells: std::ops::Range<usize>| {
-        let code = ((step[0] + 1) * 9 + (step[1] + 1) * 3 + step[2] + 1) as usize;
-        let block = around[code]?;
-        let (low, high) = (block.starts[cells.start], block.starts[cells.end]);
-        let run = Run {
-            block,
-            low,
-            high,
-            shift: step.map(|step| step as f32 * EDGE),
-            bits: step_bits(step),
-            first: firsts[code],
-        };
-        (low < high).then_some(run)
-    };
-    let mut found = Found {
-        starts: Vec::with_capacity(block.members.len() + 1),
-        pairs: Vec::with_capacity(5 * block.members.len()),
-    };
-    found.starts.push(0);
+    scratch.starts.clear();
+    scratch.starts.push(0);
+    scratch.pairs.clear();
+    scratch.behind.clear();
+    scratch.behind.resize(total as usize, 0);
     let mut runs: Vec<Run<'_>> = Vec::with_capacity(16);
     for cell in 0..ALL_CELLS {
         let own = block.starts[cell]..block.starts[cell + 1];
         if own.is_empty() {
             continue;
         }
-        let [y, x, z] = [cell / (CELLS * CELLS), cell / CELLS % CELLS, cell % CELLS];
         runs.clear();
-        for [dy, dx] in [[-1, -1], [-1, 0], [-1, 1], [0, -1]] {
-            let cells = CELLS as i32;
-            let (there_x, there_y) = (x as i32 + dx, y as i32 + dy);
-            let step = [there_x.div_euclid(cells), there_y.div_euclid(cells)];
-            let row = (there_y.rem_euclid(cells) * cells + there_x.rem_euclid(cells)) as usize * CELLS;
-            if z == 0 {
-                runs.extend(run([step[0], step[1], -1], row + CELLS - 1..row + CELLS));
-            }
-            runs.extend(run([step[0], step[1], 0], row + z.max(1) - 1..row + (z + 2).min(CELLS)));
-            if z == CELLS - 1 {
-                runs.extend(run([step[0], step[1], 1], row..row + 1));
+        for cells in &NEAR_CELLS[cell] {
+            let step = [i32::from(cells.step[0]), i32::from(cells.step[1]), i32::from(cells.step[2])];
+            let code = ((step[0] + 1) * 9 + (step[1] + 1) * 3 + step[2] + 1) as usize;
+            let Some(there) = around[code] else { continue };
+            let (low, high) = (there.starts[usize::from(cells.first)], there.starts[usize::from(cells.end)]);
+            if low < high {
+                let shift = [step[0] as f32 * EDGE, step[1] as f32 * EDGE, step[2] as f32 * EDGE];
+                runs.push(Run { block: there, low, high, shift, bits: step_bits(step), first: firsts[code] });
             }
         }
-        if z == 0 {
-            let row = (y * CELLS + x) * CELLS;
-            runs.extend(run([0, 0, -1], row + CELLS - 1..row + CELLS));
-        }
-        // What comes before a grain in its own cell and in the one before.
-        let mut before = run([0; 3], cell - usize::from(z > 0)..cell + 1);
+        // What comes before a grain in its own cell.
+        let mut before =
+            Run { block, low: own.start, high: own.start, shift: [0.0; 3], bits: step_bits([0; 3]), first: 0 };
         for owner in own {
-            let place = [0, 1, 2].map(|axis| block.anchors[axis][owner as usize]);
-            runs.iter().for_each(|run| scan(place, run, &mut found.pairs));
-            if let Some(before) = &mut before {
-                before.high = owner;
-                scan(place, before, &mut found.pairs);
+            let [xs, ys, zs] = &block.anchors;
+            let place = [xs[owner as usize], ys[owner as usize], zs[owner as usize]];
+            for run in &runs {
+                scan(place, run, &mut scratch.pairs);
             }
-            found.starts.push(found.pairs.len() as u32);
+            before.high = owner;
+            scan(place, &before, &mut scratch.pairs);
+            scratch.starts.push(scratch.pairs.len() as u32);
         }
     }
-    found
 }
 
 /// Adds the pairs of a grain with those of a run.
@@ -308,20 +359,24 @@ fn eight(numbers: &[f32], first: u32) -> Lanes {
     Lanes(out)
 }
 
-impl Found {
+impl Scratch {
+    /// Gives a pair of an owner (by rank) and a partner the impulse that it had; whether there is such a pair.
+    fn carry(&mut self, owner: usize, partner: u32, impulse: V) -> bool {
+        let pairs = &mut self.pairs[self.starts[owner] as usize..self.starts[owner + 1] as usize];
+        let pair = pairs.iter_mut().find(|pair| other(pair.code) == partner);
+        let is_there = pair.is_some();
+        pair.into_iter().for_each(|pair| pair.impulse = impulse);
+        is_there
+    }
+
     /// Puts the pairs into batches, each into the first one with room behind those of its grains' earlier pairs.
-    fn schedule(self, members: &[u32], batches: &mut Vec<Batch>) {
-        let locals = self.pairs.iter().map(|pair| pair.local + 1).max().unwrap_or(0).max(members.len() as u32);
-        const APART: usize = 1;
-        // The batch behind the last one of each grain.
-        let mut behind = vec![0u32; locals as usize];
-        let mut counts: Vec<u8> = Vec::new();
-        // A batch with room at or behind each.
-        let mut room: Vec<u32> = Vec::new();
+    fn schedule(&mut self, members: &[u32], batches: &mut Vec<Batch>) {
+        let Self { starts, pairs, behind, counts, room } = self;
+        counts.clear();
+        room.clear();
         batches.clear();
-        batches.reserve_exact(self.pairs.len().div_ceil(LANES) + 8);
         for (member, &slot) in members.iter().enumerate() {
-            for pair in &self.pairs[self.starts[member] as usize..self.starts[member + 1] as usize] {
+            for pair in &pairs[starts[member] as usize..starts[member + 1] as usize] {
                 let least = behind[member].max(behind[pair.local as usize]) as usize;
                 let mut at = least;
                 while at < room.len() && room[at] as usize != at {
@@ -331,31 +386,26 @@ impl Found {
                 while through < at {
                     through = std::mem::replace(&mut room[through], at as u32) as usize;
                 }
-                while at >= batches.len() {
-                    room.push(batches.len() as u32);
+                if at == batches.len() {
+                    room.push(at as u32);
                     counts.push(0);
-                    batches.push(Batch::default());
+                    // All lanes, so that those that are left over repeat the first one.
+                    let (owners, codes) = ([slot; LANES], [pair.code; LANES]);
+                    batches.push(Batch { owners, codes, impulse: pair.impulse.map(Lanes::all) });
                 }
-                let lane = usize::from(counts[at]);
-                let batch = &mut batches[at];
+                let (lane, batch) = (usize::from(counts[at]), &mut batches[at]);
                 (batch.owners[lane], batch.codes[lane]) = (slot, pair.code);
                 (0..3).for_each(|axis| batch.impulse[axis].0[lane] = pair.impulse[axis]);
                 counts[at] += 1;
                 if counts[at] == LANES as u8 {
                     room[at] = at as u32 + 1;
                 }
-                behind[member] = (at + APART) as u32;
-                behind[pair.local as usize] = (at + APART) as u32;
+                behind[member] = at as u32 + 1;
+                behind[pair.local as usize] = at as u32 + 1;
             }
         }
-        for (batch, count) in batches.iter_mut().zip(&mut counts) {
-            for lane in usize::from(*count).max(1)..LANES {
-                (batch.owners[lane], batch.codes[lane]) = (batch.owners[0], batch.codes[0]);
-                batch.impulse.iter_mut().for_each(|impulse| impulse.0[lane] = impulse.0[0]);
-            }
+        if batches.capacity() > batches.len() + batches.len() / 4 + 4 {
+            batches.shrink_to_fit();
         }
-        let mut counts = counts.iter();
-        batches.retain(|_| counts.next().is_some_and(|count| *count > 0));
-        batches.shrink_to_fit();
     }
 }

@@ -7,7 +7,7 @@ use std::collections::HashMap;
 
 use rayon::prelude::*;
 
-use super::contacts::{Batch, Found};
+use super::contacts::Batch;
 use super::rows::{Row, Shared, V};
 use super::touch::Touch;
 use crate::base::DVec3;
@@ -37,10 +37,6 @@ pub struct Block {
     pub starts: [u32; ALL_CELLS + 1],
     /// Where members were when their neighbours were found (diameters, each axis for itself), and some that are nowhere.
     pub anchors: [Vec<f32>; 3],
-    /// Pairs whose higher grain is a member.
-    pub batches: Vec<Batch>,
-    /// Those pairs while they are looked for.
-    pub found: Option<Found>,
     /// What members touch that cannot be moved, by member.
     pub touches: Vec<Touch>,
     /// Whether a member is awake.
@@ -66,12 +62,16 @@ pub struct Column {
 pub struct Layout {
     /// Blocks with grains, and some that had some.
     pub blocks: Vec<Block>,
+    /// The pairs that each block owns: those with a grain of its own and another one, of its own or of a block that comes before it.
+    pub batches: Vec<Vec<Batch>>,
     /// Columns of blocks.
     pub columns: Vec<Column>,
     /// Block of each grain.
     pub of: Vec<u32>,
     /// Place of each grain among the members of its block.
     pub rank: Vec<u32>,
+    /// Whether a grain has just changed blocks.
+    pub has_moved: bool,
     index: HashMap<At, u32>,
     column_index: HashMap<[i32; 2], u32>,
 }
@@ -153,8 +153,6 @@ impl Layout {
             members: Vec::new(),
             starts: [0; ALL_CELLS + 1],
             anchors: Default::default(),
-            batches: Vec::new(),
-            found: None,
             touches: Vec::new(),
             is_awake: false,
             is_reached: false,
@@ -162,6 +160,7 @@ impl Layout {
             is_changed: true,
         });
         let (columns, at) = (&mut self.columns, [at[0], at[2]]);
+        self.batches.push(Vec::new());
         let column = *self.column_index.entry(at).or_insert_with(|| {
             columns.push(Column { at, blocks: Vec::new() });
             columns.len() as u32 - 1
@@ -194,6 +193,7 @@ impl Layout {
                 gone
             })
             .collect();
+        self.has_moved = movers.iter().any(|movers| !movers.is_empty());
         for (slot, at) in movers.into_iter().flatten() {
             self.of[slot as usize] = NONE;
             if holds(at) {
@@ -219,32 +219,41 @@ impl Layout {
         let rows = &*rows;
         let rank = Shared::new(&mut self.rank);
         self.blocks.par_iter_mut().filter(|block| block.is_changed).for_each(|block| {
-            let mut keyed: Vec<(usize, u32, u32, V)> = block
-                .members
-                .iter()
-                .enumerate()
-                .map(|(member, &slot)| {
-                    let place = if block.has_strayed {
-                        rows[slot as usize].place
-                    } else {
-                        [0, 1, 2].map(|axis| block.anchors[axis][member])
-                    };
-                    (cell(place), ids[slot as usize], slot, place)
-                })
-                .collect();
-            keyed.sort_unstable_by_key(|(cell, id, _, _)| (*cell, *id));
-            block.anchors.iter_mut().for_each(Vec::clear);
-            let mut next = 0;
-            for (member, (cell, _, slot, place)) in keyed.into_iter().enumerate() {
-                block.members[member] = slot;
-                // SAFETY: a grain is a member of one block.
-                unsafe { *rank.get(slot as usize) = member as u32 };
-                block.starts[next..=cell].fill(member as u32);
-                next = next.max(cell + 1);
-                block.anchors.iter_mut().zip(place).for_each(|(anchors, place)| anchors.push(place));
+            let place = |member: usize, slot: u32| {
+                if block.has_strayed {
+                    rows[slot as usize].place
+                } else {
+                    [0, 1, 2].map(|axis: usize| block.anchors[axis][member])
+                }
+            };
+            // Counted into cells, then the few of a cell sorted.
+            let places: Vec<V> =
+                block.members.iter().enumerate().map(|(member, &slot)| place(member, slot)).collect();
+            let mut starts = [0u32; ALL_CELLS + 1];
+            places.iter().for_each(|place| starts[cell(*place) + 1] += 1);
+            (0..ALL_CELLS).for_each(|cell| starts[cell + 1] += starts[cell]);
+            let mut next = starts;
+            let mut sorted = vec![(0u32, 0u32); places.len()];
+            for (place, (member, &slot)) in places.iter().zip((0..).zip(&block.members)) {
+                let at = &mut next[cell(*place)];
+                sorted[*at as usize] = (ids[slot as usize], member);
+                *at += 1;
             }
-            block.starts[next..].fill(block.members.len() as u32);
-            block.anchors.iter_mut().for_each(|anchors| anchors.extend([f32::INFINITY; LANES]));
+            for cell in starts.windows(2) {
+                sorted[cell[0] as usize..cell[1] as usize].sort_unstable();
+            }
+            let members: Vec<u32> =
+                sorted.iter().map(|(_, member)| block.members[*member as usize]).collect();
+            for (axis, anchors) in block.anchors.iter_mut().enumerate() {
+                anchors.clear();
+                anchors.extend(sorted.iter().map(|(_, member)| places[*member as usize][axis]));
+                anchors.extend([f32::INFINITY; LANES]);
+            }
+            for (member, &slot) in (0..).zip(&members) {
+                // SAFETY: a grain is a member of one block.
+                unsafe { *rank.get(slot as usize) = member };
+            }
+            (block.starts, block.members) = (starts, members);
             block.is_awake = block.members.iter().any(|&slot| !rows[slot as usize].rests());
             block.has_strayed = false;
         });

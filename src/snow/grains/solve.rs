@@ -86,14 +86,15 @@ enum Pass {
 fn sweep(rows: &mut [Row], layout: &mut Layout, colour: &[u32], pass: Pass, c: &Coefficients) {
     let rows = Shared::new(rows);
     let (columns, blocks) = (&layout.columns, Shared::new(&mut layout.blocks));
+    let batches = Shared::new(&mut layout.batches);
     colour.par_iter().with_max_len(1).for_each(|&column| {
         for &block in &columns[column as usize].blocks {
             // SAFETY: a block is in one column.
-            let block = unsafe { blocks.get(block as usize) };
+            let (block, batches) = unsafe { (blocks.get(block as usize), batches.get(block as usize)) };
             if !block.is_reached {
                 continue;
             }
-            let (touches, batches) = (&mut block.touches, &mut block.batches);
+            let touches = &mut block.touches;
             match pass {
                 Pass::Begin => begin(rows, batches),
                 Pass::Solve => {
