@@ -8,7 +8,7 @@ use std::sync::LazyLock;
 
 use rayon::prelude::*;
 
-use super::layout::{ALL_CELLS, Block, CELLS, EDGE, Layout, NONE};
+use super::layout::{ALL_CELLS, Block, CELLS, EDGE, Home, Layout, NONE};
 use super::rows::{Row, V, norm, sub};
 use crate::base::cpu::dispatch;
 use crate::base::lanes::{LANES, Lanes};
@@ -40,15 +40,6 @@ pub struct Held {
     pub grains: [u32; 2],
     /// On the first one (m/s).
     pub impulse: V,
-    /// From the first one's block to the second one's, as a code.
-    code: u8,
-}
-
-impl Held {
-    /// The impulse (m/s) that two grains of some blocks carry on the first one.
-    pub fn new(grains: [u32; 2], impulse: V) -> Self {
-        Self { grains, impulse, code: 0 }
-    }
 }
 
 /// A pair that was found.
@@ -98,15 +89,25 @@ impl Batch {
         shift
     }
 
+    /// Visits its pairs that carry an impulse: the grains, from which block the other one is, and the impulse. Lanes that are left
+    /// over repeat the first one.
+    #[inline(always)]
+    fn for_each_held(&self, mut visit: impl FnMut([u32; 2], usize, V)) {
+        for lane in 0..LANES {
+            let impulse = [self.impulse[0].0[lane], self.impulse[1].0[lane], self.impulse[2].0[lane]];
+            if impulse != [0.0; 3] {
+                let bits = self.codes[lane] >> INDEX;
+                let code = 9 * (bits & 3) + 3 * (bits >> 2 & 3) + (bits >> 4);
+                visit([self.owners[lane], other(self.codes[lane])], code as usize, impulse);
+            }
+        }
+    }
+
     /// Its pairs that carry an impulse, each once.
     pub fn held(&self) -> impl Iterator<Item = Held> + '_ {
         let held = |lane: usize| Held {
             grains: [self.owners[lane], other(self.codes[lane])],
             impulse: [0, 1, 2].map(|axis: usize| self.impulse[axis].0[lane]),
-            code: {
-                let digit = |axis: u32| (self.codes[lane] >> (INDEX + 2 * axis) & 3) as u8;
-                9 * digit(0) + 3 * digit(1) + digit(2)
-            },
         };
         self.lanes().map(held).filter(|held| held.impulse != [0.0; 3])
     }
@@ -146,17 +147,26 @@ impl Layout {
             let first = moved.partition_point(|(of, _)| *of < block);
             moved[first..].iter().take_while(move |(of, _)| *of == block).map(|(_, held)| *held)
         };
-        let (of, rank) = (&self.of, &self.rank);
+        let (homes, has_moved) = (&self.homes, self.has_moved);
         let listed = self.batches.par_iter_mut().enumerate().filter(|(index, _)| is_listed[*index]);
         listed.for_each_init(Scratch::default, |scratch, (index, batches)| {
             find(scratch, blocks, index);
             let block = &blocks[index];
-            let stayed = batches.iter().flat_map(Batch::held).filter(|held| block.has(held, index, of));
-            stayed.chain(of_block(index as u32)).for_each(|held| {
-                let [a, b] = held.grains;
-                let rank = |slot: u32| rank[slot as usize] as usize;
-                let _ = scratch.carry(rank(a), b, held.impulse)
-                    || of[b as usize] == index as u32 && scratch.carry(rank(b), a, held.impulse.map(|x| -x));
+            let mut carry = |[a, b]: [u32; 2], homes: [Home; 2], impulse: V| {
+                let _ = scratch.carry(homes[0].rank, b, impulse)
+                    || homes[1].block == index as u32
+                        && scratch.carry(homes[1].rank, a, [-impulse[0], -impulse[1], -impulse[2]]);
+            };
+            for batch in &*batches {
+                batch.for_each_held(|grains, code, impulse| {
+                    let homes = [homes[grains[0] as usize], homes[grains[1] as usize]];
+                    if !has_moved || block.has(homes, code, index) {
+                        carry(grains, homes, impulse);
+                    }
+                });
+            }
+            of_block(index as u32).for_each(|held| {
+                carry(held.grains, held.grains.map(|grain| homes[grain as usize]), held.impulse);
             });
             scratch.schedule(&block.members, batches);
         });
@@ -170,22 +180,30 @@ impl Layout {
             [y, x, z]
         };
         let owned = |held: Held| {
-            let [a, b] = held.grains.map(|grain| self.of[grain as usize]);
+            let [a, b] = held.grains.map(|grain| self.homes[grain as usize].block);
             if a == NONE || b == NONE {
                 None
             } else if a == b || level(a) > level(b) {
                 Some((a, held))
             } else {
                 let [first, second] = held.grains;
-                Some((b, Held::new([second, first], held.impulse.map(|x| -x))))
+                Some((b, Held { grains: [second, first], impulse: held.impulse.map(|x| -x) }))
             }
         };
         let mut moved: Vec<(u32, Held)> = held.par_iter().copied().filter_map(owned).collect();
         if self.has_moved {
             let listed = self.batches.par_iter().enumerate().filter(|(index, _)| is_listed[*index]);
             moved.par_extend(listed.flat_map_iter(|(index, batches)| {
-                let gone = move |held: &Held| !self.blocks[index].has(held, index, &self.of);
-                batches.iter().flat_map(Batch::held).filter(gone).filter_map(owned)
+                let mut gone = Vec::new();
+                for batch in batches {
+                    batch.for_each_held(|grains, code, impulse| {
+                        let homes = [self.homes[grains[0] as usize], self.homes[grains[1] as usize]];
+                        if !self.blocks[index].has(homes, code, index) {
+                            gone.extend(owned(Held { grains, impulse }));
+                        }
+                    });
+                }
+                gone
             }));
         }
         moved.par_sort_unstable_by_key(|(block, held)| (*block, held.grains));
@@ -250,9 +268,9 @@ const EARLIER: [usize; 13] = [0, 1, 2, 9, 10, 11, 18, 19, 20, 3, 4, 5, 12];
 
 impl Block {
     /// Whether a pair that a block owned is still its own: none of the grains has changed blocks.
-    fn has(&self, held: &Held, index: usize, of: &[u32]) -> bool {
-        let [a, b] = held.grains.map(|grain| of[grain as usize]);
-        a == index as u32 && b == self.near[held.code as usize]
+    #[inline(always)]
+    fn has(&self, homes: [Home; 2], code: usize, index: usize) -> bool {
+        homes[0].block == index as u32 && homes[1].block == self.near[code]
     }
 }
 
@@ -361,12 +379,16 @@ fn eight(numbers: &[f32], first: u32) -> Lanes {
 
 impl Scratch {
     /// Gives a pair of an owner (by rank) and a partner the impulse that it had; whether there is such a pair.
-    fn carry(&mut self, owner: usize, partner: u32, impulse: V) -> bool {
-        let pairs = &mut self.pairs[self.starts[owner] as usize..self.starts[owner + 1] as usize];
-        let pair = pairs.iter_mut().find(|pair| other(pair.code) == partner);
-        let is_there = pair.is_some();
-        pair.into_iter().for_each(|pair| pair.impulse = impulse);
-        is_there
+    #[inline(always)]
+    fn carry(&mut self, owner: u32, partner: u32, impulse: V) -> bool {
+        let owned = self.starts[owner as usize] as usize..self.starts[owner as usize + 1] as usize;
+        for pair in &mut self.pairs[owned] {
+            if other(pair.code) == partner {
+                pair.impulse = impulse;
+                return true;
+            }
+        }
+        false
     }
 
     /// Puts the pairs into batches, each into the first one with room behind those of its grains' earlier pairs.

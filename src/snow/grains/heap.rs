@@ -188,7 +188,7 @@ impl Heap {
         self.keep(&from);
         let mut layout = Layout::new(&mut self.rows, &self.ids, &self.at);
         for touch in std::mem::take(&mut self.touches) {
-            layout.blocks[layout.of[touch.grain as usize] as usize].touches.push(touch);
+            layout.blocks[layout.homes[touch.grain as usize].block as usize].touches.push(touch);
         }
         layout
     }
@@ -198,9 +198,9 @@ impl Heap {
         self.held = layout.held();
         self.touches = layout.blocks.iter().flat_map(|block| block.touches.iter().copied()).collect();
         self.touches.par_sort_unstable_by_key(Touch::key);
-        self.rows.par_iter_mut().zip(&mut self.at).zip(&layout.of).for_each(|((row, at), &of)| {
-            if of != NONE {
-                *at = layout.blocks[of as usize].at;
+        self.rows.par_iter_mut().zip(&mut self.at).zip(&layout.homes).for_each(|((row, at), home)| {
+            if home.block != NONE {
+                *at = layout.blocks[home.block as usize].at;
                 settle(row, at);
             }
         });
@@ -208,7 +208,7 @@ impl Heap {
         if !self.rows.par_iter().all(is_finite) {
             return Err(Error::Internal("grains have places or velocities that are not finite".into()));
         }
-        let is_there = |slot: &u32| layout.of[*slot as usize] != NONE && holds(self.at[*slot as usize]);
+        let is_there = |slot: &u32| layout.homes[*slot as usize].block != NONE && holds(self.at[*slot as usize]);
         let kept: Vec<u32> = (0..self.rows.len() as u32).filter(is_there).collect();
         if kept.len() < self.rows.len() {
             self.keep(&kept);

@@ -49,6 +49,15 @@ pub struct Block {
     pub is_changed: bool,
 }
 
+/// Where a grain belongs.
+#[derive(Clone, Copy)]
+pub struct Home {
+    /// Its block; [`NONE`] where it has left the range of blocks.
+    pub block: u32,
+    /// Its place among the block's members.
+    pub rank: u32,
+}
+
 /// Blocks one above the other.
 pub struct Column {
     /// Index along x and z.
@@ -66,10 +75,8 @@ pub struct Layout {
     pub batches: Vec<Vec<Batch>>,
     /// Columns of blocks.
     pub columns: Vec<Column>,
-    /// Block of each grain.
-    pub of: Vec<u32>,
-    /// Place of each grain among the members of its block.
-    pub rank: Vec<u32>,
+    /// Where each grain belongs.
+    pub homes: Vec<Home>,
     /// Whether a grain has just changed blocks.
     pub has_moved: bool,
     index: HashMap<At, u32>,
@@ -117,14 +124,14 @@ pub fn order(rows: &[Row], ids: &[u32], at: &[At]) -> Vec<u32> {
 impl Layout {
     /// Blocks of grains in the order of [`order`]; neighbours are not found yet.
     pub fn new(rows: &mut [Row], ids: &[u32], at: &[At]) -> Self {
-        let mut layout = Self { of: vec![NONE; at.len()], rank: vec![0; at.len()], ..Self::default() };
+        let mut layout = Self { homes: vec![Home { block: NONE, rank: 0 }; at.len()], ..Self::default() };
         let is_first = |slot: &usize| *slot == 0 || at[*slot] != at[slot - 1];
         let mut firsts: Vec<usize> = (0..at.len()).into_par_iter().filter(is_first).collect();
         firsts.push(at.len());
         for run in firsts.windows(2) {
             let block = layout.block(at[run[0]]);
             layout.blocks[block as usize].members.extend(run[0] as u32..run[1] as u32);
-            layout.of[run[0]..run[1]].fill(block);
+            layout.homes[run[0]..run[1]].fill(Home { block, rank: 0 });
         }
         layout.rank_members(rows, ids);
         layout
@@ -195,10 +202,10 @@ impl Layout {
             .collect();
         self.has_moved = movers.iter().any(|movers| !movers.is_empty());
         for (slot, at) in movers.into_iter().flatten() {
-            self.of[slot as usize] = NONE;
+            self.homes[slot as usize].block = NONE;
             if holds(at) {
                 let block = self.block(at);
-                self.of[slot as usize] = block;
+                self.homes[slot as usize].block = block;
                 let block = &mut self.blocks[block as usize];
                 block.members.push(slot);
                 block.is_changed = true;
@@ -217,7 +224,7 @@ impl Layout {
     /// Sorts the members of blocks that changed.
     fn rank_members(&mut self, rows: &mut [Row], ids: &[u32]) {
         let rows = &*rows;
-        let rank = Shared::new(&mut self.rank);
+        let homes = Shared::new(&mut self.homes);
         self.blocks.par_iter_mut().filter(|block| block.is_changed).for_each(|block| {
             let place = |member: usize, slot: u32| {
                 if block.has_strayed {
@@ -251,7 +258,7 @@ impl Layout {
             }
             for (member, &slot) in (0..).zip(&members) {
                 // SAFETY: a grain is a member of one block.
-                unsafe { *rank.get(slot as usize) = member };
+                unsafe { homes.get(slot as usize).rank = member };
             }
             (block.starts, block.members) = (starts, members);
             block.is_awake = block.members.iter().any(|&slot| !rows[slot as usize].rests());

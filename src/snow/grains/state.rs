@@ -174,7 +174,7 @@ pub fn load(grains: &mut Grains, bytes: &[u8]) -> Result<()> {
         if grains.iter().any(|grain| *grain as usize >= count) || grains[0] == grains[1] {
             return Err(Error::argument("has a contact of a grain that is not there"));
         }
-        heap.held.push(Held::new(grains, from.f32s()?));
+        heap.held.push(Held { grains, impulse: from.f32s()? });
     }
     for _ in 0..from.count(24)? {
         let (grain, collider) = (from.u32()?, from.u32()?);
