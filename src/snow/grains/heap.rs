@@ -37,6 +37,9 @@ pub struct Colliders<'a> {
     pub shells: Vec<(Shell, Pose<'a>)>,
 }
 
+/// For how many sub-steps neighbours are to last.
+const AHEAD: f64 = 6.0;
+
 /// Grains between two steps.
 #[derive(Clone)]
 pub struct Heap {
@@ -164,10 +167,12 @@ impl Heap {
             at(0.0, &mut pose)?;
             shell.follow(&pose);
         }
-        let mut layout = self.lay_out();
+        // A few sub-steps ahead.
+        let ahead = (AHEAD * dt / self.diameter) as f32;
+        let mut layout = self.lay_out(ahead);
         for sub in 0..division.sub_steps {
             ctx.check()?;
-            let is_changed = layout.follow(&mut self.rows, &self.ids);
+            let is_changed = layout.follow(&mut self.rows, &self.ids, ahead);
             for (shell, at) in &mut colliders.shells {
                 at((sub + 1) as f64 / division.sub_steps as f64, &mut pose)?;
                 shell.follow(&pose);
@@ -183,10 +188,10 @@ impl Heap {
     }
 
     /// Sorts the grains into blocks.
-    fn lay_out(&mut self) -> Layout {
+    fn lay_out(&mut self, ahead: f32) -> Layout {
         let from = order(&self.rows, &self.ids, &self.at);
         self.keep(&from);
-        let mut layout = Layout::new(&mut self.rows, &self.ids, &self.at);
+        let mut layout = Layout::new(&mut self.rows, &self.ids, &self.at, ahead);
         for touch in std::mem::take(&mut self.touches) {
             layout.blocks[layout.homes[touch.grain as usize].block as usize].touches.push(touch);
         }
@@ -262,7 +267,7 @@ impl Heap {
     /// Overlaps (diameters) of the pairs that touch, for tests and reports.
     pub fn overlaps(&self) -> Vec<f32> {
         let mut heap = self.clone();
-        let mut layout = heap.lay_out();
+        let mut layout = heap.lay_out(0.0);
         layout.find_pairs(&[]);
         layout.overlaps(&heap.rows)
     }

@@ -7,8 +7,8 @@ use std::collections::HashMap;
 
 use rayon::prelude::*;
 
-use super::contacts::Batch;
-use super::rows::{Row, Shared, V};
+use super::contacts::{Batch, SKIN};
+use super::rows::{Row, Shared, V, add, norm, scaled};
 use super::touch::Touch;
 use crate::base::DVec3;
 use crate::base::lanes::LANES;
@@ -123,7 +123,7 @@ pub fn order(rows: &[Row], ids: &[u32], at: &[At]) -> Vec<u32> {
 
 impl Layout {
     /// Blocks of grains in the order of [`order`]; neighbours are not found yet.
-    pub fn new(rows: &mut [Row], ids: &[u32], at: &[At]) -> Self {
+    pub fn new(rows: &mut [Row], ids: &[u32], at: &[At], ahead: f32) -> Self {
         let mut layout = Self { homes: vec![Home { block: NONE, rank: 0 }; at.len()], ..Self::default() };
         let is_first = |slot: &usize| *slot == 0 || at[*slot] != at[slot - 1];
         let mut firsts: Vec<usize> = (0..at.len()).into_par_iter().filter(is_first).collect();
@@ -133,7 +133,7 @@ impl Layout {
             layout.blocks[block as usize].members.extend(run[0] as u32..run[1] as u32);
             layout.homes[run[0]..run[1]].fill(Home { block, rank: 0 });
         }
-        layout.rank_members(rows, ids);
+        layout.rank_members(rows, ids, ahead);
         layout
     }
 
@@ -181,7 +181,7 @@ impl Layout {
 
     /// Moves members of blocks that have strayed to the blocks that they are in, and sorts the members of every block that
     /// changed. Whether there is one.
-    pub fn follow(&mut self, rows: &mut [Row], ids: &[u32]) -> bool {
+    pub fn follow(&mut self, rows: &mut [Row], ids: &[u32], ahead: f32) -> bool {
         let shared = Shared::new(rows);
         let strayed = self.blocks.par_iter_mut().filter(|block| block.has_strayed);
         let movers: Vec<Vec<(u32, At)>> = strayed
@@ -210,25 +210,25 @@ impl Layout {
                 block.members.push(slot);
                 block.is_changed = true;
                 if !block.has_strayed {
-                    let place = rows[slot as usize].place;
+                    let place = anchor(&rows[slot as usize], ahead);
                     block.anchors.iter_mut().zip(place).for_each(|(anchors, place)| {
                         anchors.insert(anchors.len() - LANES.min(anchors.len()), place);
                     });
                 }
             }
         }
-        self.rank_members(rows, ids);
+        self.rank_members(rows, ids, ahead);
         self.blocks.iter().any(|block| block.is_changed)
     }
 
     /// Sorts the members of blocks that changed.
-    fn rank_members(&mut self, rows: &mut [Row], ids: &[u32]) {
+    fn rank_members(&mut self, rows: &mut [Row], ids: &[u32], ahead: f32) {
         let rows = &*rows;
         let homes = Shared::new(&mut self.homes);
         self.blocks.par_iter_mut().filter(|block| block.is_changed).for_each(|block| {
             let place = |member: usize, slot: u32| {
                 if block.has_strayed {
-                    rows[slot as usize].place
+                    anchor(&rows[slot as usize], ahead)
                 } else {
                     [0, 1, 2].map(|axis: usize| block.anchors[axis][member])
                 }
@@ -284,6 +284,19 @@ impl Layout {
         sets
     }
 }
+
+/// Where a grain is taken to be while its neighbours last: a little ahead of it, so that it takes longer to stray. `ahead` is how
+/// far (diameters) it would go at 1 m/s.
+fn anchor(row: &Row, ahead: f32) -> V {
+    let way = scaled(row.velocity, ahead);
+    let length = norm(way);
+    let share = if length > AHEAD { AHEAD / length } else { 1.0 };
+    let place = add(row.place, scaled(way, share));
+    place.map(|x| x.clamp(0.0, EDGE))
+}
+
+/// Farthest that an anchor lies ahead of its grain (diameters): less than half of the skin.
+const AHEAD: f32 = 0.45 * SKIN;
 
 /// Moves a grain to the block that its place lies in.
 pub fn settle(row: &mut Row, at: &mut At) {
