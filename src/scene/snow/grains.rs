@@ -240,6 +240,7 @@ fn told(report: &StepReport) -> Report {
     let serde_json::Value::Object(results) = json!({
         "grains": report.count,
         "born": report.born,
+        "resting": report.resting,
         "owed": report.owed,
         "dropped": report.dropped,
         "removed_m3": report.removed_volume,

@@ -1,17 +1,20 @@
 //! Grains: snow that is pushed, piled and thrown (thesis section 3.3).
 //!
 //! They are born where the base layer was removed (`sourcing`), pushed by what moves (`shell`), lie on the base (`field`), pile up
-//! at their angle of repose (`solve`), and read the base layer without changing it. A step is divided into sub-steps (`heap`).
+//! at their angle of repose (`solve`), come to rest (`rest`), and read the base layer without changing it. A step is divided into sub-steps (`heap`).
 //!
 //! | word | meaning |
 //! |---|---|
 //! | row | the part of a grain that every sub-step reads and writes, a cache line |
-//! | pair | two grains that touch or may soon; the higher one owns it |
+//! | pair | two grains that touch or may soon; one of them owns it |
+//! | batch | eight pairs that share no grain, solved at once |
 //! | touch | a grain beside a plane that it cannot move: ground, base, object |
 //! | impulse | what a contact changes of a velocity; kept from sub-step to sub-step |
 //! | push | a displacement that removes overlap and never becomes velocity |
 //! | block, column | 8 x 8 x 8 diameters; blocks one above the other, the unit of work |
 //! | colour | one of four sets of columns that share no grain |
+//! | anchor | where a grain was when its pairs were found |
+//! | rest | a grain that has lain still stops, and holds what lies on it, until something wakes it |
 
 mod contacts;
 mod field;
@@ -28,10 +31,10 @@ mod sourcing;
 mod state;
 mod touch;
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, HashSet};
 
 use crate::base::DVec3;
-use crate::base::blocks::Origin;
+use crate::base::blocks::{DIM, Origin};
 use crate::base::points::{Attribute, Column, Points, Values};
 use crate::context::{Context, PhaseTime};
 use crate::error::{Error, Result};
@@ -86,6 +89,8 @@ pub struct Surroundings<'a> {
 pub struct StepReport {
     /// Grains now.
     pub count: usize,
+    /// Those that rest.
+    pub resting: usize,
     /// Grains that were born.
     pub born: usize,
     /// Snow removed from the base (m3).
@@ -161,8 +166,8 @@ impl Grains {
             self.heap.drop_below(around.lowest);
             let (count, owed) = (self.heap.count(), self.owed.values().sum());
             let dropped = all - count;
-            let (fastest, phases) = (self.heap.fastest(), Vec::new());
-            Ok(StepReport { count, born, removed_volume, owed, dropped, sub_steps, fastest, phases })
+            let (resting, fastest, phases) = (self.heap.resting(), self.heap.fastest(), Vec::new());
+            Ok(StepReport { count, resting, born, removed_volume, owed, dropped, sub_steps, fastest, phases })
         });
         match stepped {
             Ok((report, phases)) => Ok(StepReport { phases, ..report }),
@@ -177,6 +182,7 @@ impl Grains {
     fn source(&mut self, around: &Surroundings<'_>, frame: i32) -> Result<(usize, f64)> {
         let [before, after] = around.base;
         let removals = removals(before, after)?;
+        self.wake_near(&removals, before.voxel_size());
         let Params { compression, seed, most, .. } = self.params;
         let sourcing = Sourcing { diameter: self.heap.diameter, compression, seed, frame };
         let places = sourcing.places(before, after, &removals, &mut self.owed)?;
@@ -192,6 +198,19 @@ impl Grains {
             self.next_id += 1;
         }
         Ok((places.len(), removals.iter().map(|removal| removal.volume).sum()))
+    }
+
+    /// Wakes the grains within a grain and a cell of blocks of the base (m a cell) that have lost snow.
+    fn wake_near(&mut self, removals: &[Removal], cell: f64) {
+        let changed: HashSet<Origin> = removals.iter().map(|removal| removal.origin).collect();
+        let reach = 1.0 + self.heap.diameter / cell;
+        self.heap.wake(|place| {
+            let leaf = |axis: usize, off: f64| ((place[axis] / cell + 0.5 + off).floor() as i32) & !(DIM as i32 - 1);
+            let ends = [0, 1, 2].map(|axis| [leaf(axis, -reach), leaf(axis, reach)]);
+            let corners = (0..8).map(|corner| [0, 1, 2].map(|axis: usize| ends[axis][corner >> axis & 1]));
+            let mut last = None;
+            corners.into_iter().any(|corner| last.replace(corner) != Some(corner) && changed.contains(&corner))
+        });
     }
 
     /// What grains cannot move, and how far objects move in the step (m).
@@ -229,7 +248,7 @@ impl Grains {
         Ok((colliders, way))
     }
 
-    /// The grains as points: `v` (m/s), `id`, `pscale` (radius, m), `source_frame` and `rest` (place of birth, m).
+    /// The grains as points: `v` (m/s), `id`, `active` (not where it rests), `pscale` (radius, m), `source_frame` and `rest` (place of birth, m).
     pub fn points(&self) -> Points {
         let (mut cells, mut offsets) = (Vec::new(), Vec::new());
         for (at, place) in self.heap.located() {
@@ -246,6 +265,7 @@ impl Grains {
                 "id",
                 Values::Long(Column::Each(self.heap.ids().iter().map(|id| i64::from(*id)).collect())),
             ),
+            attribute("active", Values::Bool(Column::Each(self.heap.awake().collect()))),
             attribute("pscale", Values::Float(Column::Uniform(self.params.radius as f32))),
             attribute("source_frame", Values::Int(Column::Each(births().map(|birth| birth.frame).collect()))),
             attribute("rest", Values::Vector(Column::Each(births().map(|birth| birth.rest).collect()))),

@@ -6,15 +6,15 @@
 use super::rows::{Row, SUPPORTED, dot, sub};
 
 /// How far (diameters) a grain goes before it counts as moving.
-const WAY: f32 = 0.05;
+const WAY: f32 = 0.01;
 /// How many sub-steps a grain that has come so far counts as moving.
-pub const MOVING: f32 = 8.0;
+pub const MOVING: f32 = 16.0;
 /// Gap (diameters) across which a moving grain wakes another.
 pub const NEAR: f32 = 0.1;
 /// In `marks`: something wakes the grain.
 pub const WOKEN: f32 = 2.0;
 /// How long a grain lies still before it rests (s).
-pub const PATIENCE: f64 = 0.1;
+pub const PATIENCE: f64 = 0.2;
 
 /// What becomes of a grain at the end of a sub-step; `patience` are the sub-steps that it must lie still.
 pub fn judge(row: &mut Row, patience: Option<f32>) {

@@ -2,7 +2,7 @@
 
 use std::collections::BTreeMap;
 
-use super::Grains;
+use super::{Grains, Params};
 use super::contacts::{Held, MOST};
 use super::heap::Heap;
 use super::layout::{EDGE, holds};
@@ -97,6 +97,7 @@ pub fn save(grains: &Grains) -> Vec<u8> {
     let heap = &grains.heap;
     let mut to = Writer(MAGIC.to_vec());
     to.f64(heap.diameter);
+    rest_depends_on(grains).iter().for_each(|number| to.f64(*number));
     to.u32(grains.next_id);
     to.count(heap.rows.len());
     for ((row, id), at) in heap.rows.iter().zip(&heap.ids).zip(&heap.at) {
@@ -146,6 +147,7 @@ pub fn load(grains: &mut Grains, bytes: &[u8]) -> Result<()> {
         return Err(Error::argument(format!("has grains of {diameter} m, not {}", grains.heap.diameter)));
     }
     let mut heap = Heap::new(diameter);
+    let is_same = rest_depends_on(grains).iter().try_fold(true, |is_same, now| Ok(is_same & (from.f64()? == *now)))?;
     grains.next_id = from.u32()?;
     let count = from.count(ROW)?;
     if count > MOST || grains.next_id as usize > MOST {
@@ -191,8 +193,17 @@ pub fn load(grains: &mut Grains, bytes: &[u8]) -> Result<()> {
     if !from.0.is_empty() {
         return Err(Error::argument("has bytes behind its end"));
     }
+    if !is_same {
+        heap.wake(|_| true);
+    }
     grains.heap = heap;
     Ok(())
+}
+
+/// What wakes all grains when it changes: gravity and what grains are made of.
+fn rest_depends_on(grains: &Grains) -> [f64; 3] {
+    let Params { gravity, friction, attraction, .. } = grains.params;
+    [gravity, friction, attraction]
 }
 
 /// Bytes of a grain.
