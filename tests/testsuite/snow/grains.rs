@@ -261,3 +261,105 @@ fn grains_that_are_pressed_are_not_thrown_when_they_are_free() {
     assert!(fastest < 1.0, "{fastest}");
     assert!(heap.places().all(|place| place.y < 3.0 * diameter && place.y > 0.0));
 }
+
+/// Grains of a small heap on a plane, so many layers high.
+fn heap(layers: u32, params: &Params) -> Heap {
+    let diameter = 2.0 * params.radius;
+    let mut heap = Heap::new(diameter);
+    let side = 2 * layers + 2;
+    for layer in 0..layers {
+        let from = layer..side - layer;
+        for (x, z) in from.clone().flat_map(|x| from.clone().map(move |z| (x, z))) {
+            let shift = f64::from((x * 7 + z * 3 + layer) % 5) * 0.02;
+            let at = [f64::from(x) + shift, 0.5 + f64::from(layer), f64::from(z) - shift];
+            heap.add(heap.count() as u32, DVec3::from(at) * (1.04 * diameter), [0.0; 3]).unwrap();
+        }
+    }
+    heap
+}
+
+/// Steps a heap through some frames on a plane; a ball that rolls into it on request.
+fn settle(heap: &mut Heap, params: &Params, frames: usize, visits_all: bool, ball: bool) {
+    let ctx = context(2);
+    let division = Division { dt: 1.0 / 24.0, sub_steps: params.sub_steps(1.0 / 24.0, 0.0) };
+    let mut coefficients = params.coefficients(&division);
+    coefficients.visits_all = visits_all;
+    let mesh = sphere(4.0 * params.radius as f32, 12);
+    for frame in 0..frames {
+        let at = |share: f64| -> Vec<DVec3> {
+            let x = (frame as f64 + share - 12.0) * params.radius;
+            let middle = DVec3::new(x, 4.0 * params.radius, 8.0 * params.radius);
+            mesh.positions.iter().map(|place| place.cast::<f64>() + middle).collect()
+        };
+        let floor = Some(Floor { height: 0.0, friction: 0.3 });
+        let mut colliders = Colliders { floor, ..Colliders::default() };
+        if ball {
+            let shell = Shell::new(2, 0.3, mesh.triangles.clone(), true, at(0.0));
+            let pose = |share: f64, out: &mut Vec<DVec3>| {
+                *out = at(share);
+                Ok(())
+            };
+            colliders.shells.push((shell, Box::new(pose)));
+            ctx.phase("move", || heap.step(&ctx, division, coefficients, &mut colliders)).unwrap();
+        } else {
+            ctx.phase("move", || heap.step(&ctx, division, coefficients, &mut colliders)).unwrap();
+        }
+    }
+}
+
+#[test]
+fn a_heap_comes_to_rest_and_a_ball_wakes_what_it_pushes() {
+    let params = Params { friction: 0.3, ..Params::for_cell(CELL) };
+    let mut heap = heap(6, &params);
+    assert_eq!(heap.resting(), 0);
+    settle(&mut heap, &params, 96, false, false);
+    assert_eq!((heap.resting(), heap.fastest()), (heap.count(), 0.0));
+    let places: Vec<DVec3> = heap.places().collect();
+    settle(&mut heap, &params, 24, false, false);
+    assert!(heap.places().eq(places.iter().copied()), "grains that rest stay where they are");
+    settle(&mut heap, &params, 24, false, true);
+    let awake = heap.count() - heap.resting();
+    assert!(awake > heap.count() / 20 && awake < heap.count(), "{awake} of {}", heap.count());
+    settle(&mut heap, &params, 96, false, false);
+    assert_eq!(heap.resting(), heap.count());
+}
+
+#[test]
+fn leaving_out_what_rests_changes_no_bit() {
+    let params = Params { friction: 0.3, ..Params::for_cell(CELL) };
+    let run = |visits_all: bool| {
+        let mut heap = heap(7, &params);
+        settle(&mut heap, &params, 40, visits_all, false);
+        let some = heap.resting();
+        settle(&mut heap, &params, 20, visits_all, true);
+        (some, heap.resting(), heap.places().map(|x| [x.x, x.y, x.z].map(f64::to_bits)).collect::<Vec<_>>())
+    };
+    let (skipped, all) = (run(false), run(true));
+    assert!(skipped.0 > 100 && skipped.1 > 100 && skipped.1 < skipped.2.len(), "{} {}", skipped.0, skipped.1);
+    assert!(skipped == all);
+}
+
+#[test]
+fn grains_that_rest_wake_when_the_base_below_them_or_gravity_changes() {
+    let ctx = context(2);
+    let story = story(&ctx);
+    let mut grains = Grains::new(params()).unwrap();
+    run(&ctx, &story, &mut grains, 1..=FRAMES);
+    let last = &story.layers[FRAMES as usize];
+    let step = |grains: &mut Grains, base: [&FloatGrid; 2]| {
+        let around = Surroundings { base, bodies: &[], statics: &[], floor: Some(0.0), lowest: -1.0 };
+        grains.step(&ctx, &around, [0.0, 1.0 / 24.0], 99).unwrap().resting
+    };
+    let mut resting = 0;
+    for _ in 0..150 {
+        resting = step(&mut grains, [last, last]);
+    }
+    assert!(resting > grains.count() * 9 / 10, "{resting} of {}", grains.count());
+    let mut lighter = Grains::resume(Params { gravity: -5.0, ..params() }, &grains.save()).unwrap();
+    assert_eq!(step(&mut lighter, [last, last]), 0);
+    let mut same = Grains::resume(params(), &grains.save()).unwrap();
+    assert!(step(&mut same, [last, last]) >= resting);
+    // The layer loses what the ball has not taken yet.
+    let gone = step(&mut grains, [&story.layers[2], last]);
+    assert!(gone < resting * 3 / 4, "{gone} of {resting}");
+}
