@@ -7,7 +7,7 @@ use frazil::motion::{Key, Keys, Rigid};
 use frazil::snow::base_layer::initial::{Cover, Ground, layer};
 use frazil::snow::base_layer::{BaseLayer, Params as BaseParams};
 use frazil::snow::grains::heap::{Colliders, Division, Floor, Heap, Shell};
-use frazil::snow::grains::{Grains, PACKING, Params, Surroundings, removals};
+use frazil::snow::grains::{Base, Grains, PACKING, Params, Surroundings, removals};
 use frazil::sweep::Body;
 use frazil::vdb::FloatGrid;
 use frazil::{Context, Pool};
@@ -64,7 +64,7 @@ fn run(
     for frame in frames {
         let at = frame as usize;
         let around = Surroundings {
-            base: [&story.layers[at - 1], &story.layers[at]],
+            base: Base::Whole([&story.layers[at - 1], &story.layers[at]]),
             bodies: &[(&story.body, 0.3)],
             statics: &[],
             floor: Some(0.0),
@@ -158,7 +158,7 @@ fn too_many_grains_are_refused_and_leave_the_others_as_they_were() {
     run(&ctx, &story, &mut grains, 1..=3);
     let before = grains.save();
     let around = Surroundings {
-        base: [&story.layers[3], &story.layers[FRAMES as usize]],
+        base: Base::Whole([&story.layers[3], &story.layers[FRAMES as usize]]),
         bodies: &[],
         statics: &[],
         floor: Some(0.0),
