@@ -236,8 +236,9 @@ impl Heap {
             count: done.count as u64,
             born: done.born as u64,
             dropped: done.dropped as u64,
-            removed_volume: done.removed_volume,
-            owed: done.owed,
+            // An empty sum is -0.
+            removed_volume: done.removed_volume + 0.0,
+            owed: done.owed + 0.0,
             fastest: f64::from(done.fastest),
         })
     }

@@ -230,18 +230,18 @@ impl Grains {
             let sub_steps = self.params.sub_steps(to - from, way);
             let division = Division { dt: to - from, sub_steps };
             let all = self.heap.count();
-            ctx.phase("move", || {
-                self.heap.step(ctx, division, self.params.coefficients(&division), &mut colliders)
+            let fastest = ctx.phase("move", || {
+                self.heap.step(ctx, division, self.params.coefficients(&division), &mut colliders)?;
+                if !self.heap.velocities().all(|velocity| velocity.iter().all(|x| x.is_finite())) {
+                    return Err(Error::argument(
+                        "a grain would move infinitely fast: the base layer or an object is not as it should be",
+                    ));
+                }
+                self.heap.drop_below(around.lowest);
+                Ok(self.heap.fastest())
             })?;
-            if !self.heap.velocities().all(|velocity| velocity.iter().all(|x| x.is_finite())) {
-                return Err(Error::argument(
-                    "a grain would move infinitely fast: the base layer or a body is not as it should be",
-                ));
-            }
-            self.heap.drop_below(around.lowest);
             let (count, owed) = (self.heap.count(), self.owed.values().sum());
-            let dropped = all - count;
-            let (fastest, phases) = (self.heap.fastest(), Vec::new());
+            let (dropped, phases) = (all - count, Vec::new());
             Ok(StepReport { count, born, removed_volume, owed, dropped, sub_steps, fastest, phases })
         });
         match stepped {
@@ -266,8 +266,7 @@ impl Grains {
         for place in &places {
             self.add(*place, [0.0; 3], frame)?;
         }
-        // An empty sum is -0.
-        Ok((places.len(), removals.iter().map(|removal| removal.volume).sum::<f64>() + 0.0))
+        Ok((places.len(), removals.iter().map(|removal| removal.volume).sum()))
     }
 
     /// What grains cannot move, and how far objects move in the step (m).
