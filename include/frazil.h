@@ -36,7 +36,7 @@
 /**
  * Version of the interface that this header describes: major << 16 | minor.
  */
-#define FRZ_ABI_VERSION 65537
+#define FRZ_ABI_VERSION 65538
 
 /**
  * Version of frazil that this header belongs to.
@@ -62,6 +62,16 @@
  * Flag of a body: its imprints have no noise.
  */
 #define FRZ_BODY_EXACT 1
+
+/**
+ * Flag of parameters of grains: a level ground lies at frz_grains_params.floor.
+ */
+#define FRZ_GRAINS_FLOOR 1
+
+/**
+ * Flag of parameters of grains: they never come to rest.
+ */
+#define FRZ_GRAINS_RESTLESS 2
 
 /**
  * Status codes. Numbers never change; new ones are added at the end.
@@ -187,6 +197,55 @@ enum frz_csg
 typedef enum frz_csg frz_csg;
 #else
 typedef uint32_t frz_csg;
+#endif // __STDC_VERSION__ >= 202311L
+#endif // __cplusplus
+
+/**
+ * What frz_grains_read reads of each grain; in brackets its usual name as an attribute.
+ */
+enum frz_grains_attribute
+#if defined(__cplusplus) || __STDC_VERSION__ >= 202311L
+  : uint32_t
+#endif // defined(__cplusplus) || __STDC_VERSION__ >= 202311L
+ {
+    /**
+     * float[3]: its place (P, m).
+     */
+    FRZ_GRAINS_POSITION = 0,
+    /**
+     * double[3]: its place (m), as exactly as it is known: also far from the origin.
+     */
+    FRZ_GRAINS_POSITION_DOUBLE = 1,
+    /**
+     * float[3]: its velocity (v, m/s).
+     */
+    FRZ_GRAINS_VELOCITY = 2,
+    /**
+     * int64_t: its number (id), counted from 0 in the order of birth; it keeps it, and no other grain ever has it.
+     */
+    FRZ_GRAINS_ID = 3,
+    /**
+     * float: its radius (pscale, m).
+     */
+    FRZ_GRAINS_RADIUS = 4,
+    /**
+     * int32_t: the frame that frz_grains_step or frz_grains_emit was given when it was born (source_frame).
+     */
+    FRZ_GRAINS_SOURCE_FRAME = 5,
+    /**
+     * float[3]: its place when it was born (rest, m).
+     */
+    FRZ_GRAINS_REST = 6,
+    /**
+     * int32_t: 1 where it is awake, 0 where it rests (active).
+     */
+    FRZ_GRAINS_ACTIVE = 7,
+};
+#ifndef __cplusplus
+#if __STDC_VERSION__ >= 202311L
+typedef enum frz_grains_attribute frz_grains_attribute;
+#else
+typedef uint32_t frz_grains_attribute;
 #endif // __STDC_VERSION__ >= 202311L
 #endif // __cplusplus
 
@@ -370,6 +429,11 @@ typedef struct frz_base frz_base;
  * One computation: cancel flag, progress, polls, warnings, phase times. Cheap: make one for every cook.
  */
 typedef struct frz_context frz_context;
+
+/**
+ * Grains of snow, all of one size.
+ */
+typedef struct frz_grains frz_grains;
 
 /**
  * A sparse grid of 32-bit floats, or of vectors of three of them; voxel (i, j, k) has its centre at (i, j, k) x voxel
@@ -719,29 +783,6 @@ typedef struct {
 } frz_grid_desc;
 
 /**
- * Irregularity of a surface: where the noise is positive it moves outward.
- */
-typedef struct {
-    /**
-     * Farthest displacement (m), 0 to 32 voxels; 0: none; -1: two voxels. So much that islands would be left is
-     * refused, with the greatest that is not.
-     */
-    double amplitude;
-    /**
-     * Size of the largest clumps (m), 2 to 10000 voxels; -1: eight voxels.
-     */
-    double size;
-    /**
-     * Octaves, each of half the size and a quarter of the strength, 1 to 8.
-     */
-    uint32_t octaves;
-    /**
-     * Seed of the pattern, which is fixed in the world.
-     */
-    int32_t seed;
-} frz_noise;
-
-/**
  * A mesh that moves in the time of one step. All arrays are lent for the call.
  */
 typedef struct {
@@ -780,10 +821,37 @@ typedef struct {
      */
     frz_view face_counts;
     /**
-     * As in frz_mesh_desc. Open meshes are closed, and a warning says so.
+     * As in frz_mesh_desc. Where open meshes press into snow or are swept they are closed, and a warning says so.
      */
     frz_view indices;
+    /**
+     * Friction of grains against it, 0 to 10; only grains read it. 0.3 in headers of interface 1.1 and from frz_body_init.
+     */
+    double friction;
 } frz_body;
+
+/**
+ * Irregularity of a surface: where the noise is positive it moves outward.
+ */
+typedef struct {
+    /**
+     * Farthest displacement (m), 0 to 32 voxels; 0: none; -1: two voxels. So much that islands would be left is
+     * refused, with the greatest that is not.
+     */
+    double amplitude;
+    /**
+     * Size of the largest clumps (m), 2 to 10000 voxels; -1: eight voxels.
+     */
+    double size;
+    /**
+     * Octaves, each of half the size and a quarter of the strength, 1 to 8.
+     */
+    uint32_t octaves;
+    /**
+     * Seed of the pattern, which is fixed in the world.
+     */
+    int32_t seed;
+} frz_noise;
 
 /**
  * Description of a layer of snow: the ground and the depth.
@@ -886,6 +954,112 @@ typedef struct {
      */
     uint64_t sweep_faces;
 } frz_base_report;
+
+/**
+ * How snow becomes grains and how they behave. All of it but the radius may change between steps.
+ */
+typedef struct {
+    /**
+     * sizeof(frz_grains_params).
+     */
+    uint32_t struct_size;
+    /**
+     * 0, or FRZ_GRAINS_FLOOR, FRZ_GRAINS_RESTLESS or both.
+     */
+    uint32_t flags;
+    /**
+     * Radius of a grain (m), 1e-5 to 1; at a base layer from 0.02 to 0.5 of its voxel. A third of the voxel gives the
+     * thesis' look, and is usual for voxels of 1 cm.
+     */
+    double radius;
+    /**
+     * Share of the removed snow that is pressed together and becomes no grains, 0 to 1; 0.75 is usual.
+     */
+    double compression;
+    /**
+     * Friction between grains, and between them and the base layer, 0 to 1; as they do not turn, 0.27, the usual one,
+     * already holds a slope of 32 degrees.
+     */
+    double friction;
+    /**
+     * With which grains that all but touch hold each other (weights of a grain), 0 to 1000; 0 is usual.
+     */
+    double attraction;
+    /**
+     * Share of its velocity that a grain keeps in a second, 0 to 1; 0.5 is usual.
+     */
+    double air;
+    /**
+     * Gravity along y (m/s2), -1000 to 1000; -9.81 is usual.
+     */
+    double gravity;
+    /**
+     * Height of a level ground (m), -1e6 to 1e6; only with FRZ_GRAINS_FLOOR. 0 is usual.
+     */
+    double floor;
+    /**
+     * Grains below this height (m) are dropped at the end of a step; -1e6 is usual, and far below all that grains reach.
+     */
+    double lowest;
+    /**
+     * Most grains, 1 to 60000000: a step or an emission that would make more fails. 20000000 is usual.
+     */
+    uint64_t max_grains;
+    /**
+     * Another one scatters the grains of removed snow otherwise; 0 is usual.
+     */
+    uint64_t seed;
+    /**
+     * Sub-steps of a step, 1 to 1000; 0, as is usual: as many as sizes, times and speeds need.
+     */
+    uint32_t sub_steps;
+    /**
+     * 0.
+     */
+    uint32_t reserved;
+} frz_grains_params;
+
+/**
+ * What a step did.
+ */
+typedef struct {
+    /**
+     * sizeof(frz_grains_report), set by the caller.
+     */
+    uint32_t struct_size;
+    /**
+     * Sub-steps that the step was divided into.
+     */
+    uint32_t sub_steps;
+    /**
+     * Grains now.
+     */
+    uint64_t count;
+    /**
+     * Those that rest: nothing moves them until something wakes them.
+     */
+    uint64_t resting;
+    /**
+     * Grains that were born of removed snow.
+     */
+    uint64_t born;
+    /**
+     * Grains that fell below the lowest height or left the range of coordinates.
+     */
+    uint64_t dropped;
+    /**
+     * Snow that the base layer lost (m3).
+     */
+    double removed_volume;
+    /**
+     * Grains that removed snow has paid for and that are not born yet: fractions, and what had no place.
+     */
+    double owed;
+    /**
+     * Largest speed (m/s).
+     */
+    double fastest;
+} frz_grains_report;
 
 /**
  * How long a phase took.
@@ -1433,6 +1607,16 @@ frz_status frz_grid_load_guarded(frz_context *context,
                                  frz_grid **out);
 
 /**
+ * Fills a body with the usual values: none of the arrays, a friction of 0.3.
+ *
+ * body: receives them.
+ * size: sizeof(frz_body).
+ *
+ * Any thread.
+ */
+frz_status frz_body_init(frz_body *body, size_t size);
+
+/**
  * Makes a level set of the solid that a mesh bounds: points that its faces wind around.
  *
  * The mesh may be open (open loops are closed), cross itself, and have faces that are doubled or reversed.
@@ -1713,6 +1897,164 @@ frz_status frz_base_bounds(const frz_base *base, double *min, double *max);
 frz_status frz_base_dirty(const frz_base *base,
                           const int32_t **origins,
                           size_t *count);
+
+/**
+ * Fills parameters with the usual values, those of the thesis' look for voxels of 1 cm.
+ *
+ * params: receives them.
+ * size: sizeof(frz_grains_params).
+ *
+ * Any thread.
+ */
+frz_status frz_grains_params_init(frz_grains_params *params, size_t size);
+
+/**
+ * Makes grains: none yet, or those of a state that frz_grains_save wrote.
+ *
+ * params: NULL for the usual ones.
+ * restart: restart_bytes bytes of frz_grains_save of grains of the same radius: they come back bit for bit, on any number
+ *     of threads. NULL: none. Bytes that are damaged so that it can be told, of another version or of another radius are
+ *     FRZ_ERROR_FILE.
+ * restart_bytes: 0 without a restart.
+ * out: receives the grains, to be destroyed with frz_grains_destroy; NULL after a failure.
+ *
+ * One thread at a time for each context.
+ */
+frz_status frz_grains_create(frz_context *context,
+                             const frz_grains_params *params,
+                             const void *restart,
+                             size_t restart_bytes,
+                             frz_grains **out);
+
+/**
+ * Destroys grains; NULL is fine.
+ *
+ * grains: may be NULL. Not while a call uses them: they then stay.
+ *
+ * One thread at a time.
+ */
+void frz_grains_destroy(frz_grains *grains);
+
+/**
+ * Sets how grains behave from the next step on. All parameters but the radius may change between steps.
+ *
+ * params: FRZ_ERROR_ARGUMENT names the field at fault and its range; the old ones then stay.
+ *
+ * One thread at a time.
+ */
+frz_status frz_grains_set_params(frz_grains *grains, const frz_grains_params *params);
+
+/**
+ * Moves grains through a step, with those that are born of what the base layer's last step removed.
+ *
+ * Call it once after each frz_base_step, with the same bodies, dt and frame. The layer has kept the blocks that its step
+ * changed, as they were: nothing else of it is compared or copied. After a failure or a cancel the grains are as they were
+ * before.
+ *
+ * base: the layer after its step; it is only read. Its voxels must suit the radius: FRZ_ERROR_ARGUMENT. A layer that has not
+ *     stepped since it was made or restored removed nothing. NULL: there is none.
+ * bodies: count bodies that push the grains, each with its friction; NULL with a count of 0. Those that do not move have
+ *     no positions_end. Both sides of an open mesh collide, and a warning says so. A vertex farther than 1e6 m from the
+ *     origin along an axis is FRZ_ERROR_ARGUMENT.
+ * count: number of bodies.
+ * dt: length of the step (s), 1e-6 to 3600. 0: nothing is born and nothing moves, as the first frame of a shot wants it:
+ *     what bodies cut out there was gone before.
+ * frame: becomes the source frame of the grains that are born.
+ * report: receives what was done, all zeroes after a failure; may be NULL. Its struct_size is set by the caller.
+ *
+ * One thread at a time; any number may read a base layer, but none may step it meanwhile (FRZ_ERROR_BUSY).
+ */
+frz_status frz_grains_step(frz_context *context,
+                           frz_grains *grains,
+                           const frz_base *base,
+                           const frz_body *bodies,
+                           size_t count,
+                           double dt,
+                           int32_t frame,
+                           frz_grains_report *report);
+
+/**
+ * Moves grains through a step, with those that are born of the snow that lies in one grid and no more in another: as
+ * frz_grains_step, for a host whose base layer is its own, or that has its states only. The grains are the same, bit for
+ * bit, but all blocks of both grids are compared.
+ *
+ * before: the snow before the base layer's step, a level set with voxels fixed in the world; NULL: nothing was removed.
+ * after: the snow after it, with which grains collide; a level set with voxels of the same size.
+ * bodies: as for frz_grains_step.
+ * count: as for frz_grains_step.
+ * dt: as for frz_grains_step.
+ * frame: as for frz_grains_step.
+ * report: as for frz_grains_step.
+ *
+ * One thread at a time; any number may read a grid.
+ */
+frz_status frz_grains_step_grids(frz_context *context,
+                                 frz_grains *grains,
+                                 const frz_grid *before,
+                                 const frz_grid *after,
+                                 const frz_body *bodies,
+                                 size_t count,
+                                 double dt,
+                                 int32_t frame,
+                                 frz_grains_report *report);
+
+/**
+ * Adds loose grains: debris, drift, snow that falls from a tree. They are there at once and move with the next step; those
+ * that overlap each other or an object are pushed apart.
+ *
+ * positions: float[3] for each grain (m), finite, within 8388608 diameters of the origin along x and z and 65536 along y.
+ * velocities: float[3] for each grain (m/s), each component from -10000 to 10000; data NULL with a count of 0: at rest.
+ * frame: becomes their source frame.
+ * first: receives the id of the first new grain, the others follow it in the order of the positions; -1 where there are
+ *     none, 0 after a failure; may be NULL.
+ *
+ * After a failure no grain was added; the error names the first element at fault, counted from 0. One thread at a time.
+ */
+frz_status frz_grains_emit(frz_context *context,
+                           frz_grains *grains,
+                           frz_view positions,
+                           frz_view velocities,
+                           int32_t frame,
+                           int64_t *first);
+
+/**
+ * Reports how many grains there are.
+ *
+ * count: receives their number; 0 after a failure.
+ *
+ * Any number of threads may read grains.
+ */
+frz_status frz_grains_count(const frz_grains *grains, size_t *count);
+
+/**
+ * Copies an attribute of all grains, in an order that all attributes share and that changes from step to step: ids tell
+ * which is which.
+ *
+ * attribute: a frz_grains_attribute; it says of what type the elements are.
+ * dst: room for as many elements as frz_grains_count reports; FRZ_ERROR_CAPACITY when it is too little, and nothing is
+ *     written.
+ *
+ * Any number of threads may read grains.
+ */
+frz_status frz_grains_read(const frz_grains *grains,
+                           uint32_t attribute,
+                           frz_span dst);
+
+/**
+ * Writes all that the next step depends on, besides the parameters, the base layer and the bodies: for a host's own cache.
+ * The bytes are the same on any number of threads.
+ *
+ * dst: room for capacity bytes. NULL: size receives their number, and nothing is written.
+ * capacity: bytes at dst. FRZ_ERROR_CAPACITY when they are too few.
+ * size: receives the bytes that were written, or are needed; 0 after other failures.
+ *
+ * One thread at a time.
+ */
+frz_status frz_grains_save(frz_context *context,
+                           const frz_grains *grains,
+                           void *dst,
+                           size_t capacity,
+                           size_t *size);
 
 #ifdef __cplusplus
 }  // extern "C"

@@ -128,6 +128,7 @@ impl Host {
             between_count: 0,
             face_counts: frz_view { data: null(), count: 0, stride: 0 },
             indices: view(self.ball.triangles.as_flattened()),
+            friction: 0.3,
         }
     }
 

@@ -55,6 +55,7 @@ impl Poses {
             between_count: 0,
             face_counts: view(std::ptr::null(), 0),
             indices: view(self.triangles.as_ptr().cast(), self.triangles.len() * 3),
+            friction: 0.3,
         }
     }
 }

@@ -9,18 +9,23 @@ by the system's loader.
     base.step([frazil.Body(points_before, points_after, triangles)], dt=1 / 24, frame=1)
     frazil.save(ctx, [base.grid, base.compression], "pressed.vdb")
 
+    grains = frazil.Grains(ctx, radius=0.01 / 3)
+    grains.step(base, bodies, dt=1 / 24, frame=1)   # after each step of the base, with the same bodies
+    grains.positions, grains.read("v"), grains.read("id")
+
 Lengths are metres, times seconds; Y is up. Everything that fails raises frazil.Error with one sentence.
 Handles have close(), and work in with blocks.
 """
 
 from ._library import ABI_VERSION, Error, library, version
 from .context import Context, Pool
+from .grains import Grains
 from .grid import Grid, Leaf, load, save
 from .mesh import Mesh
 from .snow import Base, Body, Noise, snow_layer
 from . import level_set
 
 __all__ = [
-    "ABI_VERSION", "Base", "Body", "Context", "Error", "Grid", "Leaf", "Mesh", "Noise", "Pool", "level_set", "library",
+    "ABI_VERSION", "Base", "Body", "Context", "Error", "Grains", "Grid", "Leaf", "Mesh", "Noise", "Pool", "level_set", "library",
     "load", "save", "snow_layer", "version",
 ]

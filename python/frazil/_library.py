@@ -9,7 +9,7 @@ import threading
 
 import numpy as np
 
-ABI_VERSION = 0x10001
+ABI_VERSION = 0x10002
 
 OK, CANCELLED = 0, 5
 
@@ -98,7 +98,7 @@ class BodyDesc(c.Structure):
     _fields_ = [
         ("struct_size", c.c_uint32), ("flags", c.c_uint32), ("id", c.c_uint64), ("positions", View),
         ("positions_end", View), ("between", c.POINTER(View)), ("between_count", c.c_size_t),
-        ("face_counts", View), ("indices", View),
+        ("face_counts", View), ("indices", View), ("friction", c.c_double),
     ]
 
 
@@ -124,6 +124,22 @@ class BaseReport(Struct):
     ]
 
 
+class GrainsParams(Struct):
+    _fields_ = [
+        ("struct_size", c.c_uint32), ("flags", c.c_uint32), ("radius", c.c_double), ("compression", c.c_double),
+        ("friction", c.c_double), ("attraction", c.c_double), ("air", c.c_double), ("gravity", c.c_double),
+        ("floor", c.c_double), ("lowest", c.c_double), ("max_grains", c.c_uint64), ("seed", c.c_uint64),
+        ("sub_steps", c.c_uint32), ("reserved", c.c_uint32),
+    ]
+
+
+class GrainsReport(Struct):
+    _fields_ = [
+        ("struct_size", c.c_uint32), ("sub_steps", c.c_uint32), ("count", c.c_uint64),
+        ("resting", c.c_uint64), ("born", c.c_uint64), ("dropped", c.c_uint64), ("removed_volume", c.c_double), ("owed", c.c_double), ("fastest", c.c_double),
+    ]
+
+
 # The structs by their names in the header: a test compares every field's place.
 STRUCTS = {
     "frz_view": View, "frz_span": Span, "frz_progress": Progress, "frz_stage_time": StageTime,
@@ -131,6 +147,7 @@ STRUCTS = {
     "frz_vector_leaf": VectorLeafView,
     "frz_grid_desc": GridDesc, "frz_grid_info": GridInfo, "frz_noise": NoiseParams, "frz_body": BodyDesc,
     "frz_snow_desc": SnowDesc, "frz_base_params": BaseParams, "frz_base_report": BaseReport,
+    "frz_grains_params": GrainsParams, "frz_grains_report": GrainsReport,
 }
 
 POLL = c.CFUNCTYPE(c.c_int, c.c_void_p, c.POINTER(Progress))
@@ -157,9 +174,14 @@ _FUNCTIONS = {
     "base_step": [_P, _P, _P, _Z, _D, c.c_int32, _P], "base_save": [_P, _P, _P, _Z, _P],
     "base_dirty": [_P, _P, _P], "base_bounds": [_P, _P, _P], "grid_to_mesh_box": [_P, _P, _F, _F, _P, _P, _P],
     "grid_to_mesh_blocks": [_P, _P, _F, _F, View, _P],
+    "grains_params_init": [_P, _Z], "grains_create": [_P, _P, _P, _Z, _P], "grains_set_params": [_P, _P],
+    "grains_step": [_P, _P, _P, _P, _Z, _D, c.c_int32, _P],
+    "grains_step_grids": [_P, _P, _P, _P, _P, _Z, _D, c.c_int32, _P],
+    "grains_emit": [_P, _P, View, View, c.c_int32, _P], "grains_count": [_P, _P], "grains_read": [_P, _U, Span],
+    "grains_save": [_P, _P, _P, _Z, _P],
 }
 _VOID = ["pool_destroy", "context_destroy", "context_cancel", "context_reset", "mesh_destroy", "grid_destroy",
-         "base_destroy"]
+         "base_destroy", "grains_destroy"]
 _LENT = ["base_grid", "base_removed", "base_compression", "base_touched"]
 
 

@@ -30,6 +30,7 @@ class Body(NamedTuple):
     between: poses at equal times between the two; without, vertices move straight.
     id: a number that stays with the body from step to step, different in all bodies of a step.
     exact: no noise along its imprints.
+    friction: of grains against it, 0 to 10.
     """
 
     positions: np.ndarray
@@ -39,6 +40,7 @@ class Body(NamedTuple):
     between: Sequence[np.ndarray] = ()
     id: int = 0
     exact: bool = False
+    friction: float = 0.3
 
 
 def bodies_of(bodies):
@@ -54,7 +56,7 @@ def bodies_of(bodies):
         kept.append((start, end, indices, counts, poses, views))
         descs[at] = BodyDesc(
             c.sizeof(BodyDesc), int(body.exact), body.id, view(start), none if end is None else view(end),
-            views if poses else None, len(poses), view(counts), view(indices),
+            views if poses else None, len(poses), view(counts), view(indices), body.friction,
         )
     return descs, kept
 

@@ -3,7 +3,7 @@
 use std::ffi::c_void;
 use std::ptr::NonNull;
 
-use super::body::{Shapes, bodies, frz_body};
+use super::body::{Role, Shapes, bodies, frz_body};
 use super::context::{creates, enter, frz_context};
 use super::grid::{Grid, frz_grid};
 use super::guard::{Failure, Outcome, frz_status, guard};
@@ -13,7 +13,7 @@ use super::mesh::no_flags;
 use super::views::{Sized32, fill, finite, frz_view, sized, write_bytes};
 use crate::base::blocks::Origin;
 use crate::snow::base_layer::{BaseLayer, Params};
-use crate::sweep::TOLERANCE;
+use crate::sweep::{Body, TOLERANCE};
 use crate::vdb::FloatGrid;
 
 /// A layer of snow that bodies press into.
@@ -87,7 +87,7 @@ const LENT: usize = 4;
 
 /// The value of a base layer's handle.
 pub(super) struct Layer {
-    layer: Box<BaseLayer>,
+    pub layer: Box<BaseLayer>,
     shapes: Shapes,
     lent: [*mut frz_grid; LENT],
     dirty: Vec<Origin>,
@@ -282,9 +282,10 @@ pub unsafe extern "C" fn frz_base_step(
             }
             let done = base.alone(|state| {
                 let mut shapes = std::mem::take(&mut state.shapes);
-                let bodies = self::bodies(ctx, bodies, count, dt, &mut shapes);
+                let bodies = self::bodies(ctx, bodies, count, dt, Role::Sweep, &mut shapes);
                 state.shapes = shapes;
-                let done = state.layer.step(ctx, &bodies?, 0.0, dt, frame)?;
+                let bodies: Vec<Body> = bodies?.into_iter().map(|(body, _)| body).collect();
+                let done = state.layer.step(ctx, &bodies, 0.0, dt, frame)?;
                 state.dirty = state.layer.dirty().collect();
                 Ok(done)
             })?;

@@ -5,9 +5,9 @@ use std::sync::Arc;
 
 use rayon::prelude::*;
 
-use super::guard::{Failure, Outcome};
+use super::guard::{Failure, Outcome, frz_status, guard};
 use super::mesh::{no_flags, polygons};
-use super::views::{Sized32, check_size, finite, frz_view, sized};
+use super::views::{Sized32, check_size, fill, finite, frz_view, sized, within};
 use crate::base::{DVec3, PolygonMesh, Vec3};
 use crate::context::Context;
 use crate::error::Result;
@@ -39,14 +39,43 @@ pub struct frz_body {
     pub between_count: usize,
     /// As in frz_mesh_desc.
     pub face_counts: frz_view,
-    /// As in frz_mesh_desc. Open meshes are closed, and a warning says so.
+    /// As in frz_mesh_desc. Where open meshes press into snow or are swept they are closed, and a warning says so.
     pub indices: frz_view,
+    /// Friction of grains against it, 0 to 10; only grains read it. 0.3 in headers of interface 1.1 and from frz_body_init.
+    pub friction: f64,
 }
 
 // SAFETY: numbers and pointers.
 unsafe impl Sized32 for frz_body {
-    const SIZES: &'static [usize] = &[size_of::<Self>()];
+    const SIZES: &'static [usize] = &[std::mem::offset_of!(frz_body, friction), size_of::<Self>()];
     const NAME: &'static str = "frz_body";
+}
+
+impl frz_body {
+    const USUAL: Self = Self {
+        struct_size: 0,
+        flags: 0,
+        id: 0,
+        positions: frz_view::NONE,
+        positions_end: frz_view::NONE,
+        between: std::ptr::null(),
+        between_count: 0,
+        face_counts: frz_view::NONE,
+        indices: frz_view::NONE,
+        friction: 0.3,
+    };
+}
+
+/// Fills a body with the usual values: none of the arrays, a friction of 0.3.
+///
+/// body: receives them.
+/// size: sizeof(frz_body).
+///
+/// Any thread.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn frz_body_init(body: *mut frz_body, size: usize) -> frz_status {
+    // SAFETY: the body is NULL or has so many bytes.
+    guard(|| unsafe { fill(body, Some(size), frz_body::USUAL) })
 }
 
 // SAFETY: views are numbers and pointers.
@@ -93,6 +122,7 @@ impl Motion for HostMotion {
 struct Arrived {
     id: u64,
     exact: bool,
+    friction: f64,
     mesh: PolygonMesh,
     poses: Vec<Vec<Vec3>>,
 }
@@ -100,7 +130,19 @@ struct Arrived {
 /// Shapes of a host's bodies by their ids, kept from step to step.
 pub(super) type Shapes = HashMap<u64, Arc<Shape>>;
 
-/// Bodies from a host's arrays, checked; `shapes` are those of earlier calls, and are updated.
+/// What bodies do in a call.
+#[derive(Clone, Copy, PartialEq, Eq)]
+pub(super) enum Role {
+    /// What they sweep is taken.
+    Sweep,
+    /// They push grains.
+    Push,
+}
+
+/// Farthest from the origin (m) that a body that pushes grains may lie.
+const FARTHEST: f32 = 1.0e6;
+
+/// Bodies from a host's arrays, checked, each with its friction; `shapes` are those of earlier calls, and are updated.
 ///
 /// # Safety
 /// The bodies must describe memory that can be read.
@@ -109,14 +151,20 @@ pub(super) unsafe fn bodies(
     list: *const frz_body,
     count: usize,
     dt: f64,
+    role: Role,
     shapes: &mut Shapes,
-) -> Outcome<Vec<Body>> {
+) -> Outcome<Vec<(Body, f64)>> {
     finite("dt", dt)?;
     if dt < 0.0 {
         return Err(Failure::argument(format!("dt = {dt} is not 0 or more")));
     }
     // SAFETY: the caller's promise.
     let arrived = unsafe { arrived(list, count, dt) }?;
+    if role == Role::Push {
+        for (at, body) in arrived.iter().enumerate() {
+            check_far(body).map_err(|failure| named(at, failure))?;
+        }
+    }
     let bytes = arrived
         .iter()
         .map(|body| body.poses.len() * body.poses[0].len() * 12 + body.mesh.corners.len() * 200);
@@ -128,28 +176,44 @@ pub(super) unsafe fn bodies(
         let triangles = body.mesh.triangles();
         let motion = HostMotion { triangles, poses: body.poses, end: dt };
         let made = Body::shaped(Box::new(motion), 0.0, known.get(&body.id).cloned())?;
-        Ok((body.id, made.with_noise(!body.exact)))
+        Ok((body.id, made.with_noise(!body.exact), body.friction))
     };
-    let made: Vec<(u64, Body)> = ctx.phase("bodies", || {
+    let made: Vec<(u64, Body, f64)> = ctx.phase("bodies", || {
         ctx.expect(arrived.len());
         arrived.into_par_iter().map(make).collect::<Result<_>>()
     })?;
-    made.iter().for_each(|(id, body)| warn(ctx, *id, body, shapes.get(id)));
-    *shapes = made.iter().map(|(id, body)| (*id, body.shape().clone())).collect();
-    Ok(made.into_iter().map(|(_, body)| body).collect())
+    made.iter().for_each(|(id, body, _)| warn(ctx, role, *id, body, shapes.get(id)));
+    *shapes = made.iter().map(|(id, body, _)| (*id, body.shape().clone())).collect();
+    Ok(made.into_iter().map(|(_, body, friction)| (body, friction)).collect())
 }
 
 /// Warnings about a body, once for each set of faces.
-fn warn(ctx: &Context, id: u64, body: &Body, known: Option<&Arc<Shape>>) {
+fn warn(ctx: &Context, role: Role, id: u64, body: &Body, known: Option<&Arc<Shape>>) {
     if known.is_some_and(|known| Arc::ptr_eq(known, body.shape())) {
         return;
     }
-    if body.closed_loops() > 0 {
-        ctx.warn(&format!("body {id}: {} open loops of the mesh are closed", body.closed_loops()));
+    let (loops, edges) = (body.closed_loops(), body.contradictions());
+    if role == Role::Push && loops + edges > 0 {
+        ctx.warn(&format!("body {id}: the mesh has no inside: grains collide with both of its sides"));
+        return;
     }
-    if body.contradictions() > 0 {
-        let edges = body.contradictions();
+    if loops > 0 {
+        ctx.warn(&format!("body {id}: {loops} open loops of the mesh are closed"));
+    }
+    if edges > 0 {
         ctx.warn(&format!("body {id}: the faces disagree about inside and outside at {edges} edges"));
+    }
+}
+
+/// Refuses a body so far away that its speed could not be computed.
+fn check_far(body: &Arrived) -> Outcome {
+    let is_far = |place: &Vec3| place.iter().any(|x| x.abs() > FARTHEST);
+    match body.poses.iter().flat_map(|pose| pose.iter().position(is_far)).next() {
+        None => Ok(()),
+        Some(vertex) => {
+            let text = format!("vertex {vertex} lies more than {FARTHEST} m from the origin along an axis");
+            Err(Failure::argument(text))
+        }
     }
 }
 
@@ -191,22 +255,11 @@ fn named(at: usize, failure: Failure) -> Failure {
 /// # Safety
 /// As [`bodies`].
 unsafe fn one(body: *const frz_body, dt: f64) -> Outcome<Arrived> {
-    let none = frz_view::NONE;
-    let defaults = frz_body {
-        struct_size: 0,
-        flags: 0,
-        id: 0,
-        positions: none,
-        positions_end: none,
-        between: std::ptr::null(),
-        between_count: 0,
-        face_counts: none,
-        indices: none,
-    };
     // SAFETY: the caller's promise.
     unsafe {
-        let body = sized(body, defaults)?;
+        let body = sized(body, frz_body::USUAL)?;
         no_flags(body.flags, FRZ_BODY_EXACT)?;
+        within("friction", body.friction, 0.0..=10.0, "")?;
         if body.between_count > MOST_BETWEEN {
             let text = format!("between_count = {} is more than {MOST_BETWEEN}", body.between_count);
             return Err(Failure::argument(text));
@@ -236,6 +289,7 @@ unsafe fn one(body: *const frz_body, dt: f64) -> Outcome<Arrived> {
             }
             pose(&body.positions_end, "positions_end")?;
         }
-        Ok(Arrived { id: body.id, exact: body.flags & FRZ_BODY_EXACT != 0, mesh, poses })
+        let exact = body.flags & FRZ_BODY_EXACT != 0;
+        Ok(Arrived { id: body.id, exact, friction: body.friction, mesh, poses })
     }
 }

@@ -1,6 +1,6 @@
 //! Level sets: made from meshes, particles and motion, and changed.
 
-use super::body::{Shapes, bodies, frz_body};
+use super::body::{Role, Shapes, bodies, frz_body};
 use super::context::{creates, enter, frz_context};
 use super::grid::{Grid, check_voxel, frz_grid};
 use super::guard::{Failure, Outcome, frz_status, guard};
@@ -388,7 +388,8 @@ pub unsafe extern "C" fn frz_levelset_sweep(
     unsafe {
         creates(context, out, |ctx| {
             let settings = settings(voxel_size, half_width)?;
-            let bodies = self::bodies(ctx, bodies, count, dt, &mut Shapes::new())?;
+            let bodies = self::bodies(ctx, bodies, count, dt, Role::Sweep, &mut Shapes::new())?;
+            let bodies: Vec<Body> = bodies.into_iter().map(|(body, _)| body).collect();
             ctx.polled(|| check_reach(&bodies, dt, voxel_size))?;
             let grid = ctx.polled(|| sweep::chain(ctx, &bodies, 0.0, dt, &settings))?;
             Ok(Grid::from(grid))

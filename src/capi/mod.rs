@@ -55,6 +55,12 @@ pub mod snow;
 #[cfg(feature = "vdb")]
 pub mod base;
 
+#[cfg(feature = "vdb")]
+pub mod grains;
+
+#[cfg(feature = "vdb")]
+pub mod grains_points;
+
 mod handle;
 
 pub use guard::frz_status;

@@ -41,6 +41,10 @@ unsafe impl Plain for u8 {}
 // SAFETY: as above.
 unsafe impl Plain for u32 {}
 // SAFETY: as above.
+unsafe impl Plain for i32 {}
+// SAFETY: as above.
+unsafe impl Plain for i64 {}
+// SAFETY: as above.
 unsafe impl Plain for f32 {}
 // SAFETY: as above.
 unsafe impl Plain for [f32; 2] {}
@@ -48,6 +52,8 @@ unsafe impl Plain for [f32; 2] {}
 unsafe impl Plain for [f32; 3] {}
 // SAFETY: as above.
 unsafe impl Plain for [f32; 4] {}
+// SAFETY: as above.
+unsafe impl Plain for [f64; 3] {}
 // SAFETY: as above.
 unsafe impl Plain for [i32; 3] {}
 // SAFETY: as above.
@@ -164,12 +170,12 @@ impl frz_span {
 ///
 /// # Safety
 /// `dst` must be NULL or have room for `capacity` bytes; `size` must be NULL or point to a number.
-pub(super) unsafe fn write_bytes(
+pub(super) unsafe fn write_bytes<B: AsRef<[u8]>>(
     dst: *mut c_void,
     capacity: usize,
     size: *mut usize,
     bound: impl FnOnce() -> usize,
-    bytes: impl FnOnce() -> Outcome<Vec<u8>>,
+    bytes: impl FnOnce() -> Outcome<B>,
 ) -> Outcome {
     let size = super::handle::required(size, "size")?;
     // SAFETY: the caller's promise, and it is not NULL.
@@ -180,6 +186,7 @@ pub(super) unsafe fn write_bytes(
         return Ok(());
     }
     let bytes = bytes()?;
+    let bytes = bytes.as_ref();
     tell(bytes.len());
     if capacity < bytes.len() {
         let text = format!("there is room for {capacity} bytes, {} are needed", bytes.len());

@@ -218,18 +218,21 @@ fn returns(ctx: &Context, poses: &Poses<'_>, step: usize, triangles: &[u32]) -> 
     }
     let points: Vec<DVec3> = passages.iter().flat_map(Passage::samples).collect();
     let (during, first) = (Step::new(poses, step, &points), Still::new(poses, 0, &points));
-    let test = |passage: &Passage| {
+    let test = |passage: &Passage| -> Result<Option<(Place, Vec<Early>)>> {
+        // A point that many faces pass takes long.
+        ctx.check()?;
         let mut early = Vec::new();
         for at in passage.samples() {
             match during.change(passage.place, &at) {
-                Change::Counts => return None,
+                Change::Counts => return Ok(None),
                 Change::Rises if first.winding(&at) < 0 => early.push(Early { place: passage.place, at }),
                 Change::Rises | Change::Returns => {}
             }
         }
-        Some((passage.place, early))
+        Ok(Some((passage.place, early)))
     };
-    let found: Vec<_> = passages.par_iter().with_min_len(FEW).filter_map(test).collect();
+    let tested = passages.par_iter().with_min_len(FEW).map(test).filter_map(Result::transpose);
+    let found: Vec<_> = tested.collect::<Result<_>>()?;
     let places = found.iter().map(|(place, _)| *place).collect();
     Ok(Returns { places, early: found.into_iter().flat_map(|(_, early)| early).collect() })
 }

@@ -3,7 +3,7 @@
 use std::marker::PhantomData;
 
 use super::bridge::ffi::LeafView;
-use crate::base::blocks::{Block, Mask, Origin, VOXELS, Values};
+use crate::base::blocks::{Block, BlockEdit, Mask, Origin, VOXELS, Values};
 
 /// A leaf to read, of floats by default.
 #[derive(Clone, Copy)]
@@ -72,6 +72,16 @@ pub enum Probe<'a, V = Values, T = f32> {
         /// Whether it is active.
         active: bool,
     },
+}
+
+impl Probe<'_> {
+    /// A copy with its own memory, of the block at an origin; a tile becomes an inactive value.
+    pub fn to_edit(&self, origin: Origin) -> BlockEdit {
+        match self {
+            Self::Leaf(leaf) => BlockEdit::Dense(leaf.to_block()),
+            Self::Tile { value, .. } => BlockEdit::Constant(origin, *value),
+        }
+    }
 }
 
 /// Lends the leaf that a view points at.

@@ -116,8 +116,7 @@ static inline void ball_place(ball *out, const ball *rest, const float from[3], 
 
 static inline frz_body ball_body(const ball *from, uint64_t id) {
     frz_body body;
-    memset(&body, 0, sizeof body);
-    body.struct_size = sizeof body;
+    WORKS(frz_body_init(&body, sizeof body));
     body.id = id;
     body.positions = VIEW(from->positions, BALL_VERTICES);
     body.positions_end = VIEW(from->positions_end, BALL_VERTICES);
@@ -184,6 +183,23 @@ static inline bytes base_state(frz_context *ctx, const frz_base *base) {
     CHECK(out.data != NULL);
     WORKS(frz_base_save(ctx, base, out.data, out.size, &out.size));
     return out;
+}
+
+static inline bytes grains_state(frz_context *ctx, const frz_grains *grains) {
+    bytes out;
+    size_t size = 0;
+    WORKS(frz_grains_save(ctx, grains, NULL, 0, &size));
+    out.data = malloc(size);
+    CHECK(out.data != NULL);
+    WORKS(frz_grains_save(ctx, grains, out.data, size, &out.size));
+    CHECK(out.size == size);
+    return out;
+}
+
+static inline size_t grains_count(const frz_grains *grains) {
+    size_t count = 99;
+    WORKS(frz_grains_count(grains, &count));
+    return count;
 }
 
 static inline int same_bytes(bytes a, bytes b) { return a.size == b.size && memcmp(a.data, b.data, a.size) == 0; }

@@ -1,7 +1,7 @@
 /* A host application, small: the template for a plug-in.
  *
- * A node cooks the snow of a frame out of the state of the frame before, which it keeps in a cache; when the cache has
- * a hole, it steps from the nearest frame before it. Cooks are cancelled at random and asked for again; two nodes cook
+ * A node cooks the snow of a frame, the base layer and the grains that come of it, out of the state of the frame before,
+ * which it keeps in a cache; when the cache has a hole, it steps from the nearest frame before it. Cooks are cancelled at random and asked for again; two nodes cook
  * at once in two threads. In the end everything must have the bytes of a run straight through the frames. */
 #include "check.h"
 
@@ -9,13 +9,24 @@
 
 enum { LAST = 9 };
 
+/* What a step moves. */
+typedef struct systems {
+    frz_base *base;
+    frz_grains *grains;
+} systems;
+
+/* The state after a frame, empty where there is none. */
+typedef struct states {
+    bytes base, grains;
+} states;
+
 /* A solver node of the host. */
 typedef struct node {
     frz_pool *pool;
     const frz_grid *snow; /* the node's input */
     ball shape;
-    bytes states[LAST + 1]; /* the cache: the state after each frame, empty where there is none */
-    bytes results[LAST + 1];
+    states cache[LAST + 1];
+    states results[LAST + 1]; /* the layer's grids, and the grains' state */
     unsigned random;
     int cancels;
 } node;
@@ -31,55 +42,90 @@ static int poll(void *user, const frz_progress *progress) {
     return next_random(user) % 8 == 0;
 }
 
-/* The layer as it was after a frame that the cache has, or before the first one. */
-static frz_status restore(node *self, frz_context *ctx, int frame, frz_base **out) {
-    const bytes *state = frame > 0 ? &self->states[frame] : NULL;
-    return frz_base_create(ctx, NULL, self->snow, state ? state->data : NULL, state ? state->size : 0, out);
+static void drop_states(states *them) {
+    free(them->base.data), free(them->grains.data);
+    memset(them, 0, sizeof *them);
 }
 
-static frz_status step(node *self, frz_context *ctx, frz_base *base, int frame) {
+static void destroy(systems *them) {
+    frz_grains_destroy(them->grains);
+    frz_base_destroy(them->base);
+}
+
+/* Everything as it was after a frame that the cache has, or before the first one. */
+static frz_status restore(node *self, frz_context *ctx, int frame, systems *out) {
+    static const states NOTHING = {{NULL, 0}, {NULL, 0}};
+    const states *from = frame > 0 ? &self->cache[frame] : &NOTHING;
+    frz_grains_params params;
+    frz_status status;
+    out->base = NULL, out->grains = NULL;
+    WORKS(frz_grains_params_init(&params, sizeof params));
+    /* A third of the snow's voxels. */
+    params.radius = 0.02 / 3, params.compression = 0.5;
+    status = frz_base_create(ctx, NULL, self->snow, from->base.data, from->base.size, &out->base);
+    if (status == FRZ_OK) status = frz_grains_create(ctx, &params, from->grains.data, from->grains.size, &out->grains);
+    return status;
+}
+
+static frz_status step(node *self, frz_context *ctx, const systems *them, int frame) {
     ball *at = malloc(sizeof *at);
     frz_body body;
     frz_status status;
+    /* The first frame cuts the body out where it is. */
+    const double dt = frame == 1 ? 0.0 : 1.0 / 24;
     CHECK(at != NULL);
     ball_frame(at, &self->shape, frame);
     body = ball_body(at, 1);
-    /* The first frame cuts the body out where it is. */
-    status = frz_base_step(ctx, base, &body, 1, frame == 1 ? 0.0 : 1.0 / 24, frame, NULL);
+    status = frz_base_step(ctx, them->base, &body, 1, dt, frame, NULL);
+    /* The grains that are born come of what this step took from the layer. */
+    if (status == FRZ_OK) status = frz_grains_step(ctx, them->grains, them->base, &body, 1, dt, frame, NULL);
     free(at);
     return status;
+}
+
+/* Keeps the state after a frame: that of both, or none. */
+static frz_status keep(frz_context *ctx, const systems *them, states *to) {
+    states made = {{NULL, 0}, {NULL, 0}};
+    frz_status status = frz_base_save(ctx, them->base, NULL, 0, &made.base.size);
+    if (status == FRZ_OK) status = frz_grains_save(ctx, them->grains, NULL, 0, &made.grains.size);
+    if (status != FRZ_OK) return status;
+    made.base.data = malloc(made.base.size), made.grains.data = malloc(made.grains.size);
+    CHECK(made.base.data != NULL && made.grains.data != NULL);
+    status = frz_base_save(ctx, them->base, made.base.data, made.base.size, &made.base.size);
+    if (status == FRZ_OK)
+        status = frz_grains_save(ctx, them->grains, made.grains.data, made.grains.size, &made.grains.size);
+    if (status == FRZ_OK) *to = made;
+    else drop_states(&made);
+    return status;
+}
+
+static void take_results(frz_context *ctx, const systems *them, states *to) {
+    drop_states(to);
+    to->base = base_bytes(ctx, them->base);
+    to->grains = grains_state(ctx, them->grains);
 }
 
 /* One cook, on a context of its own; the status says whether it came to its end. */
 static frz_status cook(node *self, int frame, int escape) {
     frz_context *ctx = NULL;
-    frz_base *base = NULL;
+    systems them;
     int known = frame - 1;
     frz_status status;
     WORKS(frz_context_create(FRZ_ABI_VERSION, self->pool, &ctx));
     if (escape) WORKS(frz_context_set_poll(ctx, poll, self));
-    while (known > 0 && self->states[known].data == NULL) --known;
-    status = restore(self, ctx, known, &base);
+    while (known > 0 && self->cache[known].base.data == NULL) --known;
+    status = restore(self, ctx, known, &them);
     while (status == FRZ_OK && known < frame) {
         ++known;
-        status = step(self, ctx, base, known);
-        if (status == FRZ_OK && self->states[known].data == NULL) {
-            bytes state = {NULL, 0};
-            status = frz_base_save(ctx, base, NULL, 0, &state.size);
-            if (status != FRZ_OK) break;
-            CHECK((state.data = malloc(state.size)) != NULL);
-            status = frz_base_save(ctx, base, state.data, state.size, &state.size);
-            if (status == FRZ_OK) self->states[known] = state;
-            else free(state.data);
-        }
+        status = step(self, ctx, &them, known);
+        if (status == FRZ_OK && self->cache[known].base.data == NULL) status = keep(ctx, &them, &self->cache[known]);
     }
     if (status == FRZ_OK) {
         WORKS(frz_context_set_poll(ctx, NULL, NULL));
         frz_context_reset(ctx);
-        free(self->results[frame].data);
-        self->results[frame] = base_bytes(ctx, base);
+        take_results(ctx, &them, &self->results[frame]);
     }
-    frz_base_destroy(base);
+    destroy(&them);
     frz_context_destroy(ctx);
     return status;
 }
@@ -98,17 +144,14 @@ static void *cook_frames(void *user) {
         }
         CHECK(status == FRZ_OK);
         /* The host throws a state away when memory is short. */
-        if (ORDER[i] == 9) {
-            free(self->states[5].data);
-            self->states[5].data = NULL;
-        }
+        if (ORDER[i] == 9) drop_states(&self->cache[5]);
     }
     return NULL;
 }
 
 static void clear(node *self) {
     int frame;
-    for (frame = 0; frame <= LAST; ++frame) free(self->states[frame].data), free(self->results[frame].data);
+    for (frame = 0; frame <= LAST; ++frame) drop_states(&self->cache[frame]), drop_states(&self->results[frame]);
 }
 
 int main(void) {
@@ -128,13 +171,17 @@ int main(void) {
     ball_make(&straight.shape, 0.1f);
     nodes[0] = nodes[1] = straight;
     {
-        frz_base *base = NULL;
-        WORKS(restore(&straight, ctx, 0, &base));
+        systems them;
+        size_t count = 0;
+        WORKS(restore(&straight, ctx, 0, &them));
         for (frame = 1; frame <= LAST; ++frame) {
-            WORKS(step(&straight, ctx, base, frame));
-            straight.results[frame] = base_bytes(ctx, base);
+            WORKS(step(&straight, ctx, &them, frame));
+            take_results(ctx, &them, &straight.results[frame]);
         }
-        frz_base_destroy(base);
+        WORKS(frz_grains_count(them.grains, &count));
+        CHECK(count > 100);
+        printf("%lu grains\n", (unsigned long)count);
+        destroy(&them);
     }
     for (i = 0; i < 2; ++i) {
         nodes[i].random = 42u + (unsigned)i;
@@ -143,7 +190,8 @@ int main(void) {
     for (i = 0; i < 2; ++i) pthread_join(threads[i], NULL);
     for (i = 0; i < 2; ++i) {
         for (k = 0; k < sizeof ORDER / sizeof *ORDER; ++k) {
-            CHECK(same_bytes(nodes[i].results[ORDER[k]], straight.results[ORDER[k]]));
+            const states *got = &nodes[i].results[ORDER[k]], *want = &straight.results[ORDER[k]];
+            CHECK(same_bytes(got->base, want->base) && same_bytes(got->grains, want->grains));
         }
     }
     CHECK(nodes[0].cancels + nodes[1].cancels > 5);

@@ -36,6 +36,7 @@ int main(void) {
     SIZE(frz_body), FIELD(frz_body, struct_size), FIELD(frz_body, flags), FIELD(frz_body, id);
     FIELD(frz_body, positions), FIELD(frz_body, positions_end), FIELD(frz_body, between);
     FIELD(frz_body, between_count), FIELD(frz_body, face_counts), FIELD(frz_body, indices);
+    FIELD(frz_body, friction);
     SIZE(frz_snow_desc), FIELD(frz_snow_desc, struct_size), FIELD(frz_snow_desc, flags);
     FIELD(frz_snow_desc, voxel_size), FIELD(frz_snow_desc, half_width), FIELD(frz_snow_desc, depth);
     FIELD(frz_snow_desc, top), FIELD(frz_snow_desc, ground), FIELD(frz_snow_desc, ground_height);
@@ -45,5 +46,13 @@ int main(void) {
     SIZE(frz_base_report), FIELD(frz_base_report, struct_size), FIELD(frz_base_report, reserved);
     FIELD(frz_base_report, removed_volume), FIELD(frz_base_report, base_volume);
     FIELD(frz_base_report, touched_blocks), FIELD(frz_base_report, sweep_faces);
+    SIZE(frz_grains_params), FIELD(frz_grains_params, struct_size), FIELD(frz_grains_params, flags);
+    FIELD(frz_grains_params, radius), FIELD(frz_grains_params, compression), FIELD(frz_grains_params, friction);
+    FIELD(frz_grains_params, attraction), FIELD(frz_grains_params, air), FIELD(frz_grains_params, gravity);
+    FIELD(frz_grains_params, floor), FIELD(frz_grains_params, lowest), FIELD(frz_grains_params, max_grains);
+    FIELD(frz_grains_params, seed), FIELD(frz_grains_params, sub_steps), FIELD(frz_grains_params, reserved);
+    SIZE(frz_grains_report), FIELD(frz_grains_report, struct_size), FIELD(frz_grains_report, sub_steps);
+    FIELD(frz_grains_report, count), FIELD(frz_grains_report, resting), FIELD(frz_grains_report, born), FIELD(frz_grains_report, dropped);
+    FIELD(frz_grains_report, removed_volume), FIELD(frz_grains_report, owed), FIELD(frz_grains_report, fastest);
     return 0;
 }

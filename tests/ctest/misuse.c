@@ -80,10 +80,12 @@ static frz_context *ctx;
 static frz_mesh *meshes[HANDLES];
 static frz_grid *grids[HANDLES];
 static frz_base *bases[HANDLES];
+static frz_grains *heaps[HANDLES];
 
 static frz_context *a_context(void) { return chance(40) ? NULL : ctx; }
 static frz_mesh *a_mesh(void) { return chance(60) ? (frz_mesh *)ctx : meshes[any() % HANDLES]; }
 static frz_base *a_base(void) { return chance(60) ? (frz_base *)pool : bases[any() % HANDLES]; }
+static frz_grains *some_grains(void) { return chance(60) ? (frz_grains *)pool : heaps[any() % HANDLES]; }
 
 static frz_grid *a_grid(void) {
     if (chance(60)) return (frz_grid *)ctx;
@@ -111,6 +113,7 @@ static frz_body a_body(frz_view *between) {
     if (chance(3)) body.positions_end = view(floats + 3, 12);
     else body.positions_end = body.positions, body.positions_end.data = floats + 6;
     if (body.positions.data == NULL || chance(4)) body.positions_end.data = NULL;
+    body.friction = chance(4) ? number() : 0.3;
     if (body.positions_end.data && body.positions_end.count > 200) body.positions_end.count = 200, body.positions.count = 200;
     body.indices = view(whole, 4);
     if (!chance(4)) body.indices.count = body.indices.count / 3 % 300 * 3, body.indices.stride = 0;
@@ -141,6 +144,24 @@ static int impatient(void *user, const frz_progress *progress) {
 
 static void quiet(void *user, const char *text) { *(size_t *)user += strlen(text); }
 
+static frz_grains_params a_behaviour(void) {
+    frz_grains_params params;
+    double *fields[8];
+    WORKS(frz_grains_params_init(&params, sizeof params));
+    fields[0] = &params.radius, fields[1] = &params.compression, fields[2] = &params.friction, fields[3] = &params.attraction;
+    fields[4] = &params.air, fields[5] = &params.gravity, fields[6] = &params.floor, fields[7] = &params.lowest;
+    if (chance(2)) params.radius = 0.005 * (1 + any() % 4);
+    if (chance(2)) *fields[any() % 8] = number();
+    if (chance(4)) *fields[any() % 8] = number();
+    if (chance(2)) params.sub_steps = chance(6) ? any() : any() % 20;
+    if (chance(4)) params.max_grains = any() % 5000;
+    if (chance(2)) params.compression = 0;
+    params.flags = chance(9) ? any() : any() % 2;
+    params.seed = any();
+    params.struct_size = size_near(sizeof params);
+    return params;
+}
+
 static double a_voxel(void) { return chance(4) ? number() : 0.02 + 0.01 * (any() % 5); }
 static float a_width(void) { return chance(4) ? (float)number() : 3.0f; }
 
@@ -154,10 +175,11 @@ static void call(void) {
     frz_mesh *mesh = NULL;
     frz_grid *grid = NULL;
     frz_base *base = NULL;
+    frz_grains *grains = NULL;
     frz_context *c = a_context();
     polls = 0;
     fill();
-    switch (any() % 49) {
+    switch (any() % 59) {
         case 0: (void)frz_status_name(any()), (void)frz_last_error(), (void)frz_version(); break;
         case 1: {
             frz_pool *other = NULL;
@@ -348,11 +370,64 @@ static void call(void) {
             (void)frz_base_compression(from);
             break;
         }
+        case 48: case 49: {
+            const frz_grains_params params = a_behaviour();
+            if (chance(3)) (void)frz_grains_set_params(some_grains(), chance(9) ? NULL : &params);
+            else (void)frz_grains_create(c, chance(3) ? NULL : &params, chance(6) ? memory : NULL, chance(6) ? room : 0, chance(20) ? NULL : &grains);
+            break;
+        }
+        case 50: case 51: case 52: {
+            frz_view between[1];
+            frz_body bodies[2];
+            frz_grains_report report;
+            report.struct_size = size_near(sizeof report);
+            if (report.struct_size > sizeof report) break;
+            bodies[0] = a_body(between), bodies[1] = a_body(between);
+            bodies[1].struct_size = chance(4) ? bodies[1].struct_size : bodies[0].struct_size;
+            {
+                const double dt = chance(2) ? 1.0 / 24 : number();
+                const size_t count = any() % 3;
+                const frz_body *list = chance(9) ? NULL : bodies;
+                frz_grains_report *told = chance(4) ? NULL : &report;
+                if (chance(2)) (void)frz_grains_step(c, some_grains(), chance(2) ? NULL : a_base(), list, count, dt, (int32_t)any(), told);
+                else (void)frz_grains_step_grids(c, some_grains(), chance(3) ? NULL : a_grid(), a_grid(), list, count, dt, (int32_t)any(), told);
+            }
+            break;
+        }
+        case 53: case 54: {
+            const frz_view at = view(floats, 12);
+            frz_view fast = view(floats + 64, 12);
+            int64_t first;
+            if (chance(2)) fast = NO_VIEW;
+            else if (chance(2) && fast.data && fast.count > at.count) fast.count = at.count;
+            (void)frz_grains_emit(c, some_grains(), at, fast, (int32_t)any(), chance(2) ? NULL : &first);
+            break;
+        }
+        case 55: {
+            const frz_grains *from = some_grains();
+            (void)frz_grains_count(from, chance(9) ? NULL : &size);
+            (void)frz_grains_read(from, any() % 8, span());
+            break;
+        }
+        case 56: {
+            const frz_grains *from = some_grains();
+            (void)frz_grains_save(c, from, chance(4) ? NULL : memory, sizeof memory, chance(9) ? NULL : &size);
+            if (size > 0 && size <= sizeof memory) {
+                frz_grains_params params;
+                if (chance(2)) memory[any() % size] ^= (unsigned char)any();
+                WORKS(frz_grains_params_init(&params, sizeof params));
+                if (chance(2)) params.radius = 0.005 * (1 + any() % 4);
+                (void)frz_grains_create(c, &params, memory, chance(9) ? any() % size : size, &grains);
+            }
+            break;
+        }
+        case 57: frz_grains_destroy(heaps[slot]), heaps[slot] = NULL; break;
         default: frz_base_destroy(bases[slot]), bases[slot] = NULL; break;
     }
     if (mesh) frz_mesh_destroy(meshes[slot]), meshes[slot] = mesh;
     if (grid) frz_grid_destroy(grids[slot]), grids[slot] = grid;
     if (base) frz_base_destroy(bases[slot]), bases[slot] = base;
+    if (grains) frz_grains_destroy(heaps[slot]), heaps[slot] = grains;
 }
 
 /* Calls `first` to `last` of a seed, in this process. */
@@ -373,6 +448,7 @@ static void calls(uint64_t seed, long first, long last) {
         if (chance(4)) frz_context_reset(ctx);
     }
     for (slot = 0; slot < HANDLES; ++slot) {
+        frz_grains_destroy(heaps[slot]);
         frz_base_destroy(bases[slot]), frz_grid_destroy(grids[slot]), frz_mesh_destroy(meshes[slot]);
     }
     frz_context_destroy(ctx);

@@ -182,6 +182,96 @@ class Snow(unittest.TestCase):
         self.assertGreater(high[1], 0.2)
 
 
+class Grains(unittest.TestCase):
+    """What bodies take from the snow becomes grains."""
+
+    def pressed(self, ctx, grains, layer, frames, base=None):
+        base = base or frazil.Base(ctx, layer)
+        for frame in frames:
+            dt = 0.0 if frame == 1 else 1 / 24
+            base.step([moved_box(frame)], dt, frame)
+            report = grains.step(base, [moved_box(frame)], dt, frame)
+        return base, report
+
+    def test_snow_becomes_grains_with_attributes(self):
+        ctx = frazil.Context(threads=2)
+        grains = frazil.Grains(ctx, radius=0.02 / 3, compression=0.5, floor=0.0)
+        self.assertEqual((len(grains), grains.read("P").shape), (0, (0, 3)))
+        base, report = self.pressed(ctx, grains, snow(ctx), range(1, 6))
+        self.assertGreater(len(grains), 200)
+        self.assertEqual(report.count, len(grains))
+        self.assertRegex(repr(report), "^<GrainsReport sub_steps=.* fastest=")
+        self.assertEqual(repr(grains), f"<frazil.Grains {len(grains)} of a radius of 0.00666667 m>")
+        self.assertAlmostEqual(report.removed_volume, 0.08 * 0.1 * 0.2, delta=0.0003)
+        self.assertEqual(set(grains.read("source_frame")), {2, 3, 4, 5})
+        np.testing.assert_array_equal(grains.read("P64").astype(np.float32), grains.positions)
+        self.assertEqual(len(set(grains.read("id"))), len(grains))
+        self.assertTrue((grains.read("pscale") == np.float32(0.02 / 3)).all())
+        self.assertEqual(grains.read("v").shape, grains.read("rest").shape)
+        # The box carries those before it along.
+        way = grains.positions - grains.read("rest")
+        self.assertGreater(way[:, 0].max(), 0.05)
+        with self.assertRaisesRegex(ValueError, "no attribute 'Cd', but P, P64, v"):
+            grains.read("Cd")
+
+    def test_a_state_and_grids_give_the_same_bytes(self):
+        ctx, other = frazil.Context(threads=2), frazil.Context()
+        layer, more = snow(ctx), {"radius": 0.02 / 3, "compression": 0.5}
+        straight = frazil.Grains(ctx, **more)
+        base, _ = self.pressed(ctx, straight, layer, range(1, 4))
+        back = frazil.Grains(other, state=straight.save(), **more)
+        self.assertEqual(back.save(), straight.save())
+        before = base.grid.copy(ctx)
+        self.pressed(ctx, straight, layer, [4], base)
+        back.step((before, base.grid), [moved_box(4)], 1 / 24, 4)
+        self.assertEqual(back.save(), straight.save())
+        with self.assertRaisesRegex(frazil.Error, "the saved state has grains of"):
+            frazil.Grains(ctx, state=straight.save())
+
+    def test_loose_grains_fall(self):
+        ctx = frazil.Context()
+        grains = frazil.Grains(ctx, radius=0.005, air=1.0, sub_steps=4)
+        places = np.array([[0, 1, 0], [0.2, 1, 0]], np.float32)
+        self.assertEqual(list(grains.emit(places)), [0, 1])
+        self.assertEqual(list(grains.emit(places + [0, 1, 0], np.full((2, 3), 0.5), frame=7)), [2, 3])
+        report = grains.step(None, [], 0.04, 8)
+        self.assertEqual((report.count, report.sub_steps, report.born), (4, 4, 0))
+        order = np.argsort(grains.read("id"))
+        np.testing.assert_allclose(grains.read("v")[order][0], [0, -9.81 * 0.04, 0], atol=1e-6)
+        np.testing.assert_allclose(grains.read("v")[order][3], [0.5, 0.5 - 9.81 * 0.04, 0.5], atol=1e-6)
+        self.assertEqual(list(grains.read("source_frame")[order]), [0, 0, 7, 7])
+        grains.set_params(gravity=0.0, air=1.0)
+        before = grains.read("v")[np.argsort(grains.read("id"))]
+        grains.step(None, [], 0.04, 9)
+        np.testing.assert_array_equal(before, grains.read("v")[np.argsort(grains.read("id"))])
+        with self.assertRaisesRegex(frazil.Error, "positions: element 1 is not finite"):
+            grains.emit([[0, 0, 0], [0, np.nan, 0]])
+        with self.assertRaisesRegex(TypeError, "no parameter gravitation"):
+            grains.set_params(gravitation=1)
+        with self.assertRaisesRegex(frazil.Error, "air = 2 must lie in 0 to 1"):
+            frazil.Grains(ctx, air=2)
+        with self.assertRaisesRegex(frazil.Error, "is not within 0.0004 to 0.01 m"):
+            frazil.Grains(ctx, radius=0.02).step((None, snow(ctx)), [], 1.0, 1)
+
+    def test_an_exception_in_a_poll_leaves_them_as_they_were(self):
+        broken = []
+
+        def poll(stage, done, seconds):
+            if broken and stage == "move":
+                raise LookupError("enough")
+
+        ctx = frazil.Context(threads=1, poll=poll)
+        grains = frazil.Grains(ctx, radius=0.005)
+        grains.emit(np.random.default_rng(2).uniform(0, 0.3, (2000, 3)))
+        before = grains.save()
+        broken.append(True)
+        with self.assertRaisesRegex(LookupError, "enough"):
+            grains.step(None, [], 1 / 24, 1)
+        broken.clear()
+        self.assertEqual(grains.save(), before)
+        self.assertEqual(grains.step(None, [], 1 / 24, 1).count, 2000)
+
+
 class Vectors(unittest.TestCase):
     """Grids of vectors."""
 

@@ -14,7 +14,7 @@ use crate::scene::text::keys::{self, settings_of};
 use crate::scene::{Role, Scene, moving};
 use crate::snow::base_layer::{Grids, initial};
 use crate::snow::grain_friction;
-use crate::snow::grains::{self, Params, StepReport, Surroundings};
+use crate::snow::grains::{self, Base, Params, StepReport, Surroundings};
 use crate::vdb::file::WriteOptions;
 use crate::vdb::points;
 
@@ -99,7 +99,7 @@ impl<'a> Grains<'a> {
         let surface = &layers[1].surface;
         let bottom = surface.active_bbox().map_or(0.0, |(low, _)| f64::from(low[1]) * surface.voxel_size());
         let around = Surroundings {
-            base: [&layers[0].surface, surface],
+            base: Base::Whole([&layers[0].surface, surface]),
             bodies: &bodies,
             statics: &statics,
             floor,

@@ -12,7 +12,7 @@ use super::edit::{self, Edit, Scale};
 use crate::base::blocks::{BlockEdit, Mask, Origin, VOXELS, Values, offset};
 use crate::context::Context;
 use crate::error::Result;
-use crate::vdb::{FloatGrid, Probe};
+use crate::vdb::FloatGrid;
 
 /// Voxels around an island whose distances may be to it: a band of three cells, and one more.
 const REACH: i32 = 4;
@@ -236,10 +236,7 @@ impl Near {
 
 /// An edit that changes nothing yet.
 fn untouched(origin: Origin, surface: &FloatGrid) -> Result<Edit> {
-    let surface = match &surface.probe(&[origin])?[0] {
-        Probe::Leaf(leaf) => BlockEdit::Dense(leaf.to_block()),
-        Probe::Tile { value, .. } => BlockEdit::Constant(origin, *value),
-    };
+    let surface = surface.probe(&[origin])?[0].to_edit(origin);
     Ok(Edit { surface, removed: None, changed: [0; 8], heights: [0.0; CELLS] })
 }
 

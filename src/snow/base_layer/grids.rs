@@ -24,6 +24,8 @@ pub struct Changes {
     pub(super) surface: Vec<BlockEdit>,
     pub(super) compression: Vec<BlockEdit>,
     pub(super) touched: Vec<BlockEdit>,
+    /// The blocks of `surface` as they were before the step.
+    pub(super) before: Vec<BlockEdit>,
     /// What the step removed (level set).
     pub removed: FloatGrid,
     /// Snow left (m3).
@@ -156,8 +158,8 @@ impl Changes {
     /// Nothing changed.
     pub(super) fn none(grids: &Grids, half_width: f32) -> Result<Self> {
         let removed = empty_removed(grids.surface.voxel_size(), half_width)?;
-        let (surface, compression, touched) = Default::default();
-        Ok(Self { surface, compression, touched, removed, volume: grids.volume()? })
+        let (surface, compression, touched, before) = Default::default();
+        Ok(Self { surface, compression, touched, before, removed, volume: grids.volume()? })
     }
 }
 

@@ -186,13 +186,14 @@ impl BaseLayer {
         &self.grids
     }
 
-    /// Takes what the last step changed; [`BaseLayer::removed`] is empty afterwards.
+    /// Takes what the last step changed; [`BaseLayer::removed`] and [`BaseLayer::before`] are empty afterwards.
     ///
     /// # Errors
     /// When memory runs out.
     pub fn take_changes(&mut self) -> Result<Changes> {
         let none = Changes::none(&self.grids, self.half_width)?;
-        Ok(std::mem::replace(&mut self.changes, none))
+        // Whoever takes the changes has the grids before them.
+        Ok(Changes { before: Vec::new(), ..std::mem::replace(&mut self.changes, none) })
     }
 
     /// The snow (level set).
@@ -210,6 +211,12 @@ impl BaseLayer {
             .map(BlockEdit::origin)
             .collect::<BTreeSet<_>>()
             .into_iter()
+    }
+
+    /// Blocks of the snow that the last step changed, as they were before it: grains are made from the difference. None before
+    /// the first step and after a restore.
+    pub fn before(&self) -> &[BlockEdit] {
+        &self.changes.before
     }
 
     /// What the last step removed (level set).
@@ -407,13 +414,16 @@ impl BaseLayer {
         let touched = self.touched_edits(&marks, frame)?;
         let surfaces: Vec<&BlockEdit> = edits.iter().map(|edit| &edit.surface).collect();
         let compression = self.compression_edits(ctx, &fresh, &surfaces, &touched)?;
+        let origins: Vec<Origin> = surfaces.iter().map(|edit| edit.origin()).collect();
+        let snow = self.grids.surface.probe(&origins)?;
+        let before = snow.par_iter().zip(&origins).map(|(probe, origin)| probe.to_edit(*origin)).collect();
         let (surface, taken): (Vec<BlockEdit>, Vec<Option<BlockEdit>>) =
             edits.into_iter().map(|edit| (edit.surface, edit.removed)).unzip();
         removed.replace_blocks(ctx, &taken.into_iter().flatten().collect::<Vec<_>>())?;
         // The sum includes shells thinner than a cell, which leave no trace in the level set.
         removed.set_metadata("volume_m3", MetaValue::Double(volume))?;
         let left = self.changes.volume - volume;
-        Ok((Changes { surface, touched, compression, removed, volume: left }, fresh, volume))
+        Ok((Changes { surface, touched, compression, before, removed, volume: left }, fresh, volume))
     }
 
     /// Puts a step's changes in place.

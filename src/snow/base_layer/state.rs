@@ -83,8 +83,9 @@ impl BaseLayer {
         let compression =
             ctx.phase("compression", || layer.compression_edits(ctx, &columns, &surfaces, &touched))?;
         let removed = super::empty_removed(layer.surface().voxel_size(), layer.half_width)?;
-        let volume = layer.changes.volume;
-        layer.commit(ctx, Changes { surface, touched, compression, removed, volume }, columns)?;
+        let (before, volume) = (Vec::new(), layer.changes.volume);
+        let changes = Changes { surface, touched, compression, before, removed, volume };
+        layer.commit(ctx, changes, columns)?;
         // Nothing has changed since this state.
         layer.take_changes()?;
         Ok(layer)

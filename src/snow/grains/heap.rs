@@ -170,6 +170,7 @@ impl Heap {
         // A few sub-steps ahead.
         let ahead = (AHEAD * dt / self.diameter) as f32;
         let mut layout = self.lay_out(ahead);
+        ctx.expect(division.sub_steps);
         for sub in 0..division.sub_steps {
             ctx.check()?;
             let is_changed = layout.follow(&mut self.rows, &self.ids, ahead);
@@ -179,10 +180,12 @@ impl Heap {
             }
             self.touch(&mut layout, colliders, dt)?;
             if is_changed {
+                ctx.check()?;
                 layout.find_pairs(&self.held);
                 self.held = Vec::new();
             }
-            sub_step(&mut self.rows, &mut layout, &coefficients);
+            sub_step(ctx, &mut self.rows, &mut layout, &coefficients)?;
+            ctx.advance();
         }
         self.take_back(layout)
     }
@@ -211,7 +214,9 @@ impl Heap {
         });
         let is_finite = |row: &Row| row.place.iter().chain(&row.velocity).all(|x| x.is_finite());
         if !self.rows.par_iter().all(is_finite) {
-            return Err(Error::Internal("grains have places or velocities that are not finite".into()));
+            return Err(Error::argument(
+                "a grain would move infinitely fast: the base layer or an object is not as it should be",
+            ));
         }
         let is_there = |slot: &u32| layout.homes[*slot as usize].block != NONE && holds(self.at[*slot as usize]);
         let kept: Vec<u32> = (0..self.rows.len() as u32).filter(is_there).collect();

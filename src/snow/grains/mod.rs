@@ -39,15 +39,15 @@ use crate::base::points::{Attribute, Column, Points, Values};
 use crate::context::{Context, PhaseTime};
 use crate::error::{Error, Result};
 use crate::sweep::Body;
-use crate::vdb::FloatGrid;
 
 use field::Field;
 use heap::{Colliders, Division, Floor, Heap};
+use layout::{locate};
 use shell::Shell;
 use sourcing::Sourcing;
 
 pub use params::Params;
-pub use sourcing::{PACKING, Removal, removals};
+pub use sourcing::{Base, PACKING, Removal, removals};
 
 /// Where and when a grain was born.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
@@ -72,8 +72,8 @@ pub struct Grains {
 
 /// What a step of grains reads.
 pub struct Surroundings<'a> {
-    /// The base layer at the step's start and end; grains collide with the latter.
-    pub base: [&'a FloatGrid; 2],
+    /// The base layer; grains collide with it as it is at the step's end.
+    pub base: Base<'a>,
     /// What moves, with the friction of grains against it.
     pub bodies: &'a [(&'a Body, f64)],
     /// Meshes that do not move, as triangles and places (m).
@@ -109,6 +109,13 @@ pub struct StepReport {
 
 /// Friction of grains against what does not move, besides the base.
 const GROUND: f32 = 0.5;
+/// Largest component (m/s) of the velocity of a grain that is emitted.
+pub const FASTEST: f32 = 10_000.0;
+
+/// Memory (bytes) of grains in a step, with the copy to which a failed step returns.
+pub fn memory(grains: usize) -> u64 {
+    (grains as u64).saturating_mul(700)
+}
 
 impl Grains {
     /// No grains yet.
@@ -131,6 +138,11 @@ impl Grains {
         Ok(grains)
     }
 
+    /// Bytes that a saved state has once it is unpacked; 0 where it is none.
+    pub fn unpacked(bytes: &[u8]) -> u64 {
+        state::unpacked(bytes)
+    }
+
     /// The exact state as bytes, the same from any number of threads.
     pub fn save(&self) -> Vec<u8> {
         state::save(self)
@@ -139,6 +151,83 @@ impl Grains {
     /// How many there are.
     pub fn count(&self) -> usize {
         self.heap.count()
+    }
+
+    /// How they behave.
+    pub fn params(&self) -> &Params {
+        &self.params
+    }
+
+    /// How they behave from the next step on.
+    ///
+    /// # Errors
+    /// A parameter out of range, another radius; the old ones are then kept.
+    pub fn set_params(&mut self, params: Params) -> Result<()> {
+        params.validate()?;
+        if params.radius != self.params.radius {
+            let old = self.params.radius;
+            return Err(Error::argument(format!("radius = {} cannot change, it is {old}", params.radius)));
+        }
+        if state::rest_depends_on(&params) != state::rest_depends_on(&self.params) {
+            self.heap.wake(|_| true);
+        }
+        self.params = params;
+        Ok(())
+    }
+
+    /// Adds loose grains at places (m) with velocities (m/s), at rest where there are none of these; `frame` is that of their
+    /// birth. Returns the identity of the first, those of the others follow. After a failure all is as it was.
+    ///
+    /// # Errors
+    /// Too many grains; a place out of range; a velocity that is not finite or over [`FASTEST`].
+    pub fn emit(&mut self, places: &[DVec3], velocities: &[[f32; 3]], frame: i32) -> Result<u32> {
+        if !velocities.is_empty() && velocities.len() != places.len() {
+            let text =
+                format!("velocities: {} elements, but there are {} places", velocities.len(), places.len());
+            return Err(Error::argument(text));
+        }
+        let is_out = |place: &DVec3| {
+            !place.iter().all(|x| x.is_finite()) || !layout::holds(locate(*place, self.heap.diameter).0)
+        };
+        if let Some(at) = places.iter().position(is_out) {
+            return Err(Error::argument(format!("positions: element {at} is too far from the origin")));
+        }
+        let is_fast = |velocity: &[f32; 3]| velocity.iter().any(|x| !(-FASTEST..=FASTEST).contains(x));
+        if let Some(at) = velocities.iter().position(is_fast) {
+            let text = format!(
+                "velocities: element {at} has a component that is not within -{FASTEST} to {FASTEST} m/s"
+            );
+            return Err(Error::argument(text));
+        }
+        self.room_for(places.len(), frame)?;
+        let first = self.next_id;
+        for (at, place) in places.iter().enumerate() {
+            self.add(*place, velocities.get(at).copied().unwrap_or_default(), frame)?;
+        }
+        Ok(first)
+    }
+
+    /// Refuses more grains than there may be.
+    fn room_for(&self, more: usize, frame: i32) -> Result<()> {
+        let (count, most) = (self.heap.count() + more, self.params.most);
+        if count > most || self.next_id as usize + more > contacts::MOST {
+            return Err(Error::argument(format!(
+                "frame {frame} would have {count} grains, more than max = {most}: larger grains or more compression make fewer"
+            )));
+        }
+        Ok(())
+    }
+
+    fn add(&mut self, place: DVec3, velocity: [f32; 3], frame: i32) -> Result<()> {
+        self.heap.add(self.next_id, place, velocity)?;
+        self.births.push(Birth { rest: [place.x as f32, place.y as f32, place.z as f32], frame });
+        self.next_id += 1;
+        Ok(())
+    }
+
+    /// How many rest.
+    pub fn resting(&self) -> usize {
+        self.heap.resting()
     }
 
     /// Moves the grains from `from` to `to` (s), those born of the snow that this removed from the base among them. A step that
@@ -155,18 +244,18 @@ impl Grains {
     ) -> Result<StepReport> {
         let before = self.clone();
         let stepped = ctx.step(["source", "colliders", "move"].len(), || {
-            let (born, removed_volume) = ctx.phase("source", || self.source(around, frame))?;
+            let (born, removed_volume) = ctx.phase("source", || self.source(ctx, around, frame))?;
             let (mut colliders, way) = ctx.phase("colliders", || self.colliders(around, [from, to]))?;
             let sub_steps = self.params.sub_steps(to - from, way);
             let division = Division { dt: to - from, sub_steps };
             let all = self.heap.count();
-            ctx.phase("move", || {
-                self.heap.step(ctx, division, self.params.coefficients(&division), &mut colliders)
+            let (resting, fastest) = ctx.phase("move", || {
+                self.heap.step(ctx, division, self.params.coefficients(&division), &mut colliders)?;
+                self.heap.drop_below(around.lowest);
+                Ok((self.heap.resting(), self.heap.fastest()))
             })?;
-            self.heap.drop_below(around.lowest);
             let (count, owed) = (self.heap.count(), self.owed.values().sum());
-            let dropped = all - count;
-            let (resting, fastest, phases) = (self.heap.resting(), self.heap.fastest(), Vec::new());
+            let (dropped, phases) = (all - count, Vec::new());
             Ok(StepReport { count, resting, born, removed_volume, owed, dropped, sub_steps, fastest, phases })
         });
         match stepped {
@@ -179,23 +268,18 @@ impl Grains {
     }
 
     /// Grains where snow was removed; how many, and the snow's volume (m3).
-    fn source(&mut self, around: &Surroundings<'_>, frame: i32) -> Result<(usize, f64)> {
-        let [before, after] = around.base;
-        let removals = removals(before, after)?;
-        self.wake_near(&removals, before.voxel_size());
-        let Params { compression, seed, most, .. } = self.params;
+    fn source(&mut self, ctx: &Context, around: &Surroundings<'_>, frame: i32) -> Result<(usize, f64)> {
+        let Some(after) = around.base.after() else { return Ok((0, 0.0)) };
+        let Some((before, removals)) = around.base.taken(ctx)? else { return Ok((0, 0.0)) };
+        self.wake_near(&removals, after.voxel_size());
+        let Params { compression, seed, .. } = self.params;
         let sourcing = Sourcing { diameter: self.heap.diameter, compression, seed, frame };
-        let places = sourcing.places(before, after, &removals, &mut self.owed)?;
-        let count = self.heap.count() + places.len();
-        if count > most || self.next_id as usize + places.len() > contacts::MOST {
-            return Err(Error::argument(format!(
-                "frame {frame} would have {count} grains, more than max = {most}: larger grains or more compression make fewer"
-            )));
-        }
+        ctx.allow("finding places for grains", sourcing.bytes(removals.len(), after.voxel_size()))?;
+        let places = sourcing.places(before.grid(), after, &removals, &mut self.owed)?;
+        self.room_for(places.len(), frame)?;
+        ctx.allow("the grains", memory(self.heap.count() + places.len()))?;
         for place in &places {
-            self.heap.add(self.next_id, *place, [0.0; 3])?;
-            self.births.push(Birth { rest: [place.x as f32, place.y as f32, place.z as f32], frame });
-            self.next_id += 1;
+            self.add(*place, [0.0; 3], frame)?;
         }
         Ok((places.len(), removals.iter().map(|removal| removal.volume).sum()))
     }
@@ -216,8 +300,9 @@ impl Grains {
     /// What grains cannot move, and how far objects move in the step (m).
     fn colliders<'a>(&self, around: &Surroundings<'a>, [from, to]: [f64; 2]) -> Result<(Colliders<'a>, f64)> {
         let floor = around.floor.map(|height| Floor { height, friction: GROUND });
-        let base = Field { grid: around.base[1], friction: self.params.friction as f32 };
-        let mut colliders = Colliders { floor, fields: vec![base], shells: Vec::new() };
+        let field = |grid| Field { grid, friction: self.params.friction as f32 };
+        let fields = around.base.after().map(field).into_iter().collect();
+        let mut colliders = Colliders { floor, fields, shells: Vec::new() };
         let (mut way, mut number) = (0.0f64, touch::FIRST_SHELL);
         for (body, friction) in around.bodies {
             let (mut first, mut last) = (Vec::new(), Vec::new());
@@ -248,6 +333,40 @@ impl Grains {
         Ok((colliders, way))
     }
 
+    /// Places (m), in the order in which [`Grains::points`] has the grains, as all that follows.
+    pub fn places(&self) -> impl Iterator<Item = DVec3> + '_ {
+        self.heap.places()
+    }
+
+    /// Velocities (m/s).
+    pub fn velocities(&self) -> impl Iterator<Item = [f32; 3]> + '_ {
+        self.heap.velocities()
+    }
+
+    /// Identities, counted from 0 in the order of birth: a grain keeps its own, and no other ever has it.
+    pub fn ids(&self) -> &[u32] {
+        self.heap.ids()
+    }
+
+    /// The frame of each one's birth.
+    pub fn source_frames(&self) -> impl Iterator<Item = i32> + '_ {
+        self.births().map(|birth| birth.frame)
+    }
+
+    /// The place of each one's birth (m).
+    pub fn rests(&self) -> impl Iterator<Item = [f32; 3]> + '_ {
+        self.births().map(|birth| birth.rest)
+    }
+
+    /// Whether each is awake.
+    pub fn awake(&self) -> impl Iterator<Item = bool> + '_ {
+        self.heap.awake()
+    }
+
+    fn births(&self) -> impl Iterator<Item = &Birth> + '_ {
+        self.heap.ids().iter().map(|id| &self.births[*id as usize])
+    }
+
     /// The grains as points: `v` (m/s), `id`, `active` (not where it rests), `pscale` (radius, m), `source_frame` and `rest` (place of birth, m).
     pub fn points(&self) -> Points {
         let (mut cells, mut offsets) = (Vec::new(), Vec::new());
@@ -257,7 +376,6 @@ impl Grains {
             cells.push([0, 1, 2].map(|axis| at[axis] * layout::EDGE as i32 + voxel[axis] as i32));
             offsets.push([0, 1, 2].map(|axis| place[axis] - voxel[axis]));
         }
-        let births = || self.heap.ids().iter().map(|id| &self.births[*id as usize]);
         let attribute = |name: &str, values: Values| Attribute { name: name.into(), values };
         let attributes = vec![
             attribute("v", Values::Vector(Column::Each(self.heap.velocities().collect()))),
@@ -267,8 +385,8 @@ impl Grains {
             ),
             attribute("active", Values::Bool(Column::Each(self.heap.awake().collect()))),
             attribute("pscale", Values::Float(Column::Uniform(self.params.radius as f32))),
-            attribute("source_frame", Values::Int(Column::Each(births().map(|birth| birth.frame).collect()))),
-            attribute("rest", Values::Vector(Column::Each(births().map(|birth| birth.rest).collect()))),
+            attribute("source_frame", Values::Int(Column::Each(self.source_frames().collect()))),
+            attribute("rest", Values::Vector(Column::Each(self.rests().collect()))),
         ];
         Points { voxel_size: self.heap.diameter, cells, offsets, attributes }
     }

@@ -1,7 +1,7 @@
 //! What grains are made of and how they move.
 
 use super::heap::Division;
-use super::rest;
+use super::rest::Rest;
 use super::solve::Coefficients;
 use crate::error::{Error, Result};
 use crate::snow::grain_friction;
@@ -88,7 +88,7 @@ impl Params {
         let diameter = 2.0 * self.radius;
         let of_fall = (dt * (self.gravity.abs() / (FALL * diameter)).sqrt()).ceil().max(1.0) as usize;
         let of_way = (way / (WAY * diameter)).ceil() as usize;
-        of_way.clamp(of_fall, MOST_OF_FALL * of_fall)
+        of_way.clamp(of_fall, of_fall.saturating_mul(MOST_OF_FALL))
     }
 
     /// What a sub-step of a divided step needs.
@@ -105,7 +105,7 @@ impl Params {
             friction: self.friction as f32,
             attraction: (self.attraction * self.gravity.abs() * dt) as f32,
             band: BAND,
-            rest: self.rests.then(|| (rest::PATIENCE / dt).ceil().max(16.0) as f32),
+            rest: self.rests.then(|| Rest::new(2.0 * self.radius, self.gravity, dt)),
             visits_all: false,
         }
     }

@@ -7,33 +7,55 @@ use super::rows::{Row, SUPPORTED, dot, sub};
 
 /// How far (diameters) a grain goes before it counts as moving.
 const WAY: f32 = 0.01;
-/// How many sub-steps a grain that has come so far counts as moving.
-pub const MOVING: f32 = 16.0;
 /// Gap (diameters) across which a moving grain wakes another.
 pub const NEAR: f32 = 0.1;
+/// In `still`: the grain has just woken.
+const JUST_WOKEN: f32 = f32::MAX;
 /// In `marks`: something wakes the grain.
 pub const WOKEN: f32 = 2.0;
-/// How long a grain lies still before it rests (s).
-pub const PATIENCE: f64 = 0.2;
+/// How long a grain lies still before it rests, in usual sub-steps, sqrt(0.02 d / g): grains of every size rest alike.
+const PATIENCE: f64 = 64.0;
+/// How long a grain that has come so far counts as moving, in the same unit.
+const MOVING: f64 = 16.0;
 
-/// What becomes of a grain at the end of a sub-step; `patience` are the sub-steps that it must lie still.
-pub fn judge(row: &mut Row, patience: Option<f32>) {
+/// When grains rest.
+#[derive(Debug, Clone, Copy)]
+pub struct Rest {
+    /// Sub-steps that a grain lies still before it rests.
+    pub patience: f32,
+    /// Sub-steps that a grain that has moved counts as moving.
+    pub moving: f32,
+}
+
+impl Rest {
+    /// The rule for a diameter (m), gravity (m/s2) and sub-steps of `dt` (s).
+    pub fn new(diameter: f64, gravity: f64, dt: f64) -> Self {
+        let gravity = if gravity == 0.0 { 9.81 } else { gravity.abs() };
+        let sub_steps = |times: f64| (times * (0.02 * diameter / gravity).sqrt() / dt).ceil() as f32;
+        Self { patience: sub_steps(PATIENCE).max(16.0), moving: sub_steps(MOVING).max(4.0) }
+    }
+}
+
+/// What becomes of a grain at the end of a sub-step; without a rule it never rests.
+pub fn judge(row: &mut Row, rule: Option<Rest>) {
     let (is_woken, is_supported) = (row.marks >= WOKEN, row.marks == 1.0 || row.marks == WOKEN + 1.0);
     (row.push, row.marks) = ([0.0; 3], 0.0);
     if row.rests() {
-        if is_woken {
+        if is_woken || rule.is_none() {
             wake(row);
         }
         return;
     }
+    let moving = rule.map_or(0.0, |rule| rule.moving);
+    row.still = if row.still == JUST_WOKEN { moving } else { row.still };
     row.hold = if is_supported { 1.0 + SUPPORTED } else { 1.0 };
     let way = sub(row.place, row.since);
     if dot(way, way) > WAY * WAY {
         (row.since, row.still) = (row.place, 0.0);
     } else {
-        row.still = if is_supported { row.still + 1.0 } else { (row.still + 1.0).min(MOVING) };
+        row.still = if is_supported { row.still + 1.0 } else { (row.still + 1.0).min(moving) };
     }
-    if patience.is_some_and(|patience| row.still >= patience) {
+    if rule.is_some_and(|rule| row.still >= rule.patience) {
         (row.hold, row.velocity) = (SUPPORTED, [0.0; 3]);
     }
 }
@@ -41,6 +63,6 @@ pub fn judge(row: &mut Row, patience: Option<f32>) {
 /// Wakes a grain, which does not count as moving before it has moved.
 pub fn wake(row: &mut Row) {
     if row.rests() {
-        (row.hold, row.since, row.still) = (1.0 + SUPPORTED, row.place, MOVING);
+        (row.hold, row.since, row.still) = (1.0 + SUPPORTED, row.place, JUST_WOKEN);
     }
 }

@@ -15,11 +15,13 @@ use rayon::prelude::*;
 
 use super::contacts::{Batch, SKIN};
 use super::layout::{Block, Layout};
-use super::rest;
+use super::rest::{self, Rest};
 use super::rows::{Part, Row, SUPPORTED, Shared, V, add, dot, scaled, sub};
 use super::touch::Touch;
 use crate::base::cpu::dispatch;
 use crate::base::lanes::{LaneMask, Lanes};
+use crate::context::Context;
+use crate::error::Result;
 
 /// Share of an overlap that a sub-step removes.
 const REMOVED: f32 = 0.8;
@@ -27,6 +29,8 @@ const REMOVED: f32 = 0.8;
 const FARTHEST: f32 = 0.5;
 /// Gap (diameters) up to which a contact still supports and keeps its impulse.
 const TOUCHING: f32 = 0.02;
+/// Least distance (diameters) at which two grains have a direction.
+const LEAST: f32 = 1.0e-6;
 /// Least upward part of the direction from a grain to one that it supports.
 const STEEP: f32 = 0.2;
 
@@ -49,23 +53,28 @@ pub struct Coefficients {
     pub attraction: f32,
     /// Gap (diameters) up to which grains attract each other.
     pub band: f32,
-    /// Sub-steps that a grain must lie still to rest; none: it never rests.
-    pub rest: Option<f32>,
+    /// When grains rest; none: never.
+    pub rest: Option<Rest>,
     /// Whether all contacts are visited, also where everything rests: the result is the same.
     pub visits_all: bool,
 }
 
 /// One sub-step: forces, contacts, motion.
-pub fn sub_step(rows: &mut [Row], layout: &mut Layout, c: &Coefficients) {
+///
+/// # Errors
+/// Cancel.
+pub fn sub_step(ctx: &Context, rows: &mut [Row], layout: &mut Layout, c: &Coefficients) -> Result<()> {
     layout.reach(c.visits_all);
     let colours = layout.colours();
     accelerate(rows, layout, c);
     for pass in [Pass::Begin, Pass::Solve, Pass::SolveLast] {
         for colour in &colours {
+            ctx.check()?;
             sweep(rows, layout, colour, pass, c);
         }
     }
     advance(rows, layout, c);
+    Ok(())
 }
 
 /// A sweep over the contacts.
@@ -370,7 +379,10 @@ fn collide(a: Eight, b: Eight, batch: &mut Batch, c: &Coefficients) -> (Eight, E
     let apart = sub8(sub8(a.place, batch.shift()), b.place);
     let distance = dot8(apart, apart).sqrt();
     let gap = distance - one;
-    let normal = scaled8(apart, one / distance.max(Lanes::all(1.0e-6)));
+    let [x, y, z] = scaled8(apart, one / distance.max(Lanes::all(LEAST)));
+    // Two grains at one place part upward.
+    let is_none = distance.is_less(Lanes::all(LEAST));
+    let normal = [is_none.choose(zero, x), is_none.choose(one, y), is_none.choose(zero, z)];
     let relative = sub8(a.velocity, b.velocity);
     let along = dot8(relative, normal);
     let is_apart = zero.is_less(gap);
@@ -435,7 +447,7 @@ impl Contact {
         let (a_stands, b_stands) = (up.choose(one, a_stands), down.choose(one, b_stands));
         // A grain that moves wakes its neighbours.
         let near = self.gap.is_less(Lanes::all(rest::NEAR));
-        let moving = Lanes::all(rest::MOVING);
+        let moving = Lanes::all(c.rest.map_or(0.0, |rule| rule.moving));
         let a_moves = half.is_less(a.weight) & a.still.is_less(moving);
         let b_moves = half.is_less(b.weight) & b.still.is_less(moving);
         let a_marks = a_stands + (a_wakes | (near & a_rests & b_moves)).choose(woken, zero);

@@ -4,12 +4,13 @@
 //! laid bare, as many become grains as the block's removed volume pays for; what it pays for beyond the sites that there are is
 //! owed and carried over, so that slices thinner than a grain, of which only some hold a site, starve nothing.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 
 use rayon::prelude::*;
 
 use crate::base::DVec3;
-use crate::base::blocks::{DIM, Origin, VOXELS};
+use crate::base::blocks::{BlockEdit, DIM, Origin, VOXELS};
+use crate::context::Context;
 use crate::error::Result;
 use crate::snow::base_layer::filled;
 use crate::vdb::{FloatGrid, Probe};
@@ -20,6 +21,80 @@ use super::field::Window;
 pub const PACKING: f64 = 0.55;
 /// Jitter of a site (distances of neighbouring sites). The lattice's neighbours are 1.10 diameters apart.
 const JITTER: f64 = 0.04;
+
+/// The base layer that a step of grains reads.
+#[derive(Clone, Copy)]
+pub enum Base<'a> {
+    /// There is none.
+    Missing,
+    /// At the step's start and end.
+    Whole([&'a FloatGrid; 2]),
+    /// At its end, and the blocks that the step changed, as they were at its start
+    /// ([`BaseLayer::before`](crate::snow::base_layer::BaseLayer::before)).
+    Changed(&'a FloatGrid, &'a [BlockEdit]),
+}
+
+/// The layer before a step, as far as grains come from it.
+pub enum Before<'a> {
+    /// All of it.
+    Whole(&'a FloatGrid),
+    /// The blocks that the step changed, and those around them.
+    Near(FloatGrid),
+}
+
+impl Before<'_> {
+    /// The grid.
+    pub fn grid(&self) -> &FloatGrid {
+        match self {
+            Self::Whole(grid) => grid,
+            Self::Near(grid) => grid,
+        }
+    }
+}
+
+impl<'a> Base<'a> {
+    /// The layer at the step's end.
+    pub fn after(&self) -> Option<&'a FloatGrid> {
+        match *self {
+            Self::Missing => None,
+            Self::Whole([_, after]) | Self::Changed(after, _) => Some(after),
+        }
+    }
+
+    /// What the step removed, block by block, ascending, and the layer before it. Only changed blocks are visited where they are
+    /// known. None without a layer.
+    ///
+    /// # Errors
+    /// When a grid cannot be read; when memory runs out.
+    pub fn taken(&self, ctx: &Context) -> Result<Option<(Before<'a>, Vec<Removal>)>> {
+        match *self {
+            Self::Missing => Ok(None),
+            Self::Whole([before, after]) => Ok(Some((Before::Whole(before), removals(before, after)?))),
+            Self::Changed(after, blocks) => {
+                let mut before = FloatGrid::new(after.voxel_size(), after.background())?;
+                before.replace_blocks(ctx, blocks)?;
+                let changed: BTreeSet<Origin> = blocks.iter().map(BlockEdit::origin).collect();
+                let origins: Vec<Origin> = changed.iter().copied().collect();
+                let removals = volumes(&before, after, &origins)?;
+                // Values between voxels need those beside them.
+                let around: BTreeSet<Origin> =
+                    removals.iter().flat_map(|removal| around(removal.origin)).collect();
+                let around: Vec<Origin> = around.difference(&changed).copied().collect();
+                let same: Vec<BlockEdit> =
+                    after.probe(&around)?.iter().zip(&around).map(|(probe, at)| probe.to_edit(*at)).collect();
+                before.replace_blocks(ctx, &same)?;
+                Ok(Some((Before::Near(before), removals)))
+            }
+        }
+    }
+}
+
+/// A block and those around it.
+fn around([x, y, z]: Origin) -> impl Iterator<Item = Origin> {
+    let side = |at: i32| [-1, 0, 1].map(|step| at + step * DIM as i32);
+    let rows = side(x).into_iter().flat_map(move |x| side(y).map(move |y| [x, y]));
+    rows.flat_map(move |[x, y]| side(z).map(move |z| [x, y, z]))
+}
 
 /// Snow that a step removed from a block.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -35,20 +110,11 @@ pub struct Removal {
 /// # Errors
 /// When a grid cannot be read.
 pub fn removals(before: &FloatGrid, after: &FloatGrid) -> Result<Vec<Removal>> {
-    let cell = before.voxel_size() as f32;
-    let volume = |origins: &[Origin]| -> Result<Vec<Removal>> {
-        let (old, new) = (before.probe(origins)?, after.probe(origins)?);
-        let removed = origins.par_iter().zip(old.par_iter().zip(&new)).map(|(origin, (old, new))| {
-            let volume = lost(old, new, cell) * f64::from(cell).powi(3);
-            Removal { origin: *origin, volume }
-        });
-        Ok(removed.filter(|removal| removal.volume > 0.0).collect())
-    };
     let mut leaves: Vec<Origin> =
         before.leaves()?.iter().chain(&after.leaves()?).map(|leaf| leaf.origin).collect();
     leaves.par_sort_unstable();
     leaves.dedup();
-    let mut out = volume(&leaves)?;
+    let mut out = volumes(before, after, &leaves)?;
     // Blocks without a surface before and after, deep snow that is gone, lie within the bounds of the others.
     let Some(first) = out.first() else { return Ok(out) };
     let bounds = out.iter().fold([first.origin; 2], |[low, high], removal| {
@@ -58,9 +124,20 @@ pub fn removals(before: &FloatGrid, after: &FloatGrid) -> Result<Vec<Removal>> {
     let span = |axis: usize| (bounds[0][axis]..=bounds[1][axis]).step_by(DIM);
     let all = span(0).flat_map(|x| span(1).flat_map(move |y| span(2).map(move |z| [x, y, z])));
     let deep: Vec<Origin> = all.filter(|origin| leaves.binary_search(origin).is_err()).collect();
-    out.extend(volume(&deep)?);
+    out.extend(volumes(before, after, &deep)?);
     out.par_sort_unstable_by_key(|removal| removal.origin);
     Ok(out)
+}
+
+/// What was removed from blocks; those that lost nothing are left out.
+fn volumes(before: &FloatGrid, after: &FloatGrid, origins: &[Origin]) -> Result<Vec<Removal>> {
+    let cell = after.voxel_size() as f32;
+    let (old, new) = (before.probe(origins)?, after.probe(origins)?);
+    let removed = origins.par_iter().zip(old.par_iter().zip(&new)).map(|(origin, (old, new))| {
+        let volume = lost(old, new, cell) * f64::from(cell).powi(3);
+        Removal { origin: *origin, volume }
+    });
+    Ok(removed.filter(|removal| removal.volume > 0.0).collect())
 }
 
 /// Cells of snow that a block lost.
@@ -99,6 +176,12 @@ impl Sourcing {
         (1.0 - self.compression) * volume * PACKING / grain
     }
 
+    /// Memory (bytes) that [`Sourcing::places`] takes for the sites of so many blocks with voxels of `cell` m.
+    pub fn bytes(&self, blocks: usize, cell: f64) -> u64 {
+        let sites = (cell / self.diameter).powi(3) * VOXELS as f64 * PACKING * 6.0 / std::f64::consts::PI;
+        (blocks as f64 * sites * size_of::<(u64, DVec3)>() as f64) as u64
+    }
+
     /// Places (m) of new grains. `owed` has the grains that blocks have paid for and not got.
     ///
     /// # Errors
@@ -115,7 +198,7 @@ impl Sourcing {
         };
         let bounds: Vec<[[i32; 3]; 2]> = removals.iter().map(around).collect();
         let windows = [Window::all(before, &bounds)?, Window::all(after, &bounds)?];
-        let cell = before.voxel_size();
+        let cell = after.voxel_size();
         let sites: Vec<Vec<(u64, DVec3)>> = removals
             .par_iter()
             .enumerate()

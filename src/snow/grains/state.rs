@@ -2,6 +2,9 @@
 
 use std::collections::BTreeMap;
 
+use rayon::prelude::*;
+use xxhash_rust::xxh3::xxh3_128;
+
 use super::{Grains, Params};
 use super::contacts::{Held, MOST};
 use super::heap::Heap;
@@ -11,7 +14,7 @@ use super::touch::Touch;
 use crate::error::{Error, Result};
 
 /// The first bytes: what it is, and its version.
-const MAGIC: &[u8; 8] = b"frzgrn02";
+const MAGIC: &[u8; 8] = b"frzgrn03";
 
 /// Writes little-endian numbers.
 #[derive(Default)]
@@ -45,7 +48,7 @@ struct Reader<'a>(&'a [u8]);
 impl Reader<'_> {
     fn take<const N: usize>(&mut self) -> Result<[u8; N]> {
         let (first, rest) =
-            self.0.split_first_chunk().ok_or_else(|| Error::argument("the state is cut short"))?;
+            self.0.split_first_chunk().ok_or_else(|| wrong("the state is cut short"))?;
         self.0 = rest;
         Ok(*first)
     }
@@ -54,7 +57,7 @@ impl Reader<'_> {
     fn count(&mut self, bytes: usize) -> Result<usize> {
         let count = u64::from_le_bytes(self.take()?) as usize;
         if count > self.0.len() / bytes {
-            return Err(Error::argument("the state is cut short"));
+            return Err(wrong("the state is cut short"));
         }
         Ok(count)
     }
@@ -76,7 +79,7 @@ impl Reader<'_> {
         for number in &mut out {
             *number = f32::from_le_bytes(self.take()?);
             if !number.is_finite() {
-                return Err(Error::argument("the state has a number that is not finite"));
+                return Err(wrong("the state has a number that is not finite"));
             }
         }
         Ok(out)
@@ -87,7 +90,7 @@ impl Reader<'_> {
         if number.is_finite() {
             Ok(number)
         } else {
-            Err(Error::argument("the state has a number that is not finite"))
+            Err(wrong("the state has a number that is not finite"))
         }
     }
 }
@@ -95,9 +98,9 @@ impl Reader<'_> {
 /// The state as bytes; the same from any number of threads.
 pub fn save(grains: &Grains) -> Vec<u8> {
     let heap = &grains.heap;
-    let mut to = Writer(MAGIC.to_vec());
+    let mut to = Writer::default();
     to.f64(heap.diameter);
-    rest_depends_on(grains).iter().for_each(|number| to.f64(*number));
+    rest_depends_on(&grains.params).iter().for_each(|number| to.f64(*number));
     to.u32(grains.next_id);
     to.count(heap.rows.len());
     for ((row, id), at) in heap.rows.iter().zip(&heap.ids).zip(&heap.at) {
@@ -128,7 +131,7 @@ pub fn save(grains: &Grains) -> Vec<u8> {
         to.i32s(origin);
         to.f64(*owed);
     }
-    lz4_flex::compress_prepend_size(&to.0)
+    pack(&to.0)
 }
 
 /// Takes the state from bytes into grains that have none yet.
@@ -136,22 +139,18 @@ pub fn save(grains: &Grains) -> Vec<u8> {
 /// # Errors
 /// Bytes that are no such state, or one of grains of another size.
 pub fn load(grains: &mut Grains, bytes: &[u8]) -> Result<()> {
-    let bytes = lz4_flex::decompress_size_prepended(bytes)
-        .map_err(|error| Error::argument(format!("is not a state of grains: {error}")))?;
+    let bytes = unpack(bytes)?;
     let mut from = Reader(&bytes);
-    if &from.take::<8>()? != MAGIC {
-        return Err(Error::argument("is not a state of grains, or one of another version"));
-    }
     let diameter = from.f64()?;
     if diameter != grains.heap.diameter {
-        return Err(Error::argument(format!("has grains of {diameter} m, not {}", grains.heap.diameter)));
+        return Err(wrong(format!("has grains of {diameter} m, not {}", grains.heap.diameter)));
     }
     let mut heap = Heap::new(diameter);
-    let is_same = rest_depends_on(grains).iter().try_fold(true, |is_same, now| Ok(is_same & (from.f64()? == *now)))?;
+    let is_same = rest_depends_on(&grains.params).iter().try_fold(true, |is_same, now| Ok(is_same & (from.f64()? == *now)))?;
     grains.next_id = from.u32()?;
     let count = from.count(ROW)?;
     if count > MOST || grains.next_id as usize > MOST {
-        return Err(Error::argument("has more grains than there may be"));
+        return Err(wrong("has more grains than there may be"));
     }
     grains.births = vec![Default::default(); grains.next_id as usize];
     for _ in 0..count {
@@ -159,29 +158,29 @@ pub fn load(grains: &mut Grains, bytes: &[u8]) -> Result<()> {
         heap.ids.push(id);
         heap.at.push(from.i32s()?);
         if !heap.at.last().is_some_and(|at| holds(*at)) {
-            return Err(Error::argument("has a grain that is too far from the origin"));
+            return Err(wrong("has a grain that is too far from the origin"));
         }
         let (place, velocity, since) = (from.f32s()?, from.f32s()?, from.f32s()?);
         let [hold, still] = from.f32s()?;
         if ![0.0, 1.0, 2.0, 3.0].contains(&hold) || place.iter().any(|x| !(0.0..=EDGE).contains(x)) {
-            return Err(Error::argument("has a grain that lies in no block"));
+            return Err(wrong("has a grain that lies in no block"));
         }
         heap.rows.push(Row { place, hold, velocity, still, since, ..Row::default() });
         let birth =
-            grains.births.get_mut(id as usize).ok_or_else(|| Error::argument("has a grain without birth"))?;
+            grains.births.get_mut(id as usize).ok_or_else(|| wrong("has a grain without birth"))?;
         (birth.rest, [birth.frame]) = (from.f32s()?, from.i32s()?);
     }
     for _ in 0..from.count(20)? {
         let grains = [from.u32()?, from.u32()?];
         if grains.iter().any(|grain| *grain as usize >= count) || grains[0] == grains[1] {
-            return Err(Error::argument("has a contact of a grain that is not there"));
+            return Err(wrong("has a contact of a grain that is not there"));
         }
         heap.held.push(Held { grains, impulse: from.f32s()? });
     }
     for _ in 0..from.count(24)? {
         let (grain, collider) = (from.u32()?, from.u32()?);
         if grain as usize >= count {
-            return Err(Error::argument("has a contact of a grain that is not there"));
+            return Err(wrong("has a contact of a grain that is not there"));
         }
         let ([impulse], across) = (from.f32s()?, from.f32s()?);
         heap.touches.push(Touch { grain, collider, impulse, across, ..Touch::default() });
@@ -191,7 +190,7 @@ pub fn load(grains: &mut Grains, bytes: &[u8]) -> Result<()> {
         grains.owed.insert(from.i32s()?, from.f64()?);
     }
     if !from.0.is_empty() {
-        return Err(Error::argument("has bytes behind its end"));
+        return Err(wrong("has bytes behind its end"));
     }
     if !is_same {
         heap.wake(|_| true);
@@ -201,9 +200,68 @@ pub fn load(grains: &mut Grains, bytes: &[u8]) -> Result<()> {
 }
 
 /// What wakes all grains when it changes: gravity and what grains are made of.
-fn rest_depends_on(grains: &Grains) -> [f64; 3] {
-    let Params { gravity, friction, attraction, .. } = grains.params;
+pub fn rest_depends_on(params: &Params) -> [f64; 3] {
+    let Params { gravity, friction, attraction, .. } = *params;
     [gravity, friction, attraction]
+}
+
+/// Bytes that are packed together.
+const PART: usize = 1 << 24;
+/// Bytes of the seal.
+const SEAL: usize = 16;
+
+/// Bytes packed: magic, seal, and parts, each behind its length.
+fn pack(bytes: &[u8]) -> Vec<u8> {
+    let parts: Vec<Vec<u8>> = bytes.par_chunks(PART).map(lz4_flex::compress_prepend_size).collect();
+    let mut out = MAGIC.to_vec();
+    out.resize(MAGIC.len() + SEAL, 0);
+    for part in parts {
+        out.extend((part.len() as u32).to_le_bytes());
+        out.extend(part);
+    }
+    let seal = xxh3_128(&out[MAGIC.len() + SEAL..]).to_le_bytes();
+    out[MAGIC.len()..][..SEAL].copy_from_slice(&seal);
+    out
+}
+
+/// How many bytes [`unpack`] would return; 0 where it would fail.
+pub fn unpacked(packed: &[u8]) -> u64 {
+    let size = |part: &&[u8]| part.first_chunk().map_or(0, |size| u64::from(u32::from_le_bytes(*size)));
+    parts(packed).map_or(0, |parts| parts.iter().map(size).sum())
+}
+
+/// What [`pack`] packed.
+fn unpack(packed: &[u8]) -> Result<Vec<u8>> {
+    let whole = |part| lz4_flex::decompress_size_prepended(part).map_err(|error| wrong(error.to_string()));
+    let parts: Vec<Vec<u8>> = parts(packed)?.into_par_iter().map(whole).collect::<Result<_>>()?;
+    Ok(parts.concat())
+}
+
+/// The parts of what was packed, which is whole.
+fn parts(packed: &[u8]) -> Result<Vec<&[u8]>> {
+    let mut from = Reader(packed);
+    if &from.take::<8>()? != MAGIC {
+        return Err(wrong("is not a state of grains, or one of another version"));
+    }
+    if from.take::<SEAL>()? != xxh3_128(from.0).to_le_bytes() {
+        return Err(wrong("is a damaged state of grains"));
+    }
+    let mut parts = Vec::new();
+    while !from.0.is_empty() {
+        let length = from.u32()? as usize;
+        let part = from.0.get(..length).ok_or_else(|| wrong("the state is cut short"))?;
+        let whole = part.first_chunk().map_or(0, |size| u32::from_le_bytes(*size) as usize);
+        if whole > PART {
+            return Err(wrong("has a part that is too large"));
+        }
+        parts.push(part);
+        from.0 = &from.0[length..];
+    }
+    Ok(parts)
+}
+
+fn wrong(what: impl Into<String>) -> Error {
+    Error::Bytes(what.into())
 }
 
 /// Bytes of a grain.

@@ -7,7 +7,7 @@ use frazil::motion::{Key, Keys, Rigid};
 use frazil::snow::base_layer::initial::{Cover, Ground, layer};
 use frazil::snow::base_layer::{BaseLayer, Params as BaseParams};
 use frazil::snow::grains::heap::{Colliders, Division, Floor, Heap, Shell};
-use frazil::snow::grains::{Grains, PACKING, Params, Surroundings, removals};
+use frazil::snow::grains::{Base, Grains, PACKING, Params, Surroundings, removals};
 use frazil::sweep::Body;
 use frazil::vdb::FloatGrid;
 use frazil::{Context, Pool};
@@ -64,7 +64,7 @@ fn run(
     for frame in frames {
         let at = frame as usize;
         let around = Surroundings {
-            base: [&story.layers[at - 1], &story.layers[at]],
+            base: Base::Whole([&story.layers[at - 1], &story.layers[at]]),
             bodies: &[(&story.body, 0.3)],
             statics: &[],
             floor: Some(0.0),
@@ -151,6 +151,70 @@ fn grains_stay_out_of_the_ball_and_the_base() {
 }
 
 #[test]
+fn a_layer_that_remembers_its_changed_blocks_gives_the_same_grains() {
+    let ctx = context(2);
+    let story = story(&ctx);
+    let mut whole = Grains::new(params()).unwrap();
+    run(&ctx, &story, &mut whole, 1..=FRAMES);
+    let mut base =
+        BaseLayer::new(&ctx, story.layers[0].deep_copy().unwrap(), BaseParams::for_cell(CELL)).unwrap();
+    let mut changed = Grains::new(params()).unwrap();
+    assert!(base.before().is_empty());
+    for frame in 1..=FRAMES {
+        let time = |frame: i32| f64::from(frame) / 24.0;
+        let times = [time(frame - 1), time(frame)];
+        base.step(&ctx, &[ball()], times[0], times[1], frame).unwrap();
+        let around = Surroundings {
+            base: Base::Changed(base.surface(), base.before()),
+            bodies: &[(&story.body, 0.3)],
+            statics: &[],
+            floor: Some(0.0),
+            lowest: -1.0,
+        };
+        changed.step(&ctx, &around, times, frame).unwrap();
+    }
+    assert!(changed.count() > 500);
+    assert!(changed.save() == whole.save());
+    base.take_changes().unwrap();
+    assert!(base.before().is_empty());
+}
+
+#[test]
+fn loose_grains_are_added_or_refused_all_together() {
+    let ctx = context(1);
+    let mut grains = Grains::new(Params { most: 4, ..params() }).unwrap();
+    let at = |x: f64| DVec3::new(x, 1.0, 0.0);
+    assert_eq!(grains.emit(&[at(0.0), at(1.0)], &[], 3).unwrap(), 0);
+    assert_eq!(grains.emit(&[at(2.0)], &[[1.0, 2.0, 3.0]], 5).unwrap(), 2);
+    let before = grains.save();
+    type Refused<'a> = (&'a [DVec3], &'a [[f32; 3]], &'a str);
+    let refused: [Refused<'_>; 6] = [
+        (&[at(3.0), at(1e12)], &[], "positions: element 1 is too far from the origin"),
+        (&[at(f64::NAN)], &[], "positions: element 0 is too far from the origin"),
+        (&[at(3.0)], &[[0.0, f32::NAN, 0.0]], "velocities: element 0 has a component"),
+        (&[at(3.0)], &[[0.0, 2e4, 0.0]], "velocities: element 0 has a component"),
+        (&[at(3.0)], &[[0.0; 3]; 2], "velocities: 2 elements, but there are 1 places"),
+        (&[at(3.0), at(4.0)], &[], "more than max = 4"),
+    ];
+    for (places, velocities, words) in refused {
+        let error = grains.emit(places, velocities, 6).unwrap_err().to_string();
+        assert!(error.contains(words), "{error}");
+        assert!(grains.save() == before);
+    }
+    let around = Surroundings { base: Base::Missing, bodies: &[], statics: &[], floor: None, lowest: -1.0 };
+    let report = grains.step(&ctx, &around, [0.0, 0.1], 6).unwrap();
+    assert_eq!((report.count, report.born, report.removed_volume), (3, 0, 0.0));
+    let mut ids = grains.ids().to_vec();
+    ids.sort_unstable();
+    assert_eq!(ids, [0, 1, 2]);
+    // Only the radius cannot change.
+    let error = grains.set_params(Params { radius: 0.5, ..params() }).unwrap_err().to_string();
+    assert!(error.contains("cannot change"), "{error}");
+    grains.set_params(Params { gravity: 0.0, ..params() }).unwrap();
+    assert_eq!(grains.params().gravity, 0.0);
+}
+
+#[test]
 fn too_many_grains_are_refused_and_leave_the_others_as_they_were() {
     let ctx = context(2);
     let story = story(&ctx);
@@ -158,7 +222,7 @@ fn too_many_grains_are_refused_and_leave_the_others_as_they_were() {
     run(&ctx, &story, &mut grains, 1..=3);
     let before = grains.save();
     let around = Surroundings {
-        base: [&story.layers[3], &story.layers[FRAMES as usize]],
+        base: Base::Whole([&story.layers[3], &story.layers[FRAMES as usize]]),
         bodies: &[],
         statics: &[],
         floor: Some(0.0),
@@ -347,7 +411,7 @@ fn grains_that_rest_wake_when_the_base_below_them_or_gravity_changes() {
     run(&ctx, &story, &mut grains, 1..=FRAMES);
     let last = &story.layers[FRAMES as usize];
     let step = |grains: &mut Grains, base: [&FloatGrid; 2]| {
-        let around = Surroundings { base, bodies: &[], statics: &[], floor: Some(0.0), lowest: -1.0 };
+        let around = Surroundings { base: Base::Whole(base), bodies: &[], statics: &[], floor: Some(0.0), lowest: -1.0 };
         grains.step(&ctx, &around, [0.0, 1.0 / 24.0], 99).unwrap().resting
     };
     let mut resting = 0;

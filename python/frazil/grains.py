@@ -1,0 +1,113 @@
+"""Grains: snow that is pushed, piled and thrown."""
+
+import ctypes as c
+
+import numpy as np
+
+from ._library import GrainsParams, GrainsReport, Handle, Span, View, call, made, rows, span, view
+from .snow import bodies_of
+
+# Attributes by their usual names: the number in the header, the type, and how many of it a grain has.
+ATTRIBUTES = {
+    "P": (0, np.float32, 3), "P64": (1, np.float64, 3), "v": (2, np.float32, 3), "id": (3, np.int64, 1),
+    "pscale": (4, np.float32, 1), "source_frame": (5, np.int32, 1), "rest": (6, np.float32, 3),
+    "active": (7, np.int32, 1),
+}
+FLOOR, RESTLESS = 1, 2
+
+
+class Grains(Handle):
+    """Grains of snow, all of one radius (m): a third of the base layer's voxel gives the usual look.
+
+    Further parameters, as in frz_grains_params: compression, friction, attraction, air, gravity, lowest, max_grains, seed,
+    sub_steps (0: as many as are needed), floor, the height of a level ground (None: there is none), and rests: whether grains that lie still come to rest.
+    state: bytes of save(), to go on from.
+    """
+
+    _destroy = "frz_grains_destroy"
+
+    def __init__(self, ctx, radius=0.01 / 3, floor=None, state=None, rests=True, **more):
+        params = self._params(radius, floor, rests, more)
+        super().__init__(made("grains_create", ctx.pointer, c.byref(params), state, len(state) if state else 0))
+        self._ctx, self._radius = ctx, radius
+
+    def _words(self):
+        return f"{len(self)} of a radius of {self._radius:g} m"
+
+    @staticmethod
+    def _params(radius, floor, rests, more):
+        params = GrainsParams()
+        call("grains_params_init", c.byref(params), c.sizeof(params))
+        params.radius = radius
+        if floor is not None:
+            params.flags, params.floor = FLOOR, floor
+        if not rests:
+            params.flags |= RESTLESS
+        for name, value in more.items():
+            if name in ("struct_size", "flags", "reserved") or name not in dict(GrainsParams._fields_):
+                raise TypeError(f"grains have no parameter {name}")
+            setattr(params, name, value)
+        return params
+
+    def set_params(self, floor=None, rests=True, **more):
+        """How grains behave from the next step on: all parameters but the radius; those not given are the usual ones."""
+        params = self._params(self._radius, floor, rests, more)
+        call("grains_set_params", self.pointer, c.byref(params))
+
+    def step(self, base, bodies, dt, frame):
+        """Moves the grains through dt seconds, with those born of what the base's last step removed; the report, as
+        frz_grains_report has it.
+
+        base: a frazil.Base after its step, or the snow as grids before and after it, (before, after), or None.
+        """
+        descs, _kept = bodies_of(bodies)
+        report = GrainsReport(c.sizeof(GrainsReport))
+        if isinstance(base, tuple):
+            before, after = base
+            name, snow = "grains_step_grids", (before.pointer if before else None, after.pointer)
+        else:
+            name, snow = "grains_step", (base.pointer if base else None,)
+        call(name, self._ctx.pointer, self.pointer, *snow, descs, len(bodies), dt, frame, c.byref(report))
+        return report
+
+    def emit(self, positions, velocities=None, frame=0):
+        """Adds loose grains at positions (n, 3) with velocities (n, 3), at rest without; the ids of the new ones, (n,)."""
+        places = rows(positions, np.float32, 3)
+        fast = None if velocities is None else rows(velocities, np.float32, 3)
+        first = c.c_int64()
+        call("grains_emit", self._ctx.pointer, self.pointer, view(places),
+             View(None, 0, 0) if fast is None else view(fast), frame, c.byref(first))
+        return np.arange(first.value, first.value + len(places))
+
+    def __len__(self):
+        count = c.c_size_t()
+        call("grains_count", self.pointer, c.byref(count))
+        return count.value
+
+    def __bool__(self):
+        """A handle is one, also without any grains."""
+        return True
+
+    def read(self, name):
+        """A copy of an attribute: P, v, rest (n, 3), id, pscale, source_frame, active (n,), or P64, places in 64 bits. All have the
+        same order, which changes from step to step: ids tell which grain is which."""
+        if name not in ATTRIBUTES:
+            raise ValueError(f"grains have no attribute {name!r}, but {', '.join(ATTRIBUTES)}")
+        number, kind, width = ATTRIBUTES[name]
+        count = len(self)
+        out = np.empty((count, width) if width > 1 else count, kind)
+        call("grains_read", self.pointer, number, span(out) if count else Span(None, 0, 0))
+        return out
+
+    @property
+    def positions(self):
+        """Where they are: (n, 3) in 32 bits."""
+        return self.read("P")
+
+    def save(self):
+        """The state, for a cache: bytes that Grains(..., state=...) goes on from."""
+        size = c.c_size_t()
+        call("grains_save", self._ctx.pointer, self.pointer, None, 0, c.byref(size))
+        out = c.create_string_buffer(size.value)
+        call("grains_save", self._ctx.pointer, self.pointer, out, size.value, c.byref(size))
+        return out.raw[: size.value]
