@@ -6,7 +6,8 @@ use super::contacts::{Held, MOST};
 use super::field::Field;
 use super::layout::{At, Layout, NONE, holds, locate, order, settle, world};
 use super::rest;
-use super::rows::{Row, V, norm};
+use super::rows::{Row, Shared, V, norm};
+use super::shell::Search;
 pub use super::shell::Shell;
 use super::solve::{Coefficients, sub_step};
 use super::touch::{self, Touch};
@@ -170,6 +171,9 @@ impl Heap {
         // A few sub-steps ahead.
         let ahead = (AHEAD * dt / self.diameter) as f32;
         let mut layout = self.lay_out(ahead);
+        // How far meshes have moved in the step (diameters).
+        let mut travel = 0.0;
+        self.rows.par_iter_mut().for_each(|row| row.limit = 0.0);
         ctx.expect(division.sub_steps);
         for sub in 0..division.sub_steps {
             ctx.check()?;
@@ -178,7 +182,7 @@ impl Heap {
                 at((sub + 1) as f64 / division.sub_steps as f64, &mut pose)?;
                 shell.follow(&pose);
             }
-            self.touch(&mut layout, colliders, dt)?;
+            self.touch(&mut layout, colliders, dt, &mut travel)?;
             if is_changed {
                 ctx.check()?;
                 layout.find_pairs(&self.held);
@@ -240,8 +244,15 @@ impl Heap {
         self.touches.par_sort_unstable_by_key(Touch::key);
     }
 
-    /// Finds what grains touch that cannot be moved, and wakes those that a moving surface touches.
-    fn touch(&mut self, layout: &mut Layout, colliders: &Colliders<'_>, dt: f64) -> Result<()> {
+    /// Finds what grains touch that cannot be moved, and wakes those that a moving surface touches. `travel` is how far meshes have
+    /// moved in the step so far (diameters).
+    fn touch(
+        &mut self,
+        layout: &mut Layout,
+        colliders: &Colliders<'_>,
+        dt: f64,
+        travel: &mut f64,
+    ) -> Result<()> {
         let reach = (2.0 * dt / self.diameter) as f32;
         let changed: Vec<u32> =
             (0..).zip(&layout.blocks).filter(|(_, block)| block.is_changed).map(|(index, _)| index).collect();
@@ -256,14 +267,21 @@ impl Heap {
             let found = field.touches(layout, &changed, &self.rows, self.diameter, reach)?;
             changed.iter().zip(found).for_each(|(&index, found)| fresh[index as usize].extend(found));
         }
-        for (shell, _) in &colliders.shells {
-            for (index, found) in shell.touches(layout, &self.rows, self.diameter, dt) {
+        if !colliders.shells.is_empty() {
+            let shells: Vec<&Shell> = colliders.shells.iter().map(|(shell, _)| shell).collect();
+            let way = shells.iter().map(|shell| shell.way()).fold(0.0, f64::max) / self.diameter;
+            let search = Search { shells, diameter: self.diameter, dt, travel: *travel, way };
+            *travel += way;
+            let rows = Shared::new(&mut self.rows);
+            layout.blocks.par_iter_mut().zip(&mut fresh).for_each(|(block, fresh)| {
+                let found = search.touches(block, rows);
                 for touch in &found {
-                    rest::wake(&mut self.rows[touch.grain as usize]);
+                    // SAFETY: a grain is a member of one block.
+                    rest::wake(unsafe { rows.get(touch.grain as usize) });
                 }
-                layout.blocks[index as usize].is_awake = true;
-                fresh[index as usize].extend(found);
-            }
+                block.is_awake |= !found.is_empty();
+                fresh.extend(found);
+            });
         }
         touch::renew(&mut layout.blocks, fresh);
         Ok(())

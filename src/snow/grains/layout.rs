@@ -39,6 +39,8 @@ pub struct Block {
     pub anchors: [Vec<f32>; 3],
     /// What members touch that cannot be moved, by member.
     pub touches: Vec<Touch>,
+    /// How far (diameters) meshes may travel in a step before one can touch a member.
+    pub limit: f32,
     /// Whether a member is awake.
     pub is_awake: bool,
     /// Whether contacts of its members can matter: it or a neighbour is awake.
@@ -161,6 +163,7 @@ impl Layout {
             starts: [0; ALL_CELLS + 1],
             anchors: Default::default(),
             touches: Vec::new(),
+            limit: 0.0,
             is_awake: false,
             is_reached: false,
             has_strayed: true,

@@ -25,8 +25,8 @@ pub struct Row {
     pub marks: f32,
     /// The place that it must leave to count as moving (diameters, as `place`).
     pub since: V,
-    /// Fills the row up to a cache line.
-    pub unused: f32,
+    /// How far (diameters) meshes may travel in a step before one can touch it.
+    pub limit: f32,
 }
 
 /// In `hold` and `marks`: supported.

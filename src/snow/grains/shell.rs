@@ -8,9 +8,9 @@
 use rayon::prelude::*;
 
 use super::contacts::SKIN;
-use super::layout::{EDGE, Layout, world};
+use super::layout::{Block, EDGE, world};
 use super::rest;
-use super::rows::{Row, dot};
+use super::rows::{Row, Shared, dot, norm};
 use super::touch::Touch;
 use crate::base::DVec3;
 
@@ -34,6 +34,82 @@ pub struct Shell {
     /// Longest way of a vertex in the sub-step (m).
     way: f64,
 }
+
+/// What a sub-step asks of the meshes.
+pub struct Search<'a> {
+    /// The meshes.
+    pub shells: Vec<&'a Shell>,
+    /// Diameter of a grain (m).
+    pub diameter: f64,
+    /// Length of the sub-step (s).
+    pub dt: f64,
+    /// Farthest way of a mesh's vertex in the step before this sub-step (diameters).
+    pub travel: f64,
+    /// The same in this sub-step.
+    pub way: f64,
+}
+
+impl Search<'_> {
+    /// Members of a block near a mesh, each with the plane that the mesh is there. Of grains that rest, those that a mesh touches
+    /// and moves. Blocks and grains remember how far the meshes may travel before they can matter.
+    pub fn touches(&self, block: &mut Block, rows: Shared<'_, Row>) -> Vec<Touch> {
+        let is_near = |limit: f32, reach: f64| f64::from(limit) - self.travel < reach + self.way;
+        // A member has left the block by less than two diameters.
+        let around = 0.5 * f64::from(EDGE) * 3f64.sqrt() + REACH + 2.0;
+        if block.members.is_empty() || !is_near(block.limit, around) {
+            return Vec::new();
+        }
+        let middle = world(block.at, [EDGE * 0.5; 3], self.diameter);
+        block.limit = self.limit(middle, around + self.way + f64::from(EDGE));
+        if !is_near(block.limit, around) {
+            return Vec::new();
+        }
+        let mut touches = Vec::new();
+        for &slot in &block.members {
+            // SAFETY: a grain is a member of one block.
+            let row = unsafe { rows.get(slot as usize) };
+            let fast = f64::from(norm(row.velocity)) * self.dt / self.diameter;
+            if is_near(row.limit, REACH + fast) && !(row.rests() && self.way == 0.0) {
+                self.touch(slot, row, world(block.at, row.place, self.diameter), REACH + fast, &mut touches);
+            }
+        }
+        touches
+    }
+
+    /// How far the meshes may have travelled before one can be at a place (m), looked for within so many diameters.
+    fn limit(&self, place: DVec3, within: f64) -> f32 {
+        let square = |shell: &&Shell| shell.nearest(place, within * self.diameter).map(|found| found.square);
+        let nearest = self.shells.iter().filter_map(square).fold(f64::INFINITY, f64::min).sqrt();
+        (self.travel + (nearest / self.diameter).min(within)) as f32 - SLACK
+    }
+
+    /// What a grain at a place (m) touches within a reach (diameters).
+    fn touch(&self, slot: u32, row: &mut Row, place: DVec3, reach: f64, touches: &mut Vec<Touch>) {
+        let reach = reach + self.way;
+        let mut free = reach + AHEAD;
+        for shell in &self.shells {
+            let Some(nearest) = shell.nearest(place, (reach + AHEAD) * self.diameter) else { continue };
+            let distance = nearest.square.sqrt() / self.diameter;
+            free = free.min(distance);
+            if distance <= reach {
+                let touch = shell.touch(slot, row, place, &nearest, self.diameter, self.dt);
+                let is_close = dot(touch.normal, row.place) - touch.offset < rest::NEAR;
+                let moves = nearest.motion.norm() > 1.0e-6 * self.diameter;
+                if !row.rests() || is_close && moves {
+                    touches.push(touch);
+                }
+            }
+        }
+        row.limit = (self.travel + free) as f32 - SLACK;
+    }
+}
+
+/// Distance (diameters) between a grain's centre and a mesh at which they count as near.
+const REACH: f64 = 0.5 + SKIN as f64;
+/// How much farther meshes are looked for, so that a grain need not ask in every sub-step (diameters).
+const AHEAD: f64 = 1.5;
+/// Room for rounding (diameters).
+const SLACK: f32 = 1.0e-3;
 
 /// A point of the surface.
 struct Nearest {
@@ -110,36 +186,6 @@ impl Shell {
     /// Longest way of a vertex in the sub-step (m).
     pub fn way(&self) -> f64 {
         self.way
-    }
-
-    /// Grains near the surface by block, each with the plane that the surface is there; `dt` (s) is the sub-step's length. Of
-    /// grains that rest, those that the surface touches and moves.
-    pub fn touches(&self, layout: &Layout, rows: &[Row], diameter: f64, dt: f64) -> Vec<(u32, Vec<Touch>)> {
-        let half = 0.5 * f64::from(EDGE) * diameter;
-        let reach = diameter * (0.5 + f64::from(SKIN)) + self.way;
-        let blocks = layout.blocks.par_iter().enumerate();
-        let near = blocks.filter(|(_, block)| {
-            let middle = world(block.at, [EDGE * 0.5; 3], diameter);
-            let is_near = || self.nearest(middle, half * 3f64.sqrt() + reach + 2.0 * diameter).is_some();
-            (block.is_awake || self.way > 0.0) && !block.members.is_empty() && is_near()
-        });
-        let touches = near.map(|(index, block)| {
-            let touch = |&slot: &u32| {
-                let row = &rows[slot as usize];
-                if row.rests() && self.way == 0.0 {
-                    return None;
-                }
-                let place = world(block.at, row.place, diameter);
-                let fast = row.velocity.iter().map(|x| f64::from(*x).powi(2)).sum::<f64>().sqrt() * dt;
-                let nearest = self.nearest(place, reach + fast)?;
-                let touch = self.touch(slot, row, place, &nearest, diameter, dt);
-                let is_near = dot(touch.normal, row.place) - touch.offset < rest::NEAR;
-                let moves = nearest.motion.norm() > 1.0e-6 * diameter;
-                (!row.rests() || is_near && moves).then_some(touch)
-            };
-            (index as u32, block.members.iter().filter_map(touch).collect::<Vec<_>>())
-        });
-        touches.filter(|(_, touches)| !touches.is_empty()).collect()
     }
 
     fn touch(

@@ -16,7 +16,7 @@ use rayon::prelude::*;
 use super::contacts::{Batch, SKIN};
 use super::layout::{Block, Layout};
 use super::rest::{self, Rest};
-use super::rows::{Part, Row, SUPPORTED, Shared, V, add, dot, scaled, sub};
+use super::rows::{Part, Row, SUPPORTED, Shared, V, add, dot, norm, scaled, sub};
 use super::touch::Touch;
 use crate::base::cpu::dispatch;
 use crate::base::lanes::{LaneMask, Lanes};
@@ -162,7 +162,9 @@ fn advance(rows: &mut [Row], layout: &mut Layout, c: &Coefficients) {
 
 /// Moves a grain; what its push took back of its motion, its velocity loses where something holds it.
 fn move_on(row: &mut Row, c: &Coefficients) {
-    row.place = add(add(row.place, scaled(row.velocity, c.dt / c.diameter)), row.push);
+    let way = add(scaled(row.velocity, c.dt / c.diameter), row.push);
+    row.place = add(row.place, way);
+    row.limit -= norm(way);
     let square = dot(row.push, row.push);
     if row.is_supported() && square > 0.0 {
         let back = scaled(row.push, c.diameter / c.dt);
