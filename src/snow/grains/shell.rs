@@ -30,6 +30,8 @@ pub struct Shell {
     next: Vec<DVec3>,
     /// Boxes of a complete binary tree over leaves of triangles, the root first.
     boxes: Vec<[DVec3; 2]>,
+    /// Longest way of a vertex in the sub-step (m), of each box.
+    ways: Vec<f64>,
     leaves: usize,
     /// Longest way of a vertex in the sub-step (m).
     way: f64,
@@ -60,7 +62,7 @@ impl Search<'_> {
             return Vec::new();
         }
         let middle = world(block.at, [EDGE * 0.5; 3], self.diameter);
-        block.limit = self.limit(middle, around + self.way + f64::from(EDGE));
+        block.limit = self.limit(middle, around + f64::from(EDGE));
         if !is_near(block.limit, around) {
             return Vec::new();
         }
@@ -85,13 +87,14 @@ impl Search<'_> {
 
     /// What a grain at a place (m) touches within a reach (diameters).
     fn touch(&self, slot: u32, row: &mut Row, place: DVec3, reach: f64, touches: &mut Vec<Touch>) {
-        let reach = reach + self.way;
-        let mut free = reach + AHEAD;
+        // Where meshes are fast, a grain would have to ask again at once.
+        let within = if self.way < 0.5 * AHEAD { reach + AHEAD } else { reach };
+        let mut free = within;
         for shell in &self.shells {
-            let Some(nearest) = shell.nearest(place, (reach + AHEAD) * self.diameter) else { continue };
+            let Some(nearest) = shell.nearest(place, within * self.diameter) else { continue };
             let distance = nearest.square.sqrt() / self.diameter;
             free = free.min(distance);
-            if distance <= reach {
+            if distance <= reach + nearest.motion.norm() / self.diameter {
                 let touch = shell.touch(slot, row, place, &nearest, self.diameter, self.dt);
                 let is_close = dot(touch.normal, row.place) - touch.offset < rest::NEAR;
                 let moves = nearest.motion.norm() > 1.0e-6 * self.diameter;
@@ -134,8 +137,9 @@ impl Shell {
         let leaves = triangles.len().div_ceil(LEAF).max(1).next_power_of_two();
         let next = pose.clone();
         let boxes = vec![[DVec3::zeros(); 2]; 2 * leaves - 1];
+        let ways = vec![0.0; 2 * leaves - 1];
         let mut shell =
-            Self { collider, friction, triangles, closed, now: pose, next, boxes, leaves, way: 0.0 };
+            Self { collider, friction, triangles, closed, now: pose, next, boxes, ways, leaves, way: 0.0 };
         shell.sort();
         shell
     }
@@ -165,21 +169,26 @@ impl Shell {
             self.now.iter().zip(&self.next).map(|(a, b)| (b - a).norm_squared()).fold(0.0, f64::max).sqrt();
         let (now, triangles, leaves) = (&self.now, &self.triangles, self.leaves);
         let (inner, outer) = self.boxes.split_at_mut(leaves - 1);
-        outer.par_iter_mut().enumerate().with_min_len(256).for_each(|(leaf, bounds)| {
-            *bounds = EMPTY;
+        let (next, (inner_ways, outer_ways)) = (&self.next, self.ways.split_at_mut(leaves - 1));
+        let outer_nodes = outer.par_iter_mut().zip(outer_ways.par_iter_mut());
+        outer_nodes.enumerate().with_min_len(256).for_each(|(leaf, (bounds, way))| {
+            (*bounds, *way) = (EMPTY, 0.0);
             for triangle in triangles.iter().skip(leaf * LEAF).take(LEAF) {
                 for &index in triangle {
                     let place = now[index as usize];
                     *bounds = [bounds[0].inf(&place), bounds[1].sup(&place)];
+                    *way = way.max((next[index as usize] - place).norm());
                 }
             }
         });
         for node in (0..inner.len()).rev() {
-            let child = |index: usize| {
-                if index < leaves - 1 { inner[index] } else { outer[index - (leaves - 1)] }
+            let child = |index: usize| match index.checked_sub(leaves - 1) {
+                Some(leaf) => (outer[leaf], outer_ways[leaf]),
+                None => (inner[index], inner_ways[index]),
             };
-            let (a, b) = (child(2 * node + 1), child(2 * node + 2));
+            let ((a, way), (b, other)) = (child(2 * node + 1), child(2 * node + 2));
             inner[node] = [a[0].inf(&b[0]), a[1].sup(&b[1])];
+            inner_ways[node] = way.max(other);
         }
     }
 
@@ -219,20 +228,22 @@ impl Shell {
         }
     }
 
-    /// The nearest point of the surface within a distance (m).
+    /// The nearest point of the surface within a distance (m), and where it moves, within that and its way.
     fn nearest(&self, place: DVec3, within: f64) -> Option<Nearest> {
         let apart = |bounds: &[DVec3; 2]| {
             let outside = (bounds[0] - place).sup(&(place - bounds[1])).sup(&DVec3::zeros());
             outside.norm_squared()
         };
         let mut best: Option<Nearest> = None;
-        let mut most = within * within;
+        let mut most = f64::INFINITY;
+        let reach = |node: usize| (within + self.ways[node]).powi(2);
         let mut stack = [0usize; 64];
         let mut depth = 1;
         while depth > 0 {
             depth -= 1;
             let node = stack[depth];
-            if apart(&self.boxes[node]) > most {
+            let reach = reach(node);
+            if apart(&self.boxes[node]) > most.min(reach) {
                 continue;
             }
             if node < self.leaves - 1 {
@@ -247,7 +258,7 @@ impl Shell {
                 let found = self.on_triangle(triangle, place);
                 // At an edge or corner that triangles share, the one that the point is highest over tells its side.
                 let is_better = match &best {
-                    None => found.square <= most,
+                    None => found.square <= reach,
                     Some(best) => {
                         let tie = 1.0e-9 * (found.square + best.square);
                         found.square < best.square - tie
