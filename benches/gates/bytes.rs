@@ -5,6 +5,7 @@ use std::hash::{DefaultHasher, Hash, Hasher};
 use frazil::vdb::file::{WriteOptions, to_bytes};
 
 use crate::common::tools;
+use crate::grains;
 use crate::harness::Harness;
 use crate::scenes::{self, context};
 use crate::speed;
@@ -19,6 +20,12 @@ pub fn run(h: &mut Harness) {
         let note =
             format!("FRAZIL_CPU baseline, avx2, avx512; this one has {:?}", frazil::base::cpu::cpu_level());
         h.holds("snow.base.same_bytes_cpu", hashes.iter().all(|hash| *hash == hashes[0]), &note);
+    }
+    if h.wants("snow.grains.same_bytes") {
+        let one = grains::collapse(1);
+        let hashes = ["baseline", "avx2", "avx512"].map(hash_at);
+        let is_same = one == grains::collapse(2) && hashes.iter().all(|hash| *hash == hashes[0]);
+        h.holds("snow.grains.same_bytes", is_same, "a heap that collapses: 1 and 2 threads, all CPU levels");
     }
     if h.wants("snow.base.same_bytes_tools") {
         let one = tools::outputs(&context(1));
@@ -37,13 +44,14 @@ fn small(threads: usize) -> Vec<u8> {
     to_bytes(&grids, &WriteOptions::default()).expect("bytes")
 }
 
-/// Argument of a run that only prints a hash of the files of `small`.
+/// Argument of a run that only prints a hash of the files of `small` and of grains.
 pub const HASH: &str = "hash-of-small";
 
 /// Such a run.
 pub fn print_hash() {
     let mut hasher = DefaultHasher::new();
     small(2).hash(&mut hasher);
+    grains::collapse(2).hash(&mut hasher);
     println!("{:016x}", hasher.finish());
 }
 

@@ -19,6 +19,8 @@ pub fn run(h: &mut Harness) {
     free(h);
     heap_in_the_air(h);
     bed(h);
+    rest(h);
+    rest_gain(h);
     speed(h);
 }
 
@@ -30,6 +32,8 @@ struct Experiment {
     division: Division,
     colliders: Colliders<'static>,
     random: Random,
+    /// Whether what rests is visited too.
+    visits_all: bool,
 }
 
 /// Numbers in 0..1 (xorshift: Marsaglia 2003).
@@ -51,7 +55,7 @@ impl Experiment {
         let floor = Some(Floor { height: 0.0, friction: friction as f32 });
         let colliders = Colliders { floor, ..Colliders::default() };
         let (ctx, heap) = (context(threads), Heap::new(diameter));
-        Self { ctx, params, heap, division, colliders, random: Random(seed * 7919 + 1) }
+        Self { ctx, params, heap, division, colliders, random: Random(seed * 7919 + 1), visits_all: false }
     }
 
     fn diameter(&self) -> f64 {
@@ -59,10 +63,34 @@ impl Experiment {
     }
 
     fn step(&mut self) {
-        let Self { ctx, params, heap, division, colliders, .. } = self;
-        let coefficients = params.coefficients(division);
+        let Self { ctx, params, heap, division, colliders, visits_all, .. } = self;
+        let mut coefficients = params.coefficients(division);
+        coefficients.visits_all = *visits_all;
         let step = || heap.step(ctx, *division, coefficients, colliders);
         ctx.phase("move", step).expect("step");
+    }
+
+    /// A truncated cone of upright layers, of a radius in grains.
+    fn fill(&mut self, radius: i32) {
+        for layer in 0..2 * radius / 3 {
+            let reach = f64::from(radius) - 1.5 * f64::from(layer);
+            for (x, z) in (-radius..=radius).flat_map(|x| (-radius..=radius).map(move |z| (x, z))) {
+                if f64::from(x * x + z * z) < reach * reach {
+                    let site = [f64::from(x), f64::from(layer) + 0.5, f64::from(z)];
+                    let place = DVec3::from(site) * 1.08 * self.diameter();
+                    self.heap.add(self.heap.count() as u32, place, [0.0; 3]).expect("add");
+                }
+            }
+        }
+    }
+
+    /// Places and velocities, bit for bit.
+    fn state(&self) -> Vec<u32> {
+        let places = self
+            .heap
+            .located()
+            .flat_map(|(at, place)| at.map(|block| block as u32).into_iter().chain(place.map(f32::to_bits)));
+        places.chain(self.heap.velocities().flat_map(|velocity| velocity.map(f32::to_bits))).collect()
     }
 
     /// Pours grains through a hole of 2.5 diameters a little above the pile, then waits.
@@ -309,28 +337,96 @@ fn walls(
     (shell, Box::new(pose))
 }
 
-/// All grains of a settled pile at work, at the angle asked for.
+/// What rest changes: nothing where what rests is left out, little of a pile's angle.
+fn rest(h: &mut Harness) {
+    if h.wants("snow.grains.rest_bytes") {
+        let run = |visits_all: bool| {
+            let mut pile = Experiment::new(2, 0.005, of_repose(32.0), 2);
+            pile.visits_all = visits_all;
+            pile.pour(3_000, 60, 60);
+            (pile.state(), pile.heap.resting())
+        };
+        let (skipped, all) = (run(false), run(true));
+        let note = format!("{} of 3000 grains rest", all.1);
+        h.holds("snow.grains.rest_bytes", skipped == all && all.1 > 1_000, &note);
+    }
+    if h.wants("snow.grains.rest_angle") {
+        let slope = |rests: bool| {
+            let one = |seed: u64| {
+                let mut pile = Experiment::new(2, 0.005, of_repose(32.0), seed);
+                pile.params.rests = rests;
+                pile.pour(10_000, 220, 30);
+                pile.slope()
+            };
+            (1..=3).map(one).sum::<f64>() / 3.0
+        };
+        let (with, without) = (slope(true), slope(false));
+        let note = format!("{with:.2} and {without:.2} degrees, mean of 3 seeds");
+        h.gate("snow.grains.rest_angle", (with - without).abs(), &note);
+    }
+}
+
+/// A walker of 96 frames: time of the grains' motion in the last 48 without rest over that with it.
+fn rest_gain(h: &mut Harness) {
+    if !h.wants("snow.grains.rest_gain") {
+        return;
+    }
+    let Some(man) = crate::common::character::data("character/CesiumMan.glb") else {
+        h.skipped("snow.grains.rest_gain", "no data");
+        return;
+    };
+    let folder = std::env::temp_dir().join(format!("frazil-rest-{}", std::process::id()));
+    std::fs::create_dir_all(&folder).expect("a folder");
+    let seconds = |rests: bool| {
+        let (scene, out) = (folder.join("walk.toml"), folder.join(format!("rest-{rests}")));
+        let text = format!(
+            r#"
+shot = {{ frames = "1-96" }}
+snow = {{ ground = 0.0, area = [-0.9, -1.6, 0.9, 3.4], depth = 0.2, cell = 0.009 }}
+grains = {{ rest = {rests} }}
+[[object]]
+file = {:?}
+scale = 1.166
+keys = [{{ frame = 1, at = [0.0, 0.06, -1.15] }}, {{ frame = 96, at = [0.0, 0.06, 3.0] }}]
+"#,
+            man.display().to_string()
+        );
+        std::fs::write(&scene, text).expect("a scene");
+        let mut run = std::process::Command::new(env!("CARGO_BIN_EXE_frazil"));
+        let run = run.arg("snow").arg(&scene).arg("-o").arg(&out).args(["-q", "--threads", "2"]);
+        assert!(run.stderr(std::process::Stdio::null()).status().expect("frazil").success());
+        (49..=96).map(|frame| moving(&out.join(format!("report/grains.{frame:04}.json")))).sum::<f64>()
+    };
+    let (with, without) = (seconds(true), seconds(false));
+    let _ = std::fs::remove_dir_all(&folder);
+    let note = format!("threads=2 {with:.1} s with rest, {without:.1} s without; thesis=1.58 x");
+    h.gate("snow.grains.rest_gain", without / with, &note);
+}
+
+/// Seconds of a frame's `move`, from its report.
+fn moving(report: &std::path::Path) -> f64 {
+    let text = std::fs::read(report).expect("a report");
+    let report: serde_json::Value = serde_json::from_slice(&text).expect("a report");
+    let phases = report["phases"].as_array().expect("phases").iter();
+    phases.filter(|phase| phase["name"] == "move").filter_map(|phase| phase["seconds"].as_f64()).sum()
+}
+
+/// The state of a heap of 10,000 grains some frames after it began to collapse.
+pub fn collapse(threads: usize) -> Vec<u32> {
+    let mut heap = Experiment::new(threads, 0.0015, of_repose(25.0), 1);
+    heap.fill(24);
+    (0..8).for_each(|_| heap.step());
+    heap.state()
+}
+
+/// All grains of a heap that collapses at work.
 fn speed(h: &mut Harness) {
     if !h.wants("snow.grains.speed") {
         return;
     }
     let mut pile = Experiment::new(1, 0.0015, of_repose(32.0), 1);
     pile.params.rests = false;
-    let mut id = 0;
-    let big = std::env::var("BIG").map_or(60, |x| x.parse::<i32>().unwrap());
-    for layer in 0..(big as u32 * 2 / 3) {
-        let radius = f64::from(big) - 1.5 * f64::from(layer);
-        for x in -big..=big {
-            for z in -big..=big {
-                if f64::from(x * x + z * z) < radius * radius {
-                    let place =
-                        DVec3::new(f64::from(x), f64::from(layer) + 0.5, f64::from(z)) * 1.08 * 0.0015;
-                    pile.heap.add(id, place, [0.0; 3]).expect("add");
-                    id += 1;
-                }
-            }
-        }
-    }
+    pile.fill(60);
     (0..12).for_each(|_| pile.step());
     let frames = 6;
     let start = std::time::Instant::now();

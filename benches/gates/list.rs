@@ -32,6 +32,11 @@ pub const GATES: &[Gate] = &[
     gate("snow.grains.free_energy", "1", Most(1.0e-5), Open),
     // Deep beds.
     gate("snow.grains.bed_overlap", "%", Most(5.0), Most(2.0)),
+    // Rest: what it changes (nothing where it is only speed), and what it saves.
+    yes("snow.grains.rest_bytes"),
+    gate("snow.grains.rest_angle", "deg", Most(0.5), Open),
+    gate("snow.grains.rest_gain", "x", Least(3.0), Least(8.0)),
+    yes("snow.grains.same_bytes"),
     // All grains at work.
     gate("snow.grains.speed", "k/s", Least(90.0), Least(200.0)),
     // The walls that a box leaves, against the envelope of its poses.

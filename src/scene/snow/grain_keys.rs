@@ -57,9 +57,14 @@ pub const GRAIN_KEYS: &[Key] = &[
     Key::new("grains", "gravity", Kind::Number(-100.0, 100.0, "m/s2"), "along y (m/s2)")
         .or("-9.81")
         .concerns(STEP),
-    Key::new("grains", "rest", Kind::Flag, "whether grains that lie still come to rest until something wakes them")
-        .or("true")
-        .concerns(STEP),
+    Key::new(
+        "grains",
+        "rest",
+        Kind::Flag,
+        "whether grains that lie still come to rest until something wakes them",
+    )
+    .or("true")
+    .concerns(STEP),
     Key::new(
         "grains",
         "substeps",

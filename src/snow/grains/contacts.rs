@@ -249,7 +249,8 @@ static NEAR_CELLS: LazyLock<Vec<Vec<Cells>>> = LazyLock::new(|| {
             let row = (there_y.rem_euclid(cells) * cells + there_x.rem_euclid(cells)) * cells;
             let [step_x, step_y] = [there_x, there_y].map(|at| at.div_euclid(cells));
             for step_z in -1..=1 {
-                let (first, last) = ((z - 1 - step_z * cells).max(0), (z + 1 - step_z * cells).min(cells - 1));
+                let (first, last) =
+                    ((z - 1 - step_z * cells).max(0), (z + 1 - step_z * cells).min(cells - 1));
                 let order = [step_y, step_x, step_z].cmp(&[0; 3]).then([dy, dx].cmp(&[0; 2]));
                 let end = if [step_x, step_y, step_z, dx, dy] == [0; 5] { z } else { last + 1 };
                 if first < end && (order.is_lt() || [step_x, step_y, step_z, dx, dy] == [0; 5]) {
@@ -328,8 +329,14 @@ fn find_in(scratch: &mut Scratch, blocks: &[Block], index: usize) {
             }
         }
         // What comes before a grain in its own cell.
-        let mut before =
-            Run { block, low: own.start, high: own.start, shift: [0.0; 3], bits: step_bits([0; 3]), first: 0 };
+        let mut before = Run {
+            block,
+            low: own.start,
+            high: own.start,
+            shift: [0.0; 3],
+            bits: step_bits([0; 3]),
+            first: 0,
+        };
         for owner in own {
             let [xs, ys, zs] = &block.anchors;
             let place = [xs[owner as usize], ys[owner as usize], zs[owner as usize]];

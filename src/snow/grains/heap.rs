@@ -222,7 +222,8 @@ impl Heap {
                 "a grain would move infinitely fast: the base layer or an object is not as it should be",
             ));
         }
-        let is_there = |slot: &u32| layout.homes[*slot as usize].block != NONE && holds(self.at[*slot as usize]);
+        let is_there =
+            |slot: &u32| layout.homes[*slot as usize].block != NONE && holds(self.at[*slot as usize]);
         let kept: Vec<u32> = (0..self.rows.len() as u32).filter(is_there).collect();
         if kept.len() < self.rows.len() {
             self.keep(&kept);
@@ -237,7 +238,9 @@ impl Heap {
         self.rows = from.par_iter().map(|&from| self.rows[from as usize]).collect();
         self.ids = from.par_iter().map(|&from| self.ids[from as usize]).collect();
         self.at = from.par_iter().map(|&from| self.at[from as usize]).collect();
-        self.held.par_iter_mut().for_each(|held| held.grains = held.grains.map(|grain| slots[grain as usize]));
+        self.held
+            .par_iter_mut()
+            .for_each(|held| held.grains = held.grains.map(|grain| slots[grain as usize]));
         self.held.retain(|held| !held.grains.contains(&NONE));
         self.touches.iter_mut().for_each(|touch| touch.grain = slots[touch.grain as usize]);
         self.touches.retain(|touch| touch.grain != NONE);
@@ -300,7 +303,8 @@ impl Floor {
     /// Members of a block near the floor.
     fn touches(&self, block: &super::layout::Block, rows: &[Row], diameter: f64, reach: f32) -> Vec<Touch> {
         // From the block's lower side to the floor (diameters).
-        let height = (self.height / diameter - f64::from(block.at[1]) * f64::from(super::layout::EDGE)) as f32;
+        let height =
+            (self.height / diameter - f64::from(block.at[1]) * f64::from(super::layout::EDGE)) as f32;
         let near = block.members.iter().filter(|slot| {
             let row = &rows[**slot as usize];
             row.place[1] - height - 0.5 < super::contacts::SKIN + norm(row.velocity) * reach

@@ -273,7 +273,9 @@ impl Layout {
     pub fn reach(&mut self, all: bool) {
         let awake: Vec<bool> = self.blocks.par_iter().map(|block| block.is_awake).collect();
         let is_awake = |&block: &u32| block != NONE && awake[block as usize];
-        self.blocks.par_iter_mut().for_each(|block| block.is_reached = all || block.near.iter().any(is_awake));
+        self.blocks
+            .par_iter_mut()
+            .for_each(|block| block.is_reached = all || block.near.iter().any(is_awake));
     }
 
     /// Columns with blocks that are reached in four sets: of two columns of one set neither is the other's neighbour.

@@ -42,7 +42,7 @@ use crate::sweep::Body;
 
 use field::Field;
 use heap::{Colliders, Division, Floor, Heap};
-use layout::{locate};
+use layout::locate;
 use shell::Shell;
 use sourcing::Sourcing;
 
@@ -289,11 +289,14 @@ impl Grains {
         let changed: HashSet<Origin> = removals.iter().map(|removal| removal.origin).collect();
         let reach = 1.0 + self.heap.diameter / cell;
         self.heap.wake(|place| {
-            let leaf = |axis: usize, off: f64| ((place[axis] / cell + 0.5 + off).floor() as i32) & !(DIM as i32 - 1);
+            let leaf =
+                |axis: usize, off: f64| ((place[axis] / cell + 0.5 + off).floor() as i32) & !(DIM as i32 - 1);
             let ends = [0, 1, 2].map(|axis| [leaf(axis, -reach), leaf(axis, reach)]);
             let corners = (0..8).map(|corner| [0, 1, 2].map(|axis: usize| ends[axis][corner >> axis & 1]));
             let mut last = None;
-            corners.into_iter().any(|corner| last.replace(corner) != Some(corner) && changed.contains(&corner))
+            corners
+                .into_iter()
+                .any(|corner| last.replace(corner) != Some(corner) && changed.contains(&corner))
         });
     }
 

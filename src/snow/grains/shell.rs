@@ -197,15 +197,7 @@ impl Shell {
         self.way
     }
 
-    fn touch(
-        &self,
-        slot: u32,
-        row: &Row,
-        place: DVec3,
-        nearest: &Nearest,
-        diameter: f64,
-        dt: f64,
-    ) -> Touch {
+    fn touch(&self, slot: u32, row: &Row, place: DVec3, nearest: &Nearest, diameter: f64, dt: f64) -> Touch {
         let distance = nearest.square.sqrt();
         let inside = self.closed && nearest.height < 0.0;
         let out = if distance > 1.0e-6 * diameter {

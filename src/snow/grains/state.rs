@@ -5,12 +5,12 @@ use std::collections::BTreeMap;
 use rayon::prelude::*;
 use xxhash_rust::xxh3::xxh3_128;
 
-use super::{Grains, Params};
 use super::contacts::{Held, MOST};
 use super::heap::Heap;
 use super::layout::{EDGE, holds};
 use super::rows::Row;
 use super::touch::Touch;
+use super::{Grains, Params};
 use crate::error::{Error, Result};
 
 /// The first bytes: what it is, and its version.
@@ -47,8 +47,7 @@ struct Reader<'a>(&'a [u8]);
 
 impl Reader<'_> {
     fn take<const N: usize>(&mut self) -> Result<[u8; N]> {
-        let (first, rest) =
-            self.0.split_first_chunk().ok_or_else(|| wrong("the state is cut short"))?;
+        let (first, rest) = self.0.split_first_chunk().ok_or_else(|| wrong("the state is cut short"))?;
         self.0 = rest;
         Ok(*first)
     }
@@ -87,11 +86,7 @@ impl Reader<'_> {
 
     fn f64(&mut self) -> Result<f64> {
         let number = f64::from_le_bytes(self.take()?);
-        if number.is_finite() {
-            Ok(number)
-        } else {
-            Err(wrong("the state has a number that is not finite"))
-        }
+        if number.is_finite() { Ok(number) } else { Err(wrong("the state has a number that is not finite")) }
     }
 }
 
@@ -146,7 +141,9 @@ pub fn load(grains: &mut Grains, bytes: &[u8]) -> Result<()> {
         return Err(wrong(format!("has grains of {diameter} m, not {}", grains.heap.diameter)));
     }
     let mut heap = Heap::new(diameter);
-    let is_same = rest_depends_on(&grains.params).iter().try_fold(true, |is_same, now| Ok(is_same & (from.f64()? == *now)))?;
+    let is_same = rest_depends_on(&grains.params)
+        .iter()
+        .try_fold(true, |is_same, now| Ok(is_same & (from.f64()? == *now)))?;
     grains.next_id = from.u32()?;
     let count = from.count(ROW)?;
     if count > MOST || grains.next_id as usize > MOST {
@@ -166,8 +163,7 @@ pub fn load(grains: &mut Grains, bytes: &[u8]) -> Result<()> {
             return Err(wrong("has a grain that lies in no block"));
         }
         heap.rows.push(Row { place, hold, velocity, still, since, ..Row::default() });
-        let birth =
-            grains.births.get_mut(id as usize).ok_or_else(|| wrong("has a grain without birth"))?;
+        let birth = grains.births.get_mut(id as usize).ok_or_else(|| wrong("has a grain without birth"))?;
         (birth.rest, [birth.frame]) = (from.f32s()?, from.i32s()?);
     }
     for _ in 0..from.count(20)? {

@@ -411,7 +411,13 @@ fn grains_that_rest_wake_when_the_base_below_them_or_gravity_changes() {
     run(&ctx, &story, &mut grains, 1..=FRAMES);
     let last = &story.layers[FRAMES as usize];
     let step = |grains: &mut Grains, base: [&FloatGrid; 2]| {
-        let around = Surroundings { base: Base::Whole(base), bodies: &[], statics: &[], floor: Some(0.0), lowest: -1.0 };
+        let around = Surroundings {
+            base: Base::Whole(base),
+            bodies: &[],
+            statics: &[],
+            floor: Some(0.0),
+            lowest: -1.0,
+        };
         grains.step(&ctx, &around, [0.0, 1.0 / 24.0], 99).unwrap().resting
     };
     let mut resting = 0;
