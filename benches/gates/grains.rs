@@ -351,6 +351,7 @@ fn rest(h: &mut Harness) {
         h.holds("snow.grains.rest_bytes", skipped == all && all.1 > 1_000, &note);
     }
     if h.wants("snow.grains.rest_angle") {
+        const SEEDS: u64 = 6;
         let slope = |rests: bool| {
             let one = |seed: u64| {
                 let mut pile = Experiment::new(2, 0.005, of_repose(32.0), seed);
@@ -358,10 +359,10 @@ fn rest(h: &mut Harness) {
                 pile.pour(10_000, 220, 30);
                 pile.slope()
             };
-            (1..=3).map(one).sum::<f64>() / 3.0
+            (1..=SEEDS).map(one).sum::<f64>() / SEEDS as f64
         };
         let (with, without) = (slope(true), slope(false));
-        let note = format!("{with:.2} and {without:.2} degrees, mean of 3 seeds");
+        let note = format!("{with:.2} and {without:.2} degrees, mean of {SEEDS} seeds");
         h.gate("snow.grains.rest_angle", (with - without).abs(), &note);
     }
 }

@@ -278,10 +278,6 @@ impl Heap {
             let rows = Shared::new(&mut self.rows);
             layout.blocks.par_iter_mut().zip(&mut fresh).for_each(|(block, fresh)| {
                 let found = search.touches(block, rows);
-                for touch in &found {
-                    // SAFETY: a grain is a member of one block.
-                    rest::wake(unsafe { rows.get(touch.grain as usize) });
-                }
                 block.is_awake |= !found.is_empty();
                 fresh.extend(found);
             });

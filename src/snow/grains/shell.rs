@@ -53,7 +53,7 @@ pub struct Search<'a> {
 
 impl Search<'_> {
     /// Members of a block near a mesh, each with the plane that the mesh is there. Of grains that rest, those that a mesh touches
-    /// and moves. Blocks and grains remember how far the meshes may travel before they can matter.
+    /// and moves, which wake. Blocks and grains remember how far the meshes may travel before they can matter.
     pub fn touches(&self, block: &mut Block, rows: Shared<'_, Row>) -> Vec<Touch> {
         let is_near = |limit: f32, reach: f64| f64::from(limit) - self.travel < reach + self.way;
         // A member has left the block by less than two diameters.
@@ -99,6 +99,7 @@ impl Search<'_> {
                 let is_close = dot(touch.normal, row.place) - touch.offset < rest::NEAR;
                 let moves = nearest.motion.norm() > 1.0e-6 * self.diameter;
                 if !row.rests() || is_close && moves {
+                    rest::wake(row);
                     touches.push(touch);
                 }
             }

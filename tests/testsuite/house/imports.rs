@@ -18,8 +18,15 @@ const LAW: [(&str, &[&str]); 10] = [
 ];
 
 /// Files besides those of vdb and capi that may contain `unsafe`.
-const UNSAFE: [&str; 4] =
-    ["src/base/cpu.rs", "src/context/pool.rs", "src/snow/grains/rows.rs", "src/snow/grains/solve.rs"];
+const UNSAFE: [&str; 7] = [
+    "src/base/cpu.rs",
+    "src/base/lanes.rs",
+    "src/context/pool.rs",
+    "src/snow/grains/layout.rs",
+    "src/snow/grains/rows.rs",
+    "src/snow/grains/shell.rs",
+    "src/snow/grains/solve.rs",
+];
 
 fn sources(folder: &Path, out: &mut Vec<PathBuf>) {
     for entry in fs::read_dir(folder).unwrap() {
