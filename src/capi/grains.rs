@@ -300,8 +300,7 @@ pub unsafe extern "C" fn frz_grains_params_init(params: *mut frz_grains_params, 
 ///
 /// params: NULL for the usual ones.
 /// restart: restart_bytes bytes of frz_grains_save of grains of the same radius: they come back bit for bit, on any number
-///     of threads. NULL: none. Bytes that are damaged so that it can be told, of another version or of another radius are
-///     FRZ_ERROR_FILE.
+///     of threads. NULL: none. Bytes that are damaged, of another version or of another radius are FRZ_ERROR_FILE.
 /// restart_bytes: 0 without a restart.
 /// out: receives the grains, to be destroyed with frz_grains_destroy; NULL after a failure.
 ///

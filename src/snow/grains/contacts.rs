@@ -1,7 +1,7 @@
 //! Pairs of grains that touch or may soon, each with the impulse that it carries from sub-step to sub-step.
 //!
-//! The pairs of a block are found when a grain near it has moved by half the skin, from where grains were then (`anchors`), so that
-//! no pair is missed before. They are solved eight at a time: a *batch* has eight pairs that share no grain, and every pair comes
+//! The pairs of a block are found again when a grain near it has moved by half the skin; as pairs are found by where grains were then
+//! (`anchors`), none is missed before. They are solved eight at a time: a *batch* has eight pairs that share no grain, and every pair comes
 //! after those before it in the sweep that have a grain in common with it, so that the result is that of one pair after the other.
 
 use std::sync::LazyLock;
@@ -25,7 +25,7 @@ pub const MOST: usize = 1 << INDEX;
 /// Eight pairs without a common grain. Lanes that are left over repeat the first one.
 #[derive(Clone, Copy)]
 pub struct Batch {
-    /// The grains that own them: of each pair the one that lies higher, or farther along x, then z.
+    /// The grains that own them: of each pair the one in the higher block, or in a block the one in the higher cell.
     pub owners: [u32; LANES],
     /// The other grains, and above their bits from which block.
     codes: [u32; LANES],
@@ -132,8 +132,8 @@ fn step_bits(step: [i32; 3]) -> u32 {
 }
 
 impl Layout {
-    /// Finds the pairs of blocks that changed and of those that own pairs with their grains. What they carry, is taken from their
-    /// old pairs, and from `held`.
+    /// Finds the pairs of blocks that changed and of those that own pairs with their grains. What they carry is taken from their
+    /// old pairs and from `held`.
     pub fn find_pairs(&mut self, held: &[Held]) {
         let blocks = &self.blocks;
         let is_listed = |block: &Block| {

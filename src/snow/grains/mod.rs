@@ -68,7 +68,12 @@ pub struct Grains {
     next_id: u32,
     /// Grains that blocks of the base have paid for and not got: fractions, mostly.
     owed: BTreeMap<Origin, f64>,
+    /// What rest depends on as a whole, as it was in the last step: see [`Grains::ties`].
+    ties: [f64; TIES],
 }
+
+/// Numbers in [`Grains::ties`].
+const TIES: usize = 8;
 
 /// What a step of grains reads.
 pub struct Surroundings<'a> {
@@ -125,7 +130,7 @@ impl Grains {
     pub fn new(params: Params) -> Result<Self> {
         params.validate()?;
         let heap = Heap::new(2.0 * params.radius);
-        Ok(Self { params, heap, births: Vec::new(), next_id: 0, owed: BTreeMap::new() })
+        Ok(Self { params, heap, births: Vec::new(), next_id: 0, owed: BTreeMap::new(), ties: [0.0; TIES] })
     }
 
     /// Resumes from what [`Grains::save`] wrote.
@@ -167,9 +172,6 @@ impl Grains {
         if params.radius != self.params.radius {
             let old = self.params.radius;
             return Err(Error::argument(format!("radius = {} cannot change, it is {old}", params.radius)));
-        }
-        if state::rest_depends_on(&params) != state::rest_depends_on(&self.params) {
-            self.heap.wake(|_| true);
         }
         self.params = params;
         Ok(())
@@ -244,6 +246,10 @@ impl Grains {
     ) -> Result<StepReport> {
         let before = self.clone();
         let stepped = ctx.step(["source", "colliders", "move"].len(), || {
+            let ties = self.ties(around);
+            if std::mem::replace(&mut self.ties, ties) != ties {
+                self.heap.wake(|_| true);
+            }
             let (born, removed_volume) = ctx.phase("source", || self.source(ctx, around, frame))?;
             let (mut colliders, way) = ctx.phase("colliders", || self.colliders(around, [from, to]))?;
             let sub_steps = self.params.sub_steps(to - from, way);
@@ -282,6 +288,15 @@ impl Grains {
             self.add(*place, [0.0; 3], frame)?;
         }
         Ok((places.len(), removals.iter().map(|removal| removal.volume).sum()))
+    }
+
+    /// What wakes all grains when it changes: gravity, what they are made of, and whether what they may rest on is there.
+    fn ties(&self, around: &Surroundings<'_>) -> [f64; TIES] {
+        let Params { gravity, friction, attraction, rests, .. } = self.params;
+        let has_base = around.base.after().is_some();
+        let (bodies, statics) = (around.bodies.len() as f64, around.statics.len() as f64);
+        let floor = around.floor.unwrap_or(f64::MIN);
+        [gravity, friction, attraction, f64::from(rests), f64::from(has_base), bodies, statics, floor]
     }
 
     /// Wakes the grains within a grain and a cell of blocks of the base (m a cell) that have lost snow.

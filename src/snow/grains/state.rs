@@ -5,16 +5,16 @@ use std::collections::BTreeMap;
 use rayon::prelude::*;
 use xxhash_rust::xxh3::xxh3_128;
 
+use super::Grains;
 use super::contacts::{Held, MOST};
 use super::heap::Heap;
 use super::layout::{EDGE, holds};
 use super::rows::Row;
 use super::touch::Touch;
-use super::{Grains, Params};
 use crate::error::{Error, Result};
 
 /// The first bytes: what it is, and its version.
-const MAGIC: &[u8; 8] = b"frzgrn03";
+const MAGIC: &[u8; 8] = b"frzgrn04";
 
 /// Writes little-endian numbers.
 #[derive(Default)]
@@ -95,7 +95,7 @@ pub fn save(grains: &Grains) -> Vec<u8> {
     let heap = &grains.heap;
     let mut to = Writer::default();
     to.f64(heap.diameter);
-    rest_depends_on(&grains.params).iter().for_each(|number| to.f64(*number));
+    grains.ties.iter().for_each(|number| to.f64(*number));
     to.u32(grains.next_id);
     to.count(heap.rows.len());
     for ((row, id), at) in heap.rows.iter().zip(&heap.ids).zip(&heap.at) {
@@ -141,9 +141,9 @@ pub fn load(grains: &mut Grains, bytes: &[u8]) -> Result<()> {
         return Err(wrong(format!("has grains of {diameter} m, not {}", grains.heap.diameter)));
     }
     let mut heap = Heap::new(diameter);
-    let is_same = rest_depends_on(&grains.params)
-        .iter()
-        .try_fold(true, |is_same, now| Ok(is_same & (from.f64()? == *now)))?;
+    for tie in &mut grains.ties {
+        *tie = from.f64()?;
+    }
     grains.next_id = from.u32()?;
     let count = from.count(ROW)?;
     if count > MOST || grains.next_id as usize > MOST {
@@ -188,17 +188,8 @@ pub fn load(grains: &mut Grains, bytes: &[u8]) -> Result<()> {
     if !from.0.is_empty() {
         return Err(wrong("has bytes behind its end"));
     }
-    if !is_same {
-        heap.wake(|_| true);
-    }
     grains.heap = heap;
     Ok(())
-}
-
-/// What wakes all grains when it changes: gravity and what grains are made of.
-pub fn rest_depends_on(params: &Params) -> [f64; 3] {
-    let Params { gravity, friction, attraction, .. } = *params;
-    [gravity, friction, attraction]
 }
 
 /// Bytes that are packed together.

@@ -429,6 +429,15 @@ fn grains_that_rest_wake_when_the_base_below_them_or_gravity_changes() {
     assert_eq!(step(&mut lighter, [last, last]), 0);
     let mut same = Grains::resume(params(), &grains.save()).unwrap();
     assert!(step(&mut same, [last, last]) >= resting);
+    // Nor may they rest on a floor that has gone.
+    let around = Surroundings {
+        base: Base::Whole([last, last]),
+        bodies: &[],
+        statics: &[],
+        floor: None,
+        lowest: -1.0,
+    };
+    assert_eq!(same.step(&ctx, &around, [0.0, 1.0 / 24.0], 99).unwrap().resting, 0);
     // The layer loses what the ball has not taken yet.
     let gone = step(&mut grains, [&story.layers[2], last]);
     assert!(gone < resting * 3 / 4, "{gone} of {resting}");
