@@ -60,6 +60,11 @@ static void lands(frz_context *ctx) {
     for (frame = 1; frame < 24; ++frame) WORKS(frz_grains_step(ctx, grains, NULL, NULL, 0, DT, frame, &report));
     WORKS(frz_grains_read(grains, FRZ_GRAINS_POSITION_DOUBLE, SPAN(place, 1)));
     CHECK(fabs(place[1] + 0.025) < 1e-4 && report.fastest < 1e-3);
+    {
+        int32_t active = -1;
+        WORKS(frz_grains_read(grains, FRZ_GRAINS_ACTIVE, SPAN(&active, 1)));
+        CHECK(active == 0 && report.resting == 1);
+    }
     params.flags = 0;
     WORKS(frz_grains_set_params(grains, &params));
     for (frame = 0; frame < 24 && grains_count(grains) > 0; ++frame) {
@@ -121,7 +126,7 @@ static void attributes(const frz_grains *grains, int last) {
     FAILS(frz_grains_read(grains, FRZ_GRAINS_POSITION_DOUBLE, into), FRZ_ERROR_ARGUMENT, "less than an element's 24");
     into.stride = (size_t)-1 / 2;
     FAILS(frz_grains_read(grains, FRZ_GRAINS_POSITION, into), FRZ_ERROR_ARGUMENT, "more than a memory holds");
-    FAILS(frz_grains_read(grains, 7, SPAN(ids, count)), FRZ_ERROR_ARGUMENT, "not a value of frz_grains_attribute");
+    FAILS(frz_grains_read(grains, 8, SPAN(ids, count)), FRZ_ERROR_ARGUMENT, "not a value of frz_grains_attribute");
     into.data = NULL, into.stride = 0;
     FAILS(frz_grains_read(grains, FRZ_GRAINS_POSITION, into), FRZ_ERROR_ARGUMENT, "dst: the data is NULL");
     free(all), free(places), free(rests), free(radii), free(ids), free(seen);

@@ -130,7 +130,7 @@ static void parameters(frz_context *ctx, const ball *rest, const frz_grid *snow)
             *wrong[i].field = good;
         }
         params.max_grains = 0;
-        FAILS(frz_grains_create(ctx, &params, NULL, 0, &none), FRZ_ERROR_ARGUMENT, "max_grains = 0 is not within 1 to 100000000");
+        FAILS(frz_grains_create(ctx, &params, NULL, 0, &none), FRZ_ERROR_ARGUMENT, "max_grains = 0 is not within 1 to 60000000");
         params.max_grains = (uint64_t)-1;
         FAILS(frz_grains_create(ctx, &params, NULL, 0, &none), FRZ_ERROR_ARGUMENT, "max_grains = ");
         params.max_grains = 5, params.sub_steps = 1001;

@@ -78,7 +78,7 @@ impl Heap {
 
     /// Number of grains that rest.
     pub fn resting(&self) -> usize {
-        self.rows.par_iter().filter(|row| row.rests()).count()
+        self.rows.iter().filter(|row| row.rests()).count()
     }
 
     /// Adds a grain with an identity of its own, at a place (m) with a velocity (m/s).

@@ -246,11 +246,13 @@ impl Grains {
     ) -> Result<StepReport> {
         let before = self.clone();
         let stepped = ctx.step(["source", "colliders", "move"].len(), || {
-            let ties = self.ties(around);
-            if std::mem::replace(&mut self.ties, ties) != ties {
-                self.heap.wake(|_| true);
-            }
-            let (born, removed_volume) = ctx.phase("source", || self.source(ctx, around, frame))?;
+            let (born, removed_volume) = ctx.phase("source", || {
+                let ties = self.ties(around);
+                if std::mem::replace(&mut self.ties, ties) != ties {
+                    self.heap.wake(|_| true);
+                }
+                self.source(ctx, around, frame)
+            })?;
             let (mut colliders, way) = ctx.phase("colliders", || self.colliders(around, [from, to]))?;
             let sub_steps = self.params.sub_steps(to - from, way);
             let division = Division { dt: to - from, sub_steps };

@@ -2,7 +2,6 @@
 
 use std::collections::BTreeMap;
 
-use rayon::prelude::*;
 use xxhash_rust::xxh3::xxh3_128;
 
 use super::Grains;
@@ -199,7 +198,7 @@ const SEAL: usize = 16;
 
 /// Bytes packed: magic, seal, and parts, each behind its length.
 fn pack(bytes: &[u8]) -> Vec<u8> {
-    let parts: Vec<Vec<u8>> = bytes.par_chunks(PART).map(lz4_flex::compress_prepend_size).collect();
+    let parts: Vec<Vec<u8>> = bytes.chunks(PART).map(lz4_flex::compress_prepend_size).collect();
     let mut out = MAGIC.to_vec();
     out.resize(MAGIC.len() + SEAL, 0);
     for part in parts {
@@ -220,7 +219,7 @@ pub fn unpacked(packed: &[u8]) -> u64 {
 /// What [`pack`] packed.
 fn unpack(packed: &[u8]) -> Result<Vec<u8>> {
     let whole = |part| lz4_flex::decompress_size_prepended(part).map_err(|error| wrong(error.to_string()));
-    let parts: Vec<Vec<u8>> = parts(packed)?.into_par_iter().map(whole).collect::<Result<_>>()?;
+    let parts: Vec<Vec<u8>> = parts(packed)?.into_iter().map(whole).collect::<Result<_>>()?;
     Ok(parts.concat())
 }
 
