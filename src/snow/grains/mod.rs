@@ -1,7 +1,8 @@
 //! Grains: snow that is pushed, piled and thrown (thesis section 3.3).
 //!
 //! They are born where the base layer was removed (`sourcing`), pushed by what moves (`shell`), lie on the base (`field`), pile up
-//! at their angle of repose (`solve`), come to rest (`rest`), and read the base layer without changing it. A step is divided into sub-steps (`heap`).
+//! at their angle of repose (`solve`), come to rest (`rest`), and read the base layer without changing it. A step is divided into
+//! sub-steps (`heap`).
 //!
 //! | word | meaning |
 //! |---|---|
@@ -70,10 +71,16 @@ pub struct Grains {
     owed: BTreeMap<Origin, f64>,
     /// What rest depends on as a whole, as it was in the last step: see [`Grains::ties`].
     ties: [f64; TIES],
+    /// The boxes (m) of the meshes at the end of the last step.
+    boxes: Vec<Bounds>,
 }
 
 /// Numbers in [`Grains::ties`].
-const TIES: usize = 8;
+const TIES: usize = 6;
+/// Least and greatest place of a box.
+type Bounds = [DVec3; 2];
+/// Farthest (diameters) that a mesh's box may jump between two steps: more, and what rested on it wakes.
+const JUMP: f64 = 0.1;
 
 /// What a step of grains reads.
 pub struct Surroundings<'a> {
@@ -130,7 +137,8 @@ impl Grains {
     pub fn new(params: Params) -> Result<Self> {
         params.validate()?;
         let heap = Heap::new(2.0 * params.radius);
-        Ok(Self { params, heap, births: Vec::new(), next_id: 0, owed: BTreeMap::new(), ties: [0.0; TIES] })
+        let (births, owed, boxes) = Default::default();
+        Ok(Self { params, heap, births, next_id: 0, owed, ties: [0.0; TIES], boxes })
     }
 
     /// Resumes from what [`Grains::save`] wrote.
@@ -253,7 +261,14 @@ impl Grains {
                 }
                 self.source(ctx, around, frame)
             })?;
-            let (mut colliders, way) = ctx.phase("colliders", || self.colliders(around, [from, to]))?;
+            let (mut colliders, way) = ctx.phase("colliders", || {
+                let (colliders, way, [first, last]) = self.colliders(around, [from, to])?;
+                if !is_near(&self.boxes, &first, JUMP * self.heap.diameter) {
+                    self.heap.wake(|_| true);
+                }
+                self.boxes = last;
+                Ok((colliders, way))
+            })?;
             let sub_steps = self.params.sub_steps(to - from, way);
             let division = Division { dt: to - from, sub_steps };
             let all = self.heap.count();
@@ -292,13 +307,12 @@ impl Grains {
         Ok((places.len(), removals.iter().map(|removal| removal.volume).sum()))
     }
 
-    /// What wakes all grains when it changes: gravity, what they are made of, and whether what they may rest on is there.
+    /// What wakes all grains when it changes, besides the meshes: gravity, what they are made of, whether base and floor are there.
     fn ties(&self, around: &Surroundings<'_>) -> [f64; TIES] {
         let Params { gravity, friction, attraction, rests, .. } = self.params;
         let has_base = around.base.after().is_some();
-        let (bodies, statics) = (around.bodies.len() as f64, around.statics.len() as f64);
         let floor = around.floor.unwrap_or(f64::MIN);
-        [gravity, friction, attraction, f64::from(rests), f64::from(has_base), bodies, statics, floor]
+        [gravity, friction, attraction, f64::from(rests), f64::from(has_base), floor]
     }
 
     /// Wakes the grains within a grain and a cell of blocks of the base (m a cell) that have lost snow.
@@ -309,25 +323,31 @@ impl Grains {
             let leaf =
                 |axis: usize, off: f64| ((place[axis] / cell + 0.5 + off).floor() as i32) & !(DIM as i32 - 1);
             let ends = [0, 1, 2].map(|axis| [leaf(axis, -reach), leaf(axis, reach)]);
-            let corners = (0..8).map(|corner| [0, 1, 2].map(|axis: usize| ends[axis][corner >> axis & 1]));
+            let mut corners =
+                (0..8).map(|corner| [0, 1, 2].map(|axis: usize| ends[axis][corner >> axis & 1]));
             let mut last = None;
-            corners
-                .into_iter()
-                .any(|corner| last.replace(corner) != Some(corner) && changed.contains(&corner))
+            corners.any(|corner| last.replace(corner) != Some(corner) && changed.contains(&corner))
         });
     }
 
-    /// What grains cannot move, and how far objects move in the step (m).
-    fn colliders<'a>(&self, around: &Surroundings<'a>, [from, to]: [f64; 2]) -> Result<(Colliders<'a>, f64)> {
+    /// What grains cannot move, how far objects move in the step (m), and the boxes of all meshes at its start and end.
+    fn colliders<'a>(
+        &self,
+        around: &Surroundings<'a>,
+        [from, to]: [f64; 2],
+    ) -> Result<(Colliders<'a>, f64, [Vec<Bounds>; 2])> {
         let floor = around.floor.map(|height| Floor { height, friction: GROUND });
         let field = |grid| Field { grid, friction: self.params.friction as f32 };
         let fields = around.base.after().map(field).into_iter().collect();
         let mut colliders = Colliders { floor, fields, shells: Vec::new() };
         let (mut way, mut number) = (0.0f64, touch::FIRST_SHELL);
+        let mut boxes = [Vec::new(), Vec::new()];
         for (body, friction) in around.bodies {
             let (mut first, mut last) = (Vec::new(), Vec::new());
             body.motion().pose(from, &mut first)?;
             body.motion().pose(to, &mut last)?;
+            boxes[0].push(bounds(&first));
+            boxes[1].push(bounds(&last));
             way = first.iter().zip(&last).map(|(a, b)| (b - a).norm()).fold(way, f64::max);
             let turn = |triangle: &[u32; 3]| {
                 if body.is_reversed() { [triangle[0], triangle[2], triangle[1]] } else { *triangle }
@@ -342,6 +362,7 @@ impl Grains {
         }
         for mesh in around.statics {
             let pose: Vec<DVec3> = mesh.positions.iter().map(|place| place.cast::<f64>()).collect();
+            boxes.iter_mut().for_each(|boxes| boxes.push(bounds(&pose)));
             let shell = Shell::new(number, GROUND, mesh.triangles.clone(), false, pose.clone());
             let rests = move |_: f64, out: &mut Vec<DVec3>| {
                 out.clone_from(&pose);
@@ -350,7 +371,7 @@ impl Grains {
             colliders.shells.push((shell, Box::new(rests)));
             number += 1;
         }
-        Ok((colliders, way))
+        Ok((colliders, way, boxes))
     }
 
     /// Places (m), in the order in which [`Grains::points`] has the grains, as all that follows.
@@ -387,7 +408,8 @@ impl Grains {
         self.heap.ids().iter().map(|id| &self.births[*id as usize])
     }
 
-    /// The grains as points: `v` (m/s), `id`, `active` (not where it rests), `pscale` (radius, m), `source_frame` and `rest` (place of birth, m).
+    /// The grains as points: `v` (m/s), `id`, `active` (not where it rests), `pscale` (radius, m), `source_frame` and `rest` (place
+    /// of birth, m).
     pub fn points(&self) -> Points {
         let (mut cells, mut offsets) = (Vec::new(), Vec::new());
         for (at, place) in self.heap.located() {
@@ -410,4 +432,16 @@ impl Grains {
         ];
         Points { voxel_size: self.heap.diameter, cells, offsets, attributes }
     }
+}
+
+/// The box of some places.
+fn bounds(places: &[DVec3]) -> Bounds {
+    let none = [DVec3::repeat(f64::MAX), DVec3::repeat(f64::MIN)];
+    places.iter().fold(none, |[low, high], place| [low.inf(place), high.sup(place)])
+}
+
+/// Whether boxes are the same but for a distance.
+fn is_near(boxes: &[Bounds], others: &[Bounds], most: f64) -> bool {
+    let differ = |(a, b): (&Bounds, &Bounds)| a.iter().zip(b).any(|(a, b)| (a - b).amax() > most);
+    boxes.len() == others.len() && !boxes.iter().zip(others).any(differ)
 }

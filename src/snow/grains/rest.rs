@@ -1,7 +1,7 @@
 //! Rest (thesis section 3.3.3) as a part of the model: a grain that something supports and that has stayed within a small part of
 //! its diameter for a while stops, and holds what lies on it like the ground. It wakes when a neighbour that moves touches it,
-//! when a surface that moves does, and when the base layer near it changes; gravity, a material, and an object that comes or goes
-//! wake all. What rests next to nothing that is awake need not be visited: that is only speed.
+//! when a surface that moves does, and when the base layer near it changes; gravity, a material, and an object that comes, goes
+//! or jumps wake all. What rests next to nothing that is awake need not be visited: that is only speed.
 
 use super::rows::{Row, SUPPORTED, dot, sub};
 

@@ -10,10 +10,11 @@ use super::heap::Heap;
 use super::layout::{EDGE, holds};
 use super::rows::Row;
 use super::touch::Touch;
+use crate::base::DVec3;
 use crate::error::{Error, Result};
 
 /// The first bytes: what it is, and its version.
-const MAGIC: &[u8; 8] = b"frzgrn04";
+const MAGIC: &[u8; 8] = b"frzgrn05";
 
 /// Writes little-endian numbers.
 #[derive(Default)]
@@ -95,6 +96,8 @@ pub fn save(grains: &Grains) -> Vec<u8> {
     let mut to = Writer::default();
     to.f64(heap.diameter);
     grains.ties.iter().for_each(|number| to.f64(*number));
+    to.count(grains.boxes.len());
+    grains.boxes.iter().flatten().flat_map(|corner| corner.iter()).for_each(|number| to.f64(*number));
     to.u32(grains.next_id);
     to.count(heap.rows.len());
     for ((row, id), at) in heap.rows.iter().zip(&heap.ids).zip(&heap.at) {
@@ -142,6 +145,10 @@ pub fn load(grains: &mut Grains, bytes: &[u8]) -> Result<()> {
     let mut heap = Heap::new(diameter);
     for tie in &mut grains.ties {
         *tie = from.f64()?;
+    }
+    for _ in 0..from.count(48)? {
+        let mut corner = || Ok(DVec3::new(from.f64()?, from.f64()?, from.f64()?));
+        grains.boxes.push([corner()?, corner()?]);
     }
     grains.next_id = from.u32()?;
     let count = from.count(ROW)?;
