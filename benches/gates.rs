@@ -8,6 +8,8 @@ mod bytes;
 mod cancel;
 #[path = "gates/capi.rs"]
 mod capi;
+#[path = "gates/cohesion.rs"]
+mod cohesion;
 #[path = "../tests/common/mod.rs"]
 mod common;
 #[path = "gates/damage.rs"]
@@ -60,6 +62,7 @@ fn main() {
     bytes::run(&mut h);
     readers::run(&mut h);
     grains::run(&mut h);
+    cohesion::run(&mut h);
     shot::run(&mut h);
     capi::run(&mut h);
     cancel::run(&mut h);

@@ -25,22 +25,22 @@ pub fn run(h: &mut Harness) {
 }
 
 /// Grains and what moves them.
-struct Experiment {
-    ctx: Context,
-    params: Params,
-    heap: Heap,
-    division: Division,
-    colliders: Colliders<'static>,
-    random: Random,
+pub struct Experiment {
+    pub ctx: Context,
+    pub params: Params,
+    pub heap: Heap,
+    pub division: Division,
+    pub colliders: Colliders<'static>,
+    pub random: Random,
     /// Whether what rests is visited too.
     visits_all: bool,
 }
 
 /// Numbers in 0..1 (xorshift: Marsaglia 2003).
-struct Random(u64);
+pub struct Random(u64);
 
 impl Random {
-    fn next(&mut self) -> f64 {
+    pub fn next(&mut self) -> f64 {
         self.0 ^= self.0 << 13;
         self.0 ^= self.0 >> 7;
         self.0 ^= self.0 << 17;
@@ -49,7 +49,7 @@ impl Random {
 }
 
 impl Experiment {
-    fn new(threads: usize, diameter: f64, friction: f64, seed: u64) -> Self {
+    pub fn new(threads: usize, diameter: f64, friction: f64, seed: u64) -> Self {
         let params = Params { radius: 0.5 * diameter, friction, ..Params::for_cell(1.5 * diameter) };
         let division = Division { dt: FRAME, sub_steps: params.sub_steps(FRAME, 0.0) };
         let floor = Some(Floor { height: 0.0, friction: friction as f32 });
@@ -58,11 +58,11 @@ impl Experiment {
         Self { ctx, params, heap, division, colliders, random: Random(seed * 7919 + 1), visits_all: false }
     }
 
-    fn diameter(&self) -> f64 {
+    pub fn diameter(&self) -> f64 {
         2.0 * self.params.radius
     }
 
-    fn step(&mut self) {
+    pub fn step(&mut self) {
         let Self { ctx, params, heap, division, colliders, visits_all, .. } = self;
         let mut coefficients = params.coefficients(division);
         coefficients.visits_all = *visits_all;

@@ -33,6 +33,7 @@ pub const GATES: &[Gate] = &[
     // Deep beds.
     gate("snow.grains.bed_overlap", "%", Most(5.0), Most(2.0)),
     // Rest: what it changes (nothing where it is only speed), and what it saves.
+    yes("snow.grains.wall"),
     yes("snow.grains.rest_bytes"),
     gate("snow.grains.rest_angle", "deg", Most(0.5), Open),
     gate("snow.grains.rest_gain", "x", Least(3.0), Least(8.0)),

@@ -13,7 +13,7 @@ use super::mesh::no_flags;
 use super::views::{Sized32, fill, finite, frz_view, sized, within};
 use crate::context::Context;
 use crate::error::Error;
-use crate::snow::grains::{Base, Grains, Params, Surroundings, memory};
+use crate::snow::grains::{Base, Grains, Object, Params, Surroundings, memory};
 use crate::vdb::{FloatGrid, GridClass};
 
 /// Flag of parameters of grains: a level ground lies at frz_grains_params.floor.
@@ -116,8 +116,11 @@ impl frz_grains_params {
             compression: self.compression,
             friction: self.friction,
             attraction: self.attraction,
+            restitution: 0.0,
             air: self.air,
             gravity: self.gravity,
+            lifetime: None,
+            keep_box: None,
             rests: self.flags & FRZ_GRAINS_RESTLESS == 0,
             sub_steps: Some(self.sub_steps).filter(|&count| count > 0),
             most: self.max_grains as usize,
@@ -233,9 +236,9 @@ impl Heap {
             let (count, resting) = (self.grains.count() as u64, self.grains.resting() as u64);
             return Ok(frz_grains_report { count, resting, ..frz_grains_report::NOTHING });
         }
-        let bodies: Vec<_> = bodies.iter().map(|(body, friction)| (body, *friction)).collect();
+        let objects: Vec<_> = bodies.iter().map(|(body, friction)| Object::new(body, *friction)).collect();
         let Ground { floor, lowest } = self.ground;
-        let around = Surroundings { base, bodies: &bodies, statics: &[], floor, lowest };
+        let around = Surroundings { base, objects: &objects, statics: &[], floor, lowest };
         let done = self.grains.step(ctx, &around, [0.0, dt], frame)?;
         self.packed().take();
         Ok(frz_grains_report {

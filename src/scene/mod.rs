@@ -123,12 +123,47 @@ pub struct KeyPose {
 /// What an object does to the snow.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Role {
-    /// It moves through the snow and takes away what it touches.
+    /// It moves through the snow, takes away what it touches, and pushes grains.
     Collide,
+    /// It takes snow away, and pushes no grains.
+    Base,
+    /// It pushes grains, and takes no snow away.
+    Grains,
     /// The snow lies on it from the start.
     Static,
     /// Nothing.
     Ignore,
+}
+
+impl Role {
+    /// Those of objects that move.
+    pub const MOVING: [Self; 3] = [Self::Collide, Self::Base, Self::Grains];
+
+    /// Whether its object moves.
+    pub fn moves(self) -> bool {
+        Self::MOVING.contains(&self)
+    }
+
+    /// Whether its object takes snow away.
+    pub fn removes(self) -> bool {
+        matches!(self, Self::Collide | Self::Base)
+    }
+
+    /// Whether its object pushes grains.
+    pub fn pushes(self) -> bool {
+        matches!(self, Self::Collide | Self::Grains)
+    }
+
+    /// As a scene writes it.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Collide => "collide",
+            Self::Base => "base",
+            Self::Grains => "grains",
+            Self::Static => "static",
+            Self::Ignore => "ignore",
+        }
+    }
 }
 
 /// What is written.
@@ -207,6 +242,7 @@ impl Scene {
         if let Some(snow) = &self.snow {
             out.extend(snow.files().map(|(_, path)| path.clone()));
         }
+        out.extend(self.values.get("grains.initial").and_then(Value::path).map(Path::to_path_buf));
         for object in &self.objects {
             let first = f64::from(self.shot.frames.first) - object.offset;
             out.push(match Pattern::parse(&object.file) {

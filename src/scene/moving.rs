@@ -2,13 +2,13 @@
 
 use std::path::PathBuf;
 
-use super::{Role, Scene};
+use super::Scene;
 use crate::io::sequence::Pattern;
 use crate::io::usd;
 
 /// The sequences of the objects that move, each with its offset (frames).
 fn sequences(scene: &Scene) -> impl Iterator<Item = (Pattern, f64)> + '_ {
-    let moving = scene.objects.iter().filter(|object| object.role == Role::Collide);
+    let moving = scene.objects.iter().filter(|object| object.role.moves());
     moving.filter_map(|object| Some((Pattern::parse(&object.file)?, object.offset)))
 }
 
@@ -32,7 +32,7 @@ pub(super) fn files_ahead(scene: &Scene, frame: i32) -> Vec<PathBuf> {
 /// Names of the moving objects' prims, each once.
 pub(super) fn prim_names(scene: &Scene) -> Vec<String> {
     let mut names: Vec<String> = Vec::new();
-    for object in scene.objects.iter().filter(|object| object.role == Role::Collide) {
+    for object in scene.objects.iter().filter(|object| object.role.moves()) {
         let stem = object.file.file_stem().unwrap_or_default().to_string_lossy().into_owned();
         let stem =
             usd::prim_name(stem.split(['%', '#', '$']).next().unwrap_or("").trim_end_matches(['.', '_']));

@@ -79,7 +79,7 @@ impl Stage for Objects<'_> {
     }
 
     fn settings(&self) -> Result<Settings> {
-        settings_of(self.scene, self.name(), self.seen, &[Role::Collide])
+        settings_of(self.scene, self.name(), self.seen, &Role::MOVING)
     }
 
     fn of_first_state(&self, _settings: &Settings) -> Settings {

@@ -16,6 +16,13 @@ const PILES: [(f64, f64); 8] = [
 /// Steepest angle of repose (degrees) that [`of_repose`] knows.
 pub const STEEPEST: f64 = 42.0;
 
+/// The angle of repose (degrees) of piles with a friction; the reverse of [`of_repose`].
+pub fn repose_of(friction: f64) -> f64 {
+    let above = PILES.iter().position(|(_, most)| *most >= friction).unwrap_or(PILES.len() - 1).max(1);
+    let [(low, least), (high, most)] = [PILES[above - 1], PILES[above]];
+    low + (high - low) * ((friction - least) / (most - least)).clamp(0.0, 1.0)
+}
+
 /// The friction whose poured pile has an angle of repose (degrees), 0..=[`STEEPEST`].
 pub fn of_repose(repose: f64) -> f64 {
     let above = PILES.iter().position(|(angle, _)| *angle >= repose).unwrap_or(PILES.len() - 1).max(1);

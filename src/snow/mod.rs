@@ -2,6 +2,7 @@
 
 #[cfg(feature = "vdb")]
 pub mod base_layer;
+pub mod grain_cohesion;
 pub mod grain_friction;
 #[cfg(feature = "vdb")]
 pub mod grains;

@@ -12,7 +12,7 @@ use crate::scene::shot::{
 };
 use crate::scene::{BaseMode, Scene, moving};
 use crate::snow::base_layer::{BaseLayer, Changes, Grids, Params, StepReport};
-use crate::sweep::TOLERANCE;
+use crate::sweep::{Body, TOLERANCE};
 use crate::vdb::file::{self, WriteOptions, to_bytes};
 use crate::vdb::{FloatGrid, MetaValue};
 
@@ -151,7 +151,10 @@ impl Stepping for Base<'_> {
         let time = |frame: i32| f64::from(frame) / self.scene.shot.fps;
         // The first frame's poses are cut out; nothing has moved yet.
         let from = if self.is_first(frame) { frame } else { frame - 1 };
-        let report = layer.step(ctx, &self.inputs.bodies, time(from), time(frame), frame);
+        let moving = self.scene.objects.iter().filter(|object| object.role.moves());
+        let removing = self.inputs.bodies.iter().zip(moving).filter(|(_, object)| object.role.removes());
+        let bodies: Vec<&Body> = removing.map(|(body, _)| body).collect();
+        let report = layer.step(ctx, &bodies, time(from), time(frame), frame);
         let report = report.map_err(|error| match error {
             Error::Argument(what) => Error::file(&self.scene.path, format!("frame {frame}: {what}")),
             other => other,

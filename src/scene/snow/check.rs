@@ -41,7 +41,7 @@ pub struct Report {
 pub struct ObjectReport {
     /// Its file.
     pub file: String,
-    /// collide or static.
+    /// collide, base or grains.
     pub role: &'static str,
     /// Its triangles.
     pub triangles: usize,

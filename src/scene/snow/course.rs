@@ -10,7 +10,7 @@ use crate::base::{DVec3, faults};
 use crate::context::Context;
 use crate::error::{Error, Result};
 use crate::motion::{Motion, Poses, span};
-use crate::scene::{Object, Role, Scene};
+use crate::scene::{Object, Scene};
 use crate::snow::base_layer::Reach;
 use crate::sweep::{Body, REACH};
 
@@ -53,7 +53,7 @@ impl<'a> Course<'a> {
     /// # Errors
     /// A frame that cannot be read or fits no other; cancel.
     pub fn all(ctx: &Context, scene: &'a Scene, inputs: &'a Inputs) -> Result<Vec<Self>> {
-        let colliders = scene.objects.iter().enumerate().filter(|(_, object)| object.role == Role::Collide);
+        let colliders = scene.objects.iter().enumerate().filter(|(_, object)| object.role.moves());
         let of = |((index, object), body): ((usize, &'a Object), &'a Body)| {
             let name = format!("object {} ({})", index + 1, crate::scene::text::name(&object.file));
             let extents = ctx.phase("inputs", || extents(ctx, scene, body))?;
@@ -73,7 +73,7 @@ impl<'a> Course<'a> {
         let fastest = self.extents.iter().fold(first, faster);
         Ok(ObjectReport {
             file: self.object.file.display().to_string(),
-            role: "collide",
+            role: self.object.role.name(),
             triangles: self.body.motion().triangles().len(),
             closed_loops: self.body.closed_loops(),
             holes: self.holes()?,

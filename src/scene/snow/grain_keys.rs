@@ -1,7 +1,8 @@
 //! The keys of `[grains]`, and those that grains have of each object.
 
-use crate::scene::text::Values;
+use crate::error::Result;
 use crate::scene::text::key::{Key, Kind, OBJECT, Scope};
+use crate::scene::text::{FAR, Table, Values};
 use crate::snow::grain_friction;
 
 type Scopes = &'static [(&'static str, Scope)];
@@ -10,6 +11,15 @@ const STEP: Scopes = &[("grains", Scope::Step)];
 
 /// All of them.
 pub const GRAIN_KEYS: &[Key] = &[
+    Key::new(
+        "grains",
+        "preset",
+        Kind::Choice(&["powder", "packed", "wet"]),
+        "kind of snow: what is left out below is then as it has it",
+    )
+    .or_nothing()
+    .such_as("\"powder\"")
+    .concerns(STEP),
     Key::new("grains", "radius", Kind::Cells(0.02, 0.5), "of a grain (m); a third of a cell")
         .or_cells(1.0 / 3.0)
         .concerns(FIRST),
@@ -20,6 +30,7 @@ pub const GRAIN_KEYS: &[Key] = &[
         "share of the removed snow that is pressed together and becomes no grains",
     )
     .or("0.75")
+    .with_presets(&[("powder", "0.8"), ("packed", "0.5"), ("wet", "0.7")])
     .concerns(STEP),
     Key::new(
         "grains",
@@ -28,6 +39,16 @@ pub const GRAIN_KEYS: &[Key] = &[
         "slope at which a poured pile comes to rest",
     )
     .or("32.0")
+    .with_presets(&[("powder", "36.0"), ("packed", "38.0"), ("wet", "34.0")])
+    .concerns(STEP),
+    Key::new(
+        "grains",
+        "stands",
+        Kind::Number(0.0, 1000.0, "m"),
+        "height of a wall of grains that just stands (m)",
+    )
+    .or("0.0")
+    .with_presets(&[("packed", "0.1"), ("wet", "0.25")])
     .concerns(STEP),
     Key::new(
         "grains",
@@ -42,7 +63,16 @@ pub const GRAIN_KEYS: &[Key] = &[
         "grains",
         "attraction",
         Kind::Number(0.0, 1000.0, "weights of a grain"),
-        "with which grains that all but touch hold each other",
+        "with which grains that all but touch hold each other, in place of stands",
+    )
+    .or_nothing()
+    .such_as("4.0")
+    .concerns(STEP),
+    Key::new(
+        "grains",
+        "restitution",
+        Kind::Number(0.0, 1.0, ""),
+        "share of their speed with which grains bounce off",
     )
     .or("0.0")
     .concerns(STEP),
@@ -53,6 +83,7 @@ pub const GRAIN_KEYS: &[Key] = &[
         "share of its velocity that a grain keeps in a second",
     )
     .or("0.5")
+    .with_presets(&[("powder", "0.3"), ("wet", "0.8")])
     .concerns(STEP),
     Key::new("grains", "gravity", Kind::Number(-100.0, 100.0, "m/s2"), "along y (m/s2)")
         .or("-9.81")
@@ -82,13 +113,72 @@ pub const GRAIN_KEYS: &[Key] = &[
     )
     .or("20000000")
     .concerns(STEP),
+    Key::new(
+        "grains",
+        "lifetime",
+        Kind::Number(0.001, 1.0e6, "s"),
+        "a grain is taken away when it is so old (s)",
+    )
+    .or_nothing()
+    .such_as("10.0")
+    .concerns(STEP),
+    Key::new(
+        "grains",
+        "keep_box",
+        Kind::Numbers(6, FAR, "m"),
+        "grains outside of it are taken away: x0, y0, z0, x1, y1, z1 (m)",
+    )
+    .or_nothing()
+    .such_as("[-3.0, -1.0, -3.0, 3.0, 3.0, 3.0]")
+    .concerns(STEP),
+    Key::new(
+        "grains",
+        "initial",
+        Kind::File(&["ply", "vdb"]),
+        "points that are grains at the first frame, with their velocities v, if they have some",
+    )
+    .or_nothing()
+    .such_as("\"drift.ply\"")
+    .concerns(FIRST),
     Key::new("grains", "seed", Kind::Whole(0, i32::MAX as i64), "another one scatters new grains otherwise")
         .or("0")
         .concerns(STEP),
+    Key::new(
+        OBJECT,
+        "compression",
+        Kind::Number(0.0, 1.0, ""),
+        "in place of grains.compression, of the snow that it removes",
+    )
+    .or_nothing()
+    .such_as("0.9")
+    .concerns(STEP),
+    Key::new(
+        OBJECT,
+        "stick",
+        Kind::Number(0.0, 1000.0, "weights of a grain"),
+        "with which it holds the grains that touch it",
+    )
+    .or("0.0")
+    .concerns(STEP),
     Key::new(OBJECT, "friction", Kind::Number(0.0, 10.0, ""), "of grains against it")
         .or("0.3")
         .concerns(STEP),
 ];
+
+/// Checks what single keys do not show.
+///
+/// # Errors
+/// A box without a volume.
+pub fn check_grains(table: &Table, values: &Values) -> Result<()> {
+    let keep_box = values.get("grains.keep_box").and_then(|value| value.numbers());
+    if let Some([x0, y0, z0, x1, y1, z1]) = keep_box
+        && (x1 <= x0 || y1 <= y0 || z1 <= z0)
+    {
+        let what = "must be [x0, y0, z0, x1, y1, z1] with x0 < x1, y0 < y1 and z0 < z1";
+        return Err(table.error("keep_box", what));
+    }
+    Ok(())
+}
 
 /// Whether a scene has grains.
 pub fn has_grains(values: &Values) -> bool {

@@ -1,20 +1,26 @@
 //! The stage `grains`: snow that was removed from the base, pushed, piled and thrown.
 
+use std::path::Path;
+
 use serde_json::json;
 
 use super::base;
 use super::inputs::Inputs;
+use crate::base::DVec3;
+use crate::base::points::Values;
 use crate::context::Context;
 use crate::error::{Error, Result};
 use crate::io::manifest::Keeps;
+use crate::io::mesh::extension;
 use crate::io::{points_ply, usd_points};
 use crate::scene::shot::{FrameFiles, Kind, Reads, Report, Settings, Stage, Stepped, Stepping, Stored, To};
 use crate::scene::text::key::Scope;
 use crate::scene::text::keys::{self, settings_of};
-use crate::scene::{Role, Scene, moving};
+use crate::scene::{self, Role, Scene, moving};
 use crate::snow::base_layer::{Grids, initial};
-use crate::snow::grain_friction;
-use crate::snow::grains::{self, Base, Params, StepReport, Surroundings};
+use crate::snow::grains::{self, Base, Object, Params, StepReport, Surroundings};
+use crate::snow::{grain_cohesion, grain_friction};
+use crate::sweep::Body;
 use crate::vdb::file::WriteOptions;
 use crate::vdb::points;
 
@@ -22,8 +28,8 @@ use crate::vdb::points;
 pub struct Grains<'a> {
     scene: &'a Scene,
     inputs: &'a Inputs,
-    /// Friction of each moving object.
-    frictions: Vec<f64>,
+    /// What grains have of each moving object.
+    objects: Vec<Object<'a>>,
 }
 
 /// What the stage carries from frame to frame.
@@ -42,11 +48,20 @@ const BELOW: f64 = 1.0;
 impl<'a> Grains<'a> {
     /// Those of a scene.
     pub fn new(scene: &'a Scene, inputs: &'a Inputs) -> Self {
-        let moving = scene.objects.iter().enumerate().filter(|(_, object)| object.role == Role::Collide);
-        let friction =
-            |index: usize| scene.values.of_object(index, "friction").and_then(|value| value.number());
-        let frictions = moving.map(|(index, _)| friction(index).unwrap_or(0.0)).collect();
-        Self { scene, inputs, frictions }
+        let moving = scene.objects.iter().enumerate().filter(|(_, object)| object.role.moves());
+        let object = |((index, object), body): ((usize, &scene::Object), &'a Body)| {
+            let number = |name: &str| scene.values.of_object(index, name).and_then(|value| value.number());
+            Object {
+                body,
+                friction: number("friction").unwrap_or(0.0),
+                stick: number("stick").unwrap_or(0.0),
+                compression: number("compression"),
+                removes: object.role.removes(),
+                pushes: object.role.pushes(),
+            }
+        };
+        let objects = moving.zip(&inputs.bodies).map(object).collect();
+        Self { scene, inputs, objects }
     }
 
     fn params(&self) -> Params {
@@ -55,18 +70,53 @@ impl<'a> Grains<'a> {
         let whole = |name: &str| values.get(&format!("grains.{name}")).and_then(|value| value.whole());
         let usual = Params::for_cell(self.inputs.snow.cell);
         let of_repose = || number("repose_angle_deg").map(grain_friction::of_repose);
+        let radius = number("radius").unwrap_or(usual.radius);
+        let friction = number("friction").or_else(of_repose).unwrap_or(usual.friction);
+        let of_wall =
+            || number("stands").map(|height| grain_cohesion::of_wall(height, 2.0 * radius, friction));
+        let keep_box = values.get("grains.keep_box").and_then(|value| value.numbers());
         Params {
-            radius: number("radius").unwrap_or(usual.radius),
+            radius,
             compression: number("compression").unwrap_or(usual.compression),
-            friction: number("friction").or_else(of_repose).unwrap_or(usual.friction),
-            attraction: number("attraction").unwrap_or(usual.attraction),
+            friction,
+            attraction: number("attraction").or_else(of_wall).unwrap_or(usual.attraction),
+            restitution: number("restitution").unwrap_or(usual.restitution),
             air: number("air").unwrap_or(usual.air),
             gravity: number("gravity").unwrap_or(usual.gravity),
             rests: values.get("grains.rest").and_then(|value| value.flag()).unwrap_or(usual.rests),
+            lifetime: number("lifetime"),
+            keep_box: keep_box.map(|[a, b, c, d, e, f]| [DVec3::new(a, b, c), DVec3::new(d, e, f)]),
             sub_steps: whole("substeps").map(|count| count as u32),
             most: whole("max").map_or(usual.most, |most| most as usize),
             seed: whole("seed").unwrap_or(0) as u64,
         }
+    }
+
+    /// The grains before the first frame: those of a file, or none.
+    fn initial(&self) -> Result<grains::Grains> {
+        let mut grains = grains::Grains::new(self.params())?;
+        let Some(path) = self.initial_file() else { return Ok(grains) };
+        self.inputs.seen.hash(path)?;
+        let (places, attributes) = if extension(path) == "ply" {
+            let cloud = points_ply::read(path)?;
+            (cloud.places, cloud.attributes)
+        } else {
+            let points = points::read(path, None)?;
+            ((0..points.count()).map(|index| points.position(index)).collect(), points.attributes)
+        };
+        let velocity = attributes.iter().find(|attribute| attribute.name == "v");
+        let velocities: Vec<[f32; 3]> = match velocity.map(|attribute| &attribute.values) {
+            Some(Values::Vector(column)) => (0..places.len()).map(|index| column.get(index)).collect(),
+            Some(_) => return Err(Error::file(path, "has an attribute v that is no vector")),
+            None => Vec::new(),
+        };
+        let added = grains.emit(&places, &velocities, self.scene.shot.frames.first);
+        added.map_err(|error| Error::file(path, format!("as grains: {error}")))?;
+        Ok(grains)
+    }
+
+    fn initial_file(&self) -> Option<&Path> {
+        self.scene.values.get("grains.initial").and_then(|value| value.path())
     }
 
     /// The layer after a frame; from the one before it, where that is at hand and the frame keeps its changes.
@@ -88,7 +138,6 @@ impl<'a> Grains<'a> {
         layers: [&Grids; 2],
         frame: i32,
     ) -> Result<StepReport> {
-        let bodies: Vec<_> = self.inputs.bodies.iter().zip(self.frictions.iter().copied()).collect();
         let mut statics: Vec<_> = self.inputs.statics().iter().collect();
         let mut floor = None;
         match self.inputs.made() {
@@ -100,7 +149,7 @@ impl<'a> Grains<'a> {
         let bottom = surface.active_bbox().map_or(0.0, |(low, _)| f64::from(low[1]) * surface.voxel_size());
         let around = Surroundings {
             base: Base::Whole([&layers[0].surface, surface]),
-            bodies: &bodies,
+            objects: &self.objects,
             statics: &statics,
             floor,
             lowest: floor.map_or(bottom, |floor| floor.min(bottom)) - BELOW,
@@ -136,13 +185,15 @@ impl Stage for Grains<'_> {
     }
 
     fn settings(&self) -> Result<Settings> {
-        let mut settings =
-            settings_of(self.scene, self.name(), &self.inputs.seen, &[Role::Collide, Role::Static])?;
+        let roles = [&Role::MOVING[..], &[Role::Static]].concat();
+        let mut settings = settings_of(self.scene, self.name(), &self.inputs.seen, &roles)?;
         let files = self.scene.snow.iter().flat_map(|snow| snow.files());
-        for (key, path) in files.filter(|(key, _)| *key == "snow.ground") {
+        let initial = self.initial_file().map(Path::to_path_buf);
+        let ground = files.filter(|(key, _)| *key == "snow.ground").map(|(key, path)| (key, path.clone()));
+        for (key, path) in ground.chain(initial.map(|path| ("grains.initial", path))) {
             settings.insert(
                 key.into(),
-                format!("{}{}", crate::scene::shot::CONTENT, self.inputs.seen.hash(path)?),
+                format!("{}{}", crate::scene::shot::CONTENT, self.inputs.seen.hash(&path)?),
             );
         }
         Ok(settings)
@@ -178,7 +229,7 @@ impl Stepping for Grains<'_> {
 
     fn load(&self, _ctx: &Context, done: &Stored, after: Option<i32>) -> Result<State> {
         let grains = match after {
-            None => grains::Grains::new(self.params()),
+            None => self.initial(),
             Some(frame) => {
                 let path = done.state_file(frame)?;
                 let bytes = std::fs::read(&path).map_err(|error| Error::io(&path, "read", error))?;
@@ -241,8 +292,10 @@ fn told(report: &StepReport) -> Report {
         "grains": report.count,
         "born": report.born,
         "resting": report.resting,
+        "trapped": report.trapped,
         "owed": report.owed,
         "dropped": report.dropped,
+        "expired": report.expired,
         "removed_m3": report.removed_volume,
         "sub_steps": report.sub_steps,
         "fastest_m_per_s": report.fastest,

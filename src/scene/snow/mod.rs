@@ -28,7 +28,7 @@ mod settings;
 #[cfg(feature = "vdb")]
 mod walks;
 
-pub(super) use grain_keys::{GRAIN_KEYS, has_grains};
+pub(super) use grain_keys::{GRAIN_KEYS, check_grains, has_grains};
 pub(super) use keys::KEYS;
 #[cfg(feature = "vdb")]
 pub use {

@@ -12,7 +12,7 @@ use crate::scene::{Role, Scene, shot};
 /// # Errors
 /// An input that cannot be read.
 pub(super) fn of_base(scene: &Scene, seen: &Seen) -> Result<Settings> {
-    let mut settings = settings_of(scene, "base", seen, &[Role::Collide, Role::Static])?;
+    let mut settings = settings_of(scene, "base", seen, &[Role::Collide, Role::Base, Role::Static])?;
     for (key, path) in scene.snow.iter().flat_map(|snow| snow.files()) {
         settings.insert(key.into(), format!("{}{}", shot::CONTENT, seen.hash(path)?));
     }

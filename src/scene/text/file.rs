@@ -6,7 +6,7 @@ use super::overrides::Override;
 use super::table::{Document, Table};
 use super::values::Values;
 use crate::error::{Error, Result};
-use crate::scene::{Object, Output, Scene, Shot, Snow};
+use crate::scene::{Object, Output, Scene, Shot, Snow, snow};
 use std::path::{Path, PathBuf};
 use toml::de::DeTable;
 
@@ -133,6 +133,7 @@ fn check(name: &str, table: &Table, values: &Values) -> Result<()> {
     match name {
         "snow" => Snow::check(table, values),
         "snow.noise" => Snow::check_noise(table, values),
+        "grains" => snow::check_grains(table, values),
         "output" => Output::check(table, values),
         _ => Ok(()),
     }

@@ -78,6 +78,8 @@ pub struct Key {
     pub kind: Kind,
     /// What is taken where it is left out.
     pub fallback: Fallback,
+    /// What is taken instead where the table's `preset` has one of these names, as a scene writes it.
+    pub presets: &'static [(&'static str, &'static str)],
     /// Its line in a scene to begin with.
     pub example: Example,
     /// Whether it is for characters only.
@@ -96,6 +98,7 @@ impl Key {
             name,
             kind,
             fallback: Fallback::Required,
+            presets: &[],
             example: Example::Default,
             of_characters: false,
             meaning,
@@ -111,6 +114,11 @@ impl Key {
     /// What is taken where it is left out: so many cells.
     pub const fn or_cells(self, cells: f64) -> Self {
         Self { fallback: Fallback::Cells(cells), ..self }
+    }
+
+    /// What is taken instead where the table's `preset` has one of these names.
+    pub const fn with_presets(self, presets: &'static [(&'static str, &'static str)]) -> Self {
+        Self { presets, ..self }
     }
 
     /// It may be left out, and then has no value.

@@ -64,8 +64,8 @@ const OBJECTS: &[Key] = &[
     Key::new(
         OBJECT,
         "role",
-        Kind::Choice(&["collide", "static", "ignore"]),
-        "collide, static (the snow lies on it from the start) or ignore",
+        Kind::Choice(&["collide", "base", "grains", "static", "ignore"]),
+        "collide, base (takes snow, pushes no grains), grains (pushes grains, takes no snow), static (the snow lies on it from the start) or ignore",
     )
     .or("\"collide\"")
     .concerns(MOVES),

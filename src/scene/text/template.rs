@@ -83,6 +83,8 @@ pub(super) fn reference_of(keys: &[Key]) -> String {
                 Fallback::Is(value) => format!("`{value}`"),
                 Fallback::Cells(cells) => format!("{cells} cells"),
             };
+            let presets = key.presets.iter().map(|(name, value)| format!("; {name} `{value}`"));
+            let default = default + &presets.collect::<String>();
             let _ = writeln!(out, "| `{}` | {} | {default} | {} |", key.name, holds(key), key.meaning);
         }
     }

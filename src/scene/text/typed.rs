@@ -36,6 +36,8 @@ impl Object {
             offset: number("offset"),
             space: Space { scale: number("scale"), up: if text("up") == Some("z") { Up::Z } else { Up::Y } },
             role: match text("role") {
+                Some("base") => Role::Base,
+                Some("grains") => Role::Grains,
                 Some("static") => Role::Static,
                 Some("ignore") => Role::Ignore,
                 _ => Role::Collide,

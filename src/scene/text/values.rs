@@ -76,7 +76,7 @@ impl Values {
             let cell = self.number("snow.cell");
             let value = match read(key, table, cell)? {
                 Some(value) => Some(value),
-                None if allowed => default(key, table, cell)?,
+                None if allowed => default(key, self.preset(key), table, cell)?,
                 None => None,
             };
             if let Some(value) = value {
@@ -84,6 +84,12 @@ impl Values {
             }
         }
         Ok(())
+    }
+
+    /// A key's value in the preset that its table names.
+    fn preset(&self, key: &Key) -> Option<&'static str> {
+        let chosen = self.of(None, key.table, "preset")?.text()?;
+        key.presets.iter().find(|(name, _)| *name == chosen).map(|(_, value)| *value)
     }
 
     /// Every value with its key and, of an object, its index: in the order of the keys, object by object.
@@ -314,8 +320,13 @@ fn poses(name: &str, object: &Table, far: f64) -> Result<Vec<KeyPose>> {
 }
 
 /// What is taken where a key is left out.
-fn default(key: &Key, table: &Table, cell: Option<f64>) -> Result<Option<Value>> {
-    match key.fallback {
+fn default(
+    key: &Key,
+    preset: Option<&'static str>,
+    table: &Table,
+    cell: Option<f64>,
+) -> Result<Option<Value>> {
+    match preset.map_or(key.fallback, Fallback::Is) {
         Fallback::Required => Err(table.error(key.name, "is missing")),
         Fallback::Nothing => Ok(None),
         Fallback::Cells(cells) => Ok(cell.map(|cell| Value::Number(cells * cell))),

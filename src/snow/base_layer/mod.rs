@@ -13,6 +13,7 @@ mod reach;
 mod state;
 mod wanted;
 
+use std::borrow::Borrow;
 use std::collections::{BTreeSet, HashMap, HashSet};
 
 use rayon::prelude::*;
@@ -247,14 +248,17 @@ impl BaseLayer {
     pub fn step(
         &mut self,
         ctx: &Context,
-        bodies: &[Body],
+        bodies: &[impl Borrow<Body>],
         from: f64,
         to: f64,
         frame: i32,
     ) -> Result<StepReport> {
         let noise = self.params.noise.map(|noise| Displacement::new(&noise, self.grids.surface.voxel_size()));
-        let (ragged, exact): (Vec<_>, Vec<_>) =
-            bodies.iter().enumerate().partition(|(_, body)| body.has_noise());
+        let (ragged, exact): (Vec<_>, Vec<_>) = bodies
+            .iter()
+            .map(Borrow::borrow)
+            .enumerate()
+            .partition(|(_, body): &(_, &Body)| body.has_noise());
         let sweeps = sweep_phases(&ragged, noise.is_some()) + sweep_phases(&exact, false);
         let phases = sweeps + ["subtract", "columns", "commit"].len() + usize::from(self.min_crumb > 1);
         let (report, phases) = ctx.step(phases, || {

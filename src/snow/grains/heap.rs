@@ -53,6 +53,8 @@ pub struct Heap {
     pub(super) held: Vec<Held>,
     /// What grains touch that cannot be moved, by grain and collider.
     pub(super) touches: Vec<Touch>,
+    /// Identities of the grains that had no room at the end of the last step, ascending.
+    pub(super) trapped: Vec<u32>,
 }
 
 /// How a step is divided.
@@ -68,7 +70,8 @@ impl Heap {
     /// No grains yet, of a diameter (m).
     pub fn new(diameter: f64) -> Self {
         let (rows, ids, at) = (Vec::new(), Vec::new(), Vec::new());
-        Self { diameter, rows, ids, at, held: Vec::new(), touches: Vec::new() }
+        let (held, touches, trapped) = Default::default();
+        Self { diameter, rows, ids, at, held, touches, trapped }
     }
 
     /// Number of grains.
@@ -99,13 +102,13 @@ impl Heap {
         Ok(())
     }
 
-    /// Leaves out the grains below a height (m).
-    pub fn drop_below(&mut self, height: f64) {
-        let is_above = |(row, at): (&Row, &At)| world(*at, row.place, self.diameter).y >= height;
-        let kept: Vec<u32> = (0..)
-            .zip(self.rows.iter().zip(&self.at))
-            .filter_map(|(slot, grain)| is_above(grain).then_some(slot))
-            .collect();
+    /// Leaves out the grains whose identity and place (m) something says no to.
+    pub fn retain(&mut self, keeps: impl Fn(u32, DVec3) -> bool + Sync) {
+        let is_kept = |slot: &u32| {
+            let slot = *slot as usize;
+            keeps(self.ids[slot], world(self.at[slot], self.rows[slot].place, self.diameter))
+        };
+        let kept: Vec<u32> = (0..self.rows.len() as u32).into_par_iter().filter(is_kept).collect();
         if kept.len() < self.rows.len() {
             self.keep(&kept);
         }
@@ -136,6 +139,16 @@ impl Heap {
         self.rows.iter().zip(&self.at).map(|(row, at)| world(*at, row.place, self.diameter))
     }
 
+    /// The box (m) of all grains; least over greatest where there are none.
+    pub fn bounds(&self) -> [DVec3; 2] {
+        let room = DVec3::repeat(self.diameter);
+        let none = || [DVec3::repeat(f64::MAX), DVec3::repeat(f64::MIN)];
+        let places = self.rows.par_iter().zip(&self.at).map(|(row, at)| world(*at, row.place, self.diameter));
+        let with =
+            |[low, high]: [DVec3; 2], place: DVec3| [low.inf(&(place - room)), high.sup(&(place + room))];
+        places.fold(none, with).reduce(none, |[low, high], [l, h]| [low.inf(&l), high.sup(&h)])
+    }
+
     /// Places as a block and a place within it (diameters).
     pub fn located(&self) -> impl Iterator<Item = (At, V)> + '_ {
         self.rows.iter().zip(&self.at).map(|(row, at)| (*at, row.place))
@@ -144,6 +157,12 @@ impl Heap {
     /// Whether each is awake.
     pub fn awake(&self) -> impl Iterator<Item = bool> + '_ {
         self.rows.iter().map(|row| !row.rests())
+    }
+
+    /// Identities of the grains that the last step left no room, ascending: two surfaces that face each other press each of them,
+    /// and it is deeper than a tenth of its diameter in one.
+    pub fn trapped(&self) -> &[u32] {
+        &self.trapped
     }
 
     /// Largest speed (m/s).
@@ -191,6 +210,12 @@ impl Heap {
             sub_step(ctx, &mut self.rows, &mut layout, &coefficients)?;
             ctx.advance();
         }
+        let trapped = layout
+            .blocks
+            .par_iter()
+            .flat_map_iter(|block| touch::trapped(&block.touches, &self.rows, self.diameter, dt));
+        self.trapped = trapped.map(|slot| self.ids[slot as usize]).collect();
+        self.trapped.par_sort_unstable();
         self.take_back(layout)
     }
 
@@ -209,6 +234,7 @@ impl Heap {
     fn take_back(&mut self, layout: Layout) -> Result<()> {
         self.held = layout.held();
         self.touches = layout.blocks.iter().flat_map(|block| block.touches.iter().copied()).collect();
+        self.touches.iter_mut().for_each(Touch::forget_bounce);
         self.touches.par_sort_unstable_by_key(Touch::key);
         self.rows.par_iter_mut().zip(&mut self.at).zip(&layout.homes).for_each(|((row, at), home)| {
             if home.block != NONE {

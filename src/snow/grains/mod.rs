@@ -17,6 +17,7 @@
 //! | anchor | where a grain was when its pairs were found |
 //! | rest | a grain that has lain still stops, and holds what lies on it, until something wakes it |
 
+mod claims;
 mod contacts;
 mod field;
 #[doc(hidden)]
@@ -30,6 +31,7 @@ mod shell;
 pub mod solve;
 mod sourcing;
 mod state;
+mod surroundings;
 mod touch;
 
 use std::collections::{BTreeMap, HashSet};
@@ -39,16 +41,16 @@ use crate::base::blocks::{DIM, Origin};
 use crate::base::points::{Attribute, Column, Points, Values};
 use crate::context::{Context, PhaseTime};
 use crate::error::{Error, Result};
-use crate::sweep::Body;
 
-use field::Field;
-use heap::{Colliders, Division, Floor, Heap};
+use claims::Claims;
+use heap::{Division, Heap};
 use layout::locate;
-use shell::Shell;
 use sourcing::Sourcing;
+use surroundings::{Bounds, Obstacles, TIES, have_stayed};
 
 pub use params::Params;
 pub use sourcing::{Base, PACKING, Removal, removals};
+pub use surroundings::{Object, Surroundings};
 
 /// Where and when a grain was born.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
@@ -69,31 +71,10 @@ pub struct Grains {
     next_id: u32,
     /// Grains that blocks of the base have paid for and not got: fractions, mostly.
     owed: BTreeMap<Origin, f64>,
-    /// What rest depends on as a whole, as it was in the last step: see [`Grains::ties`].
+    /// What rest depends on as a whole, as it was in the last step: see [`Surroundings::ties`].
     ties: [f64; TIES],
     /// The boxes (m) of the meshes at the end of the last step.
     boxes: Vec<Bounds>,
-}
-
-/// Numbers in [`Grains::ties`].
-const TIES: usize = 6;
-/// Least and greatest place of a box.
-type Bounds = [DVec3; 2];
-/// Farthest (diameters) that a mesh's box may jump between two steps: more, and what rested on it wakes.
-const JUMP: f64 = 0.1;
-
-/// What a step of grains reads.
-pub struct Surroundings<'a> {
-    /// The base layer; grains collide with it as it is at the step's end.
-    pub base: Base<'a>,
-    /// What moves, with the friction of grains against it.
-    pub bodies: &'a [(&'a Body, f64)],
-    /// Meshes that do not move, as triangles and places (m).
-    pub statics: &'a [&'a crate::base::TriMesh],
-    /// Height of a level ground (m).
-    pub floor: Option<f64>,
-    /// Grains below this height (m) are dropped.
-    pub lowest: f64,
 }
 
 /// What a step did.
@@ -109,8 +90,12 @@ pub struct StepReport {
     pub removed_volume: f64,
     /// Grains that removed snow has paid for and that are not born yet.
     pub owed: f64,
-    /// Grains that fell below the lowest height or left the range of coordinates.
+    /// Grains that fell below the lowest height, left [`Params::keep_box`] or the range of coordinates.
     pub dropped: usize,
+    /// Grains that had lived for [`Params::lifetime`].
+    pub expired: usize,
+    /// Grains that are pressed where they have no room: see [`Grains::trapped`].
+    pub trapped: usize,
     /// Sub-steps.
     pub sub_steps: usize,
     /// Largest speed (m/s).
@@ -119,8 +104,6 @@ pub struct StepReport {
     pub phases: Vec<PhaseTime>,
 }
 
-/// Friction of grains against what does not move, besides the base.
-const GROUND: f32 = 0.5;
 /// Largest component (m/s) of the velocity of a grain that is emitted.
 pub const FASTEST: f32 = 10_000.0;
 
@@ -255,31 +238,37 @@ impl Grains {
         let before = self.clone();
         let stepped = ctx.step(["source", "colliders", "move"].len(), || {
             let (born, removed_volume) = ctx.phase("source", || {
-                let ties = self.ties(around);
+                let ties = around.ties(&self.params);
                 if std::mem::replace(&mut self.ties, ties) != ties {
                     self.heap.wake(|_| true);
                 }
-                self.source(ctx, around, frame)
+                self.source(ctx, around, [from, to], frame)
             })?;
-            let (mut colliders, way) = ctx.phase("colliders", || {
-                let (colliders, way, [first, last]) = self.colliders(around, [from, to])?;
-                if !is_near(&self.boxes, &first, JUMP * self.heap.diameter) {
-                    self.heap.wake(|_| true);
-                }
-                self.boxes = last;
-                Ok((colliders, way))
-            })?;
-            let sub_steps = self.params.sub_steps(to - from, way);
+            let mut obstacles = ctx.phase("colliders", || self.obstacles(around, [from, to]))?;
+            let sub_steps = self.params.sub_steps(to - from, obstacles.way);
             let division = Division { dt: to - from, sub_steps };
             let all = self.heap.count();
-            let (resting, fastest) = ctx.phase("move", || {
-                self.heap.step(ctx, division, self.params.coefficients(&division), &mut colliders)?;
-                self.heap.drop_below(around.lowest);
-                Ok((self.heap.resting(), self.heap.fastest()))
+            let (expired, resting, fastest) = ctx.phase("move", || {
+                let coefficients = self.params.coefficients(&division);
+                self.heap.step(ctx, division, coefficients, &mut obstacles.colliders)?;
+                let expired = self.limit(around.lowest, to - from, frame);
+                Ok((expired, self.heap.resting(), self.heap.fastest()))
             })?;
             let (count, owed) = (self.heap.count(), self.owed.values().sum());
-            let (dropped, phases) = (all - count, Vec::new());
-            Ok(StepReport { count, resting, born, removed_volume, owed, dropped, sub_steps, fastest, phases })
+            let (dropped, phases) = (all - count - expired, Vec::new());
+            Ok(StepReport {
+                count,
+                resting,
+                born,
+                removed_volume,
+                owed,
+                dropped,
+                expired,
+                trapped: self.heap.trapped().len(),
+                sub_steps,
+                fastest,
+                phases,
+            })
         });
         match stepped {
             Ok((report, phases)) => Ok(StepReport { phases, ..report }),
@@ -291,12 +280,18 @@ impl Grains {
     }
 
     /// Grains where snow was removed; how many, and the snow's volume (m3).
-    fn source(&mut self, ctx: &Context, around: &Surroundings<'_>, frame: i32) -> Result<(usize, f64)> {
+    fn source(
+        &mut self,
+        ctx: &Context,
+        around: &Surroundings<'_>,
+        [from, to]: [f64; 2],
+        frame: i32,
+    ) -> Result<(usize, f64)> {
         let Some(after) = around.base.after() else { return Ok((0, 0.0)) };
         let Some((before, removals)) = around.base.taken(ctx)? else { return Ok((0, 0.0)) };
         self.wake_near(&removals, after.voxel_size());
-        let Params { compression, seed, .. } = self.params;
-        let sourcing = Sourcing { diameter: self.heap.diameter, compression, seed, frame };
+        let claims = Claims::new(around.objects, self.params.compression, [from, to])?;
+        let sourcing = Sourcing { diameter: self.heap.diameter, claims, seed: self.params.seed, frame };
         ctx.allow("finding places for grains", sourcing.bytes(removals.len(), after.voxel_size()))?;
         let places = sourcing.places(before.grid(), after, &removals, &mut self.owed)?;
         self.room_for(places.len(), frame)?;
@@ -307,12 +302,33 @@ impl Grains {
         Ok((places.len(), removals.iter().map(|removal| removal.volume).sum()))
     }
 
-    /// What wakes all grains when it changes, besides the meshes: gravity, what they are made of, whether base and floor are there.
-    fn ties(&self, around: &Surroundings<'_>) -> [f64; TIES] {
-        let Params { gravity, friction, attraction, rests, .. } = self.params;
-        let has_base = around.base.after().is_some();
-        let floor = around.floor.unwrap_or(f64::MIN);
-        [gravity, friction, attraction, f64::from(rests), f64::from(has_base), floor]
+    /// What the grains cannot move; all of them wake where a mesh is not where it was.
+    fn obstacles<'a>(&mut self, around: &Surroundings<'a>, times: [f64; 2]) -> Result<Obstacles<'a>> {
+        let obstacles = around.obstacles(&self.params, &self.heap.bounds(), times)?;
+        let [first, last] = &obstacles.boxes;
+        if !have_stayed(&self.boxes, first, self.heap.diameter) {
+            self.heap.wake(|_| true);
+        }
+        self.boxes.clone_from(last);
+        Ok(obstacles)
+    }
+
+    /// Takes away grains that are too old (how many is returned), too low, or out of the box.
+    fn limit(&mut self, lowest: f64, dt: f64, frame: i32) -> usize {
+        let Params { lifetime, keep_box, .. } = self.params;
+        let all = self.heap.count();
+        if let Some(lifetime) = lifetime {
+            let births = &self.births;
+            // A grain that lives for a whole number of frames is not to outlive them by rounding.
+            let age =
+                |id: u32| (f64::from(frame) - f64::from(births[id as usize].frame)) * dt * (1.0 + 1.0e-9);
+            self.heap.retain(|id, _| age(id) < lifetime);
+        }
+        let expired = all - self.heap.count();
+        self.heap.retain(|_, place| {
+            place.y >= lowest && keep_box.is_none_or(|[low, high]| low <= place && place <= high)
+        });
+        expired
     }
 
     /// Wakes the grains within a grain and a cell of blocks of the base (m a cell) that have lost snow.
@@ -328,50 +344,6 @@ impl Grains {
             let mut last = None;
             corners.any(|corner| last.replace(corner) != Some(corner) && changed.contains(&corner))
         });
-    }
-
-    /// What grains cannot move, how far objects move in the step (m), and the boxes of all meshes at its start and end.
-    fn colliders<'a>(
-        &self,
-        around: &Surroundings<'a>,
-        [from, to]: [f64; 2],
-    ) -> Result<(Colliders<'a>, f64, [Vec<Bounds>; 2])> {
-        let floor = around.floor.map(|height| Floor { height, friction: GROUND });
-        let field = |grid| Field { grid, friction: self.params.friction as f32 };
-        let fields = around.base.after().map(field).into_iter().collect();
-        let mut colliders = Colliders { floor, fields, shells: Vec::new() };
-        let (mut way, mut number) = (0.0f64, touch::FIRST_SHELL);
-        let mut boxes = [Vec::new(), Vec::new()];
-        for (body, friction) in around.bodies {
-            let (mut first, mut last) = (Vec::new(), Vec::new());
-            body.motion().pose(from, &mut first)?;
-            body.motion().pose(to, &mut last)?;
-            boxes[0].push(bounds(&first));
-            boxes[1].push(bounds(&last));
-            way = first.iter().zip(&last).map(|(a, b)| (b - a).norm()).fold(way, f64::max);
-            let turn = |triangle: &[u32; 3]| {
-                if body.is_reversed() { [triangle[0], triangle[2], triangle[1]] } else { *triangle }
-            };
-            let triangles = body.motion().triangles().iter().map(turn).collect();
-            let closed = body.closed_loops() == 0 && body.contradictions() == 0;
-            let shell = Shell::new(number, *friction as f32, triangles, closed, first);
-            let pose =
-                move |share: f64, out: &mut Vec<DVec3>| body.motion().pose(from + (to - from) * share, out);
-            colliders.shells.push((shell, Box::new(pose)));
-            number += 1;
-        }
-        for mesh in around.statics {
-            let pose: Vec<DVec3> = mesh.positions.iter().map(|place| place.cast::<f64>()).collect();
-            boxes.iter_mut().for_each(|boxes| boxes.push(bounds(&pose)));
-            let shell = Shell::new(number, GROUND, mesh.triangles.clone(), false, pose.clone());
-            let rests = move |_: f64, out: &mut Vec<DVec3>| {
-                out.clone_from(&pose);
-                Ok(())
-            };
-            colliders.shells.push((shell, Box::new(rests)));
-            number += 1;
-        }
-        Ok((colliders, way, boxes))
     }
 
     /// Places (m), in the order in which [`Grains::points`] has the grains, as all that follows.
@@ -404,11 +376,25 @@ impl Grains {
         self.heap.awake()
     }
 
+    /// Identities of the grains that the last step left no room, ascending: two surfaces that face each other, such as a sole and
+    /// the base below it, press each of them, and it is deeper than a tenth of its diameter in one.
+    pub fn trapped(&self) -> &[u32] {
+        self.heap.trapped()
+    }
+
     fn births(&self) -> impl Iterator<Item = &Birth> + '_ {
         self.heap.ids().iter().map(|id| &self.births[*id as usize])
     }
 
-    /// The grains as points: `v` (m/s), `id`, `active` (not where it rests), `pscale` (radius, m), `source_frame` and `rest` (place
+    /// Which grains are trapped.
+    fn marked(&self) -> Column<bool> {
+        if self.trapped().is_empty() {
+            return Column::Uniform(false);
+        }
+        Column::Each(self.heap.ids().iter().map(|id| self.trapped().binary_search(id).is_ok()).collect())
+    }
+
+    /// The grains as points: `v` (m/s), `id`, `active` (not where it rests), `trapped` (where it has no room), `pscale` (radius, m), `source_frame` and `rest` (place
     /// of birth, m).
     pub fn points(&self) -> Points {
         let (mut cells, mut offsets) = (Vec::new(), Vec::new());
@@ -426,22 +412,11 @@ impl Grains {
                 Values::Long(Column::Each(self.heap.ids().iter().map(|id| i64::from(*id)).collect())),
             ),
             attribute("active", Values::Bool(Column::Each(self.heap.awake().collect()))),
+            attribute("trapped", Values::Bool(self.marked())),
             attribute("pscale", Values::Float(Column::Uniform(self.params.radius as f32))),
             attribute("source_frame", Values::Int(Column::Each(self.source_frames().collect()))),
             attribute("rest", Values::Vector(Column::Each(self.rests().collect()))),
         ];
         Points { voxel_size: self.heap.diameter, cells, offsets, attributes }
     }
-}
-
-/// The box of some places.
-fn bounds(places: &[DVec3]) -> Bounds {
-    let none = [DVec3::repeat(f64::MAX), DVec3::repeat(f64::MIN)];
-    places.iter().fold(none, |[low, high], place| [low.inf(place), high.sup(place)])
-}
-
-/// Whether boxes are the same but for a distance.
-fn is_near(boxes: &[Bounds], others: &[Bounds], most: f64) -> bool {
-    let differ = |(a, b): (&Bounds, &Bounds)| a.iter().zip(b).any(|(a, b)| (a - b).amax() > most);
-    boxes.len() == others.len() && !boxes.iter().zip(others).any(differ)
 }

@@ -3,6 +3,7 @@
 use super::heap::Division;
 use super::rest::Rest;
 use super::solve::Coefficients;
+use crate::base::DVec3;
 use crate::error::{Error, Result};
 use crate::snow::grain_friction;
 
@@ -17,6 +18,8 @@ pub struct Params {
     pub friction: f64,
     /// Greatest attraction between two grains that all but touch, in weights of a grain, 0..=1000.
     pub attraction: f64,
+    /// Share of their speed with which grains bounce off each other and off what they hit, 0..=1.
+    pub restitution: f64,
     /// Velocity kept in a second (beta, thesis section 3.3.1), 0..=1.
     pub air: f64,
     /// Gravity along y (m/s2), -1000..=1000; downward is negative.
@@ -25,6 +28,10 @@ pub struct Params {
     pub rests: bool,
     /// Sub-steps in a step; none: by the rule of [`Params::sub_steps`].
     pub sub_steps: Option<u32>,
+    /// Seconds after whose frames a grain is taken away; none: it stays.
+    pub lifetime: Option<f64>,
+    /// Least and greatest place (m) of a box outside of which grains are taken away; none: they stay.
+    pub keep_box: Option<[DVec3; 2]>,
     /// Most grains; more are an error.
     pub most: usize,
     /// Another one scatters grains otherwise.
@@ -46,10 +53,13 @@ impl Params {
             compression: 0.75,
             friction: grain_friction::of_repose(32.0),
             attraction: 0.0,
+            restitution: 0.0,
             air: 0.5,
             gravity: -9.81,
             rests: true,
             sub_steps: None,
+            lifetime: None,
+            keep_box: None,
             most: 20_000_000,
             seed: 0,
         }
@@ -65,12 +75,22 @@ impl Params {
             ("compression", self.compression, 0.0, 1.0),
             ("friction", self.friction, 0.0, 1.0),
             ("attraction", self.attraction, 0.0, 1000.0),
+            ("restitution", self.restitution, 0.0, 1.0),
             ("air", self.air, 0.0, 1.0),
             ("gravity", self.gravity, -1000.0, 1000.0),
         ];
         let wrong = checks.into_iter().find(|(_, value, low, high)| !(*low..=*high).contains(value));
         if let Some((name, value, low, high)) = wrong {
             return Err(Error::argument(format!("{name} = {value} must lie in {low} to {high}")));
+        }
+        if let Some(lifetime) = self.lifetime.filter(|lifetime| lifetime.is_nan() || *lifetime <= 0.0) {
+            return Err(Error::argument(format!("lifetime = {lifetime} must be over 0")));
+        }
+        let is_box = |[low, high]: &[DVec3; 2]| (0..3).all(|axis| low[axis] < high[axis]);
+        if self.keep_box.is_some_and(|bounds| !is_box(&bounds)) {
+            return Err(Error::argument(
+                "keep_box must be x0, y0, z0, x1, y1, z1 with x0 < x1, y0 < y1, z0 < z1",
+            ));
         }
         if self.sub_steps == Some(0) {
             return Err(Error::argument("sub_steps must be at least 1"));
@@ -104,6 +124,9 @@ impl Params {
             air: (1.0 - libm::pow(self.air, dt)) as f32,
             friction: self.friction as f32,
             attraction: (self.attraction * self.gravity.abs() * dt) as f32,
+            weight: (self.gravity.abs() * dt) as f32,
+            restitution: self.restitution as f32,
+            bouncing: (BOUNCING * self.gravity.abs() * dt) as f32,
             band: BAND,
             rest: self.rests.then(|| Rest::new(2.0 * self.radius, self.gravity, dt)),
             visits_all: false,
@@ -111,5 +134,7 @@ impl Params {
     }
 }
 
+/// Least speed that bounces: what so many sub-steps of gravity add.
+const BOUNCING: f64 = 4.0;
 /// Gap (diameters) up to which grains attract each other.
 const BAND: f32 = 0.05;

@@ -23,6 +23,8 @@ pub struct Shell {
     pub collider: u32,
     /// Friction against it.
     pub friction: f32,
+    /// With which it holds grains that touch it (weights of a grain).
+    pub stick: f32,
     triangles: Vec<[u32; 3]>,
     /// Whether inside and outside are told apart.
     closed: bool,
@@ -139,10 +141,28 @@ impl Shell {
         let next = pose.clone();
         let boxes = vec![[DVec3::zeros(); 2]; 2 * leaves - 1];
         let ways = vec![0.0; 2 * leaves - 1];
+        let (now, stick, way) = (pose, 0.0, 0.0);
         let mut shell =
-            Self { collider, friction, triangles, closed, now: pose, next, boxes, ways, leaves, way: 0.0 };
+            Self { collider, friction, stick, triangles, closed, now, next, boxes, ways, leaves, way };
         shell.sort();
         shell
+    }
+
+    /// One that does not move, to measure distances from.
+    pub fn at_rest(triangles: Vec<[u32; 3]>, pose: Vec<DVec3>) -> Self {
+        let mut shell = Self::new(0, 0.0, triangles, false, pose.clone());
+        shell.follow(&pose);
+        shell
+    }
+
+    /// Distance (m) of a place from the surface, where it is within another.
+    pub fn distance(&self, place: DVec3, within: f64) -> Option<f64> {
+        self.nearest(place, within).map(|found| found.square.sqrt())
+    }
+
+    /// With a surface that holds grains that touch it (weights of a grain).
+    pub fn with_stick(self, stick: f32) -> Self {
+        Self { stick, ..self }
     }
 
     /// Sorts triangles along a curve, so that those of a leaf are near each other.
@@ -216,8 +236,8 @@ impl Shell {
             offset: dot(normal, row.place) - gap as f32,
             velocity: [velocity.x as f32, velocity.y as f32, velocity.z as f32],
             friction: self.friction,
-            impulse: 0.0,
-            across: [0.0; 3],
+            stick: self.stick,
+            ..Touch::default()
         }
     }
 

@@ -51,6 +51,12 @@ pub struct Coefficients {
     pub friction: f32,
     /// Largest impulse of attraction in a sub-step (m/s).
     pub attraction: f32,
+    /// What gravity adds to a velocity in a sub-step (m/s).
+    pub weight: f32,
+    /// Share of its speed with which a grain bounces off.
+    pub restitution: f32,
+    /// Least speed of approach that bounces (m/s): contacts that carry a weight do not.
+    pub bouncing: f32,
     /// Gap (diameters) up to which grains attract each other.
     pub band: f32,
     /// When grains rest; none: never.
@@ -120,9 +126,9 @@ fn sweep(rows: &mut [Row], layout: &mut Layout, colour: &[u32], pass: Pass, c: &
 }
 
 /// Gravity, air (thesis section 3.3.1), and the impulses that touches had in the last sub-step.
-fn accelerate(rows: &mut [Row], layout: &Layout, c: &Coefficients) {
+fn accelerate(rows: &mut [Row], layout: &mut Layout, c: &Coefficients) {
     let rows = Shared::new(rows);
-    layout.blocks.par_iter().filter(|block| block.is_awake).for_each(|block| {
+    layout.blocks.par_iter_mut().filter(|block| block.is_awake).for_each(|block| {
         for &slot in &block.members {
             // SAFETY: a grain is a member of one block.
             let row = unsafe { rows.get(slot as usize) };
@@ -131,12 +137,25 @@ fn accelerate(rows: &mut [Row], layout: &Layout, c: &Coefficients) {
                 row.velocity = sub(velocity, scaled(velocity, c.air));
             }
         }
-        for touch in &block.touches {
+        for touch in &mut block.touches {
             // SAFETY: a touch's grain is a member of its block.
             let row = unsafe { rows.get(touch.grain as usize) };
-            row.velocity = add(row.velocity, scaled(touch.total(), row.weight()));
+            begin_touch(row, touch, c);
         }
     });
+}
+
+/// The impulse that a touch had in the last sub-step; or a bounce, after which there is none.
+fn begin_touch(row: &mut Row, touch: &mut Touch, c: &Coefficients) {
+    touch.forget_bounce();
+    if c.restitution > 0.0 && !row.rests() {
+        let approach = -dot(sub(row.velocity, touch.velocity), touch.normal);
+        let gap = dot(touch.normal, row.place) - touch.offset;
+        if approach > c.bouncing.max(gap * c.diameter / c.dt) {
+            touch.bounce = c.restitution * approach;
+        }
+    }
+    row.velocity = add(row.velocity, scaled(touch.total(), row.weight()));
 }
 
 /// Moves the grains: what cannot move has the last word.
@@ -190,10 +209,11 @@ fn resist(row: &mut Row, touch: &mut Touch, c: &Coefficients, last: bool) {
     let gap = dot(normal, row.place) - touch.offset;
     let relative = sub(row.velocity, touch.velocity);
     let along = dot(relative, normal);
-    let wanted = if gap > 0.0 { -gap * c.diameter / c.dt } else { 0.0 };
-    let total = (touch.impulse + wanted - along).max(0.0);
+    let least = if gap < c.band { -touch.stick * c.weight } else { 0.0 };
+    let wanted = if gap > 0.0 && least == 0.0 { -gap * c.diameter / c.dt } else { 0.0 };
+    let total = (touch.impulse + wanted.max(touch.bounce) - along).max(least);
     let sliding = sub(relative, scaled(normal, along));
-    let across = bounded(sub(touch.across, sliding), touch.friction * total);
+    let across = bounded(sub(touch.across, sliding), touch.friction * (total - least));
     let impulse = add(scaled(normal, total - touch.impulse), sub(across, touch.across));
     (touch.impulse, touch.across) = (total, across);
     row.velocity = add(row.velocity, impulse);
@@ -270,15 +290,21 @@ fn solve_batches_last(rows: Shared<'_, Row>, batches: &mut [Batch], c: &Coeffici
         // SAFETY: as in `begin_batches`.
         unsafe {
             let (a, b) = (Eight::load(rows, &batch.owners), Eight::load(rows, &others));
-            let (a, b, contact) = collide(a, b, batch, c);
+            let (mut a, mut b, contact) = collide(a, b, batch, c);
+            // Two grains that meet in the air do not meet again: what they gave each other says nothing of the next sub-step.
+            let mut is_held = a.supported & b.supported;
+            if c.attraction > 0.0 {
+                is_held = is_held | contact.gap.is_less(Lanes::all(c.band));
+            }
+            if c.restitution > 0.0 {
+                (a, b) = contact.bounce(a, b, is_held, &batch.impulse, c);
+            }
             a.store(rows, &batch.owners);
             b.store(rows, &others);
             let pushes = [rows.gather(&batch.owners, Part::Push), rows.gather(&others, Part::Push)];
             let pushes = contact.push(&a, &b, pushes, c);
             rows.scatter(&batch.owners, Part::Push, &pushes[0]);
             rows.scatter(&others, Part::Push, &pushes[1]);
-            // Two grains that meet in the air do not meet again: what they gave each other says nothing of the next sub-step.
-            let is_held = a.supported & b.supported;
             for impulse in &mut batch.impulse {
                 *impulse = is_held.choose(*impulse, Lanes::all(0.0));
             }
@@ -416,6 +442,26 @@ fn collide(a: Eight, b: Eight, batch: &mut Batch, c: &Coefficients) -> (Eight, E
 }
 
 impl Contact {
+    /// Grains that nothing holds bounce: what stopped them (the impulses so far) tells how fast they met (Poisson's hypothesis).
+    #[inline(always)]
+    fn bounce(
+        &self,
+        a: Eight,
+        b: Eight,
+        is_held: LaneMask,
+        impulse: &V8,
+        c: &Coefficients,
+    ) -> (Eight, Eight) {
+        let zero = Lanes::all(0.0);
+        let stopped = dot8(*impulse, self.normal) * self.weights;
+        let closing = self.gap.max(zero) * Lanes::all(c.diameter / c.dt);
+        let approach = stopped + closing;
+        let meets = zero.is_less(stopped) & Lanes::all(c.bouncing).is_less(approach);
+        let wanted = is_held.choose(zero, meets.choose(approach * Lanes::all(c.restitution) + closing, zero));
+        let change = scaled8(self.normal, wanted * self.inverse);
+        (a.kicked(change, a.weight), b.kicked(change, zero - b.weight))
+    }
+
     /// Pushes of eight pairs, and what they find out: which grains are supported, and which something wakes.
     #[inline(always)]
     fn push(&self, a: &Eight, b: &Eight, pushes: [[Lanes; 4]; 2], c: &Coefficients) -> [[Lanes; 4]; 2] {
@@ -444,8 +490,9 @@ impl Contact {
         let a_stands = a_wakes.choose(a_marks - woken, a_marks);
         let b_stands = b_wakes.choose(b_marks - woken, b_marks);
         let touching = self.gap.is_less(Lanes::all(TOUCHING));
-        let up = touching & Lanes::all(STEEP).is_less(upward) & (half.is_less(b_stands) | b_rests);
-        let down = touching & upward.is_less(Lanes::all(-STEEP)) & (half.is_less(a_stands) | a_rests);
+        let steep = if c.attraction > 0.0 { -2.0 } else { STEEP };
+        let up = touching & Lanes::all(steep).is_less(upward) & (half.is_less(b_stands) | b_rests);
+        let down = touching & upward.is_less(Lanes::all(-steep)) & (half.is_less(a_stands) | a_rests);
         let (a_stands, b_stands) = (up.choose(one, a_stands), down.choose(one, b_stands));
         // A grain that moves wakes its neighbours.
         let near = self.gap.is_less(Lanes::all(rest::NEAR));

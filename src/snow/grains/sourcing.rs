@@ -15,6 +15,7 @@ use crate::error::Result;
 use crate::snow::base_layer::filled;
 use crate::vdb::{FloatGrid, Probe};
 
+use super::claims::Claims;
 use super::field::Window;
 
 /// Packing of new grains: the share of space that they fill.
@@ -157,12 +158,29 @@ fn lost(old: &Probe<'_>, new: &Probe<'_>, cell: f32) -> f64 {
     }
 }
 
+/// A place where a grain may be born.
+struct Site {
+    hash: u64,
+    place: DVec3,
+    /// Share of the snow there that becomes grains.
+    share: f64,
+    /// Whose is least is born first: a random number, so that sites are chosen as often as their shares say (exponential race).
+    turn: f64,
+}
+
+impl Site {
+    fn new(hash: u64, place: DVec3, share: f64) -> Self {
+        let random = (hash >> 11) as f64 / (1u64 << 53) as f64;
+        Self { hash, place, share, turn: -libm::log1p(-random) / share }
+    }
+}
+
 /// How removed snow becomes grains.
 pub struct Sourcing {
     /// Diameter of a grain (m).
     pub diameter: f64,
-    /// Share of the snow that becomes none.
-    pub compression: f64,
+    /// Which object took the snow at a place, and what share of it becomes grains.
+    pub claims: Claims,
     /// Seed of the scatter.
     pub seed: u64,
     /// The frame.
@@ -170,16 +188,15 @@ pub struct Sourcing {
 }
 
 impl Sourcing {
-    /// Grains for a volume (m3).
-    pub fn paid(&self, volume: f64) -> f64 {
-        let grain = std::f64::consts::PI / 6.0 * self.diameter.powi(3);
-        (1.0 - self.compression) * volume * PACKING / grain
+    /// Grains for a volume (m3) of which nothing is pressed together.
+    fn paid(&self, volume: f64) -> f64 {
+        volume * PACKING / (std::f64::consts::PI / 6.0 * self.diameter.powi(3))
     }
 
     /// Memory (bytes) that [`Sourcing::places`] takes for the sites of so many blocks with voxels of `cell` m.
     pub fn bytes(&self, blocks: usize, cell: f64) -> u64 {
         let sites = (cell / self.diameter).powi(3) * VOXELS as f64 * PACKING * 6.0 / std::f64::consts::PI;
-        (blocks as f64 * sites * size_of::<(u64, DVec3)>() as f64) as u64
+        (blocks as f64 * sites * size_of::<Site>() as f64) as u64
     }
 
     /// Places (m) of new grains. `owed` has the grains that blocks have paid for and not got.
@@ -199,20 +216,30 @@ impl Sourcing {
         let bounds: Vec<[[i32; 3]; 2]> = removals.iter().map(around).collect();
         let windows = [Window::all(before, &bounds)?, Window::all(after, &bounds)?];
         let cell = after.voxel_size();
-        let sites: Vec<Vec<(u64, DVec3)>> = removals
+        let sourced: Vec<(f64, Vec<Site>)> = removals
             .par_iter()
             .enumerate()
             .map(|(index, removal)| {
-                self.sites(removal.origin, cell, [&windows[0][index], &windows[1][index]])
+                let windows = [&windows[0][index], &windows[1][index]];
+                let low = DVec3::from(removal.origin.map(|at| (f64::from(at) - 0.5) * cell));
+                let high = low + DVec3::repeat(DIM as f64 * cell);
+                let claims = self.claims.in_box(&[low, high]);
+                let sites = self.sites(removal.origin, cell, windows, |place| claims.share(place));
+                let share = match sites.len() {
+                    0 => claims.share((low + high) * 0.5),
+                    count => sites.iter().map(|site| site.share).sum::<f64>() / count as f64,
+                };
+                (share, sites)
             })
             .collect();
         let mut out = Vec::new();
-        for (removal, mut sites) in removals.iter().zip(sites) {
-            let paid = self.paid(removal.volume) + owed.remove(&removal.origin).unwrap_or(0.0);
+        for (removal, (share, mut sites)) in removals.iter().zip(sourced) {
+            let paid = share * self.paid(removal.volume) + owed.remove(&removal.origin).unwrap_or(0.0);
+            sites.retain(|site| site.share > 0.0);
             let count = (paid.floor().max(0.0) as usize).min(sites.len());
             // A random choice that no order of computation changes.
-            sites.sort_unstable_by_key(|(hash, _)| *hash);
-            out.extend(sites[..count].iter().map(|(_, place)| *place));
+            sites.sort_unstable_by(|a, b| a.turn.total_cmp(&b.turn).then(a.hash.cmp(&b.hash)));
+            out.extend(sites[..count].iter().map(|site| site.place));
             let left = paid - count as f64;
             if left != 0.0 {
                 owed.insert(removal.origin, left);
@@ -221,8 +248,14 @@ impl Sourcing {
         Ok(out)
     }
 
-    /// Sites in a block that held snow before and hold none after, each with a random number.
-    fn sites(&self, origin: Origin, cell: f64, [before, after]: [&Window<'_>; 2]) -> Vec<(u64, DVec3)> {
+    /// Sites in a block that held snow before and hold none after.
+    fn sites(
+        &self,
+        origin: Origin,
+        cell: f64,
+        [before, after]: [&Window<'_>; 2],
+        share: impl Fn(DVec3) -> f64,
+    ) -> Vec<Site> {
         // Half of the lattice's cube: its diagonal is the distance of neighbours.
         let apart =
             self.diameter * libm::cbrt(std::f64::consts::SQRT_2 * std::f64::consts::PI / 6.0 / PACKING);
@@ -242,7 +275,7 @@ impl Sourcing {
                         DVec3::new(x as f64 * half, y as f64 * half, z as f64 * half) + DVec3::from(shift);
                     let at = [place.x / cell, place.y / cell, place.z / cell];
                     if before.sample(at).0 < 0.0 && after.sample(at).0 > 0.0 {
-                        out.push((hash, place));
+                        out.push(Site::new(hash, place, share(place)));
                     }
                 }
             }

@@ -3,7 +3,7 @@
 use rayon::prelude::*;
 
 use super::layout::Block;
-use super::rows::{V, add, dot, scaled};
+use super::rows::{Row, V, add, dot, scaled};
 
 /// A grain beside a plane that nothing moves.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
@@ -20,10 +20,14 @@ pub struct Touch {
     pub velocity: V,
     /// Friction against it.
     pub friction: f32,
+    /// With which it holds a grain that touches it (weights of the grain).
+    pub stick: f32,
     /// Impulse along the normal (m/s).
     pub impulse: f32,
     /// Impulse across it (m/s).
     pub across: V,
+    /// Speed at which the grain bounces off in this sub-step (m/s).
+    pub bounce: f32,
 }
 
 impl Touch {
@@ -35,6 +39,13 @@ impl Touch {
     /// Grain and collider: no two touches have the same.
     pub fn key(&self) -> (u32, u32) {
         (self.grain, self.collider)
+    }
+
+    /// After a bounce there is nothing to begin the next sub-step with.
+    pub fn forget_bounce(&mut self) {
+        if self.bounce > 0.0 {
+            (self.impulse, self.across, self.bounce) = (0.0, [0.0; 3], 0.0);
+        }
     }
 
     fn is_of_mesh(&self) -> bool {
@@ -69,7 +80,8 @@ pub fn renew(blocks: &mut [Block], fresh: Vec<Vec<Touch>>) {
     blocks.par_iter_mut().zip(fresh).filter(|(_, fresh)| !fresh.is_empty()).for_each(|(block, mut fresh)| {
         for touch in &mut fresh {
             if let Ok(at) = old.binary_search_by_key(&touch.key(), Touch::key) {
-                (touch.impulse, touch.across) = (old[at].impulse, old[at].across);
+                (touch.impulse, touch.across, touch.bounce) =
+                    (old[at].impulse, old[at].across, old[at].bounce);
             }
         }
         block.touches.extend(fresh);
@@ -77,6 +89,34 @@ pub fn renew(blocks: &mut [Block], fresh: Vec<Vec<Touch>>) {
         release_pressed(&mut block.touches);
     });
 }
+
+/// The grains that surfaces leave no room, of a block's touches after a sub-step of `dt` (s), sorted: each is deeper than a tenth
+/// of its diameter in one of two surfaces that face each other.
+pub fn trapped<'a>(
+    touches: &'a [Touch],
+    rows: &'a [Row],
+    diameter: f64,
+    dt: f64,
+) -> impl Iterator<Item = u32> + 'a {
+    let depth = move |touch: &Touch| {
+        let moved = dot(touch.velocity, touch.normal) * (dt / diameter) as f32;
+        touch.offset + moved - dot(touch.normal, rows[touch.grain as usize].place)
+    };
+    touches.chunk_by(|a, b| a.grain == b.grain).filter_map(move |touches| {
+        let is_deep = touches.iter().any(|touch| depth(touch) > DEEP);
+        let presses = |index: usize, touch: &Touch| {
+            depth(touch) > -DEEP
+                && touches[..index]
+                    .iter()
+                    .any(|other| depth(other) > -DEEP && dot(touch.normal, other.normal) < OPPOSITE)
+        };
+        let is_pressed = || touches.iter().enumerate().any(|(index, touch)| presses(index, touch));
+        (is_deep && is_pressed()).then(|| touches[0].grain)
+    })
+}
+
+/// Depth (diameters) in a surface from which a grain counts as in it.
+const DEEP: f32 = 0.1;
 
 /// Takes the impulses of grains that are pressed between two sides: those would grow as long as the sides fight over the grain,
 /// and throw it when one of them leaves. The touches are sorted.

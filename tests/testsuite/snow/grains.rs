@@ -7,7 +7,7 @@ use frazil::motion::{Key, Keys, Rigid};
 use frazil::snow::base_layer::initial::{Cover, Ground, layer};
 use frazil::snow::base_layer::{BaseLayer, Params as BaseParams};
 use frazil::snow::grains::heap::{Colliders, Division, Floor, Heap, Shell};
-use frazil::snow::grains::{Base, Grains, PACKING, Params, Surroundings, removals};
+use frazil::snow::grains::{Base, Grains, Object, PACKING, Params, Surroundings, removals};
 use frazil::sweep::Body;
 use frazil::vdb::FloatGrid;
 use frazil::{Context, Pool};
@@ -65,7 +65,7 @@ fn run(
         let at = frame as usize;
         let around = Surroundings {
             base: Base::Whole([&story.layers[at - 1], &story.layers[at]]),
-            bodies: &[(&story.body, 0.3)],
+            objects: &[Object::new(&story.body, 0.3)],
             statics: &[],
             floor: Some(0.0),
             lowest: -1.0,
@@ -166,7 +166,7 @@ fn a_layer_that_remembers_its_changed_blocks_gives_the_same_grains() {
         base.step(&ctx, &[ball()], times[0], times[1], frame).unwrap();
         let around = Surroundings {
             base: Base::Changed(base.surface(), base.before()),
-            bodies: &[(&story.body, 0.3)],
+            objects: &[Object::new(&story.body, 0.3)],
             statics: &[],
             floor: Some(0.0),
             lowest: -1.0,
@@ -201,7 +201,7 @@ fn loose_grains_are_added_or_refused_all_together() {
         assert!(error.contains(words), "{error}");
         assert!(grains.save() == before);
     }
-    let around = Surroundings { base: Base::Missing, bodies: &[], statics: &[], floor: None, lowest: -1.0 };
+    let around = Surroundings { base: Base::Missing, objects: &[], statics: &[], floor: None, lowest: -1.0 };
     let report = grains.step(&ctx, &around, [0.0, 0.1], 6).unwrap();
     assert_eq!((report.count, report.born, report.removed_volume), (3, 0, 0.0));
     let mut ids = grains.ids().to_vec();
@@ -223,7 +223,7 @@ fn too_many_grains_are_refused_and_leave_the_others_as_they_were() {
     let before = grains.save();
     let around = Surroundings {
         base: Base::Whole([&story.layers[3], &story.layers[FRAMES as usize]]),
-        bodies: &[],
+        objects: &[],
         statics: &[],
         floor: Some(0.0),
         lowest: -1.0,
@@ -413,7 +413,7 @@ fn grains_that_rest_wake_when_the_base_below_them_or_gravity_changes() {
     let step = |grains: &mut Grains, base: [&FloatGrid; 2]| {
         let around = Surroundings {
             base: Base::Whole(base),
-            bodies: &[],
+            objects: &[],
             statics: &[],
             floor: Some(0.0),
             lowest: -1.0,
@@ -432,7 +432,7 @@ fn grains_that_rest_wake_when_the_base_below_them_or_gravity_changes() {
     // Nor may they rest on a floor that has gone.
     let around = Surroundings {
         base: Base::Whole([last, last]),
-        bodies: &[],
+        objects: &[],
         statics: &[],
         floor: None,
         lowest: -1.0,
@@ -440,19 +440,19 @@ fn grains_that_rest_wake_when_the_base_below_them_or_gravity_changes() {
     assert_eq!(same.step(&ctx, &around, [0.0, 1.0 / 24.0], 99).unwrap().resting, 0);
     // Nor on an object that has jumped.
     let mut beside = Grains::resume(params(), &grains.save()).unwrap();
-    let mut at = |from: f64, bodies: &[(&Body, f64)]| {
+    let mut at = |from: f64, objects: &[Object<'_>]| {
         let base = Base::Whole([last, last]);
-        let around = Surroundings { base, bodies, statics: &[], floor: Some(0.0), lowest: -1.0 };
+        let around = Surroundings { base, objects, statics: &[], floor: Some(0.0), lowest: -1.0 };
         beside.step(&ctx, &around, [from, from + 1.0 / 24.0], 99).unwrap().resting
     };
     let far = ball();
     // It stands still from 0.5 s on; where it was before is elsewhere.
-    assert_eq!(at(2.0, &[(&far, 0.3)]), 0);
+    assert_eq!(at(2.0, &[Object::new(&far, 0.3)]), 0);
     for _ in 0..150 {
-        at(2.0, &[(&far, 0.3)]);
+        at(2.0, &[Object::new(&far, 0.3)]);
     }
-    assert!(at(3.0, &[(&far, 0.3)]) > resting * 9 / 10);
-    assert_eq!(at(0.1, &[(&far, 0.3)]), 0);
+    assert!(at(3.0, &[Object::new(&far, 0.3)]) > resting * 9 / 10);
+    assert_eq!(at(0.1, &[Object::new(&far, 0.3)]), 0);
     // The layer loses what the ball has not taken yet.
     let gone = step(&mut grains, [&story.layers[2], last]);
     assert!(gone < resting * 3 / 4, "{gone} of {resting}");

@@ -1,0 +1,22 @@
+//! The attraction between grains that lets a wall of them stand.
+
+use super::grain_friction::repose_of;
+
+/// Height (diameters) of a wall that stands by the grains' size alone, as the gate `snow.grains.wall` measures it.
+const ALONE: f64 = 5.5;
+/// Measured attraction (weights of a grain) times tan(a) tan(45 degrees + a/2) for each further diameter, a the angle of repose,
+/// and what each of these makes the next ones need more: long chains of contacts are solved less exactly.
+const EACH: [f64; 2] = [0.37, 0.0045];
+
+/// The attraction (weights of a grain) with which a wall of a height (m) of grains of a diameter (m) just stands. By Rankine
+/// the critical height is 4 c tan(45 + a/2) / (rho g), and the cohesion c is tan(a) times a tensile strength, which is
+/// proportional to the attraction (Rumpf 1962).
+pub fn of_wall(height: f64, diameter: f64, friction: f64) -> f64 {
+    let angle = repose_of(friction).max(GENTLEST).to_radians();
+    let shape = angle.tan() * (std::f64::consts::FRAC_PI_4 + 0.5 * angle).tan();
+    let more = (height / diameter - ALONE).max(0.0);
+    (EACH[0] + EACH[1] * more) * more / shape
+}
+
+/// Least angle of repose (degrees) that counts: without friction no attraction would do.
+const GENTLEST: f64 = 10.0;

@@ -1,0 +1,111 @@
+//! Which of several objects took the snow at a place, where they press it together by different shares: the one whose surface
+//! comes nearest to the place at the step's start, its end or one of the moments between (`MOMENTS`); of equals the first.
+
+use super::shell::Shell;
+use super::surroundings::{Bounds, Object, bounds};
+use crate::base::DVec3;
+use crate::error::Result;
+
+/// Poses of a step that are looked at.
+const MOMENTS: u32 = 9;
+
+/// What share of the removed snow becomes grains.
+pub enum Claims {
+    /// The same everywhere.
+    One(f64),
+    /// That of the object that took it.
+    Each(Vec<Claim>),
+}
+
+/// The claim of an object.
+pub struct Claim {
+    share: f64,
+    /// Its meshes at the moments.
+    meshes: Vec<Shell>,
+    /// The box (m) of all of them.
+    bounds: Bounds,
+}
+
+impl Claims {
+    /// Those of the objects that remove snow from `from` to `to` (s); `usual` is the compression of those that have none of
+    /// their own.
+    ///
+    /// # Errors
+    /// A pose that cannot be computed.
+    pub fn new(objects: &[Object<'_>], usual: f64, [from, to]: [f64; 2]) -> Result<Self> {
+        let share = |object: &Object<'_>| 1.0 - object.compression.unwrap_or(usual);
+        let removing: Vec<_> = objects.iter().filter(|object| object.removes).collect();
+        let first = removing.first().map_or(1.0 - usual, |object| share(object));
+        if removing.iter().all(|object| share(object) == first) {
+            return Ok(Self::One(first));
+        }
+        let claim = |object: &&Object<'_>| {
+            let motion = object.body.motion();
+            let (mut meshes, mut places) = (Vec::new(), Vec::new());
+            for moment in 0..MOMENTS {
+                let part = f64::from(moment) / f64::from(MOMENTS - 1);
+                let mut pose = Vec::new();
+                motion.pose(from + (to - from) * part, &mut pose)?;
+                places.extend(bounds(&pose));
+                meshes.push(Shell::at_rest(motion.triangles().to_vec(), pose));
+            }
+            Ok(Claim { share: share(object), meshes, bounds: bounds(&places) })
+        };
+        Ok(Self::Each(removing.iter().map(claim).collect::<Result<_>>()?))
+    }
+
+    /// What matters within a box (m).
+    pub fn in_box(&self, around: &Bounds) -> ClaimsHere<'_> {
+        match self {
+            Self::One(share) => ClaimsHere { share: *share, claims: Vec::new() },
+            Self::Each(all) => {
+                let claims: Vec<&Claim> = all.iter().filter(|claim| claim.reaches(around)).collect();
+                match claims[..] {
+                    [only] => ClaimsHere { share: only.share, claims: Vec::new() },
+                    [] => ClaimsHere { share: all[0].share, claims: all.iter().collect() },
+                    _ => ClaimsHere { share: claims[0].share, claims },
+                }
+            }
+        }
+    }
+}
+
+/// The claims that matter within a box.
+pub struct ClaimsHere<'a> {
+    /// Where nothing is nearer.
+    share: f64,
+    claims: Vec<&'a Claim>,
+}
+
+impl ClaimsHere<'_> {
+    /// Share of the snow at a place (m) that becomes grains.
+    pub fn share(&self, place: DVec3) -> f64 {
+        let mut best = (f64::INFINITY, self.share);
+        for claim in &self.claims {
+            for mesh in &claim.meshes {
+                // Not farther than the nearest so far.
+                if let Some(distance) =
+                    mesh.distance(place, best.0.min(FARTHEST)).filter(|near| *near < best.0)
+                {
+                    best = (distance, claim.share);
+                }
+            }
+        }
+        best.1
+    }
+}
+
+/// Farthest that surfaces are looked for (m).
+const FARTHEST: f64 = 1.0e6;
+/// How much farther than its box an object may take snow: its noise does so (share of a block).
+const AROUND: f64 = 0.5;
+
+impl Claim {
+    /// Whether it may have taken snow in a box.
+    fn reaches(&self, [low, high]: &Bounds) -> bool {
+        let room = (high - low) * AROUND;
+        (0..3).all(|axis| {
+            self.bounds[0][axis] <= high[axis] + room[axis] && self.bounds[1][axis] >= low[axis] - room[axis]
+        })
+    }
+}
