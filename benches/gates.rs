@@ -2,12 +2,16 @@
 
 #[path = "gates/band.rs"]
 mod band;
+#[path = "gates/beds.rs"]
+mod beds;
 #[path = "gates/bytes.rs"]
 mod bytes;
 #[path = "gates/cancel.rs"]
 mod cancel;
 #[path = "gates/capi.rs"]
 mod capi;
+#[path = "gates/columns.rs"]
+mod columns;
 #[path = "../tests/common/mod.rs"]
 mod common;
 #[path = "gates/damage.rs"]
@@ -18,6 +22,8 @@ mod dense;
 mod far;
 #[path = "gates/flip.rs"]
 mod flip;
+#[path = "gates/free.rs"]
+mod free;
 #[path = "gates/grains.rs"]
 mod grains;
 #[path = "gates/harness.rs"]
@@ -26,10 +32,18 @@ mod harness;
 mod house;
 #[path = "gates/oracle.rs"]
 mod oracle;
+#[path = "gates/piles.rs"]
+mod piles;
+#[path = "gates/planes.rs"]
+mod planes;
 #[path = "gates/poses.rs"]
 mod poses;
+#[path = "gates/rate.rs"]
+mod rate;
 #[path = "gates/readers.rs"]
 mod readers;
+#[path = "gates/rest.rs"]
+mod rest;
 #[path = "gates/scenes.rs"]
 mod scenes;
 #[path = "gates/shot.rs"]
@@ -42,6 +56,8 @@ mod speed;
 mod spin;
 #[path = "gates/sweeps.rs"]
 mod sweeps;
+#[path = "gates/turned.rs"]
+mod turned;
 
 use harness::Harness;
 

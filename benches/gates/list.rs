@@ -32,6 +32,14 @@ pub const GATES: &[Gate] = &[
     gate("snow.grains.free_energy", "1", Most(1.0e-5), Open),
     // Deep beds.
     gate("snow.grains.bed_overlap", "%", Most(5.0), Most(2.0)),
+    gate("snow.grains.bed_height", "%", Most(2.0), Most(0.5)),
+    // The angle at which a bed slides, less the angle of repose that was asked for.
+    gate("snow.grains.turned_bed_least", "deg", Least(-1.0), Open),
+    gate("snow.grains.turned_bed_most", "deg", Most(5.0), Open),
+    // Columns that collapse, and a grain on a plane that leans.
+    gate("snow.grains.column_runout", "%", Most(15.0), Most(8.0)),
+    yes("snow.grains.slope_rests"),
+    yes("snow.grains.slope_slides"),
     // Rest: what it changes (nothing where it is only speed), and what it saves.
     yes("snow.grains.rest_bytes"),
     gate("snow.grains.rest_angle", "deg", Most(0.5), Open),
