@@ -4,6 +4,8 @@
 mod band;
 #[path = "gates/beds.rs"]
 mod beds;
+#[path = "gates/births.rs"]
+mod births;
 #[path = "gates/bytes.rs"]
 mod bytes;
 #[path = "gates/cancel.rs"]

@@ -43,7 +43,7 @@ fn settled(seed: u64) -> Experiment {
 }
 
 /// How much lower (%) the bed between its ends stands than its grains would at the packing of its upper third. That height is
-/// the volume of the grains over packing and ground: the packing of the third over that of the whole says it all.
+/// the volume of the grains over packing and ground: the packing of the third over that of the whole says it all. Below 0 the lower part is the looser one.
 fn missing(bed: &Experiment) -> f64 {
     let heights: Vec<f64> = bed.heap.places().map(|place| place.y / D).collect();
     let top = heights.iter().copied().fold(0.0, f64::max) + 0.5;

@@ -114,7 +114,17 @@ fn edge(column: &Experiment) -> f64 {
         *sector = sector.max(place.xz().norm() + 0.5 * D);
     }
     let strays = is_part.iter().filter(|is_part| !**is_part).count();
-    let far = places.iter().map(|place| place.xz().norm()).fold(0.0, f64::max);
-    println!("# {strays} strays, the farthest grain at {:.1} diameters", far / D);
+    let most = far(&places, 0.99) / D;
+    println!(
+        "# {strays} strays; 99 % of the grains lie within {most:.1} diameters, all within {:.1}",
+        far(&places, 1.0) / D
+    );
     sectors.iter().sum::<f64>() / SECTORS as f64
+}
+
+/// The distance (m) from the axis within which a share of the grains lies.
+fn far(places: &[DVec3], share: f64) -> f64 {
+    let mut distances: Vec<f64> = places.iter().map(|place| place.xz().norm()).collect();
+    distances.sort_by(f64::total_cmp);
+    distances[((distances.len() - 1) as f64 * share) as usize]
 }

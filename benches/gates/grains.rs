@@ -7,7 +7,7 @@ use frazil::snow::grains::heap::{Colliders, Division, Floor, Heap, Pose, Shell};
 
 use crate::harness::Harness;
 use crate::scenes::context;
-use crate::{beds, columns, free, piles, planes, rate, rest, turned};
+use crate::{beds, births, columns, free, piles, planes, rate, rest, turned};
 
 /// Length of a frame (s).
 pub const FRAME: f64 = 1.0 / 24.0;
@@ -20,6 +20,7 @@ pub fn run(h: &mut Harness) {
     turned::run(h);
     columns::run(h);
     planes::run(h);
+    births::run(h);
     rest::run(h);
     rate::run(h);
 }

@@ -40,6 +40,10 @@ pub const GATES: &[Gate] = &[
     gate("snow.grains.column_runout", "%", Most(15.0), Most(8.0)),
     yes("snow.grains.slope_rests"),
     yes("snow.grains.slope_slides"),
+    // Births: the account of snow and grains, the same print in few and many frames, and how fast grains are born.
+    none("snow.grains.ledger", "grains"),
+    gate("snow.grains.birth_spread", "%", Most(2.0), Most(0.5)),
+    gate("snow.grains.birth_speed", "m/s", Most(0.05), Open),
     // Rest: what it changes (nothing where it is only speed), and what it saves.
     yes("snow.grains.rest_bytes"),
     gate("snow.grains.rest_angle", "deg", Most(0.5), Open),
