@@ -34,6 +34,8 @@ mod harness;
 mod house;
 #[path = "gates/oracle.rs"]
 mod oracle;
+#[path = "gates/passes.rs"]
+mod passes;
 #[path = "gates/piles.rs"]
 mod piles;
 #[path = "gates/planes.rs"]

@@ -7,7 +7,7 @@ use frazil::snow::grains::heap::{Colliders, Division, Floor, Heap, Pose, Shell};
 
 use crate::harness::Harness;
 use crate::scenes::context;
-use crate::{beds, births, columns, free, piles, planes, rate, rest, turned};
+use crate::{beds, births, columns, free, passes, piles, planes, rate, rest, turned};
 
 /// Length of a frame (s).
 pub const FRAME: f64 = 1.0 / 24.0;
@@ -22,6 +22,7 @@ pub fn run(h: &mut Harness) {
     planes::run(h);
     births::run(h);
     rest::run(h);
+    passes::run(h);
     rate::run(h);
 }
 

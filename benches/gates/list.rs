@@ -49,6 +49,9 @@ pub const GATES: &[Gate] = &[
     gate("snow.grains.rest_angle", "deg", Most(0.5), Open),
     gate("snow.grains.rest_gain", "x", Least(3.0), Least(8.0)),
     yes("snow.grains.same_bytes"),
+    // Whole passes: the bytes of a grain in its file, and the same files after kills and from 1 and 2 threads.
+    gate("snow.grains.file_bytes", "B", Most(44.0), Most(32.0)),
+    yes("snow.grains.same_pass"),
     // All grains at work.
     gate("snow.grains.speed", "k/s", Least(90.0), Least(200.0)),
     // The walls that a box leaves, against the envelope of its poses.

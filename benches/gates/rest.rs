@@ -4,6 +4,7 @@ use frazil::snow::grain_friction::of_repose;
 
 use crate::grains::Experiment;
 use crate::harness::Harness;
+use crate::passes;
 
 pub fn run(h: &mut Harness) {
     changes(h);
@@ -49,30 +50,16 @@ fn gain(h: &mut Harness) {
         h.skipped("snow.grains.rest_gain", "no data");
         return;
     };
-    let folder = std::env::temp_dir().join(format!("frazil-rest-{}", std::process::id()));
-    std::fs::create_dir_all(&folder).expect("a folder");
+    let folder = tempfile::tempdir().expect("a folder");
     let seconds = |rests: bool| {
-        let (scene, out) = (folder.join("walk.toml"), folder.join(format!("rest-{rests}")));
-        let text = format!(
-            r#"
-shot = {{ frames = "1-96" }}
-snow = {{ ground = 0.0, area = [-0.9, -1.6, 0.9, 3.4], depth = 0.2, cell = 0.009 }}
-grains = {{ rest = {rests} }}
-[[object]]
-file = {:?}
-scale = 1.166
-keys = [{{ frame = 1, at = [0.0, 0.06, -1.15] }}, {{ frame = 96, at = [0.0, 0.06, 3.0] }}]
-"#,
-            man.display().to_string()
-        );
-        std::fs::write(&scene, text).expect("a scene");
+        let scene = passes::walk(folder.path(), &man, 96, 0.009, &format!("rest = {rests}"));
+        let out = folder.path().join(format!("rest-{rests}"));
         let mut run = std::process::Command::new(env!("CARGO_BIN_EXE_frazil"));
         let run = run.arg("snow").arg(&scene).arg("-o").arg(&out).args(["-q", "--threads", "2"]);
         assert!(run.stderr(std::process::Stdio::null()).status().expect("frazil").success());
         (49..=96).map(|frame| moving(&out.join(format!("report/grains.{frame:04}.json")))).sum::<f64>()
     };
     let (with, without) = (seconds(true), seconds(false));
-    let _ = std::fs::remove_dir_all(&folder);
     let note = format!("threads=2 {with:.1} s with rest, {without:.1} s without; thesis=1.58 x");
     h.gate("snow.grains.rest_gain", without / with, &note);
 }
