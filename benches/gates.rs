@@ -2,14 +2,18 @@
 
 #[path = "gates/band.rs"]
 mod band;
+#[path = "gates/beds.rs"]
+mod beds;
+#[path = "gates/births.rs"]
+mod births;
 #[path = "gates/bytes.rs"]
 mod bytes;
 #[path = "gates/cancel.rs"]
 mod cancel;
 #[path = "gates/capi.rs"]
 mod capi;
-#[path = "gates/cohesion.rs"]
-mod cohesion;
+#[path = "gates/columns.rs"]
+mod columns;
 #[path = "../tests/common/mod.rs"]
 mod common;
 #[path = "gates/damage.rs"]
@@ -20,18 +24,32 @@ mod dense;
 mod far;
 #[path = "gates/flip.rs"]
 mod flip;
+#[path = "gates/free.rs"]
+mod free;
 #[path = "gates/grains.rs"]
 mod grains;
 #[path = "gates/harness.rs"]
 mod harness;
 #[path = "gates/house.rs"]
 mod house;
+#[path = "gates/materials.rs"]
+mod materials;
 #[path = "gates/oracle.rs"]
 mod oracle;
+#[path = "gates/passes.rs"]
+mod passes;
+#[path = "gates/piles.rs"]
+mod piles;
+#[path = "gates/planes.rs"]
+mod planes;
 #[path = "gates/poses.rs"]
 mod poses;
+#[path = "gates/rate.rs"]
+mod rate;
 #[path = "gates/readers.rs"]
 mod readers;
+#[path = "gates/rest.rs"]
+mod rest;
 #[path = "gates/scenes.rs"]
 mod scenes;
 #[path = "gates/shot.rs"]
@@ -44,6 +62,8 @@ mod speed;
 mod spin;
 #[path = "gates/sweeps.rs"]
 mod sweeps;
+#[path = "gates/turned.rs"]
+mod turned;
 
 use harness::Harness;
 
@@ -62,7 +82,6 @@ fn main() {
     bytes::run(&mut h);
     readers::run(&mut h);
     grains::run(&mut h);
-    cohesion::run(&mut h);
     shot::run(&mut h);
     capi::run(&mut h);
     cancel::run(&mut h);

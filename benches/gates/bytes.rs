@@ -5,8 +5,8 @@ use std::hash::{DefaultHasher, Hash, Hasher};
 use frazil::vdb::file::{WriteOptions, to_bytes};
 
 use crate::common::tools;
-use crate::grains;
 use crate::harness::Harness;
+use crate::rate;
 use crate::scenes::{self, context};
 use crate::speed;
 
@@ -22,9 +22,9 @@ pub fn run(h: &mut Harness) {
         h.holds("snow.base.same_bytes_cpu", hashes.iter().all(|hash| *hash == hashes[0]), &note);
     }
     if h.wants("snow.grains.same_bytes") {
-        let one = grains::collapse(1);
+        let one = rate::collapse(1);
         let hashes = ["baseline", "avx2", "avx512"].map(hash_at);
-        let is_same = one == grains::collapse(2) && hashes.iter().all(|hash| *hash == hashes[0]);
+        let is_same = one == rate::collapse(2) && hashes.iter().all(|hash| *hash == hashes[0]);
         h.holds("snow.grains.same_bytes", is_same, "a heap that collapses: 1 and 2 threads, all CPU levels");
     }
     if h.wants("snow.base.same_bytes_tools") {
@@ -51,7 +51,7 @@ pub const HASH: &str = "hash-of-small";
 pub fn print_hash() {
     let mut hasher = DefaultHasher::new();
     small(2).hash(&mut hasher);
-    grains::collapse(2).hash(&mut hasher);
+    rate::collapse(2).hash(&mut hasher);
     println!("{:016x}", hasher.finish());
 }
 

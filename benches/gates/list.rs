@@ -32,12 +32,31 @@ pub const GATES: &[Gate] = &[
     gate("snow.grains.free_energy", "1", Most(1.0e-5), Open),
     // Deep beds.
     gate("snow.grains.bed_overlap", "%", Most(5.0), Most(2.0)),
-    // Rest: what it changes (nothing where it is only speed), and what it saves.
+    gate("snow.grains.bed_height", "%", Most(2.0), Most(0.5)),
+    // The angle at which a bed slides, less the angle of repose that was asked for.
+    gate("snow.grains.turned_bed_least", "deg", Least(-1.0), Open),
+    gate("snow.grains.turned_bed_most", "deg", Most(5.0), Open),
+    // Columns that collapse, and a grain on a plane that leans.
+    gate("snow.grains.column_runout", "%", Most(15.0), Most(8.0)),
+    yes("snow.grains.slope_rests"),
+    yes("snow.grains.slope_slides"),
+    // Walls that stand or fall as asked, bounces, and what clings to an object that stops and that shakes.
     yes("snow.grains.wall"),
+    gate("snow.grains.restitution", "%", Most(5.0), Open),
+    gate("snow.grains.stick_stops", "%", Least(95.0), Open),
+    gate("snow.grains.stick_shakes", "%", Most(5.0), Open),
+    // Births: the account of snow and grains, the same print in few and many frames, and how fast grains are born.
+    none("snow.grains.ledger", "grains"),
+    gate("snow.grains.birth_spread", "%", Most(2.0), Most(0.5)),
+    gate("snow.grains.birth_speed", "m/s", Most(0.05), Open),
+    // Rest: what it changes (nothing where it is only speed), and what it saves.
     yes("snow.grains.rest_bytes"),
     gate("snow.grains.rest_angle", "deg", Most(0.5), Open),
     gate("snow.grains.rest_gain", "x", Least(3.0), Least(8.0)),
     yes("snow.grains.same_bytes"),
+    // Whole passes: the bytes of a grain in its file, and the same files after kills and from 1 and 2 threads.
+    gate("snow.grains.file_bytes", "B", Most(44.0), Most(32.0)),
+    yes("snow.grains.same_pass"),
     // All grains at work.
     gate("snow.grains.speed", "k/s", Least(90.0), Least(200.0)),
     // The walls that a box leaves, against the envelope of its poses.

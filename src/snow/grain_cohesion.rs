@@ -2,8 +2,9 @@
 
 use super::grain_friction::repose_of;
 
-/// Height (diameters) of a wall that stands by the grains' size alone, as the gate `snow.grains.wall` measures it.
-const ALONE: f64 = 5.5;
+/// Height (diameters) of a wall that stands by the grains' size alone, as the gate `snow.grains.wall` measures it: up to an angle
+/// of repose of 32 degrees, and for each further degree.
+const ALONE: [f64; 2] = [5.5, 0.4];
 /// Measured attraction (weights of a grain) times tan(a) tan(45 degrees + a/2) for each further diameter, a the angle of repose,
 /// and what each of these makes the next ones need more: long chains of contacts are solved less exactly.
 const EACH: [f64; 2] = [0.37, 0.0045];
@@ -12,9 +13,10 @@ const EACH: [f64; 2] = [0.37, 0.0045];
 /// the critical height is 4 c tan(45 + a/2) / (rho g), and the cohesion c is tan(a) times a tensile strength, which is
 /// proportional to the attraction (Rumpf 1962).
 pub fn of_wall(height: f64, diameter: f64, friction: f64) -> f64 {
-    let angle = repose_of(friction).max(GENTLEST).to_radians();
+    let repose = repose_of(friction).max(GENTLEST);
+    let angle = repose.to_radians();
     let shape = angle.tan() * (std::f64::consts::FRAC_PI_4 + 0.5 * angle).tan();
-    let more = (height / diameter - ALONE).max(0.0);
+    let more = (height / diameter - ALONE[0] - ALONE[1] * (repose - 32.0).max(0.0)).max(0.0);
     (EACH[0] + EACH[1] * more) * more / shape
 }
 

@@ -210,8 +210,9 @@ fn resist(row: &mut Row, touch: &mut Touch, c: &Coefficients, last: bool) {
     let relative = sub(row.velocity, touch.velocity);
     let along = dot(relative, normal);
     let least = if gap < c.band { -touch.stick * c.weight } else { 0.0 };
-    let wanted = if gap > 0.0 && least == 0.0 { -gap * c.diameter / c.dt } else { 0.0 };
-    let total = (touch.impulse + wanted.max(touch.bounce) - along).max(least);
+    let closing = if gap > 0.0 && least == 0.0 { -gap * c.diameter / c.dt } else { 0.0 };
+    let wanted = if touch.bounce > 0.0 { touch.bounce } else { closing };
+    let total = (touch.impulse + wanted - along).max(least);
     let sliding = sub(relative, scaled(normal, along));
     let across = bounded(sub(touch.across, sliding), touch.friction * (total - least));
     let impulse = add(scaled(normal, total - touch.impulse), sub(across, touch.across));

@@ -1,0 +1,127 @@
+//! Gates of whole passes with grains: the bytes of their files, and the same ones after a kill and from any number of threads.
+
+use std::path::{Path, PathBuf};
+use std::process::{Command, Stdio};
+use std::time::{Duration, Instant};
+
+use frazil::base::points::Points;
+use frazil::vdb::file::WriteOptions;
+use frazil::vdb::points;
+
+use crate::common::character::{self, data};
+use crate::harness::{Harness, timed};
+use crate::scenes::context;
+
+/// Frames and cell (m) of the pass whose file is measured: with fewer grains the tree that every file has outweighs them.
+const MEASURED: (i32, f64) = (64, 0.009);
+/// Frames and cell of the pass that is made again and again: coarse, to be quick.
+const REPEATED: (i32, f64) = (32, 0.012);
+
+pub fn run(h: &mut Harness) {
+    let [bytes, same] = ["snow.grains.file_bytes", "snow.grains.same_pass"];
+    if !h.wants(bytes) && !h.wants(same) {
+        return;
+    }
+    let Some(man) = data("character/CesiumMan.glb") else {
+        for name in [bytes, same] {
+            h.skipped(name, "no data");
+        }
+        return;
+    };
+    let folder = tempfile::tempdir().expect("a folder");
+    let made = |(frames, cell): (i32, f64), name: &str, threads: usize| {
+        let scene = walk(folder.path(), &man, frames, cell, "");
+        let out = folder.path().join(name);
+        let (took, _) = timed(|| assert!(pass(&scene, &out, threads).status().expect("frazil").success()));
+        (scene, out, took)
+    };
+    if h.wants(bytes) {
+        let (_, out, _) = made(MEASURED, "measured", 2);
+        let file = out.join(format!("grains/grains.{:04}.vdb", MEASURED.0));
+        let grains = points::read(&file, None).expect("grains");
+        parts(&grains);
+        let each = std::fs::metadata(&file).expect("a file").len() as f64 / grains.count() as f64;
+        h.gate(bytes, each, &format!("{} grains after {} frames", grains.count(), MEASURED.0));
+    }
+    if h.wants(same) {
+        let (scene, once, took) = made(REPEATED, "once", 2);
+        let (_, alone, _) = made(REPEATED, "alone", 1);
+        let killed = folder.path().join("killed");
+        let kills = kill_in_the_middle(&scene, &killed, took);
+        assert!(pass(&scene, &killed, 2).status().expect("frazil").success());
+        let [once, alone, killed] = [once, alone, killed].map(|folder| character::output(&folder));
+        let note = format!(
+            "{} files of a pass of {took:.1} s, after kills at frames {kills:?}; 1 and 2 threads",
+            once.len()
+        );
+        h.holds(same, once == alone && once == killed && kills.len() > 2, &note);
+    }
+}
+
+/// Prints how many bytes a grain has without each attribute.
+fn parts(grains: &Points) {
+    let ctx = context(2);
+    let bytes = |points: &Points| {
+        let options = WriteOptions::default();
+        let bytes = points::to_bytes(&ctx, "grains", points, &options).expect("bytes");
+        bytes.len() as f64 / points.count() as f64
+    };
+    let all = bytes(grains);
+    let mut bare = grains.clone();
+    for attribute in &grains.attributes {
+        let mut less = grains.clone();
+        less.attributes.retain(|other| other.name != attribute.name);
+        bare.attributes.clear();
+        println!("# {}: {:.2} bytes a grain", attribute.name, all - bytes(&less));
+    }
+    println!("# places, the tree and the rest of the file: {:.2} bytes a grain", bytes(&bare));
+}
+
+/// Kills a pass again and again while it makes grains; the last frame of grains that each had written.
+fn kill_in_the_middle(scene: &Path, out: &Path, took: f64) -> Vec<usize> {
+    let mut kills = Vec::new();
+    for (round, moment) in character::moments(8).into_iter().enumerate() {
+        let start = Instant::now();
+        let mut child = pass(scene, out, 1 + round % 2).spawn().expect("frazil");
+        // Short enough that all of them do not finish the shot.
+        let limit = Duration::from_secs_f64(0.1 + 0.25 * took * moment);
+        while start.elapsed() < limit && child.try_wait().expect("a child").is_none() {
+            std::thread::sleep(Duration::from_millis(1));
+        }
+        let is_running = child.try_wait().expect("a child").is_none();
+        child.kill().expect("a kill");
+        child.wait().expect("a child");
+        let frames = std::fs::read_dir(out.join("grains")).map_or(0, |files| files.count());
+        if is_running && frames > 0 {
+            kills.push(frames);
+        }
+    }
+    kills
+}
+
+/// A pass of a scene, quiet.
+fn pass(scene: &Path, out: &Path, threads: usize) -> Command {
+    let mut run = Command::new(env!("CARGO_BIN_EXE_frazil"));
+    run.arg("snow").arg(scene).arg("-o").arg(out).args(["-q", "--threads", &threads.to_string()]);
+    run.stdout(Stdio::null()).stderr(Stdio::null());
+    run
+}
+
+/// A scene in which a character walks straight on through snow; `grains` is put into the table of the grains.
+pub fn walk(folder: &Path, man: &Path, frames: i32, cell: f64, grains: &str) -> PathBuf {
+    let text = format!(
+        r#"
+shot = {{ frames = "1-{frames}" }}
+snow = {{ ground = 0.0, area = [-0.9, -1.6, 0.9, 3.4], depth = 0.2, cell = {cell} }}
+grains = {{ {grains} }}
+[[object]]
+file = {:?}
+scale = 1.166
+keys = [{{ frame = 1, at = [0.0, 0.06, -1.15] }}, {{ frame = 96, at = [0.0, 0.06, 3.0] }}]
+"#,
+        man.display().to_string()
+    );
+    let path = folder.join("walk.toml");
+    std::fs::write(&path, text).expect("a scene");
+    path
+}
