@@ -7,7 +7,7 @@ use frazil::snow::grains::heap::{Colliders, Division, Floor, Heap, Pose, Shell};
 
 use crate::harness::Harness;
 use crate::scenes::context;
-use crate::{beds, births, columns, free, passes, piles, planes, rate, rest, turned};
+use crate::{beds, births, columns, free, grain_readers, passes, piles, planes, rate, rest, turned};
 
 /// Length of a frame (s).
 pub const FRAME: f64 = 1.0 / 24.0;
@@ -23,6 +23,7 @@ pub fn run(h: &mut Harness) {
     births::run(h);
     rest::run(h);
     passes::run(h);
+    grain_readers::run(h);
     rate::run(h);
 }
 

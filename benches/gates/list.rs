@@ -44,6 +44,9 @@ pub const GATES: &[Gate] = &[
     none("snow.grains.ledger", "grains"),
     gate("snow.grains.birth_spread", "%", Most(2.0), Most(0.5)),
     gate("snow.grains.birth_speed", "m/s", Most(0.05), Open),
+    // Other programs see each grain with all of its values.
+    yes("snow.grains.readers_openvdb"),
+    yes("snow.grains.readers_usd"),
     // Rest: what it changes (nothing where it is only speed), and what it saves.
     yes("snow.grains.rest_bytes"),
     gate("snow.grains.rest_angle", "deg", Most(0.5), Open),
