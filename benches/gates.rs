@@ -26,6 +26,8 @@ mod far;
 mod flip;
 #[path = "gates/free.rs"]
 mod free;
+#[path = "gates/grain_cancel.rs"]
+mod grain_cancel;
 #[path = "gates/grain_readers.rs"]
 mod grain_readers;
 #[path = "gates/grains.rs"]

@@ -7,7 +7,9 @@ use frazil::snow::grains::heap::{Colliders, Division, Floor, Heap, Pose, Shell};
 
 use crate::harness::Harness;
 use crate::scenes::context;
-use crate::{beds, births, columns, free, grain_readers, passes, piles, planes, rate, rest, turned};
+use crate::{
+    beds, births, columns, free, grain_cancel, grain_readers, passes, piles, planes, rate, rest, turned,
+};
 
 /// Length of a frame (s).
 pub const FRAME: f64 = 1.0 / 24.0;
@@ -24,6 +26,7 @@ pub fn run(h: &mut Harness) {
     rest::run(h);
     passes::run(h);
     grain_readers::run(h);
+    grain_cancel::run(h);
     rate::run(h);
 }
 
@@ -42,7 +45,7 @@ pub struct Experiment {
 }
 
 /// Numbers in 0..1 (xorshift: Marsaglia 2003).
-pub struct Random(u64);
+pub struct Random(pub u64);
 
 impl Random {
     pub fn next(&mut self) -> f64 {

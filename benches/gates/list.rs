@@ -55,6 +55,8 @@ pub const GATES: &[Gate] = &[
     // Whole passes: the bytes of a grain in its file, and the same files after kills and from 1 and 2 threads.
     gate("snow.grains.file_bytes", "B", Most(44.0), Most(32.0)),
     yes("snow.grains.same_pass"),
+    // From a cancel to the return of a step, through C.
+    gate("snow.grains.cancel_p99", "s", Most(0.2), Most(0.05)),
     // All grains at work.
     gate("snow.grains.speed", "k/s", Least(90.0), Least(200.0)),
     // The walls that a box leaves, against the envelope of its poses.
