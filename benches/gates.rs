@@ -46,6 +46,8 @@ mod piles;
 mod planes;
 #[path = "gates/poses.rs"]
 mod poses;
+#[path = "gates/preview.rs"]
+mod preview;
 #[path = "gates/rate.rs"]
 mod rate;
 #[path = "gates/readers.rs"]

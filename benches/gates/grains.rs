@@ -8,7 +8,8 @@ use frazil::snow::grains::heap::{Colliders, Division, Floor, Heap, Pose, Shell};
 use crate::harness::Harness;
 use crate::scenes::context;
 use crate::{
-    beds, births, columns, free, grain_cancel, grain_readers, passes, piles, planes, rate, rest, turned,
+    beds, births, columns, free, grain_cancel, grain_readers, passes, piles, planes, preview, rate, rest,
+    turned,
 };
 
 /// Length of a frame (s).
@@ -17,6 +18,7 @@ pub const FRAME: f64 = 1.0 / 24.0;
 /// All of them.
 pub fn run(h: &mut Harness) {
     piles::run(h);
+    preview::run(h);
     free::run(h);
     beds::run(h);
     turned::run(h);

@@ -24,6 +24,9 @@ pub const GATES: &[Gate] = &[
     gate("snow.grains.pile_100k", "deg", Most(3.0), Most(1.5)),
     gate("snow.grains.pile_size", "deg", Most(1.5), Most(0.7)),
     gate("snow.grains.pile_creep", "deg", Most(0.5), Most(0.1)),
+    // The same snow in grains of twice the diameter.
+    gate("snow.grains.preview_volume", "%", Most(10.0), Most(5.0)),
+    gate("snow.grains.preview_angle", "%", Most(10.0), Most(5.0)),
     // Free motion against formulas, and heaps that nothing holds.
     gate("snow.grains.fall_speed", "1", Most(1.0e-6), Open),
     gate("snow.grains.fall_way", "1", Most(1.0e-6), Open),
