@@ -12,6 +12,8 @@ mod bytes;
 mod cancel;
 #[path = "gates/capi.rs"]
 mod capi;
+#[path = "gates/collisions.rs"]
+mod collisions;
 #[path = "gates/columns.rs"]
 mod columns;
 #[path = "../tests/common/mod.rs"]
@@ -26,6 +28,10 @@ mod far;
 mod flip;
 #[path = "gates/free.rs"]
 mod free;
+#[path = "gates/grain_cancel.rs"]
+mod grain_cancel;
+#[path = "gates/grain_readers.rs"]
+mod grain_readers;
 #[path = "gates/grains.rs"]
 mod grains;
 #[path = "gates/harness.rs"]
@@ -44,6 +50,8 @@ mod piles;
 mod planes;
 #[path = "gates/poses.rs"]
 mod poses;
+#[path = "gates/preview.rs"]
+mod preview;
 #[path = "gates/rate.rs"]
 mod rate;
 #[path = "gates/readers.rs"]

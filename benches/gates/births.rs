@@ -65,6 +65,17 @@ fn step(
     (lost.removed_volume, grains.step(ctx, &around, [from, to], frame).expect("a step"))
 }
 
+/// Grains some frames after a plough has begun to move, some of them at rest.
+pub fn ploughed(ctx: &Context, frames: i32) -> Grains {
+    let (mut base, body) = (snow(ctx), plough());
+    let mut grains = Grains::new(Params::for_cell(CELL)).expect("grains");
+    for frame in 1..=frames {
+        let times = [f64::from(frame - 1) * FRAME, f64::from(frame) * FRAME];
+        step(ctx, &mut base, &mut grains, &body, times, frame);
+    }
+    grains
+}
+
 /// The account of each frame: what snow has paid for, was owed, is owed and was born.
 fn ledger(h: &mut Harness) {
     let name = "snow.grains.ledger";

@@ -58,13 +58,13 @@ struct Host {
     radii: Vec<f32>,
 }
 
-fn works(status: frz_status) {
+pub fn works(status: frz_status) {
     // SAFETY: the text ends with a zero.
     let said = unsafe { std::ffi::CStr::from_ptr(frazil::capi::library::frz_last_error()) };
     assert_eq!(status, frz_status::FRZ_OK, "{said:?}");
 }
 
-fn view<T>(elements: &[T]) -> frz_view {
+pub fn view<T>(elements: &[T]) -> frz_view {
     frz_view { data: elements.as_ptr().cast(), count: elements.len(), stride: 0 }
 }
 

@@ -7,7 +7,10 @@ use frazil::snow::grains::heap::{Colliders, Division, Floor, Heap, Pose, Shell};
 
 use crate::harness::Harness;
 use crate::scenes::context;
-use crate::{beds, births, columns, free, materials, passes, piles, planes, rate, rest, turned};
+use crate::{
+    beds, births, collisions, columns, free, grain_cancel, grain_readers, materials, passes, piles, planes,
+    preview, rate, rest, turned,
+};
 
 /// Length of a frame (s).
 pub const FRAME: f64 = 1.0 / 24.0;
@@ -15,15 +18,19 @@ pub const FRAME: f64 = 1.0 / 24.0;
 /// All of them.
 pub fn run(h: &mut Harness) {
     piles::run(h);
+    preview::run(h);
     free::run(h);
     beds::run(h);
     turned::run(h);
     columns::run(h);
     planes::run(h);
     materials::run(h);
+    collisions::run(h);
     births::run(h);
     rest::run(h);
     passes::run(h);
+    grain_readers::run(h);
+    grain_cancel::run(h);
     rate::run(h);
 }
 
@@ -42,7 +49,7 @@ pub struct Experiment {
 }
 
 /// Numbers in 0..1 (xorshift: Marsaglia 2003).
-pub struct Random(u64);
+pub struct Random(pub u64);
 
 impl Random {
     pub fn next(&mut self) -> f64 {

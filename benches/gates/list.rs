@@ -24,6 +24,9 @@ pub const GATES: &[Gate] = &[
     gate("snow.grains.pile_100k", "deg", Most(3.0), Most(1.5)),
     gate("snow.grains.pile_size", "deg", Most(1.5), Most(0.7)),
     gate("snow.grains.pile_creep", "deg", Most(0.5), Most(0.1)),
+    // The same snow in grains of twice the diameter.
+    gate("snow.grains.preview_volume", "%", Most(10.0), Most(5.0)),
+    gate("snow.grains.preview_angle", "%", Most(10.0), Most(5.0)),
     // Free motion against formulas, and heaps that nothing holds.
     gate("snow.grains.fall_speed", "1", Most(1.0e-6), Open),
     gate("snow.grains.fall_way", "1", Most(1.0e-6), Open),
@@ -45,10 +48,18 @@ pub const GATES: &[Gate] = &[
     gate("snow.grains.restitution", "%", Most(5.0), Open),
     gate("snow.grains.stick_stops", "%", Least(95.0), Open),
     gate("snow.grains.stick_shakes", "%", Most(5.0), Open),
+    // Grains deeper than a tenth of a diameter in what moves or in the base, but those that are trapped.
+    none("snow.grains.deep_plate", "grains"),
+    none("snow.grains.deep_blades", "grains"),
+    none("snow.grains.deep_sheet", "grains"),
+    none("snow.grains.deep_walker", "grains"),
     // Births: the account of snow and grains, the same print in few and many frames, and how fast grains are born.
     none("snow.grains.ledger", "grains"),
     gate("snow.grains.birth_spread", "%", Most(2.0), Most(0.5)),
     gate("snow.grains.birth_speed", "m/s", Most(0.05), Open),
+    // Other programs see each grain with all of its values.
+    yes("snow.grains.readers_openvdb"),
+    yes("snow.grains.readers_usd"),
     // Rest: what it changes (nothing where it is only speed), and what it saves.
     yes("snow.grains.rest_bytes"),
     gate("snow.grains.rest_angle", "deg", Most(0.5), Open),
@@ -57,6 +68,8 @@ pub const GATES: &[Gate] = &[
     // Whole passes: the bytes of a grain in its file, and the same files after kills and from 1 and 2 threads.
     gate("snow.grains.file_bytes", "B", Most(44.0), Most(32.0)),
     yes("snow.grains.same_pass"),
+    // From a cancel to the return of a step, through C.
+    gate("snow.grains.cancel_p99", "s", Most(0.2), Most(0.05)),
     // All grains at work.
     gate("snow.grains.speed", "k/s", Least(90.0), Least(200.0)),
     // The walls that a box leaves, against the envelope of its poses.

@@ -100,7 +100,7 @@ fn kill_in_the_middle(scene: &Path, out: &Path, took: f64) -> Vec<usize> {
 }
 
 /// A pass of a scene, quiet.
-fn pass(scene: &Path, out: &Path, threads: usize) -> Command {
+pub fn pass(scene: &Path, out: &Path, threads: usize) -> Command {
     let mut run = Command::new(env!("CARGO_BIN_EXE_frazil"));
     run.arg("snow").arg(scene).arg("-o").arg(out).args(["-q", "--threads", &threads.to_string()]);
     run.stdout(Stdio::null()).stderr(Stdio::null());

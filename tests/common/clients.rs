@@ -51,3 +51,10 @@ pub fn usd_composes(python: &Path, folder: &Path, first: i32, last: i32) -> Resu
         .args([first.to_string(), last.to_string()]);
     run(command)
 }
+
+/// usd-core reads the grains of a frame and finds the values of their records.
+pub fn usd_reads_grains(python: &Path, file: &Path, records: &Path, frame: i32) -> Result<String, String> {
+    let mut command = Command::new(python);
+    command.arg(root().join("tests/clients/points.py")).arg(file).arg(records).arg(frame.to_string());
+    run(command)
+}

@@ -1,0 +1,134 @@
+//! Gate of grains that are cancelled through C: the time until their step returns, and that it left all as it was.
+
+use std::ptr::{null, null_mut};
+use std::time::{Duration, Instant};
+
+use frazil::capi::context::*;
+use frazil::capi::grains::*;
+use frazil::capi::grains_points::*;
+use frazil::capi::library::FRZ_ABI_VERSION;
+use frazil::capi::pool::*;
+use frazil::capi::{frz_status, frz_view};
+
+use crate::cancel::{view, works};
+use crate::grains::{FRAME, Random};
+use crate::harness::{Harness, median, timed};
+
+/// Cancels that are measured.
+const CANCELS: usize = 200;
+/// Length (s) and sub-steps of a step: a part of a frame, as a whole one would take minutes to cancel so often.
+const STEP: (f64, u32) = (FRAME / 3.0, 5);
+/// Grains along each axis of the block that collapses: 200,000 of them.
+const SIDES: [u32; 3] = [80, 32, 80];
+
+/// Grains that are awake, and a context on two threads.
+struct Host {
+    pool: *mut frz_pool,
+    ctx: *mut frz_context,
+    grains: *mut frz_grains,
+}
+
+impl Host {
+    fn new(random: &mut Random) -> Self {
+        let mut host = Self { pool: null_mut(), ctx: null_mut(), grains: null_mut() };
+        let mut params = std::mem::MaybeUninit::<frz_grains_params>::uninit();
+        let apart = 1.1 * 2.0 * 0.0025;
+        let sites = (0..SIDES[0]).flat_map(|x| (0..SIDES[1]).map(move |y| [x, y]));
+        let sites = sites.flat_map(|[x, y]| (0..SIDES[2]).map(move |z| [x, y, z]));
+        let mut off = |at: u32| ((f64::from(at) + 0.5 + 0.05 * random.next()) * apart) as f32;
+        let places: Vec<[f32; 3]> = sites.map(|site| site.map(&mut off)).collect();
+        let none = frz_view { data: null(), count: 0, stride: 0 };
+        // SAFETY: the pointers are valid, and the parameters are filled before they are read.
+        unsafe {
+            works(frz_pool_create(2, &mut host.pool));
+            works(frz_context_create(FRZ_ABI_VERSION, host.pool, &mut host.ctx));
+            works(frz_grains_params_init(params.as_mut_ptr(), size_of::<frz_grains_params>()));
+            let mut params = params.assume_init();
+            (params.radius, params.sub_steps) = (0.0025, STEP.1);
+            params.flags = FRZ_GRAINS_FLOOR | FRZ_GRAINS_RESTLESS;
+            works(frz_grains_create(host.ctx, &params, null(), 0, &mut host.grains));
+            works(frz_grains_emit(host.ctx, host.grains, view(&places), none, 0, null_mut()));
+        }
+        host
+    }
+
+    fn step(&self) -> frz_status {
+        // SAFETY: the pointers are valid.
+        unsafe { frz_grains_step(self.ctx, self.grains, null(), null(), 0, STEP.0, 1, null_mut()) }
+    }
+
+    fn state(&self) -> Vec<u8> {
+        let mut size = 0;
+        // SAFETY: the pointers are valid, and the room is as large as the call before said.
+        unsafe {
+            works(frz_grains_save(self.ctx, self.grains, null_mut(), 0, &mut size));
+            let mut out = vec![0u8; size];
+            works(frz_grains_save(self.ctx, self.grains, out.as_mut_ptr().cast(), size, &mut size));
+            out.truncate(size);
+            out
+        }
+    }
+
+    /// Seconds from a cancel after `moment` to the return of the step; none when the step ended first.
+    fn cancelled(&self, moment: Duration) -> Option<f64> {
+        let ctx = self.ctx as usize;
+        let canceller = std::thread::spawn(move || {
+            std::thread::sleep(moment);
+            let now = Instant::now();
+            // SAFETY: the context outlives this thread, which is joined.
+            unsafe { frz_context_cancel(ctx as *mut frz_context) };
+            now
+        });
+        let status = self.step();
+        let ended = Instant::now();
+        let asked = canceller.join().expect("the thread");
+        // SAFETY: the context is the host's.
+        unsafe { frz_context_reset(self.ctx) };
+        (status == frz_status::FRZ_CANCELLED).then(|| ended.saturating_duration_since(asked).as_secs_f64())
+    }
+}
+
+impl Drop for Host {
+    fn drop(&mut self) {
+        // SAFETY: nobody uses them any more.
+        unsafe {
+            frz_grains_destroy(self.grains);
+            frz_context_destroy(self.ctx);
+            frz_pool_destroy(self.pool);
+        }
+    }
+}
+
+pub fn run(h: &mut Harness) {
+    let name = "snow.grains.cancel_p99";
+    if !h.wants(name) {
+        return;
+    }
+    let mut random = Random(42);
+    let host = Host::new(&mut random);
+    // Until they lie on each other.
+    (0..12).for_each(|_| works(host.step()));
+    let (whole, noisy) = timed(|| works(host.step()));
+    let mut before = host.state();
+    let mut latencies = Vec::new();
+    for attempt in 0..2 * CANCELS {
+        match host.cancelled(Duration::from_secs_f64(whole * random.next())) {
+            Some(latency) => latencies.push(latency),
+            // The step ended first.
+            None => before = host.state(),
+        }
+        assert!(attempt % 50 > 0 || host.state() == before, "a cancel changed the grains");
+        if latencies.len() == CANCELS {
+            break;
+        }
+    }
+    latencies.sort_unstable_by(f64::total_cmp);
+    let (p99, count) = (latencies[latencies.len() * 99 / 100], latencies.len());
+    println!("# the slowest: {:.4?} s", &latencies[count - 5..]);
+    let grains = SIDES.iter().product::<u32>();
+    let note = format!(
+        "{count} cancels of a step of {whole:.2} s of {grains} grains{noisy}; median {:.4} s",
+        median(latencies)
+    );
+    h.gate(name, p99, &note);
+}
