@@ -31,7 +31,7 @@ impl Field<'_> {
         diameter: f64,
         reach: f32,
     ) -> Result<Vec<Vec<Touch>>> {
-        let windows = self.windows(layout, which, diameter)?;
+        let windows = self.windows(layout, which, diameter, MARGIN)?;
         let near = which.par_iter().zip(&windows).map(|(&index, window)| {
             let (block, Some(window)) = (&layout.blocks[index as usize], window) else { return Vec::new() };
             let near = |&slot: &u32| self.touch(block, slot, &rows[slot as usize], window, diameter, reach);
@@ -40,8 +40,17 @@ impl Field<'_> {
         Ok(near.collect())
     }
 
-    /// The leaves around each block; none where no surface is near.
-    fn windows(&self, layout: &Layout, which: &[u32], diameter: f64) -> Result<Vec<Option<Window<'_>>>> {
+    /// The leaves around each block and a margin (cells); none where no surface is near.
+    ///
+    /// # Errors
+    /// What the grid reports.
+    pub fn windows(
+        &self,
+        layout: &Layout,
+        which: &[u32],
+        diameter: f64,
+        margin: f64,
+    ) -> Result<Vec<Option<Window<'_>>>> {
         let cell = self.grid.voxel_size();
         let bounds: Vec<[[i32; 3]; 2]> = which
             .par_iter()
@@ -49,8 +58,8 @@ impl Field<'_> {
                 let at = layout.blocks[index as usize].at;
                 let leaf = |x: f64| (x / DIM as f64).floor() as i32;
                 let edge = f64::from(EDGE) * diameter / cell;
-                let low = at.map(|at| leaf(f64::from(at) * edge - MARGIN));
-                let high = at.map(|at| leaf(f64::from(at + 1) * edge + MARGIN));
+                let low = at.map(|at| leaf(f64::from(at) * edge - margin));
+                let high = at.map(|at| leaf(f64::from(at + 1) * edge + margin));
                 [low, high]
             })
             .collect();

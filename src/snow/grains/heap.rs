@@ -11,6 +11,7 @@ use super::shell::Search;
 pub use super::shell::Shell;
 use super::solve::{Coefficients, sub_step};
 use super::touch::{self, Touch};
+use super::trapped;
 use crate::base::DVec3;
 use crate::context::Context;
 use crate::error::{Error, Result};
@@ -159,8 +160,7 @@ impl Heap {
         self.rows.iter().map(|row| !row.rests())
     }
 
-    /// Identities of the grains that the last step left no room, ascending: two surfaces that face each other press each of them,
-    /// and it is deeper than a tenth of its diameter in one.
+    /// Identities of the grains that the last step left no room, ascending: see [`super::trapped`].
     pub fn trapped(&self) -> &[u32] {
         &self.trapped
     }
@@ -210,12 +210,8 @@ impl Heap {
             sub_step(ctx, &mut self.rows, &mut layout, &coefficients)?;
             ctx.advance();
         }
-        let trapped = layout
-            .blocks
-            .par_iter()
-            .flat_map_iter(|block| touch::trapped(&block.touches, &self.rows, self.diameter, dt));
-        self.trapped = trapped.map(|slot| self.ids[slot as usize]).collect();
-        self.trapped.par_sort_unstable();
+        let end = trapped::End { layout: &layout, diameter: self.diameter, dt };
+        self.trapped = end.release(&mut self.rows, &self.ids, colliders, &mut pose)?;
         self.take_back(layout)
     }
 

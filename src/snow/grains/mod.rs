@@ -33,6 +33,7 @@ mod sourcing;
 mod state;
 mod surroundings;
 mod touch;
+mod trapped;
 
 use std::collections::{BTreeMap, HashSet};
 
@@ -376,8 +377,8 @@ impl Grains {
         self.heap.awake()
     }
 
-    /// Identities of the grains that the last step left no room, ascending: two surfaces that face each other, such as a sole and
-    /// the base below it, press each of them, and it is deeper than a tenth of its diameter in one.
+    /// Identities of the grains that the last step left no room, ascending: each is deeper than a tenth of its diameter in a
+    /// surface, and has no place outside of all surfaces within a diameter and a half, such as between a sole and the base.
     pub fn trapped(&self) -> &[u32] {
         self.heap.trapped()
     }

@@ -114,6 +114,8 @@ impl Search<'_> {
 const REACH: f64 = 0.5 + SKIN as f64;
 /// How much farther meshes are looked for, so that a grain need not ask in every sub-step (diameters).
 const AHEAD: f64 = 1.5;
+/// Least distance (m) at which a place lies to one side of its nearest point.
+const LEAST: f64 = 1.0e-9;
 /// Room for rounding (diameters).
 const SLACK: f32 = 1.0e-3;
 
@@ -219,13 +221,7 @@ impl Shell {
     }
 
     fn touch(&self, slot: u32, row: &Row, place: DVec3, nearest: &Nearest, diameter: f64, dt: f64) -> Touch {
-        let distance = nearest.square.sqrt();
-        let inside = self.closed && nearest.height < 0.0;
-        let out = if distance > 1.0e-6 * diameter {
-            (place - nearest.point) * (if inside { -1.0 } else { 1.0 } / distance)
-        } else {
-            nearest.normal
-        };
+        let (distance, inside, out) = self.side(place, nearest);
         let normal = [out.x as f32, out.y as f32, out.z as f32];
         let gap = (if inside { -distance } else { distance }) / diameter - 0.5;
         let velocity = nearest.motion / dt;
@@ -239,6 +235,27 @@ impl Shell {
             stick: self.stick,
             ..Touch::default()
         }
+    }
+
+    /// Distance (m) of a place from its nearest point, whether it is inside, and the direction out.
+    fn side(&self, place: DVec3, nearest: &Nearest) -> (f64, bool, DVec3) {
+        let distance = nearest.square.sqrt();
+        let inside = self.closed && nearest.height < 0.0;
+        let out = if distance > LEAST {
+            (place - nearest.point) * (if inside { -1.0 } else { 1.0 } / distance)
+        } else {
+            nearest.normal
+        };
+        (distance, inside, out)
+    }
+
+    /// How far (m) a ball of a radius (m) must go to be out of the mesh, and whereto; nothing where it touches no surface within
+    /// three radii. Where the mesh is told to be at rest.
+    pub fn depth(&self, place: DVec3, radius: f64) -> Option<(f64, DVec3)> {
+        let nearest = self.nearest(place, 3.0 * radius)?;
+        let (distance, inside, out) = self.side(place, &nearest);
+        let depth = if inside { radius + distance } else { radius - distance };
+        (depth > 0.0).then_some((depth, out))
     }
 
     /// The nearest point of the surface within a distance (m), and where it moves, within that and its way.

@@ -3,7 +3,7 @@
 use rayon::prelude::*;
 
 use super::layout::Block;
-use super::rows::{Row, V, add, dot, scaled};
+use super::rows::{V, add, dot, scaled};
 
 /// A grain beside a plane that nothing moves.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
@@ -89,34 +89,6 @@ pub fn renew(blocks: &mut [Block], fresh: Vec<Vec<Touch>>) {
         release_pressed(&mut block.touches);
     });
 }
-
-/// The grains that surfaces leave no room, of a block's touches after a sub-step of `dt` (s), sorted: each is deeper than a tenth
-/// of its diameter in one of two surfaces that face each other.
-pub fn trapped<'a>(
-    touches: &'a [Touch],
-    rows: &'a [Row],
-    diameter: f64,
-    dt: f64,
-) -> impl Iterator<Item = u32> + 'a {
-    let depth = move |touch: &Touch| {
-        let moved = dot(touch.velocity, touch.normal) * (dt / diameter) as f32;
-        touch.offset + moved - dot(touch.normal, rows[touch.grain as usize].place)
-    };
-    touches.chunk_by(|a, b| a.grain == b.grain).filter_map(move |touches| {
-        let is_deep = touches.iter().any(|touch| depth(touch) > DEEP);
-        let presses = |index: usize, touch: &Touch| {
-            depth(touch) > -DEEP
-                && touches[..index]
-                    .iter()
-                    .any(|other| depth(other) > -DEEP && dot(touch.normal, other.normal) < OPPOSITE)
-        };
-        let is_pressed = || touches.iter().enumerate().any(|(index, touch)| presses(index, touch));
-        (is_deep && is_pressed()).then(|| touches[0].grain)
-    })
-}
-
-/// Depth (diameters) in a surface from which a grain counts as in it.
-const DEEP: f32 = 0.1;
 
 /// Takes the impulses of grains that are pressed between two sides: those would grow as long as the sides fight over the grain,
 /// and throw it when one of them leaves. The touches are sorted.
