@@ -64,6 +64,11 @@
 #define FRZ_BODY_EXACT 1
 
 /**
+ * Flag of a body: of the snow that it removes, the share frz_body.compression becomes no grains.
+ */
+#define FRZ_BODY_COMPRESSION 2
+
+/**
  * Flag of parameters of grains: a level ground lies at frz_grains_params.floor.
  */
 #define FRZ_GRAINS_FLOOR 1
@@ -72,6 +77,11 @@
  * Flag of parameters of grains: they never come to rest.
  */
 #define FRZ_GRAINS_RESTLESS 2
+
+/**
+ * Flag of parameters of grains: those outside of frz_grains_params.keep_low and keep_high are taken away.
+ */
+#define FRZ_GRAINS_BOX 4
 
 /**
  * Status codes. Numbers never change; new ones are added at the end.
@@ -240,6 +250,10 @@ enum frz_grains_attribute
      * int32_t: 1 where it is awake, 0 where it rests (active).
      */
     FRZ_GRAINS_ACTIVE = 7,
+    /**
+     * int32_t: 1 where it is trapped: a surface that it is in and those around it leave it no room (trapped).
+     */
+    FRZ_GRAINS_TRAPPED = 8,
 };
 #ifndef __cplusplus
 #if __STDC_VERSION__ >= 202311L
@@ -791,7 +805,7 @@ typedef struct {
      */
     uint32_t struct_size;
     /**
-     * 0 or FRZ_BODY_EXACT.
+     * 0, FRZ_BODY_EXACT, FRZ_BODY_COMPRESSION or both.
      */
     uint32_t flags;
     /**
@@ -828,6 +842,15 @@ typedef struct {
      * Friction of grains against it, 0 to 10; only grains read it. 0.3 in headers of interface 1.1 and from frz_body_init.
      */
     double friction;
+    /**
+     * With which it holds grains that touch it (weights of a grain), 0 to 1000; only grains read it.
+     */
+    double stick;
+    /**
+     * In place of frz_grains_params.compression, 0 to 1; only with FRZ_BODY_COMPRESSION, and only grains read it. Where several
+     * bodies that differ in it took the snow, that of the one counts whose surface came nearest to the place.
+     */
+    double compression;
 } frz_body;
 
 /**
@@ -964,7 +987,7 @@ typedef struct {
      */
     uint32_t struct_size;
     /**
-     * 0, or FRZ_GRAINS_FLOOR, FRZ_GRAINS_RESTLESS or both.
+     * 0, or some of FRZ_GRAINS_FLOOR, FRZ_GRAINS_RESTLESS and FRZ_GRAINS_BOX.
      */
     uint32_t flags;
     /**
@@ -986,6 +1009,10 @@ typedef struct {
      */
     double attraction;
     /**
+     * Share of their speed with which grains bounce off, 0 to 1; 0 is usual.
+     */
+    double restitution;
+    /**
      * Share of its velocity that a grain keeps in a second, 0 to 1; 0.5 is usual.
      */
     double air;
@@ -1001,6 +1028,18 @@ typedef struct {
      * Grains below this height (m) are dropped at the end of a step; -1e6 is usual, and far below all that grains reach.
      */
     double lowest;
+    /**
+     * Least and greatest place (m) of a box outside of which grains are dropped; only with FRZ_GRAINS_BOX. 0 is usual.
+     */
+    double keep_low[3];
+    /**
+     * See keep_low.
+     */
+    double keep_high[3];
+    /**
+     * Seconds after which a grain is taken away, counted by the frames of its birth and of the step; 0, as is usual: it stays.
+     */
+    double lifetime;
     /**
      * Most grains, 1 to 60000000: a step or an emission that would make more fails. 20000000 is usual.
      */
@@ -1044,9 +1083,17 @@ typedef struct {
      */
     uint64_t born;
     /**
-     * Grains that fell below the lowest height or left the range of coordinates.
+     * Grains that fell below the lowest height, left the box or the range of coordinates.
      */
     uint64_t dropped;
+    /**
+     * Grains that were as old as their lifetime.
+     */
+    uint64_t expired;
+    /**
+     * Grains that are pressed where they have no room: the attribute FRZ_GRAINS_TRAPPED.
+     */
+    uint64_t trapped;
     /**
      * Snow that the base layer lost (m3).
      */
@@ -1907,6 +1954,19 @@ frz_status frz_base_dirty(const frz_base *base,
  * Any thread.
  */
 frz_status frz_grains_params_init(frz_grains_params *params, size_t size);
+
+/**
+ * Sets the friction and the attraction of parameters from what can be measured of snow.
+ *
+ * params: friction and attraction are set, for grains of its radius.
+ * repose_angle_deg: slope at which a poured pile comes to rest (degrees), 0 to 42.
+ * stands: height of a wall of grains that just stands (m), 0 to 1000; up to 64 diameters it was measured. 0: no attraction.
+ *
+ * Any thread.
+ */
+frz_status frz_grains_params_of_snow(frz_grains_params *params,
+                                     double repose_angle_deg,
+                                     double stands);
 
 /**
  * Makes grains: none yet, or those of a state that frz_grains_save wrote.

@@ -129,6 +129,8 @@ impl Host {
             face_counts: frz_view { data: null(), count: 0, stride: 0 },
             indices: view(self.ball.triangles.as_flattened()),
             friction: 0.3,
+            stick: 0.0,
+            compression: 0.0,
         }
     }
 

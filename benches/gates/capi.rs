@@ -56,6 +56,8 @@ impl Poses {
             face_counts: view(std::ptr::null(), 0),
             indices: view(self.triangles.as_ptr().cast(), self.triangles.len() * 3),
             friction: 0.3,
+            stick: 0.0,
+            compression: 0.0,
         }
     }
 }

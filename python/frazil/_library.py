@@ -98,7 +98,8 @@ class BodyDesc(c.Structure):
     _fields_ = [
         ("struct_size", c.c_uint32), ("flags", c.c_uint32), ("id", c.c_uint64), ("positions", View),
         ("positions_end", View), ("between", c.POINTER(View)), ("between_count", c.c_size_t),
-        ("face_counts", View), ("indices", View), ("friction", c.c_double),
+        ("face_counts", View), ("indices", View), ("friction", c.c_double), ("stick", c.c_double),
+        ("compression", c.c_double),
     ]
 
 
@@ -127,8 +128,9 @@ class BaseReport(Struct):
 class GrainsParams(Struct):
     _fields_ = [
         ("struct_size", c.c_uint32), ("flags", c.c_uint32), ("radius", c.c_double), ("compression", c.c_double),
-        ("friction", c.c_double), ("attraction", c.c_double), ("air", c.c_double), ("gravity", c.c_double),
-        ("floor", c.c_double), ("lowest", c.c_double), ("max_grains", c.c_uint64), ("seed", c.c_uint64),
+        ("friction", c.c_double), ("attraction", c.c_double), ("restitution", c.c_double), ("air", c.c_double),
+        ("gravity", c.c_double), ("floor", c.c_double), ("lowest", c.c_double), ("keep_low", c.c_double * 3),
+        ("keep_high", c.c_double * 3), ("lifetime", c.c_double), ("max_grains", c.c_uint64), ("seed", c.c_uint64),
         ("sub_steps", c.c_uint32), ("reserved", c.c_uint32),
     ]
 
@@ -136,7 +138,8 @@ class GrainsParams(Struct):
 class GrainsReport(Struct):
     _fields_ = [
         ("struct_size", c.c_uint32), ("sub_steps", c.c_uint32), ("count", c.c_uint64),
-        ("resting", c.c_uint64), ("born", c.c_uint64), ("dropped", c.c_uint64), ("removed_volume", c.c_double), ("owed", c.c_double), ("fastest", c.c_double),
+        ("resting", c.c_uint64), ("born", c.c_uint64), ("dropped", c.c_uint64), ("expired", c.c_uint64),
+        ("trapped", c.c_uint64), ("removed_volume", c.c_double), ("owed", c.c_double), ("fastest", c.c_double),
     ]
 
 

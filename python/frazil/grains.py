@@ -11,23 +11,28 @@ from .snow import bodies_of
 ATTRIBUTES = {
     "P": (0, np.float32, 3), "P64": (1, np.float64, 3), "v": (2, np.float32, 3), "id": (3, np.int64, 1),
     "pscale": (4, np.float32, 1), "source_frame": (5, np.int32, 1), "rest": (6, np.float32, 3),
-    "active": (7, np.int32, 1),
+    "active": (7, np.int32, 1), "trapped": (8, np.int32, 1),
 }
-FLOOR, RESTLESS = 1, 2
+FLOOR, RESTLESS, BOX = 1, 2, 4
 
 
 class Grains(Handle):
     """Grains of snow, all of one radius (m): a third of the base layer's voxel gives the usual look.
 
-    Further parameters, as in frz_grains_params: compression, friction, attraction, air, gravity, lowest, max_grains, seed,
-    sub_steps (0: as many as are needed), floor, the height of a level ground (None: there is none), and rests: whether grains that lie still come to rest.
+    floor: the height of a level ground (m); None: there is none.
+    rests: whether grains that lie still come to rest.
+    repose_angle_deg: slope of a poured pile, in place of friction.
+    stands: height of a wall that just stands (m), in place of attraction.
+    keep_box: (low, high), places (m) of a box outside of which grains are taken away; None: there is none.
+    Further parameters, as in frz_grains_params: compression, friction, attraction, restitution, air, gravity, lowest, lifetime,
+    max_grains, seed, sub_steps (0: as many as are needed).
     state: bytes of save(), to go on from.
     """
 
     _destroy = "frz_grains_destroy"
 
-    def __init__(self, ctx, radius=0.01 / 3, floor=None, state=None, rests=True, **more):
-        params = self._params(radius, floor, rests, more)
+    def __init__(self, ctx, radius=0.01 / 3, floor=None, state=None, **more):
+        params = self._params(radius, floor, **more)
         super().__init__(made("grains_create", ctx.pointer, c.byref(params), state, len(state) if state else 0))
         self._ctx, self._radius = ctx, radius
 
@@ -35,7 +40,7 @@ class Grains(Handle):
         return f"{len(self)} of a radius of {self._radius:g} m"
 
     @staticmethod
-    def _params(radius, floor, rests, more):
+    def _params(radius, floor, rests=True, repose_angle_deg=None, stands=None, keep_box=None, **more):
         params = GrainsParams()
         call("grains_params_init", c.byref(params), c.sizeof(params))
         params.radius = radius
@@ -43,15 +48,21 @@ class Grains(Handle):
             params.flags, params.floor = FLOOR, floor
         if not rests:
             params.flags |= RESTLESS
+        if keep_box is not None:
+            params.flags |= BOX
+            params.keep_low, params.keep_high = ((c.c_double * 3)(*place) for place in keep_box)
+        if repose_angle_deg is not None or stands is not None:
+            call("grains_params_of_snow", c.byref(params), 32.0 if repose_angle_deg is None else repose_angle_deg,
+                 stands or 0.0)
         for name, value in more.items():
             if name in ("struct_size", "flags", "reserved") or name not in dict(GrainsParams._fields_):
                 raise TypeError(f"grains have no parameter {name}")
             setattr(params, name, value)
         return params
 
-    def set_params(self, floor=None, rests=True, **more):
+    def set_params(self, floor=None, **more):
         """How grains behave from the next step on: all parameters but the radius; those not given are the usual ones."""
-        params = self._params(self._radius, floor, rests, more)
+        params = self._params(self._radius, floor, **more)
         call("grains_set_params", self.pointer, c.byref(params))
 
     def step(self, base, bodies, dt, frame):
@@ -89,7 +100,7 @@ class Grains(Handle):
         return True
 
     def read(self, name):
-        """A copy of an attribute: P, v, rest (n, 3), id, pscale, source_frame, active (n,), or P64, places in 64 bits. All have the
+        """A copy of an attribute: P, v, rest (n, 3), id, pscale, source_frame, active, trapped (n,), or P64, places in 64 bits. All have the
         same order, which changes from step to step: ids tell which grain is which."""
         if name not in ATTRIBUTES:
             raise ValueError(f"grains have no attribute {name!r}, but {', '.join(ATTRIBUTES)}")

@@ -31,6 +31,8 @@ class Body(NamedTuple):
     id: a number that stays with the body from step to step, different in all bodies of a step.
     exact: no noise along its imprints.
     friction: of grains against it, 0 to 10.
+    stick: with which it holds grains that touch it (weights of a grain), 0 to 1000.
+    compression: share of the snow that it removes that becomes no grains; None: as the grains have it.
     """
 
     positions: np.ndarray
@@ -41,6 +43,8 @@ class Body(NamedTuple):
     id: int = 0
     exact: bool = False
     friction: float = 0.3
+    stick: float = 0.0
+    compression: Optional[float] = None
 
 
 def bodies_of(bodies):
@@ -55,8 +59,9 @@ def bodies_of(bodies):
         views = (View * max(len(poses), 1))(*[view(pose) for pose in poses])
         kept.append((start, end, indices, counts, poses, views))
         descs[at] = BodyDesc(
-            c.sizeof(BodyDesc), int(body.exact), body.id, view(start), none if end is None else view(end),
+            c.sizeof(BodyDesc), int(body.exact) | (0 if body.compression is None else 2), body.id, view(start), none if end is None else view(end),
             views if poses else None, len(poses), view(counts), view(indices), body.friction,
+            body.stick, body.compression or 0.0,
         )
     return descs, kept
 

@@ -12,10 +12,14 @@ use crate::base::{DVec3, PolygonMesh, Vec3};
 use crate::context::Context;
 use crate::error::Result;
 use crate::motion::{Motion, between};
+use crate::snow::grains::Object;
 use crate::sweep::{Body, Shape};
 
 /// Flag of a body: its imprints have no noise.
 pub const FRZ_BODY_EXACT: u32 = 1;
+
+/// Flag of a body: of the snow that it removes, the share frz_body.compression becomes no grains.
+pub const FRZ_BODY_COMPRESSION: u32 = 2;
 
 /// A mesh that moves in the time of one step. All arrays are lent for the call.
 #[repr(C)]
@@ -23,7 +27,7 @@ pub const FRZ_BODY_EXACT: u32 = 1;
 pub struct frz_body {
     /// sizeof(frz_body), the same in all bodies of a call.
     pub struct_size: u32,
-    /// 0 or FRZ_BODY_EXACT.
+    /// 0, FRZ_BODY_EXACT, FRZ_BODY_COMPRESSION or both.
     pub flags: u32,
     /// A number of the host that stays with the body from step to step, different in all bodies of a call. It saves
     /// work where a body keeps its faces; results do not depend on it.
@@ -43,6 +47,11 @@ pub struct frz_body {
     pub indices: frz_view,
     /// Friction of grains against it, 0 to 10; only grains read it. 0.3 in headers of interface 1.1 and from frz_body_init.
     pub friction: f64,
+    /// With which it holds grains that touch it (weights of a grain), 0 to 1000; only grains read it.
+    pub stick: f64,
+    /// In place of frz_grains_params.compression, 0 to 1; only with FRZ_BODY_COMPRESSION, and only grains read it. Where several
+    /// bodies that differ in it took the snow, that of the one counts whose surface came nearest to the place.
+    pub compression: f64,
 }
 
 // SAFETY: numbers and pointers.
@@ -63,6 +72,8 @@ impl frz_body {
         face_counts: frz_view::NONE,
         indices: frz_view::NONE,
         friction: 0.3,
+        stick: 0.0,
+        compression: 0.0,
     };
 }
 
@@ -122,9 +133,24 @@ impl Motion for HostMotion {
 struct Arrived {
     id: u64,
     exact: bool,
-    friction: f64,
+    surface: Surface,
     mesh: PolygonMesh,
     poses: Vec<Vec<Vec3>>,
+}
+
+/// What grains have of a body.
+#[derive(Clone, Copy)]
+pub(super) struct Surface {
+    friction: f64,
+    stick: f64,
+    compression: Option<f64>,
+}
+
+impl Surface {
+    /// A body with this surface.
+    pub(super) fn of<'a>(&self, body: &'a Body) -> Object<'a> {
+        Object { stick: self.stick, compression: self.compression, ..Object::new(body, self.friction) }
+    }
 }
 
 /// Shapes of a host's bodies by their ids, kept from step to step.
@@ -142,7 +168,7 @@ pub(super) enum Role {
 /// Farthest from the origin (m) that a body that pushes grains may lie.
 const FARTHEST: f32 = 1.0e6;
 
-/// Bodies from a host's arrays, checked, each with its friction; `shapes` are those of earlier calls, and are updated.
+/// Bodies from a host's arrays, checked, each with its surface; `shapes` are those of earlier calls, and are updated.
 ///
 /// # Safety
 /// The bodies must describe memory that can be read.
@@ -153,7 +179,7 @@ pub(super) unsafe fn bodies(
     dt: f64,
     role: Role,
     shapes: &mut Shapes,
-) -> Outcome<Vec<(Body, f64)>> {
+) -> Outcome<Vec<(Body, Surface)>> {
     finite("dt", dt)?;
     if dt < 0.0 {
         return Err(Failure::argument(format!("dt = {dt} is not 0 or more")));
@@ -176,15 +202,15 @@ pub(super) unsafe fn bodies(
         let triangles = body.mesh.triangles();
         let motion = HostMotion { triangles, poses: body.poses, end: dt };
         let made = Body::shaped(Box::new(motion), 0.0, known.get(&body.id).cloned())?;
-        Ok((body.id, made.with_noise(!body.exact), body.friction))
+        Ok((body.id, made.with_noise(!body.exact), body.surface))
     };
-    let made: Vec<(u64, Body, f64)> = ctx.phase("bodies", || {
+    let made: Vec<(u64, Body, Surface)> = ctx.phase("bodies", || {
         ctx.expect(arrived.len());
         arrived.into_par_iter().map(make).collect::<Result<_>>()
     })?;
     made.iter().for_each(|(id, body, _)| warn(ctx, role, *id, body, shapes.get(id)));
     *shapes = made.iter().map(|(id, body, _)| (*id, body.shape().clone())).collect();
-    Ok(made.into_iter().map(|(_, body, friction)| (body, friction)).collect())
+    Ok(made.into_iter().map(|(_, body, surface)| (body, surface)).collect())
 }
 
 /// Warnings about a body, once for each set of faces.
@@ -258,8 +284,13 @@ unsafe fn one(body: *const frz_body, dt: f64) -> Outcome<Arrived> {
     // SAFETY: the caller's promise.
     unsafe {
         let body = sized(body, frz_body::USUAL)?;
-        no_flags(body.flags, FRZ_BODY_EXACT)?;
+        no_flags(body.flags, FRZ_BODY_EXACT | FRZ_BODY_COMPRESSION)?;
         within("friction", body.friction, 0.0..=10.0, "")?;
+        within("stick", body.stick, 0.0..=1000.0, "")?;
+        let has_compression = body.flags & FRZ_BODY_COMPRESSION != 0;
+        let compression = has_compression.then_some(body.compression);
+        within("compression", compression.unwrap_or(0.0), 0.0..=1.0, "")?;
+        let surface = Surface { friction: body.friction, stick: body.stick, compression };
         if body.between_count > MOST_BETWEEN {
             let text = format!("between_count = {} is more than {MOST_BETWEEN}", body.between_count);
             return Err(Failure::argument(text));
@@ -290,6 +321,6 @@ unsafe fn one(body: *const frz_body, dt: f64) -> Outcome<Arrived> {
             pose(&body.positions_end, "positions_end")?;
         }
         let exact = body.flags & FRZ_BODY_EXACT != 0;
-        Ok(Arrived { id: body.id, exact, friction: body.friction, mesh, poses })
+        Ok(Arrived { id: body.id, exact, surface, mesh, poses })
     }
 }

@@ -8,12 +8,14 @@ use super::body::{Role, Shapes, bodies, frz_body};
 use super::context::{creates, enter, frz_context};
 use super::grid::frz_grid;
 use super::guard::{Failure, Outcome, frz_status, guard};
-use super::handle::{Noun, change, destroy, read};
+use super::handle::{Noun, change, destroy, read, required};
 use super::mesh::no_flags;
 use super::views::{Sized32, fill, finite, frz_view, sized, within};
+use crate::base::DVec3;
 use crate::context::Context;
 use crate::error::Error;
-use crate::snow::grains::{Base, Grains, Object, Params, Surroundings, memory};
+use crate::snow::grains::{Base, Grains, Params, Surroundings, memory};
+use crate::snow::{grain_cohesion, grain_friction};
 use crate::vdb::{FloatGrid, GridClass};
 
 /// Flag of parameters of grains: a level ground lies at frz_grains_params.floor.
@@ -21,6 +23,9 @@ pub const FRZ_GRAINS_FLOOR: u32 = 1;
 
 /// Flag of parameters of grains: they never come to rest.
 pub const FRZ_GRAINS_RESTLESS: u32 = 2;
+
+/// Flag of parameters of grains: those outside of frz_grains_params.keep_low and keep_high are taken away.
+pub const FRZ_GRAINS_BOX: u32 = 4;
 
 /// Grains of snow, all of one size.
 pub struct frz_grains {
@@ -33,7 +38,7 @@ pub struct frz_grains {
 pub struct frz_grains_params {
     /// sizeof(frz_grains_params).
     pub struct_size: u32,
-    /// 0, or FRZ_GRAINS_FLOOR, FRZ_GRAINS_RESTLESS or both.
+    /// 0, or some of FRZ_GRAINS_FLOOR, FRZ_GRAINS_RESTLESS and FRZ_GRAINS_BOX.
     pub flags: u32,
     /// Radius of a grain (m), 1e-5 to 1; at a base layer from 0.02 to 0.5 of its voxel. A third of the voxel gives the
     /// thesis' look, and is usual for voxels of 1 cm.
@@ -45,6 +50,8 @@ pub struct frz_grains_params {
     pub friction: f64,
     /// With which grains that all but touch hold each other (weights of a grain), 0 to 1000; 0 is usual.
     pub attraction: f64,
+    /// Share of their speed with which grains bounce off, 0 to 1; 0 is usual.
+    pub restitution: f64,
     /// Share of its velocity that a grain keeps in a second, 0 to 1; 0.5 is usual.
     pub air: f64,
     /// Gravity along y (m/s2), -1000 to 1000; -9.81 is usual.
@@ -53,6 +60,12 @@ pub struct frz_grains_params {
     pub floor: f64,
     /// Grains below this height (m) are dropped at the end of a step; -1e6 is usual, and far below all that grains reach.
     pub lowest: f64,
+    /// Least and greatest place (m) of a box outside of which grains are dropped; only with FRZ_GRAINS_BOX. 0 is usual.
+    pub keep_low: [f64; 3],
+    /// See keep_low.
+    pub keep_high: [f64; 3],
+    /// Seconds after which a grain is taken away, counted by the frames of its birth and of the step; 0, as is usual: it stays.
+    pub lifetime: f64,
     /// Most grains, 1 to 60000000: a step or an emission that would make more fails. 20000000 is usual.
     pub max_grains: u64,
     /// Another one scatters the grains of removed snow otherwise; 0 is usual.
@@ -83,10 +96,14 @@ impl frz_grains_params {
             compression: usual.compression,
             friction: usual.friction,
             attraction: usual.attraction,
+            restitution: usual.restitution,
             air: usual.air,
             gravity: usual.gravity,
             floor: 0.0,
             lowest: -FARTHEST,
+            keep_low: [0.0; 3],
+            keep_high: [0.0; 3],
+            lifetime: 0.0,
             max_grains: usual.most as u64,
             seed: usual.seed,
             sub_steps: 0,
@@ -96,7 +113,7 @@ impl frz_grains_params {
 
     /// The library's own parameters; what is out of range is named.
     fn params(&self) -> Outcome<Params> {
-        no_flags(self.flags, FRZ_GRAINS_FLOOR | FRZ_GRAINS_RESTLESS)?;
+        no_flags(self.flags, FRZ_GRAINS_FLOOR | FRZ_GRAINS_RESTLESS | FRZ_GRAINS_BOX)?;
         let numbers = [
             ("radius", self.radius),
             ("compression", self.compression),
@@ -104,10 +121,13 @@ impl frz_grains_params {
             ("attraction", self.attraction),
             ("air", self.air),
             ("gravity", self.gravity),
+            ("restitution", self.restitution),
             ("lowest", self.lowest),
         ];
         numbers.into_iter().try_for_each(|(name, value)| finite(name, value))?;
         within("floor", self.floor, -FARTHEST..=FARTHEST, " m")?;
+        within("lifetime", self.lifetime, 0.0..=1.0e9, " s")?;
+        let has_box = self.flags & FRZ_GRAINS_BOX != 0;
         within("max_grains", self.max_grains as f64, 1.0..=6.0e7, "")?;
         within("sub_steps", f64::from(self.sub_steps), 0.0..=1000.0, "")?;
         within("reserved", f64::from(self.reserved), 0.0..=0.0, "")?;
@@ -116,11 +136,11 @@ impl frz_grains_params {
             compression: self.compression,
             friction: self.friction,
             attraction: self.attraction,
-            restitution: 0.0,
+            restitution: self.restitution,
             air: self.air,
             gravity: self.gravity,
-            lifetime: None,
-            keep_box: None,
+            lifetime: Some(self.lifetime).filter(|&lifetime| lifetime > 0.0),
+            keep_box: has_box.then(|| [self.keep_low, self.keep_high].map(DVec3::from)),
             rests: self.flags & FRZ_GRAINS_RESTLESS == 0,
             sub_steps: Some(self.sub_steps).filter(|&count| count > 0),
             most: self.max_grains as usize,
@@ -150,8 +170,12 @@ pub struct frz_grains_report {
     pub resting: u64,
     /// Grains that were born of removed snow.
     pub born: u64,
-    /// Grains that fell below the lowest height or left the range of coordinates.
+    /// Grains that fell below the lowest height, left the box or the range of coordinates.
     pub dropped: u64,
+    /// Grains that were as old as their lifetime.
+    pub expired: u64,
+    /// Grains that are pressed where they have no room: the attribute FRZ_GRAINS_TRAPPED.
+    pub trapped: u64,
     /// Snow that the base layer lost (m3).
     pub removed_volume: f64,
     /// Grains that removed snow has paid for and that are not born yet: fractions, and what had no place.
@@ -174,6 +198,8 @@ impl frz_grains_report {
         resting: 0,
         born: 0,
         dropped: 0,
+        expired: 0,
+        trapped: 0,
         removed_volume: 0.0,
         owed: 0.0,
         fastest: 0.0,
@@ -236,7 +262,7 @@ impl Heap {
             let (count, resting) = (self.grains.count() as u64, self.grains.resting() as u64);
             return Ok(frz_grains_report { count, resting, ..frz_grains_report::NOTHING });
         }
-        let objects: Vec<_> = bodies.iter().map(|(body, friction)| Object::new(body, *friction)).collect();
+        let objects: Vec<_> = bodies.iter().map(|(body, surface)| surface.of(body)).collect();
         let Ground { floor, lowest } = self.ground;
         let around = Surroundings { base, objects: &objects, statics: &[], floor, lowest };
         let done = self.grains.step(ctx, &around, [0.0, dt], frame)?;
@@ -248,6 +274,8 @@ impl Heap {
             resting: done.resting as u64,
             born: done.born as u64,
             dropped: done.dropped as u64,
+            expired: done.expired as u64,
+            trapped: done.trapped as u64,
             // An empty sum is -0.
             removed_volume: done.removed_volume + 0.0,
             owed: done.owed + 0.0,
@@ -297,6 +325,35 @@ fn check_snow(name: &str, grid: &FloatGrid) -> Outcome {
 pub unsafe extern "C" fn frz_grains_params_init(params: *mut frz_grains_params, size: usize) -> frz_status {
     // SAFETY: the parameters are NULL or have so many bytes.
     guard(|| unsafe { fill(params, Some(size), frz_grains_params::usual()) })
+}
+
+/// Sets the friction and the attraction of parameters from what can be measured of snow.
+///
+/// params: friction and attraction are set, for grains of its radius.
+/// repose_angle_deg: slope at which a poured pile comes to rest (degrees), 0 to 42.
+/// stands: height of a wall of grains that just stands (m), 0 to 1000; up to 64 diameters it was measured. 0: no attraction.
+///
+/// Any thread.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn frz_grains_params_of_snow(
+    params: *mut frz_grains_params,
+    repose_angle_deg: f64,
+    stands: f64,
+) -> frz_status {
+    guard(|| {
+        within("repose_angle_deg", repose_angle_deg, 0.0..=grain_friction::STEEPEST, " degrees")?;
+        within("stands", stands, 0.0..=1000.0, " m")?;
+        let to = required(params, "params")?;
+        // SAFETY: the parameters are the caller's, checked for their size.
+        unsafe {
+            let mut now = sized(to.cast_const(), frz_grains_params::usual())?;
+            now.params()?;
+            now.friction = grain_friction::of_repose(repose_angle_deg);
+            now.attraction = grain_cohesion::of_wall(stands, 2.0 * now.radius, now.friction).min(1000.0);
+            to.write_unaligned(now);
+        }
+        Ok(())
+    })
 }
 
 /// Makes grains: none yet, or those of a state that frz_grains_save wrote.

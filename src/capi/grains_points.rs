@@ -30,11 +30,13 @@ pub enum frz_grains_attribute {
     FRZ_GRAINS_REST = 6,
     /// int32_t: 1 where it is awake, 0 where it rests (active).
     FRZ_GRAINS_ACTIVE = 7,
+    /// int32_t: 1 where it is trapped: a surface that it is in and those around it leave it no room (trapped).
+    FRZ_GRAINS_TRAPPED = 8,
 }
 
 use frz_grains_attribute::*;
 
-const ATTRIBUTES: [(u32, frz_grains_attribute); 8] = [
+const ATTRIBUTES: [(u32, frz_grains_attribute); 9] = [
     (0, FRZ_GRAINS_POSITION),
     (1, FRZ_GRAINS_POSITION_DOUBLE),
     (2, FRZ_GRAINS_VELOCITY),
@@ -43,6 +45,7 @@ const ATTRIBUTES: [(u32, frz_grains_attribute); 8] = [
     (5, FRZ_GRAINS_SOURCE_FRAME),
     (6, FRZ_GRAINS_REST),
     (7, FRZ_GRAINS_ACTIVE),
+    (8, FRZ_GRAINS_TRAPPED),
 ];
 
 /// Adds loose grains: debris, drift, snow that falls from a tree. They are there at once and move with the next step; those
@@ -141,6 +144,9 @@ pub unsafe extern "C" fn frz_grains_read(
                 FRZ_GRAINS_RADIUS => dst.fill("dst", &vec![grains.params().radius as f32; grains.count()]),
                 FRZ_GRAINS_SOURCE_FRAME => dst.fill("dst", &grains.source_frames().collect::<Vec<_>>()),
                 FRZ_GRAINS_ACTIVE => dst.fill("dst", &grains.awake().map(i32::from).collect::<Vec<_>>()),
+                FRZ_GRAINS_TRAPPED => {
+                    dst.fill("dst", &grains.trapped_each().map(i32::from).collect::<Vec<_>>())
+                }
                 FRZ_GRAINS_REST => dst.fill("dst", &grains.rests().collect::<Vec<_>>()),
             }
         }

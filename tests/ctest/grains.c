@@ -75,6 +75,57 @@ static void lands(frz_context *ctx) {
     frz_grains_destroy(grains);
 }
 
+/* Grains bounce as high as asked, leave a box, and grow old. */
+static void limits(frz_context *ctx) {
+    const float from[1][3] = {{0.2f, 0.1f, 0.1f}};
+    frz_grains_params params = params_of(0.005);
+    frz_grains_report report;
+    frz_grains *grains;
+    double place[3], top = 0;
+    int frame, rises = 0;
+    params.flags = FRZ_GRAINS_FLOOR, params.restitution = 0.7, params.air = 1, params.lifetime = 20 * DT;
+    grains = grains_of(ctx, &params);
+    WORKS(frz_grains_emit(ctx, grains, VIEW(from, 1), NO_VIEW, 0, NULL));
+    report.struct_size = sizeof report;
+    for (frame = 1; frame < 16; ++frame) {
+        float velocity[3];
+        WORKS(frz_grains_step(ctx, grains, NULL, NULL, 0, DT / 4, frame, &report));
+        WORKS(frz_grains_read(grains, FRZ_GRAINS_POSITION_DOUBLE, SPAN(place, 1)));
+        WORKS(frz_grains_read(grains, FRZ_GRAINS_VELOCITY, SPAN(velocity, 1)));
+        rises |= velocity[1] > 0;
+        if (rises && place[1] > top) top = place[1];
+    }
+    /* 0.095 m down, and 0.49 of that up again, but for what lies between two steps. */
+    CHECK(rises && fabs(top - 0.005 - 0.49 * 0.095) < 0.01);
+    WORKS(frz_grains_step(ctx, grains, NULL, NULL, 0, DT, 19, &report));
+    CHECK(report.count == 1 && report.expired == 0 && report.trapped == 0);
+    WORKS(frz_grains_step(ctx, grains, NULL, NULL, 0, DT, 20, &report));
+    CHECK(report.count == 0 && report.expired == 1 && report.dropped == 0);
+    params.lifetime = 0, params.flags |= FRZ_GRAINS_BOX;
+    FAILS(frz_grains_set_params(grains, &params), FRZ_ERROR_ARGUMENT, "keep_box");
+    params.keep_low[0] = -1, params.keep_low[1] = 0.05, params.keep_low[2] = -1;
+    params.keep_high[0] = params.keep_high[1] = params.keep_high[2] = 1;
+    WORKS(frz_grains_set_params(grains, &params));
+    WORKS(frz_grains_emit(ctx, grains, VIEW(from, 1), NO_VIEW, 0, NULL));
+    for (frame = 1; frame < 8; ++frame) WORKS(frz_grains_step(ctx, grains, NULL, NULL, 0, DT, frame, &report));
+    CHECK(report.count == 0);
+    frz_grains_destroy(grains);
+}
+
+/* What is measured of snow becomes friction and attraction. */
+static void measured(void) {
+    frz_grains_params params = params_of(0.005);
+    double friction;
+    WORKS(frz_grains_params_of_snow(&params, 25, 0));
+    CHECK(params.friction > 0.15 && params.friction < 0.25 && params.attraction == 0);
+    friction = params.friction;
+    WORKS(frz_grains_params_of_snow(&params, 35, 0.3));
+    CHECK(params.friction > friction && params.attraction > 5 && params.attraction < 20);
+    FAILS(frz_grains_params_of_snow(&params, 60, 0), FRZ_ERROR_ARGUMENT, "repose_angle_deg");
+    FAILS(frz_grains_params_of_snow(&params, 30, -1), FRZ_ERROR_ARGUMENT, "stands");
+    FAILS(frz_grains_params_of_snow(NULL, 30, 0), FRZ_ERROR_ARGUMENT, "params");
+}
+
 static void attributes(const frz_grains *grains, int last) {
     typedef struct vertex {
         char before[5];
@@ -261,6 +312,8 @@ int main(void) {
     frz_grid *snow = small_snow(ctx);
     ball_make(&rest, 0.1f);
     falls(ctx);
+    limits(ctx);
+    measured();
     lands(ctx);
     bodies(ctx);
     snow_becomes_grains(ctx, &rest, snow);

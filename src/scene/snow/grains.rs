@@ -4,14 +4,12 @@ use std::path::Path;
 
 use serde_json::json;
 
-use super::base;
 use super::inputs::Inputs;
+use super::{base, drift};
 use crate::base::DVec3;
-use crate::base::points::Values;
 use crate::context::Context;
 use crate::error::{Error, Result};
 use crate::io::manifest::Keeps;
-use crate::io::mesh::extension;
 use crate::io::{points_ply, usd_points};
 use crate::scene::shot::{FrameFiles, Kind, Reads, Report, Settings, Stage, Stepped, Stepping, Stored, To};
 use crate::scene::text::key::Scope;
@@ -95,28 +93,14 @@ impl<'a> Grains<'a> {
     /// The grains before the first frame: those of a file, or none.
     fn initial(&self) -> Result<grains::Grains> {
         let mut grains = grains::Grains::new(self.params())?;
-        let Some(path) = self.initial_file() else { return Ok(grains) };
-        self.inputs.seen.hash(path)?;
-        let (places, attributes) = if extension(path) == "ply" {
-            let cloud = points_ply::read(path)?;
-            (cloud.places, cloud.attributes)
-        } else {
-            let points = points::read(path, None)?;
-            ((0..points.count()).map(|index| points.position(index)).collect(), points.attributes)
-        };
-        let velocity = attributes.iter().find(|attribute| attribute.name == "v");
-        let velocities: Vec<[f32; 3]> = match velocity.map(|attribute| &attribute.values) {
-            Some(Values::Vector(column)) => (0..places.len()).map(|index| column.get(index)).collect(),
-            Some(_) => return Err(Error::file(path, "has an attribute v that is no vector")),
-            None => Vec::new(),
-        };
-        let added = grains.emit(&places, &velocities, self.scene.shot.frames.first);
-        added.map_err(|error| Error::file(path, format!("as grains: {error}")))?;
+        if let Some(drift) = &self.inputs.drift {
+            let added = grains.emit(&drift.places, &drift.velocities, self.scene.shot.frames.first);
+            added.map_err(|error| {
+                let path = drift::file(self.scene).unwrap_or(&self.scene.path);
+                Error::file(path, format!("as grains: {error}"))
+            })?;
+        }
         Ok(grains)
-    }
-
-    fn initial_file(&self) -> Option<&Path> {
-        self.scene.values.get("grains.initial").and_then(|value| value.path())
     }
 
     /// The layer after a frame; from the one before it, where that is at hand and the frame keeps its changes.
@@ -188,7 +172,7 @@ impl Stage for Grains<'_> {
         let roles = [&Role::MOVING[..], &[Role::Static]].concat();
         let mut settings = settings_of(self.scene, self.name(), &self.inputs.seen, &roles)?;
         let files = self.scene.snow.iter().flat_map(|snow| snow.files());
-        let initial = self.initial_file().map(Path::to_path_buf);
+        let initial = drift::file(self.scene).map(Path::to_path_buf);
         let ground = files.filter(|(key, _)| *key == "snow.ground").map(|(key, path)| (key, path.clone()));
         for (key, path) in ground.chain(initial.map(|path| ("grains.initial", path))) {
             settings.insert(

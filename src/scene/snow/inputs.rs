@@ -3,6 +3,7 @@
 use std::path::Path;
 use std::sync::Arc;
 
+use super::drift::Drift;
 use crate::base::mesh::{farthest, too_far as far_mesh};
 use crate::base::{DVec3, TriMesh};
 use crate::context::Context;
@@ -27,6 +28,8 @@ pub struct Inputs {
     statics: Vec<TriMesh>,
     /// The objects that move through the snow.
     pub bodies: Vec<Body>,
+    /// Grains that are there from the start.
+    pub(super) drift: Option<Drift>,
     /// What the files held when they were read.
     pub(in crate::scene) seen: Arc<Seen>,
     /// What about the files should be told, a sentence each; the log has it too.
@@ -91,8 +94,9 @@ impl Inputs {
                 }
             }
         }
+        let drift = Drift::of(scene, &seen)?;
         warnings.iter().for_each(|warning| log::warn!("{warning}"));
-        Ok(Self { snow, source, statics, bodies, seen, warnings })
+        Ok(Self { snow, source, statics, bodies, drift, seen, warnings })
     }
 
     /// Least and greatest x and z of the snow (m), as far as they are known before it is made.

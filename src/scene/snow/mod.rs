@@ -9,6 +9,7 @@ pub mod check;
 mod course;
 #[cfg(feature = "vdb")]
 mod disk;
+mod drift;
 mod grain_keys;
 #[cfg(feature = "vdb")]
 mod grains;

@@ -387,12 +387,9 @@ impl Grains {
         self.heap.ids().iter().map(|id| &self.births[*id as usize])
     }
 
-    /// Which grains are trapped.
-    fn marked(&self) -> Column<bool> {
-        if self.trapped().is_empty() {
-            return Column::Uniform(false);
-        }
-        Column::Each(self.heap.ids().iter().map(|id| self.trapped().binary_search(id).is_ok()).collect())
+    /// Whether each is trapped.
+    pub fn trapped_each(&self) -> impl Iterator<Item = bool> + '_ {
+        self.heap.ids().iter().map(|id| self.trapped().binary_search(id).is_ok())
     }
 
     /// The grains as points: `v` (m/s), `id`, `active` (not where it rests), `trapped` (where it has no room), `pscale` (radius, m), `source_frame` and `rest` (place
@@ -405,6 +402,10 @@ impl Grains {
             cells.push([0, 1, 2].map(|axis| at[axis] * layout::EDGE as i32 + voxel[axis] as i32));
             offsets.push([0, 1, 2].map(|axis| place[axis] - voxel[axis]));
         }
+        let trapped = match self.trapped() {
+            [] => Column::Uniform(false),
+            _ => Column::Each(self.trapped_each().collect()),
+        };
         let attribute = |name: &str, values: Values| Attribute { name: name.into(), values };
         let attributes = vec![
             attribute("v", Values::Vector(Column::Each(self.heap.velocities().collect()))),
@@ -413,7 +414,7 @@ impl Grains {
                 Values::Long(Column::Each(self.heap.ids().iter().map(|id| i64::from(*id)).collect())),
             ),
             attribute("active", Values::Bool(Column::Each(self.heap.awake().collect()))),
-            attribute("trapped", Values::Bool(self.marked())),
+            attribute("trapped", Values::Bool(trapped)),
             attribute("pscale", Values::Float(Column::Uniform(self.params.radius as f32))),
             attribute("source_frame", Values::Int(Column::Each(self.source_frames().collect()))),
             attribute("rest", Values::Vector(Column::Each(self.rests().collect()))),

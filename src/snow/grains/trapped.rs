@@ -15,6 +15,8 @@ use crate::error::Result;
 
 /// Depth (diameters) in a surface from which a grain is in it.
 const DEEP: f64 = 0.1;
+/// Share of that depth in which places that are written with less precision stay.
+const ROUNDED: f64 = 0.98;
 /// How often it is moved out of each surface.
 const ROUNDS: usize = 16;
 /// Farthest that it is moved (diameters).
@@ -114,7 +116,7 @@ impl Surfaces<'_> {
         let mut place = from;
         for _ in 0..ROUNDS {
             let mut is_out = true;
-            self.for_each_way_out(&mut place, |depth| is_out &= depth <= DEEP);
+            self.for_each_way_out(&mut place, |depth| is_out &= depth <= ROUNDED * DEEP);
             if is_out {
                 let way = (place - from) / self.diameter;
                 row.place = [0, 1, 2].map(|axis| row.place[axis] + way[axis] as f32);

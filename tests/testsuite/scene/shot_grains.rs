@@ -100,6 +100,12 @@ fn what_grains_cannot_be_made_from_is_said_first() {
     at("compression = -0.1", "", &["compression"]);
     at("repose_angle_deg = 80.0", "", &["repose_angle_deg"]);
     at("air = nan", "", &["air"]);
+    at("restitution = 1.5", "", &["restitution"]);
+    at("stands = -0.1", "", &["stands"]);
+    at("preset = \"icy\"", "", &["preset", "powder"]);
+    at("lifetime = 0.0", "", &["lifetime"]);
+    at("keep_box = [0, 0, 0, 1, 0, 1]", "", &["keep_box"]);
+    at("initial = \"gone.ply\"", "", &["gone.ply"]);
     // A frame of the base that is not there.
     let folder = folder("", "");
     works(folder.path(), "snow shot.toml -o cache -q --stage base --frames 1-10x3");
@@ -110,4 +116,59 @@ fn what_grains_cannot_be_made_from_is_said_first() {
 fn more_grains_than_max_end_the_run_with_the_frame() {
     let folder = folder("max = 50\ncompression = 0.0", "");
     fails(folder.path(), "snow shot.toml -o out -q", 1, &["max = 50", "frame"]);
+}
+
+#[test]
+fn a_preset_fills_in_what_is_left_out() {
+    let folder = folder("preset = \"wet\"\ncompression = 0.4", "");
+    let at = folder.path();
+    works(at, "snow shot.toml -o out -q --frames 1-3");
+    let scene = fs::read_to_string(at.join("out/scene.toml")).unwrap();
+    for line in
+        ["preset = \"wet\"", "compression = 0.4", "repose_angle_deg = 34.0", "stands = 0.25", "air = 0.8"]
+    {
+        assert!(scene.contains(line), "{line} in {scene}");
+    }
+    // The resolved scene is the same scene.
+    works(at, "snow out/scene.toml -o again -q --frames 1-3");
+    assert!(grains(at, "out") == grains(at, "again"));
+}
+
+#[test]
+fn objects_take_snow_or_push_grains_or_both() {
+    let born = |role: &str| {
+        let folder = folder("compression = 0.0", "");
+        let at = folder.path();
+        let scene = fs::read_to_string(at.join("shot.toml")).unwrap() + &format!("role = \"{role}\"\n");
+        fs::write(at.join("shot.toml"), scene).unwrap();
+        works(at, "snow shot.toml -o out -q");
+        let report = fs::read_to_string(at.join("out/report/grains.0010.json")).unwrap();
+        let report: serde_json::Value = serde_json::from_str(&report).unwrap();
+        (report["grains"].as_u64().unwrap(), grains(at, "out").pop().unwrap().1)
+    };
+    let (both, base, grains) = (born("collide"), born("base"), born("grains"));
+    // The cube stands in the grains of what it took.
+    assert!(both.0 == base.0 && both.0 > 100 && both.1 != base.1);
+    assert_eq!(grains.0, 0);
+}
+
+#[test]
+fn grains_of_a_file_are_there_from_the_start() {
+    let folder = folder("initial = \"drift.ply\"", "");
+    let at = folder.path();
+    let points = "ply\nformat ascii 1.0\nelement vertex 2\nproperty float x\nproperty float y\nproperty float z\n\
+                  property float vx\nproperty float vy\nproperty float vz\nend_header\n0 0.5 0 0 1 0\n0.3 0.9 0.5 0 0 0\n";
+    fs::write(at.join("drift.ply"), points).unwrap();
+    works(at, "snow shot.toml -o out -q");
+    let info = works(at, "info out/grains/grains.0001.vdb");
+    assert!(info.contains("points                 2"), "{info}");
+    let files = grains(at, "out");
+    // Another file makes others.
+    fs::write(at.join("drift.ply"), points.replace("0.3 0.9", "0.3 0.8")).unwrap();
+    fails(at, "snow shot.toml -o out -q", 2, &["grains.initial"]);
+    works(at, "snow shot.toml -o out -q --stage grains --from 1");
+    assert!(grains(at, "out") != files);
+    fs::write(at.join("drift.ply"), &points[..points.len() - 9]).unwrap();
+    fails(at, "snow shot.toml -o none -q", 2, &["drift.ply"]);
+    assert!(!at.join("none/base").exists());
 }

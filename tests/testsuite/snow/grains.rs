@@ -457,3 +457,102 @@ fn grains_that_rest_wake_when_the_base_below_them_or_gravity_changes() {
     let gone = step(&mut grains, [&story.layers[2], last]);
     assert!(gone < resting * 3 / 4, "{gone} of {resting}");
 }
+
+#[test]
+fn snow_is_pressed_together_as_the_object_that_took_it_says() {
+    let ctx = context(2);
+    let ground = Ground::Plane { height: 0.0, area: [-0.5, -0.25, 0.5, 0.25] };
+    let snow = layer(&ctx, &ground, &[], &Cover::Depth(0.15), CELL, 3.0).unwrap();
+    let mut base =
+        BaseLayer::new(&ctx, snow, BaseParams { noise: None, ..BaseParams::for_cell(CELL) }).unwrap();
+    let before = base.surface().deep_copy().unwrap();
+    let ball = |x: f64| {
+        let key = |time, y: f64| Key { time, at: DVec3::new(x, y, 0.0), turn: DVec3::zeros() };
+        let keys = Keys::new(vec![key(0.0, 0.26), key(1.0 / 24.0, 0.19)]).unwrap();
+        Body::new(Box::new(Rigid::new(sphere(0.1, 24), keys)), 0.0).unwrap()
+    };
+    // Side by side: there are blocks from which both take snow.
+    let bodies = [ball(-0.1), ball(0.1)];
+    base.step(&ctx, &bodies, 0.0, 1.0 / 24.0, 1).unwrap();
+    let born = |compressions: [Option<f64>; 2], removes: bool| {
+        let object = |index: usize| Object {
+            compression: compressions[index],
+            removes: removes || index == 1,
+            pushes: false,
+            ..Object::new(&bodies[index], 0.3)
+        };
+        let around = Surroundings {
+            base: Base::Whole([&before, base.surface()]),
+            objects: &[object(0), object(1)],
+            statics: &[],
+            floor: None,
+            lowest: -1.0,
+        };
+        let mut grains = Grains::new(params()).unwrap();
+        let report = grains.step(&ctx, &around, [0.0, 1.0 / 24.0], 1).unwrap();
+        let left = grains.rests().filter(|rest| rest[0] < 0.0).count();
+        (left, report.born - left, report.born as f64 + report.owed)
+    };
+    let (left, right, all) = born([None, None], true);
+    let (none, half, some) = born([Some(1.0), None], true);
+    assert!(left > 200 && right > 200);
+    // What is left over of the other side's blocks may lie a little over the middle.
+    assert!(none < left / 50 && half > right * 9 / 10, "{none} of {left}, {half} of {right}");
+    assert!((some / all - 0.5).abs() < 0.02, "{some} of {all}");
+    // One that takes no snow has no say.
+    assert_eq!(born([Some(1.0), None], false), (left, right, all));
+}
+
+#[test]
+fn grains_grow_old_and_leave_their_box() {
+    let ctx = context(1);
+    let mut grains = Grains::new(Params { lifetime: Some(0.25), gravity: 0.0, ..params() }).unwrap();
+    grains.emit(&[DVec3::zeros(), DVec3::new(0.1, 0.0, 0.0)], &[[0.0; 3], [1.0, 0.0, 0.0]], 3).unwrap();
+    let around = Surroundings { base: Base::Missing, objects: &[], statics: &[], floor: None, lowest: -1.0 };
+    let mut step = |grains: &mut Grains, frame: i32| {
+        let report = grains.step(&ctx, &around, [0.0, 1.0 / 24.0], frame).unwrap();
+        (report.count, report.expired, report.dropped)
+    };
+    assert_eq!(step(&mut grains, 8), (2, 0, 0));
+    let place = DVec3::new(0.13, 1.0, 1.0);
+    grains.set_params(Params { keep_box: Some([-place, place]), ..*grains.params() }).unwrap();
+    assert_eq!(step(&mut grains, 8), (1, 0, 1));
+    assert_eq!(step(&mut grains, 9), (0, 1, 0));
+    assert!(Grains::new(Params { keep_box: Some([place, place]), ..params() }).is_err());
+    assert!(Grains::new(Params { lifetime: Some(0.0), ..params() }).is_err());
+}
+
+#[test]
+fn pressed_grains_are_moved_out_or_trapped() {
+    let ctx = context(2);
+    let plate = |from: f64, to: f64| {
+        let key = |time, y: f64| Key { time, at: DVec3::new(0.0, y, 0.0), turn: DVec3::zeros() };
+        let keys = Keys::new(vec![key(0.0, from), key(1.0, to)]).unwrap();
+        Body::new(Box::new(Rigid::new(TriMesh::cuboid([-0.1; 3], [0.1; 3]), keys)), 0.0).unwrap()
+    };
+    let radius = params().radius;
+    let pressed = |room: f64| {
+        let mut grains = Grains::new(params()).unwrap();
+        grains.emit(&[DVec3::new(0.001, radius, 0.002)], &[], 0).unwrap();
+        // Its lower side comes down from two diameters to `room` over the floor.
+        let body = plate(0.1 + 4.0 * radius, 0.1 + room);
+        let around = Surroundings {
+            base: Base::Missing,
+            objects: &[Object::new(&body, 0.3)],
+            statics: &[],
+            floor: Some(0.0),
+            lowest: -1.0,
+        };
+        for frame in 1..=24 {
+            let times = [frame - 1, frame].map(|frame| f64::from(frame) / 24.0);
+            grains.step(&ctx, &around, times, frame).unwrap();
+        }
+        let points = grains.points();
+        let Some(Values::Bool(marks)) = points.attribute("trapped") else { panic!() };
+        assert_eq!(grains.trapped().len(), usize::from(marks.get(0)));
+        (marks.get(0), grains.places().next().unwrap().y / radius)
+    };
+    let (free, low) = pressed(2.05 * radius);
+    assert!(!free && (low - 1.0).abs() < 0.1, "{low}");
+    assert!(pressed(1.2 * radius).0);
+}
