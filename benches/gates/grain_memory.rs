@@ -1,7 +1,7 @@
 //! Gate of the memory of grains while they are stepped, in a process of its own.
 
 use frazil::base::DVec3;
-use frazil::snow::grains::{Base, Grains, Params, Surroundings};
+use frazil::snow::grains::{Base, Grains, Params, Surroundings, memory};
 
 use crate::grains::{FRAME, Random};
 use crate::harness::Harness;
@@ -72,10 +72,9 @@ pub fn print_memory() {
     let is_reset = std::fs::write("/proc/self/clear_refs", "5").is_ok();
     grains.step(&ctx, &around, [0.0, FRAME], SETTLE as i32).expect("a step");
     let peak = kilobytes("VmHWM:") - before;
-    println!(
-        "# the step itself (blocks, anchors, pairs in batches, the copy) adds {:.0}",
-        each(peak - between)
-    );
+    println!("# a step adds (that copy, blocks, anchors, pairs in batches): {:.0}", each(peak - between));
+    println!("# after it, before freed memory goes back: {:.0}", each(kilobytes("VmRSS:") - before));
+    println!("# the library reckons with {}", memory(count) / count as u64);
     println!(
         "# {count} grains; the peak is {} one step",
         if is_reset { "that of" } else { "not only that of" }
@@ -83,6 +82,7 @@ pub fn print_memory() {
     println!("bytes {}", each(peak));
 }
 
+// SAFETY: glibc declares it so.
 unsafe extern "C" {
     /// Gives freed memory back to the system.
     fn malloc_trim(pad: usize) -> i32;
