@@ -30,6 +30,8 @@ mod flip;
 mod free;
 #[path = "gates/grain_cancel.rs"]
 mod grain_cancel;
+#[path = "gates/grain_memory.rs"]
+mod grain_memory;
 #[path = "gates/grain_readers.rs"]
 mod grain_readers;
 #[path = "gates/grains.rs"]
@@ -80,6 +82,7 @@ fn main() {
     match first.as_deref() {
         Some(speed::PEAK) => return speed::print_peak(),
         Some(bytes::HASH) => return bytes::print_hash(),
+        Some(grain_memory::MEMORY) => return grain_memory::print_memory(),
         Some(damage::FUZZ) => return damage::read_mutated(),
         _ => {}
     }

@@ -8,8 +8,8 @@ use frazil::snow::grains::heap::{Colliders, Division, Floor, Heap, Pose, Shell};
 use crate::harness::Harness;
 use crate::scenes::context;
 use crate::{
-    beds, births, collisions, columns, free, grain_cancel, grain_readers, materials, passes, piles, planes,
-    preview, rate, rest, turned,
+    beds, births, collisions, columns, free, grain_cancel, grain_memory, grain_readers, materials, passes,
+    piles, planes, preview, rate, rest, turned,
 };
 
 /// Length of a frame (s).
@@ -32,6 +32,7 @@ pub fn run(h: &mut Harness) {
     grain_readers::run(h);
     grain_cancel::run(h);
     rate::run(h);
+    grain_memory::run(h);
 }
 
 /// Grains and what moves them.

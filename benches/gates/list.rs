@@ -72,6 +72,7 @@ pub const GATES: &[Gate] = &[
     gate("snow.grains.cancel_p99", "s", Most(0.2), Most(0.05)),
     // All grains at work.
     gate("snow.grains.speed", "k/s", Least(90.0), Least(200.0)),
+    gate("snow.grains.memory", "B", Most(128.0), Most(96.0)),
     // The walls that a box leaves, against the envelope of its poses.
     gate("snow.base.wall_translation_max", "cells", Most(0.1), Most(0.03)),
     gate("snow.base.wall_translation_mean", "cells", Most(0.05), Most(0.01)),

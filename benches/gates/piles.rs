@@ -9,13 +9,20 @@ use crate::harness::Harness;
 impl Experiment {
     /// Pours grains through a hole of 2.5 diameters a little above the pile, then waits.
     pub fn pour(&mut self, count: usize, frames: usize, wait: usize) {
-        let d = self.diameter();
-        let speed = -0.6 * (d / 0.005).sqrt();
+        self.pour_through(2.5 * self.diameter(), count, frames, wait);
+    }
+
+    /// Pours grains through a hole of a radius (m), as fast as is fit for it.
+    pub fn pour_through(&mut self, hole: f64, count: usize, frames: usize, wait: usize) {
+        let (d, unit) = (self.diameter(), hole / 2.5);
+        let speed = -0.6 * (unit / 0.005).sqrt();
         let each = count.div_ceil(frames);
+        // As high as they need to find room.
+        let span = each as f64 / 6.0 * d * (d / unit).powi(2);
         while self.heap.count() < count {
             let rests = |velocity: [f32; 3]| velocity.iter().map(|x| x * x).sum::<f32>() < 0.04;
             let places = self.heap.places().zip(self.heap.velocities());
-            let near = places.filter(|(place, velocity)| place.xz().norm() < 6.0 * d && rests(*velocity));
+            let near = places.filter(|(place, velocity)| place.xz().norm() < 6.0 * unit && rests(*velocity));
             let top = near.map(|(place, _)| place.y).fold(0.0, f64::max);
             let mut born: Vec<DVec3> = Vec::new();
             for _ in 0..30 * each {
@@ -23,8 +30,8 @@ impl Experiment {
                     break;
                 }
                 let (angle, radius) =
-                    (self.random.next() * std::f64::consts::TAU, self.random.next().sqrt() * 2.5 * d);
-                let height = top + (2.0 + self.random.next() * each as f64 / 6.0) * d;
+                    (self.random.next() * std::f64::consts::TAU, self.random.next().sqrt() * hole);
+                let height = top + 2.0 * unit + self.random.next() * span;
                 let place = DVec3::new(angle.cos() * radius, height, angle.sin() * radius);
                 if born.iter().all(|other| (other - place).norm() > d) {
                     self.heap.add(self.heap.count() as u32, place, [0.0, speed as f32, 0.0]).expect("add");
@@ -33,7 +40,7 @@ impl Experiment {
             }
             self.step();
         }
-        (0..wait).for_each(|_| self.step());
+        self.steps(wait);
     }
 
     /// Slope of the pile (degrees): a line through the mean heights of rings, in the middle 60 % of its radius.

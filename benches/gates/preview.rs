@@ -26,7 +26,8 @@ pub fn run(h: &mut Harness) {
         let (mut volumes, mut angles) = (0.0, 0.0);
         for seed in 1..=SEEDS {
             let mut pile = Experiment::new(2, diameter, of_repose(32.0), seed);
-            pile.pour(count, FRAMES, 48);
+            // The same pour for both.
+            pile.pour_through(2.5 * 2.0 * D, count, FRAMES, 48);
             let (volume, angle) = (under(&pile), pile.slope());
             println!("# {count} grains of {} mm: {:.4} l, {angle:.2} degrees", diameter * 1e3, volume * 1e3);
             (volumes, angles) = (volumes + volume, angles + angle);

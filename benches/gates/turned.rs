@@ -1,7 +1,7 @@
 //! Gates of a deep bed under gravity that turns: the angle at which its top slides.
 //!
 //! A heap has no periodic sides. The bed is long instead, between walls without friction, and only the middle third of its top is
-//! watched: a bed twice as long slides at the same angle, which is printed beside it.
+//! watched. The angle of a bed twice as long is printed beside it: as long as both agree, the ends do not matter.
 
 use std::collections::HashMap;
 
@@ -17,7 +17,7 @@ const D: f64 = 0.005;
 /// How fast gravity turns (degrees/s).
 const RATE: f64 = 5.0;
 /// Sites of the lattice from which the bed settles: its depth is then 20 diameters or a little more.
-const SITES: [u32; 3] = [48, 31, 12];
+const SITES: [u32; 3] = [96, 31, 10];
 /// How deep (diameters) the top reaches.
 const TOP: f64 = 1.5;
 

@@ -509,7 +509,7 @@ fn grains_grow_old_and_leave_their_box() {
     let mut grains = Grains::new(Params { lifetime: Some(0.25), gravity: 0.0, ..params() }).unwrap();
     grains.emit(&[DVec3::zeros(), DVec3::new(0.1, 0.0, 0.0)], &[[0.0; 3], [1.0, 0.0, 0.0]], 3).unwrap();
     let around = Surroundings { base: Base::Missing, objects: &[], statics: &[], floor: None, lowest: -1.0 };
-    let mut step = |grains: &mut Grains, frame: i32| {
+    let step = |grains: &mut Grains, frame: i32| {
         let report = grains.step(&ctx, &around, [0.0, 1.0 / 24.0], frame).unwrap();
         (report.count, report.expired, report.dropped)
     };
