@@ -1000,7 +1000,7 @@ typedef struct {
      */
     double compression;
     /**
-     * Friction between grains, and between them and the base layer, 0 to 1; as they do not turn, 0.27, the usual one,
+     * Friction between grains, and between them and the base layer, 0 to 1; as they do not turn, 0.257, the usual one,
      * already holds a slope of 32 degrees.
      */
     double friction;

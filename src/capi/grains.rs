@@ -45,7 +45,7 @@ pub struct frz_grains_params {
     pub radius: f64,
     /// Share of the removed snow that is pressed together and becomes no grains, 0 to 1; 0.75 is usual.
     pub compression: f64,
-    /// Friction between grains, and between them and the base layer, 0 to 1; as they do not turn, 0.27, the usual one,
+    /// Friction between grains, and between them and the base layer, 0 to 1; as they do not turn, 0.257, the usual one,
     /// already holds a slope of 32 degrees.
     pub friction: f64,
     /// With which grains that all but touch hold each other (weights of a grain), 0 to 1000; 0 is usual.

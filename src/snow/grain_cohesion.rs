@@ -2,9 +2,9 @@
 
 use super::grain_friction::repose_of;
 
-/// Height (diameters) of a wall that stands by the grains' size alone, as the gate `snow.grains.wall` measures it: up to an angle
-/// of repose of 32 degrees, and for each further degree.
-const ALONE: [f64; 2] = [5.5, 0.4];
+/// Height (diameters) of a wall that stands by the grains' size alone, as the gate `snow.grains.wall` measures it: at an angle of
+/// repose of 32 degrees, and for each degree below and above that.
+const ALONE: [f64; 3] = [5.5, 0.3, 0.4];
 /// Measured attraction (weights of a grain) times tan(a) tan(45 degrees + a/2) for each further diameter, a the angle of repose,
 /// and what each of these makes the next ones need more: long chains of contacts are solved less exactly.
 const EACH: [f64; 2] = [0.37, 0.0045];
@@ -16,7 +16,8 @@ pub fn of_wall(height: f64, diameter: f64, friction: f64) -> f64 {
     let repose = repose_of(friction).max(GENTLEST);
     let angle = repose.to_radians();
     let shape = angle.tan() * (std::f64::consts::FRAC_PI_4 + 0.5 * angle).tan();
-    let more = (height / diameter - ALONE[0] - ALONE[1] * (repose - 32.0).max(0.0)).max(0.0);
+    let alone = ALONE[0] + ALONE[1] * (32.0 - repose).max(0.0) + ALONE[2] * (repose - 32.0).max(0.0);
+    let more = (height / diameter - alone).max(0.0);
     (EACH[0] + EACH[1] * more) * more / shape
 }
 

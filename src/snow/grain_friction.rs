@@ -2,15 +2,18 @@
 
 /// Angles of poured piles of 10,000 grains (degrees) and the friction that gives them, as `make gates ONLY=snow.grains.pile`
 /// measures them. Grains do not turn, so that a little friction holds steep piles.
-const PILES: [(f64, f64); 8] = [
+const PILES: [(f64, f64); 11] = [
     (0.0, 0.0),
-    (9.6, 0.08),
-    (15.2, 0.12),
-    (19.4, 0.15),
-    (26.8, 0.209),
-    (34.4, 0.293),
-    (40.4, 0.372),
-    (STEEPEST, 0.393),
+    (5.5, 0.06),
+    (9.1, 0.09),
+    (13.5, 0.12),
+    (18.5, 0.15),
+    (22.3, 0.18),
+    (26.7, 0.21),
+    (31.3, 0.25),
+    (35.2, 0.29),
+    (38.9, 0.33),
+    (STEEPEST, 0.367),
 ];
 
 /// Steepest angle of repose (degrees) that [`of_repose`] knows.

@@ -29,6 +29,11 @@ const REMOVED: f32 = 0.8;
 const FARTHEST: f32 = 0.5;
 /// Gap (diameters) up to which a contact still supports and keeps its impulse.
 const TOUCHING: f32 = 0.02;
+/// Gap (diameters) that grains in contact do not close, and overlap that they may keep: pushed out of every last overlap, a heap
+/// would never come to rest, as each push opens and closes contacts around it.
+const SLACK: f32 = 0.01;
+/// As above.
+const SLOP: f32 = 0.005;
 /// Least distance (diameters) at which two grains have a direction.
 const LEAST: f32 = 1.0e-6;
 /// Least upward part of the direction from a grain to one that it supports.
@@ -294,6 +299,7 @@ fn solve_batches_last(rows: Shared<'_, Row>, batches: &mut [Batch], c: &Coeffici
             let (mut a, mut b, contact) = collide(a, b, batch, c);
             // Two grains that meet in the air do not meet again: what they gave each other says nothing of the next sub-step.
             let mut is_held = a.supported & b.supported;
+            is_held = is_held | (a.supported | b.supported) & contact.gap.is_less(Lanes::all(TOUCHING));
             if c.attraction > 0.0 {
                 is_held = is_held | contact.gap.is_less(Lanes::all(c.band));
             }
@@ -421,7 +427,8 @@ fn collide(a: Eight, b: Eight, batch: &mut Batch, c: &Coefficients) -> (Eight, E
         let least = attracts.choose(Lanes::all(-c.attraction), zero);
         (least, attracts.choose(zero, is_apart.choose(closing, zero)))
     } else {
-        (zero, is_apart.choose(closing, zero))
+        let is_open = Lanes::all(SLACK).is_less(gap);
+        (zero, is_open.choose(closing, zero))
     };
     let before = batch.impulse;
     let before_along = dot8(before, normal);
@@ -474,7 +481,7 @@ impl Contact {
         let (a_push, b_push) = ([ax, ay, az], [bx, by, bz]);
         // Overlap is removed, and a gap stays one.
         let overlap = zero - self.gap;
-        let some = (overlap * Lanes::all(REMOVED)).min(Lanes::all(FARTHEST));
+        let some = ((overlap - Lanes::all(SLOP)).max(zero) * Lanes::all(REMOVED)).min(Lanes::all(FARTHEST));
         let removed = zero.is_less(self.gap).choose(overlap, some);
         let missing = removed - dot8(sub8(a_push, b_push), self.normal);
         let is_up = zero.is_less(upward);
