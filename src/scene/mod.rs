@@ -13,7 +13,7 @@ mod text;
 
 pub use objects::Objects;
 #[cfg(feature = "vdb")]
-pub use snow::{Inputs, Rebuild, Walk, check_memory, estimate};
+pub use snow::{Forecast, Inputs, Rebuild, Walk, check_memory, estimate};
 pub use text::{FrameChoice, Frames, Override, Value, Values, reference, template};
 
 use crate::error::{Error, Result};

@@ -108,6 +108,15 @@ pub trait Stepping: Stage {
     /// What that thread carries from frame to frame.
     type Writer: Send;
 
+    /// Looks at what frames up to a last one are made from, before the first of them is; the frames of the stages upstream are
+    /// there.
+    ///
+    /// # Errors
+    /// Why they cannot be made.
+    fn foresee(&self, _ctx: &Context, _upstream: &[&Stored], _last: i32) -> Result<()> {
+        Ok(())
+    }
+
     /// The state after a frame that `done` keeps, or the one before the first.
     ///
     /// # Errors

@@ -4,6 +4,7 @@ use std::path::Path;
 
 use serde_json::json;
 
+use super::forecast::Forecast;
 use super::inputs::Inputs;
 use super::{base, drift};
 use crate::base::DVec3;
@@ -62,37 +63,9 @@ impl<'a> Grains<'a> {
         Self { scene, inputs, objects }
     }
 
-    fn params(&self) -> Params {
-        let values = &self.scene.values;
-        let number = |name: &str| values.number(&format!("grains.{name}"));
-        let whole = |name: &str| values.get(&format!("grains.{name}")).and_then(|value| value.whole());
-        let usual = Params::for_cell(self.inputs.snow.cell);
-        let of_repose = || number("repose_angle_deg").map(grain_friction::of_repose);
-        let radius = number("radius").unwrap_or(usual.radius);
-        let friction = number("friction").or_else(of_repose).unwrap_or(usual.friction);
-        let of_wall =
-            || number("stands").map(|height| grain_cohesion::of_wall(height, 2.0 * radius, friction));
-        let keep_box = values.get("grains.keep_box").and_then(|value| value.numbers());
-        Params {
-            radius,
-            compression: number("compression").unwrap_or(usual.compression),
-            friction,
-            attraction: number("attraction").or_else(of_wall).unwrap_or(usual.attraction),
-            restitution: number("restitution").unwrap_or(usual.restitution),
-            air: number("air").unwrap_or(usual.air),
-            gravity: number("gravity").unwrap_or(usual.gravity),
-            rests: values.get("grains.rest").and_then(|value| value.flag()).unwrap_or(usual.rests),
-            lifetime: number("lifetime"),
-            keep_box: keep_box.map(|[a, b, c, d, e, f]| [DVec3::new(a, b, c), DVec3::new(d, e, f)]),
-            sub_steps: whole("substeps").map(|count| count as u32),
-            most: whole("max").map_or(usual.most, |most| most as usize),
-            seed: whole("seed").unwrap_or(0) as u64,
-        }
-    }
-
     /// The grains before the first frame: those of a file, or none.
     fn initial(&self) -> Result<grains::Grains> {
-        let mut grains = grains::Grains::new(self.params())?;
+        let mut grains = grains::Grains::new(params(self.scene, self.inputs.snow.cell))?;
         if let Some(drift) = &self.inputs.drift {
             let added = grains.emit(&drift.places, &drift.velocities, self.scene.shot.frames.first);
             added.map_err(|error| {
@@ -143,6 +116,34 @@ impl<'a> Grains<'a> {
             Error::Argument(what) => Error::file(&self.scene.path, format!("grains: {what}")),
             other => other,
         })
+    }
+}
+
+/// How the grains of a scene with cells of this size (m) behave.
+pub(super) fn params(scene: &Scene, cell: f64) -> Params {
+    let values = &scene.values;
+    let number = |name: &str| values.number(&format!("grains.{name}"));
+    let whole = |name: &str| values.get(&format!("grains.{name}")).and_then(|value| value.whole());
+    let usual = Params::for_cell(cell);
+    let of_repose = || number("repose_angle_deg").map(grain_friction::of_repose);
+    let radius = number("radius").unwrap_or(usual.radius);
+    let friction = number("friction").or_else(of_repose).unwrap_or(usual.friction);
+    let of_wall = || number("stands").map(|height| grain_cohesion::of_wall(height, 2.0 * radius, friction));
+    let keep_box = values.get("grains.keep_box").and_then(|value| value.numbers());
+    Params {
+        radius,
+        compression: number("compression").unwrap_or(usual.compression),
+        friction,
+        attraction: number("attraction").or_else(of_wall).unwrap_or(usual.attraction),
+        restitution: number("restitution").unwrap_or(usual.restitution),
+        air: number("air").unwrap_or(usual.air),
+        gravity: number("gravity").unwrap_or(usual.gravity),
+        rests: values.get("grains.rest").and_then(|value| value.flag()).unwrap_or(usual.rests),
+        lifetime: number("lifetime"),
+        keep_box: keep_box.map(|[a, b, c, d, e, f]| [DVec3::new(a, b, c), DVec3::new(d, e, f)]),
+        sub_steps: whole("substeps").map(|count| count as u32),
+        most: whole("max").map_or(usual.most, |most| most as usize),
+        seed: whole("seed").unwrap_or(0) as u64,
     }
 }
 
@@ -211,13 +212,30 @@ impl Stepping for Grains<'_> {
     type Step = Step;
     type Writer = Context;
 
+    fn foresee(&self, ctx: &Context, upstream: &[&Stored], last: i32) -> Result<()> {
+        let [base] = upstream else { return Err(Error::Internal("grains read one stage".into())) };
+        let Some(forecast) = Forecast::of(self.scene, self.inputs, base, last)? else { return Ok(()) };
+        log::info!(
+            "grains: {}, {:.1} MB of memory, {:.1} MB of files",
+            forecast.count(),
+            forecast.memory_bytes as f64 / 1e6,
+            forecast.disk_bytes as f64 / 1e6
+        );
+        match forecast.check(self.scene, ctx.memory_limit()) {
+            // There may be fewer.
+            Err(error) if forecast.at_most => log::warn!("{error}"),
+            other => return other,
+        }
+        Ok(())
+    }
+
     fn load(&self, _ctx: &Context, done: &Stored, after: Option<i32>) -> Result<State> {
         let grains = match after {
             None => self.initial(),
             Some(frame) => {
                 let path = done.state_file(frame)?;
                 let bytes = std::fs::read(&path).map_err(|error| Error::io(&path, "read", error))?;
-                grains::Grains::resume(self.params(), &bytes)
+                grains::Grains::resume(params(self.scene, self.inputs.snow.cell), &bytes)
                     .map_err(|error| Error::file(path, error.to_string()))
             }
         };

@@ -10,6 +10,8 @@ mod course;
 #[cfg(feature = "vdb")]
 mod disk;
 mod drift;
+#[cfg(feature = "vdb")]
+mod forecast;
 mod grain_keys;
 #[cfg(feature = "vdb")]
 mod grains;
@@ -33,6 +35,7 @@ pub(super) use grain_keys::{GRAIN_KEYS, check_grains, has_grains};
 pub(super) use keys::KEYS;
 #[cfg(feature = "vdb")]
 pub use {
+    forecast::Forecast,
     inputs::Inputs,
     memory::{check as check_memory, estimate},
     plan::plan,
