@@ -5,9 +5,10 @@ use std::path::Path;
 use serde_json::json;
 
 use super::forecast::Forecast;
+use super::grain_files::{self, WHOLE_EVERY, ordered};
 use super::inputs::Inputs;
 use super::{base, drift};
-use crate::base::DVec3;
+use crate::base::{DVec3, Points};
 use crate::context::Context;
 use crate::error::{Error, Result};
 use crate::io::manifest::Keeps;
@@ -20,8 +21,6 @@ use crate::snow::base_layer::{Grids, initial};
 use crate::snow::grains::{self, Base, Object, Params, StepReport, Surroundings};
 use crate::snow::{grain_cohesion, grain_friction};
 use crate::sweep::Body;
-use crate::vdb::file::WriteOptions;
-use crate::vdb::points;
 
 /// Grains of a scene.
 pub struct Grains<'a> {
@@ -38,8 +37,16 @@ pub struct State {
     layer: Option<(i32, Grids)>,
 }
 
-/// What a step hands to the writer: the grains after it, where their files are wanted.
+/// What a step hands to the writer: the grains after it, where their files, or what changed since, are wanted.
 pub struct Step(Option<grains::Grains>);
+
+/// What writes frames.
+pub struct Writer {
+    /// Gives the threads; its cancel flag does not matter: a frame begun is finished.
+    ctx: Context,
+    /// The grains of the frame before, where changes are written.
+    before: Option<Points>,
+}
 
 /// How far below the snow (m) grains are dropped.
 const BELOW: f64 = 1.0;
@@ -74,6 +81,12 @@ impl<'a> Grains<'a> {
             })?;
         }
         Ok(grains)
+    }
+
+    /// Whether the files of a frame hold changes only.
+    fn is_delta(&self, frame: i32) -> bool {
+        let passed = i64::from(frame) - i64::from(self.scene.shot.frames.first);
+        self.scene.output.grains_delta && passed % i64::from(WHOLE_EVERY) != 0
     }
 
     /// The layer after a frame; from the one before it, where that is at hand and the frame keeps its changes.
@@ -205,12 +218,16 @@ impl Stage for Grains<'_> {
     fn keeps(&self, _frame: i32) -> Keeps {
         Keeps::State
     }
+
+    fn needs_every_frame(&self) -> Option<&'static str> {
+        self.scene.output.grains_delta.then_some("grains_mode = \"delta\"")
+    }
 }
 
 impl Stepping for Grains<'_> {
     type State = State;
     type Step = Step;
-    type Writer = Context;
+    type Writer = Writer;
 
     fn foresee(&self, ctx: &Context, upstream: &[&Stored], last: i32) -> Result<()> {
         let [base] = upstream else { return Err(Error::Internal("grains read one stage".into())) };
@@ -262,30 +279,37 @@ impl Stepping for Grains<'_> {
             Some(before) => told(&self.move_grains(ctx, state, [before, &after], frame)?),
         };
         state.layer = Some((frame, after));
-        Ok(Stepped { step: Step(to.made_from.map(|_| state.grains.clone())), report })
+        let is_wanted = to.made_from.is_some() || self.scene.output.grains_delta;
+        Ok(Stepped { step: Step(is_wanted.then(|| state.grains.clone())), report })
     }
 
-    fn writer(&self, ctx: &Context, _state: &State) -> Result<Context> {
-        Ok(Context::new(ctx.pool().clone()))
+    fn writer(&self, ctx: &Context, state: &State) -> Result<Writer> {
+        let before = self.scene.output.grains_delta.then(|| ordered(state.grains.points()));
+        Ok(Writer { ctx: Context::new(ctx.pool().clone()), before })
     }
 
-    fn write(&self, ctx: &mut Context, step: Step, files: Option<&mut FrameFiles>) -> Result<()> {
-        let (Some(grains), Some(files)) = (step.0, files) else { return Ok(()) };
-        let output = self.scene.output;
-        let points = grains.points();
-        if output.grains_vdb {
-            let metadata = base::metadata(self.scene, files.frame, files.made_from);
-            let options = WriteOptions { metadata, ..WriteOptions::default() };
-            files.save("grains", "vdb", &points::to_bytes(ctx, "grains", &points, &options)?)?;
+    fn write(&self, writer: &mut Writer, step: Step, files: Option<&mut FrameFiles>) -> Result<()> {
+        let Some(grains) = step.0 else { return Ok(()) };
+        let points = ordered(grains.points());
+        if let Some(files) = files {
+            let output = self.scene.output;
+            if output.grains_vdb {
+                let before = writer.before.as_ref().filter(|_| self.is_delta(files.frame));
+                grain_files::write(&writer.ctx, self.scene, files, &points, before)?;
+            }
+            if output.grains_ply {
+                files.save("grains", "ply", &points_ply::to_bytes(&points)?)?;
+            }
+            if output.grains_usd {
+                let text = usd_points::frame("grains", files.frame, self.scene.shot.fps, &points);
+                files.save("grains", "usda", text.as_bytes())?;
+            }
+            files.save_state(&grains.save())?;
         }
-        if output.grains_ply {
-            files.save("grains", "ply", &points_ply::to_bytes(&points)?)?;
+        if writer.before.is_some() {
+            writer.before = Some(points);
         }
-        if output.grains_usd {
-            let text = usd_points::frame("grains", files.frame, self.scene.shot.fps, &points);
-            files.save("grains", "usda", text.as_bytes())?;
-        }
-        files.save_state(&grains.save())
+        Ok(())
     }
 }
 
