@@ -93,7 +93,7 @@ pub trait Stage: Sync {
         Vec::new()
     }
 
-    /// Its moving meshes for `shot.usda`.
+    /// Its moving meshes or points for `shot.usda`.
     fn clip(&self) -> Option<Clip<'_>> {
         None
     }

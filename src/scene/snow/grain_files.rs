@@ -2,7 +2,8 @@
 //!
 //! Points are brought into the order of their identities before they are written, so that whole files made from changes are
 //! those that `"full"` writes. A file of changes holds the grains that were born or are not as they were, and names those that
-//! are gone. A grain that it does not hold is not trapped: states from which runs resume do not know which were.
+//! are gone. What a grain has from its birth is 0 there unless it was just born. A grain that the file does not hold is not
+//! trapped: states from which runs resume do not know which were.
 
 use std::path::Path;
 
@@ -63,8 +64,16 @@ pub(super) fn ordered(mut points: Points) -> Points {
     points
 }
 
+/// Points whose attributes take one value a point in every frame or in none, as the clips of a stage in USD must.
+pub(super) fn told_apart(mut points: Points) -> Points {
+    if points.attribute(TRAPPED) == Some(&FREE) {
+        points.set(TRAPPED, Values::Bool(Column::Each(vec![false; points.count()])));
+    }
+    points
+}
+
 /// The attribute of grains that have no room, and its value where none is.
-pub(super) const TRAPPED: &str = "trapped";
+const TRAPPED: &str = "trapped";
 const FREE: Values = Values::Bool(Column::Uniform(false));
 
 fn ids(points: &Points) -> Vec<i64> {
@@ -104,7 +113,7 @@ const NAME: &str = "grains";
 /// The points that are new or not as they were, and the identities that are gone.
 fn changes(before: &Points, after: &Points) -> (Points, Vec<i64>) {
     let (old, new) = (ids(before), ids(after));
-    let (mut picked, mut gone) = (Vec::new(), Vec::new());
+    let (mut picked, mut were, mut gone) = (Vec::new(), Vec::new(), Vec::new());
     let mut at = 0;
     for (point, id) in new.iter().enumerate() {
         while at < old.len() && old[at] < *id {
@@ -115,12 +124,42 @@ fn changes(before: &Points, after: &Points) -> (Points, Vec<i64>) {
         at += usize::from(was.is_some());
         if was.is_none_or(|was| !is_same(before, was, after, point)) {
             picked.push(point as u32);
+            were.push(was);
         }
     }
     gone.extend(&old[at..]);
     let mut changed = after.clone();
     changed.reorder(&picked);
+    of_birth(&mut changed, None, &were);
     (changed, gone)
+}
+
+/// Gives points that were there before, each at an index, what they have from their birth: as it was, or 0 that takes no room.
+fn of_birth(points: &mut Points, before: Option<&Points>, were: &[Option<usize>]) {
+    fn taken<T: Copy + Default>(
+        own: &Column<T>,
+        before: Option<&Column<T>>,
+        were: &[Option<usize>],
+    ) -> Column<T> {
+        let old = |was: usize| before.map_or(T::default(), |before| before.get(was));
+        Column::Each(
+            were.iter().enumerate().map(|(point, was)| was.map_or_else(|| own.get(point), old)).collect(),
+        )
+    }
+    for name in ["source_frame", "rest"] {
+        let values = match (points.attribute(name), before.and_then(|before| before.attribute(name))) {
+            (Some(Values::Int(own)), Some(Values::Int(before))) => {
+                Values::Int(taken(own, Some(before), were))
+            }
+            (Some(Values::Int(own)), _) => Values::Int(taken(own, None, were)),
+            (Some(Values::Vector(own)), Some(Values::Vector(before))) => {
+                Values::Vector(taken(own, Some(before), were))
+            }
+            (Some(Values::Vector(own)), _) => Values::Vector(taken(own, None, were)),
+            _ => continue,
+        };
+        points.set(name, values);
+    }
 }
 
 /// Whether a point is as another was, bit by bit, and is not trapped.
@@ -149,8 +188,10 @@ fn is_same(before: &Points, was: usize, after: &Points, point: usize) -> bool {
 ///
 /// # Errors
 /// Changes of other points.
-fn follow(mut points: Points, changed: Points, gone: &[i64]) -> Result<Points> {
+fn follow(mut points: Points, mut changed: Points, gone: &[i64]) -> Result<Points> {
     let (old, new) = (ids(&points), ids(&changed));
+    let were: Vec<Option<usize>> = new.iter().map(|id| old.binary_search(id).ok()).collect();
+    of_birth(&mut changed, Some(&points), &were);
     if let Some(id) = gone.iter().find(|id| old.binary_search(id).is_err()) {
         return Err(Error::argument(format!("names grain {id} as gone, which was not there")));
     }
@@ -293,6 +334,14 @@ mod tests {
         out.set("id", Values::Long(Column::Each(all.iter().map(|(id, _, _)| *id).collect())));
         out.set(TRAPPED, Values::Bool(Column::Each(all.iter().map(|(_, _, trapped)| *trapped).collect())));
         out.set("pscale", Values::Float(Column::Uniform(0.25)));
+        out.set(
+            "rest",
+            Values::Vector(Column::Each(all.iter().map(|(id, _, _)| [*id as f32, 0.5, 1.0]).collect())),
+        );
+        out.set(
+            "source_frame",
+            Values::Int(Column::Each(all.iter().map(|(id, _, _)| *id as i32 + 7).collect())),
+        );
         ordered(out)
     }
 
@@ -311,6 +360,13 @@ mod tests {
         let sizes = frames.windows(2).map(|pair| {
             let (changed, gone) = changes(&pair[0], &pair[1]);
             let sizes = (changed.count(), gone.clone());
+            // What was there before has nothing of its birth.
+            if let Some(Values::Int(frames)) = changed.attribute("source_frame") {
+                let old = ids(&pair[0]);
+                for (point, id) in ids(&changed).into_iter().enumerate() {
+                    assert_eq!(frames.get(point), if old.contains(&id) { 0 } else { id as i32 + 7 });
+                }
+            }
             let after = follow(pair[0].clone(), changed, &numbers(&listed(&gone)).unwrap()).unwrap();
             assert_eq!(after.cells, pair[1].cells);
             assert_eq!(after.offsets, pair[1].offsets);

@@ -5,7 +5,7 @@ use std::path::Path;
 use serde_json::json;
 
 use super::forecast::Forecast;
-use super::grain_files::{self, WHOLE_EVERY, ordered};
+use super::grain_files::{self, WHOLE_EVERY, ordered, told_apart};
 use super::inputs::Inputs;
 use super::{base, drift};
 use crate::base::{DVec3, Points};
@@ -13,7 +13,9 @@ use crate::context::Context;
 use crate::error::{Error, Result};
 use crate::io::manifest::Keeps;
 use crate::io::{points_ply, usd_points};
-use crate::scene::shot::{FrameFiles, Kind, Reads, Report, Settings, Stage, Stepped, Stepping, Stored, To};
+use crate::scene::shot::{
+    Clip, FrameFiles, Kind, Prims, Reads, Report, Settings, Stage, Stepped, Stepping, Stored, To,
+};
 use crate::scene::text::key::Scope;
 use crate::scene::text::keys::{self, settings_of};
 use crate::scene::{self, Role, Scene, moving};
@@ -48,6 +50,8 @@ pub struct Writer {
     before: Option<Points>,
 }
 
+/// What the clips of `grains/` share.
+const MANIFEST: &str = "grains/grains.manifest.usda";
 /// How far below the snow (m) grains are dropped.
 const BELOW: f64 = 1.0;
 
@@ -219,6 +223,15 @@ impl Stage for Grains<'_> {
         Keeps::State
     }
 
+    fn loose_files(&self) -> &'static [&'static str] {
+        if self.scene.output.grains_usd { &[MANIFEST] } else { &[] }
+    }
+
+    fn clip(&self) -> Option<Clip<'_>> {
+        let grains = grains::Grains::new(params(self.scene, self.inputs.snow.cell)).ok()?;
+        Some(Clip { kind: "grains", manifest: MANIFEST, prims: Prims::Points(told_apart(grains.points())) })
+    }
+
     fn needs_every_frame(&self) -> Option<&'static str> {
         self.scene.output.grains_delta.then_some("grains_mode = \"delta\"")
     }
@@ -301,6 +314,7 @@ impl Stepping for Grains<'_> {
                 files.save("grains", "ply", &points_ply::to_bytes(&points)?)?;
             }
             if output.grains_usd {
+                let points = told_apart(points.clone());
                 let text = usd_points::frame("grains", files.frame, self.scene.shot.fps, &points);
                 files.save("grains", "usda", text.as_bytes())?;
             }
