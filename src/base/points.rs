@@ -84,6 +84,17 @@ impl<T: Copy> Column<T> {
     }
 }
 
+impl<T: Copy + PartialEq> Column<T> {
+    /// Adds the values of other points; both have so many points.
+    fn append(&mut self, other: &Self, [own, others]: [usize; 2]) {
+        if self == other && matches!(self, Self::Uniform(_)) {
+            return;
+        }
+        let all = (0..own).map(|point| self.get(point)).chain((0..others).map(|point| other.get(point)));
+        *self = Self::Each(all.collect());
+    }
+}
+
 /// Runs the same code on the column of each type.
 macro_rules! each_type {
     ($values:expr, $column:ident => $what:expr) => {
@@ -235,6 +246,43 @@ impl Points {
         }
     }
 
+    /// Adds other points behind these, which have the same attributes and voxels; without any points they take the others' place.
+    /// A value that all of both share stays one.
+    ///
+    /// # Errors
+    /// Other attributes or voxels; the points are then as they were.
+    pub fn append(&mut self, other: Self) -> Result<()> {
+        if other.count() == 0 {
+            return Ok(());
+        }
+        if self.count() == 0 {
+            *self = other;
+            return Ok(());
+        }
+        let is_alike = |(a, b): (&Attribute, &Attribute)| {
+            a.name == b.name && a.values.type_name() == b.values.type_name()
+        };
+        let are_alike = self.attributes.len() == other.attributes.len()
+            && self.attributes.iter().zip(&other.attributes).all(is_alike);
+        if self.voxel_size != other.voxel_size || !are_alike {
+            return Err(Error::argument("the points have other attributes or voxels"));
+        }
+        let counts = [self.count(), other.count()];
+        for (own, others) in self.attributes.iter_mut().zip(&other.attributes) {
+            match (&mut own.values, &others.values) {
+                (Values::Float(a), Values::Float(b)) => a.append(b, counts),
+                (Values::Int(a), Values::Int(b)) => a.append(b, counts),
+                (Values::Long(a), Values::Long(b)) => a.append(b, counts),
+                (Values::Bool(a), Values::Bool(b)) => a.append(b, counts),
+                (Values::Vector(a), Values::Vector(b)) => a.append(b, counts),
+                _ => return Err(Error::Internal("attributes of one type differ in it".into())),
+            }
+        }
+        self.cells.extend(other.cells);
+        self.offsets.extend(other.offsets);
+        Ok(())
+    }
+
     /// Checks that all arrays have one value for each point, that numbers are finite, that offsets lie within their voxel,
     /// and that names are there and differ.
     ///
@@ -319,6 +367,26 @@ mod tests {
         assert_eq!(points.attribute("id"), Some(&Values::Long(Column::Each(vec![7, 5, 6]))));
         assert_eq!(points.attribute("id").unwrap().range(), Some((vec![5.0], vec![7.0])));
         assert_eq!(points.attribute("pscale").unwrap().number(2), f64::from(0.1f32));
+    }
+
+    #[test]
+    fn points_are_added_behind_others() {
+        let mut points = three();
+        let mut more = three();
+        more.set("id", Values::Long(Column::Uniform(9)));
+        points.append(more.clone()).unwrap();
+        assert_eq!((points.count(), points.cells[3]), (6, points.cells[0]));
+        assert_eq!(points.attribute("id"), Some(&Values::Long(Column::Each(vec![5, 6, 7, 9, 9, 9]))));
+        assert_eq!(points.attribute("pscale"), Some(&Values::Float(Column::Uniform(0.1))));
+        points.validate().unwrap();
+        let before = points.clone();
+        more.set("id", Values::Int(Column::Uniform(9)));
+        assert!(points.append(more).is_err());
+        points.append(Points::default()).unwrap();
+        assert_eq!(points, before);
+        let mut none = Points::default();
+        none.append(before.clone()).unwrap();
+        assert_eq!(none, before);
     }
 
     #[test]

@@ -169,7 +169,11 @@ const NAME: &str = "grains";
 
 #[cfg(feature = "vdb")]
 fn points_of_vdb(path: &Path) -> Result<Points> {
-    frazil::vdb::points::read(path, None)
+    use frazil::scene::{changes_since, partial};
+    match changes_since(path)? {
+        Some(since) => Err(Error::file(path, partial(since))),
+        None => frazil::vdb::points::read(path, None),
+    }
 }
 
 #[cfg(not(feature = "vdb"))]

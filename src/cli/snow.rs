@@ -63,6 +63,7 @@ pub fn run(args: Args, session: &Session) -> Result<(), Failure> {
     if let Some(from) = args.from.filter(|from| !shot_frames.contains(*from)) {
         return Err(Failure::refused(format!("--from {from} is not within the shot's {shot_frames}")));
     }
+    session.ctx.set_memory_limit(session.max_memory());
     let inputs = Inputs::load(&scene).before()?;
     check_memory(&scene, &inputs, session.max_memory()).before()?;
     let plan = snow::plan(&scene, &inputs);

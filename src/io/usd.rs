@@ -2,7 +2,8 @@
 
 use std::fmt::Write;
 
-use crate::base::{DVec3, Uvs, Vec3};
+use super::usd_points;
+use crate::base::{DVec3, Points, Uvs, Vec3};
 
 /// A moving mesh at one frame.
 pub struct MeshFrame<'a> {
@@ -94,14 +95,8 @@ impl Units {
     }
 }
 
-/// A stage with the shot's volumes, and the objects' meshes under value clips when `clips` gives the pattern of
-/// their files and the meshes in them.
-pub fn stage(
-    comment: &str,
-    time: StageTime,
-    volumes: &[VolumeFiles],
-    clips: Option<(&Clips, &[MeshPrim])>,
-) -> String {
+/// A stage with the shot's volumes, and what has a .usda file a frame under value clips.
+pub fn stage(comment: &str, time: StageTime, volumes: &[VolumeFiles], clips: &[Clips]) -> String {
     let mut out = String::new();
     let StageTime { first, last, fps } = time;
     let _ = write!(
@@ -115,9 +110,7 @@ pub fn stage(
         .iter()
         .filter(|volume| !volume.files.is_empty())
         .for_each(|volume| write_volume(&mut out, volume));
-    if let Some((clips, meshes)) = clips {
-        write_clips(&mut out, clips, meshes);
-    }
+    clips.iter().for_each(|clips| write_clips(&mut out, clips));
     out.push_str("}\n");
     out
 }
@@ -142,16 +135,27 @@ fn write_volume(out: &mut String, volume: &VolumeFiles) {
     out.push_str("    }\n");
 }
 
-/// Files of one frame each that hold the moving meshes.
-pub struct Clips {
+/// Files of one frame each.
+pub struct Clips<'a> {
     /// Folder and kind: `./objects/objects.0001.usda` for `objects`.
     pub kind: &'static str,
     /// The existing frames, ascending.
     pub frames: Vec<i32>,
+    /// What they hold.
+    pub prims: ClipPrims<'a>,
 }
 
-fn write_clips(out: &mut String, clips: &Clips, meshes: &[MeshPrim]) {
+/// What the files of a clip hold, as far as all frames have it in common.
+pub enum ClipPrims<'a> {
+    /// Moving meshes, under a prim of the kind's name.
+    Meshes(Vec<MeshPrim<'a>>),
+    /// One prim of points with the kind's name, as [`usd_points::frame`] writes it; these have its attributes.
+    Points(&'a Points),
+}
+
+fn write_clips(out: &mut String, clips: &Clips) {
     let kind = clips.kind;
+    let class = if matches!(clips.prims, ClipPrims::Points(_)) { "Points" } else { "Xform" };
     let file = |frame: &i32| asset(&format!("./{kind}/{kind}.{frame:04}.usda"));
     let files: Vec<String> = clips.frames.iter().map(file).collect();
     let pairs = |pair: &dyn Fn(usize, i32) -> String| {
@@ -161,7 +165,7 @@ fn write_clips(out: &mut String, clips: &Clips, meshes: &[MeshPrim]) {
     };
     let _ = write!(
         out,
-        "    def Xform \"{kind}\" (\n        clips = {{\n            dictionary default = {{\n                \
+        "    def {class} \"{kind}\" (\n        clips = {{\n            dictionary default = {{\n                \
          asset[] assetPaths = [{}]\n                asset manifestAssetPath = @./{kind}/{kind}.manifest.usda@\n                \
          string primPath = \"/{kind}\"\n                double2[] active = [{}]\n                double2[] times = [{}]\n            \
          }}\n        }}\n    )\n    {{\n",
@@ -169,6 +173,18 @@ fn write_clips(out: &mut String, clips: &Clips, meshes: &[MeshPrim]) {
         pairs(&|clip, frame| format!("({frame}, {clip})")),
         pairs(&|_, frame| format!("({frame}, {frame})")),
     );
+    match &clips.prims {
+        ClipPrims::Meshes(meshes) => define_meshes(out, meshes),
+        ClipPrims::Points(points) => {
+            // Previews show grains when they are asked for renders.
+            out.push_str("        uniform token purpose = \"render\"\n");
+            out.push_str(&usd_points::declared(points, "        "));
+        }
+    }
+    out.push_str("    }\n");
+}
+
+fn define_meshes(out: &mut String, meshes: &[MeshPrim]) {
     for MeshPrim { name, uvs } in meshes {
         let _ = writeln!(
             out,
@@ -177,7 +193,6 @@ fn write_clips(out: &mut String, clips: &Clips, meshes: &[MeshPrim]) {
         declare_uvs(out, "            ", *uvs);
         out.push_str("        }\n");
     }
-    out.push_str("    }\n");
 }
 
 /// Attributes of a mesh that change from frame to frame.
@@ -204,8 +219,15 @@ fn declare_uvs(out: &mut String, indent: &str, uvs: Option<&Uvs>) {
 }
 
 /// The manifest of the clips that USD requires.
-pub fn clip_manifest(kind: &str, meshes: &[MeshPrim]) -> String {
+pub fn clip_manifest(kind: &str, prims: &ClipPrims) -> String {
     let mut out = format!("#usda 1.0\n(\n    defaultPrim = \"{kind}\"\n)\n\nover \"{kind}\"\n{{\n");
+    let meshes = match prims {
+        ClipPrims::Meshes(meshes) => &meshes[..],
+        ClipPrims::Points(points) => {
+            out.push_str(&usd_points::declared(points, "    "));
+            &[]
+        }
+    };
     for MeshPrim { name, uvs } in meshes {
         let _ = writeln!(out, "    over \"{name}\"\n    {{");
         ATTRIBUTES.iter().for_each(|(class, attribute)| {

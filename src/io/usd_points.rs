@@ -28,49 +28,70 @@ pub fn frame(name: &str, frame: i32, fps: f64, points: &Points) -> String {
         let _ = writeln!(out, "    {declared}.timeSamples = {{ {frame}: {values} }}");
     };
     let places: Vec<Vec3> = (0..points.count()).map(|point| points.position(point).cast()).collect();
-    sample(&mut out, "float3[] extent", None, &list(extent(points, pscale).iter(), |out, p| vector(out, *p)));
-    sample(&mut out, "point3f[] points", None, &list(places.iter(), |out, p| vector(out, (*p).into())));
-    for Attribute { name, values } in &points.attributes {
-        let interpolation = Some(if values.is_uniform() { "constant" } else { "vertex" });
-        match (name.as_str(), values) {
+    sample(&mut out, EXTENT, None, &list(extent(points, pscale).iter(), |out, p| vector(out, *p)));
+    sample(&mut out, PLACES, None, &list(places.iter(), |out, p| vector(out, (*p).into())));
+    for attribute in &points.attributes {
+        let (declared, interpolation) = declaration(attribute);
+        let each = 0..points.count();
+        let values = match (&attribute.name[..], &attribute.values) {
             // USD has one of each for all points.
-            ("v", Values::Vector(column)) => {
-                let each = (0..points.count()).map(|point| column.get(point));
-                sample(&mut out, "vector3f[] velocities", None, &list(each, vector));
-            }
-            ("id", Values::Long(column)) => {
-                let each = (0..points.count()).map(|point| column.get(point));
-                sample(&mut out, "int64[] ids", None, &list(each, number));
-            }
-            ("id", Values::Int(column)) => {
-                let each = (0..points.count()).map(|point| column.get(point));
-                sample(&mut out, "int64[] ids", None, &list(each, number));
-            }
+            ("v", Values::Vector(column)) => list(each.map(|point| column.get(point)), vector),
+            ("id", Values::Long(column)) => list(each.map(|point| column.get(point)), number),
+            ("id", Values::Int(column)) => list(each.map(|point| column.get(point)), number),
             ("pscale", Values::Float(column)) => {
-                let widths = list(column.stored().iter(), |out, radius| number(out, 2.0 * radius));
-                sample(&mut out, "float[] widths", interpolation, &widths);
+                list(column.stored().iter(), |out, radius| number(out, 2.0 * radius))
             }
-            _ => {
-                let (class, values) = primvar(values);
-                let declared = format!("{class} primvars:{}", prim_name(name));
-                sample(&mut out, &declared, interpolation, &values);
-            }
-        }
+            (_, values) => primvar(values),
+        };
+        sample(&mut out, &declared, interpolation, &values);
     }
     out.push_str("}\n");
     out
 }
 
-/// Type and values of a primvar.
-fn primvar(values: &Values) -> (&'static str, String) {
-    match values {
-        Values::Float(column) => ("float[]", list(column.stored().iter(), number)),
-        Values::Int(column) => ("int[]", list(column.stored().iter(), number)),
-        Values::Long(column) => ("int64[]", list(column.stored().iter(), number)),
-        Values::Bool(column) => {
-            ("bool[]", list(column.stored().iter(), |out, yes| number(out, u8::from(*yes))))
+/// What [`frame`] writes of points with these attributes, without values: for what is over them in a stage.
+pub(super) fn declared(points: &Points, indent: &str) -> String {
+    let mut out = format!("{indent}{EXTENT}\n{indent}{PLACES}\n");
+    for (declared, interpolation) in points.attributes.iter().map(declaration) {
+        let of = interpolation
+            .map_or(String::new(), |word| format!(" (\n{indent}    interpolation = \"{word}\"\n{indent})"));
+        let _ = writeln!(out, "{indent}{declared}{of}");
+    }
+    out
+}
+
+const EXTENT: &str = "float3[] extent";
+const PLACES: &str = "point3f[] points";
+
+/// Type and name of an attribute, and its interpolation where that is not known from the name.
+fn declaration(attribute: &Attribute) -> (String, Option<&'static str>) {
+    let Attribute { name, values } = attribute;
+    let interpolation = Some(if values.is_uniform() { "constant" } else { "vertex" });
+    match (&name[..], values) {
+        ("v", Values::Vector(_)) => ("vector3f[] velocities".into(), None),
+        ("id", Values::Long(_) | Values::Int(_)) => ("int64[] ids".into(), None),
+        ("pscale", Values::Float(_)) => ("float[] widths".into(), interpolation),
+        _ => {
+            let class = match values {
+                Values::Float(_) => "float[]",
+                Values::Int(_) => "int[]",
+                Values::Long(_) => "int64[]",
+                Values::Bool(_) => "bool[]",
+                Values::Vector(_) => "float3[]",
+            };
+            (format!("{class} primvars:{}", prim_name(name)), interpolation)
         }
-        Values::Vector(column) => ("float3[]", list(column.stored().iter(), |out, v| vector(out, *v))),
+    }
+}
+
+/// Values of a primvar.
+fn primvar(values: &Values) -> String {
+    match values {
+        Values::Float(column) => list(column.stored().iter(), number),
+        Values::Int(column) => list(column.stored().iter(), number),
+        Values::Long(column) => list(column.stored().iter(), number),
+        Values::Bool(column) => list(column.stored().iter(), |out, yes| number(out, u8::from(*yes))),
+        Values::Vector(column) => list(column.stored().iter(), |out, v| vector(out, *v)),
     }
 }
 

@@ -13,7 +13,9 @@ mod text;
 
 pub use objects::Objects;
 #[cfg(feature = "vdb")]
-pub use snow::{Inputs, Rebuild, Walk, check_memory, estimate};
+pub use snow::{
+    Forecast, Inputs, Rebuild, RebuildGrains, Walk, changes_since, check_memory, estimate, partial,
+};
 pub use text::{FrameChoice, Frames, Override, Value, Values, reference, template};
 
 use crate::error::{Error, Result};
@@ -183,6 +185,8 @@ pub struct Output {
     pub grains_ply: bool,
     /// `grains/grains.%04d.usda`.
     pub grains_usd: bool,
+    /// Whether most of the grains' .vdb files hold only what changed since the frame before.
+    pub grains_delta: bool,
     /// `objects/objects.%04d.usda`: the objects as they moved, with velocities.
     pub objects_usd: bool,
     /// `objects/objects.%04d.ply`: the same, all in one mesh.

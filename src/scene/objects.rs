@@ -2,7 +2,9 @@
 
 use std::sync::Arc;
 
-use super::shot::{Clip, FrameFiles, Kind, Reads, Report, Settings, Stage, Stepped, Stepping, Stored, To};
+use super::shot::{
+    Clip, FrameFiles, Kind, Prims, Reads, Report, Settings, Stage, Stepped, Stepping, Stored, To,
+};
 use super::text::keys::settings_of;
 use super::{Role, Scene, moving};
 use crate::base::{DVec3, TriMesh, Uvs, Vec3};
@@ -101,7 +103,7 @@ impl Stage for Objects<'_> {
     fn clip(&self) -> Option<Clip<'_>> {
         let uvs = self.bodies.iter().map(|body| body.motion().drawn().uvs);
         let meshes = self.names.iter().cloned().zip(uvs).collect();
-        Some(Clip { kind: "objects", manifest: MANIFEST, meshes })
+        Some(Clip { kind: "objects", manifest: MANIFEST, prims: Prims::Meshes(meshes) })
     }
 }
 

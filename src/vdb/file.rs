@@ -140,6 +140,32 @@ pub fn describe(path: &Path) -> Result<Vec<GridInfo>> {
     }
 }
 
+/// The metadata of a file itself, which [`WriteOptions::metadata`] puts there; OpenVDB is not asked. None where the file is of
+/// a newer version than this library knows.
+///
+/// # Errors
+/// A file that is missing, cut short or of another kind.
+pub fn metadata(path: &Path) -> Result<Vec<(String, MetaValue)>> {
+    let open = || layout::metadata(std::io::BufReader::new(std::fs::File::open(path)?));
+    let all = open().map_err(|fault| match fault {
+        layout::Fault::Io(error) => Error::io(path, "read", error),
+        layout::Fault::Content(what) => Error::file(path, what),
+    })?;
+    let value = |kind: String, bytes: Vec<u8>| {
+        let all = &bytes[..];
+        match (&kind[..], bytes.len()) {
+            ("string", _) => MetaValue::Text(String::from_utf8_lossy(all).into_owned()),
+            ("int32", 4) => MetaValue::Int(i32::from_le_bytes(all.try_into().unwrap_or_default()).into()),
+            ("int64", 8) => MetaValue::Int(i64::from_le_bytes(all.try_into().unwrap_or_default())),
+            ("double", 8) => MetaValue::Double(f64::from_le_bytes(all.try_into().unwrap_or_default())),
+            ("float", 4) => MetaValue::Float(f32::from_le_bytes(all.try_into().unwrap_or_default())),
+            ("bool", 1) => MetaValue::Bool(all != [0]),
+            _ => MetaValue::Other(kind, String::new()),
+        }
+    };
+    Ok(all.into_iter().map(|(key, kind, bytes)| (key, value(kind, bytes))).collect())
+}
+
 /// Every grid of a file, in the order of their names; all must be float grids.
 ///
 /// # Errors

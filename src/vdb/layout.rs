@@ -79,24 +79,8 @@ fn damaged(what: impl std::fmt::Display) -> Fault {
 /// [`Fault::Content`] for a file that is empty, of another kind, too short for its offsets, or that contradicts itself.
 pub fn read(source: impl Read + Seek) -> Result<Layout, Fault> {
     let mut walk = Walk::new(source)?;
-    let start = walk.length.min(8) as usize;
-    let mut magic = [0; 8];
-    walk.fill(&mut magic[..start], "header")?;
-    match start {
-        0 => return Err(Fault::Content("the file is empty".into())),
-        _ if magic[..start] != MAGIC[..start] => return Err(Fault::Content("not a .vdb file".into())),
-        1..8 => return Err(Fault::Content("the .vdb file is cut short".into())),
-        _ => {}
-    }
-    let version = walk.u32("header")?;
-    if !KNOWN.contains(&version) {
-        return Ok(Layout { version, grids: None });
-    }
-    // The library's version is not used.
-    walk.skip(8, "header")?;
-    let has_offsets = version < OFFSETS_FLAG || walk.array::<1>("header")? != [0];
-    let identifier = if version < LONG_UUID { 16 } else { 36 };
-    walk.skip(u64::from(FILE_COMPRESSION.contains(&version)) + identifier, "header")?;
+    let (version, has_offsets) = walk.head()?;
+    let Some(has_offsets) = has_offsets else { return Ok(Layout { version, grids: None }) };
     walk.metadata(walk.length, "metadata of the file")?;
     let count = walk.u32("number of grids")? as i32;
     if count < 0 {
@@ -112,6 +96,26 @@ pub fn read(source: impl Read + Seek) -> Result<Layout, Fault> {
         grids.push(grid);
     }
     Ok(Layout { version, grids: Some(grids) })
+}
+
+/// Reads the metadata of a file: key, OpenVDB's name of the type, and bytes. None where the version is unknown.
+///
+/// # Errors
+/// As [`read`], up to where the metadata ends.
+pub fn metadata(source: impl Read + Seek) -> Result<Vec<(String, String, Vec<u8>)>, Fault> {
+    const PART: &str = "metadata of the file";
+    let mut walk = Walk::new(source)?;
+    let mut out = Vec::new();
+    if walk.head()?.1.is_some() {
+        for _ in 0..walk.u32(PART)? {
+            let (key, kind, size) = walk.entry(PART)?;
+            walk.expect(size, PART)?;
+            let mut bytes = vec![0; size as usize];
+            walk.fill(&mut bytes, PART)?;
+            out.push((key, kind, bytes));
+        }
+    }
+    Ok(out)
 }
 
 /// Reads forward, never beyond the end.
@@ -178,14 +182,40 @@ impl<R: Read + Seek> Walk<R> {
         Ok(String::from_utf8_lossy(&text).into_owned())
     }
 
+    /// Reads up to the metadata of the file: its version, and whether it has offsets; none where the version is unknown.
+    fn head(&mut self) -> Result<(u32, Option<bool>), Fault> {
+        let start = self.length.min(8) as usize;
+        let mut magic = [0; 8];
+        self.fill(&mut magic[..start], "header")?;
+        match start {
+            0 => return Err(Fault::Content("the file is empty".into())),
+            _ if magic[..start] != MAGIC[..start] => return Err(Fault::Content("not a .vdb file".into())),
+            1..8 => return Err(Fault::Content("the .vdb file is cut short".into())),
+            _ => {}
+        }
+        let version = self.u32("header")?;
+        if !KNOWN.contains(&version) {
+            return Ok((version, None));
+        }
+        // The library's version is not used.
+        self.skip(8, "header")?;
+        let has_offsets = version < OFFSETS_FLAG || self.array::<1>("header")? != [0];
+        let identifier = if version < LONG_UUID { 16 } else { 36 };
+        self.skip(u64::from(FILE_COMPRESSION.contains(&version)) + identifier, "header")?;
+        Ok((version, Some(has_offsets)))
+    }
+
+    /// Reads the key, type and size of metadata, which follows.
+    fn entry(&mut self, part: &str) -> Result<(String, String, u64), Fault> {
+        Ok((self.name(part)?, self.name(part)?, self.u32(part)?.into()))
+    }
+
     /// Skips a list of metadata, which must end before a place.
     fn metadata(&mut self, before: u64, part: &str) -> Result<(), Fault> {
         let count = self.u32(part)?;
         for _ in 0..count {
-            self.name(part)?;
-            self.name(part)?;
-            let size = self.u32(part)?;
-            self.skip(size.into(), part)?;
+            let (_, _, size) = self.entry(part)?;
+            self.skip(size, part)?;
             if self.at > before {
                 return Err(damaged(format_args!("the {part} reaches beyond its place")));
             }
@@ -264,6 +294,17 @@ mod tests {
         bytes.extend(places.iter().flat_map(|place| place.to_le_bytes()));
         bytes.extend([0; 50]);
         bytes
+    }
+
+    #[test]
+    fn metadata_is_read_as_it_stands() {
+        for version in [211, 224] {
+            let bytes = file(version, true);
+            let all = metadata(Cursor::new(&bytes)).unwrap();
+            assert_eq!(all, [("creator".to_string(), "string".to_string(), b"test".to_vec())]);
+        }
+        let bytes = file(224, true);
+        (0..80).for_each(|length| assert!(metadata(Cursor::new(&bytes[..length])).is_err(), "{length}"));
     }
 
     #[test]

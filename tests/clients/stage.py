@@ -51,4 +51,26 @@ for frame in (first, (first + last) // 2, last):
             worst = max((points[i] + velocities[i] / 24.0 - after[i]).GetLength() for i in range(len(points)))
             assert worst < 1e-4, worst
         checked += 1
-print(f"frazil: {checked} meshes at 3 frames, {textured} with UVs, {len(volume.GetFieldPaths())} grids")
+grains = UsdGeom.Points(stage.GetPrimAtPath("/shot/grains"))
+counts = []
+if grains:
+    assert grains.GetPurposeAttr().Get() == UsdGeom.Tokens.render
+    assert grains.GetWidthsInterpolation() == UsdGeom.Tokens.constant
+    primvars = UsdGeom.PrimvarsAPI(grains)
+    for frame in range(first, last + 1):
+        ids, places, velocities = (
+            attribute.Get(frame) for attribute in (grains.GetIdsAttr(), grains.GetPointsAttr(), grains.GetVelocitiesAttr())
+        )
+        assert len(ids) == len(places) == len(velocities) and list(ids) == sorted(set(ids))
+        (width,) = grains.GetWidthsAttr().Get(frame)
+        file = Usd.Stage.Open(str(folder / "grains" / f"grains.{frame:04d}.usda"))
+        alone = UsdGeom.Points(file.GetDefaultPrim())
+        assert places == alone.GetPointsAttr().Get(frame) and ids == alone.GetIdsAttr().Get(frame) and width > 0
+        for name in ("active", "trapped", "source_frame", "rest"):
+            primvar = primvars.GetPrimvar(name)
+            assert primvar.GetInterpolation() == UsdGeom.Tokens.vertex and len(primvar.Get(frame)) == len(ids), name
+        low, high = grains.GetExtentAttr().Get(frame)
+        assert all(low[axis] <= place[axis] <= high[axis] for place in places for axis in range(3))
+        counts.append(len(ids))
+    assert counts[-1] > 0 == counts[0], counts
+print(f"frazil: {checked} meshes at 3 frames, {textured} with UVs, {len(volume.GetFieldPaths())} grids, {max(counts, default=0)} grains")

@@ -50,6 +50,7 @@ mod scene {
     mod demo_walk;
     mod fuzz;
     mod shot_folder;
+    mod shot_grain_files;
     mod shot_grains;
     mod shot_inputs;
     mod shot_runs;

@@ -21,7 +21,7 @@ use super::session::Session;
 pub struct Args {
     /// Scene file (TOML), or an output folder.
     scene: PathBuf,
-    /// Where the output is to go: its free space is printed too.
+    /// Where the output is to go: its free space is printed too, and how many grains come from the base that is there.
     #[arg(short, long, value_name = "DIR")]
     output: Option<PathBuf>,
     /// Put a setting over the scene's, for instance snow.noise.seed=2 or object.1.file=hero.glb.

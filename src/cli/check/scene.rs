@@ -15,8 +15,10 @@ use crate::cli::{machine, output};
 pub fn run(args: &Args, session: &Session) -> Result<(), Failure> {
     let scene = Scene::read_with(&args.scene, &args.set).before()?;
     let inputs = Inputs::load(&scene).before()?;
-    let mut report = check(&session.ctx, &scene, &inputs).before()?;
+    let mut report = check(&session.ctx, &scene, &inputs, args.output.as_deref()).before()?;
     let limit = session.max_memory();
+    let too_many = report.grains.as_ref().and_then(|grains| grains.check(&scene, limit).err());
+    report.warnings.extend(too_many.map(|error| error.to_string()));
     if let Err(error) = check_memory(&scene, &inputs, limit) {
         report.warnings.push(error.to_string());
     }
@@ -52,6 +54,7 @@ fn in_words(report: &Report, limit: u64, free: Option<u64>) -> String {
     });
     let _ = writeln!(out, "snow      {area}cells of {} m", report.cell_m);
     report.objects.iter().for_each(|object| describe_object(&mut out, report, object));
+    describe_grains(&mut out, report);
     let _ = writeln!(out, "memory    about {} of {}", size(report.memory_bytes), size(limit));
     if let Some(disk) = report.disk_bytes {
         let free = free.map_or(String::new(), |free| format!(" of {} free", size(free)));
@@ -61,6 +64,24 @@ fn in_words(report: &Report, limit: u64, free: Option<u64>) -> String {
         let _ = writeln!(out, "warning   {warning}");
     });
     out
+}
+
+fn describe_grains(out: &mut String, report: &Report) {
+    let Some(grains) = &report.grains else {
+        if report.settings.contains_key("grains.radius") {
+            out.push_str(
+                "grains    how many is known when the base is there: make it, then check with -o DIR\n",
+            );
+        }
+        return;
+    };
+    let (removed, share) = (grains.removed_m3, grains.compression);
+    let upto = match (grains.to_frame, report.frames[1]) {
+        (frame, last) if frame == last => String::new(),
+        (frame, last) => format!(" up to frame {frame} of {last}, as far as the base is there"),
+    };
+    let _ = writeln!(out, "grains    {}{upto}", grains.count());
+    let _ = writeln!(out, "          from {removed:.6} m3 of the base, compression {share}");
 }
 
 fn describe_object(out: &mut String, report: &Report, object: &ObjectReport) {

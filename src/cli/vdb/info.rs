@@ -3,6 +3,7 @@
 use std::path::Path;
 
 use frazil::Context;
+use frazil::scene::{changes_since, partial};
 use frazil::vdb::{MetaValue, file, level_set, points};
 use serde_json::{Map, Value, json};
 
@@ -29,6 +30,9 @@ pub fn grids(path: &Path, measure: bool, ctx: &Context) -> frazil::Result<Vec<Va
         if grid.value_type.starts_with("Tree_ptdataidx32") {
             let points = points::read(path, Some(&grid.name))?;
             entry.extend(crate::cli::cloud::described(&points));
+            if let Some(since) = changes_since(path)? {
+                entry.insert("partial".into(), json!(partial(since)));
+            }
         }
         let mut set = |key: &str, value: Value| entry.insert(key.into(), value);
         for (key, value) in grid.metadata.iter().filter(|(key, _)| !key.starts_with("file_")) {

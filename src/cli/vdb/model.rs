@@ -4,6 +4,7 @@ use std::path::Path;
 
 use frazil::base::Points;
 use frazil::render::Model;
+use frazil::scene::{changes_since, partial};
 use frazil::vdb::{GridClass, file, points};
 use frazil::{Context, Error};
 
@@ -31,6 +32,9 @@ pub fn points_of(path: &Path) -> frazil::Result<Option<Points>> {
     let has = |start: &str| grids.iter().any(|grid| grid.value_type.starts_with(start));
     if has("Tree_float") || !has("Tree_ptdataidx32") {
         return Ok(None);
+    }
+    if let Some(since) = changes_since(path)? {
+        log::warn!("{}: {}", path.display(), partial(since));
     }
     points::read(path, None).map(Some)
 }

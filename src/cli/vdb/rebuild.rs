@@ -6,21 +6,26 @@ use super::{Packing, check_name};
 use crate::cli::exit::{Failure, Phase};
 use crate::cli::output;
 use crate::cli::session::Session;
+use frazil::io::atomic;
 use frazil::io::sequence::Pattern;
-use frazil::scene::{FrameChoice, Rebuild};
+use frazil::scene::{FrameChoice, Rebuild, RebuildGrains};
 use frazil::vdb::MetaValue;
 use frazil::vdb::file::{self, WriteOptions};
 use serde_json::json;
 
-/// Make whole frames of a snow cache that holds changes (base_mode = "delta")
+/// Make whole frames of a snow cache that holds changes (base_mode or grains_mode = "delta")
 #[derive(clap::Args)]
 #[command(after_help = "\
 Examples:
   frazil vdb rebuild cache/ --frame 48 -o base.0048.vdb
-  frazil vdb rebuild cache/ --frame 1-48 -o base.%04d.vdb")]
+  frazil vdb rebuild cache/ --frame 1-48 -o base.%04d.vdb
+  frazil vdb rebuild cache/ --stage grains --frame 48 -o grains.0048.vdb")]
 pub struct Args {
     /// Output folder of `frazil snow`
     folder: PathBuf,
+    /// Stage whose frames are made
+    #[arg(long, value_enum, default_value = "base")]
+    stage: Of,
     /// Frames to make
     #[arg(long, value_name = "N|A-B|A-BxN", allow_hyphen_values = true)]
     frame: FrameChoice,
@@ -29,6 +34,21 @@ pub struct Args {
     output: PathBuf,
     #[command(flatten)]
     packing: Packing,
+}
+
+/// What can be made whole.
+#[derive(Clone, Copy, PartialEq, clap::ValueEnum)]
+enum Of {
+    /// The layer of snow
+    Base,
+    /// Grains, as points
+    Grains,
+}
+
+/// A cache that is read frame by frame.
+enum Cache {
+    Base(Rebuild),
+    Grains(RebuildGrains),
 }
 
 /// Runs the command.
@@ -40,11 +60,21 @@ pub fn run(args: &Args, session: &Session) -> Result<(), Failure> {
         let what = format!("{}: several frames need a pattern such as base.%04d.vdb", args.output.display());
         return Err(Failure::refused(what));
     }
-    let mut cache = Rebuild::open(&args.folder).before()?;
-    if let Some(missing) = args.frame.iter().find(|frame| !cache.stored().is_done(*frame)) {
+    if args.stage == Of::Grains && args.packing.half {
+        return Err(Failure::refused("--half is of no use with --stage grains: points keep 32 bits"));
+    }
+    let mut cache = match args.stage {
+        Of::Base => Cache::Base(Rebuild::open(&args.folder).before()?),
+        Of::Grains => Cache::Grains(RebuildGrains::open(&args.folder).before()?),
+    };
+    let stored = match &cache {
+        Cache::Base(cache) => cache.stored(),
+        Cache::Grains(cache) => cache.stored(),
+    };
+    if let Some(missing) = args.frame.iter().find(|frame| !stored.is_done(*frame)) {
         return Err(Failure::refused(format!("{}: frame {missing} is not there", args.folder.display())));
     }
-    let folders = [args.folder.join("base"), args.folder.join("removed"), args.folder.join("state")];
+    let folders = ["base", "removed", "grains", "state"].map(|name| args.folder.join(name));
     let own: Vec<PathBuf> = folders.iter().filter_map(|folder| std::fs::canonicalize(folder).ok()).collect();
     let there = match args.output.parent() {
         Some(folder) if !folder.as_os_str().is_empty() => std::fs::canonicalize(folder).ok(),
@@ -56,11 +86,19 @@ pub fn run(args: &Args, session: &Session) -> Result<(), Failure> {
     }
     for frame in args.frame.iter() {
         let path = pattern.as_ref().map_or_else(|| args.output.clone(), |pattern| pattern.path(frame));
-        let grids = cache.layer(&session.ctx, frame).during()?;
-        session.ctx.check().during()?;
-        let metadata = vec![("frazil:frame".to_string(), MetaValue::Int(frame.into()))];
-        let options = WriteOptions { metadata, ..args.packing.options() };
-        file::write(&path, &grids.list(), &options).during()?;
+        match &mut cache {
+            Cache::Base(cache) => {
+                let grids = cache.layer(&session.ctx, frame).during()?;
+                session.ctx.check().during()?;
+                let metadata = vec![("frazil:frame".to_string(), MetaValue::Int(frame.into()))];
+                let options = WriteOptions { metadata, ..args.packing.options() };
+                file::write(&path, &grids.list(), &options).during()?;
+            }
+            Cache::Grains(cache) => {
+                let bytes = cache.bytes(&session.ctx, frame, &args.packing.options()).during()?;
+                atomic::write_bytes(&path, &bytes).during()?;
+            }
+        }
     }
     session.record("frames", json!(args.frame.count()));
     Ok(())

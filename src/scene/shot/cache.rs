@@ -101,6 +101,10 @@ impl Cache {
                 forgotten = stored.leave_out_from(first);
                 record.segments = vec![Segment::new(first, settings, None)];
             }
+            // A run that was refused before its first frame left a record of its settings.
+            None if stored.frames().next().is_none() => {
+                record.segments = vec![Segment::new(first, settings, None)];
+            }
             None => match record.segments.last() {
                 Some(last) => {
                     let changed = settings::changed(&last.settings, &settings);

@@ -53,6 +53,10 @@ pub trait AnyStage: Stage {
     /// As the trait that says what it is.
     fn as_stage(&self) -> &dyn Stage;
 
+    /// See [`Stepping::foresee`].
+    #[doc(hidden)]
+    fn looks_ahead(&self, ctx: &Context, upstream: &[&Stored], last: i32) -> Result<()>;
+
     /// The state from which a frame is reached in the fewest steps.
     #[doc(hidden)]
     fn before<'a>(&'a self, ctx: &Context, frame: i32, kept: Kept<'_>) -> Result<Box<dyn Pass + 'a>>;
@@ -61,6 +65,10 @@ pub trait AnyStage: Stage {
 impl<S: Stepping> AnyStage for S {
     fn as_stage(&self) -> &dyn Stage {
         self
+    }
+
+    fn looks_ahead(&self, ctx: &Context, upstream: &[&Stored], last: i32) -> Result<()> {
+        self.foresee(ctx, upstream, last)
     }
 
     fn before<'a>(&'a self, ctx: &Context, frame: i32, kept: Kept<'_>) -> Result<Box<dyn Pass + 'a>> {

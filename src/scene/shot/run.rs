@@ -213,10 +213,14 @@ impl<'a> Run<'a> {
         let first = self.plan.scene.shot.frames.first;
         let busy: Vec<&str> =
             self.stages.iter().filter(|run| !run.todo.is_empty()).map(|run| run.stage.name()).collect();
-        for run in &mut self.stages {
+        for place in 0..self.stages.len() {
+            let run = &self.stages[place];
             let waits = run.stage.upstream().iter().any(|name| busy.contains(name));
-            if let (Some(&frame), Some(cache), false) = (run.todo.first(), &run.cache, waits) {
-                run.start = Some(run.stage.before(ctx, frame, cache.kept(first))?);
+            if let ([frame, ..], Some(cache), false) = (&run.todo[..], &run.cache, waits) {
+                let upstream = self.upstream(run.stage.as_stage(), self.own.folder())?;
+                let last = run.todo.last().copied().unwrap_or(*frame);
+                run.stage.looks_ahead(ctx, &upstream.iter().collect::<Vec<_>>(), last)?;
+                self.stages[place].start = Some(run.stage.before(ctx, *frame, cache.kept(first))?);
             }
         }
         Ok(())
@@ -334,6 +338,7 @@ impl StageRun<'_> {
             None => {
                 // What is upstream was made only now.
                 cache.check_inputs(self.stage.as_stage(), &FrameChoice::none(), &upstream)?;
+                self.stage.looks_ahead(shared.ctx, &upstream, todo[todo.len() - 1])?;
                 self.stage.before(shared.ctx, todo[0], cache.kept(shared.first))?
             }
         };

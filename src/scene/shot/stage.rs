@@ -93,7 +93,7 @@ pub trait Stage: Sync {
         Vec::new()
     }
 
-    /// Its moving meshes for `shot.usda`.
+    /// Its moving meshes or points for `shot.usda`.
     fn clip(&self) -> Option<Clip<'_>> {
         None
     }
@@ -107,6 +107,15 @@ pub trait Stepping: Stage {
     type Step: Send;
     /// What that thread carries from frame to frame.
     type Writer: Send;
+
+    /// Looks at what frames up to a last one are made from, before the first of them is; the frames of the stages upstream are
+    /// there.
+    ///
+    /// # Errors
+    /// Why they cannot be made.
+    fn foresee(&self, _ctx: &Context, _upstream: &[&Stored], _last: i32) -> Result<()> {
+        Ok(())
+    }
 
     /// The state after a frame that `done` keeps, or the one before the first.
     ///

@@ -4,8 +4,11 @@ use std::collections::BTreeMap;
 use std::ops::RangeInclusive;
 use std::path::{Path, PathBuf};
 
+use serde_json::Value;
+
 use crate::error::{Error, Result};
 use crate::io::manifest::{Keeps, Manifest, Written};
+use crate::io::sealed;
 
 /// The frames of a stage that a folder holds.
 pub struct Stored {
@@ -140,6 +143,20 @@ impl Stored {
         let whole = whole.filter(|whole| self.is_done(*whole));
         let missing = || Error::file(&self.folder, format!("frame {frame} cannot be had from its files"));
         Ok(whole.ok_or_else(missing)?..=frame)
+    }
+
+    /// The report of a frame that is done; none where it is gone.
+    ///
+    /// # Errors
+    /// One that is not what was written.
+    pub fn report(&self, frame: i32) -> Result<Option<Value>> {
+        let path = self.folder.join("report").join(format!("{}.{frame:04}.json", self.stage));
+        let bytes = match std::fs::read(&path) {
+            Err(error) if error.kind() == std::io::ErrorKind::NotFound => return Ok(None),
+            other => other.map_err(|error| Error::io(&path, "read", error))?,
+        };
+        let report = serde_json::from_slice(&bytes).ok().filter(|_| sealed::is_stamped(&bytes));
+        report.map(Some).ok_or_else(|| Error::file(path, "is not the report that was written"))
     }
 
     /// The file from which the state after a frame, or what the frame changed, is read; its content was compared.

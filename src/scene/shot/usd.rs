@@ -4,7 +4,7 @@ use super::own::Own;
 use super::run::Plan;
 use super::stage::Stage;
 use super::stored::Stored;
-use crate::base::Uvs;
+use crate::base::{Points, Uvs};
 use crate::error::Result;
 use crate::io::usd;
 
@@ -20,14 +20,22 @@ pub struct Volume {
     pub grids: &'static [(&'static str, bool)],
 }
 
-/// A kind of a stage's files that holds moving meshes: a .usda file a frame.
+/// A kind of a stage's files with a .usda file a frame.
 pub struct Clip<'a> {
     /// The kind.
     pub kind: &'static str,
     /// What the frames have in common: a file that belongs to no frame.
     pub manifest: &'static str,
-    /// Names of the meshes' prims, and their texture coordinates.
-    pub meshes: Vec<(String, Option<&'a Uvs>)>,
+    /// What the frames hold.
+    pub prims: Prims<'a>,
+}
+
+/// What the frames of a [`Clip`] hold.
+pub enum Prims<'a> {
+    /// Moving meshes: names of their prims, and their texture coordinates.
+    Meshes(Vec<(String, Option<&'a Uvs>)>),
+    /// Points, in a prim of the kind's name; these have their attributes.
+    Points(Points),
 }
 
 /// Writes the description of the frames that are there, by relative paths.
@@ -53,22 +61,31 @@ pub(super) fn write<'s>(
         .iter()
         .map(|(volume, files)| usd::VolumeFiles { name: volume.kind, grids: volume.grids, files })
         .collect();
-    let clip = stages.iter().find_map(|(stage, stored)| {
+    let clips = stages.iter().filter_map(|(stage, stored)| {
         let clip = stage.clip()?;
         let files = relative(stored, clip.kind).into_iter().filter(|(_, file)| file.ends_with(".usda"));
         let frames: Vec<i32> = files.map(|(frame, _)| frame).collect();
         (!frames.is_empty()).then_some((clip, frames))
     });
-    let meshes: Vec<usd::MeshPrim> = clip
+    let clips: Vec<(Clip, Vec<i32>)> = clips.collect();
+    let clips: Vec<(&str, usd::Clips)> = clips
         .iter()
-        .flat_map(|(clip, _)| clip.meshes.iter().map(|(name, uvs)| usd::MeshPrim { name, uvs: *uvs }))
+        .map(|(clip, frames)| {
+            let prims = match &clip.prims {
+                Prims::Meshes(meshes) => usd::ClipPrims::Meshes(
+                    meshes.iter().map(|(name, uvs)| usd::MeshPrim { name, uvs: *uvs }).collect(),
+                ),
+                Prims::Points(points) => usd::ClipPrims::Points(points),
+            };
+            (clip.manifest, usd::Clips { kind: clip.kind, frames: frames.clone(), prims })
+        })
         .collect();
-    if let Some((clip, _)) = &clip {
-        files.write(clip.manifest, usd::clip_manifest(clip.kind, &meshes).as_bytes())?;
+    for (manifest, clips) in &clips {
+        files.write(manifest, usd::clip_manifest(clips.kind, &clips.prims).as_bytes())?;
     }
-    let clips = clip.as_ref().map(|(clip, frames)| usd::Clips { kind: clip.kind, frames: frames.clone() });
+    let clips: Vec<usd::Clips> = clips.into_iter().map(|(_, clips)| clips).collect();
     let time = usd::StageTime { first: frames.first, last: frames.last, fps };
     let comment = format!("made by frazil {}", env!("CARGO_PKG_VERSION"));
-    let text = usd::stage(&comment, time, &volumes, clips.as_ref().map(|clips| (clips, &meshes[..])));
+    let text = usd::stage(&comment, time, &volumes, &clips);
     files.write(SHOT, text.as_bytes())
 }

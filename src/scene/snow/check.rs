@@ -1,15 +1,17 @@
 //! Looks at every input of every frame of a scene, and computes nothing else.
 
 use std::collections::BTreeMap;
+use std::path::Path;
 
 use serde::Serialize;
 
 use super::course::Course;
 use super::relief::Relief;
 use super::walks::Walk;
-use super::{Inputs, disk, memory};
+use super::{Forecast, Inputs, disk, has_grains, memory};
 use crate::context::Context;
 use crate::error::Result;
+use crate::scene::shot::Stored;
 use crate::scene::{Layer, Scene, Value};
 use crate::snow::base_layer::initial::thin;
 
@@ -26,9 +28,11 @@ pub struct Report {
     pub cell_m: f64,
     /// The objects.
     pub objects: Vec<ObjectReport>,
-    /// Memory that the run needs, about (bytes).
+    /// The grains, where the scene has some and its base is there.
+    pub grains: Option<Forecast>,
+    /// Memory that the run needs, about (bytes); without grains that are not known yet.
     pub memory_bytes: u64,
-    /// Space that its files need, about (bytes).
+    /// Space that its files need, about (bytes); without grains that are not known yet.
     pub disk_bytes: Option<u64>,
     /// What looks wrong, one sentence each.
     pub warnings: Vec<String>,
@@ -80,11 +84,11 @@ pub struct Deepest {
     pub below_top_m: f64,
 }
 
-/// Checks a scene whose inputs are open.
+/// Checks a scene whose inputs are open; `folder` is that of its output, whose base says how many grains there will be.
 ///
 /// # Errors
-/// A frame that cannot be read or fits no other; cancel.
-pub fn check(ctx: &Context, scene: &Scene, inputs: &Inputs) -> Result<Report> {
+/// A frame that cannot be read or fits no other; a damaged record of the base; cancel.
+pub fn check(ctx: &Context, scene: &Scene, inputs: &Inputs, folder: Option<&Path>) -> Result<Report> {
     let mut warnings = inputs.warnings.clone();
     if let Layer::Depth(depth) = inputs.snow.layer {
         warnings.extend(thin(depth, inputs.snow.cell));
@@ -100,14 +104,20 @@ pub fn check(ctx: &Context, scene: &Scene, inputs: &Inputs) -> Result<Report> {
     if objects.is_empty() {
         warnings.push("nothing moves through the snow: no object has the role collide".into());
     }
+    let grains = match folder.filter(|_| has_grains(&scene.values)) {
+        Some(folder) => Forecast::of(scene, inputs, &Stored::read(folder, "base")?, scene.shot.frames.last)?,
+        None => None,
+    };
+    let (memory, disk) = grains.as_ref().map_or((0, 0), |grains| (grains.memory_bytes, grains.disk_bytes));
     Ok(Report {
         frames: [scene.shot.frames.first, scene.shot.frames.last],
         fps: scene.shot.fps,
         area_m: inputs.area(),
         cell_m: inputs.snow.cell,
         objects,
-        memory_bytes: memory::estimate(scene, inputs)?,
-        disk_bytes: Some(disk::estimate(scene, inputs)),
+        grains,
+        memory_bytes: memory::estimate(scene, inputs)?.max(memory),
+        disk_bytes: Some(disk::estimate(scene, inputs) + disk),
         warnings,
         settings: scene.values.by_path(),
     })

@@ -1,6 +1,7 @@
 //! How much space a shot's files will need.
 
 use super::Inputs;
+use super::grain_files::WHOLE_EVERY;
 use crate::scene::{BaseMode, Scene};
 
 /// Bytes of a whole base file for each column of cells, and of what a frame changes and removes besides.
@@ -15,7 +16,33 @@ const PLY_PER_VERTEX: f64 = 50.0;
 const USDA_PER_PLACE: f64 = 20.0;
 const USDA_PER_INDEX: f64 = 7.0;
 const PLY_PER_PLACE: f64 = 8.0;
-/// Estimates the space of all files (bytes).
+/// Bytes of a grain in each kind of file (of changes: while a character walks), and in a packed state.
+const GRAIN_VDB: f64 = 49.0;
+const GRAIN_CHANGES: f64 = 28.0;
+const GRAIN_PLY: f64 = 50.0;
+const GRAIN_USDA: f64 = 125.0;
+const GRAIN_STATE: f64 = 90.0;
+/// States of grains that are kept.
+const STATES: f64 = 2.0;
+
+/// Estimates the space of grains' files and states (bytes), of so many after each frame.
+pub(super) fn of_grains(scene: &Scene, there: &[f64]) -> u64 {
+    let output = scene.output;
+    let vdb = |frame: usize| match output.grains_delta && !frame.is_multiple_of(WHOLE_EVERY as usize) {
+        true => GRAIN_CHANGES,
+        false => GRAIN_VDB,
+    };
+    let each = |frame: usize| {
+        f64::from(output.grains_vdb) * vdb(frame)
+            + f64::from(output.grains_ply) * GRAIN_PLY
+            + f64::from(output.grains_usd) * GRAIN_USDA
+    };
+    let files: f64 = there.iter().enumerate().map(|(frame, grains)| grains * each(frame)).sum();
+    let most = there.iter().copied().fold(0.0, f64::max);
+    (files + STATES * most * GRAIN_STATE) as u64
+}
+
+/// Estimates the space of all files (bytes) but those of grains.
 pub fn estimate(scene: &Scene, inputs: &Inputs) -> u64 {
     let (output, frames) = (scene.output, scene.shot.frames.count() as f64);
     let whole = whole_base(inputs) * if output.half { 0.6 } else { 1.0 };

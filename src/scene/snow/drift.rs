@@ -2,6 +2,7 @@
 
 use std::path::Path;
 
+use super::grain_files::{changes_since, partial};
 use crate::base::DVec3;
 use crate::base::points::Values;
 use crate::error::{Error, Result};
@@ -36,6 +37,9 @@ impl Drift {
             let cloud = points_ply::read(path)?;
             (cloud.places, cloud.attributes)
         } else {
+            if let Some(since) = changes_since(path)? {
+                return Err(Error::file(path, partial(since)));
+            }
             let points = points::read(path, None)?;
             ((0..points.count()).map(|index| points.position(index)).collect(), points.attributes)
         };

@@ -4,14 +4,18 @@ use std::path::Path;
 
 use serde_json::json;
 
+use super::forecast::Forecast;
+use super::grain_files::{self, WHOLE_EVERY, ordered, told_apart};
 use super::inputs::Inputs;
 use super::{base, drift};
-use crate::base::DVec3;
+use crate::base::{DVec3, Points};
 use crate::context::Context;
 use crate::error::{Error, Result};
 use crate::io::manifest::Keeps;
 use crate::io::{points_ply, usd_points};
-use crate::scene::shot::{FrameFiles, Kind, Reads, Report, Settings, Stage, Stepped, Stepping, Stored, To};
+use crate::scene::shot::{
+    Clip, FrameFiles, Kind, Prims, Reads, Report, Settings, Stage, Stepped, Stepping, Stored, To,
+};
 use crate::scene::text::key::Scope;
 use crate::scene::text::keys::{self, settings_of};
 use crate::scene::{self, Role, Scene, moving};
@@ -19,8 +23,6 @@ use crate::snow::base_layer::{Grids, initial};
 use crate::snow::grains::{self, Base, Object, Params, StepReport, Surroundings};
 use crate::snow::{grain_cohesion, grain_friction};
 use crate::sweep::Body;
-use crate::vdb::file::WriteOptions;
-use crate::vdb::points;
 
 /// Grains of a scene.
 pub struct Grains<'a> {
@@ -37,9 +39,19 @@ pub struct State {
     layer: Option<(i32, Grids)>,
 }
 
-/// What a step hands to the writer: the grains after it, where their files are wanted.
+/// What a step hands to the writer: the grains after it, where their files, or what changed since, are wanted.
 pub struct Step(Option<grains::Grains>);
 
+/// What writes frames.
+pub struct Writer {
+    /// Gives the threads; its cancel flag does not matter: a frame begun is finished.
+    ctx: Context,
+    /// The grains of the frame before, where changes are written.
+    before: Option<Points>,
+}
+
+/// What the clips of `grains/` share.
+const MANIFEST: &str = "grains/grains.manifest.usda";
 /// How far below the snow (m) grains are dropped.
 const BELOW: f64 = 1.0;
 
@@ -62,37 +74,9 @@ impl<'a> Grains<'a> {
         Self { scene, inputs, objects }
     }
 
-    fn params(&self) -> Params {
-        let values = &self.scene.values;
-        let number = |name: &str| values.number(&format!("grains.{name}"));
-        let whole = |name: &str| values.get(&format!("grains.{name}")).and_then(|value| value.whole());
-        let usual = Params::for_cell(self.inputs.snow.cell);
-        let of_repose = || number("repose_angle_deg").map(grain_friction::of_repose);
-        let radius = number("radius").unwrap_or(usual.radius);
-        let friction = number("friction").or_else(of_repose).unwrap_or(usual.friction);
-        let of_wall =
-            || number("stands").map(|height| grain_cohesion::of_wall(height, 2.0 * radius, friction));
-        let keep_box = values.get("grains.keep_box").and_then(|value| value.numbers());
-        Params {
-            radius,
-            compression: number("compression").unwrap_or(usual.compression),
-            friction,
-            attraction: number("attraction").or_else(of_wall).unwrap_or(usual.attraction),
-            restitution: number("restitution").unwrap_or(usual.restitution),
-            air: number("air").unwrap_or(usual.air),
-            gravity: number("gravity").unwrap_or(usual.gravity),
-            rests: values.get("grains.rest").and_then(|value| value.flag()).unwrap_or(usual.rests),
-            lifetime: number("lifetime"),
-            keep_box: keep_box.map(|[a, b, c, d, e, f]| [DVec3::new(a, b, c), DVec3::new(d, e, f)]),
-            sub_steps: whole("substeps").map(|count| count as u32),
-            most: whole("max").map_or(usual.most, |most| most as usize),
-            seed: whole("seed").unwrap_or(0) as u64,
-        }
-    }
-
     /// The grains before the first frame: those of a file, or none.
     fn initial(&self) -> Result<grains::Grains> {
-        let mut grains = grains::Grains::new(self.params())?;
+        let mut grains = grains::Grains::new(params(self.scene, self.inputs.snow.cell))?;
         if let Some(drift) = &self.inputs.drift {
             let added = grains.emit(&drift.places, &drift.velocities, self.scene.shot.frames.first);
             added.map_err(|error| {
@@ -101,6 +85,12 @@ impl<'a> Grains<'a> {
             })?;
         }
         Ok(grains)
+    }
+
+    /// Whether the files of a frame hold changes only.
+    fn is_delta(&self, frame: i32) -> bool {
+        let passed = i64::from(frame) - i64::from(self.scene.shot.frames.first);
+        self.scene.output.grains_delta && passed % i64::from(WHOLE_EVERY) != 0
     }
 
     /// The layer after a frame; from the one before it, where that is at hand and the frame keeps its changes.
@@ -143,6 +133,34 @@ impl<'a> Grains<'a> {
             Error::Argument(what) => Error::file(&self.scene.path, format!("grains: {what}")),
             other => other,
         })
+    }
+}
+
+/// How the grains of a scene with cells of this size (m) behave.
+pub(super) fn params(scene: &Scene, cell: f64) -> Params {
+    let values = &scene.values;
+    let number = |name: &str| values.number(&format!("grains.{name}"));
+    let whole = |name: &str| values.get(&format!("grains.{name}")).and_then(|value| value.whole());
+    let usual = Params::for_cell(cell);
+    let of_repose = || number("repose_angle_deg").map(grain_friction::of_repose);
+    let radius = number("radius").unwrap_or(usual.radius);
+    let friction = number("friction").or_else(of_repose).unwrap_or(usual.friction);
+    let of_wall = || number("stands").map(|height| grain_cohesion::of_wall(height, 2.0 * radius, friction));
+    let keep_box = values.get("grains.keep_box").and_then(|value| value.numbers());
+    Params {
+        radius,
+        compression: number("compression").unwrap_or(usual.compression),
+        friction,
+        attraction: number("attraction").or_else(of_wall).unwrap_or(usual.attraction),
+        restitution: number("restitution").unwrap_or(usual.restitution),
+        air: number("air").unwrap_or(usual.air),
+        gravity: number("gravity").unwrap_or(usual.gravity),
+        rests: values.get("grains.rest").and_then(|value| value.flag()).unwrap_or(usual.rests),
+        lifetime: number("lifetime"),
+        keep_box: keep_box.map(|[a, b, c, d, e, f]| [DVec3::new(a, b, c), DVec3::new(d, e, f)]),
+        sub_steps: whole("substeps").map(|count| count as u32),
+        most: whole("max").map_or(usual.most, |most| most as usize),
+        seed: whole("seed").unwrap_or(0) as u64,
     }
 }
 
@@ -204,12 +222,42 @@ impl Stage for Grains<'_> {
     fn keeps(&self, _frame: i32) -> Keeps {
         Keeps::State
     }
+
+    fn loose_files(&self) -> &'static [&'static str] {
+        if self.scene.output.grains_usd { &[MANIFEST] } else { &[] }
+    }
+
+    fn clip(&self) -> Option<Clip<'_>> {
+        let grains = grains::Grains::new(params(self.scene, self.inputs.snow.cell)).ok()?;
+        Some(Clip { kind: "grains", manifest: MANIFEST, prims: Prims::Points(told_apart(grains.points())) })
+    }
+
+    fn needs_every_frame(&self) -> Option<&'static str> {
+        self.scene.output.grains_delta.then_some("grains_mode = \"delta\"")
+    }
 }
 
 impl Stepping for Grains<'_> {
     type State = State;
     type Step = Step;
-    type Writer = Context;
+    type Writer = Writer;
+
+    fn foresee(&self, ctx: &Context, upstream: &[&Stored], last: i32) -> Result<()> {
+        let [base] = upstream else { return Err(Error::Internal("grains read one stage".into())) };
+        let Some(forecast) = Forecast::of(self.scene, self.inputs, base, last)? else { return Ok(()) };
+        log::info!(
+            "grains: {}, {:.1} MB of memory, {:.1} MB of files",
+            forecast.count(),
+            forecast.memory_bytes as f64 / 1e6,
+            forecast.disk_bytes as f64 / 1e6
+        );
+        match forecast.check(self.scene, ctx.memory_limit()) {
+            // There may be fewer.
+            Err(error) if forecast.at_most => log::warn!("{error}"),
+            other => return other,
+        }
+        Ok(())
+    }
 
     fn load(&self, _ctx: &Context, done: &Stored, after: Option<i32>) -> Result<State> {
         let grains = match after {
@@ -217,7 +265,7 @@ impl Stepping for Grains<'_> {
             Some(frame) => {
                 let path = done.state_file(frame)?;
                 let bytes = std::fs::read(&path).map_err(|error| Error::io(&path, "read", error))?;
-                grains::Grains::resume(self.params(), &bytes)
+                grains::Grains::resume(params(self.scene, self.inputs.snow.cell), &bytes)
                     .map_err(|error| Error::file(path, error.to_string()))
             }
         };
@@ -244,30 +292,38 @@ impl Stepping for Grains<'_> {
             Some(before) => told(&self.move_grains(ctx, state, [before, &after], frame)?),
         };
         state.layer = Some((frame, after));
-        Ok(Stepped { step: Step(to.made_from.map(|_| state.grains.clone())), report })
+        let is_wanted = to.made_from.is_some() || self.scene.output.grains_delta;
+        Ok(Stepped { step: Step(is_wanted.then(|| state.grains.clone())), report })
     }
 
-    fn writer(&self, ctx: &Context, _state: &State) -> Result<Context> {
-        Ok(Context::new(ctx.pool().clone()))
+    fn writer(&self, ctx: &Context, state: &State) -> Result<Writer> {
+        let before = self.scene.output.grains_delta.then(|| ordered(state.grains.points()));
+        Ok(Writer { ctx: Context::new(ctx.pool().clone()), before })
     }
 
-    fn write(&self, ctx: &mut Context, step: Step, files: Option<&mut FrameFiles>) -> Result<()> {
-        let (Some(grains), Some(files)) = (step.0, files) else { return Ok(()) };
-        let output = self.scene.output;
-        let points = grains.points();
-        if output.grains_vdb {
-            let metadata = base::metadata(self.scene, files.frame, files.made_from);
-            let options = WriteOptions { metadata, ..WriteOptions::default() };
-            files.save("grains", "vdb", &points::to_bytes(ctx, "grains", &points, &options)?)?;
+    fn write(&self, writer: &mut Writer, step: Step, files: Option<&mut FrameFiles>) -> Result<()> {
+        let Some(grains) = step.0 else { return Ok(()) };
+        let points = ordered(grains.points());
+        if let Some(files) = files {
+            let output = self.scene.output;
+            if output.grains_vdb {
+                let before = writer.before.as_ref().filter(|_| self.is_delta(files.frame));
+                grain_files::write(&writer.ctx, self.scene, files, &points, before)?;
+            }
+            if output.grains_ply {
+                files.save("grains", "ply", &points_ply::to_bytes(&points)?)?;
+            }
+            if output.grains_usd {
+                let points = told_apart(points.clone());
+                let text = usd_points::frame("grains", files.frame, self.scene.shot.fps, &points);
+                files.save("grains", "usda", text.as_bytes())?;
+            }
+            files.save_state(&grains.save())?;
         }
-        if output.grains_ply {
-            files.save("grains", "ply", &points_ply::to_bytes(&points)?)?;
+        if writer.before.is_some() {
+            writer.before = Some(points);
         }
-        if output.grains_usd {
-            let text = usd_points::frame("grains", files.frame, self.scene.shot.fps, &points);
-            files.save("grains", "usda", text.as_bytes())?;
-        }
-        files.save_state(&grains.save())
+        Ok(())
     }
 }
 

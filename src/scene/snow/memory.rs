@@ -1,24 +1,55 @@
 //! How much memory a scene will need, before any of it is taken.
 
-use super::Inputs;
+use super::{Inputs, has_grains};
 use crate::error::{Error, Result};
 use crate::scene::{BaseMode, Layer, Scene};
+use crate::snow;
 use crate::vdb::file;
 
 /// Bytes for each column of cells: two surfaces, each across two leaves, and what making them takes.
 const BYTES_PER_COLUMN: f64 = 260.0;
 /// Bytes for each triangle that moves: its poses, and what it sweeps in a frame.
 const BYTES_PER_TRIANGLE: f64 = 2000.0;
+/// Bytes for each grain besides those of a step: a copy of the grains that is written while the next frame is made, their
+/// points and files.
+const BYTES_PER_WRITTEN: u64 = 400;
 /// Bytes that every run takes.
 const FIXED: f64 = 64e6;
 
-/// Estimates a scene's memory (bytes).
+/// Estimates a scene's memory (bytes), without grains that come from the snow: how many those are is known when the base is
+/// there, see [`Forecast`](super::forecast::Forecast).
 ///
 /// # Errors
 /// When the layer's file cannot be read.
 pub fn estimate(scene: &Scene, inputs: &Inputs) -> Result<u64> {
+    // Whole frames are written from a copy while the next one is made.
+    let output = scene.output;
+    let copies = if output.base_restarts() && output.base_mode == BaseMode::Delta { 1.0 } else { 2.0 };
+    let base = layer(inputs)? * copies + around(inputs);
+    let drift = inputs.drift.as_ref().map_or(0, |drift| drift.places.len() as u64);
+    Ok(if has_grains(&scene.values) { of_grains(inputs, drift)?.max(base as u64) } else { base as u64 })
+}
+
+/// Estimates the memory (bytes) of the stage grains, with so many of them: it has the base before and after a frame, and
+/// hands copies of the grains to what writes them.
+///
+/// # Errors
+/// As [`estimate`].
+pub(super) fn of_grains(inputs: &Inputs, grains: u64) -> Result<u64> {
+    Ok((2.0 * layer(inputs)? + around(inputs)) as u64
+        + snow::grains::memory(grains as usize)
+        + grains * BYTES_PER_WRITTEN)
+}
+
+/// Bytes of what a run takes besides its layers.
+fn around(inputs: &Inputs) -> f64 {
     let triangles: usize = inputs.bodies.iter().map(|body| body.motion().triangles().len()).sum();
-    let layer = match (&inputs.snow.layer, inputs.area()) {
+    triangles as f64 * BYTES_PER_TRIANGLE + FIXED
+}
+
+/// Bytes of a layer.
+fn layer(inputs: &Inputs) -> Result<f64> {
+    Ok(match (&inputs.snow.layer, inputs.area()) {
         (Layer::Grid(path), _) => {
             1.5 * file::describe(path)?.iter().filter_map(|grid| grid.memory).sum::<u64>() as f64
         }
@@ -27,11 +58,7 @@ pub fn estimate(scene: &Scene, inputs: &Inputs) -> Result<u64> {
             columns * BYTES_PER_COLUMN
         }
         (_, None) => 0.0,
-    };
-    // Whole frames are written from a copy while the next one is made.
-    let output = scene.output;
-    let copies = if output.base_restarts() && output.base_mode == BaseMode::Delta { 1.0 } else { 2.0 };
-    Ok((layer * copies + triangles as f64 * BYTES_PER_TRIANGLE + FIXED) as u64)
+    })
 }
 
 /// Refuses a scene that would need more than it may.

@@ -9,7 +9,12 @@ pub mod check;
 mod course;
 #[cfg(feature = "vdb")]
 mod disk;
+#[cfg(feature = "vdb")]
 mod drift;
+#[cfg(feature = "vdb")]
+mod forecast;
+#[cfg(feature = "vdb")]
+mod grain_files;
 mod grain_keys;
 #[cfg(feature = "vdb")]
 mod grains;
@@ -33,6 +38,8 @@ pub(super) use grain_keys::{GRAIN_KEYS, check_grains, has_grains};
 pub(super) use keys::KEYS;
 #[cfg(feature = "vdb")]
 pub use {
+    forecast::Forecast,
+    grain_files::{RebuildGrains, changes_since, partial},
     inputs::Inputs,
     memory::{check as check_memory, estimate},
     plan::plan,

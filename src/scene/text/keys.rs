@@ -118,6 +118,14 @@ const OUTPUT: &[Key] = &[
     .concerns(&[("grains", Output)]),
     Key::new(
         "output",
+        "grains_mode",
+        Kind::Choice(&["full", "delta"]),
+        "full, or delta: .vdb files of the first and every 24th frame whole, then what changed (`frazil vdb rebuild`)",
+    )
+    .or("\"full\"")
+    .concerns(&[("grains", Output)]),
+    Key::new(
+        "output",
         "objects",
         Kind::Choices(&["usd", "ply"]),
         "\"usd\", \"ply\": objects/, as they moved, with velocities",

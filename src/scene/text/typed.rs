@@ -62,6 +62,7 @@ impl Output {
             grains_vdb: holds("output.grains", "vdb"),
             grains_ply: holds("output.grains", "ply"),
             grains_usd: holds("output.grains", "usd"),
+            grains_delta: values.get("output.grains_mode").and_then(Value::text) == Some("delta"),
             objects_usd: holds("output.objects", "usd"),
             objects_ply: holds("output.objects", "ply"),
             usd: flag("output.usd"),
@@ -78,6 +79,11 @@ impl Output {
             let key = if output.half { "half" } else { "base" };
             return Err(
                 table.error(key, "leaves out what `[grains]` reads of every frame: exact values of the base")
+            );
+        }
+        if snow::has_grains(values) && output.grains_delta && !output.grains_vdb {
+            return Err(
+                table.error("grains_mode", "= \"delta\" is for .vdb files: `grains` must hold \"vdb\"")
             );
         }
         if output.half && output.base && output.base_mode == BaseMode::Delta {

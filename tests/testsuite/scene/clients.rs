@@ -7,8 +7,8 @@ use crate::common::clients;
 use crate::common::shapes;
 use tempfile::TempDir;
 
-/// A shot of a box that crosses the snow, frames 3 to 8.
-fn shot() -> TempDir {
+/// A shot of a box that crosses the snow, frames 3 to 8; on request with grains.
+fn shot(grains: bool) -> TempDir {
     let folder = tempfile::tempdir().unwrap();
     let mesh = shapes::cuboid([0.4; 3]);
     // Seams at every edge.
@@ -19,6 +19,8 @@ fn shot() -> TempDir {
     let scene = "[shot]\nframes = \"3-8\"\n[snow]\nground = 0.0\narea = [-1, -1, 1, 1]\ndepth = 0.3\ncell = 0.02\n\
                  [output]\nobjects = [\"usd\"]\n[[object]]\nfile = \"box.obj\"\n\
                  keys = [{ frame = 3, at = [0, 0.4, -0.5] }, { frame = 8, at = [0, 0.25, 0.6], turn_deg = [0, 20, 0] }]\n";
+    let with_grains = ("[output]", "[grains]\ncompression = 0.5\n[output]\ngrains = [\"usd\"]");
+    let scene = if grains { scene.replace(with_grains.0, with_grains.1) } else { scene.to_string() };
     fs::write(folder.path().join("shot.toml"), scene).unwrap();
     let run = Command::new(env!("CARGO_BIN_EXE_frazil"))
         .current_dir(folder.path())
@@ -31,14 +33,22 @@ fn shot() -> TempDir {
 #[test]
 fn blender_imports_the_sequence_as_one_volume_and_renders_it() {
     let Some(blender) = clients::blender() else { return eprintln!("skipped: no blender") };
-    let folder = shot();
+    let folder = shot(false);
     clients::blender_opens(&blender, &folder.path().join("out"), 3, 8).unwrap();
 }
 
 #[test]
 fn usd_core_composes_the_stage_with_velocities_and_files() {
     let Some(python) = clients::usd_python() else { return eprintln!("skipped: no usd-core") };
-    let folder = shot();
+    let folder = shot(false);
     let said = clients::usd_composes(&python, &folder.path().join("out"), 3, 8).unwrap();
     assert!(said.contains("3 with UVs"), "{said}");
+}
+
+#[test]
+fn usd_core_composes_the_grains() {
+    let Some(python) = clients::usd_python() else { return eprintln!("skipped: no usd-core") };
+    let folder = shot(true);
+    let said = clients::usd_composes(&python, &folder.path().join("out"), 3, 8).unwrap();
+    assert!(said.contains(" grains") && !said.contains(" 0 grains"), "{said}");
 }

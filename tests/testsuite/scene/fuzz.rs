@@ -166,7 +166,7 @@ fn ten_thousand_changed_scenes_are_read_or_refused() {
             }
             let Ok(inputs) = Inputs::load(&scene) else { return };
             let _ = check_memory(&scene, &inputs, 1 << 28);
-            checked += usize::from(check::check(&ctx, &scene, &inputs).is_ok());
+            checked += usize::from(check::check(&ctx, &scene, &inputs, None).is_ok());
         });
     }
     assert!(read > ROUNDS / 50 && checked > ROUNDS / 100, "{read} read, {checked} checked");

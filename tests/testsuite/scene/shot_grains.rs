@@ -10,7 +10,7 @@ use crate::program::{CUBE, command, fails, works};
 use tempfile::TempDir;
 
 /// A folder with a cube that slides through snow; `grains` and `output` stand in the scene's tables.
-fn folder(grains: &str, output: &str) -> TempDir {
+pub fn folder(grains: &str, output: &str) -> TempDir {
     let folder = tempfile::tempdir().unwrap();
     fs::write(folder.path().join("cube.obj"), CUBE).unwrap();
     let scene = format!(
@@ -22,14 +22,16 @@ fn folder(grains: &str, output: &str) -> TempDir {
     folder
 }
 
-fn grains(folder: &Path, out: &str) -> Vec<(String, Vec<u8>)> {
+/// The files of grains.
+pub fn grains(folder: &Path, out: &str) -> Vec<(String, Vec<u8>)> {
     let files = output(&folder.join(out)).into_iter();
     files.filter(|(name, _)| name.starts_with("grains/")).collect()
 }
 
 #[test]
 fn a_killed_run_resumes_to_the_same_grains() {
-    for written in ["", "base_mode = \"delta\"\ngrains = [\"vdb\", \"ply\", \"usd\"]"] {
+    let all = "base_mode = \"delta\"\ngrains = [\"vdb\", \"ply\", \"usd\"]";
+    for (written, files) in [("", 10), (all, 31), ("grains_mode = \"delta\"", 10)] {
         let folder = folder("compression = 0.4", written);
         let at = folder.path();
         works(at, "snow shot.toml -o once -q");
@@ -45,7 +47,7 @@ fn a_killed_run_resumes_to_the_same_grains() {
         works(at, "snow shot.toml -o killed -q --threads 1");
         let [once, killed] = ["once", "killed"].map(|out| grains(at, out));
         assert!(once == killed, "{written}");
-        assert_eq!(once.len(), if written.is_empty() { 10 } else { 30 });
+        assert_eq!(once.len(), files);
         let info = works(at, "info once/grains/grains.0010.vdb");
         assert!(info.contains("source_frame") && info.contains("pscale"), "{info}");
         assert!(works(at, "snow shot.toml -o once").contains("there"), "nothing is made again");
@@ -113,9 +115,77 @@ fn what_grains_cannot_be_made_from_is_said_first() {
 }
 
 #[test]
-fn more_grains_than_max_end_the_run_with_the_frame() {
+fn more_grains_than_max_are_refused_before_their_first_frame() {
     let folder = folder("max = 50\ncompression = 0.0", "");
+    let at = folder.path();
+    // With the base made by the same run, and by an earlier one.
+    for _ in 0..2 {
+        fails(at, "snow shot.toml -o out -q", 2, &["shot.toml", "grains.max = 50", "grains.radius"]);
+        assert!(at.join("out/base/base.0010.vdb").exists() && grains(at, "out").is_empty());
+    }
+    fails(at, "snow shot.toml -o out -q --stage grains", 2, &["grains.max = 50"]);
+    let said = works(at, "check shot.toml -o out");
+    assert!(said.contains("warning   ") && said.contains("more than grains.max = 50"), "{said}");
+    // The frames up to the last one that is asked for count. No frame was made, so that other settings are welcome.
+    let some = "snow shot.toml -o out -q --stage grains --frames 1-2 --set grains.max=2000";
+    works(at, some);
+    fails(at, &some.replace("1-2", "3-10"), 2, &["grains.max = 2000"]);
+}
+
+#[test]
+fn where_a_box_takes_grains_away_too_many_end_the_run_with_the_frame() {
+    let folder = folder("max = 50\ncompression = 0.0\nkeep_box = [-9, -9, -9, 9, 9, 9]", "");
     fails(folder.path(), "snow shot.toml -o out -q", 1, &["max = 50", "frame"]);
+    let said = works(folder.path(), "check shot.toml -o out");
+    assert!(said.contains("at most about"), "{said}");
+}
+
+#[test]
+fn a_check_says_how_many_grains_the_base_gives() {
+    let folder = folder("compression = 0.4", "");
+    let at = folder.path();
+    let report = |arguments: &str| -> serde_json::Value {
+        serde_json::from_str(&works(at, &format!("check shot.toml --json {arguments}"))).unwrap()
+    };
+    let before = report("-o cache");
+    assert_eq!(before["grains"], serde_json::Value::Null);
+    assert!(works(at, "check shot.toml").contains("when the base is there"));
+    works(at, "snow shot.toml -o cache -q --stage base --frames 1-4");
+    assert_eq!(report("-o cache")["grains"]["to_frame"], 4);
+    assert!(works(at, "check shot.toml -o cache").contains("up to frame 4 of 10"));
+    works(at, "snow shot.toml -o cache -q --stage base");
+    let after = report("-o cache");
+    let number = |value: &serde_json::Value| value.as_f64().unwrap();
+    // Memory and space count them.
+    for key in ["memory_bytes", "disk_bytes"] {
+        assert!(number(&after[key]) > number(&before[key]), "{key}");
+    }
+    // The run refuses what is more than the limit before it writes a grain.
+    let limit = (number(&before["memory_bytes"]) + number(&after["memory_bytes"])) / 2.0;
+    let run = format!("snow shot.toml -o cache --stage grains --max-memory {}", limit.round());
+    fails(at, &run, 2, &["stage grains", "needs about"]);
+    assert!(grains(at, "cache").is_empty());
+    let said = works(at, "snow shot.toml -o cache --stage grains -v");
+    let count = number(&after["grains"]["grains"]);
+    assert!(said.contains(&format!("grains: about {count} grains at once, ")), "{said}");
+    let made: serde_json::Value =
+        serde_json::from_slice(&fs::read(at.join("cache/report/grains.0010.json")).unwrap()).unwrap();
+    assert!((number(&made["grains"]) + number(&made["owed"]) - count).abs() < 2.0, "{made} {count}");
+    let disk = |set: &str| number(&report(&format!("-o cache --set output.{set}"))["disk_bytes"]);
+    assert!(
+        disk("grains_mode=delta") < disk("grains=[\"vdb\"]")
+            && disk("grains=[\"vdb\"]") < disk("grains=[\"vdb\",\"usd\"]")
+    );
+    // Fewer where they live for three frames, and where an object presses all of its snow together.
+    let few = report("-o cache --set grains.lifetime=0.125");
+    assert!(number(&few["grains"]["grains"]) < 0.5 * count, "{few}");
+    let none = report("-o cache --set object.1.compression=1.0");
+    assert_eq!(none["grains"]["grains"], 0);
+    // A report that was changed is no ground to count on.
+    let path = at.join("cache/report/base.0003.json");
+    let text = fs::read_to_string(&path).unwrap();
+    fs::write(&path, text.replacen("\"removed_m3\": 0", "\"removed_m3\": 1", 1)).unwrap();
+    fails(at, "check shot.toml -o cache", 2, &["base.0003.json"]);
 }
 
 #[test]

@@ -1,0 +1,119 @@
+//! How many grains a base gives and what they take, known from its reports before the first of them is made.
+
+use serde::Serialize;
+
+use super::grains::params;
+use super::{Inputs, disk, memory};
+use crate::error::{Error, Result};
+use crate::scene::Scene;
+use crate::scene::shot::Stored;
+use crate::snow::grains::PACKING;
+
+/// What a base gives.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Forecast {
+    /// The last frame of the base that is counted.
+    pub to_frame: i32,
+    /// Snow that the frames after the first remove (m3).
+    pub removed_m3: f64,
+    /// Share of it that becomes no grains: the least of all objects that take snow.
+    pub compression: f64,
+    /// Grains, as many as there are at once.
+    pub grains: u64,
+    /// Whether there may be fewer: objects have other values of `compression`, or a `keep_box` takes grains away.
+    pub at_most: bool,
+    /// Memory of the stage (bytes).
+    pub memory_bytes: u64,
+    /// Space of its files and states (bytes).
+    pub disk_bytes: u64,
+}
+
+impl Forecast {
+    /// What the frames of a base up to a last one give; none where its first frames, or their reports, are not there. Frames
+    /// that are not there end it.
+    ///
+    /// # Errors
+    /// A report that is damaged; a layer's file that cannot be read.
+    pub fn of(scene: &Scene, inputs: &Inputs, base: &Stored, last: i32) -> Result<Option<Self>> {
+        let first = scene.shot.frames.first;
+        let mut removed = Vec::new();
+        for frame in first..=last {
+            let report = if base.is_done(frame) { base.report(frame)? } else { None };
+            let Some(volume) = report.as_ref().and_then(|report| report.get("removed_m3")?.as_f64()) else {
+                break;
+            };
+            // What the first poses cut out was gone before the shot began.
+            removed.push(if frame == first { 0.0 } else { volume });
+        }
+        if removed.is_empty() {
+            return Ok(None);
+        }
+        let params = params(scene, inputs.snow.cell);
+        let takers = scene.objects.iter().enumerate().filter(|(_, object)| object.role.removes());
+        let own = |index| scene.values.of_object(index, "compression").and_then(|value| value.number());
+        let all: Vec<f64> = takers.map(|(index, _)| own(index).unwrap_or(params.compression)).collect();
+        let compression = all.iter().copied().reduce(f64::min).unwrap_or(params.compression);
+        let grain = std::f64::consts::PI / 6.0 * (2.0 * params.radius).powi(3);
+        let of_snow = |volume: f64| volume * (1.0 - compression) * PACKING / grain;
+        let mut born: Vec<f64> = removed.iter().map(|volume| of_snow(*volume)).collect();
+        born[0] += inputs.drift.as_ref().map_or(0.0, |drift| drift.places.len() as f64);
+        let frames = params.lifetime.map(|lifetime| (lifetime * scene.shot.fps).ceil() as usize);
+        let there = alive(&born, frames.unwrap_or(usize::MAX));
+        let grains = there.iter().copied().fold(0.0, f64::max).round() as u64;
+        Ok(Some(Self {
+            to_frame: first + (removed.len() - 1) as i32,
+            removed_m3: removed.iter().sum(),
+            compression,
+            grains,
+            at_most: all.iter().any(|other| *other != compression) || params.keep_box.is_some(),
+            memory_bytes: memory::of_grains(inputs, grains)?,
+            disk_bytes: disk::of_grains(scene, &there),
+        }))
+    }
+
+    /// What is wrong with so many grains; where there may be fewer, that is only likely.
+    ///
+    /// # Errors
+    /// More than `grains.max`; more memory than the limit (bytes).
+    pub fn check(&self, scene: &Scene, limit: u64) -> Result<()> {
+        let Self { grains, to_frame, .. } = self;
+        let most = scene.values.get("grains.max").and_then(|value| value.whole()).unwrap_or(i64::MAX);
+        if *grains > most as u64 {
+            return Err(Error::argument(format!(
+                "{}: the base up to frame {to_frame} makes {}, more than grains.max = {most}: larger grains \
+                 (grains.radius) or more grains.compression make fewer",
+                scene.path.display(),
+                self.count()
+            )));
+        }
+        if self.memory_bytes > limit {
+            let what = format!("{}: stage grains with {}", scene.path.display(), self.count());
+            return Err(Error::Memory { what, needed: self.memory_bytes, limit });
+        }
+        Ok(())
+    }
+
+    /// "about 30261 grains at once".
+    pub fn count(&self) -> String {
+        format!("{} {} grains at once", if self.at_most { "at most about" } else { "about" }, self.grains)
+    }
+}
+
+/// How many there are after each frame, of those born in each, which live for so many frames.
+fn alive(born: &[f64], frames: usize) -> Vec<f64> {
+    let from = |frame: usize| (frame + 1).saturating_sub(frames);
+    (0..born.len()).map(|frame| born[from(frame)..=frame].iter().sum()).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn grains_are_there_for_their_lifetime() {
+        let born = [1.0, 10.0, 100.0, 0.0];
+        assert_eq!(alive(&born, usize::MAX), [1.0, 11.0, 111.0, 111.0]);
+        assert_eq!(alive(&born, 2), [1.0, 11.0, 110.0, 100.0]);
+        assert_eq!(alive(&born, 1), born);
+    }
+}

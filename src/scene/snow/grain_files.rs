@@ -1,0 +1,395 @@
+//! Files of grains: all of them, or what a frame changed (`grains_mode = "delta"`).
+//!
+//! Points are brought into the order of their identities before they are written, so that whole files made from changes are
+//! those that `"full"` writes. A file of changes holds the grains that were born or are not as they were, and names those that
+//! are gone. What a grain has from its birth is 0 there unless it was just born. A grain that the file does not hold is not
+//! trapped: states from which runs resume do not know which were.
+
+use std::path::Path;
+
+use super::base;
+use crate::base::points::{Column, Points, Values};
+use crate::context::Context;
+use crate::error::{Error, Result};
+use crate::io::mesh::extension;
+use crate::scene::Scene;
+use crate::scene::shot::{FrameFiles, Stored};
+use crate::vdb::file::{self, WriteOptions};
+use crate::vdb::{MetaValue, points};
+
+/// Of so many frames one is whole.
+pub(super) const WHOLE_EVERY: i32 = 24;
+/// Metadata of a file of changes: the frame before.
+const SINCE: &str = "frazil:changes_since";
+/// Metadata of a file of changes: the identities that are gone since.
+const GONE: &str = "frazil:gone";
+/// Most identities that a file may name.
+const MOST: i64 = 1 << 32;
+
+/// The frame since which a .vdb file holds changes; none where it is whole.
+///
+/// # Errors
+/// A file that cannot be read.
+pub fn changes_since(path: &Path) -> Result<Option<i32>> {
+    Ok(since(&file::metadata(path)?))
+}
+
+/// What to say of a file that holds changes since a frame.
+pub fn partial(since: i32) -> String {
+    format!(
+        "holds only the grains that changed since frame {since}: `frazil vdb rebuild DIR --stage grains` makes it whole"
+    )
+}
+
+fn since(metadata: &[(String, MetaValue)]) -> Option<i32> {
+    metadata.iter().find_map(|(key, value)| match value {
+        MetaValue::Int(frame) if key == SINCE => Some(*frame as i32),
+        _ => None,
+    })
+}
+
+/// Points in the order of their identities.
+pub(super) fn ordered(mut points: Points) -> Points {
+    let ids = ids(&points);
+    if !ids.is_sorted() {
+        let mut order: Vec<u32> = (0..ids.len() as u32).collect();
+        order.sort_unstable_by_key(|point| ids[*point as usize]);
+        points.reorder(&order);
+    }
+    let all_free =
+        |values: &Values| matches!(values, Values::Bool(column) if !column.stored().contains(&true));
+    if points.attribute(TRAPPED).is_some_and(all_free) {
+        points.set(TRAPPED, FREE);
+    }
+    points
+}
+
+/// Points whose attributes take one value a point in every frame or in none, as the clips of a stage in USD must.
+pub(super) fn told_apart(mut points: Points) -> Points {
+    if points.attribute(TRAPPED) == Some(&FREE) {
+        points.set(TRAPPED, Values::Bool(Column::Each(vec![false; points.count()])));
+    }
+    points
+}
+
+/// The attribute of grains that have no room, and its value where none is.
+const TRAPPED: &str = "trapped";
+const FREE: Values = Values::Bool(Column::Uniform(false));
+
+fn ids(points: &Points) -> Vec<i64> {
+    match points.attribute("id") {
+        Some(Values::Long(column)) => (0..points.count()).map(|point| column.get(point)).collect(),
+        _ => Vec::new(),
+    }
+}
+
+/// Writes a frame's .vdb file: all points, or what changed since others; both in the order of [`ordered`].
+pub(super) fn write(
+    ctx: &Context,
+    scene: &Scene,
+    files: &mut FrameFiles,
+    points: &Points,
+    before: Option<&Points>,
+) -> Result<()> {
+    let mut metadata = base::metadata(scene, files.frame, files.made_from);
+    let bytes = |points: &Points, metadata| {
+        points::to_bytes(ctx, NAME, points, &WriteOptions { metadata, ..WriteOptions::default() })
+    };
+    let bytes = match before {
+        None => bytes(points, metadata)?,
+        Some(before) => {
+            let (changed, gone) = changes(before, points);
+            metadata.push((SINCE.into(), MetaValue::Int(i64::from(files.frame) - 1)));
+            metadata.push((GONE.into(), MetaValue::Text(listed(&gone))));
+            bytes(&changed, metadata)?
+        }
+    };
+    files.save(NAME, "vdb", &bytes)
+}
+
+/// Name of the grid, of its folder and of the files in it.
+const NAME: &str = "grains";
+
+/// The points that are new or not as they were, and the identities that are gone.
+fn changes(before: &Points, after: &Points) -> (Points, Vec<i64>) {
+    let (old, new) = (ids(before), ids(after));
+    let (mut picked, mut were, mut gone) = (Vec::new(), Vec::new(), Vec::new());
+    let mut at = 0;
+    for (point, id) in new.iter().enumerate() {
+        while at < old.len() && old[at] < *id {
+            gone.push(old[at]);
+            at += 1;
+        }
+        let was = (at < old.len() && old[at] == *id).then_some(at);
+        at += usize::from(was.is_some());
+        if was.is_none_or(|was| !is_same(before, was, after, point)) {
+            picked.push(point as u32);
+            were.push(was);
+        }
+    }
+    gone.extend(&old[at..]);
+    let mut changed = after.clone();
+    changed.reorder(&picked);
+    of_birth(&mut changed, None, &were);
+    (changed, gone)
+}
+
+/// Gives points that were there before, each at an index, what they have from their birth: as it was, or 0 that takes no room.
+fn of_birth(points: &mut Points, before: Option<&Points>, were: &[Option<usize>]) {
+    fn taken<T: Copy + Default>(
+        own: &Column<T>,
+        before: Option<&Column<T>>,
+        were: &[Option<usize>],
+    ) -> Column<T> {
+        let old = |was: usize| before.map_or(T::default(), |before| before.get(was));
+        Column::Each(
+            were.iter().enumerate().map(|(point, was)| was.map_or_else(|| own.get(point), old)).collect(),
+        )
+    }
+    for name in ["source_frame", "rest"] {
+        let values = match (points.attribute(name), before.and_then(|before| before.attribute(name))) {
+            (Some(Values::Int(own)), Some(Values::Int(before))) => {
+                Values::Int(taken(own, Some(before), were))
+            }
+            (Some(Values::Int(own)), _) => Values::Int(taken(own, None, were)),
+            (Some(Values::Vector(own)), Some(Values::Vector(before))) => {
+                Values::Vector(taken(own, Some(before), were))
+            }
+            (Some(Values::Vector(own)), _) => Values::Vector(taken(own, None, were)),
+            _ => continue,
+        };
+        points.set(name, values);
+    }
+}
+
+/// Whether a point is as another was, bit by bit, and is not trapped.
+fn is_same(before: &Points, was: usize, after: &Points, point: usize) -> bool {
+    let bits = |vector: [f32; 3]| vector.map(f32::to_bits);
+    before.cells[was] == after.cells[point]
+        && bits(before.offsets[was]) == bits(after.offsets[point])
+        && after.attributes.iter().all(|attribute| {
+            match (before.attribute(&attribute.name), &attribute.values) {
+                (_, Values::Bool(now)) if attribute.name == TRAPPED => !now.get(point),
+                (Some(Values::Float(then)), Values::Float(now)) => {
+                    then.get(was).to_bits() == now.get(point).to_bits()
+                }
+                (Some(Values::Vector(then)), Values::Vector(now)) => {
+                    bits(then.get(was)) == bits(now.get(point))
+                }
+                (Some(Values::Int(then)), Values::Int(now)) => then.get(was) == now.get(point),
+                (Some(Values::Long(then)), Values::Long(now)) => then.get(was) == now.get(point),
+                (Some(Values::Bool(then)), Values::Bool(now)) => then.get(was) == now.get(point),
+                _ => false,
+            }
+        })
+}
+
+/// The points after a frame, from those before it and what it changed.
+///
+/// # Errors
+/// Changes of other points.
+fn follow(mut points: Points, mut changed: Points, gone: &[i64]) -> Result<Points> {
+    let (old, new) = (ids(&points), ids(&changed));
+    let were: Vec<Option<usize>> = new.iter().map(|id| old.binary_search(id).ok()).collect();
+    of_birth(&mut changed, Some(&points), &were);
+    if let Some(id) = gone.iter().find(|id| old.binary_search(id).is_err()) {
+        return Err(Error::argument(format!("names grain {id} as gone, which was not there")));
+    }
+    let is_kept = |point: &u32| {
+        let id = old[*point as usize];
+        gone.binary_search(&id).is_err() && new.binary_search(&id).is_err()
+    };
+    let kept: Vec<u32> = (0..old.len() as u32).filter(is_kept).collect();
+    points.reorder(&kept);
+    if points.count() > 0 {
+        points.set(TRAPPED, FREE);
+    }
+    points.append(changed)?;
+    Ok(ordered(points))
+}
+
+/// The identities that a file names as gone; none where it is whole.
+fn gone(metadata: &[(String, MetaValue)]) -> Result<Option<Vec<i64>>> {
+    if since(metadata).is_none() {
+        return Ok(None);
+    }
+    let text = metadata.iter().find_map(|(key, value)| match value {
+        MetaValue::Text(text) if key == GONE => numbers(text),
+        _ => None,
+    });
+    text.map(Some).ok_or_else(|| Error::argument(format!("has no list of the grains that are gone ({GONE})")))
+}
+
+/// Ascending numbers as ranges: `3-7,12`.
+fn listed(numbers: &[i64]) -> String {
+    let runs = numbers.chunk_by(|a, b| *b == a + 1);
+    let run = |run: &[i64]| match run {
+        [only] => only.to_string(),
+        _ => format!("{}-{}", run[0], run[run.len() - 1]),
+    };
+    runs.map(run).collect::<Vec<_>>().join(",")
+}
+
+/// What [`listed`] listed.
+fn numbers(text: &str) -> Option<Vec<i64>> {
+    let mut out = Vec::new();
+    for run in text.split(',').filter(|run| !run.is_empty()) {
+        let (low, high) = run.split_once('-').unwrap_or((run, run));
+        let (low, high) = (low.parse::<i64>().ok()?, high.parse::<i64>().ok()?);
+        if !(0..MOST).contains(&low)
+            || !(low..MOST).contains(&high)
+            || out.last().is_some_and(|last| low <= *last)
+        {
+            return None;
+        }
+        out.extend(low..=high);
+    }
+    Some(out)
+}
+
+/// The whole grains of a cache, one frame after another.
+pub struct RebuildGrains {
+    stored: Stored,
+    at: Option<(i32, Points)>,
+}
+
+/// Points of a file, with its metadata.
+type Held = (Points, Vec<(String, MetaValue)>);
+
+impl RebuildGrains {
+    /// Opens a cache.
+    ///
+    /// # Errors
+    /// As [`Stored::read`].
+    pub fn open(folder: &Path) -> Result<Self> {
+        Ok(Self { stored: Stored::read(folder, NAME)?, at: None })
+    }
+
+    /// The frames that are there.
+    pub fn stored(&self) -> &Stored {
+        &self.stored
+    }
+
+    /// The bytes of a frame's file, as `grains_mode = "full"` writes them, but for the hash of the settings in its metadata;
+    /// frames in ascending order cost one file each.
+    ///
+    /// # Errors
+    /// A frame that is not there; a file that is not what was written; cancel.
+    pub fn bytes(&mut self, ctx: &Context, frame: i32, options: &WriteOptions) -> Result<Vec<u8>> {
+        let (mut later, mut metadata, mut at) = (Vec::new(), None, frame);
+        let mut points = loop {
+            ctx.check()?;
+            if let Some((_, points)) = self.at.take_if(|(there, _)| *there == at && at < frame) {
+                break points;
+            }
+            let (points, of_file) = self.read(at)?;
+            let gone = gone(&of_file).map_err(|error| self.wrong(at, error))?;
+            metadata.get_or_insert(of_file);
+            match gone {
+                None => break points,
+                Some(gone) => later.push((at, points, gone)),
+            }
+            at -= 1;
+        };
+        for (at, changed, gone) in later.into_iter().rev() {
+            points = follow(points, changed, &gone).map_err(|error| self.wrong(at, error))?;
+        }
+        let mut metadata = metadata.unwrap_or_default();
+        metadata.retain(|(key, _)| key.starts_with("frazil:") && key != SINCE && key != GONE);
+        let bytes = points::to_bytes(ctx, NAME, &points, &WriteOptions { metadata, ..options.clone() });
+        self.at = Some((frame, points));
+        bytes
+    }
+
+    fn wrong(&self, frame: i32, error: Error) -> Error {
+        match error {
+            Error::Argument(what) => {
+                Error::file(self.stored.folder(), format!("frame {frame} of grains {what}"))
+            }
+            other => other,
+        }
+    }
+
+    fn read(&self, frame: i32) -> Result<Held> {
+        let path = self.stored.file(frame, NAME)?;
+        if extension(&path) != "vdb" {
+            return Err(Error::file(
+                self.stored.folder(),
+                format!("frame {frame} has no .vdb file in {NAME}/"),
+            ));
+        }
+        Ok((ordered(points::read_own(&path, None)?), file::metadata(&path)?))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::base::DVec3;
+
+    /// Points with these identities, heights and marks.
+    fn points(all: &[(i64, f32, bool)]) -> Points {
+        let places: Vec<DVec3> = all.iter().map(|(_, y, _)| DVec3::new(0.0, f64::from(*y), 0.0)).collect();
+        let mut out = Points::at(0.5, &places).unwrap();
+        out.set("id", Values::Long(Column::Each(all.iter().map(|(id, _, _)| *id).collect())));
+        out.set(TRAPPED, Values::Bool(Column::Each(all.iter().map(|(_, _, trapped)| *trapped).collect())));
+        out.set("pscale", Values::Float(Column::Uniform(0.25)));
+        out.set(
+            "rest",
+            Values::Vector(Column::Each(all.iter().map(|(id, _, _)| [*id as f32, 0.5, 1.0]).collect())),
+        );
+        out.set(
+            "source_frame",
+            Values::Int(Column::Each(all.iter().map(|(id, _, _)| *id as i32 + 7).collect())),
+        );
+        ordered(out)
+    }
+
+    #[test]
+    fn changes_lead_from_one_frame_to_the_next() {
+        let frames = [
+            points(&[]),
+            points(&[(3, 0.3, false), (0, 0.0, true), (1, -0.0, false)]),
+            // One moved, one was born, one is trapped no more, one became so.
+            points(&[(4, 1.0, false), (3, 0.5, false), (0, 0.0, false), (1, -0.0, true)]),
+            points(&[(4, 1.0, false), (1, -0.0, false)]),
+            points(&[(4, 1.0, false), (1, 0.0, false)]),
+            points(&[]),
+            points(&[(9, 0.0, false)]),
+        ];
+        let sizes = frames.windows(2).map(|pair| {
+            let (changed, gone) = changes(&pair[0], &pair[1]);
+            let sizes = (changed.count(), gone.clone());
+            // What was there before has nothing of its birth.
+            if let Some(Values::Int(frames)) = changed.attribute("source_frame") {
+                let old = ids(&pair[0]);
+                for (point, id) in ids(&changed).into_iter().enumerate() {
+                    assert_eq!(frames.get(point), if old.contains(&id) { 0 } else { id as i32 + 7 });
+                }
+            }
+            let after = follow(pair[0].clone(), changed, &numbers(&listed(&gone)).unwrap()).unwrap();
+            assert_eq!(after.cells, pair[1].cells);
+            assert_eq!(after.offsets, pair[1].offsets);
+            assert!(after.count() == 0 || after.attributes == pair[1].attributes, "{after:?}");
+            sizes
+        });
+        let sizes: Vec<_> = sizes.collect();
+        let none = Vec::new;
+        assert_eq!(
+            sizes,
+            [(3, none()), (3, none()), (0, vec![0, 3]), (1, none()), (0, vec![1, 4]), (1, none())]
+        );
+        assert!(follow(points(&[(1, 0.0, false)]), points(&[]), &[2]).is_err());
+    }
+
+    #[test]
+    fn identities_are_listed_as_ranges() {
+        assert_eq!(listed(&[3, 4, 5, 6, 7, 12]), "3-7,12");
+        for list in [vec![], vec![0], vec![1, 2], vec![0, 2, 3, 9, 100_000]] {
+            assert_eq!(numbers(&listed(&list)), Some(list));
+        }
+        for wrong in ["x", "3-1", "-1", "5,4", "5,5", "1-5000000000000", "1-2-3"] {
+            assert_eq!(numbers(wrong), None, "{wrong}");
+        }
+    }
+}
