@@ -227,20 +227,6 @@ fn walker_frame(out: &Path, frame: i32) -> [usize; 4] {
     let at: Vec<DVec3> = free.iter().map(|index| places[*index]).collect();
     let mut values = Vec::new();
     base.sample_linear(&context(2), &at, &mut values).expect("values");
-    if std::env::var("DBG").is_ok() {
-        let Some(Values::Vector(v)) = points.attribute("v") else { panic!() };
-        let Some(Values::Int(born)) = points.attribute("source_frame") else { panic!() };
-        for (k, value) in values.iter().enumerate().filter(|(_, value)| f64::from(**value) < near) {
-            let d = shell.distance(at[k], 0.15);
-            println!(
-                "base {:.2} r, mesh {:.2?} r, v {:.2?}, born {}",
-                f64::from(*value) / radius,
-                d.map(|d| d / radius),
-                v.get(free[k]),
-                born.get(free[k])
-            );
-        }
-    }
     let in_base = values.iter().filter(|value| f64::from(**value) < near).count();
     [in_object, in_base, places.len() - free.len(), places.len()]
 }
