@@ -5,6 +5,7 @@ use std::time::{Duration, Instant};
 
 use frazil::capi::context::*;
 use frazil::capi::grains::*;
+use frazil::capi::grains_params::*;
 use frazil::capi::grains_points::*;
 use frazil::capi::library::FRZ_ABI_VERSION;
 use frazil::capi::pool::*;

@@ -56,6 +56,9 @@ pub mod snow;
 pub mod base;
 
 #[cfg(feature = "vdb")]
+pub mod grains_params;
+
+#[cfg(feature = "vdb")]
 pub mod grains;
 
 #[cfg(feature = "vdb")]

@@ -15,7 +15,7 @@ const EACH: [f64; 2] = [0.37, 0.0045];
 pub fn of_wall(height: f64, diameter: f64, friction: f64) -> f64 {
     let repose = repose_of(friction).max(GENTLEST);
     let angle = repose.to_radians();
-    let shape = angle.tan() * (std::f64::consts::FRAC_PI_4 + 0.5 * angle).tan();
+    let shape = libm::tan(angle) * libm::tan(std::f64::consts::FRAC_PI_4 + 0.5 * angle);
     let alone = ALONE[0] + ALONE[1] * (32.0 - repose).max(0.0) + ALONE[2] * (repose - 32.0).max(0.0);
     let more = (height / diameter - alone).max(0.0);
     (EACH[0] + EACH[1] * more) * more / shape

@@ -118,9 +118,10 @@ impl Heap {
     /// Wakes the grains whose places (m) something says yes to.
     pub fn wake(&mut self, wakes: impl Fn(DVec3) -> bool + Sync) {
         let diameter = self.diameter;
-        self.rows.par_iter_mut().zip(&self.at).filter(|(row, _)| row.rests()).for_each(|(row, at)| {
+        self.rows.par_iter_mut().zip(&self.at).for_each(|(row, at)| {
             if wakes(world(*at, row.place, diameter)) {
                 rest::wake(row);
+                rest::begin_again(row);
             }
         });
     }

@@ -18,6 +18,7 @@
 //! | rest | a grain that has lain still stops, and holds what lies on it, until something wakes it |
 
 mod claims;
+mod collide;
 mod contacts;
 mod field;
 #[doc(hidden)]

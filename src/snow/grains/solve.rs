@@ -13,31 +13,16 @@
 
 use rayon::prelude::*;
 
+use super::collide::{Eight, FARTHEST, STEEP, TOUCHING, collide};
 use super::contacts::{Batch, SKIN};
 use super::layout::{Block, Layout};
 use super::rest::{self, Rest};
-use super::rows::{Part, Row, SUPPORTED, Shared, V, add, dot, norm, scaled, sub};
+use super::rows::{Part, Row, Shared, V, add, dot, norm, scaled, sub};
 use super::touch::Touch;
 use crate::base::cpu::dispatch;
-use crate::base::lanes::{LaneMask, Lanes};
+use crate::base::lanes::Lanes;
 use crate::context::Context;
 use crate::error::Result;
-
-/// Share of an overlap that a sub-step removes.
-const REMOVED: f32 = 0.8;
-/// Most that a sub-step moves a grain out of an overlap (diameters).
-const FARTHEST: f32 = 0.5;
-/// Gap (diameters) up to which a contact still supports and keeps its impulse.
-const TOUCHING: f32 = 0.02;
-/// Gap (diameters) that grains in contact do not close, and overlap that they may keep: pushed out of every last overlap, a heap
-/// would never come to rest, as each push opens and closes contacts around it.
-const SLACK: f32 = 0.01;
-/// As above.
-const SLOP: f32 = 0.005;
-/// Least distance (diameters) at which two grains have a direction.
-const LEAST: f32 = 1.0e-6;
-/// Least upward part of the direction from a grain to one that it supports.
-const STEEP: f32 = 0.2;
 
 /// What a sub-step needs besides the grains.
 #[derive(Debug, Clone, Copy)]
@@ -327,188 +312,5 @@ fn prefetch(rows: Shared<'_, Row>, batch: Option<&Batch>) {
     if let Some(batch) = batch {
         rows.prefetch(&batch.owners);
         rows.prefetch(&batch.others());
-    }
-}
-
-type V8 = [Lanes; 3];
-
-#[inline(always)]
-fn add8(a: V8, b: V8) -> V8 {
-    [a[0] + b[0], a[1] + b[1], a[2] + b[2]]
-}
-
-#[inline(always)]
-fn sub8(a: V8, b: V8) -> V8 {
-    [a[0] - b[0], a[1] - b[1], a[2] - b[2]]
-}
-
-#[inline(always)]
-fn scaled8(a: V8, s: Lanes) -> V8 {
-    [a[0] * s, a[1] * s, a[2] * s]
-}
-
-#[inline(always)]
-fn dot8(a: V8, b: V8) -> Lanes {
-    a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
-}
-
-/// Eight grains of a batch.
-#[derive(Clone, Copy)]
-struct Eight {
-    place: V8,
-    weight: Lanes,
-    supported: LaneMask,
-    velocity: V8,
-    still: Lanes,
-}
-
-impl Eight {
-    /// # Safety
-    /// As for [`Shared::gather`].
-    #[inline(always)]
-    unsafe fn load(rows: Shared<'_, Row>, slots: &[u32; 8]) -> Self {
-        // SAFETY: the caller's promise.
-        let ([x, y, z, hold], [u, v, w, still]) =
-            unsafe { (rows.gather(slots, Part::Place), rows.gather(slots, Part::Velocity)) };
-        let free = hold.is_less(Lanes::all(SUPPORTED));
-        let weight = free.choose(hold, hold - Lanes::all(SUPPORTED));
-        let supported = Lanes::all(1.5).is_less(hold);
-        Self { place: [x, y, z], weight, supported, velocity: [u, v, w], still }
-    }
-
-    /// Writes the velocities.
-    ///
-    /// # Safety
-    /// As for [`Shared::scatter`].
-    #[inline(always)]
-    unsafe fn store(&self, rows: Shared<'_, Row>, slots: &[u32; 8]) {
-        let [u, v, w] = self.velocity;
-        // SAFETY: the caller's promise.
-        unsafe { rows.scatter(slots, Part::Velocity, &[u, v, w, self.still]) };
-    }
-
-    /// With an impulse.
-    #[inline(always)]
-    fn kicked(self, impulse: V8, weight: Lanes) -> Self {
-        Self { velocity: add8(self.velocity, scaled8(impulse, weight)), ..self }
-    }
-}
-
-/// How eight pairs lie to each other.
-struct Contact {
-    /// From the others to the owners.
-    normal: V8,
-    gap: Lanes,
-    /// Sum of the weights, and its inverse.
-    weights: Lanes,
-    inverse: Lanes,
-}
-
-/// One correction of the velocities and impulses of eight pairs.
-#[inline(always)]
-fn collide(a: Eight, b: Eight, batch: &mut Batch, c: &Coefficients) -> (Eight, Eight, Contact) {
-    let (zero, one) = (Lanes::all(0.0), Lanes::all(1.0));
-    let weights = a.weight + b.weight;
-    // 1 / weights, of 1 and 2.
-    let inverse = Lanes::all(1.5) - Lanes::all(0.5) * weights;
-    let apart = sub8(sub8(a.place, batch.shift()), b.place);
-    let distance = dot8(apart, apart).sqrt();
-    let gap = distance - one;
-    let [x, y, z] = scaled8(apart, one / distance.max(Lanes::all(LEAST)));
-    // Two grains at one place part upward.
-    let is_none = distance.is_less(Lanes::all(LEAST));
-    let normal = [is_none.choose(zero, x), is_none.choose(one, y), is_none.choose(zero, z)];
-    let relative = sub8(a.velocity, b.velocity);
-    let along = dot8(relative, normal);
-    let is_apart = zero.is_less(gap);
-    let closing = zero - gap * Lanes::all(c.diameter / c.dt);
-    let (least, wanted) = if c.attraction > 0.0 {
-        let attracts = gap.is_less(Lanes::all(c.band));
-        let least = attracts.choose(Lanes::all(-c.attraction), zero);
-        (least, attracts.choose(zero, is_apart.choose(closing, zero)))
-    } else {
-        let is_open = Lanes::all(SLACK).is_less(gap);
-        (zero, is_open.choose(closing, zero))
-    };
-    let before = batch.impulse;
-    let before_along = dot8(before, normal);
-    let total = (before_along + (wanted - along) * inverse).max(least);
-    let sliding = sub8(relative, scaled8(normal, along));
-    let across = sub8(sub8(before, scaled8(normal, before_along)), scaled8(sliding, inverse));
-    let most = Lanes::all(c.friction) * (total - least);
-    let square = dot8(across, across);
-    let exceeds = (most * most).is_less(square);
-    let share = exceeds.choose(most / square.sqrt().max(Lanes::all(1.0e-30)), one);
-    let impulse = add8(scaled8(normal, total), scaled8(across, share));
-    let moves = zero.is_less(weights);
-    for (axis, impulse) in impulse.into_iter().enumerate() {
-        batch.impulse[axis] = moves.choose(impulse, before[axis]);
-    }
-    let change = sub8(batch.impulse, before);
-    let (push, back) = (a.weight, zero - b.weight);
-    (a.kicked(change, push), b.kicked(change, back), Contact { normal, gap, weights, inverse })
-}
-
-impl Contact {
-    /// Grains that nothing holds bounce: what stopped them (the impulses so far) tells how fast they met (Poisson's hypothesis).
-    #[inline(always)]
-    fn bounce(
-        &self,
-        a: Eight,
-        b: Eight,
-        is_held: LaneMask,
-        impulse: &V8,
-        c: &Coefficients,
-    ) -> (Eight, Eight) {
-        let zero = Lanes::all(0.0);
-        let stopped = dot8(*impulse, self.normal) * self.weights;
-        let closing = self.gap.max(zero) * Lanes::all(c.diameter / c.dt);
-        let approach = stopped + closing;
-        let meets = zero.is_less(stopped) & Lanes::all(c.bouncing).is_less(approach);
-        let wanted = is_held.choose(zero, meets.choose(approach * Lanes::all(c.restitution) + closing, zero));
-        let change = scaled8(self.normal, wanted * self.inverse);
-        (a.kicked(change, a.weight), b.kicked(change, zero - b.weight))
-    }
-
-    /// Pushes of eight pairs, and what they find out: which grains are supported, and which something wakes.
-    #[inline(always)]
-    fn push(&self, a: &Eight, b: &Eight, pushes: [[Lanes; 4]; 2], c: &Coefficients) -> [[Lanes; 4]; 2] {
-        let (zero, one) = (Lanes::all(0.0), Lanes::all(1.0));
-        let [x, y, z] = c.up;
-        let upward = dot8(self.normal, [Lanes::all(x), Lanes::all(y), Lanes::all(z)]);
-        let moves = zero.is_less(self.weights);
-        let [[ax, ay, az, a_marks], [bx, by, bz, b_marks]] = pushes;
-        let (a_push, b_push) = ([ax, ay, az], [bx, by, bz]);
-        // Overlap is removed, and a gap stays one.
-        let overlap = zero - self.gap;
-        let some = ((overlap - Lanes::all(SLOP)).max(zero) * Lanes::all(REMOVED)).min(Lanes::all(FARTHEST));
-        let removed = zero.is_less(self.gap).choose(overlap, some);
-        let missing = removed - dot8(sub8(a_push, b_push), self.normal);
-        let is_up = zero.is_less(upward);
-        let (a_holds, b_holds) = (a.supported.choose(one, zero), b.supported.choose(one, zero));
-        let share = upward * is_up.choose(b_holds, a_holds) * a.weight * b.weight;
-        let amount = (zero.is_less(missing) & moves).choose(missing * self.inverse, zero);
-        let push = scaled8(self.normal, amount);
-        let [ax, ay, az] = add8(a_push, scaled8(push, a.weight * (one + share)));
-        let [bx, by, bz] = sub8(b_push, scaled8(push, b.weight * (one - share)));
-        // Chains of contacts that lead down to something fixed.
-        let (half, woken) = (Lanes::all(0.5), Lanes::all(rest::WOKEN));
-        let (a_rests, b_rests) = (a.weight.is_less(half), b.weight.is_less(half));
-        let (a_wakes, b_wakes) = (Lanes::all(1.5).is_less(a_marks), Lanes::all(1.5).is_less(b_marks));
-        let a_stands = a_wakes.choose(a_marks - woken, a_marks);
-        let b_stands = b_wakes.choose(b_marks - woken, b_marks);
-        let touching = self.gap.is_less(Lanes::all(TOUCHING));
-        let steep = if c.attraction > 0.0 { -2.0 } else { STEEP };
-        let up = touching & Lanes::all(steep).is_less(upward) & (half.is_less(b_stands) | b_rests);
-        let down = touching & upward.is_less(Lanes::all(-steep)) & (half.is_less(a_stands) | a_rests);
-        let (a_stands, b_stands) = (up.choose(one, a_stands), down.choose(one, b_stands));
-        // A grain that moves wakes its neighbours.
-        let near = self.gap.is_less(Lanes::all(rest::NEAR));
-        let moving = Lanes::all(c.rest.map_or(0.0, |rule| rule.moving));
-        let a_moves = half.is_less(a.weight) & a.still.is_less(moving);
-        let b_moves = half.is_less(b.weight) & b.still.is_less(moving);
-        let a_marks = a_stands + (a_wakes | (near & a_rests & b_moves)).choose(woken, zero);
-        let b_marks = b_stands + (b_wakes | (near & b_rests & a_moves)).choose(woken, zero);
-        [[ax, ay, az, a_marks], [bx, by, bz, b_marks]]
     }
 }

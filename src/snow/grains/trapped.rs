@@ -7,7 +7,7 @@ use rayon::prelude::*;
 use super::field::{Field, Window};
 use super::heap::{Colliders, Floor};
 use super::layout::{At, Block, Layout, world};
-use super::rows::{Row, Shared, dot};
+use super::rows::{Row, V, dot};
 use super::shell::Shell;
 use super::touch::Touch;
 use crate::base::DVec3;
@@ -60,8 +60,8 @@ impl End<'_> {
         let windows =
             colliders.fields.iter().map(|field| field.windows(self.layout, &which, self.diameter, MARGIN));
         let windows: Vec<Vec<Option<Window<'_>>>> = windows.collect::<Result<_>>()?;
-        let rows = Shared::new(rows);
-        let trapped = which.par_iter().enumerate().flat_map_iter(|(index, &block)| {
+        let seen = &*rows;
+        let released = which.par_iter().enumerate().flat_map_iter(|(index, &block)| {
             let fields = colliders.fields.iter().zip(&windows);
             let surfaces = Surfaces {
                 floor: colliders.floor,
@@ -72,13 +72,17 @@ impl End<'_> {
                 diameter: self.diameter,
             };
             let at = self.layout.blocks[block as usize].at;
-            // SAFETY: a grain is a member of one block.
-            let is_trapped = |slot: &&u32| !surfaces.release(at, unsafe { rows.get(**slot as usize) });
-            let trapped: Vec<u32> =
-                deep[block as usize].iter().filter(is_trapped).map(|slot| ids[*slot as usize]).collect();
-            trapped
+            let release = |&slot: &u32| (slot, surfaces.release(at, seen[slot as usize].place));
+            deep[block as usize].iter().map(release).collect::<Vec<_>>()
         });
-        let mut trapped: Vec<u32> = trapped.collect();
+        let released: Vec<(u32, Option<V>)> = released.collect();
+        let mut trapped = Vec::new();
+        for (slot, place) in released {
+            match place {
+                Some(place) => rows[slot as usize].place = place,
+                None => trapped.push(ids[slot as usize]),
+            }
+        }
         trapped.par_sort_unstable();
         Ok(trapped)
     }
@@ -110,23 +114,22 @@ struct Surfaces<'a> {
 }
 
 impl Surfaces<'_> {
-    /// Moves a grain of a block at `at` out of them; whether it is out.
-    fn release(&self, at: At, row: &mut Row) -> bool {
-        let from = world(at, row.place, self.diameter);
+    /// Where a grain at a place in a block is out of them; nothing where it finds no room.
+    fn release(&self, at: At, within: V) -> Option<V> {
+        let from = world(at, within, self.diameter);
         let mut place = from;
         for _ in 0..ROUNDS {
             let mut is_out = true;
             self.for_each_way_out(&mut place, |depth| is_out &= depth <= ROUNDED * DEEP);
             if is_out {
                 let way = (place - from) / self.diameter;
-                row.place = [0, 1, 2].map(|axis| row.place[axis] + way[axis] as f32);
-                return true;
+                return Some([0, 1, 2].map(|axis| within[axis] + way[axis] as f32));
             }
             if (place - from).norm() > FARTHEST * self.diameter {
-                return false;
+                return None;
             }
         }
-        false
+        None
     }
 
     /// Moves a place (m) out of one surface after the other, and tells how deep (diameters) it was in each.

@@ -44,7 +44,9 @@ fn a_new_scene_lacks_nothing_but_its_character() {
             Some(key) if key.contains(" = ") || key.starts_with('[') => key.to_string(),
             _ => line.to_string(),
         })
-        .filter(|line| !["top =", "node =", "clip =", "loop ="].iter().any(|key| line.starts_with(key)))
+        .filter(|line| {
+            !["top =", "node =", "clip =", "loop =", "compression ="].iter().any(|key| line.starts_with(key))
+        })
         .collect();
     fs::write(folder.path().join("all.toml"), all.join("\n")).unwrap();
     let resolved = |name: &str| {

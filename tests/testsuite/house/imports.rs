@@ -18,10 +18,11 @@ const LAW: [(&str, &[&str]); 10] = [
 ];
 
 /// Files besides those of vdb and capi that may contain `unsafe`.
-const UNSAFE: [&str; 7] = [
+const UNSAFE: [&str; 8] = [
     "src/base/cpu.rs",
     "src/base/lanes.rs",
     "src/context/pool.rs",
+    "src/snow/grains/collide.rs",
     "src/snow/grains/layout.rs",
     "src/snow/grains/rows.rs",
     "src/snow/grains/shell.rs",
