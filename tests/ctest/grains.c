@@ -83,11 +83,11 @@ static void limits(frz_context *ctx) {
     frz_grains *grains;
     double place[3], top = 0;
     int frame, rises = 0;
-    params.flags = FRZ_GRAINS_FLOOR, params.restitution = 0.7, params.air = 1, params.lifetime = 20 * DT;
+    params.flags = FRZ_GRAINS_FLOOR, params.restitution = 0.7, params.air = 1, params.lifetime = 30 * DT;
     grains = grains_of(ctx, &params);
     WORKS(frz_grains_emit(ctx, grains, VIEW(from, 1), NO_VIEW, 0, NULL));
     report.struct_size = sizeof report;
-    for (frame = 1; frame < 16; ++frame) {
+    for (frame = 1; frame < 28; ++frame) {
         float velocity[3];
         WORKS(frz_grains_step(ctx, grains, NULL, NULL, 0, DT / 4, frame, &report));
         WORKS(frz_grains_read(grains, FRZ_GRAINS_POSITION_DOUBLE, SPAN(place, 1)));
@@ -97,9 +97,9 @@ static void limits(frz_context *ctx) {
     }
     /* 0.095 m down, and 0.49 of that up again, but for what lies between two steps. */
     CHECK(rises && fabs(top - 0.005 - 0.49 * 0.095) < 0.01);
-    WORKS(frz_grains_step(ctx, grains, NULL, NULL, 0, DT, 19, &report));
+    WORKS(frz_grains_step(ctx, grains, NULL, NULL, 0, DT, 29, &report));
     CHECK(report.count == 1 && report.expired == 0 && report.trapped == 0);
-    WORKS(frz_grains_step(ctx, grains, NULL, NULL, 0, DT, 20, &report));
+    WORKS(frz_grains_step(ctx, grains, NULL, NULL, 0, DT, 30, &report));
     CHECK(report.count == 0 && report.expired == 1 && report.dropped == 0);
     params.lifetime = 0, params.flags |= FRZ_GRAINS_BOX;
     FAILS(frz_grains_set_params(grains, &params), FRZ_ERROR_ARGUMENT, "keep_box");

@@ -135,8 +135,8 @@ static void parameters(frz_context *ctx, const ball *rest, const frz_grid *snow)
         FAILS(frz_grains_create(ctx, &params, NULL, 0, &none), FRZ_ERROR_ARGUMENT, "max_grains = ");
         params.max_grains = 5, params.sub_steps = 1001;
         FAILS(frz_grains_create(ctx, &params, NULL, 0, &none), FRZ_ERROR_ARGUMENT, "sub_steps = 1001 is not within 0 to 1000");
-        params.sub_steps = 0, params.flags = 6;
-        FAILS(frz_grains_create(ctx, &params, NULL, 0, &none), FRZ_ERROR_ARGUMENT, "flags = 0x6");
+        params.sub_steps = 0, params.flags = 10;
+        FAILS(frz_grains_create(ctx, &params, NULL, 0, &none), FRZ_ERROR_ARGUMENT, "flags = 0xa");
         params.flags = 0, params.struct_size = 20;
         FAILS(frz_grains_create(ctx, &params, NULL, 0, &none), FRZ_ERROR_VERSION, "struct_size = 20");
         FAILS(frz_grains_params_init(&params, 20), FRZ_ERROR_VERSION, "struct_size = 20");
