@@ -42,6 +42,19 @@ pub struct Held {
     pub impulse: V,
 }
 
+impl Held {
+    /// From the other side.
+    fn turned(self) -> Self {
+        let [a, b] = self.grains;
+        Self { grains: [b, a], impulse: self.impulse.map(|x| -x) }
+    }
+
+    /// With the lesser grain first.
+    fn in_order(self) -> Self {
+        if self.grains[0] < self.grains[1] { self } else { self.turned() }
+    }
+}
+
 /// A pair that was found.
 #[derive(Clone, Copy)]
 struct Pair {
@@ -132,22 +145,35 @@ fn step_bits(step: [i32; 3]) -> u32 {
 }
 
 impl Layout {
-    /// Finds the pairs of blocks that changed and of those that own pairs with their grains. What they carry is taken from their
-    /// old pairs and from `held`.
-    pub fn find_pairs(&mut self, held: &[Held]) {
+    /// Keeps what pairs carried in the last step until they are found.
+    pub fn keep_held(&mut self, held: Vec<Held>) {
+        let mut kept: Vec<(u32, Held)> = held.into_par_iter().filter_map(|held| self.owned(held)).collect();
+        kept.par_sort_unstable_by_key(|(block, held)| (*block, held.grains));
+        self.kept = kept;
+    }
+
+    /// Finds the pairs of the blocks that are reached and lack them: since they, or blocks with whose grains they own pairs,
+    /// changed. What pairs carry is taken from their old ones and from what was kept.
+    pub fn find_pairs(&mut self) {
+        let changed: Vec<bool> = self.blocks.par_iter().map(|block| block.is_changed).collect();
+        let is_changed = |block: &u32| *block != NONE && changed[*block as usize];
+        self.blocks.par_iter_mut().for_each(|block| {
+            block.lacks_pairs |=
+                block.is_changed || EARLIER.iter().any(|&code| is_changed(&block.near[code]));
+            block.is_changed = false;
+        });
         let blocks = &self.blocks;
-        let is_listed = |block: &Block| {
-            let owned = [&EARLIER[..], &[13]].concat();
-            let near = owned.iter().map(|&code| block.near[code]).filter(|&other| other != NONE);
-            near.into_iter().any(|other| blocks[other as usize].is_changed)
-        };
-        let is_listed: Vec<bool> = blocks.par_iter().map(is_listed).collect();
-        let moved = self.moved(&is_listed, held);
-        let of_block = |block: u32| {
-            let first = moved.partition_point(|(of, _)| *of < block);
-            moved[first..].iter().take_while(move |(of, _)| *of == block).map(|(_, held)| *held)
-        };
-        let (homes, has_moved) = (&self.homes, self.has_moved);
+        let is_listed: Vec<bool> =
+            blocks.par_iter().map(|block| block.lacks_pairs && block.is_reached).collect();
+        if !is_listed.contains(&true) {
+            return;
+        }
+        let moved = self.moved(&is_listed);
+        fn of_block(all: &[(u32, Held)], block: u32) -> impl Iterator<Item = Held> {
+            let first = all.partition_point(|(of, _)| *of < block);
+            all[first..].iter().take_while(move |(of, _)| *of == block).map(|(_, held)| *held)
+        }
+        let (homes, has_moved, kept) = (&self.homes, self.has_ever_moved, &self.kept);
         let listed = self.batches.par_iter_mut().enumerate().filter(|(index, _)| is_listed[*index]);
         listed.for_each_init(Scratch::default, |scratch, (index, batches)| {
             find(scratch, blocks, index);
@@ -165,47 +191,57 @@ impl Layout {
                     }
                 });
             }
-            of_block(index as u32).for_each(|held| {
-                carry(held.grains, held.grains.map(|grain| homes[grain as usize]), held.impulse);
-            });
+            let kept = if block.is_found { &[] } else { &kept[..] };
+            for held in of_block(kept, index as u32).chain(of_block(&moved, index as u32)) {
+                let homes = held.grains.map(|grain| homes[grain as usize]);
+                if homes[0].block == index as u32 {
+                    carry(held.grains, homes, held.impulse);
+                }
+            }
             scratch.schedule(&block.members, batches);
         });
-        self.blocks.par_iter_mut().for_each(|block| block.is_changed = false);
+        self.blocks.par_iter_mut().zip(is_listed).filter(|(_, is_listed)| *is_listed).for_each(
+            |(block, _)| {
+                (block.lacks_pairs, block.is_found) = (false, true);
+            },
+        );
     }
 
-    /// Pairs of grains that have changed blocks, and those of `held`, by the block that owns them now.
-    fn moved(&self, is_listed: &[bool], held: &[Held]) -> Vec<(u32, Held)> {
+    /// What a pair carries, with the block that owns it; nothing where a grain has left.
+    fn owned(&self, held: Held) -> Option<(u32, Held)> {
         let level = |block: u32| {
             let [x, y, z] = self.blocks[block as usize].at;
             [y, x, z]
         };
-        let owned = |held: Held| {
-            let [a, b] = held.grains.map(|grain| self.homes[grain as usize].block);
-            if a == NONE || b == NONE {
-                None
-            } else if a == b || level(a) > level(b) {
-                Some((a, held))
-            } else {
-                let [first, second] = held.grains;
-                Some((b, Held { grains: [second, first], impulse: held.impulse.map(|x| -x) }))
-            }
-        };
-        let mut moved: Vec<(u32, Held)> = held.par_iter().copied().filter_map(owned).collect();
-        if self.has_moved {
-            let listed = self.batches.par_iter().enumerate().filter(|(index, _)| is_listed[*index]);
-            moved.par_extend(listed.flat_map_iter(|(index, batches)| {
-                let mut gone = Vec::new();
-                for batch in batches {
-                    batch.for_each_held(|grains, code, impulse| {
-                        let homes = [self.homes[grains[0] as usize], self.homes[grains[1] as usize]];
-                        if !self.blocks[index].has(homes, code, index) {
-                            gone.extend(owned(Held { grains, impulse }));
-                        }
-                    });
-                }
-                gone
-            }));
+        let [a, b] = held.grains.map(|grain| self.homes[grain as usize].block);
+        if a == NONE || b == NONE {
+            None
+        } else if a == b || level(a) > level(b) {
+            Some((a, held))
+        } else {
+            Some((b, held.turned()))
         }
+    }
+
+    /// Pairs of grains that have just changed blocks, by the block that owns them now.
+    fn moved(&self, is_listed: &[bool]) -> Vec<(u32, Held)> {
+        if !self.has_moved {
+            return Vec::new();
+        }
+        let listed = self.batches.par_iter().enumerate().filter(|(index, _)| is_listed[*index]);
+        let moved = listed.flat_map_iter(|(index, batches)| {
+            let mut gone = Vec::new();
+            for batch in batches {
+                batch.for_each_held(|grains, code, impulse| {
+                    let homes = [self.homes[grains[0] as usize], self.homes[grains[1] as usize]];
+                    if !self.blocks[index].has(homes, code, index) {
+                        gone.extend(self.owned(Held { grains, impulse }));
+                    }
+                });
+            }
+            gone
+        });
+        let mut moved: Vec<(u32, Held)> = moved.collect();
         moved.par_sort_unstable_by_key(|(block, held)| (*block, held.grains));
         moved
     }
@@ -222,9 +258,14 @@ impl Layout {
         pairs.filter(|overlap| *overlap > -0.02).map(|overlap| overlap.max(0.0)).collect()
     }
 
-    /// What all pairs carry.
+    /// What all pairs carry, in the order of their grains: the same whether a pair was found in this step or kept.
     pub fn held(&self) -> Vec<Held> {
-        self.batches.par_iter().flat_map_iter(|batches| batches.iter().flat_map(Batch::held)).collect()
+        let found = self.batches.par_iter().flat_map_iter(|batches| batches.iter().flat_map(Batch::held));
+        let is_kept = |(block, _): &&(u32, Held)| !self.blocks[*block as usize].is_found;
+        let all = found.chain(self.kept.par_iter().filter(is_kept).map(|(_, held)| *held));
+        let mut held: Vec<Held> = all.map(Held::in_order).collect();
+        held.par_sort_unstable_by_key(|held| held.grains);
+        held
     }
 }
 

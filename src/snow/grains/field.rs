@@ -84,10 +84,11 @@ impl Field<'_> {
         let distance = distance / diameter as f32;
         let steep = norm(gradient);
         let fast = norm(row.velocity) * reach;
-        if distance > 0.5 + SKIN + fast || steep < 1.0e-6 {
+        if distance > 0.5 + SKIN + fast {
             return None;
         }
-        let normal = scaled(gradient, 1.0 / steep);
+        // Deep in the level set there is no direction: a touch that does nothing tells of the grain.
+        let normal = if steep < 1.0e-6 { [0.0; 3] } else { scaled(gradient, 1.0 / steep) };
         Some(Touch {
             grain: slot,
             collider: BASE,

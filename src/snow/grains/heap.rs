@@ -7,7 +7,7 @@ use super::field::Field;
 use super::layout::{At, Layout, NONE, holds, locate, order, settle, world};
 use super::rest;
 use super::rows::{Row, Shared, V, norm};
-use super::shell::Search;
+use super::search::{Scratch, Search};
 pub use super::shell::Shell;
 use super::solve::{Coefficients, sub_step};
 use super::touch::{self, Touch};
@@ -197,22 +197,20 @@ impl Heap {
         ctx.expect(division.sub_steps);
         for sub in 0..division.sub_steps {
             ctx.check()?;
-            let is_changed = layout.follow(&mut self.rows, &self.ids, ahead);
+            layout.follow(&mut self.rows, &self.ids, ahead);
             for (shell, at) in &mut colliders.shells {
                 at((sub + 1) as f64 / division.sub_steps as f64, &mut pose)?;
                 shell.follow(&pose);
             }
             self.touch(&mut layout, colliders, dt, &mut travel)?;
-            if is_changed {
-                ctx.check()?;
-                layout.find_pairs(&self.held);
-                self.held = Vec::new();
-            }
+            ctx.check()?;
+            layout.reach(coefficients.visits_all);
+            layout.find_pairs();
             sub_step(ctx, &mut self.rows, &mut layout, &coefficients)?;
             ctx.advance();
         }
         let end = trapped::End { layout: &layout, diameter: self.diameter, dt };
-        self.trapped = end.release(&mut self.rows, &self.ids, colliders, &mut pose)?;
+        self.trapped = end.release(&mut self.rows, &self.ids, &self.trapped, colliders, &mut pose)?;
         self.take_back(layout)
     }
 
@@ -221,6 +219,7 @@ impl Heap {
         let from = order(&self.rows, &self.ids, &self.at);
         self.keep(&from);
         let mut layout = Layout::new(&mut self.rows, &self.ids, &self.at, ahead);
+        layout.keep_held(std::mem::take(&mut self.held));
         for touch in std::mem::take(&mut self.touches) {
             layout.blocks[layout.homes[touch.grain as usize].block as usize].touches.push(touch);
         }
@@ -231,7 +230,7 @@ impl Heap {
     fn take_back(&mut self, layout: Layout) -> Result<()> {
         self.held = layout.held();
         self.touches = layout.blocks.iter().flat_map(|block| block.touches.iter().copied()).collect();
-        self.touches.iter_mut().for_each(Touch::forget_bounce);
+        self.touches.iter_mut().for_each(|touch| *touch = touch.kept());
         self.touches.par_sort_unstable_by_key(Touch::key);
         self.rows.par_iter_mut().zip(&mut self.at).zip(&layout.homes).for_each(|((row, at), home)| {
             if home.block != NONE {
@@ -279,31 +278,37 @@ impl Heap {
         dt: f64,
         travel: &mut f64,
     ) -> Result<()> {
-        let reach = (2.0 * dt / self.diameter) as f32;
-        let changed: Vec<u32> =
-            (0..).zip(&layout.blocks).filter(|(_, block)| block.is_changed).map(|(index, _)| index).collect();
         let mut fresh: Vec<Vec<Touch>> = vec![Vec::new(); layout.blocks.len()];
-        if let Some(floor) = &colliders.floor {
-            for &index in &changed {
-                fresh[index as usize] =
-                    floor.touches(&layout.blocks[index as usize], &self.rows, self.diameter, reach);
-            }
-        }
-        for field in &colliders.fields {
-            let found = field.touches(layout, &changed, &self.rows, self.diameter, reach)?;
-            changed.iter().zip(found).for_each(|(&index, found)| fresh[index as usize].extend(found));
-        }
         if !colliders.shells.is_empty() {
             let shells: Vec<&Shell> = colliders.shells.iter().map(|(shell, _)| shell).collect();
             let way = shells.iter().map(|shell| shell.way()).fold(0.0, f64::max) / self.diameter;
             let search = Search { shells, diameter: self.diameter, dt, travel: *travel, way };
             *travel += way;
             let rows = Shared::new(&mut self.rows);
-            layout.blocks.par_iter_mut().zip(&mut fresh).for_each(|(block, fresh)| {
-                let found = search.touches(block, rows);
+            let blocks = layout.blocks.par_iter_mut().zip(&mut fresh);
+            blocks.for_each_init(Scratch::default, |scratch, (block, fresh)| {
+                let found = search.touches(scratch, block, rows);
                 block.is_awake |= !found.is_empty();
                 fresh.extend(found);
             });
+        }
+        // Where all grains rest, what they lie on does nothing; those that left a block take their touches with them.
+        layout.blocks.par_iter_mut().for_each(|block| {
+            block.is_due = block.lacks_touches && (block.is_awake || block.is_stirred);
+            block.lacks_touches &= !block.is_due;
+        });
+        let due: Vec<u32> =
+            (0..).zip(&layout.blocks).filter(|(_, block)| block.is_due).map(|(index, _)| index).collect();
+        let reach = (2.0 * dt / self.diameter) as f32;
+        if let Some(floor) = &colliders.floor {
+            for &index in &due {
+                let block = &layout.blocks[index as usize];
+                fresh[index as usize].extend(floor.touches(block, &self.rows, self.diameter, reach));
+            }
+        }
+        for field in &colliders.fields {
+            let found = field.touches(layout, &due, &self.rows, self.diameter, reach)?;
+            due.iter().zip(found).for_each(|(&index, found)| fresh[index as usize].extend(found));
         }
         touch::renew(&mut layout.blocks, fresh);
         Ok(())
@@ -313,7 +318,8 @@ impl Heap {
     pub fn overlaps(&self) -> Vec<f32> {
         let mut heap = self.clone();
         let mut layout = heap.lay_out(0.0);
-        layout.find_pairs(&[]);
+        layout.reach(true);
+        layout.find_pairs();
         layout.overlaps(&heap.rows)
     }
 }

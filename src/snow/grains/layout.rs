@@ -7,7 +7,7 @@ use std::collections::HashMap;
 
 use rayon::prelude::*;
 
-use super::contacts::{Batch, SKIN};
+use super::contacts::{Batch, Held, SKIN};
 use super::rows::{Row, Shared, V, add, norm, scaled};
 use super::touch::Touch;
 use crate::base::DVec3;
@@ -47,8 +47,18 @@ pub struct Block {
     pub is_reached: bool,
     /// Whether a member has moved so far that neighbours must be found again.
     pub has_strayed: bool,
-    /// Whether its members changed.
+    /// Whether its members changed in this sub-step.
     pub is_changed: bool,
+    /// Whether they have changed since the step began.
+    pub is_stirred: bool,
+    /// Whether its touches are not those of its members.
+    pub lacks_touches: bool,
+    /// Whether they are found in this sub-step.
+    pub is_due: bool,
+    /// Whether its pairs are not those of its members.
+    pub lacks_pairs: bool,
+    /// Whether it has had its pairs found in this step.
+    pub is_found: bool,
 }
 
 /// Where a grain belongs.
@@ -81,6 +91,10 @@ pub struct Layout {
     pub homes: Vec<Home>,
     /// Whether a grain has just changed blocks.
     pub has_moved: bool,
+    /// Whether one has in this step.
+    pub has_ever_moved: bool,
+    /// What pairs carried in the last step, by the block that owns them, in this order.
+    pub kept: Vec<(u32, Held)>,
     index: HashMap<At, u32>,
     column_index: HashMap<[i32; 2], u32>,
 }
@@ -135,7 +149,7 @@ impl Layout {
             layout.blocks[block as usize].members.extend(run[0] as u32..run[1] as u32);
             layout.homes[run[0]..run[1]].fill(Home { block, rank: 0 });
         }
-        layout.rank_members(rows, ids, ahead);
+        layout.rank_members(rows, ids, ahead, |_| true);
         layout
     }
 
@@ -168,6 +182,11 @@ impl Layout {
             is_reached: false,
             has_strayed: true,
             is_changed: true,
+            is_stirred: false,
+            lacks_touches: true,
+            is_due: false,
+            lacks_pairs: true,
+            is_found: false,
         });
         let (columns, at) = (&mut self.columns, [at[0], at[2]]);
         self.batches.push(Vec::new());
@@ -183,13 +202,13 @@ impl Layout {
     }
 
     /// Moves members of blocks that have strayed to the blocks that they are in, and sorts the members of every block that
-    /// changed. Whether there is one.
-    pub fn follow(&mut self, rows: &mut [Row], ids: &[u32], ahead: f32) -> bool {
+    /// changed.
+    pub fn follow(&mut self, rows: &mut [Row], ids: &[u32], ahead: f32) {
         let shared = Shared::new(rows);
         let strayed = self.blocks.par_iter_mut().filter(|block| block.has_strayed);
         let movers: Vec<Vec<(u32, At)>> = strayed
             .map(|block| {
-                block.is_changed = true;
+                (block.is_changed, block.is_stirred) = (true, true);
                 let (mut gone, at) = (Vec::new(), block.at);
                 block.members.retain(|&slot| {
                     let mut now = at;
@@ -204,6 +223,7 @@ impl Layout {
             })
             .collect();
         self.has_moved = movers.iter().any(|movers| !movers.is_empty());
+        self.has_ever_moved |= self.has_moved;
         for (slot, at) in movers.into_iter().flatten() {
             self.homes[slot as usize].block = NONE;
             if holds(at) {
@@ -211,7 +231,7 @@ impl Layout {
                 self.homes[slot as usize].block = block;
                 let block = &mut self.blocks[block as usize];
                 block.members.push(slot);
-                block.is_changed = true;
+                (block.is_changed, block.is_stirred) = (true, true);
                 if !block.has_strayed {
                     let place = anchor(&rows[slot as usize], ahead);
                     block.anchors.iter_mut().zip(place).for_each(|(anchors, place)| {
@@ -220,15 +240,20 @@ impl Layout {
                 }
             }
         }
-        self.rank_members(rows, ids, ahead);
-        self.blocks.iter().any(|block| block.is_changed)
+        self.rank_members(rows, ids, ahead, |block| block.is_changed && block.is_stirred);
     }
 
-    /// Sorts the members of blocks that changed.
-    fn rank_members(&mut self, rows: &mut [Row], ids: &[u32], ahead: f32) {
+    /// Sorts the members of some blocks.
+    fn rank_members(
+        &mut self,
+        rows: &mut [Row],
+        ids: &[u32],
+        ahead: f32,
+        which: impl Fn(&Block) -> bool + Sync,
+    ) {
         let rows = &*rows;
         let homes = Shared::new(&mut self.homes);
-        self.blocks.par_iter_mut().filter(|block| block.is_changed).for_each(|block| {
+        self.blocks.par_iter_mut().filter(|block| which(block)).for_each(|block| {
             let place = |member: usize, slot: u32| {
                 if block.has_strayed {
                     anchor(&rows[slot as usize], ahead)
@@ -266,6 +291,7 @@ impl Layout {
             (block.starts, block.members) = (starts, members);
             block.is_awake = block.members.iter().any(|&slot| !rows[slot as usize].rests());
             block.has_strayed = false;
+            block.lacks_touches = true;
         });
     }
 

@@ -27,6 +27,7 @@ mod layout;
 mod params;
 mod rest;
 mod rows;
+mod search;
 mod shell;
 #[doc(hidden)]
 pub mod solve;

@@ -1,4 +1,4 @@
-//! Grains beside a mesh that moves during the step: the nearest point of its triangles, as they are in this sub-step.
+//! A mesh that moves during the step as a collider: the nearest point of its triangles, as they are in this sub-step.
 //!
 //! A signed distance grid of a deforming mesh would have to be made for each of dozens of sub-steps; the triangles need only
 //! have their boxes fitted again, and give the surface's own velocity, however thin the mesh is. A plane that moves with the
@@ -7,12 +7,10 @@
 
 use rayon::prelude::*;
 
-use super::contacts::SKIN;
-use super::layout::{Block, EDGE, world};
-use super::rest;
-use super::rows::{Row, Shared, dot, norm};
+use super::rows::{Row, dot};
 use super::touch::Touch;
 use crate::base::DVec3;
+use crate::base::cpu::dispatch;
 
 /// Triangles in a leaf of the tree.
 const LEAF: usize = 4;
@@ -39,92 +37,15 @@ pub struct Shell {
     way: f64,
 }
 
-/// What a sub-step asks of the meshes.
-pub struct Search<'a> {
-    /// The meshes.
-    pub shells: Vec<&'a Shell>,
-    /// Diameter of a grain (m).
-    pub diameter: f64,
-    /// Length of the sub-step (s).
-    pub dt: f64,
-    /// Farthest way of a mesh's vertex in the step before this sub-step (diameters).
-    pub travel: f64,
-    /// The same in this sub-step.
-    pub way: f64,
-}
-
-impl Search<'_> {
-    /// Members of a block near a mesh, each with the plane that the mesh is there. Of grains that rest, those that a mesh touches
-    /// and moves, which wake. Blocks and grains remember how far the meshes may travel before they can matter.
-    pub fn touches(&self, block: &mut Block, rows: Shared<'_, Row>) -> Vec<Touch> {
-        let is_near = |limit: f32, reach: f64| f64::from(limit) - self.travel < reach + self.way;
-        // A member has left the block by less than two diameters.
-        let around = 0.5 * f64::from(EDGE) * 3f64.sqrt() + REACH + 2.0;
-        if block.members.is_empty() || !is_near(block.limit, around) {
-            return Vec::new();
-        }
-        let middle = world(block.at, [EDGE * 0.5; 3], self.diameter);
-        block.limit = self.limit(middle, around + f64::from(EDGE));
-        if !is_near(block.limit, around) {
-            return Vec::new();
-        }
-        let mut touches = Vec::new();
-        for &slot in &block.members {
-            // SAFETY: a grain is a member of one block.
-            let row = unsafe { rows.get(slot as usize) };
-            let fast = f64::from(norm(row.velocity)) * self.dt / self.diameter;
-            if is_near(row.limit, REACH + fast) && !(row.rests() && self.way == 0.0) {
-                self.touch(slot, row, world(block.at, row.place, self.diameter), REACH + fast, &mut touches);
-            }
-        }
-        touches
-    }
-
-    /// How far the meshes may have travelled before one can be at a place (m), looked for within so many diameters.
-    fn limit(&self, place: DVec3, within: f64) -> f32 {
-        let square = |shell: &&Shell| shell.nearest(place, within * self.diameter).map(|found| found.square);
-        let nearest = self.shells.iter().filter_map(square).fold(f64::INFINITY, f64::min).sqrt();
-        (self.travel + (nearest / self.diameter).min(within)) as f32 - SLACK
-    }
-
-    /// What a grain at a place (m) touches within a reach (diameters).
-    fn touch(&self, slot: u32, row: &mut Row, place: DVec3, reach: f64, touches: &mut Vec<Touch>) {
-        // Where meshes are fast, a grain would have to ask again at once.
-        let within = if self.way < 0.5 * AHEAD { reach + AHEAD } else { reach };
-        let mut free = within;
-        for shell in &self.shells {
-            let Some(nearest) = shell.nearest(place, within * self.diameter) else { continue };
-            let distance = nearest.square.sqrt() / self.diameter;
-            free = free.min(distance);
-            if distance <= reach + nearest.motion.norm() / self.diameter {
-                let touch = shell.touch(slot, row, place, &nearest, self.diameter, self.dt);
-                let is_close = dot(touch.normal, row.place) - touch.offset < rest::NEAR;
-                let moves = nearest.motion.norm() > 1.0e-6 * self.diameter;
-                if !row.rests() || is_close && moves {
-                    rest::wake(row);
-                    touches.push(touch);
-                }
-            }
-        }
-        row.limit = (self.travel + free) as f32 - SLACK;
-    }
-}
-
-/// Distance (diameters) between a grain's centre and a mesh at which they count as near.
-const REACH: f64 = 0.5 + SKIN as f64;
-/// How much farther meshes are looked for, so that a grain need not ask in every sub-step (diameters).
-const AHEAD: f64 = 1.5;
 /// Least distance (m) at which a place lies to one side of its nearest point.
 const LEAST: f64 = 1.0e-9;
-/// Room for rounding (diameters).
-const SLACK: f32 = 1.0e-3;
-
 /// A point of the surface.
-struct Nearest {
-    square: f64,
+pub struct Nearest {
+    /// Square of its distance (m2).
+    pub square: f64,
     point: DVec3,
-    /// Where it goes in the sub-step.
-    motion: DVec3,
+    /// Where it goes in the sub-step (m).
+    pub motion: DVec3,
     /// Height over the plane of its triangle.
     height: f64,
     normal: DVec3,
@@ -220,7 +141,16 @@ impl Shell {
         self.way
     }
 
-    fn touch(&self, slot: u32, row: &Row, place: DVec3, nearest: &Nearest, diameter: f64, dt: f64) -> Touch {
+    /// The plane of a nearest point for the grain of a slot.
+    pub fn touch(
+        &self,
+        slot: u32,
+        row: &Row,
+        place: DVec3,
+        nearest: &Nearest,
+        diameter: f64,
+        dt: f64,
+    ) -> Touch {
         let (distance, inside, out) = self.side(place, nearest);
         let normal = [out.x as f32, out.y as f32, out.z as f32];
         let gap = (if inside { -distance } else { distance }) / diameter - 0.5;
@@ -259,21 +189,19 @@ impl Shell {
     }
 
     /// The nearest point of the surface within a distance (m), and where it moves, within that and its way.
-    fn nearest(&self, place: DVec3, within: f64) -> Option<Nearest> {
+    pub fn nearest(&self, place: DVec3, within: f64) -> Option<Nearest> {
         let apart = |bounds: &[DVec3; 2]| {
             let outside = (bounds[0] - place).sup(&(place - bounds[1])).sup(&DVec3::zeros());
             outside.norm_squared()
         };
-        let mut best: Option<Nearest> = None;
-        let mut most = f64::INFINITY;
-        let reach = |node: usize| (within + self.ways[node]).powi(2);
+        let mut best = Best::default();
         let mut stack = [0usize; 64];
         let mut depth = 1;
         while depth > 0 {
             depth -= 1;
             let node = stack[depth];
-            let reach = reach(node);
-            if apart(&self.boxes[node]) > most.min(reach) {
+            let reach = (within + self.ways[node]).powi(2);
+            if apart(&self.boxes[node]) > best.most.min(reach) {
                 continue;
             }
             if node < self.leaves - 1 {
@@ -283,47 +211,189 @@ impl Shell {
                 depth += 2;
                 continue;
             }
-            let leaf = node - (self.leaves - 1);
-            for triangle in self.triangles.iter().skip(leaf * LEAF).take(LEAF) {
-                let found = self.on_triangle(triangle, place);
-                // At an edge or corner that triangles share, the one that the point is highest over tells its side.
-                let is_better = match &best {
-                    None => found.square <= reach,
-                    Some(best) => {
-                        let tie = 1.0e-9 * (found.square + best.square);
-                        found.square < best.square - tie
-                            || (found.square <= best.square + tie && found.height.abs() > best.height.abs())
-                    }
-                };
-                if is_better {
-                    most = most.min(found.square * (1.0 + 1.0e-8));
-                    best = Some(found);
-                }
-            }
+            self.compare(node - (self.leaves - 1), place, reach, &mut best);
         }
-        best
+        best.found.map(|found| self.resolve(found, place))
     }
 
-    fn on_triangle(&self, triangle: &[u32; 3], place: DVec3) -> Nearest {
-        let [a, b, c] = triangle.map(|index| self.now[index as usize]);
-        let weights = nearest_weights(place, a, b, c);
-        let point = a * weights[0] + b * weights[1] + c * weights[2];
-        let motion = (0..3)
-            .map(|corner| {
-                let index = triangle[corner] as usize;
-                (self.next[index] - self.now[index]) * weights[corner]
-            })
-            .sum();
+    /// The nearest point as [`Shell::nearest`] finds it, of those leaves only.
+    pub fn nearest_of(&self, leaves: &mut Leaves, place: DVec3, within: f64) -> Option<Nearest> {
+        let first = leaves.measure(place)?;
+        let mut best = Best::default();
+        let mut visit = |index: usize| {
+            let reach = (within + f64::from(leaves.ways[index])).powi(2);
+            if f64::from(leaves.apart[index]) <= best.most.min(reach) {
+                self.compare(leaves.which[index] as usize, place, reach, &mut best);
+            }
+        };
+        visit(first);
+        (0..leaves.which.len()).filter(|index| *index != first).for_each(visit);
+        best.found.map(|found| self.resolve(found, place))
+    }
+
+    /// Leaves that may be within a distance (m), and their way, of places in a box.
+    pub fn leaves_near(&self, [low, high]: &[DVec3; 2], within: f64, leaves: &mut Leaves) {
+        let room = DVec3::repeat(within + self.way);
+        leaves.clear([low - room, high + room]);
+        let mut stack = [0usize; 64];
+        let mut depth = 1;
+        while depth > 0 {
+            depth -= 1;
+            let node = stack[depth];
+            let room = within + self.ways[node];
+            let [least, greatest] = &self.boxes[node];
+            if (0..3).any(|axis| least[axis] - room > high[axis] || greatest[axis] + room < low[axis]) {
+                continue;
+            }
+            if node < self.leaves - 1 {
+                (stack[depth], stack[depth + 1]) = (2 * node + 2, 2 * node + 1);
+                depth += 2;
+            } else {
+                leaves.push((node - (self.leaves - 1)) as u32, &self.boxes[node], self.ways[node]);
+            }
+        }
+    }
+
+    /// Compares the triangles of a leaf with the best one so far, or with the square of a reach (m2).
+    fn compare(&self, leaf: usize, place: DVec3, reach: f64, best: &mut Best) {
+        let first = leaf * LEAF;
+        for index in first..(first + LEAF).min(self.triangles.len()) {
+            let [a, b, c] = self.corners(index);
+            let weights = nearest_weights(place, a, b, c);
+            let point = a * weights[0] + b * weights[1] + c * weights[2];
+            let square = (place - point).norm_squared();
+            let is_better = match &best.found {
+                None => square <= reach,
+                Some(other) => {
+                    let tie = 1.0e-9 * (square + other.square);
+                    let height = |triangle: usize| self.plane(triangle, place).0.abs();
+                    // At an edge or corner that triangles share, the one that the point is highest over tells its side.
+                    square < other.square - tie
+                        || square <= other.square + tie && height(index) > height(other.triangle)
+                }
+            };
+            if is_better {
+                best.most = best.most.min(square * (1.0 + 1.0e-8));
+                best.found = Some(Found { square, triangle: index, weights, point });
+            }
+        }
+    }
+
+    fn corners(&self, triangle: usize) -> [DVec3; 3] {
+        self.triangles[triangle].map(|index| self.now[index as usize])
+    }
+
+    /// Height (m) of a place over the plane of a triangle, and the plane's normal.
+    fn plane(&self, triangle: usize, place: DVec3) -> (f64, DVec3) {
+        let [a, b, c] = self.corners(triangle);
         let across = (b - a).cross(&(c - a));
         let length = across.norm();
         let normal = if length > 0.0 { across / length } else { DVec3::y() };
-        Nearest {
-            square: (place - point).norm_squared(),
-            point,
-            motion,
-            height: (place - a).dot(&normal),
-            normal,
+        ((place - a).dot(&normal), normal)
+    }
+
+    fn resolve(&self, found: Found, place: DVec3) -> Nearest {
+        let Found { square, triangle, weights, point } = found;
+        let way = |corner: usize| {
+            let index = self.triangles[triangle][corner] as usize;
+            (self.next[index] - self.now[index]) * weights[corner]
+        };
+        let (height, normal) = self.plane(triangle, place);
+        Nearest { square, point, motion: way(0) + way(1) + way(2), height, normal }
+    }
+}
+
+/// The nearest triangle so far.
+struct Best {
+    found: Option<Found>,
+    /// Square of the distance (m2) beyond which there is no better one.
+    most: f64,
+}
+
+impl Default for Best {
+    fn default() -> Self {
+        Self { found: None, most: f64::INFINITY }
+    }
+}
+
+/// A triangle, the weights of its corners at its nearest point, that point, and the square of its distance (m2).
+struct Found {
+    square: f64,
+    triangle: usize,
+    weights: [f64; 3],
+    point: DVec3,
+}
+
+/// Leaves of a mesh near some places.
+#[derive(Default)]
+pub struct Leaves {
+    which: Vec<u32>,
+    /// Longest way of a vertex in the sub-step (m).
+    ways: Vec<f32>,
+    /// Their boxes as far as they matter, about `middle` (m): least and greatest along each axis. A little too large, so that rounding
+    /// leaves no triangle out.
+    boxes: [Vec<f32>; 6],
+    /// Squares of the distances (m2) of the place that was measured last.
+    apart: Vec<f32>,
+    /// Where they matter (m).
+    within: [DVec3; 2],
+    middle: DVec3,
+    /// Room for rounding (m).
+    room: f64,
+}
+
+impl Leaves {
+    /// None, for places in a box.
+    fn clear(&mut self, within: [DVec3; 2]) {
+        self.which.clear();
+        self.ways.clear();
+        self.boxes.iter_mut().for_each(Vec::clear);
+        (self.within, self.middle) = (within, (within[0] + within[1]) * 0.5);
+        self.room = 1.0e-6 * (within[1] - within[0]).max();
+    }
+
+    fn push(&mut self, leaf: u32, [low, high]: &[DVec3; 2], way: f64) {
+        self.which.push(leaf);
+        self.ways.push((way * (1.0 + 1.0e-6)) as f32);
+        let [least, greatest] = &self.within;
+        for axis in 0..3 {
+            let side = |x: f64| x.clamp(least[axis], greatest[axis]) - self.middle[axis];
+            self.boxes[2 * axis].push((side(low[axis]) - self.room) as f32);
+            self.boxes[2 * axis + 1].push((side(high[axis]) + self.room) as f32);
         }
+    }
+
+    /// Measures how far the boxes are from a place (m); which is nearest.
+    fn measure(&mut self, place: DVec3) -> Option<usize> {
+        let place = place - self.middle;
+        distances(&self.boxes, [place.x as f32, place.y as f32, place.z as f32], &mut self.apart);
+        let least = |a: usize, b: usize| if self.apart[b] < self.apart[a] { b } else { a };
+        (0..self.which.len()).reduce(least)
+    }
+}
+
+/// Squares of the distances of boxes from a place.
+fn distances(boxes: &[Vec<f32>; 6], place: [f32; 3], out: &mut Vec<f32>) {
+    dispatch!(distances_of(boxes: &[Vec<f32>; 6], place: [f32; 3], out: &mut Vec<f32>))
+}
+
+#[inline(always)]
+fn distances_of(boxes: &[Vec<f32>; 6], place: [f32; 3], out: &mut Vec<f32>) {
+    let count = boxes[0].len();
+    out.clear();
+    out.resize(count, 0.0);
+    let [lx, hx, ly, hy, lz, hz] = boxes.each_ref().map(|side| &side[..count]);
+    let [x, y, z] = place;
+    for (index, out) in out.iter_mut().enumerate() {
+        let beyond = |low: f32, high: f32, at: f32| {
+            let (under, over) = (low - at, at - high);
+            let most = if under > over { under } else { over };
+            if most > 0.0 { most } else { 0.0 }
+        };
+        let dx = beyond(lx[index], hx[index], x);
+        let dy = beyond(ly[index], hy[index], y);
+        let dz = beyond(lz[index], hz[index], z);
+        *out = dx * dx + dy * dy + dz * dz;
     }
 }
 

@@ -60,7 +60,6 @@ pub struct Coefficients {
 /// # Errors
 /// Cancel.
 pub fn sub_step(ctx: &Context, rows: &mut [Row], layout: &mut Layout, c: &Coefficients) -> Result<()> {
-    layout.reach(c.visits_all);
     let colours = layout.colours();
     accelerate(rows, layout, c);
     for pass in [Pass::Begin, Pass::Solve, Pass::SolveLast] {

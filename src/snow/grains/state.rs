@@ -14,7 +14,7 @@ use crate::base::DVec3;
 use crate::error::{Error, Result};
 
 /// The first bytes: what it is, and its version.
-const MAGIC: &[u8; 8] = b"frzgrn05";
+const MAGIC: &[u8; 8] = b"frzgrn06";
 
 /// Writes little-endian numbers.
 #[derive(Default)]
@@ -123,6 +123,8 @@ pub fn save(grains: &Grains) -> Vec<u8> {
         to.f32s(&[touch.impulse]);
         to.f32s(&touch.across);
     }
+    to.count(heap.trapped.len());
+    heap.trapped.iter().for_each(|id| to.u32(*id));
     to.count(grains.owed.len());
     for (origin, owed) in &grains.owed {
         to.i32s(origin);
@@ -186,6 +188,12 @@ pub fn load(grains: &mut Grains, bytes: &[u8]) -> Result<()> {
         }
         let ([impulse], across) = (from.f32s()?, from.f32s()?);
         heap.touches.push(Touch { grain, collider, impulse, across, ..Touch::default() });
+    }
+    for _ in 0..from.count(4)? {
+        heap.trapped.push(from.u32()?);
+    }
+    if !heap.trapped.is_sorted_by(|a, b| a < b) {
+        return Err(wrong("has trapped grains out of order"));
     }
     grains.owed = BTreeMap::new();
     for _ in 0..from.count(20)? {

@@ -48,6 +48,18 @@ impl Touch {
         }
     }
 
+    /// What the next step needs of it.
+    pub fn kept(mut self) -> Self {
+        self.forget_bounce();
+        let Self { grain, collider, impulse, across, .. } = self;
+        Self { grain, collider, impulse, across, ..Self::default() }
+    }
+
+    /// Whether it has a plane: none that was kept has, and none deep in a level set.
+    pub fn has_plane(&self) -> bool {
+        self.normal != [0.0; 3]
+    }
+
     fn is_of_mesh(&self) -> bool {
         self.collider >= FIRST_SHELL
     }
@@ -60,18 +72,18 @@ pub const BASE: u32 = 1;
 /// Collider number of the first mesh.
 pub const FIRST_SHELL: u32 = 2;
 
-/// Gives blocks the touches that were found in this sub-step: all of those whose members changed, meshes of all. They take over
+/// Gives blocks the touches that were found in this sub-step: all of those that are due, meshes of all. They take over
 /// the impulses of those that were there before.
 pub fn renew(blocks: &mut [Block], fresh: Vec<Vec<Touch>>) {
     let is_renewed = |block: &Block, fresh: &[Touch]| {
-        block.is_changed || !fresh.is_empty() || block.touches.iter().any(Touch::is_of_mesh)
+        block.is_due || !fresh.is_empty() || block.touches.iter().any(Touch::is_of_mesh)
     };
     let renewed = blocks.par_iter_mut().zip(&fresh).filter(|(block, fresh)| is_renewed(block, fresh));
     let mut old: Vec<Touch> = renewed
         .flat_map_iter(|(block, _)| {
             let (old, kept) = std::mem::take(&mut block.touches)
                 .into_iter()
-                .partition::<Vec<_>, _>(|touch| block.is_changed || touch.is_of_mesh());
+                .partition::<Vec<_>, _>(|touch| block.is_due || touch.is_of_mesh());
             block.touches = kept;
             old
         })

@@ -17,6 +17,8 @@ use crate::error::Result;
 const DEEP: f64 = 0.1;
 /// Share of that depth in which places that are written with less precision stay.
 const ROUNDED: f64 = 0.98;
+/// Gap (diameters) to the plane of a surface up to which a grain that is awake may be in the surface itself.
+const NEAR: f32 = 0.1;
 /// How often it is moved out of each surface.
 const ROUNDS: usize = 16;
 /// Farthest that it is moved (diameters).
@@ -35,8 +37,8 @@ pub struct End<'a> {
 }
 
 impl End<'_> {
-    /// Moves grains out of the surfaces that they are in; the identities of those that have no room, ascending. `pose` is room
-    /// for the places of a mesh.
+    /// Moves grains out of the surfaces that they are in; the identities of those that have no room, ascending, as `before` has
+    /// them of the last step. `pose` is room for the places of a mesh.
     ///
     /// # Errors
     /// A pose that cannot be computed; what a grid reports.
@@ -44,10 +46,12 @@ impl End<'_> {
         &self,
         rows: &mut [Row],
         ids: &[u32],
+        before: &[u32],
         colliders: &mut Colliders<'_>,
         pose: &mut Vec<DVec3>,
     ) -> Result<Vec<u32>> {
-        let deep: Vec<Vec<u32>> = self.layout.blocks.par_iter().map(|block| self.deep(block, rows)).collect();
+        let blocks = self.layout.blocks.par_iter();
+        let deep: Vec<Vec<u32>> = blocks.map(|block| self.deep(block, rows, ids, before)).collect();
         let which: Vec<u32> =
             (0..).zip(&deep).filter(|(_, deep)| !deep.is_empty()).map(|(index, _)| index).collect();
         if which.is_empty() {
@@ -87,19 +91,28 @@ impl End<'_> {
         Ok(trapped)
     }
 
-    /// Members of a block that may be in something: those that are awake near a surface, and of those that rest the ones that
-    /// their planes tell to be.
-    fn deep(&self, block: &Block, rows: &[Row]) -> Vec<u32> {
-        let is_deep = |touch: &Touch| {
+    /// Members of a block that may be in something: those whose planes come near them while they are awake, or say that they
+    /// are in them while they rest; those that are so deep in a level set that there is no plane; and those that rest where they
+    /// had no room.
+    fn deep(&self, block: &Block, rows: &[Row], ids: &[u32], before: &[u32]) -> Vec<u32> {
+        let is_deep = |touch: &&Touch| {
+            let row = &rows[touch.grain as usize];
+            if !touch.has_plane() {
+                return !row.rests();
+            }
             let moved = dot(touch.velocity, touch.normal) * (self.dt / self.diameter) as f32;
-            touch.offset + moved - dot(touch.normal, rows[touch.grain as usize].place) > 0.5 * DEEP as f32
+            let depth = touch.offset + moved - dot(touch.normal, row.place);
+            depth > if row.rests() { 0.5 * DEEP as f32 } else { -NEAR }
         };
-        let resting =
-            block.touches.iter().filter(|touch| rows[touch.grain as usize].rests() && is_deep(touch));
-        let resting: Vec<u32> = resting.map(|touch| touch.grain).collect();
-        let awake = block.members.iter().filter(|slot| !rows[**slot as usize].rests());
-        let mut deep: Vec<u32> = resting.into_iter().chain(awake.copied()).collect();
-        deep.sort_unstable();
+        let had_no_room = |slot: &&u32| {
+            let slot = **slot as usize;
+            rows[slot].rests() && before.binary_search(&ids[slot]).is_ok()
+        };
+        let mut deep: Vec<u32> = block.touches.iter().filter(is_deep).map(|touch| touch.grain).collect();
+        if !before.is_empty() {
+            deep.extend(block.members.iter().filter(had_no_room));
+            deep.sort_unstable();
+        }
         deep.dedup();
         deep
     }

@@ -25,7 +25,7 @@ const UNSAFE: [&str; 8] = [
     "src/snow/grains/collide.rs",
     "src/snow/grains/layout.rs",
     "src/snow/grains/rows.rs",
-    "src/snow/grains/shell.rs",
+    "src/snow/grains/search.rs",
     "src/snow/grains/solve.rs",
 ];
 

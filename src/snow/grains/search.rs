@@ -1,0 +1,127 @@
+//! Which grains are near meshes that move during the step: asked in every sub-step, block by block, of the few triangles near it.
+
+use super::contacts::SKIN;
+use super::layout::{Block, EDGE, world};
+use super::rest;
+use super::rows::{Row, Shared, dot, norm};
+use super::shell::{Leaves, Shell};
+use super::touch::Touch;
+use crate::base::DVec3;
+
+/// Working memory of one thread.
+#[derive(Default)]
+pub struct Scratch {
+    asking: Vec<Asking>,
+    /// Of each mesh.
+    leaves: Vec<Leaves>,
+}
+
+/// A grain that may touch a mesh.
+struct Asking {
+    slot: u32,
+    /// Where it is (m).
+    place: DVec3,
+    /// Distance (diameters) at which a surface counts as near.
+    reach: f64,
+    /// How far surfaces are looked for (diameters).
+    within: f64,
+}
+
+/// What a sub-step asks of the meshes.
+pub struct Search<'a> {
+    /// The meshes.
+    pub shells: Vec<&'a Shell>,
+    /// Diameter of a grain (m).
+    pub diameter: f64,
+    /// Length of the sub-step (s).
+    pub dt: f64,
+    /// Farthest way of a mesh's vertex in the step before this sub-step (diameters).
+    pub travel: f64,
+    /// The same in this sub-step.
+    pub way: f64,
+}
+
+impl Search<'_> {
+    /// Members of a block near a mesh, each with the plane that the mesh is there. Of grains that rest, those that a mesh touches
+    /// and moves, which wake. Blocks and grains remember how far the meshes may travel before they can matter.
+    pub fn touches(&self, scratch: &mut Scratch, block: &mut Block, rows: Shared<'_, Row>) -> Vec<Touch> {
+        let is_near = |limit: f32, reach: f64| f64::from(limit) - self.travel < reach + self.way;
+        // A member has left the block by less than two diameters.
+        let around = 0.5 * f64::from(EDGE) * 3f64.sqrt() + REACH + 2.0;
+        if block.members.is_empty() || !is_near(block.limit, around) {
+            return Vec::new();
+        }
+        let middle = world(block.at, [EDGE * 0.5; 3], self.diameter);
+        block.limit = self.limit(middle, around + f64::from(EDGE));
+        if !is_near(block.limit, around) {
+            return Vec::new();
+        }
+        let Scratch { asking, leaves } = scratch;
+        asking.clear();
+        let mut room = [DVec3::repeat(f64::MAX), DVec3::repeat(f64::MIN)];
+        let mut farthest = 0.0f64;
+        for &slot in &block.members {
+            // SAFETY: a grain is a member of one block.
+            let row = unsafe { rows.get(slot as usize) };
+            let reach = REACH + f64::from(norm(row.velocity)) * self.dt / self.diameter;
+            if is_near(row.limit, reach) && !(row.rests() && self.way == 0.0) {
+                let place = world(block.at, row.place, self.diameter);
+                room = [room[0].inf(&place), room[1].sup(&place)];
+                // Where meshes are fast, a grain would have to ask again at once.
+                let within = if self.way < 0.5 * AHEAD { reach + AHEAD } else { reach };
+                farthest = farthest.max(within);
+                asking.push(Asking { slot, place, reach, within });
+            }
+        }
+        if asking.is_empty() {
+            return Vec::new();
+        }
+        leaves.resize_with(self.shells.len(), Leaves::default);
+        for (shell, leaves) in self.shells.iter().zip(&mut *leaves) {
+            shell.leaves_near(&room, farthest * self.diameter, leaves);
+        }
+        let mut touches = Vec::new();
+        for asking in asking {
+            // SAFETY: as above.
+            let row = unsafe { rows.get(asking.slot as usize) };
+            self.touch(asking, leaves, row, &mut touches);
+        }
+        touches
+    }
+
+    /// How far the meshes may have travelled before one can be at a place (m), looked for within so many diameters.
+    fn limit(&self, place: DVec3, within: f64) -> f32 {
+        let square = |shell: &&Shell| shell.nearest(place, within * self.diameter).map(|found| found.square);
+        let nearest = self.shells.iter().filter_map(square).fold(f64::INFINITY, f64::min).sqrt();
+        (self.travel + (nearest / self.diameter).min(within)) as f32 - SLACK
+    }
+
+    /// What a grain touches.
+    fn touch(&self, asking: &Asking, leaves: &mut [Leaves], row: &mut Row, touches: &mut Vec<Touch>) {
+        let Asking { slot, place, reach, within } = *asking;
+        let mut free = within;
+        for (shell, leaves) in self.shells.iter().zip(leaves) {
+            let Some(nearest) = shell.nearest_of(leaves, place, within * self.diameter) else { continue };
+            let distance = nearest.square.sqrt() / self.diameter;
+            free = free.min(distance);
+            if distance <= reach + nearest.motion.norm() / self.diameter {
+                let touch = shell.touch(slot, row, place, &nearest, self.diameter, self.dt);
+                let is_close = dot(touch.normal, row.place) - touch.offset < rest::NEAR;
+                let moves = nearest.motion.norm() > 1.0e-6 * self.diameter;
+                if !row.rests() || is_close && moves {
+                    rest::wake(row);
+                    touches.push(touch);
+                }
+            }
+        }
+        row.limit = (self.travel + free) as f32 - SLACK;
+    }
+}
+
+/// Distance (diameters) between a grain's centre and a mesh at which they count as near.
+const REACH: f64 = 0.5 + SKIN as f64;
+/// How much farther meshes are looked for, so that a grain need not ask in every sub-step (diameters).
+const AHEAD: f64 = 1.5;
+
+/// Room for rounding (diameters).
+const SLACK: f32 = 1.0e-3;
