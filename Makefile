@@ -29,7 +29,9 @@ demo: setup
 	target/release/frazil preview $(DEMO)/cube/base/base.0007.vdb -o $(DEMO)/cube.png
 	target/release/frazil snow $(DEMO)/ball.toml -o $(DEMO)/ball
 	target/release/frazil preview $(DEMO)/ball/base/base.0024.vdb -o $(DEMO)/ball.png
-	@echo "Pictures: $(DEMO)/hero.png $(DEMO)/walker.png $(DEMO)/print.png $(DEMO)/box.png $(DEMO)/cube.png $(DEMO)/ball.png; volumes: $(DEMO)/hero/base/*.vdb; the whole shot: $(DEMO)/hero/shot.usda"
+	target/release/frazil snow $(DEMO)/plough.toml -o $(DEMO)/plough
+	target/release/frazil preview $(DEMO)/plough/base/base.0022.vdb $(DEMO)/plough/grains/grains.0022.vdb $(DEMO)/plough/objects/objects.0022.ply -o $(DEMO)/plough.png --eye -0.95,0.85,0.75 --target 0.1,0.3,0.0 --sun 60,22
+	@echo "Pictures: $(DEMO)/hero.png $(DEMO)/walker.png $(DEMO)/print.png $(DEMO)/box.png $(DEMO)/cube.png $(DEMO)/ball.png $(DEMO)/plough.png (grains); volumes: $(DEMO)/hero/base/*.vdb; the whole shot: $(DEMO)/hero/shot.usda"
 
 lint:
 	@if cargo fmt --version >/dev/null 2>&1; then cargo fmt --all --check; else echo "lint: rustfmt is not installed, skipped"; fi

@@ -68,6 +68,8 @@ pub const GATES: &[Gate] = &[
     // Whole passes: the bytes of a grain in its file, and the same files after kills and from 1 and 2 threads.
     gate("snow.grains.file_bytes", "B", Most(44.0), Most(32.0)),
     yes("snow.grains.same_pass"),
+    // Whole files that are made from those of changes, against a run that writes whole ones.
+    yes("snow.grains.same_delta"),
     // From a cancel to the return of a step, through C.
     gate("snow.grains.cancel_p99", "s", Most(0.2), Most(0.05)),
     // All grains at work.

@@ -1,4 +1,5 @@
-//! Gates of whole passes with grains: the bytes of their files, and the same ones after a kill and from any number of threads.
+//! Gates of whole passes with grains: the bytes of their files, and the same ones after a kill, from any number of threads and
+//! from files of changes.
 
 use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
@@ -18,14 +19,13 @@ const MEASURED: (i32, f64) = (64, 0.009);
 const REPEATED: (i32, f64) = (32, 0.012);
 
 pub fn run(h: &mut Harness) {
-    let [bytes, same] = ["snow.grains.file_bytes", "snow.grains.same_pass"];
-    if !h.wants(bytes) && !h.wants(same) {
+    let all @ [bytes, same, delta] =
+        ["snow.grains.file_bytes", "snow.grains.same_pass", "snow.grains.same_delta"];
+    if !all.iter().any(|name| h.wants(name)) {
         return;
     }
     let Some(man) = data("character/CesiumMan.glb") else {
-        for name in [bytes, same] {
-            h.skipped(name, "no data");
-        }
+        all.iter().for_each(|name| h.skipped(name, "no data"));
         return;
     };
     let folder = tempfile::tempdir().expect("a folder");
@@ -56,6 +56,34 @@ pub fn run(h: &mut Harness) {
         );
         h.holds(same, once == alone && once == killed && kills.len() > 2, &note);
     }
+    if h.wants(delta) {
+        let (scene, full, _) = made(REPEATED, "full", 2);
+        let changes = folder.path().join("changes");
+        let mut run = pass(&scene, &changes, 2);
+        assert!(run.args(["--set", "output.grains_mode=delta"]).status().expect("frazil").success());
+        let (same, sizes) = rebuilt(&changes, &full, REPEATED.0);
+        let note = format!("{} frames, {:.0} % of the bytes", REPEATED.0, 100.0 * sizes[0] / sizes[1]);
+        h.holds(delta, same, &note);
+    }
+}
+
+/// Whether the files that are made from a folder of changes are those of a folder of whole ones; the bytes of both folders' files.
+fn rebuilt(changes: &Path, full: &Path, frames: i32) -> (bool, [f64; 2]) {
+    let whole = changes.with_file_name("whole.%04d.vdb");
+    let mut rebuild = Command::new(env!("CARGO_BIN_EXE_frazil"));
+    rebuild.args(["vdb", "rebuild", "--stage", "grains", "--frame", &format!("1-{frames}"), "-q"]);
+    assert!(rebuild.arg(changes).arg("-o").arg(&whole).status().expect("frazil").success());
+    let file = |out: &Path, frame: i32| out.join(format!("grains/grains.{frame:04}.vdb"));
+    let is_same = |frame: i32| {
+        let whole = whole.with_file_name(format!("whole.{frame:04}.vdb"));
+        character::apart_from_settings(&whole, changes, frame)
+            == character::apart_from_settings(&file(full, frame), full, frame)
+    };
+    let size = |out: &Path| -> f64 {
+        let bytes = |frame: i32| std::fs::metadata(file(out, frame)).expect("a file").len() as f64;
+        (1..=frames).map(bytes).sum()
+    };
+    ((1..=frames).all(is_same), [changes, full].map(size))
 }
 
 /// Prints how many bytes a grain has without each attribute.

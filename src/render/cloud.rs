@@ -18,6 +18,8 @@ const TILE: usize = 32;
 const AREA: usize = TILE * TILE;
 /// Spheres between two looks at whether a tile is full.
 const LOOK: usize = 64;
+/// As [`Hit::wrap`]: grains of snow let light through.
+const WRAP: f64 = 0.5;
 /// Least radius of a sphere on the picture (samples): a smaller one could slip between samples.
 const LEAST_SEEN: f64 = 0.75;
 
@@ -79,6 +81,11 @@ impl Cloud {
         });
         let bounds = boxes.reduce(|a, b| (a.0.inf(&b.0), a.1.sup(&b.1)));
         Ok(Self { spheres, bounds })
+    }
+
+    /// Centres and radii of its spheres (m).
+    pub(super) fn spheres(&self) -> impl Iterator<Item = (DVec3, f64)> + '_ {
+        self.spheres.iter().map(|sphere| (sphere.centre, sphere.radius))
     }
 
     /// Its least and greatest corner (m); none when it is empty.
@@ -167,7 +174,8 @@ impl<'a> Splats<'a> {
         // Spheres that were made larger have the same normals as others.
         let normal = (eye + toward * distance - centre).try_normalize(0.0).unwrap_or(-toward);
         let skin = 0.01 * radius.max(1e-9);
-        Some(Hit { distance, normal, albedo: Colour::from(albedo.map(f64::from)), skin })
+        let albedo = Colour::from(albedo.map(f64::from));
+        Some(Hit { distance, normal, albedo, skin, wrap: WRAP })
     }
 }
 

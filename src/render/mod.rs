@@ -18,6 +18,7 @@ mod models;
 mod picture;
 mod ramp;
 mod shade;
+mod shadows;
 #[cfg(feature = "vdb")]
 mod volume;
 

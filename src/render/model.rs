@@ -25,6 +25,8 @@ pub(super) struct Hit {
     pub albedo: Colour,
     /// As [`Model::skin`].
     pub skin: f64,
+    /// How far light reaches round to the side that is turned away from the sun: 0 for a surface, 1 for all around.
+    pub wrap: f64,
 }
 
 impl Model {
@@ -59,7 +61,7 @@ impl Model {
         let normal = if flat.dot(&toward) > 0.0 { -smooth } else { smooth };
         let away = normal.dot(&toward).max(0.0);
         let normal = (normal - toward * away).try_normalize(0.0).unwrap_or(-toward);
-        Some(Hit { distance: hit.distance, normal, albedo: self.albedo, skin: self.skin })
+        Some(Hit { distance: hit.distance, normal, albedo: self.albedo, skin: self.skin, wrap: 0.0 })
     }
 
     /// Whether the surface hides a direction from a point.

@@ -5,6 +5,7 @@ use super::cloud::{Cloud, Splats};
 use super::model::{Hit, Model};
 use super::picture::Picture;
 use super::shade::{Colour, Light, shade, to_bytes};
+use super::shadows::Shadows;
 use crate::base::DVec3;
 use crate::context::Context;
 use crate::error::{Error, Result};
@@ -14,6 +15,13 @@ use rayon::prelude::*;
 const SAMPLES: usize = 3;
 /// Longest edge of a picture (pixels).
 const LONGEST: u32 = 16_384;
+
+/// The light, and the points that are in its way.
+#[derive(Clone, Copy)]
+struct Lit<'a> {
+    light: &'a Light,
+    shadows: Option<&'a Shadows>,
+}
 
 /// The models in one picture.
 pub struct Models {
@@ -27,8 +35,7 @@ impl Models {
         Self { models, clouds: Vec::new() }
     }
 
-    /// With clouds of points beside them. Points get light from the sun and the sky as far as models let it through;
-    /// they cast no shadows themselves.
+    /// With clouds of points beside them, which get light from the sun and the sky and cast shadows as models do.
     pub fn with_clouds(self, clouds: Vec<Cloud>) -> Self {
         Self { clouds, ..self }
     }
@@ -51,13 +58,15 @@ impl Models {
         }
         ctx.phase("draw", || {
             let splats = Splats::new(ctx, &self.clouds, camera, size, SAMPLES)?;
+            let shadows = Shadows::new(&self.clouds);
+            let scene = Lit { light, shadows: shadows.as_ref() };
             let lens = camera.lens(size);
             let row_bytes = 3 * size.width as usize;
             let mut rgb = vec![0; row_bytes * size.height as usize];
             rgb.par_chunks_mut(row_bytes).enumerate().try_for_each(|(y, row)| {
                 ctx.check()?;
                 for (x, pixel) in row.chunks_mut(3).enumerate() {
-                    pixel.copy_from_slice(&self.pixel(&splats, &lens, camera.eye, light, [x, y]));
+                    pixel.copy_from_slice(&self.pixel(&splats, &lens, camera.eye, scene, [x, y]));
                 }
                 Ok(())
             })?;
@@ -70,7 +79,7 @@ impl Models {
         splats: &Splats<'_>,
         lens: &Lens,
         eye: DVec3,
-        light: &Light,
+        scene: Lit<'_>,
         [x, y]: [usize; 2],
     ) -> [u8; 3] {
         let mut sum = Colour::zeros();
@@ -79,18 +88,21 @@ impl Models {
             let (right, down) = (sample % SAMPLES, sample / SAMPLES);
             let toward = lens.through(x as f64 + inside(right), y as f64 + inside(down));
             let splat = splats.at(x * SAMPLES + right, y * SAMPLES + down, eye, toward);
-            sum += self.seen(eye, toward, light, sample, splat);
+            sum += self.seen(eye, toward, scene, sample, splat);
         }
         to_bytes(sum / (SAMPLES * SAMPLES) as f64)
     }
 
     /// Light that comes along a ray, which meets a point of a cloud or none.
-    fn seen(&self, eye: DVec3, toward: DVec3, light: &Light, sample: usize, splat: Option<Hit>) -> Colour {
+    fn seen(&self, eye: DVec3, toward: DVec3, scene: Lit<'_>, sample: usize, splat: Option<Hit>) -> Colour {
         let hits = self.models.iter().filter_map(|model| model.hit(eye, toward)).chain(splat);
         let nearest = hits.reduce(|a: Hit, b| if b.distance < a.distance { b } else { a });
-        let Some(hit) = nearest else { return light.background(toward) };
+        let Some(hit) = nearest else { return scene.light.background(toward) };
         let point = eye + toward * hit.distance + hit.normal * hit.skin;
-        let blocked = |direction| self.models.iter().any(|model| model.blocks(point, direction));
-        shade(light, hit.normal, hit.albedo, sample, blocked)
+        let blocked = |direction| {
+            self.models.iter().any(|model| model.blocks(point, direction))
+                || scene.shadows.is_some_and(|shadows| shadows.block(point, direction))
+        };
+        shade(scene.light, hit.normal, hit.albedo, sample, hit.wrap, blocked)
     }
 }

@@ -62,18 +62,19 @@ fn sky(height: f64) -> Colour {
 /// Light that leaves a point towards the camera.
 ///
 /// `blocked(direction)` returns whether something hides that direction from the point; `sample` numbers the
-/// samples of this pixel.
+/// samples of this pixel; `wrap` is how far light reaches round to the side that is turned away, 0 to 1.
 pub(super) fn shade(
     light: &Light,
     normal: DVec3,
     albedo: Colour,
     sample: usize,
+    wrap: f64,
     blocked: impl Fn(DVec3) -> bool,
 ) -> Colour {
     let (side, other) = tangents(light.sun);
     let (x, y) = disc(sample);
     let toward_sun = (light.sun + (side * x + other * y) * SUN_RADIUS).normalize();
-    let facing = normal.dot(&toward_sun);
+    let facing = (normal.dot(&toward_sun) + wrap) / (1.0 + wrap);
     let sun = if facing > 0.0 && !blocked(toward_sun) { SUN * facing } else { Colour::zeros() };
     let (side, other) = tangents(normal);
     let mut fill = Colour::zeros();
@@ -135,8 +136,8 @@ mod tests {
     fn a_shadow_is_darker_and_bluer_than_the_sunny_side() {
         let light = Light::from_degrees(90.0, 45.0);
         let albedo = Colour::new(0.9, 0.9, 0.9);
-        let lit = shade(&light, DVec3::y(), albedo, 0, |_| false);
-        let shadowed = shade(&light, DVec3::y(), albedo, 0, |toward| toward.dot(&light.sun) > 0.99);
+        let lit = shade(&light, DVec3::y(), albedo, 0, 0.0, |_| false);
+        let shadowed = shade(&light, DVec3::y(), albedo, 0, 0.0, |toward| toward.dot(&light.sun) > 0.99);
         assert!(lit.x > 2.0 * shadowed.x);
         assert!(shadowed.z / shadowed.x > lit.z / lit.x);
     }

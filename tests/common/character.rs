@@ -127,3 +127,16 @@ pub fn output(folder: &Path) -> BTreeMap<String, Vec<u8>> {
     }
     out
 }
+
+/// The bytes of a file of grains without what two runs with other settings have by themselves: the file's identifier, and the
+/// hash of what a frame of stage grains in a folder was made from.
+pub fn apart_from_settings(file: &Path, out: &Path, frame: i32) -> Vec<u8> {
+    let record = std::fs::read(out.join(format!("state/grains.{frame:04}.json"))).unwrap();
+    let record: serde_json::Value = serde_json::from_slice(&record).unwrap();
+    let hash = record["content"]["inputs"].as_str().unwrap().as_bytes().to_vec();
+    let mut bytes = std::fs::read(file).unwrap();
+    bytes[21..57].fill(b'-');
+    let found = bytes.windows(hash.len()).position(|window| window == hash).expect("the hash of its inputs");
+    bytes[found..found + hash.len()].fill(b'-');
+    bytes
+}

@@ -8,5 +8,6 @@ pub mod folded;
 pub mod header;
 pub mod hero;
 pub mod shapes;
+pub mod sleigh;
 pub mod tools;
 pub mod walk;

@@ -6,6 +6,7 @@ mod common {
     pub mod boot;
     pub mod hero;
     pub mod shapes;
+    pub mod sleigh;
     pub mod walk;
 }
 
@@ -15,8 +16,11 @@ use std::path::Path;
 use common::boot::{left_boot, right_boot};
 use common::hero;
 use common::shapes::{cuboid, sphere};
+use common::sleigh::sleigh;
 use common::walk::{Step, walk};
-use frazil::io::{atomic, mesh};
+use frazil::base::points::Points;
+use frazil::base::{DVec3, TriMesh, Vec3};
+use frazil::io::{atomic, mesh, points_ply};
 
 fn main() -> frazil::Result<()> {
     let folder = std::env::args().nth(1).unwrap_or_else(|| "target/demo".into());
@@ -27,6 +31,9 @@ fn main() -> frazil::Result<()> {
     mesh::write(&folder.join("box.obj"), &cuboid([0.2; 3]))?;
     mesh::write(&folder.join("cube.obj"), &cuboid([0.4; 3]))?;
     mesh::write(&folder.join("ball.obj"), &sphere(0.18, 32))?;
+    mesh::write(&folder.join("sleigh.obj"), &sleigh())?;
+    mesh::write(&folder.join("drifts.obj"), &drifts())?;
+    atomic::write_bytes(&folder.join("column.ply"), &points_ply::to_bytes(&column()?)?)?;
     atomic::write_bytes(&folder.join("hero.glb"), &hero::glb())?;
     for (name, text) in [
         ("hero", hero()),
@@ -34,10 +41,56 @@ fn main() -> frazil::Result<()> {
         ("box", sliding_box()),
         ("cube", turning_cube()),
         ("ball", rolling_ball()),
+        ("plough", plough()),
     ] {
         atomic::write_bytes(&folder.join(format!("{name}.toml")), text.as_bytes())?;
     }
     Ok(())
+}
+
+/// The surface of snow that the wind has shaped, 3.2 x 6 m around the origin, some 0.27 m above the ground.
+fn drifts() -> TriMesh {
+    const EDGE: f32 = 0.03;
+    let [across, along] = [107u32, 201];
+    let height = |x: f32, z: f32| {
+        let bend = x + 0.35 * (0.9 * z).sin() + 0.12 * (2.3 * z + x).sin();
+        let ripples = 0.6 + 0.4 * (1.3 * x - 0.8 * z).sin();
+        0.27 + 0.035 * (2.1 * bend + 0.8 * z).sin() + 0.008 * ripples * (13.0 * bend + 4.0 * z).sin()
+    };
+    let place = |index: u32| {
+        let [x, z] = [(index % across, across), (index / across, along)]
+            .map(|(at, count)| EDGE * (at as f32 - 0.5 * (count - 1) as f32));
+        Vec3::new(x, height(x, z), z)
+    };
+    let square = |index: u32| {
+        let [a, b, c, d] = [index, index + across, index + across + 1, index + 1];
+        [[a, b, c], [a, c, d]]
+    };
+    let is_square = |index: &u32| index % across + 1 < across && index / across + 1 < along;
+    let triangles = (0..across * along).filter(is_square).flat_map(square).collect();
+    TriMesh { positions: (0..across * along).map(place).collect(), triangles }
+}
+
+/// A block of loose grains of a diameter of 6 mm, 0.18 x 0.18 x 0.18 m, that stands at a height of 0.1 m; they do not touch.
+fn column() -> frazil::Result<Points> {
+    const APART: f64 = 0.0062;
+    let mut state = 1u64;
+    // Numbers that look random and are always the same (Knuth's MMIX).
+    let mut off = || {
+        state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+        ((state >> 40) as f64 / (1u64 << 24) as f64 - 0.5) * 0.02 * APART
+    };
+    let mut places = Vec::new();
+    for layer in 0..40 {
+        for (x, z) in (0..29).flat_map(|x| (0..29).map(move |z| (x, z))) {
+            // Each layer lies in the hollows of the one below.
+            let shift = 0.5 * f64::from(layer % 2) - 14.25;
+            let at = [f64::from(x) + shift, f64::from(layer) * 0.5f64.sqrt() + 0.5, f64::from(z) + shift];
+            let [x, y, z] = at.map(|at| at * APART + off());
+            places.push(DVec3::new(x, y + 0.1, z));
+        }
+    }
+    Points::at(APART, &places)
 }
 
 fn head(frames: &str, area: [f64; 4], cell: f64) -> String {
@@ -95,6 +148,17 @@ fn sliding_box() -> String {
 fn turning_cube() -> String {
     let mut text = head("1-7", [-0.6, -0.6, 0.6, 0.6], 0.005);
     object(&mut text, "cube.obj", &two_keys(7, [0.0, 0.35, 0.0], [0.0, 0.35, 0.0], [30.0, 60.0, 90.0]));
+    text
+}
+
+/// A ball that is pulled through the snow and heaps it up: with grains.
+fn plough() -> String {
+    let mut text = head("1-22", [-0.5, -0.45, 0.7, 0.45], 0.009);
+    text.push_str(
+        "noise = { amplitude = 0.004, size = 0.05 }\n\n[grains]\npreset = \"packed\"\ncompression = 0.3\n",
+    );
+    text.push_str("\n[output]\nobjects = [\"ply\"]\n");
+    object(&mut text, "ball.obj", &two_keys(22, [-0.8, 0.4, 0.0], [0.35, 0.36, 0.0], [0.0; 3]));
     text
 }
 

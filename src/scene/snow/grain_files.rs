@@ -5,12 +5,14 @@
 //! are gone. What a grain has from its birth is 0 there unless it was just born. A grain that the file does not hold is not
 //! trapped: states from which runs resume do not know which were.
 
+use std::ops::RangeInclusive;
 use std::path::Path;
 
 use super::base;
 use crate::base::points::{Column, Points, Values};
 use crate::context::Context;
 use crate::error::{Error, Result};
+use crate::io::hash::Hasher;
 use crate::io::mesh::extension;
 use crate::scene::Scene;
 use crate::scene::shot::{FrameFiles, Stored};
@@ -23,7 +25,9 @@ pub(super) const WHOLE_EVERY: i32 = 24;
 const SINCE: &str = "frazil:changes_since";
 /// Metadata of a file of changes: the identities that are gone since.
 const GONE: &str = "frazil:gone";
-/// Most identities that a file may name.
+/// Metadata of a file of changes: [`print_of`] the grains before.
+const OF: &str = "frazil:changes_of";
+/// Identities are below this.
 const MOST: i64 = 1 << 32;
 
 /// The frame since which a .vdb file holds changes; none where it is whole.
@@ -100,7 +104,8 @@ pub(super) fn write(
         Some(before) => {
             let (changed, gone) = changes(before, points);
             metadata.push((SINCE.into(), MetaValue::Int(i64::from(files.frame) - 1)));
-            metadata.push((GONE.into(), MetaValue::Text(listed(&gone))));
+            metadata.push((OF.into(), MetaValue::Text(print_of(before))));
+            metadata.push((GONE.into(), MetaValue::Text(listed(&runs(&gone)))));
             bytes(&changed, metadata)?
         }
     };
@@ -109,6 +114,19 @@ pub(super) fn write(
 
 /// Name of the grid, of its folder and of the files in it.
 const NAME: &str = "grains";
+
+/// A hash of which grains there are and where, in the order of [`ordered`].
+fn print_of(points: &Points) -> String {
+    let mut hash = Hasher::default();
+    for id in ids(points) {
+        hash.add(&id.to_le_bytes());
+    }
+    for (cell, offset) in points.cells.iter().zip(&points.offsets) {
+        cell.iter().for_each(|at| _ = hash.add(&at.to_le_bytes()));
+        offset.iter().for_each(|at| _ = hash.add(&at.to_bits().to_le_bytes()));
+    }
+    hash.finish()
+}
 
 /// The points that are new or not as they were, and the identities that are gone.
 fn changes(before: &Points, after: &Points) -> (Points, Vec<i64>) {
@@ -188,61 +206,90 @@ fn is_same(before: &Points, was: usize, after: &Points, point: usize) -> bool {
 ///
 /// # Errors
 /// Changes of other points.
-fn follow(mut points: Points, mut changed: Points, gone: &[i64]) -> Result<Points> {
+fn follow(mut points: Points, mut changed: Points, gone: &[Run]) -> Result<Points> {
     let (old, new) = (ids(&points), ids(&changed));
     let were: Vec<Option<usize>> = new.iter().map(|id| old.binary_search(id).ok()).collect();
     of_birth(&mut changed, Some(&points), &were);
-    if let Some(id) = gone.iter().find(|id| old.binary_search(id).is_err()) {
-        return Err(Error::argument(format!("names grain {id} as gone, which was not there")));
+    let mut stays = vec![true; old.len()];
+    for run in gone {
+        let ends = [run.start(), run.end()].map(|id| old.binary_search(id));
+        // Identities differ, so that only a run of which each was there takes as many places.
+        match ends {
+            [Ok(low), Ok(high)] if (high - low) as i64 == run.end() - run.start() => {
+                stays[low..=high].fill(false);
+            }
+            _ => {
+                let run = listed(std::slice::from_ref(run));
+                return Err(Error::argument(format!("names grains as gone ({run}) that were not there")));
+            }
+        }
     }
-    let is_kept = |point: &u32| {
-        let id = old[*point as usize];
-        gone.binary_search(&id).is_err() && new.binary_search(&id).is_err()
-    };
-    let kept: Vec<u32> = (0..old.len() as u32).filter(is_kept).collect();
+    for was in were.iter().flatten() {
+        if !std::mem::take(&mut stays[*was]) {
+            return Err(Error::argument(format!("names grain {} as gone, and holds it", old[*was])));
+        }
+    }
+    let kept: Vec<u32> = (0..old.len() as u32).filter(|point| stays[*point as usize]).collect();
     points.reorder(&kept);
     if points.count() > 0 {
         points.set(TRAPPED, FREE);
     }
-    points.append(changed)?;
+    points.append(changed).map_err(|_| Error::argument("holds grains with other attributes or voxels"))?;
     Ok(ordered(points))
 }
 
-/// The identities that a file names as gone; none where it is whole.
-fn gone(metadata: &[(String, MetaValue)]) -> Result<Option<Vec<i64>>> {
-    if since(metadata).is_none() {
-        return Ok(None);
+/// Identities one after the other.
+type Run = RangeInclusive<i64>;
+
+/// What the file of a frame says of the grains before it: those that are gone, and [`print_of`] all, if it has that. None where
+/// it is whole.
+fn told_of_before(
+    frame: i32,
+    metadata: &[(String, MetaValue)],
+) -> Result<Option<(Vec<Run>, Option<String>)>> {
+    match since(metadata) {
+        None => return Ok(None),
+        Some(since) if since == frame - 1 => {}
+        Some(since) => return Err(Error::argument(format!("holds what changed since frame {since}"))),
     }
-    let text = metadata.iter().find_map(|(key, value)| match value {
-        MetaValue::Text(text) if key == GONE => numbers(text),
-        _ => None,
-    });
-    text.map(Some).ok_or_else(|| Error::argument(format!("has no list of the grains that are gone ({GONE})")))
-}
-
-/// Ascending numbers as ranges: `3-7,12`.
-fn listed(numbers: &[i64]) -> String {
-    let runs = numbers.chunk_by(|a, b| *b == a + 1);
-    let run = |run: &[i64]| match run {
-        [only] => only.to_string(),
-        _ => format!("{}-{}", run[0], run[run.len() - 1]),
+    let text = |wanted: &str| {
+        metadata.iter().find_map(|(key, value)| match value {
+            MetaValue::Text(text) if key == wanted => Some(text),
+            _ => None,
+        })
     };
-    runs.map(run).collect::<Vec<_>>().join(",")
+    let runs = text(GONE).and_then(|text| runs_of_text(text));
+    runs.map(|runs| Some((runs, text(OF).cloned())))
+        .ok_or_else(|| Error::argument(format!("has no list of the grains that are gone ({GONE})")))
 }
 
-/// What [`listed`] listed.
-fn numbers(text: &str) -> Option<Vec<i64>> {
-    let mut out = Vec::new();
+/// Ascending numbers as runs.
+fn runs(numbers: &[i64]) -> Vec<Run> {
+    numbers.chunk_by(|a, b| *b == a + 1).map(|run| run[0]..=run[run.len() - 1]).collect()
+}
+
+/// Runs as text: `3-7,12`.
+fn listed(runs: &[Run]) -> String {
+    let run = |run: &Run| match (run.start(), run.end()) {
+        (low, high) if low == high => low.to_string(),
+        (low, high) => format!("{low}-{high}"),
+    };
+    runs.iter().map(run).collect::<Vec<_>>().join(",")
+}
+
+/// What [`listed`] listed. They stay runs: a text of a few letters may name four billion numbers.
+fn runs_of_text(text: &str) -> Option<Vec<Run>> {
+    let mut out: Vec<Run> = Vec::new();
     for run in text.split(',').filter(|run| !run.is_empty()) {
         let (low, high) = run.split_once('-').unwrap_or((run, run));
         let (low, high) = (low.parse::<i64>().ok()?, high.parse::<i64>().ok()?);
         if !(0..MOST).contains(&low)
             || !(low..MOST).contains(&high)
-            || out.last().is_some_and(|last| low <= *last)
+            || out.last().is_some_and(|last| low <= *last.end())
         {
             return None;
         }
-        out.extend(low..=high);
+        out.push(low..=high);
     }
     Some(out)
 }
@@ -283,19 +330,22 @@ impl RebuildGrains {
                 break points;
             }
             let (points, of_file) = self.read(at)?;
-            let gone = gone(&of_file).map_err(|error| self.wrong(at, error))?;
+            let told = told_of_before(at, &of_file).map_err(|error| self.wrong(at, error))?;
             metadata.get_or_insert(of_file);
-            match gone {
+            match told {
                 None => break points,
-                Some(gone) => later.push((at, points, gone)),
+                Some((gone, of)) => later.push((at, points, gone, of)),
             }
             at -= 1;
         };
-        for (at, changed, gone) in later.into_iter().rev() {
+        for (at, changed, gone, of) in later.into_iter().rev() {
+            if of.is_some_and(|of| of != print_of(&points)) {
+                return Err(self.wrong(at, Error::argument("holds changes of other grains")));
+            }
             points = follow(points, changed, &gone).map_err(|error| self.wrong(at, error))?;
         }
         let mut metadata = metadata.unwrap_or_default();
-        metadata.retain(|(key, _)| key.starts_with("frazil:") && key != SINCE && key != GONE);
+        metadata.retain(|(key, _)| key.starts_with("frazil:") && ![SINCE, GONE, OF].contains(&&key[..]));
         let bytes = points::to_bytes(ctx, NAME, &points, &WriteOptions { metadata, ..options.clone() });
         self.at = Some((frame, points));
         bytes
@@ -318,7 +368,12 @@ impl RebuildGrains {
                 format!("frame {frame} has no .vdb file in {NAME}/"),
             ));
         }
-        Ok((ordered(points::read_own(&path, None)?), file::metadata(&path)?))
+        let points = ordered(points::read_own(&path, None)?);
+        let ids = ids(&points);
+        if ids.len() != points.count() || !ids.is_sorted_by(|one, next| one < next) {
+            return Err(Error::file(path, "has grains that share an identity or have none (id)"));
+        }
+        Ok((points, file::metadata(&path)?))
     }
 }
 
@@ -371,7 +426,8 @@ mod tests {
                     assert_eq!(frames.get(point), if old.contains(&id) { 0 } else { id as i32 + 7 });
                 }
             }
-            let after = follow(pair[0].clone(), changed, &numbers(&listed(&gone)).unwrap()).unwrap();
+            let after =
+                follow(pair[0].clone(), changed, &runs_of_text(&listed(&runs(&gone))).unwrap()).unwrap();
             assert_eq!(after.cells, pair[1].cells);
             assert_eq!(after.offsets, pair[1].offsets);
             assert!(after.count() == 0 || after.attributes == pair[1].attributes, "{after:?}");
@@ -383,17 +439,21 @@ mod tests {
             sizes,
             [(3, none()), (3, none()), (0, vec![0, 3]), (1, none()), (0, vec![1, 4]), (1, none())]
         );
-        assert!(follow(points(&[(1, 0.0, false)]), points(&[]), &[2]).is_err());
+        let there = || points(&[(1, 0.0, false), (2, 0.0, false), (4, 0.0, false)]);
+        for (held, gone) in [(&[][..], 3..=3), (&[], 2..=4), (&[], 1..=MOST - 1), (&[(2, 1.0, false)], 1..=2)]
+        {
+            assert!(follow(there(), points(held), &[gone]).is_err());
+        }
     }
 
     #[test]
     fn identities_are_listed_as_ranges() {
-        assert_eq!(listed(&[3, 4, 5, 6, 7, 12]), "3-7,12");
+        assert_eq!(listed(&runs(&[3, 4, 5, 6, 7, 12])), "3-7,12");
         for list in [vec![], vec![0], vec![1, 2], vec![0, 2, 3, 9, 100_000]] {
-            assert_eq!(numbers(&listed(&list)), Some(list));
+            assert_eq!(runs_of_text(&listed(&runs(&list))), Some(runs(&list)));
         }
         for wrong in ["x", "3-1", "-1", "5,4", "5,5", "1-5000000000000", "1-2-3"] {
-            assert_eq!(numbers(wrong), None, "{wrong}");
+            assert_eq!(runs_of_text(wrong), None, "{wrong}");
         }
     }
 }

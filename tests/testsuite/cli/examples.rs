@@ -82,8 +82,12 @@ fn the_readme_takes_a_character_through_snow() {
 
 #[test]
 fn the_example_scenes_are_sound() {
-    for name in ["walking_character", "walking_robot", "bunny_imprint", "bunny_slide"] {
-        let path = Path::new(env!("CARGO_MANIFEST_DIR")).join(format!("examples/scenes/{name}.toml"));
+    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("examples/scenes");
+    let paths: Vec<_> = fs::read_dir(folder).unwrap().map(|entry| entry.unwrap().path()).collect();
+    assert_eq!(paths.len(), 10);
+    for path in paths {
+        let name = path.file_stem().unwrap().to_string_lossy().into_owned();
+        assert!(README.contains(&name), "the README does not name {name}");
         let scene = frazil::scene::Scene::read(&path).unwrap();
         // The command in the comment is the one that the README gives, with this scene's file.
         let text = fs::read_to_string(&path).unwrap();

@@ -1,22 +1,23 @@
 //! Files of grains: whole ones, changes from which whole ones are made again, and the stage in USD.
 
 use std::fs;
-use std::path::Path;
+use std::path::{Path, PathBuf};
+
+use frazil::base::DVec3;
+use frazil::base::points::{Column, Points, Values};
+use frazil::io::manifest::{Manifest, Written};
+use frazil::scene::RebuildGrains;
+use frazil::vdb::file::{self, WriteOptions};
+use frazil::vdb::{MetaValue, points};
+use frazil::{Context, Pool};
 
 use super::shot_grains::{folder, grains};
-use crate::program::{fails, works};
+use crate::common::character;
+use crate::program::{fails, frazil, works};
 
-/// A file's bytes without what two runs with other settings have by themselves: the file's identifier, and the hash of what
-/// frame `frame` of stage grains in folder `out` was made from.
+/// The bytes of a file of grains apart from settings, all paths from folder `at`.
 fn apart_from_settings(at: &Path, file: &str, out: &str, frame: i32) -> Vec<u8> {
-    let record = fs::read(at.join(format!("{out}/state/grains.{frame:04}.json"))).unwrap();
-    let record: serde_json::Value = serde_json::from_slice(&record).unwrap();
-    let hash = record["content"]["inputs"].as_str().unwrap().as_bytes().to_vec();
-    let mut bytes = fs::read(at.join(file)).unwrap();
-    bytes[21..57].fill(b'-');
-    let found = bytes.windows(hash.len()).position(|window| window == hash).expect("the hash of its inputs");
-    bytes[found..found + hash.len()].fill(b'-');
-    bytes
+    character::apart_from_settings(&at.join(file), &at.join(out), frame)
 }
 
 #[test]
@@ -93,6 +94,246 @@ fn changes_are_made_again_as_they_were_and_for_other_settings_anew() {
     fails(at, "snow shot.toml -o some -q --frames 5-7", 2, &["grains_mode", "frame 1"]);
     works(at, "snow shot.toml -o some -q --stage base");
     fails(at, "snow shot.toml -o some -q --stage grains --frames 5-7", 2, &["grains_mode", "frame 1"]);
+}
+
+#[test]
+fn changes_are_the_same_from_any_threads_stops_and_starts() {
+    // Some grains are always gone, and frame 25 is whole.
+    let folder = folder("compression = 0.4\nlifetime = 0.3\nradius = 0.005", "grains_mode = \"delta\"");
+    let at = folder.path();
+    let run = "snow shot.toml -q --set shot.frames=1-28";
+    works(at, &format!("{run} -o once --threads 2"));
+    let once = grains(at, "once");
+    assert_eq!(once.len(), 28);
+    works(at, &format!("{run} -o alone --threads 1"));
+    assert!(grains(at, "alone") == once);
+    // Stopped after changes, before a whole frame and after one; the base is there or not.
+    for (stops, stage) in [(&[7, 8, 24][..], ""), (&[25], ""), (&[1, 26], " --stage grains")] {
+        let out = format!("stopped{}", stops[0]);
+        if !stage.is_empty() {
+            works(at, &format!("{run} -o {out} --stage base"));
+        }
+        for stop in stops {
+            works(at, &format!("{run}{stage} -o {out} --frames 1-{stop}"));
+        }
+        works(at, &format!("{run}{stage} -o {out}"));
+        assert!(grains(at, &out) == once, "{stops:?}");
+    }
+    // Made again from a frame on: one of changes, a whole one, and all. What is kept before counts as an input then.
+    let apart = |out: &str| -> Vec<Vec<u8>> {
+        let file = |frame: i32| format!("{out}/grains/grains.{frame:04}.vdb");
+        (1..=28).map(|frame| apart_from_settings(at, &file(frame), out, frame)).collect()
+    };
+    let once_apart = apart("once");
+    for (end, from) in [(9, 9), (25, 25), (26, 26), (28, 28), (28, 1)] {
+        let out = format!("from{end}-{from}");
+        works(at, &format!("{run} -o {out} --stage base"));
+        works(at, &format!("{run} -o {out} --stage grains --frames 1-{end}"));
+        works(at, &format!("{run} -o {out} --stage grains --from {from}"));
+        assert!(apart(&out) == once_apart, "from {from} of {end}");
+    }
+    let rebuilt = |out: &str| {
+        works(at, &format!("vdb rebuild {out} --stage grains --frame 1-28 -o {out}.%04d.vdb"));
+        (1..=28).map(|frame| fs::read(at.join(format!("{out}.{frame:04}.vdb"))).unwrap()).collect::<Vec<_>>()
+    };
+    assert!(rebuilt("once") == rebuilt("alone"));
+}
+
+/// Numbers that look random and are always the same (splitmix64).
+struct Random(u64);
+
+impl Random {
+    fn below(&mut self, end: usize) -> usize {
+        self.0 = self.0.wrapping_add(0x9e37_79b9_7f4a_7c15);
+        let mut z = self.0;
+        z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
+        z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
+        ((z ^ (z >> 31)) % end.max(1) as u64) as usize
+    }
+
+    /// Bytes that are cut, longer, or have other bits.
+    fn damaged(&mut self, whole: &[u8]) -> Vec<u8> {
+        let mut bytes = whole.to_vec();
+        match self.below(4) {
+            0 => bytes.truncate(self.below(whole.len())),
+            1 => bytes.extend_from_slice(&whole[self.below(whole.len() - 1)..]),
+            _ => {
+                // More often among the first, where lengths and counts are.
+                let end = [whole.len(), 1500.min(whole.len())][self.below(2)];
+                for _ in 0..=self.below(4) {
+                    bytes[self.below(end)] ^= 1 << self.below(8);
+                }
+            }
+        }
+        bytes
+    }
+}
+
+/// How many damaged files are tried: as `FRAZIL_FUZZ` says, 10,000 when this was made.
+fn rounds(usual: usize) -> usize {
+    std::env::var("FRAZIL_FUZZ").ok().and_then(|text| text.parse().ok()).unwrap_or(usual)
+}
+
+#[test]
+fn damaged_changes_are_one_error_that_names_the_file() {
+    let folder = folder("compression = 0.4", "grains_mode = \"delta\"");
+    let at = folder.path();
+    works(at, "snow shot.toml -o out -q");
+    works(at, "snow shot.toml -o other -q --set grains.seed=1");
+    let (ctx, options) = (Context::new(Pool::new(1).unwrap()), WriteOptions::default());
+    let name = "grains/grains.0008.vdb";
+    let path = at.join("out").join(name);
+    let whole = fs::read(&path).unwrap();
+    let mut cache = RebuildGrains::open(&at.join("out")).unwrap();
+    let right = cache.bytes(&ctx, 9, &options).unwrap();
+    let mut random = Random(5);
+    for round in 0..rounds(2000) {
+        let bytes = random.damaged(&whole);
+        if bytes == whole {
+            continue;
+        }
+        fs::write(&path, &bytes).unwrap();
+        let mut opened = RebuildGrains::open(&at.join("out"));
+        // A file of another length is none of a frame that is done.
+        let frame = 8 + (round % 2) as i32;
+        for cache in [Some(&mut cache), opened.as_mut().ok()].into_iter().flatten() {
+            let error = cache.bytes(&ctx, frame, &options).expect_err("refused").to_string();
+            assert!(error.contains("grains.0008.vdb") || error.contains("frame 8 has no file"), "{error}");
+        }
+        // A whole file of a later frame helps nobody; those before are there.
+        if round % 100 == 0 {
+            cache.bytes(&ctx, 7, &options).unwrap();
+        }
+    }
+    fs::write(&path, &whole).unwrap();
+    assert!(cache.bytes(&ctx, 9, &options).unwrap() == right);
+
+    // One that is gone, one of another scene, and one of the same length.
+    let rebuild = |frame: i32| format!("vdb rebuild out --stage grains --frame {frame} -o x.vdb");
+    fs::remove_file(&path).unwrap();
+    fails(at, &rebuild(8), 2, &["out", "frame 8 is not there"]);
+    fails(at, &rebuild(9), 1, &["out", "frame 8 has no file in grains/"]);
+    works(at, &rebuild(7));
+    works(at, &rebuild(7).replace("x.vdb", "seven.vdb"));
+    let foreign = fs::read(at.join("other").join(name)).unwrap();
+    assert!(foreign != whole);
+    fs::write(&path, &foreign).unwrap();
+    for frame in [8, 9] {
+        let output = frazil(at, &rebuild(frame));
+        assert!(matches!(output.status.code(), Some(1 | 2)), "{output:?}");
+        let said = String::from_utf8(output.stderr).unwrap();
+        assert_eq!(said.matches("frazil: ").count(), 1, "{said}");
+    }
+    // With its record, too: changes of other grains.
+    let record = "state/grains.0008.json";
+    fs::copy(at.join("other").join(record), at.join("out").join(record)).unwrap();
+    for frame in [8, 9] {
+        fails(at, &rebuild(frame), 1, &["frame 8 of grains", "other grains"]);
+    }
+    assert!(!fs::read_dir(at.join("out/grains")).unwrap().any(|entry| entry.unwrap().path().ends_with("x")));
+    let said = works(at, "info other/grains/grains.0008.vdb");
+    assert!(said.contains("since frame 7"), "{said}");
+}
+
+#[test]
+fn damaged_changes_are_one_error_of_every_command() {
+    let folder = folder("compression = 0.4\nradius = 0.005", "grains_mode = \"delta\"");
+    let at = folder.path();
+    works(at, "snow shot.toml -o out -q --frames 1-3");
+    let whole = fs::read(at.join("out/grains/grains.0003.vdb")).unwrap();
+    let mut random = Random(6);
+    let commands = ["convert a.vdb a.ply", "info a.vdb", "preview a.vdb -o a.png --size 16x16"];
+    for round in 0..rounds(150) {
+        fs::write(at.join("a.vdb"), random.damaged(&whole)).unwrap();
+        let command = commands[[0, 0, 0, 1, 2][round % 5]];
+        let output = frazil(at, command);
+        let said = String::from_utf8_lossy(&output.stderr);
+        let errors =
+            said.lines().filter(|line| line.starts_with("frazil: ") && !line.starts_with("frazil: warn: "));
+        let errors = errors.count();
+        match output.status.code() {
+            Some(0) => assert!(errors == 0 && !said.contains("panicked"), "{said}"),
+            Some(1 | 2) => assert!(errors == 1 && said.contains("a.vdb"), "round {round}: {said}"),
+            other => panic!("{command} ended with {other:?}: {said}"),
+        }
+    }
+}
+
+/// A cache of one whole frame and one of changes, whose contents somebody made up: `changes` and the metadata of its file.
+fn made_up(at: &Path, changes: &Points, metadata: Vec<(String, MetaValue)>) -> PathBuf {
+    let ctx = Context::new(Pool::new(1).unwrap());
+    let out = at.join("made");
+    for kind in ["grains", "state"] {
+        fs::create_dir_all(out.join(kind)).unwrap();
+    }
+    for (frame, points, metadata) in [(1, &grains_of(&[1, 2, 3, 5, 8]), Vec::new()), (2, changes, metadata)] {
+        let options = WriteOptions { metadata, ..WriteOptions::default() };
+        let bytes = points::to_bytes(&ctx, "grains", points, &options).unwrap();
+        let path = format!("grains/grains.{frame:04}.vdb");
+        fs::write(out.join(&path), &bytes).unwrap();
+        let file = Written::new(path, &bytes);
+        let mut manifest = serde_json::json!({"frame": frame, "inputs": "", "keeps": "whole", "files": []});
+        manifest["files"] = serde_json::json!([file]);
+        let manifest: Manifest = serde_json::from_value(manifest).unwrap();
+        manifest.write(&out, "grains").unwrap();
+    }
+    out
+}
+
+/// Grains of these identities.
+fn grains_of(ids: &[i64]) -> Points {
+    let places: Vec<DVec3> = ids.iter().map(|id| DVec3::new(0.1, 0.1 * *id as f64, 0.0)).collect();
+    let mut points = Points::at(0.1, &places).unwrap();
+    points.voxel_size = 0.1;
+    points.set("id", Values::Long(Column::Each(ids.to_vec())));
+    points.set("trapped", Values::Bool(Column::Uniform(false)));
+    points
+}
+
+#[test]
+fn changes_that_do_not_fit_are_refused() {
+    let folder = tempfile::tempdir().unwrap();
+    let ctx = Context::new(Pool::new(1).unwrap());
+    let rebuilt = |held: &Points, since: i64, gone: Option<&str>| {
+        let mut metadata = vec![("frazil:changes_since".into(), MetaValue::Int(since))];
+        metadata.extend(gone.map(|gone| ("frazil:gone".into(), MetaValue::Text(gone.into()))));
+        let out = made_up(folder.path(), held, metadata);
+        let mut cache = RebuildGrains::open(&out).unwrap();
+        cache.bytes(&ctx, 2, &WriteOptions::default()).map_err(|error| error.to_string())
+    };
+    let held = grains_of(&[2, 9]);
+    let bytes = rebuilt(&held, 1, Some("3,8")).unwrap();
+    let path = folder.path().join("whole.vdb");
+    fs::write(&path, bytes).unwrap();
+    let whole = points::read_own(&path, None).unwrap();
+    let Some(Values::Long(ids)) = whole.attribute("id") else { panic!("{whole:?}") };
+    let mut ids: Vec<i64> = (0..whole.count()).map(|point| ids.get(point)).collect();
+    ids.sort_unstable();
+    assert_eq!(ids, [1, 2, 5, 9]);
+    assert!(file::metadata(&path).unwrap().iter().all(|(key, _)| !key.starts_with("frazil:")));
+    // Many more than there can be are no reason to make room for them.
+    for gone in ["4", "1-4", "0-4294967295", "2-3", "1-2", "9", "5-8", "8-5", "1,1", "-", "1-", "x"] {
+        let error = rebuilt(&held, 1, Some(gone)).expect_err(gone);
+        assert!(error.contains("frame 2 of grains"), "{gone}: {error}");
+    }
+    for (held, since, gone) in [(&held, 0, Some("")), (&held, 2, Some("")), (&held, 1, None)] {
+        let error = rebuilt(held, since, gone).unwrap_err();
+        assert!(error.contains("frame 2 of grains"), "{error}");
+    }
+    let mut nameless = held.clone();
+    nameless.attributes.clear();
+    for held in [grains_of(&[2, 2]), nameless] {
+        let error = rebuilt(&held, 1, Some("")).unwrap_err();
+        assert!(error.contains("grains.0002.vdb") && error.contains("identity"), "{error}");
+    }
+    let mut random = Random(7);
+    for _ in 0..rounds(2000) {
+        let held: Vec<i64> = (0..12).filter(|_| random.below(3) == 0).collect();
+        let gone: String = (0..random.below(8)).map(|_| char::from(b"0123589,-"[random.below(9)])).collect();
+        if let Err(error) = rebuilt(&grains_of(&held), 1, Some(&gone)) {
+            assert!(error.contains("frame 2 of grains"), "{gone}: {error}");
+        }
+    }
 }
 
 #[test]
