@@ -258,11 +258,16 @@ impl Layout {
         pairs.filter(|overlap| *overlap > -0.02).map(|overlap| overlap.max(0.0)).collect()
     }
 
-    /// What all pairs carry, in the order of their grains: the same whether a pair was found in this step or kept.
-    pub fn held(&self) -> Vec<Held> {
-        let found = self.batches.par_iter().flat_map_iter(|batches| batches.iter().flat_map(Batch::held));
-        let is_kept = |(block, _): &&(u32, Held)| !self.blocks[*block as usize].is_found;
-        let all = found.chain(self.kept.par_iter().filter(is_kept).map(|(_, held)| *held));
+    /// What all pairs carry, in the order of their grains: the same whether a pair was found in this step or kept. The pairs
+    /// themselves are given up, block by block, so that there is no room for both.
+    pub fn take_held(&mut self) -> Vec<Held> {
+        let batches = std::mem::take(&mut self.batches);
+        let kept = std::mem::take(&mut self.kept);
+        let found = batches
+            .into_par_iter()
+            .flat_map_iter(|batches| batches.iter().flat_map(Batch::held).collect::<Vec<_>>());
+        let is_kept = |(block, _): &(u32, Held)| !self.blocks[*block as usize].is_found;
+        let all = found.chain(kept.into_par_iter().filter(is_kept).map(|(_, held)| held));
         let mut held: Vec<Held> = all.map(Held::in_order).collect();
         held.par_sort_unstable_by_key(|held| held.grains);
         held

@@ -227,8 +227,8 @@ impl Heap {
     }
 
     /// Keeps what the next step needs of a layout, and the grains that have not left it.
-    fn take_back(&mut self, layout: Layout) -> Result<()> {
-        self.held = layout.held();
+    fn take_back(&mut self, mut layout: Layout) -> Result<()> {
+        self.held = layout.take_held();
         self.touches = layout.blocks.iter().flat_map(|block| block.touches.iter().copied()).collect();
         self.touches.iter_mut().for_each(|touch| *touch = touch.kept());
         self.touches.par_sort_unstable_by_key(Touch::key);

@@ -112,7 +112,7 @@ pub const FASTEST: f32 = 10_000.0;
 
 /// Memory (bytes) of grains in a step, with the copy to which a failed step returns.
 pub fn memory(grains: usize) -> u64 {
-    (grains as u64).saturating_mul(700)
+    (grains as u64).saturating_mul(760)
 }
 
 impl Grains {
