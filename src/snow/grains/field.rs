@@ -19,27 +19,6 @@ pub struct Field<'a> {
 }
 
 impl Field<'_> {
-    /// Members of some blocks near the surface, each with the plane that the surface is there.
-    ///
-    /// # Errors
-    /// What the grid reports.
-    pub fn touches(
-        &self,
-        layout: &Layout,
-        which: &[u32],
-        rows: &[Row],
-        diameter: f64,
-        reach: f32,
-    ) -> Result<Vec<Vec<Touch>>> {
-        let windows = self.windows(layout, which, diameter, MARGIN)?;
-        let near = which.par_iter().zip(&windows).map(|(&index, window)| {
-            let (block, Some(window)) = (&layout.blocks[index as usize], window) else { return Vec::new() };
-            let near = |&slot: &u32| self.touch(block, slot, &rows[slot as usize], window, diameter, reach);
-            block.members.iter().filter_map(near).collect()
-        });
-        Ok(near.collect())
-    }
-
     /// The leaves around each block and a margin (cells); none where no surface is near.
     ///
     /// # Errors
@@ -66,27 +45,79 @@ impl Field<'_> {
         let windows = Window::all(self.grid, &bounds)?;
         Ok(windows.into_iter().map(|window| window.has_surface().then_some(window)).collect())
     }
+}
 
-    fn touch(
-        &self,
-        block: &Block,
-        slot: u32,
-        row: &Row,
-        window: &Window<'_>,
-        diameter: f64,
+/// A level set as the blocks of a step see it: what lies around a block is copied once.
+pub struct Seen<'a> {
+    field: &'a Field<'a>,
+    /// Of each block that has asked.
+    patches: Vec<Option<Patch>>,
+    diameter: f64,
+}
+
+impl<'a> Seen<'a> {
+    /// Nothing of it yet, by grains of a diameter (m).
+    pub fn new(field: &'a Field<'a>, diameter: f64) -> Self {
+        Self { field, patches: Vec::new(), diameter }
+    }
+
+    /// Members of some blocks near the surface, each with the plane that the surface is there. `reach` is how far (diameters) a
+    /// grain at 1 m/s is expected to go.
+    ///
+    /// # Errors
+    /// What the grid reports.
+    pub fn touches(
+        &mut self,
+        layout: &Layout,
+        which: &[u32],
+        rows: &[Row],
         reach: f32,
-    ) -> Option<Touch> {
-        let cell = self.grid.voxel_size();
-        let scale = diameter / cell;
-        let at = [0, 1, 2]
-            .map(|axis| (f64::from(block.at[axis]) * f64::from(EDGE) + f64::from(row.place[axis])) * scale);
-        let (distance, gradient) = window.sample(at);
-        let distance = distance / diameter as f32;
-        let steep = norm(gradient);
-        let fast = norm(row.velocity) * reach;
-        if distance > 0.5 + SKIN + fast {
+    ) -> Result<Vec<Vec<Touch>>> {
+        self.see(layout, which)?;
+        let near = which.par_iter().map(|&index| {
+            let (block, patch) = (&layout.blocks[index as usize], &self.patches[index as usize]);
+            let Some(patch) = patch.as_ref().filter(|patch| !patch.values.is_empty()) else {
+                return Vec::new();
+            };
+            let near = |&slot: &u32| self.touch(block, slot, &rows[slot as usize], patch, reach);
+            block.members.iter().filter_map(near).collect()
+        });
+        Ok(near.collect())
+    }
+
+    /// Copies what lies around those of some blocks that have not asked yet.
+    fn see(&mut self, layout: &Layout, which: &[u32]) -> Result<()> {
+        self.patches.resize_with(layout.blocks.len(), || None);
+        let is_new = |index: &&u32| self.patches[**index as usize].is_none();
+        let new: Vec<u32> = which.iter().filter(is_new).copied().collect();
+        let cell = self.field.grid.voxel_size();
+        let windows = self.field.windows(layout, &new, self.diameter, ROOM * self.diameter / cell + 2.0)?;
+        let (edge, room) = (f64::from(EDGE) * self.diameter / cell, ROOM * self.diameter / cell);
+        let patch = |(&index, window): (&u32, Option<Window<'_>>)| {
+            let Some(window) = window else { return Patch::default() };
+            let at = layout.blocks[index as usize].at.map(f64::from);
+            let low = at.map(|at| (at * edge - room).floor() as i32);
+            Patch::of(&window, low, at.map(|at| ((at + 1.0) * edge + room).floor() as i32 + 2))
+        };
+        let made: Vec<Patch> = new.par_iter().zip(windows).map(patch).collect();
+        new.iter().zip(made).for_each(|(&index, patch)| self.patches[index as usize] = Some(patch));
+        Ok(())
+    }
+
+    fn touch(&self, block: &Block, slot: u32, row: &Row, patch: &Patch, reach: f32) -> Option<Touch> {
+        let near = 0.5 + SKIN + norm(row.velocity) * reach;
+        if patch.least / self.diameter as f32 > near {
             return None;
         }
+        let scale = self.diameter / self.field.grid.voxel_size();
+        let at = [0, 1, 2]
+            .map(|axis| (f64::from(block.at[axis]) * f64::from(EDGE) + f64::from(row.place[axis])) * scale);
+        let (distance, gradient) = patch.sample(at);
+        let distance = distance / self.diameter as f32;
+        if distance > near {
+            return None;
+        }
+        let steep = norm(gradient);
         // Deep in the level set there is no direction: a touch that does nothing tells of the grain.
         let normal = if steep < 1.0e-6 { [0.0; 3] } else { scaled(gradient, 1.0 / steep) };
         Some(Touch {
@@ -94,14 +125,48 @@ impl Field<'_> {
             collider: BASE,
             normal,
             offset: dot(normal, row.place) - (distance - 0.5),
-            friction: self.friction,
+            friction: self.field.friction,
             ..Touch::default()
         })
     }
 }
 
-/// Room around a block for grains that left it since it was sorted (cells of the level set).
-const MARGIN: f64 = 1.0;
+/// Room around a block for grains that left it since it was sorted (diameters).
+const ROOM: f64 = 1.0;
+
+/// Values of a level set around a block; empty where no surface is near.
+#[derive(Default)]
+struct Patch {
+    /// Least voxel along each axis.
+    low: [i32; 3],
+    /// Voxels along each axis.
+    size: [usize; 3],
+    values: Vec<f32>,
+    least: f32,
+}
+
+impl Patch {
+    /// Those of the voxels from one to before another one.
+    fn of(window: &Window<'_>, low: [i32; 3], end: [i32; 3]) -> Self {
+        let size = [0, 1, 2].map(|axis| (end[axis] - low[axis]) as usize);
+        let mut values = Vec::with_capacity(size.iter().product());
+        for (x, y) in (low[0]..end[0]).flat_map(|x| (low[1]..end[1]).map(move |y| (x, y))) {
+            values.extend((low[2]..end[2]).map(|z| window.value([x, y, z])));
+        }
+        let least = values.iter().copied().fold(f32::INFINITY, f32::min);
+        Self { low, size, values, least }
+    }
+
+    fn value(&self, voxel: [i32; 3]) -> f32 {
+        let at = |axis: usize| (voxel[axis] - self.low[axis]).clamp(0, self.size[axis] as i32 - 1) as usize;
+        self.values[(at(0) * self.size[1] + at(1)) * self.size[2] + at(2)]
+    }
+
+    /// Value and gradient (a voxel) at a place (voxels).
+    fn sample(&self, at: [f64; 3]) -> (f32, V) {
+        interpolated(at, |voxel| self.value(voxel))
+    }
+}
 
 /// Leaves of a level set side by side.
 pub struct Window<'a> {
@@ -148,19 +213,25 @@ impl<'a> Window<'a> {
         }
     }
 
-    /// Value and gradient (a voxel) at a place (voxels) by trilinear interpolation.
+    /// Value and gradient (a voxel) at a place (voxels).
     pub fn sample(&self, at: [f64; 3]) -> (f32, V) {
-        let low = at.map(|x| x.floor() as i32);
-        let [u, v, w] = [0, 1, 2].map(|axis| (at[axis] - f64::from(low[axis])) as f32);
-        let corner = |x: i32, y: i32, z: i32| self.value([low[0] + x, low[1] + y, low[2] + z]);
-        let along = |x: i32, y: i32| {
-            let (a, b) = (corner(x, y, 0), corner(x, y, 1));
-            (a + (b - a) * w, b - a)
-        };
-        let [(a, az), (b, bz), (c, cz), (d, dz)] = [along(0, 0), along(0, 1), along(1, 0), along(1, 1)];
-        let (front, back) = (a + (b - a) * v, c + (d - c) * v);
-        let mix = |low: f32, high: f32, t: f32| low + (high - low) * t;
-        let gradient = [back - front, mix(b - a, d - c, u), mix(mix(az, bz, v), mix(cz, dz, v), u)];
-        (mix(front, back, u), gradient)
+        interpolated(at, |voxel| self.value(voxel))
     }
+}
+
+/// Value and gradient (a voxel) at a place (voxels) by trilinear interpolation.
+#[inline(always)]
+fn interpolated(at: [f64; 3], value: impl Fn([i32; 3]) -> f32) -> (f32, V) {
+    let low = at.map(|x| x.floor() as i32);
+    let [u, v, w] = [0, 1, 2].map(|axis| (at[axis] - f64::from(low[axis])) as f32);
+    let corner = |x: i32, y: i32, z: i32| value([low[0] + x, low[1] + y, low[2] + z]);
+    let along = |x: i32, y: i32| {
+        let (a, b) = (corner(x, y, 0), corner(x, y, 1));
+        (a + (b - a) * w, b - a)
+    };
+    let [(a, az), (b, bz), (c, cz), (d, dz)] = [along(0, 0), along(0, 1), along(1, 0), along(1, 1)];
+    let (front, back) = (a + (b - a) * v, c + (d - c) * v);
+    let mix = |low: f32, high: f32, t: f32| low + (high - low) * t;
+    let gradient = [back - front, mix(b - a, d - c, u), mix(mix(az, bz, v), mix(cz, dz, v), u)];
+    (mix(front, back, u), gradient)
 }

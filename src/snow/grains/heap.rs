@@ -3,7 +3,7 @@
 use rayon::prelude::*;
 
 use super::contacts::{Held, MOST};
-use super::field::Field;
+use super::field::{Field, Seen};
 use super::layout::{At, Layout, NONE, holds, locate, order, settle, world};
 use super::rest;
 use super::rows::{Row, Shared, V, norm};
@@ -184,7 +184,9 @@ impl Heap {
     ) -> Result<()> {
         let dt = division.dt / division.sub_steps as f64;
         let mut pose = Vec::new();
-        for (shell, at) in &mut colliders.shells {
+        let Colliders { floor, fields, shells } = colliders;
+        let mut fields: Vec<Seen<'_>> = fields.iter().map(|field| Seen::new(field, self.diameter)).collect();
+        for (shell, at) in &mut *shells {
             at(0.0, &mut pose)?;
             shell.follow(&pose);
         }
@@ -198,11 +200,11 @@ impl Heap {
         for sub in 0..division.sub_steps {
             ctx.check()?;
             layout.follow(&mut self.rows, &self.ids, ahead);
-            for (shell, at) in &mut colliders.shells {
+            for (shell, at) in &mut *shells {
                 at((sub + 1) as f64 / division.sub_steps as f64, &mut pose)?;
                 shell.follow(&pose);
             }
-            self.touch(&mut layout, colliders, dt, &mut travel)?;
+            self.touch(&mut layout, (*floor, &mut fields, shells), dt, &mut travel)?;
             ctx.check()?;
             layout.reach(coefficients.visits_all);
             layout.find_pairs();
@@ -274,13 +276,13 @@ impl Heap {
     fn touch(
         &mut self,
         layout: &mut Layout,
-        colliders: &Colliders<'_>,
+        (floor, fields, shells): (Option<Floor>, &mut [Seen<'_>], &[(Shell, Pose<'_>)]),
         dt: f64,
         travel: &mut f64,
     ) -> Result<()> {
         let mut fresh: Vec<Vec<Touch>> = vec![Vec::new(); layout.blocks.len()];
-        if !colliders.shells.is_empty() {
-            let shells: Vec<&Shell> = colliders.shells.iter().map(|(shell, _)| shell).collect();
+        if !shells.is_empty() {
+            let shells: Vec<&Shell> = shells.iter().map(|(shell, _)| shell).collect();
             let way = shells.iter().map(|shell| shell.way()).fold(0.0, f64::max) / self.diameter;
             let search = Search { shells, diameter: self.diameter, dt, travel: *travel, way };
             *travel += way;
@@ -300,14 +302,14 @@ impl Heap {
         let due: Vec<u32> =
             (0..).zip(&layout.blocks).filter(|(_, block)| block.is_due).map(|(index, _)| index).collect();
         let reach = (2.0 * dt / self.diameter) as f32;
-        if let Some(floor) = &colliders.floor {
+        if let Some(floor) = &floor {
             for &index in &due {
                 let block = &layout.blocks[index as usize];
                 fresh[index as usize].extend(floor.touches(block, &self.rows, self.diameter, reach));
             }
         }
-        for field in &colliders.fields {
-            let found = field.touches(layout, &due, &self.rows, self.diameter, reach)?;
+        for field in fields {
+            let found = field.touches(layout, &due, &self.rows, reach)?;
             due.iter().zip(found).for_each(|(&index, found)| fresh[index as usize].extend(found));
         }
         touch::renew(&mut layout.blocks, fresh);

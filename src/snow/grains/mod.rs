@@ -24,6 +24,7 @@ mod field;
 #[doc(hidden)]
 pub mod heap;
 mod layout;
+mod nearby;
 mod params;
 mod rest;
 mod rows;

@@ -2,9 +2,10 @@
 
 use super::contacts::SKIN;
 use super::layout::{Block, EDGE, world};
+use super::nearby::Nearby;
 use super::rest;
 use super::rows::{Row, Shared, dot, norm};
-use super::shell::{Leaves, Shell};
+use super::shell::Shell;
 use super::touch::Touch;
 use crate::base::DVec3;
 
@@ -13,7 +14,7 @@ use crate::base::DVec3;
 pub struct Scratch {
     asking: Vec<Asking>,
     /// Of each mesh.
-    leaves: Vec<Leaves>,
+    nearby: Vec<Nearby>,
 }
 
 /// A grain that may touch a mesh.
@@ -56,7 +57,7 @@ impl Search<'_> {
         if !is_near(block.limit, around) {
             return Vec::new();
         }
-        let Scratch { asking, leaves } = scratch;
+        let Scratch { asking, nearby } = scratch;
         asking.clear();
         let mut room = [DVec3::repeat(f64::MAX), DVec3::repeat(f64::MIN)];
         let mut farthest = 0.0f64;
@@ -76,15 +77,15 @@ impl Search<'_> {
         if asking.is_empty() {
             return Vec::new();
         }
-        leaves.resize_with(self.shells.len(), Leaves::default);
-        for (shell, leaves) in self.shells.iter().zip(&mut *leaves) {
-            shell.leaves_near(&room, farthest * self.diameter, leaves);
+        nearby.resize_with(self.shells.len(), Nearby::default);
+        for (shell, nearby) in self.shells.iter().zip(&mut *nearby) {
+            nearby.find(shell, &room, farthest * self.diameter);
         }
         let mut touches = Vec::new();
         for asking in asking {
             // SAFETY: as above.
             let row = unsafe { rows.get(asking.slot as usize) };
-            self.touch(asking, leaves, row, &mut touches);
+            self.touch(asking, nearby, row, &mut touches);
         }
         touches
     }
@@ -97,11 +98,11 @@ impl Search<'_> {
     }
 
     /// What a grain touches.
-    fn touch(&self, asking: &Asking, leaves: &mut [Leaves], row: &mut Row, touches: &mut Vec<Touch>) {
+    fn touch(&self, asking: &Asking, nearby: &mut [Nearby], row: &mut Row, touches: &mut Vec<Touch>) {
         let Asking { slot, place, reach, within } = *asking;
         let mut free = within;
-        for (shell, leaves) in self.shells.iter().zip(leaves) {
-            let Some(nearest) = shell.nearest_of(leaves, place, within * self.diameter) else { continue };
+        for (shell, nearby) in self.shells.iter().zip(nearby) {
+            let Some(nearest) = nearby.nearest(shell, place, within * self.diameter) else { continue };
             let distance = nearest.square.sqrt() / self.diameter;
             free = free.min(distance);
             if distance <= reach + nearest.motion.norm() / self.diameter {

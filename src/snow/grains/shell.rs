@@ -10,10 +10,10 @@ use rayon::prelude::*;
 use super::rows::{Row, dot};
 use super::touch::Touch;
 use crate::base::DVec3;
-use crate::base::cpu::dispatch;
+use crate::base::lanes::LANES;
 
-/// Triangles in a leaf of the tree.
-const LEAF: usize = 4;
+/// Triangles in a leaf of the tree: as many as are compared at once.
+const LEAF: usize = LANES;
 
 /// A mesh in motion as a collider.
 pub struct Shell {
@@ -211,30 +211,48 @@ impl Shell {
                 depth += 2;
                 continue;
             }
-            self.compare(node - (self.leaves - 1), place, reach, &mut best);
+            self.compare_all(node - (self.leaves - 1), place, reach, &mut best);
         }
         best.found.map(|found| self.resolve(found, place))
     }
 
-    /// The nearest point as [`Shell::nearest`] finds it, of those leaves only.
-    pub fn nearest_of(&self, leaves: &mut Leaves, place: DVec3, within: f64) -> Option<Nearest> {
-        let first = leaves.measure(place)?;
-        let mut best = Best::default();
-        let mut visit = |index: usize| {
-            let reach = (within + f64::from(leaves.ways[index])).powi(2);
-            if f64::from(leaves.apart[index]) <= best.most.min(reach) {
-                self.compare(leaves.which[index] as usize, place, reach, &mut best);
-            }
-        };
-        visit(first);
-        (0..leaves.which.len()).filter(|index| *index != first).for_each(visit);
-        best.found.map(|found| self.resolve(found, place))
+    /// Compares the triangles of a leaf with the best one so far, or with the square of a reach (m2).
+    fn compare_all(&self, leaf: usize, place: DVec3, reach: f64, best: &mut Best) {
+        let first = leaf * LEAF;
+        for index in first..(first + LEAF).min(self.triangles.len()) {
+            self.compare(index, place, reach, best);
+        }
     }
 
-    /// Leaves that may be within a distance (m), and their way, of places in a box.
-    pub fn leaves_near(&self, [low, high]: &[DVec3; 2], within: f64, leaves: &mut Leaves) {
-        let room = DVec3::repeat(within + self.way);
-        leaves.clear([low - room, high + room]);
+    /// Compares a triangle with the best one so far, or with the square of a reach (m2).
+    pub(super) fn compare(&self, index: usize, place: DVec3, reach: f64, best: &mut Best) {
+        let [a, b, c] = self.corners(index);
+        let weights = nearest_weights(place, a, b, c);
+        let point = a * weights[0] + b * weights[1] + c * weights[2];
+        let square = (place - point).norm_squared();
+        let is_better = match &best.found {
+            None => square <= reach,
+            Some(other) => {
+                let tie = 1.0e-9 * (square + other.square);
+                let height = |triangle: usize| self.plane(triangle, place).0.abs();
+                // At an edge or corner that triangles share, the one that the point is highest over tells its side.
+                square < other.square - tie
+                    || square <= other.square + tie && height(index) > height(other.triangle)
+            }
+        };
+        if is_better {
+            best.most = best.most.min(square * (1.0 + 1.0e-8));
+            best.found = Some(Found { square, triangle: index, weights, point });
+        }
+    }
+
+    /// Visits the leaves that may be within a distance (m), and their way, of places in a box: each with its box and way (m).
+    pub(super) fn for_each_leaf(
+        &self,
+        [low, high]: &[DVec3; 2],
+        within: f64,
+        mut visit: impl FnMut(u32, &[DVec3; 2], f64),
+    ) {
         let mut stack = [0usize; 64];
         let mut depth = 1;
         while depth > 0 {
@@ -249,34 +267,15 @@ impl Shell {
                 (stack[depth], stack[depth + 1]) = (2 * node + 2, 2 * node + 1);
                 depth += 2;
             } else {
-                leaves.push((node - (self.leaves - 1)) as u32, &self.boxes[node], self.ways[node]);
+                visit((node - (self.leaves - 1)) as u32, &self.boxes[node], self.ways[node]);
             }
         }
     }
 
-    /// Compares the triangles of a leaf with the best one so far, or with the square of a reach (m2).
-    fn compare(&self, leaf: usize, place: DVec3, reach: f64, best: &mut Best) {
-        let first = leaf * LEAF;
-        for index in first..(first + LEAF).min(self.triangles.len()) {
-            let [a, b, c] = self.corners(index);
-            let weights = nearest_weights(place, a, b, c);
-            let point = a * weights[0] + b * weights[1] + c * weights[2];
-            let square = (place - point).norm_squared();
-            let is_better = match &best.found {
-                None => square <= reach,
-                Some(other) => {
-                    let tie = 1.0e-9 * (square + other.square);
-                    let height = |triangle: usize| self.plane(triangle, place).0.abs();
-                    // At an edge or corner that triangles share, the one that the point is highest over tells its side.
-                    square < other.square - tie
-                        || square <= other.square + tie && height(index) > height(other.triangle)
-                }
-            };
-            if is_better {
-                best.most = best.most.min(square * (1.0 + 1.0e-8));
-                best.found = Some(Found { square, triangle: index, weights, point });
-            }
-        }
+    /// The corners of the triangles of a leaf.
+    pub(super) fn leaf_corners(&self, leaf: u32) -> impl Iterator<Item = [DVec3; 3]> + '_ {
+        let first = leaf as usize * LEAF;
+        (first..(first + LEAF).min(self.triangles.len())).map(|index| self.corners(index))
     }
 
     fn corners(&self, triangle: usize) -> [DVec3; 3] {
@@ -292,7 +291,7 @@ impl Shell {
         ((place - a).dot(&normal), normal)
     }
 
-    fn resolve(&self, found: Found, place: DVec3) -> Nearest {
+    pub(super) fn resolve(&self, found: Found, place: DVec3) -> Nearest {
         let Found { square, triangle, weights, point } = found;
         let way = |corner: usize| {
             let index = self.triangles[triangle][corner] as usize;
@@ -304,10 +303,10 @@ impl Shell {
 }
 
 /// The nearest triangle so far.
-struct Best {
-    found: Option<Found>,
+pub(super) struct Best {
+    pub(super) found: Option<Found>,
     /// Square of the distance (m2) beyond which there is no better one.
-    most: f64,
+    pub(super) most: f64,
 }
 
 impl Default for Best {
@@ -317,84 +316,11 @@ impl Default for Best {
 }
 
 /// A triangle, the weights of its corners at its nearest point, that point, and the square of its distance (m2).
-struct Found {
+pub(super) struct Found {
     square: f64,
     triangle: usize,
     weights: [f64; 3],
     point: DVec3,
-}
-
-/// Leaves of a mesh near some places.
-#[derive(Default)]
-pub struct Leaves {
-    which: Vec<u32>,
-    /// Longest way of a vertex in the sub-step (m).
-    ways: Vec<f32>,
-    /// Their boxes as far as they matter, about `middle` (m): least and greatest along each axis. A little too large, so that rounding
-    /// leaves no triangle out.
-    boxes: [Vec<f32>; 6],
-    /// Squares of the distances (m2) of the place that was measured last.
-    apart: Vec<f32>,
-    /// Where they matter (m).
-    within: [DVec3; 2],
-    middle: DVec3,
-    /// Room for rounding (m).
-    room: f64,
-}
-
-impl Leaves {
-    /// None, for places in a box.
-    fn clear(&mut self, within: [DVec3; 2]) {
-        self.which.clear();
-        self.ways.clear();
-        self.boxes.iter_mut().for_each(Vec::clear);
-        (self.within, self.middle) = (within, (within[0] + within[1]) * 0.5);
-        self.room = 1.0e-6 * (within[1] - within[0]).max();
-    }
-
-    fn push(&mut self, leaf: u32, [low, high]: &[DVec3; 2], way: f64) {
-        self.which.push(leaf);
-        self.ways.push((way * (1.0 + 1.0e-6)) as f32);
-        let [least, greatest] = &self.within;
-        for axis in 0..3 {
-            let side = |x: f64| x.clamp(least[axis], greatest[axis]) - self.middle[axis];
-            self.boxes[2 * axis].push((side(low[axis]) - self.room) as f32);
-            self.boxes[2 * axis + 1].push((side(high[axis]) + self.room) as f32);
-        }
-    }
-
-    /// Measures how far the boxes are from a place (m); which is nearest.
-    fn measure(&mut self, place: DVec3) -> Option<usize> {
-        let place = place - self.middle;
-        distances(&self.boxes, [place.x as f32, place.y as f32, place.z as f32], &mut self.apart);
-        let least = |a: usize, b: usize| if self.apart[b] < self.apart[a] { b } else { a };
-        (0..self.which.len()).reduce(least)
-    }
-}
-
-/// Squares of the distances of boxes from a place.
-fn distances(boxes: &[Vec<f32>; 6], place: [f32; 3], out: &mut Vec<f32>) {
-    dispatch!(distances_of(boxes: &[Vec<f32>; 6], place: [f32; 3], out: &mut Vec<f32>))
-}
-
-#[inline(always)]
-fn distances_of(boxes: &[Vec<f32>; 6], place: [f32; 3], out: &mut Vec<f32>) {
-    let count = boxes[0].len();
-    out.clear();
-    out.resize(count, 0.0);
-    let [lx, hx, ly, hy, lz, hz] = boxes.each_ref().map(|side| &side[..count]);
-    let [x, y, z] = place;
-    for (index, out) in out.iter_mut().enumerate() {
-        let beyond = |low: f32, high: f32, at: f32| {
-            let (under, over) = (low - at, at - high);
-            let most = if under > over { under } else { over };
-            if most > 0.0 { most } else { 0.0 }
-        };
-        let dx = beyond(lx[index], hx[index], x);
-        let dy = beyond(ly[index], hy[index], y);
-        let dz = beyond(lz[index], hz[index], z);
-        *out = dx * dx + dy * dy + dz * dz;
-    }
 }
 
 /// A box that contains nothing.

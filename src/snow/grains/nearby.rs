@@ -1,0 +1,267 @@
+//! Triangles of a mesh near a block of grains. Eight at a time are measured in single precision, about the middle of the block, which leaves
+//! out all but one or two of them; those are compared as [`Shell::nearest`] compares them, so that the result is the same.
+
+use super::shell::{Best, Nearest, Shell};
+use crate::base::DVec3;
+use crate::base::cpu::dispatch;
+use crate::base::lanes::{LANES, Lanes};
+
+/// Leaves of a mesh near some places.
+#[derive(Default)]
+pub struct Nearby {
+    which: Vec<u32>,
+    boxes: Vec<Boxes>,
+    /// Their triangles, once they have been asked for.
+    triangles: Vec<Option<Triangles>>,
+    /// Those whose boxes the place that was asked for last may reach, and the squares of their distances (m2).
+    reached: Vec<(u32, f32)>,
+    /// Where the boxes matter (m).
+    within: [DVec3; 2],
+    middle: DVec3,
+}
+
+/// Boxes of eight leaves.
+#[derive(Clone, Copy)]
+struct Boxes {
+    /// As far as they matter, about the middle (m): least and greatest along each axis. A little too large, so that rounding leaves no
+    /// triangle out. Those that are left over lie far away.
+    sides: [[Lanes; 2]; 3],
+    /// Longest way of a vertex in the sub-step (m).
+    ways: Lanes,
+}
+
+impl Nearby {
+    /// Takes the leaves of a mesh that may be within a distance (m), and their way, of places in a box.
+    pub fn find(&mut self, shell: &Shell, [low, high]: &[DVec3; 2], within: f64) {
+        let room = DVec3::repeat(within + shell.way());
+        let bounds = [low - room, high + room];
+        self.which.clear();
+        self.boxes.clear();
+        self.triangles.clear();
+        (self.within, self.middle) = (bounds, (bounds[0] + bounds[1]) * 0.5);
+        shell.for_each_leaf(&[*low, *high], within, |leaf, bounds, way| self.push(leaf, bounds, way));
+    }
+
+    fn push(&mut self, leaf: u32, [low, high]: &[DVec3; 2], way: f64) {
+        let lane = self.which.len() % LANES;
+        self.which.push(leaf);
+        self.triangles.push(None);
+        if lane == 0 {
+            self.boxes.push(Boxes { sides: [[Lanes::all(FAR); 2]; 3], ways: Lanes::all(0.0) });
+        }
+        let Some(Boxes { sides, ways }) = self.boxes.last_mut() else { return };
+        ways.0[lane] = (way * (1.0 + ROUNDING)) as f32;
+        let [least, greatest] = &self.within;
+        let room = ROUNDING * (greatest - least).max();
+        for (axis, sides) in sides.iter_mut().enumerate() {
+            let side = |x: f64| x.clamp(least[axis], greatest[axis]) - self.middle[axis];
+            sides[0].0[lane] = (side(low[axis]) - room) as f32;
+            sides[1].0[lane] = (side(high[axis]) + room) as f32;
+        }
+    }
+
+    /// The nearest point of the mesh within a distance (m), and where it moves, within that and its way.
+    pub fn nearest(&mut self, shell: &Shell, place: DVec3, within: f64) -> Option<Nearest> {
+        let about = place - self.middle;
+        let about = [about.x as f32, about.y as f32, about.z as f32];
+        let Self { which, boxes, triangles, reached, middle, .. } = self;
+        let room = (self.within[1] - self.within[0]).max();
+        reach(boxes, about, (within * (1.0 + ROUNDING)) as f32, reached);
+        let least = |a: usize, b: usize| if reached[b].1 < reached[a].1 { b } else { a };
+        let first = (0..reached.len()).reduce(least)?;
+        reached.swap(0, first);
+        let mut best = Best::default();
+        for &(index, apart) in &*reached {
+            if f64::from(apart) <= best.most {
+                let (index, leaf) = (index as usize, which[index as usize]);
+                let triangles =
+                    triangles[index].get_or_insert_with(|| Triangles::of(shell, leaf, *middle, room));
+                let way = f64::from(boxes[index / LANES].ways.0[index % LANES]);
+                triangles.compare(shell, leaf, (place, about), within + way, &mut best);
+            }
+        }
+        best.found.map(|found| shell.resolve(found, place))
+    }
+}
+
+/// Relative error of a distance in single precision, with room to spare; of the largest of the numbers that it is made of.
+const ROUNDING: f64 = 4.0e-6;
+
+/// Eight triangles about a place (m). Lanes that are left over lie far away.
+struct Triangles {
+    corner: [Lanes; 3],
+    /// From that corner to the others.
+    sides: [[Lanes; 3]; 2],
+    /// 1 over the squares of the lengths of the sides, and of the third one.
+    inverse: [Lanes; 3],
+    /// Product with a place gives the weights of the other corners, in the triangle's plane.
+    weights: [[Lanes; 3]; 2],
+    /// Of length 1.
+    normal: [Lanes; 3],
+    /// How far (m) a distance may be off.
+    error: f64,
+}
+
+impl Triangles {
+    fn of(shell: &Shell, leaf: u32, middle: DVec3, room: f64) -> Self {
+        let mut corners = [[Lanes::all(FAR); 3]; 3];
+        let mut largest = 0.0f64;
+        for (lane, triangle) in shell.leaf_corners(leaf).enumerate() {
+            for (corner, place) in corners.iter_mut().zip(triangle) {
+                let about = place - middle;
+                largest = largest.max(about.amax());
+                for axis in 0..3 {
+                    corner[axis].0[lane] = about[axis] as f32;
+                }
+            }
+        }
+        let mut out = prepared(&corners);
+        out.error = ROUNDING * (largest + room);
+        out
+    }
+
+    /// Compares those within a reach (m) that may be nearer than the best one so far.
+    #[inline]
+    fn compare(
+        &self,
+        shell: &Shell,
+        leaf: u32,
+        (place, about): (DVec3, [f32; 3]),
+        reach: f64,
+        best: &mut Best,
+    ) {
+        let squares = squares(self, about);
+        let square = reach * reach;
+        let near = |best: &Best| {
+            let most = best.most.min(square).sqrt() + self.error;
+            squares.is_less(Lanes::all((most * most * (1.0 + ROUNDING)) as f32)).bits()
+        };
+        let mut left = near(best);
+        while left != 0 {
+            // The nearest one first leaves out most of the others.
+            let mut lane = left.trailing_zeros() as usize;
+            let mut others = left & (left - 1);
+            while others != 0 {
+                let other = others.trailing_zeros() as usize;
+                lane = if squares.0[other] < squares.0[lane] { other } else { lane };
+                others &= others - 1;
+            }
+            shell.compare(leaf as usize * LANES + lane, place, square, best);
+            left &= near(best) & !(1 << lane);
+        }
+    }
+}
+
+/// Where lanes without a triangle are (m): their squares are still finite.
+const FAR: f32 = 1.0e9;
+
+fn prepared(corners: &[[Lanes; 3]; 3]) -> Triangles {
+    dispatch!(prepare(corners: &[[Lanes; 3]; 3]) -> Triangles)
+}
+
+#[inline(always)]
+fn prepare([a, b, c]: &[[Lanes; 3]; 3]) -> Triangles {
+    let (ab, ac, bc) = (minus(b, a), minus(c, a), minus(c, b));
+    let one = Lanes::all(1.0);
+    let (d00, d01, d11) = (dot(&ab, &ab), dot(&ab, &ac), dot(&ac, &ac));
+    let across = cross(&ab, &ac);
+    let square = dot(&across, &across);
+    // A triangle without an area has no weights: NaN is never inside.
+    let inverse = one / square;
+    let length = one / square.sqrt();
+    // A side without a length begins where it ends.
+    let tiny = Lanes::all(f32::MIN_POSITIVE);
+    Triangles {
+        corner: *a,
+        sides: [ab, ac],
+        inverse: [one / d00.max(tiny), one / d11.max(tiny), one / dot(&bc, &bc).max(tiny)],
+        weights: [weight(&ab, d11, &ac, d01, inverse), weight(&ac, d00, &ab, d01, inverse)],
+        normal: [across[0] * length, across[1] * length, across[2] * length],
+        error: 0.0,
+    }
+}
+
+fn squares(triangles: &Triangles, place: [f32; 3]) -> Lanes {
+    dispatch!(squares_of(triangles: &Triangles, place: [f32; 3]) -> Lanes)
+}
+
+/// Squares of the distances (m2) of triangles from a place.
+#[inline(always)]
+fn squares_of(triangles: &Triangles, place: [f32; 3]) -> Lanes {
+    let Triangles { corner, sides: [ab, ac], inverse, weights, normal, .. } = triangles;
+    let place = [Lanes::all(place[0]), Lanes::all(place[1]), Lanes::all(place[2])];
+    let (zero, one) = (Lanes::all(0.0), Lanes::all(1.0));
+    let from = minus(&place, corner);
+    let (first, second) = (side(&from, ab, inverse[0]), side(&from, ac, inverse[1]));
+    let third = side(&minus(&from, ab), &minus(ac, ab), inverse[2]);
+    let outside = first.min(second).min(third);
+    let height = dot(&from, normal);
+    let (v, w) = (dot(&from, &weights[0]), dot(&from, &weights[1]));
+    let is_inside = zero.is_less(v) & zero.is_less(w) & (v + w).is_less(one);
+    is_inside.choose(height * height, outside)
+}
+
+/// Product with a place, from the corner that all sides begin at, gives the weight of the end of a side.
+#[inline(always)]
+fn weight(
+    side: &[Lanes; 3],
+    of_other: Lanes,
+    other: &[Lanes; 3],
+    of_both: Lanes,
+    inverse: Lanes,
+) -> [Lanes; 3] {
+    [
+        (of_other * side[0] - of_both * other[0]) * inverse,
+        (of_other * side[1] - of_both * other[1]) * inverse,
+        (of_other * side[2] - of_both * other[2]) * inverse,
+    ]
+}
+
+/// Squares of the distances (m2) of sides from places, which are given from where the sides begin.
+#[inline(always)]
+fn side(place: &[Lanes; 3], side: &[Lanes; 3], inverse: Lanes) -> Lanes {
+    let along = (dot(place, side) * inverse).max(Lanes::all(0.0)).min(Lanes::all(1.0));
+    let off = [place[0] - along * side[0], place[1] - along * side[1], place[2] - along * side[2]];
+    dot(&off, &off)
+}
+
+#[inline(always)]
+fn minus(a: &[Lanes; 3], b: &[Lanes; 3]) -> [Lanes; 3] {
+    [a[0] - b[0], a[1] - b[1], a[2] - b[2]]
+}
+
+#[inline(always)]
+fn dot(a: &[Lanes; 3], b: &[Lanes; 3]) -> Lanes {
+    a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
+}
+
+#[inline(always)]
+fn cross(a: &[Lanes; 3], b: &[Lanes; 3]) -> [Lanes; 3] {
+    [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]]
+}
+
+fn reach(boxes: &[Boxes], place: [f32; 3], within: f32, out: &mut Vec<(u32, f32)>) {
+    dispatch!(reach_of(boxes: &[Boxes], place: [f32; 3], within: f32, out: &mut Vec<(u32, f32)>))
+}
+
+/// The boxes within a distance (m), and their way, of a place, with the squares of their distances (m2).
+#[inline(always)]
+fn reach_of(boxes: &[Boxes], place: [f32; 3], within: f32, out: &mut Vec<(u32, f32)>) {
+    out.clear();
+    for (first, Boxes { sides, ways }) in (0..).step_by(LANES).zip(boxes) {
+        let zero = Lanes::all(0.0);
+        let mut square = zero;
+        for (axis, [low, high]) in sides.iter().enumerate() {
+            let at = Lanes::all(place[axis]);
+            let beyond = (*low - at).max(at - *high).max(zero);
+            square = square + beyond * beyond;
+        }
+        let most = Lanes::all(within) + *ways;
+        let mut near = square.is_less(most * most).bits();
+        while near != 0 {
+            let lane = near.trailing_zeros();
+            out.push((first + lane, square.0[lane as usize]));
+            near &= near - 1;
+        }
+    }
+}
