@@ -7,7 +7,7 @@ use super::field::{Field, Seen};
 use super::layout::{At, Layout, NONE, holds, locate, order, settle, world};
 use super::rest;
 use super::rows::{Row, Shared, V, norm};
-use super::search::{Scratch, Search};
+use super::search::{Scratch, Search, Travel};
 pub use super::shell::Shell;
 use super::solve::{Coefficients, sub_step};
 use super::touch::{self, Touch};
@@ -193,8 +193,8 @@ impl Heap {
         // A few sub-steps ahead.
         let ahead = (AHEAD * dt / self.diameter) as f32;
         let mut layout = self.lay_out(ahead);
-        // How far meshes have moved in the step (diameters).
-        let mut travel = 0.0;
+        // How far meshes may have travelled in the step (diameters).
+        let mut before = 0.0;
         self.rows.par_iter_mut().for_each(|row| row.limit = 0.0);
         ctx.expect(division.sub_steps);
         for sub in 0..division.sub_steps {
@@ -204,11 +204,15 @@ impl Heap {
                 at((sub + 1) as f64 / division.sub_steps as f64, &mut pose)?;
                 shell.follow(&pose);
             }
-            self.touch(&mut layout, (*floor, &mut fields, shells), dt, &mut travel)?;
+            let meshes: Vec<&Shell> = shells.iter().map(|(shell, _)| shell).collect();
+            let travel = Travel::of(&meshes, self.diameter);
+            let search = Search { shells: meshes, diameter: self.diameter, dt, before, travel };
+            self.touch(&mut layout, *floor, &mut fields, &search)?;
+            before += travel.most();
             ctx.check()?;
             layout.reach(coefficients.visits_all);
             layout.find_pairs();
-            sub_step(ctx, &mut self.rows, &mut layout, &coefficients)?;
+            sub_step(ctx, &mut self.rows, &mut layout, &coefficients, travel.along)?;
             ctx.advance();
         }
         let end = trapped::End { layout: &layout, diameter: self.diameter, dt };
@@ -271,21 +275,16 @@ impl Heap {
         self.touches.par_sort_unstable_by_key(Touch::key);
     }
 
-    /// Finds what grains touch that cannot be moved, and wakes those that a moving surface touches. `travel` is how far meshes have
-    /// moved in the step so far (diameters).
+    /// Finds what grains touch that cannot be moved, and wakes those that a moving surface touches.
     fn touch(
         &mut self,
         layout: &mut Layout,
-        (floor, fields, shells): (Option<Floor>, &mut [Seen<'_>], &[(Shell, Pose<'_>)]),
-        dt: f64,
-        travel: &mut f64,
+        floor: Option<Floor>,
+        fields: &mut [Seen<'_>],
+        search: &Search<'_>,
     ) -> Result<()> {
         let mut fresh: Vec<Vec<Touch>> = vec![Vec::new(); layout.blocks.len()];
-        if !shells.is_empty() {
-            let shells: Vec<&Shell> = shells.iter().map(|(shell, _)| shell).collect();
-            let way = shells.iter().map(|shell| shell.way()).fold(0.0, f64::max) / self.diameter;
-            let search = Search { shells, diameter: self.diameter, dt, travel: *travel, way };
-            *travel += way;
+        if !search.shells.is_empty() {
             let rows = Shared::new(&mut self.rows);
             let blocks = layout.blocks.par_iter_mut().zip(&mut fresh);
             blocks.for_each_init(Scratch::default, |scratch, (block, fresh)| {
@@ -301,7 +300,7 @@ impl Heap {
         });
         let due: Vec<u32> =
             (0..).zip(&layout.blocks).filter(|(_, block)| block.is_due).map(|(index, _)| index).collect();
-        let reach = (2.0 * dt / self.diameter) as f32;
+        let reach = (2.0 * search.dt / self.diameter) as f32;
         if let Some(floor) = &floor {
             for &index in &due {
                 let block = &layout.blocks[index as usize];

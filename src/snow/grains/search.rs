@@ -4,7 +4,7 @@ use super::contacts::SKIN;
 use super::layout::{Block, EDGE, world};
 use super::nearby::Nearby;
 use super::rest;
-use super::rows::{Row, Shared, dot, norm};
+use super::rows::{Row, Shared, V, dot, norm, scaled, sub};
 use super::shell::Shell;
 use super::touch::Touch;
 use crate::base::DVec3;
@@ -36,25 +36,59 @@ pub struct Search<'a> {
     pub diameter: f64,
     /// Length of the sub-step (s).
     pub dt: f64,
-    /// Farthest way of a mesh's vertex in the step before this sub-step (diameters).
-    pub travel: f64,
+    /// How far the meshes may have travelled in the step before this sub-step (diameters): the sum of [`Travel::most`].
+    pub before: f64,
     /// The same in this sub-step.
-    pub way: f64,
+    pub travel: Travel,
 }
+
+/// How far meshes travel in a sub-step. What rides on a mesh goes along with it, and is as near to it as before.
+#[derive(Clone, Copy, Default)]
+pub struct Travel {
+    /// Where all of them go (diameters).
+    pub along: V,
+    /// How much farther a vertex may go (diameters).
+    pub beside: f64,
+}
+
+impl Travel {
+    /// Of some meshes, with grains of a diameter (m).
+    pub fn of(shells: &[&Shell], diameter: f64) -> Self {
+        let farthest = shells.iter().map(|shell| shell.way()).fold(0.0, f64::max);
+        let ways = || shells.iter().flat_map(|shell| shell.ways());
+        let none = [DVec3::repeat(f64::MAX), DVec3::repeat(f64::MIN)];
+        let [least, greatest] = ways().fold(none, |[low, high], way| [low.inf(&way), high.sup(&way)]);
+        let middle = (least + greatest) * 0.5;
+        let beside = ways().map(|way| (way - middle).norm_squared()).fold(0.0, f64::max).sqrt();
+        if middle.norm() + beside > ALONG * farthest {
+            return Self { along: [0.0; 3], beside: farthest / diameter };
+        }
+        Self { along: [0, 1, 2].map(|axis| (middle[axis] / diameter) as f32), beside: beside / diameter }
+    }
+
+    /// How far it is at most (diameters).
+    pub fn most(&self) -> f64 {
+        f64::from(norm(self.along)) + self.beside
+    }
+}
+
+/// How much more than the farthest vertex goes the parts of its way may be together.
+const ALONG: f64 = 1.2;
 
 impl Search<'_> {
     /// Members of a block near a mesh, each with the plane that the mesh is there. Of grains that rest, those that a mesh touches
     /// and moves, which wake. Blocks and grains remember how far the meshes may travel before they can matter.
     pub fn touches(&self, scratch: &mut Scratch, block: &mut Block, rows: Shared<'_, Row>) -> Vec<Touch> {
-        let is_near = |limit: f32, reach: f64| f64::from(limit) - self.travel < reach + self.way;
+        let is_near = |limit: f32, reach: f64| f64::from(limit) - self.before < reach;
+        let most = self.travel.most();
         // A member has left the block by less than two diameters.
         let around = 0.5 * f64::from(EDGE) * 3f64.sqrt() + REACH + 2.0;
-        if block.members.is_empty() || !is_near(block.limit, around) {
+        if block.members.is_empty() || !is_near(block.limit, around + most) {
             return Vec::new();
         }
         let middle = world(block.at, [EDGE * 0.5; 3], self.diameter);
         block.limit = self.limit(middle, around + f64::from(EDGE));
-        if !is_near(block.limit, around) {
+        if !is_near(block.limit, around + most) {
             return Vec::new();
         }
         let Scratch { asking, nearby } = scratch;
@@ -65,11 +99,17 @@ impl Search<'_> {
             // SAFETY: a grain is a member of one block.
             let row = unsafe { rows.get(slot as usize) };
             let reach = REACH + f64::from(norm(row.velocity)) * self.dt / self.diameter;
-            if is_near(row.limit, reach) && !(row.rests() && self.way == 0.0) {
+            let closing = if row.rests() {
+                most
+            } else {
+                let way = scaled(row.velocity, (self.dt / self.diameter) as f32);
+                f64::from(norm(sub(way, self.travel.along))) + self.travel.beside
+            };
+            if is_near(row.limit, REACH + closing) && !(row.rests() && most == 0.0) {
                 let place = world(block.at, row.place, self.diameter);
                 room = [room[0].inf(&place), room[1].sup(&place)];
                 // Where meshes are fast, a grain would have to ask again at once.
-                let within = if self.way < 0.5 * AHEAD { reach + AHEAD } else { reach };
+                let within = if most < 0.5 * AHEAD { reach + AHEAD } else { reach };
                 farthest = farthest.max(within);
                 asking.push(Asking { slot, place, reach, within });
             }
@@ -94,7 +134,7 @@ impl Search<'_> {
     fn limit(&self, place: DVec3, within: f64) -> f32 {
         let square = |shell: &&Shell| shell.nearest(place, within * self.diameter).map(|found| found.square);
         let nearest = self.shells.iter().filter_map(square).fold(f64::INFINITY, f64::min).sqrt();
-        (self.travel + (nearest / self.diameter).min(within)) as f32 - SLACK
+        (self.before + (nearest / self.diameter).min(within)) as f32 - SLACK
     }
 
     /// What a grain touches.
@@ -115,7 +155,7 @@ impl Search<'_> {
                 }
             }
         }
-        row.limit = (self.travel + free) as f32 - SLACK;
+        row.limit = (self.before + free) as f32 - SLACK;
     }
 }
 

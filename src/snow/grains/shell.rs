@@ -109,8 +109,7 @@ impl Shell {
         std::mem::swap(&mut self.now, &mut self.next);
         self.next.clear();
         self.next.extend_from_slice(pose);
-        self.way =
-            self.now.iter().zip(&self.next).map(|(a, b)| (b - a).norm_squared()).fold(0.0, f64::max).sqrt();
+        self.way = self.ways().map(|way| way.norm_squared()).fold(0.0, f64::max).sqrt();
         let (now, triangles, leaves) = (&self.now, &self.triangles, self.leaves);
         let (inner, outer) = self.boxes.split_at_mut(leaves - 1);
         let (next, (inner_ways, outer_ways)) = (&self.next, self.ways.split_at_mut(leaves - 1));
@@ -139,6 +138,11 @@ impl Shell {
     /// Longest way of a vertex in the sub-step (m).
     pub fn way(&self) -> f64 {
         self.way
+    }
+
+    /// Ways of the vertices in the sub-step (m).
+    pub fn ways(&self) -> impl Iterator<Item = DVec3> + '_ {
+        self.now.iter().zip(&self.next).map(|(now, next)| next - now)
     }
 
     /// The plane of a nearest point for the grain of a slot.

@@ -55,11 +55,17 @@ pub struct Coefficients {
     pub visits_all: bool,
 }
 
-/// One sub-step: forces, contacts, motion.
+/// One sub-step: forces, contacts, motion. `along` is where meshes go meanwhile (diameters).
 ///
 /// # Errors
 /// Cancel.
-pub fn sub_step(ctx: &Context, rows: &mut [Row], layout: &mut Layout, c: &Coefficients) -> Result<()> {
+pub fn sub_step(
+    ctx: &Context,
+    rows: &mut [Row],
+    layout: &mut Layout,
+    c: &Coefficients,
+    along: V,
+) -> Result<()> {
     let colours = layout.colours();
     accelerate(rows, layout, c);
     for pass in [Pass::Begin, Pass::Solve, Pass::SolveLast] {
@@ -68,7 +74,7 @@ pub fn sub_step(ctx: &Context, rows: &mut [Row], layout: &mut Layout, c: &Coeffi
             sweep(rows, layout, colour, pass, c);
         }
     }
-    advance(rows, layout, c);
+    advance(rows, layout, c, along);
     Ok(())
 }
 
@@ -148,7 +154,7 @@ fn begin_touch(row: &mut Row, touch: &mut Touch, c: &Coefficients) {
 }
 
 /// Moves the grains: what cannot move has the last word.
-fn advance(rows: &mut [Row], layout: &mut Layout, c: &Coefficients) {
+fn advance(rows: &mut [Row], layout: &mut Layout, c: &Coefficients, along: V) {
     let rows = Shared::new(rows);
     layout.blocks.par_iter_mut().filter(|block| block.is_reached).for_each(|block| {
         resist_all(rows, &mut block.touches, true, c);
@@ -158,7 +164,7 @@ fn advance(rows: &mut [Row], layout: &mut Layout, c: &Coefficients) {
             // SAFETY: a grain is a member of one block.
             let row = unsafe { rows.get(slot as usize) };
             if !row.rests() {
-                move_on(row, c);
+                move_on(row, c, along);
             }
             rest::judge(row, c.rest);
             let strayed = [0, 1, 2].map(|axis| row.place[axis] - anchors[axis][member]);
@@ -169,10 +175,11 @@ fn advance(rows: &mut [Row], layout: &mut Layout, c: &Coefficients) {
 }
 
 /// Moves a grain; what its push took back of its motion, its velocity loses where something holds it.
-fn move_on(row: &mut Row, c: &Coefficients) {
+fn move_on(row: &mut Row, c: &Coefficients, along: V) {
     let way = add(scaled(row.velocity, c.dt / c.diameter), row.push);
     row.place = add(row.place, way);
-    row.limit -= norm(way);
+    // It counts as travel of the meshes that they go along.
+    row.limit += norm(along) - norm(sub(way, along));
     let square = dot(row.push, row.push);
     if row.is_supported() && square > 0.0 {
         let back = scaled(row.push, c.diameter / c.dt);
