@@ -72,6 +72,8 @@ mod speed;
 mod spin;
 #[path = "gates/sweeps.rs"]
 mod sweeps;
+#[path = "gates/table.rs"]
+mod table;
 #[path = "gates/turned.rs"]
 mod turned;
 

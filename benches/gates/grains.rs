@@ -9,7 +9,7 @@ use crate::harness::Harness;
 use crate::scenes::context;
 use crate::{
     beds, births, collisions, columns, free, grain_cancel, grain_memory, grain_readers, materials, passes,
-    piles, planes, preview, rate, rest, turned,
+    piles, planes, preview, rate, rest, table, turned,
 };
 
 /// Length of a frame (s).
@@ -32,6 +32,7 @@ pub fn run(h: &mut Harness) {
     grain_readers::run(h);
     grain_cancel::run(h);
     rate::run(h);
+    table::run(h);
     grain_memory::run(h);
 }
 

@@ -74,6 +74,14 @@ pub const GATES: &[Gate] = &[
     gate("snow.grains.cancel_p99", "s", Most(0.2), Most(0.05)),
     // All grains at work.
     gate("snow.grains.speed", "k/s", Least(90.0), Least(200.0)),
+    // The scenes of the thesis' table 3.1.
+    gate("snow.grains.table_3_8a", "s", Most(1.7), Most(0.7)),
+    gate("snow.grains.table_3_8b", "s", Most(0.7), Most(0.3)),
+    gate("snow.grains.table_3_9a", "s", Most(12.0), Most(5.0)),
+    gate("snow.grains.table_3_9b", "s", Most(2.4), Most(1.0)),
+    gate("snow.grains.table_3_10", "s", Most(5.0), Most(2.0)),
+    gate("snow.grains.table_3_11", "s", Most(1.7), Most(0.7)),
+    gate("snow.grains.table_3_12", "s", Most(12.0), Most(4.0)),
     gate("snow.grains.memory", "B", Most(128.0), Most(96.0)),
     // The walls that a box leaves, against the envelope of its poses.
     gate("snow.base.wall_translation_max", "cells", Most(0.1), Most(0.03)),

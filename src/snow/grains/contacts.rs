@@ -16,6 +16,8 @@ use crate::base::lanes::{LANES, Lanes};
 /// Distance (diameters) up to which a pair of grains is kept beyond touching: pairs are found again once a grain has moved half
 /// of it. Less than a cell less a diameter.
 pub const SKIN: f32 = 0.25;
+/// The same in blocks with a grain so fast that pairs last for one sub-step anyway: as far as grains wake one another.
+pub const THIN_SKIN: f32 = 0.12;
 
 /// Bits of a grain's index; above them from which block the other grain of a pair is, two bits an axis.
 const INDEX: u32 = 26;
@@ -319,6 +321,11 @@ impl Block {
     fn has(&self, homes: [Home; 2], code: usize, index: usize) -> bool {
         homes[0].block == index as u32 && homes[1].block == self.near[code]
     }
+
+    /// Distance (diameters) up to which a member and one of another block are a pair.
+    fn reach_to(&self, other: &Self) -> f32 {
+        1.0 + 0.5 * (self.skin + other.skin)
+    }
 }
 
 /// Members of a block one behind the other that may be near a grain.
@@ -326,6 +333,8 @@ struct Run<'a> {
     block: &'a Block,
     low: u32,
     high: u32,
+    /// Distance (diameters) up to which grains are a pair.
+    reach: f32,
     /// From the owner's block to this one (diameters).
     shift: V,
     bits: u32,
@@ -371,7 +380,9 @@ fn find_in(scratch: &mut Scratch, blocks: &[Block], index: usize) {
             let (low, high) = (there.starts[usize::from(cells.first)], there.starts[usize::from(cells.end)]);
             if low < high {
                 let shift = [step[0] as f32 * EDGE, step[1] as f32 * EDGE, step[2] as f32 * EDGE];
-                runs.push(Run { block: there, low, high, shift, bits: step_bits(step), first: firsts[code] });
+                let reach = block.reach_to(there);
+                let (bits, first) = (step_bits(step), firsts[code]);
+                runs.push(Run { block: there, low, high, reach, shift, bits, first });
             }
         }
         // What comes before a grain in its own cell.
@@ -379,6 +390,7 @@ fn find_in(scratch: &mut Scratch, blocks: &[Block], index: usize) {
             block,
             low: own.start,
             high: own.start,
+            reach: block.reach_to(block),
             shift: [0.0; 3],
             bits: step_bits([0; 3]),
             first: 0,
@@ -399,7 +411,7 @@ fn find_in(scratch: &mut Scratch, blocks: &[Block], index: usize) {
 /// Adds the pairs of a grain with those of a run.
 #[inline(always)]
 fn scan(place: V, run: &Run<'_>, pairs: &mut Vec<Pair>) {
-    let reach = Lanes::all((1.0 + SKIN) * (1.0 + SKIN));
+    let reach = Lanes::all(run.reach * run.reach);
     let [x, y, z] = sub(place, run.shift);
     let [xs, ys, zs] = &run.block.anchors;
     let mut member = run.low;

@@ -4,7 +4,7 @@ use rayon::prelude::*;
 
 use super::contacts::{Held, MOST};
 use super::field::{Field, Seen};
-use super::layout::{At, Layout, NONE, holds, locate, order, settle, world};
+use super::layout::{At, Layout, NONE, SUB_STEPS_AHEAD, holds, locate, order, settle, world};
 use super::rest;
 use super::rows::{Row, Shared, V, norm};
 use super::search::{Scratch, Search, Travel};
@@ -38,9 +38,6 @@ pub struct Colliders<'a> {
     /// Meshes that move, each with its pose (m) at a share 0..=1 of the step.
     pub shells: Vec<(Shell, Pose<'a>)>,
 }
-
-/// For how many sub-steps neighbours are to last.
-const AHEAD: f64 = 6.0;
 
 /// Grains between two steps.
 #[derive(Clone)]
@@ -191,7 +188,7 @@ impl Heap {
             shell.follow(&pose);
         }
         // A few sub-steps ahead.
-        let ahead = (AHEAD * dt / self.diameter) as f32;
+        let ahead = (f64::from(SUB_STEPS_AHEAD) * dt / self.diameter) as f32;
         let mut layout = self.lay_out(ahead);
         // How far meshes may have travelled in the step (diameters).
         let mut before = 0.0;

@@ -7,7 +7,7 @@ use std::collections::HashMap;
 
 use rayon::prelude::*;
 
-use super::contacts::{Batch, Held, SKIN};
+use super::contacts::{Batch, Held, SKIN, THIN_SKIN};
 use super::rows::{Row, Shared, V, add, norm, scaled};
 use super::touch::Touch;
 use crate::base::DVec3;
@@ -37,6 +37,8 @@ pub struct Block {
     pub starts: [u32; ALL_CELLS + 1],
     /// Where members were when their neighbours were found (diameters, each axis for itself), and some that are nowhere.
     pub anchors: [Vec<f32>; 3],
+    /// Distance (diameters) beyond touching up to which two members are a pair.
+    pub skin: f32,
     /// What members touch that cannot be moved, by member.
     pub touches: Vec<Touch>,
     /// How far (diameters) meshes may travel in a step before one can touch a member.
@@ -176,6 +178,7 @@ impl Layout {
             members: Vec::new(),
             starts: [0; ALL_CELLS + 1],
             anchors: Default::default(),
+            skin: SKIN,
             touches: Vec::new(),
             limit: 0.0,
             is_awake: false,
@@ -233,7 +236,7 @@ impl Layout {
                 block.members.push(slot);
                 (block.is_changed, block.is_stirred) = (true, true);
                 if !block.has_strayed {
-                    let place = anchor(&rows[slot as usize], ahead);
+                    let place = anchor(&rows[slot as usize], ahead, block.skin);
                     block.anchors.iter_mut().zip(place).for_each(|(anchors, place)| {
                         anchors.insert(anchors.len() - LANES.min(anchors.len()), place);
                     });
@@ -254,9 +257,14 @@ impl Layout {
         let rows = &*rows;
         let homes = Shared::new(&mut self.homes);
         self.blocks.par_iter_mut().filter(|block| which(block)).for_each(|block| {
+            if block.has_strayed {
+                let speeds = block.members.iter().map(|&slot| norm(rows[slot as usize].velocity));
+                let fastest = speeds.fold(0.0, f32::max) * ahead / SUB_STEPS_AHEAD;
+                block.skin = if fastest > FAST { THIN_SKIN } else { SKIN };
+            }
             let place = |member: usize, slot: u32| {
                 if block.has_strayed {
-                    anchor(&rows[slot as usize], ahead)
+                    anchor(&rows[slot as usize], ahead, block.skin)
                 } else {
                     [0, 1, 2].map(|axis: usize| block.anchors[axis][member])
                 }
@@ -318,16 +326,20 @@ impl Layout {
 
 /// Where a grain is taken to be while its neighbours last: a little ahead of it, so that it takes longer to stray. `ahead` is how
 /// far (diameters) it would go at 1 m/s.
-fn anchor(row: &Row, ahead: f32) -> V {
+fn anchor(row: &Row, ahead: f32, skin: f32) -> V {
+    // Less than half of the skin.
+    let most = 0.45 * skin;
     let way = scaled(row.velocity, ahead);
     let length = norm(way);
-    let share = if length > AHEAD { AHEAD / length } else { 1.0 };
+    let share = if length > most { most / length } else { 1.0 };
     let place = add(row.place, scaled(way, share));
     place.map(|x| x.clamp(0.0, EDGE))
 }
 
-/// Farthest that an anchor lies ahead of its grain (diameters): less than half of the skin.
-const AHEAD: f32 = 0.45 * SKIN;
+/// For how many sub-steps neighbours are to last.
+pub const SUB_STEPS_AHEAD: f32 = 6.0;
+/// How far (diameters) a grain goes in a sub-step that strays in it, wherever it is taken to be.
+const FAST: f32 = 0.95 * SKIN;
 
 /// Moves a grain to the block that its place lies in.
 pub fn settle(row: &mut Row, at: &mut At) {

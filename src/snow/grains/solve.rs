@@ -14,7 +14,7 @@
 use rayon::prelude::*;
 
 use super::collide::{Eight, FARTHEST, STEEP, TOUCHING, collide};
-use super::contacts::{Batch, SKIN};
+use super::contacts::Batch;
 use super::layout::{Block, Layout};
 use super::rest::{self, Rest};
 use super::rows::{Part, Row, Shared, V, add, dot, norm, scaled, sub};
@@ -158,6 +158,7 @@ fn advance(rows: &mut [Row], layout: &mut Layout, c: &Coefficients, along: V) {
     let rows = Shared::new(rows);
     layout.blocks.par_iter_mut().filter(|block| block.is_reached).for_each(|block| {
         resist_all(rows, &mut block.touches, true, c);
+        let far = (0.5 * block.skin).powi(2);
         let Block { members, anchors, .. } = block;
         (block.is_awake, block.has_strayed) = (false, false);
         for (member, &slot) in members.iter().enumerate() {
@@ -168,7 +169,7 @@ fn advance(rows: &mut [Row], layout: &mut Layout, c: &Coefficients, along: V) {
             }
             rest::judge(row, c.rest);
             let strayed = [0, 1, 2].map(|axis| row.place[axis] - anchors[axis][member]);
-            block.has_strayed |= dot(strayed, strayed) > (0.5 * SKIN).powi(2);
+            block.has_strayed |= dot(strayed, strayed) > far;
             block.is_awake |= !row.rests();
         }
     });
