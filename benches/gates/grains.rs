@@ -99,10 +99,15 @@ impl Experiment {
     /// Loose grains in a box that begins at a height of 0 and has its middle above the origin, a little off the sites of a
     /// cubic lattice, where `takes` wants them. Numbers are those of the lattice's sites.
     pub fn scatter(&mut self, sites: [u32; 3], takes: impl Fn(DVec3) -> bool) {
-        let (d, apart) = (self.diameter(), 1.16 * self.diameter());
+        self.scatter_apart([1.16, 0.1], sites, takes);
+    }
+
+    /// As [`Experiment::scatter`], with a distance of the sites (diameters) and how far grains are off them along each axis.
+    pub fn scatter_apart(&mut self, [apart, off]: [f64; 2], sites: [u32; 3], takes: impl Fn(DVec3) -> bool) {
+        let [apart, most] = [apart, off].map(|length| length * self.diameter());
         for layer in 0..sites[1] {
             for (x, z) in (0..sites[0]).flat_map(|x| (0..sites[2]).map(move |z| (x, z))) {
-                let mut off = |at: u32| (f64::from(at) + 0.5) * apart + (self.random.next() - 0.5) * 0.1 * d;
+                let mut off = |at: u32| (f64::from(at) + 0.5) * apart + (self.random.next() - 0.5) * most;
                 let [x, y, z] = [off(x), off(layer), off(z)];
                 let [width, length] = [sites[0], sites[2]].map(|count| 0.5 * f64::from(count) * apart);
                 let place = DVec3::new(x - width, y, z - length);

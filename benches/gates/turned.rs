@@ -17,7 +17,9 @@ const D: f64 = 0.005;
 /// How fast gravity turns (degrees/s).
 const RATE: f64 = 5.0;
 /// Sites of the lattice from which the bed settles: its depth is then 20 diameters or a little more.
-const SITES: [u32; 3] = [96, 31, 10];
+const SITES: [u32; 3] = [74, 52, 8];
+/// Distance of its sites, and how far grains are off them (diameters): so much that no layers are left.
+const LOOSE: [f64; 2] = [1.5, 0.5];
 /// How deep (diameters) the top reaches.
 const TOP: f64 = 1.5;
 
@@ -61,10 +63,10 @@ fn slides(asked: f64, sites: [u32; 3]) -> f64 {
     let mut bed = Experiment::new(2, D, of_repose(asked), 11);
     bed.params.rests = false;
     bed.colliders.floor = None;
-    let [length, width] = [sites[0], sites[2]].map(|count| f64::from(count) * 1.16 * D);
+    let [length, width] = [sites[0], sites[2]].map(|count| f64::from(count) * LOOSE[0] * D);
     bed.colliders.shells =
         vec![walls(&rectangle(length, width), 100.0 * D), rough(length, width, &mut bed.random)];
-    bed.scatter(sites, |_| true);
+    bed.scatter_apart(LOOSE, sites, |_| true);
     bed.steps(48);
     let places = |bed: &Experiment| -> HashMap<u32, DVec3> {
         bed.heap.ids().iter().copied().zip(bed.heap.places()).collect()

@@ -108,6 +108,9 @@ pub struct StepReport {
     pub phases: Vec<PhaseTime>,
 }
 
+/// Edge (diameters) of a voxel of [`Grains::points`], a power of two: it holds the few grains that readers of VDB Points like best.
+const VOXEL: f32 = 2.0;
+
 /// Largest component (m/s) of the velocity of a grain that is emitted.
 pub const FASTEST: f32 = 10_000.0;
 
@@ -400,9 +403,10 @@ impl Grains {
     pub fn points(&self) -> Points {
         let (mut cells, mut offsets) = (Vec::new(), Vec::new());
         for (at, place) in self.heap.located() {
-            // Voxels of one diameter, around whose centres offsets reach half a voxel.
+            // Offsets reach half a voxel around its centre.
+            let place = place.map(|x| x / VOXEL);
             let voxel = place.map(|x| (x + 0.5).floor());
-            cells.push([0, 1, 2].map(|axis| at[axis] * layout::EDGE as i32 + voxel[axis] as i32));
+            cells.push([0, 1, 2].map(|axis| at[axis] * (layout::EDGE / VOXEL) as i32 + voxel[axis] as i32));
             offsets.push([0, 1, 2].map(|axis| place[axis] - voxel[axis]));
         }
         let trapped = match self.trapped() {
@@ -422,6 +426,6 @@ impl Grains {
             attribute("source_frame", Values::Int(Column::Each(self.source_frames().collect()))),
             attribute("rest", Values::Vector(Column::Each(self.rests().collect()))),
         ];
-        Points { voxel_size: self.heap.diameter, cells, offsets, attributes }
+        Points { voxel_size: f64::from(VOXEL) * self.heap.diameter, cells, offsets, attributes }
     }
 }
