@@ -339,7 +339,7 @@ fn anchor(row: &Row, ahead: f32, skin: f32) -> V {
 /// For how many sub-steps neighbours are to last.
 pub const SUB_STEPS_AHEAD: f32 = 6.0;
 /// How far (diameters) a grain goes in a sub-step that strays in it, wherever it is taken to be.
-const FAST: f32 = 0.95 * SKIN;
+const FAST: f32 = 0.06;
 
 /// Moves a grain to the block that its place lies in.
 pub fn settle(row: &mut Row, at: &mut At) {
