@@ -113,8 +113,11 @@ impl Frames {
         Self { ends: (1..).map_while(end).collect() }
     }
 
+    /// Seconds of a frame and of the one before, each: files are written while the next frame is made.
     fn seconds(&self, frame: usize) -> f64 {
-        self.ends[frame].duration_since(self.ends[frame - 1]).map_or(0.0, |took| took.as_secs_f64())
+        let first = frame.saturating_sub(2);
+        let took = self.ends[frame].duration_since(self.ends[first]);
+        took.map_or(0.0, |took| took.as_secs_f64()) / (frame - first) as f64
     }
 
     /// The frames that count, the last one among them.

@@ -16,7 +16,7 @@ use crate::base::lanes::{LANES, Lanes};
 /// Distance (diameters) up to which a pair of grains is kept beyond touching: pairs are found again once a grain has moved half
 /// of it. Less than a cell less a diameter.
 pub const SKIN: f32 = 0.25;
-/// The same in blocks with a grain so fast that pairs last for one sub-step anyway: as far as grains wake one another.
+/// The same in blocks with a fast grain, whose pairs last for a sub-step or two anyway: a little farther than grains wake one another.
 pub const THIN_SKIN: f32 = 0.12;
 
 /// Bits of a grain's index; above them from which block the other grain of a pair is, two bits an axis.

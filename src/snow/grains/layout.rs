@@ -338,7 +338,8 @@ fn anchor(row: &Row, ahead: f32, skin: f32) -> V {
 
 /// For how many sub-steps neighbours are to last.
 pub const SUB_STEPS_AHEAD: f32 = 6.0;
-/// How far (diameters) a grain goes in a sub-step that strays in it, wherever it is taken to be.
+/// How far (diameters) a grain goes in a sub-step for which a thin skin is the cheaper one: some grain near it strays in every
+/// sub-step then, and takes its neighbours' pairs along.
 const FAST: f32 = 0.06;
 
 /// Moves a grain to the block that its place lies in.
