@@ -22,6 +22,8 @@ mod common;
 mod damage;
 #[path = "gates/dense.rs"]
 mod dense;
+#[path = "gates/distance.rs"]
+mod distance;
 #[path = "gates/far.rs"]
 mod far;
 #[path = "gates/flip.rs"]

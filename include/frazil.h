@@ -84,6 +84,11 @@
 #define FRZ_GRAINS_BOX 4
 
 /**
+ * Flag of parameters of grains: those among others feel less of the air than those of a thin spray.
+ */
+#define FRZ_GRAINS_AIR_BY_DENSITY 8
+
+/**
  * Status codes. Numbers never change; new ones are added at the end.
  */
 enum frz_status
@@ -987,7 +992,7 @@ typedef struct {
      */
     uint32_t struct_size;
     /**
-     * 0, or some of FRZ_GRAINS_FLOOR, FRZ_GRAINS_RESTLESS and FRZ_GRAINS_BOX.
+     * 0, or some of FRZ_GRAINS_FLOOR, FRZ_GRAINS_RESTLESS, FRZ_GRAINS_BOX and FRZ_GRAINS_AIR_BY_DENSITY.
      */
     uint32_t flags;
     /**
@@ -1056,6 +1061,11 @@ typedef struct {
      * 0.
      */
     uint32_t reserved;
+    /**
+     * Distance (m) from objects and fast grains beyond which slow grains rest at once, 1e-5 to 1e5; 0, as is usual: they lie still
+     * first, wherever they are. It has no effect with FRZ_GRAINS_RESTLESS.
+     */
+    double active_distance;
 } frz_grains_params;
 
 /**

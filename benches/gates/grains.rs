@@ -8,8 +8,8 @@ use frazil::snow::grains::heap::{Colliders, Division, Floor, Heap, Pose, Shell};
 use crate::harness::Harness;
 use crate::scenes::context;
 use crate::{
-    beds, births, collisions, columns, free, grain_cancel, grain_memory, grain_readers, materials, passes,
-    piles, planes, preview, rate, rest, table, turned,
+    beds, births, collisions, columns, distance, free, grain_cancel, grain_memory, grain_readers, materials,
+    passes, piles, planes, preview, rate, rest, table, turned,
 };
 
 /// Length of a frame (s).
@@ -28,6 +28,7 @@ pub fn run(h: &mut Harness) {
     collisions::run(h);
     births::run(h);
     rest::run(h);
+    distance::run(h);
     passes::run(h);
     grain_readers::run(h);
     grain_cancel::run(h);

@@ -64,6 +64,8 @@ pub const GATES: &[Gate] = &[
     yes("snow.grains.rest_bytes"),
     gate("snow.grains.rest_angle", "deg", Most(0.5), Open),
     gate("snow.grains.rest_gain", "x", Least(3.0), Least(8.0)),
+    // Height fields with the distance rule and without it, over those of two seeds.
+    gate("snow.grains.distance_rule", "x", Most(1.5), Open),
     yes("snow.grains.same_bytes"),
     // Whole passes: the bytes of a grain in its file, and the same files after kills and from 1 and 2 threads.
     gate("snow.grains.file_bytes", "B", Most(44.0), Most(32.0)),

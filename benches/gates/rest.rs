@@ -65,7 +65,7 @@ fn gain(h: &mut Harness) {
 }
 
 /// Seconds of a frame's `move`, from its report.
-fn moving(report: &std::path::Path) -> f64 {
+pub fn moving(report: &std::path::Path) -> f64 {
     let text = std::fs::read(report).expect("a report");
     let report: serde_json::Value = serde_json::from_slice(&text).expect("a report");
     let phases = report["phases"].as_array().expect("phases").iter();

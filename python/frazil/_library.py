@@ -131,7 +131,7 @@ class GrainsParams(Struct):
         ("friction", c.c_double), ("attraction", c.c_double), ("restitution", c.c_double), ("air", c.c_double),
         ("gravity", c.c_double), ("floor", c.c_double), ("lowest", c.c_double), ("keep_low", c.c_double * 3),
         ("keep_high", c.c_double * 3), ("lifetime", c.c_double), ("max_grains", c.c_uint64), ("seed", c.c_uint64),
-        ("sub_steps", c.c_uint32), ("reserved", c.c_uint32),
+        ("sub_steps", c.c_uint32), ("reserved", c.c_uint32), ("active_distance", c.c_double),
     ]
 
 

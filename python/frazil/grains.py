@@ -13,7 +13,7 @@ ATTRIBUTES = {
     "pscale": (4, np.float32, 1), "source_frame": (5, np.int32, 1), "rest": (6, np.float32, 3),
     "active": (7, np.int32, 1), "trapped": (8, np.int32, 1),
 }
-FLOOR, RESTLESS, BOX = 1, 2, 4
+FLOOR, RESTLESS, BOX, AIR_BY_DENSITY = 1, 2, 4, 8
 
 
 class Grains(Handle):
@@ -24,8 +24,9 @@ class Grains(Handle):
     repose_angle_deg: slope of a poured pile, in place of friction.
     stands: height of a wall that just stands (m), in place of attraction.
     keep_box: (low, high), places (m) of a box outside of which grains are taken away; None: there is none.
+    air_by_density: whether grains among others feel less of the air than those of a thin spray.
     Further parameters, as in frz_grains_params: compression, friction, attraction, restitution, air, gravity, lowest, lifetime,
-    max_grains, seed, sub_steps (0: as many as are needed).
+    max_grains, seed, sub_steps (0: as many as are needed), active_distance (m; 0: slow grains lie still before they rest).
     state: bytes of save(), to go on from.
     """
 
@@ -40,7 +41,8 @@ class Grains(Handle):
         return f"{len(self)} of a radius of {self._radius:g} m"
 
     @staticmethod
-    def _params(radius, floor, rests=True, repose_angle_deg=None, stands=None, keep_box=None, **more):
+    def _params(radius, floor, rests=True, repose_angle_deg=None, stands=None, keep_box=None, air_by_density=False,
+                **more):
         params = GrainsParams()
         call("grains_params_init", c.byref(params), c.sizeof(params))
         params.radius = radius
@@ -48,6 +50,8 @@ class Grains(Handle):
             params.flags, params.floor = FLOOR, floor
         if not rests:
             params.flags |= RESTLESS
+        if air_by_density:
+            params.flags |= AIR_BY_DENSITY
         if keep_box is not None:
             params.flags |= BOX
             params.keep_low, params.keep_high = ((c.c_double * 3)(*place) for place in keep_box)

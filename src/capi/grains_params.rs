@@ -17,13 +17,16 @@ pub const FRZ_GRAINS_RESTLESS: u32 = 2;
 /// Flag of parameters of grains: those outside of frz_grains_params.keep_low and keep_high are taken away.
 pub const FRZ_GRAINS_BOX: u32 = 4;
 
+/// Flag of parameters of grains: those among others feel less of the air than those of a thin spray.
+pub const FRZ_GRAINS_AIR_BY_DENSITY: u32 = 8;
+
 /// How snow becomes grains and how they behave. All of it but the radius may change between steps.
 #[repr(C)]
 #[derive(Clone, Copy)]
 pub struct frz_grains_params {
     /// sizeof(frz_grains_params).
     pub struct_size: u32,
-    /// 0, or some of FRZ_GRAINS_FLOOR, FRZ_GRAINS_RESTLESS and FRZ_GRAINS_BOX.
+    /// 0, or some of FRZ_GRAINS_FLOOR, FRZ_GRAINS_RESTLESS, FRZ_GRAINS_BOX and FRZ_GRAINS_AIR_BY_DENSITY.
     pub flags: u32,
     /// Radius of a grain (m), 1e-5 to 1; at a base layer from 0.02 to 0.5 of its voxel. A third of the voxel gives the
     /// thesis' look, and is usual for voxels of 1 cm.
@@ -59,11 +62,15 @@ pub struct frz_grains_params {
     pub sub_steps: u32,
     /// 0.
     pub reserved: u32,
+    /// Distance (m) from objects and fast grains beyond which slow grains rest at once, 1e-5 to 1e5; 0, as is usual: they lie still
+    /// first, wherever they are. It has no effect with FRZ_GRAINS_RESTLESS.
+    pub active_distance: f64,
 }
 
 // SAFETY: numbers.
 unsafe impl Sized32 for frz_grains_params {
-    const SIZES: &'static [usize] = &[size_of::<Self>()];
+    const SIZES: &'static [usize] =
+        &[std::mem::offset_of!(frz_grains_params, active_distance), size_of::<Self>()];
     const NAME: &'static str = "frz_grains_params";
 }
 
@@ -93,12 +100,14 @@ impl frz_grains_params {
             seed: usual.seed,
             sub_steps: 0,
             reserved: 0,
+            active_distance: 0.0,
         }
     }
 
     /// The library's own parameters; what is out of range is named.
     pub(super) fn params(&self) -> Outcome<Params> {
-        no_flags(self.flags, FRZ_GRAINS_FLOOR | FRZ_GRAINS_RESTLESS | FRZ_GRAINS_BOX)?;
+        let known = FRZ_GRAINS_FLOOR | FRZ_GRAINS_RESTLESS | FRZ_GRAINS_BOX | FRZ_GRAINS_AIR_BY_DENSITY;
+        no_flags(self.flags, known)?;
         let numbers = [
             ("radius", self.radius),
             ("compression", self.compression),
@@ -111,6 +120,7 @@ impl frz_grains_params {
         ];
         numbers.into_iter().try_for_each(|(name, value)| finite(name, value))?;
         within("floor", self.floor, -FARTHEST..=FARTHEST, " m")?;
+        within("active_distance", self.active_distance, 0.0..=1.0e5, " m")?;
         within("lifetime", self.lifetime, 0.0..=1.0e9, " s")?;
         let has_box = self.flags & FRZ_GRAINS_BOX != 0;
         within("max_grains", self.max_grains as f64, 1.0..=6.0e7, "")?;
@@ -123,10 +133,12 @@ impl frz_grains_params {
             attraction: self.attraction,
             restitution: self.restitution,
             air: self.air,
+            air_by_density: self.flags & FRZ_GRAINS_AIR_BY_DENSITY != 0,
             gravity: self.gravity,
             lifetime: Some(self.lifetime).filter(|&lifetime| lifetime > 0.0),
             keep_box: has_box.then(|| [self.keep_low, self.keep_high].map(DVec3::from)),
             rests: self.flags & FRZ_GRAINS_RESTLESS == 0,
+            active_distance: Some(self.active_distance).filter(|&distance| distance > 0.0),
             sub_steps: Some(self.sub_steps).filter(|&count| count > 0),
             most: self.max_grains as usize,
             seed: self.seed,

@@ -103,6 +103,9 @@ static void limits(frz_context *ctx) {
     CHECK(report.count == 0 && report.expired == 1 && report.dropped == 0);
     params.lifetime = 0, params.flags |= FRZ_GRAINS_BOX;
     FAILS(frz_grains_set_params(grains, &params), FRZ_ERROR_ARGUMENT, "keep_box");
+    params.active_distance = -0.1;
+    FAILS(frz_grains_set_params(grains, &params), FRZ_ERROR_ARGUMENT, "active_distance");
+    params.active_distance = 0.1, params.flags |= FRZ_GRAINS_AIR_BY_DENSITY;
     params.keep_low[0] = -1, params.keep_low[1] = 0.05, params.keep_low[2] = -1;
     params.keep_high[0] = params.keep_high[1] = params.keep_high[2] = 1;
     WORKS(frz_grains_set_params(grains, &params));

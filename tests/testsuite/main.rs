@@ -58,6 +58,7 @@ mod scene {
 mod snow {
     mod base;
     mod crumbs;
+    mod grain_options;
     mod grains;
     mod layers;
     mod state;

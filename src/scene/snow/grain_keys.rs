@@ -85,6 +85,14 @@ pub const GRAIN_KEYS: &[Key] = &[
     .or("0.5")
     .with_presets(&[("powder", "0.3"), ("wet", "0.8")])
     .concerns(STEP),
+    Key::new(
+        "grains",
+        "air_by_density",
+        Kind::Flag,
+        "whether grains among others feel less of the air than those of a thin spray",
+    )
+    .or("false")
+    .concerns(STEP),
     Key::new("grains", "gravity", Kind::Number(-100.0, 100.0, "m/s2"), "along y (m/s2)")
         .or("-9.81")
         .concerns(STEP),
@@ -95,6 +103,15 @@ pub const GRAIN_KEYS: &[Key] = &[
         "whether grains that lie still come to rest until something wakes them",
     )
     .or("true")
+    .concerns(STEP),
+    Key::new(
+        "grains",
+        "active_distance",
+        Kind::Number(1.0e-5, FAR, "m"),
+        "slow grains farther than this (m) from objects and fast grains rest at once; of no effect with rest = false",
+    )
+    .or_nothing()
+    .such_as("0.15")
     .concerns(STEP),
     Key::new(
         "grains",

@@ -141,6 +141,7 @@ pub(super) fn params(scene: &Scene, cell: f64) -> Params {
     let values = &scene.values;
     let number = |name: &str| values.number(&format!("grains.{name}"));
     let whole = |name: &str| values.get(&format!("grains.{name}")).and_then(|value| value.whole());
+    let flag = |name: &str| values.get(&format!("grains.{name}")).and_then(|value| value.flag());
     let usual = Params::for_cell(cell);
     let of_repose = || number("repose_angle_deg").map(grain_friction::of_repose);
     let radius = number("radius").unwrap_or(usual.radius);
@@ -154,8 +155,10 @@ pub(super) fn params(scene: &Scene, cell: f64) -> Params {
         attraction: number("attraction").or_else(of_wall).unwrap_or(usual.attraction),
         restitution: number("restitution").unwrap_or(usual.restitution),
         air: number("air").unwrap_or(usual.air),
+        air_by_density: flag("air_by_density").unwrap_or(usual.air_by_density),
         gravity: number("gravity").unwrap_or(usual.gravity),
-        rests: values.get("grains.rest").and_then(|value| value.flag()).unwrap_or(usual.rests),
+        rests: flag("rest").unwrap_or(usual.rests),
+        active_distance: number("active_distance"),
         lifetime: number("lifetime"),
         keep_box: keep_box.map(|[a, b, c, d, e, f]| [DVec3::new(a, b, c), DVec3::new(d, e, f)]),
         sub_steps: whole("substeps").map(|count| count as u32),

@@ -128,7 +128,7 @@ impl Batch {
     }
 
     /// Lanes with a pair of their own.
-    fn lanes(&self) -> impl Iterator<Item = usize> + '_ {
+    pub fn lanes(&self) -> impl Iterator<Item = usize> + '_ {
         let repeats = |lane: usize| self.owners[lane] == self.owners[0] && self.codes[lane] == self.codes[0];
         (0..LANES).filter(move |&lane| lane == 0 || !repeats(lane))
     }

@@ -209,6 +209,9 @@ impl Heap {
             ctx.check()?;
             layout.reach(coefficients.visits_all);
             layout.find_pairs();
+            if sub == 0 && coefficients.air_by_neighbours.is_some() {
+                layout.count_neighbours(&self.rows);
+            }
             sub_step(ctx, &mut self.rows, &mut layout, &coefficients, travel.along)?;
             ctx.advance();
         }

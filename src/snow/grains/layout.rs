@@ -97,6 +97,8 @@ pub struct Layout {
     pub has_ever_moved: bool,
     /// What pairs carried in the last step, by the block that owns them, in this order.
     pub kept: Vec<(u32, Held)>,
+    /// How many neighbours each grain had when the step began, where that is asked: see [`super::density`].
+    pub neighbours: Vec<u8>,
     index: HashMap<At, u32>,
     column_index: HashMap<[i32; 2], u32>,
 }

@@ -20,6 +20,8 @@
 mod claims;
 mod collide;
 mod contacts;
+mod density;
+mod distance;
 mod field;
 #[doc(hidden)]
 pub mod heap;
@@ -257,6 +259,13 @@ impl Grains {
             let all = self.heap.count();
             let (expired, resting, fastest) = ctx.phase("move", || {
                 let coefficients = self.params.coefficients(&division);
+                if let Some(distance) = self.params.active_distance.filter(|_| self.params.rests) {
+                    self.heap.rest_far_away(
+                        distance,
+                        self.params.gravity,
+                        &mut obstacles.colliders.shells,
+                    )?;
+                }
                 self.heap.step(ctx, division, coefficients, &mut obstacles.colliders)?;
                 let expired = self.limit(around.lowest, to - from, frame);
                 Ok((expired, self.heap.resting(), self.heap.fastest()))

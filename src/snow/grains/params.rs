@@ -1,5 +1,6 @@
 //! What grains are made of and how they move.
 
+use super::density;
 use super::heap::Division;
 use super::rest::Rest;
 use super::solve::Coefficients;
@@ -22,10 +23,15 @@ pub struct Params {
     pub restitution: f64,
     /// Velocity kept in a second (beta, thesis section 3.3.1), 0..=1.
     pub air: f64,
+    /// Whether a grain among others feels less of the air (thesis section 3.8): as much as it lacks of six neighbours.
+    pub air_by_density: bool,
     /// Gravity along y (m/s2), -1000..=1000; downward is negative.
     pub gravity: f64,
     /// Whether grains that lie still come to rest.
     pub rests: bool,
+    /// Distance (m) from objects and fast grains beyond which slow grains rest at once (thesis section 3.3.3), 1e-5..=1e5; none:
+    /// they lie still first, wherever they are. It has no effect where they do not come to rest.
+    pub active_distance: Option<f64>,
     /// Sub-steps in a step; none: by the rule of [`Params::sub_steps`].
     pub sub_steps: Option<u32>,
     /// Seconds after whose frames a grain is taken away; none: it stays.
@@ -55,8 +61,10 @@ impl Params {
             attraction: 0.0,
             restitution: 0.0,
             air: 0.5,
+            air_by_density: false,
             gravity: -9.81,
             rests: true,
+            active_distance: None,
             sub_steps: None,
             lifetime: None,
             keep_box: None,
@@ -82,6 +90,11 @@ impl Params {
         let wrong = checks.into_iter().find(|(_, value, low, high)| !(*low..=*high).contains(value));
         if let Some((name, value, low, high)) = wrong {
             return Err(Error::argument(format!("{name} = {value} must lie in {low} to {high}")));
+        }
+        if let Some(distance) = self.active_distance.filter(|distance| !(1.0e-5..=1.0e5).contains(distance)) {
+            return Err(Error::argument(format!(
+                "active_distance = {distance} must lie in 0.00001 to 100000"
+            )));
         }
         if let Some(lifetime) = self.lifetime.filter(|lifetime| lifetime.is_nan() || *lifetime <= 0.0) {
             return Err(Error::argument(format!("lifetime = {lifetime} must be over 0")));
@@ -127,6 +140,7 @@ impl Params {
             gravity: [0.0, self.gravity as f32, 0.0],
             up: [0.0, up, 0.0],
             air: (1.0 - libm::pow(self.air, dt)) as f32,
+            air_by_neighbours: self.air_by_density.then(|| density::air_by_neighbours(self.air, dt)),
             friction: self.friction as f32,
             attraction: (self.attraction * self.gravity.abs() * dt) as f32,
             weight: (self.gravity.abs() * dt) as f32,

@@ -65,8 +65,18 @@ pub fn judge(row: &mut Row, rule: Option<Rest>) {
     }
     let patience = |rule: Rest| if is_supported { rule.patience } else { rule.long_patience };
     if rule.is_some_and(|rule| row.still >= patience(rule)) {
-        (row.hold, row.velocity) = (SUPPORTED, [0.0; 3]);
+        stop(row);
     }
+}
+
+/// Puts a grain to rest: it stops, and holds what lies on it.
+pub fn stop(row: &mut Row) {
+    (row.hold, row.velocity) = (SUPPORTED, [0.0; 3]);
+}
+
+/// Whether something has woken a grain, or begun its wait again, since the last sub-step.
+pub fn has_just_woken(row: &Row) -> bool {
+    row.still == JUST_WOKEN
 }
 
 /// Wakes a grain, which does not count as moving before it has moved.

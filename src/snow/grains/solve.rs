@@ -15,6 +15,7 @@ use rayon::prelude::*;
 
 use super::collide::{Eight, FARTHEST, STEEP, TOUCHING, collide};
 use super::contacts::Batch;
+use super::density::SURROUNDED;
 use super::layout::{Block, Layout};
 use super::rest::{self, Rest};
 use super::rows::{Part, Row, Shared, V, add, dot, norm, scaled, sub};
@@ -37,6 +38,8 @@ pub struct Coefficients {
     pub up: V,
     /// Share of the velocity that air takes in a sub-step: 1 - beta^dt.
     pub air: f32,
+    /// The same by how many neighbours shelter a grain; none: they do not.
+    pub air_by_neighbours: Option<[f32; SURROUNDED + 1]>,
     /// Friction between grains.
     pub friction: f32,
     /// Largest impulse of attraction in a sub-step (m/s).
@@ -123,13 +126,16 @@ fn sweep(rows: &mut [Row], layout: &mut Layout, colour: &[u32], pass: Pass, c: &
 /// Gravity, air (thesis section 3.3.1), and the impulses that touches had in the last sub-step.
 fn accelerate(rows: &mut [Row], layout: &mut Layout, c: &Coefficients) {
     let rows = Shared::new(rows);
-    layout.blocks.par_iter_mut().filter(|block| block.is_awake).for_each(|block| {
+    let Layout { blocks, neighbours, .. } = layout;
+    let air =
+        |slot: u32| c.air_by_neighbours.map_or(c.air, |air| air[usize::from(neighbours[slot as usize])]);
+    blocks.par_iter_mut().filter(|block| block.is_awake).for_each(|block| {
         for &slot in &block.members {
             // SAFETY: a grain is a member of one block.
             let row = unsafe { rows.get(slot as usize) };
             if !row.rests() {
                 let velocity = add(row.velocity, scaled(c.gravity, c.dt));
-                row.velocity = sub(velocity, scaled(velocity, c.air));
+                row.velocity = sub(velocity, scaled(velocity, air(slot)));
             }
         }
         for touch in &mut block.touches {

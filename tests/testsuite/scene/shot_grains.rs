@@ -106,6 +106,8 @@ fn what_grains_cannot_be_made_from_is_said_first() {
     at("stands = -0.1", "", &["stands"]);
     at("preset = \"icy\"", "", &["preset", "powder"]);
     at("lifetime = 0.0", "", &["lifetime"]);
+    at("active_distance = 0.0", "", &["active_distance"]);
+    at("air_by_density = 0.5", "", &["air_by_density"]);
     at("keep_box = [0, 0, 0, 1, 0, 1]", "", &["keep_box"]);
     at("initial = \"gone.ply\"", "", &["gone.ply"]);
     // A frame of the base that is not there.

@@ -1,0 +1,49 @@
+//! Drag by local density (proposed in thesis section 3.8), an option: a grain in a thin spray feels the whole drag of the air, one
+//! among others less, and one that others surround none.
+
+use std::sync::atomic::{AtomicU32, Ordering};
+
+use rayon::prelude::*;
+
+use super::layout::Layout;
+use super::rest::NEAR;
+use super::rows::{Row, norm, sub};
+
+/// Neighbours that shelter a grain from the air altogether: about as many as one in a settled heap has.
+pub const SURROUNDED: usize = 6;
+
+/// What air takes of a velocity in a sub-step, by how many neighbours shelter a grain. `air` is the share that a grain on its own keeps in a
+/// second (beta), `dt` the sub-step (s): the drag coefficient, -ln(beta), is that times the share of neighbours that are missing.
+pub fn air_by_neighbours(air: f64, dt: f64) -> [f32; SURROUNDED + 1] {
+    let mut all = [0.0; SURROUNDED + 1];
+    for (count, taken) in all.iter_mut().enumerate() {
+        let missing = (SURROUNDED - count) as f64 / SURROUNDED as f64;
+        *taken = (1.0 - libm::pow(air, dt * missing)) as f32;
+    }
+    all
+}
+
+impl Layout {
+    /// Counts the neighbours of each grain among the pairs that were found: those within a tenth of a diameter, at most
+    /// [`SURROUNDED`]. What rests counts as surrounded: it feels no air before it moves, and then among others.
+    pub fn count_neighbours(&mut self, rows: &[Row]) {
+        let counts: Vec<AtomicU32> = rows.par_iter().map(|_| AtomicU32::new(0)).collect();
+        // Sums of whole numbers do not depend on their order.
+        self.batches.par_iter().flatten_iter().for_each(|batch| {
+            let (others, shift) = (batch.others(), batch.shift());
+            for lane in batch.lanes() {
+                let [owner, other] = [batch.owners[lane], others[lane]].map(|slot| slot as usize);
+                let apart = sub(sub(rows[owner].place, shift.map(|shift| shift.0[lane])), rows[other].place);
+                if norm(apart) < 1.0 + NEAR {
+                    for slot in [owner, other] {
+                        counts[slot].fetch_add(1, Ordering::Relaxed);
+                    }
+                }
+            }
+        });
+        let count = |(count, row): (AtomicU32, &Row)| {
+            if row.rests() { SURROUNDED as u8 } else { count.into_inner().min(SURROUNDED as u32) as u8 }
+        };
+        self.neighbours = counts.into_par_iter().zip(rows).map(count).collect();
+    }
+}

@@ -1,0 +1,137 @@
+//! The distance rule (thesis section 3.3.3), an option: what lies slowly on something, far from every object and every fast grain,
+//! need not lie still for a while first. It is put to rest at a step's start and wakes as all that rests does (`rest`).
+//!
+//! Distances are those of coarse cells: no grain nearer than the distance is put to rest by the rule, and one that is farther by
+//! less than two diagonals of a cell may stay awake.
+
+use rayon::prelude::*;
+
+use super::heap::{Heap, Pose};
+use super::layout::{At, world};
+use super::rest;
+use super::rows::{Row, norm};
+use super::shell::Shell;
+use crate::base::DVec3;
+use crate::error::Result;
+
+/// Speed over which a grain is fast, in sqrt(g d): slower ones rise by at most d / 32, too little to leave the hollow between those
+/// that they lie on.
+const FAST: f64 = 0.25;
+/// Edge of a cell in the distance, where that is not less than [`LEAST`].
+const EDGE: f64 = 0.25;
+/// Least edge of a cell (diameters), so that a cell holds many grains.
+const LEAST: f64 = 4.0;
+
+/// Index of a cell along each axis.
+type Cell = [i32; 3];
+
+/// Cells one behind the other along z: steps along x and y to them, and how many there are on each side.
+type Run = [i32; 3];
+
+impl Heap {
+    /// Puts grains to rest that something supports, that are slow, and farther than a distance (m) from every fast grain and from the
+    /// meshes, as they are at the step's start and at its end. Gravity is in m/s2. What has just woken stays awake.
+    ///
+    /// # Errors
+    /// A pose that cannot be computed.
+    pub fn rest_far_away(
+        &mut self,
+        distance: f64,
+        gravity: f64,
+        shells: &mut [(Shell, Pose<'_>)],
+    ) -> Result<()> {
+        let diameter = self.diameter;
+        let edge = (EDGE * distance).max(LEAST * diameter);
+        let fast = (FAST * (gravity.abs() * diameter).sqrt()) as f32;
+        let is_fast = |row: &Row| norm(row.velocity) > fast;
+        // A grain at the top of its flight is slow, but lies on nothing.
+        let may_rest =
+            |row: &Row| !row.rests() && row.is_supported() && !rest::has_just_woken(row) && !is_fast(row);
+        let cell = |row: &Row, at: &At| -> Cell {
+            world(*at, row.place, diameter).map(|x| (x / edge).floor() as i32).into()
+        };
+        let mut cells = self.cells(&may_rest, &cell);
+        let sources = self.cells(&is_fast, &cell);
+        let runs = runs(distance / edge);
+        cells = cells.into_par_iter().filter(|cell| !is_near(*cell, &sources, &runs)).collect();
+        let within = distance + 0.5 * 3f64.sqrt() * edge;
+        let middle = |cell: &Cell| DVec3::from(cell.map(|index| (f64::from(index) + 0.5) * edge));
+        let mut pose = Vec::new();
+        for (shell, at) in shells {
+            for share in [0.0, 1.0] {
+                if cells.is_empty() {
+                    return Ok(());
+                }
+                at(share, &mut pose)?;
+                // What it follows to is its next pose: the second time it is there.
+                shell.follow(&pose);
+                shell.follow(&pose);
+                let shell = &*shell;
+                let is_free = |cell: &Cell| shell.distance(middle(cell), within).is_none();
+                cells = cells.into_par_iter().filter(is_free).collect();
+            }
+        }
+        self.rows.par_iter_mut().zip(&self.at).for_each(|(row, at)| {
+            if may_rest(row) && cells.binary_search(&cell(row, at)).is_ok() {
+                rest::stop(row);
+            }
+        });
+        Ok(())
+    }
+
+    /// The cells that hold a grain of a kind, ascending.
+    fn cells(
+        &self,
+        is_one: &(impl Fn(&Row) -> bool + Sync),
+        cell: &(impl Fn(&Row, &At) -> Cell + Sync),
+    ) -> Vec<Cell> {
+        let rows = self.rows.par_iter().zip(&self.at).filter(|(row, _)| is_one(row));
+        let mut cells: Vec<Cell> = rows.map(|(row, at)| cell(row, at)).collect();
+        cells.par_sort_unstable();
+        cells.dedup();
+        cells
+    }
+}
+
+/// The cells around a cell that have places nearer than a distance (cells) to places of its own.
+fn runs(distance: f64) -> Vec<Run> {
+    let most = distance.ceil() as i32;
+    // Between two cells so many steps apart.
+    let gap = |steps: i32| f64::from((steps.abs() - 1).max(0)).powi(2);
+    let mut runs = Vec::new();
+    for (x, y) in (-most..=most).flat_map(|x| (-most..=most).map(move |y| (x, y))) {
+        let is_within = |z: &i32| gap(x) + gap(y) + gap(*z) < distance * distance;
+        if let Some(z) = (0..=most).rev().find(is_within) {
+            runs.push([x, y, z]);
+        }
+    }
+    runs
+}
+
+/// Whether one of the cells around a cell is among some, which ascend.
+fn is_near([x, y, z]: Cell, sources: &[Cell], runs: &[Run]) -> bool {
+    runs.iter().any(|[dx, dy, dz]| {
+        let [first, last] = [z - dz, z + dz].map(|z| [x + dx, y + dy, z]);
+        let at = sources.partition_point(|source| *source < first);
+        sources.get(at).is_some_and(|source| *source <= last)
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn cells_with_places_nearer_than_the_distance_are_around_a_cell() {
+        for distance in [0.2, 1.0, 1.7, 4.0] {
+            let runs = runs(distance);
+            let sources = |at: Cell| is_near([0; 3], &[[-9, 0, 0], at, [9, 0, 0]], &runs);
+            for at in (0..11 * 11 * 11).map(|index| [index / 121 - 5, index / 11 % 11 - 5, index % 11 - 5]) {
+                // From corner to corner.
+                let gap = |corner: i32| f64::from((corner.abs() - 1).max(0)).powi(2);
+                let nearest = at.map(gap).iter().sum::<f64>().sqrt();
+                assert_eq!(sources(at), nearest < distance, "{at:?} {distance}");
+            }
+        }
+    }
+}
