@@ -1,8 +1,8 @@
 /* Grains: states, parameters, cancels, and what is refused. */
 #include "grains.h"
 
-#include <stddef.h>
 #include <pthread.h>
+#include <stddef.h>
 
 static void states(frz_context *ctx, const ball *rest, const frz_grid *snow) {
     frz_grains_params params = usual();
