@@ -2,6 +2,7 @@
 #include "grains.h"
 
 #include <pthread.h>
+#include <stddef.h>
 
 static void states(frz_context *ctx, const ball *rest, const frz_grid *snow) {
     frz_grains_params params = usual();
@@ -135,9 +136,13 @@ static void parameters(frz_context *ctx, const ball *rest, const frz_grid *snow)
         FAILS(frz_grains_create(ctx, &params, NULL, 0, &none), FRZ_ERROR_ARGUMENT, "max_grains = ");
         params.max_grains = 5, params.sub_steps = 1001;
         FAILS(frz_grains_create(ctx, &params, NULL, 0, &none), FRZ_ERROR_ARGUMENT, "sub_steps = 1001 is not within 0 to 1000");
-        params.sub_steps = 0, params.flags = 10;
-        FAILS(frz_grains_create(ctx, &params, NULL, 0, &none), FRZ_ERROR_ARGUMENT, "flags = 0xa");
-        params.flags = 0, params.struct_size = 20;
+        params.sub_steps = 0, params.flags = 18;
+        FAILS(frz_grains_create(ctx, &params, NULL, 0, &none), FRZ_ERROR_ARGUMENT, "flags = 0x12");
+        /* A header without the last field leaves it as is usual. */
+        params.flags = 0, params.active_distance = -1, params.struct_size = offsetof(frz_grains_params, active_distance);
+        WORKS(frz_grains_create(ctx, &params, NULL, 0, &none));
+        frz_grains_destroy(none), none = NULL;
+        params.active_distance = 0, params.struct_size = 20;
         FAILS(frz_grains_create(ctx, &params, NULL, 0, &none), FRZ_ERROR_VERSION, "struct_size = 20");
         FAILS(frz_grains_params_init(&params, 20), FRZ_ERROR_VERSION, "struct_size = 20");
         FAILS(frz_grains_params_init(NULL, sizeof params), FRZ_ERROR_ARGUMENT, "frz_grains_params is NULL");

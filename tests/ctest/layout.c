@@ -51,6 +51,7 @@ int main(void) {
     FIELD(frz_grains_params, attraction), FIELD(frz_grains_params, air), FIELD(frz_grains_params, gravity);
     FIELD(frz_grains_params, floor), FIELD(frz_grains_params, lowest), FIELD(frz_grains_params, max_grains);
     FIELD(frz_grains_params, seed), FIELD(frz_grains_params, sub_steps), FIELD(frz_grains_params, reserved);
+    FIELD(frz_grains_params, active_distance);
     SIZE(frz_grains_report), FIELD(frz_grains_report, struct_size), FIELD(frz_grains_report, sub_steps);
     FIELD(frz_grains_report, count), FIELD(frz_grains_report, resting), FIELD(frz_grains_report, born), FIELD(frz_grains_report, dropped);
     FIELD(frz_grains_report, removed_volume), FIELD(frz_grains_report, owed), FIELD(frz_grains_report, fastest);
