@@ -360,6 +360,10 @@ pub fn settle(row: &mut Row, at: &mut At) {
                 *since -= EDGE;
             }
         }
+        // So near 0 that it or an eighth of it counts as 0 where denormal numbers do.
+        if *place <= 0.0 {
+            *place = 0.0;
+        }
     }
 }
 
@@ -382,4 +386,24 @@ pub fn locate(world: DVec3, diameter: f64) -> (At, V) {
     }
     settle(&mut row, &mut at);
     (at, row.place)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::base::cpu::FlushDenormals;
+
+    #[test]
+    fn every_place_settles_in_a_block() {
+        for place in [-6.0e-38, -1.0e-45, -1.0e-8, -0.0, 0.0, 7.999_999_5, 8.0, -8.0, -8.1, 31.0, -1.0e6] {
+            let mut row = Row { place: [place; 3], since: [place; 3], ..Row::default() };
+            let mut at = [3; 3];
+            let flush = FlushDenormals::begin();
+            settle(&mut row, &mut at);
+            drop(flush);
+            assert!(row.place.iter().all(|x| (0.0..EDGE).contains(x)), "{place} becomes {:?}", row.place);
+            let whole = f64::from(at[0] - 3) * f64::from(EDGE) + f64::from(row.place[0]);
+            assert!((whole - f64::from(place)).abs() < 1.0e-6, "{place} becomes {whole}");
+        }
+    }
 }

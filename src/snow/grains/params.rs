@@ -119,12 +119,7 @@ impl Params {
             return count as usize;
         }
         let diameter = 2.0 * self.radius;
-        let of_fall = (dt
-            * (self.gravity.abs()
-                / (std::env::var("FZ_FALL").ok().and_then(|t| t.parse().ok()).unwrap_or(FALL) * diameter))
-                .sqrt())
-        .ceil()
-        .max(1.0) as usize;
+        let of_fall = (dt * (self.gravity.abs() / (FALL * diameter)).sqrt()).ceil().max(1.0) as usize;
         let of_way = (way / (WAY * diameter)).ceil() as usize;
         of_way.clamp(of_fall, of_fall.saturating_mul(MOST_OF_FALL))
     }
