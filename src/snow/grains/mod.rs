@@ -407,8 +407,8 @@ impl Grains {
         self.heap.ids().iter().map(|id| self.trapped().binary_search(id).is_ok())
     }
 
-    /// The grains as points: `v` (m/s), `id`, `active` (not where it rests), `trapped` (where it has no room), `pscale` (radius, m), `source_frame` and `rest` (place
-    /// of birth, m).
+    /// The grains as points: `v` (m/s), `id`, `active` (not where it rests), `trapped` (where it has no room), `pscale` (radius, m),
+    /// `source_frame` and `rest` (place of birth, m).
     pub fn points(&self) -> Points {
         let (mut cells, mut offsets) = (Vec::new(), Vec::new());
         for (at, place) in self.heap.located() {

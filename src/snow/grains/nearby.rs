@@ -1,5 +1,6 @@
-//! Triangles of a mesh near a block of grains. Eight at a time are measured in single precision, about the middle of the block, which leaves
-//! out all but one or two of them; those are compared as [`Shell::nearest`] compares them, so that the result is the same.
+//! Triangles of a mesh near a block of grains. Eight at a time are measured in single precision, about the middle of the block,
+//! which leaves out all but one or two of them; those are compared as [`Shell::nearest`] compares them, so that the result is the
+//! same.
 
 use super::shell::{Best, Nearest, Shell};
 use crate::base::DVec3;
@@ -263,5 +264,54 @@ fn reach_of(boxes: &[Boxes], place: [f32; 3], within: f32, out: &mut Vec<(u32, f
             out.push((first + lane, square.0[lane as usize]));
             near &= near - 1;
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Triangles of all shapes about the origin: slivers, some without an area, and one that is far larger than the others.
+    fn shell(random: &mut impl FnMut() -> f64) -> Shell {
+        let mut places = Vec::new();
+        for index in 0..90 {
+            let first = DVec3::new(random(), random(), random());
+            let size: f64 = [0.3, 1.0e-3, 0.0, 200.0][if index == 89 { 3 } else { index % 3 }];
+            let along = DVec3::new(random(), random(), random()) * size.max(0.2);
+            let across = DVec3::new(random(), random(), random()) * size;
+            places.extend([first, first + along, first + along * random() + across]);
+        }
+        let triangles = (0..90).map(|index| [3 * index, 3 * index + 1, 3 * index + 2]).collect();
+        let mut shell = Shell::new(0, 0.0, triangles, false, places.clone());
+        shell.follow(&places);
+        shell
+    }
+
+    #[test]
+    fn the_nearest_point_is_that_of_the_whole_mesh() {
+        let mut state = 1u64;
+        let mut random = || {
+            state = state.wrapping_mul(0x5851_f42d_4c95_7f2d).wrapping_add(0x1405_7b7e_f767_814f);
+            (state >> 40) as f64 / f64::from(1 << 23) - 1.0
+        };
+        let (mut nearby, mut found) = (Nearby::default(), 0);
+        for _ in 0..40 {
+            let shell = shell(&mut random);
+            let middle = DVec3::new(random(), random(), random());
+            let corner = DVec3::repeat(0.2);
+            let within = 0.15 * (random() + 1.0);
+            nearby.find(&shell, &[middle - corner, middle + corner], within);
+            for _ in 0..200 {
+                let place = middle + DVec3::new(random(), random(), random()) * 0.2;
+                let expected = shell.nearest(place, within).map(|nearest| nearest.square);
+                let nearest = nearby.nearest(&shell, place, within).map(|nearest| nearest.square);
+                assert_eq!(nearest.is_some(), expected.is_some(), "{place} within {within}");
+                if let (Some(nearest), Some(expected)) = (nearest, expected) {
+                    assert!((nearest - expected).abs() <= 1.0e-8 * expected, "{nearest} for {expected}");
+                    found += 1;
+                }
+            }
+        }
+        assert!((1_000..7_000).contains(&found), "{found} of 8000 are near");
     }
 }

@@ -43,7 +43,7 @@ pub struct Search<'a> {
 }
 
 /// How far meshes travel in a sub-step. What rides on a mesh goes along with it, and is as near to it as before.
-#[derive(Clone, Copy, Default)]
+#[derive(Debug, Clone, Copy, Default)]
 pub struct Travel {
     /// Where all of them go (diameters).
     pub along: V,
@@ -72,7 +72,7 @@ impl Travel {
     }
 }
 
-/// How much more than the farthest vertex goes the parts of its way may be together.
+/// Longest that [`Travel::most`] may be, in the way of the farthest vertex: beyond it, grains that do not ride would ask too often.
 const ALONG: f64 = 1.2;
 
 impl Search<'_> {
@@ -166,3 +166,35 @@ const AHEAD: f64 = 1.5;
 
 /// Room for rounding (diameters).
 const SLACK: f32 = 1.0e-3;
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A triangle whose corners go along ways (m).
+    fn moved(ways: [[f64; 3]; 3]) -> Shell {
+        let places = [DVec3::zeros(), DVec3::x(), DVec3::z()];
+        let mut shell = Shell::new(0, 0.0, vec![[0, 1, 2]], false, places.to_vec());
+        let next: Vec<DVec3> = places.iter().zip(ways).map(|(place, way)| place + DVec3::from(way)).collect();
+        shell.follow(&next);
+        shell
+    }
+
+    #[test]
+    fn no_corner_travels_farther_than_along_and_beside() {
+        let [along, still] = [[0.3, -0.2, 0.1], [0.0; 3]];
+        let cases =
+            [[along; 3], [still; 3], [along, still, still], [[0.2, 0.0, 0.0], [-0.2, 0.0, 0.0], still]];
+        for ways in cases {
+            let shell = moved(ways);
+            let travel = Travel::of(&[&shell], 0.1);
+            let corner = travel.along.map(f64::from);
+            for way in ways {
+                let rest = DVec3::from(way) / 0.1 - DVec3::from(corner);
+                assert!(rest.norm() <= travel.beside + 1.0e-6, "{travel:?} for {way:?}");
+            }
+            assert!(travel.most() <= ALONG * shell.way() / 0.1 + 1.0e-6, "{travel:?}");
+        }
+        assert!(Travel::of(&[&moved([along; 3])], 0.1).beside < 1.0e-6);
+    }
+}

@@ -11,6 +11,7 @@ use frazil::vdb::file::{self, WriteOptions};
 use frazil::vdb::{MetaValue, points};
 use frazil::{Context, Pool};
 
+use super::fuzz::Random;
 use super::shot_grains::{folder, grains};
 use crate::common::character;
 use crate::program::{fails, frazil, works};
@@ -139,34 +140,21 @@ fn changes_are_the_same_from_any_threads_stops_and_starts() {
     assert!(rebuilt("once") == rebuilt("alone"));
 }
 
-/// Numbers that look random and are always the same (splitmix64).
-struct Random(u64);
-
-impl Random {
-    fn below(&mut self, end: usize) -> usize {
-        self.0 = self.0.wrapping_add(0x9e37_79b9_7f4a_7c15);
-        let mut z = self.0;
-        z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
-        z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
-        ((z ^ (z >> 31)) % end.max(1) as u64) as usize
-    }
-
-    /// Bytes that are cut, longer, or have other bits.
-    fn damaged(&mut self, whole: &[u8]) -> Vec<u8> {
-        let mut bytes = whole.to_vec();
-        match self.below(4) {
-            0 => bytes.truncate(self.below(whole.len())),
-            1 => bytes.extend_from_slice(&whole[self.below(whole.len() - 1)..]),
-            _ => {
-                // More often among the first, where lengths and counts are.
-                let end = [whole.len(), 1500.min(whole.len())][self.below(2)];
-                for _ in 0..=self.below(4) {
-                    bytes[self.below(end)] ^= 1 << self.below(8);
-                }
+/// Bytes that are cut, longer, or have other bits.
+fn damaged(random: &mut Random, whole: &[u8]) -> Vec<u8> {
+    let mut bytes = whole.to_vec();
+    match random.below(4) {
+        0 => bytes.truncate(random.below(whole.len())),
+        1 => bytes.extend_from_slice(&whole[random.below(whole.len() - 1)..]),
+        _ => {
+            // More often among the first, where lengths and counts are.
+            let end = [whole.len(), 1500.min(whole.len())][random.below(2)];
+            for _ in 0..=random.below(4) {
+                bytes[random.below(end)] ^= 1 << random.below(8);
             }
         }
-        bytes
     }
+    bytes
 }
 
 /// How many damaged files are tried: as `FRAZIL_FUZZ` says, 10,000 when this was made.
@@ -188,7 +176,7 @@ fn damaged_changes_are_one_error_that_names_the_file() {
     let right = cache.bytes(&ctx, 9, &options).unwrap();
     let mut random = Random(5);
     for round in 0..rounds(2000) {
-        let bytes = random.damaged(&whole);
+        let bytes = damaged(&mut random, &whole);
         if bytes == whole {
             continue;
         }
@@ -244,7 +232,7 @@ fn damaged_changes_are_one_error_of_every_command() {
     let mut random = Random(6);
     let commands = ["convert a.vdb a.ply", "info a.vdb", "preview a.vdb -o a.png --size 16x16"];
     for round in 0..rounds(150) {
-        fs::write(at.join("a.vdb"), random.damaged(&whole)).unwrap();
+        fs::write(at.join("a.vdb"), damaged(&mut random, &whole)).unwrap();
         let command = commands[[0, 0, 0, 1, 2][round % 5]];
         let output = frazil(at, command);
         let said = String::from_utf8_lossy(&output.stderr);
