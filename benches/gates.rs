@@ -18,6 +18,8 @@ mod collisions;
 mod columns;
 #[path = "../tests/common/mod.rs"]
 mod common;
+#[path = "gates/crowd.rs"]
+mod crowd;
 #[path = "gates/damage.rs"]
 mod damage;
 #[path = "gates/dense.rs"]
@@ -46,6 +48,8 @@ mod house;
 mod materials;
 #[path = "gates/oracle.rs"]
 mod oracle;
+#[path = "gates/particles.rs"]
+mod particles;
 #[path = "gates/passes.rs"]
 mod passes;
 #[path = "gates/piles.rs"]

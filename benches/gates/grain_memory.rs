@@ -89,7 +89,7 @@ unsafe extern "C" {
 }
 
 /// A number of this process' status (kB).
-fn kilobytes(name: &str) -> f64 {
+pub fn kilobytes(name: &str) -> f64 {
     let status = std::fs::read_to_string("/proc/self/status").unwrap_or_default();
     let line = status.lines().find_map(|line| line.strip_prefix(name)).unwrap_or("0");
     line.split_whitespace().next().and_then(|number| number.parse().ok()).unwrap_or(0.0)

@@ -8,8 +8,8 @@ use frazil::snow::grains::heap::{Colliders, Division, Floor, Heap, Pose, Shell};
 use crate::harness::Harness;
 use crate::scenes::context;
 use crate::{
-    beds, births, collisions, columns, distance, free, grain_cancel, grain_memory, grain_readers, materials,
-    passes, piles, planes, preview, rate, rest, table, turned,
+    beds, births, collisions, columns, crowd, distance, free, grain_cancel, grain_memory, grain_readers,
+    materials, particles, passes, piles, planes, preview, rate, rest, table, turned,
 };
 
 /// Length of a frame (s).
@@ -26,6 +26,8 @@ pub fn run(h: &mut Harness) {
     planes::run(h);
     materials::run(h);
     collisions::run(h);
+    crowd::run(h);
+    particles::run(h);
     births::run(h);
     rest::run(h);
     distance::run(h);

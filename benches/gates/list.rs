@@ -49,6 +49,8 @@ pub const GATES: &[Gate] = &[
     gate("snow.grains.stick_stops", "%", Least(95.0), Open),
     gate("snow.grains.stick_shakes", "%", Most(5.0), Open),
     // Grains deeper than a tenth of a diameter in what moves or in the base, but those that are trapped.
+    // Most grains in a cube of two diameters.
+    gate("snow.grains.crowd", "grains", Most(14.0), Most(10.0)),
     none("snow.grains.deep_plate", "grains"),
     none("snow.grains.deep_blades", "grains"),
     none("snow.grains.deep_sheet", "grains"),
@@ -84,6 +86,8 @@ pub const GATES: &[Gate] = &[
     gate("snow.grains.table_3_10", "s", Most(5.0), Most(2.0)),
     gate("snow.grains.table_3_11", "s", Most(1.7), Most(0.7)),
     gate("snow.grains.table_3_12", "s", Most(12.0), Most(4.0)),
+    // Particles only: printed.
+    gate("snow.grains.walk_particles", "s", Open, Open),
     gate("snow.grains.memory", "B", Most(128.0), Most(96.0)),
     // The walls that a box leaves, against the envelope of its poses.
     gate("snow.base.wall_translation_max", "cells", Most(0.1), Most(0.03)),

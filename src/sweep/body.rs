@@ -8,7 +8,7 @@ use xxhash_rust::xxh3::Xxh3;
 use super::chain::{Face, Weights, Window, boundary};
 use super::lattice::{Fixed, Lattice, UNITS};
 use super::refine::{edge_error, refine};
-use super::topology::Topology;
+use super::topology::{Simplex, Topology};
 use crate::base::DVec3;
 use crate::base::mesh::coincident;
 use crate::context::Context;
@@ -122,6 +122,29 @@ impl Body {
     /// counterpart.
     pub fn contradictions(&self) -> usize {
         self.shape.contradictions
+    }
+
+    /// Its triangles with the caps of its open loops, counter-clockwise seen from outside; [`Body::closed_pose`] has their vertices.
+    pub fn closed_triangles(&self) -> impl Iterator<Item = [u32; 3]> + '_ {
+        self.shape.topology.simplices.iter().map(Simplex::triangle)
+    }
+
+    /// The pose (m) at a time (s), and the vertices in the middle of its caps.
+    ///
+    /// # Errors
+    /// When the pose cannot be computed.
+    pub fn closed_pose(&self, time: f64, out: &mut Vec<DVec3>) -> Result<()> {
+        self.motion.pose(time, out)?;
+        self.shape.topology.complete(out);
+        Ok(())
+    }
+
+    /// Share of its surface at a pose of [`Body::closed_pose`] that is caps, 0..=1.
+    pub fn share_of_caps(&self, pose: &[DVec3]) -> f64 {
+        let topology = &self.shape.topology;
+        let area = |simplex: &Simplex| simplex.doubled_area(pose);
+        let all: f64 = topology.simplices.iter().map(area).sum();
+        if all > 0.0 { topology.caps().map(area).sum::<f64>() / all } else { 0.0 }
     }
 
     /// Whether its triangles face inward as its motion has them.

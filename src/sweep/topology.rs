@@ -18,6 +18,18 @@ pub struct Simplex {
 }
 
 impl Simplex {
+    /// Its vertices, counter-clockwise seen from outside.
+    pub fn triangle(&self) -> [u32; 3] {
+        let [a, b, c] = self.v;
+        if self.sign > 0 { [a, b, c] } else { [a, c, b] }
+    }
+
+    /// Twice its area (m2) at a pose.
+    pub fn doubled_area(&self, pose: &[DVec3]) -> f64 {
+        let [a, b, c] = self.v.map(|vertex| pose[vertex as usize]);
+        (b - a).cross(&(c - a)).norm()
+    }
+
     /// A counter-clockwise triangle; none when two corners are the same.
     pub fn new([a, b, c]: [u32; 3]) -> Option<Self> {
         if a == b || b == c || c == a {
@@ -98,6 +110,12 @@ impl Topology {
             topology.index_edges();
         }
         topology
+    }
+
+    /// The caps of open loops: the triangles with a derived vertex.
+    pub fn caps(&self) -> impl Iterator<Item = &Simplex> {
+        // The greatest vertex comes last.
+        self.simplices.iter().filter(|simplex| simplex.v[2] as usize >= self.own_vertices)
     }
 
     /// A topology from its triangles and derived vertices.

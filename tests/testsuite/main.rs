@@ -60,6 +60,7 @@ mod snow {
     mod crumbs;
     mod grain_options;
     mod grains;
+    mod holes;
     mod layers;
     mod state;
 }

@@ -3,7 +3,7 @@
 use rayon::prelude::*;
 
 use super::contacts::SKIN;
-use super::layout::{Block, EDGE, Layout};
+use super::layout::{At, Block, EDGE, Layout};
 use super::rows::{Row, V, dot, norm, scaled};
 use super::touch::{BASE, Touch};
 use crate::base::blocks::{DIM, offset};
@@ -23,18 +23,11 @@ impl Field<'_> {
     ///
     /// # Errors
     /// What the grid reports.
-    pub fn windows(
-        &self,
-        layout: &Layout,
-        which: &[u32],
-        diameter: f64,
-        margin: f64,
-    ) -> Result<Vec<Option<Window<'_>>>> {
+    pub fn windows(&self, blocks: &[At], diameter: f64, margin: f64) -> Result<Vec<Option<Window<'_>>>> {
         let cell = self.grid.voxel_size();
-        let bounds: Vec<[[i32; 3]; 2]> = which
+        let bounds: Vec<[[i32; 3]; 2]> = blocks
             .par_iter()
-            .map(|&index| {
-                let at = layout.blocks[index as usize].at;
+            .map(|at| {
                 let leaf = |x: f64| (x / DIM as f64).floor() as i32;
                 let edge = f64::from(EDGE) * diameter / cell;
                 let low = at.map(|at| leaf(f64::from(at) * edge - margin));
@@ -91,7 +84,8 @@ impl<'a> Seen<'a> {
         let is_new = |index: &&u32| self.patches[**index as usize].is_none();
         let new: Vec<u32> = which.iter().filter(is_new).copied().collect();
         let cell = self.field.grid.voxel_size();
-        let windows = self.field.windows(layout, &new, self.diameter, ROOM * self.diameter / cell + 2.0)?;
+        let blocks: Vec<At> = new.iter().map(|&index| layout.blocks[index as usize].at).collect();
+        let windows = self.field.windows(&blocks, self.diameter, ROOM * self.diameter / cell + 2.0)?;
         let (edge, room) = (f64::from(EDGE) * self.diameter / cell, ROOM * self.diameter / cell);
         let patch = |(&index, window): (&u32, Option<Window<'_>>)| {
             let Some(window) = window else { return Patch::default() };

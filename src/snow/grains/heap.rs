@@ -181,12 +181,13 @@ impl Heap {
     ) -> Result<()> {
         let dt = division.dt / division.sub_steps as f64;
         let mut pose = Vec::new();
-        let Colliders { floor, fields, shells } = colliders;
-        let mut fields: Vec<Seen<'_>> = fields.iter().map(|field| Seen::new(field, self.diameter)).collect();
-        for (shell, at) in &mut *shells {
+        for (shell, at) in &mut colliders.shells {
             at(0.0, &mut pose)?;
             shell.follow(&pose);
         }
+        self.make_room(ctx, colliders)?;
+        let Colliders { floor, fields, shells } = colliders;
+        let mut fields: Vec<Seen<'_>> = fields.iter().map(|field| Seen::new(field, self.diameter)).collect();
         // A few sub-steps ahead.
         let ahead = (f64::from(SUB_STEPS_AHEAD) * dt / self.diameter) as f32;
         let mut layout = self.lay_out(ahead);
@@ -215,9 +216,14 @@ impl Heap {
             sub_step(ctx, &mut self.rows, &mut layout, &coefficients, travel.along)?;
             ctx.advance();
         }
+        for (shell, at) in &mut *shells {
+            at(1.0, &mut pose)?;
+            shell.follow(&pose);
+        }
         let end = trapped::End { layout: &layout, diameter: self.diameter, dt };
-        self.trapped = end.release(&mut self.rows, &self.ids, &self.trapped, colliders, &mut pose)?;
-        self.take_back(layout)
+        self.trapped = end.release(&mut self.rows, &self.ids, &self.trapped, colliders)?;
+        self.take_back(layout)?;
+        self.make_room(ctx, colliders)
     }
 
     /// Sorts the grains into blocks.

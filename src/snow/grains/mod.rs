@@ -20,6 +20,7 @@
 mod claims;
 mod collide;
 mod contacts;
+mod crowd;
 mod density;
 mod distance;
 mod field;
@@ -36,6 +37,7 @@ mod shell;
 pub mod solve;
 mod sourcing;
 mod state;
+mod surfaces;
 mod surroundings;
 mod touch;
 mod trapped;

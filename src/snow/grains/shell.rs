@@ -3,7 +3,7 @@
 //! A signed distance grid of a deforming mesh would have to be made for each of dozens of sub-steps; the triangles need only
 //! have their boxes fitted again, and give the surface's own velocity, however thin the mesh is. A plane that moves with the
 //! nearest point holds a grain on its side of the surface; inside and outside are told by the orientation of the nearest
-//! triangle, and not at all for open meshes, whose both sides collide.
+//! triangle, and not at all for wide open meshes, whose both sides collide.
 
 use rayon::prelude::*;
 

@@ -285,7 +285,7 @@ impl Sourcing {
 }
 
 /// A random number for a site (splitmix64: Steele et al. 2014).
-fn hash(seed: u64, frame: i32, site: [i64; 3]) -> u64 {
+pub fn hash(seed: u64, frame: i32, site: [i64; 3]) -> u64 {
     let mix = |mut x: u64| {
         x = x.wrapping_add(0x9e37_79b9_7f4a_7c15);
         x = (x ^ x >> 30).wrapping_mul(0xbf58_476d_1ce4_e5b9);

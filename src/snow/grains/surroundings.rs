@@ -63,6 +63,9 @@ pub struct Obstacles<'a> {
 const GROUND: f32 = 0.5;
 /// Farthest (diameters) that a mesh's box may jump between two steps: more, and what rested on it wakes.
 const JUMP: f64 = 0.1;
+/// Greatest share of an object's surface that its holes are, where it counts as closed; what is open wider, a bowl, has two sides that
+/// collide.
+const HOLES: f64 = 0.1;
 /// Numbers in [`Surroundings::ties`].
 pub const TIES: usize = 6;
 
@@ -89,20 +92,29 @@ impl<'a> Surroundings<'a> {
         for object in self.objects.iter().filter(|object| object.pushes) {
             let body = object.body;
             let (mut first, mut last) = (Vec::new(), Vec::new());
-            body.motion().pose(from, &mut first)?;
-            body.motion().pose(to, &mut last)?;
+            body.closed_pose(from, &mut first)?;
+            body.closed_pose(to, &mut last)?;
+            let closed = body.share_of_caps(&first) <= HOLES && body.contradictions() == 0;
+            let own = if closed { first.len() } else { body.motion().vertex_count() };
+            first.truncate(own);
+            last.truncate(own);
             boxes[0].push(bounds(&first));
             boxes[1].push(bounds(&last));
             way = first.iter().zip(&last).map(|(a, b)| way_near(*a, *b, grains)).fold(way, f64::max);
             let turn = |triangle: &[u32; 3]| {
                 if body.is_reversed() { [triangle[0], triangle[2], triangle[1]] } else { *triangle }
             };
-            let triangles = body.motion().triangles().iter().map(turn).collect();
-            let closed = body.closed_loops() == 0 && body.contradictions() == 0;
+            let triangles = match closed {
+                true => body.closed_triangles().collect(),
+                false => body.motion().triangles().iter().map(turn).collect(),
+            };
             let shell = Shell::new(number, object.friction as f32, triangles, closed, first)
                 .with_stick(object.stick as f32);
-            let pose =
-                move |share: f64, out: &mut Vec<DVec3>| body.motion().pose(from + (to - from) * share, out);
+            let pose = move |share: f64, out: &mut Vec<DVec3>| {
+                body.closed_pose(from + (to - from) * share, out)?;
+                out.truncate(own);
+                Ok(())
+            };
             colliders.shells.push((shell, Box::new(pose)));
             number += 1;
         }

@@ -1,0 +1,364 @@
+//! Grains that a step leaves crowded. What an object removes in a step it fills itself at the step's end: the snow of a slice as thick as
+//! its way has to leave through a gap that closes. Grains that push each other aside get about ten diameters far in a frame; the others
+//! would end inside one another, more of them from frame to frame. At the step's end those that have no room go on along the surfaces and
+//! through the grains around them, by the shortest way, to where there is some: up the front of a plough, out from under a sole.
+//!
+//! Room is counted in cells of two diameters. Grains keep their velocity.
+
+use std::collections::hash_map::Entry;
+use std::collections::{HashMap, HashSet};
+
+use rayon::prelude::*;
+
+use super::heap::{Colliders, Heap};
+use super::layout::{At, EDGE, world};
+use super::rest;
+use super::rows::{Row, V, add};
+use super::surfaces::{Side, Surfaces};
+#[cfg(test)]
+use crate::base::DVec3;
+use crate::context::Context;
+use crate::error::Result;
+
+/// Edge of a cell (diameters): eight grains beside each other.
+const CELL: f32 = 2.0;
+/// Cells along a block's edge.
+const PER_BLOCK: i32 = (EDGE / CELL) as i32;
+/// Most grains in a cell that is not crowded; ten fit in at most, packed at random.
+const MOST: usize = 14;
+/// What a crowded cell keeps besides one grain for each eighth that is free of surfaces.
+const KEPT: usize = 2;
+/// Most grains of a cell with room.
+const LOOSE: usize = 7;
+/// Cells that grains go through at most.
+const FARTHEST: usize = 100;
+/// Least distance (diameters) of a grain that is moved from a surface.
+const CLEAR: f64 = 0.5;
+/// How far (diameters) it is from the middle of its eighth, at most, along each axis.
+const JITTER: f32 = 0.25;
+/// Distance (diameters) of any such place from the middle of its cell, at most.
+const CORNER: f64 = 1.3;
+/// Room around a block (cells of a level set).
+const MARGIN: f64 = 2.0;
+
+/// Index of a cell along each axis.
+type Cell = [i32; 3];
+
+impl Heap {
+    /// Moves grains from where they are crowded to where there is room, with meshes as they are now.
+    ///
+    /// # Errors
+    /// Cancel; what a grid reports.
+    pub(super) fn make_room(&mut self, ctx: &Context, colliders: &Colliders<'_>) -> Result<()> {
+        let slots = (0u32..).zip(self.rows.iter().zip(&self.at));
+        let mut slots: Vec<(Cell, u32)> =
+            slots.map(|(slot, (row, at))| (cell(*at, row.place), slot)).collect();
+        slots.par_sort_unstable();
+        let crowded: Vec<Cell> = slots
+            .chunk_by(|a, b| a.0 == b.0)
+            .filter(|grains| grains.len() > MOST)
+            .map(|grains| grains[0].0)
+            .collect();
+        if crowded.is_empty() {
+            return Ok(());
+        }
+        let mut map =
+            Map { slots, rows: &self.rows, colliders, diameter: self.diameter, blocks: HashMap::new() };
+        let moves = Flow::begin(&mut map, &crowded)?.run(ctx, &mut map)?;
+        for Move { slot, cell, place } in &moves {
+            let row = &mut self.rows[*slot as usize];
+            (row.place, self.at[*slot as usize]) = (*place, block(*cell));
+            rest::wake(row);
+            rest::begin_again(row);
+        }
+        let moved: HashSet<u32> = moves.iter().map(|Move { slot, .. }| *slot).collect();
+        self.held.retain(|held| !held.grains.iter().any(|slot| moved.contains(slot)));
+        self.touches.retain(|touch| !moved.contains(&touch.grain));
+        let moved: HashSet<u32> = moved.iter().map(|slot| self.ids[*slot as usize]).collect();
+        self.trapped.retain(|id| !moved.contains(id));
+        Ok(())
+    }
+}
+
+/// A grain that goes elsewhere.
+struct Move {
+    slot: u32,
+    cell: Cell,
+    /// Within its block (diameters).
+    place: V,
+}
+
+/// Where grains and surfaces are.
+struct Map<'a, 'b> {
+    /// Cells and slots, ascending.
+    slots: Vec<(Cell, u32)>,
+    rows: &'a [Row],
+    colliders: &'a Colliders<'b>,
+    /// Of a grain (m).
+    diameter: f64,
+    /// Surfaces around the blocks that were asked for.
+    blocks: HashMap<At, Surfaces<'a>>,
+}
+
+/// What is known of a cell.
+struct Known {
+    /// What its middle lies beside.
+    side: Side,
+    /// How many grains are in it.
+    count: usize,
+    /// A place (diameters, within the block) for each eighth that is clear of surfaces, and whether grains are in it.
+    eighths: Vec<(V, bool)>,
+}
+
+impl Map<'_, '_> {
+    /// Reads the surfaces around some cells.
+    fn see(&mut self, cells: impl Iterator<Item = Cell>) -> Result<()> {
+        let mut new: Vec<At> = cells.map(block).filter(|at| !self.blocks.contains_key(at)).collect();
+        new.sort_unstable();
+        new.dedup();
+        let around = Surfaces::around(self.colliders, &new, self.diameter, MARGIN)?;
+        self.blocks.extend(new.into_iter().zip(around));
+        Ok(())
+    }
+
+    /// Slots of the grains of a cell.
+    fn grains(&self, cell: Cell) -> impl Iterator<Item = u32> + '_ {
+        let first = self.slots.partition_point(|(of, _)| *of < cell);
+        self.slots[first..].iter().take_while(move |(of, _)| *of == cell).map(|(_, slot)| *slot)
+    }
+
+    /// What is known of a cell whose surroundings were read; its eighths only where grains may come to or where they are asked for.
+    fn know(&self, cell: Cell, asks: bool) -> Known {
+        let surfaces = &self.blocks[&block(cell)];
+        let side = |place: V| surfaces.side(world(block(cell), place, self.diameter));
+        let corner = cell.map(|at| at.rem_euclid(PER_BLOCK) as f32 * CELL);
+        let known = side(add(corner, [0.5 * CELL; 3]));
+        let grains: Vec<u32> = self.grains(cell).collect();
+        let count = grains.len();
+        let mut eighths = Vec::new();
+        if known.distance > -f64::from(CELL) && (asks || count < LOOSE) {
+            let is_in = |slot: &u32, eighth: usize| {
+                let place = self.rows[*slot as usize].place;
+                (0..3).all(|axis| (place[axis] - corner[axis] >= 0.5 * CELL) == (eighth >> axis & 1 == 1))
+            };
+            for eighth in 0..8 {
+                let place = add(corner, scattered(cell, eighth));
+                let is_clear = || {
+                    let beside = side(place);
+                    beside.distance >= CLEAR && !beside.is_across(&known)
+                };
+                if known.distance >= CLEAR + CORNER || is_clear() {
+                    eighths.push((place, grains.iter().any(|slot| is_in(slot, eighth))));
+                }
+            }
+        }
+        Known { side: known, count, eighths }
+    }
+}
+
+/// Grains on their way out of crowds, which spread all at once, cell by cell.
+struct Flow {
+    /// The crowd that came to a cell first.
+    came: HashMap<Cell, u32>,
+    /// For each crowd the one that it has met and become part of, or itself.
+    parents: Vec<u32>,
+    /// Slots without room, by crowd.
+    pools: Vec<Vec<u32>>,
+    /// Cells that crowds have just come to.
+    front: Vec<(Cell, u32, Side)>,
+}
+
+impl Flow {
+    /// Crowds in some cells.
+    fn begin(map: &mut Map<'_, '_>, crowded: &[Cell]) -> Result<Self> {
+        map.see(crowded.iter().copied())?;
+        let known: Vec<Known> = crowded.par_iter().map(|&cell| map.know(cell, true)).collect();
+        let pool =
+            |(&cell, known): (&Cell, &Known)| map.grains(cell).skip(known.eighths.len() + KEPT).collect();
+        Ok(Self {
+            came: crowded.iter().copied().zip(0..).collect(),
+            parents: (0..crowded.len() as u32).collect(),
+            pools: crowded.iter().zip(&known).map(pool).collect(),
+            front: crowded
+                .iter()
+                .zip(0..)
+                .zip(known)
+                .map(|((&cell, crowd), known)| (cell, crowd, known.side))
+                .collect(),
+        })
+    }
+
+    /// Where grains go.
+    ///
+    /// # Errors
+    /// Cancel; what a grid reports.
+    fn run(mut self, ctx: &Context, map: &mut Map<'_, '_>) -> Result<Vec<Move>> {
+        let mut moves = Vec::new();
+        for _ in 0..FARTHEST {
+            ctx.check()?;
+            let visits = self.advance();
+            if visits.is_empty() {
+                break;
+            }
+            map.see(visits.iter().map(|(cell, _)| *cell))?;
+            let known: Vec<Known> = visits.par_iter().map(|(cell, _)| map.know(*cell, false)).collect();
+            let mut front = Vec::new();
+            for ((cell, from), known) in visits.into_iter().zip(known) {
+                let (_, crowd, side) = &self.front[from];
+                if known.side.distance <= -f64::from(CELL) || known.side.is_across(side) {
+                    self.came.remove(&cell);
+                    continue;
+                }
+                let crowd = self.part_of(*crowd);
+                let room = LOOSE.saturating_sub(known.count);
+                for (place, _) in known.eighths.iter().filter(|(_, is_taken)| !is_taken).take(room) {
+                    let Some(slot) = self.pools[crowd as usize].pop() else { break };
+                    moves.push(Move { slot, cell, place: *place });
+                }
+                front.push((cell, crowd, known.side));
+            }
+            self.front = front;
+        }
+        Ok(moves)
+    }
+
+    /// The cells around those of the front that no crowd has come to, each with the one that it is come to from.
+    fn advance(&mut self) -> Vec<(Cell, usize)> {
+        let mut visits = Vec::new();
+        for from in 0..self.front.len() {
+            let (cell, crowd, _) = &self.front[from];
+            let (cell, crowd) = (*cell, self.part_of(*crowd));
+            if self.pools[crowd as usize].is_empty() {
+                continue;
+            }
+            for step in (0..27).filter(|step| *step != 13) {
+                let [x, y, z] = cell;
+                let near = [x + step / 9 - 1, y + step / 3 % 3 - 1, z + step % 3 - 1];
+                match self.came.entry(near) {
+                    Entry::Vacant(entry) => {
+                        entry.insert(crowd);
+                        visits.push((near, from));
+                    }
+                    Entry::Occupied(entry) => {
+                        let other = *entry.get();
+                        self.join(crowd, other);
+                    }
+                }
+            }
+        }
+        visits
+    }
+
+    /// The crowd that a crowd is part of.
+    fn part_of(&self, crowd: u32) -> u32 {
+        let mut crowd = crowd;
+        while self.parents[crowd as usize] != crowd {
+            crowd = self.parents[crowd as usize];
+        }
+        crowd
+    }
+
+    /// Two crowds that meet become one.
+    fn join(&mut self, a: u32, b: u32) {
+        let (a, b) = (self.part_of(a), self.part_of(b));
+        if a != b {
+            let (into, from) = (a.min(b), a.max(b));
+            self.parents[from as usize] = into;
+            let pool = std::mem::take(&mut self.pools[from as usize]);
+            self.pools[into as usize].extend(pool);
+        }
+    }
+}
+
+/// The cell of a place in a block.
+fn cell(at: At, place: V) -> Cell {
+    [0, 1, 2].map(|axis| at[axis] * PER_BLOCK + (place[axis] / CELL) as i32)
+}
+
+/// The block of a cell.
+fn block(cell: Cell) -> At {
+    cell.map(|at| at.div_euclid(PER_BLOCK))
+}
+
+/// A place in an eighth of a cell (diameters, from the cell's least corner), not the same in all cells.
+fn scattered(cell: Cell, eighth: usize) -> V {
+    let hash = super::sourcing::hash(eighth as u64, 0, cell.map(i64::from));
+    [0, 1, 2].map(|axis: usize| {
+        let share = (hash >> (21 * axis) & 0x1f_ffff) as f32 / 1_048_576.0 - 1.0;
+        0.25 * CELL + 0.5 * CELL * (eighth >> axis & 1) as f32 + JITTER * share
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::base::mesh::TriMesh;
+    use crate::context::Pool;
+    use crate::snow::grains::heap::Floor;
+    use crate::snow::grains::shell::Shell;
+
+    /// Places (m) after room was made for grains of a diameter of 1 m on a floor, beside a mesh.
+    fn spread(places: &[DVec3], mesh: Option<(TriMesh, bool)>) -> Vec<DVec3> {
+        let mut heap = Heap::new(1.0);
+        for (id, place) in (0..).zip(places) {
+            heap.add(id, *place, [0.0; 3]).unwrap();
+        }
+        let floor = Some(Floor { height: 0.0, friction: 0.5 });
+        let mut colliders = Colliders { floor, ..Colliders::default() };
+        if let Some((mesh, closed)) = mesh {
+            let pose: Vec<DVec3> = mesh.positions.iter().map(|place| place.cast::<f64>()).collect();
+            let mut shell = Shell::new(2, 0.5, mesh.triangles, closed, pose.clone());
+            shell.follow(&pose);
+            colliders.shells.push((shell, Box::new(|_, _| Ok(()))));
+        }
+        let ctx = Context::new(Pool::new(2).unwrap());
+        ctx.step(1, || ctx.phase("move", || heap.make_room(&ctx, &colliders))).unwrap();
+        assert_eq!(heap.ids(), (0..places.len() as u32).collect::<Vec<u32>>());
+        heap.places().collect()
+    }
+
+    fn fullest(places: &[DVec3]) -> usize {
+        let mut counts = HashMap::new();
+        places
+            .iter()
+            .for_each(|place| *counts.entry(place.map(|x| (x / 2.0).floor() as i64)).or_insert(0) += 1);
+        counts.into_values().max().unwrap_or(0)
+    }
+
+    #[test]
+    fn grains_at_one_place_spread_and_stay_above_the_floor() {
+        let places = spread(&[DVec3::new(0.3, 0.6, -0.2); 3000], None);
+        assert!(fullest(&places) <= MOST, "{}", fullest(&places));
+        assert!(places.iter().all(|place| place.y >= 0.5), "one is in the floor");
+        // Half a ball of seven grains in eight cubic diameters.
+        let farthest = places.iter().map(|place| place.norm()).fold(0.0, f64::max);
+        assert!(
+            farthest < 1.8 * (3000.0 * 8.0 / 7.0 / (2.0 / 3.0 * std::f64::consts::PI)).cbrt(),
+            "{farthest}"
+        );
+    }
+
+    #[test]
+    fn grains_leave_a_closed_gap_along_it() {
+        // A plate on the floor, 30 by 30 and as thick as nothing goes through.
+        let plate = TriMesh::cuboid([-15.0, 0.1, -15.0], [15.0, 30.0, 15.0]);
+        let at = |n: i32| DVec3::new(f64::from(n % 40) * 0.05 - 1.0, 0.05, f64::from(n / 40) * 0.05 - 1.0);
+        let before: Vec<DVec3> = (0..1600).map(at).collect();
+        let after = spread(&before, Some((plate, true)));
+        let moved: Vec<&DVec3> =
+            after.iter().zip(&before).filter(|(a, b)| (*a - *b).norm() > 0.01).map(|(a, _)| a).collect();
+        assert!(moved.len() > 1400, "{}", moved.len());
+        let is_beside = |place: &&DVec3| place.x.abs().max(place.z.abs()) >= 15.4 && place.y >= 0.5;
+        assert!(moved.iter().all(is_beside), "{:?}", moved.iter().find(|place| !is_beside(place)));
+    }
+
+    #[test]
+    fn no_grain_goes_through_a_sheet() {
+        let sheet = TriMesh::cuboid([0.0, -1.0, -60.0], [0.0, 60.0, 60.0]);
+        for side in [-1.0, 1.0] {
+            let places = spread(&[DVec3::new(0.7 * side, 0.6, 0.0); 2000], Some((sheet.clone(), false)));
+            assert!(fullest(&places) <= MOST);
+            assert!(places.iter().all(|place| place.x * side >= 0.49), "one is on the other side");
+        }
+    }
+}

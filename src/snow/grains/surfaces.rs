@@ -1,0 +1,133 @@
+//! The surfaces around grains that have no room.
+
+use super::field::Window;
+use super::heap::{Colliders, Floor, Pose};
+use super::layout::{At, world};
+use super::rows::{V, dot};
+use super::shell::Shell;
+use super::trapped::DEEP;
+use crate::base::DVec3;
+use crate::error::Result;
+
+/// How far (diameters) surfaces are looked for.
+const FAR: f64 = 2.0;
+/// Share of the depth of grains that are in a surface, in which places that are written with less precision stay.
+const ROUNDED: f64 = 0.98;
+/// How often a grain is moved out of each surface.
+const ROUNDS: usize = 16;
+/// Farthest that it is moved (diameters).
+const FARTHEST: f64 = 1.5;
+/// Cosine between the ways out of a mesh on its two sides.
+const OPPOSITE: f64 = -0.5;
+
+/// The surfaces around a block, as they are at the step's end.
+pub struct Surfaces<'a> {
+    floor: Option<Floor>,
+    fields: Vec<(f64, Window<'a>)>,
+    shells: &'a [(Shell, Pose<'a>)],
+    /// Of a grain (m).
+    diameter: f64,
+}
+
+/// What a place lies beside.
+pub struct Side {
+    /// Distance from the nearest surface (diameters), negative inside; at most [`FAR`].
+    pub distance: f64,
+    /// The way out of each mesh that is nearer than [`FAR`].
+    pub out: Vec<(usize, DVec3)>,
+}
+
+impl Side {
+    /// Whether a mesh lies between this place and another one nearby.
+    pub fn is_across(&self, other: &Self) -> bool {
+        let is_same = |(mesh, out): &(usize, DVec3)| {
+            other.out.iter().any(|(index, way)| index == mesh && way.dot(out) < OPPOSITE)
+        };
+        self.out.iter().any(is_same)
+    }
+}
+
+impl<'a> Surfaces<'a> {
+    /// Those of some blocks and a margin (cells of a level set).
+    ///
+    /// # Errors
+    /// What a grid reports.
+    pub fn around(
+        colliders: &'a Colliders<'_>,
+        blocks: &[At],
+        diameter: f64,
+        margin: f64,
+    ) -> Result<Vec<Self>> {
+        let Colliders { floor, fields, shells } = colliders;
+        let new = || Surfaces { floor: *floor, fields: Vec::new(), shells, diameter };
+        let mut around: Vec<Self> = blocks.iter().map(|_| new()).collect();
+        for field in fields {
+            let windows = field.windows(blocks, diameter, margin)?;
+            for (surfaces, window) in around.iter_mut().zip(windows) {
+                surfaces.fields.extend(window.map(|window| (field.grid.voxel_size(), window)));
+            }
+        }
+        Ok(around)
+    }
+
+    /// What a place (m) lies beside.
+    pub fn side(&self, place: DVec3) -> Side {
+        let mut side = Side { distance: FAR, out: Vec::new() };
+        if let Some(floor) = &self.floor {
+            side.distance = side.distance.min((place.y - floor.height) / self.diameter);
+        }
+        for (cell, window) in &self.fields {
+            let distance = f64::from(window.sample([0, 1, 2].map(|axis| place[axis] / cell)).0);
+            side.distance = side.distance.min(distance / self.diameter);
+        }
+        for (index, (shell, _)) in self.shells.iter().enumerate() {
+            if let Some((depth, out)) = shell.depth(place, FAR * self.diameter) {
+                side.distance = side.distance.min(FAR - depth / self.diameter);
+                side.out.push((index, out));
+            }
+        }
+        side
+    }
+    /// Where a grain at a place in a block is out of them; nothing where it finds no room.
+    pub fn release(&self, at: At, within: V) -> Option<V> {
+        let from = world(at, within, self.diameter);
+        let mut place = from;
+        for _ in 0..ROUNDS {
+            let mut is_out = true;
+            self.for_each_way_out(&mut place, |depth| is_out &= depth <= ROUNDED * DEEP);
+            if is_out {
+                let way = (place - from) / self.diameter;
+                return Some([0, 1, 2].map(|axis| within[axis] + way[axis] as f32));
+            }
+            if (place - from).norm() > FARTHEST * self.diameter {
+                return None;
+            }
+        }
+        None
+    }
+
+    /// Moves a place (m) out of one surface after the other, and tells how deep (diameters) it was in each.
+    fn for_each_way_out(&self, place: &mut DVec3, mut tell: impl FnMut(f64)) {
+        let half = 0.5 * self.diameter;
+        if let Some(floor) = &self.floor {
+            let depth = floor.height + half - place.y;
+            tell(depth / self.diameter);
+            place.y += depth.max(0.0);
+        }
+        for (cell, window) in &self.fields {
+            let (distance, gradient) = window.sample([0, 1, 2].map(|axis| place[axis] / cell));
+            let depth = half - f64::from(distance);
+            tell(depth / self.diameter);
+            let steep = dot(gradient, gradient).sqrt();
+            if depth > 0.0 && steep > 1.0e-6 {
+                *place += DVec3::from(gradient.map(f64::from)) * (depth / f64::from(steep));
+            }
+        }
+        for (shell, _) in self.shells {
+            if let Some((depth, out)) = shell.depth(*place, half) {
+                tell(depth / self.diameter);
+                *place += out * depth.max(0.0);
+            }
+        }
+    }
+}
