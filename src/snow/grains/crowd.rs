@@ -25,7 +25,10 @@ const CELL: f32 = 2.0;
 /// Cells along a block's edge.
 const PER_BLOCK: i32 = (EDGE / CELL) as i32;
 /// Most grains in a cell that is not crowded; ten fit in at most, packed at random.
-const MOST: usize = 14;
+pub const MOST: usize = 14;
+/// The same before a step, in which more than these, from a file of grains that lie in one place, would have too many neighbours. Those
+/// that the last step found no room for do not try again.
+pub const MOST_BEFORE: usize = 64;
 /// What a crowded cell keeps besides one grain for each eighth that is free of surfaces.
 const KEPT: usize = 2;
 /// Most grains of a cell with room.
@@ -38,6 +41,9 @@ const CLEAR: f64 = 0.5;
 const JITTER: f32 = 0.25;
 /// Distance (diameters) of any such place from the middle of its cell, at most.
 const CORNER: f64 = 1.3;
+/// Greatest depth (diameters) of the middle of a cell that grains go through in a surface: half of its edge, so that a way leads along
+/// two surfaces that touch.
+const DEEPEST: f64 = 1.0;
 /// Room around a block (cells of a level set).
 const MARGIN: f64 = 2.0;
 
@@ -45,18 +51,18 @@ const MARGIN: f64 = 2.0;
 type Cell = [i32; 3];
 
 impl Heap {
-    /// Moves grains from where they are crowded to where there is room, with meshes as they are now.
+    /// Moves grains from cells with more than so many to where there is room, with meshes as they are now.
     ///
     /// # Errors
     /// Cancel; what a grid reports.
-    pub(super) fn make_room(&mut self, ctx: &Context, colliders: &Colliders<'_>) -> Result<()> {
+    pub(super) fn make_room(&mut self, ctx: &Context, colliders: &Colliders<'_>, most: usize) -> Result<()> {
         let slots = (0u32..).zip(self.rows.iter().zip(&self.at));
         let mut slots: Vec<(Cell, u32)> =
             slots.map(|(slot, (row, at))| (cell(*at, row.place), slot)).collect();
         slots.par_sort_unstable();
         let crowded: Vec<Cell> = slots
             .chunk_by(|a, b| a.0 == b.0)
-            .filter(|grains| grains.len() > MOST)
+            .filter(|grains| grains.len() > most)
             .map(|grains| grains[0].0)
             .collect();
         if crowded.is_empty() {
@@ -136,7 +142,7 @@ impl Map<'_, '_> {
         let grains: Vec<u32> = self.grains(cell).collect();
         let count = grains.len();
         let mut eighths = Vec::new();
-        if known.distance > -f64::from(CELL) && (asks || count < LOOSE) {
+        if known.distance > -DEEPEST && (asks || count < LOOSE) {
             let is_in = |slot: &u32, eighth: usize| {
                 let place = self.rows[*slot as usize].place;
                 (0..3).all(|axis| (place[axis] - corner[axis] >= 0.5 * CELL) == (eighth >> axis & 1 == 1))
@@ -205,7 +211,7 @@ impl Flow {
             let mut front = Vec::new();
             for ((cell, from), known) in visits.into_iter().zip(known) {
                 let (_, crowd, side) = &self.front[from];
-                if known.side.distance <= -f64::from(CELL) || known.side.is_across(side) {
+                if known.side.distance <= -DEEPEST || known.side.is_across(side) {
                     self.came.remove(&cell);
                     continue;
                 }
@@ -312,7 +318,7 @@ mod tests {
             colliders.shells.push((shell, Box::new(|_, _| Ok(()))));
         }
         let ctx = Context::new(Pool::new(2).unwrap());
-        ctx.step(1, || ctx.phase("move", || heap.make_room(&ctx, &colliders))).unwrap();
+        ctx.step(1, || ctx.phase("move", || heap.make_room(&ctx, &colliders, MOST))).unwrap();
         assert_eq!(heap.ids(), (0..places.len() as u32).collect::<Vec<u32>>());
         heap.places().collect()
     }

@@ -2,7 +2,8 @@
 
 use rayon::prelude::*;
 
-use super::contacts::{Held, MOST};
+use super::contacts::{Held, MOST as MOST_GRAINS};
+use super::crowd::{MOST, MOST_BEFORE};
 use super::field::{Field, Seen};
 use super::layout::{At, Layout, NONE, SUB_STEPS_AHEAD, holds, locate, order, settle, world};
 use super::rest;
@@ -91,8 +92,8 @@ impl Heap {
         if !holds(at) {
             return Err(Error::argument("a grain is too far from the origin"));
         }
-        if self.rows.len() >= MOST {
-            return Err(Error::argument(format!("there are more than {MOST} grains")));
+        if self.rows.len() >= MOST_GRAINS {
+            return Err(Error::argument(format!("there are more than {MOST_GRAINS} grains")));
         }
         self.rows.push(Row { place, hold: 1.0, velocity, since: place, ..Row::default() });
         self.ids.push(id);
@@ -185,7 +186,7 @@ impl Heap {
             at(0.0, &mut pose)?;
             shell.follow(&pose);
         }
-        self.make_room(ctx, colliders)?;
+        self.make_room(ctx, colliders, MOST_BEFORE)?;
         let Colliders { floor, fields, shells } = colliders;
         let mut fields: Vec<Seen<'_>> = fields.iter().map(|field| Seen::new(field, self.diameter)).collect();
         // A few sub-steps ahead.
@@ -223,7 +224,7 @@ impl Heap {
         let end = trapped::End { layout: &layout, diameter: self.diameter, dt };
         self.trapped = end.release(&mut self.rows, &self.ids, &self.trapped, colliders)?;
         self.take_back(layout)?;
-        self.make_room(ctx, colliders)
+        self.make_room(ctx, colliders, MOST)
     }
 
     /// Sorts the grains into blocks.
