@@ -147,7 +147,7 @@ impl Experiment {
 
 /// An open mesh that stands still.
 pub fn still(friction: f32, triangles: Vec<[u32; 3]>, places: Vec<DVec3>) -> (Shell, Pose<'static>) {
-    let shell = Shell::new(9, friction, triangles, false, places.clone());
+    let shell = Shell::new(friction, triangles, false, places.clone());
     let pose = move |_: f64, out: &mut Vec<DVec3>| {
         out.clone_from(&places);
         Ok(())

@@ -313,7 +313,7 @@ mod tests {
         let mut colliders = Colliders { floor, ..Colliders::default() };
         if let Some((mesh, closed)) = mesh {
             let pose: Vec<DVec3> = mesh.positions.iter().map(|place| place.cast::<f64>()).collect();
-            let mut shell = Shell::new(2, 0.5, mesh.triangles, closed, pose.clone());
+            let mut shell = Shell::new(0.5, mesh.triangles, closed, pose.clone());
             shell.follow(&pose);
             colliders.shells.push((shell, Box::new(|_, _| Ok(()))));
         }

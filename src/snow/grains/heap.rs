@@ -34,8 +34,8 @@ pub type Pose<'a> = Box<dyn Fn(f64, &mut Vec<DVec3>) -> Result<()> + Send + Sync
 pub struct Colliders<'a> {
     /// A level plane.
     pub floor: Option<Floor>,
-    /// Level sets that rest during the step.
-    pub fields: Vec<Field<'a>>,
+    /// A level set that rests during the step.
+    pub field: Option<Field<'a>>,
     /// Meshes that move, each with its pose (m) at a share 0..=1 of the step.
     pub shells: Vec<(Shell, Pose<'a>)>,
 }
@@ -182,13 +182,14 @@ impl Heap {
     ) -> Result<()> {
         let dt = division.dt / division.sub_steps as f64;
         let mut pose = Vec::new();
-        for (shell, at) in &mut colliders.shells {
+        for (number, (shell, at)) in (touch::FIRST_SHELL..).zip(&mut colliders.shells) {
+            shell.collider = number;
             at(0.0, &mut pose)?;
             shell.follow(&pose);
         }
         self.make_room(ctx, colliders, MOST_BEFORE)?;
-        let Colliders { floor, fields, shells } = colliders;
-        let mut fields: Vec<Seen<'_>> = fields.iter().map(|field| Seen::new(field, self.diameter)).collect();
+        let Colliders { floor, field, shells } = colliders;
+        let mut field = field.as_ref().map(|field| Seen::new(field, self.diameter));
         // A few sub-steps ahead.
         let ahead = (f64::from(SUB_STEPS_AHEAD) * dt / self.diameter) as f32;
         let mut layout = self.lay_out(ahead);
@@ -206,7 +207,7 @@ impl Heap {
             let meshes: Vec<&Shell> = shells.iter().map(|(shell, _)| shell).collect();
             let travel = Travel::of(&meshes, self.diameter);
             let search = Search { shells: meshes, diameter: self.diameter, dt, before, travel };
-            self.touch(&mut layout, *floor, &mut fields, &search)?;
+            self.touch(&mut layout, *floor, field.as_mut(), &search)?;
             before += travel.most();
             ctx.check()?;
             layout.reach(coefficients.visits_all);
@@ -287,7 +288,7 @@ impl Heap {
         &mut self,
         layout: &mut Layout,
         floor: Option<Floor>,
-        fields: &mut [Seen<'_>],
+        field: Option<&mut Seen<'_>>,
         search: &Search<'_>,
     ) -> Result<()> {
         let mut fresh: Vec<Vec<Touch>> = vec![Vec::new(); layout.blocks.len()];
@@ -314,7 +315,7 @@ impl Heap {
                 fresh[index as usize].extend(floor.touches(block, &self.rows, self.diameter, reach));
             }
         }
-        for field in fields {
+        if let Some(field) = field {
             let found = field.touches(layout, &due, &self.rows, reach)?;
             due.iter().zip(found).for_each(|(&index, found)| fresh[index as usize].extend(found));
         }

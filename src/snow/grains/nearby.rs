@@ -282,7 +282,7 @@ mod tests {
             places.extend([first, first + along, first + along * random() + across]);
         }
         let triangles = (0..90).map(|index| [3 * index, 3 * index + 1, 3 * index + 2]).collect();
-        let mut shell = Shell::new(0, 0.0, triangles, false, places.clone());
+        let mut shell = Shell::new(0.0, triangles, false, places.clone());
         shell.follow(&places);
         shell
     }

@@ -174,7 +174,7 @@ mod tests {
     /// A triangle whose corners go along ways (m).
     fn moved(ways: [[f64; 3]; 3]) -> Shell {
         let places = [DVec3::zeros(), DVec3::x(), DVec3::z()];
-        let mut shell = Shell::new(0, 0.0, vec![[0, 1, 2]], false, places.to_vec());
+        let mut shell = Shell::new(0.0, vec![[0, 1, 2]], false, places.to_vec());
         let next: Vec<DVec3> = places.iter().zip(ways).map(|(place, way)| place + DVec3::from(way)).collect();
         shell.follow(&next);
         shell

@@ -8,7 +8,7 @@
 use rayon::prelude::*;
 
 use super::rows::{Row, dot};
-use super::touch::Touch;
+use super::touch::{FIRST_SHELL, Touch};
 use crate::base::DVec3;
 use crate::base::lanes::LANES;
 
@@ -17,7 +17,7 @@ const LEAF: usize = LANES;
 
 /// A mesh in motion as a collider.
 pub struct Shell {
-    /// Which collider it is.
+    /// Which collider it is; a step counts its own.
     pub collider: u32,
     /// Friction against it.
     pub friction: f32,
@@ -53,18 +53,12 @@ pub struct Nearest {
 
 impl Shell {
     /// A mesh of triangles, counter-clockwise seen from outside, at a pose (m).
-    pub fn new(
-        collider: u32,
-        friction: f32,
-        triangles: Vec<[u32; 3]>,
-        closed: bool,
-        pose: Vec<DVec3>,
-    ) -> Self {
+    pub fn new(friction: f32, triangles: Vec<[u32; 3]>, closed: bool, pose: Vec<DVec3>) -> Self {
         let leaves = triangles.len().div_ceil(LEAF).max(1).next_power_of_two();
         let next = pose.clone();
         let boxes = vec![[DVec3::zeros(); 2]; 2 * leaves - 1];
         let ways = vec![0.0; 2 * leaves - 1];
-        let (now, stick, way) = (pose, 0.0, 0.0);
+        let (now, stick, way, collider) = (pose, 0.0, 0.0, FIRST_SHELL);
         let mut shell =
             Self { collider, friction, stick, triangles, closed, now, next, boxes, ways, leaves, way };
         shell.sort();
@@ -73,7 +67,7 @@ impl Shell {
 
     /// One that does not move, to measure distances from.
     pub fn at_rest(triangles: Vec<[u32; 3]>, pose: Vec<DVec3>) -> Self {
-        let mut shell = Self::new(0, 0.0, triangles, false, pose.clone());
+        let mut shell = Self::new(0.0, triangles, false, pose.clone());
         shell.follow(&pose);
         shell
     }

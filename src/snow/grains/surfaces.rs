@@ -23,7 +23,8 @@ const OPPOSITE: f64 = -0.5;
 /// The surfaces around a block, as they are at the step's end.
 pub struct Surfaces<'a> {
     floor: Option<Floor>,
-    fields: Vec<(f64, Window<'a>)>,
+    /// Cell of the level set (m), and its part around the block.
+    field: Option<(f64, Window<'a>)>,
     shells: &'a [(Shell, Pose<'a>)],
     /// Of a grain (m).
     diameter: f64,
@@ -58,13 +59,13 @@ impl<'a> Surfaces<'a> {
         diameter: f64,
         margin: f64,
     ) -> Result<Vec<Self>> {
-        let Colliders { floor, fields, shells } = colliders;
-        let new = || Surfaces { floor: *floor, fields: Vec::new(), shells, diameter };
+        let Colliders { floor, field, shells } = colliders;
+        let new = || Surfaces { floor: *floor, field: None, shells, diameter };
         let mut around: Vec<Self> = blocks.iter().map(|_| new()).collect();
-        for field in fields {
+        if let Some(field) = field {
             let windows = field.windows(blocks, diameter, margin)?;
             for (surfaces, window) in around.iter_mut().zip(windows) {
-                surfaces.fields.extend(window.map(|window| (field.grid.voxel_size(), window)));
+                surfaces.field = window.map(|window| (field.grid.voxel_size(), window));
             }
         }
         Ok(around)
@@ -76,7 +77,7 @@ impl<'a> Surfaces<'a> {
         if let Some(floor) = &self.floor {
             side.distance = side.distance.min((place.y - floor.height) / self.diameter);
         }
-        for (cell, window) in &self.fields {
+        if let Some((cell, window)) = &self.field {
             let distance = f64::from(window.sample([0, 1, 2].map(|axis| place[axis] / cell)).0);
             side.distance = side.distance.min(distance / self.diameter);
         }
@@ -88,6 +89,7 @@ impl<'a> Surfaces<'a> {
         }
         side
     }
+
     /// Where a grain at a place in a block is out of them; nothing where it finds no room.
     pub fn release(&self, at: At, within: V) -> Option<V> {
         let from = world(at, within, self.diameter);
@@ -114,7 +116,7 @@ impl<'a> Surfaces<'a> {
             tell(depth / self.diameter);
             place.y += depth.max(0.0);
         }
-        for (cell, window) in &self.fields {
+        if let Some((cell, window)) = &self.field {
             let (distance, gradient) = window.sample([0, 1, 2].map(|axis| place[axis] / cell));
             let depth = half - f64::from(distance);
             tell(depth / self.diameter);

@@ -3,7 +3,7 @@
 use super::field::Field;
 use super::heap::{Colliders, Floor};
 use super::shell::Shell;
-use super::{Base, Params, touch};
+use super::{Base, Params};
 use crate::base::{DVec3, TriMesh};
 use crate::error::Result;
 use crate::sweep::Body;
@@ -85,9 +85,8 @@ impl<'a> Surroundings<'a> {
     pub fn obstacles(&self, params: &Params, grains: &Bounds, [from, to]: [f64; 2]) -> Result<Obstacles<'a>> {
         let floor = self.floor.map(|height| Floor { height, friction: GROUND });
         let field = |grid| Field { grid, friction: params.friction as f32 };
-        let fields = self.base.after().map(field).into_iter().collect();
-        let mut colliders = Colliders { floor, fields, shells: Vec::new() };
-        let (mut way, mut number) = (0.0f64, touch::FIRST_SHELL);
+        let mut colliders = Colliders { floor, field: self.base.after().map(field), shells: Vec::new() };
+        let mut way = 0.0f64;
         let mut boxes = [Vec::new(), Vec::new()];
         for object in self.objects.iter().filter(|object| object.pushes) {
             let body = object.body;
@@ -108,26 +107,24 @@ impl<'a> Surroundings<'a> {
                 true => body.closed_triangles().collect(),
                 false => body.motion().triangles().iter().map(turn).collect(),
             };
-            let shell = Shell::new(number, object.friction as f32, triangles, closed, first)
-                .with_stick(object.stick as f32);
+            let shell =
+                Shell::new(object.friction as f32, triangles, closed, first).with_stick(object.stick as f32);
             let pose = move |share: f64, out: &mut Vec<DVec3>| {
                 body.closed_pose(from + (to - from) * share, out)?;
                 out.truncate(own);
                 Ok(())
             };
             colliders.shells.push((shell, Box::new(pose)));
-            number += 1;
         }
         for mesh in self.statics {
             let pose: Vec<DVec3> = mesh.positions.iter().map(|place| place.cast::<f64>()).collect();
             boxes.iter_mut().for_each(|boxes| boxes.push(bounds(&pose)));
-            let shell = Shell::new(number, GROUND, mesh.triangles.clone(), false, pose.clone());
+            let shell = Shell::new(GROUND, mesh.triangles.clone(), false, pose.clone());
             let rests = move |_: f64, out: &mut Vec<DVec3>| {
                 out.clone_from(&pose);
                 Ok(())
             };
             colliders.shells.push((shell, Box::new(rests)));
-            number += 1;
         }
         Ok(Obstacles { colliders, way, boxes })
     }

@@ -309,7 +309,7 @@ fn grains_that_are_pressed_are_not_thrown_when_they_are_free() {
         let at = |height: f64| -> Vec<DVec3> {
             plate.positions.iter().map(|place| place.cast::<f64>() + DVec3::new(0.0, height, 0.0)).collect()
         };
-        let shell = Shell::new(2, 0.3, plate.triangles.clone(), true, at(ends[0]));
+        let shell = Shell::new(0.3, plate.triangles.clone(), true, at(ends[0]));
         let pose = |share: f64, out: &mut Vec<DVec3>| {
             *out = at(ends[0] + (ends[1] - ends[0]) * share);
             Ok(())
@@ -358,7 +358,7 @@ fn settle(heap: &mut Heap, params: &Params, frames: usize, visits_all: bool, bal
         let floor = Some(Floor { height: 0.0, friction: 0.3 });
         let mut colliders = Colliders { floor, ..Colliders::default() };
         if ball {
-            let shell = Shell::new(2, 0.3, mesh.triangles.clone(), true, at(0.0));
+            let shell = Shell::new(0.3, mesh.triangles.clone(), true, at(0.0));
             let pose = |share: f64, out: &mut Vec<DVec3>| {
                 *out = at(share);
                 Ok(())
