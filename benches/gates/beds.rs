@@ -29,7 +29,7 @@ pub fn run(h: &mut Harness) {
 }
 
 fn settled(seed: u64) -> Experiment {
-    let mut bed = Experiment::new(2, D, of_repose(32.0), seed);
+    let mut bed = Experiment::new(2, D, of_repose(32.0, false), seed);
     bed.colliders.shells = vec![walls(&rectangle(WIDTH * D, WIDTH * D), 100.0 * D)];
     bed.scatter([12, 52, 12], |_| true);
     for frame in 0..72 {

@@ -37,7 +37,7 @@ pub fn run(h: &mut Harness) {
 
 /// How far (radii) a column of about an aspect runs out, and what aspect it had once it had settled.
 fn collapse(aspect: f64) -> (f64, f64) {
-    let mut column = Experiment::new(2, D, of_repose(REPOSE), 3);
+    let mut column = Experiment::new(2, D, of_repose(REPOSE, false), 3);
     column.params.air = 1.0;
     // As many as fill a cylinder of that aspect at a packing of 0.6.
     let radius = (GRAINS / (6.0 * 0.6 * aspect)).cbrt() * D;

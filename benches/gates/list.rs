@@ -48,9 +48,9 @@ pub const GATES: &[Gate] = &[
     gate("snow.grains.restitution", "%", Most(5.0), Open),
     gate("snow.grains.stick_stops", "%", Least(95.0), Open),
     gate("snow.grains.stick_shakes", "%", Most(5.0), Open),
-    // Grains deeper than a tenth of a diameter in what moves or in the base, but those that are trapped.
     // Most grains in a cube of two diameters.
     gate("snow.grains.crowd", "grains", Most(14.0), Most(10.0)),
+    // Grains deeper than a tenth of a diameter in what moves or in the base, but those that are trapped.
     none("snow.grains.deep_plate", "grains"),
     none("snow.grains.deep_blades", "grains"),
     none("snow.grains.deep_sheet", "grains"),

@@ -30,8 +30,8 @@ fn cohesion(h: &mut Harness) {
     }
     let mut holds = true;
     for (repose, layers) in [(32.0, 16.0), (32.0, 32.0), (25.0, 20.0), (38.0, 20.0)] {
-        let friction = of_repose(repose);
-        let attraction = of_wall(layers * D, D, friction);
+        let friction = of_repose(repose, true);
+        let attraction = of_wall(layers * D, D, repose);
         let [low, high] = [0.85, 1.15].map(|share| stands(share * layers, attraction, friction));
         println!(
             "# {repose} degrees, made for {layers} diameters by {attraction:.2} weights: 0.85 of it {}, 1.15 {}",

@@ -89,7 +89,7 @@ fn piles(h: &mut Harness) {
         let mut worst: f64 = 0.0;
         for &asked in angles {
             for seed in 1..=seeds {
-                let mut pile = Experiment::new(2, 0.005, of_repose(asked), seed);
+                let mut pile = Experiment::new(2, 0.005, of_repose(asked, false), seed);
                 pile.pour(count, frames, 30);
                 let slope = pile.slope();
                 println!("# asked {asked} degrees, seed {seed}: {slope:.2}");
@@ -115,7 +115,7 @@ fn sizes(h: &mut Harness) {
     let mut creep: f64 = 0.0;
     for diameter in [0.0015, 0.005, 0.02] {
         let frames = (220.0 * f64::sqrt(diameter / 0.005)).ceil() as usize;
-        let mut pile = Experiment::new(2, diameter, of_repose(32.0), 1);
+        let mut pile = Experiment::new(2, diameter, of_repose(32.0, false), 1);
         pile.pour(10_000, frames, frames / 6);
         let slope = pile.slope();
         (0..240).for_each(|_| pile.step());

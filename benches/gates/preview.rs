@@ -25,7 +25,7 @@ pub fn run(h: &mut Harness) {
     let mean = |diameter: f64, count: usize| {
         let (mut volumes, mut angles) = (0.0, 0.0);
         for seed in 1..=SEEDS {
-            let mut pile = Experiment::new(2, diameter, of_repose(32.0), seed);
+            let mut pile = Experiment::new(2, diameter, of_repose(32.0, false), seed);
             // The same pour for both.
             pile.pour_through(2.5 * 2.0 * D, count, FRAMES, 48);
             let (volume, angle) = (under(&pile), pile.slope());

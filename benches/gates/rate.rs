@@ -7,7 +7,7 @@ use crate::harness::Harness;
 
 /// The state of a heap of 10,000 grains some frames after it began to collapse.
 pub fn collapse(threads: usize) -> Vec<u32> {
-    let mut heap = Experiment::new(threads, 0.0015, of_repose(25.0), 1);
+    let mut heap = Experiment::new(threads, 0.0015, of_repose(25.0, false), 1);
     heap.fill(24);
     (0..8).for_each(|_| heap.step());
     heap.state()
@@ -18,7 +18,7 @@ pub fn run(h: &mut Harness) {
     if !h.wants("snow.grains.speed") {
         return;
     }
-    let mut pile = Experiment::new(1, 0.0015, of_repose(32.0), 1);
+    let mut pile = Experiment::new(1, 0.0015, of_repose(32.0, false), 1);
     pile.params.rests = false;
     pile.fill(60);
     (0..12).for_each(|_| pile.step());

@@ -15,7 +15,7 @@ pub fn run(h: &mut Harness) {
 fn changes(h: &mut Harness) {
     if h.wants("snow.grains.rest_bytes") {
         let run = |visits_all: bool| {
-            let mut pile = Experiment::new(2, 0.005, of_repose(32.0), 2);
+            let mut pile = Experiment::new(2, 0.005, of_repose(32.0, false), 2);
             pile.visits_all = visits_all;
             pile.pour(3_000, 60, 60);
             (pile.state(), pile.heap.resting())
@@ -28,7 +28,7 @@ fn changes(h: &mut Harness) {
         const SEEDS: u64 = 6;
         let slope = |rests: bool| {
             let one = |seed: u64| {
-                let mut pile = Experiment::new(2, 0.005, of_repose(32.0), seed);
+                let mut pile = Experiment::new(2, 0.005, of_repose(32.0, false), seed);
                 pile.params.rests = rests;
                 pile.pour(10_000, 220, 30);
                 pile.slope()

@@ -60,7 +60,7 @@ fn rough(length: f64, width: f64, random: &mut Random) -> (Shell, Pose<'static>)
 
 /// The angle (degrees) at which the top has moved by a diameter.
 fn slides(asked: f64, sites: [u32; 3]) -> f64 {
-    let mut bed = Experiment::new(2, D, of_repose(asked), 11);
+    let mut bed = Experiment::new(2, D, of_repose(asked, false), 11);
     bed.params.rests = false;
     bed.colliders.floor = None;
     let [length, width] = [sites[0], sites[2]].map(|count| f64::from(count) * LOOSE[0] * D);

@@ -33,8 +33,8 @@ pub struct frz_grains_params {
     pub radius: f64,
     /// Share of the removed snow that is pressed together and becomes no grains, 0 to 1; 0.75 is usual.
     pub compression: f64,
-    /// Friction between grains, and between them and the base layer, 0 to 1; as they do not turn, 0.257, the usual one,
-    /// already holds a slope of 32 degrees.
+    /// Friction between grains, 0 to 1; as they do not turn, 0.14, the usual one, already holds a slope of 32 degrees. Where
+    /// they attract each other, 0.26 does. On the base layer they lie up to the same slope.
     pub friction: f64,
     /// With which grains that all but touch hold each other (weights of a grain), 0 to 1000; 0 is usual.
     pub attraction: f64,
@@ -181,8 +181,8 @@ pub unsafe extern "C" fn frz_grains_params_of_snow(
         unsafe {
             let mut now = sized(to.cast_const(), frz_grains_params::usual())?;
             now.params()?;
-            now.friction = grain_friction::of_repose(repose_angle_deg);
-            now.attraction = grain_cohesion::of_wall(stands, 2.0 * now.radius, now.friction).min(1000.0);
+            now.attraction = grain_cohesion::of_wall(stands, 2.0 * now.radius, repose_angle_deg).min(1000.0);
+            now.friction = grain_friction::of_repose(repose_angle_deg, now.attraction > 0.0);
             to.write_unaligned(now);
         }
         Ok(())

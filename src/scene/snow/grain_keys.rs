@@ -57,7 +57,7 @@ pub const GRAIN_KEYS: &[Key] = &[
         "between grains, in place of repose_angle_deg; they do not turn, so that little holds much",
     )
     .or_nothing()
-    .such_as("0.3")
+    .such_as("0.2")
     .concerns(STEP),
     Key::new(
         "grains",

@@ -143,16 +143,14 @@ pub(super) fn params(scene: &Scene, cell: f64) -> Params {
     let whole = |name: &str| values.get(&format!("grains.{name}")).and_then(|value| value.whole());
     let flag = |name: &str| values.get(&format!("grains.{name}")).and_then(|value| value.flag());
     let usual = Params::for_cell(cell);
-    let of_repose = || number("repose_angle_deg").map(grain_friction::of_repose);
     let radius = number("radius").unwrap_or(usual.radius);
-    let friction = number("friction").or_else(of_repose).unwrap_or(usual.friction);
-    let of_wall = || number("stands").map(|height| grain_cohesion::of_wall(height, 2.0 * radius, friction));
+    let [friction, attraction] = material(scene, radius);
     let keep_box = values.get("grains.keep_box").and_then(|value| value.numbers());
     Params {
         radius,
         compression: number("compression").unwrap_or(usual.compression),
         friction,
-        attraction: number("attraction").or_else(of_wall).unwrap_or(usual.attraction),
+        attraction,
         restitution: number("restitution").unwrap_or(usual.restitution),
         air: number("air").unwrap_or(usual.air),
         air_by_density: flag("air_by_density").unwrap_or(usual.air_by_density),
@@ -165,6 +163,18 @@ pub(super) fn params(scene: &Scene, cell: f64) -> Params {
         most: whole("max").map_or(usual.most, |most| most as usize),
         seed: whole("seed").unwrap_or(0) as u64,
     }
+}
+
+/// Friction between grains of a radius (m), and their attraction (weights of a grain): as given, or from what can be measured.
+fn material(scene: &Scene, radius: f64) -> [f64; 2] {
+    let number = |name: &str| scene.values.number(&format!("grains.{name}"));
+    let given = number("friction");
+    let of_friction = || given.map(|friction| grain_friction::repose_of(friction, true));
+    let repose = of_friction().or_else(|| number("repose_angle_deg")).unwrap_or_default();
+    let of_wall = || grain_cohesion::of_wall(number("stands").unwrap_or_default(), 2.0 * radius, repose);
+    let attraction = number("attraction").unwrap_or_else(of_wall);
+    let friction = given.unwrap_or_else(|| grain_friction::of_repose(repose, attraction > 0.0));
+    [friction, attraction]
 }
 
 impl Stage for Grains<'_> {

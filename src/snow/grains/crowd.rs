@@ -77,11 +77,11 @@ impl Heap {
             rest::wake(row);
             rest::begin_again(row);
         }
-        let moved: HashSet<u32> = moves.iter().map(|Move { slot, .. }| *slot).collect();
-        self.held.retain(|held| !held.grains.iter().any(|slot| moved.contains(slot)));
-        self.touches.retain(|touch| !moved.contains(&touch.grain));
-        let moved: HashSet<u32> = moved.iter().map(|slot| self.ids[*slot as usize]).collect();
-        self.trapped.retain(|id| !moved.contains(id));
+        let slots: HashSet<u32> = moves.iter().map(|Move { slot, .. }| *slot).collect();
+        self.held.retain(|held| !held.grains.iter().any(|slot| slots.contains(slot)));
+        self.touches.retain(|touch| !slots.contains(&touch.grain));
+        let ids: HashSet<u32> = slots.iter().map(|slot| self.ids[*slot as usize]).collect();
+        self.trapped.retain(|id| !ids.contains(id));
         Ok(())
     }
 }

@@ -15,7 +15,7 @@ pub struct Params {
     pub radius: f64,
     /// Compression ratio r_c (thesis section 3.3.2), 0..=1: the share of removed snow that becomes no grains.
     pub compression: f64,
-    /// Friction between grains, and between grains and the base layer, 0..=1: see [`grain_friction`].
+    /// Friction between grains, 0..=1: see [`grain_friction`].
     pub friction: f64,
     /// Greatest attraction between two grains that all but touch, in weights of a grain, 0..=1000.
     pub attraction: f64,
@@ -57,7 +57,7 @@ impl Params {
         Self {
             radius: cell / 3.0,
             compression: 0.75,
-            friction: grain_friction::of_repose(32.0),
+            friction: grain_friction::of_repose(32.0, false),
             attraction: 0.0,
             restitution: 0.0,
             air: 0.5,
@@ -122,6 +122,11 @@ impl Params {
         let of_fall = (dt * (self.gravity.abs() / (FALL * diameter)).sqrt()).ceil().max(1.0) as usize;
         let of_way = (way / (WAY * diameter)).ceil() as usize;
         of_way.clamp(of_fall, of_fall.saturating_mul(MOST_OF_FALL))
+    }
+
+    /// Friction against the base layer, which is snow too: grains lie on it up to their own angle of repose.
+    pub fn friction_of_base(&self) -> f64 {
+        libm::tan(grain_friction::repose_of(self.friction, self.attraction > 0.0).to_radians())
     }
 
     /// What a sub-step of a divided step needs.

@@ -6,6 +6,7 @@
 //! *push*, a displacement that never becomes velocity (split impulse: Guendelman et al. 2003). Impulses are equal and opposite,
 //! so a free heap keeps its momentum. Pushes move the upper of two grains, where a chain of contacts holds the lower one (mass
 //! scaling by height: Macklin et al. 2014), so that a heap of any depth is as dense as its packing after one sweep upward.
+//! Impulses do so a little, where chains hold both, so that a deep bed keeps its slope.
 //! What a push takes back of a sinking grain's motion, its velocity loses too.
 //!
 //! Columns are swept upward, in four sets that share no grain, in a fixed order: the same bytes from any number of threads.
@@ -13,7 +14,7 @@
 
 use rayon::prelude::*;
 
-use super::collide::{Eight, FARTHEST, STEEP, TOUCHING, collide};
+use super::collide::{Contact, Eight, FARTHEST, STEEP, TOUCHING, collide};
 use super::contacts::Batch;
 use super::density::SURROUNDED;
 use super::layout::{Block, Layout};
@@ -109,7 +110,7 @@ fn sweep(rows: &mut [Row], layout: &mut Layout, colour: &[u32], pass: Pass, c: &
             }
             let touches = &mut block.touches;
             match pass {
-                Pass::Begin => begin(rows, batches),
+                Pass::Begin => begin(rows, batches, c),
                 Pass::Solve => {
                     resist_all(rows, touches, false, c);
                     solve(rows, batches, c);
@@ -239,8 +240,8 @@ fn bounded(vector: V, most: f32) -> V {
     if square > most * most { scaled(vector, most / square.sqrt()) } else { vector }
 }
 
-fn begin(rows: Shared<'_, Row>, batches: &[Batch]) {
-    dispatch!(begin_batches(rows: Shared<'_, Row>, batches: &[Batch]))
+fn begin(rows: Shared<'_, Row>, batches: &[Batch], c: &Coefficients) {
+    dispatch!(begin_batches(rows: Shared<'_, Row>, batches: &[Batch], c: &Coefficients))
 }
 
 fn solve(rows: Shared<'_, Row>, batches: &mut [Batch], c: &Coefficients) {
@@ -253,7 +254,7 @@ fn solve_last(rows: Shared<'_, Row>, batches: &mut [Batch], c: &Coefficients) {
 
 /// Gives grains the impulses of the last sub-step.
 #[inline(always)]
-fn begin_batches(rows: Shared<'_, Row>, batches: &[Batch]) {
+fn begin_batches(rows: Shared<'_, Row>, batches: &[Batch], c: &Coefficients) {
     for (index, batch) in batches.iter().enumerate() {
         prefetch(rows, batches.get(index + AHEAD));
         if batch.impulse == [Lanes::all(0.0); 3] {
@@ -263,8 +264,9 @@ fn begin_batches(rows: Shared<'_, Row>, batches: &[Batch]) {
         unsafe {
             let others = batch.others();
             let (a, b) = (Eight::load(rows, &batch.owners), Eight::load(rows, &others));
-            a.kicked(batch.impulse, a.weight).store(rows, &batch.owners);
-            b.kicked(batch.impulse, Lanes::all(0.0) - b.weight).store(rows, &others);
+            let (a, b) = Contact::between(&a, &b, batch, c).kick(a, b, batch.impulse);
+            a.store(rows, &batch.owners);
+            b.store(rows, &others);
         }
     }
 }

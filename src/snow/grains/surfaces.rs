@@ -23,7 +23,7 @@ const OPPOSITE: f64 = -0.5;
 /// The surfaces around a block, as they are at the step's end.
 pub struct Surfaces<'a> {
     floor: Option<Floor>,
-    /// Cell of the level set (m), and its part around the block.
+    /// Edge of a cell of the level set (m), and the values around the block.
     field: Option<(f64, Window<'a>)>,
     shells: &'a [(Shell, Pose<'a>)],
     /// Of a grain (m).

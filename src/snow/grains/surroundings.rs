@@ -63,8 +63,7 @@ pub struct Obstacles<'a> {
 const GROUND: f32 = 0.5;
 /// Farthest (diameters) that a mesh's box may jump between two steps: more, and what rested on it wakes.
 const JUMP: f64 = 0.1;
-/// Greatest share of an object's surface that its holes are, where it counts as closed; what is open wider, a bowl, has two sides that
-/// collide.
+/// Share of an object's surface under which its holes are closed; what is open wider, a bowl, has two sides that collide.
 const HOLES: f64 = 0.1;
 /// Numbers in [`Surroundings::ties`].
 pub const TIES: usize = 6;
@@ -84,7 +83,7 @@ impl<'a> Surroundings<'a> {
     /// A pose that cannot be computed.
     pub fn obstacles(&self, params: &Params, grains: &Bounds, [from, to]: [f64; 2]) -> Result<Obstacles<'a>> {
         let floor = self.floor.map(|height| Floor { height, friction: GROUND });
-        let field = |grid| Field { grid, friction: params.friction as f32 };
+        let field = |grid| Field { grid, friction: params.friction_of_base() as f32 };
         let mut colliders = Colliders { floor, field: self.base.after().map(field), shells: Vec::new() };
         let mut way = 0.0f64;
         let mut boxes = [Vec::new(), Vec::new()];
@@ -93,7 +92,7 @@ impl<'a> Surroundings<'a> {
             let (mut first, mut last) = (Vec::new(), Vec::new());
             body.closed_pose(from, &mut first)?;
             body.closed_pose(to, &mut last)?;
-            let closed = body.share_of_caps(&first) <= HOLES && body.contradictions() == 0;
+            let closed = body.share_of_caps(&first) < HOLES && body.contradictions() == 0;
             let own = if closed { first.len() } else { body.motion().vertex_count() };
             first.truncate(own);
             last.truncate(own);
