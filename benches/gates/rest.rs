@@ -25,7 +25,7 @@ fn changes(h: &mut Harness) {
         h.holds("snow.grains.rest_bytes", skipped == all && all.1 > 1_000, &note);
     }
     if h.wants("snow.grains.rest_angle") {
-        const SEEDS: u64 = 6;
+        const SEEDS: u64 = 16;
         let slope = |rests: bool| {
             let one = |seed: u64| {
                 let mut pile = Experiment::new(2, 0.005, of_repose(32.0, false), seed);
