@@ -17,6 +17,8 @@ pub const TOUCHING: f32 = 0.02;
 const SLACK: f32 = 0.01;
 /// As above.
 const SLOP: f32 = 0.02;
+/// The same where they attract each other: a wall that gives way by more cracks.
+const SLOP_OF_WALLS: f32 = 0.005;
 /// How much more than the mean of both an impulse changes the velocity of a grain right above another, and less that of the lower
 /// one, where both are supported: masses that fall upward by e^(-2 of this) per diameter, so that a sweep upward nearly finds the
 /// impulses of a deep bed. Equal masses never do: a bed creeps down slopes of a third of its angle of repose. Where grains
@@ -205,7 +207,8 @@ impl Contact {
         let (a_push, b_push) = ([ax, ay, az], [bx, by, bz]);
         // Overlap is removed, and a gap stays one.
         let overlap = zero - self.gap;
-        let some = ((overlap - Lanes::all(SLOP)).max(zero) * Lanes::all(REMOVED)).min(Lanes::all(FARTHEST));
+        let slop = Lanes::all(if c.attraction > 0.0 { SLOP_OF_WALLS } else { SLOP });
+        let some = ((overlap - slop).max(zero) * Lanes::all(REMOVED)).min(Lanes::all(FARTHEST));
         let removed = zero.is_less(self.gap).choose(overlap, some);
         let missing = removed - dot8(sub8(a_push, b_push), self.normal);
         let is_up = zero.is_less(upward);
