@@ -1005,8 +1005,8 @@ typedef struct {
      */
     double compression;
     /**
-     * Friction between grains, and between them and the base layer, 0 to 1; as they do not turn, 0.257, the usual one,
-     * already holds a slope of 32 degrees.
+     * Friction between grains, 0 to 1; as they do not turn, 0.14, the usual one, already holds a slope of 32 degrees. Where
+     * they attract each other, 0.26 does. On the base layer they lie up to the same slope.
      */
     double friction;
     /**
@@ -2023,9 +2023,8 @@ frz_status frz_grains_set_params(frz_grains *grains, const frz_grains_params *pa
  * base: the layer after its step; it is only read. Its voxels must suit the radius: FRZ_ERROR_ARGUMENT. A layer that has not
  *     stepped since it was made or restored removed nothing. NULL: there is none.
  * bodies: count bodies that push the grains, each with its friction; NULL with a count of 0. Those that do not move have
- *     no positions_end. Holes of less than a tenth of a mesh's area are closed; of a mesh that is
- *     open wider both sides collide. A warning says so. A vertex farther than 1e6 m from the
- *     origin along an axis is FRZ_ERROR_ARGUMENT.
+ *     no positions_end. Holes of less than a tenth of a mesh's area are closed; of a mesh that is open wider both sides collide.
+ *     A warning says so. A vertex farther than 1e6 m from the origin along an axis is FRZ_ERROR_ARGUMENT.
  * count: number of bodies.
  * dt: length of the step (s), 1e-6 to 3600. 0: nothing is born and nothing moves, as the first frame of a shot wants it:
  *     what bodies cut out there was gone before.

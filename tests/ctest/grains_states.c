@@ -63,7 +63,7 @@ static void parameters(frz_context *ctx, const ball *rest, const frz_grid *snow)
     WORKS(frz_grains_params_init(&params, sizeof params));
     CHECK(params.struct_size == sizeof params && params.radius == 0.01 / 3 && params.compression == 0.75);
     CHECK(params.gravity == -9.81 && params.sub_steps == 0 && params.max_grains == 20000000 && params.flags == 0);
-    CHECK(params.friction > 0.2 && params.friction < 0.3 && params.floor == 0 && params.lowest == -1e6);
+    CHECK(params.friction > 0.12 && params.friction < 0.16 && params.floor == 0 && params.lowest == -1e6);
     FAILS(frz_grains_set_params(grains, &params), FRZ_ERROR_ARGUMENT, "cannot change, it is 0.00666");
     FAILS(frz_grains_set_params(grains, NULL), FRZ_ERROR_ARGUMENT, "frz_grains_params is NULL");
     /* More grains than there may be: the step fails, and nothing is changed. */

@@ -283,9 +283,10 @@ fn refuse_from(
             .collect();
         let ways = if kept.is_empty() { String::new() } else { format!("{}, ", kept.join(", ")) };
         return refused(format!(
-            "--from {from} needs the exact {} after frame {before}, which the folder does not keep (`half` and \
-             `base = []` keep the last ones only): {ways}--from {first} or another -o",
-            stage.noun()
+            "--from {from} needs the exact {} after frame {before}, which the folder does not keep ({}): \
+             {ways}--from {first} or another -o",
+            stage.noun(),
+            stage.why_states_go()
         ));
     }
     match frames.iter().find(|frame| *frame < from && !stored.is_done(*frame)) {

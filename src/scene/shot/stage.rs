@@ -40,6 +40,11 @@ pub trait Stage: Sync {
         "state"
     }
 
+    /// Why a folder may lack the exact state after a frame, as messages say it.
+    fn why_states_go(&self) -> &'static str {
+        "state/ keeps those of the last two frames"
+    }
+
     /// Its folders. A frame that [`Keeps::Whole`] or [`Keeps::Changes`] keeps them in the folder of the stage's own name.
     fn kinds(&self) -> &'static [Kind];
 

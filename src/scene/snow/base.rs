@@ -73,6 +73,10 @@ impl Stage for Base<'_> {
         "layer"
     }
 
+    fn why_states_go(&self) -> &'static str {
+        "`half` and `base = []` keep those of the last two frames"
+    }
+
     fn kinds(&self) -> &'static [Kind] {
         &[Kind { name: "base", extensions: &["vdb"] }, Kind { name: "removed", extensions: &["vdb"] }]
     }

@@ -258,7 +258,8 @@ impl Layout {
     ) {
         let rows = &*rows;
         let homes = Shared::new(&mut self.homes);
-        self.blocks.par_iter_mut().filter(|block| which(block)).for_each(|block| {
+        let changed = self.blocks.par_iter_mut().filter(|block| which(block));
+        changed.for_each_init(Ranking::default, |Ranking { places, sorted, members }, block| {
             if block.has_strayed {
                 let speeds = block.members.iter().map(|&slot| norm(rows[slot as usize].velocity));
                 let fastest = speeds.fold(0.0, f32::max) * ahead / SUB_STEPS_AHEAD;
@@ -272,13 +273,14 @@ impl Layout {
                 }
             };
             // Counted into cells, then the few of a cell sorted.
-            let places: Vec<V> =
-                block.members.iter().enumerate().map(|(member, &slot)| place(member, slot)).collect();
+            places.clear();
+            places.extend(block.members.iter().enumerate().map(|(member, &slot)| place(member, slot)));
             let mut starts = [0u32; ALL_CELLS + 1];
             places.iter().for_each(|place| starts[cell(*place) + 1] += 1);
             (0..ALL_CELLS).for_each(|cell| starts[cell + 1] += starts[cell]);
             let mut next = starts;
-            let mut sorted = vec![(0u32, 0u32); places.len()];
+            sorted.clear();
+            sorted.resize(places.len(), (0, 0));
             for (place, (member, &slot)) in places.iter().zip((0..).zip(&block.members)) {
                 let at = &mut next[cell(*place)];
                 sorted[*at as usize] = (ids[slot as usize], member);
@@ -287,18 +289,19 @@ impl Layout {
             for cell in starts.windows(2) {
                 sorted[cell[0] as usize..cell[1] as usize].sort_unstable();
             }
-            let members: Vec<u32> =
-                sorted.iter().map(|(_, member)| block.members[*member as usize]).collect();
+            members.clear();
+            members.extend(sorted.iter().map(|(_, member)| block.members[*member as usize]));
             for (axis, anchors) in block.anchors.iter_mut().enumerate() {
                 anchors.clear();
                 anchors.extend(sorted.iter().map(|(_, member)| places[*member as usize][axis]));
                 anchors.extend([f32::INFINITY; LANES]);
             }
-            for (member, &slot) in (0..).zip(&members) {
+            for (member, &slot) in (0..).zip(&*members) {
                 // SAFETY: a grain is a member of one block.
                 unsafe { homes.get(slot as usize).rank = member };
             }
-            (block.starts, block.members) = (starts, members);
+            block.starts = starts;
+            block.members.copy_from_slice(members);
             block.is_awake = block.members.iter().any(|&slot| !rows[slot as usize].rests());
             block.has_strayed = false;
             block.lacks_touches = true;
@@ -324,6 +327,15 @@ impl Layout {
         }
         sets
     }
+}
+
+/// Working memory of one thread that sorts the members of blocks.
+#[derive(Default)]
+struct Ranking {
+    places: Vec<V>,
+    /// Identities and where they were among the members.
+    sorted: Vec<(u32, u32)>,
+    members: Vec<u32>,
 }
 
 /// Where a grain is taken to be while its neighbours last: a little ahead of it, so that it takes longer to stray. `ahead` is how

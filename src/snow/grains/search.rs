@@ -86,10 +86,13 @@ impl Search<'_> {
         if block.members.is_empty() || !is_near(block.limit, around + most) {
             return Vec::new();
         }
-        let middle = world(block.at, [EDGE * 0.5; 3], self.diameter);
-        block.limit = self.limit(middle, around + f64::from(EDGE));
-        if !is_near(block.limit, around + most) {
-            return Vec::new();
+        // Where a mesh has just been touched, it still is too near to ask again.
+        if !block.touches.iter().any(Touch::is_of_mesh) {
+            let middle = world(block.at, [EDGE * 0.5; 3], self.diameter);
+            block.limit = self.limit(middle, around + f64::from(EDGE));
+            if !is_near(block.limit, around + most) {
+                return Vec::new();
+            }
         }
         let Scratch { asking, nearby } = scratch;
         asking.clear();

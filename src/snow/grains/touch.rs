@@ -60,7 +60,8 @@ impl Touch {
         self.normal != [0.0; 3]
     }
 
-    fn is_of_mesh(&self) -> bool {
+    /// Whether it is of a mesh.
+    pub fn is_of_mesh(&self) -> bool {
         self.collider >= FIRST_SHELL
     }
 }
