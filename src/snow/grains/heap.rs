@@ -269,6 +269,7 @@ impl Heap {
 
     /// Puts the grains into another order, which may leave some out.
     fn keep(&mut self, from: &[u32]) {
+        let leaves_out = from.len() < self.rows.len();
         let mut slots = vec![NONE; self.rows.len()];
         from.iter().zip(0..).for_each(|(&was, slot)| slots[was as usize] = slot);
         self.rows = from.par_iter().map(|&from| self.rows[from as usize]).collect();
@@ -277,9 +278,11 @@ impl Heap {
         self.held
             .par_iter_mut()
             .for_each(|held| held.grains = held.grains.map(|grain| slots[grain as usize]));
-        self.held.retain(|held| !held.grains.contains(&NONE));
         self.touches.iter_mut().for_each(|touch| touch.grain = slots[touch.grain as usize]);
-        self.touches.retain(|touch| touch.grain != NONE);
+        if leaves_out {
+            self.held.retain(|held| !held.grains.contains(&NONE));
+            self.touches.retain(|touch| touch.grain != NONE);
+        }
         self.touches.par_sort_unstable_by_key(Touch::key);
     }
 
