@@ -151,14 +151,15 @@ impl Patch {
         Self { low, size, values, least }
     }
 
-    fn value(&self, voxel: [i32; 3]) -> f32 {
-        let at = |axis: usize| (voxel[axis] - self.low[axis]).clamp(0, self.size[axis] as i32 - 1) as usize;
-        self.values[(at(0) * self.size[1] + at(1)) * self.size[2] + at(2)]
-    }
-
     /// Value and gradient (a voxel) at a place (voxels).
     fn sample(&self, at: [f64; 3]) -> (f32, V) {
-        interpolated(at, |voxel| self.value(voxel))
+        let low = at.map(|x| x.floor() as i32);
+        let index = |axis: usize| {
+            [0, 1]
+                .map(|step| (low[axis] + step - self.low[axis]).clamp(0, self.size[axis] as i32 - 1) as usize)
+        };
+        let [xs, ys, zs] = [index(0), index(1), index(2)];
+        interpolated(at, low, |x, y, z| self.values[(xs[x] * self.size[1] + ys[y]) * self.size[2] + zs[z]])
     }
 }
 
@@ -209,17 +210,18 @@ impl<'a> Window<'a> {
 
     /// Value and gradient (a voxel) at a place (voxels).
     pub fn sample(&self, at: [f64; 3]) -> (f32, V) {
-        interpolated(at, |voxel| self.value(voxel))
+        let low = at.map(|x| x.floor() as i32);
+        let step = |step: usize| step as i32;
+        interpolated(at, low, |x, y, z| self.value([low[0] + step(x), low[1] + step(y), low[2] + step(z)]))
     }
 }
 
-/// Value and gradient (a voxel) at a place (voxels) by trilinear interpolation.
+/// Value and gradient (a voxel) at a place (voxels) by trilinear interpolation between the voxel below it and those a step of 0 or 1
+/// along each axis away.
 #[inline(always)]
-fn interpolated(at: [f64; 3], value: impl Fn([i32; 3]) -> f32) -> (f32, V) {
-    let low = at.map(|x| x.floor() as i32);
+fn interpolated(at: [f64; 3], low: [i32; 3], corner: impl Fn(usize, usize, usize) -> f32) -> (f32, V) {
     let [u, v, w] = [0, 1, 2].map(|axis| (at[axis] - f64::from(low[axis])) as f32);
-    let corner = |x: i32, y: i32, z: i32| value([low[0] + x, low[1] + y, low[2] + z]);
-    let along = |x: i32, y: i32| {
+    let along = |x: usize, y: usize| {
         let (a, b) = (corner(x, y, 0), corner(x, y, 1));
         (a + (b - a) * w, b - a)
     };

@@ -16,6 +16,9 @@ pub struct Nearby {
     triangles: Vec<Option<Triangles>>,
     /// Those whose boxes the place that was asked for last may reach, and the squares of their distances (m2).
     reached: Vec<(u32, f32)>,
+    /// The box of the places, and how far from them surfaces are known (m).
+    places: [DVec3; 2],
+    far: f64,
     /// Where the boxes matter (m).
     within: [DVec3; 2],
     middle: DVec3,
@@ -40,6 +43,7 @@ impl Nearby {
         self.boxes.clear();
         self.triangles.clear();
         (self.within, self.middle) = (bounds, (bounds[0] + bounds[1]) * 0.5);
+        (self.places, self.far) = ([*low, *high], within);
         shell.for_each_leaf(&[*low, *high], within, |leaf, bounds, way| self.push(leaf, bounds, way));
     }
 
@@ -61,8 +65,13 @@ impl Nearby {
         }
     }
 
-    /// The nearest point of the mesh within a distance (m), and where it moves, within that and its way.
+    /// The nearest point of the mesh within a distance (m), and where it moves, within that and its way. Beyond what it knows it
+    /// asks the whole mesh.
     pub fn nearest(&mut self, shell: &Shell, place: DVec3, within: f64) -> Option<Nearest> {
+        let [low, high] = &self.places;
+        if within > self.far || !(*low <= place && place <= *high) {
+            return shell.nearest(place, within);
+        }
         let about = place - self.middle;
         let about = [about.x as f32, about.y as f32, about.z as f32];
         let Self { which, boxes, triangles, reached, middle, .. } = self;

@@ -39,6 +39,9 @@ pub struct Shell {
 
 /// Least distance (m) at which a place lies to one side of its nearest point.
 const LEAST: f64 = 1.0e-9;
+/// How far the surface is looked for where a depth in it is asked for (radii of the ball).
+pub const DEPTHS: f64 = 3.0;
+
 /// A point of the surface.
 pub struct Nearest {
     /// Square of its distance (m2).
@@ -180,7 +183,12 @@ impl Shell {
     /// How far (m) a ball of a radius (m) must go to be out of the mesh, and whereto; nothing where it touches no surface within
     /// three radii. Where the mesh is told to be at rest.
     pub fn depth(&self, place: DVec3, radius: f64) -> Option<(f64, DVec3)> {
-        let nearest = self.nearest(place, 3.0 * radius)?;
+        self.depth_beside(place, radius, self.nearest(place, DEPTHS * radius))
+    }
+
+    /// The same where the nearest point within [`DEPTHS`] radii is known.
+    pub fn depth_beside(&self, place: DVec3, radius: f64, nearest: Option<Nearest>) -> Option<(f64, DVec3)> {
+        let nearest = nearest?;
         let (distance, inside, out) = self.side(place, &nearest);
         let depth = if inside { radius + distance } else { radius - distance };
         (depth > 0.0).then_some((depth, out))
@@ -228,19 +236,22 @@ impl Shell {
         let weights = nearest_weights(place, a, b, c);
         let point = a * weights[0] + b * weights[1] + c * weights[2];
         let square = (place - point).norm_squared();
-        let is_better = match &best.found {
+        let mut height = None;
+        let is_better = match &mut best.found {
             None => square <= reach,
             Some(other) => {
                 let tie = 1.0e-9 * (square + other.square);
-                let height = |triangle: usize| self.plane(triangle, place).0.abs();
+                let over = |triangle: usize| self.plane(triangle, place).0.abs();
                 // At an edge or corner that triangles share, the one that the point is highest over tells its side.
                 square < other.square - tie
-                    || square <= other.square + tie && height(index) > height(other.triangle)
+                    || square <= other.square + tie
+                        && *height.insert(over(index))
+                            > *other.height.get_or_insert_with(|| over(other.triangle))
             }
         };
         if is_better {
             best.most = best.most.min(square * (1.0 + 1.0e-8));
-            best.found = Some(Found { square, triangle: index, weights, point });
+            best.found = Some(Found { square, triangle: index, weights, point, height });
         }
     }
 
@@ -290,7 +301,7 @@ impl Shell {
     }
 
     pub(super) fn resolve(&self, found: Found, place: DVec3) -> Nearest {
-        let Found { square, triangle, weights, point } = found;
+        let Found { square, triangle, weights, point, .. } = found;
         let way = |corner: usize| {
             let index = self.triangles[triangle][corner] as usize;
             (self.next[index] - self.now[index]) * weights[corner]
@@ -319,6 +330,8 @@ pub(super) struct Found {
     triangle: usize,
     weights: [f64; 3],
     point: DVec3,
+    /// Distance of the place from its plane (m), once it has been asked for.
+    height: Option<f64>,
 }
 
 /// A box that contains nothing.

@@ -2,9 +2,10 @@
 
 use super::field::Window;
 use super::heap::{Colliders, Floor, Pose};
-use super::layout::{At, world};
+use super::layout::At;
+use super::nearby::Nearby;
 use super::rows::{V, dot};
-use super::shell::Shell;
+use super::shell::{DEPTHS, Shell};
 use super::trapped::DEEP;
 use crate::base::DVec3;
 use crate::error::Result;
@@ -90,16 +91,26 @@ impl<'a> Surfaces<'a> {
         side
     }
 
-    /// Where a grain at a place in a block is out of them; nothing where it finds no room.
-    pub fn release(&self, at: At, within: V) -> Option<V> {
-        let from = world(at, within, self.diameter);
+    /// What is near some places (m) of the meshes, so that [`Surfaces::release`] finds it soon.
+    pub fn find(&self, places: impl Iterator<Item = DVec3>, nearby: &mut Vec<Nearby>) {
+        let none = [DVec3::repeat(f64::MAX), DVec3::repeat(f64::MIN)];
+        let [low, high] = places.fold(none, |[low, high], place| [low.inf(&place), high.sup(&place)]);
+        let room = DVec3::repeat((FARTHEST + 0.5) * self.diameter);
+        nearby.resize_with(self.shells.len(), Nearby::default);
+        for ((shell, _), nearby) in self.shells.iter().zip(nearby) {
+            nearby.find(shell, &[low - room, high + room], 0.5 * DEPTHS * self.diameter);
+        }
+    }
+
+    /// Where a grain at a place (m) is out of them, as a way from there (diameters); nothing where it finds no room.
+    pub fn release(&self, from: DVec3, nearby: &mut [Nearby]) -> Option<V> {
         let mut place = from;
         for _ in 0..ROUNDS {
             let mut is_out = true;
-            self.for_each_way_out(&mut place, |depth| is_out &= depth <= ROUNDED * DEEP);
+            self.for_each_way_out(&mut place, nearby, |depth| is_out &= depth <= ROUNDED * DEEP);
             if is_out {
                 let way = (place - from) / self.diameter;
-                return Some([0, 1, 2].map(|axis| within[axis] + way[axis] as f32));
+                return Some([0, 1, 2].map(|axis| way[axis] as f32));
             }
             if (place - from).norm() > FARTHEST * self.diameter {
                 return None;
@@ -109,7 +120,7 @@ impl<'a> Surfaces<'a> {
     }
 
     /// Moves a place (m) out of one surface after the other, and tells how deep (diameters) it was in each.
-    fn for_each_way_out(&self, place: &mut DVec3, mut tell: impl FnMut(f64)) {
+    fn for_each_way_out(&self, place: &mut DVec3, nearby: &mut [Nearby], mut tell: impl FnMut(f64)) {
         let half = 0.5 * self.diameter;
         if let Some(floor) = &self.floor {
             let depth = floor.height + half - place.y;
@@ -125,8 +136,9 @@ impl<'a> Surfaces<'a> {
                 *place += DVec3::from(gradient.map(f64::from)) * (depth / f64::from(steep));
             }
         }
-        for (shell, _) in self.shells {
-            if let Some((depth, out)) = shell.depth(*place, half) {
+        for ((shell, _), nearby) in self.shells.iter().zip(nearby) {
+            let nearest = nearby.nearest(shell, *place, DEPTHS * half);
+            if let Some((depth, out)) = shell.depth_beside(*place, half, nearest) {
                 tell(depth / self.diameter);
                 *place += out * depth.max(0.0);
             }

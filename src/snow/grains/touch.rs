@@ -48,6 +48,11 @@ impl Touch {
         }
     }
 
+    /// Goes on with the impulses of the same touch in the last sub-step.
+    fn take_over(&mut self, old: &Self) {
+        (self.impulse, self.across, self.bounce) = (old.impulse, old.across, old.bounce);
+    }
+
     /// What the next step needs of it.
     pub fn kept(mut self) -> Self {
         self.forget_bounce();
@@ -75,30 +80,45 @@ pub const FIRST_SHELL: u32 = 2;
 
 /// Gives blocks the touches that were found in this sub-step: all of those that are due, meshes of all. They take over
 /// the impulses of those that were there before.
-pub fn renew(blocks: &mut [Block], fresh: Vec<Vec<Touch>>) {
+pub fn renew(blocks: &mut [Block], mut fresh: Vec<Vec<Touch>>) {
     let is_renewed = |block: &Block, fresh: &[Touch]| {
         block.is_due || !fresh.is_empty() || block.touches.iter().any(Touch::is_of_mesh)
     };
-    let renewed = blocks.par_iter_mut().zip(&fresh).filter(|(block, fresh)| is_renewed(block, fresh));
-    let mut old: Vec<Touch> = renewed
-        .flat_map_iter(|(block, _)| {
-            let (old, kept) = std::mem::take(&mut block.touches)
-                .into_iter()
-                .partition::<Vec<_>, _>(|touch| block.is_due || touch.is_of_mesh());
-            block.touches = kept;
-            old
+    let renewed = blocks.par_iter_mut().zip(&mut fresh).filter(|(block, fresh)| is_renewed(block, fresh));
+    // What its block does not touch any more, another one may.
+    let mut gone: Vec<Touch> = renewed
+        .flat_map_iter(|(block, fresh)| {
+            fresh.sort_unstable_by_key(Touch::key);
+            let (mut gone, mut next) = (Vec::new(), 0);
+            block.touches.retain(|old| {
+                let is_kept = !block.is_due && !old.is_of_mesh();
+                if !is_kept {
+                    while fresh.get(next).is_some_and(|touch| touch.key() < old.key()) {
+                        next += 1;
+                    }
+                    match fresh.get_mut(next).filter(|touch| touch.key() == old.key()) {
+                        Some(touch) => touch.take_over(old),
+                        None => gone.push(*old),
+                    }
+                }
+                is_kept
+            });
+            gone
         })
         .collect();
-    old.par_sort_unstable_by_key(Touch::key);
+    gone.par_sort_unstable_by_key(Touch::key);
     blocks.par_iter_mut().zip(fresh).filter(|(_, fresh)| !fresh.is_empty()).for_each(|(block, mut fresh)| {
         for touch in &mut fresh {
-            if let Ok(at) = old.binary_search_by_key(&touch.key(), Touch::key) {
-                (touch.impulse, touch.across, touch.bounce) =
-                    (old[at].impulse, old[at].across, old[at].bounce);
+            if let Ok(at) = gone.binary_search_by_key(&touch.key(), Touch::key) {
+                touch.take_over(&gone[at]);
             }
         }
-        block.touches.extend(fresh);
-        block.touches.sort_unstable_by_key(Touch::key);
+        if block.touches.is_empty() {
+            block.touches = fresh;
+        } else {
+            block.touches.extend(fresh);
+            block.touches.sort_unstable_by_key(Touch::key);
+        }
         release_pressed(&mut block.touches);
     });
 }

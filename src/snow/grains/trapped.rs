@@ -5,8 +5,9 @@
 use rayon::prelude::*;
 
 use super::heap::Colliders;
-use super::layout::{At, Block, Layout};
-use super::rows::{Row, V, dot};
+use super::layout::{At, Block, Layout, world};
+use super::nearby::Nearby;
+use super::rows::{Row, V, add, dot};
 use super::surfaces::Surfaces;
 use super::touch::Touch;
 use crate::error::Result;
@@ -51,16 +52,19 @@ impl End<'_> {
         let blocks: Vec<At> = which.iter().map(|&block| self.layout.blocks[block as usize].at).collect();
         let around = Surfaces::around(colliders, &blocks, self.diameter, MARGIN)?;
         let seen = &*rows;
-        let released = which.par_iter().zip(&around).flat_map_iter(|(&block, surfaces)| {
+        let blocks = which.par_iter().zip(&around);
+        let released = blocks.map_init(Vec::new, |nearby: &mut Vec<Nearby>, (&block, surfaces)| {
             let at = self.layout.blocks[block as usize].at;
-            let release = |&slot: &u32| (slot, surfaces.release(at, seen[slot as usize].place));
-            deep[block as usize].iter().map(release).collect::<Vec<_>>()
+            let place = |slot: u32| world(at, seen[slot as usize].place, self.diameter);
+            let deep = &deep[block as usize];
+            surfaces.find(deep.iter().map(|&slot| place(slot)), nearby);
+            deep.iter().map(|&slot| (slot, surfaces.release(place(slot), nearby))).collect::<Vec<_>>()
         });
-        let released: Vec<(u32, Option<V>)> = released.collect();
+        let released: Vec<Vec<(u32, Option<V>)>> = released.collect();
         let mut trapped = Vec::new();
-        for (slot, place) in released {
-            match place {
-                Some(place) => rows[slot as usize].place = place,
+        for (slot, way) in released.into_iter().flatten() {
+            match way {
+                Some(way) => rows[slot as usize].place = add(rows[slot as usize].place, way),
                 None => trapped.push(ids[slot as usize]),
             }
         }
