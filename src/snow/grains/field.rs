@@ -67,7 +67,7 @@ impl<'a> Seen<'a> {
         reach: f32,
     ) -> Result<Vec<Vec<Touch>>> {
         self.see(layout, which)?;
-        let near = which.par_iter().map(|&index| {
+        let near = which.par_iter().with_max_len(8).map(|&index| {
             let (block, patch) = (&layout.blocks[index as usize], &self.patches[index as usize]);
             let Some(patch) = patch.as_ref().filter(|patch| !patch.values.is_empty()) else {
                 return Vec::new();

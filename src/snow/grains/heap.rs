@@ -297,11 +297,13 @@ impl Heap {
         let mut fresh: Vec<Vec<Touch>> = vec![Vec::new(); layout.blocks.len()];
         if !search.shells.is_empty() {
             let rows = Shared::new(&mut self.rows);
+            // Few blocks ask, and those lie side by side: they are shared out in small parts.
             let blocks = layout.blocks.par_iter_mut().zip(&mut fresh);
-            blocks.for_each_init(Scratch::default, |scratch, (block, fresh)| {
-                let found = search.touches(scratch, block, rows);
-                block.is_awake |= !found.is_empty();
-                fresh.extend(found);
+            let asking: Vec<_> = blocks.filter(|(block, _)| search.may_be_near(block)).collect();
+            let asking = asking.into_par_iter().with_max_len(4);
+            asking.for_each_init(Scratch::default, |scratch, (block, fresh)| {
+                *fresh = search.touches(scratch, block, rows);
+                block.is_awake |= !fresh.is_empty();
             });
         }
         // Where all grains rest, what they lie on does nothing; those that left a block take their touches with them.

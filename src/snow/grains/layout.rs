@@ -72,6 +72,21 @@ pub struct Home {
     pub rank: u32,
 }
 
+/// A grain that has left its block.
+struct Mover {
+    slot: u32,
+    /// Index of the block that it is in.
+    at: At,
+    /// That block, where it is next to the last one; [`NONE`] where there is none yet.
+    block: u32,
+}
+
+/// Of the blocks around an index the one at another index; [`NONE`] where there is none, or farther away.
+fn beside(from: At, near: &[u32; 27], to: At) -> u32 {
+    let [x, y, z] = [0, 1, 2].map(|axis| i64::from(to[axis]) - i64::from(from[axis]) + 1);
+    if [x, y, z].iter().all(|step| (0..3).contains(step)) { near[(9 * x + 3 * y + z) as usize] } else { NONE }
+}
+
 /// Blocks one above the other.
 pub struct Column {
     /// Index along x and z.
@@ -211,16 +226,16 @@ impl Layout {
     pub fn follow(&mut self, rows: &mut [Row], ids: &[u32], ahead: f32) {
         let shared = Shared::new(rows);
         let strayed = self.blocks.par_iter_mut().filter(|block| block.has_strayed);
-        let movers: Vec<Vec<(u32, At)>> = strayed
+        let movers: Vec<Vec<Mover>> = strayed
             .map(|block| {
                 (block.is_changed, block.is_stirred) = (true, true);
-                let (mut gone, at) = (Vec::new(), block.at);
+                let (mut gone, at, near) = (Vec::new(), block.at, block.near);
                 block.members.retain(|&slot| {
                     let mut now = at;
                     // SAFETY: a grain is a member of one block.
                     settle(unsafe { shared.get(slot as usize) }, &mut now);
                     if now != at {
-                        gone.push((slot, now));
+                        gone.push(Mover { slot, at: now, block: beside(at, &near, now) });
                     }
                     now == at
                 });
@@ -229,10 +244,10 @@ impl Layout {
             .collect();
         self.has_moved = movers.iter().any(|movers| !movers.is_empty());
         self.has_ever_moved |= self.has_moved;
-        for (slot, at) in movers.into_iter().flatten() {
+        for Mover { slot, at, block } in movers.into_iter().flatten() {
             self.homes[slot as usize].block = NONE;
             if holds(at) {
-                let block = self.block(at);
+                let block = if block == NONE { self.block(at) } else { block };
                 self.homes[slot as usize].block = block;
                 let block = &mut self.blocks[block as usize];
                 block.members.push(slot);

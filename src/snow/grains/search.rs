@@ -75,22 +75,31 @@ impl Travel {
 /// Longest that [`Travel::most`] may be, in the way of the farthest vertex: beyond it, grains that do not ride would ask too often.
 const ALONG: f64 = 1.2;
 
+/// How far (diameters) from its middle a block's members may touch a mesh: they have left the block by less than two diameters.
+fn around() -> f64 {
+    0.5 * f64::from(EDGE) * 3f64.sqrt() + REACH + 2.0
+}
+
 impl Search<'_> {
+    /// Whether a mesh may be as near (diameters) as that, by what is remembered.
+    fn is_within(&self, limit: f32, reach: f64) -> bool {
+        f64::from(limit) - self.before < reach
+    }
+
+    /// Whether a mesh may be near members of a block, by what the block remembers.
+    pub fn may_be_near(&self, block: &Block) -> bool {
+        !block.members.is_empty() && self.is_within(block.limit, around() + self.travel.most())
+    }
+
     /// Members of a block near a mesh, each with the plane that the mesh is there. Of grains that rest, those that a mesh touches
     /// and moves, which wake. Blocks and grains remember how far the meshes may travel before they can matter.
     pub fn touches(&self, scratch: &mut Scratch, block: &mut Block, rows: Shared<'_, Row>) -> Vec<Touch> {
-        let is_near = |limit: f32, reach: f64| f64::from(limit) - self.before < reach;
         let most = self.travel.most();
-        // A member has left the block by less than two diameters.
-        let around = 0.5 * f64::from(EDGE) * 3f64.sqrt() + REACH + 2.0;
-        if block.members.is_empty() || !is_near(block.limit, around + most) {
-            return Vec::new();
-        }
         // Where a mesh has just been touched, it still is too near to ask again.
         if !block.touches.iter().any(Touch::is_of_mesh) {
             let middle = world(block.at, [EDGE * 0.5; 3], self.diameter);
-            block.limit = self.limit(middle, around + f64::from(EDGE));
-            if !is_near(block.limit, around + most) {
+            block.limit = self.limit(middle, around() + f64::from(EDGE));
+            if !self.may_be_near(block) {
                 return Vec::new();
             }
         }
@@ -108,7 +117,7 @@ impl Search<'_> {
                 let way = scaled(row.velocity, (self.dt / self.diameter) as f32);
                 f64::from(norm(sub(way, self.travel.along))) + self.travel.beside
             };
-            if is_near(row.limit, REACH + closing) && !(row.rests() && most == 0.0) {
+            if self.is_within(row.limit, REACH + closing) && !(row.rests() && most == 0.0) {
                 let place = world(block.at, row.place, self.diameter);
                 room = [room[0].inf(&place), room[1].sup(&place)];
                 // Where meshes are fast, a grain would have to ask again at once.

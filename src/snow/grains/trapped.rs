@@ -52,7 +52,7 @@ impl End<'_> {
         let blocks: Vec<At> = which.iter().map(|&block| self.layout.blocks[block as usize].at).collect();
         let around = Surfaces::around(colliders, &blocks, self.diameter, MARGIN)?;
         let seen = &*rows;
-        let blocks = which.par_iter().zip(&around);
+        let blocks = which.par_iter().zip(&around).with_max_len(1);
         let released = blocks.map_init(Vec::new, |nearby: &mut Vec<Nearby>, (&block, surfaces)| {
             let at = self.layout.blocks[block as usize].at;
             let place = |slot: u32| world(at, seen[slot as usize].place, self.diameter);
