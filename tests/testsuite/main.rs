@@ -59,6 +59,7 @@ mod snow {
     mod base;
     mod crumbs;
     mod grain_options;
+    mod grain_slopes;
     mod grains;
     mod holes;
     mod layers;

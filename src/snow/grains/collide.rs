@@ -239,3 +239,39 @@ impl Contact {
         [[ax, ay, az, a_marks], [bx, by, bz, b_marks]]
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::base::DVec3;
+    use crate::context::{Context, Pool};
+    use crate::snow::grains::Params;
+    use crate::snow::grains::heap::{Colliders, Division, Heap};
+
+    /// Velocities (m/s) of a grain and of one that has come down on it at 1 m/s, both held by chains of contacts.
+    fn met(attraction: f32) -> [f32; 2] {
+        let params =
+            Params { gravity: 0.0, friction: 0.0, attraction, rests: false, ..Params::for_cell(1.5) };
+        let mut heap = Heap::new(2.0 * params.radius);
+        for (id, speed) in [(0, 0.0), (1, -1.0)] {
+            let place = DVec3::new(0.5, 0.5 + f64::from(id), 0.5) * heap.diameter;
+            heap.add(id, place, [0.0, speed, 0.0]).unwrap();
+        }
+        heap.rows.iter_mut().for_each(|row| row.hold = 1.0 + SUPPORTED);
+        let division = Division { dt: 1.0e-3, sub_steps: 1 };
+        let coefficients = params.coefficients(&division);
+        let coefficients = Coefficients { up: [0.0, 1.0, 0.0], air: 0.0, attraction, ..coefficients };
+        let ctx = Context::new(Pool::new(1).unwrap());
+        let step = || heap.step(&ctx, division, coefficients, &mut Colliders::default());
+        ctx.step(1, || ctx.phase("move", step)).unwrap();
+        [0, 1].map(|slot: usize| heap.rows[slot].velocity[1])
+    }
+
+    #[test]
+    fn the_upper_of_two_grains_that_are_held_is_the_lighter_one_but_where_they_attract() {
+        let [lower, upper] = met(0.0);
+        assert!((lower + 0.4).abs() < 1.0e-5 && (upper + 0.4).abs() < 1.0e-5, "{lower} {upper}");
+        let [lower, upper] = met(1.0e-9);
+        assert!((lower + 0.5).abs() < 1.0e-5 && (upper + 0.5).abs() < 1.0e-5, "{lower} {upper}");
+    }
+}

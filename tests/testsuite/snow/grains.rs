@@ -263,31 +263,6 @@ fn damaged_states_are_refused() {
     assert_eq!(refused, 10_000);
 }
 
-/// A grain on a plane that leans, as gravity that leans: it rests below the angle of friction and slides above it.
-#[test]
-fn a_grain_slides_where_the_slope_is_steeper_than_its_friction() {
-    let ctx = context(1);
-    let moved = |degrees: f64| {
-        let params = Params { friction: 0.3, air: 1.0, ..Params::for_cell(CELL) };
-        let mut heap = Heap::new(2.0 * params.radius);
-        heap.add(0, DVec3::new(0.0, params.radius, 0.0), [0.0; 3]).unwrap();
-        let division = Division { dt: 1.0 / 24.0, sub_steps: params.sub_steps(1.0 / 24.0, 0.0) };
-        let mut coefficients = params.coefficients(&division);
-        let (sine, cosine) = degrees.to_radians().sin_cos();
-        coefficients.gravity = [(9.81 * sine) as f32, (-9.81 * cosine) as f32, 0.0];
-        let floor = Some(Floor { height: 0.0, friction: 0.3 });
-        let mut colliders = Colliders { floor, ..Colliders::default() };
-        for _ in 0..24 {
-            ctx.phase("move", || heap.step(&ctx, division, coefficients, &mut colliders)).unwrap();
-        }
-        heap.places().next().unwrap().x
-    };
-    let angle = 0.3f64.atan().to_degrees();
-    assert!(moved(angle - 3.0).abs() < 1e-4, "{}", moved(angle - 3.0));
-    let expected = 0.5 * 9.81 * ((angle + 3.0).to_radians().sin() - 0.3 * (angle + 3.0).to_radians().cos());
-    assert!((moved(angle + 3.0) / expected - 1.0).abs() < 0.1, "{} {expected}", moved(angle + 3.0));
-}
-
 /// A plate comes down on a layer of grains until they have no room, and leaves: they are not thrown.
 #[test]
 fn grains_that_are_pressed_are_not_thrown_when_they_are_free() {
