@@ -250,8 +250,7 @@ mod tests {
 
     /// Velocities (m/s) of a grain and of one that has come down on it at 1 m/s, both held by chains of contacts.
     fn met(attraction: f32) -> [f32; 2] {
-        let params =
-            Params { gravity: 0.0, friction: 0.0, attraction, rests: false, ..Params::for_cell(1.5) };
+        let params = Params { gravity: 0.0, friction: 0.0, rests: false, ..Params::for_cell(1.5) };
         let mut heap = Heap::new(2.0 * params.radius);
         for (id, speed) in [(0, 0.0), (1, -1.0)] {
             let place = DVec3::new(0.5, 0.5 + f64::from(id), 0.5) * heap.diameter;
