@@ -8,9 +8,8 @@ const ALONE: [f64; 3] = [5.5, 0.3, 0.4];
 const EACH: [f64; 2] = [0.37, 0.0045];
 
 /// The attraction (weights of a grain) with which a wall of a height (m) of grains of a diameter (m) and an angle of repose
-/// (degrees) just stands; 0 where it stands without. By Rankine
-/// the critical height is 4 c tan(45 + a/2) / (rho g), and the cohesion c is tan(a) times a tensile strength, which is
-/// proportional to the attraction (Rumpf 1962).
+/// (degrees) just stands; 0 where it stands without. By Rankine the critical height is 4 c tan(45 + a/2) / (rho g), and the
+/// cohesion c is tan(a) times a tensile strength, which is proportional to the attraction (Rumpf 1962).
 pub fn of_wall(height: f64, diameter: f64, repose: f64) -> f64 {
     let repose = repose.max(GENTLEST);
     let angle = repose.to_radians();
