@@ -1,34 +1,34 @@
-//! Which of several objects took the snow at a place, where they press it together by different shares: the one whose surface
-//! comes nearest to the place at the step's start, its end or one of the moments between (`MOMENTS`); of equals the first.
+//! Decides which object took the snow at a position when objects have different compression: the one whose surface comes
+//! nearest to the position at the start, the end or one of the moments between (`MOMENTS`); the first of equals.
 
 use super::shell::Shell;
 use super::surroundings::{Bounds, Object, bounds};
 use crate::base::DVec3;
 use crate::error::Result;
 
-/// Poses of a step that are looked at.
+/// Count of poses that are examined in a step.
 const MOMENTS: u32 = 9;
 
-/// What share of the removed snow becomes grains.
+/// Share of the removed snow that becomes grains.
 pub enum Claims {
     /// The same everywhere.
     One(f64),
-    /// That of the object that took it.
+    /// That of the object that took the snow.
     Each(Vec<Claim>),
 }
 
-/// The claim of an object.
+/// An object that may have taken snow.
 pub struct Claim {
     share: f64,
-    /// Its meshes at the moments.
+    /// Its mesh at each moment.
     meshes: Vec<Shell>,
-    /// The box (m) of all of them.
+    /// Bounding box (m) of all of them.
     bounds: Bounds,
 }
 
 impl Claims {
-    /// Those of the objects that remove snow from `from` to `to` (s); `usual` is the compression of those that have none of
-    /// their own.
+    /// Claims of the objects that remove snow from `from` to `to` (s); `usual` is the compression of objects that have none
+    /// of their own.
     ///
     /// # Errors
     /// A pose that cannot be computed.
@@ -54,7 +54,7 @@ impl Claims {
         Ok(Self::Each(removing.iter().map(claim).collect::<Result<_>>()?))
     }
 
-    /// What matters within a box (m).
+    /// The claims that reach into a box (m).
     pub fn in_box(&self, around: &Bounds) -> ClaimsHere<'_> {
         match self {
             Self::One(share) => ClaimsHere { share: *share, claims: Vec::new() },
@@ -70,20 +70,20 @@ impl Claims {
     }
 }
 
-/// The claims that matter within a box.
+/// Claims that reach into a box.
 pub struct ClaimsHere<'a> {
-    /// Where nothing is nearer.
+    /// Used where no surface is found.
     share: f64,
     claims: Vec<&'a Claim>,
 }
 
 impl ClaimsHere<'_> {
-    /// Share of the snow at a place (m) that becomes grains.
+    /// Share of the snow at a position (m) that becomes grains.
     pub fn share(&self, place: DVec3) -> f64 {
         let mut best = (f64::INFINITY, self.share);
         for claim in &self.claims {
             for mesh in &claim.meshes {
-                // Not farther than the nearest so far.
+                // Only what is nearer than the best so far.
                 if let Some(distance) =
                     mesh.distance(place, best.0.min(FARTHEST)).filter(|near| *near < best.0)
                 {
@@ -95,13 +95,13 @@ impl ClaimsHere<'_> {
     }
 }
 
-/// Farthest that surfaces are looked for (m).
+/// Search distance for surfaces (m).
 const FARTHEST: f64 = 1.0e6;
-/// How much farther than its box an object may take snow: its noise does so (share of a block).
+/// Margin around the box of an object, for its noise (share of a block).
 const AROUND: f64 = 0.5;
 
 impl Claim {
-    /// Whether it may have taken snow in a box.
+    /// Whether the object may have taken snow in a box.
     fn reaches(&self, [low, high]: &Bounds) -> bool {
         let room = (high - low) * AROUND;
         (0..3).all(|axis| {

@@ -1,4 +1,4 @@
-//! One correction of eight pairs of grains: their impulses, their pushes, and what a contact finds out.
+//! One correction of eight pairs of grains: impulses, pushes, and which grains are supported or woken.
 
 use super::contacts::Batch;
 use super::rest;
@@ -8,25 +8,26 @@ use crate::base::lanes::{LaneMask, Lanes};
 
 /// Share of an overlap that a sub-step removes.
 const REMOVED: f32 = 0.8;
-/// Most that a sub-step moves a grain out of an overlap (diameters).
+/// Largest correction of an overlap in a sub-step (diameters).
 pub const FARTHEST: f32 = 0.5;
-/// Gap (diameters) up to which a contact still supports and keeps its impulse.
+/// Largest gap (diameters) at which a contact still supports and keeps its impulse.
 pub const TOUCHING: f32 = 0.02;
-/// Gap (diameters) that grains in contact do not close, and overlap that they may keep: pushed out of every last overlap, a heap
-/// would never come to rest, as each push opens and closes contacts around it.
+/// Gap (diameters) below which contacts are not closed, and overlap (`SLOP`) that they may keep. If every overlap were
+/// removed, a heap would never come to rest: each push opens and closes contacts around it.
 const SLACK: f32 = 0.01;
-/// As above.
+/// See [`SLACK`].
 const SLOP: f32 = 0.02;
-/// The same where they attract each other: a wall that gives way by more cracks.
+/// The same for grains that attract each other: a larger value would let walls crack.
 const SLOP_OF_WALLS: f32 = 0.005;
-/// How much more than the mean of both an impulse changes the velocity of a grain right above another, and less that of the lower
-/// one, where both are supported: masses that fall upward by e^(-2 of this) per diameter, so that a sweep upward nearly finds the
-/// impulses of a deep bed. Equal masses never do: a bed creeps down slopes of a third of its angle of repose. Where grains
-/// attract each other the masses are equal, as their strength is a force: walls of any height would stand.
+/// An impulse changes the velocity of a supported grain right above another supported one by this share more than equal
+/// masses would, and that of the lower one by as much less. Masses thus fall upward by a factor e^(-2 x this) per diameter,
+/// and one upward sweep nearly finds the impulses of a deep bed. Equal masses never do: a bed creeps down slopes of a third
+/// of its angle of repose. Grains that attract each other have equal masses: their strength is a force, and walls of any
+/// height would stand.
 const LIGHTER_ABOVE: f32 = 0.2;
-/// Least distance (diameters) at which two grains have a direction.
+/// Least distance (diameters) between two grains that defines a direction.
 const LEAST: f32 = 1.0e-6;
-/// Least upward part of the direction from a grain to one that it supports.
+/// Least upward component of the direction from a grain to one that it supports.
 pub const STEEP: f32 = 0.2;
 
 type V8 = [Lanes; 3];
@@ -88,52 +89,52 @@ impl Eight {
         unsafe { rows.scatter(slots, Part::Velocity, &[u, v, w, self.still]) };
     }
 
-    /// With an impulse.
+    /// Applies an impulse.
     #[inline(always)]
     fn kicked(self, impulse: V8, weight: Lanes) -> Self {
         Self { velocity: add8(self.velocity, scaled8(impulse, weight)), ..self }
     }
 }
 
-/// How eight pairs lie to each other, and what they weigh.
+/// Geometry and masses of eight pairs.
 pub struct Contact {
-    /// From the others to the owners.
+    /// From the other grains to the owners.
     normal: V8,
-    /// Its part along the upward direction.
+    /// Upward component of the normal.
     upward: Lanes,
-    /// Distance between their surfaces (diameters).
+    /// Gap between the surfaces (diameters).
     pub gap: Lanes,
-    /// Sum of the weights, and its inverse.
+    /// Sum of the inverse masses, and its inverse.
     weights: Lanes,
     inverse: Lanes,
-    /// How much an impulse changes the velocity of an owner, and of its other.
+    /// Change of velocity per impulse, of the owners and of the others.
     shares: [Lanes; 2],
 }
 
 impl Contact {
-    /// That of the pairs of a batch.
+    /// The contacts of a batch.
     #[inline(always)]
     pub fn between(a: &Eight, b: &Eight, batch: &Batch, c: &Coefficients) -> Self {
         let (zero, one) = (Lanes::all(0.0), Lanes::all(1.0));
         let weights = a.weight + b.weight;
-        // 1 / weights, of 1 and 2.
+        // 1 / weights, exact for 1 and 2.
         let inverse = Lanes::all(1.5) - Lanes::all(0.5) * weights;
         let apart = sub8(sub8(a.place, batch.shift()), b.place);
         let distance = dot8(apart, apart).sqrt();
         let [x, y, z] = scaled8(apart, one / distance.max(Lanes::all(LEAST)));
-        // Two grains at one place part upward.
+        // Two grains at the same position separate vertically.
         let is_none = distance.is_less(Lanes::all(LEAST));
         let normal = [is_none.choose(zero, x), is_none.choose(one, y), is_none.choose(zero, z)];
         let upward = dot8(normal, c.up.map(Lanes::all));
         let lighter = Lanes::all(if c.attraction > 0.0 { 0.0 } else { LIGHTER_ABOVE });
-        // Grains at rest cannot be moved, whatever they weigh.
+        // Resting grains have infinite mass.
         let tilt = upward * lighter * a.weight * b.weight;
         let tilt = (a.supported & b.supported).choose(tilt, zero);
         let shares = [a.weight * (one + tilt), zero - b.weight * (one - tilt)];
         Self { normal, upward, gap: distance - one, weights, inverse, shares }
     }
 
-    /// Grains that get an impulse, in opposite directions.
+    /// Applies opposite impulses to both grains of each pair.
     #[inline(always)]
     pub fn kick(&self, a: Eight, b: Eight, impulse: V8) -> (Eight, Eight) {
         let [up, down] = self.shares;
@@ -177,7 +178,7 @@ pub fn collide(a: Eight, b: Eight, batch: &mut Batch, c: &Coefficients) -> (Eigh
 }
 
 impl Contact {
-    /// Grains that nothing holds bounce: what stopped them (the impulses so far) tells how fast they met (Poisson's hypothesis).
+    /// Unsupported grains bounce: the impulse that stopped them gives their speed of approach (Poisson's hypothesis).
     #[inline(always)]
     pub fn bounce(
         &self,
@@ -197,7 +198,7 @@ impl Contact {
         self.kick(a, b, change)
     }
 
-    /// Pushes of eight pairs, and what they find out: which grains are supported, and which something wakes.
+    /// Pushes of eight pairs, and marks for grains that are supported or woken.
     #[inline(always)]
     pub fn push(&self, a: &Eight, b: &Eight, pushes: [[Lanes; 4]; 2], c: &Coefficients) -> [[Lanes; 4]; 2] {
         let (zero, one) = (Lanes::all(0.0), Lanes::all(1.0));
@@ -205,7 +206,7 @@ impl Contact {
         let moves = zero.is_less(self.weights);
         let [[ax, ay, az, a_marks], [bx, by, bz, b_marks]] = pushes;
         let (a_push, b_push) = ([ax, ay, az], [bx, by, bz]);
-        // Overlap is removed, and a gap stays one.
+        // Overlap is removed; a gap must not close.
         let overlap = zero - self.gap;
         let slop = Lanes::all(if c.attraction > 0.0 { SLOP_OF_WALLS } else { SLOP });
         let some = ((overlap - slop).max(zero) * Lanes::all(REMOVED)).min(Lanes::all(FARTHEST));
@@ -218,7 +219,7 @@ impl Contact {
         let push = scaled8(self.normal, amount);
         let [ax, ay, az] = add8(a_push, scaled8(push, a.weight * (one + share)));
         let [bx, by, bz] = sub8(b_push, scaled8(push, b.weight * (one - share)));
-        // Chains of contacts that lead down to something fixed.
+        // Support spreads upward along chains of contacts that begin at something fixed.
         let (half, woken) = (Lanes::all(0.5), Lanes::all(rest::WOKEN));
         let (a_rests, b_rests) = (a.weight.is_less(half), b.weight.is_less(half));
         let (a_wakes, b_wakes) = (Lanes::all(1.5).is_less(a_marks), Lanes::all(1.5).is_less(b_marks));
@@ -248,7 +249,7 @@ mod tests {
     use crate::snow::grains::Params;
     use crate::snow::grains::heap::{Colliders, Division, Heap};
 
-    /// Velocities (m/s) of a grain and of one that has come down on it at 1 m/s, both held by chains of contacts.
+    /// Velocities (m/s) of a grain and of another that lands on it at 1 m/s, both supported.
     fn met(attraction: f32) -> [f32; 2] {
         let params = Params { gravity: 0.0, friction: 0.0, rests: false, ..Params::for_cell(1.5) };
         let mut heap = Heap::new(2.0 * params.radius);

@@ -1,9 +1,10 @@
-//! Grains that a step leaves crowded. What an object removes in a step it fills itself at the step's end: the snow of a slice as thick as
-//! its way has to leave through a gap that closes. Grains that push each other aside get about ten diameters far in a frame; the others
-//! would end inside one another, more of them from frame to frame. At the step's end those that have no room go on along the surfaces and
-//! through the grains around them, by the shortest way, to where there is some: up the front of a plough, out from under a sole.
+//! Relieves crowding at the end of a step. An object fills the volume that it sweeps, so the snow of a slice as thick as its
+//! displacement must leave through a closing gap. Grains that push each other aside get no farther than about ten diameters
+//! in a frame; the others would end up inside one another, more of them with every frame. At the end of the step, surplus
+//! grains are therefore moved along the surfaces and through the grains around them, by the shortest path, to cells with free
+//! space: up the front of a plough, out from under a sole.
 //!
-//! Room is counted in cells of two diameters. Grains keep their velocity.
+//! Grains are counted in cells of two diameters. They keep their velocity.
 
 use std::collections::hash_map::Entry;
 use std::collections::{HashMap, HashSet};
@@ -20,41 +21,40 @@ use crate::base::DVec3;
 use crate::context::Context;
 use crate::error::Result;
 
-/// Edge of a cell (diameters): eight grains beside each other.
+/// Edge of a cell (diameters): it holds 2 x 2 x 2 grains side by side.
 const CELL: f32 = 2.0;
 /// Cells along a block's edge.
 const PER_BLOCK: i32 = (EDGE / CELL) as i32;
-/// Most grains in a cell that is not crowded; ten fit in at most, packed at random.
+/// Most grains in a cell that is not crowded; a random packing fits ten.
 pub const MOST: usize = 14;
-/// The same before a step, in which more than these, from a file of grains that lie in one place, would have too many neighbours. Those
-/// that the last step found no room for do not try again.
+/// The same before a step: only a cell with more than this, as from a file of grains at one position, would give grains too
+/// many neighbours. Grains that the last step could not place are not tried again.
 pub const MOST_BEFORE: usize = 64;
-/// What a crowded cell keeps besides one grain for each eighth that is free of surfaces.
+/// Grains that a crowded cell keeps in addition to one for each octant that is clear of surfaces.
 const KEPT: usize = 2;
-/// Most grains of a cell with room.
+/// A cell with fewer grains than this has free space.
 const LOOSE: usize = 7;
-/// Cells that grains go through at most.
+/// Longest path of a grain (cells).
 const FARTHEST: usize = 100;
-/// Least distance (diameters) of a grain that is moved from a surface.
+/// Least distance (diameters) from a surface at which a moved grain is placed.
 const CLEAR: f64 = 0.5;
-/// How far (diameters) it is from the middle of its eighth, at most, along each axis.
+/// Largest offset (diameters) of a moved grain from the centre of its octant, along each axis.
 const JITTER: f32 = 0.25;
-/// Distance (diameters) of any such place from the middle of its cell, at most.
+/// Largest distance (diameters) of such a position from the centre of its cell.
 const CORNER: f64 = 1.3;
-/// Greatest depth (diameters) of the middle of a cell that grains go through in a surface: half of its edge, so that a way leads along
-/// two surfaces that touch.
+/// A path does not enter cells whose centre is at least this deep (diameters) in a surface: half a cell edge, so that paths
+/// can run between two surfaces that touch.
 const DEEPEST: f64 = 1.0;
-/// Room around a block (cells of a level set).
+/// Margin around a block (cells of a level set).
 const MARGIN: f64 = 2.0;
 
-/// Index of a cell along each axis.
 type Cell = [i32; 3];
 
 impl Heap {
-    /// Moves grains from cells with more than so many to where there is room, with meshes as they are now.
+    /// Moves grains out of cells that hold more than `most` into cells with free space. Meshes are at their current pose.
     ///
     /// # Errors
-    /// Cancel; what a grid reports.
+    /// Cancel; errors of a grid.
     pub(super) fn make_room(&mut self, ctx: &Context, colliders: &Colliders<'_>, most: usize) -> Result<()> {
         let slots = (0u32..).zip(self.rows.iter().zip(&self.at));
         let mut slots: Vec<(Cell, u32)> =
@@ -86,38 +86,39 @@ impl Heap {
     }
 }
 
-/// A grain that goes elsewhere.
+/// A grain to move.
 struct Move {
     slot: u32,
     cell: Cell,
-    /// Within its block (diameters).
+    /// Position within its block (diameters).
     place: V,
 }
 
-/// Where grains and surfaces are.
+/// Positions of grains and surfaces.
 struct Map<'a, 'b> {
-    /// Cells and slots, ascending.
+    /// The cell and slot of each grain, ascending.
     slots: Vec<(Cell, u32)>,
     rows: &'a [Row],
     colliders: &'a Colliders<'b>,
-    /// Of a grain (m).
+    /// Diameter of a grain (m).
     diameter: f64,
-    /// Surfaces around the blocks that were asked for.
+    /// Surfaces around the blocks visited so far.
     blocks: HashMap<At, Surfaces<'a>>,
 }
 
-/// What is known of a cell.
+/// Contents of a cell.
 struct Known {
-    /// What its middle lies beside.
+    /// Side of the surfaces that its centre is on.
     side: Side,
-    /// How many grains are in it.
+    /// Count of grains in it.
     count: usize,
-    /// A place (diameters, within the block) for each eighth that is clear of surfaces, and whether grains are in it.
+    /// A position (diameters, within the block) in each octant that is clear of surfaces, and whether the octant holds
+    /// grains.
     eighths: Vec<(V, bool)>,
 }
 
 impl Map<'_, '_> {
-    /// Reads the surfaces around some cells.
+    /// Reads the surfaces around cells.
     fn see(&mut self, cells: impl Iterator<Item = Cell>) -> Result<()> {
         let mut new: Vec<At> = cells.map(block).filter(|at| !self.blocks.contains_key(at)).collect();
         new.sort_unstable();
@@ -133,7 +134,8 @@ impl Map<'_, '_> {
         self.slots[first..].iter().take_while(move |(of, _)| *of == cell).map(|(_, slot)| *slot)
     }
 
-    /// What is known of a cell whose surroundings were read; its eighths only where grains may come to or where they are asked for.
+    /// Contents of a cell whose surroundings have been read. Octants are listed only if the cell has free space or `asks` is
+    /// set.
     fn know(&self, cell: Cell, asks: bool) -> Known {
         let surfaces = &self.blocks[&block(cell)];
         let side = |place: V| surfaces.side(world(block(cell), place, self.diameter));
@@ -162,20 +164,20 @@ impl Map<'_, '_> {
     }
 }
 
-/// Grains on their way out of crowds, which spread all at once, cell by cell.
+/// Grains that leave crowded cells: a breadth-first search from all crowds at once.
 struct Flow {
-    /// The crowd that came to a cell first.
+    /// The crowd that reached each cell first.
     came: HashMap<Cell, u32>,
-    /// For each crowd the one that it has met and become part of, or itself.
+    /// Union-find: the crowd that each crowd was merged into, or itself.
     parents: Vec<u32>,
-    /// Slots without room, by crowd.
+    /// Slots of the surplus grains of each crowd.
     pools: Vec<Vec<u32>>,
-    /// Cells that crowds have just come to.
+    /// Cells that crowds reached in the last round.
     front: Vec<(Cell, u32, Side)>,
 }
 
 impl Flow {
-    /// Crowds in some cells.
+    /// One crowd per crowded cell.
     fn begin(map: &mut Map<'_, '_>, crowded: &[Cell]) -> Result<Self> {
         map.see(crowded.iter().copied())?;
         let known: Vec<Known> = crowded.par_iter().map(|&cell| map.know(cell, true)).collect();
@@ -194,10 +196,10 @@ impl Flow {
         })
     }
 
-    /// Where grains go.
+    /// The moves of grains.
     ///
     /// # Errors
-    /// Cancel; what a grid reports.
+    /// Cancel; errors of a grid.
     fn run(mut self, ctx: &Context, map: &mut Map<'_, '_>) -> Result<Vec<Move>> {
         let mut moves = Vec::new();
         for _ in 0..FARTHEST {
@@ -228,7 +230,7 @@ impl Flow {
         Ok(moves)
     }
 
-    /// The cells around those of the front that no crowd has come to, each with the one that it is come to from.
+    /// Unvisited cells next to the front, each with the index of the front's cell that it was reached from.
     fn advance(&mut self) -> Vec<(Cell, usize)> {
         let mut visits = Vec::new();
         for from in 0..self.front.len() {
@@ -255,7 +257,7 @@ impl Flow {
         visits
     }
 
-    /// The crowd that a crowd is part of.
+    /// The crowd that a crowd was merged into.
     fn part_of(&self, crowd: u32) -> u32 {
         let mut crowd = crowd;
         while self.parents[crowd as usize] != crowd {
@@ -264,7 +266,7 @@ impl Flow {
         crowd
     }
 
-    /// Two crowds that meet become one.
+    /// Merges two crowds that meet.
     fn join(&mut self, a: u32, b: u32) {
         let (a, b) = (self.part_of(a), self.part_of(b));
         if a != b {
@@ -276,7 +278,7 @@ impl Flow {
     }
 }
 
-/// The cell of a place in a block.
+/// The cell of a position in a block.
 fn cell(at: At, place: V) -> Cell {
     [0, 1, 2].map(|axis| at[axis] * PER_BLOCK + (place[axis] / CELL) as i32)
 }
@@ -286,7 +288,7 @@ fn block(cell: Cell) -> At {
     cell.map(|at| at.div_euclid(PER_BLOCK))
 }
 
-/// A place in an eighth of a cell (diameters, from the cell's least corner), not the same in all cells.
+/// A jittered position in an octant of a cell (diameters, from the cell's least corner).
 fn scattered(cell: Cell, eighth: usize) -> V {
     let hash = super::sourcing::hash(eighth as u64, 0, cell.map(i64::from));
     [0, 1, 2].map(|axis: usize| {
@@ -303,7 +305,7 @@ mod tests {
     use crate::snow::grains::heap::Floor;
     use crate::snow::grains::shell::Shell;
 
-    /// Places (m) after room was made for grains of a diameter of 1 m on a floor, beside a mesh.
+    /// Positions (m) of grains of diameter 1 m on a floor, beside a mesh, after crowding was relieved.
     fn spread(places: &[DVec3], mesh: Option<(TriMesh, bool)>) -> Vec<DVec3> {
         let mut heap = Heap::new(1.0);
         for (id, place) in (0..).zip(places) {
@@ -336,7 +338,7 @@ mod tests {
         let places = spread(&[DVec3::new(0.3, 0.6, -0.2); 3000], None);
         assert!(fullest(&places) <= MOST, "{}", fullest(&places));
         assert!(places.iter().all(|place| place.y >= 0.5), "one is in the floor");
-        // Half a ball of seven grains in eight cubic diameters.
+        // A hemisphere with seven grains per eight cubic diameters.
         let farthest = places.iter().map(|place| place.norm()).fold(0.0, f64::max);
         assert!(
             farthest < 1.8 * (3000.0 * 8.0 / 7.0 / (2.0 / 3.0 * std::f64::consts::PI)).cbrt(),
@@ -346,7 +348,7 @@ mod tests {
 
     #[test]
     fn grains_leave_a_closed_gap_along_it() {
-        // A plate on the floor, 30 by 30 and as thick as nothing goes through.
+        // A plate on the floor, 30 by 30 and too thick for any grain to pass through.
         let plate = TriMesh::cuboid([-15.0, 0.1, -15.0], [15.0, 30.0, 15.0]);
         let at = |n: i32| DVec3::new(f64::from(n % 40) * 0.05 - 1.0, 0.05, f64::from(n / 40) * 0.05 - 1.0);
         let before: Vec<DVec3> = (0..1600).map(at).collect();

@@ -1,5 +1,5 @@
-//! Drag by local density (proposed in thesis section 3.8), an option: a grain in a thin spray feels the whole drag of the air, one
-//! among others less, and one that others surround none.
+//! Drag by local density (proposed in thesis section 3.8), optional: a lone grain in a thin spray feels the full drag of the
+//! air, a grain with neighbours less, and a surrounded grain none.
 
 use std::sync::atomic::{AtomicU32, Ordering};
 
@@ -9,11 +9,12 @@ use super::layout::Layout;
 use super::rest::NEAR;
 use super::rows::{Row, norm, sub};
 
-/// Neighbours that shelter a grain from the air altogether: about as many as one in a settled heap has.
+/// Count of neighbours that shelter a grain from the air completely: about as many as in a settled heap.
 pub const SURROUNDED: usize = 6;
 
-/// What air takes of a velocity in a sub-step, by how many neighbours shelter a grain. `air` is the share that a grain on its own keeps in a
-/// second (beta), `dt` the sub-step (s): the drag coefficient, -ln(beta), is that times the share of neighbours that are missing.
+/// Share of the velocity that air takes in a sub-step, by the count of neighbours. `air` is the share that a lone grain keeps
+/// in a second (beta), `dt` the sub-step (s): the drag coefficient, -ln(beta), is multiplied by the share of missing
+/// neighbours.
 pub fn air_by_neighbours(air: f64, dt: f64) -> [f32; SURROUNDED + 1] {
     let mut all = [0.0; SURROUNDED + 1];
     for (count, taken) in all.iter_mut().enumerate() {
@@ -24,11 +25,11 @@ pub fn air_by_neighbours(air: f64, dt: f64) -> [f32; SURROUNDED + 1] {
 }
 
 impl Layout {
-    /// Counts the neighbours of each grain among the pairs that were found: those within a tenth of a diameter, at most
-    /// [`SURROUNDED`]. What rests counts as surrounded: it feels no air before it moves, and then among others.
+    /// Counts the neighbours of each grain among its pairs: those within a tenth of a diameter, at most [`SURROUNDED`]. A
+    /// resting grain counts as surrounded: it feels no air until it moves, and then moves among others.
     pub fn count_neighbours(&mut self, rows: &[Row]) {
         let counts: Vec<AtomicU32> = rows.par_iter().map(|_| AtomicU32::new(0)).collect();
-        // Sums of whole numbers do not depend on their order.
+        // Integer sums do not depend on the order.
         self.batches.par_iter().flatten_iter().for_each(|batch| {
             let (others, shift) = (batch.others(), batch.shift());
             for lane in batch.lanes() {

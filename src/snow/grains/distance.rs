@@ -1,8 +1,8 @@
-//! The distance rule (thesis section 3.3.3), an option: what lies slowly on something, far from every object and every fast grain,
-//! need not lie still for a while first. It is put to rest at a step's start and wakes as all that rests does (`rest`).
+//! The distance rule (thesis section 3.3.3), optional: slow, supported grains far from every object and every fast grain come
+//! to rest at the start of a step without lying still first. They wake like all resting grains (`rest`).
 //!
-//! Distances are those of coarse cells: no grain nearer than the distance is put to rest by the rule, and one that is farther by
-//! less than two diagonals of a cell may stay awake.
+//! Distances are measured between coarse cells: the rule puts no grain to rest that is nearer than the distance, and may
+//! leave one awake that is farther by less than two cell diagonals.
 
 use rayon::prelude::*;
 
@@ -14,23 +14,22 @@ use super::shell::Shell;
 use crate::base::DVec3;
 use crate::error::Result;
 
-/// Speed over which a grain is fast, in sqrt(g d): slower ones rise by at most d / 32, too little to leave the hollow between those
-/// that they lie on.
+/// Speed above which a grain is fast, in sqrt(g d): a slower one rises by at most d / 32, too little to leave the hollow
+/// between the grains below it.
 const FAST: f64 = 0.25;
-/// Edge of a cell in the distance, where that is not less than [`LEAST`].
+/// Edge of a cell as a share of the distance; at least [`LEAST`].
 const EDGE: f64 = 0.25;
 /// Least edge of a cell (diameters), so that a cell holds many grains.
 const LEAST: f64 = 4.0;
 
-/// Index of a cell along each axis.
 type Cell = [i32; 3];
 
-/// Cells one behind the other along z: steps along x and y to them, and how many there are on each side.
+/// A row of cells along z, centred on an offset: offset along x and y, and count of cells on each side.
 type Run = [i32; 3];
 
 impl Heap {
-    /// Puts grains to rest that something supports, that are slow, and farther than a distance (m) from every fast grain and from the
-    /// meshes, as they are at the step's start and at its end. Gravity is in m/s2. What has just woken stays awake.
+    /// Puts grains to rest that are supported, slow, and farther than a distance (m) from every fast grain and from the
+    /// meshes at the start and end of the step. Gravity is in m/s2. Grains that have just woken stay awake.
     ///
     /// # Errors
     /// A pose that cannot be computed.
@@ -44,7 +43,7 @@ impl Heap {
         let edge = (EDGE * distance).max(LEAST * diameter);
         let fast = (FAST * (gravity.abs() * diameter).sqrt()) as f32;
         let is_fast = |row: &Row| norm(row.velocity) > fast;
-        // A grain at the top of its flight is slow, but lies on nothing.
+        // A grain at the top of its flight is slow but unsupported.
         let may_rest =
             |row: &Row| !row.rests() && row.is_supported() && !rest::has_just_woken(row) && !is_fast(row);
         let cell = |row: &Row, at: &At| -> Cell {
@@ -63,7 +62,7 @@ impl Heap {
                     return Ok(());
                 }
                 at(share, &mut pose)?;
-                // What it follows to is its next pose: the second time it is there.
+                // The first call makes it the next pose, the second the current one.
                 shell.follow(&pose);
                 shell.follow(&pose);
                 let shell = &*shell;
@@ -79,7 +78,7 @@ impl Heap {
         Ok(())
     }
 
-    /// The cells that hold a grain of a kind, ascending.
+    /// The cells that contain a grain for which `is_one` holds, ascending.
     fn cells(
         &self,
         is_one: &(impl Fn(&Row) -> bool + Sync),
@@ -93,10 +92,10 @@ impl Heap {
     }
 }
 
-/// The cells around a cell that have places nearer than a distance (cells) to places of its own.
+/// The rows of cells that contain a point nearer than a distance (cells) to a point of the cell in the middle.
 fn runs(distance: f64) -> Vec<Run> {
     let most = distance.ceil() as i32;
-    // Between two cells so many steps apart.
+    // Least distance between two cells along an axis, squared.
     let gap = |steps: i32| f64::from((steps.abs() - 1).max(0)).powi(2);
     let mut runs = Vec::new();
     for (x, y) in (-most..=most).flat_map(|x| (-most..=most).map(move |y| (x, y))) {
@@ -108,7 +107,7 @@ fn runs(distance: f64) -> Vec<Run> {
     runs
 }
 
-/// Whether one of the cells around a cell is among some, which ascend.
+/// Whether `sources` (ascending) contains a cell of the rows around a cell.
 fn is_near([x, y, z]: Cell, sources: &[Cell], runs: &[Run]) -> bool {
     runs.iter().any(|[dx, dy, dz]| {
         let [first, last] = [z - dz, z + dz].map(|z| [x + dx, y + dy, z]);
@@ -127,7 +126,7 @@ mod tests {
             let runs = runs(distance);
             let sources = |at: Cell| is_near([0; 3], &[[-9, 0, 0], at, [9, 0, 0]], &runs);
             for at in (0..11 * 11 * 11).map(|index| [index / 121 - 5, index / 11 % 11 - 5, index % 11 - 5]) {
-                // From corner to corner.
+                // Least distance between the two cells along an axis, squared.
                 let gap = |corner: i32| f64::from((corner.abs() - 1).max(0)).powi(2);
                 let nearest = at.map(gap).iter().sum::<f64>().sqrt();
                 assert_eq!(sources(at), nearest < distance, "{at:?} {distance}");

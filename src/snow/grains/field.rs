@@ -1,4 +1,4 @@
-//! Grains beside a level set that does not move during the step: the base layer, ground as a grid.
+//! Contacts between grains and a level set that does not move during the step: the base layer.
 
 use rayon::prelude::*;
 
@@ -19,10 +19,10 @@ pub struct Field<'a> {
 }
 
 impl Field<'_> {
-    /// The leaves around each block and a margin (cells); none where no surface is near.
+    /// The leaves around each block, with a margin (cells); none where no surface is near.
     ///
     /// # Errors
-    /// What the grid reports.
+    /// Errors of the grid.
     pub fn windows(&self, blocks: &[At], diameter: f64, margin: f64) -> Result<Vec<Option<Window<'_>>>> {
         let cell = self.grid.voxel_size();
         let bounds: Vec<[[i32; 3]; 2]> = blocks
@@ -40,25 +40,25 @@ impl Field<'_> {
     }
 }
 
-/// A level set as the blocks of a step see it: what lies around a block is copied once.
+/// A level set with a cached copy of the values around each block.
 pub struct Seen<'a> {
     field: &'a Field<'a>,
-    /// Of each block that has asked.
+    /// By block; none until it is first needed.
     patches: Vec<Option<Patch>>,
     diameter: f64,
 }
 
 impl<'a> Seen<'a> {
-    /// Nothing of it yet, by grains of a diameter (m).
+    /// An empty cache, for grains of a diameter (m).
     pub fn new(field: &'a Field<'a>, diameter: f64) -> Self {
         Self { field, patches: Vec::new(), diameter }
     }
 
-    /// Members of some blocks near the surface, each with the plane that the surface is there. `reach` is how far (diameters) a
-    /// grain at 1 m/s is expected to go.
+    /// Touches of the members of `which` blocks that are near the surface. `reach` is the distance (diameters) that a grain
+    /// at 1 m/s may move.
     ///
     /// # Errors
-    /// What the grid reports.
+    /// Errors of the grid.
     pub fn touches(
         &mut self,
         layout: &Layout,
@@ -78,7 +78,7 @@ impl<'a> Seen<'a> {
         Ok(near.collect())
     }
 
-    /// Copies what lies around those of some blocks that have not asked yet.
+    /// Copies the values around blocks that are not in the cache yet.
     fn see(&mut self, layout: &Layout, which: &[u32]) -> Result<()> {
         self.patches.resize_with(layout.blocks.len(), || None);
         let is_new = |index: &&u32| self.patches[**index as usize].is_none();
@@ -112,7 +112,7 @@ impl<'a> Seen<'a> {
             return None;
         }
         let steep = norm(gradient);
-        // Deep in the level set there is no direction: a touch that does nothing tells of the grain.
+        // Deep in the level set the gradient is 0: the touch has no plane and only records that the grain is inside.
         let normal = if steep < 1.0e-6 { [0.0; 3] } else { scaled(gradient, 1.0 / steep) };
         Some(Touch {
             grain: slot,
@@ -125,22 +125,22 @@ impl<'a> Seen<'a> {
     }
 }
 
-/// Room around a block for grains that left it since it was sorted (diameters).
+/// Margin around a block (diameters) for grains that have left it since it was sorted.
 const ROOM: f64 = 1.0;
 
 /// Values of a level set around a block; empty where no surface is near.
 #[derive(Default)]
 struct Patch {
-    /// Least voxel along each axis.
+    /// Least voxel index along each axis.
     low: [i32; 3],
-    /// Voxels along each axis.
+    /// Count of voxels along each axis.
     size: [usize; 3],
     values: Vec<f32>,
     least: f32,
 }
 
 impl Patch {
-    /// Those of the voxels from one to before another one.
+    /// Values of the voxels from `low` to before `end`.
     fn of(window: &Window<'_>, low: [i32; 3], end: [i32; 3]) -> Self {
         let size = [0, 1, 2].map(|axis| (end[axis] - low[axis]) as usize);
         let mut values = Vec::with_capacity(size.iter().product());
@@ -151,7 +151,7 @@ impl Patch {
         Self { low, size, values, least }
     }
 
-    /// Value and gradient (a voxel) at a place (voxels).
+    /// Value, and gradient per voxel, at a position (voxels).
     fn sample(&self, at: [f64; 3]) -> (f32, V) {
         let low = at.map(|x| x.floor() as i32);
         let index = |axis: usize| {
@@ -163,20 +163,20 @@ impl Patch {
     }
 }
 
-/// Leaves of a level set side by side.
+/// A box of adjacent leaves of a level set.
 pub struct Window<'a> {
-    /// Least leaf along each axis.
+    /// Least leaf index along each axis.
     low: [i32; 3],
-    /// Leaves along each axis.
+    /// Count of leaves along each axis.
     size: [usize; 3],
     probes: Vec<Probe<'a>>,
 }
 
 impl<'a> Window<'a> {
-    /// A window for each pair of a least and a greatest leaf (in leaves).
+    /// A window for each pair of a least and a greatest leaf index.
     ///
     /// # Errors
-    /// What the grid reports.
+    /// Errors of the grid.
     pub fn all(grid: &'a FloatGrid, bounds: &[[[i32; 3]; 2]]) -> Result<Vec<Self>> {
         let origins = |[low, high]: &[[i32; 3]; 2]| {
             let [low, high] = [*low, *high];
@@ -208,7 +208,7 @@ impl<'a> Window<'a> {
         }
     }
 
-    /// Value and gradient (a voxel) at a place (voxels).
+    /// Value, and gradient per voxel, at a position (voxels).
     pub fn sample(&self, at: [f64; 3]) -> (f32, V) {
         let low = at.map(|x| x.floor() as i32);
         let step = |step: usize| step as i32;
@@ -216,8 +216,8 @@ impl<'a> Window<'a> {
     }
 }
 
-/// Value and gradient (a voxel) at a place (voxels) by trilinear interpolation between the voxel below it and those a step of 0 or 1
-/// along each axis away.
+/// Value, and gradient per voxel, at a position (voxels): trilinear interpolation. `corner` returns the value of the voxel
+/// `low` plus 0 or 1 along each axis.
 #[inline(always)]
 fn interpolated(at: [f64; 3], low: [i32; 3], corner: impl Fn(usize, usize, usize) -> f32) -> (f32, V) {
     let [u, v, w] = [0, 1, 2].map(|axis| (at[axis] - f64::from(low[axis])) as f32);

@@ -1,21 +1,24 @@
 //! Grains: snow that is pushed, piled and thrown (thesis section 3.3).
 //!
-//! They are born where the base layer was removed (`sourcing`), pushed by what moves (`shell`), lie on the base (`field`), pile up
-//! at their angle of repose (`solve`), come to rest (`rest`), and read the base layer without changing it. A step is divided into
-//! sub-steps (`heap`).
+//! Grains are created where the base layer lost snow (`sourcing`), pushed by moving meshes (`shell`), lie on the base
+//! (`field`), pile up at their angle of repose (`solve`) and come to rest (`rest`). They read the base layer and never change
+//! it. A step is divided into sub-steps (`heap`).
 //!
 //! | word | meaning |
 //! |---|---|
-//! | row | the part of a grain that every sub-step reads and writes, a cache line |
-//! | pair | two grains that touch or may soon; one of them owns it |
-//! | batch | eight pairs that share no grain, solved at once |
-//! | touch | a grain beside a plane that it cannot move: ground, base, object |
-//! | impulse | what a contact changes of a velocity; kept from sub-step to sub-step |
+//! | row | the part of a grain that every sub-step reads and writes: one cache line |
+//! | slot | index of a grain in the heap's arrays; it changes from step to step, the identity (`id`) never does |
+//! | pair | two grains in contact or close to it; one of them owns the pair |
+//! | batch | eight pairs that share no grain, solved together |
+//! | collider | what grains cannot move: the floor, the base layer, the mesh of an object |
+//! | shell | a mesh as a collider |
+//! | touch | a contact between a grain and a collider, as a plane |
+//! | impulse | the change of velocity that a contact causes; kept from sub-step to sub-step |
 //! | push | a displacement that removes overlap and never becomes velocity |
-//! | block, column | 8 x 8 x 8 diameters; blocks one above the other, the unit of work |
-//! | colour | one of four sets of columns that share no grain |
-//! | anchor | where a grain was when its pairs were found |
-//! | rest | a grain that has lain still stops, and holds what lies on it, until something wakes it |
+//! | block, column | a cube of 8 x 8 x 8 diameters; the blocks above each other, the unit of work |
+//! | colour | one of four sets of columns; no two columns of a set share a grain |
+//! | anchor | the position of a grain that its pairs are found from, slightly ahead of the grain |
+//! | rest | a grain that has lain still stops and supports others like the ground, until something wakes it |
 
 mod claims;
 mod collide;
@@ -60,12 +63,12 @@ pub use params::Params;
 pub use sourcing::{Base, PACKING, Removal, removals};
 pub use surroundings::{Object, Surroundings};
 
-/// Where and when a grain was born.
+/// Where and when a grain was created.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
 struct Birth {
-    /// Its place then (m).
+    /// Position (m).
     rest: [f32; 3],
-    /// The frame that removed its snow.
+    /// Frame that removed its snow.
     frame: i32,
 }
 
@@ -74,37 +77,37 @@ struct Birth {
 pub struct Grains {
     params: Params,
     heap: Heap,
-    /// By identity.
+    /// Indexed by identity.
     births: Vec<Birth>,
     next_id: u32,
-    /// Grains that blocks of the base have paid for and not got: fractions, mostly.
+    /// Grains that the removed snow of a block of the base has paid for but that do not exist yet: mostly fractions.
     owed: BTreeMap<Origin, f64>,
-    /// What rest depends on as a whole, as it was in the last step: see [`Surroundings::ties`].
+    /// Settings of the last step whose change wakes all grains: see [`Surroundings::ties`].
     ties: [f64; TIES],
-    /// The boxes (m) of the meshes at the end of the last step.
+    /// Bounding boxes (m) of the meshes at the end of the last step.
     boxes: Vec<Bounds>,
 }
 
-/// What a step did.
+/// Results of a step.
 #[derive(Debug, Clone, PartialEq)]
 pub struct StepReport {
-    /// Grains now.
+    /// Count of grains after the step.
     pub count: usize,
-    /// Those that rest.
+    /// Count of those at rest.
     pub resting: usize,
-    /// Grains that were born.
+    /// Count of new grains.
     pub born: usize,
     /// Snow removed from the base (m3).
     pub removed_volume: f64,
-    /// Grains that removed snow has paid for and that are not born yet.
+    /// Grains that removed snow has paid for but that do not exist yet.
     pub owed: f64,
-    /// Grains that fell below the lowest height, left [`Params::keep_box`] or the range of coordinates.
+    /// Count of grains removed below the lowest height, outside [`Params::keep_box`] or beyond the range of coordinates.
     pub dropped: usize,
-    /// Grains that had lived for [`Params::lifetime`].
+    /// Count of grains that reached [`Params::lifetime`].
     pub expired: usize,
-    /// Grains that are pressed where they have no room: see [`Grains::trapped`].
+    /// Count of trapped grains: see [`Grains::trapped`].
     pub trapped: usize,
-    /// Sub-steps.
+    /// Count of sub-steps.
     pub sub_steps: usize,
     /// Largest speed (m/s).
     pub fastest: f32,
@@ -112,13 +115,14 @@ pub struct StepReport {
     pub phases: Vec<PhaseTime>,
 }
 
-/// Edge (diameters) of a voxel of [`Grains::points`], a power of two: it holds the few grains that readers of VDB Points like best.
+/// Edge (diameters) of a voxel of [`Grains::points`], a power of two: readers of VDB Points work best with a few points per
+/// voxel.
 const VOXEL: f32 = 2.0;
 
-/// Largest component (m/s) of the velocity of a grain that is emitted.
+/// Largest component (m/s) of the velocity of an emitted grain.
 pub const FASTEST: f32 = 10_000.0;
 
-/// Memory (bytes) of grains in a step, with the copy to which a failed step returns.
+/// Memory (bytes) of grains in a step, including the copy that a failed step restores.
 pub fn memory(grains: usize) -> u64 {
     (grains as u64).saturating_mul(760)
 }
@@ -135,40 +139,40 @@ impl Grains {
         Ok(Self { params, heap, births, next_id: 0, owed, ties: [0.0; TIES], boxes })
     }
 
-    /// Resumes from what [`Grains::save`] wrote.
+    /// Resumes from a state that [`Grains::save`] wrote.
     ///
     /// # Errors
-    /// A parameter out of range; bytes that are no such state.
+    /// A parameter out of range; bytes that are not a valid state.
     pub fn resume(params: Params, bytes: &[u8]) -> Result<Self> {
         let mut grains = Self::new(params)?;
         state::load(&mut grains, bytes)?;
         Ok(grains)
     }
 
-    /// Bytes that a saved state has once it is unpacked; 0 where it is none.
+    /// Unpacked size (bytes) of a saved state; 0 if it is invalid.
     pub fn unpacked(bytes: &[u8]) -> u64 {
         state::unpacked(bytes)
     }
 
-    /// The exact state as bytes, the same from any number of threads.
+    /// The exact state as bytes, the same for any number of threads.
     pub fn save(&self) -> Vec<u8> {
         state::save(self)
     }
 
-    /// How many there are.
+    /// Count of grains.
     pub fn count(&self) -> usize {
         self.heap.count()
     }
 
-    /// How they behave.
+    /// The current parameters.
     pub fn params(&self) -> &Params {
         &self.params
     }
 
-    /// How they behave from the next step on.
+    /// Sets the parameters from the next step on.
     ///
     /// # Errors
-    /// A parameter out of range, another radius; the old ones are then kept.
+    /// A parameter out of range, or a different radius; the old parameters are then kept.
     pub fn set_params(&mut self, params: Params) -> Result<()> {
         params.validate()?;
         if params.radius != self.params.radius {
@@ -179,11 +183,11 @@ impl Grains {
         Ok(())
     }
 
-    /// Adds loose grains at places (m) with velocities (m/s), at rest where there are none of these; `frame` is that of their
-    /// birth. Returns the identity of the first, those of the others follow. After a failure all is as it was.
+    /// Adds grains at positions (m) with velocities (m/s), or at rest if `velocities` is empty; `frame` is their frame of
+    /// birth. Returns the identity of the first; the others follow in order. On error nothing changes.
     ///
     /// # Errors
-    /// Too many grains; a place out of range; a velocity that is not finite or over [`FASTEST`].
+    /// Too many grains; a position out of range; a velocity that is not finite or over [`FASTEST`].
     pub fn emit(&mut self, places: &[DVec3], velocities: &[[f32; 3]], frame: i32) -> Result<u32> {
         if !velocities.is_empty() && velocities.len() != places.len() {
             let text =
@@ -211,7 +215,7 @@ impl Grains {
         Ok(first)
     }
 
-    /// Refuses more grains than there may be.
+    /// Fails if there would be more grains than allowed.
     fn room_for(&self, more: usize, frame: i32) -> Result<()> {
         let (count, most) = (self.heap.count() + more, self.params.most);
         if count > most || self.next_id as usize + more > contacts::MOST {
@@ -229,13 +233,13 @@ impl Grains {
         Ok(())
     }
 
-    /// How many rest.
+    /// Count of grains at rest.
     pub fn resting(&self) -> usize {
         self.heap.resting()
     }
 
-    /// Moves the grains from `from` to `to` (s), those born of the snow that this removed from the base among them. A step that
-    /// fails or is cancelled leaves them as they were.
+    /// Moves the grains from `from` to `to` (s), including new ones from the snow that this step removed from the base. A
+    /// step that fails or is cancelled leaves them unchanged.
     ///
     /// # Errors
     /// Too many grains; a pose that cannot be computed; cancel; memory.
@@ -297,7 +301,7 @@ impl Grains {
         }
     }
 
-    /// Grains where snow was removed; how many, and the snow's volume (m3).
+    /// Creates grains where snow was removed; returns their count and the volume of the snow (m3).
     fn source(
         &mut self,
         ctx: &Context,
@@ -320,7 +324,7 @@ impl Grains {
         Ok((places.len(), removals.iter().map(|removal| removal.volume).sum()))
     }
 
-    /// What the grains cannot move; all of them wake where a mesh is not where it was.
+    /// The colliders of the step; wakes all grains if a mesh has jumped since the last step.
     fn obstacles<'a>(&mut self, around: &Surroundings<'a>, times: [f64; 2]) -> Result<Obstacles<'a>> {
         let obstacles = around.obstacles(&self.params, &self.heap.bounds(), times)?;
         let [first, last] = &obstacles.boxes;
@@ -331,13 +335,13 @@ impl Grains {
         Ok(obstacles)
     }
 
-    /// Takes away grains that are too old (how many is returned), too low, or out of the box.
+    /// Removes grains that are too old, too low or outside the box; returns the count of those that are too old.
     fn limit(&mut self, lowest: f64, dt: f64, frame: i32) -> usize {
         let Params { lifetime, keep_box, .. } = self.params;
         let all = self.heap.count();
         if let Some(lifetime) = lifetime {
             let births = &self.births;
-            // A grain that lives for a whole number of frames is not to outlive them by rounding.
+            // Rounding must not add a frame to a lifetime of a whole number of frames.
             let age =
                 |id: u32| (f64::from(frame) - f64::from(births[id as usize].frame)) * dt * (1.0 + 1.0e-9);
             self.heap.retain(|id, _| age(id) < lifetime);
@@ -349,7 +353,7 @@ impl Grains {
         expired
     }
 
-    /// Wakes the grains within a grain and a cell of blocks of the base (m a cell) that have lost snow.
+    /// Wakes the grains within a diameter and a cell of the blocks of the base that lost snow; a cell is `cell` m wide.
     fn wake_near(&mut self, removals: &[Removal], cell: f64) {
         let changed: HashSet<Origin> = removals.iter().map(|removal| removal.origin).collect();
         let reach = 1.0 + self.heap.diameter / cell;
@@ -364,7 +368,7 @@ impl Grains {
         });
     }
 
-    /// Places (m), in the order in which [`Grains::points`] has the grains, as all that follows.
+    /// Positions (m), in the order of [`Grains::points`], like all that follow.
     pub fn places(&self) -> impl Iterator<Item = DVec3> + '_ {
         self.heap.places()
     }
@@ -374,17 +378,17 @@ impl Grains {
         self.heap.velocities()
     }
 
-    /// Identities, counted from 0 in the order of birth: a grain keeps its own, and no other ever has it.
+    /// Identities, counted from 0 in order of birth; they never change and are never reused.
     pub fn ids(&self) -> &[u32] {
         self.heap.ids()
     }
 
-    /// The frame of each one's birth.
+    /// Frame of birth of each grain.
     pub fn source_frames(&self) -> impl Iterator<Item = i32> + '_ {
         self.births().map(|birth| birth.frame)
     }
 
-    /// The place of each one's birth (m).
+    /// Position of birth of each grain (m).
     pub fn rests(&self) -> impl Iterator<Item = [f32; 3]> + '_ {
         self.births().map(|birth| birth.rest)
     }
@@ -394,8 +398,9 @@ impl Grains {
         self.heap.awake()
     }
 
-    /// Identities of the grains that the last step left no room, ascending: each is deeper than a tenth of its diameter in a
-    /// surface, and has no place outside of all surfaces within a diameter and a half, such as between a sole and the base.
+    /// Identities of the grains that the last step could not move out of a surface, ascending: each is deeper than a tenth of
+    /// its diameter in a surface and has no position outside all surfaces within a diameter and a half, as between a sole and
+    /// the base.
     pub fn trapped(&self) -> &[u32] {
         self.heap.trapped()
     }
@@ -409,12 +414,12 @@ impl Grains {
         self.heap.ids().iter().map(|id| self.trapped().binary_search(id).is_ok())
     }
 
-    /// The grains as points: `v` (m/s), `id`, `active` (not where it rests), `trapped` (where it has no room), `pscale` (radius, m),
-    /// `source_frame` and `rest` (place of birth, m).
+    /// The grains as points: `v` (m/s), `id`, `active` (false at rest), `trapped`, `pscale` (radius, m), `source_frame` and
+    /// `rest` (position of birth, m).
     pub fn points(&self) -> Points {
         let (mut cells, mut offsets) = (Vec::new(), Vec::new());
         for (at, place) in self.heap.located() {
-            // Offsets reach half a voxel around its centre.
+            // An offset is relative to the centre of its voxel, at most half a voxel.
             let place = place.map(|x| x / VOXEL);
             let voxel = place.map(|x| (x + 0.5).floor());
             cells.push([0, 1, 2].map(|axis| at[axis] * (layout::EDGE / VOXEL) as i32 + voxel[axis] as i32));

@@ -1,41 +1,41 @@
-//! Triangles of a mesh near a block of grains. Eight at a time are measured in single precision, about the middle of the block,
-//! which leaves out all but one or two of them; those are compared as [`Shell::nearest`] compares them, so that the result is the
-//! same.
+//! Triangles of a mesh near a block of grains. A single-precision test of eight triangles at a time, relative to the middle of
+//! the block, rejects all but one or two of them; [`Shell::compare`] decides between the rest, so that the result is that of
+//! [`Shell::nearest`].
 
 use super::shell::{Best, Nearest, Shell};
 use crate::base::DVec3;
 use crate::base::cpu::dispatch;
 use crate::base::lanes::{LANES, Lanes};
 
-/// Leaves of a mesh near some places.
+/// The leaves of a mesh near some positions.
 #[derive(Default)]
 pub struct Nearby {
     which: Vec<u32>,
     boxes: Vec<Boxes>,
-    /// Their triangles, once they have been asked for.
+    /// Their triangles, once queried.
     triangles: Vec<Option<Triangles>>,
-    /// Those whose boxes the place that was asked for last may reach, and the squares of their distances (m2).
+    /// Leaves in reach of the last query, and the squares of the distances to their boxes (m2).
     reached: Vec<(u32, f32)>,
-    /// The box of the places, and how far from them surfaces are known (m).
+    /// Bounding box of the positions, and the distance from them within which surfaces are known (m).
     places: [DVec3; 2],
     far: f64,
-    /// Where the boxes matter (m).
+    /// The boxes are clamped to this one (m).
     within: [DVec3; 2],
     middle: DVec3,
 }
 
-/// Boxes of eight leaves.
+/// The boxes of eight leaves.
 #[derive(Clone, Copy)]
 struct Boxes {
-    /// As far as they matter, about the middle (m): least and greatest along each axis. A little too large, so that rounding leaves no
-    /// triangle out. Those that are left over lie far away.
+    /// Clamped, relative to the middle (m): least and greatest along each axis. Slightly enlarged, so that rounding rejects
+    /// no triangle. Unused lanes lie far away.
     sides: [[Lanes; 2]; 3],
-    /// Longest way of a vertex in the sub-step (m).
+    /// Largest displacement of a vertex in the sub-step (m).
     ways: Lanes,
 }
 
 impl Nearby {
-    /// Takes the leaves of a mesh that may be within a distance (m), and their way, of places in a box.
+    /// Collects the leaves of a mesh that may be within a distance (m), plus their displacement, of positions in a box.
     pub fn find(&mut self, shell: &Shell, [low, high]: &[DVec3; 2], within: f64) {
         let room = DVec3::repeat(within + shell.way());
         let bounds = [low - room, high + room];
@@ -65,8 +65,8 @@ impl Nearby {
         }
     }
 
-    /// The nearest point of the mesh within a distance (m), and where it moves, within that and its way. Beyond what it knows it
-    /// asks the whole mesh.
+    /// The nearest point of the mesh within a distance (m) plus its displacement in the sub-step. Queries the whole mesh
+    /// outside the range of [`Nearby::find`].
     pub fn nearest(&mut self, shell: &Shell, place: DVec3, within: f64) -> Option<Nearest> {
         let [low, high] = &self.places;
         if within > self.far || !(*low <= place && place <= *high) {
@@ -94,21 +94,21 @@ impl Nearby {
     }
 }
 
-/// Relative error of a distance in single precision, with room to spare; of the largest of the numbers that it is made of.
+/// Error bound of a distance in single precision, relative to the largest number that it is computed from.
 const ROUNDING: f64 = 4.0e-6;
 
-/// Eight triangles about a place (m). Lanes that are left over lie far away.
+/// Eight triangles relative to the middle (m). Unused lanes lie far away.
 struct Triangles {
     corner: [Lanes; 3],
-    /// From that corner to the others.
+    /// The edges from that corner.
     sides: [[Lanes; 3]; 2],
-    /// 1 over the squares of the lengths of the sides, and of the third one.
+    /// 1 over the squared lengths of these edges and of the third one.
     inverse: [Lanes; 3],
-    /// Product with a place gives the weights of the other corners, in the triangle's plane.
+    /// The dot product with a position in the triangle's plane is the barycentric weight of the edge's end.
     weights: [[Lanes; 3]; 2],
-    /// Of length 1.
+    /// Of unit length.
     normal: [Lanes; 3],
-    /// How far (m) a distance may be off.
+    /// Error bound of a distance (m).
     error: f64,
 }
 
@@ -130,7 +130,7 @@ impl Triangles {
         out
     }
 
-    /// Compares those within a reach (m) that may be nearer than the best one so far.
+    /// Compares the triangles within a reach (m) that may be nearer than the best so far.
     #[inline]
     fn compare(
         &self,
@@ -148,7 +148,7 @@ impl Triangles {
         };
         let mut left = near(best);
         while left != 0 {
-            // The nearest one first leaves out most of the others.
+            // Starting with the nearest rejects most others.
             let mut lane = left.trailing_zeros() as usize;
             let mut others = left & (left - 1);
             while others != 0 {
@@ -162,7 +162,7 @@ impl Triangles {
     }
 }
 
-/// Where lanes without a triangle are (m): their squares are still finite.
+/// Position of lanes without a triangle (m): small enough that its square is finite.
 const FAR: f32 = 1.0e9;
 
 fn prepared(corners: &[[Lanes; 3]; 3]) -> Triangles {
@@ -176,10 +176,10 @@ fn prepare([a, b, c]: &[[Lanes; 3]; 3]) -> Triangles {
     let (d00, d01, d11) = (dot(&ab, &ab), dot(&ab, &ac), dot(&ac, &ac));
     let across = cross(&ab, &ac);
     let square = dot(&across, &across);
-    // A triangle without an area has no weights: NaN is never inside.
+    // A triangle without area has weights of NaN, so no point is inside it.
     let inverse = one / square;
     let length = one / square.sqrt();
-    // A side without a length begins where it ends.
+    // An edge of length 0 counts as a point.
     let tiny = Lanes::all(f32::MIN_POSITIVE);
     Triangles {
         corner: *a,
@@ -195,7 +195,7 @@ fn squares(triangles: &Triangles, place: [f32; 3]) -> Lanes {
     dispatch!(squares_of(triangles: &Triangles, place: [f32; 3]) -> Lanes)
 }
 
-/// Squares of the distances (m2) of triangles from a place.
+/// Squared distances (m2) of triangles from a position.
 #[inline(always)]
 fn squares_of(triangles: &Triangles, place: [f32; 3]) -> Lanes {
     let Triangles { corner, sides: [ab, ac], inverse, weights, normal, .. } = triangles;
@@ -211,7 +211,7 @@ fn squares_of(triangles: &Triangles, place: [f32; 3]) -> Lanes {
     is_inside.choose(height * height, outside)
 }
 
-/// Product with a place, from the corner that all sides begin at, gives the weight of the end of a side.
+/// The dot product of the result with a position, relative to the common corner, is the weight of the end of `side`.
 #[inline(always)]
 fn weight(
     side: &[Lanes; 3],
@@ -227,7 +227,7 @@ fn weight(
     ]
 }
 
-/// Squares of the distances (m2) of sides from places, which are given from where the sides begin.
+/// Squared distances (m2) of edges from positions relative to the start of each edge.
 #[inline(always)]
 fn side(place: &[Lanes; 3], side: &[Lanes; 3], inverse: Lanes) -> Lanes {
     let along = (dot(place, side) * inverse).max(Lanes::all(0.0)).min(Lanes::all(1.0));
@@ -254,7 +254,7 @@ fn reach(boxes: &[Boxes], place: [f32; 3], within: f32, out: &mut Vec<(u32, f32)
     dispatch!(reach_of(boxes: &[Boxes], place: [f32; 3], within: f32, out: &mut Vec<(u32, f32)>))
 }
 
-/// The boxes within a distance (m), and their way, of a place, with the squares of their distances (m2).
+/// The boxes within a distance (m), plus their displacement, of a position, with the squares of their distances (m2).
 #[inline(always)]
 fn reach_of(boxes: &[Boxes], place: [f32; 3], within: f32, out: &mut Vec<(u32, f32)>) {
     out.clear();
@@ -280,7 +280,7 @@ fn reach_of(boxes: &[Boxes], place: [f32; 3], within: f32, out: &mut Vec<(u32, f
 mod tests {
     use super::*;
 
-    /// Triangles of all shapes about the origin: slivers, some without an area, and one that is far larger than the others.
+    /// Triangles of all shapes about the origin: slivers, some without area, and one that is far larger than the others.
     fn shell(random: &mut impl FnMut() -> f64) -> Shell {
         let mut places = Vec::new();
         for index in 0..90 {

@@ -1,4 +1,4 @@
-//! What grains are made of and how they move.
+//! Parameters of grains.
 
 use super::density;
 use super::heap::Division;
@@ -13,46 +13,47 @@ use crate::snow::grain_friction;
 pub struct Params {
     /// Radius of a grain (m), 1e-5..=1 (thesis table 3.1: a third of a cell).
     pub radius: f64,
-    /// Compression ratio r_c (thesis section 3.3.2), 0..=1: the share of removed snow that becomes no grains.
+    /// Compression ratio r_c (thesis section 3.3.2), 0..=1: the share of removed snow that does not become grains.
     pub compression: f64,
     /// Friction between grains, 0..=1: see [`grain_friction`].
     pub friction: f64,
-    /// Greatest attraction between two grains that all but touch, in weights of a grain, 0..=1000.
+    /// Largest attraction between two grains that almost touch, in weights of a grain, 0..=1000.
     pub attraction: f64,
-    /// Share of their speed with which grains bounce off each other and off what they hit, 0..=1.
+    /// Share of the speed that grains keep when they bounce off each other or off a collider, 0..=1.
     pub restitution: f64,
-    /// Velocity kept in a second (beta, thesis section 3.3.1), 0..=1.
+    /// Share of the velocity that a grain keeps in a second (beta, thesis section 3.3.1), 0..=1.
     pub air: f64,
-    /// Whether a grain among others feels less of the air (thesis section 3.8): as much as it lacks of six neighbours.
+    /// Whether grains with neighbours feel less drag (thesis section 3.8): in proportion to how many of six neighbours are
+    /// missing.
     pub air_by_density: bool,
     /// Gravity along y (m/s2), -1000..=1000; downward is negative.
     pub gravity: f64,
     /// Whether grains that lie still come to rest.
     pub rests: bool,
-    /// Distance (m) from objects and fast grains beyond which slow grains rest at once (thesis section 3.3.3), 1e-5..=1e5; none:
-    /// they lie still first, wherever they are. It has no effect where they do not come to rest.
+    /// Distance (m) from objects and fast grains beyond which slow grains rest at once (thesis section 3.3.3), 1e-5..=1e5;
+    /// none: all grains lie still first. No effect if `rests` is false.
     pub active_distance: Option<f64>,
-    /// Sub-steps in a step; none: by the rule of [`Params::sub_steps`].
+    /// Count of sub-steps in a step; none: the rule of [`Params::sub_steps`].
     pub sub_steps: Option<u32>,
-    /// Seconds after whose frames a grain is taken away; none: it stays.
+    /// Age (s) at which a grain is removed, at the end of a frame; none: never.
     pub lifetime: Option<f64>,
-    /// Least and greatest place (m) of a box outside of which grains are taken away; none: they stay.
+    /// Least and greatest corner (m) of a box; grains outside are removed; none: no box.
     pub keep_box: Option<[DVec3; 2]>,
     /// Most grains; more are an error.
     pub most: usize,
-    /// Another one scatters grains otherwise.
+    /// Seed of the positions of new grains.
     pub seed: u64,
 }
 
-/// Greatest g dt^2 / d of a sub-step: grains fall by this part of their diameter.
+/// Largest g dt^2 / d of a sub-step: a grain at rest falls by this part of its diameter.
 const FALL: f64 = 0.02;
-/// Farthest that an object moves in a sub-step (diameters).
+/// Largest displacement of an object in a sub-step (diameters).
 const WAY: f64 = 2.0;
-/// Most times that fast objects raise the number of sub-steps.
+/// Fast objects multiply the count of sub-steps by at most this.
 const MOST_OF_FALL: usize = 8;
 
 impl Params {
-    /// The thesis' look for a layer's cells (m): a radius of a third of a cell.
+    /// The look of the thesis for a layer with cells of `cell` m: the radius is a third of a cell.
     pub fn for_cell(cell: f64) -> Self {
         Self {
             radius: cell / 3.0,
@@ -111,9 +112,9 @@ impl Params {
         Ok(())
     }
 
-    /// Sub-steps of a step of `dt` (s) in which objects move at most so far (m): so many that grains fall by at most 0.02 of
-    /// their diameter in each, which keeps deep heaps dense, and that objects move by at most two diameters, as long as that
-    /// takes no more than eight times as many.
+    /// Count of sub-steps in a step of `dt` (s) in which objects move by at most `way` (m). A grain falls by at most 0.02 of
+    /// its diameter in a sub-step, which keeps deep heaps dense; an object moves by at most two diameters, unless that needs
+    /// more than eight times as many sub-steps.
     pub fn sub_steps(&self, dt: f64, way: f64) -> usize {
         if let Some(count) = self.sub_steps {
             return count as usize;
@@ -124,12 +125,12 @@ impl Params {
         of_way.clamp(of_fall, of_fall.saturating_mul(MOST_OF_FALL))
     }
 
-    /// Friction against the base layer, which is snow too: grains lie on it up to their own angle of repose.
+    /// Friction against the base layer. The base is snow too: grains stay on it up to their own angle of repose.
     pub fn friction_of_base(&self) -> f64 {
         libm::tan(grain_friction::repose_of(self.friction, self.attraction > 0.0).to_radians())
     }
 
-    /// What a sub-step of a divided step needs.
+    /// Constants of a sub-step.
     #[doc(hidden)]
     pub fn coefficients(&self, division: &Division) -> Coefficients {
         let dt = division.dt / division.sub_steps as f64;
@@ -153,7 +154,7 @@ impl Params {
     }
 }
 
-/// Least speed that bounces: what so many sub-steps of gravity add.
+/// Least speed that bounces, in sub-steps of gravity.
 const BOUNCING: f64 = 4.0;
-/// Gap (diameters) up to which grains attract each other.
+/// Largest gap (diameters) at which grains attract each other.
 const BAND: f32 = 0.05;

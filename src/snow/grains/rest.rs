@@ -1,34 +1,36 @@
-//! Rest (thesis section 3.3.3) as a part of the model: a grain that has stayed within a small part of its diameter for a while
-//! stops, and holds what lies on it like the ground. The while is longer where nothing below supports it, but friction from the
-//! sides, say; without gravity such a grain floats and never rests. It wakes when a neighbour that moves touches it,
-//! when a surface that moves does, and when the base layer near it changes; gravity, a material, and an object that comes, goes
-//! or jumps wake all. What rests next to nothing that is awake need not be visited: that is only speed.
+//! Rest (thesis section 3.3.3) as part of the model: a grain that has stayed within a small part of its diameter for a while
+//! stops and supports others like the ground. It takes longer if nothing supports it from below, only friction from the
+//! sides, say; without gravity, such a grain floats and never rests. A resting grain wakes when a moving neighbour or a
+//! moving surface touches it, and when the base layer near it changes; a change of gravity or material, or an object that
+//! comes, goes or jumps, wakes all. Resting grains with no neighbour awake are skipped: that only saves time and never
+//! changes the result.
 
 use super::rows::{Row, SUPPORTED, dot, sub};
 
-/// How far (diameters) a grain goes before it counts as moving.
+/// Displacement (diameters) beyond which a grain counts as moving.
 const WAY: f32 = 0.01;
-/// Gap (diameters) across which a moving grain wakes another.
+/// Largest gap (diameters) at which a moving grain wakes another.
 pub const NEAR: f32 = 0.1;
-/// In `still`: the grain has just woken.
+/// Value of `still`: the grain has just woken.
 const JUST_WOKEN: f32 = f32::MAX;
-/// In `marks`: something wakes the grain.
+/// Added to `marks`: something wakes the grain.
 pub const WOKEN: f32 = 2.0;
-/// How long a grain lies still before it rests, in usual sub-steps, sqrt(0.02 d / g): grains of every size rest alike.
+/// Time without motion before a grain rests, in standard sub-steps of sqrt(0.02 d / g), so that grains of every size rest
+/// alike.
 const PATIENCE: f64 = 64.0;
-/// How many times as long where nothing supports it.
+/// The same for an unsupported grain, as a multiple.
 const HELD: f32 = 4.0;
-/// How long a grain that has come so far counts as moving, in the same unit.
+/// Time for which a grain that has moved counts as moving, in the same unit.
 const MOVING: f64 = 16.0;
 
-/// When grains rest.
+/// When grains come to rest.
 #[derive(Debug, Clone, Copy)]
 pub struct Rest {
-    /// Sub-steps that a grain lies still before it rests.
+    /// Sub-steps without motion before a grain rests.
     pub patience: f32,
-    /// The same where nothing supports it.
+    /// The same for an unsupported grain.
     pub long_patience: f32,
-    /// Sub-steps that a grain that has moved counts as moving.
+    /// Sub-steps for which a grain that has moved counts as moving.
     pub moving: f32,
 }
 
@@ -44,7 +46,7 @@ impl Rest {
     }
 }
 
-/// What becomes of a grain at the end of a sub-step; without a rule it never rests.
+/// Updates the state of a grain at the end of a sub-step; without a rule, grains never rest.
 pub fn judge(row: &mut Row, rule: Option<Rest>) {
     let (is_woken, is_supported) = (row.marks >= WOKEN, row.marks == 1.0 || row.marks == WOKEN + 1.0);
     (row.push, row.marks) = ([0.0; 3], 0.0);
@@ -69,17 +71,17 @@ pub fn judge(row: &mut Row, rule: Option<Rest>) {
     }
 }
 
-/// Puts a grain to rest: it stops, and holds what lies on it.
+/// Puts a grain to rest: it stops and supports others.
 pub fn stop(row: &mut Row) {
     (row.hold, row.velocity) = (SUPPORTED, [0.0; 3]);
 }
 
-/// Whether something has woken a grain, or begun its wait again, since the last sub-step.
+/// Whether a grain was woken, or its waiting time restarted, since the last sub-step.
 pub fn has_just_woken(row: &Row) -> bool {
     row.still == JUST_WOKEN
 }
 
-/// Wakes a grain, which does not count as moving before it has moved.
+/// Wakes a grain; it does not count as moving until it has moved.
 pub fn wake(row: &mut Row) {
     if row.rests() {
         row.hold = 1.0 + SUPPORTED;
@@ -87,7 +89,7 @@ pub fn wake(row: &mut Row) {
     }
 }
 
-/// How long the grain has lain still no longer counts.
+/// Restarts the time that the grain must lie still.
 pub fn begin_again(row: &mut Row) {
     (row.since, row.still) = (row.place, JUST_WOKEN);
 }

@@ -7,33 +7,33 @@ use crate::base::lanes::{LANES, Lanes};
 /// Three components.
 pub type V = [f32; 3];
 
-/// A grain while it is stepped.
+/// A grain during a step.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
 #[repr(C, align(64))]
 pub struct Row {
-    /// Place within its block (diameters), from the block's least corner.
+    /// Position within its block (diameters), relative to the block's least corner.
     pub place: V,
-    /// Inverse mass, 1 or 0 while it rests, and 2 more where a chain of contacts led down to something fixed in the last sub-step.
+    /// Inverse mass (1, or 0 at rest), plus 2 if a chain of contacts led down to something fixed in the last sub-step.
     pub hold: f32,
     /// Velocity (m/s).
     pub velocity: V,
-    /// Sub-steps since it was at `since` or woke.
+    /// Sub-steps since it was at `since`; a special value if it has just woken.
     pub still: f32,
-    /// Displacement (diameters) of this sub-step that removes overlap and never becomes velocity.
+    /// Displacement (diameters) in this sub-step that removes overlap and never becomes velocity.
     pub push: V,
-    /// What contacts found in this sub-step: 1 where it is supported, 2 more where something wakes it.
+    /// Result of the contacts of this sub-step: 1 if supported, plus 2 if something wakes it.
     pub marks: f32,
-    /// The place that it must leave to count as moving (diameters, as `place`).
+    /// Reference position: the grain counts as moving once it is too far from it (diameters, like `place`).
     pub since: V,
-    /// How far (diameters) meshes may travel in a step before one can touch it.
+    /// Distance (diameters) that meshes may travel from the start of the step before one can touch it.
     pub limit: f32,
 }
 
-/// In `hold` and `marks`: supported.
+/// Added to `hold`: supported.
 pub const SUPPORTED: f32 = 2.0;
 
 impl Row {
-    /// Inverse mass: 1, or 0 while it rests.
+    /// Inverse mass: 1, or 0 at rest.
     #[inline(always)]
     pub fn weight(&self) -> f32 {
         if self.is_supported() { self.hold - SUPPORTED } else { self.hold }
@@ -52,7 +52,7 @@ impl Row {
     }
 }
 
-/// The four numbers of a row that begin with its place, velocity or push.
+/// Four consecutive numbers of a row, starting with the position, velocity or push.
 #[derive(Clone, Copy)]
 pub enum Part {
     /// `place` and `hold`.
@@ -63,7 +63,7 @@ pub enum Part {
     Push = 8,
 }
 
-/// A slice whose elements tasks change at the same time, each its own.
+/// A slice that tasks change concurrently, each its own elements.
 pub struct Shared<'a, T> {
     first: *mut T,
     count: usize,
@@ -89,7 +89,7 @@ impl<'a, T> Shared<'a, T> {
         Self { first: slice.as_mut_ptr(), count: slice.len(), borrowed: PhantomData }
     }
 
-    /// An element to change.
+    /// Mutable access to an element.
     ///
     /// # Safety
     /// No other reference to this element may be in use.
@@ -103,7 +103,7 @@ impl<'a, T> Shared<'a, T> {
 }
 
 impl Shared<'_, Row> {
-    /// Where a part of a row is.
+    /// Address of a part of a row.
     ///
     /// # Safety
     /// The row exists.
@@ -113,7 +113,7 @@ impl Shared<'_, Row> {
         unsafe { self.first.cast::<f32>().add(row as usize * 16 + part as usize) }
     }
 
-    /// Asks for eight rows to be brought near: most of a sweep's time would be spent waiting for them.
+    /// Prefetches eight rows: a sweep would otherwise spend most of its time waiting for them.
     #[inline(always)]
     pub fn prefetch(&self, rows: &[u32; LANES]) {
         #[cfg(target_arch = "x86_64")]
@@ -124,7 +124,7 @@ impl Shared<'_, Row> {
         }
     }
 
-    /// One part of eight rows, component by component.
+    /// One part of eight rows, by component.
     ///
     /// # Safety
     /// The rows exist, and nothing else changes them meanwhile.
@@ -157,7 +157,7 @@ impl Shared<'_, Row> {
         out
     }
 
-    /// Writes back what [`Shared::gather`] read. Where two of the rows are the same, so are their values.
+    /// Writes back what [`Shared::gather`] read. Lanes with the same row must hold the same values.
     ///
     /// # Safety
     /// The rows exist, and nothing else uses them meanwhile.

@@ -1,9 +1,9 @@
-//! A mesh that moves during the step as a collider: the nearest point of its triangles, as they are in this sub-step.
+//! A mesh, moving or not, as a collider: the nearest point of its triangles at the current sub-step.
 //!
-//! A signed distance grid of a deforming mesh would have to be made for each of dozens of sub-steps; the triangles need only
-//! have their boxes fitted again, and give the surface's own velocity, however thin the mesh is. A plane that moves with the
-//! nearest point holds a grain on its side of the surface; inside and outside are told by the orientation of the nearest
-//! triangle, and not at all for wide open meshes, whose both sides collide.
+//! A signed distance grid of a deforming mesh would have to be rebuilt in each of dozens of sub-steps; triangles only need
+//! their bounding boxes refitted, and give the velocity of the surface however thin the mesh is. A plane that moves with the
+//! nearest point keeps a grain on its side of the surface. The orientation of the nearest triangle decides between inside and
+//! outside, except for wide open meshes, which collide on both sides.
 
 use rayon::prelude::*;
 
@@ -15,41 +15,41 @@ use crate::base::lanes::LANES;
 /// Triangles in a leaf of the tree: as many as are compared at once.
 const LEAF: usize = LANES;
 
-/// A mesh in motion as a collider.
+/// A mesh as a collider.
 pub struct Shell {
-    /// Which collider it is; a step counts its own.
+    /// Collider index, set by the step.
     pub collider: u32,
     /// Friction against it.
     pub friction: f32,
-    /// With which it holds grains that touch it (weights of a grain).
+    /// Acceleration up to which it holds grains that touch it (weights of a grain).
     pub stick: f32,
     triangles: Vec<[u32; 3]>,
-    /// Whether inside and outside are told apart.
+    /// Whether it has an inside.
     closed: bool,
     now: Vec<DVec3>,
     next: Vec<DVec3>,
-    /// Boxes of a complete binary tree over leaves of triangles, the root first.
+    /// Bounding boxes of a complete binary tree over leaves of triangles, root first.
     boxes: Vec<[DVec3; 2]>,
-    /// Longest way of a vertex in the sub-step (m), of each box.
+    /// Largest displacement of a vertex in the sub-step (m), for each box.
     ways: Vec<f64>,
     leaves: usize,
-    /// Longest way of a vertex in the sub-step (m).
+    /// Largest displacement of a vertex in the sub-step (m).
     way: f64,
 }
 
-/// Least distance (m) at which a place lies to one side of its nearest point.
+/// Below this distance (m) from its nearest point, a position takes the triangle's normal as the outward direction.
 const LEAST: f64 = 1.0e-9;
-/// How far the surface is looked for where a depth in it is asked for (radii of the ball).
+/// Search distance for the surface when a depth is queried (radii of the ball).
 pub const DEPTHS: f64 = 3.0;
 
-/// A point of the surface.
+/// The point of the surface nearest to a position.
 pub struct Nearest {
     /// Square of its distance (m2).
     pub square: f64,
     point: DVec3,
-    /// Where it goes in the sub-step (m).
+    /// Its displacement in the sub-step (m).
     pub motion: DVec3,
-    /// Height over the plane of its triangle.
+    /// Height of the position above the plane of its triangle.
     height: f64,
     normal: DVec3,
 }
@@ -68,24 +68,24 @@ impl Shell {
         shell
     }
 
-    /// One that does not move, to measure distances from.
+    /// A mesh that does not move, for distance queries.
     pub fn at_rest(triangles: Vec<[u32; 3]>, pose: Vec<DVec3>) -> Self {
         let mut shell = Self::new(0.0, triangles, false, pose.clone());
         shell.follow(&pose);
         shell
     }
 
-    /// Distance (m) of a place from the surface, where it is within another.
+    /// Distance (m) of a position from the surface; none if it is over `within`.
     pub fn distance(&self, place: DVec3, within: f64) -> Option<f64> {
         self.nearest(place, within).map(|found| found.square.sqrt())
     }
 
-    /// With a surface that holds grains that touch it (weights of a grain).
+    /// Sets the acceleration up to which the surface holds grains (weights of a grain).
     pub fn with_stick(self, stick: f32) -> Self {
         Self { stick, ..self }
     }
 
-    /// Sorts triangles along a curve, so that those of a leaf are near each other.
+    /// Sorts triangles along a Z-order curve, so that those of a leaf are close together.
     fn sort(&mut self) {
         let spread = |x: u64| (0..16).fold(0u64, |out, bit| out | (x >> bit & 1) << (3 * bit));
         let (mut low, mut high) = (DVec3::repeat(f64::INFINITY), DVec3::repeat(f64::NEG_INFINITY));
@@ -101,7 +101,7 @@ impl Shell {
         });
     }
 
-    /// Moves on: what was next is now. `pose` is the next one.
+    /// Advances to the next sub-step: the next pose becomes the current one, and `pose` the next.
     pub fn follow(&mut self, pose: &[DVec3]) {
         std::mem::swap(&mut self.now, &mut self.next);
         self.next.clear();
@@ -132,17 +132,17 @@ impl Shell {
         }
     }
 
-    /// Longest way of a vertex in the sub-step (m).
+    /// Largest displacement of a vertex in the sub-step (m).
     pub fn way(&self) -> f64 {
         self.way
     }
 
-    /// Ways of the vertices in the sub-step (m).
+    /// Displacements of the vertices in the sub-step (m).
     pub fn ways(&self) -> impl Iterator<Item = DVec3> + '_ {
         self.now.iter().zip(&self.next).map(|(now, next)| next - now)
     }
 
-    /// The plane of a nearest point for the grain of a slot.
+    /// The touch of the grain in a slot with the plane through a nearest point.
     pub fn touch(
         &self,
         slot: u32,
@@ -168,7 +168,7 @@ impl Shell {
         }
     }
 
-    /// Distance (m) of a place from its nearest point, whether it is inside, and the direction out.
+    /// Distance (m) of a position from its nearest point, whether it is inside, and the outward direction.
     fn side(&self, place: DVec3, nearest: &Nearest) -> (f64, bool, DVec3) {
         let distance = nearest.square.sqrt();
         let inside = self.closed && nearest.height < 0.0;
@@ -180,13 +180,13 @@ impl Shell {
         (distance, inside, out)
     }
 
-    /// How far (m) a ball of a radius (m) must go to be out of the mesh, and whereto; nothing where it touches no surface within
-    /// three radii. Where the mesh is told to be at rest.
+    /// Distance (m) and direction in which a ball of a radius (m) must move to leave the mesh; none if it does not overlap
+    /// the mesh or no surface lies within three radii. The mesh must be at rest.
     pub fn depth(&self, place: DVec3, radius: f64) -> Option<(f64, DVec3)> {
         self.depth_beside(place, radius, self.nearest(place, DEPTHS * radius))
     }
 
-    /// The same where the nearest point within [`DEPTHS`] radii is known.
+    /// The same if the nearest point within [`DEPTHS`] radii is known.
     pub fn depth_beside(&self, place: DVec3, radius: f64, nearest: Option<Nearest>) -> Option<(f64, DVec3)> {
         let nearest = nearest?;
         let (distance, inside, out) = self.side(place, &nearest);
@@ -194,7 +194,7 @@ impl Shell {
         (depth > 0.0).then_some((depth, out))
     }
 
-    /// The nearest point of the surface within a distance (m), and where it moves, within that and its way.
+    /// The nearest point of the surface within a distance (m) plus its displacement in the sub-step.
     pub fn nearest(&self, place: DVec3, within: f64) -> Option<Nearest> {
         let apart = |bounds: &[DVec3; 2]| {
             let outside = (bounds[0] - place).sup(&(place - bounds[1])).sup(&DVec3::zeros());
@@ -222,7 +222,7 @@ impl Shell {
         best.found.map(|found| self.resolve(found, place))
     }
 
-    /// Compares the triangles of a leaf with the best one so far, or with the square of a reach (m2).
+    /// Compares the triangles of a leaf with the best so far and with the square of a reach (m2).
     fn compare_all(&self, leaf: usize, place: DVec3, reach: f64, best: &mut Best) {
         let first = leaf * LEAF;
         for index in first..(first + LEAF).min(self.triangles.len()) {
@@ -230,7 +230,7 @@ impl Shell {
         }
     }
 
-    /// Compares a triangle with the best one so far, or with the square of a reach (m2).
+    /// Compares a triangle with the best so far and with the square of a reach (m2).
     pub(super) fn compare(&self, index: usize, place: DVec3, reach: f64, best: &mut Best) {
         let [a, b, c] = self.corners(index);
         let weights = nearest_weights(place, a, b, c);
@@ -242,7 +242,7 @@ impl Shell {
             Some(other) => {
                 let tie = 1.0e-9 * (square + other.square);
                 let over = |triangle: usize| self.plane(triangle, place).0.abs();
-                // At an edge or corner that triangles share, the one that the point is highest over tells its side.
+                // At a shared edge or vertex, the triangle whose plane is farthest from the position decides its side.
                 square < other.square - tie
                     || square <= other.square + tie
                         && *height.insert(over(index))
@@ -255,7 +255,8 @@ impl Shell {
         }
     }
 
-    /// Visits the leaves that may be within a distance (m), and their way, of places in a box: each with its box and way (m).
+    /// Visits the leaves that may be within a distance (m), plus their displacement, of positions in a box: each with its box
+    /// and displacement (m).
     pub(super) fn for_each_leaf(
         &self,
         [low, high]: &[DVec3; 2],
@@ -281,7 +282,7 @@ impl Shell {
         }
     }
 
-    /// The corners of the triangles of a leaf.
+    /// Corners of the triangles of a leaf.
     pub(super) fn leaf_corners(&self, leaf: u32) -> impl Iterator<Item = [DVec3; 3]> + '_ {
         let first = leaf as usize * LEAF;
         (first..(first + LEAF).min(self.triangles.len())).map(|index| self.corners(index))
@@ -291,7 +292,7 @@ impl Shell {
         self.triangles[triangle].map(|index| self.now[index as usize])
     }
 
-    /// Height (m) of a place over the plane of a triangle, and the plane's normal.
+    /// Height (m) of a position above the plane of a triangle, and the normal of the plane.
     fn plane(&self, triangle: usize, place: DVec3) -> (f64, DVec3) {
         let [a, b, c] = self.corners(triangle);
         let across = (b - a).cross(&(c - a));
@@ -314,7 +315,7 @@ impl Shell {
 /// The nearest triangle so far.
 pub(super) struct Best {
     pub(super) found: Option<Found>,
-    /// Square of the distance (m2) beyond which there is no better one.
+    /// Square of the distance (m2) beyond which no triangle can be better.
     pub(super) most: f64,
 }
 
@@ -324,23 +325,23 @@ impl Default for Best {
     }
 }
 
-/// A triangle, the weights of its corners at its nearest point, that point, and the square of its distance (m2).
+/// A triangle, the barycentric weights of its nearest point, that point, and the square of its distance (m2).
 pub(super) struct Found {
     square: f64,
     triangle: usize,
     weights: [f64; 3],
     point: DVec3,
-    /// Distance of the place from its plane (m), once it has been asked for.
+    /// Distance of the position from its plane (m), once computed.
     height: Option<f64>,
 }
 
-/// A box that contains nothing.
+/// An empty box.
 const EMPTY: [DVec3; 2] = [
     DVec3::new(f64::INFINITY, f64::INFINITY, f64::INFINITY),
     DVec3::new(f64::NEG_INFINITY, f64::NEG_INFINITY, f64::NEG_INFINITY),
 ];
 
-/// Barycentric weights of the point of a triangle that is nearest to a place (Ericson, Real-Time Collision Detection, 5.1.5).
+/// Barycentric weights of the point of a triangle nearest to a position (Ericson, Real-Time Collision Detection, 5.1.5).
 fn nearest_weights(place: DVec3, a: DVec3, b: DVec3, c: DVec3) -> [f64; 3] {
     let (ab, ac, ap) = (b - a, c - a, place - a);
     let (d1, d2) = (ab.dot(&ap), ac.dot(&ap));

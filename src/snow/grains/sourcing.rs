@@ -1,8 +1,8 @@
-//! Grains from the snow that a step removed (thesis section 3.3.2).
+//! Creates grains from the snow that a step removed (thesis section 3.3.2).
 //!
-//! Places are sites of a face-centred cubic lattice that is fixed in the world and jittered. Of those in a block that the step
-//! laid bare, as many become grains as the block's removed volume pays for; what it pays for beyond the sites that there are is
-//! owed and carried over, so that slices thinner than a grain, of which only some hold a site, starve nothing.
+//! Candidate positions are the jittered sites of a face-centred cubic lattice fixed in world space. Of the sites of a block
+//! that the step cleared, as many become grains as its removed volume pays for. What the volume pays for beyond the available
+//! sites is owed and carried over, so that no snow is lost from slices thinner than a grain, few of which contain a site.
 
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -20,26 +20,26 @@ use super::field::Window;
 
 /// Packing of new grains: the share of space that they fill.
 pub const PACKING: f64 = 0.55;
-/// Jitter of a site (distances of neighbouring sites). The lattice's neighbours are 1.10 diameters apart.
+/// Jitter of a site, in distances between neighbouring sites, which are 1.10 diameters apart.
 const JITTER: f64 = 0.04;
 
 /// The base layer that a step of grains reads.
 #[derive(Clone, Copy)]
 pub enum Base<'a> {
-    /// There is none.
+    /// No base layer.
     Missing,
-    /// At the step's start and end.
+    /// At the start and end of the step.
     Whole([&'a FloatGrid; 2]),
-    /// At its end, and the blocks that the step changed, as they were at its start
+    /// At the end of the step, and the changed blocks as they were at its start
     /// ([`BaseLayer::before`](crate::snow::base_layer::BaseLayer::before)).
     Changed(&'a FloatGrid, &'a [BlockEdit]),
 }
 
-/// The layer before a step, as far as grains come from it.
+/// The layer before a step, where grains may be created.
 pub enum Before<'a> {
-    /// All of it.
+    /// The whole layer.
     Whole(&'a FloatGrid),
-    /// The blocks that the step changed, and those around them.
+    /// The blocks that the step changed, and their neighbours.
     Near(FloatGrid),
 }
 
@@ -54,7 +54,7 @@ impl Before<'_> {
 }
 
 impl<'a> Base<'a> {
-    /// The layer at the step's end.
+    /// The layer at the end of the step.
     pub fn after(&self) -> Option<&'a FloatGrid> {
         match *self {
             Self::Missing => None,
@@ -62,8 +62,8 @@ impl<'a> Base<'a> {
         }
     }
 
-    /// What the step removed, block by block, ascending, and the layer before it. Only changed blocks are visited where they are
-    /// known. None without a layer.
+    /// The layer before the step and what the step removed, by block, ascending. Visits only the changed blocks where they
+    /// are known. None without a layer.
     ///
     /// # Errors
     /// When a grid cannot be read; when memory runs out.
@@ -77,7 +77,7 @@ impl<'a> Base<'a> {
                 let changed: BTreeSet<Origin> = blocks.iter().map(BlockEdit::origin).collect();
                 let origins: Vec<Origin> = changed.iter().copied().collect();
                 let removals = volumes(&before, after, &origins)?;
-                // Values between voxels need those beside them.
+                // Interpolation also reads the neighbouring blocks.
                 let around: BTreeSet<Origin> =
                     removals.iter().flat_map(|removal| around(removal.origin)).collect();
                 let around: Vec<Origin> = around.difference(&changed).copied().collect();
@@ -90,7 +90,7 @@ impl<'a> Base<'a> {
     }
 }
 
-/// A block and those around it.
+/// A block and its neighbours.
 fn around([x, y, z]: Origin) -> impl Iterator<Item = Origin> {
     let side = |at: i32| [-1, 0, 1].map(|step| at + step * DIM as i32);
     let rows = side(x).into_iter().flat_map(move |x| side(y).map(move |y| [x, y]));
@@ -106,7 +106,7 @@ pub struct Removal {
     pub volume: f64,
 }
 
-/// What was removed between two states of a layer, block by block, ascending.
+/// The snow removed between two states of a layer, by block, ascending.
 ///
 /// # Errors
 /// When a grid cannot be read.
@@ -116,7 +116,7 @@ pub fn removals(before: &FloatGrid, after: &FloatGrid) -> Result<Vec<Removal>> {
     leaves.par_sort_unstable();
     leaves.dedup();
     let mut out = volumes(before, after, &leaves)?;
-    // Blocks without a surface before and after, deep snow that is gone, lie within the bounds of the others.
+    // Blocks without a surface before and after (deep snow that is gone) lie within the bounding box of the others.
     let Some(first) = out.first() else { return Ok(out) };
     let bounds = out.iter().fold([first.origin; 2], |[low, high], removal| {
         let at = removal.origin;
@@ -130,7 +130,7 @@ pub fn removals(before: &FloatGrid, after: &FloatGrid) -> Result<Vec<Removal>> {
     Ok(out)
 }
 
-/// What was removed from blocks; those that lost nothing are left out.
+/// The snow removed from blocks; blocks that lost none are left out.
 fn volumes(before: &FloatGrid, after: &FloatGrid, origins: &[Origin]) -> Result<Vec<Removal>> {
     let cell = after.voxel_size() as f32;
     let (old, new) = (before.probe(origins)?, after.probe(origins)?);
@@ -141,7 +141,7 @@ fn volumes(before: &FloatGrid, after: &FloatGrid, origins: &[Origin]) -> Result<
     Ok(removed.filter(|removal| removal.volume > 0.0).collect())
 }
 
-/// Cells of snow that a block lost.
+/// Volume (cells) that a block lost.
 fn lost(old: &Probe<'_>, new: &Probe<'_>, cell: f32) -> f64 {
     let value = |probe: &Probe<'_>, index: usize| match probe {
         Probe::Leaf(leaf) => leaf.values[index],
@@ -158,13 +158,14 @@ fn lost(old: &Probe<'_>, new: &Probe<'_>, cell: f32) -> f64 {
     }
 }
 
-/// A place where a grain may be born.
+/// A position where a grain may be created.
 struct Site {
     hash: u64,
     place: DVec3,
     /// Share of the snow there that becomes grains.
     share: f64,
-    /// Whose is least is born first: a random number, so that sites are chosen as often as their shares say (exponential race).
+    /// Sites are chosen in ascending order of this random number, which makes the choice proportional to the shares
+    /// (exponential race).
     turn: f64,
 }
 
@@ -179,27 +180,27 @@ impl Site {
 pub struct Sourcing {
     /// Diameter of a grain (m).
     pub diameter: f64,
-    /// Which object took the snow at a place, and what share of it becomes grains.
+    /// The object that took the snow at each position, and the share of it that becomes grains.
     pub claims: Claims,
-    /// Seed of the scatter.
+    /// Seed of the positions.
     pub seed: u64,
     /// The frame.
     pub frame: i32,
 }
 
 impl Sourcing {
-    /// Grains for a volume (m3) of which nothing is pressed together.
+    /// Count of grains for a volume (m3) without compression.
     fn paid(&self, volume: f64) -> f64 {
         volume * PACKING / (std::f64::consts::PI / 6.0 * self.diameter.powi(3))
     }
 
-    /// Memory (bytes) that [`Sourcing::places`] takes for the sites of so many blocks with voxels of `cell` m.
+    /// Memory (bytes) of [`Sourcing::places`] for the sites of `blocks` blocks with voxels of `cell` m.
     pub fn bytes(&self, blocks: usize, cell: f64) -> u64 {
         let sites = (cell / self.diameter).powi(3) * VOXELS as f64 * PACKING * 6.0 / std::f64::consts::PI;
         (blocks as f64 * sites * size_of::<Site>() as f64) as u64
     }
 
-    /// Places (m) of new grains. `owed` has the grains that blocks have paid for and not got.
+    /// Positions (m) of new grains. `owed` holds the grains that each block has paid for but that do not exist yet.
     ///
     /// # Errors
     /// When a grid cannot be read.
@@ -237,7 +238,7 @@ impl Sourcing {
             let paid = share * self.paid(removal.volume) + owed.remove(&removal.origin).unwrap_or(0.0);
             sites.retain(|site| site.share > 0.0);
             let count = (paid.floor().max(0.0) as usize).min(sites.len());
-            // A random choice that no order of computation changes.
+            // A random choice that does not depend on the order of computation.
             sites.sort_unstable_by(|a, b| a.turn.total_cmp(&b.turn).then(a.hash.cmp(&b.hash)));
             out.extend(sites[..count].iter().map(|site| site.place));
             let left = paid - count as f64;
@@ -248,7 +249,7 @@ impl Sourcing {
         Ok(out)
     }
 
-    /// Sites in a block that held snow before and hold none after.
+    /// Sites in a block that were in snow before and are not after.
     fn sites(
         &self,
         origin: Origin,
@@ -256,11 +257,11 @@ impl Sourcing {
         [before, after]: [&Window<'_>; 2],
         share: impl Fn(DVec3) -> f64,
     ) -> Vec<Site> {
-        // Half of the lattice's cube: its diagonal is the distance of neighbours.
+        // Half the edge of the lattice's cube; neighbours are half a face diagonal apart.
         let apart =
             self.diameter * libm::cbrt(std::f64::consts::SQRT_2 * std::f64::consts::PI / 6.0 / PACKING);
         let half = apart / std::f64::consts::SQRT_2;
-        // A voxel reaches half a cell around its centre.
+        // A voxel extends half a cell around its centre.
         let low = origin.map(|at| (f64::from(at) - 0.5) * cell);
         let high = origin.map(|at| (f64::from(at + DIM as i32) - 0.5) * cell);
         let range = |axis: usize| (low[axis] / half).ceil() as i64..(high[axis] / half).ceil() as i64;

@@ -1,4 +1,4 @@
-//! The exact state of grains as bytes: what a run resumes from.
+//! The exact state of grains as bytes, from which a run resumes.
 
 use std::collections::BTreeMap;
 
@@ -13,7 +13,7 @@ use super::touch::Touch;
 use crate::base::DVec3;
 use crate::error::{Error, Result};
 
-/// The first bytes: what it is, and its version.
+/// Magic bytes, including the version.
 const MAGIC: &[u8; 8] = b"frzgrn06";
 
 /// Writes little-endian numbers.
@@ -42,7 +42,7 @@ impl Writer {
     }
 }
 
-/// Reads what [`Writer`] wrote.
+/// Reads bytes that [`Writer`] wrote.
 struct Reader<'a>(&'a [u8]);
 
 impl Reader<'_> {
@@ -52,7 +52,7 @@ impl Reader<'_> {
         Ok(*first)
     }
 
-    /// A count of things of at least so many bytes each.
+    /// A count of elements of at least `bytes` bytes each.
     fn count(&mut self, bytes: usize) -> Result<usize> {
         let count = u64::from_le_bytes(self.take()?) as usize;
         if count > self.0.len() / bytes {
@@ -90,7 +90,7 @@ impl Reader<'_> {
     }
 }
 
-/// The state as bytes; the same from any number of threads.
+/// The state as bytes, the same for any number of threads.
 pub fn save(grains: &Grains) -> Vec<u8> {
     let heap = &grains.heap;
     let mut to = Writer::default();
@@ -133,10 +133,10 @@ pub fn save(grains: &Grains) -> Vec<u8> {
     pack(&to.0)
 }
 
-/// Takes the state from bytes into grains that have none yet.
+/// Reads a state into grains that have none yet.
 ///
 /// # Errors
-/// Bytes that are no such state, or one of grains of another size.
+/// Bytes that are not a valid state, or a state of grains of another size.
 pub fn load(grains: &mut Grains, bytes: &[u8]) -> Result<()> {
     let bytes = unpack(bytes)?;
     let mut from = Reader(&bytes);
@@ -206,12 +206,12 @@ pub fn load(grains: &mut Grains, bytes: &[u8]) -> Result<()> {
     Ok(())
 }
 
-/// Bytes that are packed together.
+/// Size of a part before compression (bytes).
 const PART: usize = 1 << 24;
-/// Bytes of the seal.
+/// Size of the checksum (bytes).
 const SEAL: usize = 16;
 
-/// Bytes packed: magic, seal, and parts, each behind its length.
+/// Packs bytes: magic, checksum, then compressed parts, each after its length.
 fn pack(bytes: &[u8]) -> Vec<u8> {
     let parts: Vec<Vec<u8>> = bytes.chunks(PART).map(lz4_flex::compress_prepend_size).collect();
     let mut out = MAGIC.to_vec();
@@ -225,20 +225,20 @@ fn pack(bytes: &[u8]) -> Vec<u8> {
     out
 }
 
-/// How many bytes [`unpack`] would return; 0 where it would fail.
+/// Count of bytes that [`unpack`] would return; 0 if it would fail.
 pub fn unpacked(packed: &[u8]) -> u64 {
     let size = |part: &&[u8]| part.first_chunk().map_or(0, |size| u64::from(u32::from_le_bytes(*size)));
     parts(packed).map_or(0, |parts| parts.iter().map(size).sum())
 }
 
-/// What [`pack`] packed.
+/// Reverses [`pack`].
 fn unpack(packed: &[u8]) -> Result<Vec<u8>> {
     let whole = |part| lz4_flex::decompress_size_prepended(part).map_err(|error| wrong(error.to_string()));
     let parts: Vec<Vec<u8>> = parts(packed)?.into_iter().map(whole).collect::<Result<_>>()?;
     Ok(parts.concat())
 }
 
-/// The parts of what was packed, which is whole.
+/// The compressed parts, after a check of the magic bytes and of the checksum.
 fn parts(packed: &[u8]) -> Result<Vec<&[u8]>> {
     let mut from = Reader(packed);
     if &from.take::<8>()? != MAGIC {
@@ -265,5 +265,5 @@ fn wrong(what: impl Into<String>) -> Error {
     Error::Bytes(what.into())
 }
 
-/// Bytes of a grain.
+/// Size of a grain (bytes).
 const ROW: usize = 4 + 12 + 3 * 12 + 8 + 16;

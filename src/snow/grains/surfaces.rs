@@ -1,4 +1,4 @@
-//! The surfaces around grains that have no room.
+//! The surfaces around grains that are inside a surface or in a crowd.
 
 use super::field::Window;
 use super::heap::{Colliders, Floor, Pose};
@@ -10,37 +10,38 @@ use super::trapped::DEEP;
 use crate::base::DVec3;
 use crate::error::Result;
 
-/// How far (diameters) surfaces are looked for.
+/// Search distance for surfaces (diameters).
 const FAR: f64 = 2.0;
-/// Share of the depth of grains that are in a surface, in which places that are written with less precision stay.
+/// Share of [`DEEP`] that released grains must stay within, so that it still holds after positions are written with less
+/// precision.
 const ROUNDED: f64 = 0.98;
-/// How often a grain is moved out of each surface.
+/// Most times that a grain is moved out of each surface.
 const ROUNDS: usize = 16;
-/// Farthest that it is moved (diameters).
+/// Largest displacement (diameters).
 const FARTHEST: f64 = 1.5;
-/// Cosine between the ways out of a mesh on its two sides.
+/// Cosine between the outward directions on the two sides of a mesh.
 const OPPOSITE: f64 = -0.5;
 
-/// The surfaces around a block, as they are at the step's end.
+/// The surfaces around a block at the end of the step.
 pub struct Surfaces<'a> {
     floor: Option<Floor>,
-    /// Edge of a cell of the level set (m), and the values around the block.
+    /// Edge of a cell of the level set (m), and its values around the block.
     field: Option<(f64, Window<'a>)>,
     shells: &'a [(Shell, Pose<'a>)],
-    /// Of a grain (m).
+    /// Diameter of a grain (m).
     diameter: f64,
 }
 
-/// What a place lies beside.
+/// Which side of the surfaces a position is on.
 pub struct Side {
-    /// Distance from the nearest surface (diameters), negative inside; at most [`FAR`].
+    /// Distance to the nearest surface (diameters), negative inside; at most [`FAR`].
     pub distance: f64,
-    /// The way out of each mesh that is nearer than [`FAR`].
+    /// Index of each mesh nearer than [`FAR`] and the outward direction from it.
     pub out: Vec<(usize, DVec3)>,
 }
 
 impl Side {
-    /// Whether a mesh lies between this place and another one nearby.
+    /// Whether a mesh lies between this position and another nearby.
     pub fn is_across(&self, other: &Self) -> bool {
         let is_same = |(mesh, out): &(usize, DVec3)| {
             other.out.iter().any(|(index, way)| index == mesh && way.dot(out) < OPPOSITE)
@@ -50,10 +51,10 @@ impl Side {
 }
 
 impl<'a> Surfaces<'a> {
-    /// Those of some blocks and a margin (cells of a level set).
+    /// The surfaces around blocks, with a margin (cells of a level set).
     ///
     /// # Errors
-    /// What a grid reports.
+    /// Errors of a grid.
     pub fn around(
         colliders: &'a Colliders<'_>,
         blocks: &[At],
@@ -72,7 +73,7 @@ impl<'a> Surfaces<'a> {
         Ok(around)
     }
 
-    /// What a place (m) lies beside.
+    /// Which side of the surfaces a position (m) is on.
     pub fn side(&self, place: DVec3) -> Side {
         let mut side = Side { distance: FAR, out: Vec::new() };
         if let Some(floor) = &self.floor {
@@ -91,7 +92,7 @@ impl<'a> Surfaces<'a> {
         side
     }
 
-    /// What is near some places (m) of the meshes, so that [`Surfaces::release`] finds it soon.
+    /// Collects the triangles near positions (m) for [`Surfaces::release`].
     pub fn find(&self, places: impl Iterator<Item = DVec3>, nearby: &mut Vec<Nearby>) {
         let none = [DVec3::repeat(f64::MAX), DVec3::repeat(f64::MIN)];
         let [low, high] = places.fold(none, |[low, high], place| [low.inf(&place), high.sup(&place)]);
@@ -102,7 +103,7 @@ impl<'a> Surfaces<'a> {
         }
     }
 
-    /// Where a grain at a place (m) is out of them, as a way from there (diameters); nothing where it finds no room.
+    /// Displacement (diameters) that moves a grain at a position (m) out of the surfaces; none if no free position is found.
     pub fn release(&self, from: DVec3, nearby: &mut [Nearby]) -> Option<V> {
         let mut place = from;
         for _ in 0..ROUNDS {
@@ -119,7 +120,7 @@ impl<'a> Surfaces<'a> {
         None
     }
 
-    /// Moves a place (m) out of one surface after the other, and tells how deep (diameters) it was in each.
+    /// Moves a position (m) out of each surface in turn, and reports the depth (diameters) that it had in each.
     fn for_each_way_out(&self, place: &mut DVec3, nearby: &mut [Nearby], mut tell: impl FnMut(f64)) {
         let half = 0.5 * self.diameter;
         if let Some(floor) = &self.floor {

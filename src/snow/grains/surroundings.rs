@@ -1,4 +1,4 @@
-//! What a step of grains reads besides themselves, as colliders, and what of it wakes all of them when it changes.
+//! Inputs of a step of grains besides the grains themselves, as colliders, and the changes in them that wake all grains.
 
 use super::field::Field;
 use super::heap::{Colliders, Floor};
@@ -8,68 +8,70 @@ use crate::base::{DVec3, TriMesh};
 use crate::error::Result;
 use crate::sweep::Body;
 
-/// What a step of grains reads.
+/// Inputs of a step of grains.
 pub struct Surroundings<'a> {
-    /// The base layer; grains collide with it as it is at the step's end.
+    /// The base layer; grains collide with its state at the end of the step.
     pub base: Base<'a>,
-    /// What moves.
+    /// Moving objects.
     pub objects: &'a [Object<'a>],
-    /// Meshes that do not move, as triangles and places (m).
+    /// Static meshes: triangles and positions (m).
     pub statics: &'a [&'a TriMesh],
-    /// Height of a level ground (m).
+    /// Height of a level ground plane (m).
     pub floor: Option<f64>,
     /// Grains below this height (m) are dropped.
     pub lowest: f64,
 }
 
-/// Something that moves among grains.
+/// A moving object.
 #[derive(Clone, Copy)]
 pub struct Object<'a> {
     /// Its mesh and motion.
     pub body: &'a Body,
     /// Friction of grains against it.
     pub friction: f64,
-    /// With which it holds grains that touch it (weights of a grain).
+    /// Acceleration up to which it holds grains that touch it (weights of a grain).
     pub stick: f64,
-    /// Share of the snow that it removes that becomes no grains; none: [`Params::compression`].
+    /// Share of the snow it removes that does not become grains; none: [`Params::compression`].
     pub compression: Option<f64>,
-    /// Whether it takes snow from the base layer.
+    /// Whether it removes snow from the base layer.
     pub removes: bool,
     /// Whether it pushes grains.
     pub pushes: bool,
 }
 
 impl<'a> Object<'a> {
-    /// One that removes snow and pushes grains, with a friction against it.
+    /// An object that removes snow and pushes grains, with a friction against it.
     pub fn new(body: &'a Body, friction: f64) -> Self {
         Self { body, friction, stick: 0.0, compression: None, removes: true, pushes: true }
     }
 }
 
-/// Least and greatest place (m) of a box.
+/// Least and greatest corner (m) of a box.
 pub type Bounds = [DVec3; 2];
 
-/// What grains cannot move in a step.
+/// The colliders of a step.
 pub struct Obstacles<'a> {
-    /// As the heap wants it.
+    /// For the heap.
     pub colliders: Colliders<'a>,
-    /// How far objects move near the grains in the step (m).
+    /// Largest displacement of a vertex near the grains in the step (m).
     pub way: f64,
-    /// The boxes of all meshes at the step's start and end.
+    /// Bounding boxes of all meshes at the start and end of the step.
     pub boxes: [Vec<Bounds>; 2],
 }
 
-/// Friction of grains against what does not move, besides the base.
+/// Friction of grains against the floor and static meshes.
 const GROUND: f32 = 0.5;
-/// Farthest (diameters) that a mesh's box may jump between two steps: more, and what rested on it wakes.
+/// Largest jump (diameters) of a mesh's box between two steps; a larger one wakes all grains.
 const JUMP: f64 = 0.1;
-/// Share of an object's surface under which its holes are closed; what is open wider, a bowl, has two sides that collide.
+/// Holes of less than this share of an object's area are closed; an object with larger ones, such as a bowl, collides on both
+/// sides.
 const HOLES: f64 = 0.1;
-/// Numbers in [`Surroundings::ties`].
+/// Count of numbers in [`Surroundings::ties`].
 pub const TIES: usize = 6;
 
 impl<'a> Surroundings<'a> {
-    /// What wakes all grains when it changes, besides the meshes: gravity, what they are made of, whether base and floor are there.
+    /// Settings whose change wakes all grains: gravity, friction, attraction, whether grains rest, whether there is a base,
+    /// and the floor's height.
     pub fn ties(&self, params: &Params) -> [f64; TIES] {
         let Params { gravity, friction, attraction, rests, .. } = *params;
         let has_base = self.base.after().is_some();
@@ -77,7 +79,7 @@ impl<'a> Surroundings<'a> {
         [gravity, friction, attraction, f64::from(rests), f64::from(has_base), floor]
     }
 
-    /// What grains within a box (m) cannot move from `from` to `to` (s).
+    /// The colliders near grains within a box (m), from `from` to `to` (s).
     ///
     /// # Errors
     /// A pose that cannot be computed.
@@ -129,13 +131,13 @@ impl<'a> Surroundings<'a> {
     }
 }
 
-/// The box of some places.
+/// Bounding box of positions.
 pub fn bounds(places: &[DVec3]) -> Bounds {
     let none = [DVec3::repeat(f64::MAX), DVec3::repeat(f64::MIN)];
     places.iter().fold(none, |[low, high], place| [low.inf(place), high.sup(place)])
 }
 
-/// How far a vertex goes from one place to another, where it can come near a box; its path may bend by as much as it is long.
+/// Displacement of a vertex if it may come near a box, else 0; its path may bend aside by as much as the displacement.
 fn way_near(from: DVec3, to: DVec3, [low, high]: &Bounds) -> f64 {
     let way = (to - from).norm();
     let room = DVec3::repeat(way);
@@ -146,7 +148,7 @@ fn way_near(from: DVec3, to: DVec3, [low, high]: &Bounds) -> f64 {
     if (0..3).any(is_off) { 0.0 } else { way }
 }
 
-/// Whether boxes are the same but for a small part of a diameter (m).
+/// Whether boxes agree within a small part of a diameter (m).
 pub fn have_stayed(boxes: &[Bounds], others: &[Bounds], diameter: f64) -> bool {
     let differ = |(a, b): (&Bounds, &Bounds)| a.iter().zip(b).any(|(a, b)| (a - b).amax() > JUMP * diameter);
     boxes.len() == others.len() && !boxes.iter().zip(others).any(differ)

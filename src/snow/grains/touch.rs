@@ -1,91 +1,91 @@
-//! Grains that touch what they cannot move: ground, base layer, objects.
+//! Contacts between grains and colliders: floor, base layer, meshes.
 
 use rayon::prelude::*;
 
 use super::layout::Block;
 use super::rows::{V, add, dot, scaled};
 
-/// A grain beside a plane that nothing moves.
+/// A contact between a grain and a collider, as a plane that the grain cannot move.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
 pub struct Touch {
-    /// The grain.
+    /// Slot of the grain.
     pub grain: u32,
-    /// Which collider it is.
+    /// Collider index.
     pub collider: u32,
     /// From the collider to the grain.
     pub normal: V,
-    /// Where the plane is that the grain's centre may not pass: normal . place (diameters) of the points on it.
+    /// Offset of the plane that the grain's centre may not cross: dot(normal, p) (diameters) for points p on it.
     pub offset: f32,
     /// Velocity of the surface (m/s).
     pub velocity: V,
     /// Friction against it.
     pub friction: f32,
-    /// With which it holds a grain that touches it (weights of the grain).
+    /// Acceleration up to which the collider holds the grain (weights of the grain).
     pub stick: f32,
     /// Impulse along the normal (m/s).
     pub impulse: f32,
-    /// Impulse across it (m/s).
+    /// Tangential impulse (m/s).
     pub across: V,
-    /// Speed at which the grain bounces off in this sub-step (m/s).
+    /// Speed at which the grain bounces in this sub-step (m/s).
     pub bounce: f32,
 }
 
 impl Touch {
-    /// All of its impulse (m/s).
+    /// Total impulse (m/s).
     pub fn total(&self) -> V {
         add(scaled(self.normal, self.impulse), self.across)
     }
 
-    /// Grain and collider: no two touches have the same.
+    /// Grain and collider, unique for each touch.
     pub fn key(&self) -> (u32, u32) {
         (self.grain, self.collider)
     }
 
-    /// After a bounce there is nothing to begin the next sub-step with.
+    /// Clears the impulses after a bounce: the next sub-step starts without any.
     pub fn forget_bounce(&mut self) {
         if self.bounce > 0.0 {
             (self.impulse, self.across, self.bounce) = (0.0, [0.0; 3], 0.0);
         }
     }
 
-    /// Goes on with the impulses of the same touch in the last sub-step.
+    /// Continues with the impulses of the same touch in the last sub-step.
     fn take_over(&mut self, old: &Self) {
         (self.impulse, self.across, self.bounce) = (old.impulse, old.across, old.bounce);
     }
 
-    /// What the next step needs of it.
+    /// The part that the next step needs.
     pub fn kept(mut self) -> Self {
         self.forget_bounce();
         let Self { grain, collider, impulse, across, .. } = self;
         Self { grain, collider, impulse, across, ..Self::default() }
     }
 
-    /// Whether it has a plane: none that was kept has, and none deep in a level set.
+    /// Whether it has a plane: false if it was kept from the last step, or if the grain is deep in a level set.
     pub fn has_plane(&self) -> bool {
         self.normal != [0.0; 3]
     }
 
-    /// Whether it is of a mesh.
+    /// Whether the collider is a mesh.
     pub fn is_of_mesh(&self) -> bool {
         self.collider >= FIRST_SHELL
     }
 }
 
-/// Collider number of the floor.
+/// Collider index of the floor.
 pub const FLOOR: u32 = 0;
-/// Collider number of the base layer.
+/// Collider index of the base layer.
 pub const BASE: u32 = 1;
-/// Collider number of the first mesh.
+/// Collider index of the first mesh.
 pub const FIRST_SHELL: u32 = 2;
 
-/// Gives blocks the touches that were found in this sub-step: all of those that are due, meshes of all. They take over
-/// the impulses of those that were there before.
+/// Replaces the touches of blocks with those found in this sub-step: all touches of blocks that are due, and those with
+/// meshes in every block. New touches take over the impulses of the old ones.
 pub fn renew(blocks: &mut [Block], mut fresh: Vec<Vec<Touch>>) {
     let is_renewed = |block: &Block, fresh: &[Touch]| {
         block.is_due || !fresh.is_empty() || block.touches.iter().any(Touch::is_of_mesh)
     };
     let renewed = blocks.par_iter_mut().zip(&mut fresh).filter(|(block, fresh)| is_renewed(block, fresh));
-    // What its block does not touch any more, another one may.
+    // Touches that a block lost: their grains may have moved to another block.
     let mut gone: Vec<Touch> = renewed
         .flat_map_iter(|(block, fresh)| {
             fresh.sort_unstable_by_key(Touch::key);
@@ -123,8 +123,8 @@ pub fn renew(blocks: &mut [Block], mut fresh: Vec<Vec<Touch>>) {
     });
 }
 
-/// Takes the impulses of grains that are pressed between two sides: those would grow as long as the sides fight over the grain,
-/// and throw it when one of them leaves. The touches are sorted.
+/// Clears the impulses of grains that are pressed from opposite sides: they would grow as long as both sides press, and throw
+/// the grain when one of them leaves. The touches must be sorted.
 fn release_pressed(touches: &mut [Touch]) {
     for touches in touches.chunk_by_mut(|a, b| a.grain == b.grain) {
         let is_pressed = touches.iter().enumerate().any(|(index, touch)| {
@@ -136,5 +136,5 @@ fn release_pressed(touches: &mut [Touch]) {
     }
 }
 
-/// Cosine between the normals of two sides that press a grain.
+/// Two normals with a cosine below this press a grain from opposite sides.
 const OPPOSITE: f32 = -0.5;

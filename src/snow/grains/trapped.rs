@@ -1,6 +1,6 @@
-//! Grains that a step leaves in a surface: pressed between a sole and the base, say. At the step's end each of them is moved out
-//! of the surfaces around it, one after the other, again and again. One that finds no place within a diameter and a half stays
-//! where it was: it is *trapped*.
+//! Grains that a step leaves inside a surface, for example pressed between a sole and the base. At the end of the step each
+//! is moved out of the surfaces around it, one after another, repeatedly. A grain that reaches no free position within a
+//! diameter and a half stays where it was: it is *trapped*.
 
 use rayon::prelude::*;
 
@@ -12,16 +12,16 @@ use super::surfaces::Surfaces;
 use super::touch::Touch;
 use crate::error::Result;
 
-/// Depth (diameters) in a surface from which a grain is in it.
+/// Depth (diameters) beyond which a grain counts as inside a surface.
 pub const DEEP: f64 = 0.1;
-/// Gap (diameters) to the plane of a surface up to which a grain that is awake may be in the surface itself.
+/// A grain that is awake and this near (diameters) to the plane of a surface may be inside the surface itself.
 const NEAR: f32 = 0.1;
-/// Room around a block for grains that left it and are moved (cells of a level set).
+/// Margin around a block (cells of a level set) for grains that left it or are moved.
 const MARGIN: f64 = 4.0;
 
-/// A step's end.
+/// Input at the end of a step.
 pub struct End<'a> {
-    /// Where the grains are.
+    /// Positions of the grains.
     pub layout: &'a Layout,
     /// Diameter of a grain (m).
     pub diameter: f64,
@@ -30,11 +30,11 @@ pub struct End<'a> {
 }
 
 impl End<'_> {
-    /// Moves grains out of the surfaces that they are in; the identities of those that have no room, ascending, as `before` has
-    /// them of the last step.
+    /// Moves grains out of surfaces. Returns the identities of the trapped ones, ascending; `before` holds those of the last
+    /// step.
     ///
     /// # Errors
-    /// A pose that cannot be computed; what a grid reports.
+    /// A pose that cannot be computed; errors of a grid.
     pub fn release(
         &self,
         rows: &mut [Row],
@@ -72,9 +72,8 @@ impl End<'_> {
         Ok(trapped)
     }
 
-    /// Members of a block that may be in something: those whose planes come near them while they are awake, or say that they
-    /// are in them while they rest; those that are so deep in a level set that there is no plane; and those that rest where they
-    /// had no room.
+    /// Members of a block that may be inside a surface: awake ones close to the plane of a touch; resting ones inside such a
+    /// plane; awake ones so deep in a level set that the touch has no plane; and resting ones that were trapped before.
     fn deep(&self, block: &Block, rows: &[Row], ids: &[u32], before: &[u32]) -> Vec<u32> {
         let is_deep = |touch: &&Touch| {
             let row = &rows[touch.grain as usize];
