@@ -1,4 +1,4 @@
-//! Where an object goes over a shot, and what of that looks wrong.
+//! The path of an object over a shot, and warnings about it.
 
 use rayon::prelude::*;
 
@@ -14,28 +14,28 @@ use crate::scene::{Object, Scene};
 use crate::snow::base_layer::Reach;
 use crate::sweep::{Body, REACH};
 
-/// Frames that one task poses, one after another.
+/// Frames that one task poses in sequence.
 const RUN: usize = 12;
-/// How far a body turns between two looks at its way (radians), and most looks between two of its kinks.
+/// Largest turn of a body between two samples of its path (radians), and most samples between two of its kinks.
 const TURN: f64 = std::f64::consts::PI / 6.0;
 const MOST_PARTS: f64 = 1000.0;
-/// A character taller than this (m), or smaller, is likely in another unit.
+/// An object larger than the first or smaller than the second (m) probably uses another unit.
 const TALL: f64 = 20.0;
 const SMALL: f64 = 0.02;
 
-/// The way of an object that moves.
+/// The path of a moving object.
 pub struct Course<'a> {
     scene: &'a Scene,
     inputs: &'a Inputs,
-    /// As messages call it.
+    /// Its name in messages.
     name: String,
     object: &'a Object,
     body: &'a Body,
-    /// One for each frame.
+    /// By frame.
     extents: Vec<Extent>,
 }
 
-/// An object's extent at one frame.
+/// The extent of an object at one frame.
 #[derive(Clone, Copy)]
 struct Extent {
     frame: i32,
@@ -43,15 +43,15 @@ struct Extent {
     high: DVec3,
     /// Its lowest vertex.
     lowest: DVec3,
-    /// Longest way of a vertex since the frame before (m).
+    /// Longest path of a vertex since the previous frame (m).
     moved: f64,
 }
 
 impl<'a> Course<'a> {
-    /// Those of all objects that move through the snow: each is posed at every frame.
+    /// The paths of all moving objects, each posed at every frame.
     ///
     /// # Errors
-    /// A frame that cannot be read or fits no other; cancel.
+    /// A frame that cannot be read or does not match the others; cancel.
     pub fn all(ctx: &Context, scene: &'a Scene, inputs: &'a Inputs) -> Result<Vec<Self>> {
         let colliders = scene.objects.iter().enumerate().filter(|(_, object)| object.role.moves());
         let of = |((index, object), body): ((usize, &'a Object), &'a Body)| {
@@ -62,7 +62,7 @@ impl<'a> Course<'a> {
         colliders.zip(&inputs.bodies).map(of).collect()
     }
 
-    /// What the object does.
+    /// The report on the object.
     ///
     /// # Errors
     /// A pose that cannot be read.
@@ -88,7 +88,7 @@ impl<'a> Course<'a> {
         })
     }
 
-    /// What looks wrong, one sentence each.
+    /// Warnings, one sentence each.
     ///
     /// # Errors
     /// Cancel.
@@ -111,7 +111,7 @@ impl<'a> Course<'a> {
         self.extents.iter().fold((first.low, first.high), |(l, h), e| (l.inf(&e.low), h.sup(&e.high)))
     }
 
-    /// First and last frame at which its bounds touch the snow's, where those are known; else of the shot.
+    /// First and last frame at which its bounds overlap those of the snow; those of the shot if the snow's are unknown.
     fn touches(&self) -> Option<[i32; 2]> {
         let snow = self.inputs.area().zip(self.inputs.top());
         let touching = |extent: &&Extent| match snow {
@@ -127,7 +127,7 @@ impl<'a> Course<'a> {
         Some([first.frame, last.frame])
     }
 
-    /// Holes at the first frame.
+    /// Count of holes at the first frame.
     fn holes(&self) -> Result<usize> {
         let mut pose = Vec::new();
         let shot = self.scene.shot;
@@ -135,7 +135,7 @@ impl<'a> Course<'a> {
         Ok(faults::holes(&pose, self.body.motion().triangles()))
     }
 
-    /// The lowest place against the ground, of the lowest vertices of all frames.
+    /// The lowest vertex of all frames, by height above the ground.
     fn deepest(&self, relief: &Relief) -> Option<Deepest> {
         let of = |extent: &Extent| {
             let (ground, top) = relief.at(extent.lowest.x, extent.lowest.z)?;
@@ -145,12 +145,12 @@ impl<'a> Course<'a> {
         self.extents.iter().filter_map(of).min_by(|a, b| a.above_ground_m.total_cmp(&b.above_ground_m))
     }
 
-    /// The first frame that a run could not make because a body that touches the snow reaches too far from it.
+    /// The first frame that cannot be made because a body that touches the snow extends too far from it.
     fn out_of_reach(&self, ctx: &Context) -> Result<Option<String>> {
         let Self { scene, inputs, body, extents, .. } = self;
         let Some((low, high)) = inputs.bounds() else { return Ok(None) };
         let (middle, cell) = (0.5 * (low + high), inputs.snow.cell);
-        // The snow's own middle, known when it is made, may be another.
+        // The centre of the actual snow, known only once it is made, may differ.
         let near = (0.5 * REACH * cell).min(REACH * cell - (high - low).norm());
         let is_far = |extent: &Extent| {
             let far = (extent.low - middle).abs().sup(&(extent.high - middle).abs()).max();
@@ -171,7 +171,7 @@ impl<'a> Course<'a> {
         Ok(None)
     }
 
-    /// The first frame whose step turns a body too far to be made.
+    /// The first frame in which a body turns too far for one step.
     fn too_fast(&self) -> Option<String> {
         let Self { scene, body, .. } = self;
         let time = |frame: i32| f64::from(frame) / scene.shot.fps;
@@ -181,14 +181,14 @@ impl<'a> Course<'a> {
         })
     }
 
-    /// A size that another unit explains.
+    /// A size that suggests another unit.
     fn other_unit(&self) -> Option<String> {
         let tallest = (self.extents[0].high - self.extents[0].low).max();
         let scale = self.object.space.scale * likely_scale(tallest)?;
         Some(format!("{} is {tallest:.3} m large: scale = {scale}?", self.name))
     }
 
-    /// Where it stays that the snow is not.
+    /// On which side of the snow it stays.
     fn untouched(&self, report: &ObjectReport) -> Option<String> {
         let (area, top) = self.inputs.area().zip(self.inputs.top()).filter(|_| report.touches.is_none())?;
         let (low, _) = self.bounds();
@@ -200,7 +200,7 @@ impl<'a> Course<'a> {
         Some(format!("{} never touches the snow: {what}", self.name))
     }
 
-    /// Triangles that do not agree about inside and outside.
+    /// Triangles that disagree about inside and outside.
     fn inside_out(&self) -> Option<String> {
         let edges = self.body.contradictions();
         (edges > 0).then(|| {
@@ -212,7 +212,7 @@ impl<'a> Course<'a> {
         })
     }
 
-    /// Its lowest place, where it is below the ground.
+    /// Its lowest vertex, if that is below the ground.
     fn below_ground(&self, report: &ObjectReport) -> Option<String> {
         let deep = report.deepest.filter(|deep| deep.above_ground_m < -0.5 * self.inputs.snow.cell)?;
         Some(format!(
@@ -239,7 +239,7 @@ fn extents(ctx: &Context, scene: &Scene, body: &Body) -> Result<Vec<Extent>> {
     let frames: Vec<i32> = scene.shot.frames.iter().collect();
     let of_run = |run: &[i32]| -> Result<Vec<Extent>> {
         let at = |frame: i32| f64::from(frame) / scene.shot.fps;
-        // Its first frame is compared with the one before it, if the shot has that.
+        // The first frame of a run is compared with the frame before it, if the shot has one.
         let mut time = at((run[0] - 1).max(scene.shot.frames.first));
         let mut poses = Poses::start(body.motion(), time)?;
         let mut ways = vec![0.0; body.motion().vertex_count()];
@@ -265,7 +265,7 @@ fn extents(ctx: &Context, scene: &Scene, body: &Body) -> Result<Vec<Extent>> {
     Ok(runs.concat())
 }
 
-/// Times up to `to` (s) at which a motion is looked at after `from`: its kinks, and between them as many as its turns need.
+/// Sample times of a motion after `from` and up to `to` (s): its kinks, and between them as many as its rotation requires.
 fn moments(motion: &dyn Motion, from: f64, to: f64) -> Vec<f64> {
     let mut out = Vec::new();
     let mut begin = from;
@@ -278,7 +278,8 @@ fn moments(motion: &dyn Motion, from: f64, to: f64) -> Vec<f64> {
     out
 }
 
-/// The factor that a size (m) asks for when the file is likely in centimetres, millimetres, or in a unit too large.
+/// Scale factor suggested by a size (m) that is implausible in metres: a file in centimetres or millimetres, or in too large
+/// a unit.
 fn likely_scale(size: f64) -> Option<f64> {
     let plausible = |factor: f64| (0.3..=5.0).contains(&(size * factor));
     match size {

@@ -1,4 +1,5 @@
-//! How many grains a base gives and what they take, known from its reports before the first of them is made.
+//! Forecast of the count, memory and disk space of the grains that a base makes, from its reports, before the first grain is
+//! made.
 
 use serde::Serialize;
 
@@ -9,31 +10,31 @@ use crate::scene::Scene;
 use crate::scene::shot::Stored;
 use crate::snow::grains::PACKING;
 
-/// What a base gives.
+/// Forecast of the grains from a base.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Forecast {
     /// The last frame of the base that is counted.
     pub to_frame: i32,
-    /// Snow that the frames after the first remove (m3).
+    /// Snow removed after the first frame (m3).
     pub removed_m3: f64,
-    /// Share of it that becomes no grains: the least of all objects that take snow.
+    /// Share of it that does not become grains: the least of all objects that remove snow.
     pub compression: f64,
-    /// Grains, as many as there are at once.
+    /// Largest count of grains at one time.
     pub grains: u64,
-    /// Whether there may be fewer: objects have other values of `compression`, or a `keep_box` takes grains away.
+    /// Whether it is an upper bound: objects differ in `compression`, or a `keep_box` removes grains.
     pub at_most: bool,
     /// Memory of the stage (bytes).
     pub memory_bytes: u64,
-    /// Space of its files and states (bytes).
+    /// Disk space of its files and states (bytes).
     pub disk_bytes: u64,
 }
 
 impl Forecast {
-    /// What the frames of a base up to a last one give; none where its first frames, or their reports, are not there. Frames
-    /// that are not there end it.
+    /// Forecast from the frames of a base up to `last`; ends at the first missing frame or report. None if that is the first
+    /// frame.
     ///
     /// # Errors
-    /// A report that is damaged; a layer's file that cannot be read.
+    /// A damaged report; a file of the layer that cannot be read.
     pub fn of(scene: &Scene, inputs: &Inputs, base: &Stored, last: i32) -> Result<Option<Self>> {
         let first = scene.shot.frames.first;
         let mut removed = Vec::new();
@@ -42,7 +43,7 @@ impl Forecast {
             let Some(volume) = report.as_ref().and_then(|report| report.get("removed_m3")?.as_f64()) else {
                 break;
             };
-            // What the first poses cut out was gone before the shot began.
+            // Snow cut out by the first poses was removed before the shot began.
             removed.push(if frame == first { 0.0 } else { volume });
         }
         if removed.is_empty() {
@@ -71,7 +72,7 @@ impl Forecast {
         }))
     }
 
-    /// What is wrong with so many grains; where there may be fewer, that is only likely.
+    /// Fails if there are too many grains for the limits; if the forecast is an upper bound, that is only likely.
     ///
     /// # Errors
     /// More than `grains.max`; more memory than the limit (bytes).
@@ -99,7 +100,7 @@ impl Forecast {
     }
 }
 
-/// How many there are after each frame, of those born in each, which live for so many frames.
+/// Count of grains after each frame, given those born in each and their lifetime in frames.
 fn alive(born: &[f64], frames: usize) -> Vec<f64> {
     let from = |frame: usize| (frame + 1).saturating_sub(frames);
     (0..born.len()).map(|frame| born[from(frame)..=frame].iter().sum()).collect()

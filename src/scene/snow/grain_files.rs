@@ -1,9 +1,8 @@
-//! Files of grains: all of them, or what a frame changed (`grains_mode = "delta"`).
+//! Files of grains: complete, or only the changes of a frame (`grains_mode = "delta"`).
 //!
-//! Points are brought into the order of their identities before they are written, so that whole files made from changes are
-//! those that `"full"` writes. A file of changes holds the grains that were born or are not as they were, and names those that
-//! are gone. What a grain has from its birth is 0 there unless it was just born. A grain that the file does not hold is not
-//! trapped: states from which runs resume do not know which were.
+//! Points are sorted by identity before they are written, so that a file rebuilt from changes equals the one that `"full"`
+//! writes. A file of changes contains the grains that are new, changed or trapped, and lists the identities that are gone.
+//! Attributes set at birth are 0 there unless the grain is new. A grain that is not in the file is not trapped.
 
 use std::ops::RangeInclusive;
 use std::path::Path;
@@ -19,18 +18,18 @@ use crate::scene::shot::{FrameFiles, Stored};
 use crate::vdb::file::{self, WriteOptions};
 use crate::vdb::{MetaValue, points};
 
-/// Of so many frames one is whole.
+/// One frame in so many is complete.
 pub(super) const WHOLE_EVERY: i32 = 24;
-/// Metadata of a file of changes: the frame before.
+/// Metadata of a file of changes: the previous frame.
 const SINCE: &str = "frazil:changes_since";
-/// Metadata of a file of changes: the identities that are gone since.
+/// Metadata of a file of changes: the identities that are gone since then.
 const GONE: &str = "frazil:gone";
-/// Metadata of a file of changes: [`print_of`] the grains before.
+/// Metadata of a file of changes: [`print_of`] the previous grains.
 const OF: &str = "frazil:changes_of";
-/// Identities are below this.
+/// Upper bound of identities (exclusive).
 const MOST: i64 = 1 << 32;
 
-/// The frame since which a .vdb file holds changes; none where it is whole.
+/// The frame since which a .vdb file contains changes; none if it is complete.
 ///
 /// # Errors
 /// A file that cannot be read.
@@ -38,7 +37,7 @@ pub fn changes_since(path: &Path) -> Result<Option<i32>> {
     Ok(since(&file::metadata(path)?))
 }
 
-/// What to say of a file that holds changes since a frame.
+/// Message about a file that contains changes since a frame.
 pub fn partial(since: i32) -> String {
     format!(
         "holds only the grains that changed since frame {since}: `frazil vdb rebuild DIR --stage grains` makes it whole"
@@ -52,7 +51,7 @@ fn since(metadata: &[(String, MetaValue)]) -> Option<i32> {
     })
 }
 
-/// Points in the order of their identities.
+/// Points sorted by identity.
 pub(super) fn ordered(mut points: Points) -> Points {
     let ids = ids(&points);
     if !ids.is_sorted() {
@@ -68,7 +67,7 @@ pub(super) fn ordered(mut points: Points) -> Points {
     points
 }
 
-/// Points whose attributes take one value a point in every frame or in none, as the clips of a stage in USD must.
+/// Points whose attributes are either uniform in every frame or never, as the clips of a USD stage require.
 pub(super) fn told_apart(mut points: Points) -> Points {
     if points.attribute(TRAPPED) == Some(&FREE) {
         points.set(TRAPPED, Values::Bool(Column::Each(vec![false; points.count()])));
@@ -76,7 +75,7 @@ pub(super) fn told_apart(mut points: Points) -> Points {
     points
 }
 
-/// The attribute of grains that have no room, and its value where none is.
+/// The attribute of trapped grains, and its value if there are none.
 const TRAPPED: &str = "trapped";
 const FREE: Values = Values::Bool(Column::Uniform(false));
 
@@ -87,7 +86,7 @@ fn ids(points: &Points) -> Vec<i64> {
     }
 }
 
-/// Writes a frame's .vdb file: all points, or what changed since others; both in the order of [`ordered`].
+/// Writes the .vdb file of a frame: all points, or the changes since `before`; both in the order of [`ordered`].
 pub(super) fn write(
     ctx: &Context,
     scene: &Scene,
@@ -112,10 +111,10 @@ pub(super) fn write(
     files.save(NAME, "vdb", &bytes)
 }
 
-/// Name of the grid, of its folder and of the files in it.
+/// Name of the grid, of the folder and of the files in it.
 const NAME: &str = "grains";
 
-/// A hash of which grains there are and where, in the order of [`ordered`].
+/// A hash of the identities and positions of grains in the order of [`ordered`].
 fn print_of(points: &Points) -> String {
     let mut hash = Hasher::default();
     for id in ids(points) {
@@ -128,7 +127,7 @@ fn print_of(points: &Points) -> String {
     hash.finish()
 }
 
-/// The points that are new or not as they were, and the identities that are gone.
+/// The points to store in a file of changes, and the identities that are gone.
 fn changes(before: &Points, after: &Points) -> (Points, Vec<i64>) {
     let (old, new) = (ids(before), ids(after));
     let (mut picked, mut were, mut gone) = (Vec::new(), Vec::new(), Vec::new());
@@ -152,7 +151,8 @@ fn changes(before: &Points, after: &Points) -> (Points, Vec<i64>) {
     (changed, gone)
 }
 
-/// Gives points that were there before, each at an index, what they have from their birth: as it was, or 0 that takes no room.
+/// Sets the attributes of birth of the points that existed before, each at an index: to their old values, or to 0, which
+/// compresses well.
 fn of_birth(points: &mut Points, before: Option<&Points>, were: &[Option<usize>]) {
     fn taken<T: Copy + Default>(
         own: &Column<T>,
@@ -180,7 +180,7 @@ fn of_birth(points: &mut Points, before: Option<&Points>, were: &[Option<usize>]
     }
 }
 
-/// Whether a point is as another was, bit by bit, and is not trapped.
+/// Whether a point is bitwise the same as before and not trapped.
 fn is_same(before: &Points, was: usize, after: &Points, point: usize) -> bool {
     let bits = |vector: [f32; 3]| vector.map(f32::to_bits);
     before.cells[was] == after.cells[point]
@@ -202,7 +202,7 @@ fn is_same(before: &Points, was: usize, after: &Points, point: usize) -> bool {
         })
 }
 
-/// The points after a frame, from those before it and what it changed.
+/// The points after a frame, from those before it and its changes.
 ///
 /// # Errors
 /// Changes of other points.
@@ -213,7 +213,7 @@ fn follow(mut points: Points, mut changed: Points, gone: &[Run]) -> Result<Point
     let mut stays = vec![true; old.len()];
     for run in gone {
         let ends = [run.start(), run.end()].map(|id| old.binary_search(id));
-        // Identities differ, so that only a run of which each was there takes as many places.
+        // Identities are unique, so a run spans this many points only if each of its identities exists.
         match ends {
             [Ok(low), Ok(high)] if (high - low) as i64 == run.end() - run.start() => {
                 stays[low..=high].fill(false);
@@ -238,11 +238,11 @@ fn follow(mut points: Points, mut changed: Points, gone: &[Run]) -> Result<Point
     Ok(ordered(points))
 }
 
-/// Identities one after the other.
+/// Consecutive identities.
 type Run = RangeInclusive<i64>;
 
-/// What the file of a frame says of the grains before it: those that are gone, and [`print_of`] all, if it has that. None where
-/// it is whole.
+/// What the file of a frame states about the previous grains: those that are gone, and [`print_of`] all of them, if present.
+/// None if the file is complete.
 fn told_of_before(
     frame: i32,
     metadata: &[(String, MetaValue)],
@@ -268,7 +268,7 @@ fn runs(numbers: &[i64]) -> Vec<Run> {
     numbers.chunk_by(|a, b| *b == a + 1).map(|run| run[0]..=run[run.len() - 1]).collect()
 }
 
-/// Runs as text: `3-7,12`.
+/// Runs as a string: `3-7,12`.
 fn listed(runs: &[Run]) -> String {
     let run = |run: &Run| match (run.start(), run.end()) {
         (low, high) if low == high => low.to_string(),
@@ -277,7 +277,7 @@ fn listed(runs: &[Run]) -> String {
     runs.iter().map(run).collect::<Vec<_>>().join(",")
 }
 
-/// What [`listed`] listed. They stay runs: a text of a few letters may name four billion numbers.
+/// Reverses [`listed`]. The result stays runs: a short string may stand for four billion numbers.
 fn runs_of_text(text: &str) -> Option<Vec<Run>> {
     let mut out: Vec<Run> = Vec::new();
     for run in text.split(',').filter(|run| !run.is_empty()) {
@@ -294,7 +294,7 @@ fn runs_of_text(text: &str) -> Option<Vec<Run>> {
     Some(out)
 }
 
-/// The whole grains of a cache, one frame after another.
+/// Reads complete grains from a cache, frame by frame.
 pub struct RebuildGrains {
     stored: Stored,
     at: Option<(i32, Points)>,
@@ -312,16 +312,16 @@ impl RebuildGrains {
         Ok(Self { stored: Stored::read(folder, NAME)?, at: None })
     }
 
-    /// The frames that are there.
+    /// The stored frames.
     pub fn stored(&self) -> &Stored {
         &self.stored
     }
 
-    /// The bytes of a frame's file, as `grains_mode = "full"` writes them, but for the hash of the settings in its metadata;
-    /// frames in ascending order cost one file each.
+    /// The bytes of a frame's file as `grains_mode = "full"` writes it, except for the hash of the settings in its metadata.
+    /// Frames in ascending order cost one file each.
     ///
     /// # Errors
-    /// A frame that is not there; a file that is not what was written; cancel.
+    /// A frame that does not exist; a file that was changed since it was written; cancel.
     pub fn bytes(&mut self, ctx: &Context, frame: i32, options: &WriteOptions) -> Result<Vec<u8>> {
         let (mut later, mut metadata, mut at) = (Vec::new(), None, frame);
         let mut points = loop {
@@ -382,11 +382,11 @@ mod tests {
     use super::*;
     use crate::base::DVec3;
 
-    /// Points with these identities, heights and marks.
+    /// Points with these identities, heights and trapped flags.
     fn points(all: &[(i64, f32, bool)]) -> Points {
         let places: Vec<DVec3> = all.iter().map(|(_, y, _)| DVec3::new(0.0, f64::from(*y), 0.0)).collect();
         let mut out = Points::at(0.5, &places).unwrap();
-        // A file may hold the other zero, which is another value of a position.
+        // A file may contain -0.0, which is a different value of a position.
         for (offset, (_, y, _)) in out.offsets.iter_mut().zip(all).filter(|(_, (_, y, _))| *y == 0.0) {
             offset[1] = *y;
         }
@@ -409,7 +409,7 @@ mod tests {
         let frames = [
             points(&[]),
             points(&[(3, 0.3, false), (0, 0.0, true), (1, -0.0, false)]),
-            // One moved, one was born, one is trapped no more, one became so.
+            // One moved, one was born, one is no longer trapped, one became trapped.
             points(&[(4, 1.0, false), (3, 0.5, false), (0, 0.0, false), (1, -0.0, true)]),
             points(&[(4, 1.0, false), (1, -0.0, false)]),
             points(&[(4, 1.0, false), (1, 0.0, false)]),
@@ -419,7 +419,7 @@ mod tests {
         let sizes = frames.windows(2).map(|pair| {
             let (changed, gone) = changes(&pair[0], &pair[1]);
             let sizes = (changed.count(), gone.clone());
-            // What was there before has nothing of its birth.
+            // Grains that existed before have no attributes of birth.
             if let Some(Values::Int(frames)) = changed.attribute("source_frame") {
                 let old = ids(&pair[0]);
                 for (point, id) in ids(&changed).into_iter().enumerate() {

@@ -1,4 +1,4 @@
-//! The stage `grains`: snow that was removed from the base, pushed, piled and thrown.
+//! The stage `grains`: snow removed from the base is pushed, piled and thrown.
 
 use std::path::Path;
 
@@ -24,39 +24,39 @@ use crate::snow::grains::{self, Base, Object, Params, StepReport, Surroundings};
 use crate::snow::{grain_cohesion, grain_friction};
 use crate::sweep::Body;
 
-/// Grains of a scene.
+/// The stage for a scene.
 pub struct Grains<'a> {
     scene: &'a Scene,
     inputs: &'a Inputs,
-    /// What grains have of each moving object.
+    /// Moving objects as the grains see them.
     objects: Vec<Object<'a>>,
 }
 
-/// What the stage carries from frame to frame.
+/// State carried from frame to frame.
 pub struct State {
     grains: grains::Grains,
-    /// The layer after a frame.
+    /// The base layer after a frame.
     layer: Option<(i32, Grids)>,
 }
 
-/// What a step hands to the writer: the grains after it, where their files, or what changed since, are wanted.
+/// Input of the writer: the grains after a step, if their files or the changes are written.
 pub struct Step(Option<grains::Grains>);
 
-/// What writes frames.
+/// Writes frames.
 pub struct Writer {
-    /// Gives the threads; its cancel flag does not matter: a frame begun is finished.
+    /// Provides the threads. Its cancel flag is ignored: a frame that was begun is finished.
     ctx: Context,
-    /// The grains of the frame before, where changes are written.
+    /// The grains of the previous frame, if changes are written.
     before: Option<Points>,
 }
 
-/// What the clips of `grains/` share.
+/// Manifest shared by the clips in `grains/`.
 const MANIFEST: &str = "grains/grains.manifest.usda";
-/// How far below the snow (m) grains are dropped.
+/// Grains are dropped this far below the snow (m).
 const BELOW: f64 = 1.0;
 
 impl<'a> Grains<'a> {
-    /// Those of a scene.
+    /// The stage for a scene.
     pub fn new(scene: &'a Scene, inputs: &'a Inputs) -> Self {
         let moving = scene.objects.iter().enumerate().filter(|(_, object)| object.role.moves());
         let object = |((index, object), body): ((usize, &scene::Object), &'a Body)| {
@@ -74,7 +74,7 @@ impl<'a> Grains<'a> {
         Self { scene, inputs, objects }
     }
 
-    /// The grains before the first frame: those of a file, or none.
+    /// The grains before the first frame: read from a file, or none.
     fn initial(&self) -> Result<grains::Grains> {
         let mut grains = grains::Grains::new(params(self.scene, self.inputs.snow.cell))?;
         if let Some(drift) = &self.inputs.drift {
@@ -87,13 +87,13 @@ impl<'a> Grains<'a> {
         Ok(grains)
     }
 
-    /// Whether the files of a frame hold changes only.
+    /// Whether the files of a frame contain only changes.
     fn is_delta(&self, frame: i32) -> bool {
         let passed = i64::from(frame) - i64::from(self.scene.shot.frames.first);
         self.scene.output.grains_delta && passed % i64::from(WHOLE_EVERY) != 0
     }
 
-    /// The layer after a frame; from the one before it, where that is at hand and the frame keeps its changes.
+    /// The base layer after a frame; made from the layer before it if that is given and the frame stores changes.
     fn layer(&self, ctx: &Context, stored: &Stored, before: Option<&Grids>, frame: i32) -> Result<Grids> {
         match before {
             Some(before) if stored.keeps_changes(frame) => {
@@ -136,7 +136,7 @@ impl<'a> Grains<'a> {
     }
 }
 
-/// How the grains of a scene with cells of this size (m) behave.
+/// Parameters of the grains of a scene with cells of `cell` m.
 pub(super) fn params(scene: &Scene, cell: f64) -> Params {
     let values = &scene.values;
     let number = |name: &str| values.number(&format!("grains.{name}"));
@@ -165,7 +165,8 @@ pub(super) fn params(scene: &Scene, cell: f64) -> Params {
     }
 }
 
-/// Friction between grains of a radius (m), and their attraction (weights of a grain): as given, or from what can be measured.
+/// Friction between grains of a radius (m) and their attraction (weights of a grain): as given, or derived from the angle of
+/// repose and the height of a wall.
 fn material(scene: &Scene, radius: f64) -> [f64; 2] {
     let number = |name: &str| scene.values.number(&format!("grains.{name}"));
     let given = number("friction");
@@ -265,7 +266,7 @@ impl Stepping for Grains<'_> {
             forecast.disk_bytes as f64 / 1e6
         );
         match forecast.check(self.scene, ctx.memory_limit()) {
-            // There may be fewer.
+            // The forecast is an upper bound.
             Err(error) if forecast.at_most => log::warn!("{error}"),
             other => return other,
         }
@@ -300,7 +301,7 @@ impl Stepping for Grains<'_> {
         };
         let after = self.layer(ctx, stored, before.as_ref(), frame)?;
         let report = match &before {
-            // What the first poses cut out was gone before the shot began.
+            // Snow cut out by the first poses was removed before the shot began.
             None => Report::default(),
             Some(before) => told(&self.move_grains(ctx, state, [before, &after], frame)?),
         };
