@@ -1,65 +1,74 @@
-//! Eight numbers side by side. Each operation is a loop of its own over plain arrays: inside a kernel that
-//! `cpu::dispatch` compiles, the compiler makes one vector instruction of it. (It did not of one long loop over lanes.)
+//! Eight numbers side by side, as two halves of four: the vector that every x86-64 processor has, and the one in which rows
+//! of four numbers are loaded and stored. (Left to itself, the compiler made a mixture of halves, wholes and single numbers of
+//! loops over eight, and spent most of a kernel on putting them together.)
 
 use std::ops::{Add, BitAnd, BitOr, Div, Mul, Sub};
+
+use half::Half;
 
 /// How many.
 pub const LANES: usize = 8;
 
 /// Eight numbers.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
+#[repr(C, align(16))]
 pub struct Lanes(pub [f32; LANES]);
 
 /// A mask: for each of eight numbers all bits set or none.
 #[derive(Debug, Clone, Copy)]
-pub struct LaneMask([u32; LANES]);
+#[repr(C, align(16))]
+pub struct LaneMask([f32; LANES]);
+
+/// Loads both halves.
+#[inline(always)]
+fn load(numbers: &[f32; LANES]) -> [Half; 2] {
+    let [a, b, c, d, e, f, g, h] = *numbers;
+    [half::load([a, b, c, d]), half::load([e, f, g, h])]
+}
+
+/// Stores both halves.
+#[inline(always)]
+fn store(halves: [Half; 2]) -> [f32; LANES] {
+    let ([a, b, c, d], [e, f, g, h]) = (half::store(halves[0]), half::store(halves[1]));
+    [a, b, c, d, e, f, g, h]
+}
+
+/// An operation on both halves of two.
+#[inline(always)]
+fn each(a: &[f32; LANES], b: &[f32; LANES], operation: impl Fn(Half, Half) -> Half) -> [f32; LANES] {
+    let ([a, c], [b, d]) = (load(a), load(b));
+    store([operation(a, b), operation(c, d)])
+}
 
 impl Lanes {
     /// The same number eight times.
     #[inline(always)]
     pub fn all(value: f32) -> Self {
-        Self([value; LANES])
+        Self(store([half::all(value); 2]))
     }
 
     /// The lesser of each pair.
     #[inline(always)]
     pub fn min(self, other: Self) -> Self {
-        self.each(other, |a, b| if a < b { a } else { b })
+        Self(each(&self.0, &other.0, half::min))
     }
 
     /// The greater of each pair.
     #[inline(always)]
     pub fn max(self, other: Self) -> Self {
-        self.each(other, |a, b| if a > b { a } else { b })
+        Self(each(&self.0, &other.0, half::max))
     }
 
     /// Where this is less than the other.
     #[inline(always)]
     pub fn is_less(self, other: Self) -> LaneMask {
-        let mut out = [0; LANES];
-        for (lane, out) in out.iter_mut().enumerate() {
-            *out = if self.0[lane] < other.0[lane] { u32::MAX } else { 0 };
-        }
-        LaneMask(out)
+        LaneMask(each(&self.0, &other.0, half::is_less))
     }
 
     /// The square roots.
     #[inline(always)]
     pub fn sqrt(self) -> Self {
-        let mut out = self.0;
-        for out in &mut out {
-            *out = out.sqrt();
-        }
-        Self(out)
-    }
-
-    #[inline(always)]
-    fn each(self, other: Self, operation: impl Fn(f32, f32) -> f32) -> Self {
-        let mut out = [0.0; LANES];
-        for (lane, out) in out.iter_mut().enumerate() {
-            *out = operation(self.0[lane], other.0[lane]);
-        }
-        Self(out)
+        Self(store(load(&self.0).map(half::sqrt)))
     }
 }
 
@@ -67,50 +76,21 @@ impl LaneMask {
     /// The first number where the mask is set, the second elsewhere.
     #[inline(always)]
     pub fn choose(self, set: Lanes, clear: Lanes) -> Lanes {
-        let mut out = [0.0; LANES];
-        for (lane, out) in out.iter_mut().enumerate() {
-            let (set, clear) = (set.0[lane].to_bits(), clear.0[lane].to_bits());
-            *out = f32::from_bits(set & self.0[lane] | clear & !self.0[lane]);
-        }
-        Lanes(out)
+        let (mask, set, clear) = (load(&self.0), load(&set.0), load(&clear.0));
+        Lanes(store([half::choose(mask[0], set[0], clear[0]), half::choose(mask[1], set[1], clear[1])]))
     }
 
     /// As [`LaneMask::choose`], of whole numbers.
     #[inline(always)]
     pub fn choose_number(self, set: u32, clear: [u32; LANES]) -> [u32; LANES] {
-        let mut out = [0; LANES];
-        for (lane, out) in out.iter_mut().enumerate() {
-            *out = set & self.0[lane] | clear[lane] & !self.0[lane];
-        }
-        out
+        self.choose(Lanes::all(f32::from_bits(set)), Lanes(clear.map(f32::from_bits))).0.map(f32::to_bits)
     }
-}
 
-impl LaneMask {
     /// Bit i says whether lane i is set.
     #[inline(always)]
     pub fn bits(self) -> u32 {
-        #[cfg(target_arch = "x86_64")]
-        {
-            use std::arch::x86_64::{_mm_loadu_ps, _mm_movemask_ps};
-            let first = self.0.as_ptr().cast::<f32>();
-            // SAFETY: both halves lie within the array; SSE2 is part of x86-64.
-            unsafe {
-                let (low, high) = (_mm_loadu_ps(first), _mm_loadu_ps(first.add(4)));
-                (_mm_movemask_ps(low) | _mm_movemask_ps(high) << 4) as u32
-            }
-        }
-        #[cfg(not(target_arch = "x86_64"))]
-        self.0.iter().enumerate().map(|(lane, mask)| (mask & 1) << lane).sum()
-    }
-
-    #[inline(always)]
-    fn each(self, other: Self, operation: impl Fn(u32, u32) -> u32) -> Self {
-        let mut out = [0; LANES];
-        for (lane, out) in out.iter_mut().enumerate() {
-            *out = operation(self.0[lane], other.0[lane]);
-        }
-        Self(out)
+        let [low, high] = load(&self.0);
+        half::bits(low) | half::bits(high) << 4
     }
 }
 
@@ -119,7 +99,7 @@ impl BitAnd for LaneMask {
 
     #[inline(always)]
     fn bitand(self, other: Self) -> Self {
-        self.each(other, |a, b| a & b)
+        Self(each(&self.0, &other.0, half::and))
     }
 }
 
@@ -128,7 +108,7 @@ impl BitOr for LaneMask {
 
     #[inline(always)]
     fn bitor(self, other: Self) -> Self {
-        self.each(other, |a, b| a | b)
+        Self(each(&self.0, &other.0, half::or))
     }
 }
 
@@ -137,7 +117,7 @@ impl Add for Lanes {
 
     #[inline(always)]
     fn add(self, other: Self) -> Self {
-        self.each(other, |a, b| a + b)
+        Self(each(&self.0, &other.0, half::add))
     }
 }
 
@@ -146,7 +126,7 @@ impl Sub for Lanes {
 
     #[inline(always)]
     fn sub(self, other: Self) -> Self {
-        self.each(other, |a, b| a - b)
+        Self(each(&self.0, &other.0, half::sub))
     }
 }
 
@@ -155,7 +135,7 @@ impl Mul for Lanes {
 
     #[inline(always)]
     fn mul(self, other: Self) -> Self {
-        self.each(other, |a, b| a * b)
+        Self(each(&self.0, &other.0, half::mul))
     }
 }
 
@@ -164,7 +144,134 @@ impl Div for Lanes {
 
     #[inline(always)]
     fn div(self, other: Self) -> Self {
-        self.each(other, |a, b| a / b)
+        Self(each(&self.0, &other.0, half::div))
+    }
+}
+
+/// Four numbers, in a vector.
+#[cfg(target_arch = "x86_64")]
+mod half {
+    use std::arch::x86_64::*;
+
+    pub type Half = __m128;
+
+    /// Declares operations of SSE2.
+    macro_rules! operations {
+        ($($name:ident($($operand:ident),+) = $operation:expr;)+) => {$(
+            #[inline(always)]
+            pub fn $name($($operand: Half),+) -> Half {
+                // SAFETY: SSE2 is part of x86-64.
+                #[allow(unused_unsafe)]
+                unsafe { $operation }
+            }
+        )+};
+    }
+
+    operations! {
+        add(a, b) = _mm_add_ps(a, b);
+        sub(a, b) = _mm_sub_ps(a, b);
+        mul(a, b) = _mm_mul_ps(a, b);
+        div(a, b) = _mm_div_ps(a, b);
+        min(a, b) = _mm_min_ps(a, b);
+        max(a, b) = _mm_max_ps(a, b);
+        sqrt(a) = _mm_sqrt_ps(a);
+        is_less(a, b) = _mm_cmplt_ps(a, b);
+        and(a, b) = _mm_and_ps(a, b);
+        or(a, b) = _mm_or_ps(a, b);
+        choose(mask, set, clear) = _mm_or_ps(_mm_and_ps(mask, set), _mm_andnot_ps(mask, clear));
+    }
+
+    #[inline(always)]
+    pub fn all(value: f32) -> Half {
+        // SAFETY: SSE2 is part of x86-64.
+        #[allow(unused_unsafe)]
+        unsafe {
+            _mm_set1_ps(value)
+        }
+    }
+
+    #[inline(always)]
+    pub fn bits(mask: Half) -> u32 {
+        // SAFETY: SSE2 is part of x86-64.
+        #[allow(unused_unsafe)]
+        unsafe {
+            _mm_movemask_ps(mask) as u32
+        }
+    }
+
+    #[inline(always)]
+    pub fn load(numbers: [f32; 4]) -> Half {
+        // SAFETY: it reads the four numbers.
+        unsafe { _mm_loadu_ps(numbers.as_ptr()) }
+    }
+
+    #[inline(always)]
+    pub fn store(half: Half) -> [f32; 4] {
+        let mut out = [0.0; 4];
+        // SAFETY: it writes the four numbers.
+        unsafe { _mm_storeu_ps(out.as_mut_ptr(), half) };
+        out
+    }
+}
+
+/// Four numbers.
+#[cfg(not(target_arch = "x86_64"))]
+mod half {
+    pub type Half = [f32; 4];
+
+    /// Declares operations number by number.
+    macro_rules! operations {
+        ($($name:ident($a:ident, $b:ident) = $operation:expr;)+) => {$(
+            #[inline(always)]
+            pub fn $name(a: Half, b: Half) -> Half {
+                std::array::from_fn(|lane| {
+                    let ($a, $b) = (a[lane], b[lane]);
+                    $operation
+                })
+            }
+        )+};
+    }
+
+    operations! {
+        add(a, b) = a + b;
+        sub(a, b) = a - b;
+        mul(a, b) = a * b;
+        div(a, b) = a / b;
+        min(a, b) = if a < b { a } else { b };
+        max(a, b) = if a > b { a } else { b };
+        is_less(a, b) = f32::from_bits(if a < b { u32::MAX } else { 0 });
+        and(a, b) = f32::from_bits(a.to_bits() & b.to_bits());
+        or(a, b) = f32::from_bits(a.to_bits() | b.to_bits());
+    }
+
+    #[inline(always)]
+    pub fn choose(mask: Half, set: Half, clear: Half) -> Half {
+        std::array::from_fn(|lane| if mask[lane].to_bits() == 0 { clear[lane] } else { set[lane] })
+    }
+
+    #[inline(always)]
+    pub fn sqrt(a: Half) -> Half {
+        a.map(f32::sqrt)
+    }
+
+    #[inline(always)]
+    pub fn all(value: f32) -> Half {
+        [value; 4]
+    }
+
+    #[inline(always)]
+    pub fn bits(mask: Half) -> u32 {
+        (0..4).map(|lane| (mask[lane].to_bits() & 1) << lane).sum()
+    }
+
+    #[inline(always)]
+    pub fn load(numbers: [f32; 4]) -> Half {
+        numbers
+    }
+
+    #[inline(always)]
+    pub fn store(half: Half) -> [f32; 4] {
+        half
     }
 }
 

@@ -58,6 +58,7 @@ mod scene {
 mod snow {
     mod base;
     mod crumbs;
+    mod grain_limits;
     mod grain_options;
     mod grain_slopes;
     mod grains;

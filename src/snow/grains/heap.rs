@@ -10,7 +10,7 @@ use super::rest;
 use super::rows::{Row, Shared, V, norm};
 use super::search::{Scratch, Search, Travel};
 pub use super::shell::Shell;
-use super::solve::{Coefficients, sub_step};
+use super::solve::{Coefficients, Motion, sub_step};
 use super::touch::{self, Touch};
 use super::trapped;
 use crate::base::DVec3;
@@ -55,6 +55,9 @@ pub struct Heap {
     /// Identities of the grains that had no room at the end of the last step, ascending.
     pub(super) trapped: Vec<u32>,
 }
+
+/// Relative tolerance of a speed.
+const ROUNDING: f32 = 1.0e-4;
 
 /// How a step is divided.
 #[derive(Debug, Clone, Copy)]
@@ -195,11 +198,12 @@ impl Heap {
         let mut layout = self.lay_out(ahead);
         // How far meshes may have travelled in the step (diameters).
         let mut before = 0.0;
+        let mut fastest = self.fastest();
         self.rows.par_iter_mut().for_each(|row| row.limit = 0.0);
         ctx.expect(division.sub_steps);
         for sub in 0..division.sub_steps {
             ctx.check()?;
-            layout.follow(&mut self.rows, &self.ids, ahead);
+            layout.follow(&mut self.rows, ahead);
             for (shell, at) in &mut *shells {
                 at((sub + 1) as f64 / division.sub_steps as f64, &mut pose)?;
                 shell.follow(&pose);
@@ -215,7 +219,10 @@ impl Heap {
             if sub == 0 && coefficients.air_by_neighbours.is_some() {
                 layout.count_neighbours(&self.rows);
             }
-            sub_step(ctx, &mut self.rows, &mut layout, &coefficients, travel.along)?;
+            let most =
+                search.fastest(coefficients.restitution).map_or(f32::INFINITY, |most| most.max(fastest));
+            let motion = Motion { along: travel.along, fastest: most * (1.0 + ROUNDING) };
+            fastest = sub_step(ctx, &mut self.rows, &mut layout, &coefficients, motion)?;
             ctx.advance();
         }
         for (shell, at) in &mut *shells {
@@ -232,7 +239,7 @@ impl Heap {
     fn lay_out(&mut self, ahead: f32) -> Layout {
         let from = order(&self.rows, &self.ids, &self.at);
         self.keep(&from);
-        let mut layout = Layout::new(&mut self.rows, &self.ids, &self.at, ahead);
+        let mut layout = Layout::new(&mut self.rows, &self.at, ahead);
         layout.keep_held(std::mem::take(&mut self.held));
         for touch in std::mem::take(&mut self.touches) {
             layout.blocks[layout.homes[touch.grain as usize].block as usize].touches.push(touch);

@@ -8,7 +8,7 @@ use std::collections::HashMap;
 use rayon::prelude::*;
 
 use super::contacts::{Batch, Held, SKIN, THIN_SKIN};
-use super::rows::{Row, Shared, V, add, norm, scaled};
+use super::rows::{Row, Shared, V, add, dot, norm, scaled};
 use super::touch::Touch;
 use crate::base::DVec3;
 use crate::base::lanes::LANES;
@@ -31,7 +31,7 @@ pub struct Block {
     pub at: At,
     /// The blocks around it, and itself in the middle: along x, then y, then z; [`NONE`] where there is none.
     pub near: [u32; 27],
-    /// Its grains by cell, in a cell by identity.
+    /// Its grains by cell, in a cell in the order in which they came to the block.
     pub members: Vec<u32>,
     /// The first member of each cell (upward, then along x, then z), and how many there are.
     pub starts: [u32; ALL_CELLS + 1],
@@ -158,7 +158,7 @@ pub fn order(rows: &[Row], ids: &[u32], at: &[At]) -> Vec<u32> {
 
 impl Layout {
     /// Blocks of grains in the order of [`order`]; neighbours are not found yet.
-    pub fn new(rows: &mut [Row], ids: &[u32], at: &[At], ahead: f32) -> Self {
+    pub fn new(rows: &mut [Row], at: &[At], ahead: f32) -> Self {
         let mut layout = Self { homes: vec![Home { block: NONE, rank: 0 }; at.len()], ..Self::default() };
         let is_first = |slot: &usize| *slot == 0 || at[*slot] != at[slot - 1];
         let mut firsts: Vec<usize> = (0..at.len()).into_par_iter().filter(is_first).collect();
@@ -168,7 +168,7 @@ impl Layout {
             layout.blocks[block as usize].members.extend(run[0] as u32..run[1] as u32);
             layout.homes[run[0]..run[1]].fill(Home { block, rank: 0 });
         }
-        layout.rank_members(rows, ids, ahead, |_| true);
+        layout.rank_members(rows, ahead, |_| true);
         layout
     }
 
@@ -223,7 +223,7 @@ impl Layout {
 
     /// Moves members of blocks that have strayed to the blocks that they are in, and sorts the members of every block that
     /// changed.
-    pub fn follow(&mut self, rows: &mut [Row], ids: &[u32], ahead: f32) {
+    pub fn follow(&mut self, rows: &mut [Row], ahead: f32) {
         let shared = Shared::new(rows);
         let strayed = self.blocks.par_iter_mut().filter(|block| block.has_strayed);
         let movers: Vec<Vec<Mover>> = strayed
@@ -260,25 +260,22 @@ impl Layout {
                 }
             }
         }
-        self.rank_members(rows, ids, ahead, |block| block.is_changed && block.is_stirred);
+        self.rank_members(rows, ahead, |block| block.is_changed && block.is_stirred);
     }
 
     /// Sorts the members of some blocks.
-    fn rank_members(
-        &mut self,
-        rows: &mut [Row],
-        ids: &[u32],
-        ahead: f32,
-        which: impl Fn(&Block) -> bool + Sync,
-    ) {
+    fn rank_members(&mut self, rows: &mut [Row], ahead: f32, which: impl Fn(&Block) -> bool + Sync) {
         let rows = &*rows;
         let homes = Shared::new(&mut self.homes);
         let changed = self.blocks.par_iter_mut().filter(|block| which(block));
-        changed.for_each_init(Ranking::default, |Ranking { places, sorted, members }, block| {
+        changed.for_each_init(Ranking::default, |Ranking { places, members }, block| {
             if block.has_strayed {
-                let speeds = block.members.iter().map(|&slot| norm(rows[slot as usize].velocity));
-                let fastest = speeds.fold(0.0, f32::max) * ahead / SUB_STEPS_AHEAD;
-                block.skin = if fastest > FAST { THIN_SKIN } else { SKIN };
+                let square = |&slot: &u32| {
+                    let velocity = rows[slot as usize].velocity;
+                    dot(velocity, velocity)
+                };
+                let fastest = block.members.iter().map(square).fold(0.0, f32::max).sqrt();
+                block.skin = if fastest * ahead / SUB_STEPS_AHEAD > FAST { THIN_SKIN } else { SKIN };
             }
             let place = |member: usize, slot: u32| {
                 if block.has_strayed {
@@ -287,29 +284,29 @@ impl Layout {
                     [0, 1, 2].map(|axis: usize| block.anchors[axis][member])
                 }
             };
-            // Counted into cells, then the few of a cell sorted.
             places.clear();
-            places.extend(block.members.iter().enumerate().map(|(member, &slot)| place(member, slot)));
+            places.extend(block.members.iter().enumerate().map(|(member, &slot)| {
+                let place = place(member, slot);
+                (place, cell(place) as u32)
+            }));
+            // Counted into cells; in a cell they keep their order.
             let mut starts = [0u32; ALL_CELLS + 1];
-            places.iter().for_each(|place| starts[cell(*place) + 1] += 1);
+            places.iter().for_each(|(_, cell)| starts[*cell as usize + 1] += 1);
             (0..ALL_CELLS).for_each(|cell| starts[cell + 1] += starts[cell]);
             let mut next = starts;
-            sorted.clear();
-            sorted.resize(places.len(), (0, 0));
-            for (place, (member, &slot)) in places.iter().zip((0..).zip(&block.members)) {
-                let at = &mut next[cell(*place)];
-                sorted[*at as usize] = (ids[slot as usize], member);
-                *at += 1;
-            }
-            for cell in starts.windows(2) {
-                sorted[cell[0] as usize..cell[1] as usize].sort_unstable();
-            }
+            let count = places.len();
             members.clear();
-            members.extend(sorted.iter().map(|(_, member)| block.members[*member as usize]));
-            for (axis, anchors) in block.anchors.iter_mut().enumerate() {
+            members.resize(count, 0);
+            block.anchors.iter_mut().for_each(|anchors| {
                 anchors.clear();
-                anchors.extend(sorted.iter().map(|(_, member)| places[*member as usize][axis]));
-                anchors.extend([f32::INFINITY; LANES]);
+                anchors.resize(count + LANES, f32::INFINITY);
+            });
+            let [xs, ys, zs] = &mut block.anchors;
+            for ((place, cell), &slot) in places.iter().zip(&block.members) {
+                let at = next[*cell as usize] as usize;
+                next[*cell as usize] += 1;
+                members[at] = slot;
+                (xs[at], ys[at], zs[at]) = (place[0], place[1], place[2]);
             }
             for (member, &slot) in (0..).zip(&*members) {
                 // SAFETY: a grain is a member of one block.
@@ -347,9 +344,8 @@ impl Layout {
 /// Working memory of one thread that sorts the members of blocks.
 #[derive(Default)]
 struct Ranking {
-    places: Vec<V>,
-    /// Identities and where they were among the members.
-    sorted: Vec<(u32, u32)>,
+    /// Of each member, with its cell.
+    places: Vec<(V, u32)>,
     members: Vec<u32>,
 }
 

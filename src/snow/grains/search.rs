@@ -81,6 +81,16 @@ fn around() -> f64 {
 }
 
 impl Search<'_> {
+    /// Greatest speed (m/s) at which the meshes throw grains with a restitution; none without meshes.
+    ///
+    /// Grains in a gap that closes between an object and the base would be squeezed out the faster the shorter sub-steps are,
+    /// without a bound, as a liquid is; snow is compacted instead. Contacts dissipate, so that no grain becomes faster than
+    /// what drives them all.
+    pub fn fastest(&self, restitution: f32) -> Option<f32> {
+        let way = self.shells.iter().map(|shell| shell.way()).reduce(f64::max)?;
+        Some((way / self.dt) as f32 * (1.0 + restitution))
+    }
+
     /// Whether a mesh may be as near (diameters) as that, by what is remembered.
     fn is_within(&self, limit: f32, reach: f64) -> bool {
         f64::from(limit) - self.before < reach

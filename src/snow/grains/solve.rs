@@ -59,7 +59,16 @@ pub struct Coefficients {
     pub visits_all: bool,
 }
 
-/// One sub-step: forces, contacts, motion. `along` is where meshes go meanwhile (diameters).
+/// What limits the motion of grains in a sub-step.
+#[derive(Debug, Clone, Copy)]
+pub struct Motion {
+    /// Common displacement of the meshes (diameters).
+    pub along: V,
+    /// Greatest speed (m/s) that contacts may give a grain, gravity aside.
+    pub fastest: f32,
+}
+
+/// One sub-step: forces, contacts, motion. Returns the greatest speed (m/s) at its end.
 ///
 /// # Errors
 /// Cancel.
@@ -68,8 +77,8 @@ pub fn sub_step(
     rows: &mut [Row],
     layout: &mut Layout,
     c: &Coefficients,
-    along: V,
-) -> Result<()> {
+    motion: Motion,
+) -> Result<f32> {
     let colours = layout.colours();
     accelerate(rows, layout, c);
     for pass in [Pass::Begin, Pass::Solve, Pass::SolveLast] {
@@ -78,8 +87,7 @@ pub fn sub_step(
             sweep(rows, layout, colour, pass, c);
         }
     }
-    advance(rows, layout, c, along);
-    Ok(())
+    Ok(advance(rows, layout, c, motion))
 }
 
 /// A sweep over the contacts.
@@ -160,34 +168,48 @@ fn begin_touch(row: &mut Row, touch: &mut Touch, c: &Coefficients) {
     row.velocity = add(row.velocity, scaled(touch.total(), row.weight()));
 }
 
-/// Moves the grains: what cannot move has the last word.
-fn advance(rows: &mut [Row], layout: &mut Layout, c: &Coefficients, along: V) {
+/// Moves the grains: what cannot move has the last word. Returns the greatest speed (m/s).
+fn advance(rows: &mut [Row], layout: &mut Layout, c: &Coefficients, motion: Motion) -> f32 {
     let rows = Shared::new(rows);
-    layout.blocks.par_iter_mut().filter(|block| block.is_reached).for_each(|block| {
+    let reached = layout.blocks.par_iter_mut().filter(|block| block.is_reached);
+    let fastest = reached.map(|block| {
         resist_all(rows, &mut block.touches, true, c);
         let far = (0.5 * block.skin).powi(2);
+        let mut fastest = 0.0f32;
         let Block { members, anchors, .. } = block;
         (block.is_awake, block.has_strayed) = (false, false);
         for (member, &slot) in members.iter().enumerate() {
             // SAFETY: a grain is a member of one block.
             let row = unsafe { rows.get(slot as usize) };
             if !row.rests() {
-                move_on(row, c, along);
+                move_on(row, c, &motion);
+                fastest = fastest.max(dot(row.velocity, row.velocity));
             }
             rest::judge(row, c.rest);
             let strayed = [0, 1, 2].map(|axis| row.place[axis] - anchors[axis][member]);
             block.has_strayed |= dot(strayed, strayed) > far;
             block.is_awake |= !row.rests();
         }
+        fastest
     });
+    fastest.reduce(|| 0.0, f32::max).sqrt()
 }
 
 /// Moves a grain; what its push took back of its motion, its velocity loses where something holds it.
-fn move_on(row: &mut Row, c: &Coefficients, along: V) {
+///
+/// Each contact removes a part of its own overlap, so that the pushes of a grain that is pressed from all sides add up to
+/// more than it takes to leave them all: their sum is bounded too.
+fn move_on(row: &mut Row, c: &Coefficients, motion: &Motion) {
+    row.push = bounded(row.push, FARTHEST);
+    let fall = scaled(c.gravity, c.dt);
+    let driven = sub(row.velocity, fall);
+    if dot(driven, driven) > motion.fastest * motion.fastest {
+        row.velocity = add(bounded(driven, motion.fastest), fall);
+    }
     let way = add(scaled(row.velocity, c.dt / c.diameter), row.push);
     row.place = add(row.place, way);
     // It counts as travel of the meshes that they go along.
-    row.limit += norm(along) - norm(sub(way, along));
+    row.limit += norm(motion.along) - norm(sub(way, motion.along));
     let square = dot(row.push, row.push);
     if row.is_supported() && square > 0.0 {
         let back = scaled(row.push, c.diameter / c.dt);

@@ -66,6 +66,9 @@ const JUMP: f64 = 0.1;
 /// Holes of less than this share of an object's area are closed; an object with larger ones, such as a bowl, collides on both
 /// sides.
 const HOLES: f64 = 0.1;
+/// Speed (m/s) over which an object does not move through a step but stands where it ends: it jumps from one shot, or from one
+/// side of a set, to the next.
+pub const FASTEST_OBJECT: f64 = 100.0;
 /// Count of numbers in [`Surroundings::ties`].
 pub const TIES: usize = 6;
 
@@ -89,7 +92,7 @@ impl<'a> Surroundings<'a> {
         let mut colliders = Colliders { floor, field: self.base.after().map(field), shells: Vec::new() };
         let mut way = 0.0f64;
         let mut boxes = [Vec::new(), Vec::new()];
-        for object in self.objects.iter().filter(|object| object.pushes) {
+        for (index, object) in self.objects.iter().enumerate().filter(|(_, object)| object.pushes) {
             let body = object.body;
             let (mut first, mut last) = (Vec::new(), Vec::new());
             body.closed_pose(from, &mut first)?;
@@ -100,6 +103,16 @@ impl<'a> Surroundings<'a> {
             last.truncate(own);
             boxes[0].push(bounds(&first));
             boxes[1].push(bounds(&last));
+            let speed = speed(&first, &last, to - from);
+            let jumps = speed > FASTEST_OBJECT;
+            if jumps {
+                log::warn!(
+                    "object {} moves at {speed:.0} m/s at {from:.3} s: over {FASTEST_OBJECT} m/s it is taken to jump, and carries no \
+                     grains along",
+                    index + 1
+                );
+                first.clone_from(&last);
+            }
             way = first.iter().zip(&last).map(|(a, b)| way_near(*a, *b, grains)).fold(way, f64::max);
             let turn = |triangle: &[u32; 3]| {
                 if body.is_reversed() { [triangle[0], triangle[2], triangle[1]] } else { *triangle }
@@ -111,7 +124,7 @@ impl<'a> Surroundings<'a> {
             let shell =
                 Shell::new(object.friction as f32, triangles, closed, first).with_stick(object.stick as f32);
             let pose = move |share: f64, out: &mut Vec<DVec3>| {
-                body.closed_pose(from + (to - from) * share, out)?;
+                body.closed_pose(if jumps { to } else { from + (to - from) * share }, out)?;
                 out.truncate(own);
                 Ok(())
             };
@@ -129,6 +142,11 @@ impl<'a> Surroundings<'a> {
         }
         Ok(Obstacles { colliders, way, boxes })
     }
+}
+
+/// Greatest speed (m/s) of a vertex between two poses (m) that lie `dt` (s) apart.
+fn speed(first: &[DVec3], last: &[DVec3], dt: f64) -> f64 {
+    first.iter().zip(last).map(|(a, b)| (b - a).norm_squared()).fold(0.0, f64::max).sqrt() / dt
 }
 
 /// Bounding box of positions.
