@@ -54,6 +54,7 @@ mod scene {
     mod shot_grains;
     mod shot_inputs;
     mod shot_runs;
+    mod shot_upstream;
 }
 mod snow {
     mod base;

@@ -136,6 +136,39 @@ impl Cache {
         Ok(Self { stored, record, chain, forgotten })
     }
 
+    /// Refuses frames of a stage that others read in this run but that it does not make, where they were made with other
+    /// settings or inputs. `upstream` has the frames that these were made from.
+    ///
+    /// # Errors
+    /// The changed settings, or the frame whose inputs have changed; a record that is damaged; an input that cannot be read.
+    pub fn refuse_stale(
+        stage: &dyn Stage,
+        seen: &Arc<Seen>,
+        folder: &Path,
+        reader: &str,
+        upstream: &[&Stored],
+    ) -> Result<()> {
+        let stored = Stored::read(folder, stage.name())?;
+        let record: Record = sealed::read(&record_path(folder, stage))?.unwrap_or_default();
+        // Frames that are not there are reported by themselves.
+        let Some(last) = record.segments.last().filter(|_| stored.frames().next().is_some()) else {
+            return Ok(());
+        };
+        let changed = settings::changed(&last.settings, &stage.settings()?);
+        if !changed.is_empty() {
+            return Err(stale(stage, folder, reader, &format!("other settings ({})", changed.join(", "))));
+        }
+        let chain = Chain::new(seen, last.from, &last.seed);
+        let mut cache = Self { stored, record, chain, forgotten: Vec::new() };
+        match cache.first_changed(stage, upstream)? {
+            None => Ok(()),
+            Some(frame) => {
+                let what = format!("other inputs from frame {frame} on ({})", read_by(stage, frame));
+                Err(stale(stage, folder, reader, &what))
+            }
+        }
+    }
+
     /// Removes the frames that are to be made again, and says in the folder what it is for.
     ///
     /// # Errors
@@ -192,13 +225,24 @@ impl Cache {
         Ok(())
     }
 
+    /// The first frame of the settings of now that was made from other inputs.
+    fn first_changed(&mut self, stage: &dyn Stage, upstream: &[&Stored]) -> Result<Option<i32>> {
+        let own = self.own_from();
+        let is_read = |frame: &i32| *frame >= own && upstream.iter().all(|upstream| upstream.is_done(*frame));
+        let frames: Vec<i32> = self.stored.frames().filter(is_read).collect();
+        for frame in frames {
+            let made = self.inputs(stage, frame, upstream)?;
+            if self.stored.manifest(frame).is_some_and(|manifest| manifest.inputs != made.from) {
+                return Ok(Some(frame));
+            }
+        }
+        Ok(None)
+    }
+
     fn changed_inputs(&self, stage: &dyn Stage, frame: i32) -> Error {
-        let mut names: Vec<String> =
-            stage.reads(frame).files.iter().map(|file| file.display().to_string()).collect();
-        names.extend(stage.upstream().iter().map(|upstream| format!("stage {upstream}")));
         let what = format!(
             "the inputs of frame {frame} have changed since it was made ({}): --from {frame} keeps the frames before it",
-            names.join(" or ")
+            read_by(stage, frame)
         );
         Error::file(self.stored.folder(), what)
     }
@@ -300,6 +344,23 @@ fn refuse_from(
 
 fn record_path(folder: &Path, stage: &dyn Stage) -> PathBuf {
     folder.join("state").join(format!("{}.json", stage.name()))
+}
+
+/// What a stage reads for a frame, as messages say it.
+fn read_by(stage: &dyn Stage, frame: i32) -> String {
+    let mut names: Vec<String> =
+        stage.reads(frame).files.iter().map(|file| file.display().to_string()).collect();
+    names.extend(stage.upstream().iter().map(|upstream| format!("stage {upstream}")));
+    names.join(" or ")
+}
+
+fn stale(stage: &dyn Stage, folder: &Path, reader: &str, made_with: &str) -> Error {
+    let name = stage.name();
+    let what = format!(
+        "stage {reader} reads frames of stage {name} that were made with {made_with}: --stage {name},{reader} --from N \
+         makes both again from frame N on, another -o starts anew"
+    );
+    Error::file(folder, what)
 }
 
 fn other_settings(stage: &dyn Stage, folder: &Path, changed: &[String]) -> Error {

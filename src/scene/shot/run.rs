@@ -65,6 +65,21 @@ impl Plan<'_> {
         out
     }
 
+    /// Refuses to read frames, of stages that are not among some, which this scene would not make as they are.
+    fn refuse_stale(&self, chosen: &[usize], folder: &Path) -> Result<()> {
+        for reader in chosen.iter().map(|place| self.stages[*place].as_stage()) {
+            let is_read = |place: &usize| reader.upstream().contains(&self.stages[*place].name());
+            for place in (0..self.stages.len()).filter(|place| is_read(place) && !chosen.contains(place)) {
+                let stage = self.stages[place].as_stage();
+                let upstream = stage.upstream().iter().map(|name| Stored::read(folder, name));
+                let upstream: Vec<Stored> = upstream.collect::<Result<_>>()?;
+                let upstream: Vec<&Stored> = upstream.iter().collect();
+                Cache::refuse_stale(stage, self.seen, folder, reader.name(), &upstream)?;
+            }
+        }
+        Ok(())
+    }
+
     /// Whether another stage reads a stage's frames.
     fn is_read(&self, name: &str) -> bool {
         self.stages().any(|stage| stage.upstream().contains(&name))
@@ -122,11 +137,13 @@ impl<'a> Run<'a> {
             refuse_asked(stage, asked, &Stored::read(folder, stage.name())?)?;
         }
         Own::read(folder, of_run())?.refuse_foreign(plan, frames)?;
+        plan.refuse_stale(&chosen, folder)?;
         make_folders(of_run(), folder)?;
         let lock = lock(folder)?;
         let own = Own::read(folder, of_run())?;
         own.remove_unfinished()?;
         own.refuse_foreign(plan, frames)?;
+        plan.refuse_stale(&chosen, folder)?;
         let mut run = Self { plan, stages: Vec::new(), own, _lock: lock };
         let downstream = if from.is_some() { plan.downstream(&chosen) } else { Vec::new() };
         for (place, stage) in plan.stages.iter().enumerate() {
