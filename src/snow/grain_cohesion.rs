@@ -11,13 +11,40 @@ const EACH: [f64; 2] = [0.37, 0.0045];
 /// (degrees) just stands; 0 where it stands without. By Rankine the critical height is 4 c tan(45 + a/2) / (rho g), and the
 /// cohesion c is tan(a) times a tensile strength, which is proportional to the attraction (Rumpf 1962).
 pub fn of_wall(height: f64, diameter: f64, repose: f64) -> f64 {
+    let more = (height / diameter - alone(repose)).max(0.0);
+    (EACH[0] + EACH[1] * more) * more / shape(repose)
+}
+
+/// The height (m) of the wall that just stands with an attraction; the reverse of [`of_wall`].
+pub fn wall_of(attraction: f64, diameter: f64, repose: f64) -> f64 {
+    let root = (EACH[0] * EACH[0] + 4.0 * EACH[1] * attraction * shape(repose)).sqrt();
+    (alone(repose) + (root - EACH[0]) / (2.0 * EACH[1])) * diameter
+}
+
+/// Height (diameters) of a wall that stands by the grains' size alone.
+fn alone(repose: f64) -> f64 {
     let repose = repose.max(GENTLEST);
-    let angle = repose.to_radians();
-    let shape = libm::tan(angle) * libm::tan(std::f64::consts::FRAC_PI_4 + 0.5 * angle);
-    let alone = ALONE[0] + ALONE[1] * (32.0 - repose).max(0.0) + ALONE[2] * (repose - 32.0).max(0.0);
-    let more = (height / diameter - alone).max(0.0);
-    (EACH[0] + EACH[1] * more) * more / shape
+    ALONE[0] + ALONE[1] * (32.0 - repose).max(0.0) + ALONE[2] * (repose - 32.0).max(0.0)
+}
+
+/// tan(a) tan(45 degrees + a/2) of an angle of repose a (degrees).
+fn shape(repose: f64) -> f64 {
+    let angle = repose.max(GENTLEST).to_radians();
+    libm::tan(angle) * libm::tan(std::f64::consts::FRAC_PI_4 + 0.5 * angle)
 }
 
 /// Least angle of repose (degrees) that counts: without friction no attraction would do.
 const GENTLEST: f64 = 10.0;
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_height_gives_the_attraction_that_gives_it() {
+        for (height, repose) in [(0.3, 32.0), (0.1, 38.0), (1.5, 5.0)] {
+            let attraction = of_wall(height, 0.005, repose);
+            assert!((wall_of(attraction, 0.005, repose) - height).abs() < 1e-9, "{height}");
+        }
+    }
+}

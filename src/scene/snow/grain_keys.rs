@@ -2,12 +2,15 @@
 
 use crate::error::Result;
 use crate::scene::text::key::{Key, Kind, OBJECT, Scope};
-use crate::scene::text::{FAR, Table, Values};
-use crate::snow::grain_friction;
+use crate::scene::text::{FAR, Table, Values, rounded};
+use crate::snow::{grain_cohesion, grain_friction};
 
 type Scopes = &'static [(&'static str, Scope)];
 const FIRST: Scopes = &[("grains", Scope::First)];
 const STEP: Scopes = &[("grains", Scope::Step)];
+
+/// Greatest attraction (weights of a grain).
+const MOST_ATTRACTION: f64 = 1000.0;
 
 /// All of them.
 pub const GRAIN_KEYS: &[Key] = &[
@@ -62,7 +65,7 @@ pub const GRAIN_KEYS: &[Key] = &[
     Key::new(
         "grains",
         "attraction",
-        Kind::Number(0.0, 1000.0, "weights of a grain"),
+        Kind::Number(0.0, MOST_ATTRACTION, "weights of a grain"),
         "with which grains that all but touch hold each other, in place of stands",
     )
     .or_nothing()
@@ -194,7 +197,38 @@ pub fn check_grains(table: &Table, values: &Values) -> Result<()> {
         let what = "must be [x0, y0, z0, x1, y1, z1] with x0 < x1, y0 < y1 and z0 < z1";
         return Err(table.error("keep_box", what));
     }
+    let Some(radius) = values.number("grains.radius") else { return Ok(()) };
+    if material(values, radius)[1] > MOST_ATTRACTION {
+        let repose = repose_of(values);
+        let highest = grain_cohesion::wall_of(MOST_ATTRACTION, 2.0 * radius, repose);
+        // A little less, so that what is printed is accepted.
+        let highest = rounded(highest * (1.0 - 1.0e-4));
+        let what = format!(
+            "is too high: grains with a radius of {} m and an angle of repose of {} degrees stand at most {highest} m high",
+            rounded(radius),
+            rounded(repose)
+        );
+        return Err(table.error("stands", what));
+    }
     Ok(())
+}
+
+/// Friction between grains of a radius (m) and their attraction (weights of a grain): as given, or derived from the angle of
+/// repose and the height of a wall.
+pub fn material(values: &Values, radius: f64) -> [f64; 2] {
+    let number = |name: &str| values.number(&format!("grains.{name}"));
+    let repose = repose_of(values);
+    let of_wall = || grain_cohesion::of_wall(number("stands").unwrap_or_default(), 2.0 * radius, repose);
+    let attraction = number("attraction").unwrap_or_else(of_wall);
+    let friction = number("friction").unwrap_or_else(|| grain_friction::of_repose(repose, attraction > 0.0));
+    [friction, attraction]
+}
+
+/// The angle of repose (degrees): as given, or that of the friction.
+fn repose_of(values: &Values) -> f64 {
+    let number = |name: &str| values.number(&format!("grains.{name}"));
+    let of_friction = number("friction").map(|friction| grain_friction::repose_of(friction, true));
+    of_friction.or_else(|| number("repose_angle_deg")).unwrap_or_default()
 }
 
 /// Whether a scene has grains.

@@ -6,6 +6,7 @@ use serde_json::json;
 
 use super::forecast::Forecast;
 use super::grain_files::{self, WHOLE_EVERY, ordered, told_apart};
+use super::grain_keys::material;
 use super::inputs::Inputs;
 use super::{base, drift};
 use crate::base::{DVec3, Points};
@@ -21,7 +22,6 @@ use crate::scene::text::keys::{self, settings_of};
 use crate::scene::{self, Role, Scene, moving};
 use crate::snow::base_layer::{Grids, initial};
 use crate::snow::grains::{self, Base, Object, Params, StepReport, Surroundings};
-use crate::snow::{grain_cohesion, grain_friction};
 use crate::sweep::Body;
 
 /// The stage for a scene.
@@ -144,7 +144,7 @@ pub(super) fn params(scene: &Scene, cell: f64) -> Params {
     let flag = |name: &str| values.get(&format!("grains.{name}")).and_then(|value| value.flag());
     let usual = Params::for_cell(cell);
     let radius = number("radius").unwrap_or(usual.radius);
-    let [friction, attraction] = material(scene, radius);
+    let [friction, attraction] = material(values, radius);
     let keep_box = values.get("grains.keep_box").and_then(|value| value.numbers());
     Params {
         radius,
@@ -163,19 +163,6 @@ pub(super) fn params(scene: &Scene, cell: f64) -> Params {
         most: whole("max").map_or(usual.most, |most| most as usize),
         seed: whole("seed").unwrap_or(0) as u64,
     }
-}
-
-/// Friction between grains of a radius (m) and their attraction (weights of a grain): as given, or derived from the angle of
-/// repose and the height of a wall.
-fn material(scene: &Scene, radius: f64) -> [f64; 2] {
-    let number = |name: &str| scene.values.number(&format!("grains.{name}"));
-    let given = number("friction");
-    let of_friction = || given.map(|friction| grain_friction::repose_of(friction, true));
-    let repose = of_friction().or_else(|| number("repose_angle_deg")).unwrap_or_default();
-    let of_wall = || grain_cohesion::of_wall(number("stands").unwrap_or_default(), 2.0 * radius, repose);
-    let attraction = number("attraction").unwrap_or_else(of_wall);
-    let friction = given.unwrap_or_else(|| grain_friction::of_repose(repose, attraction > 0.0));
-    [friction, attraction]
 }
 
 impl Stage for Grains<'_> {

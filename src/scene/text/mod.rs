@@ -21,6 +21,7 @@ pub use values::{Value, Values};
 pub(super) use file::name;
 pub(super) use keys::FAR;
 pub(super) use table::Table;
+pub(super) use template::rounded;
 
 #[cfg(test)]
 mod tests {

@@ -61,13 +61,16 @@ fn default_value(key: &Key, keys: &[Key]) -> String {
     };
     match key.fallback {
         Fallback::Is(value) => value.to_string(),
-        Fallback::Cells(cells) => cell().map_or(String::new(), |cell| format!("{:?}", cells * cell)),
+        Fallback::Cells(cells) => cell().map_or(String::new(), |cell| format!("{:?}", rounded(cells * cell))),
         Fallback::Required | Fallback::Nothing => String::new(),
     }
 }
 
 fn cells(key: &Key) -> String {
-    if let Fallback::Cells(cells) = key.fallback { format!("; default {cells} cells") } else { String::new() }
+    match key.fallback {
+        Fallback::Cells(cells) => format!("; default {} cells", rounded(cells)),
+        _ => String::new(),
+    }
 }
 
 pub(super) fn reference_of(keys: &[Key]) -> String {
@@ -81,7 +84,7 @@ pub(super) fn reference_of(keys: &[Key]) -> String {
                 Fallback::Required => "required".to_string(),
                 Fallback::Nothing => String::new(),
                 Fallback::Is(value) => format!("`{value}`"),
-                Fallback::Cells(cells) => format!("{cells} cells"),
+                Fallback::Cells(cells) => format!("{} cells", rounded(cells)),
             };
             let presets = key.presets.iter().map(|(name, value)| format!("; {name} `{value}`"));
             let default = default + &presets.collect::<String>();
@@ -122,4 +125,9 @@ fn holds(key: &Key) -> String {
 fn short(bound: f64) -> String {
     let size = bound.abs();
     if size != 0.0 && !(1e-3..1e5).contains(&size) { format!("{bound:e}") } else { bound.to_string() }
+}
+
+/// A number with five digits, to be read by people.
+pub(in crate::scene) fn rounded(number: f64) -> f64 {
+    format!("{number:.4e}").parse().unwrap_or(number)
 }
