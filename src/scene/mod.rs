@@ -49,7 +49,7 @@ pub struct Shot {
 /// The layer of snow before the first frame, and how it is edited.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Snow {
-    /// What the snow lies on; may be absent when `layer` is a .vdb.
+    /// What the snow lies on; may be absent when `layer` is a .vdb, where only grains lie on it.
     pub ground: Option<Ground>,
     /// How the layer is given.
     pub layer: Layer,
@@ -68,8 +68,8 @@ pub enum Ground {
     Plane {
         /// Its y (m).
         height: f64,
-        /// The layer's least and greatest x and z: `[x0, z0, x1, z1]` (m).
-        area: [f64; 4],
+        /// The layer's least and greatest x and z: `[x0, z0, x1, z1]` (m); none beside a .vdb layer.
+        area: Option<[f64; 4]>,
     },
     /// A mesh file.
     Mesh(PathBuf),

@@ -20,7 +20,7 @@ use crate::scene::shot::{
 use crate::scene::text::key::Scope;
 use crate::scene::text::keys::{self, settings_of};
 use crate::scene::{self, Role, Scene, moving};
-use crate::snow::base_layer::{Grids, initial};
+use crate::snow::base_layer::Grids;
 use crate::snow::grains::{self, Base, Object, Params, StepReport, Surroundings};
 use crate::sweep::Body;
 
@@ -112,21 +112,18 @@ impl<'a> Grains<'a> {
         layers: [&Grids; 2],
         frame: i32,
     ) -> Result<StepReport> {
-        let mut statics: Vec<_> = self.inputs.statics().iter().collect();
-        let mut floor = None;
-        match self.inputs.made() {
-            Some((initial::Ground::Plane { height, .. }, _)) => floor = Some(*height),
-            Some((initial::Ground::Mesh(mesh), _)) => statics.push(mesh),
-            None => {}
-        }
+        let (floor, ground) = (self.inputs.floor(), self.inputs.ground());
+        let statics: Vec<_> = self.inputs.statics().iter().chain(ground).collect();
         let surface = &layers[1].surface;
-        let bottom = surface.active_bbox().map_or(0.0, |(low, _)| f64::from(low[1]) * surface.voxel_size());
+        let of_layer = surface.active_bbox().map_or(0.0, |(low, _)| f64::from(low[1]) * surface.voxel_size());
+        let of_ground = ground.and_then(|mesh| mesh.bounds()).map(|(low, _)| f64::from(low.y));
+        let bottom = [floor, of_ground].into_iter().flatten().fold(of_layer, f64::min);
         let around = Surroundings {
             base: Base::Whole([&layers[0].surface, surface]),
             objects: &self.objects,
             statics: &statics,
             floor,
-            lowest: floor.map_or(bottom, |floor| floor.min(bottom)) - BELOW,
+            lowest: bottom - BELOW,
         };
         let time = |frame: i32| f64::from(frame) / self.scene.shot.fps;
         state.grains.step(ctx, &around, [time(frame - 1), time(frame)], frame).map_err(|error| match error {

@@ -38,8 +38,21 @@ pub struct Inputs {
 
 /// What the first layer is made from.
 enum Source {
-    Made { ground: initial::Ground, cover: Cover },
-    Given(FloatGrid),
+    Made {
+        ground: initial::Ground,
+        cover: Cover,
+    },
+    /// It is a file's, as it is; only grains lie on the ground.
+    Given {
+        grid: FloatGrid,
+        ground: Option<Under>,
+    },
+}
+
+/// A ground without an area.
+enum Under {
+    Level(f64),
+    Mesh(TriMesh),
 }
 
 impl Inputs {
@@ -51,7 +64,9 @@ impl Inputs {
         let seen = Arc::new(Seen::default());
         let snow = scene.snow()?.clone();
         let source = match &snow.layer {
-            Layer::Grid(path) => Source::Given(layer_grid(path, snow.cell, &seen)?),
+            Layer::Grid(path) => {
+                Source::Given { grid: layer_grid(path, snow.cell, &seen)?, ground: under(&snow, &seen)? }
+            }
             Layer::Depth(depth) => {
                 Source::Made { ground: ground(&snow, &seen)?, cover: Cover::Depth(*depth) }
             }
@@ -63,8 +78,8 @@ impl Inputs {
         if let Source::Made { ground, cover } = &source {
             initial::fits(ground, cover, snow.cell)
                 .map_err(|error| Error::argument(format!("{}: {error}", scene.path.display())))?;
-            warnings.extend(far_meshes(&snow, ground, cover));
         }
+        warnings.extend(far_meshes(&snow, &source));
         let start = f64::from(scene.shot.frames.first) / scene.shot.fps;
         let (mut statics, mut bodies) = (Vec::new(), Vec::new());
         for (index, object) in scene.objects.iter().enumerate() {
@@ -107,7 +122,7 @@ impl Inputs {
                 let (low, high) = mesh.bounds()?;
                 Some([low.x, low.z, high.x, high.z].map(f64::from))
             }
-            Source::Given(_) => None,
+            Source::Given { .. } => None,
         }
     }
 
@@ -134,7 +149,7 @@ impl Inputs {
         let of_mesh =
             |mesh: &TriMesh| mesh.bounds().map(|(low, high)| (low.cast::<f64>(), high.cast::<f64>()));
         let (ground, top) = match &self.source {
-            Source::Given(grid) => {
+            Source::Given { grid, .. } => {
                 let (low, high) = grid.active_bbox()?;
                 let corner = |voxel: [i32; 3]| DVec3::from(voxel.map(f64::from)) * grid.voxel_size();
                 return Some((corner(low), corner(high)));
@@ -184,8 +199,22 @@ impl Inputs {
     pub(super) fn made(&self) -> Option<(&initial::Ground, &Cover)> {
         match &self.source {
             Source::Made { ground, cover } => Some((ground, cover)),
-            Source::Given(_) => None,
+            Source::Given { .. } => None,
         }
+    }
+
+    /// Height of a level ground (m).
+    pub(super) fn floor(&self) -> Option<f64> {
+        match &self.source {
+            Source::Made { ground: initial::Ground::Plane { height, .. }, .. } => Some(*height),
+            Source::Given { ground: Some(Under::Level(height)), .. } => Some(*height),
+            _ => None,
+        }
+    }
+
+    /// The ground, where it is a mesh.
+    pub(super) fn ground(&self) -> Option<&TriMesh> {
+        self.source.ground()
     }
 
     /// What the snow lies on: static objects.
@@ -196,7 +225,7 @@ impl Inputs {
     /// The snow where it is given as a level set.
     pub(super) fn given(&self) -> Option<&FloatGrid> {
         match &self.source {
-            Source::Given(grid) => Some(grid),
+            Source::Given { grid, .. } => Some(grid),
             Source::Made { .. } => None,
         }
     }
@@ -207,11 +236,25 @@ impl Inputs {
     /// As [`initial::layer`].
     pub fn layer(&self, ctx: &Context) -> Result<FloatGrid> {
         match &self.source {
-            Source::Given(grid) => grid.deep_copy(),
+            Source::Given { grid, .. } => grid.deep_copy(),
             Source::Made { ground, cover } => {
                 initial::layer(ctx, ground, &self.statics, cover, self.snow.cell, HALF_WIDTH)
             }
         }
+    }
+}
+
+impl Source {
+    fn ground(&self) -> Option<&TriMesh> {
+        match self {
+            Self::Made { ground: initial::Ground::Mesh(mesh), .. } => Some(mesh),
+            Self::Given { ground: Some(Under::Mesh(mesh)), .. } => Some(mesh),
+            _ => None,
+        }
+    }
+
+    fn top(&self) -> Option<&TriMesh> {
+        if let Self::Made { cover: Cover::Top(mesh), .. } = self { Some(mesh) } else { None }
     }
 }
 
@@ -222,23 +265,34 @@ fn read_mesh(path: &Path, seen: &Seen) -> Result<TriMesh> {
 
 fn ground(snow: &Snow, seen: &Seen) -> Result<initial::Ground> {
     match &snow.ground {
-        Some(Ground::Plane { height, area }) => Ok(initial::Ground::Plane { height: *height, area: *area }),
+        Some(Ground::Plane { height, area: Some(area) }) => {
+            Ok(initial::Ground::Plane { height: *height, area: *area })
+        }
         Some(Ground::Mesh(path)) => Ok(initial::Ground::Mesh(read_mesh(path, seen)?)),
-        None => Err(Error::argument("the snow has no ground")),
+        _ => Err(Error::argument("the snow has no ground")),
     }
 }
 
+/// The ground beside a layer that is given.
+fn under(snow: &Snow, seen: &Seen) -> Result<Option<Under>> {
+    Ok(match &snow.ground {
+        None => None,
+        Some(Ground::Plane { height, .. }) => Some(Under::Level(*height)),
+        Some(Ground::Mesh(path)) => Some(Under::Mesh(read_mesh(path, seen)?)),
+    })
+}
+
 /// What to say of a ground's or top's mesh that lies far from the origin.
-fn far_meshes(snow: &Snow, ground: &initial::Ground, cover: &Cover) -> Vec<String> {
+fn far_meshes(snow: &Snow, source: &Source) -> Vec<String> {
     let told = |path: &Path, mesh: &TriMesh| {
         let farthest = mesh.positions.iter().map(|p| f64::from(p.amax())).fold(0.0, f64::max);
         far_mesh(&path.display().to_string(), farthest, 1.0, snow.cell)
     };
     let mut out = Vec::new();
-    if let (Some(Ground::Mesh(path)), initial::Ground::Mesh(mesh)) = (&snow.ground, ground) {
+    if let (Some(Ground::Mesh(path)), Some(mesh)) = (&snow.ground, source.ground()) {
         out.extend(told(path, mesh));
     }
-    if let (Layer::Top(path), Cover::Top(mesh)) = (&snow.layer, cover) {
+    if let (Layer::Top(path), Some(mesh)) = (&snow.layer, source.top()) {
         out.extend(told(path, mesh));
     }
     // No key moves these.

@@ -24,7 +24,7 @@ pub const KEYS: &[Key] = &[
         "snow",
         "ground",
         Kind::HeightOrFile(FAR, &EXTENSIONS),
-        "height of a level plane (m), or a mesh (then no area)",
+        "height of a level plane (m), or a mesh (then no area); beside a .vdb layer only grains lie on it",
     )
     .or_nothing()
     .begins_with("0.0")
@@ -83,8 +83,7 @@ impl Snow {
             (None, top) => Layer::Top(top?),
         };
         let area = values.get("snow.area").and_then(Value::numbers);
-        let plane =
-            values.number("snow.ground").zip(area).map(|(height, area)| Ground::Plane { height, area });
+        let plane = values.number("snow.ground").map(|height| Ground::Plane { height, area });
         let ground = plane.or(path("snow.ground").map(Ground::Mesh));
         let min_crumb = values.get("snow.min_crumb")?.whole()? as usize;
         Some(Self { ground, layer, cell, noise: noise(values)?, min_crumb })
@@ -101,12 +100,16 @@ impl Snow {
             (None, None) => return Err(snow.error("depth", "is missing (or `top`, a mesh or .vdb file)")),
             _ => {}
         }
+        let is_grid = value("top").and_then(Value::path).is_some_and(|path| extension(path) == "vdb");
         match (value("ground"), value("area")) {
+            (_, Some(_)) if is_grid => {
+                return Err(snow.error("area", "is of no use beside a .vdb layer in `top`: leave it out"));
+            }
             (None, Some(_)) => return Err(snow.error("area", "needs `ground`, the height of a plane")),
             (Some(Value::File(_)), Some(_)) => {
                 return Err(snow.error("area", "is of no use beside a mesh in `ground`: leave it out"));
             }
-            (Some(Value::Number(_)), None) => {
+            (Some(Value::Number(_)), None) if !is_grid => {
                 return Err(snow.error("area", "is missing: a plane needs [x0, z0, x1, z1] (m)"));
             }
             (Some(_), Some(area)) => {
@@ -116,10 +119,6 @@ impl Snow {
                 }
             }
             _ => {}
-        }
-        let is_grid = value("top").and_then(Value::path).is_some_and(|path| extension(path) == "vdb");
-        if is_grid && value("ground").is_some() {
-            return Err(snow.error("ground", "is of no use beside a .vdb layer in `top`: leave it out"));
         }
         if !is_grid && value("ground").is_none() {
             return Err(snow.error("ground", "is missing"));

@@ -5,7 +5,7 @@ use crate::io::seen::Seen;
 use crate::scene::shot::Settings;
 use crate::scene::text::key::{Key, Scope};
 use crate::scene::text::keys::{self, settings_of};
-use crate::scene::{Role, Scene, shot};
+use crate::scene::{Layer, Role, Scene, shot};
 
 /// The settings that the base depends on. Of the frames only the first counts: a shot may grow.
 ///
@@ -15,6 +15,10 @@ pub(super) fn of_base(scene: &Scene, seen: &Seen) -> Result<Settings> {
     let mut settings = settings_of(scene, "base", seen, &[Role::Collide, Role::Base, Role::Static])?;
     for (key, path) in scene.snow.iter().flat_map(|snow| snow.files()) {
         settings.insert(key.into(), format!("{}{}", shot::CONTENT, seen.hash(path)?));
+    }
+    // A layer that is given is as it is, whatever it lies on.
+    if scene.snow.as_ref().is_some_and(|snow| matches!(snow.layer, Layer::Grid(_))) {
+        settings.remove("snow.ground");
     }
     Ok(settings)
 }
