@@ -51,6 +51,7 @@ mod scene {
     mod fuzz;
     mod shot_folder;
     mod shot_grain_files;
+    mod shot_grain_inputs;
     mod shot_grains;
     mod shot_inputs;
     mod shot_runs;

@@ -2,15 +2,30 @@
 
 use std::path::Path;
 
+use rayon::prelude::*;
+
 use super::grain_files::{changes_since, partial};
-use crate::base::DVec3;
+use super::grains::params;
+use super::inputs::Inputs;
+use crate::base::bvh::Bvh;
 use crate::base::points::Values;
+use crate::base::{DVec3, TriMesh};
+use crate::context::Context;
 use crate::error::{Error, Result};
 use crate::io::mesh::extension;
 use crate::io::points_ply;
 use crate::io::seen::Seen;
 use crate::scene::Scene;
-use crate::vdb::points;
+use crate::scene::text::rounded;
+use crate::snow::grains::{FASTEST, Grains, Params};
+use crate::vdb::{FloatGrid, points};
+
+/// Points that are tried as grains together.
+const RUN: usize = 4096;
+/// Depth (diameters) in the snow or below the ground from which a point is no grain.
+const DEEP: f64 = 0.1;
+/// Share of the grains' radius by which a file's own may differ before it is reported.
+const OTHER_SIZE: f64 = 0.01;
 
 /// Loose grains of a file.
 pub struct Drift {
@@ -26,11 +41,11 @@ pub fn file(scene: &Scene) -> Option<&Path> {
 }
 
 impl Drift {
-    /// Those of a scene.
+    /// Those of a scene with cells of this size (m); adds to the warnings what the file says that grains do not follow.
     ///
     /// # Errors
-    /// A file that is missing, cut or damaged; a `v` that is no vector.
-    pub fn of(scene: &Scene, seen: &Seen) -> Result<Option<Self>> {
+    /// A file that is missing, cut or damaged; a `v` that is no vector; places or velocities that no grain can have.
+    pub fn of(scene: &Scene, cell: f64, seen: &Seen, warnings: &mut Vec<String>) -> Result<Option<Self>> {
         let Some(path) = file(scene) else { return Ok(None) };
         seen.hash(path)?;
         let (places, attributes) = if extension(path) == "ply" {
@@ -43,12 +58,98 @@ impl Drift {
             let points = points::read(path, None)?;
             ((0..points.count()).map(|index| points.position(index)).collect(), points.attributes)
         };
-        let velocity = attributes.iter().find(|attribute| attribute.name == "v");
-        let velocities = match velocity.map(|attribute| &attribute.values) {
+        let values = |name: &str| {
+            let attribute = attributes.iter().find(|attribute| attribute.name == name);
+            attribute.map(|attribute| &attribute.values)
+        };
+        let velocities = match values("v") {
             Some(Values::Vector(column)) => (0..places.len()).map(|index| column.get(index)).collect(),
             Some(_) => return Err(Error::file(path, "has an attribute v that is no vector")),
             None => Vec::new(),
         };
-        Ok(Some(Self { places, velocities }))
+        let params = params(scene, cell);
+        if let (Some(Values::Float(own)), false) = (values("pscale"), places.is_empty()) {
+            warnings.extend(other_size(path, own.stored(), params.radius));
+        }
+        let drift = Self { places, velocities };
+        drift.check(params).map_err(|what| Error::file(path, what))?;
+        Ok(Some(drift))
     }
+
+    /// Places (m) and velocities (m/s) of those that are not in a layer, nor below the ground; of grains with a radius (m).
+    ///
+    /// # Errors
+    /// What the grid reports; cancel.
+    pub fn outside(
+        &self,
+        ctx: &Context,
+        inputs: &Inputs,
+        layer: &FloatGrid,
+        radius: f64,
+    ) -> Result<(Vec<DVec3>, Vec<[f32; 3]>)> {
+        let deep = DEEP * 2.0 * radius;
+        let mut distances = Vec::new();
+        layer.sample_linear(ctx, &self.places, &mut distances)?;
+        let ground = inputs.ground().map(|mesh| (mesh, Bvh::new(mesh)));
+        let is_below = |place: &DVec3| {
+            inputs.floor().is_some_and(|floor| place.y < floor - deep)
+                || ground.as_ref().is_some_and(|(mesh, tree)| is_below(mesh, tree, *place, deep))
+        };
+        let is_outside =
+            |point: &usize| f64::from(distances[*point]) >= -deep && !is_below(&self.places[*point]);
+        let kept: Vec<usize> = (0..self.places.len()).into_par_iter().filter(is_outside).collect();
+        let places = kept.iter().map(|point| self.places[*point]).collect();
+        let velocities = kept.iter().filter_map(|point| self.velocities.get(*point).copied()).collect();
+        Ok((places, velocities))
+    }
+
+    /// Checks that every point can be a grain.
+    fn check(&self, params: Params) -> std::result::Result<(), String> {
+        let is_nan = |index: &usize| !self.places[*index].iter().all(|x| x.is_finite());
+        if let Some(point) = (0..self.places.len()).find(is_nan) {
+            return Err(format!("the place of point {} is not finite", point + 1));
+        }
+        for (point, velocity) in self.velocities.iter().enumerate() {
+            if !velocity.iter().all(|x| x.is_finite()) {
+                return Err(format!("the velocity of point {} is not finite", point + 1));
+            }
+            if velocity.iter().any(|x| x.abs() > FASTEST) {
+                return Err(format!(
+                    "the velocity of point {} has a component over {FASTEST} m/s",
+                    point + 1
+                ));
+            }
+        }
+        // How many there may be is another question.
+        let params = Params { most: usize::MAX, ..params };
+        let fits = |places: &[DVec3]| Grains::new(params)?.emit(places, &[], 0);
+        for (run, places) in self.places.chunks(RUN).enumerate() {
+            let Err(error) = fits(places) else { continue };
+            return Err(match places.iter().position(|place| fits(&[*place]).is_err()) {
+                Some(point) => format!("point {} is too far from the origin", run * RUN + point + 1),
+                None => error.to_string(),
+            });
+        }
+        Ok(())
+    }
+}
+
+/// Whether a place is more than a depth (m) below a mesh that is seen from above: the next triangle over it faces up.
+fn is_below(mesh: &TriMesh, tree: &Bvh, place: DVec3, deep: f64) -> bool {
+    let Some(hit) = tree.ray(place, DVec3::y(), f64::INFINITY) else { return false };
+    let [a, b, c] = mesh.triangles[hit.triangle].map(|vertex| mesh.positions[vertex as usize]);
+    hit.distance > deep && (b - a).cross(&(c - a)).y > 0.0
+}
+
+/// What to say of points that have another radius (m) than grains.
+fn other_size(path: &Path, own: &[f32], radius: f64) -> Option<String> {
+    let differs = |own: &&f32| (f64::from(**own) - radius).abs() > OTHER_SIZE * radius;
+    own.iter().find(differs).map(|own| {
+        format!(
+            "{}: its pscale ({} m) is not used: all grains have grains.radius = {} m",
+            path.display(),
+            rounded((*own).into()),
+            rounded(radius)
+        )
+    })
 }

@@ -74,17 +74,26 @@ impl<'a> Grains<'a> {
         Self { scene, inputs, objects }
     }
 
-    /// The grains before the first frame: read from a file, or none.
-    fn initial(&self) -> Result<grains::Grains> {
-        let mut grains = grains::Grains::new(params(self.scene, self.inputs.snow.cell))?;
-        if let Some(drift) = &self.inputs.drift {
-            let added = grains.emit(&drift.places, &drift.velocities, self.scene.shot.frames.first);
-            added.map_err(|error| {
-                let path = drift::file(self.scene).unwrap_or(&self.scene.path);
-                Error::file(path, format!("as grains: {error}"))
-            })?;
+    /// Adds the grains that a file gives at the first frame, except those in the snow or below the ground; returns the frame's report.
+    fn begin(&self, ctx: &Context, grains: &mut grains::Grains, layer: &Grids) -> Result<Report> {
+        let Some(drift) = &self.inputs.drift else { return Ok(Report::default()) };
+        let path = drift::file(self.scene).unwrap_or(&self.scene.path);
+        let frame = self.scene.shot.frames.first;
+        let all = drift.places.len();
+        let (places, velocities) = drift.outside(ctx, self.inputs, &layer.surface, grains.params().radius)?;
+        let left_out = all - places.len();
+        if left_out > 0 {
+            log::warn!(
+                "{}: {left_out} of {all} points lie in the snow or below the ground at frame {frame} and are left out",
+                path.display()
+            );
         }
-        Ok(grains)
+        grains
+            .emit(&places, &velocities, frame)
+            .map_err(|error| Error::file(path, format!("as grains: {error}")))?;
+        let results = [("grains", grains.count()), ("left_out", left_out)];
+        let results = results.map(|(name, count)| (name.to_string(), json!(count))).into_iter().collect();
+        Ok(Report { results, ..Report::default() })
     }
 
     /// Whether the files of a frame contain only changes.
@@ -259,7 +268,7 @@ impl Stepping for Grains<'_> {
 
     fn load(&self, _ctx: &Context, done: &Stored, after: Option<i32>) -> Result<State> {
         let grains = match after {
-            None => self.initial(),
+            None => grains::Grains::new(params(self.scene, self.inputs.snow.cell)),
             Some(frame) => {
                 let path = done.state_file(frame)?;
                 let bytes = std::fs::read(&path).map_err(|error| Error::io(&path, "read", error))?;
@@ -286,7 +295,7 @@ impl Stepping for Grains<'_> {
         let after = self.layer(ctx, stored, before.as_ref(), frame)?;
         let report = match &before {
             // Snow cut out by the first poses was removed before the shot began.
-            None => Report::default(),
+            None => self.begin(ctx, &mut state.grains, &after)?,
             Some(before) => told(&self.move_grains(ctx, state, [before, &after], frame)?),
         };
         state.layer = Some((frame, after));

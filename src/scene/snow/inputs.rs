@@ -109,7 +109,7 @@ impl Inputs {
                 }
             }
         }
-        let drift = Drift::of(scene, &seen)?;
+        let drift = Drift::of(scene, snow.cell, &seen, &mut warnings)?;
         warnings.iter().for_each(|warning| log::warn!("{warning}"));
         Ok(Self { snow, source, statics, bodies, drift, seen, warnings })
     }

@@ -1,0 +1,138 @@
+//! What scenes with grains hold: grounds, walls, grains of files, small objects; what cannot be is refused before the first frame.
+
+use std::fs;
+use std::path::Path;
+
+use super::shot_grains::{folder, grains};
+use crate::program::{CUBE, fails, frazil, works};
+use frazil::base::DVec3;
+use frazil::io::points_ply;
+
+/// Points as a .ply file: x, y, z, vx, vy, vz of each.
+fn points(all: &[[&str; 6]]) -> String {
+    let mut out = format!("ply\nformat ascii 1.0\nelement vertex {}\n", all.len());
+    for name in ["x", "y", "z", "vx", "vy", "vz"] {
+        out += &format!("property float {name}\n");
+    }
+    out += "end_header\n";
+    all.iter().for_each(|point| out += &format!("{}\n", point.join(" ")));
+    out
+}
+
+/// Places of the grains after a frame.
+fn places(at: &Path, frame: i32) -> Vec<DVec3> {
+    points_ply::read(&at.join(format!("out/grains/grains.{frame:04}.ply"))).unwrap().places
+}
+
+fn report(at: &Path, frame: i32) -> serde_json::Value {
+    serde_json::from_slice(&fs::read(at.join(format!("out/report/grains.{frame:04}.json"))).unwrap()).unwrap()
+}
+
+#[test]
+fn a_layer_of_a_file_may_have_a_ground_on_which_grains_lie() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = folder.path();
+    fs::write(at.join("cube.obj"), CUBE).unwrap();
+    works(at, "vdb from-mesh cube.obj --cell 0.02 -o layer.vdb -q");
+    let plane = "v -2 -.05 -2\nv 2 -.05 -2\nv 2 -.05 2\nv -2 -.05 2\nf 1 4 3 2\n";
+    fs::write(at.join("plane.obj"), plane).unwrap();
+    fs::write(at.join("drift.ply"), points(&[["0.6", "0.1", "0", "0", "0", "0"]])).unwrap();
+    let scene = "[shot]\nframes = \"1-20\"\n[snow]\ntop = \"layer.vdb\"\ncell = 0.02\n[grains]\ninitial = \"drift.ply\"\n\
+                 radius = 0.006\n[output]\ngrains = [\"ply\"]\n";
+    let write = |ground: &str| {
+        fs::write(at.join("shot.toml"), scene.replace("cell =", &format!("{ground}\ncell ="))).unwrap();
+    };
+    // Without a ground it falls on and on.
+    write("");
+    works(at, "snow shot.toml -o out -q");
+    assert!(places(at, 20).iter().all(|place| place.y < -1.0));
+    for (ground, height) in [("ground = 0.0", 0.0), ("ground = \"plane.obj\"", -0.05)] {
+        write(ground);
+        works(at, "check shot.toml");
+        // The layer is as it is: another ground changes the grains only.
+        fails(at, "snow shot.toml -o out -q", 2, &["stage grains", "snow.ground"]);
+        works(at, "snow shot.toml -o out -q --stage grains --from 1");
+        let places = places(at, 20);
+        assert_eq!(places.len(), 1);
+        assert!((places[0].y - height - 0.006).abs() < 0.001, "{places:?}");
+    }
+    write("ground = 0.0\narea = [-1, -1, 1, 1]");
+    fails(at, "snow shot.toml -o none -q", 2, &["shot.toml", "`area`", ".vdb"]);
+}
+
+#[test]
+fn a_wall_that_no_attraction_holds_is_refused_with_the_highest_that_stands() {
+    let folder = folder("radius = 0.002\nstands = 2.0", "");
+    let at = folder.path();
+    for command in ["check shot.toml", "snow shot.toml -o out -q"] {
+        fails(at, command, 2, &["shot.toml:10", "`stands`", "0.002 m", "32 degrees", "at most"]);
+    }
+    let said = String::from_utf8(frazil(at, "check shot.toml").stderr).unwrap();
+    let highest: f64 =
+        said.split("at most ").nth(1).and_then(|rest| rest.split(' ').next()).unwrap().parse().unwrap();
+    works(at, &format!("check shot.toml --set grains.stands={highest}"));
+    fails(at, &format!("check shot.toml --set grains.stands={}", 1.01 * highest), 2, &["`stands`"]);
+    works(at, "check shot.toml --set grains.attraction=20");
+}
+
+#[test]
+fn points_that_can_be_no_grains_are_refused_before_the_base_is_made() {
+    let folder = folder("initial = \"drift.ply\"", "");
+    let at = folder.path();
+    let good = ["0", "0.5", "0", "0", "0", "0"];
+    for (point, words) in [
+        (["nan", "0.5", "0", "0", "0", "0"], ["the place of point 2", "is not finite"]),
+        (["0", "inf", "0", "0", "0", "0"], ["the place of point 2", "is not finite"]),
+        (["0", "0.5", "1e15", "0", "0", "0"], ["point 2", "too far from the origin"]),
+        (["0", "0.5", "0", "0", "nan", "0"], ["the velocity of point 2", "is not finite"]),
+        (["0", "0.5", "0", "1e30", "0", "0"], ["the velocity of point 2", "10000 m/s"]),
+    ] {
+        fs::write(at.join("drift.ply"), points(&[good, point])).unwrap();
+        for command in ["check shot.toml", "snow shot.toml -o out -q"] {
+            fails(at, command, 2, &["drift.ply", words[0], words[1]]);
+        }
+        assert!(!at.join("out").exists());
+    }
+}
+
+#[test]
+fn points_in_the_snow_or_below_the_ground_are_left_out_and_counted() {
+    let snow = ["0.4", "0.1", "0.9", "0", "0", "0"];
+    let air = ["0.4", "0.5", "0.9", "0", "0", "0"];
+    let below = ["2", "-0.3", "0", "0", "0", "0"];
+    // On the snow, which is 0.2 m deep, and in it by less than a tenth of a diameter of 13.3 mm.
+    let on = ["-0.4", "0.205", "0.9", "0", "0", "0"];
+    let dipped = ["-0.4", "0.199", "0.7", "0", "0", "0"];
+    let folder = folder("initial = \"drift.ply\"\ncompression = 1.0", "grains = [\"vdb\", \"ply\"]");
+    let at = folder.path();
+    fs::write(at.join("drift.ply"), points(&[snow, air, below, on, dipped])).unwrap();
+    let said = works(at, "snow shot.toml -o out");
+    let warned: Vec<&str> = said.lines().filter(|line| line.contains("left out")).collect();
+    assert_eq!(warned.len(), 1, "{said}");
+    assert!(warned[0].contains("drift.ply: 2 of 5 points"), "{said}");
+    assert_eq!((&report(at, 1)["left_out"], &report(at, 1)["grains"]), (&2.into(), &3.into()));
+    assert_eq!(places(at, 1).len(), 3);
+    assert!((1..=10).all(|frame| report(at, frame)["trapped"].as_u64().unwrap_or(0) == 0));
+    // A run that resumes has the same grains.
+    let files = grains(at, "out");
+    fs::remove_file(at.join("out/state/grains.0010.json")).unwrap();
+    works(at, "snow shot.toml -o out -q");
+    assert!(files == grains(at, "out"));
+}
+
+#[test]
+fn a_radius_of_a_file_that_grains_do_not_have_is_reported() {
+    let folder = folder("initial = \"drift.ply\"\nradius = 0.005", "");
+    let at = folder.path();
+    let file = |radius: &str| {
+        let text = points(&[["0", "0.5", "0", "0", "0", radius]]).replace("float vz", "float pscale");
+        fs::write(at.join("drift.ply"), text).unwrap();
+        works(at, "check shot.toml")
+    };
+    let said = file("0.004");
+    assert!(
+        said.contains("pscale (0.004 m) is not used") && said.contains("grains.radius = 0.005"),
+        "{said}"
+    );
+    assert!(!file("0.00501").contains("pscale"));
+}
