@@ -11,7 +11,10 @@ use crate::error::{Error, Result};
 use crate::io::seen::Seen;
 use crate::io::sequence::Pattern;
 use crate::io::{hash, mesh};
-use crate::motion::{Character, Key, Keys, MeshSequence, Motion, Placed, Play, Rigid, is_gltf, missing_uvs};
+use crate::motion::{
+    Character, Key, Keys, MeshSequence, Motion, Placed, Play, Rigid, is_gltf, missing_uvs, span,
+};
+use crate::scene::text::rounded;
 use crate::scene::{Ground, Layer, Object, Role, Scene, Snow, text};
 use crate::snow::base_layer::initial::{self, Cover};
 use crate::sweep::{self, Body, REACH};
@@ -106,6 +109,7 @@ impl Inputs {
                         );
                     }
                     bodies.push(body);
+                    warnings.extend(too_small(scene, object, &body, start)?);
                 }
             }
         }
@@ -380,4 +384,23 @@ fn posed(motion: &dyn Motion, time: f64) -> Result<TriMesh> {
     let mut pose = Vec::new();
     motion.pose(time, &mut pose)?;
     Ok(TriMesh { positions: pose.iter().map(|p| p.cast()).collect(), triangles: motion.triangles().to_vec() })
+/// What to say of an object that takes snow and is smaller than a grain at a time (s).
+fn too_small(scene: &Scene, object: &Object, body: &Body, time: f64) -> Result<Option<String>> {
+    let Some(radius) = scene.values.number("grains.radius").filter(|_| object.role.removes()) else {
+        return Ok(None);
+    };
+    let mut pose = Vec::new();
+    body.motion().pose(time, &mut pose)?;
+    let (low, high) = span(&pose);
+    let (size, diameter) = ((high - low).max(), 2.0 * radius);
+    Ok((size < diameter).then(|| {
+        format!(
+            "{} is {} m large, smaller than a grain of {} m: what it takes makes no grains; choose a smaller grains.radius",
+            body.name().unwrap_or("an object"),
+            rounded(size),
+            rounded(diameter)
+        )
+    }))
+}
+
 }

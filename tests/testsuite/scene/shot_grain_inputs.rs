@@ -136,3 +136,22 @@ fn a_radius_of_a_file_that_grains_do_not_have_is_reported() {
     );
     assert!(!file("0.00501").contains("pscale"));
 }
+
+#[test]
+fn an_object_smaller_than_a_grain_is_reported() {
+    let folder = folder("compression = 0.0\nradius = 0.005", "");
+    let at = folder.path();
+    let small = "--set object.1.scale=0.02";
+    for command in ["check shot.toml", "snow shot.toml -o out --frames 1-2"] {
+        let said = works(at, &format!("{command} {small}"));
+        assert!(
+            said.contains("object 1 (cube.obj) is 0.008 m large, smaller than a grain of 0.01 m"),
+            "{said}"
+        );
+    }
+    assert!(!works(at, "check shot.toml").contains("smaller than a grain"));
+    // Nor where it takes no snow.
+    assert!(
+        !works(at, &format!("check shot.toml {small} --set object.1.role=grains")).contains("smaller than")
+    );
+}
