@@ -20,7 +20,9 @@ pub fn run(args: &Args, session: &Session) -> Result<(), Failure> {
     let too_many = report.grains.as_ref().and_then(|grains| grains.check(&scene, limit).err());
     report.warnings.extend(too_many.map(|error| error.to_string()));
     if let Err(error) = check_memory(&scene, &inputs, limit) {
+    let close = report.grains.as_ref().and_then(|grains| grains.warning(&scene));
         report.warnings.push(error.to_string());
+    report.warnings.extend(close);
     }
     let free = args.output.as_deref().and_then(free_space);
     if let (Some(free), Some(needed)) = (free, report.disk_bytes.filter(|needed| Some(*needed) > free)) {

@@ -10,6 +10,9 @@ use crate::scene::Scene;
 use crate::scene::shot::Stored;
 use crate::snow::grains::PACKING;
 
+/// Relative error that an estimate of the grains may have.
+const OFF: f64 = 0.1;
+
 /// Forecast of the grains from a base.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Forecast {
@@ -75,17 +78,10 @@ impl Forecast {
     /// Fails if there are too many grains for the limits; if the forecast is an upper bound, that is only likely.
     ///
     /// # Errors
-    /// More than `grains.max`; more memory than the limit (bytes).
+    /// More than `grains.max` by over a tenth, which estimates are not off by; more memory than the limit (bytes).
     pub fn check(&self, scene: &Scene, limit: u64) -> Result<()> {
-        let Self { grains, to_frame, .. } = self;
-        let most = scene.values.get("grains.max").and_then(|value| value.whole()).unwrap_or(i64::MAX);
-        if *grains > most as u64 {
-            return Err(Error::argument(format!(
-                "{}: the base up to frame {to_frame} makes {}, more than grains.max = {most}: larger grains \
-                 (grains.radius) or more grains.compression make fewer",
-                scene.path.display(),
-                self.count()
-            )));
+        if self.grains as f64 > (1.0 + OFF) * most(scene) as f64 {
+            return Err(Error::argument(self.too_many(scene)));
         }
         if self.memory_bytes > limit {
             let what = format!("{}: stage grains with {}", scene.path.display(), self.count());
@@ -94,10 +90,34 @@ impl Forecast {
         Ok(())
     }
 
+    /// The warning for an estimate that is over `grains.max`, but by no more than its error.
+    pub fn warning(&self, scene: &Scene) -> Option<String> {
+        let (grains, most) = (self.grains, most(scene));
+        let is_close = grains > most && grains as f64 <= (1.0 + OFF) * most as f64;
+        is_close.then(|| self.too_many(scene))
+    }
+
+    fn too_many(&self, scene: &Scene) -> String {
+        format!(
+            "{}: the base up to frame {} makes {}, more than grains.max = {}: larger grains (grains.radius) or more \
+             grains.compression make fewer",
+            scene.path.display(),
+            self.to_frame,
+            self.count(),
+            most(scene)
+        )
+    }
+
     /// "about 30261 grains at once".
     pub fn count(&self) -> String {
         format!("{} {} grains at once", if self.at_most { "at most about" } else { "about" }, self.grains)
     }
+}
+
+/// The most grains that a scene may have.
+fn most(scene: &Scene) -> u64 {
+    let most = scene.values.get("grains.max").and_then(|value| value.whole());
+    most.map_or(u64::MAX, |most| most as u64)
 }
 
 /// Count of grains after each frame, given those born in each and their lifetime in frames.

@@ -131,8 +131,8 @@ pub const GRAIN_KEYS: &[Key] = &[
         Kind::Whole(1, 60_000_000),
         "most grains: a frame that would have more is an error",
     )
-    .or("20000000")
-    .concerns(STEP),
+    // No frame that is there depends on it.
+    .or("20000000"),
     Key::new(
         "grains",
         "lifetime",

@@ -258,6 +258,9 @@ impl Stepping for Grains<'_> {
             forecast.memory_bytes as f64 / 1e6,
             forecast.disk_bytes as f64 / 1e6
         );
+        if let Some(warning) = forecast.warning(self.scene) {
+            log::warn!("{warning}");
+        }
         match forecast.check(self.scene, ctx.memory_limit()) {
             // The forecast is an upper bound.
             Err(error) if forecast.at_most => log::warn!("{error}"),

@@ -155,3 +155,26 @@ fn an_object_smaller_than_a_grain_is_reported() {
         !works(at, &format!("check shot.toml {small} --set object.1.role=grains")).contains("smaller than")
     );
 }
+
+#[test]
+fn an_estimate_that_is_little_over_max_is_a_warning() {
+    let folder = folder("compression = 0.4", "");
+    let at = folder.path();
+    works(at, "snow shot.toml -o out -q");
+    let count = report(at, 10)["grains"].as_u64().unwrap();
+    let owed = report(at, 10)["owed"].as_f64().unwrap();
+    assert!((1.0..0.1 * count as f64).contains(&owed), "{owed} of {count}");
+    // Frames that are there do not depend on it.
+    for max in [count, 3 * count, 1] {
+        let said = works(at, &format!("snow shot.toml -o out --set grains.max={max}"));
+        assert!(said.contains("there"), "{said}");
+    }
+    let again = |max: u64| format!("snow shot.toml -o out --stage grains --from 1 --set grains.max={max}");
+    let said = works(at, &again(count));
+    assert!(said.contains("warn") && said.contains(&format!("more than grains.max = {count}")), "{said}");
+    let said = works(at, &format!("check shot.toml -o out --set grains.max={count}"));
+    assert!(said.contains("more than grains.max"), "{said}");
+    // The frame that has too many ends the run.
+    fails(at, &again(count - 1), 1, &["frame 10", "max"]);
+    fails(at, &again(count / 2), 2, &["grains.max"]);
+}
