@@ -19,6 +19,8 @@ const RUN: usize = 12;
 /// Largest turn of a body between two samples of its path (radians), and most samples between two of its kinks.
 const TURN: f64 = std::f64::consts::PI / 6.0;
 const MOST_PARTS: f64 = 1000.0;
+/// A vertex faster than this (m/s) probably jumps.
+const JUMPING: f64 = 100.0;
 /// An object larger than the first or smaller than the second (m) probably uses another unit.
 const TALL: f64 = 20.0;
 const SMALL: f64 = 0.02;
@@ -96,6 +98,7 @@ impl<'a> Course<'a> {
         let all = [
             self.out_of_reach(ctx)?,
             self.too_fast(),
+            self.jumping(report),
             self.other_unit(),
             self.untouched(report),
             self.inside_out(),
@@ -178,6 +181,17 @@ impl<'a> Course<'a> {
         scene.shot.frames.iter().skip(1).find_map(|frame| {
             let error = body.turning(time(frame - 1), time(frame)).err()?;
             Some(format!("frame {frame} cannot be made: {error}"))
+        })
+    }
+
+    /// A step so fast that it is probably a jump.
+    fn jumping(&self, report: &ObjectReport) -> Option<String> {
+        (report.fastest_m_per_s > JUMPING).then(|| {
+            format!(
+                "{} moves at {:.0} m/s in the step to frame {}: if that is a jump, it still cuts the snow on its way; grains \
+                 take it as standing at its new place from the step's start",
+                self.name, report.fastest_m_per_s, report.fastest_frame
+            )
         })
     }
 

@@ -178,3 +178,24 @@ fn an_estimate_that_is_little_over_max_is_a_warning() {
     fails(at, &again(count - 1), 1, &["frame 10", "max"]);
     fails(at, &again(count / 2), 2, &["grains.max"]);
 }
+
+#[test]
+fn an_object_that_jumps_is_reported_with_its_speed_and_frame() {
+    let folder = folder("", "");
+    let at = folder.path();
+    let scene = fs::read_to_string(at.join("shot.toml")).unwrap();
+    let jump = |z: f64| {
+        let jumping = scene.replace(
+            "{ frame = 10, at = [0, 0.1, 0.4], turn_deg = [0, 40, 0] }",
+            &format!("{{ frame = 5, at = [0, 0.1, 0] }}, {{ frame = 6, at = [0, 0.1, {z}] }}"),
+        );
+        assert!(jumping != scene);
+        fs::write(at.join("jump.toml"), jumping).unwrap();
+        works(at, "check jump.toml")
+    };
+    let said = jump(5.0);
+    assert!(said.contains("object 1 (cube.obj) moves at 120 m/s in the step to frame 6"), "{said}");
+    assert!(!jump(4.0).contains("jump,"));
+    // Outside of the shot nothing jumps.
+    assert!(!works(at, "check jump.toml --set shot.frames=1-5").contains("jump,"));
+}
