@@ -27,6 +27,9 @@ pub struct Args {
     /// Put a setting over the scene's, for instance snow.noise.seed=2 or object.1.file=hero.glb.
     #[arg(long, value_name = "KEY=VALUE")]
     set: Vec<Override>,
+    /// Check it with cells N times as large, as `frazil snow --preview N` makes it.
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..=100))]
+    preview: Option<u16>,
     /// Print JSON.
     #[arg(long)]
     json: bool,
@@ -45,8 +48,8 @@ pub fn run(args: &Args, session: &Session) -> Result<(), Failure> {
 
 /// Compares an output folder with what was written into it.
 fn check_folder(args: &Args, session: &Session) -> Result<(), Failure> {
-    if args.output.is_some() || !args.set.is_empty() {
-        return Err(Failure::refused("-o and --set are of no use with an output folder"));
+    if args.output.is_some() || !args.set.is_empty() || args.preview.is_some() {
+        return Err(Failure::refused("-o, --set and --preview are of no use with an output folder"));
     }
     let verified = verify(&session.ctx, &args.scene).before()?;
     let text = if args.json {

@@ -13,16 +13,19 @@ use crate::cli::{machine, output};
 
 /// Checks the scene.
 pub fn run(args: &Args, session: &Session) -> Result<(), Failure> {
-    let scene = Scene::read_with(&args.scene, &args.set).before()?;
+    let mut scene = Scene::read_with(&args.scene, &args.set).before()?;
+    if let Some(factor) = args.preview {
+        scene.coarsen(factor.into()).before()?;
+    }
     let inputs = Inputs::load(&scene).before()?;
     let mut report = check(&session.ctx, &scene, &inputs, args.output.as_deref()).before()?;
     let limit = session.max_memory();
+    let close = report.grains.as_ref().and_then(|grains| grains.warning(&scene));
     let too_many = report.grains.as_ref().and_then(|grains| grains.check(&scene, limit).err());
+    report.warnings.extend(close);
     report.warnings.extend(too_many.map(|error| error.to_string()));
     if let Err(error) = check_memory(&scene, &inputs, limit) {
-    let close = report.grains.as_ref().and_then(|grains| grains.warning(&scene));
         report.warnings.push(error.to_string());
-    report.warnings.extend(close);
     }
     let free = args.output.as_deref().and_then(free_space);
     if let (Some(free), Some(needed)) = (free, report.disk_bytes.filter(|needed| Some(*needed) > free)) {

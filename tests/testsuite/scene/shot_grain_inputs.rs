@@ -199,3 +199,12 @@ fn an_object_that_jumps_is_reported_with_its_speed_and_frame() {
     // Outside of the shot nothing jumps.
     assert!(!works(at, "check jump.toml --set shot.frames=1-5").contains("jump,"));
 }
+
+#[test]
+fn a_check_of_a_preview_has_its_cells() {
+    let folder = folder("", "");
+    let said = works(folder.path(), "check shot.toml --preview 2");
+    assert!(said.contains("cells of 0.04 m"), "{said}");
+    fails(folder.path(), "check shot.toml --preview 0", 2, &["--preview"]);
+    fails(folder.path(), "check . --preview 2", 2, &["--preview"]);
+}
