@@ -4,6 +4,7 @@ use std::path::Path;
 use std::sync::Arc;
 
 use super::drift::Drift;
+use super::grain_keys::{has_grains, replaced};
 use crate::base::mesh::{farthest, too_far as far_mesh};
 use crate::base::{DVec3, TriMesh};
 use crate::context::Context;
@@ -108,10 +109,13 @@ impl Inputs {
                             body.contradictions()
                         );
                     }
-                    bodies.push(body);
                     warnings.extend(too_small(scene, object, &body, start)?);
+                    bodies.push(body);
                 }
             }
+        }
+        if has_grains(&scene.values) {
+            warnings.extend(replaced(&scene.values));
         }
         let drift = Drift::of(scene, snow.cell, &seen, &mut warnings)?;
         warnings.iter().for_each(|warning| log::warn!("{warning}"));
@@ -380,10 +384,6 @@ fn character(scene: &Scene, object: &Object, seen: &Seen) -> Result<Character> {
     Ok(character)
 }
 
-fn posed(motion: &dyn Motion, time: f64) -> Result<TriMesh> {
-    let mut pose = Vec::new();
-    motion.pose(time, &mut pose)?;
-    Ok(TriMesh { positions: pose.iter().map(|p| p.cast()).collect(), triangles: motion.triangles().to_vec() })
 /// What to say of an object that takes snow and is smaller than a grain at a time (s).
 fn too_small(scene: &Scene, object: &Object, body: &Body, time: f64) -> Result<Option<String>> {
     let Some(radius) = scene.values.number("grains.radius").filter(|_| object.role.removes()) else {
@@ -403,4 +403,8 @@ fn too_small(scene: &Scene, object: &Object, body: &Body, time: f64) -> Result<O
     }))
 }
 
+fn posed(motion: &dyn Motion, time: f64) -> Result<TriMesh> {
+    let mut pose = Vec::new();
+    motion.pose(time, &mut pose)?;
+    Ok(TriMesh { positions: pose.iter().map(|p| p.cast()).collect(), triangles: motion.triangles().to_vec() })
 }
