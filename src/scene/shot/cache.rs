@@ -322,7 +322,7 @@ fn refuse_from(
     if stage.remembers() && stored.latest_state(before..=before).is_none() {
         let kept: Vec<String> = stored
             .frames()
-            .filter(|frame| stored.latest_state(*frame..=*frame).is_some())
+            .filter(|frame| *frame < frames.last() && stored.latest_state(*frame..=*frame).is_some())
             .map(|frame| format!("--from {}", i64::from(frame) + 1))
             .collect();
         let ways = if kept.is_empty() { String::new() } else { format!("{}, ", kept.join(", ")) };

@@ -8,6 +8,7 @@ use super::stage::Stage;
 use super::stored::Stored;
 use crate::error::{Error, Result};
 use crate::io::hash::Hasher;
+use crate::io::manifest::{Manifest, Written};
 use crate::io::seen::Seen;
 
 /// Hashes of the frames from a start on.
@@ -93,9 +94,18 @@ impl Chain {
     }
 }
 
-/// Says that a stage's frame lacks that of a stage upstream.
+/// Says that a stage's frame lacks that of a stage upstream, or a file of it.
 pub(super) fn missing(stage: &dyn Stage, frame: i32, upstream: &str, folder: &Path) -> Error {
     let name = stage.name();
+    let files = Manifest::read(folder, upstream, frame).ok().flatten().map(|manifest| manifest.files);
+    let is_other = |file: &&Written| folder.join(&file.path).exists() && !file.is_there(folder);
+    if let Some(file) = files.iter().flatten().find(is_other) {
+        let fault = file.fault(folder).unwrap_or_default();
+        let what = format!(
+            "is not the file that was made, which frame {frame} of stage {name} needs (it {fault}): make stage {upstream} too"
+        );
+        return Error::file(folder.join(&file.path), what);
+    }
     let what = format!(
         "frame {frame} of stage {name} needs that of stage {upstream}, which is not there: make it too"
     );

@@ -222,3 +222,19 @@ fn keys_that_others_stand_in_place_of_are_reported() {
         assert!(!said(&format!("--set grains.{one}")).contains("stands in place"), "{one}");
     }
 }
+
+#[test]
+fn a_replaced_base_file_and_frames_to_start_from_are_named_as_they_are() {
+    let folder = folder("", "");
+    let at = folder.path();
+    works(at, "snow shot.toml -o out -q --frames 1-6 --set shot.frames=1-6");
+    // Of the grains only the last two frames are kept exactly; there is no frame 7.
+    let from = "snow shot.toml -o out -q --stage grains --from 4 --set shot.frames=1-6";
+    fails(at, from, 2, &["(state/ keeps those of the last two frames): --from 6, --from 1 or another -o"]);
+    let none = report(at, 1).get("owed").cloned();
+    assert!(none.is_none());
+    fs::copy(at.join("out/base/base.0004.vdb"), at.join("out/base/base.0003.vdb")).unwrap();
+    let run = "snow shot.toml -o out -q --stage grains --from 1 --set shot.frames=1-6";
+    fails(at, run, 2, &["base.0003.vdb", "is not the file that was made", "frame 3 of stage grains"]);
+    works(at, &run.replace("grains", "base,grains"));
+}
