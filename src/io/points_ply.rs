@@ -54,7 +54,7 @@ pub fn holds_points(path: &Path) -> Result<bool> {
     Ok(ply::open(&bytes).is_ok_and(|body| !body.elements.iter().any(|e| is_face(e) && e.count > 0)))
 }
 
-/// Reads the vertices of a .ply file as points. `id` becomes 64-bit integers and `active` `bool`; other integers of up to
+/// Reads the vertices of a .ply file as points. `id` becomes 64-bit integers, `active` and `trapped` `bool`; other integers of up to
 /// 32 bits become 32-bit ones, floats 32-bit ones, and three properties that end in x, y and z vectors. Values that are the
 /// same at all points become one. Lists are left out.
 ///
@@ -118,7 +118,7 @@ fn attributes(
                 )
             }
             (None, "id") => (name.as_str(), Values::Long(shared(whole(name, column)?, |&id| id))),
-            (None, "active") => {
+            (None, "active" | "trapped") => {
                 let yes = column.iter().map(|&value| value != 0.0).collect();
                 (name.as_str(), Values::Bool(shared(yes, |&yes| yes)))
             }
@@ -275,6 +275,7 @@ mod tests {
             points.set("id", Values::Long(Column::Each(vec![5, 1 << 40, 7])));
             points.set("pscale", Values::Float(Column::Uniform(0.1)));
             points.set("active", Values::Bool(Column::Each(vec![true, false, true])));
+            points.set("trapped", Values::Bool(Column::Each(vec![false, false, true])));
             points.set("source_frame", Values::Int(Column::Each(vec![-1, 2, 3])));
             let plain: Vec<Plain<'_>> = points.attributes.iter().map(|a| plain(a).unwrap()).collect();
             let mut bytes = Vec::new();

@@ -343,7 +343,8 @@ fn told(report: &StepReport) -> Report {
         "born": report.born,
         "resting": report.resting,
         "trapped": report.trapped,
-        "owed": report.owed,
+        // A sum of nothing is -0.
+        "owed": report.owed + 0.0,
         "dropped": report.dropped,
         "expired": report.expired,
         "removed_m3": report.removed_volume,

@@ -112,7 +112,7 @@ const OUTPUT: &[Key] = &[
         "output",
         "grains",
         Kind::Choices(&["vdb", "ply", "usd"]),
-        "grains/grains.%04d.vdb: points with v, id, pscale, source_frame, rest; also \"ply\", \"usd\" (large)",
+        "grains/grains.%04d.vdb: points with v, id, active, trapped, pscale, source_frame, rest; also \"ply\", \"usd\" (large)",
     )
     .or("[\"vdb\"]")
     .concerns(&[("grains", Output)]),

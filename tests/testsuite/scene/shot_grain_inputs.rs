@@ -157,6 +157,41 @@ fn an_object_smaller_than_a_grain_is_reported() {
 }
 
 #[test]
+fn an_object_that_jumps_is_reported_with_its_speed_and_frame() {
+    let folder = folder("", "");
+    let at = folder.path();
+    let scene = fs::read_to_string(at.join("shot.toml")).unwrap();
+    let jump = |z: f64| {
+        let jumping = scene.replace(
+            "{ frame = 10, at = [0, 0.1, 0.4], turn_deg = [0, 40, 0] }",
+            &format!("{{ frame = 5, at = [0, 0.1, 0] }}, {{ frame = 6, at = [0, 0.1, {z}] }}"),
+        );
+        assert!(jumping != scene);
+        fs::write(at.join("jump.toml"), jumping).unwrap();
+        works(at, "check jump.toml")
+    };
+    let said = jump(5.0);
+    assert!(said.contains("object 1 (cube.obj) moves at 120 m/s in the step to frame 6"), "{said}");
+    assert!(!jump(4.0).contains("jump,"));
+    // Outside of the shot nothing jumps.
+    assert!(!works(at, "check jump.toml --set shot.frames=1-5").contains("jump,"));
+}
+
+#[test]
+fn keys_that_others_stand_in_place_of_are_reported() {
+    let folder = folder("", "");
+    let at = folder.path();
+    let said = |set: &str| works(at, &format!("check shot.toml {set}"));
+    let both = said("--set grains.friction=0.2 --set grains.repose_angle_deg=25");
+    assert!(both.contains("grains.friction = 0.2 stands in place of grains.repose_angle_deg = 25"), "{both}");
+    let both = said("--set grains.attraction=4 --set grains.stands=0.2");
+    assert!(both.contains("grains.attraction = 4 stands in place of grains.stands = 0.2"), "{both}");
+    for one in ["friction=0.2", "repose_angle_deg=25", "attraction=4 --set grains.preset=wet"] {
+        assert!(!said(&format!("--set grains.{one}")).contains("stands in place"), "{one}");
+    }
+}
+
+#[test]
 fn an_estimate_that_is_little_over_max_is_a_warning() {
     let folder = folder("compression = 0.4", "");
     let at = folder.path();
@@ -180,47 +215,12 @@ fn an_estimate_that_is_little_over_max_is_a_warning() {
 }
 
 #[test]
-fn an_object_that_jumps_is_reported_with_its_speed_and_frame() {
-    let folder = folder("", "");
-    let at = folder.path();
-    let scene = fs::read_to_string(at.join("shot.toml")).unwrap();
-    let jump = |z: f64| {
-        let jumping = scene.replace(
-            "{ frame = 10, at = [0, 0.1, 0.4], turn_deg = [0, 40, 0] }",
-            &format!("{{ frame = 5, at = [0, 0.1, 0] }}, {{ frame = 6, at = [0, 0.1, {z}] }}"),
-        );
-        assert!(jumping != scene);
-        fs::write(at.join("jump.toml"), jumping).unwrap();
-        works(at, "check jump.toml")
-    };
-    let said = jump(5.0);
-    assert!(said.contains("object 1 (cube.obj) moves at 120 m/s in the step to frame 6"), "{said}");
-    assert!(!jump(4.0).contains("jump,"));
-    // Outside of the shot nothing jumps.
-    assert!(!works(at, "check jump.toml --set shot.frames=1-5").contains("jump,"));
-}
-
-#[test]
 fn a_check_of_a_preview_has_its_cells() {
     let folder = folder("", "");
     let said = works(folder.path(), "check shot.toml --preview 2");
     assert!(said.contains("cells of 0.04 m"), "{said}");
     fails(folder.path(), "check shot.toml --preview 0", 2, &["--preview"]);
     fails(folder.path(), "check . --preview 2", 2, &["--preview"]);
-}
-
-#[test]
-fn keys_that_others_stand_in_place_of_are_reported() {
-    let folder = folder("", "");
-    let at = folder.path();
-    let said = |set: &str| works(at, &format!("check shot.toml {set}"));
-    let both = said("--set grains.friction=0.2 --set grains.repose_angle_deg=25");
-    assert!(both.contains("grains.friction = 0.2 stands in place of grains.repose_angle_deg = 25"), "{both}");
-    let both = said("--set grains.attraction=4 --set grains.stands=0.2");
-    assert!(both.contains("grains.attraction = 4 stands in place of grains.stands = 0.2"), "{both}");
-    for one in ["friction=0.2", "repose_angle_deg=25", "attraction=4 --set grains.preset=wet"] {
-        assert!(!said(&format!("--set grains.{one}")).contains("stands in place"), "{one}");
-    }
 }
 
 #[test]
@@ -237,4 +237,19 @@ fn a_replaced_base_file_and_frames_to_start_from_are_named_as_they_are() {
     let run = "snow shot.toml -o out -q --stage grains --from 1 --set shot.frames=1-6";
     fails(at, run, 2, &["base.0003.vdb", "is not the file that was made", "frame 3 of stage grains"]);
     works(at, &run.replace("grains", "base,grains"));
+}
+
+#[test]
+fn what_is_owed_is_never_less_than_nothing() {
+    let folder = folder("compression = 1.0", "");
+    let at = folder.path();
+    works(at, "snow shot.toml -o out -q --frames 1-2");
+    let text = fs::read_to_string(at.join("out/report/grains.0002.json")).unwrap();
+    assert!(text.contains("\"owed\": 0.0"), "{text}");
+}
+
+#[test]
+fn numbers_of_a_scene_to_begin_with_are_short() {
+    let said = works(Path::new("."), "new snow") + &works(Path::new("."), "new snow --keys");
+    assert!(said.contains("radius = 0.0025 ") && said.contains("0.33333 cells"), "{said}");
 }
