@@ -1,7 +1,7 @@
 //! The keys of `[grains]`, and those that grains have of each object.
 
 use crate::error::Result;
-use crate::scene::text::key::{Fallback, Key, Kind, OBJECT, Scope};
+use crate::scene::text::key::{Key, Kind, OBJECT, Scope};
 use crate::scene::text::{FAR, Table, Values, rounded};
 use crate::snow::{grain_cohesion, grain_friction};
 
@@ -229,31 +229,6 @@ fn repose_of(values: &Values) -> f64 {
     let number = |name: &str| values.number(&format!("grains.{name}"));
     let of_friction = number("friction").map(|friction| grain_friction::repose_of(friction, true));
     of_friction.or_else(|| number("repose_angle_deg")).unwrap_or_default()
-}
-
-/// What to say of keys that another one stands in place of, unless they are as they would be if they were left out.
-pub fn replaced(values: &Values) -> Vec<String> {
-    let number = |name: &str| values.number(&format!("grains.{name}"));
-    let pairs = [("friction", "repose_angle_deg"), ("attraction", "stands")];
-    let given = pairs.into_iter().filter_map(|(key, other)| Some((key, number(key)?, other, number(other)?)));
-    given
-        .filter(|(_, _, other, value)| left_out(values, other) != Some(*value))
-        .map(|(key, own, other, value)| {
-            format!("grains.{key} = {own} stands in place of grains.{other} = {value}, which has no effect")
-        })
-        .collect()
-}
-
-/// The number that a key of `[grains]` has where it is left out.
-fn left_out(values: &Values, name: &str) -> Option<f64> {
-    let key = GRAIN_KEYS.iter().find(|key| key.table == "grains" && key.name == name)?;
-    let chosen = values.get("grains.preset").and_then(|preset| preset.text());
-    let of_preset = key.presets.iter().find(|(preset, _)| Some(*preset) == chosen);
-    match (of_preset, key.fallback) {
-        (Some((_, value)), _) => value.parse().ok(),
-        (None, Fallback::Is(value)) => value.parse().ok(),
-        _ => None,
-    }
 }
 
 /// Whether a scene has grains.

@@ -4,7 +4,7 @@ use std::path::Path;
 use std::sync::Arc;
 
 use super::drift::Drift;
-use super::grain_keys::{has_grains, replaced};
+use super::warnings::{replaced, too_small};
 use crate::base::mesh::{farthest, too_far as far_mesh};
 use crate::base::{DVec3, TriMesh};
 use crate::context::Context;
@@ -12,10 +12,7 @@ use crate::error::{Error, Result};
 use crate::io::seen::Seen;
 use crate::io::sequence::Pattern;
 use crate::io::{hash, mesh};
-use crate::motion::{
-    Character, Key, Keys, MeshSequence, Motion, Placed, Play, Rigid, is_gltf, missing_uvs, span,
-};
-use crate::scene::text::rounded;
+use crate::motion::{Character, Key, Keys, MeshSequence, Motion, Placed, Play, Rigid, is_gltf, missing_uvs};
 use crate::scene::{Ground, Layer, Object, Role, Scene, Snow, text};
 use crate::snow::base_layer::initial::{self, Cover};
 use crate::sweep::{self, Body, REACH};
@@ -114,9 +111,7 @@ impl Inputs {
                 }
             }
         }
-        if has_grains(&scene.values) {
-            warnings.extend(replaced(&scene.values));
-        }
+        warnings.extend(replaced(&scene.values));
         let drift = Drift::of(scene, snow.cell, &seen, &mut warnings)?;
         warnings.iter().for_each(|warning| log::warn!("{warning}"));
         Ok(Self { snow, source, statics, bodies, drift, seen, warnings })
@@ -382,25 +377,6 @@ fn character(scene: &Scene, object: &Object, seen: &Seen) -> Result<Character> {
         );
     }
     Ok(character)
-}
-
-/// What to say of an object that takes snow and is smaller than a grain at a time (s).
-fn too_small(scene: &Scene, object: &Object, body: &Body, time: f64) -> Result<Option<String>> {
-    let Some(radius) = scene.values.number("grains.radius").filter(|_| object.role.removes()) else {
-        return Ok(None);
-    };
-    let mut pose = Vec::new();
-    body.motion().pose(time, &mut pose)?;
-    let (low, high) = span(&pose);
-    let (size, diameter) = ((high - low).max(), 2.0 * radius);
-    Ok((size < diameter).then(|| {
-        format!(
-            "{} is {} m large, smaller than a grain of {} m: what it takes makes no grains; choose a smaller grains.radius",
-            body.name().unwrap_or("an object"),
-            rounded(size),
-            rounded(diameter)
-        )
-    }))
 }
 
 fn posed(motion: &dyn Motion, time: f64) -> Result<TriMesh> {

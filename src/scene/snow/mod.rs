@@ -33,6 +33,8 @@ mod relief;
 mod settings;
 #[cfg(feature = "vdb")]
 mod walks;
+#[cfg(feature = "vdb")]
+mod warnings;
 
 pub(super) use grain_keys::{GRAIN_KEYS, check_grains, has_grains};
 pub(super) use keys::KEYS;

@@ -1,0 +1,53 @@
+//! What of a scene's grains has no effect, or not the one that was likely meant.
+
+use super::GRAIN_KEYS;
+use crate::error::Result;
+use crate::motion::span;
+use crate::scene::text::key::Fallback;
+use crate::scene::text::{Values, rounded};
+use crate::scene::{Object, Scene};
+use crate::sweep::Body;
+
+/// What to say of keys that another one stands in place of, unless they are as they would be if they were left out.
+pub(super) fn replaced(values: &Values) -> Vec<String> {
+    let number = |name: &str| values.number(&format!("grains.{name}"));
+    let pairs = [("friction", "repose_angle_deg"), ("attraction", "stands")];
+    let given = pairs.into_iter().filter_map(|(key, other)| Some((key, number(key)?, other, number(other)?)));
+    given
+        .filter(|(_, _, other, value)| left_out(values, other) != Some(*value))
+        .map(|(key, own, other, value)| {
+            format!("grains.{key} = {own} stands in place of grains.{other} = {value}, which has no effect")
+        })
+        .collect()
+}
+
+/// The number that a key of `[grains]` has where it is left out.
+fn left_out(values: &Values, name: &str) -> Option<f64> {
+    let key = GRAIN_KEYS.iter().find(|key| key.table == "grains" && key.name == name)?;
+    let chosen = values.get("grains.preset").and_then(|preset| preset.text());
+    let of_preset = key.presets.iter().find(|(preset, _)| Some(*preset) == chosen);
+    match (of_preset, key.fallback) {
+        (Some((_, value)), _) => value.parse().ok(),
+        (None, Fallback::Is(value)) => value.parse().ok(),
+        _ => None,
+    }
+}
+
+/// What to say of an object that takes snow and is smaller than a grain at a time (s).
+pub(super) fn too_small(scene: &Scene, object: &Object, body: &Body, time: f64) -> Result<Option<String>> {
+    let Some(radius) = scene.values.number("grains.radius").filter(|_| object.role.removes()) else {
+        return Ok(None);
+    };
+    let mut pose = Vec::new();
+    body.motion().pose(time, &mut pose)?;
+    let (low, high) = span(&pose);
+    let (size, diameter) = ((high - low).max(), 2.0 * radius);
+    Ok((size < diameter).then(|| {
+        format!(
+            "{} is {} m large, smaller than a grain of {} m: what it takes makes no grains; choose a smaller grains.radius",
+            body.name().unwrap_or("an object"),
+            rounded(size),
+            rounded(diameter)
+        )
+    }))
+}
