@@ -42,7 +42,7 @@ void check_types(const AttributeSet::Descriptor& descriptor) {
     const std::pair<const char*, const char*> types[] = {{"P", "vec3s"},      {"v", "vec3s"},
                                                          {"id", "int64"},     {"active", "bool"},
                                                          {"pscale", "float"}, {"source_frame", "int32"},
-                                                         {"rest", "vec3s"}};
+                                                         {"rest", "vec3s"},   {"trapped", "bool"}};
     CHECK(descriptor.size() == std::size(types));
     for (const auto& [name, type] : types) {
         const size_t at = descriptor.find(name);

@@ -98,15 +98,24 @@ impl<'a> Seen<'a> {
         Ok(())
     }
 
+    /// Distance (diameters) of a member of the block of an index from the surface; none where no surface is near the block.
+    pub fn distance(&self, index: usize, at: At, place: V) -> Option<f32> {
+        let patch = self.patches.get(index)?.as_ref().filter(|patch| !patch.values.is_empty())?;
+        Some(patch.sample(self.voxel(at, place)).0 / self.diameter as f32)
+    }
+
+    /// A place in a block, in voxels.
+    fn voxel(&self, at: At, place: V) -> [f64; 3] {
+        let scale = self.diameter / self.field.grid.voxel_size();
+        [0, 1, 2].map(|axis| (f64::from(at[axis]) * f64::from(EDGE) + f64::from(place[axis])) * scale)
+    }
+
     fn touch(&self, block: &Block, slot: u32, row: &Row, patch: &Patch, reach: f32) -> Option<Touch> {
         let near = 0.5 + SKIN + norm(row.velocity) * reach;
         if patch.least / self.diameter as f32 > near {
             return None;
         }
-        let scale = self.diameter / self.field.grid.voxel_size();
-        let at = [0, 1, 2]
-            .map(|axis| (f64::from(block.at[axis]) * f64::from(EDGE) + f64::from(row.place[axis])) * scale);
-        let (distance, gradient) = patch.sample(at);
+        let (distance, gradient) = patch.sample(self.voxel(block.at, row.place));
         let distance = distance / self.diameter as f32;
         if distance > near {
             return None;

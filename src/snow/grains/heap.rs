@@ -56,9 +56,6 @@ pub struct Heap {
     pub(super) trapped: Vec<u32>,
 }
 
-/// Relative tolerance of a speed.
-const ROUNDING: f32 = 1.0e-4;
-
 /// How a step is divided.
 #[derive(Debug, Clone, Copy)]
 pub struct Division {
@@ -219,9 +216,8 @@ impl Heap {
             if sub == 0 && coefficients.air_by_neighbours.is_some() {
                 layout.count_neighbours(&self.rows);
             }
-            let most =
-                search.fastest(coefficients.restitution).map_or(f32::INFINITY, |most| most.max(fastest));
-            let motion = Motion { along: travel.along, fastest: most * (1.0 + ROUNDING) };
+            let limit = search.fastest(fastest, coefficients.restitution, coefficients.gravity[1]);
+            let motion = Motion { along: travel.along, fastest: limit };
             fastest = sub_step(ctx, &mut self.rows, &mut layout, &coefficients, motion)?;
             ctx.advance();
         }
@@ -229,8 +225,9 @@ impl Heap {
             at(1.0, &mut pose)?;
             shell.follow(&pose);
         }
-        let end = trapped::End { layout: &layout, diameter: self.diameter, dt };
-        self.trapped = end.release(&mut self.rows, &self.ids, &self.trapped, colliders)?;
+        let end = trapped::End { layout: &layout, diameter: self.diameter, dt, travelled: before };
+        let deep = end.deep(&self.rows, &self.ids, &self.trapped, field.as_ref());
+        self.trapped = end.release(&mut self.rows, &self.ids, &deep, colliders)?;
         self.take_back(layout)?;
         self.make_room(ctx, colliders, MOST)
     }

@@ -76,19 +76,24 @@ impl Travel {
 const ALONG: f64 = 1.2;
 
 /// How far (diameters) from its middle a block's members may touch a mesh: they have left the block by less than two diameters.
-fn around() -> f64 {
+pub fn around() -> f64 {
     0.5 * f64::from(EDGE) * 3f64.sqrt() + REACH + 2.0
 }
 
 impl Search<'_> {
-    /// Greatest speed (m/s) at which the meshes throw grains with a restitution; none without meshes.
+    /// Greatest speed (m/s) that contacts may give grains, with a restitution, under a gravity (m/s2), where the fastest has a speed
+    /// (m/s) already; without meshes there is none.
     ///
     /// Grains in a gap that closes between an object and the base would be squeezed out the faster the shorter sub-steps are,
-    /// without a bound, as a liquid is; snow is compacted instead. Contacts dissipate, so that no grain becomes faster than
-    /// what drives them all.
-    pub fn fastest(&self, restitution: f32) -> Option<f32> {
-        let way = self.shells.iter().map(|shell| shell.way()).reduce(f64::max)?;
-        Some((way / self.dt) as f32 * (1.0 + restitution))
+    /// without a bound, as a liquid is; snow is compacted instead. Contacts dissipate: no grain becomes faster than what drives
+    /// them all, but by what it falls.
+    pub fn fastest(&self, fastest: f32, restitution: f32, gravity: f32) -> f32 {
+        let Some(way) = self.shells.iter().map(|shell| shell.way()).reduce(f64::max) else {
+            return f32::INFINITY;
+        };
+        let thrown = (way / self.dt) as f32 * (1.0 + restitution);
+        let falls = (gravity.abs() * self.diameter as f32).sqrt();
+        fastest.max(thrown).max(falls) * (1.0 + ROUNDING)
     }
 
     /// Whether a mesh may be as near (diameters) as that, by what is remembered.
@@ -186,6 +191,8 @@ const REACH: f64 = 0.5 + SKIN as f64;
 /// How much farther meshes are looked for, so that a grain need not ask in every sub-step (diameters).
 const AHEAD: f64 = 1.5;
 
+/// Relative tolerance of a speed.
+const ROUNDING: f32 = 1.0e-4;
 /// Room for rounding (diameters).
 const SLACK: f32 = 1.0e-3;
 

@@ -201,9 +201,11 @@ fn advance(rows: &mut [Row], layout: &mut Layout, c: &Coefficients, motion: Moti
 /// more than it takes to leave them all: their sum is bounded too.
 fn move_on(row: &mut Row, c: &Coefficients, motion: &Motion) {
     row.push = bounded(row.push, FARTHEST);
+    // What gravity adds in this sub-step is its own: a grain that falls, or slides down a slope, goes on to become faster.
     let fall = scaled(c.gravity, c.dt);
     let driven = sub(row.velocity, fall);
-    if dot(driven, driven) > motion.fastest * motion.fastest {
+    let most = motion.fastest * motion.fastest;
+    if dot(row.velocity, row.velocity) > most && dot(driven, driven) > most + dot(fall, fall) {
         row.velocity = add(bounded(driven, motion.fastest), fall);
     }
     let way = add(scaled(row.velocity, c.dt / c.diameter), row.push);

@@ -4,10 +4,12 @@
 
 use rayon::prelude::*;
 
+use super::field::Seen;
 use super::heap::Colliders;
-use super::layout::{At, Block, Layout, world};
+use super::layout::{At, Layout, world};
 use super::nearby::Nearby;
 use super::rows::{Row, V, add, dot};
+use super::search::around;
 use super::surfaces::Surfaces;
 use super::touch::Touch;
 use crate::error::Result;
@@ -27,11 +29,21 @@ pub struct End<'a> {
     pub diameter: f64,
     /// Length of the last sub-step (s).
     pub dt: f64,
+    /// How far the meshes may have travelled in the step (diameters).
+    pub travelled: f64,
 }
 
 impl End<'_> {
-    /// Moves grains out of surfaces. Returns the identities of the trapped ones, ascending; `before` holds those of the last
-    /// step.
+    /// Members of each block that may be inside a surface, with the level set as the blocks saw it; `before` holds the identities of
+    /// those that the last step left trapped, ascending.
+    pub fn deep(&self, rows: &[Row], ids: &[u32], before: &[u32], field: Option<&Seen<'_>>) -> Vec<Vec<u32>> {
+        (0..self.layout.blocks.len())
+            .into_par_iter()
+            .map(|index| self.deep_members(index, rows, ids, before, field))
+            .collect()
+    }
+
+    /// Moves the grains that [`End::deep`] found out of surfaces. Returns the identities of the trapped ones, ascending.
     ///
     /// # Errors
     /// A pose that cannot be computed; errors of a grid.
@@ -39,13 +51,11 @@ impl End<'_> {
         &self,
         rows: &mut [Row],
         ids: &[u32],
-        before: &[u32],
+        deep: &[Vec<u32>],
         colliders: &Colliders<'_>,
     ) -> Result<Vec<u32>> {
-        let blocks = self.layout.blocks.par_iter();
-        let deep: Vec<Vec<u32>> = blocks.map(|block| self.deep(block, rows, ids, before)).collect();
         let which: Vec<u32> =
-            (0..).zip(&deep).filter(|(_, deep)| !deep.is_empty()).map(|(index, _)| index).collect();
+            (0..).zip(deep).filter(|(_, deep)| !deep.is_empty()).map(|(index, _)| index).collect();
         if which.is_empty() {
             return Ok(Vec::new());
         }
@@ -72,9 +82,19 @@ impl End<'_> {
         Ok(trapped)
     }
 
-    /// Members of a block that may be inside a surface: awake ones close to the plane of a touch; resting ones inside such a
-    /// plane; awake ones so deep in a level set that the touch has no plane; and resting ones that were trapped before.
-    fn deep(&self, block: &Block, rows: &[Row], ids: &[u32], before: &[u32]) -> Vec<u32> {
+    /// Members of a block that may be inside a surface: awake ones that are close to the plane of a touch, or in a surface that they
+    /// did not touch before the last sub-step pushed them there; resting ones inside such a plane; and resting ones that were
+    /// trapped before.
+    fn deep_members(
+        &self,
+        index: usize,
+        rows: &[Row],
+        ids: &[u32],
+        before: &[u32],
+        field: Option<&Seen<'_>>,
+    ) -> Vec<u32> {
+        let block = &self.layout.blocks[index];
+        let has_mesh = f64::from(block.limit) - self.travelled < around();
         let is_deep = |touch: &&Touch| {
             let row = &rows[touch.grain as usize];
             if !touch.has_plane() {
@@ -84,15 +104,25 @@ impl End<'_> {
             let depth = touch.offset + moved - dot(touch.normal, row.place);
             depth > if row.rests() { 0.5 * DEEP as f32 } else { -NEAR }
         };
+        let was_pushed_in = |slot: &&u32| {
+            let row = &rows[**slot as usize];
+            let is_in_mesh = || row.limit > 0.0 && f64::from(row.limit) - self.travelled < 0.5;
+            let is_in_field = || {
+                let distance = field.and_then(|field| field.distance(index, block.at, row.place));
+                distance.is_some_and(|distance| distance < 0.5)
+            };
+            !row.rests() && (has_mesh && is_in_mesh() || is_in_field())
+        };
         let had_no_room = |slot: &&u32| {
             let slot = **slot as usize;
             rows[slot].rests() && before.binary_search(&ids[slot]).is_ok()
         };
         let mut deep: Vec<u32> = block.touches.iter().filter(is_deep).map(|touch| touch.grain).collect();
+        deep.extend(block.members.iter().filter(was_pushed_in));
         if !before.is_empty() {
             deep.extend(block.members.iter().filter(had_no_room));
-            deep.sort_unstable();
         }
+        deep.sort_unstable();
         deep.dedup();
         deep
     }
