@@ -2024,7 +2024,9 @@ frz_status frz_grains_set_params(frz_grains *grains, const frz_grains_params *pa
  *     stepped since it was made or restored removed nothing. NULL: there is none.
  * bodies: count bodies that push the grains, each with its friction; NULL with a count of 0. Those that do not move have
  *     no positions_end. Holes of less than a tenth of a mesh's area are closed; of a mesh that is open wider both sides collide.
- *     A warning says so. A vertex farther than 1e6 m from the origin along an axis is FRZ_ERROR_ARGUMENT.
+ *     A warning says so. A body with a vertex that moves at over 100 m/s is taken to jump: it stands at positions_end for the whole
+ *     step and carries no grains along, with a warning. A vertex farther than 1e6 m from the origin along an axis is
+ *     FRZ_ERROR_ARGUMENT.
  * count: number of bodies.
  * dt: length of the step (s), 1e-6 to 3600. 0: nothing is born and nothing moves, as the first frame of a shot wants it:
  *     what bodies cut out there was gone before.

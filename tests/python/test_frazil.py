@@ -253,6 +253,56 @@ class Grains(unittest.TestCase):
         with self.assertRaisesRegex(frazil.Error, "is not within 0.0004 to 0.01 m"):
             frazil.Grains(ctx, radius=0.02).step((None, snow(ctx)), [], 1.0, 1)
 
+    def test_a_body_has_a_compression_of_its_own(self):
+        ctx = frazil.Context(threads=2)
+        counts = []
+        for compression in (None, 0.0, 1.0):
+            grains = frazil.Grains(ctx, radius=0.02 / 3, compression=0.5)
+            base = frazil.Base(ctx, snow(ctx))
+            for frame in range(1, 5):
+                bodies = [moved_box(frame)._replace(compression=compression)]
+                base.step(bodies, 0.0 if frame == 1 else 1 / 24, frame)
+                grains.step(base, bodies, 0.0 if frame == 1 else 1 / 24, frame)
+            counts.append(len(grains))
+        usual, loose, pressed = counts
+        self.assertEqual(pressed, 0)
+        self.assertAlmostEqual(loose / usual, 2.0, delta=0.1)
+
+    def test_sticky_bodies_hold_grains(self):
+        ctx = frazil.Context()
+        corners, faces = box((-0.1, 0.5, -0.1), (0.1, 0.6, 0.1))
+        for stick, falls in ((0.0, True), (5.0, False)):
+            grains = frazil.Grains(ctx, radius=0.005)
+            grains.emit([[0.0, 0.4949, 0.0]])
+            body = frazil.Body(corners, None, faces, id=1, stick=stick)
+            for frame in range(1, 5):
+                grains.step(None, [body], 1 / 24, frame)
+            self.assertEqual(bool(grains.positions[0, 1] < 0.45), falls)
+
+    def test_grains_among_others_feel_less_of_the_air(self):
+        ctx = frazil.Context()
+        sites = np.stack(np.meshgrid(*[np.arange(3)] * 3, indexing="ij"), -1).reshape(-1, 3) * 0.01
+        speeds = []
+        for by_density in (False, True):
+            grains = frazil.Grains(ctx, radius=0.005, air=0.01, gravity=0.0, air_by_density=by_density)
+            grains.emit(sites, np.tile([1.0, 0, 0], (27, 1)))
+            grains.step(None, [], 1 / 24, 1)
+            # The one in the middle and one at a corner.
+            speeds.append(grains.read("v")[np.argsort(grains.read("id"))][[13, 0], 0])
+        np.testing.assert_allclose(speeds[0], 0.01 ** (1 / 24), rtol=1e-4)
+        self.assertGreater(speeds[1][0], speeds[0][0] + 0.05)
+        self.assertGreater(speeds[1][0], speeds[1][1])
+
+    def test_slow_grains_far_from_all_rest_at_once(self):
+        ctx = frazil.Context()
+        sites = [[0.02 * x, 0.005, 0.02 * z] for x in range(10) for z in range(10)]
+        for distance, resting in ((0.0, 0), (0.1, 100)):
+            grains = frazil.Grains(ctx, radius=0.005, floor=0.0, active_distance=distance)
+            grains.emit(sites)
+            for frame in range(1, 4):
+                report = grains.step(None, [], 1 / 24, frame)
+            self.assertEqual(report.resting, resting)
+
     def test_an_exception_in_a_poll_leaves_them_as_they_were(self):
         broken = []
 

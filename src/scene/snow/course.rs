@@ -12,6 +12,7 @@ use crate::error::{Error, Result};
 use crate::motion::{Motion, Poses, span};
 use crate::scene::{Object, Scene};
 use crate::snow::base_layer::Reach;
+use crate::snow::grains::FASTEST_OBJECT;
 use crate::sweep::{Body, REACH};
 
 /// Frames that one task poses in sequence.
@@ -19,8 +20,6 @@ const RUN: usize = 12;
 /// Largest turn of a body between two samples of its path (radians), and most samples between two of its kinks.
 const TURN: f64 = std::f64::consts::PI / 6.0;
 const MOST_PARTS: f64 = 1000.0;
-/// A vertex faster than this (m/s) probably jumps.
-const JUMPING: f64 = 100.0;
 /// An object larger than the first or smaller than the second (m) probably uses another unit.
 const TALL: f64 = 20.0;
 const SMALL: f64 = 0.02;
@@ -186,7 +185,7 @@ impl<'a> Course<'a> {
 
     /// A step so fast that it is probably a jump.
     fn jumping(&self, report: &ObjectReport) -> Option<String> {
-        (report.fastest_m_per_s > JUMPING).then(|| {
+        (report.fastest_m_per_s > FASTEST_OBJECT).then(|| {
             format!(
                 "{} moves at {:.0} m/s in the step to frame {}: if that is a jump, it still cuts the snow on its way; grains \
                  take it as standing at its new place from the step's start",

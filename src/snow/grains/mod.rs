@@ -61,7 +61,7 @@ use surroundings::{Bounds, Obstacles, TIES, have_stayed};
 
 pub use params::Params;
 pub use sourcing::{Base, PACKING, Removal, removals};
-pub use surroundings::{Object, Surroundings};
+pub use surroundings::{FASTEST_OBJECT, Object, Surroundings};
 
 /// Where and when a grain was created.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
@@ -276,7 +276,8 @@ impl Grains {
                 let expired = self.limit(around.lowest, to - from, frame);
                 Ok((expired, self.heap.resting(), self.heap.fastest()))
             })?;
-            let (count, owed) = (self.heap.count(), self.owed.values().sum());
+            // A sum of nothing is -0.
+            let (count, owed) = (self.heap.count(), self.owed.values().sum::<f64>() + 0.0);
             let (dropped, phases) = (all - count - expired, Vec::new());
             Ok(StepReport {
                 count,
