@@ -1,4 +1,4 @@
-//! Gates of births: every grain is paid for by removed snow, whatever the number of frames, and none is thrown by being born.
+//! Gates of births: removed snow pays for every grain, for any count of frames, and birth throws none.
 
 use frazil::Context;
 use frazil::base::{DVec3, TriMesh};
@@ -14,7 +14,7 @@ use crate::grains::FRAME;
 use crate::harness::Harness;
 use crate::scenes::context;
 
-/// Cell of the layer (m).
+/// Edge of a cell of the layer (m).
 const CELL: f64 = 0.01;
 /// Height below which grains are dropped (m): under the snow.
 const LOWEST: f64 = -0.1;
@@ -32,20 +32,20 @@ fn snow(ctx: &Context) -> BaseLayer {
     BaseLayer::new(ctx, snow, BaseParams::for_cell(CELL)).expect("a layer")
 }
 
-/// A body that goes from place to place at times (s).
+/// A body that passes positions (m) at times (s).
 fn body(mesh: TriMesh, way: &[(f64, [f64; 3])]) -> Body {
     let key = |&(time, at): &(f64, [f64; 3])| Key { time, at: DVec3::from(at), turn: DVec3::zeros() };
     let keys = Keys::new(way.iter().map(key).collect()).expect("keys");
     Body::new(Box::new(Rigid::new(mesh, keys)), 0.0).expect("a body")
 }
 
-/// A ball that is pressed into the snow, drawn through it, and over its edge.
+/// A ball that is pressed into the snow, then drawn through it and over its edge.
 fn plough() -> Body {
     let way = [(0.0, [-0.1, 0.4, 0.0]), (0.25, [-0.1, 0.15, 0.0]), (1.0, [0.4, 0.15, 0.0])];
     body(sphere(0.1, 24), &way)
 }
 
-/// Steps a layer, and grains with it; what the layer lost (m3), and what became of the grains.
+/// Steps a layer, and grains with it; returns the volume that the layer lost (m3) and the report of the grains.
 fn step(
     ctx: &Context,
     base: &mut BaseLayer,
@@ -65,7 +65,7 @@ fn step(
     (lost.removed_volume, grains.step(ctx, &around, [from, to], frame).expect("a step"))
 }
 
-/// Grains some frames after a plough has begun to move, some of them at rest.
+/// Grains some frames after a plough started to move; some of them are at rest.
 pub fn ploughed(ctx: &Context, frames: i32) -> Grains {
     let (mut base, body) = (snow(ctx), plough());
     let mut grains = Grains::new(Params::for_cell(CELL)).expect("grains");
@@ -76,7 +76,7 @@ pub fn ploughed(ctx: &Context, frames: i32) -> Grains {
     grains
 }
 
-/// The account of each frame: what snow has paid for, was owed, is owed and was born.
+/// The balance of each frame: grains paid for by snow, owed before, owed after and born.
 fn ledger(h: &mut Harness) {
     let name = "snow.grains.ledger";
     if !h.wants(name) {
@@ -110,12 +110,12 @@ fn ledger(h: &mut Harness) {
         "# {worst:.1e} grains of a frame unaccounted for, at most {off} births neither there nor dropped"
     );
     assert!(dropped > 0, "the experiment drops none");
-    // What remains is the rounding of sums.
+    // The rest is rounding of sums.
     let worst = if worst < 1.0e-6 { 0.0 } else { worst };
     h.gate(name, worst + off as f64, "");
 }
 
-/// Grains of the same print, made in few and in many frames.
+/// Count of grains of the same print, made in few and in many frames.
 fn spread(h: &mut Harness) {
     let name = "snow.grains.birth_spread";
     if !h.wants(name) {
@@ -143,7 +143,7 @@ fn spread(h: &mut Harness) {
     h.gate(name, (most - least) / (counts.iter().sum::<f64>() / 3.0) * 100.0, "");
 }
 
-/// Grains that nothing pushes but themselves and the snow around them, a frame after their birth.
+/// Speed of grains a frame after birth, pushed only by each other and the snow around them.
 fn speed(h: &mut Harness) {
     let name = "snow.grains.birth_speed";
     if !h.wants(name) {
@@ -176,7 +176,7 @@ fn speed(h: &mut Harness) {
         base.step(&ctx, std::slice::from_ref(&body), time(frame - 1), time(frame), frame).expect("a step");
         add(speed([&before, base.surface()], frame));
     }
-    // All that was removed at once.
+    // All removed snow at once.
     add(speed([&whole, base.surface()], 99));
     h.gate(name, fastest, &format!("{born} births"));
 }

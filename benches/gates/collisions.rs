@@ -1,4 +1,4 @@
-//! Gates of grains that objects move through: how many end a frame in one, or in the base below it.
+//! Gates of objects that move through grains: how many grains end a frame inside one, or in the base below it.
 
 use std::path::Path;
 
@@ -17,7 +17,7 @@ use crate::scenes::context;
 
 /// Diameter of the grains (m).
 const D: f64 = 0.005;
-/// Depth (diameters) from which a grain is in something.
+/// Depth (diameters) beyond which a grain counts as inside.
 const DEEP: f64 = 0.1;
 
 pub fn run(h: &mut Harness) {
@@ -27,7 +27,7 @@ pub fn run(h: &mut Harness) {
     walker(h);
 }
 
-/// Grains of a mesh at a place, bad and trapped: nearer to its surface than 0.4 of a diameter, or inside of it.
+/// Indices of the grains in a mesh, trapped or not: nearer to its surface than 0.4 diameters, or inside it if it is closed.
 fn deep(places: &[DVec3], mesh: &TriMesh, closed: bool) -> Vec<usize> {
     let pose: Vec<DVec3> = mesh.positions.iter().map(|place| place.cast::<f64>()).collect();
     let shell = Shell::at_rest(mesh.triangles.clone(), pose.clone());
@@ -41,7 +41,7 @@ fn deep(places: &[DVec3], mesh: &TriMesh, closed: bool) -> Vec<usize> {
     (0..places.len()).into_par_iter().filter(|index| is_deep(&places[*index])).collect()
 }
 
-/// How often a closed mesh winds around a place: its solid angle (van Oosterom and Strackee 1983) over 4 pi.
+/// Winding number of a closed mesh around a position: its solid angle (van Oosterom and Strackee 1983) over 4 pi.
 fn winding(place: DVec3, triangles: &[[u32; 3]], pose: &[DVec3]) -> f64 {
     let angle = |triangle: &[u32; 3]| {
         let [a, b, c] = triangle.map(|index| pose[index as usize] - place);
@@ -52,7 +52,7 @@ fn winding(place: DVec3, triangles: &[[u32; 3]], pose: &[DVec3]) -> f64 {
     triangles.iter().map(angle).sum::<f64>() / (4.0 * std::f64::consts::PI)
 }
 
-/// A heap of grains through which an object goes for some frames; grains that ended one of them in it, and were not trapped.
+/// Moves an object through a heap of grains for some frames; counts grains that end one of them inside it but not trapped.
 fn through(h: &mut Harness, name: &str, motion: Box<dyn Motion>, frames: i32) {
     let ctx = context(2);
     let mut grains = Grains::new(Params { radius: 0.5 * D, ..Params::for_cell(1.5 * D) }).expect("grains");
@@ -109,7 +109,7 @@ fn rigid(mesh: TriMesh, keys: &[(f64, [f64; 3], [f64; 3])]) -> Box<dyn Motion> {
     Box::new(Rigid::new(mesh, Keys::new(keys.iter().map(key).collect()).expect("keys")))
 }
 
-/// A plate 2 mm thick that goes through them at 10 m/s.
+/// A plate 2 mm thick that moves through them at 10 m/s.
 fn plate(h: &mut Harness) {
     if h.wants("snow.grains.deep_plate") {
         let keys = [(0.0, [0.0, 0.06, -1.0], [0.0; 3]), (0.2, [0.0, 0.06, 1.0], [0.0; 3])];
@@ -117,7 +117,7 @@ fn plate(h: &mut Harness) {
     }
 }
 
-/// Four blades 2 mm thick that turn twice a second.
+/// Four blades 2 mm thick that rotate twice a second.
 fn blades(h: &mut Harness) {
     if h.wants("snow.grains.deep_blades") {
         let mut mesh = cuboid([0.12, 0.03, 0.002]);
@@ -133,7 +133,7 @@ fn blades(h: &mut Harness) {
 /// An open sheet that waves.
 struct Sheet(Vec<[u32; 3]>);
 
-/// Vertices along an edge of it.
+/// Count of vertices along its edge.
 const EDGE: u32 = 25;
 
 impl Motion for Sheet {
@@ -200,7 +200,7 @@ fn walker(h: &mut Harness) {
     h.gate("snow.grains.deep_walker", (in_object + in_base) as f64, &note);
 }
 
-/// Grains in the character and in the base that are not trapped, those that are, and all of a frame.
+/// Counts of grains of a frame: not trapped but in the character, or in the base; trapped; all.
 fn walker_frame(out: &Path, frame: i32) -> [usize; 4] {
     use frazil::base::points::Values;
     let points =

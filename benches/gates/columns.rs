@@ -1,8 +1,8 @@
-//! Gate of columns that collapse, against the experiments of Lube, Huppert, Sparks and Hallworth, "Axisymmetric collapses of
+//! Gate of collapsing columns, against the experiments of Lube, Huppert, Sparks and Hallworth, "Axisymmetric collapses of
 //! granular columns", Journal of Fluid Mechanics 508 (2004).
 //!
-//! Their final radius is the edge of the deposit, not the farthest stray. Here: of the grains that touch one another from the
-//! middle on, the farthest in each of 36 sectors, and of those the mean.
+//! Their final radius is the edge of the deposit, not the farthest stray. Here it is the mean over 36 sectors of the farthest
+//! grain that a chain of touching grains connects to the middle.
 
 use frazil::base::DVec3;
 use frazil::snow::grain_friction::of_repose;
@@ -14,11 +14,11 @@ use crate::harness::Harness;
 const D: f64 = 0.005;
 /// Angle of repose (degrees): that of the materials in the paper.
 const REPOSE: f64 = 31.0;
-/// Grains of a column, nearly.
+/// Approximate count of grains of a column.
 const GRAINS: f64 = 20_000.0;
-/// Distance (diameters) up to which grains of the deposit touch.
+/// Largest distance (diameters) at which grains of the deposit touch.
 const TOUCHING: f64 = 1.1;
-/// Sectors of the deposit's edge.
+/// Count of sectors of the deposit's edge.
 const SECTORS: usize = 36;
 
 pub fn run(h: &mut Harness) {
@@ -35,11 +35,11 @@ pub fn run(h: &mut Harness) {
     h.gate(name, errors.into_iter().fold(0.0, f64::max), &format!("aspects 1, 2, 4: {errors:.1?} %"));
 }
 
-/// How far (radii) a column of about an aspect runs out, and what aspect it had once it had settled.
+/// Runout (radii) of a column of about an aspect ratio, and its aspect ratio once settled.
 fn collapse(aspect: f64) -> (f64, f64) {
     let mut column = Experiment::new(2, D, of_repose(REPOSE, false), 3);
     column.params.air = 1.0;
-    // As many as fill a cylinder of that aspect at a packing of 0.6.
+    // The grains fill a cylinder of that aspect ratio at a packing of 0.6.
     let radius = (GRAINS / (6.0 * 0.6 * aspect)).cbrt() * D;
     let corner = |n: usize| {
         let angle = n as f64 / 64.0 * std::f64::consts::TAU;
@@ -59,7 +59,7 @@ fn collapse(aspect: f64) -> (f64, f64) {
         column.step();
         frames += 1;
     }
-    // The mean height of its top.
+    // Mean height of the top.
     let mut tops = std::collections::HashMap::new();
     for place in column.heap.places() {
         let at = [place.x, place.z].map(|x| (x / (1.5 * D)).floor() as i32);
@@ -83,7 +83,7 @@ fn collapse(aspect: f64) -> (f64, f64) {
     (edge / radius - 1.0, height / radius)
 }
 
-/// The radius (m) of the deposit.
+/// Radius (m) of the deposit.
 fn edge(column: &Experiment) -> f64 {
     let places: Vec<DVec3> = column.heap.places().collect();
     let cell = |place: &DVec3| [0, 1, 2].map(|axis: usize| (place[axis] / (TOUCHING * D)).floor() as i32);
@@ -122,7 +122,7 @@ fn edge(column: &Experiment) -> f64 {
     sectors.iter().sum::<f64>() / SECTORS as f64
 }
 
-/// The distance (m) from the axis within which a share of the grains lies.
+/// Distance (m) from the axis within which a share of the grains lies.
 fn far(places: &[DVec3], share: f64) -> f64 {
     let mut distances: Vec<f64> = places.iter().map(|place| place.xz().norm()).collect();
     distances.sort_by(f64::total_cmp);

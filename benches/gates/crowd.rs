@@ -1,4 +1,4 @@
-//! Gate of crowded grains: a box ploughs faster than the grains can push each other aside, and all of its way is snow.
+//! Gate of crowded grains: a box ploughs through snow all the way, faster than the grains can push each other aside.
 
 use std::collections::HashMap;
 
@@ -9,7 +9,7 @@ use crate::common::shapes::cuboid;
 use crate::harness::Harness;
 use crate::passes::pass;
 
-/// Most grains in a cube of two diameters, in any frame: ten fit in at random.
+/// Largest count of grains in a cube of two diameters, in any frame: a random packing fits ten.
 pub fn run(h: &mut Harness) {
     let name = "snow.grains.crowd";
     if !h.wants(name) {
@@ -34,7 +34,7 @@ pub fn run(h: &mut Harness) {
         let mut counts = HashMap::new();
         grains = points.count();
         for index in 0..grains {
-            // The cells are those of the grains' blocks.
+            // The cells in which grains count as crowded.
             let cell: [i64; 3] = points.position(index).map(|x| (x / 0.008).floor() as i64).into();
             *counts.entry(cell).or_insert(0u32) += 1;
         }

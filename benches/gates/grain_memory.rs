@@ -1,4 +1,4 @@
-//! Gate of the memory of grains while they are stepped, in a process of its own.
+//! Gate of the memory of grains in a step, measured in a process of its own.
 
 use frazil::base::DVec3;
 use frazil::snow::grains::{Base, Grains, Params, Surroundings, memory};
@@ -7,12 +7,12 @@ use crate::grains::{FRAME, Random};
 use crate::harness::Harness;
 use crate::scenes::context;
 
-/// Argument of a run that only steps grains and prints what memory they took.
+/// Argument of a run that only steps grains and prints their memory.
 pub const MEMORY: &str = "memory-of-grains";
 
-/// Grains along each axis of a block that settles.
+/// Count of grains along each axis of a box of them that settles.
 const SIDES: [u32; 3] = [90, 32, 90];
-/// Frames until they lie on each other.
+/// Count of frames until they lie on each other.
 const SETTLE: usize = 10;
 
 pub fn run(h: &mut Harness) {
@@ -32,10 +32,10 @@ pub fn run(h: &mut Harness) {
     );
 }
 
-/// Such a run.
+/// The run with [`MEMORY`].
 pub fn print_memory() {
     let ctx = context(2);
-    // The threads' own memory counts as the process'.
+    // Memory of the threads themselves is in the baseline.
     ctx.pool().install(|| rayon::broadcast(|_| vec![1u8; 1 << 16].len()));
     let mut random = Random(7);
     let params = Params { rests: false, ..Params::for_cell(0.0075) };
@@ -56,9 +56,9 @@ pub fn print_memory() {
     for frame in 0..SETTLE {
         grains.step(&ctx, &around, [0.0, FRAME], frame as i32).expect("a step");
     }
-    // What earlier steps have freed goes back to the system: only what is in use remains.
+    // Returns memory that earlier steps freed to the system, so that only what is in use counts.
     let resident = || {
-        // SAFETY: glibc's, from any thread.
+        // SAFETY: a function of glibc that any thread may call.
         unsafe { malloc_trim(0) };
         kilobytes("VmRSS:")
     };
@@ -82,13 +82,13 @@ pub fn print_memory() {
     println!("bytes {}", each(peak));
 }
 
-// SAFETY: glibc declares it so.
+// SAFETY: the declaration is that of glibc.
 unsafe extern "C" {
-    /// Gives freed memory back to the system.
+    /// Returns freed memory to the system.
     fn malloc_trim(pad: usize) -> i32;
 }
 
-/// A number of this process' status (kB).
+/// A value of this process' status (kB).
 pub fn kilobytes(name: &str) -> f64 {
     let status = std::fs::read_to_string("/proc/self/status").unwrap_or_default();
     let line = status.lines().find_map(|line| line.strip_prefix(name)).unwrap_or("0");

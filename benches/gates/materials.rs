@@ -1,4 +1,4 @@
-//! Gates of what grains are made of: walls that stand or fall as asked, bounces, and what clings to an object.
+//! Gates of materials: walls that stand or fall as requested, bounces, and grains that stick to an object.
 
 use frazil::Context;
 use frazil::base::DVec3;
@@ -23,10 +23,10 @@ pub fn run(h: &mut Harness) {
     stick(h);
 }
 
-/// Seeds of the heaps of which walls are made.
+/// Seeds of the heaps that walls are made of.
 const SEEDS: [u64; 2] = [1, 2];
 
-/// Walls of two heights and three frictions, made to stand at a height: at 0.85 of it they do, at 1.15 of it they fall.
+/// Walls of three heights and three frictions, made to stand up to a height: at 0.85 of it they stand, at 1.15 they fall.
 fn cohesion(h: &mut Harness) {
     if !h.wants("snow.grains.wall") {
         return;
@@ -48,7 +48,7 @@ fn cohesion(h: &mut Harness) {
     h.holds("snow.grains.wall", holds, "0.85 of the height stands, 1.15 falls");
 }
 
-/// Whether the edge of a wall that loses its front keeps nine tenths of its height, and what lies behind it, for 1.25 s.
+/// Whether a wall whose support is removed keeps 90 % of the height of its edge, and 99 % of its grains, for 1.25 s.
 fn stands(layers: f64, attraction: f64, friction: f64, seed: u64) -> bool {
     let mut wall = Experiment::new(2, D, friction, seed);
     let height = layers * D;
@@ -76,7 +76,7 @@ fn stands(layers: f64, attraction: f64, friction: f64, seed: u64) -> bool {
     })
 }
 
-/// Mean height of the uppermost grains of the strip behind the edge.
+/// Mean height (m) of the topmost grains of the strip behind the edge.
 fn edge(wall: &Experiment) -> f64 {
     let mut tops = std::collections::BTreeMap::new();
     for place in wall.heap.places().filter(|place| place.x > -4.0 * D && place.x < 0.0) {
@@ -87,7 +87,7 @@ fn edge(wall: &Experiment) -> f64 {
     tops.values().sum::<f64>() / tops.len().max(1) as f64
 }
 
-/// Two grains that meet, and one that falls on the floor and on a mesh: the speed after over the speed before.
+/// Two grains that collide, and one that falls on the floor and on a mesh: speed after over speed before.
 fn restitution(h: &mut Harness) {
     if !h.wants("snow.grains.restitution") {
         return;
@@ -116,7 +116,7 @@ fn plane() -> (Shell, Pose<'static>) {
     crate::grains::still(0.3, vec![[0, 1, 2], [0, 2, 3]], places.to_vec())
 }
 
-/// Root of the height to which a grain comes up again over that from which it fell.
+/// Square root of the height to which a grain rebounds over that from which it fell.
 fn bounce(restitution: f64, colliders: Colliders<'static>) -> f64 {
     let mut one = Experiment::new(1, D, 0.3, 1);
     one.colliders = colliders;
@@ -124,7 +124,7 @@ fn bounce(restitution: f64, colliders: Colliders<'static>) -> f64 {
     let drop = 0.3;
     one.heap.add(0, DVec3::new(0.1, 0.5 * D + drop, 0.03), [0.0; 3]).expect("add");
     let (mut has_met, mut top) = (false, 0.0f64);
-    // Half a frame is a small part of the way up.
+    // A twelfth of a frame is a small part of the way up.
     (one.division.dt, one.division.sub_steps) = (FRAME / 12.0, 4);
     for _ in 0..12 * 24 {
         one.step();
@@ -139,10 +139,10 @@ fn bounce(restitution: f64, colliders: Colliders<'static>) -> f64 {
     (top / drop).sqrt()
 }
 
-/// A plate that hangs over nothing, moves by waves that grow and end, and later shakes.
+/// A plate in the air that moves to the side, stops, and later shakes.
 struct Plate(Vec<[u32; 3]>, Vec<DVec3>);
 
-/// When the plate begins to shake (s).
+/// Time (s) at which the plate starts to shake.
 const SHAKES: f64 = 1.5;
 
 impl Motion for Plate {
@@ -159,7 +159,7 @@ impl Motion for Plate {
     }
 
     fn pose(&self, time: f64, out: &mut Vec<DVec3>) -> frazil::Result<()> {
-        // To the side for a second, from rest to rest, by at most a weight; then to and fro by fifty.
+        // Sideways for a second, accelerated by about a weight at most; then up and down by fifty.
         let moved = (time.clamp(0.0, 1.0) * std::f64::consts::PI).cos();
         let shaken = (time - SHAKES).max(0.0) * std::f64::consts::TAU * 15.0;
         let at = DVec3::new(1.0 - moved, 0.055 * shaken.sin(), 0.0);
@@ -169,7 +169,7 @@ impl Motion for Plate {
     }
 }
 
-/// Share of the grains below a plate that still hang there after it has moved and stopped, and after it has shaken.
+/// Share (%) of the grains below a plate that still hang there after it has moved and stopped, and after it has shaken.
 fn stick(h: &mut Harness) {
     if !h.wants("snow.grains.stick_stops") && !h.wants("snow.grains.stick_shakes") {
         return;

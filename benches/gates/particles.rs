@@ -1,4 +1,4 @@
-//! The walking scene with particles only, twice as large as beside a base layer: what a base saves. Its number has no bound.
+//! The walking scene with grains only, twice as large as those beside a base layer: what a base saves. The gate has no bound.
 
 use std::time::Instant;
 
@@ -15,12 +15,12 @@ use crate::scenes::context;
 
 /// Radius (m): twice that of examples/scenes/grains_walk.toml.
 const RADIUS: f64 = 0.005;
-/// Least and greatest corner of the snow (m), and its depth.
+/// Least and greatest corner of the snow (m, along x and z), and its depth.
 const AREA: [[f64; 2]; 2] = [[-0.8, -1.1], [0.8, 1.7]];
 const DEPTH: f64 = 0.35;
-/// Frames until the grains rest.
+/// Count of frames until the grains rest.
 const SETTLE: i32 = 10;
-/// Frames that he walks, and those of them without rest.
+/// Counts of frames that he walks, with and without rest.
 const WALK: i32 = 24;
 const AWAKE: i32 = 2;
 
@@ -43,7 +43,7 @@ pub fn run(h: &mut Harness) {
     h.gate(name, resting, &note);
 }
 
-/// Number of grains, seconds of a frame of the walk, and the most memory so far (kB).
+/// Count of grains, mean time of a frame of the walk (s), and peak memory so far (kB).
 fn seconds(man: &std::path::Path, rests: bool, settle: i32, walk: i32) -> [f64; 3] {
     let ctx = context(2);
     let params = Params { rests, ..Params::for_cell(1.5 * RADIUS) };
@@ -72,7 +72,7 @@ fn seconds(man: &std::path::Path, rests: bool, settle: i32, walk: i32) -> [f64; 
     [grains.ids().len() as f64, taken / f64::from(walk), kilobytes("VmHWM:")]
 }
 
-/// Layers of balls that lie in the hollows of those below.
+/// Hexagonal layers of grains, alternately shifted, spaced as in a close packing.
 fn packed() -> Vec<DVec3> {
     let d = 2.0 * RADIUS;
     let [low, high] = AREA;
@@ -90,7 +90,7 @@ fn packed() -> Vec<DVec3> {
     places
 }
 
-/// CesiumMan as in examples/scenes/grains_walk.toml, from before the snow.
+/// CesiumMan as in examples/scenes/grains_walk.toml, starting outside the snow.
 fn walking(man: &std::path::Path) -> Placed {
     let figure = Character::open(man, Play::default()).expect("the figure");
     let key = |time: f64, z: f64| Key { time, at: DVec3::new(0.0, 0.06, z), turn: DVec3::zeros() };

@@ -1,4 +1,4 @@
-//! Gates of poured piles: the slope that was asked for, whatever the grains' size and number.
+//! Gates of poured piles: the requested slope, for any size and count of grains.
 
 use frazil::base::DVec3;
 use frazil::snow::grain_friction::of_repose;
@@ -7,17 +7,17 @@ use crate::grains::Experiment;
 use crate::harness::Harness;
 
 impl Experiment {
-    /// Pours grains through a hole of 2.5 diameters a little above the pile, then waits.
+    /// Pours grains through a hole with a radius of 2.5 diameters, slightly above the pile, then waits.
     pub fn pour(&mut self, count: usize, frames: usize, wait: usize) {
         self.pour_through(2.5 * self.diameter(), count, frames, wait);
     }
 
-    /// Pours grains through a hole of a radius (m), as fast as is fit for it.
+    /// Pours grains through a hole of a radius (m), at a speed that suits it.
     pub fn pour_through(&mut self, hole: f64, count: usize, frames: usize, wait: usize) {
         let (d, unit) = (self.diameter(), hole / 2.5);
         let speed = -0.6 * (unit / 0.005).sqrt();
         let each = count.div_ceil(frames);
-        // As high as they need to find room.
+        // Range of heights in which they find room.
         let span = each as f64 / 6.0 * d * (d / unit).powi(2);
         while self.heap.count() < count {
             let rests = |velocity: [f32; 3]| velocity.iter().map(|x| x * x).sum::<f32>() < 0.04;
@@ -43,7 +43,7 @@ impl Experiment {
         self.steps(wait);
     }
 
-    /// Slope of the pile (degrees): a line through the mean heights of rings, in the middle 60 % of its radius.
+    /// Slope of the pile (degrees): a line fitted to the mean heights of rings, in the middle 60 % of its radius.
     pub fn slope(&self) -> f64 {
         let (d, width) = (self.diameter(), 1.5 * self.diameter());
         let mut tops = std::collections::BTreeMap::new();
@@ -83,7 +83,7 @@ pub fn run(h: &mut Harness) {
     sizes(h);
 }
 
-/// Slopes of poured piles against those that were asked for.
+/// Slopes of poured piles against the requested ones.
 fn piles(h: &mut Harness) {
     let worst = |angles: &[f64], seeds: u64, count: usize, frames: usize| {
         let mut worst: f64 = 0.0;
@@ -106,7 +106,7 @@ fn piles(h: &mut Harness) {
     }
 }
 
-/// The same angle from grains of three sizes, and what becomes of it in ten seconds.
+/// Slopes of piles of three grain sizes for the same angle, and their change in ten seconds.
 fn sizes(h: &mut Harness) {
     if !h.wants("snow.grains.pile_size") && !h.wants("snow.grains.pile_creep") {
         return;

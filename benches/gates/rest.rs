@@ -1,4 +1,4 @@
-//! Gates of rest: what it changes and what it saves.
+//! Gates of rest: its effect on the result, and the time that it saves.
 
 use frazil::snow::grain_friction::of_repose;
 
@@ -11,7 +11,7 @@ pub fn run(h: &mut Harness) {
     gain(h);
 }
 
-/// What rest changes: nothing where what rests is left out, little of a pile's angle.
+/// Skipping resting grains changes nothing; rest itself changes the angle of a pile little.
 fn changes(h: &mut Harness) {
     if h.wants("snow.grains.rest_bytes") {
         let run = |visits_all: bool| {
@@ -41,7 +41,7 @@ fn changes(h: &mut Harness) {
     }
 }
 
-/// A walker of 96 frames: time of the grains' motion in the last 48 without rest over that with it.
+/// A walker of 96 frames: time of the grains' motion in the last 48 without rest, over that with it.
 fn gain(h: &mut Harness) {
     if !h.wants("snow.grains.rest_gain") {
         return;
@@ -64,7 +64,7 @@ fn gain(h: &mut Harness) {
     h.gate("snow.grains.rest_gain", without / with, &note);
 }
 
-/// Seconds of a frame's `move`, from its report.
+/// Time (s) of the phase `move` of a frame, from its report.
 pub fn moving(report: &std::path::Path) -> f64 {
     let text = std::fs::read(report).expect("a report");
     let report: serde_json::Value = serde_json::from_slice(&text).expect("a report");

@@ -1,5 +1,5 @@
-//! Gates of the scenes of the thesis' table 3.1, grains alone, writing included: the mean of eight frames spread over each shot.
-//! The shot is made once, so that each of them begins where the frame before it ended.
+//! Gates of the scenes of the thesis' table 3.1, grains only, including writing: mean time of eight frames spread over each
+//! shot. The shot is computed once, so that each of them resumes from the frame before it.
 
 use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
@@ -11,7 +11,7 @@ use crate::common::character::data;
 use crate::common::sleigh::sleigh;
 use crate::harness::Harness;
 
-/// Frames of a shot that count.
+/// Count of measured frames of a shot.
 const COUNTED: usize = 8;
 
 /// A scene of the table.
@@ -19,10 +19,10 @@ struct Scene {
     gate: &'static str,
     /// Name of the scene in examples/scenes.
     file: &'static str,
-    /// Its object, in the folder of the test data; none: the sleigh.
+    /// File of its object in the test data; none: the sleigh.
     object: Option<&'static str>,
     compression: f64,
-    /// Seconds of a frame on the thesis' six cores.
+    /// Time (s) of a frame on the thesis' six cores.
     thesis: f64,
 }
 
@@ -101,32 +101,32 @@ impl Scene {
     }
 }
 
-/// When the frames of a pass were done.
+/// Completion times of the frames of a pass.
 struct Frames {
     ends: Vec<SystemTime>,
 }
 
 impl Frames {
-    /// Those of a folder; the first one, which has no grains yet, is the start.
+    /// Those of a folder; the first frame, which has no grains yet, is the start.
     fn of(out: &Path) -> Self {
         let end = |frame: usize| std::fs::metadata(record(out, frame)).and_then(|file| file.modified()).ok();
         Self { ends: (1..).map_while(end).collect() }
     }
 
-    /// Seconds of a frame and of the one before, each: files are written while the next frame is made.
+    /// Mean time (s) of a frame and the one before: files are written while the next frame is computed.
     fn seconds(&self, frame: usize) -> f64 {
         let first = frame.saturating_sub(2);
         let took = self.ends[frame].duration_since(self.ends[first]);
         took.map_or(0.0, |took| took.as_secs_f64()) / (frame - first) as f64
     }
 
-    /// The frames that count, the last one among them.
+    /// The measured frames, including the last one.
     fn spread(&self) -> impl Iterator<Item = usize> {
         let last = self.ends.len() - 1;
         (1..=COUNTED).map(move |n| n * last / COUNTED)
     }
 
-    /// Grains in the end, those of them that rest, and the sum over the frames of those that are awake.
+    /// Counts of grains at the end, of those at rest, and of those awake summed over all frames.
     fn counts(&self, out: &Path) -> [f64; 3] {
         let number = |frame: usize, name: &str| {
             let text = std::fs::read(record(out, frame)).expect("a report");

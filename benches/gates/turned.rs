@@ -1,7 +1,7 @@
 //! Gates of a deep bed under gravity that turns: the angle at which its top slides.
 //!
-//! A heap has no periodic sides. The bed is long instead, between walls without friction, and only the middle third of its top is
-//! watched. The angle of a bed twice as long is printed beside it: as long as both agree, the ends do not matter.
+//! A heap has no periodic boundaries. Instead the bed is long, between walls without friction, and only the middle third of
+//! its top is measured. The angle of a bed twice as long is printed too: while both agree, the ends do not matter.
 
 use std::collections::HashMap;
 
@@ -14,13 +14,13 @@ use crate::harness::Harness;
 
 /// Diameter of a grain (m).
 const D: f64 = 0.005;
-/// How fast gravity turns (degrees/s).
+/// Rate at which gravity turns (degrees/s).
 const RATE: f64 = 5.0;
-/// Sites of the lattice from which the bed settles: its depth is then 20 diameters or a little more.
+/// Counts of lattice sites from which the bed settles to a depth of 20 diameters or slightly more.
 const SITES: [u32; 3] = [74, 52, 8];
-/// Distance of its sites, and how far grains are off them (diameters): so much that no layers are left.
+/// Spacing of the sites, and range of the offsets from them (diameters): enough to leave no layers.
 const LOOSE: [f64; 2] = [1.5, 0.5];
-/// How deep (diameters) the top reaches.
+/// Thickness of the top (diameters).
 const TOP: f64 = 1.5;
 
 pub fn run(h: &mut Harness) {
@@ -40,7 +40,7 @@ pub fn run(h: &mut Harness) {
     h.gate(most, differences.iter().copied().fold(f64::MIN, f64::max), "");
 }
 
-/// A floor with bumps of half a grain, along which no layer slides as a whole.
+/// A floor with bumps of up to half a diameter, on which no layer slides as a whole.
 fn rough(length: f64, width: f64, random: &mut Random) -> (Shell, Pose<'static>) {
     let [columns, rows] = [length, width].map(|size| (size / D).ceil() as u32 + 2);
     let vertices = (0..=columns).flat_map(|x| (0..=rows).map(move |z| (x, z)));
@@ -58,7 +58,7 @@ fn rough(length: f64, width: f64, random: &mut Random) -> (Shell, Pose<'static>)
     still(1.0, halves.collect(), places)
 }
 
-/// The angle (degrees) at which the top has moved by a diameter.
+/// Angle (degrees) at which the top has moved by a diameter on average.
 fn slides(asked: f64, sites: [u32; 3]) -> f64 {
     let mut bed = Experiment::new(2, D, of_repose(asked, false), 11);
     bed.params.rests = false;
@@ -76,7 +76,7 @@ fn slides(asked: f64, sites: [u32; 3]) -> f64 {
         start.into_iter().filter(|(_, place)| place.x.abs() < length / 6.0).collect();
     let mut heights: Vec<f64> = middle.iter().map(|(_, place)| place.y).collect();
     heights.sort_by(f64::total_cmp);
-    // A single grain may lie on top of all.
+    // Not the highest: a single grain may lie on top.
     let surface = heights[heights.len() * 99 / 100] + 0.5 * D;
     let top: Vec<(u32, DVec3)> =
         middle.into_iter().filter(|(_, place)| place.y > surface - TOP * D).collect();

@@ -1,12 +1,12 @@
-//! Eight numbers side by side, as two halves of four: the vector that every x86-64 processor has, and the one in which rows
-//! of four numbers are loaded and stored. (Left to itself, the compiler made a mixture of halves, wholes and single numbers of
-//! loops over eight, and spent most of a kernel on putting them together.)
+//! Vectors of eight numbers, as two halves of four: the width that every x86-64 processor has, and in which rows of four
+//! numbers are loaded and stored. (Auto-vectorised loops over eight mixed halves, whole vectors and scalars, and kernels spent
+//! most of their time combining them.)
 
 use std::ops::{Add, BitAnd, BitOr, Div, Mul, Sub};
 
 use half::Half;
 
-/// How many.
+/// Count of lanes.
 pub const LANES: usize = 8;
 
 /// Eight numbers.
@@ -14,7 +14,7 @@ pub const LANES: usize = 8;
 #[repr(C, align(16))]
 pub struct Lanes(pub [f32; LANES]);
 
-/// A mask: for each of eight numbers all bits set or none.
+/// A mask: in each of eight lanes, all bits are set or none.
 #[derive(Debug, Clone, Copy)]
 #[repr(C, align(16))]
 pub struct LaneMask([f32; LANES]);
@@ -33,7 +33,7 @@ fn store(halves: [Half; 2]) -> [f32; LANES] {
     [a, b, c, d, e, f, g, h]
 }
 
-/// An operation on both halves of two.
+/// Applies an operation to both halves of two vectors.
 #[inline(always)]
 fn each(a: &[f32; LANES], b: &[f32; LANES], operation: impl Fn(Half, Half) -> Half) -> [f32; LANES] {
     let ([a, c], [b, d]) = (load(a), load(b));
@@ -47,25 +47,25 @@ impl Lanes {
         Self(store([half::all(value); 2]))
     }
 
-    /// The lesser of each pair.
+    /// The lesser in each lane.
     #[inline(always)]
     pub fn min(self, other: Self) -> Self {
         Self(each(&self.0, &other.0, half::min))
     }
 
-    /// The greater of each pair.
+    /// The greater in each lane.
     #[inline(always)]
     pub fn max(self, other: Self) -> Self {
         Self(each(&self.0, &other.0, half::max))
     }
 
-    /// Where this is less than the other.
+    /// The lanes where this is less than `other`.
     #[inline(always)]
     pub fn is_less(self, other: Self) -> LaneMask {
         LaneMask(each(&self.0, &other.0, half::is_less))
     }
 
-    /// The square roots.
+    /// Square root of each lane.
     #[inline(always)]
     pub fn sqrt(self) -> Self {
         Self(store(load(&self.0).map(half::sqrt)))
@@ -73,20 +73,20 @@ impl Lanes {
 }
 
 impl LaneMask {
-    /// The first number where the mask is set, the second elsewhere.
+    /// `set` in lanes where the mask is set, `clear` elsewhere.
     #[inline(always)]
     pub fn choose(self, set: Lanes, clear: Lanes) -> Lanes {
         let (mask, set, clear) = (load(&self.0), load(&set.0), load(&clear.0));
         Lanes(store([half::choose(mask[0], set[0], clear[0]), half::choose(mask[1], set[1], clear[1])]))
     }
 
-    /// As [`LaneMask::choose`], of whole numbers.
+    /// As [`LaneMask::choose`], for integers.
     #[inline(always)]
     pub fn choose_number(self, set: u32, clear: [u32; LANES]) -> [u32; LANES] {
         self.choose(Lanes::all(f32::from_bits(set)), Lanes(clear.map(f32::from_bits))).0.map(f32::to_bits)
     }
 
-    /// Bit i says whether lane i is set.
+    /// Bit i is set if lane i is.
     #[inline(always)]
     pub fn bits(self) -> u32 {
         let [low, high] = load(&self.0);
@@ -148,7 +148,7 @@ impl Div for Lanes {
     }
 }
 
-/// Four numbers, in a vector.
+/// Four numbers in an SSE register.
 #[cfg(target_arch = "x86_64")]
 mod half {
     use std::arch::x86_64::*;
@@ -201,14 +201,14 @@ mod half {
 
     #[inline(always)]
     pub fn load(numbers: [f32; 4]) -> Half {
-        // SAFETY: it reads the four numbers.
+        // SAFETY: it reads the four numbers of the array, at any alignment.
         unsafe { _mm_loadu_ps(numbers.as_ptr()) }
     }
 
     #[inline(always)]
     pub fn store(half: Half) -> [f32; 4] {
         let mut out = [0.0; 4];
-        // SAFETY: it writes the four numbers.
+        // SAFETY: it writes the four numbers of the array, at any alignment.
         unsafe { _mm_storeu_ps(out.as_mut_ptr(), half) };
         out
     }
@@ -219,7 +219,7 @@ mod half {
 mod half {
     pub type Half = [f32; 4];
 
-    /// Declares operations number by number.
+    /// Declares lane-wise operations.
     macro_rules! operations {
         ($($name:ident($a:ident, $b:ident) = $operation:expr;)+) => {$(
             #[inline(always)]

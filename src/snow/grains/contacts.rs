@@ -1,8 +1,8 @@
 //! Pairs of grains that touch or may soon, each with the impulse that it carries from sub-step to sub-step.
 //!
-//! The pairs of a block are found again when a grain near it has moved by half the skin; as pairs are found by where grains were then
-//! (`anchors`), none is missed before. They are solved eight at a time: a *batch* has eight pairs that share no grain, and every pair comes
-//! after those before it in the sweep that have a grain in common with it, so that the result is that of one pair after the other.
+//! The pairs of a block are found again when a grain in or near it is half the skin away from its anchor; as pairs are found
+//! between anchors, none is missed before. They are solved eight at a time: the pairs of a *batch* share no grain, and every
+//! pair is solved after the earlier pairs that share a grain with it, so that the result is that of one pair after the other.
 
 use std::sync::LazyLock;
 
@@ -13,45 +13,46 @@ use super::rows::{Row, V, norm, sub};
 use crate::base::cpu::dispatch;
 use crate::base::lanes::{LANES, Lanes};
 
-/// Distance (diameters) up to which a pair of grains is kept beyond touching: pairs are found again once a grain has moved half
-/// of it. Less than a cell less a diameter.
+/// Largest gap (diameters) between the anchors of a pair: pairs are found again once a grain is half as far from its anchor.
+/// Less than the edge of a cell minus a diameter.
 pub const SKIN: f32 = 0.25;
-/// The same in blocks with a fast grain, whose pairs last for a sub-step or two anyway: a little farther than grains wake one another.
+/// The same in blocks with a fast grain, whose pairs last only a sub-step or two: slightly more than the gap at which grains
+/// wake each other.
 pub const THIN_SKIN: f32 = 0.12;
 
-/// Bits of a grain's index; above them from which block the other grain of a pair is, two bits an axis.
+/// Bits of the slot in a code; the bits above are the step to the block of the other grain, two bits per axis.
 const INDEX: u32 = 26;
-/// Most grains.
+/// Largest count of grains.
 pub const MOST: usize = 1 << INDEX;
 
-/// Eight pairs without a common grain. Lanes that are left over repeat the first one.
+/// Eight pairs that share no grain. Unused lanes repeat the first one.
 #[derive(Clone, Copy)]
 pub struct Batch {
-    /// The grains that own them: of each pair the one in the higher block, or in a block the one in the higher cell.
+    /// Slots of the owners: of each pair the grain in the later block (by y, x, z), or in one block the later member.
     pub owners: [u32; LANES],
-    /// The other grains, and above their bits from which block.
+    /// Slots of the other grains, with the step to their block above.
     codes: [u32; LANES],
-    /// Impulses (m/s, of a grain of unit mass) on the owners.
+    /// Impulses on the owners (m/s, for a grain of unit mass).
     pub impulse: [Lanes; 3],
 }
 
 /// The impulse of a pair between two steps.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Held {
-    /// Its grains.
+    /// Slots of the grains.
     pub grains: [u32; 2],
-    /// On the first one (m/s).
+    /// On the first grain (m/s).
     pub impulse: V,
 }
 
 impl Held {
-    /// From the other side.
+    /// With the grains swapped.
     fn turned(self) -> Self {
         let [a, b] = self.grains;
         Self { grains: [b, a], impulse: self.impulse.map(|x| -x) }
     }
 
-    /// With the lesser grain first.
+    /// With the lower slot first.
     fn in_order(self) -> Self {
         if self.grains[0] < self.grains[1] { self } else { self.turned() }
     }
@@ -61,7 +62,7 @@ impl Held {
 #[derive(Clone, Copy)]
 struct Pair {
     code: u32,
-    /// Number of the other grain among the members of the blocks around the owner's.
+    /// Index of the other grain among the members of the owner's block and the earlier ones around it.
     local: u32,
     impulse: V,
 }
@@ -69,20 +70,20 @@ struct Pair {
 /// Working memory of one thread.
 #[derive(Default)]
 struct Scratch {
-    /// Where each member's pairs begin, and how many there are.
+    /// Index of each member's first pair, then the count of pairs.
     starts: Vec<u32>,
     /// Pairs by owner.
     pairs: Vec<Pair>,
-    /// For each grain around, the batch behind the last one that it is in.
+    /// For each grain around, the index after the last batch that holds it.
     behind: Vec<u32>,
-    /// Pairs in each batch.
+    /// Count of pairs in each batch.
     counts: Vec<u8>,
-    /// For each batch one with room, at or behind it.
+    /// For each batch itself if it has room, else a later one to try.
     room: Vec<u32>,
 }
 
 impl Batch {
-    /// The other grains.
+    /// Slots of the other grains.
     #[inline(always)]
     pub fn others(&self) -> [u32; LANES] {
         let mut others = self.codes;
@@ -92,7 +93,7 @@ impl Batch {
         others
     }
 
-    /// From the owner's block to the other's (diameters).
+    /// From the owner's block to the other grain's (diameters).
     #[inline(always)]
     pub fn shift(&self) -> [Lanes; 3] {
         let mut shift = [Lanes::default(); 3];
@@ -104,8 +105,8 @@ impl Batch {
         shift
     }
 
-    /// Visits its pairs that carry an impulse: the grains, from which block the other one is, and the impulse. Lanes that are left
-    /// over repeat the first one.
+    /// Visits the pairs that carry an impulse: their slots, the index of the other grain's block in [`Block::near`], and the
+    /// impulse. Unused lanes repeat the first pair.
     #[inline(always)]
     fn for_each_held(&self, mut visit: impl FnMut([u32; 2], usize, V)) {
         for lane in 0..LANES {
@@ -118,7 +119,7 @@ impl Batch {
         }
     }
 
-    /// Its pairs that carry an impulse, each once.
+    /// The pairs that carry an impulse, each once.
     pub fn held(&self) -> impl Iterator<Item = Held> + '_ {
         let held = |lane: usize| Held {
             grains: [self.owners[lane], other(self.codes[lane])],
@@ -127,35 +128,35 @@ impl Batch {
         self.lanes().map(held).filter(|held| held.impulse != [0.0; 3])
     }
 
-    /// Lanes with a pair of their own.
+    /// The lanes in use.
     pub fn lanes(&self) -> impl Iterator<Item = usize> + '_ {
         let repeats = |lane: usize| self.owners[lane] == self.owners[0] && self.codes[lane] == self.codes[0];
         (0..LANES).filter(move |&lane| lane == 0 || !repeats(lane))
     }
 }
 
-/// The grain of a code.
+/// The slot in a code.
 #[inline(always)]
 fn other(code: u32) -> u32 {
     code & ((1 << INDEX) - 1)
 }
 
-/// Bits for the block a step away, -1 to 1 along each axis.
+/// The upper bits of a code: a step of -1 to 1 along each axis.
 fn step_bits(step: [i32; 3]) -> u32 {
     let [x, y, z] = step.map(|step| (step + 1) as u32);
     (z << 4 | y << 2 | x) << INDEX
 }
 
 impl Layout {
-    /// Keeps what pairs carried in the last step until they are found.
+    /// Keeps the impulses of the last step until their pairs are found.
     pub fn keep_held(&mut self, held: Vec<Held>) {
         let mut kept: Vec<(u32, Held)> = held.into_par_iter().filter_map(|held| self.owned(held)).collect();
         kept.par_sort_unstable_by_key(|(block, held)| (*block, held.grains));
         self.kept = kept;
     }
 
-    /// Finds the pairs of the blocks that are reached and lack them: since they, or blocks with whose grains they own pairs,
-    /// changed. What pairs carry is taken from their old ones and from what was kept.
+    /// Finds the pairs of the reached blocks that lack them because they, or earlier blocks around them, changed. Impulses are
+    /// taken over from the old pairs and from the last step.
     pub fn find_pairs(&mut self) {
         let changed: Vec<bool> = self.blocks.par_iter().map(|block| block.is_changed).collect();
         let is_changed = |block: &u32| *block != NONE && changed[*block as usize];
@@ -209,7 +210,7 @@ impl Layout {
         );
     }
 
-    /// What a pair carries, with the block that owns it; nothing where a grain has left.
+    /// The block that owns a pair, and the impulse with its grain first; none if a grain has left.
     fn owned(&self, held: Held) -> Option<(u32, Held)> {
         let level = |block: u32| {
             let [x, y, z] = self.blocks[block as usize].at;
@@ -225,7 +226,7 @@ impl Layout {
         }
     }
 
-    /// Pairs of grains that have just changed blocks, by the block that owns them now.
+    /// Impulses of the pairs whose grains have just changed blocks, sorted by the block that owns them now.
     fn moved(&self, is_listed: &[bool]) -> Vec<(u32, Held)> {
         if !self.has_moved {
             return Vec::new();
@@ -248,7 +249,7 @@ impl Layout {
         moved
     }
 
-    /// Overlaps (diameters) of the pairs that touch.
+    /// Overlaps (diameters) of touching pairs.
     pub fn overlaps(&self, rows: &[Row]) -> Vec<f32> {
         let pairs = self.batches.iter().flatten().flat_map(|batch| {
             batch.lanes().map(|lane| {
@@ -260,8 +261,8 @@ impl Layout {
         pairs.filter(|overlap| *overlap > -0.02).map(|overlap| overlap.max(0.0)).collect()
     }
 
-    /// What all pairs carry, in the order of their grains: the same whether a pair was found in this step or kept. The pairs
-    /// themselves are given up, block by block, so that there is no room for both.
+    /// The impulses of all pairs, sorted by slots: the same whether a pair was found in this step or kept. Pairs are freed block
+    /// by block, so that memory need not hold both.
     pub fn take_held(&mut self) -> Vec<Held> {
         let batches = std::mem::take(&mut self.batches);
         let kept = std::mem::take(&mut self.kept);
@@ -276,17 +277,17 @@ impl Layout {
     }
 }
 
-/// Cells of a block one behind the other along z, whose grains may be near those of a cell.
+/// A range of cells of a block along z whose grains may be near those of a cell.
 #[derive(Clone, Copy)]
 struct Cells {
-    /// Steps to the block.
+    /// Step to the block.
     step: [i8; 3],
     first: u8,
     end: u8,
 }
 
-/// For each cell of a block those with whose grains its own have pairs: in the block itself cells that come before it (upward,
-/// then along x, then z), but not the cell itself; in blocks that come before it all that are near.
+/// For each cell of a block, the cells with whose grains its own may form pairs: in the same block the adjacent ones before it
+/// (ordered by y, x, z) but not itself, in earlier blocks all adjacent ones.
 static NEAR_CELLS: LazyLock<Vec<Vec<Cells>>> = LazyLock::new(|| {
     let cells = CELLS as i32;
     let near = |cell: i32| {
@@ -312,33 +313,33 @@ static NEAR_CELLS: LazyLock<Vec<Vec<Cells>>> = LazyLock::new(|| {
     (0..ALL_CELLS as i32).map(near).collect()
 });
 
-/// Blocks that come before a block, by code: below it, then along x, then z.
+/// The earlier blocks around a block (by y, x, z), as indices in [`Block::near`].
 const EARLIER: [usize; 13] = [0, 1, 2, 9, 10, 11, 18, 19, 20, 3, 4, 5, 12];
 
 impl Block {
-    /// Whether a pair that a block owned is still its own: none of the grains has changed blocks.
+    /// Whether a pair that the block owned is still its own: neither grain has changed blocks.
     #[inline(always)]
     fn has(&self, homes: [Home; 2], code: usize, index: usize) -> bool {
         homes[0].block == index as u32 && homes[1].block == self.near[code]
     }
 
-    /// Distance (diameters) up to which a member and one of another block are a pair.
+    /// Largest distance (diameters) between the anchors of a pair of a member and one of `other`.
     fn reach_to(&self, other: &Self) -> f32 {
         1.0 + 0.5 * (self.skin + other.skin)
     }
 }
 
-/// Members of a block one behind the other that may be near a grain.
+/// A range of members of a block that may be near a grain.
 struct Run<'a> {
     block: &'a Block,
     low: u32,
     high: u32,
-    /// Distance (diameters) up to which grains are a pair.
+    /// Largest distance (diameters) between the anchors of a pair.
     reach: f32,
     /// From the owner's block to this one (diameters).
     shift: V,
     bits: u32,
-    /// Number of this block's first member among those around.
+    /// Index of this block's first member among those around.
     first: u32,
 }
 
@@ -346,7 +347,7 @@ fn find(scratch: &mut Scratch, blocks: &[Block], index: usize) {
     dispatch!(find_in(scratch: &mut Scratch, blocks: &[Block], index: usize))
 }
 
-/// The pairs that a block owns.
+/// Finds the pairs that a block owns.
 #[inline(always)]
 fn find_in(scratch: &mut Scratch, blocks: &[Block], index: usize) {
     let block = &blocks[index];
@@ -385,7 +386,7 @@ fn find_in(scratch: &mut Scratch, blocks: &[Block], index: usize) {
                 runs.push(Run { block: there, low, high, reach, shift, bits, first });
             }
         }
-        // What comes before a grain in its own cell.
+        // The earlier members of a grain's own cell.
         let mut before = Run {
             block,
             low: own.start,
@@ -408,7 +409,7 @@ fn find_in(scratch: &mut Scratch, blocks: &[Block], index: usize) {
     }
 }
 
-/// Adds the pairs of a grain with those of a run.
+/// Adds the pairs of a grain with members of a run.
 #[inline(always)]
 fn scan(place: V, run: &Run<'_>, pairs: &mut Vec<Pair>) {
     let reach = Lanes::all(run.reach * run.reach);
@@ -434,7 +435,7 @@ fn scan(place: V, run: &Run<'_>, pairs: &mut Vec<Pair>) {
     }
 }
 
-/// Eight numbers from one on.
+/// Eight numbers, starting at `first`.
 #[inline(always)]
 fn eight(numbers: &[f32], first: u32) -> Lanes {
     let mut out = [0.0; LANES];
@@ -443,7 +444,7 @@ fn eight(numbers: &[f32], first: u32) -> Lanes {
 }
 
 impl Scratch {
-    /// Gives a pair of an owner (by rank) and a partner the impulse that it had; whether there is such a pair.
+    /// Sets the impulse of the pair of an owner (rank) and a partner (slot); returns whether it exists.
     #[inline(always)]
     fn carry(&mut self, owner: u32, partner: u32, impulse: V) -> bool {
         let owned = self.starts[owner as usize] as usize..self.starts[owner as usize + 1] as usize;
@@ -456,7 +457,7 @@ impl Scratch {
         false
     }
 
-    /// Puts the pairs into batches, each into the first one with room behind those of its grains' earlier pairs.
+    /// Puts each pair into the first batch with room after those of its grains' earlier pairs.
     fn schedule(&mut self, members: &[u32], batches: &mut Vec<Batch>) {
         let Self { starts, pairs, behind, counts, room } = self;
         counts.clear();
@@ -476,7 +477,7 @@ impl Scratch {
                 if at == batches.len() {
                     room.push(at as u32);
                     counts.push(0);
-                    // All lanes, so that those that are left over repeat the first one.
+                    // All lanes: unused ones repeat the first pair.
                     let (owners, codes) = ([slot; LANES], [pair.code; LANES]);
                     batches.push(Batch { owners, codes, impulse: pair.impulse.map(Lanes::all) });
                 }

@@ -1,4 +1,4 @@
-//! Grains and how they move: sub-steps of [`super::solve`], in which neighbours are found again where grains have moved.
+//! Grains and their motion: sub-steps of [`super::solve`], in which pairs are found again where grains have moved.
 
 use rayon::prelude::*;
 
@@ -26,7 +26,7 @@ pub struct Floor {
     pub friction: f32,
 }
 
-/// Writes the places (m) of a mesh's vertices at a share 0..=1 of a step.
+/// Writes the positions (m) of a mesh's vertices at a share 0..=1 of a step.
 pub type Pose<'a> = Box<dyn Fn(f64, &mut Vec<DVec3>) -> Result<()> + Send + Sync + 'a>;
 
 /// What grains cannot move.
@@ -34,9 +34,9 @@ pub type Pose<'a> = Box<dyn Fn(f64, &mut Vec<DVec3>) -> Result<()> + Send + Sync
 pub struct Colliders<'a> {
     /// A level plane.
     pub floor: Option<Floor>,
-    /// A level set that rests during the step.
+    /// A level set that does not move during the step.
     pub field: Option<Field<'a>>,
-    /// Meshes that move, each with its pose (m) at a share 0..=1 of the step.
+    /// Moving meshes, each with its pose (m) at a share 0..=1 of the step.
     pub shells: Vec<(Shell, Pose<'a>)>,
 }
 
@@ -46,13 +46,13 @@ pub struct Heap {
     pub(super) diameter: f64,
     pub(super) rows: Vec<Row>,
     pub(super) ids: Vec<u32>,
-    /// Block of each.
+    /// Block index of each.
     pub(super) at: Vec<At>,
-    /// What pairs carry.
+    /// Impulses of pairs.
     pub(super) held: Vec<Held>,
-    /// What grains touch that cannot be moved, by grain and collider.
+    /// Touches, sorted by slot and collider.
     pub(super) touches: Vec<Touch>,
-    /// Identities of the grains that had no room at the end of the last step, ascending.
+    /// Identities of the grains trapped at the end of the last step, ascending.
     pub(super) trapped: Vec<u32>,
 }
 
@@ -61,32 +61,32 @@ pub struct Heap {
 pub struct Division {
     /// Length of the step (s).
     pub dt: f64,
-    /// Sub-steps.
+    /// Count of sub-steps.
     pub sub_steps: usize,
 }
 
 impl Heap {
-    /// No grains yet, of a diameter (m).
+    /// No grains yet; they will have this diameter (m).
     pub fn new(diameter: f64) -> Self {
         let (rows, ids, at) = (Vec::new(), Vec::new(), Vec::new());
         let (held, touches, trapped) = Default::default();
         Self { diameter, rows, ids, at, held, touches, trapped }
     }
 
-    /// Number of grains.
+    /// Count of grains.
     pub fn count(&self) -> usize {
         self.rows.len()
     }
 
-    /// Number of grains that rest.
+    /// Count of grains at rest.
     pub fn resting(&self) -> usize {
         self.rows.iter().filter(|row| row.rests()).count()
     }
 
-    /// Adds a grain with an identity of its own, at a place (m) with a velocity (m/s).
+    /// Adds a grain with an unused identity, at a position (m) with a velocity (m/s).
     ///
     /// # Errors
-    /// A place too far away; too many grains.
+    /// A position out of range; too many grains.
     pub fn add(&mut self, id: u32, place: DVec3, velocity: V) -> Result<()> {
         let (at, place) = locate(place, self.diameter);
         if !holds(at) {
@@ -101,7 +101,7 @@ impl Heap {
         Ok(())
     }
 
-    /// Leaves out the grains whose identity and place (m) something says no to.
+    /// Removes the grains for whose identity and position (m) `keeps` returns false.
     pub fn retain(&mut self, keeps: impl Fn(u32, DVec3) -> bool + Sync) {
         let is_kept = |slot: &u32| {
             let slot = *slot as usize;
@@ -113,7 +113,7 @@ impl Heap {
         }
     }
 
-    /// Wakes the grains whose places (m) something says yes to.
+    /// Wakes the grains for whose position (m) `wakes` returns true.
     pub fn wake(&mut self, wakes: impl Fn(DVec3) -> bool + Sync) {
         let diameter = self.diameter;
         self.rows.par_iter_mut().zip(&self.at).for_each(|(row, at)| {
@@ -124,7 +124,7 @@ impl Heap {
         });
     }
 
-    /// Identities, in the order of the places.
+    /// Identities, in the order of [`Heap::places`].
     pub fn ids(&self) -> &[u32] {
         &self.ids
     }
@@ -134,12 +134,12 @@ impl Heap {
         self.rows.iter().map(|row| row.velocity)
     }
 
-    /// Places (m).
+    /// Positions (m).
     pub fn places(&self) -> impl Iterator<Item = DVec3> + '_ {
         self.rows.iter().zip(&self.at).map(|(row, at)| world(*at, row.place, self.diameter))
     }
 
-    /// The box (m) of all grains; least over greatest where there are none.
+    /// Bounding box (m) of all positions, plus a diameter; least over greatest if there are none.
     pub fn bounds(&self) -> [DVec3; 2] {
         let room = DVec3::repeat(self.diameter);
         let none = || [DVec3::repeat(f64::MAX), DVec3::repeat(f64::MIN)];
@@ -149,17 +149,17 @@ impl Heap {
         places.fold(none, with).reduce(none, |[low, high], [l, h]| [low.inf(&l), high.sup(&h)])
     }
 
-    /// Places as a block and a place within it (diameters).
+    /// Positions as a block and a position within it (diameters).
     pub fn located(&self) -> impl Iterator<Item = (At, V)> + '_ {
         self.rows.iter().zip(&self.at).map(|(row, at)| (*at, row.place))
     }
 
-    /// Whether each is awake.
+    /// Whether each grain is awake.
     pub fn awake(&self) -> impl Iterator<Item = bool> + '_ {
         self.rows.iter().map(|row| !row.rests())
     }
 
-    /// Identities of the grains that the last step left no room, ascending: see [`super::trapped`].
+    /// Identities of the grains that the last step left trapped, ascending: see [`super::trapped`].
     pub fn trapped(&self) -> &[u32] {
         &self.trapped
     }
@@ -172,7 +172,7 @@ impl Heap {
     /// Moves the grains through a step.
     ///
     /// # Errors
-    /// Cancel; a pose that cannot be computed; a grid that cannot be read; numbers that are no longer finite.
+    /// Cancel; a pose that cannot be computed; a grid that cannot be read; a position or velocity that is no longer finite.
     pub fn step(
         &mut self,
         ctx: &Context,
@@ -190,10 +190,10 @@ impl Heap {
         self.make_room(ctx, colliders, MOST_BEFORE)?;
         let Colliders { floor, field, shells } = colliders;
         let mut field = field.as_ref().map(|field| Seen::new(field, self.diameter));
-        // A few sub-steps ahead.
+        // Distance (diameters) at 1 m/s.
         let ahead = (f64::from(SUB_STEPS_AHEAD) * dt / self.diameter) as f32;
         let mut layout = self.lay_out(ahead);
-        // How far meshes may have travelled in the step (diameters).
+        // Largest travel of the meshes in the step so far (diameters).
         let mut before = 0.0;
         let mut fastest = self.fastest();
         self.rows.par_iter_mut().for_each(|row| row.limit = 0.0);
@@ -244,7 +244,7 @@ impl Heap {
         layout
     }
 
-    /// Keeps what the next step needs of a layout, and the grains that have not left it.
+    /// Keeps what the next step needs of a layout; removes the grains that have left its range.
     fn take_back(&mut self, mut layout: Layout) -> Result<()> {
         self.held = layout.take_held();
         self.touches = layout.blocks.iter().flat_map(|block| block.touches.iter().copied()).collect();
@@ -271,7 +271,7 @@ impl Heap {
         Ok(())
     }
 
-    /// Puts the grains into another order, which may leave some out.
+    /// Reorders the grains by their old slots; those not in `from` are removed.
     fn keep(&mut self, from: &[u32]) {
         let leaves_out = from.len() < self.rows.len();
         let mut slots = vec![NONE; self.rows.len()];
@@ -290,7 +290,7 @@ impl Heap {
         self.touches.par_sort_unstable_by_key(Touch::key);
     }
 
-    /// Finds what grains touch that cannot be moved, and wakes those that a moving surface touches.
+    /// Finds the touches of grains, and wakes the grains that a moving surface touches.
     fn touch(
         &mut self,
         layout: &mut Layout,
@@ -301,7 +301,7 @@ impl Heap {
         let mut fresh: Vec<Vec<Touch>> = vec![Vec::new(); layout.blocks.len()];
         if !search.shells.is_empty() {
             let rows = Shared::new(&mut self.rows);
-            // Few blocks ask, and those lie side by side: they are shared out in small parts.
+            // Few blocks search, and those are adjacent: small tasks balance the load.
             let blocks = layout.blocks.par_iter_mut().zip(&mut fresh);
             let asking: Vec<_> = blocks.filter(|(block, _)| search.may_be_near(block)).collect();
             let asking = asking.into_par_iter().with_max_len(4);
@@ -310,7 +310,7 @@ impl Heap {
                 block.is_awake |= !fresh.is_empty();
             });
         }
-        // Where all grains rest, what they lie on does nothing; those that left a block take their touches with them.
+        // Blocks at rest need no touches, but are due if their grains changed: those that left take their touches along.
         layout.blocks.par_iter_mut().for_each(|block| {
             block.is_due = block.lacks_touches && (block.is_awake || block.is_stirred);
             block.lacks_touches &= !block.is_due;
@@ -332,7 +332,7 @@ impl Heap {
         Ok(())
     }
 
-    /// Overlaps (diameters) of the pairs that touch, for tests and reports.
+    /// Overlaps (diameters) of touching pairs, for tests and reports.
     pub fn overlaps(&self) -> Vec<f32> {
         let mut heap = self.clone();
         let mut layout = heap.lay_out(0.0);
@@ -343,9 +343,9 @@ impl Heap {
 }
 
 impl Floor {
-    /// Members of a block near the floor.
+    /// Touches of a block's members near the floor.
     fn touches(&self, block: &super::layout::Block, rows: &[Row], diameter: f64, reach: f32) -> Vec<Touch> {
-        // From the block's lower side to the floor (diameters).
+        // Height of the floor above the bottom of the block (diameters).
         let height =
             (self.height / diameter - f64::from(block.at[1]) * f64::from(super::layout::EDGE)) as f32;
         let near = block.members.iter().filter(|slot| {

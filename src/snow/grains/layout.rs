@@ -1,7 +1,7 @@
-//! Grains in blocks of 8 x 8 x 8 diameters, so that neighbours are near in memory, and those in columns: two columns that are
-//! no neighbours never touch the same grain.
+//! Sorts grains into blocks of 8 x 8 x 8 diameters, so that neighbours are close in memory, and blocks into columns: two
+//! columns that are not adjacent never use the same grain.
 //!
-//! Within a step grains change blocks without moving in memory: a block has a list of its members.
+//! Within a step, grains change blocks without moving in memory: a block lists its members.
 
 use std::collections::HashMap;
 
@@ -15,79 +15,79 @@ use crate::base::lanes::LANES;
 
 /// Edge of a block (diameters). At least twice the reach of a contact.
 pub const EDGE: f32 = 8.0;
-/// Cells along a block's edge: wider than the reach of a contact.
+/// Count of cells along a block's edge; a cell is wider than the reach of a contact.
 pub const CELLS: usize = 6;
-/// Cells of a block.
+/// Count of cells of a block.
 pub const ALL_CELLS: usize = CELLS * CELLS * CELLS;
-/// In place of a number: there is none.
+/// An index that stands for none.
 pub const NONE: u32 = u32::MAX;
 
 /// Index of a block along each axis.
 pub type At = [i32; 3];
 
-/// A block of grains, and what they do in a step.
+/// A block of grains and their state in a step.
 pub struct Block {
-    /// Which.
+    /// Its index.
     pub at: At,
-    /// The blocks around it, and itself in the middle: along x, then y, then z; [`NONE`] where there is none.
+    /// The blocks around it, and itself in the middle, ordered by x, y, z; [`NONE`] where there is none.
     pub near: [u32; 27],
-    /// Its grains by cell, in a cell in the order in which they came to the block.
+    /// Slots of its grains, sorted by cell; the sort is stable, and newcomers follow the others.
     pub members: Vec<u32>,
-    /// The first member of each cell (upward, then along x, then z), and how many there are.
+    /// Index of the first member of each cell (ordered by y, x, z), then the count of members.
     pub starts: [u32; ALL_CELLS + 1],
-    /// Where members were when their neighbours were found (diameters, each axis for itself), and some that are nowhere.
+    /// Anchors of the members (diameters), by axis; padded with infinity.
     pub anchors: [Vec<f32>; 3],
-    /// Distance (diameters) beyond touching up to which two members are a pair.
+    /// Largest gap (diameters) between the anchors of two members that form a pair.
     pub skin: f32,
-    /// What members touch that cannot be moved, by member.
+    /// Touches of members, sorted by slot and collider.
     pub touches: Vec<Touch>,
-    /// How far (diameters) meshes may travel in a step before one can touch a member.
+    /// Distance (diameters) that meshes may travel from the start of the step before one can touch a member.
     pub limit: f32,
     /// Whether a member is awake.
     pub is_awake: bool,
     /// Whether contacts of its members can matter: it or a neighbour is awake.
     pub is_reached: bool,
-    /// Whether a member has moved so far that neighbours must be found again.
+    /// Whether a member is so far from its anchor that pairs must be found again.
     pub has_strayed: bool,
-    /// Whether its members changed in this sub-step.
+    /// Whether its members or anchors changed in this sub-step.
     pub is_changed: bool,
-    /// Whether they have changed since the step began.
+    /// Whether they have changed since the start of the step.
     pub is_stirred: bool,
-    /// Whether its touches are not those of its members.
+    /// Whether its touches are out of date.
     pub lacks_touches: bool,
-    /// Whether they are found in this sub-step.
+    /// Whether they are found again in this sub-step.
     pub is_due: bool,
-    /// Whether its pairs are not those of its members.
+    /// Whether its pairs are out of date.
     pub lacks_pairs: bool,
-    /// Whether it has had its pairs found in this step.
+    /// Whether its pairs were found in this step.
     pub is_found: bool,
 }
 
-/// Where a grain belongs.
+/// The block of a grain.
 #[derive(Clone, Copy)]
 pub struct Home {
-    /// Its block; [`NONE`] where it has left the range of blocks.
+    /// Index of the block; [`NONE`] if the grain has left the range of blocks.
     pub block: u32,
-    /// Its place among the block's members.
+    /// Index among the block's members.
     pub rank: u32,
 }
 
 /// A grain that has left its block.
 struct Mover {
     slot: u32,
-    /// Index of the block that it is in.
+    /// Index of its new block along each axis.
     at: At,
-    /// That block, where it is next to the last one; [`NONE`] where there is none yet.
+    /// The new block if it exists and is adjacent to the old one, else [`NONE`].
     block: u32,
 }
 
-/// Of the blocks around an index the one at another index; [`NONE`] where there is none, or farther away.
+/// The block at `to` among those around the block at `from`; [`NONE`] if there is none or it is farther away.
 fn beside(from: At, near: &[u32; 27], to: At) -> u32 {
     let [x, y, z] = [0, 1, 2].map(|axis| i64::from(to[axis]) - i64::from(from[axis]) + 1);
     if [x, y, z].iter().all(|step| (0..3).contains(step)) { near[(9 * x + 3 * y + z) as usize] } else { NONE }
 }
 
-/// Blocks one above the other.
+/// Blocks above each other.
 pub struct Column {
     /// Index along x and z.
     pub at: [i32; 2],
@@ -95,30 +95,30 @@ pub struct Column {
     pub blocks: Vec<u32>,
 }
 
-/// Where the grains are.
+/// Blocks and columns of grains.
 #[derive(Default)]
 pub struct Layout {
-    /// Blocks with grains, and some that had some.
+    /// Blocks that have or had grains.
     pub blocks: Vec<Block>,
-    /// The pairs that each block owns: those with a grain of its own and another one, of its own or of a block that comes before it.
+    /// The pairs that each block owns: those of a member with another member or with one of an earlier block.
     pub batches: Vec<Vec<Batch>>,
     /// Columns of blocks.
     pub columns: Vec<Column>,
-    /// Where each grain belongs.
+    /// Home of each grain, by slot.
     pub homes: Vec<Home>,
     /// Whether a grain has just changed blocks.
     pub has_moved: bool,
-    /// Whether one has in this step.
+    /// Whether one has since the start of the step.
     pub has_ever_moved: bool,
-    /// What pairs carried in the last step, by the block that owns them, in this order.
+    /// Impulses of the last step with the block that owns the pair, sorted by block.
     pub kept: Vec<(u32, Held)>,
-    /// How many neighbours each grain had when the step began, where that is asked: see [`super::density`].
+    /// Count of neighbours of each grain at the start of the step, if needed: see [`super::density`].
     pub neighbours: Vec<u8>,
     index: HashMap<At, u32>,
     column_index: HashMap<[i32; 2], u32>,
 }
 
-/// Where a grain goes: column, level and cell, then its identity.
+/// Sort key of a grain: column, level and cell, then identity.
 #[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 struct Key {
     cell: u64,
@@ -126,22 +126,21 @@ struct Key {
     from: u32,
 }
 
-/// Blocks are counted from the middle of what a key holds: 2^21 of them along x and z, 2^14 upward.
+/// Offset of block indices in a key, which holds 2^21 blocks along x and z and 2^14 upward.
 const MIDDLE: [i32; 3] = [1 << 20, 1 << 13, 1 << 20];
 
-/// Whether a block index can be sorted.
+/// Whether a block index fits into a sort key.
 pub fn holds(at: At) -> bool {
     (0..3).all(|axis| (-MIDDLE[axis]..MIDDLE[axis]).contains(&at[axis]))
 }
 
-/// Cell of a block that a place lies in.
+/// Index of the cell of a position in a block.
 fn cell(place: V) -> usize {
     let [x, y, z] = place.map(|x| ((x * (CELLS as f32 / EDGE)) as usize).min(CELLS - 1));
     (y * CELLS + x) * CELLS + z
 }
 
-/// The order of grains by column, level, cell and identity: where each was before. Those in a block that cannot be sorted are
-/// left out.
+/// The slots of grains, sorted by column, level, cell and identity. Those in blocks that do not fit into a key are left out.
 pub fn order(rows: &[Row], ids: &[u32], at: &[At]) -> Vec<u32> {
     let mut keys: Vec<Key> = (rows.par_iter(), ids.par_iter(), at.par_iter())
         .into_par_iter()
@@ -157,7 +156,7 @@ pub fn order(rows: &[Row], ids: &[u32], at: &[At]) -> Vec<u32> {
 }
 
 impl Layout {
-    /// Blocks of grains in the order of [`order`]; neighbours are not found yet.
+    /// Blocks of grains that are sorted as by [`order`]; pairs are not found yet.
     pub fn new(rows: &mut [Row], at: &[At], ahead: f32) -> Self {
         let mut layout = Self { homes: vec![Home { block: NONE, rank: 0 }; at.len()], ..Self::default() };
         let is_first = |slot: &usize| *slot == 0 || at[*slot] != at[slot - 1];
@@ -172,7 +171,7 @@ impl Layout {
         layout
     }
 
-    /// The block at an index; a new one where there is none yet.
+    /// The block at an index; creates it if there is none.
     pub fn block(&mut self, at: At) -> u32 {
         if let Some(&index) = self.index.get(&at) {
             return index;
@@ -221,8 +220,7 @@ impl Layout {
         index
     }
 
-    /// Moves members of blocks that have strayed to the blocks that they are in, and sorts the members of every block that
-    /// changed.
+    /// Moves members of strayed blocks to the blocks that they are in now, and sorts the members of every block that changed.
     pub fn follow(&mut self, rows: &mut [Row], ahead: f32) {
         let shared = Shared::new(rows);
         let strayed = self.blocks.par_iter_mut().filter(|block| block.has_strayed);
@@ -232,7 +230,7 @@ impl Layout {
                 let (mut gone, at, near) = (Vec::new(), block.at, block.near);
                 block.members.retain(|&slot| {
                     let mut now = at;
-                    // SAFETY: a grain is a member of one block.
+                    // SAFETY: a grain is a member of one block, which one task has.
                     settle(unsafe { shared.get(slot as usize) }, &mut now);
                     if now != at {
                         gone.push(Mover { slot, at: now, block: beside(at, &near, now) });
@@ -263,7 +261,7 @@ impl Layout {
         self.rank_members(rows, ahead, |block| block.is_changed && block.is_stirred);
     }
 
-    /// Sorts the members of some blocks.
+    /// Sorts the members of some blocks; strayed blocks get new anchors.
     fn rank_members(&mut self, rows: &mut [Row], ahead: f32, which: impl Fn(&Block) -> bool + Sync) {
         let rows = &*rows;
         let homes = Shared::new(&mut self.homes);
@@ -289,7 +287,7 @@ impl Layout {
                 let place = place(member, slot);
                 (place, cell(place) as u32)
             }));
-            // Counted into cells; in a cell they keep their order.
+            // A counting sort by cell, which is stable.
             let mut starts = [0u32; ALL_CELLS + 1];
             places.iter().for_each(|(_, cell)| starts[*cell as usize + 1] += 1);
             (0..ALL_CELLS).for_each(|cell| starts[cell + 1] += starts[cell]);
@@ -309,7 +307,7 @@ impl Layout {
                 (xs[at], ys[at], zs[at]) = (place[0], place[1], place[2]);
             }
             for (member, &slot) in (0..).zip(&*members) {
-                // SAFETY: a grain is a member of one block.
+                // SAFETY: a grain is a member of one block, which one task has.
                 unsafe { homes.get(slot as usize).rank = member };
             }
             block.starts = starts;
@@ -320,7 +318,7 @@ impl Layout {
         });
     }
 
-    /// Marks the blocks whose contacts can matter: those that are awake, and their neighbours; all of them on request.
+    /// Marks the blocks whose contacts can matter: those awake and their neighbours, or all.
     pub fn reach(&mut self, all: bool) {
         let awake: Vec<bool> = self.blocks.par_iter().map(|block| block.is_awake).collect();
         let is_awake = |&block: &u32| block != NONE && awake[block as usize];
@@ -329,7 +327,7 @@ impl Layout {
             .for_each(|block| block.is_reached = all || block.near.iter().any(is_awake));
     }
 
-    /// Columns with blocks that are reached in four sets: of two columns of one set neither is the other's neighbour.
+    /// Columns with blocks that are reached, in four sets; no two columns of a set are adjacent.
     pub fn colours(&self) -> [Vec<u32>; 4] {
         let mut sets: [Vec<u32>; 4] = Default::default();
         for (index, column) in self.columns.iter().enumerate() {
@@ -341,18 +339,18 @@ impl Layout {
     }
 }
 
-/// Working memory of one thread that sorts the members of blocks.
+/// Working memory of one thread that sorts members.
 #[derive(Default)]
 struct Ranking {
-    /// Of each member, with its cell.
+    /// Anchor and cell of each member.
     places: Vec<(V, u32)>,
     members: Vec<u32>,
 }
 
-/// Where a grain is taken to be while its neighbours last: a little ahead of it, so that it takes longer to stray. `ahead` is how
-/// far (diameters) it would go at 1 m/s.
+/// Anchor of a grain, which its pairs are found from: slightly ahead of it, so that it takes longer to stray. `ahead` is how
+/// far (diameters) a grain goes at 1 m/s while its pairs should last.
 fn anchor(row: &Row, ahead: f32, skin: f32) -> V {
-    // Less than half of the skin.
+    // Less than half the skin.
     let most = 0.45 * skin;
     let way = scaled(row.velocity, ahead);
     let length = norm(way);
@@ -361,13 +359,13 @@ fn anchor(row: &Row, ahead: f32, skin: f32) -> V {
     place.map(|x| x.clamp(0.0, EDGE))
 }
 
-/// For how many sub-steps neighbours are to last.
+/// Count of sub-steps for which pairs should last.
 pub const SUB_STEPS_AHEAD: f32 = 6.0;
-/// How far (diameters) a grain goes in a sub-step for which a thin skin is the cheaper one: some grain near it strays in every
-/// sub-step then, and takes its neighbours' pairs along.
+/// Displacement (diameters) in a sub-step beyond which a thin skin is cheaper: some grain nearby then strays in every
+/// sub-step, and the pairs around it are found again.
 const FAST: f32 = 0.06;
 
-/// Moves a grain to the block that its place lies in.
+/// Moves a grain to the block that it lies in.
 pub fn settle(row: &mut Row, at: &mut At) {
     for axis in 0..3 {
         let (place, since, at) = (&mut row.place[axis], &mut row.since[axis], &mut at[axis]);
@@ -376,28 +374,28 @@ pub fn settle(row: &mut Row, at: &mut At) {
             *at = at.saturating_add(blocks as i32);
             *place -= blocks * EDGE;
             *since -= blocks * EDGE;
-            // A place just below 0 becomes the edge itself.
+            // A position just below 0 rounds to the edge itself.
             if *place >= EDGE {
                 *at = at.saturating_add(1);
                 *place = 0.0;
                 *since -= EDGE;
             }
         }
-        // So near 0 that it or an eighth of it counts as 0 where denormal numbers do.
+        // So little below 0 that it, or an eighth of it, is a denormal that was flushed to 0.
         if *place <= 0.0 {
             *place = 0.0;
         }
     }
 }
 
-/// World position (m) of a place in a block.
+/// World position (m) of a position in a block.
 pub fn world(at: At, place: V, diameter: f64) -> DVec3 {
     DVec3::from(
         [0, 1, 2].map(|axis| (f64::from(at[axis]) * f64::from(EDGE) + f64::from(place[axis])) * diameter),
     )
 }
 
-/// Block and place of a world position (m).
+/// Block of a world position (m), and the position in it.
 pub fn locate(world: DVec3, diameter: f64) -> (At, V) {
     let mut row = Row::default();
     let mut at = [0; 3];

@@ -1,4 +1,4 @@
-//! Which grains are near meshes that move during the step: asked in every sub-step, block by block, of the few triangles near it.
+//! Finds the grains near meshes that move during the step: in every sub-step, block by block, among the few triangles near it.
 
 use super::contacts::SKIN;
 use super::layout::{Block, EDGE, world};
@@ -13,22 +13,22 @@ use crate::base::DVec3;
 #[derive(Default)]
 pub struct Scratch {
     asking: Vec<Asking>,
-    /// Of each mesh.
+    /// By mesh.
     nearby: Vec<Nearby>,
 }
 
 /// A grain that may touch a mesh.
 struct Asking {
     slot: u32,
-    /// Where it is (m).
+    /// Its position (m).
     place: DVec3,
-    /// Distance (diameters) at which a surface counts as near.
+    /// Largest distance (diameters) of a surface that counts as near.
     reach: f64,
-    /// How far surfaces are looked for (diameters).
+    /// Search distance for surfaces (diameters).
     within: f64,
 }
 
-/// What a sub-step asks of the meshes.
+/// The search for meshes in a sub-step.
 pub struct Search<'a> {
     /// The meshes.
     pub shells: Vec<&'a Shell>,
@@ -36,23 +36,23 @@ pub struct Search<'a> {
     pub diameter: f64,
     /// Length of the sub-step (s).
     pub dt: f64,
-    /// How far the meshes may have travelled in the step before this sub-step (diameters): the sum of [`Travel::most`].
+    /// Largest travel of the meshes in the step before this sub-step (diameters): the sum of [`Travel::most`].
     pub before: f64,
     /// The same in this sub-step.
     pub travel: Travel,
 }
 
-/// How far meshes travel in a sub-step. What rides on a mesh goes along with it, and is as near to it as before.
+/// Travel of meshes in a sub-step: a common part, along which grains that ride on a mesh stay as near to it, and the rest.
 #[derive(Debug, Clone, Copy, Default)]
 pub struct Travel {
-    /// Where all of them go (diameters).
+    /// Common displacement (diameters).
     pub along: V,
-    /// How much farther a vertex may go (diameters).
+    /// Largest displacement of a vertex beside it (diameters).
     pub beside: f64,
 }
 
 impl Travel {
-    /// Of some meshes, with grains of a diameter (m).
+    /// Travel of meshes, with grains of a diameter (m).
     pub fn of(shells: &[&Shell], diameter: f64) -> Self {
         let farthest = shells.iter().map(|shell| shell.way()).fold(0.0, f64::max);
         let ways = || shells.iter().flat_map(|shell| shell.ways());
@@ -66,27 +66,29 @@ impl Travel {
         Self { along: [0, 1, 2].map(|axis| (middle[axis] / diameter) as f32), beside: beside / diameter }
     }
 
-    /// How far it is at most (diameters).
+    /// Bound of the displacement of a vertex (diameters).
     pub fn most(&self) -> f64 {
         f64::from(norm(self.along)) + self.beside
     }
 }
 
-/// Longest that [`Travel::most`] may be, in the way of the farthest vertex: beyond it, grains that do not ride would ask too often.
+/// Largest [`Travel::most`], as a multiple of the largest displacement of a vertex: beyond it, grains that do not ride would
+/// search too often.
 const ALONG: f64 = 1.2;
 
-/// How far (diameters) from its middle a block's members may touch a mesh: they have left the block by less than two diameters.
+/// Largest distance (diameters) from the middle of a block to a mesh that its members touch: they have left the block by less
+/// than two diameters.
 pub fn around() -> f64 {
     0.5 * f64::from(EDGE) * 3f64.sqrt() + REACH + 2.0
 }
 
 impl Search<'_> {
-    /// Greatest speed (m/s) that contacts may give grains, with a restitution, under a gravity (m/s2), where the fastest has a speed
-    /// (m/s) already; without meshes there is none.
+    /// Largest speed (m/s) that contacts may give grains, by the speed of the fastest one now (m/s), restitution and gravity
+    /// (m/s2); infinite without meshes.
     ///
-    /// Grains in a gap that closes between an object and the base would be squeezed out the faster the shorter sub-steps are,
-    /// without a bound, as a liquid is; snow is compacted instead. Contacts dissipate: no grain becomes faster than what drives
-    /// them all, but by what it falls.
+    /// Grains in a closing gap between an object and the base would be squeezed out like a liquid, the faster the shorter the
+    /// sub-steps, without bound; snow is compacted instead. Contacts dissipate: apart from falling, no grain becomes faster than
+    /// what drives them all.
     pub fn fastest(&self, fastest: f32, restitution: f32, gravity: f32) -> f32 {
         let Some(way) = self.shells.iter().map(|shell| shell.way()).reduce(f64::max) else {
             return f32::INFINITY;
@@ -96,21 +98,21 @@ impl Search<'_> {
         fastest.max(thrown).max(falls) * (1.0 + ROUNDING)
     }
 
-    /// Whether a mesh may be as near (diameters) as that, by what is remembered.
+    /// Whether a mesh may be within `reach` (diameters), by a stored limit.
     fn is_within(&self, limit: f32, reach: f64) -> bool {
         f64::from(limit) - self.before < reach
     }
 
-    /// Whether a mesh may be near members of a block, by what the block remembers.
+    /// Whether a mesh may be near members of a block, by the block's limit.
     pub fn may_be_near(&self, block: &Block) -> bool {
         !block.members.is_empty() && self.is_within(block.limit, around() + self.travel.most())
     }
 
-    /// Members of a block near a mesh, each with the plane that the mesh is there. Of grains that rest, those that a mesh touches
-    /// and moves, which wake. Blocks and grains remember how far the meshes may travel before they can matter.
+    /// Touches of the members of a block with meshes. A resting grain has one only if a moving mesh touches it, which wakes it.
+    /// Updates the limits of the block and of its grains.
     pub fn touches(&self, scratch: &mut Scratch, block: &mut Block, rows: Shared<'_, Row>) -> Vec<Touch> {
         let most = self.travel.most();
-        // Where a mesh has just been touched, it still is too near to ask again.
+        // A block that touched a mesh in the last sub-step is still near it.
         if !block.touches.iter().any(Touch::is_of_mesh) {
             let middle = world(block.at, [EDGE * 0.5; 3], self.diameter);
             block.limit = self.limit(middle, around() + f64::from(EDGE));
@@ -123,7 +125,7 @@ impl Search<'_> {
         let mut room = [DVec3::repeat(f64::MAX), DVec3::repeat(f64::MIN)];
         let mut farthest = 0.0f64;
         for &slot in &block.members {
-            // SAFETY: a grain is a member of one block.
+            // SAFETY: a grain is a member of one block, which one task has.
             let row = unsafe { rows.get(slot as usize) };
             let reach = REACH + f64::from(norm(row.velocity)) * self.dt / self.diameter;
             let closing = if row.rests() {
@@ -135,7 +137,7 @@ impl Search<'_> {
             if self.is_within(row.limit, REACH + closing) && !(row.rests() && most == 0.0) {
                 let place = world(block.at, row.place, self.diameter);
                 room = [room[0].inf(&place), room[1].sup(&place)];
-                // Where meshes are fast, a grain would have to ask again at once.
+                // Near fast meshes, a grain would have to search again at once anyway.
                 let within = if most < 0.5 * AHEAD { reach + AHEAD } else { reach };
                 farthest = farthest.max(within);
                 asking.push(Asking { slot, place, reach, within });
@@ -157,14 +159,14 @@ impl Search<'_> {
         touches
     }
 
-    /// How far the meshes may have travelled before one can be at a place (m), looked for within so many diameters.
+    /// Travel of the meshes at which one can reach a position (m), from a search within so many diameters.
     fn limit(&self, place: DVec3, within: f64) -> f32 {
         let square = |shell: &&Shell| shell.nearest(place, within * self.diameter).map(|found| found.square);
         let nearest = self.shells.iter().filter_map(square).fold(f64::INFINITY, f64::min).sqrt();
         (self.before + (nearest / self.diameter).min(within)) as f32 - SLACK
     }
 
-    /// What a grain touches.
+    /// Finds what a grain touches, and updates its limit.
     fn touch(&self, asking: &Asking, nearby: &mut [Nearby], row: &mut Row, touches: &mut Vec<Touch>) {
         let Asking { slot, place, reach, within } = *asking;
         let mut free = within;
@@ -186,21 +188,21 @@ impl Search<'_> {
     }
 }
 
-/// Distance (diameters) between a grain's centre and a mesh at which they count as near.
+/// Largest distance (diameters) between a grain's centre and a mesh that count as near.
 const REACH: f64 = 0.5 + SKIN as f64;
-/// How much farther meshes are looked for, so that a grain need not ask in every sub-step (diameters).
+/// Additional search distance (diameters), so that a grain need not search in every sub-step.
 const AHEAD: f64 = 1.5;
 
 /// Relative tolerance of a speed.
 const ROUNDING: f32 = 1.0e-4;
-/// Room for rounding (diameters).
+/// Tolerance for rounding (diameters).
 const SLACK: f32 = 1.0e-3;
 
 #[cfg(test)]
 mod tests {
     use super::*;
 
-    /// A triangle whose corners go along ways (m).
+    /// A triangle with displacements of its corners (m).
     fn moved(ways: [[f64; 3]; 3]) -> Shell {
         let places = [DVec3::zeros(), DVec3::x(), DVec3::z()];
         let mut shell = Shell::new(0.0, vec![[0, 1, 2]], false, places.to_vec());

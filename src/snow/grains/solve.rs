@@ -1,15 +1,16 @@
 //! The granular solver (thesis section 3.3.1): position based dynamics in small sub-steps, with two corrections per contact.
 //!
-//! Averaged or few-iteration position projections lose the weight of what lies above: piles come out at a few degrees and deep
+//! Averaged or few-iteration position projections lose the weight of what lies above: piles end at a few degrees and deep
 //! heaps sink into themselves. Here each contact keeps an *impulse* from sub-step to sub-step (projected Gauss-Seidel with
-//! warm start: Moreau 1988; small steps: Macklin et al. 2019), bounded by Coulomb's cone as a whole, and overlap is removed by a
-//! *push*, a displacement that never becomes velocity (split impulse: Guendelman et al. 2003). Impulses are equal and opposite,
-//! so a free heap keeps its momentum. Pushes move the upper of two grains, where a chain of contacts holds the lower one (mass
-//! scaling by height: Macklin et al. 2014), so that a heap of any depth is as dense as its packing after one sweep upward.
-//! Impulses do so a little, where chains hold both, so that a deep bed keeps its slope.
-//! What a push takes back of a sinking grain's motion, its velocity loses too.
+//! warm start: Moreau 1988; small steps: Macklin et al. 2019), whose total is bounded by Coulomb's cone, and overlap is removed
+//! by a *push*, a displacement that never becomes velocity (split impulse: Guendelman et al. 2003). Impulses are equal and
+//! opposite, so a free heap keeps its momentum. Pushes move the upper of two grains if a chain of contacts holds the lower one
+//! (mass scaling by height: Macklin et al. 2014), so that a heap of any depth is as dense as its packing after one sweep
+//! upward. Impulses favour the upper grain slightly if chains hold both, so that a deep bed keeps its slope. A sinking grain
+//! also loses the part of its velocity that its push undid.
 //!
-//! Columns are swept upward, in four sets that share no grain, in a fixed order: the same bytes from any number of threads.
+//! Columns are swept upward in a fixed order, in four sets within which they share no grain: any count of threads gives the
+//! same bytes.
 //! Eight pairs are solved at a time (`contacts`).
 
 use rayon::prelude::*;
@@ -26,7 +27,7 @@ use crate::base::lanes::Lanes;
 use crate::context::Context;
 use crate::error::Result;
 
-/// What a sub-step needs besides the grains.
+/// Constants of a sub-step.
 #[derive(Debug, Clone, Copy)]
 pub struct Coefficients {
     /// Length of the sub-step (s).
@@ -35,40 +36,40 @@ pub struct Coefficients {
     pub diameter: f32,
     /// Gravity (m/s2).
     pub gravity: V,
-    /// Opposite of gravity's direction; 0 without gravity.
+    /// Direction opposite to gravity; 0 without gravity.
     pub up: V,
-    /// Share of the velocity that air takes in a sub-step: 1 - beta^dt.
+    /// Share of the velocity that drag removes in a sub-step: 1 - beta^dt.
     pub air: f32,
-    /// The same by how many neighbours shelter a grain; none: they do not.
+    /// The same by the count of neighbours that shelter a grain; none: they do not.
     pub air_by_neighbours: Option<[f32; SURROUNDED + 1]>,
     /// Friction between grains.
     pub friction: f32,
     /// Largest impulse of attraction in a sub-step (m/s).
     pub attraction: f32,
-    /// What gravity adds to a velocity in a sub-step (m/s).
+    /// Speed that gravity adds in a sub-step (m/s).
     pub weight: f32,
-    /// Share of its speed with which a grain bounces off.
+    /// Share of its speed that a grain keeps in a bounce.
     pub restitution: f32,
-    /// Least speed of approach that bounces (m/s): contacts that carry a weight do not.
+    /// Least speed of approach that bounces (m/s): contacts that carry weight do not.
     pub bouncing: f32,
-    /// Gap (diameters) up to which grains attract each other.
+    /// Largest gap (diameters) at which grains attract each other.
     pub band: f32,
-    /// When grains rest; none: never.
+    /// When grains come to rest; none: never.
     pub rest: Option<Rest>,
-    /// Whether all contacts are visited, also where everything rests: the result is the same.
+    /// Whether all contacts are visited, even where all grains rest: the result is the same.
     pub visits_all: bool,
 }
 
-/// What limits the motion of grains in a sub-step.
+/// Limits of the motion of grains in a sub-step.
 #[derive(Debug, Clone, Copy)]
 pub struct Motion {
     /// Common displacement of the meshes (diameters).
     pub along: V,
-    /// Greatest speed (m/s) that contacts may give a grain, gravity aside.
+    /// Largest speed (m/s) that contacts may give a grain, not counting gravity.
     pub fastest: f32,
 }
 
-/// One sub-step: forces, contacts, motion. Returns the greatest speed (m/s) at its end.
+/// One sub-step: forces, contacts, motion. Returns the largest speed (m/s) at its end.
 ///
 /// # Errors
 /// Cancel.
@@ -93,25 +94,25 @@ pub fn sub_step(
 /// A sweep over the contacts.
 #[derive(Clone, Copy)]
 enum Pass {
-    /// Impulses of the last sub-step.
+    /// Applies the impulses of the last sub-step.
     Begin,
-    /// Impulses.
+    /// Corrects the impulses.
     Solve,
-    /// Impulses, pushes and what the next sub-step wants to know.
+    /// Corrects the impulses, and computes pushes and what the next sub-step needs.
     SolveLast,
 }
 
 /// Visits the contacts of some columns, upward.
 ///
-/// Two columns of a colour lie at least two apart. A task changes the members of its own column's blocks and the grains that their
-/// pairs name, whose anchors lay within a contact's reach of it, less than half a column's width.
+/// Two columns of a colour lie at least two apart. A task changes the members of its own column and their partners in pairs,
+/// whose anchors lie within the reach of a contact of it, less than half a column's width.
 fn sweep(rows: &mut [Row], layout: &mut Layout, colour: &[u32], pass: Pass, c: &Coefficients) {
     let rows = Shared::new(rows);
     let (columns, blocks) = (&layout.columns, Shared::new(&mut layout.blocks));
     let batches = Shared::new(&mut layout.batches);
     colour.par_iter().with_max_len(1).for_each(|&column| {
         for &block in &columns[column as usize].blocks {
-            // SAFETY: a block is in one column.
+            // SAFETY: a block is in one column, which one task has.
             let (block, batches) = unsafe { (blocks.get(block as usize), batches.get(block as usize)) };
             if !block.is_reached {
                 continue;
@@ -132,7 +133,7 @@ fn sweep(rows: &mut [Row], layout: &mut Layout, colour: &[u32], pass: Pass, c: &
     });
 }
 
-/// Gravity, air (thesis section 3.3.1), and the impulses that touches had in the last sub-step.
+/// Applies gravity, drag (thesis section 3.3.1) and the impulses of touches from the last sub-step.
 fn accelerate(rows: &mut [Row], layout: &mut Layout, c: &Coefficients) {
     let rows = Shared::new(rows);
     let Layout { blocks, neighbours, .. } = layout;
@@ -140,7 +141,7 @@ fn accelerate(rows: &mut [Row], layout: &mut Layout, c: &Coefficients) {
         |slot: u32| c.air_by_neighbours.map_or(c.air, |air| air[usize::from(neighbours[slot as usize])]);
     blocks.par_iter_mut().filter(|block| block.is_awake).for_each(|block| {
         for &slot in &block.members {
-            // SAFETY: a grain is a member of one block.
+            // SAFETY: a grain is a member of one block, which one task has.
             let row = unsafe { rows.get(slot as usize) };
             if !row.rests() {
                 let velocity = add(row.velocity, scaled(c.gravity, c.dt));
@@ -148,14 +149,14 @@ fn accelerate(rows: &mut [Row], layout: &mut Layout, c: &Coefficients) {
             }
         }
         for touch in &mut block.touches {
-            // SAFETY: a touch's grain is a member of its block.
+            // SAFETY: a touch's grain is a member of its block, as above.
             let row = unsafe { rows.get(touch.grain as usize) };
             begin_touch(row, touch, c);
         }
     });
 }
 
-/// The impulse that a touch had in the last sub-step; or a bounce, after which there is none.
+/// Applies the impulse of a touch from the last sub-step, none after a bounce; a fast approach starts a bounce.
 fn begin_touch(row: &mut Row, touch: &mut Touch, c: &Coefficients) {
     touch.forget_bounce();
     if c.restitution > 0.0 && !row.rests() {
@@ -168,7 +169,7 @@ fn begin_touch(row: &mut Row, touch: &mut Touch, c: &Coefficients) {
     row.velocity = add(row.velocity, scaled(touch.total(), row.weight()));
 }
 
-/// Moves the grains: what cannot move has the last word. Returns the greatest speed (m/s).
+/// Moves the grains, after a last correction of touches. Returns the largest speed (m/s).
 fn advance(rows: &mut [Row], layout: &mut Layout, c: &Coefficients, motion: Motion) -> f32 {
     let rows = Shared::new(rows);
     let reached = layout.blocks.par_iter_mut().filter(|block| block.is_reached);
@@ -179,7 +180,7 @@ fn advance(rows: &mut [Row], layout: &mut Layout, c: &Coefficients, motion: Moti
         let Block { members, anchors, .. } = block;
         (block.is_awake, block.has_strayed) = (false, false);
         for (member, &slot) in members.iter().enumerate() {
-            // SAFETY: a grain is a member of one block.
+            // SAFETY: a grain is a member of one block, which one task has.
             let row = unsafe { rows.get(slot as usize) };
             if !row.rests() {
                 move_on(row, c, &motion);
@@ -195,13 +196,13 @@ fn advance(rows: &mut [Row], layout: &mut Layout, c: &Coefficients, motion: Moti
     fastest.reduce(|| 0.0, f32::max).sqrt()
 }
 
-/// Moves a grain; what its push took back of its motion, its velocity loses where something holds it.
+/// Moves a grain; a supported one loses the part of its velocity that its push undid.
 ///
-/// Each contact removes a part of its own overlap, so that the pushes of a grain that is pressed from all sides add up to
-/// more than it takes to leave them all: their sum is bounded too.
+/// Each contact removes part of its own overlap, so the pushes of a grain that is pressed from all sides add up to more than
+/// needed to leave them all: their sum is bounded too.
 fn move_on(row: &mut Row, c: &Coefficients, motion: &Motion) {
     row.push = bounded(row.push, FARTHEST);
-    // What gravity adds in this sub-step is its own: a grain that falls, or slides down a slope, goes on to become faster.
+    // The limit spares what gravity adds in this sub-step: a grain that falls or slides down a slope keeps accelerating.
     let fall = scaled(c.gravity, c.dt);
     let driven = sub(row.velocity, fall);
     let most = motion.fastest * motion.fastest;
@@ -210,7 +211,7 @@ fn move_on(row: &mut Row, c: &Coefficients, motion: &Motion) {
     }
     let way = add(scaled(row.velocity, c.dt / c.diameter), row.push);
     row.place = add(row.place, way);
-    // It counts as travel of the meshes that they go along.
+    // The travel of the meshes, which uses up the limit, includes `along`.
     row.limit += norm(motion.along) - norm(sub(way, motion.along));
     let square = dot(row.push, row.push);
     if row.is_supported() && square > 0.0 {
@@ -220,7 +221,7 @@ fn move_on(row: &mut Row, c: &Coefficients, motion: &Motion) {
     }
 }
 
-/// Corrections of the grains that touch something that they cannot move.
+/// Corrects the touches of a block.
 fn resist_all(rows: Shared<'_, Row>, touches: &mut [Touch], last: bool, c: &Coefficients) {
     for touch in touches {
         // SAFETY: a touch's grain is a member of its block, which one task has.
@@ -228,7 +229,7 @@ fn resist_all(rows: Shared<'_, Row>, touches: &mut [Touch], last: bool, c: &Coef
     }
 }
 
-/// One correction of such a grain.
+/// One correction of a touch.
 fn resist(row: &mut Row, touch: &mut Touch, c: &Coefficients, last: bool) {
     if row.rests() {
         return;
@@ -257,7 +258,7 @@ fn resist(row: &mut Row, touch: &mut Touch, c: &Coefficients, last: bool) {
     }
 }
 
-/// A vector of at most a length.
+/// A vector shortened to at most a length.
 #[inline(always)]
 fn bounded(vector: V, most: f32) -> V {
     let square = dot(vector, vector);
@@ -276,7 +277,7 @@ fn solve_last(rows: Shared<'_, Row>, batches: &mut [Batch], c: &Coefficients) {
     dispatch!(solve_batches_last(rows: Shared<'_, Row>, batches: &mut [Batch], c: &Coefficients))
 }
 
-/// Gives grains the impulses of the last sub-step.
+/// Applies the impulses of the last sub-step.
 #[inline(always)]
 fn begin_batches(rows: Shared<'_, Row>, batches: &[Batch], c: &Coefficients) {
     for (index, batch) in batches.iter().enumerate() {
@@ -284,7 +285,7 @@ fn begin_batches(rows: Shared<'_, Row>, batches: &[Batch], c: &Coefficients) {
         if batch.impulse == [Lanes::all(0.0); 3] {
             continue;
         }
-        // SAFETY: see `sweep`; the pairs of a batch share no grain.
+        // SAFETY: no other task has these grains (see `sweep`); the pairs of a batch share none.
         unsafe {
             let others = batch.others();
             let (a, b) = (Eight::load(rows, &batch.owners), Eight::load(rows, &others));
@@ -321,7 +322,7 @@ fn solve_batches_last(rows: Shared<'_, Row>, batches: &mut [Batch], c: &Coeffici
         unsafe {
             let (a, b) = (Eight::load(rows, &batch.owners), Eight::load(rows, &others));
             let (mut a, mut b, contact) = collide(a, b, batch, c);
-            // Two grains that meet in the air do not meet again: what they gave each other says nothing of the next sub-step.
+            // Two grains that collide in the air then part: their impulse is no guess for the next sub-step.
             let mut is_held = a.supported & b.supported;
             is_held = is_held | (a.supported | b.supported) & contact.gap.is_less(Lanes::all(TOUCHING));
             if c.attraction > 0.0 {
@@ -343,7 +344,7 @@ fn solve_batches_last(rows: Shared<'_, Row>, batches: &mut [Batch], c: &Coeffici
     }
 }
 
-/// How many batches ahead rows are asked for.
+/// Count of batches by which rows are prefetched ahead.
 const AHEAD: usize = 8;
 
 #[inline(always)]

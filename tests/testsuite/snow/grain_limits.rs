@@ -1,4 +1,4 @@
-//! What bounds the motion of grains: pushes of a crowd, gaps that close, objects that jump.
+//! Limits of the motion of grains: pushes in a crowd, closing gaps, objects that jump.
 
 use crate::common::shapes::sphere;
 use frazil::base::DVec3;
@@ -56,7 +56,7 @@ fn diameter(params: &Params) -> f64 {
     2.0 * params.radius
 }
 
-/// The fastest grain (m/s) of six frames in which a ball is drawn through snow at a speed (m/s).
+/// Largest speed (m/s) of a grain in six frames in which a ball is drawn through snow at a speed (m/s).
 fn fastest(speed: f64, sub_steps: u32) -> f64 {
     let ctx = context();
     let cell = 0.02;
