@@ -200,7 +200,7 @@ impl Heap {
         ctx.expect(division.sub_steps);
         for sub in 0..division.sub_steps {
             ctx.check()?;
-            layout.follow(&mut self.rows, ahead);
+            layout.follow(&mut self.rows, &self.ids, ahead);
             for (shell, at) in &mut *shells {
                 at((sub + 1) as f64 / division.sub_steps as f64, &mut pose)?;
                 shell.follow(&pose);
@@ -236,7 +236,7 @@ impl Heap {
     fn lay_out(&mut self, ahead: f32) -> Layout {
         let from = order(&self.rows, &self.ids, &self.at);
         self.keep(&from);
-        let mut layout = Layout::new(&mut self.rows, &self.at, ahead);
+        let mut layout = Layout::new(&mut self.rows, &self.ids, &self.at, ahead);
         layout.keep_held(std::mem::take(&mut self.held));
         for touch in std::mem::take(&mut self.touches) {
             layout.blocks[layout.homes[touch.grain as usize].block as usize].touches.push(touch);
@@ -319,10 +319,10 @@ impl Heap {
             (0..).zip(&layout.blocks).filter(|(_, block)| block.is_due).map(|(index, _)| index).collect();
         let reach = (2.0 * search.dt / self.diameter) as f32;
         if let Some(floor) = &floor {
-            for &index in &due {
-                let block = &layout.blocks[index as usize];
-                fresh[index as usize].extend(floor.touches(block, &self.rows, self.diameter, reach));
-            }
+            let blocks = layout.blocks.par_iter().zip(&mut fresh).filter(|(block, _)| block.is_due);
+            blocks.for_each(|(block, fresh)| {
+                fresh.extend(floor.touches(block, &self.rows, self.diameter, reach));
+            });
         }
         if let Some(field) = field {
             let found = field.touches(layout, &due, &self.rows, reach)?;

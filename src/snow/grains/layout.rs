@@ -31,7 +31,7 @@ pub struct Block {
     pub at: At,
     /// The blocks around it, and itself in the middle, ordered by x, y, z; [`NONE`] where there is none.
     pub near: [u32; 27],
-    /// Slots of its grains, sorted by cell; the sort is stable, and newcomers follow the others.
+    /// Slots of its grains, sorted by cell, within a cell by identity.
     pub members: Vec<u32>,
     /// Index of the first member of each cell (ordered by y, x, z), then the count of members.
     pub starts: [u32; ALL_CELLS + 1],
@@ -157,7 +157,7 @@ pub fn order(rows: &[Row], ids: &[u32], at: &[At]) -> Vec<u32> {
 
 impl Layout {
     /// Blocks of grains that are sorted as by [`order`]; pairs are not found yet.
-    pub fn new(rows: &mut [Row], at: &[At], ahead: f32) -> Self {
+    pub fn new(rows: &mut [Row], ids: &[u32], at: &[At], ahead: f32) -> Self {
         let mut layout = Self { homes: vec![Home { block: NONE, rank: 0 }; at.len()], ..Self::default() };
         let is_first = |slot: &usize| *slot == 0 || at[*slot] != at[slot - 1];
         let mut firsts: Vec<usize> = (0..at.len()).into_par_iter().filter(is_first).collect();
@@ -167,7 +167,7 @@ impl Layout {
             layout.blocks[block as usize].members.extend(run[0] as u32..run[1] as u32);
             layout.homes[run[0]..run[1]].fill(Home { block, rank: 0 });
         }
-        layout.rank_members(rows, ahead, |_| true);
+        layout.rank_members(rows, ids, ahead, |_| true);
         layout
     }
 
@@ -221,7 +221,7 @@ impl Layout {
     }
 
     /// Moves members of strayed blocks to the blocks that they are in now, and sorts the members of every block that changed.
-    pub fn follow(&mut self, rows: &mut [Row], ahead: f32) {
+    pub fn follow(&mut self, rows: &mut [Row], ids: &[u32], ahead: f32) {
         let shared = Shared::new(rows);
         let strayed = self.blocks.par_iter_mut().filter(|block| block.has_strayed);
         let movers: Vec<Vec<Mover>> = strayed
@@ -258,11 +258,17 @@ impl Layout {
                 }
             }
         }
-        self.rank_members(rows, ahead, |block| block.is_changed && block.is_stirred);
+        self.rank_members(rows, ids, ahead, |block| block.is_changed && block.is_stirred);
     }
 
     /// Sorts the members of some blocks; strayed blocks get new anchors.
-    fn rank_members(&mut self, rows: &mut [Row], ahead: f32, which: impl Fn(&Block) -> bool + Sync) {
+    fn rank_members(
+        &mut self,
+        rows: &mut [Row],
+        ids: &[u32],
+        ahead: f32,
+        which: impl Fn(&Block) -> bool + Sync,
+    ) {
         let rows = &*rows;
         let homes = Shared::new(&mut self.homes);
         let changed = self.blocks.par_iter_mut().filter(|block| which(block));
@@ -287,7 +293,7 @@ impl Layout {
                 let place = place(member, slot);
                 (place, cell(place) as u32)
             }));
-            // A counting sort by cell, which is stable.
+            // A counting sort by cell, then the few of a cell by identity.
             let mut starts = [0u32; ALL_CELLS + 1];
             places.iter().for_each(|(_, cell)| starts[*cell as usize + 1] += 1);
             (0..ALL_CELLS).for_each(|cell| starts[cell + 1] += starts[cell]);
@@ -305,6 +311,16 @@ impl Layout {
                 next[*cell as usize] += 1;
                 members[at] = slot;
                 (xs[at], ys[at], zs[at]) = (place[0], place[1], place[2]);
+            }
+            for cell in starts.windows(2) {
+                for from in cell[0] as usize + 1..cell[1] as usize {
+                    let mut at = from;
+                    while at > cell[0] as usize && ids[members[at] as usize] < ids[members[at - 1] as usize] {
+                        members.swap(at, at - 1);
+                        [&mut *xs, &mut *ys, &mut *zs].into_iter().for_each(|places| places.swap(at, at - 1));
+                        at -= 1;
+                    }
+                }
             }
             for (member, &slot) in (0..).zip(&*members) {
                 // SAFETY: a grain is a member of one block, which one task has.
