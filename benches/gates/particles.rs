@@ -83,7 +83,7 @@ fn packed() -> Vec<DVec3> {
     let mut places = Vec::new();
     for (y, z) in (0..layers).flat_map(|y| (0..rows).map(move |z| (y, z))) {
         let shift = f64::from((z + y) % 2) * 0.5 * d;
-        let row = f64::from(z) * wide + f64::from(y % 2) * wide / 1.5;
+        let row = f64::from(z) * wide + f64::from(y % 2) * wide / 3.0;
         let place = |x: i32| DVec3::new(f64::from(x) * d + shift, f64::from(y) * up, row);
         places.extend((0..along).map(|x| place(x) + DVec3::new(low[0] + 0.5 * d, 0.5 * d, low[1] + 0.5 * d)));
     }

@@ -55,11 +55,12 @@ impl Travel {
     /// Travel of meshes, with grains of a diameter (m).
     pub fn of(shells: &[&Shell], diameter: f64) -> Self {
         let farthest = shells.iter().map(|shell| shell.way()).fold(0.0, f64::max);
-        let ways = || shells.iter().flat_map(|shell| shell.ways());
         let none = [DVec3::repeat(f64::MAX), DVec3::repeat(f64::MIN)];
-        let [least, greatest] = ways().fold(none, |[low, high], way| [low.inf(&way), high.sup(&way)]);
+        let bounds = shells.iter().map(|shell| shell.bounds_of_ways());
+        let [least, greatest] =
+            bounds.fold(none, |[low, high], [least, greatest]| [low.inf(least), high.sup(greatest)]);
         let middle = (least + greatest) * 0.5;
-        let beside = ways().map(|way| (way - middle).norm_squared()).fold(0.0, f64::max).sqrt();
+        let beside = 0.5 * (greatest - least).norm();
         if middle.norm() + beside > ALONG * farthest {
             return Self { along: [0.0; 3], beside: farthest / diameter };
         }

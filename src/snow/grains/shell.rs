@@ -12,6 +12,8 @@ use super::touch::{FIRST_SHELL, Touch};
 use crate::base::DVec3;
 use crate::base::lanes::LANES;
 
+/// Vertices that one task measures.
+const VERTICES: usize = 4096;
 /// Triangles in a leaf of the tree: as many as are compared at once.
 const LEAF: usize = LANES;
 
@@ -35,6 +37,8 @@ pub struct Shell {
     leaves: usize,
     /// Largest displacement of a vertex in the sub-step (m).
     way: f64,
+    /// Bounds of the displacements (m).
+    bounds_of_ways: [DVec3; 2],
 }
 
 /// Below this distance (m) from its nearest point, a position takes the triangle's normal as the outward direction.
@@ -62,8 +66,21 @@ impl Shell {
         let boxes = vec![[DVec3::zeros(); 2]; 2 * leaves - 1];
         let ways = vec![0.0; 2 * leaves - 1];
         let (now, stick, way, collider) = (pose, 0.0, 0.0, FIRST_SHELL);
-        let mut shell =
-            Self { collider, friction, stick, triangles, closed, now, next, boxes, ways, leaves, way };
+        let bounds_of_ways = [DVec3::zeros(); 2];
+        let mut shell = Self {
+            collider,
+            friction,
+            stick,
+            triangles,
+            closed,
+            now,
+            next,
+            boxes,
+            ways,
+            leaves,
+            way,
+            bounds_of_ways,
+        };
         shell.sort();
         shell
     }
@@ -106,7 +123,7 @@ impl Shell {
         std::mem::swap(&mut self.now, &mut self.next);
         self.next.clear();
         self.next.extend_from_slice(pose);
-        self.way = self.ways().map(|way| way.norm_squared()).fold(0.0, f64::max).sqrt();
+        self.measure();
         let (now, triangles, leaves) = (&self.now, &self.triangles, self.leaves);
         let (inner, outer) = self.boxes.split_at_mut(leaves - 1);
         let (next, (inner_ways, outer_ways)) = (&self.next, self.ways.split_at_mut(leaves - 1));
@@ -137,9 +154,23 @@ impl Shell {
         self.way
     }
 
-    /// Displacements of the vertices in the sub-step (m).
-    pub fn ways(&self) -> impl Iterator<Item = DVec3> + '_ {
-        self.now.iter().zip(&self.next).map(|(now, next)| next - now)
+    /// Least and greatest displacement of a vertex in the sub-step along each axis (m).
+    pub fn bounds_of_ways(&self) -> &[DVec3; 2] {
+        &self.bounds_of_ways
+    }
+
+    /// Finds the largest displacement, and their bounds.
+    fn measure(&mut self) {
+        let ways = self.now.par_iter().zip(&self.next).with_min_len(VERTICES).map(|(now, next)| next - now);
+        let with = |(square, [low, high]): (f64, [DVec3; 2]), way: DVec3| {
+            (f64::max(square, way.norm_squared()), [low.inf(&way), high.sup(&way)])
+        };
+        let both = |(square, [low, high]): (f64, [DVec3; 2]),
+                    (other, [least, greatest]): (f64, [DVec3; 2])| {
+            (f64::max(square, other), [low.inf(&least), high.sup(&greatest)])
+        };
+        let (square, bounds) = ways.fold(|| (0.0, EMPTY), with).reduce(|| (0.0, EMPTY), both);
+        (self.way, self.bounds_of_ways) = (square.sqrt(), bounds);
     }
 
     /// The touch of the grain in a slot with the plane through a nearest point.
