@@ -213,10 +213,11 @@ fn move_on(row: &mut Row, c: &Coefficients, motion: &Motion) {
     row.place = add(row.place, way);
     // The travel of the meshes, which uses up the limit, includes `along`.
     row.limit += norm(motion.along) - norm(sub(way, motion.along));
-    let square = dot(row.push, row.push);
+    // Its square may be over 0 in diameters and underflow to 0 in m/s.
+    let back = scaled(row.push, c.diameter / c.dt);
+    let square = dot(back, back);
     if row.is_supported() && square > 0.0 {
-        let back = scaled(row.push, c.diameter / c.dt);
-        let share = (-dot(row.velocity, back) / dot(back, back)).clamp(0.0, 1.0);
+        let share = (-dot(row.velocity, back) / square).clamp(0.0, 1.0);
         row.velocity = add(row.velocity, scaled(back, share));
     }
 }
@@ -352,5 +353,30 @@ fn prefetch(rows: Shared<'_, Row>, batch: Option<&Batch>) {
     if let Some(batch) = batch {
         rows.prefetch(&batch.owners);
         rows.prefetch(&batch.others());
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::base::cpu::FlushDenormals;
+    use crate::snow::grains::Params;
+    use crate::snow::grains::heap::Division;
+    use crate::snow::grains::rows::SUPPORTED;
+
+    #[test]
+    fn a_push_of_any_length_leaves_a_finite_velocity() {
+        let params = Params { radius: 0.000_75, ..Params::for_cell(0.005) };
+        let c = params.coefficients(&Division { dt: 1.0 / 24.0, sub_steps: 24 });
+        let motion = Motion { along: [0.0; 3], fastest: f32::INFINITY };
+        let _flush = FlushDenormals::begin();
+        let mut push = 1.0e-24;
+        while push < 1.0 {
+            let mut row = Row { hold: 1.0 + SUPPORTED, velocity: [0.0, -0.1, 0.0], ..Row::default() };
+            row.push = [0.0, push, 0.0];
+            move_on(&mut row, &c, &motion);
+            assert!(row.velocity[1].is_finite(), "{push}");
+            push *= 1.01;
+        }
     }
 }
