@@ -106,10 +106,10 @@ impl<'a> Surroundings<'a> {
             let speed = speed(&first, &last, to - from);
             let jumps = speed > FASTEST_OBJECT;
             if jumps {
+                let name = body.name().map_or_else(|| format!("body {}", index + 1), String::from);
                 log::warn!(
-                    "object {} moves at {speed:.0} m/s at {from:.3} s: over {FASTEST_OBJECT} m/s it is taken to jump, and carries no \
-                     grains along",
-                    index + 1
+                    "{name} moves at {speed:.0} m/s at {from:.3} s: over {FASTEST_OBJECT} m/s it is taken to jump, and carries no \
+                     grains along"
                 );
                 first.clone_from(&last);
             }

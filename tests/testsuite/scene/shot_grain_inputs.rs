@@ -172,6 +172,10 @@ fn an_object_that_jumps_is_reported_with_its_speed_and_frame() {
     };
     let said = jump(5.0);
     assert!(said.contains("object 1 (cube.obj) moves at 120 m/s in the step to frame 6"), "{said}");
+    let run = frazil(at, "snow jump.toml -o jump --frames 1-6");
+    let said = String::from_utf8_lossy(&run.stderr).into_owned();
+    assert!(said.contains("object 1 (cube.obj) moves at 120 m/s"), "{said}");
+    assert_eq!(said.matches("is taken to jump").count(), 1, "{said}");
     assert!(!jump(4.0).contains("jump,"));
     // Outside of the shot nothing jumps.
     assert!(!works(at, "check jump.toml --set shot.frames=1-5").contains("jump,"));

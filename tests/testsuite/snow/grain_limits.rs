@@ -1,12 +1,13 @@
 //! Limits of the motion of grains: pushes in a crowd, closing gaps, objects that jump.
 
+use super::grains::on_floor;
 use crate::common::shapes::sphere;
 use frazil::base::DVec3;
 use frazil::motion::{Key, Keys, Rigid};
 use frazil::snow::base_layer::initial::{Cover, Ground, layer};
 use frazil::snow::base_layer::{BaseLayer, Params as BaseParams};
 use frazil::snow::grains::heap::{Colliders, Division, Heap};
-use frazil::snow::grains::{Base, Grains, Object, Params, Surroundings};
+use frazil::snow::grains::{Base, Grains, Object, Params};
 use frazil::sweep::Body;
 use frazil::{Context, Pool};
 
@@ -73,13 +74,8 @@ fn fastest(speed: f64, sub_steps: u32) -> f64 {
         let times = [f64::from(frame - 1) * FRAME, f64::from(frame) * FRAME];
         let before = base.surface().deep_copy().unwrap();
         base.step(&ctx, std::slice::from_ref(&body), times[0], times[1], frame).unwrap();
-        let around = Surroundings {
-            base: Base::Whole([&before, base.surface()]),
-            objects: &[Object::new(&body, 0.3)],
-            statics: &[],
-            floor: Some(0.0),
-            lowest: -1.0,
-        };
+        let objects = [Object::new(&body, 0.3)];
+        let around = on_floor(Base::Whole([&before, base.surface()]), &objects);
         let report = grains.step(&ctx, &around, times, frame).unwrap();
         fastest = fastest.max(f64::from(report.fastest));
     }
@@ -107,13 +103,8 @@ fn an_object_that_jumps_carries_no_grains_along() {
     grains.emit(&places, &[], 0).unwrap();
     let body = ball(&[[0.0, 0.3, 0.0], [0.0, 0.3, 0.0], [90.0, 0.1, 0.0], [90.0, 0.1, 0.0]]);
     for frame in 1..=3 {
-        let around = Surroundings {
-            base: Base::Missing,
-            objects: &[Object::new(&body, 0.3)],
-            statics: &[],
-            floor: Some(0.0),
-            lowest: -1.0,
-        };
+        let objects = [Object::new(&body, 0.3)];
+        let around = on_floor(Base::Missing, &objects);
         let times = [f64::from(frame - 1) * FRAME, f64::from(frame) * FRAME];
         let report = grains.step(&ctx, &around, times, frame).unwrap();
         assert!(report.fastest < 1.0 && report.dropped == 0, "frame {frame}: {} m/s", report.fastest);

@@ -49,6 +49,11 @@ fn story(ctx: &Context) -> Story {
     Story { layers, removed, body: ball() }
 }
 
+/// Objects over a level ground.
+pub fn on_floor<'a>(base: Base<'a>, objects: &'a [Object<'a>]) -> Surroundings<'a> {
+    Surroundings { base, objects, statics: &[], floor: Some(0.0), lowest: -1.0 }
+}
+
 fn params() -> Params {
     Params { compression: 0.5, ..Params::for_cell(CELL) }
 }
@@ -63,13 +68,8 @@ fn run(
     let (mut born, mut owed, mut removed) = (0, 0.0, 0.0);
     for frame in frames {
         let at = frame as usize;
-        let around = Surroundings {
-            base: Base::Whole([&story.layers[at - 1], &story.layers[at]]),
-            objects: &[Object::new(&story.body, 0.3)],
-            statics: &[],
-            floor: Some(0.0),
-            lowest: -1.0,
-        };
+        let objects = [Object::new(&story.body, 0.3)];
+        let around = on_floor(Base::Whole([&story.layers[at - 1], &story.layers[at]]), &objects);
         let time = |frame: i32| f64::from(frame) / 24.0;
         let report = grains.step(ctx, &around, [time(frame - 1), time(frame)], frame).unwrap();
         assert_eq!(report.dropped, 0);
@@ -511,13 +511,8 @@ fn pressed_grains_are_moved_out_or_trapped() {
         grains.emit(&[DVec3::new(0.001, radius, 0.002)], &[], 0).unwrap();
         // Its lower side comes down from two diameters to `room` over the floor.
         let body = plate(0.1 + 4.0 * radius, 0.1 + room);
-        let around = Surroundings {
-            base: Base::Missing,
-            objects: &[Object::new(&body, 0.3)],
-            statics: &[],
-            floor: Some(0.0),
-            lowest: -1.0,
-        };
+        let objects = [Object::new(&body, 0.3)];
+        let around = on_floor(Base::Missing, &objects);
         for frame in 1..=24 {
             let times = [frame - 1, frame].map(|frame| f64::from(frame) / 24.0);
             grains.step(&ctx, &around, times, frame).unwrap();
