@@ -372,10 +372,12 @@ mod tests {
         let _flush = FlushDenormals::begin();
         let mut push = 1.0e-24;
         while push < 1.0 {
-            let mut row = Row { hold: 1.0 + SUPPORTED, velocity: [0.0, -0.1, 0.0], ..Row::default() };
-            row.push = [0.0, push, 0.0];
-            move_on(&mut row, &c, &motion);
-            assert!(row.velocity[1].is_finite(), "{push}");
+            for velocity in [[0.0, -0.1, 0.0], [0.1, 0.0, 0.0], [0.0; 3]] {
+                let mut row = Row { hold: 1.0 + SUPPORTED, velocity, ..Row::default() };
+                row.push = [0.0, push, 0.0];
+                move_on(&mut row, &c, &motion);
+                assert!(row.velocity.iter().all(|x| x.is_finite()), "{push} {velocity:?}");
+            }
             push *= 1.01;
         }
     }
