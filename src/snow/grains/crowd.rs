@@ -49,6 +49,11 @@ const DEEPEST: f64 = 1.0;
 const MARGIN: f64 = 2.0;
 
 type Cell = [i32; 3];
+/// Cells of a block, and a count of grains for each.
+const CELLS: usize = (PER_BLOCK * PER_BLOCK * PER_BLOCK) as usize;
+type Counts = [u32; CELLS];
+/// Grains that a task counts.
+const CHUNK: usize = 16_384;
 
 impl Heap {
     /// Moves grains out of cells that hold more than `most` into cells with free space. Meshes are at their current pose.
@@ -56,18 +61,14 @@ impl Heap {
     /// # Errors
     /// Cancel; errors of a grid.
     pub(super) fn make_room(&mut self, ctx: &Context, colliders: &Colliders<'_>, most: usize) -> Result<()> {
+        let crowded = self.crowded(most);
+        if crowded.is_empty() {
+            return Ok(());
+        }
         let slots = (0u32..).zip(self.rows.iter().zip(&self.at));
         let mut slots: Vec<(Cell, u32)> =
             slots.map(|(slot, (row, at))| (cell(*at, row.place), slot)).collect();
         slots.par_sort_unstable();
-        let crowded: Vec<Cell> = slots
-            .chunk_by(|a, b| a.0 == b.0)
-            .filter(|grains| grains.len() > most)
-            .map(|grains| grains[0].0)
-            .collect();
-        if crowded.is_empty() {
-            return Ok(());
-        }
         let mut map =
             Map { slots, rows: &self.rows, colliders, diameter: self.diameter, blocks: HashMap::new() };
         let moves = Flow::begin(&mut map, &crowded)?.run(ctx, &mut map)?;
@@ -83,6 +84,38 @@ impl Heap {
         let ids: HashSet<u32> = slots.iter().map(|slot| self.ids[*slot as usize]).collect();
         self.trapped.retain(|id| !ids.contains(id));
         Ok(())
+    }
+}
+
+impl Heap {
+    /// Cells that hold more than `most` grains, ascending.
+    fn crowded(&self, most: usize) -> Vec<Cell> {
+        let chunks = self.rows.par_chunks(CHUNK).zip(self.at.par_chunks(CHUNK));
+        let counts = chunks.map(|(rows, at)| {
+            let mut counts = HashMap::<At, Counts>::new();
+            // Grains of a block lie next to each other.
+            let mut first = 0;
+            for at in at.chunk_by(|a, b| a == b) {
+                let counts = counts.entry(at[0]).or_insert([0; CELLS]);
+                rows[first..first + at.len()].iter().for_each(|row| counts[index_of(row.place)] += 1);
+                first += at.len();
+            }
+            counts
+        });
+        let all = counts.reduce(HashMap::new, |mut all, part| {
+            for (at, part) in part {
+                let counts = all.entry(at).or_insert([0; CELLS]);
+                counts.iter_mut().zip(part).for_each(|(count, more)| *count += more);
+            }
+            all
+        });
+        let is_crowded = |(_, count): &(usize, &u32)| **count as usize > most;
+        let cells = all.iter().flat_map(|(at, counts)| {
+            counts.iter().enumerate().filter(is_crowded).map(|(index, _)| cell_of(*at, index))
+        });
+        let mut cells: Vec<Cell> = cells.collect();
+        cells.sort_unstable();
+        cells
     }
 }
 
@@ -134,11 +167,25 @@ impl Map<'_, '_> {
         self.slots[first..].iter().take_while(move |(of, _)| *of == cell).map(|(_, slot)| *slot)
     }
 
+    /// Which side of the surfaces a position (diameters, within the cell's block) is on.
+    fn side_of(&self, cell: Cell, place: V) -> Side {
+        let at = block(cell);
+        self.blocks[&at].side(world(at, place, self.diameter))
+    }
+
+    /// Slots of the grains of a cell: those on the side of its centre, and those that a mesh separates from it.
+    fn on_two_sides(&self, cell: Cell, centre: &Side) -> [Vec<u32>; 2] {
+        let is_beyond = |slot: &u32| {
+            !centre.out.is_empty() && self.side_of(cell, self.rows[*slot as usize].place).is_across(centre)
+        };
+        let (beyond, here) = self.grains(cell).partition(is_beyond);
+        [here, beyond]
+    }
+
     /// Contents of a cell whose surroundings have been read. Octants are listed only if the cell has free space or `asks` is
     /// set.
     fn know(&self, cell: Cell, asks: bool) -> Known {
-        let surfaces = &self.blocks[&block(cell)];
-        let side = |place: V| surfaces.side(world(block(cell), place, self.diameter));
+        let side = |place: V| self.side_of(cell, place);
         let corner = cell.map(|at| at.rem_euclid(PER_BLOCK) as f32 * CELL);
         let known = side(add(corner, [0.5 * CELL; 3]));
         let grains: Vec<u32> = self.grains(cell).collect();
@@ -164,36 +211,54 @@ impl Map<'_, '_> {
     }
 }
 
-/// Grains that leave crowded cells: a breadth-first search from all crowds at once.
+/// Grains that leave crowded cells: a breadth-first search from all crowds at once. A crowd has one side of each mesh: grains
+/// of one cell on two sides of a sheet are two crowds, and crowds on two sides never share a cell.
 struct Flow {
-    /// The crowd that reached each cell first.
-    came: HashMap<Cell, u32>,
+    /// The crowd that reached each cell first, and the index of the cell's side.
+    came: HashMap<Cell, (u32, usize)>,
+    /// Sides of the cells and grains that paths start from.
+    sides: Vec<Side>,
     /// Union-find: the crowd that each crowd was merged into, or itself.
     parents: Vec<u32>,
     /// Slots of the surplus grains of each crowd.
     pools: Vec<Vec<u32>>,
-    /// Cells that crowds reached in the last round.
-    front: Vec<(Cell, u32, Side)>,
+    /// Cells that crowds reached in the last round, each with its crowd and the index of its side.
+    front: Vec<(Cell, u32, usize)>,
 }
 
 impl Flow {
-    /// One crowd per crowded cell.
+    /// One crowd per crowded cell, and another of the grains that a mesh separates from the cell's centre.
     fn begin(map: &mut Map<'_, '_>, crowded: &[Cell]) -> Result<Self> {
         map.see(crowded.iter().copied())?;
-        let known: Vec<Known> = crowded.par_iter().map(|&cell| map.know(cell, true)).collect();
-        let pool =
-            |(&cell, known): (&Cell, &Known)| map.grains(cell).skip(known.eighths.len() + KEPT).collect();
-        Ok(Self {
-            came: crowded.iter().copied().zip(0..).collect(),
-            parents: (0..crowded.len() as u32).collect(),
-            pools: crowded.iter().zip(&known).map(pool).collect(),
-            front: crowded
-                .iter()
-                .zip(0..)
-                .zip(known)
-                .map(|((&cell, crowd), known)| (cell, crowd, known.side))
-                .collect(),
-        })
+        let known: Vec<(Known, [Vec<u32>; 2])> = crowded
+            .par_iter()
+            .map(|&cell| {
+                let known = map.know(cell, true);
+                let grains = map.on_two_sides(cell, &known.side);
+                (known, grains)
+            })
+            .collect();
+        let (came, sides, parents) = Default::default();
+        let mut flow = Self { came, sides, parents, pools: Vec::new(), front: Vec::new() };
+        for (&cell, (known, [here, beyond])) in crowded.iter().zip(known) {
+            let crowd = flow.start(cell, known.side, here.get(known.eighths.len() + KEPT..));
+            flow.came.insert(cell, crowd);
+            if let Some(first) = beyond.first() {
+                let side = map.side_of(cell, map.rows[*first as usize].place);
+                flow.start(cell, side, beyond.get(KEPT..));
+            }
+        }
+        Ok(flow)
+    }
+
+    /// A new crowd in a cell, on a side, with its surplus grains. Returns it and the index of the side.
+    fn start(&mut self, cell: Cell, side: Side, surplus: Option<&[u32]>) -> (u32, usize) {
+        let (crowd, index) = (self.pools.len() as u32, self.sides.len());
+        self.sides.push(side);
+        self.parents.push(crowd);
+        self.pools.push(surplus.unwrap_or_default().to_vec());
+        self.front.push((cell, crowd, index));
+        (crowd, index)
     }
 
     /// The moves of grains.
@@ -208,49 +273,65 @@ impl Flow {
             if visits.is_empty() {
                 break;
             }
-            map.see(visits.iter().map(|(cell, _)| *cell))?;
-            let known: Vec<Known> = visits.par_iter().map(|(cell, _)| map.know(*cell, false)).collect();
+            let mut cells: Vec<Cell> = visits.iter().map(|(cell, _)| *cell).collect();
+            cells.sort_unstable();
+            cells.dedup();
+            map.see(cells.iter().copied())?;
+            let known: Vec<Known> = cells.par_iter().map(|cell| map.know(*cell, false)).collect();
+            let first = self.sides.len();
+            let (sides, known): (Vec<Side>, Vec<_>) =
+                known.into_iter().map(|Known { side, count, eighths }| (side, (count, eighths))).unzip();
+            self.sides.extend(sides);
             let mut front = Vec::new();
-            for ((cell, from), known) in visits.into_iter().zip(known) {
-                let (_, crowd, side) = &self.front[from];
-                if known.side.distance <= -DEEPEST || known.side.is_across(side) {
-                    self.came.remove(&cell);
+            for (cell, from) in visits {
+                let index = cells.partition_point(|other| *other < cell);
+                let (_, crowd, side) = self.front[from];
+                let reached = &self.sides[first + index];
+                if reached.distance <= -DEEPEST || reached.is_across(&self.sides[side]) {
                     continue;
                 }
-                let crowd = self.part_of(*crowd);
-                let room = LOOSE.saturating_sub(known.count);
-                for (place, _) in known.eighths.iter().filter(|(_, is_taken)| !is_taken).take(room) {
-                    let Some(slot) = self.pools[crowd as usize].pop() else { break };
-                    moves.push(Move { slot, cell, place: *place });
+                let crowd = self.part_of(crowd);
+                match self.came.entry(cell) {
+                    Entry::Occupied(entry) => {
+                        let (other, _) = *entry.get();
+                        self.join(crowd, other);
+                    }
+                    Entry::Vacant(entry) => {
+                        entry.insert((crowd, first + index));
+                        let (count, eighths) = &known[index];
+                        let room = LOOSE.saturating_sub(*count);
+                        for (place, _) in eighths.iter().filter(|(_, is_taken)| !is_taken).take(room) {
+                            let Some(slot) = self.pools[crowd as usize].pop() else { break };
+                            moves.push(Move { slot, cell, place: *place });
+                        }
+                        front.push((cell, crowd, first + index));
+                    }
                 }
-                front.push((cell, crowd, known.side));
             }
             self.front = front;
         }
         Ok(moves)
     }
 
-    /// Unvisited cells next to the front, each with the index of the front's cell that it was reached from.
+    /// Unvisited cells next to the front, each with the index of the front's cell that may reach it. Crowds that meet on the
+    /// same side are merged.
     fn advance(&mut self) -> Vec<(Cell, usize)> {
         let mut visits = Vec::new();
         for from in 0..self.front.len() {
-            let (cell, crowd, _) = &self.front[from];
-            let (cell, crowd) = (*cell, self.part_of(*crowd));
+            let (cell, crowd, side) = self.front[from];
+            let crowd = self.part_of(crowd);
             if self.pools[crowd as usize].is_empty() {
                 continue;
             }
             for step in (0..27).filter(|step| *step != 13) {
                 let [x, y, z] = cell;
                 let near = [x + step / 9 - 1, y + step / 3 % 3 - 1, z + step % 3 - 1];
-                match self.came.entry(near) {
-                    Entry::Vacant(entry) => {
-                        entry.insert(crowd);
-                        visits.push((near, from));
-                    }
-                    Entry::Occupied(entry) => {
-                        let other = *entry.get();
+                match self.came.get(&near) {
+                    None => visits.push((near, from)),
+                    Some(&(other, beside)) if !self.sides[beside].is_across(&self.sides[side]) => {
                         self.join(crowd, other);
                     }
+                    Some(_) => (),
                 }
             }
         }
@@ -281,6 +362,18 @@ impl Flow {
 /// The cell of a position in a block.
 fn cell(at: At, place: V) -> Cell {
     [0, 1, 2].map(|axis| at[axis] * PER_BLOCK + (place[axis] / CELL) as i32)
+}
+
+/// Index of the cell of a position in its block.
+fn index_of(place: V) -> usize {
+    place.iter().fold(0, |index, x| index * PER_BLOCK as usize + (x / CELL) as usize)
+}
+
+/// The cell of an index in a block.
+fn cell_of(at: At, index: usize) -> Cell {
+    let edge = PER_BLOCK as usize;
+    let within = [index / edge / edge, index / edge % edge, index % edge];
+    [0, 1, 2].map(|axis| at[axis] * PER_BLOCK + within[axis] as i32)
 }
 
 /// The block of a cell.
@@ -363,10 +456,21 @@ mod tests {
     #[test]
     fn no_grain_goes_through_a_sheet() {
         let sheet = TriMesh::cuboid([0.0, -1.0, -60.0], [0.0, 60.0, 60.0]);
-        for side in [-1.0, 1.0] {
-            let places = spread(&[DVec3::new(0.7 * side, 0.6, 0.0); 2000], Some((sheet.clone(), false)));
-            assert!(fullest(&places) <= MOST);
-            assert!(places.iter().all(|place| place.x * side >= 0.49), "one is on the other side");
+        for (side, turn) in [(-1.0, 0.0), (1.0, 0.0), (1.0, 30.0), (-1.0, 45.0), (1.0, 75.0)] {
+            let (sine, cosine) = f64::to_radians(turn).sin_cos();
+            let [normal, along] = [DVec3::new(cosine, 0.0, sine), DVec3::new(-sine, 0.0, cosine)];
+            for shift in [0.0, 0.7, 1.3, 1.9] {
+                let mut turned = sheet.clone();
+                for place in &mut turned.positions {
+                    let to = normal * shift + along * f64::from(place.z) + DVec3::y() * f64::from(place.y);
+                    *place = to.cast::<f32>();
+                }
+                let from = normal * (shift + 0.7 * side) + DVec3::y() * 0.6;
+                let places = spread(&[from; 2000], Some((turned, false)));
+                assert!(fullest(&places) <= MOST);
+                let is_beside = |place: &DVec3| (place.dot(&normal) - shift) * side >= 0.49;
+                assert!(places.iter().all(is_beside), "one is on the other side, {turn} degrees at {shift}");
+            }
         }
     }
 }

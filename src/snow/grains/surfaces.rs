@@ -10,8 +10,9 @@ use super::trapped::DEEP;
 use crate::base::DVec3;
 use crate::error::Result;
 
-/// Search distance for surfaces (diameters).
-const FAR: f64 = 2.0;
+/// Search distance for surfaces (diameters): more than the longest step of a crowd's path, which starts anywhere in a cell with
+/// edges of two diameters and ends at the centre of the next, so that a mesh between the two is near both.
+const FAR: f64 = 5.5;
 /// Share of [`DEEP`] that released grains must stay within, so that it still holds after positions are written with less
 /// precision.
 const ROUNDED: f64 = 0.98;
