@@ -46,6 +46,8 @@ mod harness;
 mod house;
 #[path = "gates/materials.rs"]
 mod materials;
+#[path = "gates/mist.rs"]
+mod mist;
 #[path = "gates/oracle.rs"]
 mod oracle;
 #[path = "gates/particles.rs"]
@@ -91,6 +93,7 @@ fn main() {
         Some(speed::PEAK) => return speed::print_peak(),
         Some(bytes::HASH) => return bytes::print_hash(),
         Some(grain_memory::MEMORY) => return grain_memory::print_memory(),
+        Some(mist::MEMORY) => return mist::print_memory(),
         Some(damage::FUZZ) => return damage::read_mutated(),
         _ => {}
     }
@@ -101,6 +104,7 @@ fn main() {
     bytes::run(&mut h);
     readers::run(&mut h);
     grains::run(&mut h);
+    mist::run(&mut h);
     shot::run(&mut h);
     capi::run(&mut h);
     cancel::run(&mut h);

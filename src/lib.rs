@@ -10,6 +10,7 @@
 //! | run a shot from a scene file into a folder, as `frazil snow` does | [`scene::Scene`], [`scene::snow::plan`], [`scene::shot::Run`] |
 //! | press moving meshes into snow in a frame loop of your own | [`snow::base_layer::BaseLayer`] |
 //! | turn the volume that moving meshes sweep into a level set | [`sweep::chain()`] |
+//! | let mist flow around things, or a gas or liquid of your own | [`snow::mist`], [`flow`] |
 //! | move things: rigid keys, sequences of meshes, glTF characters | [`motion`] |
 //! | make, change, measure and save level sets | [`vdb::level_set`], [`vdb::file`] |
 //! | read and write meshes, as polygons with UVs | [`io::mesh`] |
@@ -92,6 +93,7 @@ pub mod base;
 pub mod capi;
 pub mod context;
 pub mod error;
+pub mod flow;
 pub mod io;
 pub mod motion;
 #[cfg(feature = "cli")]

@@ -209,4 +209,18 @@ pub const GATES: &[Gate] = &[
     yes("house.stages"),
     yes("house.key"),
     yes("house.bare_cli"),
+    // Mist: projections around a ball that moves, still air, symmetry, order, what becomes of the mass, and of a grain's way.
+    gate("snow.mist.divergence", "1", Most(1.0e-4), Most(1.0e-5)),
+    none("snow.mist.density_negative", "1"),
+    gate("snow.mist.flux", "1", Most(1.0e-3), Open),
+    gate("snow.mist.still", "m/s", Most(1.0e-3), Most(1.0e-6)),
+    gate("snow.mist.symmetry", "1", Most(1.0e-5), Open),
+    gate("snow.mist.taylor_green", "x", Least(3.0), Least(3.5)),
+    gate("snow.mist.half_life", "1", Most(1.0e-3), Open),
+    gate("snow.mist.mass_drift", "%", Most(5.0), Most(1.0)),
+    gate("snow.mist.padding", "%", Most(1.0), Most(0.2)),
+    gate("snow.mist.dashes", "1", Most(0.0), Open),
+    // One step of two million cells on two threads, and its memory.
+    gate("snow.mist.speed", "s", Most(0.3), Most(0.13)),
+    gate("snow.mist.memory", "B", Most(120.0), Most(80.0)),
 ];

@@ -6,6 +6,7 @@ pub mod grain_cohesion;
 pub mod grain_friction;
 #[cfg(feature = "vdb")]
 pub mod grains;
+pub mod mist;
 mod noise;
 
 pub use noise::NoiseParams;

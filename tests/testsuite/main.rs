@@ -28,6 +28,11 @@ mod cli {
     mod tools;
     mod words;
 }
+mod flow {
+    mod advection;
+    mod fields;
+    mod pressure;
+}
 mod house {
     mod gates;
     mod imports;

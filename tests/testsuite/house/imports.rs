@@ -4,16 +4,17 @@ use std::fs;
 use std::path::{Path, PathBuf};
 
 /// Each room with what it may use besides itself, `error` and `context`.
-const LAW: [(&str, &[&str]); 10] = [
+const LAW: [(&str, &[&str]); 11] = [
     ("base", &[]),
     ("io", &["base"]),
     ("vdb", &["base", "io"]),
     ("motion", &["base", "io"]),
     ("sweep", &["base", "vdb", "motion"]),
+    ("flow", &["base"]),
     ("render", &["base", "io", "vdb"]),
-    ("snow", &["base", "vdb", "motion", "sweep"]),
-    ("scene", &["base", "io", "vdb", "motion", "sweep", "snow"]),
-    ("capi", &["base", "io", "vdb", "motion", "sweep", "snow"]),
+    ("snow", &["base", "vdb", "motion", "sweep", "flow"]),
+    ("scene", &["base", "io", "vdb", "motion", "sweep", "flow", "snow"]),
+    ("capi", &["base", "io", "vdb", "motion", "sweep", "flow", "snow"]),
     ("cli", &[]),
 ];
 

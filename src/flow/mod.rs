@@ -1,0 +1,231 @@
+//! Incompressible flow on a sparse set of tiles of 8 x 8 x 8 cells: what is the same for mist and for any other gas or liquid.
+//!
+//! A step is: forces (the caller's), [`Flow::project`], [`Flow::advect`]. Solids come in as open shares and speeds of faces
+//! ([`Solids`]); which tiles there are is the caller's choice ([`Flow::resize`]).
+//!
+//! | word | meaning |
+//! |---|---|
+//! | tile | 8 x 8 x 8 cells |
+//! | active | a tile that holds cells of the flow |
+//! | rim | the tiles next to these: upper faces of their cells, and what the air around is like |
+//! | slot | index of a tile; the rim comes after the active ones |
+//! | around | a flow in cells four times as wide, which goes on where the active tiles end |
+//! | ambient | velocity of the air outside both, where the pressure is 0: sides are open |
+//!
+//! Velocities are at the cells' *lower faces* (staggered grid: Harlow and Welch 1965), everything else at their centres.
+
+// Kernels index several arrays by one lane, row or axis.
+#![allow(clippy::needless_range_loop)]
+
+mod advect;
+mod around;
+mod multigrid;
+mod pockets;
+mod pressure;
+mod slip;
+mod solids;
+mod stencil;
+pub mod tiles;
+mod window;
+
+pub use advect::{FARTHEST, Scheme};
+pub use pressure::Solved;
+pub use solids::{Faces, Solids};
+pub use tiles::{Coord, Field, Tile, Tiles};
+
+use crate::context::Context;
+use crate::error::{Error, Result};
+use advect::{At, Paths};
+use multigrid::Operator;
+use pressure::Room;
+use rayon::prelude::*;
+
+/// A velocity, a density and a pressure on sparse tiles.
+#[derive(Debug, Default)]
+pub struct Flow {
+    /// Edge of a cell (m).
+    cell: f32,
+    /// Velocity (m/s) of the air outside all tiles.
+    ambient: [f32; 3],
+    tiles: Tiles,
+    /// Velocity (m/s) at lower faces, of active tiles and the rim.
+    velocity: [Field; 3],
+    /// Density at the centres, of active tiles.
+    density: Field,
+    /// Pressure at the centres, of active tiles and the rim: see [`pressure`].
+    pressure: Field,
+    /// The air around; none: the flow is that itself.
+    around: Option<Box<Flow>>,
+    /// The operator of the last projection.
+    operator: Operator,
+    paths: Paths,
+    room: Room,
+    /// Fields that are between two uses.
+    spare: [Field; 2],
+}
+
+/// Open shares and speeds of faces for tiles with cells of an edge (m).
+pub type Boundary<'a> = dyn Fn(&Tiles, f32) -> Result<Solids> + Sync + 'a;
+
+impl Flow {
+    /// No tiles yet; cells have an edge (m), and the air outside all tiles a velocity (m/s).
+    ///
+    /// # Errors
+    /// A cell that is not positive; a velocity that is not finite.
+    pub fn new(cell: f64, ambient: [f32; 3]) -> Result<Self> {
+        if !(cell > 0.0 && cell.is_finite()) {
+            return Err(Error::argument(format!("cell is {cell}: it must be over 0")));
+        }
+        if ambient.iter().any(|speed| !speed.is_finite()) {
+            return Err(Error::argument("the wind is not finite"));
+        }
+        let cell = cell as f32;
+        let around = Self { cell: cell * around::WIDER as f32, ambient, ..Self::default() };
+        Ok(Self { cell, ambient, around: Some(Box::new(around)), ..Self::default() })
+    }
+
+    /// Edge of a cell (m).
+    pub fn cell(&self) -> f32 {
+        self.cell
+    }
+
+    /// Its tiles.
+    pub fn tiles(&self) -> &Tiles {
+        &self.tiles
+    }
+
+    /// Velocity (m/s) at the lower faces on each axis, by slot.
+    pub fn velocity(&self) -> &[Field; 3] {
+        &self.velocity
+    }
+
+    /// Tiles, velocity and density, to change.
+    pub fn fields(&mut self) -> (&Tiles, &mut [Field; 3], &mut Field) {
+        (&self.tiles, &mut self.velocity, &mut self.density)
+    }
+
+    /// Density at the centres, by slot.
+    pub fn density(&self) -> &Field {
+        &self.density
+    }
+
+    /// Greatest speed (m/s) on any axis.
+    pub fn fastest(&self) -> f32 {
+        pressure::fastest(&self.velocity)
+    }
+
+    /// Makes these (sorted, each once) the active tiles: values are kept where they were; new tiles hold air that moves as it did
+    /// there before, with no density.
+    pub fn resize(&mut self, active: &[Coord]) {
+        if &self.tiles.coords()[..self.tiles.active()] == active {
+            return;
+        }
+        let old = std::mem::replace(&mut self.tiles, Tiles::new(active));
+        let tiles = &self.tiles;
+        for (axis, speed) in self.ambient.into_iter().enumerate() {
+            self.velocity[axis] = tiles::moved(&self.velocity[axis], &old, tiles, tiles.count(), speed);
+        }
+        self.pressure = tiles::moved(&self.pressure, &old, tiles, tiles.count(), 0.0);
+        self.density = tiles::moved(&self.density, &old, tiles, tiles.active(), 0.0);
+        if let Some(around) = &mut self.around {
+            around.resize(&around::tiles_around(active));
+        }
+        let tiles = std::mem::take(&mut self.tiles);
+        self.read_around(&tiles, &old);
+        self.tiles = tiles;
+    }
+
+    /// Takes the velocity at faces of its tiles from the air around, but for those that bound an active cell of a set.
+    fn read_around(&mut self, tiles: &Tiles, set: &Tiles) {
+        let Some(around) = &self.around else { return };
+        for axis in 0..3 {
+            let reader = around::Reader {
+                tiles: &around.tiles,
+                field: &around.velocity[axis],
+                axis: Some(axis),
+                outside: self.ambient[axis],
+            };
+            let faces = self.velocity[axis].par_iter_mut().zip(tiles.coords()).with_min_len(4);
+            faces.for_each_init(window::Window::default, |window, (tile, coord)| {
+                let is_active = |coord| set.find(coord).is_some_and(|slot| (slot as usize) < set.active());
+                if is_active(*coord) {
+                    return;
+                }
+                let keeps_first = is_active(tiles::shifted(*coord, axis, -1));
+                let values = reader.read(window, *coord);
+                for (cell, speed) in tile.iter_mut().enumerate() {
+                    if !keeps_first || cell >> (6 - 3 * axis) & 7 != 0 {
+                        *speed = values[cell];
+                    }
+                }
+            });
+        }
+    }
+
+    /// Carries velocity and density along for a time (s). Paths longer than [`FARTHEST`] cells are cut off.
+    pub fn advect(&mut self, dt: f64, scheme: Scheme) {
+        if let Some(around) = &mut self.around {
+            around.advect(dt, scheme);
+        }
+        let Self { tiles, velocity, density, paths, spare, ambient, .. } = self;
+        for field in paths.back.iter_mut().chain(&mut paths.ahead) {
+            field.resize(tiles.active(), [0.0; 512]);
+        }
+        paths.trace(tiles, velocity, *ambient, dt as f32 / self.cell, scheme);
+        let [hat, out] = spare;
+        for axis in 0..3 {
+            for field in [&mut *hat, &mut *out] {
+                field.resize(tiles.count(), [0.0; 512]);
+            }
+            paths.carry(tiles, (&velocity[axis], At::Faces(axis), ambient[axis]), hat, out, scheme);
+            std::mem::swap(&mut velocity[axis], out);
+        }
+        for field in [&mut *hat, &mut *out] {
+            field.truncate(tiles.active());
+        }
+        paths.carry(tiles, (density, At::Centres, 0.0), hat, out, scheme);
+        std::mem::swap(density, out);
+    }
+
+    /// Makes the velocity free of divergence: what is left, times the cell, is at most `tolerance` times the greatest speed.
+    ///
+    /// # Errors
+    /// Cancel; errors of the boundary.
+    pub fn project(&mut self, ctx: &Context, boundary: &Boundary<'_>, tolerance: f32) -> Result<Solved> {
+        if let Some(mut around) = self.around.take() {
+            around::restrict(self, &mut around);
+            let solved = around.project(ctx, boundary, tolerance);
+            self.press(&around);
+            self.around = Some(around);
+            solved?;
+        }
+        let solids = boundary(&self.tiles, self.cell)?;
+        let Self { tiles, velocity, pressure, room, .. } = self;
+        let (solved, operator) =
+            pressure::project(ctx, (tiles, &solids), velocity, pressure, room, tolerance)?;
+        self.operator = operator;
+        let tiles = std::mem::take(&mut self.tiles);
+        self.read_around(&tiles, &tiles);
+        self.tiles = tiles;
+        Ok(solved)
+    }
+
+    /// Takes the pressure in the rim from the air around.
+    fn press(&mut self, around: &Self) {
+        let wide = around::continued(&around.operator, &around.pressure);
+        let reader = around::Reader { tiles: &around.tiles, field: &wide, axis: None, outside: 0.0 };
+        let (tiles, active) = (&self.tiles, self.tiles.active());
+        let rim = self.pressure[active..].par_iter_mut().enumerate().with_min_len(4);
+        rim.for_each_init(window::Window::default, |window, (index, tile)| {
+            *tile = reader.read(window, tiles.coords()[active + index]);
+            tile.iter_mut().for_each(|pressure| *pressure *= around::WIDER as f32);
+        });
+    }
+
+    /// Divergence of each cell times its edge (m/s), negative.
+    pub fn divergence(&self, solids: &Solids) -> Field {
+        let mut out = vec![[0.0; 512]; self.tiles.active()];
+        pressure::divergence(&self.tiles, solids, &self.velocity, &mut out);
+        out
+    }
+}

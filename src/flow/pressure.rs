@@ -1,0 +1,217 @@
+//! Pressure: the velocity field becomes free of divergence (Chorin 1968), with solids that cover part of a face (Batty, Bertails
+//! and Bridson 2007), by conjugate gradients that one cycle of multigrid preconditions.
+//!
+//! The unknown is p dt / (density x cell), in m/s: its differences are changes of velocity.
+
+use rayon::prelude::*;
+
+use super::multigrid::{Multigrid, Operator};
+use super::pockets::Pockets;
+use super::slip;
+use super::solids::Solids;
+use super::stencil::{Task, row_of};
+use super::tiles::{FACES, Field, Tile, Tiles, ZEROS};
+use super::window::max;
+use crate::context::Context;
+use crate::error::Result;
+
+/// What a solve did.
+#[derive(Debug, Clone, Copy, Default, PartialEq)]
+pub struct Solved {
+    /// Iterations of the conjugate gradient method.
+    pub iterations: usize,
+    /// Greatest divergence left, times the cell (m/s).
+    pub divergence: f32,
+    /// Greatest speed (m/s) on any axis, before.
+    pub fastest: f32,
+}
+
+/// Most iterations.
+const MOST: usize = 200;
+
+/// Room for four fields.
+#[derive(Debug, Default)]
+pub struct Room {
+    pub residual: Field,
+    pub guess: Field,
+    pub direction: Field,
+    pub product: Field,
+}
+
+/// Changes the velocity (m/s, at lower faces) so that its divergence times the cell is at most `tolerance` times the greatest
+/// speed. `pressure` holds the first guess, and then the solution; in the rim, what it is there.
+///
+/// # Errors
+/// Cancel.
+pub fn project(
+    ctx: &Context,
+    (tiles, solids): (&Tiles, &Solids),
+    velocity: &mut [Field; 3],
+    pressure: &mut Field,
+    room: &mut Room,
+    tolerance: f32,
+) -> Result<(Solved, Operator)> {
+    let mut multigrid = Multigrid::new(Operator::new(tiles, solids));
+    let fastest = max(fastest(velocity), solids.fastest());
+    let aim = tolerance * fastest;
+    let Room { residual, guess, direction, product } = room;
+    for field in [&mut *residual, &mut *guess, &mut *direction, &mut *product] {
+        field.resize(tiles.active(), [0.0; 512]);
+    }
+    let pockets = Pockets::find(&multigrid.finest);
+    divergence(tiles, solids, velocity, guess);
+    pockets.level(guess);
+    pockets.level(pressure);
+    multigrid.finest.compute(pressure, |slot| Task::Residual(&guess[slot]), residual);
+    let mut solved = Solved { iterations: 0, divergence: greatest(residual), fastest };
+    let mut before = 0.0;
+    while solved.divergence > aim && solved.iterations < MOST {
+        ctx.check()?;
+        let now = multigrid.cycle(residual, guess, product);
+        let share = if before > 0.0 { (now / before) as f32 } else { 0.0 };
+        before = now;
+        follow(direction, guess, share, solved.iterations == 0);
+        let energy = multigrid.finest.compute(direction, |_| Task::Product, product);
+        if !(energy > 0.0 && now > 0.0) {
+            break;
+        }
+        let step = (now / energy) as f32;
+        solved.divergence = advance(pressure, residual, direction, product, step);
+        solved.iterations += 1;
+    }
+    accelerate(tiles, solids, pressure, velocity);
+    slip::extend(tiles, &multigrid.finest, solids, velocity);
+    Ok((solved, multigrid.finest))
+}
+
+/// direction = guess + share direction.
+fn follow(direction: &mut Field, guess: &Field, share: f32, is_first: bool) {
+    direction.par_iter_mut().zip(guess).with_min_len(64).for_each(|(direction, guess)| {
+        if is_first {
+            *direction = *guess;
+        } else {
+            direction.iter_mut().zip(guess).for_each(|(to, from)| *to = from + share * *to);
+        }
+    });
+}
+
+/// One step of the method. Returns the greatest residual.
+fn advance(pressure: &mut Field, residual: &mut Field, direction: &Field, product: &Field, step: f32) -> f32 {
+    let tiles = pressure.par_iter_mut().zip(residual).zip(direction).zip(product).with_min_len(64);
+    let each = tiles.map(|(((pressure, residual), direction), product)| {
+        let mut most = [0.0f32; 8];
+        for cell in 0..512 {
+            pressure[cell] += step * direction[cell];
+            residual[cell] -= step * product[cell];
+            most[cell & 7] = max(most[cell & 7], residual[cell].abs());
+        }
+        most.into_iter().fold(0.0, max)
+    });
+    each.reduce(|| 0.0, max)
+}
+
+/// Greatest absolute value.
+fn greatest(field: &Field) -> f32 {
+    let of_tile = |tile: &Tile| tile.iter().fold(0.0, |most, value| max(most, value.abs()));
+    field.par_iter().with_min_len(64).map(of_tile).reduce(|| 0.0, max)
+}
+
+/// Greatest speed (m/s) on any axis.
+pub fn fastest(velocity: &[Field; 3]) -> f32 {
+    velocity.iter().map(greatest).fold(0.0, max)
+}
+
+/// What flows into each cell (m/s: the divergence times the cell, negative).
+pub fn divergence(tiles: &Tiles, solids: &Solids, velocity: &[Field; 3], out: &mut Field) {
+    out.par_iter_mut().enumerate().with_min_len(16).for_each(|(slot, out)| {
+        for (row, out) in out.chunks_exact_mut(8).enumerate() {
+            let sides = [0, 1, 2].map(|axis| fluxes(tiles, solids, velocity, axis, slot, row));
+            let [[left, right], [down, up], [back, front]] = &sides;
+            for (lane, out) in out.iter_mut().enumerate() {
+                *out = (left[lane] - right[lane]) + (down[lane] - up[lane]) + (back[lane] - front[lane]);
+            }
+        }
+    });
+}
+
+/// What flows through the lower and through the upper faces of a row of cells on an axis (m/s).
+fn fluxes(
+    tiles: &Tiles,
+    solids: &Solids,
+    velocity: &[Field; 3],
+    axis: usize,
+    slot: usize,
+    row: usize,
+) -> [[f32; 8]; 2] {
+    let above = tiles.neighbours()[slot][FACES[2 * axis + 1]] as usize;
+    let flux = |slot: usize, row: usize| {
+        let mut flux = row_of(&velocity[axis][slot], row);
+        if let Some(faces) = solids.faces(slot) {
+            let (open, speed) = (row_of(&faces.open[axis], row), row_of(&faces.speed[axis], row));
+            for lane in 0..8 {
+                flux[lane] = open[lane] * flux[lane] + (1.0 - open[lane]) * speed[lane];
+            }
+        }
+        flux
+    };
+    let lower = flux(slot, row);
+    let upper = match axis {
+        0 if row < 56 => flux(slot, row + 8),
+        0 => flux(above, row - 56),
+        1 if row & 7 < 7 => flux(slot, row + 1),
+        1 => flux(above, row - 7),
+        _ => {
+            let mut upper = [0.0; 8];
+            upper[..7].copy_from_slice(&lower[1..]);
+            upper[7] = flux(above, row)[0];
+            upper
+        }
+    };
+    [lower, upper]
+}
+
+/// Changes the velocity by the gradient of the pressure; covered faces move as the solid does.
+fn accelerate(tiles: &Tiles, solids: &Solids, pressure: &Field, velocity: &mut [Field; 3]) {
+    for (axis, velocity) in velocity.iter_mut().enumerate() {
+        velocity.par_iter_mut().enumerate().with_min_len(16).for_each(|(slot, speed)| {
+            let below = tiles.neighbours()[slot][FACES[2 * axis]] as usize;
+            let is_active = slot < tiles.active();
+            if !is_active && below >= tiles.active() {
+                return;
+            }
+            let (here, below) = (&pressure[slot], pressure.get(below).unwrap_or(&ZEROS));
+            let faces = solids.faces(slot);
+            for (row, speed) in speed.chunks_exact_mut(8).enumerate() {
+                // Of the rim, only the faces of cells move.
+                let moving = match axis {
+                    _ if is_active => 8,
+                    0 => 8 * usize::from(row < 8),
+                    1 => 8 * usize::from(row & 7 == 0),
+                    _ => 1,
+                };
+                let upper = row_of(here, row);
+                let lower = match axis {
+                    0 if row >= 8 => row_of(here, row - 8),
+                    0 => row_of(below, row + 56),
+                    1 if row & 7 > 0 => row_of(here, row - 1),
+                    1 => row_of(below, row + 7),
+                    _ => {
+                        let mut lower = [0.0; 8];
+                        lower[0] = below[row * 8 + 7];
+                        lower[1..].copy_from_slice(&upper[..7]);
+                        lower
+                    }
+                };
+                for (lane, speed) in speed.iter_mut().enumerate().take(moving) {
+                    *speed -= upper[lane] - lower[lane];
+                }
+                if let Some(faces) = faces {
+                    let (open, solid) = (row_of(&faces.open[axis], row), row_of(&faces.speed[axis], row));
+                    for (lane, speed) in speed.iter_mut().enumerate().filter(|(lane, _)| open[*lane] == 0.0) {
+                        *speed = solid[lane];
+                    }
+                }
+            }
+        });
+    }
+}

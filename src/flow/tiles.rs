@@ -1,0 +1,145 @@
+//! Which tiles there are, and who is whose neighbour.
+
+use crate::base::blocks::VOXELS;
+
+/// Coordinate of a tile: that of its least cell, divided by 8.
+pub type Coord = [i32; 3];
+/// 512 values of a tile, in the order of [`crate::base::blocks`].
+pub type Tile = [f32; VOXELS];
+/// A field: a tile of values for each slot.
+pub type Field = Vec<Tile>;
+
+/// No tile.
+pub const NONE: u32 = u32::MAX;
+/// Position of a tile itself among its 27 neighbours.
+pub const SELF: usize = 13;
+/// A tile without values.
+pub static ZEROS: Tile = [0.0; VOXELS];
+
+/// Position among the 27 neighbours of the one at an offset of -1, 0 or 1 on each axis.
+#[inline]
+pub const fn neighbour_at(offset: [i32; 3]) -> usize {
+    ((offset[0] + 1) * 9 + (offset[1] + 1) * 3 + offset[2] + 1) as usize
+}
+
+/// Positions among the 27 neighbours of the six that share a face: -x, +x, -y, +y, -z, +z.
+pub const FACES: [usize; 6] = [4, 22, 10, 16, 12, 14];
+
+/// A sparse set of tiles. The first [`Tiles::active`] slots hold cells. Those behind them, the *rim*, are the tiles next to these
+/// in all 26 directions: they hold the upper faces of cells whose tiles end there, and what the air around is like.
+#[derive(Debug, Clone, Default)]
+pub struct Tiles {
+    coords: Vec<Coord>,
+    active: usize,
+    neighbours: Vec<[u32; 27]>,
+}
+
+impl Tiles {
+    /// The set whose active tiles are these, sorted and each once.
+    pub fn new(active: &[Coord]) -> Self {
+        debug_assert!(active.is_sorted_by(|a, b| a < b));
+        let rim = padded(active, 1).into_iter().filter(|coord| active.binary_search(coord).is_err());
+        let rim: Vec<Coord> = rim.collect();
+        let mut tiles = Self { coords: active.to_vec(), active: active.len(), neighbours: Vec::new() };
+        tiles.coords.extend(rim);
+        tiles.neighbours = (0..tiles.coords.len()).map(|slot| tiles.around(tiles.coords[slot])).collect();
+        tiles
+    }
+
+    /// Slots of the 27 tiles around a coordinate.
+    fn around(&self, coord: Coord) -> [u32; 27] {
+        std::array::from_fn(|at| {
+            let offset = [at / 9, at / 3 % 3, at % 3].map(|x| x as i32 - 1);
+            self.find([0, 1, 2].map(|axis| coord[axis] + offset[axis])).unwrap_or(NONE)
+        })
+    }
+
+    /// The slot of a coordinate.
+    pub fn find(&self, coord: Coord) -> Option<u32> {
+        let (active, rim) = self.coords.split_at(self.active);
+        let found = active.binary_search(&coord);
+        let found = found.or_else(|_| rim.binary_search(&coord).map(|slot| slot + self.active));
+        found.ok().map(|slot| slot as u32)
+    }
+
+    /// Coordinates of all tiles, by slot.
+    pub fn coords(&self) -> &[Coord] {
+        &self.coords
+    }
+
+    /// Count of active tiles.
+    pub fn active(&self) -> usize {
+        self.active
+    }
+
+    /// Count of all tiles.
+    pub fn count(&self) -> usize {
+        self.coords.len()
+    }
+
+    /// Slots of the 27 tiles around each tile, itself at [`SELF`].
+    pub fn neighbours(&self) -> &[[u32; 27]] {
+        &self.neighbours
+    }
+
+    /// The cell next to one on an axis, and its tile.
+    pub fn beside(&self, slot: usize, cell: usize, axis: usize, upper: bool) -> (u32, usize) {
+        let step = 64 >> (3 * axis);
+        match (upper, cell / step % 8) {
+            (true, 7) => (self.neighbours[slot][FACES[2 * axis + 1]], cell - 7 * step),
+            (true, _) => (slot as u32, cell + step),
+            (false, 0) => (self.neighbours[slot][FACES[2 * axis]], cell + 7 * step),
+            (false, _) => (slot as u32, cell - step),
+        }
+    }
+
+    /// The values of the six neighbours that share a face with an active tile, in the order of [`FACES`]; zeros where the
+    /// field has none.
+    pub fn six<'a>(&self, field: &'a [Tile], slot: usize) -> [&'a Tile; 6] {
+        FACES.map(|at| field.get(self.neighbours[slot][at] as usize).unwrap_or(&ZEROS))
+    }
+}
+
+/// A coordinate moved along an axis.
+pub fn shifted(mut coord: Coord, axis: usize, by: i32) -> Coord {
+    coord[axis] += by;
+    coord
+}
+
+/// Sorted coordinates of the tiles within `padding` tiles of any of these, in all 26 directions.
+pub fn padded(tiles: &[Coord], padding: i32) -> Vec<Coord> {
+    let mut out = tiles.to_vec();
+    for axis in 0..3 {
+        let wider = out.iter().flat_map(|coord| (-padding..=padding).map(|by| shifted(*coord, axis, by)));
+        let mut wider: Vec<Coord> = wider.collect();
+        wider.sort_unstable();
+        wider.dedup();
+        out = wider;
+    }
+    out
+}
+
+/// A field on the first `count` of other tiles: values are kept where they were, new tiles get `fill`.
+pub fn moved(field: &[Tile], from: &Tiles, to: &Tiles, count: usize, fill: f32) -> Field {
+    let tile = |coord: &Coord| {
+        let slot = from.find(*coord);
+        slot.and_then(|slot| field.get(slot as usize)).copied().unwrap_or([fill; VOXELS])
+    };
+    to.coords[..count].iter().map(tile).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_rim_lies_around_the_active_tiles() {
+        let tiles = Tiles::new(&[[0, 0, 0], [0, 0, 1]]);
+        assert_eq!((tiles.active(), tiles.count()), (2, 36));
+        assert_eq!(tiles.find([-1, -1, -1]), Some(2));
+        let near = tiles.neighbours()[0];
+        assert_eq!((near[SELF], near[neighbour_at([0, 0, 1])]), (0, 1));
+        assert_eq!(tiles.neighbours()[2][neighbour_at([0, 0, -1])], NONE);
+        assert_eq!(padded(&[[0, 0, 0]], 1).len(), 27);
+    }
+}

@@ -1,0 +1,78 @@
+//! What a user chooses about mist.
+
+use std::ops::RangeInclusive;
+
+use crate::error::{Error, Result};
+
+/// Parameters of mist (thesis section 3.4).
+#[derive(Debug, Clone, PartialEq)]
+pub struct Params {
+    /// Edge of a cell (m).
+    pub cell: f64,
+    /// Least speed (m/s) of grains that raise mist: the thesis' v_mist.
+    pub from_speed: f64,
+    /// Whether falling grains raise mist too.
+    pub falling: bool,
+    /// Acceleration (m/s2) of the air where there is mist, upward: the thesis' g_mist.
+    pub gravity: f64,
+    /// Time (s) in which half of the mist dissipates; infinite: it stays.
+    pub half_life: f64,
+    /// Velocity (m/s) of the air.
+    pub wind: [f64; 3],
+    /// Share 0..=1 of the new density that noise takes away at most.
+    pub noise: f64,
+    /// Size (m) of that noise.
+    pub noise_size: f64,
+    /// Seed of the noise.
+    pub seed: i32,
+    /// Tiles of air (8 cells wide) that are computed around the mist.
+    pub padding: u32,
+    /// Divergence times the cell that a projection leaves, over the greatest speed.
+    pub tolerance: f64,
+}
+
+impl Params {
+    /// The thesis' values, for cells of an edge (m).
+    pub fn for_cell(cell: f64) -> Self {
+        Self {
+            cell,
+            from_speed: 2.0,
+            falling: false,
+            gravity: -2.0,
+            half_life: 1.0,
+            wind: [0.0; 3],
+            noise: 0.3,
+            noise_size: 4.0 * cell,
+            seed: 0,
+            padding: 1,
+            tolerance: 1.0e-5,
+        }
+    }
+
+    /// Checks each field.
+    ///
+    /// # Errors
+    /// Names the field and its range.
+    pub fn validate(&self) -> Result<()> {
+        let within = |name: &str, value: f64, range: RangeInclusive<f64>| {
+            let (low, high) = (*range.start(), *range.end());
+            if range.contains(&value) {
+                return Ok(());
+            }
+            Err(Error::argument(format!("{name} = {value} is not within {low} to {high}")))
+        };
+        within("cell", self.cell, 1.0e-5..=100.0)?;
+        within("from_speed", self.from_speed, 0.0..=1000.0)?;
+        within("gravity", self.gravity, -1000.0..=1000.0)?;
+        if self.half_life.is_nan() || self.half_life <= 0.0 {
+            return Err(Error::argument(format!("half_life = {} is not over 0", self.half_life)));
+        }
+        for wind in self.wind {
+            within("wind", wind, -1000.0..=1000.0)?;
+        }
+        within("noise", self.noise, 0.0..=1.0)?;
+        within("noise_size", self.noise_size, self.cell..=1.0e6 * self.cell)?;
+        within("padding", f64::from(self.padding), 1.0..=64.0)?;
+        within("tolerance", self.tolerance, 1.0e-6..=0.1)
+    }
+}

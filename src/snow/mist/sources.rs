@@ -1,0 +1,130 @@
+//! Where grains raise mist (thesis section 3.4.2): along the way of each fast grain within the frame, a tube of twice its radius.
+
+use rayon::prelude::*;
+
+use super::Params;
+use crate::base::DVec3;
+use crate::flow::{Coord, Tile};
+
+/// A grain that raises mist.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Source {
+    /// Position (m) at the end of the step.
+    pub place: DVec3,
+    /// Velocity (m/s).
+    pub velocity: [f32; 3],
+    /// Radius (m) of the grain.
+    pub radius: f64,
+}
+
+impl Source {
+    /// Whether a grain is fast enough to raise mist, and does not fall where falling grains do not.
+    pub fn raises(&self, params: &Params) -> bool {
+        let speed = self.velocity.iter().map(|x| f64::from(*x).powi(2)).sum::<f64>().sqrt();
+        speed > params.from_speed && (params.falling || self.velocity[1] >= 0.0)
+    }
+}
+
+/// Mist that is new in a tile.
+pub struct Seed {
+    /// Its tile.
+    pub coord: Coord,
+    /// Density 0..=1 at the cells' centres.
+    pub density: Box<Tile>,
+    /// Velocity (m/s) there: the mean of the grains', by how much of the cell each one's tube covers.
+    pub velocity: Box<[Tile; 3]>,
+}
+
+/// The new mist of a step of `dt` (s), by tile, sorted.
+pub fn seeds(sources: &[Source], params: &Params, dt: f64) -> Vec<Seed> {
+    let raising: Vec<&Source> = sources.iter().filter(|source| source.raises(params)).collect();
+    let mut touched: Vec<(Coord, u32)> = raising
+        .par_iter()
+        .enumerate()
+        .flat_map_iter(|(index, source)| {
+            tiles_of(source, params.cell, dt).into_iter().map(move |coord| (coord, index as u32))
+        })
+        .collect();
+    touched.par_sort_unstable();
+    let groups: Vec<&[(Coord, u32)]> = touched.chunk_by(|a, b| a.0 == b.0).collect();
+    groups.into_par_iter().map(|group| seed(group, &raising, params, dt)).collect()
+}
+
+/// Coordinates of the tiles that a source's tube may touch.
+fn tiles_of(source: &Source, cell: f64, dt: f64) -> Vec<Coord> {
+    let [from, to] = ends(source, dt);
+    let reach = DVec3::repeat(2.0 * source.radius + cell);
+    let tile = |place: DVec3| [0, 1, 2].map(|axis| (place[axis] / (8.0 * cell)).floor() as i32);
+    let (low, high) = (tile(from.inf(&to) - reach), tile(from.sup(&to) + reach));
+    let mut out = Vec::new();
+    for x in low[0]..=high[0] {
+        for y in low[1]..=high[1] {
+            for z in low[2]..=high[2] {
+                let middle = DVec3::new(f64::from(x) + 0.5, f64::from(y) + 0.5, f64::from(z) + 0.5);
+                let apart = distance(middle * (8.0 * cell), from, to);
+                if apart < 2.0 * source.radius + cell * (1.0 + 4.0 * 3f64.sqrt()) {
+                    out.push([x, y, z]);
+                }
+            }
+        }
+    }
+    out
+}
+
+/// Where a source's way in the step begins and ends (m).
+fn ends(source: &Source, dt: f64) -> [DVec3; 2] {
+    let way = DVec3::from(source.velocity.map(|x| f64::from(x) * dt));
+    [source.place - way, source.place]
+}
+
+/// Distance (m) of a place from a segment.
+fn distance(place: DVec3, from: DVec3, to: DVec3) -> f64 {
+    let (way, off) = (to - from, place - from);
+    let share = (off.dot(&way) / way.norm_squared().max(f64::MIN_POSITIVE)).clamp(0.0, 1.0);
+    (off - way * share).norm()
+}
+
+fn seed(group: &[(Coord, u32)], sources: &[&Source], params: &Params, dt: f64) -> Seed {
+    let coord = group[0].0;
+    let (mut density, mut velocity) = (Box::new([0.0f32; 512]), Box::new([[0.0f32; 512]; 3]));
+    let mut weights = [0.0f32; 512];
+    for (_, index) in group {
+        let source = sources[*index as usize];
+        let [from, to] = ends(source, dt);
+        for cell in 0..512usize {
+            let at = [cell >> 6, cell >> 3 & 7, cell & 7];
+            let place =
+                [0, 1, 2].map(|axis| (f64::from(coord[axis] * 8 + at[axis] as i32) + 0.5) * params.cell);
+            let apart = distance(DVec3::from(place), from, to);
+            let cover = (0.5 + (2.0 * source.radius - apart) / params.cell).clamp(0.0, 1.0) as f32;
+            if cover > 0.0 {
+                density[cell] = density[cell].max(cover);
+                weights[cell] += cover;
+                for axis in 0..3 {
+                    velocity[axis][cell] += cover * source.velocity[axis];
+                }
+            }
+        }
+    }
+    let noise = noise(params);
+    for cell in (0..512usize).filter(|cell| weights[*cell] > 0.0) {
+        for speeds in velocity.iter_mut() {
+            speeds[cell] /= weights[cell];
+        }
+        if params.noise > 0.0 {
+            let at = [cell >> 6, cell >> 3 & 7, cell & 7];
+            let [x, y, z] = [0, 1, 2].map(|axis| f64::from(coord[axis] * 8 + at[axis] as i32) + 0.5);
+            let share = 0.5 + 0.5 * noise.get_noise_3d(x, y, z).clamp(-1.0, 1.0);
+            density[cell] *= 1.0 - params.noise as f32 * share;
+        }
+    }
+    Seed { coord, density, velocity }
+}
+
+/// The noise, over cells.
+fn noise(params: &Params) -> fastnoise_lite::FastNoiseLite {
+    let mut noise = fastnoise_lite::FastNoiseLite::with_seed(params.seed);
+    noise.set_noise_type(Some(fastnoise_lite::NoiseType::OpenSimplex2));
+    noise.set_frequency(Some((params.cell / params.noise_size) as f32));
+    noise
+}
