@@ -17,7 +17,7 @@ const JUST_WOKEN: f32 = f32::MAX;
 pub const WOKEN: f32 = 2.0;
 /// Time without motion before a grain rests, in standard sub-steps of sqrt(0.02 d / g), so that grains of every size rest
 /// alike.
-const PATIENCE: f64 = 80.0;
+const PATIENCE: f64 = 96.0;
 /// The same for an unsupported grain, as a multiple.
 const HELD: f32 = 4.0;
 /// Time for which a grain that has moved counts as moving, in the same unit.
