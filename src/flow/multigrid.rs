@@ -1,8 +1,8 @@
 //! One V-cycle of multigrid: a good guess at the solution of L x = b, and a symmetric operator, as the conjugate gradient
 //! method needs of its preconditioner (McAdams, Sifakis and Teran 2010).
 //!
-//! Cells double from level to level; the open share of a coarse face is the mean of its four fine ones, and a coarse cell takes
-//! part if one of its eight does. Values go down and up by trilinear interpolation. Each level is smoothed by two weighted
+//! Cells double from level to level; the open share of a coarse face is the mean of its four fine ones. A coarse cell takes part
+//! if one of its eight does and none is outside, where the pressure is 0. Values go down and up by trilinear interpolation. Each level is smoothed by two weighted
 //! Jacobi sweeps before and after, with Chebyshev's weights for the upper half of the frequencies: unlike Gauss and Seidel's,
 //! these do not depend on any order, so that mirrored fields have mirrored results.
 
@@ -12,6 +12,7 @@ use super::solids::Solids;
 use super::stencil::{Near, Stencil, Task, compute, start};
 use super::tiles::{Coord, Field, NONE, SELF, Tile, Tiles};
 use super::window::Window;
+use crate::base::blocks::Mask;
 
 /// Weights of two Jacobi sweeps: the inverse roots of Chebyshev's polynomial on [1/3, 2], the eigenvalues (over the diagonal) of
 /// the modes that a coarser level cannot hold. They leave at most 0.34 of those.
@@ -135,15 +136,14 @@ impl Operator {
             let child = children[octant];
             let fine = at.map(|x| (x & 3) * 2);
             let stencil = (child != NONE).then(|| self.stencil(child as usize)).flatten();
+            let fine_cells = std::array::from_fn::<usize, 8, _>(|part| fine_cell(fine, part));
+            let is_outside = child == NONE
+                || stencil.is_some_and(|stencil| fine_cells.iter().any(|at| is_set(&stencil.outside, *at)));
+            let is_solid =
+                stencil.is_some_and(|stencil| fine_cells.iter().all(|at| stencil.inverse[*at] == 0.0));
+            out.outside[cell >> 6] |= u64::from(is_outside) << (cell & 63);
             // Marks cells that do not take part, until `join` inverts the diagonal.
-            out.inverse[cell] = match (child, stencil) {
-                (NONE, _) => 0.0,
-                (_, None) => 1.0,
-                (_, Some(stencil)) => {
-                    let parts = (0..8).map(|part| stencil.inverse[fine_cell(fine, part)] > 0.0);
-                    f32::from(u8::from(parts.into_iter().any(|part| part)))
-                }
-            };
+            out.inverse[cell] = f32::from(u8::from(!is_outside && !is_solid));
             if let Some(stencil) = stencil {
                 for axis in 0..3 {
                     let four = (0..8).filter(|part| part >> (2 - axis) & 1 == 0);
@@ -180,6 +180,11 @@ impl Operator {
             }
         }
     }
+}
+
+/// Whether a cell's bit is set.
+fn is_set(mask: &Mask, cell: usize) -> bool {
+    mask[cell >> 6] >> (cell & 63) & 1 == 1
 }
 
 /// The cell of a tile in the first layer on an axis, at a place in that layer.

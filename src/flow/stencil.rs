@@ -1,6 +1,7 @@
 //! The discrete Laplace operator of a tile: L x = sum over the six faces of open (x - neighbour), 0 outside all tiles.
 
 use super::tiles::Tile;
+use crate::base::blocks::Mask;
 use crate::base::cpu::dispatch;
 
 /// Coefficients of a tile with faces that are not fully open, or with cells that do not take part.
@@ -12,12 +13,14 @@ pub struct Stencil {
     pub upper: [[f32; 64]; 3],
     /// Inverse of the sum of each cell's open shares; 0: the cell does not take part.
     pub inverse: Tile,
+    /// Cells where the pressure is 0, of levels whose tiles reach beyond the active ones: bit `y << 3 | z` of word `x`.
+    pub outside: Mask,
 }
 
 impl Stencil {
     /// All faces open.
     pub fn open() -> Self {
-        Self { lower: [[1.0; 512]; 3], upper: [[1.0; 64]; 3], inverse: [1.0 / 6.0; 512] }
+        Self { lower: [[1.0; 512]; 3], upper: [[1.0; 64]; 3], inverse: [1.0 / 6.0; 512], outside: [0; 8] }
     }
 
     /// Open shares of the lower and the upper faces of a row's cells, on each axis.

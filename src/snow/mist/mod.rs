@@ -106,31 +106,34 @@ impl Mist {
         if !(dt > 0.0 && dt.is_finite()) {
             return Err(Error::argument(format!("dt = {dt} is not over 0")));
         }
-        let raising = sources.iter().filter(|source| source.raises(&self.params)).count();
-        let (mut report, phases) = ctx.step(2, || {
-            ctx.phase("sources", || {
-                let seeds = sources::seeds(sources, &self.params, dt);
-                self.sow(&seeds);
-                Ok(())
-            })?;
-            ctx.phase("flow", || self.carry(ctx, boundary, dt))
-        })?;
-        (report.sources, report.phases) = (raising, phases);
+        let raising: Vec<Source> =
+            sources.iter().filter(|source| source.raises(&self.params)).copied().collect();
+        let (mut report, phases) =
+            ctx.step(1, || ctx.phase("flow", || self.carry(ctx, &raising, boundary, dt)))?;
+        (report.sources, report.phases) = (raising.len(), phases);
         Ok(report)
     }
 
-    /// The sub-steps.
-    fn sub_steps(&self, dt: f64) -> usize {
-        let speed = f64::from(self.flow.fastest()) + self.params.gravity.abs() * dt;
+    /// Count of sub-steps in which nothing moves farther than [`FARTHEST`] cells.
+    fn sub_steps(&self, sources: &[Source], dt: f64) -> usize {
+        let speeds = sources.iter().flat_map(|source| source.velocity);
+        let fastest = speeds.fold(self.flow.fastest(), |most, speed| most.max(speed.abs()));
+        let speed = f64::from(fastest) + self.params.gravity.abs() * dt;
         let count = (speed * dt / (f64::from(FARTHEST) * self.params.cell)).ceil();
         (count as usize).clamp(1, MOST)
     }
 }
 
 impl Mist {
-    /// Moves the mist, in sub-steps.
-    fn carry(&mut self, ctx: &Context, boundary: &Boundary<'_>, dt: f64) -> Result<StepReport> {
-        let sub_steps = self.sub_steps(dt);
+    /// Moves the mist in sub-steps, in each of which grains raise more along their way.
+    fn carry(
+        &mut self,
+        ctx: &Context,
+        sources: &[Source],
+        boundary: &Boundary<'_>,
+        dt: f64,
+    ) -> Result<StepReport> {
+        let sub_steps = self.sub_steps(sources, dt);
         let part = dt / sub_steps as f64;
         let mut report = StepReport {
             cells: 0,
@@ -145,8 +148,8 @@ impl Mist {
         ctx.expect(sub_steps);
         for sub in 0..sub_steps {
             ctx.check()?;
-            self.follow(&[]);
-            let share = (sub + 1) as f64 / sub_steps as f64;
+            let [from, share] = [sub, sub + 1].map(|sub| sub as f64 / sub_steps as f64);
+            self.sow(&sources::seeds(&sources::ways(sources, &self.params, dt, [from, share]), &self.params));
             let boundary = |tiles: &Tiles, cell: f32| boundary(tiles, cell, share);
             forces::fall(&mut self.flow, (self.params.gravity * part) as f32);
             let solved = self.flow.project(ctx, &boundary, self.params.tolerance as f32)?;

@@ -35,25 +35,44 @@ pub struct Seed {
     pub velocity: Box<[Tile; 3]>,
 }
 
-/// The new mist of a step of `dt` (s), by tile, sorted.
-pub fn seeds(sources: &[Source], params: &Params, dt: f64) -> Vec<Seed> {
-    let raising: Vec<&Source> = sources.iter().filter(|source| source.raises(params)).collect();
-    let mut touched: Vec<(Coord, u32)> = raising
+/// The ways (m) of the grains that raise mist, in the part of a step of `dt` (s) between two shares 0..=1 of it.
+pub fn ways(sources: &[Source], params: &Params, dt: f64, part: [f64; 2]) -> Vec<Way> {
+    let raising = sources.iter().filter(|source| source.raises(params));
+    let way = |source: &Source| {
+        let velocity = DVec3::from(source.velocity.map(f64::from));
+        let ends = part.map(|share| source.place - velocity * (dt * (1.0 - share)));
+        Way { ends, velocity: source.velocity, radius: source.radius }
+    };
+    raising.map(way).collect()
+}
+
+/// The way of a grain.
+pub struct Way {
+    /// Its ends (m).
+    ends: [DVec3; 2],
+    /// Velocity (m/s) and radius (m) of the grain.
+    velocity: [f32; 3],
+    radius: f64,
+}
+
+/// The new mist along ways, by tile, sorted.
+pub fn seeds(ways: &[Way], params: &Params) -> Vec<Seed> {
+    let mut touched: Vec<(Coord, u32)> = ways
         .par_iter()
         .enumerate()
-        .flat_map_iter(|(index, source)| {
-            tiles_of(source, params.cell, dt).into_iter().map(move |coord| (coord, index as u32))
+        .flat_map_iter(|(index, way)| {
+            tiles_of(way, params.cell).into_iter().map(move |coord| (coord, index as u32))
         })
         .collect();
     touched.par_sort_unstable();
     let groups: Vec<&[(Coord, u32)]> = touched.chunk_by(|a, b| a.0 == b.0).collect();
-    groups.into_par_iter().map(|group| seed(group, &raising, params, dt)).collect()
+    groups.into_par_iter().map(|group| seed(group, ways, params)).collect()
 }
 
-/// Coordinates of the tiles that a source's tube may touch.
-fn tiles_of(source: &Source, cell: f64, dt: f64) -> Vec<Coord> {
-    let [from, to] = ends(source, dt);
-    let reach = DVec3::repeat(2.0 * source.radius + cell);
+/// Coordinates of the tiles that a way's tube may touch.
+fn tiles_of(way: &Way, cell: f64) -> Vec<Coord> {
+    let [from, to] = way.ends;
+    let reach = DVec3::repeat(2.0 * way.radius + cell);
     let tile = |place: DVec3| [0, 1, 2].map(|axis| (place[axis] / (8.0 * cell)).floor() as i32);
     let (low, high) = (tile(from.inf(&to) - reach), tile(from.sup(&to) + reach));
     let mut out = Vec::new();
@@ -62,19 +81,13 @@ fn tiles_of(source: &Source, cell: f64, dt: f64) -> Vec<Coord> {
             for z in low[2]..=high[2] {
                 let middle = DVec3::new(f64::from(x) + 0.5, f64::from(y) + 0.5, f64::from(z) + 0.5);
                 let apart = distance(middle * (8.0 * cell), from, to);
-                if apart < 2.0 * source.radius + cell * (1.0 + 4.0 * 3f64.sqrt()) {
+                if apart < 2.0 * way.radius + cell * (1.0 + 4.0 * 3f64.sqrt()) {
                     out.push([x, y, z]);
                 }
             }
         }
     }
     out
-}
-
-/// Where a source's way in the step begins and ends (m).
-fn ends(source: &Source, dt: f64) -> [DVec3; 2] {
-    let way = DVec3::from(source.velocity.map(|x| f64::from(x) * dt));
-    [source.place - way, source.place]
 }
 
 /// Distance (m) of a place from a segment.
@@ -84,24 +97,23 @@ fn distance(place: DVec3, from: DVec3, to: DVec3) -> f64 {
     (off - way * share).norm()
 }
 
-fn seed(group: &[(Coord, u32)], sources: &[&Source], params: &Params, dt: f64) -> Seed {
+fn seed(group: &[(Coord, u32)], ways: &[Way], params: &Params) -> Seed {
     let coord = group[0].0;
     let (mut density, mut velocity) = (Box::new([0.0f32; 512]), Box::new([[0.0f32; 512]; 3]));
     let mut weights = [0.0f32; 512];
     for (_, index) in group {
-        let source = sources[*index as usize];
-        let [from, to] = ends(source, dt);
+        let Way { ends: [from, to], velocity: speed, radius } = ways[*index as usize];
         for cell in 0..512usize {
             let at = [cell >> 6, cell >> 3 & 7, cell & 7];
             let place =
                 [0, 1, 2].map(|axis| (f64::from(coord[axis] * 8 + at[axis] as i32) + 0.5) * params.cell);
             let apart = distance(DVec3::from(place), from, to);
-            let cover = (0.5 + (2.0 * source.radius - apart) / params.cell).clamp(0.0, 1.0) as f32;
+            let cover = (0.5 + (2.0 * radius - apart) / params.cell).clamp(0.0, 1.0) as f32;
             if cover > 0.0 {
                 density[cell] = density[cell].max(cover);
                 weights[cell] += cover;
                 for axis in 0..3 {
-                    velocity[axis][cell] += cover * source.velocity[axis];
+                    velocity[axis][cell] += cover * speed[axis];
                 }
             }
         }
