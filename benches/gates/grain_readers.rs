@@ -14,7 +14,7 @@ use crate::harness::Harness;
 use crate::scenes::context;
 
 /// Frame of the files.
-const FRAME: i32 = 48;
+const FRAME: i32 = 36;
 /// Bytes of a place in a record, after those of the identity.
 const PLACE: std::ops::Range<usize> = 8..32;
 /// Bytes of a record.
