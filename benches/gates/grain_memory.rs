@@ -20,8 +20,13 @@ pub fn run(h: &mut Harness) {
     if !h.wants(name) {
         return;
     }
+    in_a_process_of_its_own(h, name, MEMORY);
+}
+
+/// A gate of bytes that a run of this program with an argument prints.
+pub fn in_a_process_of_its_own(h: &mut Harness, name: &str, argument: &str) {
     let program = std::env::current_exe().expect("this program's path");
-    let output = std::process::Command::new(program).arg(MEMORY).output().expect("a process for grains");
+    let output = std::process::Command::new(program).arg(argument).output().expect("a process");
     let text = String::from_utf8_lossy(&output.stdout).into_owned();
     text.lines().filter(|line| line.starts_with("# ")).for_each(|line| println!("{line}"));
     let bytes = text.lines().find_map(|line| line.strip_prefix("bytes ")?.parse().ok());

@@ -212,7 +212,6 @@ pub const GATES: &[Gate] = &[
     // Mist: projections around a ball that moves, still air, symmetry, order, what becomes of the mass, and of a grain's way.
     gate("snow.mist.divergence", "1", Most(1.0e-4), Most(1.0e-5)),
     none("snow.mist.density_negative", "1"),
-    gate("snow.mist.flux", "1", Most(1.0e-3), Open),
     gate("snow.mist.still", "m/s", Most(1.0e-3), Most(1.0e-6)),
     gate("snow.mist.symmetry", "1", Most(1.0e-5), Open),
     gate("snow.mist.taylor_green", "x", Least(3.0), Least(3.5)),

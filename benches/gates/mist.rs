@@ -8,7 +8,7 @@ use frazil::flow::tiles::padded;
 use frazil::flow::{Coord, Faces, Flow, Scheme, Solids, Tile, Tiles};
 use frazil::snow::mist::{Mist, Params, Source};
 
-use crate::grain_memory::kilobytes;
+use crate::grain_memory::{in_a_process_of_its_own, kilobytes};
 use crate::harness::Harness;
 use crate::scenes::context;
 
@@ -64,13 +64,13 @@ fn puff(params: Params, radius: f32, speed: f32) -> Mist {
 
 /// Divergence after projections and least density, while a puff is blown past a ball that moves.
 fn projection(h: &mut Harness) {
-    let names = ["snow.mist.divergence", "snow.mist.density_negative", "snow.mist.flux"];
+    let names = ["snow.mist.divergence", "snow.mist.density_negative"];
     if !names.iter().any(|name| h.wants(name)) {
         return;
     }
     let ctx = context(2);
     let mut mist = puff(air(), 8.0, 2.0);
-    let (mut left, mut least, mut leak, mut iterations) = (0.0f64, 0.0f32, 0.0f64, 0);
+    let (mut left, mut least, mut iterations) = (0.0f64, 0.0f32, 0);
     for frame in 0..24 {
         let at = |share: f64| [0.3 * (f64::from(frame) + share), 12.0, 0.0].map(|x| x as f32);
         let boundary = |tiles: &Tiles, cell: f32, share: f64| {
@@ -80,11 +80,9 @@ fn projection(h: &mut Harness) {
         left = left.max(f64::from(report.divergence));
         iterations = iterations.max(report.iterations);
         least = mist.flow().density().iter().flatten().fold(least, |least, value| least.min(*value));
-        leak = leak.max(leaks(&ctx, &mist, at(1.0)));
     }
     h.gate(names[0], left, &format!("in 24 frames, at most {iterations} iterations in one"));
     h.gate(names[1], f64::from(-least), "");
-    h.gate(names[2], leak, "");
 }
 
 /// Faces of a ball around a place (fine cells), of a radius (fine cells), that moves along x at a speed (m/s), for cells of an
@@ -115,30 +113,6 @@ fn ball(tiles: &Tiles, cell: f32, place: [f32; 3], radius: f32, speed: f32) -> S
         faces.push((slot, tile));
     }
     Solids::new(tiles, faces)
-}
-
-/// Flux through the closed faces of a ball, over the flux around it.
-fn leaks(ctx: &Context, mist: &Mist, place: [f32; 3]) -> f64 {
-    let mut flow = Flow::new(CELL, [0.0, 1.0, 0.0]).expect("a flow");
-    flow.resize(&mist.flow().tiles().coords()[..mist.flow().tiles().active()]);
-    let solids = ball(flow.tiles(), CELL as f32, place, 6.0, 0.0);
-    let boundary = |tiles: &Tiles, cell: f32| Ok(ball(tiles, cell, place, 6.0, 0.0));
-    ctx.phase("project", || flow.project(ctx, &boundary, 1.0e-5)).expect("a projection");
-    let (mut through, mut around) = (0.0f64, 0.0f64);
-    for (slot, tile) in flow.velocity()[1][..flow.tiles().active()].iter().enumerate() {
-        for (cell, speed) in tile.iter().enumerate() {
-            let open = solids.faces(slot).map_or(1.0, |faces| faces.open[1][cell]);
-            let flux = f64::from(speed.abs());
-            // Faces inside continue the flow outside: what counts is what the solve lets through them.
-            if open == 0.0 {
-                let inside = solids.faces(slot).map_or(0.0, |faces| f64::from(faces.speed[1][cell]));
-                through += inside.abs();
-            } else {
-                around += f64::from(open) * flux;
-            }
-        }
-    }
-    through / around
 }
 
 /// A closed box that is full of mist: gravity must not move it.
@@ -411,16 +385,7 @@ fn memory(h: &mut Harness) {
     if !h.wants(name) {
         return;
     }
-    let program = std::env::current_exe().expect("this program's path");
-    let output = std::process::Command::new(program).arg(MEMORY).output().expect("a process for mist");
-    let text = String::from_utf8_lossy(&output.stdout).into_owned();
-    text.lines().filter(|line| line.starts_with("# ")).for_each(|line| println!("{line}"));
-    let bytes = text.lines().find_map(|line| line.strip_prefix("bytes ")?.parse().ok());
-    h.gate(
-        name,
-        bytes.expect("a number of bytes"),
-        "the peak of a step, without what the process had before",
-    );
+    in_a_process_of_its_own(h, name, MEMORY);
 }
 
 /// The run with [`MEMORY`].

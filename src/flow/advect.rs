@@ -82,14 +82,10 @@ impl Paths {
         scheme: Scheme,
     ) {
         let first = if scheme == Scheme::SemiLagrangian { &mut *out } else { &mut *hat };
-        each_tile(first, |slot, window, to| {
-            if is_still(tiles, slot, at) {
-                *to = [outside; VOXELS];
-                return;
-            }
+        let is_moved = |slot: usize| !is_still(tiles, slot, at);
+        each_tile(first, outside, is_moved, |slot, window, to| {
             let [margin, _] = self.margins[slot].map(usize::from);
             window[0].fill(field, &tiles.neighbours()[slot], margin, outside);
-            *to = [outside; VOXELS];
             if at != At::Centres || !window[0].is_zero() {
                 carry_tile(tiles, slot, at, &self.back, &window[0], to);
             }
@@ -98,16 +94,11 @@ impl Paths {
             return;
         }
         let hat = &*hat;
-        each_tile(out, |slot, window, to| {
-            if is_still(tiles, slot, at) {
-                *to = [outside; VOXELS];
-                return;
-            }
+        each_tile(out, outside, is_moved, |slot, window, to| {
             let near = &tiles.neighbours()[slot];
             let [back, ahead] = self.margins[slot].map(usize::from);
             window[0].fill(field, near, back, outside);
             window[1].fill(hat, near, ahead, outside);
-            *to = [outside; VOXELS];
             if at != At::Centres || !window[0].is_zero() || !window[1].is_zero() {
                 let [old, guess, _] = &*window;
                 let bounded = scheme == Scheme::MacCormack;
@@ -117,10 +108,20 @@ impl Paths {
     }
 }
 
-/// Calls `work` with each tile's slot, windows and values.
-fn each_tile(field: &mut Field, work: impl Fn(usize, &mut [Window; 3], &mut Tile) + Sync) {
+/// Fills each tile with `outside`; then calls `work` with its slot, windows and values where it is moved.
+fn each_tile(
+    field: &mut Field,
+    outside: f32,
+    is_moved: impl Fn(usize) -> bool + Sync,
+    work: impl Fn(usize, &mut [Window; 3], &mut Tile) + Sync,
+) {
     let tiles = field.par_iter_mut().enumerate().with_min_len(16);
-    tiles.for_each_init(Scratch::default, |scratch, (slot, tile)| work(slot, &mut scratch.0, tile));
+    tiles.for_each_init(Scratch::default, |scratch, (slot, tile)| {
+        *tile = [outside; VOXELS];
+        if is_moved(slot) {
+            work(slot, &mut scratch.0, tile);
+        }
+    });
 }
 
 /// Greatest displacement (cells) in each tile.

@@ -25,7 +25,7 @@ const LEVELS: usize = 7;
 /// The operator on a level.
 #[derive(Debug, Default)]
 pub struct Operator {
-    /// Its tiles; the rim is not used.
+    /// Its tiles. The rim holds no unknowns: what a field has there is the pressure outside.
     pub tiles: Tiles,
     /// The stencil of each active tile; [`NONE`]: all faces are open.
     index: Vec<u32>,

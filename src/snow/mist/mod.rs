@@ -92,7 +92,8 @@ impl Mist {
         self.sow(&seeds);
     }
 
-    /// Moves the mist through a step of `dt` (s), in which grains raise more of it.
+    /// Moves the mist through a step of `dt` (s), in which grains raise more of it. After an error it is somewhere within the
+    /// step: it must not be stepped any further.
     ///
     /// # Errors
     /// A time that is not positive; cancel; errors of the boundary.
