@@ -84,6 +84,8 @@ mod sweeps;
 mod table;
 #[path = "gates/turned.rs"]
 mod turned;
+#[path = "gates/volumes.rs"]
+mod volumes;
 
 use harness::Harness;
 
@@ -106,6 +108,7 @@ fn main() {
     grains::run(&mut h);
     mist::run(&mut h);
     shot::run(&mut h);
+    volumes::run(&mut h);
     capi::run(&mut h);
     cancel::run(&mut h);
     flip::run(&mut h);

@@ -67,13 +67,18 @@ fn step(
 
 /// Grains some frames after a plough started to move; some of them are at rest.
 pub fn ploughed(ctx: &Context, frames: i32) -> Grains {
+    ploughed_snow(ctx, frames).1
+}
+
+/// The layer and the grains some frames after a plough started to move.
+pub fn ploughed_snow(ctx: &Context, frames: i32) -> (BaseLayer, Grains) {
     let (mut base, body) = (snow(ctx), plough());
     let mut grains = Grains::new(Params::for_cell(CELL)).expect("grains");
     for frame in 1..=frames {
         let times = [f64::from(frame - 1) * FRAME, f64::from(frame) * FRAME];
         step(ctx, &mut base, &mut grains, &body, times, frame);
     }
-    grains
+    (base, grains)
 }
 
 /// The balance of each frame: grains paid for by snow, owed before, owed after and born.

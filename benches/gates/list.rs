@@ -156,6 +156,9 @@ pub const GATES: &[Gate] = &[
     // Other programs open the shot.
     yes("snow.shot.clients_blender"),
     yes("snow.shot.clients_usd"),
+    // Volumes to render: full density against the union of spheres, and holes between the base and what rests on it.
+    gate("snow.shot.fog_volume", "%", Most(3.0), Most(1.0)),
+    none("snow.shot.snow_seam", "holes"),
     // The C interface: cancels, states, what crossing the border costs.
     gate("capi.cancel_latency", "s", Most(0.2), Most(0.05)),
     yes("capi.cancel_state"),

@@ -19,4 +19,5 @@ pub mod sequence;
 pub mod source;
 mod stl;
 pub mod usd;
+pub mod usd_looks;
 pub mod usd_points;

@@ -2,6 +2,7 @@
 
 use std::fmt::Write;
 
+use super::usd_looks::{self, Look};
 use super::usd_points;
 use crate::base::{DVec3, Points, Uvs, Vec3};
 
@@ -11,7 +12,7 @@ pub struct MeshFrame<'a> {
     pub name: &'a str,
     /// Places (m).
     pub points: &'a [Vec3],
-    /// Velocities (m/s) over the coming frame, one a point.
+    /// Velocities (m/s) over the coming frame, one a point; of a mesh that is another one at each frame none.
     pub velocities: &'a [Vec3],
     /// Triangles.
     pub triangles: &'a [[u32; 3]],
@@ -23,18 +24,55 @@ pub struct MeshFrame<'a> {
 pub struct MeshPrim<'a> {
     /// Name of its prim: see [`prim_name`].
     pub name: &'a str,
+    /// What it is made of.
+    pub look: Look,
+    /// Whether its frames have velocities; one that is another mesh at each frame has none.
+    pub moves: bool,
     /// The texture coordinates of its frames, where they have any.
     pub uvs: Option<&'a Uvs>,
 }
 
-/// A kind of volume with its .vdb files.
+/// A volume with its .vdb files.
 pub struct VolumeFiles<'a> {
     /// Name of its prim.
     pub name: &'a str,
-    /// Its grids: name and whether it is a level set.
-    pub grids: &'a [(&'a str, bool)],
+    /// Its fields, each a grid of the files.
+    pub fields: &'a [Field],
+    /// Whether it is there to be looked at and not to be rendered.
+    pub is_guide: bool,
     /// Frames with their files, relative to the .usda file.
     pub files: &'a [(i32, String)],
+}
+
+/// A field of a volume.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Field {
+    /// What shaders call it.
+    pub name: &'static str,
+    /// Name of its grid.
+    pub grid: &'static str,
+    /// What the grid holds.
+    pub holds: Holds,
+}
+
+/// What a grid holds.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Holds {
+    /// Distances from a surface.
+    Distance,
+    /// A density, that much of which (1/m) is meant by 1.
+    Density(f32),
+    /// Other numbers.
+    Number,
+    /// Vectors.
+    Vector,
+}
+
+impl Field {
+    /// A field with the name of its grid.
+    pub const fn of(grid: &'static str, holds: Holds) -> Self {
+        Self { name: grid, grid, holds }
+    }
 }
 
 /// Frames and units of a stage.
@@ -106,26 +144,53 @@ pub fn stage(comment: &str, time: StageTime, volumes: &[VolumeFiles], clips: &[C
         quoted(comment),
         Units::OWN.head()
     );
-    volumes
-        .iter()
-        .filter(|volume| !volume.files.is_empty())
-        .for_each(|volume| write_volume(&mut out, volume));
+    let volumes: Vec<&VolumeFiles> = volumes.iter().filter(|volume| !volume.files.is_empty()).collect();
+    let of_volumes = volumes.iter().filter_map(|volume| volume.look());
+    usd_looks::define(&mut out, of_volumes.chain(clips.iter().flat_map(Clips::looks)).collect());
+    volumes.iter().for_each(|volume| write_volume(&mut out, volume));
     clips.iter().for_each(|clips| write_clips(&mut out, clips));
     out.push_str("}\n");
     out
 }
 
-fn write_volume(out: &mut String, volume: &VolumeFiles) {
-    let _ = writeln!(out, "    def Volume \"{}\"\n    {{", volume.name);
-    for (grid, _) in volume.grids {
-        let _ = writeln!(out, "        rel field:{grid} = </shot/{}/{grid}>", volume.name);
+impl VolumeFiles<'_> {
+    /// What it is made of; nothing that could be seen where none of its fields is a distance or a density.
+    fn look(&self) -> Option<Look> {
+        self.fields.iter().find_map(|field| match field.holds {
+            Holds::Distance => Some(Look::Snow),
+            Holds::Density(_) => Some(Look::Fog),
+            Holds::Number | Holds::Vector => None,
+        })
     }
-    for (grid, is_level_set) in volume.grids {
-        let class = if *is_level_set { "\n            token fieldClass = \"levelSet\"" } else { "" };
+}
+
+fn write_volume(out: &mut String, volume: &VolumeFiles) {
+    let look = volume.look();
+    let schema = look.map_or(String::new(), |_| format!(" (\n        {}\n    )", Look::SCHEMA));
+    let _ = writeln!(out, "    def Volume \"{}\"{schema}\n    {{", volume.name);
+    if volume.is_guide {
+        out.push_str("        uniform token purpose = \"guide\"\n");
+    }
+    if let Some(look) = look {
+        look.bind(out, "        ");
+    }
+    for Field { name, grid, holds } in volume.fields {
+        if let Holds::Density(scale) = holds {
+            let _ = writeln!(out, "        custom float frazil:{name}_scale = {scale}");
+        }
+        let _ = writeln!(out, "        rel field:{name} = </shot/{}/{grid}>", volume.name);
+    }
+    for Field { grid, holds, .. } in volume.fields {
+        let (class, numbers) = match holds {
+            Holds::Distance => ("\n            token fieldClass = \"levelSet\"", "float"),
+            Holds::Density(_) => ("\n            token fieldClass = \"fogVolume\"", "float"),
+            Holds::Number => ("", "float"),
+            Holds::Vector => ("", "float3"),
+        };
         let _ = write!(
             out,
             "\n        def OpenVDBAsset \"{grid}\"\n        {{\n            token fieldName = \"{grid}\"\n            \
-             token fieldDataType = \"float\"{class}\n            asset filePath.timeSamples = {{\n"
+             token fieldDataType = \"{numbers}\"{class}\n            asset filePath.timeSamples = {{\n"
         );
         for (frame, file) in volume.files {
             let _ = writeln!(out, "                {frame}: {},", asset(file));
@@ -153,9 +218,22 @@ pub enum ClipPrims<'a> {
     Points(&'a Points),
 }
 
+impl Clips<'_> {
+    /// What its prims are made of.
+    fn looks(&self) -> Vec<Look> {
+        match &self.prims {
+            ClipPrims::Meshes(meshes) => meshes.iter().map(|mesh| mesh.look).collect(),
+            ClipPrims::Points(_) => vec![Look::Snow],
+        }
+    }
+}
+
 fn write_clips(out: &mut String, clips: &Clips) {
     let kind = clips.kind;
-    let class = if matches!(clips.prims, ClipPrims::Points(_)) { "Points" } else { "Xform" };
+    let (class, schema) = match &clips.prims {
+        ClipPrims::Points(_) => ("Points", format!("        {}\n", Look::SCHEMA)),
+        ClipPrims::Meshes(_) => ("Xform", String::new()),
+    };
     let file = |frame: &i32| asset(&format!("./{kind}/{kind}.{frame:04}.usda"));
     let files: Vec<String> = clips.frames.iter().map(file).collect();
     let pairs = |pair: &dyn Fn(usize, i32) -> String| {
@@ -165,7 +243,7 @@ fn write_clips(out: &mut String, clips: &Clips) {
     };
     let _ = write!(
         out,
-        "    def {class} \"{kind}\" (\n        clips = {{\n            dictionary default = {{\n                \
+        "    def {class} \"{kind}\" (\n{schema}        clips = {{\n            dictionary default = {{\n                \
          asset[] assetPaths = [{}]\n                asset manifestAssetPath = @./{kind}/{kind}.manifest.usda@\n                \
          string primPath = \"/{kind}\"\n                double2[] active = [{}]\n                double2[] times = [{}]\n            \
          }}\n        }}\n    )\n    {{\n",
@@ -178,6 +256,7 @@ fn write_clips(out: &mut String, clips: &Clips) {
         ClipPrims::Points(points) => {
             // Previews show grains when they are asked for renders.
             out.push_str("        uniform token purpose = \"render\"\n");
+            Look::Snow.bind(out, "        ");
             out.push_str(&usd_points::declared(points, "        "));
         }
     }
@@ -185,11 +264,14 @@ fn write_clips(out: &mut String, clips: &Clips) {
 }
 
 fn define_meshes(out: &mut String, meshes: &[MeshPrim]) {
-    for MeshPrim { name, uvs } in meshes {
+    for MeshPrim { name, look, uvs, .. } in meshes {
         let _ = writeln!(
             out,
-            "        def Mesh \"{name}\"\n        {{\n            uniform token subdivisionScheme = \"none\""
+            "        def Mesh \"{name}\" (\n            {}\n        )\n        {{\n            \
+             uniform token subdivisionScheme = \"none\"",
+            Look::SCHEMA
         );
+        look.bind(out, "            ");
         declare_uvs(out, "            ", *uvs);
         out.push_str("        }\n");
     }
@@ -201,8 +283,10 @@ const ATTRIBUTES: [(&str, &str); 5] = [
     ("int[]", "faceVertexCounts"),
     ("int[]", "faceVertexIndices"),
     ("point3f[]", "points"),
-    ("vector3f[]", "velocities"),
+    ("vector3f[]", VELOCITIES),
 ];
+
+const VELOCITIES: &str = "velocities";
 
 /// Texture coordinates: the places, and where there are seams an index for each corner.
 const PLACES: &str = "texCoord2f[] primvars:st";
@@ -228,11 +312,11 @@ pub fn clip_manifest(kind: &str, prims: &ClipPrims) -> String {
             &[]
         }
     };
-    for MeshPrim { name, uvs } in meshes {
+    for MeshPrim { name, uvs, moves, .. } in meshes {
         let _ = writeln!(out, "    over \"{name}\"\n    {{");
-        ATTRIBUTES.iter().for_each(|(class, attribute)| {
+        for (class, attribute) in ATTRIBUTES.iter().filter(|(_, attribute)| *moves || *attribute != VELOCITIES) {
             let _ = writeln!(out, "        {class} {attribute}");
-        });
+        }
         declare_uvs(&mut out, "        ", *uvs);
         out.push_str("    }\n");
     }
@@ -265,7 +349,9 @@ pub fn clip(kind: &str, frame: i32, fps: f64, units: Units, meshes: &[MeshFrame]
             list(mesh.points.iter(), row),
             list(mesh.velocities.iter(), row),
         ];
-        for ((class, attribute), value) in ATTRIBUTES.iter().zip(values) {
+        let moves = mesh.velocities.len() == mesh.points.len();
+        let there = ATTRIBUTES.iter().zip(values);
+        for ((class, attribute), value) in there.filter(|((_, name), _)| moves || *name != VELOCITIES) {
             let _ = writeln!(out, "        {class} {attribute}.timeSamples = {{ {frame}: {value} }}");
         }
         declare_uvs(&mut out, "        ", mesh.uvs);

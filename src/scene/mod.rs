@@ -187,12 +187,43 @@ pub struct Output {
     pub grains_usd: bool,
     /// Whether most of the grains' .vdb files hold only what changed since the frame before.
     pub grains_delta: bool,
+    /// Volumes to render.
+    pub volumes: VolumesOutput,
     /// `objects/objects.%04d.usda`: the objects as they moved, with velocities.
     pub objects_usd: bool,
     /// `objects/objects.%04d.ply`: the same, all in one mesh.
     pub objects_ply: bool,
     /// `shot.usda`.
     pub usd: bool,
+}
+
+/// Which volumes to render, and meshes, are written.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub struct VolumesOutput {
+    /// In `fog/fog.%04d.vdb`: the density of the base.
+    pub fog_base: bool,
+    /// In `fog/fog.%04d.vdb`: the density of grains.
+    pub fog_grains: bool,
+    /// In `fog/fog.%04d.vdb`: the density of mist.
+    pub fog_mist: bool,
+    /// `snow/snow.%04d.vdb`: the base united with resting grains.
+    pub snow: bool,
+    /// `mesh/mesh.%04d.ply`: the surface of the base.
+    pub mesh_ply: bool,
+    /// `mesh/mesh.%04d.usda`: the surface of the base.
+    pub mesh_usd: bool,
+}
+
+impl VolumesOutput {
+    /// Whether there is a fog.
+    pub fn fog(self) -> bool {
+        self.fog_base || self.fog_grains || self.fog_mist
+    }
+
+    /// Whether there is a mesh.
+    pub fn mesh(self) -> bool {
+        self.mesh_ply || self.mesh_usd
+    }
 }
 
 /// How much of the base a frame's file holds.

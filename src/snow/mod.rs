@@ -8,5 +8,7 @@ pub mod grain_friction;
 pub mod grains;
 pub mod mist;
 mod noise;
+#[cfg(feature = "vdb")]
+pub mod volumes;
 
 pub use noise::NoiseParams;

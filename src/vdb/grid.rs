@@ -10,7 +10,7 @@ use super::{alone, call, fail};
 use crate::base::DVec3;
 use crate::base::blocks::{BlockEdit, Origin};
 use crate::context::Context;
-use crate::error::Result;
+use crate::error::{Error, Result};
 
 /// The meaning of a grid's values.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -68,6 +68,9 @@ pub enum MetaValue {
 pub struct FloatGrid {
     pub(super) inner: UniquePtr<ffi::Grid>,
 }
+
+/// Voxels along the edge of a tile, by its level in the tree.
+const EDGES: [i32; 4] = [1, 8, 128, 4096];
 
 /// One value for a cube of voxels, of a leaf's size or larger.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -130,6 +133,22 @@ impl FloatGrid {
     /// As [`FloatGrid::new`].
     pub fn level_set(voxel: f64, half_width: f32) -> Result<Self> {
         Ok(Self { inner: ffi::make_grid(voxel, half_width * voxel as f32, true).map_err(fail)? })
+    }
+
+    /// A grid of cells of `voxel` m that consists of tiles of at least a leaf's size, and is `background` elsewhere.
+    ///
+    /// # Errors
+    /// A tile of one voxel; as [`FloatGrid::new`].
+    pub fn of_tiles(voxel: f64, background: f32, tiles: &[Tile]) -> Result<Self> {
+        let stored = |tile: &Tile| {
+            let [x, y, z] = tile.origin;
+            let level = EDGES.iter().position(|edge| *edge == tile.edge).filter(|level| *level > 0);
+            let level = level.ok_or_else(|| Error::argument(format!("no tile is {} voxels wide", tile.edge)))?;
+            Ok(ffi::Tile { x, y, z, level: level as u32, active: tile.active, value: [tile.value; 3] })
+        };
+        let tiles: Vec<ffi::Tile> = tiles.iter().map(stored).collect::<Result<_>>()?;
+        let head = ffi::grid_head(&Self::new(voxel, background)?.inner).map_err(fail)?;
+        Ok(Self { inner: ffi::assemble(head.as_bytes(), background, &tiles).map_err(fail)? })
     }
 
     /// A copy that shares no memory.
@@ -258,7 +277,6 @@ impl FloatGrid {
     /// # Errors
     /// When memory runs out.
     pub fn tiles(&self) -> Result<Vec<Tile>> {
-        const EDGES: [i32; 4] = [1, 8, 128, 4096];
         let tile = |tile: ffi::Tile| Tile {
             origin: [tile.x, tile.y, tile.z],
             edge: EDGES[(tile.level as usize).min(3)],

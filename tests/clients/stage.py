@@ -6,7 +6,7 @@ python stage.py FOLDER FIRST LAST
 import pathlib
 import sys
 
-from pxr import Usd, UsdGeom, UsdVol
+from pxr import Usd, UsdGeom, UsdShade, UsdVol
 
 folder, first, last = pathlib.Path(sys.argv[1]).resolve(), int(sys.argv[2]), int(sys.argv[3])
 stage = Usd.Stage.Open(str(folder / "shot.usda"))
@@ -18,7 +18,8 @@ assert stage.GetDefaultPrim().GetPath() == "/shot"
 
 volume = UsdVol.Volume(stage.GetPrimAtPath("/shot/base"))
 assert volume and set(volume.GetFieldPaths()) == {"surface", "compression", "touched"}
-meshes = [UsdGeom.Mesh(prim) for prim in stage.Traverse() if prim.IsA(UsdGeom.Mesh)]
+snow = UsdGeom.Mesh(stage.GetPrimAtPath("/shot/mesh/base"))
+meshes = [UsdGeom.Mesh(prim) for prim in stage.Traverse() if prim.IsA(UsdGeom.Mesh) and not (snow and prim == snow.GetPrim())]
 assert meshes, "no mesh"
 checked = textured = 0
 for frame in (first, (first + last) // 2, last):
@@ -73,4 +74,25 @@ if grains:
         assert all(low[axis] <= place[axis] <= high[axis] for place in places for axis in range(3))
         counts.append(len(ids))
     assert counts[-1] > 0 == counts[0], counts
-print(f"frazil: {checked} meshes at 3 frames, {textured} with UVs, {len(volume.GetFieldPaths())} grids, {max(counts, default=0)} grains")
+shown = [prim for prim in stage.Traverse() if prim.IsA(UsdGeom.Gprim) or prim.IsA(UsdVol.Volume)]
+for prim in shown:
+    material, _ = UsdShade.MaterialBindingAPI(prim).ComputeBoundMaterial()
+    assert material, f"{prim.GetPath()} has no material"
+    if material.GetPrim().GetName() != "fog":
+        shader, *_ = material.ComputeSurfaceSource()
+        assert shader and shader.GetShaderId() == "UsdPreviewSurface", material.GetPath()
+volumes = [UsdVol.Volume(prim) for prim in shown if prim.IsA(UsdVol.Volume)]
+for other in volumes:
+    for name, path in other.GetFieldPaths().items():
+        asset = UsdVol.OpenVDBAsset(stage.GetPrimAtPath(path))
+        assert asset and pathlib.Path(asset.GetFilePathAttr().Get(last).resolvedPath).is_file(), path
+    if other.GetPrim().GetName().startswith("fog_"):
+        assert list(other.GetFieldPaths()) == ["density"] and asset.GetFieldClassAttr().Get() == "fogVolume"
+        assert other.GetPrim().GetAttribute("frazil:density_scale").Get() > 0
+if snow:
+    for frame in (first, last):
+        points, indices = snow.GetPointsAttr().Get(frame), snow.GetFaceVertexIndicesAttr().Get(frame)
+        assert len(points) > 100 and max(indices) == len(points) - 1 and not snow.GetVelocitiesAttr().Get(frame)
+print(f"frazil: {len(volumes)} volumes, {len(shown)} prims with materials, "
+      f"{'a' if snow else 'no'} mesh of snow;"
+      f" {checked} meshes at 3 frames, {textured} with UVs, {len(volume.GetFieldPaths())} grids, {max(counts, default=0)} grains")

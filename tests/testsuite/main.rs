@@ -61,6 +61,7 @@ mod scene {
     mod shot_inputs;
     mod shot_runs;
     mod shot_upstream;
+    mod shot_volumes;
 }
 mod snow {
     mod base;
@@ -72,6 +73,7 @@ mod snow {
     mod holes;
     mod layers;
     mod state;
+    mod volumes;
 }
 mod sweep {
     mod band;

@@ -71,6 +71,10 @@ impl Chain {
                 let recorded = own.manifest(frame).map(|manifest| manifest.inputs.clone());
                 return recorded.ok_or_else(|| missing(stage, frame, name, stored.folder()));
             };
+            // A file of changes does not say what it changes: the frames before it count, which no link of this stage knows.
+            if !stage.remembers() {
+                link.add_text(&manifest.inputs);
+            }
             manifest.files.iter().chain(&manifest.state).for_each(|file| {
                 link.add_text(&file.hash);
             });

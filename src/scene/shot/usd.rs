@@ -6,18 +6,23 @@ use super::stage::Stage;
 use super::stored::Stored;
 use crate::base::{Points, Uvs};
 use crate::error::Result;
-use crate::io::usd;
+use crate::io::usd::{self, Field};
+use crate::io::usd_looks::Look;
 
 /// The shot for programs that read USD.
 pub(super) const SHOT: &str = "shot.usda";
 
-/// A kind of a stage's files that holds volumes.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+/// A volume in a kind of a stage's files.
+#[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Volume {
-    /// The kind, and the name of the prim.
+    /// The kind.
     pub kind: &'static str,
-    /// Its grids: name, and whether it is a level set.
-    pub grids: &'static [(&'static str, bool)],
+    /// Name of the prim.
+    pub prim: &'static str,
+    /// Its fields, each a grid of the files.
+    pub fields: &'static [Field],
+    /// Whether it is there to be looked at and not to be rendered.
+    pub is_guide: bool,
 }
 
 /// A kind of a stage's files with a .usda file a frame.
@@ -34,6 +39,8 @@ pub struct Clip<'a> {
 pub enum Prims<'a> {
     /// Moving meshes: names of their prims, and their texture coordinates.
     Meshes(Vec<(String, Option<&'a Uvs>)>),
+    /// A surface that is another mesh at each frame, without velocities: name of its prim.
+    Surface(&'static str),
     /// Points, in a prim of the kind's name; these have their attributes.
     Points(Points),
 }
@@ -59,7 +66,12 @@ pub(super) fn write<'s>(
         .collect();
     let volumes: Vec<usd::VolumeFiles> = volumes
         .iter()
-        .map(|(volume, files)| usd::VolumeFiles { name: volume.kind, grids: volume.grids, files })
+        .map(|(Volume { prim, fields, is_guide, .. }, files)| usd::VolumeFiles {
+            name: prim,
+            fields,
+            is_guide: *is_guide,
+            files,
+        })
         .collect();
     let clips = stages.iter().filter_map(|(stage, stored)| {
         let clip = stage.clip()?;
@@ -73,8 +85,17 @@ pub(super) fn write<'s>(
         .map(|(clip, frames)| {
             let prims = match &clip.prims {
                 Prims::Meshes(meshes) => usd::ClipPrims::Meshes(
-                    meshes.iter().map(|(name, uvs)| usd::MeshPrim { name, uvs: *uvs }).collect(),
+                    meshes
+                        .iter()
+                        .map(|(name, uvs)| usd::MeshPrim { name, look: Look::Object, moves: true, uvs: *uvs })
+                        .collect(),
                 ),
+                Prims::Surface(name) => usd::ClipPrims::Meshes(vec![usd::MeshPrim {
+                    name,
+                    look: Look::Snow,
+                    moves: false,
+                    uvs: None,
+                }]),
                 Prims::Points(points) => usd::ClipPrims::Points(points),
             };
             (clip.manifest, usd::Clips { kind: clip.kind, frames: frames.clone(), prims })

@@ -7,6 +7,7 @@ use super::settings;
 use crate::context::{Context, PhaseTime};
 use crate::error::{Error, Result};
 use crate::io::manifest::Keeps;
+use crate::io::usd::{Field, Holds};
 use crate::scene::shot::{
     FrameFiles, Kind, Reads, Report, Settings, Stage, Stepped, Stepping, Stored, To, Volume,
 };
@@ -113,10 +114,15 @@ impl Stage for Base<'_> {
 
     /// The base of a cache of changes is left out: its files are not whole volumes.
     fn volumes(&self) -> Vec<Volume> {
-        const GRIDS: &[(&str, bool)] = &[("surface", true), ("compression", false), ("touched", false)];
-        let base = Volume { kind: "base", grids: GRIDS };
+        const BASE: &[Field] = &[
+            Field::of("surface", Holds::Distance),
+            Field::of("compression", Holds::Number),
+            Field::of("touched", Holds::Number),
+        ];
+        const REMOVED: &[Field] = &[Field::of("removed", Holds::Distance)];
+        let base = Volume { kind: "base", prim: "base", fields: BASE, is_guide: false };
         let whole = self.scene.output.base_mode == BaseMode::Full;
-        let removed = Volume { kind: "removed", grids: &[("removed", true)] };
+        let removed = Volume { kind: "removed", prim: "removed", fields: REMOVED, is_guide: true };
         whole.then_some(base).into_iter().chain([removed]).collect()
     }
 }

@@ -108,7 +108,13 @@ pub fn check(ctx: &Context, scene: &Scene, inputs: &Inputs, folder: Option<&Path
         Some(folder) => Forecast::of(scene, inputs, &Stored::read(folder, "base")?, scene.shot.frames.last)?,
         None => None,
     };
-    let (memory, disk) = grains.as_ref().map_or((0, 0), |grains| (grains.memory_bytes, grains.disk_bytes));
+    let (memory, disk) = match &grains {
+        Some(grains) => {
+            let volumes = memory::of_volumes(scene, inputs, grains.grains)?;
+            (grains.memory_bytes.max(volumes), grains.disk_bytes)
+        }
+        None => (0, 0),
+    };
     Ok(Report {
         frames: [scene.shot.frames.first, scene.shot.frames.last],
         fps: scene.shot.fps,

@@ -1,7 +1,8 @@
 //! How much space a shot's files will need.
 
-use super::Inputs;
 use super::grain_files::WHOLE_EVERY;
+use super::volume_keys::Needs;
+use super::{Inputs, memory};
 use crate::scene::{BaseMode, Scene};
 
 /// Bytes of a whole base file for each column of cells, and of what a frame changes and removes besides.
@@ -22,6 +23,14 @@ const GRAIN_CHANGES: f64 = 28.0;
 const GRAIN_PLY: f64 = 50.0;
 const GRAIN_USDA: f64 = 125.0;
 const GRAIN_STATE: f64 = 90.0;
+/// Bytes of a grain in a fog and in a united surface.
+const GRAIN_FOG: f64 = 60.0;
+const GRAIN_UNITED: f64 = 150.0;
+/// Share of a whole base file that the density of the base takes.
+const FOG_SHARE: f64 = 0.3;
+/// Bytes for each column of cells in a mesh of the base.
+const MESH_PLY: f64 = 80.0;
+const MESH_USDA: f64 = 220.0;
 /// States of grains that are kept.
 const STATES: f64 = 2.0;
 
@@ -36,6 +45,8 @@ pub(super) fn of_grains(scene: &Scene, there: &[f64]) -> u64 {
         f64::from(output.grains_vdb) * vdb(frame)
             + f64::from(output.grains_ply) * GRAIN_PLY
             + f64::from(output.grains_usd) * GRAIN_USDA
+            + f64::from(output.volumes.fog_grains) * GRAIN_FOG
+            + f64::from(output.volumes.snow) * GRAIN_UNITED
     };
     let files: f64 = there.iter().enumerate().map(|(frame, grains)| grains * each(frame)).sum();
     let most = there.iter().copied().fold(0.0, f64::max);
@@ -62,7 +73,19 @@ pub fn estimate(scene: &Scene, inputs: &Inputs) -> u64 {
         f64::from(output.objects_usd) * usda + f64::from(output.objects_ply) * ply
     });
     let objects = objects.sum::<f64>() * frames;
-    (base + objects + frames * BYTES_PER_CHANGE) as u64
+    (base + objects + frames * (BYTES_PER_CHANGE + of_volumes(scene, inputs))) as u64
+}
+
+/// Bytes of a frame's volumes and meshes of the base.
+fn of_volumes(scene: &Scene, inputs: &Inputs) -> f64 {
+    let (asked, whole) = (scene.output.volumes, whole_base(inputs));
+    let columns = whole / BYTES_PER_COLUMN;
+    let is_fine = Needs::of(asked, &scene.values).grains;
+    let fine = if is_fine { memory::division(scene, inputs) as f64 } else { 1.0 };
+    f64::from(asked.fog_base) * whole * FOG_SHARE
+        + f64::from(asked.snow) * whole * fine * fine
+        + f64::from(asked.mesh_ply) * columns * MESH_PLY
+        + f64::from(asked.mesh_usd) * columns * MESH_USDA
 }
 
 /// Bytes of a whole base file: by its columns, or by the leaves of a layer that is given.

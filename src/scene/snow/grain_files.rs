@@ -297,11 +297,8 @@ fn runs_of_text(text: &str) -> Option<Vec<Run>> {
 /// Reads complete grains from a cache, frame by frame.
 pub struct RebuildGrains {
     stored: Stored,
-    at: Option<(i32, Points)>,
+    whole: Whole,
 }
-
-/// Points of a file, with its metadata.
-type Held = (Points, Vec<(String, MetaValue)>);
 
 impl RebuildGrains {
     /// Opens a cache.
@@ -309,7 +306,7 @@ impl RebuildGrains {
     /// # Errors
     /// As [`Stored::read`].
     pub fn open(folder: &Path) -> Result<Self> {
-        Ok(Self { stored: Stored::read(folder, NAME)?, at: None })
+        Ok(Self { stored: Stored::read(folder, NAME)?, whole: Whole::default() })
     }
 
     /// The stored frames.
@@ -323,14 +320,35 @@ impl RebuildGrains {
     /// # Errors
     /// A frame that does not exist; a file that was changed since it was written; cancel.
     pub fn bytes(&mut self, ctx: &Context, frame: i32, options: &WriteOptions) -> Result<Vec<u8>> {
+        let (points, mut metadata) = self.whole.points(ctx, &self.stored, frame)?;
+        metadata.retain(|(key, _)| key.starts_with("frazil:") && ![SINCE, GONE, OF].contains(&&key[..]));
+        points::to_bytes(ctx, NAME, points, &WriteOptions { metadata, ..options.clone() })
+    }
+}
+
+/// Complete grains, and the frame after which they are so.
+#[derive(Default)]
+pub(super) struct Whole {
+    at: Option<(i32, Points)>,
+}
+
+/// Metadata of a file.
+type Metadata = Vec<(String, MetaValue)>;
+
+impl Whole {
+    /// The grains after a frame, sorted by identity, with the metadata of its file. Frames in ascending order cost one file each.
+    ///
+    /// # Errors
+    /// A frame that does not exist; a file that was changed since it was written; cancel.
+    pub fn points(&mut self, ctx: &Context, stored: &Stored, frame: i32) -> Result<(&Points, Metadata)> {
         let (mut later, mut metadata, mut at) = (Vec::new(), None, frame);
         let mut points = loop {
             ctx.check()?;
             if let Some((_, points)) = self.at.take_if(|(there, _)| *there == at && at < frame) {
                 break points;
             }
-            let (points, of_file) = self.read(at)?;
-            let told = told_of_before(at, &of_file).map_err(|error| self.wrong(at, error))?;
+            let (points, of_file) = read(stored, at)?;
+            let told = told_of_before(at, &of_file).map_err(|error| wrong(stored, at, error))?;
             metadata.get_or_insert(of_file);
             match told {
                 None => break points,
@@ -340,41 +358,33 @@ impl RebuildGrains {
         };
         for (at, changed, gone, of) in later.into_iter().rev() {
             if of.is_some_and(|of| of != print_of(&points)) {
-                return Err(self.wrong(at, Error::argument("holds changes of other grains")));
+                return Err(wrong(stored, at, Error::argument("holds changes of other grains")));
             }
-            points = follow(points, changed, &gone).map_err(|error| self.wrong(at, error))?;
+            points = follow(points, changed, &gone).map_err(|error| wrong(stored, at, error))?;
         }
-        let mut metadata = metadata.unwrap_or_default();
-        metadata.retain(|(key, _)| key.starts_with("frazil:") && ![SINCE, GONE, OF].contains(&&key[..]));
-        let bytes = points::to_bytes(ctx, NAME, &points, &WriteOptions { metadata, ..options.clone() });
-        self.at = Some((frame, points));
-        bytes
+        Ok((&self.at.insert((frame, points)).1, metadata.unwrap_or_default()))
     }
+}
 
-    fn wrong(&self, frame: i32, error: Error) -> Error {
-        match error {
-            Error::Argument(what) => {
-                Error::file(self.stored.folder(), format!("frame {frame} of grains {what}"))
-            }
-            other => other,
-        }
+fn wrong(stored: &Stored, frame: i32, error: Error) -> Error {
+    match error {
+        Error::Argument(what) => Error::file(stored.folder(), format!("frame {frame} of grains {what}")),
+        other => other,
     }
+}
 
-    fn read(&self, frame: i32) -> Result<Held> {
-        let path = self.stored.file(frame, NAME)?;
-        if extension(&path) != "vdb" {
-            return Err(Error::file(
-                self.stored.folder(),
-                format!("frame {frame} has no .vdb file in {NAME}/"),
-            ));
-        }
-        let points = ordered(points::read_own(&path, None)?);
-        let ids = ids(&points);
-        if ids.len() != points.count() || !ids.is_sorted_by(|one, next| one < next) {
-            return Err(Error::file(path, "has grains that share an identity or have none (id)"));
-        }
-        Ok((points, file::metadata(&path)?))
+/// The points of a frame's file, with its metadata.
+fn read(stored: &Stored, frame: i32) -> Result<(Points, Metadata)> {
+    let path = stored.file(frame, NAME)?;
+    if extension(&path) != "vdb" {
+        return Err(Error::file(stored.folder(), format!("frame {frame} has no .vdb file in {NAME}/")));
     }
+    let points = ordered(points::read_own(&path, None)?);
+    let ids = ids(&points);
+    if ids.len() != points.count() || !ids.is_sorted_by(|one, next| one < next) {
+        return Err(Error::file(path, "has grains that share an identity or have none (id)"));
+    }
+    Ok((points, file::metadata(&path)?))
 }
 
 #[cfg(test)]

@@ -1,5 +1,7 @@
 //! How much memory a scene will need, before any of it is taken.
 
+use super::grains::params;
+use super::volume_keys::Needs;
 use super::{Inputs, has_grains};
 use crate::error::{Error, Result};
 use crate::scene::{BaseMode, Layer, Scene};
@@ -13,6 +15,12 @@ const BYTES_PER_TRIANGLE: f64 = 2000.0;
 /// Bytes for each grain besides those of a step: a copy of the grains that is written while the next frame is made, their
 /// points and files.
 const BYTES_PER_WRITTEN: u64 = 400;
+/// Bytes of each column of cells in a mesh of the base, and in its files.
+const BYTES_OF_MESH: f64 = 500.0;
+/// Bytes of each grain as a point that was read, and in each kind of volume with its file.
+const BYTES_OF_POINT: u64 = 150;
+const BYTES_OF_FOG: u64 = 700;
+const BYTES_OF_UNITED: u64 = 700;
 /// Bytes that every run takes.
 const FIXED: f64 = 64e6;
 
@@ -27,7 +35,41 @@ pub fn estimate(scene: &Scene, inputs: &Inputs) -> Result<u64> {
     let copies = if output.base_restarts() && output.base_mode == BaseMode::Delta { 1.0 } else { 2.0 };
     let base = layer(inputs)? * copies + around(inputs);
     let drift = inputs.drift.as_ref().map_or(0, |drift| drift.places.len() as u64);
-    Ok(if has_grains(&scene.values) { of_grains(inputs, drift)?.max(base as u64) } else { base as u64 })
+    let grains = if has_grains(&scene.values) { of_grains(inputs, drift)? } else { 0 };
+    Ok(grains.max(base as u64).max(of_volumes(scene, inputs, drift)?))
+}
+
+/// Estimates the memory (bytes) of the stage volumes, with so many grains; 0 without one.
+///
+/// # Errors
+/// As [`estimate`].
+pub(super) fn of_volumes(scene: &Scene, inputs: &Inputs, grains: u64) -> Result<u64> {
+    let asked = scene.output.volumes;
+    let needs = Needs::of(asked, &scene.values);
+    let layer = layer(inputs)?;
+    let columns = layer / BYTES_PER_COLUMN;
+    let fine = if needs.grains { division(scene, inputs) as f64 } else { 1.0 };
+    let parts = [
+        (needs.base, layer),
+        (asked.fog_base, layer),
+        (asked.snow, layer * fine * fine),
+        (asked.mesh(), columns * BYTES_OF_MESH),
+    ];
+    let base: f64 = parts.into_iter().filter(|(is_there, _)| *is_there).map(|(_, bytes)| bytes).sum();
+    let each = [
+        (needs.grains, BYTES_OF_POINT),
+        (asked.fog_grains, BYTES_OF_FOG),
+        (needs.grains && asked.snow, BYTES_OF_UNITED),
+    ];
+    let each: u64 = each.into_iter().filter(|(is_there, _)| *is_there).map(|(_, bytes)| bytes).sum();
+    let there = needs.base || needs.grains || needs.mist;
+    Ok(if there { (base + FIXED) as u64 + grains * each } else { 0 })
+}
+
+/// Voxels of the united surface along a cell's edge.
+pub(super) fn division(scene: &Scene, inputs: &Inputs) -> usize {
+    let cell = inputs.snow.cell;
+    snow::volumes::united::division(cell, params(scene, cell).radius)
 }
 
 /// Estimates the memory (bytes) of the stage grains, with so many of them: it has the base before and after a frame, and

@@ -1,5 +1,5 @@
 //! Snow in scenes: its keys, and with OpenVDB what its files hold ([`Inputs`]), what a check says of it ([`check`]), what memory
-//! it takes, and its stages: the base layer (`base.rs`) and grains (`grains.rs`).
+//! it takes, and its stages: the base layer (`base.rs`), grains (`grains.rs`) and volumes to render (`volumes.rs`).
 
 #[cfg(feature = "vdb")]
 mod base;
@@ -31,6 +31,9 @@ mod rebuild;
 mod relief;
 #[cfg(feature = "vdb")]
 mod settings;
+mod volume_keys;
+#[cfg(feature = "vdb")]
+mod volumes;
 #[cfg(feature = "vdb")]
 mod walks;
 #[cfg(feature = "vdb")]
@@ -38,6 +41,7 @@ mod warnings;
 
 pub(super) use grain_keys::{GRAIN_KEYS, check_grains, has_grains};
 pub(super) use keys::KEYS;
+pub(super) use volume_keys::check_volumes;
 #[cfg(feature = "vdb")]
 pub use {
     forecast::Forecast,

@@ -4,6 +4,7 @@ use super::Inputs;
 use super::base::Base;
 use super::grains::Grains;
 use super::has_grains;
+use super::volumes::Volumes;
 use crate::scene::Scene;
 use crate::scene::objects::Objects;
 use crate::scene::shot::{AnyStage, Plan};
@@ -13,6 +14,10 @@ pub fn plan<'a>(scene: &'a Scene, inputs: &'a Inputs) -> Plan<'a> {
     let mut stages: Vec<Box<dyn AnyStage + 'a>> = vec![Box::new(Base::new(scene, inputs))];
     if has_grains(&scene.values) {
         stages.push(Box::new(Grains::new(scene, inputs)));
+    }
+    let volumes = scene.output.volumes;
+    if volumes.fog() || volumes.snow || volumes.mesh() {
+        stages.push(Box::new(Volumes::new(scene, inputs)));
     }
     if scene.output.objects_usd || scene.output.objects_ply {
         stages.push(Box::new(Objects::new(scene, &inputs.bodies, &inputs.seen)));

@@ -30,10 +30,11 @@ const SHOT: &[Key] = &[
         ("base", First),
         ("grains", First),
         ("objects", First),
+        ("volumes", First),
     ]),
     Key::new("shot", "fps", Kind::Number(0.001, 100_000.0, "frames per second"), "frames per second")
         .or("24.0")
-        .concerns(&[("base", Step), ("grains", Step), ("objects", Step)]),
+        .concerns(&[("base", Step), ("grains", Step), ("objects", Step), ("volumes", Step)]),
 ];
 
 const OBJECTS: &[Key] = &[
@@ -79,6 +80,7 @@ const OBJECTS: &[Key] = &[
 ];
 
 const BASE_OUTPUT: Scopes = &[("base", Output)];
+const VOLUMES_OUTPUT: Scopes = &[("volumes", Output)];
 
 const OUTPUT: &[Key] = &[
     Key::new(
@@ -124,6 +126,31 @@ const OUTPUT: &[Key] = &[
     )
     .or("\"full\"")
     .concerns(&[("grains", Output)]),
+    Key::new(
+        "output",
+        "fog",
+        Kind::Choices(&["base", "grains", "mist"]),
+        "fog/fog.%04d.vdb: densities to render, of each of these a grid (see docs/snow.md)",
+    )
+    .or("[]")
+    .such_as("[\"base\", \"grains\"]")
+    .concerns(VOLUMES_OUTPUT),
+    Key::new(
+        "output",
+        "snow",
+        Kind::Flag,
+        "snow/snow.%04d.vdb: one level set of the base and the grains that rest, on voxels fine enough for these (large)",
+    )
+    .or("false")
+    .concerns(VOLUMES_OUTPUT),
+    Key::new(
+        "output",
+        "mesh",
+        Kind::Choices(&["ply", "usd"]),
+        "\"ply\", \"usd\": mesh/, the surface of the base in triangles (large)",
+    )
+    .or("[]")
+    .concerns(VOLUMES_OUTPUT),
     Key::new(
         "output",
         "objects",

@@ -4,7 +4,7 @@ use super::table::Table;
 use super::values::{Value, Values};
 use crate::error::Result;
 use crate::motion::{Space, Up};
-use crate::scene::{BaseMode, Frames, Object, Output, Role, Shot, snow};
+use crate::scene::{BaseMode, Frames, Object, Output, Role, Shot, VolumesOutput, snow};
 
 impl Shot {
     pub(super) fn of(values: &Values) -> Self {
@@ -63,6 +63,14 @@ impl Output {
             grains_ply: holds("output.grains", "ply"),
             grains_usd: holds("output.grains", "usd"),
             grains_delta: values.get("output.grains_mode").and_then(Value::text) == Some("delta"),
+            volumes: VolumesOutput {
+                fog_base: holds("output.fog", "base"),
+                fog_grains: holds("output.fog", "grains"),
+                fog_mist: holds("output.fog", "mist"),
+                snow: flag("output.snow"),
+                mesh_ply: holds("output.mesh", "ply"),
+                mesh_usd: holds("output.mesh", "usd"),
+            },
             objects_usd: holds("output.objects", "usd"),
             objects_ply: holds("output.objects", "ply"),
             usd: flag("output.usd"),
@@ -89,6 +97,6 @@ impl Output {
         if output.half && output.base && output.base_mode == BaseMode::Delta {
             return Err(table.error("half", "goes with `base_mode = \"full\"` only: changes must be exact"));
         }
-        Ok(())
+        snow::check_volumes(table, values, &output)
     }
 }

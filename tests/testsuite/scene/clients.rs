@@ -7,7 +7,11 @@ use crate::common::clients;
 use crate::common::shapes;
 use tempfile::TempDir;
 
-/// A shot of a box that crosses the snow, frames 3 to 8; on request with grains.
+/// Grains, and all that is made of them and the snow.
+const VOLUMES: &str = "[grains]\ncompression = 0.5\n[output]\ngrains = [\"vdb\", \"usd\"]\nfog = [\"base\", \"grains\"]\n\
+                       snow = true\nmesh = [\"usd\"]";
+
+/// A shot of a box that crosses the snow, frames 3 to 8; on request with grains and volumes.
 fn shot(grains: bool) -> TempDir {
     let folder = tempfile::tempdir().unwrap();
     let mesh = shapes::cuboid([0.4; 3]);
@@ -19,7 +23,7 @@ fn shot(grains: bool) -> TempDir {
     let scene = "[shot]\nframes = \"3-8\"\n[snow]\nground = 0.0\narea = [-1, -1, 1, 1]\ndepth = 0.3\ncell = 0.02\n\
                  [output]\nobjects = [\"usd\"]\n[[object]]\nfile = \"box.obj\"\n\
                  keys = [{ frame = 3, at = [0, 0.4, -0.5] }, { frame = 8, at = [0, 0.25, 0.6], turn_deg = [0, 20, 0] }]\n";
-    let with_grains = ("[output]", "[grains]\ncompression = 0.5\n[output]\ngrains = [\"usd\"]");
+    let with_grains = ("[output]", VOLUMES);
     let scene = if grains { scene.replace(with_grains.0, with_grains.1) } else { scene.to_string() };
     fs::write(folder.path().join("shot.toml"), scene).unwrap();
     let run = Command::new(env!("CARGO_BIN_EXE_frazil"))
@@ -46,9 +50,10 @@ fn usd_core_composes_the_stage_with_velocities_and_files() {
 }
 
 #[test]
-fn usd_core_composes_the_grains() {
+fn usd_core_composes_grains_and_volumes_with_materials() {
     let Some(python) = clients::usd_python() else { return eprintln!("skipped: no usd-core") };
     let folder = shot(true);
     let said = clients::usd_composes(&python, &folder.path().join("out"), 3, 8).unwrap();
     assert!(said.contains(" grains") && !said.contains(" 0 grains"), "{said}");
+    assert!(said.contains("5 volumes") && said.contains("a mesh of snow"), "{said}");
 }

@@ -1,0 +1,343 @@
+//! The stage `volumes`: what renderers want of base, grains and mist. A frame depends on no frame before it.
+
+use serde_json::{Map, Value, json};
+
+use super::grain_files::Whole;
+use super::grains::params;
+use super::volume_keys::Needs;
+use super::{Inputs, base, memory};
+use crate::base::points::Values;
+use crate::base::{DVec3, Points, TriMesh};
+use crate::context::Context;
+use crate::error::{Error, Result};
+use crate::io::manifest::Keeps;
+use crate::io::usd::{self, Field, Holds};
+use crate::io::mesh;
+use crate::scene::shot::{
+    Clip, FrameFiles, Kind, Prims, Report, Settings, Stage, Stepped, Stepping, Stored, To, Volume,
+};
+use crate::scene::text::keys::settings_of;
+use crate::scene::{Scene, VolumesOutput};
+use crate::snow::base_layer::Grids;
+use crate::snow::volumes::{fog, united};
+use crate::vdb::file::{self, WriteOptions, to_bytes};
+use crate::vdb::{FloatGrid, GridClass, MetaValue, level_set};
+
+/// The stage for a scene.
+pub struct Volumes<'a> {
+    scene: &'a Scene,
+    inputs: &'a Inputs,
+    asked: VolumesOutput,
+    needs: Needs,
+}
+
+/// What it keeps from frame to frame, only to read less.
+#[derive(Default)]
+pub struct State {
+    /// The base after a frame.
+    layer: Option<(i32, Grids)>,
+    grains: Whole,
+}
+
+/// What a frame is made from.
+struct Source<'s> {
+    frame: i32,
+    base: Option<&'s FloatGrid>,
+    grains: Option<&'s Points>,
+    mist: Option<FloatGrid>,
+}
+
+/// Files of a frame: kinds, extensions and contents. Grids wait for the writer packed: those of several frames would take too
+/// much memory.
+type Files = Vec<(&'static str, &'static str, Vec<u8>)>;
+
+/// Manifest shared by the clips in `mesh/`.
+const MANIFEST: &str = "mesh/mesh.manifest.usda";
+/// Name of the mesh's prim.
+const MESH: &str = "base";
+
+impl<'a> Volumes<'a> {
+    /// The stage for a scene.
+    pub fn new(scene: &'a Scene, inputs: &'a Inputs) -> Self {
+        let asked = scene.output.volumes;
+        Self { scene, inputs, asked, needs: Needs::of(asked, &scene.values) }
+    }
+
+    /// The frames of a stage that is read.
+    fn stored<'s>(&self, upstream: &[&'s Stored], name: &str) -> Result<&'s Stored> {
+        let index = self.upstream().iter().position(|upstream| *upstream == name);
+        let stored = index.and_then(|index| upstream.get(index));
+        stored.copied().ok_or_else(|| Error::Internal(format!("volumes do not read {name}")))
+    }
+
+    /// Reads what a frame is made from.
+    fn read<'s>(&self, ctx: &Context, state: &'s mut State, to: &To<'_>) -> Result<Source<'s>> {
+        let State { layer, grains } = state;
+        let mut source = Source { frame: to.frame, base: None, grains: None, mist: None };
+        if self.needs.base {
+            let stored = self.stored(to.upstream, "base")?;
+            let grids = match layer.take() {
+                Some((before, mut grids)) if before == to.frame - 1 && stored.keeps_changes(to.frame) => {
+                    base::follow(ctx, stored, &mut grids, to.frame)?;
+                    grids
+                }
+                _ => base::grids(ctx, stored, to.frame)?,
+            };
+            source.base = Some(&layer.insert((to.frame, grids)).1.surface);
+        }
+        if self.needs.grains {
+            source.grains = Some(grains.points(ctx, self.stored(to.upstream, "grains")?, to.frame)?.0);
+        }
+        if self.needs.mist {
+            let path = self.stored(to.upstream, "mist")?.file(to.frame, "mist")?;
+            source.mist = Some(file::read_named(&path, Some("density"))?);
+        }
+        Ok(source)
+    }
+
+    /// Makes the grids of the fog.
+    fn fog(&self, ctx: &Context, source: &mut Source<'_>) -> Result<Vec<FloatGrid>> {
+        let names = fog_names(self.asked);
+        let mut grids = Vec::new();
+        let mut add = |mut grid: FloatGrid, name: Option<&str>| {
+            grid.set_name(name.unwrap_or_default())?;
+            grids.push(grid);
+            Ok::<(), Error>(())
+        };
+        if let Some(surface) = source.base.filter(|_| self.asked.fog_base) {
+            add(fog::base(ctx, surface)?, names[0])?;
+        }
+        if let Some(points) = source.grains.filter(|_| self.asked.fog_grains) {
+            let radius = self.radius();
+            add(fog::grains(ctx, &places(points, |_| true), radius, fog::VOXEL * radius)?, names[1])?;
+        }
+        if let Some(mut mist) = source.mist.take() {
+            mist.set_class(GridClass::Fog)?;
+            mist.set_metadata(fog::SCALE_KEY, MetaValue::Float(1.0))?;
+            add(mist, names[2])?;
+        }
+        Ok(grids)
+    }
+
+    /// Unites the base with the grains that rest.
+    fn snow(&self, ctx: &Context, surface: &FloatGrid, grains: Option<&Points>) -> Result<FloatGrid> {
+        let Some(points) = grains else { return surface.deep_copy() };
+        let resting = match points.attribute("active") {
+            Some(Values::Bool(active)) => places(points, |point| !active.get(point)),
+            // A file of no points has no attributes.
+            _ => Vec::new(),
+        };
+        united::unite(ctx, surface, &resting, self.radius())
+    }
+
+    /// Radius of a grain (m).
+    fn radius(&self) -> f64 {
+        params(self.scene, self.inputs.snow.cell).radius
+    }
+
+    /// Makes a frame's files and what is reported of them.
+    fn make(&self, ctx: &Context, source: &mut Source<'_>, made_from: &str) -> Result<(Files, Map<String, Value>)> {
+        let (mut files, mut results) = (Files::new(), Map::new());
+        let options = WriteOptions {
+            metadata: base::metadata(self.scene, source.frame, made_from),
+            ..WriteOptions::default()
+        };
+        if self.asked.fog() {
+            let grids = ctx.phase("fog", || self.fog(ctx, source))?;
+            let voxels: u64 = grids.iter().map(FloatGrid::active_voxels).sum();
+            results.insert("fog_voxels".into(), json!(voxels));
+            // Renderers take no more than 16 bits of a density.
+            let options = WriteOptions { half: true, ..options.clone() };
+            let grids: Vec<&FloatGrid> = grids.iter().collect();
+            files.push(("fog", "vdb", ctx.phase("pack", || to_bytes(&grids, &options))?));
+        }
+        let Some(surface) = source.base else { return Ok((files, results)) };
+        if self.asked.snow {
+            let grid = ctx.phase("snow", || self.snow(ctx, surface, source.grains))?;
+            results.insert("snow_voxels".into(), json!(grid.active_voxels()));
+            files.push(("snow", "vdb", ctx.phase("pack", || to_bytes(&[&grid], &options))?));
+        }
+        if self.asked.mesh() {
+            let mesh = ctx.phase("mesh", || level_set::to_mesh(ctx, surface, 0.0, 0.0))?;
+            results.insert("mesh_triangles".into(), json!(mesh.triangles.len()));
+            files.extend(ctx.phase("pack", || Ok(self.mesh_files(&mesh, source.frame)))?);
+        }
+        Ok((files, results))
+    }
+
+    /// The files of the base's surface.
+    fn mesh_files(&self, surface: &TriMesh, frame: i32) -> Files {
+        let mut files = Files::new();
+        if self.asked.mesh_ply {
+            files.push(("mesh", "ply", mesh::ply_bytes(surface, &[], None)));
+        }
+        if self.asked.mesh_usd {
+            let mesh = usd::MeshFrame {
+                name: MESH,
+                points: &surface.positions,
+                velocities: &[],
+                triangles: &surface.triangles,
+                uvs: None,
+            };
+            let text = usd::clip("mesh", frame, self.scene.shot.fps, usd::Units::OWN, &[mesh]);
+            files.push(("mesh", "usda", text.into_bytes()));
+        }
+        files
+    }
+}
+
+/// Places (m) of some points.
+fn places(points: &Points, is_wanted: impl Fn(usize) -> bool) -> Vec<DVec3> {
+    (0..points.count()).filter(|point| is_wanted(*point)).map(|point| points.position(point)).collect()
+}
+
+/// Names of the fog's grids of base, grains and mist. One that is alone has the name that smoke shaders look for.
+fn fog_names(asked: VolumesOutput) -> [Option<&'static str>; 3] {
+    let parts = [asked.fog_base, asked.fog_grains, asked.fog_mist];
+    let is_alone = parts.iter().filter(|is_asked| **is_asked).count() == 1;
+    [0, 1, 2].map(|part| {
+        let name = if is_alone { "density" } else { ["base", "grains", "mist"][part] };
+        parts[part].then_some(name)
+    })
+}
+
+impl Stage for Volumes<'_> {
+    fn name(&self) -> &'static str {
+        "volumes"
+    }
+
+    fn kinds(&self) -> &'static [Kind] {
+        &[
+            Kind { name: "fog", extensions: &["vdb"] },
+            Kind { name: "snow", extensions: &["vdb"] },
+            Kind { name: "mesh", extensions: &["ply", "usda"] },
+        ]
+    }
+
+    fn writes(&self, kind: &str) -> bool {
+        match kind {
+            "fog" => self.asked.fog(),
+            "snow" => self.asked.snow,
+            _ => self.asked.mesh(),
+        }
+    }
+
+    fn settings(&self) -> Result<Settings> {
+        settings_of(self.scene, self.name(), &self.inputs.seen, &[])
+    }
+
+    fn of_first_state(&self, _settings: &Settings) -> Settings {
+        Settings::new()
+    }
+
+    fn upstream(&self) -> &'static [&'static str] {
+        match (self.needs.base, self.needs.grains, self.needs.mist) {
+            (true, true, true) => &["base", "grains", "mist"],
+            (true, true, false) => &["base", "grains"],
+            (true, false, true) => &["base", "mist"],
+            (false, true, true) => &["grains", "mist"],
+            (true, false, false) => &["base"],
+            (false, true, false) => &["grains"],
+            (false, false, true) => &["mist"],
+            (false, false, false) => &[],
+        }
+    }
+
+    fn reads_state_of(&self, _upstream: &str) -> bool {
+        false
+    }
+
+    fn remembers(&self) -> bool {
+        false
+    }
+
+    fn keeps(&self, _frame: i32) -> Keeps {
+        Keeps::Whole
+    }
+
+    fn loose_files(&self) -> &'static [&'static str] {
+        if self.asked.mesh_usd { &[MANIFEST] } else { &[] }
+    }
+
+    fn volumes(&self) -> Vec<Volume> {
+        const SCALED: Holds = Holds::Density(fog::DENSITY_SCALE);
+        const MIST: Holds = Holds::Density(1.0);
+        /// The density of a part, from the grid of its name or from the only one.
+        const fn density(grid: &'static str, holds: Holds) -> Field {
+            Field { name: "density", grid, holds }
+        }
+        const ALONE: [&[Field]; 3] =
+            [&[density("density", SCALED)], &[density("density", SCALED)], &[density("density", MIST)]];
+        const PARTS: [&[Field]; 3] =
+            [&[density("base", SCALED)], &[density("grains", SCALED)], &[density("mist", MIST)]];
+        const PRIMS: [&str; 3] = ["fog_base", "fog_grains", "fog_mist"];
+        let names = fog_names(self.asked);
+        let of_part = |part: usize| {
+            let fields = if names[part]? == "density" { ALONE[part] } else { PARTS[part] };
+            Some(Volume { kind: "fog", prim: PRIMS[part], fields, is_guide: false })
+        };
+        const SNOW: &[Field] = &[Field::of("surface", Holds::Distance)];
+        let snow = Volume { kind: "snow", prim: "snow", fields: SNOW, is_guide: false };
+        (0..3).filter_map(of_part).chain(self.asked.snow.then_some(snow)).collect()
+    }
+
+    fn clip(&self) -> Option<Clip<'_>> {
+        self.asked.mesh_usd.then(|| Clip { kind: "mesh", manifest: MANIFEST, prims: Prims::Surface(MESH) })
+    }
+}
+
+impl Stepping for Volumes<'_> {
+    type State = State;
+    type Step = Files;
+    type Writer = ();
+
+    fn foresee(&self, ctx: &Context, upstream: &[&Stored], last: i32) -> Result<()> {
+        let grains = match self.needs.grains {
+            true => most_grains(self.stored(upstream, "grains")?, last)?,
+            false => 0,
+        };
+        let needed = memory::of_volumes(self.scene, self.inputs, grains)?;
+        let what = format!("{}: stage volumes with {grains} grains", self.scene.path.display());
+        ctx.allow(&what, needed)
+    }
+
+    fn load(&self, _ctx: &Context, _done: &Stored, _after: Option<i32>) -> Result<State> {
+        Ok(State::default())
+    }
+
+    fn step(&self, ctx: &Context, state: &mut State, to: &To<'_>) -> Result<Stepped<Files>> {
+        let Some(made_from) = to.made_from else {
+            return Ok(Stepped { step: Files::new(), report: Report::default() });
+        };
+        let asked = [self.asked.fog(), self.asked.snow, self.asked.mesh()];
+        let phases = 1 + 2 * asked.iter().filter(|is_asked| **is_asked).count();
+        let work = || {
+            let mut source = ctx.phase("read", || self.read(ctx, state, to))?;
+            self.make(ctx, &mut source, made_from)
+        };
+        let ((step, results), phases) = ctx.step(phases, work).map_err(|error| match error {
+            Error::Argument(what) => Error::file(&self.scene.path, format!("frame {}: {what}", to.frame)),
+            other => other,
+        })?;
+        Ok(Stepped { step, report: Report { results, phases } })
+    }
+
+    fn writer(&self, _ctx: &Context, _state: &State) -> Result<()> {
+        Ok(())
+    }
+
+    fn write(&self, _writer: &mut (), step: Files, files: Option<&mut FrameFiles>) -> Result<()> {
+        let Some(files) = files else { return Ok(()) };
+        step.into_iter().try_for_each(|(kind, extension, bytes)| files.save(kind, extension, &bytes))
+    }
+}
+
+/// The greatest count of grains after a frame up to `last`, by the reports that are there.
+fn most_grains(grains: &Stored, last: i32) -> Result<u64> {
+    let mut most = 0;
+    for frame in grains.frames().filter(|frame| *frame <= last) {
+        let count = grains.report(frame)?.and_then(|report| report.get("grains")?.as_u64());
+        most = most.max(count.unwrap_or(0));
+    }
+    Ok(most)
+}

@@ -1,0 +1,43 @@
+//! Snow as renderers want it (thesis section 3.5): densities of the base layer and of grains ([`fog`]), and one surface around
+//! the base and the grains that rest on it ([`united`]).
+//!
+//! All grids are sparse and world-fixed, made block by block in parallel, the same from any number of threads.
+//!
+//! | word | meaning |
+//! |---|---|
+//! | fog | a density: 1 where there is snow, 0 where there is none |
+//! | falloff | the shell around a sphere in which its density falls from 1 to 0 |
+//! | cube | the blocks that are made together: the unit of work |
+
+pub mod fog;
+mod spheres;
+pub mod united;
+
+use crate::base::blocks::BlockEdit;
+use crate::context::Context;
+use crate::error::Result;
+use crate::vdb::FloatGrid;
+use rayon::prelude::*;
+
+/// Blocks in memory at once, besides the grid that they are put into: 64 MB.
+const AT_ONCE: usize = 1 << 15;
+
+/// Makes the blocks of some cubes, `edge` blocks wide, in parallel and puts them into a grid.
+fn fill<T: Sync>(
+    ctx: &Context,
+    grid: &mut FloatGrid,
+    edge: usize,
+    cubes: &[T],
+    blocks: impl Fn(&T) -> Vec<BlockEdit> + Sync,
+) -> Result<()> {
+    let some = (AT_ONCE / edge.pow(3)).max(1);
+    ctx.expect(cubes.len().div_ceil(some));
+    for some in cubes.chunks(some) {
+        ctx.check()?;
+        let made: Vec<Vec<BlockEdit>> = ctx.pool().install(|| some.par_iter().map(&blocks).collect());
+        let made: Vec<BlockEdit> = made.into_iter().flatten().collect();
+        grid.replace_blocks(ctx, &made)?;
+        ctx.advance();
+    }
+    Ok(())
+}
