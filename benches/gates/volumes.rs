@@ -36,7 +36,11 @@ fn density(h: &mut Harness) {
         let (ours, want) = (full(&grid), union(centres, radius));
         let alone = 4.0 / 3.0 * std::f64::consts::PI * radius.powi(3) * centres.len() as f64;
         let off = 100.0 * (ours / want - 1.0);
-        println!("# {what}: {} spheres, {:.1} % of their volume in the union, full density {off:+.3} % of it", centres.len(), 100.0 * want / alone);
+        println!(
+            "# {what}: {} spheres, {:.1} % of their volume in the union, full density {off:+.3} % of it",
+            centres.len(),
+            100.0 * want / alone
+        );
         off.abs()
     };
     let heap = off(&heap(4000, 0.0025), 0.0025, "a heap");
@@ -54,7 +58,8 @@ fn heap(count: usize, radius: f64) -> Vec<DVec3> {
 /// Volume (m3) of the voxels with a density of 1.
 fn full(grid: &FloatGrid) -> f64 {
     let leaves = grid.leaves().expect("leaves");
-    let of_leaves = leaves.iter().flat_map(|leaf| leaf.values).filter(|density| **density == 1.0).count() as f64;
+    let of_leaves =
+        leaves.iter().flat_map(|leaf| leaf.values).filter(|density| **density == 1.0).count() as f64;
     let tiles = grid.tiles().expect("tiles").into_iter().filter(|tile| tile.value == 1.0);
     (of_leaves + tiles.map(|tile| f64::from(tile.edge).powi(3)).sum::<f64>()) * grid.voxel_size().powi(3)
 }
@@ -76,7 +81,8 @@ fn union(centres: &[DVec3], radius: f64) -> f64 {
     let inside = |cell: &[i64; 3], centres: &[DVec3]| {
         let low = DVec3::from(cell.map(|x| x as f64 * 2.0 * radius));
         let points = (0..16usize.pow(3)).map(|n| {
-            low + DVec3::new((n >> 8) as f64 + 0.37, (n >> 4 & 15) as f64 + 0.61, (n & 15) as f64 + 0.17) * step
+            low + DVec3::new((n >> 8) as f64 + 0.37, (n >> 4 & 15) as f64 + 0.61, (n & 15) as f64 + 0.17)
+                * step
         });
         points.filter(|point| centres.iter().any(|c| (c - point).norm_squared() <= radius * radius)).count()
     };
@@ -119,8 +125,10 @@ fn gaps(ctx: &Context, base: &FloatGrid, snow: &FloatGrid, centres: &[DVec3], ra
     for (centre, distance) in centres.iter().zip(distances).filter(|(_, d)| f64::from(*d) < 1.2 * radius) {
         touching += 1;
         let axes = [DVec3::x(), DVec3::y(), DVec3::z()].map(|axis| axis * step);
-        let sides = sampled(base, &axes.iter().flat_map(|axis| [centre + axis, centre - axis]).collect::<Vec<_>>());
-        let normal = DVec3::from_iterator(sides.chunks(2).map(|pair| f64::from(pair[0] - pair[1]))).normalize();
+        let sides =
+            sampled(base, &axes.iter().flat_map(|axis| [centre + axis, centre - axis]).collect::<Vec<_>>());
+        let normal =
+            DVec3::from_iterator(sides.chunks(2).map(|pair| f64::from(pair[0] - pair[1]))).normalize();
         let part = 0.25 * snow.voxel_size();
         let steps = (f64::from(distance).max(0.0) / part).ceil() as usize;
         let way: Vec<DVec3> = (0..=steps).map(|step| centre - normal * (step as f64 * part)).collect();
@@ -138,7 +146,9 @@ fn balls(ctx: &Context, base: &FloatGrid, snow: &FloatGrid) -> (usize, usize) {
     assert!(half < snow.background(), "the band is too narrow for balls");
     let mut places = Vec::new();
     for leaf in snow.leaves().expect("leaves") {
-        for index in (0..512).filter(|index| leaf.values[*index] >= half && leaf.values[*index] < snow.background()) {
+        for index in
+            (0..512).filter(|index| leaf.values[*index] >= half && leaf.values[*index] < snow.background())
+        {
             let at = [index >> 6, index >> 3 & 7, index & 7];
             places.push([0, 1, 2].map(|axis| leaf.origin[axis] + at[axis] as i32));
         }

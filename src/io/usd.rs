@@ -314,7 +314,9 @@ pub fn clip_manifest(kind: &str, prims: &ClipPrims) -> String {
     };
     for MeshPrim { name, uvs, moves, .. } in meshes {
         let _ = writeln!(out, "    over \"{name}\"\n    {{");
-        for (class, attribute) in ATTRIBUTES.iter().filter(|(_, attribute)| *moves || *attribute != VELOCITIES) {
+        for (class, attribute) in
+            ATTRIBUTES.iter().filter(|(_, attribute)| *moves || *attribute != VELOCITIES)
+        {
             let _ = writeln!(out, "        {class} {attribute}");
         }
         declare_uvs(&mut out, "        ", *uvs);

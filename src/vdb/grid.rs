@@ -143,7 +143,8 @@ impl FloatGrid {
         let stored = |tile: &Tile| {
             let [x, y, z] = tile.origin;
             let level = EDGES.iter().position(|edge| *edge == tile.edge).filter(|level| *level > 0);
-            let level = level.ok_or_else(|| Error::argument(format!("no tile is {} voxels wide", tile.edge)))?;
+            let level =
+                level.ok_or_else(|| Error::argument(format!("no tile is {} voxels wide", tile.edge)))?;
             Ok(ffi::Tile { x, y, z, level: level as u32, active: tile.active, value: [tile.value; 3] })
         };
         let tiles: Vec<ffi::Tile> = tiles.iter().map(stored).collect::<Result<_>>()?;

@@ -24,13 +24,13 @@ const GRAIN_PLY: f64 = 50.0;
 const GRAIN_USDA: f64 = 125.0;
 const GRAIN_STATE: f64 = 90.0;
 /// Bytes of a grain in a fog and in a united surface.
-const GRAIN_FOG: f64 = 60.0;
-const GRAIN_UNITED: f64 = 150.0;
+const GRAIN_FOG: f64 = 190.0;
+const GRAIN_UNITED: f64 = 60.0;
 /// Share of a whole base file that the density of the base takes.
 const FOG_SHARE: f64 = 0.3;
 /// Bytes for each column of cells in a mesh of the base.
-const MESH_PLY: f64 = 80.0;
-const MESH_USDA: f64 = 220.0;
+const MESH_PLY: f64 = 90.0;
+const MESH_USDA: f64 = 180.0;
 /// States of grains that are kept.
 const STATES: f64 = 2.0;
 

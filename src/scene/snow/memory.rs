@@ -19,7 +19,7 @@ const BYTES_PER_WRITTEN: u64 = 400;
 const BYTES_OF_MESH: f64 = 500.0;
 /// Bytes of each grain as a point that was read, and in each kind of volume with its file.
 const BYTES_OF_POINT: u64 = 150;
-const BYTES_OF_FOG: u64 = 700;
+const BYTES_OF_FOG: u64 = 1200;
 const BYTES_OF_UNITED: u64 = 700;
 /// Bytes that every run takes.
 const FIXED: f64 = 64e6;

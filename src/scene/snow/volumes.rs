@@ -11,8 +11,8 @@ use crate::base::{DVec3, Points, TriMesh};
 use crate::context::Context;
 use crate::error::{Error, Result};
 use crate::io::manifest::Keeps;
-use crate::io::usd::{self, Field, Holds};
 use crate::io::mesh;
+use crate::io::usd::{self, Field, Holds};
 use crate::scene::shot::{
     Clip, FrameFiles, Kind, Prims, Report, Settings, Stage, Stepped, Stepping, Stored, To, Volume,
 };
@@ -136,7 +136,12 @@ impl<'a> Volumes<'a> {
     }
 
     /// Makes a frame's files and what is reported of them.
-    fn make(&self, ctx: &Context, source: &mut Source<'_>, made_from: &str) -> Result<(Files, Map<String, Value>)> {
+    fn make(
+        &self,
+        ctx: &Context,
+        source: &mut Source<'_>,
+        made_from: &str,
+    ) -> Result<(Files, Map<String, Value>)> {
         let (mut files, mut results) = (Files::new(), Map::new());
         let options = WriteOptions {
             metadata: base::metadata(self.scene, source.frame, made_from),

@@ -3,8 +3,8 @@
 //! Each part of the snow has a grid of its own, on voxels of its own: those of the base are as large as its cells, those of
 //! grains at most half of their radius. On one grid for both, a layer of 6 x 6 m with grains of 2.5 mm would take gigabytes.
 
-use super::spheres::{Spheres, Squares};
 use super::fill;
+use super::spheres::{Spheres, Squares};
 use crate::base::DVec3;
 use crate::base::blocks::{Block, BlockEdit, DIM, VOXELS, Values};
 use crate::context::Context;
@@ -56,7 +56,9 @@ pub fn grains(ctx: &Context, centres: &[DVec3], radius: f64, voxel: f64) -> Resu
     }
     // A product of a radius may be off by its last bit.
     if !(voxel > 0.0 && voxel <= VOXEL * radius * (1.0 + 1.0e-9)) {
-        let what = format!("voxels of {voxel} m are not above 0 and at most half of the grains' radius of {radius} m");
+        let what = format!(
+            "voxels of {voxel} m are not above 0 and at most half of the grains' radius of {radius} m"
+        );
         return Err(Error::argument(what));
     }
     let full = radius / voxel;

@@ -38,7 +38,9 @@ pub fn division(cell: f64, radius: f64) -> usize {
 pub fn unite(ctx: &Context, base: &FloatGrid, centres: &[DVec3], radius: f64) -> Result<FloatGrid> {
     let cell = base.voxel_size();
     if !base.is_world_fixed() || f64::from(base.background()) < 2.0 * cell {
-        return Err(Error::argument("the base must be a level set on world-fixed cells, at least two cells wide on each side"));
+        return Err(Error::argument(
+            "the base must be a level set on world-fixed cells, at least two cells wide on each side",
+        ));
     }
     if !(radius.is_finite() && radius >= 0.01 * cell) {
         return Err(Error::argument(format!("grains of {radius} m are too small for cells of {cell} m")));
@@ -55,10 +57,10 @@ pub fn unite(ctx: &Context, base: &FloatGrid, centres: &[DVec3], radius: f64) ->
     cubes.dedup();
     let origins: Vec<Origin> = cubes.iter().flat_map(|cube| around(*cube)).collect();
     let probes = base.probe(&origins)?;
-    let cubes: Vec<([i32; 3], &[Probe<'_>])> =
-        cubes.into_iter().zip(probes.chunks_exact(DIM)).collect();
+    let cubes: Vec<([i32; 3], &[Probe<'_>])> = cubes.into_iter().zip(probes.chunks_exact(DIM)).collect();
     let fine = Fine { division, voxel: voxel as f32, grown: grown as f32 };
-    let blocks = |(cube, probes): &([i32; 3], &[Probe<'_>])| fine.blocks(*cube, probes, spheres.squares(*cube));
+    let blocks =
+        |(cube, probes): &([i32; 3], &[Probe<'_>])| fine.blocks(*cube, probes, spheres.squares(*cube));
     fill(ctx, &mut grid, division, &cubes, blocks)?;
     grid.flood_fill()?;
     grid.set_name("surface")?;
@@ -67,9 +69,8 @@ pub fn unite(ctx: &Context, base: &FloatGrid, centres: &[DVec3], radius: f64) ->
 
 /// The origins of a leaf and of the seven that follow it along the axes.
 fn around(leaf: [i32; 3]) -> impl Iterator<Item = Origin> {
-    (0..DIM as i32).map(move |corner| {
-        [0, 1, 2].map(|axis| (leaf[axis] + (corner >> (2 - axis) & 1)) * DIM as i32)
-    })
+    (0..DIM as i32)
+        .map(move |corner| [0, 1, 2].map(|axis| (leaf[axis] + (corner >> (2 - axis) & 1)) * DIM as i32))
 }
 
 /// The fine grid.
@@ -91,7 +92,8 @@ impl Fine {
         let all = 0..self.division;
         for (x, y) in all.clone().flat_map(|x| all.clone().map(move |y| (x, y))) {
             for block in all.clone().map(|z| [x, y, z]) {
-                let place = |axis: usize| (cube[axis] * self.division as i32 + block[axis] as i32) * DIM as i32;
+                let place =
+                    |axis: usize| (cube[axis] * self.division as i32 + block[axis] as i32) * DIM as i32;
                 let origin = [0, 1, 2].map(place);
                 let of_grains = squares.next_if(|squares| squares.origin == origin);
                 out.extend(self.block(origin, block, &cells, of_grains));
@@ -154,7 +156,9 @@ impl Cells {
         let [xs, ys, zs] = block.map(|block| block * DIM / division..=(block * DIM + DIM - 1) / division + 1);
         let rows = xs.flat_map(|x| ys.clone().map(move |y| (x, y)));
         let values = rows.flat_map(|(x, y)| &self.row(x, y)[zs.clone()]);
-        values.fold((f32::INFINITY, f32::NEG_INFINITY), |(low, high), value| (low.min(*value), high.max(*value)))
+        values.fold((f32::INFINITY, f32::NEG_INFINITY), |(low, high), value| {
+            (low.min(*value), high.max(*value))
+        })
     }
 
     /// The values of a fine block: trilinear.

@@ -48,7 +48,10 @@ fn volumes_are_made_and_made_again_without_touching_base_and_grains() {
         grids.iter().map(|grid| (grid.name(), grid.voxel_size())).collect::<Vec<_>>()
     };
     let radius = 0.02 * (1.0 / 3.0);
-    assert_eq!(of_file("fog/fog.0010.vdb"), [("base".to_string(), 0.02), ("grains".to_string(), 0.5 * radius)]);
+    assert_eq!(
+        of_file("fog/fog.0010.vdb"),
+        [("base".to_string(), 0.02), ("grains".to_string(), 0.5 * radius)]
+    );
     assert_eq!(of_file("snow/snow.0010.vdb"), [("surface".to_string(), 0.02 / 5.0)]);
     let mesh = frazil::io::mesh::read(&at.join("out/mesh/mesh.0010.ply")).unwrap();
     assert!(mesh.is_closed() && mesh.triangles.len() > 1000);
@@ -153,7 +156,8 @@ fn what_volumes_cannot_be_made_from_is_said_first() {
     let folder = folder("", "");
     let text = fs::read_to_string(folder.path().join("shot.toml")).unwrap().replace("[grains]", "");
     let plain = |output: &str, words: &[&str]| {
-        fs::write(folder.path().join("plain.toml"), text.replace("[output]", &format!("[output]\n{output}"))).unwrap();
+        fs::write(folder.path().join("plain.toml"), text.replace("[output]", &format!("[output]\n{output}")))
+            .unwrap();
         fails(folder.path(), "snow plain.toml -o out -q", 2, words);
     };
     plain("fog = [\"grains\"]", &["fog", "[grains]"]);
