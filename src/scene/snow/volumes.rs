@@ -287,7 +287,7 @@ impl Stage for Volumes<'_> {
     }
 
     fn clip(&self) -> Option<Clip<'_>> {
-        self.asked.mesh_usd.then(|| Clip { kind: "mesh", manifest: MANIFEST, prims: Prims::Surface(MESH) })
+        self.asked.mesh_usd.then_some(Clip { kind: "mesh", manifest: MANIFEST, prims: Prims::Surface(MESH) })
     }
 }
 

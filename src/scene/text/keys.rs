@@ -133,7 +133,6 @@ const OUTPUT: &[Key] = &[
         "fog/fog.%04d.vdb: densities to render, of each of these a grid (see docs/snow.md)",
     )
     .or("[]")
-    .such_as("[\"base\", \"grains\"]")
     .concerns(VOLUMES_OUTPUT),
     Key::new(
         "output",
