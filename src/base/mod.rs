@@ -1,6 +1,7 @@
 //! Plain data that every room shares; knows no file format and no OpenVDB.
 
 pub mod blocks;
+pub mod bytes;
 pub mod bvh;
 #[doc(hidden)]
 pub mod cpu;

@@ -24,13 +24,16 @@ mod pockets;
 mod pressure;
 mod slip;
 mod solids;
+mod state;
 mod stencil;
 pub mod tiles;
+mod vorticity;
 mod window;
 
 pub use advect::{FARTHEST, Scheme};
 pub use pressure::Solved;
 pub use solids::{Faces, Solids};
+pub use state::Kept;
 pub use tiles::{Coord, Field, Tile, Tiles};
 
 use crate::context::Context;
@@ -220,6 +223,11 @@ impl Flow {
             *tile = reader.read(window, tiles.coords()[active + index]);
             tile.iter_mut().for_each(|pressure| *pressure *= around::WIDER as f32);
         });
+    }
+
+    /// Takes the density out of cells that the solids of the last projection cover.
+    pub fn clear_covered(&mut self) {
+        self.operator.clear_covered(&mut self.density);
     }
 
     /// Divergence of each cell times its edge (m/s), negative.

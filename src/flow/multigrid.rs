@@ -88,6 +88,16 @@ impl Operator {
         self.stencils.get(self.index[slot] as usize)
     }
 
+    /// Sets a field to 0 in cells that take no part.
+    pub fn clear_covered(&self, field: &mut Field) {
+        field.par_iter_mut().enumerate().with_min_len(64).for_each(|(slot, tile)| {
+            if let Some(stencil) = self.stencil(slot) {
+                let covered = tile.iter_mut().zip(&stencil.inverse).filter(|(_, inverse)| **inverse == 0.0);
+                covered.for_each(|(value, _)| *value = 0.0);
+            }
+        });
+    }
+
     /// A tile of a field with its neighbours and coefficients.
     pub fn near<'a>(&'a self, field: &'a [Tile], slot: usize) -> Near<'a> {
         Near { own: &field[slot], six: self.tiles.six(field, slot), stencil: self.stencil(slot) }
@@ -212,6 +222,8 @@ struct Level {
     b: Field,
     x: Field,
     spare: Field,
+    /// Room for this level's share of the correction by the next one: see [`correct`].
+    detour: Field,
 }
 
 /// The preconditioner.
@@ -220,6 +232,8 @@ pub struct Multigrid {
     /// The finest level's operator.
     pub finest: Operator,
     levels: Vec<Level>,
+    /// Room of the finest level, where there are solids.
+    room: [Field; 2],
 }
 
 impl Multigrid {
@@ -239,19 +253,33 @@ impl Multigrid {
                 }
             }
             let zeros = vec![[0.0; 512]; operator.tiles.active()];
+            let detour = if operator.has_stencils() { zeros.clone() } else { Field::new() };
             let (b, x, spare) = (zeros.clone(), zeros.clone(), zeros);
-            levels.push(Level { operator, children, parents, b, x, spare });
+            levels.push(Level { operator, children, parents, b, x, spare, detour });
         }
-        Self { finest, levels }
+        let zeros = if finest.has_stencils() { vec![[0.0; 512]; finest.tiles.active()] } else { Field::new() };
+        Self { finest, levels, room: [zeros.clone(), zeros] }
     }
 
-    /// x = M b; returns the sum of x times b.
-    pub fn cycle(&mut self, b: &Field, x: &mut Field, spare: &mut Field) -> f64 {
-        descend(&self.finest, &mut self.levels, b, x, spare);
-        let one = |(x, b): (&Tile, &Tile)| dot(x, b);
-        let sums: Vec<f64> = x.par_iter().zip(b).with_min_len(64).map(one).collect();
-        sums.iter().sum()
+    /// Whether the method that it serves must allow for a preconditioner that is not linear: see [`correct`].
+    pub fn is_flexible(&self) -> bool {
+        self.finest.has_stencils()
     }
+
+    /// x = M b; returns the sum of x times b. `spare` is left as it is where the preconditioner is not linear.
+    pub fn cycle(&mut self, b: &Field, x: &mut Field, spare: &mut Field) -> f64 {
+        let [own, detour] = &mut self.room;
+        let spare = if self.finest.has_stencils() { own } else { spare };
+        descend(&self.finest, &mut self.levels, b, x, [spare, detour]);
+        product(x, b)
+    }
+}
+
+/// Sum of the products of two fields' values.
+pub fn product(a: &Field, b: &Field) -> f64 {
+    let one = |(a, b): (&Tile, &Tile)| dot(a, b);
+    let sums: Vec<f64> = a.par_iter().zip(b).with_min_len(64).map(one).collect();
+    sums.iter().sum()
 }
 
 /// Sum of the products of two tiles' values.
@@ -265,7 +293,13 @@ pub fn dot(a: &Tile, b: &Tile) -> f64 {
     sums.iter().map(|sum| f64::from(*sum)).sum()
 }
 
-fn descend(operator: &Operator, coarser: &mut [Level], b: &Field, x: &mut Field, spare: &mut Field) {
+fn descend(
+    operator: &Operator,
+    coarser: &mut [Level],
+    b: &Field,
+    x: &mut Field,
+    [spare, detour]: [&mut Field; 2],
+) {
     let [first, second] = WEIGHTS;
     let begin = |(slot, out): (usize, &mut Tile)| start(&b[slot], first, operator.stencil(slot), out);
     spare.par_iter_mut().enumerate().with_min_len(64).for_each(begin);
@@ -279,9 +313,13 @@ fn descend(operator: &Operator, coarser: &mut [Level], b: &Field, x: &mut Field,
     };
     operator.compute(x, |slot| Task::Residual(&b[slot]), spare);
     restrict(operator, next, spare);
-    let Level { operator: coarse, b: below, x: correction, spare: room, .. } = next;
-    descend(coarse, further, below, correction, room);
-    prolong(next, x);
+    let Level { operator: coarse, b: below, x: correction, spare: room, detour: more, .. } = next;
+    descend(coarse, further, below, correction, [room, more]);
+    if operator.has_stencils() {
+        correct(operator, next, x, spare, detour);
+    } else {
+        prolong(next, x);
+    }
     operator.compute(x, |slot| Task::Smooth(&b[slot], first), spare);
     operator.compute(spare, |slot| Task::Smooth(&b[slot], second), x);
 }
@@ -328,6 +366,21 @@ fn restrict(operator: &Operator, level: &mut Level, residual: &Field) {
                 }
             }
         }
+    });
+}
+
+/// Adds so much of the coarse correction that the error has the least energy. Coarse cells do not see narrow gaps and thin walls,
+/// and interpolation leads through these: taken whole, the correction may be many times too large. `residual` is used up.
+fn correct(operator: &Operator, level: &Level, x: &mut Field, residual: &mut Field, detour: &mut Field) {
+    detour.par_iter_mut().with_min_len(64).for_each(|tile| *tile = [0.0; 512]);
+    prolong(level, detour);
+    // Cells that take no part have no error.
+    operator.clear_covered(detour);
+    let gain = product(detour, residual);
+    let energy = operator.compute(detour, |_| Task::Product, residual);
+    let share = if energy > 0.0 { (gain / energy) as f32 } else { 0.0 };
+    x.par_iter_mut().zip(&*detour).with_min_len(64).for_each(|(x, detour)| {
+        x.iter_mut().zip(detour).for_each(|(x, way)| *x += share * way);
     });
 }
 

@@ -5,7 +5,7 @@
 
 use rayon::prelude::*;
 
-use super::multigrid::{Multigrid, Operator};
+use super::multigrid::{self, Multigrid, Operator};
 use super::pockets::Pockets;
 use super::slip;
 use super::solids::Solids;
@@ -60,18 +60,25 @@ pub fn project(
     }
     let pockets = Pockets::find(&multigrid.finest);
     divergence(tiles, solids, velocity, guess);
+    // Where a solid covers a cell, what its own parts press together flows nowhere.
+    multigrid.finest.clear_covered(guess);
     pockets.level(guess);
     pockets.level(pressure);
     multigrid.finest.compute(pressure, |slot| Task::Residual(&guess[slot]), residual);
     let mut solved = Solved { iterations: 0, divergence: greatest(residual), fastest };
-    let mut before = 0.0;
+    let (mut before, mut energy) = (0.0, 0.0);
     while solved.divergence > aim && solved.iterations < MOST {
         ctx.check()?;
         let now = multigrid.cycle(residual, guess, product);
-        let share = if before > 0.0 { (now / before) as f32 } else { 0.0 };
+        let share = match multigrid.is_flexible() {
+            _ if solved.iterations == 0 => 0.0,
+            // The new direction has no part along the old one, whatever the preconditioner does (Notay 2000).
+            true => (-multigrid::product(guess, product) / energy) as f32,
+            false => (now / before) as f32,
+        };
         before = now;
         follow(direction, guess, share, solved.iterations == 0);
-        let energy = multigrid.finest.compute(direction, |_| Task::Product, product);
+        energy = multigrid.finest.compute(direction, |_| Task::Product, product);
         if !(energy > 0.0 && now > 0.0) {
             break;
         }

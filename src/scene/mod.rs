@@ -187,6 +187,8 @@ pub struct Output {
     pub grains_usd: bool,
     /// Whether most of the grains' .vdb files hold only what changed since the frame before.
     pub grains_delta: bool,
+    /// `mist/mist.%04d.vdb`.
+    pub mist: bool,
     /// `objects/objects.%04d.usda`: the objects as they moved, with velocities.
     pub objects_usd: bool,
     /// `objects/objects.%04d.ply`: the same, all in one mesh.
@@ -246,6 +248,7 @@ impl Scene {
         if let Some(snow) = &self.snow {
             out.extend(snow.files().map(|(_, path)| path.clone()));
         }
+        out.extend(self.values.get("mist.wind").and_then(Value::path).map(Path::to_path_buf));
         out.extend(self.values.get("grains.initial").and_then(Value::path).map(Path::to_path_buf));
         for object in &self.objects {
             let first = f64::from(self.shot.frames.first) - object.offset;

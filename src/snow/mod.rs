@@ -8,5 +8,6 @@ pub mod grain_friction;
 pub mod grains;
 pub mod mist;
 mod noise;
+mod packed;
 
 pub use noise::NoiseParams;

@@ -80,9 +80,9 @@ impl Plan<'_> {
         Ok(())
     }
 
-    /// Whether another stage reads a stage's frames.
-    fn is_read(&self, name: &str) -> bool {
-        self.stages().any(|stage| stage.upstream().contains(&name))
+    /// Whether another stage reads the exact states of a stage's frames.
+    fn reads_states_of(&self, name: &str) -> bool {
+        self.stages().any(|stage| stage.upstream().contains(&name) && stage.reads_states_of(name))
     }
 }
 
@@ -317,7 +317,7 @@ impl<'a> Run<'a> {
             let threads: Vec<_> = runs
                 .zip(&upstream)
                 .map(|((_, run), upstream)| {
-                    let every_state = plan.is_read(run.stage.name());
+                    let every_state = plan.reads_states_of(run.stage.name());
                     scope.spawn(move || {
                         let stop = StopOthers(shared.stop);
                         let result = run.make(&shared, upstream, every_state);

@@ -75,6 +75,11 @@ pub trait Stage: Sync {
         &[]
     }
 
+    /// Whether it reads the exact states of a stage upstream, of every frame.
+    fn reads_states_of(&self, _upstream: &str) -> bool {
+        true
+    }
+
     /// Whether a frame depends on the frames before it.
     fn remembers(&self) -> bool {
         true

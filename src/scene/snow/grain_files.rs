@@ -317,12 +317,35 @@ impl RebuildGrains {
         &self.stored
     }
 
+    /// Those of a cache whose records are read.
+    pub(super) fn of(stored: Stored) -> Self {
+        Self { stored, at: None }
+    }
+
     /// The bytes of a frame's file as `grains_mode = "full"` writes it, except for the hash of the settings in its metadata.
     /// Frames in ascending order cost one file each.
     ///
     /// # Errors
     /// A frame that does not exist; a file that was changed since it was written; cancel.
     pub fn bytes(&mut self, ctx: &Context, frame: i32, options: &WriteOptions) -> Result<Vec<u8>> {
+        let (points, mut metadata) = self.whole(ctx, frame)?;
+        metadata.retain(|(key, _)| key.starts_with("frazil:") && ![SINCE, GONE, OF].contains(&&key[..]));
+        let bytes = points::to_bytes(ctx, NAME, &points, &WriteOptions { metadata, ..options.clone() });
+        self.at = Some((frame, points));
+        bytes
+    }
+
+    /// The complete grains of a frame, in the order of their identities.
+    ///
+    /// # Errors
+    /// As [`RebuildGrains::bytes`].
+    pub fn points(&mut self, ctx: &Context, frame: i32) -> Result<&Points> {
+        let (points, _) = self.whole(ctx, frame)?;
+        Ok(&self.at.insert((frame, points)).1)
+    }
+
+    /// The complete grains of a frame, and its file's metadata.
+    fn whole(&mut self, ctx: &Context, frame: i32) -> Result<Held> {
         let (mut later, mut metadata, mut at) = (Vec::new(), None, frame);
         let mut points = loop {
             ctx.check()?;
@@ -344,11 +367,7 @@ impl RebuildGrains {
             }
             points = follow(points, changed, &gone).map_err(|error| self.wrong(at, error))?;
         }
-        let mut metadata = metadata.unwrap_or_default();
-        metadata.retain(|(key, _)| key.starts_with("frazil:") && ![SINCE, GONE, OF].contains(&&key[..]));
-        let bytes = points::to_bytes(ctx, NAME, &points, &WriteOptions { metadata, ..options.clone() });
-        self.at = Some((frame, points));
-        bytes
+        Ok((points, metadata.unwrap_or_default()))
     }
 
     fn wrong(&self, frame: i32, error: Error) -> Error {

@@ -17,10 +17,10 @@ pub const FAR: f64 = 1.0e5;
 type Scopes = &'static [(&'static str, Scope)];
 
 /// Concerns every stage that knows the objects.
-const MOVES: Scopes = &[("base", Object), ("grains", Object), ("objects", Step)];
+const MOVES: Scopes = &[("base", Object), ("grains", Object), ("mist", Object), ("objects", Step)];
 
 /// Tables whose stages a scene has only where it has the table.
-pub const OPTIONAL: &[&str] = &["grains"];
+pub const OPTIONAL: &[&str] = &["grains", "mist"];
 
 /// Extensions of what moves: characters and meshes.
 const MOVING: &[&str] = &["glb", "gltf", EXTENSIONS[0], EXTENSIONS[1], EXTENSIONS[2]];
@@ -29,11 +29,12 @@ const SHOT: &[Key] = &[
     Key::new("shot", "frames", Kind::Frames, "first and last").begins_with("\"1-120\"").concerns(&[
         ("base", First),
         ("grains", First),
+        ("mist", First),
         ("objects", First),
     ]),
     Key::new("shot", "fps", Kind::Number(0.001, 100_000.0, "frames per second"), "frames per second")
         .or("24.0")
-        .concerns(&[("base", Step), ("grains", Step), ("objects", Step)]),
+        .concerns(&[("base", Step), ("grains", Step), ("mist", Step), ("objects", Step)]),
 ];
 
 const OBJECTS: &[Key] = &[
@@ -126,6 +127,14 @@ const OUTPUT: &[Key] = &[
     .concerns(&[("grains", Output)]),
     Key::new(
         "output",
+        "mist",
+        Kind::Choices(&["vdb"]),
+        "mist/mist.%04d.vdb: density, and vel (m/s) at the cells' centres; [] = none",
+    )
+    .or("[\"vdb\"]")
+    .concerns(&[("mist", Output)]),
+    Key::new(
+        "output",
         "objects",
         Kind::Choices(&["usd", "ply"]),
         "\"usd\", \"ply\": objects/, as they moved, with velocities",
@@ -139,7 +148,7 @@ const OUTPUT: &[Key] = &[
 /// has of each object behind the shared ones.
 pub fn all() -> &'static [Key] {
     static ALL: LazyLock<Vec<Key>> = LazyLock::new(|| {
-        let mut keys = [SHOT, OBJECTS, OUTPUT, snow::KEYS, snow::GRAIN_KEYS].concat();
+        let mut keys = [SHOT, OBJECTS, OUTPUT, snow::KEYS, snow::GRAIN_KEYS, snow::MIST_KEYS].concat();
         keys.sort_by_key(|key| match key.table {
             "shot" => 0,
             OBJECT => 2,

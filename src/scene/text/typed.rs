@@ -63,6 +63,7 @@ impl Output {
             grains_ply: holds("output.grains", "ply"),
             grains_usd: holds("output.grains", "usd"),
             grains_delta: values.get("output.grains_mode").and_then(Value::text) == Some("delta"),
+            mist: holds("output.mist", "vdb"),
             objects_usd: holds("output.objects", "usd"),
             objects_ply: holds("output.objects", "ply"),
             usd: flag("output.usd"),
@@ -85,6 +86,9 @@ impl Output {
             return Err(
                 table.error("grains_mode", "= \"delta\" is for .vdb files: `grains` must hold \"vdb\"")
             );
+        }
+        if snow::has_mist(values) && !output.grains_vdb {
+            return Err(table.error("grains", "leaves out what `[mist]` reads of every frame: it must hold \"vdb\""));
         }
         if output.half && output.base && output.base_mode == BaseMode::Delta {
             return Err(table.error("half", "goes with `base_mode = \"full\"` only: changes must be exact"));
