@@ -323,6 +323,21 @@ impl RebuildGrains {
     /// # Errors
     /// A frame that does not exist; a file that was changed since it was written; cancel.
     pub fn bytes(&mut self, ctx: &Context, frame: i32, options: &WriteOptions) -> Result<Vec<u8>> {
+        let (points, mut metadata) = self.whole(ctx, frame)?;
+        metadata.retain(|(key, _)| key.starts_with("frazil:") && ![SINCE, GONE, OF].contains(&&key[..]));
+        points::to_bytes(ctx, NAME, points, &WriteOptions { metadata, ..options.clone() })
+    }
+
+    /// The grains after a frame, sorted by identity. Frames in ascending order cost one file each.
+    ///
+    /// # Errors
+    /// As [`RebuildGrains::bytes`].
+    pub fn points(&mut self, ctx: &Context, frame: i32) -> Result<&Points> {
+        Ok(self.whole(ctx, frame)?.0)
+    }
+
+    /// The grains after a frame, and the metadata of its file.
+    fn whole(&mut self, ctx: &Context, frame: i32) -> Result<(&Points, Vec<(String, MetaValue)>)> {
         let (mut later, mut metadata, mut at) = (Vec::new(), None, frame);
         let mut points = loop {
             ctx.check()?;
@@ -344,11 +359,7 @@ impl RebuildGrains {
             }
             points = follow(points, changed, &gone).map_err(|error| self.wrong(at, error))?;
         }
-        let mut metadata = metadata.unwrap_or_default();
-        metadata.retain(|(key, _)| key.starts_with("frazil:") && ![SINCE, GONE, OF].contains(&&key[..]));
-        let bytes = points::to_bytes(ctx, NAME, &points, &WriteOptions { metadata, ..options.clone() });
-        self.at = Some((frame, points));
-        bytes
+        Ok((&self.at.insert((frame, points)).1, metadata.unwrap_or_default()))
     }
 
     fn wrong(&self, frame: i32, error: Error) -> Error {
