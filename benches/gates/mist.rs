@@ -361,7 +361,7 @@ fn speed(h: &mut Harness) {
         return;
     }
     let ctx = context(2);
-    let mut mist = large(15);
+    let mut mist = large(14);
     let mut note = String::new();
     let mut seconds = Vec::new();
     for _ in 0..6 {
@@ -393,7 +393,7 @@ pub fn print_memory() {
     let ctx = context(2);
     ctx.pool().install(|| rayon::broadcast(|_| vec![1u8; 1 << 16].len()));
     let before = kilobytes("VmRSS:");
-    let mut mist = large(15);
+    let mut mist = large(14);
     let mut cells = 0;
     for _ in 0..3 {
         cells = mist.step(&ctx, &[], &open, FRAME).expect("a step").cells;
