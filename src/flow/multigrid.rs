@@ -88,6 +88,16 @@ impl Operator {
         self.stencils.get(self.index[slot] as usize)
     }
 
+    /// Sets a field to 0 in cells that take no part.
+    pub fn clear_covered(&self, field: &mut Field) {
+        field.par_iter_mut().enumerate().with_min_len(64).for_each(|(slot, tile)| {
+            if let Some(stencil) = self.stencil(slot) {
+                let covered = tile.iter_mut().zip(&stencil.inverse).filter(|(_, inverse)| **inverse == 0.0);
+                covered.for_each(|(value, _)| *value = 0.0);
+            }
+        });
+    }
+
     /// A tile of a field with its neighbours and coefficients.
     pub fn near<'a>(&'a self, field: &'a [Tile], slot: usize) -> Near<'a> {
         Near { own: &field[slot], six: self.tiles.six(field, slot), stencil: self.stencil(slot) }

@@ -38,8 +38,8 @@ pub struct Room {
     pub product: Field,
 }
 
-/// Changes the velocity (m/s, at lower faces) so that its divergence times the cell is at most `tolerance` times the greatest
-/// speed. `pressure` holds the first guess, and then the solution; in the rim, what it is there.
+/// Changes the velocity (m/s, at lower faces) so that its divergence times the cell, in all cells that no solid covers, is at most
+/// `tolerance` times the greatest speed. `pressure` holds the first guess, and then the solution; in the rim, what it is there.
 ///
 /// # Errors
 /// Cancel.
@@ -60,6 +60,8 @@ pub fn project(
     }
     let pockets = Pockets::find(&multigrid.finest);
     divergence(tiles, solids, velocity, guess);
+    // Cells inside solids have no equation: what solids press together there must not reach the coarse levels.
+    multigrid.finest.clear_covered(guess);
     pockets.level(guess);
     pockets.level(pressure);
     multigrid.finest.compute(pressure, |slot| Task::Residual(&guess[slot]), residual);

@@ -55,6 +55,43 @@ fn a_ball_that_moves_carries_the_air_around_it() {
     assert!((-0.4..-0.25).contains(&beside), "{beside}");
 }
 
+#[test]
+fn solids_that_move_into_each_other_leave_the_air_around_them_solvable() {
+    let ctx = context();
+    let mut flow = Flow::new(0.1, [0.0; 3]).unwrap();
+    flow.resize(&padded(&[[0, 0, 0]], 2));
+    // One half of a ball moves into the other, which stands still: inside, faces of one cell move at two speeds.
+    let boundary = |tiles: &Tiles, cell: f32| {
+        let [moves, stands] = [1.0, 0.0].map(|speed| ball(tiles, cell, 9.0, [speed, 0.0, 0.0]));
+        let halves = (0..tiles.count()).filter_map(|slot| {
+            let of = if tiles.coords()[slot][0] < 0 { &moves } else { &stands };
+            Some((slot as u32, of.faces(slot)?.clone()))
+        });
+        Ok(Solids::new(tiles, halves.collect()))
+    };
+    let solved = ctx.phase("project", || flow.project(&ctx, &boundary, 1.0e-5)).unwrap();
+    assert!(solved.iterations <= 40 && solved.divergence <= 1.0e-5 * solved.fastest, "{solved:?}");
+    let solids = boundary(flow.tiles(), flow.cell()).unwrap();
+    let left = flow.divergence(&solids);
+    let mut covered = 0;
+    for (slot, tile) in left.iter().enumerate() {
+        for cell in 0..512usize {
+            let open: f32 = (0..6).map(|face| open_share(flow.tiles(), &solids, slot, cell, face)).sum();
+            covered += usize::from(open == 0.0 && tile[cell].abs() > 0.5);
+            assert!(open < 1.0e-3 || tile[cell].abs() < 1.0e-4, "{slot} {cell}: {}", tile[cell]);
+        }
+    }
+    assert!(covered > 0, "no cell inside is pressed together");
+    assert!(flow.fastest() < 10.0, "{}", flow.fastest());
+}
+
+/// Open share of a face of a cell: the lower one on each axis, then the upper ones.
+fn open_share(tiles: &Tiles, solids: &Solids, slot: usize, cell: usize, face: usize) -> f32 {
+    let axis = face % 3;
+    let (slot, cell) = if face < 3 { (slot as u32, cell) } else { tiles.beside(slot, cell, axis, true) };
+    solids.faces(slot as usize).map_or(1.0, |faces| faces.open[axis][cell])
+}
+
 /// Faces of a ball of a radius (cells of 0.1 m) around the middle of tile 0 that moves at a speed (m/s), for cells of an edge (m).
 fn ball(tiles: &Tiles, cell: f32, radius: f32, speed: [f32; 3]) -> Solids {
     let wider = cell / 0.1;
