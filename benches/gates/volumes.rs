@@ -5,6 +5,8 @@ use std::collections::HashMap;
 
 use frazil::Context;
 use frazil::base::DVec3;
+use frazil::snow::base_layer::BaseLayer;
+use frazil::snow::grains::Grains;
 use frazil::snow::volumes::{fog, united};
 use frazil::vdb::FloatGrid;
 
@@ -16,22 +18,28 @@ use crate::scenes::context;
 /// Frames after which a plough's grains have come to rest.
 const FRAMES: i32 = 48;
 
-pub fn run(h: &mut Harness) {
-    density(h);
-    seam(h);
-}
+const NAMES: [&str; 2] = ["snow.shot.fog_volume", "snow.shot.snow_seam"];
 
-/// Volume of full density against that of the union of spheres: of a heap whose spheres overlap, and of grains at rest.
-fn density(h: &mut Harness) {
-    let name = "snow.shot.fog_volume";
-    if !h.wants(name) {
+pub fn run(h: &mut Harness) {
+    let [volume, seams] = NAMES.map(|name| h.wants(name));
+    if !volume && !seams {
         return;
     }
     let ctx = context(2);
-    let (_, grains) = ploughed_snow(&ctx, FRAMES);
+    let (base, grains) = ploughed_snow(&ctx, FRAMES);
+    if volume {
+        density(h, &ctx, &grains);
+    }
+    if seams {
+        seam(h, &ctx, &base, &grains);
+    }
+}
+
+/// Volume of full density against that of the union of spheres: of a heap whose spheres overlap, and of grains at rest.
+fn density(h: &mut Harness, ctx: &Context, grains: &Grains) {
     let real: Vec<DVec3> = grains.places().collect();
     let off = |centres: &[DVec3], radius: f64, what: &str| {
-        let grid = fog::grains(&ctx, centres, radius, fog::VOXEL * radius).expect("a grid");
+        let grid = fog::grains(ctx, centres, radius, fog::VOXEL * radius).expect("a grid");
         assert!(grid.voxel_size() <= 0.5 * radius * (1.0 + 1.0e-9));
         let (ours, want) = (full(&grid), union(centres, radius));
         let alone = 4.0 / 3.0 * std::f64::consts::PI * radius.powi(3) * centres.len() as f64;
@@ -45,7 +53,7 @@ fn density(h: &mut Harness) {
     };
     let heap = off(&heap(4000, 0.0025), 0.0025, "a heap");
     let real = off(&real, grains.params().radius, "ploughed snow");
-    h.gate(name, heap.max(real), &format!("heap {heap:.3}, ploughed {real:.3}"));
+    h.gate(NAMES[0], heap.max(real), &format!("heap {heap:.3}, ploughed {real:.3}"));
 }
 
 /// Overlapping spheres in a cube, the same ones every time.
@@ -91,25 +99,19 @@ fn union(centres: &[DVec3], radius: f64) -> f64 {
 
 /// Holes between the base and resting grains in their united surface: places without snow that are a voxel long on the way from
 /// a grain that touches the base to it, and balls of a cell of the base that have base below and a grain above them.
-fn seam(h: &mut Harness) {
-    let name = "snow.shot.snow_seam";
-    if !h.wants(name) {
-        return;
-    }
-    let ctx = context(2);
-    let (base, grains) = ploughed_snow(&ctx, FRAMES);
+fn seam(h: &mut Harness, ctx: &Context, base: &BaseLayer, grains: &Grains) {
     let radius = grains.params().radius;
     let there = grains.places().zip(grains.awake());
     let resting: Vec<DVec3> = there.filter(|(_, awake)| !awake).map(|(place, _)| place).collect();
-    let grid = united::unite(&ctx, base.surface(), &resting, radius).expect("a grid");
-    let (touching, gaps) = gaps(&ctx, base.surface(), &grid, &resting, radius);
-    let (places, balls) = balls(&ctx, base.surface(), &grid);
+    let grid = united::unite(ctx, base.surface(), &resting, radius).expect("a grid");
+    let (touching, gaps) = gaps(ctx, base.surface(), &grid, &resting, radius);
+    let (places, balls) = balls(ctx, base.surface(), &grid);
     assert!(touching > 100, "only {touching} grains touch the base");
     let note = format!(
         "{} resting, {touching} touch the base, {gaps} of them apart from it; {balls} balls of {places} places",
         resting.len()
     );
-    h.gate(name, (gaps + balls) as f64, &note);
+    h.gate(NAMES[1], (gaps + balls) as f64, &note);
 }
 
 /// Count of grains within a tenth of their diameter of the base, and of those from which no unbroken snow leads to it.
