@@ -204,8 +204,6 @@ pub struct VolumesOutput {
     pub fog_base: bool,
     /// In `fog/fog.%04d.vdb`: the density of grains.
     pub fog_grains: bool,
-    /// In `fog/fog.%04d.vdb`: the density of mist.
-    pub fog_mist: bool,
     /// `snow/snow.%04d.vdb`: the base united with resting grains.
     pub snow: bool,
     /// `mesh/mesh.%04d.ply`: the surface of the base.
@@ -217,7 +215,7 @@ pub struct VolumesOutput {
 impl VolumesOutput {
     /// Whether there is a fog.
     pub fn fog(self) -> bool {
-        self.fog_base || self.fog_grains || self.fog_mist
+        self.fog_base || self.fog_grains
     }
 
     /// Whether there is a mesh.

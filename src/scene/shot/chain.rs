@@ -71,7 +71,7 @@ impl Chain {
                 let recorded = own.manifest(frame).map(|manifest| manifest.inputs.clone());
                 return recorded.ok_or_else(|| missing(stage, frame, name, stored.folder()));
             };
-            // A file of changes does not say what it changes: the frames before it count, which no link of this stage knows.
+            // What a file of changes means depends on the frames before it; a stage that remembers has links for those.
             if !stage.remembers() {
                 link.add_text(&manifest.inputs);
             }

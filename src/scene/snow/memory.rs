@@ -62,7 +62,7 @@ pub(super) fn of_volumes(scene: &Scene, inputs: &Inputs, grains: u64) -> Result<
         (needs.grains && asked.snow, BYTES_OF_UNITED),
     ];
     let each: u64 = each.into_iter().filter(|(is_there, _)| *is_there).map(|(_, bytes)| bytes).sum();
-    let there = needs.base || needs.grains || needs.mist;
+    let there = needs.base || needs.grains;
     Ok(if there { (base + FIXED) as u64 + grains * each } else { 0 })
 }
 

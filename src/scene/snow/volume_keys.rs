@@ -2,7 +2,7 @@
 
 use super::has_grains;
 use crate::error::Result;
-use crate::scene::text::{Table, Value, Values};
+use crate::scene::text::{Table, Values};
 use crate::scene::{Output, VolumesOutput};
 
 /// The stages that a scene's volumes are made from.
@@ -12,8 +12,6 @@ pub struct Needs {
     pub base: bool,
     /// Whether they read grains.
     pub grains: bool,
-    /// Whether they read mist.
-    pub mist: bool,
 }
 
 impl Needs {
@@ -22,14 +20,8 @@ impl Needs {
         Self {
             base: asked.fog_base || asked.snow || asked.mesh(),
             grains: asked.fog_grains || asked.snow && has_grains(values),
-            mist: asked.fog_mist,
         }
     }
-}
-
-/// Whether a scene has mist.
-fn has_mist(values: &Values) -> bool {
-    values.number("mist.cell").is_some()
 }
 
 /// Checks that a scene has, and writes, what its volumes are made from.
@@ -39,12 +31,8 @@ fn has_mist(values: &Values) -> bool {
 pub fn check_volumes(table: &Table, values: &Values, output: &Output) -> Result<()> {
     let asked = output.volumes;
     let needs = Needs::of(asked, values);
-    for (part, is_asked, is_there) in
-        [("grains", asked.fog_grains, has_grains(values)), ("mist", asked.fog_mist, has_mist(values))]
-    {
-        if is_asked && !is_there {
-            return Err(table.error("fog", format!("names \"{part}\", but the scene has no table [{part}]")));
-        }
+    if asked.fog_grains && !has_grains(values) {
+        return Err(table.error("fog", "names \"grains\", but the scene has no table [grains]"));
     }
     let reader = match (asked.fog(), asked.snow) {
         (true, _) => "fog",
@@ -56,12 +44,9 @@ pub fn check_volumes(table: &Table, values: &Values, output: &Output) -> Result<
         let what = format!("leaves out what `{reader}` reads of every frame: exact values of the base");
         return Err(table.error(key, what));
     }
-    let lacks_vdb = |key: &str| values.get(key).is_some_and(|files: &Value| !files.holds("vdb"));
-    for (part, is_needed) in [("grains", needs.grains), ("mist", needs.mist)] {
-        if is_needed && lacks_vdb(&format!("output.{part}")) {
-            let what = format!("leaves out the .vdb files that `{reader}` is made from: add \"vdb\"");
-            return Err(table.error(part, what));
-        }
+    if needs.grains && !output.grains_vdb {
+        let what = format!("leaves out the .vdb files that `{reader}` is made from: add \"vdb\"");
+        return Err(table.error("grains", what));
     }
     Ok(())
 }

@@ -1,4 +1,4 @@
-//! The stage `volumes`: what renderers want of base, grains and mist. A frame depends on no frame before it.
+//! The stage `volumes`: what renderers want of base and grains. A frame depends on no frame before it.
 
 use serde_json::{Map, Value, json};
 
@@ -20,8 +20,8 @@ use crate::scene::text::keys::settings_of;
 use crate::scene::{Scene, VolumesOutput};
 use crate::snow::base_layer::Grids;
 use crate::snow::volumes::{fog, united};
-use crate::vdb::file::{self, WriteOptions, to_bytes};
-use crate::vdb::{FloatGrid, GridClass, MetaValue, level_set};
+use crate::vdb::file::{WriteOptions, to_bytes};
+use crate::vdb::{FloatGrid, level_set};
 
 /// The stage for a scene.
 pub struct Volumes<'a> {
@@ -44,7 +44,6 @@ struct Source<'s> {
     frame: i32,
     base: Option<&'s FloatGrid>,
     grains: Option<&'s Points>,
-    mist: Option<FloatGrid>,
 }
 
 /// Files of a frame: kinds, extensions and contents. Grids wait for the writer packed: those of several frames would take too
@@ -73,7 +72,7 @@ impl<'a> Volumes<'a> {
     /// Reads what a frame is made from.
     fn read<'s>(&self, ctx: &Context, state: &'s mut State, to: &To<'_>) -> Result<Source<'s>> {
         let State { layer, grains } = state;
-        let mut source = Source { frame: to.frame, base: None, grains: None, mist: None };
+        let mut source = Source { frame: to.frame, base: None, grains: None };
         if self.needs.base {
             let stored = self.stored(to.upstream, "base")?;
             let grids = match layer.take() {
@@ -88,15 +87,11 @@ impl<'a> Volumes<'a> {
         if self.needs.grains {
             source.grains = Some(grains.points(ctx, self.stored(to.upstream, "grains")?, to.frame)?.0);
         }
-        if self.needs.mist {
-            let path = self.stored(to.upstream, "mist")?.file(to.frame, "mist")?;
-            source.mist = Some(file::read_named(&path, Some("density"))?);
-        }
         Ok(source)
     }
 
     /// Makes the grids of the fog.
-    fn fog(&self, ctx: &Context, source: &mut Source<'_>) -> Result<Vec<FloatGrid>> {
+    fn fog(&self, ctx: &Context, source: &Source<'_>) -> Result<Vec<FloatGrid>> {
         let names = fog_names(self.asked);
         let mut grids = Vec::new();
         let mut add = |mut grid: FloatGrid, name: Option<&str>| {
@@ -110,11 +105,6 @@ impl<'a> Volumes<'a> {
         if let Some(points) = source.grains.filter(|_| self.asked.fog_grains) {
             let radius = self.radius();
             add(fog::grains(ctx, &places(points, |_| true), radius, fog::VOXEL * radius)?, names[1])?;
-        }
-        if let Some(mut mist) = source.mist.take() {
-            mist.set_class(GridClass::Fog)?;
-            mist.set_metadata(fog::SCALE_KEY, MetaValue::Float(1.0))?;
-            add(mist, names[2])?;
         }
         Ok(grids)
     }
@@ -139,7 +129,7 @@ impl<'a> Volumes<'a> {
     fn make(
         &self,
         ctx: &Context,
-        source: &mut Source<'_>,
+        source: &Source<'_>,
         made_from: &str,
     ) -> Result<(Files, Map<String, Value>)> {
         let (mut files, mut results) = (Files::new(), Map::new());
@@ -196,14 +186,12 @@ fn places(points: &Points, is_wanted: impl Fn(usize) -> bool) -> Vec<DVec3> {
     (0..points.count()).filter(|point| is_wanted(*point)).map(|point| points.position(point)).collect()
 }
 
-/// Names of the fog's grids of base, grains and mist. One that is alone has the name that smoke shaders look for.
-fn fog_names(asked: VolumesOutput) -> [Option<&'static str>; 3] {
-    let parts = [asked.fog_base, asked.fog_grains, asked.fog_mist];
-    let is_alone = parts.iter().filter(|is_asked| **is_asked).count() == 1;
-    [0, 1, 2].map(|part| {
-        let name = if is_alone { "density" } else { ["base", "grains", "mist"][part] };
-        parts[part].then_some(name)
-    })
+/// Names of the fog's grids of base and grains. One that is alone has the name that smoke shaders look for.
+fn fog_names(asked: VolumesOutput) -> [Option<&'static str>; 2] {
+    match (asked.fog_base, asked.fog_grains) {
+        (true, true) => [Some("base"), Some("grains")],
+        (is_base, is_grains) => [is_base, is_grains].map(|is_asked| is_asked.then_some("density")),
+    }
 }
 
 impl Stage for Volumes<'_> {
@@ -236,15 +224,11 @@ impl Stage for Volumes<'_> {
     }
 
     fn upstream(&self) -> &'static [&'static str] {
-        match (self.needs.base, self.needs.grains, self.needs.mist) {
-            (true, true, true) => &["base", "grains", "mist"],
-            (true, true, false) => &["base", "grains"],
-            (true, false, true) => &["base", "mist"],
-            (false, true, true) => &["grains", "mist"],
-            (true, false, false) => &["base"],
-            (false, true, false) => &["grains"],
-            (false, false, true) => &["mist"],
-            (false, false, false) => &[],
+        match (self.needs.base, self.needs.grains) {
+            (true, true) => &["base", "grains"],
+            (true, false) => &["base"],
+            (false, true) => &["grains"],
+            (false, false) => &[],
         }
     }
 
@@ -265,25 +249,21 @@ impl Stage for Volumes<'_> {
     }
 
     fn volumes(&self) -> Vec<Volume> {
-        const SCALED: Holds = Holds::Density(fog::DENSITY_SCALE);
-        const MIST: Holds = Holds::Density(1.0);
         /// The density of a part, from the grid of its name or from the only one.
-        const fn density(grid: &'static str, holds: Holds) -> Field {
-            Field { name: "density", grid, holds }
+        const fn density(grid: &'static str) -> Field {
+            Field { name: "density", grid, holds: Holds::Density(fog::DENSITY_SCALE) }
         }
-        const ALONE: [&[Field]; 3] =
-            [&[density("density", SCALED)], &[density("density", SCALED)], &[density("density", MIST)]];
-        const PARTS: [&[Field]; 3] =
-            [&[density("base", SCALED)], &[density("grains", SCALED)], &[density("mist", MIST)]];
-        const PRIMS: [&str; 3] = ["fog_base", "fog_grains", "fog_mist"];
-        let names = fog_names(self.asked);
-        let of_part = |part: usize| {
-            let fields = if names[part]? == "density" { ALONE[part] } else { PARTS[part] };
-            Some(Volume { kind: "fog", prim: PRIMS[part], fields, is_guide: false })
+        const ALONE: &[Field] = &[density("density")];
+        const PARTS: [(&str, &[Field]); 2] =
+            [("fog_base", &[density("base")]), ("fog_grains", &[density("grains")])];
+        let of_part = |(name, (prim, own)): (Option<&str>, (&'static str, &'static [Field]))| {
+            let fields = if name? == "density" { ALONE } else { own };
+            Some(Volume { kind: "fog", prim, fields, is_guide: false })
         };
+        let fog = fog_names(self.asked).into_iter().zip(PARTS).filter_map(of_part);
         const SNOW: &[Field] = &[Field::of("surface", Holds::Distance)];
         let snow = Volume { kind: "snow", prim: "snow", fields: SNOW, is_guide: false };
-        (0..3).filter_map(of_part).chain(self.asked.snow.then_some(snow)).collect()
+        fog.chain(self.asked.snow.then_some(snow)).collect()
     }
 
     fn clip(&self) -> Option<Clip<'_>> {
@@ -317,8 +297,8 @@ impl Stepping for Volumes<'_> {
         let asked = [self.asked.fog(), self.asked.snow, self.asked.mesh()];
         let phases = 1 + 2 * asked.iter().filter(|is_asked| **is_asked).count();
         let work = || {
-            let mut source = ctx.phase("read", || self.read(ctx, state, to))?;
-            self.make(ctx, &mut source, made_from)
+            let source = ctx.phase("read", || self.read(ctx, state, to))?;
+            self.make(ctx, &source, made_from)
         };
         let ((step, results), phases) = ctx.step(phases, work).map_err(|error| match error {
             Error::Argument(what) => Error::file(&self.scene.path, format!("frame {}: {what}", to.frame)),

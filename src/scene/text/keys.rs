@@ -129,7 +129,7 @@ const OUTPUT: &[Key] = &[
     Key::new(
         "output",
         "fog",
-        Kind::Choices(&["base", "grains", "mist"]),
+        Kind::Choices(&["base", "grains"]),
         "fog/fog.%04d.vdb: densities to render, of each of these a grid (see docs/snow.md)",
     )
     .or("[]")

@@ -66,7 +66,6 @@ impl Output {
             volumes: VolumesOutput {
                 fog_base: holds("output.fog", "base"),
                 fog_grains: holds("output.fog", "grains"),
-                fog_mist: holds("output.fog", "mist"),
                 snow: flag("output.snow"),
                 mesh_ply: holds("output.mesh", "ply"),
                 mesh_usd: holds("output.mesh", "usd"),

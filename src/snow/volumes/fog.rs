@@ -1,7 +1,7 @@
 //! Densities (thesis section 3.5): 1 in snow, 0 outside.
 //!
 //! Each part of the snow has a grid of its own, on voxels of its own: those of the base are as large as its cells, those of
-//! grains at most half of their radius. On one grid for both, a layer of 6 x 6 m with grains of 2.5 mm would take gigabytes.
+//! grains at most half of their radius. One grid for both would hold the base's surface on the voxels of the grains.
 
 use super::fill;
 use super::spheres::{Spheres, Squares};

@@ -148,7 +148,7 @@ fn what_volumes_cannot_be_made_from_is_said_first() {
     };
     at("fog = [\"smoke\"]", &["fog", "smoke"]);
     at("fog = true", &["fog"]);
-    at("fog = [\"mist\"]", &["fog", "[mist]"]);
+    at("fog = [\"mist\"]", &["fog", "mist"]);
     at("fog = [\"grains\"]\ngrains = [\"ply\"]", &["grains", "fog", "vdb"]);
     at("snow = true\ngrains = [\"ply\"]", &["grains", "snow", "vdb"]);
     at("mesh = [\"obj\"]", &["mesh", "obj"]);
