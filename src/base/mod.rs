@@ -2,6 +2,7 @@
 
 pub mod blocks;
 pub mod bvh;
+pub mod bytes;
 #[doc(hidden)]
 pub mod cpu;
 mod ears;

@@ -1,17 +1,21 @@
-//! The air around the tiles: a second flow whose cells are four times as wide, over the same place and some way around it. It
-//! gives the tiles the pressure and the velocity at their border, as if the air went on: a few tiles of padding do.
+//! The air around the tiles: a flow whose cells are twice as wide, over the same place and some way around it, with another one
+//! around it, and so on. It gives the tiles the pressure and the velocity at their border, as if the air went on: one tile of
+//! padding does.
 //!
 //! Where both are, the fine velocity counts: its mean goes into the wide cells before their projection.
 
 use rayon::prelude::*;
 
 use super::Flow;
-use super::multigrid::Operator;
+use super::operator::Operator;
 use super::tiles::{Coord, FACES, Field, Tile, Tiles, padded};
-use super::window::Window;
+use super::window::{Span, Window};
+use crate::base::cpu::dispatch;
 
 /// How many times wider the cells around are.
-pub const WIDER: i32 = 4;
+pub const WIDER: i32 = 2;
+/// How many flows lie around a flow, each around the one before.
+pub const LEVELS: u32 = 3;
 /// Tiles of wide cells around those that hold fine ones.
 const PADDING: i32 = 1;
 
@@ -23,11 +27,16 @@ pub fn tiles_around(fine: &[Coord]) -> Vec<Coord> {
     padded(&wide, PADDING)
 }
 
+/// Wide cells along the edge of a fine tile.
+const PART: usize = 8 / WIDER as usize;
+/// Wide cells in a fine tile.
+const PARTS: usize = PART * PART * PART;
+
 /// The mean fine velocity, in the wide faces that fine faces of active cells cover.
 pub fn restrict(fine: &Flow, wide: &mut Flow) {
     let (tiles, velocity) = (&fine.tiles, &fine.velocity);
     for axis in 0..3 {
-        let means: Vec<[f32; 8]> =
+        let means: Vec<[f32; PARTS]> =
             velocity[axis].par_iter().with_min_len(16).map(|tile| means_of(tile, axis)).collect();
         for (slot, means) in means.into_iter().enumerate() {
             let is_active = slot < tiles.active();
@@ -37,10 +46,10 @@ pub fn restrict(fine: &Flow, wide: &mut Flow) {
             }
             let coord = tiles.coords()[slot];
             let Some(parent) = wide.tiles.find(coord.map(|x| x.div_euclid(WIDER))) else { continue };
-            let corner = coord.map(|x| x.rem_euclid(WIDER) as usize * 2);
+            let corner = coord.map(|x| x.rem_euclid(WIDER) as usize * PART);
             let tile = &mut wide.velocity[axis][parent as usize];
             for (index, mean) in means.into_iter().enumerate() {
-                let at = [index >> 2, index >> 1 & 1, index & 1];
+                let at = part(index);
                 // Of the rim, only the first faces bound active cells.
                 if is_active || at[axis] == 0 {
                     tile[(corner[0] + at[0]) << 6 | (corner[1] + at[1]) << 3 | (corner[2] + at[2])] = mean;
@@ -50,21 +59,25 @@ pub fn restrict(fine: &Flow, wide: &mut Flow) {
     }
 }
 
-/// Means over the faces of eight wide cells in a fine tile.
-fn means_of(tile: &Tile, axis: usize) -> [f32; 8] {
+/// Place of a wide cell in a fine tile.
+fn part(index: usize) -> [usize; 3] {
+    [index / (PART * PART), index / PART % PART, index % PART]
+}
+
+/// Means over the faces of the wide cells in a fine tile.
+fn means_of(tile: &Tile, axis: usize) -> [f32; PARTS] {
     std::array::from_fn(|index| {
-        let at = [index >> 2, index >> 1 & 1, index & 1].map(|x: usize| 4 * x);
-        let mut sum = 0.0;
-        for part in 0..16 {
-            let [a, b] = [part >> 2, part & 3];
-            let off = match axis {
+        let at = part(index).map(|x| WIDER as usize * x);
+        let face = |a: usize, b: usize| {
+            let [x, y, z] = match axis {
                 0 => [0, a, b],
                 1 => [a, 0, b],
                 _ => [a, b, 0],
             };
-            sum += tile[(at[0] + off[0]) << 6 | (at[1] + off[1]) << 3 | (at[2] + off[2])];
-        }
-        sum / 16.0
+            tile[(at[0] + x) << 6 | (at[1] + y) << 3 | (at[2] + z)]
+        };
+        // In an order that mirrored fields share.
+        0.25 * ((face(0, 0) + face(1, 1)) + (face(0, 1) + face(1, 0)))
     })
 }
 
@@ -80,24 +93,66 @@ pub struct Reader<'a> {
     pub outside: f32,
 }
 
+/// Wide cells on an axis that the interpolation of a fine tile reads: those that it covers and one on each side.
+const READ: usize = PART + 2;
+
+/// For each of eight fine places on an axis: the first of the two wide cells read, counted from the first of [`READ`], and the
+/// weight of the second.
+type Weights = [(usize, f32); 8];
+
+/// Weights of linear interpolation; `is_centre`: values are at the centres on this axis.
+fn weights(is_centre: bool) -> Weights {
+    let half = if is_centre { 0.5 } else { 0.0 };
+    std::array::from_fn(|fine| {
+        let at = (fine as f32 + half) / WIDER as f32 - half + 1.0;
+        (at as usize, at - at.floor())
+    })
+}
+
 impl Reader<'_> {
-    /// Interpolates linearly at the places of a fine tile's values.
+    /// Interpolates at the places of a fine tile's values.
     pub fn read(&self, window: &mut Window, coord: Coord) -> Tile {
         let parent = coord.map(|x| x.div_euclid(WIDER));
         let mut out = [self.outside; 512];
         let Some(slot) = self.tiles.find(parent) else { return out };
-        window.fill(self.field, &self.tiles.neighbours()[slot as usize], 1, self.outside);
-        let wide = WIDER as f32;
-        let at = |axis: usize, index: usize| {
-            let within = (coord[axis].rem_euclid(WIDER) as usize * 8 + index) as f32;
-            let half = if self.axis == Some(axis) { 0.0 } else { 0.5 };
-            1.0 + (within + half) / wide - half
-        };
-        for (row, out) in out.chunks_exact_mut(8).enumerate() {
-            let place = [[at(0, row >> 3); 8], [at(1, row & 7); 8], std::array::from_fn(|lane| at(2, lane))];
-            out.copy_from_slice(&window.sample(&place));
-        }
+        let corner = coord.map(|x| x.rem_euclid(WIDER) * PART as i32 - 1);
+        let span = Span::new(corner, corner.map(|x| x + READ as i32));
+        window.fill(self.field, &self.tiles.neighbours()[slot as usize], &span, self.outside);
+        let weights = [0, 1, 2].map(|axis| weights(self.axis != Some(axis)));
+        interpolate(window, corner, &weights, &mut out);
         out
+    }
+}
+
+fn interpolate(window: &Window, corner: [i32; 3], weights: &[Weights; 3], out: &mut Tile) {
+    dispatch!(interpolate_rows(window: &Window, corner: [i32; 3], weights: &[Weights; 3], out: &mut Tile))
+}
+
+/// Along z, then y, then x.
+#[inline(always)]
+fn interpolate_rows(window: &Window, corner: [i32; 3], weights: &[Weights; 3], out: &mut Tile) {
+    let mix = |a: &[f32; 8], b: &[f32; 8], share: f32| -> [f32; 8] {
+        std::array::from_fn(|lane| (1.0 - share) * a[lane] + share * b[lane])
+    };
+    let mut lines = [[[0.0f32; 8]; READ]; READ];
+    for (x, lines) in lines.iter_mut().enumerate() {
+        for (y, line) in lines.iter_mut().enumerate() {
+            let [x, y] = [corner[0] + x as i32, corner[1] + y as i32];
+            let values: [f32; READ] = std::array::from_fn(|z| window.at(x, y, corner[2] + z as i32));
+            for (to, (first, share)) in line.iter_mut().zip(&weights[2]) {
+                *to = (1.0 - share) * values[*first] + share * values[first + 1];
+            }
+        }
+    }
+    let mut planes = [[[0.0f32; 8]; 8]; READ];
+    for (lines, plane) in lines.iter().zip(&mut planes) {
+        for (row, (first, share)) in plane.iter_mut().zip(&weights[1]) {
+            *row = mix(&lines[*first], &lines[first + 1], *share);
+        }
+    }
+    for (row, out) in out.chunks_exact_mut(8).enumerate() {
+        let (first, share) = weights[0][row >> 3];
+        out.copy_from_slice(&mix(&planes[first][row & 7], &planes[first + 1][row & 7], share));
     }
 }
 

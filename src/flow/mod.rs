@@ -9,8 +9,8 @@
 //! | active | a tile that holds cells of the flow |
 //! | rim | the tiles next to these: upper faces of their cells, and what the air around is like |
 //! | slot | index of a tile; the rim comes after the active ones |
-//! | around | a flow in cells four times as wide, which goes on where the active tiles end |
-//! | ambient | velocity of the air outside both, where the pressure is 0: sides are open |
+//! | around | a flow in cells twice as wide, which goes on where the active tiles end, and has one around it too |
+//! | ambient | velocity of the air outside all of them, where the pressure is 0: sides are open |
 //!
 //! Velocities are at the cells' *lower faces* (staggered grid: Harlow and Welch 1965), everything else at their centres.
 
@@ -20,25 +20,32 @@
 mod advect;
 mod around;
 mod multigrid;
+mod operator;
+mod paths;
 mod pockets;
 mod pressure;
+mod room;
 mod slip;
 mod solids;
+mod state;
 mod stencil;
 pub mod tiles;
+mod transfer;
+mod vorticity;
 mod window;
 
-pub use advect::{FARTHEST, Scheme};
+pub use advect::Scheme;
+pub use paths::FARTHEST;
 pub use pressure::Solved;
 pub use solids::{Faces, Solids};
+pub use state::Kept;
 pub use tiles::{Coord, Field, Tile, Tiles};
 
 use crate::context::Context;
 use crate::error::{Error, Result};
-use advect::{At, Paths};
-use multigrid::Operator;
-use pressure::Room;
+use multigrid::Multigrid;
 use rayon::prelude::*;
+use room::Room;
 
 /// A velocity, a density and a pressure on sparse tiles.
 #[derive(Debug, Default)]
@@ -54,14 +61,11 @@ pub struct Flow {
     density: Field,
     /// Pressure at the centres, of active tiles and the rim: see [`pressure`].
     pressure: Field,
-    /// The air around; none: the flow is that itself.
+    /// The air around; none: the flow is the widest one.
     around: Option<Box<Flow>>,
-    /// The operator of the last projection.
-    operator: Operator,
-    paths: Paths,
+    /// The operator of the last projection and its preconditioner.
+    multigrid: Multigrid,
     room: Room,
-    /// Fields that are between two uses.
-    spare: [Field; 2],
 }
 
 /// Open shares and speeds of faces for tiles with cells of an edge (m).
@@ -80,8 +84,13 @@ impl Flow {
             return Err(Error::argument("the wind is not finite"));
         }
         let cell = cell as f32;
-        let around = Self { cell: cell * around::WIDER as f32, ambient, ..Self::default() };
-        Ok(Self { cell, ambient, around: Some(Box::new(around)), ..Self::default() })
+        let wide = |level: u32| cell * around::WIDER.pow(level) as f32;
+        let mut flow = Self { cell: wide(around::LEVELS), ambient, ..Self::default() };
+        for level in (0..around::LEVELS).rev() {
+            let cell = wide(level);
+            flow = Self { cell, ambient, around: Some(Box::new(flow)), ..Self::default() };
+        }
+        Ok(flow)
     }
 
     /// Edge of a cell (m).
@@ -121,12 +130,14 @@ impl Flow {
             return;
         }
         let old = std::mem::replace(&mut self.tiles, Tiles::new(active));
-        let tiles = &self.tiles;
-        for (axis, speed) in self.ambient.into_iter().enumerate() {
-            self.velocity[axis] = tiles::moved(&self.velocity[axis], &old, tiles, tiles.count(), speed);
+        let Self { tiles, velocity, density, pressure, room, .. } = self;
+        let find = |coord: &Coord| old.find(*coord).unwrap_or(tiles::NONE);
+        let from: Vec<u32> = tiles.coords().par_iter().with_min_len(64).map(find).collect();
+        for (field, speed) in velocity.iter_mut().zip(self.ambient) {
+            room.move_tiles(field, &from, speed);
         }
-        self.pressure = tiles::moved(&self.pressure, &old, tiles, tiles.count(), 0.0);
-        self.density = tiles::moved(&self.density, &old, tiles, tiles.active(), 0.0);
+        room.move_tiles(pressure, &from, 0.0);
+        room.move_tiles(density, &from[..tiles.active()], 0.0);
         if let Some(around) = &mut self.around {
             around.resize(&around::tiles_around(active));
         }
@@ -139,12 +150,7 @@ impl Flow {
     fn read_around(&mut self, tiles: &Tiles, set: &Tiles) {
         let Some(around) = &self.around else { return };
         for axis in 0..3 {
-            let reader = around::Reader {
-                tiles: &around.tiles,
-                field: &around.velocity[axis],
-                axis: Some(axis),
-                outside: self.ambient[axis],
-            };
+            let reader = around.faces(axis);
             let faces = self.velocity[axis].par_iter_mut().zip(tiles.coords()).with_min_len(4);
             faces.for_each_init(window::Window::default, |window, (tile, coord)| {
                 let is_active = |coord| set.find(coord).is_some_and(|slot| (slot as usize) < set.active());
@@ -165,26 +171,13 @@ impl Flow {
     /// Carries velocity and density along for a time (s). Paths longer than [`FARTHEST`] cells are cut off.
     pub fn advect(&mut self, dt: f64, scheme: Scheme) {
         if let Some(around) = &mut self.around {
+            std::mem::swap(&mut around.room, &mut self.room);
             around.advect(dt, scheme);
+            std::mem::swap(&mut around.room, &mut self.room);
         }
-        let Self { tiles, velocity, density, paths, spare, ambient, .. } = self;
-        for field in paths.back.iter_mut().chain(&mut paths.ahead) {
-            field.resize(tiles.active(), [0.0; 512]);
-        }
-        paths.trace(tiles, velocity, *ambient, dt as f32 / self.cell, scheme);
-        let [hat, out] = spare;
-        for axis in 0..3 {
-            for field in [&mut *hat, &mut *out] {
-                field.resize(tiles.count(), [0.0; 512]);
-            }
-            paths.carry(tiles, (&velocity[axis], At::Faces(axis), ambient[axis]), hat, out, scheme);
-            std::mem::swap(&mut velocity[axis], out);
-        }
-        for field in [&mut *hat, &mut *out] {
-            field.truncate(tiles.active());
-        }
-        paths.carry(tiles, (density, At::Centres, 0.0), hat, out, scheme);
-        std::mem::swap(density, out);
+        let Self { tiles, velocity, density, ambient, around, room, .. } = self;
+        let scale = dt as f32 / self.cell;
+        advect::advect(tiles, (velocity, density), *ambient, scale, scheme, around.as_deref(), room);
     }
 
     /// Makes the velocity free of divergence: what is left, times the cell, is at most `tolerance` times the greatest speed.
@@ -194,25 +187,37 @@ impl Flow {
     pub fn project(&mut self, ctx: &Context, boundary: &Boundary<'_>, tolerance: f32) -> Result<Solved> {
         if let Some(mut around) = self.around.take() {
             around::restrict(self, &mut around);
+            std::mem::swap(&mut around.room, &mut self.room);
             let solved = around.project(ctx, boundary, tolerance);
+            std::mem::swap(&mut around.room, &mut self.room);
             self.press(&around);
             self.around = Some(around);
             solved?;
         }
         let solids = boundary(&self.tiles, self.cell)?;
-        let Self { tiles, velocity, pressure, room, .. } = self;
-        let (solved, operator) =
-            pressure::project(ctx, (tiles, &solids), velocity, pressure, room, tolerance)?;
-        self.operator = operator;
+        let Self { tiles, velocity, pressure, multigrid, room, .. } = self;
+        let fields = room.six(tiles);
+        let solved =
+            pressure::project(ctx, (tiles, &solids), velocity, pressure, multigrid, fields, tolerance)?;
         let tiles = std::mem::take(&mut self.tiles);
         self.read_around(&tiles, &tiles);
         self.tiles = tiles;
         Ok(solved)
     }
 
+    /// Its velocity at lower faces on an axis, for finer tiles.
+    fn faces(&self, axis: usize) -> around::Reader<'_> {
+        around::Reader {
+            tiles: &self.tiles,
+            field: &self.velocity[axis],
+            axis: Some(axis),
+            outside: self.ambient[axis],
+        }
+    }
+
     /// Takes the pressure in the rim from the air around.
     fn press(&mut self, around: &Self) {
-        let wide = around::continued(&around.operator, &around.pressure);
+        let wide = around::continued(&around.multigrid.finest, &around.pressure);
         let reader = around::Reader { tiles: &around.tiles, field: &wide, axis: None, outside: 0.0 };
         let (tiles, active) = (&self.tiles, self.tiles.active());
         let rim = self.pressure[active..].par_iter_mut().enumerate().with_min_len(4);
@@ -220,6 +225,11 @@ impl Flow {
             *tile = reader.read(window, tiles.coords()[active + index]);
             tile.iter_mut().for_each(|pressure| *pressure *= around::WIDER as f32);
         });
+    }
+
+    /// Takes the density out of cells that the solids of the last projection cover.
+    pub fn clear_covered(&mut self) {
+        self.multigrid.finest.clear_covered(&mut self.density);
     }
 
     /// Divergence of each cell times its edge (m/s), negative.

@@ -4,9 +4,9 @@
 
 use rayon::prelude::*;
 
-use super::multigrid::Operator;
+use super::operator::{Operator, layer};
 use super::stencil::Stencil;
-use super::tiles::{FACES, Field, NONE};
+use super::tiles::{FACES, NONE, Tile};
 
 /// Label of a cell that does not take part.
 const SOLID: u16 = u16::MAX;
@@ -81,7 +81,7 @@ impl Pockets {
     }
 
     /// Subtracts the mean over each pocket.
-    pub fn level(&self, field: &mut Field) {
+    pub fn level(&self, field: &mut [Tile]) {
         for pocket in &self.pockets {
             let (mut sum, mut count) = (0.0f64, 0usize);
             for (slot, cells) in pocket {
@@ -159,20 +159,10 @@ fn within(axis: usize, is_upper: bool, cell: usize) -> Option<usize> {
 
 /// Open share of a face of a cell.
 fn open(stencil: &Stencil, axis: usize, is_upper: bool, cell: usize) -> f32 {
-    let step = 64 >> (3 * axis);
     match (is_upper, within(axis, true, cell)) {
         (false, _) => stencil.lower[axis][cell],
         (true, Some(next)) => stencil.lower[axis][next],
-        (true, None) => stencil.upper[axis][layer(step, cell)],
-    }
-}
-
-/// Place of a cell of the last layer on an axis in that layer.
-fn layer(step: usize, cell: usize) -> usize {
-    match step {
-        64 => cell & 63,
-        8 => (cell >> 6) << 3 | cell & 7,
-        _ => cell >> 3,
+        (true, None) => stencil.upper[axis][layer(axis, cell)],
     }
 }
 
@@ -204,7 +194,7 @@ impl Groups {
         };
         let step = 64 >> (3 * axis);
         for at in 0..64 {
-            let low = super::multigrid::first(axis, at);
+            let low = super::operator::first(axis, at);
             let last = low + 7 * step;
             if stencil.is_none_or(|stencil| open(stencil, axis, true, last) > 0.0)
                 && let (Some(a), Some(b)) = (part(below, last), part(above, low))

@@ -5,7 +5,7 @@
 
 use rayon::prelude::*;
 
-use super::multigrid::{Multigrid, Operator};
+use super::multigrid::{self, Multigrid};
 use super::pockets::Pockets;
 use super::slip;
 use super::solids::Solids;
@@ -29,15 +29,6 @@ pub struct Solved {
 /// Most iterations.
 const MOST: usize = 200;
 
-/// Room for four fields.
-#[derive(Debug, Default)]
-pub struct Room {
-    pub residual: Field,
-    pub guess: Field,
-    pub direction: Field,
-    pub product: Field,
-}
-
 /// Changes the velocity (m/s, at lower faces) so that its divergence times the cell, in all cells that no solid covers, is at most
 /// `tolerance` times the greatest speed. `pressure` holds the first guess, and then the solution; in the rim, what it is there.
 ///
@@ -48,16 +39,13 @@ pub fn project(
     (tiles, solids): (&Tiles, &Solids),
     velocity: &mut [Field; 3],
     pressure: &mut Field,
-    room: &mut Room,
+    multigrid: &mut Multigrid,
+    [residual, guess, direction, product, spare, detour]: [&mut [Tile]; 6],
     tolerance: f32,
-) -> Result<(Solved, Operator)> {
-    let mut multigrid = Multigrid::new(Operator::new(tiles, solids));
+) -> Result<Solved> {
+    multigrid.become_of(tiles, solids);
     let fastest = max(fastest(velocity), solids.fastest());
     let aim = tolerance * fastest;
-    let Room { residual, guess, direction, product } = room;
-    for field in [&mut *residual, &mut *guess, &mut *direction, &mut *product] {
-        field.resize(tiles.active(), [0.0; 512]);
-    }
     let pockets = Pockets::find(&multigrid.finest);
     divergence(tiles, solids, velocity, guess);
     // Cells inside solids have no equation: what solids press together there must not reach the coarse levels.
@@ -66,14 +54,19 @@ pub fn project(
     pockets.level(pressure);
     multigrid.finest.compute(pressure, |slot| Task::Residual(&guess[slot]), residual);
     let mut solved = Solved { iterations: 0, divergence: greatest(residual), fastest };
-    let mut before = 0.0;
-    while solved.divergence > aim && solved.iterations < MOST {
+    let mut energy = 0.0;
+    // What a step leaves is there in the next one again: unless it is next to nothing, it is made less of at least once.
+    let is_due = |solved: &Solved| match solved.iterations {
+        0 => solved.divergence > 0.01 * aim,
+        _ => solved.divergence > aim,
+    };
+    while is_due(&solved) && solved.iterations < MOST {
         ctx.check()?;
-        let now = multigrid.cycle(residual, guess, product);
-        let share = if before > 0.0 { (now / before) as f32 } else { 0.0 };
-        before = now;
-        follow(direction, guess, share, solved.iterations == 0);
-        let energy = multigrid.finest.compute(direction, |_| Task::Product, product);
+        let now = multigrid.cycle(residual, guess, [&mut *spare, &mut *detour]);
+        // The new direction has no part along the old one, though the preconditioner is not symmetric (Notay 2000).
+        let along = if energy > 0.0 { multigrid::product(guess, product) / energy } else { 0.0 };
+        follow(direction, guess, -along as f32, solved.iterations == 0);
+        energy = multigrid.finest.compute(direction, |_| Task::Product, product);
         if !(energy > 0.0 && now > 0.0) {
             break;
         }
@@ -83,11 +76,11 @@ pub fn project(
     }
     accelerate(tiles, solids, pressure, velocity);
     slip::extend(tiles, &multigrid.finest, solids, velocity);
-    Ok((solved, multigrid.finest))
+    Ok(solved)
 }
 
 /// direction = guess + share direction.
-fn follow(direction: &mut Field, guess: &Field, share: f32, is_first: bool) {
+fn follow(direction: &mut [Tile], guess: &[Tile], share: f32, is_first: bool) {
     direction.par_iter_mut().zip(guess).with_min_len(64).for_each(|(direction, guess)| {
         if is_first {
             *direction = *guess;
@@ -98,7 +91,13 @@ fn follow(direction: &mut Field, guess: &Field, share: f32, is_first: bool) {
 }
 
 /// One step of the method. Returns the greatest residual.
-fn advance(pressure: &mut Field, residual: &mut Field, direction: &Field, product: &Field, step: f32) -> f32 {
+fn advance(
+    pressure: &mut [Tile],
+    residual: &mut [Tile],
+    direction: &[Tile],
+    product: &[Tile],
+    step: f32,
+) -> f32 {
     let tiles = pressure.par_iter_mut().zip(residual).zip(direction).zip(product).with_min_len(64);
     let each = tiles.map(|(((pressure, residual), direction), product)| {
         let mut most = [0.0f32; 8];
@@ -113,18 +112,18 @@ fn advance(pressure: &mut Field, residual: &mut Field, direction: &Field, produc
 }
 
 /// Greatest absolute value.
-fn greatest(field: &Field) -> f32 {
+fn greatest(field: &[Tile]) -> f32 {
     let of_tile = |tile: &Tile| tile.iter().fold(0.0, |most, value| max(most, value.abs()));
     field.par_iter().with_min_len(64).map(of_tile).reduce(|| 0.0, max)
 }
 
 /// Greatest speed (m/s) on any axis.
 pub fn fastest(velocity: &[Field; 3]) -> f32 {
-    velocity.iter().map(greatest).fold(0.0, max)
+    velocity.iter().map(|field| greatest(field)).fold(0.0, max)
 }
 
 /// What flows into each cell (m/s: the divergence times the cell, negative).
-pub fn divergence(tiles: &Tiles, solids: &Solids, velocity: &[Field; 3], out: &mut Field) {
+pub fn divergence(tiles: &Tiles, solids: &Solids, velocity: &[Field; 3], out: &mut [Tile]) {
     out.par_iter_mut().enumerate().with_min_len(16).for_each(|(slot, out)| {
         for (row, out) in out.chunks_exact_mut(8).enumerate() {
             let sides = [0, 1, 2].map(|axis| fluxes(tiles, solids, velocity, axis, slot, row));

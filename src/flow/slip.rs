@@ -3,7 +3,7 @@
 
 use rayon::prelude::*;
 
-use super::multigrid::Operator;
+use super::operator::Operator;
 use super::solids::Solids;
 use super::tiles::{Field, NONE, Tiles};
 

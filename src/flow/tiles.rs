@@ -38,20 +38,20 @@ impl Tiles {
     /// The set whose active tiles are these, sorted and each once.
     pub fn new(active: &[Coord]) -> Self {
         debug_assert!(active.is_sorted_by(|a, b| a < b));
-        let rim = padded(active, 1).into_iter().filter(|coord| active.binary_search(coord).is_err());
-        let rim: Vec<Coord> = rim.collect();
-        let mut tiles = Self { coords: active.to_vec(), active: active.len(), neighbours: Vec::new() };
-        tiles.coords.extend(rim);
-        tiles.neighbours = (0..tiles.coords.len()).map(|slot| tiles.around(tiles.coords[slot])).collect();
-        tiles
-    }
-
-    /// Slots of the 27 tiles around a coordinate.
-    fn around(&self, coord: Coord) -> [u32; 27] {
-        std::array::from_fn(|at| {
-            let offset = [at / 9, at / 3 % 3, at % 3].map(|x| x as i32 - 1);
-            self.find([0, 1, 2].map(|axis| coord[axis] + offset[axis])).unwrap_or(NONE)
-        })
+        // All tiles in their order, with their slots.
+        let mut all: Vec<(Coord, u32)> = padded(active, 1).into_iter().map(|coord| (coord, NONE)).collect();
+        let mut coords = active.to_vec();
+        let mut rest = active.iter().zip(0u32..).peekable();
+        for (coord, slot) in &mut all {
+            if let Some((_, next)) = rest.next_if(|(next, _)| *next == coord) {
+                *slot = next;
+            } else {
+                *slot = coords.len() as u32;
+                coords.push(*coord);
+            }
+        }
+        let neighbours = neighbours(&all);
+        Self { coords, active: active.len(), neighbours }
     }
 
     /// The slot of a coordinate.
@@ -60,6 +60,11 @@ impl Tiles {
         let found = active.binary_search(&coord);
         let found = found.or_else(|_| rim.binary_search(&coord).map(|slot| slot + self.active));
         found.ok().map(|slot| slot as u32)
+    }
+
+    /// Whether these are the same tiles as others.
+    pub fn is_of(&self, other: &Self) -> bool {
+        self.active == other.active && self.coords == other.coords
     }
 
     /// Coordinates of all tiles, by slot.
@@ -100,6 +105,31 @@ impl Tiles {
     }
 }
 
+/// Slots of the 27 tiles around each of sorted ones, by slot.
+fn neighbours(all: &[(Coord, u32)]) -> Vec<[u32; 27]> {
+    let mut out = vec![[NONE; 27]; all.len()];
+    for column in 0..9 {
+        let [x, y] = [column / 3, column % 3].map(|at| at - 1);
+        // The tiles sought come in the same order as those that seek them.
+        let mut next = 0;
+        for (coord, slot) in all {
+            let sought = [coord[0] + x, coord[1] + y, coord[2] - 1];
+            while all.get(next).is_some_and(|(coord, _)| *coord < sought) {
+                next += 1;
+            }
+            let mut found = next;
+            for z in 0..3 {
+                let wanted = [sought[0], sought[1], sought[2] + z];
+                if let Some((_, near)) = all.get(found).filter(|(coord, _)| *coord == wanted) {
+                    out[*slot as usize][(3 * column + z) as usize] = *near;
+                    found += 1;
+                }
+            }
+        }
+    }
+    out
+}
+
 /// A coordinate moved along an axis.
 pub fn shifted(mut coord: Coord, axis: usize, by: i32) -> Coord {
     coord[axis] += by;
@@ -110,22 +140,15 @@ pub fn shifted(mut coord: Coord, axis: usize, by: i32) -> Coord {
 pub fn padded(tiles: &[Coord], padding: i32) -> Vec<Coord> {
     let mut out = tiles.to_vec();
     for axis in 0..3 {
-        let wider = out.iter().flat_map(|coord| (-padding..=padding).map(|by| shifted(*coord, axis, by)));
+        // Sorted runs, which a stable sort merges.
+        let wider =
+            (-padding..=padding).flat_map(|by| out.iter().map(move |coord| shifted(*coord, axis, by)));
         let mut wider: Vec<Coord> = wider.collect();
-        wider.sort_unstable();
+        wider.sort();
         wider.dedup();
         out = wider;
     }
     out
-}
-
-/// A field on the first `count` of other tiles: values are kept where they were, new tiles get `fill`.
-pub fn moved(field: &[Tile], from: &Tiles, to: &Tiles, count: usize, fill: f32) -> Field {
-    let tile = |coord: &Coord| {
-        let slot = from.find(*coord);
-        slot.and_then(|slot| field.get(slot as usize)).copied().unwrap_or([fill; VOXELS])
-    };
-    to.coords[..count].iter().map(tile).collect()
 }
 
 #[cfg(test)]

@@ -3,80 +3,122 @@
 use super::tiles::Tile;
 
 /// Most cells around a tile: a displacement of five cells, and one for interpolation.
-pub const MOST: usize = 6;
-/// Room for the values, a power of two so that a masked index is in bounds: (8 + 2 x 6)^3 are 8000.
-const ROOM: usize = 8192;
+pub const MOST: i32 = 6;
+/// Layers, and rows of a layer: 8 + 2 x 6.
+const SIDE: usize = 20;
+/// Values of a row: whole rows of the tile and of the tiles before and behind it, which copies fastest.
+const ROW: usize = 24;
+/// Values of a layer.
+const LAYER: usize = SIDE * ROW;
+/// Index of the tile's first cell.
+const FIRST: usize = MOST as usize * (LAYER + ROW) + 8;
+/// Masks indices, which are in bounds then.
+const MASK: usize = 16383;
+/// Room for the values: the corners of a cell lie up to a layer, a row and a value behind its first one.
+const ROOM: usize = MASK + 1 + LAYER + ROW + 8;
+/// Room for rounding (cells) in the sum of a cell's place and a displacement.
+const ROUNDING: f32 = 1.0e-4;
 
-/// A cube of values: a tile and `margin` cells on each side.
+/// Cells that a window covers on each axis, counted from the tile's first one: `low` and those up to `high`, without it.
+#[derive(Debug, Clone, Copy)]
+pub struct Span {
+    low: [i32; 3],
+    high: [i32; 3],
+}
+
+impl Span {
+    /// A tile and `margin` cells (up to [`MOST`]) around it.
+    pub fn around(margin: i32) -> Self {
+        debug_assert!((0..=MOST).contains(&margin));
+        Self { low: [-margin; 3], high: [8 + margin; 3] }
+    }
+
+    /// Those from `low` up to `high`, without it.
+    pub fn new(low: [i32; 3], high: [i32; 3]) -> Self {
+        Self { low, high }
+    }
+
+    /// What interpolation reads for the first `cells` cells of a tile on each axis, moved by `ways` (cells): the least and the
+    /// greatest displacement on each axis.
+    pub fn moved(cells: [i32; 3], ways: &[[f32; 2]; 3]) -> Self {
+        let low = ways.map(|[least, _]| ((least - ROUNDING).floor() as i32).max(-MOST));
+        let high = [0, 1, 2].map(|axis| {
+            let most = (ways[axis][1] + ROUNDING).floor() as i32;
+            (cells[axis] + most + 1).min(8 + MOST)
+        });
+        Self { low, high }
+    }
+}
+
+/// A tile and cells around it.
 pub struct Window {
     values: Box<[f32; ROOM]>,
-    margin: usize,
-    size: usize,
 }
 
 impl Default for Window {
     fn default() -> Self {
-        Self { values: Box::new([0.0; ROOM]), margin: 0, size: 8 }
+        Self { values: Box::new([0.0; ROOM]) }
     }
 }
 
 impl Window {
     /// Copies a tile's surroundings; `outside` where there are no tiles.
-    pub fn fill(&mut self, field: &[Tile], neighbours: &[u32; 27], margin: usize, outside: f32) {
-        debug_assert!((1..=MOST).contains(&margin));
-        (self.margin, self.size) = (margin, 8 + 2 * margin);
-        let (low, size) = (8 - margin, self.size);
-        for x in 0..size {
-            let (tile_x, in_x) = ((low + x) / 8, (low + x) % 8);
-            for y in 0..size {
-                let (tile_y, in_y) = ((low + y) / 8, (low + y) % 8);
-                let near = &neighbours[tile_x * 9 + tile_y * 3..][..3];
-                let row = &mut self.values[(x * size + y) * size..][..size];
-                let at = in_x << 6 | in_y << 3;
-                let [before, own, after] = [near[0], near[1], near[2]].map(|near| field.get(near as usize));
-                let (first, rest) = row.split_at_mut(margin);
-                let (middle, last) = rest.split_at_mut(8);
-                for (z, to) in first.iter_mut().enumerate() {
-                    *to = before.map_or(outside, |tile| tile[at + low + z]);
-                }
-                match own {
-                    Some(tile) => middle.copy_from_slice(&tile[at..at + 8]),
-                    None => middle.fill(outside),
-                }
-                for (z, to) in last.iter_mut().enumerate() {
-                    *to = after.map_or(outside, |tile| tile[at + z]);
+    pub fn fill(&mut self, field: &[Tile], neighbours: &[u32; 27], span: &Span, outside: f32) {
+        for part in 0..27 {
+            let tile = [part / 9, part / 3 % 3, part % 3];
+            // On each axis, those cells of this tile that the window covers.
+            let low = [0, 1, 2].map(|axis| span.low[axis].max(8 * tile[axis] as i32 - 8));
+            let high = [0, 1, 2].map(|axis| span.high[axis].min(8 * tile[axis] as i32));
+            if (0..3).any(|axis| low[axis] >= high[axis]) {
+                continue;
+            }
+            let from = field.get(neighbours[part] as usize);
+            for x in low[0]..high[0] {
+                let layer = (x + MOST) as usize * LAYER + 8 * tile[2];
+                for y in low[1]..high[1] {
+                    let to = &mut self.values[layer + (y + MOST) as usize * ROW..][..8];
+                    let at = ((x & 7) << 6 | (y & 7) << 3) as usize;
+                    match from {
+                        Some(tile) => to.copy_from_slice(&tile[at..at + 8]),
+                        None => to.fill(outside),
+                    }
                 }
             }
         }
     }
 
-    /// Whether all values are 0.
-    pub fn is_zero(&self) -> bool {
-        self.values[..self.size.pow(3)].iter().all(|value| *value == 0.0)
-    }
-
-    /// Cells around the tile.
-    pub fn margin(&self) -> usize {
-        self.margin
-    }
-
-    /// The value at a place whose coordinates are non-negative integers (cells from the window's corner).
+    /// The value of a cell, counted from the tile's first one; each coordinate is at least -6.
     #[inline(always)]
-    pub fn at(&self, x: usize, y: usize, z: usize) -> f32 {
-        self.values[((x * self.size + y) * self.size + z) & (ROOM - 1)]
+    pub fn at(&self, x: i32, y: i32, z: i32) -> f32 {
+        let index = (x + MOST) as usize * LAYER + (y + MOST) as usize * ROW + (z + 8) as usize;
+        self.values[index & MASK]
     }
 
-    /// Trilinear interpolation at eight places (cells from the window's corner).
+    /// The values of eight cells along z, from one on that is counted from the tile's first one.
     #[inline(always)]
-    pub fn sample(&self, place: &[[f32; 8]; 3]) -> [f32; 8] {
-        let (corners, weights) = self.corners(place);
+    pub fn row(&self, x: usize, y: usize, z: usize) -> [f32; 8] {
+        let index = (FIRST + x * LAYER + y * ROW + z) & MASK;
+        std::array::from_fn(|lane| self.values[index + lane])
+    }
+
+    /// Trilinear interpolation at the places of a row's cells, moved by displacements (cells).
+    #[inline(always)]
+    pub fn sample(&self, row: usize, ways: &[[f32; 8]; 3]) -> [f32; 8] {
+        let (corners, weights) = self.corners(row, ways, None);
         interpolate(&corners, &weights)
     }
 
-    /// The same, with the least and the greatest of the eight values around each place.
+    /// The same at half a cell further on an axis.
     #[inline(always)]
-    pub fn sample_bounded(&self, place: &[[f32; 8]; 3]) -> [[f32; 8]; 3] {
-        let (corners, weights) = self.corners(place);
+    pub fn sample_between(&self, row: usize, ways: &[[f32; 8]; 3], axis: usize) -> [f32; 8] {
+        let (corners, weights) = self.corners(row, ways, Some(axis));
+        interpolate(&corners, &weights)
+    }
+
+    /// Trilinear interpolation, with the least and the greatest of the eight values around each place.
+    #[inline(always)]
+    pub fn sample_bounded(&self, row: usize, ways: &[[f32; 8]; 3]) -> [[f32; 8]; 3] {
+        let (corners, weights) = self.corners(row, ways, None);
         let mut bounds = [corners[0]; 2];
         for corner in &corners[1..] {
             for lane in 0..8 {
@@ -87,30 +129,48 @@ impl Window {
         [interpolate(&corners, &weights), bounds[0], bounds[1]]
     }
 
-    /// The values at the eight corners of the cells of places, and the places' weights in them.
+    /// The values at the eight corners of the cells of places, and the corners' weights. Mirrored places have mirrored weights to
+    /// the last bit.
     #[inline(always)]
-    fn corners(&self, place: &[[f32; 8]; 3]) -> ([[f32; 8]; 8], [[f32; 8]; 3]) {
-        let size = self.size;
-        let (most, last) = ((size - 1) as f32, size as i32 - 2);
-        let (mut base, mut weights) = ([0u32; 8], [[0.0f32; 8]; 3]);
+    fn corners(&self, row: usize, ways: &[[f32; 8]; 3], between: Option<usize>) -> ([[f32; 8]; 8], Weights) {
+        let (mut whole, mut weights) = ([[0.0f32; 8]; 3], [[[0.0f32; 8]; 2]; 3]);
         for axis in 0..3 {
             for lane in 0..8 {
-                let at = max(min(place[axis][lane], most), 0.0);
-                let whole = if at as i32 > last { last } else { at as i32 };
-                weights[axis][lane] = at - whole as f32;
-                base[lane] = base[lane] * size as u32 + whole as u32;
+                let at = ways[axis][lane];
+                let nearest = (at + WHOLE) - WHOLE;
+                if between == Some(axis) {
+                    whole[axis][lane] = nearest;
+                    weights[axis][0][lane] = 0.5 - (at - nearest);
+                    weights[axis][1][lane] = 0.5 + (at - nearest);
+                } else {
+                    let down = nearest - if nearest > at { 1.0 } else { 0.0 };
+                    whole[axis][lane] = down;
+                    weights[axis][0][lane] = (down + 1.0) - at;
+                    weights[axis][1][lane] = at - down;
+                }
             }
         }
+        let first = WHOLE + (FIRST + (row >> 3) * LAYER + (row & 7) * ROW) as f32;
+        let mut base = [0u32; 8];
+        for lane in 0..8 {
+            // Whole numbers: the sum is exact, and its low bits are the index.
+            let index = whole[0][lane] * LAYER as f32 + whole[1][lane] * ROW as f32 + whole[2][lane];
+            base[lane] = (index + (first + lane as f32)).to_bits();
+        }
         let mut corners = [[0.0f32; 8]; 8];
-        for (index, corner) in corners.iter_mut().enumerate() {
-            let shift = ((index >> 2) * size + (index >> 1 & 1)) * size + (index & 1);
-            for lane in 0..8 {
-                corner[lane] = self.values[(base[lane] as usize + shift) & (ROOM - 1)];
+        for lane in 0..8 {
+            let first = base[lane] as usize & MASK;
+            for (index, corner) in corners.iter_mut().enumerate() {
+                let shift = (index >> 2) * LAYER + (index >> 1 & 1) * ROW + (index & 1);
+                corner[lane] = self.values[first + shift];
             }
         }
         (corners, weights)
     }
 }
+
+/// 1.5 x 2^23: the sum with a small number is rounded to whole numbers.
+const WHOLE: f32 = 12_582_912.0;
 
 #[inline(always)]
 pub fn min(a: f32, b: f32) -> f32 {
@@ -122,15 +182,19 @@ pub fn max(a: f32, b: f32) -> f32 {
     if a > b { a } else { b }
 }
 
+/// Weights of the lower and the upper corners on each axis.
+type Weights = [[[f32; 8]; 2]; 3];
+
+/// Mirrored corners with mirrored weights have the same result to the last bit.
 #[inline(always)]
-fn interpolate(corners: &[[f32; 8]; 8], [x, y, z]: &[[f32; 8]; 3]) -> [f32; 8] {
+fn interpolate(corners: &[[f32; 8]; 8], [x, y, z]: &Weights) -> [f32; 8] {
     let mut out = [0.0; 8];
     for lane in 0..8 {
         let c = |index: usize| corners[index][lane];
-        let mix = |a: f32, b: f32, share: f32| a + (b - a) * share;
-        let low = mix(mix(c(0), c(1), z[lane]), mix(c(2), c(3), z[lane]), y[lane]);
-        let high = mix(mix(c(4), c(5), z[lane]), mix(c(6), c(7), z[lane]), y[lane]);
-        out[lane] = mix(low, high, x[lane]);
+        let mix = |a: f32, b: f32, [low, high]: &[[f32; 8]; 2]| a * low[lane] + b * high[lane];
+        let low = mix(mix(c(0), c(1), z), mix(c(2), c(3), z), y);
+        let high = mix(mix(c(4), c(5), z), mix(c(6), c(7), z), y);
+        out[lane] = mix(low, high, x);
     }
     out
 }
@@ -154,18 +218,36 @@ mod tests {
                 })
             })
             .collect();
-        let mut window = Window::default();
+        let middle = tiles.find([0, 0, 0]).unwrap() as usize;
+        let fill = |span: Span| {
+            // What a window does not cover must not be read.
+            let mut window = Window::default();
+            window.values.fill(f32::NAN);
+            window.fill(&field, &tiles.neighbours()[middle], &span, 0.0);
+            window
+        };
         for margin in 1..=MOST {
-            let middle = tiles.find([0, 0, 0]).unwrap() as usize;
-            window.fill(&field, &tiles.neighbours()[middle], margin, 0.0);
-            let from = margin as f32;
-            let place = [[from + 0.25; 8], [from + 7.5; 8], [from - 0.75; 8]];
-            let far = window.sample(&[[from + 7.75; 8], [from; 8], [from; 8]])[0];
-            assert!((far - 7.75).abs() < 1e-5, "{margin}: {far}");
-            let value = window.sample(&place)[3];
-            assert!((value - (0.25 + 15.0 + 2.25)).abs() < 1e-5, "{margin}: {value}");
-            let [_, low, high] = window.sample_bounded(&place).map(|values| values[0]);
-            assert_eq!((low, high), (14.0, 20.0));
+            let window = fill(Span::around(margin));
+            assert_eq!(window.at(-1, 3, 8), -1.0 + 6.0 - 24.0);
+            assert_eq!(window.row(1, 2, 1)[7], 5.0 - 24.0);
+            // Row 42 begins at (5, 2, 0).
+            let ways = [[0.25; 8], [0.5; 8], [-0.75; 8]];
+            let value = window.sample(42, &ways)[3];
+            assert!((value - (5.25 + 5.0 - 6.75)).abs() < 1e-5, "{margin}: {value}");
+            let far = margin as f32;
+            let value = window.sample(7, &[[-far; 8], [far - 0.25; 8], [0.0; 8]])[0];
+            assert!((value - (13.5 + far)).abs() < 1e-5, "{margin}: {value}");
+            let [_, low, high] = window.sample_bounded(42, &ways).map(|values| values[3]);
+            assert_eq!((low, high), (0.0, 6.0));
+        }
+        // Only what paths reach is covered, to the last cell.
+        let extent = [[-4.3, -3.7], [1.0, 1.0], [-0.2, 4.9]];
+        let window = fill(Span::moved([8; 3], &extent));
+        for (row, lane, ways) in [(0, 0, [-4.3, 1.0, -0.2]), (63, 7, [-3.7, 1.0, 4.9])] {
+            let value = window.sample(row, &ways.map(|way| [way; 8]))[lane];
+            let [x, y, z] = ways;
+            let cell = (row >> 3) as f32 + 2.0 * (row & 7) as f32 - 3.0 * lane as f32;
+            assert!((value - (cell + x + 2.0 * y - 3.0 * z)).abs() < 1e-5, "{value}");
         }
     }
 }

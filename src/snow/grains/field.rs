@@ -207,6 +207,15 @@ impl<'a> Window<'a> {
         self.probes.iter().any(|probe| matches!(probe, Probe::Leaf(_)))
     }
 
+    /// Whether some of it may be inside.
+    pub fn has_inside(&self) -> bool {
+        let may = |probe: &Probe<'_>| match probe {
+            Probe::Leaf(_) => true,
+            Probe::Tile { value, .. } => *value < 0.0,
+        };
+        self.probes.iter().any(may)
+    }
+
     fn value(&self, voxel: [i32; 3]) -> f32 {
         let leaf = [0, 1, 2]
             .map(|axis| ((voxel[axis] >> 3) - self.low[axis]).clamp(0, self.size[axis] as i32 - 1) as usize);

@@ -26,7 +26,7 @@ mod contacts;
 mod crowd;
 mod density;
 mod distance;
-mod field;
+pub(super) mod field;
 #[doc(hidden)]
 pub mod heap;
 mod layout;
@@ -35,7 +35,7 @@ mod params;
 mod rest;
 mod rows;
 mod search;
-mod shell;
+pub(super) mod shell;
 #[doc(hidden)]
 pub mod solve;
 mod sourcing;
@@ -61,6 +61,7 @@ use surroundings::{Bounds, Obstacles, TIES, have_stayed};
 
 pub use params::Params;
 pub use sourcing::{Base, PACKING, Removal, removals};
+pub(super) use surroundings::HOLES;
 pub use surroundings::{FASTEST_OBJECT, Object, Surroundings};
 
 /// Where and when a grain was created.

@@ -65,7 +65,7 @@ const GROUND: f32 = 0.5;
 const JUMP: f64 = 0.1;
 /// Holes of less than this share of an object's area are closed; an object with larger ones, such as a bowl, collides on both
 /// sides.
-const HOLES: f64 = 0.1;
+pub const HOLES: f64 = 0.1;
 /// Speed (m/s) over which an object does not move through a step but stands where it ends: it jumps from one shot, or from one
 /// side of a set, to the next.
 pub const FASTEST_OBJECT: f64 = 100.0;

@@ -1,0 +1,51 @@
+//! Room for fields that live within one call only: paths while values are carried, residuals while the pressure is solved, tiles
+//! on their way to other slots. It stays between calls and only grows, so that a step of as many tiles allocates nothing.
+
+use rayon::prelude::*;
+
+use super::tiles::{Field, Tile, Tiles};
+
+/// Fields whose values mean nothing between calls.
+#[derive(Debug, Default)]
+pub struct Room {
+    /// For active tiles and the rim.
+    wide: [Field; 3],
+    /// For active tiles.
+    fields: [Field; 6],
+}
+
+impl Room {
+    /// For the paths back and ahead of active tiles, and three fields that hold the rim too.
+    #[allow(clippy::type_complexity)]
+    pub fn paths(&mut self, tiles: &Tiles) -> ([&mut [Tile]; 3], [&mut [Tile]; 3], [&mut [Tile]; 3]) {
+        let Self { wide, fields } = self;
+        let [a, b, c, d, e, f] = fields.each_mut().map(|field| first(field, tiles.active()));
+        ([a, b, c], [d, e, f], wide.each_mut().map(|field| first(field, tiles.count())))
+    }
+
+    /// Six fields for active tiles.
+    pub fn six(&mut self, tiles: &Tiles) -> [&mut [Tile]; 6] {
+        self.fields.each_mut().map(|field| first(field, tiles.active()))
+    }
+
+    /// Moves a field to other slots: each new one's old slot, or none, where it gets `fill`.
+    pub fn move_tiles(&mut self, field: &mut Field, from: &[u32], fill: f32) {
+        let [room, ..] = &mut self.wide;
+        let to = first(room, from.len());
+        to.par_iter_mut().zip(from).with_min_len(16).for_each(|(to, from)| {
+            *to = field.get(*from as usize).copied().unwrap_or([fill; 512]);
+        });
+        std::mem::swap(field, room);
+        field.truncate(from.len());
+    }
+}
+
+/// The first tiles of a field, which grows to hold them.
+pub fn first(field: &mut Field, count: usize) -> &mut [Tile] {
+    if field.len() < count {
+        // A little more than now, not twice as much: fields are large, and the flow grows slowly.
+        field.reserve_exact(count + count / 16 - field.len());
+        field.resize(count, [0.0; 512]);
+    }
+    &mut field[..count]
+}

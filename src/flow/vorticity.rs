@@ -1,0 +1,152 @@
+//! Vorticity confinement: what advection damps of small eddies is given back to them (Steinhoff and Underhill 1994; Fedkiw, Stam
+//! and Jensen 2001, section 3): an acceleration gain h (N x w), where w is the vorticity and N points to where it is greatest.
+
+use rayon::prelude::*;
+
+use super::Flow;
+use super::tiles::{FACES, Tile};
+use super::window::{Span, Window};
+
+/// Cells around a tile of which velocities at centres, and vorticities, are computed.
+const CENTRES: usize = 3;
+const CURLS: usize = 2;
+/// Vorticity times a cell (m/s) under which it has no direction.
+const LEAST: f32 = 1.0e-6;
+
+/// Vectors in a cube of cells: a tile and a margin.
+struct Cube {
+    margin: usize,
+    values: Vec<[f32; 3]>,
+}
+
+impl Cube {
+    fn new(margin: usize, of: impl Fn([usize; 3]) -> [f32; 3]) -> Self {
+        let size = 8 + 2 * margin;
+        let at = |index: usize| [index / (size * size), index / size % size, index % size];
+        Self { margin, values: (0..size.pow(3)).map(|index| of(at(index))).collect() }
+    }
+
+    /// The vector of a cell that is counted in a cube with another margin, `by` cells on along an axis.
+    fn at(&self, cell: [usize; 3], margin: usize, axis: usize, by: isize) -> [f32; 3] {
+        let size = 8 + 2 * self.margin;
+        let mut at = cell.map(|x| x + self.margin - margin);
+        at[axis] = at[axis].wrapping_add_signed(by);
+        self.values[(at[0] * size + at[1]) * size + at[2]]
+    }
+}
+
+impl Flow {
+    /// Confines vorticity: `gain` is its strength (1/s) times the time (s).
+    pub fn confine(&mut self, gain: f32) {
+        let Self { tiles, velocity, ambient, .. } = self;
+        let near = tiles.neighbours();
+        let pushes: Vec<[Tile; 3]> = (0..tiles.active())
+            .into_par_iter()
+            .map_init(<[Window; 3]>::default, |windows, slot| {
+                for (axis, window) in windows.iter_mut().enumerate() {
+                    let span = Span::around(CENTRES as i32 + 1);
+                    window.fill(&velocity[axis], &near[slot], &span, ambient[axis]);
+                }
+                pushes(windows, gain)
+            })
+            .collect();
+        for (axis, field) in velocity.iter_mut().enumerate() {
+            field.par_iter_mut().take(tiles.active()).enumerate().for_each(|(slot, faces)| {
+                let below = near[slot][FACES[2 * axis]] as usize;
+                let step = 64 >> (3 * axis);
+                for (cell, face) in faces.iter_mut().enumerate() {
+                    let lower = match cell / step % 8 {
+                        0 => pushes.get(below).map_or(0.0, |push| push[axis][cell + 7 * step]),
+                        _ => pushes[slot][axis][cell - step],
+                    };
+                    *face += 0.5 * (lower + pushes[slot][axis][cell]);
+                }
+            });
+        }
+    }
+}
+
+/// What each cell of a tile gains (m/s).
+fn pushes(windows: &[Window; 3], gain: f32) -> [Tile; 3] {
+    let centre = |cell: [usize; 3]| {
+        std::array::from_fn(|axis| {
+            let low = cell.map(|x| x as i32 - CENTRES as i32);
+            let mut high = low;
+            high[axis] += 1;
+            let value = |at: [i32; 3]| windows[axis].at(at[0], at[1], at[2]);
+            0.5 * (value(low) + value(high))
+        })
+    };
+    let centres = Cube::new(CENTRES, centre);
+    // Times the edge of a cell.
+    let curls = Cube::new(CURLS, |cell| {
+        let slope = |component: usize, axis: usize| {
+            let [ahead, back] = [1, -1].map(|by| centres.at(cell, CURLS, axis, by)[component]);
+            0.5 * (ahead - back)
+        };
+        [slope(2, 1) - slope(1, 2), slope(0, 2) - slope(2, 0), slope(1, 0) - slope(0, 1)]
+    });
+    let length = |vector: [f32; 3]| vector.iter().map(|x| x * x).sum::<f32>().sqrt();
+    let mut out = [[0.0; 512]; 3];
+    for index in 0..512 {
+        let cell = [index >> 6, index >> 3 & 7, index & 7];
+        let toward: [f32; 3] = std::array::from_fn(|axis| {
+            let [ahead, back] = [1, -1].map(|by| length(curls.at(cell, 0, axis, by)));
+            ahead - back
+        });
+        let steep = length(toward);
+        if steep < LEAST {
+            continue;
+        }
+        let n = toward.map(|x| x / steep);
+        let w = curls.at(cell, 0, 0, 0);
+        let cross = [n[1] * w[2] - n[2] * w[1], n[2] * w[0] - n[0] * w[2], n[0] * w[1] - n[1] * w[0]];
+        for (axis, out) in out.iter_mut().enumerate() {
+            out[index] = gain * cross[axis];
+        }
+    }
+    out
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::flow::tiles::{Coord, padded};
+
+    /// Speed (m/s) of a column of turning air around the z axis, by the distance from it.
+    fn column() -> Flow {
+        let mut flow = Flow::new(0.1, [0.0; 3]).unwrap();
+        flow.resize(&padded(&[[0, 0, 0]], 2));
+        let (tiles, velocity, _) = flow.fields();
+        for (slot, coord) in tiles.coords().to_vec().into_iter().enumerate() {
+            for cell in 0..512usize {
+                let at = |axis: usize, half: f32| {
+                    (coord[axis] * 8) as f32 + (cell >> (6 - 3 * axis) & 7) as f32 + half - 4.0
+                };
+                let speed = |x: f32, y: f32| 1.0 / (1.0 + 0.1 * (x * x + y * y));
+                let (x, y) = (at(0, 0.0), at(1, 0.5));
+                velocity[0][slot][cell] = -y * speed(x, y);
+                let (x, y) = (at(0, 0.5), at(1, 0.0));
+                velocity[1][slot][cell] = x * speed(x, y);
+            }
+        }
+        flow
+    }
+
+    #[test]
+    fn a_vortex_turns_faster_and_air_at_rest_stays_so() {
+        let energy = |flow: &Flow, coord: Coord| {
+            let slot = flow.tiles().find(coord).unwrap() as usize;
+            flow.velocity().iter().flat_map(|field| field[slot]).map(|x| x * x).sum::<f32>()
+        };
+        let mut flow = column();
+        let before = energy(&flow, [0, 0, 0]);
+        flow.confine(0.2);
+        let after = energy(&flow, [0, 0, 0]);
+        assert!(after > 1.02 * before, "{before} {after}");
+        let mut still = Flow::new(0.1, [1.0, 0.0, 0.0]).unwrap();
+        still.resize(&padded(&[[0, 0, 0]], 1));
+        still.confine(0.2);
+        assert!(still.velocity()[0].iter().flatten().all(|x| *x == 1.0));
+    }
+}
