@@ -48,6 +48,10 @@ mod house;
 mod materials;
 #[path = "gates/mist.rs"]
 mod mist;
+#[path = "gates/mist_passes.rs"]
+mod mist_passes;
+#[path = "gates/mist_walls.rs"]
+mod mist_walls;
 #[path = "gates/oracle.rs"]
 mod oracle;
 #[path = "gates/particles.rs"]
@@ -107,6 +111,8 @@ fn main() {
     readers::run(&mut h);
     grains::run(&mut h);
     mist::run(&mut h);
+    mist_walls::run(&mut h);
+    mist_passes::run(&mut h);
     shot::run(&mut h);
     volumes::run(&mut h);
     capi::run(&mut h);

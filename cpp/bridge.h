@@ -105,6 +105,8 @@ int32_t grid_class(const G& grid) noexcept;
 template <typename G>
 void set_grid_class(G& grid, int32_t grid_class);
 template <typename G>
+void shift(G& grid, std::array<double, 3> by);
+template <typename G>
 rust::String name(const G& grid) noexcept;
 template <typename G>
 void set_name(G& grid, rust::Str name);

@@ -110,6 +110,11 @@ void set_grid_class(G& grid, int32_t value) {
 }
 
 template <typename G>
+void shift(G& grid, std::array<double, 3> by) {
+    grid.impl->grid->transform().postTranslate(openvdb::Vec3d(by[0], by[1], by[2]));
+}
+
+template <typename G>
 rust::String name(const G& grid) noexcept {
     return rust::String::lossy(grid.impl->grid->getName());
 }
@@ -206,6 +211,7 @@ rust::Vec<LeafView> probe(const G& grid, rust::Slice<const int32_t> origins) {
     template std::array<double, 3> index_to_world(const G&, std::array<double, 3>) noexcept; \
     template int32_t grid_class(const G&) noexcept;                                          \
     template void set_grid_class(G&, int32_t);                                               \
+    template void shift(G&, std::array<double, 3>);                                          \
     template rust::String name(const G&) noexcept;                                           \
     template void set_name(G&, rust::Str);                                                   \
     template uint64_t active_voxels(const G&) noexcept;                                      \

@@ -212,6 +212,15 @@ pub const GATES: &[Gate] = &[
     yes("house.stages"),
     yes("house.key"),
     yes("house.bare_cli"),
+    // The thesis' table 3.1: whole frames with writing, and the greatest memory of a stage.
+    gate("snow.shot.table_3_8a", "s", Most(3.0), Most(1.2)),
+    gate("snow.shot.table_3_8b", "s", Most(2.0), Most(0.8)),
+    gate("snow.shot.table_3_9a", "s", Most(14.0), Most(5.5)),
+    gate("snow.shot.table_3_9b", "s", Most(4.0), Most(1.6)),
+    gate("snow.shot.table_3_10", "s", Most(6.0), Most(2.3)),
+    gate("snow.shot.table_3_11", "s", Most(4.0), Most(1.5)),
+    gate("snow.shot.table_3_12", "s", Most(14.0), Most(5.0)),
+    gate("snow.shot.peak_3_11", "GB", Most(0.6), Most(0.4)),
     // Mist: projections around a ball that moves, still air, symmetry, order, what becomes of the mass, and of a grain's way.
     gate("snow.mist.divergence", "1", Most(1.0e-4), Most(1.0e-5)),
     none("snow.mist.density_negative", "1"),
@@ -222,6 +231,12 @@ pub const GATES: &[Gate] = &[
     gate("snow.mist.mass_drift", "%", Most(5.0), Most(1.0)),
     gate("snow.mist.padding", "%", Most(1.0), Most(0.2)),
     gate("snow.mist.dashes", "1", Most(0.0), Open),
+    // Solids that move through mist, and a pocket that they close.
+    gate("snow.mist.flux", "1", Most(1.0e-3), Open),
+    yes("snow.mist.pocket"),
+    // A pass of all stages: its files from 1 and 2 threads, at other CPU levels and after kills; mist leaves other stages alone.
+    yes("snow.mist.same_bytes"),
+    yes("snow.mist.apart"),
     // One step of two million cells on two threads, and its memory.
     gate("snow.mist.speed", "s", Most(0.3), Most(0.13)),
     gate("snow.mist.memory", "B", Most(120.0), Most(80.0)),

@@ -1,9 +1,9 @@
-//! Gates of the scenes of the thesis' table 3.1, grains only, including writing: mean time of eight frames spread over each
-//! shot. The shot is computed once, so that each of them resumes from the frame before it.
+//! Gates of the scenes of the thesis' table 3.1, grains only and whole frames, including writing: mean time of eight frames spread
+//! over each shot. The shot is computed once, so that each of them resumes from the frame before it.
 
 use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
-use std::time::SystemTime;
+use std::time::{Duration, SystemTime};
 
 use frazil::io::mesh;
 
@@ -11,53 +11,58 @@ use crate::common::character::data;
 use crate::common::sleigh::sleigh;
 use crate::harness::Harness;
 
+/// The gate of the greatest memory of all stages of the walk.
+const PEAK: &str = "snow.shot.peak_3_11";
 /// Count of measured frames of a shot.
 const COUNTED: usize = 8;
 
 /// A scene of the table.
 struct Scene {
-    gate: &'static str,
+    /// Gates of grains only, and of whole frames.
+    gates: [&'static str; 2],
     /// Name of the scene in examples/scenes.
     file: &'static str,
     /// File of its object in the test data; none: the sleigh.
     object: Option<&'static str>,
     compression: f64,
-    /// Time (s) of a frame on the thesis' six cores.
-    thesis: f64,
+    /// Times (s) of a frame on the thesis' six cores: grains only, and whole.
+    thesis: [f64; 2],
 }
 
 const SCENES: [Scene; 7] = {
     const fn scene(
-        gate: &'static str,
+        gates: [&'static str; 2],
         file: &'static str,
         object: Option<&'static str>,
         compression: f64,
-        thesis: f64,
+        thesis: [f64; 2],
     ) -> Scene {
-        Scene { gate, file, object, compression, thesis }
+        Scene { gates, file, object, compression, thesis }
     }
     let bunny = Some("mesh/stanford-bunny.obj");
     let [man, robot] = [Some("character/CesiumMan.glb"), Some("character/RobotExpressive.glb")];
     [
-        scene("snow.grains.table_3_8a", "grains_imprint", bunny, 0.0, 11.6),
-        scene("snow.grains.table_3_8b", "grains_imprint", bunny, 0.75, 4.4),
-        scene("snow.grains.table_3_9a", "grains_slide", bunny, 0.0, 81.3),
-        scene("snow.grains.table_3_9b", "grains_slide", bunny, 0.75, 15.9),
-        scene("snow.grains.table_3_10", "grains_sleigh", None, 0.0, 33.7),
-        scene("snow.grains.table_3_11", "grains_walk", man, 0.0, 11.3),
-        scene("snow.grains.table_3_12", "grains_roll", robot, 0.0, 39.3),
+        scene(["snow.grains.table_3_8a", "snow.shot.table_3_8a"], "grains_imprint", bunny, 0.0, [11.6, 19.5]),
+        scene(["snow.grains.table_3_8b", "snow.shot.table_3_8b"], "grains_imprint", bunny, 0.75, [4.4, 11.3]),
+        scene(["snow.grains.table_3_9a", "snow.shot.table_3_9a"], "grains_slide", bunny, 0.0, [81.3, 92.1]),
+        scene(["snow.grains.table_3_9b", "snow.shot.table_3_9b"], "grains_slide", bunny, 0.75, [15.9, 23.8]),
+        scene(["snow.grains.table_3_10", "snow.shot.table_3_10"], "grains_sleigh", None, 0.0, [33.7, 38.5]),
+        scene(["snow.grains.table_3_11", "snow.shot.table_3_11"], "grains_walk", man, 0.0, [11.3, 21.1]),
+        scene(["snow.grains.table_3_12", "snow.shot.table_3_12"], "grains_roll", robot, 0.0, [39.3, 57.5]),
     ]
 };
 
 pub fn run(h: &mut Harness) {
     for scene in &SCENES {
-        if !h.wants(scene.gate) {
+        let mut names = scene.gates.to_vec();
+        names.extend(scene.has_peak().then_some(PEAK));
+        if !names.iter().any(|name| h.wants(name)) {
             continue;
         }
         let folder = tempfile::tempdir().expect("a folder");
         match scene.object_in(folder.path()) {
             Some(object) => scene.measure(h, &object, &folder.path().join("out")),
-            None => h.skipped(scene.gate, "no data"),
+            None => names.into_iter().for_each(|name| h.skipped(name, "no data")),
         }
     }
 }
@@ -74,43 +79,83 @@ impl Scene {
         }
     }
 
+    /// Whether its memory is measured.
+    fn has_peak(&self) -> bool {
+        self.file == "grains_walk"
+    }
+
     fn measure(&self, h: &mut Harness, object: &Path, out: &Path) {
-        for stage in ["base", "grains"] {
-            let scene = format!("{}/examples/scenes/{}.toml", env!("CARGO_MANIFEST_DIR"), self.file);
-            let mut run = Command::new(env!("CARGO_BIN_EXE_frazil"));
-            run.arg("snow").arg(scene).arg("-o").arg(out).args(["-q", "--threads", "2", "--stage", stage]);
-            run.args(["--set", &format!("object.1.file={}", object.display())]);
-            run.args(["--set", &format!("grains.compression={}", self.compression)]);
-            assert!(run.stderr(Stdio::null()).status().expect("frazil").success());
+        let [grains, shot] = self.gates;
+        let is_whole = h.wants(shot) || self.has_peak() && h.wants(PEAK);
+        let stages: &[&'static str] =
+            if is_whole { &["base", "grains", "mist"] } else { &["base", "grains"] };
+        let peaks: Vec<f64> = stages.iter().map(|stage| self.run(object, out, stage)).collect();
+        let passes: Vec<Pass> = stages.iter().map(|stage| Pass::of(out, stage)).collect();
+        let [thesis, whole] = self.thesis;
+        if h.wants(grains) {
+            h.gate(grains, passes[1].mean(), &passes[1].note(out, thesis));
         }
-        let frames = Frames::of(out);
-        let counted: Vec<f64> = frames.spread().map(|frame| frames.seconds(frame)).collect();
-        let mean = |seconds: &[f64]| seconds.iter().sum::<f64>() / seconds.len() as f64;
-        let all: Vec<f64> = (1..frames.ends.len()).map(|frame| frames.seconds(frame)).collect();
-        let [count, resting, awake] = frames.counts(out);
-        let note = format!(
-            "threads=2 cpu={:?} thesis={} s on 6 cores; {count} grains in the end, {resting} of them rest; {:.1} thousand grains that are \
-             awake in a core-second; all frames {:.2} s, the longest {:.2}",
-            frazil::base::cpu::cpu_level(),
-            self.thesis,
-            awake / all.iter().sum::<f64>() / 2e3,
-            mean(&all),
-            all.iter().copied().fold(0.0, f64::max),
-        );
-        h.gate(self.gate, mean(&counted), &note);
+        if h.wants(shot) {
+            let parts: Vec<String> = stages
+                .iter()
+                .zip(&passes)
+                .map(|(stage, pass)| format!("{stage} {:.2}", pass.mean()))
+                .collect();
+            let sum = passes.iter().map(Pass::mean).sum();
+            let cpu = frazil::base::cpu::cpu_level();
+            h.gate(
+                shot,
+                sum,
+                &format!("threads=2 cpu={cpu:?} thesis={whole} s on 6 cores; {}", parts.join(", ")),
+            );
+        }
+        if self.has_peak() && h.wants(PEAK) {
+            let most = peaks.iter().copied().fold(0.0, f64::max);
+            let each: Vec<String> =
+                stages.iter().zip(&peaks).map(|(stage, peak)| format!("{stage} {peak:.2}")).collect();
+            h.gate(PEAK, most, &each.join(", "));
+        }
+    }
+
+    /// Makes a stage; its greatest memory (GB).
+    fn run(&self, object: &Path, out: &Path, stage: &str) -> f64 {
+        let scene = format!("{}/examples/scenes/{}.toml", env!("CARGO_MANIFEST_DIR"), self.file);
+        let mut run = Command::new(env!("CARGO_BIN_EXE_frazil"));
+        run.arg("snow").arg(scene).arg("-o").arg(out).args(["-q", "--threads", "2", "--stage", stage]);
+        run.args(["--set", &format!("object.1.file={}", object.display())]);
+        run.args(["--set", &format!("grains.compression={}", self.compression)]);
+        if stage == "mist" {
+            run.args(["--set", "mist.falling=false"]);
+        }
+        let mut child = run.stderr(Stdio::null()).spawn().expect("frazil");
+        let status = format!("/proc/{}/status", child.id());
+        let mut peak = 0.0f64;
+        loop {
+            let text = std::fs::read_to_string(&status).unwrap_or_default();
+            let line = text.lines().find_map(|line| line.strip_prefix("VmHWM:"));
+            let kilobytes = line.and_then(|line| line.split_whitespace().next()?.parse::<f64>().ok());
+            peak = peak.max(kilobytes.unwrap_or(0.0) * 1024.0 / 1e9);
+            if let Some(status) = child.try_wait().expect("a child") {
+                assert!(status.success(), "stage {stage}");
+                return peak;
+            }
+            std::thread::sleep(Duration::from_millis(20));
+        }
     }
 }
 
 /// Completion times of the frames of a pass.
-struct Frames {
+struct Pass {
+    stage: &'static str,
     ends: Vec<SystemTime>,
 }
 
-impl Frames {
-    /// Those of a folder; the first frame, which has no grains yet, is the start.
-    fn of(out: &Path) -> Self {
-        let end = |frame: usize| std::fs::metadata(record(out, frame)).and_then(|file| file.modified()).ok();
-        Self { ends: (1..).map_while(end).collect() }
+impl Pass {
+    /// Those of a folder; the first frame, before which nothing moves, is the start.
+    fn of(out: &Path, stage: &'static str) -> Self {
+        let end =
+            |frame: usize| std::fs::metadata(record(out, stage, frame)).and_then(|file| file.modified()).ok();
+        Self { stage, ends: (1..).map_while(end).collect() }
     }
 
     /// Mean time (s) of a frame and the one before: files are written while the next frame is computed.
@@ -120,25 +165,36 @@ impl Frames {
         took.map_or(0.0, |took| took.as_secs_f64()) / (frame - first) as f64
     }
 
-    /// The measured frames, including the last one.
-    fn spread(&self) -> impl Iterator<Item = usize> {
+    /// The mean time (s) of the measured frames, including the last one.
+    fn mean(&self) -> f64 {
         let last = self.ends.len() - 1;
-        (1..=COUNTED).map(move |n| n * last / COUNTED)
+        (1..=COUNTED).map(|n| self.seconds(n * last / COUNTED)).sum::<f64>() / COUNTED as f64
     }
 
-    /// Counts of grains at the end, of those at rest, and of those awake summed over all frames.
-    fn counts(&self, out: &Path) -> [f64; 3] {
+    /// What a pass of grains did; `thesis` is its time (s) there.
+    fn note(&self, out: &Path, thesis: f64) -> String {
         let number = |frame: usize, name: &str| {
-            let text = std::fs::read(record(out, frame)).expect("a report");
+            let text = std::fs::read(record(out, self.stage, frame)).expect("a report");
             let report: serde_json::Value = serde_json::from_slice(&text).expect("a report");
             report[name].as_f64().expect("a number")
         };
-        let frames = self.ends.len();
-        let awake = (2..=frames).map(|frame| number(frame, "grains") - number(frame, "resting")).sum();
-        [number(frames, "grains"), number(frames, "resting"), awake]
+        let last = self.ends.len();
+        let awake: f64 = (2..=last).map(|frame| number(frame, "grains") - number(frame, "resting")).sum();
+        let all: Vec<f64> = (1..last).map(|frame| self.seconds(frame)).collect();
+        let sum = all.iter().sum::<f64>();
+        format!(
+            "threads=2 cpu={:?} thesis={thesis} s on 6 cores; {} grains in the end, {} of them rest; {:.1} thousand grains that are \
+             awake in a core-second; all frames {:.2} s, the longest {:.2}",
+            frazil::base::cpu::cpu_level(),
+            number(last, "grains"),
+            number(last, "resting"),
+            awake / sum / 2e3,
+            sum / all.len() as f64,
+            all.iter().copied().fold(0.0, f64::max),
+        )
     }
 }
 
-fn record(out: &Path, frame: usize) -> PathBuf {
-    out.join(format!("report/grains.{frame:04}.json"))
+fn record(out: &Path, stage: &str, frame: usize) -> PathBuf {
+    out.join(format!("report/{stage}.{frame:04}.json"))
 }

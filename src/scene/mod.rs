@@ -187,6 +187,8 @@ pub struct Output {
     pub grains_usd: bool,
     /// Whether most of the grains' .vdb files hold only what changed since the frame before.
     pub grains_delta: bool,
+    /// `mist/mist.%04d.vdb`.
+    pub mist: bool,
     /// Volumes to render.
     pub volumes: VolumesOutput,
     /// `objects/objects.%04d.usda`: the objects as they moved, with velocities.
@@ -204,6 +206,8 @@ pub struct VolumesOutput {
     pub fog_base: bool,
     /// In `fog/fog.%04d.vdb`: the density of grains.
     pub fog_grains: bool,
+    /// In `fog/fog.%04d.vdb`: the density of the mist.
+    pub fog_mist: bool,
     /// `snow/snow.%04d.vdb`: the base united with resting grains.
     pub snow: bool,
     /// `mesh/mesh.%04d.ply`: the surface of the base.
@@ -215,7 +219,7 @@ pub struct VolumesOutput {
 impl VolumesOutput {
     /// Whether there is a fog.
     pub fn fog(self) -> bool {
-        self.fog_base || self.fog_grains
+        self.fog_base || self.fog_grains || self.fog_mist
     }
 
     /// Whether there is a mesh.
@@ -275,6 +279,7 @@ impl Scene {
         if let Some(snow) = &self.snow {
             out.extend(snow.files().map(|(_, path)| path.clone()));
         }
+        out.extend(self.values.get("mist.wind").and_then(Value::path).map(Path::to_path_buf));
         out.extend(self.values.get("grains.initial").and_then(Value::path).map(Path::to_path_buf));
         for object in &self.objects {
             let first = f64::from(self.shot.frames.first) - object.offset;

@@ -128,6 +128,7 @@ pub(super) mod ffi {
         fn background(grid: &Grid) -> f32;
         fn grid_class(grid: &Grid) -> i32;
         fn set_grid_class(grid: Pin<&mut Grid>, number: i32) -> Result<()>;
+        fn shift(grid: Pin<&mut Grid>, by: [f64; 3]) -> Result<()>;
         fn name(grid: &Grid) -> String;
         fn set_name(grid: Pin<&mut Grid>, name: &str) -> Result<()>;
         fn metadata(grid: &Grid) -> Result<Vec<Meta>>;
@@ -191,6 +192,8 @@ pub(super) mod ffi {
         fn vector_index_to_world(grid: &VectorGrid, index: [f64; 3]) -> [f64; 3];
         #[cxx_name = "grid_class"]
         fn vector_class(grid: &VectorGrid) -> i32;
+        #[cxx_name = "shift"]
+        fn shift_vectors(grid: Pin<&mut VectorGrid>, by: [f64; 3]) -> Result<()>;
         #[cxx_name = "set_grid_class"]
         fn set_vector_class(grid: Pin<&mut VectorGrid>, number: i32) -> Result<()>;
         #[cxx_name = "name"]

@@ -196,6 +196,14 @@ pub fn read_named(path: &Path, name: Option<&str>) -> Result<FloatGrid> {
     }
 }
 
+/// As [`read_named`], always in this process: for files whose content is known by its hash.
+///
+/// # Errors
+/// As [`read_named`].
+pub fn read_own_named(path: &Path, name: &str) -> Result<FloatGrid> {
+    decode::read_named(path, Some(name))
+}
+
 /// The grid of that name, of floats or of vectors; without a name the first level set, else the first float grid, else
 /// the first grid of vectors.
 ///

@@ -203,6 +203,14 @@ impl FloatGrid {
         ffi::set_grid_class(self.inner.pin_mut(), class.number()).map_err(fail)
     }
 
+    /// Moves the whole grid (m).
+    ///
+    /// # Errors
+    /// When memory runs out.
+    pub fn shift(&mut self, by: DVec3) -> Result<()> {
+        ffi::shift(self.inner.pin_mut(), by.into()).map_err(fail)
+    }
+
     /// The grid's name in a file.
     pub fn name(&self) -> String {
         ffi::name(&self.inner)

@@ -89,6 +89,14 @@ impl VectorGrid {
         ffi::set_vector_class(self.inner.pin_mut(), class.number()).map_err(fail)
     }
 
+    /// Moves the whole grid (m).
+    ///
+    /// # Errors
+    /// When memory runs out.
+    pub fn shift(&mut self, by: DVec3) -> Result<()> {
+        ffi::shift_vectors(self.inner.pin_mut(), by.into()).map_err(fail)
+    }
+
     /// The grid's name in a file.
     pub fn name(&self) -> String {
         ffi::vector_name(&self.inner)

@@ -19,6 +19,7 @@ mod cli {
     mod errors;
     mod examples;
     mod figures;
+    mod flipbook;
     mod honest;
     mod limits;
     mod outputs;
@@ -47,6 +48,7 @@ mod motion {
     mod gltf;
 }
 mod render {
+    mod fog;
     mod points;
     mod preview;
 }
@@ -59,6 +61,7 @@ mod scene {
     mod shot_grain_inputs;
     mod shot_grains;
     mod shot_inputs;
+    mod shot_mist;
     mod shot_runs;
     mod shot_upstream;
     mod shot_volumes;
@@ -72,6 +75,7 @@ mod snow {
     mod grains;
     mod holes;
     mod layers;
+    mod mist;
     mod state;
     mod volumes;
 }

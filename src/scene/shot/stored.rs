@@ -11,6 +11,7 @@ use crate::io::manifest::{Keeps, Manifest, Written};
 use crate::io::sealed;
 
 /// The frames of a stage that a folder holds.
+#[derive(Clone)]
 pub struct Stored {
     folder: PathBuf,
     stage: String,

@@ -313,7 +313,6 @@ impl RebuildGrains {
     pub fn stored(&self) -> &Stored {
         &self.stored
     }
-
     /// The bytes of a frame's file as `grains_mode = "full"` writes it, except for the hash of the settings in its metadata.
     /// Frames in ascending order cost one file each.
     ///
@@ -323,6 +322,14 @@ impl RebuildGrains {
         let (points, mut metadata) = self.whole.points(ctx, &self.stored, frame)?;
         metadata.retain(|(key, _)| key.starts_with("frazil:") && ![SINCE, GONE, OF].contains(&&key[..]));
         points::to_bytes(ctx, NAME, points, &WriteOptions { metadata, ..options.clone() })
+    }
+
+    /// The grains after a frame, sorted by identity. Frames in ascending order cost one file each.
+    ///
+    /// # Errors
+    /// As [`RebuildGrains::bytes`].
+    pub fn points(&mut self, ctx: &Context, frame: i32) -> Result<&Points> {
+        Ok(self.whole.points(ctx, &self.stored, frame)?.0)
     }
 }
 

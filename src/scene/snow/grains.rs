@@ -8,7 +8,7 @@ use super::forecast::Forecast;
 use super::grain_files::{self, WHOLE_EVERY, ordered, told_apart};
 use super::grain_keys::material;
 use super::inputs::Inputs;
-use super::{base, drift};
+use super::{base, drift, first_keys};
 use crate::base::{DVec3, Points};
 use crate::context::Context;
 use crate::error::{Error, Result};
@@ -17,8 +17,7 @@ use crate::io::{points_ply, usd_points};
 use crate::scene::shot::{
     Clip, FrameFiles, Kind, Prims, Reads, Report, Settings, Stage, Stepped, Stepping, Stored, To,
 };
-use crate::scene::text::key::Scope;
-use crate::scene::text::keys::{self, settings_of};
+use crate::scene::text::keys::settings_of;
 use crate::scene::{self, Role, Scene, moving};
 use crate::snow::base_layer::Grids;
 use crate::snow::grains::{self, Base, Object, Params, StepReport, Surroundings};
@@ -209,13 +208,7 @@ impl Stage for Grains<'_> {
     }
 
     fn of_first_state(&self, settings: &Settings) -> Settings {
-        let firsts = keys::all().iter().filter(|key| key.scope("grains") == Some(Scope::First));
-        let firsts: Vec<String> = firsts.map(|key| format!("{}.{}", key.table, key.name)).collect();
-        settings
-            .iter()
-            .filter(|(key, _)| firsts.contains(key))
-            .map(|(key, value)| (key.clone(), value.clone()))
-            .collect()
+        first_keys(settings, "grains")
     }
 
     fn upstream(&self) -> &'static [&'static str] {

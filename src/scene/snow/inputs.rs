@@ -4,6 +4,7 @@ use std::path::Path;
 use std::sync::Arc;
 
 use super::drift::Drift;
+use super::mist;
 use super::warnings::{replaced, too_small};
 use crate::base::mesh::{farthest, too_far as far_mesh};
 use crate::base::{DVec3, TriMesh};
@@ -16,7 +17,7 @@ use crate::motion::{Character, Key, Keys, MeshSequence, Motion, Placed, Play, Ri
 use crate::scene::{Ground, Layer, Object, Role, Scene, Snow, text};
 use crate::snow::base_layer::initial::{self, Cover};
 use crate::sweep::{self, Body, REACH};
-use crate::vdb::{FloatGrid, GridClass, file};
+use crate::vdb::{FloatGrid, GridClass, VectorGrid, file};
 
 /// Half width of the snow's narrow band (cells).
 const HALF_WIDTH: f32 = 3.0;
@@ -31,6 +32,8 @@ pub struct Inputs {
     pub bodies: Vec<Body>,
     /// Grains that are there from the start.
     pub(super) drift: Option<Drift>,
+    /// Wind that differs from place to place.
+    pub(super) wind: Option<VectorGrid>,
     /// What the files held when they were read.
     pub(in crate::scene) seen: Arc<Seen>,
     /// What about the files should be told, a sentence each; the log has it too.
@@ -113,8 +116,18 @@ impl Inputs {
         }
         warnings.extend(replaced(&scene.values));
         let drift = Drift::of(scene, snow.cell, &seen, &mut warnings)?;
+        let wind = match mist::wind_file(scene) {
+            None => None,
+            Some(path) => {
+                // OpenVDB reads the file itself: it must be the same before and after.
+                seen.hash(path)?;
+                let wind = mist::wind(path)?;
+                seen.note(path, hash::of_file(path)?)?;
+                Some(wind)
+            }
+        };
         warnings.iter().for_each(|warning| log::warn!("{warning}"));
-        Ok(Self { snow, source, statics, bodies, drift, seen, warnings })
+        Ok(Self { snow, source, statics, bodies, drift, wind, seen, warnings })
     }
 
     /// Least and greatest x and z of the snow (m), as far as they are known before it is made.

@@ -1,5 +1,6 @@
 //! The keys of `[snow]` and those that it has of each object, and the layer that they describe.
 
+use super::mist_keys::mist_params;
 use crate::error::Result;
 use crate::io::mesh::{EXTENSIONS, extension};
 use crate::scene::text::key::{Key, Kind, OBJECT, Scope};
@@ -9,8 +10,8 @@ use crate::snow::NoiseParams;
 
 type Scopes = &'static [(&'static str, Scope)];
 const FIRST: Scopes = &[("base", Scope::First)];
-/// Grains fall on the ground too.
-const GROUND: Scopes = &[("base", Scope::First), ("grains", Scope::First)];
+/// Grains fall on the ground too, and mist flows along it.
+const GROUND: Scopes = &[("base", Scope::First), ("grains", Scope::First), ("mist", Scope::First)];
 const STEP: Scopes = &[("base", Scope::Step)];
 
 /// Edges of voxels (m).
@@ -167,6 +168,12 @@ impl Snow {
         values.set_number("snow.noise.amplitude", noise.amplitude);
         if let Some(radius) = values.number("grains.radius") {
             values.set_number("grains.radius", radius * factor);
+        }
+        if let Some(params) = mist_params(values) {
+            let cell = params.cell * factor;
+            values.set_number("mist.cell", cell);
+            values.set_number("mist.turbulence_size", params.turbulence_size.max(8.0 * cell));
+            values.set_number("mist.noise_size", params.noise_size.max(cell));
         }
         Ok(())
     }

@@ -3,8 +3,9 @@
 use super::Inputs;
 use super::base::Base;
 use super::grains::Grains;
-use super::has_grains;
+use super::mist::Mist;
 use super::volumes::Volumes;
+use super::{has_grains, has_mist};
 use crate::scene::Scene;
 use crate::scene::objects::Objects;
 use crate::scene::shot::{AnyStage, Plan};
@@ -14,6 +15,9 @@ pub fn plan<'a>(scene: &'a Scene, inputs: &'a Inputs) -> Plan<'a> {
     let mut stages: Vec<Box<dyn AnyStage + 'a>> = vec![Box::new(Base::new(scene, inputs))];
     if has_grains(&scene.values) {
         stages.push(Box::new(Grains::new(scene, inputs)));
+    }
+    if has_mist(&scene.values) {
+        stages.push(Box::new(Mist::new(scene, inputs)));
     }
     let volumes = scene.output.volumes;
     if volumes.fog() || volumes.snow || volumes.mesh() {

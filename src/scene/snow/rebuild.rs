@@ -28,14 +28,18 @@ impl Rebuild {
         &self.stored
     }
 
-    /// The layer after a frame; frames in ascending order cost one file each.
+    /// The layer after a frame; frames in ascending order cost one file each, those between them that hold changes too.
     ///
     /// # Errors
     /// A frame that is not there; a file that is not what was written.
     pub fn layer(&mut self, ctx: &Context, frame: i32) -> Result<&Grids> {
+        let follows = |before: i32| {
+            before <= frame && (before + 1..=frame).all(|between| self.stored.keeps_changes(between))
+        };
         let grids = match self.at.take() {
-            Some((before, mut grids)) if before == frame - 1 && self.stored.keeps_changes(frame) => {
-                base::follow(ctx, &self.stored, &mut grids, frame)?;
+            Some((before, mut grids)) if follows(before) => {
+                (before + 1..=frame)
+                    .try_for_each(|next| base::follow(ctx, &self.stored, &mut grids, next))?;
                 grids
             }
             _ => base::grids(ctx, &self.stored, frame)?,

@@ -1,6 +1,6 @@
 //! What the keys of `[output]` that ask for volumes to render need of the rest of a scene.
 
-use super::has_grains;
+use super::{has_grains, has_mist};
 use crate::error::Result;
 use crate::scene::text::{Table, Values};
 use crate::scene::{Output, VolumesOutput};
@@ -12,6 +12,8 @@ pub struct Needs {
     pub base: bool,
     /// Whether they read grains.
     pub grains: bool,
+    /// Whether they read mist.
+    pub mist: bool,
 }
 
 impl Needs {
@@ -20,6 +22,7 @@ impl Needs {
         Self {
             base: asked.fog_base || asked.snow || asked.mesh(),
             grains: asked.fog_grains || asked.snow && has_grains(values),
+            mist: asked.fog_mist,
         }
     }
 }
@@ -34,6 +37,9 @@ pub fn check_volumes(table: &Table, values: &Values, output: &Output) -> Result<
     if asked.fog_grains && !has_grains(values) {
         return Err(table.error("fog", "names \"grains\", but the scene has no table [grains]"));
     }
+    if asked.fog_mist && !has_mist(values) {
+        return Err(table.error("fog", "names \"mist\", but the scene has no table [mist]"));
+    }
     let reader = match (asked.fog(), asked.snow) {
         (true, _) => "fog",
         (false, true) => "snow",
@@ -47,6 +53,9 @@ pub fn check_volumes(table: &Table, values: &Values, output: &Output) -> Result<
     if needs.grains && !output.grains_vdb {
         let what = format!("leaves out the .vdb files that `{reader}` is made from: add \"vdb\"");
         return Err(table.error("grains", what));
+    }
+    if needs.mist && !output.mist {
+        return Err(table.error("mist", "leaves out the .vdb files that `fog` is made from: add \"vdb\""));
     }
     Ok(())
 }

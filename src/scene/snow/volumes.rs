@@ -1,11 +1,11 @@
-//! The stage `volumes`: what renderers want of base and grains. A frame depends on no frame before it.
+//! The stage `volumes`: what renderers want of base, grains and mist. A frame depends on no frame before it.
 
 use serde_json::{Map, Value, json};
 
 use super::grain_files::Whole;
 use super::grains::params;
 use super::volume_keys::Needs;
-use super::{Inputs, base, memory};
+use super::{Inputs, base, memory, mist};
 use crate::base::points::Values;
 use crate::base::{DVec3, Points, TriMesh};
 use crate::context::Context;
@@ -44,6 +44,7 @@ struct Source<'s> {
     frame: i32,
     base: Option<&'s FloatGrid>,
     grains: Option<&'s Points>,
+    mist: Option<FloatGrid>,
 }
 
 /// Files of a frame: kinds, extensions and contents. Grids wait for the writer packed: those of several frames would take too
@@ -72,7 +73,7 @@ impl<'a> Volumes<'a> {
     /// Reads what a frame is made from.
     fn read<'s>(&self, ctx: &Context, state: &'s mut State, to: &To<'_>) -> Result<Source<'s>> {
         let State { layer, grains } = state;
-        let mut source = Source { frame: to.frame, base: None, grains: None };
+        let mut source = Source { frame: to.frame, base: None, grains: None, mist: None };
         if self.needs.base {
             let stored = self.stored(to.upstream, "base")?;
             let grids = match layer.take() {
@@ -87,11 +88,14 @@ impl<'a> Volumes<'a> {
         if self.needs.grains {
             source.grains = Some(grains.points(ctx, self.stored(to.upstream, "grains")?, to.frame)?.0);
         }
+        if self.needs.mist {
+            source.mist = Some(mist::density(self.stored(to.upstream, "mist")?, to.frame)?);
+        }
         Ok(source)
     }
 
     /// Makes the grids of the fog.
-    fn fog(&self, ctx: &Context, source: &Source<'_>) -> Result<Vec<FloatGrid>> {
+    fn fog(&self, ctx: &Context, source: &mut Source<'_>) -> Result<Vec<FloatGrid>> {
         let names = fog_names(self.asked);
         let mut grids = Vec::new();
         let mut add = |mut grid: FloatGrid, name: Option<&str>| {
@@ -105,6 +109,9 @@ impl<'a> Volumes<'a> {
         if let Some(points) = source.grains.filter(|_| self.asked.fog_grains) {
             let radius = self.radius();
             add(fog::grains(ctx, &places(points, |_| true), radius, fog::VOXEL * radius)?, names[1])?;
+        }
+        if let Some(mist) = source.mist.take() {
+            add(mist, names[2])?;
         }
         Ok(grids)
     }
@@ -129,7 +136,7 @@ impl<'a> Volumes<'a> {
     fn make(
         &self,
         ctx: &Context,
-        source: &Source<'_>,
+        source: &mut Source<'_>,
         made_from: &str,
     ) -> Result<(Files, Map<String, Value>)> {
         let (mut files, mut results) = (Files::new(), Map::new());
@@ -186,12 +193,11 @@ fn places(points: &Points, is_wanted: impl Fn(usize) -> bool) -> Vec<DVec3> {
     (0..points.count()).filter(|point| is_wanted(*point)).map(|point| points.position(point)).collect()
 }
 
-/// Names of the fog's grids of base and grains. One that is alone has the name that smoke shaders look for.
-fn fog_names(asked: VolumesOutput) -> [Option<&'static str>; 2] {
-    match (asked.fog_base, asked.fog_grains) {
-        (true, true) => [Some("base"), Some("grains")],
-        (is_base, is_grains) => [is_base, is_grains].map(|is_asked| is_asked.then_some("density")),
-    }
+/// Names of the fog's grids of base, grains and mist. One that is alone has the name that smoke shaders look for.
+fn fog_names(asked: VolumesOutput) -> [Option<&'static str>; 3] {
+    let parts = [(asked.fog_base, "base"), (asked.fog_grains, "grains"), (asked.fog_mist, "mist")];
+    let is_alone = parts.iter().filter(|(is_asked, _)| *is_asked).count() == 1;
+    parts.map(|(is_asked, name)| is_asked.then_some(if is_alone { "density" } else { name }))
 }
 
 impl Stage for Volumes<'_> {
@@ -224,11 +230,15 @@ impl Stage for Volumes<'_> {
     }
 
     fn upstream(&self) -> &'static [&'static str] {
-        match (self.needs.base, self.needs.grains) {
-            (true, true) => &["base", "grains"],
-            (true, false) => &["base"],
-            (false, true) => &["grains"],
-            (false, false) => &[],
+        match (self.needs.base, self.needs.grains, self.needs.mist) {
+            (true, true, true) => &["base", "grains", "mist"],
+            (true, true, false) => &["base", "grains"],
+            (true, false, true) => &["base", "mist"],
+            (true, false, false) => &["base"],
+            (false, true, true) => &["grains", "mist"],
+            (false, true, false) => &["grains"],
+            (false, false, true) => &["mist"],
+            (false, false, false) => &[],
         }
     }
 
@@ -250,19 +260,23 @@ impl Stage for Volumes<'_> {
 
     fn volumes(&self) -> Vec<Volume> {
         /// The density of a part, from the grid of its name or from the only one.
-        const fn density(grid: &'static str) -> Field {
-            Field { name: "density", grid, holds: Holds::Density(fog::DENSITY_SCALE) }
+        const fn density(grid: &'static str, scale: f32) -> [Field; 1] {
+            [Field { name: "density", grid, holds: Holds::Density(scale) }]
         }
-        const ALONE: &[Field] = &[density("density")];
-        const PARTS: [(&str, &[Field]); 2] =
-            [("fog_base", &[density("base")]), ("fog_grains", &[density("grains")])];
-        let of_part = |(name, (prim, own)): (Option<&str>, (&'static str, &'static [Field]))| {
-            let fields = if name? == "density" { ALONE } else { own };
+        type Part = (&'static str, [&'static [Field]; 2]);
+        const SNOW_SCALE: f32 = fog::DENSITY_SCALE;
+        const PARTS: [Part; 3] = [
+            ("fog_base", [&density("density", SNOW_SCALE), &density("base", SNOW_SCALE)]),
+            ("fog_grains", [&density("density", SNOW_SCALE), &density("grains", SNOW_SCALE)]),
+            ("fog_mist", [&density("density", 1.0), &density("mist", 1.0)]),
+        ];
+        let of_part = |(name, (prim, [alone, own])): (Option<&str>, Part)| {
+            let fields = if name? == "density" { alone } else { own };
             Some(Volume { kind: "fog", prim, fields, is_guide: false })
         };
         let fog = fog_names(self.asked).into_iter().zip(PARTS).filter_map(of_part);
-        const SNOW: &[Field] = &[Field::of("surface", Holds::Distance)];
-        let snow = Volume { kind: "snow", prim: "snow", fields: SNOW, is_guide: false };
+        const SURFACE: &[Field] = &[Field::of("surface", Holds::Distance)];
+        let snow = Volume { kind: "snow", prim: "snow", fields: SURFACE, is_guide: false };
         fog.chain(self.asked.snow.then_some(snow)).collect()
     }
 
@@ -297,8 +311,8 @@ impl Stepping for Volumes<'_> {
         let asked = [self.asked.fog(), self.asked.snow, self.asked.mesh()];
         let phases = 1 + 2 * asked.iter().filter(|is_asked| **is_asked).count();
         let work = || {
-            let source = ctx.phase("read", || self.read(ctx, state, to))?;
-            self.make(ctx, &source, made_from)
+            let mut source = ctx.phase("read", || self.read(ctx, state, to))?;
+            self.make(ctx, &mut source, made_from)
         };
         let ((step, results), phases) = ctx.step(phases, work).map_err(|error| match error {
             Error::Argument(what) => Error::file(&self.scene.path, format!("frame {}: {what}", to.frame)),

@@ -134,6 +134,7 @@ fn check(name: &str, table: &Table, values: &Values) -> Result<()> {
         "snow" => Snow::check(table, values),
         "snow.noise" => Snow::check_noise(table, values),
         "grains" => snow::check_grains(table, values),
+        "mist" => snow::check_mist(table, values),
         "output" => Output::check(table, values),
         _ => Ok(()),
     }

@@ -38,6 +38,8 @@ pub enum Kind {
     File(&'static [&'static str]),
     /// A height (m) at most so far from 0, or a file with one of these extensions.
     HeightOrFile(f64, &'static [&'static str]),
+    /// So many numbers, each at most so far from 0, in a unit; or a file with one of these extensions.
+    NumbersOrFile(usize, f64, &'static str, &'static [&'static str]),
     /// Rigid poses at frames, each place at most so far from the origin (m).
     Poses(f64),
 }

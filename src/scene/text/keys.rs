@@ -17,10 +17,10 @@ pub const FAR: f64 = 1.0e5;
 type Scopes = &'static [(&'static str, Scope)];
 
 /// Concerns every stage that knows the objects.
-const MOVES: Scopes = &[("base", Object), ("grains", Object), ("objects", Step)];
+const MOVES: Scopes = &[("base", Object), ("grains", Object), ("mist", Object), ("objects", Step)];
 
 /// Tables whose stages a scene has only where it has the table.
-pub const OPTIONAL: &[&str] = &["grains"];
+pub const OPTIONAL: &[&str] = &["grains", "mist"];
 
 /// Extensions of what moves: characters and meshes.
 const MOVING: &[&str] = &["glb", "gltf", EXTENSIONS[0], EXTENSIONS[1], EXTENSIONS[2]];
@@ -29,12 +29,13 @@ const SHOT: &[Key] = &[
     Key::new("shot", "frames", Kind::Frames, "first and last").begins_with("\"1-120\"").concerns(&[
         ("base", First),
         ("grains", First),
+        ("mist", First),
         ("objects", First),
         ("volumes", First),
     ]),
     Key::new("shot", "fps", Kind::Number(0.001, 100_000.0, "frames per second"), "frames per second")
         .or("24.0")
-        .concerns(&[("base", Step), ("grains", Step), ("objects", Step), ("volumes", Step)]),
+        .concerns(&[("base", Step), ("grains", Step), ("mist", Step), ("objects", Step), ("volumes", Step)]),
 ];
 
 const OBJECTS: &[Key] = &[
@@ -128,8 +129,16 @@ const OUTPUT: &[Key] = &[
     .concerns(&[("grains", Output)]),
     Key::new(
         "output",
+        "mist",
+        Kind::Choices(&["vdb"]),
+        "mist/mist.%04d.vdb: density, and vel (m/s) at the cells' centres; [] = none",
+    )
+    .or("[\"vdb\"]")
+    .concerns(&[("mist", Output)]),
+    Key::new(
+        "output",
         "fog",
-        Kind::Choices(&["base", "grains"]),
+        Kind::Choices(&["base", "grains", "mist"]),
         "fog/fog.%04d.vdb: densities to render, of each of these a grid (see docs/snow.md)",
     )
     .or("[]")
@@ -165,7 +174,7 @@ const OUTPUT: &[Key] = &[
 /// has of each object behind the shared ones.
 pub fn all() -> &'static [Key] {
     static ALL: LazyLock<Vec<Key>> = LazyLock::new(|| {
-        let mut keys = [SHOT, OBJECTS, OUTPUT, snow::KEYS, snow::GRAIN_KEYS].concat();
+        let mut keys = [SHOT, OBJECTS, OUTPUT, snow::KEYS, snow::GRAIN_KEYS, snow::MIST_KEYS].concat();
         keys.sort_by_key(|key| match key.table {
             "shot" => 0,
             OBJECT => 2,

@@ -116,6 +116,10 @@ fn holds(key: &Key) -> String {
         Kind::HeightOrFile(far, extensions) => {
             format!("-{0} to {0} m, or {1}", short(far), any_of(extensions))
         }
+        Kind::NumbersOrFile(count, far, unit, extensions) => {
+            let numbers = format!("{count} numbers, each -{0} to {0}{1}", short(far), of_unit(unit));
+            format!("{numbers}, or {}", any_of(extensions))
+        }
         Kind::Poses(_) => "list of `{ frame, at, turn_deg }`".to_string(),
     };
     if key.of_characters { format!("{held}; .glb and .gltf") } else { held }

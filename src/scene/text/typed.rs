@@ -63,9 +63,11 @@ impl Output {
             grains_ply: holds("output.grains", "ply"),
             grains_usd: holds("output.grains", "usd"),
             grains_delta: values.get("output.grains_mode").and_then(Value::text) == Some("delta"),
+            mist: holds("output.mist", "vdb"),
             volumes: VolumesOutput {
                 fog_base: holds("output.fog", "base"),
                 fog_grains: holds("output.fog", "grains"),
+                fog_mist: holds("output.fog", "mist"),
                 snow: flag("output.snow"),
                 mesh_ply: holds("output.mesh", "ply"),
                 mesh_usd: holds("output.mesh", "usd"),
@@ -91,6 +93,11 @@ impl Output {
         if snow::has_grains(values) && output.grains_delta && !output.grains_vdb {
             return Err(
                 table.error("grains_mode", "= \"delta\" is for .vdb files: `grains` must hold \"vdb\"")
+            );
+        }
+        if snow::has_mist(values) && !output.grains_vdb {
+            return Err(
+                table.error("grains", "leaves out what `[mist]` reads of every frame: it must hold \"vdb\"")
             );
         }
         if output.half && output.base && output.base_mode == BaseMode::Delta {

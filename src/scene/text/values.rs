@@ -252,13 +252,7 @@ fn read(key: &Key, table: &Table, cell: Option<f64>) -> Result<Option<Value>> {
             table.number_in(name, low * cell..=high * cell, &unit)?.map(Value::Number)
         }
         Kind::Whole(low, high) => table.integer_in(name, low..=high)?.map(Value::Whole),
-        Kind::Numbers(count, far, unit) => {
-            let numbers = table.numbers(name, count)?;
-            if numbers.iter().flatten().any(|number| number.abs() > far) {
-                return Err(table.error(name, format!("must lie within {far} {unit} of 0")));
-            }
-            numbers.map(Value::Numbers)
-        }
+        Kind::Numbers(count, far, unit) => numbers(name, table, count, far, unit)?,
         Kind::File(extensions) => match table.path(name)? {
             None => None,
             Some(path) => Some(file(key, table, path, extensions, "")?),
@@ -270,6 +264,10 @@ fn read(key: &Key, table: &Table, cell: Option<f64>) -> Result<Option<Value>> {
             (_, Ok(Some(_))) => return Err(table.error(name, format!("must lie in -{far} to {far} m"))),
             (_, Err(_)) => return Err(table.error(name, "must be a number (m) or the name of a mesh file")),
         },
+        Kind::NumbersOrFile(count, far, unit, extensions) => match table.path(name) {
+            Ok(Some(path)) => Some(file(key, table, path, extensions, &format!("{count} numbers or "))?),
+            _ => numbers(name, table, count, far, unit)?,
+        },
         Kind::Poses(far) => {
             if table.has(name) {
                 Some(Value::Poses(poses(name, table, far)?))
@@ -278,6 +276,14 @@ fn read(key: &Key, table: &Table, cell: Option<f64>) -> Result<Option<Value>> {
             }
         }
     })
+}
+
+fn numbers(name: &str, table: &Table, count: usize, far: f64, unit: &str) -> Result<Option<Value>> {
+    let numbers = table.numbers(name, count)?;
+    if numbers.iter().flatten().any(|number| number.abs() > far) {
+        return Err(table.error(name, format!("must lie within {far} {unit} of 0")));
+    }
+    Ok(numbers.map(Value::Numbers))
 }
 
 fn file(key: &Key, table: &Table, path: PathBuf, extensions: &[&str], or: &str) -> Result<Value> {

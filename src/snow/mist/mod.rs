@@ -4,28 +4,47 @@
 //! heavier than the air around, so that gravity acts there alone. Mist reads grains and never changes them; what it holds is not
 //! taken from theirs, and dissipates.
 
+mod coarse;
+#[cfg(feature = "vdb")]
+mod corners;
 mod forces;
+#[cfg(feature = "vdb")]
+mod grids;
 mod params;
+#[cfg(feature = "vdb")]
+mod shares;
 mod sources;
+mod sow;
+mod state;
+#[cfg(feature = "vdb")]
+mod surroundings;
+mod turbulence;
+mod wind;
 
 use rayon::prelude::*;
 
 use crate::context::{Context, PhaseTime};
 use crate::error::{Error, Result};
 use crate::flow::{Coord, FARTHEST, Flow, Scheme, Solids, Tiles, tiles};
+use sources::Seed;
 
+#[cfg(feature = "vdb")]
+pub use grids::Grids;
 pub use params::Params;
 pub use sources::Source;
+#[cfg(feature = "vdb")]
+pub use surroundings::{Surroundings, Walls};
+pub use wind::Wind;
 
 /// Density under which there is no mist.
-pub const LEAST: f32 = 1.0e-4;
+pub const LEAST: f32 = 2.0e-3;
 /// Greatest factor by which mass that advection lost is put back in a sub-step.
 const MOST_GAIN: f64 = 1.1;
-/// Most sub-steps of a step.
+/// Most sub-steps of a step, and most parts of a sub-step.
 const MOST: usize = 1000;
 
 /// What a step did.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, Default)]
 pub struct StepReport {
     /// Count of active cells after it.
     pub cells: usize,
@@ -45,14 +64,41 @@ pub struct StepReport {
     pub phases: Vec<PhaseTime>,
 }
 
+/// Bytes that a step takes for each active cell at most, with the air around and solids.
+const BYTES_PER_CELL: u64 = 220;
+
+/// Memory (bytes) of a step with so many active tiles.
+fn memory(tiles: usize) -> u64 {
+    512 * tiles as u64 * BYTES_PER_CELL
+}
+
 /// Open shares and speeds of faces for tiles with cells of an edge (m), at a share 0..=1 of a step.
 pub type Boundary<'a> = dyn Fn(&Tiles, f32, f64) -> Result<Solids> + Sync + 'a;
+
+/// What acts on mist in a step.
+pub struct Around<'a> {
+    /// Grains, of which the fast ones raise mist.
+    pub sources: &'a [Source],
+    /// What it flows around.
+    pub boundary: &'a Boundary<'a>,
+    /// Greatest speed (m/s) of what it flows around.
+    pub fastest: f64,
+    /// Wind that differs from place to place; none: that of [`Params::wind`] is everywhere.
+    pub wind: Option<&'a Wind<'a>>,
+}
 
 /// Mist in the air.
 #[derive(Debug)]
 pub struct Mist {
     params: Params,
     flow: Flow,
+}
+
+impl Clone for Mist {
+    /// A copy of what is carried from step to step.
+    fn clone(&self) -> Self {
+        Self { params: self.params.clone(), flow: self.flow.copy() }
+    }
 }
 
 impl Mist {
@@ -66,9 +112,49 @@ impl Mist {
         Ok(Self { params, flow })
     }
 
+    /// Resumes from a state that [`Mist::save`] wrote.
+    ///
+    /// # Errors
+    /// A parameter out of range; bytes that are not a valid state.
+    pub fn resume(params: Params, bytes: &[u8]) -> Result<Self> {
+        let mut mist = Self::new(params)?;
+        state::load(&mut mist, bytes)?;
+        Ok(mist)
+    }
+
+    /// Count of bytes of a saved state before it was packed; 0 if it is not one.
+    pub fn unpacked(bytes: &[u8]) -> u64 {
+        state::unpacked(bytes)
+    }
+
+    /// The exact state as bytes, the same for any number of threads.
+    pub fn save(&self) -> Vec<u8> {
+        state::save(self)
+    }
+
     /// The parameters.
     pub fn params(&self) -> &Params {
         &self.params
+    }
+
+    /// Sets the parameters from the next step on.
+    ///
+    /// # Errors
+    /// A parameter out of range, another cell or another wind; the old parameters are then kept.
+    pub fn set_params(&mut self, params: Params) -> Result<()> {
+        params.validate()?;
+        let old = &self.params;
+        if params.cell != old.cell {
+            return Err(Error::argument(format!("cell = {} cannot change, it is {}", params.cell, old.cell)));
+        }
+        if params.wind != old.wind {
+            return Err(Error::argument(format!(
+                "wind = {:?} cannot change, it is {:?}",
+                params.wind, old.wind
+            )));
+        }
+        self.params = params;
+        Ok(())
     }
 
     /// The air: velocity and density.
@@ -78,95 +164,120 @@ impl Mist {
 
     /// Adds mist: density and velocity (m/s) at a cell, none where the density is 0.
     pub fn add(&mut self, tiles: &[Coord], of: impl Fn([i32; 3]) -> (f32, [f32; 3])) {
-        let seed = |coord: &Coord| {
-            let (mut density, mut velocity) = (Box::new([0.0; 512]), Box::new([[0.0; 512]; 3]));
-            for cell in 0..512usize {
-                let at = [cell >> 6, cell >> 3 & 7, cell & 7];
-                let (value, speed) = of([0, 1, 2].map(|axis| coord[axis] * 8 + at[axis] as i32));
-                density[cell] = value;
-                (0..3).for_each(|axis| velocity[axis][cell] = speed[axis]);
-            }
-            sources::Seed { coord: *coord, density, velocity }
-        };
-        let seeds: Vec<sources::Seed> = tiles.iter().map(seed).collect();
+        let seeds = sow::seeds(tiles, of);
+        self.flow.resize(&self.wanted(&seeds));
         self.sow(&seeds);
     }
 
-    /// Moves the mist through a step of `dt` (s), in which grains raise more of it. After an error it is somewhere within the
-    /// step: it must not be stepped any further.
+    /// Moves the mist from `from` to `to` (s), while grains raise more of it. A step that fails or is cancelled leaves it as it
+    /// was.
     ///
     /// # Errors
-    /// A time that is not positive; cancel; errors of the boundary.
-    pub fn step(
-        &mut self,
-        ctx: &Context,
-        sources: &[Source],
-        boundary: &Boundary<'_>,
-        dt: f64,
-    ) -> Result<StepReport> {
-        if !(dt > 0.0 && dt.is_finite()) {
-            return Err(Error::argument(format!("dt = {dt} is not over 0")));
+    /// Times that do not ascend; a grain that is not finite or too large; air that moves too fast for its cells; more memory than
+    /// the context allows; cancel; errors of the boundary.
+    pub fn step(&mut self, ctx: &Context, around: &Around<'_>, times: [f64; 2]) -> Result<StepReport> {
+        let [from, to] = times;
+        if !(to > from && (to - from).is_finite()) {
+            return Err(Error::argument(format!("a step from {from} s to {to} s does not go on in time")));
         }
-        let raising: Vec<Source> =
-            sources.iter().filter(|source| source.raises(&self.params)).copied().collect();
-        let (mut report, phases) =
-            ctx.step(1, || ctx.phase("flow", || self.carry(ctx, &raising, boundary, dt)))?;
-        (report.sources, report.phases) = (raising.len(), phases);
-        Ok(report)
+        around.sources.iter().try_for_each(|source| source.check(self.params.cell))?;
+        let raising = around.sources.iter().filter(|source| source.raises(&self.params));
+        let raising: Vec<Source> = raising.copied().collect();
+        let before = self.flow.keep();
+        let around = Around { sources: &raising, ..*around };
+        match ctx.step(1, || ctx.phase("flow", || self.carry(ctx, &around, times))) {
+            Ok((report, phases)) => Ok(StepReport { sources: raising.len(), phases, ..report }),
+            Err(error) => {
+                self.flow.put_back(before);
+                Err(error)
+            }
+        }
     }
 
-    /// Count of sub-steps in which nothing moves farther than [`FARTHEST`] cells.
-    fn sub_steps(&self, sources: &[Source], dt: f64) -> usize {
-        let speeds = sources.iter().flat_map(|source| source.velocity);
-        let fastest = speeds.fold(self.flow.fastest(), |most, speed| most.max(speed.abs()));
-        let speed = f64::from(fastest) + self.params.gravity.abs() * dt;
-        let count = (speed * dt / (f64::from(FARTHEST) * self.params.cell)).ceil();
-        (count as usize).clamp(1, MOST)
-    }
-}
-
-impl Mist {
     /// Moves the mist in sub-steps, in each of which grains raise more along their way.
-    fn carry(
-        &mut self,
-        ctx: &Context,
-        sources: &[Source],
-        boundary: &Boundary<'_>,
-        dt: f64,
-    ) -> Result<StepReport> {
-        let sub_steps = self.sub_steps(sources, dt);
-        let part = dt / sub_steps as f64;
-        let mut report = StepReport {
-            cells: 0,
-            mass: 0.0,
-            sources: 0,
-            sub_steps,
-            iterations: 0,
-            divergence: 0.0,
-            fastest: 0.0,
-            phases: Vec::new(),
-        };
+    fn carry(&mut self, ctx: &Context, around: &Around<'_>, [from, to]: [f64; 2]) -> Result<StepReport> {
+        let sub_steps = self.sub_steps(around, to - from)?;
+        let part = (to - from) / sub_steps as f64;
+        let mut report = StepReport { sub_steps, ..StepReport::default() };
         ctx.expect(sub_steps);
         for sub in 0..sub_steps {
             ctx.check()?;
-            let [from, share] = [sub, sub + 1].map(|sub| sub as f64 / sub_steps as f64);
-            self.sow(&sources::seeds(&sources::ways(sources, &self.params, dt, [from, share]), &self.params));
-            let boundary = |tiles: &Tiles, cell: f32| boundary(tiles, cell, share);
-            forces::fall(&mut self.flow, (self.params.gravity * part) as f32);
+            let shares = [sub, sub + 1].map(|sub| sub as f64 / sub_steps as f64);
+            self.push(ctx, around.wind, from + part * sub as f64, part)?;
+            let boundary = |tiles: &Tiles, cell: f32| (around.boundary)(tiles, cell, shares[1]);
             let solved = self.flow.project(ctx, &boundary, self.params.tolerance as f32)?;
             report.iterations += solved.iterations;
             if solved.fastest > 0.0 {
                 report.divergence = report.divergence.max(solved.divergence / solved.fastest);
             }
-            let mass = self.mass();
-            self.flow.advect(part, Scheme::MacCormack);
-            self.settle(mass * libm::exp2(-part / self.params.half_life));
+            self.flow.clear_covered();
+            self.follow_air(ctx, part)?;
+            // Last, so that new mist is where its grains were, and begins to move in the next sub-step.
+            self.raise(ctx, around.sources, to - from, shares)?;
             ctx.advance();
         }
         report.cells = 512 * self.flow.tiles().active();
         report.mass = self.mass();
         report.fastest = self.flow.fastest();
         Ok(report)
+    }
+
+    /// Count of sub-steps in which neither the air nor a grain nor an object moves farther than [`FARTHEST`] cells.
+    fn sub_steps(&self, around: &Around<'_>, dt: f64) -> Result<usize> {
+        let speeds = around.sources.iter().flat_map(|source| source.velocity);
+        let fastest = speeds.fold(self.flow.fastest(), |most, speed| most.max(speed.abs()));
+        let speed = f64::from(fastest).max(around.fastest) + self.params.gravity.abs() * dt;
+        self.parts(speed, dt)
+    }
+
+    /// Into how many parts a time (s) is divided for a speed (m/s).
+    fn parts(&self, speed: f64, dt: f64) -> Result<usize> {
+        let count = (speed * dt / (f64::from(FARTHEST) * self.params.cell)).ceil();
+        if count > MOST as f64 {
+            return Err(Error::argument(format!(
+                "mist moves at {speed:.0} m/s, more than {MOST} steps of {FARTHEST} cells of {} m in {dt:.4} s",
+                self.params.cell
+            )));
+        }
+        Ok((count as usize).max(1))
+    }
+
+    /// Puts the mist that grains raise along a part, two shares 0..=1, of their way in a step of `dt` (s) into the air.
+    fn raise(&mut self, ctx: &Context, sources: &[Source], dt: f64, shares: [f64; 2]) -> Result<()> {
+        let ways = sources::ways(sources, &self.params, dt, shares);
+        let seeds = sources::seeds(&ways, &self.params);
+        let wanted = self.wanted(&seeds);
+        let what = format!("mist of {} cells of {} m", 512 * wanted.len(), self.params.cell);
+        ctx.allow(&what, memory(wanted.len()))?;
+        self.flow.resize(&wanted);
+        self.sow(&seeds);
+        Ok(())
+    }
+
+    /// Forces act on the air for `dt` (s) from a time (s) on.
+    fn push(&mut self, ctx: &Context, wind: Option<&Wind<'_>>, time: f64, dt: f64) -> Result<()> {
+        forces::fall(&mut self.flow, (self.params.gravity * dt) as f32);
+        if let Some(wind) = wind {
+            wind.blow(ctx, &mut self.flow, dt)?;
+        }
+        turbulence::stir(&mut self.flow, &self.params, time, dt);
+        if self.params.confinement > 0.0 {
+            self.flow.confine((self.params.confinement * dt) as f32);
+        }
+        Ok(())
+    }
+
+    /// The air carries itself and the mist along for `dt` (s); some of it dissipates.
+    fn follow_air(&mut self, ctx: &Context, dt: f64) -> Result<()> {
+        let mass = self.mass();
+        // The boundary may have made the air faster than it was when the sub-steps were chosen.
+        let parts = self.parts(f64::from(self.flow.fastest()), dt)?;
+        for _ in 0..parts {
+            ctx.check()?;
+            self.flow.advect(dt / parts as f64, Scheme::MacCormack);
+        }
+        self.settle(mass * libm::exp2(-dt / self.params.half_life));
+        Ok(())
     }
 
     /// Sum of the density, times the volume of a cell (m3).
@@ -176,60 +287,18 @@ impl Mist {
         sums.iter().sum::<f64>() * self.params.cell.powi(3)
     }
 
-    /// Makes the tiles that hold mist, and others, active, with padding.
-    fn follow(&mut self, others: &[Coord]) {
+    /// The tiles that hold mist or will get some, with padding.
+    fn wanted(&self, seeds: &[Seed]) -> Vec<Coord> {
         let holds = |tile: &crate::flow::Tile| tile.iter().any(|density| *density > LEAST);
         let held = self.flow.tiles().coords().iter().zip(self.flow.density());
         let mut wanted: Vec<Coord> = held
             .filter(|(_, tile)| holds(tile))
             .map(|(coord, _)| *coord)
-            .chain(others.iter().copied())
+            .chain(seeds.iter().map(|seed| seed.coord))
             .collect();
         wanted.sort_unstable();
         wanted.dedup();
-        self.flow.resize(&tiles::padded(&wanted, self.params.padding as i32));
-    }
-
-    /// Puts new mist into the air: the greater density counts, and the air takes the new one's velocity as far as it fills the
-    /// cells.
-    fn sow(&mut self, seeds: &[sources::Seed]) {
-        let coords: Vec<Coord> = seeds.iter().map(|seed| seed.coord).collect();
-        self.follow(&coords);
-        let (tiles, velocity, density) = self.flow.fields();
-        let of = |slot: usize| {
-            let coord = tiles.coords().get(slot)?;
-            coords.binary_search(coord).ok().map(|index| &seeds[index])
-        };
-        for (axis, field) in velocity.iter_mut().enumerate() {
-            field.par_iter_mut().enumerate().with_min_len(16).for_each(|(slot, speeds)| {
-                let below = tiles.neighbours()[slot][tiles::FACES[2 * axis]] as usize;
-                let (own, below) = (of(slot), of(below));
-                if own.is_none() && below.is_none() {
-                    return;
-                }
-                let step = 64 >> (3 * axis);
-                let read = |seed: Option<&sources::Seed>, cell: usize| {
-                    seed.map_or((0.0, 0.0), |seed| (seed.density[cell], seed.velocity[axis][cell]))
-                };
-                for (cell, speed) in speeds.iter_mut().enumerate() {
-                    let lower = match cell / step % 8 {
-                        0 => read(below, cell + 7 * step),
-                        _ => read(own, cell - step),
-                    };
-                    let upper = read(own, cell);
-                    let sum = lower.0 + upper.0;
-                    if sum > 0.0 {
-                        let wanted = (lower.0 * lower.1 + upper.0 * upper.1) / sum;
-                        *speed += (0.5 * sum).min(1.0) * (wanted - *speed);
-                    }
-                }
-            });
-        }
-        density.par_iter_mut().enumerate().with_min_len(16).for_each(|(slot, tile)| {
-            if let Some(seed) = of(slot) {
-                tile.iter_mut().zip(seed.density.iter()).for_each(|(old, new)| *old = old.max(*new));
-            }
-        });
+        tiles::padded(&wanted, self.params.padding as i32)
     }
 
     /// Makes the mass (m3) what it should be: advection does not keep it, and of almost no mist nothing is left.

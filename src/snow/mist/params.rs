@@ -19,6 +19,12 @@ pub struct Params {
     pub half_life: f64,
     /// Velocity (m/s) of the air.
     pub wind: [f64; 3],
+    /// Acceleration (m/s2, root mean square) of the air by eddies; 0: none.
+    pub turbulence: f64,
+    /// Size (m) of the eddies, at least 8 cells.
+    pub turbulence_size: f64,
+    /// Strength (1/s) with which small eddies are kept alive; 0: not at all.
+    pub confinement: f64,
     /// Share 0..=1 of the new density that noise takes away at most.
     pub noise: f64,
     /// Size (m) of that noise.
@@ -41,6 +47,9 @@ impl Params {
             gravity: -2.0,
             half_life: 1.0,
             wind: [0.0; 3],
+            turbulence: 0.0,
+            turbulence_size: 24.0 * cell,
+            confinement: 0.0,
             noise: 0.3,
             noise_size: 4.0 * cell,
             seed: 0,
@@ -70,6 +79,9 @@ impl Params {
         for wind in self.wind {
             within("wind", wind, -1000.0..=1000.0)?;
         }
+        within("turbulence", self.turbulence, 0.0..=1000.0)?;
+        within("turbulence_size", self.turbulence_size, 8.0 * self.cell..=1.0e6 * self.cell)?;
+        within("confinement", self.confinement, 0.0..=100.0)?;
         within("noise", self.noise, 0.0..=1.0)?;
         within("noise_size", self.noise_size, self.cell..=1.0e6 * self.cell)?;
         within("padding", f64::from(self.padding), 1.0..=64.0)?;

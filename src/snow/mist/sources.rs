@@ -4,7 +4,13 @@ use rayon::prelude::*;
 
 use super::Params;
 use crate::base::DVec3;
+use crate::error::{Error, Result};
 use crate::flow::{Coord, Tile};
+
+/// Farthest place of a grain from the origin on an axis (cells).
+const FARTHEST_CELL: f64 = 1e7;
+/// Largest radius of a grain (cells).
+const LARGEST: f64 = 64.0;
 
 /// A grain that raises mist.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -18,6 +24,31 @@ pub struct Source {
 }
 
 impl Source {
+    /// Checks that it can raise mist in cells of an edge (m).
+    ///
+    /// # Errors
+    /// A number that is not finite; a place that is too far from the origin; a radius that is negative or too large.
+    pub(super) fn check(&self, cell: f64) -> Result<()> {
+        let [x, y, z] = self.place.into();
+        let at = format!("grain at ({x:.3}, {y:.3}, {z:.3}) m");
+        if !self.place.iter().all(|x| x.abs() <= FARTHEST_CELL * cell) {
+            return Err(Error::argument(format!(
+                "the {at} is farther than {FARTHEST_CELL:.0} cells from the origin"
+            )));
+        }
+        if !self.velocity.iter().all(|speed| speed.is_finite()) {
+            return Err(Error::argument(format!("the velocity of the {at} is not finite")));
+        }
+        let most = LARGEST * cell;
+        if !(0.0..=most).contains(&self.radius) {
+            let radius = self.radius;
+            return Err(Error::argument(format!(
+                "the {at} has a radius of {radius} m, not within 0 to {most}"
+            )));
+        }
+        Ok(())
+    }
+
     /// Whether a grain is fast enough to raise mist, and does not fall where falling grains do not.
     pub fn raises(&self, params: &Params) -> bool {
         let speed = self.velocity.iter().map(|x| f64::from(*x).powi(2)).sum::<f64>().sqrt();

@@ -1,0 +1,102 @@
+//! Gates of whole passes with mist: the same bytes from any number of threads, at every CPU level and after kills, and other
+//! stages' files as they were where only the mist is another.
+
+use std::collections::BTreeMap;
+use std::path::{Path, PathBuf};
+use std::process::Command;
+use std::time::{Duration, Instant, SystemTime};
+
+use crate::common::character::{self, data};
+use crate::harness::{Harness, timed};
+use crate::passes::{pass, walk};
+
+/// Frames of the pass, and its cell (m).
+const FRAMES: i32 = 24;
+const CELL: f64 = 0.014;
+/// The slow walk raises mist from this speed (m/s) on.
+const FROM_SPEED: f64 = 0.5;
+
+pub fn run(h: &mut Harness) {
+    let all @ [same, apart] = ["snow.mist.same_bytes", "snow.mist.apart"];
+    if !all.iter().any(|name| h.wants(name)) {
+        return;
+    }
+    let Some(man) = data("character/CesiumMan.glb") else {
+        all.iter().for_each(|name| h.skipped(name, "no data"));
+        return;
+    };
+    let folder = tempfile::tempdir().expect("a folder");
+    let scene = walk(folder.path(), &man, FRAMES, CELL, "");
+    let out = |name: &str| folder.path().join(name);
+    let run = |name: &str, threads: usize| misty(&scene, &out(name), threads);
+    let (took, _) = timed(|| works(&mut run("once", 2)));
+    if h.wants(same) {
+        works(&mut run("alone", 1));
+        works(run("baseline", 2).env("FRAZIL_CPU", "baseline"));
+        works(run("avx2", 2).env("FRAZIL_CPU", "avx2"));
+        let kills = kill(&scene, &out("killed"), took);
+        works(&mut run("killed", 1));
+        let once = character::output(&out("once"));
+        let differs = |name: &&str| character::output(&out(name)) != once;
+        let others: Vec<&str> = ["alone", "baseline", "avx2", "killed"].into_iter().filter(differs).collect();
+        let mist = once.keys().filter(|name| name.starts_with("mist/")).count();
+        let note =
+            format!("{mist} files of mist in a pass of {took:.1} s; kills in {kills:?}; others: {others:?}");
+        h.holds(same, others.is_empty() && mist == FRAMES as usize && kills.len() > 2, &note);
+    }
+    if h.wants(apart) {
+        let before = written(&out("once"));
+        let again = ["--stage", "mist", "--from", "1", "--set", "mist.gravity=-1.0"];
+        works(run("once", 2).args(again));
+        let is_mist = |file: &Path| file.to_string_lossy().contains("mist");
+        let after = written(&out("once"));
+        let made = after.iter().filter(|(file, time)| before.get(*file) != Some(*time));
+        let made: Vec<&PathBuf> = made.map(|(file, _)| file).collect();
+        let others = made.iter().filter(|file| !is_mist(file)).count();
+        h.holds(
+            apart,
+            others == 0 && !made.is_empty(),
+            &format!("{} files made again, {others} of others", made.len()),
+        );
+    }
+}
+
+/// A pass of the scene with mist.
+fn misty(scene: &Path, out: &Path, threads: usize) -> Command {
+    let mut run = pass(scene, out, threads);
+    run.args(["--set", &format!("mist.from_speed={FROM_SPEED}")]);
+    run
+}
+
+fn works(run: &mut Command) {
+    assert!(run.status().expect("frazil").success());
+}
+
+/// Kills a pass again and again; the stages of which each had written a frame.
+fn kill(scene: &Path, out: &Path, took: f64) -> Vec<&'static str> {
+    let mut kills = Vec::new();
+    for (round, moment) in character::moments(8).into_iter().enumerate() {
+        let start = Instant::now();
+        let mut child = misty(scene, out, 1 + round % 2).spawn().expect("frazil");
+        let limit = Duration::from_secs_f64(0.1 + 0.3 * took * moment);
+        while start.elapsed() < limit && child.try_wait().expect("a child").is_none() {
+            std::thread::sleep(Duration::from_millis(1));
+        }
+        let is_running = child.try_wait().expect("a child").is_none();
+        child.kill().expect("a kill");
+        child.wait().expect("a child");
+        let last = ["mist", "grains", "base"].into_iter().find(|stage| out.join(stage).is_dir());
+        kills.extend(last.filter(|_| is_running));
+    }
+    kills
+}
+
+/// When the files that a pass is for were written, but for what it says of the run as a whole.
+fn written(out: &Path) -> BTreeMap<PathBuf, SystemTime> {
+    let kinds = ["base", "removed", "grains", "mist", "state", "report"];
+    let files = kinds.iter().flat_map(|kind| std::fs::read_dir(out.join(kind)).into_iter().flatten());
+    let files = files.map(|file| file.expect("a file"));
+    files
+        .map(|file| (file.path(), file.metadata().and_then(|data| data.modified()).expect("a time")))
+        .collect()
+}

@@ -1,0 +1,320 @@
+//! The stage `mist`: fast grains raise powder into the air.
+
+use std::path::Path;
+
+use serde_json::json;
+
+use super::grain_files::Whole;
+use super::inputs::Inputs;
+use super::mist_keys::mist_params;
+use super::{base, first_keys};
+use crate::base::points::Values;
+use crate::base::{DVec3, Points, TriMesh};
+use crate::context::Context;
+use crate::error::{Error, Result};
+use crate::flow::{Solids, Tiles};
+use crate::io::manifest::Keeps;
+use crate::io::usd::{Field, Holds};
+use crate::motion::{Keys, Rigid};
+use crate::scene::shot::{
+    FrameFiles, Kind, Reads, Report, Settings, Stage, Stepped, Stepping, Stored, To, Volume,
+};
+use crate::scene::text::keys::settings_of;
+use crate::scene::{Role, Scene, moving};
+use crate::snow::base_layer;
+use crate::snow::mist::{self, Around, Grids, Params, Source, StepReport, Surroundings, Wind};
+use crate::sweep::Body;
+use crate::vdb::file::{WriteOptions, any_to_bytes};
+use crate::vdb::{AnyGrid, FloatGrid, GridRef, VectorGrid, file};
+
+/// Name of the stage, and kind of its files.
+const NAME: &str = "mist";
+/// Name of the grid of densities in its files.
+const DENSITY: &str = "density";
+
+/// The stage for a scene.
+pub struct Mist<'a> {
+    scene: &'a Scene,
+    inputs: &'a Inputs,
+}
+
+/// State carried from frame to frame.
+pub struct State {
+    mist: mist::Mist,
+    /// Static objects, and the ground where it is a mesh.
+    statics: Vec<Body>,
+    /// The grains after a frame.
+    grains: Whole,
+    /// The base layer after a frame, the one before that which is made next.
+    layer: Option<(i32, base_layer::Grids)>,
+}
+
+/// Input of the writer: the mist after a step, if its files are written.
+pub struct Step(Option<mist::Mist>);
+
+/// Writes frames.
+pub struct Writer {
+    /// Provides the threads. Its cancel flag is ignored: a frame that was begun is finished.
+    ctx: Context,
+}
+
+/// The file of a scene's wind, where it is a grid.
+pub(super) fn wind_file(scene: &Scene) -> Option<&Path> {
+    scene.values.get("mist.wind").and_then(|value| value.path())
+}
+
+/// The density of the mist after a frame.
+///
+/// # Errors
+/// A frame that does not exist; a file that was changed since it was written, or that has no such grid.
+pub(super) fn density(stored: &Stored, frame: i32) -> Result<FloatGrid> {
+    file::read_own_named(&stored.file(frame, NAME)?, DENSITY)
+}
+
+/// The wind of a file: its first grid of vectors.
+///
+/// # Errors
+/// A file that cannot be read, or that has no such grid.
+pub(super) fn wind(path: &Path) -> Result<VectorGrid> {
+    let grids = file::describe(path)?;
+    let vectors = grids.iter().find(|grid| grid.value_type.starts_with("Tree_vec3s"));
+    let name = vectors.map(|grid| grid.name.clone()).ok_or_else(|| {
+        let names: Vec<String> =
+            grids.iter().map(|grid| format!("\"{}\" ({})", grid.name, grid.value_type)).collect();
+        Error::file(path, format!("has no grid of vectors for the wind, only {}", names.join(", ")))
+    })?;
+    match file::read_any(path, Some(&name))? {
+        AnyGrid::Vectors(grid) => Ok(grid),
+        AnyGrid::Floats(_) => Err(Error::file(path, format!("grid \"{name}\" is not one of vectors"))),
+    }
+}
+
+impl<'a> Mist<'a> {
+    /// The stage for a scene.
+    pub fn new(scene: &'a Scene, inputs: &'a Inputs) -> Self {
+        Self { scene, inputs }
+    }
+
+    fn params(&self) -> Result<Params> {
+        mist_params(&self.scene.values).ok_or_else(|| Error::Internal("the scene has no mist".into()))
+    }
+
+    /// An error of the mist, with the scene.
+    fn told(&self, error: Error) -> Error {
+        match error {
+            Error::Argument(what) => Error::file(&self.scene.path, format!("mist: {what}")),
+            other => other,
+        }
+    }
+
+    /// The grains of a frame that may raise mist.
+    fn sources(&self, ctx: &Context, state: &mut State, stored: &Stored, frame: i32) -> Result<Vec<Source>> {
+        let (points, _) = state.grains.points(ctx, stored, frame)?;
+        sources_of(points, state.mist.params())
+            .map_err(|error| Error::file(stored.folder(), format!("frame {frame} of grains {error}")))
+    }
+
+    /// Moves the mist through a frame.
+    fn move_mist(&self, ctx: &Context, state: &mut State, to: &To<'_>) -> Result<StepReport> {
+        let [base, grains] = to.upstream else {
+            return Err(Error::Internal("mist reads two stages".into()));
+        };
+        let frame = to.frame;
+        let sources = self.sources(ctx, state, grains, frame)?;
+        let raises = sources.iter().any(|source| source.raises(state.mist.params()));
+        // Air without mist is not computed: what it flows around does not matter.
+        if !raises && state.mist.flow().tiles().active() == 0 {
+            return Ok(StepReport::default());
+        }
+        // What objects remove in this frame still bounds the air: see `Surroundings`.
+        self.go_to(ctx, state, base, frame - 1)?;
+        let State { mist, statics, layer, .. } = state;
+        let moving = self.scene.objects.iter().filter(|object| object.role.moves());
+        let pushing = self.inputs.bodies.iter().zip(moving).filter(|(_, object)| object.role.pushes());
+        let bodies: Vec<&Body> = pushing.map(|(body, _)| body).chain(statics.iter()).collect();
+        let around = Surroundings {
+            base: layer.as_ref().map(|(_, layer)| &layer.surface),
+            bodies: &bodies,
+            floor: self.inputs.floor(),
+        };
+        let time = |frame: i32| f64::from(frame) / self.scene.shot.fps;
+        let times = [time(frame - 1), time(frame)];
+        let walls = around.during(times, mist.params().cell)?;
+        let boundary =
+            |tiles: &Tiles, cell: f32, share: f64| -> Result<Solids> { walls.faces(ctx, tiles, cell, share) };
+        let sample = |ctx: &Context, places: &[DVec3]| match &self.inputs.wind {
+            Some(wind) => wind.sample(ctx, places, true),
+            None => Ok(vec![[0.0; 3]; places.len()]),
+        };
+        let wind = self.inputs.wind.as_ref().map(|_| Wind(&sample));
+        let fastest = walls.fastest_near(mist, &sources);
+        let around = Around { sources: &sources, boundary: &boundary, fastest, wind: wind.as_ref() };
+        mist.step(ctx, &around, times).map_err(|error| self.told(error))
+    }
+
+    /// Takes the base layer to a frame.
+    fn go_to(&self, ctx: &Context, state: &mut State, base: &Stored, frame: i32) -> Result<()> {
+        let layer = match state.layer.take() {
+            Some((at, mut layer)) if at == frame - 1 && base.keeps_changes(frame) => {
+                base::follow(ctx, base, &mut layer, frame)?;
+                layer
+            }
+            _ => base::grids(ctx, base, frame)?,
+        };
+        state.layer = Some((frame, layer));
+        Ok(())
+    }
+}
+
+/// Grains as sources of mist, but for those that are too slow.
+fn sources_of(points: &Points, params: &Params) -> Result<Vec<Source>> {
+    // A file of no points keeps no attributes.
+    if points.count() == 0 {
+        return Ok(Vec::new());
+    }
+    let missing = |name: &str| Error::argument(format!("have no attribute {name}"));
+    let Some(Values::Vector(velocities)) = points.attribute("v") else { return Err(missing("v")) };
+    let Some(Values::Float(radii)) = points.attribute("pscale") else { return Err(missing("pscale")) };
+    let is_fast = |velocity: [f32; 3]| {
+        let square: f64 = velocity.iter().map(|x| f64::from(*x).powi(2)).sum();
+        square > params.from_speed.powi(2)
+    };
+    let fast = (0..points.count()).filter(|point| is_fast(velocities.get(*point)));
+    let source = |point: usize| Source {
+        place: points.position(point),
+        velocity: velocities.get(point),
+        radius: f64::from(radii.get(point)),
+    };
+    Ok(fast.map(source).collect())
+}
+
+/// A mesh as a body that stands still; none where it has no triangles.
+fn still(mesh: &TriMesh) -> Option<Result<Body>> {
+    let body = || Body::new(Box::new(Rigid::new(mesh.clone(), Keys::default())), 0.0);
+    (!mesh.triangles.is_empty()).then(body)
+}
+
+impl Stage for Mist<'_> {
+    fn name(&self) -> &'static str {
+        NAME
+    }
+
+    fn kinds(&self) -> &'static [Kind] {
+        &[Kind { name: NAME, extensions: &["vdb"] }]
+    }
+
+    fn writes(&self, _kind: &str) -> bool {
+        self.scene.output.mist
+    }
+
+    fn state_extension(&self) -> &'static str {
+        NAME
+    }
+
+    fn settings(&self) -> Result<Settings> {
+        let roles = [&Role::MOVING[..], &[Role::Static]].concat();
+        let mut settings = settings_of(self.scene, self.name(), &self.inputs.seen, &roles)?;
+        let files = self.scene.snow.iter().flat_map(|snow| snow.files());
+        let ground = files.filter(|(key, _)| *key == "snow.ground").map(|(key, path)| (key, path.clone()));
+        let wind = wind_file(self.scene).map(|path| ("mist.wind", path.to_path_buf()));
+        for (key, path) in ground.chain(wind) {
+            let hash = self.inputs.seen.hash(&path)?;
+            settings.insert(key.into(), format!("{}{hash}", crate::scene::shot::CONTENT));
+        }
+        Ok(settings)
+    }
+
+    fn of_first_state(&self, settings: &Settings) -> Settings {
+        first_keys(settings, NAME)
+    }
+
+    fn upstream(&self) -> &'static [&'static str] {
+        &["base", "grains"]
+    }
+
+    fn reads_state_of(&self, upstream: &str) -> bool {
+        // Grains are read from their files.
+        upstream != "grains"
+    }
+
+    fn reads(&self, frame: i32) -> Reads {
+        Reads { files: moving::files(self.scene, frame), ahead: Vec::new() }
+    }
+
+    fn keeps(&self, _frame: i32) -> Keeps {
+        Keeps::State
+    }
+
+    fn volumes(&self) -> Vec<Volume> {
+        const FIELDS: &[Field] = &[Field::of(DENSITY, Holds::Density(1.0)), Field::of("vel", Holds::Vector)];
+        vec![Volume { kind: NAME, prim: NAME, fields: FIELDS, is_guide: false }]
+    }
+}
+
+impl Stepping for Mist<'_> {
+    type State = State;
+    type Step = Step;
+    type Writer = Writer;
+
+    fn load(&self, _ctx: &Context, done: &Stored, after: Option<i32>) -> Result<State> {
+        let params = self.params()?;
+        let mist = match after {
+            None => mist::Mist::new(params).map_err(|error| self.told(error))?,
+            Some(frame) => {
+                let path = done.state_file(frame)?;
+                let bytes = std::fs::read(&path).map_err(|error| Error::io(&path, "read", error))?;
+                mist::Mist::resume(params, &bytes).map_err(|error| Error::file(path, error.to_string()))?
+            }
+        };
+        let statics = self.inputs.statics().iter().chain(self.inputs.ground());
+        let statics = statics.filter_map(still).collect::<Result<_>>()?;
+        Ok(State { mist, statics, grains: Whole::default(), layer: None })
+    }
+
+    fn step(&self, ctx: &Context, state: &mut State, to: &To<'_>) -> Result<Stepped<Step>> {
+        // Before the first frame nothing moves.
+        let report = match to.frame == self.scene.shot.frames.first {
+            true => StepReport::default(),
+            false => self.move_mist(ctx, state, to)?,
+        };
+        if to.frame == self.scene.shot.frames.last && report.sources == 0 && report.mass == 0.0 {
+            let speed = state.mist.params().from_speed;
+            log::warn!(
+                "frame {}: no mist: no grain rises faster than mist.from_speed = {speed} m/s",
+                to.frame
+            );
+        }
+        Ok(Stepped { step: Step(to.made_from.map(|_| state.mist.clone())), report: told(&report) })
+    }
+
+    fn writer(&self, ctx: &Context, _state: &State) -> Result<Writer> {
+        Ok(Writer { ctx: Context::new(ctx.pool().clone()) })
+    }
+
+    fn write(&self, writer: &mut Writer, step: Step, files: Option<&mut FrameFiles>) -> Result<()> {
+        let (Some(mist), Some(files)) = (step.0, files) else { return Ok(()) };
+        if self.scene.output.mist {
+            let grids = Grids::of(&writer.ctx, &mist)?;
+            let metadata = base::metadata(self.scene, files.frame, files.made_from);
+            let grids = [GridRef::Floats(&grids.density), GridRef::Vectors(&grids.velocity)];
+            let options = WriteOptions { metadata, ..WriteOptions::default() };
+            files.save(NAME, "vdb", &any_to_bytes(&grids, &options)?)?;
+        }
+        files.save_state(&mist.save())
+    }
+}
+
+fn told(report: &StepReport) -> Report {
+    let serde_json::Value::Object(results) = json!({
+        "cells": report.cells,
+        "mist_m3": report.mass,
+        "sources": report.sources,
+        "sub_steps": report.sub_steps,
+        "iterations": report.iterations,
+        "divergence": report.divergence,
+        "fastest_m_per_s": report.fastest,
+    }) else {
+        unreachable!("it is written as an object")
+    };
+    Report { results, phases: report.phases.clone() }
+}

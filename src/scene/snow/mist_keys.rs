@@ -1,0 +1,139 @@
+//! The keys of `[mist]`.
+
+use super::has_grains;
+use crate::error::{Error, Result};
+use crate::scene::text::key::{Key, Kind, Scope};
+use crate::scene::text::{Table, Values};
+use crate::snow::mist::Params;
+
+type Scopes = &'static [(&'static str, Scope)];
+const FIRST: Scopes = &[("mist", Scope::First)];
+const STEP: Scopes = &[("mist", Scope::Step)];
+
+/// Fastest wind (m/s).
+const FASTEST: f64 = 1000.0;
+
+/// All of them.
+pub const MIST_KEYS: &[Key] = &[
+    Key::new("mist", "cell", Kind::Cells(0.25, 64.0), "edge of a cell of air (m)")
+        .or_cells(4.0 / 3.0)
+        .concerns(FIRST),
+    Key::new(
+        "mist",
+        "from_speed",
+        Kind::Number(0.0, 1000.0, "m/s"),
+        "grains that are faster raise mist along their way (m/s)",
+    )
+    .or("2.0")
+    .concerns(STEP),
+    Key::new("mist", "falling", Kind::Flag, "whether falling grains raise mist too").or("false").concerns(STEP),
+    Key::new("mist", "gravity", Kind::Number(-100.0, 100.0, "m/s2"), "of the air where there is mist (m/s2)")
+        .or("-2.0")
+        .concerns(STEP),
+    Key::new(
+        "mist",
+        "half_life",
+        Kind::Number(0.001, 1.0e6, "s"),
+        "time in which half of the mist dissipates (s)",
+    )
+    .or("1.0")
+    .concerns(STEP),
+    Key::new(
+        "mist",
+        "wind",
+        Kind::NumbersOrFile(3, FASTEST, "m/s", &["vdb"]),
+        "velocity of the air (m/s), or a grid of velocities, by which the air is carried along where there is mist",
+    )
+    .or("[0.0, 0.0, 0.0]")
+    .concerns(FIRST),
+    Key::new(
+        "mist",
+        "turbulence",
+        Kind::Number(0.0, 1000.0, "m/s2"),
+        "acceleration by eddies (m/s2, root mean square)",
+    )
+    .or("0.0")
+    .concerns(STEP),
+    Key::new(
+        "mist",
+        "turbulence_size",
+        Kind::Cells(2.0, 1.0e6),
+        "of the eddies (m), at least 8 cells of air; left out: 24 of them",
+    )
+    .or_nothing()
+    .such_as("0.4")
+    .concerns(STEP),
+    Key::new(
+        "mist",
+        "confinement",
+        Kind::Number(0.0, 100.0, "1/s"),
+        "strength with which small eddies are kept alive (1/s); 0 = not at all",
+    )
+    .or("0.0")
+    .concerns(STEP),
+    Key::new(
+        "mist",
+        "noise",
+        Kind::Number(0.0, 1.0, ""),
+        "share of the density of new mist that noise takes away at most",
+    )
+    .or("0.3")
+    .concerns(STEP),
+    Key::new(
+        "mist",
+        "noise_size",
+        Kind::Cells(0.25, 1.0e6),
+        "of that noise (m), at least a cell of air; left out: 4 of them",
+    )
+    .or_nothing()
+    .such_as("0.05")
+    .concerns(STEP),
+    Key::new("mist", "seed", Kind::Whole(0, i32::MAX as i64), "another one gives other noise and eddies")
+        .or("0")
+        .concerns(STEP),
+];
+
+/// Checks what single keys do not show.
+///
+/// # Errors
+/// Mist without grains; sizes that the cell does not allow.
+pub fn check_mist(table: &Table, values: &Values) -> Result<()> {
+    if !has_grains(values) {
+        return Err(table.error("from_speed", "is of grains that raise mist: the scene needs `[grains]` too"));
+    }
+    let Some(params) = mist_params(values) else { return Ok(()) };
+    params.validate().map_err(|error| match error {
+        Error::Argument(what) => {
+            let key = what.split(' ').next().unwrap_or_default();
+            let key = MIST_KEYS.iter().find(|declared| declared.name == key).map_or("cell", |key| key.name);
+            table.error(key, what.strip_prefix(key).unwrap_or(&what).trim_start())
+        }
+        other => other,
+    })
+}
+
+/// The parameters of a scene's mist; none where it has no mist. A wind that is a grid is none here.
+pub fn mist_params(values: &Values) -> Option<Params> {
+    let number = |name: &str| values.number(&format!("mist.{name}"));
+    let value = |name: &str| values.get(&format!("mist.{name}"));
+    let usual = Params::for_cell(number("cell")?);
+    Some(Params {
+        from_speed: number("from_speed").unwrap_or(usual.from_speed),
+        falling: value("falling").and_then(|value| value.flag()).unwrap_or(usual.falling),
+        gravity: number("gravity").unwrap_or(usual.gravity),
+        half_life: number("half_life").unwrap_or(usual.half_life),
+        wind: value("wind").and_then(|value| value.numbers()).unwrap_or(usual.wind),
+        turbulence: number("turbulence").unwrap_or(usual.turbulence),
+        turbulence_size: number("turbulence_size").unwrap_or(usual.turbulence_size),
+        confinement: number("confinement").unwrap_or(usual.confinement),
+        noise: number("noise").unwrap_or(usual.noise),
+        noise_size: number("noise_size").unwrap_or(usual.noise_size),
+        seed: value("seed").and_then(|value| value.whole()).map_or(usual.seed, |seed| seed as i32),
+        ..usual
+    })
+}
+
+/// Whether a scene has mist.
+pub fn has_mist(values: &Values) -> bool {
+    values.number("mist.cell").is_some()
+}

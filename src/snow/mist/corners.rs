@@ -1,0 +1,125 @@
+//! Corners of cells, and level sets at them.
+
+use crate::base::DVec3;
+use crate::context::Context;
+use crate::error::Result;
+use crate::flow::Coord;
+use crate::snow::grains::field::Window;
+use crate::vdb::FloatGrid;
+
+/// The corners of cells, and of the parts into which they are divided.
+#[derive(Clone, Copy)]
+pub struct Lattice {
+    /// Edge of a cell (m).
+    pub cell: f64,
+    /// Parts of an edge.
+    pub parts: usize,
+}
+
+impl Lattice {
+    /// Distance of two corners (m).
+    pub fn spacing(&self) -> f64 {
+        self.cell / self.parts as f64
+    }
+
+    /// Corners along the edge of a tile, both ends included.
+    pub fn corners(&self) -> usize {
+        8 * self.parts + 1
+    }
+
+    /// Least and greatest corner (m) of tiles.
+    pub fn bounds(&self, tiles: &[Coord]) -> [DVec3; 2] {
+        let low = |coord: &Coord| DVec3::from(coord.map(f64::from)) * (8.0 * self.cell);
+        let none = [DVec3::repeat(f64::MAX), DVec3::repeat(f64::MIN)];
+        let [least, greatest] =
+            tiles.iter().map(low).fold(none, |[least, most], at| [least.inf(&at), most.sup(&at)]);
+        [least, greatest.add_scalar(8.0 * self.cell)]
+    }
+
+    /// All corners (m) of a tile.
+    pub fn places(self, tile: Coord) -> impl Iterator<Item = DVec3> {
+        let count = self.corners();
+        let at = move |index: usize| [index / (count * count), index / count % count, index % count];
+        (0..count.pow(3)).map(move |index| self.place(tile, at(index)))
+    }
+
+    /// The corner (m) at an index in a tile.
+    pub fn place(&self, tile: Coord, at: [usize; 3]) -> DVec3 {
+        let index = |axis: usize| f64::from(tile[axis] * 8 * self.parts as i32 + at[axis] as i32);
+        DVec3::new(index(0), index(1), index(2)) * self.spacing()
+    }
+}
+
+/// A level set around tiles.
+pub struct Grid<'a> {
+    /// Corners' spacing in cells of the level set.
+    scale: f64,
+    /// For each tile; none: it is far away.
+    near: Vec<Option<Distances<'a>>>,
+}
+
+/// Signed distances (m) around a tile.
+enum Distances<'a> {
+    /// The leaves around it.
+    Leaves(Window<'a>),
+    /// Those at its corners.
+    Corners(Vec<f32>),
+}
+
+/// Widest tile (cells of a level set) whose leaves are looked at; of wider ones there are too many.
+const WIDEST: f64 = 24.0;
+
+impl<'a> Grid<'a> {
+    pub fn new(
+        ctx: &Context,
+        grid: Option<&'a FloatGrid>,
+        tiles: &[Coord],
+        lattice: &Lattice,
+    ) -> Result<Option<Self>> {
+        let Some(grid) = grid else { return Ok(None) };
+        let Some((low, high)) = grid.active_bbox() else { return Ok(None) };
+        let scale = lattice.spacing() / grid.voxel_size();
+        let edge = 8.0 * lattice.parts as f64 * scale;
+        let bounds = tiles.iter().map(|tile| {
+            let low = tile.map(|at| (f64::from(at) * edge).floor() as i32);
+            let high = tile.map(|at| (f64::from(at + 1) * edge).ceil() as i32 + 1);
+            [low, high]
+        });
+        // Beside the level set, and above it, nothing is solid; below it, what it encloses ends.
+        let is_near = |[least, most]: &[[i32; 3]; 2]| {
+            (0..3).all(|axis| least[axis] <= high[axis] + 1 && most[axis] >= low[axis] - 1)
+        };
+        let bounds: Vec<Option<[[i32; 3]; 2]>> = bounds.map(|bounds| Some(bounds).filter(is_near)).collect();
+        let mut all = if edge > WIDEST {
+            let near = tiles.iter().zip(&bounds).filter(|(_, bounds)| bounds.is_some());
+            let places: Vec<DVec3> = near.flat_map(|(tile, _)| lattice.places(*tile)).collect();
+            let mut values = Vec::new();
+            grid.sample_linear(ctx, &places, &mut values)?;
+            let each = values.chunks(lattice.corners().pow(3));
+            each.map(|values| Distances::Corners(values.to_vec())).collect::<Vec<_>>()
+        } else {
+            let leaves = bounds.iter().flatten().map(|bounds| bounds.map(|voxel| voxel.map(|x| x >> 3)));
+            let leaves: Vec<[[i32; 3]; 2]> = leaves.collect();
+            Window::all(grid, &leaves)?.into_iter().map(Distances::Leaves).collect()
+        }
+        .into_iter();
+        let near = bounds.iter().map(|bounds| bounds.and_then(|_| all.next())).collect();
+        Ok(Some(Self { scale, near }))
+    }
+
+    /// Whether a tile may have corners inside.
+    pub fn is_near(&self, slot: usize) -> bool {
+        self.near[slot].as_ref().is_some_and(|near| match near {
+            Distances::Leaves(window) => window.has_inside(),
+            Distances::Corners(values) => values.iter().any(|value| *value < 0.0),
+        })
+    }
+
+    /// Signed distance (m) at a corner of a tile, `at` its index there; none far away.
+    pub fn at(&self, slot: usize, at: usize, corner: DVec3) -> Option<f32> {
+        Some(match self.near[slot].as_ref()? {
+            Distances::Leaves(window) => window.sample((corner * self.scale).into()).0,
+            Distances::Corners(values) => values[at],
+        })
+    }
+}

@@ -1,0 +1,44 @@
+//! The exact state of mist as bytes, from which a run resumes.
+
+use super::Mist;
+use crate::base::bytes::{Reader, Writer};
+use crate::error::{Error, Result};
+use crate::snow::packed::{self, Magic};
+
+/// Magic bytes, including the version.
+const MAGIC: &Magic = b"frzmst01";
+/// What messages call it.
+const NOUN: &str = "mist";
+
+/// The state as bytes, the same for any number of threads.
+pub fn save(mist: &Mist) -> Vec<u8> {
+    let mut to = Writer::default();
+    to.f64(mist.params.cell);
+    mist.params.wind.iter().for_each(|speed| to.f64(*speed));
+    mist.flow.save(&mut to);
+    packed::pack(&to.0, MAGIC)
+}
+
+/// Count of bytes before they were packed; 0 for those of no state.
+pub fn unpacked(bytes: &[u8]) -> u64 {
+    packed::unpacked(bytes, MAGIC, NOUN)
+}
+
+/// Reads a state into mist that has none yet.
+///
+/// # Errors
+/// Bytes that are not a valid state, or one of other cells or another wind.
+pub fn load(mist: &mut Mist, bytes: &[u8]) -> Result<()> {
+    let bytes = packed::unpack(bytes, MAGIC, NOUN)?;
+    let mut from = Reader::new(&bytes);
+    let cell = from.f64()?;
+    if cell != mist.params.cell {
+        return Err(Error::Bytes(format!("has cells of {cell} m, not {}", mist.params.cell)));
+    }
+    let wind = [from.f64()?, from.f64()?, from.f64()?];
+    if wind != mist.params.wind {
+        return Err(Error::Bytes(format!("has a wind of {wind:?} m/s, not {:?}", mist.params.wind)));
+    }
+    mist.flow.load(&mut from)?;
+    from.end()
+}
