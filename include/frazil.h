@@ -36,7 +36,7 @@
 /**
  * Version of the interface that this header describes: major << 16 | minor.
  */
-#define FRZ_ABI_VERSION 65538
+#define FRZ_ABI_VERSION 65539
 
 /**
  * Version of frazil that this header belongs to.
@@ -87,6 +87,16 @@
  * Flag of parameters of grains: those among others feel less of the air than those of a thin spray.
  */
 #define FRZ_GRAINS_AIR_BY_DENSITY 8
+
+/**
+ * Flag of parameters of mist: falling grains raise it too.
+ */
+#define FRZ_MIST_FALLING 1
+
+/**
+ * Flag of parameters of mist: a level ground lies at frz_mist_params.floor.
+ */
+#define FRZ_MIST_FLOOR 2
 
 /**
  * Status codes. Numbers never change; new ones are added at the end.
@@ -340,6 +350,31 @@ typedef uint32_t frz_mesh_part;
 #endif // __cplusplus
 
 /**
+ * What frz_mist_grid makes a grid of.
+ */
+enum frz_mist_field
+#if defined(__cplusplus) || __STDC_VERSION__ >= 202311L
+  : uint32_t
+#endif // defined(__cplusplus) || __STDC_VERSION__ >= 202311L
+ {
+    /**
+     * Floats: the density of the mist, a fog; active where there is some. It is called "density".
+     */
+    FRZ_MIST_DENSITY = 0,
+    /**
+     * Vectors: the velocity of the air (m/s) at the cells' centres, where blocks hold mist. It is called "vel".
+     */
+    FRZ_MIST_VELOCITY = 1,
+};
+#ifndef __cplusplus
+#if __STDC_VERSION__ >= 202311L
+typedef enum frz_mist_field frz_mist_field;
+#else
+typedef uint32_t frz_mist_field;
+#endif // __STDC_VERSION__ >= 202311L
+#endif // __cplusplus
+
+/**
  * How values between voxels are found.
  */
 enum frz_sampling
@@ -464,6 +499,11 @@ typedef struct frz_grid frz_grid;
  * A mesh of polygons with attributes of its vertices.
  */
 typedef struct frz_mesh frz_mesh;
+
+/**
+ * Powder in the air.
+ */
+typedef struct frz_mist frz_mist;
 
 /**
  * Worker threads, shared by any number of contexts.
@@ -1117,6 +1157,110 @@ typedef struct {
      */
     double fastest;
 } frz_grains_report;
+
+/**
+ * How grains raise mist and how it behaves. All of it but the cell and the wind may change between steps.
+ */
+typedef struct {
+    /**
+     * sizeof(frz_mist_params).
+     */
+    uint32_t struct_size;
+    /**
+     * 0, FRZ_MIST_FALLING, FRZ_MIST_FLOOR or both.
+     */
+    uint32_t flags;
+    /**
+     * Edge of a cell of air (m), 1e-5 to 100; 4/3 of the base layer's voxel gives the thesis' look.
+     */
+    double cell;
+    /**
+     * Speed (m/s) over which grains raise mist, 0 to 1000; 2 is usual.
+     */
+    double from_speed;
+    /**
+     * Of the air where there is mist, along y (m/s2), -1000 to 1000; -2 is usual.
+     */
+    double gravity;
+    /**
+     * Time (s) in which half of the mist dissipates, above 0; infinite: it stays. 1 is usual.
+     */
+    double half_life;
+    /**
+     * Velocity of the air (m/s), each component -1000 to 1000; 0 is usual.
+     */
+    double wind[3];
+    /**
+     * Acceleration by eddies (m/s2, root mean square), 0 to 1000; 0, as is usual: none.
+     */
+    double turbulence;
+    /**
+     * Size of the eddies (m), at least 8 cells; 24 cells are usual.
+     */
+    double turbulence_size;
+    /**
+     * Strength with which small eddies are kept alive (1/s), 0 to 100; 0, as is usual: not at all.
+     */
+    double confinement;
+    /**
+     * Share of the density of new mist that noise takes away at most, 0 to 1; 0.3 is usual.
+     */
+    double noise;
+    /**
+     * Size of that noise (m), at least a cell; 4 cells are usual.
+     */
+    double noise_size;
+    /**
+     * Height of a level ground (m), -1e6 to 1e6; only with FRZ_MIST_FLOOR. 0 is usual.
+     */
+    double floor;
+    /**
+     * Another one gives other noise and eddies; 0 is usual.
+     */
+    int32_t seed;
+    /**
+     * Tiles of air, 8 cells wide, that are computed around the mist, 1 to 64; 1 is usual.
+     */
+    uint32_t padding;
+} frz_mist_params;
+
+/**
+ * What a step did.
+ */
+typedef struct {
+    /**
+     * sizeof(frz_mist_report), set by the caller.
+     */
+    uint32_t struct_size;
+    /**
+     * Sub-steps that the step was divided into.
+     */
+    uint32_t sub_steps;
+    /**
+     * Cells of air now.
+     */
+    uint64_t cells;
+    /**
+     * Grains that raised mist.
+     */
+    uint64_t sources;
+    /**
+     * Iterations of all projections.
+     */
+    uint64_t iterations;
+    /**
+     * Sum of the density, times the volume of a cell (m3).
+     */
+    double mass;
+    /**
+     * Greatest divergence times the cell that a projection left, over the greatest speed before it.
+     */
+    double divergence;
+    /**
+     * Greatest speed of the air on any axis (m/s).
+     */
+    double fastest;
+} frz_mist_report;
 
 /**
  * How long a phase took.
@@ -2126,6 +2270,145 @@ frz_status frz_grains_save(frz_context *context,
                            void *dst,
                            size_t capacity,
                            size_t *size);
+
+/**
+ * Fills parameters with the usual values, those of the thesis' look for voxels of 1 cm. Another cell wants another
+ * turbulence_size and noise_size.
+ *
+ * params: receives them.
+ * size: sizeof(frz_mist_params).
+ *
+ * Any thread.
+ */
+frz_status frz_mist_params_init(frz_mist_params *params,
+                                size_t size);
+
+/**
+ * Makes mist: none yet, or that of a state that frz_mist_save wrote.
+ *
+ * params: NULL for the usual ones.
+ * restart: restart_bytes bytes of frz_mist_save of mist with the same cell and wind: it comes back bit for bit, on any
+ *     number of threads. NULL: none. Bytes that are damaged, of another version, cell or wind are FRZ_ERROR_FILE.
+ * restart_bytes: 0 without a restart.
+ * out: receives the mist, to be destroyed with frz_mist_destroy; NULL after a failure.
+ *
+ * One thread at a time for each context.
+ */
+frz_status frz_mist_create(frz_context *context,
+                           const frz_mist_params *params,
+                           const void *restart,
+                           size_t restart_bytes,
+                           frz_mist **out);
+
+/**
+ * Destroys mist; NULL is fine.
+ *
+ * mist: may be NULL. Not while a call uses it: it then stays.
+ *
+ * One thread at a time.
+ */
+void frz_mist_destroy(frz_mist *mist);
+
+/**
+ * Sets how mist behaves from the next step on. All parameters but the cell and the wind may change between steps.
+ *
+ * params: FRZ_ERROR_ARGUMENT names the field at fault and its range; the old ones then stay.
+ *
+ * One thread at a time.
+ */
+frz_status frz_mist_set_params(frz_mist *mist,
+                               const frz_mist_params *params);
+
+/**
+ * Moves mist through a step, with what fast grains raise on their way in it.
+ *
+ * Call it once after each frz_grains_step, with the same base layer, bodies and dt, but not at the first frame of a shot, with a
+ * dt of 0: nothing moved before it. After a failure or a cancel the mist is as it was before.
+ *
+ * grains: the grains after their step; they are only read. NULL: none raise mist.
+ * base: the layer after its step, around which the air flows; it is only read. NULL: there is none.
+ * wind: a grid of velocities (m/s) that the air where there is mist takes on, half of the difference in a tenth of a second;
+ *     a value that is not finite where there is air is FRZ_ERROR_ARGUMENT. NULL: only frz_mist_params.wind.
+ * bodies: count bodies that bound the air and carry it along; NULL with a count of 0. Those that do not move have no
+ *     positions_end. Of a body that is open wider than a tenth of its area the air flows around both sides. One with a vertex that
+ *     moves at over 100 m/s is taken to jump: it stands at positions_end for the whole step.
+ * count: number of bodies.
+ * time: of the step's beginning (s), -1e9 to 1e9: eddies change with it.
+ * dt: length of the step (s), 1e-6 to 3600.
+ * report: receives what was done, all zeroes after a failure; may be NULL. Its struct_size is set by the caller.
+ *
+ * One thread at a time; any number may read a base layer, grains and a grid, but none may change them meanwhile (FRZ_ERROR_BUSY).
+ */
+frz_status frz_mist_step(frz_context *context,
+                         frz_mist *mist,
+                         const frz_grains *grains,
+                         const frz_base *base,
+                         const frz_grid *wind,
+                         const frz_body *bodies,
+                         size_t count,
+                         double time,
+                         double dt,
+                         frz_mist_report *report);
+
+/**
+ * Moves mist through a step, with what points raise on their way in it: as frz_mist_step, for a host whose grains or base
+ * layer are its own, or that has their files only. The mist is the same, bit for bit.
+ *
+ * positions: double[3] for each point at the step's end (m), finite, within 1e7 cells of the origin along each axis.
+ * velocities: float[3] for each point (m/s), finite.
+ * radius: of the points (m), above 0 and at most 64 cells.
+ * snow: a level set around which the air flows, with voxels fixed in the world, as it was before the layer's step, in which bodies
+ *     move into it. NULL: there is none.
+ * wind: as for frz_mist_step.
+ * bodies: as for frz_mist_step.
+ * count: as for frz_mist_step.
+ * time: as for frz_mist_step.
+ * dt: as for frz_mist_step.
+ * report: as for frz_mist_step.
+ *
+ * One thread at a time; any number may read a grid.
+ */
+frz_status frz_mist_step_points(frz_context *context,
+                                frz_mist *mist,
+                                frz_view positions,
+                                frz_view velocities,
+                                double radius,
+                                const frz_grid *snow,
+                                const frz_grid *wind,
+                                const frz_body *bodies,
+                                size_t count,
+                                double time,
+                                double dt,
+                                frz_mist_report *report);
+
+/**
+ * Makes a grid of the mist, whose voxels are its cells: the centre of voxel (0, 0, 0) lies at half a cell on each axis.
+ *
+ * field: a frz_mist_field.
+ * out: receives the grid, the caller's own, to be destroyed with frz_grid_destroy; NULL after a failure.
+ *
+ * One thread at a time for each context; any number may read mist.
+ */
+frz_status frz_mist_grid(frz_context *context,
+                         const frz_mist *mist,
+                         uint32_t field,
+                         frz_grid **out);
+
+/**
+ * Writes all that the next step depends on, besides the parameters and what is around: for a host's own cache. The bytes
+ * are the same on any number of threads.
+ *
+ * dst: room for capacity bytes. NULL: size receives their number, and nothing is written.
+ * capacity: bytes at dst. FRZ_ERROR_CAPACITY when they are too few.
+ * size: receives the bytes that were written, or are needed; 0 after other failures.
+ *
+ * One thread at a time.
+ */
+frz_status frz_mist_save(frz_context *context,
+                         const frz_mist *mist,
+                         void *dst,
+                         size_t capacity,
+                         size_t *size);
 
 #ifdef __cplusplus
 }  // extern "C"

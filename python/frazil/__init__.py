@@ -13,6 +13,10 @@ by the system's loader.
     grains.step(base, bodies, dt=1 / 24, frame=1)   # after each step of the base, with the same bodies
     grains.positions, grains.read("v"), grains.read("id")
 
+    mist = frazil.Mist(ctx, cell=0.04 / 3)
+    mist.step(grains, base, bodies, time=0.0, dt=1 / 24)   # after each step of the grains
+    frazil.save(ctx, [mist.density(ctx)], "mist.vdb")
+
 Lengths are metres, times seconds; Y is up. Everything that fails raises frazil.Error with one sentence.
 Handles have close(), and work in with blocks.
 """
@@ -22,10 +26,11 @@ from .context import Context, Pool
 from .grains import Grains
 from .grid import Grid, Leaf, load, save
 from .mesh import Mesh
+from .mist import Mist
 from .snow import Base, Body, Noise, snow_layer
 from . import level_set
 
 __all__ = [
-    "ABI_VERSION", "Base", "Body", "Context", "Error", "Grains", "Grid", "Leaf", "Mesh", "Noise", "Pool", "level_set", "library",
-    "load", "save", "snow_layer", "version",
+    "ABI_VERSION", "Base", "Body", "Context", "Error", "Grains", "Grid", "Leaf", "Mesh", "Mist", "Noise", "Pool", "level_set",
+    "library", "load", "save", "snow_layer", "version",
 ]

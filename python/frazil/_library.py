@@ -9,7 +9,7 @@ import threading
 
 import numpy as np
 
-ABI_VERSION = 0x10002
+ABI_VERSION = 0x10003
 
 OK, CANCELLED = 0, 5
 
@@ -143,6 +143,22 @@ class GrainsReport(Struct):
     ]
 
 
+class MistParams(Struct):
+    _fields_ = [
+        ("struct_size", c.c_uint32), ("flags", c.c_uint32), ("cell", c.c_double), ("from_speed", c.c_double),
+        ("gravity", c.c_double), ("half_life", c.c_double), ("wind", c.c_double * 3), ("turbulence", c.c_double),
+        ("turbulence_size", c.c_double), ("confinement", c.c_double), ("noise", c.c_double),
+        ("noise_size", c.c_double), ("floor", c.c_double), ("seed", c.c_int32), ("padding", c.c_uint32),
+    ]
+
+
+class MistReport(Struct):
+    _fields_ = [
+        ("struct_size", c.c_uint32), ("sub_steps", c.c_uint32), ("cells", c.c_uint64), ("sources", c.c_uint64),
+        ("iterations", c.c_uint64), ("mass", c.c_double), ("divergence", c.c_double), ("fastest", c.c_double),
+    ]
+
+
 # The structs by their names in the header: a test compares every field's place.
 STRUCTS = {
     "frz_view": View, "frz_span": Span, "frz_progress": Progress, "frz_stage_time": StageTime,
@@ -151,6 +167,7 @@ STRUCTS = {
     "frz_grid_desc": GridDesc, "frz_grid_info": GridInfo, "frz_noise": NoiseParams, "frz_body": BodyDesc,
     "frz_snow_desc": SnowDesc, "frz_base_params": BaseParams, "frz_base_report": BaseReport,
     "frz_grains_params": GrainsParams, "frz_grains_report": GrainsReport,
+    "frz_mist_params": MistParams, "frz_mist_report": MistReport,
 }
 
 POLL = c.CFUNCTYPE(c.c_int, c.c_void_p, c.POINTER(Progress))
@@ -182,9 +199,13 @@ _FUNCTIONS = {
     "grains_step_grids": [_P, _P, _P, _P, _P, _Z, _D, c.c_int32, _P],
     "grains_emit": [_P, _P, View, View, c.c_int32, _P], "grains_count": [_P, _P], "grains_read": [_P, _U, Span],
     "grains_save": [_P, _P, _P, _Z, _P],
+    "mist_params_init": [_P, _Z], "mist_create": [_P, _P, _P, _Z, _P], "mist_set_params": [_P, _P],
+    "mist_step": [_P, _P, _P, _P, _P, _P, _Z, _D, _D, _P],
+    "mist_step_points": [_P, _P, View, View, _D, _P, _P, _P, _Z, _D, _D, _P],
+    "mist_grid": [_P, _P, _U, _P], "mist_save": [_P, _P, _P, _Z, _P],
 }
 _VOID = ["pool_destroy", "context_destroy", "context_cancel", "context_reset", "mesh_destroy", "grid_destroy",
-         "base_destroy", "grains_destroy"]
+         "base_destroy", "grains_destroy", "mist_destroy"]
 _LENT = ["base_grid", "base_removed", "base_compression", "base_touched"]
 
 

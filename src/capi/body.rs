@@ -163,9 +163,11 @@ pub(super) enum Role {
     Sweep,
     /// They push grains.
     Push,
+    /// They bound the air and carry it along.
+    Bound,
 }
 
-/// Farthest from the origin (m) that a body that pushes grains may lie.
+/// Farthest from the origin (m) that a body that pushes grains or bounds the air may lie.
 const FARTHEST: f32 = 1.0e6;
 
 /// Bodies from a host's arrays, checked, each with its surface; `shapes` are those of earlier calls, and are updated.
@@ -186,7 +188,7 @@ pub(super) unsafe fn bodies(
     }
     // SAFETY: the caller's promise.
     let arrived = unsafe { arrived(list, count, dt) }?;
-    if role == Role::Push {
+    if role != Role::Sweep {
         for (at, body) in arrived.iter().enumerate() {
             check_far(body).map_err(|failure| named(at, failure))?;
         }
@@ -221,6 +223,10 @@ fn warn(ctx: &Context, role: Role, id: u64, body: &Body, known: Option<&Arc<Shap
     let (loops, edges) = (body.closed_loops(), body.contradictions());
     if role == Role::Push && loops + edges > 0 {
         ctx.warn(&format!("body {id}: the mesh has no inside: grains collide with both of its sides"));
+        return;
+    }
+    // Of small holes, which are closed, and of others, which are not, the air is told by a step.
+    if role == Role::Bound {
         return;
     }
     if loops > 0 {

@@ -176,7 +176,7 @@ fn check_size(radius: f64, voxel: f64) -> Outcome {
 }
 
 /// Refuses a grid that cannot be the snow of a base layer.
-fn check_snow(name: &str, grid: &FloatGrid) -> Outcome {
+pub(super) fn check_snow(name: &str, grid: &FloatGrid) -> Outcome {
     if grid.class() != GridClass::LevelSet {
         return Err(Failure::argument(format!("{name}: the grid is not a level set")));
     }

@@ -64,6 +64,12 @@ pub mod grains;
 #[cfg(feature = "vdb")]
 pub mod grains_points;
 
+#[cfg(feature = "vdb")]
+pub mod mist_params;
+
+#[cfg(feature = "vdb")]
+pub mod mist;
+
 mod handle;
 
 pub use guard::frz_status;

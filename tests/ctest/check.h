@@ -196,6 +196,17 @@ static inline bytes grains_state(frz_context *ctx, const frz_grains *grains) {
     return out;
 }
 
+static inline bytes mist_state(frz_context *ctx, const frz_mist *mist) {
+    bytes out;
+    size_t size = 0;
+    WORKS(frz_mist_save(ctx, mist, NULL, 0, &size));
+    out.data = malloc(size);
+    CHECK(out.data != NULL);
+    WORKS(frz_mist_save(ctx, mist, out.data, size, &out.size));
+    CHECK(out.size == size);
+    return out;
+}
+
 static inline size_t grains_count(const frz_grains *grains) {
     size_t count = 99;
     WORKS(frz_grains_count(grains, &count));

@@ -1,7 +1,7 @@
 /* A host application, small: the template for a plug-in.
  *
- * A node cooks the snow of a frame, the base layer and the grains that come of it, out of the state of the frame before,
- * which it keeps in a cache; when the cache has a hole, it steps from the nearest frame before it. Cooks are cancelled at random and asked for again; two nodes cook
+ * A node cooks the snow of a frame, the base layer, the grains that come of it and the mist that these raise, out of the state
+ * of the frame before, which it keeps in a cache; when the cache has a hole, it steps from the nearest frame before it. Cooks are cancelled at random and asked for again; two nodes cook
  * at once in two threads. In the end everything must have the bytes of a run straight through the frames. */
 #include "check.h"
 
@@ -13,11 +13,12 @@ enum { LAST = 9 };
 typedef struct systems {
     frz_base *base;
     frz_grains *grains;
+    frz_mist *mist;
 } systems;
 
 /* The state after a frame, empty where there is none. */
 typedef struct states {
-    bytes base, grains;
+    bytes base, grains, mist;
 } states;
 
 /* A solver node of the host. */
@@ -26,7 +27,7 @@ typedef struct node {
     const frz_grid *snow; /* the node's input */
     ball shape;
     states cache[LAST + 1];
-    states results[LAST + 1]; /* the layer's grids, and the grains' state */
+    states results[LAST + 1]; /* the layer's grids, and the states of grains and mist */
     unsigned random;
     int cancels;
 } node;
@@ -43,27 +44,32 @@ static int poll(void *user, const frz_progress *progress) {
 }
 
 static void drop_states(states *them) {
-    free(them->base.data), free(them->grains.data);
+    free(them->base.data), free(them->grains.data), free(them->mist.data);
     memset(them, 0, sizeof *them);
 }
 
 static void destroy(systems *them) {
+    frz_mist_destroy(them->mist);
     frz_grains_destroy(them->grains);
     frz_base_destroy(them->base);
 }
 
 /* Everything as it was after a frame that the cache has, or before the first one. */
 static frz_status restore(node *self, frz_context *ctx, int frame, systems *out) {
-    static const states NOTHING = {{NULL, 0}, {NULL, 0}};
+    static const states NOTHING = {{NULL, 0}, {NULL, 0}, {NULL, 0}};
     const states *from = frame > 0 ? &self->cache[frame] : &NOTHING;
     frz_grains_params params;
+    frz_mist_params air;
     frz_status status;
-    out->base = NULL, out->grains = NULL;
+    out->base = NULL, out->grains = NULL, out->mist = NULL;
     WORKS(frz_grains_params_init(&params, sizeof params));
     /* A third of the snow's voxels. */
     params.radius = 0.02 / 3, params.compression = 0.5;
+    WORKS(frz_mist_params_init(&air, sizeof air));
+    air.cell = 0.03, air.turbulence_size = 0.24, air.noise_size = 0.1, air.from_speed = 0.3;
     status = frz_base_create(ctx, NULL, self->snow, from->base.data, from->base.size, &out->base);
     if (status == FRZ_OK) status = frz_grains_create(ctx, &params, from->grains.data, from->grains.size, &out->grains);
+    if (status == FRZ_OK) status = frz_mist_create(ctx, &air, from->mist.data, from->mist.size, &out->mist);
     return status;
 }
 
@@ -79,21 +85,26 @@ static frz_status step(node *self, frz_context *ctx, const systems *them, int fr
     status = frz_base_step(ctx, them->base, &body, 1, dt, frame, NULL);
     /* The grains that are born come of what this step took from the layer. */
     if (status == FRZ_OK) status = frz_grains_step(ctx, them->grains, them->base, &body, 1, dt, frame, NULL);
+    if (status == FRZ_OK && dt > 0)
+        status = frz_mist_step(ctx, them->mist, them->grains, them->base, NULL, &body, 1, dt * (frame - 1), dt, NULL);
     free(at);
     return status;
 }
 
-/* Keeps the state after a frame: that of both, or none. */
+/* Keeps the state after a frame: that of all, or none. */
 static frz_status keep(frz_context *ctx, const systems *them, states *to) {
-    states made = {{NULL, 0}, {NULL, 0}};
+    states made = {{NULL, 0}, {NULL, 0}, {NULL, 0}};
     frz_status status = frz_base_save(ctx, them->base, NULL, 0, &made.base.size);
     if (status == FRZ_OK) status = frz_grains_save(ctx, them->grains, NULL, 0, &made.grains.size);
+    if (status == FRZ_OK) status = frz_mist_save(ctx, them->mist, NULL, 0, &made.mist.size);
     if (status != FRZ_OK) return status;
     made.base.data = malloc(made.base.size), made.grains.data = malloc(made.grains.size);
-    CHECK(made.base.data != NULL && made.grains.data != NULL);
+    made.mist.data = malloc(made.mist.size);
+    CHECK(made.base.data != NULL && made.grains.data != NULL && made.mist.data != NULL);
     status = frz_base_save(ctx, them->base, made.base.data, made.base.size, &made.base.size);
     if (status == FRZ_OK)
         status = frz_grains_save(ctx, them->grains, made.grains.data, made.grains.size, &made.grains.size);
+    if (status == FRZ_OK) status = frz_mist_save(ctx, them->mist, made.mist.data, made.mist.size, &made.mist.size);
     if (status == FRZ_OK) *to = made;
     else drop_states(&made);
     return status;
@@ -103,6 +114,7 @@ static void take_results(frz_context *ctx, const systems *them, states *to) {
     drop_states(to);
     to->base = base_bytes(ctx, them->base);
     to->grains = grains_state(ctx, them->grains);
+    to->mist = mist_state(ctx, them->mist);
 }
 
 /* One cook, on a context of its own; the status says whether it came to its end. */
@@ -181,6 +193,7 @@ int main(void) {
         WORKS(frz_grains_count(them.grains, &count));
         CHECK(count > 100);
         printf("%lu grains\n", (unsigned long)count);
+        CHECK(straight.results[LAST].mist.size > straight.results[1].mist.size);
         destroy(&them);
     }
     for (i = 0; i < 2; ++i) {
@@ -191,7 +204,7 @@ int main(void) {
     for (i = 0; i < 2; ++i) {
         for (k = 0; k < sizeof ORDER / sizeof *ORDER; ++k) {
             const states *got = &nodes[i].results[ORDER[k]], *want = &straight.results[ORDER[k]];
-            CHECK(same_bytes(got->base, want->base) && same_bytes(got->grains, want->grains));
+            CHECK(same_bytes(got->base, want->base) && same_bytes(got->grains, want->grains) && same_bytes(got->mist, want->mist));
         }
     }
     CHECK(nodes[0].cancels + nodes[1].cancels > 5);

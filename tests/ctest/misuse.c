@@ -31,6 +31,7 @@ static double number(void) {
 static uint32_t index_of(uint32_t count) { return chance(30) ? any() : any() % (count + 1); }
 
 static float floats[ROOM];
+static double wide[ROOM / 2];
 static uint32_t whole[ROOM];
 static int32_t places[ROOM];
 static unsigned char memory[ROOM * 8];
@@ -43,6 +44,7 @@ static void fill(void) {
     const uint32_t vertices = 4 + any() % 60;
     for (i = 0; i < ROOM; ++i) {
         floats[i] = wild ? (float)number() : ((float)any() / 2147483648.0f - 0.5f) * 2;
+        wide[i / 2] = wild ? number() : floats[i];
         whole[i] = wild ? index_of(vertices) : any() % vertices;
         places[i] = (int32_t)(chance(20) ? any() : (any() % 64 - 32) * 8);
     }
@@ -81,11 +83,13 @@ static frz_mesh *meshes[HANDLES];
 static frz_grid *grids[HANDLES];
 static frz_base *bases[HANDLES];
 static frz_grains *heaps[HANDLES];
+static frz_mist *airs[HANDLES];
 
 static frz_context *a_context(void) { return chance(40) ? NULL : ctx; }
 static frz_mesh *a_mesh(void) { return chance(60) ? (frz_mesh *)ctx : meshes[any() % HANDLES]; }
 static frz_base *a_base(void) { return chance(60) ? (frz_base *)pool : bases[any() % HANDLES]; }
 static frz_grains *some_grains(void) { return chance(60) ? (frz_grains *)pool : heaps[any() % HANDLES]; }
+static frz_mist *some_mist(void) { return chance(60) ? (frz_mist *)pool : airs[any() % HANDLES]; }
 
 static frz_grid *a_grid(void) {
     if (chance(60)) return (frz_grid *)ctx;
@@ -162,6 +166,23 @@ static frz_grains_params a_behaviour(void) {
     return params;
 }
 
+static frz_mist_params an_air(void) {
+    frz_mist_params params;
+    double *fields[8];
+    WORKS(frz_mist_params_init(&params, sizeof params));
+    fields[0] = &params.cell, fields[1] = &params.from_speed, fields[2] = &params.gravity, fields[3] = &params.half_life;
+    fields[4] = &params.turbulence, fields[5] = &params.wind[any() % 3], fields[6] = &params.floor, fields[7] = &params.confinement;
+    if (chance(2)) params.cell = 0.05, params.turbulence_size = 0.4, params.noise_size = 0.2;
+    if (chance(2)) *fields[any() % 8] = number();
+    if (chance(2)) params.turbulence = any() % 20;
+    if (chance(4)) params.padding = any() % 4;
+    if (chance(2)) params.from_speed = 0.1;
+    params.flags = chance(9) ? any() : any() % 4;
+    params.seed = (int32_t)any();
+    params.struct_size = size_near(sizeof params);
+    return params;
+}
+
 static double a_voxel(void) { return chance(4) ? number() : 0.02 + 0.01 * (any() % 5); }
 static float a_width(void) { return chance(4) ? (float)number() : 3.0f; }
 
@@ -176,10 +197,11 @@ static void call(void) {
     frz_grid *grid = NULL;
     frz_base *base = NULL;
     frz_grains *grains = NULL;
+    frz_mist *mist = NULL;
     frz_context *c = a_context();
     polls = 0;
     fill();
-    switch (any() % 59) {
+    switch (any() % 65) {
         case 0: (void)frz_status_name(any()), (void)frz_last_error(), (void)frz_version(); break;
         case 1: {
             frz_pool *other = NULL;
@@ -422,12 +444,58 @@ static void call(void) {
             break;
         }
         case 57: frz_grains_destroy(heaps[slot]), heaps[slot] = NULL; break;
+        case 59: {
+            const frz_mist_params params = an_air();
+            if (chance(3)) (void)frz_mist_set_params(some_mist(), chance(9) ? NULL : &params);
+            else (void)frz_mist_create(c, chance(3) ? NULL : &params, chance(6) ? memory : NULL, chance(6) ? room : 0, chance(20) ? NULL : &mist);
+            break;
+        }
+        case 60: case 61: {
+            frz_view between[1];
+            frz_body bodies[2];
+            frz_mist_report report;
+            report.struct_size = size_near(sizeof report);
+            if (report.struct_size > sizeof report) break;
+            bodies[0] = a_body(between), bodies[1] = a_body(between);
+            bodies[1].struct_size = chance(4) ? bodies[1].struct_size : bodies[0].struct_size;
+            {
+                const double dt = chance(3) ? number() : 1.0 / 24, time = chance(9) ? number() : any() % 100;
+                const size_t count = any() % 3;
+                const frz_body *list = chance(9) ? NULL : bodies;
+                frz_mist_report *told = chance(4) ? NULL : &report;
+                const frz_grid *wind = chance(4) ? a_grid() : NULL;
+                if (chance(2)) (void)frz_mist_step(c, some_mist(), chance(4) ? NULL : some_grains(), chance(2) ? NULL : a_base(), wind, list, count, time, dt, told);
+                else {
+                    const double radius = chance(4) ? number() : 0.01;
+                    const frz_view at = view(wide, 24);
+                    frz_view fast = view(floats, 12);
+                    if (fast.data && at.data && fast.count > at.count) fast.count = at.count;
+                    (void)frz_mist_step_points(c, some_mist(), at, fast, radius, chance(3) ? a_grid() : NULL, wind, list, count, time, dt, told);
+                }
+            }
+            break;
+        }
+        case 62: (void)frz_mist_grid(c, some_mist(), any() % 3, chance(9) ? NULL : &grid); break;
+        case 63: {
+            const frz_mist *from = some_mist();
+            (void)frz_mist_save(c, from, chance(4) ? NULL : memory, sizeof memory, chance(9) ? NULL : &size);
+            if (size > 0 && size <= sizeof memory) {
+                frz_mist_params params;
+                if (chance(2)) memory[any() % size] ^= (unsigned char)any();
+                WORKS(frz_mist_params_init(&params, sizeof params));
+                if (chance(2)) params.cell = 0.05, params.turbulence_size = 0.4, params.noise_size = 0.2;
+                (void)frz_mist_create(c, &params, memory, chance(9) ? any() % size : size, &mist);
+            }
+            break;
+        }
+        case 64: frz_mist_destroy(airs[slot]), airs[slot] = NULL; break;
         default: frz_base_destroy(bases[slot]), bases[slot] = NULL; break;
     }
     if (mesh) frz_mesh_destroy(meshes[slot]), meshes[slot] = mesh;
     if (grid) frz_grid_destroy(grids[slot]), grids[slot] = grid;
     if (base) frz_base_destroy(bases[slot]), bases[slot] = base;
     if (grains) frz_grains_destroy(heaps[slot]), heaps[slot] = grains;
+    if (mist) frz_mist_destroy(airs[slot]), airs[slot] = mist;
 }
 
 /* Calls `first` to `last` of a seed, in this process. */
@@ -448,7 +516,7 @@ static void calls(uint64_t seed, long first, long last) {
         if (chance(4)) frz_context_reset(ctx);
     }
     for (slot = 0; slot < HANDLES; ++slot) {
-        frz_grains_destroy(heaps[slot]);
+        frz_mist_destroy(airs[slot]), frz_grains_destroy(heaps[slot]);
         frz_base_destroy(bases[slot]), frz_grid_destroy(grids[slot]), frz_mesh_destroy(meshes[slot]);
     }
     frz_context_destroy(ctx);

@@ -322,6 +322,40 @@ class Grains(unittest.TestCase):
         self.assertEqual(grains.step(None, [], 1 / 24, 1).count, 2000)
 
 
+class Mist(unittest.TestCase):
+    """Fast grains raise powder."""
+
+    def test_grains_raise_mist_that_goes_on_from_a_state(self):
+        ctx, other = frazil.Context(threads=2), frazil.Context()
+        more = {"cell": 0.03, "from_speed": 1.0, "floor": 0.0}
+        mist = frazil.Mist(ctx, **more)
+        self.assertEqual(repr(mist), "<frazil.Mist on cells of 0.03 m>")
+        places = np.array([[0, 0.3, 0], [0.1, 0.3, 0.05]])
+        speeds = np.array([[0, 3, 0], [1, 2, 0]], np.float32)
+        report = mist.step((places, speeds, 0.01), None, [moved_box(2)], 0.0, 1 / 24)
+        self.assertEqual(report.sources, 2)
+        self.assertGreater(report.mass, 0)
+        self.assertRegex(repr(report), "^<MistReport sub_steps=.* fastest=")
+        back = frazil.Mist(other, state=mist.save(), **more)
+        grains = frazil.Grains(ctx, radius=0.01)
+        grains.emit(places.astype(np.float32), speeds)
+        for one in (mist, back):
+            one.step(grains, None, [], 1 / 24, 1 / 24)
+        self.assertEqual(back.save(), mist.save())
+        density, velocity = mist.density(ctx), mist.velocity(ctx)
+        self.assertEqual((density.name, velocity.name), ("density", "vel"))
+        self.assertGreater(max(leaf.values.max() for leaf in density.leaves()), 0.3)
+        mist.set_params(half_life=0.1)
+        less = mist.step(None, None, [], 2 / 24, 1 / 24).mass
+        self.assertLess(less, 0.8 * back.step(None, None, [], 2 / 24, 1 / 24).mass)
+        with self.assertRaisesRegex(frazil.Error, "the saved state has cells of"):
+            frazil.Mist(ctx, cell=0.02, state=mist.save())
+        with self.assertRaisesRegex(TypeError, "no parameter gravitation"):
+            frazil.Mist(ctx, gravitation=1)
+        with self.assertRaisesRegex(frazil.Error, "velocities: 1 elements, but there are 2 positions"):
+            mist.step((places, speeds[:1], 0.01), None, [], 0.0, 1 / 24)
+
+
 class Vectors(unittest.TestCase):
     """Grids of vectors."""
 

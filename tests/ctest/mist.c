@@ -1,0 +1,377 @@
+/* Mist: steps beside grains, states, cancels, grids, and what is refused. */
+#include "grains.h"
+
+#include <pthread.h>
+#include <stddef.h>
+
+static frz_mist_params airy(void) {
+    frz_mist_params params;
+    WORKS(frz_mist_params_init(&params, sizeof params));
+    params.cell = 0.02, params.from_speed = 0.2, params.turbulence_size = 0.2, params.noise_size = 0.08;
+    params.flags = FRZ_MIST_FALLING | FRZ_MIST_FLOOR;
+    return params;
+}
+
+static frz_mist *mist_of(frz_context *ctx, bytes state) {
+    const frz_mist_params params = airy();
+    frz_mist *mist = NULL;
+    WORKS(frz_mist_create(ctx, &params, state.data, state.size, &mist));
+    return mist;
+}
+
+static const bytes NOTHING = {NULL, 0};
+
+/* Grains that move, a layer below them, and a vector grid that blows. */
+typedef struct scene {
+    frz_grains *grains;
+    layer pressed;
+    const ball *rest;
+    frz_grid *wind;
+} scene;
+
+static frz_grid *blowing(frz_context *ctx, float speed) {
+    static float values[512][3];
+    frz_vector_leaf leaf;
+    frz_grid_desc desc;
+    frz_grid *grid = NULL;
+    int at;
+    for (at = 0; at < 512; ++at) values[at][0] = speed, values[at][1] = values[at][2] = 0;
+    memset(&leaf, 0, sizeof leaf);
+    leaf.values = &values[0][0];
+    memset(&desc, 0, sizeof desc);
+    desc.struct_size = sizeof desc, desc.value_type = FRZ_VALUE_VECTOR, desc.voxel_size = 10;
+    desc.vector_leaves = &leaf, desc.leaf_count = 1, desc.name = "gusts";
+    WORKS(frz_grid_create(ctx, &desc, &grid));
+    return grid;
+}
+
+static frz_mist_report blow(frz_context *ctx, frz_mist *mist, const scene *with, int frame) {
+    const frz_body body = rolling(with->rest, frame);
+    frz_mist_report report;
+    report.struct_size = sizeof report;
+    WORKS(frz_mist_step(ctx, mist, with->grains, with->pressed.base, with->wind, &body, 1, DT * (frame - 1), DT, &report));
+    return report;
+}
+
+/* The same step of a host that has points and a grid only. */
+static void blow_points(frz_context *ctx, frz_mist *mist, const scene *with, int frame) {
+    const frz_body body = rolling(with->rest, frame);
+    const size_t count = grains_count(with->grains);
+    double(*places)[3] = malloc(count * sizeof *places);
+    float(*speeds)[3] = malloc(count * sizeof *speeds);
+    CHECK(places != NULL && speeds != NULL);
+    WORKS(frz_grains_read(with->grains, FRZ_GRAINS_POSITION_DOUBLE, SPAN(places, count)));
+    WORKS(frz_grains_read(with->grains, FRZ_GRAINS_VELOCITY, SPAN(speeds, count)));
+    WORKS(frz_mist_step_points(ctx, mist, VIEW(places, count), VIEW(speeds, count), 0.02 / 3, with->pressed.before,
+                               with->wind, &body, 1, DT * (frame - 1), DT, NULL));
+    free(places), free(speeds);
+}
+
+static void steps(frz_context *ctx, const scene *with) {
+    frz_mist *mist = mist_of(ctx, NOTHING), *other = mist_of(ctx, NOTHING), *back;
+    frz_mist_report report = blow(ctx, mist, with, 3);
+    bytes state, again, before;
+    frz_grid *density = NULL, *velocity = NULL, *none = NULL;
+    frz_grid_info info;
+    CHECK(report.sources > 0 && report.mass > 0 && report.cells > 0 && report.sub_steps > 0);
+    CHECK(report.divergence < 1e-4 && report.fastest > 0 && report.fastest < 20);
+    blow_points(ctx, other, with, 3);
+    state = mist_state(ctx, mist), again = mist_state(ctx, other);
+    CHECK(same_bytes(state, again));
+    free(again.data);
+    /* A saved state goes on as if it had never stopped, on any number of threads. */
+    {
+        frz_context *alone = context_on(0);
+        back = mist_of(alone, state);
+        blow(ctx, mist, with, 4), blow(alone, back, with, 4);
+        before = mist_state(ctx, mist), again = mist_state(alone, back);
+        CHECK(same_bytes(before, again));
+        frz_mist_destroy(back);
+        frz_context_destroy(alone);
+    }
+    free(again.data), free(before.data), free(state.data);
+    /* Without grains, a layer, wind and bodies the mist goes on by itself. */
+    report.struct_size = sizeof report;
+    WORKS(frz_mist_step(ctx, mist, NULL, NULL, NULL, NULL, 0, 0, DT, &report));
+    CHECK(report.sources == 0 && report.mass > 0);
+    WORKS(frz_mist_step(ctx, mist, NULL, NULL, NULL, NULL, 0, 0, DT, NULL));
+    WORKS(frz_mist_grid(ctx, mist, FRZ_MIST_DENSITY, &density));
+    WORKS(frz_mist_grid(ctx, mist, FRZ_MIST_VELOCITY, &velocity));
+    FAILS(frz_mist_grid(ctx, mist, 2, &none), FRZ_ERROR_ARGUMENT, "field = 2");
+    CHECK(none == NULL);
+    info.struct_size = sizeof info;
+    WORKS(frz_grid_get_info(density, &info));
+    CHECK(info.value_type == FRZ_VALUE_FLOAT && info.grid_class == FRZ_GRID_FOG && info.active_voxels > 100);
+    CHECK(info.voxel_size == 0.02);
+    WORKS(frz_grid_get_info(velocity, &info));
+    CHECK(info.value_type == FRZ_VALUE_VECTOR && info.active_voxels > 100);
+    {
+        /* A sample at a cell's centre is the cell's value, whatever the grid's transform is. */
+        frz_leaf leaves[1];
+        size_t count = 0, i;
+        WORKS(frz_grid_leaves(density, NO_SPAN, &count));
+        CHECK(count > 0);
+        {
+            frz_leaf *all = malloc(count * sizeof *all);
+            CHECK(all != NULL);
+            WORKS(frz_grid_leaves(density, SPAN(all, count), &count));
+            leaves[0] = all[count / 2];
+            free(all);
+        }
+        for (i = 0; i < 512; i += 37) {
+            float place[1][3], value[1] = {-1};
+            const int at[3] = {(int)(i >> 6), (int)(i >> 3 & 7), (int)(i & 7)};
+            int k;
+            for (k = 0; k < 3; ++k) place[0][k] = (float)(0.02 * (leaves[0].origin[k] + at[k] + 0.5));
+            WORKS(frz_grid_sample(ctx, density, VIEW(place, 1), FRZ_SAMPLE_LINEAR, SPAN(value, 1)));
+            CHECK(fabsf(value[0] - leaves[0].values[i]) < 1e-3f);
+        }
+    }
+    frz_grid_destroy(density), frz_grid_destroy(velocity);
+    frz_mist_destroy(mist), frz_mist_destroy(other), frz_mist_destroy(NULL);
+}
+
+typedef struct watch {
+    frz_context *ctx;
+    frz_mist *mist;
+    int polls, at;
+} watch;
+
+static int cancel_at(void *user, const frz_progress *progress) {
+    watch *state = user;
+    (void)progress;
+    if (++state->polls == state->at) {
+        frz_context_cancel(state->ctx);
+        frz_context_reset(state->ctx);
+    }
+    return 0;
+}
+
+/* Other calls while a step runs: the handle is in use. */
+static int try_others(void *user, const frz_progress *progress) {
+    watch *state = user;
+    const frz_mist_params params = airy();
+    frz_grid *grid = NULL;
+    size_t size = 7;
+    (void)progress;
+    ++state->polls;
+    CHECK(frz_mist_step(state->ctx, state->mist, NULL, NULL, NULL, NULL, 0, 0, DT, NULL) == FRZ_ERROR_BUSY);
+    CHECK(frz_mist_set_params(state->mist, &params) == FRZ_ERROR_BUSY);
+    CHECK(frz_mist_grid(state->ctx, state->mist, 0, &grid) == FRZ_ERROR_BUSY && grid == NULL);
+    CHECK(frz_mist_save(state->ctx, state->mist, NULL, 0, &size) == FRZ_ERROR_BUSY && size == 0);
+    frz_mist_destroy(state->mist);
+    CHECK(strstr(frz_last_error(), "in use") != NULL);
+    return 0;
+}
+
+static void *cancel_soon(void *user) {
+    frz_context_cancel(user);
+    return NULL;
+}
+
+static void cancels(const scene *with) {
+    frz_context *quiet = context_on(2);
+    const frz_body body = rolling(with->rest, 4);
+    frz_mist *mist = mist_of(quiet, NOTHING);
+    bytes before, want, got;
+    uint32_t threads;
+    blow(quiet, mist, with, 3);
+    before = mist_state(quiet, mist);
+    blow(quiet, mist, with, 4);
+    want = mist_state(quiet, mist);
+    frz_mist_destroy(mist);
+    mist = mist_of(quiet, before);
+    for (threads = 0; threads <= 2; threads += 2) {
+        frz_context *ctx = context_on(threads);
+        watch state = {NULL, NULL, 0, 0};
+        frz_status status = FRZ_CANCELLED;
+        pthread_t thread;
+        state.ctx = ctx;
+        for (state.at = 1; status != FRZ_OK; ++state.at) {
+            frz_mist_report report;
+            report.struct_size = sizeof report, report.cells = 1;
+            state.polls = 0;
+            WORKS(frz_context_set_poll(ctx, cancel_at, &state));
+            status = frz_mist_step(ctx, mist, with->grains, with->pressed.base, with->wind, &body, 1, DT * 3, DT, &report);
+            WORKS(frz_context_set_poll(ctx, NULL, NULL));
+            CHECK(status == FRZ_OK || (status == FRZ_CANCELLED && report.cells == 0));
+            got = mist_state(quiet, mist);
+            CHECK(same_bytes(got, status == FRZ_OK ? want : before));
+            free(got.data);
+        }
+        CHECK(state.at > 3);
+        frz_mist_destroy(mist);
+        mist = mist_of(quiet, before);
+        /* From another thread, at any time. */
+        CHECK(pthread_create(&thread, NULL, cancel_soon, ctx) == 0);
+        status = frz_mist_step(ctx, mist, with->grains, with->pressed.base, with->wind, &body, 1, DT * 3, DT, NULL);
+        pthread_join(thread, NULL);
+        CHECK(status == FRZ_OK || status == FRZ_CANCELLED);
+        frz_context_reset(ctx);
+        got = mist_state(quiet, mist);
+        CHECK(same_bytes(got, status == FRZ_OK ? want : before));
+        free(got.data);
+        frz_mist_destroy(mist);
+        mist = mist_of(quiet, before);
+        state.mist = mist, state.polls = 0, state.ctx = quiet;
+        WORKS(frz_context_set_poll(ctx, try_others, &state));
+        WORKS(frz_mist_step(ctx, mist, with->grains, with->pressed.base, with->wind, &body, 1, DT * 3, DT, NULL));
+        CHECK(state.polls > 2);
+        frz_mist_destroy(mist);
+        mist = mist_of(quiet, before);
+        frz_context_destroy(ctx);
+    }
+    frz_mist_destroy(mist);
+    free(before.data), free(want.data);
+    frz_context_destroy(quiet);
+}
+
+static void parameters(frz_context *ctx) {
+    frz_mist_params params;
+    frz_mist *mist = NULL, *none = NULL;
+    size_t i;
+    WORKS(frz_mist_params_init(&params, sizeof params));
+    CHECK(params.struct_size == sizeof params && params.from_speed == 2 && params.gravity == -2 && params.half_life == 1);
+    CHECK(params.padding == 1 && params.flags == 0 && params.noise == 0.3 && params.turbulence == 0);
+    params = airy();
+    WORKS(frz_mist_create(ctx, &params, NULL, 0, &mist));
+    {
+        struct {
+            double *field;
+            double value;
+            const char *words;
+        } wrong[] = {
+            {&params.cell, 0, "cell = 0 is not within"},
+            {&params.cell, (double)NAN, "cell is not finite"},
+            {&params.from_speed, -1, "from_speed = -1 is not within"},
+            {&params.from_speed, (double)NAN, "from_speed = NaN"},
+            {&params.gravity, 1e9, "gravity = 1000000000 is not within"},
+            {&params.half_life, 0, "half_life = 0 is not over 0"},
+            {&params.half_life, (double)NAN, "half_life = NaN"},
+            {&params.wind[1], (double)INFINITY, "wind = inf"},
+            {&params.turbulence, -1, "turbulence = -1"},
+            {&params.turbulence_size, 0.1, "turbulence_size = 0.1 is not within 0.16"},
+            {&params.confinement, 101, "confinement = 101"},
+            {&params.noise, 1.5, "noise = 1.5"},
+            {&params.noise_size, 0.01, "noise_size = 0.01"},
+            {&params.floor, (double)NAN, "floor"},
+            {&params.floor, 1e300, "floor = "},
+        };
+        for (i = 0; i < sizeof wrong / sizeof *wrong; ++i) {
+            const double good = *wrong[i].field;
+            *wrong[i].field = wrong[i].value;
+            FAILS(frz_mist_create(ctx, &params, NULL, 0, &none), FRZ_ERROR_ARGUMENT, wrong[i].words);
+            FAILS(frz_mist_set_params(mist, &params), FRZ_ERROR_ARGUMENT, wrong[i].words);
+            CHECK(none == NULL);
+            *wrong[i].field = good;
+        }
+    }
+    params.padding = 0;
+    FAILS(frz_mist_set_params(mist, &params), FRZ_ERROR_ARGUMENT, "padding = 0");
+    params.padding = 2, params.flags = 4;
+    FAILS(frz_mist_set_params(mist, &params), FRZ_ERROR_ARGUMENT, "flags = 0x4");
+    params.flags = 0, params.cell = 0.021;
+    FAILS(frz_mist_set_params(mist, &params), FRZ_ERROR_ARGUMENT, "cell = 0.021 cannot change, it is 0.02");
+    params.cell = 0.02, params.wind[0] = 1;
+    FAILS(frz_mist_set_params(mist, &params), FRZ_ERROR_ARGUMENT, "cannot change");
+    params.wind[0] = 0;
+    WORKS(frz_mist_set_params(mist, &params));
+    params.struct_size = 20;
+    FAILS(frz_mist_set_params(mist, &params), FRZ_ERROR_VERSION, "struct_size = 20");
+    FAILS(frz_mist_params_init(&params, 20), FRZ_ERROR_VERSION, "struct_size = 20");
+    FAILS(frz_mist_params_init(NULL, sizeof params), FRZ_ERROR_ARGUMENT, "frz_mist_params is NULL");
+    frz_mist_destroy(mist);
+    WORKS(frz_mist_create(ctx, NULL, NULL, 0, &none));
+    frz_mist_destroy(none);
+}
+
+static void what_is_refused(frz_context *ctx, const scene *with) {
+    const frz_mist_params params = airy();
+    const frz_body body = rolling(with->rest, 4);
+    frz_mist *mist = mist_of(ctx, NOTHING), *none = NULL;
+    double places[2][3] = {{0, 0.3, 0}, {0.1, 0.3, 0}};
+    float speeds[2][3] = {{0, 3, 0}, {0, 3, 0}};
+    frz_mist_report report;
+    frz_grid *nan = blowing(ctx, 1);
+    bytes state, before, after;
+    size_t size = 5, i;
+    report.struct_size = sizeof report;
+    blow(ctx, mist, with, 3);
+    before = state = mist_state(ctx, mist);
+    FAILS(frz_mist_create(NULL, NULL, NULL, 0, &none), FRZ_ERROR_ARGUMENT, "the context is NULL");
+    FAILS(frz_mist_create(ctx, NULL, NULL, 0, NULL), FRZ_ERROR_ARGUMENT, "out is NULL");
+    FAILS(frz_mist_step(ctx, NULL, NULL, NULL, NULL, NULL, 0, 0, DT, &report), FRZ_ERROR_ARGUMENT, "the mist handle is NULL");
+    FAILS(frz_mist_step(NULL, mist, NULL, NULL, NULL, NULL, 0, 0, DT, &report), FRZ_ERROR_ARGUMENT, "the context is NULL");
+    FAILS(frz_mist_step(ctx, (frz_mist *)ctx, NULL, NULL, NULL, NULL, 0, 0, DT, &report), FRZ_ERROR_HANDLE, "not a mist handle");
+    FAILS(frz_mist_step(ctx, mist, (frz_grains *)mist, NULL, NULL, NULL, 0, 0, DT, &report), FRZ_ERROR_HANDLE, "not a grains handle");
+    FAILS(frz_mist_step(ctx, mist, NULL, NULL, frz_base_grid(with->pressed.base), NULL, 0, 0, DT, &report), FRZ_ERROR_ARGUMENT, "holds floats");
+    FAILS(frz_mist_step(ctx, mist, NULL, NULL, NULL, NULL, 1, 0, DT, &report), FRZ_ERROR_ARGUMENT, "bodies is NULL");
+    FAILS(frz_mist_step(ctx, mist, NULL, NULL, NULL, NULL, 0, 0, 0, &report), FRZ_ERROR_ARGUMENT, "dt = 0 is not within");
+    FAILS(frz_mist_step(ctx, mist, NULL, NULL, NULL, NULL, 0, 0, (double)NAN, &report), FRZ_ERROR_ARGUMENT, "dt is not finite");
+    FAILS(frz_mist_step(ctx, mist, NULL, NULL, NULL, NULL, 0, 1e300, DT, &report), FRZ_ERROR_ARGUMENT, "time = ");
+    report.struct_size = 12;
+    FAILS(frz_mist_step(ctx, mist, NULL, NULL, NULL, NULL, 0, 0, DT, &report), FRZ_ERROR_VERSION, "struct_size = 12");
+    report.struct_size = sizeof report;
+#define POINTS(n, m, r, snow) frz_mist_step_points(ctx, mist, VIEW(places, n), VIEW(speeds, m), r, snow, NULL, NULL, 0, 0, DT, &report)
+    FAILS(POINTS(2, 1, 0.005, NULL), FRZ_ERROR_ARGUMENT, "velocities: 1 elements, but there are 2 positions");
+    FAILS(POINTS(2, 2, 0, NULL), FRZ_ERROR_ARGUMENT, "radius = 0 is not within");
+    FAILS(POINTS(2, 2, 100, NULL), FRZ_ERROR_ARGUMENT, "radius of 100 m");
+    FAILS(POINTS(2, 2, 0.005, with->wind), FRZ_ERROR_ARGUMENT, "holds vectors");
+    FAILS(POINTS(2, 2, 0.005, nan), FRZ_ERROR_ARGUMENT, "holds vectors");
+    places[1][2] = (double)NAN;
+    FAILS(POINTS(2, 2, 0.005, NULL), FRZ_ERROR_ARGUMENT, "from the origin");
+    places[1][2] = 1e9;
+    FAILS(POINTS(2, 2, 0.005, NULL), FRZ_ERROR_ARGUMENT, "from the origin");
+    places[1][2] = 0, speeds[0][0] = (float)NAN;
+    FAILS(POINTS(2, 2, 0.005, NULL), FRZ_ERROR_ARGUMENT, "velocity of the grain");
+    speeds[0][0] = 1e9f;
+    FAILS(POINTS(2, 2, 0.005, NULL), FRZ_ERROR_ARGUMENT, "mist moves at");
+    WORKS(frz_context_set_memory_limit(ctx, 1000));
+    FAILS(frz_mist_step(ctx, mist, with->grains, NULL, NULL, &body, 1, 0, DT, &report), FRZ_ERROR_MEMORY, "more than the limit");
+    WORKS(frz_context_set_memory_limit(ctx, 0));
+    after = mist_state(ctx, mist);
+    CHECK(same_bytes(before, after));
+    free(after.data);
+    /* States. */
+    FAILS(frz_mist_save(ctx, mist, state.data, 10, &size), FRZ_ERROR_CAPACITY, "room for 10 bytes");
+    CHECK(size == state.size);
+    FAILS(frz_mist_save(ctx, mist, NULL, 0, NULL), FRZ_ERROR_ARGUMENT, "size is NULL");
+    FAILS(frz_mist_create(ctx, &params, "no", 2, &none), FRZ_ERROR_FILE, "the saved state");
+    FAILS(frz_mist_create(ctx, &params, NULL, 2, &none), FRZ_ERROR_ARGUMENT, "restart: the data is NULL");
+    for (i = 1; i < state.size; i += 1 + state.size / 50) {
+        FAILS(frz_mist_create(ctx, &params, state.data, i, &none), FRZ_ERROR_FILE, "the saved state");
+        ((unsigned char *)state.data)[i] ^= 4;
+        FAILS(frz_mist_create(ctx, &params, state.data, state.size, &none), FRZ_ERROR_FILE, "the saved state");
+        ((unsigned char *)state.data)[i] ^= 4;
+    }
+    {
+        frz_mist_params other = airy();
+        other.cell = 0.03, other.turbulence_size = 1;
+        FAILS(frz_mist_create(ctx, &other, state.data, state.size, &none), FRZ_ERROR_FILE, "the saved state has cells of 0.02 m");
+    }
+    CHECK(none == NULL);
+    free(state.data);
+    frz_grid_destroy(nan);
+    frz_mist_destroy(mist);
+}
+
+int main(void) {
+    frz_context *ctx = context_on(2);
+    frz_grid *snow = small_snow(ctx);
+    ball rest;
+    scene with;
+    ball_make(&rest, 0.1f);
+    with.rest = &rest;
+    with.grains = some(ctx, &with.pressed, &rest, snow);
+    move(ctx, with.grains, &with.pressed, &rest, 3);
+    with.wind = blowing(ctx, 1);
+    steps(ctx, &with);
+    parameters(ctx);
+    what_is_refused(ctx, &with);
+    cancels(&with);
+    frz_grains_destroy(with.grains);
+    frz_base_destroy(with.pressed.base), frz_grid_destroy(with.pressed.before), frz_grid_destroy(with.wind);
+    frz_grid_destroy(snow);
+    frz_context_destroy(ctx);
+    return 0;
+}
