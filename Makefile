@@ -19,7 +19,8 @@ demo: setup
 	target/release/make_scenes $(DEMO)
 	target/release/frazil check $(DEMO)/hero.toml
 	target/release/frazil snow $(DEMO)/hero.toml -o $(DEMO)/hero
-	target/release/frazil preview $(DEMO)/hero/base/base.0070.vdb $(DEMO)/hero/objects/objects.0070.ply -o $(DEMO)/hero.png --eye 1.9,1.9,-3.0 --target 0,0.7,0.2 --fov 39 --sun 250,35
+	target/release/frazil preview $(DEMO)/hero --frames 66 -o $(DEMO)/hero.png --size 960x540 --eye=-1.75,1.2,3.1 --target 0.05,0.72,0.45 --fov 41 --sun 115,22 --fog-density 25
+	target/release/frazil preview $(DEMO)/hero --frames 25-72 -o $(DEMO)/hero.gif --size 400x225 --eye=-2.3,1.5,3.2 --target 0,0.5,-0.2 --fov 46 --sun 115,22 --fog-density 25
 	target/release/frazil snow $(DEMO)/walker.toml -o $(DEMO)/walker
 	target/release/frazil preview $(DEMO)/walker/base/base.0048.vdb -o $(DEMO)/walker.png
 	target/release/frazil preview $(DEMO)/walker/base/base.0048.vdb -o $(DEMO)/print.png --eye -0.05,1.1,1.2 --target 0.085,0.15,1.67 --fov 21 --sun 160,60
@@ -31,7 +32,7 @@ demo: setup
 	target/release/frazil preview $(DEMO)/ball/base/base.0024.vdb -o $(DEMO)/ball.png
 	target/release/frazil snow $(DEMO)/plough.toml -o $(DEMO)/plough
 	target/release/frazil preview $(DEMO)/plough/base/base.0022.vdb $(DEMO)/plough/grains/grains.0022.vdb $(DEMO)/plough/objects/objects.0022.ply -o $(DEMO)/plough.png --eye -0.95,0.85,0.75 --target 0.1,0.3,0.0 --sun 60,22
-	@echo "Pictures: $(DEMO)/hero.png $(DEMO)/walker.png $(DEMO)/print.png $(DEMO)/box.png $(DEMO)/cube.png $(DEMO)/ball.png $(DEMO)/plough.png (grains); volumes: $(DEMO)/hero/base/*.vdb; the whole shot: $(DEMO)/hero/shot.usda"
+	@echo "Pictures: $(DEMO)/hero.png $(DEMO)/hero.gif (base layer, grains and mist) $(DEMO)/walker.png $(DEMO)/print.png $(DEMO)/box.png $(DEMO)/cube.png $(DEMO)/ball.png $(DEMO)/plough.png (grains); volumes: $(DEMO)/hero/base/*.vdb; the whole shot: $(DEMO)/hero/shot.usda"
 
 lint:
 	@if cargo fmt --version >/dev/null 2>&1; then cargo fmt --all --check; else echo "lint: rustfmt is not installed, skipped"; fi

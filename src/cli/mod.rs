@@ -12,7 +12,6 @@ mod new;
 mod options;
 mod output;
 mod preview;
-#[cfg(feature = "vdb")]
 mod progress;
 mod session;
 mod signals;

@@ -80,7 +80,6 @@ impl Session {
     }
 
     /// Whether only errors are printed.
-    #[cfg(feature = "vdb")]
     pub fn is_quiet(&self) -> bool {
         self.globals.quiet
     }

@@ -1,4 +1,5 @@
-//! Preview pictures of meshes, level sets and points: sun, sky and shadows, so that the depth of a print reads.
+//! Preview pictures of meshes, level sets, points and fog: sun, sky and shadows, so that the depth of a print reads; and
+//! flipbooks of them.
 //!
 //! ```no_run
 //! # use frazil::{Context, Pool, io, render::{Camera, Light, Model, Size, Models}};
@@ -13,8 +14,11 @@
 
 mod camera;
 mod cloud;
+pub mod fog;
+mod gif;
 mod model;
 mod models;
+mod palette;
 mod picture;
 mod ramp;
 mod shade;
@@ -24,7 +28,10 @@ mod volume;
 
 pub use camera::{Camera, Size};
 pub use cloud::Cloud;
+pub use fog::Fog;
+pub use gif::{Gif, delays};
 pub use model::Model;
 pub use models::Models;
+pub use palette::Palette;
 pub use picture::Picture;
 pub use shade::{Light, SNOW};

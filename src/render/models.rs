@@ -2,6 +2,7 @@
 
 use super::camera::{Camera, Lens, Size};
 use super::cloud::{Cloud, Splats};
+use super::fog::{Fog, LitFogs, Veil};
 use super::model::{Hit, Model};
 use super::picture::Picture;
 use super::shade::{Colour, Light, shade, to_bytes};
@@ -13,26 +14,35 @@ use rayon::prelude::*;
 
 /// Samples along each edge of a pixel.
 const SAMPLES: usize = 3;
+/// Samples of a pixel.
+const RAYS: usize = SAMPLES * SAMPLES;
 /// Longest edge of a picture (pixels).
 const LONGEST: u32 = 16_384;
 
-/// The light, and the points that are in its way.
-#[derive(Clone, Copy)]
-struct Lit<'a> {
+/// What a picture is drawn from.
+struct View<'a> {
+    camera: &'a Camera,
+    lens: Lens,
     light: &'a Light,
-    shadows: Option<&'a Shadows>,
+    /// The points as the camera sees them, and as they are in the way of the light.
+    splats: Splats<'a>,
+    shadows: Option<Shadows>,
+    fogs: LitFogs<'a>,
+    /// Whether the fogs are the same for all samples of a pixel.
+    is_smooth: bool,
 }
 
-/// The models in one picture.
+/// Models, clouds of points and fogs in one picture.
 pub struct Models {
     models: Vec<Model>,
     clouds: Vec<Cloud>,
+    fogs: Vec<Fog>,
 }
 
 impl Models {
     /// Puts models together.
     pub fn new(models: Vec<Model>) -> Self {
-        Self { models, clouds: Vec::new() }
+        Self { models, clouds: Vec::new(), fogs: Vec::new() }
     }
 
     /// With clouds of points beside them, which get light from the sun and the sky and cast shadows as models do.
@@ -40,10 +50,17 @@ impl Models {
         Self { clouds, ..self }
     }
 
+    /// With fogs, through which what is behind them is seen, and which get light from the sun and the sky; they weaken the
+    /// sun that reaches the models.
+    pub fn with_fogs(self, fogs: Vec<Fog>) -> Self {
+        Self { fogs, ..self }
+    }
+
     /// Least and greatest corner of everything (m); none when all is empty.
     pub fn bounds(&self) -> Option<(DVec3, DVec3)> {
         let boxes =
             self.models.iter().filter_map(Model::bounds).chain(self.clouds.iter().filter_map(Cloud::bounds));
+        let boxes = boxes.chain(self.fogs.iter().filter_map(Fog::bounds));
         boxes.reduce(|a, b| (a.0.inf(&b.0), a.1.sup(&b.1)))
     }
 
@@ -57,16 +74,13 @@ impl Models {
             return Err(Error::argument(what));
         }
         ctx.phase("draw", || {
-            let splats = Splats::new(ctx, &self.clouds, camera, size, SAMPLES)?;
-            let shadows = Shadows::new(&self.clouds);
-            let scene = Lit { light, shadows: shadows.as_ref() };
-            let lens = camera.lens(size);
+            let view = self.view(ctx, camera, light, size)?;
             let row_bytes = 3 * size.width as usize;
             let mut rgb = vec![0; row_bytes * size.height as usize];
             rgb.par_chunks_mut(row_bytes).enumerate().try_for_each(|(y, row)| {
                 ctx.check()?;
                 for (x, pixel) in row.chunks_mut(3).enumerate() {
-                    pixel.copy_from_slice(&self.pixel(&splats, &lens, camera.eye, scene, [x, y]));
+                    pixel.copy_from_slice(&self.pixel(&view, [x, y]));
                 }
                 Ok(())
             })?;
@@ -74,35 +88,76 @@ impl Models {
         })
     }
 
-    fn pixel(
-        &self,
-        splats: &Splats<'_>,
-        lens: &Lens,
-        eye: DVec3,
-        scene: Lit<'_>,
-        [x, y]: [usize; 2],
-    ) -> [u8; 3] {
-        let mut sum = Colour::zeros();
-        for sample in 0..SAMPLES * SAMPLES {
-            let inside = |index: usize| (index as f64 + 0.5) / SAMPLES as f64;
-            let (right, down) = (sample % SAMPLES, sample / SAMPLES);
-            let toward = lens.through(x as f64 + inside(right), y as f64 + inside(down));
-            let splat = splats.at(x * SAMPLES + right, y * SAMPLES + down, eye, toward);
-            sum += self.seen(eye, toward, scene, sample, splat);
-        }
-        to_bytes(sum / (SAMPLES * SAMPLES) as f64)
+    fn view<'a>(
+        &'a self,
+        ctx: &Context,
+        camera: &'a Camera,
+        light: &'a Light,
+        size: Size,
+    ) -> Result<View<'a>> {
+        let splats = Splats::new(ctx, &self.clouds, camera, size, SAMPLES)?;
+        let shadows = Shadows::new(&self.clouds);
+        let blocked = |point, toward| self.hide(shadows.as_ref(), point, toward);
+        let fogs = LitFogs::new(ctx, &self.fogs, light.sun, blocked)?;
+        let is_smooth = fogs.is_smooth(camera, size);
+        Ok(View { camera, lens: camera.lens(size), light, splats, shadows, fogs, is_smooth })
     }
 
-    /// Light that comes along a ray, which meets a point of a cloud or none.
-    fn seen(&self, eye: DVec3, toward: DVec3, scene: Lit<'_>, sample: usize, splat: Option<Hit>) -> Colour {
+    fn pixel(&self, view: &View<'_>, [x, y]: [usize; 2]) -> [u8; 3] {
+        let eye = view.camera.eye;
+        let rays: [(DVec3, Option<Hit>); RAYS] = std::array::from_fn(|sample| {
+            let inside = |index: usize| (index as f64 + 0.5) / SAMPLES as f64;
+            let (right, down) = (sample % SAMPLES, sample / SAMPLES);
+            let toward = view.lens.through(x as f64 + inside(right), y as f64 + inside(down));
+            let splat = view.splats.at(x * SAMPLES + right, y * SAMPLES + down, eye, toward);
+            (toward, self.hit(eye, toward, splat))
+        });
+        let veils = self.veils(view, &rays);
+        let mut sum = Colour::zeros();
+        for (sample, ((toward, hit), veil)) in rays.iter().zip(&veils).enumerate() {
+            if veil.through > 0.0 {
+                sum += self.seen(view, *toward, hit.as_ref(), sample) * veil.through;
+            }
+            sum += veil.light;
+        }
+        to_bytes(sum / RAYS as f64)
+    }
+
+    /// The nearest point on a ray, which meets a point of a cloud or none.
+    fn hit(&self, eye: DVec3, toward: DVec3, splat: Option<Hit>) -> Option<Hit> {
         let hits = self.models.iter().filter_map(|model| model.hit(eye, toward)).chain(splat);
-        let nearest = hits.reduce(|a: Hit, b| if b.distance < a.distance { b } else { a });
-        let Some(hit) = nearest else { return scene.light.background(toward) };
-        let point = eye + toward * hit.distance + hit.normal * hit.skin;
-        let blocked = |direction| {
-            self.models.iter().any(|model| model.blocks(point, direction))
-                || scene.shadows.is_some_and(|shadows| shadows.block(point, direction))
-        };
-        shade(scene.light, hit.normal, hit.albedo, sample, hit.wrap, blocked)
+        hits.reduce(|a: Hit, b| if b.distance < a.distance { b } else { a })
+    }
+
+    /// What the fogs do to the samples of a pixel.
+    fn veils(&self, view: &View<'_>, rays: &[(DVec3, Option<Hit>); RAYS]) -> [Veil; RAYS] {
+        if self.fogs.is_empty() {
+            return [Veil::NONE; RAYS];
+        }
+        let distance = |hit: &Option<Hit>| hit.as_ref().map_or(f64::INFINITY, |hit| hit.distance);
+        if view.is_smooth {
+            let distances = std::array::from_fn(|sample| distance(&rays[sample].1));
+            return view.fogs.veils(view.camera.eye, rays[RAYS / 2].0, distances);
+        }
+        std::array::from_fn(|sample| {
+            let (toward, hit) = &rays[sample];
+            let [veil] = view.fogs.veils(view.camera.eye, *toward, [distance(hit)]);
+            veil
+        })
+    }
+
+    /// Whether a model or a point of a cloud hides a direction from a point.
+    fn hide(&self, shadows: Option<&Shadows>, point: DVec3, toward: DVec3) -> bool {
+        self.models.iter().any(|model| model.blocks(point, toward))
+            || shadows.is_some_and(|shadows| shadows.block(point, toward))
+    }
+
+    /// Light that comes along a ray from what it meets, without the fogs before it.
+    fn seen(&self, view: &View<'_>, toward: DVec3, hit: Option<&Hit>, sample: usize) -> Colour {
+        let Some(hit) = hit else { return view.light.background(toward) };
+        let point = view.camera.eye + toward * hit.distance + hit.normal * hit.skin;
+        let blocked = |direction| self.hide(view.shadows.as_ref(), point, direction);
+        let clear = |direction| if self.fogs.is_empty() { 1.0 } else { view.fogs.sunlight(point, direction) };
+        shade(view.light, hit.normal, hit.albedo, sample, hit.wrap, blocked, clear)
     }
 }

@@ -17,11 +17,17 @@ impl Picture {
     /// Writes a PNG file, whole or not at all.
     ///
     /// # Errors
-    /// What the system refuses.
+    /// As [`Picture::png`]; what the system refuses.
     pub fn write(&self, path: &Path) -> Result<()> {
-        let bytes =
-            self.encoded().map_err(|error| Error::file(path, format!("cannot be made a PNG: {error}")))?;
-        crate::io::atomic::write_bytes(path, &bytes)
+        crate::io::atomic::write_bytes(path, &self.png()?)
+    }
+
+    /// The bytes of a PNG file.
+    ///
+    /// # Errors
+    /// A picture of no pixels, or of another number of bytes than its size says.
+    pub fn png(&self) -> Result<Vec<u8>> {
+        self.encoded().map_err(|error| Error::argument(format!("a picture cannot be made a PNG: {error}")))
     }
 
     fn encoded(&self) -> std::result::Result<Vec<u8>, png::EncodingError> {

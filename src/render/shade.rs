@@ -21,12 +21,14 @@ pub struct Light {
 }
 
 /// Radiance of the sun on a surface that faces it.
-const SUN: Colour = Colour::new(1.75, 1.52, 1.22);
+pub(super) const SUN: Colour = Colour::new(1.75, 1.52, 1.22);
 /// Radiance of the zenith and of the horizon.
 const ZENITH: Colour = Colour::new(0.20, 0.30, 0.48);
 const HORIZON: Colour = Colour::new(0.42, 0.50, 0.60);
 /// What a hidden part of the sky still sends: light that snow reflected several times.
 const BOUNCED: Colour = Colour::new(0.085, 0.115, 0.165);
+/// Mean radiance around a fog: half of it is sky, the other half snow.
+pub(super) const SURROUNDINGS: Colour = Colour::new(0.50, 0.545, 0.61);
 /// Half the angle of the sun's disc, wider than in nature: the edges of shadows are soft (radians).
 const SUN_RADIUS: f64 = 0.02;
 /// Sky rays at each sample of a pixel.
@@ -61,8 +63,9 @@ fn sky(height: f64) -> Colour {
 
 /// Light that leaves a point towards the camera.
 ///
-/// `blocked(direction)` returns whether something hides that direction from the point; `sample` numbers the
-/// samples of this pixel; `wrap` is how far light reaches round to the side that is turned away, 0 to 1.
+/// `blocked(direction)` returns whether something hides that direction from the point, `clear(direction)` how much of the
+/// sun's light fog lets through, 0 to 1; `sample` numbers the samples of this pixel; `wrap` is how far light reaches round
+/// to the side that is turned away, 0 to 1.
 pub(super) fn shade(
     light: &Light,
     normal: DVec3,
@@ -70,12 +73,14 @@ pub(super) fn shade(
     sample: usize,
     wrap: f64,
     blocked: impl Fn(DVec3) -> bool,
+    clear: impl Fn(DVec3) -> f64,
 ) -> Colour {
     let (side, other) = tangents(light.sun);
     let (x, y) = disc(sample);
     let toward_sun = (light.sun + (side * x + other * y) * SUN_RADIUS).normalize();
     let facing = (normal.dot(&toward_sun) + wrap) / (1.0 + wrap);
-    let sun = if facing > 0.0 && !blocked(toward_sun) { SUN * facing } else { Colour::zeros() };
+    let is_lit = facing > 0.0 && !blocked(toward_sun);
+    let sun = if is_lit { SUN * (facing * clear(toward_sun)) } else { Colour::zeros() };
     let (side, other) = tangents(normal);
     let mut fill = Colour::zeros();
     for ray in 0..SKY_RAYS {
@@ -136,8 +141,11 @@ mod tests {
     fn a_shadow_is_darker_and_bluer_than_the_sunny_side() {
         let light = Light::from_degrees(90.0, 45.0);
         let albedo = Colour::new(0.9, 0.9, 0.9);
-        let lit = shade(&light, DVec3::y(), albedo, 0, 0.0, |_| false);
-        let shadowed = shade(&light, DVec3::y(), albedo, 0, 0.0, |toward| toward.dot(&light.sun) > 0.99);
+        let lit = shade(&light, DVec3::y(), albedo, 0, 0.0, |_| false, |_| 1.0);
+        let hidden = |toward: DVec3| toward.dot(&light.sun) > 0.99;
+        let shadowed = shade(&light, DVec3::y(), albedo, 0, 0.0, hidden, |_| 1.0);
+        let veiled = shade(&light, DVec3::y(), albedo, 0, 0.0, |_| false, |_| 0.5);
+        assert!((veiled - (lit + shadowed) * 0.5).norm() < 1e-9);
         assert!(lit.x > 2.0 * shadowed.x);
         assert!(shadowed.z / shadowed.x > lit.z / lit.x);
     }

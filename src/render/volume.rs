@@ -1,11 +1,13 @@
-//! Level sets and fog volumes as surfaces to be drawn.
+//! Grids to be drawn: level sets as surfaces, fog volumes as fog.
 
+use super::fog::{Fog, Part, Placement};
 use super::model::Model;
 use super::shade::SNOW;
-use crate::base::{TriMesh, Vec3};
+use crate::base::blocks::{DIM, Origin};
+use crate::base::{DVec3, TriMesh, Vec3};
 use crate::context::Context;
-use crate::error::Result;
-use crate::vdb::{FloatGrid, level_set};
+use crate::error::{Error, Result};
+use crate::vdb::{FloatGrid, MetaValue, Tile, level_set};
 
 impl Model {
     /// A level set with the colour of snow.
@@ -17,23 +19,77 @@ impl Model {
         let normals = smooth_normals(&mesh);
         Ok(Self::new(mesh, Some(normals), SNOW, 0.5 * grid.voxel_size()))
     }
+}
 
-    /// A fog volume with the colour of snow: the surface where its density is half of the greatest; and that density.
+/// Metadata of a fog: the extinction (1/m) that a value of 1 stands for.
+const SCALE: &str = "frazil:density_scale";
+
+impl Fog {
+    /// A fog volume. A value of 1 loses as much light per metre as its metadata `frazil:density_scale` says, `extinction`
+    /// without that (1/m, for short ways, over 0). Voxels that are not active, and values below 0, count as empty.
     ///
     /// # Errors
-    /// A cancel, or what OpenVDB reports.
-    pub fn fog(ctx: &Context, grid: &FloatGrid) -> Result<(Self, f32)> {
+    /// A transform that is not linear; a scale that is no number of 0 or more; densities too far apart to be drawn, or
+    /// too many for the memory limit; a cancel.
+    pub fn grid(ctx: &Context, grid: &FloatGrid, extinction: f64) -> Result<Self> {
+        let wrong = |what: String| Error::argument(format!("grid \"{}\" {what}", grid.name()));
+        let placement = placement(grid).ok_or_else(|| wrong("has a transform that is not linear".into()))?;
+        let extinction = density_scale(grid)?.unwrap_or(extinction);
+        let tiles: Vec<Tile> =
+            grid.tiles()?.into_iter().filter(|tile| tile.active && tile.value > 0.0).collect();
+        let edge = |tile: &Tile| u64::from(tile.edge.unsigned_abs()) / DIM as u64;
+        let count: u64 = tiles.iter().map(|tile| edge(tile).pow(3)).sum();
+        ctx.allow("a fog", count * TILE_BYTES)?;
         let leaves = grid.leaves()?;
-        let stored = leaves.iter().map(|leaf| leaf.values.iter().copied().fold(0.0, f32::max));
-        let half = 0.5 * stored.fold(0.0, f32::max);
-        if half == 0.0 {
-            return Ok((Self::new(TriMesh::default(), None, SNOW, grid.voxel_size()), half));
+        let mut parts: Vec<(Origin, Part<'_>)> =
+            leaves.iter().map(|leaf| (leaf.origin, Part::Dense(leaf.values, leaf.mask))).collect();
+        for tile in &tiles {
+            let edge = edge(tile) as i32;
+            let places = (0..edge * edge * edge).map(|n| [n / (edge * edge), n / edge % edge, n % edge]);
+            let origin = |at: Origin| [0, 1, 2].map(|axis| tile.origin[axis] + DIM as i32 * at[axis]);
+            parts.extend(places.map(|at| (origin(at), Part::Even(tile.value))));
         }
-        // Densities fall outward where distances rise: the triangles look inward.
-        let mesh = level_set::to_mesh(ctx, grid, half, 0.0)?.reversed();
-        let normals = smooth_normals(&mesh);
-        Ok((Self::new(mesh, Some(normals), SNOW, 0.5 * grid.voxel_size()), half))
+        Self::of_parts(ctx, placement, parts, extinction).map_err(|error| match error {
+            Error::Argument(what) => wrong(what),
+            other => other,
+        })
     }
+}
+
+/// Memory (bytes) of a block of a tile while it is prepared.
+const TILE_BYTES: u64 = 64;
+
+/// What a fog's file says of its densities.
+fn density_scale(grid: &FloatGrid) -> Result<Option<f64>> {
+    let metadata = grid.metadata()?;
+    let Some((_, value)) = metadata.iter().find(|(key, _)| key == SCALE) else { return Ok(None) };
+    let number = match value {
+        MetaValue::Float(number) => Some(f64::from(*number)),
+        MetaValue::Double(number) => Some(*number),
+        MetaValue::Int(number) => Some(*number as f64),
+        _ => None,
+    };
+    let number = number.filter(|number| *number >= 0.0 && number.is_finite());
+    number.map(Some).ok_or_else(|| {
+        let name = grid.name();
+        Error::argument(format!("grid \"{name}\" has a {SCALE} that is no number of 0 or more"))
+    })
+}
+
+/// Where a grid's voxels are; none where its transform is not linear.
+fn placement(grid: &FloatGrid) -> Option<Placement> {
+    let origin = grid.index_to_world(DVec3::zeros());
+    let axes = [DVec3::x(), DVec3::y(), DVec3::z()].map(|axis| grid.index_to_world(axis) - origin);
+    let placement = Placement::new(origin, axes)?;
+    // Perspective shows at the corners of what is there.
+    let (low, high) = grid.active_bbox().unwrap_or_default();
+    let is_linear = (0..8).all(|n| {
+        let corner = [0, 1, 2].map(|axis| f64::from(if n >> axis & 1 == 0 { low[axis] } else { high[axis] }));
+        let corner = DVec3::from(corner);
+        let off = grid.index_to_world(corner) - placement.to_world(corner);
+        off.norm() <= 1.0e-6 * placement.cell() * (1.0 + corner.norm())
+    });
+    is_linear.then_some(placement)
 }
 
 /// The mean of the triangles' normals around each vertex, weighted by area.

@@ -109,15 +109,21 @@ fn object(text: &mut String, file: &str, keys: &[Step]) {
     text.push_str("]\n");
 }
 
-/// A skinned figure that crosses the snow at the speed of its feet.
+/// A skinned figure that crosses the snow at the speed of its feet: base layer, grains and mist.
 fn hero() -> String {
-    let mut text = head("1-96", [-0.8, -2.5, 0.8, 2.5], 0.006);
-    text.push_str("noise = { amplitude = 0.008, size = 0.06 }\n\n[output]\nbase_mode = \"full\"\nobjects = [\"ply\", \"usd\"]\n");
-    let last = 1.1 * 95.0 / 24.0;
+    let mut text = head("1-72", [-0.8, -2.5, 0.8, 1.5], 0.01);
+    text.push_str(
+        "noise = { amplitude = 0.012, size = 0.07 }\n\n[grains]\npreset = \"packed\"\ncompression = 0.4\n",
+    );
+    text.push_str(
+        "\n[mist]\ncell = 0.02\nfrom_speed = 1.2\nhalf_life = 0.5\nturbulence = 3.0\nturbulence_size = 0.4\n",
+    );
+    text.push_str("\n[output]\nobjects = [\"ply\", \"usd\"]\n");
+    let last = 1.1 * 71.0 / 24.0;
     let _ = write!(
         text,
         "\n[[object]]\nfile = \"hero.glb\"\nclip = \"walk\"\nkeys = [\n    {{ frame = 1, at = [0.0, 0.12, -2.2] }},\n    \
-         {{ frame = 96, at = [0.0, 0.12, {:.4}] }},\n]\n",
+         {{ frame = 72, at = [0.0, 0.12, {:.4}] }},\n]\n",
         last - 2.2
     );
     text

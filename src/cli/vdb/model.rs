@@ -3,38 +3,49 @@
 use std::path::Path;
 
 use frazil::base::Points;
-use frazil::render::Model;
 use frazil::scene::{changes_since, partial};
-use frazil::vdb::{GridClass, file, points};
-use frazil::{Context, Error};
+use frazil::vdb::{FloatGrid, file, points};
 
-/// The level set of a file, or its fog volume.
-pub fn of_file(path: &Path, ctx: &Context) -> frazil::Result<Model> {
-    let grid = file::read_named(path, None)?;
-    if grid.class() == GridClass::LevelSet {
-        return Model::level_set(ctx, &grid);
-    }
-    let (model, density) = Model::fog(ctx, &grid)?;
-    if model.bounds().is_none() {
-        return Err(Error::file(path, format!("grid \"{}\" has no density above 0 to draw", grid.name())));
-    }
-    log::warn!(
-        "{}: grid \"{}\" is not a level set: it is drawn where its values are {density}, half of the greatest",
-        path.display(),
-        grid.name()
-    );
-    Ok(model)
+/// What is drawn of a file.
+pub enum Content {
+    /// A level set.
+    Surface(FloatGrid),
+    /// Fog volumes, at least one.
+    Fogs(Vec<FloatGrid>),
+    /// Points.
+    Points(Points),
 }
 
-/// The points of a file that has no grid of floats.
-pub fn points_of(path: &Path) -> frazil::Result<Option<Points>> {
+/// Name of the fog volume that stands for all of a file: others beside it are temperatures, fuels and the like.
+const DENSITY: &str = "density";
+
+/// Reads the first level set of a file; else its fog: the grid called "density", else all fog volumes, else its first grid
+/// of floats; else its points. Grids of vectors are left alone.
+///
+/// # Errors
+/// A file that cannot be read, or that holds none of these.
+pub fn read(path: &Path) -> frazil::Result<Content> {
     let grids = file::describe(path)?;
-    let has = |start: &str| grids.iter().any(|grid| grid.value_type.starts_with(start));
-    if has("Tree_float") || !has("Tree_ptdataidx32") {
-        return Ok(None);
+    let of_type = |start: &'static str| grids.iter().filter(move |grid| grid.value_type.starts_with(start));
+    let floats = || of_type("Tree_float");
+    if floats().next().is_none() && of_type("Tree_ptdataidx32").next().is_some() {
+        if let Some(since) = changes_since(path)? {
+            log::warn!("{}: {}", path.display(), partial(since));
+        }
+        return points::read(path, None).map(Content::Points);
     }
-    if let Some(since) = changes_since(path)? {
-        log::warn!("{}: {}", path.display(), partial(since));
+    if floats().any(|grid| grid.class == "level set") {
+        return file::read_named(path, None).map(Content::Surface);
     }
-    points::read(path, None).map(Some)
+    let mut names: Vec<&str> = match floats().find(|grid| grid.name == DENSITY) {
+        Some(_) => vec![DENSITY],
+        None => floats().filter(|grid| grid.class == "fog volume").map(|grid| grid.name.as_str()).collect(),
+    };
+    // Of several grids with one name the first is read.
+    names.dedup();
+    if names.is_empty() {
+        return file::read_named(path, None).map(|grid| Content::Fogs(vec![grid]));
+    }
+    let fogs = names.into_iter().map(|name| file::read_named(path, Some(name)));
+    fogs.collect::<frazil::Result<_>>().map(Content::Fogs)
 }

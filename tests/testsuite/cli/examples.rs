@@ -124,7 +124,12 @@ fn the_page_of_the_command_line_runs() {
         works(folder.path(), &line.replace("cache/", "changes/"));
         count += 1;
     }
-    assert_eq!(count, 9);
+    for line in lines(block(CLI, "## Pictures", "sh")) {
+        // A few frames show as much as all.
+        works(folder.path(), &line.replace(" -o shot.gif", " --frames 1-120x40 -o shot.gif"));
+        count += 1;
+    }
+    assert_eq!(count, 14);
 }
 
 /// Two frames of points.

@@ -1,0 +1,118 @@
+//! How what was read is drawn, and from where.
+
+use frazil::render::{Camera, Cloud, Light, Model, Models, Picture, Size};
+use frazil::{Context, Error, Result};
+
+use super::sources::Part;
+use crate::cli::exit::Failure;
+
+/// The colour of meshes (linear red, green, blue): leather, which snow is seen beside.
+const BROWN: [f32; 3] = [0.35, 0.16, 0.08];
+
+/// What the user chose about the picture.
+pub struct Look {
+    /// Pixels.
+    pub size: Size,
+    /// The camera; none: one that sees everything.
+    pub camera: Option<Camera>,
+    /// The light; none: one beside the camera.
+    pub light: Option<Light>,
+    /// The attribute that colours points.
+    pub color: Option<String>,
+    /// Extinction (1/m) of a fog of density 1 whose file does not say it.
+    #[cfg_attr(not(feature = "vdb"), expect(dead_code, reason = "fogs come from .vdb files"))]
+    pub fog_density: f64,
+}
+
+/// What is drawn of a frame.
+pub struct Drawing {
+    /// It.
+    pub models: Models,
+    /// Whether there are points in it.
+    has_points: bool,
+    /// Says of a fog that it has no density.
+    hollow: Option<String>,
+}
+
+/// What all pictures of a flipbook have in common.
+pub struct View {
+    camera: Camera,
+    light: Light,
+    /// Pixels.
+    pub size: Size,
+}
+
+impl Look {
+    /// Prepares parts to be drawn.
+    ///
+    /// # Errors
+    /// Points without the attribute; a fog that cannot be drawn; cancel.
+    #[cfg_attr(not(feature = "vdb"), expect(unused_variables, unused_mut, reason = "of grids only"))]
+    pub fn build(&self, ctx: &Context, parts: Vec<Part>) -> Result<Drawing> {
+        let (mut models, mut clouds, mut fogs, mut hollow) = (Vec::new(), Vec::new(), Vec::new(), None);
+        for part in parts {
+            match part {
+                Part::Mesh(mesh) => models.push(Model::mesh(&mesh, BROWN)),
+                Part::Points(path, points) => {
+                    let cloud = Cloud::new(&points, self.color.as_deref());
+                    clouds.push(cloud.map_err(|error| Error::file(path, error.to_string()))?);
+                }
+                #[cfg(feature = "vdb")]
+                Part::Surface(grid) => models.push(Model::level_set(ctx, &grid)?),
+                #[cfg(feature = "vdb")]
+                Part::Fog(path, grid) => {
+                    let fog = frazil::render::Fog::grid(ctx, &grid, self.fog_density);
+                    let fog = fog.map_err(|error| match error {
+                        Error::Argument(what) => Error::file(&path, what),
+                        other => other,
+                    })?;
+                    if fog.is_empty() {
+                        let name = grid.name();
+                        let what = format!("{}: grid \"{name}\" has no density above 0", path.display());
+                        log::info!("{what}");
+                        hollow = Some(what);
+                    }
+                    fogs.push(fog);
+                }
+            }
+        }
+        let has_points = !clouds.is_empty();
+        Ok(Drawing { models: Models::new(models).with_clouds(clouds).with_fogs(fogs), has_points, hollow })
+    }
+
+    /// The camera and the light that were chosen, or those that show all drawings as wholes.
+    ///
+    /// # Errors
+    /// Nothing to see; no points for `--color`.
+    pub fn view(&self, drawings: &[Drawing]) -> std::result::Result<View, Failure> {
+        if self.color.is_some() && drawings.iter().all(|drawing| !drawing.has_points) {
+            return Err(Failure::refused("--color is for points, and no file holds any"));
+        }
+        let boxes = drawings.iter().filter_map(|drawing| drawing.models.bounds());
+        let bounds = boxes.reduce(|a, b| (a.0.inf(&b.0), a.1.sup(&b.1)));
+        let bounds = bounds.ok_or_else(|| {
+            let hollow = drawings.iter().find_map(|drawing| drawing.hollow.as_deref());
+            let why = hollow.unwrap_or("the files are empty");
+            Failure::refused(format!("there is nothing to draw: {why}"))
+        })?;
+        let camera = self.camera.unwrap_or_else(|| Camera::framing(bounds, self.size));
+        Ok(View { camera, light: self.light.unwrap_or_else(|| Light::beside(&camera)), size: self.size })
+    }
+}
+
+impl View {
+    /// Draws a picture.
+    ///
+    /// # Errors
+    /// Cancel.
+    pub fn draw(&self, ctx: &Context, drawing: &Drawing) -> Result<Picture> {
+        drawing.models.draw(ctx, &self.camera, &self.light, self.size)
+    }
+
+    /// The same view on a picture that is smaller by a factor along each edge.
+    pub fn smaller(&self, factor: u32) -> Self {
+        let Size { width, height } = self.size;
+        let size = Size { width: width.div_ceil(factor), height: height.div_ceil(factor) };
+        Self { camera: self.camera, light: self.light, size }
+    }
+}

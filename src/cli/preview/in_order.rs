@@ -1,0 +1,121 @@
+//! Several frames at once: read in order, made side by side, taken in order.
+
+use std::collections::VecDeque;
+use std::sync::Mutex;
+use std::sync::mpsc::{Receiver, Sender, channel};
+
+use frazil::{Error, Result};
+
+/// A frame to be made: its place, and where it goes.
+type Job<T> = (usize, Sender<Result<T>>);
+
+/// Makes frames 0 to `count` on some threads. `read` is called with one after the other, `make` for several at once, on
+/// the thread that read them, and `take` with their results in order on the thread of the caller. At most two frames more
+/// than there are threads are begun and not taken.
+///
+/// # Errors
+/// The first error, by frame; the frames behind it that are begun are made and dropped.
+pub fn in_order<R, T: Send>(
+    count: usize,
+    threads: usize,
+    read: impl FnMut(usize) -> Result<R> + Send,
+    make: impl Fn(usize, R) -> Result<T> + Sync,
+    mut take: impl FnMut(usize, T) -> Result<()>,
+) -> Result<()> {
+    let (ask, jobs) = channel::<Job<T>>();
+    let waiting = Mutex::new((jobs, read));
+    std::thread::scope(|scope| {
+        for _ in 0..threads.max(1) {
+            scope.spawn(|| work(&waiting, &make));
+        }
+        // Dropped with the closure, which ends the threads.
+        let ask = ask;
+        let mut begun: VecDeque<Receiver<Result<T>>> = VecDeque::new();
+        let mut next = 0;
+        for taken in 0..count {
+            while next < count && begun.len() <= threads {
+                let (done, made) = channel();
+                ask.send((next, done)).map_err(|_| gone())?;
+                begun.push_back(made);
+                next += 1;
+            }
+            let made = begun.pop_front().ok_or_else(gone)?.recv().map_err(|_| gone())?;
+            take(taken, made?)?;
+        }
+        Ok(())
+    })
+}
+
+/// Takes jobs until there are none.
+fn work<R, T>(
+    waiting: &Mutex<(Receiver<Job<T>>, impl FnMut(usize) -> Result<R>)>,
+    make: &impl Fn(usize, R) -> Result<T>,
+) {
+    loop {
+        // One thread waits for a job and reads it while the others make theirs; a panic there ends them all.
+        let Ok(mut turn) = waiting.lock() else { return };
+        let (jobs, read) = &mut *turn;
+        let Ok((frame, done)) = jobs.recv() else { return };
+        let raw = read(frame);
+        drop(turn);
+        // Nobody listens any more when a frame before this one failed.
+        let _ = done.send(raw.and_then(|raw| make(frame, raw)));
+    }
+}
+
+fn gone() -> Error {
+    Error::Internal("the threads that make frames are gone".into())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::sync::atomic::{AtomicUsize, Ordering};
+    use std::time::Duration;
+
+    #[test]
+    fn frames_are_read_and_taken_in_order_and_few_are_under_way() {
+        for threads in [1, 3] {
+            let (mut read, mut taken) = (Vec::new(), Vec::new());
+            let under_way = AtomicUsize::new(0);
+            let begin = |frame: usize| {
+                read.push(frame);
+                assert!(under_way.fetch_add(1, Ordering::SeqCst) < threads + 2);
+                Ok(frame)
+            };
+            let make = |frame: usize, raw: usize| {
+                // Later frames are done sooner.
+                std::thread::sleep(Duration::from_millis(3 * (20 - frame as u64) % 7));
+                Ok(10 * raw)
+            };
+            let take = |frame: usize, made: usize| {
+                under_way.fetch_sub(1, Ordering::SeqCst);
+                taken.push((frame, made));
+                Ok(())
+            };
+            in_order(20, threads, begin, make, take).unwrap();
+            assert_eq!(read, (0..20).collect::<Vec<_>>());
+            assert_eq!(taken, (0..20).map(|frame| (frame, 10 * frame)).collect::<Vec<_>>());
+        }
+        in_order(0, 2, |_| Ok(()), |_, ()| Ok(()), |_, ()| Ok(())).unwrap();
+    }
+
+    #[test]
+    fn the_first_error_ends_it() {
+        for faulty in [0, 4, 19] {
+            let mut taken = 0;
+            let make = |frame: usize, ()| {
+                if frame >= faulty { Err(Error::argument(frame.to_string())) } else { Ok(()) }
+            };
+            let take = |_, ()| {
+                taken += 1;
+                Ok(())
+            };
+            let error = in_order(20, 3, |_| Ok(()), make, take).unwrap_err();
+            assert_eq!((error.to_string(), taken), (faulty.to_string(), faulty));
+        }
+        let full =
+            in_order(9, 2, |_| Ok(()), |_, ()| Ok(()), |_, ()| Err(Error::argument("full"))).unwrap_err();
+        assert_eq!(full.to_string(), "full");
+    }
+}

@@ -1,0 +1,219 @@
+//! `frazil preview`: pictures of meshes, level sets, points, fog and whole shots; flipbooks.
+
+mod drawing;
+mod flipbook;
+mod in_order;
+#[cfg(feature = "vdb")]
+mod shot;
+mod sources;
+
+use std::path::{Path, PathBuf};
+
+use frazil::base::DVec3;
+use frazil::io::mesh::extension;
+use frazil::io::sequence::Pattern;
+use frazil::render::{Camera, Light, Size};
+use frazil::scene::FrameChoice;
+
+use super::exit::{Failure, Phase};
+use super::session::Session;
+use super::{options, output};
+use drawing::Look;
+use flipbook::Flipbook;
+use sources::Sources;
+
+/// Draw meshes, level sets, points, fog or frames of a shot: a PNG, or a flipbook.
+#[derive(clap::Args)]
+#[command(
+    group = clap::ArgGroup::new("when").args(["frame", "frames"]),
+    after_help = "Examples:\n  frazil preview cache/base/base.0048.vdb boot.obj -o print.png --eye 1,1.5,2 --target 0,0,1\n  \
+                  frazil preview cache/ --frame 48 -o look.png\n  \
+                  frazil preview cache/ --frames 1-48x8 -o shot.gif --size 640x360\n  \
+                  frazil preview cache/ --frames 40-42 -o p.%04d.png --size 640x360\n  \
+                  frazil preview hero.glb --clip walk --frame 12 -o pose.png\n  \
+                  frazil preview grains.0001.vdb -o grains.png --color v"
+)]
+pub struct Args {
+    /// .vdb (its first level set, else its fog, else its points), a mesh, a character, points (.ply), the output folder of
+    /// `frazil snow`, or, with --frame or --frames, a pattern (base.%04d.vdb).
+    #[arg(required = true)]
+    files: Vec<PathBuf>,
+    /// The picture (.png); of several frames a pattern (p.%04d.png), or a .gif.
+    #[arg(short, long, value_name = "FILE")]
+    output: PathBuf,
+    /// Attribute that gives points their colours, from dark blue to pale yellow over its values.
+    #[arg(long, value_name = "NAME")]
+    color: Option<String>,
+    /// Clip that characters play [default: they are at rest, or play their only clip with --frame].
+    #[arg(long, value_name = "NAME")]
+    clip: Option<String>,
+    /// Frame of a shot [default: its last one]; clips of characters begin at frame 1.
+    #[arg(long, value_name = "N", value_parser = options::finite, allow_hyphen_values = true)]
+    frame: Option<f64>,
+    /// Frames of a flipbook [default: all of a shot, if the output is a pattern or a .gif].
+    #[arg(long, value_name = "A-B|A-BxN|A,B,C", allow_hyphen_values = true)]
+    frames: Option<FrameChoice>,
+    /// Frames a second [default: as the shot's scene says, else 24].
+    #[arg(long, value_name = "N", value_parser = options::positive)]
+    fps: Option<f64>,
+    /// Extinction of a fog of density 1 (1/m), where its file does not say it (frazil:density_scale).
+    #[arg(long, value_name = "N", default_value = "5", value_parser = options::positive)]
+    fog_density: f64,
+    /// Pixels.
+    #[arg(long, default_value = "1280x720", value_parser = options::size)]
+    size: Size,
+    /// Where the camera is (m) [default: so that everything is seen].
+    #[arg(long, value_name = "X,Y,Z", value_parser = options::triple, allow_hyphen_values = true, requires = "target")]
+    eye: Option<DVec3>,
+    /// What it looks at (m).
+    #[arg(long, value_name = "X,Y,Z", value_parser = options::triple, allow_hyphen_values = true, requires = "eye")]
+    target: Option<DVec3>,
+    /// Vertical field of view (degrees).
+    #[arg(long, default_value_t = 35.0, requires = "eye")]
+    fov: f64,
+    /// Azimuth and elevation of the sun (degrees) [default: beside the camera].
+    #[arg(long, value_name = "AZ,EL", value_parser = sun, allow_hyphen_values = true)]
+    sun: Option<(f64, f64)>,
+}
+
+fn sun(text: &str) -> Result<(f64, f64), String> {
+    let (azimuth, elevation) = text.split_once(',').ok_or("give azimuth,elevation")?;
+    let number = |text: &str| text.trim().parse::<f64>().map_err(|_| format!("\"{text}\" is not a number"));
+    let (azimuth, elevation) = (number(azimuth)?, number(elevation)?);
+    if !(1.0..=90.0).contains(&elevation) || !azimuth.is_finite() {
+        return Err("the elevation must be within 1 to 90 degrees".into());
+    }
+    Ok((azimuth, elevation))
+}
+
+/// What is made.
+enum Job {
+    /// A picture, of a frame where something moves.
+    Still(Option<f64>, PathBuf),
+    /// A picture of each frame.
+    Pictures(Vec<i32>, Pattern),
+    /// A GIF of all frames.
+    Gif(Vec<i32>, PathBuf),
+}
+
+/// Runs the command.
+pub fn run(args: Args, session: &Session) -> Result<(), Failure> {
+    let look = args.look()?;
+    #[cfg(feature = "vdb")]
+    session.ctx.set_memory_limit(session.max_memory());
+    let sources = Sources::open(&args.files, args.clip.clone(), args.fps).before()?;
+    args.refuse_idle_options(&sources)?;
+    let job = args.job(&sources)?;
+    job.check(&sources).before()?;
+    match job {
+        Job::Still(frame, path) => still(session, &look, sources, frame, &path),
+        Job::Pictures(frames, pattern) => {
+            Flipbook::open(session, &look, sources, frames)?.pictures(&pattern).during()
+        }
+        Job::Gif(frames, path) => {
+            let fps = sources.fps();
+            Flipbook::open(session, &look, sources, frames)?.gif(&path, fps).during()
+        }
+    }
+}
+
+/// Draws one picture.
+fn still(
+    session: &Session,
+    look: &Look,
+    mut sources: Sources,
+    frame: Option<f64>,
+    path: &Path,
+) -> Result<(), Failure> {
+    let parts = sources.read(&session.ctx, frame).before()?;
+    let drawing = look.build(&session.ctx, parts).before()?;
+    let view = look.view(std::slice::from_ref(&drawing))?;
+    view.draw(&session.ctx, &drawing).and_then(|picture| picture.write(path)).during()
+}
+
+impl Args {
+    fn look(&self) -> Result<Look, Failure> {
+        if !(1.0..=170.0).contains(&self.fov) {
+            return Err(Failure::refused(format!("--fov {} is not within 1 to 170 degrees", self.fov)));
+        }
+        let camera = match self.eye.zip(self.target) {
+            Some((eye, target)) if eye == target => {
+                return Err(Failure::refused("--eye and --target are the same point"));
+            }
+            Some((eye, target)) => Some(Camera { eye, target, fov_deg: self.fov }),
+            None => None,
+        };
+        let light = self.sun.map(|(azimuth, elevation)| Light::from_degrees(azimuth, elevation));
+        Ok(Look { size: self.size, camera, light, color: self.color.clone(), fog_density: self.fog_density })
+    }
+
+    /// Refuses options that nothing of what is drawn depends on.
+    fn refuse_idle_options(&self, sources: &Sources) -> Result<(), Failure> {
+        if self.clip.is_some() && !sources.has_characters() {
+            return Err(Failure::refused("--clip is for .glb and .gltf files, and none is given"));
+        }
+        let is_timed = self.frame.is_some() || self.frames.is_some() || self.fps.is_some();
+        if is_timed && !sources.moves() {
+            let what = "--frame, --frames and --fps are for .glb and .gltf files, patterns and folders of shots, and none is given";
+            return Err(Failure::refused(what));
+        }
+        Ok(())
+    }
+
+    /// What is to be made, by the name of the output and the frames.
+    fn job(&self, sources: &Sources) -> Result<Job, Failure> {
+        let path = self.output.clone();
+        let refused = |what: &str| Err(Failure::refused(format!("{}: {what}", path.display())));
+        let is_gif = extension(&path) == "gif";
+        let pattern = Pattern::parse(&path);
+        let frames: Option<Vec<i32>> = match (&self.frames, self.frame) {
+            (Some(frames), _) => Some(frames.iter().collect()),
+            (None, Some(_)) => None,
+            (None, None) => sources.frames(),
+        };
+        match (pattern, frames) {
+            (Some(_), _) if is_gif => refused("a .gif holds all frames, and has one name"),
+            (Some(pattern), Some(frames)) => Ok(Job::Pictures(frames, pattern)),
+            (Some(_), None) => refused("a pattern is for several frames: choose them with --frames"),
+            (None, Some(frames)) if is_gif => Ok(Job::Gif(frames, path)),
+            (None, None) if is_gif => {
+                refused("a .gif is for several frames of something that moves: choose them with --frames")
+            }
+            (None, Some(frames)) if self.frames.is_some() && frames.len() > 1 => {
+                refused("several frames need a pattern such as p.%04d.png, or a .gif")
+            }
+            (None, frames) => {
+                let last = frames.and_then(|frames| frames.last().copied()).map(f64::from);
+                Ok(Job::Still(self.frame.or(last), path))
+            }
+        }
+    }
+}
+
+impl Job {
+    /// The frames with the files that are written.
+    fn outputs(&self) -> Vec<(Option<f64>, PathBuf)> {
+        let each = |frames: &[i32], path: &dyn Fn(i32) -> PathBuf| {
+            frames.iter().map(|frame| (Some(f64::from(*frame)), path(*frame))).collect()
+        };
+        match self {
+            Self::Still(frame, path) => vec![(*frame, path.clone())],
+            Self::Pictures(frames, pattern) => each(frames, &|frame| pattern.path(frame)),
+            Self::Gif(frames, path) => each(frames, &|_| path.clone()),
+        }
+    }
+
+    /// Refuses frames that are not there, and outputs that cannot be written or that are read.
+    fn check(&self, sources: &Sources) -> frazil::Result<()> {
+        let outputs = self.outputs();
+        if let Some((_, path)) = outputs.first() {
+            output::check_writable(path)?;
+        }
+        for (frame, path) in &outputs {
+            sources.refuse_missing(*frame)?;
+            let inputs = sources.files(*frame);
+            output::refuse_input(path, inputs.iter().map(PathBuf::as_path))?;
+        }
+        Ok(())
+    }
+}

@@ -1,0 +1,155 @@
+//! The frames of a whole shot: the output folder of `frazil snow`.
+
+use std::collections::BTreeMap;
+use std::path::{Path, PathBuf};
+
+use frazil::io::mesh::{self, extension};
+use frazil::scene::shot::Stored;
+use frazil::scene::{Rebuild, RebuildGrains, Scene};
+use frazil::vdb::{FloatGrid, file};
+use frazil::{Context, Error, Result};
+
+use super::sources::{Part, of_vdb, points_of_ply};
+
+/// A shot's folder, read frame by frame.
+pub struct Shot {
+    folder: PathBuf,
+    base: Rebuild,
+    grains: RebuildGrains,
+    files: [Files; 4],
+    /// The frames that all stages have, ascending; at least one.
+    frames: Vec<i32>,
+}
+
+/// Of each frame of a stage the file that is drawn.
+type Files = BTreeMap<i32, PathBuf>;
+
+/// The stages that are drawn, in this order, each with the files of it that are read, the best first.
+const STAGES: [(&str, &[&str]); 4] =
+    [("base", &["vdb"]), ("grains", &["vdb", "ply"]), ("mist", &["vdb"]), ("objects", &["ply"])];
+
+impl Shot {
+    /// Opens a folder.
+    ///
+    /// # Errors
+    /// Records that cannot be read; none of a stage that is drawn.
+    pub fn open(folder: &Path) -> Result<Self> {
+        let (base, grains) = (Rebuild::open(folder)?, RebuildGrains::open(folder)?);
+        let [mist, objects] = [Stored::read(folder, STAGES[2].0)?, Stored::read(folder, STAGES[3].0)?];
+        let stored = [base.stored(), grains.stored(), &mist, &objects];
+        let files = [0, 1, 2, 3].map(|stage| files_of(folder, stored[stage], STAGES[stage]));
+        let frames = frames_of_all(&files);
+        if frames.is_empty() {
+            let names = STAGES.map(|(name, _)| name).join(", ");
+            let what =
+                format!("is no folder of a shot that has frames to draw of one of its stages ({names})");
+            return Err(Error::file(folder, what));
+        }
+        Ok(Self { folder: folder.to_path_buf(), base, grains, files, frames })
+    }
+
+    /// Where it is.
+    pub fn folder(&self) -> &Path {
+        &self.folder
+    }
+
+    /// The frames that all of its stages have, ascending; at least one.
+    pub fn frames(&self) -> &[i32] {
+        &self.frames
+    }
+
+    /// Its frames a second, from its scene.
+    ///
+    /// # Errors
+    /// No scene.toml, or one that cannot be read.
+    pub fn fps(&self) -> Result<f64> {
+        let scene = Scene::read(&self.folder.join("scene.toml"));
+        let fps = scene.map(|scene| scene.shot().fps);
+        fps.map_err(|error| {
+            Error::argument(format!("{error}; --fps says how many frames a second there are"))
+        })
+    }
+
+    /// Refuses a frame that one of its stages lacks.
+    ///
+    /// # Errors
+    /// Which frames there are.
+    pub fn refuse_missing(&self, frame: i32) -> Result<()> {
+        if self.frames.binary_search(&frame).is_ok() {
+            return Ok(());
+        }
+        let stages = STAGES.iter().zip(&self.files).filter(|(_, files)| !files.is_empty());
+        let names: Vec<&str> = stages.map(|((name, _), _)| *name).collect();
+        let (first, last) = (self.frames[0], self.frames[self.frames.len() - 1]);
+        let what = format!(
+            "frame {frame} is not there: the folder holds {} frames, {first} to {last}, of {}",
+            self.frames.len(),
+            names.join(" and ")
+        );
+        Err(Error::file(&self.folder, what))
+    }
+
+    /// What there is of a frame; frames in ascending order cost one file of each stage.
+    ///
+    /// # Errors
+    /// A file that cannot be read or that is not what was written; cancel.
+    pub fn read(&mut self, ctx: &Context, frame: i32) -> Result<Vec<Part>> {
+        let [base, grains, mist, objects] = self.files.each_ref().map(|files| files.get(&frame).cloned());
+        let mut parts = Vec::new();
+        if base.is_some() {
+            parts.push(Part::Surface(self.surface(ctx, frame)?));
+        }
+        match grains {
+            Some(path) if extension(&path) == "vdb" => {
+                let points = self.grains.points(ctx, frame)?.clone();
+                parts.push(Part::Points(path, points));
+            }
+            Some(path) => parts.push(points_of_ply(&path)?),
+            None => {}
+        }
+        if let Some(path) = mist {
+            parts.extend(of_vdb(&path)?);
+        }
+        if let Some(path) = objects {
+            parts.push(Part::Mesh(mesh::read(&path)?.without_unused()));
+        }
+        Ok(parts)
+    }
+
+    /// The surface of the snow after a frame.
+    fn surface(&mut self, ctx: &Context, frame: i32) -> Result<FloatGrid> {
+        if self.base.stored().keeps_changes(frame) {
+            return self.base.layer(ctx, frame)?.surface.deep_copy();
+        }
+        // Whole, though perhaps in 16 bits, from which no run could resume.
+        let path = self.base.stored().file(frame, "base")?;
+        let surface = file::read_own(&path)?.into_iter().find(|grid| grid.name() == "surface");
+        surface.ok_or_else(|| Error::file(path, "has no grid \"surface\""))
+    }
+}
+
+/// The files of a stage that are drawn; a warning where it has none of a kind that is read.
+fn files_of(folder: &Path, stored: &Stored, (stage, extensions): (&str, &[&str])) -> Files {
+    let all = stored.files(stage);
+    let mut files = Files::new();
+    for (frame, path) in extensions
+        .iter()
+        .flat_map(|known| all.iter().filter(move |(_, path)| extension(path.as_ref()) == *known))
+    {
+        files.entry(*frame).or_insert_with(|| folder.join(path));
+    }
+    if files.is_empty() && !all.is_empty() {
+        let read = extensions.join(" and .");
+        log::warn!("{}: not drawn, since it has no .{read} files", folder.join(stage).display());
+    }
+    files
+}
+
+/// The frames that all stages have of which there are any.
+fn frames_of_all(files: &[Files]) -> Vec<i32> {
+    let mut of_stages = files.iter().filter(|files| !files.is_empty());
+    let Some(first) = of_stages.next() else { return Vec::new() };
+    let others: Vec<&Files> = of_stages.collect();
+    let is_in_all = |frame: &&i32| others.iter().all(|files| files.contains_key(frame));
+    first.keys().filter(is_in_all).copied().collect()
+}

@@ -1,0 +1,229 @@
+//! What is drawn: files, sequences and whole shots, read frame by frame.
+
+use std::path::{Path, PathBuf};
+
+use frazil::base::{Points, TriMesh};
+use frazil::io::sequence::Pattern;
+use frazil::motion::{Character, Play, is_gltf};
+#[cfg(feature = "vdb")]
+use frazil::vdb::FloatGrid;
+use frazil::{Context, Error, Result, io};
+
+#[cfg(feature = "vdb")]
+use super::shot::Shot;
+#[cfg(feature = "vdb")]
+use crate::cli::vdb::model::{self, Content};
+
+/// A part of a picture, as it was read.
+pub enum Part {
+    /// A mesh.
+    Mesh(TriMesh),
+    /// Points, and where they came from.
+    Points(PathBuf, Points),
+    /// A level set.
+    #[cfg(feature = "vdb")]
+    Surface(FloatGrid),
+    /// A fog volume, and its file.
+    #[cfg(feature = "vdb")]
+    Fog(PathBuf, FloatGrid),
+}
+
+/// Something to draw.
+enum Source {
+    File(PathBuf),
+    Sequence(Pattern),
+    #[cfg(feature = "vdb")]
+    Shot(Box<Shot>),
+}
+
+/// Everything that is drawn.
+pub struct Sources {
+    all: Vec<Source>,
+    clip: Option<String>,
+    fps: f64,
+}
+
+/// Frames a second where neither the user nor a shot says it.
+const FPS: f64 = 24.0;
+
+impl Sources {
+    /// Opens files, patterns of sequences and folders of shots. Characters play `clip`, their only one without it; `fps`
+    /// are the frames a second where the user gave them, else those of the first shot count, else 24.
+    ///
+    /// # Errors
+    /// A folder that is no shot's, or whose records or scene cannot be read.
+    pub fn open(paths: &[PathBuf], clip: Option<String>, fps: Option<f64>) -> Result<Self> {
+        let all: Vec<Source> = paths.iter().map(|path| Source::open(path)).collect::<Result<_>>()?;
+        let fps = match fps {
+            Some(fps) => fps,
+            None => all.iter().find_map(Source::fps).transpose()?.unwrap_or(FPS),
+        };
+        Ok(Self { all, clip, fps })
+    }
+
+    /// Frames a second.
+    pub fn fps(&self) -> f64 {
+        self.fps
+    }
+
+    /// The frames that all of the shots hold, ascending; none without a shot.
+    pub fn frames(&self) -> Option<Vec<i32>> {
+        let shots = self.all.iter().filter_map(Source::frames);
+        shots.reduce(|mut all, other| {
+            all.retain(|frame| other.contains(frame));
+            all
+        })
+    }
+
+    /// Whether something depends on the frame.
+    pub fn moves(&self) -> bool {
+        self.all.iter().any(|source| !matches!(source, Source::File(path) if !is_gltf(path)))
+    }
+
+    /// Whether there is a character.
+    pub fn has_characters(&self) -> bool {
+        self.all.iter().any(|source| matches!(source, Source::File(path) if is_gltf(path)))
+    }
+
+    /// Refuses a frame of which a sequence or a shot has nothing, and no frame where one is needed.
+    ///
+    /// # Errors
+    /// Which.
+    pub fn refuse_missing(&self, frame: Option<f64>) -> Result<()> {
+        self.all.iter().try_for_each(|source| source.refuse_missing(frame))
+    }
+
+    /// The files that are given by name, those of sequences at a frame.
+    pub fn files(&self, frame: Option<f64>) -> Vec<PathBuf> {
+        let file = |source: &Source| match source {
+            Source::File(path) => Some(path.clone()),
+            Source::Sequence(pattern) => frame.map(|frame| pattern.path(frame as i32)),
+            #[cfg(feature = "vdb")]
+            Source::Shot(_) => None,
+        };
+        self.all.iter().filter_map(file).collect()
+    }
+
+    /// Reads what is drawn at a frame; a shot's frames in ascending order cost one file each.
+    ///
+    /// # Errors
+    /// A file that cannot be read; cancel.
+    #[cfg_attr(
+        not(feature = "vdb"),
+        expect(unused_variables, reason = "only shots take long to put together")
+    )]
+    pub fn read(&mut self, ctx: &Context, frame: Option<f64>) -> Result<Vec<Part>> {
+        let mut parts = Vec::new();
+        for source in &mut self.all {
+            match source {
+                Source::File(path) => parts.extend(of_file(path, self.clip.as_deref(), frame, self.fps)?),
+                Source::Sequence(pattern) => {
+                    let path = pattern.path(whole(frame, &pattern.path(0))?);
+                    parts.extend(of_file(&path, None, None, self.fps)?);
+                }
+                #[cfg(feature = "vdb")]
+                Source::Shot(shot) => {
+                    let frame = whole(frame, shot.folder())?;
+                    parts.extend(shot.read(ctx, frame)?);
+                }
+            }
+        }
+        Ok(parts)
+    }
+}
+
+impl Source {
+    fn open(path: &Path) -> Result<Self> {
+        if path.is_dir() {
+            #[cfg(feature = "vdb")]
+            return Ok(Self::Shot(Box::new(Shot::open(path)?)));
+            #[cfg(not(feature = "vdb"))]
+            return crate::cli::needs_openvdb(path);
+        }
+        Ok(Pattern::parse(path).map_or_else(|| Self::File(path.to_path_buf()), Self::Sequence))
+    }
+
+    /// Frames a second, of a shot.
+    fn fps(&self) -> Option<Result<f64>> {
+        match self {
+            #[cfg(feature = "vdb")]
+            Self::Shot(shot) => Some(shot.fps()),
+            _ => None,
+        }
+    }
+
+    /// The frames of a shot.
+    fn frames(&self) -> Option<Vec<i32>> {
+        match self {
+            #[cfg(feature = "vdb")]
+            Self::Shot(shot) => Some(shot.frames().to_vec()),
+            _ => None,
+        }
+    }
+
+    fn refuse_missing(&self, frame: Option<f64>) -> Result<()> {
+        match self {
+            Self::File(_) => Ok(()),
+            Self::Sequence(pattern) => {
+                let path = pattern.path(whole(frame, &pattern.path(0))?);
+                if path.is_file() { Ok(()) } else { Err(Error::file(path, "is not there")) }
+            }
+            #[cfg(feature = "vdb")]
+            Self::Shot(shot) => shot.refuse_missing(whole(frame, shot.folder())?),
+        }
+    }
+}
+
+/// The frame of something that has whole frames only.
+fn whole(frame: Option<f64>, name: &Path) -> Result<i32> {
+    match frame {
+        Some(frame) if frame.fract() == 0.0 && frame.abs() <= 1.0e9 => Ok(frame as i32),
+        Some(frame) => Err(Error::file(name, format!("has whole frames only, and --frame is {frame}"))),
+        None => Err(Error::file(
+            name,
+            "is of many frames: choose one with --frame N, or several with --frames A-B",
+        )),
+    }
+}
+
+/// Reads a file; a character is posed by its clip if a clip or a frame is given.
+fn of_file(path: &Path, clip: Option<&str>, frame: Option<f64>, fps: f64) -> Result<Vec<Part>> {
+    let mesh = match io::mesh::extension(path).as_str() {
+        #[cfg(feature = "vdb")]
+        "vdb" => return of_vdb(path),
+        #[cfg(not(feature = "vdb"))]
+        "vdb" => return crate::cli::needs_openvdb(path),
+        "ply" if io::points_ply::holds_points(path)? => return Ok(vec![points_of_ply(path)?]),
+        _ if is_gltf(path) && clip.is_none() && frame.is_none() => Character::at_rest(path)?,
+        _ if is_gltf(path) => {
+            let play = Play { clip: clip.map(String::from), ..Play::default() };
+            Character::posed(path, play, (frame.unwrap_or(1.0) - 1.0) / fps)?
+        }
+        _ => io::mesh::read(path)?.without_unused(),
+    };
+    Ok(vec![Part::Mesh(mesh)])
+}
+
+/// Reads points.
+///
+/// # Errors
+/// A file that cannot be read.
+pub fn points_of_ply(path: &Path) -> Result<Part> {
+    let cloud = io::points_ply::read(path)?;
+    let voxel = cloud.voxel_size.unwrap_or(0.01);
+    let points = cloud.into_points(Some(voxel)).map_err(|error| Error::file(path, error.to_string()))?;
+    Ok(Part::Points(path.to_path_buf(), points))
+}
+
+/// Reads a .vdb file.
+///
+/// # Errors
+/// A file that cannot be read, or that holds nothing to draw.
+#[cfg(feature = "vdb")]
+pub fn of_vdb(path: &Path) -> Result<Vec<Part>> {
+    Ok(match model::read(path)? {
+        Content::Surface(grid) => vec![Part::Surface(grid)],
+        Content::Fogs(grids) => grids.into_iter().map(|grid| Part::Fog(path.to_path_buf(), grid)).collect(),
+        Content::Points(points) => vec![Part::Points(path.to_path_buf(), points)],
+    })
+}

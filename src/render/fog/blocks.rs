@@ -1,0 +1,367 @@
+//! The densities of a fog: blocks of 8 x 8 x 8 voxels, found through nodes of 16 x 16 x 16 blocks.
+
+use std::collections::HashMap;
+
+use nalgebra::Matrix3;
+use rayon::prelude::*;
+
+use crate::base::DVec3;
+use crate::base::blocks::{DIM, Mask, Origin, Values, offset};
+use crate::context::Context;
+use crate::error::{Error, Result};
+
+/// Samples along an edge of a block: its own voxels and the first of the next block, so that every place in the block is
+/// interpolated from its samples alone.
+const EDGE: usize = DIM + 1;
+/// Extinctions (1/m) at the samples of a block; sample (x, y, z) lies at `(x * 9 + y) * 9 + z`.
+type Samples = [f32; EDGE * EDGE * EDGE];
+/// Blocks along an edge of a node.
+pub(super) const NODE: i32 = 16;
+/// Blocks of a node.
+const NODE_BLOCKS: usize = (NODE * NODE * NODE) as usize;
+/// Most nodes in the box around a fog: their table takes 64 MB.
+const MOST_NODES: f64 = (1 << 24) as f64;
+/// Voxels have coordinates below this, either way.
+const FARTHEST: i32 = 1 << 30;
+/// Greatest extinction (1/m): no light passes a micrometre.
+const MOST_EXTINCTION: f64 = 1.0e6;
+/// Voxels of less than this part of the greatest extinction do not count for the bounds: wisps that nobody sees reach far.
+const SEEN: f32 = 0.01;
+/// Memory (bytes) of a block with values of its own: its samples and its light, and those of half a block before it.
+const DENSE_BYTES: u64 = 3 * (size_of::<Samples>() as u64 + 1500) / 2;
+/// Memory (bytes) of any block while a fog is made.
+const PART_BYTES: u64 = 256;
+/// No node, or no block.
+const NONE: u32 = u32::MAX;
+
+/// A fog volume, ready to be drawn.
+pub struct Fog {
+    placement: Placement,
+    /// Least corner of the box of nodes, in nodes, and how many there are along each axis.
+    low: [i32; 3],
+    counts: [usize; 3],
+    /// For each node of the box its index, or [`NONE`].
+    table: Vec<u32>,
+    /// For each block of a node its index, or [`NONE`].
+    nodes: Vec<Box<[u32; NODE_BLOCKS]>>,
+    blocks: Vec<FogBlock>,
+    /// Blocks of one value share theirs.
+    samples: Vec<Samples>,
+    bounds: Option<(DVec3, DVec3)>,
+}
+
+/// A block that is not empty.
+#[derive(Clone, Copy)]
+pub(super) struct FogBlock {
+    /// Least corner, in voxels.
+    pub origin: Origin,
+    samples: u32,
+}
+
+/// Where the voxels of a fog are in the world.
+#[derive(Debug, Clone, Copy)]
+pub struct Placement {
+    /// The centre of voxel (0, 0, 0) (m).
+    origin: DVec3,
+    /// The ways (m) from one voxel to the next along x, y and z.
+    axes: Matrix3<f64>,
+    inverse: Matrix3<f64>,
+}
+
+impl Placement {
+    /// From the centre of voxel (0, 0, 0) and the ways to its neighbours (m); none where these lie in a plane.
+    pub fn new(origin: DVec3, axes: [DVec3; 3]) -> Option<Self> {
+        let axes = Matrix3::from_columns(&axes);
+        let inverse = axes.try_inverse()?;
+        inverse.iter().all(|number| number.is_finite()).then_some(Self { origin, axes, inverse })
+    }
+
+    /// World position (m) of a place in voxels.
+    pub fn to_world(self, at: DVec3) -> DVec3 {
+        self.origin + self.axes * at
+    }
+
+    /// A ray in voxels: its origin, and voxels per metre along it.
+    pub fn ray(self, origin: DVec3, toward: DVec3) -> [DVec3; 2] {
+        [self.inverse * (origin - self.origin), self.inverse * toward]
+    }
+
+    /// Shortest way (m) between neighbouring voxels.
+    pub fn cell(self) -> f64 {
+        self.axes.column_iter().map(|axis| axis.norm()).fold(f64::INFINITY, f64::min)
+    }
+}
+
+/// Densities at a block position; those below 0 count as 0.
+#[derive(Clone, Copy)]
+pub enum Part<'a> {
+    /// One for each voxel; voxels that are not active are empty.
+    Dense(&'a Values, &'a Mask),
+    /// The same for all.
+    Even(f32),
+}
+
+impl Part<'_> {
+    fn density(&self, voxel: usize) -> f32 {
+        match self {
+            Self::Dense(values, mask) if mask[voxel >> 6] >> (voxel & 63) & 1 == 1 => values[voxel].max(0.0),
+            Self::Dense(..) => 0.0,
+            Self::Even(density) => density.max(0.0),
+        }
+    }
+
+    fn is_empty(&self) -> bool {
+        match self {
+            Self::Dense(..) => (0..DIM * DIM * DIM).all(|voxel| self.density(voxel) == 0.0),
+            Self::Even(density) => *density <= 0.0,
+        }
+    }
+}
+
+/// The samples of a block.
+enum Filled {
+    Even(f32),
+    Dense(Box<Samples>),
+}
+
+impl Filled {
+    fn is_dense(&self) -> bool {
+        matches!(self, Self::Dense(_))
+    }
+}
+
+impl Fog {
+    /// A fog of densities by block position (a multiple of 8 on each axis), each at most once. Density 1 loses the part
+    /// `extinction` of the light per metre, for short ways (1/m, over 0; what comes to more than a million counts as that).
+    ///
+    /// # Errors
+    /// Densities too far apart, or too many for the memory limit; cancel.
+    pub fn of_parts(
+        ctx: &Context,
+        placement: Placement,
+        mut parts: Vec<(Origin, Part<'_>)>,
+        extinction: f64,
+    ) -> Result<Self> {
+        parts.retain(|(_, part)| !part.is_empty());
+        let (low, counts) = node_box(&parts)?;
+        let dense = parts.iter().filter(|(_, part)| matches!(part, Part::Dense(..))).count();
+        ctx.allow("a fog", dense as u64 * DENSE_BYTES + parts.len() as u64 * PART_BYTES)?;
+        let of_place: HashMap<Origin, Part<'_>> = parts.iter().copied().collect();
+        let places = places(&parts);
+        let filled: Vec<Option<Filled>> = ctx.pool().install(|| {
+            let fill = |place: &Origin| {
+                ctx.check()?;
+                Ok(fill(*place, &of_place, extinction))
+            };
+            places.par_iter().map(fill).collect::<Result<_>>()
+        })?;
+        let mut fog = Self {
+            placement,
+            low,
+            counts,
+            table: vec![NONE; counts.iter().product()],
+            nodes: Vec::new(),
+            blocks: Vec::new(),
+            // Most fogs have at most one value that whole blocks share.
+            samples: Vec::with_capacity(
+                filled.iter().flatten().filter(|filled| filled.is_dense()).count() + 1,
+            ),
+            bounds: None,
+        };
+        let mut even: HashMap<u32, u32> = HashMap::new();
+        for (place, filled) in places.into_iter().zip(filled) {
+            let next = fog.samples.len() as u32;
+            let samples = match filled {
+                None => continue,
+                Some(Filled::Even(value)) => *even.entry(value.to_bits()).or_insert_with(|| {
+                    fog.samples.push([value; EDGE * EDGE * EDGE]);
+                    next
+                }),
+                Some(Filled::Dense(samples)) => {
+                    fog.samples.push(*samples);
+                    next
+                }
+            };
+            fog.put(FogBlock { origin: place, samples });
+        }
+        fog.bounds = fog.find_bounds();
+        Ok(fog)
+    }
+
+    /// Adds a block.
+    fn put(&mut self, block: FogBlock) {
+        let place = block.origin.map(|at| at.div_euclid(DIM as i32));
+        let (Some(slot), within) = self.slot(place) else { return };
+        if self.table[slot] == NONE {
+            self.table[slot] = self.nodes.len() as u32;
+            self.nodes.push(Box::new([NONE; NODE_BLOCKS]));
+        }
+        self.nodes[self.table[slot] as usize][within] = self.blocks.len() as u32;
+        self.blocks.push(block);
+    }
+
+    /// Where the node of a block is in the table, none outside of the box, and where the block is in the node.
+    fn slot(&self, place: [i32; 3]) -> (Option<usize>, usize) {
+        let [x, y, z] = [0, 1, 2].map(|axis| i64::from(place[axis].div_euclid(NODE) - self.low[axis]));
+        let inside = [x, y, z].iter().zip(&self.counts).all(|(at, count)| (0..*count as i64).contains(at));
+        let slot = (x as usize * self.counts[1] + y as usize) * self.counts[2] + z as usize;
+        let [x, y, z] = place.map(|at| at.rem_euclid(NODE) as usize);
+        (inside.then_some(slot), (x * NODE as usize + y) * NODE as usize + z)
+    }
+
+    /// What is at a block position, in blocks.
+    pub(super) fn look(&self, place: [i32; 3]) -> Look {
+        let (Some(slot), within) = self.slot(place) else { return Look::Outside };
+        match self.table[slot] {
+            NONE => Look::EmptyNode,
+            node => match self.nodes[node as usize][within] {
+                NONE => Look::Empty,
+                block => Look::Block(block as usize),
+            },
+        }
+    }
+
+    /// Least block position of the box of nodes, and the first one beyond it, in blocks.
+    pub(super) fn block_box(&self) -> [[i32; 3]; 2] {
+        let end = [0, 1, 2].map(|axis| (self.low[axis] + self.counts[axis] as i32) * NODE);
+        [self.low.map(|low| low * NODE), end]
+    }
+
+    /// The blocks that are not empty.
+    pub(super) fn blocks(&self) -> &[FogBlock] {
+        &self.blocks
+    }
+
+    /// Where its voxels are.
+    pub(super) fn placement(&self) -> Placement {
+        self.placement
+    }
+
+    /// Extinction (1/m) at a place in a block, in voxels from its least corner, 0 to 8.
+    #[inline]
+    pub(super) fn extinction(&self, block: usize, local: [f32; 3]) -> f32 {
+        let samples = &self.samples[self.blocks[block].samples as usize];
+        let whole = local.map(|at| (at as usize).min(DIM - 1));
+        let [x, y, z] = [0, 1, 2].map(|axis| local[axis] - whole[axis] as f32);
+        let corner = (whole[0] * EDGE + whole[1]) * EDGE + whole[2];
+        let along_z = |at: usize| samples[at] + (samples[at + 1] - samples[at]) * z;
+        let along_y = |at: usize| {
+            let (near, far) = (along_z(at), along_z(at + EDGE));
+            near + (far - near) * y
+        };
+        let (near, far) = (along_y(corner), along_y(corner + EDGE * EDGE));
+        near + (far - near) * x
+    }
+
+    /// Greatest extinction (1/m) of the samples of a block around a place, less than `reach` voxels away along each axis.
+    pub(super) fn most_near(&self, block: usize, local: [i32; 3], reach: i32) -> f32 {
+        let samples = &self.samples[self.blocks[block].samples as usize];
+        let [x, y, z] =
+            local.map(|at| (at - reach + 1).max(0) as usize..=((at + reach - 1) as usize).min(DIM));
+        let of_row = |x: usize, y: usize| samples[(x * EDGE + y) * EDGE..][z.clone()].iter().copied();
+        let of_slice = |x: usize| y.clone().flat_map(move |y| of_row(x, y)).fold(0.0, f32::max);
+        x.map(of_slice).fold(0.0, f32::max)
+    }
+
+    /// Whether it has no density above 0 anywhere.
+    pub fn is_empty(&self) -> bool {
+        self.blocks.is_empty()
+    }
+
+    /// Least and greatest corner (m) of what is seen of it: of the voxels with a hundredth of the greatest density or more;
+    /// none when it is empty.
+    pub fn bounds(&self) -> Option<(DVec3, DVec3)> {
+        self.bounds
+    }
+
+    fn find_bounds(&self) -> Option<(DVec3, DVec3)> {
+        let most = self.samples.iter().flat_map(|samples| samples.iter().copied()).fold(0.0, f32::max);
+        let boxes = self.blocks.iter().flat_map(|block| {
+            let samples = &self.samples[block.samples as usize];
+            let seen = (0..samples.len()).filter(|n| samples[*n] >= SEEN * most && samples[*n] > 0.0);
+            let voxel = |n: usize| [n / (EDGE * EDGE), n / EDGE % EDGE, n % EDGE];
+            let all = seen.map(|n| DVec3::from(voxel(n).map(|at| at as f64)));
+            let corner = DVec3::from(block.origin.map(f64::from));
+            let found = all.map(|at| (at, at)).reduce(|a, b| (a.0.inf(&b.0), a.1.sup(&b.1)));
+            found.map(|(low, high)| (corner + low, corner + high))
+        });
+        let (low, high) = boxes.reduce(|a, b| (a.0.inf(&b.0), a.1.sup(&b.1)))?;
+        let half = DVec3::repeat(0.5);
+        let ends = [low - half, high + half];
+        let corners = (0..8).map(|n| {
+            let at = [0, 1, 2].map(|axis| ends[n >> axis & 1][axis]);
+            self.placement.to_world(DVec3::from(at))
+        });
+        corners.map(|at| (at, at)).reduce(|a, b| (a.0.inf(&b.0), a.1.sup(&b.1)))
+    }
+}
+
+/// What is at a block position.
+pub(super) enum Look {
+    /// A block that is not empty, by its index.
+    Block(usize),
+    /// Nothing.
+    Empty,
+    /// Nothing, nor in the whole node.
+    EmptyNode,
+    /// It is outside of the box of nodes.
+    Outside,
+}
+
+/// The box of nodes around some blocks and what lies before them: its least node and the number of nodes along each axis.
+fn node_box(parts: &[(Origin, Part<'_>)]) -> Result<([i32; 3], [usize; 3])> {
+    let too_far = || Error::argument("has densities too far apart, or too far from its origin, to be drawn");
+    let ends = parts.iter().map(|(origin, _)| (*origin, *origin)).reduce(|(low, high), (at, _)| {
+        let pick = |choose: fn(i32, i32) -> i32, a: Origin| [0, 1, 2].map(|axis| choose(a[axis], at[axis]));
+        (pick(i32::min, low), pick(i32::max, high))
+    });
+    let Some((low, high)) = ends else { return Ok(([0; 3], [0; 3])) };
+    if low.iter().chain(&high).any(|at| !(-FARTHEST..FARTHEST).contains(at)) {
+        return Err(too_far());
+    }
+    let node = |at: i32| at.div_euclid(NODE * DIM as i32);
+    let first = low.map(|at| node(at - DIM as i32));
+    let counts = [0, 1, 2].map(|axis| (node(high[axis]) - first[axis] + 1) as usize);
+    if counts.iter().map(|count| *count as f64).product::<f64>() > MOST_NODES {
+        return Err(too_far());
+    }
+    Ok((first, counts))
+}
+
+/// The block positions in which something may be: those of the parts and those before them, whose last cells end there.
+fn places(parts: &[(Origin, Part<'_>)]) -> Vec<Origin> {
+    let before = |n: usize, origin: &Origin| [0, 1, 2].map(|axis| origin[axis] - (n >> axis & 1) as i32 * 8);
+    let mut places: Vec<Origin> =
+        parts.iter().flat_map(|(origin, _)| (0..8).map(move |n| before(n, origin))).collect();
+    places.par_sort_unstable();
+    places.dedup();
+    places
+}
+
+/// The samples of the block at a position; none when all are 0.
+fn fill(place: Origin, parts: &HashMap<Origin, Part<'_>>, extinction: f64) -> Option<Filled> {
+    let value = |density: f32| (f64::from(density) * extinction).min(MOST_EXTINCTION) as f32;
+    let near: [Option<Part<'_>>; 8] = std::array::from_fn(|n| {
+        parts.get(&[0, 1, 2].map(|axis| place[axis] + (n >> axis & 1) as i32 * DIM as i32)).copied()
+    });
+    if let Some(Part::Even(first)) = near[0]
+        && near.iter().all(|part| matches!(part, Some(Part::Even(other)) if *other == first))
+    {
+        return Some(Filled::Even(value(first)));
+    }
+    let mut samples = Box::new([0.0; EDGE * EDGE * EDGE]);
+    for (n, part) in near.iter().enumerate().filter_map(|(n, part)| part.map(|part| (n, part))) {
+        // The block itself gives 8 samples along an axis, the next one its first.
+        let range = |axis: usize| if n >> axis & 1 == 0 { 0..DIM } else { 0..1 };
+        let shift = |axis: usize| if n >> axis & 1 == 0 { 0 } else { DIM };
+        for x in range(0) {
+            for y in range(1) {
+                for z in range(2) {
+                    let at = ((x + shift(0)) * EDGE + y + shift(1)) * EDGE + z + shift(2);
+                    samples[at] = value(part.density(offset(x, y, z)));
+                }
+            }
+        }
+    }
+    samples.iter().any(|sample| *sample > 0.0).then_some(Filled::Dense(samples))
+}

@@ -1,0 +1,145 @@
+//! The light in fogs: how much of the sun and of the sky reaches each part, computed once for a picture.
+
+use rayon::prelude::*;
+
+use super::blocks::Fog;
+use super::walk::{Here, along, entry};
+use crate::base::DVec3;
+use crate::base::blocks::DIM;
+use crate::context::Context;
+use crate::error::Result;
+
+/// Voxels between two samples of light: it changes less from place to place than the density does.
+const SPACING: usize = 2;
+/// Samples along an edge of a block.
+const EDGE: usize = DIM / SPACING + 1;
+/// The light in a block; sample (x, y, z) lies at `(x * 5 + y) * 5 + z`.
+type Lattice = [Lit; EDGE * EDGE * EDGE];
+/// Greatest step (voxels) of rays towards the light.
+const STRIDE: f64 = 2.0;
+/// Optical depth behind which nothing arrives.
+const OPAQUE: f64 = 12.0;
+/// A block in which no sample has more sun or sky counts as dark.
+const DARK: f32 = 1.0e-4;
+/// Part of the sky's light that arrives in the thickest fog: it comes from the side, scattered many times.
+const LEAST_SKY: f32 = 0.35;
+
+/// The light at a place, each as a part of what there is in the open, 0 to 1.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Lit {
+    /// Sun that the fogs let through.
+    pub sun: f32,
+    /// Sun that models and points do not hide.
+    pub open: f32,
+    /// Sky.
+    pub sky: f32,
+}
+
+/// Fogs with their light.
+pub(in crate::render) struct LitFogs<'a> {
+    pub(super) fogs: &'a [Fog],
+    /// Unit vector towards the sun.
+    pub(super) sun: DVec3,
+    /// For each fog and block the index of its light.
+    of_block: Vec<Vec<u32>>,
+    /// The first is that of dark blocks.
+    lattices: Vec<Lattice>,
+}
+
+impl<'a> LitFogs<'a> {
+    /// Lights fogs by a sun in a direction (a unit vector); `blocked` returns whether something besides fog hides a
+    /// direction from a point (m).
+    ///
+    /// # Errors
+    /// Cancel.
+    pub fn new(
+        ctx: &Context,
+        fogs: &'a [Fog],
+        sun: DVec3,
+        blocked: impl Fn(DVec3, DVec3) -> bool + Sync,
+    ) -> Result<Self> {
+        let all: Vec<(usize, usize)> = fogs
+            .iter()
+            .enumerate()
+            .flat_map(|(fog, of)| (0..of.blocks().len()).map(move |block| (fog, block)))
+            .collect();
+        let light = |(fog, block): &(usize, usize)| {
+            ctx.check()?;
+            Ok(lattice(fogs, *fog, *block, sun, &blocked))
+        };
+        let lit: Vec<Option<Box<Lattice>>> = all.par_iter().map(light).collect::<Result<_>>()?;
+        let dark = Lit { sun: 0.0, open: 0.0, sky: LEAST_SKY };
+        let mut lattices = Vec::with_capacity(1 + lit.iter().flatten().count());
+        lattices.push([dark; EDGE * EDGE * EDGE]);
+        let mut of_block: Vec<Vec<u32>> = vec![Vec::new(); fogs.len()];
+        for ((fog, _), lattice) in all.iter().zip(lit) {
+            of_block[*fog].push(if lattice.is_some() { lattices.len() as u32 } else { 0 });
+            lattices.extend(lattice.map(|lattice| *lattice));
+        }
+        Ok(Self { fogs, sun, of_block, lattices })
+    }
+
+    /// Part of the sun's light, 0 to 1, that the fogs let through to a point (m), `toward` the sun (a unit vector).
+    pub fn sunlight(&self, point: DVec3, toward: DVec3) -> f64 {
+        // Where the ray enters the first fog, it is known what that and all behind it let through.
+        entry(self.fogs, (point, toward)).map_or(1.0, |here| f64::from(self.at(here).sun))
+    }
+
+    /// The light at a place.
+    #[inline]
+    pub(super) fn at(&self, here: Here) -> Lit {
+        let lattice = &self.lattices[self.of_block[here.fog][here.block] as usize];
+        let scaled = here.local.map(|at| at / SPACING as f32);
+        let whole = scaled.map(|at| (at as usize).min(EDGE - 2));
+        let [x, y, z] = [0, 1, 2].map(|axis| scaled[axis] - whole[axis] as f32);
+        let mix = |a: Lit, b: Lit, part: f32| Lit {
+            sun: a.sun + (b.sun - a.sun) * part,
+            open: a.open + (b.open - a.open) * part,
+            sky: a.sky + (b.sky - a.sky) * part,
+        };
+        let corner = (whole[0] * EDGE + whole[1]) * EDGE + whole[2];
+        let along_z = |at: usize| mix(lattice[at], lattice[at + 1], z);
+        let along_y = |at: usize| mix(along_z(at), along_z(at + EDGE), y);
+        mix(along_y(corner), along_y(corner + EDGE * EDGE), x)
+    }
+}
+
+/// The light of a block; none where it is dark.
+fn lattice(
+    fogs: &[Fog],
+    fog: usize,
+    block: usize,
+    sun: DVec3,
+    blocked: &impl Fn(DVec3, DVec3) -> bool,
+) -> Option<Box<Lattice>> {
+    let of = &fogs[fog];
+    let corner = DVec3::from(of.blocks()[block].origin.map(f64::from));
+    // Rays towards the sun start a little off, so that fog on the ground is not in the ground's shade.
+    let skin = sun * (SPACING as f64 * of.placement().cell());
+    let lit = |n: usize| {
+        let place = [n / (EDGE * EDGE), n / EDGE % EDGE, n % EDGE].map(|at| (at * SPACING) as i32);
+        let point = of.placement().to_world(corner + DVec3::from(place.map(f64::from)));
+        let sun_left = left(fogs, point, sun);
+        // Light where there is no fog around is only asked for by [`LitFogs::sunlight`].
+        let is_seen = sun_left > DARK && of.most_near(block, place, SPACING as i32) > 0.0;
+        let open = if is_seen && blocked(point + skin, sun) { 0.0 } else { 1.0 };
+        Lit { sun: sun_left, open, sky: left(fogs, point, DVec3::y()) }
+    };
+    let mut lattice: Box<Lattice> = Box::new(std::array::from_fn(lit));
+    if lattice.iter().all(|lit| lit.sun < DARK && lit.sky < DARK) {
+        return None;
+    }
+    lattice.iter_mut().for_each(|lit| lit.sky = LEAST_SKY + (1.0 - LEAST_SKY) * lit.sky.sqrt());
+    Some(lattice)
+}
+
+/// Part of the light, 0 to 1, that is left on the way from far away to a point (m) in a direction (a unit vector).
+fn left(fogs: &[Fog], point: DVec3, toward: DVec3) -> f32 {
+    let mut depth = 0.0f64;
+    along(fogs, (point, toward), f64::INFINITY, STRIDE, |from, to, here| {
+        let extinction: f32 = here.iter().map(|here| fogs[here.fog].extinction(here.block, here.local)).sum();
+        depth += f64::from(extinction) * (to - from);
+        depth < OPAQUE
+    });
+    if depth < OPAQUE { libm::exp(-depth) as f32 } else { 0.0 }
+}

@@ -1,0 +1,227 @@
+//! Along rays of view: what a fog hides of what is behind it, and what it adds.
+//!
+//! Light that was scattered once comes from the sun through the fog (Henyey and Greenstein 1941); what was scattered more
+//! often is added as one wider and weaker lobe that reaches deeper (after Wrenninge, Kulla and Lundqvist 2013), since the
+//! crystals of powder snow absorb next to nothing. The sky lights it from all sides.
+
+use super::light::LitFogs;
+use super::walk::along;
+use crate::base::DVec3;
+use crate::render::camera::{Camera, Size};
+use crate::render::shade::{Colour, SUN, SURROUNDINGS};
+
+/// Greatest step (voxels).
+const STRIDE: f64 = 1.0;
+/// Mean cosine of the angle by which light is scattered: a little forward.
+const FORWARD: f64 = 0.3;
+/// The lobe of light that was scattered several times, over that of light that was scattered once.
+const SEVERAL: f64 = 0.9;
+/// A fog that lets less through is opaque.
+const OPAQUE: f64 = 0.002;
+
+/// What fog does to what is behind it at some distance.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(in crate::render) struct Veil {
+    /// Part of the light that comes through, 0 to 1.
+    pub through: f64,
+    /// Light that the fog adds.
+    pub light: Colour,
+}
+
+impl Veil {
+    /// That of no fog.
+    pub const NONE: Self = Self { through: 1.0, light: Colour::new(0.0, 0.0, 0.0) };
+}
+
+impl LitFogs<'_> {
+    /// Whether one ray through the middle of a pixel sees what all its samples see: no voxel is smaller than a pixel where
+    /// the fog is.
+    pub fn is_smooth(&self, camera: &Camera, size: Size) -> bool {
+        let pixel = 2.0 * libm::tan(camera.fov_deg.to_radians() * 0.5) / f64::from(size.height);
+        let is_smooth =
+            |(low, high): (DVec3, DVec3), cell: f64| cell >= pixel * ((low + high) * 0.5 - camera.eye).norm();
+        self.fogs
+            .iter()
+            .all(|fog| fog.bounds().is_none_or(|bounds| is_smooth(bounds, fog.placement().cell())))
+    }
+
+    /// The veils from a point (m) along a ray (a unit vector) before what is at some distances (m).
+    pub fn veils<const N: usize>(&self, eye: DVec3, toward: DVec3, distances: [f64; N]) -> [Veil; N] {
+        let mut order: [usize; N] = std::array::from_fn(|n| n);
+        order.sort_unstable_by(|a, b| distances[*a].total_cmp(&distances[*b]).then(a.cmp(b)));
+        let mut veils = [Veil::NONE; N];
+        let Some(farthest) = order.last().map(|last| distances[*last]) else { return veils };
+        let lobe = lobe(self.sun.dot(&toward));
+        let mut march = March { through: 1.0, sun: 0.0, sky: 0.0 };
+        let mut rest = &order[..];
+        along(self.fogs, (eye, toward), farthest, STRIDE, |from, to, here| {
+            let (mut extinction, mut sun, mut sky) = (0.0f64, 0.0, 0.0);
+            for here in here {
+                let of = f64::from(self.fogs[here.fog].extinction(here.block, here.local));
+                if of > 0.0 {
+                    let lit = self.at(*here);
+                    // The fourth root is what a quarter of the way lets through.
+                    let deep = f64::from(lit.sun).sqrt().sqrt();
+                    sun += of * f64::from(lit.open) * (lobe * f64::from(lit.sun) + SEVERAL * deep);
+                    sky += of * f64::from(lit.sky);
+                    extinction += of;
+                }
+            }
+            let to_end = |march: &March, end: f64| match extinction > 0.0 {
+                true => march.after(extinction * (end - from), sun / extinction, sky / extinction),
+                false => *march,
+            };
+            while let [next, others @ ..] = rest
+                && distances[*next] < to
+            {
+                veils[*next] = to_end(&march, distances[*next].max(from)).veil();
+                rest = others;
+            }
+            march = to_end(&march, to);
+            march.through > OPAQUE
+        });
+        if march.through <= OPAQUE {
+            march.through = 0.0;
+        }
+        rest.iter().for_each(|n| veils[*n] = march.veil());
+        veils
+    }
+}
+
+/// A ray on its way.
+#[derive(Clone, Copy)]
+struct March {
+    /// Part of the light that comes through so far.
+    through: f64,
+    /// Light of the sun and of the sky that was added so far, over what there is of them.
+    sun: f64,
+    sky: f64,
+}
+
+impl March {
+    /// After a part with an optical depth that has these sources of light.
+    fn after(self, depth: f64, sun: f64, sky: f64) -> Self {
+        let left = libm::exp(-depth);
+        let added = self.through * (1.0 - left);
+        Self { through: self.through * left, sun: self.sun + added * sun, sky: self.sky + added * sky }
+    }
+
+    fn veil(self) -> Veil {
+        // A white surface that faces the sun has the radiance E / pi = `SUN`; light that is scattered evenly into all
+        // directions has E / (4 pi).
+        Veil { through: self.through, light: SUN * (0.25 * self.sun) + SURROUNDINGS * self.sky }
+    }
+}
+
+/// Light that is scattered by an angle with this cosine, over the mean of all.
+fn lobe(cosine: f64) -> f64 {
+    let g = FORWARD;
+    let spread = 1.0 + g * g - 2.0 * g * cosine;
+    (1.0 - g * g) / (spread * spread.sqrt())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::blocks::{Fog, Part, Placement};
+    use super::*;
+    use crate::base::blocks::{Mask, Origin, Values};
+    use crate::{Context, Pool};
+
+    const CELL: f64 = 0.05;
+    const EXTINCTION: f64 = 1.5;
+
+    fn ctx(threads: usize) -> Context {
+        Context::new(Pool::new(threads).unwrap())
+    }
+
+    /// A slab of density 1 that is 16 voxels thick along x, and 64 wide: from (0, 0, 0) to (16, 64, 64).
+    fn slab(ctx: &Context, density: &Values, mask: &Mask) -> Fog {
+        let places = (0..2).flat_map(|x| (0..8).flat_map(move |y| (0..8).map(move |z| [x, y, z])));
+        let part = |at: [i32; 3]| (at.map(|at| 8 * at), Part::Dense(density, mask));
+        fog(ctx, places.map(part).collect())
+    }
+
+    fn fog(ctx: &Context, parts: Vec<(Origin, Part<'_>)>) -> Fog {
+        let axes = [DVec3::x() * CELL, DVec3::y() * CELL, DVec3::z() * CELL];
+        Fog::of_parts(ctx, Placement::new(DVec3::zeros(), axes).unwrap(), parts, EXTINCTION).unwrap()
+    }
+
+    fn lit<'a>(ctx: &Context, fogs: &'a [Fog]) -> LitFogs<'a> {
+        let sun = DVec3::new(1.0, 2.0, 0.5).normalize();
+        LitFogs::new(ctx, fogs, sun, |_, _| false).unwrap()
+    }
+
+    #[test]
+    fn a_slab_lets_through_what_the_law_of_beer_and_lambert_says() {
+        let ctx = ctx(1);
+        let fogs = [slab(&ctx, &[1.0; 512], &[u64::MAX; 8])];
+        let lit = lit(&ctx, &fogs);
+        for toward in [DVec3::x(), DVec3::new(1.0, 0.2, -0.3).normalize()] {
+            let middle = DVec3::new(7.5, 31.5, 31.5) * CELL;
+            let eye = middle - toward * 3.0;
+            let thickness = 16.0 * CELL / toward.x;
+            // Behind the slab, and in the middle of it.
+            let [behind, inside, before] = lit.veils(eye, toward, [f64::INFINITY, 3.0, 1.0]);
+            for (veil, way) in [(behind, thickness), (inside, 0.5 * thickness), (before, 0.0)] {
+                let expected = libm::exp(-EXTINCTION * way);
+                assert!((veil.through / expected - 1.0).abs() < 0.01, "{} {expected}", veil.through);
+            }
+            assert_eq!(before, Veil::NONE);
+            assert!(behind.light.x > inside.light.x && inside.light.x > 0.1);
+        }
+    }
+
+    #[test]
+    fn overlapping_fogs_add_up_and_even_blocks_are_as_others() {
+        let ctx = ctx(1);
+        let even = |density: f32| {
+            let places = (0..2).flat_map(|x| (0..8).flat_map(move |y| (0..8).map(move |z| [x, y, z])));
+            fog(&ctx, places.map(|at| (at.map(|at| 8 * at), Part::Even(density))).collect())
+        };
+        let one = [even(0.75)];
+        let three = [even(0.25), slab(&ctx, &[0.25; 512], &[u64::MAX; 8]), even(0.25)];
+        let toward = DVec3::new(0.9, -0.3, 0.2).normalize();
+        let eye = DVec3::new(7.5, 31.5, 31.5) * CELL - toward * 3.0;
+        let [of_one, of_three] =
+            [&one[..], &three].map(|fogs| lit(&ctx, fogs).veils(eye, toward, [3.1, 9.0]));
+        for (a, b) in of_one.iter().zip(&of_three) {
+            assert!((a.through - b.through).abs() < 1e-5 && (a.light - b.light).norm() < 1e-4, "{a:?} {b:?}");
+        }
+    }
+
+    #[test]
+    fn the_sun_comes_through_to_what_is_behind_a_fog() {
+        let ctx = ctx(1);
+        let fogs = [slab(&ctx, &[1.0; 512], &[u64::MAX; 8])];
+        let lit = LitFogs::new(&ctx, &fogs, DVec3::x(), |_, _| false).unwrap();
+        let at = |x: f64| lit.sunlight(DVec3::new(x, 31.5, 31.5) * CELL, DVec3::x());
+        let expected = libm::exp(-EXTINCTION * 16.0 * CELL);
+        assert!((at(-10.0) / expected - 1.0).abs() < 0.01, "{} {expected}", at(-10.0));
+        assert_eq!(at(40.0), 1.0);
+        assert_eq!(lit.sunlight(DVec3::new(-1.0, 9.0, 0.0), DVec3::x()), 1.0);
+    }
+
+    #[test]
+    fn voxels_that_are_not_active_are_empty_and_far_ones_are_refused() {
+        let ctx = ctx(1);
+        let fogs = [slab(&ctx, &[1.0; 512], &[0; 8])];
+        assert!(fogs[0].is_empty() && fogs[0].bounds().is_none());
+        let eye = DVec3::new(-1.0, 1.6, 1.6);
+        assert_eq!(lit(&ctx, &fogs).veils(eye, DVec3::x(), [9.0]), [Veil::NONE]);
+        let axes = [DVec3::x(), DVec3::y(), DVec3::z()];
+        let placement = Placement::new(DVec3::zeros(), axes).unwrap();
+        let far = vec![([0; 3], Part::Even(1.0)), ([1 << 28; 3], Part::Even(1.0))];
+        assert!(Fog::of_parts(&ctx, placement, far, 1.0).is_err());
+        let edge = vec![([i32::MIN; 3], Part::Even(1.0))];
+        assert!(Fog::of_parts(&ctx, placement, edge, 1.0).is_err());
+        assert!(Placement::new(DVec3::zeros(), [DVec3::x(), DVec3::x(), DVec3::z()]).is_none());
+    }
+
+    #[test]
+    fn the_lobe_sends_on_what_it_gets() {
+        let steps = 20_000;
+        let mean: f64 = (0..steps).map(|n| lobe((f64::from(n) + 0.5) / f64::from(steps) * 2.0 - 1.0)).sum();
+        assert!((mean / f64::from(steps) - 1.0).abs() < 1e-6);
+        assert!(lobe(1.0) > lobe(0.0) && lobe(0.0) > lobe(-1.0));
+    }
+}

@@ -1,0 +1,271 @@
+//! Along a ray from block to block, past empty blocks and nodes (Amanatides and Woo 1987, on two levels).
+
+use super::blocks::{Fog, Look, NODE};
+use crate::base::DVec3;
+use crate::base::blocks::DIM;
+
+/// A ray on its way through a fog.
+struct Walk<'a> {
+    fog: &'a Fog,
+    /// Place at its beginning, in voxels, and voxels per metre along it.
+    origin: DVec3,
+    direction: DVec3,
+    /// Block position.
+    place: [i32; 3],
+    /// Where on the ray (m) it leaves the block through each side.
+    sides: [f64; 3],
+    /// Where it is (m), and where it ends.
+    at: f64,
+    end: f64,
+}
+
+/// A part of a ray (m) in one block.
+#[derive(Clone, Copy)]
+struct Stretch {
+    from: f64,
+    to: f64,
+    block: usize,
+}
+
+impl<'a> Walk<'a> {
+    /// From a point (m) in a direction (a unit vector), at most to `end` (m); none where the ray misses the fog.
+    fn new(fog: &'a Fog, from: DVec3, toward: DVec3, end: f64) -> Option<Self> {
+        let [origin, direction] = fog.placement().ray(from, toward);
+        let [low, high] = fog.block_box();
+        let (mut enter, mut leave) = (0.0f64, end);
+        for axis in 0..3 {
+            let [low, high] = [low[axis], high[axis]].map(|at| f64::from(at) * DIM as f64 - origin[axis]);
+            if direction[axis] == 0.0 {
+                if !(low <= 0.0 && high > 0.0) {
+                    return None;
+                }
+                continue;
+            }
+            let (a, b) = (low / direction[axis], high / direction[axis]);
+            enter = enter.max(a.min(b));
+            leave = leave.min(a.max(b));
+        }
+        let is_met = enter < leave;
+        let mut walk = Self { fog, origin, direction, place: [0; 3], sides: [0.0; 3], at: enter, end: leave };
+        walk.settle([low, high.map(|at| at - 1)]);
+        is_met.then_some(walk)
+    }
+
+    /// Finds the block position at `at`, within a box of them (least and greatest).
+    fn settle(&mut self, [low, high]: [[i32; 3]; 2]) {
+        for axis in 0..3 {
+            let at = (self.origin[axis] + self.direction[axis] * self.at) / DIM as f64;
+            // A number that an i32 does not hold becomes its greatest or least.
+            self.place[axis] = (at.floor() as i32).clamp(low[axis], high[axis]);
+            self.sides[axis] = self.side(axis, self.place[axis], 1);
+        }
+    }
+
+    /// Where the ray (m) leaves the `count` block positions from one on along an axis.
+    fn side(&self, axis: usize, place: i32, count: i32) -> f64 {
+        let direction = self.direction[axis];
+        if direction == 0.0 {
+            return f64::INFINITY;
+        }
+        let plane = if direction > 0.0 { place + count } else { place };
+        (f64::from(plane) * DIM as f64 - self.origin[axis]) / direction
+    }
+
+    /// To the next block position.
+    fn step(&mut self) {
+        let axis = least(self.sides);
+        self.at = self.at.max(self.sides[axis]);
+        self.place[axis] += if self.direction[axis] > 0.0 { 1 } else { -1 };
+        self.sides[axis] = self.side(axis, self.place[axis], 1);
+    }
+
+    /// Beyond the node.
+    fn leave_node(&mut self) {
+        let low = self.place.map(|at| at.div_euclid(NODE) * NODE);
+        let sides = [0, 1, 2].map(|axis| self.side(axis, low[axis], NODE));
+        let axis = least(sides);
+        self.at = self.at.max(sides[axis]);
+        let (mut first, mut last) = (low, low.map(|at| at + NODE - 1));
+        let next = if self.direction[axis] > 0.0 { low[axis] + NODE } else { low[axis] - 1 };
+        (first[axis], last[axis]) = (next, next);
+        self.settle([first, last]);
+    }
+
+    /// The next stretch in a block that is not empty.
+    fn next(&mut self) -> Option<Stretch> {
+        while self.at < self.end {
+            match self.fog.look(self.place) {
+                Look::Outside => return None,
+                Look::Empty => self.step(),
+                Look::EmptyNode => self.leave_node(),
+                Look::Block(block) => {
+                    let from = self.at;
+                    self.step();
+                    return Some(Stretch { from, to: self.at.min(self.end), block });
+                }
+            }
+        }
+        None
+    }
+}
+
+fn least(sides: [f64; 3]) -> usize {
+    (0..3).fold(0, |best, axis| if sides[axis] < sides[best] { axis } else { best })
+}
+
+/// A place in a fog.
+#[derive(Clone, Copy)]
+pub(super) struct Here {
+    /// Which fog.
+    pub fog: usize,
+    /// Which of its blocks.
+    pub block: usize,
+    /// Voxels from the block's least corner, 0 to 8.
+    pub local: [f32; 3],
+}
+
+/// A ray in one of the fogs.
+struct InFog<'a> {
+    index: usize,
+    walk: Walk<'a>,
+    stretch: Stretch,
+}
+
+impl InFog<'_> {
+    fn here(&self, at: f64) -> Here {
+        let block = self.stretch.block;
+        let corner = self.walk.fog.blocks()[block].origin;
+        let local = [0, 1, 2].map(|axis| {
+            let voxel = self.walk.origin[axis] + self.walk.direction[axis] * at - f64::from(corner[axis]);
+            (voxel as f32).clamp(0.0, DIM as f32)
+        });
+        Here { fog: self.index, block, local }
+    }
+}
+
+/// Goes along a ray from a point (m) in a direction (a unit vector), at most to `end` (m), through everything that is not
+/// empty, in steps of at most `stride` voxels. Calls `each` with the beginning and the end of a step (m) and the places in
+/// its middle, one for each fog that is there, until it returns false.
+pub(super) fn along(
+    fogs: &[Fog],
+    (from, toward): (DVec3, DVec3),
+    end: f64,
+    stride: f64,
+    mut each: impl FnMut(f64, f64, &[Here]) -> bool,
+) {
+    let enter = |(index, fog)| {
+        let mut walk = Walk::new(fog, from, toward, end)?;
+        walk.next().map(|stretch| InFog { index, walk, stretch })
+    };
+    let mut ways: Vec<InFog<'_>> = fogs.iter().enumerate().filter_map(enter).collect();
+    let mut here = Vec::with_capacity(ways.len());
+    let mut at = 0.0f64;
+    while !ways.is_empty() {
+        let first = ways.iter().map(|way| way.stretch.from).fold(f64::INFINITY, f64::min);
+        let from = first.max(at);
+        let is_in = |way: &&InFog<'_>| way.stretch.from <= from;
+        // As long as it stays in the same blocks.
+        let ends = ways.iter().map(|way| if is_in(&way) { way.stretch.to } else { way.stretch.from });
+        let to = ends.fold(f64::INFINITY, f64::min);
+        let voxels = ways.iter().filter(is_in).map(|way| way.walk.direction.norm()).fold(0.0, f64::max);
+        let count = ((to - from) * voxels / stride).ceil().max(1.0);
+        let step = (to - from) / count;
+        for n in 0..count as usize {
+            let [begin, middle, end] = [0.0, 0.5, 1.0].map(|part| from + step * (n as f64 + part));
+            here.clear();
+            here.extend(ways.iter().filter(is_in).map(|way| way.here(middle)));
+            if !each(begin, end, &here) {
+                return;
+            }
+        }
+        at = to;
+        ways.retain_mut(|way| {
+            while way.stretch.to <= at {
+                match way.walk.next() {
+                    Some(stretch) => way.stretch = stretch,
+                    None => return false,
+                }
+            }
+            true
+        });
+    }
+}
+
+/// Where a ray from a point (m) in a direction (a unit vector) first enters a block that is not empty.
+pub(super) fn entry(fogs: &[Fog], (from, toward): (DVec3, DVec3)) -> Option<Here> {
+    let enter = |(index, fog)| {
+        let mut walk = Walk::new(fog, from, toward, f64::INFINITY)?;
+        walk.next().map(|stretch| InFog { index, walk, stretch })
+    };
+    let ways = fogs.iter().enumerate().filter_map(enter);
+    let first = ways.reduce(|a, b| if b.stretch.from < a.stretch.from { b } else { a })?;
+    Some(first.here(first.stretch.from))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::blocks::{Part, Placement};
+    use super::*;
+    use crate::{Context, Pool};
+
+    /// Whole numbers, 0 to below `count`, the same in every run.
+    fn numbers(count: i32) -> impl FnMut() -> i32 {
+        let mut state = 42u64;
+        move || {
+            state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+            ((state >> 33) % count as u64) as i32
+        }
+    }
+
+    /// How long a ray is in a block (voxels).
+    fn length(origin: DVec3, direction: DVec3, corner: [i32; 3]) -> f64 {
+        let (mut enter, mut leave) = (0.0f64, f64::INFINITY);
+        for axis in 0..3 {
+            let [a, b] = [corner[axis], corner[axis] + DIM as i32].map(|at| f64::from(at) - origin[axis]);
+            if direction[axis] == 0.0 {
+                // A ray in the plane between two blocks is in the one behind it.
+                leave = if a <= 0.0 && b > 0.0 { leave } else { enter };
+            } else {
+                let [a, b] = [a / direction[axis], b / direction[axis]];
+                (enter, leave) = (enter.max(a.min(b)), leave.min(a.max(b)));
+            }
+        }
+        (leave - enter).max(0.0)
+    }
+
+    #[test]
+    fn rays_pass_every_block_on_their_way_once() {
+        let ctx = Context::new(Pool::new(1).unwrap());
+        let mut number = numbers(100);
+        let mut places: Vec<[i32; 3]> = (0..80).map(|_| [0; 3].map(|_: i32| 8 * (number() - 50))).collect();
+        places.sort_unstable();
+        places.dedup();
+        let parts = places.iter().map(|at| (*at, Part::Even(1.0))).collect();
+        let axes = [DVec3::x(), DVec3::y(), DVec3::z()];
+        let placement = Placement::new(DVec3::zeros(), axes).unwrap();
+        let fogs = [Fog::of_parts(&ctx, placement, parts, 1.0).unwrap()];
+        for n in 0..400 {
+            let target = places[n % places.len()].map(|at| f64::from(at) + 1.5 + f64::from(number()) * 0.05);
+            let mut origin = DVec3::from([0; 3].map(|_: i32| f64::from(12 * (number() - 50)) + 0.25));
+            // Some rays run along one axis or in a plane.
+            (0..n % 3).for_each(|axis| origin[(axis + n) % 3] = target[(axis + n) % 3]);
+            let toward = (DVec3::from(target) - origin).normalize();
+            let mut passed = vec![0.0; fogs[0].blocks().len()];
+            let mut at = 0.0;
+            along(&fogs, (origin, toward), f64::INFINITY, 2.0, |from, to, here| {
+                assert!(from >= at - 1e-9 && to - from <= 2.0 + 1e-9, "{n}: {at} {from} {to}");
+                at = to;
+                here.iter().for_each(|here| passed[here.block] += to - from);
+                true
+            });
+            for (block, passed) in fogs[0].blocks().iter().zip(passed) {
+                let expected = length(origin, toward, block.origin);
+                assert!(
+                    (passed - expected).abs() < 1e-6,
+                    "{n}: {passed}, not {expected}, of {:?}",
+                    block.origin
+                );
+            }
+        }
+    }
+}
