@@ -156,6 +156,7 @@ pub const GATES: &[Gate] = &[
     // Other programs open the shot.
     yes("snow.shot.clients_blender"),
     yes("snow.shot.clients_usd"),
+    yes("snow.shot.blender_parts"),
     // Volumes to render: full density against the union of spheres, and holes between the base and what rests on it.
     gate("snow.shot.fog_volume", "%", Most(3.0), Most(1.0)),
     none("snow.shot.snow_seam", "holes"),

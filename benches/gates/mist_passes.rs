@@ -7,6 +7,7 @@ use std::process::Command;
 use std::time::{Duration, Instant, SystemTime};
 
 use crate::common::character::{self, data};
+use crate::common::clients;
 use crate::harness::{Harness, timed};
 use crate::passes::{pass, walk};
 
@@ -17,7 +18,7 @@ const CELL: f64 = 0.014;
 const FROM_SPEED: f64 = 0.5;
 
 pub fn run(h: &mut Harness) {
-    let all @ [same, apart] = ["snow.mist.same_bytes", "snow.mist.apart"];
+    let all @ [same, apart, blender] = ["snow.mist.same_bytes", "snow.mist.apart", "snow.shot.blender_parts"];
     if !all.iter().any(|name| h.wants(name)) {
         return;
     }
@@ -43,6 +44,19 @@ pub fn run(h: &mut Harness) {
         let note =
             format!("{mist} files of mist in a pass of {took:.1} s; kills in {kills:?}; others: {others:?}");
         h.holds(same, others.is_empty() && mist == FRAMES as usize && kills.len() > 2, &note);
+    }
+    if h.wants(blender) {
+        match clients::blender() {
+            Some(program) => {
+                works(run("parts", 2).args(["--set", "output.grains=[\"vdb\",\"ply\"]"]));
+                let picture = folder.path().join("frame.png");
+                let answer = clients::blender_renders(&program, &out("parts"), FRAMES, &picture);
+                let is_whole = answer.as_ref().is_ok_and(|said| said.ends_with("with base, grains, mist"));
+                let said = answer.unwrap_or_else(|error| error);
+                h.holds(blender, is_whole, said.lines().last().unwrap_or_default());
+            }
+            None => h.skipped(blender, "not installed: make test-clients"),
+        }
     }
     if h.wants(apart) {
         let before = written(&out("once"));

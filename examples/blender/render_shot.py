@@ -78,6 +78,9 @@ def mesh_of(name, path, root, material):
     mesh.loops.foreach_set("vertex_index", triangles.ravel().astype(np.int32))
     mesh.polygons.add(len(triangles))
     mesh.polygons.foreach_set("loop_start", np.arange(0, triangles.size, 3, dtype=np.int32))
+    # Newer versions find it by themselves.
+    if not bpy.types.MeshPolygon.bl_rna.properties["loop_total"].is_readonly:
+        mesh.polygons.foreach_set("loop_total", np.full(len(triangles), 3, np.int32))
     mesh.update(calc_edges=True)
     mesh.validate()
     mesh.polygons.foreach_set("use_smooth", np.ones(len(mesh.polygons), bool))
@@ -89,6 +92,7 @@ def base_of_volume(path, root, material):
     data = bpy.data.volumes.new("base")
     data.filepath = str(path)
     volume = bpy.data.objects.new("base volume", data)
+    volume.parent = root
     bpy.context.scene.collection.objects.link(volume)
     volume.hide_render = True
     snow = put("base", bpy.data.meshes.new("base"), root, material)
@@ -140,9 +144,9 @@ def light_and_look(asked, root):
     scene.world = bpy.data.worlds.new("sky")
     scene.world.use_nodes = True
     scene.world.node_tree.nodes["Background"].inputs["Color"].default_value = (0.45, 0.6, 0.85, 1.0)
-    scene.world.node_tree.nodes["Background"].inputs["Strength"].default_value = 0.6
+    scene.world.node_tree.nodes["Background"].inputs["Strength"].default_value = 0.35
     sun = bpy.data.objects.new("sun", bpy.data.lights.new("sun", "SUN"))
-    sun.data.energy, sun.data.angle = 3.0, math.radians(1.0)
+    sun.data.energy, sun.data.angle = 4.0, math.radians(1.0)
     sun.rotation_euler = (math.radians(62), 0.0, math.radians(140))
     camera = bpy.data.objects.new("camera", bpy.data.cameras.new("camera"))
     for thing in (sun, camera):

@@ -33,6 +33,15 @@ pub fn blender_opens(blender: &Path, folder: &Path, first: i32, last: i32) -> Re
     run(command)
 }
 
+/// Blender renders a frame of a shot with the script that examples/blender has for users; says of what.
+pub fn blender_renders(blender: &Path, folder: &Path, frame: i32, picture: &Path) -> Result<String, String> {
+    let mut command = Command::new(blender);
+    command.args(["-b", "--factory-startup", "-noaudio", "--python-exit-code", "7", "--python"]);
+    command.arg(root().join("examples/blender/render_shot.py")).arg("--").arg(folder);
+    command.arg(frame.to_string()).arg(picture).args(["--size", "192x108", "--samples", "8"]);
+    run(command)
+}
+
 /// A Python with usd-core, if there is one.
 pub fn usd_python() -> Option<PathBuf> {
     let has_usd = |python: &PathBuf| {

@@ -11,8 +11,12 @@ use tempfile::TempDir;
 const VOLUMES: &str = "[grains]\ncompression = 0.5\n[output]\ngrains = [\"vdb\", \"usd\"]\nfog = [\"base\", \"grains\"]\n\
                        snow = true\nmesh = [\"usd\"]";
 
-/// A shot of a box that crosses the snow, frames 3 to 8; on request with grains and volumes.
-fn shot(grains: bool) -> TempDir {
+/// All three parts, as the script for Blender wants them.
+const PARTS: &str =
+    "[grains]\ncompression = 0.5\n[mist]\n[output]\ngrains = [\"vdb\", \"ply\"]\nmesh = [\"ply\"]";
+
+/// A shot of a box that crosses the snow, frames 3 to 8; with tables in place of `[output]`.
+fn shot(tables: &str) -> TempDir {
     let folder = tempfile::tempdir().unwrap();
     let mesh = shapes::cuboid([0.4; 3]);
     // Seams at every edge.
@@ -23,9 +27,7 @@ fn shot(grains: bool) -> TempDir {
     let scene = "[shot]\nframes = \"3-8\"\n[snow]\nground = 0.0\narea = [-1, -1, 1, 1]\ndepth = 0.3\ncell = 0.02\n\
                  [output]\nobjects = [\"usd\"]\n[[object]]\nfile = \"box.obj\"\n\
                  keys = [{ frame = 3, at = [0, 0.4, -0.5] }, { frame = 8, at = [0, 0.25, 0.6], turn_deg = [0, 20, 0] }]\n";
-    let with_grains = ("[output]", VOLUMES);
-    let scene = if grains { scene.replace(with_grains.0, with_grains.1) } else { scene.to_string() };
-    fs::write(folder.path().join("shot.toml"), scene).unwrap();
+    fs::write(folder.path().join("shot.toml"), scene.replace("[output]", tables)).unwrap();
     let run = Command::new(env!("CARGO_BIN_EXE_frazil"))
         .current_dir(folder.path())
         .args(["snow", "shot.toml", "-o", "out", "-q"])
@@ -37,14 +39,24 @@ fn shot(grains: bool) -> TempDir {
 #[test]
 fn blender_imports_the_sequence_as_one_volume_and_renders_it() {
     let Some(blender) = clients::blender() else { return eprintln!("skipped: no blender") };
-    let folder = shot(false);
+    let folder = shot("[output]");
     clients::blender_opens(&blender, &folder.path().join("out"), 3, 8).unwrap();
+}
+
+#[test]
+fn blender_renders_base_grains_and_mist_with_the_script_for_users() {
+    let Some(blender) = clients::blender() else { return eprintln!("skipped: no blender") };
+    let folder = shot(PARTS);
+    let picture = folder.path().join("frame.png");
+    let said = clients::blender_renders(&blender, &folder.path().join("out"), 8, &picture).unwrap();
+    assert!(said.ends_with("with base, grains, mist"), "{said}");
+    assert!(fs::metadata(&picture).unwrap().len() > 5000);
 }
 
 #[test]
 fn usd_core_composes_the_stage_with_velocities_and_files() {
     let Some(python) = clients::usd_python() else { return eprintln!("skipped: no usd-core") };
-    let folder = shot(false);
+    let folder = shot("[output]");
     let said = clients::usd_composes(&python, &folder.path().join("out"), 3, 8).unwrap();
     assert!(said.contains("3 with UVs"), "{said}");
 }
@@ -52,7 +64,7 @@ fn usd_core_composes_the_stage_with_velocities_and_files() {
 #[test]
 fn usd_core_composes_grains_and_volumes_with_materials() {
     let Some(python) = clients::usd_python() else { return eprintln!("skipped: no usd-core") };
-    let folder = shot(true);
+    let folder = shot(VOLUMES);
     let said = clients::usd_composes(&python, &folder.path().join("out"), 3, 8).unwrap();
     assert!(said.contains(" grains") && !said.contains(" 0 grains"), "{said}");
     assert!(said.contains("5 volumes") && said.contains("a mesh of snow"), "{said}");
