@@ -35,11 +35,12 @@ fn a_new_scene_lacks_nothing_but_its_character() {
     assert!(said.contains("120, 5.00 s at 24 a second") && said.contains("800 x 800 columns"), "{said}");
     // Every line behind a # is a default: with all of them in force nothing changes.
     let text = fs::read_to_string(folder.path().join("new.toml")).unwrap();
-    // But for those of a table without which its stage is left out.
+    // But for those of tables without which their stages are left out.
     let (before, grains) = text.split_once("# [grains]").unwrap();
+    let (_, mist) = grains.split_once("# [mist]").unwrap();
     let all: Vec<String> = before
         .lines()
-        .chain(grains.split_once("\n\n").unwrap().1.lines())
+        .chain(mist.split_once("\n\n").unwrap().1.lines())
         .map(|line| match line.strip_prefix("# ") {
             Some(key) if key.contains(" = ") || key.starts_with('[') => key.to_string(),
             _ => line.to_string(),
