@@ -2328,7 +2328,7 @@ frz_status frz_mist_set_params(frz_mist *mist,
  * grains: the grains after their step; they are only read. NULL: none raise mist.
  * base: the layer after its step, around which the air flows; it is only read. NULL: there is none.
  * wind: a grid of velocities (m/s) that the air where there is mist takes on, half of the difference in a tenth of a second;
- *     a value that is not finite where there is air is FRZ_ERROR_ARGUMENT. NULL: only frz_mist_params.wind.
+ *     a component that is not within 1000 m/s of 0 where there is air is FRZ_ERROR_ARGUMENT. NULL: only frz_mist_params.wind.
  * bodies: count bodies that bound the air and carry it along; NULL with a count of 0. Those that do not move have no
  *     positions_end. Of a body that is open wider than a tenth of its area the air flows around both sides. One with a vertex that
  *     moves at over 100 m/s is taken to jump: it stands at positions_end for the whole step.

@@ -209,6 +209,15 @@ _VOID = ["pool_destroy", "context_destroy", "context_cancel", "context_reset", "
 _LENT = ["base_grid", "base_removed", "base_compression", "base_touched"]
 
 
+def saved(function, ctx, pointer):
+    """The bytes that a saving function of the C interface gives."""
+    size = c.c_size_t()
+    call(function, ctx.pointer, pointer, None, 0, c.byref(size))
+    out = c.create_string_buffer(size.value)
+    call(function, ctx.pointer, pointer, out, size.value, c.byref(size))
+    return out.raw[: size.value]
+
+
 class Error(Exception):
     """A call failed: one sentence that names what is at fault; `status` is the C interface's number."""
 

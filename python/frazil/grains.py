@@ -4,7 +4,7 @@ import ctypes as c
 
 import numpy as np
 
-from ._library import GrainsParams, GrainsReport, Handle, Span, View, call, made, rows, span, view
+from ._library import GrainsParams, GrainsReport, Handle, Span, View, call, made, rows, saved, span, view
 from .snow import bodies_of
 
 # Attributes by their usual names: the number in the header, the type, and how many of it a grain has.
@@ -121,8 +121,4 @@ class Grains(Handle):
 
     def save(self):
         """The state, for a cache: bytes that Grains(..., state=...) goes on from."""
-        size = c.c_size_t()
-        call("grains_save", self._ctx.pointer, self.pointer, None, 0, c.byref(size))
-        out = c.create_string_buffer(size.value)
-        call("grains_save", self._ctx.pointer, self.pointer, out, size.value, c.byref(size))
-        return out.raw[: size.value]
+        return saved("grains_save", self._ctx, self.pointer)

@@ -4,7 +4,7 @@ import ctypes as c
 
 import numpy as np
 
-from ._library import Handle, MistParams, MistReport, call, made, rows, view
+from ._library import Handle, MistParams, MistReport, call, made, rows, saved, view
 from .grid import Grid
 from .snow import bodies_of
 
@@ -60,7 +60,7 @@ class Mist(Handle):
         """Moves the mist through dt seconds from a time (s), with what fast grains raise; the report, as frz_mist_report has it.
 
         grains: frazil.Grains after their step; or (positions (n, 3), velocities (n, 3), radius); or None.
-        base: a frazil.Base after its step; with points a frazil.Grid, its snow; or None.
+        base: a frazil.Base after its step; with points a frazil.Grid, the snow as it was before its step; or None.
         wind: a grid of vectors, or None.
         """
         descs, _kept = bodies_of(bodies)
@@ -84,8 +84,4 @@ class Mist(Handle):
 
     def save(self):
         """The state, for a cache: bytes that Mist(..., state=...) goes on from."""
-        size = c.c_size_t()
-        call("mist_save", self._ctx.pointer, self.pointer, None, 0, c.byref(size))
-        out = c.create_string_buffer(size.value)
-        call("mist_save", self._ctx.pointer, self.pointer, out, size.value, c.byref(size))
-        return out.raw[: size.value]
+        return saved("mist_save", self._ctx, self.pointer)

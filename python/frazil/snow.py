@@ -6,7 +6,7 @@ from typing import NamedTuple, Optional, Sequence
 import numpy as np
 
 from ._library import (BaseParams, BaseReport, BodyDesc, Handle, NoiseParams, SnowDesc, View, call, library, made,
-                       rows, view)
+                       rows, saved, view)
 from .grid import Grid
 from .mesh import faces_of
 
@@ -122,11 +122,7 @@ class Base(Handle):
 
     def save(self):
         """The state, for a cache: bytes that Base(..., state=...) goes on from."""
-        size = c.c_size_t()
-        call("base_save", self._ctx.pointer, self.pointer, None, 0, c.byref(size))
-        out = c.create_string_buffer(size.value)
-        call("base_save", self._ctx.pointer, self.pointer, out, size.value, c.byref(size))
-        return out.raw[: size.value]
+        return saved("base_save", self._ctx, self.pointer)
 
     def dirty(self):
         """(n, 3) origins of the blocks that the last step changed."""

@@ -1,7 +1,6 @@
 //! Grains: snow that is pushed, piled and thrown.
 
 use std::ffi::c_void;
-use std::sync::{Mutex, MutexGuard, PoisonError};
 
 use super::base::frz_base;
 use super::body::{Role, Shapes, bodies, frz_body};
@@ -10,10 +9,10 @@ use super::grains_params::{FRZ_GRAINS_FLOOR, frz_grains_params};
 use super::grid::frz_grid;
 use super::guard::{Failure, Outcome, frz_status, guard};
 use super::handle::{Noun, change, destroy, read};
+use super::saved::{Saved, resumed};
 use super::views::{Sized32, fill, frz_view, sized, within};
 use crate::context::Context;
-use crate::error::Error;
-use crate::snow::grains::{Base, Grains, Params, Surroundings, memory};
+use crate::snow::grains::{Base, Grains, Surroundings, memory};
 use crate::vdb::{FloatGrid, GridClass};
 
 /// Grains of snow, all of one size.
@@ -90,8 +89,7 @@ pub(super) struct Heap {
     pub grains: Grains,
     ground: Ground,
     shapes: Shapes,
-    /// The bytes of a state whose size was asked for: they are handed out next.
-    packed: Mutex<Option<Vec<u8>>>,
+    pub saved: Saved,
 }
 
 impl Noun for frz_grains {
@@ -101,10 +99,6 @@ impl Noun for frz_grains {
 }
 
 impl Heap {
-    pub(super) fn packed(&self) -> MutexGuard<'_, Option<Vec<u8>>> {
-        self.packed.lock().unwrap_or_else(PoisonError::into_inner)
-    }
-
     /// Moves the grains through a step.
     ///
     /// # Safety
@@ -138,7 +132,7 @@ impl Heap {
         let Ground { floor, lowest } = self.ground;
         let around = Surroundings { base, objects: &objects, statics: &[], floor, lowest };
         let done = self.grains.step(ctx, &around, [0.0, dt], frame)?;
-        self.packed().take();
+        self.saved.take();
         Ok(frz_grains_report {
             struct_size: 0,
             sub_steps: done.sub_steps as u32,
@@ -212,23 +206,14 @@ pub unsafe extern "C" fn frz_grains_create(
             let own = params.params()?;
             let state =
                 frz_view { data: restart, count: restart_bytes, stride: 0 }.elements::<u8>("restart")?;
-            let grains = if restart.is_null() { Grains::new(own)? } else { resumed(ctx, own, &state)? };
+            let grains = match restart.is_null() {
+                true => Grains::new(own)?,
+                false => resumed(ctx, "grains", Grains::unpacked(&state), || Grains::resume(own, &state))?,
+            };
             let ground = params.ground();
-            Ok(Heap { grains, ground, shapes: Shapes::new(), packed: Mutex::default() })
+            Ok(Heap { grains, ground, shapes: Shapes::new(), saved: Saved::default() })
         })
     }
-}
-
-/// Grains of a saved state.
-fn resumed(ctx: &Context, params: Params, state: &[u8]) -> Outcome<Grains> {
-    ctx.allow("the saved state of grains", 3 * Grains::unpacked(state))?;
-    ctx.phase("unpack", || Grains::resume(params, state)).map_err(|error| match error {
-        Error::Bytes(what) => {
-            let what = what.strip_prefix("the state ").unwrap_or(&what);
-            Failure::new(frz_status::FRZ_ERROR_FILE, format!("the saved state {what}"))
-        }
-        other => other.into(),
-    })
 }
 
 /// Destroys grains; NULL is fine.

@@ -6,7 +6,7 @@ use super::context::{enter, frz_context};
 use super::grains::frz_grains;
 use super::guard::{frz_status, guard};
 use super::handle::{change, clear, read, required};
-use super::views::{frz_span, frz_view, meaning, write_bytes};
+use super::views::{frz_span, frz_view, meaning};
 use crate::base::DVec3;
 use crate::snow::grains::memory;
 
@@ -81,7 +81,7 @@ pub unsafe extern "C" fn frz_grains_emit(
             let places: Vec<DVec3> = places.into_iter().map(|place| place.map(f64::from).into()).collect();
             let all = &mut grains.grains;
             let id = ctx.phase_in_place("emit", || all.emit(&places, &velocities, frame))?;
-            grains.packed().take();
+            grains.saved.take();
             if !first.is_null() {
                 first.write_unaligned(if places.is_empty() { -1 } else { i64::from(id) });
             }
@@ -176,21 +176,9 @@ pub unsafe extern "C" fn frz_grains_save(
             required(size, "size")?;
             let call = enter(context)?;
             let heap = read(grains)?;
-            // Nothing is locked while polls of the host run.
-            let packed = heap.packed().take();
-            let bytes = match packed {
-                Some(bytes) => bytes,
-                None => {
-                    let grains = &heap.grains;
-                    call.ctx().phase("save", || Ok(grains.save()))?
-                }
-            };
-            let written = write_bytes(dst, capacity, size, || bytes.len(), || Ok(bytes.as_slice()));
-            if dst.is_null() || written.is_err() {
-                // Who asked for the size, or had too little room, comes again.
-                *heap.packed() = Some(bytes);
-            }
-            written
+            let grains = &heap.grains;
+            let save = || call.ctx().phase("save", || Ok(grains.save()));
+            heap.saved.write((dst, capacity, size), save)
         }
     })
 }

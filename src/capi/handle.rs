@@ -113,6 +113,15 @@ pub(super) unsafe fn read<'a, N: Noun>(pointer: *const N) -> Outcome<Reading<'a,
     Ok(reading)
 }
 
+/// The handle behind a pointer, to read; none for NULL.
+///
+/// # Safety
+/// As [`read`].
+pub(super) unsafe fn read_some<'a, N: Noun>(pointer: *const N) -> Outcome<Option<Reading<'a, N::Value>>> {
+    // SAFETY: the caller's promise.
+    if pointer.is_null() { Ok(None) } else { unsafe { read(pointer) }.map(Some) }
+}
+
 /// The handle behind a pointer, to change.
 ///
 /// # Safety

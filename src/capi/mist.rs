@@ -1,7 +1,6 @@
 //! Mist: powder that fast grains raise into the air.
 
 use std::ffi::c_void;
-use std::sync::{Mutex, MutexGuard, PoisonError};
 
 use super::base::frz_base;
 use super::body::{Role, Shapes, bodies, frz_body};
@@ -9,15 +8,15 @@ use super::context::{creates, enter, frz_context};
 use super::grains::{check_snow, frz_grains};
 use super::grid::{Grid, frz_grid};
 use super::guard::{Failure, Outcome, frz_status, guard};
-use super::handle::{Noun, change, clear, destroy, read, required};
+use super::handle::{Noun, change, clear, destroy, read, read_some, required};
 use super::mist_params::frz_mist_params;
-use super::views::{Sized32, fill, frz_view, meaning, sized, within, write_bytes};
+use super::saved::{Saved, resumed};
+use super::views::{Sized32, fill, frz_view, meaning, sized, within};
 use crate::base::DVec3;
 use crate::context::Context;
-use crate::error::Error;
 use crate::flow::Tiles;
 use crate::snow::base_layer::BaseLayer;
-use crate::snow::mist::{Around, Grids, Mist, Params, Source, Surroundings, Wind};
+use crate::snow::mist::{Around, Grids, Mist, Source, Surroundings, Wind};
 use crate::sweep::Body;
 use crate::vdb::{AnyGrid, FloatGrid, VectorGrid};
 
@@ -72,8 +71,7 @@ pub(super) struct Air {
     mist: Mist,
     floor: Option<f64>,
     shapes: Shapes,
-    /// The bytes of a state whose size was asked for: they are handed out next.
-    packed: Mutex<Option<Vec<u8>>>,
+    saved: Saved,
 }
 
 impl Noun for frz_mist {
@@ -99,10 +97,6 @@ struct Scene<'a> {
 }
 
 impl Air {
-    fn packed(&self) -> MutexGuard<'_, Option<Vec<u8>>> {
-        self.packed.lock().unwrap_or_else(PoisonError::into_inner)
-    }
-
     /// Moves the mist through a step.
     ///
     /// # Safety
@@ -133,15 +127,14 @@ impl Air {
         let fastest = walls.fastest_near(&self.mist, sources);
         let around = Around { sources, boundary: &boundary, fastest, wind: wind.as_ref() };
         let done = self.mist.step(ctx, &around, [time, time + dt])?;
-        self.packed().take();
+        self.saved.take();
         Ok(frz_mist_report {
             struct_size: 0,
             sub_steps: done.sub_steps as u32,
             cells: done.cells as u64,
             sources: done.sources as u64,
             iterations: done.iterations as u64,
-            // An empty sum is -0.
-            mass: done.mass + 0.0,
+            mass: done.mass,
             divergence: f64::from(done.divergence),
             fastest: f64::from(done.fastest),
         })
@@ -173,22 +166,13 @@ pub unsafe extern "C" fn frz_mist_create(
             let own = params.params()?;
             let state =
                 frz_view { data: restart, count: restart_bytes, stride: 0 }.elements::<u8>("restart")?;
-            let mist = if restart.is_null() { Mist::new(own)? } else { resumed(ctx, own, &state)? };
-            Ok(Air { mist, floor: params.ground(), shapes: Shapes::new(), packed: Mutex::default() })
+            let mist = match restart.is_null() {
+                true => Mist::new(own)?,
+                false => resumed(ctx, "mist", Mist::unpacked(&state), || Mist::resume(own, &state))?,
+            };
+            Ok(Air { mist, floor: params.ground(), shapes: Shapes::new(), saved: Saved::default() })
         })
     }
-}
-
-/// Mist of a saved state.
-fn resumed(ctx: &Context, params: Params, state: &[u8]) -> Outcome<Mist> {
-    ctx.allow("the saved state of mist", 3 * Mist::unpacked(state))?;
-    ctx.phase("unpack", || Mist::resume(params, state)).map_err(|error| match error {
-        Error::Bytes(what) => {
-            let what = what.strip_prefix("the state ").unwrap_or(&what);
-            Failure::new(frz_status::FRZ_ERROR_FILE, format!("the saved state {what}"))
-        }
-        other => other.into(),
-    })
 }
 
 /// Destroys mist; NULL is fine.
@@ -232,7 +216,7 @@ pub unsafe extern "C" fn frz_mist_set_params(
 /// grains: the grains after their step; they are only read. NULL: none raise mist.
 /// base: the layer after its step, around which the air flows; it is only read. NULL: there is none.
 /// wind: a grid of velocities (m/s) that the air where there is mist takes on, half of the difference in a tenth of a second;
-///     a value that is not finite where there is air is FRZ_ERROR_ARGUMENT. NULL: only frz_mist_params.wind.
+///     a component that is not within 1000 m/s of 0 where there is air is FRZ_ERROR_ARGUMENT. NULL: only frz_mist_params.wind.
 /// bodies: count bodies that bound the air and carry it along; NULL with a count of 0. Those that do not move have no
 ///     positions_end. Of a body that is open wider than a tenth of its area the air flows around both sides. One with a vertex that
 ///     moves at over 100 m/s is taken to jump: it stands at positions_end for the whole step.
@@ -258,9 +242,9 @@ pub unsafe extern "C" fn frz_mist_step(
     // SAFETY: the pointers are NULL or the caller's.
     unsafe {
         stepped(context, mist, report, |ctx, air| {
-            let grains = if grains.is_null() { None } else { Some(read(grains)?) };
-            let base = if base.is_null() { None } else { Some(read(base)?) };
-            let wind = if wind.is_null() { None } else { Some(read(wind)?) };
+            let grains = read_some(grains)?;
+            let base = read_some(base)?;
+            let wind = read_some(wind)?;
             let wind = wind.as_deref().map(Grid::vectors).transpose()?;
             let sources = match &grains {
                 Some(heap) => {
@@ -310,10 +294,10 @@ pub unsafe extern "C" fn frz_mist_step_points(
     // SAFETY: the pointers are NULL or the caller's.
     unsafe {
         stepped(context, mist, report, |ctx, air| {
-            let snow = if snow.is_null() { None } else { Some(read(snow)?) };
+            let snow = read_some(snow)?;
             let snow = snow.as_deref().map(Grid::floats).transpose()?;
             snow.map_or(Ok(()), |snow| check_snow("snow", snow))?;
-            let wind = if wind.is_null() { None } else { Some(read(wind)?) };
+            let wind = read_some(wind)?;
             let wind = wind.as_deref().map(Grid::vectors).transpose()?;
             let places = positions.elements::<[f64; 3]>("positions")?;
             let velocities = velocities.elements::<[f32; 3]>("velocities")?;
@@ -434,21 +418,9 @@ pub unsafe extern "C" fn frz_mist_save(
             required(size, "size")?;
             let call = enter(context)?;
             let air = read(mist)?;
-            // Nothing is locked while polls of the host run.
-            let packed = air.packed().take();
-            let bytes = match packed {
-                Some(bytes) => bytes,
-                None => {
-                    let mist = &air.mist;
-                    call.ctx().phase("save", || Ok(mist.save()))?
-                }
-            };
-            let written = write_bytes(dst, capacity, size, || bytes.len(), || Ok(bytes.as_slice()));
-            if dst.is_null() || written.is_err() {
-                // Who asked for the size, or had too little room, comes again.
-                *air.packed() = Some(bytes);
-            }
-            written
+            let mist = &air.mist;
+            let save = || call.ctx().phase("save", || Ok(mist.save()));
+            air.saved.write((dst, capacity, size), save)
         }
     })
 }

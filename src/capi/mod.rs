@@ -71,6 +71,8 @@ pub mod mist_params;
 pub mod mist;
 
 mod handle;
+#[cfg(feature = "vdb")]
+mod saved;
 
 pub use guard::frz_status;
 pub use views::{frz_span, frz_view};

@@ -67,22 +67,6 @@ static bytes bytes_of(const frz_grid *grid) {
     return out;
 }
 
-/* Cancels and resets at once, at one of the polls. */
-typedef struct hasty {
-    frz_context *ctx;
-    int polls, at;
-} hasty;
-
-static int cancel_and_reset(void *user, const frz_progress *progress) {
-    hasty *state = user;
-    (void)progress;
-    if (++state->polls == state->at) {
-        frz_context_cancel(state->ctx);
-        frz_context_reset(state->ctx);
-    }
-    return 0;
-}
-
 typedef frz_status (*function)(frz_context *, frz_grid **);
 
 /* Cancels and resets at every poll of a function in turn: it answers FRZ_CANCELLED and changes nothing, and the next

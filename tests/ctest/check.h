@@ -225,4 +225,20 @@ static inline frz_context *context_on(uint32_t threads) {
     return ctx;
 }
 
+/* Cancels and resets at once, at one of the polls. */
+typedef struct hasty {
+    frz_context *ctx;
+    int polls, at;
+} hasty;
+
+static inline int cancel_and_reset(void *user, const frz_progress *progress) {
+    hasty *state = user;
+    (void)progress;
+    if (++state->polls == state->at) {
+        frz_context_cancel(state->ctx);
+        frz_context_reset(state->ctx);
+    }
+    return 0;
+}
+
 #endif

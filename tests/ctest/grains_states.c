@@ -154,21 +154,12 @@ static void parameters(frz_context *ctx, const ball *rest, const frz_grid *snow)
     frz_base_destroy(pressed.base), frz_grid_destroy(pressed.before);
 }
 
+/* A step that looks at itself from within. */
 typedef struct watch {
     frz_context *ctx;
     frz_grains *grains;
-    int polls, at;
+    int polls;
 } watch;
-
-static int cancel_at(void *user, const frz_progress *progress) {
-    watch *state = user;
-    (void)progress;
-    if (++state->polls == state->at) {
-        frz_context_cancel(state->ctx);
-        frz_context_reset(state->ctx);
-    }
-    return 0;
-}
 
 /* Other calls while a step runs: the handle is in use. */
 static int try_others(void *user, const frz_progress *progress) {
@@ -208,7 +199,8 @@ static void cancels(const ball *rest, const frz_grid *snow) {
     }
     for (threads = 0; threads <= 2; threads += 2) {
         frz_context *ctx = context_on(threads);
-        watch state = {NULL, NULL, 0, 0};
+        watch inner = {NULL, NULL, 0};
+        hasty state = {NULL, 0, 0};
         frz_status status = FRZ_CANCELLED;
         pthread_t thread;
         state.ctx = ctx;
@@ -216,7 +208,7 @@ static void cancels(const ball *rest, const frz_grid *snow) {
             frz_grains_report report;
             report.struct_size = sizeof report, report.count = 1;
             state.polls = 0;
-            WORKS(frz_context_set_poll(ctx, cancel_at, &state));
+            WORKS(frz_context_set_poll(ctx, cancel_and_reset, &state));
             status = frz_grains_step(ctx, grains, pressed.base, &body, 1, DT, 3, &report);
             WORKS(frz_context_set_poll(ctx, NULL, NULL));
             CHECK(status == FRZ_OK || (status == FRZ_CANCELLED && report.count == 0));
@@ -238,10 +230,10 @@ static void cancels(const ball *rest, const frz_grid *snow) {
         CHECK(same_bytes(got, status == FRZ_OK ? want : before));
         free(got.data);
         /* Within a step the grains are in use, the layer can be read and not stepped. */
-        state.grains = grains, state.polls = 0, state.ctx = quiet;
-        WORKS(frz_context_set_poll(ctx, try_others, &state));
+        inner.grains = grains, inner.ctx = quiet;
+        WORKS(frz_context_set_poll(ctx, try_others, &inner));
         WORKS(frz_grains_step(ctx, grains, pressed.base, &body, 1, DT, 4, NULL));
-        CHECK(state.polls > 3);
+        CHECK(inner.polls > 3);
         frz_grains_destroy(grains);
         grains = resumed(quiet, &params, before);
         frz_context_destroy(ctx);
