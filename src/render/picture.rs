@@ -19,7 +19,8 @@ impl Picture {
     /// # Errors
     /// As [`Picture::png`]; what the system refuses.
     pub fn write(&self, path: &Path) -> Result<()> {
-        crate::io::atomic::write_bytes(path, &self.png()?)
+        let bytes = self.png().map_err(|error| Error::file(path, error.to_string()))?;
+        crate::io::atomic::write_bytes(path, &bytes)
     }
 
     /// The bytes of a PNG file.

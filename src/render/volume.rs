@@ -7,7 +7,7 @@ use crate::base::blocks::{DIM, Origin};
 use crate::base::{DVec3, TriMesh, Vec3};
 use crate::context::Context;
 use crate::error::{Error, Result};
-use crate::vdb::{FloatGrid, MetaValue, Tile, level_set};
+use crate::vdb::{DENSITY_SCALE_KEY, FloatGrid, MetaValue, Tile, level_set};
 
 impl Model {
     /// A level set with the colour of snow.
@@ -20,9 +20,6 @@ impl Model {
         Ok(Self::new(mesh, Some(normals), SNOW, 0.5 * grid.voxel_size()))
     }
 }
-
-/// Metadata of a fog: the extinction (1/m) that a value of 1 stands for.
-const SCALE: &str = "frazil:density_scale";
 
 impl Fog {
     /// A fog volume. A value of 1 loses as much light per metre as its metadata `frazil:density_scale` says, `extinction`
@@ -62,7 +59,7 @@ const TILE_BYTES: u64 = 64;
 /// What a fog's file says of its densities.
 fn density_scale(grid: &FloatGrid) -> Result<Option<f64>> {
     let metadata = grid.metadata()?;
-    let Some((_, value)) = metadata.iter().find(|(key, _)| key == SCALE) else { return Ok(None) };
+    let Some((_, value)) = metadata.iter().find(|(key, _)| key == DENSITY_SCALE_KEY) else { return Ok(None) };
     let number = match value {
         MetaValue::Float(number) => Some(f64::from(*number)),
         MetaValue::Double(number) => Some(*number),
@@ -72,7 +69,7 @@ fn density_scale(grid: &FloatGrid) -> Result<Option<f64>> {
     let number = number.filter(|number| *number >= 0.0 && number.is_finite());
     number.map(Some).ok_or_else(|| {
         let name = grid.name();
-        Error::argument(format!("grid \"{name}\" has a {SCALE} that is no number of 0 or more"))
+        Error::argument(format!("grid \"{name}\" has a {DENSITY_SCALE_KEY} that is no number of 0 or more"))
     })
 }
 

@@ -26,7 +26,7 @@ pub struct Look {
 
 /// What is drawn of a frame.
 pub struct Drawing {
-    /// It.
+    /// Everything in it.
     pub models: Models,
     /// Whether there are points in it.
     has_points: bool,
@@ -86,7 +86,7 @@ impl Look {
     /// Nothing to see; no points for `--color`.
     pub fn view(&self, drawings: &[Drawing]) -> std::result::Result<View, Failure> {
         if self.color.is_some() && drawings.iter().all(|drawing| !drawing.has_points) {
-            return Err(Failure::refused("--color is for points, and no file holds any"));
+            return Err(Failure::refused("--color is for points, and there are none"));
         }
         let boxes = drawings.iter().filter_map(|drawing| drawing.models.bounds());
         let bounds = boxes.reduce(|a, b| (a.0.inf(&b.0), a.1.sup(&b.1)));

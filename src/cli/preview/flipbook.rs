@@ -1,7 +1,6 @@
 //! Flipbooks: a picture of each frame, or a GIF of all of them, from one camera in one light.
 
 use std::path::Path;
-use std::sync::Mutex;
 
 use frazil::io::{atomic, sequence::Pattern};
 use frazil::render::{Gif, Palette, Picture, delays};
@@ -14,7 +13,7 @@ use crate::cli::exit::{Failure, Phase};
 use crate::cli::progress::FrameProgress;
 use crate::cli::session::Session;
 
-/// Most frames that are made at once: each holds its snow as triangles.
+/// Most frames that are made at once: each holds its snow as triangles, and a limit of memory holds for each of them.
 const MOST_AT_ONCE: usize = 4;
 /// The colours of a GIF are chosen from pictures that are smaller by this factor along each edge.
 const SMALLER: u32 = 4;
@@ -23,7 +22,7 @@ const SMALLER: u32 = 4;
 pub struct Flipbook<'a> {
     session: &'a Session,
     look: &'a Look,
-    sources: Mutex<Sources>,
+    sources: Sources,
     /// Ascending.
     frames: Vec<i32>,
     view: View,
@@ -51,7 +50,7 @@ impl<'a> Flipbook<'a> {
         };
         let probes = places.into_iter().map(&mut probe).collect::<Result<Vec<_>>>().before()?;
         let view = look.view(&probes)?;
-        Ok(Self { session, look, sources: Mutex::new(sources), frames, view, probes })
+        Ok(Self { session, look, sources, frames, view, probes })
     }
 
     /// Writes a PNG file of each frame, in their order, each whole or not at all.
@@ -60,7 +59,8 @@ impl<'a> Flipbook<'a> {
     /// A file that cannot be read or written; cancel: the pictures of the frames before it are there.
     pub fn pictures(mut self, pattern: &Pattern) -> Result<()> {
         self.probes.clear();
-        let write = |place: usize, png: Vec<u8>| atomic::write_bytes(&pattern.path(self.frames[place]), &png);
+        let paths: Vec<_> = self.frames.iter().map(|frame| pattern.path(*frame)).collect();
+        let write = |place: usize, png: Vec<u8>| atomic::write_bytes(&paths[place], &png);
         self.draw(|picture| picture.png(), write)
     }
 
@@ -71,15 +71,15 @@ impl<'a> Flipbook<'a> {
     pub fn gif(mut self, path: &Path, fps: f64) -> Result<()> {
         let palette = self.palette()?;
         self.probes.clear();
-        let delays = delays(&self.frames, fps);
-        // Why the frames ended early is not an error of the file.
+        let (delays, size, ctx) = (delays(&self.frames, fps), self.view.size, &self.session.ctx);
+        // The first error of a frame, kept apart so that it is not reported as one of writing.
         let mut ended = None;
         let written = atomic::write(path, |out| {
-            let mut gif = Gif::new(out, self.view.size, &palette)?;
+            let mut gif = Gif::new(out, size, &palette)?;
             let add = |place: usize, indices: Vec<u8>| {
                 gif.add(indices, delays[place]).map_err(|error| Error::io(path, "write", error))
             };
-            match self.draw(|picture| Ok(palette.indices(&self.session.ctx, &picture)), add) {
+            match self.draw(|picture| Ok(palette.indices(ctx, &picture)), add) {
                 Ok(()) => gif.finish(),
                 Err(error) => {
                     ended = Some(error);
@@ -92,22 +92,22 @@ impl<'a> Flipbook<'a> {
 
     /// Draws the frames, several at once: `finish` makes of each picture what `take` then gets in the order of the frames.
     fn draw<T: Send>(
-        &self,
+        &mut self,
         finish: impl Fn(Picture) -> Result<T> + Sync,
         mut take: impl FnMut(usize, T) -> Result<()>,
     ) -> Result<()> {
-        let ctx = &self.session.ctx;
+        let Self { session, look, sources, frames, view, .. } = self;
+        let ctx = &session.ctx;
         let read = |place: usize| {
             ctx.check()?;
-            let mut sources = self.sources.lock().map_err(|_| Error::Internal("no frame is read".into()))?;
-            sources.read(ctx, Some(f64::from(self.frames[place])))
+            sources.read(ctx, Some(f64::from(frames[place])))
         };
-        let make = |_, parts| finish(self.view.draw(ctx, &self.look.build(ctx, parts)?)?);
-        let mut progress = FrameProgress::new(ctx, self.frames.len(), 0, self.session.is_quiet());
+        let make = |_, parts| finish(view.draw(ctx, &look.build(ctx, parts)?)?);
+        let mut progress = FrameProgress::new(ctx, frames.len(), 0, session.is_quiet());
         let at_once = ctx.pool().threads().min(MOST_AT_ONCE);
-        in_order(self.frames.len(), at_once, read, make, |place, made| {
+        in_order(frames.len(), at_once, read, make, |place, made| {
             take(place, made)?;
-            progress.finished("picture", self.frames[place]);
+            progress.finished("picture", frames[place]);
             Ok(())
         })
     }

@@ -2,6 +2,7 @@
 
 use std::collections::VecDeque;
 use std::sync::Mutex;
+use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::mpsc::{Receiver, Sender, channel};
 
 use frazil::{Error, Result};
@@ -10,11 +11,11 @@ use frazil::{Error, Result};
 type Job<T> = (usize, Sender<Result<T>>);
 
 /// Makes frames 0 to `count` on some threads. `read` is called with one after the other, `make` for several at once, on
-/// the thread that read them, and `take` with their results in order on the thread of the caller. At most two frames more
-/// than there are threads are begun and not taken.
+/// the thread that read them, and `take` with their results in order on the thread of the caller. At most one frame more
+/// than there are threads is begun and not taken.
 ///
 /// # Errors
-/// The first error, by frame; the frames behind it that are begun are made and dropped.
+/// The first error, by frame; no frame behind it is read any more.
 pub fn in_order<R, T: Send>(
     count: usize,
     threads: usize,
@@ -23,16 +24,16 @@ pub fn in_order<R, T: Send>(
     mut take: impl FnMut(usize, T) -> Result<()>,
 ) -> Result<()> {
     let (ask, jobs) = channel::<Job<T>>();
-    let waiting = Mutex::new((jobs, read));
+    let (waiting, failed) = (Mutex::new((jobs, read)), AtomicBool::new(false));
     std::thread::scope(|scope| {
         for _ in 0..threads.max(1) {
-            scope.spawn(|| work(&waiting, &make));
+            scope.spawn(|| work(&waiting, &failed, &make));
         }
         // Dropped with the closure, which ends the threads.
         let ask = ask;
         let mut begun: VecDeque<Receiver<Result<T>>> = VecDeque::new();
         let mut next = 0;
-        for taken in 0..count {
+        let mut one = |taken: usize| {
             while next < count && begun.len() <= threads {
                 let (done, made) = channel();
                 ask.send((next, done)).map_err(|_| gone())?;
@@ -40,15 +41,18 @@ pub fn in_order<R, T: Send>(
                 next += 1;
             }
             let made = begun.pop_front().ok_or_else(gone)?.recv().map_err(|_| gone())?;
-            take(taken, made?)?;
-        }
-        Ok(())
+            take(taken, made?)
+        };
+        let ended = (0..count).try_for_each(&mut one);
+        failed.store(ended.is_err(), Ordering::Relaxed);
+        ended
     })
 }
 
 /// Takes jobs until there are none.
 fn work<R, T>(
     waiting: &Mutex<(Receiver<Job<T>>, impl FnMut(usize) -> Result<R>)>,
+    failed: &AtomicBool,
     make: &impl Fn(usize, R) -> Result<T>,
 ) {
     loop {
@@ -56,6 +60,10 @@ fn work<R, T>(
         let Ok(mut turn) = waiting.lock() else { return };
         let (jobs, read) = &mut *turn;
         let Ok((frame, done)) = jobs.recv() else { return };
+        // What was asked for before a frame failed is still in the channel.
+        if failed.load(Ordering::Relaxed) {
+            return;
+        }
         let raw = read(frame);
         drop(turn);
         // Nobody listens any more when a frame before this one failed.
@@ -70,7 +78,7 @@ fn gone() -> Error {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use std::sync::atomic::{AtomicUsize, Ordering};
+    use std::sync::atomic::AtomicUsize;
     use std::time::Duration;
 
     #[test]
@@ -80,7 +88,7 @@ mod tests {
             let under_way = AtomicUsize::new(0);
             let begin = |frame: usize| {
                 read.push(frame);
-                assert!(under_way.fetch_add(1, Ordering::SeqCst) < threads + 2);
+                assert!(under_way.fetch_add(1, Ordering::SeqCst) <= threads);
                 Ok(frame)
             };
             let make = |frame: usize, raw: usize| {

@@ -10,6 +10,7 @@ mod sources;
 use std::path::{Path, PathBuf};
 
 use frazil::base::DVec3;
+use frazil::io::atomic;
 use frazil::io::mesh::extension;
 use frazil::io::sequence::Pattern;
 use frazil::render::{Camera, Light, Size};
@@ -111,7 +112,7 @@ pub fn run(args: Args, session: &Session) -> Result<(), Failure> {
             Flipbook::open(session, &look, sources, frames)?.pictures(&pattern).during()
         }
         Job::Gif(frames, path) => {
-            let fps = sources.fps();
+            let fps = sources.fps().before()?;
             Flipbook::open(session, &look, sources, frames)?.gif(&path, fps).during()
         }
     }
@@ -165,12 +166,22 @@ impl Args {
         let path = self.output.clone();
         let refused = |what: &str| Err(Failure::refused(format!("{}: {what}", path.display())));
         let is_gif = extension(&path) == "gif";
+        // Whatever else is there under that name, a shot's file above all, is not a picture.
+        if !is_gif && extension(&path) != "png" && !atomic::is_stream(&path) {
+            return refused("a picture is a .png file, a flipbook a .gif file or a pattern (p.%04d.png)");
+        }
+        if self.fps.is_some() && !is_gif && !sources.has_characters() {
+            return refused("--fps is for .gif files and for characters");
+        }
         let pattern = Pattern::parse(&path);
         let frames: Option<Vec<i32>> = match (&self.frames, self.frame) {
             (Some(frames), _) => Some(frames.iter().collect()),
             (None, Some(_)) => None,
             (None, None) => sources.frames(),
         };
+        if frames.as_ref().is_some_and(Vec::is_empty) {
+            return Err(Failure::refused("the shots have no frame in common"));
+        }
         match (pattern, frames) {
             (Some(_), _) if is_gif => refused("a .gif holds all frames, and has one name"),
             (Some(pattern), Some(frames)) => Ok(Job::Pictures(frames, pattern)),
@@ -191,29 +202,18 @@ impl Args {
 }
 
 impl Job {
-    /// The frames with the files that are written.
-    fn outputs(&self) -> Vec<(Option<f64>, PathBuf)> {
-        let each = |frames: &[i32], path: &dyn Fn(i32) -> PathBuf| {
-            frames.iter().map(|frame| (Some(f64::from(*frame)), path(*frame))).collect()
-        };
-        match self {
-            Self::Still(frame, path) => vec![(*frame, path.clone())],
-            Self::Pictures(frames, pattern) => each(frames, &|frame| pattern.path(frame)),
-            Self::Gif(frames, path) => each(frames, &|_| path.clone()),
-        }
-    }
-
-    /// Refuses frames that are not there, and outputs that cannot be written or that are read.
+    /// Refuses frames that are not there, and a folder that takes no pictures.
     fn check(&self, sources: &Sources) -> frazil::Result<()> {
-        let outputs = self.outputs();
-        if let Some((_, path)) = outputs.first() {
-            output::check_writable(path)?;
-        }
-        for (frame, path) in &outputs {
-            sources.refuse_missing(*frame)?;
-            let inputs = sources.files(*frame);
-            output::refuse_input(path, inputs.iter().map(PathBuf::as_path))?;
-        }
-        Ok(())
+        let (first, frames) = match self {
+            Self::Still(frame, path) => (path.clone(), vec![*frame]),
+            Self::Pictures(frames, pattern) => (pattern.path(frames[0]), some(frames)),
+            Self::Gif(frames, path) => (path.clone(), some(frames)),
+        };
+        output::check_writable(&first)?;
+        frames.into_iter().try_for_each(|frame| sources.refuse_missing(frame))
     }
+}
+
+fn some(frames: &[i32]) -> Vec<Option<f64>> {
+    frames.iter().map(|frame| Some(f64::from(*frame))).collect()
 }

@@ -16,6 +16,8 @@ pub struct Shot {
     folder: PathBuf,
     base: Rebuild,
     grains: RebuildGrains,
+    mist: Stored,
+    objects: Stored,
     files: [Files; 4],
     /// The frames that all stages have, ascending; at least one.
     frames: Vec<i32>,
@@ -45,7 +47,7 @@ impl Shot {
                 format!("is no folder of a shot that has frames to draw of one of its stages ({names})");
             return Err(Error::file(folder, what));
         }
-        Ok(Self { folder: folder.to_path_buf(), base, grains, files, frames })
+        Ok(Self { folder: folder.to_path_buf(), base, grains, mist, objects, files, frames })
     }
 
     /// Where it is.
@@ -96,6 +98,7 @@ impl Shot {
     pub fn read(&mut self, ctx: &Context, frame: i32) -> Result<Vec<Part>> {
         let [base, grains, mist, objects] = self.files.each_ref().map(|files| files.get(&frame).cloned());
         let mut parts = Vec::new();
+        // Each file is compared with its record before it is read.
         if base.is_some() {
             parts.push(Part::Surface(self.surface(ctx, frame)?));
         }
@@ -104,13 +107,16 @@ impl Shot {
                 let points = self.grains.points(ctx, frame)?.clone();
                 parts.push(Part::Points(path, points));
             }
-            Some(path) => parts.push(points_of_ply(&path)?),
+            Some(_) => {
+                parts.push(points_of_ply(&self.grains.stored().file_with(frame, STAGES[1].0, "ply")?)?);
+            }
             None => {}
         }
-        if let Some(path) = mist {
-            parts.extend(of_vdb(&path)?);
+        if mist.is_some() {
+            parts.extend(of_vdb(&self.mist.file(frame, STAGES[2].0)?)?);
         }
-        if let Some(path) = objects {
+        if objects.is_some() {
+            let path = self.objects.file_with(frame, STAGES[3].0, "ply")?;
             parts.push(Part::Mesh(mesh::read(&path)?.without_unused()));
         }
         Ok(parts)

@@ -40,30 +40,32 @@ enum Source {
 pub struct Sources {
     all: Vec<Source>,
     clip: Option<String>,
-    fps: f64,
+    /// Frames a second that the user gave.
+    fps: Option<f64>,
 }
 
 /// Frames a second where neither the user nor a shot says it.
 const FPS: f64 = 24.0;
 
 impl Sources {
-    /// Opens files, patterns of sequences and folders of shots. Characters play `clip`, their only one without it; `fps`
-    /// are the frames a second where the user gave them, else those of the first shot count, else 24.
+    /// Opens files, patterns of sequences and folders of shots. Characters play `clip`, or their only one without it.
     ///
     /// # Errors
-    /// A folder that is no shot's, or whose records or scene cannot be read.
+    /// A folder that is no shot's, or whose records cannot be read.
     pub fn open(paths: &[PathBuf], clip: Option<String>, fps: Option<f64>) -> Result<Self> {
-        let all: Vec<Source> = paths.iter().map(|path| Source::open(path)).collect::<Result<_>>()?;
-        let fps = match fps {
-            Some(fps) => fps,
-            None => all.iter().find_map(Source::fps).transpose()?.unwrap_or(FPS),
-        };
+        let all = paths.iter().map(|path| Source::open(path)).collect::<Result<_>>()?;
         Ok(Self { all, clip, fps })
     }
 
-    /// Frames a second.
-    pub fn fps(&self) -> f64 {
-        self.fps
+    /// Frames a second: those that the user gave, else those of the first shot, else 24.
+    ///
+    /// # Errors
+    /// A shot's scene that cannot be read.
+    pub fn fps(&self) -> Result<f64> {
+        match self.fps {
+            Some(fps) => Ok(fps),
+            None => Ok(self.all.iter().find_map(Source::fps).transpose()?.unwrap_or(FPS)),
+        }
     }
 
     /// The frames that all of the shots hold, ascending; none without a shot.
@@ -93,17 +95,6 @@ impl Sources {
         self.all.iter().try_for_each(|source| source.refuse_missing(frame))
     }
 
-    /// The files that are given by name, those of sequences at a frame.
-    pub fn files(&self, frame: Option<f64>) -> Vec<PathBuf> {
-        let file = |source: &Source| match source {
-            Source::File(path) => Some(path.clone()),
-            Source::Sequence(pattern) => frame.map(|frame| pattern.path(frame as i32)),
-            #[cfg(feature = "vdb")]
-            Source::Shot(_) => None,
-        };
-        self.all.iter().filter_map(file).collect()
-    }
-
     /// Reads what is drawn at a frame; a shot's frames in ascending order cost one file each.
     ///
     /// # Errors
@@ -114,12 +105,13 @@ impl Sources {
     )]
     pub fn read(&mut self, ctx: &Context, frame: Option<f64>) -> Result<Vec<Part>> {
         let mut parts = Vec::new();
+        let fps = if self.has_characters() { self.fps()? } else { FPS };
         for source in &mut self.all {
             match source {
-                Source::File(path) => parts.extend(of_file(path, self.clip.as_deref(), frame, self.fps)?),
+                Source::File(path) => parts.extend(of_file(path, self.clip.as_deref(), frame, fps)?),
                 Source::Sequence(pattern) => {
                     let path = pattern.path(whole(frame, &pattern.path(0))?);
-                    parts.extend(of_file(&path, None, None, self.fps)?);
+                    parts.extend(of_file(&path, None, None, fps)?);
                 }
                 #[cfg(feature = "vdb")]
                 Source::Shot(shot) => {

@@ -1,6 +1,6 @@
 //! The densities of a fog: blocks of 8 x 8 x 8 voxels, found through nodes of 16 x 16 x 16 blocks.
 
-use std::collections::HashMap;
+use std::collections::{HashMap, HashSet};
 
 use nalgebra::Matrix3;
 use rayon::prelude::*;
@@ -25,12 +25,13 @@ const MOST_NODES: f64 = (1 << 24) as f64;
 const FARTHEST: i32 = 1 << 30;
 /// Greatest extinction (1/m): no light passes a micrometre.
 const MOST_EXTINCTION: f64 = 1.0e6;
-/// Voxels of less than this part of the greatest extinction do not count for the bounds: wisps that nobody sees reach far.
+/// Voxels below this part of the greatest extinction are left out of the bounds, so that wisps which nobody sees do not widen
+/// the view.
 const SEEN: f32 = 0.01;
-/// Memory (bytes) of a block with values of its own: its samples and its light, and those of half a block before it.
-const DENSE_BYTES: u64 = 3 * (size_of::<Samples>() as u64 + 1500) / 2;
-/// Memory (bytes) of any block while a fog is made.
-const PART_BYTES: u64 = 256;
+/// Memory (bytes) of a block with samples of its own while a fog is made: these, twice, and its light.
+const DENSE_BYTES: u64 = 2 * size_of::<Samples>() as u64 + 1500;
+/// Memory (bytes) of any block position while a fog is made.
+const PLACE_BYTES: u64 = 256;
 /// No node, or no block.
 const NONE: u32 = u32::MAX;
 
@@ -144,10 +145,20 @@ impl Fog {
     ) -> Result<Self> {
         parts.retain(|(_, part)| !part.is_empty());
         let (low, counts) = node_box(&parts)?;
-        let dense = parts.iter().filter(|(_, part)| matches!(part, Part::Dense(..))).count();
-        ctx.allow("a fog", dense as u64 * DENSE_BYTES + parts.len() as u64 * PART_BYTES)?;
+        const WHAT: &str = "a fog";
+        // Of each block, the eight positions in which its samples count.
+        ctx.allow(WHAT, 8 * parts.len() as u64 * size_of::<Origin>() as u64)?;
+        let places = ctx.pool().install(|| places(&parts));
+        ctx.allow(WHAT, parts.len() as u64 * PLACE_BYTES + places.len() as u64 * PLACE_BYTES)?;
         let of_place: HashMap<Origin, Part<'_>> = parts.iter().copied().collect();
-        let places = places(&parts);
+        let dense = places.iter().filter(|place| even_at(**place, &of_place).is_none()).count();
+        let nodes: HashSet<[i32; 3]> =
+            places.iter().map(|place| place.map(|at| at.div_euclid(NODE * DIM as i32))).collect();
+        let needed = dense as u64 * DENSE_BYTES
+            + places.len() as u64 * PLACE_BYTES
+            + nodes.len() as u64 * size_of::<[u32; NODE_BLOCKS]>() as u64
+            + counts.iter().product::<usize>() as u64 * size_of::<u32>() as u64;
+        ctx.allow(WHAT, needed)?;
         let filled: Vec<Option<Filled>> = ctx.pool().install(|| {
             let fill = |place: &Origin| {
                 ctx.check()?;
@@ -338,17 +349,28 @@ fn places(parts: &[(Origin, Part<'_>)]) -> Vec<Origin> {
     places
 }
 
+/// The block at a position and those behind it along the axes.
+fn near<'a>(place: Origin, parts: &HashMap<Origin, Part<'a>>) -> [Option<Part<'a>>; 8] {
+    std::array::from_fn(|n| {
+        parts.get(&[0, 1, 2].map(|axis| place[axis] + (n >> axis & 1) as i32 * DIM as i32)).copied()
+    })
+}
+
+/// The density of all samples of the block at a position; none where they may differ.
+fn even_at(place: Origin, parts: &HashMap<Origin, Part<'_>>) -> Option<f32> {
+    let near = near(place, parts);
+    let Some(Part::Even(first)) = near[0] else { return None };
+    let is_same = |part: &Option<Part<'_>>| matches!(part, Some(Part::Even(other)) if *other == first);
+    near.iter().all(is_same).then_some(first)
+}
+
 /// The samples of the block at a position; none when all are 0.
 fn fill(place: Origin, parts: &HashMap<Origin, Part<'_>>, extinction: f64) -> Option<Filled> {
     let value = |density: f32| (f64::from(density) * extinction).min(MOST_EXTINCTION) as f32;
-    let near: [Option<Part<'_>>; 8] = std::array::from_fn(|n| {
-        parts.get(&[0, 1, 2].map(|axis| place[axis] + (n >> axis & 1) as i32 * DIM as i32)).copied()
-    });
-    if let Some(Part::Even(first)) = near[0]
-        && near.iter().all(|part| matches!(part, Some(Part::Even(other)) if *other == first))
-    {
-        return Some(Filled::Even(value(first)));
+    if let Some(density) = even_at(place, parts) {
+        return Some(value(density)).filter(|value| *value > 0.0).map(Filled::Even);
     }
+    let near = near(place, parts);
     let mut samples = Box::new([0.0; EDGE * EDGE * EDGE]);
     for (n, part) in near.iter().enumerate().filter_map(|(n, part)| part.map(|part| (n, part))) {
         // The block itself gives 8 samples along an axis, the next one its first.

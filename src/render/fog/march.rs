@@ -34,8 +34,8 @@ impl Veil {
 }
 
 impl LitFogs<'_> {
-    /// Whether one ray through the middle of a pixel sees what all its samples see: no voxel is smaller than a pixel where
-    /// the fog is.
+    /// Whether one ray through the middle of a pixel sees what all its samples see: no voxel is smaller than a pixel at the
+    /// middle of its fog.
     pub fn is_smooth(&self, camera: &Camera, size: Size) -> bool {
         let pixel = 2.0 * libm::tan(camera.fov_deg.to_radians() * 0.5) / f64::from(size.height);
         let is_smooth =
@@ -207,7 +207,9 @@ mod tests {
         let fogs = [slab(&ctx, &[1.0; 512], &[0; 8])];
         assert!(fogs[0].is_empty() && fogs[0].bounds().is_none());
         let eye = DVec3::new(-1.0, 1.6, 1.6);
-        assert_eq!(lit(&ctx, &fogs).veils(eye, DVec3::x(), [9.0]), [Veil::NONE]);
+        for toward in [DVec3::x(), DVec3::new(1.0, 0.3, 0.2).normalize()] {
+            assert_eq!(lit(&ctx, &fogs).veils(eye, toward, [9.0]), [Veil::NONE]);
+        }
         let axes = [DVec3::x(), DVec3::y(), DVec3::z()];
         let placement = Placement::new(DVec3::zeros(), axes).unwrap();
         let far = vec![([0; 3], Part::Even(1.0)), ([1 << 28; 3], Part::Even(1.0))];

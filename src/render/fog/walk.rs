@@ -45,10 +45,13 @@ impl<'a> Walk<'a> {
             enter = enter.max(a.min(b));
             leave = leave.min(a.max(b));
         }
-        let is_met = enter < leave;
+        // Of a fog without blocks the box is empty, and holds no position to settle at.
+        if enter >= leave || low == high {
+            return None;
+        }
         let mut walk = Self { fog, origin, direction, place: [0; 3], sides: [0.0; 3], at: enter, end: leave };
         walk.settle([low, high.map(|at| at - 1)]);
-        is_met.then_some(walk)
+        Some(walk)
     }
 
     /// Finds the block position at `at`, within a box of them (least and greatest).
@@ -124,7 +127,7 @@ pub(super) struct Here {
     pub local: [f32; 3],
 }
 
-/// A ray in one of the fogs.
+/// A ray in one of the fogs: the stretch in which it is.
 struct InFog<'a> {
     index: usize,
     walk: Walk<'a>,

@@ -121,15 +121,15 @@ fn a_gif_plays_the_pictures_at_the_speed_of_the_shot() {
     );
 }
 
-/// Puts mist over the snow into the folder of a shot, as its stage would.
-fn add_mist(folder: &Path, frame: i32) {
+/// Puts mist over the snow into the folder of a shot, as its stage would, in so many blocks.
+fn add_mist(folder: &Path, frame: i32, blocks: usize) {
     let mut grid = FloatGrid::new(0.05, 0.0).unwrap();
     let block = |x, z| {
         let values = Box::new([2.0; 512]);
         BlockEdit::Dense(Block { origin: [x, 8, z], values, mask: [u64::MAX; 8] })
     };
     let ctx = Context::new(Pool::new(1).unwrap());
-    grid.replace_blocks(&ctx, &[block(-8, 0), block(0, 0)]).unwrap();
+    grid.replace_blocks(&ctx, &[block(-8, 0), block(0, 0)][..blocks]).unwrap();
     grid.set_class(GridClass::Fog).unwrap();
     grid.set_name("density").unwrap();
     let bytes = to_bytes(&[&grid], &WriteOptions::default()).unwrap();
@@ -151,7 +151,7 @@ fn mist_is_drawn_over_the_snow_of_its_frame() {
         read(folder, "p.png")
     };
     let without = draw("shot --frame 2");
-    add_mist(&folder.join("shot"), 2);
+    add_mist(&folder.join("shot"), 2, 2);
     let with = draw("shot --frame 2");
     assert!(with != without);
     let files = "shot/base/base.0002.vdb shot/grains/grains.0002.vdb shot/mist/mist.0002.vdb shot/objects/objects.0002.ply";
@@ -165,6 +165,21 @@ fn mist_is_drawn_over_the_snow_of_its_frame() {
         2,
         &["shot", "frame 3", "1 frames, 2 to 2", "base and grains and mist"],
     );
+    // Mist that is not there yet.
+    add_mist(&folder.join("shot"), 1, 0);
+    works(folder, &format!("preview shot --frames 1-2 -o p.gif {SIZE} -q"));
+    works(folder, &format!("preview shot --frame 1 -o first.png {SIZE}"));
+    // A file that is not what its record says.
+    let path = folder.join("shot/mist/mist.0002.vdb");
+    let mut bytes = fs::read(&path).unwrap();
+    let last = bytes.len() - 1;
+    bytes[last] ^= 1;
+    fs::write(path, bytes).unwrap();
+    fails(folder, &format!("preview shot --frame 2 -o p.png {SIZE}"), 2, &["mist.0002.vdb"]);
+    // Only a flipbook needs to know how many frames a second there are.
+    fs::remove_file(folder.join("shot/scene.toml")).unwrap();
+    works(folder, &format!("preview shot --frame 1 -o p.png {SIZE}"));
+    fails(folder, &format!("preview shot --frames 1 -o p.gif {SIZE}"), 2, &["scene.toml", "--fps"]);
 }
 
 #[test]
@@ -173,7 +188,11 @@ fn what_cannot_be_drawn_is_said_before_anything_is_written() {
     let folder = folder.path();
     fs::create_dir(folder.join("bare")).unwrap();
     fs::write(folder.join("grains.ply"), GRAINS).unwrap();
-    let refused: [(&str, &[&str]); 15] = [
+    works(folder, "snow shot.toml -o first -q --frames 1");
+    works(folder, "snow shot.toml -o last -q");
+    (1..=3)
+        .for_each(|frame| fs::remove_file(folder.join(format!("last/state/base.000{frame}.json"))).unwrap());
+    let refused: [(&str, &[&str]); 20] = [
         ("shot --frames 3-9 -o p.%04d.png", &["shot", "frame 5", "1 to 4", "base and grains"]),
         ("shot --frames 0-2 -o p.gif", &["shot", "frame 0"]),
         ("shot --frame 1.5 -o p.png", &["shot", "whole frames", "1.5"]),
@@ -189,6 +208,11 @@ fn what_cannot_be_drawn_is_said_before_anything_is_written() {
         ("shot/base/base.%04d.vdb --frames 2-5 -o p.gif", &["base.0005.vdb", "not there"]),
         ("shot --frames 1-4 -o none/p.%04d.png", &["none"]),
         ("grains.ply cube.obj --clip walk -o p.png", &["--clip"]),
+        ("shot --frame 2 --fps 12 -o p.png", &["--fps", ".gif"]),
+        ("shot first --frames 2 -o p.png", &["first", "frame 2"]),
+        ("first last -o p.gif", &["no frame in common"]),
+        ("first last -o p.png", &["no frame in common"]),
+        ("shot -o shot/grains/grains.0002.vdb", &["grains.0002.vdb", ".png", ".gif"]),
     ];
     for (arguments, words) in refused {
         fails(folder, &format!("preview {arguments}"), 2, words);
@@ -197,9 +221,6 @@ fn what_cannot_be_drawn_is_said_before_anything_is_written() {
     works(folder, "snow shot.toml -o usd -q --frames 1 --set output.objects=[\"usd\"]");
     let said = works(folder, &format!("preview usd -o usd.png {SIZE}"));
     assert!(said.contains("usd/objects: not drawn") && said.contains(".ply"), "{said}");
-    // A picture over a file that it is drawn from.
-    fs::copy(folder.join("cube.obj"), folder.join("cube.0002.obj")).unwrap();
-    fails(folder, "preview cube.%04d.obj --frames 2 -o cube.%04d.obj", 2, &["cube.0002.obj", "input"]);
     let left: Vec<_> = fs::read_dir(folder).unwrap().map(|entry| entry.unwrap().file_name()).collect();
     let left: Vec<_> =
         left.iter().filter_map(|name| name.to_str()).filter(|name| name.starts_with("p.")).collect();
