@@ -10,6 +10,8 @@ mod births;
 mod bytes;
 #[path = "gates/cancel.rs"]
 mod cancel;
+#[path = "gates/cancel_latency.rs"]
+mod cancel_latency;
 #[path = "gates/capi.rs"]
 mod capi;
 #[path = "gates/collisions.rs"]
@@ -48,6 +50,8 @@ mod house;
 mod materials;
 #[path = "gates/mist.rs"]
 mod mist;
+#[path = "gates/mist_cancel.rs"]
+mod mist_cancel;
 #[path = "gates/mist_passes.rs"]
 mod mist_passes;
 #[path = "gates/mist_walls.rs"]
@@ -113,6 +117,7 @@ fn main() {
     mist::run(&mut h);
     mist_walls::run(&mut h);
     mist_passes::run(&mut h);
+    mist_cancel::run(&mut h);
     shot::run(&mut h);
     volumes::run(&mut h);
     capi::run(&mut h);

@@ -1,7 +1,6 @@
 //! Gate of grains that are cancelled through C: the time until their step returns, and that it left all as it was.
 
 use std::ptr::{null, null_mut};
-use std::time::{Duration, Instant};
 
 use frazil::capi::context::*;
 use frazil::capi::grains::*;
@@ -12,11 +11,10 @@ use frazil::capi::pool::*;
 use frazil::capi::{frz_status, frz_view};
 
 use crate::cancel::{view, works};
+use crate::cancel_latency::{Steps, measure};
 use crate::grains::{FRAME, Random};
-use crate::harness::{Harness, median, timed};
+use crate::harness::Harness;
 
-/// Cancels that are measured.
-const CANCELS: usize = 200;
 /// Length (s) and sub-steps of a step: a part of a frame, as a whole one would take minutes to cancel so often.
 const STEP: (f64, u32) = (FRAME / 3.0, 5);
 /// Grains along each axis of the block that collapses: 200,000 of them.
@@ -52,6 +50,12 @@ impl Host {
         }
         host
     }
+}
+
+impl Steps for Host {
+    fn context(&self) -> *mut frz_context {
+        self.ctx
+    }
 
     fn step(&self) -> frz_status {
         // SAFETY: the pointers are valid.
@@ -68,24 +72,6 @@ impl Host {
             out.truncate(size);
             out
         }
-    }
-
-    /// Seconds from a cancel after `moment` to the return of the step; none when the step ended first.
-    fn cancelled(&self, moment: Duration) -> Option<f64> {
-        let ctx = self.ctx as usize;
-        let canceller = std::thread::spawn(move || {
-            std::thread::sleep(moment);
-            let now = Instant::now();
-            // SAFETY: the context outlives this thread, which is joined.
-            unsafe { frz_context_cancel(ctx as *mut frz_context) };
-            now
-        });
-        let status = self.step();
-        let ended = Instant::now();
-        let asked = canceller.join().expect("the thread");
-        // SAFETY: the context is the host's.
-        unsafe { frz_context_reset(self.ctx) };
-        (status == frz_status::FRZ_CANCELLED).then(|| ended.saturating_duration_since(asked).as_secs_f64())
     }
 }
 
@@ -109,27 +95,5 @@ pub fn run(h: &mut Harness) {
     let host = Host::new(&mut random);
     // Until they lie on each other.
     (0..12).for_each(|_| works(host.step()));
-    let (whole, noisy) = timed(|| works(host.step()));
-    let mut before = host.state();
-    let mut latencies = Vec::new();
-    for attempt in 0..2 * CANCELS {
-        match host.cancelled(Duration::from_secs_f64(whole * random.next())) {
-            Some(latency) => latencies.push(latency),
-            // The step ended first.
-            None => before = host.state(),
-        }
-        assert!(attempt % 50 > 0 || host.state() == before, "a cancel changed the grains");
-        if latencies.len() == CANCELS {
-            break;
-        }
-    }
-    latencies.sort_unstable_by(f64::total_cmp);
-    let (p99, count) = (latencies[latencies.len() * 99 / 100], latencies.len());
-    println!("# the slowest: {:.4?} s", &latencies[count - 5..]);
-    let grains = SIDES.iter().product::<u32>();
-    let note = format!(
-        "{count} cancels of a step of {whole:.2} s of {grains} grains{noisy}; median {:.4} s",
-        median(latencies)
-    );
-    h.gate(name, p99, &note);
+    measure(h, name, &host, &mut random, &format!("{} grains", SIDES.iter().product::<u32>()));
 }

@@ -238,6 +238,8 @@ pub const GATES: &[Gate] = &[
     // A pass of all stages: its files from 1 and 2 threads, at other CPU levels and after kills; mist leaves other stages alone.
     yes("snow.mist.same_bytes"),
     yes("snow.mist.apart"),
+    // From a cancel to the return of a step, through C.
+    gate("snow.mist.cancel_p99", "s", Most(0.2), Most(0.05)),
     // One step of two million cells on two threads, and its memory.
     gate("snow.mist.speed", "s", Most(0.3), Most(0.13)),
     gate("snow.mist.memory", "B", Most(120.0), Most(80.0)),

@@ -100,10 +100,9 @@ fn pocket(h: &mut Harness) {
         let lid = 14.0 - 0.5 * step as f32;
         let boundary = |tiles: &Tiles, cell: f32| Ok(lidded(tiles, cell / CELL as f32, lid));
         let solved = flow.project(&ctx, &boundary, 1.0e-5).expect("a projection");
-        let speeds = flow.velocity().iter().flatten().flatten();
-        fastest = speeds
-            .fold(fastest, |most, speed| if speed.is_finite() { most.max(speed.abs()) } else { f32::NAN });
-        is_solved &= solved.divergence.is_finite() && fastest < 10.0;
+        let is_finite = flow.velocity().iter().flatten().flatten().all(|speed| speed.is_finite());
+        fastest = fastest.max(flow.fastest());
+        is_solved &= is_finite && solved.divergence <= 1.0e-4 * solved.fastest && fastest < 10.0;
         most = most.max(solved.iterations);
         flow.advect(0.01, Default::default());
     }

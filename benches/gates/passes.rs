@@ -47,7 +47,10 @@ pub fn run(h: &mut Harness) {
         let (scene, once, took) = made(REPEATED, "once", 2);
         let (_, alone, _) = made(REPEATED, "alone", 1);
         let killed = folder.path().join("killed");
-        let kills = kill_in_the_middle(&scene, &killed, took);
+        let frames = || std::fs::read_dir(killed.join("grains")).map_or(0, |files| files.count());
+        // Short enough that all of them do not finish the shot.
+        let kills =
+            kill(|threads| pass(&scene, &killed, threads), 0.25 * took, || Some(frames()).filter(|n| *n > 0));
         assert!(pass(&scene, &killed, 2).status().expect("frazil").success());
         let [once, alone, killed] = [once, alone, killed].map(|folder| character::output(&folder));
         let note = format!(
@@ -105,24 +108,21 @@ fn parts(grains: &Points) {
     println!("# places, the tree and the rest of the file: {:.2} bytes a grain", bytes(&bare));
 }
 
-/// Kills a pass again and again while it makes grains; the last frame of grains that each had written.
-fn kill_in_the_middle(scene: &Path, out: &Path, took: f64) -> Vec<usize> {
+/// Kills passes on one and two threads again and again, within a part of the time (s) that a whole one takes, and asks `seen` what
+/// each had written: what it says of those that were running.
+pub fn kill<T>(pass: impl Fn(usize) -> Command, within: f64, seen: impl Fn() -> Option<T>) -> Vec<T> {
     let mut kills = Vec::new();
     for (round, moment) in character::moments(8).into_iter().enumerate() {
         let start = Instant::now();
-        let mut child = pass(scene, out, 1 + round % 2).spawn().expect("frazil");
-        // Short enough that all of them do not finish the shot.
-        let limit = Duration::from_secs_f64(0.1 + 0.25 * took * moment);
+        let mut child = pass(1 + round % 2).spawn().expect("frazil");
+        let limit = Duration::from_secs_f64(0.1 + within * moment);
         while start.elapsed() < limit && child.try_wait().expect("a child").is_none() {
             std::thread::sleep(Duration::from_millis(1));
         }
         let is_running = child.try_wait().expect("a child").is_none();
         child.kill().expect("a kill");
         child.wait().expect("a child");
-        let frames = std::fs::read_dir(out.join("grains")).map_or(0, |files| files.count());
-        if is_running && frames > 0 {
-            kills.push(frames);
-        }
+        kills.extend(seen().filter(|_| is_running));
     }
     kills
 }

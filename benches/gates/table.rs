@@ -1,5 +1,5 @@
 //! Gates of the scenes of the thesis' table 3.1, grains only and whole frames, including writing: mean time of eight frames spread
-//! over each shot. The shot is computed once, so that each of them resumes from the frame before it.
+//! over each shot, by when the reports of a pass were written.
 
 use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
@@ -125,6 +125,7 @@ impl Scene {
         run.args(["--set", &format!("object.1.file={}", object.display())]);
         run.args(["--set", &format!("grains.compression={}", self.compression)]);
         if stage == "mist" {
+            // A key, for the scene to have the table.
             run.args(["--set", "mist.falling=false"]);
         }
         let mut child = run.stderr(Stdio::null()).spawn().expect("frazil");

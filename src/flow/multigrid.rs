@@ -2,8 +2,8 @@
 //! and Teran 2010).
 //!
 //! Cells double from level to level; the open share of a coarse face is the mean of its four fine ones. A coarse cell takes part
-//! if one of its eight does and none is outside, where the pressure is 0. Residuals go down as means, corrections come up by trilinear
-//! interpolation. Beside solids as much of a correction is taken as helps. Each level is smoothed by two weighted
+//! if one of its eight does and none is outside, where the pressure is 0. Residuals go down as means, corrections come up by
+//! trilinear interpolation. Beside solids as much of a correction is taken as helps. Each level is smoothed by two weighted
 //! Jacobi sweeps before and after, with Chebyshev's weights for the upper half of the frequencies: unlike Gauss and Seidel's,
 //! these do not depend on any order, so that mirrored fields have mirrored results.
 

@@ -15,8 +15,8 @@ pub struct Kept {
     around: Option<Box<Kept>>,
 }
 
-/// Farthest coordinate of a tile.
-const FARTHEST: i32 = 1 << 26;
+/// Greatest coordinate of a tile, either way.
+const OUTERMOST: i32 = 1 << 26;
 /// Bytes of a tile of one field.
 const TILE: usize = 4 * 512;
 
@@ -79,7 +79,9 @@ impl Flow {
     fn read(&self, from: &mut Reader<'_>) -> Result<Kept> {
         let count = from.count(12)?;
         let coords: Vec<Coord> = (0..count).map(|_| from.i32s()).collect::<Result<_>>()?;
-        if !coords.is_sorted_by(|a, b| a < b) || coords.iter().flatten().any(|at| at.abs() > FARTHEST) {
+        if !coords.is_sorted_by(|a, b| a < b)
+            || coords.iter().flatten().any(|at| !(-OUTERMOST..=OUTERMOST).contains(at))
+        {
             return Err(Error::Bytes("has tiles out of order, or too far from the origin".into()));
         }
         // All fields of active tiles must be there before memory for them is taken.

@@ -51,15 +51,20 @@ impl Flow {
             })
             .collect();
         for (axis, field) in velocity.iter_mut().enumerate() {
-            field.par_iter_mut().take(tiles.active()).enumerate().for_each(|(slot, faces)| {
-                let below = near[slot][FACES[2 * axis]] as usize;
+            // The rim has the upper faces of the last active cells.
+            field.par_iter_mut().enumerate().for_each(|(slot, faces)| {
+                let (own, below) = (pushes.get(slot), pushes.get(near[slot][FACES[2 * axis]] as usize));
+                if own.is_none() && below.is_none() {
+                    return;
+                }
+                let read = |push: Option<&[Tile; 3]>, cell: usize| push.map_or(0.0, |push| push[axis][cell]);
                 let step = 64 >> (3 * axis);
                 for (cell, face) in faces.iter_mut().enumerate() {
                     let lower = match cell / step % 8 {
-                        0 => pushes.get(below).map_or(0.0, |push| push[axis][cell + 7 * step]),
-                        _ => pushes[slot][axis][cell - step],
+                        0 => read(below, cell + 7 * step),
+                        _ => read(own, cell - step),
                     };
-                    *face += 0.5 * (lower + pushes[slot][axis][cell]);
+                    *face += 0.5 * (lower + read(own, cell));
                 }
             });
         }

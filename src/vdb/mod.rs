@@ -27,6 +27,9 @@ pub use vectors::{AnyGrid, GridRef, VectorEdit, VectorGrid, VectorLeaf, VectorPr
 use crate::context::{Context, Running};
 use crate::error::Error;
 
+/// Metadata of a fog volume: the density (1/m) that a value of 1 stands for, which its values do not contain.
+pub const DENSITY_SCALE_KEY: &str = "frazil:density_scale";
+
 fn fail(error: cxx::Exception) -> Error {
     refusal::error_of(error.what())
 }

@@ -11,7 +11,6 @@ use crate::io::manifest::{Keeps, Manifest, Written};
 use crate::io::sealed;
 
 /// The frames of a stage that a folder holds.
-#[derive(Clone)]
 pub struct Stored {
     folder: PathBuf,
     stage: String,
@@ -179,7 +178,22 @@ impl Stored {
     /// # Errors
     /// A frame that is not there or has none; a file that is not what was written.
     pub fn file(&self, frame: i32, kind: &str) -> Result<PathBuf> {
-        let written = self.done.get(&frame).and_then(|manifest| manifest.files_of(kind).next());
+        self.find(frame, kind, |_| true)
+    }
+
+    /// A frame's file of a kind with an extension; its content was compared.
+    ///
+    /// # Errors
+    /// As [`Stored::file`].
+    pub fn file_with(&self, frame: i32, kind: &str, extension: &str) -> Result<PathBuf> {
+        self.find(frame, kind, |written| {
+            Path::new(&written.path).extension().is_some_and(|is| is == extension)
+        })
+    }
+
+    fn find(&self, frame: i32, kind: &str, is_it: impl Fn(&Written) -> bool) -> Result<PathBuf> {
+        let manifest = self.done.get(&frame);
+        let written = manifest.and_then(|manifest| manifest.files_of(kind).find(|written| is_it(written)));
         let missing = || Error::file(&self.folder, format!("frame {frame} has no file in {kind}/"));
         self.compared(written.ok_or_else(missing)?)
     }

@@ -313,6 +313,7 @@ impl RebuildGrains {
     pub fn stored(&self) -> &Stored {
         &self.stored
     }
+
     /// The bytes of a frame's file as `grains_mode = "full"` writes it, except for the hash of the settings in its metadata.
     /// Frames in ascending order cost one file each.
     ///

@@ -280,7 +280,7 @@ impl Stepping for Mist<'_> {
         if to.frame == self.scene.shot.frames.last && report.sources == 0 && report.mass == 0.0 {
             let speed = state.mist.params().from_speed;
             log::warn!(
-                "frame {}: no mist: no grain rises faster than mist.from_speed = {speed} m/s",
+                "frame {}: no mist is left: grains raise it while they are faster than mist.from_speed = {speed} m/s",
                 to.frame
             );
         }

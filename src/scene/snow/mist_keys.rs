@@ -4,14 +4,11 @@ use super::has_grains;
 use crate::error::{Error, Result};
 use crate::scene::text::key::{Key, Kind, Scope};
 use crate::scene::text::{Table, Values};
-use crate::snow::mist::Params;
+use crate::snow::mist::{FASTEST_WIND, Params};
 
 type Scopes = &'static [(&'static str, Scope)];
 const FIRST: Scopes = &[("mist", Scope::First)];
 const STEP: Scopes = &[("mist", Scope::Step)];
-
-/// Fastest wind (m/s).
-const FASTEST: f64 = 1000.0;
 
 /// All of them.
 pub const MIST_KEYS: &[Key] = &[
@@ -41,7 +38,7 @@ pub const MIST_KEYS: &[Key] = &[
     Key::new(
         "mist",
         "wind",
-        Kind::NumbersOrFile(3, FASTEST, "m/s", &["vdb"]),
+        Kind::NumbersOrFile(3, FASTEST_WIND, "m/s", &["vdb"]),
         "velocity of the air (m/s), or a grid of velocities, by which the air is carried along where there is mist",
     )
     .or("[0.0, 0.0, 0.0]")

@@ -3,7 +3,7 @@
 use rayon::prelude::*;
 
 use crate::base::DVec3;
-use crate::flow::{Coord, Flow};
+use crate::flow::{Coord, Flow, tiles::FACES};
 
 /// Cells between two places.
 const SPACING: usize = 4;
@@ -21,27 +21,38 @@ pub fn places(tile: Coord, cell: f64) -> [DVec3; PLACES] {
     })
 }
 
-/// Changes the velocity (m/s) at the lower faces of active tiles: `change(old, value)` of the vectors at their places, interpolated
-/// linearly.
+/// Changes the velocity (m/s) at all faces of active cells: `change(old, value)` of the vectors at the places of their tiles,
+/// interpolated linearly.
 pub fn change(flow: &mut Flow, values: &[[[f32; 3]; PLACES]], change: impl Fn(f32, f32) -> f32 + Sync) {
-    let (_, velocity, _) = flow.fields();
+    let (tiles, velocity, _) = flow.fields();
     for (axis, field) in velocity.iter_mut().enumerate() {
-        field.par_iter_mut().zip(values).with_min_len(8).for_each(|(faces, values)| {
+        field.par_iter_mut().enumerate().with_min_len(8).for_each(|(slot, faces)| {
+            let below = tiles.neighbours()[slot][FACES[2 * axis]] as usize;
             for (cell, face) in faces.iter_mut().enumerate() {
-                *face = change(*face, at_face(values, axis, cell));
+                let mut at = [cell >> 6, cell >> 3 & 7, cell & 7];
+                // The first faces of the rim are the upper ones of the tile below.
+                let values = match values.get(slot) {
+                    None if at[axis] == 0 => {
+                        at[axis] = 8;
+                        values.get(below)
+                    }
+                    own => own,
+                };
+                if let Some(values) = values {
+                    *face = change(*face, at_face(values, axis, at));
+                }
             }
         });
     }
 }
 
-/// The component on an axis at a cell's lower face on it.
-fn at_face(values: &[[f32; 3]; PLACES], axis: usize, cell: usize) -> f32 {
-    let at = [cell >> 6, cell >> 3 & 7, cell & 7];
+/// The component on an axis at the lower face on it of a cell of a tile, 8 along that axis for the upper faces of the last ones.
+fn at_face(values: &[[f32; 3]; PLACES], axis: usize, at: [usize; 3]) -> f32 {
     let (mut low, mut share) = ([0; 3], [0.0f32; 3]);
     for along in 0..3 {
         let half = if along == axis { 0.0 } else { 0.5 };
-        low[along] = at[along] / SPACING;
-        share[along] = ((at[along] % SPACING) as f32 + half) / SPACING as f32;
+        low[along] = (at[along] / SPACING).min(EDGE - 2);
+        share[along] = ((at[along] - low[along] * SPACING) as f32 + half) / SPACING as f32;
     }
     let mut sum = 0.0;
     for corner in 0..8 {
@@ -60,16 +71,16 @@ mod tests {
 
     #[test]
     fn a_linear_field_is_exact_at_the_faces() {
-        let cell = 0.5;
+        let edge = 0.5;
         let field =
             |place: DVec3| [place.x - 2.0 * place.z, place.y, 3.0 * place.z + place.x].map(|x| x as f32);
         let tile = [2, -1, 0];
-        let values = places(tile, cell).map(field);
-        for (axis, index) in [(0, 0), (1, 0o777), (2, 0o345)] {
-            let mut at = [index >> 6, index >> 3 & 7, index & 7].map(|x| x as f64 + 0.5);
+        let values = places(tile, edge).map(field);
+        for (axis, cell) in [(0, [0, 0, 0]), (1, [7, 7, 7]), (2, [3, 4, 5]), (0, [8, 7, 1])] {
+            let mut at = cell.map(|x| x as f64 + 0.5);
             at[axis] -= 0.5;
-            let place = DVec3::from([0, 1, 2].map(|i| (f64::from(tile[i] * 8) + at[i]) * cell));
-            assert!((at_face(&values, axis, index) - field(place)[axis]).abs() < 1e-4);
+            let place = DVec3::from([0, 1, 2].map(|i| (f64::from(tile[i] * 8) + at[i]) * edge));
+            assert!((at_face(&values, axis, cell) - field(place)[axis]).abs() < 1e-4);
         }
     }
 }

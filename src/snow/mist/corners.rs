@@ -82,12 +82,14 @@ impl<'a> Grid<'a> {
         let edge = 8.0 * lattice.parts as f64 * scale;
         let bounds = tiles.iter().map(|tile| {
             let low = tile.map(|at| (f64::from(at) * edge).floor() as i32);
-            let high = tile.map(|at| (f64::from(at + 1) * edge).ceil() as i32 + 1);
+            let high = tile.map(|at| (f64::from(at + 1) * edge).ceil() as i32).map(|at| at.saturating_add(1));
             [low, high]
         });
         // Beside the level set, and above it, nothing is solid; below it, what it encloses ends.
         let is_near = |[least, most]: &[[i32; 3]; 2]| {
-            (0..3).all(|axis| least[axis] <= high[axis] + 1 && most[axis] >= low[axis] - 1)
+            (0..3).all(|axis| {
+                least[axis] <= high[axis].saturating_add(1) && most[axis] >= low[axis].saturating_sub(1)
+            })
         };
         let bounds: Vec<Option<[[i32; 3]; 2]>> = bounds.map(|bounds| Some(bounds).filter(is_near)).collect();
         let mut all = if edge > WIDEST {

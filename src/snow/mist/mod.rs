@@ -30,7 +30,7 @@ use sources::Seed;
 
 #[cfg(feature = "vdb")]
 pub use grids::Grids;
-pub use params::Params;
+pub use params::{FASTEST_WIND, Params};
 pub use sources::Source;
 #[cfg(feature = "vdb")]
 pub use surroundings::{Surroundings, Walls};
@@ -233,7 +233,8 @@ impl Mist {
     /// Into how many parts a time (s) is divided for a speed (m/s).
     fn parts(&self, speed: f64, dt: f64) -> Result<usize> {
         let count = (speed * dt / (f64::from(FARTHEST) * self.params.cell)).ceil();
-        if count > MOST as f64 {
+        // Not the other way round, which a speed that is no number would pass.
+        if !(count <= MOST as f64) {
             return Err(Error::argument(format!(
                 "mist moves at {speed:.0} m/s, more than {MOST} steps of {FARTHEST} cells of {} m in {dt:.4} s",
                 self.params.cell
@@ -244,8 +245,8 @@ impl Mist {
 
     /// Puts the mist that grains raise along a part, two shares 0..=1, of their way in a step of `dt` (s) into the air.
     fn raise(&mut self, ctx: &Context, sources: &[Source], dt: f64, shares: [f64; 2]) -> Result<()> {
-        let ways = sources::ways(sources, &self.params, dt, shares);
-        let seeds = sources::seeds(&ways, &self.params);
+        let ways = sources::ways(sources, dt, shares);
+        let seeds = sources::seeds(ctx, &ways, &self.params)?;
         let wanted = self.wanted(&seeds);
         let what = format!("mist of {} cells of {} m", 512 * wanted.len(), self.params.cell);
         ctx.allow(&what, memory(wanted.len()))?;
@@ -284,7 +285,7 @@ impl Mist {
     pub fn mass(&self) -> f64 {
         let of_tile = |tile: &crate::flow::Tile| tile.iter().map(|value| f64::from(*value)).sum::<f64>();
         let sums: Vec<f64> = self.flow.density().par_iter().map(of_tile).collect();
-        sums.iter().sum::<f64>() * self.params.cell.powi(3)
+        (sums.iter().sum::<f64>() + 0.0) * self.params.cell.powi(3)
     }
 
     /// The tiles that hold mist or will get some, with padding.

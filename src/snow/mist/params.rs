@@ -4,6 +4,9 @@ use std::ops::RangeInclusive;
 
 use crate::error::{Error, Result};
 
+/// Fastest wind (m/s) along an axis.
+pub const FASTEST_WIND: f64 = 1000.0;
+
 /// Parameters of mist (thesis section 3.4).
 #[derive(Debug, Clone, PartialEq)]
 pub struct Params {
@@ -77,7 +80,7 @@ impl Params {
             return Err(Error::argument(format!("half_life = {} is not over 0", self.half_life)));
         }
         for wind in self.wind {
-            within("wind", wind, -1000.0..=1000.0)?;
+            within("wind", wind, -FASTEST_WIND..=FASTEST_WIND)?;
         }
         within("turbulence", self.turbulence, 0.0..=1000.0)?;
         within("turbulence_size", self.turbulence_size, 8.0 * self.cell..=1.0e6 * self.cell)?;

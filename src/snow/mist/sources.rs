@@ -4,6 +4,7 @@ use rayon::prelude::*;
 
 use super::Params;
 use crate::base::DVec3;
+use crate::context::Context;
 use crate::error::{Error, Result};
 use crate::flow::{Coord, Tile};
 
@@ -66,15 +67,14 @@ pub struct Seed {
     pub velocity: Box<[Tile; 3]>,
 }
 
-/// The ways (m) of the grains that raise mist, in the part of a step of `dt` (s) between two shares 0..=1 of it.
-pub fn ways(sources: &[Source], params: &Params, dt: f64, part: [f64; 2]) -> Vec<Way> {
-    let raising = sources.iter().filter(|source| source.raises(params));
+/// The ways (m) of grains that raise mist, in the part of a step of `dt` (s) between two shares 0..=1 of it.
+pub fn ways(sources: &[Source], dt: f64, part: [f64; 2]) -> Vec<Way> {
     let way = |source: &Source| {
         let velocity = DVec3::from(source.velocity.map(f64::from));
         let ends = part.map(|share| source.place - velocity * (dt * (1.0 - share)));
         Way { ends, velocity: source.velocity, radius: source.radius }
     };
-    raising.map(way).collect()
+    sources.iter().map(way).collect()
 }
 
 /// The way of a grain.
@@ -87,7 +87,16 @@ pub struct Way {
 }
 
 /// The new mist along ways, by tile, sorted.
-pub fn seeds(ways: &[Way], params: &Params) -> Vec<Seed> {
+///
+/// # Errors
+/// More memory than the context allows.
+pub fn seeds(ctx: &Context, ways: &[Way], params: &Params) -> Result<Vec<Seed>> {
+    const WHAT: &str = "new mist";
+    let boxed = |way: &Way| {
+        let [low, high] = box_of(way, params.cell);
+        (0..3).map(|axis| u64::from(high[axis].abs_diff(low[axis])) + 1).product::<u64>()
+    };
+    ctx.allow(WHAT, ways.iter().map(boxed).sum::<u64>().saturating_mul(size_of::<(Coord, u32)>() as u64))?;
     let mut touched: Vec<(Coord, u32)> = ways
         .par_iter()
         .enumerate()
@@ -97,15 +106,24 @@ pub fn seeds(ways: &[Way], params: &Params) -> Vec<Seed> {
         .collect();
     touched.par_sort_unstable();
     let groups: Vec<&[(Coord, u32)]> = touched.chunk_by(|a, b| a.0 == b.0).collect();
-    groups.into_par_iter().map(|group| seed(group, ways, params)).collect()
+    ctx.allow(WHAT, groups.len() as u64 * SEED_BYTES)?;
+    Ok(groups.into_par_iter().map(|group| seed(group, ways, params)).collect())
+}
+
+/// Bytes of a seed.
+const SEED_BYTES: u64 = 4 * size_of::<Tile>() as u64;
+
+/// Least and greatest tile of the box around a way's tube.
+fn box_of(way: &Way, cell: f64) -> [Coord; 2] {
+    let [from, to] = way.ends;
+    let reach = DVec3::repeat(2.0 * way.radius + cell);
+    let tile = |place: DVec3| [0, 1, 2].map(|axis| (place[axis] / (8.0 * cell)).floor() as i32);
+    [tile(from.inf(&to) - reach), tile(from.sup(&to) + reach)]
 }
 
 /// Coordinates of the tiles that a way's tube may touch.
 fn tiles_of(way: &Way, cell: f64) -> Vec<Coord> {
-    let [from, to] = way.ends;
-    let reach = DVec3::repeat(2.0 * way.radius + cell);
-    let tile = |place: DVec3| [0, 1, 2].map(|axis| (place[axis] / (8.0 * cell)).floor() as i32);
-    let (low, high) = (tile(from.inf(&to) - reach), tile(from.sup(&to) + reach));
+    let ([from, to], [low, high]) = (way.ends, box_of(way, cell));
     let mut out = Vec::new();
     for x in low[0]..=high[0] {
         for y in low[1]..=high[1] {

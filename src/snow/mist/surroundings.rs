@@ -21,8 +21,8 @@ use crate::vdb::FloatGrid;
 
 /// What mist flows around in a step.
 pub struct Surroundings<'a> {
-    /// The base layer at the beginning of the step. That at its end has room for objects on their whole way: air would be pressed
-    /// out of it through gaps that are not there.
+    /// The base layer at the beginning of the step. That at its end has room for objects on their whole way: air would be
+    /// pressed out of it through gaps that are not there.
     pub base: Option<&'a FloatGrid>,
     /// Objects, moving or not.
     pub bodies: &'a [&'a Body],
@@ -39,10 +39,19 @@ pub struct Walls<'a> {
     dt: f64,
     /// Edge of the finest cells (m).
     cell: f64,
-    /// The last moment that was asked for: finer and wider cells ask for the same one.
-    moment: Mutex<Option<Moment>>,
-    /// Faces of tiles that no moving object comes near in the step, by the cells' edge (m, its bits) and the tile; none: all are open.
-    still: Mutex<HashMap<(u64, Coord), Option<Faces>>>,
+    held: Mutex<Held>,
+}
+
+/// What was computed in a step and is asked for again.
+#[derive(Default)]
+struct Held {
+    /// Objects that stand still.
+    fixed: Option<Moment>,
+    /// Moving ones at the last moment that was asked for: finer and wider cells ask for the same one.
+    moving: Option<Moment>,
+    /// Faces of tiles that no moving object comes near in the step, by the cells' edge (m, its bits) and the tile; none: all
+    /// are open.
+    faces: HashMap<(u64, Coord), Option<Faces>>,
 }
 
 /// Objects at a moment.
@@ -53,6 +62,7 @@ struct Moment {
     near: Vec<usize>,
     /// Level set of those that have an inside.
     solid: Option<FloatGrid>,
+    /// The others, and moving ones.
     surfaces: Vec<Surface>,
 }
 
@@ -90,15 +100,7 @@ impl<'a> Surroundings<'a> {
     /// A pose that cannot be computed.
     pub fn during(&'a self, [from, to]: [f64; 2], cell: f64) -> Result<Walls<'a>> {
         let bodies = self.bodies.iter().map(|body| Moving::new(body, from, to)).collect::<Result<_>>()?;
-        Ok(Walls {
-            around: self,
-            bodies,
-            from,
-            dt: to - from,
-            cell,
-            moment: Mutex::default(),
-            still: Mutex::default(),
-        })
+        Ok(Walls { around: self, bodies, from, dt: to - from, cell, held: Mutex::default() })
     }
 }
 
@@ -143,42 +145,44 @@ impl Walls<'_> {
             return Ok(Solids::none(tiles));
         }
         let lattice = Lattice { cell, parts: self.parts() };
+        let mut held = self.held.lock().unwrap_or_else(PoisonError::into_inner);
+        let Held { fixed, moving, faces: known } = &mut *held;
+        let key = |tile: &Coord| (cell.to_bits(), *tile);
+        let slots = (0..tiles.count()).filter(|slot| !known.contains_key(&key(&tiles.coords()[*slot])));
+        let slots: Vec<usize> = slots.collect();
+        let unknown: Vec<Coord> = slots.iter().map(|slot| tiles.coords()[*slot]).collect();
         let bounds = lattice.bounds(tiles.coords());
-        let near = |body: &usize| self.bodies[*body].is_near(&bounds, NEAR * cell);
-        let near: Vec<usize> = (0..self.bodies.len()).filter(near).collect();
-        let mut held = self.moment.lock().unwrap_or_else(PoisonError::into_inner);
-        let is_held =
-            |moment: &Moment| moment.share == share && near.iter().all(|body| moment.near.contains(body));
-        let moment = match held.take().filter(is_held) {
-            Some(moment) => held.insert(moment),
-            None => held.insert(self.moment(ctx, near, share)?),
-        };
-        let base = Grid::new(ctx, self.around.base, tiles.coords(), &lattice)?;
-        let solid = Grid::new(ctx, moment.solid.as_ref(), tiles.coords(), &lattice)?;
-        let (bodies, surfaces) = (&self.bodies, &moment.surfaces);
+        let is_near = |body: &Moving<'_>| body.is_near(&bounds, NEAR * cell);
+        let fixed = self.at(ctx, fixed, 1.0, |body| body.speed == 0.0 && is_near(body))?;
+        let moving = self.at(ctx, moving, share, |body| body.speed > 0.0 && is_near(body))?;
+        let grid = |grid| Grid::new(ctx, grid, &unknown, &lattice);
         // A level set whose band is narrower does not show what lies that deep.
-        let band = moment.solid.as_ref().map_or(0.0, |grid| f64::from(grid.background()));
-        let deepest = if NEAR * cell < 0.999 * band { -NEAR * cell } else { f64::NEG_INFINITY };
-        let around = Around { lattice, floor: self.around.floor, base, solid, bodies, surfaces, deepest };
-        let mut still = self.still.lock().unwrap_or_else(PoisonError::into_inner);
-        let known = |tile: Coord| still.get(&(cell.to_bits(), tile)).cloned();
-        let all = tiles.coords().par_iter().enumerate().with_min_len(4).map(|(slot, tile)| {
+        let band = moving.solid.as_ref().map_or(0.0, |grid| f64::from(grid.background()));
+        let around = Around {
+            lattice,
+            floor: self.around.floor,
+            still: [grid(self.around.base)?, grid(fixed.solid.as_ref())?],
+            moving: grid(moving.solid.as_ref())?,
+            bodies: &self.bodies,
+            surfaces: [&fixed.surfaces, &moving.surfaces],
+            deepest: if NEAR * cell < 0.999 * band { -NEAR * cell } else { f64::NEG_INFINITY },
+        };
+        let made = unknown.par_iter().enumerate().with_min_len(4).map(|(index, tile)| {
             ctx.check()?;
-            if let Some(faces) = known(*tile) {
-                return Ok((faces, false));
-            }
+            Ok(around.faces(index, *tile))
+        });
+        let made: Vec<Option<Faces>> = made.collect::<Result<_>>()?;
+        let mut out = Vec::new();
+        for ((slot, tile), faces) in slots.into_iter().zip(&unknown).zip(made) {
             let bounds = lattice.bounds(&[*tile]);
             let moves = |body: &Moving<'_>| body.speed > 0.0 && body.is_near(&bounds, NEAR * cell);
-            Ok((around.faces(slot, *tile), !self.bodies.iter().any(moves)))
-        });
-        let all: Vec<(Option<Faces>, bool)> = all.collect::<Result<_>>()?;
-        let mut out = Vec::new();
-        for (slot, (faces, stays)) in all.into_iter().enumerate() {
-            if stays {
-                still.insert((cell.to_bits(), tiles.coords()[slot]), faces.clone());
+            match self.bodies.iter().any(moves) {
+                true => out.extend(faces.map(|faces| (slot as u32, faces))),
+                false => drop(known.insert(key(tile), faces)),
             }
-            out.extend(faces.map(|faces| (slot as u32, faces)));
         }
+        let stay = |(slot, tile): (usize, &Coord)| Some((slot as u32, known.get(&key(tile))?.clone()?));
+        out.extend(tiles.coords().iter().enumerate().filter_map(stay));
         Ok(Solids::new(tiles, out))
     }
 
@@ -201,11 +205,28 @@ impl Walls<'_> {
         (1..PARTS).find(|parts| self.cell / *parts as f64 <= most).unwrap_or(PARTS)
     }
 
-    /// Some of the objects at a share 0..=1 of the step.
-    fn moment(&self, ctx: &Context, near: Vec<usize>, share: f64) -> Result<Moment> {
-        let solid = self.solid(ctx, &near, share)?;
-        let surfaces = near.iter().map(|body| self.surface(*body, share)).collect::<Result<_>>()?;
-        Ok(Moment { share, near, solid, surfaces })
+    /// The objects that are wanted, at a share 0..=1 of the step: those that are held if they are these.
+    fn at<'h>(
+        &self,
+        ctx: &Context,
+        held: &'h mut Option<Moment>,
+        share: f64,
+        is_wanted: impl Fn(&Moving<'_>) -> bool,
+    ) -> Result<&'h Moment> {
+        let near: Vec<usize> = (0..self.bodies.len()).filter(|body| is_wanted(&self.bodies[*body])).collect();
+        let has_all = |moment: &Moment| near.iter().all(|body| moment.near.contains(body));
+        let moment = match held.take().filter(|moment| moment.share == share && has_all(moment)) {
+            Some(moment) => moment,
+            None => {
+                let solid = self.solid(ctx, &near, share)?;
+                let has_surface =
+                    |body: &&usize| self.bodies[**body].is_sheet || self.bodies[**body].speed > 0.0;
+                let surfaces = near.iter().filter(has_surface).map(|body| self.surface(*body, share));
+                let surfaces = surfaces.collect::<Result<_>>()?;
+                Moment { share, near, solid, surfaces }
+            }
+        };
+        Ok(held.insert(moment))
     }
 
     fn time(&self, body: &Moving<'_>, share: f64) -> f64 {
@@ -238,7 +259,7 @@ impl Walls<'_> {
         let mut shell = Shell::new(0.0, body.triangles.clone(), false, now);
         shell.follow(&before);
         let passed = self.dt * (share - earlier);
-        let rate = if body.speed > 0.0 && passed > 0.0 { -1.0 / passed } else { 0.0 };
+        let rate = if passed > 0.0 { -1.0 / passed } else { 0.0 };
         Ok(Surface { body: index, shell, rate })
     }
 }
@@ -256,10 +277,13 @@ struct Surface {
 struct Around<'a> {
     lattice: Lattice,
     floor: Option<f64>,
-    base: Option<Grid<'a>>,
-    solid: Option<Grid<'a>>,
+    /// The base layer, and objects that stand still.
+    still: [Option<Grid<'a>>; 2],
+    /// Moving objects.
+    moving: Option<Grid<'a>>,
     bodies: &'a [Moving<'a>],
-    surfaces: &'a [Surface],
+    /// Of objects that stand still, and of moving ones.
+    surfaces: [&'a [Surface]; 2],
     /// Signed distance (m) below which the velocity of what covers a face does not matter.
     deepest: f64,
 }
@@ -287,20 +311,24 @@ impl Corners {
 }
 
 impl Around<'_> {
-    /// The faces of a tile; none: all are open.
-    fn faces(&self, slot: usize, tile: Coord) -> Option<Faces> {
+    /// The faces of a tile, `index` among those of the grids; none: all are open.
+    fn faces(&self, index: usize, tile: Coord) -> Option<Faces> {
         let bounds = self.lattice.bounds(&[tile]);
         let is_sheet = |surface: &&Surface| {
             let body = &self.bodies[surface.body];
             body.is_sheet && body.is_near(&bounds, SHEET * self.lattice.cell)
         };
-        let sheets: Vec<&Surface> = self.surfaces.iter().filter(is_sheet).collect();
-        let has = |grid: &Option<Grid<'_>>| grid.as_ref().is_some_and(|grid| grid.is_near(slot));
+        let sheets: [Vec<&Surface>; 2] =
+            self.surfaces.map(|surfaces| surfaces.iter().filter(is_sheet).collect());
+        let mut grids = self.still.iter().chain([&self.moving]).flatten();
         let is_low = self.floor.is_some_and(|floor| bounds[0].y < floor);
-        if !(is_low || has(&self.base) || has(&self.solid) || !sheets.is_empty()) {
+        if !(is_low
+            || grids.any(|grid| grid.is_near(index))
+            || sheets.iter().any(|sheets| !sheets.is_empty()))
+        {
             return None;
         }
-        let corners = self.corners(slot, tile, &sheets);
+        let corners = self.corners(index, tile, &sheets);
         if corners.distances.iter().flatten().all(|distance| *distance >= 0.0) {
             return None;
         }
@@ -318,31 +346,28 @@ impl Around<'_> {
         Some(faces)
     }
 
-    fn corners(&self, slot: usize, tile: Coord, sheets: &[&Surface]) -> Corners {
+    fn corners(&self, index: usize, tile: Coord, sheets: &[Vec<&Surface>; 2]) -> Corners {
         let count = self.lattice.corners();
         let far = (NEAR * self.lattice.cell) as f32;
         let half = SHEET * self.lattice.cell;
         let mut distances = [Vec::with_capacity(count.pow(3)), Vec::with_capacity(count.pow(3))];
-        for index in 0..count.pow(3) {
-            let at = [index / (count * count), index / count % count, index % count];
-            // Level sets are sampled in their own cells: the corner's index keeps what is exact so.
+        for corner in 0..count.pow(3) {
+            let at = [corner / (count * count), corner / count % count, corner % count];
             let place = self.lattice.place(tile, at);
-            let corner = DVec3::from(
+            // Level sets are sampled in their own cells: the corner's number keeps what is exact so.
+            let number = DVec3::from(
                 [0, 1, 2].map(|axis| f64::from(tile[axis] * 8 * self.lattice.parts as i32 + at[axis] as i32)),
             );
-            let of = |grid: &Option<Grid<'_>>| grid.as_ref().and_then(|grid| grid.at(slot, index, corner));
+            let of = |grid: &Grid<'_>| grid.at(index, corner, number);
             let floor = self.floor.map(|floor| (place.y - floor) as f32);
-            let mut still = [of(&self.base), floor].into_iter().flatten().fold(far, f32::min);
-            let mut moving = of(&self.solid).unwrap_or(far).min(far);
-            for sheet in sheets {
-                if let Some(near) = sheet.shell.nearest(place, half) {
-                    let distance = (near.square.sqrt() - half) as f32;
-                    let nearest = if self.bodies[sheet.body].speed > 0.0 { &mut moving } else { &mut still };
-                    *nearest = nearest.min(distance);
-                }
+            let still = self.still.iter().flatten().filter_map(of).chain(floor);
+            let moving = self.moving.iter().filter_map(of);
+            let solids = [still.fold(far, f32::min), moving.fold(far, f32::min)];
+            for side in 0..2 {
+                let near = sheets[side].iter().filter_map(|sheet| sheet.shell.nearest(place, half));
+                let nearest = near.map(|near| (near.square.sqrt() - half) as f32);
+                distances[side].push(nearest.fold(solids[side], f32::min));
             }
-            distances[0].push(still);
-            distances[1].push(moving);
         }
         Corners { count, distances }
     }
@@ -379,7 +404,7 @@ impl Around<'_> {
         let half = 0.5 * self.lattice.cell;
         let mut place = self.lattice.place(tile, cell.map(|x| x * parts)).add_scalar(half);
         place[axis] -= half;
-        let near = self.surfaces.iter().filter(|shell| shell.rate != 0.0).filter_map(|shell| {
+        let near = self.surfaces[1].iter().filter_map(|shell| {
             let found = shell.shell.nearest(place, NEAR * self.lattice.cell)?;
             Some((found.square, found.motion[axis] * shell.rate))
         });

@@ -1,6 +1,7 @@
 //! Wind that differs from place to place.
 
 use super::coarse;
+use super::params::FASTEST_WIND;
 use crate::base::DVec3;
 use crate::context::Context;
 use crate::error::{Error, Result};
@@ -20,15 +21,18 @@ impl Wind<'_> {
     /// The air takes the wind's velocity on, for `dt` (s).
     ///
     /// # Errors
-    /// A velocity that is not finite; those of the sampler.
+    /// A velocity that is not finite or over [`FASTEST_WIND`]; those of the sampler.
     pub fn blow(&self, ctx: &Context, flow: &mut Flow, dt: f64) -> Result<()> {
         let cell = f64::from(flow.cell());
         let tiles = &flow.tiles().coords()[..flow.tiles().active()];
         let places: Vec<DVec3> = tiles.iter().flat_map(|tile| coarse::places(*tile, cell)).collect();
         let values = (self.0)(ctx, &places)?;
-        if let Some(at) = values.iter().position(|value| value.iter().any(|speed| !speed.is_finite())) {
+        let is_calm = |value: &[f32; 3]| value.iter().all(|speed| speed.abs() <= FASTEST_WIND as f32);
+        if let Some(at) = values.iter().position(|value| !is_calm(value)) {
             let [x, y, z] = places[at].into();
-            return Err(Error::argument(format!("the wind is not finite at ({x:.3}, {y:.3}, {z:.3}) m")));
+            let what =
+                format!("the wind at ({x:.3}, {y:.3}, {z:.3}) m is not within {FASTEST_WIND} m/s of 0");
+            return Err(Error::argument(what));
         }
         let values: Vec<[[f32; 3]; coarse::PLACES]> = values.as_chunks().0.to_vec();
         let share = 1.0 - libm::exp2(-dt / RESPONSE) as f32;

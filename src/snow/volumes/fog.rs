@@ -9,12 +9,10 @@ use crate::base::DVec3;
 use crate::base::blocks::{Block, BlockEdit, DIM, VOXELS, Values};
 use crate::context::Context;
 use crate::error::{Error, Result};
-use crate::vdb::{FloatGrid, GridClass, Leaf, MetaValue, Tile};
+use crate::vdb::{DENSITY_SCALE_KEY, FloatGrid, GridClass, Leaf, MetaValue, Tile};
 
 /// What the thesis multiplies the density of base and grains by when it renders them (1/m, as renderers take a density).
 pub const DENSITY_SCALE: f32 = 100.0;
-/// Metadata of a grid: the factor, which its values do not contain.
-pub const SCALE_KEY: &str = "frazil:density_scale";
 /// Width of the falloff around a sphere (radii).
 pub const FALLOFF: f64 = 0.5;
 /// Largest voxel of grains (radii).
@@ -94,6 +92,6 @@ fn dense(origin: [i32; 3], values: Box<Values>) -> Option<BlockEdit> {
 fn finished(mut grid: FloatGrid) -> Result<FloatGrid> {
     grid.prune(0.0)?;
     grid.set_class(GridClass::Fog)?;
-    grid.set_metadata(SCALE_KEY, MetaValue::Float(DENSITY_SCALE))?;
+    grid.set_metadata(DENSITY_SCALE_KEY, MetaValue::Float(DENSITY_SCALE))?;
     Ok(grid)
 }

@@ -1,0 +1,66 @@
+//! How long steps take to return after a cancel through C, and that they left all as it was.
+
+use std::time::{Duration, Instant};
+
+use frazil::capi::context::*;
+use frazil::capi::frz_status;
+
+use crate::cancel::works;
+use crate::grains::Random;
+use crate::harness::{Harness, median, timed};
+
+/// Cancels that are measured.
+const CANCELS: usize = 200;
+
+/// Something that a host steps.
+pub trait Steps {
+    /// Its context.
+    fn context(&self) -> *mut frz_context;
+    fn step(&self) -> frz_status;
+    /// All that the next step depends on.
+    fn state(&self) -> Vec<u8>;
+}
+
+/// Gate of the time (s) from a cancel at any moment of a step to its return; `what` is stepped.
+pub fn measure(h: &mut Harness, name: &'static str, host: &impl Steps, random: &mut Random, what: &str) {
+    let (whole, noisy) = timed(|| works(host.step()));
+    let mut before = host.state();
+    let mut latencies = Vec::new();
+    for attempt in 0..2 * CANCELS {
+        match cancelled(host, Duration::from_secs_f64(whole * random.next())) {
+            Some(latency) => latencies.push(latency),
+            // The step ended first.
+            None => before = host.state(),
+        }
+        assert!(attempt % 50 > 0 || host.state() == before, "a cancel changed {what}");
+        if latencies.len() == CANCELS {
+            break;
+        }
+    }
+    latencies.sort_unstable_by(f64::total_cmp);
+    let (p99, count) = (latencies[latencies.len() * 99 / 100], latencies.len());
+    println!("# the slowest: {:.4?} s", &latencies[count - 5..]);
+    let note = format!(
+        "{count} cancels of a step of {whole:.2} s of {what}{noisy}; median {:.4} s",
+        median(latencies)
+    );
+    h.gate(name, p99, &note);
+}
+
+/// Seconds from a cancel after `moment` to the return of the step; none when the step ended first.
+fn cancelled(host: &impl Steps, moment: Duration) -> Option<f64> {
+    let ctx = host.context() as usize;
+    let canceller = std::thread::spawn(move || {
+        std::thread::sleep(moment);
+        let now = Instant::now();
+        // SAFETY: the context outlives this thread, which is joined.
+        unsafe { frz_context_cancel(ctx as *mut frz_context) };
+        now
+    });
+    let status = host.step();
+    let ended = Instant::now();
+    let asked = canceller.join().expect("the thread");
+    // SAFETY: the context is the host's.
+    unsafe { frz_context_reset(host.context()) };
+    (status == frz_status::FRZ_CANCELLED).then(|| ended.saturating_duration_since(asked).as_secs_f64())
+}
