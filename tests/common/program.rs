@@ -65,3 +65,13 @@ pub fn answer_to_sigterm(mut child: Child) -> (Option<i32>, Duration) {
     let _ = child.kill();
     (child.wait().unwrap().code(), took)
 }
+
+/// Starts a run and kills it when a file appears.
+pub fn kill_at(folder: &Path, arguments: &str, file: &str) {
+    let mut child = command(folder, arguments).stderr(std::process::Stdio::null()).spawn().unwrap();
+    while !folder.join(file).exists() && child.try_wait().unwrap().is_none() {
+        std::thread::sleep(std::time::Duration::from_millis(1));
+    }
+    let _ = child.kill();
+    child.wait().unwrap();
+}

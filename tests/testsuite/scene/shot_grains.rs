@@ -2,11 +2,9 @@
 
 use std::fs;
 use std::path::Path;
-use std::process::Stdio;
-use std::time::Duration;
 
 use crate::common::character::output;
-use crate::program::{CUBE, command, fails, works};
+use crate::program::{CUBE, fails, kill_at, works};
 use tempfile::TempDir;
 
 /// A folder with a cube that slides through snow; `grains` and `output` stand in the scene's tables.
@@ -36,13 +34,7 @@ fn a_killed_run_resumes_to_the_same_grains() {
         let at = folder.path();
         works(at, "snow shot.toml -o once -q");
         for frame in [3, 6] {
-            let mut child = command(at, "snow shot.toml -o killed").stderr(Stdio::null()).spawn().unwrap();
-            let record = at.join(format!("killed/state/grains.{frame:04}.json"));
-            while !record.exists() && child.try_wait().unwrap().is_none() {
-                std::thread::sleep(Duration::from_millis(1));
-            }
-            let _ = child.kill();
-            child.wait().unwrap();
+            kill_at(at, "snow shot.toml -o killed", &format!("killed/state/grains.{frame:04}.json"));
         }
         works(at, "snow shot.toml -o killed -q --threads 1");
         let [once, killed] = ["once", "killed"].map(|out| grains(at, out));

@@ -2,12 +2,10 @@
 
 use std::fs;
 use std::path::Path;
-use std::process::Stdio;
-use std::time::Duration;
 
 use super::shot_grains::folder;
 use crate::common::character::output;
-use crate::program::{command, fails, frazil, works};
+use crate::program::{fails, frazil, kill_at, works};
 use frazil::base::DVec3;
 use frazil::vdb::AnyGrid;
 use frazil::vdb::file::{read, read_any, to_bytes, write};
@@ -78,14 +76,16 @@ fn mist_is_made_and_made_again_without_touching_base_and_grains() {
     // From a frame in the middle on, as it was before.
     works(at, "snow shot.toml -o out -q --stage mist --from 1");
     assert!(grids(at, "out") == first);
-    // Grains that changed are told.
-    works(at, "snow shot.toml -o out -q --stage grains --from 1 --set grains.compression=0.2");
-    let again = frazil(at, "snow shot.toml -o out --stage mist --set grains.compression=0.2");
-    let said = String::from_utf8_lossy(&again.stderr).into_owned();
-    assert!(said.contains("mist") && !grids(at, "out").is_empty(), "{said}");
-    works(at, "snow shot.toml -o out -q --stage mist --from 1 --set grains.compression=0.2");
+    // Grains that are made again take the mist that was made of them along.
+    let again = "--set grains.compression=0.2";
+    works(at, &format!("snow shot.toml -o out -q --stage grains --from 1 {again}"));
+    assert_eq!(files(at, "out", &["mist"]).len(), 0);
+    works(at, &format!("snow shot.toml -o out -q --stage mist {again}"));
     works(at, "check out");
     assert!(grids(at, "out") != first);
+    // Those that were changed by another hand are refused.
+    fs::copy(at.join("out/grains/grains.0009.vdb"), at.join("out/grains/grains.0010.vdb")).unwrap();
+    fails(at, &format!("snow shot.toml -o out -q --stage mist --from 10 {again}"), 2, &["grains.0010.vdb"]);
 }
 
 #[test]
@@ -94,13 +94,7 @@ fn a_killed_run_resumes_to_the_same_mist_from_any_number_of_threads() {
     let at = folder.path();
     works(at, "snow shot.toml -o once -q --threads 2");
     for frame in [3, 6] {
-        let mut child = command(at, "snow shot.toml -o killed").stderr(Stdio::null()).spawn().unwrap();
-        let record = at.join(format!("killed/state/mist.{frame:04}.json"));
-        while !record.exists() && child.try_wait().unwrap().is_none() {
-            std::thread::sleep(Duration::from_millis(1));
-        }
-        let _ = child.kill();
-        child.wait().unwrap();
+        kill_at(at, "snow shot.toml -o killed", &format!("killed/state/mist.{frame:04}.json"));
     }
     works(at, "snow shot.toml -o killed -q --threads 1");
     let all = |out: &str| files(at, out, &["mist", "fog"]);
@@ -145,7 +139,10 @@ fn without_fast_grains_the_mist_is_empty_and_the_log_says_so() {
     let at = folder.path();
     let run = frazil(at, "snow shot.toml -o out");
     let said = String::from_utf8_lossy(&run.stderr).into_owned();
-    assert!(run.status.success() && said.contains("no mist") && said.contains("mist.from_speed"), "{said}");
+    assert!(
+        run.status.success() && said.contains("no mist is left") && said.contains("mist.from_speed"),
+        "{said}"
+    );
     assert_eq!(files(at, "out", &["mist"]).len(), 10);
     assert_eq!(read_any(&at.join("out/mist/mist.0010.vdb"), Some("density")).map(|_| ()).ok(), Some(()));
 }
@@ -161,6 +158,11 @@ fn cells_wider_than_objects_and_objects_wider_than_the_air_work() {
         at,
         "snow shot.toml -o full -q --preview 2 --frames 1-3 --set object.1.scale=3 --set mist.from_speed=0.05",
     );
+    let AnyGrid::Floats(density) = read_any(&at.join("full/mist/mist.0003.vdb"), Some("density")).unwrap()
+    else {
+        panic!("a density of vectors")
+    };
+    assert!((density.voxel_size() - 0.04 * 4.0 / 3.0).abs() < 1e-12);
     for (out, frame) in [("coarse", 10), ("fine", 4), ("full", 3)] {
         let report = report(at, out, frame);
         assert!(report["divergence"].as_f64().unwrap() < 1e-4, "{out}: {report}");

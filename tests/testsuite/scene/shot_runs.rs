@@ -3,11 +3,11 @@
 use std::collections::BTreeMap;
 use std::fs;
 use std::path::Path;
-use std::process::{Command, Stdio};
+use std::process::Command;
 use std::time::Duration;
 
 use crate::common::character::output;
-use crate::program::{CUBE, command, fails, works};
+use crate::program::{CUBE, command, fails, kill_at, works};
 use tempfile::TempDir;
 
 /// A folder with a cube that slides through snow for so many frames; `output` stands in the scene's table.
@@ -31,16 +31,6 @@ fn write_scene(folder: &Path, frames: i32, cell: f64, output: &str) {
 fn differences(a: &BTreeMap<String, Vec<u8>>, b: &BTreeMap<String, Vec<u8>>) -> Vec<String> {
     let names = a.keys().chain(b.keys()).filter(|name| a.get(*name) != b.get(*name));
     names.cloned().collect()
-}
-
-/// Starts a run and kills it when a file appears.
-fn kill_at(folder: &Path, arguments: &str, file: &str) {
-    let mut child = command(folder, arguments).stderr(Stdio::null()).spawn().unwrap();
-    while !folder.join(file).exists() && child.try_wait().unwrap().is_none() {
-        std::thread::sleep(Duration::from_millis(1));
-    }
-    let _ = child.kill();
-    child.wait().unwrap();
 }
 
 /// Two files hold the same three grids: leaves, values, active voxels.

@@ -2,12 +2,10 @@
 
 use std::fs;
 use std::path::Path;
-use std::process::Stdio;
-use std::time::Duration;
 
 use super::shot_grains::folder;
 use crate::common::character::output;
-use crate::program::{command, fails, works};
+use crate::program::{fails, kill_at, works};
 use frazil::vdb::file::{read, to_bytes};
 
 const ALL: &str = "fog = [\"base\", \"grains\"]\nsnow = true\nmesh = [\"ply\", \"usd\"]";
@@ -93,13 +91,7 @@ fn a_killed_run_resumes_to_the_same_volumes_from_any_number_of_threads() {
     let folder = folder(GRAINS, ALL);
     let at = folder.path();
     works(at, "snow shot.toml -o once -q --threads 2");
-    let mut child = command(at, "snow shot.toml -o killed").stderr(Stdio::null()).spawn().unwrap();
-    let record = at.join("killed/state/volumes.0004.json");
-    while !record.exists() && child.try_wait().unwrap().is_none() {
-        std::thread::sleep(Duration::from_millis(1));
-    }
-    let _ = child.kill();
-    child.wait().unwrap();
+    kill_at(at, "snow shot.toml -o killed", "killed/state/volumes.0004.json");
     works(at, "snow shot.toml -o killed -q --threads 1");
     let kinds = ["fog", "snow", "mesh"];
     assert!(files(at, "once", &kinds) == files(at, "killed", &kinds));

@@ -40,7 +40,7 @@ fn grains_are_full_in_their_spheres_and_fade_over_half_a_radius() {
     let (centres, voxel) = (scattered(40), 0.4 * RADIUS);
     let grid = fog::grains(&ctx, &centres, RADIUS, voxel).unwrap();
     assert_eq!(grid.class(), GridClass::Fog);
-    let scale = (fog::SCALE_KEY.to_string(), MetaValue::Float(100.0));
+    let scale = (frazil::vdb::DENSITY_SCALE_KEY.to_string(), MetaValue::Float(100.0));
     assert!(grid.metadata().unwrap().contains(&scale));
     let (mut full, mut fading, mut active) = (0, 0, 0);
     for x in -70..=70 {
