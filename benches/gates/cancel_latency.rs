@@ -10,7 +10,7 @@ use crate::grains::Random;
 use crate::harness::{Harness, median, timed};
 
 /// Cancels that are measured.
-const CANCELS: usize = 200;
+const CANCELS: usize = 120;
 
 /// Something that a host steps.
 pub trait Steps {

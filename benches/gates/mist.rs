@@ -241,11 +241,7 @@ fn vortex_error(ctx: &Context, tiles: i32) -> f64 {
     };
     project(&mut flow);
     for _ in 0..steps {
-        ctx.phase("advect", || {
-            flow.advect(dt, Scheme::Unbounded);
-            Ok(())
-        })
-        .expect("advection");
+        ctx.phase("advect", || flow.advect(ctx, dt, Scheme::Unbounded)).expect("advection");
         project(&mut flow);
     }
     let (mut sum, mut count) = (0.0, 0.0);

@@ -104,7 +104,7 @@ fn pocket(h: &mut Harness) {
         fastest = fastest.max(flow.fastest());
         is_solved &= is_finite && solved.divergence <= 1.0e-4 * solved.fastest && fastest < 10.0;
         most = most.max(solved.iterations);
-        flow.advect(0.01, Default::default());
+        flow.advect(&ctx, 0.01, Default::default()).expect("no cancel");
     }
     h.holds(name, is_solved, &format!("at most {most} iterations, {fastest:.2} m/s under a lid of 0.5 m/s"));
 }

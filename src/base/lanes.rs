@@ -47,6 +47,28 @@ impl Lanes {
         Self(store([half::all(value); 2]))
     }
 
+    /// The first and the second numbers of eight pairs.
+    #[inline(always)]
+    pub fn pairs(pairs: [&[f32; 2]; LANES]) -> [Self; 2] {
+        let [a, b, c, d, e, f, g, h] = pairs;
+        let ([x, y], [z, w]) = (half::pairs(a, b, c, d), half::pairs(e, f, g, h));
+        [Self(store([x, z])), Self(store([y, w]))]
+    }
+
+    /// Each lane has the number of the one before it, the first one another.
+    #[inline(always)]
+    pub fn behind(self, first: f32) -> Self {
+        let [low, high] = load(&self.0);
+        Self(store([half::behind(low, half::all(first)), half::behind(high, half::last(low))]))
+    }
+
+    /// Each lane has the number of the one behind it, the last one another.
+    #[inline(always)]
+    pub fn before(self, last: f32) -> Self {
+        let [low, high] = load(&self.0);
+        Self(store([half::before(low, high), half::before(high, half::all(last))]))
+    }
+
     /// The lesser in each lane.
     #[inline(always)]
     pub fn min(self, other: Self) -> Self {
@@ -179,6 +201,12 @@ mod half {
         and(a, b) = _mm_and_ps(a, b);
         or(a, b) = _mm_or_ps(a, b);
         choose(mask, set, clear) = _mm_or_ps(_mm_and_ps(mask, set), _mm_andnot_ps(mask, clear));
+        last(a) = _mm_shuffle_ps::<0b11_11_11_11>(a, a);
+        behind(a, first) = _mm_move_ss(_mm_shuffle_ps::<0b10_01_00_00>(a, a), first);
+        before(a, next) = {
+            let turned = _mm_move_ss(a, next);
+            _mm_shuffle_ps::<0b00_11_10_01>(turned, turned)
+        };
     }
 
     #[inline(always)]
@@ -196,6 +224,18 @@ mod half {
         #[allow(unused_unsafe)]
         unsafe {
             _mm_movemask_ps(mask) as u32
+        }
+    }
+
+    /// The first and the second numbers of four pairs.
+    #[inline(always)]
+    pub fn pairs(a: &[f32; 2], b: &[f32; 2], c: &[f32; 2], d: &[f32; 2]) -> [Half; 2] {
+        // SAFETY: it reads the two numbers of each pair, at any alignment; SSE2 is part of x86-64.
+        unsafe {
+            let low = _mm_loadh_pd(_mm_load_sd(a.as_ptr().cast()), b.as_ptr().cast());
+            let high = _mm_loadh_pd(_mm_load_sd(c.as_ptr().cast()), d.as_ptr().cast());
+            let (low, high) = (_mm_castpd_ps(low), _mm_castpd_ps(high));
+            [_mm_shuffle_ps::<0b10_00_10_00>(low, high), _mm_shuffle_ps::<0b11_01_11_01>(low, high)]
         }
     }
 
@@ -250,6 +290,21 @@ mod half {
     }
 
     #[inline(always)]
+    pub fn last(a: Half) -> Half {
+        [a[3]; 4]
+    }
+
+    #[inline(always)]
+    pub fn behind(a: Half, first: Half) -> Half {
+        [first[0], a[0], a[1], a[2]]
+    }
+
+    #[inline(always)]
+    pub fn before(a: Half, next: Half) -> Half {
+        [a[1], a[2], a[3], next[0]]
+    }
+
+    #[inline(always)]
     pub fn sqrt(a: Half) -> Half {
         a.map(f32::sqrt)
     }
@@ -262,6 +317,11 @@ mod half {
     #[inline(always)]
     pub fn bits(mask: Half) -> u32 {
         (0..4).map(|lane| (mask[lane].to_bits() & 1) << lane).sum()
+    }
+
+    #[inline(always)]
+    pub fn pairs(a: &[f32; 2], b: &[f32; 2], c: &[f32; 2], d: &[f32; 2]) -> [Half; 2] {
+        [0, 1].map(|at| [a[at], b[at], c[at], d[at]])
     }
 
     #[inline(always)]
@@ -288,6 +348,13 @@ mod tests {
         assert_eq!(a.is_less(b).bits(), 0b111);
         assert_eq!((a.is_less(b) & Lanes::all(0.0).is_less(a)).bits(), 0b110);
         assert_eq!((a.is_less(b) | b.is_less(a)).bits(), 0b1111_0111);
+        assert_eq!(a.behind(9.0).0, [9.0, 0.0, 1.0, 2.0, 3.0, 4.0, 5.0, 6.0]);
+        assert_eq!(a.before(9.0).0, [1.0, 2.0, 3.0, 4.0, 5.0, 6.0, 7.0, 9.0]);
+        let numbers: Vec<f32> = (0..16u8).map(f32::from).collect();
+        let [first, second] =
+            Lanes::pairs(std::array::from_fn(|lane| numbers[14 - lane..].first_chunk().unwrap()));
+        assert_eq!(first, Lanes([14.0, 13.0, 12.0, 11.0, 10.0, 9.0, 8.0, 7.0]));
+        assert_eq!(second, first + Lanes::all(1.0));
         assert_eq!((a / b * b + (b * b).sqrt()).0[6], 9.0);
         assert_eq!(a.is_less(b).choose_number(9, [1; LANES]), [9, 9, 9, 1, 1, 1, 1, 1]);
     }

@@ -12,9 +12,13 @@ use super::Flow;
 use super::around::Reader;
 use super::paths::{At, Live, Paths, Ways, trace};
 use super::room::Room;
+use super::stencil::row_of;
 use super::tiles::{Field, Tile, Tiles};
-use super::window::{Window, max, min};
+use super::window::Window;
 use crate::base::cpu::dispatch;
+use crate::base::lanes::Lanes;
+use crate::context::Context;
+use crate::error::{Error, Result};
 
 /// How values are carried.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
@@ -28,66 +32,95 @@ pub enum Scheme {
     Unbounded,
 }
 
-/// Carries velocity (m/s, at lower faces) and density along for a step, `scale` = dt / cell; the air outside all tiles moves at
-/// `ambient`. The rim keeps what it holds, but for the upper faces of cells.
+/// How a flow is carried in a step.
+pub struct Way<'a> {
+    /// Velocity (m/s) of the air outside all tiles.
+    pub ambient: [f32; 3],
+    /// Cells that a value at 1 m/s moves: the time over the cell's edge (s/m).
+    pub scale: f32,
+    pub scheme: Scheme,
+    /// The air around, as it is after the step.
+    pub around: Option<&'a Flow>,
+}
+
+/// Carries velocity (m/s, at lower faces) and density along for a step. The rim keeps what it holds, but for the upper faces of
+/// cells.
+///
+/// # Errors
+/// Cancel; the fields are then of no use.
 pub fn advect(
+    ctx: &Context,
     tiles: &Tiles,
     (velocity, density): (&mut [Field; 3], &mut Field),
-    ambient: [f32; 3],
-    scale: f32,
-    scheme: Scheme,
-    around: Option<&Flow>,
+    way: &Way<'_>,
     room: &mut Room,
-) {
+) -> Result<()> {
+    let Way { ambient, scheme, .. } = *way;
     let (mut back, mut ahead, [hat, below, above]) = room.paths(tiles);
-    let extents = trace(tiles, velocity, ambient, scale, [&mut back, &mut ahead]);
+    let extents = trace(ctx, tiles, velocity, way, [&mut back, &mut ahead])?;
     let paths = Paths { tiles, back: back.map(|field| &*field), ahead: ahead.map(|field| &*field), extents };
     for axis in 0..3 {
         let outside = ambient[axis];
-        let around = around.map(|around| around.faces(axis));
+        let around = way.around.map(|around| around.faces(axis));
         let field = (&mut velocity[axis], outside);
-        carry(&paths, At::Faces(axis), field, around.as_ref(), [&mut *hat, &mut *below, &mut *above], scheme);
+        let room = [&mut *hat, &mut *below, &mut *above];
+        carry(ctx, &paths, At::Faces(axis), field, around.as_ref(), room, scheme)?;
     }
-    let three = [hat, below, above].map(|field| &mut field[..tiles.active()]);
-    carry(&paths, At::Centres, (density, 0.0), None, three, scheme);
+    let room = [hat, below, above].map(|field| &mut field[..tiles.active()]);
+    carry(ctx, &paths, At::Centres, (density, 0.0), None, room, scheme)
 }
 
 /// Carries a field along the paths. `hat` is room for the first guess, `below` and `above` for its distances from the least and
 /// the greatest value around the place that it came from.
+///
+/// # Errors
+/// Cancel.
 fn carry(
+    ctx: &Context,
     paths: &Paths<'_>,
     at: At,
     (field, outside): (&mut Field, f32),
     around: Option<&Reader<'_>>,
     [hat, below, above]: [&mut [Tile]; 3],
     scheme: Scheme,
-) {
+) -> Result<()> {
     let is_moved = moved(paths, at, field, scheme);
+    let is_bounded = scheme == Scheme::MacCormack;
     let bounds = below.par_iter_mut().zip(above.par_iter_mut());
     let tiles = hat.par_iter_mut().zip(bounds).enumerate().with_min_len(16);
-    tiles.for_each_init(Window::default, |window, (slot, (hat, (below, above)))| {
-        // Of what lies around, the guess is what it has become there.
-        *hat = match around {
-            Some(around) if slot >= paths.tiles.active() => around.read(window, paths.tiles.coords()[slot]),
-            _ => field[slot],
-        };
-        let Some(live) = paths.live(slot, at).filter(|_| is_moved[slot]) else { return };
-        window.fill(field, &paths.tiles.neighbours()[slot], &paths.back_span(slot, at), outside);
-        guess_tile(&live, &paths.ways(slot, at, &paths.back), window, hat, [below, above]);
-    });
+    tiles.try_for_each_init(Window::default, |window, (slot, (hat, (below, above)))| {
+        ctx.check()?;
+        let live = paths.live(slot, at).filter(|_| is_moved[slot]);
+        if live.as_ref().is_none_or(|live| !live.is_whole()) {
+            // Of what lies around, the guess is what it has become there.
+            *hat = match around {
+                Some(around) if slot >= paths.tiles.active() => {
+                    around.read(window, paths.tiles.coords()[slot])
+                }
+                _ => field[slot],
+            };
+        }
+        if let Some(live) = live {
+            window.fill(field, &paths.tiles.neighbours()[slot], &paths.back_span(slot, at), outside);
+            let bounds = is_bounded.then_some([below, above]);
+            guess_tile(&live, &paths.ways(slot, at, &paths.back), window, hat, bounds);
+        }
+        Ok::<_, Error>(())
+    })?;
     if scheme == Scheme::SemiLagrangian {
         field.copy_from_slice(hat);
-        return;
+        return Ok(());
     }
     let (hat, below, above) = (&*hat, &*below, &*above);
     let tiles = field.par_iter_mut().enumerate().with_min_len(16);
-    tiles.for_each_init(Window::default, |window, (slot, values)| {
-        let Some(live) = paths.live(slot, at).filter(|_| is_moved[slot]) else { return };
+    tiles.try_for_each_init(Window::default, |window, (slot, values)| {
+        ctx.check()?;
+        let Some(live) = paths.live(slot, at).filter(|_| is_moved[slot]) else { return Ok(()) };
         window.fill(hat, &paths.tiles.neighbours()[slot], &paths.ahead_span(slot, at), outside);
-        let bounds = [&below[slot], &above[slot]];
-        let bounds = (scheme == Scheme::MacCormack).then_some((bounds, Limit::of(at)));
+        let bounds = is_bounded.then(|| ([&below[slot], &above[slot]], Limit::of(at)));
         correct_tile(&live, &paths.ways(slot, at, &paths.ahead), window, &hat[slot], bounds, values);
-    });
+        Ok(())
+    })
 }
 
 /// Whether paths bring something to each tile of a field: into tiles among others without density they bring none.
@@ -101,22 +134,31 @@ fn moved(paths: &Paths<'_>, at: At, field: &Field, scheme: Scheme) -> Vec<bool> 
     paths.tiles.neighbours()[..field.len()].iter().map(any).collect()
 }
 
-fn guess_tile(live: &Live, ways: &Ways<'_>, window: &Window, hat: &mut Tile, bounds: [&mut Tile; 2]) {
-    dispatch!(guess_rows(live: &Live, ways: &Ways<'_>, window: &Window, hat: &mut Tile, bounds: [&mut Tile; 2]))
+fn guess_tile(live: &Live, ways: &Ways<'_>, window: &Window, hat: &mut Tile, bounds: Option<[&mut Tile; 2]>) {
+    dispatch!(guess_rows(
+        live: &Live,
+        ways: &Ways<'_>,
+        window: &Window,
+        hat: &mut Tile,
+        bounds: Option<[&mut Tile; 2]>
+    ))
 }
 
 /// First guesses, and their bounds.
 #[inline(always)]
-fn guess_rows(live: &Live, ways: &Ways<'_>, window: &Window, hat: &mut Tile, bounds: [&mut Tile; 2]) {
-    let [below, above] = bounds;
+fn guess_rows(live: &Live, ways: &Ways<'_>, window: &Window, hat: &mut Tile, bounds: Option<[&mut Tile; 2]>) {
+    let Some([below, above]) = bounds else {
+        for row in live.rows() {
+            let values = window.sample(row, &ways.row(row));
+            hat[row * 8..][..live.lanes()].copy_from_slice(&values.0[..live.lanes()]);
+        }
+        return;
+    };
     for row in live.rows() {
         let [values, low, high] = window.sample_bounded(row, &ways.row(row));
-        hat[row * 8..][..live.lanes()].copy_from_slice(&values[..live.lanes()]);
-        let (below, above) = (&mut below[row * 8..][..8], &mut above[row * 8..][..8]);
-        for lane in 0..8 {
-            below[lane] = values[lane] - low[lane];
-            above[lane] = high[lane] - values[lane];
-        }
+        hat[row * 8..][..live.lanes()].copy_from_slice(&values.0[..live.lanes()]);
+        below[row * 8..][..8].copy_from_slice(&(values - low).0);
+        above[row * 8..][..8].copy_from_slice(&(high - values).0);
     }
 }
 
@@ -148,21 +190,15 @@ fn correct_rows(
     bounds: Option<([&Tile; 2], Limit)>,
     values: &mut Tile,
 ) {
+    let rows = |tile: &Tile, row: usize| Lanes(row_of(tile, row));
     for row in live.rows() {
         let there = window.sample(row, &ways.row(row));
-        let range = row * 8..row * 8 + 8;
-        let mut new = [0.0; 8];
-        for (lane, new) in new.iter_mut().enumerate() {
-            *new = hat[range.start + lane] + 0.5 * (values[range.start + lane] - there[lane]);
-        }
+        let guess = rows(hat, row);
+        let mut change = Lanes::all(0.5) * (rows(values, row) - there);
         if let Some(([below, above], limit)) = bounds {
-            for (lane, new) in new.iter_mut().enumerate() {
-                let guess = hat[range.start + lane];
-                let at = range.start + lane;
-                *new = guess + limited(*new - guess, below[at], above[at], limit);
-            }
+            change = limited(change, rows(below, row), rows(above, row), limit);
         }
-        values[range][..live.lanes()].copy_from_slice(&new[..live.lanes()]);
+        values[row * 8..][..live.lanes()].copy_from_slice(&(guess + change).0[..live.lanes()]);
     }
 }
 
@@ -184,13 +220,15 @@ impl Limit {
 
 /// A correction within its bounds.
 #[inline(always)]
-fn limited(change: f32, below: f32, above: f32, limit: Limit) -> f32 {
-    let most = if change < 0.0 { below } else { above };
-    let size = change.abs();
-    let bound = if limit == Limit::Fold { max(2.0 * most - size, 0.0) } else { most };
+fn limited(change: Lanes, below: Lanes, above: Lanes, limit: Limit) -> Lanes {
+    let zero = Lanes::all(0.0);
+    let is_negative = change.is_less(zero);
+    let most = is_negative.choose(below, above);
+    let size = change.max(zero - change);
+    let bound = if limit == Limit::Fold { (Lanes::all(2.0) * most - size).max(zero) } else { most };
     // Rounding may leave a distance a little under 0.
-    let kept = max(min(size, bound), 0.0);
-    if change < 0.0 { -kept } else { kept }
+    let kept = size.min(bound).max(zero);
+    is_negative.choose(zero - kept, kept)
 }
 
 #[cfg(test)]
@@ -199,8 +237,10 @@ mod tests {
 
     #[test]
     fn corrections_stay_in_their_bounds_and_do_not_jump() {
-        let cut = |change| limited(change, 1.0, 2.0, Limit::Cut);
-        let fold = |change| limited(change, 1.0, 2.0, Limit::Fold);
+        let within =
+            |change, limit| limited(Lanes::all(change), Lanes::all(1.0), Lanes::all(2.0), limit).0[0];
+        let cut = |change| within(change, Limit::Cut);
+        let fold = |change| within(change, Limit::Fold);
         assert_eq!([-3.0, -1.5, -0.5, 1.5, 2.5, 5.0].map(cut), [-1.0, -1.0, -0.5, 1.5, 2.0, 2.0]);
         assert_eq!([-3.0, -1.5, -0.5, 1.5, 2.5, 5.0].map(fold), [0.0, -0.5, -0.5, 1.5, 1.5, 0.0]);
     }

@@ -35,6 +35,7 @@ mod vorticity;
 mod window;
 
 pub use advect::Scheme;
+use advect::Way;
 pub use paths::FARTHEST;
 pub use pressure::Solved;
 pub use solids::{Faces, Solids};
@@ -169,15 +170,19 @@ impl Flow {
     }
 
     /// Carries velocity and density along for a time (s). Paths longer than [`FARTHEST`] cells are cut off.
-    pub fn advect(&mut self, dt: f64, scheme: Scheme) {
+    ///
+    /// # Errors
+    /// Cancel; the fields are then of no use.
+    pub fn advect(&mut self, ctx: &Context, dt: f64, scheme: Scheme) -> Result<()> {
         if let Some(around) = &mut self.around {
             std::mem::swap(&mut around.room, &mut self.room);
-            around.advect(dt, scheme);
+            let done = around.advect(ctx, dt, scheme);
             std::mem::swap(&mut around.room, &mut self.room);
+            done?;
         }
         let Self { tiles, velocity, density, ambient, around, room, .. } = self;
-        let scale = dt as f32 / self.cell;
-        advect::advect(tiles, (velocity, density), *ambient, scale, scheme, around.as_deref(), room);
+        let way = Way { ambient: *ambient, scale: dt as f32 / self.cell, scheme, around: around.as_deref() };
+        advect::advect(ctx, tiles, (velocity, density), &way, room)
     }
 
     /// Makes the velocity free of divergence: what is left, times the cell, is at most `tolerance` times the greatest speed.

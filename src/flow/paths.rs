@@ -2,9 +2,13 @@
 
 use rayon::prelude::*;
 
+use super::advect::Way;
 use super::tiles::{FACES, Field, Tile, Tiles};
 use super::window::{Span, Window, max, min};
 use crate::base::cpu::dispatch;
+use crate::base::lanes::Lanes;
+use crate::context::Context;
+use crate::error::Result;
 
 /// Largest displacement (cells) of a step; longer ones are cut off.
 pub const FARTHEST: f32 = 5.0;
@@ -111,6 +115,11 @@ impl Live {
         (0..last).step_by(step)
     }
 
+    /// Whether all are moved.
+    pub fn is_whole(&self) -> bool {
+        self.layer.is_none()
+    }
+
     /// How many values of a row are moved.
     #[inline(always)]
     pub fn lanes(&self) -> usize {
@@ -129,7 +138,7 @@ pub struct Ways<'a> {
 impl Ways<'_> {
     /// The displacements of a row.
     #[inline(always)]
-    pub fn row(&self, row: usize) -> [[f32; 8]; 3] {
+    pub fn row(&self, row: usize) -> [Lanes; 3] {
         let step = match self.at {
             At::Centres => return rows_of(self.own, row),
             At::Faces(2) => return self.along_rows(row),
@@ -147,47 +156,43 @@ impl Ways<'_> {
 
     /// The displacements of a row of faces on z.
     #[inline(always)]
-    fn along_rows(&self, row: usize) -> [[f32; 8]; 3] {
-        let below = rows_of(self.below, row).map(|values| values[7]);
+    fn along_rows(&self, row: usize) -> [Lanes; 3] {
+        let below = rows_of(self.below, row).map(|values| values.0[7]);
         if self.own.is_none() {
-            return below.map(|value| [value; 8]);
+            return below.map(Lanes::all);
         }
         let own = rows_of(self.own, row);
-        let mut lower = [[0.0; 8]; 3];
+        let mut lower = own;
         for axis in 0..3 {
-            lower[axis][0] = if self.below.is_some() { below[axis] } else { own[axis][0] };
-            lower[axis][1..].copy_from_slice(&own[axis][..7]);
+            let first = if self.below.is_some() { below[axis] } else { own[axis].0[0] };
+            lower[axis] = own[axis].behind(first);
         }
         means(own, lower)
     }
 }
 
 #[inline(always)]
-fn rows_of(tiles: Option<[&Tile; 3]>, row: usize) -> [[f32; 8]; 3] {
-    let Some(tiles) = tiles else { return [[0.0; 8]; 3] };
-    tiles.map(|tile| super::stencil::row_of(tile, row))
+fn rows_of(tiles: Option<[&Tile; 3]>, row: usize) -> [Lanes; 3] {
+    let Some(tiles) = tiles else { return [Lanes::all(0.0); 3] };
+    tiles.map(|tile| Lanes(super::stencil::row_of(tile, row)))
 }
 
 #[inline(always)]
-fn means(a: [[f32; 8]; 3], b: [[f32; 8]; 3]) -> [[f32; 8]; 3] {
-    let mut out = [[0.0; 8]; 3];
-    for axis in 0..3 {
-        for lane in 0..8 {
-            out[axis][lane] = 0.5 * (a[axis][lane] + b[axis][lane]);
-        }
-    }
-    out
+fn means(a: [Lanes; 3], b: [Lanes; 3]) -> [Lanes; 3] {
+    [0, 1, 2].map(|axis| Lanes::all(0.5) * (a[axis] + b[axis]))
 }
 
-/// Traces the paths back and ahead through a velocity (m/s, at lower faces) in a step, `scale` = dt / cell. Returns the extents
-/// of each tile's.
+/// Traces the paths back and ahead through a velocity (m/s, at lower faces) in a step. Returns the extents of each tile's.
+///
+/// # Errors
+/// Cancel.
 pub fn trace(
+    ctx: &Context,
     tiles: &Tiles,
     velocity: &[Field; 3],
-    ambient: [f32; 3],
-    scale: f32,
+    &Way { ambient, scale, .. }: &Way<'_>,
     [back, ahead]: [&mut [&mut [Tile]; 3]; 2],
-) -> Vec<[Extent; 2]> {
+) -> Result<Vec<[Extent; 2]>> {
     let reach = reach(tiles, velocity, ambient, scale);
     let ([a, b, c], [d, e, f]) = (back, ahead);
     let six = (
@@ -200,6 +205,7 @@ pub fn trace(
     );
     let active = six.into_par_iter().enumerate().with_min_len(16);
     let each = active.map_init(<[Window; 3]>::default, |windows, (slot, (a, b, c, d, e, f))| {
+        ctx.check()?;
         let near = &tiles.neighbours()[slot];
         // A cell's velocity is the mean of its two faces' on each axis; half of the way is half as far.
         let most: [f32; 3] = std::array::from_fn(|axis| {
@@ -214,8 +220,8 @@ pub fn trace(
         }
         let mut to = [a, b, c, d, e, f];
         trace_tile(windows, scale, &mut to);
-        let extent = |half: &[&mut Tile]| [0, 1, 2].map(|axis| extent_of(half[axis]));
-        [extent(&to[..3]), extent(&to[3..])]
+        let extent = |side: usize| [0, 1, 2].map(|axis| extent_of(to[3 * side + axis]));
+        Ok([extent(0), extent(1)])
     });
     each.collect()
 }
@@ -255,29 +261,23 @@ fn trace_tile(windows: &[Window; 3], scale: f32, to: &mut [&mut Tile; 6]) {
 
 #[inline(always)]
 fn trace_rows(windows: &[Window; 3], scale: f32, to: &mut [&mut Tile; 6]) {
+    let most = Lanes::all(FARTHEST);
+    let least = Lanes::all(-FARTHEST);
     for row in 0..64 {
         let (x, y) = (row >> 3, row & 7);
         let low = windows.each_ref().map(|window| window.row(x, y, 0));
         let high = [windows[0].row(x + 1, y, 0), windows[1].row(x, y + 1, 0), windows[2].row(x, y, 1)];
-        let mut half = [[0.0f32; 8]; 3];
-        for axis in 0..3 {
-            for lane in 0..8 {
-                let way = (low[axis][lane] + high[axis][lane]) * (0.5 * scale);
-                half[axis][lane] = 0.5 * min(max(way, -FARTHEST), FARTHEST);
-            }
-        }
+        let half = [0, 1, 2].map(|axis| {
+            let way = (low[axis] + high[axis]) * Lanes::all(0.5 * scale);
+            Lanes::all(0.5) * way.max(least).min(most)
+        });
         for (side, sign) in [-1.0, 1.0].into_iter().enumerate() {
-            let mut middle = half;
-            for way in middle.iter_mut().flatten() {
-                *way *= sign;
-            }
+            let middle = half.map(|way| way * Lanes::all(sign));
             for axis in 0..3 {
                 // A cell's centre is half a cell above its lower face.
                 let speed = windows[axis].sample_between(row, &middle, axis);
-                let out = &mut to[3 * side + axis][row * 8..][..8];
-                for lane in 0..8 {
-                    out[lane] = min(max(sign * scale * speed[lane], -FARTHEST), FARTHEST);
-                }
+                let way = (Lanes::all(sign * scale) * speed).max(least).min(most);
+                to[3 * side + axis][row * 8..][..8].copy_from_slice(&way.0);
             }
         }
     }

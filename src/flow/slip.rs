@@ -5,7 +5,7 @@ use rayon::prelude::*;
 
 use super::operator::Operator;
 use super::solids::Solids;
-use super::tiles::{Field, NONE, Tiles};
+use super::tiles::{FACES, Field, NONE, Tile, Tiles};
 
 /// Layers of faces that continue the flow.
 const LAYERS: usize = 2;
@@ -23,13 +23,17 @@ pub fn extend(tiles: &Tiles, operator: &Operator, solids: &Solids, velocity: &mu
     let slots: Vec<usize> = (0..tiles.count()).filter(|slot| solids.faces(*slot).is_some()).collect();
     let mut index = vec![NONE; tiles.count()];
     slots.iter().zip(0u32..).for_each(|(slot, at)| index[*slot] = at);
-    let mut known: Vec<Known> =
-        slots.par_iter().map(|slot| known_of(tiles, operator, solids, *slot)).collect();
+    let flows: Vec<[u64; 8]> = (0..tiles.count())
+        .into_par_iter()
+        .with_min_len(16)
+        .map(|slot| flows(tiles, operator, slot))
+        .collect();
+    let mut known: Vec<Known> = slots.par_iter().map(|slot| known_of(tiles, &flows, solids, *slot)).collect();
     for _ in 0..LAYERS {
-        let is_known = |slot: u32, axis: usize, cell: usize| match index.get(slot as usize) {
-            None => false,
-            Some(&NONE) => true,
-            Some(at) => known[*at as usize][axis][cell >> 6] >> (cell & 63) & 1 == 1,
+        let of = |slot: u32, axis: usize| match index.get(slot as usize) {
+            None => [0; 8],
+            Some(&NONE) => [u64::MAX; 8],
+            Some(at) => known[*at as usize][axis],
         };
         let found: Vec<Vec<(usize, u16, f32)>> = slots
             .par_iter()
@@ -37,24 +41,30 @@ pub fn extend(tiles: &Tiles, operator: &Operator, solids: &Solids, velocity: &mu
             .map(|(&slot, own)| {
                 let mut found = Vec::new();
                 for axis in 0..3 {
-                    if own[axis] == ALL[axis] {
+                    if own[axis] == [u64::MAX; 8] {
                         continue;
                     }
-                    for cell in (0..512usize).filter(|cell| own[axis][cell >> 6] >> (cell & 63) & 1 == 0) {
+                    let six = FACES.map(|at| of(tiles.neighbours()[slot][at], axis));
+                    let beside = beside(&own[axis], &six);
+                    for cell in
+                        (0..8).flat_map(|x| bits(beside[x] & !own[axis][x]).map(move |at| x << 6 | at))
+                    {
                         let (mut sums, mut count) = ([0.0f32; 3], 0);
                         for (across, sum) in sums.iter_mut().enumerate() {
-                            let both = [false, true].map(|upper| {
-                                let (near, cell) = tiles.beside(slot, cell, across, upper);
-                                let known = is_known(near, axis, cell);
-                                count += usize::from(known);
-                                if known { velocity[axis][near as usize][cell] } else { 0.0 }
-                            });
+                            let mut both = [0.0; 2];
+                            for (side, value) in both.iter_mut().enumerate() {
+                                let (near, cell) = tiles.beside(slot, cell, across, side == 1);
+                                let mask =
+                                    if near as usize == slot { &own[axis] } else { &six[2 * across + side] };
+                                if mask[cell >> 6] >> (cell & 63) & 1 == 1 {
+                                    *value = velocity[axis][near as usize][cell];
+                                    count += 1;
+                                }
+                            }
                             *sum = both[0] + both[1];
                         }
-                        if count > 0 {
-                            let mean = (sums[0] + sums[1] + sums[2]) / count as f32;
-                            found.push((axis, cell as u16, mean));
-                        }
+                        let mean = (sums[0] + sums[1] + sums[2]) / count as f32;
+                        found.push((axis, cell as u16, mean));
                     }
                 }
                 found
@@ -70,20 +80,65 @@ pub fn extend(tiles: &Tiles, operator: &Operator, solids: &Solids, velocity: &mu
     }
 }
 
-/// The faces of a tile that bound a cell of the flow.
-fn known_of(tiles: &Tiles, operator: &Operator, solids: &Solids, slot: usize) -> Known {
-    let mut known = [[0; 8]; 3];
-    let Some(faces) = solids.faces(slot) else { return ALL };
-    let flows = |slot: u32, cell: usize| {
-        (slot as usize) < tiles.active()
-            && operator.stencil(slot as usize).is_none_or(|stencil| stencil.inverse[cell] > 0.0)
-    };
-    for (axis, known) in known.iter_mut().enumerate() {
-        for cell in 0..512usize {
-            let (below, lower) = tiles.beside(slot, cell, axis, false);
-            let is_known = faces.open[axis][cell] > 0.0 || flows(slot as u32, cell) || flows(below, lower);
-            known[cell >> 6] |= u64::from(is_known) << (cell & 63);
-        }
+/// The places of bits that are set.
+fn bits(mut mask: u64) -> impl Iterator<Item = usize> {
+    std::iter::from_fn(move || {
+        let at = (mask != 0).then(|| mask.trailing_zeros() as usize)?;
+        mask &= mask - 1;
+        Some(at)
+    })
+}
+
+/// The first cell of each row along z, and the first row of a layer.
+const FIRST: u64 = 0x0101_0101_0101_0101;
+const ROW: u64 = 0xff;
+
+/// The places next to those of a mask, with the masks of the six tiles around.
+fn beside(own: &[u64; 8], [low_x, high_x, low_y, high_y, low_z, high_z]: &[[u64; 8]; 6]) -> [u64; 8] {
+    std::array::from_fn(|x| {
+        let left = if x > 0 { own[x - 1] } else { low_x[7] };
+        let right = if x < 7 { own[x + 1] } else { high_x[0] };
+        let down = own[x] << 8 | low_y[x] >> 56;
+        let up = own[x] >> 8 | (high_y[x] & ROW) << 56;
+        let back = own[x] << 1 & !FIRST | low_z[x] >> 7 & FIRST;
+        let front = own[x] >> 1 & !(FIRST << 7) | (high_z[x] & FIRST) << 7;
+        left | right | down | up | back | front
+    })
+}
+
+/// The cells of a tile that belong to the flow: bit `y << 3 | z` of word `x`.
+fn flows(tiles: &Tiles, operator: &Operator, slot: usize) -> [u64; 8] {
+    if slot >= tiles.active() {
+        return [0; 8];
     }
-    known
+    let Some(stencil) = operator.stencil(slot) else { return [u64::MAX; 8] };
+    mask(&stencil.inverse)
+}
+
+/// The cells of a tile whose value is over 0.
+fn mask(tile: &Tile) -> [u64; 8] {
+    std::array::from_fn(|x| {
+        let layer = tile[64 * x..][..64].iter().enumerate();
+        layer.fold(0, |mask, (at, value)| mask | u64::from(*value > 0.0) << at)
+    })
+}
+
+/// The faces of a tile that bound a cell of the flow, or are open.
+fn known_of(tiles: &Tiles, flows: &[[u64; 8]], solids: &Solids, slot: usize) -> Known {
+    let Some(faces) = solids.faces(slot) else { return ALL };
+    let own = &flows[slot];
+    [0, 1, 2].map(|axis| {
+        let open = mask(&faces.open[axis]);
+        let below = tiles.neighbours()[slot][FACES[2 * axis]] as usize;
+        let below = flows.get(below).unwrap_or(&[0; 8]);
+        std::array::from_fn(|x| {
+            let lower = match axis {
+                0 if x > 0 => own[x - 1],
+                0 => below[7],
+                1 => own[x] << 8 | below[x] >> 56,
+                _ => own[x] << 1 & !FIRST | below[x] >> 7 & FIRST,
+            };
+            open[x] | own[x] | lower
+        })
+    })
 }

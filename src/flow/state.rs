@@ -1,5 +1,7 @@
 //! The exact state of a flow: what a step that fails puts back, and the bytes from which a run resumes.
 
+use rayon::prelude::*;
+
 use super::Flow;
 use super::tiles::{Coord, Field, Tile, Tiles};
 use crate::base::bytes::{Reader, Writer};
@@ -20,14 +22,19 @@ const OUTERMOST: i32 = 1 << 26;
 /// Bytes of a tile of one field.
 const TILE: usize = 4 * 512;
 
+/// A copy of a field, made by all threads: most of its time goes to memory that the system hands out for the first time.
+fn copied(field: &[Tile]) -> Field {
+    field.par_iter().with_min_len(64).copied().collect()
+}
+
 impl Flow {
     /// A copy of what is carried from step to step.
     pub fn keep(&self) -> Kept {
         Kept {
             tiles: self.tiles.clone(),
-            velocity: self.velocity.clone(),
-            density: self.density.clone(),
-            pressure: self.pressure.clone(),
+            velocity: self.velocity.each_ref().map(|field| copied(field)),
+            density: copied(&self.density),
+            pressure: copied(&self.pressure),
             around: self.around.as_ref().map(|around| Box::new(around.keep())),
         }
     }

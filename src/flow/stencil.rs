@@ -3,6 +3,7 @@
 use super::tiles::Tile;
 use crate::base::blocks::Mask;
 use crate::base::cpu::dispatch;
+use crate::base::lanes::Lanes;
 
 /// Coefficients of a tile with faces that are not fully open, or with cells that do not take part.
 #[derive(Debug, Clone)]
@@ -58,10 +59,16 @@ pub fn row_of(tile: &Tile, row: usize) -> [f32; 8] {
     std::array::from_fn(|lane| tile[row * 8 + lane])
 }
 
-/// Eight values along z from a cell on that has as many behind it.
+/// The same, to compute with.
 #[inline(always)]
-fn eight(tile: &Tile, first: usize) -> [f32; 8] {
-    tile[first..].first_chunk().copied().unwrap_or([0.0; 8])
+fn lanes_of(tile: &Tile, row: usize) -> Lanes {
+    Lanes(row_of(tile, row))
+}
+
+/// Sets a row.
+#[inline(always)]
+fn put(tile: &mut Tile, row: usize, values: Lanes) {
+    tile[row * 8..][..8].copy_from_slice(&values.0);
 }
 
 #[inline(always)]
@@ -98,61 +105,95 @@ pub fn compute(near: Near<'_>, task: Task<'_>, out: &mut Tile) -> f64 {
 
 #[inline(always)]
 fn compute_rows(near: Near<'_>, task: Task<'_>, out: &mut Tile) -> f64 {
-    let mut sums = [0.0f32; 8];
-    match task {
-        Task::Product => each_row(&near, |row, x, product, _| {
-            out[row * 8..][..8].copy_from_slice(&product);
-            add_products(&mut sums, &x, &product);
-        }),
-        Task::Residual(b) => each_row(&near, |row, x, product, inverse| {
-            let values = &mut out[row * 8..][..8];
-            for lane in 0..8 {
-                values[lane] = masked(b[row * 8 + lane] - product[lane], inverse[lane]);
-            }
-            add_products(&mut sums, &x, values);
-        }),
-        Task::Smooth(b, weight) => each_row(&near, |row, x, product, inverse| {
-            let values = &mut out[row * 8..][..8];
-            let b = row_of(b, row);
-            for lane in 0..8 {
-                values[lane] = x[lane] + weight * inverse[lane] * (b[lane] - product[lane]);
-            }
-            add_products(&mut sums, &b, values);
-        }),
-    }
-    sums.iter().map(|sum| f64::from(*sum)).sum()
+    let sums = match task {
+        Task::Product => each_row(&near, Products { out, sums: Lanes::all(0.0) }).sums,
+        Task::Residual(b) => each_row(&near, Residuals { b, out, sums: Lanes::all(0.0) }).sums,
+        Task::Smooth(b, weight) => {
+            each_row(&near, Smoothed { b, weight: Lanes::all(weight), out, sums: Lanes::all(0.0) }).sums
+        }
+    };
+    sums.0.iter().map(|sum| f64::from(*sum)).sum()
 }
 
-#[inline(always)]
-fn add_products(sums: &mut [f32; 8], a: &[f32; 8], b: &[f32]) {
-    for lane in 0..8 {
-        sums[lane] += a[lane] * b[lane];
+/// What is done with each row of L x.
+trait Rows {
+    /// Takes a row's index, x, L x and inverse diagonal.
+    fn take(&mut self, row: usize, x: Lanes, product: Lanes, inverse: Lanes);
+}
+
+/// L x, with the sum of x times it.
+struct Products<'a> {
+    out: &'a mut Tile,
+    sums: Lanes,
+}
+
+impl Rows for Products<'_> {
+    #[inline(always)]
+    fn take(&mut self, row: usize, x: Lanes, product: Lanes, _: Lanes) {
+        put(self.out, row, product);
+        self.sums = self.sums + x * product;
     }
 }
 
-/// Calls `work` with each row's index, x, L x and inverse diagonal.
+/// b - L x, with the sum of x times it.
+struct Residuals<'a> {
+    b: &'a Tile,
+    out: &'a mut Tile,
+    sums: Lanes,
+}
+
+impl Rows for Residuals<'_> {
+    #[inline(always)]
+    fn take(&mut self, row: usize, x: Lanes, product: Lanes, inverse: Lanes) {
+        let residual = masked(lanes_of(self.b, row) - product, inverse);
+        put(self.out, row, residual);
+        self.sums = self.sums + x * residual;
+    }
+}
+
+/// x + weight / diagonal (b - L x), with the sum of b times it.
+struct Smoothed<'a> {
+    b: &'a Tile,
+    weight: Lanes,
+    out: &'a mut Tile,
+    sums: Lanes,
+}
+
+impl Rows for Smoothed<'_> {
+    #[inline(always)]
+    fn take(&mut self, row: usize, x: Lanes, product: Lanes, inverse: Lanes) {
+        let b = lanes_of(self.b, row);
+        let smooth = x + self.weight * inverse * (b - product);
+        put(self.out, row, smooth);
+        self.sums = self.sums + b * smooth;
+    }
+}
+
+/// Gives each row to what is done with it.
 #[inline(always)]
-fn each_row(near: &Near<'_>, mut work: impl FnMut(usize, [f32; 8], [f32; 8], [f32; 8])) {
+fn each_row<R: Rows>(near: &Near<'_>, mut rows: R) -> R {
     match near.stencil {
         None => {
             for row in 0..64 {
                 let (own, product) = plain(near, row);
-                work(row, own, product, [1.0 / 6.0; 8]);
+                rows.take(row, own, product, Lanes::all(1.0 / 6.0));
             }
         }
         Some(stencil) => {
             for row in 0..64 {
                 let (own, product) = with_faces(near, stencil, row);
-                work(row, own, product, row_of(&stencil.inverse, row));
+                rows.take(row, own, product, lanes_of(&stencil.inverse, row));
             }
         }
     }
+    rows
 }
 
-/// A value, or 0 in a cell that does not take part.
+/// Values, or 0 in cells that do not take part.
 #[inline(always)]
-fn masked(value: f32, inverse: f32) -> f32 {
-    if inverse > 0.0 { value } else { 0.0 }
+fn masked(values: Lanes, inverse: Lanes) -> Lanes {
+    let zero = Lanes::all(0.0);
+    zero.is_less(inverse).choose(values, zero)
 }
 
 /// The mean residual b - L x of each 2 x 2 x 2 cells; those that do not take part count as 0.
@@ -162,83 +203,55 @@ pub fn mean_residuals(near: Near<'_>, b: &Tile, out: &mut [f32; 64]) {
 
 #[inline(always)]
 fn mean_residual_rows(near: Near<'_>, b: &Tile, out: &mut [f32; 64]) {
-    let mut residual = [[0.0f32; 8]; 64];
-    each_row(&near, |row, _, product, inverse| {
-        for lane in 0..8 {
-            residual[row][lane] = masked(b[row * 8 + lane] - product[lane], inverse[lane]);
-        }
-    });
+    let mut residual = [0.0f32; 512];
+    each_row(&near, Residuals { b, out: &mut residual, sums: Lanes::all(0.0) });
     for (four, out) in out.chunks_exact_mut(4).enumerate() {
         let first = (four >> 2) << 4 | (four & 3) << 1;
-        let rows = [first, first + 1, first + 8, first + 9].map(|row| residual[row]);
-        let mut sum = [0.0; 8];
-        for lane in 0..8 {
-            sum[lane] = (rows[0][lane] + rows[1][lane]) + (rows[2][lane] + rows[3][lane]);
-        }
+        let rows = [first, first + 1, first + 8, first + 9].map(|row| lanes_of(&residual, row));
+        let sum = (rows[0] + rows[1]) + (rows[2] + rows[3]);
         for (z, out) in out.iter_mut().enumerate() {
-            *out = 0.125 * (sum[2 * z] + sum[2 * z + 1]);
+            *out = 0.125 * (sum.0[2 * z] + sum.0[2 * z + 1]);
         }
     }
 }
 
 /// Rows at -x, +x, -y, +y, -z, +z of a row.
 #[inline(always)]
-fn around(near: &Near<'_>, row: usize) -> [[f32; 8]; 6] {
+fn around(near: &Near<'_>, row: usize, own: Lanes) -> [Lanes; 6] {
     let (x, y) = (row >> 3, row & 7);
     let [low_x, high_x, low_y, high_y, low_z, high_z] = near.six;
     let pick = |inside: bool, row: usize, beyond: &Tile, other: usize| {
         let (tile, row) = if inside { (near.own, row) } else { (beyond, other) };
-        row_of(tile, row & 63)
+        lanes_of(tile, row & 63)
     };
     let left = pick(x > 0, row.wrapping_sub(8), low_x, row + 56);
     let right = pick(x < 7, row + 8, high_x, row.wrapping_sub(56));
     let down = pick(y > 0, row.wrapping_sub(1), low_y, row + 7);
     let up = pick(y < 7, row + 1, high_y, row.wrapping_sub(7));
-    // Both reach beyond the row, into values that are replaced.
-    let (first, last) = (row * 8, row * 8 + 7);
-    let mut back = if row > 0 { eight(near.own, first - 1) } else { [0.0; 8] };
-    let mut front = if row < 63 { eight(near.own, first + 1) } else { [0.0; 8] };
-    if row == 0 {
-        back[1..].copy_from_slice(&near.own[..7]);
-    }
-    if row == 63 {
-        front[..7].copy_from_slice(&near.own[505..]);
-    }
-    back[0] = low_z[last];
-    front[7] = high_z[first];
+    let back = own.behind(low_z[row * 8 + 7]);
+    let front = own.before(high_z[row * 8]);
     [left, right, down, up, back, front]
 }
 
 /// A row of x and of L x where all faces are open. Terms of opposite neighbours are added first, so that mirrored fields have
 /// mirrored results to the last bit.
 #[inline(always)]
-fn plain(near: &Near<'_>, row: usize) -> ([f32; 8], [f32; 8]) {
-    let own = row_of(near.own, row);
-    let [left, right, down, up, back, front] = around(near, row);
-    let mut product = [0.0; 8];
-    for lane in 0..8 {
-        let around = (left[lane] + right[lane]) + (down[lane] + up[lane]) + (back[lane] + front[lane]);
-        product[lane] = 6.0 * own[lane] - around;
-    }
-    (own, product)
+fn plain(near: &Near<'_>, row: usize) -> (Lanes, Lanes) {
+    let own = lanes_of(near.own, row);
+    let [left, right, down, up, back, front] = around(near, row, own);
+    (own, Lanes::all(6.0) * own - ((left + right) + (down + up) + (back + front)))
 }
 
 /// The same between faces that are not fully open.
 #[inline(always)]
-fn with_faces(near: &Near<'_>, stencil: &Stencil, row: usize) -> ([f32; 8], [f32; 8]) {
-    let own = row_of(near.own, row);
-    let [left, right, down, up, back, front] = around(near, row);
-    let faces = stencil.faces(row);
-    let pairs = [[left, right], [down, up], [back, front]];
-    let mut product = [0.0; 8];
-    for lane in 0..8 {
-        let term = |axis: usize| {
-            let ([low, high], [open_low, open_high]) = (&pairs[axis], &faces[axis]);
-            open_low[lane] * (own[lane] - low[lane]) + open_high[lane] * (own[lane] - high[lane])
-        };
-        product[lane] = term(0) + term(1) + term(2);
-    }
-    (own, product)
+fn with_faces(near: &Near<'_>, stencil: &Stencil, row: usize) -> (Lanes, Lanes) {
+    let own = lanes_of(near.own, row);
+    let [left, right, down, up, back, front] = around(near, row, own);
+    let [x, y, z] = stencil.faces(row);
+    let term = |low: Lanes, high: Lanes, open: [[f32; 8]; 2]| {
+        Lanes(open[0]) * (own - low) + Lanes(open[1]) * (own - high)
+    };
+    (own, term(left, right, x) + term(down, up, y) + term(back, front, z))
 }
 
 /// The first sweep from x = 0: weight / diagonal b.

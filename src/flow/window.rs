@@ -1,6 +1,7 @@
 //! Values of a tile and of cells around it, copied together so that kernels read them without asking for neighbours.
 
 use super::tiles::Tile;
+use crate::base::lanes::Lanes;
 
 /// Most cells around a tile: a displacement of five cells, and one for interpolation.
 pub const MOST: i32 = 6;
@@ -96,74 +97,72 @@ impl Window {
 
     /// The values of eight cells along z, from one on that is counted from the tile's first one.
     #[inline(always)]
-    pub fn row(&self, x: usize, y: usize, z: usize) -> [f32; 8] {
-        let index = (FIRST + x * LAYER + y * ROW + z) & MASK;
-        std::array::from_fn(|lane| self.values[index + lane])
+    pub fn row(&self, x: usize, y: usize, z: usize) -> Lanes {
+        self.lanes((FIRST + x * LAYER + y * ROW + z) & MASK)
+    }
+
+    #[inline(always)]
+    fn lanes(&self, index: usize) -> Lanes {
+        Lanes(std::array::from_fn(|lane| self.values[index + lane]))
+    }
+
+    #[inline(always)]
+    fn pair(&self, index: usize) -> &[f32; 2] {
+        self.values[index..].first_chunk().unwrap_or(&[0.0; 2])
     }
 
     /// Trilinear interpolation at the places of a row's cells, moved by displacements (cells).
     #[inline(always)]
-    pub fn sample(&self, row: usize, ways: &[[f32; 8]; 3]) -> [f32; 8] {
+    pub fn sample(&self, row: usize, ways: &[Lanes; 3]) -> Lanes {
         let (corners, weights) = self.corners(row, ways, None);
         interpolate(&corners, &weights)
     }
 
     /// The same at half a cell further on an axis.
     #[inline(always)]
-    pub fn sample_between(&self, row: usize, ways: &[[f32; 8]; 3], axis: usize) -> [f32; 8] {
+    pub fn sample_between(&self, row: usize, ways: &[Lanes; 3], axis: usize) -> Lanes {
         let (corners, weights) = self.corners(row, ways, Some(axis));
         interpolate(&corners, &weights)
     }
 
     /// Trilinear interpolation, with the least and the greatest of the eight values around each place.
     #[inline(always)]
-    pub fn sample_bounded(&self, row: usize, ways: &[[f32; 8]; 3]) -> [[f32; 8]; 3] {
+    pub fn sample_bounded(&self, row: usize, ways: &[Lanes; 3]) -> [Lanes; 3] {
         let (corners, weights) = self.corners(row, ways, None);
-        let mut bounds = [corners[0]; 2];
-        for corner in &corners[1..] {
-            for lane in 0..8 {
-                bounds[0][lane] = min(bounds[0][lane], corner[lane]);
-                bounds[1][lane] = max(bounds[1][lane], corner[lane]);
-            }
-        }
-        [interpolate(&corners, &weights), bounds[0], bounds[1]]
+        let [a, b, c, d, e, f, g, h] = corners;
+        let least = (a.min(b).min(c.min(d))).min(e.min(f).min(g.min(h)));
+        let most = (a.max(b).max(c.max(d))).max(e.max(f).max(g.max(h)));
+        [interpolate(&corners, &weights), least, most]
     }
 
     /// The values at the eight corners of the cells of places, and the corners' weights. Mirrored places have mirrored weights to
     /// the last bit.
     #[inline(always)]
-    fn corners(&self, row: usize, ways: &[[f32; 8]; 3], between: Option<usize>) -> ([[f32; 8]; 8], Weights) {
-        let (mut whole, mut weights) = ([[0.0f32; 8]; 3], [[[0.0f32; 8]; 2]; 3]);
+    fn corners(&self, row: usize, ways: &[Lanes; 3], between: Option<usize>) -> ([Lanes; 8], Weights) {
+        let (zero, one, half) = (Lanes::all(0.0), Lanes::all(1.0), Lanes::all(0.5));
+        let (mut whole, mut weights) = ([zero; 3], [[zero; 2]; 3]);
         for axis in 0..3 {
-            for lane in 0..8 {
-                let at = ways[axis][lane];
-                let nearest = (at + WHOLE) - WHOLE;
-                if between == Some(axis) {
-                    whole[axis][lane] = nearest;
-                    weights[axis][0][lane] = 0.5 - (at - nearest);
-                    weights[axis][1][lane] = 0.5 + (at - nearest);
-                } else {
-                    let down = nearest - if nearest > at { 1.0 } else { 0.0 };
-                    whole[axis][lane] = down;
-                    weights[axis][0][lane] = (down + 1.0) - at;
-                    weights[axis][1][lane] = at - down;
-                }
+            let at = ways[axis];
+            let nearest = (at + Lanes::all(WHOLE)) - Lanes::all(WHOLE);
+            if between == Some(axis) {
+                whole[axis] = nearest;
+                weights[axis] = [half - (at - nearest), half + (at - nearest)];
+            } else {
+                let down = nearest - at.is_less(nearest).choose(one, zero);
+                whole[axis] = down;
+                weights[axis] = [(down + one) - at, at - down];
             }
         }
         let first = WHOLE + (FIRST + (row >> 3) * LAYER + (row & 7) * ROW) as f32;
-        let mut base = [0u32; 8];
-        for lane in 0..8 {
-            // Whole numbers: the sum is exact, and its low bits are the index.
-            let index = whole[0][lane] * LAYER as f32 + whole[1][lane] * ROW as f32 + whole[2][lane];
-            base[lane] = (index + (first + lane as f32)).to_bits();
-        }
-        let mut corners = [[0.0f32; 8]; 8];
-        for lane in 0..8 {
-            let first = base[lane] as usize & MASK;
-            for (index, corner) in corners.iter_mut().enumerate() {
-                let shift = (index >> 2) * LAYER + (index >> 1 & 1) * ROW + (index & 1);
-                corner[lane] = self.values[first + shift];
-            }
+        // Whole numbers: the sum is exact, and its low bits are the index.
+        let index = whole[0] * Lanes::all(LAYER as f32) + whole[1] * Lanes::all(ROW as f32) + whole[2];
+        let base = (index + (Lanes::all(first) + STEPS)).0.map(|index| index.to_bits() as usize & MASK);
+        let mut corners = [zero; 8];
+        for pair in 0..4 {
+            let shift = (pair >> 1) * LAYER + (pair & 1) * ROW;
+            let at = |lane: usize| self.pair(base[lane] + shift);
+            let both = Lanes::pairs([at(0), at(1), at(2), at(3), at(4), at(5), at(6), at(7)]);
+            corners[2 * pair..][..2].copy_from_slice(&both);
         }
         (corners, weights)
     }
@@ -171,6 +170,8 @@ impl Window {
 
 /// 1.5 x 2^23: the sum with a small number is rounded to whole numbers.
 const WHOLE: f32 = 12_582_912.0;
+/// The lanes' numbers.
+const STEPS: Lanes = Lanes([0.0, 1.0, 2.0, 3.0, 4.0, 5.0, 6.0, 7.0]);
 
 #[inline(always)]
 pub fn min(a: f32, b: f32) -> f32 {
@@ -183,20 +184,16 @@ pub fn max(a: f32, b: f32) -> f32 {
 }
 
 /// Weights of the lower and the upper corners on each axis.
-type Weights = [[[f32; 8]; 2]; 3];
+type Weights = [[Lanes; 2]; 3];
 
 /// Mirrored corners with mirrored weights have the same result to the last bit.
 #[inline(always)]
-fn interpolate(corners: &[[f32; 8]; 8], [x, y, z]: &Weights) -> [f32; 8] {
-    let mut out = [0.0; 8];
-    for lane in 0..8 {
-        let c = |index: usize| corners[index][lane];
-        let mix = |a: f32, b: f32, [low, high]: &[[f32; 8]; 2]| a * low[lane] + b * high[lane];
-        let low = mix(mix(c(0), c(1), z), mix(c(2), c(3), z), y);
-        let high = mix(mix(c(4), c(5), z), mix(c(6), c(7), z), y);
-        out[lane] = mix(low, high, x);
-    }
-    out
+fn interpolate(corners: &[Lanes; 8], [x, y, z]: &Weights) -> Lanes {
+    let mix = |a: Lanes, b: Lanes, [low, high]: &[Lanes; 2]| a * *low + b * *high;
+    let [a, b, c, d, e, f, g, h] = *corners;
+    let low = mix(mix(a, b, z), mix(c, d, z), y);
+    let high = mix(mix(e, f, z), mix(g, h, z), y);
+    mix(low, high, x)
 }
 
 #[cfg(test)]
@@ -229,22 +226,22 @@ mod tests {
         for margin in 1..=MOST {
             let window = fill(Span::around(margin));
             assert_eq!(window.at(-1, 3, 8), -1.0 + 6.0 - 24.0);
-            assert_eq!(window.row(1, 2, 1)[7], 5.0 - 24.0);
+            assert_eq!(window.row(1, 2, 1).0[7], 5.0 - 24.0);
             // Row 42 begins at (5, 2, 0).
-            let ways = [[0.25; 8], [0.5; 8], [-0.75; 8]];
-            let value = window.sample(42, &ways)[3];
+            let ways = [0.25, 0.5, -0.75].map(Lanes::all);
+            let value = window.sample(42, &ways).0[3];
             assert!((value - (5.25 + 5.0 - 6.75)).abs() < 1e-5, "{margin}: {value}");
             let far = margin as f32;
-            let value = window.sample(7, &[[-far; 8], [far - 0.25; 8], [0.0; 8]])[0];
+            let value = window.sample(7, &[-far, far - 0.25, 0.0].map(Lanes::all)).0[0];
             assert!((value - (13.5 + far)).abs() < 1e-5, "{margin}: {value}");
-            let [_, low, high] = window.sample_bounded(42, &ways).map(|values| values[3]);
+            let [_, low, high] = window.sample_bounded(42, &ways).map(|values| values.0[3]);
             assert_eq!((low, high), (0.0, 6.0));
         }
         // Only what paths reach is covered, to the last cell.
         let extent = [[-4.3, -3.7], [1.0, 1.0], [-0.2, 4.9]];
         let window = fill(Span::moved([8; 3], &extent));
         for (row, lane, ways) in [(0, 0, [-4.3, 1.0, -0.2]), (63, 7, [-3.7, 1.0, 4.9])] {
-            let value = window.sample(row, &ways.map(|way| [way; 8]))[lane];
+            let value = window.sample(row, &ways.map(Lanes::all)).0[lane];
             let [x, y, z] = ways;
             let cell = (row >> 3) as f32 + 2.0 * (row & 7) as f32 - 3.0 * lane as f32;
             assert!((value - (cell + x + 2.0 * y - 3.0 * z)).abs() < 1e-5, "{value}");

@@ -273,10 +273,7 @@ impl Mist {
         let mass = self.mass();
         // The boundary may have made the air faster than it was when the sub-steps were chosen.
         let parts = self.parts(f64::from(self.flow.fastest()), dt)?;
-        for _ in 0..parts {
-            ctx.check()?;
-            self.flow.advect(dt / parts as f64, Scheme::MacCormack);
-        }
+        (0..parts).try_for_each(|_| self.flow.advect(ctx, dt / parts as f64, Scheme::MacCormack))?;
         self.settle(mass * libm::exp2(-dt / self.params.half_life));
         Ok(())
     }

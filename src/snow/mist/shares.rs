@@ -9,8 +9,16 @@ const LEAST: f32 = 0.05;
 /// loops.
 pub fn open(corners: [f32; 4]) -> f32 {
     let [a, b, c, d] = corners;
-    // Around the square.
-    let ring = [a, b, d, c];
+    let (least, greatest) = (a.min(b).min(c.min(d)), a.max(b).max(c.max(d)));
+    match (least >= 0.0, greatest < 0.0) {
+        (true, _) => 1.0,
+        (_, true) => 0.0,
+        _ => cut([a, b, d, c]),
+    }
+}
+
+/// The open share of a face that is cut by a surface, from its corners in their order around it.
+fn cut(ring: [f32; 4]) -> f32 {
     let inside = ring.iter().filter(|x| **x < 0.0).count();
     // The part of an edge on the side of its first end.
     let part = |from: f32, to: f32| from / (from - to);
@@ -19,8 +27,6 @@ pub fn open(corners: [f32; 4]) -> f32 {
     };
     let at = |index: usize| ring[index % 4];
     let closed = match inside {
-        0 => 0.0,
-        4 => 1.0,
         1 => {
             let corner = first(true);
             0.5 * part(at(corner), at(corner + 1)) * part(at(corner), at(corner + 3))

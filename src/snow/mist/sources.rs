@@ -152,7 +152,17 @@ fn seed(group: &[(Coord, u32)], ways: &[Way], params: &Params) -> Seed {
     let mut weights = [0.0f32; 512];
     for (_, index) in group {
         let Way { ends: [from, to], velocity: speed, radius } = ways[*index as usize];
-        for cell in 0..512usize {
+        let reach = DVec3::repeat(2.0 * radius + params.cell);
+        let least = (from.inf(&to) - reach) / params.cell;
+        let most = (from.sup(&to) + reach) / params.cell;
+        // The cells of the tile that the tube may cover.
+        let [x, y, z] = [0, 1, 2].map(|axis| {
+            let first = f64::from(coord[axis] * 8);
+            (least[axis] - first).clamp(0.0, 8.0) as usize
+                ..(most[axis] - first).ceil().clamp(0.0, 8.0) as usize
+        });
+        let rows = x.flat_map(|x| y.clone().map(move |y| x << 6 | y << 3));
+        for cell in rows.flat_map(|row| z.clone().map(move |z| row | z)) {
             let at = [cell >> 6, cell >> 3 & 7, cell & 7];
             let place =
                 [0, 1, 2].map(|axis| (f64::from(coord[axis] * 8 + at[axis] as i32) + 0.5) * params.cell);

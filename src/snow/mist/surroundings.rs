@@ -294,13 +294,13 @@ struct Corners {
     count: usize,
     /// To what stands still, and to what moves.
     distances: [Vec<f32>; 2],
+    /// To the nearest of both.
+    nearest: Vec<f32>,
 }
 
 impl Corners {
-    /// To the nearest of all.
     fn at(&self, [x, y, z]: [usize; 3]) -> f32 {
-        let index = (x * self.count + y) * self.count + z;
-        self.distances[0][index].min(self.distances[1][index])
+        self.nearest[(x * self.count + y) * self.count + z]
     }
 
     /// Whether what moves is nearer than what stands still.
@@ -329,7 +329,7 @@ impl Around<'_> {
             return None;
         }
         let corners = self.corners(index, tile, &sheets);
-        if corners.distances.iter().flatten().all(|distance| *distance >= 0.0) {
+        if corners.nearest.iter().all(|distance| *distance >= 0.0) {
             return None;
         }
         let mut faces = Faces::open();
@@ -369,25 +369,21 @@ impl Around<'_> {
                 distances[side].push(nearest.fold(solids[side], f32::min));
             }
         }
-        Corners { count, distances }
+        let nearest = distances[0].iter().zip(&distances[1]).map(|(a, b)| a.min(*b)).collect();
+        Corners { count, distances, nearest }
     }
 
     /// Open share of the lower face of a cell on an axis: the mean of its parts.
     fn open(&self, corners: &Corners, axis: usize, cell: [usize; 3]) -> f32 {
-        let parts = self.lattice.parts;
-        let [one, other] = [(axis + 1) % 3, (axis + 2) % 3];
+        let (parts, count) = (self.lattice.parts, corners.count);
+        let steps = [count * count, count, 1];
+        let first = (cell[0] * steps[0] + cell[1] * steps[1] + cell[2]) * parts;
+        let (one, other) = (steps[(axis + 1) % 3], steps[(axis + 2) % 3]);
         let mut sum = 0.0;
         for part in 0..parts * parts {
-            let mut at = cell.map(|x| x * parts);
-            at[one] += part / parts;
-            at[other] += part % parts;
-            let four = [[0, 0], [0, 1], [1, 0], [1, 1]].map(|[i, j]| {
-                let mut corner = at;
-                corner[one] += i;
-                corner[other] += j;
-                corners.at(corner)
-            });
-            sum += shares::open(four);
+            let at = first + part / parts * one + part % parts * other;
+            let near = &corners.nearest;
+            sum += shares::open([near[at], near[at + other], near[at + one], near[at + one + other]]);
         }
         sum / (parts * parts) as f32
     }

@@ -24,11 +24,7 @@ fn carried(scheme: Scheme, steps: usize) -> ([f64; 3], f64, f32) {
         }
     }
     for _ in 0..steps {
-        ctx.phase("advect", || {
-            flow.advect(1.0, scheme);
-            Ok(())
-        })
-        .unwrap();
+        ctx.phase("advect", || flow.advect(&ctx, 1.0, scheme)).unwrap();
     }
     let (mut sum, mut centre, mut most) = (0.0f64, [0.0f64; 3], 0.0f32);
     for (coord, tile) in flow.tiles().coords().iter().zip(flow.density()) {
