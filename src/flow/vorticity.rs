@@ -6,6 +6,8 @@ use rayon::prelude::*;
 use super::Flow;
 use super::tiles::{FACES, Tile};
 use super::window::{Span, Window};
+use crate::context::Context;
+use crate::error::Result;
 
 /// Cells around a tile of which velocities at centres, and vorticities, are computed.
 const CENTRES: usize = 3;
@@ -37,19 +39,24 @@ impl Cube {
 
 impl Flow {
     /// Confines vorticity: `gain` is its strength (1/s) times the time (s).
-    pub fn confine(&mut self, gain: f32) {
+    ///
+    /// # Errors
+    /// Cancel.
+    pub fn confine(&mut self, ctx: &Context, gain: f32) -> Result<()> {
         let Self { tiles, velocity, ambient, .. } = self;
         let near = tiles.neighbours();
-        let pushes: Vec<[Tile; 3]> = (0..tiles.active())
+        let pushes: Result<Vec<[Tile; 3]>> = (0..tiles.active())
             .into_par_iter()
             .map_init(<[Window; 3]>::default, |windows, slot| {
+                ctx.check()?;
                 for (axis, window) in windows.iter_mut().enumerate() {
                     let span = Span::around(CENTRES as i32 + 1);
                     window.fill(&velocity[axis], &near[slot], &span, ambient[axis]);
                 }
-                pushes(windows, gain)
+                Ok(pushes(windows, gain))
             })
             .collect();
+        let pushes = pushes?;
         for (axis, field) in velocity.iter_mut().enumerate() {
             // The rim has the upper faces of the last active cells.
             field.par_iter_mut().enumerate().for_each(|(slot, faces)| {
@@ -68,6 +75,7 @@ impl Flow {
                 }
             });
         }
+        Ok(())
     }
 }
 
@@ -144,14 +152,15 @@ mod tests {
             let slot = flow.tiles().find(coord).unwrap() as usize;
             flow.velocity().iter().flat_map(|field| field[slot]).map(|x| x * x).sum::<f32>()
         };
+        let ctx = Context::new(crate::context::Pool::new(1).unwrap());
         let mut flow = column();
         let before = energy(&flow, [0, 0, 0]);
-        flow.confine(0.2);
+        flow.confine(&ctx, 0.2).unwrap();
         let after = energy(&flow, [0, 0, 0]);
         assert!(after > 1.02 * before, "{before} {after}");
         let mut still = Flow::new(0.1, [1.0, 0.0, 0.0]).unwrap();
         still.resize(&padded(&[[0, 0, 0]], 1));
-        still.confine(0.2);
+        still.confine(&ctx, 0.2).unwrap();
         assert!(still.velocity()[0].iter().flatten().all(|x| *x == 1.0));
     }
 }

@@ -261,9 +261,9 @@ impl Mist {
         if let Some(wind) = wind {
             wind.blow(ctx, &mut self.flow, dt)?;
         }
-        turbulence::stir(&mut self.flow, &self.params, time, dt);
+        turbulence::stir(ctx, &mut self.flow, &self.params, time, dt)?;
         if self.params.confinement > 0.0 {
-            self.flow.confine((self.params.confinement * dt) as f32);
+            self.flow.confine(ctx, (self.params.confinement * dt) as f32)?;
         }
         Ok(())
     }

@@ -6,6 +6,8 @@ use rayon::prelude::*;
 
 use super::{Params, coarse};
 use crate::base::DVec3;
+use crate::context::Context;
+use crate::error::Result;
 use crate::flow::Flow;
 
 /// Curl of the noises, in units of their size, whose root mean square is 1 (measured by the test).
@@ -16,21 +18,26 @@ const STEP: f64 = 0.05;
 const CHANGE: f64 = 0.7;
 
 /// The eddies act on the air for `dt` (s) from a time (s) on.
-pub fn stir(flow: &mut Flow, params: &Params, time: f64, dt: f64) {
+///
+/// # Errors
+/// Cancel.
+pub fn stir(ctx: &Context, flow: &mut Flow, params: &Params, time: f64, dt: f64) -> Result<()> {
     if params.turbulence == 0.0 {
-        return;
+        return Ok(());
     }
     let eddies = Eddies::new(params, time);
     let cell = f64::from(flow.cell());
     let tiles = &flow.tiles().coords()[..flow.tiles().active()];
     let at = |tile: &_| {
-        coarse::places(*tile, cell).map(|place| {
+        ctx.check()?;
+        Ok(coarse::places(*tile, cell).map(|place| {
             let push = eddies.curl(place) * (params.turbulence * dt);
             [push.x as f32, push.y as f32, push.z as f32]
-        })
+        }))
     };
-    let values: Vec<[[f32; 3]; coarse::PLACES]> = tiles.par_iter().with_min_len(8).map(at).collect();
-    coarse::change(flow, &values, |old, push| old + push);
+    let values: Result<Vec<[[f32; 3]; coarse::PLACES]>> = tiles.par_iter().with_min_len(8).map(at).collect();
+    coarse::change(flow, &values?, |old, push| old + push);
+    Ok(())
 }
 
 /// The noises at a time.
