@@ -3,12 +3,13 @@
 use rayon::prelude::*;
 
 use super::Flow;
+use super::room::first;
 use super::tiles::{Coord, Field, Tile, Tiles};
 use crate::base::bytes::{Reader, Writer};
 use crate::error::{Error, Result};
 
 /// What a flow carries from step to step.
-#[derive(Debug, Clone, Default)]
+#[derive(Debug, Default)]
 pub struct Kept {
     tiles: Tiles,
     velocity: [Field; 3],
@@ -22,23 +23,27 @@ const OUTERMOST: i32 = 1 << 26;
 /// Bytes of a tile of one field.
 const TILE: usize = 4 * 512;
 
-/// A copy of a field, made by all threads: most of its time goes to memory that the system hands out for the first time.
-fn copied(field: &[Tile]) -> Field {
-    field.par_iter().with_min_len(64).copied().collect()
+impl Kept {
+    /// Becomes a copy of what a flow carries from step to step. Memory that it has is used again.
+    pub fn become_of(&mut self, flow: &Flow) {
+        self.tiles.clone_from(&flow.tiles);
+        for (to, from) in self.velocity.iter_mut().zip(&flow.velocity) {
+            copy(from, to);
+        }
+        copy(&flow.density, &mut self.density);
+        copy(&flow.pressure, &mut self.pressure);
+        if let Some(around) = &flow.around {
+            self.around.get_or_insert_default().become_of(around);
+        }
+    }
+}
+
+fn copy(from: &[Tile], to: &mut Field) {
+    to.truncate(from.len());
+    first(to, from.len()).par_iter_mut().zip(from).with_min_len(64).for_each(|(to, from)| *to = *from);
 }
 
 impl Flow {
-    /// A copy of what is carried from step to step.
-    pub fn keep(&self) -> Kept {
-        Kept {
-            tiles: self.tiles.clone(),
-            velocity: self.velocity.each_ref().map(|field| copied(field)),
-            density: copied(&self.density),
-            pressure: copied(&self.pressure),
-            around: self.around.as_ref().map(|around| Box::new(around.keep())),
-        }
-    }
-
     /// A flow with the same state.
     pub fn copy(&self) -> Self {
         Self {
@@ -53,12 +58,14 @@ impl Flow {
         }
     }
 
-    /// Puts back what was kept of this flow.
-    pub fn put_back(&mut self, kept: Kept) {
-        let Kept { tiles, velocity, density, pressure, around } = kept;
-        (self.tiles, self.velocity, self.density, self.pressure) = (tiles, velocity, density, pressure);
-        if let (Some(own), Some(around)) = (&mut self.around, around) {
-            own.put_back(*around);
+    /// Puts back what was kept of this flow; `kept` is of no use then, but for its memory.
+    pub fn put_back(&mut self, kept: &mut Kept) {
+        std::mem::swap(&mut self.tiles, &mut kept.tiles);
+        std::mem::swap(&mut self.velocity, &mut kept.velocity);
+        std::mem::swap(&mut self.density, &mut kept.density);
+        std::mem::swap(&mut self.pressure, &mut kept.pressure);
+        if let (Some(own), Some(around)) = (&mut self.around, &mut kept.around) {
+            own.put_back(around);
         }
     }
 
@@ -78,8 +85,8 @@ impl Flow {
     /// # Errors
     /// Bytes that are not such a state; the flow is then as it was.
     pub fn load(&mut self, from: &mut Reader<'_>) -> Result<()> {
-        let kept = self.read(from)?;
-        self.put_back(kept);
+        let mut kept = self.read(from)?;
+        self.put_back(&mut kept);
         Ok(())
     }
 

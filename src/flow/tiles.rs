@@ -27,11 +27,23 @@ pub const FACES: [usize; 6] = [4, 22, 10, 16, 12, 14];
 
 /// A sparse set of tiles. The first [`Tiles::active`] slots hold cells. Those behind them, the *rim*, are the tiles next to these
 /// in all 26 directions: they hold the upper faces of cells whose tiles end there, and what the air around is like.
-#[derive(Debug, Clone, Default)]
+#[derive(Debug, Default)]
 pub struct Tiles {
     coords: Vec<Coord>,
     active: usize,
     neighbours: Vec<[u32; 27]>,
+}
+
+impl Clone for Tiles {
+    fn clone(&self) -> Self {
+        Self { coords: self.coords.clone(), active: self.active, neighbours: self.neighbours.clone() }
+    }
+
+    fn clone_from(&mut self, other: &Self) {
+        self.coords.clone_from(&other.coords);
+        self.active = other.active;
+        self.neighbours.clone_from(&other.neighbours);
+    }
 }
 
 impl Tiles {

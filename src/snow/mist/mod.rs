@@ -25,7 +25,7 @@ use rayon::prelude::*;
 
 use crate::context::{Context, PhaseTime};
 use crate::error::{Error, Result};
-use crate::flow::{Coord, FARTHEST, Flow, Scheme, Solids, Tiles, tiles};
+use crate::flow::{Coord, FARTHEST, Flow, Kept, Scheme, Solids, Tiles, tiles};
 use sources::Seed;
 
 #[cfg(feature = "vdb")]
@@ -92,12 +92,14 @@ pub struct Around<'a> {
 pub struct Mist {
     params: Params,
     flow: Flow,
+    /// The flow as it was before the step, for one that fails.
+    before: Kept,
 }
 
 impl Clone for Mist {
     /// A copy of what is carried from step to step.
     fn clone(&self) -> Self {
-        Self { params: self.params.clone(), flow: self.flow.copy() }
+        Self { params: self.params.clone(), flow: self.flow.copy(), before: Kept::default() }
     }
 }
 
@@ -109,7 +111,7 @@ impl Mist {
     pub fn new(params: Params) -> Result<Self> {
         params.validate()?;
         let flow = Flow::new(params.cell, params.wind.map(|x| x as f32))?;
-        Ok(Self { params, flow })
+        Ok(Self { params, flow, before: Kept::default() })
     }
 
     /// Resumes from a state that [`Mist::save`] wrote.
@@ -183,12 +185,12 @@ impl Mist {
         around.sources.iter().try_for_each(|source| source.check(self.params.cell))?;
         let raising = around.sources.iter().filter(|source| source.raises(&self.params));
         let raising: Vec<Source> = raising.copied().collect();
-        let before = self.flow.keep();
+        ctx.pool().install(|| self.before.become_of(&self.flow));
         let around = Around { sources: &raising, ..*around };
         match ctx.step(1, || ctx.phase("flow", || self.carry(ctx, &around, times))) {
             Ok((report, phases)) => Ok(StepReport { sources: raising.len(), phases, ..report }),
             Err(error) => {
-                self.flow.put_back(before);
+                self.flow.put_back(&mut self.before);
                 Err(error)
             }
         }
