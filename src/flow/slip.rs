@@ -89,8 +89,9 @@ fn bits(mut mask: u64) -> impl Iterator<Item = usize> {
     })
 }
 
-/// The first cell of each row along z, and the first row of a layer.
+/// The first cell of each row of a layer.
 const FIRST: u64 = 0x0101_0101_0101_0101;
+/// The first row of a layer.
 const ROW: u64 = 0xff;
 
 /// The places next to those of a mask, with the masks of the six tiles around.
@@ -141,4 +142,31 @@ fn known_of(tiles: &Tiles, flows: &[[u64; 8]], solids: &Solids, slot: usize) -> 
             open[x] | own[x] | lower
         })
     })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn places_beside_a_mask_are_those_whose_neighbour_is_in_it() {
+        let tiles = Tiles::new(&[[0, 0, 0]]);
+        for cell in 0..512usize {
+            let mut found = Vec::new();
+            for face in 0..6 {
+                let (near, at) = tiles.beside(0, cell, face / 2, face % 2 == 1);
+                let (mut own, mut six) = ([0; 8], [[0; 8]; 6]);
+                let mask = if near == 0 { &mut own } else { &mut six[face] };
+                mask[at >> 6] |= 1 << (at & 63);
+                let beside = beside(&own, &six);
+                assert_eq!(beside[cell >> 6] >> (cell & 63) & 1, 1, "{cell} {face}");
+                found.push(beside.iter().map(|word| word.count_ones()).sum::<u32>());
+            }
+            // A place in another tile has one neighbour here.
+            let inside = found.iter().filter(|count| **count > 1).count();
+            let at = [cell >> 6, cell >> 3 & 7, cell & 7];
+            let wanted = 6 - at.iter().filter(|x| **x == 0 || **x == 7).count();
+            assert_eq!(inside, wanted, "{cell} {found:?}");
+        }
+    }
 }

@@ -235,8 +235,7 @@ impl Mist {
     /// Into how many parts a time (s) is divided for a speed (m/s).
     fn parts(&self, speed: f64, dt: f64) -> Result<usize> {
         let count = (speed * dt / (f64::from(FARTHEST) * self.params.cell)).ceil();
-        // Not the other way round, which a speed that is no number would pass.
-        if !(count <= MOST as f64) {
+        if count.is_nan() || count > MOST as f64 {
             return Err(Error::argument(format!(
                 "mist moves at {speed:.0} m/s, more than {MOST} steps of {FARTHEST} cells of {} m in {dt:.4} s",
                 self.params.cell
