@@ -232,7 +232,7 @@ typedef struct hasty {
 } hasty;
 
 static inline int cancel_and_reset(void *user, const frz_progress *progress) {
-    hasty *state = user;
+    hasty *state = (hasty *)user;
     (void)progress;
     if (++state->polls == state->at) {
         frz_context_cancel(state->ctx);
