@@ -284,7 +284,7 @@ static void what_is_refused(frz_context *ctx, const scene *with) {
     double places[2][3] = {{0, 0.3, 0}, {0.1, 0.3, 0}};
     float speeds[2][3] = {{0, 3, 0}, {0, 3, 0}};
     frz_mist_report report;
-    frz_grid *nan = blowing(ctx, (float)NAN);
+    frz_grid *storm = blowing(ctx, 2000);
     bytes state, before, after;
     size_t size = 5, i;
     report.struct_size = sizeof report;
@@ -309,7 +309,7 @@ static void what_is_refused(frz_context *ctx, const scene *with) {
     FAILS(POINTS(2, 2, 0, NULL), FRZ_ERROR_ARGUMENT, "radius = 0 is not within");
     FAILS(POINTS(2, 2, 100, NULL), FRZ_ERROR_ARGUMENT, "radius of 100 m");
     FAILS(POINTS(2, 2, 0.005, with->wind), FRZ_ERROR_ARGUMENT, "holds vectors");
-    FAILS(frz_mist_step(ctx, mist, with->grains, NULL, nan, NULL, 0, 0, DT, &report), FRZ_ERROR_ARGUMENT, "the wind at (");
+    FAILS(frz_mist_step(ctx, mist, with->grains, NULL, storm, NULL, 0, 0, DT, &report), FRZ_ERROR_ARGUMENT, "the wind at (");
     places[1][2] = (double)NAN;
     FAILS(POINTS(2, 2, 0.005, NULL), FRZ_ERROR_ARGUMENT, "from the origin");
     places[1][2] = 1e9;
@@ -343,7 +343,7 @@ static void what_is_refused(frz_context *ctx, const scene *with) {
     }
     CHECK(none == NULL);
     free(state.data);
-    frz_grid_destroy(nan);
+    frz_grid_destroy(storm);
     frz_mist_destroy(mist);
 }
 
