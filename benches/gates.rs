@@ -44,6 +44,8 @@ mod grain_readers;
 mod grains;
 #[path = "gates/harness.rs"]
 mod harness;
+#[path = "gates/host.rs"]
+mod host;
 #[path = "gates/house.rs"]
 mod house;
 #[path = "gates/materials.rs"]

@@ -18,6 +18,7 @@ use frazil::capi::{frz_status, frz_view};
 
 use crate::common::shapes;
 use crate::harness::Harness;
+use crate::host::{view, works};
 
 /// Rounds for each function.
 const ROUNDS: usize = 2000;
@@ -56,16 +57,6 @@ struct Host {
     ball_end: Vec<[f32; 3]>,
     centres: Vec<[f32; 3]>,
     radii: Vec<f32>,
-}
-
-pub fn works(status: frz_status) {
-    // SAFETY: the text ends with a zero.
-    let said = unsafe { std::ffi::CStr::from_ptr(frazil::capi::library::frz_last_error()) };
-    assert_eq!(status, frz_status::FRZ_OK, "{said:?}");
-}
-
-pub fn view<T>(elements: &[T]) -> frz_view {
-    frz_view { data: elements.as_ptr().cast(), count: elements.len(), stride: 0 }
 }
 
 impl Host {

@@ -5,17 +5,16 @@ use std::time::{Duration, Instant};
 use frazil::capi::context::*;
 use frazil::capi::frz_status;
 
-use crate::cancel::works;
 use crate::grains::Random;
 use crate::harness::{Harness, median, timed};
+use crate::host::{Threads, works};
 
 /// Cancels that are measured.
-const CANCELS: usize = 120;
+const CANCELS: usize = 200;
 
 /// Something that a host steps.
 pub trait Steps {
-    /// Its context.
-    fn context(&self) -> *mut frz_context;
+    fn threads(&self) -> &Threads;
     fn step(&self) -> frz_status;
     /// All that the next step depends on.
     fn state(&self) -> Vec<u8>;
@@ -27,7 +26,8 @@ pub fn measure(h: &mut Harness, name: &'static str, host: &impl Steps, random: &
     let mut before = host.state();
     let mut latencies = Vec::new();
     for attempt in 0..2 * CANCELS {
-        match cancelled(host, Duration::from_secs_f64(whole * random.next())) {
+        let moment = Duration::from_secs_f64(whole * random.next());
+        match latency(host.threads(), moment, || host.step()) {
             Some(latency) => latencies.push(latency),
             // The step ended first.
             None => before = host.state(),
@@ -47,9 +47,9 @@ pub fn measure(h: &mut Harness, name: &'static str, host: &impl Steps, random: &
     h.gate(name, p99, &note);
 }
 
-/// Seconds from a cancel after `moment` to the return of the step; none when the step ended first.
-fn cancelled(host: &impl Steps, moment: Duration) -> Option<f64> {
-    let ctx = host.context() as usize;
+/// Seconds from a cancel after `moment` to the return of a step; none when the step ended first.
+pub fn latency(threads: &Threads, moment: Duration, step: impl FnOnce() -> frz_status) -> Option<f64> {
+    let ctx = threads.ctx as usize;
     let canceller = std::thread::spawn(move || {
         std::thread::sleep(moment);
         let now = Instant::now();
@@ -57,10 +57,9 @@ fn cancelled(host: &impl Steps, moment: Duration) -> Option<f64> {
         unsafe { frz_context_cancel(ctx as *mut frz_context) };
         now
     });
-    let status = host.step();
+    let status = step();
     let ended = Instant::now();
     let asked = canceller.join().expect("the thread");
-    // SAFETY: the context is the host's.
-    unsafe { frz_context_reset(host.context()) };
+    threads.reset();
     (status == frz_status::FRZ_CANCELLED).then(|| ended.saturating_duration_since(asked).as_secs_f64())
 }

@@ -13,14 +13,14 @@ use frazil::capi::body::frz_body;
 use frazil::capi::context::*;
 use frazil::capi::grid::*;
 use frazil::capi::grid_bytes::*;
-use frazil::capi::library::*;
-use frazil::capi::pool::*;
 use frazil::capi::{frz_status, frz_view};
 use frazil::motion::Motion;
 use frazil::snow::base_layer::BaseLayer;
 use frazil::sweep::Body;
 
+use crate::cancel_latency::latency;
 use crate::harness::{Harness, median, timed};
+use crate::host::{Threads, view, works, written};
 use crate::scenes::{self, FRAMES, context};
 
 /// A body's poses in 32 bits at whole frames, as a host has them.
@@ -40,11 +40,7 @@ impl Poses {
     }
 
     fn body(&self, frame: i32) -> frz_body {
-        let view = |data: *const c_void, count| frz_view { data, count, stride: 0 };
-        let pose = |frame: i32| {
-            let positions = &self.frames[frame as usize];
-            view(positions.as_ptr().cast(), positions.len())
-        };
+        let pose = |frame: i32| view(&self.frames[frame as usize]);
         frz_body {
             struct_size: size_of::<frz_body>() as u32,
             flags: 0,
@@ -53,8 +49,8 @@ impl Poses {
             positions_end: pose(frame),
             between: std::ptr::null(),
             between_count: 0,
-            face_counts: view(std::ptr::null(), 0),
-            indices: view(self.triangles.as_ptr().cast(), self.triangles.len() * 3),
+            face_counts: frz_view { data: std::ptr::null(), count: 0, stride: 0 },
+            indices: view(self.triangles.as_flattened()),
             friction: 0.3,
             stick: 0.0,
             compression: 0.0,
@@ -89,24 +85,16 @@ impl Motion for Straight {
 
 /// A host with a context, a layer and a body.
 struct Host {
-    pool: *mut frz_pool,
-    ctx: *mut frz_context,
+    threads: Threads,
     snow: *mut frz_grid,
     base: *mut frz_base,
     poses: Poses,
 }
 
-fn works(status: frz_status) {
-    // SAFETY: the text ends with a zero.
-    let said = unsafe { std::ffi::CStr::from_ptr(frz_last_error()) };
-    assert_eq!(status, frz_status::FRZ_OK, "{said:?}");
-}
-
 impl Host {
     fn new((layer, body): (BaseLayer, Body), threads: u32) -> Self {
         let mut host = Self {
-            pool: null_mut(),
-            ctx: null_mut(),
+            threads: Threads::new(threads),
             snow: null_mut(),
             base: null_mut(),
             poses: Poses::of(&body),
@@ -116,10 +104,8 @@ impl Host {
         drop(layer);
         // SAFETY: the pointers are valid.
         unsafe {
-            works(frz_pool_create(threads, &mut host.pool));
-            works(frz_context_create(FRZ_ABI_VERSION, host.pool, &mut host.ctx));
             let bytes = (bytes.as_ptr().cast(), bytes.len());
-            works(frz_grid_from_bytes(host.ctx, bytes.0, bytes.1, std::ptr::null(), &mut host.snow));
+            works(frz_grid_from_bytes(host.threads.ctx, bytes.0, bytes.1, std::ptr::null(), &mut host.snow));
         }
         host.base = host.make(&[]);
         host
@@ -130,7 +116,14 @@ impl Host {
         let restart = if state.is_empty() { std::ptr::null() } else { state.as_ptr().cast() };
         // SAFETY: the pointers are valid.
         unsafe {
-            works(frz_base_create(self.ctx, std::ptr::null(), self.snow, restart, state.len(), &mut base))
+            works(frz_base_create(
+                self.threads.ctx,
+                std::ptr::null(),
+                self.snow,
+                restart,
+                state.len(),
+                &mut base,
+            ))
         };
         base
     }
@@ -141,52 +134,30 @@ impl Host {
         self.base = self.make(state);
     }
 
-    fn reset(&self) {
-        // SAFETY: the context is the host's.
-        unsafe { frz_context_reset(self.ctx) };
-    }
-
     fn step(&self, frame: i32) -> frz_status {
         let body = self.poses.body(frame);
         let dt = if frame == 0 { 0.0 } else { 1.0 };
         // SAFETY: the pointers are valid.
-        unsafe { frz_base_step(self.ctx, self.base, &body, 1, dt, frame, null_mut()) }
+        unsafe { frz_base_step(self.threads.ctx, self.base, &body, 1, dt, frame, null_mut()) }
     }
 
     fn state(&self) -> Vec<u8> {
-        let mut size = 0;
         // SAFETY: the pointers are valid.
-        unsafe {
-            works(frz_base_save(self.ctx, self.base, null_mut(), 0, &mut size));
-            let mut out = vec![0u8; size];
-            works(frz_base_save(self.ctx, self.base, out.as_mut_ptr().cast(), size, &mut size));
-            out.truncate(size);
-            out
-        }
+        written(|room, capacity, size| unsafe {
+            frz_base_save(self.threads.ctx, self.base, room, capacity, size)
+        })
     }
 
     fn bytes(&self) -> Vec<u8> {
-        let mut size = 0;
+        let none = frz_compression::FRZ_COMPRESSION_NONE as u32;
+        // SAFETY: the layer is there.
+        let grids = unsafe {
+            [frz_base_grid(self.base), frz_base_removed(self.base), frz_base_compression(self.base)]
+        };
         // SAFETY: the pointers are valid.
-        unsafe {
-            let grids =
-                [frz_base_grid(self.base), frz_base_removed(self.base), frz_base_compression(self.base)];
-            let none = frz_compression::FRZ_COMPRESSION_NONE as u32;
-            works(frz_grid_to_bytes(self.ctx, grids.as_ptr(), 3, none, 0, null_mut(), 0, &mut size));
-            let mut out = vec![0u8; size];
-            works(frz_grid_to_bytes(
-                self.ctx,
-                grids.as_ptr(),
-                3,
-                none,
-                0,
-                out.as_mut_ptr().cast(),
-                size,
-                &mut size,
-            ));
-            out.truncate(size);
-            out
-        }
+        written(|room, capacity, size| unsafe {
+            frz_grid_to_bytes(self.threads.ctx, grids.as_ptr(), 3, none, 0, room, capacity, size)
+        })
     }
 
     fn voxels(&self) -> u64 {
@@ -205,8 +176,6 @@ impl Drop for Host {
         unsafe {
             frz_base_destroy(self.base);
             frz_grid_destroy(self.snow);
-            frz_context_destroy(self.ctx);
-            frz_pool_destroy(self.pool);
         }
     }
 }
@@ -245,7 +214,11 @@ fn cancel(h: &mut Harness) {
     for attempt in 0..200 {
         random = random.wrapping_mul(6364136223846793005).wrapping_add(1442695040888963407);
         let moment = Duration::from_secs_f64(whole * (random >> 33) as f64 / (1u64 << 31) as f64);
-        match if attempt % 2 == 0 { from_a_thread(&host, moment) } else { from_the_poll(&host, moment) } {
+        match if attempt % 2 == 0 {
+            latency(&host.threads, moment, || host.step(2))
+        } else {
+            from_the_poll(&host, moment)
+        } {
             Some(latency) => latencies.push(latency),
             // The step ended first.
             None => host.restore(&state),
@@ -259,23 +232,6 @@ fn cancel(h: &mut Harness) {
     let note = format!("{count} cancels of a step of {whole:.3} s; median {:.4} s", median(latencies));
     h.gate("capi.cancel_latency", p99, &note);
     h.holds("capi.cancel_state", same, "the state after cancels, and the grids of the step made in the end");
-}
-
-/// Seconds from a cancel after `moment` to the step's answer; none when the step ended first.
-fn from_a_thread(host: &Host, moment: Duration) -> Option<f64> {
-    let ctx = host.ctx as usize;
-    let canceller = std::thread::spawn(move || {
-        std::thread::sleep(moment);
-        let now = Instant::now();
-        // SAFETY: the context outlives this thread, which is joined.
-        unsafe { frz_context_cancel(ctx as *mut frz_context) };
-        now
-    });
-    let status = host.step(2);
-    let ended = Instant::now();
-    let asked = canceller.join().expect("the thread");
-    host.reset();
-    (status == frz_status::FRZ_CANCELLED).then(|| ended.saturating_duration_since(asked).as_secs_f64())
 }
 
 /// When the poll is to cancel (microseconds of [`clock`]).
@@ -292,17 +248,17 @@ unsafe extern "C" fn poll(_: *mut c_void, _: *const frz_progress) -> c_int {
     c_int::from(clock() >= DUE.load(Ordering::Relaxed))
 }
 
-/// As [`from_a_thread`]; the time until the poll is asked counts.
+/// As [`latency`]; the time until the poll is asked counts.
 fn from_the_poll(host: &Host, moment: Duration) -> Option<f64> {
     let due = clock() + moment.as_micros() as u64;
     DUE.store(due, Ordering::Relaxed);
     // SAFETY: the context is the host's.
-    unsafe { works(frz_context_set_poll(host.ctx, Some(poll), null_mut())) };
+    unsafe { works(frz_context_set_poll(host.threads.ctx, Some(poll), null_mut())) };
     let status = host.step(2);
     let ended = clock();
     // SAFETY: as above.
-    unsafe { works(frz_context_set_poll(host.ctx, None, null_mut())) };
-    host.reset();
+    unsafe { works(frz_context_set_poll(host.threads.ctx, None, null_mut())) };
+    host.threads.reset();
     (status == frz_status::FRZ_CANCELLED).then(|| ended.saturating_sub(due) as f64 / 1e6)
 }
 

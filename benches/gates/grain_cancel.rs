@@ -2,34 +2,30 @@
 
 use std::ptr::{null, null_mut};
 
-use frazil::capi::context::*;
 use frazil::capi::grains::*;
 use frazil::capi::grains_params::*;
 use frazil::capi::grains_points::*;
-use frazil::capi::library::FRZ_ABI_VERSION;
-use frazil::capi::pool::*;
 use frazil::capi::{frz_status, frz_view};
 
-use crate::cancel::{view, works};
 use crate::cancel_latency::{Steps, measure};
 use crate::grains::{FRAME, Random};
 use crate::harness::Harness;
+use crate::host::{Threads, view, works, written};
 
 /// Length (s) and sub-steps of a step: a part of a frame, as a whole one would take minutes to cancel so often.
 const STEP: (f64, u32) = (FRAME / 3.0, 5);
 /// Grains along each axis of the block that collapses: 200,000 of them.
 const SIDES: [u32; 3] = [80, 32, 80];
 
-/// Grains that are awake, and a context on two threads.
+/// Grains that are awake.
 struct Host {
-    pool: *mut frz_pool,
-    ctx: *mut frz_context,
+    threads: Threads,
     grains: *mut frz_grains,
 }
 
 impl Host {
     fn new(random: &mut Random) -> Self {
-        let mut host = Self { pool: null_mut(), ctx: null_mut(), grains: null_mut() };
+        let mut host = Self { threads: Threads::new(2), grains: null_mut() };
         let mut params = std::mem::MaybeUninit::<frz_grains_params>::uninit();
         let apart = 1.1 * 2.0 * 0.0025;
         let sites = (0..SIDES[0]).flat_map(|x| (0..SIDES[1]).map(move |y| [x, y]));
@@ -39,50 +35,39 @@ impl Host {
         let none = frz_view { data: null(), count: 0, stride: 0 };
         // SAFETY: the pointers are valid, and the parameters are filled before they are read.
         unsafe {
-            works(frz_pool_create(2, &mut host.pool));
-            works(frz_context_create(FRZ_ABI_VERSION, host.pool, &mut host.ctx));
             works(frz_grains_params_init(params.as_mut_ptr(), size_of::<frz_grains_params>()));
             let mut params = params.assume_init();
             (params.radius, params.sub_steps) = (0.0025, STEP.1);
             params.flags = FRZ_GRAINS_FLOOR | FRZ_GRAINS_RESTLESS;
-            works(frz_grains_create(host.ctx, &params, null(), 0, &mut host.grains));
-            works(frz_grains_emit(host.ctx, host.grains, view(&places), none, 0, null_mut()));
+            works(frz_grains_create(host.threads.ctx, &params, null(), 0, &mut host.grains));
+            works(frz_grains_emit(host.threads.ctx, host.grains, view(&places), none, 0, null_mut()));
         }
         host
     }
 }
 
 impl Steps for Host {
-    fn context(&self) -> *mut frz_context {
-        self.ctx
+    fn threads(&self) -> &Threads {
+        &self.threads
     }
 
     fn step(&self) -> frz_status {
         // SAFETY: the pointers are valid.
-        unsafe { frz_grains_step(self.ctx, self.grains, null(), null(), 0, STEP.0, 1, null_mut()) }
+        unsafe { frz_grains_step(self.threads.ctx, self.grains, null(), null(), 0, STEP.0, 1, null_mut()) }
     }
 
     fn state(&self) -> Vec<u8> {
-        let mut size = 0;
-        // SAFETY: the pointers are valid, and the room is as large as the call before said.
-        unsafe {
-            works(frz_grains_save(self.ctx, self.grains, null_mut(), 0, &mut size));
-            let mut out = vec![0u8; size];
-            works(frz_grains_save(self.ctx, self.grains, out.as_mut_ptr().cast(), size, &mut size));
-            out.truncate(size);
-            out
-        }
+        // SAFETY: the pointers are valid.
+        written(|room, capacity, size| unsafe {
+            frz_grains_save(self.threads.ctx, self.grains, room, capacity, size)
+        })
     }
 }
 
 impl Drop for Host {
     fn drop(&mut self) {
         // SAFETY: nobody uses them any more.
-        unsafe {
-            frz_grains_destroy(self.grains);
-            frz_context_destroy(self.ctx);
-            frz_pool_destroy(self.pool);
-        }
+        unsafe { frz_grains_destroy(self.grains) };
     }
 }
 

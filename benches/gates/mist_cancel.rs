@@ -4,27 +4,23 @@ use std::cell::Cell;
 use std::ptr::{null, null_mut};
 
 use frazil::capi::body::{frz_body, frz_body_init};
-use frazil::capi::context::*;
-use frazil::capi::library::FRZ_ABI_VERSION;
 use frazil::capi::mist::*;
 use frazil::capi::mist_params::*;
-use frazil::capi::pool::*;
 use frazil::capi::{frz_status, frz_view};
 
-use crate::cancel::{view, works};
 use crate::cancel_latency::{Steps, measure};
 use crate::common::shapes::sphere;
 use crate::grains::{FRAME, Random};
 use crate::harness::Harness;
+use crate::host::{Threads, view, works, written};
 
 /// Edge of a cell (m), and of the cube in which points raise mist.
 const CELL: f64 = 0.01;
 const CUBE: f64 = 0.9;
 
-/// Mist that points raise around a ball, and a context on two threads.
+/// Mist that points raise around a ball.
 struct Host {
-    pool: *mut frz_pool,
-    ctx: *mut frz_context,
+    threads: Threads,
     mist: *mut frz_mist,
     places: Vec<[f64; 3]>,
     speeds: Vec<[f32; 3]>,
@@ -41,8 +37,7 @@ impl Host {
             mesh.positions.iter().map(|place| [place.x + x, place.y + 0.45, place.z + 0.45]).collect()
         };
         let mut host = Self {
-            pool: null_mut(),
-            ctx: null_mut(),
+            threads: Threads::new(2),
             mist: null_mut(),
             places: (0..4000).map(|_| [0, 1, 2].map(|_| CUBE * random.next())).collect(),
             speeds: (0..4000).map(|_| [0, 1, 2].map(|_| 2.0 * random.next() as f32 - 0.5)).collect(),
@@ -52,13 +47,11 @@ impl Host {
         };
         // SAFETY: the pointers are valid, and the parameters are filled before they are read.
         unsafe {
-            works(frz_pool_create(2, &mut host.pool));
-            works(frz_context_create(FRZ_ABI_VERSION, host.pool, &mut host.ctx));
             works(frz_mist_params_init(params.as_mut_ptr(), size_of::<frz_mist_params>()));
             let mut params = params.assume_init();
             (params.cell, params.from_speed, params.flags) = (CELL, 0.0, FRZ_MIST_FALLING);
             (params.turbulence, params.confinement) = (3.0, 0.3);
-            works(frz_mist_create(host.ctx, &params, null(), 0, &mut host.mist));
+            works(frz_mist_create(host.threads.ctx, &params, null(), 0, &mut host.mist));
         }
         host
     }
@@ -78,8 +71,8 @@ impl Host {
 }
 
 impl Steps for Host {
-    fn context(&self) -> *mut frz_context {
-        self.ctx
+    fn threads(&self) -> &Threads {
+        &self.threads
     }
 
     fn step(&self) -> frz_status {
@@ -90,7 +83,7 @@ impl Steps for Host {
         unsafe {
             (*report.as_mut_ptr()).struct_size = size_of::<frz_mist_report>() as u32;
             let status = frz_mist_step_points(
-                self.ctx,
+                self.threads.ctx,
                 self.mist,
                 places,
                 speeds,
@@ -109,25 +102,17 @@ impl Steps for Host {
     }
 
     fn state(&self) -> Vec<u8> {
-        let mut size = 0;
-        // SAFETY: the pointers are valid, and the room is as large as the call before said.
-        unsafe {
-            works(frz_mist_save(self.ctx, self.mist, null_mut(), 0, &mut size));
-            let mut out = vec![0u8; size];
-            works(frz_mist_save(self.ctx, self.mist, out.as_mut_ptr().cast(), size, &mut size));
-            out
-        }
+        // SAFETY: the pointers are valid.
+        written(|room, capacity, size| unsafe {
+            frz_mist_save(self.threads.ctx, self.mist, room, capacity, size)
+        })
     }
 }
 
 impl Drop for Host {
     fn drop(&mut self) {
         // SAFETY: nobody uses them any more.
-        unsafe {
-            frz_mist_destroy(self.mist);
-            frz_context_destroy(self.ctx);
-            frz_pool_destroy(self.pool);
-        }
+        unsafe { frz_mist_destroy(self.mist) };
     }
 }
 
