@@ -135,10 +135,10 @@ impl Flow {
         let find = |coord: &Coord| old.find(*coord).unwrap_or(tiles::NONE);
         let from: Vec<u32> = tiles.coords().par_iter().with_min_len(64).map(find).collect();
         for (field, speed) in velocity.iter_mut().zip(self.ambient) {
-            room.move_tiles(field, &from, speed);
+            room.move_wide(field, &from, speed);
         }
-        room.move_tiles(pressure, &from, 0.0);
-        room.move_tiles(density, &from[..tiles.active()], 0.0);
+        room.move_wide(pressure, &from, 0.0);
+        room.move_active(density, &from[..tiles.active()], 0.0);
         if let Some(around) = &mut self.around {
             around.resize(&around::tiles_around(active));
         }

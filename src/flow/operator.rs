@@ -23,47 +23,45 @@ pub struct Operator {
 impl Operator {
     /// The operator of the tiles' cells between solids.
     pub fn new(tiles: &Tiles, solids: &Solids) -> Self {
+        let above = |slot: usize| {
+            [[1, 0, 0], [0, 1, 0], [0, 0, 1]]
+                .map(|offset| solids.faces(tiles.neighbours()[slot][neighbour_at(offset)] as usize))
+        };
+        let has_one =
+            |slot: &usize| solids.faces(*slot).is_some() || above(*slot).iter().any(Option::is_some);
         let one = |slot: usize| {
-            let above = [[1, 0, 0], [0, 1, 0], [0, 0, 1]].map(|offset| {
-                let near = tiles.neighbours()[slot][neighbour_at(offset)];
-                solids.faces(near as usize)
-            });
-            let own = solids.faces(slot);
-            if own.is_none() && above.iter().all(Option::is_none) {
-                return None;
-            }
             let mut stencil = Stencil::open();
-            if let Some(own) = own {
+            if let Some(own) = solids.faces(slot) {
                 stencil.lower = own.open;
             }
-            for (axis, above) in above.iter().enumerate() {
+            for (axis, above) in above(slot).iter().enumerate() {
                 if let Some(above) = above {
                     stencil.upper[axis] = std::array::from_fn(|at| above.open[axis][first(axis, at)]);
                 }
             }
             stencil.invert(|_| true);
-            Some(stencil)
+            stencil
         };
-        let stencils = if solids.is_empty() {
-            vec![None; tiles.active()]
-        } else {
-            (0..tiles.active()).into_par_iter().map(one).collect()
-        };
-        Self::of(tiles.clone(), 0, stencils)
+        let count = if solids.is_empty() { 0 } else { tiles.active() };
+        let slots: Vec<usize> = (0..count).filter(has_one).collect();
+        Self::of(tiles.clone(), 0, &slots, one)
     }
 
-    fn of(tiles: Tiles, level: i32, stencils: Vec<Option<Stencil>>) -> Self {
-        let mut operator = Self { tiles, level, ..Self::default() };
-        for stencil in stencils {
-            match stencil {
-                Some(stencil) => {
-                    operator.index.push(operator.stencils.len() as u32);
-                    operator.stencils.push(stencil);
-                }
-                None => operator.index.push(NONE),
-            }
+    /// With stencils for these slots. They are large: room is made for as many as there are.
+    fn of(tiles: Tiles, level: i32, slots: &[usize], one: impl Fn(usize) -> Stencil + Sync) -> Self {
+        let mut index = vec![NONE; tiles.active()];
+        slots.iter().zip(0..).for_each(|(slot, at)| index[*slot] = at);
+        let stencils = slots.par_iter().map(|slot| one(*slot)).collect();
+        Self { tiles, level, index, stencils }
+    }
+
+    /// Gives these slots a stencil of open faces.
+    fn open(&mut self, slots: &[usize]) {
+        self.stencils.reserve_exact(slots.len());
+        for slot in slots {
+            self.index[*slot] = self.stencils.len() as u32;
+            self.stencils.push(Stencil::open());
         }
-        operator
     }
 
     /// Whether some faces are not fully open.
@@ -111,18 +109,16 @@ impl Operator {
             })
         };
         let children: Vec<[u32; 8]> = coords.par_iter().with_min_len(16).map(children).collect();
-        let stencils = children.par_iter().map(|children| self.coarse_stencil(children)).collect();
-        let mut coarse = Self::of(Tiles::new(&coords), self.level + 1, stencils);
+        let plain = |child: &u32| *child != NONE && self.index[*child as usize] == NONE;
+        let slots: Vec<usize> = (0..coords.len()).filter(|slot| !children[*slot].iter().all(plain)).collect();
+        let one = |slot: usize| self.coarse_stencil(&children[slot]);
+        let mut coarse = Self::of(Tiles::new(&coords), self.level + 1, &slots, one);
         coarse.join();
         (coarse, children)
     }
 
-    /// The coarse stencil over eight tiles, but for the faces that bound the outside and the diagonal; none: all faces are open.
-    fn coarse_stencil(&self, children: &[u32; 8]) -> Option<Stencil> {
-        let plain = |child: &u32| *child != NONE && self.index[*child as usize] == NONE;
-        if children.iter().all(plain) {
-            return None;
-        }
+    /// The coarse stencil over eight tiles, but for the faces that bound the outside and the diagonal.
+    fn coarse_stencil(&self, children: &[u32; 8]) -> Stencil {
         let mut out = Stencil::open();
         for cell in 0..512 {
             let at = [cell >> 6, cell >> 3 & 7, cell & 7];
@@ -149,32 +145,64 @@ impl Operator {
                 }
             }
         }
-        Some(out)
+        out
     }
 
     /// Completes stencils: faces that bound the outside, the upper faces, which are the next tiles' lower ones, and the diagonal.
     fn join(&mut self) {
-        let (tiles, active) = (&self.tiles, self.tiles.active());
+        self.part_outside();
+        let active = self.tiles.active();
+        let closed = |slot: &usize| {
+            let uppers = (0..3).filter_map(|axis| self.upper(*slot, axis));
+            self.index[*slot] == NONE && uppers.flatten().any(|open| open != 1.0)
+        };
+        let new: Vec<usize> = (0..active).filter(closed).collect();
+        self.open(&new);
+        let uppers: Vec<[Option<[f32; 64]>; 3]> =
+            self.slots().par_iter().map(|slot| [0, 1, 2].map(|axis| self.upper(*slot, axis))).collect();
+        self.stencils.par_iter_mut().zip(uppers).for_each(|(stencil, upper)| {
+            for (old, new) in stencil.upper.iter_mut().zip(upper) {
+                *old = new.unwrap_or(*old);
+            }
+            let parts = stencil.inverse;
+            stencil.invert(|cell| parts[cell] > 0.0);
+        });
+    }
+
+    /// A tile's upper faces on an axis, which are the lower ones of the tile above; none: that is not active.
+    fn upper(&self, slot: usize, axis: usize) -> Option<[f32; 64]> {
+        let above = self.tiles.neighbours()[slot][FACES[2 * axis + 1]] as usize;
+        let stencil = (above < self.tiles.active()).then(|| self.stencil(above))?;
+        Some(std::array::from_fn(|at| stencil.map_or(1.0, |above| above.lower[axis][first(axis, at)])))
+    }
+
+    /// The slot of each stencil.
+    fn slots(&self) -> Vec<usize> {
+        let mut slots = vec![0; self.stencils.len()];
+        let with = self.index.iter().enumerate().filter(|(_, index)| **index != NONE);
+        with.for_each(|(slot, index)| slots[*index as usize] = slot);
+        slots
+    }
+
+    /// Completes the faces between cells of which one is outside.
+    fn part_outside(&mut self) {
         // None: the whole tile is inside.
-        let outside: Vec<Option<Mask>> = (0..active)
+        let outside: Vec<Option<Mask>> = (0..self.tiles.active())
             .map(|slot| self.stencil(slot).map(|stencil| stencil.outside).filter(|mask| *mask != [0; 8]))
             .collect();
         let mask = |near: u32| match outside.get(near as usize) {
             Some(mask) => *mask,
             None => Some([u64::MAX; 8]),
         };
-        for slot in 0..active {
-            let borders = FACES.iter().any(|at| mask(tiles.neighbours()[slot][*at]).is_some());
-            if self.index[slot] == NONE && borders {
-                self.index[slot] = self.stencils.len() as u32;
-                self.stencils.push(Stencil::open());
-            }
-        }
-        let mut slots = vec![0; self.stencils.len()];
-        let with = (0..active).filter(|slot| self.index[*slot] != NONE);
-        with.for_each(|slot| slots[self.index[slot] as usize] = slot);
-        let factor = self.nearer();
-        self.stencils.par_iter_mut().zip(&slots).for_each(|(stencil, slot)| {
+        let borders = |slot: &usize| {
+            let near = &self.tiles.neighbours()[*slot];
+            self.index[*slot] == NONE && FACES.iter().any(|at| mask(near[*at]).is_some())
+        };
+        let new: Vec<usize> = (0..outside.len()).filter(borders).collect();
+        self.open(&new);
+        let (slots, factor) = (self.slots(), self.nearer());
+        let Self { tiles, stencils, .. } = self;
+        stencils.par_iter_mut().zip(&slots).for_each(|(stencil, slot)| {
             let near = &tiles.neighbours()[*slot];
             let own = mask(*slot as u32).unwrap_or([0; 8]);
             for axis in 0..3 {
@@ -189,34 +217,11 @@ impl Operator {
                         stencil.lower[axis][cell] *= factor;
                     }
                 }
-                if near[FACES[2 * axis + 1]] as usize >= active {
+                if near[FACES[2 * axis + 1]] as usize >= outside.len() {
                     stencil.upper[axis].iter_mut().for_each(|open| *open *= factor);
                 }
             }
         });
-        let above = |slot: usize, axis: usize| {
-            let near = tiles.neighbours()[slot][FACES[2 * axis + 1]] as usize;
-            (near < active).then(|| self.stencil(near))
-        };
-        let layer = |slot: usize, axis: usize| -> Option<[f32; 64]> {
-            let above = above(slot, axis)?;
-            Some(std::array::from_fn(|at| above.map_or(1.0, |above| above.lower[axis][first(axis, at)])))
-        };
-        let uppers: Vec<[Option<[f32; 64]>; 3]> =
-            (0..active).map(|slot| [0, 1, 2].map(|axis| layer(slot, axis))).collect();
-        for (slot, upper) in uppers.into_iter().enumerate() {
-            if self.index[slot] == NONE && upper.iter().flatten().flatten().any(|open| *open != 1.0) {
-                self.index[slot] = self.stencils.len() as u32;
-                self.stencils.push(Stencil::open());
-            }
-            if let Some(stencil) = self.stencils.get_mut(self.index[slot] as usize) {
-                for (old, new) in stencil.upper.iter_mut().zip(upper) {
-                    *old = new.unwrap_or(*old);
-                }
-                let parts = stencil.inverse;
-                stencil.invert(|cell| parts[cell] > 0.0);
-            }
-        }
     }
 
     /// How much nearer, in cells, the pressure outside is to the last cells than on the level above. It is known half a finest

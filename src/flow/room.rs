@@ -28,16 +28,25 @@ impl Room {
         self.fields.each_mut().map(|field| first(field, tiles.active()))
     }
 
-    /// Moves a field to other slots: each new one's old slot, or none, where it gets `fill`.
-    pub fn move_tiles(&mut self, field: &mut Field, from: &[u32], fill: f32) {
-        let [room, ..] = &mut self.wide;
-        let to = first(room, from.len());
-        to.par_iter_mut().zip(from).with_min_len(16).for_each(|(to, from)| {
-            *to = field.get(*from as usize).copied().unwrap_or([fill; 512]);
-        });
-        std::mem::swap(field, room);
-        field.truncate(from.len());
+    /// Moves a field of active tiles and the rim to other slots: each new one's old slot, or none, where it gets `fill`.
+    pub fn move_wide(&mut self, field: &mut Field, from: &[u32], fill: f32) {
+        move_tiles(&mut self.wide[0], field, from, fill);
     }
+
+    /// The same for a field of active tiles.
+    pub fn move_active(&mut self, field: &mut Field, from: &[u32], fill: f32) {
+        move_tiles(&mut self.fields[0], field, from, fill);
+    }
+}
+
+/// Moves a field through room of its size, which it is exchanged with.
+fn move_tiles(room: &mut Field, field: &mut Field, from: &[u32], fill: f32) {
+    let to = first(room, from.len());
+    to.par_iter_mut().zip(from).with_min_len(16).for_each(|(to, from)| {
+        *to = field.get(*from as usize).copied().unwrap_or([fill; 512]);
+    });
+    std::mem::swap(field, room);
+    field.truncate(from.len());
 }
 
 /// The first tiles of a field, which grows to hold them.
