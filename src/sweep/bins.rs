@@ -4,13 +4,13 @@ use std::sync::atomic::{AtomicU64, Ordering};
 
 use rayon::prelude::*;
 
-use super::chain::Face;
-use super::lattice::{Fixed, UNITS};
-use super::lists::Lists;
 use super::prism::{Prism, Prisms};
-use super::region::{Region, each_block, extent};
-use super::vectors::{cross, difference, dot, sub};
-use super::winding::Lines;
+use crate::distance::Face;
+use crate::distance::lattice::{Fixed, UNITS};
+use crate::distance::lists::Lists;
+use crate::distance::region::{Region, each_block, extent};
+use crate::distance::vectors::{cross, difference, dot, sub};
+use crate::distance::winding::Lines;
 
 /// A position or direction in fixed-point units.
 pub type Point = [f64; 3];

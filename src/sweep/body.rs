@@ -5,13 +5,14 @@ use std::sync::Arc;
 use rayon::prelude::*;
 use xxhash_rust::xxh3::Xxh3;
 
-use super::chain::{Face, Weights, Window, boundary};
-use super::lattice::{Fixed, Lattice, UNITS};
+use super::chain::{Weights, Window, boundary};
 use super::refine::{edge_error, refine};
 use super::topology::{Simplex, Topology};
 use crate::base::DVec3;
 use crate::base::mesh::coincident;
 use crate::context::Context;
+use crate::distance::Face;
+use crate::distance::lattice::{Fixed, Lattice, UNITS};
 use crate::error::{Error, Result};
 use crate::motion::Motion;
 

@@ -11,20 +11,12 @@
 use rayon::prelude::*;
 
 use super::folds::drop_returns;
-use super::lattice::{Fixed, UNITS};
 use super::topology::Topology;
-use super::vectors::{cross, difference, dot};
 use crate::context::Context;
+use crate::distance::Face;
+use crate::distance::lattice::{Fixed, UNITS};
+use crate::distance::vectors::{cross, difference, dot};
 use crate::error::Result;
-
-/// An oriented triangle of the chain's boundary; the chain lies behind it (`coef` times).
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct Face {
-    /// Corners, counter-clockwise seen from outside the chain.
-    pub v: [Fixed; 3],
-    /// Coefficient: how many layers of the chain end here; positive.
-    pub coef: i32,
-}
 
 /// How often the parts of a moving mesh count in the chain.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

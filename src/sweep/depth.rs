@@ -6,13 +6,13 @@ use std::cell::RefCell;
 use std::collections::HashMap;
 
 use super::bins::Bins;
-use super::distance::{Offsets, Points, Triangle, to_each};
 use super::exposure::Exposure;
 use super::facets::{Corners, Facet, halves, is_open, is_small, open_parts};
-use super::lattice::UNITS;
-use super::nearest::Group;
 use super::prism::Prisms;
-use super::vectors::gap;
+use crate::distance::lattice::UNITS;
+use crate::distance::nearest::Group;
+use crate::distance::triangle::{Offsets, Points, Triangle, to_each};
+use crate::distance::vectors::gap;
 
 /// Two query points on a facet closer than this (cells) share one answer.
 const SAME: f32 = 0.05;

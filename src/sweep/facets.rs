@@ -11,12 +11,12 @@ use rayon::prelude::*;
 
 use super::bins::{Bins, Point, each_voxel, voxel_of};
 use super::exposure::{BURIED, Exposure, OPEN, THIN};
-use super::lattice::{Fixed, UNITS};
 use super::patch::patches;
 use super::prism::Prisms;
-use super::region::extent;
-use super::vectors::{cross, difference, dot, sub};
 use crate::context::Context;
+use crate::distance::lattice::{Fixed, UNITS};
+use crate::distance::region::extent;
+use crate::distance::vectors::{cross, difference, dot, sub};
 use crate::error::Result;
 
 /// A triangle that bounds the volume.

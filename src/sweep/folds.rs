@@ -11,14 +11,15 @@ use std::collections::HashSet;
 
 use rayon::prelude::*;
 
-use super::chain::{Face, Window};
-use super::lattice::{Fixed, UNITS};
+use super::chain::Window;
 use super::passages::{Change, Passage, Place, Poses, Step, Still, face, to_f64};
-use super::region::{Region, each_block, extent};
 use super::topology::{Simplex, Topology};
-use super::winding::Lines;
 use crate::base::DVec3;
 use crate::context::Context;
+use crate::distance::Face;
+use crate::distance::lattice::{Fixed, UNITS};
+use crate::distance::region::{Region, each_block, extent};
+use crate::distance::winding::Lines;
 use crate::error::Result;
 
 /// Intervals of negative winding number on a line that are shorter than this (cells) are ignored.

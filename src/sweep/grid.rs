@@ -2,14 +2,14 @@
 
 use rayon::prelude::*;
 
-use super::chain::{Face, Window};
-use super::lattice::Lattice;
-use super::nearest::Scratch;
-use super::voxelise::{ALL, Band, Piece, Voxeliser};
+use super::chain::Window;
+use super::voxelise::{ALL, Band, Piece, Scratch, Voxeliser};
 use super::{Body, Settings};
 use crate::base::TriMesh;
 use crate::base::blocks::{Block, BlockEdit};
 use crate::context::Context;
+use crate::distance::Face;
+use crate::distance::lattice::Lattice;
 use crate::error::{Error, Result};
 use crate::motion::{Keys, Rigid};
 use crate::vdb::FloatGrid;

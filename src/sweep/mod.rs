@@ -2,9 +2,9 @@
 //!
 //! [`chain`] is exact up to a tolerance: signed space-time tetrahedra (`chain.rs`), poses dense enough
 //! for arcs (`body.rs`), edges split where their ends move differently (`refine.rs`), order in time where a skin folds
-//! inside out (`folds.rs`, `passages.rs`), winding numbers from exact line crossings (`winding.rs`, `exposure.rs`), the
+//! inside out (`folds.rs`, `passages.rs`), winding numbers from exact line crossings (room `distance`, `exposure.rs`), the
 //! parts of faces that bound the volume (`bins.rs`, `facets.rs`; `patch.rs` where many sheets nearly coincide), then
-//! exact distances in the narrow band (`nearest.rs`, `depth.rs`, `voxelise.rs`).
+//! exact distances in the narrow band (room `distance`, `depth.rs`, `voxelise.rs`).
 //! [`samples`] is the thesis' method (section 3.2): the union of N + 1 poses, dilated and smoothed.
 //!
 //! # Glossary
@@ -31,41 +31,34 @@
 mod bins;
 mod body;
 mod chain;
-mod columns;
 mod depth;
-mod distance;
 mod exposure;
 mod facets;
 mod folds;
-mod lattice;
-mod lists;
-mod nearest;
 mod passages;
 mod patch;
 mod prism;
 mod refine;
-mod region;
 #[cfg(feature = "vdb")]
 mod samples;
-mod signs;
 mod topology;
-mod vectors;
 mod voxelise;
-mod winding;
 
+pub use crate::distance::lattice::{REACH, too_far};
 pub use body::{Body, Shape};
-pub use lattice::{REACH, too_far};
 #[cfg(feature = "vdb")]
 pub use samples::{SamplesSettings, samples};
 
 // For the rooms above, tests and benchmarks.
 #[doc(hidden)]
 pub use {
-    chain::{Face, Weights, Window, boundary},
-    lattice::{Fixed, Lattice, UNITS},
-    nearest::Scratch,
+    crate::distance::{
+        Face,
+        lattice::{Fixed, Lattice, UNITS},
+    },
+    chain::{Weights, Window, boundary},
     topology::Topology,
-    voxelise::{ALL, Band, Piece, Voxeliser},
+    voxelise::{ALL, Band, Piece, Scratch, Voxeliser},
 };
 
 use crate::error::{Error, Result};

@@ -1,11 +1,12 @@
 //! When the surface of a moving mesh passes points, between its poses.
 
-use super::chain::{Face, STILL};
-use super::lattice::{Fixed, UNITS};
-use super::lists::Lists;
-use super::region::each_block;
+use super::chain::STILL;
 use super::topology::{Simplex, Topology};
 use crate::base::DVec3;
+use crate::distance::Face;
+use crate::distance::lattice::{Fixed, UNITS};
+use crate::distance::lists::Lists;
+use crate::distance::region::each_block;
 
 /// Least edge (fixed-point units) of the boxes that tetrahedra and faces are sorted into.
 const BOX: f64 = UNITS as f64;

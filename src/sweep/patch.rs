@@ -10,10 +10,10 @@ use rayon::prelude::*;
 use super::bins::{Bins, Point};
 use super::exposure::{Exposure, Spot};
 use super::facets::Facet;
-use super::lattice::{Fixed, UNITS};
 use super::prism::Prisms;
-use super::vectors::{cross, difference, dot};
 use crate::context::Context;
+use crate::distance::lattice::{Fixed, UNITS};
+use crate::distance::vectors::{cross, difference, dot};
 use crate::error::Result;
 
 /// How far (cells) the surface may lie from a patch's plane.

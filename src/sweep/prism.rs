@@ -2,9 +2,9 @@
 //! The prisms of a bin are tested eight at a time.
 
 use super::bins::Point;
-use super::lattice::{Fixed, UNITS};
-use super::vectors::{cross, difference, dot, sub};
 use crate::base::cpu::dispatch;
+use crate::distance::lattice::{Fixed, UNITS};
+use crate::distance::vectors::{cross, difference, dot, sub};
 
 /// Prisms tested at once.
 const LANES: usize = 8;

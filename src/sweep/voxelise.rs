@@ -5,20 +5,21 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use rayon::prelude::*;
 
 use super::bins::Bins;
-use super::chain::Face;
 use super::depth::{Depths, Near, Volume};
-use super::distance::Triangle;
 use super::exposure::Exposure;
 use super::facets::{Facet, facets};
-use super::lattice::Lattice;
-use super::nearest::{Scratch, search};
-use super::region::{Region, each_block, extent};
-use super::signs::Signs;
-use super::vectors::gap;
-use super::winding::Lines;
+use super::prism::Prisms;
 use crate::base::blocks::{Mask, Origin, Values};
 use crate::base::lanes::LANES;
 use crate::context::Context;
+use crate::distance::Face;
+use crate::distance::lattice::Lattice;
+use crate::distance::nearest::{Search, search};
+use crate::distance::region::{Region, each_block, extent};
+use crate::distance::signs::Signs;
+use crate::distance::triangle::Triangle;
+use crate::distance::vectors::gap;
+use crate::distance::winding::Lines;
 use crate::error::Result;
 
 /// How far from the surface distances are wanted, on each side (cells).
@@ -52,6 +53,13 @@ impl Piece {
             Self::Near(origin, _) | Self::Inside(origin) => *origin,
         }
     }
+}
+
+/// Working memory of one thread.
+#[derive(Default)]
+pub struct Scratch {
+    search: Search,
+    prisms: Prisms,
 }
 
 /// A chain ready to be converted to blocks.

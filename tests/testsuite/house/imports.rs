@@ -4,17 +4,19 @@ use std::fs;
 use std::path::{Path, PathBuf};
 
 /// Each room with what it may use besides itself, `error` and `context`.
-const LAW: [(&str, &[&str]); 11] = [
+const LAW: [(&str, &[&str]); 13] = [
     ("base", &[]),
     ("io", &["base"]),
     ("vdb", &["base", "io"]),
     ("motion", &["base", "io"]),
-    ("sweep", &["base", "vdb", "motion"]),
+    ("distance", &["base"]),
+    ("sweep", &["base", "vdb", "motion", "distance"]),
     ("flow", &["base"]),
     ("render", &["base", "io", "vdb"]),
     ("snow", &["base", "vdb", "motion", "sweep", "flow"]),
-    ("scene", &["base", "io", "vdb", "motion", "sweep", "flow", "snow"]),
-    ("capi", &["base", "io", "vdb", "motion", "sweep", "flow", "snow"]),
+    ("surface", &["base", "vdb", "distance"]),
+    ("scene", &["base", "io", "vdb", "motion", "sweep", "flow", "snow", "surface"]),
+    ("capi", &["base", "io", "vdb", "motion", "sweep", "flow", "snow", "surface"]),
     ("cli", &[]),
 ];
 

@@ -52,7 +52,7 @@ impl Lattice {
     }
 
     /// The origin (in voxels of the grid) of a block counted from the lattice's origin voxel.
-    pub(super) fn block_origin(&self, block: [i32; 3]) -> Origin {
+    pub fn block_origin(&self, block: [i32; 3]) -> Origin {
         [0, 1, 2].map(|axis| self.origin[axis] + block[axis] * 8)
     }
 

@@ -7,7 +7,7 @@
 
 use rayon::prelude::*;
 
-use super::chain::Face;
+use super::Face;
 use super::columns::Columns;
 use super::lattice::{Fixed, UNITS, floor};
 use super::lists::Lists;

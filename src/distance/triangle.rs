@@ -36,11 +36,21 @@ impl Triangle {
     /// Prepares a fixed-point triangle relative to a block's corner (cells from the origin voxel).
     pub fn new(v: &[Fixed; 3], corner: [i32; 3]) -> Self {
         let place = |p: &Fixed| [0, 1, 2].map(|axis| (p[axis] - corner[axis] * UNITS) as f32 / UNITS as f32);
-        let c = [place(&v[0]), place(&v[1]), place(&v[2])];
-        let edge = [sub(c[1], c[0]), sub(c[2], c[1]), sub(c[0], c[2])];
-        let inverse = edge.map(|e| if dot(e, e) > 0.0 { 1.0 / dot(e, e) } else { 0.0 });
         // Integer differences are exact: the normal of a sliver keeps its direction.
         let n = cross(difference(v[1], v[0]), difference(v[2], v[0]));
+        Self::with_normal([place(&v[0]), place(&v[1]), place(&v[2])], n)
+    }
+
+    /// Prepares a triangle with corners in cells from a block's corner.
+    pub fn of_cells(c: [[f32; 3]; 3]) -> Self {
+        let [a, b, c64] = c.map(|p| p.map(f64::from));
+        Self::with_normal(c, cross(sub(b, a), sub(c64, a)))
+    }
+
+    /// `n` is a normal of any length.
+    fn with_normal(c: [[f32; 3]; 3], n: [f64; 3]) -> Self {
+        let edge = [sub(c[1], c[0]), sub(c[2], c[1]), sub(c[0], c[2])];
+        let inverse = edge.map(|e| if dot(e, e) > 0.0 { 1.0 / dot(e, e) } else { 0.0 });
         let length = dot(n, n).sqrt();
         let normal = if length > 0.0 { n.map(|value| (value / length) as f32) } else { [0.0; 3] };
         Self { corner: c, edge, inverse, normal, inward: edge.map(|e| cross(normal, e)) }

@@ -1,17 +1,9 @@
 //! Nearest triangle of every voxel of a block, by subdivision: bounds at the centres of 4^3 and 2^3
 //! sub-blocks leave few triangles for the exact distances.
 
-use super::distance::{Offsets, Points, Triangle, near_lanes, nearest, prune, to_each};
-use super::prism::Prisms;
+use super::triangle::{Offsets, Points, Triangle, near_lanes, nearest, prune, to_each};
 use crate::base::blocks::{Mask, offset};
 use crate::base::lanes::LANES;
-
-/// Working memory of one thread.
-#[derive(Default)]
-pub struct Scratch {
-    pub(super) search: Search,
-    pub(super) prisms: Prisms,
-}
 
 /// Working memory of [`search`].
 #[derive(Default)]

@@ -1,6 +1,6 @@
 //! A box of blocks, and sets of its blocks.
 
-use super::chain::Face;
+use super::Face;
 use super::lattice::{Fixed, UNITS, floor};
 use crate::error::{Error, Result};
 

@@ -1,0 +1,25 @@
+//! Exact signs and distances from triangles, on the lattice of voxels.
+//!
+//! Coordinates are integers ([`lattice`]), so that how often a line passes through a surface is decided without rounding
+//! ([`winding`]); distances are found block by block, eight voxels at a time ([`nearest`], [`triangle`]).
+
+pub mod columns;
+pub mod lattice;
+pub mod lists;
+pub mod nearest;
+pub mod region;
+pub mod signs;
+pub mod triangle;
+pub mod vectors;
+pub mod winding;
+
+use lattice::Fixed;
+
+/// An oriented triangle of a surface; the volume lies behind it, `coef` times.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Face {
+    /// Corners, counter-clockwise seen from outside.
+    pub v: [Fixed; 3],
+    /// Coefficient: how many layers of the volume end here; positive.
+    pub coef: i32,
+}
