@@ -88,6 +88,8 @@ mod snow;
 mod speed;
 #[path = "gates/spin.rs"]
 mod spin;
+#[path = "gates/surface.rs"]
+mod surface;
 #[path = "gates/sweeps.rs"]
 mod sweeps;
 #[path = "gates/table.rs"]
@@ -129,6 +131,7 @@ fn main() {
     band::run(&mut h);
     spin::run(&mut h);
     damage::run(&mut h);
+    surface::run(&mut h);
     house::run(&mut h);
     h.finish();
 }

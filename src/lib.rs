@@ -92,6 +92,7 @@
 pub mod base;
 pub mod capi;
 pub mod context;
+pub mod distance;
 pub mod error;
 pub mod flow;
 pub mod io;
@@ -101,6 +102,7 @@ pub mod render;
 #[cfg(feature = "scene")]
 pub mod scene;
 pub mod snow;
+pub mod surface;
 pub mod sweep;
 #[cfg(feature = "vdb")]
 pub mod vdb;

@@ -7,6 +7,7 @@ pub mod clients;
 pub mod folded;
 pub mod header;
 pub mod hero;
+pub mod liquids;
 pub mod shapes;
 pub mod sleigh;
 pub mod tools;

@@ -79,6 +79,10 @@ mod snow {
     mod state;
     mod volumes;
 }
+mod surface {
+    mod implicit;
+    mod tracking;
+}
 mod sweep {
     mod band;
     mod chain;

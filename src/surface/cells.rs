@@ -1,0 +1,197 @@
+//! Particles sorted into cells, so that those near a place are found fast.
+
+use rayon::prelude::*;
+
+use crate::base::DVec3;
+use crate::error::{Error, Result};
+
+/// Coordinate of a cell.
+pub type Coord = [i32; 3];
+
+/// Bits of each axis in a key.
+const BITS: u32 = 21;
+/// Greatest distance of two cells on an axis.
+const FARTHEST: i64 = 1 << BITS;
+
+/// Particles in the order of the cells that hold them. What order they come in makes no difference: within a cell they are sorted
+/// by place, then by what else tells them apart.
+#[derive(Debug, Default)]
+pub struct Cells {
+    /// Edge of a cell (m).
+    edge: f64,
+    /// Least coordinates.
+    low: Coord,
+    /// Keys of the cells that hold particles, ascending: x, y, z above each other.
+    keys: Vec<u64>,
+    /// `start[n]..start[n + 1]` are the particles of cell `n`.
+    start: Vec<u32>,
+    /// The index of each particle in the order that they came in.
+    pub order: Vec<u32>,
+    /// Place of each in its cell (edges, 0..1).
+    offsets: Vec<[f32; 3]>,
+    /// Particles in each octant of a cell.
+    octants: Vec<[u16; 8]>,
+}
+
+/// A particle while it is sorted.
+#[derive(Clone, Copy)]
+struct Item {
+    key: u64,
+    /// Bits of the offset: not negative, so that they ascend as the numbers do.
+    offset: [u32; 3],
+    index: u32,
+}
+
+impl Cells {
+    /// Sorts particles at places (m) into cells of an edge (m); `rank` tells those at the same place apart.
+    ///
+    /// # Errors
+    /// Particles so far apart that there are more than two million cells between them.
+    pub fn new(places: &[DVec3], edge: f64, rank: impl Fn(u32) -> i64 + Sync) -> Result<Self> {
+        let cell_of = |place: &DVec3| [0, 1, 2].map(|axis| (place[axis] / edge).floor());
+        let mut low = [f64::INFINITY; 3];
+        let mut high = [f64::NEG_INFINITY; 3];
+        for place in places {
+            let cell = cell_of(place);
+            for axis in 0..3 {
+                low[axis] = low[axis].min(cell[axis]);
+                high[axis] = high[axis].max(cell[axis]);
+            }
+        }
+        if places.is_empty() {
+            return Ok(Self { edge, ..Self::default() });
+        }
+        let limit = f64::from(i32::MAX / 16);
+        for axis in 0..3 {
+            if high[axis] - low[axis] >= FARTHEST as f64 || low[axis] < -limit || high[axis] > limit {
+                let far = (high[axis] - low[axis]).max(-low[axis]).max(high[axis]) * edge;
+                return Err(Error::argument(format!(
+                    "particles reach over {far:.0} m, too far for a spacing of {} m",
+                    edge / 2.0
+                )));
+            }
+        }
+        let least = low.map(|x| x as i32);
+        let item = |(place, index): (&DVec3, u32)| {
+            let cell = cell_of(place);
+            let part = |axis: usize| ((place[axis] / edge - cell[axis]) as f32).clamp(0.0, 1.0);
+            let key = pack([0, 1, 2].map(|axis| (cell[axis] - low[axis]) as u64));
+            // Adding 0 makes -0 positive.
+            Item { key, offset: [0, 1, 2].map(|axis| (part(axis) + 0.0).to_bits()), index }
+        };
+        let mut items: Vec<Item> =
+            places.par_iter().zip(0..places.len() as u32).with_min_len(4096).map(item).collect();
+        let tell = |a: &Item, b: &Item| {
+            a.key.cmp(&b.key).then(a.offset.cmp(&b.offset)).then_with(|| rank(a.index).cmp(&rank(b.index)))
+        };
+        items.par_sort_unstable_by(tell);
+        let mut cells = Self { edge, low: least, ..Self::default() };
+        for (n, item) in items.iter().enumerate() {
+            if cells.keys.last() != Some(&item.key) {
+                cells.keys.push(item.key);
+                cells.start.push(n as u32);
+                cells.octants.push([0; 8]);
+            }
+            let octant =
+                item.offset.iter().fold(0, |at, bits| at << 1 | usize::from(f32::from_bits(*bits) >= 0.5));
+            let count = &mut cells.octants.last_mut().expect("just pushed")[octant];
+            *count = count.saturating_add(1);
+        }
+        cells.start.push(items.len() as u32);
+        cells.order = items.iter().map(|item| item.index).collect();
+        cells.offsets = items.iter().map(|item| item.offset.map(f32::from_bits)).collect();
+        Ok(cells)
+    }
+
+    /// Edge of a cell (m).
+    pub fn edge(&self) -> f64 {
+        self.edge
+    }
+
+    /// Coordinates of the cells that hold particles, ascending.
+    pub fn coords(&self) -> impl Iterator<Item = Coord> + '_ {
+        self.keys.iter().map(|key| {
+            let at = unpack(*key);
+            [0, 1, 2].map(|axis| self.low[axis] + at[axis] as i32)
+        })
+    }
+
+    /// The cells from `low` to `high` that hold particles, in ascending order: index and coordinates.
+    fn between(&self, low: Coord, high: Coord, mut see: impl FnMut(usize, Coord)) {
+        let shifted = |at: Coord| [0, 1, 2].map(|axis| i64::from(at[axis]) - i64::from(self.low[axis]));
+        let (first, last) = (shifted(low), shifted(high).map(|x| x.min(FARTHEST - 1)));
+        if last.iter().any(|x| *x < 0) {
+            return;
+        }
+        for x in first[0].max(0)..=last[0] {
+            for y in first[1].max(0)..=last[1] {
+                let begin = pack([x, y, first[2].max(0)].map(|x| x as u64));
+                let end = pack([x, y, last[2]].map(|x| x as u64));
+                let at = self.keys.partition_point(|key| *key < begin);
+                for (cell, key) in self.keys.iter().enumerate().skip(at).take_while(|(_, key)| **key <= end) {
+                    let at = unpack(*key);
+                    see(cell, [0, 1, 2].map(|axis| self.low[axis] + at[axis] as i32));
+                }
+            }
+        }
+    }
+
+    /// Calls `see` with runs of particles in the cells from `low` to `high`: their first one's number in the order of cells, and
+    /// their offsets from a cell `from` (edges).
+    pub fn near(&self, low: Coord, high: Coord, from: Coord, mut see: impl FnMut(usize, [f32; 3])) {
+        self.between(low, high, |cell, at| {
+            let shift = [0, 1, 2].map(|axis| (at[axis] - from[axis]) as f32);
+            for n in self.start[cell] as usize..self.start[cell + 1] as usize {
+                see(n, [0, 1, 2].map(|axis| shift[axis] + self.offsets[n][axis]));
+            }
+        });
+    }
+
+    /// Calls `see` with the count of particles in each octant, cubes of half an edge, of the cells from `low` to `high`
+    /// that hold any: octants are counted through all cells.
+    pub fn counts(&self, low: Coord, high: Coord, mut see: impl FnMut([i32; 3], u16)) {
+        self.between(low, high, |cell, at| {
+            for (octant, count) in self.octants[cell].iter().enumerate() {
+                let part = [octant >> 2, octant >> 1 & 1, octant & 1];
+                see([0, 1, 2].map(|axis| 2 * at[axis] + part[axis] as i32), *count);
+            }
+        });
+    }
+}
+
+fn pack([x, y, z]: [u64; 3]) -> u64 {
+    x << (2 * BITS) | y << BITS | z
+}
+
+fn unpack(key: u64) -> [u64; 3] {
+    let mask = (1 << BITS) - 1;
+    [key >> (2 * BITS), key >> BITS & mask, key & mask]
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn particles_are_found_in_the_cells_around_in_any_order() {
+        let places: Vec<DVec3> = (0..200)
+            .map(|n| DVec3::new((n * 37 % 50) as f64, (n * 13 % 40) as f64 - 20.0, (n % 30) as f64) * 0.1)
+            .collect();
+        let mut turned = places.clone();
+        turned.reverse();
+        let near = |places: &[DVec3]| {
+            let cells = Cells::new(places, 0.7, |_| 0).unwrap();
+            let mut found = Vec::new();
+            cells.near([1, -2, 0], [3, 0, 2], [2, 0, 1], |_, offset| found.push(offset.map(f32::to_bits)));
+            found
+        };
+        let found = near(&places);
+        assert_eq!(found, near(&turned));
+        let is_in = |p: &&DVec3| {
+            let cell = [0, 1, 2].map(|axis| (p[axis] / 0.7).floor() as i32);
+            (1..=3).contains(&cell[0]) && (-2..=0).contains(&cell[1]) && (0..=2).contains(&cell[2])
+        };
+        assert_eq!(found.len(), places.iter().filter(is_in).count());
+        assert!(Cells::new(&[DVec3::zeros(), DVec3::new(1e7, 0.0, 0.0)], 0.1, |_| 0).is_err());
+    }
+}

@@ -1,0 +1,149 @@
+//! Ways of particles around a place: their weighted sums, and the affine map that fits them best.
+
+use nalgebra::{Matrix3, Vector3};
+
+use crate::base::cpu::dispatch;
+use crate::base::lanes::{LANES, Lanes};
+
+/// Spread of the places, over that on all axes, below which the map does not follow the ways in that direction.
+const FLAT: f64 = 0.004;
+
+/// Particles from a common corner (spacings): their places and ways, in whole lanes.
+#[derive(Default)]
+pub struct Near {
+    place: [Vec<[f32; LANES]>; 3],
+    way: [Vec<[f32; LANES]>; 3],
+    count: usize,
+}
+
+impl Near {
+    pub fn clear(&mut self) {
+        self.place.iter_mut().chain(&mut self.way).for_each(Vec::clear);
+        self.count = 0;
+    }
+
+    #[inline(always)]
+    pub fn push(&mut self, place: [f32; 3], way: [f32; 3]) {
+        let lane = self.count % LANES;
+        if lane == 0 {
+            // What fills no lane is too far to count.
+            self.place.iter_mut().for_each(|lanes| lanes.push([1.0e6; LANES]));
+            self.way.iter_mut().for_each(|lanes| lanes.push([0.0; LANES]));
+        }
+        let last = self.count / LANES;
+        for axis in 0..3 {
+            self.place[axis][last][lane] = place[axis];
+            self.way[axis][last][lane] = way[axis];
+        }
+        self.count += 1;
+    }
+}
+
+/// Weighted sums over the particles around a place, d being the way to a particle and u its own: 1, d, d d, u, and u d.
+pub struct Sums {
+    weight: f64,
+    d: Vector3<f64>,
+    dd: Matrix3<f64>,
+    u: Vector3<f64>,
+    ud: Matrix3<f64>,
+}
+
+/// Sums over the particles within a radius (spacings) of a place, with the weights (1 - (d / radius)^2)^3 (poly6: Müller, Charypar
+/// and Gross 2003); none where there are none.
+pub fn sums(near: &Near, room: &mut Near, at: [f32; 3], radius: f32) -> Option<Sums> {
+    dispatch!(sums_body(near: &Near, room: &mut Near, at: [f32; 3], radius: f32) -> Option<Sums>)
+}
+
+#[inline(always)]
+fn sums_body(near: &Near, room: &mut Near, at: [f32; 3], radius: f32) -> Option<Sums> {
+    let zero = Lanes::all(0.0);
+    let centre = [Lanes::all(at[0]), Lanes::all(at[1]), Lanes::all(at[2])];
+    let most = Lanes::all(radius * radius);
+    room.clear();
+    for chunk in 0..near.place[0].len() {
+        let d = [
+            Lanes(near.place[0][chunk]) - centre[0],
+            Lanes(near.place[1][chunk]) - centre[1],
+            Lanes(near.place[2][chunk]) - centre[2],
+        ];
+        let square = d[0] * d[0] + d[1] * d[1] + d[2] * d[2];
+        let mut bits = square.is_less(most).bits();
+        if bits == 0 {
+            continue;
+        }
+        let way = [near.way[0][chunk], near.way[1][chunk], near.way[2][chunk]];
+        while bits != 0 {
+            let lane = bits.trailing_zeros() as usize & (LANES - 1);
+            bits &= bits - 1;
+            room.push([d[0].0[lane], d[1].0[lane], d[2].0[lane]], [way[0][lane], way[1][lane], way[2][lane]]);
+        }
+    }
+    let (one, inverse) = (Lanes::all(1.0), Lanes::all(1.0 / (radius * radius)));
+    let mut all = zero;
+    let (mut sum_d, mut sum_u) = ([zero; 3], [zero; 3]);
+    let (mut sum_dd, mut sum_ud) = ([[zero; 3]; 3], [[zero; 3]; 3]);
+    for chunk in 0..room.place[0].len() {
+        let d = [Lanes(room.place[0][chunk]), Lanes(room.place[1][chunk]), Lanes(room.place[2][chunk])];
+        let u = [Lanes(room.way[0][chunk]), Lanes(room.way[1][chunk]), Lanes(room.way[2][chunk])];
+        let q = (one - (d[0] * d[0] + d[1] * d[1] + d[2] * d[2]) * inverse).max(zero);
+        let weight = q * q * q;
+        all = all + weight;
+        for a in 0..3 {
+            let (wd, wu) = (weight * d[a], weight * u[a]);
+            sum_d[a] = sum_d[a] + wd;
+            sum_u[a] = sum_u[a] + wu;
+            for b in 0..3 {
+                sum_ud[a][b] = sum_ud[a][b] + wu * d[b];
+                if b >= a {
+                    sum_dd[a][b] = sum_dd[a][b] + wd * d[b];
+                }
+            }
+        }
+    }
+    let total = |lanes: Lanes| lanes.0.iter().map(|value| f64::from(*value)).sum::<f64>();
+    let weight = total(all);
+    (weight > 0.0).then(|| Sums {
+        weight,
+        d: Vector3::from(sum_d.map(total)),
+        dd: Matrix3::from_fn(|a, b| total(sum_dd[a.min(b)][a.max(b)])),
+        u: Vector3::from(sum_u.map(total)),
+        ud: Matrix3::from_fn(|a, b| total(sum_ud[a][b])),
+    })
+}
+
+/// An affine map from places, seen from where it was fitted (spacings), to ways (spacings).
+#[derive(Debug, Clone, Copy)]
+pub struct Map {
+    /// Sum of the weights of the particles that it was fitted to.
+    pub weight: f64,
+    /// The way at the place itself.
+    way: Vector3<f64>,
+    /// How ways change with the place.
+    change: Matrix3<f64>,
+}
+
+impl Map {
+    /// The way at a place seen from where the map was fitted.
+    pub fn at(&self, place: Vector3<f64>) -> Vector3<f64> {
+        self.way + self.change * place
+    }
+}
+
+impl Sums {
+    /// The mean way.
+    pub fn mean(&self) -> Vector3<f64> {
+        self.u / self.weight
+    }
+
+    /// The map that fits best.
+    pub fn map(&self) -> Map {
+        let (d, u) = (self.d / self.weight, self.u / self.weight);
+        let spread = self.dd / self.weight - d * d.transpose();
+        let joint = self.ud / self.weight - u * d.transpose();
+        // It is u + joint spread^-1 (x - d). In directions in which places hardly spread it is constant.
+        let least = FLAT * spread.trace();
+        let damped = spread * spread + Matrix3::from_diagonal_element(least * least);
+        let change = damped.try_inverse().map_or_else(Matrix3::zeros, |inverse| joint * spread * inverse);
+        Map { weight: self.weight, way: u - change * d, change }
+    }
+}

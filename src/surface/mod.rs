@@ -1,0 +1,93 @@
+//! A detailed triangle mesh follows a particle liquid without losing its detail (thesis chapter 2).
+//!
+//! Each frame the mesh is carried along by the particles ([`advect`]), then moved so that each vertex is as far from the
+//! surface of the particles as it was at the first frame ([`project`]). That surface is where an implicit function of the
+//! particles is 0 ([`implicit`]), turned into signed distances ([`band`]). Vertices that this would move too far are where
+//! the liquid has merged or split: they are flagged.
+//!
+//! # Glossary
+//!
+//! | word | meaning |
+//! |---|---|
+//! | spacing, r | initial distance between particles |
+//! | cell, node | the grid's spacing, half of r; a corner of the grid, where phi is known |
+//! | phi | the implicit function of the particles; then the signed distance from where it is 0, negative inside |
+//! | delta | the distance from phi = 0 that a vertex keeps: its detail, signed as phi |
+//! | patch | 4 x 4 x 4 nodes, which are evaluated together |
+//! | flagged | of a vertex: its projection failed or jumped; it stays where advection put it |
+
+// Kernels index several arrays by one lane or axis.
+#![allow(clippy::needless_range_loop)]
+
+mod advect;
+mod average;
+mod band;
+mod cells;
+mod fit;
+mod implicit;
+mod isosurface;
+#[cfg(feature = "vdb")]
+mod level_set;
+mod paths;
+mod project;
+mod sample;
+mod spacing;
+mod tracker;
+
+pub use advect::Weighting;
+pub use average::SUPPORT;
+pub use band::Distances;
+pub use implicit::Implicit;
+pub use isosurface::Isosurface;
+#[cfg(feature = "vdb")]
+pub use level_set::{HALF_WIDTH, level_set};
+pub use paths::Paths;
+pub use spacing::estimate as estimate_spacing;
+pub use tracker::{Params, StepReport, Tracker};
+
+use crate::base::DVec3;
+use crate::error::{Error, Result};
+
+/// Particles of a frame; all arrays that are not empty have one value for each.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub struct Particles {
+    /// Places (m).
+    pub places: Vec<DVec3>,
+    /// Velocities (m/s); may be empty.
+    pub velocities: Vec<[f32; 3]>,
+    /// Numbers by which particles are the same from frame to frame; may be empty.
+    pub ids: Vec<i64>,
+}
+
+impl Particles {
+    /// Checks that there are particles, that arrays have one value for each, that numbers are finite and ids differ.
+    ///
+    /// # Errors
+    /// Names the first particle at fault, counted from 1.
+    pub fn validate(&self) -> Result<()> {
+        let count = self.places.len();
+        let refuse = |what: String| Err(Error::argument(what));
+        if count == 0 {
+            return refuse("there are no particles".into());
+        }
+        for (name, length) in [("velocities", self.velocities.len()), ("ids", self.ids.len())] {
+            if length != 0 && length != count {
+                return refuse(format!("there are {count} particles, but {length} {name}"));
+            }
+        }
+        if let Some(at) = self.places.iter().position(|place| !place.iter().all(|x| x.is_finite())) {
+            return refuse(format!("the place of particle {} is not finite", at + 1));
+        }
+        if let Some(at) = self.velocities.iter().position(|speed| !speed.iter().all(|x| x.is_finite())) {
+            return refuse(format!("the velocity of particle {} is not finite", at + 1));
+        }
+        let mut ids: Vec<(i64, usize)> = self.ids.iter().copied().zip(1..).collect();
+        ids.sort_unstable();
+        match ids.windows(2).find(|pair| pair[0].0 == pair[1].0) {
+            Some(pair) => {
+                refuse(format!("particles {} and {} have the same id, {}", pair[0].1, pair[1].1, pair[0].0))
+            }
+            None => Ok(()),
+        }
+    }
+}

@@ -1,0 +1,180 @@
+//! The way of each particle from one frame to the next.
+//!
+//! Particles are matched by id: files hold them in another order in each frame. With velocities a way is a cubic that begins and ends
+//! with these (Hermite), otherwise a line. Without ids it is the velocity times the time.
+
+use rayon::prelude::*;
+
+use super::Particles;
+use crate::base::DVec3;
+use crate::error::{Error, Result};
+
+/// The ways of particles that are there in both frames.
+#[derive(Debug, Default)]
+pub struct Paths {
+    from: Vec<DVec3>,
+    to: Vec<DVec3>,
+    /// Velocities times the time between the frames (m), at both ends; none: ways are lines.
+    speeds: Vec<[DVec3; 2]>,
+    /// What tells particles at the same place apart.
+    ranks: Vec<i64>,
+    /// Particles of the first frame that end, and of the second that are new.
+    pub died: usize,
+    /// See `died`.
+    pub born: usize,
+}
+
+/// Ways are cubics if the velocities say, in the median, where particles go up to this share of the way.
+const TRUSTED: f64 = 0.5;
+
+impl Paths {
+    /// From one frame to the next, `dt` (s) later.
+    ///
+    /// # Errors
+    /// Neither ids in both frames nor velocities in the first.
+    pub fn between(from: &Particles, to: &Particles, dt: f64) -> Result<Self> {
+        if from.ids.is_empty() || to.ids.is_empty() {
+            return Self::by_velocity(from, dt);
+        }
+        let sorted = |ids: &[i64]| {
+            let mut order: Vec<(i64, u32)> = ids.iter().copied().zip(0..).collect();
+            order.par_sort_unstable();
+            order
+        };
+        let (old, new) = (sorted(&from.ids), sorted(&to.ids));
+        let mut out = Self::default();
+        let has_speeds = !from.velocities.is_empty() && !to.velocities.is_empty();
+        let speed =
+            |frame: &Particles, at: u32| DVec3::from(frame.velocities[at as usize].map(f64::from)) * dt;
+        let mut next = 0;
+        for (id, at) in old {
+            while new.get(next).is_some_and(|(other, _)| *other < id) {
+                next += 1;
+            }
+            let Some((_, then)) = new.get(next).filter(|(other, _)| *other == id) else {
+                out.died += 1;
+                continue;
+            };
+            out.from.push(from.places[at as usize]);
+            out.to.push(to.places[*then as usize]);
+            out.ranks.push(id);
+            if has_speeds {
+                out.speeds.push([speed(from, at), speed(to, *then)]);
+            }
+        }
+        out.born = to.places.len() - out.from.len();
+        if !out.are_speeds_right() {
+            out.speeds.clear();
+        }
+        Ok(out)
+    }
+
+    fn by_velocity(from: &Particles, dt: f64) -> Result<Self> {
+        if from.velocities.is_empty() {
+            return Err(Error::argument(
+                "particles have neither ids in both frames nor velocities: what moves where is not known",
+            ));
+        }
+        let ways = from.velocities.iter().map(|speed| DVec3::from(speed.map(f64::from)) * dt);
+        let to = from.places.iter().zip(ways).map(|(place, way)| place + way).collect();
+        let ranks = vec![0; from.places.len()];
+        Ok(Self { from: from.places.clone(), to, ranks, ..Self::default() })
+    }
+
+    /// Whether velocities are in the unit and at the time that the places say.
+    fn are_speeds_right(&self) -> bool {
+        let mut ways: Vec<[f64; 2]> = (0..self.speeds.len())
+            .map(|n| {
+                let way = self.to[n] - self.from[n];
+                [((self.speeds[n][0] + self.speeds[n][1]) * 0.5 - way).norm(), way.norm()]
+            })
+            .collect();
+        let middle = ways.len() / 2;
+        let mut median = |part: usize| match ways.is_empty() {
+            true => 0.0,
+            false => ways.select_nth_unstable_by(middle, |a, b| a[part].total_cmp(&b[part])).1[part],
+        };
+        median(0) <= TRUSTED * median(1)
+    }
+
+    /// Count of ways.
+    pub fn count(&self) -> usize {
+        self.from.len()
+    }
+
+    /// What tells particles at the same place apart.
+    pub fn rank(&self, path: u32) -> i64 {
+        self.ranks[path as usize]
+    }
+
+    /// Greatest distance (m) that a particle moves.
+    pub fn farthest(&self) -> f64 {
+        let each = (0..self.count()).into_par_iter().with_min_len(4096);
+        each.map(|n| {
+            let way = (self.to[n] - self.from[n]).norm();
+            self.speeds.get(n).map_or(way, |[a, b]| way.max(a.norm()).max(b.norm()))
+        })
+        .reduce(|| 0.0, f64::max)
+    }
+
+    /// Places (m) at a share 0..=1 of the time.
+    pub fn at(&self, share: f64, out: &mut Vec<DVec3>) {
+        let place = |n: usize| {
+            let (from, to) = (self.from[n], self.to[n]);
+            match self.speeds.get(n) {
+                // The ends are exact.
+                _ if share <= 0.0 => from,
+                _ if share >= 1.0 => to,
+                None => from + (to - from) * share,
+                Some([a, b]) => {
+                    let (s, s2, s3) = (share, share * share, share * share * share);
+                    from + (to - from) * (3.0 * s2 - 2.0 * s3) + a * (s3 - 2.0 * s2 + s) + b * (s3 - s2)
+                }
+            }
+        };
+        (0..self.count()).into_par_iter().with_min_len(4096).map(place).collect_into_vec(out);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn frame(ids: &[i64], x: &[f64], speed: f32) -> Particles {
+        Particles {
+            places: x.iter().map(|x| DVec3::new(*x, 0.0, 0.0)).collect(),
+            velocities: vec![[speed, 0.0, 0.0]; x.len()],
+            ids: ids.to_vec(),
+        }
+    }
+
+    #[test]
+    fn particles_are_matched_by_id() {
+        let from = frame(&[7, 3, 9], &[0.0, 1.0, 2.0], 10.0);
+        let to = frame(&[9, 5, 7], &[3.0, 0.0, 1.0], 10.0);
+        let paths = Paths::between(&from, &to, 0.1).unwrap();
+        assert_eq!((paths.count(), paths.died, paths.born), (2, 1, 1));
+        let mut places = Vec::new();
+        paths.at(0.5, &mut places);
+        assert!((places[0].x - 0.5).abs() < 1e-12 && (places[1].x - 2.5).abs() < 1e-12);
+        assert_eq!(paths.farthest(), 1.0);
+    }
+
+    #[test]
+    fn without_ids_velocities_count_and_without_both_nothing_does() {
+        let from = frame(&[], &[0.0, 1.0], 10.0);
+        let mut places = Vec::new();
+        Paths::between(&from, &from, 0.1).unwrap().at(1.0, &mut places);
+        assert_eq!(places[1].x, 2.0);
+        let none = Particles { velocities: Vec::new(), ..from };
+        assert!(Paths::between(&none, &none, 0.1).is_err());
+    }
+
+    #[test]
+    fn velocities_that_contradict_the_places_are_left_out() {
+        let (from, to) = (frame(&[1], &[0.0], 500.0), frame(&[1], &[1.0], 500.0));
+        let mut places = Vec::new();
+        Paths::between(&from, &to, 0.1).unwrap().at(0.5, &mut places);
+        assert_eq!(places[0].x, 0.5);
+    }
+}

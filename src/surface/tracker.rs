@@ -1,0 +1,285 @@
+//! The mesh, frame by frame.
+
+use rayon::prelude::*;
+
+use super::Particles;
+use super::advect::{Weighting, advect};
+use super::band::Distances;
+use super::implicit::Implicit;
+use super::isosurface::Isosurface;
+use super::paths::Paths;
+use super::project::foot;
+use super::sample::Sampler;
+use crate::base::{DVec3, TriMesh};
+use crate::context::{Context, PhaseTime};
+use crate::error::{Error, Result};
+
+/// How a mesh follows particles.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Params {
+    /// Initial distance r between particles (m), over 0.
+    pub spacing: f64,
+    /// Edge of a cell (r), 0.125..=2 (thesis 2.7: 0.5).
+    pub cell: f64,
+    /// Greatest distance (r) that projection may move a vertex; beyond, the liquid has merged or split there (thesis 2.3.3: 0.5).
+    pub change: f64,
+    /// How particles carry vertices.
+    pub weighting: Weighting,
+}
+
+impl Params {
+    /// The thesis' values for particles of a spacing (m), but for the weighting.
+    pub fn for_spacing(spacing: f64) -> Self {
+        Self { spacing, cell: 0.5, change: 0.5, weighting: Weighting::Affine }
+    }
+
+    /// Checks every field.
+    ///
+    /// # Errors
+    /// Names the field and its range.
+    pub fn validate(&self) -> Result<()> {
+        let ranges = [
+            ("spacing", self.spacing, 1e-9, 1e6, "m"),
+            ("cell", self.cell, 0.125, 2.0, "r"),
+            ("change", self.change, 1e-3, 100.0, "r"),
+        ];
+        for (name, value, low, high, unit) in ranges {
+            if !(low..=high).contains(&value) {
+                return Err(Error::argument(format!(
+                    "{name} = {value} is not within {low} to {high} {unit}"
+                )));
+            }
+        }
+        Ok(())
+    }
+}
+
+/// What a step did.
+#[derive(Debug, Clone, Default)]
+pub struct StepReport {
+    /// Vertices whose projection jumped: the liquid merged or split there.
+    pub jumped: usize,
+    /// Vertices whose projection did not find the surface.
+    pub lost: usize,
+    /// Parts into which the frame was divided.
+    pub parts: usize,
+    /// Particles that are new, and that are gone.
+    pub born: usize,
+    /// See `born`.
+    pub died: usize,
+    /// Triangles of the particles' own surface.
+    pub triangles: usize,
+    /// Time of each phase.
+    pub phases: Vec<PhaseTime>,
+}
+
+/// A detailed mesh that follows particles.
+pub struct Tracker {
+    params: Params,
+    /// Places of vertices (m).
+    vertices: Vec<DVec3>,
+    triangles: Vec<[u32; 3]>,
+    /// Distance from the surface that each vertex keeps (m); NaN: it was too far from it to have one.
+    delta: Vec<f32>,
+    /// Vertices that the last step could not project.
+    flags: Vec<bool>,
+    /// How far distances from the surface are known (r).
+    reach: f64,
+}
+
+/// Least reach of the band, and the greatest that is tried at the first frame (r).
+const REACH: [f64; 2] = [1.5, 8.0];
+/// The band reaches so much farther than vertices did before (thesis 2.3.1).
+const WIDER: f64 = 1.25;
+/// How far a vertex drifts in a frame at most, where nothing merges or splits (r).
+const DRIFT: f64 = 0.25;
+/// Share of the vertices that set the reach: a spike does not widen the band everywhere.
+const MOST: f64 = 0.999;
+/// Projection moves no vertex by less than this (r): what it would correct is rounding.
+const STILL: f64 = 1e-5;
+/// Share of vertices that must lie near the particles' surface at the first frame.
+const OVERLAP: f64 = 0.5;
+
+impl Tracker {
+    /// A mesh as it is at the first frame, in the particles' space.
+    ///
+    /// # Errors
+    /// Parameters out of range, a mesh or particles that are not valid; a mesh that is not where the particles are; cancel.
+    pub fn new(ctx: &Context, params: Params, mesh: &TriMesh, particles: &Particles) -> Result<Self> {
+        params.validate()?;
+        mesh.validate()?;
+        particles.validate()?;
+        let vertices: Vec<DVec3> = mesh.positions.iter().map(|place| place.cast()).collect();
+        let flags = vec![false; vertices.len()];
+        let (delta, reach) = (Vec::new(), REACH[0]);
+        let mut tracker = Self { params, vertices, triangles: mesh.triangles.clone(), delta, flags, reach };
+        let surface = ctx.phase("phi", || tracker.surface_of(ctx, particles))?;
+        loop {
+            let distances = ctx.phase("distance", || tracker.distances(ctx, &surface))?;
+            tracker.delta = ctx.phase("measure", || Ok(tracker.measure(&distances)))?;
+            let known = tracker.delta.iter().filter(|delta| !delta.is_nan()).count();
+            let wanted = if known == tracker.delta.len() { tracker.wanted_reach() } else { REACH[1] };
+            if wanted <= tracker.reach {
+                tracker.check_overlap(known)?;
+                return Ok(tracker);
+            }
+            // Measured again: what a step finds must be what was measured.
+            tracker.reach = wanted.max(1.25 * tracker.reach).min(REACH[1]);
+        }
+    }
+
+    fn check_overlap(&self, known: usize) -> Result<()> {
+        let share = known as f64 / self.vertices.len() as f64;
+        if share >= OVERLAP {
+            return Ok(());
+        }
+        Err(Error::argument(format!(
+            "only {:.0} % of the mesh lies within {:.3} m of the particles' surface: are both in the same space and unit?",
+            100.0 * share,
+            REACH[1] * self.params.spacing
+        )))
+    }
+
+    /// The mesh (m).
+    pub fn mesh(&self) -> TriMesh {
+        TriMesh {
+            positions: self.vertices.iter().map(|place| place.cast()).collect(),
+            triangles: self.triangles.clone(),
+        }
+    }
+
+    /// Places of the vertices (m).
+    pub fn vertices(&self) -> &[DVec3] {
+        &self.vertices
+    }
+
+    /// Distance from the particles' surface that each vertex keeps (m), negative inside; NaN: it was too far away to have one.
+    pub fn delta(&self) -> &[f32] {
+        &self.delta
+    }
+
+    /// Which vertices the last step could not project.
+    pub fn flags(&self) -> &[bool] {
+        &self.flags
+    }
+
+    /// Follows the particles from one frame to the next, `dt` (s) later. A step that fails or is cancelled leaves the mesh as it
+    /// was.
+    ///
+    /// # Errors
+    /// A time that is not positive; particles that are not valid, or have neither ids nor velocities; cancel.
+    pub fn step(&mut self, ctx: &Context, from: &Particles, to: &Particles, dt: f64) -> Result<StepReport> {
+        if !(dt > 0.0 && dt.is_finite()) {
+            return Err(Error::argument(format!("a step of {dt} s does not go on in time")));
+        }
+        from.validate()?;
+        to.validate()?;
+        let ((vertices, flags, report), phases) = ctx.step(4, || {
+            let paths = Paths::between(from, to, dt)?;
+            let (carried, parts) = ctx.phase("advect", || self.carried(ctx, &paths))?;
+            let surface = ctx.phase("phi", || self.surface_of(ctx, to))?;
+            let distances = ctx.phase("distance", || self.distances(ctx, &surface))?;
+            let (vertices, flags) = ctx.phase("project", || self.projected(ctx, carried, &distances))?;
+            let report = StepReport {
+                parts,
+                born: paths.born,
+                died: paths.died,
+                triangles: surface.1.count(),
+                ..StepReport::default()
+            };
+            Ok((vertices, flags, report))
+        })?;
+        let count = |kind: Flag| flags.iter().filter(|flag| **flag == kind).count();
+        let report = StepReport { jumped: count(Flag::Jumped), lost: count(Flag::Lost), phases, ..report };
+        self.vertices = vertices;
+        self.flags = flags.iter().map(|flag| *flag != Flag::Placed).collect();
+        Ok(report)
+    }
+
+    fn carried(&self, ctx: &Context, paths: &Paths) -> Result<(Vec<DVec3>, usize)> {
+        let mut vertices = self.vertices.clone();
+        let parts = advect(ctx, &mut vertices, paths, self.params.spacing, self.params.weighting)?;
+        Ok((vertices, parts))
+    }
+
+    fn surface_of(&self, ctx: &Context, particles: &Particles) -> Result<(Implicit, Isosurface)> {
+        let Params { spacing, cell, .. } = self.params;
+        let phi = Implicit::new(ctx, &particles.places, spacing, cell * spacing)?;
+        let surface = Isosurface::new(&phi);
+        Ok((phi, surface))
+    }
+
+    fn distances(&self, ctx: &Context, surface: &(Implicit, Isosurface)) -> Result<Distances> {
+        Distances::new(ctx, &surface.0, &surface.1, (self.reach / self.params.cell) as f32)
+    }
+
+    /// How far the band must reach (r): a little farther than vertices lie from the surface, and as far as they may jump.
+    fn wanted_reach(&self) -> f64 {
+        let mut far: Vec<f32> =
+            self.delta.iter().filter(|delta| !delta.is_nan()).map(|delta| delta.abs()).collect();
+        if far.is_empty() {
+            return REACH[0];
+        }
+        let place = ((far.len() - 1) as f64 * MOST) as usize;
+        let most = f64::from(*far.select_nth_unstable_by(place, f32::total_cmp).1) / self.params.spacing;
+        // Splines read two nodes farther; a vertex drifts less than this before it is moved back.
+        (WIDER * most + DRIFT + 2.0 * self.params.cell).clamp(REACH[0], REACH[1])
+    }
+
+    /// The distance of each vertex from the surface (m).
+    fn measure(&self, distances: &Distances) -> Vec<f32> {
+        let cell = distances.cell();
+        let one = |sampler: &mut Sampler<'_>, place: &DVec3| {
+            foot(sampler, place / cell).map_or(f32::NAN, |foot| (foot.distance * cell) as f32)
+        };
+        let vertices = self.vertices.par_iter().with_min_len(1024);
+        vertices.map_init(|| Sampler::new(distances), one).collect()
+    }
+
+    /// Moves vertices (m) to where they have the distance that they keep, unless that is too far.
+    fn projected(
+        &self,
+        ctx: &Context,
+        mut vertices: Vec<DVec3>,
+        distances: &Distances,
+    ) -> Result<(Vec<DVec3>, Vec<Flag>)> {
+        let Params { spacing, change, .. } = self.params;
+        let cell = distances.cell();
+        let chunks = vertices.par_chunks_mut(1024).zip(self.delta.par_chunks(1024));
+        let flags: Vec<Vec<Flag>> = chunks
+            .map_init(
+                || Sampler::new(distances),
+                |sampler, (vertices, delta)| {
+                    ctx.check()?;
+                    let place = |(vertex, delta): (&mut DVec3, &f32)| {
+                        let Some(foot) = foot(sampler, *vertex / cell).filter(|_| !delta.is_nan()) else {
+                            return Flag::Lost;
+                        };
+                        let to = foot.at(f64::from(*delta) / cell) * cell;
+                        let moved = (to - *vertex).norm() / spacing;
+                        if moved > change {
+                            return Flag::Jumped;
+                        }
+                        if moved > STILL {
+                            *vertex = to;
+                        }
+                        Flag::Placed
+                    };
+                    Ok(vertices.iter_mut().zip(delta).map(place).collect())
+                },
+            )
+            .collect::<Result<_>>()?;
+        Ok((vertices, flags.into_iter().flatten().collect()))
+    }
+}
+
+/// What became of a vertex.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Flag {
+    /// It keeps its distance.
+    Placed,
+    /// It would have moved too far.
+    Jumped,
+    /// The surface was not found.
+    Lost,
+}

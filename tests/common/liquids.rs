@@ -1,0 +1,123 @@
+//! Liquids whose motion is known, as particles, and meshes that ride on them.
+
+use frazil::base::{DVec3, TriMesh};
+use frazil::surface::{Params, Particles, Tracker};
+use frazil::{Context, Pool};
+
+use super::shapes::sphere;
+
+/// A context with threads of its own.
+pub fn context(threads: usize) -> Context {
+    Context::new(Pool::new(threads).expect("threads"))
+}
+
+/// Numbers from -1 to 1, the same in each run.
+pub struct Random(pub u64);
+
+impl Random {
+    /// The next one.
+    pub fn next(&mut self) -> f64 {
+        self.0 = self.0.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+        (self.0 >> 33) as f64 / f64::from(1u32 << 30) - 1.0
+    }
+
+    /// A vector in a cube of twice `size`.
+    pub fn vector(&mut self, size: f64) -> DVec3 {
+        let mut next = || size * self.next();
+        DVec3::new(next(), next(), next())
+    }
+}
+
+/// Places of particles on a grid of a spacing (m), moved by up to `jitter` (spacings), where the grid's places are inside.
+pub fn filled(spacing: f64, jitter: f64, size: f64, is_inside: impl Fn(DVec3) -> bool) -> Vec<DVec3> {
+    let mut random = Random(1);
+    let count = (size / spacing).ceil() as i32;
+    let mut out = Vec::new();
+    for x in -count..=count {
+        for y in -count..=count {
+            for z in -count..=count {
+                let place =
+                    (DVec3::new(f64::from(x), f64::from(y), f64::from(z)) + DVec3::repeat(0.5)) * spacing;
+                let moved = random.vector(jitter * spacing);
+                if is_inside(place) {
+                    out.push(place + moved);
+                }
+            }
+        }
+    }
+    out
+}
+
+/// Particles with ids from 0 on.
+pub fn numbered(places: Vec<DVec3>) -> Particles {
+    let ids = (0..places.len() as i64).collect();
+    Particles { places, ids, velocities: Vec::new() }
+}
+
+/// A ball of liquid: its spacing (m), particles, and a mesh around it with ripples of `detail` spacings.
+pub struct Ball {
+    pub spacing: f64,
+    pub places: Vec<DVec3>,
+    pub mesh: TriMesh,
+}
+
+/// A ball with a radius of so many spacings, and a mesh of 12 n^2 triangles.
+pub fn ball(radius: f64, n: usize, detail: f64) -> Ball {
+    let spacing = 0.01;
+    let size = radius * spacing;
+    let places = filled(spacing, 0.1, size, |place| place.norm() <= size);
+    let mut mesh = sphere(1.0, n);
+    for place in &mut mesh.positions {
+        let unit = place.normalize();
+        let wave = libm::sinf(9.0 * unit.x) * libm::sinf(9.0 * unit.y) * libm::sinf(9.0 * unit.z);
+        *place = unit * (size + detail * f64::from(wave) * spacing) as f32;
+    }
+    Ball { spacing, places, mesh }
+}
+
+/// How far vertices are from where they should be (spacings): mean, 95th percentile, greatest; and how many were flagged in all.
+#[derive(Debug, Clone, Copy)]
+pub struct Errors {
+    pub mean: f64,
+    pub p95: f64,
+    pub most: f64,
+    pub flagged: usize,
+}
+
+/// Lets a mesh follow particles for some frames; `motion` says where a place of the first frame is in another.
+pub fn follow(
+    ctx: &Context,
+    ball: &Ball,
+    params: Params,
+    frames: usize,
+    motion: impl Fn(DVec3, usize) -> DVec3,
+) -> (Tracker, Errors) {
+    let at = |frame: usize| numbered(ball.places.iter().map(|place| motion(*place, frame)).collect());
+    let mut tracker = Tracker::new(ctx, params, &ball.mesh, &at(0)).expect("a tracker");
+    let mut flagged = 0;
+    for frame in 0..frames {
+        let report = tracker.step(ctx, &at(frame), &at(frame + 1), 1.0 / 24.0).expect("a step");
+        flagged += report.jumped + report.lost;
+    }
+    let mut off: Vec<f64> = tracker
+        .vertices()
+        .iter()
+        .zip(&ball.mesh.positions)
+        .map(|(vertex, first)| (vertex - motion(first.cast(), frames)).norm() / ball.spacing)
+        .collect();
+    off.sort_unstable_by(f64::total_cmp);
+    let errors = Errors {
+        mean: off.iter().sum::<f64>() / off.len() as f64,
+        p95: off[off.len() * 95 / 100],
+        most: off[off.len() - 1],
+        flagged,
+    };
+    (tracker, errors)
+}
+
+/// Turns a place about an axis through the origin by an angle (rad), and moves it.
+pub fn turned(place: DVec3, angle: f64, by: DVec3) -> DVec3 {
+    let axis = DVec3::new(1.0, 2.0, 0.5).normalize();
+    let (sine, cosine) = (libm::sin(angle), libm::cos(angle));
+    place * cosine + axis.cross(&place) * sine + axis * (axis.dot(&place) * (1.0 - cosine)) + by
+}
