@@ -14,6 +14,7 @@
 //! | move things: rigid keys, sequences of meshes, glTF characters | [`motion`] |
 //! | make, change, measure and save level sets | [`vdb::level_set`], [`vdb::file`] |
 //! | read and write meshes, as polygons with UVs | [`io::mesh`] |
+//! | read particle caches of other programs | [`io::particles`] |
 //! | look at any of it | [`render`] |
 //! | link from C or C++ | `include/frazil.h`, which comes from [`capi`] |
 //!

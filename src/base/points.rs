@@ -70,6 +70,14 @@ impl<T: Copy> Column<T> {
         }
     }
 
+    /// As [`Self::stored`], to be changed.
+    pub fn stored_mut(&mut self) -> &mut [T] {
+        match self {
+            Self::Each(values) => values,
+            Self::Uniform(value) => std::slice::from_mut(value),
+        }
+    }
+
     fn count(&self) -> Option<usize> {
         match self {
             Self::Each(values) => Some(values.len()),

@@ -5,8 +5,10 @@ use std::path::{Path, PathBuf};
 use frazil::base::Points;
 use frazil::base::points::Values;
 use frazil::io::mesh::extension;
+use frazil::io::particles::{self, Cloud};
 use frazil::io::sequence::Pattern;
 use frazil::io::{atomic, points_ply, usd_points};
+use frazil::motion::Space;
 use frazil::scene::{FrameChoice, Frames};
 use frazil::{Error, Result};
 use serde_json::{Map, Value, json};
@@ -39,9 +41,9 @@ pub fn described(points: &Points) -> Map<String, Value> {
     out
 }
 
-/// Points of a .ply file, for `frazil info`.
+/// Points of a file that is not .vdb, for `frazil info`.
 pub fn info(path: &Path) -> Result<Vec<Value>> {
-    let cloud = points_ply::read(path)?;
+    let cloud = particles::read(path)?;
     // Its voxels are of no use where the file has none.
     let size = cloud.voxel_size.unwrap_or(1.0);
     let known = cloud.voxel_size.is_some();
@@ -54,9 +56,15 @@ pub fn info(path: &Path) -> Result<Vec<Value>> {
     Ok(vec![Value::Object(entry)])
 }
 
-/// Whether `frazil convert` has points to convert: a .vdb in or out, or a .ply without faces.
+/// Whether a file's name is one of points, which .ply need not be.
+pub fn is_named(path: &Path) -> bool {
+    let extension = extension(path);
+    extension == "vdb" || extension != "ply" && particles::is_named(path)
+}
+
+/// Whether `frazil convert` has points to convert: a file of points in or out, or a .ply without faces.
 pub fn is_one(input: &Path, output: &Path, frames: Option<&FrameChoice>) -> Result<bool> {
-    if [input, output].iter().any(|path| extension(path) == "vdb") {
+    if [input, output].into_iter().any(is_named) {
         return Ok(true);
     }
     let first = frames.map_or(1, FrameChoice::first);
@@ -65,6 +73,12 @@ pub fn is_one(input: &Path, output: &Path, frames: Option<&FrameChoice>) -> Resu
         && ["ply", "usda"].contains(&extension(output).as_str())
         && one.is_file()
         && points_ply::holds_points(&one)?)
+}
+
+/// Points of a file, and whether their voxels are more than a way to hold them.
+struct Read {
+    points: Points,
+    has_voxels: bool,
 }
 
 /// What `frazil convert` does with points.
@@ -79,18 +93,21 @@ pub struct Conversion<'a> {
     pub fps: f64,
     /// Edge of a voxel (m).
     pub voxel: Option<f64>,
+    /// How the input's space becomes metres with Y up.
+    pub space: Space,
 }
 
 impl Conversion<'_> {
     /// Converts every frame.
     pub fn run(&self, session: &Session) -> std::result::Result<(), Failure> {
         let [input, output] = [self.input, self.output].map(Pattern::parse);
-        if !["vdb", "ply", "usda"].contains(&extension(self.output).as_str()) {
-            let what = "the output for points must be a .vdb, .ply or .usda file";
+        let is_written = ["vdb", "usda"].contains(&extension(self.output).as_str());
+        if !is_written && !particles::is_written(self.output) {
+            let what = "the output for points must be a .vdb, .ply, .usda, .bgeo or .xyz file";
             return Err(Failure::refused(format!("{}: {what}", self.output.display())));
         }
-        if !["vdb", "ply"].contains(&extension(self.input).as_str()) {
-            let what = "points are read from .vdb and .ply files";
+        if extension(self.input) != "vdb" && !particles::is_named(self.input) {
+            let what = "points are read from .vdb, .bgeo, .vtk, .vtu, .xyz and .ply files";
             return Err(Failure::refused(format!("{}: {what}", self.input.display())));
         }
         if input.is_some() && self.frames.is_none() {
@@ -119,32 +136,43 @@ impl Conversion<'_> {
             session.ctx.check().during()?;
             let read = self.read(&place(&input, self.input, frame));
             // What the first file is without, no frame can be begun with.
-            let points = if n == 0 { read.before()? } else { read.during()? };
-            self.write(&place(&output, self.output, frame), frame, &points, session).during()?;
-            count += points.count();
+            let read = if n == 0 { read.before()? } else { read.during()? };
+            self.write(&place(&output, self.output, frame), frame, &read, session).during()?;
+            count += read.points.count();
         }
         session.record("frames", json!(frames.count()));
         session.record("points", json!(count));
         Ok(())
     }
 
-    fn read(&self, path: &Path) -> Result<Points> {
-        if extension(path) == "vdb" {
-            return points_of_vdb(path);
-        }
-        // Only .vdb files store voxels.
+    fn read(&self, path: &Path) -> Result<Read> {
+        let mut cloud = match extension(path).as_str() {
+            "vdb" => {
+                let points = points_of_vdb(path)?;
+                if self.space == Space::OWN {
+                    // Bit by bit, which another split into voxels need not be.
+                    return Ok(Read { points, has_voxels: true });
+                }
+                Cloud::from(points)
+            }
+            _ => particles::read(path)?,
+        };
+        self.space.bring(&mut cloud);
+        let voxel = self.voxel.or(cloud.voxel_size);
+        // Only .vdb files need voxels.
         let any = (extension(self.output) != "vdb").then_some(1.0);
-        let cloud = points_ply::read(path)?;
-        let voxel = self.voxel.or(cloud.voxel_size).or(any);
-        if voxel.is_none() {
+        if voxel.or(any).is_none() {
             let what = "does not say how large the voxels of its points are: give --voxel";
             return Err(Error::file(path, what));
         }
-        cloud.into_points(voxel).map_err(|error| Error::file(path, error.to_string()))
+        let points =
+            cloud.into_points(voxel.or(any)).map_err(|error| Error::file(path, error.to_string()))?;
+        Ok(Read { points, has_voxels: voxel.is_some() })
     }
 
     #[cfg_attr(not(feature = "vdb"), expect(unused_variables, reason = "grids are made by threads"))]
-    fn write(&self, path: &Path, frame: i32, points: &Points, session: &Session) -> Result<()> {
+    fn write(&self, path: &Path, frame: i32, read: &Read, session: &Session) -> Result<()> {
+        let Read { points, has_voxels } = read;
         match extension(path).as_str() {
             #[cfg(feature = "vdb")]
             "vdb" => {
@@ -153,12 +181,12 @@ impl Conversion<'_> {
             }
             #[cfg(not(feature = "vdb"))]
             "vdb" => super::needs_openvdb(path),
-            "ply" => points_ply::write(path, points),
-            _ => {
+            "usda" => {
                 let stem = self.input.file_stem().unwrap_or_default().to_string_lossy().into_owned();
                 let name = stem.split(['%', '#', '$', '.']).next().unwrap_or_default();
                 atomic::write_bytes(path, usd_points::frame(name, frame, self.fps, points).as_bytes())
             }
+            _ => particles::write(path, points, *has_voxels),
         }
     }
 }

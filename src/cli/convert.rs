@@ -24,11 +24,13 @@ use super::session::Session;
 Examples:
   frazil convert boot.obj boot.stl --up z
   frazil convert body.%04d.obj posed.%04d.usda --frames 1-2 --scale 0.01
-  frazil convert grains.%04d.vdb grains.%04d.usda --frames 1-2")]
+  frazil convert grains.%04d.vdb grains.%04d.usda --frames 1-2
+  frazil convert grains.0001.vdb drop.0001.bgeo && frazil convert drop.0001.bgeo drop.ply --up z")]
 pub struct Args {
-    /// Mesh (.obj, .ply, .stl), a sequence of them (body.%04d.obj), a character (.glb, .gltf), or points (.vdb, .ply).
+    /// Mesh (.obj, .ply, .stl), a sequence of them (body.%04d.obj), a character (.glb, .gltf), or points (.vdb,
+    /// .bgeo, .vtk, .vtu, .xyz, .ply).
     input: PathBuf,
-    /// Mesh (.obj, .ply, .stl, .usda) or points (.vdb, .ply, .usda), or their pattern.
+    /// Mesh (.obj, .ply, .stl, .usda) or points (.vdb, .ply, .usda, .bgeo, .xyz), or their pattern.
     output: PathBuf,
     /// Frames of a sequence or a character.
     #[arg(long, value_name = "A-B|A-BxN", allow_hyphen_values = true)]
@@ -50,7 +52,7 @@ pub struct Args {
     /// Factor from metres to the output's unit.
     #[arg(long, value_name = "FACTOR", default_value = "1", value_parser = positive)]
     to_scale: f64,
-    /// Edge of the voxels that points of a .ply get in a .vdb (m) [default: as the .ply says].
+    /// Edge of the voxels that points get in a .vdb (m) [default: as a .ply of points says].
     #[arg(long, value_name = "M", value_parser = positive)]
     voxel: Option<f64>,
 }
@@ -107,11 +109,10 @@ fn check_output(path: &Path) -> Result<(), Failure> {
 }
 
 impl Args {
-    /// The conversion of points, which have metres and Y up in every file.
+    /// The conversion of points, which are written in metres with Y up.
     fn points(&self) -> Result<cloud::Conversion<'_>, Failure> {
-        let is_turned = self.space.scale != 1.0 || self.space.up == Axis::Z;
-        if is_turned || self.to_scale != 1.0 || self.to_up == Axis::Z {
-            return Err(Failure::refused("--scale, --up, --to-scale and --to-up are for meshes"));
+        if self.to_scale != 1.0 || self.to_up == Axis::Z {
+            return Err(Failure::refused("--to-scale and --to-up are for meshes"));
         }
         if self.clip.is_some() || self.node.is_some() {
             return Err(Failure::refused("--clip and --node are for .glb and .gltf files"));
@@ -122,6 +123,7 @@ impl Args {
             frames: self.frames.as_ref(),
             fps: self.fps,
             voxel: self.voxel,
+            space: self.space.space(),
         })
     }
 

@@ -10,7 +10,7 @@ use super::exit::{Failure, Phase};
 use super::output;
 use super::session::Session;
 
-/// Say what .vdb, .obj, .ply, .stl, .glb and .gltf files hold.
+/// Say what .vdb, mesh (.obj, .ply, .stl), character (.glb, .gltf) and particle files (.bgeo, .vtk, .vtu, .xyz, .ply) hold.
 #[derive(clap::Args)]
 #[command(after_help = "Example:\n  frazil info cache/base/base.0048.vdb --measure")]
 pub struct Args {
@@ -37,6 +37,7 @@ pub fn run(args: Args, session: &Session) -> Result<(), Failure> {
             "vdb" => super::needs_openvdb(path),
             _ if is_gltf(path) => character(path),
             "ply" if io::points_ply::holds_points(path).is_ok_and(|yes| yes) => super::cloud::info(path),
+            _ if super::cloud::is_named(path) => super::cloud::info(path),
             _ => mesh(path),
         };
         all.push(json!({ "file": path.display().to_string(), "holds": holds.before()? }));

@@ -6,13 +6,13 @@ use frazil::motion::{Space, Up};
 use frazil::render::Size;
 use std::path::Path;
 
-/// How a mesh file's space becomes metres with Y up.
+/// How a file's space becomes metres with Y up.
 #[derive(clap::Args)]
 pub struct MeshSpace {
-    /// Factor from the mesh file's unit to metres.
+    /// Factor from the file's unit to metres.
     #[arg(long, value_name = "FACTOR", default_value = "1", value_parser = positive)]
     pub scale: f64,
-    /// The mesh file's upward axis.
+    /// The file's upward axis.
     #[arg(long, value_name = "AXIS", default_value = "y")]
     pub up: Axis,
 }

@@ -1,6 +1,7 @@
 //! Files that are not .vdb.
 
 pub mod atomic;
+mod bgeo;
 #[doc(hidden)]
 pub mod caught;
 #[doc(hidden)]
@@ -8,7 +9,9 @@ pub mod extras;
 pub mod hash;
 pub mod manifest;
 pub mod mesh;
+mod numbers;
 mod obj;
+pub mod particles;
 mod ply;
 pub mod points_ply;
 #[doc(hidden)]
@@ -21,3 +24,7 @@ mod stl;
 pub mod usd;
 pub mod usd_looks;
 pub mod usd_points;
+mod vtk;
+mod vtu;
+mod vtu_data;
+mod xyz;

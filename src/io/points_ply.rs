@@ -7,42 +7,18 @@
 use std::io::Write;
 use std::path::Path;
 
+use super::particles::{Cloud, shared, whole};
 use super::ply::{self, Element};
 use super::{atomic, source};
 use crate::base::DVec3;
 use crate::base::mesh::spacing;
-use crate::base::points::{Attribute, Column, Points, Values};
+use crate::base::points::{Attribute, Points, Values};
 use crate::error::{Error, Result};
 
 /// The comment before the voxel size (m).
 const VOXEL: &str = "frazil voxel_size";
 /// How far rounding may move a point (voxels) before its place is written in 64 bits.
 const MOST_MOVED: f64 = 1e-3;
-
-/// Points of a file, and whether it says their voxel size.
-#[derive(Debug, Clone, PartialEq)]
-pub struct Cloud {
-    /// Places (m).
-    pub places: Vec<DVec3>,
-    /// Attributes.
-    pub attributes: Vec<Attribute>,
-    /// Edge of a voxel (m), if the file says it.
-    pub voxel_size: Option<f64>,
-}
-
-impl Cloud {
-    /// The points, in voxels of the file's own size, unless another is given (m).
-    ///
-    /// # Errors
-    /// No size, or places that it does not fit: see [`Points::at`].
-    pub fn into_points(self, voxel_size: Option<f64>) -> Result<Points> {
-        let unknown = || Error::argument("the file does not say how large the voxels of its points are");
-        let size = voxel_size.or(self.voxel_size).ok_or_else(unknown)?;
-        let points = Points { attributes: self.attributes, ..Points::at(size, &self.places)? };
-        points.validate()?;
-        Ok(points)
-    }
-}
 
 /// Whether a .ply file has vertices and no faces.
 ///
@@ -65,7 +41,8 @@ pub fn read(path: &Path) -> Result<Cloud> {
     parse(&bytes).map_err(|what| Error::file(path, what))
 }
 
-fn parse(bytes: &[u8]) -> std::result::Result<Cloud, String> {
+/// As [`read`], from the bytes of the file.
+pub(super) fn parse(bytes: &[u8]) -> std::result::Result<Cloud, String> {
     let mut body = ply::open(bytes)?;
     let at = body.elements.iter().position(|element| element.name == "vertex").expect("open looks for it");
     let vertices = body.elements.swap_remove(at);
@@ -137,34 +114,22 @@ fn attributes(
     Ok(out)
 }
 
-/// Numbers as 64-bit integers.
-fn whole(name: &str, column: &[f64]) -> std::result::Result<Vec<i64>, String> {
-    let exact = |(row, &value): (usize, &f64)| {
-        let is_whole = value.fract() == 0.0 && value.abs() <= (1u64 << 53) as f64;
-        is_whole
-            .then_some(value as i64)
-            .ok_or_else(|| format!("{name} of vertex {} is not a whole number", row + 1))
-    };
-    column.iter().enumerate().map(exact).collect()
-}
-
-/// One value where all have the same key.
-fn shared<T: Copy, K: PartialEq>(values: Vec<T>, key: impl Fn(&T) -> K) -> Column<T> {
-    match values.first() {
-        Some(first) if values.len() > 1 && values.iter().all(|value| key(value) == key(first)) => {
-            Column::Uniform(*first)
-        }
-        _ => Column::Each(values),
-    }
-}
-
 /// Writes points as binary little-endian PLY, whole or not at all.
 ///
 /// # Errors
 /// 64-bit integers that a `double` does not hold; what the operating system reports.
 pub fn write(path: &Path, points: &Points) -> Result<()> {
     let plain = all_plain(points).map_err(|what| Error::file(path, what))?;
-    atomic::write(path, |out| write_to(out, points, &plain))
+    atomic::write(path, |out| write_to(out, points, &plain, true))
+}
+
+/// As [`write()`], without the voxel size, for points that have voxels only because [`Points`] do.
+///
+/// # Errors
+/// As [`write()`].
+pub fn write_without_voxels(path: &Path, points: &Points) -> Result<()> {
+    let plain = all_plain(points).map_err(|what| Error::file(path, what))?;
+    atomic::write(path, |out| write_to(out, points, &plain, false))
 }
 
 /// The bytes of such a file.
@@ -174,7 +139,7 @@ pub fn write(path: &Path, points: &Points) -> Result<()> {
 pub fn to_bytes(points: &Points) -> Result<Vec<u8>> {
     let plain = all_plain(points).map_err(Error::Argument)?;
     let mut out = Vec::new();
-    write_to(&mut out, points, &plain).map_err(|error| Error::Internal(error.to_string()))?;
+    write_to(&mut out, points, &plain, true).map_err(|error| Error::Internal(error.to_string()))?;
     Ok(out)
 }
 
@@ -218,15 +183,18 @@ fn plain(attribute: &Attribute) -> std::result::Result<Plain<'_>, String> {
     }
 }
 
-fn write_to(out: &mut dyn Write, points: &Points, attributes: &[Plain<'_>]) -> std::io::Result<()> {
+fn write_to(
+    out: &mut dyn Write,
+    points: &Points,
+    attributes: &[Plain<'_>],
+    keeps_voxels: bool,
+) -> std::io::Result<()> {
     let farthest = points.bounds().map_or(0.0, |(low, high)| low.amax().max(high.amax()));
     let is_far = spacing(farthest) > MOST_MOVED * points.voxel_size;
     let places = if is_far { "double" } else { "float" };
-    let mut head = format!(
-        "ply\nformat binary_little_endian 1.0\ncomment {VOXEL} {}\nelement vertex {}\n",
-        points.voxel_size,
-        points.count()
-    );
+    let voxel = if keeps_voxels { format!("comment {VOXEL} {}\n", points.voxel_size) } else { String::new() };
+    let mut head =
+        format!("ply\nformat binary_little_endian 1.0\n{voxel}element vertex {}\n", points.count());
     for axis in ["x", "y", "z"] {
         head += &format!("property {places} {axis}\n");
     }
@@ -265,6 +233,7 @@ fn write_to(out: &mut dyn Write, points: &Points, attributes: &[Plain<'_>]) -> s
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::base::points::Column;
 
     #[test]
     fn what_is_written_is_read_and_a_cut_file_is_refused() {
@@ -279,7 +248,7 @@ mod tests {
             points.set("source_frame", Values::Int(Column::Each(vec![-1, 2, 3])));
             let plain: Vec<Plain<'_>> = points.attributes.iter().map(|a| plain(a).unwrap()).collect();
             let mut bytes = Vec::new();
-            write_to(&mut bytes, &points, &plain).unwrap();
+            write_to(&mut bytes, &points, &plain, true).unwrap();
             let back = parse(&bytes).unwrap().into_points(None).unwrap();
             assert_eq!((&back.attributes, back.voxel_size), (&points.attributes, 0.5));
             for point in 0..3 {

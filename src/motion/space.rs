@@ -1,6 +1,8 @@
 //! The unit and upward axis of a file.
 
 use crate::base::DVec3;
+use crate::base::points::Values;
+use crate::io::particles::Cloud;
 
 /// The upward axis of a file.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -30,6 +32,30 @@ impl Space {
         match self.up {
             Up::Y => p,
             Up::Z => DVec3::new(p.x, p.z, -p.y),
+        }
+    }
+
+    /// Brings points of the file into metres, Y up: places, voxels, the vectors `v`, `vel`, `velocity` and `rest`, and the radius
+    /// `pscale`. Other attributes stay as they are.
+    pub fn bring(&self, cloud: &mut Cloud) {
+        if *self == Self::OWN {
+            return;
+        }
+        cloud.places.iter_mut().for_each(|place| *place = self.place(*place));
+        cloud.voxel_size = cloud.voxel_size.map(|size| size * self.scale);
+        for attribute in &mut cloud.attributes {
+            match (attribute.name.as_str(), &mut attribute.values) {
+                ("v" | "vel" | "velocity" | "rest", Values::Vector(column)) => {
+                    for vector in column.stored_mut() {
+                        *vector = self.place(DVec3::from(vector.map(f64::from))).cast::<f32>().into();
+                    }
+                }
+                ("pscale", Values::Float(column)) => {
+                    let larger = |radius: &mut f32| *radius = (f64::from(*radius) * self.scale) as f32;
+                    column.stored_mut().iter_mut().for_each(larger);
+                }
+                _ => {}
+            }
         }
     }
 }

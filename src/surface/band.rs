@@ -24,7 +24,7 @@ pub struct Distances {
     /// Coordinates of blocks, ascending.
     coords: Vec<Coord>,
     /// Distances (cells), negative inside.
-    values: Vec<Box<Values>>,
+    values: Vec<Values>,
     slots: HashMap<Coord, u32>,
     /// Slots of the 27 blocks around each, itself in the middle; [`Distances::NONE`]: there is none.
     around: Vec<[u32; 27]>,
@@ -87,8 +87,8 @@ impl Distances {
         };
         let values: Vec<Option<Box<Values>>> =
             groups.par_iter().with_min_len(2).map_init(Default::default, fill).collect::<Result<_>>()?;
-        let (coords, values): (Vec<Coord>, Vec<Box<Values>>) =
-            groups.iter().zip(values).filter_map(|(group, values)| Some((group[0].0, values?))).unzip();
+        let (coords, values): (Vec<Coord>, Vec<Values>) =
+            groups.iter().zip(values).filter_map(|(group, values)| Some((group[0].0, *values?))).unzip();
         let slots: HashMap<Coord, u32> = coords.iter().copied().zip(0..).collect();
         let find = |[x, y, z]: [i32; 3]| slots.get(&[x, y, z]).copied().unwrap_or(Self::NONE);
         let around = coords

@@ -42,6 +42,8 @@ mod house {
 mod io {
     mod damage;
     mod files;
+    mod particles;
+    mod particles_damage;
     mod uvs;
 }
 mod motion {
@@ -80,6 +82,7 @@ mod snow {
     mod volumes;
 }
 mod surface {
+    mod command;
     mod implicit;
     mod tracking;
 }

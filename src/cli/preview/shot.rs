@@ -9,7 +9,7 @@ use frazil::scene::{Rebuild, RebuildGrains, Scene};
 use frazil::vdb::{FloatGrid, file};
 use frazil::{Context, Error, Result};
 
-use super::sources::{Part, of_vdb, points_of_ply};
+use super::sources::{Part, of_vdb, points_of};
 
 /// A shot's folder, read frame by frame.
 pub struct Shot {
@@ -108,7 +108,7 @@ impl Shot {
                 parts.push(Part::Points(path, points));
             }
             Some(_) => {
-                parts.push(points_of_ply(&self.grains.stored().file_with(frame, STAGES[1].0, "ply")?)?);
+                parts.push(points_of(&self.grains.stored().file_with(frame, STAGES[1].0, "ply")?)?);
             }
             None => {}
         }

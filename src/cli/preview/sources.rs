@@ -185,7 +185,8 @@ fn of_file(path: &Path, clip: Option<&str>, frame: Option<f64>, fps: f64) -> Res
         "vdb" => return of_vdb(path),
         #[cfg(not(feature = "vdb"))]
         "vdb" => return crate::cli::needs_openvdb(path),
-        "ply" if io::points_ply::holds_points(path)? => return Ok(vec![points_of_ply(path)?]),
+        "ply" if io::points_ply::holds_points(path)? => return Ok(vec![points_of(path)?]),
+        _ if crate::cli::cloud::is_named(path) => return Ok(vec![points_of(path)?]),
         _ if is_gltf(path) && clip.is_none() && frame.is_none() => Character::at_rest(path)?,
         _ if is_gltf(path) => {
             let play = Play { clip: clip.map(String::from), ..Play::default() };
@@ -196,12 +197,12 @@ fn of_file(path: &Path, clip: Option<&str>, frame: Option<f64>, fps: f64) -> Res
     Ok(vec![Part::Mesh(mesh)])
 }
 
-/// Reads points.
+/// Reads points of a file that is not .vdb.
 ///
 /// # Errors
 /// A file that cannot be read.
-pub fn points_of_ply(path: &Path) -> Result<Part> {
-    let cloud = io::points_ply::read(path)?;
+pub fn points_of(path: &Path) -> Result<Part> {
+    let cloud = io::particles::read(path)?;
     let voxel = cloud.voxel_size.unwrap_or(0.01);
     let points = cloud.into_points(Some(voxel)).map_err(|error| Error::file(path, error.to_string()))?;
     Ok(Part::Points(path.to_path_buf(), points))

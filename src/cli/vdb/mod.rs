@@ -4,6 +4,7 @@ mod combine;
 mod displace;
 mod filter;
 mod from_mesh;
+mod from_particles;
 pub mod info;
 pub mod model;
 mod rebuild;
@@ -38,6 +39,7 @@ pub struct Args {
 #[derive(Subcommand)]
 enum Command {
     FromMesh(from_mesh::Args),
+    FromParticles(from_particles::Args),
     Sweep(sweep::Args),
     Union(combine::UnionArgs),
     Difference(combine::DifferenceArgs),
@@ -53,6 +55,7 @@ enum Command {
 pub fn run(args: Args, session: &Session) -> std::result::Result<(), Failure> {
     match args.command {
         Command::FromMesh(args) => from_mesh::run(&args, session),
+        Command::FromParticles(args) => from_particles::run(&args, session),
         Command::Sweep(args) => sweep::run(&args, session),
         Command::Union(args) => combine::union(&args, session),
         Command::Difference(args) => combine::difference(&args, session),

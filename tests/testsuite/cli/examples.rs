@@ -140,12 +140,34 @@ fn write_grains(folder: &Path) {
     }
 }
 
+/// Two frames of a particle cache.
+fn write_splash(folder: &Path) {
+    let place = |n: i32| {
+        format!("{} {} {}\n", 0.1 * f64::from(n % 5), 0.1 * f64::from(n / 5 % 5), 0.1 * f64::from(n / 25))
+    };
+    fs::write(folder.join("splash.xyz"), (0..125).map(place).collect::<String>()).unwrap();
+    for frame in [1, 2] {
+        works(folder, &format!("frazil convert splash.xyz splash.000{frame}.bgeo"));
+    }
+}
+
+#[test]
+fn the_page_of_the_command_line_makes_surfaces_of_particles() {
+    let folder = tempfile::tempdir().unwrap();
+    write_splash(folder.path());
+    let lines = lines(block(CLI, "## Surfaces of particles", "sh"));
+    assert_eq!(lines.len(), 3, "{lines:?}");
+    lines.iter().for_each(|line| {
+        works(folder.path(), line);
+    });
+}
+
 #[test]
 fn the_page_of_the_command_line_handles_points() {
     let folder = tempfile::tempdir().unwrap();
     write_grains(folder.path());
     let lines = lines(block(CLI, "## Points", "sh"));
-    assert_eq!(lines.len(), 5, "{lines:?}");
+    assert_eq!(lines.len(), 7, "{lines:?}");
     lines.iter().for_each(|line| {
         works(folder.path(), line);
     });
@@ -181,6 +203,7 @@ fn every_command_has_help_with_an_example_that_runs() {
     works(folder, "frazil vdb from-mesh box.obj --cell 0.02 -o boot.vdb");
     works(folder, "frazil vdb from-mesh box.obj --cell 0.02 -o right.vdb");
     write_grains(folder);
+    write_splash(folder);
     let mut commands = vec!["frazil".to_string()];
     commands.extend(commands_of(folder, "frazil"));
     for group in ["frazil vdb", "frazil mesh"] {

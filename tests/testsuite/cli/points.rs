@@ -75,6 +75,68 @@ fn convert_carries_every_attribute_through_ply() {
 }
 
 #[test]
+fn particle_caches_are_listed_and_go_from_one_format_to_another() {
+    let folder = tempfile::tempdir().unwrap();
+    let folder = folder.path();
+    for frame in [1, 2] {
+        grains(folder, &format!("g.{frame:04}.vdb"));
+    }
+    let info = |name: &str| -> serde_json::Value {
+        let said: serde_json::Value =
+            serde_json::from_str(&works(folder, &format!("info {name} --json"))).unwrap();
+        said[0]["holds"][0].clone()
+    };
+    works(folder, "convert g.%04d.vdb a.%04d.bgeo --frames 1-2");
+    let of_bgeo = info("a.0002.bgeo");
+    assert_eq!((&of_bgeo["type"], &of_bgeo["points"]), (&"points".into(), &60.into()));
+    assert_eq!(of_bgeo["attribute active"]["type"], "bool");
+    assert_eq!(of_bgeo["attribute id"]["type"], "int64");
+    assert!(of_bgeo["voxel_m"].is_null());
+    fails(folder, "convert a.0001.bgeo b.vdb", 2, &["a.0001.bgeo", "--voxel"]);
+    works(folder, "convert a.0001.bgeo b.vdb --voxel 0.01");
+    assert_eq!(info("b.vdb")["attribute v"], info("g.0001.vdb")["attribute v"]);
+    let said = works(folder, "convert a.0001.bgeo c.xyz");
+    assert!(said.contains("c.xyz") && said.contains("without v, id"), "{said}");
+    assert_eq!(info("c.xyz")["bounds_m"], info("a.0001.bgeo")["bounds_m"]);
+    works(folder, "convert c.xyz c.usda");
+    // No voxels are made up where a file has none.
+    works(folder, "convert a.0001.bgeo d.ply");
+    assert!(info("d.ply")["voxel_m"].is_null());
+    fails(folder, "convert d.ply e.vdb", 2, &["d.ply", "--voxel"]);
+    works(folder, "preview a.0001.bgeo -o p.png --size 64x48 --color v");
+}
+
+#[test]
+fn points_of_another_unit_and_axis_are_turned_with_their_vectors() {
+    let folder = tempfile::tempdir().unwrap();
+    let folder = folder.path();
+    let text = "# vtk DataFile Version 3.0\ncentimetres, z up\nASCII\nDATASET POLYDATA\nPOINTS 2 float\n100 200 300\n0 0 50\n\
+                POINT_DATA 2\nVECTORS velocity float\n10 20 30\n0 0 -981\nVECTORS colour float\n1 2 3\n1 2 4\n\
+                SCALARS pscale float\nLOOKUP_TABLE default\n2\n3\n";
+    fs::write(folder.join("a.vtk"), text).unwrap();
+    works(folder, "convert a.vtk a.ply --scale 0.01 --up z");
+    let cloud = frazil::io::particles::read(&folder.join("a.ply")).unwrap();
+    let near = |a: DVec3, b: [f64; 3]| assert!((a - DVec3::from(b)).norm() < 1e-6, "{a:?} {b:?}");
+    near(cloud.places[0], [1.0, 3.0, -2.0]);
+    let vector = |name: &str, point: usize| match cloud.attribute(name) {
+        Some(Values::Vector(column)) => DVec3::from(column.get(point).map(f64::from)),
+        other => panic!("{name}: {other:?}"),
+    };
+    near(vector("velocity", 0), [0.1, 0.3, -0.2]);
+    near(vector("velocity", 1), [0.0, -9.81, 0.0]);
+    near(vector("colour", 1), [1.0, 2.0, 4.0]);
+    assert_eq!(cloud.attribute("pscale").unwrap().number(1), f64::from(0.03f32));
+    // Points of a .vdb too, with their voxels.
+    let given = grains(folder, "g.vdb");
+    works(folder, "convert g.vdb h.vdb --scale 2 --up z");
+    let back = points::read_own(&folder.join("h.vdb"), None).unwrap();
+    assert_eq!(back.voxel_size, 0.02);
+    let found = |id: f64| (0..60).find(|&point| back.attribute("id").unwrap().number(point) == id).unwrap();
+    let (place, now) = (given.position(0), back.position(found(given.attribute("id").unwrap().number(0))));
+    near(now, [2.0 * place.x, 2.0 * place.z, -2.0 * place.y]);
+}
+
+#[test]
 fn convert_writes_points_of_usd() {
     let folder = tempfile::tempdir().unwrap();
     for frame in [4, 5] {
@@ -105,7 +167,10 @@ fn points_and_meshes_are_not_mixed_up() {
     works(folder.path(), "convert cube.ply cube2.obj");
     fails(folder.path(), "convert grains.vdb grains.obj", 2, &["grains.obj", ".usda"]);
     fails(folder.path(), "convert cube.obj cube.vdb", 2, &["cube.obj", "points"]);
-    fails(folder.path(), "convert grains.vdb g.ply --scale 2", 2, &["--scale"]);
+    fails(folder.path(), "convert grains.vdb g.ply --to-scale 2", 2, &["--to-scale"]);
+    fails(folder.path(), "convert grains.vdb g.vtk", 2, &["g.vtk", ".bgeo"]);
+    fails(folder.path(), "convert grains.bgeo.sc g.vdb", 2, &["grains.bgeo.sc"]);
+    fails(folder.path(), "info none.bgeo", 2, &["none.bgeo"]);
     fails(folder.path(), "convert cube.obj c.ply --voxel 1", 2, &["--voxel"]);
     fails(folder.path(), "convert g.%04d.vdb g.ply", 2, &["--frames"]);
     fails(folder.path(), "convert none.vdb g.ply", 2, &["none.vdb"]);

@@ -1,0 +1,264 @@
+//! Classic Houdini .bgeo, version 5: what SPlisHSPlasH and Partio write, plain or in gzip. Houdini since version 12 writes another
+//! format under the same name, which is refused.
+//!
+//! All numbers are big-endian. A head of counts, the attributes of points by name, size and type, then for each point x, y, z, w
+//! and its attributes, 4 bytes a number. w, which weighs control points of curves, is left out, as is what follows the points.
+
+use std::io::{ErrorKind, Read, Write};
+
+use flate2::Compression;
+use flate2::read::GzDecoder;
+use flate2::write::GzEncoder;
+
+use super::numbers::{Kind, Numbers, Order, most_inflated};
+use super::particles::Found;
+use super::source;
+use crate::base::points::{Points, Values};
+
+/// What Houdini's own files are, and the way out.
+pub(super) const HOUDINIS: &str = "is Houdini's own format since version 12 (JSON), not classic .bgeo: save it from Houdini as \
+                                   .bhclassic (which is classic .bgeo), as .ply, or as .vdb with VDB Points";
+
+/// Attributes and numbers of one that a file may have; more is damage.
+const MOST: u32 = 1 << 12;
+/// Texts that an attribute's list may have; more is damage.
+const MOST_TEXTS: u32 = 1 << 20;
+/// Bytes of points that are read at once.
+const PIECE: usize = 1 << 20;
+/// Bytes of a number.
+const WORD: usize = 4;
+
+/// An attribute of points.
+struct Field {
+    name: String,
+    kind: Kind,
+    /// Numbers of a point.
+    size: usize,
+    /// What is read of it; nothing of texts.
+    numbers: Option<Numbers>,
+}
+
+/// Reads the points of a file.
+pub(super) fn parse(bytes: &[u8]) -> Result<Found, String> {
+    let is_packed = bytes.starts_with(&[0x1f, 0x8b]);
+    let mut reader: Box<dyn Read + '_> =
+        if is_packed { Box::new(GzDecoder::new(bytes)) } else { Box::new(bytes) };
+    let head = Head::read(&mut *reader)?;
+    let mut fields =
+        (0..head.attributes).map(|_| Field::read(&mut *reader)).collect::<Result<Vec<_>, _>>()?;
+    let row = WORD * (4 + fields.iter().map(|field| field.size).sum::<usize>());
+    // Nothing is allocated for a damaged count.
+    let room = if is_packed { most_inflated(bytes.len()) } else { bytes.len() as u64 };
+    if (head.points as u64).saturating_mul(row as u64) > room {
+        let (points, bytes) = (head.points, bytes.len());
+        return Err(format!(
+            "the file says that it has {points} particles, and is too short for them ({bytes} bytes)"
+        ));
+    }
+    let mut places = Kind::F32.none();
+    let mut rows = vec![0; (PIECE / row).clamp(1, head.points.max(1)) * row];
+    let mut done = 0;
+    while done < head.points {
+        if source::is_stopped() {
+            return Err("stopped".into());
+        }
+        let count = (rows.len() / row).min(head.points - done);
+        let piece = &mut rows[..count * row];
+        reader.read_exact(piece).map_err(|error| match error.kind() {
+            ErrorKind::UnexpectedEof => format!("the file ends before its {} particles do", head.points),
+            _ => damaged(&error),
+        })?;
+        for point in piece.chunks_exact(row) {
+            Kind::F32.decode(&point[..3 * WORD], Order::Big, &mut places)?;
+            let mut at = 4 * WORD;
+            for Field { kind, size, numbers, .. } in &mut fields {
+                if let Some(numbers) = numbers {
+                    kind.decode(&point[at..at + *size * WORD], Order::Big, numbers)?;
+                }
+                at += *size * WORD;
+            }
+        }
+        done += count;
+    }
+    if is_packed {
+        read_to_the_end(&mut *reader)?;
+    }
+    let mut found = Found::new(places);
+    for Field { name, kind, size, numbers } in fields {
+        match numbers {
+            Some(numbers) => found.add(&name, kind, size, numbers)?,
+            None => found.leave_out(&name),
+        }
+    }
+    Ok(found)
+}
+
+/// The checksum behind the last byte tells a whole file from a cut or damaged one.
+fn read_to_the_end(reader: &mut dyn Read) -> Result<(), String> {
+    let mut rest = vec![0; PIECE];
+    loop {
+        if source::is_stopped() {
+            return Err("stopped".into());
+        }
+        if reader.read(&mut rest).map_err(|error| damaged(&error))? == 0 {
+            return Ok(());
+        }
+    }
+}
+
+fn damaged(error: &std::io::Error) -> String {
+    match error.kind() {
+        ErrorKind::UnexpectedEof => "the file is cut short".into(),
+        _ => "the file is damaged: its gzip data contradicts itself".into(),
+    }
+}
+
+struct Head {
+    points: usize,
+    attributes: u32,
+}
+
+impl Head {
+    fn read(reader: &mut dyn Read) -> Result<Self, String> {
+        let magic: [u8; 5] = take(reader)?;
+        match &magic {
+            [0x7f, b'N', b'S', b'J', b'b'] | [b'[', ..] => return Err(HOUDINIS.into()),
+            b"PGEOM" => return Err("is a .geo file (classic, as text): save it as .bhclassic".into()),
+            b"BgeoV" => {}
+            _ => return Err("is not a classic .bgeo file".into()),
+        }
+        let version = word(reader)?;
+        if version != 5 {
+            return Err(format!("is a .bgeo file of version {version}, and only version 5 is read"));
+        }
+        // Points, primitives, groups of both; attributes of points, vertices, primitives and of the whole.
+        let mut counts = [0; 8];
+        for count in &mut counts {
+            *count = word(reader)?;
+        }
+        let [points, _, _, _, attributes, ..] = counts;
+        if points > i32::MAX as u32 || attributes > MOST {
+            return Err(format!(
+                "the file is damaged: it has {points} particles with {attributes} attributes"
+            ));
+        }
+        Ok(Self { points: points as usize, attributes })
+    }
+}
+
+impl Field {
+    fn read(reader: &mut dyn Read) -> Result<Self, String> {
+        let name = text(reader)?;
+        let size = u32::from(u16::from_be_bytes(take(reader)?));
+        let number = word(reader)?;
+        if size > MOST {
+            return Err(format!("the file is damaged: attribute \"{name}\" has {size} components"));
+        }
+        let kind = match number {
+            // Floats, and vectors, which turn with what they belong to.
+            0 | 5 => Some(Kind::F32),
+            1 => Some(Kind::I32),
+            // Indices into a list of texts.
+            4 => None,
+            2 | 3 => {
+                return Err(format!(
+                    "attribute \"{name}\" is of texts that are not in a list, which are not read"
+                ));
+            }
+            _ => return Err(format!("the file is damaged: attribute \"{name}\" is of type {number}")),
+        };
+        if kind.is_some() {
+            (0..size).try_for_each(|_| word(reader).map(drop))?;
+        } else {
+            let count = word(reader)?;
+            if count > MOST_TEXTS {
+                return Err(format!("the file is damaged: attribute \"{name}\" has {count} texts"));
+            }
+            (0..count).try_for_each(|_| text(reader).map(drop))?;
+        }
+        Ok(Self { name, kind: kind.unwrap_or(Kind::I32), size: size as usize, numbers: kind.map(Kind::none) })
+    }
+}
+
+fn take<const N: usize>(reader: &mut dyn Read) -> Result<[u8; N], String> {
+    let mut bytes = [0; N];
+    reader.read_exact(&mut bytes).map_err(|error| damaged(&error))?;
+    Ok(bytes)
+}
+
+fn word(reader: &mut dyn Read) -> Result<u32, String> {
+    take(reader).map(u32::from_be_bytes)
+}
+
+fn text(reader: &mut dyn Read) -> Result<String, String> {
+    let mut bytes = vec![0; u16::from_be_bytes(take(reader)?).into()];
+    reader.read_exact(&mut bytes).map_err(|error| damaged(&error))?;
+    Ok(String::from_utf8_lossy(&bytes).into_owned())
+}
+
+/// Whether the format holds these points.
+///
+/// # Errors
+/// 64-bit integers that are too large; too many points or attributes.
+pub(super) fn check(points: &Points) -> Result<(), String> {
+    if points.count() > i32::MAX as usize || points.attributes.len() > MOST as usize {
+        return Err("there are more points or attributes than .bgeo can hold".into());
+    }
+    for attribute in &points.attributes {
+        let name = &attribute.name;
+        if name.len() > i16::MAX as usize {
+            return Err("the name of an attribute is longer than .bgeo can hold".into());
+        }
+        if let Values::Long(column) = &attribute.values
+            && column.stored().iter().any(|&value| i32::try_from(value).is_err())
+        {
+            return Err(format!("attribute \"{name}\" has integers over 2^31, which .bgeo cannot hold"));
+        }
+    }
+    Ok(())
+}
+
+/// Writes points that [`check`] accepts, in gzip.
+pub(super) fn write(out: &mut dyn Write, points: &Points) -> std::io::Result<()> {
+    // No time and no name in its head: the same points give the same bytes.
+    let mut out = GzEncoder::new(out, Compression::fast());
+    let mut head = b"BgeoV".to_vec();
+    let [count, attributes] = [points.count(), points.attributes.len()].map(|count| count as u32);
+    for number in [5, count, 0, 0, 0, attributes, 0, 0, 0] {
+        head.extend(number.to_be_bytes());
+    }
+    for attribute in &points.attributes {
+        let (size, kind) = match attribute.values {
+            Values::Float(_) => (1u16, 0u32),
+            Values::Int(_) | Values::Long(_) | Values::Bool(_) => (1, 1),
+            Values::Vector(_) => (3, 5),
+        };
+        head.extend((attribute.name.len() as u16).to_be_bytes());
+        head.extend(attribute.name.as_bytes());
+        head.extend(size.to_be_bytes());
+        head.extend(kind.to_be_bytes());
+        head.extend(std::iter::repeat_n(0, WORD * usize::from(size)));
+    }
+    out.write_all(&head)?;
+    let mut row = Vec::new();
+    for point in 0..points.count() {
+        row.clear();
+        points.position(point).iter().for_each(|part| row.extend((*part as f32).to_be_bytes()));
+        row.extend(1.0f32.to_be_bytes());
+        for attribute in &points.attributes {
+            match &attribute.values {
+                Values::Float(column) => row.extend(column.get(point).to_be_bytes()),
+                Values::Int(column) => row.extend(column.get(point).to_be_bytes()),
+                Values::Long(column) => row.extend((column.get(point) as i32).to_be_bytes()),
+                Values::Bool(column) => row.extend(i32::from(column.get(point)).to_be_bytes()),
+                Values::Vector(column) => {
+                    column.get(point).iter().for_each(|part| row.extend(part.to_be_bytes()))
+                }
+            }
+        }
+        out.write_all(&row)?;
+    }
+    // An empty block of further data.
+    out.write_all(&[0x00, 0xff])?;
+    out.finish().map(drop)
+}

@@ -1,0 +1,197 @@
+//! Arrays of numbers as particle files have them: of any type, in either byte order or as text.
+
+use super::source;
+
+/// Bytes that deflate makes of one, at most.
+const MOST_INFLATED: u64 = 1032;
+/// Numbers between two looks at whether to stop.
+const PIECE: usize = 1 << 20;
+
+/// Bytes that so many deflated ones can become, at most.
+pub(super) fn most_inflated(bytes: usize) -> u64 {
+    (bytes as u64).saturating_mul(MOST_INFLATED)
+}
+
+/// The order of a number's bytes.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Order {
+    Little,
+    Big,
+}
+
+/// The type of numbers in a file.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Kind {
+    I8,
+    U8,
+    I16,
+    U16,
+    I32,
+    U32,
+    I64,
+    U64,
+    F32,
+    F64,
+}
+
+/// Numbers of one type; integers keep all of their 64 bits.
+#[derive(Debug, Clone, PartialEq)]
+pub(super) enum Numbers {
+    Whole(Vec<i64>),
+    Real(Vec<f64>),
+}
+
+impl Kind {
+    /// Bytes of a number.
+    pub fn size(self) -> usize {
+        match self {
+            Self::I8 | Self::U8 => 1,
+            Self::I16 | Self::U16 => 2,
+            Self::I32 | Self::U32 | Self::F32 => 4,
+            Self::I64 | Self::U64 | Self::F64 => 8,
+        }
+    }
+
+    /// Whether its numbers are floats.
+    pub fn is_real(self) -> bool {
+        matches!(self, Self::F32 | Self::F64)
+    }
+
+    /// Whether 32 bits with a sign hold all of its integers.
+    pub fn fits_int(self) -> bool {
+        matches!(self, Self::I8 | Self::U8 | Self::I16 | Self::U16 | Self::I32)
+    }
+
+    /// No numbers yet.
+    pub fn none(self) -> Numbers {
+        if self.is_real() { Numbers::Real(Vec::new()) } else { Numbers::Whole(Vec::new()) }
+    }
+
+    /// Adds the numbers of these bytes; a rest that is no whole number is left out.
+    ///
+    /// # Errors
+    /// An unsigned integer over 2^63 - 1; a reader that is to stop.
+    pub fn decode(self, bytes: &[u8], order: Order, out: &mut Numbers) -> Result<(), String> {
+        for piece in bytes.chunks(PIECE * self.size()) {
+            if source::is_stopped() {
+                return Err("stopped".into());
+            }
+            self.decode_piece(piece, order, out)?;
+        }
+        Ok(())
+    }
+
+    fn decode_piece(self, bytes: &[u8], order: Order, out: &mut Numbers) -> Result<(), String> {
+        macro_rules! extend {
+            ($values:expr, $wide:ty, $type:ty) => {{
+                let exact = |raw: &[u8]| raw.try_into().expect("chunks have the size of the type");
+                let chunks = bytes.chunks_exact(size_of::<$type>());
+                $values.extend(chunks.map(|raw| match order {
+                    Order::Little => <$wide>::from(<$type>::from_le_bytes(exact(raw))),
+                    Order::Big => <$wide>::from(<$type>::from_be_bytes(exact(raw))),
+                }));
+            }};
+        }
+        match (self, out) {
+            (Self::F32, Numbers::Real(values)) => extend!(values, f64, f32),
+            (Self::F64, Numbers::Real(values)) => extend!(values, f64, f64),
+            (Self::I8, Numbers::Whole(values)) => extend!(values, i64, i8),
+            (Self::U8, Numbers::Whole(values)) => extend!(values, i64, u8),
+            (Self::I16, Numbers::Whole(values)) => extend!(values, i64, i16),
+            (Self::U16, Numbers::Whole(values)) => extend!(values, i64, u16),
+            (Self::I32, Numbers::Whole(values)) => extend!(values, i64, i32),
+            (Self::U32, Numbers::Whole(values)) => extend!(values, i64, u32),
+            (Self::I64, Numbers::Whole(values)) => extend!(values, i64, i64),
+            (Self::U64, Numbers::Whole(values)) => {
+                let before = values.len();
+                extend!(values, i64, i64);
+                if let Some(value) = values[before..].iter().find(|value| **value < 0) {
+                    return Err(format!("the integer {} is over 2^63", *value as u64));
+                }
+            }
+            _ => unreachable!("numbers are made by the kind that fills them"),
+        }
+        Ok(())
+    }
+
+    /// Adds a number that is written as text.
+    ///
+    /// # Errors
+    /// A word that is no number of this type.
+    pub fn read_word(self, word: &[u8], out: &mut Numbers) -> Result<(), String> {
+        let text = std::str::from_utf8(word).unwrap_or("");
+        let read = match (self, out) {
+            // By way of 64 bits some numbers would be rounded twice.
+            (Self::F32, Numbers::Real(values)) => {
+                text.parse::<f32>().map(|value| values.push(value.into())).ok()
+            }
+            (_, Numbers::Real(values)) => text.parse().map(|value| values.push(value)).ok(),
+            (_, Numbers::Whole(values)) => text.parse().map(|value| values.push(value)).ok(),
+        };
+        read.ok_or_else(|| {
+            let shown: String = String::from_utf8_lossy(word).chars().take(40).collect();
+            format!("\"{shown}\" is not {}", if self.is_real() { "a number" } else { "an integer" })
+        })
+    }
+}
+
+impl Numbers {
+    /// How many there are.
+    pub fn count(&self) -> usize {
+        match self {
+            Self::Whole(values) => values.len(),
+            Self::Real(values) => values.len(),
+        }
+    }
+
+    /// All as floats.
+    pub fn into_reals(self) -> Vec<f64> {
+        match self {
+            Self::Whole(values) => values.into_iter().map(|value| value as f64).collect(),
+            Self::Real(values) => values,
+        }
+    }
+
+    /// Adds those of another array of the same type.
+    pub fn append(&mut self, other: Self) {
+        match (self, other) {
+            (Self::Whole(values), Self::Whole(more)) => values.extend(more),
+            (Self::Real(values), Self::Real(more)) => values.extend(more),
+            _ => unreachable!("arrays of one type are added"),
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn every_type_is_read_in_both_orders_and_as_text() {
+        let read = |kind: Kind, big: &[u8], word: &str| {
+            let little: Vec<u8> = big.iter().rev().copied().collect();
+            let (mut a, mut b, mut c) = (kind.none(), kind.none(), kind.none());
+            kind.decode(big, Order::Big, &mut a).unwrap();
+            kind.decode(&little, Order::Little, &mut b).unwrap();
+            kind.read_word(word.as_bytes(), &mut c).unwrap();
+            assert!(
+                a == b && a == c && a.count() == 1 && big.len() == kind.size(),
+                "{kind:?} {a:?} {b:?} {c:?}"
+            );
+        };
+        read(Kind::I8, &[0xff], "-1");
+        read(Kind::U8, &[0xff], "255");
+        read(Kind::I16, &[0xff, 0xfe], "-2");
+        read(Kind::U16, &[0xff, 0xfe], "65534");
+        read(Kind::I32, &(-7i32).to_be_bytes(), "-7");
+        read(Kind::U32, &u32::MAX.to_be_bytes(), "4294967295");
+        read(Kind::I64, &i64::MIN.to_be_bytes(), "-9223372036854775808");
+        read(Kind::U64, &(i64::MAX as u64).to_be_bytes(), "9223372036854775807");
+        read(Kind::F32, &0.1f32.to_be_bytes(), "0.1");
+        read(Kind::F64, &(-1.0e300f64).to_be_bytes(), "-1e300");
+        let mut none = Kind::U64.none();
+        assert!(Kind::U64.decode(&[0xff; 8], Order::Big, &mut none).is_err());
+        assert!(Kind::I32.read_word(b"1.5", &mut Kind::I32.none()).unwrap_err().contains("1.5"));
+        assert!(Kind::F32.read_word(b"\xff", &mut Kind::F32.none()).is_err());
+    }
+}

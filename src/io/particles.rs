@@ -1,0 +1,285 @@
+//! Particle caches in files, by extension: classic .bgeo (version 5, plain or in gzip), legacy .vtk, .vtu, .xyz and .ply.
+//! Points in .vdb files are read by `vdb::points`.
+//!
+//! | file | what is read |
+//! |---|---|
+//! | .bgeo, .bgeo.gz, .bhclassic | classic version 5, as SPlisHSPlasH and Partio write it, plain or in gzip |
+//! | .vtk | legacy 1.0 to 5.1, text and binary: POLYDATA and UNSTRUCTURED_GRID |
+//! | .vtu | UnstructuredGrid, all pieces: text, base64, appended raw and base64; plain, zlib and LZ4 |
+//! | .xyz | text with x, y and z in the first three columns, or little-endian 32-bit floats |
+//! | .ply | vertices: see [`points_ply`] |
+//!
+//! Attributes keep the names of the file. Floats become 32-bit ones, places keep 64 bits. Integers of up to 32 bits with a sign become
+//! 32-bit ones, longer ones 64-bit ones. As in .ply, `id` becomes 64-bit integers, `active` and `trapped` `bool`, and a value that all
+//! points share is one. Attributes of other than one or three components, texts, and those named `P` or nothing, are named in a
+//! warning and left out.
+
+use std::path::Path;
+
+use super::caught::caught;
+use super::numbers::{Kind, Numbers};
+use super::{atomic, bgeo, points_ply, source, vtk, vtu, xyz};
+use crate::base::DVec3;
+use crate::base::mesh::spacing;
+use crate::base::points::{Attribute, Column, Points, Values};
+use crate::error::{Error, Result, one_line};
+
+/// Extensions of the files that are read.
+pub const READ: [&str; 7] = ["bgeo", "bgeo.gz", "bhclassic", "ply", "vtk", "vtu", "xyz"];
+/// Extensions of the files that are written.
+pub const WRITTEN: [&str; 5] = ["bgeo", "bgeo.gz", "bhclassic", "ply", "xyz"];
+
+/// Points of a file, and whether it says their voxel size.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Cloud {
+    /// Places (m).
+    pub places: Vec<DVec3>,
+    /// Attributes.
+    pub attributes: Vec<Attribute>,
+    /// Edge of a voxel (m), if the file says it.
+    pub voxel_size: Option<f64>,
+}
+
+impl Cloud {
+    /// The values of the attribute of this name.
+    pub fn attribute(&self, name: &str) -> Option<&Values> {
+        self.attributes.iter().find(|attribute| attribute.name == name).map(|attribute| &attribute.values)
+    }
+
+    /// The points, in voxels of the file's own size, unless another is given (m).
+    ///
+    /// # Errors
+    /// No size, or places that it does not fit: see [`Points::at`]; attributes that [`Points::validate`] refuses.
+    pub fn into_points(self, voxel_size: Option<f64>) -> Result<Points> {
+        let unknown = || Error::argument("the file does not say how large the voxels of its points are");
+        let size = voxel_size.or(self.voxel_size).ok_or_else(unknown)?;
+        let points = Points { attributes: self.attributes, ..Points::at(size, &self.places)? };
+        points.validate()?;
+        Ok(points)
+    }
+}
+
+impl From<Points> for Cloud {
+    fn from(points: Points) -> Self {
+        let places = (0..points.count()).map(|point| points.position(point)).collect();
+        Self { places, attributes: points.attributes, voxel_size: Some(points.voxel_size) }
+    }
+}
+
+#[derive(Clone, Copy, PartialEq, Eq)]
+enum Format {
+    Bgeo,
+    /// Houdini's own, packed.
+    BgeoSc,
+    Ply,
+    Vtk,
+    Vtu,
+    Xyz,
+}
+
+fn format(path: &Path) -> Option<Format> {
+    let name = path.file_name()?.to_string_lossy().to_lowercase();
+    let endings = [
+        (".bgeo", Format::Bgeo),
+        (".bgeo.gz", Format::Bgeo),
+        (".bhclassic", Format::Bgeo),
+        (".bgeo.sc", Format::BgeoSc),
+        (".ply", Format::Ply),
+        (".vtk", Format::Vtk),
+        (".vtu", Format::Vtu),
+        (".xyz", Format::Xyz),
+    ];
+    endings.into_iter().find(|(ending, _)| name.ends_with(ending)).map(|(_, format)| format)
+}
+
+/// Whether a file's name is one of particles: those of [`READ`], and .bgeo.sc, which [`read`] refuses with advice.
+pub fn is_named(path: &Path) -> bool {
+    format(path).is_some()
+}
+
+/// Whether [`write()`] takes a file of this name.
+pub fn is_written(path: &Path) -> bool {
+    matches!(format(path), Some(Format::Bgeo | Format::Ply | Format::Xyz))
+}
+
+/// Reads the particles of a file, in the file's order and its units.
+///
+/// # Errors
+/// A missing, empty, cut or malformed file; a place that is not finite (the particle is named, counted from 1); an integer that its
+/// type does not hold; Houdini's own .bgeo.
+pub fn read(path: &Path) -> Result<Cloud> {
+    parse(path, &source::read(path)?)
+}
+
+/// As [`read`], from the bytes of the file.
+///
+/// # Errors
+/// As [`read`].
+pub fn parse(path: &Path, bytes: &[u8]) -> Result<Cloud> {
+    if bytes.is_empty() {
+        return Err(Error::file(path, "the file is empty"));
+    }
+    let found = |parse: fn(&[u8]) -> std::result::Result<Found, String>| parse(bytes).map(Found::into_parts);
+    let parse = || match format(path) {
+        Some(Format::Bgeo) => found(bgeo::parse),
+        Some(Format::BgeoSc) => Err(bgeo::HOUDINIS.into()),
+        Some(Format::Ply) => points_ply::parse(bytes).map(|cloud| (cloud, Vec::new())),
+        Some(Format::Vtk) => found(vtk::parse),
+        Some(Format::Vtu) => found(vtu::parse),
+        Some(Format::Xyz) => found(xyz::parse),
+        None => Err(format!("a file of particles must be {}", listed(&READ))),
+    };
+    let (cloud, left_out) = caught(path, || parse().map_err(|what| Error::file(path, one_line(&what))))?;
+    if let Some(n) = cloud.places.iter().position(|place| !place.iter().all(|part| part.is_finite())) {
+        return Err(Error::file(path, format!("the place of particle {} is not finite", n + 1)));
+    }
+    if !left_out.is_empty() {
+        let list = one_line(&left_out.join(", "));
+        log::warn!("{}: attributes that points cannot have are left out: {list}", path.display());
+    }
+    Ok(cloud)
+}
+
+/// Writes points, whole or not at all: .bgeo and .bhclassic as classic version 5 in gzip, with 32-bit places and integers; .xyz as
+/// little-endian 32-bit floats, without attributes, which a warning names; .ply as [`points_ply`] does, with the voxel size if
+/// `keeps_voxels`.
+///
+/// # Errors
+/// Another extension; integers that the format does not hold; what the operating system reports.
+pub fn write(path: &Path, points: &Points, keeps_voxels: bool) -> Result<()> {
+    match format(path) {
+        Some(Format::Ply) if keeps_voxels => points_ply::write(path, points),
+        Some(Format::Ply) => points_ply::write_without_voxels(path, points),
+        Some(Format::Bgeo) => {
+            bgeo::check(points).map_err(|what| Error::file(path, what))?;
+            warn_of_rounding(path, points);
+            atomic::write(path, |out| bgeo::write(out, points))
+        }
+        Some(Format::Xyz) => {
+            warn_of_rounding(path, points);
+            if !points.attributes.is_empty() {
+                let names: Vec<&str> =
+                    points.attributes.iter().map(|attribute| &attribute.name[..]).collect();
+                log::warn!("{}: .xyz holds places only, without {}", path.display(), names.join(", "));
+            }
+            atomic::write(path, |out| xyz::write(out, points))
+        }
+        _ => Err(Error::file(path, format!("a file of particles must be {}", listed(&WRITTEN)))),
+    }
+}
+
+fn listed(extensions: &[&str]) -> String {
+    extensions.iter().map(|extension| format!(".{extension}")).collect::<Vec<_>>().join(", ")
+}
+
+/// Rounding of a place (m) that is worth a warning.
+const MOST_MOVED: f64 = 1e-3;
+
+fn warn_of_rounding(path: &Path, points: &Points) {
+    let farthest = points.bounds().map_or(0.0, |(low, high)| low.amax().max(high.amax()));
+    let moved = spacing(farthest) / 2.0;
+    if moved > MOST_MOVED {
+        log::warn!("{}: places in 32 bits are rounded, by up to {moved} m", path.display());
+    }
+}
+
+/// The particles of a file as a reader finds them.
+#[derive(Debug)]
+pub(super) struct Found {
+    places: Vec<DVec3>,
+    attributes: Vec<Attribute>,
+    /// Attributes that no [`Values`] hold.
+    left_out: Vec<String>,
+}
+
+impl Found {
+    /// Places in groups of three numbers; a rest is left out.
+    pub fn new(numbers: Numbers) -> Self {
+        let numbers = numbers.into_reals();
+        let places = numbers.chunks_exact(3).map(|place| DVec3::new(place[0], place[1], place[2])).collect();
+        Self { places, attributes: Vec::new(), left_out: Vec::new() }
+    }
+
+    /// How many particles there are.
+    pub fn count(&self) -> usize {
+        self.places.len()
+    }
+
+    /// Adds an attribute of one value, or so many components, for each particle.
+    ///
+    /// # Errors
+    /// Another count of values; `id` that is no whole number.
+    pub fn add(
+        &mut self,
+        name: &str,
+        kind: Kind,
+        components: usize,
+        numbers: Numbers,
+    ) -> std::result::Result<(), String> {
+        if self.count().checked_mul(components) != Some(numbers.count()) {
+            let count = self.count();
+            return Err(format!(
+                "attribute \"{name}\" does not have one value for each of {count} particles"
+            ));
+        }
+        if name.is_empty() || name == "P" || ![1, 3].contains(&components) {
+            self.leave_out(name);
+            return Ok(());
+        }
+        let values = match (components, name, numbers) {
+            (3, _, numbers) => {
+                let numbers = numbers.into_reals();
+                let vectors = numbers.chunks_exact(3).map(|v| [0, 1, 2].map(|axis| v[axis] as f32)).collect();
+                Values::Vector(shared(vectors, |v| v.map(f32::to_bits)))
+            }
+            (_, "id", Numbers::Real(numbers)) => Values::Long(shared(whole(name, &numbers)?, |&id| id)),
+            (_, "id", Numbers::Whole(numbers)) => Values::Long(shared(numbers, |&id| id)),
+            (_, "active" | "trapped", numbers) => {
+                let yes = numbers.into_reals().into_iter().map(|value| value != 0.0).collect();
+                Values::Bool(shared(yes, |&yes| yes))
+            }
+            (_, _, Numbers::Real(numbers)) => {
+                let floats = numbers.into_iter().map(|value| value as f32).collect();
+                Values::Float(shared(floats, |value| value.to_bits()))
+            }
+            (_, _, Numbers::Whole(numbers)) if kind.fits_int() => {
+                let whole = numbers.into_iter().map(|value| value as i32).collect();
+                Values::Int(shared(whole, |&value| value))
+            }
+            (_, _, Numbers::Whole(numbers)) => Values::Long(shared(numbers, |&value| value)),
+        };
+        self.attributes.push(Attribute { name: name.into(), values });
+        Ok(())
+    }
+
+    /// Notes an attribute that the particles are without.
+    pub fn leave_out(&mut self, name: &str) {
+        self.left_out.push(format!("\"{name}\""));
+    }
+
+    fn into_parts(self) -> (Cloud, Vec<String>) {
+        let Self { places, attributes, left_out } = self;
+        (Cloud { places, attributes, voxel_size: None }, left_out)
+    }
+}
+
+/// Numbers as 64-bit integers.
+pub(super) fn whole(name: &str, column: &[f64]) -> std::result::Result<Vec<i64>, String> {
+    let exact = |(row, &value): (usize, &f64)| {
+        let is_whole = value.fract() == 0.0 && value.abs() <= (1u64 << 53) as f64;
+        is_whole
+            .then_some(value as i64)
+            .ok_or_else(|| format!("{name} of particle {} is not a whole number", row + 1))
+    };
+    column.iter().enumerate().map(exact).collect()
+}
+
+/// One value where all have the same key.
+pub(super) fn shared<T: Copy, K: PartialEq>(values: Vec<T>, key: impl Fn(&T) -> K) -> Column<T> {
+    match values.first() {
+        Some(first) if values.len() > 1 && values.iter().all(|value| key(value) == key(first)) => {
+            Column::Uniform(*first)
+        }
+        _ => Column::Each(values),
+    }
+}

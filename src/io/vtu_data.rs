@@ -1,0 +1,188 @@
+//! The arrays of .vtu files: text, base64 and raw bytes, behind their lengths and compressed or not.
+
+use std::io::Read;
+
+use base64::Engine;
+use base64::engine::general_purpose::STANDARD;
+use flate2::read::ZlibDecoder;
+
+use super::numbers::{Kind, Numbers, Order, most_inflated};
+use super::source;
+
+/// Words between two looks at whether to stop.
+const PIECE: usize = 1 << 16;
+
+/// Inflates bytes that become exactly so many.
+pub(super) type Inflate = fn(&[u8], usize) -> Option<Vec<u8>>;
+
+/// How all arrays of a file are packed.
+pub(super) struct Codec {
+    pub order: Order,
+    /// Type of lengths.
+    pub head: Kind,
+    pub inflate: Option<Inflate>,
+}
+
+/// A file whose XML is read.
+pub(super) struct File<'a> {
+    pub codec: Codec,
+    /// Whether the appended data are base64, and these.
+    pub appended: Option<(bool, &'a [u8])>,
+    /// Bytes of the whole.
+    pub length: usize,
+}
+
+/// Inflates zlib data.
+pub(super) fn zlib(bytes: &[u8], size: usize) -> Option<Vec<u8>> {
+    let mut out = Vec::new();
+    // One byte more than wanted shows that there are too many.
+    ZlibDecoder::new(bytes).take(size as u64 + 1).read_to_end(&mut out).ok()?;
+    (out.len() == size).then_some(out)
+}
+
+/// Inflates an LZ4 block.
+pub(super) fn lz4(bytes: &[u8], size: usize) -> Option<Vec<u8>> {
+    lz4_flex::block::decompress(bytes, size).ok().filter(|out| out.len() == size)
+}
+
+impl<'a> File<'a> {
+    /// Reads an array of so many numbers that are written as text.
+    pub fn words<'w>(
+        &self,
+        kind: Kind,
+        count: usize,
+        words: impl Iterator<Item = &'w str>,
+    ) -> Result<Numbers, String> {
+        let mut out = kind.none();
+        for (n, word) in words.enumerate() {
+            if n.is_multiple_of(PIECE) && source::is_stopped() {
+                return Err("stopped".into());
+            }
+            kind.read_word(word.as_bytes(), &mut out)?;
+        }
+        if out.count() == count { Ok(out) } else { Err(other_size(out.count(), "numbers", count)) }
+    }
+
+    /// The appended data from an offset on.
+    pub fn appended(&self, offset: usize) -> Result<Stream<'a>, String> {
+        let (is_base64, data) = self.appended.ok_or("is appended, and the file has no appended data")?;
+        let data = data.get(offset..).ok_or("begins behind the end of the file")?;
+        Ok(if is_base64 { Stream::base64(data) } else { Stream::raw(data) })
+    }
+
+    /// Reads an array of so many numbers, which its length precedes.
+    pub fn array(&self, kind: Kind, count: usize, mut stream: Stream<'_>) -> Result<Numbers, String> {
+        let size = count.checked_mul(kind.size()).filter(|&size| size as u64 <= most_inflated(self.length));
+        let size = size.ok_or_else(|| format!("is too large for the file: it says {count} numbers"))?;
+        let mut out = kind.none();
+        if size == 0 {
+            // Not every writer gives these a length.
+            return Ok(out);
+        }
+        let Codec { order, inflate, .. } = self.codec;
+        match inflate {
+            None => {
+                let said = self.head(&mut stream)?;
+                if said != size {
+                    return Err(other_size(said, "bytes", size));
+                }
+                kind.decode(&stream.take(size)?, order, &mut out)?;
+            }
+            Some(inflate) => kind.decode(&self.inflated(inflate, size, &mut stream)?, order, &mut out)?,
+        }
+        Ok(out)
+    }
+
+    /// The bytes of compressed blocks.
+    fn inflated(&self, inflate: Inflate, size: usize, stream: &mut Stream<'_>) -> Result<Vec<u8>, String> {
+        let [blocks, whole, last] = [self.head(stream)?, self.head(stream)?, self.head(stream)?];
+        // The last block is shorter, unless its size is zero.
+        let of_block = |block: usize| if block + 1 == blocks && last > 0 { last } else { whole };
+        let said = blocks
+            .checked_sub(1)
+            .map_or(Some(0), |before| before.checked_mul(whole)?.checked_add(of_block(before)));
+        if said != Some(size) {
+            return Err(other_size(said.unwrap_or(usize::MAX), "bytes", size));
+        }
+        if blocks > stream.room() {
+            return Err(cut());
+        }
+        let packed = (0..blocks).map(|_| self.head(stream)).collect::<Result<Vec<_>, _>>()?;
+        let mut out = Vec::new();
+        for (block, packed) in packed.into_iter().enumerate() {
+            if source::is_stopped() {
+                return Err("stopped".into());
+            }
+            let (packed, size) = (stream.take(packed)?, of_block(block));
+            // Nothing is allocated for a size that the bytes cannot become.
+            let inflated = Some(size).filter(|&size| size as u64 <= most_inflated(packed.len()));
+            let inflated = inflated.and_then(|size| inflate(&packed, size));
+            out.extend(inflated.ok_or_else(|| format!("is damaged in its compressed block {}", block + 1))?);
+        }
+        Ok(out)
+    }
+
+    /// A length.
+    fn head(&self, stream: &mut Stream<'_>) -> Result<usize, String> {
+        let mut out = self.codec.head.none();
+        self.codec.head.decode(&stream.take(self.codec.head.size())?, self.codec.order, &mut out)?;
+        match out {
+            Numbers::Whole(numbers) => usize::try_from(numbers[0]).map_err(|error| error.to_string()),
+            Numbers::Real(_) => unreachable!("lengths are integers"),
+        }
+    }
+}
+
+fn cut() -> String {
+    "ends before its numbers do".into()
+}
+
+fn other_size(said: usize, what: &str, size: usize) -> String {
+    format!("has {said} {what}, not {size}")
+}
+
+/// Bytes that are taken one after another.
+pub(super) struct Stream<'a> {
+    rest: &'a [u8],
+    /// Decoded and not yet taken; none of raw bytes.
+    ready: Option<Vec<u8>>,
+}
+
+impl<'a> Stream<'a> {
+    /// Of base64: several pieces, each with its own padding, or one.
+    pub fn base64(text: &'a [u8]) -> Self {
+        Self { rest: text, ready: Some(Vec::new()) }
+    }
+
+    /// Of bytes as they are.
+    pub fn raw(bytes: &'a [u8]) -> Self {
+        Self { rest: bytes, ready: None }
+    }
+
+    /// Bytes that can be taken at most.
+    fn room(&self) -> usize {
+        self.rest.len() + self.ready.as_ref().map_or(0, Vec::len)
+    }
+
+    /// The next bytes.
+    fn take(&mut self, count: usize) -> Result<Vec<u8>, String> {
+        let Some(ready) = &mut self.ready else {
+            let (taken, rest) = self.rest.split_at_checked(count).ok_or_else(cut)?;
+            self.rest = rest;
+            return Ok(taken.to_vec());
+        };
+        while ready.len() < count {
+            // Three bytes are four letters.
+            let letters = (count - ready.len()).div_ceil(3).checked_mul(4);
+            let text = letters.and_then(|letters| self.rest.get(..letters)).ok_or_else(cut)?;
+            // Lengths may be a piece of their own: it ends with its padding.
+            let padding = text.iter().position(|&letter| letter == b'=');
+            let end = padding.map_or(text.len(), |at| (at / 4 + 1) * 4);
+            let bytes = STANDARD.decode(&text[..end]).ok().filter(|bytes| !bytes.is_empty());
+            ready.extend(bytes.ok_or("is damaged: it is not base64")?);
+            self.rest = &self.rest[end..];
+        }
+        let more = ready.split_off(count);
+        Ok(std::mem::replace(ready, more))
+    }
+}
