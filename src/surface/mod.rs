@@ -1,8 +1,8 @@
 //! A detailed triangle mesh follows a particle liquid without losing its detail (thesis chapter 2).
 //!
-//! Each frame the mesh is carried along by the particles ([`advect`]), then moved so that each vertex is as far from the
-//! surface of the particles as it was at the first frame ([`project`]). That surface is where an implicit function of the
-//! particles is 0 ([`implicit`]), turned into signed distances ([`band`]). Vertices that this would move too far are where
+//! Each frame the mesh is carried along by the particles (`advect.rs`), then moved so that each vertex is as far from the
+//! surface of the particles as it was at the first frame (`project.rs`). That surface is where an implicit function of the
+//! particles is 0 (`implicit.rs`), turned into signed distances (`band.rs`). Vertices that this would move too far are where
 //! the liquid has merged or split: they are flagged.
 //!
 //! # Glossary
