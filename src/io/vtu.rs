@@ -7,7 +7,7 @@ use roxmltree::{Document, Node};
 
 use super::numbers::{Kind, Numbers, Order};
 use super::particles::Found;
-use super::vtu_data::{Codec, File, Stream};
+use super::vtu_data::{Codec, File, Inflate, Stream, lz4, zlib};
 
 /// Reads the points of a file.
 pub(super) fn parse(bytes: &[u8]) -> Result<Found, String> {
@@ -73,8 +73,8 @@ fn codec_of(root: Node<'_, '_>) -> Result<Codec, String> {
     };
     let inflate = match root.attribute("compressor") {
         None | Some("") => None,
-        Some("vtkZLibDataCompressor") => Some(super::vtu_data::zlib as super::vtu_data::Inflate),
-        Some("vtkLZ4DataCompressor") => Some(super::vtu_data::lz4 as super::vtu_data::Inflate),
+        Some("vtkZLibDataCompressor") => Some(zlib as Inflate),
+        Some("vtkLZ4DataCompressor") => Some(lz4 as Inflate),
         Some(other) => {
             return Err(format!("the .vtu file is compressed by {other}: only zlib and LZ4 are read"));
         }
