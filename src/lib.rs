@@ -15,6 +15,7 @@
 //! | make, change, measure and save level sets | [`vdb::level_set`], [`vdb::file`] |
 //! | read and write meshes, as polygons with UVs | [`io::mesh`] |
 //! | read particle caches of other programs | [`io::particles`] |
+//! | make the surface of a liquid from its particles; let a detailed mesh follow them | [`surface`] |
 //! | look at any of it | [`render`] |
 //! | link from C or C++ | `include/frazil.h`, which comes from [`capi`] |
 //!

@@ -195,8 +195,12 @@ impl Conversion<'_> {
 #[cfg(feature = "vdb")]
 const NAME: &str = "grains";
 
+/// Points of a .vdb file.
+///
+/// # Errors
+/// A file that holds only what changed since another frame.
 #[cfg(feature = "vdb")]
-fn points_of_vdb(path: &Path) -> Result<Points> {
+pub fn points_of_vdb(path: &Path) -> Result<Points> {
     use frazil::scene::{changes_since, partial};
     match changes_since(path)? {
         Some(since) => Err(Error::file(path, partial(since))),

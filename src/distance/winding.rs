@@ -1,4 +1,4 @@
-//! Winding number of the chain at every voxel, by counting signed crossings along lines parallel to z; and crossings
+//! Winding number of a surface at every voxel, by counting signed crossings along lines parallel to z; and crossings
 //! along the lines through voxels parallel to any axis.
 //!
 //! Crossings are decided in exact integers, under one symbolic shift of all voxels: mostly -z, then +x, then +y, each

@@ -32,6 +32,10 @@ pub struct Distances {
 
 /// Patches along the edge of a block.
 const PARTS: i32 = DIM as i32 / SIDE;
+/// Bytes of a block: its distances while they are made and then, its neighbours.
+const BYTES: usize = 2 * 4 * VOXELS + 200;
+/// What needs the memory, for messages.
+const WHAT: &str = "the distances from the particles' surface (larger cells need less)";
 /// All nodes of a block.
 const ALL: [u64; DIM] = [u64::MAX; DIM];
 
@@ -42,7 +46,7 @@ impl Distances {
     /// Distances up to `reach` (cells) from a surface.
     ///
     /// # Errors
-    /// Cancel.
+    /// More memory than the context allows; cancel.
     pub fn new(ctx: &Context, phi: &Implicit, surface: &Isosurface, reach: f32) -> Result<Self> {
         let runs: Vec<(Coord, &[[u32; 3]])> = surface.runs().collect();
         // The blocks whose nodes triangles of a run may be near to.
@@ -59,6 +63,7 @@ impl Distances {
             .collect();
         pairs.par_sort_unstable();
         let groups: Vec<&[(Coord, u32)]> = pairs.chunk_by(|a, b| a.0 == b.0).collect();
+        ctx.allow(WHAT, (groups.len() * BYTES) as u64)?;
         let corners = |run: usize| {
             let (patch, triangles) = runs[run];
             triangles.iter().map(move |triangle| {

@@ -20,6 +20,10 @@ pub const SIDE: i32 = 4;
 pub const NODES: usize = 64;
 /// Particles in a cube of two spacings, of which there are 8 in a liquid, from which on it is full.
 const FULL: u32 = 4;
+/// Bytes of an evaluated patch: its values while they are made and then, and its places in lists and tables.
+const BYTES: usize = 2 * 4 * NODES + 100;
+/// What needs the memory, for messages.
+const WHAT: &str = "the particles' surface (larger cells need less)";
 /// Rounding of coordinates (spacings).
 const SLACK: f64 = 1e-6;
 
@@ -46,7 +50,7 @@ impl Implicit {
     /// Evaluates the function of particles at places (m), whose spacing is `spacing` (m), on cells of `cell` (m).
     ///
     /// # Errors
-    /// A spacing that is not positive, a cell that is not within 1/8 to 2 spacings; particles too far apart; cancel.
+    /// A spacing that is not positive, a cell that is not within 1/8 to 2 spacings; particles too far apart; more memory than the context allows; cancel.
     pub fn new(ctx: &Context, places: &[DVec3], spacing: f64, cell: f64) -> Result<Self> {
         if !(spacing > 0.0 && spacing.is_finite()) {
             return Err(Error::argument(format!(
@@ -65,6 +69,7 @@ impl Implicit {
         implicit.states.extend(full.into_iter().map(|patch| (patch, State::Inside)));
         let mut due = near;
         while !due.is_empty() {
+            ctx.allow(WHAT, ((implicit.patches.len() + due.len()) * BYTES) as u64)?;
             let new: Vec<[f32; NODES]> = due
                 .par_iter()
                 .with_min_len(8)

@@ -41,7 +41,6 @@ pub use implicit::Implicit;
 pub use isosurface::Isosurface;
 #[cfg(feature = "vdb")]
 pub use level_set::{HALF_WIDTH, level_set};
-pub use paths::Paths;
 pub use spacing::estimate as estimate_spacing;
 pub use tracker::{Params, StepReport, Tracker};
 

@@ -60,3 +60,36 @@ impl Foot {
         self.place + self.outward * distance
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::super::band::Distances;
+    use super::super::implicit::Implicit;
+    use super::super::isosurface::Isosurface;
+    use super::*;
+    use crate::context::{Context, Pool};
+
+    #[test]
+    fn feet_are_outward_and_distances_negative_inside() {
+        let ctx = Context::new(Pool::new(1).unwrap());
+        let grid = (0..17 * 17 * 17).map(|n| [n / 289, n / 17 % 17, n % 17].map(|x| f64::from(x) - 8.0));
+        let places: Vec<DVec3> = grid.map(DVec3::from).filter(|place| place.norm() < 7.0).collect();
+        let phi = Implicit::new(&ctx, &places, 1.0, 0.5).unwrap();
+        let distances = Distances::new(&ctx, &phi, &Isosurface::new(&phi), 6.0).unwrap();
+        let mut sampler = Sampler::new(&distances);
+        let way = DVec3::new(2.0, 1.0, 3.0).normalize();
+        // Cells are half as long as spacings.
+        let surface = foot(&mut sampler, way * 14.0).unwrap();
+        let height = surface.place.dot(&way);
+        for above in [-3.0, -0.5, -0.05, 0.05, 0.5, 3.0] {
+            let place = way * (height + above);
+            let foot = foot(&mut sampler, place).unwrap();
+            assert!((foot.distance - above).abs() < 0.15, "{above}: {foot:?}");
+            assert!(foot.outward.dot(&way) > 0.9, "{above}: {foot:?}");
+            assert!((foot.at(foot.distance) - place).norm() < 1e-6, "{above}: {foot:?}");
+            // A vertex that drifted through the surface comes back to its own side.
+            assert!((foot.at(-above) - way * (height - above)).norm() < 1.0, "{above}: {foot:?}");
+        }
+        assert!(super::foot(&mut sampler, way * 100.0).is_none());
+    }
+}

@@ -134,9 +134,10 @@ impl Tracker {
             return Ok(());
         }
         Err(Error::argument(format!(
-            "only {:.0} % of the mesh lies within {:.3} m of the particles' surface: are both in the same space and unit?",
+            "only {:.0} % of the mesh lies within {} spacings of {} m of the particles' surface: are both in the same space and unit?",
             100.0 * share,
-            REACH[1] * self.params.spacing
+            REACH[1],
+            self.params.spacing
         )))
     }
 

@@ -1,6 +1,7 @@
 //! `frazil vdb from-particles`.
 
 use super::{Packing, check_name};
+use crate::cli::cloud::points_of_vdb;
 use crate::cli::exit::{Failure, Phase};
 use crate::cli::options::{MeshSpace, positive};
 use crate::cli::output;
@@ -55,6 +56,7 @@ pub struct Args {
 
 /// Runs the command.
 pub fn run(args: &Args, session: &Session) -> std::result::Result<(), Failure> {
+    session.ctx.set_memory_limit(session.max_memory());
     let input = Pattern::parse(&args.particles);
     let frames = args.frames(input.is_some())?;
     for (path, extensions) in [(&args.output, &["vdb"][..]), (&args.mesh, &["ply", "obj", "stl"])] {
@@ -83,8 +85,11 @@ pub fn run(args: &Args, session: &Session) -> std::result::Result<(), Failure> {
             Some(spacing) => spacing,
             None => *spacing.insert(estimated(&path, &places).before()?),
         };
+        if n == 0 && args.spacing.is_some() {
+            warn_of_spacing(&path, &places, spacing);
+        }
         let made = args.make(session, &places, spacing, frame);
-        let is_refused = matches!(made, Err(Error::Argument(_)));
+        let is_refused = matches!(made, Err(Error::Argument(_) | Error::Memory { .. }));
         let mesh = if n == 0 && is_refused { made.before()? } else { made.during()? };
         particles += places.len();
         triangles += mesh.triangles.len();
@@ -103,13 +108,30 @@ fn of_frame(path: &Path, frame: i32) -> PathBuf {
 
 fn estimated(path: &Path, places: &[DVec3]) -> Result<f64> {
     let Some(spacing) = estimate_spacing(places) else {
-        return Err(Error::file(path, "has too few particles to tell their spacing: give --spacing"));
+        return Err(Error::file(
+            path,
+            "has too few particles, or too many at one place, to tell their spacing: give --spacing",
+        ));
     };
     log::warn!(
         "{}: the spacing of the particles is estimated as {spacing:.6} m; --spacing sets it",
         path.display()
     );
     Ok(spacing)
+}
+
+/// How many times as large as the estimate, or as small, a spacing is that looks like a mistake.
+const ODD: f64 = 2.0;
+
+/// Says so when a given spacing (m) is not that of the particles: a wrong unit makes single drops, or one lump.
+fn warn_of_spacing(path: &Path, places: &[DVec3], spacing: f64) {
+    let odd = |estimate: &f64| !(1.0 / ODD..=ODD).contains(&(spacing / estimate));
+    if let Some(estimate) = estimate_spacing(places).filter(odd) {
+        log::warn!(
+            "{}: a spacing of {spacing} m is given, but particles lie {estimate:.6} m apart",
+            path.display()
+        );
+    }
 }
 
 impl Args {
@@ -129,11 +151,8 @@ impl Args {
 
     /// Places (m) of the particles of a file.
     fn read(&self, path: &Path) -> Result<Vec<DVec3>> {
-        let mut cloud: Cloud = if extension(path) == "vdb" {
-            frazil::vdb::points::read(path, None)?.into()
-        } else {
-            particles::read(path)?
-        };
+        let mut cloud: Cloud =
+            if extension(path) == "vdb" { points_of_vdb(path)?.into() } else { particles::read(path)? };
         if cloud.places.is_empty() {
             return Err(Error::file(path, "holds no particles"));
         }

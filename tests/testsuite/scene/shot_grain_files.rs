@@ -334,6 +334,7 @@ fn what_holds_changes_says_so() {
     assert!(!works(at, "info out/grains/grains.0001.vdb").contains("partial"));
     assert!(works(at, &format!("preview {file} -o a.png")).contains("since frame 7"));
     fails(at, &format!("convert {file} b.ply"), 2, &[file, "since frame 7", "vdb rebuild"]);
+    fails(at, &format!("vdb from-particles {file} --mesh b.ply"), 2, &[file, "since frame 7", "vdb rebuild"]);
     let scene = fs::read_to_string(at.join("shot.toml")).unwrap();
     fs::write(at.join("drift.toml"), scene.replace("[grains]", &format!("[grains]\ninitial = \"{file}\"")))
         .unwrap();

@@ -6,7 +6,7 @@ use std::path::Path;
 use frazil::io::mesh;
 
 use crate::common::liquids::filled;
-use crate::program::{fails, works};
+use crate::program::{command, fails, works};
 
 /// A drop of 2,109 particles, 0.1 m apart, as text.
 fn write_drop(folder: &Path) {
@@ -24,6 +24,14 @@ fn a_drop_becomes_a_closed_mesh_and_a_level_set() {
     works(folder, "vdb from-particles drop.xyz --mesh again.ply -o again.vdb --spacing 0.1 --threads 2");
     for [a, b] in [["drop.ply", "again.ply"], ["drop.vdb", "again.vdb"]] {
         assert!(fs::read(folder.join(a)).unwrap() == fs::read(folder.join(b)).unwrap(), "{a}");
+    }
+    for level in ["baseline", "avx2"] {
+        let mut plain =
+            command(folder, "vdb from-particles drop.xyz --mesh level.ply -o level.vdb --spacing 0.1");
+        assert!(plain.env("FRAZIL_CPU", level).status().unwrap().success());
+        for [a, b] in [["drop.ply", "level.ply"], ["drop.vdb", "level.vdb"]] {
+            assert!(fs::read(folder.join(a)).unwrap() == fs::read(folder.join(b)).unwrap(), "{a} {level}");
+        }
     }
     let drop = mesh::read(&folder.join("drop.ply")).unwrap();
     assert!(drop.is_manifold());
@@ -58,5 +66,10 @@ fn what_makes_no_surface_is_refused() {
     fails(folder, "vdb from-particles drop.xyz", 2, &["--output"]);
     fails(folder, "vdb from-particles drop.%04d.xyz --mesh out.ply", 2, &["--frames"]);
     fails(folder, "vdb from-particles drop.%04d.xyz --frames 1-2 --mesh out.ply", 2, &["out.ply", "pattern"]);
+    let small = "vdb from-particles drop.xyz --mesh out.ply --spacing 0.1 --cell 0.0125 --max-memory 1M";
+    fails(folder, small, 2, &["surface", "limit"]);
     assert!(!folder.join("out.ply").exists());
+    // Ten times too small: each particle would be a drop of its own.
+    let said = works(folder, "vdb from-particles drop.xyz --mesh out.ply --spacing 0.01");
+    assert!(said.contains("a spacing of 0.01 m is given"), "{said}");
 }

@@ -22,7 +22,7 @@ fn a_mesh_turns_and_travels_with_its_liquid() {
 }
 
 #[test]
-fn detail_stays_where_the_liquid_is_stretched() {
+fn a_smooth_mesh_is_stretched_with_its_liquid() {
     let ctx = context(2);
     let ball = ball(8.0, 24, 0.0);
     let params = Params::for_spacing(ball.spacing);
@@ -30,10 +30,9 @@ fn detail_stays_where_the_liquid_is_stretched() {
         let by = libm::exp(0.02 * frame as f64);
         DVec3::new(place.x * by, place.y / by.sqrt(), place.z / by.sqrt())
     };
-    let (tracker, errors) = follow(&ctx, &ball, params, 20, motion);
+    let (_, errors) = follow(&ctx, &ball, params, 20, motion);
     assert!(errors.mean < 0.1 && errors.p95 < 0.2 && errors.most < 0.5, "{errors:?}");
     assert_eq!(errors.flagged, 0);
-    assert!(tracker.flags().iter().all(|flag| !flag));
 }
 
 #[test]
