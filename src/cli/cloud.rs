@@ -7,7 +7,7 @@ use frazil::base::points::Values;
 use frazil::io::mesh::extension;
 use frazil::io::particles::{self, Cloud};
 use frazil::io::sequence::Pattern;
-use frazil::io::{atomic, points_ply, usd_points};
+use frazil::io::{atomic, points_ply, source, usd_points};
 use frazil::motion::Space;
 use frazil::scene::{FrameChoice, Frames};
 use frazil::{Error, Result};
@@ -129,6 +129,8 @@ impl Conversion<'_> {
         output::check_writable(self.output).before()?;
         for frame in frames.iter() {
             let from = place(&input, self.input, frame);
+            // A gap in a sequence is known before any work.
+            source::open(&from).before()?;
             output::refuse_input(&place(&output, self.output, frame), [from.as_path()]).before()?;
         }
         let mut count = 0;

@@ -25,6 +25,8 @@ pub struct Isosurface {
     first: Vec<u32>,
     /// Places of vertices, in cells from the first node of the patch that has them.
     places: Vec<[f32; 3]>,
+    /// The evaluated patch that has each vertex.
+    owners: Vec<u32>,
     /// The patch of each run of triangles, and the end of the run.
     runs: Vec<(Coord, u32)>,
     triangles: Vec<[u32; 3]>,
@@ -43,9 +45,10 @@ impl Isosurface {
         let crossings: Vec<Crossings> =
             (0..phi.patches().len()).into_par_iter().with_min_len(16).map(|at| crossings(phi, at)).collect();
         let mut first = vec![0];
-        let mut places = Vec::new();
-        for crossings in &crossings {
+        let (mut places, mut owners) = (Vec::new(), Vec::new());
+        for (crossings, owner) in crossings.iter().zip(0..) {
             places.extend_from_slice(&crossings.places);
+            owners.resize(places.len(), owner);
             first.push(places.len() as u32);
         }
         let mut patches = with_lower(phi.patches());
@@ -53,7 +56,7 @@ impl Isosurface {
         patches.dedup();
         let run = |patch: &Coord| triangles(phi, *patch, &crossings, &first);
         let parts: Vec<Vec<[u32; 3]>> = patches.par_iter().with_min_len(16).map(run).collect();
-        let mut out = Self { first, places, ..Self::default() };
+        let mut out = Self { first, places, owners, ..Self::default() };
         for (patch, part) in patches.into_iter().zip(parts) {
             if !part.is_empty() {
                 out.triangles.extend(part);
@@ -79,8 +82,8 @@ impl Isosurface {
 
     /// The place of a vertex: cells from the first node of a patch, which it gives too.
     pub fn place(&self, phi: &Implicit, vertex: u32) -> (Coord, [f32; 3]) {
-        let owner = self.first.partition_point(|first| *first <= vertex) - 1;
-        (phi.patches()[owner], self.places[vertex as usize])
+        let owner = self.owners[vertex as usize];
+        (phi.patches()[owner as usize], self.places[vertex as usize])
     }
 
     /// As a mesh (m).

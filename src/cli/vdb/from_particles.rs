@@ -59,6 +59,10 @@ pub fn run(args: &Args, session: &Session) -> std::result::Result<(), Failure> {
     session.ctx.set_memory_limit(session.max_memory());
     let input = Pattern::parse(&args.particles);
     let frames = args.frames(input.is_some())?;
+    for frame in frames.iter() {
+        // A gap in a sequence is known before any work.
+        io::source::open(&of_frame(&args.particles, frame)).before()?;
+    }
     for (path, extensions) in [(&args.output, &["vdb"][..]), (&args.mesh, &["ply", "obj", "stl"])] {
         let Some(path) = path else { continue };
         check_name(path, extensions)?;
