@@ -59,10 +59,6 @@ pub fn run(args: &Args, session: &Session) -> std::result::Result<(), Failure> {
     session.ctx.set_memory_limit(session.max_memory());
     let input = Pattern::parse(&args.particles);
     let frames = args.frames(input.is_some())?;
-    for frame in frames.iter() {
-        // A gap in a sequence is known before any work.
-        io::source::open(&of_frame(&args.particles, frame)).before()?;
-    }
     for (path, extensions) in [(&args.output, &["vdb"][..]), (&args.mesh, &["ply", "obj", "stl"])] {
         let Some(path) = path else { continue };
         check_name(path, extensions)?;
@@ -76,6 +72,10 @@ pub fn run(args: &Args, session: &Session) -> std::result::Result<(), Failure> {
             let from = of_frame(&args.particles, frame);
             output::refuse_input(&of_frame(path, frame), [from.as_path()]).before()?;
         }
+    }
+    for frame in frames.iter() {
+        // A gap in a sequence is known before any work.
+        io::source::open(&of_frame(&args.particles, frame)).before()?;
     }
     let mut spacing = args.spacing;
     let (mut particles, mut triangles) = (0, 0);
