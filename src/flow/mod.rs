@@ -124,6 +124,11 @@ impl Flow {
         pressure::fastest(&self.velocity)
     }
 
+    /// The speed (m/s, rounded up by less than 1 %) on any axis that all faces but a share 0..=1 of them keep within.
+    pub fn fastest_but(&self, share: f64) -> f32 {
+        pressure::fastest_but(&self.velocity, share)
+    }
+
     /// Makes these (sorted, each once) the active tiles: values are kept where they were; new tiles hold air that moves as it did
     /// there before, with no density.
     pub fn resize(&mut self, active: &[Coord]) {

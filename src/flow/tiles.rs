@@ -163,6 +163,21 @@ pub fn padded(tiles: &[Coord], padding: i32) -> Vec<Coord> {
     out
 }
 
+/// Sorted coordinates of the tiles that are reached from these over so many faces at most.
+pub fn bordered(tiles: &[Coord], steps: usize) -> Vec<Coord> {
+    let mut out = tiles.to_vec();
+    for _ in 0..steps {
+        let sides = out
+            .iter()
+            .flat_map(|coord| (0..3).flat_map(move |axis| [-1, 1].map(|by| shifted(*coord, axis, by))));
+        let mut wider: Vec<Coord> = sides.chain(out.iter().copied()).collect();
+        wider.sort_unstable();
+        wider.dedup();
+        out = wider;
+    }
+    out
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
