@@ -1,5 +1,6 @@
 //! Plain data that every room shares; knows no file format and no OpenVDB.
 
+pub mod arrays;
 pub mod blocks;
 pub mod bvh;
 pub mod bytes;
@@ -11,6 +12,7 @@ pub mod faults;
 pub mod lanes;
 pub mod mesh;
 mod monotone;
+pub mod packed;
 pub mod points;
 pub mod polygons;
 pub mod uvs;
@@ -20,6 +22,7 @@ pub type Vec3 = nalgebra::Vector3<f32>;
 /// A point or direction in 64 bits: poses, transforms, conserved sums.
 pub type DVec3 = nalgebra::Vector3<f64>;
 
+pub use arrays::{DetailedMesh, MeshArray};
 pub use mesh::TriMesh;
 pub use points::Points;
 pub use polygons::PolygonMesh;

@@ -2,7 +2,7 @@
 
 use super::ears::{self, turn};
 use super::mesh::validate;
-use super::{DVec3, TriMesh, Uvs, Vec3, monotone};
+use super::{DVec3, DetailedMesh, MeshArray, TriMesh, Uvs, Vec3, monotone};
 use crate::error::{Error, Result};
 
 /// Most corners of a polygon: cutting it takes some 300 bytes for each, which no limit of memory sees.
@@ -21,6 +21,8 @@ pub struct PolygonMesh {
     pub ends: Vec<u32>,
     /// Texture coordinates, where the file has any.
     pub uvs: Option<Uvs>,
+    /// Other arrays that the file has.
+    pub arrays: Vec<MeshArray>,
 }
 
 impl PolygonMesh {
@@ -85,6 +87,22 @@ impl PolygonMesh {
             None => uvs,
         });
         (self.into_triangles(), uvs)
+    }
+
+    /// The mesh in triangles, with all that it carries.
+    pub fn into_detailed(mut self) -> DetailedMesh {
+        let arrays = std::mem::take(&mut self.arrays);
+        if arrays.is_empty() {
+            let (mesh, uvs) = self.into_textured();
+            return DetailedMesh { mesh, uvs, arrays };
+        }
+        let mut corners = Vec::with_capacity(self.triangle_count());
+        self.cut_all(|begin, _, triangle| corners.push(triangle.map(|corner| begin + corner)));
+        let face = |corner: usize| self.ends.partition_point(|end| *end as usize <= corner);
+        let faces: Vec<usize> = corners.iter().map(|triangle| face(triangle[0])).collect();
+        let arrays = arrays.into_iter().map(|array| array.of_triangles(&corners, &faces)).collect();
+        let (mesh, uvs) = self.into_textured();
+        DetailedMesh { mesh, uvs, arrays }
     }
 
     fn triangle_count(&self) -> usize {

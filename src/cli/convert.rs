@@ -2,7 +2,7 @@
 
 use std::path::{Path, PathBuf};
 
-use frazil::base::TriMesh;
+use frazil::base::{MeshArray, TriMesh};
 use frazil::io::mesh::extension;
 use frazil::io::sequence::Pattern;
 use frazil::io::{self, atomic, usd};
@@ -181,6 +181,15 @@ impl Args {
         Ok((Box::new(Placed::new(motion, self.space.space(), Keys::default())), frames))
     }
 
+    /// The arrays of a frame's mesh, where the output holds any: characters have none.
+    fn arrays(&self, output: &Path, frame: i32) -> frazil::Result<Vec<MeshArray>> {
+        let input = Pattern::parse(&self.input).map_or_else(|| self.input.clone(), |p| p.path(frame));
+        if is_gltf(&input) || extension(output) == "stl" {
+            return Ok(Vec::new());
+        }
+        Ok(io::mesh::read_detailed(&input)?.arrays)
+    }
+
     fn write(&self, path: &Path, motion: &dyn Motion, frame: i32) -> frazil::Result<()> {
         let time = f64::from(frame) / self.fps;
         let (mut pose, mut velocities) = (Vec::new(), Vec::new());
@@ -197,7 +206,10 @@ impl Args {
         let (positions, drawn) = (usd::to_floats(&pose), motion.drawn());
         if extension(path) != "usda" {
             let mesh = TriMesh { positions, triangles: drawn.triangles.to_vec() };
-            return io::mesh::write_textured(path, &mesh, drawn.uvs);
+            let arrays = self.arrays(path, frame)?;
+            let arrays: Vec<&MeshArray> = arrays.iter().collect();
+            let carried = io::mesh::Carried { uvs: drawn.uvs, arrays: &arrays, ..Default::default() };
+            return io::mesh::write_carried(path, &mesh, &carried);
         }
         motion.velocities_ahead(time, 1.0 / self.fps, &mut velocities)?;
         out(&mut velocities);

@@ -14,9 +14,13 @@ mod output;
 mod preview;
 mod progress;
 mod session;
+#[cfg(feature = "vdb")]
+mod shot;
 mod signals;
 #[cfg(feature = "vdb")]
 mod snow;
+#[cfg(feature = "vdb")]
+mod surface;
 mod usage;
 #[cfg(feature = "vdb")]
 mod vdb;
@@ -26,7 +30,7 @@ use exit::Failure;
 use session::{Globals, Session};
 use std::process::ExitCode;
 
-/// Volumetric effects on OpenVDB: deep snow with prints, swept volumes, level sets, pictures of them.
+/// Volumetric effects on OpenVDB: deep snow with prints, detailed meshes that follow liquids, swept volumes, level sets, pictures.
 ///
 /// Lengths are metres, frames are whole numbers, Y is up.
 #[derive(Parser)]
@@ -48,6 +52,8 @@ enum Command {
     #[cfg(feature = "vdb")]
     Snow(snow::Args),
     #[cfg(feature = "vdb")]
+    Surface(surface::Args),
+    #[cfg(feature = "vdb")]
     Vdb(vdb::Args),
     Mesh(mesh::Args),
     Convert(convert::Args),
@@ -61,7 +67,9 @@ impl Command {
             Self::New(args) => new::run(&args),
             Self::Check(args) => check::run(&args, session),
             #[cfg(feature = "vdb")]
-            Self::Snow(args) => snow::run(args, session),
+            Self::Snow(args) => snow::run(&args, session),
+            #[cfg(feature = "vdb")]
+            Self::Surface(args) => surface::run(&args, session),
             #[cfg(feature = "vdb")]
             Self::Vdb(args) => vdb::run(args, session),
             Self::Mesh(args) => mesh::run(&args, session),

@@ -1,6 +1,6 @@
 //! `frazil new`: a scene to begin with.
 
-use frazil::scene::{reference, template};
+use frazil::scene::{self, reference, template};
 
 use super::exit::{Failure, Phase};
 use super::output;
@@ -21,10 +21,15 @@ pub struct Args {
 enum System {
     /// Objects that press into snow.
     Snow,
+    /// A detailed mesh that follows a liquid.
+    Surface,
 }
 
 /// Runs the command.
 pub fn run(args: &Args) -> Result<(), Failure> {
-    let System::Snow = args.system;
-    output::print(&if args.keys { reference() } else { template() }).during()
+    let system = match args.system {
+        System::Snow => scene::System::Snow,
+        System::Surface => scene::System::Surface,
+    };
+    output::print(&if args.keys { reference(system) } else { template(system) }).during()
 }

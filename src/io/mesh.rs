@@ -3,9 +3,11 @@
 use std::path::Path;
 
 use super::caught::caught;
-use super::{atomic, obj, ply, source, stl};
-use crate::base::{PolygonMesh, TriMesh, Uvs, Vec3};
+use super::{atomic, obj, ply, ply_write, source, stl};
+use crate::base::{DetailedMesh, PolygonMesh, TriMesh};
 use crate::error::{Error, Result};
+
+pub use ply_write::Carried;
 
 /// Formats that are read and written, by extension.
 pub const EXTENSIONS: [&str; 3] = ["obj", "ply", "stl"];
@@ -48,22 +50,31 @@ pub fn parse_polygons(path: &Path, bytes: &[u8]) -> Result<PolygonMesh> {
     Ok(mesh)
 }
 
+/// Reads a mesh in triangles with all that it carries.
+///
+/// # Errors
+/// As [`read`].
+pub fn read_detailed(path: &Path) -> Result<DetailedMesh> {
+    read_polygons(path).map(PolygonMesh::into_detailed)
+}
+
 /// Writes a mesh, whole or not at all.
 ///
 /// # Errors
 /// Another extension than .obj, .ply or .stl; what the operating system reports.
 pub fn write(path: &Path, mesh: &TriMesh) -> Result<()> {
-    write_textured(path, mesh, None)
+    write_carried(path, mesh, &Carried::default())
 }
 
-/// As [`write()`], with texture coordinates, which .stl cannot hold: see [`holds_uvs`].
+/// As [`write()`], with what the mesh carries as far as the format holds it: .ply all, .obj texture coordinates (see
+/// [`holds_uvs`]) and colours.
 ///
 /// # Errors
 /// As [`write()`].
-pub fn write_textured(path: &Path, mesh: &TriMesh, uvs: Option<&Uvs>) -> Result<()> {
+pub fn write_carried(path: &Path, mesh: &TriMesh, carried: &Carried<'_>) -> Result<()> {
     match extension(path).as_str() {
-        "obj" => atomic::write(path, |out| obj::write(out, mesh, uvs)),
-        "ply" => atomic::write(path, |out| ply::write(out, mesh, &[], uvs)),
+        "obj" => atomic::write(path, |out| obj::write(out, mesh, carried)),
+        "ply" => atomic::write(path, |out| ply_write::write(out, mesh, carried)),
         "stl" => atomic::write(path, |out| stl::write(out, mesh)),
         _ => Err(Error::file(path, "a mesh file must be .obj, .ply or .stl")),
     }
@@ -74,10 +85,17 @@ pub fn holds_uvs(path: &Path) -> bool {
     matches!(extension(path).as_str(), "obj" | "ply" | "usda")
 }
 
-/// The bytes of a .ply file with velocities (m/s), one a vertex, as vx, vy, vz, and texture coordinates; or without any.
-pub fn ply_bytes(mesh: &TriMesh, velocities: &[Vec3], uvs: Option<&Uvs>) -> Vec<u8> {
+/// The bytes of a .ply file.
+pub fn ply_bytes(mesh: &TriMesh, carried: &Carried<'_>) -> Vec<u8> {
     let mut bytes = Vec::new();
-    ply::write(&mut bytes, mesh, velocities, uvs).expect("memory takes all bytes");
+    ply_write::write(&mut bytes, mesh, carried).expect("memory takes all bytes");
+    bytes
+}
+
+/// The bytes of an .obj file.
+pub fn obj_bytes(mesh: &TriMesh, carried: &Carried<'_>) -> Vec<u8> {
+    let mut bytes = Vec::new();
+    obj::write(&mut bytes, mesh, carried).expect("memory takes all bytes");
     bytes
 }
 

@@ -13,6 +13,7 @@ mod numbers;
 mod obj;
 pub mod particles;
 mod ply;
+mod ply_write;
 pub mod points_ply;
 #[doc(hidden)]
 pub mod sealed;

@@ -1,13 +1,17 @@
-//! Wavefront OBJ: positions, texture coordinates and faces, in the file's order; everything else is passed over.
+//! Wavefront OBJ: positions, colours of vertices (three numbers behind the place), texture coordinates and faces, in the file's order; everything else is passed over.
 
 use std::io::Write;
 
+use super::ply_write::Carried;
 use super::source;
+use crate::base::arrays::{MeshArray, Number, On};
 use crate::base::{PolygonMesh, TriMesh, Uvs, Vec3, uvs};
 use crate::error::one_line;
 
 /// Lines between two looks at whether to stop.
 const PIECE: usize = 1 << 14;
+/// Names of the arrays that a vertex' three numbers behind its place are.
+const COLOURS: [&str; 3] = ["red", "green", "blue"];
 /// Letters of a word that a message repeats.
 const LONGEST_WORD: usize = 40;
 /// Byte order mark of UTF-8, which some programs write.
@@ -33,6 +37,8 @@ struct Reader {
     places: Vec<[f32; 2]>,
     /// For each corner its index into `places`, or none.
     at: Vec<u32>,
+    /// Red, green and blue of the vertices, as long as all have them.
+    colours: Vec<[f32; 3]>,
 }
 
 impl Reader {
@@ -52,6 +58,9 @@ impl Reader {
         match (next(), next(), next()) {
             (Some(x), Some(y), Some(z)) => self.mesh.positions.push(Vec3::new(x, y, z)),
             _ => return Err("the vertex is not three finite numbers".into()),
+        }
+        if let (Some(red), Some(green), Some(blue)) = (next(), next(), next()) {
+            self.colours.push([red, green, blue]);
         }
         Ok(())
     }
@@ -92,7 +101,15 @@ impl Reader {
     fn finish(self) -> PolygonMesh {
         let (corners, count) = (&self.mesh.corners, self.mesh.positions.len());
         let uvs = Uvs::of_corners(self.places, self.at, corners, count);
-        PolygonMesh { uvs, ..self.mesh }
+        let colour = |(channel, name): (usize, &&str)| MeshArray {
+            name: name.to_string(),
+            on: On::Vertices,
+            number: Number::F32,
+            values: self.colours.iter().map(|colour| f64::from(colour[channel])).collect(),
+        };
+        let has_colours = self.colours.len() == count;
+        let arrays = if has_colours { COLOURS.iter().enumerate().map(colour).collect() } else { Vec::new() };
+        PolygonMesh { uvs, arrays, ..self.mesh }
     }
 }
 
@@ -112,10 +129,23 @@ fn names(word: &[u8], what: &str, count: usize) -> String {
     format!("the face names {what} {}, but there are {count} before it", one_line(&word))
 }
 
-/// Writes positions, texture coordinates where there are any, and triangles.
-pub(super) fn write(out: &mut dyn Write, mesh: &TriMesh, uvs: Option<&Uvs>) -> std::io::Result<()> {
-    for p in &mesh.positions {
-        writeln!(out, "v {} {} {}", p.x, p.y, p.z)?;
+/// Writes positions, colours and texture coordinates where there are any, and triangles.
+pub(super) fn write(out: &mut dyn Write, mesh: &TriMesh, carried: &Carried<'_>) -> std::io::Result<()> {
+    let Carried { uvs, arrays, .. } = carried;
+    let colour = |name: &str| arrays.iter().find(|array| array.on == On::Vertices && array.name == name);
+    let colours = COLOURS.map(colour);
+    let share = |array: &MeshArray, vertex: usize| {
+        // Whole numbers are of bytes.
+        array.values[vertex] as f32 / if array.number == Number::U8 { 255.0 } else { 1.0 }
+    };
+    for (vertex, p) in mesh.positions.iter().enumerate() {
+        match colours {
+            [Some(r), Some(g), Some(b)] => {
+                let [r, g, b] = [r, g, b].map(|array| share(array, vertex));
+                writeln!(out, "v {} {} {} {r} {g} {b}", p.x, p.y, p.z)?;
+            }
+            _ => writeln!(out, "v {} {} {}", p.x, p.y, p.z)?,
+        }
     }
     let Some(uvs) = uvs else {
         return mesh

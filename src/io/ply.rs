@@ -1,14 +1,18 @@
 //! Stanford PLY: ascii and binary of both byte orders; faces as lists or as triangle strips; texture coordinates of vertices
-//! (s and t, u and v, texture_u and texture_v) or of the corners of faces (a list texcoord).
+//! (s and t, u and v, texture_u and texture_v) or of the corners of faces (a list texcoord); any other numbers of vertices, faces and
+//! corners (lists as long as faces) but for normals, which a mesh that moves does not keep.
 
 use std::collections::HashMap;
-use std::io::Write;
 
 use super::source;
-use crate::base::{PolygonMesh, TriMesh, Uvs, Vec3, uvs};
+use crate::base::arrays::{MeshArray, Number, On};
+use crate::base::{PolygonMesh, Uvs, Vec3, uvs};
 
 /// Names of a vertex' texture coordinates.
-const PLACES: [[&str; 2]; 3] = [["s", "t"], ["u", "v"], ["texture_u", "texture_v"]];
+pub(super) const PLACES: [[&str; 2]; 3] = [["s", "t"], ["u", "v"], ["texture_u", "texture_v"]];
+
+/// What is no array of its own: places, and normals.
+const NO_ARRAYS: [&str; 6] = ["x", "y", "z", "nx", "ny", "nz"];
 
 /// Rows between two looks at whether to stop.
 const PIECE: usize = 1 << 14;
@@ -20,24 +24,17 @@ enum Format {
     Big,
 }
 
-#[derive(Clone, Copy, PartialEq)]
-pub(super) enum Kind {
-    Int(usize),
-    Unsigned(usize),
-    Float(usize),
-}
-
 pub(super) struct Property {
     pub name: String,
-    kind: Kind,
-    /// Kind of the count, for a list.
-    pub list: Option<Kind>,
+    number: Number,
+    /// Type of the count, for a list.
+    pub list: Option<Number>,
 }
 
 impl Property {
     /// Whether its numbers are floats.
     pub fn is_float(&self) -> bool {
-        matches!(self.kind, Kind::Float(_))
+        self.number.is_float()
     }
 }
 
@@ -68,8 +65,8 @@ impl Body<'_> {
         }
         for (n, property) in element.properties.iter().enumerate() {
             let read = match property.list {
-                None => self.reader.number(property.kind).map(|value| take(n, value)),
-                Some(count) => self.reader.list(count, property.kind).map(drop),
+                None => self.reader.number(property.number).map(|value| take(n, value)),
+                Some(count) => self.reader.list(count, property.number).map(drop),
             };
             read.map_err(|fault| fault.at(element, row))?;
         }
@@ -116,7 +113,36 @@ struct Parsed {
     of_corners: Vec<[f32; 2]>,
     known: HashMap<[u32; 2], u32>,
     at: Vec<u32>,
+    /// Other arrays, each with the index of its property; no values where they cannot be kept.
+    arrays: Vec<(usize, MeshArray)>,
 }
+
+/// Arrays that the properties of the vertices and faces are.
+fn arrays_of(elements: &[Element], names: Option<[&str; 2]>) -> Vec<(usize, MeshArray)> {
+    // Triangles of strips are faces without rows of their own.
+    let has_strips = elements.iter().any(|element| element.name == "tristrips" && element.count > 0);
+    let mut out = Vec::new();
+    for element in elements.iter().filter(|element| ["vertex", "face"].contains(&&*element.name)) {
+        let is_vertex = element.name == "vertex";
+        for (index, property) in element.properties.iter().enumerate() {
+            let name = &*property.name;
+            let on = match (is_vertex, property.list) {
+                (true, None) if !NO_ARRAYS.contains(&name) && !names.is_some_and(|n| n.contains(&name)) => {
+                    On::Vertices
+                }
+                (false, None) if !has_strips => On::Faces,
+                (false, Some(_)) if !has_strips && !LISTS.contains(&name) => On::Corners,
+                _ => continue,
+            };
+            let (name, number) = (property.name.clone(), property.number);
+            out.push((index, MeshArray { name, on, number, values: Vec::new() }));
+        }
+    }
+    out
+}
+
+/// Lists of faces that are no arrays.
+const LISTS: [&str; 3] = ["vertex_indices", "vertex_index", "texcoord"];
 
 impl Parsed {
     fn new(elements: &[Element]) -> Self {
@@ -124,13 +150,23 @@ impl Parsed {
         let has = |name: &&str| {
             vertex.is_some_and(|vertex| vertex.properties.iter().any(|p| p.name == *name && p.list.is_none()))
         };
+        let names = PLACES.into_iter().find(|pair| pair.iter().all(has));
         Self {
             mesh: PolygonMesh::default(),
-            names: PLACES.into_iter().find(|pair| pair.iter().all(has)),
+            names,
+            arrays: arrays_of(elements, names),
             of_vertices: Vec::new(),
             of_corners: Vec::new(),
             known: HashMap::new(),
             at: Vec::new(),
+        }
+    }
+
+    /// Adds values to the array of a property, if it is one.
+    fn add(&mut self, on: On, property: usize, values: &[f64]) {
+        let is_it = |(index, array): &&mut (usize, MeshArray)| *index == property && array.on == on;
+        if let Some((_, array)) = self.arrays.iter_mut().find(is_it) {
+            array.values.extend_from_slice(values);
         }
     }
 
@@ -168,7 +204,18 @@ impl Parsed {
             }
             of_corners => of_corners,
         };
-        PolygonMesh { uvs, ..self.mesh }
+        let [vertices, corners, faces] =
+            [self.mesh.positions.len(), self.mesh.corners.len(), self.mesh.ends.len()];
+        let is_whole = |array: &MeshArray| {
+            array.values.len()
+                == match array.on {
+                    On::Vertices => vertices,
+                    On::Corners => corners,
+                    On::Faces => faces,
+                }
+        };
+        let arrays = self.arrays.into_iter().map(|(_, array)| array).filter(is_whole).collect();
+        PolygonMesh { uvs, arrays, ..self.mesh }
     }
 }
 
@@ -194,16 +241,16 @@ fn parse_header(header: &str) -> Result<(Format, Vec<Element>), String> {
                 let count = count.parse().map_err(|_| wrong())?;
                 elements.push(Element { name: name.to_string(), count, properties: Vec::new() });
             }
-            ["property", "list", count, kind, name] => {
-                let (list, kind) =
-                    (Some(kind_of(count).ok_or_else(wrong)?), kind_of(kind).ok_or_else(wrong)?);
+            ["property", "list", count, number, name] => {
+                let (list, number) =
+                    (Some(number_of(count).ok_or_else(wrong)?), number_of(number).ok_or_else(wrong)?);
                 let element = elements.last_mut().ok_or_else(wrong)?;
-                element.properties.push(Property { name: name.to_string(), kind, list });
+                element.properties.push(Property { name: name.to_string(), number, list });
             }
-            ["property", kind, name] => {
-                let kind = kind_of(kind).ok_or_else(wrong)?;
+            ["property", number, name] => {
+                let number = number_of(number).ok_or_else(wrong)?;
                 let element = elements.last_mut().ok_or_else(wrong)?;
-                element.properties.push(Property { name: name.to_string(), kind, list: None });
+                element.properties.push(Property { name: name.to_string(), number, list: None });
             }
             [] | ["comment" | "obj_info", ..] => {}
             _ => return Err(wrong()),
@@ -223,19 +270,21 @@ fn check_coordinates(elements: &[Element]) -> Result<(), String> {
     }
 }
 
-fn kind_of(name: &str) -> Option<Kind> {
-    Some(match name {
-        "char" | "int8" => Kind::Int(1),
-        "short" | "int16" => Kind::Int(2),
-        "int" | "int32" => Kind::Int(4),
-        "uchar" | "uint8" => Kind::Unsigned(1),
-        "ushort" | "uint16" => Kind::Unsigned(2),
-        "uint" | "uint32" => Kind::Unsigned(4),
-        "float" | "float32" => Kind::Float(4),
-        "double" | "float64" => Kind::Float(8),
-        _ => return None,
-    })
+fn number_of(name: &str) -> Option<Number> {
+    NAMES.iter().find(|(names, _)| names.contains(&name)).map(|(_, number)| *number)
 }
+
+/// Types by the names that a header gives them; the first is what we write.
+pub(super) const NAMES: [([&str; 2], Number); 8] = [
+    (["char", "int8"], Number::I8),
+    (["uchar", "uint8"], Number::U8),
+    (["short", "int16"], Number::I16),
+    (["ushort", "uint16"], Number::U16),
+    (["int", "int32"], Number::I32),
+    (["uint", "uint32"], Number::U32),
+    (["float", "float32"], Number::F32),
+    (["double", "float64"], Number::F64),
+];
 
 struct Reader<'a> {
     format: Format,
@@ -264,16 +313,16 @@ impl Fault {
 
 impl Reader<'_> {
     /// The numbers of a list, after their count.
-    fn list(&mut self, count: Kind, kind: Kind) -> Result<Vec<f64>, Fault> {
+    fn list(&mut self, count: Number, number: Number) -> Result<Vec<f64>, Fault> {
         let count = self.number(count)?;
         // A damaged count must not allocate more than the file could fill.
         if !(0.0..=self.bytes.len() as f64).contains(&count) {
             return Err(Fault::Count(count));
         }
-        (0..count as usize).map(|_| self.number(kind)).collect()
+        (0..count as usize).map(|_| self.number(number)).collect()
     }
 
-    fn number(&mut self, kind: Kind) -> Result<f64, Fault> {
+    fn number(&mut self, number: Number) -> Result<f64, Fault> {
         if self.format == Format::Ascii {
             let rest = &self.bytes[self.at..];
             let start = rest.iter().position(|byte| !byte.is_ascii_whitespace()).ok_or(Fault::End)?;
@@ -282,7 +331,7 @@ impl Reader<'_> {
             let text = String::from_utf8_lossy(&rest[start..start + length]);
             return text.parse().map_err(|_| Fault::Text(text.chars().take(40).collect()));
         }
-        let (Kind::Int(size) | Kind::Unsigned(size) | Kind::Float(size)) = kind;
+        let size = number.size();
         let raw = self.bytes.get(self.at..self.at + size).ok_or(Fault::End)?;
         self.at += size;
         let mut wide = [0u8; 8];
@@ -292,11 +341,11 @@ impl Reader<'_> {
         }
         let bits = u64::from_le_bytes(wide);
         let unused = 64 - 8 * size as u32;
-        Ok(match kind {
-            Kind::Unsigned(_) => bits as f64,
-            Kind::Int(_) => ((bits << unused) as i64 >> unused) as f64,
-            Kind::Float(4) => f64::from(f32::from_bits(bits as u32)),
-            Kind::Float(_) => f64::from_bits(bits),
+        Ok(match number {
+            Number::U8 | Number::U16 | Number::U32 => bits as f64,
+            Number::I8 | Number::I16 | Number::I32 => ((bits << unused) as i64 >> unused) as f64,
+            Number::F32 => f64::from(f32::from_bits(bits as u32)),
+            Number::F64 => f64::from_bits(bits),
         })
     }
 }
@@ -305,27 +354,35 @@ impl Reader<'_> {
 fn read_row(reader: &mut Reader<'_>, element: &Element, parsed: &mut Parsed) -> Result<(), Fault> {
     let (mut position, mut place) = ([0.0f64; 3], [0.0f64; 2]);
     let (mut corners, mut places) = (Vec::new(), Vec::new());
-    for property in &element.properties {
+    let is_vertex = element.name == "vertex";
+    // Of a face whose corners are known only at its end.
+    let (mut of_face, mut of_corners) = (Vec::new(), Vec::new());
+    for (index, property) in element.properties.iter().enumerate() {
         let name = property.name.as_str();
         match property.list {
             None => {
-                let value = reader.number(property.kind)?;
+                let value = reader.number(property.number)?;
                 if let Some(axis) = ["x", "y", "z"].iter().position(|axis| *axis == name) {
                     position[axis] = value;
                 } else if let Some(axis) =
                     parsed.names.and_then(|names| names.iter().position(|n| *n == name))
                 {
                     place[axis] = value;
+                } else if is_vertex {
+                    parsed.add(On::Vertices, index, &[value]);
+                } else {
+                    of_face.push((index, value));
                 }
             }
             Some(count) => {
-                let values = reader.list(count, property.kind)?;
+                let values = reader.list(count, property.number)?;
                 match (element.name.as_str(), name) {
                     ("face", "vertex_indices" | "vertex_index") => {
-                        corners = values.into_iter().map(index).collect();
+                        corners = values.into_iter().map(vertex).collect();
                     }
                     ("face", "texcoord") => places = values,
                     ("tristrips", _) => add_strips(&values, parsed),
+                    ("face", _) => of_corners.push((index, values)),
                     _ => {}
                 }
             }
@@ -338,14 +395,24 @@ fn read_row(reader: &mut Reader<'_>, element: &Element, parsed: &mut Parsed) -> 
                 parsed.of_vertices.push(place.map(|value| value as f32));
             }
         }
-        "face" => parsed.face(corners, &places),
+        "face" => {
+            if corners.len() >= 3 {
+                of_face.into_iter().for_each(|(index, value)| parsed.add(On::Faces, index, &[value]));
+                of_corners.into_iter().for_each(|(index, values)| {
+                    if values.len() == corners.len() {
+                        parsed.add(On::Corners, index, &values);
+                    }
+                });
+            }
+            parsed.face(corners, &places);
+        }
         _ => {}
     }
     Ok(())
 }
 
 /// Indices that are not integers from 0 become one that validation refuses.
-fn index(value: f64) -> u32 {
+fn vertex(value: f64) -> u32 {
     if (0.0..f64::from(u32::MAX)).contains(&value) && value.fract() == 0.0 { value as u32 } else { u32::MAX }
 }
 
@@ -353,66 +420,17 @@ fn index(value: f64) -> u32 {
 fn add_strips(values: &[f64], parsed: &mut Parsed) {
     for strip in values.split(|&value| value < 0.0) {
         for (number, three) in strip.windows(3).enumerate() {
-            let [a, b, c] = [index(three[0]), index(three[1]), index(three[2])];
+            let [a, b, c] = [vertex(three[0]), vertex(three[1]), vertex(three[2])];
             parsed.face(if number % 2 == 0 { vec![a, b, c] } else { vec![b, a, c] }, &[]);
         }
     }
 }
 
-/// Writes binary little-endian PLY, with velocities when there is one for each vertex, and texture coordinates: s and t of
-/// the vertices, or where there are seams a list texcoord of the faces.
-pub(super) fn write(
-    out: &mut dyn Write,
-    mesh: &TriMesh,
-    velocities: &[Vec3],
-    uvs: Option<&Uvs>,
-) -> std::io::Result<()> {
-    let moving = velocities.len() == mesh.positions.len();
-    let of_vertices = uvs.filter(|uvs| uvs.corners.is_none());
-    let of_corners = uvs.filter(|uvs| uvs.corners.is_some());
-    let mut names = vec!["x", "y", "z"];
-    names.extend(moving.then_some(["vx", "vy", "vz"]).into_iter().flatten());
-    names.extend(of_vertices.map(|_| PLACES[0]).into_iter().flatten());
-    writeln!(
-        out,
-        "ply\nformat binary_little_endian 1.0\ncomment frazil\nelement vertex {}",
-        mesh.positions.len()
-    )?;
-    names.iter().try_for_each(|name| writeln!(out, "property float {name}"))?;
-    let faces = mesh.triangles.len();
-    writeln!(out, "element face {faces}\nproperty list uchar uint vertex_indices")?;
-    if of_corners.is_some() {
-        writeln!(out, "property list uchar float texcoord")?;
-    }
-    writeln!(out, "end_header")?;
-    for (vertex, p) in mesh.positions.iter().enumerate() {
-        let velocity = velocities.get(vertex).filter(|_| moving);
-        let place = of_vertices.map(|uvs| uvs.places[vertex]);
-        let values = p.iter().chain(velocity.into_iter().flatten()).chain(place.iter().flatten());
-        for value in values {
-            out.write_all(&value.to_le_bytes())?;
-        }
-    }
-    for (number, triangle) in mesh.triangles.iter().enumerate() {
-        out.write_all(&[3])?;
-        for index in triangle {
-            out.write_all(&index.to_le_bytes())?;
-        }
-        if let Some(uvs) = of_corners {
-            out.write_all(&[6])?;
-            for index in uvs.indices(&mesh.triangles, number) {
-                for value in uvs.places[index as usize] {
-                    out.write_all(&value.to_le_bytes())?;
-                }
-            }
-        }
-    }
-    Ok(())
-}
-
 #[cfg(test)]
 mod tests {
+    use super::super::ply_write::{Carried, write};
     use super::*;
+    use crate::base::TriMesh;
 
     #[test]
     fn what_is_written_is_read_and_a_cut_file_is_refused() {
@@ -421,7 +439,7 @@ mod tests {
             triangles: vec![[0, 1, 2], [2, 1, 0]],
         };
         let mut bytes = Vec::new();
-        write(&mut bytes, &mesh, &[], None).unwrap();
+        write(&mut bytes, &mesh, &Carried::default()).unwrap();
         assert_eq!(parse(&bytes).unwrap().into_triangles(), mesh);
         for length in 0..bytes.len() {
             assert!(parse(&bytes[..length]).is_err(), "{length} of {} bytes were accepted", bytes.len());
@@ -435,5 +453,31 @@ mod tests {
                     property list int int vertex_indices\nend_header\n0 0 0\n1 0 0\n1 1 0\n0 1 0\n4 0 1 2 3\n5 0 1 2 3 -1\n";
         let mesh = parse(text.as_bytes()).unwrap();
         assert_eq!(mesh.triangles(), [[0, 1, 2], [0, 2, 3], [0, 1, 2], [2, 1, 3]]);
+    }
+
+    #[test]
+    fn arrays_of_vertices_faces_and_corners_are_kept() {
+        let text = "ply\nformat ascii 1.0\nelement vertex 4\nproperty float x\nproperty float y\nproperty float z\n\
+                    property float nx\nproperty uchar red\nproperty double mask\n\
+                    element face 3\nproperty int part\nproperty list uchar int vertex_indices\nproperty list uchar float wet\n\
+                    end_header\n0 0 0 1 255 0.1\n1 0 0 1 0 2\n1 1 0 1 7 3\n0 1 0 1 8 4\n\
+                    5 4 0 1 2 3 4 .5 .25 .125 1\n6 2 0 1 2 9 9\n-7 3 2 1 0 3 9 8 7\n";
+        let mesh = parse(text.as_bytes()).unwrap().into_detailed();
+        assert_eq!(mesh.mesh.triangles, [[0, 1, 2], [0, 2, 3], [2, 1, 0]]);
+        let array = |name: &str| mesh.arrays.iter().find(|array| array.name == name).unwrap();
+        assert_eq!(mesh.arrays.len(), 4);
+        assert_eq!(
+            (array("red").number, &array("red").values[..]),
+            (Number::U8, &[255.0, 0.0, 7.0, 8.0][..])
+        );
+        assert_eq!(array("mask").values, [0.1, 2.0, 3.0, 4.0]);
+        assert_eq!((array("part").on, &array("part").values[..]), (On::Faces, &[5.0, 5.0, -7.0][..]));
+        assert_eq!(array("wet").values, [0.5, 0.25, 0.125, 0.5, 0.125, 1.0, 9.0, 8.0, 7.0]);
+        let arrays: Vec<&MeshArray> = mesh.arrays.iter().collect();
+        let mut bytes = Vec::new();
+        write(&mut bytes, &mesh.mesh, &Carried { arrays: &arrays, ..Carried::default() }).unwrap();
+        let again = parse(&bytes).unwrap().into_detailed();
+        assert_eq!(again.mesh, mesh.mesh);
+        arrays.iter().for_each(|array| assert!(again.arrays.contains(array), "{}", array.name));
     }
 }

@@ -2,6 +2,8 @@
 
 use std::path::{Path, PathBuf};
 
+use crate::error::{Error, Result};
+
 /// Most digits of a frame number.
 const MOST_DIGITS: usize = 32;
 
@@ -51,6 +53,26 @@ impl Pattern {
         let number = frame.unsigned_abs();
         let name = format!("{}{sign}{number:0width$}{}", self.before, self.after, width = self.digits);
         self.folder.join(name)
+    }
+
+    /// The frames whose files are there, ascending.
+    ///
+    /// # Errors
+    /// A folder that cannot be read.
+    pub fn frames(&self) -> Result<Vec<i32>> {
+        let folder = if self.folder.as_os_str().is_empty() { Path::new(".") } else { &self.folder };
+        let entries = std::fs::read_dir(folder).map_err(|error| Error::io(folder, "read", error))?;
+        let mut out = Vec::new();
+        for entry in entries {
+            let name = entry.map_err(|error| Error::io(folder, "read", error))?.file_name();
+            let number =
+                name.to_str().and_then(|name| name.strip_prefix(&*self.before)?.strip_suffix(&*self.after));
+            let frame = number.and_then(|number| number.parse::<i32>().ok());
+            // "+1", or "001" of four digits, are of no frame.
+            out.extend(frame.filter(|frame| self.path(*frame).file_name() == Some(&*name)));
+        }
+        out.sort_unstable();
+        Ok(out)
     }
 }
 

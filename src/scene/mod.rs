@@ -1,14 +1,15 @@
 //! Scene files (TOML): what a shot is made of, read with every default filled in ([`Scene::read`], `text/`), checked
 //! against its inputs and run frame by frame.
 //!
-//! [`shot`] runs any stage; [`snow`] has the inputs, the check and the stage of the base layer; the stage `objects` writes
-//! the objects as they move. A new stage is a type with the traits [`shot::Stage`] and [`shot::Stepping`] beside its
+//! [`shot`] runs any stage; [`snow`] and [`surface`] have the inputs, the check and the stages of a system; the stage `objects`
+//! writes the objects as they move. A new stage is a type with the traits [`shot::Stage`] and [`shot::Stepping`] beside its
 //! system, named in the system's plan ([`snow::plan`]) and in the scopes of the keys that it depends on.
 
 mod moving;
 mod objects;
 pub mod shot;
 pub mod snow;
+pub mod surface;
 mod text;
 
 pub use objects::Objects;
@@ -16,6 +17,7 @@ pub use objects::Objects;
 pub use snow::{
     Forecast, Inputs, Rebuild, RebuildGrains, Walk, changes_since, check_memory, estimate, partial,
 };
+pub use surface::Surface;
 pub use text::{FrameChoice, Frames, Override, Value, Values, reference, template};
 
 use crate::error::{Error, Result};
@@ -29,12 +31,44 @@ use std::path::{Path, PathBuf};
 #[derive(Debug, Clone, PartialEq)]
 pub struct Scene {
     pub(crate) path: PathBuf,
+    pub(crate) system: System,
     pub(crate) shot: Shot,
     pub(crate) snow: Option<Snow>,
+    pub(crate) surface: Option<Surface>,
     pub(crate) objects: Vec<Object>,
     pub(crate) output: Output,
     /// The value of every key, from which the others are made.
     pub(crate) values: Values,
+}
+
+/// What a scene is about: the system that makes it, whose table it has.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum System {
+    /// `[snow]`: objects move through a deep layer of snow.
+    Snow,
+    /// `[surface]`: a detailed mesh follows the particles of a liquid.
+    Surface,
+}
+
+impl System {
+    /// All of them.
+    pub const ALL: [Self; 2] = [Self::Snow, Self::Surface];
+
+    /// Its table in a scene, and its command.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Snow => "snow",
+            Self::Surface => "surface",
+        }
+    }
+
+    /// What its scenes are about, in a few words.
+    pub(crate) fn title(self) -> &'static str {
+        match self {
+            Self::Snow => "Snow that objects press into",
+            Self::Surface => "A detailed mesh that follows a liquid",
+        }
+    }
 }
 
 /// Which frames are made, how fast.
@@ -243,6 +277,11 @@ impl Scene {
         &self.path
     }
 
+    /// What it is about.
+    pub fn system(&self) -> System {
+        self.system
+    }
+
     /// Which frames, how fast.
     pub fn shot(&self) -> Shot {
         self.shot
@@ -273,9 +312,23 @@ impl Scene {
             .ok_or_else(|| Error::argument(format!("{}: `snow` is missing", self.path.display())))
     }
 
+    /// How its mesh follows a liquid.
+    ///
+    /// # Errors
+    /// It has no such mesh.
+    pub fn surface(&self) -> Result<&Surface> {
+        self.surface
+            .as_ref()
+            .ok_or_else(|| Error::argument(format!("{}: `surface` is missing", self.path.display())))
+    }
+
     /// The files that it reads; of sequences those of its own first frame.
     pub(crate) fn files(&self) -> Vec<PathBuf> {
         let mut out = Vec::new();
+        if let Some(surface) = &self.surface {
+            out.extend(surface.mesh.clone());
+            out.extend(surface.files_at(self.shot.frames, self.shot.frames.first));
+        }
         if let Some(snow) = &self.snow {
             out.extend(snow.files().map(|(_, path)| path.clone()));
         }

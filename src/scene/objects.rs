@@ -44,7 +44,8 @@ impl<'a> Objects<'a> {
             velocities.extend_from_slice(speeds);
         }
         let uvs = Uvs::joined(drawn.iter().map(|drawn| (drawn.uvs, drawn.vertices, drawn.triangles)));
-        mesh::ply_bytes(&all, &velocities, uvs.as_ref())
+        let carried = mesh::Carried { velocities: &velocities, uvs: uvs.as_ref(), arrays: &[] };
+        mesh::ply_bytes(&all, &carried)
     }
 
     /// A value clip with a mesh for each object.

@@ -8,7 +8,6 @@ pub mod grain_friction;
 pub mod grains;
 pub mod mist;
 mod noise;
-mod packed;
 #[cfg(feature = "vdb")]
 pub mod volumes;
 

@@ -32,6 +32,7 @@ mod paths;
 mod project;
 mod sample;
 mod spacing;
+mod state;
 mod tracker;
 
 pub use advect::Weighting;
@@ -41,6 +42,7 @@ pub use implicit::Implicit;
 pub use isosurface::Isosurface;
 #[cfg(feature = "vdb")]
 pub use level_set::{HALF_WIDTH, level_set};
+pub use paths::interpolate;
 pub use spacing::estimate as estimate_spacing;
 pub use tracker::{Params, StepReport, Tracker};
 

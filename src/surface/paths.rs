@@ -3,6 +3,8 @@
 //! Particles are matched by id: files hold them in another order in each frame. With velocities a way is a cubic that begins and ends
 //! with these (Hermite), otherwise a line. Without ids it is the velocity times the time.
 
+use std::collections::HashMap;
+
 use rayon::prelude::*;
 
 use super::Particles;
@@ -136,6 +138,40 @@ impl Paths {
     }
 }
 
+/// The particles between two frames of a cache that are `dt` (s) apart, at a share 0..1 of the time: those that are there in both, and
+/// those of the first that end.
+///
+/// # Errors
+/// As [`Paths::between`].
+pub fn interpolate(from: &Particles, to: &Particles, dt: f64, share: f64) -> Result<Particles> {
+    if from.ids.is_empty() || to.ids.is_empty() {
+        let mut places = Vec::new();
+        Paths::by_velocity(from, dt)?.at(share, &mut places);
+        return Ok(Particles { places, ..from.clone() });
+    }
+    let paths = Paths::between(from, to, dt)?;
+    let mut out = Particles { ids: paths.ranks.clone(), ..Particles::default() };
+    paths.at(share, &mut out.places);
+    let row = |frame: &Particles| -> HashMap<i64, usize> { frame.ids.iter().copied().zip(0..).collect() };
+    let (old, new) = (row(from), row(to));
+    if !from.velocities.is_empty() && !to.velocities.is_empty() {
+        let speed = |id: &i64| {
+            let (a, b) = (from.velocities[old[id]], to.velocities[new[id]]);
+            [0, 1, 2].map(|axis| a[axis] + (b[axis] - a[axis]) * share as f32)
+        };
+        out.velocities = paths.ranks.iter().map(speed).collect();
+    }
+    for (row, id) in from.ids.iter().enumerate().filter(|(_, id)| !new.contains_key(id)) {
+        let speed = from.velocities.get(row).copied().unwrap_or_default();
+        out.places.push(from.places[row] + DVec3::from(speed.map(f64::from)) * (dt * share));
+        out.ids.push(*id);
+        if !out.velocities.is_empty() {
+            out.velocities.push(speed);
+        }
+    }
+    Ok(out)
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -168,6 +204,20 @@ mod tests {
         assert_eq!(places[1].x, 2.0);
         let none = Particles { velocities: Vec::new(), ..from };
         assert!(Paths::between(&none, &none, 0.1).is_err());
+    }
+
+    #[test]
+    fn between_two_frames_all_particles_of_the_first_are_there() {
+        let from = frame(&[7, 3, 9], &[0.0, 1.0, 2.0], 10.0);
+        let to =
+            Particles { velocities: vec![[20.0, 0.0, 0.0]; 3], ..frame(&[9, 5, 7], &[3.0, 0.0, 1.5], 0.0) };
+        let half = interpolate(&from, &to, 0.1, 0.5).unwrap();
+        assert_eq!(half.ids, [7, 9, 3]);
+        assert!((half.places[2].x - 1.5).abs() < 1e-12, "one that ends moves on");
+        assert_eq!(half.velocities, [[15.0, 0.0, 0.0], [15.0, 0.0, 0.0], [10.0, 0.0, 0.0]]);
+        let without = |frame: &Particles| Particles { ids: Vec::new(), ..frame.clone() };
+        let half = interpolate(&without(&from), &without(&to), 0.1, 0.5).unwrap();
+        assert_eq!(half.places[1].x, 1.5);
     }
 
     #[test]

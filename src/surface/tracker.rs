@@ -73,18 +73,40 @@ pub struct StepReport {
     pub phases: Vec<PhaseTime>,
 }
 
+impl StepReport {
+    /// What two steps did, one after the other; what is flagged is so after the second.
+    pub fn followed_by(mut self, next: Self) -> Self {
+        for phase in next.phases {
+            match self.phases.iter_mut().find(|own| own.name == phase.name) {
+                Some(own) => own.time += phase.time,
+                None => self.phases.push(phase),
+            }
+        }
+        Self {
+            jumped: next.jumped,
+            lost: next.lost,
+            parts: self.parts + next.parts,
+            born: self.born + next.born,
+            died: self.died + next.died,
+            triangles: next.triangles,
+            phases: self.phases,
+        }
+    }
+}
+
 /// A detailed mesh that follows particles.
+#[derive(Debug, Clone)]
 pub struct Tracker {
-    params: Params,
+    pub(super) params: Params,
     /// Places of vertices (m).
-    vertices: Vec<DVec3>,
-    triangles: Vec<[u32; 3]>,
+    pub(super) vertices: Vec<DVec3>,
+    pub(super) triangles: Vec<[u32; 3]>,
     /// Distance from the surface that each vertex keeps (m); NaN: it was too far from it to have one.
-    delta: Vec<f32>,
+    pub(super) delta: Vec<f32>,
     /// Vertices that the last step could not project.
-    flags: Vec<bool>,
+    pub(super) flags: Vec<bool>,
     /// How far distances from the surface are known (r).
-    reach: f64,
+    pub(super) reach: f64,
 }
 
 /// Least reach of the band, and the greatest that is tried at the first frame (r).

@@ -116,8 +116,10 @@ pub fn moments(count: usize) -> Vec<f64> {
 /// The files of an output folder by name, but for reports, which hold times, and the lock.
 pub fn output(folder: &Path) -> BTreeMap<String, Vec<u8>> {
     let mut out = BTreeMap::new();
-    for name in ["", "base", "removed", "grains", "mist", "fog", "snow", "mesh", "objects", "tally", "state"]
-    {
+    for name in [
+        "", "base", "removed", "grains", "mist", "fog", "snow", "mesh", "objects", "tally", "surface",
+        "state",
+    ] {
         let Ok(entries) = std::fs::read_dir(folder.join(name)) else { continue };
         for path in entries.map(|entry| entry.unwrap().path()).filter(|path| path.is_file()) {
             let file = path.strip_prefix(folder).unwrap().to_string_lossy().into_owned();

@@ -84,6 +84,7 @@ mod snow {
 mod surface {
     mod command;
     mod implicit;
+    mod shot;
     mod tracking;
 }
 mod sweep {

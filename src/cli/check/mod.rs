@@ -1,6 +1,8 @@
 //! `frazil check`: every input of every frame, before a night on the farm; every file of a folder after it.
 
 #[cfg(feature = "vdb")]
+mod liquid;
+#[cfg(feature = "vdb")]
 mod scene;
 
 use std::fmt::Write;
@@ -33,6 +35,16 @@ pub struct Args {
     /// Print JSON.
     #[arg(long)]
     json: bool,
+}
+
+#[cfg(feature = "vdb")]
+impl Args {
+    /// Free bytes where the output is, or is to be.
+    fn free_space(&self) -> Option<u64> {
+        let absolute = std::path::absolute(self.output.as_deref()?).ok()?;
+        let there = absolute.ancestors().find(|folder| folder.exists())?;
+        super::machine::free_space(there)
+    }
 }
 
 /// Runs the command.

@@ -1,21 +1,23 @@
 //! What a scene will do: sizes, speeds, memory, disk, and what looks wrong.
 
 use std::fmt::Write;
-use std::path::Path;
 
 use frazil::scene::snow::check::{ObjectReport, Report, check};
-use frazil::scene::{Inputs, Scene, check_memory};
+use frazil::scene::{Inputs, Scene, System, check_memory};
 
-use super::{Args, size};
+use super::{Args, liquid, size};
 use crate::cli::exit::{Failure, Phase};
+use crate::cli::output;
 use crate::cli::session::Session;
-use crate::cli::{machine, output};
 
 /// Checks the scene.
 pub fn run(args: &Args, session: &Session) -> Result<(), Failure> {
     let mut scene = Scene::read_with(&args.scene, &args.set).before()?;
     if let Some(factor) = args.preview {
         scene.coarsen(factor.into()).before()?;
+    }
+    if scene.system() == System::Surface {
+        return liquid::run(args, session, &scene);
     }
     let inputs = Inputs::load(&scene).before()?;
     let mut report = check(&session.ctx, &scene, &inputs, args.output.as_deref()).before()?;
@@ -27,7 +29,7 @@ pub fn run(args: &Args, session: &Session) -> Result<(), Failure> {
     if let Err(error) = check_memory(&scene, &inputs, limit) {
         report.warnings.push(error.to_string());
     }
-    let free = args.output.as_deref().and_then(free_space);
+    let free = args.free_space();
     if let (Some(free), Some(needed)) = (free, report.disk_bytes.filter(|needed| Some(*needed) > free)) {
         let (needed, free) = (size(needed), size(free));
         report.warnings.push(format!("the files need about {needed}, but only {free} are free"));
@@ -38,13 +40,6 @@ pub fn run(args: &Args, session: &Session) -> Result<(), Failure> {
         in_words(&report, limit, free)
     };
     output::print(&text).during()
-}
-
-/// Free bytes where a folder is, or is to be.
-fn free_space(folder: &Path) -> Option<u64> {
-    let absolute = std::path::absolute(folder).ok()?;
-    let there = absolute.ancestors().find(|folder| folder.exists())?;
-    machine::free_space(there)
 }
 
 fn in_words(report: &Report, limit: u64, free: Option<u64>) -> String {

@@ -80,9 +80,11 @@ impl Plan<'_> {
         Ok(())
     }
 
-    /// Whether another stage reads the exact states of a stage.
-    fn reads_states_of(&self, name: &str) -> bool {
-        self.stages().any(|stage| stage.upstream().contains(&name) && stage.reads_state_of(name))
+    /// Whether the exact states of all frames of a stage are kept: it, or another one, reads them.
+    fn keeps_states_of(&self, of: &dyn Stage) -> bool {
+        let reads =
+            |stage: &dyn Stage| stage.upstream().contains(&of.name()) && stage.reads_state_of(of.name());
+        of.keeps_every_state() || self.stages().any(reads)
     }
 }
 
@@ -317,7 +319,7 @@ impl<'a> Run<'a> {
             let threads: Vec<_> = runs
                 .zip(&upstream)
                 .map(|((_, run), upstream)| {
-                    let every_state = plan.reads_states_of(run.stage.name());
+                    let every_state = plan.keeps_states_of(run.stage.as_stage());
                     scope.spawn(move || {
                         let stop = StopOthers(shared.stop);
                         let result = run.make(&shared, upstream, every_state);

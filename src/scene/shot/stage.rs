@@ -75,6 +75,11 @@ pub trait Stage: Sync {
         &[]
     }
 
+    /// Whether the exact states of all its frames are kept, so that a run can resume after any.
+    fn keeps_every_state(&self) -> bool {
+        false
+    }
+
     /// Whether it reads the exact states of a stage upstream, not only its files: those of all frames are then kept.
     fn reads_state_of(&self, _upstream: &str) -> bool {
         true

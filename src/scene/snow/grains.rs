@@ -8,7 +8,7 @@ use super::forecast::Forecast;
 use super::grain_files::{self, WHOLE_EVERY, ordered, told_apart};
 use super::grain_keys::material;
 use super::inputs::Inputs;
-use super::{base, drift, first_keys};
+use super::{base, drift};
 use crate::base::{DVec3, Points};
 use crate::context::Context;
 use crate::error::{Error, Result};
@@ -17,8 +17,8 @@ use crate::io::{points_ply, usd_points};
 use crate::scene::shot::{
     Clip, FrameFiles, Kind, Prims, Reads, Report, Settings, Stage, Stepped, Stepping, Stored, To,
 };
-use crate::scene::text::keys::settings_of;
-use crate::scene::{self, Role, Scene, moving};
+use crate::scene::text::keys::{first_of, settings_of};
+use crate::scene::{self, Role, Scene, System, moving};
 use crate::snow::base_layer::Grids;
 use crate::snow::grains::{self, Base, Object, Params, StepReport, Surroundings};
 use crate::sweep::Body;
@@ -208,7 +208,7 @@ impl Stage for Grains<'_> {
     }
 
     fn of_first_state(&self, settings: &Settings) -> Settings {
-        first_keys(settings, "grains")
+        first_of(System::Snow, settings, "grains")
     }
 
     fn upstream(&self) -> &'static [&'static str] {

@@ -4,10 +4,10 @@ use std::path::Path;
 
 use serde_json::json;
 
+use super::base;
 use super::grain_files::Whole;
 use super::inputs::Inputs;
 use super::mist_keys::mist_params;
-use super::{base, first_keys};
 use crate::base::points::Values;
 use crate::base::{DVec3, Points, TriMesh};
 use crate::context::Context;
@@ -19,8 +19,8 @@ use crate::motion::{Keys, Rigid};
 use crate::scene::shot::{
     FrameFiles, Kind, Reads, Report, Settings, Stage, Stepped, Stepping, Stored, To, Volume,
 };
-use crate::scene::text::keys::settings_of;
-use crate::scene::{Role, Scene, moving};
+use crate::scene::text::keys::{first_of, settings_of};
+use crate::scene::{Role, Scene, System, moving};
 use crate::snow::base_layer;
 use crate::snow::mist::{self, Around, Grids, Params, Source, StepReport, Surroundings, Wind};
 use crate::sweep::Body;
@@ -225,7 +225,7 @@ impl Stage for Mist<'_> {
     }
 
     fn of_first_state(&self, settings: &Settings) -> Settings {
-        first_keys(settings, NAME)
+        first_of(System::Snow, settings, NAME)
     }
 
     fn upstream(&self) -> &'static [&'static str] {

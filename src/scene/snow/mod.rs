@@ -26,6 +26,7 @@ mod memory;
 #[cfg(feature = "vdb")]
 mod mist;
 mod mist_keys;
+mod output_keys;
 #[cfg(feature = "vdb")]
 mod plan;
 #[cfg(feature = "vdb")]
@@ -42,15 +43,10 @@ mod walks;
 #[cfg(feature = "vdb")]
 mod warnings;
 
-#[cfg(feature = "vdb")]
-use crate::scene::shot::Settings;
-#[cfg(feature = "vdb")]
-use crate::scene::text::key::Scope;
-#[cfg(feature = "vdb")]
-use crate::scene::text::keys as all_keys;
 pub(super) use grain_keys::{GRAIN_KEYS, check_grains, has_grains};
 pub(super) use keys::KEYS;
 pub(super) use mist_keys::{MIST_KEYS, check_mist, has_mist};
+pub(super) use output_keys::OUTPUT_KEYS;
 pub(super) use volume_keys::check_volumes;
 #[cfg(feature = "vdb")]
 pub use {
@@ -62,12 +58,3 @@ pub use {
     rebuild::Rebuild,
     walks::Walk,
 };
-
-/// Those of a stage's settings that make its first state.
-#[cfg(feature = "vdb")]
-fn first_keys(settings: &Settings, stage: &str) -> Settings {
-    let firsts = all_keys::all().iter().filter(|key| key.scope(stage) == Some(Scope::First));
-    let firsts: Vec<String> = firsts.map(|key| format!("{}.{}", key.table, key.name)).collect();
-    let own = settings.iter().filter(|(key, _)| firsts.contains(key));
-    own.map(|(key, value)| (key.clone(), value.clone())).collect()
-}

@@ -5,7 +5,7 @@ use crate::io::seen::Seen;
 use crate::scene::shot::Settings;
 use crate::scene::text::key::{Key, Scope};
 use crate::scene::text::keys::{self, settings_of};
-use crate::scene::{Layer, Role, Scene, shot};
+use crate::scene::{Layer, Role, Scene, System, shot};
 
 /// The settings that the base depends on. Of the frames only the first counts: a shot may grow.
 ///
@@ -52,7 +52,7 @@ pub(super) fn of_layer(all: &Settings) -> Settings {
 fn declared(path: &str) -> Option<&'static Key> {
     let (table, name) = path.rsplit_once('.')?;
     let table = table.split('[').next().unwrap_or(table);
-    keys::all().iter().find(|key| key.table == table && key.name == name)
+    keys::of(System::Snow).iter().find(|key| key.table == table && key.name == name)
 }
 
 #[cfg(test)]

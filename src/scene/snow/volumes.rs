@@ -171,7 +171,7 @@ impl<'a> Volumes<'a> {
     fn mesh_files(&self, surface: &TriMesh, frame: i32) -> Files {
         let mut files = Files::new();
         if self.asked.mesh_ply {
-            files.push(("mesh", "ply", mesh::ply_bytes(surface, &[], None)));
+            files.push(("mesh", "ply", mesh::ply_bytes(surface, &mesh::Carried::default())));
         }
         if self.asked.mesh_usd {
             let mesh = usd::MeshFrame {

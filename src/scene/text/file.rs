@@ -6,7 +6,7 @@ use super::overrides::Override;
 use super::table::{Document, Table};
 use super::values::Values;
 use crate::error::{Error, Result};
-use crate::scene::{Object, Output, Scene, Shot, Snow, snow};
+use crate::scene::{Object, Output, Scene, Shot, Snow, Surface, System, snow};
 use std::path::{Path, PathBuf};
 use toml::de::DeTable;
 
@@ -36,7 +36,7 @@ impl Scene {
     /// # Errors
     /// As [`Scene::read`].
     pub fn parse(text: &str, path: &Path, overrides: &[Override]) -> Result<Self> {
-        Self::parse_keys(text, path, overrides, keys::all())
+        Self::parse_keys(text, path, overrides, keys::of)
     }
 
     /// The same with other keys than those that there are.
@@ -44,7 +44,7 @@ impl Scene {
         text: &str,
         path: &Path,
         overrides: &[Override],
-        keys: &'static [Key],
+        keys_of: impl Fn(System) -> &'static [Key],
     ) -> Result<Self> {
         let document = Document { path, text, folder: folder_of(path)?, overrides };
         let mut root = DeTable::parse(text).map_err(|error| {
@@ -54,24 +54,27 @@ impl Scene {
         for (index, setting) in overrides.iter().enumerate() {
             setting.apply(root.get_mut(), document.place_of(index), path)?;
         }
+        let system = System::of(&document, root.get_ref())?;
+        let keys = keys_of(system);
         let root = Table::open(&document, "", root.get_ref(), 0, &known(keys, ""))?;
         let mut values = Values::new(keys);
         for table in tables(keys).into_iter().filter(|table| !table.contains('.')) {
             read_table(&document, &root, table, &mut values)?;
         }
-        let scene = Self::of(path, values);
-        if scene.snow.is_none() {
-            return Err(root.error("snow", "is missing"));
+        if !root.has(system.name()) {
+            return Err(root.error(system.name(), "is missing"));
         }
-        Ok(scene)
+        Ok(Self::of(path, system, values))
     }
 
     /// The scene that some values make.
-    fn of(path: &Path, values: Values) -> Self {
+    fn of(path: &Path, system: System, values: Values) -> Self {
         Self {
             path: path.to_path_buf(),
+            system,
             shot: Shot::of(&values),
             snow: Snow::of(&values),
+            surface: Surface::of(&values),
             objects: Object::all_of(&values),
             output: Output::of(&values),
             values,
@@ -87,8 +90,26 @@ impl Scene {
         self.snow()?
             .coarsen(factor, &mut values)
             .map_err(|what| Error::argument(format!("{}: {what}", self.path.display())))?;
-        *self = Self::of(&self.path, values);
+        *self = Self::of(&self.path, self.system, values);
         Ok(())
+    }
+}
+
+impl System {
+    /// The system whose table a scene has; of snow where it has none, whose absence is then told.
+    fn of(document: &Document, root: &DeTable) -> Result<Self> {
+        let place = |system: &Self| root.iter().find(|(key, _)| key.get_ref() == system.name());
+        let span = |system: Self| Some((place(&system)?.0.span().start, system));
+        let mut there: Vec<(usize, Self)> = Self::ALL.into_iter().filter_map(span).collect();
+        there.sort_by_key(|(start, _)| *start);
+        match there[..] {
+            [] => Ok(Self::Snow),
+            [(_, system)] => Ok(system),
+            [(_, first), (start, second), ..] => {
+                let [first, second] = [first, second].map(Self::name);
+                Err(document.error(start, format!("a scene has one system, not [{first}] and [{second}]")))
+            }
+        }
     }
 }
 

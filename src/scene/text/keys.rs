@@ -1,15 +1,15 @@
-//! The keys that every system shares, those of all systems together, and the settings that a stage depends on.
+//! The keys that every system shares, those of each system, and the settings that a stage depends on.
 
 use std::sync::LazyLock;
 
-use super::key::Scope::{First, Object, Output, Step};
+use super::key::Scope::{First, Object, Step};
 use super::key::{Key, Kind, OBJECT, Scope};
 use crate::error::Result;
 use crate::io::mesh::EXTENSIONS;
 use crate::io::seen::Seen;
 use crate::io::sequence::Pattern;
 use crate::scene::shot::{CONTENT, Settings};
-use crate::scene::{Role, Scene, snow};
+use crate::scene::{Role, Scene, System, snow, surface};
 
 /// Farthest coordinate that a scene may name (m): f32 positions keep millimetres up to here.
 pub const FAR: f64 = 1.0e5;
@@ -32,10 +32,18 @@ const SHOT: &[Key] = &[
         ("mist", First),
         ("objects", First),
         ("volumes", First),
+        ("surface", First),
     ]),
     Key::new("shot", "fps", Kind::Number(0.001, 100_000.0, "frames per second"), "frames per second")
         .or("24.0")
-        .concerns(&[("base", Step), ("grains", Step), ("mist", Step), ("objects", Step), ("volumes", Step)]),
+        .concerns(&[
+            ("base", Step),
+            ("grains", Step),
+            ("mist", Step),
+            ("objects", Step),
+            ("volumes", Step),
+            ("surface", First),
+        ]),
 ];
 
 const OBJECTS: &[Key] = &[
@@ -80,110 +88,34 @@ const OBJECTS: &[Key] = &[
         .concerns(MOVES),
 ];
 
-const BASE_OUTPUT: Scopes = &[("base", Output)];
-const VOLUMES_OUTPUT: Scopes = &[("volumes", Output)];
+/// Of all systems.
+const OUTPUT: &[Key] =
+    &[Key::new("output", "usd", Kind::Flag, "shot.usda: the whole shot for programs that read USD")
+        .or("true")];
 
-const OUTPUT: &[Key] = &[
-    Key::new(
-        "output",
-        "base",
-        Kind::Choices(&["vdb"]),
-        "base/base.%04d.vdb: surface, compression, touched; [] = none",
-    )
-    .or("[\"vdb\"]")
-    .concerns(BASE_OUTPUT),
-    Key::new(
-        "output",
-        "base_mode",
-        Kind::Choice(&["full", "delta"]),
-        "full, or delta: first frame whole, then what changed (`frazil vdb rebuild`)",
-    )
-    .or("\"full\"")
-    .concerns(BASE_OUTPUT),
-    Key::new("output", "half", Kind::Flag, "16-bit values, for rendering only")
-        .or("false")
-        .concerns(BASE_OUTPUT),
-    Key::new(
-        "output",
-        "removed",
-        Kind::Choices(&["vdb"]),
-        "removed/removed.%04d.vdb: what each frame took away",
-    )
-    .or("[\"vdb\"]")
-    .concerns(BASE_OUTPUT),
-    Key::new(
-        "output",
-        "grains",
-        Kind::Choices(&["vdb", "ply", "usd"]),
-        "grains/grains.%04d.vdb: points with v, id, active, trapped, pscale, source_frame, rest; also \"ply\", \"usd\" (large)",
-    )
-    .or("[\"vdb\"]")
-    .concerns(&[("grains", Output)]),
-    Key::new(
-        "output",
-        "grains_mode",
-        Kind::Choice(&["full", "delta"]),
-        "full, or delta: .vdb files of the first and every 24th frame whole, then what changed (`frazil vdb rebuild`)",
-    )
-    .or("\"full\"")
-    .concerns(&[("grains", Output)]),
-    Key::new(
-        "output",
-        "mist",
-        Kind::Choices(&["vdb"]),
-        "mist/mist.%04d.vdb: density, and vel (m/s) at the cells' centres; [] = none",
-    )
-    .or("[\"vdb\"]")
-    .concerns(&[("mist", Output)]),
-    Key::new(
-        "output",
-        "fog",
-        Kind::Choices(&["base", "grains", "mist"]),
-        "fog/fog.%04d.vdb: densities to render, of each of these a grid (see docs/snow.md)",
-    )
-    .or("[]")
-    .concerns(VOLUMES_OUTPUT),
-    Key::new(
-        "output",
-        "snow",
-        Kind::Flag,
-        "snow/snow.%04d.vdb: one level set of the base and the grains that rest, on voxels fine enough for these (large)",
-    )
-    .or("false")
-    .concerns(VOLUMES_OUTPUT),
-    Key::new(
-        "output",
-        "mesh",
-        Kind::Choices(&["ply", "usd"]),
-        "\"ply\", \"usd\": mesh/, the surface of the base in triangles (large)",
-    )
-    .or("[]")
-    .concerns(VOLUMES_OUTPUT),
-    Key::new(
-        "output",
-        "objects",
-        Kind::Choices(&["usd", "ply"]),
-        "\"usd\", \"ply\": objects/, as they moved, with velocities",
-    )
-    .or("[]")
-    .concerns(&[("objects", Output)]),
-    Key::new("output", "usd", Kind::Flag, "shot.usda: the whole shot for programs that read USD").or("true"),
-];
-
-/// All keys, in the order in which a scene has them: the systems' between the shot and the objects, and those that a system
-/// has of each object behind the shared ones.
-pub fn all() -> &'static [Key] {
-    static ALL: LazyLock<Vec<Key>> = LazyLock::new(|| {
-        let mut keys = [SHOT, OBJECTS, OUTPUT, snow::KEYS, snow::GRAIN_KEYS, snow::MIST_KEYS].concat();
-        keys.sort_by_key(|key| match key.table {
-            "shot" => 0,
-            OBJECT => 2,
-            "output" => 3,
-            _ => 1,
-        });
-        keys
+/// The keys of a system's scenes, in the order in which a scene has them: the system's between the shot and the objects, and those
+/// that it has of each object behind the shared ones.
+pub fn of(system: System) -> &'static [Key] {
+    static SNOW: LazyLock<Vec<Key>> = LazyLock::new(|| {
+        let own = [snow::KEYS, snow::GRAIN_KEYS, snow::MIST_KEYS, snow::OUTPUT_KEYS];
+        ordered([SHOT, OBJECTS, &own.concat()[..], OUTPUT])
     });
-    &ALL
+    static SURFACE: LazyLock<Vec<Key>> = LazyLock::new(|| ordered([SHOT, surface::KEYS, OUTPUT]));
+    match system {
+        System::Snow => &SNOW,
+        System::Surface => &SURFACE,
+    }
+}
+
+fn ordered<const N: usize>(lists: [&[Key]; N]) -> Vec<Key> {
+    let mut keys = lists.concat();
+    keys.sort_by_key(|key| match key.table {
+        "shot" => 0,
+        OBJECT => 2,
+        "output" => 3,
+        _ => 1,
+    });
+    keys
 }
 
 /// The tables of some keys, in their order.
@@ -228,4 +160,12 @@ pub fn settings_of(scene: &Scene, stage: &str, seen: &Seen, roles: &[Role]) -> R
     // Another version may compute something else.
     settings.insert("frazil".into(), env!("CARGO_PKG_VERSION").into());
     Ok(settings)
+}
+
+/// Those of a stage's settings that make its first state.
+pub fn first_of(system: System, settings: &Settings, stage: &str) -> Settings {
+    let firsts = of(system).iter().filter(|key| key.scope(stage) == Some(First));
+    let firsts: Vec<String> = firsts.map(|key| super::values::path(key, None)).collect();
+    let own = settings.iter().filter(|(key, _)| firsts.contains(key));
+    own.map(|(key, value)| (key.clone(), value.clone())).collect()
 }

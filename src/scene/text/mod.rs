@@ -30,7 +30,7 @@ mod tests {
     use super::values::path;
     use super::*;
     use crate::io::seen::Seen;
-    use crate::scene::Scene;
+    use crate::scene::{Scene, System};
     use std::path::Path;
 
     const TEXT: &str =
@@ -41,14 +41,14 @@ mod tests {
         let new = Key::new("snow", "glitter", Kind::Number(0.0, 2.0, "m"), "how far it can be seen")
             .or("0.5")
             .concerns(&[("base", Scope::Step)]);
-        let mut keys = keys::all().to_vec();
+        let mut keys = keys::of(System::Snow).to_vec();
         let last = keys.iter().rposition(|key| key.table == "snow").unwrap();
         keys.insert(last + 1, new);
         keys.leak()
     }
 
     fn read(text: &str, keys: &'static [Key]) -> crate::Result<Scene> {
-        Scene::parse_keys(text, Path::new("/s/shot.toml"), &[], keys)
+        Scene::parse_keys(text, Path::new("/s/shot.toml"), &[], |_| keys)
     }
 
     #[test]
@@ -61,7 +61,7 @@ mod tests {
         assert!(resolved.contains(line), "{resolved}");
         assert_eq!(read(&resolved, keys).unwrap().to_toml(), resolved);
         assert!(
-            template::template_of(keys)
+            template::template_of(System::Snow, keys)
                 .contains("\n# glitter = 0.5                  # how far it can be seen\n")
         );
         assert!(
@@ -82,13 +82,15 @@ mod tests {
         assert_eq!(refused("glitter = 3"), "/s/shot.toml:8: `glitter` in [snow] must lie in 0 to 2 m, not 3");
         assert!(refused("gliter = 1").ends_with("unknown key `gliter` in [snow]; did you mean `glitter`?"));
         assert!(refused("glitter = \"far\"").ends_with("must be a finite number, not a text"));
-        assert!(read(&format!("{TEXT}glitter = 3\n"), keys::all()).is_err());
+        assert!(read(&format!("{TEXT}glitter = 3\n"), keys::of(System::Snow)).is_err());
     }
 
     #[test]
     fn defaults_and_examples_are_what_their_keys_may_hold() {
-        let shown: String =
-            template().lines().map(|line| format!("{}\n", line.trim_start_matches("# "))).collect();
+        let shown: String = template(System::Snow)
+            .lines()
+            .map(|line| format!("{}\n", line.trim_start_matches("# ")))
+            .collect();
         // Every line of the scene to begin with is a value that is taken, but for `top`, which excludes `depth`.
         let text: String = shown
             .lines()
@@ -96,15 +98,19 @@ mod tests {
             .filter(|line| !line.starts_with("top ="))
             .map(|line| format!("{line}\n"))
             .collect();
-        let scene = read(&text, keys::all()).unwrap();
+        let scene = read(&text, keys::of(System::Snow)).unwrap();
         let written: Vec<String> = scene.values.iter().map(|(key, object, _)| path(key, object)).collect();
-        let all: Vec<String> =
-            keys::all().iter().map(|key| path(key, None).replace("object.", "object[1].")).collect();
+        let all: Vec<String> = keys::of(System::Snow)
+            .iter()
+            .map(|key| path(key, None).replace("object.", "object[1]."))
+            .collect();
         let missing: Vec<&String> = all.iter().filter(|path| !written.contains(path)).collect();
         assert_eq!(missing, ["snow.top"]);
-        for key in keys::all() {
+        for key in keys::of(System::Snow) {
             assert!(!key.meaning.is_empty(), "{} means nothing", key.name);
-            let again = keys::all().iter().filter(|other| (other.table, other.name) == (key.table, key.name));
+            let again = keys::of(System::Snow)
+                .iter()
+                .filter(|other| (other.table, other.name) == (key.table, key.name));
             assert_eq!(again.count(), 1, "{} is declared twice", key.name);
         }
     }

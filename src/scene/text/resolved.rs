@@ -12,8 +12,9 @@ impl Scene {
     pub fn to_toml(&self) -> String {
         let mut out = format!(
             "# Every setting of this output, defaults filled in, made by frazil {}.\n\
-             # SI units; `frazil snow` on this file makes the same output again.\n",
-            env!("CARGO_PKG_VERSION")
+             # SI units; `frazil {}` on this file makes the same output again.\n",
+            env!("CARGO_PKG_VERSION"),
+            self.system.name()
         );
         for table in tables(self.values.keys()) {
             let objects =

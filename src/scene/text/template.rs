@@ -5,23 +5,26 @@ use super::keys::{self, tables};
 use super::resolved::line;
 use super::table::with_value;
 use super::values::any_of;
+use crate::scene::System;
 use std::fmt::Write;
 
-/// A commented scene for `frazil snow`: every key there is, those that may be left out behind a `#`.
-pub fn template() -> String {
-    template_of(keys::all())
+/// A commented scene to begin with: every key of a system, those that may be left out behind a `#`.
+pub fn template(system: System) -> String {
+    template_of(system, keys::of(system))
 }
 
-/// A table of all keys in Markdown: what they hold, unit, range, default and meaning.
-pub fn reference() -> String {
-    reference_of(keys::all())
+/// A table of a system's keys in Markdown: what they hold, unit, range, default and meaning.
+pub fn reference(system: System) -> String {
+    reference_of(keys::of(system))
 }
 
-pub(super) fn template_of(keys: &[Key]) -> String {
-    let mut out = String::from(
-        "# Snow that objects press into: `frazil check shot.toml`, then `frazil snow shot.toml -o cache/`.\n\
+pub(super) fn template_of(system: System, keys: &[Key]) -> String {
+    let mut out = format!(
+        "# {}: `frazil check shot.toml`, then `frazil {} shot.toml -o cache/`.\n\
          # SI units, Y up, degrees where a key ends in _deg; paths are relative to this file.\n\
          # A line behind a # may be left out: what stands there is what is taken, or an example.\n",
+        system.title(),
+        system.name(),
     );
     for table in tables(keys) {
         let keys_of = || keys.iter().filter(|key| key.table == table);

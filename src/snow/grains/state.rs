@@ -10,8 +10,8 @@ use super::rows::Row;
 use super::touch::Touch;
 use crate::base::DVec3;
 use crate::base::bytes::{Reader, Writer};
+use crate::base::packed::{self, Magic};
 use crate::error::{Error, Result};
-use crate::snow::packed::{self, Magic};
 
 /// Magic bytes, including the version.
 const MAGIC: &Magic = b"frzgrn06";

@@ -2,8 +2,8 @@
 
 use super::Mist;
 use crate::base::bytes::{Reader, Writer};
+use crate::base::packed::{self, Magic};
 use crate::error::{Error, Result};
-use crate::snow::packed::{self, Magic};
 
 /// Magic bytes, including the version.
 const MAGIC: &Magic = b"frzmst01";

@@ -23,7 +23,8 @@ fn shot(tables: &str) -> TempDir {
     let corners = (0..3 * mesh.triangles.len() as u32).map(|corner| corner % 4).collect();
     let places = vec![[0.0, 0.0], [0.75, 0.0], [0.5, 1.0], [0.25, -2.0]];
     let uvs = frazil::base::Uvs { places, corners: Some(corners), missing: 0 };
-    frazil::io::mesh::write_textured(&folder.path().join("box.obj"), &mesh, Some(&uvs)).unwrap();
+    let carried = frazil::io::mesh::Carried { uvs: Some(&uvs), ..Default::default() };
+    frazil::io::mesh::write_carried(&folder.path().join("box.obj"), &mesh, &carried).unwrap();
     let scene = "[shot]\nframes = \"3-8\"\n[snow]\nground = 0.0\narea = [-1, -1, 1, 1]\ndepth = 0.3\ncell = 0.02\n\
                  [output]\nobjects = [\"usd\"]\n[[object]]\nfile = \"box.obj\"\n\
                  keys = [{ frame = 3, at = [0, 0.4, -0.5] }, { frame = 8, at = [0, 0.25, 0.6], turn_deg = [0, 20, 0] }]\n";

@@ -2,7 +2,7 @@
 
 use xxhash_rust::xxh3::xxh3_128;
 
-use crate::base::bytes::Reader;
+use super::bytes::Reader;
 use crate::error::{Error, Result};
 
 /// Says what a state is of, and its version.

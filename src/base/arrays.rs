@@ -1,0 +1,88 @@
+//! Arrays of numbers that a mesh carries besides its places and texture coordinates: colours, masks, whatever its file has.
+
+use super::{TriMesh, Uvs};
+
+/// The type of an array's numbers.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Number {
+    /// 8-bit integers.
+    I8,
+    /// 8-bit integers without a sign.
+    U8,
+    /// 16-bit integers.
+    I16,
+    /// 16-bit integers without a sign.
+    U16,
+    /// 32-bit integers.
+    I32,
+    /// 32-bit integers without a sign.
+    U32,
+    /// 32-bit floats.
+    F32,
+    /// 64-bit floats.
+    F64,
+}
+
+impl Number {
+    /// Bytes of a number.
+    pub fn size(self) -> usize {
+        match self {
+            Self::I8 | Self::U8 => 1,
+            Self::I16 | Self::U16 => 2,
+            Self::I32 | Self::U32 | Self::F32 => 4,
+            Self::F64 => 8,
+        }
+    }
+
+    /// Whether its numbers are floats.
+    pub fn is_float(self) -> bool {
+        matches!(self, Self::F32 | Self::F64)
+    }
+}
+
+/// What has one number each.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum On {
+    /// Every vertex.
+    Vertices,
+    /// Every corner of a face: an array with seams.
+    Corners,
+    /// Every face.
+    Faces,
+}
+
+/// An array of numbers; of vectors and colours each component is one.
+#[derive(Debug, Clone, PartialEq)]
+pub struct MeshArray {
+    /// Name, as in the file.
+    pub name: String,
+    /// What has one number each.
+    pub on: On,
+    /// Type of the numbers in the file.
+    pub number: Number,
+    /// The numbers: 64 bits hold those of every type.
+    pub values: Vec<f64>,
+}
+
+/// A mesh in triangles with all that it carries.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub struct DetailedMesh {
+    /// Places (m) and triangles.
+    pub mesh: TriMesh,
+    /// Texture coordinates.
+    pub uvs: Option<Uvs>,
+    /// Other arrays; of corners three for each triangle.
+    pub arrays: Vec<MeshArray>,
+}
+
+impl MeshArray {
+    /// The same for triangles: `corners` are theirs among those of the faces, `faces` the faces that they are of.
+    pub(super) fn of_triangles(self, corners: &[[usize; 3]], faces: &[usize]) -> Self {
+        let values = match self.on {
+            On::Vertices => self.values,
+            On::Corners => corners.as_flattened().iter().map(|&corner| self.values[corner]).collect(),
+            On::Faces => faces.iter().map(|&face| self.values[face]).collect(),
+        };
+        Self { values, ..self }
+    }
+}

@@ -1,0 +1,107 @@
+//! Writes Stanford PLY.
+
+use std::io::{Result, Write};
+
+use super::ply::{NAMES, PLACES};
+use crate::base::arrays::{MeshArray, Number, On};
+use crate::base::{TriMesh, Uvs, Vec3};
+
+/// What a mesh carries into a file besides its places.
+#[derive(Debug, Clone, Copy, Default)]
+pub struct Carried<'a> {
+    /// Velocities (m/s), one a vertex, as vx, vy, vz; or none.
+    pub velocities: &'a [Vec3],
+    /// Texture coordinates: s and t of the vertices, or where there are seams a list texcoord of the faces.
+    pub uvs: Option<&'a Uvs>,
+    /// Other arrays, of corners three for each triangle; names that others have are left out.
+    pub arrays: &'a [&'a MeshArray],
+}
+
+/// Writes binary little-endian PLY.
+pub(super) fn write(out: &mut dyn Write, mesh: &TriMesh, carried: &Carried<'_>) -> Result<()> {
+    let Carried { velocities, uvs, .. } = *carried;
+    let moving = velocities.len() == mesh.positions.len();
+    let of_vertices = uvs.filter(|uvs| uvs.corners.is_none());
+    let of_corners = uvs.filter(|uvs| uvs.corners.is_some());
+    let mut names = vec!["x", "y", "z"];
+    names.extend(moving.then_some(["vx", "vy", "vz"]).into_iter().flatten());
+    names.extend(of_vertices.map(|_| PLACES[0]).into_iter().flatten());
+    let vertices = arrays(carried, On::Vertices, &names);
+    let faces = arrays(carried, On::Faces, &["vertex_indices", "texcoord"]);
+    let corners = arrays(carried, On::Corners, &["vertex_indices", "texcoord"]);
+    writeln!(
+        out,
+        "ply\nformat binary_little_endian 1.0\ncomment frazil\nelement vertex {}",
+        mesh.positions.len()
+    )?;
+    names.iter().try_for_each(|name| writeln!(out, "property float {name}"))?;
+    vertices.iter().try_for_each(|array| writeln!(out, "property {} {}", name(array.number), array.name))?;
+    writeln!(out, "element face {}\nproperty list uchar uint vertex_indices", mesh.triangles.len())?;
+    if of_corners.is_some() {
+        writeln!(out, "property list uchar float texcoord")?;
+    }
+    faces.iter().try_for_each(|array| writeln!(out, "property {} {}", name(array.number), array.name))?;
+    corners
+        .iter()
+        .try_for_each(|array| writeln!(out, "property list uchar {} {}", name(array.number), array.name))?;
+    writeln!(out, "end_header")?;
+    for (vertex, p) in mesh.positions.iter().enumerate() {
+        let velocity = velocities.get(vertex).filter(|_| moving);
+        let place = of_vertices.map(|uvs| uvs.places[vertex]);
+        let values = p.iter().chain(velocity.into_iter().flatten()).chain(place.iter().flatten());
+        for value in values {
+            out.write_all(&value.to_le_bytes())?;
+        }
+        vertices.iter().try_for_each(|array| put(out, array.number, array.values[vertex]))?;
+    }
+    for (number, triangle) in mesh.triangles.iter().enumerate() {
+        out.write_all(&[3])?;
+        for index in triangle {
+            out.write_all(&index.to_le_bytes())?;
+        }
+        if let Some(uvs) = of_corners {
+            out.write_all(&[6])?;
+            for index in uvs.indices(&mesh.triangles, number) {
+                for value in uvs.places[index as usize] {
+                    out.write_all(&value.to_le_bytes())?;
+                }
+            }
+        }
+        faces.iter().try_for_each(|array| put(out, array.number, array.values[number]))?;
+        for array in &corners {
+            out.write_all(&[3])?;
+            array.values[3 * number..3 * number + 3]
+                .iter()
+                .try_for_each(|value| put(out, array.number, *value))?;
+        }
+    }
+    Ok(())
+}
+
+/// The arrays of a kind, without those whose names are taken.
+fn arrays<'a>(carried: &Carried<'a>, on: On, taken: &[&str]) -> Vec<&'a MeshArray> {
+    let mut out: Vec<&MeshArray> = Vec::new();
+    for array in carried.arrays.iter().filter(|array| array.on == on) {
+        if !taken.contains(&&*array.name) && !out.iter().any(|other| other.name == array.name) {
+            out.push(array);
+        }
+    }
+    out
+}
+
+fn name(number: Number) -> &'static str {
+    NAMES.iter().find(|(_, named)| *named == number).map_or("float", |(names, _)| names[0])
+}
+
+fn put(out: &mut dyn Write, number: Number, value: f64) -> Result<()> {
+    match number {
+        Number::I8 => out.write_all(&(value as i8).to_le_bytes()),
+        Number::U8 => out.write_all(&(value as u8).to_le_bytes()),
+        Number::I16 => out.write_all(&(value as i16).to_le_bytes()),
+        Number::U16 => out.write_all(&(value as u16).to_le_bytes()),
+        Number::I32 => out.write_all(&(value as i32).to_le_bytes()),
+        Number::U32 => out.write_all(&(value as u32).to_le_bytes()),
+        Number::F32 => out.write_all(&(value as f32).to_le_bytes()),
+        Number::F64 => out.write_all(&value.to_le_bytes()),
+    }
+}

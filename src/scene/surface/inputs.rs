@@ -1,0 +1,145 @@
+//! Everything that a scene with `[surface]` reads before its first frame.
+
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+
+use super::Surface;
+use super::time::read;
+use crate::base::faults::Faults;
+use crate::base::{DetailedMesh, TriMesh};
+use crate::context::Context;
+use crate::error::{Error, Result};
+use crate::io::mesh::{extension, parse_polygons};
+use crate::io::seen::Seen;
+use crate::io::sequence::Pattern;
+use crate::io::source;
+use crate::scene::Scene;
+use crate::surface::{Implicit, Isosurface, Particles, estimate_spacing};
+
+/// Arrays of the mesh that are written anew in each frame, and those that a moving mesh does not keep.
+const REPLACED: [&str; 8] = ["vx", "vy", "vz", "delta", "flagged", "nx", "ny", "nz"];
+/// How many times as large as the estimate, or as small, a spacing is that looks like a mistake.
+const ODD: f64 = 2.0;
+
+/// What a scene's files hold.
+pub struct Inputs {
+    /// The mesh at the first frame (m), with what it carries.
+    pub mesh: DetailedMesh,
+    /// Initial distance between particles (m).
+    pub spacing: f64,
+    /// The particles at the first frame: how many there are, and how they are told apart.
+    pub particles: Particles,
+    /// What the files held when they were read.
+    pub(in crate::scene) seen: Arc<Seen>,
+    /// What about the files should be told, a sentence each; the log has it too.
+    pub warnings: Vec<String>,
+}
+
+impl Inputs {
+    /// Reads the mesh and the first frame's particles, after checking that no file of any frame is missing.
+    ///
+    /// # Errors
+    /// What the files or keys have wrong, with file and key; cancel.
+    pub fn load(ctx: &Context, scene: &Scene) -> Result<Self> {
+        let (surface, shot) = (scene.surface()?, scene.shot);
+        if Pattern::parse(&surface.particles).is_none() && shot.frames.count() > 1 {
+            let what = "is one file, which never moves: a shot needs a sequence such as spot.%04d.bgeo";
+            return Err(Error::file(&surface.particles, what));
+        }
+        for path in all_files(scene, surface) {
+            source::open(&path)?;
+        }
+        let seen = Arc::new(Seen::default());
+        let first = surface.files_at(shot.frames, shot.frames.first).swap_remove(0);
+        let particles = read(&first, surface, &seen)?;
+        if particles.ids.is_empty() && particles.velocities.is_empty() && shot.frames.count() > 1 {
+            let what =
+                "has neither ids nor velocities (attributes id and v): where its particles go is not known";
+            return Err(Error::file(first, what));
+        }
+        let mut warnings = Vec::new();
+        let estimate = estimate_spacing(&particles.places);
+        let spacing = match (surface.spacing, estimate) {
+            (Some(spacing), _) => spacing,
+            (None, Some(estimate)) => {
+                warnings.push(format!(
+                    "{}: the spacing of the particles is estimated as {estimate:.6} m; surface.spacing sets it",
+                    first.display()
+                ));
+                estimate
+            }
+            (None, None) => {
+                let what = "has too few particles, or too many at one place, to tell their spacing: give surface.spacing";
+                return Err(Error::file(first, what));
+            }
+        };
+        if let Some(estimate) = estimate.filter(|estimate| !(1.0 / ODD..=ODD).contains(&(spacing / estimate)))
+        {
+            warnings.push(format!(
+                "{}: surface.spacing is {spacing} m, but particles lie {estimate:.6} m apart",
+                first.display()
+            ));
+        }
+        let mut mesh = match &surface.mesh {
+            Some(path) => {
+                let bytes = seen.read(path)?;
+                let mut mesh = parse_polygons(path, &bytes)?.into_detailed();
+                let space = surface.space;
+                mesh.mesh.positions.iter_mut().for_each(|p| *p = space.place(p.cast()).cast());
+                warnings.extend(faults(path, &mesh.mesh));
+                mesh
+            }
+            None => {
+                let mesh = reconstructed(ctx, &particles, spacing, surface.cell)
+                    .map_err(|error| told(&first, error))?;
+                DetailedMesh { mesh, ..DetailedMesh::default() }
+            }
+        };
+        mesh.arrays.retain(|array| !REPLACED.contains(&&*array.name));
+        warnings.iter().for_each(|warning| log::warn!("{warning}"));
+        Ok(Self { mesh, spacing, particles, seen, warnings })
+    }
+}
+
+/// Every file of particles that the shot reads, each once.
+pub(super) fn all_files(scene: &Scene, surface: &Surface) -> Vec<PathBuf> {
+    let frames = scene.shot.frames;
+    let [from, to] = [frames.first, frames.last].map(|frame| surface.time(frames, frame));
+    surface.files(from, to)
+}
+
+/// The particles' own surface.
+fn reconstructed(ctx: &Context, particles: &Particles, spacing: f64, cell: f64) -> Result<TriMesh> {
+    let phi = Implicit::new(ctx, &particles.places, spacing, cell * spacing)?;
+    Ok(Isosurface::new(&phi).mesh(&phi))
+}
+
+fn told(path: &Path, error: Error) -> Error {
+    match error {
+        Error::Argument(what) => Error::file(path, what),
+        other => other,
+    }
+}
+
+/// What about a mesh matters for what follows, in a sentence.
+fn faults(path: &Path, mesh: &TriMesh) -> Option<String> {
+    // Corners of .stl files are no shared vertices: each triangle would go its own way.
+    if extension(path) == "stl" {
+        return Some(format!(
+            "{}: .stl files do not say which triangles share their corners: a .ply or .obj file follows better",
+            path.display()
+        ));
+    }
+    let faults = Faults::of(mesh);
+    let open = (faults.open_edges > 0).then(|| format!("{} open edges", faults.open_edges));
+    let crossed =
+        (faults.crossings > 0).then(|| format!("{} pairs of triangles that cross", faults.crossings));
+    let what: Vec<String> = open.into_iter().chain(crossed).collect();
+    (!what.is_empty()).then(|| {
+        format!(
+            "{}: has {}: it follows as it is, but nothing says there what is inside (`frazil mesh check`)",
+            path.display(),
+            what.join(" and ")
+        )
+    })
+}

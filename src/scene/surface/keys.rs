@@ -1,0 +1,82 @@
+//! The keys of `[surface]`, and those of `[output]` in scenes that have it.
+
+use crate::io::mesh::EXTENSIONS;
+use crate::scene::text::key::{Key, Kind, Scope};
+
+type Scopes = &'static [(&'static str, Scope)];
+const FIRST: Scopes = &[("surface", Scope::First)];
+const STEP: Scopes = &[("surface", Scope::Step)];
+const OUTPUT: Scopes = &[("surface", Scope::Output)];
+
+/// Last extensions of files of particles; those of Houdini's own (.bgeo.sc) are refused with advice when they are read.
+const PARTICLES: &[&str] = &["bgeo", "bhclassic", "gz", "ply", "sc", "vdb", "vtk", "vtu", "xyz"];
+
+/// All of them.
+pub const KEYS: &[Key] = &[
+    Key::new("surface", "particles", Kind::File(PARTICLES), "of the liquid: a sequence \"spot.%04d.bgeo\"")
+        .begins_with("\"spot.%04d.bgeo\"")
+        .concerns(FIRST),
+    Key::new(
+        "surface",
+        "mesh",
+        Kind::File(&EXTENSIONS),
+        "as it is at the first frame, in the particles' space; left out: the particles' own surface there",
+    )
+    .or_nothing()
+    .begins_with("\"spot.ply\"")
+    .concerns(FIRST),
+    Key::new("surface", "scale", Kind::Number(1.0e-9, 1.0e9, ""), "from the files' unit to metres: 0.01 for centimetres")
+        .or("1.0")
+        .concerns(FIRST),
+    Key::new("surface", "up", Kind::Choice(&["y", "z"]), "the files' upward axis: y or z").or("\"y\"").concerns(FIRST),
+    Key::new("surface", "offset", Kind::Number(-1.0e7, 1.0e7, "frames"), "frames that the sequence starts later")
+        .or("0.0")
+        .concerns(FIRST),
+    Key::new("surface", "speed", Kind::Number(0.01, 100.0, ""), "frames of the sequence that pass in one of the shot")
+        .or("1.0")
+        .concerns(FIRST),
+    Key::new(
+        "surface",
+        "spacing",
+        Kind::Number(1.0e-6, 1.0e6, "m"),
+        "initial distance between particles (m), r; left out: estimated at the first frame, and said",
+    )
+    .or_nothing()
+    .such_as("0.0086")
+    .concerns(FIRST),
+    Key::new("surface", "cell", Kind::Number(0.125, 2.0, "r"), "edge of a cell of the particles' surface (r)")
+        .or("0.5")
+        .concerns(FIRST),
+    Key::new(
+        "surface",
+        "change",
+        Kind::Number(0.001, 100.0, "r"),
+        "vertices that would be moved farther to keep their detail are flagged: the liquid merged or split there (r)",
+    )
+    .or("0.5")
+    .concerns(STEP),
+    Key::new(
+        "surface",
+        "weighting",
+        Kind::Choice(&["affine", "mean"]),
+        "how particles carry vertices: by affine maps, or by their mean as in the thesis, which lags behind",
+    )
+    .or("\"affine\"")
+    .concerns(STEP),
+    Key::new(
+        "output",
+        "surface",
+        Kind::Choices(&["ply", "usd", "obj"]),
+        "\"ply\", \"usd\", \"obj\": surface/, the mesh at each frame",
+    )
+    .or("[\"ply\"]")
+    .concerns(OUTPUT),
+    Key::new(
+        "output",
+        "attributes",
+        Kind::Choices(&["v", "delta", "flagged"]),
+        "of its vertices: velocity over the coming frame (m/s), distance kept from the particles' surface (m), 1 where flagged",
+    )
+    .or("[\"v\", \"delta\", \"flagged\"]")
+    .concerns(OUTPUT),
+];

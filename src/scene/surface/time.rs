@@ -1,0 +1,136 @@
+//! The particles of a sequence at the frames of a shot: the sequence may start later, and run faster or slower.
+
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+
+use super::Surface;
+use crate::base::points::Values;
+use crate::error::{Error, Result};
+use crate::io::mesh::extension;
+use crate::io::particles::{self, Cloud};
+use crate::io::seen::Seen;
+use crate::io::{hash, source};
+use crate::scene::{Shot, changes_since, partial};
+use crate::surface::{Particles, interpolate};
+use crate::vdb::points;
+
+/// Names of velocities and of ids in files, in lower case.
+const VELOCITIES: [&str; 4] = ["v", "vel", "velocity", "velocities"];
+const IDS: [&str; 4] = ["id", "ids", "particle_id", "particleid"];
+
+/// The points of any file of particles, in its own space.
+///
+/// # Errors
+/// A file that cannot be read, or that holds only what changed since another frame.
+pub fn read_cloud(path: &Path, seen: &Seen) -> Result<Cloud> {
+    if extension(path) != "vdb" {
+        return particles::parse(path, &seen.read(path)?);
+    }
+    source::open(path)?;
+    // OpenVDB reads the file itself: it must be the same before and after.
+    seen.hash(path)?;
+    if let Some(since) = changes_since(path)? {
+        return Err(Error::file(path, partial(since)));
+    }
+    let cloud = points::read(path, None)?.into();
+    seen.note(path, hash::of_file(path)?)?;
+    Ok(cloud)
+}
+
+/// The particles of a file (m, m/s).
+///
+/// # Errors
+/// As [`read_cloud`]; no particles, values that are not finite, two particles with one id.
+pub(super) fn read(path: &Path, surface: &Surface, seen: &Seen) -> Result<Particles> {
+    let mut cloud = read_cloud(path, seen)?;
+    surface.space.bring(&mut cloud);
+    let named = |names: &[&str]| {
+        let is_it = |name: &str| names.contains(&&*name.to_lowercase());
+        cloud.attributes.iter().find(|attribute| is_it(&attribute.name)).map(|attribute| &attribute.values)
+    };
+    let count = cloud.places.len();
+    let velocities = match named(&VELOCITIES) {
+        Some(Values::Vector(column)) => (0..count).map(|point| column.get(point)).collect(),
+        _ => Vec::new(),
+    };
+    let ids = match named(&IDS) {
+        Some(Values::Long(column)) => (0..count).map(|point| column.get(point)).collect(),
+        Some(Values::Int(column)) => (0..count).map(|point| column.get(point).into()).collect(),
+        _ => Vec::new(),
+    };
+    let particles = Particles { places: cloud.places, velocities, ids };
+    particles.validate().map_err(|error| Error::file(path, error.to_string()))?;
+    Ok(particles)
+}
+
+/// The particles of a shot, read as they are needed.
+pub(super) struct Liquid<'a> {
+    surface: &'a Surface,
+    shot: Shot,
+    seen: &'a Seen,
+    /// Those of the last files, by their numbers.
+    kept: Vec<(i32, Arc<Particles>)>,
+}
+
+/// Files that are kept: those around two frames.
+const KEPT: usize = 4;
+
+impl<'a> Liquid<'a> {
+    pub fn new(surface: &'a Surface, shot: Shot, seen: &'a Seen) -> Self {
+        Self { surface, shot, seen, kept: Vec::new() }
+    }
+
+    /// The times (frames of the sequence) by which the mesh goes from the frame before to a frame: every file on the way, so that a
+    /// fast sequence loses nothing.
+    pub fn way(&self, frame: i32) -> Vec<f64> {
+        let time = |frame: i32| self.surface.time(self.shot.frames, frame);
+        let (from, to) = (time(frame - 1), time(frame));
+        let between = (from.floor() as i32 + 1..to.ceil() as i32).map(f64::from);
+        std::iter::once(from).chain(between).chain([to]).collect()
+    }
+
+    /// Time between two frames of the sequence (s).
+    pub fn file_time(&self) -> f64 {
+        1.0 / self.shot.fps
+    }
+
+    /// The particles at a time (frames of the sequence).
+    ///
+    /// # Errors
+    /// A file that cannot be read; one with neither ids nor velocities, where the time is between two.
+    pub fn at(&mut self, time: f64) -> Result<Arc<Particles>> {
+        let (below, share) = (time.floor(), time - time.floor());
+        let from = self.file(below as i32)?;
+        if share == 0.0 {
+            return Ok(from);
+        }
+        let to = self.file(below as i32 + 1)?;
+        interpolate(&from, &to, self.file_time(), share)
+            .map(Arc::new)
+            .map_err(|error| self.told(below, error))
+    }
+
+    /// An error about what the particles at a time lack, with their file.
+    pub fn told(&self, time: f64, error: Error) -> Error {
+        match error {
+            Error::Argument(what) => Error::file(self.path(time.floor() as i32), what),
+            other => other,
+        }
+    }
+
+    fn path(&self, file: i32) -> PathBuf {
+        self.surface.files(f64::from(file), f64::from(file)).swap_remove(0)
+    }
+
+    fn file(&mut self, file: i32) -> Result<Arc<Particles>> {
+        if let Some((_, particles)) = self.kept.iter().find(|(number, _)| *number == file) {
+            return Ok(particles.clone());
+        }
+        let particles = Arc::new(read(&self.path(file), self.surface, self.seen)?);
+        if self.kept.len() == KEPT {
+            self.kept.remove(0);
+        }
+        self.kept.push((file, particles.clone()));
+        Ok(particles)
+    }
+}

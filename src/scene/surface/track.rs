@@ -1,0 +1,302 @@
+//! The stage `surface`: a detailed mesh follows the particles of a liquid.
+
+use serde_json::json;
+
+use super::time::Liquid;
+use super::{Inputs, Surface};
+use crate::base::arrays::{Number, On};
+use crate::base::{DVec3, MeshArray, TriMesh, Vec3};
+use crate::context::Context;
+use crate::error::{Error, Result};
+use crate::io::manifest::Keeps;
+use crate::io::{mesh, usd};
+use crate::scene::shot::{
+    CONTENT, Clip, FrameFiles, Kind, Prims, Reads, Report, Settings, Stage, Stepped, Stepping, Stored, To,
+};
+use crate::scene::text::keys::{first_of, settings_of};
+use crate::scene::{Scene, System};
+use crate::surface::{Params, StepReport, Tracker};
+
+/// Name of the stage, and kind of its files.
+const NAME: &str = "surface";
+/// What the clips of `surface/` share.
+const MANIFEST: &str = "surface/surface.manifest.usda";
+
+/// The stage for a scene.
+pub struct Track<'a> {
+    scene: &'a Scene,
+    surface: &'a Surface,
+    inputs: &'a Inputs,
+}
+
+/// The mesh at a frame, with what led there.
+struct At {
+    tracker: Tracker,
+    report: StepReport,
+    /// Count of particles.
+    particles: usize,
+}
+
+/// State carried from frame to frame.
+pub struct State<'a> {
+    liquid: Liquid<'a>,
+    /// The mesh after the last frame; none before the first.
+    now: Option<Tracker>,
+    /// The mesh at the coming frame, where it is known.
+    ahead: Option<At>,
+}
+
+/// Input of the writer: the mesh at a frame, if its files are written.
+pub struct Step(Option<Written>);
+
+struct Written {
+    places: Vec<Vec3>,
+    velocities: Vec<Vec3>,
+    delta: Vec<f32>,
+    flags: Vec<bool>,
+    state: Vec<u8>,
+}
+
+impl<'a> Track<'a> {
+    /// The stage for a scene.
+    pub fn new(scene: &'a Scene, surface: &'a Surface, inputs: &'a Inputs) -> Self {
+        Self { scene, surface, inputs }
+    }
+
+    fn params(&self) -> Params {
+        Params {
+            spacing: self.inputs.spacing,
+            cell: self.surface.cell,
+            change: self.surface.change,
+            weighting: self.surface.weighting,
+        }
+    }
+
+    /// The mesh at the first frame.
+    fn first(&self, ctx: &Context, liquid: &mut Liquid<'_>) -> Result<At> {
+        let frames = self.scene.shot.frames;
+        let particles = liquid.at(self.surface.time(frames, frames.first))?;
+        let begun = ctx.step(3, || Tracker::new(ctx, self.params(), &self.inputs.mesh.mesh, &particles));
+        let (tracker, phases) = begun.map_err(|error| match error {
+            Error::Argument(what) => {
+                Error::file(self.surface.mesh.as_ref().unwrap_or(&self.surface.particles), what)
+            }
+            other => other,
+        })?;
+        let report = StepReport { phases, ..StepReport::default() };
+        Ok(At { tracker, report, particles: particles.places.len() })
+    }
+
+    /// Takes the mesh to a frame from the one before it.
+    fn next(&self, ctx: &Context, liquid: &mut Liquid<'_>, tracker: &Tracker, frame: i32) -> Result<At> {
+        let mut tracker = tracker.clone();
+        let way = liquid.way(frame);
+        let mut report = StepReport::default();
+        let mut from = liquid.at(way[0])?;
+        for ends in way.windows(2) {
+            let to = liquid.at(ends[1])?;
+            let dt = (ends[1] - ends[0]) * liquid.file_time();
+            let step = tracker.step(ctx, &from, &to, dt).map_err(|error| liquid.told(ends[0], error))?;
+            report = report.followed_by(step);
+            from = to;
+        }
+        Ok(At { tracker, report, particles: from.places.len() })
+    }
+
+    /// Whether the coming frame's particles are there.
+    fn has_next(&self, frame: i32) -> bool {
+        let frames = self.scene.shot.frames;
+        frame < frames.last || self.surface.files_at(frames, frame + 1).iter().all(|path| path.is_file())
+    }
+
+    /// Velocities (m/s) over the coming frame, or where that is not known over the one before.
+    fn velocities(&self, before: Option<&Tracker>, now: &Tracker, next: Option<&Tracker>) -> Vec<Vec3> {
+        let (from, to) = match (before, next) {
+            (_, Some(next)) => (now, next),
+            (Some(before), None) => (before, now),
+            (None, None) => (now, now),
+        };
+        let speed = |(a, b): (&DVec3, &DVec3)| ((b - a) * self.scene.shot.fps).cast();
+        from.vertices().iter().zip(to.vertices()).map(speed).collect()
+    }
+
+    /// The arrays that are written: the mesh's own, and those of this frame.
+    fn arrays(&self, step: &Written) -> Vec<MeshArray> {
+        let of_vertices =
+            |name: &str, number, values| MeshArray { name: name.into(), on: On::Vertices, number, values };
+        let output = self.surface.output;
+        let delta = output.delta.then(|| {
+            let values = step.delta.iter().map(|delta| f64::from(*delta)).collect();
+            of_vertices("delta", Number::F32, values)
+        });
+        let flagged = output.flagged.then(|| {
+            let values = step.flags.iter().map(|flag| f64::from(u8::from(*flag))).collect();
+            of_vertices("flagged", Number::U8, values)
+        });
+        delta.into_iter().chain(flagged).collect()
+    }
+}
+
+impl Stage for Track<'_> {
+    fn name(&self) -> &'static str {
+        NAME
+    }
+
+    fn noun(&self) -> &'static str {
+        "mesh"
+    }
+
+    fn kinds(&self) -> &'static [Kind] {
+        &[Kind { name: NAME, extensions: &["ply", "usda", "obj"] }]
+    }
+
+    fn writes(&self, _kind: &str) -> bool {
+        let output = self.surface.output;
+        output.ply || output.usd || output.obj
+    }
+
+    fn state_extension(&self) -> &'static str {
+        NAME
+    }
+
+    fn keeps_every_state(&self) -> bool {
+        true
+    }
+
+    fn loose_files(&self) -> &'static [&'static str] {
+        if self.surface.output.usd { &[MANIFEST] } else { &[] }
+    }
+
+    fn settings(&self) -> Result<Settings> {
+        let seen = &self.inputs.seen;
+        let mut settings = settings_of(self.scene, NAME, seen, &[])?;
+        settings.insert("surface.particles".into(), format!("{CONTENT}of each frame"));
+        settings.insert("surface.spacing".into(), format!("{:?}", self.inputs.spacing));
+        if let Some(path) = &self.surface.mesh {
+            settings.insert("surface.mesh".into(), format!("{CONTENT}{}", seen.hash(path)?));
+        }
+        Ok(settings)
+    }
+
+    fn of_first_state(&self, settings: &Settings) -> Settings {
+        first_of(System::Surface, settings, NAME)
+    }
+
+    fn reads(&self, frame: i32) -> Reads {
+        let frames = self.scene.shot.frames;
+        let time = |frame: i32| self.surface.time(frames, frame);
+        let from = if frame == frames.first { time(frame) } else { time(frame - 1) };
+        // What is read anyway is not of the coming frame alone.
+        let files = self.surface.files(from, time(frame));
+        let mut ahead = self.surface.files(time(frame), time(frame + 1));
+        ahead.retain(|path| !files.contains(path));
+        Reads { files, ahead }
+    }
+
+    fn keeps(&self, _frame: i32) -> Keeps {
+        Keeps::State
+    }
+
+    fn clip(&self) -> Option<Clip<'_>> {
+        let meshes = vec![(NAME.to_string(), self.inputs.mesh.uvs.as_ref())];
+        Some(Clip { kind: NAME, manifest: MANIFEST, prims: Prims::Meshes(meshes) })
+    }
+}
+
+impl<'a> Stepping for Track<'a> {
+    type State = State<'a>;
+    type Step = Step;
+    type Writer = ();
+
+    fn load(&self, ctx: &Context, done: &Stored, after: Option<i32>) -> Result<State<'a>> {
+        let mut liquid = Liquid::new(self.surface, self.scene.shot, &self.inputs.seen);
+        let now = match after {
+            None => {
+                // A mesh that is not where the particles are is refused before anything is written.
+                let ahead = Some(self.first(ctx, &mut liquid)?);
+                return Ok(State { liquid, now: None, ahead });
+            }
+            Some(frame) => {
+                let path = done.state_file(frame)?;
+                let bytes = std::fs::read(&path).map_err(|error| Error::io(&path, "read", error))?;
+                let tracker = Tracker::resume(self.params(), &self.inputs.mesh.mesh, &bytes);
+                Some(tracker.map_err(|error| Error::file(path, error.to_string()))?)
+            }
+        };
+        Ok(State { liquid, now, ahead: None })
+    }
+
+    fn step(&self, ctx: &Context, state: &mut State<'a>, to: &To<'_>) -> Result<Stepped<Step>> {
+        let State { liquid, now, ahead } = state;
+        let At { tracker, report, particles } = match (ahead.take(), &now) {
+            (Some(ahead), _) => ahead,
+            (None, Some(before)) => self.next(ctx, liquid, before, to.frame)?,
+            (None, None) => return Err(Error::Internal("a mesh was not begun".into())),
+        };
+        let next = if self.has_next(to.frame) {
+            Some(self.next(ctx, liquid, &tracker, to.frame + 1)?)
+        } else {
+            None
+        };
+        let step = to.made_from.map(|_| Written {
+            places: usd::to_floats(tracker.vertices()),
+            velocities: self.velocities(now.as_ref(), &tracker, next.as_ref().map(|next| &next.tracker)),
+            delta: tracker.delta().to_vec(),
+            flags: tracker.flags().to_vec(),
+            state: tracker.save(),
+        });
+        let report = told(&report, particles, &tracker);
+        (*now, *ahead) = (Some(tracker), next);
+        Ok(Stepped { step: Step(step), report })
+    }
+
+    fn writer(&self, _ctx: &Context, _state: &State<'a>) -> Result<()> {
+        Ok(())
+    }
+
+    fn write(&self, _writer: &mut (), step: Step, files: Option<&mut FrameFiles>) -> Result<()> {
+        let (Some(step), Some(files)) = (step.0, files) else { return Ok(()) };
+        let (output, detail) = (self.surface.output, &self.inputs.mesh);
+        let of_frame = self.arrays(&step);
+        let arrays: Vec<&MeshArray> = detail.arrays.iter().chain(&of_frame).collect();
+        let velocities = if output.velocities { &step.velocities[..] } else { &[] };
+        let mesh = TriMesh { positions: step.places, triangles: detail.mesh.triangles.clone() };
+        let carried = mesh::Carried { velocities, uvs: detail.uvs.as_ref(), arrays: &arrays };
+        if output.ply {
+            files.save(NAME, "ply", &mesh::ply_bytes(&mesh, &carried))?;
+        }
+        if output.obj {
+            files.save(NAME, "obj", &mesh::obj_bytes(&mesh, &carried))?;
+        }
+        if output.usd {
+            let frame = usd::MeshFrame {
+                name: NAME,
+                points: &mesh.positions,
+                velocities: &step.velocities,
+                triangles: &mesh.triangles,
+                uvs: detail.uvs.as_ref(),
+            };
+            let text = usd::clip(NAME, files.frame, self.scene.shot.fps, usd::Units::OWN, &[frame]);
+            files.save(NAME, "usda", text.as_bytes())?;
+        }
+        files.save_state(&step.state)
+    }
+}
+
+fn told(report: &StepReport, particles: usize, tracker: &Tracker) -> Report {
+    let serde_json::Value::Object(results) = json!({
+        "particles": particles,
+        "born": report.born,
+        "died": report.died,
+        "vertices": tracker.vertices().len(),
+        "flagged": report.jumped + report.lost,
+        "jumped": report.jumped,
+        "lost": report.lost,
+        "parts": report.parts,
+        "volume_m3": tracker.mesh().volume(),
+        "particles_triangles": report.triangles,
+    }) else {
+        unreachable!("it is written as an object")
+    };
+    Report { results, phases: report.phases.clone() }
+}

@@ -1,0 +1,64 @@
+//! The exact state of a mesh that follows particles as bytes, from which a run resumes.
+
+use super::tracker::{Params, Tracker};
+use crate::base::bytes::{Reader, Writer};
+use crate::base::packed::{self, Magic};
+use crate::base::{DVec3, TriMesh};
+use crate::error::{Error, Result};
+
+/// Magic bytes, including the version.
+const MAGIC: &Magic = b"frzsrf01";
+/// What messages call it.
+const NOUN: &str = "surface";
+
+impl Tracker {
+    /// The exact state but for the triangles, the same bytes for any number of threads.
+    pub fn save(&self) -> Vec<u8> {
+        let mut to = Writer::default();
+        [self.params.spacing, self.params.cell, self.reach].into_iter().for_each(|number| to.f64(number));
+        to.count(self.vertices.len());
+        self.vertices.iter().flatten().for_each(|part| to.f64(*part));
+        to.f32s(&self.delta);
+        to.0.extend(self.flags.iter().map(|flag| u8::from(*flag)));
+        packed::pack(&to.0, MAGIC)
+    }
+
+    /// Resumes from a state that [`Tracker::save`] wrote; `mesh` is the one that it began with.
+    ///
+    /// # Errors
+    /// Parameters out of range; bytes that are not a valid state, or one of other cells or of another mesh.
+    pub fn resume(params: Params, mesh: &TriMesh, bytes: &[u8]) -> Result<Self> {
+        params.validate()?;
+        mesh.validate()?;
+        let bytes = packed::unpack(bytes, MAGIC, NOUN)?;
+        let mut from = Reader::new(&bytes);
+        let wrong = |what: String| Err(Error::Bytes(what));
+        for (name, own) in [("spacing", params.spacing), ("cell", params.cell)] {
+            let there = from.f64()?;
+            if there != own {
+                return wrong(format!("has a {name} of {there}, not {own}"));
+            }
+        }
+        let reach = from.f64()?;
+        // Beyond what any state has, a band would take all memory.
+        if !(0.0..=100.0).contains(&reach) {
+            return wrong(format!("has a band of {reach} spacings"));
+        }
+        let count = from.count(3 * 8 + 4 + 1)?;
+        if count != mesh.positions.len() {
+            return wrong(format!("is of a mesh of {count} vertices, not {}", mesh.positions.len()));
+        }
+        let mut vertices = Vec::with_capacity(count);
+        for _ in 0..count {
+            vertices.push(DVec3::new(from.f64()?, from.f64()?, from.f64()?));
+        }
+        // A vertex that has no distance has NaN.
+        let delta = (0..count).map(|_| Ok(f32::from_le_bytes(from.take()?))).collect::<Result<Vec<f32>>>()?;
+        if delta.iter().any(|delta| delta.is_infinite()) {
+            return wrong("has a distance that is not finite".into());
+        }
+        let flags = from.bytes(count)?.iter().map(|flag| *flag != 0).collect();
+        from.end()?;
+        Ok(Self { params, vertices, triangles: mesh.triangles.clone(), delta, flags, reach })
+    }
+}

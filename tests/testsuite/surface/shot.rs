@@ -1,0 +1,290 @@
+//! `frazil surface`: shots of a mesh that follows a cache.
+
+use std::fs;
+use std::path::Path;
+
+use frazil::base::arrays::{MeshArray, Number, On};
+use frazil::base::points::{Attribute, Column, Values};
+use frazil::base::{DVec3, DetailedMesh, Points, TriMesh, Uvs};
+use frazil::io::{mesh, particles};
+
+use crate::common::character::output;
+use crate::common::liquids::{Ball, ball, turned};
+use crate::program::{command, fails, kill_at, works};
+
+/// Where a place of the first frame is in another: it turns and travels.
+fn motion(place: DVec3, frame: f64) -> DVec3 {
+    turned(place, 0.1 * frame, DVec3::new(0.004, -0.003, 0.002) * frame)
+}
+
+fn write_frame(path: &Path, ball: &Ball, frame: f64, attributes: &[&str]) {
+    let places: Vec<DVec3> = ball.places.iter().map(|place| motion(*place, frame)).collect();
+    let mut points = Points::at(1.0, &places).unwrap();
+    let ahead = |place: &DVec3| {
+        let step = 1e-3;
+        let by = (motion(*place, frame + step) - motion(*place, frame - step)) * (24.0 / (2.0 * step));
+        [by.x as f32, by.y as f32, by.z as f32]
+    };
+    for name in attributes {
+        let values = match *name {
+            "v" => Values::Vector(Column::Each(ball.places.iter().map(ahead).collect())),
+            _ => Values::Long(Column::Each((0..places.len() as i64).collect())),
+        };
+        points.attributes.push(Attribute { name: name.to_string(), values });
+    }
+    particles::write(path, &points, false).unwrap();
+}
+
+/// A ball's mesh with a seam in its texture coordinates, colours and masks of its vertices and faces.
+fn detailed(mesh: &TriMesh) -> DetailedMesh {
+    let (vertices, faces) = (mesh.positions.len(), mesh.triangles.len());
+    let array = |name: &str, on, number, count: usize| MeshArray {
+        name: name.into(),
+        on,
+        number,
+        values: (0..count).map(|n| (n % 251) as f64).collect(),
+    };
+    let uvs = Uvs {
+        places: (0..3 * faces).map(|n| [n as f32 / 7.0, 1.0 / (1.0 + n as f32)]).collect(),
+        corners: Some((0..3 * faces as u32).collect()),
+        missing: 0,
+    };
+    let arrays = vec![
+        array("red", On::Vertices, Number::U8, vertices),
+        array("mask", On::Vertices, Number::F64, vertices),
+        array("part", On::Faces, Number::I32, faces),
+        array("wet", On::Corners, Number::F32, 3 * faces),
+    ];
+    DetailedMesh { mesh: mesh.clone(), uvs: Some(uvs), arrays }
+}
+
+fn write_mesh(path: &Path, mesh: &DetailedMesh) {
+    let arrays: Vec<&MeshArray> = mesh.arrays.iter().collect();
+    let carried = mesh::Carried { uvs: mesh.uvs.as_ref(), arrays: &arrays, ..Default::default() };
+    mesh::write_carried(path, &mesh.mesh, &carried).unwrap();
+}
+
+/// The cache of a ball that turns, of so many frames, with its mesh.
+fn write_shot(folder: &Path, frames: i32) -> Ball {
+    let ball = ball(5.0, 10, 0.25);
+    for frame in 1..=frames {
+        write_frame(&folder.join(format!("ball.{frame:04}.bgeo")), &ball, f64::from(frame - 1), &["v", "id"]);
+    }
+    write_mesh(&folder.join("ball.ply"), &detailed(&ball.mesh));
+    ball
+}
+
+const SHOT: &str = "surface -p ball.%04d.bgeo -m ball.ply --spacing 0.01";
+
+/// A frame's mesh as it was written.
+fn frame(folder: &Path, out: &str, frame: i32) -> DetailedMesh {
+    mesh::read_detailed(&folder.join(format!("{out}/surface/surface.{frame:04}.ply"))).unwrap()
+}
+
+fn array<'a>(mesh: &'a DetailedMesh, name: &str) -> &'a [f64] {
+    &mesh.arrays.iter().find(|array| array.name == name).unwrap_or_else(|| panic!("no {name}")).values
+}
+
+#[test]
+fn the_mesh_moves_with_its_velocities_and_keeps_what_it_carries() {
+    let folder = tempfile::tempdir().unwrap();
+    let folder = folder.path();
+    let ball = write_shot(folder, 6);
+    let said = works(folder, &format!("{SHOT} -o out --report run.json"));
+    assert!(!said.contains("estimated"), "{said}");
+    let before = detailed(&ball.mesh);
+    for number in 1..=6 {
+        let now = frame(folder, "out", number);
+        assert_eq!(now.mesh.triangles, before.mesh.triangles);
+        assert_eq!(now.uvs, before.uvs);
+        for own in &before.arrays {
+            assert!(now.arrays.contains(own), "{} at frame {number}", own.name);
+        }
+        assert!(array(&now, "flagged").iter().all(|flag| *flag == 0.0));
+        let ahead = frame(folder, "out", (number + 1).min(6));
+        let speed = ["vx", "vy", "vz"].map(|name| array(&now, name));
+        for (vertex, place) in now.mesh.positions.iter().enumerate() {
+            let truth = motion(ball.mesh.positions[vertex].cast(), f64::from(number - 1));
+            assert!(
+                (place.cast::<f64>() - truth).norm() < 0.02 * ball.spacing,
+                "frame {number}, vertex {vertex}"
+            );
+            let by = DVec3::new(speed[0][vertex], speed[1][vertex], speed[2][vertex]) / 24.0;
+            if number < 6 {
+                let off = (place.cast::<f64>() + by - ahead.mesh.positions[vertex].cast::<f64>()).norm();
+                // What 32 bits of a place and a velocity hold.
+                assert!(off < 2e-5 * ball.spacing, "{off} m at frame {number}, vertex {vertex}");
+            } else {
+                assert!(by.norm() > 0.0, "the last frame moves as it came");
+            }
+        }
+    }
+    let report: serde_json::Value =
+        serde_json::from_slice(&fs::read(folder.join("run.json")).unwrap()).unwrap();
+    assert_eq!((report["frames"].as_u64(), report["most_flagged"].as_u64()), (Some(6), Some(0)));
+    let checked = works(folder, "check out");
+    assert!(checked.contains("6 frames") && checked.contains("all of them"), "{checked}");
+}
+
+#[test]
+fn threads_kills_and_another_order_of_frames_give_the_same_bytes() {
+    let folder = tempfile::tempdir().unwrap();
+    let folder = folder.path();
+    write_shot(folder, 8);
+    let shot = format!("{SHOT} --set output.surface=[\"ply\",\"usd\",\"obj\"]");
+    works(folder, &format!("{shot} -o whole --threads 2"));
+    works(folder, &format!("{shot} -o one --threads 1"));
+    let whole = output(&folder.join("whole"));
+    let same = |out: &str| {
+        let other = output(&folder.join(out));
+        assert_eq!(whole.keys().collect::<Vec<_>>(), other.keys().collect::<Vec<_>>(), "{out}");
+        whole.iter().for_each(|(name, bytes)| assert!(*bytes == other[name], "{name} of {out}"));
+    };
+    same("one");
+    kill_at(folder, &format!("{shot} -o killed"), "killed/surface/surface.0003.ply");
+    works(folder, &format!("{shot} -o killed"));
+    same("killed");
+    works(folder, &format!("{shot} -o part --frames 5-6"));
+    works(folder, &format!("{shot} -o part"));
+    same("part");
+    let mut plain = command(folder, &format!("{shot} -o baseline"));
+    assert!(plain.env("FRAZIL_CPU", "baseline").status().unwrap().success());
+    same("baseline");
+    // Any frame can be resumed from, with other steps but not from another start.
+    works(folder, &format!("{shot} -o whole --from 4 --set surface.change=0.25"));
+    fails(folder, &format!("{shot} -o whole"), 2, &["surface.change was 0.25"]);
+    fails(folder, &format!("{shot} -o whole --from 4 --set surface.cell=1"), 2, &["surface.cell"]);
+}
+
+#[test]
+fn a_cache_that_grows_gives_the_last_frame_its_velocities() {
+    let folder = tempfile::tempdir().unwrap();
+    let folder = folder.path();
+    let ball = write_shot(folder, 3);
+    works(folder, &format!("{SHOT} -o out"));
+    let before = frame(folder, "out", 3);
+    write_frame(&folder.join("ball.0004.bgeo"), &ball, 3.0, &["v", "id"]);
+    works(folder, &format!("{SHOT} -o out"));
+    let after = frame(folder, "out", 3);
+    assert!(before.mesh == after.mesh && array(&before, "vx") != array(&after, "vx"));
+    works(folder, &format!("{SHOT} -o again"));
+    assert!(output(&folder.join("out")) == output(&folder.join("again")));
+}
+
+#[test]
+fn a_sequence_may_start_later_and_run_faster_or_slower() {
+    let folder = tempfile::tempdir().unwrap();
+    let folder = folder.path();
+    let ball = write_shot(folder, 5);
+    let at = |out: &str, number: i32, time: f64| {
+        let mesh = frame(folder, out, number).mesh;
+        let off =
+            mesh.positions.iter().zip(&ball.mesh.positions).map(|(place, first)| {
+                (place.cast::<f64>() - motion(first.cast(), time)).norm() / ball.spacing
+            });
+        off.fold(0.0, f64::max)
+    };
+    works(folder, &format!("{SHOT} -o fast --set shot.frames=1-3 --set surface.speed=2"));
+    assert!(at("fast", 3, 4.0) < 0.02);
+    // Frames between those of the cache are on the way that the velocities say.
+    works(folder, &format!("{SHOT} -o slow --set shot.frames=1-9 --set surface.speed=0.5"));
+    assert!(at("slow", 4, 1.5) < 0.02 && at("slow", 9, 4.0) < 0.02, "{}", at("slow", 4, 1.5));
+    works(folder, &format!("{SHOT} -o late --set shot.frames=101-105 --set surface.offset=100"));
+    assert!(at("late", 105, 4.0) < 0.02);
+    fails(folder, &format!("{SHOT} -o no --set surface.offset=1"), 2, &["ball.0000.bgeo"]);
+}
+
+#[test]
+fn without_a_mesh_the_liquid_has_its_own_surface() {
+    let folder = tempfile::tempdir().unwrap();
+    let folder = folder.path();
+    write_shot(folder, 3);
+    works(folder, "surface -p ball.%04d.bgeo --spacing 0.01 -o out");
+    let (first, last) = (frame(folder, "out", 1).mesh, frame(folder, "out", 3).mesh);
+    assert!(first.is_manifold() && first.triangles == last.triangles);
+    works(folder, "vdb from-particles ball.0001.bgeo --spacing 0.01 --mesh own.ply");
+    assert_eq!(mesh::read(&folder.join("own.ply")).unwrap(), first);
+}
+
+#[test]
+fn what_a_mesh_cannot_follow_is_refused_with_the_file() {
+    let folder = tempfile::tempdir().unwrap();
+    let folder = folder.path();
+    let ball = write_shot(folder, 3);
+    let refused = |arguments: &str, words: &[&str]| {
+        fails(folder, &format!("{arguments} -o no"), 2, words);
+        assert!(!folder.join("no").exists(), "{arguments}");
+    };
+    refused("surface -p none.%04d.bgeo -m ball.ply", &["none.%04d.bgeo", "no frame"]);
+    refused("surface -p ball.%04d.bgeo -m ball.stl", &["ball.stl", "cannot read"]);
+    refused("surface -p ball.%04d.bgeo -m ball.txt", &["mesh", ".ply"]);
+    refused(&format!("{SHOT} --set surface.cel=1"), &["did you mean `cell`"]);
+    refused("surface -p ball.0001.bgeo -m ball.ply --set shot.frames=1-2", &["never moves"]);
+    // The mesh lies elsewhere.
+    let mut far = ball.mesh.clone();
+    far.positions.iter_mut().for_each(|place| place.x += 5.0);
+    mesh::write(&folder.join("far.ply"), &far).unwrap();
+    let said = ["far.ply", "0 %", "same space"];
+    fails(folder, "surface -p ball.%04d.bgeo -m far.ply --spacing 0.01 -o far", 2, &said);
+    // Nothing says where particles go.
+    for frame in 1..=3 {
+        write_frame(&folder.join(format!("plain.{frame:04}.bgeo")), &ball, f64::from(frame - 1), &[]);
+    }
+    refused(
+        "surface -p plain.%04d.bgeo -m ball.ply --spacing 0.01",
+        &["plain.0001.bgeo", "ids", "velocities"],
+    );
+    // A frame is cut, or gone.
+    let bytes = fs::read(folder.join("ball.0002.bgeo")).unwrap();
+    fs::write(folder.join("ball.0002.bgeo"), &bytes[..bytes.len() / 2]).unwrap();
+    fails(folder, &format!("{SHOT} -o cut"), 1, &["ball.0002.bgeo"]);
+    fs::remove_file(folder.join("ball.0002.bgeo")).unwrap();
+    refused(SHOT, &["ball.0002.bgeo"]);
+    // Scenes of one system are not for the command of another.
+    fs::write(
+        folder.join("shot.toml"),
+        "[shot]\nframes = \"1-2\"\n[surface]\nparticles = \"ball.%04d.bgeo\"\n[snow]\n",
+    )
+    .unwrap();
+    refused("surface shot.toml", &["shot.toml:5", "one system"]);
+    let snow =
+        "[shot]\nframes = \"1-2\"\n[snow]\nground = 0\narea = [0, 0, 1, 1]\ndepth = 0.2\ncell = 0.05\n";
+    fs::write(folder.join("snow.toml"), snow).unwrap();
+    refused("surface snow.toml", &["snow.toml", "`surface` is missing"]);
+}
+
+#[test]
+fn velocities_alone_are_enough_and_ids_alone_too() {
+    let folder = tempfile::tempdir().unwrap();
+    let folder = folder.path();
+    let ball = write_shot(folder, 1);
+    for (name, attributes) in [("fast", &["v"]), ("named", &["id"])] {
+        for frame in 1..=4 {
+            let file = folder.join(format!("{name}.{frame:04}.bgeo"));
+            write_frame(&file, &ball, f64::from(frame - 1), attributes);
+        }
+        works(folder, &format!("surface -p {name}.%04d.bgeo -m ball.ply --spacing 0.01 -o {name}"));
+        let mesh = frame(folder, name, 4).mesh;
+        let far = |(place, first): (&frazil::base::Vec3, &frazil::base::Vec3)| {
+            (place.cast::<f64>() - motion(first.cast(), 3.0)).norm() / ball.spacing
+        };
+        let most = mesh.positions.iter().zip(&ball.mesh.positions).map(far).fold(0.0, f64::max);
+        assert!(most < 0.2, "{name}: {most}");
+    }
+}
+
+#[test]
+fn check_reads_every_file_and_says_what_there_is() {
+    let folder = tempfile::tempdir().unwrap();
+    let folder = folder.path();
+    write_shot(folder, 3);
+    let scene = "[shot]\nframes = \"1-3\"\n[surface]\nparticles = \"ball.%04d.bgeo\"\nmesh = \"ball.ply\"\n";
+    fs::write(folder.join("shot.toml"), scene).unwrap();
+    let said = works(folder, "check shot.toml");
+    for words in ["3 files of 552 particles", "ids and velocities", "1200 triangles", "estimated"] {
+        assert!(said.contains(words), "no {words:?} in {said}");
+    }
+    works(folder, "surface shot.toml -o out");
+    works(folder, "surface out/scene.toml -o again");
+    assert!(output(&folder.join("out")) == output(&folder.join("again")));
+}
