@@ -163,15 +163,19 @@ pub fn padded(tiles: &[Coord], padding: i32) -> Vec<Coord> {
     out
 }
 
-/// Sorted coordinates of the tiles that are reached from these over so many faces at most.
+/// Sorted coordinates of the tiles that are reached from these in so many steps over a face or an edge.
 pub fn bordered(tiles: &[Coord], steps: usize) -> Vec<Coord> {
     let mut out = tiles.to_vec();
     for _ in 0..steps {
-        let sides = out
-            .iter()
-            .flat_map(|coord| (0..3).flat_map(move |axis| [-1, 1].map(|by| shifted(*coord, axis, by))));
-        let mut wider: Vec<Coord> = sides.chain(out.iter().copied()).collect();
-        wider.sort_unstable();
+        // Pairs of axes: what is within one tile on both of a pair.
+        let pairs = [[0, 1], [0, 2], [1, 2]].into_iter().flat_map(|[a, b]| {
+            let ways = (-1..=1).flat_map(|i| (-1..=1).map(move |j| (i, j)));
+            let out = &out;
+            ways.flat_map(move |(i, j)| out.iter().map(move |coord| shifted(shifted(*coord, a, i), b, j)))
+        });
+        let mut wider: Vec<Coord> = pairs.collect();
+        // Sorted runs, which a stable sort merges.
+        wider.sort();
         wider.dedup();
         out = wider;
     }
@@ -191,5 +195,6 @@ mod tests {
         assert_eq!((near[SELF], near[neighbour_at([0, 0, 1])]), (0, 1));
         assert_eq!(tiles.neighbours()[2][neighbour_at([0, 0, -1])], NONE);
         assert_eq!(padded(&[[0, 0, 0]], 1).len(), 27);
+        assert_eq!(bordered(&[[0, 0, 0]], 1).len(), 19);
     }
 }
