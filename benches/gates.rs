@@ -88,12 +88,16 @@ mod snow;
 mod speed;
 #[path = "gates/spin.rs"]
 mod spin;
+#[path = "gates/spot.rs"]
+mod spot;
 #[path = "gates/surface.rs"]
 mod surface;
 #[path = "gates/sweeps.rs"]
 mod sweeps;
 #[path = "gates/table.rs"]
 mod table;
+#[path = "gates/tracker_cancel.rs"]
+mod tracker_cancel;
 #[path = "gates/turned.rs"]
 mod turned;
 #[path = "gates/volumes.rs"]
@@ -132,6 +136,8 @@ fn main() {
     spin::run(&mut h);
     damage::run(&mut h);
     surface::run(&mut h);
+    spot::run(&mut h);
+    tracker_cancel::run(&mut h);
     house::run(&mut h);
     h.finish();
 }

@@ -261,6 +261,18 @@ pub const GATES: &[Gate] = &[
     gate("surface.pool_mean", "r", Most(0.005), Most(0.003)),
     gate("surface.pool_p95", "r", Most(0.015), Most(0.01)),
     gate("surface.half_space", "r", Most(0.01), Open),
+    // A real solver's cache, through the command.
+    gate("surface.spot_off_surface", "r", Most(0.03), Most(0.01)),
+    gate("surface.spot_detail", "1", Least(0.95), Least(0.98)),
+    gate("surface.spot_gain", "1", Most(0.1), Most(0.05)),
+    gate("surface.spot_flagged_before", "%", Open, Open),
+    gate("surface.spot_flagged", "%", Open, Open),
+    gate("surface.spot_volume", "%", Most(1.0), Most(0.5)),
+    gate("surface.velocity", "r", Most(1.0e-5), Open),
+    yes("surface.arrays_kept"),
+    yes("surface.same_bytes_kill"),
+    yes("surface.same_bytes_cpu"),
+    gate("surface.cancel_p99", "s", Most(0.2), Most(0.05)),
     // Phases of a step, the thesis' dragon's size; all of them with 260,000 particles; two threads.
     gate("surface.time_advect", "s", Most(0.1), Most(0.03)),
     gate("surface.time_phi", "s", Most(0.15), Most(0.08)),

@@ -1,4 +1,4 @@
-"""Snow that bodies press into: frazil's C library from Python, with NumPy arrays and no build.
+"""Snow that bodies press into, and meshes that follow liquids: frazil's C library from Python, with NumPy arrays and no build.
 
 The library is found through FRAZIL_LIBRARY, else beside the module, else in the tree that it was installed with, else
 by the system's loader.
@@ -17,6 +17,10 @@ by the system's loader.
     mist.step(grains, base, bodies, time=0.0, dt=1 / 24)   # after each step of the grains
     frazil.save(ctx, [mist.density(ctx)], "mist.vdb")
 
+    tracker = frazil.Tracker(ctx, mesh, first, spacing=frazil.spacing(ctx, first))   # first: frazil.Particles
+    tracker.step(first, second, dt=1 / 24)
+    tracker.positions, tracker.read("flagged")
+
 Lengths are metres, times seconds; Y is up. Everything that fails raises frazil.Error with one sentence.
 Handles have close(), and work in with blocks.
 """
@@ -28,9 +32,10 @@ from .grid import Grid, Leaf, load, save
 from .mesh import Mesh
 from .mist import Mist
 from .snow import Base, Body, Noise, snow_layer
+from .tracker import Particles, Tracker, spacing
 from . import level_set
 
 __all__ = [
-    "ABI_VERSION", "Base", "Body", "Context", "Error", "Grains", "Grid", "Leaf", "Mesh", "Mist", "Noise", "Pool", "level_set",
-    "library", "load", "save", "snow_layer", "version",
+    "ABI_VERSION", "Base", "Body", "Context", "Error", "Grains", "Grid", "Leaf", "Mesh", "Mist", "Noise", "Particles",
+    "Pool", "Tracker", "level_set", "library", "load", "save", "snow_layer", "spacing", "version",
 ]

@@ -159,6 +159,28 @@ class MistReport(Struct):
     ]
 
 
+class ParticlesDesc(c.Structure):
+    _fields_ = [
+        ("struct_size", c.c_uint32), ("flags", c.c_uint32), ("positions", View), ("velocities", View), ("ids", View),
+    ]
+
+
+class TrackerParams(Struct):
+    _fields_ = [
+        ("struct_size", c.c_uint32), ("flags", c.c_uint32), ("spacing", c.c_double), ("cell", c.c_double),
+        ("change", c.c_double), ("half_life", c.c_double), ("fade", c.c_double), ("weighting", c.c_uint32),
+        ("reserved", c.c_uint32),
+    ]
+
+
+class TrackerReport(Struct):
+    _fields_ = [
+        ("struct_size", c.c_uint32), ("parts", c.c_uint32), ("jumped", c.c_uint64), ("lost", c.c_uint64),
+        ("born", c.c_uint64), ("died", c.c_uint64), ("triangles", c.c_uint64), ("drops", c.c_uint64),
+        ("bubbles", c.c_uint64),
+    ]
+
+
 # The structs by their names in the header: a test compares every field's place.
 STRUCTS = {
     "frz_view": View, "frz_span": Span, "frz_progress": Progress, "frz_stage_time": StageTime,
@@ -167,7 +189,8 @@ STRUCTS = {
     "frz_grid_desc": GridDesc, "frz_grid_info": GridInfo, "frz_noise": NoiseParams, "frz_body": BodyDesc,
     "frz_snow_desc": SnowDesc, "frz_base_params": BaseParams, "frz_base_report": BaseReport,
     "frz_grains_params": GrainsParams, "frz_grains_report": GrainsReport,
-    "frz_mist_params": MistParams, "frz_mist_report": MistReport,
+    "frz_mist_params": MistParams, "frz_mist_report": MistReport, "frz_particles": ParticlesDesc,
+    "frz_tracker_params": TrackerParams, "frz_tracker_report": TrackerReport,
 }
 
 POLL = c.CFUNCTYPE(c.c_int, c.c_void_p, c.POINTER(Progress))
@@ -203,9 +226,13 @@ _FUNCTIONS = {
     "mist_step": [_P, _P, _P, _P, _P, _P, _Z, _D, _D, _P],
     "mist_step_points": [_P, _P, View, View, _D, _P, _P, _P, _Z, _D, _D, _P],
     "mist_grid": [_P, _P, _U, _P], "mist_save": [_P, _P, _P, _Z, _P],
+    "particles_spacing": [_P, _P, _P], "tracker_params_init": [_P, _Z],
+    "tracker_create": [_P, _P, _P, _P, _P, _Z, _P], "tracker_set_params": [_P, _P],
+    "tracker_step": [_P, _P, _P, _P, _D, _P], "tracker_count": [_P, _P], "tracker_read": [_P, _U, Span],
+    "tracker_save": [_P, _P, _P, _Z, _P],
 }
 _VOID = ["pool_destroy", "context_destroy", "context_cancel", "context_reset", "mesh_destroy", "grid_destroy",
-         "base_destroy", "grains_destroy", "mist_destroy"]
+         "base_destroy", "grains_destroy", "mist_destroy", "tracker_destroy"]
 _LENT = ["base_grid", "base_removed", "base_compression", "base_touched"]
 
 

@@ -135,6 +135,12 @@ impl Mesh {
         Self { polygons, triangles, attributes: Vec::new() }
     }
 
+    /// The numbers of an attribute with so many components; none without such a one.
+    pub(super) fn attribute(&self, name: &str, components: usize) -> Option<&[f32]> {
+        let is_it = |attribute: &&Attribute| attribute.name == name && attribute.components == components;
+        self.attributes.iter().find(is_it).map(|attribute| &attribute.values[..])
+    }
+
     /// Adds an attribute, in the place of one of the same name.
     pub(super) fn set_attribute(&mut self, name: &str, components: usize, values: Vec<f32>) {
         self.attributes.retain(|attribute| attribute.name != name);

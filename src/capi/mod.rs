@@ -70,8 +70,9 @@ pub mod mist_params;
 #[cfg(feature = "vdb")]
 pub mod mist;
 
+pub mod tracker;
+
 mod handle;
-#[cfg(feature = "vdb")]
 mod saved;
 
 pub use guard::frz_status;

@@ -19,7 +19,7 @@ use super::shot::ShotArgs;
 #[command(after_help = "\
 Examples:
   frazil surface spot.toml -o out/
-  frazil surface -p spot.%04d.bgeo -m spot.ply -o out/ --fps 25")]
+  frazil surface -p spot.%04d.bgeo -m spot.ply -o spot/ --fps 25")]
 pub struct Args {
     /// Scene file (TOML); or -p, and the others below.
     #[arg(required_unless_present = "particles", conflicts_with = "particles")]

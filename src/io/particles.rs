@@ -97,6 +97,11 @@ pub fn is_named(path: &Path) -> bool {
     format(path).is_some()
 }
 
+/// What to do about a file of this name that no reader takes; none for other names.
+pub fn advice(path: &Path) -> Option<&'static str> {
+    (format(path) == Some(Format::BgeoSc)).then_some(bgeo::HOUDINIS)
+}
+
 /// Whether [`write()`] takes a file of this name.
 pub fn is_written(path: &Path) -> bool {
     matches!(format(path), Some(Format::Bgeo | Format::Ply | Format::Xyz))

@@ -71,6 +71,11 @@ impl Isosurface {
         self.triangles.len()
     }
 
+    /// Count of vertices.
+    pub fn vertices(&self) -> usize {
+        self.places.len()
+    }
+
     /// Each patch in which cubes with triangles begin, with these, ascending.
     pub fn runs(&self) -> impl Iterator<Item = (Coord, &[[u32; 3]])> {
         let starts = std::iter::once(0).chain(self.runs.iter().map(|(_, end)| *end));

@@ -12,6 +12,7 @@
 //! | spacing, r | initial distance between particles |
 //! | cell, node | the grid's spacing, half of r; a corner of the grid, where phi is known |
 //! | phi | the implicit function of the particles; then the signed distance from where it is 0, negative inside |
+//! | fading | delta becomes less: detail of a runny liquid does not last |
 //! | delta | the distance from phi = 0 that a vertex keeps: its detail, signed as phi |
 //! | patch | 4 x 4 x 4 nodes, which are evaluated together |
 //! | flagged | of a vertex: its projection failed or jumped; it stays where advection put it |
@@ -20,9 +21,11 @@
 #![allow(clippy::needless_range_loop)]
 
 mod advect;
+mod apart;
 mod average;
 mod band;
 mod cells;
+mod fade;
 mod fit;
 mod implicit;
 mod isosurface;
@@ -36,6 +39,7 @@ mod state;
 mod tracker;
 
 pub use advect::Weighting;
+pub use apart::Apart;
 pub use average::SUPPORT;
 pub use band::Distances;
 pub use implicit::Implicit;

@@ -12,7 +12,7 @@ const MAGIC: &Magic = b"frzsrf01";
 const NOUN: &str = "surface";
 
 impl Tracker {
-    /// The exact state but for the triangles, the same bytes for any number of threads.
+    /// The exact state but for the triangles and what never fades, the same bytes for any number of threads.
     pub fn save(&self) -> Vec<u8> {
         let mut to = Writer::default();
         [self.params.spacing, self.params.cell, self.reach].into_iter().for_each(|number| to.f64(number));
@@ -21,6 +21,11 @@ impl Tracker {
         to.f32s(&self.delta);
         to.0.extend(self.flags.iter().map(|flag| u8::from(*flag)));
         packed::pack(&to.0, MAGIC)
+    }
+
+    /// Count of bytes of a saved state before it was packed; 0 if it is not one.
+    pub fn unpacked(bytes: &[u8]) -> u64 {
+        packed::unpacked(bytes, MAGIC, NOUN)
     }
 
     /// Resumes from a state that [`Tracker::save`] wrote; `mesh` is the one that it began with.
@@ -59,6 +64,7 @@ impl Tracker {
         }
         let flags = from.bytes(count)?.iter().map(|flag| *flag != 0).collect();
         from.end()?;
-        Ok(Self { params, vertices, triangles: mesh.triangles.clone(), delta, flags, reach })
+        let (triangles, lasting) = (mesh.triangles.clone(), Vec::new());
+        Ok(Self { params, vertices, triangles, delta, lasting, flags, reach })
     }
 }

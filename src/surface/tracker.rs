@@ -4,7 +4,10 @@ use rayon::prelude::*;
 
 use super::Particles;
 use super::advect::{Weighting, advect};
+use super::apart::{self, Apart};
 use super::band::Distances;
+use super::cells::Coord;
+use super::fade::fade;
 use super::implicit::Implicit;
 use super::isosurface::Isosurface;
 use super::paths::Paths;
@@ -25,12 +28,17 @@ pub struct Params {
     pub change: f64,
     /// How particles carry vertices.
     pub weighting: Weighting,
+    /// Time (s) in which half of the detail fades, over 0; infinite: it stays (thesis 2.8 wishes for it).
+    pub half_life: f64,
+    /// How much detail fades where the mesh is strained: to exp(-fade) of it while lengths change by a factor of e; 0..=1000.
+    pub fade: f64,
 }
 
 impl Params {
     /// The thesis' values for particles of a spacing (m), but for the weighting.
     pub fn for_spacing(spacing: f64) -> Self {
-        Self { spacing, cell: 0.5, change: 0.5, weighting: Weighting::Affine }
+        let (half_life, fade) = (f64::INFINITY, 0.0);
+        Self { spacing, cell: 0.5, change: 0.5, weighting: Weighting::Affine, half_life, fade }
     }
 
     /// Checks every field.
@@ -42,6 +50,8 @@ impl Params {
             ("spacing", self.spacing, 1e-9, 1e6, "m"),
             ("cell", self.cell, 0.125, 2.0, "r"),
             ("change", self.change, 1e-3, 100.0, "r"),
+            ("half_life", self.half_life, f64::MIN_POSITIVE, f64::INFINITY, "s"),
+            ("fade", self.fade, 0.0, 1000.0, ""),
         ];
         for (name, value, low, high, unit) in ranges {
             if !(low..=high).contains(&value) {
@@ -69,6 +79,8 @@ pub struct StepReport {
     pub died: usize,
     /// Triangles of the particles' own surface.
     pub triangles: usize,
+    /// Parts of that surface which the mesh does not cover, the largest first: drops and bubbles.
+    pub apart: Vec<Apart>,
     /// Time of each phase.
     pub phases: Vec<PhaseTime>,
 }
@@ -89,6 +101,7 @@ impl StepReport {
             born: self.born + next.born,
             died: self.died + next.died,
             triangles: next.triangles,
+            apart: next.apart,
             phases: self.phases,
         }
     }
@@ -103,6 +116,8 @@ pub struct Tracker {
     pub(super) triangles: Vec<[u32; 3]>,
     /// Distance from the surface that each vertex keeps (m); NaN: it was too far from it to have one.
     pub(super) delta: Vec<f32>,
+    /// Share 0..=1 of each vertex' detail that never fades; empty: none.
+    pub(super) lasting: Vec<f32>,
     /// Vertices that the last step could not project.
     pub(super) flags: Vec<bool>,
     /// How far distances from the surface are known (r).
@@ -134,7 +149,8 @@ impl Tracker {
         let vertices: Vec<DVec3> = mesh.positions.iter().map(|place| place.cast()).collect();
         let flags = vec![false; vertices.len()];
         let (delta, reach) = (Vec::new(), REACH[0]);
-        let mut tracker = Self { params, vertices, triangles: mesh.triangles.clone(), delta, flags, reach };
+        let (triangles, lasting) = (mesh.triangles.clone(), Vec::new());
+        let mut tracker = Self { params, vertices, triangles, delta, lasting, flags, reach };
         let surface = ctx.phase("phi", || tracker.surface_of(ctx, particles))?;
         loop {
             let distances = ctx.phase("distance", || tracker.distances(ctx, &surface))?;
@@ -161,6 +177,43 @@ impl Tracker {
             REACH[1],
             self.params.spacing
         )))
+    }
+
+    /// Sets the parameters from the next step on.
+    ///
+    /// # Errors
+    /// A parameter out of range, another spacing or another cell; the old parameters are then kept.
+    pub fn set_params(&mut self, params: Params) -> Result<()> {
+        params.validate()?;
+        for (name, old, new) in
+            [("spacing", self.params.spacing, params.spacing), ("cell", self.params.cell, params.cell)]
+        {
+            if old != new {
+                return Err(Error::argument(format!("{name} = {new} cannot change, it is {old}")));
+            }
+        }
+        self.params = params;
+        Ok(())
+    }
+
+    /// Says how little of each vertex' detail fades, 0 (as fast as the parameters say) to 1 (not at all); empty: 0 everywhere.
+    ///
+    /// # Errors
+    /// Another count than that of the vertices; a share out of range, which is named by its vertex, counted from 1.
+    pub fn set_lasting(&mut self, shares: Vec<f32>) -> Result<()> {
+        let count = self.vertices.len();
+        if !shares.is_empty() && shares.len() != count {
+            return Err(Error::argument(format!(
+                "there are {count} vertices, but {} shares of detail",
+                shares.len()
+            )));
+        }
+        if let Some(at) = shares.iter().position(|share| !(0.0..=1.0).contains(share)) {
+            let what = format!("detail of vertex {} is {}, not within 0 to 1", at + 1, shares[at]);
+            return Err(Error::argument(what));
+        }
+        self.lasting = shares;
+        Ok(())
     }
 
     /// The mesh (m).
@@ -197,25 +250,30 @@ impl Tracker {
         }
         from.validate()?;
         to.validate()?;
-        let ((vertices, flags, report), phases) = ctx.step(4, || {
+        let ((vertices, delta, flags, report), phases) = ctx.step(5, || {
             let paths = Paths::between(from, to, dt)?;
             let (carried, parts) = ctx.phase("advect", || self.carried(ctx, &paths))?;
             let surface = ctx.phase("phi", || self.surface_of(ctx, to))?;
             let distances = ctx.phase("distance", || self.distances(ctx, &surface))?;
-            let (vertices, flags) = ctx.phase("project", || self.projected(ctx, carried, &distances))?;
+            let delta = fade(self, &carried, dt);
+            let (vertices, flags) =
+                ctx.phase("project", || self.projected(ctx, carried, &delta, &distances))?;
+            let feet = flags.iter().filter_map(|flag| flag.foot()).collect();
+            let apart = ctx.phase("apart", || Ok(apart::parts(&surface.0, &surface.1, feet)))?;
             let report = StepReport {
                 parts,
                 born: paths.born,
                 died: paths.died,
                 triangles: surface.1.count(),
+                apart,
                 ..StepReport::default()
             };
-            Ok((vertices, flags, report))
+            Ok((vertices, delta, flags, report))
         })?;
         let count = |kind: Flag| flags.iter().filter(|flag| **flag == kind).count();
         let report = StepReport { jumped: count(Flag::Jumped), lost: count(Flag::Lost), phases, ..report };
-        self.vertices = vertices;
-        self.flags = flags.iter().map(|flag| *flag != Flag::Placed).collect();
+        (self.vertices, self.delta) = (vertices, delta);
+        self.flags = flags.iter().map(|flag| flag.foot().is_none()).collect();
         Ok(report)
     }
 
@@ -264,11 +322,12 @@ impl Tracker {
         &self,
         ctx: &Context,
         mut vertices: Vec<DVec3>,
+        delta: &[f32],
         distances: &Distances,
     ) -> Result<(Vec<DVec3>, Vec<Flag>)> {
         let Params { spacing, change, .. } = self.params;
         let cell = distances.cell();
-        let chunks = vertices.par_chunks_mut(1024).zip(self.delta.par_chunks(1024));
+        let chunks = vertices.par_chunks_mut(1024).zip(delta.par_chunks(1024));
         let flags: Vec<Vec<Flag>> = chunks
             .map_init(
                 || Sampler::new(distances),
@@ -286,7 +345,7 @@ impl Tracker {
                         if moved > STILL {
                             *vertex = to;
                         }
-                        Flag::Placed
+                        Flag::Placed([0, 1, 2].map(|axis| foot.place[axis].floor() as i32))
                     };
                     Ok(vertices.iter_mut().zip(delta).map(place).collect())
                 },
@@ -299,10 +358,17 @@ impl Tracker {
 /// What became of a vertex.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum Flag {
-    /// It keeps its distance.
-    Placed,
+    /// It keeps its distance from its foot, which lies in this cell.
+    Placed(Coord),
     /// It would have moved too far.
     Jumped,
     /// The surface was not found.
     Lost,
+}
+
+impl Flag {
+    /// The cell of its foot; none where it is flagged.
+    fn foot(self) -> Option<Coord> {
+        if let Self::Placed(cell) = self { Some(cell) } else { None }
+    }
 }

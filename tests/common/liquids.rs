@@ -1,6 +1,10 @@
 //! Liquids whose motion is known, as particles, and meshes that ride on them.
 
+use std::path::Path;
+
+use frazil::base::points::{Attribute, Column, Points, Values};
 use frazil::base::{DVec3, TriMesh};
+use frazil::io::{mesh, particles};
 use frazil::surface::{Params, Particles, Tracker};
 use frazil::{Context, Pool};
 
@@ -73,6 +77,19 @@ pub fn ball(radius: f64, n: usize, detail: f64) -> Ball {
         *place = unit * (size + detail * f64::from(wave) * spacing) as f32;
     }
     Ball { spacing, places, mesh }
+}
+
+/// Writes a ball's cache, NAME.0001.bgeo and so on, in which it travels, and its mesh as NAME.ply.
+pub fn write_cache(folder: &Path, name: &str, ball: &Ball, frames: i32) {
+    for frame in 1..=frames {
+        let by = DVec3::new(0.002, -0.001, 0.0) * f64::from(frame - 1);
+        let places: Vec<DVec3> = ball.places.iter().map(|place| place + by).collect();
+        let mut points = Points::at(1.0, &places).expect("points");
+        let ids = Values::Long(Column::Each((0..places.len() as i64).collect()));
+        points.attributes.push(Attribute { name: "id".into(), values: ids });
+        particles::write(&folder.join(format!("{name}.{frame:04}.bgeo")), &points, false).expect("a file");
+    }
+    mesh::write(&folder.join(format!("{name}.ply")), &ball.mesh).expect("a file");
 }
 
 /// How far vertices are from where they should be (spacings): mean, 95th percentile, greatest; and how many were flagged in all.

@@ -213,6 +213,15 @@ static inline size_t grains_count(const frz_grains *grains) {
     return count;
 }
 
+static inline bytes tracker_state(frz_context *ctx, const frz_tracker *tracker) {
+    bytes state = {NULL, 0};
+    WORKS(frz_tracker_save(ctx, tracker, NULL, 0, &state.size));
+    state.data = malloc(state.size);
+    CHECK(state.data != NULL);
+    WORKS(frz_tracker_save(ctx, tracker, state.data, state.size, &state.size));
+    return state;
+}
+
 static inline int same_bytes(bytes a, bytes b) { return a.size == b.size && memcmp(a.data, b.data, a.size) == 0; }
 
 /* A pool and a context on it. */

@@ -55,5 +55,15 @@ int main(void) {
     SIZE(frz_grains_report), FIELD(frz_grains_report, struct_size), FIELD(frz_grains_report, sub_steps);
     FIELD(frz_grains_report, count), FIELD(frz_grains_report, resting), FIELD(frz_grains_report, born), FIELD(frz_grains_report, dropped);
     FIELD(frz_grains_report, removed_volume), FIELD(frz_grains_report, owed), FIELD(frz_grains_report, fastest);
+    SIZE(frz_particles), FIELD(frz_particles, struct_size), FIELD(frz_particles, flags), FIELD(frz_particles, positions);
+    FIELD(frz_particles, velocities), FIELD(frz_particles, ids);
+    SIZE(frz_tracker_params), FIELD(frz_tracker_params, struct_size), FIELD(frz_tracker_params, flags);
+    FIELD(frz_tracker_params, spacing), FIELD(frz_tracker_params, cell), FIELD(frz_tracker_params, change);
+    FIELD(frz_tracker_params, half_life), FIELD(frz_tracker_params, fade);
+    FIELD(frz_tracker_params, weighting), FIELD(frz_tracker_params, reserved);
+    SIZE(frz_tracker_report), FIELD(frz_tracker_report, struct_size), FIELD(frz_tracker_report, parts);
+    FIELD(frz_tracker_report, jumped), FIELD(frz_tracker_report, lost), FIELD(frz_tracker_report, born);
+    FIELD(frz_tracker_report, died), FIELD(frz_tracker_report, triangles);
+    FIELD(frz_tracker_report, drops), FIELD(frz_tracker_report, bubbles);
     return 0;
 }

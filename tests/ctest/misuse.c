@@ -84,12 +84,15 @@ static frz_grid *grids[HANDLES];
 static frz_base *bases[HANDLES];
 static frz_grains *heaps[HANDLES];
 static frz_mist *airs[HANDLES];
+static frz_tracker *trackers[HANDLES];
 
 static frz_context *a_context(void) { return chance(40) ? NULL : ctx; }
 static frz_mesh *a_mesh(void) { return chance(60) ? (frz_mesh *)ctx : meshes[any() % HANDLES]; }
 static frz_base *a_base(void) { return chance(60) ? (frz_base *)pool : bases[any() % HANDLES]; }
 static frz_grains *some_grains(void) { return chance(60) ? (frz_grains *)pool : heaps[any() % HANDLES]; }
 static frz_mist *some_mist(void) { return chance(60) ? (frz_mist *)pool : airs[any() % HANDLES]; }
+
+static frz_tracker *a_tracker(void) { return chance(60) ? (frz_tracker *)pool : trackers[any() % HANDLES]; }
 
 static frz_grid *a_grid(void) {
     if (chance(60)) return (frz_grid *)ctx;
@@ -183,6 +186,27 @@ static frz_mist_params an_air(void) {
     return params;
 }
 
+static frz_tracker_params a_way(void) {
+    frz_tracker_params params;
+    WORKS(frz_tracker_params_init(&params, sizeof params));
+    params.spacing = chance(4) ? number() : 0.1 + 0.1 * (any() % 4);
+    if (chance(4)) params.cell = number(), params.change = number(), params.weighting = any() % 3;
+    params.flags = chance(9) ? any() : 0;
+    params.struct_size = size_near(sizeof params);
+    return params;
+}
+
+/* As many velocities and ids as there are positions, or not. */
+static frz_particles some_particles(void) {
+    frz_particles out;
+    memset(&out, 0, sizeof out);
+    out.struct_size = size_near(sizeof out), out.flags = chance(20) ? any() : 0;
+    out.positions = view(wide, 24);
+    if (chance(2)) out.velocities = view(floats, 12);
+    if (out.velocities.count > out.positions.count) out.velocities.count = out.positions.count;
+    return out;
+}
+
 static double a_voxel(void) { return chance(4) ? number() : 0.02 + 0.01 * (any() % 5); }
 static float a_width(void) { return chance(4) ? (float)number() : 3.0f; }
 
@@ -198,10 +222,11 @@ static void call(void) {
     frz_base *base = NULL;
     frz_grains *grains = NULL;
     frz_mist *mist = NULL;
+    frz_tracker *tracker = NULL;
     frz_context *c = a_context();
     polls = 0;
     fill();
-    switch (any() % 65) {
+    switch (any() % 70) {
         case 0: (void)frz_status_name(any()), (void)frz_last_error(), (void)frz_version(); break;
         case 1: {
             frz_pool *other = NULL;
@@ -489,6 +514,39 @@ static void call(void) {
             break;
         }
         case 64: frz_mist_destroy(airs[slot]), airs[slot] = NULL; break;
+        case 65: case 66: {
+            const frz_tracker_params params = a_way();
+            const frz_particles particles = some_particles();
+            if (chance(4)) (void)frz_tracker_set_params(a_tracker(), chance(9) ? NULL : &params);
+            else if (chance(6)) {
+                double spacing;
+                (void)frz_particles_spacing(c, chance(9) ? NULL : &particles, chance(9) ? NULL : &spacing);
+            } else (void)frz_tracker_create(c, chance(20) ? NULL : &params, a_mesh(), chance(9) ? NULL : &particles, chance(6) ? memory : NULL, chance(6) ? room : 0, chance(20) ? NULL : &tracker);
+            break;
+        }
+        case 67: {
+            frz_tracker_report report;
+            const frz_particles from = some_particles(), to = some_particles();
+            report.struct_size = size_near(sizeof report);
+            if (report.struct_size > sizeof report) break;
+            (void)frz_tracker_step(c, a_tracker(), chance(20) ? NULL : &from, chance(20) ? NULL : &to, chance(4) ? number() : 0.04, chance(4) ? NULL : &report);
+            break;
+        }
+        case 68: {
+            const frz_tracker *from = a_tracker();
+            (void)frz_tracker_count(from, chance(9) ? NULL : &size);
+            (void)frz_tracker_read(from, any() % 5, span());
+            (void)frz_tracker_save(c, from, chance(4) ? NULL : memory, sizeof memory, chance(9) ? NULL : &size);
+            if (size > 0 && size <= sizeof memory) {
+                frz_tracker_params params;
+                if (chance(2)) memory[any() % size] ^= (unsigned char)any();
+                WORKS(frz_tracker_params_init(&params, sizeof params));
+                params.spacing = 0.1 + 0.1 * (any() % 4);
+                (void)frz_tracker_create(c, &params, a_mesh(), NULL, memory, chance(9) ? any() % size : size, &tracker);
+            }
+            break;
+        }
+        case 69: frz_tracker_destroy(trackers[slot]), trackers[slot] = NULL; break;
         default: frz_base_destroy(bases[slot]), bases[slot] = NULL; break;
     }
     if (mesh) frz_mesh_destroy(meshes[slot]), meshes[slot] = mesh;
@@ -496,6 +554,7 @@ static void call(void) {
     if (base) frz_base_destroy(bases[slot]), bases[slot] = base;
     if (grains) frz_grains_destroy(heaps[slot]), heaps[slot] = grains;
     if (mist) frz_mist_destroy(airs[slot]), airs[slot] = mist;
+    if (tracker) frz_tracker_destroy(trackers[slot]), trackers[slot] = tracker;
 }
 
 /* Calls `first` to `last` of a seed, in this process. */
@@ -516,7 +575,7 @@ static void calls(uint64_t seed, long first, long last) {
         if (chance(4)) frz_context_reset(ctx);
     }
     for (slot = 0; slot < HANDLES; ++slot) {
-        frz_mist_destroy(airs[slot]), frz_grains_destroy(heaps[slot]);
+        frz_tracker_destroy(trackers[slot]), frz_mist_destroy(airs[slot]), frz_grains_destroy(heaps[slot]);
         frz_base_destroy(bases[slot]), frz_grid_destroy(grids[slot]), frz_mesh_destroy(meshes[slot]);
     }
     frz_context_destroy(ctx);

@@ -356,6 +356,48 @@ class Mist(unittest.TestCase):
             mist.step((places, speeds[:1], 0.01), None, [], 0.0, 1 / 24)
 
 
+class Tracker(unittest.TestCase):
+    """A mesh follows particles."""
+
+    @staticmethod
+    def liquid(frame):
+        grid = (np.mgrid[-5:5, -5:5, -5:5].reshape(3, -1).T + 0.5) * 0.1
+        grid = grid[np.linalg.norm(grid, axis=1) < 0.5] + [0.05 * frame, 0.0, 0.02 * frame]
+        return frazil.Particles(grid, ids=np.arange(len(grid)))
+
+    def test_a_mesh_follows_and_goes_on_from_a_state(self):
+        ctx, other = frazil.Context(threads=2), frazil.Context()
+        first, second, third = (self.liquid(frame) for frame in range(3))
+        spacing = frazil.spacing(ctx, first)
+        self.assertAlmostEqual(spacing, 0.1, delta=0.01)
+        self.assertIsNone(frazil.spacing(ctx, frazil.Particles(np.zeros((20, 3)))))
+        corners = np.array([[x, y, z] for x in (0, 1) for y in (0, 1) for z in (0, 1)]) * 0.6 - 0.3
+        faces = [[0, 1, 3, 2], [4, 6, 7, 5], [0, 4, 5, 1], [2, 3, 7, 6], [0, 2, 6, 4], [1, 5, 7, 3]]
+        mesh = frazil.Mesh(ctx, corners, faces)
+        tracker = frazil.Tracker(ctx, mesh, first, spacing=0.1)
+        self.assertEqual(repr(tracker), "<frazil.Tracker of 8 vertices on particles 0.1 m apart>")
+        self.assertEqual(repr(first), f"<frazil.Particles {len(first.positions)} with ids>")
+        report = tracker.step(first, second, dt=1 / 24)
+        self.assertEqual((report.jumped, report.lost, report.born, report.died), (0, 0, 0, 0))
+        back = frazil.Tracker(other, mesh, None, spacing=0.1, state=tracker.save())
+        for one in (tracker, back):
+            one.step(second, third, dt=1 / 24)
+        self.assertEqual(back.save(), tracker.save())
+        np.testing.assert_allclose(tracker.positions, corners + [0.1, 0.0, 0.04], atol=1e-3)
+        self.assertEqual(tracker.read("P64").dtype, np.float64)
+        self.assertEqual(tracker.read("flagged").sum(), 0)
+        self.assertTrue((np.abs(tracker.read("delta")) < 0.2).all())
+        tracker.set_params(weighting="mean", change=0.25)
+        with self.assertRaisesRegex(frazil.Error, "cell = 1 cannot change"):
+            tracker.set_params(cell=1.0)
+        with self.assertRaisesRegex(TypeError, "no parameter gravitation"):
+            frazil.Tracker(ctx, mesh, first, spacing=0.1, gravitation=1)
+        with self.assertRaisesRegex(ValueError, "no array 'N'"):
+            tracker.read("N")
+        with self.assertRaisesRegex(frazil.Error, "neither ids in both frames nor velocities"):
+            tracker.step(frazil.Particles(first.positions), second, dt=1 / 24)
+
+
 class Vectors(unittest.TestCase):
     """Grids of vectors."""
 

@@ -8,8 +8,8 @@ const FIRST: Scopes = &[("surface", Scope::First)];
 const STEP: Scopes = &[("surface", Scope::Step)];
 const OUTPUT: Scopes = &[("surface", Scope::Output)];
 
-/// Last extensions of files of particles; those of Houdini's own (.bgeo.sc) are refused with advice when they are read.
-const PARTICLES: &[&str] = &["bgeo", "bhclassic", "gz", "ply", "sc", "vdb", "vtk", "vtu", "xyz"];
+/// Last extensions of files of particles: "gz" is that of .bgeo.gz.
+const PARTICLES: &[&str] = &["bgeo", "bhclassic", "gz", "ply", "vdb", "vtk", "vtu", "xyz"];
 
 /// All of them.
 pub const KEYS: &[Key] = &[
@@ -62,6 +62,23 @@ pub const KEYS: &[Key] = &[
         "how particles carry vertices: by affine maps, or by their mean as in the thesis, which lags behind",
     )
     .or("\"affine\"")
+    .concerns(STEP),
+    Key::new(
+        "surface",
+        "half_life",
+        Kind::Number(1.0e-3, 1.0e6, "s"),
+        "time in which half of the detail fades (s), but where the mesh's array `detail` is 1; left out: it stays",
+    )
+    .or_nothing()
+    .such_as("2.0")
+    .concerns(STEP),
+    Key::new(
+        "surface",
+        "fade",
+        Kind::Number(0.0, 1000.0, ""),
+        "how much detail fades where the mesh is stretched or pressed: to exp(-fade) while lengths change by a factor of e",
+    )
+    .or("0.0")
     .concerns(STEP),
     Key::new(
         "output",

@@ -50,6 +50,10 @@ pub struct Surface {
     pub change: f64,
     /// How particles carry vertices.
     pub weighting: Weighting,
+    /// Time in which half of the detail fades (s); none: it stays.
+    pub half_life: Option<f64>,
+    /// How much detail fades where the mesh is strained.
+    pub fade: f64,
     /// What is written.
     pub output: Files,
 }
@@ -94,6 +98,8 @@ impl Surface {
                 Some("mean") => Weighting::Mean,
                 _ => Weighting::Affine,
             },
+            half_life: number("half_life"),
+            fade: number("fade").unwrap_or(0.0),
             output: Files {
                 ply: asked("output.surface", "ply"),
                 obj: asked("output.surface", "obj"),

@@ -15,7 +15,7 @@ use crate::scene::shot::{
 };
 use crate::scene::text::keys::{first_of, settings_of};
 use crate::scene::{Scene, System};
-use crate::surface::{Params, StepReport, Tracker};
+use crate::surface::{Apart, Params, StepReport, Tracker};
 
 /// Name of the stage, and kind of its files.
 const NAME: &str = "surface";
@@ -69,7 +69,27 @@ impl<'a> Track<'a> {
             cell: self.surface.cell,
             change: self.surface.change,
             weighting: self.surface.weighting,
+            half_life: self.surface.half_life.unwrap_or(f64::INFINITY),
+            fade: self.surface.fade,
         }
+    }
+
+    /// An error of the mesh, with its file.
+    fn told(&self, error: Error) -> Error {
+        match error {
+            Error::Argument(what) => {
+                Error::file(self.surface.mesh.as_ref().unwrap_or(&self.surface.particles), what)
+            }
+            other => other,
+        }
+    }
+
+    /// Tells a mesh which of its detail never fades.
+    fn set_lasting(&self, tracker: &mut Tracker) -> Result<()> {
+        let is_it = |array: &&MeshArray| array.name == "detail" && array.on == On::Vertices;
+        let painted = self.inputs.mesh.arrays.iter().find(is_it);
+        let shares = painted.map(|array| array.values.iter().map(|share| *share as f32).collect());
+        tracker.set_lasting(shares.unwrap_or_default()).map_err(|error| self.told(error))
     }
 
     /// The mesh at the first frame.
@@ -77,12 +97,8 @@ impl<'a> Track<'a> {
         let frames = self.scene.shot.frames;
         let particles = liquid.at(self.surface.time(frames, frames.first))?;
         let begun = ctx.step(3, || Tracker::new(ctx, self.params(), &self.inputs.mesh.mesh, &particles));
-        let (tracker, phases) = begun.map_err(|error| match error {
-            Error::Argument(what) => {
-                Error::file(self.surface.mesh.as_ref().unwrap_or(&self.surface.particles), what)
-            }
-            other => other,
-        })?;
+        let (mut tracker, phases) = begun.map_err(|error| self.told(error))?;
+        self.set_lasting(&mut tracker)?;
         let report = StepReport { phases, ..StepReport::default() };
         Ok(At { tracker, report, particles: particles.places.len() })
     }
@@ -220,7 +236,9 @@ impl<'a> Stepping for Track<'a> {
                 let path = done.state_file(frame)?;
                 let bytes = std::fs::read(&path).map_err(|error| Error::io(&path, "read", error))?;
                 let tracker = Tracker::resume(self.params(), &self.inputs.mesh.mesh, &bytes);
-                Some(tracker.map_err(|error| Error::file(path, error.to_string()))?)
+                let mut tracker = tracker.map_err(|error| Error::file(path, error.to_string()))?;
+                self.set_lasting(&mut tracker)?;
+                Some(tracker)
             }
         };
         Ok(State { liquid, now, ahead: None })
@@ -283,7 +301,18 @@ impl<'a> Stepping for Track<'a> {
     }
 }
 
+/// Parts apart from the mesh that a report lists.
+const LISTED: usize = 100;
+
 fn told(report: &StepReport, particles: usize, tracker: &Tracker) -> Report {
+    let (drops, bubbles): (Vec<&Apart>, Vec<&Apart>) =
+        report.apart.iter().partition(|apart| apart.volume >= 0.0);
+    let listed: Vec<serde_json::Value> = report
+        .apart
+        .iter()
+        .take(LISTED)
+        .map(|apart| json!({ "at_m": <[f64; 3]>::from(apart.place), "volume_m3": apart.volume }))
+        .collect();
     let serde_json::Value::Object(results) = json!({
         "particles": particles,
         "born": report.born,
@@ -292,6 +321,11 @@ fn told(report: &StepReport, particles: usize, tracker: &Tracker) -> Report {
         "flagged": report.jumped + report.lost,
         "jumped": report.jumped,
         "lost": report.lost,
+        "drops": drops.len(),
+        "drops_m3": drops.iter().map(|drop| drop.volume).sum::<f64>(),
+        "bubbles": bubbles.len(),
+        "bubbles_m3": bubbles.iter().map(|bubble| -bubble.volume).sum::<f64>(),
+        "apart": listed,
         "parts": report.parts,
         "volume_m3": tracker.mesh().volume(),
         "particles_triangles": report.triangles,

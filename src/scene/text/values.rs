@@ -10,6 +10,7 @@ use super::key::{Fallback, Key, Kind};
 use super::table::{Table, with_value};
 use crate::error::{Error, Result};
 use crate::io::mesh::extension;
+use crate::io::particles;
 use crate::motion::is_gltf;
 use crate::scene::{Frames, KeyPose};
 
@@ -291,7 +292,9 @@ fn file(key: &Key, table: &Table, path: PathBuf, extensions: &[&str], or: &str) 
         return Ok(Value::File(path));
     }
     let name = super::name(&path);
-    Err(table.error(key.name, format!("must be {or}a {} file, not \"{name}\"", any_of(extensions))))
+    let advice = particles::advice(&path).filter(|_| extensions.contains(&"bgeo"));
+    let advice = advice.map_or(String::new(), |advice| format!(": {advice}"));
+    Err(table.error(key.name, format!("must be {or}a {} file, not \"{name}\"{advice}", any_of(extensions))))
 }
 
 /// ".glb, .gltf or .obj".

@@ -5,6 +5,7 @@ use std::fs;
 use std::path::Path;
 
 use crate::common::hero;
+use crate::common::liquids::{ball, write_cache};
 use crate::program::{CUBE, GRAINS};
 
 const README: &str = include_str!("../../../README.md");
@@ -40,6 +41,7 @@ fn lines(block: &'static str) -> Vec<&'static str> {
 fn the_readme_runs() {
     let folder = tempfile::tempdir().unwrap();
     fs::write(folder.path().join("boot.obj"), CUBE).unwrap();
+    write_cache(folder.path(), "spot", &ball(4.0, 8, 0.0), 3);
     // As in the README but for the cells: a test need not be fine.
     let scene = block(README, "## Commands", "toml").replace("cell = 0.005", "cell = 0.02");
     assert!(scene.contains("cell = 0.02"));
@@ -204,6 +206,9 @@ fn every_command_has_help_with_an_example_that_runs() {
     works(folder, "frazil vdb from-mesh box.obj --cell 0.02 -o right.vdb");
     write_grains(folder);
     write_splash(folder);
+    write_cache(folder, "spot", &ball(4.0, 8, 0.0), 3);
+    let shot = "[shot]\nframes = \"1-3\"\n[surface]\nparticles = \"spot.%04d.bgeo\"\nmesh = \"spot.ply\"\n";
+    fs::write(folder.join("spot.toml"), shot).unwrap();
     let mut commands = vec!["frazil".to_string()];
     commands.extend(commands_of(folder, "frazil"));
     for group in ["frazil vdb", "frazil mesh"] {
@@ -232,6 +237,32 @@ fn the_docs_have_every_key_of_a_scene() {
         Some(&keys[..]),
         "docs/scene.md is not what `frazil new snow --keys` says"
     );
+}
+
+#[test]
+fn the_page_of_surface_runs_and_has_every_key() {
+    let folder = tempfile::tempdir().unwrap();
+    let folder = folder.path();
+    const SURFACE: &str = include_str!("../../../docs/surface.md");
+    let keys = works(folder, "frazil new surface --keys");
+    let said = "docs/surface.md is not what `frazil new surface --keys` says";
+    assert_eq!(SURFACE.split("what follows.\n\n").nth(1), Some(&keys[..]), "{said}");
+    write_cache(folder, "spot", &ball(4.0, 8, 0.0), 41);
+    fs::create_dir(folder.join("cache")).unwrap();
+    write_cache(&folder.join("cache"), "spot", &ball(4.0, 8, 0.0), 41);
+    let scene = block(SURFACE, "## A shot", "toml").replace("0.00862", "0.01");
+    fs::write(folder.join("spot.toml"), scene).unwrap();
+    let blocks = SURFACE.split("```sh\n").skip(1).map(|text| text.split("```").next().unwrap());
+    let commands: Vec<&str> = blocks.flat_map(lines).collect();
+    assert_eq!(commands.len(), 6, "{commands:?}");
+    for line in commands {
+        // Two shots of one name are not one folder.
+        let line = if line.contains("spot.toml") { line.replace("out/", "scene/") } else { line.to_string() };
+        works(folder, &line);
+    }
+    let scene = works(folder, "frazil new surface");
+    fs::write(folder.join("new.toml"), scene.replace("\"1-120\"", "\"1-41\"")).unwrap();
+    works(folder, "frazil surface new.toml -o new/");
 }
 
 #[test]

@@ -218,6 +218,8 @@ fn what_a_mesh_cannot_follow_is_refused_with_the_file() {
     refused("surface -p none.%04d.bgeo -m ball.ply", &["none.%04d.bgeo", "no frame"]);
     refused("surface -p ball.%04d.bgeo -m ball.stl", &["ball.stl", "cannot read"]);
     refused("surface -p ball.%04d.bgeo -m ball.txt", &["mesh", ".ply"]);
+    fs::write(folder.join("own.0001.bgeo.sc"), "scf1").unwrap();
+    refused("surface -p own.%04d.bgeo.sc -m ball.ply", &["own.%04d.bgeo.sc", "Houdini"]);
     refused(&format!("{SHOT} --set surface.cel=1"), &["did you mean `cell`"]);
     refused("surface -p ball.0001.bgeo -m ball.ply --set shot.frames=1-2", &["never moves"]);
     // The mesh lies elsewhere.

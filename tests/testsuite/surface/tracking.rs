@@ -3,7 +3,7 @@
 use frazil::base::DVec3;
 use frazil::surface::{Params, Tracker, Weighting};
 
-use crate::common::liquids::{ball, context, follow, numbered, turned};
+use crate::common::liquids::{ball, context, filled, follow, numbered, turned};
 
 #[test]
 fn a_mesh_turns_and_travels_with_its_liquid() {
@@ -58,6 +58,68 @@ fn nothing_moves_and_the_order_of_particles_does_not_matter() {
     then.ids.rotate_left(7);
     other.step(&context(1), &from, &then, 0.04).unwrap();
     assert!(tracker.vertices() == other.vertices());
+}
+
+#[test]
+fn drops_apart_and_bubbles_inside_are_listed() {
+    let ctx = context(2);
+    let ball = ball(9.0, 20, 0.0);
+    let spacing = ball.spacing;
+    let still = numbered(ball.places.clone());
+    let mut tracker = Tracker::new(&ctx, Params::for_spacing(spacing), &ball.mesh, &still).unwrap();
+    let report = tracker.step(&ctx, &still, &still, 0.04).unwrap();
+    assert!(report.apart.is_empty(), "{:?}", report.apart);
+    // A hole in the middle, and a drop beside.
+    let beside = DVec3::new(18.0 * spacing, 0.0, 0.0);
+    let mut then = still.clone();
+    let middle: Vec<usize> =
+        (0..then.places.len()).filter(|n| then.places[*n].norm() < 4.6 * spacing).collect();
+    for (n, at) in middle.iter().zip(filled(spacing, 0.1, 5.0 * spacing, |p| p.norm() < 4.6 * spacing)) {
+        then.places[*n] = at + beside;
+    }
+    let report = tracker.step(&ctx, &then, &then, 0.04).unwrap();
+    assert_eq!((report.apart.len(), report.jumped + report.lost), (2, 0), "{:?}", report.apart);
+    let [drop, bubble] = if report.apart[0].volume > 0.0 { [0, 1] } else { [1, 0] }.map(|n| report.apart[n]);
+    assert!((drop.place - beside).norm() < 0.2 * spacing && drop.volume > 0.0, "{drop:?}");
+    assert!(bubble.place.norm() < 0.2 * spacing && bubble.volume < 0.0, "{bubble:?}");
+    let unit = 4.0 / 3.0 * std::f64::consts::PI * (4.6 * spacing).powi(3);
+    assert!((0.6..1.5).contains(&(drop.volume / unit)) && (0.2..1.2).contains(&(-bubble.volume / unit)));
+}
+
+#[test]
+fn detail_fades_with_time_and_strain_but_where_it_is_painted_to_last() {
+    let ctx = context(2);
+    let ball = ball(5.0, 12, 0.25);
+    let still = numbered(ball.places.clone());
+    let usual = Params::for_spacing(ball.spacing);
+    let begin = |params: Params| {
+        let mut tracker = Tracker::new(&ctx, params, &ball.mesh, &still).unwrap();
+        let painted = ball.mesh.positions.iter().map(|place| if place.x > 0.0 { 1.0 } else { 0.0 });
+        tracker.set_lasting(painted.collect()).unwrap();
+        tracker
+    };
+    let shares = |before: &[f32], tracker: &Tracker| -> [f32; 2] {
+        let mut out = [f32::NAN; 2];
+        for (vertex, place) in ball.mesh.positions.iter().enumerate() {
+            out[usize::from(place.x > 0.0)] = tracker.delta()[vertex] / before[vertex];
+        }
+        out
+    };
+    // Half a second at a half-life of one, in four steps.
+    let mut tracker = begin(Params { half_life: 1.0, ..usual });
+    let before = tracker.delta().to_vec();
+    (0..4).for_each(|_| drop(tracker.step(&ctx, &still, &still, 0.125).unwrap()));
+    let [faded, kept] = shares(&before, &tracker);
+    assert!((faded - 0.5f32.sqrt()).abs() < 1e-4 && kept == 1.0, "{faded} {kept}");
+    let resumed = Tracker::resume(usual, &ball.mesh, &tracker.save()).unwrap();
+    assert_eq!((resumed.delta(), resumed.vertices()), (tracker.delta(), tracker.vertices()));
+    // A ball that swells by a factor of 1.2 along all axes.
+    let mut tracker = begin(Params { fade: 2.0, ..usual });
+    let swollen = numbered(ball.places.iter().map(|place| place * 1.2).collect());
+    tracker.step(&ctx, &still, &swollen, 0.125).unwrap();
+    let [faded, kept] = shares(&before, &tracker);
+    assert!((faded - 1.0 / 1.44).abs() < 0.02 && kept == 1.0, "{faded} {kept}");
+    assert!(tracker.set_lasting(vec![0.5]).is_err() && tracker.set_lasting(vec![2.0; before.len()]).is_err());
 }
 
 #[test]

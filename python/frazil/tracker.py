@@ -1,0 +1,118 @@
+"""Trackers: detailed meshes that follow the particles of a liquid."""
+
+import ctypes as c
+
+import numpy as np
+
+from ._library import Handle, ParticlesDesc, TrackerParams, TrackerReport, View, call, made, rows, saved, span, view
+
+# Arrays by their usual names: the number in the header, the type, and how many of it a vertex has.
+ARRAYS = {
+    "P": (0, np.float32, 3), "P64": (1, np.float64, 3), "delta": (2, np.float32, 1), "flagged": (3, np.int32, 1),
+}
+WEIGHTINGS = {"affine": 0, "mean": 1}
+
+
+class Particles:
+    """The particles of a liquid at one time: positions (n, 3) in metres, velocities (n, 3) in m/s, ids (n,) of 64 bits. Ids or
+    velocities may be left out. What is an array of the right type is not copied: leave it as it is while a call reads it."""
+
+    def __init__(self, positions, velocities=None, ids=None):
+        self.positions = rows(positions, np.float64, 3)
+        self.velocities = None if velocities is None else rows(velocities, np.float32, 3)
+        self.ids = None if ids is None else np.ascontiguousarray(ids, np.int64).reshape(-1)
+
+    def _desc(self):
+        none = View(None, 0, 0)
+        velocities, ids = (none if array is None else view(array) for array in (self.velocities, self.ids))
+        return ParticlesDesc(c.sizeof(ParticlesDesc), 0, view(self.positions), velocities, ids)
+
+    def __repr__(self):
+        known = [name for name in ("velocities", "ids") if getattr(self, name) is not None]
+        return f"<frazil.Particles {len(self.positions)} with {' and '.join(known) or 'places only'}>"
+
+
+def spacing(ctx, particles):
+    """The initial distance between particles (m), estimated; None where they are too few to tell, or lie at one place."""
+    out = c.c_double()
+    call("particles_spacing", ctx.pointer, c.byref(particles._desc()), c.byref(out))
+    return out.value or None
+
+
+class Tracker(Handle):
+    """A detailed mesh that follows the particles of a liquid.
+
+    mesh: a frazil.Mesh at the first frame, in the particles' space.
+    particles: frazil.Particles at the first frame; None with a state.
+    spacing: initial distance r between particles (m): see frazil.spacing.
+    weighting: "affine" or "mean".
+    Further parameters, as in frz_tracker_params: cell and change (r), half_life (s), fade.
+    state: bytes of save(), to go on from.
+    """
+
+    _destroy = "frz_tracker_destroy"
+
+    def __init__(self, ctx, mesh, particles, spacing, state=None, **more):
+        params = self._params(spacing, **more)
+        first = None if particles is None else c.byref(particles._desc())
+        super().__init__(made("tracker_create", ctx.pointer, c.byref(params), mesh.pointer, first, state,
+                              len(state) if state else 0))
+        self._ctx, self._spacing = ctx, spacing
+
+    def _words(self):
+        return f"of {len(self)} vertices on particles {self._spacing:g} m apart"
+
+    @staticmethod
+    def _params(spacing, weighting="affine", **more):
+        params = TrackerParams()
+        call("tracker_params_init", c.byref(params), c.sizeof(params))
+        params.spacing = spacing
+        if weighting not in WEIGHTINGS:
+            raise ValueError(f"weighting is {weighting!r}, not {' or '.join(WEIGHTINGS)}")
+        params.weighting = WEIGHTINGS[weighting]
+        for name, value in more.items():
+            if name in ("struct_size", "flags", "reserved") or name not in dict(TrackerParams._fields_):
+                raise TypeError(f"trackers have no parameter {name}")
+            setattr(params, name, value)
+        return params
+
+    def set_params(self, **more):
+        """How the mesh follows from the next step on; those not given are the usual ones. Spacing and cell stay."""
+        params = self._params(self._spacing, **more)
+        call("tracker_set_params", self.pointer, c.byref(params))
+
+    def step(self, before, after, dt):
+        """Moves the mesh with its frazil.Particles from one time to another, dt seconds later; the report, as
+        frz_tracker_report has it."""
+        report = TrackerReport(c.sizeof(TrackerReport))
+        call("tracker_step", self._ctx.pointer, self.pointer, c.byref(before._desc()), c.byref(after._desc()), dt,
+             c.byref(report))
+        return report
+
+    def __len__(self):
+        count = c.c_size_t()
+        call("tracker_count", self.pointer, c.byref(count))
+        return count.value
+
+    def __bool__(self):
+        """A handle is one, also without any vertices."""
+        return True
+
+    def read(self, name):
+        """A copy of an array of the vertices, in the mesh's order: P (n, 3), P64, places in 64 bits, delta (n,), the distance kept
+        from the particles' surface (m), flagged (n,), 1 where the last step could not project."""
+        if name not in ARRAYS:
+            raise ValueError(f"trackers have no array {name!r}, but {', '.join(ARRAYS)}")
+        number, kind, width = ARRAYS[name]
+        out = np.empty((len(self), width), kind)
+        call("tracker_read", self.pointer, number, span(out))
+        return out if width > 1 else out[:, 0]
+
+    @property
+    def positions(self):
+        """(n, 3) floats (m)."""
+        return self.read("P")
+
+    def save(self):
+        """The state, for a cache: bytes that Tracker(..., state=...) goes on from."""
+        return saved("tracker_save", self._ctx, self.pointer)

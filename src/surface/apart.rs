@@ -1,0 +1,109 @@
+//! Parts of the particles' surface that the mesh does not cover: drops that fly apart from it, bubbles inside. They have no vertices.
+
+use rayon::prelude::*;
+
+use super::cells::Coord;
+use super::implicit::{Implicit, SIDE};
+use super::isosurface::Isosurface;
+use crate::base::DVec3;
+
+/// A part of the particles' surface on which no vertex of the mesh lies.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Apart {
+    /// Its middle: the mean of its corners (m).
+    pub place: DVec3,
+    /// What it encloses (m3); negative: a bubble.
+    pub volume: f64,
+    /// Its triangles.
+    pub triangles: usize,
+}
+
+/// The parts on which none of the feet lies, which are in these cells of phi's grid; the largest first.
+pub fn parts(phi: &Implicit, surface: &Isosurface, mut feet: Vec<Coord>) -> Vec<Apart> {
+    feet.par_sort_unstable();
+    feet.dedup();
+    let part_of = connected(surface);
+    let count = part_of.iter().map(|part| *part as usize + 1).max().unwrap_or(0);
+    let place = |vertex: u32| {
+        let (patch, at) = surface.place(phi, vertex);
+        DVec3::from(patch.map(|x| f64::from(x * SIDE))) + DVec3::from(at.map(f64::from))
+    };
+    let mut is_covered = vec![false; count];
+    for (vertex, part) in (0..).zip(&part_of) {
+        let part = *part as usize;
+        if !is_covered[part] {
+            let place = place(vertex);
+            is_covered[part] = is_near(&feet, [0, 1, 2].map(|axis| place[axis].floor() as i32));
+        }
+    }
+    if is_covered.iter().all(|covered| *covered) {
+        return Vec::new();
+    }
+    // Sums of corners and their count, six times the volume from the first corner, triangles.
+    let mut sums = vec![(DVec3::zeros(), 0usize, 0.0f64, 0usize); count];
+    let mut firsts: Vec<Option<DVec3>> = vec![None; count];
+    for triangle in surface.runs().flat_map(|(_, triangles)| triangles) {
+        let part = part_of[triangle[0] as usize] as usize;
+        if is_covered[part] {
+            continue;
+        }
+        let [a, b, c] = triangle.map(place);
+        let origin = *firsts[part].get_or_insert(a);
+        let sum = &mut sums[part];
+        sum.0 += a + b + c;
+        sum.1 += 3;
+        sum.2 += (a - origin).dot(&(b - origin).cross(&(c - origin)));
+        sum.3 += 1;
+    }
+    let cell = phi.cell();
+    let told = sums.into_iter().filter(|sum| sum.3 > 0).map(|(corners, count, six, triangles)| Apart {
+        place: corners / count as f64 * cell,
+        volume: six / 6.0 * cell.powi(3),
+        triangles,
+    });
+    let mut out: Vec<Apart> = told.collect();
+    out.sort_by(|a, b| b.volume.abs().total_cmp(&a.volume.abs()));
+    out
+}
+
+/// Whether a foot lies in a cell or in one beside it.
+fn is_near(feet: &[Coord], cell: Coord) -> bool {
+    (-1..=1).any(|x| {
+        (-1..=1).any(|y| {
+            // The three along z are neighbours in the order.
+            let low = [cell[0] + x, cell[1] + y, cell[2] - 1];
+            let at = feet.partition_point(|foot| *foot < low);
+            feet.get(at).is_some_and(|foot| foot[..2] == low[..2] && foot[2] <= cell[2] + 1)
+        })
+    })
+}
+
+/// The part of each vertex, counted in the order of their first vertices.
+fn connected(surface: &Isosurface) -> Vec<u32> {
+    let mut parent: Vec<u32> = (0..surface.vertices() as u32).collect();
+    fn root(parent: &mut [u32], mut at: u32) -> u32 {
+        while parent[at as usize] != at {
+            parent[at as usize] = parent[parent[at as usize] as usize];
+            at = parent[at as usize];
+        }
+        at
+    }
+    for [a, b, c] in surface.runs().flat_map(|(_, triangles)| triangles) {
+        for other in [b, c] {
+            let [from, to] = [a, other].map(|vertex| root(&mut parent, *vertex));
+            // The lesser is the root: it comes first.
+            parent[from.max(to) as usize] = from.min(to);
+        }
+    }
+    let mut numbers = vec![u32::MAX; parent.len()];
+    let mut count = 0;
+    for vertex in 0..parent.len() as u32 {
+        let root = root(&mut parent, vertex) as usize;
+        if numbers[root] == u32::MAX {
+            numbers[root] = count;
+            count += 1;
+        }
+        numbers[vertex as usize] = numbers[root];
+    }
+    numbers
+}

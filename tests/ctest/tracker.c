@@ -1,0 +1,317 @@
+/* A mesh that follows particles: steps, states, cancels, and what is refused. */
+#include "check.h"
+
+#include <math.h>
+#include <pthread.h>
+#include <stddef.h>
+
+/* A ball of particles on a grid, 0.05 m apart, which turns about y and travels along x. */
+#define SPACING 0.05
+#define DT (1.0 / 24)
+enum { HALF = 6, MOST = (2 * HALF) * (2 * HALF) * (2 * HALF) };
+
+typedef struct liquid {
+    double positions[MOST][3];
+    float velocities[MOST][3];
+    int64_t ids[MOST];
+    size_t count;
+} liquid;
+
+static void turn(const double *from, double frame, double *to) {
+    const double angle = 0.1 * frame, c = cos(angle), s = sin(angle);
+    to[0] = c * from[0] + s * from[2] + 0.02 * frame, to[1] = from[1], to[2] = c * from[2] - s * from[0];
+}
+
+/* Those of a frame; backwards in another order. */
+static void flow(liquid *out, double frame, int backwards) {
+    int x, y, z;
+    size_t at = 0;
+    for (x = -HALF; x < HALF; ++x)
+        for (y = -HALF; y < HALF; ++y)
+            for (z = -HALF; z < HALF; ++z) {
+                const double place[3] = {(x + 0.5) * SPACING, (y + 0.5) * SPACING, (z + 0.5) * SPACING};
+                if (place[0] * place[0] + place[1] * place[1] + place[2] * place[2] > HALF * HALF * SPACING * SPACING) continue;
+                turn(place, frame, out->positions[at]);
+                out->velocities[at][0] = (float)((0.1 * (out->positions[at][2]) + 0.02) / DT);
+                out->velocities[at][1] = 0;
+                out->velocities[at][2] = (float)(-0.1 * (out->positions[at][0] - 0.02 * frame) / DT);
+                out->ids[at] = 1000 + (int64_t)at;
+                ++at;
+            }
+    out->count = at;
+    for (at = 0; backwards && at < out->count / 2; ++at) {
+        const size_t other = out->count - 1 - at;
+        const liquid *whole = out;
+        double place[3];
+        const int64_t id = whole->ids[at];
+        memcpy(place, out->positions[at], sizeof place);
+        memcpy(out->positions[at], out->positions[other], sizeof place);
+        memcpy(out->positions[other], place, sizeof place);
+        out->ids[at] = out->ids[other], out->ids[other] = id;
+    }
+}
+
+static frz_particles of(const liquid *from, int with_ids, int with_velocities) {
+    frz_particles out;
+    memset(&out, 0, sizeof out);
+    out.struct_size = sizeof out;
+    out.positions = VIEW(from->positions, from->count);
+    if (with_ids) out.ids = VIEW(from->ids, from->count);
+    if (with_velocities) out.velocities = VIEW(from->velocities, from->count);
+    return out;
+}
+
+static frz_mesh *mesh_of(frz_context *ctx, float radius) {
+    static ball rest;
+    ball_make(&rest, radius);
+    return ball_mesh(ctx, &rest);
+}
+
+static frz_tracker_params usual(void) {
+    frz_tracker_params params;
+    WORKS(frz_tracker_params_init(&params, sizeof params));
+    CHECK(params.cell == 0.5 && params.change == 0.5 && params.weighting == FRZ_TRACKER_AFFINE);
+    CHECK(isinf(params.half_life) && params.fade == 0);
+    params.spacing = SPACING;
+    return params;
+}
+
+static liquid frames[4], backwards[4];
+
+static frz_tracker *begin(frz_context *ctx, const frz_mesh *mesh, bytes state) {
+    const frz_tracker_params params = usual();
+    const frz_particles first = of(&frames[0], 1, 0);
+    frz_tracker *tracker = NULL;
+    WORKS(frz_tracker_create(ctx, &params, mesh, state.data ? NULL : &first, state.data, state.size, &tracker));
+    return tracker;
+}
+
+static const bytes NOTHING = {NULL, 0};
+
+static void steps(void) {
+    frz_context *ctx = context_on(2), *alone = context_on(0);
+    frz_mesh *mesh = mesh_of(ctx, 0.31f);
+    frz_tracker *tracker = begin(ctx, mesh, NOTHING), *other = begin(alone, mesh, NOTHING), *back;
+    static double before[BALL_VERTICES][3], after[BALL_VERTICES][3];
+    static float places[BALL_VERTICES][3], delta[BALL_VERTICES];
+    static int32_t flagged[BALL_VERTICES];
+    size_t count = 0, vertex;
+    int frame;
+    double spacing = 0;
+    bytes state, again;
+    const frz_particles first = of(&frames[0], 1, 0);
+    WORKS(frz_particles_spacing(ctx, &first, &spacing));
+    CHECK(fabs(spacing / SPACING - 1) < 0.05);
+    WORKS(frz_tracker_count(tracker, &count));
+    CHECK(count == BALL_VERTICES);
+    WORKS(frz_tracker_read(tracker, FRZ_TRACKER_POSITION_DOUBLE, SPAN(before, count)));
+    WORKS(frz_tracker_read(tracker, FRZ_TRACKER_DELTA, SPAN(delta, count)));
+    for (vertex = 0; vertex < count; ++vertex) CHECK(fabsf(delta[vertex]) < 0.5f * (float)SPACING);
+    for (frame = 0; frame < 3; ++frame) {
+        const frz_particles from = of(&frames[frame], 1, 0), to = of(&frames[frame + 1], 1, 0);
+        const frz_particles same = of(&backwards[frame], 1, 0), then = of(&frames[frame + 1], 1, 0);
+        frz_tracker_report report;
+        report.struct_size = sizeof report;
+        WORKS(frz_tracker_step(ctx, tracker, &from, &to, DT, &report));
+        CHECK(report.jumped == 0 && report.lost == 0 && report.born == 0 && report.died == 0);
+        CHECK(report.parts > 0 && report.triangles > 100 && report.drops == 0 && report.bubbles == 0);
+        /* In another order, and on another number of threads, it is the same. */
+        WORKS(frz_tracker_step(alone, other, &same, &then, DT, NULL));
+    }
+    WORKS(frz_tracker_read(tracker, FRZ_TRACKER_POSITION_DOUBLE, SPAN(after, count)));
+    WORKS(frz_tracker_read(tracker, FRZ_TRACKER_POSITION, SPAN(places, count)));
+    WORKS(frz_tracker_read(tracker, FRZ_TRACKER_FLAGGED, SPAN(flagged, count)));
+    for (vertex = 0; vertex < count; ++vertex) {
+        double truth[3];
+        int axis;
+        turn(before[vertex], 3, truth);
+        CHECK(flagged[vertex] == 0);
+        for (axis = 0; axis < 3; ++axis) {
+            CHECK(fabs(after[vertex][axis] - truth[axis]) < 0.02 * SPACING);
+            CHECK(places[vertex][axis] == (float)after[vertex][axis]);
+        }
+    }
+    state = tracker_state(ctx, tracker), again = tracker_state(alone, other);
+    CHECK(same_bytes(state, again));
+    free(again.data);
+    back = begin(alone, mesh, state);
+    again = tracker_state(alone, back);
+    CHECK(same_bytes(state, again));
+    free(again.data), free(state.data);
+    FAILS(frz_tracker_read(tracker, FRZ_TRACKER_DELTA, SPAN(delta, count - 1)), FRZ_ERROR_CAPACITY, "dst");
+    FAILS(frz_tracker_read(tracker, 4, SPAN(delta, count)), FRZ_ERROR_ARGUMENT, "array = 4");
+    frz_tracker_destroy(back), frz_tracker_destroy(other), frz_tracker_destroy(tracker), frz_tracker_destroy(NULL);
+    frz_mesh_destroy(mesh);
+    frz_context_destroy(alone), frz_context_destroy(ctx);
+}
+
+/* Velocities in the place of ids. */
+static void velocities(void) {
+    frz_context *ctx = context_on(1);
+    frz_mesh *mesh = mesh_of(ctx, 0.31f);
+    frz_tracker *tracker = begin(ctx, mesh, NOTHING);
+    const frz_particles from = of(&frames[0], 0, 1), to = of(&frames[1], 0, 0), none = of(&frames[0], 0, 0);
+    frz_tracker_report report;
+    report.struct_size = sizeof report, report.jumped = 7;
+    WORKS(frz_tracker_step(ctx, tracker, &from, &to, DT, NULL));
+    FAILS(frz_tracker_step(ctx, tracker, &none, &to, DT, &report), FRZ_ERROR_ARGUMENT, "neither ids");
+    CHECK(report.jumped == 0);
+    frz_tracker_destroy(tracker);
+    frz_mesh_destroy(mesh);
+    frz_context_destroy(ctx);
+}
+
+/* A step that looks at itself from within. */
+typedef struct watch {
+    frz_context *ctx;
+    frz_tracker *tracker;
+    int polls;
+} watch;
+
+static int try_others(void *user, const frz_progress *progress) {
+    watch *state = user;
+    const frz_tracker_params params = usual();
+    const frz_particles from = of(&frames[0], 1, 0);
+    float place[3];
+    size_t size = 7;
+    (void)progress;
+    ++state->polls;
+    CHECK(frz_tracker_step(state->ctx, state->tracker, &from, &from, DT, NULL) == FRZ_ERROR_BUSY);
+    CHECK(frz_tracker_set_params(state->tracker, &params) == FRZ_ERROR_BUSY);
+    CHECK(frz_tracker_read(state->tracker, FRZ_TRACKER_POSITION, SPAN(place, 1)) == FRZ_ERROR_BUSY);
+    CHECK(frz_tracker_save(state->ctx, state->tracker, NULL, 0, &size) == FRZ_ERROR_BUSY && size == 0);
+    frz_tracker_destroy(state->tracker);
+    CHECK(strstr(frz_last_error(), "in use") != NULL);
+    return 0;
+}
+
+static void *cancel_soon(void *user) {
+    frz_context_cancel(user);
+    return NULL;
+}
+
+static void cancels(void) {
+    frz_context *quiet = context_on(2);
+    frz_mesh *mesh = mesh_of(quiet, 0.31f);
+    frz_tracker *tracker = begin(quiet, mesh, NOTHING);
+    const frz_particles from = of(&frames[0], 1, 0), to = of(&frames[1], 1, 0);
+    bytes before = tracker_state(quiet, tracker), want, got;
+    uint32_t threads;
+    WORKS(frz_tracker_step(quiet, tracker, &from, &to, DT, NULL));
+    want = tracker_state(quiet, tracker);
+    frz_tracker_destroy(tracker);
+    tracker = begin(quiet, mesh, before);
+    for (threads = 0; threads <= 2; threads += 2) {
+        frz_context *ctx = context_on(threads);
+        watch inner = {NULL, NULL, 0};
+        hasty state = {NULL, 0, 0};
+        frz_status status = FRZ_CANCELLED;
+        pthread_t thread;
+        state.ctx = ctx;
+        for (state.at = 1; status != FRZ_OK; ++state.at) {
+            frz_tracker_report report;
+            report.struct_size = sizeof report, report.triangles = 1;
+            state.polls = 0;
+            WORKS(frz_context_set_poll(ctx, cancel_and_reset, &state));
+            status = frz_tracker_step(ctx, tracker, &from, &to, DT, &report);
+            WORKS(frz_context_set_poll(ctx, NULL, NULL));
+            CHECK(status == FRZ_OK || (status == FRZ_CANCELLED && report.triangles == 0));
+            got = tracker_state(quiet, tracker);
+            CHECK(same_bytes(got, status == FRZ_OK ? want : before));
+            free(got.data);
+        }
+        CHECK(state.at > 2);
+        frz_tracker_destroy(tracker);
+        tracker = begin(quiet, mesh, before);
+        /* From another thread, at any time. */
+        CHECK(pthread_create(&thread, NULL, cancel_soon, ctx) == 0);
+        status = frz_tracker_step(ctx, tracker, &from, &to, DT, NULL);
+        pthread_join(thread, NULL);
+        CHECK(status == FRZ_OK || status == FRZ_CANCELLED);
+        got = tracker_state(quiet, tracker);
+        CHECK(same_bytes(got, status == FRZ_OK ? want : before));
+        free(got.data);
+        frz_context_reset(ctx);
+        frz_tracker_destroy(tracker);
+        tracker = begin(quiet, mesh, before);
+        inner.ctx = ctx, inner.tracker = tracker;
+        WORKS(frz_context_set_poll(ctx, try_others, &inner));
+        WORKS(frz_tracker_step(ctx, tracker, &from, &to, DT, NULL));
+        WORKS(frz_context_set_poll(ctx, NULL, NULL));
+        CHECK(inner.polls > 0);
+        frz_tracker_destroy(tracker);
+        tracker = begin(quiet, mesh, before);
+        frz_context_destroy(ctx);
+    }
+    frz_tracker_destroy(tracker);
+    free(before.data), free(want.data);
+    frz_mesh_destroy(mesh);
+    frz_context_destroy(quiet);
+}
+
+static void refusals(void) {
+    frz_context *ctx = context_on(1);
+    frz_mesh *mesh = mesh_of(ctx, 0.31f), *other = mesh_of(ctx, 0.2f);
+    frz_tracker *tracker = begin(ctx, mesh, NOTHING), *none = (frz_tracker *)ctx;
+    frz_tracker_params params = usual();
+    frz_particles first = of(&frames[0], 1, 1), then = of(&frames[1], 1, 1);
+    bytes state = tracker_state(ctx, tracker);
+    static liquid far;
+    size_t at;
+    params.spacing = 0;
+    FAILS(frz_tracker_create(ctx, &params, mesh, &first, NULL, 0, &none), FRZ_ERROR_ARGUMENT, "spacing = 0");
+    CHECK(none == NULL);
+    params = usual();
+    params.cell = 4;
+    FAILS(frz_tracker_create(ctx, &params, mesh, &first, NULL, 0, &none), FRZ_ERROR_ARGUMENT, "cell = 4");
+    FAILS(frz_tracker_set_params(tracker, &params), FRZ_ERROR_ARGUMENT, "cell = 4");
+    params = usual();
+    params.weighting = 2;
+    FAILS(frz_tracker_create(ctx, &params, mesh, &first, NULL, 0, &none), FRZ_ERROR_ARGUMENT, "weighting = 2");
+    params = usual();
+    params.cell = 1;
+    FAILS(frz_tracker_set_params(tracker, &params), FRZ_ERROR_ARGUMENT, "cell = 1 cannot change");
+    FAILS(frz_tracker_create(ctx, &params, mesh, NULL, state.data, state.size, &none), FRZ_ERROR_FILE, "cell");
+    params = usual();
+    params.change = 0.25;
+    WORKS(frz_tracker_set_params(tracker, &params));
+    FAILS(frz_tracker_create(ctx, &params, mesh, NULL, NULL, 0, &none), FRZ_ERROR_ARGUMENT, "frz_particles");
+    FAILS(frz_tracker_create(ctx, &params, NULL, &first, NULL, 0, &none), FRZ_ERROR_ARGUMENT, "mesh");
+    FAILS(frz_tracker_create(ctx, &params, mesh, NULL, state.data, state.size - 1, &none), FRZ_ERROR_FILE, "state");
+    ((unsigned char *)state.data)[state.size / 2] ^= 1;
+    FAILS(frz_tracker_create(ctx, &params, mesh, NULL, state.data, state.size, &none), FRZ_ERROR_FILE, "damaged");
+    /* Elsewhere. */
+    far = frames[0];
+    for (at = 0; at < far.count; ++at) far.positions[at][1] += 100;
+    then = of(&far, 1, 1);
+    FAILS(frz_tracker_create(ctx, &params, mesh, &then, NULL, 0, &none), FRZ_ERROR_ARGUMENT, "same space");
+    /* Particles that are none, or not what they should be. */
+    FAILS(frz_tracker_step(ctx, tracker, &first, &first, 0, NULL), FRZ_ERROR_ARGUMENT, "0 s");
+    FAILS(frz_tracker_step(ctx, tracker, &first, &first, NAN, NULL), FRZ_ERROR_ARGUMENT, "dt");
+    first.positions.count = 0;
+    FAILS(frz_tracker_step(ctx, tracker, &first, &then, DT, NULL), FRZ_ERROR_ARGUMENT, "no particles");
+    first = of(&frames[0], 1, 1);
+    first.ids.count -= 1;
+    FAILS(frz_tracker_step(ctx, tracker, &first, &then, DT, NULL), FRZ_ERROR_ARGUMENT, "ids");
+    far = frames[0];
+    far.ids[5] = far.ids[9];
+    first = of(&far, 1, 1);
+    FAILS(frz_tracker_step(ctx, tracker, &first, &then, DT, NULL), FRZ_ERROR_ARGUMENT, "same id, 1009");
+    far.positions[17][2] = INFINITY;
+    first = of(&far, 0, 1);
+    FAILS(frz_tracker_step(ctx, tracker, &first, &then, DT, NULL), FRZ_ERROR_ARGUMENT, "particle 18 is not finite");
+    frz_tracker_destroy(tracker);
+    frz_mesh_destroy(other), frz_mesh_destroy(mesh);
+    free(state.data);
+    frz_context_destroy(ctx);
+}
+
+int main(void) {
+    int frame;
+    for (frame = 0; frame < 4; ++frame) flow(&frames[frame], frame, 0), flow(&backwards[frame], frame, 1);
+    steps();
+    velocities();
+    cancels();
+    refusals();
+    return 0;
+}
