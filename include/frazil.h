@@ -36,7 +36,7 @@
 /**
  * Version of the interface that this header describes: major << 16 | minor.
  */
-#define FRZ_ABI_VERSION 65539
+#define FRZ_ABI_VERSION 65540
 
 /**
  * Version of frazil that this header belongs to.
@@ -450,6 +450,65 @@ typedef uint32_t frz_smoothing;
 #endif // __cplusplus
 
 /**
+ * What frz_tracker_read reads of each vertex, in the mesh's order.
+ */
+enum frz_tracker_array
+#if defined(__cplusplus) || __STDC_VERSION__ >= 202311L
+  : uint32_t
+#endif // defined(__cplusplus) || __STDC_VERSION__ >= 202311L
+ {
+    /**
+     * float[3]: its place (m).
+     */
+    FRZ_TRACKER_POSITION = 0,
+    /**
+     * double[3]: its place (m), as exactly as it is known: also far from the origin. The next step's, less these, over dt are the
+     * velocities for motion blur.
+     */
+    FRZ_TRACKER_POSITION_DOUBLE = 1,
+    /**
+     * float: the distance that it keeps from the particles' surface (m), negative inside; NaN: it was too far away to have one.
+     */
+    FRZ_TRACKER_DELTA = 2,
+    /**
+     * int32_t: 1 where the last step could not project it, else 0.
+     */
+    FRZ_TRACKER_FLAGGED = 3,
+};
+#ifndef __cplusplus
+#if __STDC_VERSION__ >= 202311L
+typedef enum frz_tracker_array frz_tracker_array;
+#else
+typedef uint32_t frz_tracker_array;
+#endif // __STDC_VERSION__ >= 202311L
+#endif // __cplusplus
+
+/**
+ * How particles carry vertices.
+ */
+enum frz_tracker_weighting
+#if defined(__cplusplus) || __STDC_VERSION__ >= 202311L
+  : uint32_t
+#endif // defined(__cplusplus) || __STDC_VERSION__ >= 202311L
+ {
+    /**
+     * By affine maps: exact where the liquid turns and stretches.
+     */
+    FRZ_TRACKER_AFFINE = 0,
+    /**
+     * By their mean, as in the thesis: it lags behind.
+     */
+    FRZ_TRACKER_MEAN = 1,
+};
+#ifndef __cplusplus
+#if __STDC_VERSION__ >= 202311L
+typedef enum frz_tracker_weighting frz_tracker_weighting;
+#else
+typedef uint32_t frz_tracker_weighting;
+#endif // __STDC_VERSION__ >= 202311L
+#endif // __cplusplus
+
+/**
  * The type of a grid's values.
  */
 enum frz_value_type
@@ -509,6 +568,11 @@ typedef struct frz_mist frz_mist;
  * Worker threads, shared by any number of contexts.
  */
 typedef struct frz_pool frz_pool;
+
+/**
+ * A detailed mesh that follows the particles of a liquid.
+ */
+typedef struct frz_tracker frz_tracker;
 
 /**
  * What is being done.
@@ -1261,6 +1325,120 @@ typedef struct {
      */
     double fastest;
 } frz_mist_report;
+
+/**
+ * How a mesh follows particles. All of it but the spacing and the cell may change between steps.
+ */
+typedef struct {
+    /**
+     * sizeof(frz_tracker_params).
+     */
+    uint32_t struct_size;
+    /**
+     * 0.
+     */
+    uint32_t flags;
+    /**
+     * Initial distance r between particles (m), 1e-9 to 1e6: see frz_particles_spacing. No usual one: it must be set.
+     */
+    double spacing;
+    /**
+     * Edge of a cell of the particles' surface (r), 0.125 to 2; 0.5 is usual.
+     */
+    double cell;
+    /**
+     * Vertices that would be moved farther (r) to keep their detail are flagged, 0.001 to 100: the liquid has merged or split
+     * there. 0.5 is usual.
+     */
+    double change;
+    /**
+     * Time (s) in which half of the detail fades, above 0; infinite, as is usual: it stays. It stays anyway where the mesh's attribute
+     * "detail" of one float is 1, and fades as fast as this says where that is 0.
+     */
+    double half_life;
+    /**
+     * How much detail fades where the mesh is strained: to exp(-fade) of it while lengths change by a factor of e, 0 to 1000; 0,
+     * as is usual: not at all.
+     */
+    double fade;
+    /**
+     * A frz_tracker_weighting; FRZ_TRACKER_AFFINE is usual.
+     */
+    uint32_t weighting;
+    /**
+     * 0.
+     */
+    uint32_t reserved;
+} frz_tracker_params;
+
+/**
+ * The particles of a liquid at one time. Their order does not matter.
+ */
+typedef struct {
+    /**
+     * sizeof(frz_particles).
+     */
+    uint32_t struct_size;
+    /**
+     * 0.
+     */
+    uint32_t flags;
+    /**
+     * double[3] for each particle (m), finite.
+     */
+    frz_view positions;
+    /**
+     * float[3] for each particle (m/s), finite; data NULL with a count of 0: not known.
+     */
+    frz_view velocities;
+    /**
+     * int64_t for each particle, no two the same: a particle keeps its own from time to time; data NULL with a count of 0: not
+     * known.
+     */
+    frz_view ids;
+} frz_particles;
+
+/**
+ * What a step did.
+ */
+typedef struct {
+    /**
+     * sizeof(frz_tracker_report), set by the caller.
+     */
+    uint32_t struct_size;
+    /**
+     * Parts into which the step was divided, for no particle to move farther than its spacing in one.
+     */
+    uint32_t parts;
+    /**
+     * Vertices whose projection jumped: the liquid merged or split there. They are flagged.
+     */
+    uint64_t jumped;
+    /**
+     * Vertices whose projection did not find the particles' surface. They are flagged.
+     */
+    uint64_t lost;
+    /**
+     * Particles that are new.
+     */
+    uint64_t born;
+    /**
+     * Particles that are gone.
+     */
+    uint64_t died;
+    /**
+     * Triangles of the particles' own surface.
+     */
+    uint64_t triangles;
+    /**
+     * Parts of that surface that the mesh does not cover: drops outside of it.
+     */
+    uint64_t drops;
+    /**
+     * The same: bubbles inside.
+     */
+    uint64_t bubbles;
+} frz_tracker_report;
 
 /**
  * How long a phase took.
@@ -2409,6 +2587,123 @@ frz_status frz_mist_save(frz_context *context,
                          void *dst,
                          size_t capacity,
                          size_t *size);
+
+/**
+ * Fills parameters with the usual values; the spacing must be set.
+ *
+ * params: receives them.
+ * size: sizeof(frz_tracker_params).
+ *
+ * Any thread.
+ */
+frz_status frz_tracker_params_init(frz_tracker_params *params, size_t size);
+
+/**
+ * Estimates the initial distance between particles: from the median of the mean distances to the six nearest ones.
+ *
+ * particles: as they are at the first frame.
+ * spacing: receives it (m); 0 where there are too few particles, or too many at one place, to tell, and after a failure.
+ *
+ * One thread at a time for each context.
+ */
+frz_status frz_particles_spacing(frz_context *context,
+                                 const frz_particles *particles,
+                                 double *spacing);
+
+/**
+ * Makes a mesh that follows particles: as it is at the first frame, or in a state that frz_tracker_save wrote.
+ *
+ * params: see frz_tracker_params.
+ * mesh: at the first frame, in the particles' space; also with a restart. It is copied, and may be open, cross itself and repeat
+ *     vertices. FRZ_ERROR_ARGUMENT says where it is not where the particles are.
+ * particles: at the first frame; NULL with a restart.
+ * restart: restart_bytes bytes of frz_tracker_save of a tracker of the same mesh, spacing and cell: it comes back bit for bit, on
+ *     any number of threads. NULL: none. Bytes that are damaged, of another version, mesh, spacing or cell are FRZ_ERROR_FILE.
+ * restart_bytes: 0 without a restart.
+ * out: receives the tracker, to be destroyed with frz_tracker_destroy; NULL after a failure.
+ *
+ * One thread at a time for each context; any number may read a mesh.
+ */
+frz_status frz_tracker_create(frz_context *context,
+                              const frz_tracker_params *params,
+                              const frz_mesh *mesh,
+                              const frz_particles *particles,
+                              const void *restart,
+                              size_t restart_bytes,
+                              frz_tracker **out);
+
+/**
+ * Destroys a tracker; NULL is fine.
+ *
+ * tracker: may be NULL. Not while a call uses it: it then stays.
+ *
+ * One thread at a time.
+ */
+void frz_tracker_destroy(frz_tracker *tracker);
+
+/**
+ * Sets how a mesh follows from the next step on. The spacing and the cell must stay.
+ *
+ * params: FRZ_ERROR_ARGUMENT names the field at fault and its range; the old ones then stay.
+ *
+ * One thread at a time.
+ */
+frz_status frz_tracker_set_params(frz_tracker *tracker, const frz_tracker_params *params);
+
+/**
+ * Moves the mesh with its particles from one time to another. After a failure or a cancel it is as it was before.
+ *
+ * from: the particles as they were at the last step's end.
+ * to: the particles at this step's end. Those of the same id are the same; where one of the two has no ids, from must have
+ *     velocities.
+ * dt: time between them (s), above 0.
+ * report: receives what was done, all zeroes after a failure; may be NULL. Its struct_size is set by the caller.
+ *
+ * One thread at a time.
+ */
+frz_status frz_tracker_step(frz_context *context,
+                            frz_tracker *tracker,
+                            const frz_particles *from,
+                            const frz_particles *to,
+                            double dt,
+                            frz_tracker_report *report);
+
+/**
+ * Reports how many vertices the mesh has; its faces are those that it was made with.
+ *
+ * count: receives their number; 0 after a failure.
+ *
+ * Any number of threads may read a tracker.
+ */
+frz_status frz_tracker_count(const frz_tracker *tracker, size_t *count);
+
+/**
+ * Copies an array of the mesh's vertices.
+ *
+ * array: a frz_tracker_array; it says of what type the elements are.
+ * dst: room for as many elements as frz_tracker_count reports; FRZ_ERROR_CAPACITY when it is too little, and nothing is written.
+ *
+ * Any number of threads may read a tracker.
+ */
+frz_status frz_tracker_read(const frz_tracker *tracker,
+                            uint32_t array,
+                            frz_span dst);
+
+/**
+ * Writes all that the next step depends on, besides the parameters, the mesh and the particles: for a host's own cache. The bytes
+ * are the same on any number of threads.
+ *
+ * dst: room for capacity bytes. NULL: size receives their number, and nothing is written.
+ * capacity: bytes at dst. FRZ_ERROR_CAPACITY when they are too few.
+ * size: receives the bytes that were written, or are needed; 0 after other failures.
+ *
+ * One thread at a time.
+ */
+frz_status frz_tracker_save(frz_context *context,
+                            const frz_tracker *tracker,
+                            void *dst,
+                            size_t capacity,
+                            size_t *size);
 
 #ifdef __cplusplus
 }  // extern "C"
