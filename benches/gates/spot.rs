@@ -6,9 +6,10 @@ use std::process::{Command, Stdio};
 use frazil::Context;
 use frazil::base::arrays::{MeshArray, Number, On};
 use frazil::base::bvh::Bvh;
+use frazil::base::points::Values;
 use frazil::base::{DVec3, DetailedMesh, TriMesh, Uvs, Vec3};
 use frazil::io::{mesh, particles};
-use frazil::surface::{Implicit, Isosurface};
+use frazil::surface::{Implicit, Isosurface, Params, Particles, Tracker};
 
 use crate::common::character::{data, output};
 use crate::common::liquids::context;
@@ -106,11 +107,30 @@ impl Spot {
         mesh::read_detailed(&path).expect("a frame")
     }
 
-    /// The particles' own surface at a frame, on cells of some share of the spacing.
-    fn phi(&self, ctx: &Context, frame: i32, cell: f64) -> TriMesh {
+    fn particles(&self, frame: i32) -> Particles {
         let path = self.cache.with_file_name(format!("spot.{frame:04}.bgeo"));
         let cloud = particles::read(&path).expect("particles");
-        let phi = Implicit::new(ctx, &cloud.places, SPACING, cell * SPACING).expect("a surface");
+        let ids = match cloud.attribute("id") {
+            Some(Values::Long(column)) => (0..cloud.places.len()).map(|n| column.get(n)).collect(),
+            Some(Values::Int(column)) => (0..cloud.places.len()).map(|n| column.get(n).into()).collect(),
+            _ => panic!("the particles have no ids"),
+        };
+        Particles { ids, places: cloud.places, velocities: Vec::new() }
+    }
+
+    /// Whether the particles' own surface merges or splits between a frame and the one before.
+    fn changes(&self, ctx: &Context, frame: i32) -> bool {
+        let [before, now] = [frame - 1, frame].map(|frame| self.phi(ctx, frame, 0.5));
+        let kind = |surface: &TriMesh| (parts(surface), surface.euler_characteristic());
+        let [from, to] = [frame - 1, frame].map(|frame| self.particles(frame));
+        let mut own = Tracker::new(ctx, Params::for_spacing(SPACING), &before, &from).expect("a tracker");
+        let report = own.step(ctx, &from, &to, 1.0 / FPS).expect("a step");
+        kind(&before) != kind(&now) || report.jumped + report.lost > 0
+    }
+
+    /// The particles' own surface at a frame, on cells of some share of the spacing.
+    fn phi(&self, ctx: &Context, frame: i32, cell: f64) -> TriMesh {
+        let phi = Implicit::new(ctx, &self.particles(frame).places, SPACING, cell * SPACING).expect("a surface");
         Isosurface::new(&phi).mesh(&phi)
     }
 }
@@ -128,16 +148,12 @@ fn shape(h: &mut Harness, spot: &Spot, frames: &[DetailedMesh]) {
     let ctx = context(2);
     let counts: Vec<usize> =
         frames.iter().map(|frame| is_flagged(frame).iter().filter(|flag| **flag).count()).collect();
-    // Parts and handles of the particles' own surface: the first frame at which they are others.
-    let kind = |frame: i32| {
-        let surface = spot.phi(&ctx, frame, 0.5);
-        (parts(&surface), surface.euler_characteristic())
-    };
-    let begin = kind(1);
-    let change = (2..=FRAMES).find(|frame| kind(*frame) != begin);
+    // The first frame at which the particles' own surface merges or splits: parts or handles are others, or a fold closes, so that
+    // it does not lie where the particles carried it from the frame before.
+    let change = (2..=FRAMES).find(|frame| spot.changes(&ctx, *frame));
     let last = change.unwrap_or(FRAMES + 1) - 1;
     let first_flag = counts.iter().position(|count| *count > 0).map_or(FRAMES, |index| index as i32);
-    println!("# phi changes first at frame {change:?}, the first flag is at frame {}", first_flag + 1);
+    println!("# the particles' own surface changes first at frame {change:?}, the first flag is at frame {}", first_flag + 1);
 
     let mut off = Vec::new();
     for frame in LOOKED_AT {
