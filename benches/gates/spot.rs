@@ -130,7 +130,8 @@ impl Spot {
 
     /// The particles' own surface at a frame, on cells of some share of the spacing.
     fn phi(&self, ctx: &Context, frame: i32, cell: f64) -> TriMesh {
-        let phi = Implicit::new(ctx, &self.particles(frame).places, SPACING, cell * SPACING).expect("a surface");
+        let phi =
+            Implicit::new(ctx, &self.particles(frame).places, SPACING, cell * SPACING).expect("a surface");
         Isosurface::new(&phi).mesh(&phi)
     }
 }
@@ -153,7 +154,10 @@ fn shape(h: &mut Harness, spot: &Spot, frames: &[DetailedMesh]) {
     let change = (2..=FRAMES).find(|frame| spot.changes(&ctx, *frame));
     let last = change.unwrap_or(FRAMES + 1) - 1;
     let first_flag = counts.iter().position(|count| *count > 0).map_or(FRAMES, |index| index as i32);
-    println!("# the particles' own surface changes first at frame {change:?}, the first flag is at frame {}", first_flag + 1);
+    println!(
+        "# the particles' own surface changes first at frame {change:?}, the first flag is at frame {}",
+        first_flag + 1
+    );
 
     let mut off = Vec::new();
     for frame in LOOKED_AT {

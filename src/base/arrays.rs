@@ -1,5 +1,6 @@
 //! Arrays of numbers that a mesh carries besides its places and texture coordinates: colours, masks, whatever its file has.
 
+use super::mesh::used;
 use super::{TriMesh, Uvs};
 
 /// The type of an array's numbers.
@@ -73,6 +74,42 @@ pub struct DetailedMesh {
     pub uvs: Option<Uvs>,
     /// Other arrays; of corners three for each triangle.
     pub arrays: Vec<MeshArray>,
+}
+
+impl DetailedMesh {
+    /// The mesh without the vertices that no triangle names, and without their numbers; the others keep their order.
+    pub fn without_unused(self) -> Self {
+        let Some(used) = used(self.mesh.positions.len(), &self.mesh.triangles) else { return self };
+        let kept = |array: MeshArray| match array.on {
+            On::Vertices => {
+                let values = used.iter().map(|&vertex| array.values[vertex as usize]).collect();
+                MeshArray { values, ..array }
+            }
+            On::Corners | On::Faces => array,
+        };
+        let uvs = self.uvs.map(|uvs| match uvs.corners {
+            Some(_) => uvs,
+            None => Uvs { places: used.iter().map(|&vertex| uvs.places[vertex as usize]).collect(), ..uvs },
+        });
+        let arrays = self.arrays.into_iter().map(kept).collect();
+        Self { mesh: self.mesh.without_unused(), uvs, arrays }
+    }
+
+    /// The numbers of the vertices in an array of this name; of one of vectors with parts NAMEx, NAMEy and NAMEz their lengths.
+    pub fn of_vertices(&self, name: &str) -> Option<Vec<f64>> {
+        let find = |name: &str| {
+            self.arrays
+                .iter()
+                .find(|array| array.on == On::Vertices && array.name == name)
+                .map(|array| &array.values)
+        };
+        if let Some(values) = find(name) {
+            return Some(values.clone());
+        }
+        let [x, y, z] = ["x", "y", "z"].map(|axis| find(&format!("{name}{axis}")));
+        let parts = x?.iter().zip(y?).zip(z?);
+        Some(parts.map(|((x, y), z)| (x * x + y * y + z * z).sqrt()).collect())
+    }
 }
 
 impl MeshArray {

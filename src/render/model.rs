@@ -1,5 +1,6 @@
 //! A surface to be drawn: triangles in a tree, normals, a colour.
 
+use super::ramp::ramp;
 use super::shade::Colour;
 use crate::base::bvh::Bvh;
 use crate::base::{DVec3, TriMesh, Vec3};
@@ -11,6 +12,8 @@ pub struct Model {
     /// Unit normals at the vertices of a smooth surface; without them triangles are flat.
     normals: Option<Vec<Vec3>>,
     albedo: Colour,
+    /// Colours of the vertices, in place of the one.
+    colours: Option<Vec<[f32; 3]>>,
     /// Rays towards the light start this far off the surface (m), so that it does not shadow itself.
     pub(super) skin: f64,
 }
@@ -39,7 +42,17 @@ impl Model {
     pub(super) fn new(mesh: TriMesh, normals: Option<Vec<Vec3>>, albedo: [f32; 3], skin: f64) -> Self {
         let tree = Bvh::new(&mesh);
         let albedo = Colour::from(albedo.map(f64::from));
-        Self { mesh, tree, normals, albedo, skin }
+        Self { mesh, tree, normals, albedo, colours: None, skin }
+    }
+
+    /// With colours for numbers of its vertices, from dark blue at the least to pale yellow at the greatest; numbers that are not
+    /// finite count as the least.
+    pub fn coloured(self, numbers: &[f64]) -> Self {
+        let finite = numbers.iter().filter(|number| number.is_finite());
+        let (low, high) =
+            finite.fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), n| (low.min(*n), high.max(*n)));
+        let colours = numbers.iter().map(|number| ramp((number - low) / (high - low)));
+        Self { colours: Some(colours.collect()), ..self }
     }
 
     /// Its least and greatest corner (m); none when it is empty.
@@ -61,7 +74,11 @@ impl Model {
         let normal = if flat.dot(&toward) > 0.0 { -smooth } else { smooth };
         let away = normal.dot(&toward).max(0.0);
         let normal = (normal - toward * away).try_normalize(0.0).unwrap_or(-toward);
-        Some(Hit { distance: hit.distance, normal, albedo: self.albedo, skin: self.skin, wrap: 0.0 })
+        let albedo = self.colours.as_ref().map_or(self.albedo, |colours| {
+            let [a, b, c] = corners.map(|index| Colour::from(colours[index].map(f64::from)));
+            a * (1.0 - hit.u - hit.v) + b * hit.u + c * hit.v
+        });
+        Some(Hit { distance: hit.distance, normal, albedo, skin: self.skin, wrap: 0.0 })
     }
 
     /// Whether the surface hides a direction from a point.

@@ -17,7 +17,7 @@ pub struct Look {
     pub camera: Option<Camera>,
     /// The light; none: one beside the camera.
     pub light: Option<Light>,
-    /// The attribute that colours points.
+    /// The attribute that colours points and meshes.
     pub color: Option<String>,
     /// Extinction (1/m) of a fog of density 1 whose file does not say it.
     #[cfg_attr(not(feature = "vdb"), expect(dead_code, reason = "fogs come from .vdb files"))]
@@ -28,8 +28,8 @@ pub struct Look {
 pub struct Drawing {
     /// Everything in it.
     pub models: Models,
-    /// Whether there are points in it.
-    has_points: bool,
+    /// Whether anything in it has what `--color` asks for.
+    has_colors: bool,
     /// Says of a fog that it has no density.
     hollow: Option<String>,
 }
@@ -50,9 +50,18 @@ impl Look {
     #[cfg_attr(not(feature = "vdb"), expect(unused_variables, unused_mut, reason = "of grids only"))]
     pub fn build(&self, ctx: &Context, parts: Vec<Part>) -> Result<Drawing> {
         let (mut models, mut clouds, mut fogs, mut hollow) = (Vec::new(), Vec::new(), Vec::new(), None);
+        let mut has_colors = false;
         for part in parts {
             match part {
-                Part::Mesh(mesh) => models.push(Model::mesh(&mesh, BROWN)),
+                Part::Mesh(detailed) => {
+                    let model = Model::mesh(&detailed.mesh, BROWN);
+                    let numbers = self.color.as_deref().and_then(|name| detailed.of_vertices(name));
+                    has_colors |= numbers.is_some();
+                    models.push(match numbers {
+                        Some(numbers) => model.coloured(&numbers),
+                        None => model,
+                    });
+                }
                 Part::Points(path, points) => {
                     let cloud = Cloud::new(&points, self.color.as_deref());
                     clouds.push(cloud.map_err(|error| Error::file(path, error.to_string()))?);
@@ -76,17 +85,20 @@ impl Look {
                 }
             }
         }
-        let has_points = !clouds.is_empty();
-        Ok(Drawing { models: Models::new(models).with_clouds(clouds).with_fogs(fogs), has_points, hollow })
+        has_colors |= !clouds.is_empty();
+        Ok(Drawing { models: Models::new(models).with_clouds(clouds).with_fogs(fogs), has_colors, hollow })
     }
 
     /// The camera and the light that were chosen, or those that show all drawings as wholes.
     ///
     /// # Errors
-    /// Nothing to see; no points for `--color`.
+    /// Nothing to see; nothing that `--color` gives colours.
     pub fn view(&self, drawings: &[Drawing]) -> std::result::Result<View, Failure> {
-        if self.color.is_some() && drawings.iter().all(|drawing| !drawing.has_points) {
-            return Err(Failure::refused("--color is for points, and there are none"));
+        if let Some(name) = self.color.as_ref().filter(|_| drawings.iter().all(|drawing| !drawing.has_colors))
+        {
+            let what =
+                format!("--color {name}: no points are drawn, and no mesh has such an array of its vertices");
+            return Err(Failure::refused(what));
         }
         let boxes = drawings.iter().filter_map(|drawing| drawing.models.bounds());
         let bounds = boxes.reduce(|a, b| (a.0.inf(&b.0), a.1.sup(&b.1)));

@@ -42,7 +42,7 @@ pub struct Args {
     /// The picture (.png); of several frames a pattern (p.%04d.png), or a .gif.
     #[arg(short, long, value_name = "FILE")]
     output: PathBuf,
-    /// Attribute that gives points their colours, from dark blue to pale yellow over its values.
+    /// Attribute that gives points, and vertices of a mesh, their colours, from dark blue to pale yellow over its values.
     #[arg(long, value_name = "NAME")]
     color: Option<String>,
     /// Clip that characters play [default: they are at rest, or play their only clip with --frame].

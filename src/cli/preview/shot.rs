@@ -1,4 +1,4 @@
-//! The frames of a whole shot: the output folder of `frazil snow`.
+//! The frames of a whole shot: the output folder of `frazil snow` or `frazil surface`.
 
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
@@ -18,7 +18,8 @@ pub struct Shot {
     grains: RebuildGrains,
     mist: Stored,
     objects: Stored,
-    files: [Files; 4],
+    surface: Stored,
+    files: [Files; 5],
     /// The frames that all stages have, ascending; at least one.
     frames: Vec<i32>,
 }
@@ -27,8 +28,13 @@ pub struct Shot {
 type Files = BTreeMap<i32, PathBuf>;
 
 /// The stages that are drawn, in this order, each with the files of it that are read, the best first.
-const STAGES: [(&str, &[&str]); 4] =
-    [("base", &["vdb"]), ("grains", &["vdb", "ply"]), ("mist", &["vdb"]), ("objects", &["ply"])];
+const STAGES: [(&str, &[&str]); 5] = [
+    ("base", &["vdb"]),
+    ("grains", &["vdb", "ply"]),
+    ("mist", &["vdb"]),
+    ("objects", &["ply"]),
+    ("surface", &["ply"]),
+];
 
 impl Shot {
     /// Opens a folder.
@@ -37,9 +43,10 @@ impl Shot {
     /// Records that cannot be read; none of a stage that is drawn.
     pub fn open(folder: &Path) -> Result<Self> {
         let (base, grains) = (Rebuild::open(folder)?, RebuildGrains::open(folder)?);
-        let [mist, objects] = [Stored::read(folder, STAGES[2].0)?, Stored::read(folder, STAGES[3].0)?];
-        let stored = [base.stored(), grains.stored(), &mist, &objects];
-        let files = [0, 1, 2, 3].map(|stage| files_of(folder, stored[stage], STAGES[stage]));
+        let stored = |stage: usize| Stored::read(folder, STAGES[stage].0);
+        let (mist, objects, surface) = (stored(2)?, stored(3)?, stored(4)?);
+        let stored = [base.stored(), grains.stored(), &mist, &objects, &surface];
+        let files = [0, 1, 2, 3, 4].map(|stage| files_of(folder, stored[stage], STAGES[stage]));
         let frames = frames_of_all(&files);
         if frames.is_empty() {
             let names = STAGES.map(|(name, _)| name).join(", ");
@@ -47,7 +54,7 @@ impl Shot {
                 format!("is no folder of a shot that has frames to draw of one of its stages ({names})");
             return Err(Error::file(folder, what));
         }
-        Ok(Self { folder: folder.to_path_buf(), base, grains, mist, objects, files, frames })
+        Ok(Self { folder: folder.to_path_buf(), base, grains, mist, objects, surface, files, frames })
     }
 
     /// Where it is.
@@ -96,7 +103,8 @@ impl Shot {
     /// # Errors
     /// A file that cannot be read or that is not what was written; cancel.
     pub fn read(&mut self, ctx: &Context, frame: i32) -> Result<Vec<Part>> {
-        let [base, grains, mist, objects] = self.files.each_ref().map(|files| files.get(&frame).cloned());
+        let [base, grains, mist, objects, surface] =
+            self.files.each_ref().map(|files| files.get(&frame).cloned());
         let mut parts = Vec::new();
         // Each file is compared with its record before it is read.
         if base.is_some() {
@@ -117,7 +125,11 @@ impl Shot {
         }
         if objects.is_some() {
             let path = self.objects.file_with(frame, STAGES[3].0, "ply")?;
-            parts.push(Part::Mesh(mesh::read(&path)?.without_unused()));
+            parts.push(Part::Mesh(mesh::read_detailed(&path)?.without_unused()));
+        }
+        if surface.is_some() {
+            let path = self.surface.file_with(frame, STAGES[4].0, "ply")?;
+            parts.push(Part::Mesh(mesh::read_detailed(&path)?.without_unused()));
         }
         Ok(parts)
     }

@@ -2,7 +2,7 @@
 
 use std::path::{Path, PathBuf};
 
-use frazil::base::{Points, TriMesh};
+use frazil::base::{DetailedMesh, Points, TriMesh};
 use frazil::io::sequence::Pattern;
 use frazil::motion::{Character, Play, is_gltf};
 #[cfg(feature = "vdb")]
@@ -16,8 +16,8 @@ use crate::cli::vdb::model::{self, Content};
 
 /// A part of a picture, as it was read.
 pub enum Part {
-    /// A mesh.
-    Mesh(TriMesh),
+    /// A mesh with what it carries.
+    Mesh(DetailedMesh),
     /// Points, and where they came from.
     Points(PathBuf, Points),
     /// A level set.
@@ -180,6 +180,7 @@ fn whole(frame: Option<f64>, name: &Path) -> Result<i32> {
 
 /// Reads a file; a character is posed by its clip if a clip or a frame is given.
 fn of_file(path: &Path, clip: Option<&str>, frame: Option<f64>, fps: f64) -> Result<Vec<Part>> {
+    let bare = |mesh: TriMesh| DetailedMesh { mesh, ..DetailedMesh::default() };
     let mesh = match io::mesh::extension(path).as_str() {
         #[cfg(feature = "vdb")]
         "vdb" => return of_vdb(path),
@@ -187,12 +188,12 @@ fn of_file(path: &Path, clip: Option<&str>, frame: Option<f64>, fps: f64) -> Res
         "vdb" => return crate::cli::needs_openvdb(path),
         "ply" if io::points_ply::holds_points(path)? => return Ok(vec![points_of(path)?]),
         _ if crate::cli::cloud::is_named(path) => return Ok(vec![points_of(path)?]),
-        _ if is_gltf(path) && clip.is_none() && frame.is_none() => Character::at_rest(path)?,
+        _ if is_gltf(path) && clip.is_none() && frame.is_none() => bare(Character::at_rest(path)?),
         _ if is_gltf(path) => {
             let play = Play { clip: clip.map(String::from), ..Play::default() };
-            Character::posed(path, play, (frame.unwrap_or(1.0) - 1.0) / fps)?
+            bare(Character::posed(path, play, (frame.unwrap_or(1.0) - 1.0) / fps)?)
         }
-        _ => io::mesh::read(path)?.without_unused(),
+        _ => io::mesh::read_detailed(path)?.without_unused(),
     };
     Ok(vec![Part::Mesh(mesh)])
 }
