@@ -88,6 +88,8 @@ mod snow;
 mod speed;
 #[path = "gates/spin.rs"]
 mod spin;
+#[path = "gates/splashsurf.rs"]
+mod splashsurf;
 #[path = "gates/spot.rs"]
 mod spot;
 #[path = "gates/surface.rs"]
@@ -137,6 +139,7 @@ fn main() {
     damage::run(&mut h);
     surface::run(&mut h);
     spot::run(&mut h);
+    splashsurf::run(&mut h);
     tracker_cancel::run(&mut h);
     house::run(&mut h);
     h.finish();

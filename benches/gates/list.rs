@@ -273,6 +273,10 @@ pub const GATES: &[Gate] = &[
     yes("surface.same_bytes_kill"),
     yes("surface.same_bytes_cpu"),
     gate("surface.cancel_p99", "s", Most(0.2), Most(0.05)),
+    // Time of from-particles over splashsurf's, one thread, with files.
+    gate("surface.splashsurf_20k", "1", Most(0.5), Most(0.25)),
+    gate("surface.splashsurf_260k", "1", Most(0.5), Most(0.25)),
+    gate("surface.splashsurf_1m", "1", Most(0.5), Most(0.25)),
     // Phases of a step, the thesis' dragon's size; all of them with 260,000 particles; two threads.
     gate("surface.time_advect", "s", Most(0.1), Most(0.03)),
     gate("surface.time_phi", "s", Most(0.15), Most(0.08)),

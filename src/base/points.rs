@@ -128,6 +128,14 @@ impl Values {
         }
     }
 
+    /// Puts the values of points into another order, or leaves some out.
+    ///
+    /// # Panics
+    /// When `order` names a point that is not there.
+    pub fn reorder(&mut self, order: &[u32]) {
+        each_type!(self, column => column.reorder(order));
+    }
+
     /// Whether all points share one value.
     pub fn is_uniform(&self) -> bool {
         each_type!(self, column => column.count().is_none())
@@ -250,7 +258,7 @@ impl Points {
         self.cells = picked(&self.cells, order);
         self.offsets = picked(&self.offsets, order);
         for attribute in &mut self.attributes {
-            each_type!(&mut attribute.values, column => column.reorder(order));
+            attribute.values.reorder(order);
         }
     }
 

@@ -46,6 +46,17 @@ impl Cloud {
         self.attributes.iter().find(|attribute| attribute.name == name).map(|attribute| &attribute.values)
     }
 
+    /// Leaves out the particles that are not to be kept.
+    ///
+    /// # Panics
+    /// Unless there is one flag for each.
+    pub fn retain(&mut self, kept: &[bool]) {
+        assert_eq!(kept.len(), self.places.len(), "one flag for each particle");
+        let order: Vec<u32> = (0..).zip(kept).filter(|(_, kept)| **kept).map(|(n, _)| n).collect();
+        self.places = order.iter().map(|&n| self.places[n as usize]).collect();
+        self.attributes.iter_mut().for_each(|attribute| attribute.values.reorder(&order));
+    }
+
     /// The points, in voxels of the file's own size, unless another is given (m).
     ///
     /// # Errors

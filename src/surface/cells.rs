@@ -116,6 +116,20 @@ impl Cells {
         })
     }
 
+    /// The particles of each of these cells, by the order in which they came in.
+    pub fn runs(&self) -> impl Iterator<Item = &[u32]> {
+        self.start.windows(2).map(|ends| &self.order[ends[0] as usize..ends[1] as usize])
+    }
+
+    /// The number of a cell, if it holds particles.
+    pub fn find(&self, coord: Coord) -> Option<usize> {
+        let at = [0, 1, 2].map(|axis| i64::from(coord[axis]) - i64::from(self.low[axis]));
+        if at.iter().any(|x| !(0..FARTHEST).contains(x)) {
+            return None;
+        }
+        self.keys.binary_search(&pack(at.map(|x| x as u64))).ok()
+    }
+
     /// The cells from `low` to `high` that hold particles, in ascending order: index and coordinates.
     fn between(&self, low: Coord, high: Coord, mut see: impl FnMut(usize, Coord)) {
         let shifted = |at: Coord| [0, 1, 2].map(|axis| i64::from(at[axis]) - i64::from(self.low[axis]));

@@ -35,8 +35,10 @@ mod paths;
 mod project;
 mod sample;
 mod spacing;
+mod specks;
 mod state;
 mod tracker;
+mod transfer;
 
 pub use advect::Weighting;
 pub use apart::Apart;
@@ -47,8 +49,10 @@ pub use isosurface::Isosurface;
 #[cfg(feature = "vdb")]
 pub use level_set::{HALF_WIDTH, level_set};
 pub use paths::interpolate;
-pub use spacing::estimate as estimate_spacing;
+pub use spacing::{estimate as estimate_spacing, rough as rough_spacing};
+pub use specks::specks;
 pub use tracker::{Params, StepReport, Tracker};
+pub use transfer::transfer;
 
 use crate::base::DVec3;
 use crate::error::{Error, Result};

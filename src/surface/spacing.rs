@@ -4,8 +4,8 @@ use rayon::prelude::*;
 
 use crate::base::DVec3;
 
-/// Particles whose neighbours are looked at.
-const LOOKED_AT: usize = 256;
+/// Particles whose neighbours are looked at, and those that are enough to know about how large the spacing is.
+const LOOKED_AT: [usize; 2] = [256, 32];
 /// In a cubic grid as many particles as this are one spacing away. In a liquid they are nearer and farther, by their mean distance
 /// as far (1.02 spacings in frames of two solvers' caches).
 const NEIGHBOURS: usize = 6;
@@ -13,6 +13,15 @@ const NEIGHBOURS: usize = 6;
 /// The spacing (m) of particles at places (m): the mean distance to the six nearest ones, in the median. None for fewer than seven
 /// particles, or where so many lie at one place.
 pub fn estimate(places: &[DVec3]) -> Option<f64> {
+    median(places, LOOKED_AT[0])
+}
+
+/// The same within a tenth or so, in an eighth of the time: to see whether a spacing that is known can be right.
+pub fn rough(places: &[DVec3]) -> Option<f64> {
+    median(places, LOOKED_AT[1])
+}
+
+fn median(places: &[DVec3], looked_at: usize) -> Option<f64> {
     // The same particles are looked at in whatever order they come.
     let mut order: Vec<usize> = (0..places.len()).collect();
     let key = |at: &usize| places[*at];
@@ -20,7 +29,7 @@ pub fn estimate(places: &[DVec3]) -> Option<f64> {
         let (a, b) = (key(a), key(b));
         a.x.total_cmp(&b.x).then(a.y.total_cmp(&b.y)).then(a.z.total_cmp(&b.z))
     });
-    let step = order.len().div_ceil(LOOKED_AT).max(1);
+    let step = order.len().div_ceil(looked_at).max(1);
     let mean = |at: &usize| {
         let mut nearest = [f64::INFINITY; NEIGHBOURS + 1];
         for place in places {
@@ -52,6 +61,7 @@ mod tests {
             .collect();
         let found = estimate(&places).unwrap();
         assert!((found - 0.3).abs() < 0.1, "{found}");
+        assert!((rough(&places).unwrap() / found - 1.0).abs() < 0.2);
         places.reverse();
         assert_eq!(estimate(&places), Some(found));
         assert_eq!(estimate(&places[..6]), None);

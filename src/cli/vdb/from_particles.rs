@@ -3,16 +3,20 @@
 use super::{Packing, check_name};
 use crate::cli::cloud::points_of_vdb;
 use crate::cli::exit::{Failure, Phase};
-use crate::cli::options::{MeshSpace, positive};
+use crate::cli::options::{MeshSpace, positive, triple};
 use crate::cli::output;
 use crate::cli::session::Session;
-use frazil::base::{DVec3, TriMesh};
+use frazil::base::arrays::{Number, On};
+use frazil::base::points::{Attribute, Values};
+use frazil::base::{DVec3, MeshArray, TriMesh};
 use frazil::io;
 use frazil::io::mesh::extension;
 use frazil::io::particles::{self, Cloud};
 use frazil::io::sequence::Pattern;
 use frazil::scene::{FrameChoice, Frames};
-use frazil::surface::{Distances, HALF_WIDTH, Implicit, Isosurface, estimate_spacing, level_set};
+use frazil::surface::{
+    Distances, HALF_WIDTH, Implicit, Isosurface, estimate_spacing, level_set, rough_spacing, specks, transfer,
+};
 use frazil::vdb::file;
 use frazil::{Error, Result};
 use serde_json::json;
@@ -36,6 +40,18 @@ pub struct Args {
     /// Edge of a voxel (m), 1/8 to 2 spacings [default: half a spacing]
     #[arg(long, value_name = "M", value_parser = positive)]
     cell: Option<f64>,
+    /// Attributes of the particles that the mesh gets too (.ply), as means over those around each vertex: v, density, or all
+    #[arg(long, value_name = "A,B", value_delimiter = ',', requires = "mesh")]
+    attributes: Vec<String>,
+    /// Leave out groups of fewer particles than this that lie apart from all others
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..))]
+    min_drop: Option<u32>,
+    /// Only particles in a box: its least corner (m)
+    #[arg(long, value_name = "X,Y,Z", value_parser = triple, allow_hyphen_values = true, requires = "box_max")]
+    box_min: Option<DVec3>,
+    /// Only particles in a box: its greatest corner (m)
+    #[arg(long, value_name = "X,Y,Z", value_parser = triple, allow_hyphen_values = true, requires = "box_min")]
+    box_max: Option<DVec3>,
     /// Frames of a sequence
     #[arg(long, value_name = "A-B|A-BxN", allow_hyphen_values = true)]
     frames: Option<FrameChoice>,
@@ -62,6 +78,10 @@ pub fn run(args: &Args, session: &Session) -> std::result::Result<(), Failure> {
     for (path, extensions) in [(&args.output, &["vdb"][..]), (&args.mesh, &["ply", "obj", "stl"])] {
         let Some(path) = path else { continue };
         check_name(path, extensions)?;
+        if !args.attributes.is_empty() && extensions.contains(&"ply") && extension(path) != "ply" {
+            let what = format!("{}: only .ply files hold --attributes", path.display());
+            return Err(Failure::refused(what));
+        }
         output::check_writable(path).before()?;
         let pattern = Pattern::parse(path);
         if pattern.is_none() && frames.count() > 1 {
@@ -78,28 +98,33 @@ pub fn run(args: &Args, session: &Session) -> std::result::Result<(), Failure> {
         io::source::open(&of_frame(&args.particles, frame)).before()?;
     }
     let mut spacing = args.spacing;
-    let (mut particles, mut triangles) = (0, 0);
+    let (mut particles, mut triangles, mut specks) = (0, 0, 0);
     for (n, frame) in frames.iter().enumerate() {
         session.ctx.check().during()?;
         let path = of_frame(&args.particles, frame);
         let read = args.read(&path);
         // What the first file is without, no frame can be begun with.
-        let places = if n == 0 { read.before()? } else { read.during()? };
+        let mut cloud = if n == 0 { read.before()? } else { read.during()? };
         let spacing = match spacing {
             Some(spacing) => spacing,
-            None => *spacing.insert(estimated(&path, &places).before()?),
+            None => *spacing.insert(estimated(&path, &cloud.places).before()?),
         };
         if n == 0 && args.spacing.is_some() {
-            warn_of_spacing(&path, &places, spacing);
+            warn_of_spacing(&path, &cloud.places, spacing);
         }
-        let made = args.make(session, &places, spacing, frame);
+        let left_out = args.leave_out(&mut cloud, spacing, &path);
+        specks += if n == 0 { left_out.before()? } else { left_out.during()? };
+        let columns = args.columns(&cloud, &path);
+        let columns = if n == 0 { columns.before()? } else { columns.during()? };
+        let made = args.make(session, (&cloud.places, &columns), spacing, frame);
         let is_refused = matches!(made, Err(Error::Argument(_) | Error::Memory { .. }));
         let mesh = if n == 0 && is_refused { made.before()? } else { made.during()? };
-        particles += places.len();
+        particles += cloud.places.len();
         triangles += mesh.triangles.len();
     }
     session.record("frames", json!(frames.count()));
     session.record("particles", json!(particles));
+    session.record("specks_left_out", json!(specks));
     session.record("spacing_m", json!(spacing));
     session.record("triangles", json!(triangles));
     Ok(())
@@ -130,7 +155,7 @@ const ODD: f64 = 2.0;
 /// Says so when a given spacing (m) is not that of the particles: a wrong unit makes single drops, or one lump.
 fn warn_of_spacing(path: &Path, places: &[DVec3], spacing: f64) {
     let odd = |estimate: &f64| !(1.0 / ODD..=ODD).contains(&(spacing / estimate));
-    if let Some(estimate) = estimate_spacing(places).filter(odd) {
+    if let Some(estimate) = rough_spacing(places).filter(odd) {
         log::warn!(
             "{}: a spacing of {spacing} m is given, but particles lie {estimate:.6} m apart",
             path.display()
@@ -153,19 +178,82 @@ impl Args {
         }
     }
 
-    /// Places (m) of the particles of a file.
-    fn read(&self, path: &Path) -> Result<Vec<DVec3>> {
+    /// The particles of a file (m) that lie in the box.
+    fn read(&self, path: &Path) -> Result<Cloud> {
         let mut cloud: Cloud =
             if extension(path) == "vdb" { points_of_vdb(path)?.into() } else { particles::read(path)? };
         if cloud.places.is_empty() {
             return Err(Error::file(path, "holds no particles"));
         }
         self.space.space().bring(&mut cloud);
-        Ok(cloud.places)
+        if let (Some(low), Some(high)) = (self.box_min, self.box_max) {
+            let is_inside = |p: &DVec3| (0..3).all(|axis| (low[axis]..=high[axis]).contains(&p[axis]));
+            let kept: Vec<bool> = cloud.places.iter().map(is_inside).collect();
+            cloud.retain(&kept);
+            if cloud.places.is_empty() {
+                return Err(Error::file(path, "has no particles in the box"));
+            }
+        }
+        Ok(cloud)
+    }
+
+    /// Leaves small groups of particles out; the count of these particles.
+    fn leave_out(&self, cloud: &mut Cloud, spacing: f64, path: &Path) -> Result<usize> {
+        let Some(least) = self.min_drop else { return Ok(0) };
+        let specks = specks(&cloud.places, spacing, least as usize)?;
+        let count = specks.iter().filter(|is| **is).count();
+        if count == cloud.places.len() {
+            return Err(Error::file(path, format!("has no group of {least} particles")));
+        }
+        if count > 0 {
+            log::info!("{}: {count} particles in groups of fewer than {least} are left out", path.display());
+            cloud.retain(&specks.iter().map(|is| !is).collect::<Vec<_>>());
+        }
+        Ok(count)
+    }
+
+    /// The attributes that the mesh is to have, with the names of its arrays.
+    fn columns(&self, cloud: &Cloud, path: &Path) -> Result<Vec<(String, Vec<f32>)>> {
+        let count = cloud.places.len();
+        let wanted = |attribute: &&Attribute| {
+            matches!(attribute.values, Values::Float(_) | Values::Vector(_))
+                && self.attributes.iter().any(|name| name == "all" || *name == attribute.name)
+        };
+        let found: Vec<&Attribute> = cloud.attributes.iter().filter(wanted).collect();
+        let is_missing =
+            |name: &&String| *name != "all" && !found.iter().any(|attribute| attribute.name == **name);
+        if let Some(missing) = self.attributes.iter().find(is_missing) {
+            let there: Vec<&str> = cloud.attributes.iter().map(|attribute| &attribute.name[..]).collect();
+            let what =
+                format!("has no attribute \"{missing}\" of floats or vectors; it has {}", there.join(", "));
+            return Err(Error::file(path, what));
+        }
+        let mut out = Vec::new();
+        for attribute in found {
+            match &attribute.values {
+                Values::Float(column) => {
+                    out.push((attribute.name.clone(), (0..count).map(|n| column.get(n)).collect()));
+                }
+                Values::Vector(column) => {
+                    for (axis, letter) in ["x", "y", "z"].into_iter().enumerate() {
+                        let part = (0..count).map(|n| column.get(n)[axis]).collect();
+                        out.push((format!("{}{letter}", attribute.name), part));
+                    }
+                }
+                _ => {}
+            }
+        }
+        Ok(out)
     }
 
     /// Makes the files of a frame.
-    fn make(&self, session: &Session, places: &[DVec3], spacing: f64, frame: i32) -> Result<TriMesh> {
+    fn make(
+        &self,
+        session: &Session,
+        (places, columns): (&[DVec3], &[(String, Vec<f32>)]),
+        spacing: f64,
+        frame: i32,
+    ) -> Result<TriMesh> {
         let ctx = &session.ctx;
         let cell = self.cell.unwrap_or(0.5 * spacing);
         let phi = ctx.phase("phi", || Implicit::new(ctx, places, spacing, cell))?;
@@ -178,7 +266,19 @@ impl Args {
             file::write(&of_frame(path, frame), &[&grid], &self.packing.options())?;
         }
         if let Some(path) = &self.mesh {
-            io::mesh::write(&of_frame(path, frame), &mesh)?;
+            let vertices: Vec<DVec3> = mesh.positions.iter().map(|place| place.cast()).collect();
+            let numbers: Vec<Vec<f32>> = columns.iter().map(|(_, numbers)| numbers.clone()).collect();
+            let means = ctx.phase("attributes", || transfer(ctx, places, spacing, &vertices, &numbers))?;
+            let array = |((name, _), values): (&(String, Vec<f32>), Vec<f32>)| MeshArray {
+                name: name.clone(),
+                on: On::Vertices,
+                number: Number::F32,
+                values: values.into_iter().map(f64::from).collect(),
+            };
+            let arrays: Vec<MeshArray> = columns.iter().zip(means).map(array).collect();
+            let arrays: Vec<&MeshArray> = arrays.iter().collect();
+            let carried = io::mesh::Carried { arrays: &arrays, ..Default::default() };
+            io::mesh::write_carried(&of_frame(path, frame), &mesh, &carried)?;
         }
         Ok(mesh)
     }

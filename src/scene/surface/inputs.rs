@@ -14,7 +14,7 @@ use crate::io::seen::Seen;
 use crate::io::sequence::Pattern;
 use crate::io::source;
 use crate::scene::Scene;
-use crate::surface::{Implicit, Isosurface, Particles, estimate_spacing};
+use crate::surface::{Implicit, Isosurface, Particles, estimate_spacing, rough_spacing};
 
 /// Arrays of the mesh that are written anew in each frame, and those that a moving mesh does not keep.
 const REPLACED: [&str; 8] = ["vx", "vy", "vz", "delta", "flagged", "nx", "ny", "nz"];
@@ -58,7 +58,10 @@ impl Inputs {
             return Err(Error::file(first, what));
         }
         let mut warnings = Vec::new();
-        let estimate = estimate_spacing(&particles.places);
+        let estimate = match surface.spacing {
+            Some(_) => rough_spacing(&particles.places),
+            None => estimate_spacing(&particles.places),
+        };
         let spacing = match (surface.spacing, estimate) {
             (Some(spacing), _) => spacing,
             (None, Some(estimate)) => {

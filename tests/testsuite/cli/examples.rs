@@ -158,7 +158,7 @@ fn the_page_of_the_command_line_makes_surfaces_of_particles() {
     let folder = tempfile::tempdir().unwrap();
     write_splash(folder.path());
     let lines = lines(block(CLI, "## Surfaces of particles", "sh"));
-    assert_eq!(lines.len(), 3, "{lines:?}");
+    assert_eq!(lines.len(), 4, "{lines:?}");
     lines.iter().for_each(|line| {
         works(folder.path(), line);
     });

@@ -3,7 +3,9 @@
 use std::fs;
 use std::path::Path;
 
-use frazil::io::mesh;
+use frazil::base::DVec3;
+use frazil::base::points::{Attribute, Column, Points, Values};
+use frazil::io::{mesh, particles};
 
 use crate::common::liquids::filled;
 use crate::program::{command, fails, works};
@@ -49,6 +51,47 @@ fn a_drop_becomes_a_closed_mesh_and_a_level_set() {
     let report: serde_json::Value =
         serde_json::from_slice(&fs::read(folder.join("run.json")).unwrap()).unwrap();
     assert!((report["spacing_m"].as_f64().unwrap() - 0.1).abs() < 0.005, "{report}");
+}
+
+#[test]
+fn specks_go_a_box_cuts_and_attributes_come_along() {
+    let folder = tempfile::tempdir().unwrap();
+    let folder = folder.path();
+    let mut places = filled(0.1, 0.1, 1.0, |place| place.norm() < 0.8);
+    let whole = places.len();
+    places.extend((0..5).map(|n| DVec3::new(3.0, 0.1 * f64::from(n), 0.0)));
+    let mut points = Points::at(1.0, &places).unwrap();
+    let speed = places.iter().map(|p| [p.x as f32, 2.0, -1.0]).collect();
+    points.attributes.push(Attribute { name: "v".into(), values: Values::Vector(Column::Each(speed)) });
+    points.attributes.push(Attribute { name: "heat".into(), values: Values::Float(Column::Uniform(0.25)) });
+    points.attributes.push(Attribute { name: "kind".into(), values: Values::Int(Column::Uniform(3)) });
+    particles::write(&folder.join("drop.bgeo"), &points, false).unwrap();
+    let make = "vdb from-particles drop.bgeo --spacing 0.1 --mesh out.ply --report run.json";
+    let number = |name: &str| {
+        let text = fs::read(folder.join("run.json")).unwrap();
+        serde_json::from_slice::<serde_json::Value>(&text).unwrap()[name].as_u64().unwrap() as usize
+    };
+    let parts = |mesh: &frazil::base::TriMesh| mesh.euler_characteristic() / 2;
+    works(folder, make);
+    assert_eq!(parts(&mesh::read(&folder.join("out.ply")).unwrap()), 2);
+    works(folder, &format!("{make} --min-drop 6 --attributes v,heat"));
+    assert_eq!((number("particles"), number("specks_left_out")), (whole, 5));
+    let out = mesh::read_detailed(&folder.join("out.ply")).unwrap();
+    assert_eq!(parts(&out.mesh), 1);
+    let array = |name: &str| &out.arrays.iter().find(|array| array.name == name).unwrap().values;
+    assert_eq!(out.arrays.len(), 4);
+    for (vertex, place) in out.mesh.positions.iter().enumerate() {
+        assert!((array("vx")[vertex] - f64::from(place.x)).abs() < 0.15, "{}", array("vx")[vertex]);
+        assert!((array("vy")[vertex] - 2.0).abs() < 1e-5 && (array("heat")[vertex] - 0.25).abs() < 1e-6);
+    }
+    works(folder, &format!("{make} --box-min=-1,-1,-1 --box-max=1,1,0 --attributes all"));
+    assert!(number("particles") < whole * 11 / 20 && number("particles") > whole * 9 / 20);
+    assert!(mesh::read(&folder.join("out.ply")).unwrap().is_manifold());
+    fails(folder, &format!("{make} --attributes kind"), 2, &["drop.bgeo", "\"kind\"", "heat"]);
+    fails(folder, &format!("{make} --min-drop 9000"), 2, &["drop.bgeo", "9000"]);
+    fails(folder, &format!("{make} --box-min=7,7,7 --box-max=8,8,8"), 2, &["drop.bgeo", "box"]);
+    fails(folder, &format!("{make} --box-min=7,7,7"), 2, &["box-max"]);
+    fails(folder, &format!("{} --attributes v", make.replace("out.ply", "out.obj")), 2, &["out.obj", ".ply"]);
 }
 
 #[test]

@@ -122,6 +122,11 @@ fn the_mesh_moves_with_its_velocities_and_keeps_what_it_carries() {
     let report: serde_json::Value =
         serde_json::from_slice(&fs::read(folder.join("run.json")).unwrap()).unwrap();
     assert_eq!((report["frames"].as_u64(), report["most_flagged"].as_u64()), (Some(6), Some(0)));
+    works(folder, "preview out --frame 3 -o plain.png --size 64x48");
+    works(folder, "preview out --frame 3 -o delta.png --size 64x48 --color delta");
+    works(folder, "preview out/surface/surface.0003.ply -o v.png --size 64x48 --color v");
+    assert!(fs::read(folder.join("plain.png")).unwrap() != fs::read(folder.join("delta.png")).unwrap());
+    fails(folder, "preview out --frame 3 -o no.png --color heat", 2, &["--color heat", "array"]);
     let checked = works(folder, "check out");
     assert!(checked.contains("6 frames") && checked.contains("all of them"), "{checked}");
 }

@@ -1,0 +1,85 @@
+//! Gates of surfaces of particles against splashsurf 0.14 (Löschner et al. 2023), which `make test-clients` installs: the whole
+//! command with its files, on one thread, with the same cells and the same radius of influence.
+
+use std::path::{Path, PathBuf};
+use std::process::{Command, Stdio};
+use std::time::Instant;
+
+use frazil::base::DVec3;
+use frazil::base::points::Points;
+use frazil::io::particles;
+
+use crate::common::liquids::Random;
+use crate::harness::{Harness, median};
+
+/// Gates, with the count of particles along an edge of their block.
+const GATES: [(&str, i32); 3] =
+    [("surface.splashsurf_20k", 27), ("surface.splashsurf_260k", 64), ("surface.splashsurf_1m", 100)];
+/// Initial distance between particles (m).
+const SPACING: f64 = 0.1;
+/// Runs of each, one after the other by turns.
+const RUNS: usize = 5;
+
+pub fn run(h: &mut Harness) {
+    if !GATES.iter().any(|(name, _)| h.wants(name)) {
+        return;
+    }
+    let other = Path::new(env!("CARGO_MANIFEST_DIR")).join("target/clients/bin/pysplashsurf");
+    if !other.is_file() {
+        GATES.iter().for_each(|(name, _)| h.skipped(name, "splashsurf is not installed: make test-clients"));
+        return;
+    }
+    let folder = tempfile::tempdir().expect("a folder");
+    for (name, edge) in GATES {
+        if !h.wants(name) {
+            continue;
+        }
+        let file = block(folder.path(), edge);
+        let time = |command: &mut Command| {
+            let start = Instant::now();
+            let status = command.current_dir(&folder).stdout(Stdio::null()).stderr(Stdio::null()).status();
+            assert!(status.expect("a program").success(), "{command:?}");
+            start.elapsed().as_secs_f64()
+        };
+        let (mut own, mut others) = (Vec::new(), Vec::new());
+        for _ in 0..RUNS {
+            others.push(time(splashsurf(&mut Command::new(&other), &file)));
+            own.push(time(frazil(&mut Command::new(env!("CARGO_BIN_EXE_frazil")), &file)));
+        }
+        let (own, others) = (median(own), median(others));
+        h.gate(
+            name,
+            own / others,
+            &format!("{own:.2} s, splashsurf {others:.2} s, of {} particles", edge.pow(3)),
+        );
+    }
+}
+
+/// Its lengths are in radii of particles, half a spacing, and its kernel reaches twice its smoothing length: 4 spacings as ours.
+fn splashsurf<'a>(command: &'a mut Command, file: &Path) -> &'a mut Command {
+    command
+        .arg("reconstruct")
+        .arg(file)
+        .args(["-r", "0.05", "-l", "4.0", "-c", "1.0", "-t", "0.6", "-n", "1"]);
+    command.args(["-o", "other.ply", "-q"])
+}
+
+fn frazil<'a>(command: &'a mut Command, file: &Path) -> &'a mut Command {
+    command.args(["vdb", "from-particles"]).arg(file);
+    command.args(["--spacing", "0.1", "--mesh", "own.ply", "--threads", "1", "-q"])
+}
+
+/// A block of particles with a wavy surface, as a file.
+fn block(folder: &Path, edge: i32) -> PathBuf {
+    let mut random = Random(1);
+    let mut places = Vec::with_capacity(edge.pow(3) as usize);
+    for n in 0..edge.pow(3) {
+        let at =
+            DVec3::new(f64::from(n / edge / edge), f64::from(n / edge % edge), f64::from(n % edge)) * SPACING;
+        let wave = 0.8 * libm::sin(1.5 * at.x) * libm::cos(1.2 * at.z);
+        places.push(at + DVec3::new(0.0, wave, 0.0) + random.vector(0.2 * SPACING));
+    }
+    let path = folder.join(format!("block{edge}.xyz"));
+    particles::write(&path, &Points::at(1.0, &places).expect("points"), false).expect("a file");
+    path
+}
