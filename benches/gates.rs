@@ -48,6 +48,8 @@ mod harness;
 mod host;
 #[path = "gates/house.rs"]
 mod house;
+#[path = "gates/large.rs"]
+mod large;
 #[path = "gates/materials.rs"]
 mod materials;
 #[path = "gates/mist.rs"]
@@ -138,6 +140,7 @@ fn main() {
     spin::run(&mut h);
     damage::run(&mut h);
     surface::run(&mut h);
+    large::run(&mut h);
     spot::run(&mut h);
     splashsurf::run(&mut h);
     tracker_cancel::run(&mut h);

@@ -5,7 +5,7 @@ use std::path::Path;
 use frazil::base::points::{Attribute, Column, Points, Values};
 use frazil::base::{DVec3, TriMesh};
 use frazil::io::{mesh, particles};
-use frazil::surface::{Params, Particles, Tracker};
+use frazil::surface::{Params, Particles, SUPPORT, Tracker};
 use frazil::{Context, Pool};
 
 use super::shapes::sphere;
@@ -77,6 +77,36 @@ pub fn ball(radius: f64, n: usize, detail: f64) -> Ball {
         *place = unit * (size + detail * f64::from(wave) * spacing) as f32;
     }
     Ball { spacing, places, mesh }
+}
+
+/// The function of Solenthaler et al. (2007) at a place (m), summed over all particles.
+pub fn plain_phi(places: &[DVec3], spacing: f64, at: DVec3) -> f64 {
+    let radius = SUPPORT * spacing;
+    let mean = |at: DVec3| {
+        let weight = |place: &DVec3| (1.0 - (place - at).norm_squared() / (radius * radius)).max(0.0).powi(3);
+        let sum: f64 = places.iter().map(weight).sum();
+        places.iter().map(|place| place * weight(place)).sum::<DVec3>() / sum
+    };
+    // The derivative by differences.
+    let step = 1e-5 * spacing;
+    let column = |axis: usize| {
+        let mut by = DVec3::zeros();
+        by[axis] = step;
+        (mean(at + by) - mean(at - by)) / (2.0 * step)
+    };
+    let rate = nalgebra::Matrix3::from_columns(&[column(0), column(1), column(2)]);
+    let most = ((rate + rate.transpose()) * 0.5).symmetric_eigenvalues().max();
+    let g = ((3.5 - most) / 3.1).clamp(0.0, 1.0);
+    let share = if most < 0.4 { 1.0 } else { g.powi(3) - 3.0 * g * g + 3.0 * g };
+    (at - mean(at)).norm() - spacing * share
+}
+
+/// Two clouds of trembling particles with a gap between them, where the mean of the places around moves fast.
+pub fn two_clouds(spacing: f64) -> Vec<DVec3> {
+    let mut places = filled(spacing, 0.3, 5.0 * spacing, |place| place.norm() < 4.5 * spacing);
+    let other = filled(spacing, 0.3, 5.0 * spacing, |place| place.norm() < 3.0 * spacing);
+    places.extend(other.iter().map(|at| at + DVec3::new(9.5, 1.0, 0.0) * spacing));
+    places
 }
 
 /// Writes a ball's cache, NAME.0001.bgeo and so on, in which it travels, and its mesh as NAME.ply.

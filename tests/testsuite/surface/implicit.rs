@@ -1,43 +1,16 @@
 //! The particles' own surface: against plain sums, and closed.
 
 use frazil::base::DVec3;
-use frazil::surface::{Implicit, Isosurface, SUPPORT};
+use frazil::surface::{Implicit, Isosurface};
 
-use crate::common::liquids::{ball, context, filled};
-
-/// The function of Solenthaler et al. (2007) at a place (m), summed over all particles.
-fn plain(places: &[DVec3], spacing: f64, at: DVec3) -> f64 {
-    let radius = SUPPORT * spacing;
-    let mean = |at: DVec3| {
-        let weight = |place: &DVec3| (1.0 - (place - at).norm_squared() / (radius * radius)).max(0.0).powi(3);
-        let sum: f64 = places.iter().map(weight).sum();
-        places.iter().map(|place| place * weight(place)).sum::<DVec3>() / sum
-    };
-    // The derivative by differences.
-    let step = 1e-5 * spacing;
-    let column = |axis: usize| {
-        let mut by = DVec3::zeros();
-        by[axis] = step;
-        (mean(at + by) - mean(at - by)) / (2.0 * step)
-    };
-    let rate = nalgebra::Matrix3::from_columns(&[column(0), column(1), column(2)]);
-    let most = ((rate + rate.transpose()) * 0.5).symmetric_eigenvalues().max();
-    let g = ((3.5 - most) / 3.1).clamp(0.0, 1.0);
-    let share = if most < 0.4 { 1.0 } else { g.powi(3) - 3.0 * g * g + 3.0 * g };
-    (at - mean(at)).norm() - spacing * share
-}
+use crate::common::liquids::{ball, context, filled, plain_phi, two_clouds};
 
 #[test]
 fn the_function_is_the_plain_sum() {
     let ctx = context(2);
     // Two clouds with a gap, where the mean moves fast.
     let spacing = 0.1;
-    let mut places = filled(spacing, 0.3, 0.5, |place| place.norm() < 0.45);
-    places.extend(
-        filled(spacing, 0.3, 0.5, |place| place.norm() < 0.3)
-            .iter()
-            .map(|at| at + DVec3::new(0.95, 0.1, 0.0)),
-    );
+    let places = two_clouds(spacing);
     let phi = Implicit::new(&ctx, &places, spacing, 0.5 * spacing).unwrap();
     let mut compared = 0;
     for (index, patch) in phi.patches().iter().enumerate().step_by(3) {
@@ -45,7 +18,7 @@ fn the_function_is_the_plain_sum() {
             let at = [node >> 4, node >> 2 & 3, node & 3];
             let at = DVec3::from([0, 1, 2].map(|axis| f64::from(4 * patch[axis] + at[axis]))) * phi.cell();
             let value = f64::from(phi.values(index)[node as usize]) * phi.cell();
-            let expected = plain(&places, spacing, at);
+            let expected = plain_phi(&places, spacing, at);
             if expected.is_finite() && expected < 2.0 * spacing {
                 assert!((value - expected).abs() < 1e-4 * spacing, "{value} is not {expected}");
                 compared += 1;

@@ -1,0 +1,65 @@
+//! Gates of the particles' surface against plain sums, and of a million particles under a million triangles.
+
+use std::process::{Command, Stdio};
+
+use frazil::base::DVec3;
+use frazil::surface::Implicit;
+
+use crate::common::liquids::{ball, context, plain_phi, two_clouds, write_cache};
+use crate::harness::Harness;
+
+pub fn run(h: &mut Harness) {
+    sums(h);
+    million(h);
+}
+
+/// The function at the nodes of two clouds, against sums over all particles in 64 bits.
+fn sums(h: &mut Harness) {
+    let name = "surface.phi_sum";
+    if !h.wants(name) {
+        return;
+    }
+    let (ctx, spacing) = (context(2), 0.1);
+    let places = two_clouds(spacing);
+    let phi = Implicit::new(&ctx, &places, spacing, 0.5 * spacing).expect("a surface");
+    let (mut most, mut count) = (0.0f64, 0);
+    for (index, patch) in phi.patches().iter().enumerate() {
+        for node in 0..64 {
+            let at = [node >> 4, node >> 2 & 3, node & 3];
+            let at = DVec3::from([0, 1, 2].map(|axis| f64::from(4 * patch[axis] + at[axis]))) * phi.cell();
+            let expected = plain_phi(&places, spacing, at);
+            if expected.is_finite() && expected < 2.0 * spacing {
+                let value = f64::from(phi.values(index)[node as usize]) * phi.cell();
+                most = most.max((value - expected).abs() / spacing);
+                count += 1;
+            }
+        }
+    }
+    h.gate(name, most, &format!("{count} nodes of two clouds with a gap"));
+}
+
+/// One step by the command, on one thread: what advection, surface, distances and projection take, and the greatest memory.
+fn million(h: &mut Harness) {
+    let names @ [time, memory] = ["surface.time_1m", "surface.memory_1m"];
+    if !names.iter().any(|name| h.wants(name)) {
+        return;
+    }
+    let folder = tempfile::tempdir().expect("a folder");
+    let ball = ball(62.0, 289, 0.25);
+    write_cache(folder.path(), "ball", &ball, 3);
+    let mut run = Command::new(env!("CARGO_BIN_EXE_frazil"));
+    run.current_dir(&folder).args(["surface", "-p", "ball.%04d.bgeo", "-m", "ball.ply", "-o", "out", "-q"]);
+    run.args(["--spacing", "0.01", "--threads", "1", "--report", "run.json"]).stderr(Stdio::null());
+    assert!(run.status().expect("frazil").success());
+    let read = |name: &str| -> serde_json::Value {
+        serde_json::from_slice(&std::fs::read(folder.path().join(name)).expect("a report")).expect("a report")
+    };
+    let frame = read("out/report/surface.0003.json");
+    let phases = frame["phases"].as_array().expect("phases");
+    let seconds: f64 = phases.iter().map(|phase| phase["seconds"].as_f64().expect("seconds")).sum();
+    let note = format!("{} particles, {} triangles; threads=1", ball.places.len(), ball.mesh.triangles.len());
+    let cpu = frazil::base::cpu::cpu_level();
+    h.gate(time, seconds, &format!("{note} cpu={cpu:?}; all phases of a frame"));
+    let peak = read("run.json")["peak_memory_bytes"].as_f64().expect("a peak") / 1e9;
+    h.gate(memory, peak, &format!("{note}; the whole command"));
+}
