@@ -28,6 +28,8 @@ mod damage;
 mod dense;
 #[path = "gates/distance.rs"]
 mod distance;
+#[path = "gates/early.rs"]
+mod early;
 #[path = "gates/far.rs"]
 mod far;
 #[path = "gates/flip.rs"]
@@ -140,6 +142,7 @@ fn main() {
     spin::run(&mut h);
     damage::run(&mut h);
     surface::run(&mut h);
+    early::run(&mut h);
     large::run(&mut h);
     spot::run(&mut h);
     splashsurf::run(&mut h);

@@ -273,6 +273,8 @@ pub const GATES: &[Gate] = &[
     yes("surface.same_bytes_kill"),
     yes("surface.same_bytes_cpu"),
     gate("surface.cancel_p99", "s", Most(0.2), Most(0.05)),
+    // Frames from a change of the particles' own surface to its first flag.
+    gate("surface.early", "frames", Most(1.0), Most(0.0)),
     gate("surface.phi_sum", "r", Most(1.0e-4), Open),
     gate("surface.time_1m", "s", Most(6.0), Most(2.5)),
     gate("surface.memory_1m", "GB", Most(2.0), Most(1.0)),

@@ -257,7 +257,7 @@ fn same_bytes(h: &mut Harness, spot: &Spot, took: f64) {
 }
 
 /// Count of connected parts.
-fn parts(mesh: &TriMesh) -> usize {
+pub fn parts(mesh: &TriMesh) -> usize {
     let mut parent: Vec<u32> = (0..mesh.positions.len() as u32).collect();
     let root = |parent: &mut Vec<u32>, mut at: u32| {
         while parent[at as usize] != at {
