@@ -29,7 +29,6 @@ mod fade;
 mod fit;
 mod implicit;
 mod isosurface;
-mod lean;
 #[cfg(feature = "vdb")]
 mod level_set;
 mod paths;

@@ -19,7 +19,6 @@ impl Tracker {
         to.count(self.vertices.len());
         self.vertices.iter().flatten().for_each(|part| to.f64(*part));
         to.f32s(&self.delta);
-        to.f32s(&self.lean);
         to.0.extend(self.flags.iter().map(|flag| u8::from(*flag)));
         packed::pack(&to.0, MAGIC)
     }
@@ -50,7 +49,7 @@ impl Tracker {
         if !(0.0..=100.0).contains(&reach) {
             return wrong(format!("has a band of {reach} spacings"));
         }
-        let count = from.count(3 * 8 + 2 * 4 + 1)?;
+        let count = from.count(3 * 8 + 4 + 1)?;
         if count != mesh.positions.len() {
             return wrong(format!("is of a mesh of {count} vertices, not {}", mesh.positions.len()));
         }
@@ -59,15 +58,13 @@ impl Tracker {
             vertices.push(DVec3::new(from.f64()?, from.f64()?, from.f64()?));
         }
         // A vertex that has no distance has NaN.
-        let mut numbers =
-            || (0..count).map(|_| Ok(f32::from_le_bytes(from.take()?))).collect::<Result<Vec<f32>>>();
-        let (delta, lean) = (numbers()?, numbers()?);
-        if delta.iter().chain(&lean).any(|number| number.is_infinite()) {
+        let delta = (0..count).map(|_| Ok(f32::from_le_bytes(from.take()?))).collect::<Result<Vec<f32>>>()?;
+        if delta.iter().any(|delta| delta.is_infinite()) {
             return wrong("has a distance that is not finite".into());
         }
         let flags = from.bytes(count)?.iter().map(|flag| *flag != 0).collect();
         from.end()?;
         let (triangles, lasting) = (mesh.triangles.clone(), Vec::new());
-        Ok(Self { params, vertices, triangles, delta, lean, lasting, flags, reach })
+        Ok(Self { params, vertices, triangles, delta, lasting, flags, reach })
     }
 }

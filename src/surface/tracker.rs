@@ -10,7 +10,6 @@ use super::cells::Coord;
 use super::fade::fade;
 use super::implicit::Implicit;
 use super::isosurface::Isosurface;
-use super::lean;
 use super::paths::Paths;
 use super::project::foot;
 use super::sample::Sampler;
@@ -117,8 +116,6 @@ pub struct Tracker {
     pub(super) triangles: Vec<[u32; 3]>,
     /// Distance from the surface that each vertex keeps (m); NaN: it was too far from it to have one.
     pub(super) delta: Vec<f32>,
-    /// How each vertex leans against the surface: see [`lean::of`]; NaN: it never had a foot.
-    pub(super) lean: Vec<f32>,
     /// Share 0..=1 of each vertex' detail that never fades; empty: none.
     pub(super) lasting: Vec<f32>,
     /// Vertices that the last step could not project.
@@ -152,14 +149,12 @@ impl Tracker {
         let vertices: Vec<DVec3> = mesh.positions.iter().map(|place| place.cast()).collect();
         let flags = vec![false; vertices.len()];
         let (delta, reach) = (Vec::new(), REACH[0]);
-        let (triangles, lean, lasting) = (mesh.triangles.clone(), Vec::new(), Vec::new());
-        let mut tracker = Self { params, vertices, triangles, delta, lean, lasting, flags, reach };
-        let normals = lean::normals(&tracker.vertices, &tracker.triangles);
+        let (triangles, lasting) = (mesh.triangles.clone(), Vec::new());
+        let mut tracker = Self { params, vertices, triangles, delta, lasting, flags, reach };
         let surface = ctx.phase("phi", || tracker.surface_of(ctx, particles))?;
         loop {
             let distances = ctx.phase("distance", || tracker.distances(ctx, &surface))?;
-            let measured = ctx.phase("measure", || Ok(tracker.measure(&normals, &distances)))?;
-            (tracker.delta, tracker.lean) = measured;
+            tracker.delta = ctx.phase("measure", || Ok(tracker.measure(&distances)))?;
             let known = tracker.delta.iter().filter(|delta| !delta.is_nan()).count();
             let wanted = if known == tracker.delta.len() { tracker.wanted_reach() } else { REACH[1] };
             if wanted <= tracker.reach {
@@ -255,13 +250,13 @@ impl Tracker {
         }
         from.validate()?;
         to.validate()?;
-        let ((vertices, delta, lean, flags, report), phases) = ctx.step(5, || {
+        let ((vertices, delta, flags, report), phases) = ctx.step(5, || {
             let paths = Paths::between(from, to, dt)?;
             let (carried, parts) = ctx.phase("advect", || self.carried(ctx, &paths))?;
             let surface = ctx.phase("phi", || self.surface_of(ctx, to))?;
             let distances = ctx.phase("distance", || self.distances(ctx, &surface))?;
             let delta = fade(self, &carried, dt);
-            let (vertices, lean, flags) =
+            let (vertices, flags) =
                 ctx.phase("project", || self.projected(ctx, carried, &delta, &distances))?;
             let feet = flags.iter().filter_map(|flag| flag.foot()).collect();
             let apart = ctx.phase("apart", || Ok(apart::parts(&surface.0, &surface.1, feet)))?;
@@ -273,11 +268,11 @@ impl Tracker {
                 apart,
                 ..StepReport::default()
             };
-            Ok((vertices, delta, lean, flags, report))
+            Ok((vertices, delta, flags, report))
         })?;
         let count = |kind: Flag| flags.iter().filter(|flag| **flag == kind).count();
         let report = StepReport { jumped: count(Flag::Jumped), lost: count(Flag::Lost), phases, ..report };
-        (self.vertices, self.delta, self.lean) = (vertices, delta, lean);
+        (self.vertices, self.delta) = (vertices, delta);
         self.flags = flags.iter().map(|flag| flag.foot().is_none()).collect();
         Ok(report)
     }
@@ -312,18 +307,14 @@ impl Tracker {
         (WIDER * most + DRIFT + 2.0 * self.params.cell).clamp(REACH[0], REACH[1])
     }
 
-    /// The distance of each vertex from the surface (m), and how it leans.
-    fn measure(&self, normals: &[[f32; 3]], distances: &Distances) -> (Vec<f32>, Vec<f32>) {
+    /// The distance of each vertex from the surface (m).
+    fn measure(&self, distances: &Distances) -> Vec<f32> {
         let cell = distances.cell();
-        let one = |sampler: &mut Sampler<'_>, (place, normal): (&DVec3, &[f32; 3])| match foot(
-            sampler,
-            place / cell,
-        ) {
-            Some(foot) => ((foot.distance * cell) as f32, lean::of(normal, &foot)),
-            None => (f32::NAN, f32::NAN),
+        let one = |sampler: &mut Sampler<'_>, place: &DVec3| {
+            foot(sampler, place / cell).map_or(f32::NAN, |foot| (foot.distance * cell) as f32)
         };
-        let vertices = self.vertices.par_iter().zip(normals).with_min_len(1024);
-        vertices.map_init(|| Sampler::new(distances), one).unzip()
+        let vertices = self.vertices.par_iter().with_min_len(1024);
+        vertices.map_init(|| Sampler::new(distances), one).collect()
     }
 
     /// Moves vertices (m) to where they have the distance that they keep, unless that is too far.
@@ -333,45 +324,36 @@ impl Tracker {
         mut vertices: Vec<DVec3>,
         delta: &[f32],
         distances: &Distances,
-    ) -> Result<(Vec<DVec3>, Vec<f32>, Vec<Flag>)> {
+    ) -> Result<(Vec<DVec3>, Vec<Flag>)> {
         let Params { spacing, change, .. } = self.params;
         let cell = distances.cell();
-        let normals = lean::normals(&vertices, &self.triangles);
-        let mut lean = self.lean.clone();
-        let chunks = vertices.par_chunks_mut(1024).zip(lean.par_chunks_mut(1024));
-        let chunks = chunks.zip(normals.par_chunks(1024).zip(delta.par_chunks(1024)));
+        let chunks = vertices.par_chunks_mut(1024).zip(delta.par_chunks(1024));
         let flags: Vec<Vec<Flag>> = chunks
             .map_init(
                 || Sampler::new(distances),
-                |sampler, ((vertices, lean), (normals, delta))| {
+                |sampler, (vertices, delta)| {
                     ctx.check()?;
-                    let place = |((vertex, lean), (normal, delta)): Vertex<'_>| {
+                    let place = |(vertex, delta): (&mut DVec3, &f32)| {
                         let Some(foot) = foot(sampler, *vertex / cell).filter(|_| !delta.is_nan()) else {
                             return Flag::Lost;
                         };
                         let to = foot.at(f64::from(*delta) / cell) * cell;
                         let moved = (to - *vertex).norm() / spacing;
-                        let now = lean::of(normal, &foot);
-                        if moved > change || now < *lean - lean::MOST {
+                        if moved > change {
                             return Flag::Jumped;
                         }
-                        *lean = now;
                         if moved > STILL {
                             *vertex = to;
                         }
                         Flag::Placed([0, 1, 2].map(|axis| foot.place[axis].floor() as i32))
                     };
-                    let all = vertices.iter_mut().zip(lean).zip(normals.iter().zip(delta));
-                    Ok(all.map(place).collect())
+                    Ok(vertices.iter_mut().zip(delta).map(place).collect())
                 },
             )
             .collect::<Result<_>>()?;
-        Ok((vertices, lean, flags.into_iter().flatten().collect()))
+        Ok((vertices, flags.into_iter().flatten().collect()))
     }
 }
-
-/// A vertex with how it leant, its normal, and its delta.
-type Vertex<'a> = ((&'a mut DVec3, &'a mut f32), (&'a [f32; 3], &'a f32));
 
 /// What became of a vertex.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

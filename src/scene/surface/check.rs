@@ -142,7 +142,7 @@ fn bytes_of_frame(scene: &Scene, inputs: &Inputs) -> Result<u64> {
     let ply = vertices * of_vertex + triangles * 13 + own + uvs;
     let obj = TEXT * (3 * vertices + 2 * triangles);
     let usd = TEXT * (6 * vertices + 3 * triangles);
-    // The exact state: places in 64 bits, distances, how vertices lean, flags.
-    let state = 33 * vertices;
+    // The exact state: places in 64 bits, distances, flags.
+    let state = 29 * vertices;
     Ok(state + ply * u64::from(output.ply) + obj * u64::from(output.obj) + usd * u64::from(output.usd))
 }
