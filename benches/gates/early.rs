@@ -48,7 +48,7 @@ fn sets() -> [Set; 4] {
             name: "a sheet tears",
             places: within(14.0, &|p| p.y.abs() < 1.6),
             motion: |p, t| {
-                let wide = libm::exp(0.02 * t);
+                let wide = libm::exp(0.03 * t);
                 DVec3::new(p.x * wide, p.y / (wide * wide), p.z * wide)
             },
         },
