@@ -6,7 +6,9 @@ use frazil::base::{MeshArray, TriMesh};
 use frazil::io::mesh::extension;
 use frazil::io::sequence::Pattern;
 use frazil::io::{self, atomic, usd};
-use frazil::motion::{Character, Keys, MeshSequence, Motion, Placed, Play, Rigid, is_gltf, missing_uvs};
+use frazil::motion::{
+    Character, Keys, MeshSequence, Motion, Placed, Play, Rigid, Space, is_gltf, missing_uvs,
+};
 use frazil::scene::{FrameChoice, Frames};
 use serde_json::json;
 
@@ -133,7 +135,13 @@ impl Args {
             Pattern::parse(&self.input).map_or_else(|| self.input.clone(), |pattern| pattern.path(frame));
         let mut lost = if is_gltf(&one) { Character::extras(&one)? } else { io::extras::of(&one)? };
         let uvs = motion.drawn().uvs.filter(|_| io::mesh::holds_uvs(&self.output));
-        lost.retain(|name| *name != "UVs" || uvs.is_none());
+        let to = extension(&self.output);
+        lost.retain(|name| match *name {
+            "UVs" => uvs.is_none(),
+            "colours" => !["ply", "obj"].contains(&to.as_str()),
+            "velocities" => to != "ply" || !self.keeps_space(),
+            _ => true,
+        });
         if let Some(missing) = uvs.map(|uvs| uvs.missing).filter(|missing| *missing > 0) {
             log::warn!("{}", missing_uvs(&one.display().to_string(), missing));
         }
@@ -187,7 +195,15 @@ impl Args {
         if is_gltf(&input) || extension(output) == "stl" {
             return Ok(Vec::new());
         }
-        Ok(io::mesh::read_detailed(&input)?.arrays)
+        let mut arrays = io::mesh::read_detailed(&input)?.arrays;
+        // In another space velocities would be others.
+        arrays.retain(|array| self.keeps_space() || !["vx", "vy", "vz"].contains(&&*array.name));
+        Ok(arrays)
+    }
+
+    /// Whether places stay what they are.
+    fn keeps_space(&self) -> bool {
+        self.space.space() == Space::OWN && self.to_scale == 1.0 && self.to_up == Axis::Y
     }
 
     fn write(&self, path: &Path, motion: &dyn Motion, frame: i32) -> frazil::Result<()> {

@@ -17,6 +17,30 @@ fn convert_says_what_it_leaves_out() {
 }
 
 #[test]
+fn convert_keeps_the_arrays_of_meshes() {
+    let folder = tempfile::tempdir().unwrap();
+    let folder = folder.path();
+    let text = "ply\nformat ascii 1.0\nelement vertex 3\nproperty float x\nproperty float y\nproperty float z\n\
+                property float vx\nproperty float vy\nproperty float vz\nproperty uchar red\nproperty uchar green\n\
+                property uchar blue\nproperty double mask\nelement face 1\nproperty list uchar int vertex_indices\nend_header\n\
+                0 0 0 1 2 3 255 0 51 .25\n1 0 0 1 2 3 0 0 0 .5\n0 1 0 1 2 3 0 0 0 1\n3 0 1 2\n";
+    fs::write(folder.join("rich.ply"), text).unwrap();
+    let arrays = |name: &str| -> Vec<String> {
+        let mesh = frazil::io::mesh::read_detailed(&folder.join(name)).unwrap();
+        mesh.arrays.iter().map(|array| format!("{} {}", array.name, array.values[0] as f32)).collect()
+    };
+    assert_eq!(works(folder, "convert rich.ply same.ply"), "");
+    assert_eq!(arrays("same.ply"), ["vx 1", "vy 2", "vz 3", "red 255", "green 0", "blue 51", "mask 0.25"]);
+    // In another space velocities are others.
+    assert!(
+        works(folder, "convert rich.ply large.ply --scale 2").contains("velocities are not carried over")
+    );
+    assert_eq!(arrays("large.ply"), ["red 255", "green 0", "blue 51", "mask 0.25"]);
+    assert!(!works(folder, "convert rich.ply rich.obj").contains("colours"));
+    assert_eq!(arrays("rich.obj"), ["red 1", "green 0", "blue 0.2"].map(String::from));
+}
+
+#[test]
 fn names_that_are_not_text_are_files_like_others() {
     let folder = tempfile::tempdir().unwrap();
     let name = OsStr::from_bytes(b"cube\xff.obj");
