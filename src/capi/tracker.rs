@@ -7,7 +7,7 @@ use super::guard::{Outcome, frz_status, guard};
 use super::handle::{Noun, change, clear, destroy, read, required};
 use super::mesh::{frz_mesh, no_flags};
 use super::saved::{Saved, resumed};
-use super::views::{Sized32, fill, finite, frz_span, frz_view, meaning, sized};
+use super::views::{Sized32, fill, finite, frz_span, frz_view, meaning, sized, within};
 use crate::surface::{Params, Particles, Tracker, Weighting, estimate_spacing};
 
 /// A detailed mesh that follows the particles of a liquid.
@@ -105,6 +105,7 @@ impl frz_tracker_params {
     /// The library's own parameters; what is out of range is named.
     fn params(&self) -> Outcome<Params> {
         no_flags(self.flags, 0)?;
+        within("reserved", f64::from(self.reserved), 0.0..=0.0, "")?;
         let numbers = [self.spacing, self.cell, self.change, self.fade];
         for (name, value) in ["spacing", "cell", "change", "fade"].into_iter().zip(numbers) {
             finite(name, value)?;

@@ -2,6 +2,7 @@
 
 use std::path::{Path, PathBuf};
 
+use frazil::base::arrays::On;
 use frazil::base::{MeshArray, TriMesh};
 use frazil::io::mesh::extension;
 use frazil::io::sequence::Pattern;
@@ -148,6 +149,16 @@ impl Args {
         if !lost.is_empty() {
             log::warn!("{}: {} are not carried over", one.display(), listed(&lost));
         }
+        // Those that have words of their own were told above.
+        const TOLD: [&str; 7] = ["vx", "vy", "vz", "red", "green", "blue", "alpha"];
+        if to != "ply" && extension(&one) == "ply" {
+            let arrays = io::mesh::read_detailed(&one)?.arrays;
+            let names = arrays.iter().map(|array| &array.name[..]).filter(|name| !TOLD.contains(name));
+            let names: Vec<&str> = names.collect();
+            if !names.is_empty() {
+                log::warn!("{}: arrays are not carried over: {}", one.display(), names.join(", "));
+            }
+        }
         Ok(())
     }
 
@@ -198,6 +209,8 @@ impl Args {
         let mut arrays = io::mesh::read_detailed(&input)?.arrays;
         // In another space velocities would be others.
         arrays.retain(|array| self.keeps_space() || !["vx", "vy", "vz"].contains(&&*array.name));
+        // Each mesh of a sequence may cut its polygons in its own way, but all get the triangles of the first.
+        arrays.retain(|array| array.on != On::Corners || Pattern::parse(&self.input).is_none());
         Ok(arrays)
     }
 

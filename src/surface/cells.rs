@@ -66,8 +66,7 @@ impl Cells {
             if high[axis] - low[axis] >= FARTHEST as f64 || low[axis] < -limit || high[axis] > limit {
                 let far = (high[axis] - low[axis]).max(-low[axis]).max(high[axis]) * edge;
                 return Err(Error::argument(format!(
-                    "particles reach over {far:.3} m, too far for a spacing of {} m",
-                    edge / 2.0
+                    "particles reach over {far:.3} m, too far for cells of {edge} m"
                 )));
             }
         }

@@ -1,5 +1,7 @@
 //! The exact state of a mesh that follows particles as bytes, from which a run resumes.
 
+use xxhash_rust::xxh3::xxh3_128;
+
 use super::tracker::{Params, Tracker};
 use crate::base::bytes::{Reader, Writer};
 use crate::base::packed::{self, Magic};
@@ -16,6 +18,7 @@ impl Tracker {
     pub fn save(&self) -> Vec<u8> {
         let mut to = Writer::default();
         [self.params.spacing, self.params.cell, self.reach].into_iter().for_each(|number| to.f64(number));
+        to.0.extend(seal(&self.triangles));
         to.count(self.vertices.len());
         self.vertices.iter().flatten().for_each(|part| to.f64(*part));
         to.f32s(&self.delta);
@@ -49,9 +52,13 @@ impl Tracker {
         if !(0.0..=100.0).contains(&reach) {
             return wrong(format!("has a band of {reach} spacings"));
         }
+        let sealed = from.take::<16>()?;
         let count = from.count(3 * 8 + 4 + 1)?;
         if count != mesh.positions.len() {
             return wrong(format!("is of a mesh of {count} vertices, not {}", mesh.positions.len()));
+        }
+        if sealed != seal(&mesh.triangles) {
+            return wrong("is of a mesh of other triangles".into());
         }
         let mut vertices = Vec::with_capacity(count);
         for _ in 0..count {
@@ -67,4 +74,10 @@ impl Tracker {
         let (triangles, lasting) = (mesh.triangles.clone(), Vec::new());
         Ok(Self { params, vertices, triangles, delta, lasting, flags, reach })
     }
+}
+
+/// Tells meshes of other triangles apart.
+fn seal(triangles: &[[u32; 3]]) -> [u8; 16] {
+    let bytes: Vec<u8> = triangles.as_flattened().iter().flat_map(|corner| corner.to_le_bytes()).collect();
+    xxh3_128(&bytes).to_le_bytes()
 }

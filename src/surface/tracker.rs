@@ -143,6 +143,20 @@ impl Tracker {
     /// # Errors
     /// Parameters out of range, a mesh or particles that are not valid; a mesh that is not where the particles are; cancel.
     pub fn new(ctx: &Context, params: Params, mesh: &TriMesh, particles: &Particles) -> Result<Self> {
+        Ok(Self::begin(ctx, params, mesh, particles)?.0)
+    }
+
+    /// As [`Tracker::new`], with what is known of the first frame: vertices that are too far from the particles' surface to keep a
+    /// distance count as lost.
+    ///
+    /// # Errors
+    /// As [`Tracker::new`].
+    pub fn begin(
+        ctx: &Context,
+        params: Params,
+        mesh: &TriMesh,
+        particles: &Particles,
+    ) -> Result<(Self, StepReport)> {
         params.validate()?;
         mesh.validate()?;
         particles.validate()?;
@@ -154,12 +168,16 @@ impl Tracker {
         let surface = ctx.phase("phi", || tracker.surface_of(ctx, particles))?;
         loop {
             let distances = ctx.phase("distance", || tracker.distances(ctx, &surface))?;
-            tracker.delta = ctx.phase("measure", || Ok(tracker.measure(&distances)))?;
-            let known = tracker.delta.iter().filter(|delta| !delta.is_nan()).count();
+            let (delta, feet) = ctx.phase("measure", || Ok(tracker.measure(&distances)))?;
+            tracker.delta = delta;
+            let feet: Vec<Coord> = feet.into_iter().flatten().collect();
+            let known = feet.len();
             let wanted = if known == tracker.delta.len() { tracker.wanted_reach() } else { REACH[1] };
             if wanted <= tracker.reach {
                 tracker.check_overlap(known)?;
-                return Ok(tracker);
+                let apart = ctx.phase("apart", || Ok(apart::parts(&surface.0, &surface.1, feet)))?;
+                let (lost, triangles) = (tracker.vertices.len() - known, surface.1.count());
+                return Ok((tracker, StepReport { lost, triangles, apart, ..StepReport::default() }));
             }
             // Measured again: what a step finds must be what was measured.
             tracker.reach = wanted.max(1.25 * tracker.reach).min(REACH[1]);
@@ -307,14 +325,15 @@ impl Tracker {
         (WIDER * most + DRIFT + 2.0 * self.params.cell).clamp(REACH[0], REACH[1])
     }
 
-    /// The distance of each vertex from the surface (m).
-    fn measure(&self, distances: &Distances) -> Vec<f32> {
+    /// The distance of each vertex from the surface (m), and the cell of its foot.
+    fn measure(&self, distances: &Distances) -> (Vec<f32>, Vec<Option<Coord>>) {
         let cell = distances.cell();
-        let one = |sampler: &mut Sampler<'_>, place: &DVec3| {
-            foot(sampler, place / cell).map_or(f32::NAN, |foot| (foot.distance * cell) as f32)
+        let one = |sampler: &mut Sampler<'_>, place: &DVec3| match foot(sampler, place / cell) {
+            Some(foot) => ((foot.distance * cell) as f32, Some(foot.cell())),
+            None => (f32::NAN, None),
         };
         let vertices = self.vertices.par_iter().with_min_len(1024);
-        vertices.map_init(|| Sampler::new(distances), one).collect()
+        vertices.map_init(|| Sampler::new(distances), one).unzip()
     }
 
     /// Moves vertices (m) to where they have the distance that they keep, unless that is too far.
@@ -345,7 +364,7 @@ impl Tracker {
                         if moved > STILL {
                             *vertex = to;
                         }
-                        Flag::Placed([0, 1, 2].map(|axis| foot.place[axis].floor() as i32))
+                        Flag::Placed(foot.cell())
                     };
                     Ok(vertices.iter_mut().zip(delta).map(place).collect())
                 },

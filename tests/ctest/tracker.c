@@ -277,6 +277,24 @@ static void refusals(void) {
     WORKS(frz_tracker_set_params(tracker, &params));
     FAILS(frz_tracker_create(ctx, &params, mesh, NULL, NULL, 0, &none), FRZ_ERROR_ARGUMENT, "frz_particles");
     FAILS(frz_tracker_create(ctx, &params, NULL, &first, NULL, 0, &none), FRZ_ERROR_ARGUMENT, "mesh");
+    {
+        /* As many vertices, other faces. */
+        static ball rest;
+        frz_mesh_desc desc;
+        frz_mesh *turned = NULL;
+        ball_make(&rest, 0.31f);
+        memset(&desc, 0, sizeof desc);
+        desc.struct_size = sizeof desc;
+        desc.positions = VIEW(rest.positions, BALL_VERTICES);
+        desc.face_counts = VIEW(rest.counts, BALL_FACES - 1);
+        desc.indices = VIEW(&rest.indices[0][0], 4 * (BALL_FACES - 1));
+        WORKS(frz_mesh_create(ctx, &desc, &turned));
+        FAILS(frz_tracker_create(ctx, &params, turned, NULL, state.data, state.size, &none), FRZ_ERROR_FILE, "other triangles");
+        frz_mesh_destroy(turned);
+    }
+    params.reserved = 1;
+    FAILS(frz_tracker_set_params(tracker, &params), FRZ_ERROR_ARGUMENT, "reserved");
+    params.reserved = 0;
     FAILS(frz_tracker_create(ctx, &params, mesh, NULL, state.data, state.size - 1, &none), FRZ_ERROR_FILE, "state");
     ((unsigned char *)state.data)[state.size / 2] ^= 1;
     FAILS(frz_tracker_create(ctx, &params, mesh, NULL, state.data, state.size, &none), FRZ_ERROR_FILE, "damaged");

@@ -228,7 +228,11 @@ impl Args {
                 format!("has no attribute \"{missing}\" of floats or vectors; it has {}", there.join(", "));
             return Err(Error::file(path, what));
         }
-        let mut out = Vec::new();
+        if let Some(attribute) = found.iter().find(|attribute| attribute.name.contains(char::is_whitespace)) {
+            let what = format!("the name \"{}\" has a space, which .ply cannot hold", attribute.name);
+            return Err(Error::file(path, what));
+        }
+        let mut out: Vec<(String, Vec<f32>)> = Vec::new();
         for attribute in found {
             match &attribute.values {
                 Values::Float(column) => {

@@ -5,8 +5,9 @@ use std::sync::Arc;
 
 use super::Surface;
 use super::time::read;
+use crate::base::arrays::{Number, On};
 use crate::base::faults::Faults;
-use crate::base::{DetailedMesh, TriMesh};
+use crate::base::{DetailedMesh, MeshArray, TriMesh};
 use crate::context::Context;
 use crate::error::{Error, Result};
 use crate::io::mesh::{extension, parse_polygons};
@@ -25,6 +26,8 @@ const ODD: f64 = 2.0;
 pub struct Inputs {
     /// The mesh at the first frame (m), with what it carries.
     pub mesh: DetailedMesh,
+    /// Share of each vertex' detail that never fades; empty: none.
+    pub(super) lasting: Vec<f32>,
     /// Initial distance between particles (m).
     pub spacing: f64,
     /// The particles at the first frame: how many there are, and how they are told apart.
@@ -98,9 +101,25 @@ impl Inputs {
                 DetailedMesh { mesh, ..DetailedMesh::default() }
             }
         };
+        let lasting = match (surface.half_life, surface.fade, &surface.mesh) {
+            (None, 0.0, _) | (_, _, None) => Vec::new(),
+            (_, _, Some(path)) => lasting(&mesh).map_err(|what| Error::file(path, what))?,
+        };
         mesh.arrays.retain(|array| !REPLACED.contains(&&*array.name));
         warnings.iter().for_each(|warning| log::warn!("{warning}"));
-        Ok(Self { mesh, spacing, particles, seen, warnings })
+        Ok(Self { mesh, lasting, spacing, particles, seen, warnings })
+    }
+}
+
+/// What is painted to last in the array `detail` of the vertices: shares 0..=1, of bytes 0 to 255.
+fn lasting(mesh: &DetailedMesh) -> std::result::Result<Vec<f32>, String> {
+    let is_it = |array: &&MeshArray| array.name == "detail" && array.on == On::Vertices;
+    let Some(array) = mesh.arrays.iter().find(is_it) else { return Ok(Vec::new()) };
+    let whole = if array.number == Number::U8 { 255.0 } else { 1.0 };
+    let shares: Vec<f32> = array.values.iter().map(|value| (value / whole) as f32).collect();
+    match shares.iter().position(|share| !(0.0..=1.0).contains(share)) {
+        Some(at) => Err(format!("detail of vertex {} is {}, not within 0 to 1", at + 1, shares[at])),
+        None => Ok(shares),
     }
 }
 

@@ -4,6 +4,7 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 use super::Surface;
+use crate::base::DVec3;
 use crate::base::points::Values;
 use crate::error::{Error, Result};
 use crate::io::mesh::extension;
@@ -42,23 +43,29 @@ pub fn read_cloud(path: &Path, seen: &Seen) -> Result<Cloud> {
 /// # Errors
 /// As [`read_cloud`]; no particles, values that are not finite, two particles with one id.
 pub(super) fn read(path: &Path, surface: &Surface, seen: &Seen) -> Result<Particles> {
-    let mut cloud = read_cloud(path, seen)?;
-    surface.space.bring(&mut cloud);
-    let named = |names: &[&str]| {
+    let cloud = read_cloud(path, seen)?;
+    let named = |names: &'static [&str]| {
         let is_it = |name: &str| names.contains(&&*name.to_lowercase());
-        cloud.attributes.iter().find(|attribute| is_it(&attribute.name)).map(|attribute| &attribute.values)
+        cloud
+            .attributes
+            .iter()
+            .filter(move |attribute| is_it(&attribute.name))
+            .map(|attribute| &attribute.values)
     };
-    let count = cloud.places.len();
-    let velocities = match named(&VELOCITIES) {
-        Some(Values::Vector(column)) => (0..count).map(|point| column.get(point)).collect(),
-        _ => Vec::new(),
-    };
-    let ids = match named(&IDS) {
-        Some(Values::Long(column)) => (0..count).map(|point| column.get(point)).collect(),
-        Some(Values::Int(column)) => (0..count).map(|point| column.get(point).into()).collect(),
-        _ => Vec::new(),
-    };
-    let particles = Particles { places: cloud.places, velocities, ids };
+    let (count, space) = (cloud.places.len(), surface.space);
+    let brought = |speed: [f32; 3]| space.place(DVec3::from(speed.map(f64::from))).cast::<f32>().into();
+    let velocities = named(&VELOCITIES).find_map(|values| match values {
+        Values::Vector(column) => Some((0..count).map(|point| brought(column.get(point))).collect()),
+        _ => None,
+    });
+    let ids = named(&IDS).find_map(|values| match values {
+        Values::Long(column) => Some((0..count).map(|point| column.get(point)).collect()),
+        Values::Int(column) => Some((0..count).map(|point| column.get(point).into()).collect()),
+        _ => None,
+    });
+    let places = cloud.places.iter().map(|place| space.place(*place)).collect();
+    let (velocities, ids) = (velocities.unwrap_or_default(), ids.unwrap_or_default());
+    let particles = Particles { places, velocities, ids };
     particles.validate().map_err(|error| Error::file(path, error.to_string()))?;
     Ok(particles)
 }

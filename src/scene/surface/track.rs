@@ -86,20 +86,17 @@ impl<'a> Track<'a> {
 
     /// Tells a mesh which of its detail never fades.
     fn set_lasting(&self, tracker: &mut Tracker) -> Result<()> {
-        let is_it = |array: &&MeshArray| array.name == "detail" && array.on == On::Vertices;
-        let painted = self.inputs.mesh.arrays.iter().find(is_it);
-        let shares = painted.map(|array| array.values.iter().map(|share| *share as f32).collect());
-        tracker.set_lasting(shares.unwrap_or_default()).map_err(|error| self.told(error))
+        tracker.set_lasting(self.inputs.lasting.clone()).map_err(|error| self.told(error))
     }
 
     /// The mesh at the first frame.
     fn first(&self, ctx: &Context, liquid: &mut Liquid<'_>) -> Result<At> {
         let frames = self.scene.shot.frames;
         let particles = liquid.at(self.surface.time(frames, frames.first))?;
-        let begun = ctx.step(3, || Tracker::new(ctx, self.params(), &self.inputs.mesh.mesh, &particles));
-        let (mut tracker, phases) = begun.map_err(|error| self.told(error))?;
+        let begun = ctx.step(4, || Tracker::begin(ctx, self.params(), &self.inputs.mesh.mesh, &particles));
+        let ((mut tracker, report), phases) = begun.map_err(|error| self.told(error))?;
         self.set_lasting(&mut tracker)?;
-        let report = StepReport { phases, ..StepReport::default() };
+        let report = StepReport { phases, ..report };
         Ok(At { tracker, report, particles: particles.places.len() })
     }
 
@@ -119,10 +116,25 @@ impl<'a> Track<'a> {
         Ok(At { tracker, report, particles: from.places.len() })
     }
 
-    /// Whether the coming frame's particles are there.
-    fn has_next(&self, frame: i32) -> bool {
-        let frames = self.scene.shot.frames;
-        frame < frames.last || self.surface.files_at(frames, frame + 1).iter().all(|path| path.is_file())
+    /// The mesh at the coming frame, where anything needs it. Beyond the shot's end it is only for velocities, and a cache need not have
+    /// it.
+    fn ahead(&self, ctx: &Context, liquid: &mut Liquid<'_>, now: &Tracker, frame: i32) -> Result<Option<At>> {
+        let is_last = frame == self.scene.shot.frames.last;
+        if !is_last {
+            return self.next(ctx, liquid, now, frame + 1).map(Some);
+        }
+        let ahead = self.reads(frame).ahead;
+        if ahead.is_empty() || !ahead.iter().all(|path| path.is_file()) {
+            return Ok(None);
+        }
+        match self.next(ctx, liquid, now, frame + 1) {
+            Ok(next) => Ok(Some(next)),
+            Err(Error::Cancelled) => Err(Error::Cancelled),
+            Err(error) => {
+                log::warn!("{error}; frame {frame} has the velocities of the frame before");
+                Ok(None)
+            }
+        }
     }
 
     /// Velocities (m/s) over the coming frame, or where that is not known over the one before.
@@ -204,8 +216,10 @@ impl Stage for Track<'_> {
         let from = if frame == frames.first { time(frame) } else { time(frame - 1) };
         // What is read anyway is not of the coming frame alone.
         let files = self.surface.files(from, time(frame));
+        let output = self.surface.output;
+        let has_velocities = output.velocities || output.usd;
         let mut ahead = self.surface.files(time(frame), time(frame + 1));
-        ahead.retain(|path| !files.contains(path));
+        ahead.retain(|path| has_velocities && !files.contains(path));
         Reads { files, ahead }
     }
 
@@ -251,11 +265,7 @@ impl<'a> Stepping for Track<'a> {
             (None, Some(before)) => self.next(ctx, liquid, before, to.frame)?,
             (None, None) => return Err(Error::Internal("a mesh was not begun".into())),
         };
-        let next = if self.has_next(to.frame) {
-            Some(self.next(ctx, liquid, &tracker, to.frame + 1)?)
-        } else {
-            None
-        };
+        let next = self.ahead(ctx, liquid, &tracker, to.frame)?;
         let step = to.made_from.map(|_| Written {
             places: usd::to_floats(tracker.vertices()),
             velocities: self.velocities(now.as_ref(), &tracker, next.as_ref().map(|next| &next.tracker)),

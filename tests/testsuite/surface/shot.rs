@@ -281,6 +281,82 @@ fn velocities_alone_are_enough_and_ids_alone_too() {
 }
 
 #[test]
+fn velocities_are_brought_into_the_shot_s_space_under_any_name() {
+    let folder = tempfile::tempdir().unwrap();
+    let folder = folder.path();
+    let ball = write_shot(folder, 1);
+    // Centimetres, Z up, all at 1 m/s upward; a number of another name comes first.
+    for frame in 1..=2 {
+        let places: Vec<DVec3> = ball
+            .places
+            .iter()
+            .map(|p| p + DVec3::new(0.0, f64::from(frame - 1) / 24.0, 0.0))
+            .map(|p| DVec3::new(p.x, -p.z, p.y) * 100.0)
+            .collect();
+        let mut points = Points::at(1.0, &places).unwrap();
+        let vel = Values::Float(Column::Uniform(3.0));
+        points.attributes.push(Attribute { name: "vel".into(), values: vel });
+        let speed = Values::Vector(Column::Uniform([0.0, 0.0, 100.0]));
+        points.attributes.push(Attribute { name: "Velocity".into(), values: speed });
+        particles::write(&folder.join(format!("up.{frame:04}.bgeo")), &points, false).unwrap();
+    }
+    let places = |p: &frazil::base::Vec3| frazil::base::Vec3::new(p.x, -p.z, p.y) * 100.0;
+    let positions = ball.mesh.positions.iter().map(places).collect();
+    let mesh = TriMesh { positions, triangles: ball.mesh.triangles.clone() };
+    mesh::write(&folder.join("up.ply"), &mesh).unwrap();
+    let space = "--set surface.scale=0.01 --set surface.up=z";
+    works(folder, &format!("surface -p up.%04d.bgeo -m up.ply --spacing 0.01 -o out {space}"));
+    let now = frame(folder, "out", 1);
+    for vertex in 0..now.mesh.positions.len() {
+        let speed = ["vx", "vy", "vz"].map(|name| array(&now, name)[vertex]);
+        assert!((speed[1] - 1.0).abs() < 0.01 && speed[0].abs() + speed[2].abs() < 0.01, "{speed:?}");
+    }
+}
+
+#[test]
+fn what_lies_beyond_the_shot_does_not_keep_its_last_frame() {
+    let folder = tempfile::tempdir().unwrap();
+    let folder = folder.path();
+    write_shot(folder, 4);
+    fs::copy(folder.join("ball.0004.bgeo"), folder.join("ball.0007.bgeo")).unwrap();
+    // A gap on the way to the frame behind the last one.
+    works(folder, &format!("{SHOT} -o gap --set shot.frames=1-2 --set surface.speed=3"));
+    assert!(folder.join("gap/surface/surface.0002.ply").exists());
+    // A file that is being written.
+    let bytes = fs::read(folder.join("ball.0004.bgeo")).unwrap();
+    fs::write(folder.join("ball.0004.bgeo"), &bytes[..bytes.len() / 2]).unwrap();
+    let said = works(folder, &format!("{SHOT} -o half --set shot.frames=1-3"));
+    assert!(said.contains("ball.0004.bgeo") && said.contains("the velocities of the frame before"), "{said}");
+    // One frame of places alone is a shot too.
+    works(folder, "convert ball.0001.bgeo still.xyz");
+    works(folder, "surface -p still.xyz -m ball.ply --spacing 0.01 -o still");
+    assert!(array(&frame(folder, "still", 1), "vx").iter().all(|speed| *speed == 0.0));
+}
+
+#[test]
+fn detail_may_be_painted_in_bytes_and_only_counts_where_it_fades() {
+    let folder = tempfile::tempdir().unwrap();
+    let folder = folder.path();
+    let ball = write_shot(folder, 2);
+    let paint = |number, value: f64| {
+        let values = ball.mesh.positions.iter().map(|p| if p.x > 0.0 { value } else { 0.0 }).collect();
+        let arrays = vec![MeshArray { name: "detail".into(), on: On::Vertices, number, values }];
+        write_mesh(&folder.join("ball.ply"), &DetailedMesh { mesh: ball.mesh.clone(), uvs: None, arrays });
+    };
+    paint(Number::U8, 255.0);
+    works(folder, &format!("{SHOT} -o fades --set surface.half_life=0.01"));
+    let now = frame(folder, "fades", 2);
+    let first = frame(folder, "fades", 1);
+    let share = |vertex: usize| array(&now, "delta")[vertex] / array(&first, "delta")[vertex];
+    let on =
+        |right: bool| (0..ball.mesh.positions.len()).find(|n| (ball.mesh.positions[*n].x > 0.0) == right);
+    assert!(share(on(true).unwrap()) == 1.0 && share(on(false).unwrap()) < 0.1);
+    paint(Number::F32, 7.0);
+    works(folder, &format!("{SHOT} -o stays"));
+    fails(folder, &format!("{SHOT} -o no --set surface.half_life=1"), 2, &["ball.ply", "detail of vertex"]);
+}
+
+#[test]
 fn check_reads_every_file_and_says_what_there_is() {
     let folder = tempfile::tempdir().unwrap();
     let folder = folder.path();
