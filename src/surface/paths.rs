@@ -142,7 +142,7 @@ impl Paths {
 /// those of the first that end.
 ///
 /// # Errors
-/// As [`Paths::between`].
+/// Neither ids in both frames nor velocities in the first.
 pub fn interpolate(from: &Particles, to: &Particles, dt: f64, share: f64) -> Result<Particles> {
     if from.ids.is_empty() || to.ids.is_empty() {
         let mut places = Vec::new();
