@@ -33,7 +33,7 @@ static void pools_and_contexts(void) {
     CHECK(ctx == NULL);
     FAILS(frz_context_create(FRZ_ABI_VERSION + 1, pool, &ctx), FRZ_ERROR_VERSION, "the header has interface 1.5");
     FAILS(frz_context_create(FRZ_ABI_VERSION + 0x10000, pool, &ctx), FRZ_ERROR_VERSION, "interface 2.4");
-    FAILS(frz_context_create(0, pool, &ctx), FRZ_ERROR_VERSION, "interface 0.0, this library 1.3");
+    FAILS(frz_context_create(0, pool, &ctx), FRZ_ERROR_VERSION, "interface 0.0, this library 1.4");
     WORKS(frz_context_create(FRZ_ABI_VERSION, pool, &ctx));
     /* A context keeps its threads. */
     frz_pool_destroy(pool);
