@@ -23,7 +23,7 @@ pub struct ShotArgs {
     /// Keep the frames before N, whatever they were made with, and make all others of these stages again.
     #[arg(long, value_name = "N", allow_hyphen_values = true)]
     pub from: Option<i32>,
-    /// Put a setting over the scene's, for instance KEY = snow.noise.seed or object.1.file.
+    /// Put a setting over the scene's, for instance snow.noise.seed=2 or object.1.file=hero.glb.
     #[arg(long, value_name = "KEY=VALUE")]
     pub set: Vec<Override>,
 }
