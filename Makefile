@@ -32,7 +32,14 @@ demo: setup
 	target/release/frazil preview $(DEMO)/ball/base/base.0024.vdb -o $(DEMO)/ball.png
 	target/release/frazil snow $(DEMO)/plough.toml -o $(DEMO)/plough
 	target/release/frazil preview $(DEMO)/plough/base/base.0022.vdb $(DEMO)/plough/grains/grains.0022.vdb $(DEMO)/plough/objects/objects.0022.ply -o $(DEMO)/plough.png --eye -0.95,0.85,0.75 --target 0.1,0.3,0.0 --sun 60,22
-	@echo "Pictures: $(DEMO)/hero.png $(DEMO)/hero.gif (base layer, grains and mist) $(DEMO)/walker.png $(DEMO)/print.png $(DEMO)/box.png $(DEMO)/cube.png $(DEMO)/ball.png $(DEMO)/plough.png (grains); volumes: $(DEMO)/hero/base/*.vdb; the whole shot: $(DEMO)/hero/shot.usda"
+	target/release/frazil check $(DEMO)/liquid.toml
+	target/release/frazil surface $(DEMO)/liquid.toml -o $(DEMO)/liquid
+	target/release/frazil vdb from-particles $(DEMO)/liquid.%04d.bgeo --frames 1-36 --spacing 0.0125 --mesh $(DEMO)/liquid_plain.%04d.ply
+	target/release/frazil preview $(DEMO)/liquid --frame 16 --color paint -o $(DEMO)/liquid.png --size 480x360 --eye=-0.15,0.42,1.28 --target -0.03,0.21,0 --fov 23 --sun=-50,30
+	target/release/frazil preview $(DEMO)/liquid_plain.0016.ply -o $(DEMO)/liquid_plain.png --size 480x360 --eye=-0.15,0.42,1.28 --target -0.03,0.21,0 --fov 23 --sun=-50,30
+	target/release/frazil preview $(DEMO)/liquid.0016.bgeo -o $(DEMO)/liquid_particles.png --size 480x360 --eye=-0.15,0.42,1.28 --target -0.03,0.21,0 --fov 23 --sun=-50,30
+	target/release/frazil preview $(DEMO)/liquid -o $(DEMO)/liquid.gif --color paint --size 240x180 --eye=-0.1,0.45,1.3 --target -0.01,0.26,0 --fov 30 --sun=-50,30
+	@echo "Pictures: $(DEMO)/hero.png $(DEMO)/hero.gif (base layer, grains and mist) $(DEMO)/walker.png $(DEMO)/print.png $(DEMO)/box.png $(DEMO)/cube.png $(DEMO)/ball.png $(DEMO)/plough.png (grains) $(DEMO)/liquid.png $(DEMO)/liquid.gif (a mesh that followed a liquid; beside it $(DEMO)/liquid_plain.png, the particles surfaced anew, and $(DEMO)/liquid_particles.png); volumes: $(DEMO)/hero/base/*.vdb; the whole shot: $(DEMO)/hero/shot.usda"
 
 lint:
 	@if cargo fmt --version >/dev/null 2>&1; then cargo fmt --all --check; else echo "lint: rustfmt is not installed, skipped"; fi
@@ -100,6 +107,6 @@ pictures: setup
 gates: setup hosts
 	@cargo bench --quiet --bench gates -- $(ONLY)
 
-# Times beside the thesis' and stock OpenVDB's.
+# Times and errors beside the thesis', stock OpenVDB's and other methods': make bench [ONLY=snow,surface]
 bench: setup
-	@cargo bench --quiet --bench times
+	@cargo bench --quiet --bench times -- $(ONLY)

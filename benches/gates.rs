@@ -98,6 +98,8 @@ mod splashsurf;
 mod spot;
 #[path = "gates/surface.rs"]
 mod surface;
+#[path = "gates/surface_readers.rs"]
+mod surface_readers;
 #[path = "gates/sweeps.rs"]
 mod sweeps;
 #[path = "gates/table.rs"]
@@ -108,6 +110,8 @@ mod tracker_cancel;
 mod turned;
 #[path = "gates/volumes.rs"]
 mod volumes;
+#[path = "gates/vortex.rs"]
+mod vortex;
 
 use harness::Harness;
 
@@ -143,6 +147,8 @@ fn main() {
     damage::run(&mut h);
     surface::run(&mut h);
     early::run(&mut h);
+    vortex::run(&mut h);
+    surface_readers::run(&mut h);
     large::run(&mut h);
     spot::run(&mut h);
     splashsurf::run(&mut h);

@@ -1,16 +1,23 @@
-//! Times of a frame beside the thesis' and stock OpenVDB's: `make bench`.
+//! Times of a frame beside the thesis' and stock OpenVDB's, errors beside those of other methods: `make bench [ONLY=snow,surface]`.
 
 #[path = "../tests/common/mod.rs"]
 mod common;
 #[path = "gates/harness.rs"]
 #[allow(dead_code)]
 mod harness;
+#[path = "times/projections.rs"]
+mod projections;
 #[path = "gates/scenes.rs"]
 #[allow(dead_code)]
 mod scenes;
 #[path = "gates/speed.rs"]
 #[allow(dead_code)]
 mod speed;
+#[path = "times/surface.rs"]
+mod surface;
+#[path = "gates/surface.rs"]
+#[allow(dead_code)]
+mod surface_gates;
 
 use common::character::{data, walk_scene};
 use frazil::Context;
@@ -22,8 +29,30 @@ use scenes::context;
 
 type Make = fn(&Context, f64) -> (BaseLayer, Body);
 
+/// What can be asked for.
+const SYSTEMS: [&str; 2] = ["snow", "surface"];
+
 fn main() {
     let cores = std::thread::available_parallelism().map_or(1, usize::from);
+    // `cargo bench` adds an argument of its own.
+    let asked: Vec<String> = std::env::args().skip(1).filter(|argument| argument != "--bench").collect();
+    let asked: Vec<&str> = asked.iter().flat_map(|names| names.split(',')).collect();
+    if let Some(unknown) = asked.iter().find(|name| !SYSTEMS.contains(name)) {
+        eprintln!("no system is named {unknown}, only {}", SYSTEMS.join(" and "));
+        std::process::exit(2);
+    }
+    let [snow_too, surface_too] = SYSTEMS.map(|name| asked.is_empty() || asked.contains(&name));
+    if snow_too {
+        snow(cores);
+        walk(cores);
+    }
+    if surface_too {
+        surface::tables(cores);
+    }
+}
+
+/// Steps of the base layer.
+fn snow(cores: usize) {
     println!(
         "Snow, base layer: seconds a frame, without files, noise on; median of 5 after a frame to warm up."
     );
@@ -49,7 +78,6 @@ fn main() {
         drop(base);
         println!("| {name} | {thesis} | {stock:.2} | {:.3} | {:.3} |", run(1), run(cores));
     }
-    walk(cores);
 }
 
 /// CesiumMan walks over 6 x 6 m for 240 frames, 7.5 mm: steps alone, and the program with its files.

@@ -471,7 +471,7 @@ enum frz_tracker_array
      */
     FRZ_TRACKER_DELTA = 2,
     /**
-     * int32_t: 1 where the last step could not project it, else 0.
+     * int32_t: 1 where the last step could not project it, or found surface beside it that the mesh does not cover; else 0.
      */
     FRZ_TRACKER_FLAGGED = 3,
 };
@@ -1438,6 +1438,11 @@ typedef struct {
      * The same: bubbles inside.
      */
     uint64_t bubbles;
+    /**
+     * Vertices beside which there is surface that the mesh does not cover: the liquid begins to merge or to split there. They are
+     * flagged.
+     */
+    uint64_t uncovered;
 } frz_tracker_report;
 
 /**

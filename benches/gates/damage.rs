@@ -15,6 +15,7 @@ use frazil::vdb::{MetaValue, file, level_set};
 use crate::common::{character, hero, shapes};
 use crate::harness::{Harness, median, timed};
 use crate::scenes::{self, context};
+use crate::surface_readers;
 
 /// Argument of a run that only reads mutated files: kind, first and last.
 pub const FUZZ: &str = "--read-mutated";
@@ -121,6 +122,9 @@ fn mutated(bytes: &[u8], dice: &mut Dice) -> Vec<u8> {
 
 /// Intact files of a kind: made by code, and the small ones from outside.
 fn intact(kind: &str, folder: &Path) -> Vec<Vec<u8>> {
+    if let Some(ending) = kind.strip_prefix(surface_readers::KIND) {
+        return surface_readers::intact(ending, folder);
+    }
     let written = |mesh: &frazil::base::TriMesh| {
         let path = folder.join(format!("intact.{kind}"));
         mesh::write(&path, mesh).expect("a mesh");
@@ -204,6 +208,7 @@ fn vdb_files() -> Vec<Vec<u8>> {
 
 fn read(kind: &str, path: &Path, guard: &Guard) -> bool {
     match kind {
+        _ if kind.starts_with(surface_readers::KIND) => surface_readers::is_read(path, guard),
         "vdb" => guard.read(path).is_ok(),
         "gltf" | "glb" => {
             let described = Character::describe(path).and_then(|_| Character::extras(path)).is_ok();
@@ -216,7 +221,8 @@ fn read(kind: &str, path: &Path, guard: &Guard) -> bool {
     }
 }
 
-fn decoder(memory: u64) -> Guard {
+/// Lets the command decode .vdb files, with so much memory (bytes).
+pub fn decoder(memory: u64) -> Guard {
     Guard { program: env!("CARGO_BIN_EXE_frazil").into(), memory, threads: 2, cancel: Arc::default() }
 }
 
@@ -265,7 +271,20 @@ pub fn read_mutated() {
 
 fn fuzz(h: &mut Harness, name: &str, kind: &str) {
     let count = if kind == "vdb" { VDB_INPUTS } else { INPUTS };
-    let (mut failed, mut accepted, mut which) = (0, 0, Vec::new());
+    let Tried { accepted, failed } = tried(kind, count);
+    let note = format!("{count} inputs, {accepted} accepted {}", failed.join(", "));
+    h.gate(name, failed.len() as f64, &note);
+}
+
+/// What became of mutated files: how many were read, and which ended the process that read them.
+pub struct Tried {
+    pub accepted: usize,
+    pub failed: Vec<String>,
+}
+
+/// Lets other processes read so many mutated files of a kind.
+pub fn tried(kind: &str, count: usize) -> Tried {
+    let (mut accepted, mut failed) = (0, Vec::new());
     let mut first = 0;
     while first < count {
         let last = (first + BATCH).min(count);
@@ -285,14 +304,12 @@ fn fuzz(h: &mut Harness, name: &str, kind: &str) {
             let at = std::fs::read_to_string(own.with_extension("at"))
                 .ok()
                 .and_then(|at| at.parse::<usize>().ok());
-            failed += 1;
-            which.push(format!("{} ({})", at.map_or("?".into(), |at| at.to_string()), output.status));
+            failed.push(format!("{} ({})", at.map_or("?".into(), |at| at.to_string()), output.status));
             first = at.map_or(last, |at| at + 1);
             let _ = std::fs::remove_file(own.with_extension("at"));
         }
     }
-    let note = format!("{count} inputs, {accepted} accepted {}", which.join(", "));
-    h.gate(name, failed as f64, &note);
+    Tried { accepted, failed }
 }
 
 /// The files whose formats say how long they are.

@@ -275,6 +275,11 @@ pub const GATES: &[Gate] = &[
     gate("surface.cancel_p99", "s", Most(0.2), Most(0.05)),
     // Frames from a change of the particles' own surface to its first flag.
     gate("surface.early", "frames", Most(1.0), Most(0.0)),
+    // A ball in a vortex, drawn out into a sheet and back: vertices from where they began, after a period.
+    gate("surface.vortex", "r", Open, Open),
+    // Particle caches: other programs find the same particles, and damaged files are refused or read.
+    yes("surface.readers_same"),
+    none("surface.readers_crashes", "files"),
     gate("surface.phi_sum", "r", Most(1.0e-4), Open),
     gate("surface.time_1m", "s", Most(6.0), Most(2.5)),
     gate("surface.memory_1m", "GB", Most(2.0), Most(1.0)),

@@ -5,21 +5,17 @@ use std::process::{Command, Stdio};
 
 use frazil::Context;
 use frazil::base::arrays::{MeshArray, Number, On};
-use frazil::base::bvh::Bvh;
-use frazil::base::points::Values;
-use frazil::base::{DVec3, DetailedMesh, TriMesh, Uvs, Vec3};
-use frazil::io::{mesh, particles};
+use frazil::base::{DVec3, DetailedMesh, TriMesh, Uvs};
+use frazil::io::mesh;
 use frazil::surface::{Implicit, Isosurface, Params, Particles, Tracker};
 
-use crate::common::character::{data, output};
+use crate::common::character::output;
 use crate::common::liquids::context;
+use crate::common::nearest::distances;
+use crate::common::spot::{self, FPS, FRAMES, SPACING, particles_at};
 use crate::harness::{Harness, timed};
 use crate::passes::kill;
 
-/// Its frames, frames a second, and the initial distance of its particles (m).
-const FRAMES: i32 = 41;
-const FPS: f64 = 25.0;
-const SPACING: f64 = 0.008_620_6;
 /// Frames whose particles' surface is triangulated on a quarter of the spacing.
 const LOOKED_AT: [i32; 6] = [1, 3, 4, 11, 26, 41];
 /// Rounds of smoothing that take the sculpted detail away.
@@ -42,7 +38,7 @@ pub fn run(h: &mut Harness) {
     if !NAMES.iter().any(|name| h.wants(name)) {
         return;
     }
-    let Some(first) = data("particles/spot_drop/spot.0001.bgeo") else {
+    let Some(first) = spot::first() else {
         NAMES.into_iter().for_each(|name| h.skipped(name, "no data"));
         return;
     };
@@ -108,14 +104,7 @@ impl Spot {
     }
 
     fn particles(&self, frame: i32) -> Particles {
-        let path = self.cache.with_file_name(format!("spot.{frame:04}.bgeo"));
-        let cloud = particles::read(&path).expect("particles");
-        let ids = match cloud.attribute("id") {
-            Some(Values::Long(column)) => (0..cloud.places.len()).map(|n| column.get(n)).collect(),
-            Some(Values::Int(column)) => (0..cloud.places.len()).map(|n| column.get(n).into()).collect(),
-            _ => panic!("the particles have no ids"),
-        };
-        Particles { ids, places: cloud.places, velocities: Vec::new() }
+        particles_at(&self.cache, frame)
     }
 
     /// Whether the particles' own surface merges or splits between a frame and the one before.
@@ -164,7 +153,7 @@ fn shape(h: &mut Harness, spot: &Spot, frames: &[DetailedMesh]) {
         let surface = spot.phi(&ctx, frame, 0.25);
         let (mesh, flags) = (&frames[frame as usize - 1], is_flagged(&frames[frame as usize - 1]));
         let delta = array(mesh, "delta");
-        let distances = distances(&surface, &mesh.mesh.positions);
+        let distances = distances(&surface, &mesh.mesh.positions, 0.25 * SPACING);
         let kept = (0..flags.len()).filter(|vertex| !flags[*vertex] && !delta[*vertex].is_nan());
         let mut of_frame: Vec<f64> =
             kept.map(|vertex| (distances[vertex] - delta[vertex].abs()).abs() / SPACING).collect();
@@ -320,43 +309,4 @@ fn regression(pairs: &[[f64; 2]]) -> [f64; 2] {
     let sum =
         |a: usize, b: usize| pairs.iter().map(|pair| (pair[a] - mean[a]) * (pair[b] - mean[b])).sum::<f64>();
     [sum(0, 1) / (sum(0, 0) * sum(1, 1)).sqrt(), sum(0, 1) / sum(0, 0)]
-}
-
-/// Distance (m) of each place from a surface.
-fn distances(surface: &TriMesh, places: &[Vec3]) -> Vec<f64> {
-    let tree = Bvh::new(surface);
-    let one = |place: &Vec3| {
-        let at: DVec3 = place.cast();
-        let mut reach = 0.25 * SPACING;
-        loop {
-            let mut least = f64::INFINITY;
-            let by = Vec3::repeat(reach as f32);
-            tree.in_box(place - by, place + by, |triangle| {
-                least = least.min((at - closest(at, surface.corners(triangle))).norm());
-            });
-            if least <= reach || reach > 1e3 * SPACING {
-                return least;
-            }
-            reach *= 2.0;
-        }
-    };
-    places.iter().map(one).collect()
-}
-
-/// The place of a triangle that is nearest to a point: its own if that is above it, else the nearest one of its edges.
-fn closest(p: DVec3, [a, b, c]: [DVec3; 3]) -> DVec3 {
-    let normal = (b - a).cross(&(c - a));
-    let is_inside = [(a, b), (b, c), (c, a)].iter().all(|(u, v)| normal.cross(&(v - u)).dot(&(p - u)) >= 0.0);
-    if is_inside && normal.norm_squared() > 0.0 {
-        return p - normal * ((p - a).dot(&normal) / normal.norm_squared());
-    }
-    let on = |u: DVec3, v: DVec3| {
-        let way = v - u;
-        let length = way.norm_squared();
-        let share = if length > 0.0 { ((p - u).dot(&way) / length).clamp(0.0, 1.0) } else { 0.0 };
-        u + way * share
-    };
-    let edges = [on(a, b), on(b, c), on(c, a)];
-    let nearest = edges.into_iter().min_by(|x, y| (p - x).norm().total_cmp(&(p - y).norm()));
-    nearest.expect("three edges")
 }

@@ -6,7 +6,9 @@ use frazil::Context;
 use frazil::base::DVec3;
 use frazil::surface::{Implicit, Isosurface, Params, Particles, StepReport, Tracker};
 
-use crate::common::liquids::{Ball, Errors, Random, ball, context, filled, follow, numbered, turned};
+use crate::common::liquids::{
+    Ball, Errors, Random, ball, context, filled, follow, numbered, once_around, turned,
+};
 use crate::harness::Harness;
 
 const FRAME: f64 = 1.0 / 24.0;
@@ -30,10 +32,6 @@ fn known_motions(h: &mut Harness) {
     };
     let shear =
         |place: DVec3, frame: usize| DVec3::new(place.x + 0.025 * frame as f64 * place.y, place.y, place.z);
-    let rigid = |place: DVec3, frame: usize| {
-        let share = frame as f64 / 100.0;
-        turned(place, std::f64::consts::TAU * share, DVec3::new(0.4, -0.3, 0.2) * share)
-    };
     let mut flagged = None;
     let mut measure =
         |h: &mut Harness, name: &str, detail: f64, frames: usize, motion: &dyn Fn(DVec3, usize) -> DVec3| {
@@ -51,7 +49,7 @@ fn known_motions(h: &mut Harness) {
                 }
             }
         };
-    measure(h, "rigid", 0.25, 100, &rigid);
+    measure(h, "rigid", 0.25, 100, &once_around);
     measure(h, "stretch", 0.0, 20, &stretch);
     measure(h, "shear", 0.0, 20, &shear);
     if let Some(count) = flagged.filter(|_| h.wants("surface.flagged_none")) {
@@ -214,11 +212,15 @@ fn speed(h: &mut Harness) {
 
 /// Wall clock and report of five steps, after one that warms up.
 fn steps(ctx: &Context, ball: &Ball) -> Vec<(f64, StepReport)> {
+    steps_with(ctx, ball, Params::for_spacing(ball.spacing), 5)
+}
+
+/// Wall clock and report of some steps, after one that warms up.
+pub fn steps_with(ctx: &Context, ball: &Ball, params: Params, count: usize) -> Vec<(f64, StepReport)> {
     let at = |frame: usize| moved(ball, 0.02 * frame as f64, DVec3::new(0.001, 0.0, 0.0) * frame as f64);
-    let params = Params::for_spacing(ball.spacing);
     let mut tracker = Tracker::new(ctx, params, &ball.mesh, &at(0)).expect("a tracker");
     let mut out = Vec::new();
-    for frame in 0..6 {
+    for frame in 0..=count {
         let (from, to) = (at(frame), at(frame + 1));
         let start = Instant::now();
         let report = tracker.step(ctx, &from, &to, FRAME).expect("a step");
@@ -228,7 +230,8 @@ fn steps(ctx: &Context, ball: &Ball) -> Vec<(f64, StepReport)> {
     out
 }
 
-fn time(report: &StepReport, phase: &str) -> f64 {
+/// Seconds of a phase of a step.
+pub fn time(report: &StepReport, phase: &str) -> f64 {
     report.phases.iter().find(|time| time.name == phase).map_or(0.0, |time| time.time.as_secs_f64())
 }
 

@@ -177,7 +177,7 @@ class TrackerReport(Struct):
     _fields_ = [
         ("struct_size", c.c_uint32), ("parts", c.c_uint32), ("jumped", c.c_uint64), ("lost", c.c_uint64),
         ("born", c.c_uint64), ("died", c.c_uint64), ("triangles", c.c_uint64), ("drops", c.c_uint64),
-        ("bubbles", c.c_uint64),
+        ("bubbles", c.c_uint64), ("uncovered", c.c_uint64),
     ]
 
 

@@ -1,26 +1,28 @@
 //! Faults and properties of a mesh that decide whether it bounds a solid.
 
-use std::collections::{BTreeMap, HashSet};
-
 use rayon::prelude::*;
 
 use super::bvh::Bvh;
-use super::mesh::coincident;
-use super::{DVec3, TriMesh, Vec3};
+use super::meeting::{Meeting, meeting};
+use super::mesh::{coincident, used};
+use super::orient::is_flat;
+use super::topology::{Survey, Topology, collapsed, firsts, groups};
+use super::{DVec3, TriMesh};
 
 /// Triangles a task looks at.
 const GRAIN: usize = 512;
 
-/// Faults and properties of a mesh. Vertices at the same position count as one.
+/// Faults and properties of a mesh. Vertices at the same position count as one, but in `by_index`. Every decision is exact
+/// for the mesh's 32-bit coordinates: no tolerance, no rounding.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Faults {
     /// Vertices that no triangle names.
     pub unused_vertices: usize,
     /// Vertices that share their place with one before them.
     pub doubled_vertices: usize,
-    /// Triangles with two corners at the same place, or without area.
+    /// Triangles with two corners at the same place, or without area; nothing below counts them.
     pub degenerate: usize,
-    /// Triangles with the corners of one before them, in any order.
+    /// Triangles with the corners of one before them, in any order; nothing below counts them.
     pub doubled_triangles: usize,
     /// Edges with one triangle.
     pub open_edges: usize,
@@ -30,62 +32,84 @@ pub struct Faults {
     pub crowded_edges: usize,
     /// Edges whose two triangles disagree about which side is out.
     pub turned_edges: usize,
-    /// Connected parts.
+    /// Vertices whose triangles do not form one fan, closed or with two ends: where parts touch in a vertex, and both ends
+    /// of each crowded edge.
+    pub pinched_vertices: usize,
+    /// Connected parts; those that touch in a vertex are one.
     pub parts: usize,
-    /// Pairs of triangles that cut each other.
+    /// Pairs of triangles without a common corner that pass through each other.
     pub crossings: usize,
+    /// Pairs of triangles with one common corner that pass through each other.
+    pub corner_crossings: usize,
+    /// Pairs of triangles with a common edge that are folded onto each other: in one plane, on the same side of it.
+    pub folds: usize,
+    /// Pairs of triangles without a common edge that cover the same area of a plane.
+    pub overlaps: usize,
+    /// Pairs of triangles that touch elsewhere than in a common corner, and do not pass through each other: a corner on a
+    /// face or an edge, an edge across an edge.
+    pub touches: usize,
     /// Handles, summed over the parts, when the surface is closed and no edge is crowded.
     pub genus: Option<i64>,
+    /// The mesh as its indices have it, with all triangles, and vertices at the same place apart.
+    pub by_index: Topology,
 }
 
 impl Faults {
-    /// Surveys a mesh whose indices are in range.
+    /// Surveys a mesh whose positions are finite and whose indices are in range.
     pub fn of(mesh: &TriMesh) -> Self {
+        let vertices = mesh.positions.len();
         let same = coincident(mesh.positions.iter().map(|p| p.cast()));
         let doubled_vertices =
             same.iter().enumerate().filter(|(vertex, same)| **same as usize != *vertex).count();
-        let used: HashSet<u32> = mesh.triangles.iter().flatten().copied().collect();
-        let places: Vec<DVec3> = mesh.positions.iter().map(|p| p.cast()).collect();
-        let Kept { kept, degenerate, doubled_triangles } = kept(&places, &mesh.triangles, &same);
-        let edges = edges(&kept);
-        let (mut open, mut crowded_edges, mut turned_edges) = (Vec::new(), 0, 0);
-        for (edge, ways) in &edges {
-            match ways[..] {
-                [_] => open.push(*edge),
-                [a, b] => turned_edges += usize::from(a == b),
-                _ => crowded_edges += 1,
-            }
-        }
-        let parts = groups(kept.iter().flat_map(|[a, b, c]| [[*a, *b], [*b, *c]]));
-        let closed = open.is_empty() && crowded_edges == 0 && !kept.is_empty();
-        let corners: HashSet<u32> = kept.iter().flatten().copied().collect();
-        let euler = corners.len() as i64 - edges.len() as i64 + kept.len() as i64;
+        let flat = |corners: [u32; 3]| is_flat(&corners.map(|vertex| mesh.positions[vertex as usize]));
+        let Kept { kept, degenerate, doubled_triangles } = kept(&mesh.triangles, &same, flat);
+        let survey = Survey::of(vertices, &kept);
+        let parts = groups(vertices, kept.iter().flat_map(|[a, b, c]| [[*a, *b], [*b, *c]]));
+        let pairs = Pairs::of(&TriMesh { positions: mesh.positions.clone(), triangles: kept });
         Self {
-            unused_vertices: mesh.positions.len() - used.len(),
+            unused_vertices: used(vertices, &mesh.triangles).map_or(0, |used| vertices - used.len()),
             doubled_vertices,
             degenerate,
             doubled_triangles,
-            holes: groups(open.iter().copied()),
-            open_edges: open.len(),
-            crowded_edges,
-            turned_edges,
+            holes: groups(vertices, survey.open.iter().copied()),
+            open_edges: survey.open.len(),
+            crowded_edges: survey.crowded,
+            turned_edges: survey.turned,
+            pinched_vertices: survey.pinched,
             parts,
-            crossings: crossings(&TriMesh { positions: mesh.positions.clone(), triangles: kept }),
-            genus: closed.then_some(parts as i64 - euler / 2),
+            crossings: pairs.crossings,
+            corner_crossings: pairs.corner_crossings,
+            folds: pairs.folds,
+            overlaps: pairs.overlaps,
+            touches: pairs.touches,
+            genus: survey.genus(),
+            by_index: Topology::of(vertices, &mesh.triangles),
         }
     }
 
-    /// Whether the mesh bounds a solid without doubt: closed, each edge with two triangles that agree.
+    /// Whether the mesh bounds a solid without doubt once vertices at the same place are joined: closed, each edge with two
+    /// triangles that agree. Whether it does as it is, [`Topology::is_watertight`] of `by_index` says.
     pub fn is_solid(&self) -> bool {
         self.open_edges == 0 && self.crowded_edges == 0 && self.turned_edges == 0 && self.parts > 0
     }
+
+    /// Whether no two triangles meet but in common corners and edges.
+    pub fn is_embedded(&self) -> bool {
+        let pairs = [self.crossings, self.corner_crossings, self.folds, self.overlaps, self.touches];
+        pairs == [0; 5] && self.doubled_triangles == 0
+    }
 }
 
-/// Holes of a mesh: connected sets of edges with one triangle, as [`Faults::holes`].
+/// Holes of a mesh: connected sets of edges with one triangle, as [`Faults::holes`]; in 64 bits, where rounding decides
+/// whether a triangle has an area.
 pub fn holes(places: &[DVec3], triangles: &[[u32; 3]]) -> usize {
     let same = coincident(places.iter().copied());
-    let edges = edges(&kept(places, triangles, &same).kept);
-    groups(edges.iter().filter(|(_, ways)| ways.len() == 1).map(|(edge, _)| *edge))
+    let flat = |corners: [u32; 3]| {
+        let [a, b, c] = corners.map(|vertex| places[vertex as usize]);
+        (b - a).cross(&(c - a)).norm_squared() == 0.0
+    };
+    let survey = Survey::of(places.len(), &kept(triangles, &same, flat).kept);
+    groups(places.len(), survey.open.into_iter())
 }
 
 /// The triangles that count, with joined corners, and how many do not.
@@ -95,98 +119,74 @@ struct Kept {
     doubled_triangles: usize,
 }
 
-fn kept(places: &[DVec3], triangles: &[[u32; 3]], same: &[u32]) -> Kept {
-    let mut seen = HashSet::new();
-    let mut out = Kept { kept: Vec::with_capacity(triangles.len()), degenerate: 0, doubled_triangles: 0 };
-    for triangle in triangles {
-        let [a, b, c] = triangle.map(|vertex| places[vertex as usize]);
-        let corners = triangle.map(|vertex| same[vertex as usize]);
-        let mut sorted = corners;
-        sorted.sort_unstable();
-        let flat = (b - a).cross(&(c - a)).norm_squared() == 0.0;
-        if sorted[0] == sorted[1] || sorted[1] == sorted[2] || flat {
-            out.degenerate += 1;
-        } else if seen.insert(sorted) {
-            out.kept.push(corners);
-        } else {
-            out.doubled_triangles += 1;
+fn kept(triangles: &[[u32; 3]], same: &[u32], flat: impl Fn([u32; 3]) -> bool) -> Kept {
+    let joined = triangles.iter().map(|corners| corners.map(|vertex| same[vertex as usize]));
+    let whole: Vec<[u32; 3]> = joined.filter(|corners| !collapsed(*corners) && !flat(*corners)).collect();
+    let firsts = firsts(&whole);
+    let kept: Vec<[u32; 3]> =
+        whole.iter().zip(&firsts).filter(|(_, first)| **first).map(|(corners, _)| *corners).collect();
+    Kept { degenerate: triangles.len() - whole.len(), doubled_triangles: whole.len() - kept.len(), kept }
+}
+
+/// Counts of pairs of triangles that meet elsewhere than in common corners and edges.
+#[derive(Default)]
+struct Pairs {
+    crossings: usize,
+    corner_crossings: usize,
+    folds: usize,
+    overlaps: usize,
+    touches: usize,
+}
+
+impl Pairs {
+    /// Of triangles with an area each, and corners by place.
+    fn of(mesh: &TriMesh) -> Self {
+        let tree = Bvh::new(mesh);
+        let corners =
+            |triangle: usize| mesh.triangles[triangle].map(|vertex| mesh.positions[vertex as usize]);
+        let of_triangle = |first: usize| {
+            let (names, mine) = (mesh.triangles[first], corners(first));
+            let [a, b, c] = mine;
+            let mut pairs = Self::default();
+            tree.in_box(a.inf(&b).inf(&c), a.sup(&b).sup(&c), |second| {
+                if second > first {
+                    let common = names.iter().filter(|name| mesh.triangles[second].contains(name)).count();
+                    pairs.count(meeting(&mine, &corners(second)), common);
+                }
+            });
+            pairs
+        };
+        let triangles = (0..mesh.triangles.len()).into_par_iter().with_min_len(GRAIN);
+        triangles.map(of_triangle).reduce(Self::default, Self::with)
+    }
+
+    /// Counts a pair with so many common corners.
+    fn count(&mut self, meeting: Meeting, common: usize) {
+        match (meeting, common) {
+            (Meeting::Apart, _) => {}
+            (Meeting::Touch, _) => self.touches += 1,
+            (Meeting::Overlap, 2) => self.folds += 1,
+            (Meeting::Overlap, _) => self.overlaps += 1,
+            (Meeting::Cross, 0) => self.crossings += 1,
+            (Meeting::Cross, _) => self.corner_crossings += 1,
         }
     }
-    out
-}
 
-/// Edges (lesser vertex first) with the way that each of their triangles runs along them.
-fn edges(triangles: &[[u32; 3]]) -> Vec<([u32; 2], Vec<bool>)> {
-    let mut uses: Vec<([u32; 2], bool)> = triangles
-        .iter()
-        .flat_map(|&[a, b, c]| [(a, b), (b, c), (c, a)])
-        .map(|(i, j)| if i < j { ([i, j], true) } else { ([j, i], false) })
-        .collect();
-    uses.sort_unstable();
-    uses.chunk_by(|a, b| a.0 == b.0).map(|uses| (uses[0].0, uses.iter().map(|u| u.1).collect())).collect()
-}
-
-/// Number of connected groups of vertices.
-fn groups(links: impl Iterator<Item = [u32; 2]>) -> usize {
-    fn root(parent: &mut BTreeMap<u32, u32>, vertex: u32) -> u32 {
-        let mut at = vertex;
-        loop {
-            let up = *parent.entry(at).or_insert(at);
-            if up == at {
-                break;
-            }
-            at = up;
+    fn with(self, other: Self) -> Self {
+        Self {
+            crossings: self.crossings + other.crossings,
+            corner_crossings: self.corner_crossings + other.corner_crossings,
+            folds: self.folds + other.folds,
+            overlaps: self.overlaps + other.overlaps,
+            touches: self.touches + other.touches,
         }
-        parent.insert(vertex, at);
-        at
     }
-    let mut parent = BTreeMap::new();
-    for [i, j] in links {
-        let (i, j) = (root(&mut parent, i), root(&mut parent, j));
-        parent.insert(i.max(j), i.min(j));
-    }
-    parent.iter().filter(|(vertex, up)| vertex == up).count()
-}
-
-/// Pairs of triangles without a common corner of which an edge of one passes through the other.
-fn crossings(mesh: &TriMesh) -> usize {
-    let tree = Bvh::new(mesh);
-    let of_triangle = |first: usize| {
-        let mine = mesh.triangles[first];
-        let [a, b, c] = mine.map(|vertex| mesh.positions[vertex as usize]);
-        let mut count = 0;
-        tree.in_box(a.inf(&b).inf(&c), a.sup(&b).sup(&c), |second| {
-            let theirs = mesh.triangles[second];
-            let apart = second > first && !mine.iter().any(|vertex| theirs.contains(vertex));
-            let cut = apart && {
-                let theirs = theirs.map(|vertex| mesh.positions[vertex as usize]);
-                pierces([a, b, c], theirs) || pierces(theirs, [a, b, c])
-            };
-            count += usize::from(cut);
-        });
-        count
-    };
-    (0..mesh.triangles.len()).into_par_iter().with_min_len(GRAIN).map(of_triangle).sum()
-}
-
-/// Whether an edge of one triangle passes through another, from one side of its plane to the other.
-fn pierces(edges: [Vec3; 3], triangle: [Vec3; 3]) -> bool {
-    let [a, b, c] = triangle.map(|p| p.cast::<f64>());
-    let volume = |p: DVec3, q: DVec3, r: DVec3, s: DVec3| (q - p).dot(&(r - p).cross(&(s - p)));
-    (0..3).any(|edge| {
-        let [p, q] = [edges[edge], edges[(edge + 1) % 3]].map(|p| p.cast::<f64>());
-        let (below, above) = (volume(p, a, b, c), volume(q, a, b, c));
-        if below * above >= 0.0 {
-            return false;
-        }
-        let sides = [volume(p, q, a, b), volume(p, q, b, c), volume(p, q, c, a)];
-        sides.iter().all(|side| *side > 0.0) || sides.iter().all(|side| *side < 0.0)
-    })
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::base::Vec3;
 
     fn tetrahedron(at: f32) -> TriMesh {
         let shift = Vec3::new(at, at, at);
@@ -199,7 +199,7 @@ mod tests {
     #[test]
     fn a_tetrahedron_has_no_fault_and_two_that_overlap_cross() {
         let whole = Faults::of(&tetrahedron(0.0));
-        assert!(whole.is_solid());
+        assert!(whole.is_solid() && whole.is_embedded() && whole.by_index.is_watertight());
         assert_eq!((whole.parts, whole.genus, whole.crossings), (1, Some(0), 0));
         let mut two = tetrahedron(0.0);
         two.append(&tetrahedron(0.1));

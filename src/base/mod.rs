@@ -10,11 +10,14 @@ mod ears;
 pub mod faults;
 #[doc(hidden)]
 pub mod lanes;
+pub mod meeting;
 pub mod mesh;
 mod monotone;
+pub mod orient;
 pub mod packed;
 pub mod points;
 pub mod polygons;
+pub mod topology;
 pub mod uvs;
 
 /// A point, direction or velocity in 32 bits: fields and mesh vertices (m, m/s).

@@ -146,11 +146,14 @@ pub struct frz_tracker_report {
     pub drops: u64,
     /// The same: bubbles inside.
     pub bubbles: u64,
+    /// Vertices beside which there is surface that the mesh does not cover: the liquid begins to merge or to split there. They are
+    /// flagged.
+    pub uncovered: u64,
 }
 
 // SAFETY: numbers.
 unsafe impl Sized32 for frz_tracker_report {
-    const SIZES: &'static [usize] = &[size_of::<Self>()];
+    const SIZES: &'static [usize] = &[std::mem::offset_of!(frz_tracker_report, uncovered), size_of::<Self>()];
     const NAME: &'static str = "frz_tracker_report";
 }
 
@@ -165,6 +168,7 @@ impl frz_tracker_report {
         triangles: 0,
         drops: 0,
         bubbles: 0,
+        uncovered: 0,
     };
 }
 
@@ -357,6 +361,7 @@ pub unsafe extern "C" fn frz_tracker_step(
                 triangles: done.triangles as u64,
                 drops: drops as u64,
                 bubbles: (done.apart.len() - drops) as u64,
+                uncovered: done.uncovered as u64,
             };
             if report.is_null() { Ok(()) } else { fill(report, None, told) }
         }
@@ -374,7 +379,7 @@ pub enum frz_tracker_array {
     FRZ_TRACKER_POSITION_DOUBLE = 1,
     /// float: the distance that it keeps from the particles' surface (m), negative inside; NaN: it was too far away to have one.
     FRZ_TRACKER_DELTA = 2,
-    /// int32_t: 1 where the last step could not project it, else 0.
+    /// int32_t: 1 where the last step could not project it, or found surface beside it that the mesh does not cover; else 0.
     FRZ_TRACKER_FLAGGED = 3,
 }
 

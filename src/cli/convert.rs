@@ -3,7 +3,7 @@
 use std::path::{Path, PathBuf};
 
 use frazil::base::arrays::On;
-use frazil::base::{MeshArray, TriMesh};
+use frazil::base::{MeshArray, TriMesh, Vec3};
 use frazil::io::mesh::extension;
 use frazil::io::sequence::Pattern;
 use frazil::io::{self, atomic, usd};
@@ -95,6 +95,17 @@ pub fn run(args: &Args, session: &Session) -> Result<(), Failure> {
     Ok(())
 }
 
+/// Arrays of the vertices that are their velocities (m/s).
+const VELOCITY: [&str; 3] = ["vx", "vy", "vz"];
+
+/// The vectors of the vertices whose parts are the arrays of these names.
+fn vectors(arrays: &[MeshArray], names: [&str; 3]) -> Option<Vec<Vec3>> {
+    let part = |name: &str| arrays.iter().find(|array| array.on == On::Vertices && array.name == name);
+    let [x, y, z] = names.map(part);
+    let parts = x?.values.iter().zip(&y?.values).zip(&z?.values);
+    Some(parts.map(|((x, y), z)| Vec3::new(*x as f32, *y as f32, *z as f32)).collect())
+}
+
 /// "UVs, normals and materials".
 fn listed(names: &[&str]) -> String {
     match names {
@@ -139,8 +150,8 @@ impl Args {
         let to = extension(&self.output);
         lost.retain(|name| match *name {
             "UVs" => uvs.is_none(),
-            "colours" => !["ply", "obj"].contains(&to.as_str()),
-            "velocities" => to != "ply" || !self.keeps_space(),
+            "colours" => !["ply", "obj", "usda"].contains(&to.as_str()),
+            "velocities" => !["ply", "usda"].contains(&to.as_str()) || !self.keeps_space(),
             _ => true,
         });
         if let Some(missing) = uvs.map(|uvs| uvs.missing).filter(|missing| *missing > 0) {
@@ -151,7 +162,7 @@ impl Args {
         }
         // Those that have words of their own were told above.
         const TOLD: [&str; 7] = ["vx", "vy", "vz", "red", "green", "blue", "alpha"];
-        if to != "ply" && extension(&one) == "ply" {
+        if !["ply", "usda"].contains(&to.as_str()) && extension(&one) == "ply" {
             let arrays = io::mesh::read_detailed(&one)?.arrays;
             let names = arrays.iter().map(|array| &array.name[..]).filter(|name| !TOLD.contains(name));
             let names: Vec<&str> = names.collect();
@@ -208,7 +219,7 @@ impl Args {
         }
         let mut arrays = io::mesh::read_detailed(&input)?.arrays;
         // In another space velocities would be others.
-        arrays.retain(|array| self.keeps_space() || !["vx", "vy", "vz"].contains(&&*array.name));
+        arrays.retain(|array| self.keeps_space() || !VELOCITY.contains(&&*array.name));
         // Each mesh of a sequence may cut its polygons in its own way, but all get the triangles of the first.
         arrays.retain(|array| array.on != On::Corners || Pattern::parse(&self.input).is_none());
         Ok(arrays)
@@ -233,23 +244,29 @@ impl Args {
         };
         out(&mut pose);
         let (positions, drawn) = (usd::to_floats(&pose), motion.drawn());
+        let arrays = self.arrays(path, frame)?;
         if extension(path) != "usda" {
             let mesh = TriMesh { positions, triangles: drawn.triangles.to_vec() };
-            let arrays = self.arrays(path, frame)?;
             let arrays: Vec<&MeshArray> = arrays.iter().collect();
             let carried = io::mesh::Carried { uvs: drawn.uvs, arrays: &arrays, ..Default::default() };
             return io::mesh::write_carried(path, &mesh, &carried);
         }
         motion.velocities_ahead(time, 1.0 / self.fps, &mut velocities)?;
         out(&mut velocities);
+        let own = if Pattern::parse(&self.input).is_none() { vectors(&arrays, VELOCITY) } else { None };
+        let velocities = own.unwrap_or_else(|| usd::to_floats(&velocities));
+        // USD has velocities of its own.
+        let others = arrays.iter().filter(|array| !VELOCITY.contains(&&*array.name));
+        let others: Vec<&MeshArray> = others.collect();
         let stem = self.input.file_stem().unwrap_or_default().to_string_lossy().into_owned();
         let name = usd::prim_name(stem.split(['%', '#', '$', '.']).next().unwrap_or_default());
         let mesh = usd::MeshFrame {
             name: &name,
             points: &positions,
-            velocities: &usd::to_floats(&velocities),
+            velocities: &velocities,
             triangles: drawn.triangles,
             uvs: drawn.uvs,
+            arrays: &others,
         };
         let units = usd::Units { metres: 1.0 / self.to_scale, z_up: self.to_up == Axis::Z };
         atomic::write_bytes(path, usd::clip("meshes", frame, self.fps, units, &[mesh]).as_bytes())

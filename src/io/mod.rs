@@ -25,6 +25,7 @@ mod stl;
 pub mod usd;
 pub mod usd_looks;
 pub mod usd_points;
+pub mod usd_primvars;
 mod vtk;
 mod vtu;
 mod vtu_data;

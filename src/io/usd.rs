@@ -4,7 +4,8 @@ use std::fmt::Write;
 
 use super::usd_looks::{self, Look};
 use super::usd_points;
-use crate::base::{DVec3, Points, Uvs, Vec3};
+use super::usd_primvars::{self, Primvar};
+use crate::base::{DVec3, MeshArray, Points, Uvs, Vec3};
 
 /// A moving mesh at one frame.
 pub struct MeshFrame<'a> {
@@ -18,6 +19,8 @@ pub struct MeshFrame<'a> {
     pub triangles: &'a [[u32; 3]],
     /// Their texture coordinates.
     pub uvs: Option<&'a Uvs>,
+    /// Other arrays, of corners three for each triangle: primvars, see [`usd_primvars`].
+    pub arrays: &'a [&'a MeshArray],
 }
 
 /// The part of a moving mesh that stays the same from frame to frame.
@@ -30,6 +33,8 @@ pub struct MeshPrim<'a> {
     pub moves: bool,
     /// The texture coordinates of its frames, where they have any.
     pub uvs: Option<&'a Uvs>,
+    /// What else its frames have.
+    pub primvars: &'a [Primvar],
 }
 
 /// A volume with its .vdb files.
@@ -264,7 +269,7 @@ fn write_clips(out: &mut String, clips: &Clips) {
 }
 
 fn define_meshes(out: &mut String, meshes: &[MeshPrim]) {
-    for MeshPrim { name, look, uvs, .. } in meshes {
+    for MeshPrim { name, look, uvs, primvars, .. } in meshes {
         let _ = writeln!(
             out,
             "        def Mesh \"{name}\" (\n            {}\n        )\n        {{\n            \
@@ -273,6 +278,7 @@ fn define_meshes(out: &mut String, meshes: &[MeshPrim]) {
         );
         look.bind(out, "            ");
         declare_uvs(out, "            ", *uvs);
+        usd_primvars::declare(out, "            ", primvars);
         out.push_str("        }\n");
     }
 }
@@ -312,7 +318,7 @@ pub fn clip_manifest(kind: &str, prims: &ClipPrims) -> String {
             &[]
         }
     };
-    for MeshPrim { name, uvs, moves, .. } in meshes {
+    for MeshPrim { name, uvs, primvars, moves, .. } in meshes {
         let _ = writeln!(out, "    over \"{name}\"\n    {{");
         for (class, attribute) in
             ATTRIBUTES.iter().filter(|(_, attribute)| *moves || *attribute != VELOCITIES)
@@ -320,6 +326,7 @@ pub fn clip_manifest(kind: &str, prims: &ClipPrims) -> String {
             let _ = writeln!(out, "        {class} {attribute}");
         }
         declare_uvs(&mut out, "        ", *uvs);
+        usd_primvars::declare(&mut out, "        ", primvars);
         out.push_str("    }\n");
     }
     out.push_str("}\n");
@@ -369,6 +376,7 @@ pub fn clip(kind: &str, frame: i32, fps: f64, units: Units, meshes: &[MeshFrame]
                 let _ = writeln!(out, "        {PLACE_INDICES}.timeSamples = {{ {frame}: {indices} }}");
             }
         }
+        usd_primvars::write(&mut out, "        ", frame, mesh.arrays);
         out.push_str("    }\n");
     }
     out.push_str("}\n");

@@ -1,6 +1,11 @@
 //! The camera: given, or placed so that everything is in the picture.
 
+use super::cut::Plane;
 use crate::base::DVec3;
+use crate::error::{Error, Result};
+
+/// Longest edge of a picture (pixels).
+const LONGEST: u32 = 16_384;
 
 /// Width and height of a picture (pixels), each at least 1.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -9,6 +14,20 @@ pub struct Size {
     pub width: u32,
     /// Rows.
     pub height: u32,
+}
+
+impl Size {
+    /// Checks both edges.
+    ///
+    /// # Errors
+    /// One outside 1 to 16,384 pixels.
+    pub(super) fn check(self) -> Result<()> {
+        if [self.width, self.height].iter().all(|edge| (1..=LONGEST).contains(edge)) {
+            return Ok(());
+        }
+        let what = format!("a picture must have 1 to {LONGEST} pixels along each edge");
+        Err(Error::argument(what))
+    }
 }
 
 /// A pinhole camera; Y is up.
@@ -40,6 +59,23 @@ impl Camera {
         let mut camera = Self { eye: toward_eye, target: DVec3::zeros(), fov_deg: FOV_DEG };
         camera.look_from(bounds, toward_eye, size);
         camera
+    }
+
+    /// A view straight at a plane, from the side to which its axis points, with the whole box in the picture. Upward in the picture
+    /// is +y, or -z if the plane lies across y.
+    pub fn facing(bounds: (DVec3, DVec3), plane: Plane, size: Size) -> Self {
+        let mut target = (bounds.0 + bounds.1) * 0.5;
+        target[plane.axis] = plane.at;
+        let mut toward_eye = DVec3::zeros();
+        toward_eye[plane.axis] = 1.0;
+        let camera = Self { eye: target + toward_eye, target, fov_deg: FOV_DEG };
+        let [right, up, _] = camera.axes();
+        let extent = bounds.1 - bounds.0;
+        let half = |axis: DVec3| 0.5 * extent.dot(&axis).abs();
+        let aspect = f64::from(size.width) / f64::from(size.height);
+        let tangent = libm::tan(FOV_DEG.to_radians() * 0.5) * (1.0 - 2.0 * MARGIN);
+        let distance = (half(right) / aspect).max(half(up)) / tangent;
+        Self { eye: target + toward_eye * distance.max(1.0e-6), ..camera }
     }
 
     /// Moves the camera along `toward_eye` (a unit vector from what is seen to the camera) until the box
@@ -116,6 +152,17 @@ impl Lens {
         let upward = (height - 2.0 * y) / height * self.half;
         (ahead + right * across + up * upward).normalize()
     }
+
+    /// Where a point is seen, in pixels from the picture's upper left corner; `offset` leads to it from the eye (m). None for
+    /// points that are not ahead.
+    pub fn pixel(&self, offset: DVec3) -> Option<[f64; 2]> {
+        let [right, up, ahead] = self.axes;
+        let depth = offset.dot(&ahead);
+        let scale = f64::from(self.size.height) / (self.half * depth);
+        let (across, upward) = (offset.dot(&right) * scale, offset.dot(&up) * scale);
+        let (width, height) = (f64::from(self.size.width), f64::from(self.size.height));
+        (depth > 0.0).then_some([0.5 * (width + across), 0.5 * (height - upward)])
+    }
 }
 
 /// Unit vector at an azimuth (from +z towards +x) and an elevation above the horizon (degrees).
@@ -156,6 +203,18 @@ mod tests {
             }
             assert!(most > 0.8, "too small: {most} {extent:?}");
         }
+    }
+
+    #[test]
+    fn a_point_is_seen_at_the_pixel_whose_ray_leads_to_it() {
+        let camera =
+            Camera { eye: DVec3::new(1.0, 2.0, 3.0), target: DVec3::new(0.0, 0.5, 0.0), fov_deg: 40.0 };
+        let lens = camera.lens(Size { width: 64, height: 48 });
+        for [x, y] in [[0.0, 0.0], [12.5, 40.0], [64.0, 3.0]] {
+            let [right, down] = lens.pixel(lens.through(x, y) * 7.0).unwrap();
+            assert!((right - x).abs() < 1e-9 && (down - y).abs() < 1e-9, "{x} {y}: {right} {down}");
+        }
+        assert_eq!(lens.pixel(camera.eye - camera.target), None);
     }
 
     #[test]

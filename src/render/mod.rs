@@ -1,5 +1,5 @@
-//! Preview pictures of meshes, level sets, points and fog: sun, sky and shadows, so that the depth of a print reads; and
-//! flipbooks of them.
+//! Preview pictures of meshes, level sets, points and fog: sun, sky and shadows, so that the depth of a print reads;
+//! cuts through fields; and flipbooks of them.
 //!
 //! ```no_run
 //! # use frazil::{Context, Pool, io, render::{Camera, Light, Model, Size, Models}};
@@ -14,6 +14,7 @@
 
 mod camera;
 mod cloud;
+mod cut;
 pub mod fog;
 mod gif;
 mod model;
@@ -28,6 +29,7 @@ mod volume;
 
 pub use camera::{Camera, Size};
 pub use cloud::Cloud;
+pub use cut::{Cut, Field, Plane};
 pub use fog::Fog;
 pub use gif::{Gif, delays};
 pub use model::Model;

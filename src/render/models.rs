@@ -9,15 +9,13 @@ use super::shade::{Colour, Light, shade, to_bytes};
 use super::shadows::Shadows;
 use crate::base::DVec3;
 use crate::context::Context;
-use crate::error::{Error, Result};
+use crate::error::Result;
 use rayon::prelude::*;
 
 /// Samples along each edge of a pixel.
 const SAMPLES: usize = 3;
 /// Samples of a pixel.
 const RAYS: usize = SAMPLES * SAMPLES;
-/// Longest edge of a picture (pixels).
-const LONGEST: u32 = 16_384;
 
 /// What a picture is drawn from.
 struct View<'a> {
@@ -69,10 +67,7 @@ impl Models {
     /// # Errors
     /// A size outside 1 to 16,384 pixels, or a cancel.
     pub fn draw(&self, ctx: &Context, camera: &Camera, light: &Light, size: Size) -> Result<Picture> {
-        if [size.width, size.height].iter().any(|edge| !(1..=LONGEST).contains(edge)) {
-            let what = format!("a picture must have 1 to {LONGEST} pixels along each edge");
-            return Err(Error::argument(what));
-        }
+        size.check()?;
         ctx.phase("draw", || {
             let view = self.view(ctx, camera, light, size)?;
             let row_bytes = 3 * size.width as usize;

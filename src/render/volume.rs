@@ -1,5 +1,6 @@
-//! Grids to be drawn: level sets as surfaces, fog volumes as fog.
+//! Grids to be drawn: level sets as surfaces, fog volumes as fog, both as fields to be cut.
 
+use super::cut::Field;
 use super::fog::{Fog, Part, Placement};
 use super::model::Model;
 use super::shade::SNOW;
@@ -7,7 +8,7 @@ use crate::base::blocks::{DIM, Origin};
 use crate::base::{DVec3, TriMesh, Vec3};
 use crate::context::Context;
 use crate::error::{Error, Result};
-use crate::vdb::{DENSITY_SCALE_KEY, FloatGrid, MetaValue, Tile, level_set};
+use crate::vdb::{DENSITY_SCALE_KEY, FloatGrid, GridClass, MetaValue, Tile, level_set};
 
 impl Model {
     /// A level set with the colour of snow.
@@ -51,6 +52,46 @@ impl Fog {
             other => other,
         })
     }
+}
+
+impl Field {
+    /// The values of a grid, linear between its voxels. Colours go from one end of the narrow band to the other for a level set,
+    /// from 0 to the greatest value for any other grid.
+    ///
+    /// # Errors
+    /// When memory runs out.
+    pub fn grid(grid: FloatGrid) -> Result<Self> {
+        let bounds = bounds_of(&grid);
+        let range = match grid.class() {
+            GridClass::LevelSet => [-grid.background().abs(), grid.background().abs()],
+            _ => [0.0, greatest(&grid)?],
+        };
+        let read = move |ctx: &Context, places: &[DVec3], values: &mut Vec<f32>| {
+            grid.sample_linear(ctx, places, values)
+        };
+        Ok(Self::new(bounds, range, read))
+    }
+}
+
+/// The greatest finite value of a grid, at least 0.
+fn greatest(grid: &FloatGrid) -> Result<f32> {
+    let (leaves, tiles) = (grid.leaves()?, grid.tiles()?);
+    let of_leaves = leaves.iter().flat_map(|leaf| leaf.values.iter().copied());
+    let values = of_leaves.chain(tiles.iter().map(|tile| tile.value));
+    Ok(values.filter(|value| value.is_finite()).fold(0.0, f32::max))
+}
+
+/// Least and greatest corner of the active voxels of a grid (m); none without any.
+fn bounds_of(grid: &FloatGrid) -> Option<(DVec3, DVec3)> {
+    let (low, high) = grid.active_bbox()?;
+    let corner = |n: usize| {
+        let end = |axis: usize| {
+            if n >> axis & 1 == 0 { f64::from(low[axis]) - 0.5 } else { f64::from(high[axis]) + 0.5 }
+        };
+        grid.index_to_world(DVec3::from([0, 1, 2].map(end)))
+    };
+    let corners = (0..8).map(|n| (corner(n), corner(n)));
+    corners.reduce(|a, b| (a.0.inf(&b.0), a.1.sup(&b.1)))
 }
 
 /// Memory (bytes) of a block of a tile while it is prepared.

@@ -3,7 +3,7 @@
 use std::sync::Arc;
 
 use super::shot::{
-    Clip, FrameFiles, Kind, Prims, Reads, Report, Settings, Stage, Stepped, Stepping, Stored, To,
+    Clip, FrameFiles, Kind, MovingMesh, Prims, Reads, Report, Settings, Stage, Stepped, Stepping, Stored, To,
 };
 use super::text::keys::settings_of;
 use super::{Role, Scene, moving};
@@ -58,6 +58,7 @@ impl<'a> Objects<'a> {
                 velocities,
                 triangles: drawn.triangles,
                 uvs: drawn.uvs,
+                arrays: &[],
             })
             .collect();
         usd::clip("objects", poses.frame, self.scene.shot.fps, usd::Units::OWN, &frames)
@@ -103,7 +104,8 @@ impl Stage for Objects<'_> {
 
     fn clip(&self) -> Option<Clip<'_>> {
         let uvs = self.bodies.iter().map(|body| body.motion().drawn().uvs);
-        let meshes = self.names.iter().cloned().zip(uvs).collect();
+        let named = self.names.iter().cloned().zip(uvs);
+        let meshes = named.map(|(name, uvs)| MovingMesh { name, uvs, primvars: Vec::new() }).collect();
         Some(Clip { kind: "objects", manifest: MANIFEST, prims: Prims::Meshes(meshes) })
     }
 }

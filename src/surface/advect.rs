@@ -10,9 +10,11 @@
 use nalgebra::Vector3;
 use rayon::prelude::*;
 
+use super::Particles;
 use super::cells::{Cells, Coord};
 use super::fit::{Map, Near, Sums, sums};
 use super::paths::Paths;
+use super::tracker::{Params, validate_step};
 use crate::base::DVec3;
 use crate::context::Context;
 use crate::error::Result;
@@ -39,6 +41,31 @@ const MOST: usize = 64;
 const DOUBLINGS: u32 = 8;
 /// Farthest cell.
 const LIMIT: f64 = (i32::MAX / 4) as f64;
+
+/// Where particles carry places (m) from one frame to the next, `dt` (s, over 0) later: what
+/// [`Tracker::step`](super::Tracker::step) does to its vertices before it projects them, for any places, with the parameters' spacing
+/// and weighting.
+///
+/// # Errors
+/// Parameters out of range, a time that is not positive; particles that are not valid or too far apart, or have neither ids nor
+/// velocities; cancel.
+pub fn carried(
+    ctx: &Context,
+    places: &[DVec3],
+    from: &Particles,
+    to: &Particles,
+    dt: f64,
+    params: &Params,
+) -> Result<Vec<DVec3>> {
+    params.validate()?;
+    validate_step(from, to, dt)?;
+    ctx.phase("advect", || {
+        let paths = Paths::between(from, to, dt)?;
+        let mut out = places.to_vec();
+        advect(ctx, &mut out, &paths, params.spacing, params.weighting)?;
+        Ok(out)
+    })
+}
 
 /// Working memory of one thread.
 #[derive(Default)]
@@ -241,4 +268,31 @@ fn blended(maps: &[Option<Map>; 8], at: DVec3) -> Option<DVec3> {
         all += share;
     }
     (all > 0.0).then(|| sum / all)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::context::Pool;
+
+    #[test]
+    fn places_outside_of_the_particles_turn_with_them_and_lag_behind_by_the_mean() {
+        let ctx = Context::new(Pool::new(2).unwrap());
+        let grid = (0..729).map(|n| [n / 81, n / 9 % 9, n % 9].map(|x| f64::from(x) - 4.0));
+        let places: Vec<DVec3> = grid.map(DVec3::from).collect();
+        let turn = |place: &DVec3| place + DVec3::new(-place.z, 0.0, place.x) * 0.05;
+        let at = |places: Vec<DVec3>| Particles { places, velocities: Vec::new(), ids: (0..729).collect() };
+        let (from, to) = (at(places.clone()), at(places.iter().map(turn).collect()));
+        let outside = [DVec3::new(4.5, 0.0, 0.0), DVec3::new(0.2, 4.7, 4.6)];
+        let off = |weighting| {
+            let params = Params { weighting, ..Params::for_spacing(1.0) };
+            let there = carried(&ctx, &outside, &from, &to, 0.1, &params).unwrap();
+            there.iter().zip(&outside).map(|(there, place)| (there - turn(place)).norm()).fold(0.0, f64::max)
+        };
+        assert!(off(Weighting::Affine) < 1e-3, "{}", off(Weighting::Affine));
+        assert!(off(Weighting::Mean) > 0.02, "{}", off(Weighting::Mean));
+        let params = Params::for_spacing(1.0);
+        let error = carried(&ctx, &outside, &from, &to, 0.0, &params).unwrap_err();
+        assert_eq!(error.to_string(), "a step of 0 s does not go on in time");
+    }
 }

@@ -2,8 +2,8 @@
 
 use rayon::prelude::*;
 
-use super::cells::Coord;
-use super::implicit::{Implicit, SIDE};
+use super::cells::{Coord, cell_of};
+use super::implicit::Implicit;
 use super::isosurface::Isosurface;
 use crate::base::DVec3;
 
@@ -18,52 +18,67 @@ pub struct Apart {
     pub triangles: usize,
 }
 
-/// The parts on which none of the feet lies, which are in these cells of phi's grid; the largest first.
-pub fn parts(phi: &Implicit, surface: &Isosurface, mut feet: Vec<Coord>) -> Vec<Apart> {
-    feet.par_sort_unstable();
-    feet.dedup();
-    let part_of = connected(surface);
-    let count = part_of.iter().map(|part| *part as usize + 1).max().unwrap_or(0);
-    let place = |vertex: u32| {
-        let (patch, at) = surface.place(phi, vertex);
-        DVec3::from(patch.map(|x| f64::from(x * SIDE))) + DVec3::from(at.map(f64::from))
-    };
-    let mut is_covered = vec![false; count];
-    for (vertex, part) in (0..).zip(&part_of) {
-        let part = *part as usize;
-        if !is_covered[part] {
-            let place = place(vertex);
-            is_covered[part] = is_near(&feet, [0, 1, 2].map(|axis| place[axis].floor() as i32));
+/// The connected parts of the particles' surface, and which of them the mesh covers.
+pub struct Parts {
+    /// The part of each vertex.
+    of_vertex: Vec<u32>,
+    /// Whether a foot lies on each part.
+    is_covered: Vec<bool>,
+}
+
+impl Parts {
+    /// Parts, those covered on which one of the feet lies, which are in these cells of phi's grid.
+    pub fn new(phi: &Implicit, surface: &Isosurface, mut feet: Vec<Coord>) -> Self {
+        feet.par_sort_unstable();
+        feet.dedup();
+        let of_vertex = connected(surface);
+        let count = of_vertex.iter().map(|part| *part as usize + 1).max().unwrap_or(0);
+        let mut is_covered = vec![false; count];
+        for (vertex, part) in (0..).zip(&of_vertex) {
+            let part = *part as usize;
+            if !is_covered[part] {
+                is_covered[part] = is_near(&feet, cell_of(&surface.in_cells(phi, vertex)));
+            }
         }
+        Self { of_vertex, is_covered }
     }
-    if is_covered.iter().all(|covered| *covered) {
-        return Vec::new();
+
+    /// Whether a vertex of the surface is of a part that the mesh covers.
+    pub fn is_covered(&self, vertex: u32) -> bool {
+        self.is_covered[self.of_vertex[vertex as usize] as usize]
     }
-    // Sums of corners and their count, six times the volume from the first corner, triangles.
-    let mut sums = vec![(DVec3::zeros(), 0usize, 0.0f64, 0usize); count];
-    let mut firsts: Vec<Option<DVec3>> = vec![None; count];
-    for triangle in surface.runs().flat_map(|(_, triangles)| triangles) {
-        let part = part_of[triangle[0] as usize] as usize;
-        if is_covered[part] {
-            continue;
+
+    /// The parts that the mesh does not cover, the largest first.
+    pub fn apart(&self, phi: &Implicit, surface: &Isosurface) -> Vec<Apart> {
+        if self.is_covered.iter().all(|covered| *covered) {
+            return Vec::new();
         }
-        let [a, b, c] = triangle.map(place);
-        let origin = *firsts[part].get_or_insert(a);
-        let sum = &mut sums[part];
-        sum.0 += a + b + c;
-        sum.1 += 3;
-        sum.2 += (a - origin).dot(&(b - origin).cross(&(c - origin)));
-        sum.3 += 1;
+        // Sums of corners and their count, six times the volume from the first corner, triangles.
+        let mut sums = vec![(DVec3::zeros(), 0usize, 0.0f64, 0usize); self.is_covered.len()];
+        let mut firsts: Vec<Option<DVec3>> = vec![None; sums.len()];
+        for triangle in surface.runs().flat_map(|(_, triangles)| triangles) {
+            let part = self.of_vertex[triangle[0] as usize] as usize;
+            if self.is_covered[part] {
+                continue;
+            }
+            let [a, b, c] = triangle.map(|vertex| surface.in_cells(phi, vertex));
+            let origin = *firsts[part].get_or_insert(a);
+            let sum = &mut sums[part];
+            sum.0 += a + b + c;
+            sum.1 += 3;
+            sum.2 += (a - origin).dot(&(b - origin).cross(&(c - origin)));
+            sum.3 += 1;
+        }
+        let cell = phi.cell();
+        let told = sums.into_iter().filter(|sum| sum.3 > 0).map(|(corners, count, six, triangles)| Apart {
+            place: corners / count as f64 * cell,
+            volume: six / 6.0 * cell.powi(3),
+            triangles,
+        });
+        let mut out: Vec<Apart> = told.collect();
+        out.sort_by(|a, b| b.volume.abs().total_cmp(&a.volume.abs()));
+        out
     }
-    let cell = phi.cell();
-    let told = sums.into_iter().filter(|sum| sum.3 > 0).map(|(corners, count, six, triangles)| Apart {
-        place: corners / count as f64 * cell,
-        volume: six / 6.0 * cell.powi(3),
-        triangles,
-    });
-    let mut out: Vec<Apart> = told.collect();
-    out.sort_by(|a, b| b.volume.abs().total_cmp(&a.volume.abs()));
-    out
 }
 
 /// Whether a foot lies in a cell or in one beside it.

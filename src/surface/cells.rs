@@ -8,6 +8,11 @@ use crate::error::{Error, Result};
 /// Coordinate of a cell.
 pub type Coord = [i32; 3];
 
+/// The cell that holds a place (cells).
+pub fn cell_of(place: &DVec3) -> Coord {
+    [0, 1, 2].map(|axis| place[axis].floor() as i32)
+}
+
 /// Bits of each axis in a key.
 const BITS: u32 = 21;
 /// Greatest distance of two cells on an axis.

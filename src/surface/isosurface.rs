@@ -91,6 +91,12 @@ impl Isosurface {
         (phi.patches()[owner as usize], self.places[vertex as usize])
     }
 
+    /// The place of a vertex (cells).
+    pub fn in_cells(&self, phi: &Implicit, vertex: u32) -> DVec3 {
+        let (patch, at) = self.place(phi, vertex);
+        DVec3::from(patch.map(|x| f64::from(x * SIDE))) + DVec3::from(at.map(f64::from))
+    }
+
     /// As a mesh (m).
     pub fn mesh(&self, phi: &Implicit) -> TriMesh {
         let cell = phi.cell();

@@ -3,7 +3,7 @@
 //! Each frame the mesh is carried along by the particles (`advect.rs`), then moved so that each vertex is as far from the
 //! surface of the particles as it was at the first frame (`project.rs`). That surface is where an implicit function of the
 //! particles is 0 (`implicit.rs`), turned into signed distances (`band.rs`). Vertices that this would move too far are where
-//! the liquid has merged or split: they are flagged.
+//! the liquid has merged or split: they are flagged, and so are those beside which the mesh does not cover the surface (`coverage.rs`).
 //!
 //! # Glossary
 //!
@@ -15,7 +15,8 @@
 //! | fading | delta becomes less: detail of a runny liquid does not last |
 //! | delta | the distance from phi = 0 that a vertex keeps: its detail, signed as phi |
 //! | patch | 4 x 4 x 4 nodes, which are evaluated together |
-//! | flagged | of a vertex: its projection failed or jumped; it stays where advection put it |
+//! | foot | the place of phi = 0 that belongs to a vertex: the vertex without its detail |
+//! | flagged | of a vertex: its projection failed or jumped (it stays where advection put it), or there is surface beside its foot that no triangle of feet covers |
 
 // Kernels index several arrays by one lane or axis.
 #![allow(clippy::needless_range_loop)]
@@ -25,6 +26,7 @@ mod apart;
 mod average;
 mod band;
 mod cells;
+mod coverage;
 mod fade;
 mod fit;
 mod implicit;
@@ -34,13 +36,16 @@ mod level_set;
 mod paths;
 mod project;
 mod sample;
+mod smooth;
 mod spacing;
 mod specks;
+#[cfg(feature = "vdb")]
+mod spheres;
 mod state;
 mod tracker;
 mod transfer;
 
-pub use advect::Weighting;
+pub use advect::{Weighting, carried};
 pub use apart::Apart;
 pub use average::SUPPORT;
 pub use band::Distances;
@@ -49,8 +54,13 @@ pub use isosurface::Isosurface;
 #[cfg(feature = "vdb")]
 pub use level_set::{HALF_WIDTH, level_set};
 pub use paths::interpolate;
+pub use project::{Foot, foot};
+pub use sample::Sampler;
+pub use smooth::smooth;
 pub use spacing::{estimate as estimate_spacing, rough as rough_spacing};
 pub use specks::specks;
+#[cfg(feature = "vdb")]
+pub use spheres::spheres;
 pub use tracker::{Params, StepReport, Tracker};
 pub use transfer::transfer;
 

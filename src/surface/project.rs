@@ -4,7 +4,6 @@
 //! The thesis' formulas are read so: phi and its gradient are those at the current x*, and delta is signed as phi, which the last
 //! formula needs on the inside.
 
-use super::cells::Coord;
 use super::sample::Sampler;
 use crate::base::DVec3;
 
@@ -56,11 +55,6 @@ pub fn foot(sampler: &mut Sampler<'_>, place: DVec3) -> Option<Foot> {
 }
 
 impl Foot {
-    /// The cell that it lies in.
-    pub fn cell(&self) -> Coord {
-        [0, 1, 2].map(|axis| self.place[axis].floor() as i32)
-    }
-
     /// The place (cells) at a distance (cells), negative inside.
     pub fn at(&self, distance: f64) -> DVec3 {
         self.place + self.outward * distance

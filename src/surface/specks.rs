@@ -37,7 +37,8 @@ pub fn specks(places: &[DVec3], spacing: f64, least: usize) -> Result<Vec<bool>>
     Ok(out)
 }
 
-fn root(parent: &mut [u32], mut at: u32) -> u32 {
+/// The root of a group in a forest of parents.
+pub fn root(parent: &mut [u32], mut at: u32) -> u32 {
     while parent[at as usize] != at {
         parent[at as usize] = parent[parent[at as usize] as usize];
         at = parent[at as usize];

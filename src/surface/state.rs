@@ -9,7 +9,7 @@ use crate::base::{DVec3, TriMesh};
 use crate::error::{Error, Result};
 
 /// Magic bytes, including the version.
-const MAGIC: &Magic = b"frzsrf01";
+const MAGIC: &Magic = b"frzsrf02";
 /// What messages call it.
 const NOUN: &str = "surface";
 
@@ -22,7 +22,9 @@ impl Tracker {
         to.count(self.vertices.len());
         self.vertices.iter().flatten().for_each(|part| to.f64(*part));
         to.f32s(&self.delta);
-        to.0.extend(self.flags.iter().map(|flag| u8::from(*flag)));
+        to.0.extend(
+            self.flags.iter().zip(&self.bare).map(|(flag, bare)| u8::from(*flag) | u8::from(*bare) << 1),
+        );
         packed::pack(&to.0, MAGIC)
     }
 
@@ -69,10 +71,11 @@ impl Tracker {
         if delta.iter().any(|delta| delta.is_infinite()) {
             return wrong("has a distance that is not finite".into());
         }
-        let flags = from.bytes(count)?.iter().map(|flag| *flag != 0).collect();
+        let bits = from.bytes(count)?;
         from.end()?;
+        let [flags, bare] = [1, 2].map(|bit| bits.iter().map(|bits| bits & bit != 0).collect());
         let (triangles, lasting) = (mesh.triangles.clone(), Vec::new());
-        Ok(Self { params, vertices, triangles, delta, lasting, flags, reach })
+        Ok(Self { params, vertices, triangles, delta, lasting, flags, bare, reach })
     }
 }
 

@@ -4,9 +4,10 @@ use rayon::prelude::*;
 
 use super::Particles;
 use super::advect::{Weighting, advect};
-use super::apart::{self, Apart};
+use super::apart::{Apart, Parts};
 use super::band::Distances;
-use super::cells::Coord;
+use super::cells::cell_of;
+use super::coverage::Cover;
 use super::fade::fade;
 use super::implicit::Implicit;
 use super::isosurface::Isosurface;
@@ -71,6 +72,8 @@ pub struct StepReport {
     pub jumped: usize,
     /// Vertices whose projection did not find the surface.
     pub lost: usize,
+    /// Vertices beside which there is surface that the mesh does not cover: something has begun to merge or to split there.
+    pub uncovered: usize,
     /// Parts into which the frame was divided.
     pub parts: usize,
     /// Particles that are new, and that are gone.
@@ -86,6 +89,11 @@ pub struct StepReport {
 }
 
 impl StepReport {
+    /// How often a change was found: vertices that were not projected, and others beside surface that is not covered.
+    pub fn flagged(&self) -> usize {
+        self.jumped + self.lost + self.uncovered
+    }
+
     /// What two steps did, one after the other; what is flagged is so after the second.
     pub fn followed_by(mut self, next: Self) -> Self {
         for phase in next.phases {
@@ -97,6 +105,7 @@ impl StepReport {
         Self {
             jumped: next.jumped,
             lost: next.lost,
+            uncovered: next.uncovered,
             parts: self.parts + next.parts,
             born: self.born + next.born,
             died: self.died + next.died,
@@ -118,8 +127,10 @@ pub struct Tracker {
     pub(super) delta: Vec<f32>,
     /// Share 0..=1 of each vertex' detail that never fades; empty: none.
     pub(super) lasting: Vec<f32>,
-    /// Vertices that the last step could not project.
+    /// Vertices where the last step found a change.
     pub(super) flags: Vec<bool>,
+    /// Vertices beside which the mesh does not cover the surface from the first frame on: that is no change.
+    pub(super) bare: Vec<bool>,
     /// How far distances from the surface are known (r).
     pub(super) reach: f64,
 }
@@ -162,20 +173,20 @@ impl Tracker {
         particles.validate()?;
         let vertices: Vec<DVec3> = mesh.positions.iter().map(|place| place.cast()).collect();
         let flags = vec![false; vertices.len()];
-        let (delta, reach) = (Vec::new(), REACH[0]);
-        let (triangles, lasting) = (mesh.triangles.clone(), Vec::new());
-        let mut tracker = Self { params, vertices, triangles, delta, lasting, flags, reach };
+        let (delta, lasting, bare, reach) = (Vec::new(), Vec::new(), Vec::new(), REACH[0]);
+        let triangles = mesh.triangles.clone();
+        let mut tracker = Self { params, vertices, triangles, delta, lasting, flags, bare, reach };
         let surface = ctx.phase("phi", || tracker.surface_of(ctx, particles))?;
         loop {
             let distances = ctx.phase("distance", || tracker.distances(ctx, &surface))?;
             let (delta, feet) = ctx.phase("measure", || Ok(tracker.measure(&distances)))?;
             tracker.delta = delta;
-            let feet: Vec<Coord> = feet.into_iter().flatten().collect();
-            let known = feet.len();
+            let known = feet.iter().flatten().count();
             let wanted = if known == tracker.delta.len() { tracker.wanted_reach() } else { REACH[1] };
             if wanted <= tracker.reach {
                 tracker.check_overlap(known)?;
-                let apart = ctx.phase("apart", || Ok(apart::parts(&surface.0, &surface.1, feet)))?;
+                let (apart, bare) = ctx.phase("cover", || tracker.cover(ctx, &surface, &feet))?;
+                tracker.bare = bare;
                 let (lost, triangles) = (tracker.vertices.len() - known, surface.1.count());
                 return Ok((tracker, StepReport { lost, triangles, apart, ..StepReport::default() }));
             }
@@ -252,7 +263,8 @@ impl Tracker {
         &self.delta
     }
 
-    /// Which vertices the last step could not project.
+    /// At which vertices the last step found a change: those that it could not project, and those beside which there is surface that
+    /// the mesh does not cover.
     pub fn flags(&self) -> &[bool] {
         &self.flags
     }
@@ -263,12 +275,8 @@ impl Tracker {
     /// # Errors
     /// A time that is not positive; particles that are not valid, or have neither ids nor velocities; cancel.
     pub fn step(&mut self, ctx: &Context, from: &Particles, to: &Particles, dt: f64) -> Result<StepReport> {
-        if !(dt > 0.0 && dt.is_finite()) {
-            return Err(Error::argument(format!("a step of {dt} s does not go on in time")));
-        }
-        from.validate()?;
-        to.validate()?;
-        let ((vertices, delta, flags, report), phases) = ctx.step(5, || {
+        validate_step(from, to, dt)?;
+        let ((vertices, delta, (flags, uncovered), report), phases) = ctx.step(5, || {
             let paths = Paths::between(from, to, dt)?;
             let (carried, parts) = ctx.phase("advect", || self.carried(ctx, &paths))?;
             let surface = ctx.phase("phi", || self.surface_of(ctx, to))?;
@@ -276,8 +284,9 @@ impl Tracker {
             let delta = fade(self, &carried, dt);
             let (vertices, flags) =
                 ctx.phase("project", || self.projected(ctx, carried, &delta, &distances))?;
-            let feet = flags.iter().filter_map(|flag| flag.foot()).collect();
-            let apart = ctx.phase("apart", || Ok(apart::parts(&surface.0, &surface.1, feet)))?;
+            let feet: Vec<Option<DVec3>> = flags.iter().map(Flag::foot).collect();
+            let (apart, bare) = ctx.phase("cover", || self.cover(ctx, &surface, &feet))?;
+            let uncovered: Vec<bool> = bare.iter().zip(&self.bare).map(|(now, ever)| *now && !ever).collect();
             let report = StepReport {
                 parts,
                 born: paths.born,
@@ -286,13 +295,33 @@ impl Tracker {
                 apart,
                 ..StepReport::default()
             };
-            Ok((vertices, delta, flags, report))
+            Ok((vertices, delta, (flags, uncovered), report))
         })?;
         let count = |kind: Flag| flags.iter().filter(|flag| **flag == kind).count();
-        let report = StepReport { jumped: count(Flag::Jumped), lost: count(Flag::Lost), phases, ..report };
+        let (jumped, lost) = (count(Flag::Jumped), count(Flag::Lost));
+        let report = StepReport {
+            jumped,
+            lost,
+            uncovered: uncovered.iter().filter(|is| **is).count(),
+            phases,
+            ..report
+        };
         (self.vertices, self.delta) = (vertices, delta);
-        self.flags = flags.iter().map(|flag| flag.foot().is_none()).collect();
+        self.flags = flags.iter().zip(uncovered).map(|(flag, is)| flag.foot().is_none() || is).collect();
         Ok(report)
+    }
+
+    /// What of the particles' surface the mesh does not cover: whole parts, and the vertices beside other such places.
+    fn cover(
+        &self,
+        ctx: &Context,
+        (phi, surface): &(Implicit, Isosurface),
+        feet: &[Option<DVec3>],
+    ) -> Result<(Vec<Apart>, Vec<bool>)> {
+        let parts = Parts::new(phi, surface, feet.iter().flatten().map(cell_of).collect());
+        ctx.check()?;
+        let cover = Cover { feet, triangles: &self.triangles };
+        Ok((parts.apart(phi, surface), cover.beside_bare(ctx, phi, surface, &parts)?))
     }
 
     fn carried(&self, ctx: &Context, paths: &Paths) -> Result<(Vec<DVec3>, usize)> {
@@ -325,11 +354,11 @@ impl Tracker {
         (WIDER * most + DRIFT + 2.0 * self.params.cell).clamp(REACH[0], REACH[1])
     }
 
-    /// The distance of each vertex from the surface (m), and the cell of its foot.
-    fn measure(&self, distances: &Distances) -> (Vec<f32>, Vec<Option<Coord>>) {
+    /// The distance of each vertex from the surface (m), and its foot (cells).
+    fn measure(&self, distances: &Distances) -> (Vec<f32>, Vec<Option<DVec3>>) {
         let cell = distances.cell();
         let one = |sampler: &mut Sampler<'_>, place: &DVec3| match foot(sampler, place / cell) {
-            Some(foot) => ((foot.distance * cell) as f32, Some(foot.cell())),
+            Some(foot) => ((foot.distance * cell) as f32, Some(foot.place)),
             None => (f32::NAN, None),
         };
         let vertices = self.vertices.par_iter().with_min_len(1024);
@@ -364,7 +393,7 @@ impl Tracker {
                         if moved > STILL {
                             *vertex = to;
                         }
-                        Flag::Placed(foot.cell())
+                        Flag::Placed(foot.place)
                     };
                     Ok(vertices.iter_mut().zip(delta).map(place).collect())
                 },
@@ -374,11 +403,20 @@ impl Tracker {
     }
 }
 
+/// Checks what a step goes from and to, `dt` (s) later.
+pub(super) fn validate_step(from: &Particles, to: &Particles, dt: f64) -> Result<()> {
+    if !(dt > 0.0 && dt.is_finite()) {
+        return Err(Error::argument(format!("a step of {dt} s does not go on in time")));
+    }
+    from.validate()?;
+    to.validate()
+}
+
 /// What became of a vertex.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq)]
 enum Flag {
-    /// It keeps its distance from its foot, which lies in this cell.
-    Placed(Coord),
+    /// It keeps its distance from its foot (cells).
+    Placed(DVec3),
     /// It would have moved too far.
     Jumped,
     /// The surface was not found.
@@ -386,8 +424,8 @@ enum Flag {
 }
 
 impl Flag {
-    /// The cell of its foot; none where it is flagged.
-    fn foot(self) -> Option<Coord> {
-        if let Self::Placed(cell) = self { Some(cell) } else { None }
+    /// Its foot (cells); none where it could not be projected.
+    fn foot(&self) -> Option<DVec3> {
+        if let Self::Placed(foot) = self { Some(*foot) } else { None }
     }
 }

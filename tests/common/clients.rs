@@ -42,13 +42,38 @@ pub fn blender_renders(blender: &Path, folder: &Path, frame: i32, picture: &Path
     run(command)
 }
 
-/// A Python with usd-core, if there is one.
-pub fn usd_python() -> Option<PathBuf> {
-    let has_usd = |python: &PathBuf| {
-        let tried = Command::new(python).args(["-c", "from pxr import Usd"]).output();
+/// A Python that runs a line without an error, if there is one.
+fn python_that_runs(line: &str) -> Option<PathBuf> {
+    let runs = |python: &PathBuf| {
+        let tried = Command::new(python).args(["-c", line]).output();
         tried.is_ok_and(|output| output.status.success())
     };
-    [root().join("target/clients/bin/python"), "python3".into()].into_iter().find(has_usd)
+    [root().join("target/clients/bin/python"), "python3".into()].into_iter().find(runs)
+}
+
+/// A Python with usd-core, if there is one.
+pub fn usd_python() -> Option<PathBuf> {
+    python_that_runs("from pxr import Usd")
+}
+
+/// A Python with readers of particles, pysplashsurf and meshio, if there is one.
+pub fn particles_python() -> Option<PathBuf> {
+    python_that_runs("import meshio, pysplashsurf")
+}
+
+/// pysplashsurf and meshio read a file of particles and write down what they see: of each particle, in the file's order, its
+/// identity (64-bit integer) and its place (three doubles).
+pub fn reads_particles(python: &Path, file: &Path, records: &Path) -> Result<String, String> {
+    let mut command = Command::new(python);
+    command.arg(root().join("tests/clients/particles.py")).arg(file).arg(records);
+    run(command)
+}
+
+/// As [`reads_particles`], of a .vdb file, with tests/ctest/particle_reader.cpp, in the order of the identities.
+pub fn reads_vdb_particles(program: &Path, file: &Path, records: &Path) -> Result<String, String> {
+    let mut command = Command::new(program);
+    command.arg(file).arg(records);
+    run(command)
 }
 
 /// usd-core composes a shot.
@@ -58,6 +83,20 @@ pub fn usd_composes(python: &Path, folder: &Path, first: i32, last: i32) -> Resu
         .arg(root().join("tests/clients/stage.py"))
         .arg(folder)
         .args([first.to_string(), last.to_string()]);
+    run(command)
+}
+
+/// usd-core reads the arrays of a mesh at a frame and finds those of a file that tests/clients/primvars.py describes.
+pub fn usd_reads_arrays(
+    python: &Path,
+    file: &Path,
+    prim: &str,
+    frame: i32,
+    wanted: &Path,
+) -> Result<String, String> {
+    let mut command = Command::new(python);
+    command.arg(root().join("tests/clients/primvars.py")).arg(file).arg(prim);
+    command.arg(frame.to_string()).arg(wanted);
     run(command)
 }
 

@@ -144,7 +144,7 @@ pub fn follow(
     let mut flagged = 0;
     for frame in 0..frames {
         let report = tracker.step(ctx, &at(frame), &at(frame + 1), 1.0 / 24.0).expect("a step");
-        flagged += report.jumped + report.lost;
+        flagged += report.flagged();
     }
     let mut off: Vec<f64> = tracker
         .vertices()
@@ -167,4 +167,10 @@ pub fn turned(place: DVec3, angle: f64, by: DVec3) -> DVec3 {
     let axis = DVec3::new(1.0, 2.0, 0.5).normalize();
     let (sine, cosine) = (libm::sin(angle), libm::cos(angle));
     place * cosine + axis.cross(&place) * sine + axis * (axis.dot(&place) * (1.0 - cosine)) + by
+}
+
+/// Where a place is after some of 100 frames in which all turns once and travels.
+pub fn once_around(place: DVec3, frame: usize) -> DVec3 {
+    let share = frame as f64 / 100.0;
+    turned(place, std::f64::consts::TAU * share, DVec3::new(0.4, -0.3, 0.2) * share)
 }

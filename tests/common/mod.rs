@@ -2,13 +2,19 @@
 #![allow(dead_code)]
 
 pub mod boot;
+pub mod caches;
 pub mod character;
 pub mod clients;
 pub mod folded;
 pub mod header;
 pub mod hero;
+pub mod jelly;
 pub mod liquids;
+pub mod made_sets;
+pub mod nearest;
 pub mod shapes;
 pub mod sleigh;
+pub mod spot;
 pub mod tools;
+pub mod usda;
 pub mod walk;

@@ -64,6 +64,6 @@ int main(void) {
     SIZE(frz_tracker_report), FIELD(frz_tracker_report, struct_size), FIELD(frz_tracker_report, parts);
     FIELD(frz_tracker_report, jumped), FIELD(frz_tracker_report, lost), FIELD(frz_tracker_report, born);
     FIELD(frz_tracker_report, died), FIELD(frz_tracker_report, triangles);
-    FIELD(frz_tracker_report, drops), FIELD(frz_tracker_report, bubbles);
+    FIELD(frz_tracker_report, drops), FIELD(frz_tracker_report, bubbles), FIELD(frz_tracker_report, uncovered);
     return 0;
 }

@@ -113,7 +113,7 @@ static void steps(void) {
         frz_tracker_report report;
         report.struct_size = sizeof report;
         WORKS(frz_tracker_step(ctx, tracker, &from, &to, DT, &report));
-        CHECK(report.jumped == 0 && report.lost == 0 && report.born == 0 && report.died == 0);
+        CHECK(report.jumped == 0 && report.lost == 0 && report.uncovered == 0 && report.born == 0 && report.died == 0);
         CHECK(report.parts > 0 && report.triangles > 100 && report.drops == 0 && report.bubbles == 0);
         /* In another order, and on another number of threads, it is the same. */
         WORKS(frz_tracker_step(alone, other, &same, &then, DT, NULL));

@@ -10,6 +10,7 @@ mod picture;
 mod program;
 
 mod base {
+    mod faults;
     mod meshes;
 }
 mod capi {
@@ -20,6 +21,7 @@ mod cli {
     mod examples;
     mod figures;
     mod flipbook;
+    mod forecasts;
     mod honest;
     mod limits;
     mod outputs;
@@ -40,6 +42,7 @@ mod house {
     mod readers;
 }
 mod io {
+    mod arrays;
     mod damage;
     mod files;
     mod particles;
@@ -50,12 +53,14 @@ mod motion {
     mod gltf;
 }
 mod render {
+    mod cut;
     mod fog;
     mod points;
     mod preview;
 }
 mod scene {
     mod clients;
+    mod demo_jelly;
     mod demo_walk;
     mod fuzz;
     mod shot_folder;
@@ -83,9 +88,12 @@ mod snow {
 }
 mod surface {
     mod command;
+    mod from_particles;
     mod implicit;
+    mod made_sets;
     mod shot;
     mod tracking;
+    mod usd;
 }
 mod sweep {
     mod band;

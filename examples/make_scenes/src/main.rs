@@ -5,6 +5,8 @@
 mod common {
     pub mod boot;
     pub mod hero;
+    pub mod jelly;
+    pub mod liquids;
     pub mod shapes;
     pub mod sleigh;
     pub mod walk;
@@ -15,6 +17,7 @@ use std::path::Path;
 
 use common::boot::{left_boot, right_boot};
 use common::hero;
+use common::jelly::Jelly;
 use common::shapes::{cuboid, sphere};
 use common::sleigh::sleigh;
 use common::walk::{Step, walk};
@@ -35,6 +38,8 @@ fn main() -> frazil::Result<()> {
     mesh::write(&folder.join("drifts.obj"), &drifts())?;
     atomic::write_bytes(&folder.join("column.ply"), &points_ply::to_bytes(&column()?)?)?;
     atomic::write_bytes(&folder.join("hero.glb"), &hero::glb())?;
+    // Some 15,000 particles under 144,000 triangles.
+    Jelly::new(0.0125, 190).write(folder)?;
     for (name, text) in [
         ("hero", hero()),
         ("walker", walker()),

@@ -14,6 +14,10 @@ use crate::cli::session::Session;
 pub fn run(args: &Args, session: &Session, scene: &Scene) -> Result<(), Failure> {
     let inputs = Inputs::load(&session.ctx, scene).before()?;
     let mut report = check(&session.ctx, scene, &inputs).before()?;
+    let limit = session.max_memory();
+    if let Err(error) = report.check_memory(limit) {
+        report.warnings.push(error.to_string());
+    }
     let free = args.free_space();
     if let Some(free) = free.filter(|free| report.disk_bytes > *free) {
         let (needed, free) = (size(report.disk_bytes), size(free));
@@ -22,12 +26,12 @@ pub fn run(args: &Args, session: &Session, scene: &Scene) -> Result<(), Failure>
     let text = if args.json {
         format!("{:#}\n", serde_json::to_value(&report).expect("plain values become JSON"))
     } else {
-        in_words(&report, free)
+        in_words(&report, limit, free)
     };
     output::print(&text).during()
 }
 
-fn in_words(report: &Report, free: Option<u64>) -> String {
+fn in_words(report: &Report, limit: u64, free: Option<u64>) -> String {
     let mut out = String::new();
     let [first, last] = report.frames;
     let count = i64::from(last) - i64::from(first) + 1;
@@ -56,7 +60,9 @@ fn in_words(report: &Report, free: Option<u64>) -> String {
     );
     let _ = writeln!(out, "          {width:.3} x {height:.3} x {depth:.3} m (x, y, z) at the first frame");
     let free = free.map_or(String::new(), |free| format!(" of {} free", size(free)));
-    let _ = writeln!(out, "disk      about {}{free}", size(report.disk_bytes));
+    let _ = writeln!(out, "memory    about {} of {}", size(report.memory_bytes), size(limit));
+    let each = size(report.frame_bytes);
+    let _ = writeln!(out, "disk      about {}{free}; {each} a frame", size(report.disk_bytes));
     report.warnings.iter().for_each(|warning| {
         let _ = writeln!(out, "warning   {warning}");
     });

@@ -23,7 +23,8 @@ use super::session::Session;
 pub struct Args {
     /// Scene file (TOML), or an output folder.
     scene: PathBuf,
-    /// Where the output is to go: its free space is printed too, and how many grains come from the base that is there.
+    /// Where the output is to go: its free space is printed too, how many grains come from the base that is there, and how
+    /// far the mist that is there spread.
     #[arg(short, long, value_name = "DIR")]
     output: Option<PathBuf>,
     /// Put a setting over the scene's, for instance snow.noise.seed=2 or object.1.file=hero.glb.

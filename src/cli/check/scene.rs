@@ -2,6 +2,7 @@
 
 use std::fmt::Write;
 
+use frazil::scene::snow::MistForecast;
 use frazil::scene::snow::check::{ObjectReport, Report, check};
 use frazil::scene::{Inputs, Scene, System, check_memory};
 
@@ -29,8 +30,12 @@ pub fn run(args: &Args, session: &Session) -> Result<(), Failure> {
     if let Err(error) = check_memory(&scene, &inputs, limit) {
         report.warnings.push(error.to_string());
     }
+    let too_much = report.mist.as_ref().and_then(|mist| mist.check(limit).err());
+    report.warnings.extend(too_much.map(|error| error.to_string()));
     let free = args.free_space();
-    if let (Some(free), Some(needed)) = (free, report.disk_bytes.filter(|needed| Some(*needed) > free)) {
+    let of_mist = report.mist.as_ref().map_or(0, |mist| mist.disk_bytes);
+    let needed = report.disk_bytes.map(|bytes| bytes + of_mist);
+    if let (Some(free), Some(needed)) = (free, needed.filter(|needed| Some(*needed) > free)) {
         let (needed, free) = (size(needed), size(free));
         report.warnings.push(format!("the files need about {needed}, but only {free} are free"));
     }
@@ -55,10 +60,14 @@ fn in_words(report: &Report, limit: u64, free: Option<u64>) -> String {
     let _ = writeln!(out, "snow      {area}cells of {} m", report.cell_m);
     report.objects.iter().for_each(|object| describe_object(&mut out, report, object));
     describe_grains(&mut out, report);
-    let _ = writeln!(out, "memory    about {} of {}", size(report.memory_bytes), size(limit));
+    if let Some(mist) = &report.mist {
+        describe_mist(&mut out, mist, limit);
+    }
+    let mist = if report.mist.is_some() { ", without mist" } else { "" };
+    let _ = writeln!(out, "memory    about {} of {}{mist}", size(report.memory_bytes), size(limit));
     if let Some(disk) = report.disk_bytes {
         let free = free.map_or(String::new(), |free| format!(" of {} free", size(free)));
-        let _ = writeln!(out, "disk      about {}{free}", size(disk));
+        let _ = writeln!(out, "disk      about {}{free}{mist}", size(disk));
     }
     report.warnings.iter().for_each(|warning| {
         let _ = writeln!(out, "warning   {warning}");
@@ -82,6 +91,37 @@ fn describe_grains(out: &mut String, report: &Report) {
     };
     let _ = writeln!(out, "grains    {}{upto}", grains.count());
     let _ = writeln!(out, "          from {removed:.6} m3 of the base, compression {share}");
+}
+
+fn describe_mist(out: &mut String, mist: &MistForecast, limit: u64) {
+    let of_million = |bytes: u64| size(1_000_000 * bytes);
+    let (memory, disk) = (of_million(mist.memory_bytes_per_cell), of_million(mist.disk_bytes_per_cell));
+    let _ = writeln!(
+        out,
+        "mist      cells of {:.6} m; a million take {memory} of memory, and {disk} in a frame's files",
+        mist.cell_m
+    );
+    let from = match mist.made_to_frame {
+        Some(frame) => format!("as it was made up to frame {frame}"),
+        None => {
+            out.push_str(
+                "          how far it spreads is known when it is made: make some frames, or a --preview, then check with -o DIR\n",
+            );
+            "in the boxes that objects pass while it lasts".to_string()
+        }
+    };
+    let (cells, air) = (mist.cells, mist.air_m3);
+    let _ = writeln!(
+        out,
+        "          {from}: {cells} cells at once, {air:.3} m3; memory about {}, disk at most {}",
+        size(mist.memory_bytes),
+        size(mist.disk_bytes)
+    );
+    if limit < u64::MAX {
+        let most = mist.most_cells(limit);
+        let air = most as f64 * mist.cell_m.powi(3);
+        let _ = writeln!(out, "          --max-memory refuses a step of more than {most} cells, {air:.3} m3");
+    }
 }
 
 fn describe_object(out: &mut String, report: &Report, object: &ObjectReport) {

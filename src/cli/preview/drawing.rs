@@ -1,6 +1,11 @@
 //! How what was read is drawn, and from where.
 
-use frazil::render::{Camera, Cloud, Light, Model, Models, Picture, Size};
+use frazil::base::DVec3;
+use frazil::render::{Camera, Cloud, Cut, Light, Model, Models, Picture, Plane, Size};
+#[cfg(feature = "vdb")]
+use frazil::render::{Field, SNOW};
+#[cfg(feature = "vdb")]
+use frazil::vdb::level_set;
 use frazil::{Context, Error, Result};
 
 use super::sources::Part;
@@ -8,6 +13,8 @@ use crate::cli::exit::Failure;
 
 /// The colour of meshes (linear red, green, blue): leather, which snow is seen beside.
 const BROWN: [f32; 3] = [0.35, 0.16, 0.08];
+/// The colour of the lines in which a cut meets meshes.
+const INK: [f32; 3] = [0.0; 3];
 
 /// What the user chose about the picture.
 pub struct Look {
@@ -19,6 +26,8 @@ pub struct Look {
     pub light: Option<Light>,
     /// The attribute that colours points and meshes.
     pub color: Option<String>,
+    /// The plane that is drawn in place of the whole.
+    pub cut: Option<Plane>,
     /// Extinction (1/m) of a fog of density 1 whose file does not say it.
     #[cfg_attr(not(feature = "vdb"), expect(dead_code, reason = "fogs come from .vdb files"))]
     pub fog_density: f64,
@@ -26,12 +35,17 @@ pub struct Look {
 
 /// What is drawn of a frame.
 pub struct Drawing {
-    /// Everything in it.
-    pub models: Models,
+    content: Content,
     /// Whether anything in it has what `--color` asks for.
     has_colors: bool,
-    /// Says of a fog that it has no density.
+    /// Why nothing may be seen of it: a fog without density, points that a cut leaves out.
     hollow: Option<String>,
+}
+
+/// Everything in a picture.
+enum Content {
+    Models(Models),
+    Cut(Cut),
 }
 
 /// What all pictures of a flipbook have in common.
@@ -47,8 +61,11 @@ impl Look {
     ///
     /// # Errors
     /// Points without the attribute; a fog that cannot be drawn; cancel.
-    #[cfg_attr(not(feature = "vdb"), expect(unused_variables, unused_mut, reason = "of grids only"))]
+    #[cfg_attr(not(feature = "vdb"), expect(unused_mut, reason = "of grids only"))]
     pub fn build(&self, ctx: &Context, parts: Vec<Part>) -> Result<Drawing> {
+        if let Some(plane) = self.cut {
+            return cut(ctx, parts, plane);
+        }
         let (mut models, mut clouds, mut fogs, mut hollow) = (Vec::new(), Vec::new(), Vec::new(), None);
         let mut has_colors = false;
         for part in parts {
@@ -86,13 +103,14 @@ impl Look {
             }
         }
         has_colors |= !clouds.is_empty();
-        Ok(Drawing { models: Models::new(models).with_clouds(clouds).with_fogs(fogs), has_colors, hollow })
+        let models = Models::new(models).with_clouds(clouds).with_fogs(fogs);
+        Ok(Drawing { content: Content::Models(models), has_colors, hollow })
     }
 
     /// The camera and the light that were chosen, or those that show all drawings as wholes.
     ///
     /// # Errors
-    /// Nothing to see; nothing that `--color` gives colours.
+    /// Nothing to see; nothing that `--color` gives colours; a plane beside everything.
     pub fn view(&self, drawings: &[Drawing]) -> std::result::Result<View, Failure> {
         if let Some(name) = self.color.as_ref().filter(|_| drawings.iter().all(|drawing| !drawing.has_colors))
         {
@@ -100,15 +118,59 @@ impl Look {
                 format!("--color {name}: no points are drawn, and no mesh has such an array of its vertices");
             return Err(Failure::refused(what));
         }
-        let boxes = drawings.iter().filter_map(|drawing| drawing.models.bounds());
+        let boxes = drawings.iter().filter_map(|drawing| drawing.content.bounds());
         let bounds = boxes.reduce(|a, b| (a.0.inf(&b.0), a.1.sup(&b.1)));
         let bounds = bounds.ok_or_else(|| {
             let hollow = drawings.iter().find_map(|drawing| drawing.hollow.as_deref());
             let why = hollow.unwrap_or("the files are empty");
             Failure::refused(format!("there is nothing to draw: {why}"))
         })?;
-        let camera = self.camera.unwrap_or_else(|| Camera::framing(bounds, self.size));
+        if let Some(plane) = self.cut {
+            let [low, high] = [bounds.0, bounds.1].map(|corner| corner[plane.axis]);
+            if !(low..=high).contains(&plane.at) {
+                let there = format!("which lies between {low:.6} and {high:.6} m");
+                return Err(Failure::refused(format!("--cut {plane} is beside what is drawn, {there}")));
+            }
+        }
+        let camera = self.camera.unwrap_or_else(|| match self.cut {
+            Some(plane) => Camera::facing(bounds, plane, self.size),
+            None => Camera::framing(bounds, self.size),
+        });
         Ok(View { camera, light: self.light.unwrap_or_else(|| Light::beside(&camera)), size: self.size })
+    }
+}
+
+/// Prepares parts to be cut by a plane: the first grid gives it colours, level sets and meshes are lines in it.
+#[cfg_attr(not(feature = "vdb"), expect(unused_variables, reason = "of grids only"))]
+fn cut(ctx: &Context, parts: Vec<Part>, plane: Plane) -> Result<Drawing> {
+    let (mut cut, mut hollow) = (Cut::new(plane), None);
+    for part in parts {
+        match part {
+            Part::Mesh(detailed) => cut = cut.with_surface(&detailed.mesh, INK),
+            Part::Points(path, _) => {
+                let what = format!("{}: points are left out of a cut", path.display());
+                log::info!("{what}");
+                hollow = Some(what);
+            }
+            #[cfg(feature = "vdb")]
+            Part::Surface(grid) => {
+                let surface = level_set::to_mesh(ctx, &grid, 0.0, 0.0)?;
+                cut = cut.with_surface(&surface, SNOW).with_field(Field::grid(grid)?);
+            }
+            #[cfg(feature = "vdb")]
+            Part::Fog(_, grid) => cut = cut.with_field(Field::grid(grid)?),
+        }
+    }
+    Ok(Drawing { content: Content::Cut(cut), has_colors: false, hollow })
+}
+
+impl Content {
+    /// Least and greatest corner (m); none when it is empty.
+    fn bounds(&self) -> Option<(DVec3, DVec3)> {
+        match self {
+            Self::Models(models) => models.bounds(),
+            Self::Cut(cut) => cut.bounds(),
+        }
     }
 }
 
@@ -118,7 +180,10 @@ impl View {
     /// # Errors
     /// Cancel.
     pub fn draw(&self, ctx: &Context, drawing: &Drawing) -> Result<Picture> {
-        drawing.models.draw(ctx, &self.camera, &self.light, self.size)
+        match &drawing.content {
+            Content::Models(models) => models.draw(ctx, &self.camera, &self.light, self.size),
+            Content::Cut(cut) => cut.draw(ctx, &self.camera, self.size),
+        }
     }
 
     /// The same view on a picture that is smaller by a factor along each edge.

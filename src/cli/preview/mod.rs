@@ -1,4 +1,4 @@
-//! `frazil preview`: pictures of meshes, level sets, points, fog and whole shots; flipbooks.
+//! `frazil preview`: pictures of meshes, level sets, points, fog and whole shots; cuts through grids; flipbooks.
 
 mod drawing;
 mod flipbook;
@@ -13,7 +13,7 @@ use frazil::base::DVec3;
 use frazil::io::atomic;
 use frazil::io::mesh::extension;
 use frazil::io::sequence::Pattern;
-use frazil::render::{Camera, Light, Size};
+use frazil::render::{Camera, Light, Plane, Size};
 use frazil::scene::FrameChoice;
 
 use super::exit::{Failure, Phase};
@@ -31,6 +31,7 @@ use sources::Sources;
                   frazil preview cache/ --frame 48 -o look.png\n  \
                   frazil preview cache/ --frames 1-48x8 -o shot.gif --size 640x360\n  \
                   frazil preview cache/ --frames 40-42 -o p.%04d.png --size 640x360\n  \
+                  frazil preview cache/base/base.0048.vdb --cut x=0 -o cut.png\n  \
                   frazil preview hero.glb --clip walk --frame 12 -o pose.png\n  \
                   frazil preview grains.0001.vdb -o grains.png --color v"
 )]
@@ -45,6 +46,11 @@ pub struct Args {
     /// Attribute that gives points, and vertices of a mesh, their colours, from dark blue to pale yellow over its values.
     #[arg(long, value_name = "NAME")]
     color: Option<String>,
+    /// Draw a plane across an axis at a place (m), seen from the axis' end, in place of the whole: the first grid in colours from
+    /// dark blue at its least value to pale yellow at its greatest (of a level set from one end of its narrow band to the other),
+    /// level sets as white lines and meshes as black ones; points are left out.
+    #[arg(long, value_name = "AXIS=M", value_parser = plane, conflicts_with_all = ["color", "sun", "fog_density"])]
+    cut: Option<Plane>,
     /// Clip that characters play [default: they are at rest, or play their only clip with --frame].
     #[arg(long, value_name = "NAME")]
     clip: Option<String>,
@@ -85,6 +91,14 @@ fn sun(text: &str) -> Result<(f64, f64), String> {
         return Err("the elevation must be within 1 to 90 degrees".into());
     }
     Ok((azimuth, elevation))
+}
+
+fn plane(text: &str) -> Result<Plane, String> {
+    let wrong = || "write an axis and a place on it (m), such as x=0.1".to_string();
+    let (name, at) = text.split_once('=').ok_or_else(wrong)?;
+    let axis = ["x", "y", "z"].iter().position(|axis| *axis == name.trim()).ok_or_else(wrong)?;
+    let at = options::finite(at.trim()).map_err(|_| wrong())?;
+    Ok(Plane { axis, at })
 }
 
 /// What is made.
@@ -144,8 +158,13 @@ impl Args {
             Some((eye, target)) => Some(Camera { eye, target, fov_deg: self.fov }),
             None => None,
         };
+        let holds_eye = |plane: &Plane| self.eye.is_some_and(|eye| eye[plane.axis] == plane.at);
+        if let Some(plane) = self.cut.filter(holds_eye) {
+            return Err(Failure::refused(format!("--eye lies in the plane of --cut {plane}")));
+        }
         let light = self.sun.map(|(azimuth, elevation)| Light::from_degrees(azimuth, elevation));
-        Ok(Look { size: self.size, camera, light, color: self.color.clone(), fog_density: self.fog_density })
+        let (size, color, fog_density) = (self.size, self.color.clone(), self.fog_density);
+        Ok(Look { size, camera, light, color, cut: self.cut, fog_density })
     }
 
     /// Refuses options that nothing of what is drawn depends on.

@@ -24,4 +24,4 @@ pub(in crate::scene) use settings::changed;
 pub use settings::{CONTENT, Settings};
 pub use stage::{FrameFiles, Kind, Reads, Report, Stage, Stepped, Stepping, To};
 pub use stored::Stored;
-pub use usd::{Clip, Prims, Volume};
+pub use usd::{Clip, MovingMesh, Prims, Volume};

@@ -8,6 +8,7 @@ use crate::base::{Points, Uvs};
 use crate::error::Result;
 use crate::io::usd::{self, Field};
 use crate::io::usd_looks::Look;
+use crate::io::usd_primvars::Primvar;
 
 /// The shot for programs that read USD.
 pub(super) const SHOT: &str = "shot.usda";
@@ -35,10 +36,20 @@ pub struct Clip<'a> {
     pub prims: Prims<'a>,
 }
 
+/// What the frames of a moving mesh have in common.
+pub struct MovingMesh<'a> {
+    /// Name of its prim.
+    pub name: String,
+    /// Its texture coordinates.
+    pub uvs: Option<&'a Uvs>,
+    /// Its other arrays.
+    pub primvars: Vec<Primvar>,
+}
+
 /// What the frames of a [`Clip`] hold.
 pub enum Prims<'a> {
-    /// Moving meshes: names of their prims, and their texture coordinates.
-    Meshes(Vec<(String, Option<&'a Uvs>)>),
+    /// Moving meshes.
+    Meshes(Vec<MovingMesh<'a>>),
     /// A surface that is another mesh at each frame, without velocities: name of its prim.
     Surface(&'static str),
     /// Points, in a prim of the kind's name; these have their attributes.
@@ -87,7 +98,13 @@ pub(super) fn write<'s>(
                 Prims::Meshes(meshes) => usd::ClipPrims::Meshes(
                     meshes
                         .iter()
-                        .map(|(name, uvs)| usd::MeshPrim { name, look: Look::Object, moves: true, uvs: *uvs })
+                        .map(|MovingMesh { name, uvs, primvars }| usd::MeshPrim {
+                            name,
+                            look: Look::Object,
+                            moves: true,
+                            uvs: *uvs,
+                            primvars,
+                        })
                         .collect(),
                 ),
                 Prims::Surface(name) => usd::ClipPrims::Meshes(vec![usd::MeshPrim {
@@ -95,6 +112,7 @@ pub(super) fn write<'s>(
                     look: Look::Snow,
                     moves: false,
                     uvs: None,
+                    primvars: &[],
                 }]),
                 Prims::Points(points) => usd::ClipPrims::Points(points),
             };

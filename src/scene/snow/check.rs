@@ -8,7 +8,7 @@ use serde::Serialize;
 use super::course::Course;
 use super::relief::Relief;
 use super::walks::Walk;
-use super::{Forecast, Inputs, disk, has_grains, memory};
+use super::{Forecast, Inputs, MistForecast, disk, has_grains, has_mist, memory};
 use crate::context::Context;
 use crate::error::Result;
 use crate::scene::shot::Stored;
@@ -30,9 +30,11 @@ pub struct Report {
     pub objects: Vec<ObjectReport>,
     /// The grains, where the scene has some and its base is there.
     pub grains: Option<Forecast>,
-    /// Memory that the run needs, about (bytes); without grains that are not known yet.
+    /// The mist, where the scene has some.
+    pub mist: Option<MistForecast>,
+    /// Memory that the run needs, about (bytes); without mist, and without grains that are not known yet.
     pub memory_bytes: u64,
-    /// Space that its files need, about (bytes); without grains that are not known yet.
+    /// Space that its files need, about (bytes); without mist, and without grains that are not known yet.
     pub disk_bytes: Option<u64>,
     /// What looks wrong, one sentence each.
     pub warnings: Vec<String>,
@@ -84,7 +86,8 @@ pub struct Deepest {
     pub below_top_m: f64,
 }
 
-/// Checks a scene whose inputs are open; `folder` is that of its output, whose base says how many grains there will be.
+/// Checks a scene whose inputs are open; `folder` is that of its output, whose base says how many grains there will be, and
+/// whose mist how far it spreads.
 ///
 /// # Errors
 /// A frame that cannot be read or fits no other; a damaged record of the base; cancel.
@@ -95,7 +98,8 @@ pub fn check(ctx: &Context, scene: &Scene, inputs: &Inputs, folder: Option<&Path
     }
     let relief = Relief::new(inputs);
     let mut objects = Vec::new();
-    for course in Course::all(ctx, scene, inputs)? {
+    let courses = Course::all(ctx, scene, inputs)?;
+    for course in &courses {
         let report = course.report(relief.as_ref())?;
         warnings.extend(course.warnings(ctx, &report)?);
         objects.push(report);
@@ -108,6 +112,9 @@ pub fn check(ctx: &Context, scene: &Scene, inputs: &Inputs, folder: Option<&Path
         Some(folder) => Forecast::of(scene, inputs, &Stored::read(folder, "base")?, scene.shot.frames.last)?,
         None => None,
     };
+    let mist = folder.filter(|_| has_mist(&scene.values));
+    let mist = mist.map(|folder| Stored::read(folder, "mist")).transpose()?;
+    let mist = MistForecast::of(ctx, scene, &courses, mist.as_ref())?;
     let (memory, disk) = match &grains {
         Some(grains) => {
             let volumes = memory::of_volumes(scene, inputs, grains.grains)?;
@@ -122,6 +129,7 @@ pub fn check(ctx: &Context, scene: &Scene, inputs: &Inputs, folder: Option<&Path
         cell_m: inputs.snow.cell,
         objects,
         grains,
+        mist,
         memory_bytes: memory::estimate(scene, inputs)?.max(memory),
         disk_bytes: Some(disk::estimate(scene, inputs) + disk),
         warnings,

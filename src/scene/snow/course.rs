@@ -129,6 +129,15 @@ impl<'a> Course<'a> {
         Some([first.frame, last.frame])
     }
 
+    /// Least and greatest corner (m) at each frame from the first to the last at which its bounds overlap those of the snow; none for
+    /// an object that pushes no grains.
+    pub fn passing(&self) -> impl Iterator<Item = (i32, [DVec3; 2])> {
+        let touches = self.touches().filter(|_| self.object.role.pushes());
+        let is_near = move |frame: i32| touches.is_some_and(|[first, last]| (first..=last).contains(&frame));
+        let near = self.extents.iter().filter(move |extent| is_near(extent.frame));
+        near.map(|extent| (extent.frame, [extent.low, extent.high]))
+    }
+
     /// Count of holes at the first frame.
     fn holes(&self) -> Result<usize> {
         let mut pose = Vec::new();

@@ -25,6 +25,8 @@ mod keys;
 mod memory;
 #[cfg(feature = "vdb")]
 mod mist;
+#[cfg(feature = "vdb")]
+mod mist_forecast;
 mod mist_keys;
 mod output_keys;
 #[cfg(feature = "vdb")]
@@ -54,6 +56,7 @@ pub use {
     grain_files::{RebuildGrains, changes_since, partial},
     inputs::Inputs,
     memory::{check as check_memory, estimate},
+    mist_forecast::MistForecast,
     plan::plan,
     rebuild::Rebuild,
     walks::Walk,

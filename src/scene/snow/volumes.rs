@@ -180,6 +180,7 @@ impl<'a> Volumes<'a> {
                 velocities: &[],
                 triangles: &surface.triangles,
                 uvs: None,
+                arrays: &[],
             };
             let text = usd::clip("mesh", frame, self.scene.shot.fps, usd::Units::OWN, &[mesh]);
             files.push(("mesh", "usda", text.into_bytes()));

@@ -5,11 +5,13 @@ use std::collections::BTreeMap;
 use serde::Serialize;
 
 use super::Inputs;
+use super::disk::FrameSize;
 use super::inputs::all_files;
+use super::memory::Most;
 use super::time::read;
 use crate::base::DVec3;
 use crate::context::Context;
-use crate::error::Result;
+use crate::error::{Error, Result};
 use crate::scene::{Scene, Value};
 use crate::surface::Particles;
 
@@ -40,12 +42,30 @@ pub struct Report {
     pub size_m: [f64; 3],
     /// Length of its edges in the mean (m).
     pub edge_m: f64,
+    /// Memory that the run needs, about (bytes); where vertices keep more than half a spacing from the surface, it may be more.
+    pub memory_bytes: u64,
     /// Space that the files need, about (bytes).
     pub disk_bytes: u64,
+    /// Space that the files of a frame need, about (bytes): the mesh, its exact state, report and record.
+    pub frame_bytes: u64,
     /// What looks wrong, one sentence each.
     pub warnings: Vec<String>,
     /// Every setting, defaults filled in.
     pub settings: BTreeMap<String, Value>,
+}
+
+impl Report {
+    /// Fails where the run would need more memory than a limit (bytes).
+    ///
+    /// # Errors
+    /// [`Error::Memory`] names the counts of particles and triangles.
+    pub fn check_memory(&self, limit: u64) -> Result<()> {
+        if self.memory_bytes <= limit {
+            return Ok(());
+        }
+        let what = format!("surface of {} particles and {} triangles", self.particles[1], self.triangles);
+        Err(Error::Memory { what, needed: self.memory_bytes, limit })
+    }
 }
 
 /// Edges longer than this (spacings) are too coarse for what the particles do.
@@ -62,9 +82,12 @@ pub fn check(ctx: &Context, scene: &Scene, inputs: &Inputs) -> Result<Report> {
     let (mut least, mut most) = (usize::MAX, 0);
     let (mut has_ids, mut has_velocities) = (true, true);
     let files = all_files(scene, surface);
+    let mut most_bytes = Most::default();
     for path in &files {
         ctx.check()?;
-        let Particles { places, velocities, ids } = read(path, surface, &inputs.seen)?;
+        let particles = read(path, surface, &inputs.seen)?;
+        ctx.pool().install(|| most_bytes.add(&particles, inputs.spacing, surface.cell));
+        let Particles { places, velocities, ids } = particles;
         (least, most) = (least.min(places.len()), most.max(places.len()));
         has_ids &= !ids.is_empty();
         has_velocities &= !velocities.is_empty();
@@ -93,7 +116,7 @@ pub fn check(ctx: &Context, scene: &Scene, inputs: &Inputs) -> Result<Report> {
         warnings
             .push("some files have neither ids nor velocities: where their particles go is not known".into());
     }
-    let count = shot.frames.count() as u64;
+    let (count, frame) = (shot.frames.count() as u64, FrameSize::of(surface.output, &inputs.mesh));
     Ok(Report {
         frames: [shot.frames.first, shot.frames.last],
         fps: shot.fps,
@@ -107,7 +130,9 @@ pub fn check(ctx: &Context, scene: &Scene, inputs: &Inputs) -> Result<Report> {
         triangles: mesh.triangles.len(),
         size_m: (to - from).into(),
         edge_m: edge,
-        disk_bytes: count * bytes_of_frame(scene, inputs)?,
+        memory_bytes: most_bytes.estimate(surface, files.len(), &inputs.mesh, &frame),
+        disk_bytes: count * frame.sum(),
+        frame_bytes: frame.sum(),
         warnings,
         settings: scene.values.by_path(),
     })
@@ -122,27 +147,4 @@ fn outside(places: &[DVec3], low: DVec3, high: DVec3, spacing: f64) -> Option<f6
     };
     let share = places.iter().filter(is_outside).count() as f64 / places.len() as f64;
     (share >= 0.1).then_some(share)
-}
-
-/// Bytes of a number in text, with what stands around it.
-const TEXT: u64 = 12;
-
-/// What a frame takes, about.
-fn bytes_of_frame(scene: &Scene, inputs: &Inputs) -> Result<u64> {
-    let output = scene.surface()?.output;
-    let detail = &inputs.mesh;
-    let [vertices, triangles] = [detail.mesh.positions.len(), detail.mesh.triangles.len()].map(|n| n as u64);
-    let own: u64 = detail.arrays.iter().map(|array| (array.values.len() * array.number.size()) as u64).sum();
-    let of_vertex =
-        12 + 12 * u64::from(output.velocities) + 4 * u64::from(output.delta) + u64::from(output.flagged);
-    let uvs = detail.uvs.as_ref().map_or(0, |uvs| match uvs.corners {
-        Some(_) => 25 * triangles,
-        None => 8 * vertices,
-    });
-    let ply = vertices * of_vertex + triangles * 13 + own + uvs;
-    let obj = TEXT * (3 * vertices + 2 * triangles);
-    let usd = TEXT * (6 * vertices + 3 * triangles);
-    // The exact state: places in 64 bits, distances, flags.
-    let state = 29 * vertices;
-    Ok(state + ply * u64::from(output.ply) + obj * u64::from(output.obj) + usd * u64::from(output.usd))
 }

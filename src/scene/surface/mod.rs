@@ -1,11 +1,15 @@
 //! Meshes that follow a liquid in scenes: the keys of `[surface]`, what the files hold ([`Inputs`]), what a check says of it
-//! ([`check`]), and the stage `surface` (`track.rs`).
+//! ([`check`]), memory and disk space that it takes among it, and the stage `surface` (`track.rs`).
 
 #[cfg(feature = "vdb")]
 mod check;
 #[cfg(feature = "vdb")]
+mod disk;
+#[cfg(feature = "vdb")]
 mod inputs;
 mod keys;
+#[cfg(feature = "vdb")]
+mod memory;
 #[cfg(feature = "vdb")]
 mod plan;
 #[cfg(feature = "vdb")]

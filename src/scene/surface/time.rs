@@ -80,7 +80,7 @@ pub(super) struct Liquid<'a> {
 }
 
 /// Files that are kept: those around two frames.
-const KEPT: usize = 4;
+pub(super) const KEPT: usize = 4;
 
 impl<'a> Liquid<'a> {
     pub fn new(surface: &'a Surface, shot: Shot, seen: &'a Seen) -> Self {

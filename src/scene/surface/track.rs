@@ -9,9 +9,10 @@ use crate::base::{DVec3, MeshArray, TriMesh, Vec3};
 use crate::context::Context;
 use crate::error::{Error, Result};
 use crate::io::manifest::Keeps;
-use crate::io::{mesh, usd};
+use crate::io::{mesh, usd, usd_primvars};
 use crate::scene::shot::{
-    CONTENT, Clip, FrameFiles, Kind, Prims, Reads, Report, Settings, Stage, Stepped, Stepping, Stored, To,
+    CONTENT, Clip, FrameFiles, Kind, MovingMesh, Prims, Reads, Report, Settings, Stage, Stepped, Stepping,
+    Stored, To,
 };
 use crate::scene::text::keys::{first_of, settings_of};
 use crate::scene::{Scene, System};
@@ -148,17 +149,17 @@ impl<'a> Track<'a> {
         from.vertices().iter().zip(to.vertices()).map(speed).collect()
     }
 
-    /// The arrays that are written: the mesh's own, and those of this frame.
-    fn arrays(&self, step: &Written) -> Vec<MeshArray> {
+    /// The arrays that each frame has anew.
+    fn arrays(&self, delta: &[f32], flags: &[bool]) -> Vec<MeshArray> {
         let of_vertices =
             |name: &str, number, values| MeshArray { name: name.into(), on: On::Vertices, number, values };
         let output = self.surface.output;
         let delta = output.delta.then(|| {
-            let values = step.delta.iter().map(|delta| f64::from(*delta)).collect();
+            let values = delta.iter().map(|delta| f64::from(*delta)).collect();
             of_vertices("delta", Number::F32, values)
         });
         let flagged = output.flagged.then(|| {
-            let values = step.flags.iter().map(|flag| f64::from(u8::from(*flag))).collect();
+            let values = flags.iter().map(|flag| f64::from(u8::from(*flag))).collect();
             of_vertices("flagged", Number::U8, values)
         });
         delta.into_iter().chain(flagged).collect()
@@ -228,7 +229,10 @@ impl Stage for Track<'_> {
     }
 
     fn clip(&self) -> Option<Clip<'_>> {
-        let meshes = vec![(NAME.to_string(), self.inputs.mesh.uvs.as_ref())];
+        let (mesh, of_frame) = (&self.inputs.mesh, self.arrays(&[], &[]));
+        let arrays: Vec<&MeshArray> = mesh.arrays.iter().chain(&of_frame).collect();
+        let primvars = usd_primvars::primvars(&arrays);
+        let meshes = vec![MovingMesh { name: NAME.into(), uvs: mesh.uvs.as_ref(), primvars }];
         Some(Clip { kind: NAME, manifest: MANIFEST, prims: Prims::Meshes(meshes) })
     }
 }
@@ -285,7 +289,7 @@ impl<'a> Stepping for Track<'a> {
     fn write(&self, _writer: &mut (), step: Step, files: Option<&mut FrameFiles>) -> Result<()> {
         let (Some(step), Some(files)) = (step.0, files) else { return Ok(()) };
         let (output, detail) = (self.surface.output, &self.inputs.mesh);
-        let of_frame = self.arrays(&step);
+        let of_frame = self.arrays(&step.delta, &step.flags);
         let arrays: Vec<&MeshArray> = detail.arrays.iter().chain(&of_frame).collect();
         let velocities = if output.velocities { &step.velocities[..] } else { &[] };
         let mesh = TriMesh { positions: step.places, triangles: detail.mesh.triangles.clone() };
@@ -303,6 +307,7 @@ impl<'a> Stepping for Track<'a> {
                 velocities: &step.velocities,
                 triangles: &mesh.triangles,
                 uvs: detail.uvs.as_ref(),
+                arrays: &arrays,
             };
             let text = usd::clip(NAME, files.frame, self.scene.shot.fps, usd::Units::OWN, &[frame]);
             files.save(NAME, "usda", text.as_bytes())?;
@@ -328,9 +333,10 @@ fn told(report: &StepReport, particles: usize, tracker: &Tracker) -> Report {
         "born": report.born,
         "died": report.died,
         "vertices": tracker.vertices().len(),
-        "flagged": report.jumped + report.lost,
+        "flagged": report.flagged(),
         "jumped": report.jumped,
         "lost": report.lost,
+        "uncovered": report.uncovered,
         "drops": drops.len(),
         "drops_m3": drops.iter().fold(0.0, |sum, drop| sum + drop.volume),
         "bubbles": bubbles.len(),

@@ -70,8 +70,9 @@ pub struct StepReport {
 /// Bytes that a step takes for each active cell at most, with the air around and solids.
 const BYTES_PER_CELL: u64 = 220;
 
-/// Memory (bytes) of a step with so many active tiles.
-fn memory(tiles: usize) -> u64 {
+/// Memory (bytes) that a step with so many active tiles, of 512 cells each, is taken to need: one that would need more than its
+/// context allows is refused.
+pub fn memory(tiles: usize) -> u64 {
     512 * tiles as u64 * BYTES_PER_CELL
 }
 

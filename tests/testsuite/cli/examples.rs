@@ -131,7 +131,7 @@ fn the_page_of_the_command_line_runs() {
         works(folder.path(), &line.replace(" -o shot.gif", " --frames 1-120x40 -o shot.gif"));
         count += 1;
     }
-    assert_eq!(count, 14);
+    assert_eq!(count, 15);
 }
 
 /// Two frames of points.
@@ -157,8 +157,9 @@ fn write_splash(folder: &Path) {
 fn the_page_of_the_command_line_makes_surfaces_of_particles() {
     let folder = tempfile::tempdir().unwrap();
     write_splash(folder.path());
+    fs::write(folder.path().join("rock.obj"), CUBE).unwrap();
     let lines = lines(block(CLI, "## Surfaces of particles", "sh"));
-    assert_eq!(lines.len(), 4, "{lines:?}");
+    assert_eq!(lines.len(), 7, "{lines:?}");
     lines.iter().for_each(|line| {
         works(folder.path(), line);
     });

@@ -154,7 +154,32 @@ fn mesh_check_tells_solids_from_other_meshes() {
     let report = faults(folder.path(), &cross);
     assert_eq!((&report["solid"], &report["parts"]), (&true.into(), &2.into()));
     assert!(report["crossings"].as_u64().unwrap() >= 8, "{report}");
+    assert_eq!((&report["embedded"], &report["by_index"]["watertight"]), (&false.into(), &true.into()));
     fails(folder.path(), "mesh check none.stl", &["none.stl"]);
+}
+
+#[test]
+fn mesh_check_says_what_joining_vertices_by_place_hides() {
+    let folder = folder();
+    let whole = shapes::cuboid([1.0; 3]);
+    let positions: Vec<_> =
+        whole.triangles.as_flattened().iter().map(|&vertex| whole.positions[vertex as usize]).collect();
+    let triangles = (0..12).map(|triangle| [0, 1, 2].map(|corner| 3 * triangle + corner)).collect();
+    let report = faults(folder.path(), &TriMesh { positions, triangles });
+    let by_index = &report["by_index"];
+    assert_eq!((&report["solid"], &report["open_edges"]), (&true.into(), &0.into()));
+    assert_eq!((&by_index["watertight"], &by_index["open_edges"]), (&false.into(), &36.into()));
+    let said = works(folder.path(), "mesh check mesh.ply");
+    assert!(said.contains("mesh.ply: a solid, once vertices at one place are joined"), "{said}");
+    assert!(said.contains("36 edges with one triangle, by the vertices' indices"), "{said}");
+    // Two boxes with a corner in common.
+    let [mut two, second] = [[-1.0, 0.0], [0.0, 1.0]].map(|[low, high]| TriMesh::cuboid([low; 3], [high; 3]));
+    two.append(&second);
+    let report = faults(folder.path(), &two);
+    assert_eq!((&report["pinched_vertices"], &report["embedded"]), (&1.into(), &true.into()));
+    assert_eq!((&report["genus"], &report["by_index"]["watertight"]), (&0.into(), &true.into()));
+    let said = works(folder.path(), "mesh check mesh.ply");
+    assert!(said.contains("1 vertices whose triangles form no single fan\n"), "{said}");
 }
 
 #[test]

@@ -6,29 +6,9 @@ use frazil::base::DVec3;
 use frazil::base::points::Values;
 use frazil::io::particles::{self, Cloud};
 
-use super::particles::{Vtu, bgeo, parse, vtk, zipped};
+use super::particles::parse;
+use crate::common::caches::{Vtu, bgeo, samples, vtk, zipped};
 use crate::common::character;
-
-/// A small file of each format and encoding.
-fn samples() -> Vec<(&'static str, Vec<u8>)> {
-    let mut out = vec![("a.bgeo", bgeo()), ("z.bgeo", zipped(&bgeo()))];
-    for version in ["4.1", "5.1"] {
-        out.push(("a.vtk", vtk(false, version, "POLYDATA")));
-        out.push(("b.vtk", vtk(true, version, "UNSTRUCTURED_GRID")));
-    }
-    let vtu = Vtu { format: "ascii", encoding: "", blocks: None, long: false, big: false, pieces: 2 };
-    for (format, encoding) in [("ascii", ""), ("binary", ""), ("appended", "raw"), ("appended", "base64")] {
-        out.push(("a.vtu", Vtu { format, encoding, ..vtu }.file()));
-        out.push(("b.vtu", Vtu { format, encoding, blocks: Some(16), ..vtu }.file()));
-        out.push(("c.vtu", Vtu { format, encoding, blocks: Some(16), long: true, ..vtu }.file()));
-    }
-    out.push(("a.xyz", b"0.1 -2.5 1e-7\n1 0 3\n4 5 -6\n".to_vec()));
-    out.push((
-        "b.xyz",
-        [0.1f32, -2.5, 1e-7, 1.0, 0.0, 3.0].iter().flat_map(|part| part.to_le_bytes()).collect(),
-    ));
-    out
-}
 
 /// Whatever is read is whole, and whatever is not is a sentence about the file; nothing panics on the way.
 #[track_caller]

@@ -3,6 +3,7 @@
 use std::fs;
 use std::path::Path;
 
+use crate::common::usda::numbers;
 use crate::program::works;
 use frazil::base::PolygonMesh;
 use frazil::io::mesh;
@@ -36,15 +37,7 @@ fn of_polygons(polygons: PolygonMesh) -> (Vec<[f32; 3]>, Vec<Vec<Corner>>) {
 /// The corners of a mesh in a .usda file of one frame.
 fn usda(path: &Path, seams: bool) -> (Vec<[f32; 3]>, Vec<Vec<Corner>>) {
     let text = fs::read_to_string(path).unwrap();
-    let numbers = |attribute: &str| -> Vec<f32> {
-        let start =
-            text.find(&format!(" {attribute}.timeSamples = {{")).unwrap_or_else(|| panic!("{attribute}"));
-        let line = text[start..].lines().next().unwrap().split_once(": ").unwrap().1;
-        line.split(|c: char| "[](), }".contains(c))
-            .filter(|w| !w.is_empty())
-            .map(|w| w.parse().unwrap())
-            .collect()
-    };
+    let numbers = |attribute: &str| numbers(&text, attribute);
     let points: Vec<[f32; 3]> = numbers("points").chunks(3).map(|p| [p[0], p[1], p[2]]).collect();
     let places: Vec<[f32; 2]> = numbers("primvars:st").chunks(2).map(|p| [p[0], p[1]]).collect();
     assert!(numbers("faceVertexCounts").iter().all(|&count| count == 3.0));

@@ -78,7 +78,7 @@ fn drops_apart_and_bubbles_inside_are_listed() {
         then.places[*n] = at + beside;
     }
     let report = tracker.step(&ctx, &then, &then, 0.04).unwrap();
-    assert_eq!((report.apart.len(), report.jumped + report.lost), (2, 0), "{:?}", report.apart);
+    assert_eq!((report.apart.len(), report.flagged()), (2, 0), "{:?}", report.apart);
     let [drop, bubble] = if report.apart[0].volume > 0.0 { [0, 1] } else { [1, 0] }.map(|n| report.apart[n]);
     assert!((drop.place - beside).norm() < 0.2 * spacing && drop.volume > 0.0, "{drop:?}");
     assert!(bubble.place.norm() < 0.2 * spacing && bubble.volume < 0.0, "{bubble:?}");

@@ -1,11 +1,15 @@
 //! `frazil vdb from-particles`.
 
+mod colliders;
+mod shape;
+
 use super::{Packing, check_name};
 use crate::cli::cloud::points_of_vdb;
 use crate::cli::exit::{Failure, Phase};
 use crate::cli::options::{MeshSpace, positive, triple};
 use crate::cli::output;
 use crate::cli::session::Session;
+use colliders::Colliders;
 use frazil::base::arrays::{Number, On};
 use frazil::base::points::{Attribute, Values};
 use frazil::base::{DVec3, MeshArray, TriMesh};
@@ -14,22 +18,23 @@ use frazil::io::mesh::extension;
 use frazil::io::particles::{self, Cloud};
 use frazil::io::sequence::Pattern;
 use frazil::scene::{FrameChoice, Frames};
-use frazil::surface::{
-    Distances, HALF_WIDTH, Implicit, Isosurface, estimate_spacing, level_set, rough_spacing, specks, transfer,
-};
+use frazil::surface::{estimate_spacing, rough_spacing, specks, transfer};
 use frazil::vdb::file;
-use frazil::{Error, Result};
+use frazil::vdb::level_set::to_mesh;
+use frazil::{Context, Error, Result};
 use serde_json::json;
+use shape::{Method, Recipe};
 use std::path::{Path, PathBuf};
 
 /// Make the surface of a liquid from its particles: a level set, a mesh, or both
 ///
 /// The surface is that of Solenthaler et al. (2007): smooth, half a spacing above the outermost particles, and no bridges between
-/// parts that are far from each other.
+/// parts that are far from each other; or a union of spheres.
 #[derive(clap::Args)]
 #[command(after_help = "\
 Examples:
   frazil vdb from-particles splash.0001.bgeo --mesh splash.ply
+  frazil vdb from-particles splash.0001.bgeo --spacing 0.1 --smooth 10 --subtract boot.vdb --mesh splash.ply -o splash.vdb
   frazil vdb from-particles splash.%04d.bgeo --frames 1-2 -o level.%04d.vdb --mesh splash.%04d.ply --spacing 0.1")]
 pub struct Args {
     /// Particles (.bgeo, .vtk, .vtu, .xyz, .ply, .vdb), or a sequence of them (splash.%04d.bgeo)
@@ -37,9 +42,21 @@ pub struct Args {
     /// Initial distance between particles (m) [default: estimated, and said]
     #[arg(long, value_name = "M", value_parser = positive)]
     spacing: Option<f64>,
-    /// Edge of a voxel (m), 1/8 to 2 spacings [default: half a spacing]
+    /// Edge of a voxel (m), 1/8 to 2 spacings, of spheres at most 2/3 of their radius [default: half a spacing]
     #[arg(long, value_name = "M", value_parser = positive)]
     cell: Option<f64>,
+    /// How particles become a surface
+    #[arg(long, value_enum, default_value = "solenthaler")]
+    method: Method,
+    /// Radius of the spheres (m), 1.5 to 100 voxels [default: one spacing; 0.87 of it fills a cubic grid without holes]
+    #[arg(long, value_name = "M", value_parser = positive)]
+    radius: Option<f64>,
+    /// Passes that smooth the surface, 0 to 100; each connected part keeps its volume
+    #[arg(long, value_name = "N", default_value = "0", value_parser = clap::value_parser!(u32).range(0..=100))]
+    smooth: u32,
+    /// Level set to cut out of the liquid (.vdb), or a sequence of them (collider.%04d.vdb); can be given several times
+    #[arg(long, value_name = "FILE")]
+    subtract: Vec<PathBuf>,
     /// Attributes of the particles that the mesh gets too (.ply), as means over those around each vertex: v, density, or all
     #[arg(long, value_name = "A,B", value_delimiter = ',', requires = "mesh")]
     attributes: Vec<String>,
@@ -73,6 +90,9 @@ pub struct Args {
 /// Runs the command.
 pub fn run(args: &Args, session: &Session) -> std::result::Result<(), Failure> {
     session.ctx.set_memory_limit(session.max_memory());
+    if args.radius.is_some() && args.method != Method::Spheres {
+        return Err(Failure::refused("--radius is of no use without --method spheres"));
+    }
     let input = Pattern::parse(&args.particles);
     let frames = args.frames(input.is_some())?;
     for (path, extensions) in [(&args.output, &["vdb"][..]), (&args.mesh, &["ply", "obj", "stl"])] {
@@ -89,14 +109,15 @@ pub fn run(args: &Args, session: &Session) -> std::result::Result<(), Failure> {
             return Err(Failure::refused(what));
         }
         for frame in frames.iter() {
-            let from = of_frame(&args.particles, frame);
-            output::refuse_input(&of_frame(path, frame), [from.as_path()]).before()?;
+            let inputs: Vec<PathBuf> = args.inputs().map(|input| of_frame(input, frame)).collect();
+            output::refuse_input(&of_frame(path, frame), inputs.iter().map(PathBuf::as_path)).before()?;
         }
     }
     for frame in frames.iter() {
         // A gap in a sequence is known before any work.
         io::source::open(&of_frame(&args.particles, frame)).before()?;
     }
+    let mut colliders = Colliders::open(&args.subtract, &frames).before()?;
     let mut spacing = args.spacing;
     let (mut particles, mut triangles, mut specks) = (0, 0, 0);
     for (n, frame) in frames.iter().enumerate() {
@@ -116,7 +137,7 @@ pub fn run(args: &Args, session: &Session) -> std::result::Result<(), Failure> {
         specks += if n == 0 { left_out.before()? } else { left_out.during()? };
         let columns = args.columns(&cloud, &path);
         let columns = if n == 0 { columns.before()? } else { columns.during()? };
-        let made = args.make(session, (&cloud.places, &columns), spacing, frame);
+        let made = args.make(session, (&cloud.places, &columns), spacing, (frame, &mut colliders));
         let is_refused = matches!(made, Err(Error::Argument(_) | Error::Memory { .. }));
         let mesh = if n == 0 && is_refused { made.before()? } else { made.during()? };
         particles += cloud.places.len();
@@ -164,6 +185,11 @@ fn warn_of_spacing(path: &Path, places: &[DVec3], spacing: f64) {
 }
 
 impl Args {
+    /// All files that are read, or their patterns.
+    fn inputs(&self) -> impl Iterator<Item = &PathBuf> {
+        std::iter::once(&self.particles).chain(&self.subtract)
+    }
+
     fn frames(&self, is_sequence: bool) -> std::result::Result<FrameChoice, Failure> {
         match &self.frames {
             None if is_sequence => {
@@ -256,34 +282,59 @@ impl Args {
         session: &Session,
         (places, columns): (&[DVec3], &[(String, Vec<f32>)]),
         spacing: f64,
-        frame: i32,
+        (frame, colliders): (i32, &mut Colliders),
     ) -> Result<TriMesh> {
         let ctx = &session.ctx;
-        let cell = self.cell.unwrap_or(0.5 * spacing);
-        let phi = ctx.phase("phi", || Implicit::new(ctx, places, spacing, cell))?;
-        let surface = ctx.phase("mesh", || Ok(Isosurface::new(&phi)))?;
-        let mesh = surface.mesh(&phi);
-        if let Some(path) = &self.output {
-            let distances = ctx.phase("distance", || Distances::new(ctx, &phi, &surface, HALF_WIDTH))?;
-            let mut grid = ctx.phase("grid", || level_set(ctx, &distances))?;
+        let recipe = Recipe {
+            method: self.method,
+            spacing,
+            cell: self.cell.unwrap_or(0.5 * spacing),
+            radius: self.radius.unwrap_or(spacing),
+            passes: self.smooth,
+        };
+        let wants_grid = self.output.is_some() || !colliders.is_empty();
+        let (mut mesh, mut grid) = recipe.surface(session, places, wants_grid)?;
+        if !colliders.is_empty()
+            && let Some(liquid) = &mut grid
+        {
+            colliders.cut(session, liquid, frame)?;
+            let cut = &*liquid;
+            mesh = ctx.phase("mesh", || to_mesh(ctx, cut, 0.0, 0.0))?;
+            if mesh.triangles.is_empty() {
+                let particles = of_frame(&self.particles, frame);
+                log::warn!("{}: nothing is left of the liquid", particles.display());
+            }
+        }
+        if let (Some(path), Some(grid)) = (&self.output, &mut grid) {
             grid.set_name(&self.name)?;
-            file::write(&of_frame(path, frame), &[&grid], &self.packing.options())?;
+            file::write(&of_frame(path, frame), &[&*grid], &self.packing.options())?;
         }
         if let Some(path) = &self.mesh {
-            let vertices: Vec<DVec3> = mesh.positions.iter().map(|place| place.cast()).collect();
-            let numbers: Vec<Vec<f32>> = columns.iter().map(|(_, numbers)| numbers.clone()).collect();
-            let means = ctx.phase("attributes", || transfer(ctx, places, spacing, &vertices, &numbers))?;
-            let array = |((name, _), values): (&(String, Vec<f32>), Vec<f32>)| MeshArray {
-                name: name.clone(),
-                on: On::Vertices,
-                number: Number::F32,
-                values: values.into_iter().map(f64::from).collect(),
-            };
-            let arrays: Vec<MeshArray> = columns.iter().zip(means).map(array).collect();
-            let arrays: Vec<&MeshArray> = arrays.iter().collect();
+            let means = ctx.phase("attributes", || means(ctx, places, spacing, &mesh, columns))?;
+            let arrays: Vec<&MeshArray> = means.iter().collect();
             let carried = io::mesh::Carried { arrays: &arrays, ..Default::default() };
             io::mesh::write_carried(&of_frame(path, frame), &mesh, &carried)?;
         }
         Ok(mesh)
     }
+}
+
+/// What the particles around carry, as arrays of a mesh's vertices.
+fn means(
+    ctx: &Context,
+    places: &[DVec3],
+    spacing: f64,
+    mesh: &TriMesh,
+    columns: &[(String, Vec<f32>)],
+) -> Result<Vec<MeshArray>> {
+    let vertices: Vec<DVec3> = mesh.positions.iter().map(|place| place.cast()).collect();
+    let numbers: Vec<Vec<f32>> = columns.iter().map(|(_, numbers)| numbers.clone()).collect();
+    let means = transfer(ctx, places, spacing, &vertices, &numbers)?;
+    let array = |((name, _), values): (&(String, Vec<f32>), Vec<f32>)| MeshArray {
+        name: name.clone(),
+        on: On::Vertices,
+        number: Number::F32,
+        values: values.into_iter().map(f64::from).collect(),
+    };
+    Ok(columns.iter().zip(means).map(array).collect())
 }

@@ -1,0 +1,247 @@
+//! How the triangles of a mesh hang together by their indices: edges, fans around vertices, parts.
+
+use rayon::prelude::*;
+
+/// Whether a mesh is a closed 2-manifold as its indices have it, wherever its vertices lie, and what keeps it from that.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Topology {
+    /// Triangles.
+    pub triangles: usize,
+    /// Triangles that name a vertex twice; nothing else counts them.
+    pub collapsed_triangles: usize,
+    /// Triangles with the vertices of one before them, in any order; they count everywhere else, too.
+    pub doubled_triangles: usize,
+    /// Edges with one triangle.
+    pub open_edges: usize,
+    /// Edges with more than two triangles.
+    pub crowded_edges: usize,
+    /// Edges whose two triangles disagree about which side is out.
+    pub turned_edges: usize,
+    /// Vertices whose triangles do not form one fan, closed or with two ends: where parts touch in a vertex, and both ends
+    /// of each crowded edge.
+    pub pinched_vertices: usize,
+}
+
+impl Topology {
+    /// Surveys triangles that name some of so many vertices.
+    pub fn of(vertices: usize, triangles: &[[u32; 3]]) -> Self {
+        let whole: Vec<[u32; 3]> = triangles.iter().copied().filter(|corners| !collapsed(*corners)).collect();
+        let survey = Survey::of(vertices, &whole);
+        Self {
+            triangles: triangles.len(),
+            collapsed_triangles: triangles.len() - whole.len(),
+            doubled_triangles: firsts(&whole).iter().filter(|first| !**first).count(),
+            open_edges: survey.open.len(),
+            crowded_edges: survey.crowded,
+            turned_edges: survey.turned,
+            pinched_vertices: survey.pinched,
+        }
+    }
+
+    /// Whether it has a triangle and no fault: closed, each edge with two triangles that agree about which side is out,
+    /// each vertex with one fan. The surface may still pass through itself ([`super::faults::Faults::is_embedded`]).
+    pub fn is_watertight(&self) -> bool {
+        let faults = [
+            self.collapsed_triangles,
+            self.doubled_triangles,
+            self.open_edges,
+            self.crowded_edges,
+            self.turned_edges,
+            self.pinched_vertices,
+        ];
+        self.triangles > 0 && faults == [0; 6]
+    }
+}
+
+/// Edges and fans of triangles with three different vertices each.
+pub(super) struct Survey {
+    /// Edges with one triangle, lesser vertex first.
+    pub(super) open: Vec<[u32; 2]>,
+    pub(super) crowded: usize,
+    pub(super) turned: usize,
+    pub(super) pinched: usize,
+    edges: usize,
+    /// Fans of all vertices.
+    fans: usize,
+    /// Parts that hang together by edges.
+    bodies: usize,
+    triangles: usize,
+}
+
+impl Survey {
+    pub(super) fn of(vertices: usize, triangles: &[[u32; 3]]) -> Self {
+        let corners = triangles.as_flattened();
+        let (mut fans, mut bodies) = (Sets::new(corners.len()), Sets::new(triangles.len()));
+        let mut on_crowded = vec![false; vertices];
+        let (mut open, mut crowded, mut turned, mut edges) = (Vec::new(), 0, 0, 0);
+        for uses in halves(triangles).chunk_by(|a, b| a.0 == b.0) {
+            let ends = uses[0].0;
+            edges += 1;
+            match uses {
+                [_] => open.push(ends),
+                [(_, a), (_, b)] => turned += usize::from(corners[*a as usize] == corners[*b as usize]),
+                _ => {
+                    crowded += 1;
+                    ends.iter().for_each(|&end| on_crowded[end as usize] = true);
+                }
+            }
+            for pair in uses.windows(2) {
+                let ([a, b], [c, d]) = ([pair[0].1, after(pair[0].1)], [pair[1].1, after(pair[1].1)]);
+                let (c, d) = if corners[a as usize] == corners[c as usize] { (c, d) } else { (d, c) };
+                fans.join(a, c);
+                fans.join(b, d);
+                bodies.join(a / 3, c / 3);
+            }
+        }
+        let mut fans_of = vec![0u32; vertices];
+        fans.roots().for_each(|corner| fans_of[corners[corner] as usize] += 1);
+        Self {
+            open,
+            crowded,
+            turned,
+            pinched: fans_of
+                .iter()
+                .zip(&on_crowded)
+                .filter(|(fans, crowded)| **fans > 1 || **crowded)
+                .count(),
+            edges,
+            fans: fans.roots().count(),
+            bodies: bodies.roots().count(),
+            triangles: triangles.len(),
+        }
+    }
+
+    /// Handles, summed over all bodies, where the surface is closed and no edge crowded. A vertex with several fans counts as
+    /// that many, and bodies that touch in one are apart.
+    pub(super) fn genus(&self) -> Option<i64> {
+        let closed = self.open.is_empty() && self.crowded == 0 && self.triangles > 0;
+        let euler = self.fans as i64 - self.edges as i64 + self.triangles as i64;
+        closed.then_some(self.bodies as i64 - euler / 2)
+    }
+}
+
+/// Whether a triangle names a vertex twice.
+pub(super) fn collapsed([a, b, c]: [u32; 3]) -> bool {
+    a == b || b == c || c == a
+}
+
+/// Of each triangle whether none before it has the same vertices, in any order.
+pub(super) fn firsts(triangles: &[[u32; 3]]) -> Vec<bool> {
+    let sorted = |(mut corners, index): ([u32; 3], u32)| {
+        corners.sort_unstable();
+        (corners, index)
+    };
+    let mut order: Vec<([u32; 3], u32)> = triangles.iter().copied().zip(0..).map(sorted).collect();
+    order.par_sort_unstable();
+    let mut firsts = vec![true; triangles.len()];
+    for same in order.chunk_by(|a, b| a.0 == b.0) {
+        same[1..].iter().for_each(|(_, index)| firsts[*index as usize] = false);
+    }
+    firsts
+}
+
+/// Edges (lesser vertex first), each with the corner where one of its triangles begins to run along it; sorted.
+fn halves(triangles: &[[u32; 3]]) -> Vec<([u32; 2], u32)> {
+    let of_triangle = |([a, b, c], first): ([u32; 3], u32)| {
+        let half = |i: u32, j: u32, corner: u32| ([i.min(j), i.max(j)], 3 * first + corner);
+        [half(a, b, 0), half(b, c, 1), half(c, a, 2)]
+    };
+    let mut halves: Vec<([u32; 2], u32)> = triangles.iter().copied().zip(0..).flat_map(of_triangle).collect();
+    halves.par_sort_unstable();
+    halves
+}
+
+/// The corner behind one, in the same triangle.
+fn after(corner: u32) -> u32 {
+    if corner % 3 == 2 { corner - 2 } else { corner + 1 }
+}
+
+/// Count of connected groups among those of so many vertices that links name.
+pub(super) fn groups(vertices: usize, links: impl Iterator<Item = [u32; 2]>) -> usize {
+    let (mut sets, mut named) = (Sets::new(vertices), vec![false; vertices]);
+    for link in links {
+        link.iter().for_each(|&vertex| named[vertex as usize] = true);
+        sets.join(link[0], link[1]);
+    }
+    sets.roots().filter(|&vertex| named[vertex]).count()
+}
+
+/// Disjoint sets: each index leads to a lesser one of its set, the least to itself.
+struct Sets(Vec<u32>);
+
+impl Sets {
+    fn new(count: usize) -> Self {
+        Self((0..count as u32).collect())
+    }
+
+    fn root(&mut self, mut at: u32) -> u32 {
+        while self.0[at as usize] != at {
+            let up = self.0[self.0[at as usize] as usize];
+            self.0[at as usize] = up;
+            at = up;
+        }
+        at
+    }
+
+    fn join(&mut self, a: u32, b: u32) {
+        let (a, b) = (self.root(a), self.root(b));
+        self.0[a.max(b) as usize] = a.min(b);
+    }
+
+    fn roots(&self) -> impl Iterator<Item = usize> {
+        self.0.iter().enumerate().filter(|(at, up)| *at == **up as usize).map(|(at, _)| at)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn faults(vertices: usize, triangles: &[[u32; 3]]) -> [usize; 6] {
+        let t = Topology::of(vertices, triangles);
+        assert_eq!(t.is_watertight(), faults_of(t) == [0; 6]);
+        faults_of(t)
+    }
+
+    /// Collapsed, doubled, open, crowded, turned, pinched.
+    fn faults_of(t: Topology) -> [usize; 6] {
+        let edges = [t.open_edges, t.crowded_edges, t.turned_edges];
+        [t.collapsed_triangles, t.doubled_triangles, edges[0], edges[1], edges[2], t.pinched_vertices]
+    }
+
+    const TETRAHEDRON: [[u32; 3]; 4] = [[0, 2, 1], [0, 1, 3], [1, 2, 3], [2, 0, 3]];
+
+    #[test]
+    fn each_fault_is_counted_alone() {
+        assert_eq!(faults(4, &TETRAHEDRON), [0; 6]);
+        assert_eq!(faults(4, &TETRAHEDRON[1..]), [0, 0, 3, 0, 0, 0]);
+        let mut turned = TETRAHEDRON;
+        turned[2].swap(0, 1);
+        assert_eq!(faults(4, &turned), [0, 0, 0, 0, 3, 0]);
+        let mut with_needle = TETRAHEDRON.to_vec();
+        with_needle.push([3, 1, 3]);
+        assert_eq!(faults(4, &with_needle), [1, 0, 0, 0, 0, 0]);
+        // Both sides of one triangle: closed, but no surface.
+        assert_eq!(faults(3, &[[0, 1, 2], [2, 1, 0]]), [0, 1, 0, 0, 0, 0]);
+        // Two triangles that share a vertex only; then joined by a third to one open fan.
+        assert_eq!(faults(5, &[[0, 1, 2], [0, 3, 4]]), [0, 0, 6, 0, 0, 1]);
+        assert_eq!(faults(5, &[[0, 1, 2], [0, 3, 4], [0, 2, 3]]), [0, 0, 5, 0, 0, 0]);
+        // Three triangles on an edge.
+        assert_eq!(faults(5, &[[0, 1, 2], [1, 0, 3], [0, 1, 4]]), [0, 0, 6, 1, 0, 2]);
+        assert!(!Topology::of(0, &[]).is_watertight());
+    }
+
+    #[test]
+    fn groups_hang_together_by_links() {
+        assert_eq!(groups(9, [[7, 3], [1, 2], [3, 1], [5, 6], [6, 5]].into_iter()), 2);
+        assert_eq!(groups(9, std::iter::empty()), 0);
+    }
+
+    #[test]
+    fn genus_takes_bodies_that_touch_in_a_vertex_apart() {
+        let mirrored = TETRAHEDRON.map(|corners| corners.map(|v| if v == 0 { 0 } else { v + 3 }));
+        let two: Vec<[u32; 3]> = TETRAHEDRON.into_iter().chain(mirrored).collect();
+        let survey = Survey::of(7, &two);
+        assert_eq!((survey.pinched, survey.genus()), (1, Some(0)));
+    }
+}

@@ -1,0 +1,94 @@
+//! The surface of one frame: a mesh, and the level set that fits it.
+
+use clap::ValueEnum;
+use frazil::Result;
+use frazil::base::{DVec3, TriMesh};
+use frazil::surface::{Distances, HALF_WIDTH, Implicit, Isosurface, level_set, smooth, spheres};
+use frazil::sweep::{Settings, voxelise};
+use frazil::vdb::FloatGrid;
+use frazil::vdb::level_set::to_mesh;
+
+use crate::cli::session::Session;
+use crate::cli::vdb::check_surface;
+
+/// How particles become a surface.
+#[derive(Clone, Copy, PartialEq, ValueEnum)]
+pub enum Method {
+    /// Smooth, half a spacing above the outermost particles, without bridges between parts far from each other
+    Solenthaler,
+    /// The union of spheres around the particles
+    Spheres,
+}
+
+/// What a surface is made by.
+#[derive(Clone, Copy)]
+pub struct Recipe {
+    pub method: Method,
+    /// Initial distance between particles (m).
+    pub spacing: f64,
+    /// Edge of a cell (m).
+    pub cell: f64,
+    /// Radius of the spheres (m).
+    pub radius: f64,
+    /// Passes of smoothing.
+    pub passes: u32,
+}
+
+impl Recipe {
+    /// The surface of particles at places (m), with its level set where that is wanted.
+    pub fn surface(
+        &self,
+        session: &Session,
+        places: &[DVec3],
+        wants_grid: bool,
+    ) -> Result<(TriMesh, Option<FloatGrid>)> {
+        let (mut mesh, grid) = match self.method {
+            Method::Solenthaler => self.solenthaler(session, places, wants_grid && self.passes == 0)?,
+            // Inside of a union the spheres' own values are no distances.
+            Method::Spheres => (self.union(session, places)?, None),
+        };
+        if self.passes > 0 {
+            session.ctx.phase("smooth", || smooth(&session.ctx, &mut mesh, self.passes))?;
+        }
+        let grid = match grid {
+            None if wants_grid => Some(level_set_of(session, mesh.clone(), self.cell)?),
+            grid => grid,
+        };
+        Ok((mesh, grid))
+    }
+
+    fn union(&self, session: &Session, places: &[DVec3]) -> Result<TriMesh> {
+        let ctx = &session.ctx;
+        let grid = ctx.phase("spheres", || spheres(ctx, places, self.radius, self.cell))?;
+        ctx.phase("mesh", || to_mesh(ctx, &grid, 0.0, 0.0))
+    }
+
+    /// Distances are exact to the triangles that become the mesh.
+    fn solenthaler(
+        &self,
+        session: &Session,
+        places: &[DVec3],
+        wants_grid: bool,
+    ) -> Result<(TriMesh, Option<FloatGrid>)> {
+        let ctx = &session.ctx;
+        let phi = ctx.phase("phi", || Implicit::new(ctx, places, self.spacing, self.cell))?;
+        let surface = ctx.phase("mesh", || Ok(Isosurface::new(&phi)))?;
+        let mesh = surface.mesh(&phi);
+        if !wants_grid {
+            return Ok((mesh, None));
+        }
+        let distances = ctx.phase("distance", || Distances::new(ctx, &phi, &surface, HALF_WIDTH))?;
+        let grid = ctx.phase("grid", || level_set(ctx, &distances))?;
+        Ok((mesh, Some(grid)))
+    }
+}
+
+/// The level set of the solid that a mesh bounds, on cells of an edge (m); an empty one of an empty mesh.
+pub fn level_set_of(session: &Session, mesh: TriMesh, cell: f64) -> Result<FloatGrid> {
+    if mesh.triangles.is_empty() {
+        return FloatGrid::level_set(cell, HALF_WIDTH);
+    }
+    check_surface(session, mesh.area(), cell)?;
+    let settings = Settings { half_width: HALF_WIDTH, ..Settings::new(cell) };
+    voxelise(&session.ctx, mesh, &settings)
+}

@@ -1,0 +1,221 @@
+//! Forecast of what mist takes. What a cell of air takes is known; how far mist spreads is not, before it is made. So the count of
+//! cells is that of mist which a folder already holds, be it of the shot's first frames or of coarser cells, or else a figure to go
+//! by: the cells that fill the boxes of all objects, wherever they were while mist lasts.
+
+use std::collections::HashMap;
+
+use serde::Serialize;
+
+use super::course::Course;
+use super::mist_keys::mist_params;
+use crate::base::DVec3;
+use crate::context::Context;
+use crate::error::{Error, Result};
+use crate::scene::Scene;
+use crate::scene::shot::Stored;
+use crate::snow::mist::{self, LEAST, Params};
+use crate::vdb::file;
+
+/// Cells along the edge of a tile, and in it. Air is computed in whole tiles, and one more around those that hold mist.
+const EDGE: f64 = 8.0;
+const CELLS: u64 = 512;
+/// Bytes of a cell while a frame is written and the next one made: a copy of velocity, pressure and density with those around
+/// (40), density and velocity as blocks, as grids and as a file (16 each).
+const WRITING: u64 = 40 + 3 * 16;
+/// Bytes of a cell in mist/ (density and velocity), and in fog/: whole floats, which hardly pack.
+const IN_MIST: u64 = 16;
+const IN_FOG: u64 = 4;
+/// Bytes of a cell in an exact state, and how many of those are kept.
+const IN_STATE: u64 = 40;
+const STATES: u64 = 2;
+/// Cubes of a box that are counted at most: larger boxes are counted in larger cubes.
+const COUNTED: f64 = 4096.0;
+
+/// What mist takes, as far as that can be told.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct MistForecast {
+    /// Edge of a cell of air (m).
+    pub cell_m: f64,
+    /// Memory that a step reckons with for each cell (bytes): one that would need more than the limit is refused.
+    pub step_bytes_per_cell: u64,
+    /// Memory of each cell of the run (bytes), with what is being written.
+    pub memory_bytes_per_cell: u64,
+    /// Disk space of each cell in the files of a frame, at most (bytes).
+    pub disk_bytes_per_cell: u64,
+    /// The last frame of the mist that was made, from which the count of cells is; none: it is that of the objects' boxes.
+    pub made_to_frame: Option<i32>,
+    /// Most cells at once.
+    pub cells: u64,
+    /// Their volume (m3).
+    pub air_m3: f64,
+    /// Memory of so many (bytes), beside the base layer and the grains.
+    pub memory_bytes: u64,
+    /// Disk space of all frames and states, at most (bytes), with so many.
+    pub disk_bytes: u64,
+}
+
+impl MistForecast {
+    /// Forecast for a scene with these objects, from the mist that a folder holds where it has some. None for a scene without mist.
+    ///
+    /// # Errors
+    /// A damaged report or file of that mist; cancel.
+    pub(super) fn of(
+        ctx: &Context,
+        scene: &Scene,
+        courses: &[Course],
+        stored: Option<&Stored>,
+    ) -> Result<Option<Self>> {
+        let Some(params) = mist_params(&scene.values) else { return Ok(None) };
+        let last = scene.shot.frames.last;
+        let made = stored.map(|stored| made(stored, params.cell, last)).transpose()?.flatten();
+        // The most cells at once, and those of all frames.
+        let (most, all) = match made {
+            Some((_, cells)) => (cells, cells * scene.shot.frames.count() as f64),
+            None => {
+                let of_frames = in_boxes(ctx, scene, courses, &params)?;
+                (of_frames.iter().copied().fold(0.0, f64::max), of_frames.iter().sum())
+            }
+        };
+        let output = scene.output;
+        let in_mist = if output.mist { IN_MIST } else { 0 };
+        let in_fog = if output.volumes.fog_mist { IN_FOG } else { 0 };
+        let [step, in_files] = [mist::memory(1) / CELLS, in_mist + in_fog];
+        let cells = most.ceil() as u64;
+        Ok(Some(Self {
+            cell_m: params.cell,
+            step_bytes_per_cell: step,
+            memory_bytes_per_cell: step + WRITING,
+            disk_bytes_per_cell: in_files,
+            made_to_frame: made.map(|(frame, _)| frame),
+            cells,
+            air_m3: most * params.cell.powi(3),
+            memory_bytes: cells * (step + WRITING),
+            disk_bytes: (all * in_files as f64) as u64 + cells * STATES * IN_STATE,
+        }))
+    }
+
+    /// Fails where so many cells would need more memory than a limit (bytes).
+    ///
+    /// # Errors
+    /// [`Error::Memory`] names the count of cells and where it is from.
+    pub fn check(&self, limit: u64) -> Result<()> {
+        if self.memory_bytes <= limit {
+            return Ok(());
+        }
+        let from = match self.made_to_frame {
+            Some(frame) => format!("as many as it had up to frame {frame}"),
+            None => "as many as fill the boxes that objects pass".to_string(),
+        };
+        let what = format!("mist of {} cells of {} m, {from},", self.cells, self.cell_m);
+        Err(Error::Memory { what, needed: self.memory_bytes, limit })
+    }
+
+    /// The most cells that a step may have under a limit of memory (bytes).
+    pub fn most_cells(&self, limit: u64) -> u64 {
+        limit / self.step_bytes_per_cell
+    }
+}
+
+/// The last frame, up to `last`, of mist that was made, and the most cells that a frame of it has, as cells of an edge `cell` (m);
+/// none where no mist was raised, or no file says how large its cells are.
+fn made(stored: &Stored, cell: f64, last: i32) -> Result<Option<(i32, f64)>> {
+    let (mut end, mut most) = (None, 0.0);
+    for frame in stored.frames().filter(|frame| *frame <= last) {
+        let report = stored.report(frame)?;
+        let cells = report.as_ref().and_then(|report| report.get("cells")?.as_f64());
+        most = cells.unwrap_or(0.0).max(most);
+        end = Some(frame);
+    }
+    let Some((end, (frame, _))) = end.zip(stored.files("mist").pop()).filter(|_| most > 0.0) else {
+        return Ok(None);
+    };
+    // A run with --preview has larger cells.
+    let grids = file::describe(&stored.file(frame, "mist")?)?;
+    let factor = grids.first().map_or(1.0, |grid| grid.voxel / cell);
+    Ok(Some((end, most * factor.powi(3))))
+}
+
+/// The cells at each frame, if mist fills the boxes of all objects that push grains near the snow from when they are there until it
+/// has dissipated, carried along by a wind that is the same everywhere.
+fn in_boxes(ctx: &Context, scene: &Scene, courses: &[Course], params: &Params) -> Result<Vec<f64>> {
+    let (frames, fps) = (scene.shot.frames, scene.shot.fps);
+    let count = frames.count();
+    // From full to the density under which there is none.
+    let lasts = params.half_life * libm::log2(1.0 / f64::from(LEAST)) * fps;
+    let lasts = (lasts.ceil() as usize).min(count);
+    let tile = EDGE * params.cell;
+    let mut boxes: Vec<(usize, [DVec3; 2])> = courses
+        .iter()
+        .flat_map(|course| course.passing())
+        .map(|(frame, [low, high])| {
+            // As the air sees it.
+            let drift = DVec3::from(params.wind) * (f64::from(frame) / fps);
+            let margin = DVec3::repeat(tile);
+            ((frame - frames.first) as usize, [low - margin - drift, high + margin - drift])
+        })
+        .collect();
+    boxes.sort_by_key(|(at, _)| *at);
+    let tiles = |[low, high]: &[DVec3; 2]| (high - low).iter().map(|side| side / tile).product::<f64>();
+    let largest = boxes.iter().map(|(_, corners)| tiles(corners)).fold(0.0, f64::max);
+    let wide = libm::cbrt(largest / COUNTED).ceil().max(1.0);
+    let cubes = filled(ctx, &boxes, tile * wide, [count, lasts])?;
+    let cells = CELLS as f64 * wide.powi(3);
+    Ok(cubes.into_iter().map(|cubes| cubes as f64 * cells).collect())
+}
+
+/// Count of cubes of an edge (m) that are filled at each of `count` frames: those in any box (m, ascending by frame) of that frame
+/// or of `lasts` frames before it.
+fn filled(
+    ctx: &Context,
+    boxes: &[(usize, [DVec3; 2])],
+    edge: f64,
+    [count, lasts]: [usize; 2],
+) -> Result<Vec<i64>> {
+    // When each was in a box last, and how many more there are at a frame than before.
+    let mut latest: HashMap<[i32; 3], usize> = HashMap::new();
+    let mut more = vec![0i64; count];
+    for (at, [low, high]) in boxes {
+        ctx.check()?;
+        let [first, last] =
+            [low, high].map(|corner| [0, 1, 2].map(|axis| (corner[axis] / edge).floor() as i32));
+        let on = move |axis: usize| first[axis]..=last[axis];
+        for cube in on(0).flat_map(move |x| on(1).flat_map(move |y| on(2).map(move |z| [x, y, z]))) {
+            let before = latest.insert(cube, *at);
+            if before.is_some_and(|before| *at <= before + lasts) {
+                continue;
+            }
+            more[*at] += 1;
+            if let Some(before) = before {
+                more[before + lasts + 1] -= 1;
+            }
+        }
+    }
+    for before in latest.into_values() {
+        if let Some(more) = more.get_mut(before + lasts + 1) {
+            *more -= 1;
+        }
+    }
+    (1..count).for_each(|at| more[at] += more[at - 1]);
+    Ok(more)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::context::Pool;
+
+    #[test]
+    fn cubes_are_filled_from_when_a_box_is_there_until_mist_is_gone() {
+        let ctx = Context::new(Pool::new(1).unwrap());
+        let at = |frame: usize, x: f64| (frame, [DVec3::new(x, 0.0, 0.0), DVec3::new(x + 1.5, 0.5, 0.5)]);
+        let filled =
+            |boxes: &[(usize, [DVec3; 2])], lasts: usize| filled(&ctx, boxes, 1.0, [8, lasts]).unwrap();
+        // Two cubes at once, for the frame and two more.
+        assert_eq!(filled(&[at(1, 0.0)], 2), [0, 2, 2, 2, 0, 0, 0, 0]);
+        // A box that moves by one cube a frame, and one that comes back when its cubes are empty again, or are not yet.
+        assert_eq!(filled(&[at(0, 0.0), at(1, 1.0), at(2, 2.0)], 1), [2, 3, 3, 2, 0, 0, 0, 0]);
+        assert_eq!(filled(&[at(0, 0.0), at(5, 0.0)], 2), [2, 2, 2, 0, 0, 2, 2, 2]);
+        assert_eq!(filled(&[at(0, 0.0), at(3, 0.0)], 2), [2, 2, 2, 2, 2, 2, 0, 0]);
+        assert_eq!(filled(&[at(0, 0.0), at(0, 0.0), at(2, 0.0)], 8), [2; 8]);
+    }
+}

@@ -1,0 +1,168 @@
+//! How much memory a mesh that follows a liquid will take, before any of it is taken.
+//!
+//! Bytes of each item, from the structures that hold them; lengths in spacings, r:
+//!
+//! | item | of what | bytes |
+//! |---|---|---|
+//! | particle of a frame in memory | place 24, velocity 12, id 8 | 24 to 44 |
+//! | particle of a step | both ends of its way 48, rank 8, velocities at both ends 48 | 56 to 104 |
+//! | particle, while vertices are carried | places before and after 48, in its cell 20 and while sorted 24, its way 12 | 104 |
+//! | node of the grid of maps | coordinate 12, map 112 twice | 236 |
+//! | patch of phi | values twice 512, places in lists and tables 100, crossings 220 | 832 |
+//! | vertex of the particles' surface | place 12 twice, patch 4, connection 8, 2 triangles: twice 12, corners 36 | 156 |
+//! | block of distances | values twice 4096, neighbours and slot 200 | 4296 |
+//! | vertex of the mesh | in three frames 102, projection 130, what is written 87 and 16, in 32 bits twice 24 | 359 |
+//! | triangle of the mesh | in six copies | 72 |
+
+use rayon::prelude::*;
+
+use super::Surface;
+use super::disk::FrameSize;
+use super::time::KEPT;
+use crate::base::{DVec3, DetailedMesh};
+use crate::surface::Particles;
+
+/// Bytes that every run takes.
+const FIXED: f64 = 64e6;
+/// Bytes of a particle in each frame in memory: place, velocity, id.
+const PARTICLE: [f64; 3] = [24.0, 12.0, 8.0];
+/// Bytes of a particle's way in a step, and of the velocities at both ends of it.
+const WAY: [f64; 2] = [56.0, 48.0];
+/// Bytes of a particle and of a node while the mesh is carried along.
+const CARRYING: [f64; 2] = [104.0, 236.0];
+/// Bytes of a patch, of a vertex of the particles' surface, and of a block of distances.
+const SURFACE: [f64; 3] = [832.0, 156.0, 4296.0];
+/// Bytes of a vertex and of a triangle of the mesh.
+const MESH: [f64; 2] = [359.0, 72.0];
+/// Bytes of a number that the mesh carries, in memory.
+const CARRIED: f64 = 8.0;
+
+/// Particles in a cube of two spacings, of which there are 8 in a liquid, from which on it is full.
+const FULL: usize = 4;
+/// Nodes of the grid of maps for each cube of the shell.
+const NODES: f64 = 4.0;
+/// How far distances reach on each side (r): enough for detail of half a spacing.
+const REACH: f64 = 2.0;
+
+/// The most that the particles of any file take.
+#[derive(Debug, Default)]
+pub(super) struct Most {
+    /// Bytes of a frame's particles.
+    frame: f64,
+    /// Bytes of their ways.
+    ways: f64,
+    /// Bytes of the work on them.
+    work: f64,
+}
+
+impl Most {
+    /// Counts the particles of a file, whose spacing is `spacing` (m), with cells of `cell` (r).
+    pub fn add(&mut self, particles: &Particles, spacing: f64, cell: f64) {
+        let count = particles.places.len() as f64;
+        let (has_ids, has_velocities) = (!particles.ids.is_empty(), !particles.velocities.is_empty());
+        let [place, velocity, id] = PARTICLE;
+        let each = place + if has_velocities { velocity } else { 0.0 } + if has_ids { id } else { 0.0 };
+        let way = WAY[0] + if has_ids && has_velocities { WAY[1] } else { 0.0 };
+        let shell = shell(&particles.places, spacing) as f64;
+        self.frame = self.frame.max(count * each);
+        self.ways = self.ways.max(count * way);
+        self.work = self.work.max(work(count, shell, cell));
+    }
+
+    /// Estimates the memory (bytes) of a run over so many files.
+    pub fn estimate(&self, surface: &Surface, files: usize, detail: &DetailedMesh, frame: &FrameSize) -> u64 {
+        let is_between = surface.speed.fract() != 0.0 || surface.offset.fract() != 0.0;
+        // The first frame's stay there; between two files both ends of a step are interpolated.
+        let held = files.min(KEPT) + 1 + if is_between { 2 } else { 0 };
+        let counts = [detail.mesh.positions.len(), detail.mesh.triangles.len()];
+        let mesh: f64 = counts.iter().zip(MESH).map(|(count, bytes)| *count as f64 * bytes).sum();
+        let arrays: usize = detail.arrays.iter().map(|array| array.values.len()).sum();
+        let uvs = detail.uvs.as_ref().map_or(0, |uvs| {
+            uvs.places.len() + uvs.corners.as_ref().map_or(0, |corners| corners.len().div_ceil(2))
+        });
+        let carried = (arrays + uvs) as f64 * CARRIED;
+        let particles = held as f64 * self.frame + self.ways + self.work;
+        (FIXED + particles + mesh + carried) as u64 + frame.largest()
+    }
+}
+
+/// Bytes of the work on so many particles whose shell has so many cubes, with cells of `cell` (r): the mesh is carried along, then
+/// the particles' surface and the distances from it are made.
+///
+/// Over a level surface the shell is two cubes thick. Patches of 4 cells lie within 2 r of it on both sides, each cell of its area
+/// has one vertex, and blocks of 8 cells reach as far as distances and half their edge; drops have twice as many blocks.
+fn work(particles: f64, shell: f64, cell: f64) -> f64 {
+    let carrying = CARRYING[0] * particles + CARRYING[1] * NODES * shell;
+    let patches = shell * (1.0 + cell) / (12.0 * cell.powi(3));
+    let vertices = shell * 2.0 / cell.powi(2);
+    let blocks = shell * (REACH + 4.0 * cell) / (96.0 * cell.powi(3));
+    let counts = [patches, vertices, blocks];
+    let making: f64 = counts.iter().zip(SURFACE).map(|(count, bytes)| count * bytes).sum();
+    carrying.max(making)
+}
+
+/// Count of the cubes of two spacings (m) around the surface of particles at places (m): those with particles and those beside
+/// them, but for those that are full among full ones.
+fn shell(places: &[DVec3], spacing: f64) -> usize {
+    // Farther cubes are refused later.
+    const FARTHEST: f64 = 1e9;
+    let cube_of = |place: &DVec3| {
+        [0, 1, 2].map(|axis| (place[axis] / (2.0 * spacing)).floor().clamp(-FARTHEST, FARTHEST) as i32)
+    };
+    let mut all: Vec<[i32; 3]> = places.par_iter().with_min_len(4096).map(cube_of).collect();
+    all.par_sort_unstable();
+    let cubes = all.chunk_by(|a, b| a == b);
+    let full: Vec<[i32; 3]> = cubes.filter(|cube| cube.len() >= FULL).map(|cube| cube[0]).collect();
+    all.dedup();
+    let is_inside = |cube: &[i32; 3]| {
+        (-1..=1).all(|x| {
+            (-1..=1).all(|y| {
+                // The three along z are neighbours in the order.
+                let low = [cube[0] + x, cube[1] + y, cube[2] - 1];
+                let at = full.partition_point(|other| *other < low);
+                full.get(at + 2) == Some(&[low[0], low[1], low[2] + 2])
+            })
+        })
+    };
+    let flags: Vec<bool> = all.par_iter().with_min_len(64).map(is_inside).collect();
+    let (mut inside, mut around) = (Vec::new(), Vec::new());
+    for (cube @ [x, y, z], is_inside) in all.into_iter().zip(flags) {
+        if is_inside {
+            inside.push(cube);
+        } else {
+            around.extend((0..27).map(|n| [x + n / 9 - 1, y + n / 3 % 3 - 1, z + n % 3 - 1]));
+        }
+    }
+    around.par_sort_unstable();
+    around.dedup();
+    around.par_iter().filter(|cube| inside.binary_search(cube).is_err()).count()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Particles in a cube of so many spacings.
+    fn block(side: usize) -> Vec<DVec3> {
+        let at = |n: usize| [n / (side * side), n / side % side, n % side].map(|x| x as f64 + 0.5);
+        (0..side.pow(3)).map(|n| DVec3::from(at(n))).collect()
+    }
+
+    #[test]
+    fn the_shell_lies_around_the_surface() {
+        // A drop of one particle, and a cube of 5 x 5 x 5 cubes, of which the 3 x 3 x 3 in the middle are full among full ones.
+        assert_eq!(shell(&[DVec3::repeat(0.5)], 1.0), 27);
+        assert_eq!(shell(&block(10), 1.0), 7 * 7 * 7 - 3 * 3 * 3);
+        // Drops far from each other, and a place too far for any grid.
+        let drops: Vec<DVec3> = (0..10).map(|n| DVec3::repeat(10.0 * f64::from(n))).collect();
+        assert_eq!(shell(&drops, 1.0), 270);
+        assert_eq!(shell(&[DVec3::repeat(1e300)], 1.0), 27);
+    }
+
+    #[test]
+    fn finer_cells_and_more_surface_take_more() {
+        let cube = shell(&block(20), 1.0) as f64;
+        assert!(work(8000.0, cube, 0.25) > 3.0 * work(8000.0, cube, 0.5));
+        assert!(work(8000.0, 8000.0 * 27.0, 0.5) > 10.0 * work(8000.0, cube, 0.5));
+    }
+}

@@ -1,0 +1,149 @@
+//! What `check` says before a run about its memory and disk space: of a mesh that follows a liquid, and of mist.
+
+use std::fs;
+use std::path::Path;
+
+use serde_json::Value;
+
+use crate::common::liquids::{ball, write_cache};
+use crate::program::{CUBE, works};
+
+fn report(folder: &Path, options: &str) -> Value {
+    serde_json::from_str(&works(folder, &format!("check shot.toml --json -q {options}"))).unwrap()
+}
+
+fn number(report: &Value, key: &str) -> f64 {
+    report[key].as_f64().unwrap_or_else(|| panic!("no {key} in {report}"))
+}
+
+/// Bytes of all files in a folder.
+fn bytes_in(folder: &Path) -> u64 {
+    let entries = fs::read_dir(folder).unwrap().map(|entry| entry.unwrap());
+    entries
+        .map(|entry| match entry.metadata().unwrap() {
+            metadata if metadata.is_dir() => bytes_in(&entry.path()),
+            metadata => metadata.len(),
+        })
+        .sum()
+}
+
+/// The cache of a ball of a radius (spacings) that travels, its mesh of 12 n^2 triangles, and the scene.
+fn liquid(folder: &Path, radius: f64, n: usize) {
+    write_cache(folder, "ball", &ball(radius, n, 0.2), 3);
+    let scene = "[shot]\nframes = \"1-3\"\n[surface]\nparticles = \"ball.%04d.bgeo\"\nmesh = \"ball.ply\"\nspacing = 0.01\n";
+    fs::write(folder.join("shot.toml"), scene).unwrap();
+}
+
+#[test]
+fn files_of_a_mesh_on_a_liquid_take_about_what_check_says() {
+    let folder = tempfile::tempdir().unwrap();
+    let folder = folder.path();
+    liquid(folder, 8.0, 12);
+    let all = "--set output.surface=[\"ply\",\"usd\",\"obj\"]";
+    for (out, options) in [("ply", ""), ("bare", "--set output.attributes=[]"), ("all", all)] {
+        let said = report(folder, options);
+        assert_eq!(number(&said, "disk_bytes"), 3.0 * number(&said, "frame_bytes"));
+        works(folder, &format!("surface shot.toml -o {out} -q {options}"));
+        let share = number(&said, "disk_bytes") / bytes_in(&folder.join(out)) as f64;
+        assert!((0.75..1.35).contains(&share), "{out}: {share} of what it takes");
+    }
+    let text = works(folder, "check shot.toml");
+    assert!(text.contains("memory    about ") && text.contains(" a frame\n"), "{text}");
+}
+
+#[test]
+fn memory_of_a_mesh_on_a_liquid_is_about_what_check_says() {
+    let folder = tempfile::tempdir().unwrap();
+    let folder = folder.path();
+    liquid(folder, 20.0, 40);
+    let said = report(folder, "");
+    let memory = number(&said, "memory_bytes");
+    assert!(!said["warnings"].to_string().contains("needs about"), "{said}");
+    works(folder, "surface shot.toml -o out -q --report run.json");
+    let run: Value = serde_json::from_slice(&fs::read(folder.join("run.json")).unwrap()).unwrap();
+    let peak = number(&run, "peak_memory_bytes");
+    assert!(peak < 1.1 * memory && memory < 4.0 * peak, "{peak} of {memory}");
+    // Half the cell: eight times the nodes around the same surface.
+    let fine = number(&report(folder, "--set surface.cell=0.25"), "memory_bytes");
+    assert!(fine > memory + 10e6, "{fine} after {memory}");
+    let warned = report(folder, "--max-memory 50M")["warnings"].to_string();
+    for words in ["particles and 19200 triangles", "needs about", "the limit of 50 MB"] {
+        assert!(warned.contains(words), "no {words:?} in {warned}");
+    }
+}
+
+/// A cube that slides through snow by 0.4 m in 10 frames, with grains and mist.
+fn snow(folder: &Path) {
+    fs::write(folder.join("cube.obj"), CUBE).unwrap();
+    let scene = "[shot]\nframes = \"1-10\"\n[snow]\nground = 0.0\narea = [-0.5, -0.5, 0.5, 1.0]\ndepth = 0.2\ncell = 0.02\n\
+                 [grains]\ncompression = 0.4\n[mist]\ncell = 0.03\nfrom_speed = 0.3\nhalf_life = 100.0\n\
+                 [[object]]\nfile = \"cube.obj\"\nkeys = [{ frame = 1, at = [0, 0.1, 0] }, { frame = 10, at = [0, 0.1, 0.4] }]\n";
+    fs::write(folder.join("shot.toml"), scene).unwrap();
+}
+
+#[test]
+fn before_mist_is_made_the_boxes_of_objects_are_filled_with_it() {
+    let folder = tempfile::tempdir().unwrap();
+    let folder = folder.path();
+    snow(folder);
+    let said = report(folder, "-o cache");
+    let mist = &said["mist"];
+    assert_eq!(mist["made_to_frame"], Value::Null);
+    // Tiles are 0.24 m wide. The cube of 0.4 m with one of them around it lies in 4 x 5 of them, and along its way in 4 of them at
+    // the first frame, 5 up to the seventh and 6 at the last three.
+    let tiles = |along: u64| 4 * 5 * along * 512;
+    assert_eq!(mist["cells"], tiles(6));
+    let states = 2 * 40 * tiles(6);
+    assert_eq!(mist["disk_bytes"], 16 * tiles(4 + 6 * 5 + 3 * 6) + states);
+    assert_eq!(number(mist, "memory_bytes"), number(mist, "cells") * number(mist, "memory_bytes_per_cell"));
+    assert!((number(mist, "air_m3") / (20.0 * 6.0 * 0.24f64.powi(3)) - 1.0).abs() < 1e-9, "{mist}");
+    let cells = |options: &str| number(&report(folder, options)["mist"], "cells");
+    assert!(cells("--set mist.half_life=0.001") < tiles(6) as f64, "it is gone behind the cube");
+    assert!(cells("--set mist.wind=[0,0,-5]") > tiles(6) as f64, "wind carries it away");
+    assert_eq!(cells("--set object.1.role=base"), 0.0, "what pushes no grains raises none");
+    // Fog holds the density once more, and what is not written takes no space but for states.
+    let disk = |options: &str| number(&report(folder, options)["mist"], "disk_bytes") as u64 - states;
+    assert_eq!(4 * disk("--set output.fog=[\"mist\"]"), 5 * disk(""));
+    assert_eq!(disk("--set output.mist=[]"), 0);
+    let text = works(folder, "check shot.toml --max-memory 11M");
+    for words in
+        ["cells of 0.030000 m", "known when it is made", "in the boxes that objects pass", ", without mist"]
+    {
+        assert!(text.contains(words), "no {words:?} in {text}");
+    }
+    let warning = "mist of 61440 cells of 0.03 m, as many as fill the boxes that objects pass, needs about";
+    assert!(text.contains(warning), "{text}");
+    let most = (11 << 20) / number(mist, "step_bytes_per_cell") as u64;
+    assert!(text.contains(&format!("refuses a step of more than {most} cells")), "{text}");
+    assert!(!report(folder, "")["warnings"].to_string().contains("mist"));
+    // A scene without mist says nothing of it.
+    let scene = fs::read_to_string(folder.join("shot.toml")).unwrap();
+    let plain = scene.split_once("[mist]").unwrap().0.to_string() + "[[object]]\nfile = \"cube.obj\"\n";
+    fs::write(folder.join("plain.toml"), plain).unwrap();
+    assert!(!works(folder, "check plain.toml").contains("mist"));
+}
+
+#[test]
+fn mist_that_was_made_says_how_far_it_spreads() {
+    let folder = tempfile::tempdir().unwrap();
+    let folder = folder.path();
+    snow(folder);
+    works(folder, "snow shot.toml -o cache -q --frames 1-8");
+    let of_frame = |frame: i32| -> f64 {
+        let path = folder.join(format!("cache/report/mist.{frame:04}.json"));
+        number(&serde_json::from_slice(&fs::read(path).unwrap()).unwrap(), "cells")
+    };
+    let most = (1..=8).map(of_frame).fold(0.0, f64::max);
+    assert!(most > 0.0, "grains raise mist");
+    let said = report(folder, "-o cache");
+    assert_eq!(said["mist"]["made_to_frame"], 8);
+    assert!((number(&said["mist"], "cells") - most).abs() <= 1.0, "{said} {most}");
+    // The same air in cells of half the edge.
+    let fine = report(folder, "-o cache --set mist.cell=0.015");
+    assert!((number(&fine["mist"], "cells") / (8.0 * most) - 1.0).abs() < 1e-3, "{fine} {most}");
+    assert!(works(folder, "check shot.toml -o cache").contains("as it was made up to frame 8: "));
+    // Its files take no more than that.
+    let file = |frame: i32| folder.join(format!("cache/mist/mist.{frame:04}.vdb"));
+    let files: u64 = (1..=8).map(|frame| fs::metadata(file(frame)).unwrap().len()).sum();
+    assert!((files as f64) < number(&said["mist"], "disk_bytes") + 8.0 * 50e3, "{files} of {said}");
+}
