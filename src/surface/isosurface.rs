@@ -17,6 +17,10 @@ type Edge = (usize, usize);
 
 /// No vertex.
 const NONE: u8 = u8::MAX;
+/// Values along a line are taken as smooth if their second differences are at most such a share of the first.
+const SMOOTH: f32 = 0.5;
+/// Steps to the zero of a cubic; each leaves less than half of the error.
+const STEPS: usize = 6;
 
 /// The surface's triangles.
 #[derive(Debug, Default)]
@@ -121,29 +125,56 @@ fn crossings(phi: &Implicit, patch: usize) -> Crossings {
     let values = phi.values(patch);
     let mut out = Crossings { index: [[NONE; NODES]; 3], places: Vec::new() };
     for axis in 0..3 {
-        let mut beside = phi.patches()[patch];
-        beside[axis] += 1;
-        let next = phi.find(beside).map(|at| phi.values(at));
+        let [before, next] = [-1, 1].map(|by| {
+            let mut beside = phi.patches()[patch];
+            beside[axis] += by;
+            phi.find(beside).map(|at| phi.values(at))
+        });
         let step = 16 >> (2 * axis);
         for node in 0..NODES {
-            let is_last = node >> (4 - 2 * axis) & 3 == 3;
-            let here = values[node];
-            let there = match next {
-                _ if !is_last => values[node + step],
-                Some(next) => next[node - 3 * step],
-                // The surface does not cross to a patch that was not evaluated.
-                None => continue,
+            let at = node >> (4 - 2 * axis) & 3;
+            // The value so many nodes farther on the line.
+            let value = |by: usize| match at + by {
+                to @ 0..4 => Some(values[node + to * step - at * step]),
+                to => next.map(|next| next[node + (to - 4) * step - at * step]),
             };
+            let here = values[node];
+            // The surface does not cross to a patch that was not evaluated.
+            let Some(there) = value(1) else { continue };
             if (here < 0.0) == (there < 0.0) {
                 continue;
             }
+            let last = match at {
+                0 => before.map(|before| before[node + 3 * step]),
+                _ => Some(values[node - step]),
+            };
             let mut place = [node >> 4, node >> 2 & 3, node & 3].map(|x| x as f32);
-            place[axis] += here / (here - there);
+            place[axis] += zero([last, value(2)], here, there);
             out.index[axis][node] = out.places.len() as u8;
             out.places.push(place);
         }
     }
     out
+}
+
+/// Where values on a line are 0 between two that differ in sign (0..=1): the cubic through them and those outside of them decides if
+/// the values are smooth, else the straight line.
+fn zero(outside: [Option<f32>; 2], here: f32, there: f32) -> f32 {
+    let fall = here - there;
+    let straight = here / fall;
+    let [Some(last), Some(next)] = outside else { return straight };
+    // Second differences at both ends.
+    let (first, second) = (last - here - fall, fall - there + next);
+    let is_smooth = |bend: f32| bend.abs() <= SMOOTH * fall.abs();
+    if !is_smooth(first) || !is_smooth(second) {
+        return straight;
+    }
+    let mut at = straight;
+    for _ in 0..STEPS {
+        let bend = 0.5 * at * (at - 1.0) * (first + (at + 1.0) / 3.0 * (second - first));
+        at = ((here + bend) / fall).clamp(0.0, 1.0);
+    }
+    at
 }
 
 /// The triangles in the cubes that begin at the nodes of a patch.
@@ -274,6 +305,22 @@ fn filled(ring: &[Edge]) -> Vec<[Edge; 3]> {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn zeros_of_cubics_are_exact_and_kinks_are_straight() {
+        for root in [0.05, 0.4, 0.93] {
+            let value = |t: f32| (t - root) * (1.0 + 0.15 * t + 0.02 * t * t);
+            let at = zero([Some(value(-1.0)), Some(value(2.0))], value(0.0), value(1.0));
+            assert!((at - root).abs() < 1e-4, "{at} for {root}");
+            let at = zero([Some(-value(-1.0)), Some(-value(2.0))], -value(0.0), -value(1.0));
+            assert!((at - root).abs() < 1e-4, "{at} for {root}");
+        }
+        for outside in
+            [[Some(9.0), Some(0.2)], [None, Some(0.2)], [Some(f32::INFINITY), Some(0.2)], [Some(f32::NAN); 2]]
+        {
+            assert_eq!(zero(outside, -0.25, 0.75), 0.25);
+        }
+    }
 
     #[test]
     fn every_case_is_filled_without_diagonals_on_faces() {
