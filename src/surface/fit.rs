@@ -5,8 +5,6 @@ use nalgebra::{Matrix3, Vector3};
 use crate::base::cpu::dispatch;
 use crate::base::lanes::{LANES, Lanes};
 
-/// How many times the share of the ways that any map explains of trembling ones a map must explain to count for half.
-const TREMBLING: f64 = 3.0;
 /// Spread of the places, over that on all axes, below which the map does not follow the ways in that direction.
 const FLAT: f64 = 0.004;
 
@@ -41,16 +39,13 @@ impl Near {
     }
 }
 
-/// Weighted sums over the particles around a place, d being the way to a particle and u its own: 1, d, d d, u, u d and u u.
+/// Weighted sums over the particles around a place, d being the way to a particle and u its own: 1, d, d d, u, and u d.
 pub struct Sums {
     weight: f64,
-    /// Of the weights' squares.
-    squared: f64,
     d: Vector3<f64>,
     dd: Matrix3<f64>,
     u: Vector3<f64>,
     ud: Matrix3<f64>,
-    uu: f64,
 }
 
 /// Sums over the particles within a radius (spacings) of a place, with the weights (1 - (d / radius)^2)^3 (poly6: Müller, Charypar
@@ -84,7 +79,7 @@ fn sums_body(near: &Near, room: &mut Near, at: [f32; 3], radius: f32) -> Option<
         }
     }
     let (one, inverse) = (Lanes::all(1.0), Lanes::all(1.0 / (radius * radius)));
-    let [mut all, mut squared, mut sum_uu] = [zero; 3];
+    let mut all = zero;
     let (mut sum_d, mut sum_u) = ([zero; 3], [zero; 3]);
     let (mut sum_dd, mut sum_ud) = ([[zero; 3]; 3], [[zero; 3]; 3]);
     for chunk in 0..room.place[0].len() {
@@ -93,8 +88,6 @@ fn sums_body(near: &Near, room: &mut Near, at: [f32; 3], radius: f32) -> Option<
         let q = (one - (d[0] * d[0] + d[1] * d[1] + d[2] * d[2]) * inverse).max(zero);
         let weight = q * q * q;
         all = all + weight;
-        squared = squared + weight * weight;
-        sum_uu = sum_uu + weight * (u[0] * u[0] + u[1] * u[1] + u[2] * u[2]);
         for a in 0..3 {
             let (wd, wu) = (weight * d[a], weight * u[a]);
             sum_d[a] = sum_d[a] + wd;
@@ -111,12 +104,10 @@ fn sums_body(near: &Near, room: &mut Near, at: [f32; 3], radius: f32) -> Option<
     let weight = total(all);
     (weight > 0.0).then(|| Sums {
         weight,
-        squared: total(squared),
         d: Vector3::from(sum_d.map(total)),
         dd: Matrix3::from_fn(|a, b| total(sum_dd[a.min(b)][a.max(b)])),
         u: Vector3::from(sum_u.map(total)),
         ud: Matrix3::from_fn(|a, b| total(sum_ud[a][b])),
-        uu: total(sum_uu),
     })
 }
 
@@ -153,19 +144,6 @@ impl Sums {
         let least = FLAT * spread.trace();
         let damped = spread * spread + Matrix3::from_diagonal_element(least * least);
         let change = damped.try_inverse().map_or_else(Matrix3::zeros, |inverse| joint * spread * inverse);
-        let change = change * self.trust((change * joint.transpose()).trace(), u);
         Map { weight: self.weight, way: u - change * d, change }
-    }
-
-    /// How much the part of a map counts that changes with the place, 0..=1, by what of the ways' variance it explains (spacings^2).
-    /// Particles that only tremble have a map too, which would make a vertex outside of them tremble more than they do: Fisher's
-    /// ratio of what nine numbers explain to what is left is 1 there, and very large where particles move together.
-    fn trust(&self, explained: f64, mean: Vector3<f64>) -> f64 {
-        let count = self.weight * self.weight / self.squared;
-        let left = (self.uu / self.weight - mean.norm_squared() - explained).max(0.0);
-        // Three degrees of freedom each in x, y and z are explained, all others but the means' are left.
-        let ratio = explained / 9.0 * (3.0 * count - 12.0).max(0.0);
-        let [ratio, left] = [ratio, TREMBLING * left].map(|x| x * x);
-        if ratio > 0.0 { ratio / (ratio + left) } else { 0.0 }
     }
 }
