@@ -31,8 +31,7 @@ pub fn run(h: &mut Harness) {
         );
         lags.push(match (change, flag) {
             (Some(change), Some(flag)) => flag.saturating_sub(change) as f64,
-            (None, _) => 0.0,
-            (Some(_), None) => FRAMES as f64,
+            (None, _) | (_, None) => FRAMES as f64,
         });
     }
     let worst = lags.iter().copied().fold(0.0, f64::max);

@@ -2,18 +2,20 @@
 
 use rayon::prelude::*;
 
-use super::bvh::Bvh;
 use super::meeting::{Meeting, meeting};
 use super::mesh::{coincident, used};
+use super::near::Near;
 use super::orient::is_flat;
 use super::topology::{Survey, Topology, collapsed, firsts, groups};
-use super::{DVec3, TriMesh};
+use super::{DVec3, TriMesh, Vec3};
 
 /// Triangles a task looks at.
 const GRAIN: usize = 512;
+/// Volumes of parts up to this many cubes of their size are none: rounding makes as much.
+const ROUNDING: f64 = 1e-12;
 
-/// Faults and properties of a mesh. Vertices at the same position count as one, but in `by_index`. Every decision is exact
-/// for the mesh's 32-bit coordinates: no tolerance, no rounding.
+/// Faults and properties of a mesh. Vertices at the same position count as one, but in `by_index`. Every count is exact
+/// for the mesh's 32-bit coordinates, without tolerance, but for `inverted_parts`, which go by volumes in 64 bits.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Faults {
     /// Vertices that no triangle names.
@@ -34,9 +36,17 @@ pub struct Faults {
     pub turned_edges: usize,
     /// Vertices whose triangles do not form one fan, closed or with two ends: where parts touch in a vertex, and both ends
     /// of each crowded edge.
-    pub pinched_vertices: usize,
+    pub non_manifold_vertices: usize,
     /// Connected parts; those that touch in a vertex are one.
     pub parts: usize,
+    /// Parts (apart where they touch in a vertex only) whose volume has another sign than the whole's, so that there is
+    /// nothing inside them: but for cavities, whose boxes lie within that of a part with the whole's sign. Counted where
+    /// all edges have two triangles that agree.
+    pub inverted_parts: usize,
+    /// Area (m2).
+    pub area: f64,
+    /// Enclosed volume (m3), negative when the mesh is inside out; means little where it is open.
+    pub volume: f64,
     /// Pairs of triangles without a common corner that pass through each other.
     pub crossings: usize,
     /// Pairs of triangles with one common corner that pass through each other.
@@ -65,7 +75,10 @@ impl Faults {
         let Kept { kept, degenerate, doubled_triangles } = kept(&mesh.triangles, &same, flat);
         let survey = Survey::of(vertices, &kept);
         let parts = groups(vertices, kept.iter().flat_map(|[a, b, c]| [[*a, *b], [*b, *c]]));
-        let pairs = Pairs::of(&TriMesh { positions: mesh.positions.clone(), triangles: kept });
+        let joined = TriMesh { positions: mesh.positions.clone(), triangles: kept };
+        let pairs = Pairs::of(&joined);
+        let volume = joined.volume();
+        let is_closed = survey.open.is_empty() && survey.crowded == 0 && survey.turned == 0;
         Self {
             unused_vertices: used(vertices, &mesh.triangles).map_or(0, |used| vertices - used.len()),
             doubled_vertices,
@@ -75,8 +88,11 @@ impl Faults {
             open_edges: survey.open.len(),
             crowded_edges: survey.crowded,
             turned_edges: survey.turned,
-            pinched_vertices: survey.pinched,
+            non_manifold_vertices: survey.non_manifold,
             parts,
+            inverted_parts: if is_closed { inverted_parts(&joined, &survey.body, volume) } else { 0 },
+            area: joined.area(),
+            volume,
             crossings: pairs.crossings,
             corner_crossings: pairs.corner_crossings,
             folds: pairs.folds,
@@ -88,9 +104,11 @@ impl Faults {
     }
 
     /// Whether the mesh bounds a solid without doubt once vertices at the same place are joined: closed, each edge with two
-    /// triangles that agree. Whether it does as it is, [`Topology::is_watertight`] of `by_index` says.
+    /// triangles that agree, and no part inside out, unless all are. Whether it does as it is,
+    /// [`Topology::is_watertight`] of `by_index` says.
     pub fn is_solid(&self) -> bool {
-        self.open_edges == 0 && self.crowded_edges == 0 && self.turned_edges == 0 && self.parts > 0
+        let faults = [self.open_edges, self.crowded_edges, self.turned_edges, self.inverted_parts];
+        self.parts > 0 && faults == [0; 4]
     }
 
     /// Whether no two triangles meet but in common corners and edges.
@@ -128,6 +146,50 @@ fn kept(triangles: &[[u32; 3]], same: &[u32], flat: impl Fn([u32; 3]) -> bool) -
     Kept { degenerate: triangles.len() - whole.len(), doubled_triangles: whole.len() - kept.len(), kept }
 }
 
+/// A closed part of a mesh.
+struct Part {
+    low: Vec3,
+    high: Vec3,
+    /// Signed (m3); 0 where rounding decides.
+    volume: f64,
+}
+
+impl Part {
+    fn of(mesh: &TriMesh, triangles: &[usize]) -> Self {
+        let corners = triangles.iter().flat_map(|&triangle| mesh.triangles[triangle]);
+        let nowhere = (Vec3::repeat(f32::INFINITY), Vec3::repeat(f32::NEG_INFINITY));
+        let (low, high) = corners.fold(nowhere, |(low, high), vertex| {
+            let place = &mesh.positions[vertex as usize];
+            (low.inf(place), high.sup(place))
+        });
+        let (origin, end): (DVec3, DVec3) = (low.cast(), high.cast());
+        let six = |&triangle: &usize| {
+            let [a, b, c] = mesh.corners(triangle).map(|p| p - origin);
+            a.dot(&b.cross(&c))
+        };
+        let volume = triangles.iter().map(six).sum::<f64>() / 6.0;
+        let none = ROUNDING * (end - origin).norm().powi(3);
+        Self { low, high, volume: if volume.abs() > none { volume } else { 0.0 } }
+    }
+
+    /// Whether its box lies within that of another, and is not the same.
+    fn is_within(&self, other: &Self) -> bool {
+        let inside =
+            (0..3).all(|axis| self.low[axis] >= other.low[axis] && self.high[axis] <= other.high[axis]);
+        inside && (self.low, self.high) != (other.low, other.high)
+    }
+}
+
+/// See [`Faults::inverted_parts`]: of a closed mesh with such a volume, whose triangles belong to these bodies.
+fn inverted_parts(mesh: &TriMesh, body: &[u32], volume: f64) -> usize {
+    let mut order: Vec<usize> = (0..body.len()).collect();
+    order.sort_by_key(|&triangle| body[triangle]);
+    let parts = order.chunk_by(|a, b| body[*a] == body[*b]).map(|triangles| Part::of(mesh, triangles));
+    let (out, inverted): (Vec<Part>, Vec<Part>) =
+        parts.filter(|part| part.volume != 0.0).partition(|part| (part.volume < 0.0) == (volume < 0.0));
+    inverted.par_iter().filter(|part| !out.iter().any(|other| part.is_within(other))).count()
+}
+
 /// Counts of pairs of triangles that meet elsewhere than in common corners and edges.
 #[derive(Default)]
 struct Pairs {
@@ -141,18 +203,15 @@ struct Pairs {
 impl Pairs {
     /// Of triangles with an area each, and corners by place.
     fn of(mesh: &TriMesh) -> Self {
-        let tree = Bvh::new(mesh);
+        let near = Near::of(mesh);
         let corners =
             |triangle: usize| mesh.triangles[triangle].map(|vertex| mesh.positions[vertex as usize]);
         let of_triangle = |first: usize| {
             let (names, mine) = (mesh.triangles[first], corners(first));
-            let [a, b, c] = mine;
             let mut pairs = Self::default();
-            tree.in_box(a.inf(&b).inf(&c), a.sup(&b).sup(&c), |second| {
-                if second > first {
-                    let common = names.iter().filter(|name| mesh.triangles[second].contains(name)).count();
-                    pairs.count(meeting(&mine, &corners(second)), common);
-                }
+            near.of_triangle(first, |second| {
+                let common = names.iter().filter(|name| mesh.triangles[second].contains(name)).count();
+                pairs.count(meeting(&mine, &corners(second)), common);
             });
             pairs
         };
@@ -186,7 +245,6 @@ impl Pairs {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::base::Vec3;
 
     fn tetrahedron(at: f32) -> TriMesh {
         let shift = Vec3::new(at, at, at);

@@ -13,6 +13,7 @@ pub mod lanes;
 pub mod meeting;
 pub mod mesh;
 mod monotone;
+mod near;
 pub mod orient;
 pub mod packed;
 pub mod points;

@@ -19,7 +19,7 @@ pub struct Topology {
     pub turned_edges: usize,
     /// Vertices whose triangles do not form one fan, closed or with two ends: where parts touch in a vertex, and both ends
     /// of each crowded edge.
-    pub pinched_vertices: usize,
+    pub non_manifold_vertices: usize,
 }
 
 impl Topology {
@@ -34,7 +34,7 @@ impl Topology {
             open_edges: survey.open.len(),
             crowded_edges: survey.crowded,
             turned_edges: survey.turned,
-            pinched_vertices: survey.pinched,
+            non_manifold_vertices: survey.non_manifold,
         }
     }
 
@@ -47,7 +47,7 @@ impl Topology {
             self.open_edges,
             self.crowded_edges,
             self.turned_edges,
-            self.pinched_vertices,
+            self.non_manifold_vertices,
         ];
         self.triangles > 0 && faults == [0; 6]
     }
@@ -59,11 +59,12 @@ pub(super) struct Survey {
     pub(super) open: Vec<[u32; 2]>,
     pub(super) crowded: usize,
     pub(super) turned: usize,
-    pub(super) pinched: usize,
+    pub(super) non_manifold: usize,
     edges: usize,
     /// Fans of all vertices.
     fans: usize,
-    /// Parts that hang together by edges.
+    /// Of each triangle the first one of its body: the part that hangs together by edges.
+    pub(super) body: Vec<u32>,
     bodies: usize,
     triangles: usize,
 }
@@ -99,13 +100,14 @@ impl Survey {
             open,
             crowded,
             turned,
-            pinched: fans_of
+            non_manifold: fans_of
                 .iter()
                 .zip(&on_crowded)
                 .filter(|(fans, crowded)| **fans > 1 || **crowded)
                 .count(),
             edges,
             fans: fans.roots().count(),
+            body: (0..triangles.len() as u32).map(|triangle| bodies.root(triangle)).collect(),
             bodies: bodies.roots().count(),
             triangles: triangles.len(),
         }
@@ -203,10 +205,10 @@ mod tests {
         faults_of(t)
     }
 
-    /// Collapsed, doubled, open, crowded, turned, pinched.
+    /// Collapsed, doubled, open, crowded, turned, non-manifold.
     fn faults_of(t: Topology) -> [usize; 6] {
         let edges = [t.open_edges, t.crowded_edges, t.turned_edges];
-        [t.collapsed_triangles, t.doubled_triangles, edges[0], edges[1], edges[2], t.pinched_vertices]
+        [t.collapsed_triangles, t.doubled_triangles, edges[0], edges[1], edges[2], t.non_manifold_vertices]
     }
 
     const TETRAHEDRON: [[u32; 3]; 4] = [[0, 2, 1], [0, 1, 3], [1, 2, 3], [2, 0, 3]];
@@ -242,6 +244,6 @@ mod tests {
         let mirrored = TETRAHEDRON.map(|corners| corners.map(|v| if v == 0 { 0 } else { v + 3 }));
         let two: Vec<[u32; 3]> = TETRAHEDRON.into_iter().chain(mirrored).collect();
         let survey = Survey::of(7, &two);
-        assert_eq!((survey.pinched, survey.genus()), (1, Some(0)));
+        assert_eq!((survey.non_manifold, survey.genus()), (1, Some(0)));
     }
 }

@@ -106,6 +106,17 @@ fn vectors(arrays: &[MeshArray], names: [&str; 3]) -> Option<Vec<Vec3>> {
     Some(parts.map(|((x, y), z)| Vec3::new(*x as f32, *y as f32, *z as f32)).collect())
 }
 
+/// The names of arrays in three parts but velocities, without their x, y and z.
+fn stems(arrays: &[MeshArray]) -> Vec<&str> {
+    let has = |name: String| arrays.iter().any(|array| array.name == name);
+    let stem = |array: &'_ MeshArray| array.name.len().checked_sub(1).filter(|_| array.name.ends_with('x'));
+    let named = arrays.iter().filter_map(|array| Some(&array.name[..stem(array)?]));
+    let whole = |stem: &&str| {
+        !stem.is_empty() && *stem != "v" && ["y", "z"].iter().all(|part| has(format!("{stem}{part}")))
+    };
+    named.filter(whole).collect()
+}
+
 /// "UVs, normals and materials".
 fn listed(names: &[&str]) -> String {
     match names {
@@ -162,13 +173,25 @@ impl Args {
         }
         // Those that have words of their own were told above.
         const TOLD: [&str; 7] = ["vx", "vy", "vz", "red", "green", "blue", "alpha"];
-        if !["ply", "usda"].contains(&to.as_str()) && extension(&one) == "ply" {
-            let arrays = io::mesh::read_detailed(&one)?.arrays;
-            let names = arrays.iter().map(|array| &array.name[..]).filter(|name| !TOLD.contains(name));
-            let names: Vec<&str> = names.collect();
-            if !names.is_empty() {
-                log::warn!("{}: arrays are not carried over: {}", one.display(), names.join(", "));
-            }
+        if extension(&one) != "ply" {
+            return Ok(());
+        }
+        let is_sequence = Pattern::parse(&self.input).is_some();
+        let arrays = io::mesh::read_detailed(&one)?.arrays;
+        let is_lost = |array: &&MeshArray| match to.as_str() {
+            "ply" | "usda" => is_sequence && array.on == On::Corners,
+            _ => !TOLD.contains(&&*array.name),
+        };
+        let names: Vec<&str> = arrays.iter().filter(is_lost).map(|array| &array.name[..]).collect();
+        if !names.is_empty() {
+            log::warn!("{}: arrays are not carried over: {}", one.display(), names.join(", "));
+        }
+        if to == "usda" && is_sequence && vectors(&arrays, VELOCITY).is_some() {
+            log::warn!("{}: its velocities give way to those from frame to frame", one.display());
+        }
+        let vectors = stems(&arrays);
+        if !vectors.is_empty() && !self.keeps_space() && ["ply", "usda"].contains(&to.as_str()) {
+            log::warn!("{}: these vectors keep their axes and units: {}", one.display(), vectors.join(", "));
         }
         Ok(())
     }
@@ -253,11 +276,14 @@ impl Args {
         }
         motion.velocities_ahead(time, 1.0 / self.fps, &mut velocities)?;
         out(&mut velocities);
-        let own = if Pattern::parse(&self.input).is_none() { vectors(&arrays, VELOCITY) } else { None };
-        let velocities = own.unwrap_or_else(|| usd::to_floats(&velocities));
+        let own = vectors(&arrays, VELOCITY);
         // USD has velocities of its own.
-        let others = arrays.iter().filter(|array| !VELOCITY.contains(&&*array.name));
+        let is_own = |array: &MeshArray| array.on == On::Vertices && VELOCITY.contains(&&*array.name);
+        let others = arrays.iter().filter(|array| !(own.is_some() && is_own(array)));
         let others: Vec<&MeshArray> = others.collect();
+        // Of a sequence they are what takes each mesh to the next.
+        let own = own.filter(|_| Pattern::parse(&self.input).is_none());
+        let velocities = own.unwrap_or_else(|| usd::to_floats(&velocities));
         let stem = self.input.file_stem().unwrap_or_default().to_string_lossy().into_owned();
         let name = usd::prim_name(stem.split(['%', '#', '$', '.']).next().unwrap_or_default());
         let mesh = usd::MeshFrame {

@@ -48,37 +48,14 @@ pub fn run(args: &Args, session: &Session) -> Result<(), Failure> {
     for path in &args.files {
         let mesh = args.read(path).before()?;
         let faults = session.ctx.phase("faults", || Ok(Faults::of(&mesh))).during()?;
-        let size = mesh.bounds().map(|(low, high)| <[f32; 3]>::from(high - low));
-        all.push(json!({
-            "file": path.display().to_string(),
-            "solid": faults.is_solid(),
-            "vertices": mesh.positions.len(),
-            "triangles": mesh.triangles.len(),
-            "size_m": size,
-            "area_m2": mesh.area(),
-            "volume_m3": mesh.volume(),
-            "parts": faults.parts,
-            "genus": faults.genus,
-            "holes": faults.holes,
-            "open_edges": faults.open_edges,
-            "crowded_edges": faults.crowded_edges,
-            "turned_edges": faults.turned_edges,
-            "pinched_vertices": faults.pinched_vertices,
-            "embedded": faults.is_embedded(),
-            "crossings": faults.crossings,
-            "corner_crossings": faults.corner_crossings,
-            "folds": faults.folds,
-            "overlaps": faults.overlaps,
-            "touches": faults.touches,
-            "degenerate_triangles": faults.degenerate,
-            "doubled_triangles": faults.doubled_triangles,
-            "doubled_vertices": faults.doubled_vertices,
-            "unused_vertices": faults.unused_vertices,
-            "by_index": by_index(&faults.by_index),
-        }));
+        let report = report(path, &mesh, &faults);
+        if args.json {
+            all.push(report);
+        } else {
+            output::print(&in_words(&report)).during()?;
+        }
     }
-    let text = if args.json { format!("{:#}\n", json!(all)) } else { all.iter().map(in_words).collect() };
-    output::print(&text).during()
+    if args.json { output::print(&format!("{:#}\n", json!(all))).during() } else { Ok(()) }
 }
 
 impl CheckArgs {
@@ -92,6 +69,39 @@ impl CheckArgs {
     }
 }
 
+/// What is known of a mesh.
+fn report(path: &Path, mesh: &TriMesh, faults: &Faults) -> Value {
+    let size = mesh.bounds().map(|(low, high)| <[f32; 3]>::from(high - low));
+    json!({
+        "file": path.display().to_string(),
+        "solid": faults.is_solid(),
+        "vertices": mesh.positions.len(),
+        "triangles": mesh.triangles.len(),
+        "size_m": size,
+        "area_m2": faults.area,
+        "volume_m3": faults.volume,
+        "parts": faults.parts,
+        "inverted_parts": faults.inverted_parts,
+        "genus": faults.genus,
+        "holes": faults.holes,
+        "open_edges": faults.open_edges,
+        "crowded_edges": faults.crowded_edges,
+        "turned_edges": faults.turned_edges,
+        "non_manifold_vertices": faults.non_manifold_vertices,
+        "embedded": faults.is_embedded(),
+        "crossings": faults.crossings,
+        "corner_crossings": faults.corner_crossings,
+        "folds": faults.folds,
+        "overlaps": faults.overlaps,
+        "touches": faults.touches,
+        "degenerate_triangles": faults.degenerate,
+        "doubled_triangles": faults.doubled_triangles,
+        "doubled_vertices": faults.doubled_vertices,
+        "unused_vertices": faults.unused_vertices,
+        "by_index": by_index(&faults.by_index),
+    })
+}
+
 /// What of the mesh's topology hangs on vertices as the file has them.
 fn by_index(topology: &Topology) -> Value {
     json!({
@@ -99,18 +109,95 @@ fn by_index(topology: &Topology) -> Value {
         "open_edges": topology.open_edges,
         "crowded_edges": topology.crowded_edges,
         "turned_edges": topology.turned_edges,
-        "pinched_vertices": topology.pinched_vertices,
+        "non_manifold_vertices": topology.non_manifold_vertices,
         "collapsed_triangles": topology.collapsed_triangles,
         "doubled_triangles": topology.doubled_triangles,
     })
 }
 
-/// Edges and vertices at fault, joined by place or by index, in words.
-const JOINTS: [(&str, &str); 4] = [
-    ("open_edges", "edges with one triangle"),
-    ("crowded_edges", "edges with more than two triangles"),
-    ("turned_edges", "edges whose triangles disagree about which side is out"),
-    ("pinched_vertices", "vertices whose triangles form no single fan"),
+/// A key of the report, and what it counts, for one and for several.
+type Counted = (&'static str, [&'static str; 2]);
+
+const PARTS: [Counted; 2] = [
+    ("holes", ["hole: closed by a cone to its centre", "holes: closed by cones to their centres"]),
+    (
+        "inverted_parts",
+        [
+            "part is inside out: it vanishes where the mesh is used",
+            "parts are inside out: they vanish where the mesh is used",
+        ],
+    ),
+];
+
+/// Edges and vertices at fault, joined by place or by index.
+const JOINTS: [Counted; 4] = [
+    ("open_edges", ["edge with one triangle", "edges with one triangle"]),
+    (
+        "crowded_edges",
+        [
+            "non-manifold edge: it has more than two triangles",
+            "non-manifold edges: they have more than two triangles",
+        ],
+    ),
+    (
+        "turned_edges",
+        [
+            "inconsistently oriented edge: its triangles disagree about which side is out",
+            "inconsistently oriented edges: their triangles disagree about which side is out",
+        ],
+    ),
+    (
+        "non_manifold_vertices",
+        [
+            "non-manifold vertex: its triangles form no single fan",
+            "non-manifold vertices: their triangles form no single fan",
+        ],
+    ),
+];
+
+const TRIANGLES: [Counted; 9] = [
+    (
+        "crossings",
+        [
+            "pair of triangles cuts each other: harmless only where both are right side out",
+            "pairs of triangles cut each other: harmless only where both are right side out",
+        ],
+    ),
+    (
+        "corner_crossings",
+        [
+            "pair of triangles with a common corner cuts each other: harmless only where both are right side out",
+            "pairs of triangles with a common corner cut each other: harmless only where both are right side out",
+        ],
+    ),
+    (
+        "folds",
+        [
+            "pair of triangles is folded onto each other along its common edge",
+            "pairs of triangles are folded onto each other along their common edges",
+        ],
+    ),
+    (
+        "overlaps",
+        [
+            "pair of triangles lies on each other in one plane",
+            "pairs of triangles lie on each other in one plane",
+        ],
+    ),
+    (
+        "touches",
+        ["pair of triangles touches beyond common corners", "pairs of triangles touch beyond common corners"],
+    ),
+    ("degenerate_triangles", ["triangle without area: ignored", "triangles without area: ignored"]),
+    ("doubled_triangles", ["triangle with the corners of another", "triangles with the corners of another"]),
+    (
+        "doubled_vertices",
+        ["vertex at the place of another: joined", "vertices at the place of another: joined"],
+    ),
+    (
+        "unused_vertices",
+        ["vertex that no triangle names: ignored", "vertices that no triangle names: ignored"],
+    ),
 ];
 
 /// A mesh in words: what it is, then only the faults that it has.
@@ -122,14 +209,14 @@ fn in_words(mesh: &Value) -> String {
         (true, 0) => "a solid",
         (true, _) => "a solid, once vertices at one place are joined",
     };
-    let mut out = format!(
-        "{}: {}\n  {} vertices, {} triangles, {} parts",
-        mesh["file"].as_str().unwrap_or_default(),
-        what,
-        count("vertices"),
-        count("triangles"),
-        count("parts"),
-    );
+    let [vertices, triangles, parts] = [
+        ("vertices", ["vertex", "vertices"]),
+        ("triangles", ["triangle", "triangles"]),
+        ("parts", ["part", "parts"]),
+    ]
+    .map(|(key, forms)| format!("{} {}", count(key), form(count(key), forms)));
+    let file = mesh["file"].as_str().unwrap_or_default();
+    let mut out = format!("{file}: {what}\n  {vertices}, {triangles}, {parts}");
     if let Some(genus) = mesh["genus"].as_i64() {
         out += &format!(", genus {genus}");
     }
@@ -139,27 +226,20 @@ fn in_words(mesh: &Value) -> String {
     }
     let number = |key: &str| mesh[key].as_f64().unwrap_or(0.0);
     out += &format!("area {:.6} m2, volume {:.6} m3\n", number("area_m2"), number("volume_m3"));
-    let holes = [("holes", "holes: closed by cones to their centres")];
-    let faults = [
-        ("crossings", "pairs of triangles cut each other: harmless, what lies in any part is inside"),
-        ("corner_crossings", "pairs of triangles with a common corner cut each other: harmless, too"),
-        ("folds", "pairs of triangles are folded onto each other along their common edge"),
-        ("overlaps", "pairs of triangles lie on each other in one plane"),
-        ("touches", "pairs of triangles touch beyond their common corners"),
-        ("degenerate_triangles", "triangles without area: ignored"),
-        ("doubled_triangles", "triangles with the corners of another"),
-        ("doubled_vertices", "vertices at the place of another: joined"),
-        ("unused_vertices", "vertices that no triangle names: ignored"),
-    ];
-    for (key, meaning) in holes.into_iter().chain(JOINTS).chain(faults).filter(|(key, _)| count(key) > 0) {
-        out += &format!("  {:>8} {meaning}\n", count(key));
+    for (key, forms) in PARTS.into_iter().chain(JOINTS).chain(TRIANGLES).filter(|(key, _)| count(key) > 0) {
+        out += &format!("  {:>8} {}\n", count(key), form(count(key), forms));
     }
     // What joining by place hides.
-    for (key, meaning) in JOINTS.into_iter().filter(|(key, _)| ![0, count(key)].contains(&as_it_is(key))) {
-        out += &format!("  {:>8} {meaning}, by the vertices' indices\n", as_it_is(key));
+    for (key, forms) in JOINTS.into_iter().filter(|(key, _)| ![0, count(key)].contains(&as_it_is(key))) {
+        out += &format!("  {:>8} {}, by the vertices' indices\n", as_it_is(key), form(as_it_is(key), forms));
     }
     if number("volume_m3") < 0.0 {
         out += "           inside out: flipped where it is used\n";
     }
     out
+}
+
+/// What is counted, for one or for several.
+fn form(count: u64, [one, several]: [&'static str; 2]) -> &'static str {
+    if count == 1 { one } else { several }
 }

@@ -138,6 +138,10 @@ pub(super) fn write(out: &mut dyn Write, mesh: &TriMesh, carried: &Carried<'_>) 
         // Whole numbers are of bytes.
         array.values[vertex] as f32 / if array.number == Number::U8 { 255.0 } else { 1.0 }
     };
+    if mesh.positions.is_empty() {
+        // A file without bytes looks like one that was cut.
+        return writeln!(out, "# an empty mesh");
+    }
     for (vertex, p) in mesh.positions.iter().enumerate() {
         match colours {
             [Some(r), Some(g), Some(b)] => {

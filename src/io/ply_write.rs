@@ -20,7 +20,7 @@ pub struct Carried<'a> {
 /// Writes binary little-endian PLY.
 pub(super) fn write(out: &mut dyn Write, mesh: &TriMesh, carried: &Carried<'_>) -> Result<()> {
     let Carried { velocities, uvs, .. } = *carried;
-    let moving = velocities.len() == mesh.positions.len();
+    let moving = !velocities.is_empty() && velocities.len() == mesh.positions.len();
     let of_vertices = uvs.filter(|uvs| uvs.corners.is_none());
     let of_corners = uvs.filter(|uvs| uvs.corners.is_some());
     let mut names = vec!["x", "y", "z"];

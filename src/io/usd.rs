@@ -5,6 +5,7 @@ use std::fmt::Write;
 use super::usd_looks::{self, Look};
 use super::usd_points;
 use super::usd_primvars::{self, Primvar};
+use crate::base::arrays::Number;
 use crate::base::{DVec3, MeshArray, Points, Uvs, Vec3};
 
 /// A moving mesh at one frame.
@@ -384,7 +385,11 @@ pub fn clip(kind: &str, frame: i32, fps: f64, units: Units, meshes: &[MeshFrame]
 }
 
 fn row(out: &mut String, p: &Vec3) {
-    let _ = write!(out, "({}, {}, {})", p.x, p.y, p.z);
+    for (part, before) in p.iter().zip(["(", ", ", ", "]) {
+        out.push_str(before);
+        usd_primvars::number(out, Number::F32, f64::from(*part));
+    }
+    out.push(')');
 }
 
 pub(super) fn list<T>(items: impl ExactSizeIterator<Item = T>, write: impl Fn(&mut String, T)) -> String {

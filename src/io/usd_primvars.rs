@@ -81,6 +81,8 @@ struct Vector {
 
 const COLOUR: &str = "displayColor";
 const OPACITY: &str = "displayOpacity";
+/// What these names mean to a renderer is no array of single numbers.
+const TAKEN: [&str; 5] = [COLOUR, "points", "normals", "velocities", "accelerations"];
 
 /// Each array once, in the order of the first part of each group.
 fn grouped<'a>(arrays: &[&'a MeshArray]) -> Vec<Group<'a>> {
@@ -108,7 +110,11 @@ fn alone(array: &MeshArray, at: usize) -> Draft {
     if array.name == "alpha" && holds_shares(array.number) {
         return Draft { name: OPACITY.into(), class: "float", members, is_share: true };
     }
-    Draft { name: prim_name(&array.name), class: scalar(array.number), members, is_share: false }
+    let mut name = prim_name(&array.name);
+    if TAKEN.contains(&name.as_str()) {
+        name.push('_');
+    }
+    Draft { name, class: scalar(array.number), members, is_share: false }
 }
 
 /// The vector or colour that an array is a part of, where all its parts are there and of one kind.
@@ -193,7 +199,8 @@ fn triple(number: Number) -> Option<&'static str> {
 /// Floats from here on are written with an exponent.
 const LONG: f64 = 1e16;
 
-fn number(out: &mut String, number: Number, value: f64) {
+/// Writes a number as USD reads it.
+pub(super) fn number(out: &mut String, number: Number, value: f64) {
     let _ = match number {
         // USD knows it in small letters only, and takes long numbers without an exponent for integers.
         _ if value.is_nan() => write!(out, "nan"),

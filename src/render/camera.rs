@@ -153,11 +153,16 @@ impl Lens {
         (ahead + right * across + up * upward).normalize()
     }
 
+    /// How far ahead of the eye a point lies (m), negative behind it; `offset` leads to it from the eye (m).
+    pub fn depth(&self, offset: DVec3) -> f64 {
+        offset.dot(&self.axes[2])
+    }
+
     /// Where a point is seen, in pixels from the picture's upper left corner; `offset` leads to it from the eye (m). None for
     /// points that are not ahead.
     pub fn pixel(&self, offset: DVec3) -> Option<[f64; 2]> {
-        let [right, up, ahead] = self.axes;
-        let depth = offset.dot(&ahead);
+        let [right, up, _] = self.axes;
+        let depth = self.depth(offset);
         let scale = f64::from(self.size.height) / (self.half * depth);
         let (across, upward) = (offset.dot(&right) * scale, offset.dot(&up) * scale);
         let (width, height) = (f64::from(self.size.width), f64::from(self.size.height));

@@ -17,6 +17,9 @@ use crate::error::Result;
 const ROWS: usize = 64;
 /// Width of a line (pixels).
 const LINE: f64 = 1.5;
+/// Parts of lines that lie nearer ahead of the eye than this, of the distance of their farther end, are not drawn: they are seen
+/// far beside any picture.
+const NEAREST: f64 = 1.0e-9;
 /// Light where there is no field.
 const EMPTY: [f32; 3] = [0.45, 0.47, 0.5];
 
@@ -117,6 +120,11 @@ impl Cut {
         self.bounds
     }
 
+    /// The values of its field that the ends of the colours stand for; none without a field.
+    pub fn range(&self) -> Option<[f32; 2]> {
+        self.field.as_ref().map(|field| field.range)
+    }
+
     /// Draws what a camera sees of the plane, without light or shadow: the same bytes at any number of threads. Nothing is seen
     /// of a plane that the camera stands in.
     ///
@@ -180,7 +188,7 @@ impl Outline {
         let (width, height) = (size.width as usize, size.height as usize);
         let mut cover = vec![0u8; width * height];
         for segment in &self.segments {
-            let [Some(a), Some(b)] = segment.map(|end| lens.pixel(end - eye)) else { continue };
+            let Some([a, b]) = seen(lens, segment.map(|end| end - eye)) else { continue };
             for y in near(a[1], b[1], height) {
                 for x in near(a[0], b[0], width) {
                     let distance = distance(a, b, [x as f64 + 0.5, y as f64 + 0.5]);
@@ -192,6 +200,20 @@ impl Outline {
         }
         cover
     }
+}
+
+/// Where the part of a segment that lies ahead is seen (pixels); none where all of it is behind. Its ends are from the eye (m).
+fn seen(lens: &Lens, [a, b]: [DVec3; 2]) -> Option<[[f64; 2]; 2]> {
+    let [from, to] = [a, b].map(|end| lens.depth(end));
+    let nearest = NEAREST * a.norm().max(b.norm());
+    let place = |depth: f64| a.lerp(&b, (depth - from) / (to - from));
+    let (a, b) = match (from >= nearest, to >= nearest) {
+        (true, true) => (a, b),
+        (true, false) => (a, place(nearest)),
+        (false, true) => (place(nearest), b),
+        (false, false) => return None,
+    };
+    Some([lens.pixel(a)?, lens.pixel(b)?])
 }
 
 /// The pixels of a row or column of `count` that a line between two of its places may cover.
@@ -312,6 +334,34 @@ mod tests {
         // Neither a plane beside the box meets it nor that of its lowest face, whose corners count as beyond it.
         assert!(outline(&mesh, Plane { axis: 2, at: 0.6 }).is_empty());
         assert!(outline(&mesh, Plane { axis: 2, at: -0.5 }).is_empty());
+    }
+
+    #[test]
+    fn a_line_that_passes_the_camera_is_seen_ahead_of_it() {
+        let ctx = Context::new(Pool::new(1).unwrap());
+        let plane = Plane { axis: 1, at: 0.0 };
+        // Its lines along z have no ends between z = 0 and 5 m; the camera stands at 1 m between two of them.
+        let mesh = TriMesh::cuboid([-0.6, -1.0, -5.0], [0.6, 1.0, 5.0]);
+        let camera = Camera { eye: DVec3::new(0.0, 0.5, 1.0), target: DVec3::zeros(), fov_deg: 100.0 };
+        let picture = Cut::new(plane).with_surface(&mesh, [0.0; 3]).draw(&ctx, &camera, SIZE).unwrap();
+        let (lens, empty) = (camera.lens(SIZE), bytes(EMPTY));
+        let pixel = |[x, y]: [f64; 2]| {
+            let is_inside = (0.0..120.0).contains(&x) && (0.0..90.0).contains(&y);
+            is_inside.then(|| picture.rgb.as_chunks::<3>().0[y as usize * 120 + x as usize])
+        };
+        let mut beside = 0;
+        for step in 0..500 {
+            let z = -4.0 + 0.01 * f64::from(step);
+            for x in [-0.6, 0.6] {
+                let Some(at) = lens.pixel(DVec3::new(x, 0.0, z) - camera.eye) else { continue };
+                let Some(rgb) = pixel(at) else { continue };
+                assert_ne!(rgb, empty, "{x} {z}");
+                beside += usize::from(z > 0.0);
+            }
+            let between = lens.pixel(DVec3::new(0.0, 0.0, z) - camera.eye).and_then(&pixel);
+            assert!(z < -1.0 || between.is_none_or(|rgb| rgb == empty), "{z}");
+        }
+        assert!(beside > 50, "{beside}");
     }
 
     #[test]

@@ -56,15 +56,15 @@ impl Fog {
 
 impl Field {
     /// The values of a grid, linear between its voxels. Colours go from one end of the narrow band to the other for a level set,
-    /// from 0 to the greatest value for any other grid.
+    /// for any other grid from the least of its values and 0 to the greatest of these.
     ///
     /// # Errors
-    /// When memory runs out.
-    pub fn grid(grid: FloatGrid) -> Result<Self> {
+    /// More leaves than the memory limit has room to list; when memory runs out; a cancel.
+    pub fn grid(ctx: &Context, grid: FloatGrid) -> Result<Self> {
         let bounds = bounds_of(&grid);
         let range = match grid.class() {
             GridClass::LevelSet => [-grid.background().abs(), grid.background().abs()],
-            _ => [0.0, greatest(&grid)?],
+            _ => range(ctx, &grid)?,
         };
         let read = move |ctx: &Context, places: &[DVec3], values: &mut Vec<f32>| {
             grid.sample_linear(ctx, places, values)
@@ -73,12 +73,26 @@ impl Field {
     }
 }
 
-/// The greatest finite value of a grid, at least 0.
-fn greatest(grid: &FloatGrid) -> Result<f32> {
-    let (leaves, tiles) = (grid.leaves()?, grid.tiles()?);
-    let of_leaves = leaves.iter().flat_map(|leaf| leaf.values.iter().copied());
-    let values = of_leaves.chain(tiles.iter().map(|tile| tile.value));
-    Ok(values.filter(|value| value.is_finite()).fold(0.0, f32::max))
+/// Memory (bytes) of a leaf in a list of leaves, and while that list is made; its values stay where they are.
+const LISTED: u64 = 80;
+/// Leaves that are looked at between two looks for a cancel.
+const LEAVES: usize = 4096;
+
+/// The least and the greatest of 0 and a grid's finite values.
+fn range(ctx: &Context, grid: &FloatGrid) -> Result<[f32; 2]> {
+    ctx.allow("a list of a grid's leaves", grid.leaf_count() as u64 * LISTED)?;
+    let wider = |[low, high]: [f32; 2], value: f32| match value {
+        _ if !value.is_finite() => [low, high],
+        _ if value < low => [value, high],
+        _ if value > high => [low, value],
+        _ => [low, high],
+    };
+    let mut range = grid.tiles()?.iter().map(|tile| tile.value).fold([0.0; 2], wider);
+    for leaves in grid.leaves()?.chunks(LEAVES) {
+        ctx.check()?;
+        range = leaves.iter().flat_map(|leaf| leaf.values.iter().copied()).fold(range, wider);
+    }
+    Ok(range)
 }
 
 /// Least and greatest corner of the active voxels of a grid (m); none without any.

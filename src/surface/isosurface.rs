@@ -17,8 +17,9 @@ type Edge = (usize, usize);
 
 /// No vertex.
 const NONE: u8 = u8::MAX;
-/// Values along a line are taken as smooth if their second differences are at most such a share of the first.
-const SMOOTH: f32 = 0.5;
+/// Values along a line are smooth if their second differences are at most the lesser share of the first, and a kink from the greater
+/// on; between them the surface goes over from the one to the other, or it would flicker.
+const SMOOTH: [f32; 2] = [0.3, 0.5];
 /// Steps to the zero of a cubic; each leaves less than half of the error.
 const STEPS: usize = 6;
 
@@ -165,16 +166,19 @@ fn zero(outside: [Option<f32>; 2], here: f32, there: f32) -> f32 {
     let [Some(last), Some(next)] = outside else { return straight };
     // Second differences at both ends.
     let (first, second) = (last - here - fall, fall - there + next);
-    let is_smooth = |bend: f32| bend.abs() <= SMOOTH * fall.abs();
-    if !is_smooth(first) || !is_smooth(second) {
+    let share = |bend: f32| (SMOOTH[1] - (bend / fall).abs()) / (SMOOTH[1] - SMOOTH[0]);
+    let shares = [share(first), share(second), 1.0];
+    // What is not a number is a kink too.
+    if !shares.iter().all(|share| *share > 0.0) {
         return straight;
     }
+    let share = shares.into_iter().fold(1.0, f32::min);
     let mut at = straight;
     for _ in 0..STEPS {
         let bend = 0.5 * at * (at - 1.0) * (first + (at + 1.0) / 3.0 * (second - first));
         at = ((here + bend) / fall).clamp(0.0, 1.0);
     }
-    at
+    straight + share * (at - straight)
 }
 
 /// The triangles in the cubes that begin at the nodes of a patch.

@@ -1,7 +1,8 @@
 //! Smoothing that keeps volume (Taubin 1995, "A signal processing approach to fair surface design"): vertices go toward the mean of
 //! their neighbours, then a little farther back. Lumps a few edges long go first, shapes that are longer stay.
 //!
-//! That pair of steps still shrinks drops of a few triangles, so each connected part gets its volume back after every pass.
+//! That pair of steps still shrinks drops of a few triangles, so each connected part gets its volume back after every pass. A small
+//! one may lose some of its axes faster than others, and would become a needle or a plate by that: it stops before.
 
 use rayon::prelude::*;
 
@@ -18,10 +19,14 @@ const SHRINK: f64 = 0.63;
 const GROW: f64 = 1.0 / (PASS_BAND - 1.0 / SHRINK);
 /// Largest factor by which a pass may stretch a part; one that lost more is degenerate.
 const MOST: f64 = 4.0;
+/// How far from its centre a part may reach, of how far it did at the start.
+const FARTHEST: f64 = 1.1;
 /// Vertices of a task.
 const PIECE: usize = 1024;
 
-/// Smooths a closed mesh in `passes` passes; each of its connected parts keeps its volume. Triangles stay as they are.
+/// Smooths a closed mesh in `passes` passes; each of its connected parts keeps its volume. A part that a pass would
+/// take farther from its centre than 1.1 times what it reached at the start stays as it was before that pass: it is as smooth as it
+/// gets. Triangles stay as they are.
 ///
 /// # Errors
 /// Cancel.
@@ -30,11 +35,16 @@ pub fn smooth(ctx: &Context, mesh: &mut TriMesh, passes: u32) -> Result<()> {
     let parts = Parts::of(mesh);
     let mut places: Vec<DVec3> = mesh.positions.iter().map(|place| place.cast()).collect();
     let volumes = parts.volumes(&places, &mesh.triangles, &parts.centres(&places));
+    let reaches = parts.reaches(&places);
+    let mut is_done = vec![false; reaches.len()];
     for _ in 0..passes {
         ctx.check()?;
-        places = rings.moved(&places, SHRINK);
-        places = rings.moved(&places, GROW);
-        parts.restore(&mut places, &mesh.triangles, &volumes);
+        let mut moved = rings.moved(&rings.moved(&places, SHRINK), GROW);
+        parts.restore(&mut moved, &mesh.triangles, &volumes);
+        for (is_done, (now, first)) in is_done.iter_mut().zip(parts.reaches(&moved).iter().zip(&reaches)) {
+            *is_done |= *now > FARTHEST * first;
+        }
+        parts.take(&mut places, &moved, &is_done);
     }
     mesh.positions = places.iter().map(|place| place.cast()).collect();
     Ok(())
@@ -118,6 +128,26 @@ impl Parts {
         sums.into_iter().map(|(sum, count)| sum / count).collect()
     }
 
+    /// Greatest distance (m) of each part's vertices from its centre.
+    fn reaches(&self, places: &[DVec3]) -> Vec<f64> {
+        let centres = self.centres(places);
+        let mut squares = vec![0.0f64; centres.len()];
+        for (place, &part) in places.iter().zip(&self.of) {
+            let square = &mut squares[part as usize];
+            *square = square.max((place - centres[part as usize]).norm_squared());
+        }
+        squares.into_iter().map(f64::sqrt).collect()
+    }
+
+    /// Moves the parts that are not done.
+    fn take(&self, places: &mut [DVec3], moved: &[DVec3], is_done: &[bool]) {
+        for ((place, moved), &part) in places.iter_mut().zip(moved).zip(&self.of) {
+            if !is_done[part as usize] {
+                *place = *moved;
+            }
+        }
+    }
+
     /// Volume that each part encloses (m3), by the divergence theorem about its centre; that of a cavity is below 0.
     fn volumes(&self, places: &[DVec3], triangles: &[[u32; 3]], centres: &[DVec3]) -> Vec<f64> {
         let mut volumes = vec![0.0; self.count];
@@ -163,6 +193,47 @@ mod tests {
         TriMesh {
             positions: corners.into_iter().map(position).collect(),
             triangles: (0..8).map(triangle).collect(),
+        }
+    }
+
+    /// A drop (m): rings of corners around y between two ends, longer along x than along z.
+    fn spindle(rings: u32, sides: u32) -> TriMesh {
+        let end = 1 + rings * sides;
+        let ring = |n: u32| {
+            let (ring, side) = (n / sides, n % sides);
+            let angle = std::f64::consts::TAU * f64::from(side) / f64::from(sides);
+            let height = 0.7 * ((2 * ring + 1) as f32 / rings as f32 - 1.0);
+            Vec3::new(1.1 * libm::cos(angle) as f32, height, 0.9 * libm::sin(angle) as f32) * 0.01
+        };
+        let mut positions = vec![Vec3::new(0.0, -0.01, 0.0)];
+        positions.extend((0..rings * sides).map(ring));
+        positions.push(Vec3::new(0.0, 0.01, 0.0));
+        let mut triangles = Vec::new();
+        for side in 0..sides {
+            let at = |ring: u32, step: u32| 1 + ring * sides + (side + step) % sides;
+            triangles.push([0, at(0, 0), at(0, 1)]);
+            for ring in 1..rings {
+                let [a, b, c, d] = [at(ring - 1, 0), at(ring - 1, 1), at(ring, 0), at(ring, 1)];
+                triangles.extend([[a, d, b], [a, c, d]]);
+            }
+            triangles.push([at(rings - 1, 0), end, at(rings - 1, 1)]);
+        }
+        TriMesh { positions, triangles }
+    }
+
+    #[test]
+    fn a_small_drop_and_a_small_cavity_become_no_needles() {
+        let ctx = Context::new(Pool::new(2).unwrap());
+        for (mut mesh, corners) in [(spindle(1, 6).reversed(), 8), (spindle(2, 4), 10)] {
+            assert!(mesh.is_closed() && mesh.positions.len() == corners);
+            let far = |mesh: &TriMesh| {
+                let middle = mesh.positions.iter().sum::<Vec3>() / corners as f32;
+                mesh.positions.iter().map(|place| (place - middle).norm()).fold(0.0, f32::max)
+            };
+            let (reach, volume) = (far(&mesh), mesh.volume());
+            smooth(&ctx, &mut mesh, 100).unwrap();
+            assert!(far(&mesh) < 1.101 * reach, "{corners} corners: {} of {reach}", far(&mesh));
+            assert!((mesh.volume() / volume - 1.0).abs() < 1e-3, "{} is not {volume}", mesh.volume());
         }
     }
 

@@ -23,6 +23,16 @@ const BYTES: u64 = 2 * (4 * VOXELS as u64 + 100);
 /// What needs the memory, for messages.
 const WHAT: &str = "the spheres around particles (larger cells need less)";
 
+/// Whether spheres of a radius (m) can be made on cells of an edge (m): 1.5 to 100 cells are.
+pub fn is_sphere_radius(radius: f64, cell: f64) -> bool {
+    (LEAST * (1.0 - ROUNDING)..=MOST).contains(&(radius / cell))
+}
+
+/// The greatest cell (m) for spheres of a radius (m).
+pub fn greatest_sphere_cell(radius: f64) -> f64 {
+    radius / LEAST
+}
+
 /// Level set (m) of the union of spheres of a radius (m) around places (m), on cells of `cell` (m), with a band of three of them on
 /// each side. Where spheres overlap, values inside are nearer to 0 than the true distance.
 ///
@@ -31,7 +41,7 @@ const WHAT: &str = "the spheres around particles (larger cells need less)";
 /// context allows; cancel.
 pub fn spheres(ctx: &Context, places: &[DVec3], radius: f64, cell: f64) -> Result<FloatGrid> {
     let cells = radius / cell;
-    if !(LEAST * (1.0 - ROUNDING)..=MOST).contains(&cells) {
+    if !is_sphere_radius(radius, cell) {
         return Err(Error::argument(format!(
             "spheres of {radius} m have a radius of {cells:.3} cells of {cell} m: it must be 1.5 to 100"
         )));

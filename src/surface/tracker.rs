@@ -185,7 +185,7 @@ impl Tracker {
             let wanted = if known == tracker.delta.len() { tracker.wanted_reach() } else { REACH[1] };
             if wanted <= tracker.reach {
                 tracker.check_overlap(known)?;
-                let (apart, bare) = ctx.phase("cover", || tracker.cover(ctx, &surface, &feet))?;
+                let (apart, bare) = ctx.phase("cover", || tracker.cover(ctx, &surface, &feet, true))?;
                 tracker.bare = bare;
                 let (lost, triangles) = (tracker.vertices.len() - known, surface.1.count());
                 return Ok((tracker, StepReport { lost, triangles, apart, ..StepReport::default() }));
@@ -285,7 +285,7 @@ impl Tracker {
             let (vertices, flags) =
                 ctx.phase("project", || self.projected(ctx, carried, &delta, &distances))?;
             let feet: Vec<Option<DVec3>> = flags.iter().map(Flag::foot).collect();
-            let (apart, bare) = ctx.phase("cover", || self.cover(ctx, &surface, &feet))?;
+            let (apart, bare) = ctx.phase("cover", || self.cover(ctx, &surface, &feet, false))?;
             let uncovered: Vec<bool> = bare.iter().zip(&self.bare).map(|(now, ever)| *now && !ever).collect();
             let report = StepReport {
                 parts,
@@ -317,10 +317,12 @@ impl Tracker {
         ctx: &Context,
         (phi, surface): &(Implicit, Isosurface),
         feet: &[Option<DVec3>],
+        is_first: bool,
     ) -> Result<(Vec<Apart>, Vec<bool>)> {
         let parts = Parts::new(phi, surface, feet.iter().flatten().map(cell_of).collect());
         ctx.check()?;
-        let cover = Cover { feet, triangles: &self.triangles };
+        let spacing = 1.0 / self.params.cell;
+        let cover = Cover { feet, triangles: &self.triangles, spacing, is_first };
         Ok((parts.apart(phi, surface), cover.beside_bare(ctx, phi, surface, &parts)?))
     }
 

@@ -5,11 +5,11 @@ use rayon::prelude::*;
 use super::chain::Window;
 use super::voxelise::{ALL, Band, Piece, Scratch, Voxeliser};
 use super::{Body, Settings};
-use crate::base::TriMesh;
-use crate::base::blocks::{Block, BlockEdit};
+use crate::base::blocks::{Block, BlockEdit, DIM};
+use crate::base::{DVec3, TriMesh};
 use crate::context::Context;
 use crate::distance::Face;
-use crate::distance::lattice::Lattice;
+use crate::distance::lattice::{Lattice, UNITS};
 use crate::error::{Error, Result};
 use crate::motion::{Keys, Rigid};
 use crate::vdb::FloatGrid;
@@ -53,15 +53,54 @@ pub fn voxelise(ctx: &Context, mesh: TriMesh, settings: &Settings) -> Result<Flo
     chain(ctx, &[still], 0.0, 0.0, settings)
 }
 
+/// As [`voxelise`], in a box of voxels (least and greatest, both included): the cost is that of what lies there, however large the
+/// solid is. Beside the box, from a block on, all counts as outside.
+///
+/// # Errors
+/// As [`voxelise`].
+pub fn voxelise_within(
+    ctx: &Context,
+    mesh: TriMesh,
+    settings: &Settings,
+    [low, high]: [[i32; 3]; 2],
+) -> Result<FloatGrid> {
+    settings.validate()?;
+    let still = Body::new(Box::new(Rigid::new(mesh, Keys::default())), 0.0)?;
+    let middle = [0, 1, 2].map(|axis| (f64::from(low[axis]) + f64::from(high[axis])) * 0.5 * settings.voxel);
+    let lattice = Lattice::near(settings.voxel, DVec3::from(middle))?;
+    let relative = |voxel: [i32; 3]| [0, 1, 2].map(|axis| voxel[axis] - lattice.origin[axis]);
+    let bounds = [relative(low), relative(high)];
+    // Whole blocks are made, and winding numbers are needed around them.
+    let margin = settings.half_width.ceil() as i32 + 3 + DIM as i32;
+    let fixed = |cells: i32| cells.saturating_mul(UNITS);
+    let min = bounds[0].map(|cells| fixed(cells - margin));
+    let max = bounds[1].map(|cells| fixed(cells + margin));
+    // What lies above ends the scan lines: they tell which blocks are inside.
+    let window = Window { min, max: [max[0], max[1], i32::MAX] };
+    let faces = ctx.phase("chain", || still.faces(ctx, 0.0, 0.0, &lattice, settings.tolerance, &window))?;
+    fill_within(ctx, faces, lattice, settings.half_width, bounds)
+}
+
 /// Level set of the points where the winding number of a closed chain is at least 1.
 ///
 /// # Errors
 /// A region too large; cancel.
 pub fn fill(ctx: &Context, faces: Vec<Face>, lattice: Lattice, half_width: f32) -> Result<FloatGrid> {
+    fill_within(ctx, faces, lattice, half_width, ALL_VOXELS)
+}
+
+/// As [`fill`], in a box of voxels (from the lattice's origin voxel).
+fn fill_within(
+    ctx: &Context,
+    faces: Vec<Face>,
+    lattice: Lattice,
+    half_width: f32,
+    bounds: [[i32; 3]; 2],
+) -> Result<FloatGrid> {
     let band = Band { inside: half_width, outside: half_width };
     let voxeliser = ctx.phase("winding", || {
         ctx.expect(Voxeliser::PARTS);
-        Voxeliser::new(ctx, faces, lattice, band, ALL_VOXELS, |blocks| Ok(vec![true; blocks.len()]))
+        Voxeliser::new(ctx, faces, lattice, band, bounds, |blocks| Ok(vec![true; blocks.len()]))
     })?;
     let mut grid = FloatGrid::level_set(lattice.voxel, half_width)?;
     let blocks: Vec<usize> = (0..voxeliser.near_blocks().len()).collect();

@@ -117,4 +117,4 @@ mod grid;
 #[doc(hidden)]
 pub use grid::fill;
 #[cfg(feature = "vdb")]
-pub use grid::{chain, voxelise};
+pub use grid::{chain, voxelise, voxelise_within};

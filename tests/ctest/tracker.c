@@ -152,6 +152,10 @@ static void velocities(void) {
     frz_tracker *tracker = begin(ctx, mesh, NOTHING);
     const frz_particles from = of(&frames[0], 0, 1), to = of(&frames[1], 0, 0), none = of(&frames[0], 0, 0);
     frz_tracker_report report;
+    /* A host of the time before the last field. */
+    report.struct_size = offsetof(frz_tracker_report, uncovered), report.uncovered = 77;
+    WORKS(frz_tracker_step(ctx, tracker, &from, &from, DT, &report));
+    CHECK(report.uncovered == 77);
     report.struct_size = sizeof report, report.jumped = 7;
     WORKS(frz_tracker_step(ctx, tracker, &from, &to, DT, NULL));
     FAILS(frz_tracker_step(ctx, tracker, &none, &to, DT, &report), FRZ_ERROR_ARGUMENT, "neither ids");

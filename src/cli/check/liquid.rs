@@ -12,11 +12,17 @@ use crate::cli::session::Session;
 
 /// Checks the scene.
 pub fn run(args: &Args, session: &Session, scene: &Scene) -> Result<(), Failure> {
+    if args.preview.is_some() {
+        let what = format!("{}: --preview is for snow, not for [surface]", args.scene.display());
+        return Err(Failure::refused(what));
+    }
     let inputs = Inputs::load(&session.ctx, scene).before()?;
     let mut report = check(&session.ctx, scene, &inputs).before()?;
     let limit = session.max_memory();
     if let Err(error) = report.check_memory(limit) {
-        report.warnings.push(error.to_string());
+        // A run reads no frame ahead, so that it cannot know.
+        let what = format!("{error}; a run begins all the same, and ends where one part needs more");
+        report.warnings.push(what);
     }
     let free = args.free_space();
     if let Some(free) = free.filter(|free| report.disk_bytes > *free) {

@@ -14,11 +14,11 @@ use crate::cli::session::Session;
 /// Checks the scene.
 pub fn run(args: &Args, session: &Session) -> Result<(), Failure> {
     let mut scene = Scene::read_with(&args.scene, &args.set).before()?;
-    if let Some(factor) = args.preview {
-        scene.coarsen(factor.into()).before()?;
-    }
     if scene.system() == System::Surface {
         return liquid::run(args, session, &scene);
+    }
+    if let Some(factor) = args.preview {
+        scene.coarsen(factor.into()).before()?;
     }
     let inputs = Inputs::load(&scene).before()?;
     let mut report = check(&session.ctx, &scene, &inputs, args.output.as_deref()).before()?;
@@ -34,7 +34,7 @@ pub fn run(args: &Args, session: &Session) -> Result<(), Failure> {
     report.warnings.extend(too_much.map(|error| error.to_string()));
     let free = args.free_space();
     let of_mist = report.mist.as_ref().map_or(0, |mist| mist.disk_bytes);
-    let needed = report.disk_bytes.map(|bytes| bytes + of_mist);
+    let needed = report.disk_bytes.map(|bytes| bytes.saturating_add(of_mist));
     if let (Some(free), Some(needed)) = (free, needed.filter(|needed| Some(*needed) > free)) {
         let (needed, free) = (size(needed), size(free));
         report.warnings.push(format!("the files need about {needed}, but only {free} are free"));
@@ -102,6 +102,7 @@ fn describe_mist(out: &mut String, mist: &MistForecast, limit: u64) {
         mist.cell_m
     );
     let from = match mist.made_to_frame {
+        Some(frame) if mist.cells == 0 => format!("none is raised, as it was made up to frame {frame}"),
         Some(frame) => format!("as it was made up to frame {frame}"),
         None => {
             out.push_str(

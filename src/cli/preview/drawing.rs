@@ -155,11 +155,14 @@ fn cut(ctx: &Context, parts: Vec<Part>, plane: Plane) -> Result<Drawing> {
             #[cfg(feature = "vdb")]
             Part::Surface(grid) => {
                 let surface = level_set::to_mesh(ctx, &grid, 0.0, 0.0)?;
-                cut = cut.with_surface(&surface, SNOW).with_field(Field::grid(grid)?);
+                cut = cut.with_surface(&surface, SNOW).with_field(Field::grid(ctx, grid)?);
             }
             #[cfg(feature = "vdb")]
-            Part::Fog(_, grid) => cut = cut.with_field(Field::grid(grid)?),
+            Part::Fog(_, grid) => cut = cut.with_field(Field::grid(ctx, grid)?),
         }
+    }
+    if let Some([low, high]) = cut.range() {
+        log::info!("the colours of the cut go from {low}, dark blue, to {high}, pale yellow");
     }
     Ok(Drawing { content: Content::Cut(cut), has_colors: false, hollow })
 }

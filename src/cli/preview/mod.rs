@@ -47,8 +47,8 @@ pub struct Args {
     #[arg(long, value_name = "NAME")]
     color: Option<String>,
     /// Draw a plane across an axis at a place (m), seen from the axis' end, in place of the whole: the first grid in colours from
-    /// dark blue at its least value to pale yellow at its greatest (of a level set from one end of its narrow band to the other),
-    /// level sets as white lines and meshes as black ones; points are left out.
+    /// dark blue to pale yellow, of a level set from the inner end of its narrow band to the outer, of any other from the least of
+    /// its values and 0 to the greatest (-v prints both), level sets as white lines and meshes as black ones; points are left out.
     #[arg(long, value_name = "AXIS=M", value_parser = plane, conflicts_with_all = ["color", "sun", "fog_density"])]
     cut: Option<Plane>,
     /// Clip that characters play [default: they are at rest, or play their only clip with --frame].

@@ -85,10 +85,10 @@ struct VdbOutput {
 #[derive(clap::Args)]
 struct Packing {
     /// Codec of the file
-    #[arg(long, value_enum, default_value = "blosc")]
+    #[arg(long, value_enum, default_value = "blosc", requires = "output")]
     compression: Codec,
     /// Store 16-bit values: smaller, for rendering only
-    #[arg(long)]
+    #[arg(long, requires = "output")]
     half: bool,
 }
 

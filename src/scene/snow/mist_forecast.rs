@@ -30,6 +30,8 @@ const IN_STATE: u64 = 40;
 const STATES: u64 = 2;
 /// Cubes of a box that are counted at most: larger boxes are counted in larger cubes.
 const COUNTED: f64 = 4096.0;
+/// Times of a shot at which boxes are counted at most: of a longer one several frames count as one.
+const MOMENTS: usize = 512;
 
 /// What mist takes, as far as that can be told.
 #[derive(Debug, Clone, PartialEq, Serialize)]
@@ -89,8 +91,9 @@ impl MistForecast {
             made_to_frame: made.map(|(frame, _)| frame),
             cells,
             air_m3: most * params.cell.powi(3),
-            memory_bytes: cells * (step + WRITING),
-            disk_bytes: (all * in_files as f64) as u64 + cells * STATES * IN_STATE,
+            memory_bytes: cells.saturating_mul(step + WRITING),
+            disk_bytes: ((all * in_files as f64) as u64)
+                .saturating_add(cells.saturating_mul(STATES * IN_STATE)),
         }))
     }
 
@@ -106,7 +109,7 @@ impl MistForecast {
             Some(frame) => format!("as many as it had up to frame {frame}"),
             None => "as many as fill the boxes that objects pass".to_string(),
         };
-        let what = format!("mist of {} cells of {} m, {from},", self.cells, self.cell_m);
+        let what = format!("mist of {} cells of {} m, {from},", self.cells, rounded(self.cell_m));
         Err(Error::Memory { what, needed: self.memory_bytes, limit })
     }
 
@@ -116,15 +119,24 @@ impl MistForecast {
     }
 }
 
+/// A length rounded to three significant digits.
+fn rounded(length: f64) -> f64 {
+    format!("{length:.2e}").parse().unwrap_or(length)
+}
+
 /// The last frame, up to `last`, of mist that was made, and the most cells that a frame of it has, as cells of an edge `cell` (m);
-/// none where no mist was raised, or no file says how large its cells are.
+/// none where no mist was raised yet, or no file says how large its cells are.
 fn made(stored: &Stored, cell: f64, last: i32) -> Result<Option<(i32, f64)>> {
-    let (mut end, mut most) = (None, 0.0);
+    let (mut end, mut counts) = (None, Vec::new());
     for frame in stored.frames().filter(|frame| *frame <= last) {
         let report = stored.report(frame)?;
-        let cells = report.as_ref().and_then(|report| report.get("cells")?.as_f64());
-        most = cells.unwrap_or(0.0).max(most);
+        counts.extend(report.as_ref().and_then(|report| report.get("cells")?.as_f64()));
         end = Some(frame);
+    }
+    let most = counts.iter().copied().fold(0.0, f64::max);
+    // No frame is left in which it might be raised.
+    if most == 0.0 && end == Some(last) && !counts.is_empty() {
+        return Ok(Some((last, 0.0)));
     }
     let Some((end, (frame, _))) = end.zip(stored.files("mist").pop()).filter(|_| most > 0.0) else {
         return Ok(None);
@@ -140,38 +152,51 @@ fn made(stored: &Stored, cell: f64, last: i32) -> Result<Option<(i32, f64)>> {
 fn in_boxes(ctx: &Context, scene: &Scene, courses: &[Course], params: &Params) -> Result<Vec<f64>> {
     let (frames, fps) = (scene.shot.frames, scene.shot.fps);
     let count = frames.count();
+    let each = count.div_ceil(MOMENTS).max(1);
     // From full to the density under which there is none.
     let lasts = params.half_life * libm::log2(1.0 / f64::from(LEAST)) * fps;
     let lasts = (lasts.ceil() as usize).min(count);
     let tile = EDGE * params.cell;
-    let mut boxes: Vec<(usize, [DVec3; 2])> = courses
-        .iter()
-        .flat_map(|course| course.passing())
-        .map(|(frame, [low, high])| {
-            // As the air sees it.
-            let drift = DVec3::from(params.wind) * (f64::from(frame) / fps);
-            let margin = DVec3::repeat(tile);
-            ((frame - frames.first) as usize, [low - margin - drift, high + margin - drift])
-        })
-        .collect();
+    let of_air = |(frame, [low, high]): (i32, [DVec3; 2])| {
+        // As the air sees it.
+        let drift = DVec3::from(params.wind) * (f64::from(frame) / fps);
+        let margin = DVec3::repeat(tile);
+        ((frame - frames.first) as usize / each, [low - margin - drift, high + margin - drift])
+    };
+    let of_course = |course: &Course| joined(course.passing().map(of_air));
+    let mut boxes: Vec<(usize, [DVec3; 2])> = courses.iter().flat_map(of_course).collect();
     boxes.sort_by_key(|(at, _)| *at);
     let tiles = |[low, high]: &[DVec3; 2]| (high - low).iter().map(|side| side / tile).product::<f64>();
     let largest = boxes.iter().map(|(_, corners)| tiles(corners)).fold(0.0, f64::max);
     let wide = libm::cbrt(largest / COUNTED).ceil().max(1.0);
-    let cubes = filled(ctx, &boxes, tile * wide, [count, lasts])?;
+    let cubes = filled(ctx, &boxes, tile * wide, [count, lasts].map(|frames| frames.div_ceil(each)))?;
     let cells = CELLS as f64 * wide.powi(3);
-    Ok(cubes.into_iter().map(|cubes| cubes as f64 * cells).collect())
+    Ok((0..count).map(|at| cubes[at / each] as f64 * cells).collect())
 }
 
-/// Count of cubes of an edge (m) that are filled at each of `count` frames: those in any box (m, ascending by frame) of that frame
-/// or of `lasts` frames before it.
+/// The boxes of an object (m, ascending by moment), with one around all those of a moment.
+fn joined(boxes: impl Iterator<Item = (usize, [DVec3; 2])>) -> Vec<(usize, [DVec3; 2])> {
+    let mut all: Vec<(usize, [DVec3; 2])> = Vec::new();
+    for (at, [low, high]) in boxes {
+        match all.last_mut() {
+            Some((moment, corners)) if *moment == at => {
+                *corners = [corners[0].inf(&low), corners[1].sup(&high)];
+            }
+            _ => all.push((at, [low, high])),
+        }
+    }
+    all
+}
+
+/// Count of cubes of an edge (m) that are filled at each of `count` moments: those in any box (m, ascending by moment) of that one
+/// or of `lasts` moments before it.
 fn filled(
     ctx: &Context,
     boxes: &[(usize, [DVec3; 2])],
     edge: f64,
     [count, lasts]: [usize; 2],
 ) -> Result<Vec<i64>> {
-    // When each was in a box last, and how many more there are at a frame than before.
+    // When each was in a box last, and how many more there are at a moment than before.
     let mut latest: HashMap<[i32; 3], usize> = HashMap::new();
     let mut more = vec![0i64; count];
     for (at, [low, high]) in boxes {
@@ -203,6 +228,20 @@ fn filled(
 mod tests {
     use super::*;
     use crate::context::Pool;
+
+    #[test]
+    fn boxes_of_a_moment_are_one_around_them() {
+        let corner = |x: f64, z: f64| DVec3::new(x, 0.0, z);
+        let at = |moment: usize, x: f64| (moment, [corner(x, -x), corner(x + 1.0, 1.0 - x)]);
+        let one = joined([at(0, 0.0), at(0, 2.0), at(0, 1.0), at(1, 3.0), at(3, 4.0)].into_iter());
+        let around = (0, [corner(0.0, -2.0), corner(3.0, 1.0)]);
+        assert_eq!(one, [around, at(1, 3.0), at(3, 4.0)]);
+    }
+
+    #[test]
+    fn a_length_has_three_digits() {
+        assert_eq!([0.04 / 3.0, 0.03, 0.1 * 3.0, 1234.5].map(rounded), [0.0133, 0.03, 0.3, 1230.0]);
+    }
 
     #[test]
     fn cubes_are_filled_from_when_a_box_is_there_until_mist_is_gone() {

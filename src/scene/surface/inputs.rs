@@ -154,8 +154,8 @@ fn faults(path: &Path, mesh: &TriMesh) -> Option<String> {
     }
     let faults = Faults::of(mesh);
     let open = (faults.open_edges > 0).then(|| format!("{} open edges", faults.open_edges));
-    let crossed =
-        (faults.crossings > 0).then(|| format!("{} pairs of triangles that cross", faults.crossings));
+    let crossings = faults.crossings + faults.corner_crossings + faults.folds;
+    let crossed = (crossings > 0).then(|| format!("{crossings} pairs of triangles that cross"));
     let what: Vec<String> = open.into_iter().chain(crossed).collect();
     (!what.is_empty()).then(|| {
         format!(

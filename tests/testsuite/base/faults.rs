@@ -32,19 +32,19 @@ fn pairs(mesh: &TriMesh) -> [usize; 5] {
 }
 
 #[test]
-fn bodies_that_share_a_vertex_are_pinched_there() {
+fn bodies_that_share_a_vertex_are_non_manifold_there() {
     // The second is the first seen through the origin.
     let others = [[-1.0, 0.0, 0.0], [0.0, -1.0, 0.0], [0.0, 0.0, -1.0]];
     let joined = tetrahedron_and(&others, &[[0, 4, 5], [0, 6, 4], [4, 6, 5], [5, 6, 0]]);
     let faults = Faults::of(&joined);
     assert!(faults.is_solid() && faults.is_embedded() && !faults.by_index.is_watertight());
-    assert_eq!((faults.pinched_vertices, faults.by_index.pinched_vertices), (1, 1));
+    assert_eq!((faults.non_manifold_vertices, faults.by_index.non_manifold_vertices), (1, 1));
     assert_eq!((faults.parts, faults.genus), (1, Some(0)));
     // By index they are apart when each has a vertex there.
     let others = [[-1.0, 0.0, 0.0], [0.0, -1.0, 0.0], [0.0, 0.0, -1.0], [-0.0; 3]];
     let faults = Faults::of(&tetrahedron_and(&others, &[[7, 4, 5], [7, 6, 4], [4, 6, 5], [5, 6, 7]]));
     assert!(faults.by_index.is_watertight());
-    assert_eq!((faults.pinched_vertices, faults.by_index.pinched_vertices), (1, 0));
+    assert_eq!((faults.non_manifold_vertices, faults.by_index.non_manifold_vertices), (1, 0));
 }
 
 #[test]
@@ -54,8 +54,8 @@ fn bodies_that_share_an_edge_crowd_it() {
     let joined = tetrahedron_and(&others, &[[0, 5, 4], [0, 4, 3], [4, 5, 3], [5, 0, 3]]);
     let faults = Faults::of(&joined);
     assert!(!faults.is_solid() && faults.is_embedded() && !faults.by_index.is_watertight());
-    assert_eq!((faults.crowded_edges, faults.pinched_vertices, faults.genus), (1, 2, None));
-    assert_eq!((faults.by_index.crowded_edges, faults.by_index.pinched_vertices), (1, 2));
+    assert_eq!((faults.crowded_edges, faults.non_manifold_vertices, faults.genus), (1, 2, None));
+    assert_eq!((faults.by_index.crowded_edges, faults.by_index.non_manifold_vertices), (1, 2));
     assert_eq!((faults.open_edges, faults.turned_edges), (0, 0));
 }
 
@@ -150,7 +150,10 @@ fn sound_surfaces_have_no_faults_in_any_position() {
     assert!(whole.is_solid() && whole.is_embedded() && whole.by_index.is_watertight());
     let loose = Faults::of(&apart(&globe));
     assert!(loose.is_solid() && loose.is_embedded());
-    assert_eq!((loose.by_index.open_edges, loose.by_index.pinched_vertices), (3 * globe.triangles.len(), 0));
+    assert_eq!(
+        (loose.by_index.open_edges, loose.by_index.non_manifold_vertices),
+        (3 * globe.triangles.len(), 0)
+    );
     assert_eq!((whole.genus, loose.genus), (Some(0), Some(0)));
     // A sheet of squares in planes of every kind: all triangles around a vertex in one plane, many edges in line.
     let n = 12u32;
@@ -164,11 +167,57 @@ fn sound_surfaces_have_no_faults_in_any_position() {
         }
         let sheet = Faults::of(&mesh(&positions, &triangles));
         assert!(sheet.is_embedded() && sheet.degenerate == 0, "{sheet:?}");
-        assert_eq!((sheet.open_edges, sheet.pinched_vertices, sheet.holes), (44, 0, 1));
+        assert_eq!((sheet.open_edges, sheet.non_manifold_vertices, sheet.holes), (44, 0, 1));
     }
     // Nothing, and less than that.
     let nothing = Faults::of(&TriMesh::default());
     assert!(!nothing.is_solid() && nothing.is_embedded() && !nothing.by_index.is_watertight());
     let point = Faults::of(&mesh(&[[1.0; 3]], &[[0, 0, 0]]));
     assert_eq!((point.degenerate, point.by_index.collapsed_triangles, point.parts), (1, 1, 0));
+}
+
+#[test]
+fn parts_are_inside_out_unless_all_are_or_they_are_cavities() {
+    let cube = |at: f32, size: f32| TriMesh::cuboid([at; 3], [at + size; 3]);
+    let of = |parts: &[TriMesh]| {
+        let mut mesh = TriMesh::default();
+        parts.iter().for_each(|part| mesh.append(part));
+        let [faults, flipped] = [Faults::of(&mesh), Faults::of(&mesh.reversed())];
+        assert_eq!((faults.volume, faults.area), (-flipped.volume, flipped.area));
+        assert_eq!(faults.is_solid(), faults.inverted_parts == 0);
+        (faults.inverted_parts, flipped.inverted_parts)
+    };
+    let (out, cavity) = (cube(0.0, 4.0), cube(1.0, 2.0).reversed());
+    assert_eq!(of(&[out.clone(), cube(8.0, 2.0)]), (0, 0));
+    assert_eq!(of(&[out.clone(), cube(8.0, 2.0).reversed()]), (1, 1));
+    assert_eq!(of(&[out.clone(), cavity.clone()]), (0, 0));
+    assert_eq!(of(&[out.clone(), cavity.clone(), cube(1.5, 1.0)]), (0, 0));
+    assert_eq!(of(&[out.clone(), cube(3.0, 2.0).reversed(), cube(6.0, 1.0).reversed()]), (2, 2));
+    // Doubled triangles do not count; bodies that touch in a vertex do apart.
+    assert_eq!(of(&[out.clone(), out.clone(), out.clone().reversed()]), (0, 0));
+    assert_eq!(of(&[out, cube(4.0, 1.0).reversed()]), (1, 1));
+}
+
+#[test]
+fn many_triangles_around_a_vertex_take_no_time_squared() {
+    // A cap around its centre, and half of one from a vertex of its rim: every pair has a corner in common.
+    let n = 20_000u32;
+    let on_rim = |at: u32| {
+        let (sin, cos) = (std::f64::consts::TAU * f64::from(at) / f64::from(n)).sin_cos();
+        [1e3 * cos as f32, 1e3 * sin as f32, 0.0]
+    };
+    let mut places: Vec<[f32; 3]> = (0..n).map(on_rim).chain([[0.0; 3]]).collect();
+    let mut around: Vec<[u32; 3]> = (0..n).map(|at| [n, at, (at + 1) % n]).collect();
+    let across = (3 * n / 4..5 * n / 4).map(|at| [n / 2, at % n, (at + 1) % n]);
+    let from_rim: Vec<[u32; 3]> = across.collect();
+    let began = std::time::Instant::now();
+    assert_eq!(pairs(&mesh(&places, &around)), [0; 5]);
+    assert_eq!(pairs(&mesh(&places, &from_rim)), [0; 5]);
+    // One more at the centre: under the cap, then through one triangle of it.
+    places.extend([[400.0, -0.9, -1.0], [400.0, 1.1, -1.0]]);
+    around.push([n, n + 1, n + 2]);
+    assert_eq!(pairs(&mesh(&places, &around)), [0; 5]);
+    places[n as usize + 2][2] = 1.0;
+    assert_eq!(pairs(&mesh(&places, &around)), [0, 1, 0, 0, 0]);
+    assert!(began.elapsed().as_secs() < 20, "{:?}", began.elapsed());
 }

@@ -6,7 +6,7 @@ use std::path::Path;
 use serde_json::Value;
 
 use crate::common::liquids::{ball, write_cache};
-use crate::program::{CUBE, works};
+use crate::program::{CUBE, fails, works};
 
 fn report(folder: &Path, options: &str) -> Value {
     serde_json::from_str(&works(folder, &format!("check shot.toml --json -q {options}"))).unwrap()
@@ -67,9 +67,16 @@ fn memory_of_a_mesh_on_a_liquid_is_about_what_check_says() {
     let fine = number(&report(folder, "--set surface.cell=0.25"), "memory_bytes");
     assert!(fine > memory + 10e6, "{fine} after {memory}");
     let warned = report(folder, "--max-memory 50M")["warnings"].to_string();
-    for words in ["particles and 19200 triangles", "needs about", "the limit of 50 MB"] {
+    for words in ["particles and 19200 triangles", "needs about", "the limit of 52 MB", "a run begins all"] {
         assert!(warned.contains(words), "no {words:?} in {warned}");
     }
+}
+
+#[test]
+fn a_surface_has_no_preview() {
+    let folder = tempfile::tempdir().unwrap();
+    liquid(folder.path(), 3.0, 4);
+    fails(folder.path(), "check shot.toml --preview 4", 2, &["--preview is for snow"]);
 }
 
 /// A cube that slides through snow by 0.4 m in 10 frames, with grains and mist.
@@ -121,6 +128,47 @@ fn before_mist_is_made_the_boxes_of_objects_are_filled_with_it() {
     let plain = scene.split_once("[mist]").unwrap().0.to_string() + "[[object]]\nfile = \"cube.obj\"\n";
     fs::write(folder.join("plain.toml"), plain).unwrap();
     assert!(!works(folder, "check plain.toml").contains("mist"));
+}
+
+#[test]
+fn a_long_shot_fills_the_same_boxes() {
+    let folder = tempfile::tempdir().unwrap();
+    let folder = folder.path();
+    snow(folder);
+    let cells = || number(&report(folder, "")["mist"], "cells");
+    let short = cells();
+    let scene = fs::read_to_string(folder.join("shot.toml")).unwrap();
+    let scene = scene.replace("1-10", "1-1100").replace("frame = 10,", "frame = 1100,");
+    fs::write(folder.join("shot.toml"), scene).unwrap();
+    assert_eq!(cells(), short);
+}
+
+#[test]
+fn few_digits_of_a_cell_are_told() {
+    let folder = tempfile::tempdir().unwrap();
+    let folder = folder.path();
+    snow(folder);
+    let text = works(folder, "check shot.toml --set mist.cell=0.026666666666666668 --max-memory 2M");
+    assert!(text.contains(" cells of 0.0267 m, as many as"), "{text}");
+}
+
+#[test]
+fn mist_that_was_not_raised_takes_nothing() {
+    let folder = tempfile::tempdir().unwrap();
+    let folder = folder.path();
+    snow(folder);
+    // No grain is as fast.
+    let calm = "--set mist.from_speed=900";
+    works(folder, &format!("snow shot.toml -o cache -q --frames 1-8 {calm}"));
+    let said = report(folder, &format!("-o cache {calm}"));
+    assert_eq!(said["mist"]["made_to_frame"], Value::Null, "it might be raised in the last two");
+    works(folder, &format!("snow shot.toml -o cache -q {calm}"));
+    let said = report(folder, &format!("-o cache {calm}"));
+    assert_eq!(said["mist"]["made_to_frame"], 10, "{said}");
+    assert_eq!(said["mist"]["cells"], 0, "{said}");
+    let text = works(folder, &format!("check shot.toml -o cache {calm}"));
+    assert!(text.contains("none is raised, as it was made up to frame 10: 0 cells"), "{text}");
+    assert!(!text.contains("known when it is made"), "{text}");
 }
 
 #[test]

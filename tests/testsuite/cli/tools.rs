@@ -156,6 +156,32 @@ fn mesh_check_tells_solids_from_other_meshes() {
     assert!(report["crossings"].as_u64().unwrap() >= 8, "{report}");
     assert_eq!((&report["embedded"], &report["by_index"]["watertight"]), (&false.into(), &true.into()));
     fails(folder.path(), "mesh check none.stl", &["none.stl"]);
+    assert!(
+        works(folder.path(), "mesh check box.obj").contains("8 vertices, 12 triangles, 1 part, genus 0\n")
+    );
+    // What is known of a file is said before another is at fault.
+    let output = program::frazil(folder.path(), "mesh check box.obj none.stl");
+    program::complains(&output, 2, &["none.stl"]);
+    assert!(String::from_utf8(output.stdout).unwrap().starts_with("box.obj: a solid\n"));
+}
+
+#[test]
+fn mesh_check_finds_parts_that_vanish() {
+    let folder = folder();
+    let [mut two, second] = [0.0, 2.0].map(|x| TriMesh::cuboid([x, 0.0, 0.0], [x + 1.0, 1.0, 1.0]));
+    // Mirrored, and so inside out.
+    two.append(&second.reversed());
+    let report = faults(folder.path(), &two);
+    assert_eq!((&report["solid"], &report["inverted_parts"]), (&false.into(), &1.into()));
+    let said = works(folder.path(), "mesh check mesh.ply");
+    assert!(said.contains("mesh.ply: not a solid as it is\n"), "{said}");
+    assert!(said.contains("1 part is inside out: it vanishes where the mesh is used\n"), "{said}");
+    // Area and volume are those of the triangles that count.
+    let mut doubled = TriMesh::cuboid([0.0; 3], [1.0; 3]);
+    doubled.triangles.extend_from_within(..6);
+    let report = faults(folder.path(), &doubled);
+    assert_eq!((&report["area_m2"], &report["volume_m3"]), (&6.0.into(), &1.0.into()));
+    assert_eq!((&report["doubled_triangles"], &report["solid"]), (&6.into(), &true.into()));
 }
 
 #[test]
@@ -176,10 +202,10 @@ fn mesh_check_says_what_joining_vertices_by_place_hides() {
     let [mut two, second] = [[-1.0, 0.0], [0.0, 1.0]].map(|[low, high]| TriMesh::cuboid([low; 3], [high; 3]));
     two.append(&second);
     let report = faults(folder.path(), &two);
-    assert_eq!((&report["pinched_vertices"], &report["embedded"]), (&1.into(), &true.into()));
+    assert_eq!((&report["non_manifold_vertices"], &report["embedded"]), (&1.into(), &true.into()));
     assert_eq!((&report["genus"], &report["by_index"]["watertight"]), (&0.into(), &true.into()));
     let said = works(folder.path(), "mesh check mesh.ply");
-    assert!(said.contains("1 vertices whose triangles form no single fan\n"), "{said}");
+    assert!(said.contains("1 non-manifold vertex: its triangles form no single fan\n"), "{said}");
 }
 
 #[test]

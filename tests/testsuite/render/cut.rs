@@ -5,9 +5,10 @@ use std::path::Path;
 
 use frazil::base::blocks::{Block, BlockEdit};
 use frazil::io::mesh;
+use frazil::render::Field;
 use frazil::vdb::file::WriteOptions;
 use frazil::vdb::{FloatGrid, GridClass, file};
-use frazil::{Context, Pool};
+use frazil::{Context, Error, Pool};
 
 use crate::common::shapes::sphere;
 use crate::picture::Picture;
@@ -109,28 +110,53 @@ fn a_mesh_is_a_line_on_the_colours_of_a_grid() {
     assert!(count as f64 > expected, "{count}");
 }
 
-#[test]
-fn a_fog_goes_from_nothing_to_its_greatest_density() {
-    let folder = tempfile::tempdir().unwrap();
+/// A fog of 8 voxels of 0.1 m along each axis, whose values are 0 to 7 times `step` along x.
+fn steps(step: f32) -> FloatGrid {
     let mut fog = FloatGrid::new(0.1, 0.0).unwrap();
-    // Densities 0 to 7 along x: voxel (x, y, z) lies at x << 6 | y << 3 | z.
-    let values = Box::new(std::array::from_fn(|n| (n >> 6) as f32));
+    // Voxel (x, y, z) lies at x << 6 | y << 3 | z.
+    let values = Box::new(std::array::from_fn(|n| (n >> 6) as f32 * step));
     let block = Block { origin: [0; 3], values, mask: [u64::MAX; 8] };
     let ctx = Context::new(Pool::new(1).unwrap());
     fog.replace_blocks(&ctx, &[BlockEdit::Dense(block)]).unwrap();
     fog.set_class(GridClass::Fog).unwrap();
     fog.set_name("density").unwrap();
-    file::write(&folder.path().join("fog.vdb"), &[&fog], &WriteOptions::default()).unwrap();
-    let picture = picture(folder.path(), "fog.vdb --cut z=0.35 --size 160x90");
+    fog
+}
+
+/// The pixels of a cut through such a fog, ascending along x from its first voxel to its last, and what the command says.
+fn along(step: f32) -> (Vec<[u8; 3]>, String) {
+    let folder = tempfile::tempdir().unwrap();
+    file::write(&folder.path().join("fog.vdb"), &[&steps(step)], &WriteOptions::default()).unwrap();
+    let said = works(folder.path(), "preview fog.vdb --cut z=0.35 --size 160x90 -v -o cut.png");
+    let picture = Picture::open(&folder.path().join("cut.png"));
     // Its voxels, 0.8 m of them around x = 0.35 m, fill the height but for 4 % at each edge.
     let x = |column: usize| 0.35 + (column as f64 + 0.5 - 80.0) * 0.8 / 0.92 / 90.0;
-    let seen: Vec<[u8; 3]> =
-        (0..160).filter(|c| (0.0..=0.7).contains(&x(*c))).map(|c| picture.pixel(c, 45)).collect();
-    assert!(seen.len() > 60);
-    assert!(seen.is_sorted_by_key(|rgb| rgb[0]), "{seen:?}");
-    let ends = [(seen[0], LEAST), (seen[seen.len() - 1], GREATEST)];
-    // The ends lie up to a pixel inside.
-    assert!(ends.iter().all(|(a, b)| (0..3).all(|n| a[n].abs_diff(b[n]) <= 6)), "{ends:?}");
+    let inside = (0..160).filter(|c| (0.0..=0.7).contains(&x(*c)));
+    (inside.map(|c| picture.pixel(c, 45)).collect(), said)
+}
+
+#[test]
+fn the_values_of_a_fog_and_0_have_all_colours() {
+    for (step, range) in [(1.0, "from 0, dark blue, to 7,"), (-1.0, "from -7, dark blue, to 0,")] {
+        let (mut seen, said) = along(step);
+        assert!(said.contains(range), "{said}");
+        if step < 0.0 {
+            seen.reverse();
+        }
+        assert!(seen.len() > 60);
+        assert!(seen.is_sorted_by_key(|rgb| rgb[0]), "{seen:?}");
+        let ends = [(seen[0], LEAST), (seen[seen.len() - 1], GREATEST)];
+        // The ends lie up to a pixel inside.
+        assert!(ends.iter().all(|(a, b)| (0..3).all(|n| a[n].abs_diff(b[n]) <= 6)), "{ends:?}");
+    }
+}
+
+#[test]
+fn leaves_are_listed_within_the_limit_of_memory() {
+    let ctx = Context::new(Pool::new(1).unwrap());
+    assert!(Field::grid(&ctx, steps(1.0)).is_ok());
+    ctx.set_memory_limit(40);
+    assert!(matches!(Field::grid(&ctx, steps(1.0)), Err(Error::Memory { .. })));
 }
 
 #[test]

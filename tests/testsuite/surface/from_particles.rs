@@ -210,12 +210,15 @@ fn what_cannot_be_cut_out_is_refused_before_any_work() {
     fails(folder, &format!("{frames} --subtract fog.%04d.vdb"), 2, &["fog.0002.vdb", "no level set"]);
     for (options, words) in [
         ("--radius 0.1", "--method spheres"),
-        ("--method spheres --radius 0.05", "1.5 to 100"),
+        ("--method spheres --radius 6", "1.5 to 100"),
+        ("--method spheres --radius 0.025 --cell 0.025", "--radius 0.025 m is 1.000 cells"),
         ("--method spheres --cell 0.08", "1.5 to 100"),
         ("--method spheres --cell 0.01 --max-memory 1M", "limit"),
     ] {
         fails(folder, &format!("{make} {options}"), 2, &[words]);
     }
+    // A file for each frame tells no frame.
+    fails(folder, &format!("{make} --subtract gap.%04d.vdb"), 2, &["gap.%04d.vdb", "needs --frames"]);
     let made = |name: &str| folder.join(name).exists();
     assert!(!made("out.ply") && !made("out.vdb") && !made("out.0001.ply"));
     // A solid is not written over.
@@ -235,4 +238,86 @@ fn where_solids_take_all_nothing_is_left_and_said() {
     assert!(grid.value([0; 3]) > 0.0);
     let mesh = level_set::to_mesh(&context(1), &grid, 0.0, 0.0).unwrap();
     assert_eq!(mesh.triangles.len(), 0);
+    // Files of nothing are files all the same.
+    for name in ["none.ply", "none.obj"] {
+        let make = "vdb from-particles drop.bgeo --spacing 0.1 --subtract all.vdb";
+        works(folder, &format!("{make} --mesh {name}"));
+    }
+    let ply = fs::read_to_string(folder.join("none.ply")).unwrap();
+    assert!(ply.contains("element vertex 0") && !ply.contains("vx"), "{ply}");
+    assert!(fs::read_to_string(folder.join("none.obj")).unwrap().starts_with('#'));
+}
+
+#[test]
+fn of_a_huge_solid_only_what_lies_in_the_liquid_counts() {
+    let folder = tempfile::tempdir().unwrap();
+    let folder = folder.path();
+    write_drop(folder, "drop.bgeo");
+    // On the liquid's cells its surface would take terabytes.
+    let huge = TriMesh::cuboid([0.0, -2000.0, -2000.0], [4000.0, 2000.0, 2000.0]);
+    mesh::write(&folder.join("huge.obj"), &huge).unwrap();
+    works(folder, "vdb from-mesh huge.obj --cell 50 -o huge.vdb");
+    let make = "vdb from-particles drop.bgeo --spacing 0.1";
+    works(folder, &format!("{make} --mesh whole.ply"));
+    works(folder, &format!("{make} --subtract huge.vdb --mesh cut.ply"));
+    let [whole, cut] = ["whole.ply", "cut.ply"].map(|name| read(folder, name));
+    assert!(cut.is_closed());
+    near(cut.volume(), 0.5 * whole.volume(), 0.03);
+    assert!(cut.bounds().unwrap().1.x < 0.01 * CELL as f32);
+    // Its vertices lie beyond what can be counted in cells.
+    mesh::write(&folder.join("far.obj"), &TriMesh::cuboid([0.0; 3], [9000.0; 3])).unwrap();
+    works(folder, "vdb from-mesh far.obj --cell 100 -o far.vdb");
+    fails(folder, &format!("{make} --subtract far.vdb --mesh far.ply"), 2, &["far.vdb", "reach"]);
+}
+
+#[test]
+fn all_level_sets_of_a_file_are_cut_out() {
+    let folder = tempfile::tempdir().unwrap();
+    let folder = folder.path();
+    write_drop(folder, "drop.bgeo");
+    let halves = [("one", 0), ("other", 1)].map(|(name, axis)| {
+        write_half(folder, "half.vdb", axis, "--cell 0.04");
+        let mut grid = file::read_named(&folder.join("half.vdb"), None).unwrap();
+        grid.set_name(name).unwrap();
+        grid
+    });
+    let [one, other] = &halves;
+    file::write(&folder.join("both.vdb"), &[one, other], &WriteOptions::default()).unwrap();
+    let make = "vdb from-particles drop.bgeo --spacing 0.1";
+    works(folder, &format!("{make} --mesh whole.ply"));
+    works(folder, &format!("{make} --subtract both.vdb --mesh cut.ply"));
+    near(read(folder, "cut.ply").volume(), 0.25 * read(folder, "whole.ply").volume(), 0.05);
+}
+
+#[test]
+fn options_that_would_do_nothing_are_refused() {
+    let folder = tempfile::tempdir().unwrap();
+    let folder = folder.path();
+    let places = filled(SPACING, 0.1, 1.0, |place| place.norm() < 0.4);
+    let mut points = Points::at(1.0, &places).unwrap();
+    let speed = Values::Vector(Column::Each(vec![[1.0, 2.0, 3.0]; places.len()]));
+    points.attributes.push(Attribute { name: "v".into(), values: speed });
+    for name in ["vx", "y"] {
+        let values = Values::Float(Column::Each(vec![4.0; places.len()]));
+        points.attributes.push(Attribute { name: name.into(), values });
+    }
+    particles::write(&folder.join("drop.bgeo"), &points, false).unwrap();
+    let make = "vdb from-particles drop.bgeo --spacing 0.1 --mesh out.ply";
+    for option in ["--half", "--compression zip", "--name water"] {
+        fails(folder, &format!("{make} {option}"), 2, &["--output"]);
+    }
+    for (names, twice) in [("v,vx", "\"vx\""), ("y", "\"y\""), ("all", "two arrays")] {
+        fails(folder, &format!("{make} --attributes {names}"), 2, &["drop.bgeo", twice]);
+    }
+    assert!(!folder.join("out.ply").exists());
+    works(folder, &format!("{make} --attributes vx"));
+}
+
+#[test]
+fn cells_follow_small_spheres() {
+    let folder = tempfile::tempdir().unwrap();
+    let folder = folder.path();
+    fs::write(folder.join("one.xyz"), "0 0 0\n").unwrap();
+    works(folder, "vdb from-particles one.xyz --method spheres --spacing 0.2 --radius 0.12 --mesh out.ply");
+    near(read(folder, "out.ply").volume(), 4.0 / 3.0 * PI * 0.12f64.powi(3), 0.35);
 }

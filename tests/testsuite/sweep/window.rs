@@ -3,7 +3,7 @@
 use crate::common::shapes;
 use frazil::base::DVec3;
 use frazil::motion::{Key, Keys, Rigid};
-use frazil::sweep::{Body, Lattice, UNITS, Window};
+use frazil::sweep::{Body, Lattice, Settings, UNITS, Window, voxelise, voxelise_within};
 use frazil::{Context, Pool};
 
 const CELL: f64 = 0.02;
@@ -23,4 +23,24 @@ fn what_rolls_out_of_the_window_is_cut_no_finer_within() {
     // The first half of the way lies in the smaller one.
     let [part, all] = [faces(30), faces(200)];
     assert!(part < all && part > all / 10, "{part} faces in a part of the way, {all} in all of it");
+}
+
+#[test]
+fn in_a_box_of_voxels_a_solid_is_as_the_whole_one() {
+    let ctx = Context::new(Pool::new(2).unwrap());
+    let globe = shapes::globe(0.2, 48, 24);
+    let settings = Settings::new(CELL);
+    let whole = voxelise(&ctx, globe.clone(), &settings).unwrap();
+    // From outside to the depth, below its top; wholly inside; beside it.
+    for [low, high] in [[[-3, -4, -20], [12, 2, 5]], [[-1; 3], [1; 3]], [[20; 3], [30; 3]]] {
+        let part = voxelise_within(&ctx, globe.clone(), &settings, [low, high]).unwrap();
+        for x in low[0]..=high[0] {
+            for y in low[1]..=high[1] {
+                for z in low[2]..=high[2] {
+                    let [one, two] = [&whole, &part].map(|grid| grid.value([x, y, z]));
+                    assert!((one - two).abs() < 1e-3 * CELL as f32, "{one} is not {two} at {x} {y} {z}");
+                }
+            }
+        }
+    }
 }

@@ -2,15 +2,17 @@
 
 use std::path::{Path, PathBuf};
 
+use frazil::base::TriMesh;
 use frazil::io::sequence::Pattern;
 use frazil::scene::FrameChoice;
 use frazil::surface::HALF_WIDTH;
+use frazil::sweep::{Settings, voxelise_within};
+use frazil::vdb::file::GridInfo;
 use frazil::vdb::level_set::{difference, to_mesh};
 use frazil::vdb::{FloatGrid, file};
-use frazil::{Error, Result};
+use frazil::{Context, Error, Result};
 
 use super::of_frame;
-use super::shape::level_set_of;
 use crate::cli::session::Session;
 use crate::cli::vdb::{far_mesh, read_level_set};
 
@@ -21,8 +23,18 @@ const ROUNDING: f64 = 1e-6;
 struct Collider {
     path: PathBuf,
     is_sequence: bool,
-    /// What the next frame takes instead of reading a file.
-    known: Option<FloatGrid>,
+    /// What the first frame takes instead of reading its file.
+    first: Option<Vec<FloatGrid>>,
+    /// Those of the frame before, or of all frames.
+    solids: Vec<Solid>,
+}
+
+/// A solid that a liquid may be cut by.
+enum Solid {
+    /// On the liquid's cells, with a band as wide.
+    Ready(FloatGrid),
+    /// The surface, of which the part within the liquid is made anew.
+    Surface(TriMesh),
 }
 
 /// All solids that are cut out.
@@ -36,8 +48,8 @@ impl Colliders {
             if is_sequence {
                 frames.iter().try_for_each(|frame| check(&of_frame(path, frame)))?;
             }
-            let known = Some(read(&of_frame(path, frames.first()))?);
-            Ok(Collider { path: path.clone(), is_sequence, known })
+            let first = Some(read(&of_frame(path, frames.first()))?);
+            Ok(Collider { path: path.clone(), is_sequence, first, solids: Vec::new() })
         };
         paths.iter().map(open).collect::<Result<_>>().map(Self)
     }
@@ -49,55 +61,114 @@ impl Colliders {
 
     /// Cuts those of a frame out of a liquid.
     pub fn cut(&mut self, session: &Session, liquid: &mut FloatGrid, frame: i32) -> Result<()> {
-        let ctx = &session.ctx;
-        for collider in &mut self.0 {
+        self.0.iter_mut().try_for_each(|collider| {
             let path = of_frame(&collider.path, frame);
-            let grid = match collider.known.take() {
-                Some(grid) => grid,
-                None => read(&path)?,
+            collider.cut(&session.ctx, liquid, &path).map_err(|error| of_solid(&path, error))
+        })
+    }
+}
+
+impl Collider {
+    /// Cuts what a frame's file holds out of a liquid.
+    fn cut(&mut self, ctx: &Context, liquid: &mut FloatGrid, path: &Path) -> Result<()> {
+        let cell = liquid.voxel_size();
+        if self.is_sequence || self.solids.is_empty() {
+            let grids = match self.first.take() {
+                Some(grids) => grids,
+                None => read(path)?,
             };
-            let solid = fitted(session, grid, &path, liquid.voxel_size())?;
-            if !collider.is_sequence {
-                collider.known = Some(solid.deep_copy()?);
-            }
+            let solid = |grid: FloatGrid| Solid::new(ctx, grid, path, cell);
+            self.solids = grids.into_iter().map(solid).collect::<Result<_>>()?;
+        }
+        for solid in &self.solids {
+            // Nothing may be left by those before.
+            let Some((low, high)) = liquid.active_bbox() else { return Ok(()) };
+            let solid = solid.within(ctx, [low, high], cell)?;
             ctx.phase("subtract", || difference(ctx, liquid, solid))?;
         }
         Ok(())
     }
 }
 
-/// Refuses a file that has no level set, by its description alone.
-fn check(path: &Path) -> Result<()> {
-    let grids = file::describe(path)?;
-    if grids.iter().any(|grid| grid.class == "level set") {
-        return Ok(());
+impl Solid {
+    /// A solid for a liquid of cells of an edge (m).
+    fn new(ctx: &Context, grid: FloatGrid, path: &Path, cell: f64) -> Result<Self> {
+        let width = f64::from(HALF_WIDTH) * cell;
+        let is_same = |a: f64, b: f64| (a - b).abs() <= ROUNDING * b;
+        // Combining asks for cells that are the same to nine digits.
+        let has_cells = grid.is_world_fixed() && (grid.voxel_size() - cell).abs() <= 1e-9 * cell;
+        if has_cells && is_same(f64::from(grid.background()), width) {
+            return Ok(Self::Ready(grid));
+        }
+        let surface = ctx.phase("collider", || to_mesh(ctx, &grid, 0.0, 0.0))?;
+        if let Some(what) = far_mesh(path, &surface, cell) {
+            log::warn!("{what}");
+        }
+        if !surface.is_closed() {
+            let (path, name) = (path.display(), grid.name());
+            log::warn!("{path}: grid \"{name}\" is cut off: its holes are closed by cones");
+        }
+        Ok(Self::Surface(surface))
     }
-    Err(Error::file(path, "holds no level set"))
+
+    /// Its level set in a box of a liquid's voxels, on its cells of an edge (m).
+    fn within(&self, ctx: &Context, bounds: [[i32; 3]; 2], cell: f64) -> Result<FloatGrid> {
+        match self {
+            Self::Ready(grid) => grid.deep_copy(),
+            Self::Surface(mesh) if mesh.triangles.is_empty() => FloatGrid::level_set(cell, HALF_WIDTH),
+            Self::Surface(mesh) => {
+                let settings = Settings { half_width: HALF_WIDTH, ..Settings::new(cell) };
+                voxelise_within(ctx, mesh.clone(), &settings, bounds)
+            }
+        }
+    }
 }
 
-fn read(path: &Path) -> Result<FloatGrid> {
-    let grid = read_level_set(path, None)?;
+/// An error that arose while a solid was cut out, with the name of its file.
+fn of_solid(path: &Path, error: Error) -> Error {
+    let path = path.display();
+    match error {
+        Error::Memory { needed, limit, .. } => {
+            Error::Memory { what: format!("{path}: the solid on the liquid's cells"), needed, limit }
+        }
+        Error::Argument(what) => Error::Argument(format!("{path}: {what}")),
+        Error::OpenVdb(what) => Error::OpenVdb(format!("{path}: {what}")),
+        other => other,
+    }
+}
+
+/// The names of the level sets of a file, in their order.
+fn names(grids: Vec<GridInfo>) -> Vec<String> {
+    let is_solid = |grid: &GridInfo| grid.class == "level set" && grid.value_type.starts_with("Tree_float");
+    grids.into_iter().filter(is_solid).map(|grid| grid.name).collect()
+}
+
+/// Refuses a file that has no level set, by its description alone.
+fn check(path: &Path) -> Result<()> {
+    if names(file::describe(path)?).is_empty() {
+        return Err(Error::file(path, "holds no level set"));
+    }
+    Ok(())
+}
+
+/// All level sets of a file.
+fn read(path: &Path) -> Result<Vec<FloatGrid>> {
+    let names = names(file::describe(path)?);
+    if let Some(twice) = names.windows(2).find(|pair| pair[0] == pair[1]) {
+        return Err(Error::file(path, format!("has two level sets \"{}\": give them other names", twice[0])));
+    }
+    if names.len() < 2 {
+        return Ok(vec![solid(path, None)?]);
+    }
+    names.iter().map(|name| solid(path, Some(name))).collect()
+}
+
+fn solid(path: &Path, name: Option<&str>) -> Result<FloatGrid> {
+    let grid = read_level_set(path, name)?;
     if grid.background() > 0.0 {
         return Ok(grid);
     }
     let what =
         format!("grid \"{}\" is solid everywhere outside of its voxels: turn it inside out", grid.name());
     Err(Error::file(path, what))
-}
-
-/// A solid on the liquid's cells (m), with a band as wide as the liquid's: what lies otherwise is made anew from its surface.
-fn fitted(session: &Session, grid: FloatGrid, path: &Path, cell: f64) -> Result<FloatGrid> {
-    let width = f64::from(HALF_WIDTH) * cell;
-    let is_same = |a: f64, b: f64| (a - b).abs() <= ROUNDING * b;
-    // Combining asks for cells that are the same to nine digits.
-    let has_cells = grid.is_world_fixed() && (grid.voxel_size() - cell).abs() <= 1e-9 * cell;
-    if has_cells && is_same(f64::from(grid.background()), width) {
-        return Ok(grid);
-    }
-    let ctx = &session.ctx;
-    let mesh = ctx.phase("collider", || to_mesh(ctx, &grid, 0.0, 0.0))?;
-    if let Some(what) = far_mesh(path, &mesh, cell) {
-        log::warn!("{what}");
-    }
-    level_set_of(session, mesh, cell)
 }

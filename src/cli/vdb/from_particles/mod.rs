@@ -18,7 +18,7 @@ use frazil::io::mesh::extension;
 use frazil::io::particles::{self, Cloud};
 use frazil::io::sequence::Pattern;
 use frazil::scene::{FrameChoice, Frames};
-use frazil::surface::{estimate_spacing, rough_spacing, specks, transfer};
+use frazil::surface::{estimate_spacing, greatest_sphere_cell, rough_spacing, specks, transfer};
 use frazil::vdb::file;
 use frazil::vdb::level_set::to_mesh;
 use frazil::{Context, Error, Result};
@@ -42,7 +42,8 @@ pub struct Args {
     /// Initial distance between particles (m) [default: estimated, and said]
     #[arg(long, value_name = "M", value_parser = positive)]
     spacing: Option<f64>,
-    /// Edge of a voxel (m), 1/8 to 2 spacings, of spheres at most 2/3 of their radius [default: half a spacing]
+    /// Edge of a voxel (m), 1/8 to 2 spacings; of spheres 1/100 to 2/3 of their radius [default: half a spacing; of spheres at most
+    /// 2/3 of their radius]
     #[arg(long, value_name = "M", value_parser = positive)]
     cell: Option<f64>,
     /// How particles become a surface
@@ -81,7 +82,7 @@ pub struct Args {
     #[arg(long, value_name = "FILE")]
     mesh: Option<PathBuf>,
     /// Name of the grid in the file
-    #[arg(long, value_name = "NAME", default_value = "surface")]
+    #[arg(long, value_name = "NAME", default_value = "surface", requires = "output")]
     name: String,
     #[command(flatten)]
     packing: Packing,
@@ -191,16 +192,17 @@ impl Args {
     }
 
     fn frames(&self, is_sequence: bool) -> std::result::Result<FrameChoice, Failure> {
-        match &self.frames {
-            None if is_sequence => {
-                let what = format!("{}: a sequence needs --frames A-B", self.particles.display());
+        let sequence = self.inputs().find(|path| Pattern::parse(path).is_some());
+        match (&self.frames, sequence) {
+            (None, Some(path)) => {
+                let what = format!("{}: a sequence needs --frames A-B", path.display());
                 Err(Failure::refused(what))
             }
-            Some(frames) if !is_sequence && frames.count() > 1 => {
+            (Some(frames), _) if !is_sequence && frames.count() > 1 => {
                 Err(Failure::refused("several --frames are of no use with one file of particles"))
             }
-            Some(frames) => Ok(frames.clone()),
-            None => Ok(FrameChoice::from(Frames { first: 1, last: 1 })),
+            (Some(frames), _) => Ok(frames.clone()),
+            (None, None) => Ok(FrameChoice::from(Frames { first: 1, last: 1 })),
         }
     }
 
@@ -273,7 +275,27 @@ impl Args {
                 _ => {}
             }
         }
+        let is_taken = |n: &usize| {
+            let name = &out[*n].0;
+            ["x", "y", "z"].contains(&&name[..]) || out[..*n].iter().any(|(other, _)| other == name)
+        };
+        if let Some(n) = (0..out.len()).find(is_taken) {
+            let what =
+                format!("the mesh would have two arrays \"{}\": name others with --attributes", out[n].0);
+            return Err(Error::file(path, what));
+        }
         Ok(out)
+    }
+
+    /// How the surface of particles of a spacing (m) is made.
+    fn recipe(&self, spacing: f64) -> Recipe {
+        let radius = self.radius.unwrap_or(spacing);
+        let cell = match self.method {
+            Method::Solenthaler => 0.5 * spacing,
+            Method::Spheres => greatest_sphere_cell(radius).min(0.5 * spacing),
+        };
+        let cell = self.cell.unwrap_or(cell);
+        Recipe { method: self.method, spacing, cell, radius, passes: self.smooth }
     }
 
     /// Makes the files of a frame.
@@ -285,13 +307,7 @@ impl Args {
         (frame, colliders): (i32, &mut Colliders),
     ) -> Result<TriMesh> {
         let ctx = &session.ctx;
-        let recipe = Recipe {
-            method: self.method,
-            spacing,
-            cell: self.cell.unwrap_or(0.5 * spacing),
-            radius: self.radius.unwrap_or(spacing),
-            passes: self.smooth,
-        };
+        let recipe = self.recipe(spacing);
         let wants_grid = self.output.is_some() || !colliders.is_empty();
         let (mut mesh, mut grid) = recipe.surface(session, places, wants_grid)?;
         if !colliders.is_empty()
@@ -327,6 +343,9 @@ fn means(
     mesh: &TriMesh,
     columns: &[(String, Vec<f32>)],
 ) -> Result<Vec<MeshArray>> {
+    if columns.is_empty() {
+        return Ok(Vec::new());
+    }
     let vertices: Vec<DVec3> = mesh.positions.iter().map(|place| place.cast()).collect();
     let numbers: Vec<Vec<f32>> = columns.iter().map(|(_, numbers)| numbers.clone()).collect();
     let means = transfer(ctx, places, spacing, &vertices, &numbers)?;

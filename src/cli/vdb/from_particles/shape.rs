@@ -1,12 +1,14 @@
 //! The surface of one frame: a mesh, and the level set that fits it.
 
 use clap::ValueEnum;
-use frazil::Result;
 use frazil::base::{DVec3, TriMesh};
-use frazil::surface::{Distances, HALF_WIDTH, Implicit, Isosurface, level_set, smooth, spheres};
+use frazil::surface::{
+    Distances, HALF_WIDTH, Implicit, Isosurface, is_sphere_radius, level_set, smooth, spheres,
+};
 use frazil::sweep::{Settings, voxelise};
 use frazil::vdb::FloatGrid;
 use frazil::vdb::level_set::to_mesh;
+use frazil::{Error, Result};
 
 use crate::cli::session::Session;
 use crate::cli::vdb::check_surface;
@@ -58,8 +60,14 @@ impl Recipe {
     }
 
     fn union(&self, session: &Session, places: &[DVec3]) -> Result<TriMesh> {
-        let ctx = &session.ctx;
-        let grid = ctx.phase("spheres", || spheres(ctx, places, self.radius, self.cell))?;
+        let (ctx, radius, cell) = (&session.ctx, self.radius, self.cell);
+        if !is_sphere_radius(radius, cell) {
+            let cells = radius / cell;
+            return Err(Error::argument(format!(
+                "--radius {radius} m is {cells:.3} cells of {cell} m, and must be 1.5 to 100 cells; --cell sets them"
+            )));
+        }
+        let grid = ctx.phase("spheres", || spheres(ctx, places, radius, cell))?;
         ctx.phase("mesh", || to_mesh(ctx, &grid, 0.0, 0.0))
     }
 
@@ -84,7 +92,7 @@ impl Recipe {
 }
 
 /// The level set of the solid that a mesh bounds, on cells of an edge (m); an empty one of an empty mesh.
-pub fn level_set_of(session: &Session, mesh: TriMesh, cell: f64) -> Result<FloatGrid> {
+fn level_set_of(session: &Session, mesh: TriMesh, cell: f64) -> Result<FloatGrid> {
     if mesh.triangles.is_empty() {
         return FloatGrid::level_set(cell, HALF_WIDTH);
     }
