@@ -60,7 +60,7 @@ pub use smooth::smooth;
 pub use spacing::{estimate as estimate_spacing, rough as rough_spacing};
 pub use specks::specks;
 #[cfg(feature = "vdb")]
-pub use spheres::{greatest_sphere_cell, is_sphere_radius, spheres};
+pub use spheres::{is_sphere_radius, spheres};
 pub use tracker::{Params, StepReport, Tracker};
 pub use transfer::transfer;
 

@@ -28,11 +28,6 @@ pub fn is_sphere_radius(radius: f64, cell: f64) -> bool {
     (LEAST * (1.0 - ROUNDING)..=MOST).contains(&(radius / cell))
 }
 
-/// The greatest cell (m) for spheres of a radius (m).
-pub fn greatest_sphere_cell(radius: f64) -> f64 {
-    radius / LEAST
-}
-
 /// Level set (m) of the union of spheres of a radius (m) around places (m), on cells of `cell` (m), with a band of three of them on
 /// each side. Where spheres overlap, values inside are nearer to 0 than the true distance.
 ///

@@ -18,7 +18,7 @@ use frazil::io::mesh::extension;
 use frazil::io::particles::{self, Cloud};
 use frazil::io::sequence::Pattern;
 use frazil::scene::{FrameChoice, Frames};
-use frazil::surface::{estimate_spacing, greatest_sphere_cell, rough_spacing, specks, transfer};
+use frazil::surface::{estimate_spacing, rough_spacing, specks, transfer};
 use frazil::vdb::file;
 use frazil::vdb::level_set::to_mesh;
 use frazil::{Context, Error, Result};
@@ -43,7 +43,7 @@ pub struct Args {
     #[arg(long, value_name = "M", value_parser = positive)]
     spacing: Option<f64>,
     /// Edge of a voxel (m), 1/8 to 2 spacings; of spheres 1/100 to 2/3 of their radius [default: half a spacing; of spheres at most
-    /// 2/3 of their radius]
+    /// a third of their radius]
     #[arg(long, value_name = "M", value_parser = positive)]
     cell: Option<f64>,
     /// How particles become a surface
@@ -87,6 +87,9 @@ pub struct Args {
     #[command(flatten)]
     packing: Packing,
 }
+
+/// Cells in the radius of a sphere, unless `--cell` says otherwise: with half of them a drop alone loses a third of its volume.
+const SPHERE_CELLS: f64 = 3.0;
 
 /// Runs the command.
 pub fn run(args: &Args, session: &Session) -> std::result::Result<(), Failure> {
@@ -292,7 +295,7 @@ impl Args {
         let radius = self.radius.unwrap_or(spacing);
         let cell = match self.method {
             Method::Solenthaler => 0.5 * spacing,
-            Method::Spheres => greatest_sphere_cell(radius).min(0.5 * spacing),
+            Method::Spheres => (radius / SPHERE_CELLS).min(0.5 * spacing),
         };
         let cell = self.cell.unwrap_or(cell);
         Recipe { method: self.method, spacing, cell, radius, passes: self.smooth }
