@@ -313,7 +313,7 @@ mod tests {
     #[test]
     fn zeros_of_cubics_are_exact_and_kinks_are_straight() {
         for root in [0.05, 0.4, 0.93] {
-            let value = |t: f32| (t - root) * (1.0 + 0.15 * t + 0.02 * t * t);
+            let value = |t: f32| (t - root) * (1.0 + 0.08 * t + 0.01 * t * t);
             let at = zero([Some(value(-1.0)), Some(value(2.0))], value(0.0), value(1.0));
             assert!((at - root).abs() < 1e-4, "{at} for {root}");
             let at = zero([Some(-value(-1.0)), Some(-value(2.0))], -value(0.0), -value(1.0));
