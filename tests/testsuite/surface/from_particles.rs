@@ -90,7 +90,7 @@ fn smoothing_keeps_the_volume_takes_lumps_away_and_the_level_set_follows() {
     let folder = folder.path();
     write_drop(folder, "drop.bgeo");
     for (method, parts) in [("solenthaler", [0.95, 0.93]), ("spheres", [0.9, 0.65])] {
-        let make = format!("vdb from-particles drop.bgeo --method {method} --spacing 0.1");
+        let make = format!("vdb from-particles drop.bgeo --method {method} --spacing 0.1 --cell 0.05");
         works(folder, &format!("{make} --mesh rough.ply"));
         let rough = read(folder, "rough.ply");
         for (passes, part) in [5, 25].into_iter().zip(parts) {
