@@ -81,14 +81,15 @@ impl Cover<'_> {
         places.iter().for_each(|place| around(bin_of(place, slack)).for_each(|bin| wanted.set(bin)));
         let in_bins = |(chunk, triangles): (usize, &[[u32; 3]])| {
             ctx.check()?;
-            let mut out = Vec::new();
+            let (mut out, mut bins) = (Vec::new(), Vec::new());
             for (triangle, index) in triangles.iter().zip((chunk * GRAIN) as u32..) {
                 let Some(corners) = self.corners(triangle) else { continue };
-                each_bin(corners, slack, |bin| {
-                    if wanted.has(bin) {
-                        out.push((bin, index));
-                    }
-                });
+                bins.clear();
+                each_bin(corners, slack, |bin| bins.push(bin));
+                // Parts of a long triangle share most of theirs.
+                bins.sort_unstable();
+                bins.dedup();
+                out.extend(bins.iter().filter(|bin| wanted.has(**bin)).map(|bin| (*bin, index)));
             }
             Ok(out)
         };
