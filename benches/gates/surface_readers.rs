@@ -10,6 +10,7 @@ use frazil::io::particles::{self, Cloud};
 use frazil::vdb::file::{Compression, WriteOptions};
 use frazil::vdb::guard::Guard;
 use frazil::vdb::points::to_bytes;
+use rayon::prelude::*;
 
 use crate::common::caches::{IDS, PLACES, VELOCITIES, samples};
 use crate::common::{character, clients};
@@ -144,8 +145,17 @@ fn are_same(path: &Path, ours: &[Particle], theirs: &[Particle]) -> bool {
 
 fn crashes(h: &mut Harness) {
     let (mut accepted, mut failed) = (Vec::new(), Vec::new());
-    for ending in KINDS {
+    let one = |ending: &&'static str| {
         let tried = damage::tried(&format!("{KIND}{ending}"), INPUTS);
+        println!(
+            "# .{ending}: {INPUTS} damaged files, {} accepted, {} failed",
+            tried.accepted,
+            tried.failed.len()
+        );
+        (*ending, tried)
+    };
+    let all: Vec<_> = KINDS.par_iter().map(one).collect();
+    for (ending, tried) in all {
         accepted.push(format!(".{ending} {}", tried.accepted));
         failed.extend(tried.failed.iter().map(|which| format!(".{ending} {which}")));
     }

@@ -385,9 +385,14 @@ pub fn clip(kind: &str, frame: i32, fps: f64, units: Units, meshes: &[MeshFrame]
 }
 
 fn row(out: &mut String, p: &Vec3) {
-    for (part, before) in p.iter().zip(["(", ", ", ", "]) {
+    vector(out, (*p).into());
+}
+
+/// Three numbers as USD reads them.
+pub(super) fn vector(out: &mut String, parts: [f32; 3]) {
+    for (part, before) in parts.into_iter().zip(["(", ", ", ", "]) {
         out.push_str(before);
-        usd_primvars::number(out, Number::F32, f64::from(*part));
+        usd_primvars::number(out, Number::F32, part.into());
     }
     out.push(')');
 }

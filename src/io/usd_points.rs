@@ -2,7 +2,9 @@
 
 use std::fmt::Write;
 
-use super::usd::{Units, list, prim_name, quoted};
+use super::usd::{Units, list, prim_name, quoted, vector};
+use super::usd_primvars::{self, unique};
+use crate::base::arrays::Number;
 use crate::base::points::{Attribute, Column, Points, Values};
 use crate::base::{DVec3, Vec3};
 
@@ -30,14 +32,13 @@ pub fn frame(name: &str, frame: i32, fps: f64, points: &Points) -> String {
     let places: Vec<Vec3> = (0..points.count()).map(|point| points.position(point).cast()).collect();
     sample(&mut out, EXTENT, None, &list(extent(points, pscale).iter(), |out, p| vector(out, *p)));
     sample(&mut out, PLACES, None, &list(places.iter(), |out, p| vector(out, (*p).into())));
-    for attribute in &points.attributes {
-        let (declared, interpolation) = declaration(attribute);
+    for (attribute, (declared, interpolation)) in points.attributes.iter().zip(declarations(points)) {
         let each = 0..points.count();
         let values = match (&attribute.name[..], &attribute.values) {
             // USD has one of each for all points.
             ("v", Values::Vector(column)) => list(each.map(|point| column.get(point)), vector),
-            ("id", Values::Long(column)) => list(each.map(|point| column.get(point)), number),
-            ("id", Values::Int(column)) => list(each.map(|point| column.get(point)), number),
+            ("id", Values::Long(column)) => list(each.map(|point| column.get(point)), whole),
+            ("id", Values::Int(column)) => list(each.map(|point| column.get(point)), whole),
             ("pscale", Values::Float(column)) => {
                 list(column.stored().iter(), |out, radius| number(out, 2.0 * radius))
             }
@@ -52,7 +53,7 @@ pub fn frame(name: &str, frame: i32, fps: f64, points: &Points) -> String {
 /// What [`frame`] writes of points with these attributes, without values: for what is over them in a stage.
 pub(super) fn declared(points: &Points, indent: &str) -> String {
     let mut out = format!("{indent}{EXTENT}\n{indent}{PLACES}\n");
-    for (declared, interpolation) in points.attributes.iter().map(declaration) {
+    for (declared, interpolation) in declarations(points) {
         let of = interpolation
             .map_or(String::new(), |word| format!(" (\n{indent}    interpolation = \"{word}\"\n{indent})"));
         let _ = writeln!(out, "{indent}{declared}{of}");
@@ -63,8 +64,13 @@ pub(super) fn declared(points: &Points, indent: &str) -> String {
 const EXTENT: &str = "float3[] extent";
 const PLACES: &str = "point3f[] points";
 
-/// Type and name of an attribute, and its interpolation where that is not known from the name.
-fn declaration(attribute: &Attribute) -> (String, Option<&'static str>) {
+/// Type and name of each attribute, and its interpolation where that is not known from the name; no name is there twice.
+fn declarations(points: &Points) -> Vec<(String, Option<&'static str>)> {
+    let mut taken = Vec::new();
+    points.attributes.iter().map(|attribute| declaration(attribute, &mut taken)).collect()
+}
+
+fn declaration(attribute: &Attribute, taken: &mut Vec<String>) -> (String, Option<&'static str>) {
     let Attribute { name, values } = attribute;
     let interpolation = Some(if values.is_uniform() { "constant" } else { "vertex" });
     match (&name[..], values) {
@@ -79,7 +85,7 @@ fn declaration(attribute: &Attribute) -> (String, Option<&'static str>) {
                 Values::Bool(_) => "bool[]",
                 Values::Vector(_) => "float3[]",
             };
-            (format!("{class} primvars:{}", prim_name(name)), interpolation)
+            (format!("{class} primvars:{}", unique(prim_name(name), taken)), interpolation)
         }
     }
 }
@@ -87,10 +93,10 @@ fn declaration(attribute: &Attribute) -> (String, Option<&'static str>) {
 /// Values of a primvar.
 fn primvar(values: &Values) -> String {
     match values {
-        Values::Float(column) => list(column.stored().iter(), number),
-        Values::Int(column) => list(column.stored().iter(), number),
-        Values::Long(column) => list(column.stored().iter(), number),
-        Values::Bool(column) => list(column.stored().iter(), |out, yes| number(out, u8::from(*yes))),
+        Values::Float(column) => list(column.stored().iter(), |out, value| number(out, *value)),
+        Values::Int(column) => list(column.stored().iter(), whole),
+        Values::Long(column) => list(column.stored().iter(), whole),
+        Values::Bool(column) => list(column.stored().iter(), |out, yes| whole(out, u8::from(*yes))),
         Values::Vector(column) => list(column.stored().iter(), |out, v| vector(out, *v)),
     }
 }
@@ -104,10 +110,30 @@ fn extent(points: &Points, pscale: Option<&Column<f32>>) -> [[f32; 3]; 2] {
     [low.cast::<f32>().into(), high.cast::<f32>().into()]
 }
 
-fn number(out: &mut String, number: impl std::fmt::Display) {
+fn whole(out: &mut String, number: impl std::fmt::Display) {
     let _ = write!(out, "{number}");
 }
 
-fn vector(out: &mut String, [x, y, z]: [f32; 3]) {
-    let _ = write!(out, "({x}, {y}, {z})");
+fn number(out: &mut String, value: f32) {
+    usd_primvars::number(out, Number::F32, value.into());
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn attributes_whose_names_become_one_stay_apart_and_numbers_are_those_of_usd() {
+        let mut points = Points::at(1.0, &[DVec3::zeros(), DVec3::new(1.0, 0.0, 0.0)]).unwrap();
+        for (name, numbers) in [("a.b", vec![0.5, f32::NAN]), ("a_b", vec![1.0, 2e20])] {
+            let values = Values::Float(Column::Each(numbers));
+            points.attributes.push(Attribute { name: name.into(), values });
+        }
+        let text = frame("drop", 3, 24.0, &points);
+        for line in ["a_b.timeSamples = { 3: [0.5, nan] }", "a_b_2.timeSamples = { 3: [1, 2e20] }"] {
+            assert!(text.contains(&format!("float[] primvars:{line}")), "{text}");
+        }
+        let over = declared(&points, "");
+        assert!(over.contains("primvars:a_b (") && over.contains("primvars:a_b_2 ("), "{over}");
+    }
 }

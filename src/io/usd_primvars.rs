@@ -152,7 +152,8 @@ fn vector_of(name: &str) -> Option<Vector> {
 }
 
 /// A name that no other primvar of the mesh has.
-fn unique(name: String, taken: &mut Vec<String>) -> String {
+/// The name, or with a number if it is taken already; it is taken then.
+pub(super) fn unique(name: String, taken: &mut Vec<String>) -> String {
     let mut own = name.clone();
     let mut number = 2;
     while taken.contains(&own) {

@@ -27,7 +27,8 @@ pub struct Weights {
     pub swept: i32,
 }
 
-/// Fixed-point box in which faces are wanted; along z, the axis of the scan lines, also below `min`.
+/// Fixed-point box in which a sweep is wanted. Faces are made wherever they may be met by a line along z through it, the axis of
+/// the scan lines: which voxels are inside is known from all that a line meets, below the box and above it.
 #[derive(Debug, Clone, Copy)]
 pub struct Window {
     /// Least corner.
@@ -37,13 +38,9 @@ pub struct Window {
 }
 
 impl Window {
-    /// Whether a triangle with this bounding box can matter: it overlaps the window in x and y, and is not above it.
+    /// Whether a triangle with this bounding box can matter: it overlaps the window in x and y.
     pub fn wants(&self, low: Fixed, high: Fixed) -> bool {
-        high[0] >= self.min[0]
-            && low[0] <= self.max[0]
-            && high[1] >= self.min[1]
-            && low[1] <= self.max[1]
-            && low[2] <= self.max[2]
+        high[0] >= self.min[0] && low[0] <= self.max[0] && high[1] >= self.min[1] && low[1] <= self.max[1]
     }
 }
 

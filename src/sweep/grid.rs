@@ -75,8 +75,7 @@ pub fn voxelise_within(
     let fixed = |cells: i32| cells.saturating_mul(UNITS);
     let min = bounds[0].map(|cells| fixed(cells - margin));
     let max = bounds[1].map(|cells| fixed(cells + margin));
-    // What lies above ends the scan lines: they tell which blocks are inside.
-    let window = Window { min, max: [max[0], max[1], i32::MAX] };
+    let window = Window { min, max };
     let faces = ctx.phase("chain", || still.faces(ctx, 0.0, 0.0, &lattice, settings.tolerance, &window))?;
     fill_within(ctx, faces, lattice, settings.half_width, bounds)
 }

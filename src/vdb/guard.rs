@@ -224,7 +224,7 @@ impl Guard {
         if memory.iter().any(|text| words.contains(text)) {
             let what = format!(
                 "the .vdb file is damaged, or needs more memory than the {} MB that decoding it may take",
-                limits.memory >> 20
+                limits.memory / 1_000_000
             );
             return Error::file(path, what);
         }

@@ -6,27 +6,17 @@
  * order each time, some are born and die, and two of the nodes get those of the next frame early, for the velocities of
  * motion blur. Three nodes cook in three threads on one pool, with a context for each cook. In the end everything must
  * have the bytes of a run straight through the frames, without threads. */
-#include "check.h"
+#include "liquid.h"
 
 #include <pthread.h>
 
-enum { LAST = 8, EDITED = 5, HALF = 6, MOST = 8 * HALF * HALF * HALF, NODES = 3 };
-#define SPACING 0.05
-#define DT (1.0 / 24)
+enum { LAST = 8, EDITED = 5, NODES = 3 };
 
 /* The liquid at the first frame: a drop on a grid. */
 static struct {
     double places[MOST][3];
     size_t count;
 } drop;
-
-/* The particles of a frame. */
-typedef struct liquid {
-    double positions[MOST][3];
-    float velocities[MOST][3];
-    int64_t ids[MOST];
-    size_t count;
-} liquid;
 
 /* The window of the host: its thread passes the escape key to the cook that a user looks at. */
 typedef struct window {
@@ -71,34 +61,9 @@ static void drop_bytes(bytes *them) {
 
 /* -- the liquid -- */
 
-static void fill_drop(void) {
-    int x, y, z, k;
-    for (x = -HALF; x < HALF; ++x)
-        for (y = -HALF; y < HALF; ++y)
-            for (z = -HALF; z < HALF; ++z) {
-                const double place[3] = {(x + 0.5) * SPACING, (y + 0.5) * SPACING, (z + 0.5) * SPACING};
-                const double off = place[0] * place[0] + place[1] * place[1] + place[2] * place[2];
-                if (off > HALF * HALF * SPACING * SPACING) continue;
-                for (k = 0; k < 3; ++k) drop.places[drop.count][k] = place[k];
-                ++drop.count;
-            }
-}
-
 /* Where a place of the first frame is at another: the drop turns and travels. */
 static void carry(const double *from, double frame, double *to) {
-    const double angle = 0.08 * (frame - 1), c = cos(angle), s = sin(angle);
-    to[0] = c * from[0] + s * from[2] + 0.02 * (frame - 1), to[1] = from[1], to[2] = c * from[2] - s * from[0];
-}
-
-static void swap(liquid *in, size_t a, size_t b) {
-    double place[3];
-    float velocity[3];
-    const int64_t id = in->ids[a];
-    memcpy(place, in->positions[a], sizeof place), memcpy(velocity, in->velocities[a], sizeof velocity);
-    memmove(in->positions[a], in->positions[b], sizeof place);
-    memmove(in->velocities[a], in->velocities[b], sizeof velocity);
-    memcpy(in->positions[b], place, sizeof place), memcpy(in->velocities[b], velocity, sizeof velocity);
-    in->ids[a] = in->ids[b], in->ids[b] = id;
+    liquid_turn(from, 0.08 * (frame - 1), 0.02 * (frame - 1), to);
 }
 
 /* The particles of a frame, in an order by chance; random may be NULL. Deep inside of the drop some are missing in each
@@ -117,7 +82,7 @@ static void flow(liquid *out, int frame, unsigned *random) {
         for (k = 0; k < 3; ++k) out->velocities[out->count][k] = (float)((after[k] - before[k]) / (2 * little * DT));
         out->ids[out->count++] = 1000 + (int64_t)at;
     }
-    for (at = out->count; random != NULL && at > 1; --at) swap(out, at - 1, next_random(random) % at);
+    for (at = out->count; random != NULL && at > 1; --at) liquid_swap(out, at - 1, next_random(random) % at);
 }
 
 static frz_particles particles(const liquid *from) {
@@ -444,7 +409,7 @@ int main(void) {
     frz_mesh *mesh;
     pthread_t threads[NODES], shown;
     int frame, i, cancels = 0;
-    fill_drop();
+    drop.count = liquid_at_rest(drop.places);
     mesh = painted(ctx);
     WORKS(frz_pool_create(2, &plain.pool));
     plain.mesh = mesh, plain.window = &screen;

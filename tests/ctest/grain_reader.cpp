@@ -1,25 +1,8 @@
 // Reads the grains of a .vdb file with a program's own OpenVDB, checks how their attributes are stored, and writes what
 // it sees, a record a grain in the order of their identities: grain_reader FILE RECORDS
-#include <openvdb/io/File.h>
-#include <openvdb/openvdb.h>
-#include <openvdb/points/AttributeArray.h>
-#include <openvdb/points/PointConversion.h>
-#include <openvdb/points/PointCount.h>
+#include "host_points.h"
 
 #include <algorithm>
-#include <cstdint>
-#include <cstdio>
-#include <cstdlib>
-#include <string>
-#include <vector>
-
-#define CHECK(condition)                                                                       \
-    do {                                                                                       \
-        if (!(condition)) {                                                                    \
-            std::fprintf(stderr, "%s:%d: %s does not hold\n", __FILE__, __LINE__, #condition); \
-            std::exit(1);                                                                      \
-        }                                                                                      \
-    } while (0)
 
 namespace {
 
@@ -33,38 +16,24 @@ struct Grain {
     int32_t source_frame, active;
 };
 
-template <typename T>
-T value(const PointDataTree::LeafNodeType& leaf, const char* name, Index point) {
-    return AttributeHandle<T, NullCodec>(leaf.constAttributeArray(name)).get(point);
-}
-
-void check_types(const AttributeSet::Descriptor& descriptor) {
-    const std::pair<const char*, const char*> types[] = {{"P", "vec3s"},      {"v", "vec3s"},
-                                                         {"id", "int64"},     {"active", "bool"},
-                                                         {"pscale", "float"}, {"source_frame", "int32"},
-                                                         {"rest", "vec3s"},   {"trapped", "bool"}};
-    CHECK(descriptor.size() == std::size(types));
-    for (const auto& [name, type] : types) {
-        const size_t at = descriptor.find(name);
-        CHECK(at != AttributeSet::INVALID_POS);
-        CHECK(descriptor.type(at) == NamePair(type, "null"));
-    }
-}
-
 std::vector<Grain> read(const std::string& path) {
-    io::File file(path);
-    file.open();
-    const auto grid = gridPtrCast<PointDataGrid>(file.readGrid("grains"));
-    file.close();
-    CHECK(grid && grid->tree().cbeginLeaf());
-    check_types(grid->tree().cbeginLeaf()->attributeSet().descriptor());
+    const auto grid = read_points(path);
+    CHECK(grid->tree().cbeginLeaf());
+    check_types(grid->tree().cbeginLeaf()->attributeSet().descriptor(),
+                {{"P", "vec3s"},
+                 {"v", "vec3s"},
+                 {"id", "int64"},
+                 {"active", "bool"},
+                 {"pscale", "float"},
+                 {"source_frame", "int32"},
+                 {"rest", "vec3s"},
+                 {"trapped", "bool"}});
     std::vector<Grain> grains;
     for (auto leaf = grid->tree().cbeginLeaf(); leaf; ++leaf) {
         leaf->validateOffsets();
         CHECK(leaf->constAttributeArray("pscale").isUniform());
         for (auto point = leaf->beginIndexOn(); point; ++point) {
-            const Vec3f offset = value<Vec3f>(*leaf, "P", *point);
-            const Vec3d place = grid->indexToWorld(point.getCoord().asVec3d() + offset);
+            const Vec3d place = place_of(*grid, *leaf, *point, point.getCoord());
             const Vec3f v = value<Vec3f>(*leaf, "v", *point), rest = value<Vec3f>(*leaf, "rest", *point);
             grains.push_back({value<int64_t>(*leaf, "id", *point),
                               {place[0], place[1], place[2]},

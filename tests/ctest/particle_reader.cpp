@@ -1,25 +1,8 @@
 // Reads the particles of a .vdb file with a program's own OpenVDB and writes what it sees, identity and place of each,
 // in the order of the identities: particle_reader FILE RECORDS
-#include <openvdb/io/File.h>
-#include <openvdb/openvdb.h>
-#include <openvdb/points/AttributeArray.h>
-#include <openvdb/points/PointConversion.h>
-#include <openvdb/points/PointCount.h>
+#include "host_points.h"
 
 #include <algorithm>
-#include <cstdint>
-#include <cstdio>
-#include <cstdlib>
-#include <string>
-#include <vector>
-
-#define CHECK(condition)                                                                       \
-    do {                                                                                       \
-        if (!(condition)) {                                                                    \
-            std::fprintf(stderr, "%s:%d: %s does not hold\n", __FILE__, __LINE__, #condition); \
-            std::exit(1);                                                                      \
-        }                                                                                      \
-    } while (0)
 
 namespace {
 
@@ -31,23 +14,13 @@ struct Particle {
     double place[3];
 };
 
-template <typename T>
-T value(const PointDataTree::LeafNodeType& leaf, const char* name, Index point) {
-    return AttributeHandle<T, NullCodec>(leaf.constAttributeArray(name)).get(point);
-}
-
 std::vector<Particle> read(const std::string& path) {
-    io::File file(path);
-    file.open();
-    const auto grid = gridPtrCast<PointDataGrid>(file.readGrid("grains"));
-    file.close();
-    CHECK(grid);
+    const auto grid = read_points(path);
     std::vector<Particle> particles;
     for (auto leaf = grid->tree().cbeginLeaf(); leaf; ++leaf) {
         leaf->validateOffsets();
         for (auto point = leaf->beginIndexOn(); point; ++point) {
-            const Vec3f offset = value<Vec3f>(*leaf, "P", *point);
-            const Vec3d place = grid->indexToWorld(point.getCoord().asVec3d() + offset);
+            const Vec3d place = place_of(*grid, *leaf, *point, point.getCoord());
             particles.push_back({value<int64_t>(*leaf, "id", *point), {place[0], place[1], place[2]}});
         }
     }

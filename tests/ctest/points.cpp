@@ -1,26 +1,11 @@
 // Points of a program with its own OpenVDB: it writes them with codecs that lose precision, frazil converts them, and
 // it reads what frazil writes.
-#include <openvdb/io/File.h>
-#include <openvdb/openvdb.h>
-#include <openvdb/points/AttributeArray.h>
+#include "host_points.h"
+
 #include <openvdb/points/PointAttribute.h>
-#include <openvdb/points/PointConversion.h>
-#include <openvdb/points/PointCount.h>
 #include <openvdb/points/PointGroup.h>
 
 #include <cmath>
-#include <cstdio>
-#include <cstdlib>
-#include <string>
-#include <vector>
-
-#define CHECK(condition)                                                                       \
-    do {                                                                                       \
-        if (!(condition)) {                                                                    \
-            std::fprintf(stderr, "%s:%d: %s does not hold\n", __FILE__, __LINE__, #condition); \
-            std::exit(1);                                                                      \
-        }                                                                                      \
-    } while (0)
 
 namespace {
 
@@ -73,28 +58,14 @@ void run(const std::string& arguments) {
     }
 }
 
-template <typename T>
-T value(const PointDataTree::LeafNodeType& leaf, const char* name, Index point) {
-    return AttributeHandle<T, NullCodec>(leaf.constAttributeArray(name)).get(point);
-}
-
 void read_what_frazil_wrote(const std::string& path) {
-    io::File file(path);
-    file.open();
-    const auto grid = gridPtrCast<PointDataGrid>(file.readGrid("grains"));
-    file.close();
+    const auto grid = read_points(path);
     CHECK(grid->voxelSize() == Vec3d(VOXEL));
     CHECK(pointCount(grid->tree()) == COUNT);
     const auto& descriptor = grid->tree().cbeginLeaf()->attributeSet().descriptor();
     // What frazil does not hold is left out.
-    CHECK(descriptor.size() == 5 && descriptor.find("mass") == AttributeSet::INVALID_POS);
-    const std::pair<const char*, const char*> types[] = {
-        {"P", "vec3s"}, {"v", "vec3s"}, {"id", "int64"}, {"age", "float"}, {"pscale", "float"}};
-    for (const auto& [name, type] : types) {
-        const size_t at = descriptor.find(name);
-        CHECK(at != AttributeSet::INVALID_POS);
-        CHECK(descriptor.type(at) == NamePair(type, "null"));
-    }
+    CHECK(descriptor.find("mass") == AttributeSet::INVALID_POS);
+    check_types(descriptor, {{"P", "vec3s"}, {"v", "vec3s"}, {"id", "int64"}, {"age", "float"}, {"pscale", "float"}});
     std::vector<bool> seen(COUNT, false);
     for (auto leaf = grid->tree().cbeginLeaf(); leaf; ++leaf) {
         leaf->validateOffsets();
@@ -103,8 +74,7 @@ void read_what_frazil_wrote(const std::string& path) {
             const auto n = static_cast<int>(value<int64_t>(*leaf, "id", *point));
             CHECK(n >= 0 && n < COUNT && !seen[static_cast<size_t>(n)]);
             seen[static_cast<size_t>(n)] = true;
-            const Vec3f offset = value<Vec3f>(*leaf, "P", *point);
-            const Vec3d world = grid->indexToWorld(point.getCoord().asVec3d() + offset);
+            const Vec3d world = place_of(*grid, *leaf, *point, point.getCoord());
             // 16 bits over a voxel.
             CHECK((world - place(n)).length() < 2e-5 * VOXEL + 4e-6);
             CHECK((value<Vec3f>(*leaf, "v", *point) - velocity(n)).length() < 1e-3f);

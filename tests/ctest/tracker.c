@@ -1,54 +1,22 @@
 /* A mesh that follows particles: steps, states, cancels, and what is refused. */
-#include "check.h"
+#include "liquid.h"
 
-#include <math.h>
 #include <pthread.h>
 #include <stddef.h>
 
-/* A ball of particles on a grid, 0.05 m apart, which turns about y and travels along x. */
-#define SPACING 0.05
-#define DT (1.0 / 24)
-enum { HALF = 6, MOST = (2 * HALF) * (2 * HALF) * (2 * HALF) };
-
-typedef struct liquid {
-    double positions[MOST][3];
-    float velocities[MOST][3];
-    int64_t ids[MOST];
-    size_t count;
-} liquid;
-
-static void turn(const double *from, double frame, double *to) {
-    const double angle = 0.1 * frame, c = cos(angle), s = sin(angle);
-    to[0] = c * from[0] + s * from[2] + 0.02 * frame, to[1] = from[1], to[2] = c * from[2] - s * from[0];
-}
-
 /* Those of a frame; backwards in another order. */
 static void flow(liquid *out, double frame, int backwards) {
-    int x, y, z;
-    size_t at = 0;
-    for (x = -HALF; x < HALF; ++x)
-        for (y = -HALF; y < HALF; ++y)
-            for (z = -HALF; z < HALF; ++z) {
-                const double place[3] = {(x + 0.5) * SPACING, (y + 0.5) * SPACING, (z + 0.5) * SPACING};
-                if (place[0] * place[0] + place[1] * place[1] + place[2] * place[2] > HALF * HALF * SPACING * SPACING) continue;
-                turn(place, frame, out->positions[at]);
-                out->velocities[at][0] = (float)((0.1 * (out->positions[at][2]) + 0.02) / DT);
-                out->velocities[at][1] = 0;
-                out->velocities[at][2] = (float)(-0.1 * (out->positions[at][0] - 0.02 * frame) / DT);
-                out->ids[at] = 1000 + (int64_t)at;
-                ++at;
-            }
-    out->count = at;
-    for (at = 0; backwards && at < out->count / 2; ++at) {
-        const size_t other = out->count - 1 - at;
-        const liquid *whole = out;
-        double place[3];
-        const int64_t id = whole->ids[at];
-        memcpy(place, out->positions[at], sizeof place);
-        memcpy(out->positions[at], out->positions[other], sizeof place);
-        memcpy(out->positions[other], place, sizeof place);
-        out->ids[at] = out->ids[other], out->ids[other] = id;
+    double rest[MOST][3];
+    size_t at;
+    out->count = liquid_at_rest(rest);
+    for (at = 0; at < out->count; ++at) {
+        liquid_turn(rest[at], 0.1 * frame, 0.02 * frame, out->positions[at]);
+        out->velocities[at][0] = (float)((0.1 * (out->positions[at][2]) + 0.02) / DT);
+        out->velocities[at][1] = 0;
+        out->velocities[at][2] = (float)(-0.1 * (out->positions[at][0] - 0.02 * frame) / DT);
+        out->ids[at] = 1000 + (int64_t)at;
     }
+    for (at = 0; backwards && at < out->count / 2; ++at) liquid_swap(out, at, out->count - 1 - at);
 }
 
 static frz_particles of(const liquid *from, int with_ids, int with_velocities) {
@@ -124,7 +92,7 @@ static void steps(void) {
     for (vertex = 0; vertex < count; ++vertex) {
         double truth[3];
         int axis;
-        turn(before[vertex], 3, truth);
+        liquid_turn(before[vertex], 0.1 * 3, 0.02 * 3, truth);
         CHECK(flagged[vertex] == 0);
         for (axis = 0; axis < 3; ++axis) {
             CHECK(fabs(after[vertex][axis] - truth[axis]) < 0.02 * SPACING);

@@ -163,6 +163,7 @@ pub fn settings_of(scene: &Scene, stage: &str, seen: &Seen, roles: &[Role]) -> R
 }
 
 /// Those of a stage's settings that make its first state.
+#[cfg(feature = "vdb")]
 pub fn first_of(system: System, settings: &Settings, stage: &str) -> Settings {
     let firsts = of(system).iter().filter(|key| key.scope(stage) == Some(First));
     let firsts: Vec<String> = firsts.map(|key| super::values::path(key, None)).collect();

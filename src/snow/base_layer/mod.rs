@@ -24,7 +24,7 @@ pub use noise::displace;
 pub use reach::Reach;
 
 use crate::base::DVec3;
-use crate::base::blocks::{BlockEdit, Origin};
+use crate::base::blocks::{BlockEdit, DIM, Origin};
 use crate::context::{Context, PhaseTime};
 use crate::error::{Error, Result};
 use crate::snow::NoiseParams;
@@ -323,8 +323,9 @@ impl BaseLayer {
         let middle = [0, 1, 2].map(|a| (f64::from(self.low[a]) + f64::from(self.high[a])) * 0.5 * cell);
         let lattice = Lattice::near(cell, DVec3::from(middle))?;
         let outside = self.half_width + noise.map_or(0.0, |noise| noise.amplitude);
-        // Whether a face is open is decided from the winding numbers of the voxels around it.
-        let margin = outside.ceil() as i32 + 3;
+        // Whether a face is open is decided from the winding numbers of the voxels around it; blocks are inside by their first
+        // voxel, which may lie outside of the snow.
+        let margin = outside.ceil() as i32 + 3 + DIM as i32;
         let relative = |voxel: [i32; 3], grow: i32| [0, 1, 2].map(|a| voxel[a] - lattice.origin[a] + grow);
         let fixed = |voxel: [i32; 3]| voxel.map(|cells| cells.saturating_mul(UNITS));
         let window =

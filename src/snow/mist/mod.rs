@@ -258,7 +258,7 @@ impl Mist {
         let ways = sources::ways(sources, dt, shares);
         let seeds = sources::seeds(ctx, &ways, &self.params)?;
         let wanted = self.wanted(&seeds);
-        let what = format!("mist of {} cells of {} m", 512 * wanted.len(), self.params.cell);
+        let what = format!("mist of {} cells of {:.4} m", 512 * wanted.len(), self.params.cell);
         ctx.allow(&what, memory(wanted.len()))?;
         self.flow.resize(&wanted);
         self.sow(&seeds);

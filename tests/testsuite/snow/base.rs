@@ -1,7 +1,7 @@
 //! The base layer against analytic volumes and against itself.
 
 use crate::common::shapes::{cuboid, sphere};
-use frazil::base::DVec3;
+use frazil::base::{DVec3, Vec3};
 use frazil::motion::{Key, Keys, Rigid};
 use frazil::snow::NoiseParams;
 use frazil::snow::base_layer::initial::{Cover, Ground, layer};
@@ -42,6 +42,31 @@ fn a_plane_and_a_depth_make_a_box_of_snow() {
     let volume = mesh_volume(&ctx, &snow(&ctx));
     // Dual meshing rounds the box's edges by less than a cell.
     assert!((volume - 1.4 * 0.3).abs() < 0.001, "{volume}");
+}
+
+#[test]
+fn what_hangs_over_any_edge_of_the_snow_removes_all_that_it_covers() {
+    let ctx = context(2);
+    let whole = mesh_volume(&ctx, &snow(&ctx));
+    let removed = |at: [f32; 3], size: [f32; 3]| {
+        let mut block = cuboid(size);
+        block.positions.iter_mut().for_each(|place| *place += Vec3::from(at));
+        let body = Body::new(Box::new(Rigid::new(block, Keys::default())), 0.0).unwrap();
+        let mut base = BaseLayer::new(&ctx, snow(&ctx), exact()).unwrap();
+        let report = base.step(&ctx, &[body], 0.0, 1.0, 1).unwrap();
+        let left = mesh_volume(&ctx, base.surface());
+        assert!((whole - left - report.removed_volume).abs() < 0.02 * whole, "{at:?}: {left} is left");
+        report.removed_volume
+    };
+    // Thick ones cover one half, with a metre beyond the edge.
+    for (axis, side) in [(0, 1.0), (0, -1.0), (2, 1.0), (2, -1.0)] {
+        let (mut at, mut size) = ([0.0; 3], [4.0; 3]);
+        (at[axis], size[axis]) = (side * 0.85, 1.7);
+        let half = removed(at, size);
+        assert!((half - 0.5 * whole).abs() < 0.02 * whole, "{half} on side {side} of axis {axis}");
+    }
+    let all = removed([0.0; 3], [4.0; 3]);
+    assert!((all - whole).abs() < 0.02 * whole, "{all}");
 }
 
 #[test]
