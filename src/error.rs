@@ -32,7 +32,7 @@ pub enum Error {
         source: std::io::Error,
     },
     /// The work would need more memory than it may use.
-    #[error("{what} needs about {} MB, more than the limit of {} MB", needed / 1_000_000, limit / 1_000_000)]
+    #[error("{what} needs about {} MB, more than the limit of {} MB", needed.div_ceil(1_000_000), limit / 1_000_000)]
     Memory {
         /// The work, with the setting that makes it large.
         what: String,

@@ -51,8 +51,23 @@ fn detect() -> CpuLevel {
     CpuLevel::Baseline
 }
 
-/// Calls a function's copy for the instruction set in use.
+/// Calls a function's copy for the instruction set in use; `at most avx2` where wider ones only cost.
 macro_rules! dispatch {
+    (at most avx2: $body:ident($($name:ident: $kind:ty),*) $(-> $out:ty)?) => {{
+        #[cfg(target_arch = "x86_64")]
+        #[target_feature(enable = "avx2")]
+        fn avx2($($name: $kind),*) $(-> $out)? {
+            $body($($name),*)
+        }
+        match $crate::base::cpu::cpu_level() {
+            // SAFETY: the level was detected on this processor.
+            #[cfg(target_arch = "x86_64")]
+            $crate::base::cpu::CpuLevel::Avx512 | $crate::base::cpu::CpuLevel::Avx2 => unsafe {
+                avx2($($name),*)
+            },
+            _ => $body($($name),*),
+        }
+    }};
     ($body:ident($($name:ident: $kind:ty),*) $(-> $out:ty)?) => {{
         #[cfg(target_arch = "x86_64")]
         #[target_feature(enable = "avx2")]

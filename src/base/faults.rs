@@ -2,12 +2,13 @@
 
 use rayon::prelude::*;
 
+use super::bvh::Bvh;
 use super::meeting::{Meeting, meeting};
 use super::mesh::{coincident, used};
 use super::near::Near;
 use super::orient::is_flat;
 use super::topology::{Survey, Topology, collapsed, firsts, groups};
-use super::{DVec3, TriMesh, Vec3};
+use super::{DVec3, TriMesh};
 
 /// Triangles a task looks at.
 const GRAIN: usize = 512;
@@ -15,7 +16,7 @@ const GRAIN: usize = 512;
 const ROUNDING: f64 = 1e-12;
 
 /// Faults and properties of a mesh. Vertices at the same position count as one, but in `by_index`. Every count is exact
-/// for the mesh's 32-bit coordinates, without tolerance, but for `inverted_parts`, which go by volumes in 64 bits.
+/// for the mesh's 32-bit coordinates, without tolerance, but for `inverted_parts`, which go by volumes and rays in 64 bits.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Faults {
     /// Vertices that no triangle names.
@@ -146,37 +147,64 @@ fn kept(triangles: &[[u32; 3]], same: &[u32], flat: impl Fn([u32; 3]) -> bool) -
     Kept { degenerate: triangles.len() - whole.len(), doubled_triangles: whole.len() - kept.len(), kept }
 }
 
-/// A closed part of a mesh.
-struct Part {
-    low: Vec3,
-    high: Vec3,
+/// A connected part of a mesh.
+struct Part<'a> {
+    triangles: &'a [usize],
     /// Signed (m3); 0 where rounding decides.
     volume: f64,
 }
 
-impl Part {
-    fn of(mesh: &TriMesh, triangles: &[usize]) -> Self {
-        let corners = triangles.iter().flat_map(|&triangle| mesh.triangles[triangle]);
-        let nowhere = (Vec3::repeat(f32::INFINITY), Vec3::repeat(f32::NEG_INFINITY));
-        let (low, high) = corners.fold(nowhere, |(low, high), vertex| {
-            let place = &mesh.positions[vertex as usize];
-            (low.inf(place), high.sup(place))
-        });
-        let (origin, end): (DVec3, DVec3) = (low.cast(), high.cast());
+/// A direction along which no edges of made meshes run.
+const ASLANT: DVec3 = DVec3::new(0.5773, 0.6533, 0.4896);
+
+impl<'a> Part<'a> {
+    fn of(mesh: &TriMesh, triangles: &'a [usize]) -> Self {
+        let corners = || Self::corners(mesh, triangles);
+        let nowhere = (DVec3::repeat(f64::INFINITY), DVec3::repeat(f64::NEG_INFINITY));
+        let (low, high) = corners().fold(nowhere, |(low, high), place| (low.inf(&place), high.sup(&place)));
         let six = |&triangle: &usize| {
-            let [a, b, c] = mesh.corners(triangle).map(|p| p - origin);
+            let [a, b, c] = mesh.corners(triangle).map(|p| p - low);
             a.dot(&b.cross(&c))
         };
         let volume = triangles.iter().map(six).sum::<f64>() / 6.0;
-        let none = ROUNDING * (end - origin).norm().powi(3);
-        Self { low, high, volume: if volume.abs() > none { volume } else { 0.0 } }
+        let none = ROUNDING * (high - low).norm().powi(3);
+        Self { triangles, volume: if volume.abs() > none { volume } else { 0.0 } }
     }
 
-    /// Whether its box lies within that of another, and is not the same.
-    fn is_within(&self, other: &Self) -> bool {
-        let inside =
-            (0..3).all(|axis| self.low[axis] >= other.low[axis] && self.high[axis] <= other.high[axis]);
-        inside && (self.low, self.high) != (other.low, other.high)
+    fn corners(mesh: &TriMesh, triangles: &[usize]) -> impl Iterator<Item = DVec3> {
+        triangles.iter().flat_map(|&triangle| mesh.corners(triangle))
+    }
+
+    /// Whether its outermost corners lie within others, which are `outward` or all inside out.
+    fn is_within(&self, mesh: &TriMesh, others: &Others, outward: bool) -> bool {
+        let corners = || Self::corners(mesh, self.triangles);
+        (0..3).all(|axis| {
+            let by_axis = |a: &DVec3, b: &DVec3| a[axis].total_cmp(&b[axis]);
+            let ends = [corners().min_by(by_axis), corners().max_by(by_axis)];
+            ends.into_iter().flatten().all(|place| others.hold(place, outward))
+        })
+    }
+}
+
+/// The triangles of some parts, in a tree.
+struct Others {
+    mesh: TriMesh,
+    tree: Bvh,
+}
+
+impl Others {
+    fn of(mesh: &TriMesh, parts: &[Part<'_>]) -> Self {
+        let triangles = parts.iter().flat_map(|part| part.triangles).map(|&at| mesh.triangles[at]).collect();
+        let mesh = TriMesh { positions: mesh.positions.clone(), triangles };
+        Self { tree: Bvh::new(&mesh), mesh }
+    }
+
+    /// Whether a place is within them: the first triangle that one sees from there is seen from behind.
+    fn hold(&self, place: DVec3, outward: bool) -> bool {
+        self.tree.ray(place, ASLANT, f64::INFINITY).is_some_and(|hit| {
+            let [a, b, c] = self.mesh.corners(hit.triangle);
+            ((b - a).cross(&(c - a)).dot(&ASLANT) > 0.0) == outward
+        })
     }
 }
 
@@ -185,9 +213,13 @@ fn inverted_parts(mesh: &TriMesh, body: &[u32], volume: f64) -> usize {
     let mut order: Vec<usize> = (0..body.len()).collect();
     order.sort_by_key(|&triangle| body[triangle]);
     let parts = order.chunk_by(|a, b| body[*a] == body[*b]).map(|triangles| Part::of(mesh, triangles));
-    let (out, inverted): (Vec<Part>, Vec<Part>) =
+    let (out, inverted): (Vec<Part<'_>>, Vec<Part<'_>>) =
         parts.filter(|part| part.volume != 0.0).partition(|part| (part.volume < 0.0) == (volume < 0.0));
-    inverted.par_iter().filter(|part| !out.iter().any(|other| part.is_within(other))).count()
+    if inverted.is_empty() {
+        return 0;
+    }
+    let others = Others::of(mesh, &out);
+    inverted.par_iter().filter(|part| !part.is_within(mesh, &others, volume > 0.0)).count()
 }
 
 /// Counts of pairs of triangles that meet elsewhere than in common corners and edges.
@@ -244,6 +276,7 @@ impl Pairs {
 
 #[cfg(test)]
 mod tests {
+    use super::super::Vec3;
     use super::*;
 
     fn tetrahedron(at: f32) -> TriMesh {

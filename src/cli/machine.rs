@@ -31,16 +31,17 @@ impl FromStr for Amount {
         let split = text.find(|letter: char| letter.is_alphabetic() || letter == '%').unwrap_or(text.len());
         let number: f64 = text[..split].trim().parse().map_err(|_| wrong())?;
         let unit = text[split..].to_uppercase();
-        let scale = match unit.trim_end_matches('B').trim_end_matches('I') {
+        let base = if unit.contains('I') { 1024.0f64 } else { 1000.0 };
+        let power = match unit.trim_end_matches('B').trim_end_matches('I') {
             "%" if (0.0..=100.0).contains(&number) => return Ok(Self::Part(number / 100.0)),
-            "" => 1.0,
-            "K" => 1024.0,
-            "M" => 1024.0 * 1024.0,
-            "G" => 1024.0 * 1024.0 * 1024.0,
-            "T" => 1024.0 * 1024.0 * 1024.0 * 1024.0,
+            "" => 0,
+            "K" => 1,
+            "M" => 2,
+            "G" => 3,
+            "T" => 4,
             _ => return Err(wrong()),
         };
-        let bytes = number * scale;
+        let bytes = number * base.powi(power);
         if (0.0..1.0e19).contains(&bytes) { Ok(Self::Bytes(bytes as u64)) } else { Err(wrong()) }
     }
 }
@@ -57,7 +58,8 @@ mod tests {
 
     #[test]
     fn amounts_of_memory_have_units() {
-        assert_eq!("8G".parse(), Ok(Amount::Bytes(8 << 30)));
+        assert_eq!("8G".parse(), Ok(Amount::Bytes(8_000_000_000)));
+        assert_eq!("1.5 MB".parse(), Ok(Amount::Bytes(1_500_000)));
         assert_eq!("1.5 MiB".parse(), Ok(Amount::Bytes(3 << 19)));
         assert_eq!("100".parse(), Ok(Amount::Bytes(100)));
         assert_eq!("50%".parse(), Ok(Amount::Part(0.5)));

@@ -76,6 +76,9 @@ impl Cover<'_> {
 
     /// Those of some places (cells) that no triangle of feet is near.
     fn bare(&self, ctx: &Context, places: &[DVec3]) -> Result<Vec<DVec3>> {
+        if places.is_empty() {
+            return Ok(Vec::new());
+        }
         let slack = (SLACK * self.spacing).max(1.0);
         let mut wanted = Marks::default();
         places.iter().for_each(|place| around(bin_of(place, slack)).for_each(|bin| wanted.set(bin)));
@@ -84,12 +87,11 @@ impl Cover<'_> {
             let (mut out, mut bins) = (Vec::new(), Vec::new());
             for (triangle, index) in triangles.iter().zip((chunk * GRAIN) as u32..) {
                 let Some(corners) = self.corners(triangle) else { continue };
-                bins.clear();
                 each_bin(corners, slack, |bin| bins.push(bin));
                 // Parts of a long triangle share most of theirs.
                 bins.sort_unstable();
                 bins.dedup();
-                out.extend(bins.iter().filter(|bin| wanted.has(**bin)).map(|bin| (*bin, index)));
+                out.extend(bins.drain(..).filter(|bin| wanted.has(*bin)).map(|bin| (bin, index)));
             }
             Ok(out)
         };
@@ -165,11 +167,13 @@ fn each_bin(triangle: [DVec3; 3], edge: f64, mut see: impl FnMut(Coord)) {
     if (a.sup(b).sup(c) - a.inf(b).inf(c)).max() > LONG * edge {
         return;
     }
-    let mut due = vec![triangle];
-    while let Some([a, b, c]) = due.pop() {
+    // Most triangles are no larger than a few bins: the list is not allocated for these.
+    let (mut due, mut next) = (Vec::new(), Some(triangle));
+    while let Some([a, b, c]) = next {
         let [low, high] = [bin_of(&a.inf(&b).inf(&c), edge), bin_of(&a.sup(&b).sup(&c), edge)];
         if (0..3).all(|axis| high[axis] - low[axis] <= 1) {
             each_between(low, high).for_each(&mut see);
+            next = due.pop();
             continue;
         }
         // The longest edge, ab, is halved.
@@ -180,7 +184,8 @@ fn each_bin(triangle: [DVec3; 3], edge: f64, mut see: impl FnMut(Coord)) {
             _ => [c, a, b],
         };
         let middle = 0.5 * (a + b);
-        due.extend([[a, middle, c], [middle, b, c]]);
+        due.push([a, middle, c]);
+        next = Some([middle, b, c]);
     }
 }
 

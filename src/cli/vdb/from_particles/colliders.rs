@@ -7,7 +7,6 @@ use frazil::io::sequence::Pattern;
 use frazil::scene::FrameChoice;
 use frazil::surface::HALF_WIDTH;
 use frazil::sweep::{Settings, voxelise_within};
-use frazil::vdb::file::GridInfo;
 use frazil::vdb::level_set::{difference, to_mesh};
 use frazil::vdb::{FloatGrid, file};
 use frazil::{Context, Error, Result};
@@ -18,6 +17,9 @@ use crate::cli::vdb::{far_mesh, read_level_set};
 
 /// How much a length may differ (of itself) and be taken for the same.
 const ROUNDING: f64 = 1e-6;
+
+/// Voxels around a liquid in which a solid is made, too.
+const ROOM: i32 = 16;
 
 /// One file, or a file for each frame.
 struct Collider {
@@ -33,8 +35,8 @@ struct Collider {
 enum Solid {
     /// On the liquid's cells, with a band as wide.
     Ready(FloatGrid),
-    /// The surface, of which the part within the liquid is made anew.
-    Surface(TriMesh),
+    /// The surface, and the last level set that was made of it with the box of voxels where it holds.
+    Surface(TriMesh, Option<([[i32; 3]; 2], FloatGrid)>),
 }
 
 /// All solids that are cut out.
@@ -80,7 +82,7 @@ impl Collider {
             let solid = |grid: FloatGrid| Solid::new(ctx, grid, path, cell);
             self.solids = grids.into_iter().map(solid).collect::<Result<_>>()?;
         }
-        for solid in &self.solids {
+        for solid in &mut self.solids {
             // Nothing may be left by those before.
             let Some((low, high)) = liquid.active_bbox() else { return Ok(()) };
             let solid = solid.within(ctx, [low, high], cell)?;
@@ -108,17 +110,30 @@ impl Solid {
             let (path, name) = (path.display(), grid.name());
             log::warn!("{path}: grid \"{name}\" is cut off: its holes are closed by cones");
         }
-        Ok(Self::Surface(surface))
+        Ok(Self::Surface(surface, None))
     }
 
     /// Its level set in a box of a liquid's voxels, on its cells of an edge (m).
-    fn within(&self, ctx: &Context, bounds: [[i32; 3]; 2], cell: f64) -> Result<FloatGrid> {
-        match self {
-            Self::Ready(grid) => grid.deep_copy(),
-            Self::Surface(mesh) if mesh.triangles.is_empty() => FloatGrid::level_set(cell, HALF_WIDTH),
-            Self::Surface(mesh) => {
+    fn within(&mut self, ctx: &Context, [low, high]: [[i32; 3]; 2], cell: f64) -> Result<FloatGrid> {
+        let (mesh, made) = match self {
+            Self::Ready(grid) => return grid.deep_copy(),
+            Self::Surface(mesh, _) if mesh.triangles.is_empty() => {
+                return FloatGrid::level_set(cell, HALF_WIDTH);
+            }
+            Self::Surface(mesh, made) => (mesh, made),
+        };
+        let holds = |bounds: &[[i32; 3]; 2]| {
+            (0..3).all(|axis| bounds[0][axis] <= low[axis] && high[axis] <= bounds[1][axis])
+        };
+        match made {
+            Some((bounds, grid)) if holds(bounds) => grid.deep_copy(),
+            _ => {
+                // A liquid that moves a little stays in it.
+                let bounds = [low.map(|at| at - ROOM), high.map(|at| at + ROOM)];
                 let settings = Settings { half_width: HALF_WIDTH, ..Settings::new(cell) };
-                voxelise_within(ctx, mesh.clone(), &settings, bounds)
+                let grid = voxelise_within(ctx, mesh.clone(), &settings, bounds)?;
+                let (_, grid) = made.insert((bounds, grid));
+                grid.deep_copy()
             }
         }
     }
@@ -137,15 +152,22 @@ fn of_solid(path: &Path, error: Error) -> Error {
     }
 }
 
-/// The names of the level sets of a file, in their order.
-fn names(grids: Vec<GridInfo>) -> Vec<String> {
-    let is_solid = |grid: &GridInfo| grid.class == "level set" && grid.value_type.starts_with("Tree_float");
-    grids.into_iter().filter(is_solid).map(|grid| grid.name).collect()
+/// The names of the level sets of a file, ascending; those in other precision than ours are refused.
+fn names(path: &Path) -> Result<Vec<String>> {
+    let mut grids = file::describe(path)?;
+    grids.retain(|grid| grid.class == "level set");
+    if let Some(grid) = grids.iter().find(|grid| !grid.value_type.starts_with("Tree_float")) {
+        let what = format!("level set \"{}\" is not of 32-bit floats but {}", grid.name, grid.value_type);
+        return Err(Error::file(path, what));
+    }
+    let mut names: Vec<String> = grids.into_iter().map(|grid| grid.name).collect();
+    names.sort_unstable();
+    Ok(names)
 }
 
 /// Refuses a file that has no level set, by its description alone.
 fn check(path: &Path) -> Result<()> {
-    if names(file::describe(path)?).is_empty() {
+    if names(path)?.is_empty() {
         return Err(Error::file(path, "holds no level set"));
     }
     Ok(())
@@ -153,7 +175,7 @@ fn check(path: &Path) -> Result<()> {
 
 /// All level sets of a file.
 fn read(path: &Path) -> Result<Vec<FloatGrid>> {
-    let names = names(file::describe(path)?);
+    let names = names(path)?;
     if let Some(twice) = names.windows(2).find(|pair| pair[0] == pair[1]) {
         return Err(Error::file(path, format!("has two level sets \"{}\": give them other names", twice[0])));
     }
