@@ -470,8 +470,8 @@ mod tests {
     fn memory_beyond_the_limit_is_refused_in_words() {
         let ctx = Context::new(Pool::new(0).unwrap());
         assert!(ctx.allow("a layer", u64::MAX).is_ok());
-        ctx.set_memory_limit(1 << 20);
-        let error = ctx.allow("a layer", 5 << 20).unwrap_err().to_string();
+        ctx.set_memory_limit(1_900_000);
+        let error = ctx.allow("a layer", 4_000_001).unwrap_err().to_string();
         assert_eq!(error, "a layer needs about 5 MB, more than the limit of 1 MB");
     }
 }
