@@ -115,6 +115,18 @@ impl Bvh {
         found
     }
 
+    /// How many triangles a ray leaves through, less those that it enters through: how often a closed mesh surrounds its
+    /// origin. A ray that meets a common edge of triangles counts both.
+    pub fn surrounding(&self, origin: DVec3, direction: DVec3) -> i32 {
+        let mut sum = 0;
+        self.walk(origin, direction, f64::INFINITY, |hit| {
+            let [a, b, c] = self.corners[hit.triangle].map(|corner| corner.cast::<f64>());
+            sum += if (b - a).cross(&(c - a)).dot(&direction) > 0.0 { 1 } else { -1 };
+            Some(f64::INFINITY)
+        });
+        sum
+    }
+
     /// Calls `see` with hits; it returns the new limit, or none to stop.
     fn walk(
         &self,

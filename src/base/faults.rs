@@ -41,7 +41,7 @@ pub struct Faults {
     /// Connected parts; those that touch in a vertex are one.
     pub parts: usize,
     /// Parts (apart where they touch in a vertex only) whose volume has another sign than the whole's, so that there is
-    /// nothing inside them: but for cavities, whose boxes lie within that of a part with the whole's sign. Counted where
+    /// nothing inside them: but for cavities, whose outermost corners lie within parts of the whole's sign. Counted where
     /// all edges have two triangles that agree.
     pub inverted_parts: usize,
     /// Area (m2).
@@ -175,35 +175,13 @@ impl<'a> Part<'a> {
         triangles.iter().flat_map(|&triangle| mesh.corners(triangle))
     }
 
-    /// Whether its outermost corners lie within others, which are `outward` or all inside out.
-    fn is_within(&self, mesh: &TriMesh, others: &Others, outward: bool) -> bool {
+    /// Whether its outermost corners lie within others, which turn outward (1) or inside out (-1).
+    fn is_within(&self, mesh: &TriMesh, others: &Bvh, turn: i32) -> bool {
         let corners = || Self::corners(mesh, self.triangles);
         (0..3).all(|axis| {
             let by_axis = |a: &DVec3, b: &DVec3| a[axis].total_cmp(&b[axis]);
             let ends = [corners().min_by(by_axis), corners().max_by(by_axis)];
-            ends.into_iter().flatten().all(|place| others.hold(place, outward))
-        })
-    }
-}
-
-/// The triangles of some parts, in a tree.
-struct Others {
-    mesh: TriMesh,
-    tree: Bvh,
-}
-
-impl Others {
-    fn of(mesh: &TriMesh, parts: &[Part<'_>]) -> Self {
-        let triangles = parts.iter().flat_map(|part| part.triangles).map(|&at| mesh.triangles[at]).collect();
-        let mesh = TriMesh { positions: mesh.positions.clone(), triangles };
-        Self { tree: Bvh::new(&mesh), mesh }
-    }
-
-    /// Whether a place is within them: the first triangle that one sees from there is seen from behind.
-    fn hold(&self, place: DVec3, outward: bool) -> bool {
-        self.tree.ray(place, ASLANT, f64::INFINITY).is_some_and(|hit| {
-            let [a, b, c] = self.mesh.corners(hit.triangle);
-            ((b - a).cross(&(c - a)).dot(&ASLANT) > 0.0) == outward
+            ends.into_iter().flatten().all(|place| turn * others.surrounding(place, ASLANT) > 0)
         })
     }
 }
@@ -218,8 +196,10 @@ fn inverted_parts(mesh: &TriMesh, body: &[u32], volume: f64) -> usize {
     if inverted.is_empty() {
         return 0;
     }
-    let others = Others::of(mesh, &out);
-    inverted.par_iter().filter(|part| !part.is_within(mesh, &others, volume > 0.0)).count()
+    let triangles = out.iter().flat_map(|part| part.triangles).map(|&at| mesh.triangles[at]).collect();
+    let others = Bvh::new(&TriMesh { positions: mesh.positions.clone(), triangles });
+    let turn = if volume > 0.0 { 1 } else { -1 };
+    inverted.par_iter().filter(|part| !part.is_within(mesh, &others, turn)).count()
 }
 
 /// Counts of pairs of triangles that meet elsewhere than in common corners and edges.

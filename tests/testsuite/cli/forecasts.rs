@@ -120,7 +120,7 @@ fn before_mist_is_made_the_boxes_of_objects_are_filled_with_it() {
     }
     let warning = "mist of 61440 cells of 0.03 m, as many as fill the boxes that objects pass, needs about";
     assert!(text.contains(warning), "{text}");
-    let most = (11 << 20) / number(mist, "step_bytes_per_cell") as u64;
+    let most = 11_000_000 / number(mist, "step_bytes_per_cell") as u64;
     assert!(text.contains(&format!("refuses a step of more than {most} cells")), "{text}");
     assert!(!report(folder, "")["warnings"].to_string().contains("mist"));
     // A scene without mist says nothing of it.
