@@ -80,6 +80,8 @@ mod preview;
 mod rate;
 #[path = "gates/readers.rs"]
 mod readers;
+#[path = "gates/repair.rs"]
+mod repair;
 #[path = "gates/rest.rs"]
 mod rest;
 #[path = "gates/scenes.rs"]
@@ -153,6 +155,7 @@ fn main() {
     spot::run(&mut h);
     splashsurf::run(&mut h);
     tracker_cancel::run(&mut h);
+    repair::run(&mut h);
     house::run(&mut h);
     h.finish();
 }

@@ -294,4 +294,7 @@ pub const GATES: &[Gate] = &[
     gate("surface.time_project", "s", Most(0.15), Most(0.08)),
     gate("surface.time_260k", "s", Most(2.0), Most(1.0)),
     gate("surface.threads", "x", Least(1.7), Least(1.85)),
+    // Broken meshes that do not become the solid that they mean; pairs of cubes on whose common face the surface fits.
+    none("surface.repair_fuzz", "meshes"),
+    yes("surface.cubes_fit"),
 ];

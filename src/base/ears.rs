@@ -8,7 +8,7 @@ use std::cmp::{Ordering, Reverse};
 use std::collections::BinaryHeap;
 
 /// A point of the plane.
-pub(super) type Point = [f64; 2];
+pub type Point = [f64; 2];
 
 /// Corners of a box of the tree that are compared one by one.
 const LEAF: usize = 8;
@@ -17,13 +17,13 @@ const LEAF: usize = 8;
 const LOOKS: usize = 1200;
 
 /// Twice the area of a triangle, positive when it is counter-clockwise.
-pub(super) fn turn(a: Point, b: Point, c: Point) -> f64 {
+pub fn turn(a: Point, b: Point, c: Point) -> f64 {
     (b[0] - a[0]) * (c[1] - a[1]) - (b[1] - a[1]) * (c[0] - a[0])
 }
 
 /// Triangles of a counter-clockwise polygon of at least three corners, two fewer than corners. Always the ear with the
 /// least index is cut; a polygon that crosses itself may have none: its widest corner then goes.
-pub(super) fn triangles(points: &[Point]) -> Vec<[usize; 3]> {
+pub fn triangles(points: &[Point]) -> Vec<[usize; 3]> {
     let mut ring = Ring::new(points);
     let mut out = Vec::with_capacity(points.len() - 2);
     for _ in 3..points.len() {

@@ -79,7 +79,7 @@ impl Faults {
         let joined = TriMesh { positions: mesh.positions.clone(), triangles: kept };
         let pairs = Pairs::of(&joined);
         let volume = joined.volume();
-        let is_closed = survey.open.is_empty() && survey.crowded == 0 && survey.turned == 0;
+        let is_closed = survey.open.is_empty() && survey.crowded.is_empty() && survey.turned.is_empty();
         Self {
             unused_vertices: used(vertices, &mesh.triangles).map_or(0, |used| vertices - used.len()),
             doubled_vertices,
@@ -87,9 +87,9 @@ impl Faults {
             doubled_triangles,
             holes: groups(vertices, survey.open.iter().copied()),
             open_edges: survey.open.len(),
-            crowded_edges: survey.crowded,
-            turned_edges: survey.turned,
-            non_manifold_vertices: survey.non_manifold,
+            crowded_edges: survey.crowded.len(),
+            turned_edges: survey.turned.len(),
+            non_manifold_vertices: survey.non_manifold.len(),
             parts,
             inverted_parts: if is_closed { inverted_parts(&joined, &survey.body, volume) } else { 0 },
             area: joined.area(),
@@ -117,6 +117,33 @@ impl Faults {
         let pairs = [self.crossings, self.corner_crossings, self.folds, self.overlaps, self.touches];
         pairs == [0; 5] && self.doubled_triangles == 0
     }
+}
+
+/// Pairs of triangles (numbers, ascending) that meet elsewhere than in common corners and edges, exactly; vertices at the same place are
+/// common. A triangle that lies on one before it is paired with that; those without an area are left out.
+pub fn meeting_pairs(mesh: &TriMesh) -> Vec<[u32; 2]> {
+    let same = coincident(mesh.positions.iter().map(|p| p.cast()));
+    let place = |corners: [u32; 3]| corners.map(|vertex| mesh.positions[vertex as usize]);
+    let joined = mesh.triangles.iter().map(|corners| corners.map(|vertex| same[vertex as usize])).zip(0u32..);
+    let (triangles, numbers): (Vec<[u32; 3]>, Vec<u32>) =
+        joined.filter(|(corners, _)| !collapsed(*corners) && !is_flat(&place(*corners))).unzip();
+    let joined = TriMesh { positions: mesh.positions.clone(), triangles };
+    let near = Near::of(&joined);
+    let of_triangle = |first: usize| {
+        let mut pairs = Vec::new();
+        near.of_triangle(first, |second| {
+            let [a, b] = [first, second].map(|triangle| place(joined.triangles[triangle]));
+            if meeting(&a, &b) != Meeting::Apart {
+                let [a, b] = [first, second].map(|triangle| numbers[triangle]);
+                pairs.push([a.min(b), a.max(b)]);
+            }
+        });
+        pairs
+    };
+    let triangles = (0..joined.triangles.len()).into_par_iter().with_min_len(GRAIN);
+    let mut pairs: Vec<[u32; 2]> = triangles.flat_map_iter(of_triangle).collect();
+    pairs.par_sort_unstable();
+    pairs
 }
 
 /// Holes of a mesh: connected sets of edges with one triangle, as [`Faults::holes`]; in 64 bits, where rounding decides

@@ -6,13 +6,14 @@ pub mod bvh;
 pub mod bytes;
 #[doc(hidden)]
 pub mod cpu;
-mod ears;
+pub mod deviation;
+pub(crate) mod ears;
 pub mod faults;
 #[doc(hidden)]
 pub mod lanes;
 pub mod meeting;
 pub mod mesh;
-mod monotone;
+pub(crate) mod monotone;
 mod near;
 pub mod orient;
 pub mod packed;

@@ -15,7 +15,7 @@ const SQUARE: f64 = (1u64 << 30) as f64;
 const RUN: usize = 256;
 
 /// Triangles of a counter-clockwise polygon of at least three corners, two fewer than corners.
-pub(super) fn triangles(points: &[Point]) -> Vec<[usize; 3]> {
+pub fn triangles(points: &[Point]) -> Vec<[usize; 3]> {
     let whole = rounded(points);
     let mut out = Vec::with_capacity(points.len() - 2);
     let ring = without_spikes(&whole, &mut out);

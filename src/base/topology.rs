@@ -32,9 +32,9 @@ impl Topology {
             collapsed_triangles: triangles.len() - whole.len(),
             doubled_triangles: firsts(&whole).iter().filter(|first| !**first).count(),
             open_edges: survey.open.len(),
-            crowded_edges: survey.crowded,
-            turned_edges: survey.turned,
-            non_manifold_vertices: survey.non_manifold,
+            crowded_edges: survey.crowded.len(),
+            turned_edges: survey.turned.len(),
+            non_manifold_vertices: survey.non_manifold.len(),
         }
     }
 
@@ -53,13 +53,38 @@ impl Topology {
     }
 }
 
+/// Where triangles, with three different vertices each out of so many, do not hang together as a closed 2-manifold: vertices, and edges
+/// (lesser vertex first).
+pub fn faulty(vertices: usize, triangles: &[[u32; 3]]) -> (Vec<u32>, Vec<[u32; 2]>) {
+    let survey = Survey::of(vertices, triangles);
+    (survey.non_manifold, [survey.open, survey.crowded, survey.turned].concat())
+}
+
+/// The bodies of a mesh: numbers of triangles with three different vertices each that hang together by edges, ascending.
+pub fn bodies(triangles: &[[u32; 3]]) -> Vec<Vec<u32>> {
+    let mut sets = Sets::new(triangles.len());
+    for pair in halves(triangles).windows(2).filter(|pair| pair[0].0 == pair[1].0) {
+        sets.join(pair[0].1 / 3, pair[1].1 / 3);
+    }
+    let mut order: Vec<(u32, u32)> =
+        (0..triangles.len() as u32).map(|triangle| (sets.root(triangle), triangle)).collect();
+    order.sort_unstable();
+    order
+        .chunk_by(|a, b| a.0 == b.0)
+        .map(|body| body.iter().map(|(_, triangle)| *triangle).collect())
+        .collect()
+}
+
 /// Edges and fans of triangles with three different vertices each.
 pub(super) struct Survey {
     /// Edges with one triangle, lesser vertex first.
     pub(super) open: Vec<[u32; 2]>,
-    pub(super) crowded: usize,
-    pub(super) turned: usize,
-    pub(super) non_manifold: usize,
+    /// Edges with more than two triangles, lesser vertex first.
+    pub(super) crowded: Vec<[u32; 2]>,
+    /// Edges whose two triangles disagree, lesser vertex first.
+    pub(super) turned: Vec<[u32; 2]>,
+    /// See [`Topology::non_manifold_vertices`].
+    pub(super) non_manifold: Vec<u32>,
     edges: usize,
     /// Fans of all vertices.
     fans: usize,
@@ -74,15 +99,16 @@ impl Survey {
         let corners = triangles.as_flattened();
         let (mut fans, mut bodies) = (Sets::new(corners.len()), Sets::new(triangles.len()));
         let mut on_crowded = vec![false; vertices];
-        let (mut open, mut crowded, mut turned, mut edges) = (Vec::new(), 0, 0, 0);
+        let (mut open, mut crowded, mut turned, mut edges) = (Vec::new(), Vec::new(), Vec::new(), 0);
         for uses in halves(triangles).chunk_by(|a, b| a.0 == b.0) {
             let ends = uses[0].0;
             edges += 1;
             match uses {
                 [_] => open.push(ends),
-                [(_, a), (_, b)] => turned += usize::from(corners[*a as usize] == corners[*b as usize]),
+                [(_, a), (_, b)] if corners[*a as usize] != corners[*b as usize] => {}
+                [_, _] => turned.push(ends),
                 _ => {
-                    crowded += 1;
+                    crowded.push(ends);
                     ends.iter().for_each(|&end| on_crowded[end as usize] = true);
                 }
             }
@@ -100,11 +126,9 @@ impl Survey {
             open,
             crowded,
             turned,
-            non_manifold: fans_of
-                .iter()
-                .zip(&on_crowded)
-                .filter(|(fans, crowded)| **fans > 1 || **crowded)
-                .count(),
+            non_manifold: (0..vertices as u32)
+                .filter(|vertex| fans_of[*vertex as usize] > 1 || on_crowded[*vertex as usize])
+                .collect(),
             edges,
             fans: fans.roots().count(),
             body: (0..triangles.len() as u32).map(|triangle| bodies.root(triangle)).collect(),
@@ -116,7 +140,7 @@ impl Survey {
     /// Handles, summed over all bodies, where the surface is closed and no edge crowded. A vertex with several fans counts as
     /// that many, and bodies that touch in one are apart.
     pub(super) fn genus(&self) -> Option<i64> {
-        let closed = self.open.is_empty() && self.crowded == 0 && self.triangles > 0;
+        let closed = self.open.is_empty() && self.crowded.is_empty() && self.triangles > 0;
         let euler = self.fans as i64 - self.edges as i64 + self.triangles as i64;
         closed.then_some(self.bodies as i64 - euler / 2)
     }
@@ -244,6 +268,6 @@ mod tests {
         let mirrored = TETRAHEDRON.map(|corners| corners.map(|v| if v == 0 { 0 } else { v + 3 }));
         let two: Vec<[u32; 3]> = TETRAHEDRON.into_iter().chain(mirrored).collect();
         let survey = Survey::of(7, &two);
-        assert_eq!((survey.non_manifold, survey.genus()), (1, Some(0)));
+        assert_eq!((survey.genus(), survey.non_manifold), (Some(0), vec![0]));
     }
 }

@@ -118,6 +118,7 @@ impl frz_tracker_params {
             weighting,
             half_life: self.half_life,
             fade: self.fade,
+            rebuild: false,
         };
         params.validate()?;
         Ok(params)

@@ -3,7 +3,7 @@
 use std::path::{Path, PathBuf};
 
 use frazil::base::arrays::On;
-use frazil::base::{MeshArray, TriMesh, Vec3};
+use frazil::base::{MeshArray, TriMesh, Uvs, Vec3};
 use frazil::io::mesh::extension;
 use frazil::io::sequence::Pattern;
 use frazil::io::{self, atomic, usd};
@@ -96,10 +96,10 @@ pub fn run(args: &Args, session: &Session) -> Result<(), Failure> {
 }
 
 /// Arrays of the vertices that are their velocities (m/s).
-const VELOCITY: [&str; 3] = ["vx", "vy", "vz"];
+pub const VELOCITY: [&str; 3] = ["vx", "vy", "vz"];
 
 /// The vectors of the vertices whose parts are the arrays of these names.
-fn vectors(arrays: &[MeshArray], names: [&str; 3]) -> Option<Vec<Vec3>> {
+pub fn vectors(arrays: &[MeshArray], names: [&str; 3]) -> Option<Vec<Vec3>> {
     let part = |name: &str| arrays.iter().find(|array| array.on == On::Vertices && array.name == name);
     let [x, y, z] = names.map(part);
     let parts = x?.values.iter().zip(&y?.values).zip(&z?.values);
@@ -125,12 +125,72 @@ fn listed(names: &[&str]) -> String {
     }
 }
 
-fn check_output(path: &Path) -> Result<(), Failure> {
+/// The name of a mesh in USD, after the file or the pattern that it comes from.
+pub fn prim_name(input: &Path) -> String {
+    let stem = input.file_stem().unwrap_or_default().to_string_lossy();
+    usd::prim_name(stem.split(['%', '#', '$', '.']).next().unwrap_or_default())
+}
+
+/// Refuses the name of a file that no mesh is written into.
+pub fn check_output(path: &Path) -> Result<(), Failure> {
     let extension = extension(path);
     if extension == "usda" || io::mesh::EXTENSIONS.contains(&extension.as_str()) {
         return Ok(());
     }
     Err(Failure::refused(format!("{}: the output must be a .obj, .ply, .stl or .usda file", path.display())))
+}
+
+/// What decides on what is lost between two files of meshes.
+pub struct Losses<'a> {
+    /// File or pattern.
+    pub output: &'a Path,
+    /// Whether places stay what they are.
+    pub keeps_space: bool,
+    /// Whether the input is a sequence whose meshes all get the triangles of the first.
+    pub is_sequence: bool,
+}
+
+impl Losses<'_> {
+    /// Warns about what a file of the input, from which these texture coordinates were read, contains and the output cannot.
+    pub fn warn(&self, one: &Path, uvs: Option<&Uvs>) -> frazil::Result<()> {
+        let mut lost = if is_gltf(one) { Character::extras(one)? } else { io::extras::of(one)? };
+        let uvs = uvs.filter(|_| io::mesh::holds_uvs(self.output));
+        let to = extension(self.output);
+        lost.retain(|name| match *name {
+            "UVs" => uvs.is_none(),
+            "colours" => !["ply", "obj", "usda"].contains(&to.as_str()),
+            "velocities" => !["ply", "usda"].contains(&to.as_str()) || !self.keeps_space,
+            _ => true,
+        });
+        if let Some(missing) = uvs.map(|uvs| uvs.missing).filter(|missing| *missing > 0) {
+            log::warn!("{}", missing_uvs(&one.display().to_string(), missing));
+        }
+        if !lost.is_empty() {
+            log::warn!("{}: {} are not carried over", one.display(), listed(&lost));
+        }
+        // Those that have words of their own were told above.
+        const TOLD: [&str; 7] = ["vx", "vy", "vz", "red", "green", "blue", "alpha"];
+        if extension(one) != "ply" {
+            return Ok(());
+        }
+        let arrays = io::mesh::read_detailed(one)?.arrays;
+        let is_lost = |array: &&MeshArray| match to.as_str() {
+            "ply" | "usda" => self.is_sequence && array.on == On::Corners,
+            _ => !TOLD.contains(&&*array.name),
+        };
+        let names: Vec<&str> = arrays.iter().filter(is_lost).map(|array| &array.name[..]).collect();
+        if !names.is_empty() {
+            log::warn!("{}: arrays are not carried over: {}", one.display(), names.join(", "));
+        }
+        if to == "usda" && self.is_sequence && vectors(&arrays, VELOCITY).is_some() {
+            log::warn!("{}: its velocities give way to those from frame to frame", one.display());
+        }
+        let vectors = stems(&arrays);
+        if !vectors.is_empty() && !self.keeps_space && ["ply", "usda"].contains(&to.as_str()) {
+            log::warn!("{}: these vectors keep their axes and units: {}", one.display(), vectors.join(", "));
+        }
+        Ok(())
+    }
 }
 
 impl Args {
@@ -154,46 +214,11 @@ impl Args {
 
     /// Warns about what the input contains and the output cannot.
     fn warn_of_losses(&self, frame: i32, motion: &dyn Motion) -> frazil::Result<()> {
-        let one =
-            Pattern::parse(&self.input).map_or_else(|| self.input.clone(), |pattern| pattern.path(frame));
-        let mut lost = if is_gltf(&one) { Character::extras(&one)? } else { io::extras::of(&one)? };
-        let uvs = motion.drawn().uvs.filter(|_| io::mesh::holds_uvs(&self.output));
-        let to = extension(&self.output);
-        lost.retain(|name| match *name {
-            "UVs" => uvs.is_none(),
-            "colours" => !["ply", "obj", "usda"].contains(&to.as_str()),
-            "velocities" => !["ply", "usda"].contains(&to.as_str()) || !self.keeps_space(),
-            _ => true,
-        });
-        if let Some(missing) = uvs.map(|uvs| uvs.missing).filter(|missing| *missing > 0) {
-            log::warn!("{}", missing_uvs(&one.display().to_string(), missing));
-        }
-        if !lost.is_empty() {
-            log::warn!("{}: {} are not carried over", one.display(), listed(&lost));
-        }
-        // Those that have words of their own were told above.
-        const TOLD: [&str; 7] = ["vx", "vy", "vz", "red", "green", "blue", "alpha"];
-        if extension(&one) != "ply" {
-            return Ok(());
-        }
-        let is_sequence = Pattern::parse(&self.input).is_some();
-        let arrays = io::mesh::read_detailed(&one)?.arrays;
-        let is_lost = |array: &&MeshArray| match to.as_str() {
-            "ply" | "usda" => is_sequence && array.on == On::Corners,
-            _ => !TOLD.contains(&&*array.name),
-        };
-        let names: Vec<&str> = arrays.iter().filter(is_lost).map(|array| &array.name[..]).collect();
-        if !names.is_empty() {
-            log::warn!("{}: arrays are not carried over: {}", one.display(), names.join(", "));
-        }
-        if to == "usda" && is_sequence && vectors(&arrays, VELOCITY).is_some() {
-            log::warn!("{}: its velocities give way to those from frame to frame", one.display());
-        }
-        let vectors = stems(&arrays);
-        if !vectors.is_empty() && !self.keeps_space() && ["ply", "usda"].contains(&to.as_str()) {
-            log::warn!("{}: these vectors keep their axes and units: {}", one.display(), vectors.join(", "));
-        }
-        Ok(())
+        let pattern = Pattern::parse(&self.input);
+        let is_sequence = pattern.is_some();
+        let losses = Losses { output: &self.output, keeps_space: self.keeps_space(), is_sequence };
+        let one = pattern.map_or_else(|| self.input.clone(), |pattern| pattern.path(frame));
+        losses.warn(&one, motion.drawn().uvs)
     }
 
     /// What is converted, in metres with Y up, and at which frames.
@@ -284,8 +309,7 @@ impl Args {
         // Of a sequence they are what takes each mesh to the next.
         let own = own.filter(|_| Pattern::parse(&self.input).is_none());
         let velocities = own.unwrap_or_else(|| usd::to_floats(&velocities));
-        let stem = self.input.file_stem().unwrap_or_default().to_string_lossy().into_owned();
-        let name = usd::prim_name(stem.split(['%', '#', '$', '.']).next().unwrap_or_default());
+        let name = prim_name(&self.input);
         let mesh = usd::MeshFrame {
             name: &name,
             points: &positions,

@@ -1,22 +1,28 @@
-//! `frazil mesh`: what is wrong with a mesh.
+//! `frazil mesh`: what is wrong with a mesh, and what else is done to meshes: a file for each.
 
 use std::path::{Path, PathBuf};
 
 use clap::Subcommand;
 use frazil::base::TriMesh;
 use frazil::base::faults::Faults;
+use frazil::base::mesh::coincident;
+use frazil::base::orient::is_flat;
 use frazil::base::topology::Topology;
 use frazil::motion::{Character, is_gltf};
 use serde_json::{Value, json};
 
 use super::exit::{Failure, Phase};
 use super::options::MeshSpace;
-use super::output;
 use super::session::Session;
+use super::{compare, output, repair};
 
-/// Look at meshes.
+/// Look at meshes, and repair them.
 #[derive(clap::Args)]
-#[command(after_help = "Example:\n  frazil mesh check boot.obj")]
+#[command(after_help = "\
+Examples:
+  frazil mesh check boot.obj
+  frazil mesh compare before.obj after.obj
+  frazil mesh repair boot.obj -o solid.obj")]
 pub struct Args {
     #[command(subcommand)]
     command: Command,
@@ -25,6 +31,8 @@ pub struct Args {
 #[derive(Subcommand)]
 enum Command {
     Check(CheckArgs),
+    Compare(compare::Args),
+    Repair(repair::Args),
 }
 
 /// Say whether meshes bound a solid, and what keeps them from it; characters in their pose at rest.
@@ -43,12 +51,20 @@ struct CheckArgs {
 
 /// Runs the command.
 pub fn run(args: &Args, session: &Session) -> Result<(), Failure> {
-    let Command::Check(args) = &args.command;
+    match &args.command {
+        Command::Check(args) => check(args, session),
+        Command::Compare(args) => compare::run(args, session),
+        Command::Repair(args) => repair::run(args, session),
+    }
+}
+
+fn check(args: &CheckArgs, session: &Session) -> Result<(), Failure> {
     let mut all = Vec::new();
     for path in &args.files {
         let mesh = args.read(path).before()?;
         let faults = session.ctx.phase("faults", || Ok(Faults::of(&mesh))).during()?;
-        let report = report(path, &mesh, &faults);
+        let bodies = session.ctx.phase("bodies", || Ok(Body::all(&mesh, &faults))).during()?;
+        let report = report(path, &mesh, &faults, &bodies);
         if args.json {
             all.push(report);
         } else {
@@ -70,7 +86,7 @@ impl CheckArgs {
 }
 
 /// What is known of a mesh.
-fn report(path: &Path, mesh: &TriMesh, faults: &Faults) -> Value {
+fn report(path: &Path, mesh: &TriMesh, faults: &Faults, bodies: &[Body]) -> Value {
     let size = mesh.bounds().map(|(low, high)| <[f32; 3]>::from(high - low));
     json!({
         "file": path.display().to_string(),
@@ -98,6 +114,7 @@ fn report(path: &Path, mesh: &TriMesh, faults: &Faults) -> Value {
         "doubled_triangles": faults.doubled_triangles,
         "doubled_vertices": faults.doubled_vertices,
         "unused_vertices": faults.unused_vertices,
+        "bodies": bodies.iter().map(Body::report).collect::<Value>(),
         "by_index": by_index(&faults.by_index),
     })
 }
@@ -115,8 +132,86 @@ fn by_index(topology: &Topology) -> Value {
     })
 }
 
+/// Triangles with an area that hang together by edges, with vertices at one place joined.
+struct Body {
+    mesh: TriMesh,
+    faults: Faults,
+}
+
+impl Body {
+    /// The bodies of a mesh with such faults, in the order of their first triangles.
+    fn all(mesh: &TriMesh, faults: &Faults) -> Vec<Self> {
+        let bodies = bodies(mesh);
+        let is_alone = bodies.len() == 1;
+        let body = |mesh: TriMesh| {
+            let faults = if is_alone { faults.clone() } else { Faults::of(&mesh) };
+            Self { mesh, faults }
+        };
+        bodies.into_iter().map(body).collect()
+    }
+
+    fn report(&self) -> Value {
+        let Self { mesh, faults } = self;
+        let bounds = mesh.bounds().map(|(low, high)| [low, high].map(<[f32; 3]>::from));
+        json!({
+            "solid": faults.is_solid(),
+            "triangles": mesh.triangles.len(),
+            "genus": faults.genus,
+            "holes": faults.holes,
+            "embedded": faults.is_embedded(),
+            "area_m2": faults.area,
+            "volume_m3": faults.volume,
+            "bounds_m": bounds,
+        })
+    }
+}
+
+/// See [`Body`].
+fn bodies(mesh: &TriMesh) -> Vec<TriMesh> {
+    let same = coincident(mesh.positions.iter().map(|place| place.cast()));
+    let joined = mesh.triangles.iter().map(|corners| corners.map(|vertex| same[vertex as usize]));
+    let place = |vertex: u32| mesh.positions[vertex as usize];
+    let triangles: Vec<[u32; 3]> = joined.filter(|corners| !is_flat(&corners.map(place))).collect();
+    let sides = |(&[a, b, c], triangle): (&[u32; 3], u32)| {
+        [[a, b], [b, c], [c, a]].map(|[i, j]| ([i.min(j), i.max(j)], triangle))
+    };
+    let mut edges: Vec<([u32; 2], u32)> = triangles.iter().zip(0..).flat_map(sides).collect();
+    edges.sort_unstable();
+    // Each triangle leads to one before it in its body, the first to itself.
+    let mut before: Vec<u32> = (0..triangles.len() as u32).collect();
+    for pair in edges.windows(2).filter(|pair| pair[0].0 == pair[1].0) {
+        let [a, b] = [pair[0].1, pair[1].1].map(|triangle| first(&mut before, triangle));
+        before[a.max(b) as usize] = a.min(b);
+    }
+    let mut order: Vec<(u32, usize)> =
+        (0..triangles.len()).map(|triangle| (first(&mut before, triangle as u32), triangle)).collect();
+    order.sort_unstable();
+    let alone = |body: &[(u32, usize)]| {
+        let corners: Vec<[u32; 3]> = body.iter().map(|(_, triangle)| triangles[*triangle]).collect();
+        let mut vertices = corners.as_flattened().to_vec();
+        vertices.sort_unstable();
+        vertices.dedup();
+        let number = |vertex: u32| vertices.partition_point(|other| *other < vertex) as u32;
+        TriMesh {
+            positions: vertices.iter().map(|&vertex| place(vertex)).collect(),
+            triangles: corners.iter().map(|corners| corners.map(number)).collect(),
+        }
+    };
+    order.chunk_by(|a, b| a.0 == b.0).map(alone).collect()
+}
+
+/// The first triangle of a body.
+fn first(before: &mut [u32], mut triangle: u32) -> u32 {
+    while before[triangle as usize] != triangle {
+        let further = before[before[triangle as usize] as usize];
+        before[triangle as usize] = further;
+        triangle = further;
+    }
+    triangle
+}
+
 /// A key of the report, and what it counts, for one and for several.
-type Counted = (&'static str, [&'static str; 2]);
+pub type Counted = (&'static str, [&'static str; 2]);
 
 const PARTS: [Counted; 2] = [
     ("holes", ["hole: closed by a cone to its centre", "holes: closed by cones to their centres"]),
@@ -226,6 +321,7 @@ fn in_words(mesh: &Value) -> String {
     }
     let number = |key: &str| mesh[key].as_f64().unwrap_or(0.0);
     out += &format!("area {:.6} m2, volume {:.6} m3\n", number("area_m2"), number("volume_m3"));
+    out += &bodies_in_words(mesh["bodies"].as_array().map_or(&[][..], Vec::as_slice));
     for (key, forms) in PARTS.into_iter().chain(JOINTS).chain(TRIANGLES).filter(|(key, _)| count(key) > 0) {
         out += &format!("  {:>8} {}\n", count(key), form(count(key), forms));
     }
@@ -239,7 +335,32 @@ fn in_words(mesh: &Value) -> String {
     out
 }
 
+/// Bodies that are told in words.
+const TOLD: usize = 8;
+
+/// Several bodies, the largest first; the others only by their count.
+fn bodies_in_words(bodies: &[Value]) -> String {
+    if bodies.len() < 2 {
+        return String::new();
+    }
+    let mut order: Vec<&Value> = bodies.iter().collect();
+    let area = |body: &Value| body["area_m2"].as_f64().unwrap_or(0.0);
+    order.sort_by(|&a, &b| area(b).total_cmp(&area(a)));
+    let line = |&body: &&Value| {
+        let count = body["triangles"].as_u64().unwrap_or(0);
+        let genus = body["genus"].as_i64().map_or("open".to_string(), |genus| format!("genus {genus}"));
+        let (area, volume) = (area(body), body["volume_m3"].as_f64().unwrap_or(0.0));
+        let triangles = form(count, ["triangle", "triangles"]);
+        format!("  body: {count} {triangles}, {genus}, area {area:.6} m2, volume {volume:.6} m3\n")
+    };
+    let mut out: String = order.iter().take(TOLD).map(line).collect();
+    if let Some(others) = bodies.len().checked_sub(TOLD).filter(|others| *others > 0) {
+        out += &format!("  and {others} more {}\n", form(others as u64, ["body", "bodies"]));
+    }
+    out
+}
+
 /// What is counted, for one or for several.
-fn form(count: u64, [one, several]: [&'static str; 2]) -> &'static str {
+pub fn form(count: u64, [one, several]: [&'static str; 2]) -> &'static str {
     if count == 1 { one } else { several }
 }

@@ -2,6 +2,7 @@
 
 mod check;
 mod cloud;
+mod compare;
 mod convert;
 mod exit;
 mod info;
@@ -13,6 +14,7 @@ mod options;
 mod output;
 mod preview;
 mod progress;
+mod repair;
 mod session;
 #[cfg(feature = "vdb")]
 mod shot;

@@ -107,7 +107,7 @@ impl Axis {
 
     /// A position in right-handed coordinates whose third axis runs along the lines (downward for y), and in which the
     /// symbolic shift of the first two is positive and larger in the first.
-    fn turned(self, [x, y, z]: Fixed) -> [i64; 3] {
+    pub fn turned(self, [x, y, z]: Fixed) -> [i64; 3] {
         let [x, y, z] = [x, y, z].map(i64::from);
         match self {
             Self::X => [-z, y, x],
@@ -163,6 +163,16 @@ impl Axis {
             Self::Z => [[low[0], high[0]], [low[1], high[1]]],
         }
     }
+}
+
+/// Whether the line through voxels with these coordinates passes left of the way from `a` to `b`, as one sees them with the first
+/// turned coordinate ([`Axis::turned`]) to the right and the second upward; exact, under the symbolic shift. The other way round
+/// it is the contrary; of a point on itself it means nothing.
+pub fn passes_left(axis: Axis, a: Fixed, b: Fixed, [p, q]: [i32; 2]) -> bool {
+    let [a, b] = [a, b].map(|end| axis.turned(end)).map(|[p, q, _]| [p, q]);
+    let p = if axis == Axis::Z { p } else { -p };
+    let line = [p, q].map(|value| i64::from(value) * i64::from(UNITS));
+    left_of(a, b, edge_function(a, b, line))
 }
 
 /// Calls `see` with each line through voxels that a face crosses: the line's coordinates, the place on its axis

@@ -48,6 +48,26 @@ impl Parts {
         self.is_covered[self.of_vertex[vertex as usize] as usize]
     }
 
+    /// Places (cells) on the drops that the mesh does not cover: parts with a volume over 0.
+    pub fn on_drops(&self, phi: &Implicit, surface: &Isosurface) -> Vec<DVec3> {
+        let mut six = vec![0.0f64; self.is_covered.len()];
+        let mut firsts: Vec<Option<DVec3>> = vec![None; six.len()];
+        if self.is_covered.iter().all(|covered| *covered) {
+            return Vec::new();
+        }
+        for triangle in surface.runs().flat_map(|(_, triangles)| triangles) {
+            let part = self.of_vertex[triangle[0] as usize] as usize;
+            if !self.is_covered[part] {
+                let [a, b, c] = triangle.map(|vertex| surface.in_cells(phi, vertex));
+                let origin = *firsts[part].get_or_insert(a);
+                six[part] += (a - origin).dot(&(b - origin).cross(&(c - origin)));
+            }
+        }
+        let is_on = |part: u32| !self.is_covered[part as usize] && six[part as usize] > 0.0;
+        let vertices = (0..).zip(&self.of_vertex).filter(|(_, part)| is_on(**part));
+        vertices.map(|(vertex, _)| surface.in_cells(phi, vertex)).collect()
+    }
+
     /// The parts that the mesh does not cover, the largest first.
     pub fn apart(&self, phi: &Implicit, surface: &Isosurface) -> Vec<Apart> {
         if self.is_covered.iter().all(|covered| *covered) {
@@ -81,8 +101,8 @@ impl Parts {
     }
 }
 
-/// Whether a foot lies in a cell or in one beside it.
-fn is_near(feet: &[Coord], cell: Coord) -> bool {
+/// Whether a foot, of those in ascending cells, lies in a cell or in one beside it.
+pub fn is_near(feet: &[Coord], cell: Coord) -> bool {
     (-1..=1).any(|x| {
         (-1..=1).any(|y| {
             // The three along z are neighbours in the order.

@@ -41,7 +41,7 @@ pub struct Cover<'a> {
 }
 
 impl Cover<'_> {
-    /// Whether each vertex is beside a place of the surface that is not covered.
+    /// Whether each vertex is beside a place of the surface that is not covered, and these places (cells).
     ///
     /// # Errors
     /// Cancel.
@@ -51,12 +51,12 @@ impl Cover<'_> {
         phi: &Implicit,
         surface: &Isosurface,
         parts: &Parts,
-    ) -> Result<Vec<bool>> {
+    ) -> Result<(Vec<bool>, Vec<DVec3>)> {
         let mut trodden = Marks::default();
         self.feet.iter().flatten().for_each(|foot| trodden.set(cell_of(foot)));
         ctx.check()?;
         let bare = self.bare(ctx, &doubtful(phi, surface, parts, &trodden))?;
-        let reach = (BESIDE * self.spacing).max(2.0) * if self.is_first { FIRST } else { 1.0 };
+        let reach = self.reach();
         let items = bare.iter().zip(0..).map(|(place, index)| (bin_of(place, reach), index)).collect();
         let bins = Bins::new(reach, items);
         let is_beside = |foot: &Option<DVec3>| {
@@ -64,14 +64,20 @@ impl Cover<'_> {
             let mut near = bins.near(foot).map(|place| (bare[place as usize] - foot).norm());
             near.any(|distance| distance <= reach).then_some(())
         };
-        self.feet
+        let flags: Vec<Vec<bool>> = self
+            .feet
             .par_chunks(GRAIN)
             .map(|feet| {
                 ctx.check()?;
-                Ok(feet.iter().map(|foot| is_beside(foot).is_some()).collect::<Vec<_>>())
+                Ok(feet.iter().map(|foot| is_beside(foot).is_some()).collect())
             })
-            .collect::<Result<Vec<_>>>()
-            .map(|parts| parts.concat())
+            .collect::<Result<_>>()?;
+        Ok((flags.concat(), bare))
+    }
+
+    /// How near to an uncovered place a vertex' foot is beside it (cells).
+    pub fn reach(&self) -> f64 {
+        (BESIDE * self.spacing).max(2.0) * if self.is_first { FIRST } else { 1.0 }
     }
 
     /// Those of some places (cells) that no triangle of feet is near.

@@ -1,19 +1,11 @@
-//! The surface where a function at nodes is 0, as triangles: marching cubes (Lorensen and Cline 1987). A face of a cube on which
-//! two corners across are inside keeps these apart (Montani, Scateni and Scopigno 1994), so that what two cubes make of it fits.
-//!
-//! The cases are made by code: on each face of a cube the surface runs from where one goes inside to where one leaves again;
-//! these lines join to loops, which triangles fill.
-
-use std::sync::OnceLock;
+//! The surface where a function at nodes is 0, as triangles, by marching cubes.
 
 use rayon::prelude::*;
 
 use super::cells::Coord;
+use super::cubes::cases;
 use super::implicit::{Implicit, NODES, SIDE};
 use crate::base::{DVec3, TriMesh};
-
-/// An edge of a cube: its lesser corner (bits x, y, z) and its axis.
-type Edge = (usize, usize);
 
 /// No vertex.
 const NONE: u8 = u8::MAX;
@@ -227,85 +219,6 @@ fn triangles(phi: &Implicit, patch: Coord, crossings: &[Crossings], first: &[u32
     out
 }
 
-/// The triangles of each case; bit n of a case is set if corner n is inside.
-fn cases() -> &'static [Vec<[Edge; 3]>; 256] {
-    static CASES: OnceLock<[Vec<[Edge; 3]>; 256]> = OnceLock::new();
-    CASES.get_or_init(|| {
-        std::array::from_fn(|case| loops(case).iter().flat_map(|ring| filled(ring)).collect())
-    })
-}
-
-/// Corners of the six faces, counter-clockwise seen from outside the cube.
-const FACES: [[usize; 4]; 6] =
-    [[0, 1, 3, 2], [4, 6, 7, 5], [0, 4, 5, 1], [2, 3, 7, 6], [0, 2, 6, 4], [1, 5, 7, 3]];
-
-fn edge_between(a: usize, b: usize) -> Edge {
-    let axis = match a ^ b {
-        4 => 0,
-        2 => 1,
-        _ => 2,
-    };
-    (a.min(b), axis)
-}
-
-/// The closed lines in which the surface meets the faces of a cube.
-fn loops(case: usize) -> Vec<Vec<Edge>> {
-    let is_inside = |corner: usize| case >> corner & 1 == 1;
-    // From where one goes inside on a face to where one comes out again.
-    let mut lines: Vec<[Edge; 2]> = Vec::new();
-    for face in FACES {
-        for start in 0..4 {
-            let [before, here] = [face[(start + 3) % 4], face[start]];
-            if is_inside(before) || !is_inside(here) {
-                continue;
-            }
-            let run = (1..4).find(|step| !is_inside(face[(start + step) % 4])).expect("one is outside");
-            let [last, after] = [face[(start + run - 1) % 4], face[(start + run) % 4]];
-            lines.push([edge_between(before, here), edge_between(last, after)]);
-        }
-    }
-    let mut rings = Vec::new();
-    while let Some([begin, mut end]) = lines.pop() {
-        let mut ring = vec![begin];
-        while end != begin {
-            ring.push(end);
-            let next = lines.iter().position(|line| line[0] == end).expect("lines join");
-            end = lines.swap_remove(next)[1];
-        }
-        rings.push(ring);
-    }
-    rings
-}
-
-/// Whether two edges of a cube lie on one of its faces.
-fn share_face(a: Edge, b: Edge) -> bool {
-    let ends = |(corner, axis): Edge| [corner, corner | 4 >> axis];
-    FACES.iter().any(|face| [ends(a), ends(b)].as_flattened().iter().all(|corner| face.contains(corner)))
-}
-
-/// Triangles that fill a ring. No diagonal lies on a face of the cube, where the next cube may have one too.
-fn filled(ring: &[Edge]) -> Vec<[Edge; 3]> {
-    fn fill(ring: &[Edge]) -> Option<Vec<[Edge; 3]>> {
-        let count = ring.len();
-        if count == 3 {
-            return Some(vec![[ring[0], ring[1], ring[2]]]);
-        }
-        // Cut off an ear.
-        (0..count).find_map(|ear| {
-            let [before, after] = [ring[(ear + count - 1) % count], ring[(ear + 1) % count]];
-            if share_face(before, after) {
-                return None;
-            }
-            let mut rest = ring.to_vec();
-            rest.remove(ear);
-            let mut triangles = fill(&rest)?;
-            triangles.push([before, ring[ear], after]);
-            Some(triangles)
-        })
-    }
-    fill(ring).expect("each ring of a cube can be filled so")
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -329,21 +242,6 @@ mod tests {
             [[Some(9.0), Some(0.2)], [None, Some(0.2)], [Some(f32::INFINITY), Some(0.2)], [Some(f32::NAN); 2]]
         {
             assert_eq!(zero(outside, -0.25, 0.75), 0.25);
-        }
-    }
-
-    #[test]
-    fn every_case_is_filled_without_diagonals_on_faces() {
-        for (case, triangles) in cases().iter().enumerate() {
-            let crossed =
-                (0..8).flat_map(|corner| [0, 1, 2].map(|axis| (corner, axis))).filter(|(corner, axis)| {
-                    let other = corner | 4 >> axis;
-                    other != *corner && (case >> corner & 1) != (case >> other & 1)
-                });
-            let count = crossed.count();
-            let rings = loops(case);
-            assert_eq!(rings.iter().map(Vec::len).sum::<usize>(), count, "case {case}");
-            assert_eq!(triangles.len() + 2 * rings.len(), count, "case {case}");
         }
     }
 }

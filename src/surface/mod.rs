@@ -26,15 +26,20 @@ mod apart;
 mod average;
 mod band;
 mod cells;
+mod change;
 mod coverage;
+mod cubes;
 mod fade;
 mod fit;
+mod gamma;
 mod implicit;
 mod isosurface;
 #[cfg(feature = "vdb")]
 mod level_set;
+mod matching;
 mod paths;
 mod project;
+mod repair;
 mod sample;
 mod smooth;
 mod spacing;
@@ -49,12 +54,17 @@ pub use advect::{Weighting, carried};
 pub use apart::Apart;
 pub use average::SUPPORT;
 pub use band::Distances;
+pub use change::Change;
+#[doc(hidden)]
+pub use cubes::cases as cube_cases;
 pub use implicit::Implicit;
 pub use isosurface::Isosurface;
 #[cfg(feature = "vdb")]
 pub use level_set::{HALF_WIDTH, level_set};
+pub use matching::{Matched, Matching, Node, Solver, match_topology};
 pub use paths::interpolate;
 pub use project::{Foot, foot};
+pub use repair::{Prepared, RepairReport, Repaired, Source, carried as carry_attributes, repair};
 pub use sample::Sampler;
 pub use smooth::smooth;
 pub use spacing::{estimate as estimate_spacing, rough as rough_spacing};

@@ -4,9 +4,10 @@ use rayon::prelude::*;
 
 use super::Particles;
 use super::advect::{Weighting, advect};
-use super::apart::{Apart, Parts};
+use super::apart::{Apart, Parts, is_near};
 use super::band::Distances;
-use super::cells::cell_of;
+use super::cells::{Coord, cell_of};
+use super::change::{Change, Unfit, change};
 use super::coverage::Cover;
 use super::fade::fade;
 use super::implicit::Implicit;
@@ -14,6 +15,7 @@ use super::isosurface::Isosurface;
 use super::paths::Paths;
 use super::project::foot;
 use super::sample::Sampler;
+use crate::base::topology::Topology;
 use crate::base::{DVec3, TriMesh};
 use crate::context::{Context, PhaseTime};
 use crate::error::{Error, Result};
@@ -33,13 +35,17 @@ pub struct Params {
     pub half_life: f64,
     /// How much detail fades where the mesh is strained: to exp(-fade) of it while lengths change by a factor of e; 0..=1000.
     pub fade: f64,
+    /// Whether the mesh is rebuilt where the liquid merges or splits (thesis 2.4, 2.5); it must then be a closed 2-manifold by index.
+    /// Else it is flagged there.
+    pub rebuild: bool,
 }
 
 impl Params {
     /// The thesis' values for particles of a spacing (m), but for the weighting.
     pub fn for_spacing(spacing: f64) -> Self {
         let (half_life, fade) = (f64::INFINITY, 0.0);
-        Self { spacing, cell: 0.5, change: 0.5, weighting: Weighting::Affine, half_life, fade }
+        let weighting = Weighting::Affine;
+        Self { spacing, cell: 0.5, change: 0.5, weighting, half_life, fade, rebuild: false }
     }
 
     /// Checks every field.
@@ -84,6 +90,8 @@ pub struct StepReport {
     pub triangles: usize,
     /// Parts of that surface which the mesh does not cover, the largest first: drops and bubbles.
     pub apart: Vec<Apart>,
+    /// What the mesh became where it was rebuilt; none: it was not.
+    pub change: Option<Change>,
     /// Time of each phase.
     pub phases: Vec<PhaseTime>,
 }
@@ -111,6 +119,10 @@ impl StepReport {
             died: self.died + next.died,
             triangles: next.triangles,
             apart: next.apart,
+            change: match (self.change, next.change) {
+                (Some(first), Some(second)) => Some(second.after(&first)),
+                (first, second) => second.or(first),
+            },
             phases: self.phases,
         }
     }
@@ -171,6 +183,11 @@ impl Tracker {
         params.validate()?;
         mesh.validate()?;
         particles.validate()?;
+        if params.rebuild && !Topology::of(mesh.positions.len(), &mesh.triangles).is_watertight() {
+            return Err(Error::argument(
+                "the mesh is not closed and 2-manifold by index, as it must be to be rebuilt",
+            ));
+        }
         let vertices: Vec<DVec3> = mesh.positions.iter().map(|place| place.cast()).collect();
         let flags = vec![false; vertices.len()];
         let (delta, lasting, bare, reach) = (Vec::new(), Vec::new(), Vec::new(), REACH[0]);
@@ -185,7 +202,8 @@ impl Tracker {
             let wanted = if known == tracker.delta.len() { tracker.wanted_reach() } else { REACH[1] };
             if wanted <= tracker.reach {
                 tracker.check_overlap(known)?;
-                let (apart, bare) = ctx.phase("cover", || tracker.cover(ctx, &surface, &feet, true))?;
+                let Covered { apart, bare, .. } =
+                    ctx.phase("cover", || tracker.cover(ctx, &surface, &feet, true))?;
                 tracker.bare = bare;
                 let (lost, triangles) = (tracker.vertices.len() - known, surface.1.count());
                 return Ok((tracker, StepReport { lost, triangles, apart, ..StepReport::default() }));
@@ -276,7 +294,7 @@ impl Tracker {
     /// A time that is not positive; particles that are not valid, or have neither ids nor velocities; cancel.
     pub fn step(&mut self, ctx: &Context, from: &Particles, to: &Particles, dt: f64) -> Result<StepReport> {
         validate_step(from, to, dt)?;
-        let ((vertices, delta, (flags, uncovered), report), phases) = ctx.step(5, || {
+        let (next, phases) = ctx.step(6, || {
             let paths = Paths::between(from, to, dt)?;
             let (carried, parts) = ctx.phase("advect", || self.carried(ctx, &paths))?;
             let surface = ctx.phase("phi", || self.surface_of(ctx, to))?;
@@ -285,30 +303,82 @@ impl Tracker {
             let (vertices, flags) =
                 ctx.phase("project", || self.projected(ctx, carried, &delta, &distances))?;
             let feet: Vec<Option<DVec3>> = flags.iter().map(Flag::foot).collect();
-            let (apart, bare) = ctx.phase("cover", || self.cover(ctx, &surface, &feet, false))?;
-            let uncovered: Vec<bool> = bare.iter().zip(&self.bare).map(|(now, ever)| *now && !ever).collect();
-            let report = StepReport {
-                parts,
-                born: paths.born,
-                died: paths.died,
-                triangles: surface.1.count(),
-                apart,
-                ..StepReport::default()
+            let mut covered = ctx.phase("cover", || self.cover(ctx, &surface, &feet, false))?;
+            covered.bare.iter_mut().zip(&self.bare).for_each(|(now, ever)| *now &= !ever);
+            let count = |kind: Flag| flags.iter().filter(|flag| **flag == kind).count();
+            let is_flagged = |(flag, is_bare): (&Flag, &bool)| flag.foot().is_none() || *is_bare;
+            let mut next = Next {
+                flags: flags.iter().zip(&covered.bare).map(is_flagged).collect(),
+                report: StepReport {
+                    jumped: count(Flag::Jumped),
+                    lost: count(Flag::Lost),
+                    uncovered: covered.bare.iter().filter(|is| **is).count(),
+                    parts,
+                    born: paths.born,
+                    died: paths.died,
+                    triangles: surface.1.count(),
+                    ..StepReport::default()
+                },
+                vertices,
+                delta,
             };
-            Ok((vertices, delta, (flags, uncovered), report))
+            if self.params.rebuild {
+                next.report.change = ctx
+                    .phase("rebuild", || self.changed(ctx, &next, &feet, &covered, &surface.0, &distances))?;
+            }
+            next.report.apart = covered.apart;
+            Ok(next)
         })?;
-        let count = |kind: Flag| flags.iter().filter(|flag| **flag == kind).count();
-        let (jumped, lost) = (count(Flag::Jumped), count(Flag::Lost));
-        let report = StepReport {
-            jumped,
-            lost,
-            uncovered: uncovered.iter().filter(|is| **is).count(),
-            phases,
-            ..report
-        };
-        (self.vertices, self.delta) = (vertices, delta);
-        self.flags = flags.iter().zip(uncovered).map(|(flag, is)| flag.foot().is_none() || is).collect();
+        let mut report = StepReport { phases, ..next.report };
+        (self.vertices, self.delta, self.flags) = (next.vertices, next.delta, next.flags);
+        if let Some(change) = &mut report.change {
+            self.take(change);
+        }
         Ok(report)
+    }
+
+    /// What the mesh becomes where it no longer fits.
+    fn changed(
+        &self,
+        ctx: &Context,
+        next: &Next,
+        feet: &[Option<DVec3>],
+        covered: &Covered,
+        phi: &Implicit,
+        distances: &Distances,
+    ) -> Result<Option<Change>> {
+        // What never had a distance does not fit from the start: that is no change.
+        let flags: Vec<bool> =
+            next.flags.iter().zip(&next.delta).map(|(flag, delta)| *flag && !delta.is_nan()).collect();
+        let bin = |place: &DVec3| cell_of(&(place / covered.reach));
+        let beside =
+            feet.iter().zip(&covered.bare).filter(|(_, is)| **is).filter_map(|(foot, _)| foot.as_ref());
+        let mut beside: Vec<Coord> = beside.map(bin).collect();
+        beside.par_sort_unstable();
+        beside.dedup();
+        let mut bare: Vec<DVec3> =
+            covered.places.iter().filter(|place| is_near(&beside, bin(place))).copied().collect();
+        bare.extend_from_slice(&covered.drops);
+        let unfit =
+            Unfit { vertices: &next.vertices, triangles: &self.triangles, flags: &flags, bare: &bare };
+        change(ctx, &unfit, phi, distances)
+    }
+
+    /// Becomes what the mesh became.
+    fn take(&mut self, change: &Change) {
+        let mut made = change.delta.iter();
+        let old = |values: &[f32], at: &Option<u32>| at.map_or(0.0, |at| values[at as usize]);
+        let delta =
+            |at: &Option<u32>| at.map_or_else(|| *made.next().unwrap_or(&0.0), |at| self.delta[at as usize]);
+        self.delta = change.origins.iter().map(delta).collect();
+        let flag = |flags: &[bool], at: &Option<u32>| at.is_some_and(|at| flags[at as usize]);
+        self.flags = change.origins.iter().map(|at| flag(&self.flags, at)).collect();
+        self.bare = change.origins.iter().map(|at| flag(&self.bare, at)).collect();
+        if !self.lasting.is_empty() {
+            self.lasting = change.origins.iter().map(|at| old(&self.lasting, at)).collect();
+        }
+        self.vertices.clone_from(&change.vertices);
+        self.triangles.clone_from(&change.triangles);
     }
 
     /// What of the particles' surface the mesh does not cover: whole parts, and the vertices beside other such places.
@@ -318,12 +388,14 @@ impl Tracker {
         (phi, surface): &(Implicit, Isosurface),
         feet: &[Option<DVec3>],
         is_first: bool,
-    ) -> Result<(Vec<Apart>, Vec<bool>)> {
+    ) -> Result<Covered> {
         let parts = Parts::new(phi, surface, feet.iter().flatten().map(cell_of).collect());
         ctx.check()?;
         let spacing = 1.0 / self.params.cell;
         let cover = Cover { feet, triangles: &self.triangles, spacing, is_first };
-        Ok((parts.apart(phi, surface), cover.beside_bare(ctx, phi, surface, &parts)?))
+        let (bare, places) = cover.beside_bare(ctx, phi, surface, &parts)?;
+        let (apart, drops) = (parts.apart(phi, surface), parts.on_drops(phi, surface));
+        Ok(Covered { apart, bare, places, reach: cover.reach(), drops })
     }
 
     fn carried(&self, ctx: &Context, paths: &Paths) -> Result<(Vec<DVec3>, usize)> {
@@ -412,6 +484,26 @@ pub(super) fn validate_step(from: &Particles, to: &Particles, dt: f64) -> Result
     }
     from.validate()?;
     to.validate()
+}
+
+/// The mesh after a step, before it is rebuilt.
+struct Next {
+    vertices: Vec<DVec3>,
+    delta: Vec<f32>,
+    flags: Vec<bool>,
+    report: StepReport,
+}
+
+/// What of the particles' surface the mesh does not cover.
+struct Covered {
+    apart: Vec<Apart>,
+    /// Vertices beside places that it does not cover, and these (cells).
+    bare: Vec<bool>,
+    places: Vec<DVec3>,
+    /// How near is beside (cells).
+    reach: f64,
+    /// Places on drops (cells).
+    drops: Vec<DVec3>,
 }
 
 /// What became of a vertex.

@@ -1,7 +1,9 @@
 //! What tests, benchmarks and examples share: shapes made by code.
 #![allow(dead_code)]
 
+pub mod bodies;
 pub mod boot;
+pub mod broken_meshes;
 pub mod caches;
 pub mod character;
 pub mod clients;
@@ -12,6 +14,7 @@ pub mod jelly;
 pub mod liquids;
 pub mod made_sets;
 pub mod nearest;
+pub mod repaired;
 pub mod shapes;
 pub mod sleigh;
 pub mod spot;

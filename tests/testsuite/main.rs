@@ -17,6 +17,7 @@ mod capi {
     mod header;
 }
 mod cli {
+    mod compare;
     mod errors;
     mod examples;
     mod figures;
@@ -26,6 +27,7 @@ mod cli {
     mod limits;
     mod outputs;
     mod points;
+    mod repair;
     mod runs;
     mod speed;
     mod tools;
@@ -91,6 +93,7 @@ mod surface {
     mod from_particles;
     mod implicit;
     mod made_sets;
+    mod repair;
     mod shot;
     mod tracking;
     mod usd;

@@ -72,6 +72,7 @@ impl<'a> Track<'a> {
             weighting: self.surface.weighting,
             half_life: self.surface.half_life.unwrap_or(f64::INFINITY),
             fade: self.surface.fade,
+            rebuild: false,
         }
     }
 

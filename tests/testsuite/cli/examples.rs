@@ -176,6 +176,21 @@ fn the_page_of_the_command_line_handles_points() {
     });
 }
 
+#[test]
+fn the_page_of_the_command_line_repairs_meshes() {
+    let folder = tempfile::tempdir().unwrap();
+    // A cube without its lid.
+    let (open, _) = CUBE.rsplit_once("f ").unwrap();
+    for name in ["broken", "broken.0001", "broken.0002"] {
+        fs::write(folder.path().join(format!("{name}.obj")), open).unwrap();
+    }
+    let lines = lines(block(CLI, "## Repaired meshes", "sh"));
+    assert_eq!(lines.len(), 4, "{lines:?}");
+    let said: Vec<String> = lines.iter().map(|line| works(folder.path(), line)).collect();
+    assert!(said[0].starts_with("broken.obj: a solid now, in solid.ply\n"), "{}", said[0]);
+    assert!(said[1].starts_with("solid.ply: a solid\n"), "{}", said[1]);
+}
+
 /// The commands that a help text lists, each with the command before it.
 fn commands_of(folder: &Path, command: &str) -> Vec<String> {
     let help = works(folder, &format!("{command} --help"));

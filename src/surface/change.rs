@@ -1,0 +1,214 @@
+//! The mesh where the liquid has merged or split: matched to the particles' surface (thesis 2.4) and rebuilt (2.5), in the cells
+//! in which it no longer fits; elsewhere it stays as it is.
+
+use super::band::Distances;
+use super::cells::{Coord, cell_of};
+use super::gamma::Gamma;
+use super::implicit::Implicit;
+use super::project::foot;
+use super::repair::{CellSet, Pierces, Rebuilt, Shape, Source, ladder, overlaps};
+use super::sample::Sampler;
+use crate::base::DVec3;
+use crate::base::mesh::used;
+use crate::context::Context;
+use crate::distance::lattice::Lattice;
+use crate::error::Result;
+
+/// A mesh, and where it no longer fits.
+pub struct Unfit<'a> {
+    /// Places of vertices (m).
+    pub vertices: &'a [DVec3],
+    pub triangles: &'a [[u32; 3]],
+    /// Vertices whose triangles are rebuilt.
+    pub flags: &'a [bool],
+    /// Places of the particles' surface that the mesh should have, and does not (cells).
+    pub bare: &'a [DVec3],
+}
+
+/// What a mesh became.
+#[derive(Debug, Clone)]
+pub struct Change {
+    /// Places of vertices (m): those that stayed, in their order, then those that were made.
+    pub vertices: Vec<DVec3>,
+    /// Triangles, counter-clockwise seen from outside.
+    pub triangles: Vec<[u32; 3]>,
+    /// For each vertex the vertex that it was; none: it was made.
+    pub origins: Vec<Option<u32>>,
+    /// For each triangle where it comes from.
+    pub sources: Vec<Source>,
+    /// For each vertex that was made its signed distance from the particles' surface (m).
+    pub delta: Vec<f32>,
+    /// Cells in which the mesh did not fit.
+    pub flagged_cells: usize,
+    /// Cells that were rebuilt.
+    pub rebuilt_cells: usize,
+    /// How much more was rebuilt than those cells and what they need: 0 nothing, 1 a ring around them, 2 whole parts, 3 everything.
+    pub rung: usize,
+    /// Iterations of the matching.
+    pub iterations: usize,
+}
+
+impl Change {
+    /// What two changes did, one after the other.
+    pub fn after(mut self, first: &Self) -> Self {
+        self.origins.iter_mut().for_each(|at| *at = at.and_then(|at| first.origins[at as usize]));
+        self.sources.iter_mut().for_each(|source| *source = source.after(&first.sources));
+        self.flagged_cells += first.flagged_cells;
+        self.rebuilt_cells += first.rebuilt_cells;
+        self.rung = self.rung.max(first.rung);
+        self.iterations += first.iterations;
+        self
+    }
+}
+
+/// Rebuilds a closed mesh where it no longer fits. None where it does everywhere.
+///
+/// # Errors
+/// Vertices too far apart for the grid; more memory than the context allows; cancel.
+pub fn change(
+    ctx: &Context,
+    unfit: &Unfit<'_>,
+    phi: &Implicit,
+    distances: &Distances,
+) -> Result<Option<Change>> {
+    let cell = distances.cell();
+    let Some(first) = unfit.vertices.first() else { return Ok(None) };
+    let low = unfit.vertices.iter().fold(*first, |low, place| low.inf(place));
+    let high = unfit.vertices.iter().fold(*first, |high, place| high.sup(place));
+    let lattice = Lattice::near(cell, 0.5 * (low + high))?;
+    let in_cells: Vec<DVec3> = unfit.vertices.iter().map(|place| lattice.to_cells(*place)).collect();
+    let fixed = in_cells.iter().map(|place| lattice.fix(*place)).collect::<Result<Vec<_>>>()?;
+    let pierces = Pierces::of(&fixed, unfit.triangles)?;
+    let shape = Shape { fixed, triangles: unfit.triangles.to_vec(), pierces };
+    ctx.check()?;
+    let flagged = flagged(unfit, &shape, &lattice);
+    if flagged.count() == 0 {
+        return Ok(None);
+    }
+    let gamma = Gamma::matched(ctx, &shape, &in_cells, &lattice, &flagged, (phi, distances))?;
+    let mut set = flagged.clone();
+    for node in gamma.turned() {
+        for n in 0..8 {
+            set.add([node[0] - (n >> 2), node[1] - (n >> 1 & 1), node[2] - (n & 1)]);
+        }
+    }
+    let Rebuilt { draft, cells, rung, .. } = ladder(ctx, &shape, (&in_cells, &lattice), &set, &gamma)?;
+    let own = unfit.vertices.len();
+    let names = used(draft.places.len(), &draft.triangles)
+        .unwrap_or_else(|| (0..draft.places.len() as u32).collect());
+    let origin = DVec3::from(lattice.origin.map(f64::from));
+    let mut sampler = Sampler::new(distances);
+    let mut delta = Vec::new();
+    let mut vertices = Vec::with_capacity(names.len());
+    for name in &names {
+        let at = *name as usize;
+        if at < own {
+            vertices.push(unfit.vertices[at]);
+            continue;
+        }
+        let place = draft.places[at] + origin;
+        let distance = match foot(&mut sampler, place) {
+            Some(foot) => foot.distance,
+            None => sampler.at(place).map_or(0.0, |(distance, _)| f64::from(distance)),
+        };
+        delta.push((distance * cell) as f32);
+        vertices.push(place * cell);
+    }
+    Ok(Some(Change {
+        vertices,
+        triangles: crate::base::mesh::renumbered(&draft.triangles, &names),
+        origins: names.iter().map(|name| ((*name as usize) < own).then_some(*name)).collect(),
+        sources: draft.sources,
+        delta,
+        flagged_cells: flagged.count(),
+        rebuilt_cells: cells,
+        rung,
+        iterations: gamma.iterations,
+    }))
+}
+
+/// The cells in which the mesh does not fit: those of triangles around flagged vertices, those of the places that it should have, and
+/// those in which it has passed through itself.
+fn flagged(unfit: &Unfit<'_>, shape: &Shape, lattice: &Lattice) -> CellSet {
+    let mut set = CellSet::default();
+    for (triangle, names) in (0..).zip(unfit.triangles) {
+        if names.iter().any(|name| unfit.flags[*name as usize]) {
+            shape.cells_of(triangle).into_iter().for_each(|cell| _ = set.add(cell));
+        }
+    }
+    for place in unfit.bare {
+        let cell: Coord = cell_of(place);
+        set.add([0, 1, 2].map(|axis| cell[axis] - lattice.origin[axis]));
+    }
+    overlaps(shape, &mut set);
+    set
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::{Implicit, Isosurface, Params, Particles, Tracker};
+    use super::*;
+    use crate::base::faults::Faults;
+    use crate::context::Pool;
+
+    /// Particles one spacing apart in a ball.
+    fn ball(centre: DVec3, radius: f64) -> Vec<DVec3> {
+        let most = radius.ceil() as i32;
+        let on = || -most..=most;
+        let all = on().flat_map(|x| {
+            on().flat_map(move |y| on().map(move |z| DVec3::new(f64::from(x), f64::from(y), f64::from(z))))
+        });
+        all.filter(|place| place.norm() <= radius).map(|place| place + centre).collect()
+    }
+
+    fn particles(places: Vec<DVec3>) -> Particles {
+        Particles { ids: (0..places.len() as i64).collect(), velocities: Vec::new(), places }
+    }
+
+    #[test]
+    fn two_balls_become_one_and_part_again() {
+        let ctx = Context::new(Pool::new(2).unwrap());
+        // Together and apart, with a hollow in time to merge.
+        let away = |frame: i32| 9.0 - 0.25 * f64::from(if frame < 24 { frame } else { 48 - frame });
+        let at = |frame: i32| {
+            let x = DVec3::new(away(frame), 0.1, 0.2);
+            particles([ball(x, 5.5), ball(-x, 5.5)].concat())
+        };
+        let mut from = at(0);
+        let phi = Implicit::new(&ctx, &from.places, 1.0, 0.5).unwrap();
+        let mesh = Isosurface::new(&phi).mesh(&phi);
+        let params = Params { rebuild: true, ..Params::for_spacing(1.0) };
+        let mut tracker = Tracker::new(&ctx, params, &mesh, &from).unwrap();
+        let mut parts = Vec::new();
+        for frame in 1..=48 {
+            let to = at(frame);
+            let report = tracker.step(&ctx, &from, &to, 1.0 / 24.0).unwrap();
+            from = to;
+            let faults = Faults::of(&tracker.mesh());
+            if let Some(change) = &report.change {
+                eprintln!(
+                    "{frame}: away {:.2} flagged {} cells {} rebuilt {} rung {} iterations {} vertices {} parts {} genus {:?} crossings {} volume {:.1} flags {} jumped {} lost {} uncovered {} apart {}",
+                    away(frame),
+                    change.flagged_cells,
+                    change.flagged_cells,
+                    change.rebuilt_cells,
+                    change.rung,
+                    change.iterations,
+                    change.vertices.len(),
+                    faults.parts,
+                    faults.genus,
+                    faults.crossings,
+                    faults.volume,
+                    tracker.flags().iter().filter(|f| **f).count(),
+                    report.jumped,
+                    report.lost,
+                    report.uncovered,
+                    report.apart.len()
+                );
+            }
+            assert!(faults.by_index.is_watertight(), "{frame}: {faults:?}");
+            parts.push(faults.parts);
+        }
+        assert!(parts.contains(&1) && parts[0] == 2 && parts[47] == 2, "{parts:?}");
+    }
+}

@@ -1,0 +1,411 @@
+//! Topology matching (thesis 2.4): near flagged nodes, Gamma takes the topology of phi.
+//!
+//! Gamma is the signed distance from the mesh, phi that from the particles' surface, and psi = Gamma - phi (Eq. 2.2). At fixed nodes,
+//! near the mesh and not flagged, psi is what it is: the mesh's detail. Between them it is as smooth as can be, a solution of Laplace's
+//! equation (Eq. 2.3), and Gamma becomes phi + psi: it merges and splits where phi does, and is itself where nothing is flagged.
+//! Lengths are in cells.
+//!
+//! The thesis solves on the whole grid, which is most of its time. Here nodes within a reach of flagged ones are free, and all
+//! others keep their Gamma. What is beside a free node:
+//!
+//! | node | its psi |
+//! |---|---|
+//! | not there | counts for nothing, as at the border of the thesis' grid (Neumann, 2.4.2) |
+//! | fixed, within reach or not | given: Gamma - phi (Dirichlet) |
+//! | beyond reach, where phi has Gamma's sign and a size over sqrt(3) | counts for nothing |
+//! | beyond reach, elsewhere | given: Gamma - phi |
+//!
+//! Far from the mesh Gamma and phi are cut off, each at its band, and their difference says little: taken as given all along the
+//! rim, it pulls at what flagged nodes become (between two balls by 0.1 to 0.3 at a reach of 8, by 0.02 at most with these rules).
+//! It is needed where phi alone would change a sign: without it, a drop of phi that lies across the rim would be cut in two. As a
+//! last resort a free node beside one beyond reach keeps its Gamma if its sign would change. So no edge across the rim gets or loses
+//! a crossing.
+
+mod nodes;
+mod solve;
+
+use crate::context::Context;
+use crate::error::{Error, Result};
+use nodes::Free;
+use solve::System;
+
+/// Nodes of a task.
+const PIECE: usize = 2048;
+
+/// How the Laplace equation is solved.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
+pub enum Solver {
+    /// Successive over-relaxation, red and black nodes in turn (thesis 2.4.1).
+    #[default]
+    Sor,
+    /// Conjugate gradients, preconditioned by a symmetric pass of Gauss-Seidel over red and black nodes.
+    Gradients,
+}
+
+/// How Gamma is matched.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Matching {
+    /// How the equation is solved.
+    pub solver: Solver,
+    /// Greatest change of psi in an iteration at which it ends (cells), over 0; the thesis' is 0.01.
+    pub tolerance: f64,
+    /// How far from flagged nodes, on each axis, it is solved (cells), at least 1; beyond, Gamma stays.
+    pub reach: i32,
+    /// Most iterations.
+    pub most: usize,
+}
+
+impl Default for Matching {
+    fn default() -> Self {
+        Self { solver: Solver::default(), tolerance: 0.01, reach: 12, most: 1000 }
+    }
+}
+
+/// A node of the grid.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Node {
+    /// Its place (cells).
+    pub place: [i32; 3],
+    /// Signed distance from the mesh (cells), negative inside; may be cut off beyond sqrt(3).
+    pub gamma: f32,
+    /// Signed distance from the particles' surface (cells), negative inside; where that is farther than its band is wide, the
+    /// band's width with its sign.
+    pub phi: f32,
+    /// Whether Gamma follows phi here.
+    pub is_flagged: bool,
+}
+
+/// What a matching made.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Matched {
+    /// Gamma of each node (cells), in the order in which they were given. At nodes that are not free it has the same bits as before.
+    pub gamma: Vec<f32>,
+    /// Iterations that it took.
+    pub iterations: usize,
+    /// Greatest distance of a free node's psi from the mean of those that it depends on (cells).
+    pub residual: f64,
+    /// Count of fixed nodes: those not flagged, with |Gamma| <= sqrt(3).
+    pub fixed: usize,
+    /// Count of free nodes: flagged ones, and those within reach that are not fixed.
+    pub free: usize,
+}
+
+/// Matches Gamma to phi near flagged nodes. The order of the nodes makes no difference to what each becomes, nor does the number of
+/// threads. When the iterations come to their limit, the residual says how far it is from done.
+///
+/// psi begins at 0 (thesis, algorithm 2.1): from the Gamma - phi of flagged nodes a solve that ends early would keep part of what
+/// is to go. Free nodes from which no way over free nodes leads to a given psi are left there: any constant would
+/// solve their equations, and with 0 they become phi.
+///
+/// # Errors
+/// Parameters out of range; two nodes at the same place; distances that are not finite; more memory than the context allows; cancel.
+pub fn match_topology(ctx: &Context, nodes: &[Node], matching: &Matching) -> Result<Matched> {
+    matching.validate()?;
+    ctx.check()?;
+    let Free { nodes: free, rows, fixed } = Free::of(ctx, nodes, matching.reach)?;
+    let system = System::new(&rows);
+    let solved = match matching.solver {
+        Solver::Sor => system.over_relaxed(ctx, matching.tolerance, matching.most)?,
+        Solver::Gradients => system.by_gradients(ctx, matching.tolerance, matching.most)?,
+    };
+    let mut gamma: Vec<f32> = nodes.iter().map(|node| node.gamma).collect();
+    for ((at, row), psi) in free.iter().zip(&rows).zip(&solved.psi) {
+        let gamma = &mut gamma[*at as usize];
+        let matched = (f64::from(nodes[*at as usize].phi) + psi) as f32;
+        if !row.is_rim || (matched < 0.0) == (*gamma < 0.0) {
+            *gamma = matched;
+        }
+    }
+    Ok(Matched { gamma, iterations: solved.iterations, residual: solved.residual, fixed, free: free.len() })
+}
+
+impl Matching {
+    fn validate(&self) -> Result<()> {
+        if !(self.tolerance.is_finite() && self.tolerance > 0.0) {
+            return Err(Error::argument(format!(
+                "the tolerance of the matching, {}, is not over 0 and finite",
+                self.tolerance
+            )));
+        }
+        if self.reach < 1 {
+            return Err(Error::argument(format!(
+                "the reach of the matching, {}, is not 1 or more",
+                self.reach
+            )));
+        }
+        Ok(())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::base::DVec3;
+    use crate::context::Pool;
+
+    const SOLVERS: [Solver; 2] = [Solver::Sor, Solver::Gradients];
+    /// How far the grid of two balls reaches from the origin on each axis (cells).
+    const HALF: [i32; 3] = [26, 18, 18];
+
+    fn context(threads: usize) -> Context {
+        Context::new(Pool::new(threads).unwrap())
+    }
+
+    /// Places of a box, ascending.
+    fn each(low: [i32; 3], high: [i32; 3]) -> impl Iterator<Item = [i32; 3]> {
+        let on = move |axis: usize| low[axis]..=high[axis];
+        on(0).flat_map(move |x| on(1).flat_map(move |y| on(2).map(move |z| [x, y, z])))
+    }
+
+    fn matching(solver: Solver, tolerance: f64, reach: i32) -> Matching {
+        Matching { solver, tolerance, reach, most: 5000 }
+    }
+
+    /// Two balls with a radius of 8 and 1.5 between them. For phi they lie `shift` farther along y, and a neck has grown
+    /// between them; flagged within 7 of the gap.
+    fn balls(shift: f64) -> Vec<Node> {
+        let node = |place: [i32; 3]| {
+            let place_of = DVec3::from(place.map(f64::from));
+            let ball = |side: f64, shift: f64| (place_of - DVec3::new(side * 8.75, shift, 0.0)).norm() - 8.0;
+            let (a, b) = (ball(-1.0, shift), ball(1.0, shift));
+            // Smooth minimum.
+            let near = (6.0 - (a - b).abs()).max(0.0) / 6.0;
+            let phi = a.min(b) - near * near * 1.5;
+            let gamma = ball(-1.0, 0.0).min(ball(1.0, 0.0));
+            let is_flagged = place_of.norm() <= 7.0;
+            Node { place, gamma: gamma.clamp(-4.0, 4.0) as f32, phi: phi.clamp(-5.0, 5.0) as f32, is_flagged }
+        };
+        each(HALF.map(|x| -x), HALF).map(node).collect()
+    }
+
+    /// Index of a place in the grid of two balls.
+    fn index(place: [i32; 3]) -> usize {
+        (0..3).fold(0, |at, axis| at * (2 * HALF[axis] + 1) as usize + (place[axis] + HALF[axis]) as usize)
+    }
+
+    /// Whether a way over nodes inside leads from one ball's centre to the other's.
+    fn are_joined(gamma: &[f32]) -> bool {
+        let mut is_seen = vec![false; gamma.len()];
+        let mut due = vec![[-9, 0, 0]];
+        while let Some(place) = due.pop() {
+            let at = index(place);
+            if gamma[at] >= 0.0 || std::mem::replace(&mut is_seen[at], true) {
+                continue;
+            }
+            for side in 0..6usize {
+                let mut next = place;
+                next[side / 2] += if side.is_multiple_of(2) { -1 } else { 1 };
+                if (0..3).all(|axis| next[axis].abs() <= HALF[axis]) {
+                    due.push(next);
+                }
+            }
+        }
+        is_seen[index([9, 0, 0])]
+    }
+
+    /// Nodes in a box, some missing, with values that look random.
+    fn noise() -> Vec<Node> {
+        let random = |place: [i32; 3], salt: u32| {
+            let mix = |sum: u32, x: u32| (sum ^ x).wrapping_mul(0x9e37_79b1).rotate_left(13) ^ (sum >> 7);
+            place.into_iter().map(|x| x as u32).fold(mix(salt, 77), mix).wrapping_mul(0x85eb_ca6b) >> 8
+        };
+        let value = |place, salt| (random(place, salt) % 6000) as f32 / 1000.0 - 3.0;
+        each([-9, -7, -5], [12, 8, 9])
+            .filter(|place| !random(*place, 1).is_multiple_of(7))
+            .map(|place| Node {
+                place,
+                gamma: value(place, 2),
+                phi: value(place, 3),
+                is_flagged: random(place, 4).is_multiple_of(3),
+            })
+            .collect()
+    }
+
+    fn greatest(differences: impl Iterator<Item = f32>) -> f32 {
+        differences.fold(0.0f32, |most, x| most.max(x.abs()))
+    }
+
+    #[test]
+    fn psi_is_linear_between_two_planes() {
+        // psi is -0.25 at x = 0 and 0.5 at x = 12; in between, Gamma says nothing.
+        let psi = |x: i32| -0.25 + x as f32 / 16.0;
+        let node = |place: [i32; 3]| {
+            let is_flagged = (1..12).contains(&place[0]);
+            let phi = (place[0] * 3 + place[1] * 5 + place[2]) as f32 / 8.0 % 1.0;
+            Node { place, gamma: if is_flagged { 3.0 } else { phi + psi(place[0]) }, phi, is_flagged }
+        };
+        let nodes: Vec<Node> = each([0; 3], [12, 4, 3]).map(node).collect();
+        for solver in SOLVERS {
+            let out = match_topology(&context(1), &nodes, &matching(solver, 1e-11, 12)).unwrap();
+            assert_eq!((out.fixed, out.free), (2 * 20, 11 * 20));
+            assert!(out.iterations < 400, "{solver:?} took {}", out.iterations);
+            assert!(out.residual < 1e-9, "{solver:?} left {}", out.residual);
+            let far =
+                greatest(nodes.iter().zip(&out.gamma).map(|(node, out)| out - node.phi - psi(node.place[0])));
+            assert!(far < 1e-6, "{solver:?} is off by {far}");
+        }
+    }
+
+    #[test]
+    fn both_solvers_find_the_same_from_any_order_and_with_any_threads() {
+        let nodes = noise();
+        let solve = |solver, threads, nodes: &[Node]| {
+            let ctx = context(threads);
+            ctx.phase("match", || match_topology(&ctx, nodes, &matching(solver, 1e-9, 2))).unwrap()
+        };
+        let outs = SOLVERS.map(|solver| solve(solver, 1, &nodes));
+        assert!(outs[0].fixed > 300 && outs[0].free > 1000, "{} and {}", outs[0].fixed, outs[0].free);
+        assert!(outs.iter().all(|out| out.residual < 1e-6));
+        let far = greatest(outs[0].gamma.iter().zip(&outs[1].gamma).map(|(a, b)| a - b));
+        assert!(far < 1e-4, "they differ by {far}");
+        // Every 1009th node, around and around.
+        let order: Vec<usize> = (0..nodes.len()).map(|n| n * 1009 % nodes.len()).collect();
+        let shuffled: Vec<Node> = order.iter().map(|at| nodes[*at]).collect();
+        for (solver, out) in SOLVERS.into_iter().zip(&outs) {
+            let bits = |out: &Matched| out.gamma.iter().map(|gamma| gamma.to_bits()).collect::<Vec<_>>();
+            assert!(bits(&solve(solver, 2, &nodes)) == bits(out), "{solver:?} with two threads");
+            let other = solve(solver, 2, &shuffled);
+            let expected: Vec<u32> = order.iter().map(|at| out.gamma[*at].to_bits()).collect();
+            assert!(bits(&other) == expected, "{solver:?} in another order");
+            assert_eq!((other.iterations, other.residual), (out.iterations, out.residual));
+        }
+    }
+
+    #[test]
+    fn a_neck_of_phi_joins_two_balls_and_what_is_far_stays() {
+        let nodes = balls(0.0);
+        let before: Vec<f32> = nodes.iter().map(|node| node.gamma).collect();
+        assert!(!are_joined(&before));
+        for solver in SOLVERS {
+            let out = match_topology(&context(2), &nodes, &matching(solver, 0.01, 8)).unwrap();
+            assert!(are_joined(&out.gamma), "{solver:?}");
+            assert!(out.iterations < 100, "{solver:?} took {}", out.iterations);
+            let mut stayed = 0;
+            for (node, gamma) in nodes.iter().zip(&out.gamma) {
+                let is_far = node.place.iter().any(|x| x.abs() > 15);
+                let is_fixed = !node.is_flagged && node.gamma.abs() <= 1.7;
+                if is_far || is_fixed {
+                    assert_eq!(node.gamma.to_bits(), gamma.to_bits(), "{solver:?} at {:?}", node.place);
+                    stayed += 1;
+                } else if !node.is_flagged {
+                    assert_eq!(node.gamma < 0.0, *gamma < 0.0, "{solver:?} at {:?}", node.place);
+                }
+            }
+            assert!(stayed > nodes.len() / 3 && stayed < nodes.len());
+        }
+    }
+
+    #[test]
+    fn within_a_reach_it_is_what_it_is_on_the_whole_grid() {
+        for (shift, solver) in [(0.0, Solver::Sor), (1.0, Solver::Gradients)] {
+            let nodes = balls(shift);
+            let [near, whole] = [12, i32::MAX].map(|reach| {
+                let out = match_topology(&context(2), &nodes, &matching(solver, 1e-8, reach)).unwrap();
+                assert!(out.residual < 1e-6, "{}", out.residual);
+                out
+            });
+            assert!(near.free < whole.free);
+            assert!(whole.free + whole.fixed == nodes.len());
+            let same = |(a, b): (&f32, &f32)| (*a < 0.0) == (*b < 0.0);
+            assert!(near.gamma.iter().zip(&whole.gamma).all(same), "shift {shift}");
+            let flagged = nodes.iter().zip(near.gamma.iter().zip(&whole.gamma));
+            let far =
+                greatest(flagged.filter(|(node, _)| node.is_flagged).map(|(_, (near, whole))| near - whole));
+            assert!(far < 0.1, "shift {shift}: they differ by {far}");
+        }
+    }
+
+    #[test]
+    fn no_sign_changes_at_the_rim() {
+        // A drop of phi above liquid, across the rim at x = 10; flagged within 2 of the origin.
+        let node = |place: [i32; 3]| {
+            let drop = (DVec3::from(place.map(f64::from)) - DVec3::new(10.0, 0.0, 7.0)).norm() - 4.0;
+            let height = f64::from(place[2]) + 0.5;
+            let is_flagged = place.iter().all(|x| x.abs() <= 2);
+            let phi = height.min(drop).clamp(-4.0, 4.0) as f32;
+            Node { place, gamma: height.clamp(-3.0, 3.0) as f32, phi, is_flagged }
+        };
+        let nodes: Vec<Node> = each([-14, -12, -12], [18, 12, 14]).map(node).collect();
+        for solver in SOLVERS {
+            let out = match_topology(&context(1), &nodes, &matching(solver, 1e-4, 8)).unwrap();
+            let mut counts = [0; 2];
+            for (node, gamma) in nodes.iter().zip(&out.gamma) {
+                let far = node.place.iter().map(|x| x.abs()).max().unwrap();
+                if far >= 10 {
+                    assert_eq!(node.gamma < 0.0, *gamma < 0.0, "{solver:?} at {:?}", node.place);
+                    counts[0] += usize::from(far == 10 && node.phi < 0.0 && node.gamma > 0.0);
+                }
+                if far > 10 {
+                    assert_eq!(node.gamma.to_bits(), gamma.to_bits(), "{solver:?} at {:?}", node.place);
+                }
+                counts[1] += usize::from(node.gamma != *gamma);
+            }
+            assert!(counts[0] > 20 && counts[1] > 100, "{counts:?}");
+        }
+    }
+
+    #[test]
+    fn a_free_node_beside_one_beyond_reach_keeps_its_sign() {
+        // psi is -5.5 all along.
+        let values = [(-1.5, 4.0, false), (1.0, 2.0, true), (3.0, 3.5, false), (3.0, 4.0, false)];
+        let node = |(x, (gamma, phi, is_flagged)): (i32, (f32, f32, bool))| Node {
+            place: [x, 0, 0],
+            gamma,
+            phi,
+            is_flagged,
+        };
+        let nodes: Vec<Node> = (0..).zip(values).map(node).collect();
+        for solver in SOLVERS {
+            let out = match_topology(&context(1), &nodes, &matching(solver, 1e-9, 1)).unwrap();
+            assert_eq!((out.fixed, out.free), (1, 2));
+            assert!((out.gamma[1] + 3.5).abs() < 1e-6, "{solver:?}: {:?}", out.gamma);
+            assert_eq!([out.gamma[0], out.gamma[2], out.gamma[3]], [-1.5, 3.0, 3.0], "{solver:?}");
+        }
+    }
+
+    #[test]
+    fn free_nodes_without_a_fixed_one_take_phi() {
+        let island = each([20, 0, 0], [22, 2, 2]).map(|place| {
+            let phi = 0.25 * (place[0] - 21) as f32 + 0.5 * place[1] as f32;
+            Node { place, gamma: -1.0, phi, is_flagged: true }
+        });
+        let other = each([0; 3], [2, 2, 2]).map(|place| Node {
+            place,
+            gamma: 0.5,
+            phi: 0.25,
+            is_flagged: place == [1; 3],
+        });
+        let nodes: Vec<Node> = island.chain(other).collect();
+        for solver in SOLVERS {
+            let out = match_topology(&context(1), &nodes, &matching(solver, 1e-8, 3)).unwrap();
+            assert_eq!((out.fixed, out.free), (26, 28));
+            for (node, gamma) in nodes.iter().zip(&out.gamma) {
+                let expected = if node.place[0] >= 20 { node.phi } else { 0.5 };
+                assert!((gamma - expected).abs() < 1e-6, "{solver:?}: {gamma} is not {expected}");
+            }
+        }
+    }
+
+    #[test]
+    fn nothing_is_nothing_and_what_makes_no_sense_is_refused() {
+        let node = Node { place: [1, 2, 3], gamma: 0.5, phi: 0.25, is_flagged: true };
+        for solver in SOLVERS {
+            let small = Matching { solver, ..Matching::default() };
+            let out = match_topology(&context(1), &[], &small).unwrap();
+            assert_eq!((out.gamma.len(), out.iterations, out.free), (0, 0, 0));
+            let calm = Node { is_flagged: false, ..node };
+            assert_eq!(match_topology(&context(1), &[calm], &small).unwrap().gamma, [0.5]);
+            let refusal = |nodes: &[Node], matching: &Matching| {
+                match_topology(&context(1), nodes, matching).unwrap_err().to_string()
+            };
+            assert_eq!(refusal(&[node, node], &small), "node [1, 2, 3] is there twice");
+            let lost = Node { phi: f32::NAN, ..node };
+            assert_eq!(refusal(&[lost], &small), "the distances of node [1, 2, 3] are not finite");
+            assert!(refusal(&[node], &Matching { tolerance: 0.0, ..small }).contains("tolerance"));
+            assert!(refusal(&[node], &Matching { reach: 0, ..small }).contains("reach"));
+            let ctx = context(1);
+            ctx.cancel();
+            assert!(matches!(match_topology(&ctx, &[node], &small), Err(Error::Cancelled)));
+        }
+    }
+}

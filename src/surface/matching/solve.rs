@@ -1,0 +1,340 @@
+//! The Laplace equation of the topology matching, and its two solvers (thesis 2.4.1).
+//!
+//! Nodes are red or black, by the parity of x + y + z, so that all nodes beside a red one are black and the other way round: the
+//! nodes of a colour do not depend on each other, and are updated in any order, by any number of threads, to the same bits.
+
+use rayon::prelude::*;
+
+use super::PIECE;
+use crate::context::Context;
+use crate::error::Result;
+
+/// No node.
+pub const NONE: u32 = u32::MAX;
+
+/// The equation of a free node: the count of nodes that it depends on times its psi, minus the psi of those of them that are
+/// free, is the load.
+#[derive(Debug, Clone, Copy)]
+pub struct Row {
+    /// The free nodes before and behind it on x, y and z, as indices of rows; [`NONE`]: there is none.
+    pub beside: [u32; 6],
+    /// Nodes beside it whose psi is given.
+    pub held: u32,
+    /// Sum of their psi (cells).
+    pub load: f64,
+    /// Whether x + y + z is odd.
+    pub is_odd: bool,
+    /// Whether a node beside it is not solved for since it is too far from all flagged ones.
+    pub is_rim: bool,
+}
+
+/// Values (cells) of the red nodes and of the black ones.
+type Field = [Vec<f64>; 2];
+
+/// The nodes of one colour.
+#[derive(Default)]
+struct Half {
+    /// Index of each one's row.
+    rows: Vec<u32>,
+    /// The free nodes beside each, of the other colour; [`NONE`]: there is none.
+    beside: Vec<[u32; 6]>,
+    /// Count of the nodes that each depends on: alpha_ii of the thesis.
+    counts: Vec<f64>,
+    /// Load of each (cells).
+    loads: Vec<f64>,
+}
+
+/// The equations of all nodes that given values reach. Where none does, any constant would be a solution, and psi is 0.
+pub struct System {
+    halves: [Half; 2],
+    /// Count of rows.
+    count: usize,
+    /// Most free nodes in a row on any axis.
+    widest: u32,
+}
+
+/// psi of all rows.
+pub struct Solution {
+    /// psi of each row (cells).
+    pub psi: Vec<f64>,
+    /// Iterations that were made.
+    pub iterations: usize,
+    /// Greatest distance of a psi from the mean of the nodes that it depends on (cells).
+    pub residual: f64,
+}
+
+impl System {
+    pub fn new(rows: &[Row]) -> Self {
+        let is_held = held(rows);
+        let mut halves = [Half::default(), Half::default()];
+        let mut slots = vec![NONE; rows.len()];
+        for (at, row) in rows.iter().enumerate().filter(|(at, _)| is_held[*at]) {
+            let half = &mut halves[usize::from(row.is_odd)];
+            slots[at] = half.rows.len() as u32;
+            let free = row.beside.iter().filter(|beside| **beside != NONE).count();
+            half.rows.push(at as u32);
+            half.counts.push((row.held as usize + free) as f64);
+            half.loads.push(row.load);
+        }
+        let slot = |row: u32| if row == NONE { NONE } else { slots[row as usize] };
+        for half in &mut halves {
+            half.beside = half.rows.iter().map(|at| rows[*at as usize].beside.map(slot)).collect();
+        }
+        Self { halves, count: rows.len(), widest: widest(rows, &is_held) }
+    }
+
+    /// Solves by successive over-relaxation (Eq. 2.5) until no psi changes by `tolerance` (cells), or `most` iterations.
+    ///
+    /// The relaxation factor is the best one for a cube with sides of N nodes (Yang & Gobbert 2009), N being the most free nodes
+    /// in a row on any axis: how wide the space between fixed nodes is, not how large the grid is, which would make it too great.
+    ///
+    /// # Errors
+    /// Cancel.
+    pub fn over_relaxed(&self, ctx: &Context, tolerance: f64, most: usize) -> Result<Solution> {
+        let omega = 2.0 / (1.0 + libm::sin(std::f64::consts::PI / (f64::from(self.widest) + 1.0)));
+        let mut psi = self.zeros();
+        let mut iterations = 0;
+        while self.has_nodes() && iterations < most {
+            ctx.check()?;
+            let [red, black] = &mut psi;
+            let changes = [self.halves[0].relax(omega, black, red), self.halves[1].relax(omega, red, black)];
+            iterations += 1;
+            if changes[0].max(changes[1]) < tolerance {
+                break;
+            }
+        }
+        Ok(self.solution(&psi, iterations))
+    }
+
+    /// Solves by conjugate gradients until no psi changes by `tolerance` (cells), or `most` iterations.
+    ///
+    /// One symmetric pass of Gauss-Seidel (SSOR with a factor of 1), red, black, red, preconditions them. The thesis' incomplete
+    /// Cholesky factors would need fewer iterations, but have to be run through node after node.
+    ///
+    /// # Errors
+    /// Cancel.
+    pub fn by_gradients(&self, ctx: &Context, tolerance: f64, most: usize) -> Result<Solution> {
+        let mut psi = self.zeros();
+        let mut residual: Field = [self.halves[0].loads.clone(), self.halves[1].loads.clone()];
+        let [mut guess, mut image] = [self.zeros(), self.zeros()];
+        self.precondition(&residual, &mut guess);
+        let mut direction = guess.clone();
+        let mut now = product(&residual, &guess);
+        let mut iterations = 0;
+        while iterations < most {
+            ctx.check()?;
+            self.apply(&direction, &mut image);
+            let energy = product(&direction, &image);
+            // Both are 0 where all given values are 0, or when nothing is left.
+            if !(now > 0.0 && energy > 0.0) {
+                break;
+            }
+            let step = now / energy;
+            combine(&mut psi, 1.0, step, &direction);
+            iterations += 1;
+            if step * greatest(&direction) < tolerance {
+                break;
+            }
+            combine(&mut residual, 1.0, -step, &image);
+            self.precondition(&residual, &mut guess);
+            let next = product(&residual, &guess);
+            combine(&mut direction, next / now, 1.0, &guess);
+            now = next;
+        }
+        Ok(self.solution(&psi, iterations))
+    }
+
+    fn has_nodes(&self) -> bool {
+        self.halves.iter().any(|half| !half.rows.is_empty())
+    }
+
+    fn zeros(&self) -> Field {
+        self.halves.each_ref().map(|half| vec![0.0; half.rows.len()])
+    }
+
+    fn solution(&self, psi: &Field, iterations: usize) -> Solution {
+        let mut means = self.zeros();
+        for half in 0..2 {
+            self.halves[half].means(&self.halves[half].loads, &psi[1 - half], &mut means[half]);
+        }
+        combine(&mut means, 1.0, -1.0, psi);
+        let mut all = vec![0.0; self.count];
+        for (half, psi) in self.halves.iter().zip(psi) {
+            half.rows.iter().zip(psi).for_each(|(row, psi)| all[*row as usize] = *psi);
+        }
+        Solution { psi: all, iterations, residual: greatest(&means) }
+    }
+
+    /// The preconditioner's guess of the way by which a residual comes about.
+    fn precondition(&self, residual: &Field, guess: &mut Field) {
+        let [red, black] = guess;
+        // The first pass knows nothing of the black nodes.
+        self.halves[0].means(&residual[0], &[], red);
+        self.halves[1].means(&residual[1], red, black);
+        self.halves[0].means(&residual[0], black, red);
+    }
+
+    /// The matrix times a field.
+    fn apply(&self, field: &Field, out: &mut Field) {
+        for half in 0..2 {
+            self.halves[half].apply(&field[half], &field[1 - half], &mut out[half]);
+        }
+    }
+}
+
+impl Half {
+    /// Sum of the other colour's values over the nodes beside one.
+    fn sum(&self, node: usize, other: &[f64]) -> f64 {
+        // None is beyond every end.
+        self.beside[node].iter().map(|at| other.get(*at as usize).copied().unwrap_or(0.0)).sum()
+    }
+
+    /// Over-relaxes all nodes of the colour. Returns the greatest change (cells).
+    fn relax(&self, omega: f64, other: &[f64], psi: &mut [f64]) -> f64 {
+        let piece = |(piece, psi): (usize, &mut [f64])| {
+            let mut most = 0.0f64;
+            for (psi, node) in psi.iter_mut().zip(piece * PIECE..) {
+                let mean = (self.loads[node] + self.sum(node, other)) / self.counts[node];
+                let change = omega * (mean - *psi);
+                *psi += change;
+                most = most.max(change.abs());
+            }
+            most
+        };
+        psi.par_chunks_mut(PIECE).enumerate().map(piece).reduce(|| 0.0, f64::max)
+    }
+
+    /// What each node would be by its own equation, with these loads.
+    fn means(&self, loads: &[f64], other: &[f64], out: &mut [f64]) {
+        out.par_chunks_mut(PIECE).enumerate().for_each(|(piece, out)| {
+            for (out, node) in out.iter_mut().zip(piece * PIECE..) {
+                *out = (loads[node] + self.sum(node, other)) / self.counts[node];
+            }
+        });
+    }
+
+    /// The rows of the colour times a field.
+    fn apply(&self, own: &[f64], other: &[f64], out: &mut [f64]) {
+        out.par_chunks_mut(PIECE).enumerate().for_each(|(piece, out)| {
+            for (out, node) in out.iter_mut().zip(piece * PIECE..) {
+                *out = self.counts[node] * own[node] - self.sum(node, other);
+            }
+        });
+    }
+}
+
+/// Whether a given value reaches each row, from free node to free node.
+fn held(rows: &[Row]) -> Vec<bool> {
+    let mut is_held: Vec<bool> = rows.iter().map(|row| row.held > 0).collect();
+    let mut due: Vec<u32> = (0..rows.len() as u32).filter(|at| is_held[*at as usize]).collect();
+    while let Some(at) = due.pop() {
+        for next in rows[at as usize].beside.into_iter().filter(|next| *next != NONE) {
+            if !std::mem::replace(&mut is_held[next as usize], true) {
+                due.push(next);
+            }
+        }
+    }
+    is_held
+}
+
+/// Most held nodes in a row on any axis.
+fn widest(rows: &[Row], is_held: &[bool]) -> u32 {
+    // How many end at each node: rows ascend by place, so that those before it are known.
+    let mut runs = vec![[0u32; 3]; rows.len()];
+    let mut most = 0u32;
+    for (at, row) in rows.iter().enumerate().filter(|(at, _)| is_held[*at]) {
+        for axis in 0..3 {
+            let before = row.beside[2 * axis];
+            let run = 1 + if before == NONE { 0 } else { runs[before as usize][axis] };
+            runs[at][axis] = run;
+            most = most.max(run);
+        }
+    }
+    most
+}
+
+/// to = keep to + share from.
+fn combine(to: &mut Field, keep: f64, share: f64, from: &Field) {
+    for (to, from) in to.iter_mut().zip(from) {
+        to.par_chunks_mut(PIECE).zip(from.par_chunks(PIECE)).for_each(|(to, from)| {
+            to.iter_mut().zip(from).for_each(|(to, from)| *to = keep * *to + share * from);
+        });
+    }
+}
+
+/// Scalar product, summed in a fixed order.
+fn product(a: &Field, b: &Field) -> f64 {
+    let of_half = |half: usize| -> f64 {
+        let pieces = a[half].par_chunks(PIECE).zip(b[half].par_chunks(PIECE));
+        let of_piece = |(a, b): (&[f64], &[f64])| a.iter().zip(b).map(|(a, b)| a * b).sum::<f64>();
+        let sums: Vec<f64> = pieces.map(of_piece).collect();
+        sums.iter().sum()
+    };
+    of_half(0) + of_half(1)
+}
+
+/// Greatest absolute value.
+fn greatest(field: &Field) -> f64 {
+    let of_piece = |piece: &[f64]| piece.iter().fold(0.0f64, |most, value| most.max(value.abs()));
+    let of_half = |half: &Vec<f64>| half.par_chunks(PIECE).map(of_piece).reduce(|| 0.0, f64::max);
+    field.iter().map(of_half).fold(0.0, f64::max)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::context::Pool;
+
+    /// Free nodes in a line on x, with given values beside some.
+    fn line(loads: &[Option<f64>]) -> Vec<Row> {
+        let row = |(at, load): (usize, &Option<f64>)| {
+            let mut beside = [NONE; 6];
+            if at > 0 {
+                beside[0] = at as u32 - 1;
+            }
+            if at + 1 < loads.len() {
+                beside[1] = at as u32 + 1;
+            }
+            let held = u32::from(load.is_some());
+            Row { beside, held, load: load.unwrap_or(0.0), is_odd: at % 2 == 1, is_rim: false }
+        };
+        loads.iter().enumerate().map(row).collect()
+    }
+
+    #[test]
+    fn nodes_that_no_given_value_reaches_are_zero_and_count_for_nothing() {
+        let mut rows = line(&[None, None, Some(1.0), None, None, None, None, None]);
+        // Cut into three and five.
+        rows[2].beside[1] = NONE;
+        rows[3].beside[0] = NONE;
+        let system = System::new(&rows);
+        assert_eq!(system.widest, 3);
+        let ctx = Context::new(Pool::new(1).unwrap());
+        let solutions = [
+            system.over_relaxed(&ctx, 1e-12, 1000).unwrap(),
+            system.by_gradients(&ctx, 1e-12, 1000).unwrap(),
+        ];
+        for Solution { psi, residual, .. } in solutions {
+            assert!(psi[..3].iter().all(|psi| (psi - 1.0).abs() < 1e-9), "{psi:?}");
+            assert_eq!(psi[3..], [0.0; 5]);
+            assert!(residual < 1e-9, "{residual}");
+        }
+    }
+
+    #[test]
+    fn iterations_end_at_their_limit_and_the_residual_tells() {
+        let mut loads = vec![None; 64];
+        loads[0] = Some(1.0);
+        let system = System::new(&line(&loads));
+        let ctx = Context::new(Pool::new(1).unwrap());
+        for solution in
+            [system.over_relaxed(&ctx, 1e-12, 3).unwrap(), system.by_gradients(&ctx, 1e-12, 3).unwrap()]
+        {
+            assert_eq!(solution.iterations, 3);
+            assert!(solution.residual > 1e-3, "{}", solution.residual);
+        }
+        let empty = System::new(&[]);
+        assert_eq!(empty.over_relaxed(&ctx, 1e-2, 9).unwrap().iterations, 0);
+        assert_eq!(empty.by_gradients(&ctx, 1e-2, 9).unwrap().iterations, 0);
+    }
+}

@@ -1,0 +1,418 @@
+//! What a mesh carries, on what became of it.
+//!
+//! Vertices and triangles that are still there keep their numbers bit for bit. What was made takes those of a place on the old mesh: a
+//! vertex of the nearest one, the corners of a triangle all of places on one old triangle, its chart, so that none lies across a seam.
+
+use rayon::prelude::*;
+
+use super::Source;
+use crate::base::arrays::{DetailedMesh, MeshArray, Number, On};
+use crate::base::deviation::NearestTree;
+use crate::base::{DVec3, TriMesh, Uvs, Vec3};
+
+/// Vertices or triangles of a task.
+const GRAIN: usize = 1024;
+/// Arrays whose 8-bit integers are shares of a colour: they are interpolated, as floats are.
+const COLOURS: [&str; 4] = ["red", "green", "blue", "alpha"];
+/// A triangle whose first corner has a lesser sine has no face to speak of: its places are those of its edges.
+const NEEDLE: f64 = 1e-8;
+
+/// How much the corners of a triangle count at a place on it: 0 or more, 1 in all.
+type Weights = [f64; 3];
+
+/// What a mesh carries, on what became of it: `mesh`, for whose vertices `vertices` names those that they were, and for whose
+/// triangles `sources` says where they come from.
+///
+/// Vertices that were there keep their numbers, and so do triangles that are [`Source::Whole`], with their corners. The corners of a
+/// [`Source::Part`] take what there is at their places in the triangle that it is a part of, those of a [`Source::New`] at the nearest
+/// places on the old triangle that is nearest to its middle; made vertices at the nearest place on the old mesh. There floats are
+/// interpolated, and colours in 8-bit integers (`red`, `green`, `blue`, `alpha`); other integers are those of the nearest corner.
+/// Where vertices with different texture coordinates were joined, the corners have coordinates then. Of other arrays of vertices that
+/// were joined the first one's number stays.
+pub fn carried(
+    detail: &DetailedMesh,
+    mesh: TriMesh,
+    vertices: &[Option<u32>],
+    sources: &[Source],
+) -> DetailedMesh {
+    let is_bare = detail.uvs.is_none() && detail.arrays.is_empty();
+    if is_bare || detail.mesh.triangles.is_empty() {
+        return DetailedMesh { mesh, ..DetailedMesh::default() };
+    }
+    let origins = Origins::of(&detail.mesh, &mesh, vertices, sources);
+    let uvs = detail.uvs.as_ref().map(|uvs| origins.uvs(uvs, &mesh.triangles));
+    let arrays = detail.arrays.iter().map(|array| origins.array(array)).collect();
+    DetailedMesh { mesh, uvs, arrays }
+}
+
+/// Where a vertex has its numbers from.
+enum Origin {
+    /// A vertex of the old mesh.
+    Vertex(u32),
+    /// A place on a triangle of the old mesh.
+    Place(usize, Weights),
+}
+
+/// Where all numbers come from.
+struct Origins<'a> {
+    /// The triangles of the old mesh.
+    old: &'a [[u32; 3]],
+    /// Of each vertex.
+    vertices: Vec<Origin>,
+    /// Of each triangle: its chart, a triangle of the old mesh, and the places of its corners there.
+    triangles: Vec<(usize, [Weights; 3])>,
+}
+
+impl<'a> Origins<'a> {
+    /// Of a mesh that was another, which has triangles.
+    fn of(old: &'a TriMesh, new: &TriMesh, vertices: &[Option<u32>], sources: &[Source]) -> Self {
+        let tree = NearestTree::new(old);
+        let nearest = |place: DVec3| tree.nearest(place).map_or(0, |nearest| nearest.triangle);
+        let vertex = |(own, position): (&Option<u32>, &Vec3)| match own {
+            Some(vertex) => Origin::Vertex(*vertex),
+            None => {
+                let place: DVec3 = position.cast();
+                let triangle = nearest(place);
+                Origin::Place(triangle, weights(&old.corners(triangle), place))
+            }
+        };
+        let triangle = |(number, source): (usize, &Source)| {
+            let chart = match *source {
+                Source::Whole(chart) | Source::Part(chart) => chart as usize,
+                Source::New => {
+                    let [a, b, c] = new.corners(number);
+                    nearest((a + b + c) / 3.0)
+                }
+            };
+            let corner = |vertex: u32| {
+                let is_own = |corner: &u32| vertices[vertex as usize] == Some(*corner);
+                match old.triangles[chart].iter().position(is_own) {
+                    Some(corner) => alone(corner),
+                    None => weights(&old.corners(chart), new.positions[vertex as usize].cast()),
+                }
+            };
+            (chart, new.triangles[number].map(corner))
+        };
+        Self {
+            old: &old.triangles,
+            vertices: vertices.par_iter().zip(&new.positions).with_min_len(GRAIN).map(vertex).collect(),
+            triangles: sources.par_iter().enumerate().with_min_len(GRAIN).map(triangle).collect(),
+        }
+    }
+
+    fn array(&self, array: &MeshArray) -> MeshArray {
+        let of_vertex = |origin: &Origin| match origin {
+            Origin::Vertex(vertex) => array.values[*vertex as usize],
+            Origin::Place(triangle, weights) => {
+                blended(array, self.old[*triangle].map(|vertex| array.values[vertex as usize]), weights)
+            }
+        };
+        let of_corners = |(chart, weights): &(usize, [Weights; 3])| {
+            let numbers = [0, 1, 2].map(|corner| array.values[3 * chart + corner]);
+            weights.map(|weights| blended(array, numbers, &weights))
+        };
+        let values = match array.on {
+            On::Vertices => self.vertices.iter().map(of_vertex).collect(),
+            On::Corners => self.triangles.iter().flat_map(of_corners).collect(),
+            On::Faces => self.triangles.iter().map(|(chart, _)| array.values[*chart]).collect(),
+        };
+        MeshArray { name: array.name.clone(), on: array.on, number: array.number, values }
+    }
+
+    /// Texture coordinates, for these triangles of the new mesh.
+    fn uvs(&self, uvs: &Uvs, triangles: &[[u32; 3]]) -> Uvs {
+        if uvs.corners.is_none() && !self.joins_seams(uvs, triangles) {
+            let place = |origin: &Origin| match origin {
+                Origin::Vertex(vertex) => uvs.places[*vertex as usize],
+                Origin::Place(triangle, weights) => {
+                    between(self.old[*triangle].map(|vertex| uvs.places[vertex as usize]), weights)
+                }
+            };
+            let places = self.vertices.iter().map(place).collect();
+            return Uvs { places, corners: None, missing: uvs.missing };
+        }
+        let mut places = uvs.places.clone();
+        let mut corners = Vec::with_capacity(3 * self.triangles.len());
+        for (chart, weights) in &self.triangles {
+            let own = uvs.indices(self.old, *chart);
+            for weights in weights {
+                let most = heaviest(weights);
+                if weights[most] == 1.0 {
+                    corners.push(own[most]);
+                } else {
+                    corners.push(places.len() as u32);
+                    places.push(between(own.map(|index| uvs.places[index as usize]), weights));
+                }
+            }
+        }
+        Uvs { places, corners: Some(corners), missing: uvs.missing }
+    }
+
+    /// Whether a vertex is several of the old mesh that had different texture coordinates.
+    fn joins_seams(&self, uvs: &Uvs, triangles: &[[u32; 3]]) -> bool {
+        let place = |vertex: u32| uvs.places[vertex as usize];
+        let is_other = |chart: usize, weights: &Weights, vertex: u32| {
+            let most = heaviest(weights);
+            match self.vertices[vertex as usize] {
+                Origin::Vertex(own) => weights[most] == 1.0 && place(self.old[chart][most]) != place(own),
+                Origin::Place(..) => false,
+            }
+        };
+        self.triangles.iter().zip(triangles).any(|((chart, weights), names)| {
+            weights.iter().zip(names).any(|(weights, vertex)| is_other(*chart, weights, *vertex))
+        })
+    }
+}
+
+/// The weights of a corner.
+fn alone(corner: usize) -> Weights {
+    let mut weights = [0.0; 3];
+    weights[corner] = 1.0;
+    weights
+}
+
+/// The corner that counts most, of several the first.
+fn heaviest(&[a, b, c]: &Weights) -> usize {
+    if a >= b && a >= c {
+        0
+    } else if b >= c {
+        1
+    } else {
+        2
+    }
+}
+
+/// The place of a triangle that is nearest to another place (m); where that is a corner's, exactly this corner.
+fn weights(corners: &[DVec3; 3], place: DVec3) -> Weights {
+    if let Some(corner) = corners.iter().position(|corner| *corner == place) {
+        return alone(corner);
+    }
+    let [a, b, c] = corners;
+    let (ab, ac, way) = (b - a, c - a, place - a);
+    let normal = ab.cross(&ac);
+    let square = normal.norm_squared();
+    if square > NEEDLE * NEEDLE * ab.norm_squared() * ac.norm_squared() {
+        // Shares of the area; rounding leaves them a sum of 1.
+        let (of_b, of_c) = (way.cross(&ac).dot(&normal) / square, ab.cross(&way).dot(&normal) / square);
+        let weights = [1.0 - of_b - of_c, of_b, of_c];
+        if weights.iter().all(|weight| *weight >= 0.0) {
+            return weights;
+        }
+    }
+    let mut best = (f64::INFINITY, alone(0));
+    for (from, to) in [(0, 1), (1, 2), (2, 0)] {
+        let along = corners[to] - corners[from];
+        let square = along.norm_squared();
+        let way = (place - corners[from]).dot(&along);
+        let share = if square > 0.0 { (way / square).clamp(0.0, 1.0) } else { 0.0 };
+        let far = (corners[from] + along * share - place).norm_squared();
+        if far < best.0 {
+            let mut weights = [0.0; 3];
+            weights[from] = 1.0 - share;
+            weights[to] = share;
+            best = (far, weights);
+        }
+    }
+    best.1
+}
+
+/// An array's number at a place, from those of the corners.
+fn blended(array: &MeshArray, numbers: [f64; 3], weights: &Weights) -> f64 {
+    let most = heaviest(weights);
+    if weights[most] == 1.0 {
+        return numbers[most];
+    }
+    match array.number {
+        Number::F64 => mean(numbers, weights),
+        Number::F32 => f64::from(mean(numbers, weights) as f32),
+        Number::I8 | Number::U8 if COLOURS.contains(&&*array.name) => mean(numbers, weights).round(),
+        _ => numbers[most],
+    }
+}
+
+/// Texture coordinates at a place, from those of the corners.
+fn between(places: [[f32; 2]; 3], weights: &Weights) -> [f32; 2] {
+    [0, 1].map(|axis| mean(places.map(|place| f64::from(place[axis])), weights) as f32)
+}
+
+/// The mean of three numbers: any of them where all are the same, and without those that do not count at all.
+fn mean(numbers: [f64; 3], weights: &Weights) -> f64 {
+    let most = heaviest(weights);
+    let others = (0..3).filter(|corner| *corner != most && weights[*corner] > 0.0);
+    others.fold(numbers[most], |sum, corner| sum + weights[corner] * (numbers[corner] - numbers[most]))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::context::{Context, Pool};
+    use crate::surface::repair::repair;
+
+    fn array(name: &str, on: On, number: Number, values: &[f64]) -> MeshArray {
+        MeshArray { name: name.into(), on, number, values: values.to_vec() }
+    }
+
+    /// A square of two triangles, and a square of the same with its first triangle turned round and its second cut in two, one half
+    /// of which was made anew.
+    fn squares() -> (TriMesh, TriMesh) {
+        let corners = [[0.0, 0.0], [1.0, 0.0], [1.0, 1.0], [0.0, 1.0], [0.5, 1.0]];
+        let positions: Vec<Vec3> = corners.iter().map(|[x, y]| Vec3::new(*x, *y, 0.0)).collect();
+        let old = TriMesh { positions: positions[..4].to_vec(), triangles: vec![[0, 1, 2], [0, 2, 3]] };
+        (old, TriMesh { positions, triangles: vec![[0, 2, 1], [0, 2, 4], [0, 4, 3]] })
+    }
+
+    const VERTICES: [Option<u32>; 5] = [Some(0), Some(1), Some(2), Some(3), None];
+    const SOURCES: [Source; 3] = [Source::Whole(0), Source::Part(1), Source::New];
+
+    #[test]
+    fn what_was_there_keeps_its_numbers_and_what_was_made_lies_between() {
+        let (old, new) = squares();
+        let arrays = vec![
+            array("wet", On::Vertices, Number::F32, &[0.25, 0.5, 0.125, 0.375]),
+            array("id", On::Vertices, Number::U32, &[5.0, 6.0, 7.0, 8.0]),
+            array("red", On::Vertices, Number::U8, &[0.0, 10.0, 100.0, 201.0]),
+            array("part", On::Faces, Number::U16, &[3.0, 4.0]),
+            array("dry", On::Corners, Number::F64, &[10.0, 20.0, 30.0, 40.0, 50.0, 60.0]),
+            array("kind", On::Corners, Number::I8, &[1.0, 2.0, 3.0, 4.0, 5.0, 6.0]),
+            array("hole", On::Vertices, Number::F64, &[f64::NAN, 1.0, 2.0, 3.0]),
+            array("spread", On::Vertices, Number::F64, &[0.0, 1.0, f64::NAN, 3.0]),
+        ];
+        let places = vec![[0.0, 0.0], [1.0, 0.0], [1.0, 1.0], [0.0, 1.0]];
+        let uvs = Uvs { places: places.clone(), corners: None, missing: 2 };
+        let detail = DetailedMesh { mesh: old, uvs: Some(uvs), arrays };
+        let carried = carried(&detail, new.clone(), &VERTICES, &SOURCES);
+        assert_eq!(carried.mesh, new);
+        let wanted: [&[f64]; 6] = [
+            &[0.25, 0.5, 0.125, 0.375, 0.25],
+            &[5.0, 6.0, 7.0, 8.0, 7.0],
+            &[0.0, 10.0, 100.0, 201.0, 151.0],
+            &[3.0, 4.0, 4.0],
+            &[10.0, 30.0, 20.0, 40.0, 50.0, 55.0, 40.0, 55.0, 60.0],
+            &[1.0, 3.0, 2.0, 4.0, 5.0, 5.0, 4.0, 5.0, 6.0],
+        ];
+        for (found, wanted) in carried.arrays.iter().zip(wanted) {
+            assert_eq!(found.values, wanted, "{}", found.name);
+        }
+        let [hole, spread] = [6, 7].map(|n: usize| &carried.arrays[n].values);
+        assert!(hole[0].is_nan() && hole[1..] == [1.0, 2.0, 3.0, 2.5], "{hole:?}");
+        assert!(spread[2].is_nan() && spread[4].is_nan() && spread[3] == 3.0, "{spread:?}");
+        let uvs = carried.uvs.unwrap();
+        assert_eq!((uvs.corners, uvs.missing), (None, 2));
+        assert!(uvs.places[..4] == places && uvs.places[4] == [0.5, 1.0], "{:?}", uvs.places);
+    }
+
+    #[test]
+    fn coordinates_with_seams_stay_coordinates_of_corners() {
+        let (old, new) = squares();
+        let places: Vec<[f32; 2]> = (0..6u8).map(|n| [f32::from(n), 0.125 * f32::from(n)]).collect();
+        let uvs = Uvs { places: places.clone(), corners: Some((0..6).collect()), missing: 0 };
+        let detail = DetailedMesh { mesh: old, uvs: Some(uvs), arrays: Vec::new() };
+        let uvs = carried(&detail, new, &VERTICES, &SOURCES).uvs.unwrap();
+        assert_eq!(uvs.corners.unwrap(), [0, 2, 1, 3, 4, 6, 3, 7, 5]);
+        assert!(uvs.places.starts_with(&places));
+        assert_eq!(uvs.places[6..], [[4.5, 0.5625]; 2]);
+    }
+
+    #[test]
+    fn vertices_that_were_joined_do_not_tear_what_lay_on_their_triangles() {
+        let (square, _) = squares();
+        let positions = [0, 1, 2, 0, 2, 3].map(|n: usize| square.positions[n]).to_vec();
+        let soup = TriMesh { positions, triangles: vec![[0, 1, 2], [3, 4, 5]] };
+        let vertices = [0, 1, 2, 5].map(Some);
+        let sources = [0, 1].map(Source::Whole);
+        for has_seam in [false, true] {
+            let mut places = vec![[0.0, 0.0], [1.0, 0.0], [1.0, 1.0], [0.0, 0.0], [1.0, 1.0], [0.0, 1.0]];
+            if has_seam {
+                places[4] = [7.0, 7.0];
+            }
+            let uvs = Some(Uvs { places: places.clone(), corners: None, missing: 0 });
+            let detail = DetailedMesh { mesh: soup.clone(), uvs, arrays: Vec::new() };
+            let uvs = carried(&detail, square.clone(), &vertices, &sources).uvs.unwrap();
+            if has_seam {
+                assert_eq!((uvs.places, uvs.corners), (places, Some(vec![0, 1, 2, 3, 4, 5])));
+            } else {
+                let kept = [0, 1, 2, 5].map(|n: usize| places[n]);
+                assert_eq!((&uvs.places[..], uvs.corners), (&kept[..], None));
+            }
+        }
+    }
+
+    #[test]
+    fn the_nearest_place_of_any_triangle_has_weights() {
+        let at = |x: f64, y: f64, z: f64| DVec3::new(x, y, z);
+        let triangles = [
+            [at(0.0, 0.0, 0.0), at(2.0, 0.1, 0.0), at(0.3, 1.5, 0.7)],
+            [at(0.1, 0.2, 0.3); 3],
+            [at(0.0, 0.0, 0.0), at(0.3, 0.3, 0.3), at(1.0, 1.0, 1.0)],
+            [at(0.0, 0.0, 0.0), at(0.0, 0.0, 0.0), at(1.0, -1.0, 0.5)],
+            [at(0.0, 0.0, 0.0), at(1.0, 1e-12, 0.0), at(1e-40, 0.0, 0.0)],
+        ];
+        let steps = |n: i32| f64::from(n) * 0.4 - 1.0;
+        for corners in &triangles {
+            let there = |weights: &Weights| -> DVec3 {
+                corners.iter().zip(weights).map(|(corner, weight)| corner * *weight).sum()
+            };
+            for place in (0..216).map(|n| at(steps(n % 6), steps(n / 6 % 6), steps(n / 36))) {
+                let found = weights(corners, place);
+                assert!(found.iter().all(|weight| (0.0..=1.0).contains(weight)), "{found:?}");
+                assert!((found.iter().sum::<f64>() - 1.0).abs() < 1e-12, "{found:?}");
+                let far = (there(&found) - place).norm();
+                for n in 0..121 {
+                    let [b, c] = [n % 11, n / 11].map(|n| f64::from(n) / 10.0);
+                    let other = (there(&[1.0 - b - c, b, c]) - place).norm();
+                    assert!(b + c > 1.0 || far <= other + 1e-9, "{corners:?} {place}: {far} {other}");
+                }
+            }
+            (0..3).for_each(|n| assert_eq!(there(&weights(corners, corners[n])), corners[n]));
+        }
+    }
+
+    #[test]
+    fn arrays_go_through_a_repair() {
+        let mut mesh = TriMesh::cuboid([0.0; 3], [1.0; 3]);
+        mesh.append(&TriMesh::cuboid([0.55, 0.45, 0.35], [1.5, 1.4, 1.3]));
+        let x = |vertex: u32| f64::from(mesh.positions[vertex as usize].x);
+        let of_corners: Vec<f64> = mesh.triangles.as_flattened().iter().map(|vertex| x(*vertex)).collect();
+        let numbers: Vec<f64> = (0..24u8).map(f64::from).collect();
+        let arrays = vec![
+            array("x", On::Vertices, Number::F32, &(0..16).map(x).collect::<Vec<_>>()),
+            array("x", On::Corners, Number::F32, &of_corners),
+            array("number", On::Faces, Number::I32, &numbers),
+        ];
+        let ctx = Context::new(Pool::new(2).unwrap());
+        let cell = 0.06;
+        let repaired = repair(&ctx, &mesh, cell).unwrap();
+        let detail = DetailedMesh { mesh, uvs: None, arrays };
+        let carried = carried(&detail, repaired.mesh, &repaired.vertices, &repaired.sources);
+        let (mesh, [of_vertices, of_corners, of_faces]) =
+            (&carried.mesh, [0, 1, 2].map(|n: usize| &carried.arrays[n]));
+        let [vertices, triangles] = [mesh.positions.len(), mesh.triangles.len()];
+        let lengths = [of_vertices, of_corners, of_faces].map(|array| array.values.len());
+        assert_eq!(lengths, [vertices, 3 * triangles, triangles]);
+        // What is rebuilt lies within a cell of the solid, but the nearest of the old mesh may be another face of it.
+        let is_near = |value: f64, vertex: u32, most: f64| {
+            (value - f64::from(mesh.positions[vertex as usize].x)).abs() <= most
+        };
+        for (vertex, own) in (0..).zip(&repaired.vertices) {
+            let most = if own.is_some() { 0.0 } else { 2.0 * cell };
+            assert!(is_near(of_vertices.values[vertex as usize], vertex, most), "{own:?}");
+        }
+        let mut whole = 0;
+        for (triangle, source) in repaired.sources.iter().enumerate() {
+            let most = match source {
+                Source::Whole(from) => {
+                    whole += 1;
+                    assert_eq!(of_faces.values[triangle], f64::from(*from));
+                    0.0
+                }
+                Source::Part(_) => 1e-3,
+                Source::New => 3.0 * cell,
+            };
+            let values = &of_corners.values[3 * triangle..];
+            let are_near =
+                mesh.triangles[triangle].iter().zip(values).all(|(vertex, x)| is_near(*x, *vertex, most));
+            assert!(are_near, "{source:?} {:?}", &values[..3]);
+        }
+        assert!(whole > 4, "{whole}");
+    }
+}

@@ -1,0 +1,491 @@
+//! Any triangles become triangles that are closed as a chain and turned outward.
+//!
+//! Parts that are closed by their indices stay as they are. The others are joined where vertices are at the same place, then turned so
+//! that neighbours agree, and their holes are closed (`holes.rs`). Every step takes some n log n operations for n triangles.
+
+use std::cmp::Ordering;
+
+use rayon::prelude::*;
+
+use super::holes::close;
+use crate::base::mesh::coincident;
+use crate::base::orient::is_flat;
+use crate::base::{DVec3, TriMesh, Vec3};
+use crate::surface::specks::root;
+
+/// What was done to a mesh before anything was cut.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
+pub struct Prepared {
+    /// Vertices joined with others at the same place.
+    pub joined_vertices: usize,
+    /// Triangles without area, doubled or alone, that were left out, and those of parts that lay on a part like them.
+    pub dropped_triangles: usize,
+    /// Triangles turned round so that they agree with their neighbours.
+    pub turned_triangles: usize,
+    /// Parts turned outward as a whole.
+    pub turned_parts: usize,
+    /// Holes that were closed.
+    pub holes: usize,
+    /// Triangles that close them.
+    pub added_triangles: usize,
+}
+
+/// Triangles that are closed as a chain and turned outward: along every edge as many run one way as the other.
+#[derive(Debug)]
+pub(super) struct Closed {
+    /// Positions (m): the mesh's own vertices first, in their order and all of them, then those that close holes.
+    pub positions: Vec<Vec3>,
+    /// The mesh's triangles first, in their order, then those that close holes. A triangle that was turned round keeps its
+    /// first corner.
+    pub triangles: Vec<[u32; 3]>,
+    /// The triangle of the mesh that each one is; none where it closes a hole.
+    pub sources: Vec<Option<u32>>,
+    /// What was done.
+    pub prepared: Prepared,
+}
+
+/// An edge, lesser vertex first, and a triangle that has it.
+pub(super) type Use = ([u32; 2], u32);
+
+/// A part, three corners bit by bit and the triangle of that part which has them.
+type Placed = (u32, [[u32; 3]; 3], u32);
+
+/// Triangles a task looks at.
+const GRAIN: usize = 2048;
+/// Of an edge that no second triangle has.
+const NONE: u32 = u32::MAX;
+/// The least closed part, a tetrahedron, has so many triangles.
+const LEAST: u32 = 4;
+
+/// Closes a mesh, whose positions are finite and whose indices are in range, and turns it outward, part by part: a part is what
+/// hangs together by edges. The solid is where the winding number is over 0 then. A cavity, which is a part that lies inside
+/// out within another, is turned outward too: it is filled.
+///
+/// Parts that are closed by their indices, each edge with two triangles that agree, keep their vertices, triangles without area
+/// among them too; of parts that lie on each other triangle by triangle the first stays. No triangle may be left.
+pub(super) fn prepare(mesh: &TriMesh) -> Closed {
+    let vertices = mesh.positions.len();
+    let mut closed = Closed {
+        positions: mesh.positions.clone(),
+        triangles: mesh.triangles.clone(),
+        sources: (0..mesh.triangles.len() as u32).map(Some).collect(),
+        prepared: Prepared::default(),
+    };
+    let uses = edge_uses(vertices, &mesh.triangles);
+    let mut parts = parts_of(mesh.triangles.len(), &uses);
+    let is_sound = sound(&mesh.triangles, &uses, &parts);
+    if is_sound.contains(&false) {
+        closed.join(&is_sound);
+        closed.leave_out(&collapsed(&closed.triangles));
+        closed.leave_out(&doubled(vertices, &closed.triangles));
+        closed.leave_out(&loose_needles(&closed.positions, &closed.triangles));
+        let uses = edge_uses(vertices, &closed.triangles);
+        closed.prepared.turned_triangles = agree(&closed.positions, &mut closed.triangles, &uses);
+        close(&mut closed, &uses);
+        let uses = edge_uses(closed.positions.len(), &closed.triangles);
+        parts = parts_of(closed.triangles.len(), &uses);
+    }
+    closed.turn_outward(&parts);
+    closed.leave_out(&copies(&closed.positions, &closed.triangles, &parts));
+    closed.prepared.added_triangles = closed.sources.iter().filter(|source| source.is_none()).count();
+    closed
+}
+
+impl Closed {
+    /// Joins vertices at the same place, among those of triangles that are not sound: each takes the name of the first.
+    fn join(&mut self, is_sound: &[bool]) {
+        let mut is_named = vec![false; self.positions.len()];
+        for (triangle, _) in self.triangles.iter().zip(is_sound).filter(|(_, sound)| !**sound) {
+            triangle.iter().for_each(|&vertex| is_named[vertex as usize] = true);
+        }
+        let mut names: Vec<u32> = (0..self.positions.len() as u32).collect();
+        let named: Vec<u32> = names.iter().copied().filter(|&vertex| is_named[vertex as usize]).collect();
+        let firsts = coincident(named.iter().map(|&vertex| self.positions[vertex as usize].cast()));
+        for (&vertex, first) in named.iter().zip(firsts) {
+            names[vertex as usize] = named[first as usize];
+            self.prepared.joined_vertices += usize::from(names[vertex as usize] != vertex);
+        }
+        for (triangle, _) in self.triangles.iter_mut().zip(is_sound).filter(|(_, sound)| !**sound) {
+            *triangle = triangle.map(|vertex| names[vertex as usize]);
+        }
+    }
+
+    /// Leaves out triangles, and counts them; those beyond the end of `is_out` stay.
+    pub(super) fn leave_out(&mut self, is_out: &[bool]) {
+        let count = is_out.iter().filter(|is_out| **is_out).count();
+        if count == 0 {
+            return;
+        }
+        let mut marks = is_out.iter();
+        self.triangles.retain(|_| marks.next() != Some(&true));
+        let mut marks = is_out.iter();
+        self.sources.retain(|_| marks.next() != Some(&true));
+        self.prepared.dropped_triangles += count;
+    }
+
+    /// Turns parts of negative volume round.
+    fn turn_outward(&mut self, parts: &[u32]) {
+        let mut six = vec![0.0f64; parts.len()];
+        for (triangle, &part) in self.triangles.iter().zip(parts) {
+            let origin: DVec3 = self.positions[self.triangles[part as usize][0] as usize].cast();
+            let [a, b, c] = corners(&self.positions, triangle).map(|place| place - origin);
+            six[part as usize] += a.dot(&b.cross(&c));
+        }
+        for (triangle, &part) in self.triangles.iter_mut().zip(parts) {
+            if six[part as usize] < 0.0 {
+                triangle.swap(1, 2);
+            }
+        }
+        self.prepared.turned_parts = six.iter().filter(|six| **six < 0.0).count();
+    }
+}
+
+/// The edges of triangles among so many vertices, sorted, each with all triangles that have it.
+pub(super) fn edge_uses(vertices: usize, triangles: &[[u32; 3]]) -> Vec<Use> {
+    // Sorted by counting after the lesser vertex, then by comparing: few edges begin at one vertex.
+    let mut next = vec![0usize; vertices + 1];
+    triangles.iter().flat_map(sides).for_each(|ends| next[ends[0] as usize + 1] += 1);
+    (0..vertices).for_each(|vertex| next[vertex + 1] += next[vertex]);
+    let mut uses: Vec<Use> = vec![([0; 2], 0); 3 * triangles.len()];
+    for (triangle, number) in triangles.iter().zip(0..) {
+        for ends in sides(triangle) {
+            let place = &mut next[ends[0] as usize];
+            uses[*place] = (ends, number);
+            *place += 1;
+        }
+    }
+    // Each place has moved on to the end of its vertex.
+    let mut begin = 0;
+    for &end in &next[..vertices] {
+        uses[begin..end].sort_unstable();
+        begin = end;
+    }
+    uses
+}
+
+/// The edges of a triangle, lesser vertex first.
+pub(super) fn sides(&[a, b, c]: &[u32; 3]) -> [[u32; 2]; 3] {
+    [[a, b], [b, c], [c, a]].map(|[from, to]| [from.min(to), from.max(to)])
+}
+
+/// Whether two uses are of the same edge.
+pub(super) fn is_same_edge(a: &Use, b: &Use) -> bool {
+    a.0 == b.0
+}
+
+/// Whether a triangle runs along an edge from its first end to its second.
+pub(super) fn runs(triangle: &[u32; 3], [from, to]: [u32; 2]) -> bool {
+    (0..3).any(|side| triangle[side] == from && triangle[(side + 1) % 3] == to)
+}
+
+/// Corners of a triangle beginning with the least, so that those which are turned the same way are equal.
+pub(super) fn rotated<T: Ord + Copy>([a, b, c]: [T; 3]) -> [T; 3] {
+    [a, b, c].min([b, c, a]).min([c, a, b])
+}
+
+fn corners(positions: &[Vec3], triangle: &[u32; 3]) -> [DVec3; 3] {
+    triangle.map(|vertex| positions[vertex as usize].cast())
+}
+
+/// The part of each of so many triangles, named by its first triangle.
+fn parts_of(count: usize, uses: &[Use]) -> Vec<u32> {
+    let mut parent: Vec<u32> = (0..count as u32).collect();
+    for pair in uses.windows(2).filter(|pair| is_same_edge(&pair[0], &pair[1])) {
+        let [a, b] = [pair[0].1, pair[1].1].map(|triangle| root(&mut parent, triangle));
+        parent[a.max(b) as usize] = a.min(b);
+    }
+    (0..count as u32).map(|triangle| root(&mut parent, triangle)).collect()
+}
+
+/// Which triangles are of parts that are closed as they are, each edge with two triangles that agree.
+fn sound(triangles: &[[u32; 3]], uses: &[Use], parts: &[u32]) -> Vec<bool> {
+    let mut is_sound = vec![true; parts.len()];
+    for run in uses.chunk_by(is_same_edge) {
+        let agrees = match *run {
+            [(ends, a), (_, b)] => runs(&triangles[a as usize], ends) != runs(&triangles[b as usize], ends),
+            _ => false,
+        };
+        if !agrees {
+            is_sound[parts[run[0].1 as usize] as usize] = false;
+        }
+    }
+    let mut counts = vec![0u32; parts.len()];
+    parts.iter().for_each(|&part| counts[part as usize] += 1);
+    parts.iter().map(|&part| is_sound[part as usize] && counts[part as usize] >= LEAST).collect()
+}
+
+/// Which triangles name a vertex twice.
+fn collapsed(triangles: &[[u32; 3]]) -> Vec<bool> {
+    triangles.iter().map(|[a, b, c]| a == b || b == c || c == a).collect()
+}
+
+/// Which triangles have the vertices of others and go. Of those that are turned the same way the first stays. Where two are turned
+/// opposite ways none does: they are a sheet folded onto itself, which encloses nothing. But where such sheets are closed
+/// themselves, the first ones stay: a body both sides of whose faces were given.
+fn doubled(vertices: usize, triangles: &[[u32; 3]]) -> Vec<bool> {
+    let by_vertices = |(triangle, number): (&[u32; 3], u32)| {
+        let [a, b, c] = rotated(*triangle);
+        ([a, b.min(c), b.max(c)], number, b < c)
+    };
+    let mut order: Vec<([u32; 3], u32, bool)> = triangles.iter().zip(0..).map(by_vertices).collect();
+    order.par_sort_unstable();
+    let mut is_out = vec![false; triangles.len()];
+    let mut folded = Vec::new();
+    for same in order.chunk_by(|a, b| a.0 == b.0).filter(|same| same.len() > 1) {
+        same[1..].iter().for_each(|(_, number, _)| is_out[*number as usize] = true);
+        if same.iter().any(|(_, _, way)| *way != same[0].2) {
+            folded.push(same[0].1);
+        }
+    }
+    if folded.is_empty() {
+        return is_out;
+    }
+    let sheets: Vec<[u32; 3]> = folded.iter().map(|&number| triangles[number as usize]).collect();
+    let uses = edge_uses(vertices, &sheets);
+    let parts = parts_of(sheets.len(), &uses);
+    let mut is_closed = vec![true; sheets.len()];
+    for run in uses.chunk_by(is_same_edge).filter(|run| run.len() != 2) {
+        is_closed[parts[run[0].1 as usize] as usize] = false;
+    }
+    for (&number, &part) in folded.iter().zip(&parts) {
+        is_out[number as usize] = !is_closed[part as usize];
+    }
+    is_out
+}
+
+/// Which triangles without area go: those without which fewer edges are open. One that lies between others, on an edge of one and two
+/// of another, stays.
+fn loose_needles(positions: &[Vec3], triangles: &[[u32; 3]]) -> Vec<bool> {
+    let mut is_out = vec![false; triangles.len()];
+    let is_needle = |triangle: &[u32; 3]| is_flat(&triangle.map(|vertex| positions[vertex as usize]));
+    let is_needle: Vec<bool> = triangles.par_iter().with_min_len(GRAIN).map(is_needle).collect();
+    if !is_needle.contains(&true) {
+        return is_out;
+    }
+    let uses = edge_uses(positions.len(), triangles);
+    let edges: Vec<&[Use]> = uses.chunk_by(is_same_edge).collect();
+    let mut left: Vec<usize> = edges.iter().map(|run| run.len()).collect();
+    let mut own = vec![[0usize; 3]; triangles.len()];
+    for (edge, run) in edges.iter().enumerate() {
+        for &(ends, triangle) in run.iter() {
+            own[triangle as usize][side(&triangles[triangle as usize], ends)] = edge;
+        }
+    }
+    let mut todo: Vec<u32> = (0..triangles.len() as u32).rev().filter(|at| is_needle[*at as usize]).collect();
+    while let Some(needle) = todo.pop() {
+        let counts = own[needle as usize].map(|edge| left[edge]);
+        // Without it an edge with an even number of triangles is open, one with an odd number no longer.
+        let gained = counts.iter().filter(|count| **count % 2 == 1).count();
+        if is_out[needle as usize] || gained < 2 || !counts.contains(&1) {
+            continue;
+        }
+        is_out[needle as usize] = true;
+        for edge in own[needle as usize] {
+            left[edge] -= 1;
+            // The last needle on an edge may be loose now.
+            if left[edge] == 1 {
+                todo.extend(edges[edge].iter().map(|used| used.1).filter(|at| is_needle[*at as usize]));
+            }
+        }
+    }
+    is_out
+}
+
+/// Which side of a triangle an edge is.
+fn side(triangle: &[u32; 3], ends: [u32; 2]) -> usize {
+    // It begins behind the corner that is not on it.
+    triangle.iter().position(|vertex| !ends.contains(vertex)).map_or(0, |apart| (apart + 1) % 3)
+}
+
+/// Turns triangles so that two which are alone on an edge run along it opposite ways, as far as a surface has two sides. In each
+/// patch that hangs together by such edges the way round that has more area stays. Returns how many it turned.
+fn agree(positions: &[Vec3], triangles: &mut [[u32; 3]], uses: &[Use]) -> usize {
+    let mut beside = vec![[NONE; 3]; triangles.len()];
+    for run in uses.chunk_by(is_same_edge) {
+        if let [(ends, a), (_, b)] = *run {
+            beside[a as usize][side(&triangles[a as usize], ends)] = b;
+            beside[b as usize][side(&triangles[b as usize], ends)] = a;
+        }
+    }
+    // Whether each one is turned against the first of its patch; none: not reached yet.
+    let mut is_turned: Vec<Option<bool>> = vec![None; triangles.len()];
+    let mut patch: Vec<u32> = Vec::new();
+    let mut count = 0;
+    for first in 0..triangles.len() as u32 {
+        if is_turned[first as usize].is_some() {
+            continue;
+        }
+        is_turned[first as usize] = Some(false);
+        patch.clear();
+        patch.push(first);
+        let mut areas = [0.0f64; 2];
+        let mut reached = 0;
+        while reached < patch.len() {
+            let at = patch[reached] as usize;
+            reached += 1;
+            let turned = is_turned[at] == Some(true);
+            let [a, b, c] = corners(positions, &triangles[at]);
+            areas[usize::from(turned)] += (b - a).cross(&(c - a)).norm();
+            for side in 0..3 {
+                let other = beside[at][side];
+                if other == NONE || is_turned[other as usize].is_some() {
+                    continue;
+                }
+                let back = [triangles[at][(side + 1) % 3], triangles[at][side]];
+                is_turned[other as usize] = Some(turned == runs(&triangles[other as usize], back));
+                patch.push(other);
+            }
+        }
+        let stays = areas[1] > areas[0];
+        for &triangle in patch.iter().filter(|at| is_turned[**at as usize] != Some(stays)) {
+            triangles[triangle as usize].swap(1, 2);
+            count += 1;
+        }
+    }
+    count
+}
+
+/// Which triangles are of parts that lie on one before them, triangle by triangle.
+fn copies(positions: &[Vec3], triangles: &[[u32; 3]], parts: &[u32]) -> Vec<bool> {
+    let mut is_copy = vec![false; triangles.len()];
+    let placed = |triangle: &[u32; 3]| {
+        // Adding zero makes -0 and 0 the same.
+        let bits = |place: &Vec3| [place.x + 0.0, place.y + 0.0, place.z + 0.0].map(f32::to_bits);
+        rotated(triangle.map(|vertex| bits(&positions[vertex as usize])))
+    };
+    // Parts that are alike have as many triangles, and the same least corner: only such are compared.
+    let mut marks = vec![(0u32, [u32::MAX; 3]); triangles.len()];
+    for (triangle, &part) in triangles.iter().zip(parts) {
+        let (count, least) = &mut marks[part as usize];
+        *count += 1;
+        *least = (*least).min(placed(triangle)[0]);
+    }
+    let mut named: Vec<u32> = (0..triangles.len() as u32).filter(|at| parts[*at as usize] == *at).collect();
+    named.sort_unstable_by_key(|&part| (marks[part as usize], part));
+    let mut is_compared = vec![false; triangles.len()];
+    let is_alike = |a: &u32, b: &u32| marks[*a as usize] == marks[*b as usize];
+    for alike in named.chunk_by(is_alike).filter(|alike| alike.len() > 1) {
+        alike.iter().for_each(|&part| is_compared[part as usize] = true);
+    }
+    let mut order: Vec<Placed> = Vec::new();
+    for ((triangle, &part), number) in triangles.iter().zip(parts).zip(0..) {
+        if is_compared[part as usize] {
+            order.push((part, placed(triangle), number));
+        }
+    }
+    order.par_sort_unstable();
+    // The sort is stable: of parts at the same place the first stays first.
+    let mut bodies: Vec<&[Placed]> = order.chunk_by(|a, b| a.0 == b.0).collect();
+    bodies.sort_by(|a, b| by_places(a, b));
+    for same in bodies.chunk_by(|a, b| by_places(a, b).is_eq()) {
+        for (_, _, number) in same[1..].iter().copied().flatten() {
+            is_copy[*number as usize] = true;
+        }
+    }
+    is_copy
+}
+
+/// Orders parts by their number of triangles, then by where these lie.
+fn by_places(a: &[Placed], b: &[Placed]) -> Ordering {
+    let places = || a.iter().map(|one| &one.1).cmp(b.iter().map(|one| &one.1));
+    a.len().cmp(&b.len()).then_with(places)
+}
+
+#[cfg(test)]
+pub(super) mod tests {
+    use super::*;
+
+    /// What becomes of a mesh, checked for what holds of any, with how it was prepared.
+    pub fn checked(mesh: &TriMesh) -> (TriMesh, Prepared) {
+        let Closed { positions, triangles, sources, prepared } = prepare(mesh);
+        assert!(positions.starts_with(&mesh.positions));
+        assert_eq!(sources.len(), triangles.len());
+        let own: Vec<u32> = sources.iter().copied().flatten().collect();
+        assert!(own.is_sorted_by(|a, b| a < b));
+        assert_eq!(own.len() + prepared.dropped_triangles, mesh.triangles.len());
+        assert_eq!(triangles.len() - own.len(), prepared.added_triangles);
+        let out = TriMesh { positions, triangles };
+        assert!(out.is_closed());
+        (out, prepared)
+    }
+
+    pub fn cube(at: f32) -> TriMesh {
+        TriMesh::cuboid([at, 0.0, 0.0], [at + 1.0, 1.0, 1.0])
+    }
+
+    pub fn both(mut first: TriMesh, second: &TriMesh) -> TriMesh {
+        first.append(second);
+        first
+    }
+
+    /// A mesh each of whose triangles has vertices of its own.
+    pub fn soup(mesh: &TriMesh) -> TriMesh {
+        let positions: Vec<Vec3> =
+            mesh.triangles.as_flattened().iter().map(|&vertex| mesh.positions[vertex as usize]).collect();
+        let triangles = (0..mesh.triangles.len() as u32).map(|at| [3 * at, 3 * at + 1, 3 * at + 2]).collect();
+        TriMesh { positions, triangles }
+    }
+
+    #[test]
+    fn few_triangles_are_turned_and_whole_parts_outward() {
+        let mut turned = cube(0.0);
+        turned.triangles[..2].iter_mut().for_each(|triangle| triangle.swap(1, 2));
+        let (out, prepared) = checked(&turned);
+        assert_eq!((out, prepared), (cube(0.0), Prepared { turned_triangles: 2, ..Prepared::default() }));
+        let (out, prepared) = checked(&cube(0.0).reversed());
+        assert_eq!((out, prepared), (cube(0.0), Prepared { turned_parts: 1, ..Prepared::default() }));
+        // A cavity is filled.
+        let cavity = TriMesh::cuboid([0.25; 3], [0.75; 3]).reversed();
+        let (out, prepared) = checked(&both(cube(0.0), &cavity));
+        assert_eq!((out.volume(), prepared.turned_parts, prepared.dropped_triangles), (1.125, 1, 0));
+    }
+
+    #[test]
+    fn loose_triangles_are_joined() {
+        let tetrahedron = TriMesh {
+            positions: vec![Vec3::zeros(), Vec3::x(), Vec3::y(), Vec3::z()],
+            triangles: vec![[0, 2, 1], [0, 1, 3], [1, 2, 3], [2, 0, 3]],
+        };
+        let (out, prepared) = checked(&soup(&tetrahedron));
+        assert_eq!(prepared, Prepared { joined_vertices: 8, ..Prepared::default() });
+        assert!(out.is_manifold() && out.triangles.len() == 4 && out.volume() > 0.16);
+    }
+
+    #[test]
+    fn of_doubled_bodies_one_is_left() {
+        let (one, inverted) = (cube(0.0), cube(0.0).reversed());
+        let mut twice = one.clone();
+        twice.triangles.extend_from_slice(&one.triangles);
+        let mut two_sided = one.clone();
+        two_sided.triangles.extend_from_slice(&inverted.triangles);
+        let soups = both(soup(&one), &soup(&inverted));
+        for mesh in [both(one.clone(), &one), both(one.clone(), &inverted), twice, two_sided, soups] {
+            let (out, prepared) = checked(&mesh);
+            assert_eq!((out.volume(), prepared.dropped_triangles, prepared.holes), (1.0, 12, 0));
+            assert!(out.is_manifold());
+        }
+        // Both sides of a square enclose nothing, nor does a triangle alone.
+        let positions = vec![Vec3::zeros(), Vec3::x(), Vec3::new(1.0, 1.0, 0.0), Vec3::y()];
+        let sheet = [[0, 1, 2], [0, 2, 3], [2, 1, 0], [3, 2, 0]];
+        for count in [4, 1] {
+            let mesh = TriMesh { positions: positions.clone(), triangles: sheet[..count].to_vec() };
+            let (out, prepared) = checked(&mesh);
+            assert_eq!((out.triangles.len(), prepared.dropped_triangles), (0, count));
+        }
+    }
+
+    #[test]
+    fn what_is_closed_stays_as_it_is() {
+        // Cubes that share an edge, by their indices.
+        let mut joined = both(cube(0.0), &TriMesh::cuboid([1.0, 1.0, 0.0], [2.0, 2.0, 1.0]));
+        let shared = |vertex: u32| [(8, 3), (12, 7)].iter().find(|pair| pair.0 == vertex).map(|pair| pair.1);
+        joined.triangles.as_flattened_mut().iter_mut().for_each(|at| *at = shared(*at).unwrap_or(*at));
+        assert_eq!(checked(&joined), (joined.clone(), Prepared::default()));
+        // Cubes with a wall at the same place, beside one that is open.
+        let mut mesh = both(both(cube(0.0), &cube(1.0)), &cube(5.0));
+        mesh.triangles.truncate(34);
+        let (out, prepared) = checked(&mesh);
+        assert_eq!(prepared, Prepared { holes: 1, added_triangles: 2, ..Prepared::default() });
+        assert!(out.triangles.starts_with(&mesh.triangles) && out.is_manifold() && out.volume() == 3.0);
+    }
+}
