@@ -18,6 +18,8 @@ const GOOD: f64 = 0.05;
 const SHORT: f64 = 1e-3;
 /// How far a vertex may move at once (cells).
 const FARTHEST: f64 = 0.5;
+/// How far the surface may move where an edge flips (cells): between large triangles that meet in a ridge it would go far.
+const BEVEL: f64 = 0.1;
 /// How often a triangle is queued in a sweep, at most.
 const TRIES: u8 = 8;
 /// Sweeps by one rule before the next has its turn, at most.
@@ -83,6 +85,14 @@ pub(super) fn tidy(draft: &mut Draft) -> usize {
     left
 }
 
+/// How far apart the two diagonals of a quadrangle are, a b and c d (cells).
+fn apart([a, b, c, d]: [DVec3; 4]) -> f64 {
+    let across = (b - a).cross(&(d - c));
+    let length = across.norm();
+    // Along one line they are not apart, and parallel ones bound no area.
+    if length > 0.0 { (c - a).dot(&across).abs() / length } else { 0.0 }
+}
+
 /// A normal of a triangle, as long as twice its area (square cells).
 fn normal([a, b, c]: &[DVec3; 3]) -> DVec3 {
     (b - a).cross(&(c - a))
@@ -124,7 +134,7 @@ struct Outcome {
     change: Change,
     /// Least quality after it; at most [`GOOD`]: more is not worth a longer way.
     worst: f64,
-    /// How far a vertex moves (cells).
+    /// How far the surface moves (cells).
     far: f64,
 }
 
@@ -222,9 +232,11 @@ impl<'a> Tidy<'a> {
     fn outcome(&self, change: Change, rule: &Rule) -> Option<Outcome> {
         let far = match change {
             Change::Collapse { from, place, .. } => (place - self.fans.place(from)).norm(),
-            Change::Flip { .. } => 0.0,
+            Change::Flip { corners, .. } => apart(corners.map(|corner| self.fans.place(corner))),
         };
-        if far > rule.farthest {
+        let farthest =
+            if let Change::Flip { .. } = change { rule.farthest.min(BEVEL) } else { rule.farthest };
+        if far > farthest {
             return None;
         }
         let [before, after] = match change {
