@@ -284,7 +284,10 @@ pub unsafe extern "C" fn frz_tracker_create(
                     Tracker::resume(params, triangles, &state)
                 })?,
             };
-            tracker.set_lasting(mesh.attribute("detail", 1).unwrap_or_default().to_vec())?;
+            // A mesh that was rebuilt has it in its state.
+            if !tracker.is_rebuilt() {
+                tracker.set_lasting(mesh.attribute("detail", 1).unwrap_or_default().to_vec())?;
+            }
             Ok(Follower { tracker, saved: Saved::default() })
         })
     }

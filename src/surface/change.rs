@@ -36,6 +36,8 @@ pub struct Change {
     pub origins: Vec<Option<u32>>,
     /// For each triangle where it comes from.
     pub sources: Vec<Source>,
+    /// Places (m) of the vertices that there were.
+    pub before: Vec<DVec3>,
     /// For each vertex that was made its signed distance from the particles' surface (m).
     pub delta: Vec<f32>,
     /// Cells in which the mesh did not fit.
@@ -49,6 +51,11 @@ pub struct Change {
 }
 
 impl Change {
+    /// Count of triangles that were made: parts of others among them.
+    pub fn made_triangles(&self) -> usize {
+        self.sources.iter().filter(|source| !matches!(source, Source::Whole(_))).count()
+    }
+
     /// What two changes did, one after the other.
     pub fn after(mut self, first: &Self) -> Self {
         self.origins.iter_mut().for_each(|at| *at = at.and_then(|at| first.origins[at as usize]));
@@ -56,6 +63,7 @@ impl Change {
         self.flagged_cells += first.flagged_cells;
         self.rebuilt_cells += first.rebuilt_cells;
         self.rung = self.rung.max(first.rung);
+        self.before.clone_from(&first.before);
         self.iterations += first.iterations;
         self
     }
@@ -72,13 +80,15 @@ pub fn change(
     distances: &Distances,
 ) -> Result<Option<Change>> {
     let cell = distances.cell();
-    let Some(first) = unfit.vertices.first() else { return Ok(None) };
-    let low = unfit.vertices.iter().fold(*first, |low, place| low.inf(place));
-    let high = unfit.vertices.iter().fold(*first, |high, place| high.sup(place));
+    let Some(first) = unfit.vertices.first().copied().or_else(|| Some(unfit.bare.first()? * cell)) else {
+        return Ok(None);
+    };
+    let low = unfit.vertices.iter().fold(first, |low, place| low.inf(place));
+    let high = unfit.vertices.iter().fold(first, |high, place| high.sup(place));
     let lattice = Lattice::near(cell, 0.5 * (low + high))?;
     let in_cells: Vec<DVec3> = unfit.vertices.iter().map(|place| lattice.to_cells(*place)).collect();
     let fixed = in_cells.iter().map(|place| lattice.fix(*place)).collect::<Result<Vec<_>>>()?;
-    let pierces = Pierces::of(&fixed, unfit.triangles)?;
+    let pierces = Pierces::of(&fixed, unfit.triangles);
     let shape = Shape { fixed, triangles: unfit.triangles.to_vec(), pierces };
     ctx.check()?;
     let flagged = flagged(unfit, &shape, &lattice);
@@ -119,6 +129,7 @@ pub fn change(
         triangles: crate::base::mesh::renumbered(&draft.triangles, &names),
         origins: names.iter().map(|name| ((*name as usize) < own).then_some(*name)).collect(),
         sources: draft.sources,
+        before: unfit.vertices.to_vec(),
         delta,
         flagged_cells: flagged.count(),
         rebuilt_cells: cells,

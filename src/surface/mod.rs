@@ -37,6 +37,7 @@ mod isosurface;
 #[cfg(feature = "vdb")]
 mod level_set;
 mod matching;
+mod params;
 mod paths;
 mod project;
 mod repair;
@@ -62,6 +63,7 @@ pub use isosurface::Isosurface;
 #[cfg(feature = "vdb")]
 pub use level_set::{HALF_WIDTH, level_set};
 pub use matching::{Matched, Matching, Node, Solver, match_topology};
+pub use params::Params;
 pub use paths::interpolate;
 pub use project::{Foot, foot};
 pub use repair::{Prepared, RepairReport, Repaired, Source, carried as carry_attributes, repair};
@@ -71,7 +73,7 @@ pub use spacing::{estimate as estimate_spacing, rough as rough_spacing};
 pub use specks::specks;
 #[cfg(feature = "vdb")]
 pub use spheres::{is_sphere_radius, spheres};
-pub use tracker::{Params, StepReport, Tracker};
+pub use tracker::{StepReport, Tracker};
 pub use transfer::transfer;
 
 use crate::base::DVec3;

@@ -2,23 +2,32 @@
 
 use xxhash_rust::xxh3::xxh3_128;
 
-use super::tracker::{Params, Tracker};
+use super::params::Params;
+use super::tracker::Tracker;
 use crate::base::bytes::{Reader, Writer};
 use crate::base::packed::{self, Magic};
 use crate::base::{DVec3, TriMesh};
 use crate::error::{Error, Result};
 
 /// Magic bytes, including the version.
-const MAGIC: &Magic = b"frzsrf02";
+const MAGIC: &Magic = b"frzsrf03";
 /// What messages call it.
 const NOUN: &str = "surface";
 
 impl Tracker {
-    /// The exact state but for the triangles and what never fades, the same bytes for any number of threads.
+    /// The exact state, the same bytes for any number of threads; the triangles and what never fades only where the mesh was rebuilt.
     pub fn save(&self) -> Vec<u8> {
         let mut to = Writer::default();
         [self.params.spacing, self.params.cell, self.reach].into_iter().for_each(|number| to.f64(number));
-        to.0.extend(seal(&self.triangles));
+        to.u32(u32::from(self.is_rebuilt));
+        if self.is_rebuilt {
+            to.count(self.triangles.len());
+            self.triangles.as_flattened().iter().for_each(|corner| to.u32(*corner));
+            to.count(self.lasting.len());
+            to.f32s(&self.lasting);
+        } else {
+            to.0.extend(seal(&self.triangles));
+        }
         to.count(self.vertices.len());
         self.vertices.iter().flatten().for_each(|part| to.f64(*part));
         to.f32s(&self.delta);
@@ -54,13 +63,32 @@ impl Tracker {
         if !(0.0..=100.0).contains(&reach) {
             return wrong(format!("has a band of {reach} spacings"));
         }
-        let sealed = from.take::<16>()?;
+        let is_rebuilt = from.u32()? != 0;
+        let (mut triangles, mut lasting) = (mesh.triangles.clone(), Vec::new());
+        let mut is_other = false;
+        if is_rebuilt {
+            let count = from.count(3 * 4)?;
+            triangles =
+                (0..count).map(|_| Ok([from.u32()?, from.u32()?, from.u32()?])).collect::<Result<_>>()?;
+            let count = from.count(4)?;
+            lasting = (0..count).map(|_| Ok(from.f32s::<1>()?[0])).collect::<Result<Vec<f32>>>()?;
+        } else {
+            is_other = from.take::<16>()? != seal(&mesh.triangles);
+        }
         let count = from.count(3 * 8 + 4 + 1)?;
-        if count != mesh.positions.len() {
+        if !is_rebuilt && count != mesh.positions.len() {
             return wrong(format!("is of a mesh of {count} vertices, not {}", mesh.positions.len()));
         }
-        if sealed != seal(&mesh.triangles) {
+        if is_other {
             return wrong("is of a mesh of other triangles".into());
+        }
+        if triangles.as_flattened().iter().any(|corner| *corner as usize >= count) {
+            return wrong("has a triangle without a vertex".into());
+        }
+        if !(lasting.is_empty() || lasting.len() == count)
+            || !lasting.iter().all(|share| (0.0..=1.0).contains(share))
+        {
+            return wrong("has shares of detail that do not fit".into());
         }
         let mut vertices = Vec::with_capacity(count);
         for _ in 0..count {
@@ -74,8 +102,7 @@ impl Tracker {
         let bits = from.bytes(count)?;
         from.end()?;
         let [flags, bare] = [1, 2].map(|bit| bits.iter().map(|bits| bits & bit != 0).collect());
-        let (triangles, lasting) = (mesh.triangles.clone(), Vec::new());
-        Ok(Self { params, vertices, triangles, delta, lasting, flags, bare, reach })
+        Ok(Self { params, vertices, triangles, delta, lasting, flags, bare, reach, is_rebuilt })
     }
 }
 

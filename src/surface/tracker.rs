@@ -3,7 +3,7 @@
 use rayon::prelude::*;
 
 use super::Particles;
-use super::advect::{Weighting, advect};
+use super::advect::advect;
 use super::apart::{Apart, Parts, is_near};
 use super::band::Distances;
 use super::cells::{Coord, cell_of};
@@ -12,6 +12,7 @@ use super::coverage::Cover;
 use super::fade::fade;
 use super::implicit::Implicit;
 use super::isosurface::Isosurface;
+use super::params::Params;
 use super::paths::Paths;
 use super::project::foot;
 use super::sample::Sampler;
@@ -19,57 +20,6 @@ use crate::base::topology::Topology;
 use crate::base::{DVec3, TriMesh};
 use crate::context::{Context, PhaseTime};
 use crate::error::{Error, Result};
-
-/// How a mesh follows particles.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Params {
-    /// Initial distance r between particles (m), over 0.
-    pub spacing: f64,
-    /// Edge of a cell (r), 0.125..=2 (thesis 2.7: 0.5).
-    pub cell: f64,
-    /// Greatest distance (r) that projection may move a vertex; beyond, the liquid has merged or split there (thesis 2.3.3: 0.5).
-    pub change: f64,
-    /// How particles carry vertices.
-    pub weighting: Weighting,
-    /// Time (s) in which half of the detail fades, over 0; infinite: it stays (thesis 2.8 wishes for it).
-    pub half_life: f64,
-    /// How much detail fades where the mesh is strained: to exp(-fade) of it while lengths change by a factor of e; 0..=1000.
-    pub fade: f64,
-    /// Whether the mesh is rebuilt where the liquid merges or splits (thesis 2.4, 2.5); it must then be a closed 2-manifold by index.
-    /// Else it is flagged there.
-    pub rebuild: bool,
-}
-
-impl Params {
-    /// The thesis' values for particles of a spacing (m), but for the weighting.
-    pub fn for_spacing(spacing: f64) -> Self {
-        let (half_life, fade) = (f64::INFINITY, 0.0);
-        let weighting = Weighting::Affine;
-        Self { spacing, cell: 0.5, change: 0.5, weighting, half_life, fade, rebuild: false }
-    }
-
-    /// Checks every field.
-    ///
-    /// # Errors
-    /// Names the field and its range.
-    pub fn validate(&self) -> Result<()> {
-        let ranges = [
-            ("spacing", self.spacing, 1e-9, 1e6, "m"),
-            ("cell", self.cell, 0.125, 2.0, "r"),
-            ("change", self.change, 1e-3, 100.0, "r"),
-            ("half_life", self.half_life, f64::MIN_POSITIVE, f64::INFINITY, "s"),
-            ("fade", self.fade, 0.0, 1000.0, ""),
-        ];
-        for (name, value, low, high, unit) in ranges {
-            if !(low..=high).contains(&value) {
-                return Err(Error::argument(format!(
-                    "{name} = {value} is not within {low} to {high} {unit}"
-                )));
-            }
-        }
-        Ok(())
-    }
-}
 
 /// What a step did.
 #[derive(Debug, Clone, Default)]
@@ -145,6 +95,8 @@ pub struct Tracker {
     pub(super) bare: Vec<bool>,
     /// How far distances from the surface are known (r).
     pub(super) reach: f64,
+    /// Whether the triangles are no longer those that it began with.
+    pub(super) is_rebuilt: bool,
 }
 
 /// Least reach of the band, and the greatest that is tried at the first frame (r).
@@ -192,7 +144,9 @@ impl Tracker {
         let flags = vec![false; vertices.len()];
         let (delta, lasting, bare, reach) = (Vec::new(), Vec::new(), Vec::new(), REACH[0]);
         let triangles = mesh.triangles.clone();
-        let mut tracker = Self { params, vertices, triangles, delta, lasting, flags, bare, reach };
+        let is_rebuilt = false;
+        let mut tracker =
+            Self { params, vertices, triangles, delta, lasting, flags, bare, reach, is_rebuilt };
         let surface = ctx.phase("phi", || tracker.surface_of(ctx, particles))?;
         loop {
             let distances = ctx.phase("distance", || tracker.distances(ctx, &surface))?;
@@ -269,6 +223,16 @@ impl Tracker {
             positions: self.vertices.iter().map(|place| place.cast()).collect(),
             triangles: self.triangles.clone(),
         }
+    }
+
+    /// The triangles: those that it began with, until it is rebuilt.
+    pub fn triangles(&self) -> &[[u32; 3]] {
+        &self.triangles
+    }
+
+    /// Whether the mesh was rebuilt anywhere since it began.
+    pub fn is_rebuilt(&self) -> bool {
+        self.is_rebuilt
     }
 
     /// Places of the vertices (m).
@@ -379,6 +343,7 @@ impl Tracker {
         }
         self.vertices.clone_from(&change.vertices);
         self.triangles.clone_from(&change.triangles);
+        self.is_rebuilt = true;
     }
 
     /// What of the particles' surface the mesh does not cover: whole parts, and the vertices beside other such places.

@@ -15,7 +15,9 @@ use crate::io::seen::Seen;
 use crate::io::sequence::Pattern;
 use crate::io::source;
 use crate::scene::Scene;
-use crate::surface::{Implicit, Isosurface, Particles, estimate_spacing, rough_spacing};
+use crate::surface::{
+    Implicit, Isosurface, Particles, carry_attributes, estimate_spacing, repair, rough_spacing,
+};
 
 /// Arrays of the mesh that are written anew in each frame, and those that a moving mesh does not keep.
 const REPLACED: [&str; 8] = ["vx", "vy", "vz", "delta", "flagged", "nx", "ny", "nz"];
@@ -92,8 +94,15 @@ impl Inputs {
                 let mut mesh = parse_polygons(path, &bytes)?.into_detailed();
                 let space = surface.space;
                 mesh.mesh.positions.iter_mut().for_each(|p| *p = space.place(p.cast()).cast());
-                warnings.extend(faults(path, &mesh.mesh));
-                mesh
+                if surface.rebuild {
+                    let repaired = closed(ctx, &mesh, spacing * surface.cell);
+                    let (mesh, warning) = repaired.map_err(|error| told(path, error))?;
+                    warnings.extend(warning.map(|warning| format!("{}: {warning}", path.display())));
+                    mesh
+                } else {
+                    warnings.extend(faults(path, &mesh.mesh));
+                    mesh
+                }
             }
             None => {
                 let mesh = reconstructed(ctx, &particles, spacing, surface.cell)
@@ -141,6 +150,35 @@ fn told(path: &Path, error: Error) -> Error {
         Error::Argument(what) => Error::file(path, what),
         other => other,
     }
+}
+
+/// The mesh as it can be rebuilt: a closed 2-manifold by index that does not cross itself, repaired in cells of an edge (m) where it is
+/// not; and what was done, in a sentence.
+fn closed(ctx: &Context, mesh: &DetailedMesh, cell: f64) -> Result<(DetailedMesh, Option<String>)> {
+    let faults = Faults::of(&mesh.mesh);
+    let crossings = faults.crossings + faults.corner_crossings + faults.folds + faults.overlaps;
+    let is_closed = faults.by_index.is_watertight() && faults.volume > 0.0 && faults.inverted_parts == 0;
+    if is_closed && crossings == 0 {
+        return Ok((mesh.clone(), None));
+    }
+    let repaired = repair(ctx, &mesh.mesh, cell)?;
+    let kept = repaired.report.kept_triangles;
+    let mut what = Vec::new();
+    if !is_closed {
+        what.push("is not closed as its indices have it");
+    }
+    if crossings > 0 {
+        what.push("crosses itself");
+    }
+    let warning = format!(
+        "it {}: it was repaired, as `frazil mesh repair --cell {:.6}` does; {kept} of {} triangles are as they were \
+         (surface.rebuild = false follows it as it is)",
+        what.join(" and "),
+        repaired.report.cell,
+        mesh.mesh.triangles.len(),
+    );
+    let detail = carry_attributes(mesh, repaired.mesh, &repaired.vertices, &repaired.sources);
+    Ok((detail, Some(warning)))
 }
 
 /// What about a mesh matters for what follows, in a sentence.

@@ -57,6 +57,14 @@ pub const KEYS: &[Key] = &[
     .concerns(STEP),
     Key::new(
         "surface",
+        "rebuild",
+        Kind::Flag,
+        "true: the mesh is cut and rebuilt where the liquid merges or splits, and closed first; false: it is only flagged there",
+    )
+    .or("true")
+    .concerns(FIRST),
+    Key::new(
+        "surface",
         "weighting",
         Kind::Choice(&["affine", "mean"]),
         "how particles carry vertices: by affine maps, or by their mean as in the thesis, which lags behind",

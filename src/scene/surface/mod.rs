@@ -7,6 +7,8 @@ mod check;
 mod disk;
 #[cfg(feature = "vdb")]
 mod inputs;
+#[cfg(feature = "vdb")]
+mod kept;
 mod keys;
 #[cfg(feature = "vdb")]
 mod memory;
@@ -16,6 +18,8 @@ mod plan;
 mod time;
 #[cfg(feature = "vdb")]
 mod track;
+#[cfg(feature = "vdb")]
+mod trail;
 
 use std::path::PathBuf;
 
@@ -52,6 +56,8 @@ pub struct Surface {
     pub cell: f64,
     /// Greatest distance that projection moves a vertex (spacings).
     pub change: f64,
+    /// The mesh is rebuilt where the liquid merges or splits; else it is flagged there.
+    pub rebuild: bool,
     /// How particles carry vertices.
     pub weighting: Weighting,
     /// Time in which half of the detail fades (s); none: it stays.
@@ -98,6 +104,7 @@ impl Surface {
             spacing: number("spacing"),
             cell: number("cell").unwrap_or(0.5),
             change: number("change").unwrap_or(0.5),
+            rebuild: value("rebuild").and_then(Value::flag).unwrap_or(true),
             weighting: match text("weighting") {
                 Some("mean") => Weighting::Mean,
                 _ => Weighting::Affine,

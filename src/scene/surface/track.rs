@@ -1,11 +1,14 @@
 //! The stage `surface`: a detailed mesh follows the particles of a liquid.
 
+use std::sync::Arc;
+
 use serde_json::json;
 
 use super::time::Liquid;
-use super::{Inputs, Surface};
+use super::trail::Trail;
+use super::{Inputs, Surface, kept};
 use crate::base::arrays::{Number, On};
-use crate::base::{DVec3, MeshArray, TriMesh, Vec3};
+use crate::base::{DetailedMesh, MeshArray, TriMesh, Vec3};
 use crate::context::Context;
 use crate::error::{Error, Result};
 use crate::io::manifest::Keeps;
@@ -16,7 +19,7 @@ use crate::scene::shot::{
 };
 use crate::scene::text::keys::{first_of, settings_of};
 use crate::scene::{Scene, System};
-use crate::surface::{Apart, Params, StepReport, Tracker};
+use crate::surface::{Apart, Change, Params, StepReport, Tracker, carry_attributes};
 
 /// Name of the stage, and kind of its files.
 const NAME: &str = "surface";
@@ -30,19 +33,37 @@ pub struct Track<'a> {
     inputs: &'a Inputs,
 }
 
+/// The mesh at a frame.
+#[derive(Clone)]
+struct Now {
+    tracker: Tracker,
+    /// What it carries; none: what it began with.
+    detail: Option<Arc<DetailedMesh>>,
+}
+
 /// The mesh at a frame, with what led there.
 struct At {
-    tracker: Tracker,
+    now: Now,
     report: StepReport,
     /// Count of particles.
     particles: usize,
+    way: Way,
+}
+
+/// How the vertices of the frame before went to a frame.
+#[derive(Default)]
+pub(super) struct Way {
+    /// Velocities over it (m/s) of the vertices of the frame before; empty at the first frame.
+    pub of_before: Vec<Vec3>,
+    /// Velocities over it of the vertices at its end.
+    pub of_after: Vec<Vec3>,
 }
 
 /// State carried from frame to frame.
 pub struct State<'a> {
     liquid: Liquid<'a>,
     /// The mesh after the last frame; none before the first.
-    now: Option<Tracker>,
+    now: Option<Now>,
     /// The mesh at the coming frame, where it is known.
     ahead: Option<At>,
 }
@@ -52,6 +73,9 @@ pub struct Step(Option<Written>);
 
 struct Written {
     places: Vec<Vec3>,
+    triangles: Vec<[u32; 3]>,
+    /// What the mesh carries; none: what it began with.
+    detail: Option<Arc<DetailedMesh>>,
     velocities: Vec<Vec3>,
     delta: Vec<f32>,
     flags: Vec<bool>,
@@ -72,7 +96,7 @@ impl<'a> Track<'a> {
             weighting: self.surface.weighting,
             half_life: self.surface.half_life.unwrap_or(f64::INFINITY),
             fade: self.surface.fade,
-            rebuild: false,
+            rebuild: self.surface.rebuild,
         }
     }
 
@@ -99,28 +123,49 @@ impl<'a> Track<'a> {
         let ((mut tracker, report), phases) = begun.map_err(|error| self.told(error))?;
         self.set_lasting(&mut tracker)?;
         let report = StepReport { phases, ..report };
-        Ok(At { tracker, report, particles: particles.places.len() })
+        let now = Now { tracker, detail: None };
+        Ok(At { now, report, particles: particles.places.len(), way: Way::default() })
     }
 
     /// Takes the mesh to a frame from the one before it.
-    fn next(&self, ctx: &Context, liquid: &mut Liquid<'_>, tracker: &Tracker, frame: i32) -> Result<At> {
-        let mut tracker = tracker.clone();
+    fn next(&self, ctx: &Context, liquid: &mut Liquid<'_>, before: &Now, frame: i32) -> Result<At> {
+        let mut now = before.clone();
         let way = liquid.way(frame);
         let mut report = StepReport::default();
+        let mut trail = Trail::of(before.tracker.vertices());
         let mut from = liquid.at(way[0])?;
         for ends in way.windows(2) {
             let to = liquid.at(ends[1])?;
             let dt = (ends[1] - ends[0]) * liquid.file_time();
-            let step = tracker.step(ctx, &from, &to, dt).map_err(|error| liquid.told(ends[0], error))?;
+            let step = now.tracker.step(ctx, &from, &to, dt).map_err(|error| liquid.told(ends[0], error))?;
+            let share = (ends[1] - way[0]) / (way[way.len() - 1] - way[0]);
+            match &step.change {
+                Some(change) => {
+                    trail.follow(&change.before, share);
+                    now.detail = Some(Arc::new(self.carried(&now, change)));
+                    trail.change(change);
+                }
+                None => trail.follow(now.tracker.vertices(), share),
+            }
             report = report.followed_by(step);
             from = to;
         }
-        Ok(At { tracker, report, particles: from.places.len() })
+        let way = trail.way(now.tracker.vertices(), now.tracker.triangles(), self.scene.shot.fps);
+        Ok(At { now, report, particles: from.places.len(), way })
+    }
+
+    /// What the mesh carries after a change; its places are those of the change.
+    fn carried(&self, now: &Now, change: &Change) -> DetailedMesh {
+        let carried = now.detail.as_deref().unwrap_or(&self.inputs.mesh);
+        let triangles = carried.mesh.triangles.clone();
+        let mesh = TriMesh { positions: usd::to_floats(&change.before), triangles };
+        let old = DetailedMesh { mesh, uvs: carried.uvs.clone(), arrays: carried.arrays.clone() };
+        carry_attributes(&old, now.tracker.mesh(), &change.origins, &change.sources)
     }
 
     /// The mesh at the coming frame, where anything needs it. Beyond the shot's end it is only for velocities, and a cache need not have
     /// it.
-    fn ahead(&self, ctx: &Context, liquid: &mut Liquid<'_>, now: &Tracker, frame: i32) -> Result<Option<At>> {
+    fn ahead(&self, ctx: &Context, liquid: &mut Liquid<'_>, now: &Now, frame: i32) -> Result<Option<At>> {
         let is_last = frame == self.scene.shot.frames.last;
         if !is_last {
             return self.next(ctx, liquid, now, frame + 1).map(Some);
@@ -137,17 +182,6 @@ impl<'a> Track<'a> {
                 Ok(None)
             }
         }
-    }
-
-    /// Velocities (m/s) over the coming frame, or where that is not known over the one before.
-    fn velocities(&self, before: Option<&Tracker>, now: &Tracker, next: Option<&Tracker>) -> Vec<Vec3> {
-        let (from, to) = match (before, next) {
-            (_, Some(next)) => (now, next),
-            (Some(before), None) => (before, now),
-            (None, None) => (now, now),
-        };
-        let speed = |(a, b): (&DVec3, &DVec3)| ((b - a) * self.scene.shot.fps).cast();
-        from.vertices().iter().zip(to.vertices()).map(speed).collect()
     }
 
     /// The arrays that each frame has anew.
@@ -254,10 +288,16 @@ impl<'a> Stepping for Track<'a> {
             Some(frame) => {
                 let path = done.state_file(frame)?;
                 let bytes = std::fs::read(&path).map_err(|error| Error::io(&path, "read", error))?;
-                let tracker = Tracker::resume(self.params(), &self.inputs.mesh.mesh, &bytes);
-                let mut tracker = tracker.map_err(|error| Error::file(path, error.to_string()))?;
-                self.set_lasting(&mut tracker)?;
-                Some(tracker)
+                let resumed = kept::resume(self.params(), &self.inputs.mesh, &bytes);
+                let (mut tracker, detail) = resumed.map_err(|error| Error::file(path, error.to_string()))?;
+                let detail = detail.map(|detail| {
+                    let triangles = tracker.triangles().to_vec();
+                    Arc::new(DetailedMesh { mesh: TriMesh { positions: Vec::new(), triangles }, ..detail })
+                });
+                if !tracker.is_rebuilt() {
+                    self.set_lasting(&mut tracker)?;
+                }
+                Some(Now { tracker, detail })
             }
         };
         Ok(State { liquid, now, ahead: None })
@@ -265,21 +305,30 @@ impl<'a> Stepping for Track<'a> {
 
     fn step(&self, ctx: &Context, state: &mut State<'a>, to: &To<'_>) -> Result<Stepped<Step>> {
         let State { liquid, now, ahead } = state;
-        let At { tracker, report, particles } = match (ahead.take(), &now) {
+        let At { now: at, report, particles, way } = match (ahead.take(), &now) {
             (Some(ahead), _) => ahead,
             (None, Some(before)) => self.next(ctx, liquid, before, to.frame)?,
             (None, None) => return Err(Error::Internal("a mesh was not begun".into())),
         };
-        let next = self.ahead(ctx, liquid, &tracker, to.frame)?;
+        let next = self.ahead(ctx, liquid, &at, to.frame)?;
+        let tracker = &at.tracker;
+        // Over the coming frame, or where that is not known over the one before.
+        let velocities = match &next {
+            Some(next) => next.way.of_before.clone(),
+            None if way.of_after.is_empty() => vec![Vec3::zeros(); tracker.vertices().len()],
+            None => way.of_after,
+        };
         let step = to.made_from.map(|_| Written {
             places: usd::to_floats(tracker.vertices()),
-            velocities: self.velocities(now.as_ref(), &tracker, next.as_ref().map(|next| &next.tracker)),
+            triangles: tracker.triangles().to_vec(),
+            detail: at.detail.clone(),
+            velocities,
             delta: tracker.delta().to_vec(),
             flags: tracker.flags().to_vec(),
-            state: tracker.save(),
+            state: kept::save(tracker, at.detail.as_deref().unwrap_or(&self.inputs.mesh)),
         });
-        let report = told(&report, particles, &tracker);
-        (*now, *ahead) = (Some(tracker), next);
+        let report = told(&report, particles, tracker);
+        (*now, *ahead) = (Some(at), next);
         Ok(Stepped { step: Step(step), report })
     }
 
@@ -289,11 +338,11 @@ impl<'a> Stepping for Track<'a> {
 
     fn write(&self, _writer: &mut (), step: Step, files: Option<&mut FrameFiles>) -> Result<()> {
         let (Some(step), Some(files)) = (step.0, files) else { return Ok(()) };
-        let (output, detail) = (self.surface.output, &self.inputs.mesh);
+        let (output, detail) = (self.surface.output, step.detail.as_deref().unwrap_or(&self.inputs.mesh));
         let of_frame = self.arrays(&step.delta, &step.flags);
         let arrays: Vec<&MeshArray> = detail.arrays.iter().chain(&of_frame).collect();
         let velocities = if output.velocities { &step.velocities[..] } else { &[] };
-        let mesh = TriMesh { positions: step.places, triangles: detail.mesh.triangles.clone() };
+        let mesh = TriMesh { positions: step.places, triangles: step.triangles };
         let carried = mesh::Carried { velocities, uvs: detail.uvs.as_ref(), arrays: &arrays };
         if output.ply {
             files.save(NAME, "ply", &mesh::ply_bytes(&mesh, &carried))?;
@@ -329,6 +378,7 @@ fn told(report: &StepReport, particles: usize, tracker: &Tracker) -> Report {
         .take(LISTED)
         .map(|apart| json!({ "at_m": <[f64; 3]>::from(apart.place), "volume_m3": apart.volume }))
         .collect();
+    let changed = |number: fn(&Change) -> usize| report.change.as_ref().map_or(0, number);
     let serde_json::Value::Object(results) = json!({
         "particles": particles,
         "born": report.born,
@@ -338,6 +388,10 @@ fn told(report: &StepReport, particles: usize, tracker: &Tracker) -> Report {
         "jumped": report.jumped,
         "lost": report.lost,
         "uncovered": report.uncovered,
+        "changed_cells": changed(|change| change.flagged_cells),
+        "rebuilt_cells": changed(|change| change.rebuilt_cells),
+        "rebuilt_rung": changed(|change| change.rung),
+        "made_triangles": changed(|change| change.made_triangles()),
         "drops": drops.len(),
         "drops_m3": drops.iter().fold(0.0, |sum, drop| sum + drop.volume),
         "bubbles": bubbles.len(),

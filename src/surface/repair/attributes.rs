@@ -35,13 +35,34 @@ pub fn carried(
     vertices: &[Option<u32>],
     sources: &[Source],
 ) -> DetailedMesh {
-    let is_bare = detail.uvs.is_none() && detail.arrays.is_empty();
-    if is_bare || detail.mesh.triangles.is_empty() {
+    if detail.uvs.is_none() && detail.arrays.is_empty() {
         return DetailedMesh { mesh, ..DetailedMesh::default() };
+    }
+    if detail.mesh.triangles.is_empty() {
+        return of_nothing(detail, mesh);
     }
     let origins = Origins::of(&detail.mesh, &mesh, vertices, sources);
     let uvs = detail.uvs.as_ref().map(|uvs| origins.uvs(uvs, &mesh.triangles));
     let arrays = detail.arrays.iter().map(|array| origins.array(array)).collect();
+    DetailedMesh { mesh, uvs, arrays }
+}
+
+/// What a mesh carries on one that came of nothing: zeros.
+fn of_nothing(detail: &DetailedMesh, mesh: TriMesh) -> DetailedMesh {
+    let [vertices, faces] = [mesh.positions.len(), mesh.triangles.len()];
+    let array = |array: &MeshArray| {
+        let count = match array.on {
+            On::Vertices => vertices,
+            On::Faces => faces,
+            On::Corners => 3 * faces,
+        };
+        MeshArray { values: vec![0.0; count], ..array.clone() }
+    };
+    let uvs = |uvs: &Uvs| match uvs.corners {
+        Some(_) => Uvs { places: vec![[0.0; 2]], corners: Some(vec![0; 3 * faces]), missing: 3 * faces },
+        None => Uvs { places: vec![[0.0; 2]; vertices], corners: None, missing: vertices },
+    };
+    let (arrays, uvs) = (detail.arrays.iter().map(array).collect(), detail.uvs.as_ref().map(uvs));
     DetailedMesh { mesh, uvs, arrays }
 }
 

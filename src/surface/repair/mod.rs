@@ -153,7 +153,7 @@ fn rebuild(ctx: &Context, closed: &Closed, own: usize, cell: f64) -> Result<Opti
     let lattice = Lattice::near(cell, (low.cast::<f64>() + high.cast::<f64>()) / 2.0)?;
     let in_cells: Vec<DVec3> = closed.positions.iter().map(|place| lattice.to_cells(place.cast())).collect();
     let fixed = in_cells.iter().map(|place| lattice.fix(*place)).collect::<Result<Vec<_>>>()?;
-    let pierces = Pierces::of(&fixed, &closed.triangles)?;
+    let pierces = Pierces::of(&fixed, &closed.triangles);
     let shape = Shape { fixed, triangles: closed.triangles.clone(), pierces };
     ctx.check()?;
     let flagged = flags::flagged(closed, &shape);

@@ -5,15 +5,15 @@ use rayon::prelude::*;
 use super::exact::{GridEdge, cell_of};
 use crate::distance::Face;
 use crate::distance::lattice::Fixed;
-use crate::distance::region::Region;
-use crate::distance::winding::{Axis, Lines, each_crossing};
-use crate::error::Result;
+use crate::distance::winding::{Axis, each_crossing};
 use crate::surface::cells::Coord;
 
 /// Triangles a task looks at.
 const GRAIN: usize = 2048;
+/// Bits of a coordinate in a key.
+const BITS: u32 = 20;
 /// Farthest node that a key can hold.
-const FAR: i32 = 1 << 18;
+const FAR: i32 = 1 << (BITS - 2);
 
 /// A passage of a triangle through an edge of the grid.
 #[derive(Debug, Clone, Copy)]
@@ -34,19 +34,17 @@ pub struct Pierces {
     /// `start[t]..start[t + 1]` are those of triangle t in `edges`, ascending.
     start: Vec<u32>,
     edges: Vec<GridEdge>,
-    lines: Lines,
+    /// The winding number behind each pierce along z, on its line; they are the last ones.
+    behind: Vec<i32>,
 }
 
 fn key((axis, node): GridEdge) -> u64 {
-    node.iter().fold(axis as u64, |key, at| key << 20 | (at + FAR).clamp(0, 2 * FAR) as u64)
+    node.iter().fold(axis as u64, |key, at| key << BITS | (at + FAR).clamp(0, 2 * FAR) as u64)
 }
 
 impl Pierces {
     /// Finds them.
-    ///
-    /// # Errors
-    /// A mesh that spans more than 2^28 blocks of 8 x 8 x 8 cells.
-    pub fn of(fixed: &[Fixed], triangles: &[[u32; 3]]) -> Result<Self> {
+    pub fn of(fixed: &[Fixed], triangles: &[[u32; 3]]) -> Self {
         let faces: Vec<Face> = triangles
             .iter()
             .map(|names| Face { v: names.map(|name| fixed[name as usize]), coef: 1 })
@@ -76,10 +74,18 @@ impl Pierces {
         items.par_sort_unstable_by(|(k, a), (l, b)| {
             k.cmp(l).then(a.share.total_cmp(&b.share)).then(a.triangle.cmp(&b.triangle))
         });
-        let (keys, items) = items.into_iter().unzip();
-        let wide = [i32::MIN / 2, i32::MAX / 2].map(|at| [at; 3]);
-        let region = Region::around(&faces, 1.0, wide[0], wide[1])?;
-        Ok(Self { keys, items, start, edges, lines: Lines::scan(&faces, &region) })
+        let (keys, items): (Vec<u64>, Vec<Pierce>) = items.into_iter().unzip();
+        let first = keys.partition_point(|key| key >> (3 * BITS) < 2);
+        let (mut line, mut winding) = (u64::MAX, 0);
+        let behind = keys[first..].iter().zip(&items[first..]).map(|(key, pierce)| {
+            if key >> BITS != line {
+                (line, winding) = (key >> BITS, 0);
+            }
+            winding += pierce.change;
+            winding
+        });
+        let behind = behind.collect();
+        Self { keys, items, start, edges, behind }
     }
 
     /// The passages through an edge of the grid.
@@ -98,7 +104,14 @@ impl Pierces {
 
     /// Winding number at a node.
     pub fn winding(&self, node: Coord) -> i32 {
-        self.lines.winding(node)
+        // Of the pierces before it on the line along z the last.
+        let key = key((2, node));
+        let first = self.keys.len() - self.behind.len();
+        let before = self.keys[first..].partition_point(|other| *other < key);
+        match before.checked_sub(1) {
+            Some(last) if self.keys[first + last] >> BITS == key >> BITS => self.behind[last],
+            _ => 0,
+        }
     }
 
     /// All edges of the grid that the mesh passes through, by triangle.

@@ -1,0 +1,73 @@
+//! How vertices go from a frame to the next, through changes of the mesh.
+
+use super::track::Way;
+use crate::base::{DVec3, Vec3};
+use crate::surface::Change;
+
+/// How often vertices that were made take the mean velocity of those around them.
+const PASSES: usize = 4;
+
+/// The vertices of a frame on their way to the next.
+pub struct Trail {
+    /// Where they were (m).
+    from: Vec<DVec3>,
+    /// How far each has gone (m), and in what share of the frame.
+    gone: Vec<(DVec3, f64)>,
+    /// The vertex of the frame that each vertex is now; none: it was made since.
+    names: Vec<Option<u32>>,
+}
+
+impl Trail {
+    /// Vertices that set out from these places (m).
+    pub fn of(from: &[DVec3]) -> Self {
+        let names = (0..from.len() as u32).map(Some).collect();
+        Self { from: from.to_vec(), gone: vec![(DVec3::zeros(), 0.0); from.len()], names }
+    }
+
+    /// They have come to these places (m) when a share of the frame has passed.
+    pub fn follow(&mut self, places: &[DVec3], share: f64) {
+        for (place, name) in places.iter().zip(&self.names) {
+            if let Some(name) = name {
+                let at = *name as usize;
+                self.gone[at] = (place - self.from[at], share);
+            }
+        }
+    }
+
+    /// Some are gone, and others were made.
+    pub fn change(&mut self, change: &Change) {
+        let name = |origin: &Option<u32>| origin.and_then(|at| self.names[at as usize]);
+        self.names = change.origins.iter().map(name).collect();
+    }
+
+    /// Velocities over the frame, of which `fps` pass in a second: those that are gone go on as they went.
+    pub fn way(&self, after: &[DVec3], triangles: &[[u32; 3]], fps: f64) -> Way {
+        let speed = |(gone, share): &(DVec3, f64)| -> Vec3 {
+            if *share > 0.0 { (gone * (fps / share)).cast() } else { Vec3::zeros() }
+        };
+        let of_before: Vec<Vec3> = self.gone.iter().map(speed).collect();
+        if after.len() == self.from.len() && self.names.iter().zip(0..).all(|(name, at)| *name == Some(at)) {
+            return Way { of_after: of_before.clone(), of_before };
+        }
+        let mut known: Vec<Option<Vec3>> =
+            self.names.iter().map(|name| name.map(|name| of_before[name as usize])).collect();
+        for _ in 0..PASSES {
+            let mut sums = vec![(Vec3::zeros(), 0.0f32); known.len()];
+            for corners in triangles {
+                for (at, next) in [(0, 1), (1, 2), (2, 0)] {
+                    if let Some(speed) = known[corners[next] as usize] {
+                        let sum = &mut sums[corners[at] as usize];
+                        *sum = (sum.0 + speed, sum.1 + 1.0);
+                    }
+                }
+            }
+            for (known, (sum, count)) in known.iter_mut().zip(sums) {
+                if known.is_none() && count > 0.0 {
+                    *known = Some(sum / count);
+                }
+            }
+        }
+        let of_after = known.into_iter().map(Option::unwrap_or_default).collect();
+        Way { of_before, of_after }
+    }
+}

@@ -1,0 +1,55 @@
+//! How a mesh follows particles.
+
+use super::advect::Weighting;
+use crate::error::{Error, Result};
+
+/// How a mesh follows particles.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Params {
+    /// Initial distance r between particles (m), over 0.
+    pub spacing: f64,
+    /// Edge of a cell (r), 0.125..=2 (thesis 2.7: 0.5).
+    pub cell: f64,
+    /// Greatest distance (r) that projection may move a vertex; beyond, the liquid has merged or split there (thesis 2.3.3: 0.5).
+    pub change: f64,
+    /// How particles carry vertices.
+    pub weighting: Weighting,
+    /// Time (s) in which half of the detail fades, over 0; infinite: it stays (thesis 2.8 wishes for it).
+    pub half_life: f64,
+    /// How much detail fades where the mesh is strained: to exp(-fade) of it while lengths change by a factor of e; 0..=1000.
+    pub fade: f64,
+    /// Whether the mesh is rebuilt where the liquid merges or splits (thesis 2.4, 2.5); it must then be a closed 2-manifold by index.
+    /// Else it is flagged there.
+    pub rebuild: bool,
+}
+
+impl Params {
+    /// The thesis' values for particles of a spacing (m), but for the weighting.
+    pub fn for_spacing(spacing: f64) -> Self {
+        let (half_life, fade) = (f64::INFINITY, 0.0);
+        let weighting = Weighting::Affine;
+        Self { spacing, cell: 0.5, change: 0.5, weighting, half_life, fade, rebuild: false }
+    }
+
+    /// Checks every field.
+    ///
+    /// # Errors
+    /// Names the field and its range.
+    pub fn validate(&self) -> Result<()> {
+        let ranges = [
+            ("spacing", self.spacing, 1e-9, 1e6, "m"),
+            ("cell", self.cell, 0.125, 2.0, "r"),
+            ("change", self.change, 1e-3, 100.0, "r"),
+            ("half_life", self.half_life, f64::MIN_POSITIVE, f64::INFINITY, "s"),
+            ("fade", self.fade, 0.0, 1000.0, ""),
+        ];
+        for (name, value, low, high, unit) in ranges {
+            if !(low..=high).contains(&value) {
+                return Err(Error::argument(format!(
+                    "{name} = {value} is not within {low} to {high} {unit}"
+                )));
+            }
+        }
+        Ok(())
+    }
+}
