@@ -30,6 +30,8 @@ mod dense;
 mod distance;
 #[path = "gates/early.rs"]
 mod early;
+#[path = "gates/edit_history.rs"]
+mod edit_history;
 #[path = "gates/far.rs"]
 mod far;
 #[path = "gates/flip.rs"]
@@ -52,6 +54,8 @@ mod host;
 mod house;
 #[path = "gates/large.rs"]
 mod large;
+#[path = "gates/matching.rs"]
+mod matching;
 #[path = "gates/materials.rs"]
 mod materials;
 #[path = "gates/mist.rs"]
@@ -80,6 +84,14 @@ mod preview;
 mod rate;
 #[path = "gates/readers.rs"]
 mod readers;
+#[path = "gates/rebuilt.rs"]
+mod rebuilt;
+#[path = "gates/rebuilt_sequences.rs"]
+mod rebuilt_sequences;
+#[path = "gates/rebuilt_speed.rs"]
+mod rebuilt_speed;
+#[path = "gates/rebuilt_topology.rs"]
+mod rebuilt_topology;
 #[path = "gates/repair.rs"]
 mod repair;
 #[path = "gates/rest.rs"]
@@ -114,6 +126,8 @@ mod turned;
 mod volumes;
 #[path = "gates/vortex.rs"]
 mod vortex;
+#[path = "gates/windings.rs"]
+mod windings;
 
 use harness::Harness;
 
@@ -156,6 +170,10 @@ fn main() {
     splashsurf::run(&mut h);
     tracker_cancel::run(&mut h);
     repair::run(&mut h);
+    rebuilt::run(&mut h);
+    rebuilt_topology::run(&mut h);
+    rebuilt_speed::run(&mut h);
+    matching::run(&mut h);
     house::run(&mut h);
     h.finish();
 }

@@ -297,4 +297,38 @@ pub const GATES: &[Gate] = &[
     // Broken meshes that do not become the solid that they mean; pairs of cubes on whose common face the surface fits.
     none("surface.repair_fuzz", "meshes"),
     yes("surface.cubes_fit"),
+    // A mesh that is rebuilt where liquid merges and splits: frames in which it is no closed surface, or in which a sliver was made; how
+    // deep places are that it surrounds neither once nor never, and their share of its volume.
+    none("surface.rebuilt_valid", "frames"),
+    gate("surface.rebuilt_winding_depth", "cells", Most(1.0), Open),
+    gate("surface.rebuilt_winding_volume", "1", Most(1.0e-4), Open),
+    // What it becomes on the made sets, and how many frames after the particles' own surface.
+    yes("surface.rebuilt_topology"),
+    gate("surface.rebuilt_late", "frames", Most(2.0), Most(1.0)),
+    // Particles over a spacing below their surface that are inside of it, and parts of it without a particle.
+    gate("surface.rebuilt_inside", "%", Least(99.9), Open),
+    none("surface.rebuilt_empty", "parts"),
+    // Rebuilt over flagged cells, changes that took more than their cells, triangles that are left at the end.
+    gate("surface.rebuilt_cells_median", "x", Most(2.0), Most(1.5)),
+    gate("surface.rebuilt_cells_p99", "x", Most(10.0), Most(6.0)),
+    gate("surface.rebuilt_rungs", "%", Most(1.0), Most(0.1)),
+    gate("surface.rebuilt_alive", "%", Open, Open),
+    // By how much a change changes the volume, and the volume over that of the particles' own surface, against the first frame.
+    gate("surface.rebuilt_jump", "%", Most(1.0), Most(0.3)),
+    gate("surface.rebuilt_volume", "%", Most(1.0), Most(0.5)),
+    // What changes say of vertices and triangles leads back to the first ones.
+    yes("surface.rebuilt_edits"),
+    // Triangles that were made: their least angles, and edges of half a cell to one and a half.
+    gate("surface.rebuilt_quality_angle", "deg", Least(10.0), Least(15.0)),
+    gate("surface.rebuilt_quality_edges", "%", Least(95.0), Least(99.0)),
+    // Topology matched near the flags against the whole grid: signs and differences, and the volume of a neck.
+    yes("surface.match_near"),
+    gate("surface.match_neck", "%", Most(1.0), Open),
+    // The time of rebuilding nothing, 2 % and 20 % of the mesh, of a step in which a drop merges, and what a second thread gains.
+    gate("surface.rebuild_time_0", "s", Most(0.1), Most(0.03)),
+    gate("surface.rebuild_time_2", "s", Most(0.3), Most(0.12)),
+    gate("surface.rebuild_time_20", "s", Most(1.0), Most(0.5)),
+    gate("surface.frame_dragon", "s", Most(1.0), Most(0.6)),
+    gate("surface.rebuilt_threads", "x", Least(1.5), Least(1.8)),
+    yes("surface.rebuilt_same"),
 ];

@@ -20,6 +20,8 @@ by the system's loader.
     tracker = frazil.Tracker(ctx, mesh, first, spacing=frazil.spacing(ctx, first))   # first: frazil.Particles
     tracker.step(first, second, dt=1 / 24)
     tracker.positions, tracker.read("flagged")
+    solid, report = mesh.repaired(ctx, cell=0.01)          # closed, as rebuild=True of a Tracker needs it
+    tracker.triangles, tracker.edits                       # which change then where the liquid merges or splits
 
 Lengths are metres, times seconds; Y is up. Everything that fails raises frazil.Error with one sentence.
 Handles have close(), and work in with blocks.

@@ -18,7 +18,8 @@ class Struct(c.Structure):
     """A struct that shows its fields."""
 
     def __repr__(self):
-        named = [(name, getattr(self, name)) for name, *_ in self._fields_ if name not in ("struct_size", "reserved")]
+        hidden = ("struct_size", "reserved", "reserved2")
+        named = [(name, getattr(self, name)) for name, *_ in self._fields_ if name not in hidden]
         listed = [(name, tuple(value) if isinstance(value, c.Array) else value) for name, value in named]
         return f"<{type(self).__name__} {' '.join(f'{name}={value!r}' for name, value in listed)}>"
 
@@ -169,7 +170,7 @@ class TrackerParams(Struct):
     _fields_ = [
         ("struct_size", c.c_uint32), ("flags", c.c_uint32), ("spacing", c.c_double), ("cell", c.c_double),
         ("change", c.c_double), ("half_life", c.c_double), ("fade", c.c_double), ("weighting", c.c_uint32),
-        ("reserved", c.c_uint32),
+        ("reserved", c.c_uint32), ("rebuild", c.c_uint32), ("reserved2", c.c_uint32),
     ]
 
 
@@ -177,7 +178,17 @@ class TrackerReport(Struct):
     _fields_ = [
         ("struct_size", c.c_uint32), ("parts", c.c_uint32), ("jumped", c.c_uint64), ("lost", c.c_uint64),
         ("born", c.c_uint64), ("died", c.c_uint64), ("triangles", c.c_uint64), ("drops", c.c_uint64),
-        ("bubbles", c.c_uint64), ("uncovered", c.c_uint64),
+        ("bubbles", c.c_uint64), ("uncovered", c.c_uint64), ("changed", c.c_uint32), ("rung", c.c_uint32),
+        ("changed_cells", c.c_uint64), ("rebuilt_cells", c.c_uint64), ("made_triangles", c.c_uint64),
+    ]
+
+
+class RepairReport(Struct):
+    _fields_ = [
+        ("struct_size", c.c_uint32), ("rung", c.c_uint32), ("joined_vertices", c.c_uint64),
+        ("dropped_triangles", c.c_uint64), ("turned_triangles", c.c_uint64), ("turned_parts", c.c_uint64),
+        ("holes", c.c_uint64), ("added_triangles", c.c_uint64), ("flagged_cells", c.c_uint64),
+        ("rebuilt_cells", c.c_uint64), ("kept_triangles", c.c_uint64), ("slivers", c.c_uint64), ("cell", c.c_double),
     ]
 
 
@@ -190,7 +201,7 @@ STRUCTS = {
     "frz_snow_desc": SnowDesc, "frz_base_params": BaseParams, "frz_base_report": BaseReport,
     "frz_grains_params": GrainsParams, "frz_grains_report": GrainsReport,
     "frz_mist_params": MistParams, "frz_mist_report": MistReport, "frz_particles": ParticlesDesc,
-    "frz_tracker_params": TrackerParams, "frz_tracker_report": TrackerReport,
+    "frz_tracker_params": TrackerParams, "frz_tracker_report": TrackerReport, "frz_repair_report": RepairReport,
 }
 
 POLL = c.CFUNCTYPE(c.c_int, c.c_void_p, c.POINTER(Progress))
@@ -202,6 +213,7 @@ _FUNCTIONS = {
     "context_set_log": [_P, _P, _P], "context_set_memory_limit": [_P, c.c_uint64],
     "context_progress": [_P, _P], "context_timings": [_P, Span, _P], "mesh_create": [_P, _P, _P],
     "mesh_get_info": [_P, _P], "mesh_read": [_P, _U, Span], "mesh_attribute": [_P, _S, Span, _P],
+    "mesh_repair": [_P, _P, _D, _P, _P],
     "grid_create": [_P, _P, _P], "grid_copy": [_P, _P, _P], "grid_get_info": [_P, _P],
     "grid_name": [_P, _P, _Z, _P], "grid_set_name": [_P, _S], "grid_leaves": [_P, Span, _P],
     "grid_vector_leaves": [_P, Span, _P], "grid_vector_probe": [_P, View, Span],
@@ -229,7 +241,8 @@ _FUNCTIONS = {
     "particles_spacing": [_P, _P, _P], "tracker_params_init": [_P, _Z],
     "tracker_create": [_P, _P, _P, _P, _P, _Z, _P], "tracker_set_params": [_P, _P],
     "tracker_step": [_P, _P, _P, _P, _D, _P], "tracker_count": [_P, _P], "tracker_read": [_P, _U, Span],
-    "tracker_save": [_P, _P, _P, _Z, _P],
+    "tracker_triangle_count": [_P, _P], "tracker_read_triangles": [_P, Span], "tracker_edits": [_P, _P, _P],
+    "tracker_read_edits": [_P, _U, Span], "tracker_save": [_P, _P, _P, _Z, _P],
 }
 _VOID = ["pool_destroy", "context_destroy", "context_cancel", "context_reset", "mesh_destroy", "grid_destroy",
          "base_destroy", "grains_destroy", "mist_destroy", "tracker_destroy"]
@@ -370,15 +383,15 @@ def call(name, *arguments):
         raise Error(status, said.decode("utf-8", "replace"))
 
 
-def made(name, *arguments):
-    """Calls frz_<name> with an out-pointer at the end; the new handle."""
+def made(name, *arguments, behind=()):
+    """Calls frz_<name> with an out-pointer at the end, but for the arguments `behind` it; the new handle."""
     out = c.c_void_p()
     try:
-        call(name, *arguments, c.byref(out))
+        call(name, *arguments, c.byref(out), *behind)
     except BaseException:
         # A callback raised at the end of a call that went well.
         if out.value:
-            kind = "mesh" if name.startswith("grid_to_mesh") else name.split("_")[0] if name.endswith("_create") else "grid"
+            kind = "mesh" if name.startswith(("grid_to_mesh", "mesh_")) else name.split("_")[0] if name.endswith("_create") else "grid"
             getattr(library, f"frz_{kind}_destroy")(out.value)
         raise
     return out.value

@@ -4,7 +4,7 @@ import ctypes as c
 
 import numpy as np
 
-from ._library import Attribute, Handle, MeshDesc, MeshInfo, Span, call, made, rows, span, text, view
+from ._library import Attribute, Handle, MeshDesc, MeshInfo, RepairReport, Span, call, made, rows, span, text, view
 
 
 class Mesh(Handle):
@@ -83,6 +83,13 @@ class Mesh(Handle):
         if len(out):
             call("mesh_attribute", self.pointer, text(name), span(out), None)
         return out
+
+    def repaired(self, ctx, cell):
+        """A closed mesh of this one, which may be open, cross itself or be inside out in parts, and a report, as frz_repair_report
+        has it. cell: edge (m) of the cells in which it is rebuilt where it is at fault; elsewhere it stays as it is."""
+        report = RepairReport(c.sizeof(RepairReport))
+        solid = made("mesh_repair", ctx.pointer, self.pointer, cell, behind=[c.byref(report)])
+        return Mesh._of(solid), report
 
 
 def faces_of(faces, counts):

@@ -1,5 +1,6 @@
 """Trackers: detailed meshes that follow the particles of a liquid."""
 
+import collections
 import ctypes as c
 
 import numpy as np
@@ -11,6 +12,18 @@ ARRAYS = {
     "P": (0, np.float32, 3), "P64": (1, np.float64, 3), "delta": (2, np.float32, 1), "flagged": (3, np.int32, 1),
 }
 WEIGHTINGS = {"affine": 0, "mean": 1}
+# Kinds of triangles after a step, as Edits has them.
+WHOLE, PART, NEW = 0, 1, 2
+
+Edits = collections.namedtuple("Edits", "changed origins sources kinds before")
+Edits.__doc__ = """What a step made of the mesh of a tracker.
+
+changed: whether it changed vertices and triangles; else every one of them is what it was.
+origins: (n,) for each vertex the one that it was before; -1: it was made.
+sources: (t,) for each triangle the one that it was before, or is a part of; -1: neither.
+kinds: (t,) WHOLE, PART or NEW of frazil.tracker.
+before: (m, 3) places (m) in 64 bits to which the step took the vertices that there were.
+"""
 
 
 class Particles:
@@ -46,6 +59,8 @@ class Tracker(Handle):
     particles: frazil.Particles at the first frame; None with a state.
     spacing: initial distance r between particles (m): see frazil.spacing.
     weighting: "affine" or "mean".
+    rebuild: whether the mesh is rebuilt where the liquid merges or splits; it must be closed: see Mesh.repaired. Read its triangles
+    anew after each step that changed them (the report says so), and take arrays of your own along by edits.
     Further parameters, as in frz_tracker_params: cell and change (r), half_life (s), fade.
     state: bytes of save(), to go on from.
     """
@@ -57,28 +72,29 @@ class Tracker(Handle):
         first = None if particles is None else c.byref(particles._desc())
         super().__init__(made("tracker_create", ctx.pointer, c.byref(params), mesh.pointer, first, state,
                               len(state) if state else 0))
-        self._ctx, self._spacing = ctx, spacing
+        self._ctx, self._spacing, self._rebuild = ctx, spacing, more.get("rebuild", False)
 
     def _words(self):
         return f"of {len(self)} vertices on particles {self._spacing:g} m apart"
 
     @staticmethod
-    def _params(spacing, weighting="affine", **more):
+    def _params(spacing, weighting="affine", rebuild=False, **more):
         params = TrackerParams()
         call("tracker_params_init", c.byref(params), c.sizeof(params))
         params.spacing = spacing
         if weighting not in WEIGHTINGS:
             raise ValueError(f"weighting is {weighting!r}, not {' or '.join(WEIGHTINGS)}")
         params.weighting = WEIGHTINGS[weighting]
+        params.rebuild = bool(rebuild)
         for name, value in more.items():
-            if name in ("struct_size", "flags", "reserved") or name not in dict(TrackerParams._fields_):
+            if name in ("struct_size", "flags", "reserved", "reserved2") or name not in dict(TrackerParams._fields_):
                 raise TypeError(f"trackers have no parameter {name}")
             setattr(params, name, value)
         return params
 
     def set_params(self, **more):
-        """How the mesh follows from the next step on; those not given are the usual ones. Spacing and cell stay."""
-        params = self._params(self._spacing, **more)
+        """How the mesh follows from the next step on; those not given are the usual ones. Spacing, cell and rebuild stay."""
+        params = self._params(self._spacing, **{"rebuild": self._rebuild} | more)
         call("tracker_set_params", self.pointer, c.byref(params))
 
     def step(self, before, after, dt):
@@ -112,6 +128,27 @@ class Tracker(Handle):
     def positions(self):
         """(n, 3) floats (m)."""
         return self.read("P")
+
+    @property
+    def triangles(self):
+        """(t, 3) vertices of the triangles: those of the mesh that it was made with, until a step changes them."""
+        count = c.c_size_t()
+        call("tracker_triangle_count", self.pointer, c.byref(count))
+        out = np.empty((count.value, 3), np.uint32)
+        call("tracker_read_triangles", self.pointer, span(out))
+        return out
+
+    @property
+    def edits(self):
+        """What the last step made of the mesh: Edits. Nothing before the first step, and after a start from a state."""
+        changed, before, count = c.c_uint32(), c.c_size_t(), c.c_size_t()
+        call("tracker_edits", self.pointer, c.byref(changed), c.byref(before))
+        call("tracker_triangle_count", self.pointer, c.byref(count))
+        arrays = [np.empty(len(self), np.int64), np.empty(count.value, np.int64), np.empty(count.value, np.uint32),
+                  np.empty((before.value, 3), np.float64)]
+        for number, array in enumerate(arrays):
+            call("tracker_read_edits", self.pointer, number, span(array))
+        return Edits(bool(changed.value), *arrays)
 
     def save(self):
         """The state, for a cache: bytes that Tracker(..., state=...) goes on from."""

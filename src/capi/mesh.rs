@@ -141,6 +141,11 @@ impl Mesh {
         self.attributes.iter().find(is_it).map(|attribute| &attribute.values[..])
     }
 
+    /// Name, components and numbers of each attribute.
+    pub(super) fn attributes(&self) -> impl Iterator<Item = (&str, usize, &[f32])> {
+        self.attributes.iter().map(|one| (&*one.name, one.components, &one.values[..]))
+    }
+
     /// Adds an attribute, in the place of one of the same name.
     pub(super) fn set_attribute(&mut self, name: &str, components: usize, values: Vec<f32>) {
         self.attributes.retain(|attribute| attribute.name != name);

@@ -26,6 +26,8 @@ mod views;
 
 pub mod mesh;
 
+pub mod repair;
+
 #[cfg(feature = "vdb")]
 pub mod grid;
 
@@ -71,6 +73,8 @@ pub mod mist_params;
 pub mod mist;
 
 pub mod tracker;
+
+pub mod tracker_edits;
 
 mod handle;
 mod saved;

@@ -3,12 +3,14 @@
 use std::ffi::c_void;
 
 use super::context::{creates, enter, frz_context};
-use super::guard::{Outcome, frz_status, guard};
+use super::guard::{Failure, Outcome, frz_status, guard};
 use super::handle::{Noun, change, clear, destroy, read, required};
 use super::mesh::{frz_mesh, no_flags};
 use super::saved::{Saved, resumed};
-use super::views::{Sized32, fill, finite, frz_span, frz_view, meaning, sized, within};
-use crate::surface::{Params, Particles, Tracker, Weighting, estimate_spacing};
+use super::tracker_edits::Edits;
+use super::views::{Sized32, fill, finite, frz_view, meaning, sized, within};
+use crate::base::topology::Topology;
+use crate::surface::{Change, Params, Particles, Tracker, Weighting, estimate_spacing};
 
 /// A detailed mesh that follows the particles of a liquid.
 pub struct frz_tracker {
@@ -53,7 +55,7 @@ use frz_tracker_weighting::*;
 const WEIGHTINGS: [(u32, Weighting); 2] =
     [(FRZ_TRACKER_AFFINE as u32, Weighting::Affine), (FRZ_TRACKER_MEAN as u32, Weighting::Mean)];
 
-/// How a mesh follows particles. All of it but the spacing and the cell may change between steps.
+/// How a mesh follows particles. All of it but the spacing, the cell and whether it is rebuilt may change between steps.
 #[repr(C)]
 #[derive(Clone, Copy)]
 pub struct frz_tracker_params {
@@ -69,7 +71,7 @@ pub struct frz_tracker_params {
     /// there. 0.5 is usual.
     pub change: f64,
     /// Time (s) in which half of the detail fades, above 0; infinite, as is usual: it stays. It stays anyway where the mesh's attribute
-    /// "detail" of one float is 1, and fades as fast as this says where that is 0.
+    /// "detail" of one float is 1, and fades as fast as this says where that is 0, as it is for vertices that a step makes.
     pub half_life: f64,
     /// How much detail fades where the mesh is strained: to exp(-fade) of it while lengths change by a factor of e, 0 to 1000; 0,
     /// as is usual: not at all.
@@ -78,11 +80,19 @@ pub struct frz_tracker_params {
     pub weighting: u32,
     /// 0.
     pub reserved: u32,
+    /// 1: where the liquid merges or splits the mesh is rebuilt, and merges or splits with it; where it is stretched or squeezed, edges
+    /// are divided or go. It must be closed, a 2-manifold by its indices. 0, as is usual: the mesh keeps the vertices and the faces
+    /// that it was made with, and is flagged where it no longer fits. With 1 any step may change both (frz_tracker_report.changed): a
+    /// host has to read the triangles anew, and to take its own arrays along (frz_tracker_read_edits), which one that knows nothing of
+    /// it does not do.
+    pub rebuild: u32,
+    /// 0.
+    pub reserved2: u32,
 }
 
 // SAFETY: numbers.
 unsafe impl Sized32 for frz_tracker_params {
-    const SIZES: &'static [usize] = &[size_of::<Self>()];
+    const SIZES: &'static [usize] = &[std::mem::offset_of!(frz_tracker_params, rebuild), size_of::<Self>()];
     const NAME: &'static str = "frz_tracker_params";
 }
 
@@ -99,6 +109,8 @@ impl frz_tracker_params {
             fade: usual.fade,
             weighting: FRZ_TRACKER_AFFINE as u32,
             reserved: 0,
+            rebuild: u32::from(usual.rebuild),
+            reserved2: 0,
         }
     }
 
@@ -106,6 +118,8 @@ impl frz_tracker_params {
     fn params(&self) -> Outcome<Params> {
         no_flags(self.flags, 0)?;
         within("reserved", f64::from(self.reserved), 0.0..=0.0, "")?;
+        within("rebuild", f64::from(self.rebuild), 0.0..=1.0, "")?;
+        within("reserved2", f64::from(self.reserved2), 0.0..=0.0, "")?;
         let numbers = [self.spacing, self.cell, self.change, self.fade];
         for (name, value) in ["spacing", "cell", "change", "fade"].into_iter().zip(numbers) {
             finite(name, value)?;
@@ -118,7 +132,7 @@ impl frz_tracker_params {
             weighting,
             half_life: self.half_life,
             fade: self.fade,
-            rebuild: false,
+            rebuild: self.rebuild == 1,
         };
         params.validate()?;
         Ok(params)
@@ -150,11 +164,26 @@ pub struct frz_tracker_report {
     /// Vertices beside which there is surface that the mesh does not cover: the liquid begins to merge or to split there. They are
     /// flagged.
     pub uncovered: u64,
+    /// 1 where the mesh has other vertices or triangles now (frz_tracker_read_edits); else 0, and so is all below.
+    pub changed: u32,
+    /// How much more was rebuilt than the cells in which the mesh no longer fitted, and what they need: 0 nothing, 1 a ring of cells
+    /// around them, 2 the whole parts of the mesh that pass through them, 3 everything.
+    pub rung: u32,
+    /// Cells in which the mesh no longer fitted.
+    pub changed_cells: u64,
+    /// Cells in which it was rebuilt; 0 where edges were only divided, turned, or went.
+    pub rebuilt_cells: u64,
+    /// Triangles that are new, or parts of others.
+    pub made_triangles: u64,
 }
 
 // SAFETY: numbers.
 unsafe impl Sized32 for frz_tracker_report {
-    const SIZES: &'static [usize] = &[std::mem::offset_of!(frz_tracker_report, uncovered), size_of::<Self>()];
+    const SIZES: &'static [usize] = &[
+        std::mem::offset_of!(frz_tracker_report, uncovered),
+        std::mem::offset_of!(frz_tracker_report, changed),
+        size_of::<Self>(),
+    ];
     const NAME: &'static str = "frz_tracker_report";
 }
 
@@ -170,13 +199,31 @@ impl frz_tracker_report {
         drops: 0,
         bubbles: 0,
         uncovered: 0,
+        changed: 0,
+        rung: 0,
+        changed_cells: 0,
+        rebuilt_cells: 0,
+        made_triangles: 0,
     };
 }
 
 /// The value of a tracker's handle.
 pub(super) struct Follower {
-    tracker: Tracker,
+    /// The mesh.
+    pub tracker: Tracker,
+    /// What the last step made of it; none: it changed no triangle, or there was none yet.
+    pub edits: Option<Edits>,
     saved: Saved,
+}
+
+/// Refuses to rebuild a mesh of a state that is not closed, as [`Tracker::new`] does one at the first frame.
+fn check_closed(tracker: &Tracker) -> Outcome {
+    let triangles = tracker.triangles();
+    // Nothing is left where all of the liquid has gone.
+    if triangles.is_empty() || Topology::of(tracker.vertices().len(), triangles).is_watertight() {
+        return Ok(());
+    }
+    Err(Failure::argument("the mesh is not closed and 2-manifold by index, as it must be to be rebuilt"))
 }
 
 impl Noun for frz_tracker {
@@ -249,7 +296,9 @@ pub unsafe extern "C" fn frz_particles_spacing(
 ///
 /// params: see frz_tracker_params.
 /// mesh: at the first frame, in the particles' space; also with a restart. It is copied, and may be open, cross itself and repeat
-///     vertices. FRZ_ERROR_ARGUMENT says where it is not where the particles are.
+///     vertices; with params.rebuild it must be closed, each edge with two triangles that agree about which side is out, each
+///     vertex with one fan of them: see frz_mesh_repair. FRZ_ERROR_ARGUMENT says where it is not, or is not where the particles
+///     are.
 /// particles: at the first frame; NULL with a restart.
 /// restart: restart_bytes bytes of frz_tracker_save of a tracker of the same mesh, spacing and cell: it comes back bit for bit, on
 ///     any number of threads. NULL: none. Bytes that are damaged, of another version, mesh, spacing or cell are FRZ_ERROR_FILE.
@@ -284,11 +333,14 @@ pub unsafe extern "C" fn frz_tracker_create(
                     Tracker::resume(params, triangles, &state)
                 })?,
             };
+            if params.rebuild && !restart.is_null() {
+                check_closed(&tracker)?;
+            }
             // A mesh that was rebuilt has it in its state.
             if !tracker.is_rebuilt() {
                 tracker.set_lasting(mesh.attribute("detail", 1).unwrap_or_default().to_vec())?;
             }
-            Ok(Follower { tracker, saved: Saved::default() })
+            Ok(Follower { tracker, edits: None, saved: Saved::default() })
         })
     }
 }
@@ -304,7 +356,7 @@ pub unsafe extern "C" fn frz_tracker_destroy(tracker: *mut frz_tracker) {
     guard(|| unsafe { destroy(tracker) });
 }
 
-/// Sets how a mesh follows from the next step on. The spacing and the cell must stay.
+/// Sets how a mesh follows from the next step on. The spacing, the cell and whether it is rebuilt must stay.
 ///
 /// params: FRZ_ERROR_ARGUMENT names the field at fault and its range; the old ones then stay.
 ///
@@ -324,7 +376,8 @@ pub unsafe extern "C" fn frz_tracker_set_params(
     })
 }
 
-/// Moves the mesh with its particles from one time to another. After a failure or a cancel it is as it was before.
+/// Moves the mesh with its particles from one time to another. After a failure or a cancel it is as it was before. With
+/// frz_tracker_params.rebuild it may have other vertices and triangles afterwards.
 ///
 /// from: the particles as they were at the last step's end.
 /// to: the particles at this step's end. Those of the same id are the same; where one of the two has no ids, from must have
@@ -355,6 +408,7 @@ pub unsafe extern "C" fn frz_tracker_step(
             let done = follower.tracker.step(call.ctx(), &from, &to, dt)?;
             follower.saved.take();
             let drops = done.apart.iter().filter(|apart| apart.volume >= 0.0).count();
+            let of_change = |count: fn(&Change) -> usize| done.change.as_ref().map_or(0, count);
             let told = frz_tracker_report {
                 struct_size: 0,
                 parts: done.parts as u32,
@@ -366,85 +420,14 @@ pub unsafe extern "C" fn frz_tracker_step(
                 drops: drops as u64,
                 bubbles: (done.apart.len() - drops) as u64,
                 uncovered: done.uncovered as u64,
+                changed: u32::from(done.change.is_some()),
+                rung: of_change(|change| change.rung) as u32,
+                changed_cells: of_change(|change| change.flagged_cells) as u64,
+                rebuilt_cells: of_change(|change| change.rebuilt_cells) as u64,
+                made_triangles: of_change(Change::made_triangles) as u64,
             };
+            follower.edits = done.change.map(Edits::from);
             if report.is_null() { Ok(()) } else { fill(report, None, told) }
-        }
-    })
-}
-
-/// What frz_tracker_read reads of each vertex, in the mesh's order.
-#[repr(u32)]
-#[derive(Clone, Copy)]
-pub enum frz_tracker_array {
-    /// float[3]: its place (m).
-    FRZ_TRACKER_POSITION = 0,
-    /// double[3]: its place (m), as exactly as it is known: also far from the origin. The next step's, less these, over dt are the
-    /// velocities for motion blur.
-    FRZ_TRACKER_POSITION_DOUBLE = 1,
-    /// float: the distance that it keeps from the particles' surface (m), negative inside; NaN: it was too far away to have one.
-    FRZ_TRACKER_DELTA = 2,
-    /// int32_t: 1 where the last step could not project it, or found surface beside it that the mesh does not cover; else 0.
-    FRZ_TRACKER_FLAGGED = 3,
-}
-
-use frz_tracker_array::*;
-
-const ARRAYS: [(u32, frz_tracker_array); 4] = [
-    (0, FRZ_TRACKER_POSITION),
-    (1, FRZ_TRACKER_POSITION_DOUBLE),
-    (2, FRZ_TRACKER_DELTA),
-    (3, FRZ_TRACKER_FLAGGED),
-];
-
-/// Reports how many vertices the mesh has; its faces are those that it was made with.
-///
-/// count: receives their number; 0 after a failure.
-///
-/// Any number of threads may read a tracker.
-#[unsafe(no_mangle)]
-pub unsafe extern "C" fn frz_tracker_count(tracker: *const frz_tracker, count: *mut usize) -> frz_status {
-    guard(|| {
-        // SAFETY: the pointers are NULL or the caller's.
-        unsafe {
-            clear(count);
-            let count = required(count, "count")?;
-            count.write_unaligned(read(tracker)?.tracker.vertices().len());
-            Ok(())
-        }
-    })
-}
-
-/// Copies an array of the mesh's vertices.
-///
-/// array: a frz_tracker_array; it says of what type the elements are.
-/// dst: room for as many elements as frz_tracker_count reports; FRZ_ERROR_CAPACITY when it is too little, and nothing is written.
-///
-/// Any number of threads may read a tracker.
-#[unsafe(no_mangle)]
-pub unsafe extern "C" fn frz_tracker_read(
-    tracker: *const frz_tracker,
-    array: u32,
-    dst: frz_span,
-) -> frz_status {
-    guard(|| {
-        let array = meaning("array", "frz_tracker_array", array, &ARRAYS)?;
-        // SAFETY: the tracker is NULL or was not destroyed; the span is the caller's.
-        unsafe {
-            let follower = read(tracker)?;
-            let tracker = &follower.tracker;
-            match array {
-                FRZ_TRACKER_POSITION => {
-                    let places = tracker.vertices().iter();
-                    dst.fill("dst", &places.map(|p| [p.x as f32, p.y as f32, p.z as f32]).collect::<Vec<_>>())
-                }
-                FRZ_TRACKER_POSITION_DOUBLE => {
-                    dst.fill("dst", &tracker.vertices().iter().map(|p| [p.x, p.y, p.z]).collect::<Vec<_>>())
-                }
-                FRZ_TRACKER_DELTA => dst.fill("dst", tracker.delta()),
-                FRZ_TRACKER_FLAGGED => {
-                    dst.fill("dst", &tracker.flags().iter().map(|flag| i32::from(*flag)).collect::<Vec<_>>())
-                }
-            }
         }
     })
 }

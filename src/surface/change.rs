@@ -5,6 +5,7 @@ use super::band::Distances;
 use super::cells::{Coord, cell_of};
 use super::gamma::Gamma;
 use super::implicit::Implicit;
+use super::improve::{Improvable, Improvements, Size, improve};
 use super::project::foot;
 use super::repair::{CellSet, Pierces, Rebuilt, Shape, Source, ladder, overlaps};
 use super::sample::Sampler;
@@ -40,6 +41,10 @@ pub struct Change {
     pub before: Vec<DVec3>,
     /// For each vertex that was made its signed distance from the particles' surface (m).
     pub delta: Vec<f32>,
+    /// For each vertex the lengths (m) of the shortest and of the longest edge around it at its birth.
+    pub sizes: Vec<[f32; 2]>,
+    /// What improved the mesh.
+    pub improvements: Improvements,
     /// Cells in which the mesh did not fit.
     pub flagged_cells: usize,
     /// Cells that were rebuilt.
@@ -50,7 +55,28 @@ pub struct Change {
     pub iterations: usize,
 }
 
+/// Lengths of the shortest and of the longest edge around a vertex that was made (cells).
+const BORN: [f64; 2] = [0.8, 1.0];
+
 impl Change {
+    /// Of a mesh that stays as it is.
+    fn nothing(unfit: &Unfit<'_>) -> Self {
+        Self {
+            vertices: unfit.vertices.to_vec(),
+            triangles: unfit.triangles.to_vec(),
+            origins: (0..unfit.vertices.len() as u32).map(Some).collect(),
+            sources: (0..unfit.triangles.len() as u32).map(Source::Whole).collect(),
+            before: unfit.vertices.to_vec(),
+            delta: Vec::new(),
+            sizes: Vec::new(),
+            improvements: Improvements::default(),
+            flagged_cells: 0,
+            rebuilt_cells: 0,
+            rung: 0,
+            iterations: 0,
+        }
+    }
+
     /// Count of triangles that were made: parts of others among them.
     pub fn made_triangles(&self) -> usize {
         self.sources.iter().filter(|source| !matches!(source, Source::Whole(_))).count()
@@ -88,54 +114,93 @@ pub fn change(
     let lattice = Lattice::near(cell, 0.5 * (low + high))?;
     let in_cells: Vec<DVec3> = unfit.vertices.iter().map(|place| lattice.to_cells(*place)).collect();
     let fixed = in_cells.iter().map(|place| lattice.fix(*place)).collect::<Result<Vec<_>>>()?;
-    let pierces = Pierces::of(&fixed, unfit.triangles);
-    let shape = Shape { fixed, triangles: unfit.triangles.to_vec(), pierces };
-    ctx.check()?;
-    let flagged = flagged(unfit, &shape, &lattice);
+    let (shape, flagged) = ctx.phase("flag", || {
+        let pierces = Pierces::of(&fixed, unfit.triangles);
+        let shape = Shape { fixed, triangles: unfit.triangles.to_vec(), pierces };
+        ctx.check()?;
+        let flagged = flagged(unfit, &shape, &lattice);
+        Ok((shape, flagged))
+    })?;
     if flagged.count() == 0 {
         return Ok(None);
     }
-    let gamma = Gamma::matched(ctx, &shape, &in_cells, &lattice, &flagged, (phi, distances))?;
+    let gamma =
+        ctx.phase("match", || Gamma::matched(ctx, &shape, &in_cells, &lattice, &flagged, (phi, distances)))?;
     let mut set = flagged.clone();
     for node in gamma.turned() {
         for n in 0..8 {
             set.add([node[0] - (n >> 2), node[1] - (n >> 1 & 1), node[2] - (n & 1)]);
         }
     }
-    let Rebuilt { draft, cells, rung, .. } = ladder(ctx, &shape, (&in_cells, &lattice), &set, &gamma)?;
+    let rebuilt = ctx.phase("rebuild", || ladder(ctx, &shape, (&in_cells, &lattice), &set, &gamma))?;
+    let Rebuilt { draft, cells, rung, .. } = rebuilt;
     let own = unfit.vertices.len();
     let names = used(draft.places.len(), &draft.triangles)
         .unwrap_or_else(|| (0..draft.places.len() as u32).collect());
     let origin = DVec3::from(lattice.origin.map(f64::from));
-    let mut sampler = Sampler::new(distances);
-    let mut delta = Vec::new();
-    let mut vertices = Vec::with_capacity(names.len());
-    for name in &names {
-        let at = *name as usize;
-        if at < own {
-            vertices.push(unfit.vertices[at]);
-            continue;
-        }
-        let place = draft.places[at] + origin;
-        let distance = match foot(&mut sampler, place) {
-            Some(foot) => foot.distance,
-            None => sampler.at(place).map_or(0.0, |(distance, _)| f64::from(distance)),
-        };
-        delta.push((distance * cell) as f32);
-        vertices.push(place * cell);
-    }
+    let place = |name: &u32| match unfit.vertices.get(*name as usize) {
+        Some(place) => *place,
+        None => (draft.places[*name as usize] + origin) * cell,
+    };
+    let vertices = names.iter().map(place).collect();
     Ok(Some(Change {
         vertices,
         triangles: crate::base::mesh::renumbered(&draft.triangles, &names),
         origins: names.iter().map(|name| ((*name as usize) < own).then_some(*name)).collect(),
         sources: draft.sources,
         before: unfit.vertices.to_vec(),
-        delta,
+        delta: Vec::new(),
+        sizes: Vec::new(),
+        improvements: Improvements::default(),
         flagged_cells: flagged.count(),
         rebuilt_cells: cells,
         rung,
         iterations: gamma.iterations,
     }))
+}
+
+/// Improves a mesh (thesis 2.6), also where it was changed, and measures the vertices that were made. Sizes are those of the mesh before
+/// the change; vertices that were made keep a distance of at most `most` (m): what lies farther from the particles' surface is no detail,
+/// and moves there, or is rebuilt again, in the next frame. None where nothing has changed.
+///
+/// # Errors
+/// Cancel.
+pub fn improved(
+    ctx: &Context,
+    unfit: &Unfit<'_>,
+    sizes: &[Size],
+    change: Option<Change>,
+    distances: &Distances,
+    most: f64,
+) -> Result<Option<Change>> {
+    let is_changed = change.is_some();
+    let cell = distances.cell();
+    let mut change = change.unwrap_or_else(|| Change::nothing(unfit));
+    let born = BORN.map(|share| (share * cell) as f32);
+    change.sizes = change.origins.iter().map(|at| at.map_or(born, |at| sizes[at as usize])).collect();
+    let mut flags: Vec<bool> =
+        change.origins.iter().map(|at| at.is_some_and(|at| unfit.flags[at as usize])).collect();
+    let mut mesh = Improvable {
+        places: &mut change.vertices,
+        triangles: &mut change.triangles,
+        sizes: &mut change.sizes,
+        origins: &mut change.origins,
+        sources: &mut change.sources,
+        flags: &mut flags,
+    };
+    change.improvements = ctx.phase("improve", || improve(ctx, &mut mesh))?;
+    if !is_changed && change.improvements == Improvements::default() {
+        return Ok(None);
+    }
+    let mut sampler = Sampler::new(distances);
+    let made = change.vertices.iter().zip(&change.origins).filter(|(_, origin)| origin.is_none());
+    let mut distance = |place: DVec3| match foot(&mut sampler, place) {
+        Some(foot) => foot.distance,
+        None => sampler.at(place).map_or(0.0, |(distance, _)| f64::from(distance)),
+    };
+    change.delta =
+        made.map(|(place, _)| (distance(*place / cell) * cell).clamp(-most, most) as f32).collect();
+    Ok(Some(change))
 }
 
 /// The cells in which the mesh does not fit: those of triangles around flagged vertices, those of the places that it should have, and
@@ -193,30 +258,9 @@ mod tests {
         let mut parts = Vec::new();
         for frame in 1..=48 {
             let to = at(frame);
-            let report = tracker.step(&ctx, &from, &to, 1.0 / 24.0).unwrap();
+            tracker.step(&ctx, &from, &to, 1.0 / 24.0).unwrap();
             from = to;
             let faults = Faults::of(&tracker.mesh());
-            if let Some(change) = &report.change {
-                eprintln!(
-                    "{frame}: away {:.2} flagged {} cells {} rebuilt {} rung {} iterations {} vertices {} parts {} genus {:?} crossings {} volume {:.1} flags {} jumped {} lost {} uncovered {} apart {}",
-                    away(frame),
-                    change.flagged_cells,
-                    change.flagged_cells,
-                    change.rebuilt_cells,
-                    change.rung,
-                    change.iterations,
-                    change.vertices.len(),
-                    faults.parts,
-                    faults.genus,
-                    faults.crossings,
-                    faults.volume,
-                    tracker.flags().iter().filter(|f| **f).count(),
-                    report.jumped,
-                    report.lost,
-                    report.uncovered,
-                    report.apart.len()
-                );
-            }
             assert!(faults.by_index.is_watertight(), "{frame}: {faults:?}");
             parts.push(faults.parts);
         }

@@ -33,14 +33,17 @@ mod fade;
 mod fit;
 mod gamma;
 mod implicit;
+mod improve;
 mod isosurface;
 #[cfg(feature = "vdb")]
 mod level_set;
+mod lost;
 mod matching;
 mod params;
 mod paths;
 mod project;
 mod repair;
+mod report;
 mod sample;
 mod smooth;
 mod spacing;
@@ -59,6 +62,7 @@ pub use change::Change;
 #[doc(hidden)]
 pub use cubes::cases as cube_cases;
 pub use implicit::Implicit;
+pub use improve::Improvements;
 pub use isosurface::Isosurface;
 #[cfg(feature = "vdb")]
 pub use level_set::{HALF_WIDTH, level_set};
@@ -67,13 +71,14 @@ pub use params::Params;
 pub use paths::interpolate;
 pub use project::{Foot, foot};
 pub use repair::{Prepared, RepairReport, Repaired, Source, carried as carry_attributes, repair};
+pub use report::StepReport;
 pub use sample::Sampler;
 pub use smooth::smooth;
 pub use spacing::{estimate as estimate_spacing, rough as rough_spacing};
 pub use specks::specks;
 #[cfg(feature = "vdb")]
 pub use spheres::{is_sphere_radius, spheres};
-pub use tracker::{StepReport, Tracker};
+pub use tracker::Tracker;
 pub use transfer::transfer;
 
 use crate::base::DVec3;

@@ -2,6 +2,7 @@
 
 use xxhash_rust::xxh3::xxh3_128;
 
+use super::improve::sizes;
 use super::params::Params;
 use super::tracker::Tracker;
 use crate::base::bytes::{Reader, Writer};
@@ -25,6 +26,8 @@ impl Tracker {
             self.triangles.as_flattened().iter().for_each(|corner| to.u32(*corner));
             to.count(self.lasting.len());
             to.f32s(&self.lasting);
+            to.count(self.sizes.len());
+            to.f32s(self.sizes.as_flattened());
         } else {
             to.0.extend(seal(&self.triangles));
         }
@@ -65,13 +68,15 @@ impl Tracker {
         }
         let is_rebuilt = from.u32()? != 0;
         let (mut triangles, mut lasting) = (mesh.triangles.clone(), Vec::new());
-        let mut is_other = false;
+        let (mut is_other, mut own) = (false, Vec::new());
         if is_rebuilt {
             let count = from.count(3 * 4)?;
             triangles =
                 (0..count).map(|_| Ok([from.u32()?, from.u32()?, from.u32()?])).collect::<Result<_>>()?;
             let count = from.count(4)?;
             lasting = (0..count).map(|_| Ok(from.f32s::<1>()?[0])).collect::<Result<Vec<f32>>>()?;
+            let count = from.count(8)?;
+            own = (0..count).map(|_| from.f32s::<2>()).collect::<Result<_>>()?;
         } else {
             is_other = from.take::<16>()? != seal(&mesh.triangles);
         }
@@ -102,7 +107,16 @@ impl Tracker {
         let bits = from.bytes(count)?;
         from.end()?;
         let [flags, bare] = [1, 2].map(|bit| bits.iter().map(|bits| bits & bit != 0).collect());
-        Ok(Self { params, vertices, triangles, delta, lasting, flags, bare, reach, is_rebuilt })
+        let sizes = match (params.rebuild, is_rebuilt) {
+            (false, _) => Vec::new(),
+            (true, true) if own.len() == count => own,
+            (true, true) => return wrong("has sizes that do not fit".into()),
+            (true, false) => {
+                let places: Vec<DVec3> = mesh.positions.iter().map(|place| place.cast()).collect();
+                sizes(&places, &mesh.triangles)
+            }
+        };
+        Ok(Self { params, vertices, triangles, delta, lasting, flags, bare, reach, is_rebuilt, sizes })
     }
 }
 

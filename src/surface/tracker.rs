@@ -7,76 +7,22 @@ use super::advect::advect;
 use super::apart::{Apart, Parts, is_near};
 use super::band::Distances;
 use super::cells::{Coord, cell_of};
-use super::change::{Change, Unfit, change};
+use super::change::{Change, Unfit, change, improved};
 use super::coverage::Cover;
 use super::fade::fade;
 use super::implicit::Implicit;
+use super::improve::{Size, sizes};
 use super::isosurface::Isosurface;
+use super::lost::gather;
 use super::params::Params;
 use super::paths::Paths;
 use super::project::foot;
+use super::report::StepReport;
 use super::sample::Sampler;
 use crate::base::topology::Topology;
 use crate::base::{DVec3, TriMesh};
-use crate::context::{Context, PhaseTime};
+use crate::context::Context;
 use crate::error::{Error, Result};
-
-/// What a step did.
-#[derive(Debug, Clone, Default)]
-pub struct StepReport {
-    /// Vertices whose projection jumped: the liquid merged or split there.
-    pub jumped: usize,
-    /// Vertices whose projection did not find the surface.
-    pub lost: usize,
-    /// Vertices beside which there is surface that the mesh does not cover: something has begun to merge or to split there.
-    pub uncovered: usize,
-    /// Parts into which the frame was divided.
-    pub parts: usize,
-    /// Particles that are new, and that are gone.
-    pub born: usize,
-    /// See `born`.
-    pub died: usize,
-    /// Triangles of the particles' own surface.
-    pub triangles: usize,
-    /// Parts of that surface which the mesh does not cover, the largest first: drops and bubbles.
-    pub apart: Vec<Apart>,
-    /// What the mesh became where it was rebuilt; none: it was not.
-    pub change: Option<Change>,
-    /// Time of each phase.
-    pub phases: Vec<PhaseTime>,
-}
-
-impl StepReport {
-    /// How often a change was found: vertices that were not projected, and others beside surface that is not covered.
-    pub fn flagged(&self) -> usize {
-        self.jumped + self.lost + self.uncovered
-    }
-
-    /// What two steps did, one after the other; what is flagged is so after the second.
-    pub fn followed_by(mut self, next: Self) -> Self {
-        for phase in next.phases {
-            match self.phases.iter_mut().find(|own| own.name == phase.name) {
-                Some(own) => own.time += phase.time,
-                None => self.phases.push(phase),
-            }
-        }
-        Self {
-            jumped: next.jumped,
-            lost: next.lost,
-            uncovered: next.uncovered,
-            parts: self.parts + next.parts,
-            born: self.born + next.born,
-            died: self.died + next.died,
-            triangles: next.triangles,
-            apart: next.apart,
-            change: match (self.change, next.change) {
-                (Some(first), Some(second)) => Some(second.after(&first)),
-                (first, second) => second.or(first),
-            },
-            phases: self.phases,
-        }
-    }
-}
 
 /// A detailed mesh that follows particles.
 #[derive(Debug, Clone)]
@@ -97,6 +43,8 @@ pub struct Tracker {
     pub(super) reach: f64,
     /// Whether the triangles are no longer those that it began with.
     pub(super) is_rebuilt: bool,
+    /// Lengths (m) of the shortest and of the longest edge around each vertex at its birth; empty where the mesh is not rebuilt.
+    pub(super) sizes: Vec<Size>,
 }
 
 /// Least reach of the band, and the greatest that is tried at the first frame (r).
@@ -145,8 +93,9 @@ impl Tracker {
         let (delta, lasting, bare, reach) = (Vec::new(), Vec::new(), Vec::new(), REACH[0]);
         let triangles = mesh.triangles.clone();
         let is_rebuilt = false;
+        let sizes = if params.rebuild { sizes(&vertices, &mesh.triangles) } else { Vec::new() };
         let mut tracker =
-            Self { params, vertices, triangles, delta, lasting, flags, bare, reach, is_rebuilt };
+            Self { params, vertices, triangles, delta, lasting, flags, bare, reach, is_rebuilt, sizes };
         let surface = ctx.phase("phi", || tracker.surface_of(ctx, particles))?;
         loop {
             let distances = ctx.phase("distance", || tracker.distances(ctx, &surface))?;
@@ -183,7 +132,7 @@ impl Tracker {
     /// Sets the parameters from the next step on.
     ///
     /// # Errors
-    /// A parameter out of range, another spacing or another cell; the old parameters are then kept.
+    /// A parameter out of range, another spacing or another cell, or another word about rebuilding; the old parameters are then kept.
     pub fn set_params(&mut self, params: Params) -> Result<()> {
         params.validate()?;
         for (name, old, new) in
@@ -192,6 +141,9 @@ impl Tracker {
             if old != new {
                 return Err(Error::argument(format!("{name} = {new} cannot change, it is {old}")));
             }
+        }
+        if self.params.rebuild != params.rebuild {
+            return Err(Error::argument("whether the mesh is rebuilt cannot change"));
         }
         self.params = params;
         Ok(())
@@ -258,14 +210,22 @@ impl Tracker {
     /// A time that is not positive; particles that are not valid, or have neither ids nor velocities; cancel.
     pub fn step(&mut self, ctx: &Context, from: &Particles, to: &Particles, dt: f64) -> Result<StepReport> {
         validate_step(from, to, dt)?;
-        let (next, phases) = ctx.step(6, || {
+        let (next, phases) = ctx.step(9, || {
             let paths = Paths::between(from, to, dt)?;
             let (carried, parts) = ctx.phase("advect", || self.carried(ctx, &paths))?;
             let surface = ctx.phase("phi", || self.surface_of(ctx, to))?;
             let distances = ctx.phase("distance", || self.distances(ctx, &surface))?;
             let delta = fade(self, &carried, dt);
-            let (vertices, flags) =
+            let (mut vertices, flags) =
                 ctx.phase("project", || self.projected(ctx, carried, &delta, &distances))?;
+            if self.params.rebuild {
+                let is_lost: Vec<bool> = flags
+                    .iter()
+                    .zip(&delta)
+                    .map(|(flag, delta)| *flag == Flag::Lost && !delta.is_nan())
+                    .collect();
+                gather(&self.vertices, &self.triangles, &is_lost, &mut vertices);
+            }
             let feet: Vec<Option<DVec3>> = flags.iter().map(Flag::foot).collect();
             let mut covered = ctx.phase("cover", || self.cover(ctx, &surface, &feet, false))?;
             covered.bare.iter_mut().zip(&self.bare).for_each(|(now, ever)| *now &= !ever);
@@ -287,8 +247,7 @@ impl Tracker {
                 delta,
             };
             if self.params.rebuild {
-                next.report.change = ctx
-                    .phase("rebuild", || self.changed(ctx, &next, &feet, &covered, &surface.0, &distances))?;
+                next.report.change = self.changed(ctx, &next, &feet, &covered, &surface.0, &distances)?;
             }
             next.report.apart = covered.apart;
             Ok(next)
@@ -325,7 +284,8 @@ impl Tracker {
         bare.extend_from_slice(&covered.drops);
         let unfit =
             Unfit { vertices: &next.vertices, triangles: &self.triangles, flags: &flags, bare: &bare };
-        change(ctx, &unfit, phi, distances)
+        let changed = change(ctx, &unfit, phi, distances)?;
+        improved(ctx, &unfit, &self.sizes, changed, distances, self.params.change * self.params.spacing)
     }
 
     /// Becomes what the mesh became.
@@ -341,6 +301,7 @@ impl Tracker {
         if !self.lasting.is_empty() {
             self.lasting = change.origins.iter().map(|at| old(&self.lasting, at)).collect();
         }
+        self.sizes.clone_from(&change.sizes);
         self.vertices.clone_from(&change.vertices);
         self.triangles.clone_from(&change.triangles);
         self.is_rebuilt = true;

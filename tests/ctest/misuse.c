@@ -191,6 +191,7 @@ static frz_tracker_params a_way(void) {
     WORKS(frz_tracker_params_init(&params, sizeof params));
     params.spacing = chance(4) ? number() : 0.1 + 0.1 * (any() % 4);
     if (chance(4)) params.cell = number(), params.change = number(), params.weighting = any() % 3;
+    if (chance(3)) params.rebuild = chance(9) ? any() : 1;
     params.flags = chance(9) ? any() : 0;
     params.struct_size = size_near(sizeof params);
     return params;
@@ -226,7 +227,7 @@ static void call(void) {
     frz_context *c = a_context();
     polls = 0;
     fill();
-    switch (any() % 70) {
+    switch (any() % 73) {
         case 0: (void)frz_status_name(any()), (void)frz_last_error(), (void)frz_version(); break;
         case 1: {
             frz_pool *other = NULL;
@@ -547,6 +548,22 @@ static void call(void) {
             break;
         }
         case 69: frz_tracker_destroy(trackers[slot]), trackers[slot] = NULL; break;
+        case 70: {
+            const frz_tracker *from = a_tracker();
+            uint32_t changed = 0;
+            (void)frz_tracker_triangle_count(from, chance(9) ? NULL : &size);
+            (void)frz_tracker_read_triangles(from, span());
+            (void)frz_tracker_edits(from, chance(9) ? NULL : &changed, chance(2) ? NULL : &size);
+            (void)frz_tracker_read_edits(from, any() % 5, span());
+            break;
+        }
+        case 71: case 72: {
+            frz_repair_report report;
+            report.struct_size = size_near(sizeof report);
+            if (report.struct_size > sizeof report) break;
+            (void)frz_mesh_repair(c, a_mesh(), chance(4) ? number() : 0.1 + 0.1 * (any() % 4), chance(20) ? NULL : &mesh, chance(4) ? NULL : &report);
+            break;
+        }
         default: frz_base_destroy(bases[slot]), bases[slot] = NULL; break;
     }
     if (mesh) frz_mesh_destroy(meshes[slot]), meshes[slot] = mesh;

@@ -397,6 +397,97 @@ class Tracker(unittest.TestCase):
         with self.assertRaisesRegex(frazil.Error, "neither ids in both frames nor velocities"):
             tracker.step(frazil.Particles(first.positions), second, dt=1 / 24)
 
+    @staticmethod
+    def balls(frame):
+        """Two balls of particles 0.1 m apart, which meet and part again."""
+        grid = np.mgrid[-6:7, -6:7, -6:7].reshape(3, -1).T * 0.1
+        grid = grid[np.linalg.norm(grid, axis=1) < 0.55]
+        away = np.array([0.9 - 0.025 * min(frame, 48 - frame), 0.01, 0.02])
+        places = np.concatenate([grid + away, grid - away])
+        return frazil.Particles(places, ids=np.arange(len(places)))
+
+    def check_closed(self, triangles):
+        edges = np.concatenate([triangles[:, [0, 1]], triangles[:, [1, 2]], triangles[:, [2, 0]]]).astype(np.int64)
+        self.assertGreater(len(edges), 0)
+        there, back = (np.sort(edges @ np.array(way)) for way in ([1 << 32, 1], [1, 1 << 32]))
+        self.assertTrue((np.diff(there) > 0).all())
+        np.testing.assert_array_equal(there, back)
+
+    @staticmethod
+    def parts(triangles):
+        up = np.arange(triangles.max() + 1)
+        while True:
+            least = up[triangles].min(axis=1)
+            next_ = up.copy()
+            for corner in range(3):
+                np.minimum.at(next_, triangles[:, corner], least)
+            if (next_ == up).all():
+                return len(np.unique(up[triangles]))
+            up = next_[next_]
+
+    def test_a_mesh_is_rebuilt_where_balls_meet_and_part(self):
+        ctx, other = frazil.Context(threads=2), frazil.Context()
+        first = self.balls(0)
+        ball = frazil.level_set.from_particles(ctx, [[0.9, 0.01, 0.02], [-0.9, -0.01, -0.02]], [0.535, 0.535], 0.05)
+        ball = ball.to_mesh(ctx)
+        mesh = frazil.Mesh(ctx, ball.positions, ball.triangles)
+        with self.assertRaisesRegex(frazil.Error, "not closed and 2-manifold by index"):
+            frazil.Tracker(ctx, frazil.Mesh(ctx, ball.positions, ball.triangles[1:]), first, spacing=0.1, rebuild=True)
+        tracker, back = frazil.Tracker(ctx, mesh, first, spacing=0.1, rebuild=True), None
+        np.testing.assert_array_equal(tracker.triangles, ball.triangles)
+        self.assertFalse(tracker.edits.changed)
+        parts, changes, kept = [], 0, np.arange(len(tracker))
+        for frame in range(1, 49):
+            old = tracker.triangles
+            report = tracker.step(self.balls(frame - 1), self.balls(frame), dt=1 / 24)
+            edits, triangles, places = tracker.edits, tracker.triangles, tracker.read("P64")
+            self.assertEqual((len(edits.origins), len(edits.sources)), (len(places), len(triangles)))
+            self.assertEqual(edits.changed, bool(report.changed))
+            stayed = edits.origins >= 0
+            np.testing.assert_array_equal(places[stayed], edits.before[edits.origins[stayed]])
+            whole = edits.kinds == frazil.tracker.WHOLE
+            np.testing.assert_array_equal(np.sort(edits.origins[triangles[whole]]), np.sort(old[edits.sources[whole]]))
+            self.assertTrue((edits.sources[edits.kinds == frazil.tracker.NEW] == -1).all())
+            self.assertEqual(report.made_triangles, (~whole).sum())
+            self.check_closed(triangles)
+            parts.append(self.parts(triangles))
+            changes += edits.changed
+            kept = np.where(stayed, kept[edits.origins], -1)
+            if frame == 20:
+                back = frazil.Tracker(other, mesh, None, spacing=0.1, rebuild=True, state=tracker.save())
+                self.assertFalse(back.edits.changed)
+                np.testing.assert_array_equal(back.triangles, triangles)
+            if frame == 21:
+                back.step(self.balls(20), self.balls(21), dt=1 / 24)
+                self.assertEqual(back.save(), tracker.save())
+        self.assertEqual((parts[0], parts[-1]), (2, 2))
+        self.assertIn(1, parts)
+        self.assertGreater(changes, 0)
+        self.assertGreater((kept >= 0).sum(), len(ball.positions) / 4)
+        tracker.set_params(half_life=2.0)
+        with self.assertRaisesRegex(frazil.Error, "rebuilt cannot change"):
+            tracker.set_params(rebuild=False)
+
+    def test_meshes_are_repaired(self):
+        ctx = frazil.Context(threads=2)
+        corners, faces = box((0, 0, 0), (1, 1, 1))
+        others, more = box((0.55, 0.45, 0.35), (1.5, 1.4, 1.3))
+        places = np.concatenate([corners, others])
+        mesh = frazil.Mesh(ctx, places, np.concatenate([faces, more + 8]), attributes={"place": places})
+        solid, report = mesh.repaired(ctx, 0.06)
+        self.check_closed(solid.triangles)
+        self.assertEqual(self.parts(solid.triangles), 1)
+        self.assertAlmostEqual(solid.info.volume, 1 + 0.95**3 - 0.45 * 0.55 * 0.65, delta=0.02)
+        self.assertGreater(report.rebuilt_cells, 0)
+        self.assertEqual((report.cell, report.holes), (0.06, 0))
+        self.assertRegex(repr(report), "^<RepairReport rung=.* cell=0.06>$")
+        np.testing.assert_allclose(solid.attribute("place"), solid.positions, atol=0.18)
+        open_box, report = frazil.Mesh(ctx, corners, faces[1:]).repaired(ctx, 0.1)
+        self.assertEqual((report.holes, open_box.info.closed), (1, 1))
+        self.assertAlmostEqual(open_box.info.volume, 1, delta=0.02)
+        with self.assertRaisesRegex(frazil.Error, "cell = 0 is not within"):
+            mesh.repaired(ctx, 0)
+
 
 class Vectors(unittest.TestCase):
     """Grids of vectors."""

@@ -93,6 +93,7 @@ mod surface {
     mod from_particles;
     mod implicit;
     mod made_sets;
+    mod rebuilt;
     mod repair;
     mod shot;
     mod tracking;

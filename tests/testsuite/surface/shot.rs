@@ -74,7 +74,7 @@ fn write_shot(folder: &Path, frames: i32) -> Ball {
     ball
 }
 
-const SHOT: &str = "surface -p ball.%04d.bgeo -m ball.ply --spacing 0.01";
+const SHOT: &str = "surface -p ball.%04d.bgeo -m ball.ply --spacing 0.01 --set surface.rebuild=false";
 
 /// A frame's mesh as it was written.
 fn frame(folder: &Path, out: &str, frame: i32) -> DetailedMesh {
@@ -270,7 +270,12 @@ fn velocities_alone_are_enough_and_ids_alone_too() {
             let file = folder.join(format!("{name}.{frame:04}.bgeo"));
             write_frame(&file, &ball, f64::from(frame - 1), attributes);
         }
-        works(folder, &format!("surface -p {name}.%04d.bgeo -m ball.ply --spacing 0.01 -o {name}"));
+        works(
+            folder,
+            &format!(
+                "surface -p {name}.%04d.bgeo -m ball.ply --spacing 0.01 --set surface.rebuild=false -o {name}"
+            ),
+        );
         let mesh = frame(folder, name, 4).mesh;
         let far = |(place, first): (&frazil::base::Vec3, &frazil::base::Vec3)| {
             (place.cast::<f64>() - motion(first.cast(), 3.0)).norm() / ball.spacing

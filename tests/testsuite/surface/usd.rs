@@ -50,7 +50,7 @@ fn write_shot(folder: &Path) {
     mesh::write_carried(&folder.join("ball.ply"), &body, &carried).unwrap();
 }
 
-const SHOT: &str = "surface -p ball.%04d.bgeo -m ball.ply --spacing 0.01";
+const SHOT: &str = "surface -p ball.%04d.bgeo -m ball.ply --spacing 0.01 --set surface.rebuild=false";
 
 /// Name, type and interpolation of the primvars.
 const PRIMVARS: [(&str, &str, &str); 6] = [

@@ -1,0 +1,133 @@
+//! How often a closed mesh surrounds places: on a lattice by the crossings of its lines, and of particles by rays.
+
+use frazil::base::bvh::Bvh;
+use frazil::base::topology::bodies;
+use frazil::base::{DVec3, TriMesh, Vec3};
+use rayon::prelude::*;
+
+use crate::common::liquids::Random;
+
+/// How far places of the lattice lie from the middles of their boxes at most (steps).
+const JITTER: f64 = 0.45;
+/// Directions along which no edges of made meshes run. Rounding may let a ray pass by a thin triangle, but not in all of them.
+const ASLANT: [DVec3; 3] = [
+    DVec3::new(0.5773, 0.6533, 0.4896),
+    DVec3::new(-0.3719, 0.8411, -0.3927),
+    DVec3::new(0.7127, -0.2893, -0.6391),
+];
+
+/// A line of the lattice along z; in steps from the lattice's corner.
+struct Line {
+    /// Its x and y.
+    at: [f64; 2],
+    /// The height of its first place; the others are one step apart.
+    first: f64,
+    /// Heights at which the mesh passes it, and by how much more often it surrounds what is below.
+    crossings: Vec<(f64, i32)>,
+}
+
+/// Places of a lattice (m), `step` (m) apart and out of line by chance, that a closed mesh surrounds neither once nor never.
+pub fn astray(mesh: &TriMesh, step: f64) -> Vec<Vec3> {
+    let Some((low, high)) = mesh.bounds() else { return Vec::new() };
+    let corner = low.cast::<f64>() - DVec3::repeat(step);
+    let size = (high.cast::<f64>() - corner) / step;
+    let [wide, deep] = [size.x, size.y].map(|length| length.floor() as usize + 1);
+    let mut random = Random(7);
+    let mut within = |at: usize| at as f64 + 0.5 + JITTER * random.next();
+    let mut lines: Vec<Line> = (0..wide * deep)
+        .map(|n| Line { at: [within(n / deep), within(n % deep)], first: within(0), crossings: Vec::new() })
+        .collect();
+    for triangle in 0..mesh.triangles.len() {
+        let corners = mesh.corners(triangle).map(|place| (place - corner) / step);
+        let [a, b, c] = corners;
+        let (low, high) = (a.inf(&b).inf(&c), a.sup(&b).sup(&c));
+        let range = |axis: usize| {
+            let [from, to] = [low[axis] as usize, high[axis] as usize];
+            from..=to
+        };
+        for n in range(0).flat_map(|i| range(1).map(move |j| i * deep + j)) {
+            let line = &mut lines[n];
+            let turns = turns(&corners, line.at);
+            if turns != 0 {
+                line.crossings.push((height(&corners, line.at), turns));
+            }
+        }
+    }
+    let mut places = Vec::new();
+    for line in &mut lines {
+        line.crossings.sort_unstable_by(|a, b| b.0.total_cmp(&a.0));
+        let mut winding = 0;
+        for pair in line.crossings.windows(2) {
+            winding += pair[0].1;
+            if (0..=1).contains(&winding) {
+                continue;
+            }
+            let [above, below] = [pair[0].0, pair[1].0].map(|height| height - line.first);
+            let [from, to] = [below.ceil() as i64, above.floor() as i64];
+            for n in from..=to {
+                let at = DVec3::new(line.at[0], line.at[1], line.first + n as f64);
+                places.push((corner + at * step).cast::<f32>());
+            }
+        }
+    }
+    places
+}
+
+/// How often a triangle runs around a line, seen from above: 1 counter-clockwise, -1 clockwise. Neighbours agree about an edge that
+/// they have in common, whatever rounding does.
+fn turns(corners: &[DVec3; 3], [x, y]: [f64; 2]) -> i32 {
+    let [a, b, c] = corners;
+    let crossing = |(from, to): (&DVec3, &DVec3)| {
+        let (low, high, way) = if from.y <= to.y { (from, to, 1) } else { (to, from, -1) };
+        let is_left = (high.x - low.x) * (y - low.y) > (high.y - low.y) * (x - low.x);
+        if (low.y..high.y).contains(&y) && is_left { way } else { 0 }
+    };
+    crossing((a, b)) + crossing((b, c)) + crossing((c, a))
+}
+
+/// Where a line meets a triangle.
+fn height([a, b, c]: &[DVec3; 3], [x, y]: [f64; 2]) -> f64 {
+    let normal = (b - a).cross(&(c - a));
+    let height = a.z - (normal.x * (x - a.x) + normal.y * (y - a.y)) / normal.z;
+    // Of a triangle that stands, rounding makes anything.
+    height.max(a.z.min(b.z).min(c.z)).min(a.z.max(b.z).max(c.z))
+}
+
+/// How many of some places (m) a closed mesh surrounds once.
+pub fn inside(mesh: &TriMesh, places: &[DVec3]) -> usize {
+    let tree = Bvh::new(mesh);
+    let is_inside = |place: &&DVec3| ASLANT.iter().any(|way| tree.surrounding(**place, *way) == 1);
+    places.par_iter().filter(is_inside).count()
+}
+
+/// How many parts of a closed mesh with a volume over 0 surround none of some places (m).
+pub fn empty_parts(mesh: &TriMesh, places: &[DVec3]) -> usize {
+    let is_empty = |part: &&Vec<u32>| part_volume(mesh, part) > 0.0 && !surrounds(mesh, part, places);
+    bodies(&mesh.triangles).par_iter().filter(is_empty).count()
+}
+
+/// Whether a part of a mesh, with these triangles, surrounds any of some places (m).
+fn surrounds(mesh: &TriMesh, part: &[u32], places: &[DVec3]) -> bool {
+    let corners = |triangle: &u32| mesh.triangles[*triangle as usize];
+    let positions = part.iter().flat_map(corners).map(|vertex| mesh.positions[vertex as usize]).collect();
+    let triangles = (0..part.len() as u32).map(|n| [3 * n, 3 * n + 1, 3 * n + 2]).collect();
+    let part = TriMesh { positions, triangles };
+    let Some((low, high)) = part.bounds() else { return false };
+    let tree = Bvh::new(&part);
+    places.iter().any(|place| {
+        let at: Vec3 = place.cast();
+        (0..3).all(|axis| (low[axis]..=high[axis]).contains(&at[axis]))
+            && ASLANT.iter().any(|way| tree.surrounding(*place, *way) > 0)
+    })
+}
+
+/// What a part of a mesh, with these triangles, encloses (m3); negative: a cavity.
+pub fn part_volume(mesh: &TriMesh, part: &[u32]) -> f64 {
+    let Some(first) = part.first() else { return 0.0 };
+    let origin = mesh.corners(*first as usize)[0];
+    let six = |triangle: &u32| {
+        let [a, b, c] = mesh.corners(*triangle as usize).map(|place| place - origin);
+        a.dot(&b.cross(&c))
+    };
+    part.iter().map(six).sum::<f64>() / 6.0
+}

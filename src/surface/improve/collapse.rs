@@ -1,0 +1,230 @@
+//! Which vertex goes where an edge is too short, and whether it may.
+
+use super::fans::{Collapse, Fans};
+use super::shape::{is_upright, normal, quality};
+use super::{between, mean};
+use crate::base::DVec3;
+
+/// How much normals spread on a ridge or in a corner: two planes of the same area do where they meet at 30 degrees.
+const SPREAD: f64 = 0.0625;
+/// Quality that a collapse leaves, unless there was less.
+const LEAST: f64 = 0.05;
+/// Quality of a triangle whose normal says nothing.
+const SLIVER: f64 = 1e-4;
+/// Length that a collapse leaves, at most (targets): less than that of an edge that is split, which would undo it.
+const LONGEST: f64 = 1.4;
+/// The same where a fold goes, which is worse than a long edge.
+const LONGEST_OF_FOLD: f64 = 2.0;
+/// Greatest cosine between the normals of triangles that are folded onto each other: they meet at more than 160 degrees.
+const FOLDED: f64 = -0.9397;
+
+impl Fans<'_, '_> {
+    /// In how many directions the surface looks around a vertex: 1 where it is smooth, 2 on a ridge, 3 in a corner. The rank of the sum
+    /// of the products of its normals, weighted by area (the medial quadric of Jiao 2007, "Face offsetting"), from its invariants.
+    pub fn rank(&self, vertex: u32) -> u8 {
+        let mut rows = [DVec3::zeros(); 3];
+        for &triangle in self.around(vertex) {
+            let normal = normal(&self.places(triangle));
+            let length = normal.norm();
+            if length > 0.0 {
+                for axis in 0..3 {
+                    rows[axis] += normal * (normal[axis] / length);
+                }
+            }
+        }
+        let [x, y, z] = rows;
+        let trace = x.x + y.y + z.z;
+        let minors = 0.5 * (trace * trace - x.norm_squared() - y.norm_squared() - z.norm_squared());
+        if minors <= SPREAD * trace * trace {
+            1
+        } else if x.dot(&y.cross(&z)) <= SPREAD * minors * trace {
+            2
+        } else {
+            3
+        }
+    }
+
+    /// How the ends of an edge may become one, the best way first: what stays is what has more of a ridge or corner, then what was
+    /// there before this frame, then the lesser number. Where two new ones are on a smooth surface they meet in the middle.
+    pub fn collapses(&self, [a, b]: [u32; 2]) -> Vec<Collapse> {
+        let (a, b) = (a.min(b), a.max(b));
+        let into = |to: u32, from: u32| Collapse { from, to, place: self.place(to), size: self.size(to) };
+        let [worth_a, worth_b] = [a, b].map(|end| (self.rank(end), self.has_origin(end)));
+        if worth_a > worth_b {
+            return vec![into(a, b)];
+        }
+        if worth_a < worth_b {
+            return vec![into(b, a)];
+        }
+        let mut ways = vec![into(a, b), into(b, a)];
+        if worth_a == (1, false) {
+            let (place, size) = (self.middle([a, b]), mean(self.size(a), self.size(b)));
+            ways.insert(0, Collapse { from: b, to: a, place, size });
+        }
+        ways
+    }
+
+    /// Whether a collapse keeps a closed 2-manifold and leaves sound triangles; those of a fold, where it is to go, may turn over.
+    pub fn may(&self, collapse: &Collapse, folded: &[u32]) -> bool {
+        let mut moving = self.moving(collapse).into_iter();
+        moving.all(|triangle| self.bears(triangle, collapse, folded))
+            && self.may_join(collapse.from, collapse.to)
+    }
+
+    /// Whether a triangle is sound after a collapse, or gone.
+    fn bears(&self, triangle: u32, collapse: &Collapse, folded: &[u32]) -> bool {
+        let &Collapse { from, to, place, size } = collapse;
+        let corners = self.corners(triangle);
+        if corners.iter().any(|&corner| self.is_flagged(corner)) {
+            return false;
+        }
+        if corners.contains(&from) && corners.contains(&to) {
+            return true;
+        }
+        let moves = |corner: u32| corner == from || corner == to;
+        let longest = if folded.is_empty() { LONGEST } else { LONGEST_OF_FOLD };
+        let is_short = |corner: u32| {
+            let [_, target] = between(size, self.size(corner));
+            moves(corner) || (self.place(corner) - place).norm() <= longest * target
+        };
+        let old = self.places(triangle);
+        let new = corners.map(|corner| if moves(corner) { place } else { self.place(corner) });
+        let before = quality(&old);
+        let keeps_side = folded.contains(&triangle) || before < SLIVER || is_upright(&old, &new);
+        keeps_side && quality(&new) >= before.min(LEAST) && corners.into_iter().all(is_short)
+    }
+
+    /// What unfolds a triangle, made or changed in this frame, and one that it is folded onto: the shortest of their edges that may
+    /// collapse, with an end that was made in this frame. None where it is not folded, or nothing may.
+    pub fn unfolding(&self, triangle: u32) -> Option<Collapse> {
+        if !self.is_there(triangle) || self.is_whole(triangle) {
+            return None;
+        }
+        let [a, b, c] = self.corners(triangle);
+        [[a, b], [b, c], [c, a]].into_iter().find_map(|ends| {
+            let edge = self.edge(ends)?;
+            let [one, two] = edge.triangles.map(|triangle| normal(&self.places(triangle)));
+            let is_flagged = edge.corners.iter().any(|&corner| self.is_flagged(corner));
+            if is_flagged || one.dot(&two) >= FOLDED * one.norm() * two.norm() {
+                return None;
+            }
+            let [a, b, c, d] = edge.corners;
+            let mut edges = [[a, b], [b, c], [c, a], [a, d], [d, b]].map(|[a, b]| {
+                let ends = [a.min(b), a.max(b)];
+                (self.length(ends), ends)
+            });
+            edges.sort_unstable_by(|one, two| one.0.total_cmp(&two.0).then(one.1.cmp(&two.1)));
+            let is_made = |ends: &[u32; 2]| ends.iter().any(|&end| !self.has_origin(end));
+            let ways = edges.into_iter().map(|(_, ends)| ends).filter(is_made);
+            ways.flat_map(|ends| self.collapses(ends)).find(|way| self.may(way, &edge.triangles))
+        })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::Source;
+    use super::super::tests::{Body, sphere};
+    use super::*;
+    use crate::base::TriMesh;
+
+    #[test]
+    fn ridges_and_corners_are_told_from_smooth_places() {
+        let TriMesh { positions, triangles } = TriMesh::cuboid([0.0; 3], [1.0; 3]);
+        let mut body = Body::of(positions.iter().map(|place| place.cast()).collect(), triangles);
+        let mut mesh = body.improvable();
+        let mut fans = Fans::of(&mut mesh);
+        assert!((0..8).all(|vertex| fans.rank(vertex) == 3));
+        let [mut on_faces, mut on_ridges] = [0; 2];
+        for triangle in 0..12 {
+            let [a, b, c] = fans.corners(triangle);
+            for ends in [[a, b], [b, c], [c, a]] {
+                let Some(edge) = fans.edge(ends) else { continue };
+                let [one, two] = edge.triangles.map(|triangle| normal(&fans.places(triangle)));
+                let is_flat = one.cross(&two).norm() < 1e-9;
+                let made = 8 + on_faces + on_ridges;
+                fans.split(&edge, 0.5 * (fans.place(ends[0]) + fans.place(ends[1])));
+                assert_eq!(fans.rank(made), if is_flat { 1 } else { 2 });
+                *(if is_flat { &mut on_faces } else { &mut on_ridges }) += 1;
+            }
+        }
+        assert!(on_faces > 2 && on_ridges > 2, "{on_faces} {on_ridges}");
+        let mut ball = sphere(3);
+        let mut mesh = ball.improvable();
+        let fans = Fans::of(&mut mesh);
+        assert!((0..258).all(|vertex| fans.rank(vertex) == 1));
+    }
+
+    #[test]
+    fn the_artists_vertices_and_ridges_stay() {
+        let mut body = sphere(3);
+        let [a, b, _] = body.triangles[100];
+        let (low, high) = (a.min(b), a.max(b));
+        let offers = |body: &mut Body| {
+            let mut mesh = body.improvable();
+            let fans = Fans::of(&mut mesh);
+            let ways = fans.collapses([a, b]);
+            (ways.iter().map(|way| (way.from, way.to)).collect::<Vec<_>>(), ways[0].place)
+        };
+        let place = |body: &Body, vertex: u32| body.places[vertex as usize];
+        assert_eq!(offers(&mut body), (vec![(high, low), (low, high)], place(&body, low)));
+        body.origins[low as usize] = None;
+        assert_eq!(offers(&mut body), (vec![(low, high)], place(&body, high)));
+        body.origins[high as usize] = None;
+        let (ways, middle) = offers(&mut body);
+        assert_eq!(ways, [(high, low), (high, low), (low, high)]);
+        assert!((middle - 0.5 * (place(&body, low) + place(&body, high))).norm() < 0.03);
+        // A spike is a corner.
+        body.places[low as usize] *= 1.2;
+        assert_eq!(offers(&mut body).0, [(high, low)]);
+    }
+
+    #[test]
+    fn what_would_be_long_flat_turned_over_or_flagged_may_not() {
+        let mut body = sphere(3);
+        let [a, b, c] = body.triangles[100];
+        let may = |body: &mut Body| {
+            let mut mesh = body.improvable();
+            let fans = Fans::of(&mut mesh);
+            fans.collapses([a, b]).iter().any(|way| fans.may(way, &[]))
+        };
+        // As born the edges that it leaves would be too long.
+        assert!(!may(&mut body));
+        body.sizes.iter_mut().flatten().for_each(|size| *size *= 2.0);
+        assert!(may(&mut body));
+        body.flags[c as usize] = true;
+        assert!(!may(&mut body));
+        body.flags[c as usize] = false;
+        // What is beyond the ring turns triangles over.
+        body.sizes.iter_mut().flatten().for_each(|size| *size *= 10.0);
+        let mut mesh = body.improvable();
+        let fans = Fans::of(&mut mesh);
+        let way = fans.collapses([a, b])[0];
+        let beyond = 3.5 * fans.place(way.from) - 2.5 * fans.place(way.to);
+        assert!(fans.may(&way, &[]) && !fans.may(&Collapse { place: beyond, ..way }, &[]));
+    }
+
+    #[test]
+    fn a_fold_goes_by_what_was_made() {
+        let folded = |made: bool| {
+            let mut body = sphere(3);
+            let vertex = 100u32;
+            let beside = body.triangles.iter().find(|corners| corners.contains(&vertex)).unwrap();
+            let other = beside.iter().copied().find(|&corner| corner != vertex).unwrap();
+            let [p, q] = [vertex, other].map(|at| body.places[at as usize]);
+            body.places[vertex as usize] = q + 0.6 * (q - p);
+            if made {
+                body.origins[vertex as usize] = None;
+            }
+            let around = body.triangles.iter().map(|corners| corners.contains(&vertex));
+            let marks: Vec<bool> = around.collect();
+            body.sources.iter_mut().zip(&marks).filter(|(_, is)| **is).for_each(|(at, _)| *at = Source::New);
+            let mut mesh = body.improvable();
+            let fans = Fans::of(&mut mesh);
+            (0..512).filter_map(|triangle| fans.unfolding(triangle)).collect::<Vec<_>>()
+        };
+        let ways = folded(true);
+        assert!(!ways.is_empty() && ways.iter().all(|way| way.from == 100 || way.to == 100), "{ways:?}");
+        assert!(folded(false).is_empty());
+    }
+}

@@ -1,0 +1,446 @@
+//! A closed mesh that is being improved, with the triangles around its vertices. Splits, collapses and flips keep it a closed
+//! 2-manifold by index: two neighbours become one only where the link condition holds (Dey, Edelsbrunner, Guha and Nekhayev 1999,
+//! "Topology preserving edge contraction").
+
+use super::{Improvable, Size, Source, mean};
+use crate::base::DVec3;
+
+/// Of a vertex around which no triangle has come or gone.
+const NONE: u32 = u32::MAX;
+
+/// An edge and what is beside it.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) struct Edge {
+    /// The triangle that runs along it from a to b, and the one that runs back.
+    pub triangles: [u32; 2],
+    /// Its ends a and b, then the corners opposite: the triangles are a b c and b a d.
+    pub corners: [u32; 4],
+}
+
+/// A vertex that goes into a neighbour.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct Collapse {
+    pub from: u32,
+    pub to: u32,
+    /// Where the neighbour lies then, and its size.
+    pub place: DVec3,
+    /// See `place`.
+    pub size: Size,
+}
+
+/// The corners of an edge's two triangles after it was flipped.
+pub(super) fn flipped([a, b, c, d]: [u32; 4]) -> [[u32; 3]; 2] {
+    [[c, a, d], [d, b, c]]
+}
+
+/// A mesh with the triangles around each vertex.
+pub(super) struct Fans<'m, 'a> {
+    mesh: &'m mut Improvable<'a>,
+    /// For each vertex that came in where its triangles begin in `first`; then the count of all.
+    starts: Vec<u32>,
+    /// Triangles around each vertex as they came in, ascending.
+    first: Vec<u32>,
+    /// Of each vertex the index of its triangles in `own`; [`NONE`]: they are those that came in.
+    slots: Vec<u32>,
+    /// Triangles around vertices where some came or went, in no order.
+    own: Vec<Vec<u32>>,
+    /// Of each triangle whether a collapse has taken it away.
+    is_dead: Vec<bool>,
+    /// Of each vertex whether it went into another.
+    is_gone: Vec<bool>,
+    /// Triangles that were changed since they were last asked for, each once.
+    touched: Vec<u32>,
+    is_touched: Vec<bool>,
+}
+
+impl<'m, 'a> Fans<'m, 'a> {
+    /// Takes two passes over all triangles.
+    pub fn of(mesh: &'m mut Improvable<'a>) -> Self {
+        let (vertices, triangles) = (mesh.places.len(), mesh.triangles.len());
+        let mut starts = vec![0u32; vertices + 1];
+        mesh.triangles.as_flattened().iter().for_each(|&corner| starts[corner as usize + 1] += 1);
+        for vertex in 1..starts.len() {
+            starts[vertex] += starts[vertex - 1];
+        }
+        let mut ends = starts.clone();
+        let mut first = vec![0; 3 * triangles];
+        for (triangle, corners) in (0..).zip(mesh.triangles.iter()) {
+            for &corner in corners {
+                let end = &mut ends[corner as usize];
+                first[*end as usize] = triangle;
+                *end += 1;
+            }
+        }
+        Self {
+            mesh,
+            starts,
+            first,
+            slots: vec![NONE; vertices],
+            own: Vec::new(),
+            is_dead: vec![false; triangles],
+            is_gone: vec![false; vertices],
+            touched: Vec::new(),
+            is_touched: vec![false; triangles],
+        }
+    }
+
+    /// Whether no collapse has taken a triangle away.
+    pub fn is_there(&self, triangle: u32) -> bool {
+        !self.is_dead[triangle as usize]
+    }
+
+    /// Whether a triangle is the artist's own, or one of a frame before, as it was.
+    pub fn is_whole(&self, triangle: u32) -> bool {
+        matches!(self.mesh.sources[triangle as usize], Source::Whole(_))
+    }
+
+    /// Vertices of a triangle.
+    pub fn corners(&self, triangle: u32) -> [u32; 3] {
+        self.mesh.triangles[triangle as usize]
+    }
+
+    /// Places of a triangle's vertices.
+    pub fn places(&self, triangle: u32) -> [DVec3; 3] {
+        self.corners(triangle).map(|corner| self.place(corner))
+    }
+
+    /// The place of a vertex.
+    pub fn place(&self, vertex: u32) -> DVec3 {
+        self.mesh.places[vertex as usize]
+    }
+
+    /// Length of an edge.
+    pub fn length(&self, [a, b]: [u32; 2]) -> f64 {
+        (self.place(a) - self.place(b)).norm()
+    }
+
+    /// Length of the edges that a vertex was born with.
+    pub fn size(&self, vertex: u32) -> Size {
+        self.mesh.sizes[vertex as usize]
+    }
+
+    /// Whether a vertex was there before this frame.
+    pub fn has_origin(&self, vertex: u32) -> bool {
+        self.mesh.origins[vertex as usize].is_some()
+    }
+
+    /// Whether the triangles around a vertex are left alone.
+    pub fn is_flagged(&self, vertex: u32) -> bool {
+        self.mesh.flags[vertex as usize]
+    }
+
+    /// See [`Improvable::stretch`].
+    pub fn stretch(&self, ends: [u32; 2]) -> f64 {
+        self.mesh.stretch(ends)
+    }
+
+    /// The triangles around a vertex; none where it went into another.
+    pub fn around(&self, vertex: u32) -> &[u32] {
+        let at = vertex as usize;
+        match self.own.get(self.slots[at] as usize) {
+            Some(own) => own,
+            None => &self.first[self.starts[at] as usize..self.starts[at + 1] as usize],
+        }
+    }
+
+    /// The triangle that runs from a vertex to a neighbour, and its third corner. None where they are no neighbours.
+    fn beside(&self, from: u32, to: u32) -> Option<(u32, u32)> {
+        self.around(from).iter().find_map(|&triangle| {
+            let corners = self.corners(triangle);
+            let at = corners.iter().position(|&corner| corner == from)?;
+            (corners[(at + 1) % 3] == to).then_some((triangle, corners[(at + 2) % 3]))
+        })
+    }
+
+    /// The edge between two vertices; none where they are no neighbours.
+    pub fn edge(&self, [a, b]: [u32; 2]) -> Option<Edge> {
+        let ((one, c), (two, d)) = (self.beside(a, b)?, self.beside(b, a)?);
+        Some(Edge { triangles: [one, two], corners: [a, b, c, d] })
+    }
+
+    /// The neighbours of a vertex, counter-clockwise seen from outside, beginning with one of them. None where they are fewer than 3,
+    /// or more than `most`.
+    pub fn ring_from(&self, vertex: u32, first: u32, most: usize) -> Option<Vec<u32>> {
+        let count = self.around(vertex).len();
+        if !(3..=most).contains(&count) {
+            return None;
+        }
+        let mut ring = Vec::with_capacity(count);
+        let mut last = first;
+        for _ in 0..count {
+            ring.push(last);
+            last = self.beside(vertex, last)?.1;
+        }
+        (last == first).then_some(ring)
+    }
+
+    /// The vertices that have an edge in common with one, ascending.
+    fn ring(&self, vertex: u32) -> Vec<u32> {
+        let corners = self.around(vertex).iter().flat_map(|&triangle| self.corners(triangle));
+        let mut ring: Vec<u32> = corners.filter(|&corner| corner != vertex).collect();
+        ring.sort_unstable();
+        ring.dedup();
+        ring
+    }
+
+    /// Whether two neighbours may become one vertex: none is beside both but the two corners opposite their edge, and these,
+    /// which lose a triangle each, keep three. That leaves tetrahedra alone, too.
+    pub fn may_join(&self, a: u32, b: u32) -> bool {
+        let [mut shared, other] = [a, b].map(|vertex| self.ring(vertex));
+        shared.retain(|vertex| other.binary_search(vertex).is_ok());
+        shared.len() == 2 && shared.iter().all(|&corner| self.around(corner).len() > 3)
+    }
+
+    /// Whether two vertices are neighbours.
+    pub fn are_neighbours(&self, a: u32, b: u32) -> bool {
+        self.around(a).iter().any(|&triangle| self.corners(triangle).contains(&b))
+    }
+
+    /// Triangles with a corner that a collapse moves or renames; those that it takes away are among them.
+    pub fn moving(&self, collapse: &Collapse) -> Vec<u32> {
+        let &Collapse { from, to, place, .. } = collapse;
+        let mut moving = self.around(from).to_vec();
+        if place != self.place(to) {
+            let others = self.around(to).iter().copied();
+            moving.extend(others.filter(|&triangle| !self.corners(triangle).contains(&from)));
+        }
+        moving
+    }
+
+    /// The triangles that were changed since this was last asked, ascending; collapses may have taken some away.
+    pub fn take_touched(&mut self) -> Vec<u32> {
+        let mut touched = std::mem::take(&mut self.touched);
+        touched.iter().for_each(|&triangle| self.is_touched[triangle as usize] = false);
+        touched.sort_unstable();
+        touched
+    }
+
+    /// Divides an edge by a vertex at a place.
+    pub fn split(&mut self, edge: &Edge, place: DVec3) {
+        let Edge { triangles: [one, two], corners: [a, b, c, d] } = *edge;
+        let made = self.mesh.places.len() as u32;
+        let [three, four] = [0, 1].map(|n| self.mesh.triangles.len() as u32 + n);
+        let size = mean(self.size(a), self.size(b));
+        self.mesh.places.push(place);
+        self.mesh.sizes.push(size);
+        self.mesh.origins.push(None);
+        self.mesh.flags.push(false);
+        self.is_gone.push(false);
+        self.slots.push(self.own.len() as u32);
+        self.own.push(vec![one, two, three, four]);
+        for (triangle, near, far) in [(one, [a, made, c], [made, b, c]), (two, [b, made, d], [made, a, d])] {
+            self.becomes_part(triangle);
+            self.mesh.triangles[triangle as usize] = near;
+            self.mesh.triangles.push(far);
+            let source = self.mesh.sources[triangle as usize];
+            self.mesh.sources.push(source);
+            self.is_dead.push(false);
+            self.is_touched.push(false);
+        }
+        self.remove(a, two);
+        self.remove(b, one);
+        for (vertex, triangle) in [(a, four), (b, three), (c, three), (d, four)] {
+            self.add(vertex, triangle);
+        }
+        [one, two, three, four].into_iter().for_each(|triangle| self.touch(triangle));
+    }
+
+    /// Makes a collapse of two vertices that may join.
+    pub fn collapse(&mut self, collapse: &Collapse) {
+        let &Collapse { from, to, place, size } = collapse;
+        self.moving(collapse).into_iter().for_each(|triangle| self.becomes_part(triangle));
+        self.mesh.places[to as usize] = place;
+        self.mesh.sizes[to as usize] = size;
+        self.is_gone[from as usize] = true;
+        for triangle in std::mem::take(self.own_mut(from)) {
+            let corners = self.corners(triangle);
+            if corners.contains(&to) {
+                self.is_dead[triangle as usize] = true;
+                corners.into_iter().for_each(|corner| self.remove(corner, triangle));
+            } else {
+                let renamed = corners.map(|corner| if corner == from { to } else { corner });
+                self.mesh.triangles[triangle as usize] = renamed;
+                self.add(to, triangle);
+            }
+        }
+        self.around(to).to_vec().into_iter().for_each(|triangle| self.touch(triangle));
+    }
+
+    /// Puts the other diagonal of an edge's two triangles in its place. They stay parts where they are of one triangle.
+    pub fn flip(&mut self, edge: &Edge) {
+        let Edge { triangles: [one, two], corners: [a, b, c, d] } = *edge;
+        let sources = [one, two].map(|triangle| self.mesh.sources[triangle as usize]);
+        let source = if sources[0] == sources[1] { sources[0] } else { Source::New };
+        for (triangle, corners) in [one, two].into_iter().zip(flipped(edge.corners)) {
+            self.mesh.triangles[triangle as usize] = corners;
+            self.mesh.sources[triangle as usize] = source;
+            self.touch(triangle);
+        }
+        self.remove(a, two);
+        self.remove(b, one);
+        self.add(c, two);
+        self.add(d, one);
+    }
+
+    fn becomes_part(&mut self, triangle: u32) {
+        let source = &mut self.mesh.sources[triangle as usize];
+        if let Source::Whole(of) = *source {
+            *source = Source::Part(of);
+        }
+    }
+
+    fn touch(&mut self, triangle: u32) {
+        if !std::mem::replace(&mut self.is_touched[triangle as usize], true) {
+            self.touched.push(triangle);
+        }
+    }
+
+    /// The triangles around a vertex, to be changed.
+    fn own_mut(&mut self, vertex: u32) -> &mut Vec<u32> {
+        let at = vertex as usize;
+        if self.slots[at] == NONE {
+            let own = self.around(vertex).to_vec();
+            self.slots[at] = self.own.len() as u32;
+            self.own.push(own);
+        }
+        &mut self.own[self.slots[at] as usize]
+    }
+
+    fn add(&mut self, vertex: u32, triangle: u32) {
+        self.own_mut(vertex).push(triangle);
+    }
+
+    fn remove(&mut self, vertex: u32, triangle: u32) {
+        self.own_mut(vertex).retain(|&other| other != triangle);
+    }
+
+    /// Drops the triangles and vertices that collapses took away. All others keep their order.
+    pub fn finish(self) {
+        let Self { mesh, is_dead, is_gone, .. } = self;
+        if !is_gone.contains(&true) {
+            return;
+        }
+        drop_marked(mesh.triangles, &is_dead);
+        drop_marked(mesh.sources, &is_dead);
+        drop_marked(mesh.places, &is_gone);
+        drop_marked(mesh.sizes, &is_gone);
+        drop_marked(mesh.origins, &is_gone);
+        drop_marked(mesh.flags, &is_gone);
+        let mut numbers = vec![0; is_gone.len()];
+        let mut kept = 0u32;
+        for (number, is_gone) in numbers.iter_mut().zip(&is_gone) {
+            *number = kept;
+            kept += u32::from(!is_gone);
+        }
+        for corners in mesh.triangles.iter_mut() {
+            *corners = corners.map(|corner| numbers[corner as usize]);
+        }
+    }
+}
+
+/// Drops values whose mark is set.
+fn drop_marked<T>(values: &mut Vec<T>, marks: &[bool]) {
+    let mut marks = marks.iter();
+    values.retain(|_| marks.next() == Some(&false));
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::tests::Body;
+    use super::*;
+    use crate::base::TriMesh;
+
+    /// A cube of 8 vertices and 12 triangles.
+    fn cube() -> Body {
+        let TriMesh { positions, triangles } = TriMesh::cuboid([0.0; 3], [1.0; 3]);
+        Body::of(positions.iter().map(|place| place.cast()).collect(), triangles)
+    }
+
+    #[test]
+    fn changes_keep_a_closed_manifold_and_the_fans_of_its_triangles() {
+        let mut body = cube();
+        let mut mesh = body.improvable();
+        let mut fans = Fans::of(&mut mesh);
+        let ends = |fans: &Fans<'_, '_>, triangle: u32| {
+            let [a, b, _] = fans.corners(triangle);
+            [a, b]
+        };
+        // What is around a vertex is what names it.
+        let check = |fans: &Fans<'_, '_>| {
+            for vertex in 0..fans.mesh.places.len() as u32 {
+                let names =
+                    |&triangle: &u32| fans.is_there(triangle) && fans.corners(triangle).contains(&vertex);
+                let expected: Vec<u32> = (0..fans.mesh.triangles.len() as u32).filter(names).collect();
+                let mut around = fans.around(vertex).to_vec();
+                around.sort_unstable();
+                assert_eq!(around, expected, "around {vertex}");
+            }
+        };
+        check(&fans);
+        for triangle in [0, 5, 12, 3, 7] {
+            let edge = fans.edge(ends(&fans, triangle)).unwrap();
+            assert_eq!(edge.triangles[0], triangle);
+            let [a, b, ..] = edge.corners;
+            fans.split(&edge, 0.5 * (fans.place(a) + fans.place(b)));
+            check(&fans);
+        }
+        assert_eq!((fans.mesh.places.len(), fans.mesh.triangles.len()), (13, 22));
+        let touched = fans.take_touched();
+        assert!(touched.is_sorted() && touched.contains(&13) && fans.take_touched().is_empty());
+        let mut flips = 0;
+        for triangle in 0..22 {
+            let edge = fans.edge(ends(&fans, triangle)).unwrap();
+            if !fans.are_neighbours(edge.corners[2], edge.corners[3]) {
+                fans.flip(&edge);
+                assert_eq!([fans.corners(triangle), fans.corners(edge.triangles[1])], flipped(edge.corners));
+                flips += 1;
+            }
+            check(&fans);
+        }
+        let mut joined = 0;
+        for triangle in 0..22 {
+            let [to, from] = ends(&fans, triangle);
+            if fans.is_there(triangle) && fans.may_join(from, to) {
+                let (place, size) = (fans.place(to), fans.size(to));
+                fans.collapse(&Collapse { from, to, place, size });
+                joined += 1;
+                assert!(fans.edge([from, to]).is_none());
+            }
+            check(&fans);
+        }
+        fans.finish();
+        assert!(flips > 3 && joined > 3, "{flips} {joined}");
+        body.check();
+        assert_eq!((body.places.len(), body.triangles.len()), (13 - joined, 22 - 2 * joined));
+    }
+
+    #[test]
+    fn rings_go_around_and_sources_follow() {
+        let mut body = cube();
+        let mut mesh = body.improvable();
+        let mut fans = Fans::of(&mut mesh);
+        let (count, first) = (fans.around(0).len(), fans.ring(0)[0]);
+        let ring = fans.ring_from(0, first, 24).unwrap();
+        assert_eq!((ring.len(), ring[0]), (count, first));
+        for n in 0..count {
+            let edge = fans.edge([0, ring[n]]).unwrap();
+            assert_eq!(edge.corners[2], ring[(n + 1) % count]);
+            assert_eq!(edge.corners[3], ring[(n + count - 1) % count]);
+        }
+        assert!(fans.ring_from(0, first, count - 1).is_none());
+        let [a, b, _] = fans.corners(0);
+        let edge = fans.edge([a, b]).unwrap();
+        let other = edge.triangles[1];
+        fans.mesh.sources[other as usize] = Source::New;
+        fans.split(&edge, 0.5 * (fans.place(a) + fans.place(b)));
+        assert_eq!(fans.mesh.sources[12..], [Source::Part(0), Source::New]);
+        assert_eq!(fans.mesh.sources[0], Source::Part(0));
+        assert_eq!((fans.mesh.origins[8], fans.mesh.flags[8]), (None, false));
+        let inner = fans.edge([8, edge.corners[2]]).unwrap();
+        fans.flip(&inner);
+        assert_eq!(
+            inner.triangles.map(|triangle| fans.mesh.sources[triangle as usize]),
+            [Source::Part(0); 2]
+        );
+    }
+}

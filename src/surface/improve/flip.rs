@@ -1,0 +1,134 @@
+//! Whether an edge is better the other way across its two triangles.
+
+use super::TOO_LONG;
+use super::fans::{Edge, Fans, flipped};
+use super::shape::{is_upright, least_angle, normal};
+
+/// Smallest angle (degrees) from which on a triangle is left alone.
+const LEAST: f64 = 20.0;
+/// By how much (degrees) a flip raises the smallest angle of its two triangles, at least.
+const GAIN: f64 = 5.0;
+/// Least cosine between the normals of the two triangles: they meet at up to 30 degrees.
+const FLAT: f64 = 0.866;
+
+impl Fans<'_, '_> {
+    /// The edge of a triangle that is best flipped. None where its angles are not small, or no flip is clearly better; the artist's own
+    /// triangles and those at flagged vertices do not flip.
+    pub fn better(&self, triangle: u32) -> Option<Edge> {
+        let may = self.is_there(triangle) && !self.is_whole(triangle);
+        if !may || least_angle(&self.places(triangle)) >= LEAST {
+            return None;
+        }
+        let [a, b, c] = self.corners(triangle);
+        let mut best: Option<(f64, Edge)> = None;
+        for ends in [[a, b], [b, c], [c, a]] {
+            if let Some(edge) = self.edge(ends)
+                && let Some(gain) = self.gain(&edge)
+                && best.is_none_or(|(most, _)| gain > most)
+            {
+                best = Some((gain, edge));
+            }
+        }
+        best.map(|(_, edge)| edge)
+    }
+
+    /// By how much (degrees) a flip raises the smallest angle; none where it may not be.
+    fn gain(&self, edge: &Edge) -> Option<f64> {
+        let [_, _, c, d] = edge.corners;
+        let is_fixed = edge.corners.iter().any(|&corner| self.is_flagged(corner))
+            || edge.triangles.iter().any(|&triangle| self.is_whole(triangle));
+        if is_fixed || self.stretch([c, d]) > TOO_LONG * TOO_LONG || self.are_neighbours(c, d) {
+            return None;
+        }
+        let old = edge.triangles.map(|triangle| self.places(triangle));
+        let [one, two] = old.each_ref().map(normal);
+        if one.dot(&two) < FLAT * one.norm() * two.norm() {
+            return None;
+        }
+        let new = flipped(edge.corners).map(|corners| corners.map(|corner| self.place(corner)));
+        // The larger of the two has the better normal.
+        let side = if one.norm_squared() >= two.norm_squared() { &old[0] } else { &old[1] };
+        if !new.iter().all(|corners| is_upright(side, corners)) {
+            return None;
+        }
+        let [before, after] = [&old, &new].map(|[one, two]| least_angle(one).min(least_angle(two)));
+        Some(after - before).filter(|gain| *gain >= GAIN)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::Source;
+    use super::super::tests::Body;
+    use super::*;
+    use crate::base::DVec3;
+
+    /// Two triangles along an edge, of which the second is turned up around it (degrees).
+    fn kite(height: f64, turn: f64) -> Body {
+        let turn = turn.to_radians();
+        let low = DVec3::new(0.0, -height * libm::cos(turn), height * libm::sin(turn));
+        let places = vec![DVec3::x() * -2.0, DVec3::x() * 2.0, DVec3::y() * height, low];
+        let mut body = Body::of(places, vec![[0, 1, 2], [1, 0, 3]]);
+        body.sizes = vec![[2.0; 2]; 4];
+        body.sources = vec![Source::Part(7); 2];
+        body
+    }
+
+    fn better(body: &mut Body) -> Option<Edge> {
+        let mut mesh = body.improvable();
+        let fans = Fans::of(&mut mesh);
+        let [one, two] = [0, 1].map(|triangle| fans.better(triangle));
+        assert_eq!(one.is_some(), two.is_some());
+        one
+    }
+
+    #[test]
+    fn an_edge_flips_where_that_is_clearly_better() {
+        let flip = Edge { triangles: [0, 1], corners: [0, 1, 2, 3] };
+        assert_eq!(better(&mut kite(0.5, 0.0)), Some(flip));
+        assert_eq!(better(&mut kite(0.5, 25.0)), Some(flip));
+        // It is not flat, not better by as much, good already.
+        assert_eq!(better(&mut kite(0.5, 35.0)), None);
+        assert_eq!(better(&mut kite(0.1, 0.0)), None);
+        assert_eq!(better(&mut kite(0.8, 0.0)), None);
+        for source in [Source::Whole(3), Source::New] {
+            let mut body = kite(0.5, 0.0);
+            body.sources[1] = source;
+            let mut mesh = body.improvable();
+            assert_eq!(Fans::of(&mut mesh).better(0), (source == Source::New).then_some(flip));
+        }
+        let mut body = kite(0.5, 0.0);
+        body.flags[3] = true;
+        assert_eq!(better(&mut body), None);
+        // The new edge is there already, or would be too long.
+        let mut body = kite(0.5, 0.0);
+        body.triangles.push([2, 3, 0]);
+        body.sources.push(Source::New);
+        let mut mesh = body.improvable();
+        assert_eq!(Fans::of(&mut mesh).gain(&flip), None);
+        let mut body = kite(0.5, 0.0);
+        body.sizes = vec![[0.5; 2]; 4];
+        assert_eq!(better(&mut body), None);
+        // Triangles that do not make a convex quadrangle would turn over.
+        let mut body = kite(0.5, 0.0);
+        body.places[2].x = 4.0;
+        body.places[3].x = 4.0;
+        assert_eq!(better(&mut body), None);
+    }
+
+    #[test]
+    fn parts_of_two_triangles_are_parts_of_none_after_a_flip() {
+        for (other, expected) in [(Source::Part(7), Source::Part(7)), (Source::Part(8), Source::New)] {
+            let mut body = kite(0.5, 0.0);
+            body.sources[1] = other;
+            let mut mesh = body.improvable();
+            let mut fans = Fans::of(&mut mesh);
+            let edge = fans.better(0).unwrap();
+            fans.flip(&edge);
+            assert_eq!((fans.take_touched(), fans.better(0)), (vec![0, 1], None));
+            fans.finish();
+            assert_eq!(body.triangles, [[2, 0, 3], [3, 1, 2]]);
+            assert_eq!(body.sources, [expected; 2]);
+        }
+    }
+}

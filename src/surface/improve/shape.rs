@@ -1,0 +1,57 @@
+//! Shapes of triangles.
+
+use crate::base::DVec3;
+
+/// Least cosine between the normals of a triangle before and after a change: beyond that it turns over.
+const UPRIGHT: f64 = 0.2;
+
+/// A normal of a triangle, as long as twice its area.
+pub(super) fn normal([a, b, c]: &[DVec3; 3]) -> DVec3 {
+    (b - a).cross(&(c - a))
+}
+
+/// Altitude of a triangle on its longest edge, over that edge: 0.87 at best, 0 where all corners are at one place.
+pub(super) fn quality(corners: &[DVec3; 3]) -> f64 {
+    let [a, b, c] = corners;
+    let square = (b - a).norm_squared().max((c - b).norm_squared()).max((a - c).norm_squared());
+    if square > 0.0 { normal(corners).norm() / square } else { 0.0 }
+}
+
+/// Smallest angle of a triangle (degrees): that between its two longer edges. 0 where one of these has no length.
+pub(super) fn least_angle(corners: &[DVec3; 3]) -> f64 {
+    let [a, b, c] = corners;
+    let mut lengths = [(b - a).norm(), (c - b).norm(), (a - c).norm()];
+    lengths.sort_unstable_by(f64::total_cmp);
+    let product = lengths[1] * lengths[2];
+    if product > 0.0 { libm::asin((normal(corners).norm() / product).min(1.0)).to_degrees() } else { 0.0 }
+}
+
+/// Whether a triangle looks the same way after a change of its corners, more or less.
+pub(super) fn is_upright(old: &[DVec3; 3], new: &[DVec3; 3]) -> bool {
+    let [before, after] = [old, new].map(normal);
+    before.dot(&after) > UPRIGHT * before.norm() * after.norm()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn shapes_are_those_of_the_book() {
+        let triangle = |tip: [f64; 3]| [DVec3::zeros(), DVec3::x() * 2.0, DVec3::from(tip)];
+        let even = triangle([1.0, libm::sqrt(3.0), 0.0]);
+        assert!((least_angle(&even) - 60.0).abs() < 1e-6 && (quality(&even) - 0.75f64.sqrt()).abs() < 1e-12);
+        let half = triangle([0.0, 2.0, 0.0]);
+        assert!((least_angle(&half) - 45.0).abs() < 1e-9 && (quality(&half) - 0.5).abs() < 1e-12);
+        let flat = triangle([1.0, 0.0, 0.0]);
+        assert_eq!((least_angle(&flat), quality(&flat)), (0.0, 0.0));
+        let nothing = [DVec3::x(); 3];
+        assert_eq!((least_angle(&nothing), quality(&nothing)), (0.0, 0.0));
+        let leaning = |degrees: f64| {
+            let (up, out) = (libm::sin(degrees.to_radians()), libm::cos(degrees.to_radians()));
+            triangle([1.0, out, up])
+        };
+        assert!(is_upright(&leaning(0.0), &leaning(78.0)) && !is_upright(&leaning(0.0), &leaning(79.0)));
+        assert!(!is_upright(&leaning(0.0), &leaning(180.0)) && !is_upright(&even, &flat));
+    }
+}

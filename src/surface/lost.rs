@@ -1,0 +1,67 @@
+//! Vertices that have lost the surface: particles that fly apart carry them far away, and the triangles between would be spikes through
+//! all that is there. Where the mesh is rebuilt anyway they go with the vertices around them instead.
+
+use crate::base::DVec3;
+
+/// How far from a vertex that found the surface others follow it (edges).
+const RINGS: usize = 16;
+
+/// Moves vertices (m) that are lost as those around them have moved from `before` on, ring by ring; those with none around stay.
+pub fn gather(before: &[DVec3], triangles: &[[u32; 3]], is_lost: &[bool], vertices: &mut [DVec3]) {
+    let near: Vec<&[u32; 3]> =
+        triangles.iter().filter(|corners| corners.iter().any(|corner| is_lost[*corner as usize])).collect();
+    let mut due: Vec<u32> = near.iter().flat_map(|corners| **corners).collect();
+    due.sort_unstable();
+    due.dedup();
+    let slot = |vertex: u32| due.binary_search(&vertex).unwrap_or_default();
+    let mut is_known: Vec<bool> = due.iter().map(|vertex| !is_lost[*vertex as usize]).collect();
+    for _ in 0..RINGS {
+        let mut sums = vec![(DVec3::zeros(), 0.0f64); due.len()];
+        for corners in &near {
+            let slots = corners.map(slot);
+            for (at, next) in [(0, 1), (1, 2), (2, 0)] {
+                if !is_known[slots[at]] && is_known[slots[next]] {
+                    let to = corners[next] as usize;
+                    let sum = &mut sums[slots[at]];
+                    *sum = (sum.0 + (vertices[to] - before[to]), sum.1 + 1.0);
+                }
+            }
+        }
+        let mut has_changed = false;
+        for (slot, (sum, count)) in sums.into_iter().enumerate().filter(|(_, (_, count))| *count > 0.0) {
+            let at = due[slot] as usize;
+            vertices[at] = before[at] + sum / count;
+            is_known[slot] = true;
+            has_changed = true;
+        }
+        if !has_changed {
+            return;
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_is_lost_goes_with_its_neighbours() {
+        // A strip of triangles: each vertex follows the one before it.
+        let before: Vec<DVec3> =
+            (0..6).map(|n| DVec3::new(f64::from(n / 2), f64::from(n % 2), 0.0)).collect();
+        let triangles: Vec<[u32; 3]> = (0..4).map(|n| [n, n + 1, n + 2]).collect();
+        let mut vertices = before.clone();
+        vertices[0] += DVec3::y();
+        vertices[1] += DVec3::y();
+        vertices[3] = DVec3::repeat(1e6);
+        let is_lost = [false, false, true, true, true, true];
+        gather(&before, &triangles, &is_lost, &mut vertices);
+        for (place, first) in vertices.iter().zip(&before) {
+            assert!((place - first - DVec3::y()).norm() < 1e-12, "{place:?}");
+        }
+        // Without any that is known nothing moves.
+        let mut alone = vertices.clone();
+        gather(&before, &triangles, &[true; 6], &mut alone);
+        assert!(alone == vertices);
+    }
+}

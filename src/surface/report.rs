@@ -1,0 +1,62 @@
+//! What a step of a tracker did.
+
+use super::apart::Apart;
+use super::change::Change;
+use crate::context::PhaseTime;
+
+/// What a step did.
+#[derive(Debug, Clone, Default)]
+pub struct StepReport {
+    /// Vertices whose projection jumped: the liquid merged or split there.
+    pub jumped: usize,
+    /// Vertices whose projection did not find the surface.
+    pub lost: usize,
+    /// Vertices beside which there is surface that the mesh does not cover: something has begun to merge or to split there.
+    pub uncovered: usize,
+    /// Parts into which the frame was divided.
+    pub parts: usize,
+    /// Particles that are new, and that are gone.
+    pub born: usize,
+    /// See `born`.
+    pub died: usize,
+    /// Triangles of the particles' own surface.
+    pub triangles: usize,
+    /// Parts of that surface which the mesh does not cover, the largest first: drops and bubbles.
+    pub apart: Vec<Apart>,
+    /// What the mesh became where it was rebuilt; none: it was not.
+    pub change: Option<Change>,
+    /// Time of each phase.
+    pub phases: Vec<PhaseTime>,
+}
+
+impl StepReport {
+    /// How often a change was found: vertices that were not projected, and others beside surface that is not covered.
+    pub fn flagged(&self) -> usize {
+        self.jumped + self.lost + self.uncovered
+    }
+
+    /// What two steps did, one after the other; what is flagged is so after the second.
+    pub fn followed_by(mut self, next: Self) -> Self {
+        for phase in next.phases {
+            match self.phases.iter_mut().find(|own| own.name == phase.name) {
+                Some(own) => own.time += phase.time,
+                None => self.phases.push(phase),
+            }
+        }
+        Self {
+            jumped: next.jumped,
+            lost: next.lost,
+            uncovered: next.uncovered,
+            parts: self.parts + next.parts,
+            born: self.born + next.born,
+            died: self.died + next.died,
+            triangles: next.triangles,
+            apart: next.apart,
+            change: match (self.change, next.change) {
+                (Some(first), Some(second)) => Some(second.after(&first)),
+                (first, second) => second.or(first),
+            },
+            phases: self.phases,
+        }
+    }
+}
