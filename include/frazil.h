@@ -36,7 +36,7 @@
 /**
  * Version of the interface that this header describes: major << 16 | minor.
  */
-#define FRZ_ABI_VERSION 65540
+#define FRZ_ABI_VERSION 65541
 
 /**
  * Version of frazil that this header belongs to.
@@ -450,7 +450,7 @@ typedef uint32_t frz_smoothing;
 #endif // __cplusplus
 
 /**
- * What frz_tracker_read reads of each vertex, in the mesh's order.
+ * What frz_tracker_read reads of each vertex: in the order of the mesh that the tracker was made with, until a step changes it.
  */
 enum frz_tracker_array
 #if defined(__cplusplus) || __STDC_VERSION__ >= 202311L
@@ -463,7 +463,7 @@ enum frz_tracker_array
     FRZ_TRACKER_POSITION = 0,
     /**
      * double[3]: its place (m), as exactly as it is known: also far from the origin. The next step's, less these, over dt are the
-     * velocities for motion blur.
+     * velocities for motion blur; where that step changes the mesh, FRZ_EDIT_BEFORE less these.
      */
     FRZ_TRACKER_POSITION_DOUBLE = 1,
     /**
@@ -505,6 +505,69 @@ enum frz_tracker_weighting
 typedef enum frz_tracker_weighting frz_tracker_weighting;
 #else
 typedef uint32_t frz_tracker_weighting;
+#endif // __STDC_VERSION__ >= 202311L
+#endif // __cplusplus
+
+/**
+ * Arrays that frz_tracker_read_edits reads.
+ */
+enum frz_edit_array
+#if defined(__cplusplus) || __STDC_VERSION__ >= 202311L
+  : uint32_t
+#endif // defined(__cplusplus) || __STDC_VERSION__ >= 202311L
+ {
+    /**
+     * int64_t for each vertex (frz_tracker_count): the vertex that it was before the step, and no other was; -1: it was made.
+     */
+    FRZ_EDIT_ORIGIN = 0,
+    /**
+     * int64_t for each triangle (frz_tracker_triangle_count): the triangle that it was before the step, or is a part of; -1: neither.
+     */
+    FRZ_EDIT_SOURCE = 1,
+    /**
+     * uint32_t for each triangle: a frz_edit_kind.
+     */
+    FRZ_EDIT_KIND = 2,
+    /**
+     * double[3] for each vertex that there was before the step (frz_tracker_edits): the place (m) to which the step took it, before
+     * the mesh was rebuilt. Those that are still there lie there.
+     */
+    FRZ_EDIT_BEFORE = 3,
+};
+#ifndef __cplusplus
+#if __STDC_VERSION__ >= 202311L
+typedef enum frz_edit_array frz_edit_array;
+#else
+typedef uint32_t frz_edit_array;
+#endif // __STDC_VERSION__ >= 202311L
+#endif // __cplusplus
+
+/**
+ * What a triangle is.
+ */
+enum frz_edit_kind
+#if defined(__cplusplus) || __STDC_VERSION__ >= 202311L
+  : uint32_t
+#endif // defined(__cplusplus) || __STDC_VERSION__ >= 202311L
+ {
+    /**
+     * One that there was, with the same vertices in the same direction.
+     */
+    FRZ_EDIT_WHOLE = 0,
+    /**
+     * A part of one that there was, which was cut or divided.
+     */
+    FRZ_EDIT_PART = 1,
+    /**
+     * A new one.
+     */
+    FRZ_EDIT_NEW = 2,
+};
+#ifndef __cplusplus
+#if __STDC_VERSION__ >= 202311L
+typedef enum frz_edit_kind frz_edit_kind;
+#else
+typedef uint32_t frz_edit_kind;
 #endif // __STDC_VERSION__ >= 202311L
 #endif // __cplusplus
 
@@ -751,6 +814,65 @@ typedef struct {
      */
     double volume;
 } frz_mesh_info;
+
+/**
+ * What frz_mesh_repair did.
+ */
+typedef struct {
+    /**
+     * sizeof(frz_repair_report), set by the caller.
+     */
+    uint32_t struct_size;
+    /**
+     * How much more was rebuilt than the cells at fault, and what they need: 0 nothing, 1 a ring of cells around them, 2 the whole
+     * parts of the mesh that pass through them, 3 everything.
+     */
+    uint32_t rung;
+    /**
+     * Vertices joined with others at the same place.
+     */
+    uint64_t joined_vertices;
+    /**
+     * Triangles left out: without area, doubled or alone, and those of parts that lay on a part like them.
+     */
+    uint64_t dropped_triangles;
+    /**
+     * Triangles turned round so that they agree with their neighbours.
+     */
+    uint64_t turned_triangles;
+    /**
+     * Parts turned outward as a whole.
+     */
+    uint64_t turned_parts;
+    /**
+     * Holes that were closed.
+     */
+    uint64_t holes;
+    /**
+     * Triangles that close them.
+     */
+    uint64_t added_triangles;
+    /**
+     * Cells in which the mesh was at fault.
+     */
+    uint64_t flagged_cells;
+    /**
+     * Cells in which it was rebuilt.
+     */
+    uint64_t rebuilt_cells;
+    /**
+     * Triangles that are still there as they were.
+     */
+    uint64_t kept_triangles;
+    /**
+     * Triangles that were made and have an altitude below 1e-4 of an edge.
+     */
+    uint64_t slivers;
+    /**
+     * Edge of the cells (m): the one asked for, or a part of it where nothing would have been left.
+     */
+    double cell;
+} frz_repair_report;
 
 /**
  * Properties of a grid.
@@ -1327,7 +1449,7 @@ typedef struct {
 } frz_mist_report;
 
 /**
- * How a mesh follows particles. All of it but the spacing and the cell may change between steps.
+ * How a mesh follows particles. All of it but the spacing, the cell and whether it is rebuilt may change between steps.
  */
 typedef struct {
     /**
@@ -1353,7 +1475,7 @@ typedef struct {
     double change;
     /**
      * Time (s) in which half of the detail fades, above 0; infinite, as is usual: it stays. It stays anyway where the mesh's attribute
-     * "detail" of one float is 1, and fades as fast as this says where that is 0.
+     * "detail" of one float is 1, and fades as fast as this says where that is 0, as it is for vertices that a step makes.
      */
     double half_life;
     /**
@@ -1369,6 +1491,18 @@ typedef struct {
      * 0.
      */
     uint32_t reserved;
+    /**
+     * 1: where the liquid merges or splits the mesh is rebuilt, and merges or splits with it; where it is stretched or squeezed, edges
+     * are divided or go. It must be closed, a 2-manifold by its indices. 0, as is usual: the mesh keeps the vertices and the faces
+     * that it was made with, and is flagged where it no longer fits. With 1 any step may change both (frz_tracker_report.changed): a
+     * host has to read the triangles anew, and to take its own arrays along (frz_tracker_read_edits), which one that knows nothing of
+     * it does not do.
+     */
+    uint32_t rebuild;
+    /**
+     * 0.
+     */
+    uint32_t reserved2;
 } frz_tracker_params;
 
 /**
@@ -1443,6 +1577,27 @@ typedef struct {
      * flagged.
      */
     uint64_t uncovered;
+    /**
+     * 1 where the mesh has other vertices or triangles now (frz_tracker_read_edits); else 0, and so is all below.
+     */
+    uint32_t changed;
+    /**
+     * How much more was rebuilt than the cells in which the mesh no longer fitted, and what they need: 0 nothing, 1 a ring of cells
+     * around them, 2 the whole parts of the mesh that pass through them, 3 everything.
+     */
+    uint32_t rung;
+    /**
+     * Cells in which the mesh no longer fitted.
+     */
+    uint64_t changed_cells;
+    /**
+     * Cells in which it was rebuilt; 0 where edges were only divided, turned, or went.
+     */
+    uint64_t rebuilt_cells;
+    /**
+     * Triangles that are new, or parts of others.
+     */
+    uint64_t made_triangles;
 } frz_tracker_report;
 
 /**
@@ -1684,6 +1839,29 @@ frz_status frz_mesh_attribute(const frz_mesh *mesh,
                               const char *name,
                               frz_span dst,
                               uint32_t *components);
+
+/**
+ * Makes a closed mesh of one that is open, crosses itself, or is inside out in parts: the solid where, with each part turned
+ * outward, a point lies inside of at least one. Parts that overlap become one, holes are closed, cavities are filled.
+ *
+ * The mesh is rebuilt in the cells of a grid where it is at fault, and within a cell of that solid; all its other triangles stay as
+ * they are. Vertices that are still there keep their order and their attributes; attributes of those that were made are what the
+ * mesh had at the nearest place. All faces of the result are triangles, each edge has two of them that agree about which side is
+ * out, and each vertex one fan of them.
+ *
+ * mesh: it stays as it is.
+ * cell: edge of a cell (m), 1e-9 to 1e6, about as long as the mesh's edges: what is thinner may be lost where it is rebuilt.
+ *     FRZ_ERROR_ARGUMENT where the mesh reaches farther than 131072 cells from its middle, or encloses nothing.
+ * out: receives the new mesh, to be destroyed with frz_mesh_destroy; NULL after a failure.
+ * report: receives what was done, all zeroes after a failure; may be NULL. Its struct_size is set by the caller.
+ *
+ * Any number of threads may read a mesh; one thread at a time for each context.
+ */
+frz_status frz_mesh_repair(frz_context *context,
+                           const frz_mesh *mesh,
+                           double cell,
+                           frz_mesh **out,
+                           frz_repair_report *report);
 
 /**
  * Destroys a grid; NULL is fine. A grid that belongs to another object stays.
@@ -2620,7 +2798,9 @@ frz_status frz_particles_spacing(frz_context *context,
  *
  * params: see frz_tracker_params.
  * mesh: at the first frame, in the particles' space; also with a restart. It is copied, and may be open, cross itself and repeat
- *     vertices. FRZ_ERROR_ARGUMENT says where it is not where the particles are.
+ *     vertices; with params.rebuild it must be closed, each edge with two triangles that agree about which side is out, each
+ *     vertex with one fan of them: see frz_mesh_repair. FRZ_ERROR_ARGUMENT says where it is not, or is not where the particles
+ *     are.
  * particles: at the first frame; NULL with a restart.
  * restart: restart_bytes bytes of frz_tracker_save of a tracker of the same mesh, spacing and cell: it comes back bit for bit, on
  *     any number of threads. NULL: none. Bytes that are damaged, of another version, mesh, spacing or cell are FRZ_ERROR_FILE.
@@ -2647,7 +2827,7 @@ frz_status frz_tracker_create(frz_context *context,
 void frz_tracker_destroy(frz_tracker *tracker);
 
 /**
- * Sets how a mesh follows from the next step on. The spacing and the cell must stay.
+ * Sets how a mesh follows from the next step on. The spacing, the cell and whether it is rebuilt must stay.
  *
  * params: FRZ_ERROR_ARGUMENT names the field at fault and its range; the old ones then stay.
  *
@@ -2656,7 +2836,8 @@ void frz_tracker_destroy(frz_tracker *tracker);
 frz_status frz_tracker_set_params(frz_tracker *tracker, const frz_tracker_params *params);
 
 /**
- * Moves the mesh with its particles from one time to another. After a failure or a cancel it is as it was before.
+ * Moves the mesh with its particles from one time to another. After a failure or a cancel it is as it was before. With
+ * frz_tracker_params.rebuild it may have other vertices and triangles afterwards.
  *
  * from: the particles as they were at the last step's end.
  * to: the particles at this step's end. Those of the same id are the same; where one of the two has no ids, from must have
@@ -2674,7 +2855,24 @@ frz_status frz_tracker_step(frz_context *context,
                             frz_tracker_report *report);
 
 /**
- * Reports how many vertices the mesh has; its faces are those that it was made with.
+ * Writes all that the next step depends on, besides the parameters, the mesh and the particles: for a host's own cache. The bytes
+ * are the same on any number of threads.
+ *
+ * dst: room for capacity bytes. NULL: size receives their number, and nothing is written.
+ * capacity: bytes at dst. FRZ_ERROR_CAPACITY when they are too few.
+ * size: receives the bytes that were written, or are needed; 0 after other failures.
+ *
+ * One thread at a time.
+ */
+frz_status frz_tracker_save(frz_context *context,
+                            const frz_tracker *tracker,
+                            void *dst,
+                            size_t capacity,
+                            size_t *size);
+
+/**
+ * Reports how many vertices the mesh has: as many as the one that it was made with, until a step changes it
+ * (frz_tracker_params.rebuild).
  *
  * count: receives their number; 0 after a failure.
  *
@@ -2695,20 +2893,53 @@ frz_status frz_tracker_read(const frz_tracker *tracker,
                             frz_span dst);
 
 /**
- * Writes all that the next step depends on, besides the parameters, the mesh and the particles: for a host's own cache. The bytes
- * are the same on any number of threads.
+ * Reports how many triangles the mesh has: those that the faces of the one that it was made with were cut into, until a step
+ * changes it.
  *
- * dst: room for capacity bytes. NULL: size receives their number, and nothing is written.
- * capacity: bytes at dst. FRZ_ERROR_CAPACITY when they are too few.
- * size: receives the bytes that were written, or are needed; 0 after other failures.
+ * count: receives their number; 0 after a failure.
  *
- * One thread at a time.
+ * Any number of threads may read a tracker.
  */
-frz_status frz_tracker_save(frz_context *context,
-                            const frz_tracker *tracker,
-                            void *dst,
-                            size_t capacity,
-                            size_t *size);
+frz_status frz_tracker_triangle_count(const frz_tracker *tracker,
+                                      size_t *count);
+
+/**
+ * Copies the mesh's triangles, counter-clockwise seen from outside. Until a step changes the mesh they are the FRZ_MESH_TRIANGLES of
+ * the one that it was made with; only where frz_tracker_report.changed is 1 they have to be read anew.
+ *
+ * dst: room for as many uint32_t[3] as frz_tracker_triangle_count reports, the vertices of each; FRZ_ERROR_CAPACITY when it is too
+ *     little, and nothing is written.
+ *
+ * Any number of threads may read a tracker.
+ */
+frz_status frz_tracker_read_triangles(const frz_tracker *tracker,
+                                      frz_span dst);
+
+/**
+ * Reports whether the last step changed the mesh's vertices and triangles. It did not in a tracker that has not made a step yet, or
+ * none since it came back from a state.
+ *
+ * changed: receives 1 where it did, else 0; 0 after a failure.
+ * before: receives how many vertices there were before the step; 0 after a failure. May be NULL.
+ *
+ * Any number of threads may read a tracker.
+ */
+frz_status frz_tracker_edits(const frz_tracker *tracker,
+                             uint32_t *changed,
+                             size_t *before);
+
+/**
+ * Copies what the last step made of the mesh, for a host to take its own arrays along. Where it changed nothing every vertex and
+ * every triangle is what it was.
+ *
+ * array: a frz_edit_array; it says of what type the elements are, and how many there are.
+ * dst: room for as many; FRZ_ERROR_CAPACITY when it is too little, and nothing is written.
+ *
+ * Any number of threads may read a tracker.
+ */
+frz_status frz_tracker_read_edits(const frz_tracker *tracker,
+                                  uint32_t array,
+                                  frz_span dst);
 
 #ifdef __cplusplus
 }  // extern "C"

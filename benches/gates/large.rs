@@ -49,7 +49,17 @@ fn million(h: &mut Harness) {
     write_cache(folder.path(), "ball", &ball, 3);
     let mut run = Command::new(env!("CARGO_BIN_EXE_frazil"));
     run.current_dir(&folder).args(["surface", "-p", "ball.%04d.bgeo", "-m", "ball.ply", "-o", "out", "-q"]);
-    run.args(["--spacing", "0.01", "--threads", "1", "--report", "run.json"]).stderr(Stdio::null());
+    run.args([
+        "--spacing",
+        "0.01",
+        "--threads",
+        "1",
+        "--report",
+        "run.json",
+        "--set",
+        "surface.rebuild=false",
+    ])
+    .stderr(Stdio::null());
     assert!(run.status().expect("frazil").success());
     let read = |name: &str| -> serde_json::Value {
         serde_json::from_slice(&std::fs::read(folder.path().join(name)).expect("a report")).expect("a report")

@@ -92,7 +92,15 @@ impl Spot {
     fn pass(&self, out: &str, threads: usize) -> Command {
         let mut run = Command::new(env!("CARGO_BIN_EXE_frazil"));
         run.arg("surface").arg("-p").arg(&self.cache).arg("-m").arg(self.folder.join("spot.ply"));
-        run.args(["-q", "--fps", &FPS.to_string(), "--spacing", &SPACING.to_string()]);
+        run.args([
+            "-q",
+            "--fps",
+            &FPS.to_string(),
+            "--spacing",
+            &SPACING.to_string(),
+            "--set",
+            "surface.rebuild=false",
+        ]);
         run.arg("-o").arg(self.folder.join(out)).args(["--threads", &threads.to_string()]);
         run.stdout(Stdio::null()).stderr(Stdio::null());
         run

@@ -7,6 +7,8 @@ use rayon::prelude::*;
 
 use crate::common::liquids::Random;
 
+/// Most lines of a lattice.
+const MOST: usize = 1 << 22;
 /// How far places of the lattice lie from the middles of their boxes at most (steps).
 const JITTER: f64 = 0.45;
 /// Directions along which no edges of made meshes run. Rounding may let a ray pass by a thin triangle, but not in all of them.
@@ -26,12 +28,16 @@ struct Line {
     crossings: Vec<(f64, i32)>,
 }
 
-/// Places of a lattice (m), `step` (m) apart and out of line by chance, that a closed mesh surrounds neither once nor never.
-pub fn astray(mesh: &TriMesh, step: f64) -> Vec<Vec3> {
-    let Some((low, high)) = mesh.bounds() else { return Vec::new() };
+/// Places of a lattice (m), `step` (m) apart and out of line by chance, that a closed mesh surrounds neither once nor never. None where
+/// it reaches too far for a lattice.
+pub fn astray(mesh: &TriMesh, step: f64) -> Option<Vec<Vec3>> {
+    let (low, high) = mesh.bounds()?;
     let corner = low.cast::<f64>() - DVec3::repeat(step);
     let size = (high.cast::<f64>() - corner) / step;
     let [wide, deep] = [size.x, size.y].map(|length| length.floor() as usize + 1);
+    if wide.saturating_mul(deep) > MOST {
+        return None;
+    }
     let mut random = Random(7);
     let mut within = |at: usize| at as f64 + 0.5 + JITTER * random.next();
     let mut lines: Vec<Line> = (0..wide * deep)
@@ -70,7 +76,7 @@ pub fn astray(mesh: &TriMesh, step: f64) -> Vec<Vec3> {
             }
         }
     }
-    places
+    Some(places)
 }
 
 /// How often a triangle runs around a line, seen from above: 1 counter-clockwise, -1 clockwise. Neighbours agree about an edge that

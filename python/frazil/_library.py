@@ -9,7 +9,7 @@ import threading
 
 import numpy as np
 
-ABI_VERSION = 0x10003
+ABI_VERSION = 0x10005
 
 OK, CANCELLED = 0, 5
 

@@ -172,7 +172,7 @@ fn sizes_are_the_shortest_and_the_longest_length() {
 #[test]
 fn stretched_and_squeezed_meshes_get_their_edges_back() {
     for (name, body) in [("sphere", sphere(4)), ("torus", torus())] {
-        for by in [2.0, 0.5] {
+        for by in [2.0, 0.35] {
             let body = body.clone().stretched([by, 1.0, 1.0]);
             let volume = body.volume();
             let (mut body, done) = body.improved(2);
@@ -245,7 +245,7 @@ fn what_was_rebuilt_stays_new() {
     body.sources.iter_mut().for_each(|source| *source = Source::New);
     body.origins.iter_mut().for_each(|origin| *origin = None);
     let (after, done) = body.improved(2);
-    assert!(done.splits > 100 && done.collapses > 100 && done.flips > 10, "{done:?}");
+    assert!(done.splits > 100 && done.collapses > 50 && done.flips > 10, "{done:?}");
     assert!(after.sources.iter().all(|source| *source == Source::New));
 }
 
