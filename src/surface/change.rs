@@ -45,6 +45,8 @@ pub struct Change {
     pub sizes: Vec<[f32; 2]>,
     /// What improved the mesh.
     pub improvements: Improvements,
+    /// Parts without particles that were taken away.
+    pub dry: usize,
     /// Cells in which the mesh did not fit.
     pub flagged_cells: usize,
     /// Cells that were rebuilt.
@@ -55,8 +57,10 @@ pub struct Change {
     pub iterations: usize,
 }
 
+/// Where the mesh has passed through itself by less than this (cells) it is left alone: mending takes more of it than that is worth.
+const DEEP: f64 = 0.25;
 /// Lengths of the shortest and of the longest edge around a vertex that was made (cells).
-const BORN: [f64; 2] = [0.8, 1.0];
+const BORN: [f64; 2] = [1.0, 1.0];
 
 impl Change {
     /// Of a mesh that stays as it is.
@@ -70,6 +74,7 @@ impl Change {
             delta: Vec::new(),
             sizes: Vec::new(),
             improvements: Improvements::default(),
+            dry: 0,
             flagged_cells: 0,
             rebuilt_cells: 0,
             rung: 0,
@@ -91,6 +96,7 @@ impl Change {
         self.rung = self.rung.max(first.rung);
         self.before.clone_from(&first.before);
         self.iterations += first.iterations;
+        self.dry += first.dry;
         self
     }
 }
@@ -152,6 +158,7 @@ pub fn change(
         delta: Vec::new(),
         sizes: Vec::new(),
         improvements: Improvements::default(),
+        dry: 0,
         flagged_cells: flagged.count(),
         rebuilt_cells: cells,
         rung,
@@ -159,7 +166,7 @@ pub fn change(
     }))
 }
 
-/// Improves a mesh (thesis 2.6), also where it was changed, and measures the vertices that were made. Sizes are those of the mesh before
+/// Takes parts without particles away, improves a mesh (thesis 2.6), also where it was changed, and measures the vertices that were made. Sizes are those of the mesh before
 /// the change; vertices that were made keep a distance of at most `most` (m): what lies farther from the particles' surface is no detail,
 /// and moves there, or is rebuilt again, in the next frame. None where nothing has changed.
 ///
@@ -171,11 +178,13 @@ pub fn improved(
     sizes: &[Size],
     change: Option<Change>,
     distances: &Distances,
-    most: f64,
+    (particles, most): (&[DVec3], f64),
 ) -> Result<Option<Change>> {
-    let is_changed = change.is_some();
+    let mut is_changed = change.is_some();
     let cell = distances.cell();
     let mut change = change.unwrap_or_else(|| Change::nothing(unfit));
+    change.dry = ctx.phase("dry", || Ok(change.drop_dry(particles)))?;
+    is_changed |= change.dry > 0;
     let born = BORN.map(|share| (share * cell) as f32);
     change.sizes = change.origins.iter().map(|at| at.map_or(born, |at| sizes[at as usize])).collect();
     let mut flags: Vec<bool> =
@@ -216,7 +225,7 @@ fn flagged(unfit: &Unfit<'_>, shape: &Shape, lattice: &Lattice) -> CellSet {
         let cell: Coord = cell_of(place);
         set.add([0, 1, 2].map(|axis| cell[axis] - lattice.origin[axis]));
     }
-    overlaps(shape, &mut set);
+    overlaps(shape, DEEP, &mut set);
     set
 }
 

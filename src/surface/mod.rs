@@ -29,6 +29,7 @@ mod cells;
 mod change;
 mod coverage;
 mod cubes;
+mod dry;
 mod fade;
 mod fit;
 mod gamma;

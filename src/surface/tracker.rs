@@ -210,7 +210,7 @@ impl Tracker {
     /// A time that is not positive; particles that are not valid, or have neither ids nor velocities; cancel.
     pub fn step(&mut self, ctx: &Context, from: &Particles, to: &Particles, dt: f64) -> Result<StepReport> {
         validate_step(from, to, dt)?;
-        let (next, phases) = ctx.step(9, || {
+        let (next, phases) = ctx.step(10, || {
             let paths = Paths::between(from, to, dt)?;
             let (carried, parts) = ctx.phase("advect", || self.carried(ctx, &paths))?;
             let surface = ctx.phase("phi", || self.surface_of(ctx, to))?;
@@ -247,7 +247,8 @@ impl Tracker {
                 delta,
             };
             if self.params.rebuild {
-                next.report.change = self.changed(ctx, &next, &feet, &covered, &surface.0, &distances)?;
+                next.report.change =
+                    self.changed(ctx, &next, &feet, &covered, (&surface.0, &distances), &to.places)?;
             }
             next.report.apart = covered.apart;
             Ok(next)
@@ -267,8 +268,8 @@ impl Tracker {
         next: &Next,
         feet: &[Option<DVec3>],
         covered: &Covered,
-        phi: &Implicit,
-        distances: &Distances,
+        (phi, distances): (&Implicit, &Distances),
+        particles: &[DVec3],
     ) -> Result<Option<Change>> {
         // What never had a distance does not fit from the start: that is no change.
         let flags: Vec<bool> =
@@ -285,7 +286,14 @@ impl Tracker {
         let unfit =
             Unfit { vertices: &next.vertices, triangles: &self.triangles, flags: &flags, bare: &bare };
         let changed = change(ctx, &unfit, phi, distances)?;
-        improved(ctx, &unfit, &self.sizes, changed, distances, self.params.change * self.params.spacing)
+        improved(
+            ctx,
+            &unfit,
+            &self.sizes,
+            changed,
+            distances,
+            (particles, self.params.change * self.params.spacing),
+        )
     }
 
     /// Becomes what the mesh became.

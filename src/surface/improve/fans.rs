@@ -109,6 +109,11 @@ impl<'m, 'a> Fans<'m, 'a> {
         self.mesh.places[vertex as usize]
     }
 
+    /// Moves a vertex.
+    pub fn put(&mut self, vertex: u32, place: DVec3) {
+        self.mesh.places[vertex as usize] = place;
+    }
+
     /// Length of an edge.
     pub fn length(&self, [a, b]: [u32; 2]) -> f64 {
         (self.place(a) - self.place(b)).norm()

@@ -3,7 +3,8 @@
 //! short edges stay as they were sculpted. Nearly all of a mesh needs nothing, and stays as it is, bit for bit.
 //!
 //! After Wojtan et al. 2009, and Brochu and Bridson 2009 ("Robust topological operations for dynamic explicit surfaces") for what
-//! stays on ridges and in corners. `fans.rs` has the operations, `butterfly.rs`, `collapse.rs` and `flip.rs` say where and whether.
+//! stays on ridges and in corners. `fans.rs` has the operations, `butterfly.rs`, `collapse.rs`, `flip.rs` and `relax.rs` say where and
+//! whether.
 //!
 //! | word | meaning |
 //! |---|---|
@@ -15,6 +16,7 @@ mod butterfly;
 mod collapse;
 mod fans;
 mod flip;
+mod relax;
 mod shape;
 
 use rayon::prelude::*;
@@ -33,6 +35,8 @@ const TOO_SHORT: f64 = 0.5;
 const ROUNDS: usize = 5;
 /// Sweeps in a frame: what one changes is due in the next.
 const SWEEPS: usize = 3;
+/// How often vertices move in a sweep.
+const RELAXED: usize = 3;
 /// Triangles of a task.
 const GRAIN: usize = 4096;
 /// Operations between two looks whether the work was cancelled.
@@ -209,7 +213,8 @@ impl Work<'_, '_, '_> {
             halved = self.split(&halved)?;
         }
         join(&mut near, &changed);
-        let passes: [fn(&mut Self, &[u32]) -> Result<()>; 3] = [Self::collapse, Self::unfold, Self::flip];
+        let passes: [fn(&mut Self, &[u32]) -> Result<()>; 4] =
+            [Self::collapse, Self::unfold, Self::flip, Self::relax];
         for pass in passes {
             pass(self, &near)?;
             let touched = self.fans.take_touched();
@@ -276,6 +281,23 @@ impl Work<'_, '_, '_> {
             if let Some(edge) = self.fans.better(triangle) {
                 self.fans.flip(&edge);
                 self.done.flips += 1;
+            }
+        }
+        Ok(())
+    }
+
+    /// Moves vertices that were made in this frame.
+    fn relax(&mut self, near: &[u32]) -> Result<()> {
+        let there = near.iter().filter(|triangle| self.fans.is_there(**triangle));
+        let mut vertices: Vec<u32> = there.flat_map(|triangle| self.fans.corners(*triangle)).collect();
+        vertices.sort_unstable();
+        vertices.dedup();
+        for _ in 0..RELAXED {
+            for (n, vertex) in vertices.iter().enumerate() {
+                self.look(n)?;
+                if let Some(place) = self.fans.relaxed(*vertex) {
+                    self.fans.put(*vertex, place);
+                }
             }
         }
         Ok(())

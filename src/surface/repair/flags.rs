@@ -38,7 +38,7 @@ pub fn flagged(closed: &Closed, shape: &Shape) -> CellSet {
             beside(passage.face).into_iter().for_each(|cell| _ = set.add(cell));
         }
     }
-    overlaps(shape, &mut set);
+    overlaps(shape, 0.0, &mut set);
     small(shape, &mut set);
     let caps = (0u32..).zip(&closed.sources).filter(|(_, source)| source.is_none());
     for (triangle, _) in caps.filter(|(triangle, _)| is_thin(mesh.corners(*triangle as usize))) {
@@ -52,17 +52,23 @@ fn is_thin([a, b, c]: [DVec3; 3]) -> bool {
     (b - a).cross(&(c - a)).norm() < THINNEST * longest
 }
 
-/// Adds the cells in which the surface bounds something else than the solid: where it has passed through itself.
-pub fn overlaps(shape: &Shape, set: &mut CellSet) {
+/// Adds the cells in which the surface bounds something else than the solid, because it has passed through itself: by at least a depth
+/// (cells, less than 1) along an edge of the grid.
+pub fn overlaps(shape: &Shape, depth: f64, set: &mut CellSet) {
     for edge in shape.pierces.edges() {
         let mut winding = shape.pierces.winding(edge.1);
+        let mut from = 0.0;
+        let is_wrong = |winding: i32| !(0..=1).contains(&winding);
+        let mut is_deep = false;
         // Pierces at one place are in no order: only what is before and behind them counts.
         for together in shape.pierces.on(*edge).chunk_by(|a, b| b.share - a.share < TOGETHER) {
-            let next = winding + together.iter().map(|pierce| pierce.change).sum::<i32>();
-            if !(0..=1).contains(&winding) || !(0..=1).contains(&next) {
-                around(*edge).into_iter().for_each(|cell| _ = set.add(cell));
-            }
-            winding = next;
+            let at = together[0].share;
+            is_deep |= is_wrong(winding) && (from == 0.0 || at - from >= depth);
+            winding += together.iter().map(|pierce| pierce.change).sum::<i32>();
+            from = at;
+        }
+        if is_deep || is_wrong(winding) {
+            around(*edge).into_iter().for_each(|cell| _ = set.add(cell));
         }
     }
 }

@@ -1,0 +1,43 @@
+//! Vertices that were made in this frame move along the surface toward the middle of their neighbours: edges and angles become even.
+
+use super::fans::Fans;
+use super::shape::{is_upright, least_angle, normal};
+use crate::base::DVec3;
+
+/// Share of the way that a vertex moves.
+const SHARE: f64 = 0.5;
+
+impl Fans<'_, '_> {
+    /// Where a vertex that was made in this frame should lie along the surface; none where nothing is gained, or it is to stay.
+    pub fn relaxed(&self, vertex: u32) -> Option<DVec3> {
+        let fan = self.around(vertex);
+        if self.has_origin(vertex) || fan.is_empty() {
+            return None;
+        }
+        let place = self.place(vertex);
+        let (mut sum, mut across) = (DVec3::zeros(), DVec3::zeros());
+        for &triangle in fan {
+            let corners = self.corners(triangle);
+            if self.is_whole(triangle) || corners.iter().any(|&corner| self.is_flagged(corner)) {
+                return None;
+            }
+            // Each neighbour is in two triangles.
+            sum += corners.iter().map(|&corner| self.place(corner)).sum::<DVec3>() - place;
+            across += normal(&self.places(triangle));
+        }
+        let across = across.try_normalize(0.0)?;
+        let way = sum / (2.0 * fan.len() as f64) - place;
+        let to = place + (way - across * across.dot(&way)) * SHARE;
+        let (mut before, mut after) = (f64::INFINITY, f64::INFINITY);
+        for &triangle in fan {
+            let old = self.places(triangle);
+            let new =
+                self.corners(triangle).map(|corner| if corner == vertex { to } else { self.place(corner) });
+            if !is_upright(&old, &new) {
+                return None;
+            }
+            (before, after) = (before.min(least_angle(&old)), after.min(least_angle(&new)));
+        }
+        (after > before).then_some(to)
+    }
+}
