@@ -14,7 +14,7 @@ const JITTER: f64 = 0.45;
 /// Directions along which no edges of made meshes run. Rounding may let a ray pass by a thin triangle, but not in all of them.
 const ASLANT: [DVec3; 3] = [
     DVec3::new(0.5773, 0.6533, 0.4896),
-    DVec3::new(-0.3719, 0.8411, -0.3927),
+    DVec3::new(-0.3719, 0.8411, -0.3919),
     DVec3::new(0.7127, -0.2893, -0.6391),
 ];
 

@@ -376,6 +376,30 @@ pub unsafe extern "C" fn frz_tracker_set_params(
     })
 }
 
+/// Hands over the particles to which the step after the coming one goes, early: with frz_tracker_params.rebuild their surface is made
+/// while the coming step rebuilds the mesh, on threads that have nothing to do. It makes no difference to what comes out; particles that
+/// then do not come cost time.
+///
+/// particles: as they will be; they are copied.
+///
+/// One thread at a time.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn frz_tracker_ahead(
+    tracker: *mut frz_tracker,
+    particles: *const frz_particles,
+) -> frz_status {
+    guard(|| {
+        // SAFETY: the pointers are NULL or the caller's.
+        unsafe {
+            let mut follower = change(tracker)?;
+            let particles = self::particles(particles)?;
+            particles.validate()?;
+            follower.tracker.set_ahead(std::sync::Arc::new(particles));
+            Ok(())
+        }
+    })
+}
+
 /// Moves the mesh with its particles from one time to another. After a failure or a cancel it is as it was before. With
 /// frz_tracker_params.rebuild it may have other vertices and triangles afterwards.
 ///

@@ -5,6 +5,10 @@
 //! particles is 0 (`implicit.rs`), turned into signed distances (`band.rs`). Vertices that this would move too far are where
 //! the liquid has merged or split: they are flagged, and so are those beside which the mesh does not cover the surface (`coverage.rs`).
 //!
+//! There the mesh is changed (`change.rs`): its own signed distances take the topology of phi (`gamma.rs`, `matching/`), and it is cut and
+//! rebuilt in the cells where it no longer fits (`repair/`). Parts without liquid go (`dry.rs`), edges that were stretched or pressed are
+//! split or collapse (`improve/`).
+//!
 //! # Glossary
 //!
 //! | word | meaning |
@@ -16,12 +20,15 @@
 //! | delta | the distance from phi = 0 that a vertex keeps: its detail, signed as phi |
 //! | patch | 4 x 4 x 4 nodes, which are evaluated together |
 //! | foot | the place of phi = 0 that belongs to a vertex: the vertex without its detail |
+//! | Gamma, psi | the signed distance from the mesh; Gamma - phi |
+//! | change | what a step made of the mesh's vertices and triangles, where it was rebuilt or improved |
 //! | flagged | of a vertex: its projection failed or jumped (it stays where advection put it), or there is surface beside its foot that no triangle of feet covers |
 
 // Kernels index several arrays by one lane or axis.
 #![allow(clippy::needless_range_loop)]
 
 mod advect;
+mod ahead;
 mod apart;
 mod average;
 mod band;

@@ -2,6 +2,7 @@
 
 use xxhash_rust::xxh3::xxh3_128;
 
+use super::ahead::Ahead;
 use super::improve::sizes;
 use super::params::Params;
 use super::tracker::Tracker;
@@ -116,7 +117,19 @@ impl Tracker {
                 sizes(&places, &mesh.triangles)
             }
         };
-        Ok(Self { params, vertices, triangles, delta, lasting, flags, bare, reach, is_rebuilt, sizes })
+        Ok(Self {
+            params,
+            vertices,
+            triangles,
+            delta,
+            lasting,
+            flags,
+            bare,
+            reach,
+            is_rebuilt,
+            sizes,
+            ahead: Ahead::default(),
+        })
     }
 }
 

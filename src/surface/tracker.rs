@@ -1,9 +1,12 @@
 //! The mesh, frame by frame.
 
+use std::sync::Arc;
+
 use rayon::prelude::*;
 
 use super::Particles;
 use super::advect::advect;
+use super::ahead::Ahead;
 use super::apart::{Apart, Parts, is_near};
 use super::band::Distances;
 use super::cells::{Coord, cell_of};
@@ -45,6 +48,8 @@ pub struct Tracker {
     pub(super) is_rebuilt: bool,
     /// Lengths (m) of the shortest and of the longest edge around each vertex at its birth; empty where the mesh is not rebuilt.
     pub(super) sizes: Vec<Size>,
+    /// What is known of the particles to come.
+    pub(super) ahead: Ahead,
 }
 
 /// Least reach of the band, and the greatest that is tried at the first frame (r).
@@ -93,9 +98,21 @@ impl Tracker {
         let (delta, lasting, bare, reach) = (Vec::new(), Vec::new(), Vec::new(), REACH[0]);
         let triangles = mesh.triangles.clone();
         let is_rebuilt = false;
+        let ahead = Ahead::default();
         let sizes = if params.rebuild { sizes(&vertices, &mesh.triangles) } else { Vec::new() };
-        let mut tracker =
-            Self { params, vertices, triangles, delta, lasting, flags, bare, reach, is_rebuilt, sizes };
+        let mut tracker = Self {
+            params,
+            vertices,
+            triangles,
+            delta,
+            lasting,
+            flags,
+            bare,
+            reach,
+            is_rebuilt,
+            sizes,
+            ahead,
+        };
         let surface = ctx.phase("phi", || tracker.surface_of(ctx, particles))?;
         loop {
             let distances = ctx.phase("distance", || tracker.distances(ctx, &surface))?;
@@ -213,7 +230,10 @@ impl Tracker {
         let (next, phases) = ctx.step(10, || {
             let paths = Paths::between(from, to, dt)?;
             let (carried, parts) = ctx.phase("advect", || self.carried(ctx, &paths))?;
-            let surface = ctx.phase("phi", || self.surface_of(ctx, to))?;
+            let surface = match self.ahead.ready(&to.places) {
+                Some(surface) => surface,
+                None => Arc::new(ctx.phase("phi", || self.surface_of(ctx, to))?),
+            };
             let distances = ctx.phase("distance", || self.distances(ctx, &surface))?;
             let delta = fade(self, &carried, dt);
             let (mut vertices, flags) =
@@ -246,15 +266,20 @@ impl Tracker {
                 vertices,
                 delta,
             };
+            let mut ahead = Ahead::default();
             if self.params.rebuild {
-                next.report.change =
-                    self.changed(ctx, &next, &feet, &covered, (&surface.0, &distances), &to.places)?;
+                let change =
+                    || self.changed(ctx, &next, &feet, &covered, (&surface.0, &distances), &to.places);
+                let (change, ready) = self.with_next(ctx, change)?;
+                (next.report.change, ahead) = (change, ready);
             }
             next.report.apart = covered.apart;
-            Ok(next)
+            Ok((next, ahead))
         })?;
+        let (next, ahead) = next;
         let mut report = StepReport { phases, ..next.report };
         (self.vertices, self.delta, self.flags) = (next.vertices, next.delta, next.flags);
+        self.ahead = ahead;
         if let Some(change) = &mut report.change {
             self.take(change);
         }
@@ -338,7 +363,7 @@ impl Tracker {
         Ok((vertices, parts))
     }
 
-    fn surface_of(&self, ctx: &Context, particles: &Particles) -> Result<(Implicit, Isosurface)> {
+    pub(super) fn surface_of(&self, ctx: &Context, particles: &Particles) -> Result<(Implicit, Isosurface)> {
         let Params { spacing, cell, .. } = self.params;
         let phi = Implicit::new(ctx, &particles.places, spacing, cell * spacing)?;
         let surface = Isosurface::new(&phi);

@@ -32,7 +32,7 @@ const ROUNDING: f64 = 1e-3;
 /// Directions along which no edges of made meshes run.
 const ASLANT: [DVec3; 3] = [
     DVec3::new(0.5773, 0.6533, 0.4896),
-    DVec3::new(-0.3719, 0.8411, -0.3927),
+    DVec3::new(-0.3719, 0.8411, -0.3919),
     DVec3::new(0.7127, -0.2893, -0.6391),
 ];
 
@@ -55,7 +55,7 @@ pub fn failures(seeds: Range<u64>, models: &[TriMesh], tell: impl Fn(&str) + Syn
     };
     std::thread::scope(|scope| {
         for _ in 0..std::thread::available_parallelism().map_or(1, usize::from) {
-            scope.spawn(&work);
+            scope.spawn(work);
         }
     });
     let mut found = found.into_inner().unwrap_or_else(PoisonError::into_inner);

@@ -134,9 +134,18 @@ impl<'a> Track<'a> {
         let mut report = StepReport::default();
         let mut trail = Trail::of(before.tracker.vertices());
         let mut from = liquid.at(way[0])?;
-        for ends in way.windows(2) {
+        // What the step after each goes to; beyond the shot it need not be there.
+        let beyond = liquid.way(frame + 1)[1];
+        let is_there = self.surface.rebuild && frame < self.scene.shot.frames.last;
+        let behind = way[2..].iter().copied().map(Some).chain([is_there.then_some(beyond)]);
+        for (ends, behind) in way.windows(2).zip(behind) {
             let to = liquid.at(ends[1])?;
             let dt = (ends[1] - ends[0]) * liquid.file_time();
+            if let Some(behind) = behind
+                && let Ok(particles) = liquid.at(behind)
+            {
+                now.tracker.set_ahead(particles);
+            }
             let step = now.tracker.step(ctx, &from, &to, dt).map_err(|error| liquid.told(ends[0], error))?;
             let share = (ends[1] - way[0]) / (way[way.len() - 1] - way[0]);
             match &step.change {
@@ -392,6 +401,7 @@ fn told(report: &StepReport, particles: usize, tracker: &Tracker) -> Report {
         "rebuilt_cells": changed(|change| change.rebuilt_cells),
         "rebuilt_rung": changed(|change| change.rung),
         "made_triangles": changed(|change| change.made_triangles()),
+        "dry_parts": changed(|change| change.dry),
         "drops": drops.len(),
         "drops_m3": drops.iter().fold(0.0, |sum, drop| sum + drop.volume),
         "bubbles": bubbles.len(),

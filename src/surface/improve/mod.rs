@@ -184,6 +184,9 @@ fn join(near: &mut Vec<u32>, more: &[u32]) {
     }
 }
 
+/// What is done at some triangles.
+type Pass<T> = fn(&mut T, &[u32]) -> Result<()>;
+
 /// A mesh that is being improved.
 struct Work<'c, 'm, 'a> {
     ctx: &'c Context,
@@ -213,8 +216,7 @@ impl Work<'_, '_, '_> {
             halved = self.split(&halved)?;
         }
         join(&mut near, &changed);
-        let passes: [fn(&mut Self, &[u32]) -> Result<()>; 4] =
-            [Self::collapse, Self::unfold, Self::flip, Self::relax];
+        let passes: [Pass<Self>; 4] = [Self::collapse, Self::unfold, Self::flip, Self::relax];
         for pass in passes {
             pass(self, &near)?;
             let touched = self.fans.take_touched();

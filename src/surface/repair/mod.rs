@@ -23,6 +23,7 @@
 //! | rung | a step of the ladder of fall-backs: how much is rebuilt when less could not be |
 
 mod attributes;
+mod copies;
 mod cut;
 mod draft;
 mod exact;

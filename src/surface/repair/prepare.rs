@@ -3,10 +3,9 @@
 //! Parts that are closed by their indices stay as they are. The others are joined where vertices are at the same place, then turned so
 //! that neighbours agree, and their holes are closed (`holes.rs`). Every step takes some n log n operations for n triangles.
 
-use std::cmp::Ordering;
-
 use rayon::prelude::*;
 
+use super::copies::{copies, doubled, is_balanced};
 use super::holes::close;
 use crate::base::mesh::coincident;
 use crate::base::orient::is_flat;
@@ -47,9 +46,6 @@ pub(super) struct Closed {
 /// An edge, lesser vertex first, and a triangle that has it.
 pub(super) type Use = ([u32; 2], u32);
 
-/// A part, three corners bit by bit and the triangle of that part which has them.
-type Placed = (u32, [[u32; 3]; 3], u32);
-
 /// Triangles a task looks at.
 const GRAIN: usize = 2048;
 /// Of an edge that no second triangle has.
@@ -77,7 +73,12 @@ pub(super) fn prepare(mesh: &TriMesh) -> Closed {
     if is_sound.contains(&false) {
         closed.join(&is_sound);
         closed.leave_out(&collapsed(&closed.triangles));
-        closed.leave_out(&doubled(vertices, &closed.triangles));
+        let is_out = doubled(vertices, &closed.triangles);
+        // Bodies that nearly coincide share some triangles: where all is closed as it is, it stays closed.
+        if !is_balanced(vertices, &closed.triangles, &[]) || is_balanced(vertices, &closed.triangles, &is_out)
+        {
+            closed.leave_out(&is_out);
+        }
         closed.leave_out(&loose_needles(&closed.positions, &closed.triangles));
         let uses = edge_uses(vertices, &closed.triangles);
         closed.prepared.turned_triangles = agree(&closed.positions, &mut closed.triangles, &uses);
@@ -188,7 +189,7 @@ fn corners(positions: &[Vec3], triangle: &[u32; 3]) -> [DVec3; 3] {
 }
 
 /// The part of each of so many triangles, named by its first triangle.
-fn parts_of(count: usize, uses: &[Use]) -> Vec<u32> {
+pub(super) fn parts_of(count: usize, uses: &[Use]) -> Vec<u32> {
     let mut parent: Vec<u32> = (0..count as u32).collect();
     for pair in uses.windows(2).filter(|pair| is_same_edge(&pair[0], &pair[1])) {
         let [a, b] = [pair[0].1, pair[1].1].map(|triangle| root(&mut parent, triangle));
@@ -217,40 +218,6 @@ fn sound(triangles: &[[u32; 3]], uses: &[Use], parts: &[u32]) -> Vec<bool> {
 /// Which triangles name a vertex twice.
 fn collapsed(triangles: &[[u32; 3]]) -> Vec<bool> {
     triangles.iter().map(|[a, b, c]| a == b || b == c || c == a).collect()
-}
-
-/// Which triangles have the vertices of others and go. Of those that are turned the same way the first stays. Where two are turned
-/// opposite ways none does: they are a sheet folded onto itself, which encloses nothing. But where such sheets are closed
-/// themselves, the first ones stay: a body both sides of whose faces were given.
-fn doubled(vertices: usize, triangles: &[[u32; 3]]) -> Vec<bool> {
-    let by_vertices = |(triangle, number): (&[u32; 3], u32)| {
-        let [a, b, c] = rotated(*triangle);
-        ([a, b.min(c), b.max(c)], number, b < c)
-    };
-    let mut order: Vec<([u32; 3], u32, bool)> = triangles.iter().zip(0..).map(by_vertices).collect();
-    order.par_sort_unstable();
-    let mut is_out = vec![false; triangles.len()];
-    let mut folded = Vec::new();
-    for same in order.chunk_by(|a, b| a.0 == b.0).filter(|same| same.len() > 1) {
-        same[1..].iter().for_each(|(_, number, _)| is_out[*number as usize] = true);
-        if same.iter().any(|(_, _, way)| *way != same[0].2) {
-            folded.push(same[0].1);
-        }
-    }
-    if folded.is_empty() {
-        return is_out;
-    }
-    let sheets: Vec<[u32; 3]> = folded.iter().map(|&number| triangles[number as usize]).collect();
-    let uses = edge_uses(vertices, &sheets);
-    let parts = parts_of(sheets.len(), &uses);
-    let mut is_closed = vec![true; sheets.len()];
-    for run in uses.chunk_by(is_same_edge).filter(|run| run.len() != 2) {
-        is_closed[parts[run[0].1 as usize] as usize] = false;
-    }
-    for (&number, &part) in folded.iter().zip(&parts) {
-        is_out[number as usize] = !is_closed[part as usize];
-    }
-    is_out
 }
 
 /// Which triangles without area go: those without which fewer edges are open. One that lies between others, on an edge of one and two
@@ -343,52 +310,6 @@ fn agree(positions: &[Vec3], triangles: &mut [[u32; 3]], uses: &[Use]) -> usize 
         }
     }
     count
-}
-
-/// Which triangles are of parts that lie on one before them, triangle by triangle.
-fn copies(positions: &[Vec3], triangles: &[[u32; 3]], parts: &[u32]) -> Vec<bool> {
-    let mut is_copy = vec![false; triangles.len()];
-    let placed = |triangle: &[u32; 3]| {
-        // Adding zero makes -0 and 0 the same.
-        let bits = |place: &Vec3| [place.x + 0.0, place.y + 0.0, place.z + 0.0].map(f32::to_bits);
-        rotated(triangle.map(|vertex| bits(&positions[vertex as usize])))
-    };
-    // Parts that are alike have as many triangles, and the same least corner: only such are compared.
-    let mut marks = vec![(0u32, [u32::MAX; 3]); triangles.len()];
-    for (triangle, &part) in triangles.iter().zip(parts) {
-        let (count, least) = &mut marks[part as usize];
-        *count += 1;
-        *least = (*least).min(placed(triangle)[0]);
-    }
-    let mut named: Vec<u32> = (0..triangles.len() as u32).filter(|at| parts[*at as usize] == *at).collect();
-    named.sort_unstable_by_key(|&part| (marks[part as usize], part));
-    let mut is_compared = vec![false; triangles.len()];
-    let is_alike = |a: &u32, b: &u32| marks[*a as usize] == marks[*b as usize];
-    for alike in named.chunk_by(is_alike).filter(|alike| alike.len() > 1) {
-        alike.iter().for_each(|&part| is_compared[part as usize] = true);
-    }
-    let mut order: Vec<Placed> = Vec::new();
-    for ((triangle, &part), number) in triangles.iter().zip(parts).zip(0..) {
-        if is_compared[part as usize] {
-            order.push((part, placed(triangle), number));
-        }
-    }
-    order.par_sort_unstable();
-    // The sort is stable: of parts at the same place the first stays first.
-    let mut bodies: Vec<&[Placed]> = order.chunk_by(|a, b| a.0 == b.0).collect();
-    bodies.sort_by(|a, b| by_places(a, b));
-    for same in bodies.chunk_by(|a, b| by_places(a, b).is_eq()) {
-        for (_, _, number) in same[1..].iter().copied().flatten() {
-            is_copy[*number as usize] = true;
-        }
-    }
-    is_copy
-}
-
-/// Orders parts by their number of triangles, then by where these lie.
-fn by_places(a: &[Placed], b: &[Placed]) -> Ordering {
-    let places = || a.iter().map(|one| &one.1).cmp(b.iter().map(|one| &one.1));
-    a.len().cmp(&b.len()).then_with(places)
 }
 
 #[cfg(test)]

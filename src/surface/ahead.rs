@@ -1,0 +1,51 @@
+//! The surface of the particles to come, made while the mesh is rebuilt: that work keeps few threads busy.
+
+use std::sync::Arc;
+
+use super::Particles;
+use super::implicit::Implicit;
+use super::isosurface::Isosurface;
+use super::tracker::Tracker;
+use crate::base::DVec3;
+use crate::context::Context;
+use crate::error::Result;
+
+/// Where phi is 0, and its triangles.
+type Surface = Arc<(Implicit, Isosurface)>;
+
+/// What is known of particles to come.
+#[derive(Debug, Clone, Default)]
+pub(super) struct Ahead {
+    /// Those whose surface is to be made during the next step.
+    wanted: Option<Arc<Particles>>,
+    /// Places of those whose surface is there, and that.
+    ready: Option<(Vec<DVec3>, Surface)>,
+}
+
+impl Ahead {
+    /// The surface of particles at these places, if it is there.
+    pub fn ready(&self, places: &[DVec3]) -> Option<Surface> {
+        self.ready.as_ref().filter(|(own, _)| own == places).map(|(_, surface)| surface.clone())
+    }
+}
+
+impl Tracker {
+    /// Hands over the particles to which the step after the coming one goes: where the mesh is rebuilt, their surface is made at the same
+    /// time, on threads that have nothing to do. It makes no difference to what comes out.
+    pub fn set_ahead(&mut self, particles: Arc<Particles>) {
+        self.ahead.wanted = Some(particles);
+    }
+
+    /// Does some work, and makes the surface of the particles to come at the same time.
+    pub(super) fn with_next<R>(&self, ctx: &Context, work: impl FnOnce() -> Result<R>) -> Result<(R, Ahead)> {
+        let wanted = self.ahead.wanted.as_deref().filter(|_| ctx.pool().threads() > 1);
+        std::thread::scope(|scope| {
+            let surface_of = |particles| ctx.pool().install(|| self.surface_of(ctx, particles));
+            let making = wanted.map(|particles| (scope.spawn(move || surface_of(particles)), particles));
+            let done = work()?;
+            let Some((making, particles)) = making else { return Ok((done, Ahead::default())) };
+            let surface = making.join().unwrap_or_else(|panic| std::panic::resume_unwind(panic))?;
+            Ok((done, Ahead { wanted: None, ready: Some((particles.places.clone(), Arc::new(surface))) }))
+        })
+    }
+}
