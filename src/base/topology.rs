@@ -183,7 +183,7 @@ fn after(corner: u32) -> u32 {
 }
 
 /// Count of connected groups among those of so many vertices that links name.
-pub(super) fn groups(vertices: usize, links: impl Iterator<Item = [u32; 2]>) -> usize {
+pub fn groups(vertices: usize, links: impl Iterator<Item = [u32; 2]>) -> usize {
     let (mut sets, mut named) = (Sets::new(vertices), vec![false; vertices]);
     for link in links {
         link.iter().for_each(|&vertex| named[vertex as usize] = true);

@@ -121,23 +121,11 @@ fn repaired(session: &Session, path: &Path, mesh: &TriMesh, cell: f64) -> Result
         return Err(Error::file(path, NOTHING));
     }
     #[cfg(feature = "vdb")]
-    check_memory(session, mesh, cell)?;
+    session.ctx.set_memory_limit(session.max_memory());
     repair(&session.ctx, mesh, cell).map_err(|error| match error {
         Error::Argument(what) => Error::file(path, what),
         other => other,
     })
-}
-
-/// Refuses cells so small that memory would not do for all of those that the mesh passes through.
-#[cfg(feature = "vdb")]
-fn check_memory(session: &Session, mesh: &TriMesh, cell: f64) -> Result<()> {
-    // For an area of a cell's face up to 1.7 edges of the grid, which take some 150 bytes each while they are sorted.
-    let needed = (mesh.area() / (cell * cell) * 256.0).min(1e18) as u64;
-    let limit = session.max_memory();
-    if needed <= limit {
-        return Ok(());
-    }
-    Err(Error::Memory { what: format!("a repair with cells of {cell} m"), needed, limit })
 }
 
 /// Whether a mesh had no need of a repair.

@@ -44,8 +44,10 @@ impl Tracker {
             let making = wanted.map(|particles| (scope.spawn(move || surface_of(particles)), particles));
             let done = work()?;
             let Some((making, particles)) = making else { return Ok((done, Ahead::default())) };
-            let surface = making.join().unwrap_or_else(|panic| std::panic::resume_unwind(panic))?;
-            Ok((done, Ahead { wanted: None, ready: Some((particles.places.clone(), Arc::new(surface))) }))
+            let made = making.join().unwrap_or_else(|panic| std::panic::resume_unwind(panic));
+            // What fails here fails again when it is that frame's turn, and is told there.
+            let ready = made.ok().map(|surface| (particles.places.clone(), Arc::new(surface)));
+            Ok((done, Ahead { wanted: None, ready }))
         })
     }
 }

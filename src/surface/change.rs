@@ -82,6 +82,25 @@ impl Change {
         }
     }
 
+    /// Numbers of the vertices that there were, for those that there are: a vertex that was made has the mean of the neighbours that
+    /// stayed, 0 without any.
+    pub(super) fn carried(&self, values: &[f32]) -> Vec<f32> {
+        let old = |vertex: u32| self.origins[vertex as usize].map(|at| values[at as usize]);
+        let mut sums = vec![(0.0f32, 0.0f32); self.origins.len()];
+        for corners in &self.triangles {
+            for (at, next) in [(0, 1), (1, 2), (2, 0)] {
+                if let (None, Some(value)) = (old(corners[at]), old(corners[next])) {
+                    let sum = &mut sums[corners[at] as usize];
+                    *sum = (sum.0 + value, sum.1 + 1.0);
+                }
+            }
+        }
+        let mean = |(vertex, (sum, count)): (u32, (f32, f32))| {
+            old(vertex).unwrap_or(if count > 0.0 { (sum / count).clamp(0.0, 1.0) } else { 0.0 })
+        };
+        (0..).zip(sums).map(mean).collect()
+    }
+
     /// Count of triangles that were made: parts of others among them.
     pub fn made_triangles(&self) -> usize {
         self.sources.iter().filter(|source| !matches!(source, Source::Whole(_))).count()
@@ -121,6 +140,11 @@ pub fn change(
     let in_cells: Vec<DVec3> = unfit.vertices.iter().map(|place| lattice.to_cells(*place)).collect();
     let fixed = in_cells.iter().map(|place| lattice.fix(*place)).collect::<Result<Vec<_>>>()?;
     let (shape, flagged) = ctx.phase("flag", || {
+        // Some 100 bytes for each edge of the grid, of which there are up to 1.7 for a cell's face.
+        let edges = |[a, b, c]: [DVec3; 3]| (b - a).cross(&(c - a)).norm() / 2.0;
+        let faces: f64 =
+            unfit.triangles.iter().map(|names| edges(names.map(|name| in_cells[name as usize]))).sum();
+        ctx.allow("the mesh's cells (larger ones need less)", (170.0 * faces).min(1e18) as u64)?;
         let pierces = Pierces::of(&fixed, unfit.triangles);
         let shape = Shape { fixed, triangles: unfit.triangles.to_vec(), pierces };
         ctx.check()?;

@@ -4,7 +4,7 @@ use super::change::Change;
 use super::repair::Source;
 use crate::base::bvh::Bvh;
 use crate::base::mesh::{renumbered, used};
-use crate::base::topology::bodies;
+use crate::base::topology::{bodies, groups};
 use crate::base::{DVec3, TriMesh, Vec3};
 
 /// A direction along which no edges of made meshes run.
@@ -22,11 +22,13 @@ struct Part {
 impl Change {
     /// Takes away the parts of the mesh with a volume over 0 in which no particle lies, of those at these places (m). Returns how many.
     pub(super) fn drop_dry(&mut self, particles: &[DVec3]) -> usize {
-        let all = bodies(&self.triangles);
-        if all.len() < 2 {
+        // Mostly there is one.
+        let links = self.triangles.iter().flat_map(|[a, b, c]| [[*a, *b], [*b, *c]]);
+        if groups(self.vertices.len(), links) < 2 {
             return 0;
         }
-        let mut parts: Vec<Part> = all.into_iter().filter_map(|triangles| self.part(triangles)).collect();
+        let mut parts: Vec<Part> =
+            bodies(&self.triangles).into_iter().filter_map(|triangles| self.part(triangles)).collect();
         for place in particles {
             parts.retain_mut(|part| !self.is_in(part, *place));
             if parts.is_empty() {

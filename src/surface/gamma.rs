@@ -23,6 +23,10 @@ use crate::error::Result;
 const KNOWN: f32 = 2.0;
 /// How far from flagged nodes Gamma may change (cells): at most a block.
 const REACH: i32 = 8;
+/// Bytes of a block: its distances twice, and what its nodes are in the matching.
+const BYTES: usize = VOXELS * (2 * 4 + 2 * 28);
+/// What needs the memory, for messages.
+const WHAT: &str = "the mesh's change (larger cells need less)";
 /// Least distance of a node from the mesh (cells), so that it has a side.
 const LEAST: f32 = 1e-6;
 /// All nodes of a block.
@@ -66,6 +70,7 @@ impl<'a> Gamma<'a> {
         let origin = lattice.origin.map(|at| at >> 3);
         let blocks: Vec<Coord> = wanted.into_iter().collect();
         let slots: HashMap<Coord, u32> = blocks.iter().copied().zip(0..).collect();
+        ctx.allow(WHAT, (blocks.len() * BYTES) as u64)?;
         let near = near(shape, in_cells, &blocks, &slots);
         let one = |memory: &mut Search, near: &Vec<Triangle>| {
             ctx.check()?;
@@ -192,6 +197,14 @@ fn near(
             |place: DVec3, by: f32| [0, 1, 2].map(|axis| ((place[axis] + f64::from(by)).floor() as i32) >> 3);
         let low = side(v[0].inf(&v[1]).inf(&v[2]), -KNOWN);
         let high = side(v[0].sup(&v[1]).sup(&v[2]), KNOWN + 1.0);
+        let size = (0..3).map(|axis| i64::from(high[axis] - low[axis]) + 1).product::<i64>();
+        if size > blocks.len() as i64 {
+            // A spike: its box holds more blocks than there are.
+            let is_in = |block: &Coord| (0..3).all(|axis| (low[axis]..=high[axis]).contains(&block[axis]));
+            let within = blocks.iter().zip(&mut lists).filter(|(block, _)| is_in(block));
+            within.for_each(|(_, list)| list.push(triangle));
+            continue;
+        }
         for block in between(low, high) {
             if let Some(slot) = slots.get(&block) {
                 lists[*slot as usize].push(triangle);

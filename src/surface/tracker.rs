@@ -324,7 +324,6 @@ impl Tracker {
     /// Becomes what the mesh became.
     fn take(&mut self, change: &Change) {
         let mut made = change.delta.iter();
-        let old = |values: &[f32], at: &Option<u32>| at.map_or(0.0, |at| values[at as usize]);
         let delta =
             |at: &Option<u32>| at.map_or_else(|| *made.next().unwrap_or(&0.0), |at| self.delta[at as usize]);
         self.delta = change.origins.iter().map(delta).collect();
@@ -332,7 +331,7 @@ impl Tracker {
         self.flags = change.origins.iter().map(|at| flag(&self.flags, at)).collect();
         self.bare = change.origins.iter().map(|at| flag(&self.bare, at)).collect();
         if !self.lasting.is_empty() {
-            self.lasting = change.origins.iter().map(|at| old(&self.lasting, at)).collect();
+            self.lasting = change.carried(&self.lasting);
         }
         self.sizes.clone_from(&change.sizes);
         self.vertices.clone_from(&change.vertices);

@@ -16,7 +16,10 @@ pub fn run(args: &Args, session: &Session, scene: &Scene) -> Result<(), Failure>
         let what = format!("{}: --preview is for snow, not for [surface]", args.scene.display());
         return Err(Failure::refused(what));
     }
+    // A mesh may have to be repaired.
+    session.ctx.set_memory_limit(session.max_memory());
     let inputs = Inputs::load(&session.ctx, scene).before()?;
+    session.ctx.set_memory_limit(u64::MAX);
     let mut report = check(&session.ctx, scene, &inputs).before()?;
     let limit = session.max_memory();
     if let Err(error) = report.check_memory(limit) {

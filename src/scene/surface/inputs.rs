@@ -110,9 +110,12 @@ impl Inputs {
                 DetailedMesh { mesh, ..DetailedMesh::default() }
             }
         };
-        let lasting = match (surface.half_life, surface.fade, &surface.mesh) {
-            (None, 0.0, _) | (_, _, None) => Vec::new(),
-            (_, _, Some(path)) => lasting(&mesh).map_err(|what| Error::file(path, what))?,
+        let fades = surface.half_life.is_some() || surface.fade != 0.0;
+        let lasting = match &surface.mesh {
+            Some(path) if fades => lasting(&mesh).map_err(|what| Error::file(path, what))?,
+            // A mesh that is rebuilt keeps it in its states: a later frame may be the first that fades.
+            Some(_) if surface.rebuild => lasting(&mesh).unwrap_or_default(),
+            _ => Vec::new(),
         };
         mesh.arrays.retain(|array| !REPLACED.contains(&&*array.name));
         warnings.iter().for_each(|warning| log::warn!("{warning}"));

@@ -150,7 +150,7 @@ pub struct Traced {
     pub segments: Vec<Segment>,
 }
 
-/// Traces a triangle with a number, vertices and their places, which passes through these edges of the grid. None where that does
+/// Traces a triangle with a number, vertices and their places, which passes through these edges of the grid, ascending. None where that does
 /// not fit together: the triangle has no area on the lattice in some view, or the edges are not all of them.
 pub fn trace(number: u32, names: [u32; 3], v: [Fixed; 3], pierced: &[GridEdge]) -> Option<Traced> {
     let mut traced = Traced { cells: v.map(cell_of), ..Traced::default() };
@@ -191,7 +191,7 @@ pub fn trace(number: u32, names: [u32; 3], v: [Fixed; 3], pierced: &[GridEdge]) 
                 let mut node = at;
                 node[across] += way.max(0);
                 let edge = (3 - axis - across, node);
-                (way != 0 && pierced.contains(&edge)).then_some((across, way, edge))
+                (way != 0 && pierced.binary_search(&edge).is_ok()).then_some((across, way, edge))
             });
             let (across, way, edge) = step?;
             let point = Point::OnTriangle(number, edge);
@@ -239,6 +239,7 @@ mod tests {
                 out.push((axis.index(), axis.voxel(line, at.floor() as i32)));
             });
         }
+        out.sort_unstable();
         out
     }
 

@@ -1,5 +1,7 @@
 //! Cells in which a mesh is at fault.
 
+use std::collections::HashMap;
+
 use super::cut::Shape;
 use super::exact::{around, beside, cell_of, passages};
 use super::prepare::Closed;
@@ -7,6 +9,8 @@ use super::region::CellSet;
 use crate::base::faults::meeting_pairs;
 use crate::base::topology::{bodies, faulty};
 use crate::base::{DVec3, TriMesh};
+use crate::context::Context;
+use crate::error::Result;
 use crate::surface::cells::Coord;
 
 /// Pierces so near to each other are at one place (cells).
@@ -17,14 +21,23 @@ const THINNEST: f64 = 4e-4;
 /// The cells in which a mesh is at fault: where triangles pass through each other, where edges or vertices are not manifold, where
 /// the surface bounds something else than the solid, parts too small for the grid that lie within others, and slivers that close
 /// holes.
-pub fn flagged(closed: &Closed, shape: &Shape) -> CellSet {
+///
+/// # Errors
+/// Cancel.
+pub fn flagged(ctx: &Context, closed: &Closed, shape: &Shape) -> Result<CellSet> {
     let mut set = CellSet::default();
     let mesh = TriMesh { positions: closed.positions.clone(), triangles: closed.triangles.clone() };
+    // A large triangle meets many small ones.
+    let mut known: HashMap<u32, Vec<Coord>> = HashMap::new();
     for [first, second] in meeting_pairs(&mesh) {
-        let [a, b] = [first, second].map(|triangle| shape.cells_of(triangle));
+        ctx.check()?;
+        for triangle in [first, second] {
+            known.entry(triangle).or_insert_with(|| shape.cells_of(triangle));
+        }
+        let [a, b] = [&known[&first], &known[&second]];
         let common: Vec<Coord> = a.iter().copied().filter(|cell| b.binary_search(cell).is_ok()).collect();
         // On the lattice they may just miss each other.
-        let cells = if common.is_empty() { [a, b].concat() } else { common };
+        let cells = if common.is_empty() { [&a[..], b].concat() } else { common };
         cells.into_iter().for_each(|cell| _ = set.add(cell));
     }
     let (vertices, edges) = faulty(shape.fixed.len(), &shape.triangles);
@@ -44,7 +57,7 @@ pub fn flagged(closed: &Closed, shape: &Shape) -> CellSet {
     for (triangle, _) in caps.filter(|(triangle, _)| is_thin(mesh.corners(*triangle as usize))) {
         shape.cells_of(triangle).into_iter().for_each(|cell| _ = set.add(cell));
     }
-    set
+    Ok(set)
 }
 
 fn is_thin([a, b, c]: [DVec3; 3]) -> bool {

@@ -121,6 +121,8 @@ pub struct RepairReport {
 const TRIES: usize = 32;
 /// How often slivers are taken out.
 const ROUNDS: usize = 4;
+/// Bytes for an area of a cell's face: up to 1.7 edges of the grid, some 150 bytes each while they are sorted.
+const FACE: f64 = 256.0;
 /// How often cells are halved where nothing would be left.
 const HALVINGS: u32 = 6;
 
@@ -128,21 +130,35 @@ const HALVINGS: u32 = 6;
 /// closed first. What is broken is rebuilt within a cell of that solid; solids thinner than a cell may go where they are rebuilt.
 ///
 /// # Errors
-/// A mesh that is not valid, or too large for the cell; one that encloses nothing; cancel.
+/// A mesh that is not valid, or too large for the cell; one that encloses nothing; more memory than the context allows; cancel.
 pub fn repair(ctx: &Context, mesh: &TriMesh, cell: f64) -> Result<Repaired> {
     mesh.validate()?;
     if !(cell > 0.0 && cell.is_finite()) {
         return Err(Error::argument(format!("cell = {cell} is not over 0 m")));
     }
     let closed = ctx.phase("prepare", || Ok(prepare(mesh)))?;
+    let area = TriMesh { positions: closed.positions.clone(), triangles: closed.triangles.clone() }.area();
     for halving in 0..HALVINGS {
         let cell = cell / f64::from(1u32 << halving);
+        let allowed = allow(ctx, area, cell);
+        if halving > 0 && allowed.is_err() {
+            break;
+        }
+        allowed?;
         let repaired = ctx.phase("rebuild", || rebuild(ctx, &closed, mesh.positions.len(), cell))?;
         if let Some(repaired) = repaired {
             return Ok(repaired);
         }
     }
     Err(Error::argument("nothing in the mesh encloses a volume"))
+}
+
+/// Refuses cells (m) so small that memory would not do for all of those that a surface of an area (m2) passes through.
+fn allow(ctx: &Context, area: f64, cell: f64) -> Result<()> {
+    ctx.allow(
+        "the cells that a mesh passes through (larger ones need less)",
+        (area / (cell * cell) * FACE).min(1e18) as u64,
+    )
 }
 
 /// The rungs of the ladder, for a mesh whose first `own` vertices came in. None where nothing is left.
@@ -157,7 +173,7 @@ fn rebuild(ctx: &Context, closed: &Closed, own: usize, cell: f64) -> Result<Opti
     let pierces = Pierces::of(&fixed, &closed.triangles);
     let shape = Shape { fixed, triangles: closed.triangles.clone(), pierces };
     ctx.check()?;
-    let flagged = flags::flagged(closed, &shape);
+    let flagged = flags::flagged(ctx, closed, &shape)?;
     let rebuilt = ladder(ctx, &shape, (&in_cells, &lattice), &flagged, &shape.pierces)?;
     if rebuilt.draft.triangles.is_empty() {
         return Ok(None);
@@ -210,7 +226,7 @@ pub(super) fn ladder(
                 all
             }
         };
-        let Some((mut draft, cells)) = tried(shape, set, in_cells, inside) else { continue };
+        let Some((mut draft, cells)) = tried(ctx, shape, set, in_cells, inside)? else { continue };
         let slivers = tidied(&mut draft, lattice);
         let is_whole = Topology::of(draft.places.len(), &draft.triangles).is_watertight();
         if draft.triangles.is_empty() || (is_whole && (slivers == 0 || rung == 3)) {
@@ -243,16 +259,18 @@ fn tidied(draft: &mut Draft, lattice: &Lattice) -> usize {
 
 /// Cuts the mesh along a set of cells and fills these; the set grows where that does not work. None where that does not end.
 fn tried(
+    ctx: &Context,
     shape: &Shape,
     mut set: CellSet,
     in_cells: &[DVec3],
     inside: &impl Inside,
-) -> Option<(Draft, usize)> {
+) -> Result<Option<(Draft, usize)>> {
     let mut added: Vec<Coord> = set.iter().collect();
     for _ in 0..TRIES {
+        ctx.check()?;
         grow(&mut set, added, &shape.pierces, inside);
         match once(shape, &set, in_cells, inside) {
-            Ok(draft) => return Some((draft, set.count())),
+            Ok(draft) => return Ok(Some((draft, set.count()))),
             Err(Trouble(cells)) => {
                 added = cells.iter().copied().filter(|cell| set.add(*cell)).collect();
                 // Where growing by these cells changes nothing, those around them are tried.
@@ -262,12 +280,12 @@ fn tried(
                     added = around.with_ring().iter().filter(|cell| set.add(*cell)).collect();
                 }
                 if added.is_empty() {
-                    return None;
+                    return Ok(None);
                 }
             }
         }
     }
-    None
+    Ok(None)
 }
 
 fn once(
