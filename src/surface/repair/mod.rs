@@ -155,10 +155,8 @@ pub fn repair(ctx: &Context, mesh: &TriMesh, cell: f64) -> Result<Repaired> {
 
 /// Refuses cells (m) so small that memory would not do for all of those that a surface of an area (m2) passes through.
 fn allow(ctx: &Context, area: f64, cell: f64) -> Result<()> {
-    ctx.allow(
-        "the cells that a mesh passes through (larger ones need less)",
-        (area / (cell * cell) * FACE).min(1e18) as u64,
-    )
+    let needed = (area / (cell * cell) * FACE).min(1e18) as u64;
+    ctx.allow(&format!("a repair with cells of {cell} m"), needed)
 }
 
 /// The rungs of the ladder, for a mesh whose first `own` vertices came in. None where nothing is left.
