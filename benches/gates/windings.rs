@@ -6,6 +6,7 @@ use frazil::base::{DVec3, TriMesh, Vec3};
 use rayon::prelude::*;
 
 use crate::common::liquids::Random;
+use crate::common::repaired::{height, turns};
 
 /// Most lines of a lattice.
 const MOST: usize = 1 << 22;
@@ -77,26 +78,6 @@ pub fn astray(mesh: &TriMesh, step: f64) -> Option<Vec<Vec3>> {
         }
     }
     Some(places)
-}
-
-/// How often a triangle runs around a line, seen from above: 1 counter-clockwise, -1 clockwise. Neighbours agree about an edge that
-/// they have in common, whatever rounding does.
-fn turns(corners: &[DVec3; 3], [x, y]: [f64; 2]) -> i32 {
-    let [a, b, c] = corners;
-    let crossing = |(from, to): (&DVec3, &DVec3)| {
-        let (low, high, way) = if from.y <= to.y { (from, to, 1) } else { (to, from, -1) };
-        let is_left = (high.x - low.x) * (y - low.y) > (high.y - low.y) * (x - low.x);
-        if (low.y..high.y).contains(&y) && is_left { way } else { 0 }
-    };
-    crossing((a, b)) + crossing((b, c)) + crossing((c, a))
-}
-
-/// Where a line meets a triangle.
-fn height([a, b, c]: &[DVec3; 3], [x, y]: [f64; 2]) -> f64 {
-    let normal = (b - a).cross(&(c - a));
-    let height = a.z - (normal.x * (x - a.x) + normal.y * (y - a.y)) / normal.z;
-    // Of a triangle that stands, rounding makes anything.
-    height.max(a.z.min(b.z).min(c.z)).min(a.z.max(b.z).max(c.z))
 }
 
 /// How many of some places (m) a closed mesh surrounds once.

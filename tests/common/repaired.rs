@@ -289,7 +289,7 @@ fn text(place: DVec3) -> String {
 
 /// How often a triangle runs around a column, seen from above: 1 counter-clockwise, -1 clockwise. Neighbours agree about an edge that
 /// they have in common, whatever rounding does.
-fn turns(corners: &[DVec3; 3], [x, y]: [f64; 2]) -> i32 {
+pub fn turns(corners: &[DVec3; 3], [x, y]: [f64; 2]) -> i32 {
     let [a, b, c] = corners;
     let crossing = |(from, to): (&DVec3, &DVec3)| {
         let (low, high, way) = if from.y <= to.y { (from, to, 1) } else { (to, from, -1) };
@@ -300,7 +300,7 @@ fn turns(corners: &[DVec3; 3], [x, y]: [f64; 2]) -> i32 {
 }
 
 /// Where a column meets a triangle.
-fn height([a, b, c]: &[DVec3; 3], [x, y]: [f64; 2]) -> f64 {
+pub fn height([a, b, c]: &[DVec3; 3], [x, y]: [f64; 2]) -> f64 {
     let normal = (b - a).cross(&(c - a));
     let height = a.z - (normal.x * (x - a.x) + normal.y * (y - a.y)) / normal.z;
     // Of a triangle that stands, rounding makes anything.
