@@ -104,3 +104,79 @@ fn uvs(from: &mut Reader<'_>, vertices: usize, faces: usize) -> Result<Uvs> {
 fn wrong() -> Error {
     Error::Bytes("carries what does not fit its mesh".into())
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::base::{DVec3, TriMesh};
+    use crate::context::{Context, Pool};
+    use crate::surface::{Implicit, Isosurface, Particles};
+
+    /// Two balls of particles, so many spacings from the middle.
+    fn balls(away: f64) -> Particles {
+        let on = || -3..=3;
+        let all = on().flat_map(|x| on().flat_map(move |y| on().map(move |z| [x, y, z].map(f64::from))));
+        let ball: Vec<DVec3> = all.map(DVec3::from).filter(|place| place.norm() <= 3.2).collect();
+        let side = |way: f64| ball.iter().map(move |place| place + DVec3::new(way * away, 0.1 * way, 0.0));
+        let places: Vec<DVec3> = side(1.0).chain(side(-1.0)).collect();
+        Particles { ids: (0..places.len() as i64).collect(), velocities: Vec::new(), places }
+    }
+
+    /// A mesh that was rebuilt where two balls met, the one that it began with, and what it carries.
+    fn rebuilt() -> (Tracker, DetailedMesh, DetailedMesh) {
+        let ctx = Context::new(Pool::new(1).unwrap());
+        let mut from = balls(5.0);
+        let phi = Implicit::new(&ctx, &from.places, 1.0, 0.5).unwrap();
+        let mesh = Isosurface::new(&phi).mesh(&phi);
+        let params = Params { rebuild: true, ..Params::for_spacing(1.0) };
+        let mut tracker = Tracker::new(&ctx, params, &mesh, &from).unwrap();
+        for step in 1..=6 {
+            let to = balls(5.0 - 0.3 * f64::from(step));
+            tracker.step(&ctx, &from, &to, 0.04).unwrap();
+            from = to;
+        }
+        assert!(tracker.is_rebuilt());
+        let [vertices, faces] = [tracker.vertices().len(), tracker.triangles().len()];
+        let array = |name: &str, on, count: usize| MeshArray {
+            name: name.into(),
+            on,
+            number: Number::F32,
+            values: (0..count).map(|n| if n == 3 { f64::NAN } else { n as f64 }).collect(),
+        };
+        let arrays = vec![array("wet", On::Vertices, vertices), array("part", On::Faces, faces)];
+        let uvs = Uvs { places: vec![[0.5, 0.25]; 7], corners: Some(vec![6; 3 * faces]), missing: 2 };
+        let first = DetailedMesh { mesh, ..DetailedMesh::default() };
+        (tracker, first, DetailedMesh { mesh: TriMesh::default(), uvs: Some(uvs), arrays })
+    }
+
+    #[test]
+    fn what_is_kept_comes_back_and_what_was_changed_is_refused_or_read() {
+        let (tracker, first, detail) = rebuilt();
+        let params = Params { rebuild: true, ..Params::for_spacing(1.0) };
+        let bytes = save(&tracker, &detail);
+        let (back, carried) = resume(params, &first, &bytes).unwrap();
+        let carried = carried.unwrap();
+        assert!(save(&back, &carried) == bytes && carried.uvs == detail.uvs);
+        // Damage never gets past the checksum; behind it nothing may panic either.
+        let plain = packed::unpack(&bytes, MAGIC, NOUN).unwrap();
+        let mut state = 5u64;
+        let mut below = |count: usize| {
+            state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+            (state >> 33) as usize % count
+        };
+        // The tracker's own bytes have a checksum of their own: what stands behind them is changed.
+        let own = 8 + u64::from_le_bytes(plain[..8].try_into().unwrap()) as usize;
+        let mut refused = 0;
+        for round in 0..2000 {
+            let mut changed = plain.clone();
+            if round % 4 == 0 {
+                changed.truncate(own + below(plain.len() - own));
+            } else {
+                let at = if round % 4 == 1 { own + below(100) } else { below(plain.len()) };
+                changed[at] ^= 1 << below(8);
+            }
+            refused += usize::from(resume(params, &first, &packed::pack(&changed, MAGIC)).is_err());
+        }
+        assert!(refused > 700, "{refused}");
+    }
+}
