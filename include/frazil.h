@@ -1475,7 +1475,8 @@ typedef struct {
     double change;
     /**
      * Time (s) in which half of the detail fades, above 0; infinite, as is usual: it stays. It stays anyway where the mesh's attribute
-     * "detail" of one float is 1, and fades as fast as this says where that is 0, as it is for vertices that a step makes.
+     * "detail" of one float is 1, and fades as fast as this says where that is 0. A vertex that a step makes has the mean of those of
+     * its neighbours that were there, 0 without any.
      */
     double half_life;
     /**

@@ -71,7 +71,8 @@ pub struct frz_tracker_params {
     /// there. 0.5 is usual.
     pub change: f64,
     /// Time (s) in which half of the detail fades, above 0; infinite, as is usual: it stays. It stays anyway where the mesh's attribute
-    /// "detail" of one float is 1, and fades as fast as this says where that is 0, as it is for vertices that a step makes.
+    /// "detail" of one float is 1, and fades as fast as this says where that is 0. A vertex that a step makes has the mean of those of
+    /// its neighbours that were there, 0 without any.
     pub half_life: f64,
     /// How much detail fades where the mesh is strained: to exp(-fade) of it while lengths change by a factor of e, 0 to 1000; 0,
     /// as is usual: not at all.

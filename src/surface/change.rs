@@ -37,13 +37,13 @@ pub struct Change {
     pub origins: Vec<Option<u32>>,
     /// For each triangle where it comes from.
     pub sources: Vec<Source>,
-    /// Places (m) of the vertices that there were.
+    /// Places (m) to which the step took the vertices that there were; after several steps, the first that changed the mesh.
     pub before: Vec<DVec3>,
-    /// For each vertex that was made its signed distance from the particles' surface (m).
+    /// For each vertex that was made its signed distance from the particles' surface (m); of several steps, in the last.
     pub delta: Vec<f32>,
     /// For each vertex the lengths (m) of the shortest and of the longest edge around it at its birth.
     pub sizes: Vec<[f32; 2]>,
-    /// What improved the mesh.
+    /// What improved the mesh; of several steps, in the last.
     pub improvements: Improvements,
     /// Parts without particles that were taken away.
     pub dry: usize,

@@ -23,7 +23,7 @@ pub struct StepReport {
     pub triangles: usize,
     /// Parts of that surface which the mesh does not cover, the largest first: drops and bubbles.
     pub apart: Vec<Apart>,
-    /// What the mesh became where it was rebuilt; none: it was not.
+    /// What the mesh became where it was rebuilt or improved; none: vertices and triangles are those before.
     pub change: Option<Change>,
     /// Time of each phase.
     pub phases: Vec<PhaseTime>,

@@ -69,7 +69,8 @@ impl Tracker {
     /// A mesh as it is at the first frame, in the particles' space.
     ///
     /// # Errors
-    /// Parameters out of range, a mesh or particles that are not valid; a mesh that is not where the particles are; cancel.
+    /// Parameters out of range, a mesh or particles that are not valid; a mesh that is not where the particles are; one
+    /// to be rebuilt that is not closed and 2-manifold by index; cancel.
     pub fn new(ctx: &Context, params: Params, mesh: &TriMesh, particles: &Particles) -> Result<Self> {
         Ok(Self::begin(ctx, params, mesh, particles)?.0)
     }
@@ -194,12 +195,12 @@ impl Tracker {
         }
     }
 
-    /// The triangles: those that it began with, until it is rebuilt.
+    /// The triangles: those that it began with, until a step changes them.
     pub fn triangles(&self) -> &[[u32; 3]] {
         &self.triangles
     }
 
-    /// Whether the mesh was rebuilt anywhere since it began.
+    /// Whether any step has changed vertices or triangles: by rebuilding, or by dividing, collapsing or flipping edges alone.
     pub fn is_rebuilt(&self) -> bool {
         self.is_rebuilt
     }
@@ -224,7 +225,8 @@ impl Tracker {
     /// was.
     ///
     /// # Errors
-    /// A time that is not positive; particles that are not valid, or have neither ids nor velocities; cancel.
+    /// A time that is not positive; particles that are not valid, or have neither ids nor velocities; where the mesh is rebuilt, vertices
+    /// too far apart for the grid, or more memory than the context allows; cancel.
     pub fn step(&mut self, ctx: &Context, from: &Particles, to: &Particles, dt: f64) -> Result<StepReport> {
         validate_step(from, to, dt)?;
         let (next, phases) = ctx.step(10, || {

@@ -123,7 +123,7 @@ const TRIES: usize = 32;
 const ROUNDS: usize = 4;
 /// Bytes for an area of a cell's face: up to 1.7 edges of the grid, some 150 bytes each while they are sorted.
 const FACE: f64 = 256.0;
-/// How often cells are halved where nothing would be left.
+/// How many sizes of cells are tried where nothing would be left: the one asked for, then halves of the one before.
 const HALVINGS: u32 = 6;
 
 /// Repairs a mesh in cells of an edge (m): the solid is where, with each part turned outward, the winding number is over 0. Holes are
