@@ -39,7 +39,11 @@ demo: setup
 	target/release/frazil preview $(DEMO)/liquid_plain.0016.ply -o $(DEMO)/liquid_plain.png --size 480x360 --eye=-0.15,0.42,1.28 --target -0.03,0.21,0 --fov 23 --sun=-50,30
 	target/release/frazil preview $(DEMO)/liquid.0016.bgeo -o $(DEMO)/liquid_particles.png --size 480x360 --eye=-0.15,0.42,1.28 --target -0.03,0.21,0 --fov 23 --sun=-50,30
 	target/release/frazil preview $(DEMO)/liquid -o $(DEMO)/liquid.gif --color paint --size 240x180 --eye=-0.1,0.45,1.3 --target -0.01,0.26,0 --fov 30 --sun=-50,30
-	@echo "Pictures: $(DEMO)/hero.png $(DEMO)/hero.gif (base layer, grains and mist) $(DEMO)/walker.png $(DEMO)/print.png $(DEMO)/box.png $(DEMO)/cube.png $(DEMO)/ball.png $(DEMO)/plough.png (grains) $(DEMO)/liquid.png $(DEMO)/liquid.gif (a mesh that followed a liquid; beside it $(DEMO)/liquid_plain.png, the particles surfaced anew, and $(DEMO)/liquid_particles.png); volumes: $(DEMO)/hero/base/*.vdb; the whole shot: $(DEMO)/hero/shot.usda"
+	target/release/frazil surface $(DEMO)/drip.toml -o $(DEMO)/drip
+	target/release/frazil vdb from-particles $(DEMO)/drip.0020.bgeo --spacing 0.0125 --mesh $(DEMO)/drip_plain.ply
+	target/release/frazil preview $(DEMO)/drip --frame 20 --color paint -o $(DEMO)/drip.png --size 300x360 --eye=0.25,0.5,1.5 --target 0,0.28,0 --fov 27 --sun=-50,30
+	target/release/frazil preview $(DEMO)/drip_plain.ply -o $(DEMO)/drip_plain.png --size 300x360 --eye=0.25,0.5,1.5 --target 0,0.28,0 --fov 27 --sun=-50,30
+	@echo "Pictures: $(DEMO)/hero.png $(DEMO)/hero.gif (base layer, grains and mist) $(DEMO)/walker.png $(DEMO)/print.png $(DEMO)/box.png $(DEMO)/cube.png $(DEMO)/ball.png $(DEMO)/plough.png (grains) $(DEMO)/liquid.png $(DEMO)/liquid.gif (a mesh that followed a liquid; beside it $(DEMO)/liquid_plain.png, the particles surfaced anew, and $(DEMO)/liquid_particles.png) $(DEMO)/drip.png (a mesh whose liquid pinches off and merges; beside it $(DEMO)/drip_plain.png); volumes: $(DEMO)/hero/base/*.vdb; the whole shot: $(DEMO)/hero/shot.usda"
 
 lint:
 	@if cargo fmt --version >/dev/null 2>&1; then cargo fmt --all --check; else echo "lint: rustfmt is not installed, skipped"; fi
@@ -98,7 +102,8 @@ skinning-numbers:
 	@./tools/clients
 	blender -b --factory-startup -noaudio --python-exit-code 7 --python tests/clients/skinning.py -- "$${FRAZIL_DATA:-../shared/data}/character/CesiumMan.glb" tests/clients/cesium_man.txt
 
-# The pictures of characters in docs/, from models in FRAZIL_DATA; those of the walker come from `make demo`.
+# The pictures of characters and liquids in docs/, from models and caches in FRAZIL_DATA; those of the walker, the jelly and the drop
+# come from `make demo`.
 pictures: setup
 	$(BUILD)
 	@./tools/pictures "$${FRAZIL_DATA:-../shared/data}" target/pictures docs/pictures

@@ -30,6 +30,8 @@ mod dense;
 mod distance;
 #[path = "gates/early.rs"]
 mod early;
+#[path = "gates/easing.rs"]
+mod easing;
 #[path = "gates/edit_history.rs"]
 mod edit_history;
 #[path = "gates/far.rs"]
@@ -86,6 +88,10 @@ mod rate;
 mod readers;
 #[path = "gates/rebuilt.rs"]
 mod rebuilt;
+#[path = "gates/rebuilt_frames.rs"]
+mod rebuilt_frames;
+#[path = "gates/rebuilt_large.rs"]
+mod rebuilt_large;
 #[path = "gates/rebuilt_sequences.rs"]
 mod rebuilt_sequences;
 #[path = "gates/rebuilt_speed.rs"]
@@ -118,6 +124,8 @@ mod surface_readers;
 mod sweeps;
 #[path = "gates/table.rs"]
 mod table;
+#[path = "gates/textures.rs"]
+mod textures;
 #[path = "gates/tracker_cancel.rs"]
 mod tracker_cancel;
 #[path = "gates/turned.rs"]
@@ -138,6 +146,7 @@ fn main() {
         Some(bytes::HASH) => return bytes::print_hash(),
         Some(grain_memory::MEMORY) => return grain_memory::print_memory(),
         Some(mist::MEMORY) => return mist::print_memory(),
+        Some(rebuilt_large::MILLION) => return rebuilt_large::print_million(),
         Some(damage::FUZZ) => return damage::read_mutated(),
         _ => {}
     }
@@ -172,8 +181,12 @@ fn main() {
     repair::run(&mut h);
     rebuilt::run(&mut h);
     rebuilt_topology::run(&mut h);
+    textures::run(&mut h);
     rebuilt_speed::run(&mut h);
+    rebuilt_frames::run(&mut h);
+    rebuilt_large::run(&mut h);
     matching::run(&mut h);
+    easing::run(&mut h);
     house::run(&mut h);
     h.finish();
 }

@@ -2,11 +2,21 @@
 
 #[path = "../tests/common/mod.rs"]
 mod common;
+#[path = "gates/edit_history.rs"]
+#[allow(dead_code)]
+mod edit_history;
 #[path = "gates/harness.rs"]
 #[allow(dead_code)]
 mod harness;
+#[path = "times/matching.rs"]
+mod matching;
 #[path = "times/projections.rs"]
 mod projections;
+#[path = "times/rebuilding.rs"]
+mod rebuilding;
+#[path = "gates/rebuilt_sequences.rs"]
+#[allow(dead_code)]
+mod rebuilt_sequences;
 #[path = "gates/scenes.rs"]
 #[allow(dead_code)]
 mod scenes;
@@ -48,6 +58,8 @@ fn main() {
     }
     if surface_too {
         surface::tables(cores);
+        rebuilding::tables();
+        matching::tables();
     }
 }
 

@@ -36,7 +36,7 @@
 /**
  * Version of the interface that this header describes: major << 16 | minor.
  */
-#define FRZ_ABI_VERSION 65541
+#define FRZ_ABI_VERSION 65542
 
 /**
  * Version of frazil that this header belongs to.
@@ -480,6 +480,32 @@ enum frz_tracker_array
 typedef enum frz_tracker_array frz_tracker_array;
 #else
 typedef uint32_t frz_tracker_array;
+#endif // __STDC_VERSION__ >= 202311L
+#endif // __cplusplus
+
+/**
+ * Where a mesh that is rebuilt is matched to the topology of the liquid.
+ */
+enum frz_tracker_match
+#if defined(__cplusplus) || __STDC_VERSION__ >= 202311L
+  : uint32_t
+#endif // defined(__cplusplus) || __STDC_VERSION__ >= 202311L
+ {
+    /**
+     * Where vertices are flagged, and at drops that it does not cover.
+     */
+    FRZ_TRACKER_MATCH_FLAGGED = 0,
+    /**
+     * All over it in every step: also at bubbles, and where it differs from the liquid between vertices by more than the detail
+     * around. It takes longer.
+     */
+    FRZ_TRACKER_MATCH_EVERY = 1,
+};
+#ifndef __cplusplus
+#if __STDC_VERSION__ >= 202311L
+typedef enum frz_tracker_match frz_tracker_match;
+#else
+typedef uint32_t frz_tracker_match;
 #endif // __STDC_VERSION__ >= 202311L
 #endif // __cplusplus
 
@@ -1501,9 +1527,18 @@ typedef struct {
      */
     uint32_t rebuild;
     /**
+     * A frz_tracker_match; FRZ_TRACKER_MATCH_FLAGGED is usual. It matters with rebuild alone.
+     */
+    uint32_t match;
+    /**
+     * Least count of particles in a part of a mesh that is rebuilt, up to 1000000: parts with fewer inside are taken away, and drops
+     * with fewer get no mesh; a mesh of one part stays. 1 is usual: only parts without any go. 0 is as 1.
+     */
+    uint32_t min_drop;
+    /**
      * 0.
      */
-    uint32_t reserved2;
+    uint32_t reserved3;
 } frz_tracker_params;
 
 /**
@@ -1599,6 +1634,10 @@ typedef struct {
      * Triangles that are new, or parts of others.
      */
     uint64_t made_triangles;
+    /**
+     * Parts of the mesh with some particles inside, but fewer than frz_tracker_params.min_drop, that were taken away.
+     */
+    uint64_t specks;
 } frz_tracker_report;
 
 /**
@@ -2884,6 +2923,33 @@ frz_status frz_tracker_save(frz_context *context,
                             size_t *size);
 
 /**
+ * Copies the places of the mesh's vertices as they are shown: in the steps before the liquid merges or splits, the vertices that will
+ * be taken away already go towards what will be made, so that it does not pop up. With frz_tracker_params.rebuild only; else, and
+ * far from all changes, they are those of frz_tracker_read.
+ *
+ * The steps to come are made for it, and kept: frz_tracker_step with the same particles and dt then only takes over what is there, so
+ * that a step costs as much as without. The memory of a mesh is taken for each. The tracker itself stays as it is, and so do states that
+ * are saved.
+ *
+ * now: the particles at the last step's end, or at which the tracker began.
+ * coming: count pointers, to the particles of the frames to come, in their order, each dt after the one before; NULL where count is 0.
+ * count: 0 to ahead; less than ahead where the shot ends.
+ * ahead: how many steps before a change vertices set out, 1 to 100; 4 is usual. The same in all frames.
+ * dt: time between frames (s), above 0.
+ * dst: room for as many double[3] as frz_tracker_count reports (m); FRZ_ERROR_CAPACITY when it is too little, and nothing is written.
+ *
+ * One thread at a time.
+ */
+frz_status frz_tracker_read_eased(frz_context *context,
+                                  frz_tracker *tracker,
+                                  const frz_particles *now,
+                                  const frz_particles *const *coming,
+                                  size_t count,
+                                  uint32_t ahead,
+                                  double dt,
+                                  frz_span dst);
+
+/**
  * Reports how many vertices the mesh has: as many as the one that it was made with, until a step changes it
  * (frz_tracker_params.rebuild).
  *
@@ -2953,6 +3019,44 @@ frz_status frz_tracker_edits(const frz_tracker *tracker,
 frz_status frz_tracker_read_edits(const frz_tracker *tracker,
                                   uint32_t array,
                                   frz_span dst);
+
+/**
+ * Copies for each vertex where the liquid there was at the first frame, by the particles around it that were there then: for a host to
+ * take textures and arrays of its own through merges and splits. What a step made (frz_tracker_read_edits) takes what the mesh of the
+ * first frame has at the nearest place to where its liquid was. Corners of a triangle may come from far apart, where liquids have come
+ * together: it should have all of its corners' numbers from near one of them.
+ *
+ * first: the particles at the first frame, with ids.
+ * now: the particles at the time to which the last step led, with ids.
+ * dst: room for as many double[3] as frz_tracker_count reports (m); FRZ_ERROR_CAPACITY when it is too little, and nothing is written.
+ *     NaN where it is not known: no particle near a vertex was there at the first frame.
+ *
+ * One thread at a time for each context; any number may read a tracker.
+ */
+frz_status frz_tracker_read_rest(frz_context *context,
+                                 const frz_tracker *tracker,
+                                 const frz_particles *first,
+                                 const frz_particles *now,
+                                 frz_span dst);
+
+/**
+ * Puts an edited mesh in the place of the tracker's: an artist's change in the middle of a shot. How far each of its vertices is from
+ * the particles' surface is measured anew, and kept from there on. After a failure or a cancel the tracker is as it was.
+ *
+ * The parameters stay. No vertex and no triangle is one from before: frz_tracker_edits answers 1, and frz_tracker_read_edits says that
+ * all were made; the places from before (FRZ_EDIT_BEFORE) are those to which the last step led. States that are saved from then on
+ * hold the edited mesh, and still come back with the mesh that the tracker was made with (frz_tracker_create).
+ *
+ * mesh: as frz_tracker_create takes it, with any vertices and faces, in the particles' space; it is copied. Its attribute "detail" of
+ *     one float says what does not fade, also where the mesh before had none.
+ * particles: at the time to which the last step led, or at which the tracker began: the next step begins with them.
+ *
+ * One thread at a time; any number may read a mesh.
+ */
+frz_status frz_tracker_resculpt(frz_context *context,
+                                frz_tracker *tracker,
+                                const frz_mesh *mesh,
+                                const frz_particles *particles);
 
 #ifdef __cplusplus
 }  // extern "C"

@@ -273,10 +273,14 @@ pub const GATES: &[Gate] = &[
     yes("surface.same_bytes_kill"),
     yes("surface.same_bytes_cpu"),
     gate("surface.cancel_p99", "s", Most(0.2), Most(0.05)),
+    gate("surface.cancel_rebuilt_p99", "s", Most(0.2), Most(0.05)),
     // Frames from a change of the particles' own surface to its first flag.
     gate("surface.early", "frames", Most(1.0), Most(0.0)),
     // A ball in a vortex, drawn out into a sheet and back: vertices from where they began, after a period.
     gate("surface.vortex", "r", Open, Open),
+    // The same with the mesh rebuilt: what it encloses after a period, less than at first, and how far it is from where it began.
+    gate("surface.vortex_rebuilt_volume", "%", Most(5.0), Most(2.0)),
+    gate("surface.vortex_rebuilt_mean", "r", Most(1.5), Most(0.5)),
     // Particle caches: other programs find the same particles, and damaged files are refused or read.
     yes("surface.readers_same"),
     none("surface.readers_crashes", "files"),
@@ -318,10 +322,16 @@ pub const GATES: &[Gate] = &[
     gate("surface.rebuilt_volume", "%", Most(1.0), Most(0.5)),
     // What changes say of vertices and triangles leads back to the first ones.
     yes("surface.rebuilt_edits"),
+    // Textures of faces that are rebuilt in a merge: by how much edges differ there from the particles' own.
+    gate("surface.textures", "%", Most(10.0), Most(3.0)),
     // Triangles that were made: their least angles, and edges of half a cell to one and a half.
     gate("surface.rebuilt_quality_angle", "deg", Least(10.0), Least(15.0)),
     gate("surface.rebuilt_quality_edges", "%", Least(95.0), Least(99.0)),
     // Topology matched near the flags against the whole grid: signs and differences, and the volume of a neck.
+    // How far what a change makes lies from what was shown before it; whether what is shown crosses itself.
+    gate("surface.easing_jump", "r", Most(0.5), Most(0.3)),
+    gate("surface.easing_depth", "cells", Most(1.0), Open),
+    gate("surface.easing_volume", "1", Most(1.0e-4), Open),
     yes("surface.match_near"),
     gate("surface.match_neck", "%", Most(1.0), Open),
     // The time of rebuilding nothing, 2 % and 20 % of the mesh, of a step in which a drop merges, and what a second thread gains.
@@ -331,4 +341,14 @@ pub const GATES: &[Gate] = &[
     gate("surface.frame_dragon", "s", Most(1.0), Most(0.6)),
     gate("surface.rebuilt_threads", "x", Least(1.5), Least(1.8)),
     yes("surface.rebuilt_same"),
+    // Whole frames of scenes like those of the thesis' Table 2.2, and matching on the finest cells of its Table 2.1.
+    gate("surface.frame_bunny", "s", Most(0.6), Most(0.3)),
+    gate("surface.frame_gazelle", "s", Most(1.6), Most(0.8)),
+    gate("surface.frame_gears", "s", Most(1.6), Most(0.8)),
+    gate("surface.frame_armadillo", "s", Most(1.6), Most(0.8)),
+    gate("surface.match_fine", "s", Most(0.5), Most(0.2)),
+    // 260,000 particles and 371,000 triangles, and a million of both, while they merge; the peak of memory of the latter.
+    gate("surface.frame_260k", "s", Most(4.0), Most(2.0)),
+    gate("surface.frame_million", "s", Most(12.0), Most(5.0)),
+    gate("surface.rebuilt_memory", "GB", Most(2.0), Most(1.0)),
 ];

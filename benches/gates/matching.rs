@@ -26,7 +26,7 @@ pub fn run(h: &mut Harness) {
     for (shift, solver) in [(0.0, Solver::Sor), (1.0, Solver::Gradients)] {
         let nodes = balls(shift);
         let [near, whole] = [REACH, i32::MAX].map(|reach| {
-            let matching = Matching { solver, tolerance: TOLERANCE, reach, most: 5000 };
+            let matching = Matching { solver, tolerance: TOLERANCE, reach, most: 5000, omega: None };
             match_topology(&ctx, &nodes, &matching).expect("a matching")
         });
         residual = residual.max(near.residual).max(whole.residual);

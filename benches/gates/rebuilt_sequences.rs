@@ -26,6 +26,9 @@ const FPS: f64 = 24.0;
 /// frame 47 on too: these are no liquids any more. The dumbbell and the sheet are apart for good from frames 53 and 57 on.
 const FRAMES: [usize; 4] = [46, 64, 64, 45];
 
+/// The frame at which the balls' outermost particles are a spacing apart.
+const MET: usize = 10;
+
 /// A liquid whose frames are known, and the mesh that it begins with.
 pub struct Sequence {
     pub name: &'static str,
@@ -105,6 +108,19 @@ pub fn made(ctx: &Context) -> Vec<Sequence> {
         Sequence { name, first: 0, spacing: SPACING, dt: 1.0 / FPS, frames, mesh, particles: Box::new(at) }
     };
     sets().into_iter().zip(FRAMES).map(one).collect()
+}
+
+/// The two balls of the made sets, which stay where they are when their particles have met: from then on they are one liquid.
+pub fn joined(ctx: &Context) -> Sequence {
+    let [Set { places, motion, .. }, ..] = sets();
+    let at = move |frame: usize| {
+        let passed = frame.min(MET) as f64;
+        numbered(places.iter().map(|place| motion(*place, passed) * SPACING).collect())
+    };
+    let mesh = own_surface(ctx, &at(0).places, SPACING);
+    let name = "two balls join";
+    let particles = Box::new(at);
+    Sequence { name, first: 0, spacing: SPACING, dt: 1.0 / FPS, frames: MET + 10, mesh, particles }
 }
 
 fn cached(path: &Path) -> Particles {

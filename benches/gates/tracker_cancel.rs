@@ -1,71 +1,92 @@
-//! Gate of a mesh's step that is cancelled through C: the time until it returns, and that it left all as it was.
+//! Gates of a mesh's step that is cancelled through C, also of one that rebuilds it: the time until it returns, and that it left all as
+//! it was.
 
+use std::cell::Cell;
 use std::mem::MaybeUninit;
 use std::ptr::{null, null_mut};
 
+use frazil::base::{DVec3, TriMesh};
 use frazil::capi::mesh::*;
 use frazil::capi::tracker::*;
 use frazil::capi::{frz_status, frz_view};
 
 use crate::cancel_latency::{Steps, measure};
-use crate::common::liquids::{ball, turned};
+use crate::common::liquids::{ball, context, filled, turned};
 use crate::grains::Random;
 use crate::harness::Harness;
 use crate::host::{Threads, view, works, written};
+use crate::rebuilt_sequences::own_surface;
 
 const NO_VIEW: frz_view = frz_view { data: null(), count: 0, stride: 0 };
+/// Initial distance between particles (m).
+const SPACING: f64 = 0.01;
+/// Two blocks of liquid that meet face to face in one step: their edge, and how far apart their outermost particles are before it and
+/// after it (spacings). All of both faces is then rebuilt.
+const EDGE: f64 = 36.0;
+const GAPS: [f64; 2] = [4.0, 1.0];
 
-/// A ball of particles that turns to and fro, with a mesh around it.
+/// Particles that move, with a mesh around them; each step is the same, as a tracker that has made one is put back.
 struct Host {
     threads: Threads,
+    /// Trackers are put back on these: no cancel reaches them.
+    others: Threads,
+    params: frz_tracker_params,
     mesh: *mut frz_mesh,
-    tracker: *mut frz_tracker,
+    tracker: Cell<*mut frz_tracker>,
+    /// The tracker's state before a step.
+    first: Vec<u8>,
+    /// Before a step and after it (m).
     places: [Vec<[f64; 3]>; 2],
     ids: Vec<i64>,
 }
 
 impl Host {
-    fn new() -> Self {
-        let ball = ball(26.0, 100, 0.25);
-        let at = |angle: f64| {
-            let turned = ball.places.iter().map(|place| turned(*place, angle, Default::default()));
-            turned.map(|place| place.into()).collect()
+    fn new(places: [Vec<DVec3>; 2], mesh: &TriMesh, is_rebuilt: bool) -> Self {
+        let mut params = MaybeUninit::<frz_tracker_params>::uninit();
+        // SAFETY: the pointer is valid, and the parameters are filled before they are read.
+        let mut params = unsafe {
+            works(frz_tracker_params_init(params.as_mut_ptr(), size_of::<frz_tracker_params>()));
+            params.assume_init()
         };
+        params.spacing = SPACING;
+        params.rebuild = u32::from(is_rebuilt);
         let mut host = Self {
             threads: Threads::new(2),
+            others: Threads::new(2),
+            params,
             mesh: null_mut(),
-            tracker: null_mut(),
-            places: [at(0.0), at(0.02)],
-            ids: (0..ball.places.len() as i64).collect(),
+            tracker: Cell::new(null_mut()),
+            first: Vec::new(),
+            ids: (0..places[0].len() as i64).collect(),
+            places: places.map(|places| places.iter().map(|place| (*place).into()).collect()),
         };
-        let corners: Vec<[f32; 3]> = ball.mesh.positions.iter().map(|place| (*place).into()).collect();
+        let corners: Vec<[f32; 3]> = mesh.positions.iter().map(|place| (*place).into()).collect();
         let desc = frz_mesh_desc {
             struct_size: size_of::<frz_mesh_desc>() as u32,
             flags: 0,
             positions: view(&corners),
             face_counts: NO_VIEW,
-            indices: view(ball.mesh.triangles.as_flattened()),
+            indices: view(mesh.triangles.as_flattened()),
             attributes: null(),
             attribute_count: 0,
         };
-        let mut params = MaybeUninit::<frz_tracker_params>::uninit();
-        // SAFETY: the pointers are valid, and the parameters are filled before they are read.
+        let mut tracker = null_mut();
+        // SAFETY: the pointers are valid.
         unsafe {
             works(frz_mesh_create(host.threads.ctx, &desc, &mut host.mesh));
-            works(frz_tracker_params_init(params.as_mut_ptr(), size_of::<frz_tracker_params>()));
-            let mut params = params.assume_init();
-            params.spacing = ball.spacing;
             let first = host.particles(0);
             works(frz_tracker_create(
                 host.threads.ctx,
-                &params,
+                &host.params,
                 host.mesh,
                 &first,
                 null(),
                 0,
-                &mut host.tracker,
+                &mut tracker,
             ));
         }
+        host.tracker.set(tracker);
+        host.first = host.state();
         host
     }
 
@@ -78,6 +99,35 @@ impl Host {
             ids: view(&self.ids),
         }
     }
+
+    /// Makes a step, and puts the tracker back if it was not cancelled; `report` may be null.
+    fn step_told(&self, report: *mut frz_tracker_report) -> frz_status {
+        let (from, to) = (self.particles(0), self.particles(1));
+        // SAFETY: the pointers are valid, or null where that is allowed.
+        let status =
+            unsafe { frz_tracker_step(self.threads.ctx, self.tracker.get(), &from, &to, 1.0 / 24.0, report) };
+        if status == frz_status::FRZ_OK {
+            self.put_back();
+        }
+        status
+    }
+
+    fn put_back(&self) {
+        let mut again = null_mut();
+        // SAFETY: the pointers are valid, or null where that is allowed; nobody uses the old tracker any more.
+        unsafe {
+            works(frz_tracker_create(
+                self.others.ctx,
+                &self.params,
+                self.mesh,
+                null(),
+                self.first.as_ptr().cast(),
+                self.first.len(),
+                &mut again,
+            ));
+            frz_tracker_destroy(self.tracker.replace(again));
+        }
+    }
 }
 
 impl Steps for Host {
@@ -86,15 +136,13 @@ impl Steps for Host {
     }
 
     fn step(&self) -> frz_status {
-        let (from, to) = (self.particles(0), self.particles(1));
-        // SAFETY: the pointers are valid.
-        unsafe { frz_tracker_step(self.threads.ctx, self.tracker, &from, &to, 1.0 / 24.0, null_mut()) }
+        self.step_told(null_mut())
     }
 
     fn state(&self) -> Vec<u8> {
         // SAFETY: the pointers are valid.
         written(|room, capacity, size| unsafe {
-            frz_tracker_save(self.threads.ctx, self.tracker, room, capacity, size)
+            frz_tracker_save(self.threads.ctx, self.tracker.get(), room, capacity, size)
         })
     }
 }
@@ -103,18 +151,60 @@ impl Drop for Host {
     fn drop(&mut self) {
         // SAFETY: nobody uses them any more.
         unsafe {
-            frz_tracker_destroy(self.tracker);
+            frz_tracker_destroy(self.tracker.get());
             frz_mesh_destroy(self.mesh);
         }
     }
 }
 
 pub fn run(h: &mut Harness) {
+    following(h);
+    rebuilding(h);
+}
+
+/// A ball that turns.
+fn following(h: &mut Harness) {
     let name = "surface.cancel_p99";
     if !h.wants(name) {
         return;
     }
-    let host = Host::new();
+    let ball = ball(26.0, 100, 0.25);
+    let at = |angle: f64| ball.places.iter().map(|place| turned(*place, angle, Default::default())).collect();
+    let host = Host::new([at(0.0), at(0.02)], &ball.mesh, false);
     let what = format!("{} particles", host.ids.len());
     measure(h, name, &host, &mut Random(42), &what);
+}
+
+/// Two blocks that meet.
+fn rebuilding(h: &mut Harness) {
+    let name = "surface.cancel_rebuilt_p99";
+    if !h.wants(name) {
+        return;
+    }
+    let half = 0.5 * EDGE * SPACING;
+    let block = filled(SPACING, 0.1, half, |place| place.amax() < half);
+    let at = |gap: f64| -> Vec<DVec3> {
+        // Particles lie half a spacing below a block's faces.
+        let by = DVec3::new(half + 0.5 * (gap - 1.0) * SPACING, 0.0, 0.0);
+        block.iter().map(|place| place - by).chain(block.iter().map(|place| place + by)).collect()
+    };
+    let places = GAPS.map(at);
+    let mesh = own_surface(&context(2), &places[0], SPACING);
+    let host = Host::new(places, &mesh, true);
+    // SAFETY: it is made of numbers.
+    let mut report: frz_tracker_report = unsafe { std::mem::zeroed() };
+    report.struct_size = size_of::<frz_tracker_report>() as u32;
+    works(host.step_told(&mut report));
+    if report.rebuilt_cells == 0 {
+        return h.gate(name, f64::NAN, "nothing was rebuilt");
+    }
+    let what = format!(
+        "{} particles and {} triangles, {} cells flagged and {} rebuilt, {} triangles made",
+        host.ids.len(),
+        mesh.triangles.len(),
+        report.changed_cells,
+        report.rebuilt_cells,
+        report.made_triangles
+    );
+    measure(h, name, &host, &mut Random(43), &what);
 }

@@ -1,9 +1,12 @@
-//! Gate of the ball in a vortex (Enright et al. 2002): how far its mesh is from its start after a period, drawn out into a sheet and
-//! back.
+//! Gates of the ball in a vortex (Enright et al. 2002): how far its mesh is from its start after a period, drawn out into a sheet and
+//! back; of a mesh that is rebuilt, where the sheet tears and closes again, also how much of its volume is lost.
 
 use std::time::Instant;
 
-use frazil::base::DVec3;
+use frazil::base::deviation::{NearestTree, from_surface};
+use frazil::base::mesh::coincident;
+use frazil::base::topology::bodies;
+use frazil::base::{DVec3, TriMesh};
 use frazil::surface::{Params, Particles, Tracker};
 
 use crate::common::liquids::{context, numbered};
@@ -20,10 +23,21 @@ const FRAMES: u32 = 72;
 const STEPS: u32 = 4;
 /// Every so many frames a line is printed.
 const SHOWN: u32 = 6;
+/// The same of a mesh that is rebuilt: 12 frames a second, and threads. Rebuilding a torn sheet takes long.
+const REBUILT_FRAMES: u32 = 36;
+const REBUILT_STEPS: u32 = 8;
+const THREADS: usize = 2;
 
 pub fn run(h: &mut Harness) {
+    as_it_is(h);
+    rebuilt(h);
+}
+
+/// The mesh keeps its triangles.
+fn as_it_is(h: &mut Harness) {
     let name = "surface.vortex";
-    if !h.wants(name) {
+    // Not where only those are asked for whose names begin so.
+    if !h.missing().contains(&name) {
         return;
     }
     let ctx = context(1);
@@ -35,8 +49,8 @@ pub fn run(h: &mut Harness) {
     let mut truth = first.clone();
     let (mut most_flagged, mut last_flagged) = (0.0f64, 0.0);
     for frame in 1..=FRAMES {
-        let span = [frame - 1, frame].map(|frame| Vortex::PERIOD * f64::from(frame) / f64::from(FRAMES));
-        let to = carried(&from, span);
+        let span = span(frame, FRAMES);
+        let to = carried(&from, span, STEPS);
         tracker.step(&ctx, &from, &to, span[1] - span[0]).expect("a step");
         from = to;
         Vortex::carry(&mut truth, span, STEPS);
@@ -63,11 +77,96 @@ pub fn run(h: &mut Harness) {
     h.gate(name, mean, &note);
 }
 
-/// The particles at the end of a time (s).
-fn carried(particles: &Particles, span: [f64; 2]) -> Particles {
+/// The mesh is rebuilt where the sheet is too thin for its particles, and where it closes again.
+fn rebuilt(h: &mut Harness) {
+    let names @ [volume, mean] = ["surface.vortex_rebuilt_volume", "surface.vortex_rebuilt_mean"];
+    if !names.iter().any(|name| h.wants(name)) {
+        return;
+    }
+    let ctx = context(THREADS);
+    let start = Instant::now();
+    let Vortex { spacing, places, mesh } = Vortex::new(PARTICLES, SQUARES);
+    let first = joined(&mesh);
+    let params = Params { rebuild: true, ..Params::for_spacing(spacing) };
+    let mut from = moving(numbered(places), 0.0);
+    let mut tracker = Tracker::new(&ctx, params, &first, &from).expect("a tracker");
+    let lost = |mesh: &TriMesh| 100.0 * (1.0 - mesh.volume() / first.volume());
+    let (mut changes, mut most) = (0, 0);
+    for frame in 1..=REBUILT_FRAMES {
+        let span = span(frame, REBUILT_FRAMES);
+        let to = moving(carried(&from, span, REBUILT_STEPS), span[1]);
+        let report = match tracker.step(&ctx, &from, &to, span[1] - span[0]) {
+            Ok(report) => report,
+            Err(error) => {
+                let note = format!("frame {frame} of {REBUILT_FRAMES}: {error}");
+                return names.into_iter().for_each(|name| h.gate(name, f64::NAN, &note));
+            }
+        };
+        from = to;
+        let cells = report.change.as_ref().map_or(0, |change| change.flagged_cells);
+        changes += usize::from(cells > 0);
+        most = most.max(tracker.triangles().len());
+        if frame.is_multiple_of(SHOWN) {
+            println!(
+                "# vortex, rebuilt, frame {frame}: {:.2} % lost, {} triangles in {} bodies, {cells} cells flagged, {:.0} s",
+                lost(&tracker.mesh()),
+                tracker.triangles().len(),
+                bodies(tracker.triangles()).len(),
+                start.elapsed().as_secs_f64()
+            );
+        }
+    }
+    let last = tracker.mesh();
+    let off = |from: &TriMesh, to: &TriMesh| {
+        from_surface(from, &NearestTree::new(to))
+            .map_or([f64::NAN; 3], |off| [off.mean, off.p95, off.max].map(|far| far / spacing))
+    };
+    let (there, back) = (off(&last, &first), off(&first, &last));
+    let note = format!(
+        "{} particles, {REBUILT_FRAMES} frames, {changes} of which changed cells; {} triangles at first, at most {most}, {} at the end \
+         in {} bodies; {:.0} s on {THREADS} threads",
+        from.places.len(),
+        first.triangles.len(),
+        last.triangles.len(),
+        bodies(&last.triangles).len(),
+        start.elapsed().as_secs_f64()
+    );
+    let gone = lost(&last);
+    h.gate(volume, gone.abs(), &format!("{gone:.2} % lost; {note}"));
+    let [to_mean, to_p95, to_most] = there;
+    let [back_mean, back_p95, back_most] = back;
+    let ways = format!(
+        "the larger of both ways: to the ball {to_mean:.3} r, p95 {to_p95:.3}, at most {to_most:.2}; from it {back_mean:.3}, p95 \
+         {back_p95:.3}, at most {back_most:.2}"
+    );
+    h.gate(mean, to_mean.max(back_mean), &format!("{ways}; {note}"));
+}
+
+/// The time (s) of a frame out of so many in a period.
+fn span(frame: u32, of: u32) -> [f64; 2] {
+    [frame - 1, frame].map(|frame| Vortex::PERIOD * f64::from(frame) / f64::from(of))
+}
+
+/// The particles at the end of a time (s), carried in so many steps.
+fn carried(particles: &Particles, span: [f64; 2], steps: u32) -> Particles {
     let mut out = particles.clone();
-    Vortex::carry(&mut out.places, span, STEPS);
+    Vortex::carry(&mut out.places, span, steps);
     out
+}
+
+/// Particles with their velocities at a time (s): in few frames their ways are no lines.
+fn moving(mut particles: Particles, time: f64) -> Particles {
+    let speed = |place: &DVec3| Vortex::velocity(*place, time).cast::<f32>().into();
+    particles.velocities = particles.places.iter().map(speed).collect();
+    particles
+}
+
+/// A mesh in which vertices at one place are the same.
+fn joined(mesh: &TriMesh) -> TriMesh {
+    let same = coincident(mesh.positions.iter().map(|place| place.cast()));
+    let triangles =
+        mesh.triangles.iter().map(|corners| corners.map(|corner| same[corner as usize])).collect();
+    TriMesh { positions: mesh.positions.clone(), triangles }.without_unused()
 }
 
 /// How far places are from others, one by one: mean, 95th percentile and greatest (spacings).

@@ -17,7 +17,7 @@ use crate::projections::{Follower, WAYS, measured};
 use crate::surface_gates::{steps_with, time};
 
 /// Rows of Table 2.2: particles, triangles, and seconds a frame of the phases below, on one core of an i7-3930K.
-const EXAMPLES: [(&str, usize, usize, [f64; 4]); 7] = [
+pub const EXAMPLES: [(&str, usize, usize, [f64; 4]); 7] = [
     ("dragon", 20_456, 257_785, [1.17, 3.01, 1.39, 1.24]),
     ("gears", 8_877, 121_414, [0.39, 1.82, 3.06, 0.48]),
     ("viscous armadillo", 35_195, 85_274, [0.41, 5.34, 3.43, 0.32]),
@@ -55,7 +55,7 @@ pub fn tables(cores: usize) {
 }
 
 /// What a table shows, then its head, of columns between bars.
-fn title(text: &str, columns: &str) {
+pub fn title(text: &str, columns: &str) {
     println!("\n{text}\n\n| {columns} |\n|{}", "---|".repeat(columns.split(" | ").count()));
 }
 
@@ -88,13 +88,14 @@ fn phase_times(threads: usize, ball: &Ball, params: Params, steps: usize) -> [f6
 }
 
 /// Mean, 95th percentile and greatest of some numbers.
-fn spread(mut values: Vec<f64>) -> [f64; 3] {
+pub fn spread(mut values: Vec<f64>) -> [f64; 3] {
     values.sort_unstable_by(f64::total_cmp);
     let mean = values.iter().sum::<f64>() / values.len() as f64;
     [mean, values[(values.len() * 95 / 100).min(values.len() - 1)], values[values.len() - 1]]
 }
 
-fn text(numbers: [f64; 3]) -> String {
+/// Mean, 95th percentile and greatest as a cell of a table.
+pub fn text(numbers: [f64; 3]) -> String {
     numbers.map(|number| format!("{number:.4}")).join(", ")
 }
 

@@ -9,7 +9,7 @@ import threading
 
 import numpy as np
 
-ABI_VERSION = 0x10005
+ABI_VERSION = 0x10006
 
 OK, CANCELLED = 0, 5
 
@@ -18,7 +18,7 @@ class Struct(c.Structure):
     """A struct that shows its fields."""
 
     def __repr__(self):
-        hidden = ("struct_size", "reserved", "reserved2")
+        hidden = ("struct_size", "reserved", "reserved3")
         named = [(name, getattr(self, name)) for name, *_ in self._fields_ if name not in hidden]
         listed = [(name, tuple(value) if isinstance(value, c.Array) else value) for name, value in named]
         return f"<{type(self).__name__} {' '.join(f'{name}={value!r}' for name, value in listed)}>"
@@ -170,7 +170,8 @@ class TrackerParams(Struct):
     _fields_ = [
         ("struct_size", c.c_uint32), ("flags", c.c_uint32), ("spacing", c.c_double), ("cell", c.c_double),
         ("change", c.c_double), ("half_life", c.c_double), ("fade", c.c_double), ("weighting", c.c_uint32),
-        ("reserved", c.c_uint32), ("rebuild", c.c_uint32), ("reserved2", c.c_uint32),
+        ("reserved", c.c_uint32), ("rebuild", c.c_uint32), ("match", c.c_uint32), ("min_drop", c.c_uint32),
+        ("reserved3", c.c_uint32),
     ]
 
 
@@ -180,6 +181,7 @@ class TrackerReport(Struct):
         ("born", c.c_uint64), ("died", c.c_uint64), ("triangles", c.c_uint64), ("drops", c.c_uint64),
         ("bubbles", c.c_uint64), ("uncovered", c.c_uint64), ("changed", c.c_uint32), ("rung", c.c_uint32),
         ("changed_cells", c.c_uint64), ("rebuilt_cells", c.c_uint64), ("made_triangles", c.c_uint64),
+        ("specks", c.c_uint64),
     ]
 
 
@@ -242,7 +244,9 @@ _FUNCTIONS = {
     "tracker_create": [_P, _P, _P, _P, _P, _Z, _P], "tracker_set_params": [_P, _P],
     "tracker_step": [_P, _P, _P, _P, _D, _P], "tracker_count": [_P, _P], "tracker_read": [_P, _U, Span],
     "tracker_triangle_count": [_P, _P], "tracker_read_triangles": [_P, Span], "tracker_edits": [_P, _P, _P],
-    "tracker_read_edits": [_P, _U, Span], "tracker_save": [_P, _P, _P, _Z, _P],
+    "tracker_read_edits": [_P, _U, Span], "tracker_resculpt": [_P, _P, _P, _P],
+    "tracker_read_rest": [_P, _P, _P, _P, Span],
+    "tracker_save": [_P, _P, _P, _Z, _P],
 }
 _VOID = ["pool_destroy", "context_destroy", "context_cancel", "context_reset", "mesh_destroy", "grid_destroy",
          "base_destroy", "grains_destroy", "mist_destroy", "tracker_destroy"]

@@ -12,6 +12,7 @@ ARRAYS = {
     "P": (0, np.float32, 3), "P64": (1, np.float64, 3), "delta": (2, np.float32, 1), "flagged": (3, np.int32, 1),
 }
 WEIGHTINGS = {"affine": 0, "mean": 1}
+MATCHES = {"flagged": 0, "every": 1}
 # Kinds of triangles after a step, as Edits has them.
 WHOLE, PART, NEW = 0, 1, 2
 
@@ -61,7 +62,10 @@ class Tracker(Handle):
     weighting: "affine" or "mean".
     rebuild: whether the mesh is rebuilt where the liquid merges or splits; it must be closed: see Mesh.repaired. Read its triangles
     anew after each step that changed them (the report says so), and take arrays of your own along by edits.
-    Further parameters, as in frz_tracker_params: cell and change (r), half_life (s), fade.
+    match: where a mesh that is rebuilt is matched to the liquid: "flagged", where its vertices find a change, or "every", all over it in
+    every step, which finds bubbles too and takes longer.
+    Further parameters, as in frz_tracker_params: cell and change (r), half_life (s), fade; min_drop, the least count of particles in a
+    part of a mesh that is rebuilt.
     state: bytes of save(), to go on from.
     """
 
@@ -78,16 +82,19 @@ class Tracker(Handle):
         return f"of {len(self)} vertices on particles {self._spacing:g} m apart"
 
     @staticmethod
-    def _params(spacing, weighting="affine", rebuild=False, **more):
+    def _params(spacing, weighting="affine", rebuild=False, match="flagged", **more):
         params = TrackerParams()
         call("tracker_params_init", c.byref(params), c.sizeof(params))
         params.spacing = spacing
         if weighting not in WEIGHTINGS:
             raise ValueError(f"weighting is {weighting!r}, not {' or '.join(WEIGHTINGS)}")
         params.weighting = WEIGHTINGS[weighting]
+        if match not in MATCHES:
+            raise ValueError(f"match is {match!r}, not {' or '.join(MATCHES)}")
+        params.match = MATCHES[match]
         params.rebuild = bool(rebuild)
         for name, value in more.items():
-            if name in ("struct_size", "flags", "reserved", "reserved2") or name not in dict(TrackerParams._fields_):
+            if name in ("struct_size", "flags", "reserved", "reserved3") or name not in dict(TrackerParams._fields_):
                 raise TypeError(f"trackers have no parameter {name}")
             setattr(params, name, value)
         return params
@@ -104,6 +111,12 @@ class Tracker(Handle):
         call("tracker_step", self._ctx.pointer, self.pointer, c.byref(before._desc()), c.byref(after._desc()), dt,
              c.byref(report))
         return report
+
+    def resculpt(self, mesh, particles):
+        """Puts an edited frazil.Mesh in the place of the tracked one, of any vertices and faces; particles: frazil.Particles of the
+        time to which the last step led. The distances that vertices keep are measured anew, and kept from there on. What fails leaves
+        the tracker as it was. A state that is saved later still takes the mesh that the tracker was made with."""
+        call("tracker_resculpt", self._ctx.pointer, self.pointer, mesh.pointer, c.byref(particles._desc()))
 
     def __len__(self):
         count = c.c_size_t()
@@ -140,7 +153,8 @@ class Tracker(Handle):
 
     @property
     def edits(self):
-        """What the last step made of the mesh: Edits. Nothing before the first step, and after a start from a state."""
+        """What the last step made of the mesh: Edits. Nothing before the first step, and after a start from a state; after
+        resculpt() everything was made."""
         changed, before, count = c.c_uint32(), c.c_size_t(), c.c_size_t()
         call("tracker_edits", self.pointer, c.byref(changed), c.byref(before))
         call("tracker_triangle_count", self.pointer, c.byref(count))
@@ -149,6 +163,13 @@ class Tracker(Handle):
         for number, array in enumerate(arrays):
             call("tracker_read_edits", self.pointer, number, span(array))
         return Edits(bool(changed.value), *arrays)
+
+    def rest(self, first, now):
+        """(n, 3) places (m) in 64 bits where the liquid at each vertex was at the first frame; NaN where that is not known. first,
+        now: frazil.Particles with ids at the first frame, and at the time to which the last step led."""
+        out = np.empty((len(self), 3), np.float64)
+        call("tracker_read_rest", self._ctx.pointer, self.pointer, c.byref(first._desc()), c.byref(now._desc()), span(out))
+        return out
 
     def save(self):
         """The state, for a cache: bytes that Tracker(..., state=...) goes on from."""

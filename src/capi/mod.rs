@@ -72,9 +72,17 @@ pub mod mist_params;
 #[cfg(feature = "vdb")]
 pub mod mist;
 
+pub mod tracker_params;
+
 pub mod tracker;
 
+pub mod tracker_eased;
+
 pub mod tracker_edits;
+
+pub mod tracker_rest;
+
+pub mod tracker_sculpt;
 
 mod handle;
 mod saved;

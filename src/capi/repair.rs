@@ -70,9 +70,6 @@ impl frz_repair_report {
     }
 }
 
-/// Memory for an area of a face of a cell (bytes): up to 1.7 edges of the grid, which take some 150 bytes each while they are sorted.
-const BYTES_PER_FACE: f64 = 256.0;
-
 /// Makes a closed mesh of one that is open, crosses itself, or is inside out in parts: the solid where, with each part turned
 /// outward, a point lies inside of at least one. Parts that overlap become one, holes are closed, cavities are filled.
 ///
@@ -116,8 +113,6 @@ pub unsafe extern "C" fn frz_mesh_repair(
 
 /// A repaired mesh with its attributes, and what was done.
 fn repaired(ctx: &Context, mesh: &Mesh, cell: f64) -> Outcome<(Mesh, RepairReport)> {
-    let faces = mesh.triangles.area() / (cell * cell);
-    ctx.allow(&format!("a repair with cells of {cell} m"), (faces * BYTES_PER_FACE) as u64)?;
     let Repaired { mesh: solid, vertices, sources, report } = repair(ctx, &mesh.triangles, cell)?;
     // One array for each component: they are carried one by one.
     let arrays = mesh.attributes().flat_map(|(name, components, values)| {
@@ -127,7 +122,7 @@ fn repaired(ctx: &Context, mesh: &Mesh, cell: f64) -> Outcome<(Mesh, RepairRepor
         })
     });
     let detail = DetailedMesh { mesh: mesh.triangles.clone(), uvs: None, arrays: arrays.collect() };
-    let carry = || Ok(carry_attributes(&detail, solid, &vertices, &sources));
+    let carry = || Ok(carry_attributes(&detail, solid, &vertices, &sources, None));
     let DetailedMesh { mesh: solid, arrays, .. } = ctx.phase("carry", carry)?;
     let count = solid.positions.len();
     let mut out = Mesh::of_triangles(solid);

@@ -8,9 +8,10 @@ use super::handle::{Noun, change, clear, destroy, read, required};
 use super::mesh::{frz_mesh, no_flags};
 use super::saved::{Saved, resumed};
 use super::tracker_edits::Edits;
-use super::views::{Sized32, fill, finite, frz_view, meaning, sized, within};
+pub use super::tracker_params::{frz_tracker_params, frz_tracker_params_init};
+use super::views::{Sized32, fill, finite, frz_view, sized};
 use crate::base::topology::Topology;
-use crate::surface::{Change, Params, Particles, Tracker, Weighting, estimate_spacing};
+use crate::surface::{Change, Outlook, Particles, Tracker, estimate_spacing};
 
 /// A detailed mesh that follows the particles of a liquid.
 pub struct frz_tracker {
@@ -38,106 +39,6 @@ pub struct frz_particles {
 unsafe impl Sized32 for frz_particles {
     const SIZES: &'static [usize] = &[size_of::<Self>()];
     const NAME: &'static str = "frz_particles";
-}
-
-/// How particles carry vertices.
-#[repr(u32)]
-#[derive(Clone, Copy)]
-pub enum frz_tracker_weighting {
-    /// By affine maps: exact where the liquid turns and stretches.
-    FRZ_TRACKER_AFFINE = 0,
-    /// By their mean, as in the thesis: it lags behind.
-    FRZ_TRACKER_MEAN = 1,
-}
-
-use frz_tracker_weighting::*;
-
-const WEIGHTINGS: [(u32, Weighting); 2] =
-    [(FRZ_TRACKER_AFFINE as u32, Weighting::Affine), (FRZ_TRACKER_MEAN as u32, Weighting::Mean)];
-
-/// How a mesh follows particles. All of it but the spacing, the cell and whether it is rebuilt may change between steps.
-#[repr(C)]
-#[derive(Clone, Copy)]
-pub struct frz_tracker_params {
-    /// sizeof(frz_tracker_params).
-    pub struct_size: u32,
-    /// 0.
-    pub flags: u32,
-    /// Initial distance r between particles (m), 1e-9 to 1e6: see frz_particles_spacing. No usual one: it must be set.
-    pub spacing: f64,
-    /// Edge of a cell of the particles' surface (r), 0.125 to 2; 0.5 is usual.
-    pub cell: f64,
-    /// Vertices that would be moved farther (r) to keep their detail are flagged, 0.001 to 100: the liquid has merged or split
-    /// there. 0.5 is usual.
-    pub change: f64,
-    /// Time (s) in which half of the detail fades, above 0; infinite, as is usual: it stays. It stays anyway where the mesh's attribute
-    /// "detail" of one float is 1, and fades as fast as this says where that is 0. A vertex that a step makes has the mean of those of
-    /// its neighbours that were there, 0 without any.
-    pub half_life: f64,
-    /// How much detail fades where the mesh is strained: to exp(-fade) of it while lengths change by a factor of e, 0 to 1000; 0,
-    /// as is usual: not at all.
-    pub fade: f64,
-    /// A frz_tracker_weighting; FRZ_TRACKER_AFFINE is usual.
-    pub weighting: u32,
-    /// 0.
-    pub reserved: u32,
-    /// 1: where the liquid merges or splits the mesh is rebuilt, and merges or splits with it; where it is stretched or squeezed, edges
-    /// are divided or go. It must be closed, a 2-manifold by its indices. 0, as is usual: the mesh keeps the vertices and the faces
-    /// that it was made with, and is flagged where it no longer fits. With 1 any step may change both (frz_tracker_report.changed): a
-    /// host has to read the triangles anew, and to take its own arrays along (frz_tracker_read_edits), which one that knows nothing of
-    /// it does not do.
-    pub rebuild: u32,
-    /// 0.
-    pub reserved2: u32,
-}
-
-// SAFETY: numbers.
-unsafe impl Sized32 for frz_tracker_params {
-    const SIZES: &'static [usize] = &[std::mem::offset_of!(frz_tracker_params, rebuild), size_of::<Self>()];
-    const NAME: &'static str = "frz_tracker_params";
-}
-
-impl frz_tracker_params {
-    fn usual() -> Self {
-        let usual = Params::for_spacing(0.0);
-        Self {
-            struct_size: 0,
-            flags: 0,
-            spacing: usual.spacing,
-            cell: usual.cell,
-            change: usual.change,
-            half_life: usual.half_life,
-            fade: usual.fade,
-            weighting: FRZ_TRACKER_AFFINE as u32,
-            reserved: 0,
-            rebuild: u32::from(usual.rebuild),
-            reserved2: 0,
-        }
-    }
-
-    /// The library's own parameters; what is out of range is named.
-    fn params(&self) -> Outcome<Params> {
-        no_flags(self.flags, 0)?;
-        within("reserved", f64::from(self.reserved), 0.0..=0.0, "")?;
-        within("rebuild", f64::from(self.rebuild), 0.0..=1.0, "")?;
-        within("reserved2", f64::from(self.reserved2), 0.0..=0.0, "")?;
-        let numbers = [self.spacing, self.cell, self.change, self.fade];
-        for (name, value) in ["spacing", "cell", "change", "fade"].into_iter().zip(numbers) {
-            finite(name, value)?;
-        }
-        let weighting = meaning("weighting", "frz_tracker_weighting", self.weighting, &WEIGHTINGS)?;
-        let params = Params {
-            spacing: self.spacing,
-            cell: self.cell,
-            change: self.change,
-            weighting,
-            half_life: self.half_life,
-            fade: self.fade,
-            rebuild: self.rebuild == 1,
-        };
-        params.validate()?;
-        Ok(params)
-    }
 }
 
 /// What a step did.
@@ -176,6 +77,8 @@ pub struct frz_tracker_report {
     pub rebuilt_cells: u64,
     /// Triangles that are new, or parts of others.
     pub made_triangles: u64,
+    /// Parts of the mesh with some particles inside, but fewer than frz_tracker_params.min_drop, that were taken away.
+    pub specks: u64,
 }
 
 // SAFETY: numbers.
@@ -183,6 +86,7 @@ unsafe impl Sized32 for frz_tracker_report {
     const SIZES: &'static [usize] = &[
         std::mem::offset_of!(frz_tracker_report, uncovered),
         std::mem::offset_of!(frz_tracker_report, changed),
+        std::mem::offset_of!(frz_tracker_report, specks),
         size_of::<Self>(),
     ];
     const NAME: &'static str = "frz_tracker_report";
@@ -205,6 +109,7 @@ impl frz_tracker_report {
         changed_cells: 0,
         rebuilt_cells: 0,
         made_triangles: 0,
+        specks: 0,
     };
 }
 
@@ -214,7 +119,9 @@ pub(super) struct Follower {
     pub tracker: Tracker,
     /// What the last step made of it; none: it changed no triangle, or there was none yet.
     pub edits: Option<Edits>,
-    saved: Saved,
+    /// Steps that were made ahead.
+    pub outlook: Outlook,
+    pub saved: Saved,
 }
 
 /// Refuses to rebuild a mesh of a state that is not closed, as [`Tracker::new`] does one at the first frame.
@@ -237,7 +144,7 @@ impl Noun for frz_tracker {
 ///
 /// # Safety
 /// The pointer must be NULL or the caller's, and its views describe memory that can be read.
-unsafe fn particles(pointer: *const frz_particles) -> Outcome<Particles> {
+pub(super) unsafe fn particles(pointer: *const frz_particles) -> Outcome<Particles> {
     let none = frz_view::NONE;
     let usual = frz_particles { struct_size: 0, flags: 0, positions: none, velocities: none, ids: none };
     // SAFETY: the caller's promise.
@@ -253,18 +160,6 @@ unsafe fn particles(pointer: *const frz_particles) -> Outcome<Particles> {
     let particles = Particles { places: places.into_iter().map(Into::into).collect(), velocities, ids };
     particles.validate()?;
     Ok(particles)
-}
-
-/// Fills parameters with the usual values; the spacing must be set.
-///
-/// params: receives them.
-/// size: sizeof(frz_tracker_params).
-///
-/// Any thread.
-#[unsafe(no_mangle)]
-pub unsafe extern "C" fn frz_tracker_params_init(params: *mut frz_tracker_params, size: usize) -> frz_status {
-    // SAFETY: the parameters are NULL or have so many bytes.
-    guard(|| unsafe { fill(params, Some(size), frz_tracker_params::usual()) })
 }
 
 /// Estimates the initial distance between particles: from the median of the mean distances to the six nearest ones.
@@ -341,7 +236,7 @@ pub unsafe extern "C" fn frz_tracker_create(
             if !tracker.is_rebuilt() {
                 tracker.set_lasting(mesh.attribute("detail", 1).unwrap_or_default().to_vec())?;
             }
-            Ok(Follower { tracker, edits: None, saved: Saved::default() })
+            Ok(Follower { tracker, edits: None, outlook: Outlook::default(), saved: Saved::default() })
         })
     }
 }
@@ -372,6 +267,7 @@ pub unsafe extern "C" fn frz_tracker_set_params(
         unsafe {
             let mut follower = change(tracker)?;
             let params = sized(params, frz_tracker_params::usual())?.params()?;
+            follower.outlook = Outlook::default();
             Ok(follower.tracker.set_params(params)?)
         }
     })
@@ -430,7 +326,14 @@ pub unsafe extern "C" fn frz_tracker_step(
             let mut follower = change(tracker)?;
             finite("dt", dt)?;
             let (from, to) = (particles(from)?, particles(to)?);
-            let done = follower.tracker.step(call.ctx(), &from, &to, dt)?;
+            let follower = &mut *follower;
+            let done = match follower.outlook.take(&from, &to, dt) {
+                Some((tracker, done)) => {
+                    follower.tracker = tracker;
+                    done
+                }
+                None => follower.tracker.step(call.ctx(), &from, &to, dt)?,
+            };
             follower.saved.take();
             let drops = done.apart.iter().filter(|apart| apart.volume >= 0.0).count();
             let of_change = |count: fn(&Change) -> usize| done.change.as_ref().map_or(0, count);
@@ -450,6 +353,7 @@ pub unsafe extern "C" fn frz_tracker_step(
                 changed_cells: of_change(|change| change.flagged_cells) as u64,
                 rebuilt_cells: of_change(|change| change.rebuilt_cells) as u64,
                 made_triangles: of_change(Change::made_triangles) as u64,
+                specks: of_change(|change| change.specks) as u64,
             };
             follower.edits = done.change.map(Edits::from);
             if report.is_null() { Ok(()) } else { fill(report, None, told) }

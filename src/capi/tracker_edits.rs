@@ -10,11 +10,11 @@ use crate::surface::{Change, Source};
 /// What a step made of the mesh.
 pub(super) struct Edits {
     /// For each vertex the one that it was; none: it was made.
-    origins: Vec<Option<u32>>,
+    pub origins: Vec<Option<u32>>,
     /// For each triangle where it comes from.
-    sources: Vec<Source>,
+    pub sources: Vec<Source>,
     /// Places (m) to which the step took the vertices that there were.
-    before: Vec<DVec3>,
+    pub before: Vec<DVec3>,
 }
 
 impl From<Change> for Edits {

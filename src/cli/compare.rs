@@ -121,34 +121,51 @@ impl Args {
         let watched = |path: &PathBuf| is_watched(path).then(|| Flicker::of(path));
         let mut flickers: Vec<Option<Flicker>> = self.paths().map(watched).collect();
         let mut found: Vec<(i32, Comparison)> = Vec::new();
-        for &frame in frames {
-            session.ctx.check().during()?;
-            let models = self.paths().map(|path| Model::read(&of_frame(path, frame)));
-            let models = models.collect::<frazil::Result<Vec<_>>>();
-            // What the first frame is without, nothing can be begun with.
-            let models = if frame == frames[0] { models.before()? } else { models.during()? };
-            if let [a, b] = &models[..] {
-                let comparison = Comparison::of(&session.ctx, a, b).during()?;
-                self.say(&format!("frame {frame}: {}\n", comparison.in_a_line()))?;
-                found.push((frame, comparison));
-            }
-            for (flicker, model) in flickers.iter_mut().zip(models) {
-                let Some(flicker) = flicker else { continue };
-                if let Some(text) = flicker.add(&session.ctx, frame, model).during()? {
-                    self.say(&text)?;
-                }
-            }
-        }
+        let models = |frame: i32| {
+            self.paths().map(|path| Model::read(&of_frame(path, frame))).collect::<frazil::Result<Vec<_>>>()
+        };
+        // What the first frame is without, nothing can be begun with.
+        self.look(session, models(frames[0]).before()?, frames[0], &mut found, &mut flickers)?;
+        let looked = frames[1..].iter().try_for_each(|&frame| {
+            self.look(session, models(frame).during()?, frame, &mut found, &mut flickers)
+        });
         let flickers = || flickers.iter().flatten();
         if !self.json {
+            looked?;
             let text: String = flickers().map(Flicker::in_words).collect();
             return output::print(&(all_in_words(&found) + &text)).during();
         }
+        // Frames before one that ends the run are told all the same, as they are in words; of all frames nothing is known then.
         let mut object = self.names();
         object.insert("frames".into(), found.iter().map(|(frame, found)| found.json_of(*frame)).collect());
-        object.insert("all_frames".into(), all_json(&found));
-        object.insert("flicker".into(), flickers().map(Flicker::json).collect());
-        output::print(&format!("{:#}\n", Value::Object(object))).during()
+        object.insert("all_frames".into(), all_json(if looked.is_ok() { &found[..] } else { &[] }));
+        object.insert("flicker".into(), flickers().map(|flicker| flicker.json(looked.is_ok())).collect());
+        output::print(&format!("{:#}\n", Value::Object(object))).during()?;
+        looked
+    }
+
+    /// Looks at the meshes of a frame, and says what is found.
+    fn look(
+        &self,
+        session: &Session,
+        models: Vec<Model>,
+        frame: i32,
+        found: &mut Vec<(i32, Comparison)>,
+        flickers: &mut [Option<Flicker>],
+    ) -> Result<(), Failure> {
+        session.ctx.check().during()?;
+        if let [a, b] = &models[..] {
+            let comparison = Comparison::of(&session.ctx, a, b).during()?;
+            self.say(&format!("frame {frame}: {}\n", comparison.in_a_line()))?;
+            found.push((frame, comparison));
+        }
+        for (flicker, model) in flickers.iter_mut().zip(models) {
+            let Some(flicker) = flicker else { continue };
+            if let Some(text) = flicker.add(&session.ctx, frame, model).during()? {
+                self.say(&text)?;
+            }
+        }
+        Ok(())
     }
 
     /// Prints words as soon as they are known.
@@ -410,7 +427,7 @@ impl Flicker {
         })
     }
 
-    fn json(&self) -> Value {
+    fn json(&self, is_whole: bool) -> Value {
         let frames = self.vertices().map(|(frame, found)| {
             let mut value = distances(found);
             value["frame"] = json!(frame);
@@ -428,7 +445,7 @@ impl Flicker {
         json!({
             "file": self.name,
             "frames": frames.collect::<Value>(),
-            "all_frames": Overall::of(self.vertices()).map(|all| all.json()),
+            "all_frames": Overall::of(self.vertices()).filter(|_| is_whole).map(|all| all.json()),
             "changes": changes.collect::<Value>(),
         })
     }

@@ -90,7 +90,7 @@ pub fn run(args: &Args, session: &Session) -> std::result::Result<(), Failure> {
             detail
         } else {
             let Repaired { mesh, vertices, sources, .. } = repaired;
-            let carry = || Ok(carry_attributes(&detail, mesh, &vertices, &sources));
+            let carry = || Ok(carry_attributes(&detail, mesh, &vertices, &sources, None));
             session.ctx.phase("carry", carry).during()?
         };
         args.write(&to, frame, &detail).during()?;

@@ -328,6 +328,8 @@ impl Scene {
         if let Some(surface) = &self.surface {
             out.extend(surface.mesh.clone());
             out.extend(surface.files_at(self.shot.frames, self.shot.frames.first));
+            let sculpts = surface.resculpt.as_deref().and_then(Pattern::parse);
+            out.extend(sculpts.map(|pattern| pattern.path(self.shot.frames.first)));
         }
         if let Some(snow) = &self.snow {
             out.extend(snow.files().map(|(_, path)| path.clone()));

@@ -36,6 +36,11 @@ impl Tracker {
         self.ahead.wanted = Some(particles);
     }
 
+    /// Drops the surface that was made ahead: the step that it is for is done elsewhere.
+    pub fn forget_ahead(&mut self) {
+        self.ahead = Ahead::default();
+    }
+
     /// Does some work, and makes the surface of the particles to come at the same time.
     pub(super) fn with_next<R>(&self, ctx: &Context, work: impl FnOnce() -> Result<R>) -> Result<(R, Ahead)> {
         let wanted = self.ahead.wanted.as_deref().filter(|_| ctx.pool().threads() > 1);

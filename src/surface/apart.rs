@@ -3,6 +3,7 @@
 use rayon::prelude::*;
 
 use super::cells::{Coord, cell_of};
+use super::enclosed::{Bounds, Crowd, seen_from};
 use super::implicit::Implicit;
 use super::isosurface::Isosurface;
 use crate::base::DVec3;
@@ -16,6 +17,24 @@ pub struct Apart {
     pub volume: f64,
     /// Its triangles.
     pub triangles: usize,
+}
+
+/// Which of the parts that it does not cover a mesh should have.
+#[derive(Debug, Clone, Copy)]
+pub struct Wanted<'a> {
+    /// Drops: those that hold enough of these particles; where one is enough, all.
+    pub crowd: Crowd<'a>,
+    /// Bubbles: those of so large a volume (cells^3); infinite: none.
+    pub bubble: f64,
+}
+
+/// What a mesh should have, and does not.
+#[derive(Debug, Default)]
+pub struct Lacking {
+    /// Places (cells) on the particles' surface.
+    pub places: Vec<DVec3>,
+    /// Bounds (cells) of drops that it should not have: they are too small.
+    pub specks: Vec<Bounds>,
 }
 
 /// The connected parts of the particles' surface, and which of them the mesh covers.
@@ -48,13 +67,13 @@ impl Parts {
         self.is_covered[self.of_vertex[vertex as usize] as usize]
     }
 
-    /// Places (cells) on the drops that the mesh does not cover: parts with a volume over 0.
-    pub fn on_drops(&self, phi: &Implicit, surface: &Isosurface) -> Vec<DVec3> {
+    /// What of the parts that the mesh does not cover it should have.
+    pub fn lacking(&self, phi: &Implicit, surface: &Isosurface, wanted: &Wanted<'_>) -> Lacking {
+        if self.is_covered.iter().all(|covered| *covered) {
+            return Lacking::default();
+        }
         let mut six = vec![0.0f64; self.is_covered.len()];
         let mut firsts: Vec<Option<DVec3>> = vec![None; six.len()];
-        if self.is_covered.iter().all(|covered| *covered) {
-            return Vec::new();
-        }
         for triangle in surface.runs().flat_map(|(_, triangles)| triangles) {
             let part = self.of_vertex[triangle[0] as usize] as usize;
             if !self.is_covered[part] {
@@ -63,9 +82,53 @@ impl Parts {
                 six[part] += (a - origin).dot(&(b - origin).cross(&(c - origin)));
             }
         }
-        let is_on = |part: u32| !self.is_covered[part as usize] && six[part as usize] > 0.0;
-        let vertices = (0..).zip(&self.of_vertex).filter(|(_, part)| is_on(**part));
-        vertices.map(|(vertex, _)| surface.in_cells(phi, vertex)).collect()
+        let mut is_wanted: Vec<bool> = self
+            .is_covered
+            .iter()
+            .zip(&six)
+            .map(|(covered, six)| !covered && (*six > 0.0 || -six / 6.0 >= wanted.bubble))
+            .collect();
+        let mut specks = Vec::new();
+        if wanted.crowd.least > 1 {
+            let drops: Vec<usize> =
+                (0..six.len()).filter(|part| is_wanted[*part] && six[*part] > 0.0).collect();
+            for (part, bounds) in self.specks(phi, surface, &drops, &wanted.crowd) {
+                is_wanted[part] = false;
+                specks.push(bounds);
+            }
+        }
+        let vertices = (0..).zip(&self.of_vertex).filter(|(_, part)| is_wanted[**part as usize]);
+        let places = vertices.map(|(vertex, _)| surface.in_cells(phi, vertex)).collect();
+        Lacking { places, specks }
+    }
+
+    /// Those of some drops, ascending, that hold too few particles, with their bounds (cells). The meshes that they would get are counted in
+    /// the same way.
+    fn specks(
+        &self,
+        phi: &Implicit,
+        surface: &Isosurface,
+        drops: &[usize],
+        crowd: &Crowd<'_>,
+    ) -> Vec<(usize, Bounds)> {
+        let mut triangles: Vec<Vec<[DVec3; 3]>> = vec![Vec::new(); drops.len()];
+        for triangle in surface.runs().flat_map(|(_, triangles)| triangles) {
+            let part = self.of_vertex[triangle[0] as usize] as usize;
+            if let Ok(slot) = drops.binary_search(&part) {
+                triangles[slot].push(triangle.map(|vertex| surface.in_cells(phi, vertex) * phi.cell()));
+            }
+        }
+        let bounds: Vec<Bounds> = triangles
+            .iter()
+            .map(|triangles| {
+                let corners = triangles.as_flattened();
+                let first = corners.first().copied().unwrap_or_default();
+                corners.iter().fold([first; 2], |[low, high], place| [low.inf(place), high.sup(place)])
+            })
+            .collect();
+        let counts = crowd.held(&bounds, |slot| seen_from(bounds[slot][0], &triangles[slot]));
+        let few = drops.iter().zip(&bounds).zip(counts).filter(|(_, count)| *count < crowd.least);
+        few.map(|((part, bounds), _)| (*part, bounds.map(|place| place / phi.cell()))).collect()
     }
 
     /// The parts that the mesh does not cover, the largest first.

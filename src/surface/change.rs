@@ -3,7 +3,9 @@
 
 use super::band::Distances;
 use super::cells::{Coord, cell_of};
+use super::enclosed::Crowd;
 use super::gamma::Gamma;
+use super::hidden::Everywhere;
 use super::implicit::Implicit;
 use super::improve::{Improvable, Improvements, Size, improve};
 use super::project::foot;
@@ -24,6 +26,8 @@ pub struct Unfit<'a> {
     pub flags: &'a [bool],
     /// Places of the particles' surface that the mesh should have, and does not (cells).
     pub bare: &'a [DVec3],
+    /// What it takes to find where it does not fit besides; none: that is not looked for.
+    pub everywhere: Option<Everywhere<'a>>,
 }
 
 /// What a mesh became.
@@ -47,6 +51,8 @@ pub struct Change {
     pub improvements: Improvements,
     /// Parts without particles that were taken away.
     pub dry: usize,
+    /// Parts with some particles, but fewer than [`super::Params::min_drop`], that were taken away.
+    pub specks: usize,
     /// Cells in which the mesh did not fit.
     pub flagged_cells: usize,
     /// Cells that were rebuilt.
@@ -75,6 +81,7 @@ impl Change {
             sizes: Vec::new(),
             improvements: Improvements::default(),
             dry: 0,
+            specks: 0,
             flagged_cells: 0,
             rebuilt_cells: 0,
             rung: 0,
@@ -116,6 +123,7 @@ impl Change {
         self.before.clone_from(&first.before);
         self.iterations += first.iterations;
         self.dry += first.dry;
+        self.specks += first.specks;
         self
     }
 }
@@ -148,7 +156,10 @@ pub fn change(
         let pierces = Pierces::of(&fixed, unfit.triangles);
         let shape = Shape { fixed, triangles: unfit.triangles.to_vec(), pierces };
         ctx.check()?;
-        let flagged = flagged(unfit, &shape, &lattice);
+        let mut flagged = flagged(unfit, &shape, &lattice);
+        if let Some(everywhere) = &unfit.everywhere {
+            everywhere.flag(ctx, &shape, (&in_cells, &lattice), (phi, distances), &mut flagged)?;
+        }
         Ok((shape, flagged))
     })?;
     if flagged.count() == 0 {
@@ -183,6 +194,7 @@ pub fn change(
         sizes: Vec::new(),
         improvements: Improvements::default(),
         dry: 0,
+        specks: 0,
         flagged_cells: flagged.count(),
         rebuilt_cells: cells,
         rung,
@@ -190,9 +202,10 @@ pub fn change(
     }))
 }
 
-/// Takes parts without particles away, improves a mesh (thesis 2.6), also where it was changed, and measures the vertices that were made. Sizes are those of the mesh before
-/// the change; vertices that were made keep a distance of at most `most` (m): what lies farther from the particles' surface is no detail,
-/// and moves there, or is rebuilt again, in the next frame. None where nothing has changed.
+/// Takes parts with too few particles away, improves a mesh (thesis 2.6), also where it was changed, and measures the vertices
+/// that were made. Sizes are those of the mesh before the change; vertices that were made keep a distance of at most `most` (m): what lies
+/// farther from the particles' surface is no detail, and moves there, or is rebuilt again, in the next frame. None where nothing has
+/// changed.
 ///
 /// # Errors
 /// Cancel.
@@ -202,13 +215,14 @@ pub fn improved(
     sizes: &[Size],
     change: Option<Change>,
     distances: &Distances,
-    (particles, most): (&[DVec3], f64),
+    crowd: &Crowd<'_>,
+    most: f64,
 ) -> Result<Option<Change>> {
     let mut is_changed = change.is_some();
     let cell = distances.cell();
     let mut change = change.unwrap_or_else(|| Change::nothing(unfit));
-    change.dry = ctx.phase("dry", || Ok(change.drop_dry(particles)))?;
-    is_changed |= change.dry > 0;
+    [change.dry, change.specks] = ctx.phase("dry", || Ok(change.drop_dry(crowd)))?;
+    is_changed |= change.dry + change.specks > 0;
     let born = BORN.map(|share| (share * cell) as f32);
     change.sizes = change.origins.iter().map(|at| at.map_or(born, |at| sizes[at as usize])).collect();
     let mut flags: Vec<bool> =

@@ -155,7 +155,7 @@ impl Inside for Gamma<'_> {
 }
 
 /// A node of a block.
-fn node(block: Coord, at: usize) -> Coord {
+pub(super) fn node(block: Coord, at: usize) -> Coord {
     [block[0] * 8 + (at >> 6) as i32, block[1] * 8 + (at >> 3 & 7) as i32, block[2] * 8 + (at & 7) as i32]
 }
 
@@ -165,7 +165,7 @@ fn is_flagged(flagged: &CellSet, node: Coord) -> bool {
 }
 
 /// phi at a node of a block (of phi's grid) in which no distances are known: their reach, with its sign.
-fn far(phi: &Implicit, reach: f32, block: Coord, at: usize) -> f32 {
+pub(super) fn far(phi: &Implicit, reach: f32, block: Coord, at: usize) -> f32 {
     let node = node(block, at);
     let patch = node.map(|at| at.div_euclid(SIDE));
     let is_inside = match phi.find(patch) {
@@ -178,7 +178,8 @@ fn far(phi: &Implicit, reach: f32, block: Coord, at: usize) -> f32 {
     if is_inside { -reach } else { reach }
 }
 
-fn between(low: Coord, high: Coord) -> impl Iterator<Item = Coord> {
+/// Blocks, or other coordinates, of a box, its ends included.
+pub(super) fn between(low: Coord, high: Coord) -> impl Iterator<Item = Coord> {
     let on = move |axis: usize| low[axis]..=high[axis];
     on(0).flat_map(move |x| on(1).flat_map(move |y| on(2).map(move |z| [x, y, z])))
 }

@@ -21,6 +21,13 @@ pub struct Params {
     /// Whether the mesh is rebuilt where the liquid merges or splits (thesis 2.4, 2.5); it must then be a closed 2-manifold by index.
     /// Else it is flagged there.
     pub rebuild: bool,
+    /// Where it is rebuilt: whether its topology is matched to the particles' all over it in every step (thesis 2.8), bubbles of
+    /// theirs among it; else where vertices are flagged, and at drops.
+    pub every: bool,
+    /// Where it is rebuilt: least count of particles in a part of the mesh, 0..=1,000,000. Parts with fewer are taken away, and drops
+    /// with fewer get no mesh; with 0 and 1 only parts without any inside go. Where some lie inside, those that lie beside a part, at half a
+    /// spacing or less, count too. A mesh of one part stays.
+    pub min_drop: usize,
 }
 
 impl Params {
@@ -28,7 +35,8 @@ impl Params {
     pub fn for_spacing(spacing: f64) -> Self {
         let (half_life, fade) = (f64::INFINITY, 0.0);
         let weighting = Weighting::Affine;
-        Self { spacing, cell: 0.5, change: 0.5, weighting, half_life, fade, rebuild: false }
+        let (rebuild, every, min_drop) = (false, false, 1);
+        Self { spacing, cell: 0.5, change: 0.5, weighting, half_life, fade, rebuild, every, min_drop }
     }
 
     /// Checks every field.
@@ -42,6 +50,7 @@ impl Params {
             ("change", self.change, 1e-3, 100.0, "r"),
             ("half_life", self.half_life, f64::MIN_POSITIVE, f64::INFINITY, "s"),
             ("fade", self.fade, 0.0, 1000.0, ""),
+            ("min_drop", self.min_drop as f64, 0.0, 1e6, "particles"),
         ];
         for (name, value, low, high, unit) in ranges {
             if !(low..=high).contains(&value) {

@@ -7,12 +7,14 @@ use rayon::prelude::*;
 use super::Particles;
 use super::advect::advect;
 use super::ahead::Ahead;
-use super::apart::{Apart, Parts, is_near};
+use super::apart::{Apart, Lacking, Parts, Wanted, is_near};
 use super::band::Distances;
 use super::cells::{Coord, cell_of};
 use super::change::{Change, Unfit, change, improved};
 use super::coverage::Cover;
+use super::enclosed::Crowd;
 use super::fade::fade;
+use super::hidden::Everywhere;
 use super::implicit::Implicit;
 use super::improve::{Size, sizes};
 use super::isosurface::Isosurface;
@@ -124,7 +126,7 @@ impl Tracker {
             if wanted <= tracker.reach {
                 tracker.check_overlap(known)?;
                 let Covered { apart, bare, .. } =
-                    ctx.phase("cover", || tracker.cover(ctx, &surface, &feet, true))?;
+                    ctx.phase("cover", || tracker.cover(ctx, &surface, &feet, (&particles.places, true)))?;
                 tracker.bare = bare;
                 let (lost, triangles) = (tracker.vertices.len() - known, surface.1.count());
                 return Ok((tracker, StepReport { lost, triangles, apart, ..StepReport::default() }));
@@ -185,6 +187,11 @@ impl Tracker {
         }
         self.lasting = shares;
         Ok(())
+    }
+
+    /// How it follows.
+    pub fn params(&self) -> &Params {
+        &self.params
     }
 
     /// The mesh (m).
@@ -249,7 +256,7 @@ impl Tracker {
                 gather(&self.vertices, &self.triangles, &is_lost, &mut vertices);
             }
             let feet: Vec<Option<DVec3>> = flags.iter().map(Flag::foot).collect();
-            let mut covered = ctx.phase("cover", || self.cover(ctx, &surface, &feet, false))?;
+            let mut covered = ctx.phase("cover", || self.cover(ctx, &surface, &feet, (&to.places, false)))?;
             covered.bare.iter_mut().zip(&self.bare).for_each(|(now, ever)| *now &= !ever);
             let count = |kind: Flag| flags.iter().filter(|flag| **flag == kind).count();
             let is_flagged = |(flag, is_bare): (&Flag, &bool)| flag.foot().is_none() || *is_bare;
@@ -309,18 +316,15 @@ impl Tracker {
         beside.dedup();
         let mut bare: Vec<DVec3> =
             covered.places.iter().filter(|place| is_near(&beside, bin(place))).copied().collect();
-        bare.extend_from_slice(&covered.drops);
-        let unfit =
-            Unfit { vertices: &next.vertices, triangles: &self.triangles, flags: &flags, bare: &bare };
+        bare.extend_from_slice(&covered.lacking.places);
+        let Params { spacing, cell, change: farthest, every, .. } = self.params;
+        let specks = &covered.lacking.specks;
+        let everywhere = every.then(|| Everywhere { kept: &next.delta, spacing: 1.0 / cell, specks });
+        let (vertices, triangles) = (&next.vertices, &self.triangles);
+        let unfit = Unfit { vertices, triangles, flags: &flags, bare: &bare, everywhere };
         let changed = change(ctx, &unfit, phi, distances)?;
-        improved(
-            ctx,
-            &unfit,
-            &self.sizes,
-            changed,
-            distances,
-            (particles, self.params.change * self.params.spacing),
-        )
+        let crowd = self.crowd(particles);
+        improved(ctx, &unfit, &self.sizes, changed, distances, &crowd, farthest * spacing)
     }
 
     /// Becomes what the mesh became.
@@ -347,15 +351,24 @@ impl Tracker {
         ctx: &Context,
         (phi, surface): &(Implicit, Isosurface),
         feet: &[Option<DVec3>],
-        is_first: bool,
+        (particles, is_first): (&[DVec3], bool),
     ) -> Result<Covered> {
         let parts = Parts::new(phi, surface, feet.iter().flatten().map(cell_of).collect());
         ctx.check()?;
         let spacing = 1.0 / self.params.cell;
         let cover = Cover { feet, triangles: &self.triangles, spacing, is_first };
         let (bare, places) = cover.beside_bare(ctx, phi, surface, &parts)?;
-        let (apart, drops) = (parts.apart(phi, surface), parts.on_drops(phi, surface));
-        Ok(Covered { apart, bare, places, reach: cover.reach(), drops })
+        let bubble = if self.params.every { spacing.powi(3) } else { f64::INFINITY };
+        let lacking = match self.params.rebuild {
+            true => parts.lacking(phi, surface, &Wanted { crowd: self.crowd(particles), bubble }),
+            false => Lacking::default(),
+        };
+        Ok(Covered { apart: parts.apart(phi, surface), bare, places, reach: cover.reach(), lacking })
+    }
+
+    /// Particles at these places, of which each part of the mesh must hold some.
+    fn crowd<'a>(&self, places: &'a [DVec3]) -> Crowd<'a> {
+        Crowd { places, spacing: self.params.spacing, least: self.params.min_drop.max(1) }
     }
 
     fn carried(&self, ctx: &Context, paths: &Paths) -> Result<(Vec<DVec3>, usize)> {
@@ -462,8 +475,8 @@ struct Covered {
     places: Vec<DVec3>,
     /// How near is beside (cells).
     reach: f64,
-    /// Places on drops (cells).
-    drops: Vec<DVec3>,
+    /// What it should have of the parts that it does not cover at all.
+    lacking: Lacking,
 }
 
 /// What became of a vertex.

@@ -61,13 +61,15 @@ int main(void) {
     FIELD(frz_tracker_params, spacing), FIELD(frz_tracker_params, cell), FIELD(frz_tracker_params, change);
     FIELD(frz_tracker_params, half_life), FIELD(frz_tracker_params, fade);
     FIELD(frz_tracker_params, weighting), FIELD(frz_tracker_params, reserved);
-    FIELD(frz_tracker_params, rebuild), FIELD(frz_tracker_params, reserved2);
+    FIELD(frz_tracker_params, rebuild), FIELD(frz_tracker_params, match), FIELD(frz_tracker_params, min_drop);
+    FIELD(frz_tracker_params, reserved3);
     SIZE(frz_tracker_report), FIELD(frz_tracker_report, struct_size), FIELD(frz_tracker_report, parts);
     FIELD(frz_tracker_report, jumped), FIELD(frz_tracker_report, lost), FIELD(frz_tracker_report, born);
     FIELD(frz_tracker_report, died), FIELD(frz_tracker_report, triangles);
     FIELD(frz_tracker_report, drops), FIELD(frz_tracker_report, bubbles), FIELD(frz_tracker_report, uncovered);
     FIELD(frz_tracker_report, changed), FIELD(frz_tracker_report, rung), FIELD(frz_tracker_report, changed_cells);
     FIELD(frz_tracker_report, rebuilt_cells), FIELD(frz_tracker_report, made_triangles);
+    FIELD(frz_tracker_report, specks);
     SIZE(frz_repair_report), FIELD(frz_repair_report, struct_size), FIELD(frz_repair_report, rung);
     FIELD(frz_repair_report, joined_vertices), FIELD(frz_repair_report, dropped_triangles);
     FIELD(frz_repair_report, turned_triangles), FIELD(frz_repair_report, turned_parts), FIELD(frz_repair_report, holes);

@@ -265,6 +265,21 @@ static frz_tracker *resume(frz_context *ctx, const frz_mesh *mesh, bytes saved, 
     return tracker;
 }
 
+/* Where the liquid at each vertex was at the first frame: as far along x as one of the balls has come since. */
+static void check_rest(frz_context *ctx, const frz_tracker *tracker, const state *now, int frame) {
+    static liquid began, here;
+    const frz_particles first = flow(&began, 0), end = flow(&here, frame);
+    double *rest = room(3 * now->vertices, sizeof *rest);
+    size_t v;
+    WORKS(frz_tracker_read_rest(ctx, tracker, &first, &end, SPAN(rest, now->vertices)));
+    for (v = 0; v < now->vertices; ++v) {
+        const double *place = &now->places[3 * v], *was = &rest[3 * v];
+        CHECK(fabs(fabs(was[0] - place[0]) - (away(0) - away(frame))) < 1e-9);
+        CHECK(fabs(was[1] - place[1]) < 1e-9 && fabs(was[2] - place[2]) < 1e-9);
+    }
+    free(rest);
+}
+
 static void balls_meet_and_part(frz_context *ctx, frz_context *alone, const frz_mesh *mesh) {
     frz_tracker *tracker = begin(ctx, mesh, 1), *back = NULL;
     state was = state_of(tracker);
@@ -296,6 +311,7 @@ static void balls_meet_and_part(frz_context *ctx, frz_context *alone, const frz_
         check_closed(now.corners, now.triangles, now.vertices);
         parts = parts_of(now.corners, now.triangles, now.vertices);
         CHECK(frame > 1 || parts == 2);
+        if (frame % 6 == 0) check_rest(ctx, tracker, &now, frame);
         has_met |= parts == 1, changes += report.changed == 1;
         next_born = room(now.vertices, sizeof *next_born), next_sphere = carry(sphere, &done, &now);
         for (left = 0, v = 0; v < now.vertices; ++v) {
@@ -345,6 +361,7 @@ static void reads(frz_context *ctx, const frz_mesh *mesh, const spheres *whole) 
     static int64_t numbers[2 * VERTICES], unwritten[2 * VERTICES];
     frz_tracker *tracker = begin(ctx, mesh, 0);
     const frz_particles start = flow(&from, 0), end = flow(&to, 1);
+    frz_particles nameless = start;
     frz_tracker_report report;
     uint32_t changed = 7;
     size_t count = 7;
@@ -375,6 +392,13 @@ static void reads(frz_context *ctx, const frz_mesh *mesh, const spheres *whole) 
     FAILS(frz_tracker_read_edits(tracker, 4, SPAN(numbers, 2 * VERTICES)), FRZ_ERROR_ARGUMENT, "array = 4");
     FAILS(frz_tracker_read_edits(NULL, FRZ_EDIT_ORIGIN, SPAN(numbers, 2)), FRZ_ERROR_ARGUMENT, "tracker is NULL");
     CHECK(memcmp(numbers, unwritten, sizeof unwritten) == 0);
+    nameless.ids = NO_VIEW;
+    FAILS(frz_tracker_read_rest(ctx, tracker, &start, &end, SPAN(numbers, 2)), FRZ_ERROR_CAPACITY, "dst");
+    FAILS(frz_tracker_read_rest(ctx, tracker, &nameless, &end, NO_SPAN), FRZ_ERROR_ARGUMENT, "first: the particles have no ids");
+    FAILS(frz_tracker_read_rest(ctx, tracker, &start, &nameless, NO_SPAN), FRZ_ERROR_ARGUMENT, "now: the particles have no ids");
+    FAILS(frz_tracker_read_rest(ctx, tracker, NULL, &end, NO_SPAN), FRZ_ERROR_ARGUMENT, "particles");
+    FAILS(frz_tracker_read_rest(ctx, NULL, &start, &end, NO_SPAN), FRZ_ERROR_ARGUMENT, "tracker is NULL");
+    CHECK(memcmp(numbers, unwritten, sizeof unwritten) == 0);
     FAILS(frz_tracker_read_triangles(tracker, SPAN(NULL, count)), FRZ_ERROR_ARGUMENT, "the data is NULL");
     FAILS(frz_tracker_read_triangles(tracker, (frz_span){corners, count, 8}), FRZ_ERROR_ARGUMENT, "less than an element's 12");
     FAILS(frz_tracker_read_triangles((const frz_tracker *)mesh, SPAN(corners, count)), FRZ_ERROR_HANDLE, "not a tracker");
@@ -399,9 +423,15 @@ static void refusals(frz_context *ctx, const frz_mesh *mesh, const spheres *whol
     FAILS(frz_tracker_create(ctx, &params, mesh, &first, NULL, 0, &none), FRZ_ERROR_ARGUMENT, "rebuild = 2");
     CHECK(none == NULL);
     FAILS(frz_tracker_set_params(tracker, &params), FRZ_ERROR_ARGUMENT, "rebuild = 2");
-    params.rebuild = 1, params.reserved2 = 1;
-    FAILS(frz_tracker_set_params(tracker, &params), FRZ_ERROR_ARGUMENT, "reserved2");
-    params.reserved2 = 0, params.half_life = 3;
+    params.rebuild = 1, params.match = 2;
+    FAILS(frz_tracker_set_params(tracker, &params), FRZ_ERROR_ARGUMENT, "match = 2");
+    params.match = FRZ_TRACKER_MATCH_EVERY, params.min_drop = 1000001;
+    FAILS(frz_tracker_set_params(tracker, &params), FRZ_ERROR_ARGUMENT, "min_drop = 1000001");
+    params.min_drop = 8, params.reserved3 = 1;
+    FAILS(frz_tracker_set_params(tracker, &params), FRZ_ERROR_ARGUMENT, "reserved3");
+    params.reserved3 = 0;
+    WORKS(frz_tracker_set_params(tracker, &params));
+    params.match = FRZ_TRACKER_MATCH_FLAGGED, params.min_drop = 0, params.half_life = 3;
     WORKS(frz_tracker_set_params(tracker, &params));
     params.rebuild = 0;
     FAILS(frz_tracker_set_params(tracker, &params), FRZ_ERROR_ARGUMENT, "rebuilt cannot change");

@@ -95,6 +95,7 @@ mod surface {
     mod made_sets;
     mod rebuilt;
     mod repair;
+    mod resculpt;
     mod shot;
     mod tracking;
     mod usd;

@@ -11,6 +11,7 @@ mod common {
     pub mod sleigh;
     pub mod walk;
 }
+mod drip;
 
 use std::fmt::Write;
 use std::path::Path;
@@ -40,6 +41,8 @@ fn main() -> frazil::Result<()> {
     atomic::write_bytes(&folder.join("hero.glb"), &hero::glb())?;
     // Some 15,000 particles under 144,000 triangles.
     Jelly::new(0.0125, 190).write(folder)?;
+    // Some 6,000 particles under 50,000 triangles.
+    drip::write(folder)?;
     for (name, text) in [
         ("hero", hero()),
         ("walker", walker()),

@@ -38,9 +38,10 @@ impl FrameSize {
         let own: usize = detail.arrays.iter().map(|array| array.values.len()).sum();
         let delta = if output.delta { vertices } else { 0 };
         let flagged = if output.flagged { vertices } else { 0 };
+        let rebuilt = if output.rebuilt { triangles } else { 0 };
         let usd = TEXT * (6 * vertices + 2 * places + own as u64 + delta)
             + index * (3 * triangles + corners)
-            + (1 + AROUND_INDEX) * (triangles + flagged);
+            + (1 + AROUND_INDEX) * (triangles + flagged + rebuilt);
         let if_asked = |is_asked: bool, bytes: u64| if is_asked { bytes } else { 0 };
         Self {
             ply: if_asked(output.ply, ply(output, detail)),
@@ -71,6 +72,7 @@ fn ply(output: Files, detail: &DetailedMesh) -> u64 {
     let [vertices, triangles] = counts(detail);
     let attributes =
         12 * u64::from(output.velocities) + 4 * u64::from(output.delta) + u64::from(output.flagged);
+    let of_face = u64::from(output.rebuilt);
     // Lists begin with a byte that counts: three indices, and the six coordinates of corners where there are seams.
     let uvs = detail.uvs.as_ref().map_or(0, |uvs| match uvs.corners {
         Some(_) => (1 + 6 * 4) * triangles,
@@ -81,7 +83,7 @@ fn ply(output: Files, detail: &DetailedMesh) -> u64 {
         (array.values.len() * array.number.size()) as u64 + lists
     };
     let own: u64 = detail.arrays.iter().map(own).sum();
-    (3 * 4 + attributes) * vertices + (1 + 3 * 4) * triangles + uvs + own
+    (3 * 4 + attributes) * vertices + (1 + 3 * 4 + of_face) * triangles + uvs + own
 }
 
 #[cfg(test)]
@@ -106,15 +108,23 @@ mod tests {
         let arrays =
             vec![array("mask", On::Vertices, 4), array("part", On::Faces, 2), array("wet", On::Corners, 6)];
         let detail = DetailedMesh { mesh, uvs: Some(uvs), arrays };
-        let plain =
-            Files { ply: true, obj: false, usd: false, velocities: false, delta: false, flagged: false };
+        let plain = Files {
+            ply: true,
+            obj: false,
+            usd: false,
+            velocities: false,
+            delta: false,
+            flagged: false,
+            rebuilt: false,
+        };
         let arrays: Vec<&MeshArray> = detail.arrays.iter().collect();
         let carried = Carried { velocities: &[], uvs: detail.uvs.as_ref(), arrays: &arrays };
         let bytes = ply_bytes(&detail.mesh, &carried);
         let end = b"end_header\n";
         let header = bytes.windows(end.len()).position(|part| part == end).unwrap() + end.len();
         assert_eq!(FrameSize::of(plain, &detail).ply, (bytes.len() - header) as u64);
-        let moving = Files { velocities: true, delta: true, flagged: true, ..plain };
-        assert_eq!(FrameSize::of(moving, &detail).ply, (bytes.len() - header) as u64 + 4 * (12 + 4 + 1));
+        let moving = Files { velocities: true, delta: true, flagged: true, rebuilt: true, ..plain };
+        let more = 4 * (12 + 4 + 1) + 2;
+        assert_eq!(FrameSize::of(moving, &detail).ply, (bytes.len() - header) as u64 + more);
     }
 }

@@ -3,8 +3,8 @@
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
-use super::Surface;
 use super::time::read;
+use super::{Surface, sculpts};
 use crate::base::arrays::{Number, On};
 use crate::base::faults::Faults;
 use crate::base::{DetailedMesh, MeshArray, TriMesh};
@@ -20,7 +20,7 @@ use crate::surface::{
 };
 
 /// Arrays of the mesh that are written anew in each frame, and those that a moving mesh does not keep.
-const REPLACED: [&str; 8] = ["vx", "vy", "vz", "delta", "flagged", "nx", "ny", "nz"];
+pub(super) const REPLACED: [&str; 9] = ["vx", "vy", "vz", "delta", "flagged", "rebuilt", "nx", "ny", "nz"];
 /// How many times as large as the estimate, or as small, a spacing is that looks like a mistake.
 const ODD: f64 = 2.0;
 
@@ -34,6 +34,8 @@ pub struct Inputs {
     pub spacing: f64,
     /// The particles at the first frame: how many there are, and how they are told apart.
     pub particles: Particles,
+    /// Frames at which an edited mesh takes the place of the tracked one, ascending.
+    pub(super) sculpts: Vec<i32>,
     /// What the files held when they were read.
     pub(in crate::scene) seen: Arc<Seen>,
     /// What about the files should be told, a sentence each; the log has it too.
@@ -41,7 +43,8 @@ pub struct Inputs {
 }
 
 impl Inputs {
-    /// Reads the mesh and the first frame's particles, after checking that no file of any frame is missing.
+    /// Reads the mesh and the first frame's particles, after checking that no file of any frame is missing; edited meshes of later
+    /// frames are looked at, and read again when their frames come.
     ///
     /// # Errors
     /// What the files or keys have wrong, with file and key; cancel.
@@ -54,6 +57,7 @@ impl Inputs {
         for path in all_files(scene, surface) {
             source::open(&path)?;
         }
+        let sculpts = sculpts::frames(surface, shot.frames)?;
         let seen = Arc::new(Seen::default());
         let first = surface.files_at(shot.frames, shot.frames.first).swap_remove(0);
         let particles = read(&first, surface, &seen)?;
@@ -90,19 +94,9 @@ impl Inputs {
         }
         let mut mesh = match &surface.mesh {
             Some(path) => {
-                let bytes = seen.read(path)?;
-                let mut mesh = parse_polygons(path, &bytes)?.into_detailed();
-                let space = surface.space;
-                mesh.mesh.positions.iter_mut().for_each(|p| *p = space.place(p.cast()).cast());
-                if surface.rebuild {
-                    let repaired = closed(ctx, &mesh, spacing * surface.cell);
-                    let (mesh, warning) = repaired.map_err(|error| told(path, error))?;
-                    warnings.extend(warning.map(|warning| format!("{}: {warning}", path.display())));
-                    mesh
-                } else {
-                    warnings.extend(faults(path, &mesh.mesh));
-                    mesh
-                }
+                let (mesh, warning) = read_mesh(ctx, surface, path, &seen, spacing)?;
+                warnings.extend(warning);
+                mesh
             }
             None => {
                 let mesh = reconstructed(ctx, &particles, spacing, surface.cell)
@@ -118,13 +112,39 @@ impl Inputs {
             _ => Vec::new(),
         };
         mesh.arrays.retain(|array| !REPLACED.contains(&&*array.name));
-        warnings.iter().for_each(|warning| log::warn!("{warning}"));
-        Ok(Self { mesh, lasting, spacing, particles, seen, warnings })
+        let mut inputs = Self { mesh, lasting, spacing, particles, sculpts, seen, warnings };
+        let of_sculpts = sculpts::check(ctx, surface, &inputs)?;
+        inputs.warnings.extend(of_sculpts);
+        inputs.warnings.iter().for_each(|warning| log::warn!("{warning}"));
+        Ok(inputs)
     }
 }
 
+/// A mesh in a file, in metres, and closed where it is to be rebuilt; with what about it should be told, in a sentence.
+///
+/// # Errors
+/// A file that cannot be read, or that has changed since it was read; a mesh that encloses nothing, where it is to be rebuilt; cancel.
+pub(super) fn read_mesh(
+    ctx: &Context,
+    surface: &Surface,
+    path: &Path,
+    seen: &Seen,
+    spacing: f64,
+) -> Result<(DetailedMesh, Option<String>)> {
+    let bytes = seen.read(path)?;
+    let mut mesh = parse_polygons(path, &bytes)?.into_detailed();
+    let space = surface.space;
+    mesh.mesh.positions.iter_mut().for_each(|p| *p = space.place(p.cast()).cast());
+    if !surface.rebuild {
+        let warning = faults(path, &mesh.mesh);
+        return Ok((mesh, warning));
+    }
+    let (mesh, warning) = closed(ctx, mesh, spacing * surface.cell).map_err(|error| told(path, error))?;
+    Ok((mesh, warning.map(|warning| format!("{}: {warning}", path.display()))))
+}
+
 /// What is painted to last in the array `detail` of the vertices: shares 0..=1, of bytes 0 to 255.
-fn lasting(mesh: &DetailedMesh) -> std::result::Result<Vec<f32>, String> {
+pub(super) fn lasting(mesh: &DetailedMesh) -> std::result::Result<Vec<f32>, String> {
     let is_it = |array: &&MeshArray| array.name == "detail" && array.on == On::Vertices;
     let Some(array) = mesh.arrays.iter().find(is_it) else { return Ok(Vec::new()) };
     let whole = if array.number == Number::U8 { 255.0 } else { 1.0 };
@@ -157,12 +177,12 @@ fn told(path: &Path, error: Error) -> Error {
 
 /// The mesh as it can be rebuilt: a closed 2-manifold by index that does not cross itself, repaired in cells of an edge (m) where it is
 /// not; and what was done, in a sentence.
-fn closed(ctx: &Context, mesh: &DetailedMesh, cell: f64) -> Result<(DetailedMesh, Option<String>)> {
+fn closed(ctx: &Context, mesh: DetailedMesh, cell: f64) -> Result<(DetailedMesh, Option<String>)> {
     let faults = Faults::of(&mesh.mesh);
     let crossings = faults.crossings + faults.corner_crossings + faults.folds + faults.overlaps;
     let is_closed = faults.by_index.is_watertight() && faults.volume > 0.0 && faults.inverted_parts == 0;
     if is_closed && crossings == 0 {
-        return Ok((mesh.clone(), None));
+        return Ok((mesh, None));
     }
     let repaired = repair(ctx, &mesh.mesh, cell)?;
     let kept = repaired.report.kept_triangles;
@@ -180,7 +200,7 @@ fn closed(ctx: &Context, mesh: &DetailedMesh, cell: f64) -> Result<(DetailedMesh
         repaired.report.cell,
         mesh.mesh.triangles.len(),
     );
-    let detail = carry_attributes(mesh, repaired.mesh, &repaired.vertices, &repaired.sources);
+    let detail = carry_attributes(&mesh, repaired.mesh, &repaired.vertices, &repaired.sources, None);
     Ok((detail, Some(warning)))
 }
 

@@ -25,6 +25,15 @@ pub const KEYS: &[Key] = &[
     .or_nothing()
     .begins_with("\"spot.ply\"")
     .concerns(FIRST),
+    Key::new(
+        "surface",
+        "resculpt",
+        Kind::File(&EXTENSIONS),
+        "edited meshes, a sequence: at each frame after the first that has a file, the mesh is replaced by it",
+    )
+    .or_nothing()
+    .such_as("\"sculpts/spot.%04d.ply\"")
+    .concerns(STEP),
     Key::new("surface", "scale", Kind::Number(1.0e-9, 1.0e9, ""), "from the files' unit to metres: 0.01 for centimetres")
         .or("1.0")
         .concerns(FIRST),
@@ -65,6 +74,30 @@ pub const KEYS: &[Key] = &[
     .concerns(FIRST),
     Key::new(
         "surface",
+        "match",
+        Kind::Choice(&["flagged", "every"]),
+        "where a mesh that is rebuilt takes the liquid's topology: flagged, where vertices find a change, and at drops; every: all over it in each frame, also at bubbles, which takes longer",
+    )
+    .or("\"flagged\"")
+    .concerns(STEP),
+    Key::new(
+        "surface",
+        "min_drop",
+        Kind::Whole(0, 1_000_000),
+        "of a mesh that is rebuilt, parts with fewer particles inside are taken away, and drops of fewer get no mesh; 0 and 1: only parts without any go",
+    )
+    .or("8")
+    .concerns(STEP),
+    Key::new(
+        "surface",
+        "ahead",
+        Kind::Whole(0, 100),
+        "frames before a merge or split from which on a mesh that is rebuilt eases towards it; 0: it is there from one frame to the next",
+    )
+    .or("4")
+    .concerns(STEP),
+    Key::new(
+        "surface",
         "weighting",
         Kind::Choice(&["affine", "mean"]),
         "how particles carry vertices: by affine maps, or by their mean as in the thesis, which lags behind",
@@ -99,9 +132,9 @@ pub const KEYS: &[Key] = &[
     Key::new(
         "output",
         "attributes",
-        Kind::Choices(&["v", "delta", "flagged"]),
-        "of its vertices: velocity over the coming frame (m/s), distance kept from the particles' surface (m), 1 where flagged",
+        Kind::Choices(&["v", "delta", "flagged", "rebuilt"]),
+        "of its vertices: velocity over the coming frame (m/s), distance kept from the particles' surface (m), 1 where flagged; of its faces: 1 where made, 2 where its texture is torn",
     )
-    .or("[\"v\", \"delta\", \"flagged\"]")
+    .or("[\"v\", \"delta\", \"flagged\", \"rebuilt\"]")
     .concerns(OUTPUT),
 ];

@@ -15,11 +15,17 @@ mod memory;
 #[cfg(feature = "vdb")]
 mod plan;
 #[cfg(feature = "vdb")]
+mod sculpts;
+#[cfg(feature = "vdb")]
 mod time;
+#[cfg(feature = "vdb")]
+mod told;
 #[cfg(feature = "vdb")]
 mod track;
 #[cfg(feature = "vdb")]
 mod trail;
+#[cfg(feature = "vdb")]
+mod walk;
 
 use std::path::PathBuf;
 
@@ -44,6 +50,8 @@ pub struct Surface {
     pub particles: PathBuf,
     /// The mesh at the first frame; none: the particles' own surface there.
     pub mesh: Option<PathBuf>,
+    /// The pattern of edited meshes, which need not be there for each frame; none: there are none.
+    pub resculpt: Option<PathBuf>,
     /// The files' unit and upward axis.
     pub space: Space,
     /// The sequence starts this many frames later.
@@ -58,6 +66,12 @@ pub struct Surface {
     pub change: f64,
     /// The mesh is rebuilt where the liquid merges or splits; else it is flagged there.
     pub rebuild: bool,
+    /// Where it is rebuilt, its topology is matched all over it in every step; else where vertices are flagged.
+    pub every: bool,
+    /// Where it is rebuilt, least count of particles in a part of it.
+    pub min_drop: usize,
+    /// Where it is rebuilt, frames before a change from which on it eases towards it (0..=100).
+    pub ahead: i32,
     /// How particles carry vertices.
     pub weighting: Weighting,
     /// Time in which half of the detail fades (s); none: it stays.
@@ -83,6 +97,8 @@ pub struct Files {
     pub delta: bool,
     /// Whether a vertex is flagged.
     pub flagged: bool,
+    /// Whether a face was made, and its texture torn.
+    pub rebuilt: bool,
 }
 
 impl Surface {
@@ -90,11 +106,13 @@ impl Surface {
     pub(super) fn of(values: &Values) -> Option<Self> {
         let value = |name: &str| values.get(&format!("surface.{name}"));
         let number = |name: &str| value(name).and_then(Value::number);
+        let whole = |name: &str| value(name).and_then(Value::whole);
         let text = |name: &str| value(name).and_then(Value::text);
         let asked = |name: &str, text: &str| values.get(name).is_some_and(|value| value.holds(text));
         Some(Self {
             particles: value("particles")?.path()?.to_path_buf(),
             mesh: value("mesh").and_then(Value::path).map(Into::into),
+            resculpt: value("resculpt").and_then(Value::path).map(Into::into),
             space: Space {
                 scale: number("scale").unwrap_or(1.0),
                 up: if text("up") == Some("z") { Up::Z } else { Up::Y },
@@ -105,6 +123,9 @@ impl Surface {
             cell: number("cell").unwrap_or(0.5),
             change: number("change").unwrap_or(0.5),
             rebuild: value("rebuild").and_then(Value::flag).unwrap_or(true),
+            every: text("match") == Some("every"),
+            min_drop: whole("min_drop").and_then(|count| usize::try_from(count).ok()).unwrap_or(8),
+            ahead: whole("ahead").and_then(|frames| i32::try_from(frames).ok()).unwrap_or(4),
             weighting: match text("weighting") {
                 Some("mean") => Weighting::Mean,
                 _ => Weighting::Affine,
@@ -118,6 +139,7 @@ impl Surface {
                 velocities: asked("output.attributes", "v"),
                 delta: asked("output.attributes", "delta"),
                 flagged: asked("output.attributes", "flagged"),
+                rebuilt: asked("output.attributes", "rebuilt"),
             },
         })
     }

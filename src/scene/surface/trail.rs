@@ -1,6 +1,6 @@
 //! How vertices go from a frame to the next, through changes of the mesh.
 
-use super::track::Way;
+use super::walk::Way;
 use crate::base::{DVec3, Vec3};
 use crate::surface::Change;
 

@@ -53,11 +53,13 @@ pub struct Matching {
     pub reach: i32,
     /// Most iterations.
     pub most: usize,
+    /// Relaxation factor of [`Solver::Sor`], at least 1 and less than 2; none: from how wide the space between fixed nodes is.
+    pub omega: Option<f64>,
 }
 
 impl Default for Matching {
     fn default() -> Self {
-        Self { solver: Solver::default(), tolerance: 0.01, reach: 12, most: 1000 }
+        Self { solver: Solver::default(), tolerance: 0.01, reach: 12, most: 1000, omega: None }
     }
 }
 
@@ -88,6 +90,8 @@ pub struct Matched {
     pub fixed: usize,
     /// Count of free nodes: flagged ones, and those within reach that are not fixed.
     pub free: usize,
+    /// Relaxation factor: the one that was asked for, else that of the space between fixed nodes, which [`Solver::Sor`] takes.
+    pub omega: f64,
 }
 
 /// Matches Gamma to phi near flagged nodes. The order of the nodes makes no difference to what each becomes, nor does the number of
@@ -104,8 +108,9 @@ pub fn match_topology(ctx: &Context, nodes: &[Node], matching: &Matching) -> Res
     ctx.check()?;
     let Free { nodes: free, rows, fixed } = Free::of(ctx, nodes, matching.reach)?;
     let system = System::new(&rows);
+    let omega = matching.omega.unwrap_or_else(|| system.omega());
     let solved = match matching.solver {
-        Solver::Sor => system.over_relaxed(ctx, matching.tolerance, matching.most)?,
+        Solver::Sor => system.over_relaxed(ctx, omega, matching.tolerance, matching.most)?,
         Solver::Gradients => system.by_gradients(ctx, matching.tolerance, matching.most)?,
     };
     let mut gamma: Vec<f32> = nodes.iter().map(|node| node.gamma).collect();
@@ -116,7 +121,8 @@ pub fn match_topology(ctx: &Context, nodes: &[Node], matching: &Matching) -> Res
             *gamma = matched;
         }
     }
-    Ok(Matched { gamma, iterations: solved.iterations, residual: solved.residual, fixed, free: free.len() })
+    let (iterations, residual) = (solved.iterations, solved.residual);
+    Ok(Matched { gamma, iterations, residual, fixed, free: free.len(), omega })
 }
 
 impl Matching {
@@ -131,6 +137,11 @@ impl Matching {
             return Err(Error::argument(format!(
                 "the reach of the matching, {}, is not 1 or more",
                 self.reach
+            )));
+        }
+        if let Some(omega) = self.omega.filter(|omega| !(1.0..2.0).contains(omega)) {
+            return Err(Error::argument(format!(
+                "the relaxation factor of the matching, {omega}, is not at least 1 and less than 2"
             )));
         }
         Ok(())
@@ -158,7 +169,7 @@ mod tests {
     }
 
     fn matching(solver: Solver, tolerance: f64, reach: i32) -> Matching {
-        Matching { solver, tolerance, reach, most: 5000 }
+        Matching { solver, tolerance, reach, most: 5000, omega: None }
     }
 
     /// Two balls with a radius of 8 and 1.5 between them. For phi they lie `shift` farther along y, and a neck has grown
@@ -225,16 +236,24 @@ mod tests {
         differences.fold(0.0f32, |most, x| most.max(x.abs()))
     }
 
-    #[test]
-    fn psi_is_linear_between_two_planes() {
-        // psi is -0.25 at x = 0 and 0.5 at x = 12; in between, Gamma says nothing.
-        let psi = |x: i32| -0.25 + x as f32 / 16.0;
+    /// psi between two planes: -0.25 at x = 0 and 0.5 at x = 12.
+    fn psi(x: i32) -> f32 {
+        -0.25 + x as f32 / 16.0
+    }
+
+    /// Nodes of two planes and between them, where Gamma says nothing.
+    fn planes() -> Vec<Node> {
         let node = |place: [i32; 3]| {
             let is_flagged = (1..12).contains(&place[0]);
             let phi = (place[0] * 3 + place[1] * 5 + place[2]) as f32 / 8.0 % 1.0;
             Node { place, gamma: if is_flagged { 3.0 } else { phi + psi(place[0]) }, phi, is_flagged }
         };
-        let nodes: Vec<Node> = each([0; 3], [12, 4, 3]).map(node).collect();
+        each([0; 3], [12, 4, 3]).map(node).collect()
+    }
+
+    #[test]
+    fn psi_is_linear_between_two_planes() {
+        let nodes = planes();
         for solver in SOLVERS {
             let out = match_topology(&context(1), &nodes, &matching(solver, 1e-11, 12)).unwrap();
             assert_eq!((out.fixed, out.free), (2 * 20, 11 * 20));
@@ -244,6 +263,24 @@ mod tests {
                 greatest(nodes.iter().zip(&out.gamma).map(|(node, out)| out - node.phi - psi(node.place[0])));
             assert!(far < 1e-6, "{solver:?} is off by {far}");
         }
+    }
+
+    #[test]
+    fn the_relaxation_factor_is_the_one_that_is_asked_for() {
+        let nodes = planes();
+        let solve = |omega| {
+            let matching = Matching { omega, ..matching(Solver::Sor, 1e-9, 12) };
+            match_topology(&context(1), &nodes, &matching).unwrap()
+        };
+        // Eleven nodes in a row are free.
+        let own = solve(None);
+        assert!((own.omega - 1.588_790_71).abs() < 1e-6, "{}", own.omega);
+        assert!(solve(Some(own.omega)) == own);
+        let plain = solve(Some(1.0));
+        assert_eq!(plain.omega, 1.0);
+        assert!(plain.iterations > 2 * own.iterations, "{} and {}", plain.iterations, own.iterations);
+        let far = greatest(plain.gamma.iter().zip(&own.gamma).map(|(a, b)| a - b));
+        assert!(far < 1e-4, "they differ by {far}");
     }
 
     #[test]
@@ -403,6 +440,9 @@ mod tests {
             assert_eq!(refusal(&[lost], &small), "the distances of node [1, 2, 3] are not finite");
             assert!(refusal(&[node], &Matching { tolerance: 0.0, ..small }).contains("tolerance"));
             assert!(refusal(&[node], &Matching { reach: 0, ..small }).contains("reach"));
+            for omega in [0.99, 2.0, f64::NAN] {
+                assert!(refusal(&[node], &Matching { omega: Some(omega), ..small }).contains("factor"));
+            }
             let ctx = context(1);
             ctx.cancel();
             assert!(matches!(match_topology(&ctx, &[node], &small), Err(Error::Cancelled)));

@@ -83,15 +83,18 @@ impl System {
         Self { halves, count: rows.len(), widest: widest(rows, &is_held) }
     }
 
-    /// Solves by successive over-relaxation (Eq. 2.5) until no psi changes by `tolerance` (cells), or `most` iterations.
-    ///
-    /// The relaxation factor is the best one for a cube with sides of N nodes (Yang & Gobbert 2009), N being the most free nodes
-    /// in a row on any axis: how wide the space between fixed nodes is, not how large the grid is, which would make it too great.
+    /// The best relaxation factor for a cube with sides of N nodes (Yang & Gobbert 2009), N being the most free nodes in a row on
+    /// any axis: how wide the space between fixed nodes is, not how large the grid is, which would make it too great.
+    pub fn omega(&self) -> f64 {
+        2.0 / (1.0 + libm::sin(std::f64::consts::PI / (f64::from(self.widest) + 1.0)))
+    }
+
+    /// Solves by successive over-relaxation (Eq. 2.5) with a factor `omega` until no psi changes by `tolerance` (cells), or `most`
+    /// iterations.
     ///
     /// # Errors
     /// Cancel.
-    pub fn over_relaxed(&self, ctx: &Context, tolerance: f64, most: usize) -> Result<Solution> {
-        let omega = 2.0 / (1.0 + libm::sin(std::f64::consts::PI / (f64::from(self.widest) + 1.0)));
+    pub fn over_relaxed(&self, ctx: &Context, omega: f64, tolerance: f64, most: usize) -> Result<Solution> {
         let mut psi = self.zeros();
         let mut iterations = 0;
         while self.has_nodes() && iterations < most {
@@ -311,7 +314,7 @@ mod tests {
         assert_eq!(system.widest, 3);
         let ctx = Context::new(Pool::new(1).unwrap());
         let solutions = [
-            system.over_relaxed(&ctx, 1e-12, 1000).unwrap(),
+            system.over_relaxed(&ctx, system.omega(), 1e-12, 1000).unwrap(),
             system.by_gradients(&ctx, 1e-12, 1000).unwrap(),
         ];
         for Solution { psi, residual, .. } in solutions {
@@ -327,14 +330,15 @@ mod tests {
         loads[0] = Some(1.0);
         let system = System::new(&line(&loads));
         let ctx = Context::new(Pool::new(1).unwrap());
-        for solution in
-            [system.over_relaxed(&ctx, 1e-12, 3).unwrap(), system.by_gradients(&ctx, 1e-12, 3).unwrap()]
-        {
+        for solution in [
+            system.over_relaxed(&ctx, system.omega(), 1e-12, 3).unwrap(),
+            system.by_gradients(&ctx, 1e-12, 3).unwrap(),
+        ] {
             assert_eq!(solution.iterations, 3);
             assert!(solution.residual > 1e-3, "{}", solution.residual);
         }
         let empty = System::new(&[]);
-        assert_eq!(empty.over_relaxed(&ctx, 1e-2, 9).unwrap().iterations, 0);
+        assert_eq!(empty.over_relaxed(&ctx, empty.omega(), 1e-2, 9).unwrap().iterations, 0);
         assert_eq!(empty.by_gradients(&ctx, 1e-2, 9).unwrap().iterations, 0);
     }
 }

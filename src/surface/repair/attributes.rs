@@ -2,23 +2,19 @@
 //!
 //! Vertices and triangles that are still there keep their numbers bit for bit. What was made takes those of a place on the old mesh: a
 //! vertex of the nearest one, the corners of a triangle all of places on one old triangle, its chart, so that none lies across a seam.
+//! Where it is known where the liquid there was at the first frame, that of the mesh at that frame goes before (`traced.rs`).
 
 use rayon::prelude::*;
 
 use super::Source;
-use crate::base::arrays::{DetailedMesh, MeshArray, Number, On};
+use super::traced::Traced;
+use super::weights::{Weights, alone, between, blended, heaviest, weights};
+use crate::base::arrays::{DetailedMesh, MeshArray, On};
 use crate::base::deviation::NearestTree;
 use crate::base::{DVec3, TriMesh, Uvs, Vec3};
 
 /// Vertices or triangles of a task.
-const GRAIN: usize = 1024;
-/// Arrays whose 8-bit integers are shares of a colour: they are interpolated, as floats are.
-const COLOURS: [&str; 4] = ["red", "green", "blue", "alpha"];
-/// A triangle whose first corner has a lesser sine has no face to speak of: its places are those of its edges.
-const NEEDLE: f64 = 1e-8;
-
-/// How much the corners of a triangle count at a place on it: 0 or more, 1 in all.
-type Weights = [f64; 3];
+pub(super) const GRAIN: usize = 1024;
 
 /// What a mesh carries, on what became of it: `mesh`, for whose vertices `vertices` names those that they were, and for whose
 /// triangles `sources` says where they come from.
@@ -29,7 +25,25 @@ type Weights = [f64; 3];
 /// interpolated, and colours in 8-bit integers (`red`, `green`, `blue`, `alpha`); other integers are those of the nearest corner.
 /// Where vertices with different texture coordinates were joined, the corners have coordinates then. Of other arrays of vertices that
 /// were joined the first one's number stays.
+///
+/// With `traced` what was made takes the numbers of the first frame instead, where it is known what the liquid there had then, and there
+/// is an array [`Traced::MASK`].
 pub fn carried(
+    detail: &DetailedMesh,
+    mesh: TriMesh,
+    vertices: &[Option<u32>],
+    sources: &[Source],
+    traced: Option<&Traced<'_>>,
+) -> DetailedMesh {
+    let mut out = of_old(detail, mesh, vertices, sources);
+    if let Some(traced) = traced {
+        traced.put(&mut out, vertices, sources);
+    }
+    out
+}
+
+/// What it takes from the mesh before alone.
+fn of_old(
     detail: &DetailedMesh,
     mesh: TriMesh,
     vertices: &[Option<u32>],
@@ -185,87 +199,10 @@ impl<'a> Origins<'a> {
     }
 }
 
-/// The weights of a corner.
-fn alone(corner: usize) -> Weights {
-    let mut weights = [0.0; 3];
-    weights[corner] = 1.0;
-    weights
-}
-
-/// The corner that counts most, of several the first.
-fn heaviest(&[a, b, c]: &Weights) -> usize {
-    if a >= b && a >= c {
-        0
-    } else if b >= c {
-        1
-    } else {
-        2
-    }
-}
-
-/// The place of a triangle that is nearest to another place (m); where that is a corner's, exactly this corner.
-fn weights(corners: &[DVec3; 3], place: DVec3) -> Weights {
-    if let Some(corner) = corners.iter().position(|corner| *corner == place) {
-        return alone(corner);
-    }
-    let [a, b, c] = corners;
-    let (ab, ac, way) = (b - a, c - a, place - a);
-    let normal = ab.cross(&ac);
-    let square = normal.norm_squared();
-    if square > NEEDLE * NEEDLE * ab.norm_squared() * ac.norm_squared() {
-        // Shares of the area; rounding leaves them a sum of 1.
-        let (of_b, of_c) = (way.cross(&ac).dot(&normal) / square, ab.cross(&way).dot(&normal) / square);
-        let weights = [1.0 - of_b - of_c, of_b, of_c];
-        if weights.iter().all(|weight| *weight >= 0.0) {
-            return weights;
-        }
-    }
-    let mut best = (f64::INFINITY, alone(0));
-    for (from, to) in [(0, 1), (1, 2), (2, 0)] {
-        let along = corners[to] - corners[from];
-        let square = along.norm_squared();
-        let way = (place - corners[from]).dot(&along);
-        let share = if square > 0.0 { (way / square).clamp(0.0, 1.0) } else { 0.0 };
-        let far = (corners[from] + along * share - place).norm_squared();
-        if far < best.0 {
-            let mut weights = [0.0; 3];
-            weights[from] = 1.0 - share;
-            weights[to] = share;
-            best = (far, weights);
-        }
-    }
-    best.1
-}
-
-/// An array's number at a place, from those of the corners.
-fn blended(array: &MeshArray, numbers: [f64; 3], weights: &Weights) -> f64 {
-    let most = heaviest(weights);
-    if weights[most] == 1.0 {
-        return numbers[most];
-    }
-    match array.number {
-        Number::F64 => mean(numbers, weights),
-        Number::F32 => f64::from(mean(numbers, weights) as f32),
-        Number::I8 | Number::U8 if COLOURS.contains(&&*array.name) => mean(numbers, weights).round(),
-        _ => numbers[most],
-    }
-}
-
-/// Texture coordinates at a place, from those of the corners.
-fn between(places: [[f32; 2]; 3], weights: &Weights) -> [f32; 2] {
-    [0, 1].map(|axis| mean(places.map(|place| f64::from(place[axis])), weights) as f32)
-}
-
-/// The mean of three numbers: any of them where all are the same, and without those that do not count at all.
-fn mean(numbers: [f64; 3], weights: &Weights) -> f64 {
-    let most = heaviest(weights);
-    let others = (0..3).filter(|corner| *corner != most && weights[*corner] > 0.0);
-    others.fold(numbers[most], |sum, corner| sum + weights[corner] * (numbers[corner] - numbers[most]))
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::base::arrays::Number;
     use crate::context::{Context, Pool};
     use crate::surface::repair::repair;
 
@@ -301,7 +238,7 @@ mod tests {
         let places = vec![[0.0, 0.0], [1.0, 0.0], [1.0, 1.0], [0.0, 1.0]];
         let uvs = Uvs { places: places.clone(), corners: None, missing: 2 };
         let detail = DetailedMesh { mesh: old, uvs: Some(uvs), arrays };
-        let carried = carried(&detail, new.clone(), &VERTICES, &SOURCES);
+        let carried = carried(&detail, new.clone(), &VERTICES, &SOURCES, None);
         assert_eq!(carried.mesh, new);
         let wanted: [&[f64]; 6] = [
             &[0.25, 0.5, 0.125, 0.375, 0.25],
@@ -328,7 +265,7 @@ mod tests {
         let places: Vec<[f32; 2]> = (0..6u8).map(|n| [f32::from(n), 0.125 * f32::from(n)]).collect();
         let uvs = Uvs { places: places.clone(), corners: Some((0..6).collect()), missing: 0 };
         let detail = DetailedMesh { mesh: old, uvs: Some(uvs), arrays: Vec::new() };
-        let uvs = carried(&detail, new, &VERTICES, &SOURCES).uvs.unwrap();
+        let uvs = carried(&detail, new, &VERTICES, &SOURCES, None).uvs.unwrap();
         assert_eq!(uvs.corners.unwrap(), [0, 2, 1, 3, 4, 6, 3, 7, 5]);
         assert!(uvs.places.starts_with(&places));
         assert_eq!(uvs.places[6..], [[4.5, 0.5625]; 2]);
@@ -348,43 +285,13 @@ mod tests {
             }
             let uvs = Some(Uvs { places: places.clone(), corners: None, missing: 0 });
             let detail = DetailedMesh { mesh: soup.clone(), uvs, arrays: Vec::new() };
-            let uvs = carried(&detail, square.clone(), &vertices, &sources).uvs.unwrap();
+            let uvs = carried(&detail, square.clone(), &vertices, &sources, None).uvs.unwrap();
             if has_seam {
                 assert_eq!((uvs.places, uvs.corners), (places, Some(vec![0, 1, 2, 3, 4, 5])));
             } else {
                 let kept = [0, 1, 2, 5].map(|n: usize| places[n]);
                 assert_eq!((&uvs.places[..], uvs.corners), (&kept[..], None));
             }
-        }
-    }
-
-    #[test]
-    fn the_nearest_place_of_any_triangle_has_weights() {
-        let at = |x: f64, y: f64, z: f64| DVec3::new(x, y, z);
-        let triangles = [
-            [at(0.0, 0.0, 0.0), at(2.0, 0.1, 0.0), at(0.3, 1.5, 0.7)],
-            [at(0.1, 0.2, 0.3); 3],
-            [at(0.0, 0.0, 0.0), at(0.3, 0.3, 0.3), at(1.0, 1.0, 1.0)],
-            [at(0.0, 0.0, 0.0), at(0.0, 0.0, 0.0), at(1.0, -1.0, 0.5)],
-            [at(0.0, 0.0, 0.0), at(1.0, 1e-12, 0.0), at(1e-40, 0.0, 0.0)],
-        ];
-        let steps = |n: i32| f64::from(n) * 0.4 - 1.0;
-        for corners in &triangles {
-            let there = |weights: &Weights| -> DVec3 {
-                corners.iter().zip(weights).map(|(corner, weight)| corner * *weight).sum()
-            };
-            for place in (0..216).map(|n| at(steps(n % 6), steps(n / 6 % 6), steps(n / 36))) {
-                let found = weights(corners, place);
-                assert!(found.iter().all(|weight| (0.0..=1.0).contains(weight)), "{found:?}");
-                assert!((found.iter().sum::<f64>() - 1.0).abs() < 1e-12, "{found:?}");
-                let far = (there(&found) - place).norm();
-                for n in 0..121 {
-                    let [b, c] = [n % 11, n / 11].map(|n| f64::from(n) / 10.0);
-                    let other = (there(&[1.0 - b - c, b, c]) - place).norm();
-                    assert!(b + c > 1.0 || far <= other + 1e-9, "{corners:?} {place}: {far} {other}");
-                }
-            }
-            (0..3).for_each(|n| assert_eq!(there(&weights(corners, corners[n])), corners[n]));
         }
     }
 
@@ -404,7 +311,7 @@ mod tests {
         let cell = 0.06;
         let repaired = repair(&ctx, &mesh, cell).unwrap();
         let detail = DetailedMesh { mesh, uvs: None, arrays };
-        let carried = carried(&detail, repaired.mesh, &repaired.vertices, &repaired.sources);
+        let carried = carried(&detail, repaired.mesh, &repaired.vertices, &repaired.sources, None);
         let (mesh, [of_vertices, of_corners, of_faces]) =
             (&carried.mesh, [0, 1, 2].map(|n: usize| &carried.arrays[n]));
         let [vertices, triangles] = [mesh.positions.len(), mesh.triangles.len()];

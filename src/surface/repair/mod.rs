@@ -35,7 +35,10 @@ mod pierces;
 mod polygon;
 mod prepare;
 mod region;
+mod texture;
 mod tidy;
+mod traced;
+mod weights;
 
 use self::cut::Trouble;
 use self::draft::{Draft, sewn};
@@ -51,6 +54,7 @@ use crate::error::{Error, Result};
 
 pub use self::attributes::carried;
 pub use self::prepare::Prepared;
+pub use self::traced::Traced;
 pub(super) use self::{
     cut::Shape,
     exact::{GridEdge, end},

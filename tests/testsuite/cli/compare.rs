@@ -4,7 +4,7 @@ use std::fs;
 use std::path::Path;
 
 use crate::common::shapes::{cuboid, sphere, torus};
-use crate::program::{CUBE, fails, frazil, works};
+use crate::program::{CUBE, complains, fails, frazil, works};
 use frazil::base::{TriMesh, Vec3};
 use frazil::io::mesh;
 use serde_json::{Value, json};
@@ -220,6 +220,37 @@ fn what_cannot_be_compared_is_a_sentence() {
     // What is damaged behind the first frame ends a run that has begun.
     fs::write(folder.path().join("a.0003.ply"), "ply\n").unwrap();
     fails(folder.path(), "mesh compare a.%04d.ply a.ply --frames 1-3", 1, &["a.0003.ply"]);
+}
+
+#[test]
+fn frames_before_one_without_faces_are_told() {
+    let folder = folder_with(&[("still.ply", &cuboid([1.0; 3]))]);
+    let folder = folder.path();
+    write_ride(folder, "a", &[0.0, 0.25, 0.5, 0.75, 1.0]);
+    // A liquid that is gone leaves such a mesh.
+    write(folder, "a.0005.ply", &TriMesh::default());
+    let ends = |arguments: &str| {
+        let output = frazil(folder, &format!("mesh compare a.%04d.ply {arguments} --frames 1-5"));
+        complains(&output, 1, &["a.0005.ply", "no faces"]);
+        String::from_utf8(output.stdout).unwrap()
+    };
+    let found: Value = serde_json::from_str(&ends("still.ply --json --flicker")).unwrap();
+    let frames = found["frames"].as_array().unwrap();
+    let told: Vec<_> = frames.iter().map(|of| (number(&of["frame"]), number(&of["hausdorff_m"]))).collect();
+    assert_eq!(told, [(1.0, 0.0), (2.0, 0.25), (3.0, 0.5), (4.0, 0.75)]);
+    let flicker = &found["flicker"][0];
+    assert_eq!(flicker["frames"].as_array().unwrap().len(), 2);
+    // Of all frames nothing is known, as in words.
+    assert!(found["all_frames"].is_null() && flicker["all_frames"].is_null(), "{found}");
+    let said = ends("still.ply");
+    assert!(said.contains("frame 4: from A to B ") && !said.contains("all frames:"), "{said}");
+    let alone: Value = serde_json::from_str(&ends("--flicker --json")).unwrap();
+    assert_eq!((&alone["frames"], alone["flicker"][0]["frames"].as_array().unwrap().len()), (&json!([]), 2));
+    // Without its first frame nothing is begun.
+    write(folder, "a.0001.ply", &TriMesh::default());
+    let output = frazil(folder, "mesh compare a.%04d.ply still.ply --frames 1-5 --json");
+    complains(&output, 2, &["a.0001.ply", "no faces"]);
+    assert!(output.stdout.is_empty());
 }
 
 #[test]

@@ -66,6 +66,9 @@ fn memory_of_a_mesh_on_a_liquid_is_about_what_check_says() {
     // Half the cell: eight times the nodes around the same surface.
     let fine = number(&report(folder, "--set surface.cell=0.25"), "memory_bytes");
     assert!(fine > memory + 10e6, "{fine} after {memory}");
+    // Without rebuilding there is no grid, and no surface is made ahead.
+    let still = number(&report(folder, "--set surface.rebuild=false"), "memory_bytes");
+    assert!(memory > still + 20e6, "{memory} after {still}");
     let warned = report(folder, "--max-memory 50M")["warnings"].to_string();
     for words in ["particles and 19200 triangles", "needs about", "the limit of 50 MB", "a run begins all"] {
         assert!(warned.contains(words), "no {words:?} in {warned}");

@@ -198,6 +198,8 @@ fn balls_meet_and_part_and_the_rest_of_the_mesh_stays_as_it_is() {
     let said = works(folder, &format!("{SHOT} -o out"));
     assert!(!said.contains("repaired"), "{said}");
     let (mut parts, mut rebuilt, mut made) = (Vec::new(), 0, 0);
+    // Frames in which more than the cells at fault, and those that they need, had to be rebuilt.
+    let mut fallen_back = Vec::new();
     for number in 1..=FRAMES {
         let now = frame(folder, "out", number);
         is_whole(&now.mesh, number);
@@ -206,9 +208,12 @@ fn balls_meet_and_part_and_the_rest_of_the_mesh_stays_as_it_is() {
         parts.push(bodies(&now.mesh.triangles).len());
         let told = |key: &str| reported(folder, "out", number, key);
         let counts = ["changed_cells", "rebuilt_cells", "made_triangles"].map(told);
-        assert!(told("rebuilt_rung") <= 3 && told("vertices") == now.mesh.positions.len() as u64);
+        assert_eq!(told("vertices"), now.mesh.positions.len() as u64, "frame {number}");
+        if told("rebuilt_rung") > 0 {
+            fallen_back.push(number);
+        }
         if number <= APART {
-            assert_eq!((counts, told("rebuilt_rung")), ([0; 3], 0), "frame {number}");
+            assert_eq!(counts, [0; 3], "frame {number}");
             assert!(now.mesh.triangles == first.mesh.triangles && now.uvs == first.uvs, "frame {number}");
         }
         assert_eq!(counts[0] > 0, counts[1] > 0, "frame {number}: {counts:?}");
@@ -216,6 +221,7 @@ fn balls_meet_and_part_and_the_rest_of_the_mesh_stays_as_it_is() {
         made += counts[2];
     }
     assert!(rebuilt > 1 && made > 0, "{rebuilt} frames, {made} triangles");
+    assert!(fallen_back.is_empty(), "{fallen_back:?}");
     // Between the balls there may be a part of its own, a drop, while they meet.
     let at = |frame: i32| parts[frame as usize - 1];
     assert_eq!([at(1), at(APART), at(NEAREST), at(FRAMES)], [2, 2, 1, 2], "{parts:?}");
@@ -344,12 +350,13 @@ fn an_open_mesh_is_closed_first_and_that_is_said() {
 }
 
 /// Name, type and interpolation of the primvars besides texture coordinates, and the arrays of a .ply that hold them.
-const PRIMVARS: [(&str, &str, &str, &[&str]); 5] = [
+const PRIMVARS: [(&str, &str, &str, &[&str]); 6] = [
     ("displayColor", "color3f[]", "vertex", &["red", "green", "blue"]),
     ("mask", "double[]", "vertex", &["mask"]),
     ("part", "int[]", "uniform", &["part"]),
     ("delta", "float[]", "vertex", &["delta"]),
     ("flagged", "int[]", "vertex", &["flagged"]),
+    ("rebuilt", "int[]", "uniform", &["rebuilt"]),
 ];
 
 #[test]
@@ -396,7 +403,7 @@ fn usd_has_other_faces_from_frame_to_frame_and_primvars_that_fit_them() {
         let (shot, wanted) = (file("shot.usda"), file("wanted.json"));
         let said =
             clients::usd_reads_arrays(python, &shot, "/shot/surface/surface", number, &wanted).unwrap();
-        assert_eq!(said, "5 arrays");
+        assert_eq!(said, "6 arrays");
     }
     assert!(all[0] == all[1] && all.windows(2).filter(|pair| pair[0] != pair[1]).count() > 1);
     if python.is_none() {

@@ -53,13 +53,14 @@ fn write_shot(folder: &Path) {
 const SHOT: &str = "surface -p ball.%04d.bgeo -m ball.ply --spacing 0.01 --set surface.rebuild=false";
 
 /// Name, type and interpolation of the primvars.
-const PRIMVARS: [(&str, &str, &str); 6] = [
+const PRIMVARS: [(&str, &str, &str); 7] = [
     ("displayColor", "color3f[]", "vertex"),
     ("mask", "double[]", "vertex"),
     ("part_1", "int[]", "uniform"),
     ("wet", "float[]", "faceVarying"),
     ("delta", "float[]", "vertex"),
     ("flagged", "int[]", "vertex"),
+    ("rebuilt", "int[]", "uniform"),
 ];
 
 /// The values of a primvar, from the .ply of the same frame: one for each, or three.
@@ -120,7 +121,7 @@ fn the_arrays_of_a_mesh_and_of_each_frame_are_primvars() {
         ] {
             let said =
                 clients::usd_reads_arrays(python, &file(&name), prim, frame, &file("wanted.json")).unwrap();
-            assert_eq!(said, "6 arrays");
+            assert_eq!(said, "7 arrays");
         }
     }
     if python.is_none() {

@@ -1,0 +1,52 @@
+//! A mesh that was edited by hand takes the place of a tracker's.
+
+use super::context::{enter, frz_context};
+use super::guard::{frz_status, guard};
+use super::handle::{change, read};
+use super::mesh::frz_mesh;
+use super::tracker::{frz_particles, frz_tracker, particles};
+use super::tracker_edits::Edits;
+use crate::surface::{Outlook, Source};
+
+/// Puts an edited mesh in the place of the tracker's: an artist's change in the middle of a shot. How far each of its vertices is from
+/// the particles' surface is measured anew, and kept from there on. After a failure or a cancel the tracker is as it was.
+///
+/// The parameters stay. No vertex and no triangle is one from before: frz_tracker_edits answers 1, and frz_tracker_read_edits says that
+/// all were made; the places from before (FRZ_EDIT_BEFORE) are those to which the last step led. States that are saved from then on
+/// hold the edited mesh, and still come back with the mesh that the tracker was made with (frz_tracker_create).
+///
+/// mesh: as frz_tracker_create takes it, with any vertices and faces, in the particles' space; it is copied. Its attribute "detail" of
+///     one float says what does not fade, also where the mesh before had none.
+/// particles: at the time to which the last step led, or at which the tracker began: the next step begins with them.
+///
+/// One thread at a time; any number may read a mesh.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn frz_tracker_resculpt(
+    context: *mut frz_context,
+    tracker: *mut frz_tracker,
+    mesh: *const frz_mesh,
+    particles: *const frz_particles,
+) -> frz_status {
+    guard(|| {
+        // SAFETY: the pointers are NULL or the caller's.
+        unsafe {
+            let call = enter(context)?;
+            let mut follower = change(tracker)?;
+            let mesh = read(mesh)?;
+            let particles = self::particles(particles)?;
+            // Shares of detail may be refused after the mesh was taken.
+            let mut next = follower.tracker.clone();
+            next.resculpt(call.ctx(), &mesh.triangles, &particles)?;
+            next.set_lasting(mesh.attribute("detail", 1).unwrap_or_default().to_vec())?;
+            follower.edits = Some(Edits {
+                origins: vec![None; next.vertices().len()],
+                sources: vec![Source::New; next.triangles().len()],
+                before: follower.tracker.vertices().to_vec(),
+            });
+            follower.tracker = next;
+            follower.outlook = Outlook::default();
+            follower.saved.take();
+            Ok(())
+        }
+    })
+}

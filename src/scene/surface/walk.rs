@@ -1,0 +1,371 @@
+//! The mesh from frame to frame: it steps with the liquid, carries its arrays through changes, and is exchanged for an edited one
+//! where there is one. Some frames are known ahead, for velocities and for changes that are seen before they happen.
+
+use std::collections::VecDeque;
+use std::path::PathBuf;
+use std::sync::Arc;
+
+use super::sculpts::{path_at, read_sculpt};
+use super::time::Liquid;
+use super::told::told;
+use super::trail::Trail;
+use super::{Inputs, Surface};
+use crate::base::deviation::NearestTree;
+use crate::base::{DVec3, DetailedMesh, TriMesh, Vec3};
+use crate::context::Context;
+use crate::error::{Error, Result};
+use crate::io::usd;
+use crate::scene::shot::{Reads, Report};
+use crate::scene::{Frames, Scene};
+use crate::surface::{
+    Change, Eased, Leads, Params, Particles, Rest, StepReport, Traced, Tracker, carry_attributes, eased,
+};
+
+/// A scene's liquid, and the mesh that goes along.
+pub struct Walk<'a> {
+    scene: &'a Scene,
+    surface: &'a Surface,
+    inputs: &'a Inputs,
+    liquid: Liquid<'a>,
+    /// What the mesh carried when it was last given, and where its liquid was then.
+    source: Source,
+    /// The mesh at the last frame; none before the first.
+    now: Option<At>,
+    /// Those that follow it.
+    ahead: VecDeque<At>,
+}
+
+/// A mesh as an artist made it: that of the first frame, or an edited one.
+#[derive(Clone)]
+struct Source {
+    mesh: Arc<DetailedMesh>,
+    /// The particles at its frame, where they have ids and the mesh carries anything.
+    rest: Option<Arc<Rest>>,
+}
+
+/// The mesh at a frame, with what led there.
+pub struct At {
+    pub tracker: Tracker,
+    /// What it carries; none: what the first mesh does.
+    pub detail: Option<Arc<DetailedMesh>>,
+    /// What the frame's report says.
+    pub report: Report,
+    way: Way,
+    leads: Leads,
+    source: Source,
+}
+
+/// How the vertices of the frame before went to a frame.
+#[derive(Default)]
+pub(super) struct Way {
+    /// Velocities over it (m/s) of the vertices of the frame before; empty at the first frame.
+    pub of_before: Vec<Vec3>,
+    /// Velocities over it of the vertices at its end.
+    pub of_after: Vec<Vec3>,
+}
+
+impl<'a> Walk<'a> {
+    /// The mesh at the first frame, which is the coming one.
+    ///
+    /// # Errors
+    /// A mesh that is not where the particles are, and what a tracker refuses; cancel.
+    pub fn begin(ctx: &Context, scene: &'a Scene, surface: &'a Surface, inputs: &'a Inputs) -> Result<Self> {
+        let mut walk = Self::new(scene, surface, inputs);
+        let particles = walk.particles(scene.shot.frames.first)?;
+        let begun = ctx
+            .step(4, || Tracker::begin(ctx, surface.params(inputs.spacing), &inputs.mesh.mesh, &particles));
+        let ((mut tracker, report), phases) = begun.map_err(|error| walk.told(error))?;
+        tracker.set_lasting(inputs.lasting.clone()).map_err(|error| walk.told(error))?;
+        let report = StepReport { phases, ..report };
+        let report = told(&report, particles.places.len(), &tracker, false);
+        let (way, leads, source) = (Way::default(), Leads::default(), walk.source.clone());
+        walk.ahead.push_back(At { tracker, detail: None, report, way, leads, source });
+        Ok(walk)
+    }
+
+    /// Goes on from a mesh that was kept at a frame, with what it carries; none: what it began with.
+    ///
+    /// # Errors
+    /// Particles or an edited mesh that can no longer be read.
+    pub fn resume(
+        ctx: &Context,
+        (scene, surface, inputs): (&'a Scene, &'a Surface, &'a Inputs),
+        frame: i32,
+        (mut tracker, detail): (Tracker, Option<DetailedMesh>),
+    ) -> Result<Self> {
+        let mut walk = Self::new(scene, surface, inputs);
+        if !tracker.is_rebuilt() {
+            tracker.set_lasting(inputs.lasting.clone()).map_err(|error| walk.told(error))?;
+        }
+        let detail = detail.map(|detail| {
+            let triangles = tracker.triangles().to_vec();
+            Arc::new(DetailedMesh { mesh: TriMesh { positions: Vec::new(), triangles }, ..detail })
+        });
+        let last = inputs.sculpts.iter().rfind(|sculpted| **sculpted <= frame);
+        if let Some(last) = last
+            && let Some(sculpt) = read_sculpt(ctx, surface, inputs, *last)?
+        {
+            let particles = walk.particles(*last)?;
+            walk.source = Source::of(Arc::new(sculpt.mesh), &particles);
+        }
+        let report = Report { results: serde_json::Map::new(), phases: Vec::new() };
+        let (way, leads, source) = (Way::default(), Leads::default(), walk.source.clone());
+        walk.now = Some(At { tracker, detail, report, way, leads, source });
+        Ok(walk)
+    }
+
+    fn new(scene: &'a Scene, surface: &'a Surface, inputs: &'a Inputs) -> Self {
+        let liquid = Liquid::new(surface, scene.shot, &inputs.seen);
+        let source = Source::of(Arc::new(inputs.mesh.clone()), &inputs.particles);
+        Self { scene, surface, inputs, liquid, source, now: None, ahead: VecDeque::new() }
+    }
+
+    /// Goes on to the coming frame, and as far ahead as it needs.
+    ///
+    /// # Errors
+    /// Files that cannot be read; what a step refuses; cancel.
+    pub fn go(&mut self, ctx: &Context, frame: i32) -> Result<()> {
+        let next = match (self.ahead.pop_front(), self.now.take()) {
+            (Some(next), _) => next,
+            (None, Some(mut now)) => self.next(ctx, &mut now, frame)?,
+            (None, None) => return Err(Error::Internal("a mesh was not begun".into())),
+        };
+        self.now = Some(next);
+        for coming in frame + 1 + self.ahead.len() as i32..=frame + self.surface.looks() {
+            if !self.look(ctx, coming)? {
+                break;
+            }
+        }
+        Ok(())
+    }
+
+    /// The mesh at the frame that it went to.
+    pub fn now(&self) -> Result<&At> {
+        self.now.as_ref().ok_or_else(|| Error::Internal("a mesh has gone nowhere".into()))
+    }
+
+    /// Places (m) of its vertices as they are shown: those that a change will take away already go towards what it makes; with the
+    /// velocities that lead to the next frame's (m/s), or where that is not known from the one before.
+    pub fn shown(&self) -> Result<(Vec<DVec3>, Vec<Vec3>)> {
+        let now = self.now()?;
+        let mut places = now.tracker.vertices().to_vec();
+        let mut velocities = match self.ahead.front() {
+            Some(next) => next.way.of_before.clone(),
+            None if now.way.of_after.is_empty() => vec![Vec3::zeros(); places.len()],
+            None => now.way.of_after.clone(),
+        };
+        let coming = self.ahead.iter().map(|at| &at.leads);
+        for Eased { vertex, now, next } in eased(coming, self.surface.ahead as usize) {
+            places[vertex as usize] += now;
+            velocities[vertex as usize] += ((next - now) * self.scene.shot.fps).cast::<f32>();
+        }
+        Ok((places, velocities))
+    }
+
+    /// Makes the frame after those that are known, where it is needed. Beyond the shot's end a cache need not have it.
+    fn look(&mut self, ctx: &Context, frame: i32) -> Result<bool> {
+        let last = self.scene.shot.frames.last;
+        if frame > last {
+            let files = reads(self.scene, self.surface, self.inputs, last).ahead;
+            let own = self.surface.between(self.scene.shot.frames, frame - 1, frame);
+            if files.is_empty() || !own.iter().all(|path| path.is_file()) {
+                return Ok(false);
+            }
+        }
+        let (mut before, is_ahead) = match (self.ahead.pop_back(), self.now.take()) {
+            (Some(before), now) => {
+                self.now = now;
+                (before, true)
+            }
+            (None, Some(now)) => (now, false),
+            (None, None) => return Ok(false),
+        };
+        let next = self.next(ctx, &mut before, frame);
+        if is_ahead {
+            self.ahead.push_back(before);
+        } else {
+            self.now = Some(before);
+        }
+        match next {
+            Ok(next) => self.ahead.push_back(next),
+            Err(Error::Cancelled) => return Err(Error::Cancelled),
+            Err(error) if frame <= last => return Err(error),
+            Err(error) => {
+                let what = match frame - last {
+                    1 => format!("frame {last} has the velocities of the frame before"),
+                    _ => format!("nothing moves towards a change from frame {frame} on"),
+                };
+                log::warn!("{error}; {what}");
+                return Ok(false);
+            }
+        }
+        Ok(true)
+    }
+
+    /// The mesh at a frame from the one before it.
+    fn next(&mut self, ctx: &Context, before: &mut At, frame: i32) -> Result<At> {
+        let (mut tracker, mut detail) = (before.tracker.clone(), before.detail.clone());
+        // The surface that was made ahead is the next one's.
+        before.tracker.forget_ahead();
+        let way = self.liquid.way(frame);
+        let (mut report, mut leads) = (StepReport::default(), Leads::default());
+        let mut trail = Trail::of(before.tracker.vertices());
+        let mut from = self.liquid.at(way[0])?;
+        // What the step after each goes to; beyond the shot it need not be there.
+        let beyond = self.liquid.way(frame + 1)[1];
+        let is_there = self.surface.rebuild && frame < self.scene.shot.frames.last;
+        let behind = way[2..].iter().copied().map(Some).chain([is_there.then_some(beyond)]);
+        for (ends, behind) in way.windows(2).zip(behind) {
+            let to = self.liquid.at(ends[1])?;
+            let dt = (ends[1] - ends[0]) * self.liquid.file_time();
+            if let Some(behind) = behind
+                && let Ok(particles) = self.liquid.at(behind)
+            {
+                tracker.set_ahead(particles);
+            }
+            let triangles = tracker.triangles().to_vec();
+            let step = tracker.step(ctx, &from, &to, dt).map_err(|error| self.liquid.told(ends[0], error))?;
+            let share = (ends[1] - way[0]) / (way[way.len() - 1] - way[0]);
+            match &step.change {
+                Some(change) => {
+                    trail.follow(&change.before, share);
+                    if self.surface.eases() {
+                        leads = leads.then(&Leads::of(change, &triangles, self.inputs.spacing));
+                    }
+                    let own = detail.as_ref().unwrap_or(&before.source.mesh);
+                    detail = Some(Arc::new(carried(ctx, own, &before.source, (&tracker, change), &to)?));
+                    trail.change(change);
+                }
+                None => trail.follow(tracker.vertices(), share),
+            }
+            report = report.followed_by(step);
+            from = to;
+        }
+        let way = trail.way(tracker.vertices(), tracker.triangles(), self.scene.shot.fps);
+        let count = from.places.len();
+        let source = before.source.clone();
+        let report = told(&report, count, &tracker, false);
+        let mut at = At { tracker, detail, report, way, leads, source };
+        if frame <= self.scene.shot.frames.last {
+            self.resculpt(ctx, &mut at, frame, &from)?;
+        }
+        Ok(at)
+    }
+
+    /// Puts the edited mesh of a frame in the place of the one that came there, if there is one.
+    fn resculpt(&self, ctx: &Context, at: &mut At, frame: i32, particles: &Particles) -> Result<()> {
+        let Some(sculpt) = read_sculpt(ctx, self.surface, self.inputs, frame)? else { return Ok(()) };
+        let refused = |error| match error {
+            Error::Argument(what) => Error::file(&sculpt.path, what),
+            other => other,
+        };
+        let old = NearestTree::new(&at.tracker.mesh());
+        let triangles = at.tracker.triangles().to_vec();
+        let report = at.tracker.resculpt(ctx, &sculpt.mesh.mesh, particles).map_err(refused)?;
+        at.tracker.set_lasting(sculpt.lasting).map_err(refused)?;
+        // Vertices of the edited mesh go as the mesh before went beside them.
+        let velocity = |place: &DVec3| {
+            let corner = old.nearest(*place).map(|near| triangles[near.triangle][0] as usize);
+            corner.and_then(|corner| at.way.of_after.get(corner).copied()).unwrap_or_default()
+        };
+        at.way.of_after = at.tracker.vertices().iter().map(velocity).collect();
+        at.leads = at.leads.clone().then(&Leads::cut(at.tracker.vertices().len()));
+        at.report = told(&report, particles.places.len(), &at.tracker, true);
+        let mesh = Arc::new(sculpt.mesh);
+        at.source = Source::of(mesh.clone(), particles);
+        at.detail = Some(mesh);
+        Ok(())
+    }
+
+    /// The particles at a frame.
+    fn particles(&mut self, frame: i32) -> Result<Arc<Particles>> {
+        self.liquid.at(self.surface.time(self.scene.shot.frames, frame))
+    }
+
+    /// An error of the first mesh, with its file.
+    fn told(&self, error: Error) -> Error {
+        match error {
+            Error::Argument(what) => {
+                Error::file(self.surface.mesh.as_ref().unwrap_or(&self.surface.particles), what)
+            }
+            other => other,
+        }
+    }
+}
+
+impl Source {
+    fn of(mesh: Arc<DetailedMesh>, particles: &Particles) -> Self {
+        let is_traced = mesh.uvs.is_some() || !mesh.arrays.is_empty();
+        let rest = if is_traced { Rest::of(particles).map(Arc::new) } else { None };
+        Self { mesh, rest }
+    }
+}
+
+/// What a mesh carries after a change; its places are those of the change.
+fn carried(
+    ctx: &Context,
+    own: &DetailedMesh,
+    source: &Source,
+    (tracker, change): (&Tracker, &Change),
+    particles: &Particles,
+) -> Result<DetailedMesh> {
+    let triangles = own.mesh.triangles.clone();
+    let mesh = TriMesh { positions: usd::to_floats(&change.before), triangles };
+    let old = DetailedMesh { mesh, uvs: own.uvs.clone(), arrays: own.arrays.clone() };
+    let spacing = tracker.params().spacing;
+    let places = match &source.rest {
+        Some(rest) => rest.of_change(ctx, particles, spacing, change)?,
+        None => Vec::new(),
+    };
+    let traced = Traced { first: &source.mesh, places: &places, spacing };
+    Ok(carry_attributes(&old, tracker.mesh(), &change.origins, &change.sources, Some(&traced)))
+}
+
+impl Surface {
+    /// How the mesh follows particles of a spacing (m).
+    pub(super) fn params(&self, spacing: f64) -> Params {
+        Params {
+            spacing,
+            cell: self.cell,
+            change: self.change,
+            weighting: self.weighting,
+            half_life: self.half_life.unwrap_or(f64::INFINITY),
+            fade: self.fade,
+            rebuild: self.rebuild,
+            every: self.every,
+            min_drop: self.min_drop,
+        }
+    }
+
+    /// How many frames are made ahead: one for velocities; for those that the vertices go towards a change they have to be known in the
+    /// frame after too.
+    fn looks(&self) -> i32 {
+        if self.eases() { self.ahead + 1 } else { 1 }
+    }
+
+    fn eases(&self) -> bool {
+        self.rebuild && self.ahead > 0
+    }
+
+    /// The files from a frame of the shot to another.
+    fn between(&self, shot: Frames, from: i32, to: i32) -> Vec<PathBuf> {
+        self.files(self.time(shot, from), self.time(shot, to))
+    }
+}
+
+/// The files that are read for a frame.
+pub(super) fn reads(scene: &Scene, surface: &Surface, inputs: &Inputs, frame: i32) -> Reads {
+    let frames = scene.shot.frames;
+    let before = if frame == frames.first { frame } else { frame - 1 };
+    let particles = surface.between(frames, before, frame);
+    let sculpt = |frame: i32| path_at(surface, &inputs.sculpts, frame);
+    let mut ahead = Vec::new();
+    if surface.output.velocities || surface.output.usd || surface.eases() {
+        let last = frame + surface.looks();
+        ahead = surface.between(frames, frame, last);
+        // What is read anyway is not of the coming frames alone.
+        ahead.retain(|path| !particles.contains(path));
+        ahead.extend((frame + 1..=last).filter_map(sculpt));
+    }
+    Reads { files: particles.into_iter().chain(sculpt(frame)).collect(), ahead }
+}

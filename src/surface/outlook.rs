@@ -1,0 +1,140 @@
+//! Steps of a tracker that are made before they are wanted: what they change is seen before it happens (`easing.rs`), and when their
+//! turn comes they are there.
+
+use std::collections::VecDeque;
+
+use super::Particles;
+use super::easing::{Eased, Leads, eased};
+use super::report::StepReport;
+use super::tracker::Tracker;
+use crate::base::DVec3;
+use crate::context::Context;
+use crate::error::Result;
+
+/// The steps to come of a tracker.
+#[derive(Debug, Default)]
+pub struct Outlook {
+    /// The particles at which the first one begins.
+    from: Particles,
+    /// In their order.
+    steps: VecDeque<Coming>,
+}
+
+/// A step to come.
+#[derive(Debug)]
+struct Coming {
+    to: Particles,
+    dt: f64,
+    after: Tracker,
+    report: StepReport,
+    leads: Leads,
+}
+
+impl Outlook {
+    /// Makes the steps from the particles `from`, at which the tracker is, through those to come, each `dt` (s) after the one before.
+    /// Steps that were made for the same particles are kept. A tracker that went another way needs another outlook.
+    ///
+    /// # Errors
+    /// As [`Tracker::step`]; the steps before the one that failed stay.
+    pub fn look(
+        &mut self,
+        ctx: &Context,
+        tracker: &Tracker,
+        from: &Particles,
+        coming: &[Particles],
+        dt: f64,
+    ) -> Result<()> {
+        if self.from != *from {
+            self.steps.clear();
+            self.from = from.clone();
+        }
+        let is_same = |(step, to): &(&Coming, &Particles)| step.dt == dt && step.to == **to;
+        let same = self.steps.iter().zip(coming).take_while(is_same).count();
+        self.steps.truncate(same);
+        for to in &coming[same..] {
+            let last = self.steps.back();
+            let (mut after, from) = match last {
+                Some(last) => (last.after.clone(), &last.to),
+                None => (tracker.clone(), &self.from),
+            };
+            let triangles = after.triangles().to_vec();
+            let report = after.step(ctx, from, to, dt)?;
+            let spacing = tracker.params().spacing;
+            let leads = report.change.as_ref().map(|change| Leads::of(change, &triangles, spacing));
+            let leads = leads.unwrap_or_default();
+            self.steps.push_back(Coming { to: to.clone(), dt, after, report, leads });
+        }
+        Ok(())
+    }
+
+    /// What a step becomes that was made already.
+    pub fn take(&mut self, from: &Particles, to: &Particles, dt: f64) -> Option<(Tracker, StepReport)> {
+        let is_it = |step: &Coming| step.dt == dt && step.to == *to;
+        if self.from != *from || !self.steps.front().is_some_and(is_it) {
+            *self = Self::default();
+            return None;
+        }
+        let Coming { to, after, report, .. } = self.steps.pop_front()?;
+        self.from = to;
+        Some((after, report))
+    }
+
+    /// Places (m) of the tracker's vertices as they are shown: those that a step to come takes away go towards what it makes, for
+    /// `ahead` steps before it.
+    pub fn eased(&self, tracker: &Tracker, ahead: usize) -> Vec<DVec3> {
+        let mut places = tracker.vertices().to_vec();
+        for Eased { vertex, now, .. } in eased(self.steps.iter().map(|step| &step.leads), ahead) {
+            places[vertex as usize] += now;
+        }
+        places
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::context::Pool;
+    use crate::surface::{Implicit, Isosurface, Params};
+
+    const DT: f64 = 0.04;
+
+    /// Two balls of particles that meet.
+    fn balls(frame: i32) -> Particles {
+        let on = || -4..=4;
+        let all = on().flat_map(|x| on().flat_map(move |y| on().map(move |z| [x, y, z].map(f64::from))));
+        let ball: Vec<DVec3> = all.map(DVec3::from).filter(|place| place.norm() <= 4.2).collect();
+        let away = 6.5 - 0.2 * f64::from(frame);
+        let side = |way: f64| ball.iter().map(move |place| place + DVec3::new(way * away, 0.1 * way, 0.0));
+        let places: Vec<DVec3> = side(1.0).chain(side(-1.0)).collect();
+        Particles { ids: (0..places.len() as i64).collect(), velocities: Vec::new(), places }
+    }
+
+    #[test]
+    fn steps_that_were_made_ahead_are_those_that_come_and_only_what_goes_is_moved() {
+        let ctx = Context::new(Pool::new(2).unwrap());
+        let first = balls(0);
+        let phi = Implicit::new(&ctx, &first.places, 1.0, 0.5).unwrap();
+        let mesh = Isosurface::new(&phi).mesh(&phi);
+        let params = Params { rebuild: true, ..Params::for_spacing(1.0) };
+        let mut tracker = Tracker::new(&ctx, params, &mesh, &first).unwrap();
+        let mut plain = tracker.clone();
+        let (mut outlook, mut moved) = (Outlook::default(), 0);
+        for frame in 0..16 {
+            let (from, to) = (balls(frame), balls(frame + 1));
+            let coming: Vec<Particles> = (1..=3).map(|ahead| balls(frame + ahead)).collect();
+            outlook.look(&ctx, &tracker, &from, &coming, DT).unwrap();
+            let places = outlook.eased(&tracker, 3);
+            moved += places.iter().zip(tracker.vertices()).filter(|(shown, own)| shown != own).count();
+            let (next, report) = outlook.take(&from, &to, DT).unwrap();
+            tracker = next;
+            let wanted = plain.step(&ctx, &from, &to, DT).unwrap();
+            assert!(tracker.save() == plain.save(), "{frame}");
+            assert_eq!(report.change.is_some(), wanted.change.is_some(), "{frame}");
+        }
+        assert!(moved > 20, "{moved}");
+        // Other particles are another way.
+        outlook.look(&ctx, &tracker, &balls(16), &[balls(17)], DT).unwrap();
+        assert!(outlook.take(&balls(16), &balls(18), DT).is_none());
+        assert!(outlook.take(&balls(16), &balls(17), DT).is_none());
+    }
+}

@@ -1,0 +1,294 @@
+//! `frazil surface` with meshes that were edited by hand in the middle of the shot.
+
+use std::collections::BTreeMap;
+use std::fs;
+use std::path::Path;
+
+use frazil::base::arrays::{MeshArray, Number, On};
+use frazil::base::{DVec3, DetailedMesh, TriMesh, Uvs};
+use frazil::io::mesh;
+
+use crate::common::character::output;
+use crate::common::liquids::{ball, write_cache};
+use crate::program::{fails, kill_at, works};
+
+/// Distance between particles (m), and frames of the shot.
+const SPACING: f64 = 0.01;
+const FRAMES: i32 = 6;
+/// Height of a bump (spacings).
+const BUMP: f64 = 0.8;
+
+const SHOT: &str = "surface -p ball.%04d.bgeo -m ball.ply --spacing 0.01 --set surface.rebuild=false";
+const REBUILT: &str = "surface -p ball.%04d.bgeo -m ball.ply --spacing 0.01";
+const SCULPTS: &str = "--set surface.resculpt=sculpts/ball.%04d.ply";
+
+/// The middle of the ball at a frame (m), as its cache has it.
+fn middle(frame: i32) -> DVec3 {
+    DVec3::new(0.002, -0.001, 0.0) * f64::from(frame - 1)
+}
+
+fn array(name: &str, on: On, number: Number, values: Vec<f64>) -> MeshArray {
+    MeshArray { name: name.into(), on, number, values }
+}
+
+/// Numbers that count.
+fn counted(count: usize) -> Vec<f64> {
+    (0..count).map(|n| (n % 251) as f64).collect()
+}
+
+fn write_mesh(path: &Path, mesh: &DetailedMesh) {
+    let arrays: Vec<&MeshArray> = mesh.arrays.iter().collect();
+    let carried = mesh::Carried { uvs: mesh.uvs.as_ref(), arrays: &arrays, ..Default::default() };
+    mesh::write_carried(path, &mesh.mesh, &carried).unwrap();
+}
+
+/// The cache of a ball that travels, with a mesh that carries colours, masks and texture coordinates with seams.
+fn write_shot(folder: &Path) {
+    let ball = ball(5.0, 10, 0.25);
+    write_cache(folder, "ball", &ball, FRAMES);
+    let (vertices, faces) = (ball.mesh.positions.len(), ball.mesh.triangles.len());
+    let uvs = Uvs {
+        places: (0..3 * faces).map(|n| [n as f32 / 7.0, 1.0 / (1.0 + n as f32)]).collect(),
+        corners: Some((0..3 * faces as u32).collect()),
+        missing: 0,
+    };
+    let arrays = vec![
+        array("red", On::Vertices, Number::U8, counted(vertices)),
+        array("mask", On::Vertices, Number::F64, counted(vertices)),
+        array("part", On::Faces, Number::I32, counted(faces)),
+    ];
+    write_mesh(&folder.join("ball.ply"), &DetailedMesh { mesh: ball.mesh, uvs: Some(uvs), arrays });
+    fs::create_dir(folder.join("sculpts")).unwrap();
+}
+
+/// A mesh of the ball at a frame, of other triangles, with a bump of a height (spacings) along z.
+fn edited(frame: i32, height: f64) -> TriMesh {
+    let mut mesh = ball(5.0, 8, 0.0).mesh;
+    for place in &mut mesh.positions {
+        let unit = place.cast::<f64>().normalize();
+        let share = ((unit.z - 0.7) / 0.3).clamp(0.0, 1.0);
+        *place = (unit * ((5.0 + height * share) * SPACING) + middle(frame)).cast();
+    }
+    mesh
+}
+
+fn write_sculpt(folder: &Path, frame: i32, mesh: TriMesh, arrays: Vec<MeshArray>) {
+    let path = folder.join(format!("sculpts/ball.{frame:04}.ply"));
+    write_mesh(&path, &DetailedMesh { mesh, uvs: None, arrays });
+}
+
+/// A frame's mesh as it was written.
+fn frame(folder: &Path, out: &str, frame: i32) -> DetailedMesh {
+    mesh::read_detailed(&folder.join(format!("{out}/surface/surface.{frame:04}.ply"))).unwrap()
+}
+
+fn values<'a>(mesh: &'a DetailedMesh, name: &str) -> &'a [f64] {
+    &mesh.arrays.iter().find(|array| array.name == name).unwrap_or_else(|| panic!("no {name}")).values
+}
+
+/// How far a mesh reaches from the middle of the ball along z (spacings).
+fn reach(mesh: &TriMesh, frame: i32) -> f64 {
+    let along = mesh.positions.iter().map(|place| (place.cast::<f64>() - middle(frame)).z / SPACING);
+    along.fold(0.0, f64::max)
+}
+
+/// Whether a folder has the files of another run, and the same bytes in those that are compared.
+#[track_caller]
+fn are_same(whole: &BTreeMap<String, Vec<u8>>, out: &Path, is_compared: impl Fn(&str) -> bool) {
+    let other = output(out);
+    assert_eq!(whole.keys().collect::<Vec<_>>(), other.keys().collect::<Vec<_>>(), "{}", out.display());
+    for (name, bytes) in whole.iter().filter(|(name, _)| is_compared(name)) {
+        assert!(*bytes == other[name], "{name} of {}", out.display());
+    }
+}
+
+/// Records say from which frame on a shot was made again.
+fn is_no_record(name: &str) -> bool {
+    !name.ends_with(".json")
+}
+
+#[test]
+fn a_mesh_that_was_sculpted_takes_the_place_of_the_tracked_one() {
+    let folder = tempfile::tempdir().unwrap();
+    let folder = folder.path();
+    write_shot(folder);
+    let sculpt = edited(3, BUMP);
+    let (vertices, faces) = (sculpt.positions.len(), sculpt.triangles.len());
+    let arrays = vec![
+        array("heat", On::Vertices, Number::F32, vec![1.0; vertices]),
+        array("mask", On::Vertices, Number::I16, counted(vertices)),
+        array("red", On::Vertices, Number::F32, vec![0.5; vertices]),
+    ];
+    write_sculpt(folder, 3, sculpt.clone(), arrays);
+    works(folder, &format!("{SHOT} -o plain"));
+    let said = works(folder, &format!("{SHOT} {SCULPTS} -o out"));
+    let path = "ball.0003.ply: ";
+    for words in [
+        &format!("{path}lacks what the first frame's mesh carries: part, texture coordinates"),
+        &format!("{path}carries what the first frame's mesh does not, which is left out: heat"),
+    ] {
+        assert!(said.contains(words), "no {words:?} in {said}");
+    }
+    // Nothing before it knows of it: not even velocities.
+    for number in 1..=2 {
+        let name = format!("surface/surface.{number:04}.ply");
+        let [plain, out] = ["plain", "out"].map(|run| fs::read(folder.join(run).join(&name)).unwrap());
+        assert!(plain == out, "frame {number}");
+    }
+    let plain = reach(&frame(folder, "plain", FRAMES).mesh, FRAMES);
+    let height = reach(&sculpt, 3);
+    assert!(height > plain + 0.5, "{plain} {height}");
+    for number in 3..=FRAMES {
+        let now = frame(folder, "out", number);
+        assert!(now.mesh.triangles == sculpt.triangles, "frame {number}");
+        assert!(number > 3 || now.mesh.positions == sculpt.positions);
+        let is = reach(&now.mesh, number);
+        assert!((is - height).abs() < 0.2, "{is} at frame {number}, {height} before");
+        assert!(values(&now, "mask") == counted(vertices), "frame {number}");
+        assert!(values(&now, "red").iter().all(|red| *red == 128.0), "frame {number}");
+        let part = values(&now, "part");
+        assert!(part.len() == faces && part.iter().all(|part| *part == 0.0), "frame {number}");
+        assert!(now.arrays.iter().all(|array| array.name != "heat"), "frame {number}");
+        let uvs = now.uvs.as_ref().expect("texture coordinates");
+        assert!(uvs.places.iter().all(|place| *place == [0.0; 2]), "frame {number}");
+        // Velocities lead to the next frame.
+        if number < FRAMES {
+            let next = frame(folder, "out", number + 1).mesh;
+            let speed = ["vx", "vy", "vz"].map(|name| values(&now, name));
+            for (vertex, place) in now.mesh.positions.iter().enumerate() {
+                let by = DVec3::new(speed[0][vertex], speed[1][vertex], speed[2][vertex]) / 24.0;
+                let off = (place.cast::<f64>() + by - next.positions[vertex].cast::<f64>()).norm() / SPACING;
+                assert!(off < 1e-4, "{off} spacings at frame {number}, vertex {vertex}");
+            }
+        }
+    }
+}
+
+#[test]
+fn threads_kills_and_frames_made_again_give_the_same_bytes() {
+    for shot in [SHOT, REBUILT] {
+        let folder = tempfile::tempdir().unwrap();
+        let folder = folder.path();
+        write_shot(folder);
+        write_sculpt(folder, 3, edited(3, BUMP), Vec::new());
+        write_sculpt(folder, 5, edited(5, 0.5 * BUMP), Vec::new());
+        let shot = format!("{shot} {SCULPTS} --set output.surface=[\"ply\",\"usd\",\"obj\"]");
+        works(folder, &format!("{shot} -o whole --threads 2"));
+        let whole = output(&folder.join("whole"));
+        works(folder, &format!("{shot} -o one --threads 1"));
+        are_same(&whole, &folder.join("one"), |_| true);
+        kill_at(folder, &format!("{shot} -o killed"), "killed/surface/surface.0003.ply");
+        works(folder, &format!("{shot} -o killed"));
+        are_same(&whole, &folder.join("killed"), |_| true);
+        for from in [6, 4, 3] {
+            works(folder, &format!("{shot} -o one --from {from}"));
+            are_same(&whole, &folder.join("one"), is_no_record);
+        }
+        let reaches = [2, 4, 6].map(|number| reach(&frame(folder, "whole", number).mesh, number));
+        assert!(reaches[1] > reaches[2] + 0.2 && reaches[2] > reaches[0] + 0.2, "{reaches:?}");
+    }
+}
+
+#[test]
+fn a_sculpt_that_changes_comes_or_goes_is_noticed() {
+    let folder = tempfile::tempdir().unwrap();
+    let folder = folder.path();
+    write_shot(folder);
+    let shot = format!("{SHOT} {SCULPTS}");
+    let again = |from: i32| {
+        let words = [&format!("inputs of frame {from} have changed"), &format!("--from {from} ")];
+        fails(folder, &format!("{shot} -o out"), 2, &words.map(String::as_str));
+        works(folder, &format!("{shot} -o out --from {from}"));
+        let fresh = format!("fresh{}", fs::read_dir(folder).unwrap().count());
+        works(folder, &format!("{shot} -o {fresh}"));
+        are_same(&output(&folder.join(&fresh)), &folder.join("out"), is_no_record);
+    };
+    // A shot that is done has none yet.
+    works(folder, &format!("{SHOT} -o out"));
+    write_sculpt(folder, 3, edited(3, BUMP), Vec::new());
+    fails(folder, &format!("{shot} -o out"), 2, &["surface.resculpt was not there", "--from N"]);
+    works(folder, &format!("{shot} -o out --from 3"));
+    works(folder, &format!("{shot} -o fresh"));
+    are_same(&output(&folder.join("fresh")), &folder.join("out"), is_no_record);
+    // Another one.
+    write_sculpt(folder, 3, edited(3, 0.5 * BUMP), Vec::new());
+    again(3);
+    // One more, and one less.
+    write_sculpt(folder, 5, edited(5, BUMP), Vec::new());
+    again(5);
+    fs::remove_file(folder.join("sculpts/ball.0005.ply")).unwrap();
+    again(5);
+}
+
+#[test]
+fn an_open_sculpt_is_closed_where_the_mesh_is_rebuilt() {
+    let folder = tempfile::tempdir().unwrap();
+    let folder = folder.path();
+    write_shot(folder);
+    let mut open = edited(3, BUMP);
+    open.triangles.truncate(open.triangles.len() - 2);
+    write_sculpt(folder, 3, open.clone(), Vec::new());
+    let said = works(folder, &format!("{REBUILT} {SCULPTS} -o closed --set shot.frames=1-4"));
+    let line = said.lines().find(|line| line.contains("sculpts/ball.0003.ply") && line.contains("repaired"));
+    assert!(line.is_some_and(|line| line.contains("as they were")), "{said}");
+    for number in 3..=4 {
+        let mesh = frame(folder, "closed", number).mesh;
+        assert!(mesh.is_manifold(), "frame {number}");
+        assert!(reach(&mesh, number) > 5.0 + 0.5 * BUMP, "frame {number}");
+    }
+    let said = works(folder, &format!("{SHOT} {SCULPTS} -o open --set shot.frames=1-4"));
+    assert!(said.contains("ball.0003.ply: has") && said.contains("it follows as it is"), "{said}");
+    assert!(frame(folder, "open", 4).mesh.triangles == open.triangles);
+}
+
+#[test]
+fn what_is_painted_to_last_on_a_sculpt_does_not_fade() {
+    let folder = tempfile::tempdir().unwrap();
+    let folder = folder.path();
+    write_shot(folder);
+    let shot = format!("{SHOT} {SCULPTS} --set surface.half_life=0.05");
+    let sculpt = edited(3, BUMP);
+    let vertices = sculpt.positions.len();
+    let painted = |number, share: f64| vec![array("detail", On::Vertices, number, vec![share; vertices])];
+    let last = |out: &str| reach(&frame(folder, out, FRAMES).mesh, FRAMES);
+    write_sculpt(folder, 3, sculpt.clone(), Vec::new());
+    works(folder, &format!("{shot} -o fades"));
+    write_sculpt(folder, 3, sculpt.clone(), painted(Number::U8, 255.0));
+    works(folder, &format!("{shot} -o stays"));
+    let (fades, stays) = (last("fades"), last("stays"));
+    assert!((stays - reach(&sculpt, 3)).abs() < 0.2 && fades < stays - 0.5 * BUMP, "{fades} {stays}");
+    write_sculpt(folder, 3, sculpt, painted(Number::F32, 7.0));
+    fails(folder, &format!("{shot} -o no"), 2, &["ball.0003.ply", "detail of vertex 1 is 7"]);
+}
+
+#[test]
+fn what_is_no_sculpt_is_refused_with_the_key_or_the_file() {
+    let folder = tempfile::tempdir().unwrap();
+    let folder = folder.path();
+    write_shot(folder);
+    let shot = |pattern: &str, out: &str| format!("{SHOT} --set surface.resculpt={pattern} -o {out}");
+    let refused = |pattern: &str, words: &[&str]| {
+        fails(folder, &shot(pattern, "no"), 2, words);
+        assert!(!folder.join("no").exists(), "{pattern}");
+    };
+    // No place for the frame's number.
+    for one in ["ball.ply", "sculpts/none.ply"] {
+        refused(one, &[one, "surface.resculpt", "place for the frame's number"]);
+    }
+    let words = ["sculpts/none.%04d.ply", "no edited mesh", "surface.resculpt", "after its first, 1"];
+    refused("sculpts/none.%04d.ply", &words);
+    let sculpt = edited(1, BUMP);
+    mesh::write(&folder.join("sculpts/first.0001.ply"), &sculpt).unwrap();
+    mesh::write(&folder.join("sculpts/first.0003.ply"), &sculpt).unwrap();
+    refused("sculpts/first.%04d.ply", &["first.0001.ply", "surface.mesh", "surface.resculpt"]);
+    // Only beyond the shot.
+    mesh::write(&folder.join("sculpts/late.0007.ply"), &sculpt).unwrap();
+    refused("sculpts/late.%04d.ply", &["late.%04d.ply", "no edited mesh"]);
+    fs::write(folder.join("sculpts/cut.0003.ply"), "ply\n").unwrap();
+    refused("sculpts/cut.%04d.ply", &["cut.0003.ply"]);
+    // It lies elsewhere, which is seen when its frame comes.
+    let mut far = edited(3, BUMP);
+    far.positions.iter_mut().for_each(|place| place.x += 5.0);
+    mesh::write(&folder.join("sculpts/far.0003.ply"), &far).unwrap();
+    fails(folder, &shot("sculpts/far.%04d.ply", "far"), 1, &["far.0003.ply", "same space"]);
+}
