@@ -246,6 +246,7 @@ _FUNCTIONS = {
     "tracker_triangle_count": [_P, _P], "tracker_read_triangles": [_P, Span], "tracker_edits": [_P, _P, _P],
     "tracker_read_edits": [_P, _U, Span], "tracker_resculpt": [_P, _P, _P, _P],
     "tracker_read_rest": [_P, _P, _P, _P, Span],
+    "tracker_read_eased": [_P, _P, _P, _P, _Z, _U, _D, Span],
     "tracker_save": [_P, _P, _P, _Z, _P],
 }
 _VOID = ["pool_destroy", "context_destroy", "context_cancel", "context_reset", "mesh_destroy", "grid_destroy",

@@ -171,6 +171,20 @@ class Tracker(Handle):
         call("tracker_read_rest", self._ctx.pointer, self.pointer, c.byref(first._desc()), c.byref(now._desc()), span(out))
         return out
 
+    def eased(self, now, coming, dt, ahead=4):
+        """(n, 3) places (m) in 64 bits as they are to be shown: vertices that a step to come takes away, where the liquid merges or
+        splits, go towards what takes their place in the `ahead` steps (1 to 100, the same in all frames) before it. Others, and all
+        of a mesh that is not rebuilt, are at those of read("P64"). now: frazil.Particles of the time to which the last step led;
+        coming: a list of those of the frames to come, at most `ahead` of them, each dt seconds after the one before, fewer where the
+        shot ends. The steps to come are kept: step() with the same particles and dt takes over what is there. The tracker stays as it
+        is."""
+        descs = [particles._desc() for particles in coming]
+        pointers = (c.POINTER(ParticlesDesc) * len(descs))(*(c.pointer(desc) for desc in descs))
+        out = np.empty((len(self), 3), np.float64)
+        call("tracker_read_eased", self._ctx.pointer, self.pointer, c.byref(now._desc()), pointers, len(descs), ahead, dt,
+             span(out))
+        return out
+
     def save(self):
         """The state, for a cache: bytes that Tracker(..., state=...) goes on from."""
         return saved("tracker_save", self._ctx, self.pointer)

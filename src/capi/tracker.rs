@@ -327,6 +327,8 @@ pub unsafe extern "C" fn frz_tracker_step(
             finite("dt", dt)?;
             let (from, to) = (particles(from)?, particles(to)?);
             let follower = &mut *follower;
+            // A step that was made ahead looks for no cancel.
+            call.ctx().check()?;
             let done = match follower.outlook.take(&from, &to, dt) {
                 Some((tracker, done)) => {
                     follower.tracker = tracker;

@@ -42,7 +42,11 @@ pub unsafe extern "C" fn frz_tracker_read_eased(
         unsafe {
             let call = enter(context)?;
             let mut follower = change(tracker)?;
+            call.ctx().check()?;
             finite("dt", dt)?;
+            if dt <= 0.0 {
+                return Err(Failure::argument(format!("dt = {dt} s does not go on in time")));
+            }
             if ahead == 0 || ahead as usize > MOST {
                 return Err(Failure::argument(format!("ahead = {ahead} is not within 1 to {MOST}")));
             }
@@ -55,6 +59,10 @@ pub unsafe extern "C" fn frz_tracker_read_eased(
             let now = particles(now)?;
             let coming: Vec<Particles> = frames(coming, count)?;
             let follower = &mut *follower;
+            if !follower.tracker.params().rebuild {
+                let places = follower.tracker.vertices().iter();
+                return dst.fill("dst", &places.map(|p| [p.x, p.y, p.z]).collect::<Vec<_>>());
+            }
             follower.outlook.look(call.ctx(), &follower.tracker, &now, &coming, dt)?;
             let places = follower.outlook.eased(&follower.tracker, ahead as usize);
             dst.fill("dst", &places.iter().map(|p| [p.x, p.y, p.z]).collect::<Vec<_>>())

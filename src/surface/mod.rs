@@ -67,6 +67,7 @@ mod spheres;
 mod state;
 mod tracker;
 mod transfer;
+mod unfit;
 
 pub use advect::{Weighting, carried};
 pub use apart::Apart;

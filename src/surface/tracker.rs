@@ -7,14 +7,12 @@ use rayon::prelude::*;
 use super::Particles;
 use super::advect::advect;
 use super::ahead::Ahead;
-use super::apart::{Apart, Lacking, Parts, Wanted, is_near};
+use super::apart::{Apart, Lacking, Parts, Wanted};
 use super::band::Distances;
-use super::cells::{Coord, cell_of};
-use super::change::{Change, Unfit, change, improved};
+use super::cells::cell_of;
 use super::coverage::Cover;
 use super::enclosed::Crowd;
 use super::fade::fade;
-use super::hidden::Everywhere;
 use super::implicit::Implicit;
 use super::improve::{Size, sizes};
 use super::isosurface::Isosurface;
@@ -295,56 +293,6 @@ impl Tracker {
         Ok(report)
     }
 
-    /// What the mesh becomes where it no longer fits.
-    fn changed(
-        &self,
-        ctx: &Context,
-        next: &Next,
-        feet: &[Option<DVec3>],
-        covered: &Covered,
-        (phi, distances): (&Implicit, &Distances),
-        particles: &[DVec3],
-    ) -> Result<Option<Change>> {
-        // What never had a distance does not fit from the start: that is no change.
-        let flags: Vec<bool> =
-            next.flags.iter().zip(&next.delta).map(|(flag, delta)| *flag && !delta.is_nan()).collect();
-        let bin = |place: &DVec3| cell_of(&(place / covered.reach));
-        let beside =
-            feet.iter().zip(&covered.bare).filter(|(_, is)| **is).filter_map(|(foot, _)| foot.as_ref());
-        let mut beside: Vec<Coord> = beside.map(bin).collect();
-        beside.par_sort_unstable();
-        beside.dedup();
-        let mut bare: Vec<DVec3> =
-            covered.places.iter().filter(|place| is_near(&beside, bin(place))).copied().collect();
-        bare.extend_from_slice(&covered.lacking.places);
-        let Params { spacing, cell, change: farthest, every, .. } = self.params;
-        let specks = &covered.lacking.specks;
-        let everywhere = every.then(|| Everywhere { kept: &next.delta, spacing: 1.0 / cell, specks });
-        let (vertices, triangles) = (&next.vertices, &self.triangles);
-        let unfit = Unfit { vertices, triangles, flags: &flags, bare: &bare, everywhere };
-        let changed = change(ctx, &unfit, phi, distances)?;
-        let crowd = self.crowd(particles);
-        improved(ctx, &unfit, &self.sizes, changed, distances, &crowd, farthest * spacing)
-    }
-
-    /// Becomes what the mesh became.
-    fn take(&mut self, change: &Change) {
-        let mut made = change.delta.iter();
-        let delta =
-            |at: &Option<u32>| at.map_or_else(|| *made.next().unwrap_or(&0.0), |at| self.delta[at as usize]);
-        self.delta = change.origins.iter().map(delta).collect();
-        let flag = |flags: &[bool], at: &Option<u32>| at.is_some_and(|at| flags[at as usize]);
-        self.flags = change.origins.iter().map(|at| flag(&self.flags, at)).collect();
-        self.bare = change.origins.iter().map(|at| flag(&self.bare, at)).collect();
-        if !self.lasting.is_empty() {
-            self.lasting = change.carried(&self.lasting);
-        }
-        self.sizes.clone_from(&change.sizes);
-        self.vertices.clone_from(&change.vertices);
-        self.triangles.clone_from(&change.triangles);
-        self.is_rebuilt = true;
-    }
-
     /// What of the particles' surface the mesh does not cover: whole parts, and the vertices beside other such places.
     fn cover(
         &self,
@@ -367,7 +315,7 @@ impl Tracker {
     }
 
     /// Particles at these places, of which each part of the mesh must hold some.
-    fn crowd<'a>(&self, places: &'a [DVec3]) -> Crowd<'a> {
+    pub(super) fn crowd<'a>(&self, places: &'a [DVec3]) -> Crowd<'a> {
         Crowd { places, spacing: self.params.spacing, least: self.params.min_drop.max(1) }
     }
 
@@ -460,23 +408,23 @@ pub(super) fn validate_step(from: &Particles, to: &Particles, dt: f64) -> Result
 }
 
 /// The mesh after a step, before it is rebuilt.
-struct Next {
-    vertices: Vec<DVec3>,
-    delta: Vec<f32>,
-    flags: Vec<bool>,
-    report: StepReport,
+pub(super) struct Next {
+    pub vertices: Vec<DVec3>,
+    pub delta: Vec<f32>,
+    pub flags: Vec<bool>,
+    pub report: StepReport,
 }
 
 /// What of the particles' surface the mesh does not cover.
-struct Covered {
-    apart: Vec<Apart>,
+pub(super) struct Covered {
+    pub apart: Vec<Apart>,
     /// Vertices beside places that it does not cover, and these (cells).
-    bare: Vec<bool>,
-    places: Vec<DVec3>,
+    pub bare: Vec<bool>,
+    pub places: Vec<DVec3>,
     /// How near is beside (cells).
-    reach: f64,
+    pub reach: f64,
     /// What it should have of the parts that it does not cover at all.
-    lacking: Lacking,
+    pub lacking: Lacking,
 }
 
 /// What became of a vertex.

@@ -384,6 +384,7 @@ class Tracker(unittest.TestCase):
             one.step(second, third, dt=1 / 24)
         self.assertEqual(back.save(), tracker.save())
         np.testing.assert_allclose(tracker.positions, corners + [0.1, 0.0, 0.04], atol=1e-3)
+        np.testing.assert_allclose(tracker.rest(first, third), tracker.read("P64") - [0.1, 0.0, 0.04], atol=1e-9)
         self.assertEqual(tracker.read("P64").dtype, np.float64)
         self.assertEqual(tracker.read("flagged").sum(), 0)
         self.assertTrue((np.abs(tracker.read("delta")) < 0.2).all())
@@ -467,6 +468,65 @@ class Tracker(unittest.TestCase):
         tracker.set_params(half_life=2.0)
         with self.assertRaisesRegex(frazil.Error, "rebuilt cannot change"):
             tracker.set_params(rebuild=False)
+
+    def test_an_edited_mesh_takes_the_place_of_the_tracked_one(self):
+        ctx = frazil.Context(threads=2)
+        first, second, third = (self.liquid(frame) for frame in range(3))
+        ball = frazil.level_set.from_particles(ctx, [[0.0, 0.0, 0.0]], [0.5], 0.05).to_mesh(ctx)
+        mesh = frazil.Mesh(ctx, ball.positions, ball.triangles)
+        tracker = frazil.Tracker(ctx, mesh, first, spacing=0.1)
+        tracker.step(first, second, dt=1 / 24)
+        places, triangles = tracker.positions, tracker.triangles
+        top = places[:, 1].argmax()
+        places[:, 1] += 0.08 * np.clip((places[:, 1] / 0.5 - 0.7) / 0.3, 0.0, 1.0)
+        with self.assertRaisesRegex(frazil.Error, "same space"):
+            tracker.resculpt(frazil.Mesh(ctx, places + 5.0, triangles), second)
+        self.assertFalse(tracker.edits.changed)
+        tracker.resculpt(frazil.Mesh(ctx, places, triangles), second)
+        np.testing.assert_array_equal(tracker.positions, places)
+        edits = tracker.edits
+        self.assertTrue(edits.changed and (edits.origins == -1).all() and (edits.kinds == frazil.tracker.NEW).all())
+        self.assertEqual(len(edits.before), len(places))
+        back = frazil.Tracker(ctx, mesh, None, spacing=0.1, state=tracker.save())
+        for one in (tracker, back):
+            one.step(second, third, dt=1 / 24)
+        self.assertEqual(back.save(), tracker.save())
+        self.assertAlmostEqual(tracker.positions[top, 1], places[top, 1], delta=0.02)
+
+    def test_a_change_is_seen_before_it_happens(self):
+        ctx, other = frazil.Context(threads=2), frazil.Context()
+        ball = frazil.level_set.from_particles(ctx, [[0.9, 0.01, 0.02], [-0.9, -0.01, -0.02]], [0.535, 0.535], 0.05)
+        ball = ball.to_mesh(ctx)
+        mesh = frazil.Mesh(ctx, ball.positions, ball.triangles)
+        last, dt = 16, 1 / 24
+        flows = [self.balls(frame) for frame in range(last + 1)]
+        tracker, plain = (frazil.Tracker(one, mesh, flows[0], spacing=0.1, rebuild=True) for one in (ctx, other))
+        # Steps in which each vertex has to go; 0: it need not.
+        due, most, changes = np.zeros(len(tracker), int), 0.0, 0
+        for frame in range(last):
+            coming = flows[frame + 1 : frame + 5]
+            shown, own = tracker.eased(flows[frame], coming, dt), tracker.read("P64")
+            self.assertEqual((shown.dtype, shown.shape), (np.float64, own.shape))
+            moved = (shown != own).any(axis=1)
+            self.assertFalse(frame == 0 and moved.any())
+            most = max(most, np.linalg.norm(shown - own, axis=1).max())
+            due[moved & (due == 0)] = len(coming)
+            for one in (tracker, plain):
+                one.step(flows[frame], flows[frame + 1], dt)
+            self.assertEqual(tracker.save(), plain.save())
+            edits = tracker.edits
+            changes += edits.changed
+            stayed = edits.origins >= 0
+            self.assertFalse((due[edits.origins[stayed]] == 1).any())
+            due = np.where(stayed, np.maximum(due[edits.origins] - 1, 0), 0)
+        self.assertGreater(changes, 0)
+        # A tenth of the distance between particles.
+        self.assertGreater(most, 0.01)
+        np.testing.assert_array_equal(tracker.eased(flows[last], [], dt), tracker.read("P64"))
+        with self.assertRaisesRegex(frazil.Error, "ahead = 0 is not within 1 to 100"):
+            tracker.eased(flows[last], [], dt, ahead=0)
+        with self.assertRaisesRegex(frazil.Error, "count = 2 is more than ahead, 1"):
+            tracker.eased(flows[last - 2], flows[-2:], dt, ahead=1)
 
     def test_meshes_are_repaired(self):
         ctx = frazil.Context(threads=2)

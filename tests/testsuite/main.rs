@@ -90,6 +90,7 @@ mod snow {
 }
 mod surface {
     mod command;
+    mod easing;
     mod from_particles;
     mod implicit;
     mod made_sets;

@@ -25,7 +25,9 @@
 //! | triangle near such blocks | in five of them, in 32 bits 132 and a number 4 | 680 |
 //! | vertex of the mesh | in cells 24 and units 12, as cut 25, as it was and is 48, names 12, sizes in four copies 32, state 24 | 177 |
 //! | triangle of the mesh | on the grid 12, as cut 20, while its edges are looked at 82, state 36 | 150 |
-//! | number that the mesh carries | in two frames 16, state 16 | 32 |
+//! | vertex of the mesh in a coming frame, but for the next | place 24, distance 4, flags 2, size 8, velocities 24, name 8 | 70 |
+//! | triangle of such a mesh | corners | 12 |
+//! | number that the mesh carries | in two frames 16, state 16; 8 in each coming frame | 32 |
 //! | vertex of a mesh that carries something | where it has its numbers from | 40 |
 //! | triangle of such a mesh | where it has its numbers from 80, in a tree 84 | 164 |
 //!
@@ -55,7 +57,9 @@ const MESH: [f64; 2] = [359.0, 72.0];
 /// Bytes of a number that the mesh carries, in memory.
 const CARRIED: f64 = 8.0;
 
-/// Where the mesh is rebuilt: bytes of a particle of the next frame, whose surface is made at the same time.
+/// Where the mesh is rebuilt: bytes of a vertex and of a triangle of the mesh in each coming frame but the next.
+const COMING: [f64; 2] = [70.0, 12.0];
+/// Bytes of a particle of the next frame, whose surface is made at the same time.
 const AHEAD: f64 = 68.0;
 /// Bytes of a face of a cell that the mesh passes through, of a block of Gamma, and of a triangle near such blocks.
 const CUT: [f64; 3] = [170.0, 98816.0, 680.0];
@@ -117,14 +121,14 @@ impl Most {
         let held = files.min(KEPT) + 1 + if is_between { 2 } else { 0 };
         let mesh = of_both(counts(detail), MESH) + numbers(detail) * CARRIED;
         let particles = held as f64 * self.frame + self.ways + self.work;
-        let rebuilding = if surface.rebuild { self.rebuilding(detail) } else { 0.0 };
+        let rebuilding = if surface.rebuild { self.rebuilding(detail, surface.looks() - 1) } else { 0.0 };
         (FIXED + particles + mesh + rebuilding) as u64 + frame.largest()
     }
 
-    /// More bytes where the mesh is rebuilt.
+    /// More bytes where the mesh is rebuilt, and so many frames after the next are kept.
     ///
     /// It grows with the particles' surface, by a vertex and two triangles for each face of a cell.
-    fn rebuilding(&self, detail: &DetailedMesh) -> f64 {
+    fn rebuilding(&self, detail: &DetailedMesh, coming: i32) -> f64 {
         let own = detail.mesh.area() / self.edge.powi(2);
         let grown = (self.area - own).max(0.0);
         let [vertices, triangles] = counts(detail);
@@ -139,7 +143,8 @@ impl Most {
         } else {
             0.0
         };
-        self.ahead + mesh + changing.max(carrying)
+        let coming = f64::from(coming) * (of_both(now, COMING) + count * CARRIED);
+        self.ahead + mesh + coming + changing.max(carrying)
     }
 }
 
@@ -253,7 +258,7 @@ mod tests {
     fn rebuilding(places: Vec<DVec3>, cell: f64, detail: &DetailedMesh) -> f64 {
         let mut most = Most::default();
         most.add(&Particles { places, ..Particles::default() }, 1.0, cell);
-        most.rebuilding(detail)
+        most.rebuilding(detail, 0)
     }
 
     #[test]

@@ -339,7 +339,7 @@ impl Surface {
 
     /// How many frames are made ahead: one for velocities; for those that the vertices go towards a change they have to be known in the
     /// frame after too.
-    fn looks(&self) -> i32 {
+    pub(super) fn looks(&self) -> i32 {
         if self.eases() { self.ahead + 1 } else { 1 }
     }
 
