@@ -3,7 +3,7 @@
 use rayon::prelude::*;
 
 use super::cells::{Coord, cell_of};
-use super::enclosed::{Bounds, Crowd, seen_from};
+use super::enclosed::{Bounds, Crowd, are_inside, seen_from};
 use super::implicit::Implicit;
 use super::isosurface::Isosurface;
 use crate::base::DVec3;
@@ -24,7 +24,7 @@ pub struct Apart {
 pub struct Wanted<'a> {
     /// Drops: those that hold enough of these particles; where one is enough, all.
     pub crowd: Crowd<'a>,
-    /// Bubbles: those of so large a volume (cells^3); infinite: none.
+    /// Bubbles: those of so large a volume (cells^3), but none in drops that are too small; infinite: none at all.
     pub bubble: f64,
 }
 
@@ -90,27 +90,28 @@ impl Parts {
             .collect();
         let mut specks = Vec::new();
         if wanted.crowd.least > 1 {
-            let drops: Vec<usize> =
-                (0..six.len()).filter(|part| is_wanted[*part] && six[*part] > 0.0).collect();
-            for (part, bounds) in self.specks(phi, surface, &drops, &wanted.crowd) {
-                is_wanted[part] = false;
-                specks.push(bounds);
-            }
+            let (drops, bubbles): (Vec<usize>, Vec<usize>) =
+                (0..six.len()).filter(|part| is_wanted[*part]).partition(|part| six[*part] > 0.0);
+            let first = |part: usize| firsts[part].map(|place| (part, place * phi.cell()));
+            let bubbles: Vec<(usize, DVec3)> = bubbles.into_iter().filter_map(first).collect();
+            let (unwanted, bounds) = self.specks(phi, surface, (&drops, &bubbles), &wanted.crowd);
+            unwanted.into_iter().for_each(|part| is_wanted[part] = false);
+            specks = bounds;
         }
         let vertices = (0..).zip(&self.of_vertex).filter(|(_, part)| is_wanted[**part as usize]);
         let places = vertices.map(|(vertex, _)| surface.in_cells(phi, vertex)).collect();
         Lacking { places, specks }
     }
 
-    /// Those of some drops, ascending, that hold too few particles, with their bounds (cells). The meshes that they would get are counted in
-    /// the same way.
+    /// Those of some drops, ascending, that hold too few particles, those of some bubbles, with a place (m) on each, that lie in such a
+    /// drop, and the bounds (cells) of the drops. The meshes that they would get are counted in the same way.
     fn specks(
         &self,
         phi: &Implicit,
         surface: &Isosurface,
-        drops: &[usize],
+        (drops, bubbles): (&[usize], &[(usize, DVec3)]),
         crowd: &Crowd<'_>,
-    ) -> Vec<(usize, Bounds)> {
+    ) -> (Vec<usize>, Vec<Bounds>) {
         let mut triangles: Vec<Vec<[DVec3; 3]>> = vec![Vec::new(); drops.len()];
         for triangle in surface.runs().flat_map(|(_, triangles)| triangles) {
             let part = self.of_vertex[triangle[0] as usize] as usize;
@@ -126,9 +127,16 @@ impl Parts {
                 corners.iter().fold([first; 2], |[low, high], place| [low.inf(place), high.sup(place)])
             })
             .collect();
-        let counts = crowd.held(&bounds, |slot| seen_from(bounds[slot][0], &triangles[slot]));
-        let few = drops.iter().zip(&bounds).zip(counts).filter(|(_, count)| *count < crowd.least);
-        few.map(|((part, bounds), _)| (*part, bounds.map(|place| place / phi.cell()))).collect()
+        let mesh = |slot: usize| seen_from(bounds[slot][0], &triangles[slot]);
+        let counts = crowd.held(&bounds, mesh);
+        let few: Vec<usize> = (0..drops.len()).filter(|slot| counts[*slot] < crowd.least).collect();
+        let few_bounds: Vec<Bounds> = few.iter().map(|slot| bounds[*slot]).collect();
+        let places: Vec<DVec3> = bubbles.iter().map(|(_, place)| *place).collect();
+        let are_in = are_inside(&places, &few_bounds, |at| mesh(few[at]));
+        let bubbles = bubbles.iter().zip(are_in).filter(|(_, is_in)| *is_in).map(|((part, _), _)| *part);
+        let parts = few.iter().map(|slot| drops[*slot]).chain(bubbles).collect();
+        let in_cells = |bounds: Bounds| bounds.map(|place| place / phi.cell());
+        (parts, few_bounds.into_iter().map(in_cells).collect())
     }
 
     /// The parts that the mesh does not cover, the largest first.

@@ -1,38 +1,52 @@
 //! Parts of the mesh without liquid, crumbs that were left where it went, and those with too little of it. They are taken away.
 
 use super::change::Change;
-use super::enclosed::{Bounds, Crowd, seen_from};
+use super::enclosed::{Bounds, Crowd, are_inside, seen_from};
 use super::repair::Source;
 use crate::base::DVec3;
 use crate::base::mesh::{renumbered, used};
 use crate::base::topology::{bodies, groups};
 
 impl Change {
-    /// Takes away the parts of the mesh with a volume over 0 that hold too few particles. Returns how many held none, and how many some.
-    /// A mesh of one part stays.
+    /// Takes away the parts of the mesh with a volume over 0 that hold too few particles, and what hollows are in them. Returns how many
+    /// held none, and how many some; hollows are not counted. A mesh of one part stays.
     pub(super) fn drop_dry(&mut self, crowd: &Crowd<'_>) -> [usize; 2] {
         // Mostly there is one.
         let links = self.triangles.iter().flat_map(|[a, b, c]| [[*a, *b], [*b, *c]]);
         if groups(self.vertices.len(), links) < 2 {
             return [0; 2];
         }
-        let (parts, bounds): (Vec<Vec<u32>>, Vec<Bounds>) = bodies(&self.triangles)
-            .into_iter()
-            .filter_map(|part| self.bounds(&part).map(|bounds| (part, bounds)))
-            .unzip();
+        let (mut parts, mut bounds): (Vec<Vec<u32>>, Vec<Bounds>) = Default::default();
+        let mut hollows: Vec<Vec<u32>> = Vec::new();
+        for part in bodies(&self.triangles) {
+            match self.bounds(&part) {
+                Some(own) => {
+                    parts.push(part);
+                    bounds.push(own);
+                }
+                None => hollows.push(part),
+            }
+        }
         let mesh = |at: usize| {
             let corners: Vec<[DVec3; 3]> = self.corners(&parts[at]).collect();
             seen_from(bounds[at][0], &corners)
         };
         let counts = crowd.held(&bounds, mesh);
-        let mut is_out = vec![false; self.triangles.len()];
+        let out: Vec<usize> = (0..parts.len()).filter(|part| counts[*part] < crowd.least).collect();
         let mut gone = [0; 2];
-        for (part, count) in parts.iter().zip(counts).filter(|(_, count)| *count < crowd.least) {
-            gone[usize::from(count > 0)] += 1;
-            part.iter().for_each(|triangle| is_out[*triangle as usize] = true);
-        }
+        out.iter().for_each(|part| gone[usize::from(counts[*part] > 0)] += 1);
         if gone == [0; 2] {
             return gone;
+        }
+        // Parts do not pass through each other, so one corner tells. A part within one of too few particles has too few, too.
+        let corners = hollows.iter().filter_map(|hollow| self.corners(hollow).next());
+        let firsts: Vec<DVec3> = corners.map(|[first, ..]| first).collect();
+        let out_bounds: Vec<Bounds> = out.iter().map(|part| bounds[*part]).collect();
+        let are_out = are_inside(&firsts, &out_bounds, |at| mesh(out[at]));
+        let hollows = hollows.iter().zip(are_out).filter(|(_, is_out)| *is_out).map(|(hollow, _)| hollow);
+        let mut is_out = vec![false; self.triangles.len()];
+        for triangle in out.iter().map(|part| &parts[*part]).chain(hollows).flatten() {
+            is_out[*triangle as usize] = true;
         }
         let mut marks = is_out.iter();
         self.triangles.retain(|_| !marks.next().copied().unwrap_or_default());
@@ -124,5 +138,34 @@ mod tests {
         let (specks, counts) = followed(8);
         assert!(specks > 0, "{counts:?}");
         assert!(counts.iter().all(|[small, large]| *small == 0 && *large > 8), "{counts:?}");
+    }
+
+    #[test]
+    fn a_hollow_goes_with_the_drop_around_it() {
+        const LEAST: usize = 1200;
+        let ctx = Context::new(Pool::new(2).unwrap());
+        let all = || lattice(DVec3::repeat(-7.0), [15; 3]);
+        let ball: Vec<DVec3> = all().filter(|place| place.norm() <= 7.0).collect();
+        let shell: Vec<DVec3> = all().filter(|place| (4.0..=6.5).contains(&place.norm())).collect();
+        assert!(shell.len() < LEAST && ball.len() >= LEAST, "{} and {}", shell.len(), ball.len());
+        let away = DVec3::new(-20.0, 0.3, 0.2);
+        let places: Vec<DVec3> = ball.into_iter().chain(shell.iter().map(|place| place + away)).collect();
+        let ids = (0..places.len() as i64).collect();
+        let particles = Particles { ids, velocities: Vec::new(), places };
+        let phi = Implicit::new(&ctx, &particles.places, 1.0, 0.5).unwrap();
+        let mesh = Isosurface::new(&phi).mesh(&phi);
+        assert_eq!(bodies(&mesh.triangles).len(), 3);
+        for every in [false, true] {
+            let params = Params { rebuild: true, every, min_drop: LEAST, ..Params::for_spacing(1.0) };
+            let mut tracker = Tracker::new(&ctx, params, &mesh, &particles).unwrap();
+            let mut specks = 0;
+            for step in 0..3 {
+                let report = tracker.step(&ctx, &particles, &particles, 1.0 / 24.0).unwrap();
+                specks += report.change.map_or(0, |change| change.specks);
+                let left = tracker.vertices().iter().filter(|place| place.x < -10.0).count();
+                assert!(left == 0, "{left} vertices after step {step}, every = {every}");
+            }
+            assert!(specks == 1 && bodies(tracker.triangles()).len() == 1, "{specks}, every = {every}");
+        }
     }
 }

@@ -2,13 +2,19 @@
 //! their place, and go a part of that way in each of the frames before it, so that a bridge does not pop up. Only what is shown is
 //! moved so; the mesh that goes on is not.
 
+use rayon::prelude::*;
+
 use super::change::Change;
 use super::repair::Source;
 use crate::base::deviation::NearestTree;
 use crate::base::mesh::{renumbered, used};
 use crate::base::topology::bodies;
 use crate::base::{DVec3, TriMesh, Vec3};
+use crate::context::Context;
+use crate::error::Result;
 
+/// Places of a task.
+const GRAIN: usize = 256;
 /// How often the places that are made pull the old surface towards them.
 const PULLS: usize = 16;
 /// Longest way to what takes a vertex' place (spacings): what is farther away is another surface that appears.
@@ -31,8 +37,12 @@ pub struct Leads {
 
 impl Leads {
     /// Those of a change of a mesh that had these triangles; particles are a spacing (m) apart.
-    pub fn of(change: &Change, triangles: &[[u32; 3]], spacing: f64) -> Self {
-        Self { ways: ways(change, triangles, spacing), origins: Some(change.origins.clone()) }
+    ///
+    /// # Errors
+    /// Cancel.
+    pub fn of(ctx: &Context, change: &Change, triangles: &[[u32; 3]], spacing: f64) -> Result<Self> {
+        let ways = ctx.phase("ease", || ways(ctx, change, triangles, spacing))?;
+        Ok(Self { ways, origins: Some(change.origins.clone()) })
     }
 
     /// Of a mesh that is exchanged for another, which has nothing of it.
@@ -98,11 +108,11 @@ fn weight(steps: usize, ahead: usize) -> f64 {
 }
 
 /// The ways (m) of the vertices that a change takes away, by the vertices before it; lengths count in spacings (m).
-fn ways(change: &Change, triangles: &[[u32; 3]], spacing: f64) -> Vec<(u32, DVec3)> {
-    let Some(old) = Patch::old(change, triangles) else { return Vec::new() };
+fn ways(ctx: &Context, change: &Change, triangles: &[[u32; 3]], spacing: f64) -> Result<Vec<(u32, DVec3)>> {
+    let Some(old) = Patch::old(change, triangles) else { return Ok(Vec::new()) };
     let new = Patch::new(change);
     if new.triangles.is_empty() {
-        return Vec::new();
+        return Ok(Vec::new());
     }
     // Places count from one of them: far from the origin 32 bits are too few.
     let origin = change.before[old.names[0] as usize];
@@ -111,15 +121,17 @@ fn ways(change: &Change, triangles: &[[u32; 3]], spacing: f64) -> Vec<(u32, DVec
     let made = ends.iter().zip(&new.is_loose).filter(|(_, made)| **made).map(|(place, _)| *place);
     let made = old.jumps(&begin, made.collect(), [NEAR, LONGEST].map(|length| length * spacing));
     if made.is_empty() {
-        return Vec::new();
+        return Ok(Vec::new());
     }
     let mut places = begin.clone();
     let mut is_pulled = vec![false; places.len()];
     for _ in 0..PULLS {
+        ctx.check()?;
         let tree = old.tree(&places);
+        let near: Vec<_> = made.par_iter().with_min_len(GRAIN).map(|place| tree.nearest(*place)).collect();
         let mut pulls = vec![(DVec3::zeros(), 0.0); places.len()];
-        for place in &made {
-            let Some(near) = tree.nearest(*place) else { continue };
+        for (place, near) in made.iter().zip(near) {
+            let Some(near) = near else { continue };
             let corners = old.triangles[near.triangle];
             let shares = shares(&corners.map(|at| places[at as usize]), near.place);
             for (corner, share) in corners.into_iter().zip(shares) {
@@ -138,7 +150,7 @@ fn ways(change: &Change, triangles: &[[u32; 3]], spacing: f64) -> Vec<(u32, DVec
     old.spread(&mut ways, &is_pulled);
     let limit = LONGEST * spacing;
     let moved = (0..ways.len()).filter(|at| ways[*at] != DVec3::zeros() && ways[*at].norm() <= limit);
-    moved.map(|at| (old.names[at], ways[at])).collect()
+    Ok(moved.map(|at| (old.names[at], ways[at])).collect())
 }
 
 /// Triangles that a change takes away, or that it makes.
@@ -242,7 +254,7 @@ fn shares([a, b, c]: &[DVec3; 3], place: DVec3) -> [f64; 3] {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::context::{Context, Pool};
+    use crate::context::Pool;
     use crate::surface::{Implicit, Isosurface, Params, Particles, Tracker};
 
     /// Two balls of particles, so many spacings from the middle.
@@ -281,7 +293,7 @@ mod tests {
                 continue;
             }
             let mut places = change.before.clone();
-            let leads = Leads::of(&change, &triangles, 1.0);
+            let leads = Leads::of(&ctx, &change, &triangles, 1.0).unwrap();
             eased([&leads], 0).iter().for_each(|eased| places[eased.vertex as usize] += eased.next);
             assert!(farthest(&places, &triangles, &change) < 0.35 * far, "{step}");
             // What stays is not moved.

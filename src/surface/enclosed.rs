@@ -3,6 +3,8 @@
 //! The particles' surface passes close to those of small drops, and outside of some: of 20 at random places 10 to 14 lie inside, nearly
 //! all others less than half a spacing from it. So those beside a part count too, if any lies inside.
 
+use super::cells::{Coord, cell_of};
+use super::gamma::between;
 use crate::base::bvh::Bvh;
 use crate::base::deviation::NearestTree;
 use crate::base::{DVec3, TriMesh};
@@ -11,8 +13,8 @@ use crate::base::{DVec3, TriMesh};
 const ASLANT: DVec3 = DVec3::new(0.5773, 0.6533, 0.4896);
 /// How near to a part a particle is beside it (spacings).
 const BESIDE: f64 = 0.5;
-/// Parts up to so many times as long as half of them are found by where they begin on the first axis; others are looked at one by one.
-const NARROW: f64 = 4.0;
+/// The longest part of those in bins of one size over the shortest.
+const SPREAD: f64 = 4.0;
 
 /// Least and greatest place of a part.
 pub type Bounds = [DVec3; 2];
@@ -67,37 +69,92 @@ fn count(
     mut is_of: impl FnMut(usize, DVec3) -> bool,
 ) -> Vec<usize> {
     let mut counts = vec![0; parts.len()];
-    let mut open: Vec<usize> = (0..parts.len()).filter(|part| lacking[*part] > 0).collect();
-    if open.is_empty() {
-        return counts;
-    }
-    open.sort_by(|a, b| parts[*a][0].x.total_cmp(&parts[*b][0].x));
-    let length = |part: usize| parts[part][1].x - parts[part][0].x;
-    let mut lengths: Vec<f64> = open.iter().map(|part| length(*part)).collect();
-    lengths.sort_unstable_by(f64::total_cmp);
-    let reach = NARROW * lengths[lengths.len() / 2];
-    let mut left = open.len();
-    let (narrow, mut wide): (Vec<usize>, Vec<usize>) =
-        open.into_iter().partition(|part| length(*part) <= reach);
+    let mut all = Bins::of(parts, (0..parts.len()).filter(|part| lacking[*part] > 0).collect());
     for place in places {
-        // A little farther back: differences are rounded.
-        let first = narrow.partition_point(|part| parts[*part][0].x < place.x - 1.01 * reach);
-        let near = narrow[first..].iter().take_while(|part| parts[**part][0].x <= place.x);
-        let before = left;
-        for &part in wide.iter().chain(near) {
-            if counts[part] < lacking[part] && is_within(&parts[part], place) && is_of(part, *place) {
-                counts[part] += 1;
-                left -= usize::from(counts[part] == lacking[part]);
-            }
-        }
-        if left == 0 {
+        if all.is_empty() {
             break;
         }
-        if left < before {
-            wide.retain(|part| counts[*part] < lacking[*part]);
+        for bins in &mut all {
+            let mut full = 0;
+            for part in bins.near(place) {
+                if counts[part] < lacking[part] && is_within(&parts[part], place) && is_of(part, *place) {
+                    counts[part] += 1;
+                    full += usize::from(counts[part] == lacking[part]);
+                }
+            }
+            bins.open -= full;
+            if 2 * bins.open <= bins.parts {
+                bins.listed.retain(|(_, part)| counts[*part] < lacking[*part]);
+                bins.parts = bins.open;
+            }
         }
+        all.retain(|bins| bins.open > 0);
     }
     counts
+}
+
+/// Parts of about one size, in the bins that their bounds touch: up to 8 each.
+struct Bins {
+    /// Of a bin (m): as long as the longest part.
+    edge: f64,
+    /// Bins with the parts in them, ascending.
+    listed: Vec<(Coord, usize)>,
+    /// How many parts are listed.
+    parts: usize,
+    /// How many of them still lack some.
+    open: usize,
+}
+
+impl Bins {
+    /// Those of some parts: a few, for sizes from the least to the greatest.
+    fn of(bounds: &[Bounds], mut parts: Vec<usize>) -> Vec<Self> {
+        let length = |part: usize| (bounds[part][1] - bounds[part][0]).max();
+        parts.sort_by(|a, b| length(*a).total_cmp(&length(*b)));
+        let mut all = Vec::new();
+        let mut rest = &parts[..];
+        while let [first, ..] = rest {
+            let most = SPREAD * length(*first);
+            // Never none, whatever the numbers.
+            let count = rest.partition_point(|part| length(*part) <= most).max(1);
+            let (own, longer) = rest.split_at(count);
+            let edge = length(own[count - 1]);
+            let bin = |place: DVec3| cell_of(&(place / edge));
+            let mut listed: Vec<(Coord, usize)> = own
+                .iter()
+                .flat_map(|part| {
+                    let [low, high] = bounds[*part].map(bin);
+                    between(low, high).map(move |bin| (bin, *part))
+                })
+                .collect();
+            listed.sort_unstable();
+            all.push(Self { edge, listed, parts: count, open: count });
+            rest = longer;
+        }
+        all
+    }
+
+    /// The parts in the bin of a place: all whose bounds hold it, and others.
+    fn near(&self, place: &DVec3) -> impl Iterator<Item = usize> {
+        // The quotient of a place between two others is never outside of theirs.
+        let bin = cell_of(&(place / self.edge));
+        let first = self.listed.partition_point(|(other, _)| *other < bin);
+        self.listed[first..].iter().take_while(move |(other, _)| *other == bin).map(|(_, part)| *part)
+    }
+}
+
+/// Which of some places (m) lie inside of any of some closed parts, of which these are the bounds (m); `mesh` as for [`Crowd::held`].
+pub fn are_inside(places: &[DVec3], parts: &[Bounds], mesh: impl Fn(usize) -> TriMesh) -> Vec<bool> {
+    let mut are = vec![false; places.len()];
+    for (part, bounds) in parts.iter().enumerate() {
+        let mut tree: Option<Bvh> = None;
+        for (place, is_inside) in places.iter().zip(&mut are) {
+            if !*is_inside && is_within(bounds, place) {
+                let tree = tree.get_or_insert_with(|| Bvh::new(&mesh(part)));
+                *is_inside = tree.surrounding(place - bounds[0], ASLANT) > 0;
+            }
+        }
+    }
+    are
 }
 
 /// Whether a place lies within bounds.
@@ -146,6 +203,41 @@ mod tests {
                 assert_eq!(count, all.min(least), "part {n} up to {least}");
             }
         }
+    }
+
+    #[test]
+    fn counts_are_those_of_looking_at_each() {
+        let mut state = 1u64;
+        let mut next = || {
+            state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+            (state >> 11) as f64 / (1u64 << 53) as f64
+        };
+        let mut any = |most: f64| DVec3::new(most * next(), most * next(), most * next());
+        let sizes = [0.5, 2.0, 9.0, 30.0];
+        let parts: Vec<Bounds> = (0..300)
+            .map(|n| (any(40.0) - DVec3::repeat(20.0), any(sizes[n % 4])))
+            .map(|(low, size)| [low, low + size])
+            .collect();
+        // Some on the very bounds.
+        let mut places: Vec<DVec3> = (0..3000).map(|_| any(44.0) - DVec3::repeat(22.0)).collect();
+        places.extend(parts.as_flattened());
+        let lacking: Vec<usize> = (0..parts.len()).map(|n| n % 3 * 5).collect();
+        let counts = count(&parts, &places, &lacking, |part, _| part != 7);
+        for (n, bounds) in parts.iter().enumerate() {
+            let all = places.iter().filter(|place| n != 7 && is_within(bounds, place)).count();
+            assert_eq!(counts[n], all.min(lacking[n]), "part {n}: {bounds:?}");
+        }
+    }
+
+    #[test]
+    fn places_in_any_part_are_told() {
+        let parts = [DVec3::zeros(), DVec3::new(5.0, 0.0, 0.0)].map(|low| [low, low + DVec3::repeat(1.0)]);
+        // The mesh of the second fills a part of its bounds alone.
+        let mesh = |part: usize| TriMesh::cuboid([0.0; 3], [1.0, [1.0, 0.5][part], 1.0]);
+        let places = [0.3, 5.3, 3.0].map(|x| DVec3::new(x, 0.7, 0.6));
+        assert_eq!(are_inside(&places, &parts, mesh), [true, false, false]);
+        let lower = places.map(|place| place - DVec3::new(0.0, 0.4, 0.0));
+        assert_eq!(are_inside(&lower, &parts, mesh), [true, true, false]);
     }
 
     #[test]

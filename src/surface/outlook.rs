@@ -60,8 +60,10 @@ impl Outlook {
             let triangles = after.triangles().to_vec();
             let report = after.step(ctx, from, to, dt)?;
             let spacing = tracker.params().spacing;
-            let leads = report.change.as_ref().map(|change| Leads::of(change, &triangles, spacing));
-            let leads = leads.unwrap_or_default();
+            let leads = match &report.change {
+                Some(change) => Leads::of(ctx, change, &triangles, spacing)?,
+                None => Leads::default(),
+            };
             self.steps.push_back(Coming { to: to.clone(), dt, after, report, leads });
         }
         Ok(())

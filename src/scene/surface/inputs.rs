@@ -3,7 +3,7 @@
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
-use super::time::read;
+use super::time::Liquid;
 use super::{Surface, sculpts};
 use crate::base::arrays::{Number, On};
 use crate::base::faults::Faults;
@@ -60,7 +60,8 @@ impl Inputs {
         let sculpts = sculpts::frames(surface, shot.frames)?;
         let seen = Arc::new(Seen::default());
         let first = surface.files_at(shot.frames, shot.frames.first).swap_remove(0);
-        let particles = read(&first, surface, &seen)?;
+        let time = surface.time(shot.frames, shot.frames.first);
+        let particles = Particles::clone(&*Liquid::new(surface, shot, &seen).at(time)?);
         if particles.ids.is_empty() && particles.velocities.is_empty() && shot.frames.count() > 1 {
             let what =
                 "has neither ids nor velocities (attributes id and v): where its particles go is not known";
@@ -178,7 +179,7 @@ fn told(path: &Path, error: Error) -> Error {
 /// The mesh as it can be rebuilt: a closed 2-manifold by index that does not cross itself, repaired in cells of an edge (m) where it is
 /// not; and what was done, in a sentence.
 fn closed(ctx: &Context, mesh: DetailedMesh, cell: f64) -> Result<(DetailedMesh, Option<String>)> {
-    let faults = Faults::of(&mesh.mesh);
+    let faults = ctx.pool().install(|| Faults::of(&mesh.mesh));
     let crossings = faults.crossings + faults.corner_crossings + faults.folds + faults.overlaps;
     let is_closed = faults.by_index.is_watertight() && faults.volume > 0.0 && faults.inverted_parts == 0;
     if is_closed && crossings == 0 {

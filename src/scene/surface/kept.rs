@@ -8,7 +8,7 @@ use crate::error::{Error, Result};
 use crate::surface::{Params, Tracker};
 
 /// Magic bytes, including the version.
-const MAGIC: &Magic = b"frzsrm01";
+const MAGIC: &Magic = b"frzsrm02";
 /// What messages call it.
 const NOUN: &str = "surface";
 
@@ -16,8 +16,18 @@ const NUMBERS: [Number; 8] =
     [Number::I8, Number::U8, Number::I16, Number::U16, Number::I32, Number::U32, Number::F32, Number::F64];
 const PLACES: [On; 3] = [On::Vertices, On::Corners, On::Faces];
 
-/// The exact state of a mesh, with what it carries now; as long as it was not rebuilt that is what it began with.
-pub fn save(tracker: &Tracker, detail: &DetailedMesh) -> Vec<u8> {
+/// A mesh that was kept.
+pub struct Kept {
+    pub tracker: Tracker,
+    /// What it carries; none: what the first mesh does.
+    pub detail: Option<DetailedMesh>,
+    /// The frame at which an edited mesh was the last to take its place.
+    pub sculpted: Option<i32>,
+}
+
+/// The exact state of a mesh, with what it carries now, and the frame of the last edited one; as long as it was not rebuilt that is
+/// what it began with.
+pub fn save(tracker: &Tracker, detail: &DetailedMesh, sculpted: Option<i32>) -> Vec<u8> {
     let own = tracker.save();
     if !tracker.is_rebuilt() {
         return own;
@@ -25,6 +35,8 @@ pub fn save(tracker: &Tracker, detail: &DetailedMesh) -> Vec<u8> {
     let mut to = Writer::default();
     to.count(own.len());
     to.0.extend(own);
+    to.u32(u32::from(sculpted.is_some()));
+    to.u32(sculpted.unwrap_or_default().cast_unsigned());
     to.count(detail.arrays.len());
     for array in &detail.arrays {
         let code = |found: Option<usize>| found.unwrap_or_default() as u32;
@@ -52,14 +64,17 @@ pub fn save(tracker: &Tracker, detail: &DetailedMesh) -> Vec<u8> {
 ///
 /// # Errors
 /// Bytes that are no such state, or one of another mesh.
-pub fn resume(params: Params, first: &DetailedMesh, bytes: &[u8]) -> Result<(Tracker, Option<DetailedMesh>)> {
+pub fn resume(params: Params, first: &DetailedMesh, bytes: &[u8]) -> Result<Kept> {
     if !bytes.starts_with(MAGIC) {
-        return Ok((Tracker::resume(params, &first.mesh, bytes)?, None));
+        let tracker = Tracker::resume(params, &first.mesh, bytes)?;
+        return Ok(Kept { tracker, detail: None, sculpted: None });
     }
     let bytes = packed::unpack(bytes, MAGIC, NOUN)?;
     let mut from = Reader::new(&bytes);
     let length = from.count(1)?;
     let tracker = Tracker::resume(params, &first.mesh, from.bytes(length)?)?;
+    let [has_sculpt, frame] = [from.u32()?, from.u32()?];
+    let sculpted = (has_sculpt != 0).then_some(frame.cast_signed());
     let [vertices, faces] = [tracker.vertices().len(), tracker.triangles().len()];
     let mut arrays = Vec::new();
     for _ in 0..from.count(8)? {
@@ -82,7 +97,8 @@ pub fn resume(params: Params, first: &DetailedMesh, bytes: &[u8]) -> Result<(Tra
     }
     let uvs = if from.u32()? == 0 { None } else { Some(uvs(&mut from, vertices, faces)?) };
     from.end()?;
-    Ok((tracker, Some(DetailedMesh { uvs, arrays, ..DetailedMesh::default() })))
+    let detail = Some(DetailedMesh { uvs, arrays, ..DetailedMesh::default() });
+    Ok(Kept { tracker, detail, sculpted })
 }
 
 fn uvs(from: &mut Reader<'_>, vertices: usize, faces: usize) -> Result<Uvs> {
@@ -153,10 +169,11 @@ mod tests {
     fn what_is_kept_comes_back_and_what_was_changed_is_refused_or_read() {
         let (tracker, first, detail) = rebuilt();
         let params = Params { rebuild: true, ..Params::for_spacing(1.0) };
-        let bytes = save(&tracker, &detail);
-        let (back, carried) = resume(params, &first, &bytes).unwrap();
+        let bytes = save(&tracker, &detail, Some(-7));
+        let Kept { tracker: back, detail: carried, sculpted } = resume(params, &first, &bytes).unwrap();
         let carried = carried.unwrap();
-        assert!(save(&back, &carried) == bytes && carried.uvs == detail.uvs);
+        assert!(save(&back, &carried, sculpted) == bytes && carried.uvs == detail.uvs);
+        assert_eq!(sculpted, Some(-7));
         // Damage never gets past the checksum; behind it nothing may panic either.
         let plain = packed::unpack(&bytes, MAGIC, NOUN).unwrap();
         let mut state = 5u64;

@@ -26,7 +26,7 @@
 //! | vertex of the mesh | in cells 24 and units 12, as cut 25, as it was and is 48, names 12, sizes in four copies 32, state 24 | 177 |
 //! | triangle of the mesh | on the grid 12, as cut 20, while its edges are looked at 82, state 36 | 150 |
 //! | vertex of the mesh in a coming frame, but for the next | place 24, distance 4, flags 2, size 8, velocities 24, name 8 | 70 |
-//! | triangle of such a mesh | corners | 12 |
+//! | triangle of such a mesh | corners twice 24, the mask 8 | 32 |
 //! | number that the mesh carries | in two frames 16, state 16; 8 in each coming frame | 32 |
 //! | vertex of a mesh that carries something | where it has its numbers from | 40 |
 //! | triangle of such a mesh | where it has its numbers from 80, in a tree 84 | 164 |
@@ -58,7 +58,7 @@ const MESH: [f64; 2] = [359.0, 72.0];
 const CARRIED: f64 = 8.0;
 
 /// Where the mesh is rebuilt: bytes of a vertex and of a triangle of the mesh in each coming frame but the next.
-const COMING: [f64; 2] = [70.0, 12.0];
+const COMING: [f64; 2] = [70.0, 32.0];
 /// Bytes of a particle of the next frame, whose surface is made at the same time.
 const AHEAD: f64 = 68.0;
 /// Bytes of a face of a cell that the mesh passes through, of a block of Gamma, and of a triangle near such blocks.

@@ -5,6 +5,7 @@ use std::collections::VecDeque;
 use std::path::PathBuf;
 use std::sync::Arc;
 
+use super::kept::Kept;
 use super::sculpts::{path_at, read_sculpt};
 use super::time::Liquid;
 use super::told::told;
@@ -37,7 +38,9 @@ pub struct Walk<'a> {
 
 /// A mesh as an artist made it: that of the first frame, or an edited one.
 #[derive(Clone)]
-struct Source {
+pub(super) struct Source {
+    /// The frame of an edited one.
+    pub sculpted: Option<i32>,
     mesh: Arc<DetailedMesh>,
     /// The particles at its frame, where they have ids and the mesh carries anything.
     rest: Option<Arc<Rest>>,
@@ -52,7 +55,7 @@ pub struct At {
     pub report: Report,
     way: Way,
     leads: Leads,
-    source: Source,
+    pub(super) source: Source,
 }
 
 /// How the vertices of the frame before went to a frame.
@@ -90,8 +93,7 @@ impl<'a> Walk<'a> {
     pub fn resume(
         ctx: &Context,
         (scene, surface, inputs): (&'a Scene, &'a Surface, &'a Inputs),
-        frame: i32,
-        (mut tracker, detail): (Tracker, Option<DetailedMesh>),
+        Kept { mut tracker, detail, sculpted }: Kept,
     ) -> Result<Self> {
         let mut walk = Self::new(scene, surface, inputs);
         if !tracker.is_rebuilt() {
@@ -101,22 +103,24 @@ impl<'a> Walk<'a> {
             let triangles = tracker.triangles().to_vec();
             Arc::new(DetailedMesh { mesh: TriMesh { positions: Vec::new(), triangles }, ..detail })
         });
-        let last = inputs.sculpts.iter().rfind(|sculpted| **sculpted <= frame);
-        if let Some(last) = last
-            && let Some(sculpt) = read_sculpt(ctx, surface, inputs, *last)?
-        {
-            let particles = walk.particles(*last)?;
-            walk.source = Source::of(Arc::new(sculpt.mesh), &particles);
+        if let Some(frame) = sculpted {
+            walk.source = match read_sculpt(ctx, surface, inputs, frame)? {
+                Some(sculpt) => {
+                    let particles = walk.particles(frame)?;
+                    Source::of(sculpted, Arc::new(sculpt.mesh), &particles)
+                }
+                // Its file is gone: what is made takes what the mesh beside it carries.
+                None => Source { sculpted, rest: None, ..walk.source },
+            };
         }
-        let report = Report { results: serde_json::Map::new(), phases: Vec::new() };
         let (way, leads, source) = (Way::default(), Leads::default(), walk.source.clone());
-        walk.now = Some(At { tracker, detail, report, way, leads, source });
+        walk.now = Some(At { tracker, detail, report: nothing_told(), way, leads, source });
         Ok(walk)
     }
 
     fn new(scene: &'a Scene, surface: &'a Surface, inputs: &'a Inputs) -> Self {
         let liquid = Liquid::new(surface, scene.shot, &inputs.seen);
-        let source = Source::of(Arc::new(inputs.mesh.clone()), &inputs.particles);
+        let source = Source::of(None, Arc::new(inputs.mesh.clone()), &inputs.particles);
         Self { scene, surface, inputs, liquid, source, now: None, ahead: VecDeque::new() }
     }
 
@@ -230,9 +234,9 @@ impl<'a> Walk<'a> {
                 Some(change) => {
                     trail.follow(&change.before, share);
                     if self.surface.eases() {
-                        leads = leads.then(&Leads::of(change, &triangles, self.inputs.spacing));
+                        leads = leads.then(&Leads::of(ctx, change, &triangles, self.inputs.spacing)?);
                     }
-                    let own = detail.as_ref().unwrap_or(&before.source.mesh);
+                    let own = detail.as_deref().unwrap_or(&self.inputs.mesh);
                     detail = Some(Arc::new(carried(ctx, own, &before.source, (&tracker, change), &to)?));
                     trail.change(change);
                 }
@@ -242,24 +246,33 @@ impl<'a> Walk<'a> {
             from = to;
         }
         let way = trail.way(tracker.vertices(), tracker.triangles(), self.scene.shot.fps);
-        let count = from.places.len();
         let source = before.source.clone();
-        let report = told(&report, count, &tracker, false);
-        let mut at = At { tracker, detail, report, way, leads, source };
-        if frame <= self.scene.shot.frames.last {
-            self.resculpt(ctx, &mut at, frame, &from)?;
-        }
+        let mut at = At { tracker, detail, report: nothing_told(), way, leads, source };
+        let sculpted = if frame <= self.scene.shot.frames.last {
+            self.resculpt(ctx, &mut at, frame, &from)?
+        } else {
+            None
+        };
+        let is_resculpted = sculpted.is_some();
+        let report = sculpted.into_iter().fold(report, StepReport::followed_by);
+        at.report = told(&report, from.places.len(), &at.tracker, is_resculpted);
         Ok(at)
     }
 
-    /// Puts the edited mesh of a frame in the place of the one that came there, if there is one.
-    fn resculpt(&self, ctx: &Context, at: &mut At, frame: i32, particles: &Particles) -> Result<()> {
-        let Some(sculpt) = read_sculpt(ctx, self.surface, self.inputs, frame)? else { return Ok(()) };
+    /// Puts the edited mesh of a frame in the place of the one that came there, if there is one; what that did.
+    fn resculpt(
+        &self,
+        ctx: &Context,
+        at: &mut At,
+        frame: i32,
+        particles: &Particles,
+    ) -> Result<Option<StepReport>> {
+        let Some(sculpt) = read_sculpt(ctx, self.surface, self.inputs, frame)? else { return Ok(None) };
         let refused = |error| match error {
             Error::Argument(what) => Error::file(&sculpt.path, what),
             other => other,
         };
-        let old = NearestTree::new(&at.tracker.mesh());
+        let old = ctx.pool().install(|| NearestTree::new(&at.tracker.mesh()));
         let triangles = at.tracker.triangles().to_vec();
         let report = at.tracker.resculpt(ctx, &sculpt.mesh.mesh, particles).map_err(refused)?;
         at.tracker.set_lasting(sculpt.lasting).map_err(refused)?;
@@ -270,11 +283,10 @@ impl<'a> Walk<'a> {
         };
         at.way.of_after = at.tracker.vertices().iter().map(velocity).collect();
         at.leads = at.leads.clone().then(&Leads::cut(at.tracker.vertices().len()));
-        at.report = told(&report, particles.places.len(), &at.tracker, true);
         let mesh = Arc::new(sculpt.mesh);
-        at.source = Source::of(mesh.clone(), particles);
+        at.source = Source::of(Some(frame), mesh.clone(), particles);
         at.detail = Some(mesh);
-        Ok(())
+        Ok(Some(report))
     }
 
     /// The particles at a frame.
@@ -293,11 +305,16 @@ impl<'a> Walk<'a> {
     }
 }
 
+/// Before anything is known.
+fn nothing_told() -> Report {
+    Report { results: serde_json::Map::new(), phases: Vec::new() }
+}
+
 impl Source {
-    fn of(mesh: Arc<DetailedMesh>, particles: &Particles) -> Self {
+    fn of(sculpted: Option<i32>, mesh: Arc<DetailedMesh>, particles: &Particles) -> Self {
         let is_traced = mesh.uvs.is_some() || !mesh.arrays.is_empty();
         let rest = if is_traced { Rest::of(particles).map(Arc::new) } else { None };
-        Self { mesh, rest }
+        Self { sculpted, mesh, rest }
     }
 }
 
@@ -318,7 +335,13 @@ fn carried(
         None => Vec::new(),
     };
     let traced = Traced { first: &source.mesh, places: &places, spacing };
-    Ok(carry_attributes(&old, tracker.mesh(), &change.origins, &change.sources, Some(&traced)))
+    let (origins, sources) = (&change.origins, &change.sources);
+    ctx.phase("carry", || {
+        let mut out = carry_attributes(&old, tracker.mesh(), origins, sources, Some(&traced));
+        // The tracker has them.
+        out.mesh.positions = Vec::new();
+        Ok(out)
+    })
 }
 
 impl Surface {

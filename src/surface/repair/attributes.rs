@@ -7,7 +7,7 @@
 use rayon::prelude::*;
 
 use super::Source;
-use super::traced::Traced;
+use super::traced::{Traced, is_mask};
 use super::weights::{Weights, alone, between, blended, heaviest, weights};
 use crate::base::arrays::{DetailedMesh, MeshArray, On};
 use crate::base::deviation::NearestTree;
@@ -35,19 +35,23 @@ pub fn carried(
     sources: &[Source],
     traced: Option<&Traced<'_>>,
 ) -> DetailedMesh {
-    let mut out = of_old(detail, mesh, vertices, sources);
+    let mut out = match &detail.arrays[..] {
+        [mask] if traced.is_some() && detail.uvs.is_none() && is_mask(mask) => of_mask(mask, mesh, sources),
+        _ => of_old(detail, mesh, vertices, sources, traced.is_some()),
+    };
     if let Some(traced) = traced {
         traced.put(&mut out, vertices, sources);
     }
     out
 }
 
-/// What it takes from the mesh before alone.
+/// What it takes from the mesh before alone. Of a mesh that is tracked no vertices were joined, but vertices that stay went into others.
 fn of_old(
     detail: &DetailedMesh,
     mesh: TriMesh,
     vertices: &[Option<u32>],
     sources: &[Source],
+    is_tracked: bool,
 ) -> DetailedMesh {
     if detail.uvs.is_none() && detail.arrays.is_empty() {
         return DetailedMesh { mesh, ..DetailedMesh::default() };
@@ -56,9 +60,20 @@ fn of_old(
         return of_nothing(detail, mesh);
     }
     let origins = Origins::of(&detail.mesh, &mesh, vertices, sources);
-    let uvs = detail.uvs.as_ref().map(|uvs| origins.uvs(uvs, &mesh.triangles));
+    let uvs = detail.uvs.as_ref().map(|uvs| origins.uvs(uvs, &mesh.triangles, sources, is_tracked));
     let arrays = detail.arrays.iter().map(|array| origins.array(array)).collect();
     DetailedMesh { mesh, uvs, arrays }
+}
+
+/// The same of a mesh that carries the mask of what was made alone: that needs no places.
+fn of_mask(mask: &MeshArray, mesh: TriMesh, sources: &[Source]) -> DetailedMesh {
+    let value = |source: &Source| match *source {
+        Source::Whole(triangle) | Source::Part(triangle) => mask.values[triangle as usize],
+        Source::New => 1.0,
+    };
+    let values = sources.iter().map(value).collect();
+    let arrays = vec![MeshArray { name: mask.name.clone(), on: mask.on, number: mask.number, values }];
+    DetailedMesh { mesh, uvs: None, arrays }
 }
 
 /// What a mesh carries on one that came of nothing: zeros.
@@ -154,9 +169,9 @@ impl<'a> Origins<'a> {
         MeshArray { name: array.name.clone(), on: array.on, number: array.number, values }
     }
 
-    /// Texture coordinates, for these triangles of the new mesh.
-    fn uvs(&self, uvs: &Uvs, triangles: &[[u32; 3]]) -> Uvs {
-        if uvs.corners.is_none() && !self.joins_seams(uvs, triangles) {
+    /// Texture coordinates, for these triangles of the new mesh with their sources.
+    fn uvs(&self, uvs: &Uvs, triangles: &[[u32; 3]], sources: &[Source], is_tracked: bool) -> Uvs {
+        if uvs.corners.is_none() && (is_tracked || !self.joins_seams(uvs, triangles)) {
             let place = |origin: &Origin| match origin {
                 Origin::Vertex(vertex) => uvs.places[*vertex as usize],
                 Origin::Place(triangle, weights) => {
@@ -168,11 +183,14 @@ impl<'a> Origins<'a> {
         }
         let mut places = uvs.places.clone();
         let mut corners = Vec::with_capacity(3 * self.triangles.len());
+        let mut beside = self.beside(uvs, triangles, sources).into_iter().peekable();
         for (chart, weights) in &self.triangles {
             let own = uvs.indices(self.old, *chart);
             for weights in weights {
                 let most = heaviest(weights);
-                if weights[most] == 1.0 {
+                if let Some((_, index)) = beside.next_if(|(corner, _)| *corner == corners.len()) {
+                    corners.push(index);
+                } else if weights[most] == 1.0 {
                     corners.push(own[most]);
                 } else {
                     corners.push(places.len() as u32);
@@ -183,15 +201,67 @@ impl<'a> Origins<'a> {
         Uvs { places, corners: Some(corners), missing: uvs.missing }
     }
 
+    /// The vertex of the old mesh that one of the new mesh is.
+    fn own(&self, vertex: u32) -> Option<u32> {
+        match self.vertices[vertex as usize] {
+            Origin::Vertex(own) => Some(own),
+            Origin::Place(..) => None,
+        }
+    }
+
+    /// Corners of parts that are vertices of the old mesh, but not their charts', ascending (of each triangle three), with the indices of
+    /// these vertices' coordinates: a collapse of two vertices leaves such corners. That index counts which the vertex has in a triangle
+    /// that it shares with the corner that went, where that has the index that it has on the chart: on the same side of a seam. Corners
+    /// without such a triangle are left out.
+    fn beside(&self, uvs: &Uvs, triangles: &[[u32; 3]], sources: &[Source]) -> Vec<(usize, u32)> {
+        // Each with its vertex, and the vertex and index of the corner that went.
+        let mut corners: Vec<(usize, u32, [u32; 2])> = Vec::new();
+        let parts = sources.iter().enumerate().filter(|(_, source)| matches!(source, Source::Part(_)));
+        for (number, _) in parts {
+            let (chart, weights) = &self.triangles[number];
+            let of_chart = self.old[*chart];
+            let names = triangles[number].map(|vertex| self.own(vertex));
+            for (corner, (name, weights)) in names.iter().zip(weights).enumerate() {
+                let Some(name) = name.filter(|name| !of_chart.contains(name)) else { continue };
+                let gone = (0..3usize).filter(|other| !names.contains(&Some(of_chart[*other])));
+                let nearest = gone.max_by(|a, b| weights[*a].total_cmp(&weights[*b]));
+                let index = |other: usize| uvs.indices(self.old, *chart)[other];
+                corners.extend(nearest.map(|at| (3 * number + corner, name, [of_chart[at], index(at)])));
+            }
+        }
+        let count = corners.iter().map(|(_, name, _)| *name as usize + 1).max().unwrap_or(0);
+        if count == 0 {
+            return Vec::new();
+        }
+        let mut is_asked = vec![false; count];
+        corners.iter().for_each(|(_, name, _)| is_asked[*name as usize] = true);
+        let mut around: Vec<(u32, usize)> = Vec::new();
+        for (triangle, names) in self.old.iter().enumerate() {
+            let asked = names.iter().filter(|name| is_asked.get(**name as usize) == Some(&true));
+            around.extend(asked.map(|name| (*name, triangle)));
+        }
+        around.sort_unstable();
+        let index_in = |triangle: usize, name: u32, [gone, index]: [u32; 2]| {
+            let (names, indices) = (self.old[triangle], uvs.indices(self.old, triangle));
+            let is_same_side = (0..3usize).any(|at| (names[at], indices[at]) == (gone, index));
+            let at = names.iter().position(|other| *other == name)?;
+            is_same_side.then_some(indices[at])
+        };
+        let found = |(corner, name, gone): (usize, u32, [u32; 2])| {
+            let begin = around.partition_point(|(other, _)| *other < name);
+            let mut own = around[begin..].iter().take_while(|(other, _)| *other == name);
+            own.find_map(|(_, triangle)| index_in(*triangle, name, gone)).map(|index| (corner, index))
+        };
+        corners.into_iter().filter_map(found).collect()
+    }
+
     /// Whether a vertex is several of the old mesh that had different texture coordinates.
     fn joins_seams(&self, uvs: &Uvs, triangles: &[[u32; 3]]) -> bool {
         let place = |vertex: u32| uvs.places[vertex as usize];
         let is_other = |chart: usize, weights: &Weights, vertex: u32| {
             let most = heaviest(weights);
-            match self.vertices[vertex as usize] {
-                Origin::Vertex(own) => weights[most] == 1.0 && place(self.old[chart][most]) != place(own),
-                Origin::Place(..) => false,
-            }
+            let own = self.own(vertex);
+            own.is_some_and(|own| weights[most] == 1.0 && place(self.old[chart][most]) != place(own))
         };
         self.triangles.iter().zip(triangles).any(|((chart, weights), names)| {
             weights.iter().zip(names).any(|(weights, vertex)| is_other(*chart, weights, *vertex))
@@ -269,6 +339,67 @@ mod tests {
         assert_eq!(uvs.corners.unwrap(), [0, 2, 1, 3, 4, 6, 3, 7, 5]);
         assert!(uvs.places.starts_with(&places));
         assert_eq!(uvs.places[6..], [[4.5, 0.5625]; 2]);
+    }
+
+    #[test]
+    fn a_collapse_tears_no_texture() {
+        let corners = [[0.0, 0.0], [1.0, 0.0], [2.0, 0.0], [0.0, 1.0], [1.0, 1.0], [2.0, 1.0]];
+        let positions: Vec<Vec3> = corners.iter().map(|[x, y]| Vec3::new(*x, *y, 0.0)).collect();
+        let old = TriMesh { positions, triangles: vec![[0, 1, 4], [0, 4, 3], [1, 2, 5], [1, 5, 4]] };
+        // The second vertex became the first.
+        let kept = [0, 2, 3, 4, 5];
+        let positions = kept.map(|n: usize| old.positions[n]).to_vec();
+        let new = TriMesh { positions, triangles: vec![[0, 1, 4], [0, 4, 3], [0, 3, 2]] };
+        let vertices = kept.map(|n| Some(n as u32));
+        let sources = [Source::Part(2), Source::Part(3), Source::Whole(1)];
+        let places: Vec<[f32; 2]> = (0..7u8).map(|n| [f32::from(n), 0.5 * f32::from(n)]).collect();
+        let found = |places: &[[f32; 2]], corners| {
+            let uvs = Some(Uvs { places: places.to_vec(), corners, missing: 0 });
+            let detail = DetailedMesh { mesh: old.clone(), uvs, arrays: Vec::new() };
+            let traced = Traced { first: &detail, places: &[], spacing: 1.0 };
+            carried(&detail, new.clone(), &vertices, &sources, Some(&traced)).uvs.unwrap()
+        };
+        let uvs = found(&places[..6], None);
+        assert_eq!((uvs.places, uvs.corners), (kept.map(|n| places[n]).to_vec(), None));
+        let mut indices = old.triangles.as_flattened().to_vec();
+        for has_seam in [false, true] {
+            if has_seam {
+                // The third triangle's coordinates lie elsewhere: there the first vertex has none.
+                indices[6] = 6;
+            }
+            let uvs = found(&places, Some(indices.clone()));
+            let first = if has_seam { 6 } else { 0 };
+            assert_eq!(
+                (uvs.places, uvs.corners),
+                (places.clone(), Some(vec![first, 2, 5, 0, 5, 4, 0, 4, 3]))
+            );
+        }
+    }
+
+    #[test]
+    fn coordinates_that_no_corner_has_any_more_go_where_nothing_is_traced() {
+        let (old, mut new) = squares();
+        let places: Vec<[f32; 2]> = (0..6u8).map(|n| [f32::from(n), 0.125 * f32::from(n)]).collect();
+        let uvs = Some(Uvs { places: places.clone(), corners: Some((0..6).collect()), missing: 0 });
+        let first = DetailedMesh { mesh: old, uvs, arrays: Vec::new() };
+        let traced = Traced { first: &first, places: &[], spacing: 1.0 };
+        let [mut with, mut without] = [first.clone(), first.clone()];
+        for change in 0..3 {
+            with = carried(&with, new.clone(), &VERTICES, &SOURCES, Some(&traced));
+            without = carried(&without, new.clone(), &VERTICES, &SOURCES, None);
+            let (uvs, all) = (with.uvs.as_ref().unwrap(), without.uvs.as_ref().unwrap());
+            assert!(uvs.places.starts_with(&places));
+            let corners = uvs.corners.as_ref().unwrap();
+            assert!((6..uvs.places.len() as u32).all(|index| corners.contains(&index)), "{corners:?}");
+            assert_eq!(all.places.len() > uvs.places.len(), change > 0);
+            for triangle in 0..3 {
+                let of =
+                    |uvs: &Uvs| uvs.indices(&new.triangles, triangle).map(|index| uvs.places[index as usize]);
+                assert_eq!(of(uvs), of(all));
+            }
+            // The vertex that was made is made again, a little farther on.
+            new.positions[4].x += 0.125;
+        }
     }
 
     #[test]

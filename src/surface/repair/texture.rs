@@ -39,6 +39,8 @@ pub(super) fn textured(
     is_kept: &[bool],
 ) {
     if charts.list.is_empty() {
+        // What was made has coordinates of the mesh before, and each change adds some.
+        tidy(out, first.places.len());
         return;
     }
     let texture = Texture::of(charts, first, mesh);

@@ -58,10 +58,14 @@ impl Traced<'_> {
     }
 }
 
+/// Whether an array is the one that says of each face what it is.
+pub(super) fn is_mask(array: &MeshArray) -> bool {
+    array.name == Traced::MASK && array.on == On::Faces
+}
+
 /// Says of each face what it is.
 fn mark(out: &mut DetailedMesh, sources: &[Source], charts: &[Chart]) {
-    let is_it = |array: &MeshArray| array.name == Traced::MASK && array.on == On::Faces;
-    let at = out.arrays.iter().position(is_it).unwrap_or(out.arrays.len());
+    let at = out.arrays.iter().position(is_mask).unwrap_or(out.arrays.len());
     if at == out.arrays.len() {
         let values = vec![0.0; sources.len()];
         let name = Traced::MASK.into();
@@ -431,6 +435,13 @@ mod tests {
         (wanted[0], wanted[1]) = (1.0, 1.0);
         assert_eq!((wanted[torn], mask(&out) == wanted), (2.0, true));
         assert_eq!(out.arrays.len(), old.arrays.len());
+        // The same where the mesh carries nothing else, and goes with its triangles.
+        let arrays = old.arrays.iter().filter(|array| is_mask(array)).cloned().collect();
+        let alone = DetailedMesh { mesh: old.mesh.clone(), uvs: None, arrays };
+        (sources[2], wanted[2]) = (Source::Whole(torn as u32), 2.0);
+        let out = carried(&alone, old.mesh.clone(), &origins, &sources, Some(&traced));
+        assert!(mask(&out) == wanted && out.arrays.len() == 1);
+        sources[2] = Source::Whole(2);
         let bare = DetailedMesh { mesh: old.mesh.clone(), ..DetailedMesh::default() };
         let out = carried(&bare, old.mesh.clone(), &origins, &sources, Some(&traced));
         assert_eq!(mask(&out).iter().sum::<f64>(), 3.0);
