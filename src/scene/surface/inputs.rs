@@ -68,6 +68,9 @@ impl Inputs {
             return Err(Error::file(first, what));
         }
         let mut warnings = Vec::new();
+        if surface.every && !surface.rebuild {
+            warnings.push(r#"surface.match = "every" does nothing where surface.rebuild is false"#.into());
+        }
         let estimate = match surface.spacing {
             Some(_) => rough_spacing(&particles.places),
             None => estimate_spacing(&particles.places),

@@ -34,6 +34,8 @@ pub struct Walk<'a> {
     now: Option<At>,
     /// Those that follow it.
     ahead: VecDeque<At>,
+    /// The first frame beyond the shot's end that could not be made.
+    end: Option<i32>,
 }
 
 /// A mesh as an artist made it: that of the first frame, or an edited one.
@@ -121,7 +123,7 @@ impl<'a> Walk<'a> {
     fn new(scene: &'a Scene, surface: &'a Surface, inputs: &'a Inputs) -> Self {
         let liquid = Liquid::new(surface, scene.shot, &inputs.seen);
         let source = Source::of(None, Arc::new(inputs.mesh.clone()), &inputs.particles);
-        Self { scene, surface, inputs, liquid, source, now: None, ahead: VecDeque::new() }
+        Self { scene, surface, inputs, liquid, source, now: None, ahead: VecDeque::new(), end: None }
     }
 
     /// Goes on to the coming frame, and as far ahead as it needs.
@@ -169,6 +171,9 @@ impl<'a> Walk<'a> {
     /// Makes the frame after those that are known, where it is needed. Beyond the shot's end a cache need not have it.
     fn look(&mut self, ctx: &Context, frame: i32) -> Result<bool> {
         let last = self.scene.shot.frames.last;
+        if self.end.is_some_and(|end| frame >= end) {
+            return Ok(false);
+        }
         if frame > last {
             let files = reads(self.scene, self.surface, self.inputs, last).ahead;
             let own = self.surface.between(self.scene.shot.frames, frame - 1, frame);
@@ -200,6 +205,7 @@ impl<'a> Walk<'a> {
                     _ => format!("nothing moves towards a change from frame {frame} on"),
                 };
                 log::warn!("{error}; {what}");
+                self.end = Some(frame);
                 return Ok(false);
             }
         }

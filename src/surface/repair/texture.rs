@@ -21,7 +21,7 @@ const SEAMLESS: f64 = 4.0;
 /// What rounding to 32 bits may make of coordinates that are the same.
 const ROUNDING: f64 = 1e-6;
 /// A coordinate that a vertex has in kept triangles is about the same as another within so many edges of the made triangle.
-const SAME: f64 = 3.0;
+const SAME: f64 = 2.0;
 /// What is left of a difference from one vertex to the next: far from what is kept the texture is its own.
 const FADES: f64 = 0.8;
 /// How often differences are spread.
