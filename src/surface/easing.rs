@@ -5,7 +5,7 @@
 use rayon::prelude::*;
 
 use super::change::Change;
-use super::repair::Source;
+use super::repair::{Source, weights};
 use crate::base::deviation::NearestTree;
 use crate::base::mesh::{renumbered, used};
 use crate::base::topology::bodies;
@@ -133,7 +133,7 @@ fn ways(ctx: &Context, change: &Change, triangles: &[[u32; 3]], spacing: f64) ->
         for (place, near) in made.iter().zip(near) {
             let Some(near) = near else { continue };
             let corners = old.triangles[near.triangle];
-            let shares = shares(&corners.map(|at| places[at as usize]), near.place);
+            let shares = weights(&corners.map(|at| places[at as usize]), near.place);
             for (corner, share) in corners.into_iter().zip(shares) {
                 let pull = &mut pulls[corner as usize];
                 *pull = (pull.0 + (place - near.place) * share, pull.1 + share);
@@ -237,18 +237,6 @@ impl Patch {
         let positions: Vec<Vec3> = places.iter().map(|place| place.cast()).collect();
         NearestTree::new(&TriMesh { positions, triangles: self.triangles.clone() })
     }
-}
-
-/// What the corners of a triangle count at a place on it.
-fn shares([a, b, c]: &[DVec3; 3], place: DVec3) -> [f64; 3] {
-    let (ab, ac, way) = (b - a, c - a, place - a);
-    let normal = ab.cross(&ac);
-    let square = normal.norm_squared();
-    if square == 0.0 {
-        return [1.0 / 3.0; 3];
-    }
-    let (of_b, of_c) = (way.cross(&ac).dot(&normal) / square, ab.cross(&way).dot(&normal) / square);
-    [1.0 - of_b - of_c, of_b, of_c].map(|share| share.clamp(0.0, 1.0))
 }
 
 #[cfg(test)]

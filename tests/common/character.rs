@@ -131,6 +131,16 @@ pub fn output(folder: &Path) -> BTreeMap<String, Vec<u8>> {
     out
 }
 
+/// Checks that a folder has the files of another run, and the same bytes in those that are compared.
+#[track_caller]
+pub fn are_same(whole: &BTreeMap<String, Vec<u8>>, out: &Path, is_compared: impl Fn(&str) -> bool) {
+    let other = output(out);
+    assert_eq!(whole.keys().collect::<Vec<_>>(), other.keys().collect::<Vec<_>>(), "{}", out.display());
+    for (name, bytes) in whole.iter().filter(|(name, _)| is_compared(name)) {
+        assert!(*bytes == other[name], "{name} of {}", out.display());
+    }
+}
+
 /// The bytes of a file of grains without what two runs with other settings have by themselves: the file's identifier, and the
 /// hash of what a frame of stage grains in a folder was made from.
 pub fn apart_from_settings(file: &Path, out: &Path, frame: i32) -> Vec<u8> {

@@ -153,16 +153,15 @@ impl<'a> Stepping for Track<'a> {
         let params = self.surface.params(self.inputs.spacing);
         let kept = kept::resume(params, &self.inputs.mesh, &bytes);
         let kept = kept.map_err(|error| Error::file(path, error.to_string()))?;
-        Walk::resume(ctx, (self.scene, self.surface, self.inputs), kept)
+        Walk::resume(ctx, (self.scene, self.surface, self.inputs), frame, kept)
     }
 
     fn step(&self, ctx: &Context, walk: &mut Walk<'a>, to: &To<'_>) -> Result<Stepped<Step>> {
         walk.go(ctx, to.frame)?;
-        let At { tracker, detail, report, source, .. } = walk.now()?;
-        let mut step = None;
-        if to.made_from.is_some() {
-            let (places, velocities) = walk.shown()?;
-            step = Some(Written {
+        let At { tracker, detail, report, source, .. } = walk.now();
+        let step = to.made_from.map(|_| {
+            let (places, velocities) = walk.shown();
+            Written {
                 places: usd::to_floats(&places),
                 triangles: tracker.triangles().to_vec(),
                 detail: detail.clone(),
@@ -170,8 +169,8 @@ impl<'a> Stepping for Track<'a> {
                 delta: tracker.delta().to_vec(),
                 flags: tracker.flags().to_vec(),
                 state: kept::save(tracker, detail.as_deref().unwrap_or(&self.inputs.mesh), source.sculpted),
-            });
-        }
+            }
+        });
         Ok(Stepped { step: Step(step), report: report.clone() })
     }
 

@@ -28,12 +28,10 @@ pub struct Walk<'a> {
     surface: &'a Surface,
     inputs: &'a Inputs,
     liquid: Liquid<'a>,
-    /// What the mesh carried when it was last given, and where its liquid was then.
-    source: Source,
-    /// The mesh at the last frame; none before the first.
-    now: Option<At>,
-    /// Those that follow it.
-    ahead: VecDeque<At>,
+    /// The frame of the first of `known`.
+    frame: i32,
+    /// The mesh at a frame, and at those that follow it as far as they are needed; at least one.
+    known: VecDeque<At>,
     /// The first frame beyond the shot's end that could not be made.
     end: Option<i32>,
 }
@@ -70,156 +68,143 @@ pub(super) struct Way {
 }
 
 impl<'a> Walk<'a> {
-    /// The mesh at the first frame, which is the coming one.
+    /// The mesh at the first frame.
     ///
     /// # Errors
     /// A mesh that is not where the particles are, and what a tracker refuses; cancel.
     pub fn begin(ctx: &Context, scene: &'a Scene, surface: &'a Surface, inputs: &'a Inputs) -> Result<Self> {
-        let mut walk = Self::new(scene, surface, inputs);
-        let particles = walk.particles(scene.shot.frames.first)?;
-        let begun = ctx
-            .step(4, || Tracker::begin(ctx, surface.params(inputs.spacing), &inputs.mesh.mesh, &particles));
-        let ((mut tracker, report), phases) = begun.map_err(|error| walk.told(error))?;
-        tracker.set_lasting(inputs.lasting.clone()).map_err(|error| walk.told(error))?;
+        let params = surface.params(inputs.spacing);
+        let begun = ctx.step(4, || Tracker::begin(ctx, params, &inputs.mesh.mesh, &inputs.particles));
+        let ((mut tracker, report), phases) = begun.map_err(|error| of_first(surface, error))?;
+        tracker.set_lasting(inputs.lasting.clone()).map_err(|error| of_first(surface, error))?;
         let report = StepReport { phases, ..report };
-        let report = told(&report, particles.places.len(), &tracker, false);
-        let (way, leads, source) = (Way::default(), Leads::default(), walk.source.clone());
-        walk.ahead.push_back(At { tracker, detail: None, report, way, leads, source });
-        Ok(walk)
+        let report = told(&report, inputs.particles.places.len(), &tracker, false);
+        let source = Source::of(None, Arc::new(inputs.mesh.clone()), &inputs.particles);
+        let at = At { tracker, detail: None, report, way: Way::default(), leads: Leads::default(), source };
+        Ok(Self::at((scene, surface, inputs), scene.shot.frames.first, at))
     }
 
-    /// Goes on from a mesh that was kept at a frame, with what it carries; none: what it began with.
+    /// Goes on from a mesh that was kept at a frame.
     ///
     /// # Errors
     /// Particles or an edited mesh that can no longer be read.
     pub fn resume(
         ctx: &Context,
-        (scene, surface, inputs): (&'a Scene, &'a Surface, &'a Inputs),
+        of @ (_, surface, inputs): (&'a Scene, &'a Surface, &'a Inputs),
+        frame: i32,
         Kept { mut tracker, detail, sculpted }: Kept,
     ) -> Result<Self> {
-        let mut walk = Self::new(scene, surface, inputs);
         if !tracker.is_rebuilt() {
-            tracker.set_lasting(inputs.lasting.clone()).map_err(|error| walk.told(error))?;
+            tracker.set_lasting(inputs.lasting.clone()).map_err(|error| of_first(surface, error))?;
         }
         let detail = detail.map(|detail| {
             let triangles = tracker.triangles().to_vec();
             Arc::new(DetailedMesh { mesh: TriMesh { positions: Vec::new(), triangles }, ..detail })
         });
-        if let Some(frame) = sculpted {
-            walk.source = match read_sculpt(ctx, surface, inputs, frame)? {
+        let source = Source::of(None, Arc::new(inputs.mesh.clone()), &inputs.particles);
+        let (report, way, leads) = (nothing_told(), Way::default(), Leads::default());
+        let mut walk = Self::at(of, frame, At { tracker, detail, report, way, leads, source });
+        if let Some(sculpted) = sculpted {
+            let source = match read_sculpt(ctx, surface, inputs, sculpted)? {
                 Some(sculpt) => {
-                    let particles = walk.particles(frame)?;
-                    Source::of(sculpted, Arc::new(sculpt.mesh), &particles)
+                    let particles = walk.particles(sculpted)?;
+                    Source::of(Some(sculpted), Arc::new(sculpt.mesh), &particles)
                 }
                 // Its file is gone: what is made takes what the mesh beside it carries.
-                None => Source { sculpted, rest: None, ..walk.source },
+                None => Source { sculpted: Some(sculpted), rest: None, ..walk.now().source.clone() },
             };
+            walk.known[0].source = source;
         }
-        let (way, leads, source) = (Way::default(), Leads::default(), walk.source.clone());
-        walk.now = Some(At { tracker, detail, report: nothing_told(), way, leads, source });
         Ok(walk)
     }
 
-    fn new(scene: &'a Scene, surface: &'a Surface, inputs: &'a Inputs) -> Self {
+    fn at((scene, surface, inputs): (&'a Scene, &'a Surface, &'a Inputs), frame: i32, at: At) -> Self {
         let liquid = Liquid::new(surface, scene.shot, &inputs.seen);
-        let source = Source::of(None, Arc::new(inputs.mesh.clone()), &inputs.particles);
-        Self { scene, surface, inputs, liquid, source, now: None, ahead: VecDeque::new(), end: None }
+        Self { scene, surface, inputs, liquid, frame, known: VecDeque::from([at]), end: None }
     }
 
-    /// Goes on to the coming frame, and as far ahead as it needs.
+    /// Goes on to a frame, and as far ahead as that needs.
     ///
     /// # Errors
     /// Files that cannot be read; what a step refuses; cancel.
     pub fn go(&mut self, ctx: &Context, frame: i32) -> Result<()> {
-        let next = match (self.ahead.pop_front(), self.now.take()) {
-            (Some(next), _) => next,
-            (None, Some(mut now)) => self.next(ctx, &mut now, frame)?,
-            (None, None) => return Err(Error::Internal("a mesh was not begun".into())),
-        };
-        self.now = Some(next);
-        for coming in frame + 1 + self.ahead.len() as i32..=frame + self.surface.looks() {
-            if !self.look(ctx, coming)? {
-                break;
+        while self.frame < frame {
+            if self.known.len() == 1 {
+                let next = self.next(ctx, self.frame + 1)?;
+                self.known.push_back(next);
+            }
+            self.known.pop_front();
+            self.frame += 1;
+        }
+        for coming in frame + self.known.len() as i32..=frame + self.surface.looks() {
+            match self.look(ctx, coming)? {
+                Some(next) => self.known.push_back(next),
+                None => break,
             }
         }
         Ok(())
     }
 
     /// The mesh at the frame that it went to.
-    pub fn now(&self) -> Result<&At> {
-        self.now.as_ref().ok_or_else(|| Error::Internal("a mesh has gone nowhere".into()))
+    pub fn now(&self) -> &At {
+        &self.known[0]
     }
 
     /// Places (m) of its vertices as they are shown: those that a change will take away already go towards what it makes; with the
     /// velocities that lead to the next frame's (m/s), or where that is not known from the one before.
-    pub fn shown(&self) -> Result<(Vec<DVec3>, Vec<Vec3>)> {
-        let now = self.now()?;
+    pub fn shown(&self) -> (Vec<DVec3>, Vec<Vec3>) {
+        let now = self.now();
         let mut places = now.tracker.vertices().to_vec();
-        let mut velocities = match self.ahead.front() {
+        let mut velocities = match self.known.get(1) {
             Some(next) => next.way.of_before.clone(),
             None if now.way.of_after.is_empty() => vec![Vec3::zeros(); places.len()],
             None => now.way.of_after.clone(),
         };
-        let coming = self.ahead.iter().map(|at| &at.leads);
+        let coming = self.known.iter().skip(1).map(|at| &at.leads);
         for Eased { vertex, now, next } in eased(coming, self.surface.ahead as usize) {
             places[vertex as usize] += now;
             velocities[vertex as usize] += ((next - now) * self.scene.shot.fps).cast::<f32>();
         }
-        Ok((places, velocities))
+        (places, velocities)
     }
 
-    /// Makes the frame after those that are known, where it is needed. Beyond the shot's end a cache need not have it.
-    fn look(&mut self, ctx: &Context, frame: i32) -> Result<bool> {
+    /// The frame after those that are known, where it is there: beyond the shot's end a cache need not have it.
+    fn look(&mut self, ctx: &Context, frame: i32) -> Result<Option<At>> {
         let last = self.scene.shot.frames.last;
-        if self.end.is_some_and(|end| frame >= end) {
-            return Ok(false);
+        if frame <= last {
+            return self.next(ctx, frame).map(Some);
         }
-        if frame > last {
-            let files = reads(self.scene, self.surface, self.inputs, last).ahead;
-            let own = self.surface.between(self.scene.shot.frames, frame - 1, frame);
-            if files.is_empty() || !own.iter().all(|path| path.is_file()) {
-                return Ok(false);
-            }
+        let is_wanted = !reads(self.scene, self.surface, self.inputs, last).ahead.is_empty();
+        let files = self.surface.between(self.scene.shot.frames, frame - 1, frame);
+        let is_beyond = self.end.is_some_and(|end| frame >= end);
+        if is_beyond || !is_wanted || !files.iter().all(|path| path.is_file()) {
+            return Ok(None);
         }
-        let (mut before, is_ahead) = match (self.ahead.pop_back(), self.now.take()) {
-            (Some(before), now) => {
-                self.now = now;
-                (before, true)
-            }
-            (None, Some(now)) => (now, false),
-            (None, None) => return Ok(false),
-        };
-        let next = self.next(ctx, &mut before, frame);
-        if is_ahead {
-            self.ahead.push_back(before);
-        } else {
-            self.now = Some(before);
-        }
-        match next {
-            Ok(next) => self.ahead.push_back(next),
-            Err(Error::Cancelled) => return Err(Error::Cancelled),
-            Err(error) if frame <= last => return Err(error),
-            Err(error) => {
+        match self.next(ctx, frame) {
+            Err(error) if !matches!(error, Error::Cancelled) => {
                 let what = match frame - last {
                     1 => format!("frame {last} has the velocities of the frame before"),
                     _ => format!("nothing moves towards a change from frame {frame} on"),
                 };
                 log::warn!("{error}; {what}");
                 self.end = Some(frame);
-                return Ok(false);
+                Ok(None)
             }
+            next => next.map(Some),
         }
-        Ok(true)
     }
 
-    /// The mesh at a frame from the one before it.
-    fn next(&mut self, ctx: &Context, before: &mut At, frame: i32) -> Result<At> {
-        let (mut tracker, mut detail) = (before.tracker.clone(), before.detail.clone());
+    /// The mesh at a frame, from the last that is known, which is the one before.
+    fn next(&mut self, ctx: &Context, frame: i32) -> Result<At> {
+        let last = self.known.len() - 1;
+        let before = &mut self.known[last];
+        let (mut tracker, mut detail, source) =
+            (before.tracker.clone(), before.detail.clone(), before.source.clone());
         // The surface that was made ahead is the next one's.
         before.tracker.forget_ahead();
+        let mut trail = Trail::of(tracker.vertices());
         let way = self.liquid.way(frame);
         let (mut report, mut leads) = (StepReport::default(), Leads::default());
-        let mut trail = Trail::of(before.tracker.vertices());
         let mut from = self.liquid.at(way[0])?;
         // What the step after each goes to; beyond the shot it need not be there.
         let beyond = self.liquid.way(frame + 1)[1];
@@ -233,17 +218,17 @@ impl<'a> Walk<'a> {
             {
                 tracker.set_ahead(particles);
             }
-            let triangles = tracker.triangles().to_vec();
+            let triangles = self.surface.eases().then(|| tracker.triangles().to_vec());
             let step = tracker.step(ctx, &from, &to, dt).map_err(|error| self.liquid.told(ends[0], error))?;
             let share = (ends[1] - way[0]) / (way[way.len() - 1] - way[0]);
             match &step.change {
                 Some(change) => {
                     trail.follow(&change.before, share);
-                    if self.surface.eases() {
+                    if let Some(triangles) = triangles {
                         leads = leads.then(&Leads::of(ctx, change, &triangles, self.inputs.spacing)?);
                     }
                     let own = detail.as_deref().unwrap_or(&self.inputs.mesh);
-                    detail = Some(Arc::new(carried(ctx, own, &before.source, (&tracker, change), &to)?));
+                    detail = Some(Arc::new(carried(ctx, own, &source, (&tracker, change), &to)?));
                     trail.change(change);
                 }
                 None => trail.follow(tracker.vertices(), share),
@@ -252,13 +237,8 @@ impl<'a> Walk<'a> {
             from = to;
         }
         let way = trail.way(tracker.vertices(), tracker.triangles(), self.scene.shot.fps);
-        let source = before.source.clone();
         let mut at = At { tracker, detail, report: nothing_told(), way, leads, source };
-        let sculpted = if frame <= self.scene.shot.frames.last {
-            self.resculpt(ctx, &mut at, frame, &from)?
-        } else {
-            None
-        };
+        let sculpted = self.resculpt(ctx, &mut at, frame, &from)?;
         let is_resculpted = sculpted.is_some();
         let report = sculpted.into_iter().fold(report, StepReport::followed_by);
         at.report = told(&report, from.places.len(), &at.tracker, is_resculpted);
@@ -299,15 +279,13 @@ impl<'a> Walk<'a> {
     fn particles(&mut self, frame: i32) -> Result<Arc<Particles>> {
         self.liquid.at(self.surface.time(self.scene.shot.frames, frame))
     }
+}
 
-    /// An error of the first mesh, with its file.
-    fn told(&self, error: Error) -> Error {
-        match error {
-            Error::Argument(what) => {
-                Error::file(self.surface.mesh.as_ref().unwrap_or(&self.surface.particles), what)
-            }
-            other => other,
-        }
+/// An error of the first mesh, with its file.
+fn of_first(surface: &Surface, error: Error) -> Error {
+    match error {
+        Error::Argument(what) => Error::file(surface.mesh.as_ref().unwrap_or(&surface.particles), what),
+        other => other,
     }
 }
 

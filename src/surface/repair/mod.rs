@@ -61,6 +61,7 @@ pub(super) use self::{
     flags::overlaps,
     pierces::Pierces,
     region::{CellSet, Inside},
+    weights::weights,
 };
 
 /// Where a triangle of a repaired mesh comes from.

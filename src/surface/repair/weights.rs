@@ -9,7 +9,7 @@ const COLOURS: [&str; 4] = ["red", "green", "blue", "alpha"];
 const NEEDLE: f64 = 1e-8;
 
 /// How much the corners of a triangle count at a place on it: 0 or more, 1 in all.
-pub(super) type Weights = [f64; 3];
+pub type Weights = [f64; 3];
 
 /// The weights of a corner.
 pub(super) fn alone(corner: usize) -> Weights {
@@ -30,7 +30,7 @@ pub(super) fn heaviest(&[a, b, c]: &Weights) -> usize {
 }
 
 /// The place of a triangle that is nearest to another place (m); where that is a corner's, exactly this corner.
-pub(super) fn weights(corners: &[DVec3; 3], place: DVec3) -> Weights {
+pub fn weights(corners: &[DVec3; 3], place: DVec3) -> Weights {
     if let Some(corner) = corners.iter().position(|corner| *corner == place) {
         return alone(corner);
     }

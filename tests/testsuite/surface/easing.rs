@@ -8,7 +8,7 @@ use frazil::base::points::{Attribute, Column, Values};
 use frazil::base::{DVec3, DetailedMesh, Points, Vec3};
 use frazil::io::{mesh, particles};
 
-use crate::common::character::output;
+use crate::common::character::{are_same, output};
 use crate::common::liquids::ball;
 use crate::program::{fails, kill_at, works};
 
@@ -167,16 +167,6 @@ fn what_a_change_takes_away_sets_out_before_it_and_the_states_are_those_without(
     velocities_lead_on(&own, &own);
     let words = ["ahead", "must lie in 0 to 100, not 101"];
     fails(folder, &format!("{SHOT} -o no --set surface.ahead=101"), 2, &words);
-}
-
-/// Whether a folder has the files of another run, and the same bytes in those that are compared.
-#[track_caller]
-fn are_same(whole: &BTreeMap<String, Vec<u8>>, out: &Path, is_compared: impl Fn(&str) -> bool) {
-    let other = output(out);
-    assert_eq!(whole.keys().collect::<Vec<_>>(), other.keys().collect::<Vec<_>>(), "{}", out.display());
-    for (name, bytes) in whole.iter().filter(|(name, _)| is_compared(name)) {
-        assert!(*bytes == other[name], "{name} of {}", out.display());
-    }
 }
 
 #[test]

@@ -1,6 +1,5 @@
 //! `frazil surface` where the liquid merges, splits, appears and is gone: the mesh is cut and rebuilt there, with all that it carries.
 
-use std::collections::BTreeMap;
 use std::fs;
 use std::path::Path;
 
@@ -12,7 +11,7 @@ use frazil::base::{DVec3, DetailedMesh, Points, TriMesh, Uvs, Vec3};
 use frazil::io::{mesh, particles};
 use serde_json::json;
 
-use crate::common::character::output;
+use crate::common::character::{are_same, output};
 use crate::common::clients;
 use crate::common::liquids::ball;
 use crate::common::usda::numbers;
@@ -260,16 +259,6 @@ fn velocities_lead_to_the_next_frame_and_stay_small_where_it_is_another_mesh() {
         now = next;
     }
     assert!(same > 0 && others > 1, "{same} {others}");
-}
-
-/// Whether a folder has the files of another run, and the same bytes in those that are compared.
-#[track_caller]
-fn are_same(whole: &BTreeMap<String, Vec<u8>>, out: &Path, is_compared: impl Fn(&str) -> bool) {
-    let other = output(out);
-    assert_eq!(whole.keys().collect::<Vec<_>>(), other.keys().collect::<Vec<_>>(), "{}", out.display());
-    for (name, bytes) in whole.iter().filter(|(name, _)| is_compared(name)) {
-        assert!(*bytes == other[name], "{name} of {}", out.display());
-    }
 }
 
 #[test]

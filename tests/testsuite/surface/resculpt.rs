@@ -1,6 +1,5 @@
 //! `frazil surface` with meshes that were edited by hand in the middle of the shot.
 
-use std::collections::BTreeMap;
 use std::fs;
 use std::path::Path;
 
@@ -8,7 +7,7 @@ use frazil::base::arrays::{MeshArray, Number, On};
 use frazil::base::{DVec3, DetailedMesh, TriMesh, Uvs};
 use frazil::io::mesh;
 
-use crate::common::character::output;
+use crate::common::character::{are_same, output};
 use crate::common::liquids::{ball, write_cache};
 use crate::program::{fails, kill_at, works};
 
@@ -90,16 +89,6 @@ fn values<'a>(mesh: &'a DetailedMesh, name: &str) -> &'a [f64] {
 fn reach(mesh: &TriMesh, frame: i32) -> f64 {
     let along = mesh.positions.iter().map(|place| (place.cast::<f64>() - middle(frame)).z / SPACING);
     along.fold(0.0, f64::max)
-}
-
-/// Whether a folder has the files of another run, and the same bytes in those that are compared.
-#[track_caller]
-fn are_same(whole: &BTreeMap<String, Vec<u8>>, out: &Path, is_compared: impl Fn(&str) -> bool) {
-    let other = output(out);
-    assert_eq!(whole.keys().collect::<Vec<_>>(), other.keys().collect::<Vec<_>>(), "{}", out.display());
-    for (name, bytes) in whole.iter().filter(|(name, _)| is_compared(name)) {
-        assert!(*bytes == other[name], "{name} of {}", out.display());
-    }
 }
 
 /// Records say from which frame on a shot was made again.
