@@ -136,6 +136,8 @@ mod volumes;
 mod vortex;
 #[path = "gates/windings.rs"]
 mod windings;
+#[path = "gates/worst.rs"]
+mod worst;
 
 use harness::Harness;
 

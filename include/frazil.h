@@ -450,7 +450,7 @@ typedef uint32_t frz_smoothing;
 #endif // __cplusplus
 
 /**
- * What frz_tracker_read reads of each vertex: in the order of the mesh that the tracker was made with, until a step changes it.
+ * What frz_tracker_read reads of each vertex: in the order of the mesh that the tracker was made with, until a step or frz_tracker_resculpt changes it.
  */
 enum frz_tracker_array
 #if defined(__cplusplus) || __STDC_VERSION__ >= 202311L
@@ -1521,18 +1521,18 @@ typedef struct {
     /**
      * 1: where the liquid merges or splits the mesh is rebuilt, and merges or splits with it; where it is stretched or squeezed, edges
      * are divided or go. It must be closed, a 2-manifold by its indices. 0, as is usual: the mesh keeps the vertices and the faces
-     * that it was made with, and is flagged where it no longer fits. With 1 any step may change both (frz_tracker_report.changed): a
+     * that it was made with, or was given by frz_tracker_resculpt, and is flagged where it no longer fits. With 1 any step may change both (frz_tracker_report.changed): a
      * host has to read the triangles anew, and to take its own arrays along (frz_tracker_read_edits), which one that knows nothing of
      * it does not do.
      */
     uint32_t rebuild;
     /**
-     * A frz_tracker_match; FRZ_TRACKER_MATCH_FLAGGED is usual. It matters with rebuild alone.
+     * A frz_tracker_match; FRZ_TRACKER_MATCH_FLAGGED is usual. Without rebuild it does nothing.
      */
     uint32_t match;
     /**
-     * Least count of particles in a part of a mesh that is rebuilt, up to 1000000: parts with fewer inside are taken away, and drops
-     * with fewer get no mesh; a mesh of one part stays. 1 is usual: only parts without any go. 0 is as 1.
+     * Least count of particles in a part of a mesh that is rebuilt, up to 1000000; those up to half a spacing outside count where any is
+     * inside. Parts with fewer are taken away, and drops with fewer get no mesh; a mesh of one part stays. 1 is usual: only parts without any go. 0 is as 1.
      */
     uint32_t min_drop;
     /**
@@ -2878,7 +2878,7 @@ frz_status frz_tracker_set_params(frz_tracker *tracker, const frz_tracker_params
 /**
  * Hands over the particles to which the step after the coming one goes, early: with frz_tracker_params.rebuild their surface is made
  * while the coming step rebuilds the mesh, on threads that have nothing to do. It makes no difference to what comes out; particles that
- * then do not come cost time.
+ * then do not come cost time. Of no use with frz_tracker_read_eased, which makes the steps to come itself.
  *
  * particles: as they will be; they are copied.
  *
@@ -2928,7 +2928,7 @@ frz_status frz_tracker_save(frz_context *context,
  * far from all changes, they are those of frz_tracker_read.
  *
  * The steps to come are made for it, and kept: frz_tracker_step with the same particles and dt then only takes over what is there, so
- * that a step costs as much as without. The memory of a mesh is taken for each. The tracker itself stays as it is, and so do states that
+ * that a step costs about as much as without. Each of them keeps its particles and a mesh, and where it changes that two more. The tracker itself stays as it is, and so do states that
  * are saved.
  *
  * now: the particles at the last step's end, or at which the tracker began.
@@ -2950,14 +2950,15 @@ frz_status frz_tracker_read_eased(frz_context *context,
                                   frz_span dst);
 
 /**
- * Reports how many vertices the mesh has: as many as the one that it was made with, until a step changes it
+ * Reports how many vertices the mesh has: as many as the one that it was made with, until a step or frz_tracker_resculpt changes it
  * (frz_tracker_params.rebuild).
  *
  * count: receives their number; 0 after a failure.
  *
  * Any number of threads may read a tracker.
  */
-frz_status frz_tracker_count(const frz_tracker *tracker, size_t *count);
+frz_status frz_tracker_count(const frz_tracker *tracker,
+                             size_t *count);
 
 /**
  * Copies an array of the mesh's vertices.
@@ -2984,7 +2985,7 @@ frz_status frz_tracker_triangle_count(const frz_tracker *tracker,
 
 /**
  * Copies the mesh's triangles, counter-clockwise seen from outside. Until a step changes the mesh they are the FRZ_MESH_TRIANGLES of
- * the one that it was made with; only where frz_tracker_report.changed is 1 they have to be read anew.
+ * the one that it was made with; they have to be read anew where frz_tracker_report.changed is 1, and after frz_tracker_resculpt.
  *
  * dst: room for as many uint32_t[3] as frz_tracker_triangle_count reports, the vertices of each; FRZ_ERROR_CAPACITY when it is too
  *     little, and nothing is written.
@@ -2995,8 +2996,8 @@ frz_status frz_tracker_read_triangles(const frz_tracker *tracker,
                                       frz_span dst);
 
 /**
- * Reports whether the last step changed the mesh's vertices and triangles. It did not in a tracker that has not made a step yet, or
- * none since it came back from a state.
+ * Reports whether the last step, or frz_tracker_resculpt since, changed the mesh's vertices and triangles. Neither did in a tracker that
+ * has just been made, or has just come back from a state.
  *
  * changed: receives 1 where it did, else 0; 0 after a failure.
  * before: receives how many vertices there were before the step; 0 after a failure. May be NULL.

@@ -1,40 +1,37 @@
-//! Gates of easing, on the made sets: how far what a change makes lies from the surface that was shown before it, and whether what is
-//! shown crosses itself.
+//! Gates of easing, on the made sets and the caches: how far what a change makes lies from the surface that was shown before it, and
+//! whether what is shown crosses itself.
 
+use frazil::Context;
 use frazil::base::deviation::NearestTree;
 use frazil::base::{DVec3, TriMesh};
 use frazil::surface::{Change, Outlook, Particles, Tracker};
 
 use crate::common::liquids::context;
 use crate::harness::Harness;
-use crate::rebuilt_sequences::{Sequence, made};
-use crate::windings::astray;
+use crate::rebuilt_sequences::{Sequence, dambreak, made, spot_drop};
+use crate::windings::depth_and_share;
+use crate::worst::Worst;
 
 const NAMES: [&str; 3] = ["surface.easing_jump", "surface.easing_depth", "surface.easing_volume"];
 /// Frames ahead, as is usual.
 const AHEAD: usize = 4;
+/// Frames of the caches from one look at the lattice to the next.
+const EVERY: usize = 5;
 
-/// The greatest of some numbers, and where it is.
+/// What was found of changes.
 #[derive(Default)]
-struct Worst(f64, String);
-
-impl Worst {
-    fn see(&mut self, value: f64, title: impl Fn() -> String) {
-        if value > self.0 || value.is_nan() {
-            *self = Self(value, title());
-        }
-    }
-}
-
-/// What was found.
-#[derive(Default)]
-struct Tally {
+struct Jumps {
     /// Farthest that something is made from the surface that was shown (spacings), and from the one that was not eased.
     eased: Worst,
     plain: Worst,
     /// Farthest that easing moves a vertex from one frame to the next (spacings).
     step: Worst,
-    /// Deepest place that what is shown surrounds neither once nor never (cells), and the share of the volume that such places have.
+}
+
+/// What was found of frames as they are shown.
+#[derive(Default)]
+struct Shown {
+    /// Deepest place that the mesh surrounds neither once nor never (cells), and the share of the volume that such places have.
     depth: Worst,
     volume: Worst,
     frames: usize,
@@ -44,93 +41,82 @@ pub fn run(h: &mut Harness) {
     if !NAMES.iter().any(|name| h.wants(name)) {
         return;
     }
-    let mut tally = Tally::default();
-    for sequence in made(&context(2)) {
-        tally.follow(&sequence);
+    let ctx = context(2);
+    let [mut of_made, mut of_caches] = [Jumps::default(), Jumps::default()];
+    let mut shown = Shown::default();
+    for sequence in made(&ctx) {
+        follow(&ctx, &sequence, 1, (&mut of_made, &mut shown));
     }
-    let Tally { eased, plain, step, depth, volume, frames } = tally;
-    let notes = [
-        format!(
-            "{}, {AHEAD} frames ahead; without {:.2}; before it no vertex is moved farther in a frame than {:.2}",
-            eased.1, plain.0, step.0
-        ),
-        format!("cells, in {frames} frames of the made sets as they are shown; {}", depth.1),
-        volume.1,
+    let mut names = vec!["the made sets"];
+    for (name, cache) in [("spot_drop", spot_drop()), ("dambreak", dambreak(&ctx))] {
+        match cache {
+            Some(sequence) => {
+                names.push(name);
+                follow(&ctx, &sequence, EVERY, (&mut of_caches, &mut shown));
+            }
+            None => println!("# {name} is skipped: no data"),
+        }
+    }
+    let caches = match names[1..].join(", ") {
+        found if found.is_empty() => "no caches".into(),
+        found => format!("of {found} {:.2}, {}", of_caches.eased.value(), of_caches.told()),
+    };
+    let frames =
+        format!("{} frames of {} as they are shown, where that is eased", shown.frames, names.join(", "));
+    let results = [
+        (of_made.eased.value(), format!("of the made sets, {}; {caches}", of_made.told())),
+        (shown.depth.value(), format!("{frames}; {}", shown.depth.note())),
+        (shown.volume.value(), format!("{frames}; {}", shown.volume.note())),
     ];
-    for ((name, value), note) in NAMES.iter().zip([eased.0, depth.0, volume.0]).zip(notes) {
+    for (name, (value, note)) in NAMES.iter().zip(results) {
         if h.wants(name) {
             h.gate(name, value, &note);
         }
     }
 }
 
-impl Tally {
-    fn follow(&mut self, sequence: &Sequence) {
-        let ctx = context(2);
-        let frames: Vec<Particles> = (0..sequence.frames).map(|frame| sequence.at(frame)).collect();
-        let mut tracker =
-            Tracker::new(&ctx, sequence.params(), &sequence.mesh, &frames[0]).expect("a tracker");
-        let mut outlook = Outlook::default();
-        for frame in 1..frames.len() {
-            let (from, to) = (&frames[frame - 1], &frames[frame]);
-            let coming = &frames[frame..frames.len().min(frame + AHEAD + 1)];
-            outlook.look(&ctx, &tracker, from, coming, sequence.dt).expect("steps");
-            let title = || sequence.title(frame - 1);
-            let moved: Vec<DVec3> = outlook
-                .eased(&tracker, AHEAD)
-                .iter()
-                .zip(tracker.vertices())
-                .map(|(shown, own)| shown - own)
-                .collect();
-            self.see_shown(sequence, &tracker, &moved, title);
-            let triangles = tracker.triangles().to_vec();
-            let (next, report) = outlook.take(from, to, sequence.dt).expect("the step that was made");
-            match &report.change {
-                Some(change) => {
-                    self.see_change(sequence, (change, &triangles), &moved, || sequence.title(frame))
-                }
-                None => {
-                    let after = outlook.eased(&next, AHEAD);
-                    for ((shown, own), before) in after.iter().zip(next.vertices()).zip(&moved) {
-                        self.step.see(((shown - own) - before).norm() / sequence.spacing, title);
-                    }
+/// Lets a mesh follow a sequence, and looks at every so many frames as they are shown.
+fn follow(ctx: &Context, sequence: &Sequence, every: usize, (jumps, shown): (&mut Jumps, &mut Shown)) {
+    let frames: Vec<Particles> = (0..sequence.frames).map(|frame| sequence.at(frame)).collect();
+    let mut tracker = Tracker::new(ctx, sequence.params(), &sequence.mesh, &frames[0]).expect("a tracker");
+    let mut outlook = Outlook::default();
+    for frame in 1..frames.len() {
+        let (from, to) = (&frames[frame - 1], &frames[frame]);
+        let coming = frames[frame..frames.len().min(frame + AHEAD + 1)].to_vec();
+        outlook.look(ctx, &tracker, from.clone(), coming, sequence.dt).expect("steps");
+        let title = || sequence.title(frame - 1);
+        let moved: Vec<DVec3> = outlook
+            .eased(&tracker, AHEAD)
+            .iter()
+            .zip(tracker.vertices())
+            .map(|(shown, own)| shown - own)
+            .collect();
+        if (frame - 1).is_multiple_of(every) {
+            shown.see(sequence, &tracker, &moved, title);
+        }
+        let triangles = tracker.triangles().to_vec();
+        let (next, report) = outlook.take(from, to, sequence.dt).expect("the step that was made");
+        match &report.change {
+            Some(change) => jumps.see(sequence, (change, &triangles), &moved, || sequence.title(frame)),
+            None => {
+                let after = outlook.eased(&next, AHEAD);
+                for ((shown, own), before) in after.iter().zip(next.vertices()).zip(&moved) {
+                    jumps.step.see(((shown - own) - before).norm() / sequence.spacing, title);
                 }
             }
-            tracker = next;
         }
+        tracker = next;
     }
+}
 
-    /// A frame as it is shown, with vertices moved by so much (m).
-    fn see_shown(
-        &mut self,
-        sequence: &Sequence,
-        tracker: &Tracker,
-        moved: &[DVec3],
-        title: impl Fn() -> String + Copy,
-    ) {
-        if moved.iter().all(|way| *way == DVec3::zeros()) {
-            return;
-        }
-        self.frames += 1;
-        let places = tracker.vertices().iter().zip(moved).map(|(own, way)| (own + way).cast());
-        let mesh = TriMesh { positions: places.collect(), triangles: tracker.triangles().to_vec() };
-        let Some(astray) = astray(&mesh, sequence.cell() / 4.0) else { return };
-        let tree = NearestTree::new(&mesh);
-        for place in &astray {
-            let depth = tree.nearest(place.cast()).map_or(0.0, |near| near.distance) / sequence.cell();
-            self.depth.see(depth, title);
-        }
-        let volume = astray.len() as f64 * (sequence.cell() / 4.0).powi(3);
-        self.volume.see(volume / mesh.volume(), title);
-    }
-
+impl Jumps {
     /// A change of a mesh that had these triangles, and whose vertices were shown so far (m) from where they are.
-    fn see_change(
+    fn see(
         &mut self,
         sequence: &Sequence,
         (change, triangles): (&Change, &[[u32; 3]]),
         moved: &[DVec3],
-        title: impl Fn() -> String + Copy,
+        title: impl Fn() -> String,
     ) {
         let tree = |share: f64| {
             let places = change.before.iter().zip(moved).map(|(place, way)| (place + way * share).cast());
@@ -139,8 +125,32 @@ impl Tally {
         for (tree, worst) in [(tree(1.0), &mut self.eased), (tree(0.0), &mut self.plain)] {
             for (place, _) in change.vertices.iter().zip(&change.origins).filter(|(_, own)| own.is_none()) {
                 let far = tree.nearest(*place).map_or(f64::INFINITY, |near| near.distance);
-                worst.see(far / sequence.spacing, title);
+                worst.see(far / sequence.spacing, &title);
             }
         }
+    }
+
+    fn told(&self) -> String {
+        format!(
+            "{}, {AHEAD} frames ahead; without {:.2}; before it no vertex is moved farther in a frame than {:.2}",
+            self.eased.note(),
+            self.plain.value(),
+            self.step.value()
+        )
+    }
+}
+
+impl Shown {
+    /// A frame with vertices moved by so much (m). Where none is, it is the mesh of gates `surface.rebuilt_winding`.
+    fn see(&mut self, sequence: &Sequence, tracker: &Tracker, moved: &[DVec3], title: impl Fn() -> String) {
+        if moved.iter().all(|way| *way == DVec3::zeros()) {
+            return;
+        }
+        self.frames += 1;
+        let places = tracker.vertices().iter().zip(moved).map(|(own, way)| (own + way).cast());
+        let mesh = TriMesh { positions: places.collect(), triangles: tracker.triangles().to_vec() };
+        let [depth, share] = depth_and_share(&mesh, sequence.cell());
+        self.depth.see(depth, &title);
+        self.volume.see(share, &title);
     }
 }

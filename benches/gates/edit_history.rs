@@ -32,6 +32,11 @@ impl History {
         (self.vertices, self.triangles) = (vertices, triangles);
     }
 
+    /// The first vertices that those of now are, and the first triangles.
+    pub fn survivors(&self) -> [&[Option<u32>]; 2] {
+        [&self.vertices, &self.triangles]
+    }
+
     /// Share (percent) of the first triangles that are still there.
     pub fn alive(&self) -> f64 {
         100.0 * self.triangles.iter().flatten().count() as f64 / self.first.len() as f64

@@ -274,6 +274,7 @@ pub const GATES: &[Gate] = &[
     yes("surface.same_bytes_cpu"),
     gate("surface.cancel_p99", "s", Most(0.2), Most(0.05)),
     gate("surface.cancel_rebuilt_p99", "s", Most(0.2), Most(0.05)),
+    gate("surface.cancel_eased_p99", "s", Most(0.2), Most(0.05)),
     // Frames from a change of the particles' own surface to its first flag.
     gate("surface.early", "frames", Most(1.0), Most(0.0)),
     // A ball in a vortex, drawn out into a sheet and back: vertices from where they began, after a period.
@@ -309,9 +310,13 @@ pub const GATES: &[Gate] = &[
     // What it becomes on the made sets, and how many frames after the particles' own surface.
     yes("surface.rebuilt_topology"),
     gate("surface.rebuilt_late", "frames", Most(2.0), Most(1.0)),
-    // Particles over a spacing below their surface that are inside of it, and parts of it without a particle.
+    // The made sets with match = "every": frames in which the mesh is no closed surface, or is at the end not what the liquid is.
+    none("surface.every_valid", "frames"),
+    // Particles over a spacing below their surface that are inside of it, parts of it without a particle, and frames in which 20 or more
+    // such particles are outside: an upper bound of those in which a cluster of so many is, for over 2 frames.
     gate("surface.rebuilt_inside", "%", Least(99.9), Open),
     none("surface.rebuilt_empty", "parts"),
+    none("surface.rebuilt_clusters", "frames"),
     // Rebuilt over flagged cells, changes that took more than their cells, triangles that are left at the end.
     gate("surface.rebuilt_cells_median", "x", Most(2.0), Most(1.5)),
     gate("surface.rebuilt_cells_p99", "x", Most(10.0), Most(6.0)),
@@ -320,21 +325,24 @@ pub const GATES: &[Gate] = &[
     // By how much a change changes the volume, and the volume over that of the particles' own surface, against the first frame.
     gate("surface.rebuilt_jump", "%", Most(1.0), Most(0.3)),
     gate("surface.rebuilt_volume", "%", Most(1.0), Most(0.5)),
-    // What changes say of vertices and triangles leads back to the first ones.
+    // What changes say of vertices and triangles leads back to the first ones, and so do arrays that are carried along.
     yes("surface.rebuilt_edits"),
     // Textures of faces that are rebuilt in a merge: by how much edges differ there from the particles' own.
     gate("surface.textures", "%", Most(10.0), Most(3.0)),
-    // Triangles that were made: their least angles, and edges of half a cell to one and a half.
+    // Triangles that were made: their least angles, and edges of half their target to one and a half: between vertices that were made
+    // that is the cell, else what their ends had at birth.
     gate("surface.rebuilt_quality_angle", "deg", Least(10.0), Least(15.0)),
     gate("surface.rebuilt_quality_edges", "%", Least(95.0), Least(99.0)),
-    // Topology matched near the flags against the whole grid: signs and differences, and the volume of a neck.
-    // How far what a change makes lies from what was shown before it; whether what is shown crosses itself.
+    // How far what a change makes lies from what was shown before it, on the made sets; whether what is shown crosses itself, on these and
+    // the caches.
     gate("surface.easing_jump", "r", Most(0.5), Most(0.3)),
     gate("surface.easing_depth", "cells", Most(1.0), Open),
     gate("surface.easing_volume", "1", Most(1.0e-4), Open),
+    // Topology matched near the flags against the whole grid: signs and differences, and the volume of a neck.
     yes("surface.match_near"),
     gate("surface.match_neck", "%", Most(1.0), Open),
-    // The time of rebuilding nothing, 2 % and 20 % of the mesh, of a step in which a drop merges, and what a second thread gains.
+    // The time of rebuilding nothing, 2 % and 20 % of the mesh, of a step in which a drop merges, and what a second thread gains. Here
+    // and below these are steps alone, without easing, arrays that are carried, and files.
     gate("surface.rebuild_time_0", "s", Most(0.1), Most(0.03)),
     gate("surface.rebuild_time_2", "s", Most(0.3), Most(0.12)),
     gate("surface.rebuild_time_20", "s", Most(1.0), Most(0.5)),

@@ -7,18 +7,20 @@ use frazil::base::{DVec3, TriMesh};
 use frazil::surface::{Change, Distances, Implicit, Isosurface, Sampler, Source};
 
 use crate::common::liquids::context;
-use crate::common::nearest::distances;
 use crate::edit_history::History;
 use crate::harness::Harness;
 use crate::rebuilt_sequences::{CELL, Frame, Sequence, dambreak, made, own_surface, spot_drop, walk};
-use crate::windings::{astray, empty_parts, inside};
+use crate::windings::{depth_and_share, empty_parts, inside};
+use crate::worst::Worst;
 
 /// Least altitude of a triangle in the frame in which it was made (its longest edge).
 const FLATTEST: f64 = 1e-4;
-/// Places of the lattice along a cell.
-const PLACES: f64 = 4.0;
-/// Frames of the caches from one look at the lattice, or at the particles inside, to the next.
-const EVERY: usize = 5;
+/// Frames of the caches from one look at the lattice to the next.
+const LATTICE: usize = 5;
+/// And from one look at the particles inside to the next: what is wrong for over two frames is seen.
+const INSIDE: usize = 3;
+/// So many particles that are outside of the mesh may be a cluster that it misses.
+const CLUSTER: usize = 20;
 /// How far distances from the particles' surface are known (cells), and how deep a particle is that must be inside (spacings).
 const REACH: f32 = 5.0;
 const DEEP: f64 = 1.0;
@@ -32,10 +34,10 @@ const OF_ALL: &[&str] = &[
     "surface.rebuilt_cells_p99",
     "surface.rebuilt_rungs",
 ];
-/// Of `spot_drop` and the made sets, on the lattice.
+/// Of all sequences, on the lattice.
 const OF_LATTICE: &[&str] = &["surface.rebuilt_winding_depth", "surface.rebuilt_winding_volume"];
 /// Of `spot_drop` and `dambreak`.
-const OF_CACHES: &[&str] = &["surface.rebuilt_inside", "surface.rebuilt_empty"];
+const OF_CACHES: &[&str] = &["surface.rebuilt_inside", "surface.rebuilt_empty", "surface.rebuilt_clusters"];
 /// Of `spot_drop`.
 const OF_SPOT: &[&str] = &["surface.rebuilt_alive", "surface.rebuilt_jump", "surface.rebuilt_volume"];
 /// Of the made sets.
@@ -51,26 +53,22 @@ pub fn run(h: &mut Harness) {
     let ctx = context(2);
     let mut tally = Tally::default();
     let mut missing = Vec::new();
+    let of_cache = || Look {
+        lattice: if lattice { LATTICE } else { 0 },
+        inside: if caches { INSIDE } else { 0 },
+        ..Look::default()
+    };
     if all || lattice || caches || spot {
         match spot_drop() {
             Some(sequence) => {
-                let look = Look {
-                    lattice: if lattice { EVERY } else { 0 },
-                    inside: if caches { EVERY } else { 0 },
-                    volumes: spot,
-                    shapes: false,
-                };
-                tally.follow(&ctx, &sequence, &look);
+                tally.follow(&ctx, &sequence, &Look { volumes: spot, ..of_cache() });
             }
             None => missing.push("spot_drop"),
         }
     }
-    if all || caches {
+    if all || lattice || caches {
         match dambreak(&ctx) {
-            Some(sequence) => {
-                let look = Look { inside: if caches { EVERY } else { 0 }, ..Look::default() };
-                tally.follow(&ctx, &sequence, &look);
-            }
+            Some(sequence) => tally.follow(&ctx, &sequence, &of_cache()),
             None => missing.push("dambreak"),
         }
     }
@@ -112,23 +110,6 @@ struct Look {
     shapes: bool,
 }
 
-/// The greatest of some numbers, and where it is.
-#[derive(Default)]
-struct Worst(f64, String);
-
-impl Worst {
-    fn see(&mut self, value: f64, title: impl Fn() -> String) {
-        // What is not a number is worse than any.
-        if value > self.0 || value.is_nan() {
-            *self = Self(value, title());
-        }
-    }
-
-    fn note(&self) -> String {
-        if self.1.is_empty() { "nowhere any".into() } else { format!("the worst: {}", self.1) }
-    }
-}
-
 /// What was found.
 #[derive(Default)]
 struct Tally {
@@ -143,6 +124,9 @@ struct Tally {
     deep: [usize; 2],
     /// Parts of the mesh without a particle, in all frames that were looked at.
     empty: usize,
+    /// Most particles that must be inside and are not, of a frame, and the frames with [`CLUSTER`] of them or more.
+    outside: Worst,
+    clusters: usize,
     /// Frames that were looked at so.
     looked: usize,
     /// Rebuilt over flagged cells of each change.
@@ -197,7 +181,7 @@ impl Tally {
                 self.lattice(&mesh, sequence.cell(), title);
             }
             if is_sound && is_due(look.inside, frame.index) {
-                self.inside(ctx, &mesh, &frame.particles.places, sequence.spacing);
+                self.inside(ctx, &mesh, &frame.particles.places, sequence.spacing, title);
             }
         });
         if let Some(error) = ended {
@@ -221,21 +205,27 @@ impl Tally {
 
     /// Looks for places of a lattice that the mesh surrounds neither once nor never.
     fn lattice(&mut self, mesh: &TriMesh, cell: f64, title: impl Fn() -> String) {
-        let step = cell / PLACES;
-        let Some(places) = astray(mesh, step) else {
-            self.depth.see(f64::INFINITY, &title);
-            return self.astray.see(f64::INFINITY, &title);
-        };
-        self.astray.see(places.len() as f64 * step.powi(3) / mesh.volume(), &title);
-        let depths = distances(mesh, &places, step);
-        self.depth.see(depths.into_iter().fold(0.0, f64::max) / cell, &title);
+        let [depth, share] = depth_and_share(mesh, cell);
+        self.depth.see(depth, &title);
+        self.astray.see(share, &title);
     }
 
     /// Looks for particles that are outside of the mesh, and for parts of it that have none.
-    fn inside(&mut self, ctx: &Context, mesh: &TriMesh, places: &[DVec3], spacing: f64) {
+    fn inside(
+        &mut self,
+        ctx: &Context,
+        mesh: &TriMesh,
+        places: &[DVec3],
+        spacing: f64,
+        title: impl Fn() -> String,
+    ) {
         let deep = deep(ctx, places, spacing);
+        let kept = inside(mesh, &deep);
         self.deep[0] += deep.len();
-        self.deep[1] += inside(mesh, &deep);
+        self.deep[1] += kept;
+        let outside = deep.len() - kept;
+        self.outside.see(outside as f64, title);
+        self.clusters += usize::from(outside >= CLUSTER);
         self.empty += empty_parts(mesh, places);
         self.looked += 1;
     }
@@ -288,6 +278,15 @@ impl Tally {
         let percent = |count: usize, all: usize| 100.0 * count as f64 / all as f64;
         let [deep, kept] = self.deep;
         let outside = format!("{} of {deep} particles are not, in {} frames", deep - kept, self.looked);
+        // Without a look nothing is known.
+        let looked = |count: usize| if self.looked > 0 { count as f64 } else { f64::NAN };
+        let clusters = format!(
+            "of {} frames; an upper bound, as {CLUSTER} particles or more that are outside in one frame need not lie together, nor be \
+             outside for over 2 frames; at most {} in a frame, {}",
+            self.looked,
+            self.outside.value(),
+            self.outside.note()
+        );
         let least = self.angles.first().copied().unwrap_or(f64::NAN);
         let angles = format!("p1 of {} triangles that were made; at least {least:.2}", self.angles.len());
         let [edges, good, of_cell] = self.edges;
@@ -296,13 +295,14 @@ impl Tally {
             (OF_ALL[1], quantile(&self.shares, 0.5), of_changes.clone()),
             (OF_ALL[2], quantile(&self.shares, 0.99), of_changes),
             (OF_ALL[3], percent(changes - cells, changes), rungs),
-            (OF_LATTICE[0], self.depth.0, self.depth.note()),
-            (OF_LATTICE[1], self.astray.0, self.astray.note()),
+            (OF_LATTICE[0], self.depth.value(), self.depth.note()),
+            (OF_LATTICE[1], self.astray.value(), self.astray.note()),
             (OF_CACHES[0], percent(kept, deep), outside),
-            (OF_CACHES[1], self.empty as f64, format!("in {} frames", self.looked)),
+            (OF_CACHES[1], looked(self.empty), format!("in {} frames", self.looked)),
+            (OF_CACHES[2], looked(self.clusters), clusters),
             (OF_SPOT[0], self.alive, "of the sculpted triangles, at the end".into()),
-            (OF_SPOT[1], self.jump.0, self.jump.note()),
-            (OF_SPOT[2], self.drift.0, self.drift.note()),
+            (OF_SPOT[1], self.jump.value(), self.jump.note()),
+            (OF_SPOT[2], self.drift.value(), self.drift.note()),
             (OF_MADE[0], quantile(&self.angles, 0.01), angles),
             (
                 OF_MADE[1],
@@ -332,7 +332,7 @@ fn created(sources: &[Source]) -> impl Iterator<Item = (usize, &Source)> {
 }
 
 /// What keeps a mesh from being a closed surface that is turned outward.
-fn unsound(mesh: &TriMesh) -> Option<String> {
+pub fn unsound(mesh: &TriMesh) -> Option<String> {
     if let Some(vertex) = mesh.positions.iter().position(|place| !place.iter().all(|x| x.is_finite())) {
         return Some(format!("vertex {vertex} is not finite"));
     }

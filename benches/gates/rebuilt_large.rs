@@ -3,10 +3,10 @@
 
 use std::process::{Command, Stdio};
 
-use frazil::base::mesh::coincident;
 use frazil::base::{DVec3, TriMesh};
 
 use crate::common::liquids::{ball, context};
+use crate::common::shapes::welded;
 use crate::grain_memory::kilobytes;
 use crate::harness::Harness;
 use crate::rebuilt_frames::{DETAIL, Lump, SPACING, Scene, flying, params};
@@ -53,7 +53,7 @@ pub fn run(h: &mut Harness) {
         h.gate(
             memory,
             number("gigabytes "),
-            "the peak of a process with mesh and particles, the making of both included",
+            "the peak of a process with mesh and particles, the making of both included; steps alone, without easing, arrays and files",
         );
     }
 }
@@ -100,8 +100,5 @@ fn merging(lumps: &[Lump], squares: usize, steps: usize) -> Scene {
         own.positions.iter_mut().for_each(|place| *place = (place.cast::<f64>() + by).cast());
         mesh.append(&own);
     }
-    // Its faces share their rims, so that it is closed by index.
-    let same = coincident(mesh.positions.iter().map(|place| place.cast()));
-    mesh.triangles.as_flattened_mut().iter_mut().for_each(|corner| *corner = same[*corner as usize]);
-    Scene { mesh: mesh.without_unused(), motion: flying(lumps, 0.0), steps, is_matched: true }
+    Scene { mesh: welded(&mesh), motion: flying(lumps, 0.0), steps, is_matched: true }
 }

@@ -42,6 +42,8 @@ pub struct Sequence {
     pub frames: usize,
     /// Closed, and 2-manifold by index.
     pub mesh: TriMesh,
+    /// Whether the topology is matched all over the mesh in every step.
+    pub every: bool,
     particles: Box<dyn Fn(usize) -> Particles>,
 }
 
@@ -57,7 +59,7 @@ impl Sequence {
     }
 
     pub fn params(&self) -> Params {
-        Params { rebuild: true, ..Params::for_spacing(self.spacing) }
+        Params { rebuild: true, every: self.every, ..Params::for_spacing(self.spacing) }
     }
 
     /// Edge of a cell (m).
@@ -78,6 +80,7 @@ pub fn spot_drop() -> Option<Sequence> {
         dt: 1.0 / spot::FPS,
         frames: spot::FRAMES as usize,
         mesh,
+        every: false,
         particles: Box::new(at),
     })
 }
@@ -93,6 +96,7 @@ pub fn dambreak(ctx: &Context) -> Option<Sequence> {
         dt: 1.0 / DAM_FPS,
         frames: DAM_FRAMES,
         mesh: own_surface(ctx, &at(0).places, DAM_SPACING),
+        every: false,
         particles: Box::new(at),
     })
 }
@@ -105,7 +109,16 @@ pub fn made(ctx: &Context) -> Vec<Sequence> {
             numbered(places.iter().map(|place| motion(*place, frame as f64) * SPACING).collect())
         };
         let mesh = own_surface(ctx, &at(0).places, SPACING);
-        Sequence { name, first: 0, spacing: SPACING, dt: 1.0 / FPS, frames, mesh, particles: Box::new(at) }
+        Sequence {
+            name,
+            first: 0,
+            spacing: SPACING,
+            dt: 1.0 / FPS,
+            frames,
+            mesh,
+            every: false,
+            particles: Box::new(at),
+        }
     };
     sets().into_iter().zip(FRAMES).map(one).collect()
 }
@@ -118,9 +131,16 @@ pub fn joined(ctx: &Context) -> Sequence {
         numbered(places.iter().map(|place| motion(*place, passed) * SPACING).collect())
     };
     let mesh = own_surface(ctx, &at(0).places, SPACING);
-    let name = "two balls join";
-    let particles = Box::new(at);
-    Sequence { name, first: 0, spacing: SPACING, dt: 1.0 / FPS, frames: MET + 10, mesh, particles }
+    Sequence {
+        name: "two balls join",
+        first: 0,
+        spacing: SPACING,
+        dt: 1.0 / FPS,
+        frames: MET + 10,
+        mesh,
+        every: false,
+        particles: Box::new(at),
+    }
 }
 
 fn cached(path: &Path) -> Particles {

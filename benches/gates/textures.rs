@@ -45,7 +45,7 @@ pub fn run(h: &mut Harness) {
             sheet.name,
             sheet.rebuilt,
             sheet.frames,
-            100.0 * sheet.marked as f64 / sheet.rebuilt as f64,
+            sheet.marked_percent(),
             sheet.all.percent(),
             sheet.made.percent(),
             sheet.last.percent(),
@@ -60,8 +60,9 @@ pub fn run(h: &mut Harness) {
     }
     let most = |percent: fn(&Sheet) -> f64| sheets.iter().map(percent).fold(0.0, f64::max);
     let note = format!(
-        "faces as they are made, but those that are marked; the worse of coordinates of vertices and of corners. What was made is \
-         squeezed as the gap goes on closing: over all frames {:.0} %, taken from the mesh before alone {:.0} %",
+        "faces as they are made, but those that are marked, {:.1} % of all that are rebuilt; the worse of coordinates of vertices and of \
+         corners. What was made is squeezed as the gap goes on closing: over all frames {:.0} %, taken from the mesh before alone {:.0} %",
+        most(Sheet::marked_percent),
         most(|sheet| sheet.all.percent()),
         most(|sheet| sheet.of_before.percent())
     );
@@ -200,6 +201,11 @@ impl Sheet {
         }
     }
 
+    /// The share of the rebuilt faces, over all frames, that is marked.
+    fn marked_percent(&self) -> f64 {
+        100.0 * self.marked as f64 / self.rebuilt as f64
+    }
+
     /// Takes what it carries along a change, as the command does.
     fn follow(&mut self, frame: &Frame<'_>, change: &Change, places: &[Option<DVec3>], spacing: f64) {
         let positions: Vec<Vec3> = change.before.iter().map(|place| place.cast()).collect();
@@ -211,7 +217,7 @@ impl Sheet {
         let carried = |was: &DetailedMesh, traced: Option<&Traced<'_>>| {
             carry_attributes(&old(was), frame.tracker.mesh(), &change.origins, &change.sources, traced)
         };
-        let traced = Traced { first: &self.first, places, spacing };
+        let traced = Traced { first: &self.first, tree: None, places, spacing };
         let (through, alone) = (carried(&self.traced, Some(&traced)), carried(&self.before, None));
         (self.traced, self.before) = (through, alone);
     }

@@ -1,14 +1,15 @@
-//! Gates of a mesh's step that is cancelled through C, also of one that rebuilds it: the time until it returns, and that it left all as
-//! it was.
+//! Gates of a mesh's step that is cancelled through C, also of one that rebuilds it, and of the look at one to come: the time until it
+//! returns, and that it left all as it was.
 
 use std::cell::Cell;
 use std::mem::MaybeUninit;
 use std::ptr::{null, null_mut};
 
-use frazil::base::{DVec3, TriMesh};
+use frazil::base::{DVec3, TriMesh, Vec3};
 use frazil::capi::mesh::*;
 use frazil::capi::tracker::*;
-use frazil::capi::{frz_status, frz_view};
+use frazil::capi::tracker_eased::frz_tracker_read_eased;
+use frazil::capi::{frz_span, frz_status, frz_view};
 
 use crate::cancel_latency::{Steps, measure};
 use crate::common::liquids::{ball, context, filled, turned};
@@ -18,8 +19,11 @@ use crate::host::{Threads, view, works, written};
 use crate::rebuilt_sequences::own_surface;
 
 const NO_VIEW: frz_view = frz_view { data: null(), count: 0, stride: 0 };
-/// Initial distance between particles (m).
+/// Initial distance between particles (m), and time between frames (s).
 const SPACING: f64 = 0.01;
+const FRAME: f64 = 1.0 / 24.0;
+/// Frames ahead, as is usual.
+const AHEAD: u32 = 4;
 /// Two blocks of liquid that meet face to face in one step: their edge, and how far apart their outermost particles are before it and
 /// after it (spacings). All of both faces is then rebuilt.
 const EDGE: f64 = 36.0;
@@ -105,7 +109,32 @@ impl Host {
         let (from, to) = (self.particles(0), self.particles(1));
         // SAFETY: the pointers are valid, or null where that is allowed.
         let status =
-            unsafe { frz_tracker_step(self.threads.ctx, self.tracker.get(), &from, &to, 1.0 / 24.0, report) };
+            unsafe { frz_tracker_step(self.threads.ctx, self.tracker.get(), &from, &to, FRAME, report) };
+        if status == frz_status::FRZ_OK {
+            self.put_back();
+        }
+        status
+    }
+
+    /// Reads the vertices as they are shown before the step, which is made for it, into room for each (m), and puts the tracker back if
+    /// that was not cancelled, so that the step is to be made again.
+    fn look(&self, shown: &mut [[f64; 3]]) -> frz_status {
+        let (now, to) = (self.particles(0), self.particles(1));
+        let coming: [*const frz_particles; 1] = [&to];
+        let room = frz_span { data: shown.as_mut_ptr().cast(), count: shown.len(), stride: 0 };
+        // SAFETY: the pointers are valid.
+        let status = unsafe {
+            frz_tracker_read_eased(
+                self.threads.ctx,
+                self.tracker.get(),
+                &now,
+                coming.as_ptr(),
+                coming.len(),
+                AHEAD,
+                FRAME,
+                room,
+            )
+        };
         if status == frz_status::FRZ_OK {
             self.put_back();
         }
@@ -147,6 +176,26 @@ impl Steps for Host {
     }
 }
 
+/// A host that looks at the step, and does not make it. Its tracker has so many vertices.
+struct Looking<'a> {
+    host: &'a Host,
+    vertices: usize,
+}
+
+impl Steps for Looking<'_> {
+    fn threads(&self) -> &Threads {
+        &self.host.threads
+    }
+
+    fn step(&self) -> frz_status {
+        self.host.look(&mut vec![[0.0; 3]; self.vertices])
+    }
+
+    fn state(&self) -> Vec<u8> {
+        self.host.state()
+    }
+}
+
 impl Drop for Host {
     fn drop(&mut self) {
         // SAFETY: nobody uses them any more.
@@ -175,10 +224,10 @@ fn following(h: &mut Harness) {
     measure(h, name, &host, &mut Random(42), &what);
 }
 
-/// Two blocks that meet.
+/// Two blocks that meet: the step, and the look at it.
 fn rebuilding(h: &mut Harness) {
-    let name = "surface.cancel_rebuilt_p99";
-    if !h.wants(name) {
+    let names @ [step, look] = ["surface.cancel_rebuilt_p99", "surface.cancel_eased_p99"];
+    if !names.iter().any(|name| h.wants(name)) {
         return;
     }
     let half = 0.5 * EDGE * SPACING;
@@ -196,7 +245,12 @@ fn rebuilding(h: &mut Harness) {
     report.struct_size = size_of::<frz_tracker_report>() as u32;
     works(host.step_told(&mut report));
     if report.rebuilt_cells == 0 {
-        return h.gate(name, f64::NAN, "nothing was rebuilt");
+        for name in names {
+            if h.wants(name) {
+                h.gate(name, f64::NAN, "nothing was rebuilt");
+            }
+        }
+        return;
     }
     let what = format!(
         "{} particles and {} triangles, {} cells flagged and {} rebuilt, {} triangles made",
@@ -206,5 +260,24 @@ fn rebuilding(h: &mut Harness) {
         report.rebuilt_cells,
         report.made_triangles
     );
-    measure(h, name, &host, &mut Random(43), &what);
+    if h.wants(step) {
+        measure(h, step, &host, &mut Random(43), &what);
+    }
+    if h.wants(look) {
+        looking(h, look, &host, &mesh, &what);
+    }
+}
+
+/// The look at a step to come, from a mesh.
+fn looking(h: &mut Harness, name: &'static str, host: &Host, mesh: &TriMesh, what: &str) {
+    let mut shown = vec![[0.0; 3]; mesh.positions.len()];
+    works(host.look(&mut shown));
+    let is_moved = |(shown, own): &(&[f64; 3], &Vec3)| DVec3::from(**shown) != own.cast::<f64>();
+    let moved = shown.iter().zip(&mesh.positions).filter(is_moved).count();
+    if moved == 0 {
+        return h.gate(name, f64::NAN, "no vertex is eased");
+    }
+    let what = format!("{what}; it is only looked at, and {moved} vertices are eased");
+    let looking = Looking { host, vertices: mesh.positions.len() };
+    measure(h, name, &looking, &mut Random(44), &what);
 }

@@ -4,13 +4,13 @@
 use std::time::Instant;
 
 use frazil::base::deviation::{NearestTree, from_surface};
-use frazil::base::mesh::coincident;
 use frazil::base::topology::bodies;
 use frazil::base::{DVec3, TriMesh};
 use frazil::surface::{Params, Particles, Tracker};
 
 use crate::common::liquids::{context, numbered};
 use crate::common::made_sets::Vortex;
+use crate::common::shapes::welded;
 use crate::harness::Harness;
 
 /// About as many particles: with 100,000 the gate would take some minutes on one thread, not one.
@@ -86,7 +86,7 @@ fn rebuilt(h: &mut Harness) {
     let ctx = context(THREADS);
     let start = Instant::now();
     let Vortex { spacing, places, mesh } = Vortex::new(PARTICLES, SQUARES);
-    let first = joined(&mesh);
+    let first = welded(&mesh);
     let params = Params { rebuild: true, ..Params::for_spacing(spacing) };
     let mut from = moving(numbered(places), 0.0);
     let mut tracker = Tracker::new(&ctx, params, &first, &from).expect("a tracker");
@@ -159,14 +159,6 @@ fn moving(mut particles: Particles, time: f64) -> Particles {
     let speed = |place: &DVec3| Vortex::velocity(*place, time).cast::<f32>().into();
     particles.velocities = particles.places.iter().map(speed).collect();
     particles
-}
-
-/// A mesh in which vertices at one place are the same.
-fn joined(mesh: &TriMesh) -> TriMesh {
-    let same = coincident(mesh.positions.iter().map(|place| place.cast()));
-    let triangles =
-        mesh.triangles.iter().map(|corners| corners.map(|corner| same[corner as usize])).collect();
-    TriMesh { positions: mesh.positions.clone(), triangles }.without_unused()
 }
 
 /// How far places are from others, one by one: mean, 95th percentile and greatest (spacings).

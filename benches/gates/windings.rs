@@ -6,8 +6,11 @@ use frazil::base::{DVec3, TriMesh, Vec3};
 use rayon::prelude::*;
 
 use crate::common::liquids::Random;
+use crate::common::nearest::distances;
 use crate::common::repaired::{height, turns};
 
+/// Places of the lattice along a cell.
+const PLACES: f64 = 4.0;
 /// Most lines of a lattice.
 const MOST: usize = 1 << 22;
 /// How far places of the lattice lie from the middles of their boxes at most (steps).
@@ -29,9 +32,19 @@ struct Line {
     crossings: Vec<(f64, i32)>,
 }
 
+/// How deep the places are that a closed mesh surrounds neither once nor never (cells, whose edge is `cell` m), and their share of its
+/// volume: on a lattice of [`PLACES`] along a cell. Infinite where the mesh reaches too far for one.
+pub fn depth_and_share(mesh: &TriMesh, cell: f64) -> [f64; 2] {
+    let step = cell / PLACES;
+    let Some(places) = astray(mesh, step) else { return [f64::INFINITY; 2] };
+    let depth = distances(mesh, &places, step).into_iter().fold(0.0, f64::max);
+    // What is turned inside out has no volume: then the share keeps no bound.
+    [depth / cell, places.len() as f64 * step.powi(3) / mesh.volume().max(0.0)]
+}
+
 /// Places of a lattice (m), `step` (m) apart and out of line by chance, that a closed mesh surrounds neither once nor never. None where
 /// it reaches too far for a lattice.
-pub fn astray(mesh: &TriMesh, step: f64) -> Option<Vec<Vec3>> {
+fn astray(mesh: &TriMesh, step: f64) -> Option<Vec<Vec3>> {
     let (low, high) = mesh.bounds()?;
     let corner = low.cast::<f64>() - DVec3::repeat(step);
     let size = (high.cast::<f64>() - corner) / step;

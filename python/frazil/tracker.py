@@ -144,7 +144,7 @@ class Tracker(Handle):
 
     @property
     def triangles(self):
-        """(t, 3) vertices of the triangles: those of the mesh that it was made with, until a step changes them."""
+        """(t, 3) vertices of the triangles: those of the mesh that it was made with, until a step or resculpt() changes them."""
         count = c.c_size_t()
         call("tracker_triangle_count", self.pointer, c.byref(count))
         out = np.empty((count.value, 3), np.uint32)

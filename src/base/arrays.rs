@@ -52,6 +52,17 @@ pub enum On {
     Faces,
 }
 
+impl On {
+    /// How many numbers an array of a mesh of so many vertices and triangles has.
+    pub fn count(self, vertices: usize, faces: usize) -> usize {
+        match self {
+            Self::Vertices => vertices,
+            Self::Corners => 3 * faces,
+            Self::Faces => faces,
+        }
+    }
+}
+
 /// An array of numbers; of vectors and colours each component is one.
 #[derive(Debug, Clone, PartialEq)]
 pub struct MeshArray {

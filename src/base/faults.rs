@@ -7,7 +7,7 @@ use super::meeting::{Meeting, meeting};
 use super::mesh::{coincident, used};
 use super::near::Near;
 use super::orient::is_flat;
-use super::topology::{Survey, Topology, collapsed, firsts, groups};
+use super::topology::{Survey, Topology, collapsed, firsts, groups, parts};
 use super::{DVec3, TriMesh};
 
 /// Triangles a task looks at.
@@ -75,7 +75,7 @@ impl Faults {
         let flat = |corners: [u32; 3]| is_flat(&corners.map(|vertex| mesh.positions[vertex as usize]));
         let Kept { kept, degenerate, doubled_triangles } = kept(&mesh.triangles, &same, flat);
         let survey = Survey::of(vertices, &kept);
-        let parts = groups(vertices, kept.iter().flat_map(|[a, b, c]| [[*a, *b], [*b, *c]]));
+        let parts = parts(vertices, &kept);
         let joined = TriMesh { positions: mesh.positions.clone(), triangles: kept };
         let pairs = Pairs::of(&joined);
         let volume = joined.volume();

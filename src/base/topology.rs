@@ -182,8 +182,33 @@ fn after(corner: u32) -> u32 {
     if corner % 3 == 2 { corner - 2 } else { corner + 1 }
 }
 
+/// Count of connected parts of triangles of so many vertices; those that meet in a vertex hang together.
+pub fn parts(vertices: usize, triangles: &[[u32; 3]]) -> usize {
+    groups(vertices, triangles.iter().flat_map(|[a, b, c]| [[*a, *b], [*b, *c]]))
+}
+
+/// For each of so many vertices the sum of its neighbours' values, and how many have one: in each triangle around it the vertex that comes
+/// next.
+pub fn around<T: Default + Copy + std::ops::AddAssign>(
+    vertices: usize,
+    triangles: &[[u32; 3]],
+    of: impl Fn(u32) -> Option<T>,
+) -> Vec<(T, u32)> {
+    let mut sums = vec![(T::default(), 0); vertices];
+    for corners in triangles {
+        for (at, next) in [(0, 1), (1, 2), (2, 0)] {
+            if let Some(value) = of(corners[next]) {
+                let sum = &mut sums[corners[at] as usize];
+                sum.0 += value;
+                sum.1 += 1;
+            }
+        }
+    }
+    sums
+}
+
 /// Count of connected groups among those of so many vertices that links name.
-pub fn groups(vertices: usize, links: impl Iterator<Item = [u32; 2]>) -> usize {
+pub(super) fn groups(vertices: usize, links: impl Iterator<Item = [u32; 2]>) -> usize {
     let (mut sets, mut named) = (Sets::new(vertices), vec![false; vertices]);
     for link in links {
         link.iter().for_each(|&vertex| named[vertex as usize] = true);

@@ -15,6 +15,14 @@ pub struct Uvs {
 }
 
 impl Uvs {
+    /// Those of so many vertices and triangles to which nothing gives any: 0, 0; of corners, or of vertices.
+    pub fn nothing(has_corners: bool, vertices: usize, faces: usize) -> Self {
+        match has_corners {
+            true => Self { places: vec![[0.0; 2]], corners: Some(vec![0; 3 * faces]), missing: 3 * faces },
+            false => Self { places: vec![[0.0; 2]; vertices], corners: None, missing: vertices },
+        }
+    }
+
     /// Coordinates of the corners of faces: `at` has an index into `places`, or [`NONE`], for each of the `vertices` that
     /// the corners are. Where all corners of every vertex agree, they are the vertices' own. None when no corner has any.
     pub fn of_corners(

@@ -267,15 +267,16 @@ pub unsafe extern "C" fn frz_tracker_set_params(
         unsafe {
             let mut follower = change(tracker)?;
             let params = sized(params, frz_tracker_params::usual())?.params()?;
+            follower.tracker.set_params(params)?;
             follower.outlook = Outlook::default();
-            Ok(follower.tracker.set_params(params)?)
+            Ok(())
         }
     })
 }
 
 /// Hands over the particles to which the step after the coming one goes, early: with frz_tracker_params.rebuild their surface is made
 /// while the coming step rebuilds the mesh, on threads that have nothing to do. It makes no difference to what comes out; particles that
-/// then do not come cost time.
+/// then do not come cost time. Of no use with frz_tracker_read_eased, which makes the steps to come itself.
 ///
 /// particles: as they will be; they are copied.
 ///

@@ -15,7 +15,7 @@ const MOST: usize = 100;
 /// far from all changes, they are those of frz_tracker_read.
 ///
 /// The steps to come are made for it, and kept: frz_tracker_step with the same particles and dt then only takes over what is there, so
-/// that a step costs as much as without. The memory of a mesh is taken for each. The tracker itself stays as it is, and so do states that
+/// that a step costs about as much as without. Each of them keeps its particles and a mesh, and where it changes that two more. The tracker itself stays as it is, and so do states that
 /// are saved.
 ///
 /// now: the particles at the last step's end, or at which the tracker began.
@@ -63,7 +63,7 @@ pub unsafe extern "C" fn frz_tracker_read_eased(
                 let places = follower.tracker.vertices().iter();
                 return dst.fill("dst", &places.map(|p| [p.x, p.y, p.z]).collect::<Vec<_>>());
             }
-            follower.outlook.look(call.ctx(), &follower.tracker, &now, &coming, dt)?;
+            follower.outlook.look(call.ctx(), &follower.tracker, now, coming, dt)?;
             let places = follower.outlook.eased(&follower.tracker, ahead as usize);
             dst.fill("dst", &places.iter().map(|p| [p.x, p.y, p.z]).collect::<Vec<_>>())
         }

@@ -24,7 +24,7 @@ impl From<Change> for Edits {
     }
 }
 
-/// What frz_tracker_read reads of each vertex: in the order of the mesh that the tracker was made with, until a step changes it.
+/// What frz_tracker_read reads of each vertex: in the order of the mesh that the tracker was made with, until a step or frz_tracker_resculpt changes it.
 #[repr(u32)]
 #[derive(Clone, Copy)]
 pub enum frz_tracker_array {
@@ -48,7 +48,7 @@ const ARRAYS: [(u32, frz_tracker_array); 4] = [
     (3, FRZ_TRACKER_FLAGGED),
 ];
 
-/// Reports how many vertices the mesh has: as many as the one that it was made with, until a step changes it
+/// Reports how many vertices the mesh has: as many as the one that it was made with, until a step or frz_tracker_resculpt changes it
 /// (frz_tracker_params.rebuild).
 ///
 /// count: receives their number; 0 after a failure.
@@ -125,7 +125,7 @@ pub unsafe extern "C" fn frz_tracker_triangle_count(
 }
 
 /// Copies the mesh's triangles, counter-clockwise seen from outside. Until a step changes the mesh they are the FRZ_MESH_TRIANGLES of
-/// the one that it was made with; only where frz_tracker_report.changed is 1 they have to be read anew.
+/// the one that it was made with; they have to be read anew where frz_tracker_report.changed is 1, and after frz_tracker_resculpt.
 ///
 /// dst: room for as many uint32_t[3] as frz_tracker_triangle_count reports, the vertices of each; FRZ_ERROR_CAPACITY when it is too
 ///     little, and nothing is written.
@@ -173,8 +173,8 @@ use frz_edit_kind::*;
 const EDITS: [(u32, frz_edit_array); 4] =
     [(0, FRZ_EDIT_ORIGIN), (1, FRZ_EDIT_SOURCE), (2, FRZ_EDIT_KIND), (3, FRZ_EDIT_BEFORE)];
 
-/// Reports whether the last step changed the mesh's vertices and triangles. It did not in a tracker that has not made a step yet, or
-/// none since it came back from a state.
+/// Reports whether the last step, or frz_tracker_resculpt since, changed the mesh's vertices and triangles. Neither did in a tracker that
+/// has just been made, or has just come back from a state.
 ///
 /// changed: receives 1 where it did, else 0; 0 after a failure.
 /// before: receives how many vertices there were before the step; 0 after a failure. May be NULL.

@@ -64,14 +64,14 @@ pub struct frz_tracker_params {
     pub reserved: u32,
     /// 1: where the liquid merges or splits the mesh is rebuilt, and merges or splits with it; where it is stretched or squeezed, edges
     /// are divided or go. It must be closed, a 2-manifold by its indices. 0, as is usual: the mesh keeps the vertices and the faces
-    /// that it was made with, and is flagged where it no longer fits. With 1 any step may change both (frz_tracker_report.changed): a
+    /// that it was made with, or was given by frz_tracker_resculpt, and is flagged where it no longer fits. With 1 any step may change both (frz_tracker_report.changed): a
     /// host has to read the triangles anew, and to take its own arrays along (frz_tracker_read_edits), which one that knows nothing of
     /// it does not do.
     pub rebuild: u32,
-    /// A frz_tracker_match; FRZ_TRACKER_MATCH_FLAGGED is usual. It matters with rebuild alone.
+    /// A frz_tracker_match; FRZ_TRACKER_MATCH_FLAGGED is usual. Without rebuild it does nothing.
     pub r#match: u32,
-    /// Least count of particles in a part of a mesh that is rebuilt, up to 1000000: parts with fewer inside are taken away, and drops
-    /// with fewer get no mesh; a mesh of one part stays. 1 is usual: only parts without any go. 0 is as 1.
+    /// Least count of particles in a part of a mesh that is rebuilt, up to 1000000; those up to half a spacing outside count where any is
+    /// inside. Parts with fewer are taken away, and drops with fewer get no mesh; a mesh of one part stays. 1 is usual: only parts without any go. 0 is as 1.
     pub min_drop: u32,
     /// 0.
     pub reserved3: u32,

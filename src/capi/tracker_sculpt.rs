@@ -34,16 +34,16 @@ pub unsafe extern "C" fn frz_tracker_resculpt(
             let mut follower = change(tracker)?;
             let mesh = read(mesh)?;
             let particles = self::particles(particles)?;
-            // Shares of detail may be refused after the mesh was taken.
-            let mut next = follower.tracker.clone();
-            next.resculpt(call.ctx(), &mesh.triangles, &particles)?;
-            next.set_lasting(mesh.attribute("detail", 1).unwrap_or_default().to_vec())?;
+            let lasting = mesh.attribute("detail", 1).unwrap_or_default().to_vec();
+            let before = follower.tracker.vertices().to_vec();
+            let follower = &mut *follower;
+            follower.tracker.resculpt(call.ctx(), &mesh.triangles, lasting, &particles)?;
+            let now = &follower.tracker;
             follower.edits = Some(Edits {
-                origins: vec![None; next.vertices().len()],
-                sources: vec![Source::New; next.triangles().len()],
-                before: follower.tracker.vertices().to_vec(),
+                origins: vec![None; now.vertices().len()],
+                sources: vec![Source::New; now.triangles().len()],
+                before,
             });
-            follower.tracker = next;
             follower.outlook = Outlook::default();
             follower.saved.take();
             Ok(())

@@ -18,14 +18,14 @@ type Surface = Arc<(Implicit, Isosurface)>;
 pub(super) struct Ahead {
     /// Those whose surface is to be made during the next step.
     wanted: Option<Arc<Particles>>,
-    /// Places of those whose surface is there, and that.
-    ready: Option<(Vec<DVec3>, Surface)>,
+    /// Those whose surface is there, and that.
+    ready: Option<(Arc<Particles>, Surface)>,
 }
 
 impl Ahead {
     /// The surface of particles at these places, if it is there.
     pub fn ready(&self, places: &[DVec3]) -> Option<Surface> {
-        self.ready.as_ref().filter(|(own, _)| own == places).map(|(_, surface)| surface.clone())
+        self.ready.as_ref().filter(|(own, _)| *own.places == *places).map(|(_, surface)| surface.clone())
     }
 }
 
@@ -43,15 +43,17 @@ impl Tracker {
 
     /// Does some work, and makes the surface of the particles to come at the same time.
     pub(super) fn with_next<R>(&self, ctx: &Context, work: impl FnOnce() -> Result<R>) -> Result<(R, Ahead)> {
-        let wanted = self.ahead.wanted.as_deref().filter(|_| ctx.pool().threads() > 1);
+        let wanted = self.ahead.wanted.clone().filter(|_| ctx.pool().threads() > 1);
         std::thread::scope(|scope| {
-            let surface_of = |particles| ctx.pool().install(|| self.surface_of(ctx, particles));
-            let making = wanted.map(|particles| (scope.spawn(move || surface_of(particles)), particles));
+            let surface_of = |particles: &Particles| ctx.pool().install(|| self.surface_of(ctx, particles));
+            let making = wanted.as_ref().map(|particles| scope.spawn(move || surface_of(particles)));
             let done = work()?;
-            let Some((making, particles)) = making else { return Ok((done, Ahead::default())) };
+            let (Some(making), Some(particles)) = (making, &wanted) else {
+                return Ok((done, Ahead::default()));
+            };
             let made = making.join().unwrap_or_else(|panic| std::panic::resume_unwind(panic));
             // What fails here fails again when it is that frame's turn, and is told there.
-            let ready = made.ok().map(|surface| (particles.places.clone(), Arc::new(surface)));
+            let ready = made.ok().map(|surface| (particles.clone(), Arc::new(surface)));
             Ok((done, Ahead { wanted: None, ready }))
         })
     }

@@ -13,6 +13,7 @@ use super::repair::{CellSet, Pierces, Rebuilt, Shape, Source, ladder, overlaps};
 use super::sample::Sampler;
 use crate::base::DVec3;
 use crate::base::mesh::used;
+use crate::base::topology::around;
 use crate::context::Context;
 use crate::distance::lattice::Lattice;
 use crate::error::Result;
@@ -89,21 +90,13 @@ impl Change {
         }
     }
 
-    /// Numbers of the vertices that there were, for those that there are: a vertex that was made has the mean of the neighbours that
+    /// Shares 0..=1 of the vertices that there were, for those that there are: a vertex that was made has the mean of the neighbours that
     /// stayed, 0 without any.
-    pub(super) fn carried(&self, values: &[f32]) -> Vec<f32> {
+    pub(super) fn carried_shares(&self, values: &[f32]) -> Vec<f32> {
         let old = |vertex: u32| self.origins[vertex as usize].map(|at| values[at as usize]);
-        let mut sums = vec![(0.0f32, 0.0f32); self.origins.len()];
-        for corners in &self.triangles {
-            for (at, next) in [(0, 1), (1, 2), (2, 0)] {
-                if let (None, Some(value)) = (old(corners[at]), old(corners[next])) {
-                    let sum = &mut sums[corners[at] as usize];
-                    *sum = (sum.0 + value, sum.1 + 1.0);
-                }
-            }
-        }
-        let mean = |(vertex, (sum, count)): (u32, (f32, f32))| {
-            old(vertex).unwrap_or(if count > 0.0 { (sum / count).clamp(0.0, 1.0) } else { 0.0 })
+        let sums: Vec<(f32, u32)> = around(self.origins.len(), &self.triangles, old);
+        let mean = |(vertex, (sum, count)): (u32, (f32, u32))| {
+            old(vertex).unwrap_or(if count > 0 { (sum / count as f32).clamp(0.0, 1.0) } else { 0.0 })
         };
         (0..).zip(sums).map(mean).collect()
     }
@@ -269,37 +262,20 @@ fn flagged(unfit: &Unfit<'_>, shape: &Shape, lattice: &Lattice) -> CellSet {
 
 #[cfg(test)]
 mod tests {
-    use super::super::{Implicit, Isosurface, Params, Particles, Tracker};
+    use super::super::balls::{own_surface, two_balls};
+    use super::super::{Params, Tracker};
     use super::*;
     use crate::base::faults::Faults;
     use crate::context::Pool;
-
-    /// Particles one spacing apart in a ball.
-    fn ball(centre: DVec3, radius: f64) -> Vec<DVec3> {
-        let most = radius.ceil() as i32;
-        let on = || -most..=most;
-        let all = on().flat_map(|x| {
-            on().flat_map(move |y| on().map(move |z| DVec3::new(f64::from(x), f64::from(y), f64::from(z))))
-        });
-        all.filter(|place| place.norm() <= radius).map(|place| place + centre).collect()
-    }
-
-    fn particles(places: Vec<DVec3>) -> Particles {
-        Particles { ids: (0..places.len() as i64).collect(), velocities: Vec::new(), places }
-    }
 
     #[test]
     fn two_balls_become_one_and_part_again() {
         let ctx = Context::new(Pool::new(2).unwrap());
         // Together and apart, with a hollow in time to merge.
         let away = |frame: i32| 9.0 - 0.25 * f64::from(if frame < 24 { frame } else { 48 - frame });
-        let at = |frame: i32| {
-            let x = DVec3::new(away(frame), 0.1, 0.2);
-            particles([ball(x, 5.5), ball(-x, 5.5)].concat())
-        };
+        let at = |frame: i32| two_balls(5.5, DVec3::new(away(frame), 0.1, 0.2));
         let mut from = at(0);
-        let phi = Implicit::new(&ctx, &from.places, 1.0, 0.5).unwrap();
-        let mesh = Isosurface::new(&phi).mesh(&phi);
+        let mesh = own_surface(&ctx, &from.places);
         let params = Params { rebuild: true, ..Params::for_spacing(1.0) };
         let mut tracker = Tracker::new(&ctx, params, &mesh, &from).unwrap();
         let mut parts = Vec::new();

@@ -5,15 +5,14 @@ use super::enclosed::{Bounds, Crowd, are_inside, seen_from};
 use super::repair::Source;
 use crate::base::DVec3;
 use crate::base::mesh::{renumbered, used};
-use crate::base::topology::{bodies, groups};
+use crate::base::topology::{self, bodies};
 
 impl Change {
     /// Takes away the parts of the mesh with a volume over 0 that hold too few particles, and what hollows are in them. Returns how many
     /// held none, and how many some; hollows are not counted. A mesh of one part stays.
     pub(super) fn drop_dry(&mut self, crowd: &Crowd<'_>) -> [usize; 2] {
         // Mostly there is one.
-        let links = self.triangles.iter().flat_map(|[a, b, c]| [[*a, *b], [*b, *c]]);
-        if groups(self.vertices.len(), links) < 2 {
+        if topology::parts(self.vertices.len(), &self.triangles) < 2 {
             return [0; 2];
         }
         let (mut parts, mut bounds): (Vec<Vec<u32>>, Vec<Bounds>) = Default::default();
@@ -80,7 +79,8 @@ impl Change {
 
 #[cfg(test)]
 mod tests {
-    use super::super::{Implicit, Isosurface, Params, Particles, Tracker};
+    use super::super::balls::{numbered, own_surface, shell};
+    use super::super::{Params, Particles, Tracker};
     use super::*;
     use crate::context::{Context, Pool};
 
@@ -98,21 +98,19 @@ mod tests {
     fn splash(frame: i32) -> (Particles, [DVec3; 2]) {
         let way = 3.6 + 0.25 * f64::from(frame);
         let [small, large] = [DVec3::new(way, 0.4, 0.4), DVec3::new(-way - 4.0, 0.4, 0.4)];
-        let ball = lattice(DVec3::repeat(-4.0), [9; 3]).filter(|place| place.norm() <= 4.5);
+        let ball = shell(DVec3::zeros(), 0.0, 4.5);
         let four = lattice(small, [2, 2, 1]);
         let twenty = lattice(large, [5, 2, 2]);
-        let places: Vec<DVec3> = ball.chain(four).chain(twenty).collect();
-        let ids = (0..places.len() as i64).collect();
+        let places = ball.into_iter().chain(four).chain(twenty).collect();
         let middles = [small + DVec3::new(0.5, 0.5, 0.0), large + DVec3::new(2.0, 0.5, 0.5)];
-        (Particles { ids, velocities: Vec::new(), places }, middles)
+        (numbered(places), middles)
     }
 
     /// Follows it to the end: how many specks were taken away, and in each of the last frames the counts of vertices at both drops.
     fn followed(min_drop: usize) -> (usize, Vec<[usize; 2]>) {
         let ctx = Context::new(Pool::new(2).unwrap());
         let mut from = splash(0).0;
-        let phi = Implicit::new(&ctx, &from.places, 1.0, 0.5).unwrap();
-        let mesh = Isosurface::new(&phi).mesh(&phi);
+        let mesh = own_surface(&ctx, &from.places);
         let params = Params { rebuild: true, min_drop, ..Params::for_spacing(1.0) };
         let mut tracker = Tracker::new(&ctx, params, &mesh, &from).unwrap();
         let (mut specks, mut counts) = (0, Vec::new());
@@ -144,16 +142,11 @@ mod tests {
     fn a_hollow_goes_with_the_drop_around_it() {
         const LEAST: usize = 1200;
         let ctx = Context::new(Pool::new(2).unwrap());
-        let all = || lattice(DVec3::repeat(-7.0), [15; 3]);
-        let ball: Vec<DVec3> = all().filter(|place| place.norm() <= 7.0).collect();
-        let shell: Vec<DVec3> = all().filter(|place| (4.0..=6.5).contains(&place.norm())).collect();
-        assert!(shell.len() < LEAST && ball.len() >= LEAST, "{} and {}", shell.len(), ball.len());
-        let away = DVec3::new(-20.0, 0.3, 0.2);
-        let places: Vec<DVec3> = ball.into_iter().chain(shell.iter().map(|place| place + away)).collect();
-        let ids = (0..places.len() as i64).collect();
-        let particles = Particles { ids, velocities: Vec::new(), places };
-        let phi = Implicit::new(&ctx, &particles.places, 1.0, 0.5).unwrap();
-        let mesh = Isosurface::new(&phi).mesh(&phi);
+        let ball = shell(DVec3::zeros(), 0.0, 7.0);
+        let hollow = shell(DVec3::new(-20.0, 0.3, 0.2), 4.0, 6.5);
+        assert!(hollow.len() < LEAST && ball.len() >= LEAST, "{} and {}", hollow.len(), ball.len());
+        let particles = numbered([ball, hollow].concat());
+        let mesh = own_surface(&ctx, &particles.places);
         assert_eq!(bodies(&mesh.triangles).len(), 3);
         for every in [false, true] {
             let params = Params { rebuild: true, every, min_drop: LEAST, ..Params::for_spacing(1.0) };

@@ -8,7 +8,7 @@ use super::change::Change;
 use super::repair::{Source, weights};
 use crate::base::deviation::NearestTree;
 use crate::base::mesh::{renumbered, used};
-use crate::base::topology::bodies;
+use crate::base::topology::{around, bodies};
 use crate::base::{DVec3, TriMesh, Vec3};
 use crate::context::Context;
 use crate::error::Result;
@@ -206,8 +206,9 @@ impl Patch {
         let tree = self.tree(begin);
         let mut is_jump = vec![false; parts.len()];
         let mut found = Vec::with_capacity(made.len());
-        for place in made {
-            let Some(at) = tree.nearest(place).filter(|at| at.distance <= longest) else { continue };
+        let feet: Vec<_> = made.par_iter().with_min_len(GRAIN).map(|place| tree.nearest(*place)).collect();
+        for (place, at) in made.into_iter().zip(feet) {
+            let Some(at) = at.filter(|at| at.distance <= longest) else { continue };
             let part = part_of[at.triangle];
             is_jump[part] |= at.distance > near;
             found.push((place, part));
@@ -218,16 +219,10 @@ impl Patch {
     /// Gives each loose vertex without a way the mean of those around it, a few times; those that stay have none.
     fn spread(&self, ways: &mut [DVec3], has_way: &[bool]) {
         for _ in 0..SPREAD {
-            let mut sums = vec![(DVec3::zeros(), 0.0f64); ways.len()];
-            for corners in &self.triangles {
-                for (at, next) in [(0, 1), (1, 2), (2, 0)] {
-                    let sum = &mut sums[corners[at] as usize];
-                    *sum = (sum.0 + ways[corners[next] as usize], sum.1 + 1.0);
-                }
-            }
+            let sums = around(ways.len(), &self.triangles, |vertex| Some(ways[vertex as usize]));
             for (at, (sum, count)) in sums.into_iter().enumerate() {
-                if self.is_loose[at] && !has_way[at] && count > 0.0 {
-                    ways[at] = sum / count;
+                if self.is_loose[at] && !has_way[at] && count > 0 {
+                    ways[at] = sum / f64::from(count);
                 }
             }
         }
@@ -243,24 +238,15 @@ impl Patch {
 mod tests {
     use super::*;
     use crate::context::Pool;
-    use crate::surface::{Implicit, Isosurface, Params, Particles, Tracker};
-
-    /// Two balls of particles, so many spacings from the middle.
-    fn balls(away: f64) -> Particles {
-        let on = || -4..=4;
-        let all = on().flat_map(|x| on().flat_map(move |y| on().map(move |z| [x, y, z].map(f64::from))));
-        let ball: Vec<DVec3> = all.map(DVec3::from).filter(|place| place.norm() <= 4.2).collect();
-        let side = |way: f64| ball.iter().map(move |place| place + DVec3::new(way * away, 0.1 * way, 0.0));
-        let places: Vec<DVec3> = side(1.0).chain(side(-1.0)).collect();
-        Particles { ids: (0..places.len() as i64).collect(), velocities: Vec::new(), places }
-    }
+    use crate::surface::balls::{own_surface, two_balls};
+    use crate::surface::{Params, Tracker};
 
     #[test]
     fn the_old_surface_leads_to_the_bridge_that_comes() {
         let ctx = Context::new(Pool::new(2).unwrap());
+        let balls = |away: f64| two_balls(4.2, DVec3::new(away, 0.1, 0.0));
         let mut from = balls(6.5);
-        let phi = Implicit::new(&ctx, &from.places, 1.0, 0.5).unwrap();
-        let mesh = Isosurface::new(&phi).mesh(&phi);
+        let mesh = own_surface(&ctx, &from.places);
         let params = Params { rebuild: true, ..Params::for_spacing(1.0) };
         let mut tracker = Tracker::new(&ctx, params, &mesh, &from).unwrap();
         let farthest = |places: &[DVec3], triangles: &[[u32; 3]], change: &Change| {
@@ -285,8 +271,10 @@ mod tests {
             eased([&leads], 0).iter().for_each(|eased| places[eased.vertex as usize] += eased.next);
             assert!(farthest(&places, &triangles, &change) < 0.35 * far, "{step}");
             // What stays is not moved.
-            for at in change.origins.iter().flatten() {
-                assert_eq!(places[*at as usize], change.before[*at as usize]);
+            let stay: Vec<u32> = change.origins.iter().copied().flatten().collect();
+            assert!(stay.len() > 100, "{step}: {} stay", stay.len());
+            for at in stay {
+                assert_eq!(places[at as usize], change.before[at as usize]);
             }
             seen += 1;
         }
@@ -310,6 +298,8 @@ mod tests {
         assert!(one.now == DVec3::zeros() && one.next == way * 0.15625, "{one:?}");
         assert!(moved(&[&still, &still, &still, &still, &both]).is_empty());
         assert!(moved(&[&Leads::cut(3), &second]).is_empty());
-        assert!(eased([&second], 0).iter().all(|eased| eased.now == DVec3::zeros() && eased.next == way));
+        let [one, two] = eased([&second], 0)[..] else { panic!("two vertices are moved") };
+        assert_eq!((one.vertex, two.vertex), (1, 2));
+        assert!([one, two].iter().all(|eased| eased.now == DVec3::zeros() && eased.next == way));
     }
 }

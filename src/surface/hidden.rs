@@ -25,7 +25,7 @@ use super::repair::{CellSet, Shape};
 use super::sample::Sampler;
 use crate::base::DVec3;
 use crate::base::blocks::{VOXELS, offset};
-use crate::base::topology::{bodies, groups};
+use crate::base::topology::{bodies, parts};
 use crate::context::Context;
 use crate::distance::lattice::Lattice;
 use crate::error::Result;
@@ -228,8 +228,7 @@ impl Compared<'_> {
     /// Adds the cells of hollows of the mesh that lie inside of phi, with all that is in them.
     fn hollows(&self, ctx: &Context, set: &mut CellSet) -> Result<()> {
         let triangles = &self.shape.triangles;
-        let links = triangles.iter().flat_map(|[a, b, c]| [[*a, *b], [*b, *c]]);
-        if groups(self.in_cells.len(), links) < 2 {
+        if parts(self.in_cells.len(), triangles) < 2 {
             return Ok(());
         }
         let mut sampler = Sampler::new(self.distances);
@@ -356,7 +355,8 @@ fn each_place([a, b, c]: [DVec3; 3], mut see: impl FnMut(DVec3)) {
 
 #[cfg(test)]
 mod tests {
-    use super::super::{Isosurface, Params, Particles, Tracker};
+    use super::super::balls::{numbered, own_surface, shell, two_balls};
+    use super::super::{Params, Tracker};
     use super::*;
     use crate::base::faults::Faults;
     use crate::base::{TriMesh, Vec3};
@@ -366,23 +366,9 @@ mod tests {
         Context::new(Pool::new(2).unwrap())
     }
 
-    /// Places 1 m apart, from one distance (m) of a centre to another.
-    fn shell(centre: DVec3, from: f64, to: f64) -> Vec<DVec3> {
-        let most = to.ceil() as i32;
-        let on = || (-most..=most).map(f64::from);
-        let all = on().flat_map(|x| on().flat_map(move |y| on().map(move |z| DVec3::new(x, y, z))));
-        all.filter(|place| (from..=to).contains(&place.norm())).map(|place| place + centre).collect()
-    }
-
-    fn surface_of(ctx: &Context, places: &[DVec3]) -> TriMesh {
-        let phi = Implicit::new(ctx, places, 1.0, 0.5).unwrap();
-        Isosurface::new(&phi).mesh(&phi)
-    }
-
     /// What becomes of a mesh on particles that stay where they are.
     fn followed(ctx: &Context, mesh: &TriMesh, places: &[DVec3], every: bool) -> Tracker {
-        let ids = (0..places.len() as i64).collect();
-        let particles = Particles { ids, velocities: Vec::new(), places: places.to_vec() };
+        let particles = numbered(places.to_vec());
         let params = Params { rebuild: true, every, ..Params::for_spacing(1.0) };
         let mut tracker = Tracker::new(ctx, params, mesh, &particles).unwrap();
         for step in 0..3 {
@@ -403,8 +389,8 @@ mod tests {
     fn a_hollow_with_liquid_in_it_is_filled() {
         let ctx = context();
         let places = shell(DVec3::zeros(), 0.0, 6.5);
-        let mut mesh = surface_of(&ctx, &places);
-        let hollow = surface_of(&ctx, &shell(DVec3::new(2.5, 0.3, 0.2), 0.0, 2.0));
+        let mut mesh = own_surface(&ctx, &places);
+        let hollow = own_surface(&ctx, &shell(DVec3::new(2.5, 0.3, 0.2), 0.0, 2.0));
         let whole = mesh.volume();
         mesh.append(&hollow.clone().reversed());
         assert!(followed(&ctx, &mesh, &places, false).triangles() == mesh.triangles);
@@ -417,7 +403,7 @@ mod tests {
     fn a_bubble_of_the_liquid_is_meshed() {
         let ctx = context();
         let places = shell(DVec3::zeros(), 5.0, 8.5);
-        let whole = surface_of(&ctx, &places);
+        let whole = own_surface(&ctx, &places);
         let of_part = |part: Vec<u32>| {
             let triangles = part.iter().map(|triangle| whole.triangles[*triangle as usize]).collect();
             TriMesh { positions: whole.positions.clone(), triangles }.without_unused()
@@ -435,9 +421,8 @@ mod tests {
     #[test]
     fn a_needle_across_a_gap_is_cut() {
         let ctx = context();
-        let away = DVec3::new(7.0, 0.0, 0.0);
-        let places = [shell(-away, 0.0, 3.5), shell(away, 0.0, 3.5)].concat();
-        let mut mesh = surface_of(&ctx, &places);
+        let places = two_balls(3.5, DVec3::new(-7.0, 0.0, 0.0)).places;
+        let mut mesh = own_surface(&ctx, &places);
         // The tip of a triangle that looks at the other ball is pulled up to it.
         let x = |name: u32| mesh.positions[name as usize].x;
         let middle = |triangle: &usize| mesh.triangles[*triangle].map(x).iter().sum::<f32>();
@@ -467,7 +452,7 @@ mod tests {
     fn detail_stays_as_it_is() {
         let ctx = context();
         let places = shell(DVec3::zeros(), 0.0, 6.5);
-        let mut mesh = surface_of(&ctx, &places);
+        let mut mesh = own_surface(&ctx, &places);
         // A bump of 2 m on one side, a dent of 1.5 m on the other.
         for place in &mut mesh.positions {
             let off = (place.x * place.x + place.z * place.z) / 9.0;

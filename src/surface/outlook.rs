@@ -40,31 +40,31 @@ impl Outlook {
         &mut self,
         ctx: &Context,
         tracker: &Tracker,
-        from: &Particles,
-        coming: &[Particles],
+        from: Particles,
+        coming: Vec<Particles>,
         dt: f64,
     ) -> Result<()> {
-        if self.from != *from {
+        if self.from != from {
             self.steps.clear();
-            self.from = from.clone();
+            self.from = from;
         }
         let is_same = |(step, to): &(&Coming, &Particles)| step.dt == dt && step.to == **to;
-        let same = self.steps.iter().zip(coming).take_while(is_same).count();
+        let same = self.steps.iter().zip(&coming).take_while(is_same).count();
         self.steps.truncate(same);
-        for to in &coming[same..] {
+        for to in coming.into_iter().skip(same) {
             let last = self.steps.back();
             let (mut after, from) = match last {
                 Some(last) => (last.after.clone(), &last.to),
                 None => (tracker.clone(), &self.from),
             };
             let triangles = after.triangles().to_vec();
-            let report = after.step(ctx, from, to, dt)?;
+            let report = after.step(ctx, from, &to, dt)?;
             let spacing = tracker.params().spacing;
             let leads = match &report.change {
                 Some(change) => Leads::of(ctx, change, &triangles, spacing)?,
                 None => Leads::default(),
             };
-            self.steps.push_back(Coming { to: to.clone(), dt, after, report, leads });
+            self.steps.push_back(Coming { to, dt, after, report, leads });
         }
         Ok(())
     }
@@ -96,27 +96,21 @@ impl Outlook {
 mod tests {
     use super::*;
     use crate::context::Pool;
-    use crate::surface::{Implicit, Isosurface, Params};
+    use crate::surface::Params;
+    use crate::surface::balls::{own_surface, two_balls};
 
     const DT: f64 = 0.04;
 
     /// Two balls of particles that meet.
     fn balls(frame: i32) -> Particles {
-        let on = || -4..=4;
-        let all = on().flat_map(|x| on().flat_map(move |y| on().map(move |z| [x, y, z].map(f64::from))));
-        let ball: Vec<DVec3> = all.map(DVec3::from).filter(|place| place.norm() <= 4.2).collect();
-        let away = 6.5 - 0.2 * f64::from(frame);
-        let side = |way: f64| ball.iter().map(move |place| place + DVec3::new(way * away, 0.1 * way, 0.0));
-        let places: Vec<DVec3> = side(1.0).chain(side(-1.0)).collect();
-        Particles { ids: (0..places.len() as i64).collect(), velocities: Vec::new(), places }
+        two_balls(4.2, DVec3::new(6.5 - 0.2 * f64::from(frame), 0.1, 0.0))
     }
 
     #[test]
     fn steps_that_were_made_ahead_are_those_that_come_and_only_what_goes_is_moved() {
         let ctx = Context::new(Pool::new(2).unwrap());
         let first = balls(0);
-        let phi = Implicit::new(&ctx, &first.places, 1.0, 0.5).unwrap();
-        let mesh = Isosurface::new(&phi).mesh(&phi);
+        let mesh = own_surface(&ctx, &first.places);
         let params = Params { rebuild: true, ..Params::for_spacing(1.0) };
         let mut tracker = Tracker::new(&ctx, params, &mesh, &first).unwrap();
         let mut plain = tracker.clone();
@@ -124,7 +118,7 @@ mod tests {
         for frame in 0..16 {
             let (from, to) = (balls(frame), balls(frame + 1));
             let coming: Vec<Particles> = (1..=3).map(|ahead| balls(frame + ahead)).collect();
-            outlook.look(&ctx, &tracker, &from, &coming, DT).unwrap();
+            outlook.look(&ctx, &tracker, from.clone(), coming, DT).unwrap();
             let places = outlook.eased(&tracker, 3);
             moved += places.iter().zip(tracker.vertices()).filter(|(shown, own)| shown != own).count();
             let (next, report) = outlook.take(&from, &to, DT).unwrap();
@@ -135,7 +129,7 @@ mod tests {
         }
         assert!(moved > 20, "{moved}");
         // Other particles are another way.
-        outlook.look(&ctx, &tracker, &balls(16), &[balls(17)], DT).unwrap();
+        outlook.look(&ctx, &tracker, balls(16), vec![balls(17)], DT).unwrap();
         assert!(outlook.take(&balls(16), &balls(18), DT).is_none());
         assert!(outlook.take(&balls(16), &balls(17), DT).is_none());
     }

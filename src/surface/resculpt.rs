@@ -16,9 +16,16 @@ impl Tracker {
     /// States have the edited mesh's triangles from then on: [`Tracker::resume`] still takes the mesh with which all began.
     ///
     /// # Errors
-    /// As [`Tracker::begin`].
-    pub fn resculpt(&mut self, ctx: &Context, mesh: &TriMesh, particles: &Particles) -> Result<StepReport> {
+    /// As [`Tracker::begin`] and [`Tracker::set_lasting`].
+    pub fn resculpt(
+        &mut self,
+        ctx: &Context,
+        mesh: &TriMesh,
+        lasting: Vec<f32>,
+        particles: &Particles,
+    ) -> Result<StepReport> {
         let ((mut next, report), phases) = ctx.step(4, || Self::begin(ctx, self.params, mesh, particles))?;
+        next.set_lasting(lasting)?;
         // Also where the triangles are the first ones: sizes, and what lasts, are no longer those of the first mesh.
         next.is_rebuilt = true;
         // The surface of the particles to come is the same for every mesh.
@@ -30,7 +37,8 @@ impl Tracker {
 
 #[cfg(test)]
 mod tests {
-    use super::super::{Implicit, Isosurface, Params};
+    use super::super::Params;
+    use super::super::balls::{numbered, own_surface, shell};
     use super::*;
     use crate::base::{DVec3, Vec3};
     use crate::context::Pool;
@@ -50,18 +58,13 @@ mod tests {
 
     /// A ball of particles that travels.
     fn ball(frame: i32) -> Particles {
-        let on = || -5..=5;
-        let all = on().flat_map(|x| on().flat_map(move |y| on().map(move |z| [x, y, z].map(f64::from))));
-        let inside = all.map(DVec3::from).filter(|place| place.norm() <= 5.2);
-        let places: Vec<DVec3> = inside.map(|place| place + middle(frame)).collect();
-        Particles { ids: (0..places.len() as i64).collect(), velocities: Vec::new(), places }
+        numbered(shell(middle(frame), 0.0, 5.2))
     }
 
     /// A mesh of its surface that has followed it to a frame, and the mesh at the first one.
     fn followed(ctx: &Context, rebuild: bool, frame: i32) -> (Tracker, TriMesh) {
         let first = ball(0);
-        let phi = Implicit::new(ctx, &first.places, 1.0, 0.5).unwrap();
-        let mesh = Isosurface::new(&phi).mesh(&phi);
+        let mesh = own_surface(ctx, &first.places);
         let params = Params { rebuild, ..Params::for_spacing(1.0) };
         let mut tracker = Tracker::new(ctx, params, &mesh, &first).unwrap();
         go_on(ctx, &mut tracker, [0, frame]);
@@ -96,7 +99,7 @@ mod tests {
         for rebuild in [false, true] {
             let (mut tracker, _) = followed(&ctx, rebuild, 5);
             let plain = top(&tracker, 5);
-            let report = tracker.resculpt(&ctx, &with_bump(&tracker, 5), &ball(5)).unwrap();
+            let report = tracker.resculpt(&ctx, &with_bump(&tracker, 5), Vec::new(), &ball(5)).unwrap();
             assert!(report.lost == 0 && report.change.is_none() && report.triangles > 100);
             assert!(tracker.flags().iter().all(|flag| !flag));
             let most = |tracker: &Tracker| tracker.delta().iter().copied().fold(0.0, f32::max);
@@ -120,7 +123,7 @@ mod tests {
                 // One that is not rebuilt may be open.
                 edited.triangles.truncate(edited.triangles.len() - 2);
             }
-            tracker.resculpt(&ctx, &edited, &ball(2)).unwrap();
+            tracker.resculpt(&ctx, &edited, Vec::new(), &ball(2)).unwrap();
             assert!(tracker.is_rebuilt() && tracker.triangles() == edited.triangles);
             assert!(tracker.lasting.is_empty());
             tracker.set_lasting(vec![0.25; edited.positions.len()]).unwrap();
@@ -140,7 +143,7 @@ mod tests {
         let (mut tracker, _) = followed(&ctx, true, 1);
         let before = tracker.save();
         let refused = |tracker: &mut Tracker, mesh: &TriMesh, words: &str| {
-            let error = tracker.resculpt(&ctx, mesh, &ball(1)).unwrap_err().to_string();
+            let error = tracker.resculpt(&ctx, mesh, Vec::new(), &ball(1)).unwrap_err().to_string();
             assert!(error.contains(words), "{error}");
             assert!(tracker.save() == before, "{words}");
         };
@@ -155,6 +158,6 @@ mod tests {
         let mesh = tracker.mesh();
         refused(&mut tracker, &mesh, "cancelled");
         ctx.reset();
-        tracker.resculpt(&ctx, &mesh, &ball(1)).unwrap();
+        tracker.resculpt(&ctx, &mesh, Vec::new(), &ball(1)).unwrap();
     }
 }

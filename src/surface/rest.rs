@@ -256,15 +256,12 @@ fn heaviest_origin(seen: &mut [Seen], most: f64) -> Option<usize> {
 mod tests {
     use super::*;
     use crate::context::Pool;
+    use crate::surface::balls::numbered;
 
     /// A block of n^3 places, one apart, from a corner on.
     fn block(corner: DVec3, n: i32) -> impl Iterator<Item = DVec3> {
         let on = move |axis: u32| (0..n * n * n).map(move |at| f64::from(at / n.pow(axis) % n));
         on(0).zip(on(1)).zip(on(2)).map(move |((x, y), z)| corner + DVec3::new(x, y, z))
-    }
-
-    fn particles(places: Vec<DVec3>) -> Particles {
-        Particles { ids: (0..places.len() as i64).collect(), velocities: Vec::new(), places }
     }
 
     /// Turned by 1 rad about an axis, drawn out, and taken far away.
@@ -281,10 +278,10 @@ mod tests {
     fn liquid_that_turned_and_stretched_is_found_where_it_was() {
         let ctx = Context::new(Pool::new(2).unwrap());
         let spacing = 0.01;
-        let first = particles(block(DVec3::zeros(), 9).map(|place| place * spacing).collect());
+        let first = numbered(block(DVec3::zeros(), 9).map(|place| place * spacing).collect());
         let rest = Rest::of(&first).unwrap();
         // Backwards, and with particles that were born later, far away.
-        let mut now = particles(block(DVec3::zeros(), 9).map(|place| moved(place) * spacing).collect());
+        let mut now = numbered(block(DVec3::zeros(), 9).map(|place| moved(place) * spacing).collect());
         now.places.extend(block(DVec3::new(90.0, 0.0, 0.0), 3).map(|place| place * spacing));
         now.ids.extend(10_000..10_027);
         now.places.reverse();
@@ -322,7 +319,7 @@ mod tests {
             let corners = [DVec3::zeros(), DVec3::new(10.0, 0.3, 0.4)];
             let all = |share: f64| {
                 let one = |n: usize| block(corners[n], 6).map(move |place| place + ways[n] * share);
-                particles(one(0).chain(one(1)).collect())
+                numbered(one(0).chain(one(1)).collect())
             };
             let rest = Rest::of(&all(0.0)).unwrap();
             let at: Vec<DVec3> = (0..400)

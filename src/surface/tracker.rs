@@ -205,7 +205,8 @@ impl Tracker {
         &self.triangles
     }
 
-    /// Whether any step has changed vertices or triangles: by rebuilding, or by dividing, collapsing or flipping edges alone.
+    /// Whether any step, or [`Tracker::resculpt`], has changed vertices or triangles: by rebuilding, or by dividing, collapsing or flipping
+    /// edges alone.
     pub fn is_rebuilt(&self) -> bool {
         self.is_rebuilt
     }

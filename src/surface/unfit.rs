@@ -79,7 +79,7 @@ impl Tracker {
         self.flags = change.origins.iter().map(|at| flag(&self.flags, at)).collect();
         self.bare = change.origins.iter().map(|at| flag(&self.bare, at)).collect();
         if !self.lasting.is_empty() {
-            self.lasting = change.carried(&self.lasting);
+            self.lasting = change.carried_shares(&self.lasting);
         }
         self.sizes.clone_from(&change.sizes);
         self.vertices.clone_from(&change.vertices);
@@ -92,17 +92,13 @@ impl Tracker {
 mod tests {
     use super::*;
     use crate::context::Pool;
-    use crate::surface::{Isosurface, Particles};
+    use crate::surface::balls::{numbered, own_surface, shell};
 
     #[test]
     fn a_vertex_that_jumps_alone_has_a_step_to_come_back() {
-        let on = || -3..=3;
-        let all = on().flat_map(|x| on().flat_map(move |y| on().map(move |z| [x, y, z].map(f64::from))));
-        let places: Vec<DVec3> = all.map(DVec3::from).filter(|place| place.norm() <= 3.2).collect();
-        let particles = Particles { ids: (0..places.len() as i64).collect(), velocities: Vec::new(), places };
+        let particles = numbered(shell(DVec3::zeros(), 0.0, 3.2));
         let ctx = Context::new(Pool::new(1).unwrap());
-        let phi = Implicit::new(&ctx, &particles.places, 1.0, 0.5).unwrap();
-        let mesh = Isosurface::new(&phi).mesh(&phi);
+        let mesh = own_surface(&ctx, &particles.places);
         let params = Params { rebuild: true, ..Params::for_spacing(1.0) };
         let mut tracker = Tracker::new(&ctx, params, &mesh, &particles).unwrap();
         let none = vec![false; mesh.positions.len()];

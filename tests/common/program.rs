@@ -66,12 +66,15 @@ pub fn answer_to_sigterm(mut child: Child) -> (Option<i32>, Duration) {
     (child.wait().unwrap().code(), took)
 }
 
-/// Starts a run and kills it when a file appears.
+/// Starts a run and kills it when a file appears: it must not have ended by itself.
+#[track_caller]
 pub fn kill_at(folder: &Path, arguments: &str, file: &str) {
     let mut child = command(folder, arguments).stderr(std::process::Stdio::null()).spawn().unwrap();
     while !folder.join(file).exists() && child.try_wait().unwrap().is_none() {
         std::thread::sleep(std::time::Duration::from_millis(1));
     }
     let _ = child.kill();
-    child.wait().unwrap();
+    let status = child.wait().unwrap();
+    // What a signal ends has no exit code.
+    assert!(status.code().is_none(), "{arguments} was not killed at {file}, but ended by itself: {status}");
 }

@@ -1,5 +1,6 @@
 //! Shapes whose size is known.
 
+use frazil::base::mesh::coincident;
 use frazil::base::{TriMesh, Vec3};
 
 /// A box around the origin with the given edges (m), 12 triangles.
@@ -62,6 +63,14 @@ fn exact(value: f32, index: usize, n: usize) -> f32 {
     } else {
         value
     }
+}
+
+/// A mesh in which vertices at one place are the same: closed by index where its faces share their rims.
+pub fn welded(mesh: &TriMesh) -> TriMesh {
+    let same = coincident(mesh.positions.iter().map(|place| place.cast()));
+    let triangles =
+        mesh.triangles.iter().map(|corners| corners.map(|corner| same[corner as usize])).collect();
+    TriMesh { positions: mesh.positions.clone(), triangles }.without_unused()
 }
 
 /// A closed capsule between two points (m), its rings along the axis.

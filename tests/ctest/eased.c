@@ -1,21 +1,14 @@
-/* Changes that are seen before they happen: two balls of a liquid meet, and the mesh that is shown sets out towards what comes. The
- * tracker goes the way of one that never looked ahead; and what is refused. */
+/* Changes that are seen before they happen: two balls of a liquid meet, and the mesh that is shown sets out towards what comes.
+ * The tracker goes the way of one that never looked ahead, and takes over what was looked at; and what is refused. */
+#include "balls.h"
 #include "closed.h"
 
-#define DT (1.0 / 24)
-/* Of the balls of particles, which lie 1 m apart, and of the spheres around them (m). */
-#define LIQUID_RADIUS 5.5
+/* Of the spheres around the balls of particles (m). */
 #define MESH_RADIUS 5.35f
 /* The last frame, at which the balls touch, one shortly before they become one, and how far ahead is looked. */
-enum { LAST = 12, BEFORE = 5, AHEAD = 4, REACH = 6, MOST = 2 * 13 * 13 * 13 };
+enum { LAST = 12, BEFORE = 5, AHEAD = 4 };
 
-typedef struct liquid {
-    double positions[MOST][3];
-    int64_t ids[MOST];
-    size_t count;
-} liquid;
-
-static liquid flows[LAST + 1];
+static balls flows[LAST + 1];
 static frz_particles frames[LAST + 1];
 /* Those of the frames, as a host hands them over. */
 static const frz_particles *coming[LAST + 1];
@@ -24,35 +17,15 @@ static const frz_particles *coming[LAST + 1];
 static double away(int frame) { return 8.25 - 0.25 * frame; }
 
 static void flow(int frame) {
-    liquid *out = &flows[frame];
-    frz_particles *particles = &frames[frame];
-    int side, x, y, z;
-    for (side = 1; side >= -1; side -= 2)
-        for (x = -REACH; x <= REACH; ++x)
-            for (y = -REACH; y <= REACH; ++y)
-                for (z = -REACH; z <= REACH; ++z) {
-                    double *place = out->positions[out->count];
-                    if (x * x + y * y + z * z > LIQUID_RADIUS * LIQUID_RADIUS) continue;
-                    place[0] = x + side * away(frame), place[1] = y + side * 0.1, place[2] = z + side * 0.2;
-                    out->ids[out->count] = (int64_t)out->count;
-                    ++out->count;
-                }
-    particles->struct_size = sizeof *particles;
-    particles->positions = VIEW(out->positions, out->count);
-    particles->ids = VIEW(out->ids, out->count);
-    coming[frame] = particles;
+    frames[frame] = balls_at(&flows[frame], away(frame));
+    coming[frame] = &frames[frame];
 }
 
 /* A sphere around each ball of the first frame. */
 static frz_mesh *spheres(frz_context *ctx, float radius) {
     const float x = (float)away(0), radii[2] = {radius, radius};
     const float centres[2][3] = {{x, 0.1f, 0.2f}, {-x, -0.1f, -0.2f}};
-    frz_grid *grid = NULL;
-    frz_mesh *mesh = NULL;
-    WORKS(frz_levelset_from_particles(ctx, VIEW(centres, 2), VIEW(radii, 2), 0.7, 3, &grid));
-    WORKS(frz_grid_to_mesh(ctx, grid, 0, 0, &mesh));
-    frz_grid_destroy(grid);
-    return mesh;
+    return mesh_around(ctx, VIEW(centres, 2), VIEW(radii, 2), 0.7);
 }
 
 /* -- trackers -- */
@@ -176,6 +149,37 @@ static void looks_change_nothing(frz_context *ctx, frz_context *alone, const frz
     CHECK(changes > 0 && has_moved && most > 0.1);
     free(due);
     frz_tracker_destroy(tracker), frz_tracker_destroy(plain);
+}
+
+static int count_poll(void *user, const frz_progress *progress) {
+    (void)progress;
+    ++*(int *)user;
+    return 0;
+}
+
+/* How often a step polls: each of its phases does. */
+static int polls_of_step(frz_context *ctx, frz_tracker *tracker, int frame) {
+    int polls = 0;
+    WORKS(frz_context_set_poll(ctx, count_poll, &polls));
+    (void)step(ctx, tracker, frame);
+    WORKS(frz_context_set_poll(ctx, NULL, NULL));
+    return polls;
+}
+
+/* A step that was looked at only takes over what is there: it hardly polls, as nothing is made. */
+static void what_was_looked_at_is_not_made_again(frz_context *ctx, const frz_mesh *mesh) {
+    frz_tracker *looked = begin(ctx, mesh, 1), *plain = begin(ctx, mesh, 1);
+    const int seen_frames = 2;
+    look seen = look_at(ctx, looked, 0, seen_frames);
+    int frame;
+    drop_look(&seen);
+    for (frame = 0; frame <= seen_frames; ++frame) {
+        const int polls = polls_of_step(ctx, looked, frame), usually = polls_of_step(ctx, plain, frame);
+        CHECK(usually > 5);
+        CHECK(frame < seen_frames ? 4 * polls < usually : polls > 5);
+        CHECK(same_trackers(ctx, looked, plain));
+    }
+    frz_tracker_destroy(looked), frz_tracker_destroy(plain);
 }
 
 /* A tracker shortly before the balls become one. */
@@ -353,6 +357,7 @@ int main(void) {
     for (frame = 0; frame <= LAST; ++frame) flow(frame);
     mesh = spheres(ctx, MESH_RADIUS);
     looks_change_nothing(ctx, alone, mesh);
+    what_was_looked_at_is_not_made_again(ctx, mesh);
     a_mesh_that_only_follows_is_still(ctx, mesh);
     what_comes_between_counts(ctx, alone, mesh);
     cancels(ctx, alone, mesh);

@@ -34,6 +34,7 @@ static float floats[ROOM];
 static double wide[ROOM / 2];
 static uint32_t whole[ROOM];
 static int32_t places[ROOM];
+static int64_t names[ROOM / 2];
 static unsigned char memory[ROOM * 8];
 static float leaf_values[512], vector_values[3 * 512];
 static uint64_t leaf_mask[8];
@@ -45,6 +46,7 @@ static void fill(void) {
     for (i = 0; i < ROOM; ++i) {
         floats[i] = wild ? (float)number() : ((float)any() / 2147483648.0f - 0.5f) * 2;
         wide[i / 2] = wild ? number() : floats[i];
+        names[i / 2] = wild && chance(50) ? (int64_t)index_of(64) : (int64_t)(i / 2);
         whole[i] = wild ? index_of(vertices) : any() % vertices;
         places[i] = (int32_t)(chance(20) ? any() : (any() % 64 - 32) * 8);
     }
@@ -192,6 +194,7 @@ static frz_tracker_params a_way(void) {
     params.spacing = chance(4) ? number() : 0.1 + 0.1 * (any() % 4);
     if (chance(4)) params.cell = number(), params.change = number(), params.weighting = any() % 3;
     if (chance(3)) params.rebuild = chance(9) ? any() : 1;
+    if (chance(3)) params.match = any() % 3, params.min_drop = chance(9) ? any() : any() % 20;
     params.flags = chance(9) ? any() : 0;
     params.struct_size = size_near(sizeof params);
     return params;
@@ -205,6 +208,8 @@ static frz_particles some_particles(void) {
     out.positions = view(wide, 24);
     if (chance(2)) out.velocities = view(floats, 12);
     if (out.velocities.count > out.positions.count) out.velocities.count = out.positions.count;
+    if (chance(2)) out.ids = view(names, 8);
+    if (out.ids.count > out.positions.count && !chance(9)) out.ids.count = out.positions.count;
     return out;
 }
 
@@ -227,7 +232,7 @@ static void call(void) {
     frz_context *c = a_context();
     polls = 0;
     fill();
-    switch (any() % 73) {
+    switch (any() % 77) {
         case 0: (void)frz_status_name(any()), (void)frz_last_error(), (void)frz_version(); break;
         case 1: {
             frz_pool *other = NULL;
@@ -562,6 +567,31 @@ static void call(void) {
             report.struct_size = size_near(sizeof report);
             if (report.struct_size > sizeof report) break;
             (void)frz_mesh_repair(c, a_mesh(), chance(4) ? number() : 0.1 + 0.1 * (any() % 4), chance(20) ? NULL : &mesh, chance(4) ? NULL : &report);
+            break;
+        }
+        case 73: {
+            const frz_particles now = some_particles(), next = some_particles(), later = some_particles();
+            const frz_particles *coming[3];
+            /* More than there can be are not followed. */
+            const size_t frames = chance(20) ? (size_t)101 + any() : any() % 4;
+            coming[0] = &next, coming[1] = chance(9) ? NULL : &later, coming[2] = chance(2) ? &now : &next;
+            (void)frz_tracker_read_eased(c, a_tracker(), chance(20) ? NULL : &now, chance(9) ? NULL : coming, frames,
+                                         chance(6) ? any() : 1 + any() % 4, chance(4) ? number() : 0.04, span());
+            break;
+        }
+        case 74: {
+            const frz_particles now = some_particles();
+            (void)frz_tracker_resculpt(c, a_tracker(), a_mesh(), chance(20) ? NULL : &now);
+            break;
+        }
+        case 75: {
+            const frz_particles first = some_particles(), now = some_particles();
+            (void)frz_tracker_read_rest(c, a_tracker(), chance(20) ? NULL : &first, chance(20) ? NULL : &now, span());
+            break;
+        }
+        case 76: {
+            const frz_particles next = some_particles();
+            (void)frz_tracker_ahead(a_tracker(), chance(20) ? NULL : &next);
             break;
         }
         default: frz_base_destroy(bases[slot]), bases[slot] = NULL; break;

@@ -469,6 +469,23 @@ class Tracker(unittest.TestCase):
         with self.assertRaisesRegex(frazil.Error, "rebuilt cannot change"):
             tracker.set_params(rebuild=False)
 
+    def test_match_and_min_drop_are_parameters(self):
+        ctx = frazil.Context(threads=2)
+        first, second = (self.liquid(frame) for frame in range(2))
+        ball = frazil.level_set.from_particles(ctx, [[0.0, 0.0, 0.0]], [0.5], 0.05).to_mesh(ctx)
+        mesh = frazil.Mesh(ctx, ball.positions, ball.triangles)
+        more = {"spacing": 0.1, "rebuild": True}
+        tracker = frazil.Tracker(ctx, mesh, first, match="every", min_drop=8, **more)
+        self.assertEqual(tracker.step(first, second, dt=1 / 24).specks, 0)
+        self.check_closed(tracker.triangles)
+        tracker.set_params(match="flagged", min_drop=1)
+        for refused in (lambda: frazil.Tracker(ctx, mesh, first, match="never", **more),
+                        lambda: tracker.set_params(match="never")):
+            with self.assertRaisesRegex(ValueError, "match is 'never', not flagged or every"):
+                refused()
+        with self.assertRaisesRegex(frazil.Error, "min_drop = 1000001"):
+            frazil.Tracker(ctx, mesh, first, min_drop=1000001, **more)
+
     def test_an_edited_mesh_takes_the_place_of_the_tracked_one(self):
         ctx = frazil.Context(threads=2)
         first, second, third = (self.liquid(frame) for frame in range(3))

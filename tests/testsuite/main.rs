@@ -98,6 +98,7 @@ mod surface {
     mod repair;
     mod resculpt;
     mod shot;
+    mod small;
     mod tracking;
     mod usd;
 }

@@ -27,7 +27,7 @@ const ODD: f64 = 2.0;
 /// What a scene's files hold.
 pub struct Inputs {
     /// The mesh at the first frame (m), with what it carries.
-    pub mesh: DetailedMesh,
+    pub mesh: Arc<DetailedMesh>,
     /// Share of each vertex' detail that never fades; empty: none.
     pub(super) lasting: Vec<f32>,
     /// Initial distance between particles (m).
@@ -116,7 +116,7 @@ impl Inputs {
             _ => Vec::new(),
         };
         mesh.arrays.retain(|array| !REPLACED.contains(&&*array.name));
-        let mut inputs = Self { mesh, lasting, spacing, particles, sculpts, seen, warnings };
+        let mut inputs = Self { mesh: Arc::new(mesh), lasting, spacing, particles, sculpts, seen, warnings };
         let of_sculpts = sculpts::check(ctx, surface, &inputs)?;
         inputs.warnings.extend(of_sculpts);
         inputs.warnings.iter().for_each(|warning| log::warn!("{warning}"));

@@ -84,7 +84,7 @@ pub const KEYS: &[Key] = &[
         "surface",
         "min_drop",
         Kind::Whole(0, 1_000_000),
-        "of a mesh that is rebuilt, parts with fewer particles inside are taken away, and drops of fewer get no mesh; 0 and 1: only parts without any go",
+        "of a mesh that is rebuilt, parts of fewer particles (inside, or half a spacing outside) are taken away, but not the last part, and drops of fewer get no mesh; 0 and 1: only parts without any go",
     )
     .or("8")
     .concerns(STEP),

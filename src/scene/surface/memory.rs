@@ -27,6 +27,8 @@
 //! | triangle of the mesh | on the grid 12, as cut 20, while its edges are looked at 82, state 36 | 150 |
 //! | vertex of the mesh in a coming frame, but for the next | place 24, distance 4, flags 2, size 8, velocities 24, name 8 | 70 |
 //! | triangle of such a mesh | corners twice 24, the mask 8 | 32 |
+//! | particle, where a mesh with ids carries something | its id and its first place | 32 |
+//! | triangle of the first mesh, or of the last edited one, then | in a tree | 84 |
 //! | number that the mesh carries | in two frames 16, state 16; 8 in each coming frame | 32 |
 //! | vertex of a mesh that carries something | where it has its numbers from | 40 |
 //! | triangle of such a mesh | where it has its numbers from 80, in a tree 84 | 164 |
@@ -59,6 +61,9 @@ const CARRIED: f64 = 8.0;
 
 /// Where the mesh is rebuilt: bytes of a vertex and of a triangle of the mesh in each coming frame but the next.
 const COMING: [f64; 2] = [70.0, 32.0];
+/// Bytes of a particle's first place with its id, and of a triangle in a tree.
+const REST: f64 = 32.0;
+const TREE: f64 = 84.0;
 /// Bytes of a particle of the next frame, whose surface is made at the same time.
 const AHEAD: f64 = 68.0;
 /// Bytes of a face of a cell that the mesh passes through, of a block of Gamma, and of a triangle near such blocks.
@@ -88,6 +93,8 @@ pub(super) struct Most {
     ways: f64,
     /// Bytes of the work on them.
     work: f64,
+    /// Bytes of ids and places that stay, for textures.
+    rest: f64,
     /// Bytes of their surface, made early.
     ahead: f64,
     /// Area of their surface (faces of cells).
@@ -109,6 +116,7 @@ impl Most {
         self.frame = self.frame.max(count * each);
         self.ways = self.ways.max(count * way);
         self.work = self.work.max(work(count, shell, cell));
+        self.rest = self.rest.max(if has_ids { count * REST } else { 0.0 });
         self.ahead = self.ahead.max(count * AHEAD + patches * SURFACE[0] + vertices * SURFACE[1]);
         self.area = self.area.max(vertices);
         self.edge = cell * spacing;
@@ -144,7 +152,8 @@ impl Most {
             0.0
         };
         let coming = f64::from(coming) * (of_both(now, COMING) + count * CARRIED);
-        self.ahead + mesh + coming + changing.max(carrying)
+        let source = if count > 0.0 { self.rest + TREE * triangles } else { 0.0 };
+        self.ahead + mesh + coming + source + changing.max(carrying)
     }
 }
 
@@ -287,7 +296,7 @@ mod tests {
         let finer = of(&detail) - plain;
         let own = 3000.0 * REBUILT[0] + 6000.0 * (REBUILT[1] + UNFIT * CUT[2]);
         assert!((finer - own).abs() < 1.0, "{finer} is not {own}");
-        // Little is brought to the mesh when Gamma is gone; a million numbers are more than that.
+        // The first mesh's tree; little is brought to the mesh when Gamma is gone, but a million numbers are more than that.
         let array = |count: usize| MeshArray {
             name: "mask".into(),
             on: On::Vertices,
@@ -295,7 +304,7 @@ mod tests {
             values: vec![0.0; count],
         };
         detail.arrays = vec![array(3008)];
-        assert_eq!(of(&detail) - plain, finer);
+        assert_eq!(of(&detail) - plain, finer + 6012.0 * TREE);
         detail.arrays = vec![array(1_000_000)];
         let more = of(&detail) - plain - finer;
         assert!(more > 10e6, "{more}");

@@ -108,11 +108,6 @@ fn conformed(edited: DetailedMesh, first: &DetailedMesh) -> (DetailedMesh, Vec<S
     let DetailedMesh { mesh, uvs, mut arrays } = edited;
     arrays.retain(|array| !REPLACED.contains(&&*array.name));
     let (vertices, faces) = (mesh.positions.len(), mesh.triangles.len());
-    let count = |on: On| match on {
-        On::Vertices => vertices,
-        On::Corners => 3 * faces,
-        On::Faces => faces,
-    };
     let (mut lacking, mut faults): (Vec<&str>, Vec<String>) = (Vec::new(), Vec::new());
     let mut taken = Vec::with_capacity(first.arrays.len());
     for own in &first.arrays {
@@ -120,10 +115,8 @@ fn conformed(edited: DetailedMesh, first: &DetailedMesh) -> (DetailedMesh, Vec<S
         let values = match found {
             Some(array) => converted(array, own.number),
             None => {
-                if !REPLACED.contains(&&*own.name) {
-                    lacking.push(&own.name);
-                }
-                vec![0.0; count(own.on)]
+                lacking.push(&own.name);
+                vec![0.0; own.on.count(vertices, faces)]
             }
         };
         taken.push(MeshArray { name: own.name.clone(), on: own.on, number: own.number, values });
@@ -144,7 +137,7 @@ fn conformed(edited: DetailedMesh, first: &DetailedMesh) -> (DetailedMesh, Vec<S
         (None, None) => None,
         (None, Some(own)) => {
             lacking.push("texture coordinates");
-            Some(no_uvs(own.corners.is_some(), vertices, faces))
+            Some(Uvs::nothing(own.corners.is_some(), vertices, faces))
         }
         (Some(uvs), Some(own)) => match (&uvs.corners, own.corners.is_some()) {
             (None, true) => {
@@ -198,14 +191,6 @@ fn fitted(value: f64, to: Number) -> f64 {
         Number::U32 => (0.0, f64::from(u32::MAX)),
     };
     if value.is_nan() { 0.0 } else { value.round().clamp(low, high) }
-}
-
-/// Texture coordinates of a mesh that has none: 0, 0; of corners, or of vertices.
-fn no_uvs(has_corners: bool, vertices: usize, faces: usize) -> Uvs {
-    match has_corners {
-        true => Uvs { places: vec![[0.0; 2]], corners: Some(vec![0; 3 * faces]), missing: 3 * faces },
-        false => Uvs { places: vec![[0.0; 2]; vertices], corners: None, missing: vertices },
-    }
 }
 
 /// The texture coordinates of each vertex: those of its first corner.

@@ -1,6 +1,7 @@
 //! How vertices go from a frame to the next, through changes of the mesh.
 
 use super::walk::Way;
+use crate::base::topology::around;
 use crate::base::{DVec3, Vec3};
 use crate::surface::Change;
 
@@ -52,18 +53,10 @@ impl Trail {
         let mut known: Vec<Option<Vec3>> =
             self.names.iter().map(|name| name.map(|name| of_before[name as usize])).collect();
         for _ in 0..PASSES {
-            let mut sums = vec![(Vec3::zeros(), 0.0f32); known.len()];
-            for corners in triangles {
-                for (at, next) in [(0, 1), (1, 2), (2, 0)] {
-                    if let Some(speed) = known[corners[next] as usize] {
-                        let sum = &mut sums[corners[at] as usize];
-                        *sum = (sum.0 + speed, sum.1 + 1.0);
-                    }
-                }
-            }
+            let sums = around(known.len(), triangles, |vertex| known[vertex as usize]);
             for (known, (sum, count)) in known.iter_mut().zip(sums) {
-                if known.is_none() && count > 0.0 {
-                    *known = Some(sum / count);
+                if known.is_none() && count > 0 {
+                    *known = Some(sum / count as f32);
                 }
             }
         }

@@ -42,8 +42,8 @@ pub(super) struct Source {
     /// The frame of an edited one.
     pub sculpted: Option<i32>,
     mesh: Arc<DetailedMesh>,
-    /// The particles at its frame, where they have ids and the mesh carries anything.
-    rest: Option<Arc<Rest>>,
+    /// The particles at its frame, where they have ids and the mesh carries anything and is rebuilt, and its triangles.
+    rest: Option<Arc<(Rest, NearestTree)>>,
 }
 
 /// The mesh at a frame, with what led there.
@@ -79,7 +79,7 @@ impl<'a> Walk<'a> {
         tracker.set_lasting(inputs.lasting.clone()).map_err(|error| of_first(surface, error))?;
         let report = StepReport { phases, ..report };
         let report = told(&report, inputs.particles.places.len(), &tracker, false);
-        let source = Source::of(None, Arc::new(inputs.mesh.clone()), &inputs.particles);
+        let source = Source::of(ctx, surface.rebuild, None, inputs.mesh.clone(), &inputs.particles);
         let at = At { tracker, detail: None, report, way: Way::default(), leads: Leads::default(), source };
         Ok(Self::at((scene, surface, inputs), scene.shot.frames.first, at))
     }
@@ -101,17 +101,21 @@ impl<'a> Walk<'a> {
             let triangles = tracker.triangles().to_vec();
             Arc::new(DetailedMesh { mesh: TriMesh { positions: Vec::new(), triangles }, ..detail })
         });
-        let source = Source::of(None, Arc::new(inputs.mesh.clone()), &inputs.particles);
+        let source = Source::of(ctx, surface.rebuild, None, inputs.mesh.clone(), &inputs.particles);
         let (report, way, leads) = (nothing_told(), Way::default(), Leads::default());
         let mut walk = Self::at(of, frame, At { tracker, detail, report, way, leads, source });
         if let Some(sculpted) = sculpted {
             let source = match read_sculpt(ctx, surface, inputs, sculpted)? {
                 Some(sculpt) => {
                     let particles = walk.particles(sculpted)?;
-                    Source::of(Some(sculpted), Arc::new(sculpt.mesh), &particles)
+                    Source::of(ctx, surface.rebuild, Some(sculpted), Arc::new(sculpt.mesh), &particles)
                 }
-                // Its file is gone: what is made takes what the mesh beside it carries.
-                None => Source { sculpted: Some(sculpted), rest: None, ..walk.now().source.clone() },
+                None => {
+                    log::warn!(
+                        "the edited mesh of frame {sculpted} is gone: what is made takes its texture from the mesh beside it"
+                    );
+                    Source { sculpted: Some(sculpted), rest: None, ..walk.now().source.clone() }
+                }
             };
             walk.known[0].source = source;
         }
@@ -174,17 +178,16 @@ impl<'a> Walk<'a> {
         if frame <= last {
             return self.next(ctx, frame).map(Some);
         }
-        let is_wanted = !reads(self.scene, self.surface, self.inputs, last).ahead.is_empty();
         let files = self.surface.between(self.scene.shot.frames, frame - 1, frame);
         let is_beyond = self.end.is_some_and(|end| frame >= end);
-        if is_beyond || !is_wanted || !files.iter().all(|path| path.is_file()) {
+        if is_beyond || !self.surface.reads_ahead() || !files.iter().all(|path| path.is_file()) {
             return Ok(None);
         }
         match self.next(ctx, frame) {
             Err(error) if !matches!(error, Error::Cancelled) => {
                 let what = match frame - last {
                     1 => format!("frame {last} has the velocities of the frame before"),
-                    _ => format!("nothing moves towards a change from frame {frame} on"),
+                    _ => format!("changes from frame {frame} on are not eased in"),
                 };
                 log::warn!("{error}; {what}");
                 self.end = Some(frame);
@@ -196,6 +199,7 @@ impl<'a> Walk<'a> {
 
     /// The mesh at a frame, from the last that is known, which is the one before.
     fn next(&mut self, ctx: &Context, frame: i32) -> Result<At> {
+        let phases = ctx.collect();
         let last = self.known.len() - 1;
         let before = &mut self.known[last];
         let (mut tracker, mut detail, source) =
@@ -241,6 +245,7 @@ impl<'a> Walk<'a> {
         let sculpted = self.resculpt(ctx, &mut at, frame, &from)?;
         let is_resculpted = sculpted.is_some();
         let report = sculpted.into_iter().fold(report, StepReport::followed_by);
+        let report = StepReport { phases: phases.times(), ..report };
         at.report = told(&report, from.places.len(), &at.tracker, is_resculpted);
         Ok(at)
     }
@@ -260,17 +265,17 @@ impl<'a> Walk<'a> {
         };
         let old = ctx.pool().install(|| NearestTree::new(&at.tracker.mesh()));
         let triangles = at.tracker.triangles().to_vec();
-        let report = at.tracker.resculpt(ctx, &sculpt.mesh.mesh, particles).map_err(refused)?;
-        at.tracker.set_lasting(sculpt.lasting).map_err(refused)?;
+        let report =
+            at.tracker.resculpt(ctx, &sculpt.mesh.mesh, sculpt.lasting, particles).map_err(refused)?;
         // Vertices of the edited mesh go as the mesh before went beside them.
         let velocity = |place: &DVec3| {
             let corner = old.nearest(*place).map(|near| triangles[near.triangle][0] as usize);
             corner.and_then(|corner| at.way.of_after.get(corner).copied()).unwrap_or_default()
         };
         at.way.of_after = at.tracker.vertices().iter().map(velocity).collect();
-        at.leads = at.leads.clone().then(&Leads::cut(at.tracker.vertices().len()));
+        at.leads = std::mem::take(&mut at.leads).then(&Leads::cut(at.tracker.vertices().len()));
         let mesh = Arc::new(sculpt.mesh);
-        at.source = Source::of(Some(frame), mesh.clone(), particles);
+        at.source = Source::of(ctx, self.surface.rebuild, Some(frame), mesh.clone(), particles);
         at.detail = Some(mesh);
         Ok(Some(report))
     }
@@ -295,9 +300,17 @@ fn nothing_told() -> Report {
 }
 
 impl Source {
-    fn of(sculpted: Option<i32>, mesh: Arc<DetailedMesh>, particles: &Particles) -> Self {
-        let is_traced = mesh.uvs.is_some() || !mesh.arrays.is_empty();
-        let rest = if is_traced { Rest::of(particles).map(Arc::new) } else { None };
+    fn of(
+        ctx: &Context,
+        is_rebuilt: bool,
+        sculpted: Option<i32>,
+        mesh: Arc<DetailedMesh>,
+        particles: &Particles,
+    ) -> Self {
+        let is_traced = is_rebuilt && (mesh.uvs.is_some() || !mesh.arrays.is_empty());
+        let rest = if is_traced { Rest::of(particles) } else { None };
+        let tree = || ctx.pool().install(|| NearestTree::new(&mesh.mesh));
+        let rest = rest.map(|rest| Arc::new((rest, tree())));
         Self { sculpted, mesh, rest }
     }
 }
@@ -314,11 +327,11 @@ fn carried(
     let mesh = TriMesh { positions: usd::to_floats(&change.before), triangles };
     let old = DetailedMesh { mesh, uvs: own.uvs.clone(), arrays: own.arrays.clone() };
     let spacing = tracker.params().spacing;
-    let places = match &source.rest {
-        Some(rest) => rest.of_change(ctx, particles, spacing, change)?,
-        None => Vec::new(),
+    let (places, tree) = match source.rest.as_deref() {
+        Some((rest, tree)) => (rest.of_change(ctx, particles, spacing, change)?, Some(tree)),
+        None => (Vec::new(), None),
     };
-    let traced = Traced { first: &source.mesh, places: &places, spacing };
+    let traced = Traced { first: &source.mesh, tree, places: &places, spacing };
     let (origins, sources) = (&change.origins, &change.sources);
     ctx.phase("carry", || {
         let mut out = carry_attributes(&old, tracker.mesh(), origins, sources, Some(&traced));
@@ -350,6 +363,11 @@ impl Surface {
         if self.eases() { self.ahead + 1 } else { 1 }
     }
 
+    /// Whether frames to come show in a frame's files.
+    fn reads_ahead(&self) -> bool {
+        self.output.velocities || self.output.usd || self.eases()
+    }
+
     fn eases(&self) -> bool {
         self.rebuild && self.ahead > 0
     }
@@ -367,7 +385,7 @@ pub(super) fn reads(scene: &Scene, surface: &Surface, inputs: &Inputs, frame: i3
     let particles = surface.between(frames, before, frame);
     let sculpt = |frame: i32| path_at(surface, &inputs.sculpts, frame);
     let mut ahead = Vec::new();
-    if surface.output.velocities || surface.output.usd || surface.eases() {
+    if surface.reads_ahead() {
         let last = frame + surface.looks();
         ahead = surface.between(frames, frame, last);
         // What is read anyway is not of the coming frames alone.

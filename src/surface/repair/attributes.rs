@@ -2,7 +2,7 @@
 //!
 //! Vertices and triangles that are still there keep their numbers bit for bit. What was made takes those of a place on the old mesh: a
 //! vertex of the nearest one, the corners of a triangle all of places on one old triangle, its chart, so that none lies across a seam.
-//! Where it is known where the liquid there was at the first frame, that of the mesh at that frame goes before (`traced.rs`).
+//! Where it is known where the liquid was at the first frame, that frame's mesh is asked first (`traced.rs`).
 
 use rayon::prelude::*;
 
@@ -79,18 +79,9 @@ fn of_mask(mask: &MeshArray, mesh: TriMesh, sources: &[Source]) -> DetailedMesh 
 /// What a mesh carries on one that came of nothing: zeros.
 fn of_nothing(detail: &DetailedMesh, mesh: TriMesh) -> DetailedMesh {
     let [vertices, faces] = [mesh.positions.len(), mesh.triangles.len()];
-    let array = |array: &MeshArray| {
-        let count = match array.on {
-            On::Vertices => vertices,
-            On::Faces => faces,
-            On::Corners => 3 * faces,
-        };
-        MeshArray { values: vec![0.0; count], ..array.clone() }
-    };
-    let uvs = |uvs: &Uvs| match uvs.corners {
-        Some(_) => Uvs { places: vec![[0.0; 2]], corners: Some(vec![0; 3 * faces]), missing: 3 * faces },
-        None => Uvs { places: vec![[0.0; 2]; vertices], corners: None, missing: vertices },
-    };
+    let array =
+        |array: &MeshArray| MeshArray { values: vec![0.0; array.on.count(vertices, faces)], ..array.clone() };
+    let uvs = |uvs: &Uvs| Uvs::nothing(uvs.corners.is_some(), vertices, faces);
     let (arrays, uvs) = (detail.arrays.iter().map(array).collect(), detail.uvs.as_ref().map(uvs));
     DetailedMesh { mesh, uvs, arrays }
 }
@@ -356,7 +347,7 @@ mod tests {
         let found = |places: &[[f32; 2]], corners| {
             let uvs = Some(Uvs { places: places.to_vec(), corners, missing: 0 });
             let detail = DetailedMesh { mesh: old.clone(), uvs, arrays: Vec::new() };
-            let traced = Traced { first: &detail, places: &[], spacing: 1.0 };
+            let traced = Traced { first: &detail, tree: None, places: &[], spacing: 1.0 };
             carried(&detail, new.clone(), &vertices, &sources, Some(&traced)).uvs.unwrap()
         };
         let uvs = found(&places[..6], None);
@@ -382,7 +373,7 @@ mod tests {
         let places: Vec<[f32; 2]> = (0..6u8).map(|n| [f32::from(n), 0.125 * f32::from(n)]).collect();
         let uvs = Some(Uvs { places: places.clone(), corners: Some((0..6).collect()), missing: 0 });
         let first = DetailedMesh { mesh: old, uvs, arrays: Vec::new() };
-        let traced = Traced { first: &first, places: &[], spacing: 1.0 };
+        let traced = Traced { first: &first, tree: None, places: &[], spacing: 1.0 };
         let [mut with, mut without] = [first.clone(), first.clone()];
         for change in 0..3 {
             with = carried(&with, new.clone(), &VERTICES, &SOURCES, Some(&traced));

@@ -147,7 +147,11 @@ pub fn repair(ctx: &Context, mesh: &TriMesh, cell: f64) -> Result<Repaired> {
         let cell = cell / f64::from(1u32 << halving);
         let allowed = allow(ctx, area, cell);
         if halving > 0 && allowed.is_err() {
-            break;
+            let what = format!(
+                "nothing is left of the mesh in cells of {} m, and smaller ones need more memory than there is",
+                2.0 * cell
+            );
+            return Err(Error::argument(what));
         }
         allowed?;
         let repaired = ctx.phase("rebuild", || rebuild(ctx, &closed, mesh.positions.len(), cell))?;
@@ -337,27 +341,13 @@ mod tests {
     use super::*;
     use crate::base::faults::Faults;
     use crate::context::Pool;
+    use crate::surface::balls;
 
-    /// A sphere of 8 x 4^levels triangles.
-    fn sphere(centre: [f32; 3], radius: f32, levels: usize) -> TriMesh {
-        let mut positions = vec![Vec3::x(), -Vec3::x(), Vec3::y(), -Vec3::y(), Vec3::z(), -Vec3::z()];
-        let mut triangles: Vec<[u32; 3]> =
-            vec![[0, 2, 4], [2, 1, 4], [1, 3, 4], [3, 0, 4], [2, 0, 5], [1, 2, 5], [3, 1, 5], [0, 3, 5]];
-        for _ in 0..levels {
-            let mut middles = std::collections::BTreeMap::new();
-            let mut finer = Vec::new();
-            for [a, b, c] in triangles {
-                let [ab, bc, ca] = [[a, b], [b, c], [c, a]].map(|[i, j]| {
-                    *middles.entry((i.min(j), i.max(j))).or_insert_with(|| {
-                        positions.push((positions[i as usize] + positions[j as usize]).normalize());
-                        positions.len() as u32 - 1
-                    })
-                });
-                finer.extend([[a, ab, ca], [b, bc, ab], [c, ca, bc], [ab, bc, ca]]);
-            }
-            triangles = finer;
-        }
-        let positions = positions.iter().map(|place| place * radius + Vec3::from(centre)).collect();
+    /// A sphere of 2048 triangles.
+    fn sphere(centre: [f32; 3], radius: f32) -> TriMesh {
+        let (places, triangles) = balls::sphere(4);
+        let positions =
+            places.iter().map(|place| place.cast::<f32>() * radius + Vec3::from(centre)).collect();
         TriMesh { positions, triangles }
     }
 
@@ -370,7 +360,7 @@ mod tests {
     #[test]
     fn spheres_that_overlap_become_one_and_keep_what_they_had() {
         let ctx = Context::new(Pool::new(2).unwrap());
-        let mesh = both(&sphere([0.0; 3], 1.0, 4), &sphere([1.2, 0.1, 0.05], 0.8, 4));
+        let mesh = both(&sphere([0.0; 3], 1.0), &sphere([1.2, 0.1, 0.05], 0.8));
         let repaired = repair(&ctx, &mesh, 0.06).unwrap();
         let faults = Faults::of(&repaired.mesh);
         assert!(faults.by_index.is_watertight() && faults.is_embedded(), "{faults:?}");

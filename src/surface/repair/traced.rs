@@ -25,12 +25,14 @@ const TORN: f64 = 3.0;
 /// A made triangle takes them where the places of its three corners are known: its corners those at the places of the first mesh
 /// nearest to these, all on one side of a seam, the triangle those of the one that is nearest to its middle. Made vertices of such
 /// triangles alone take those at the nearest place. A vertex that other triangles have too keeps the texture coordinates of these where
-/// they are about the same, and what was made goes over into them; where they are not, there is a seam, or, in coordinates of vertices,
+/// they are about the same, and what was made blends into them; where they are not, there is a seam, or, in coordinates of vertices,
 /// the triangle is marked.
-#[derive(Debug, Clone, Copy)]
+#[derive(Clone, Copy)]
 pub struct Traced<'a> {
     /// The mesh at the first frame, with what it carried then.
     pub first: &'a DetailedMesh,
+    /// Its triangles, for who goes through many changes; none: they are sorted anew.
+    pub tree: Option<&'a NearestTree>,
     /// For each vertex of the new mesh, where the liquid there was at the first frame (m); none where that is not known, and for
     /// vertices that no made triangle has. Empty: of none.
     pub places: &'a [Option<DVec3>],
@@ -129,7 +131,14 @@ impl<'a> Charts<'a> {
         if known.is_empty() {
             return out;
         }
-        let tree = NearestTree::new(&first.mesh);
+        let made;
+        let tree = match traced.tree {
+            Some(tree) => tree,
+            None => {
+                made = NearestTree::new(&first.mesh);
+                &made
+            }
+        };
         let spot = |place: DVec3| {
             let triangle = tree.nearest(place).map_or(0, |nearest| nearest.triangle);
             Spot { triangle, weights: weights(&first.mesh.corners(triangle), place) }
@@ -319,7 +328,7 @@ mod tests {
             Some(place.cast::<f64>() - DVec3::new(f64::from(WAY) - astray, -aside, 0.0))
         };
         let places: Vec<Option<DVec3>> = new.positions.iter().map(place).collect();
-        let traced = Traced { first: &first, places: &places, spacing: 1.0 };
+        let traced = Traced { first: &first, tree: None, places: &places, spacing: 1.0 };
         let out = carried(&old, new, &origins, &sources, Some(&traced));
         (out, sources)
     }
@@ -338,18 +347,29 @@ mod tests {
 
     #[test]
     fn a_texture_goes_on_without_a_seam_where_the_mesh_before_drifted() {
+        // The vertex in the middle of what was made.
+        let middle = 4 * (SIDE + 1) + 4;
         for kind in [Kind::OfVertices, Kind::OfCorners] {
             for astray in [0.0, 0.3] {
                 let (out, sources) = after(kind, astray, 0.0);
+                let mut corners_there = 0;
                 for (triangle, source) in sources.iter().enumerate() {
                     assert_eq!(mask(&out)[triangle], f64::from(u8::from(*source == Source::New)));
-                    for ([u, v], place) in corners(&out, triangle) {
+                    let names = out.mesh.triangles[triangle];
+                    for (name, ([u, v], place)) in names.into_iter().zip(corners(&out, triangle)) {
                         let off = (u - SCALE * (place.x - WAY)).abs().max((v - SCALE * place.y).abs());
                         // Away from what is kept the particles' own texture counts more and more.
                         let most = if *source == Source::New { SCALE * astray as f32 } else { 0.0 };
                         assert!(off < most + 1e-5, "{triangle}, {source:?}: {u} {v} at {place}");
+                        if name as usize == middle {
+                            // Two edges from the rim 0.475 of the difference there is left.
+                            let wanted = 0.525 * most;
+                            assert!((off - wanted).abs() < 0.05 * most + 1e-5, "{off}, not {wanted}");
+                            corners_there += 1;
+                        }
                     }
                 }
+                assert_eq!(corners_there, 6);
                 let [x, number] = [0, 1].map(|n: usize| &out.arrays[n].values);
                 for (vertex, place) in out.mesh.positions.iter().enumerate() {
                     let wanted = f64::from(place.x - WAY) + if is_made(vertex) { astray } else { 0.0 };
@@ -429,7 +449,7 @@ mod tests {
         (sources[0], sources[1], sources[torn]) = (Source::Part(0), Source::New, Source::Part(torn as u32));
         let origins: Vec<Option<u32>> = (0..old.mesh.positions.len() as u32).map(Some).collect();
         // Nothing is known of where the liquid was.
-        let traced = Traced { first: &first, places: &[], spacing: 1.0 };
+        let traced = Traced { first: &first, tree: None, places: &[], spacing: 1.0 };
         let out = carried(&old, old.mesh.clone(), &origins, &sources, Some(&traced));
         let mut wanted = mask(&old).to_vec();
         (wanted[0], wanted[1]) = (1.0, 1.0);

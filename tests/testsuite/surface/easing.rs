@@ -10,7 +10,7 @@ use frazil::io::{mesh, particles};
 
 use crate::common::character::{are_same, output};
 use crate::common::liquids::ball;
-use crate::program::{fails, kill_at, works};
+use crate::program::{command, fails, kill_at, works};
 
 /// Initial distance between particles (m).
 const SPACING: f64 = 0.01;
@@ -180,6 +180,9 @@ fn threads_kills_and_frames_made_again_give_the_same_bytes() {
     let path = |out: &str| folder.join(out);
     works(folder, &format!("{shot} -o one --threads 1"));
     are_same(&whole, &path("one"), |_| true);
+    let mut plain = command(folder, &format!("{shot} -o baseline"));
+    assert!(plain.env("FRAZIL_CPU", "baseline").status().unwrap().success());
+    are_same(&whole, &path("baseline"), |_| true);
     kill_at(folder, &format!("{shot} -o killed"), "killed/surface/surface.0005.ply");
     works(folder, &format!("{shot} -o killed"));
     are_same(&whole, &path("killed"), |_| true);

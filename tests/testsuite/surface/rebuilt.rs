@@ -4,7 +4,6 @@ use std::fs;
 use std::path::Path;
 
 use frazil::base::arrays::{MeshArray, Number, On};
-use frazil::base::mesh::coincident;
 use frazil::base::points::{Attribute, Column, Values};
 use frazil::base::topology::{Topology, bodies};
 use frazil::base::{DVec3, DetailedMesh, Points, TriMesh, Uvs, Vec3};
@@ -14,6 +13,7 @@ use serde_json::json;
 use crate::common::character::{are_same, output};
 use crate::common::clients;
 use crate::common::liquids::ball;
+use crate::common::shapes::welded;
 use crate::common::usda::numbers;
 use crate::program::{kill_at, works};
 
@@ -48,14 +48,6 @@ fn write_particles(path: &Path, places: &[DVec3], first_id: i64) {
     particles::write(path, &points, false).unwrap();
 }
 
-/// A mesh in which vertices at one place are the same.
-fn joined(mesh: &TriMesh) -> TriMesh {
-    let same = coincident(mesh.positions.iter().map(|place| place.cast()));
-    let triangles =
-        mesh.triangles.iter().map(|corners| corners.map(|corner| same[corner as usize])).collect();
-    TriMesh { positions: mesh.positions.clone(), triangles }.without_unused()
-}
-
 /// A mesh with colours, another number of its own for each vertex and each triangle, and texture coordinates in charts: u is the
 /// number of the chart, give or take less than a half.
 fn detailed(mesh: TriMesh) -> DetailedMesh {
@@ -87,7 +79,7 @@ fn write_shot(folder: &Path) -> DetailedMesh {
         let places: Vec<DVec3> = moved(-1.0).chain(moved(1.0)).collect();
         write_particles(&folder.join(format!("two.{frame:04}.bgeo")), &places, 0);
     }
-    let whole = joined(&one.mesh);
+    let whole = welded(&one.mesh);
     let mut both = TriMesh::default();
     for side in [-1.0, 1.0] {
         let moved = |place: &Vec3| (place.cast::<f64>() + middle(side, 1)).cast::<f32>();
@@ -216,6 +208,7 @@ fn balls_meet_and_part_and_the_rest_of_the_mesh_stays_as_it_is() {
             assert!(now.mesh.triangles == first.mesh.triangles && now.uvs == first.uvs, "frame {number}");
         }
         assert_eq!(counts[0] > 0, counts[1] > 0, "frame {number}: {counts:?}");
+        assert_eq!(told("matching_iterations") > 0, counts[1] > 0, "frame {number}: {counts:?}");
         rebuilt += usize::from(counts[0] > 0);
         made += counts[2];
     }
@@ -301,7 +294,7 @@ fn a_mesh_that_is_not_rebuilt_keeps_its_triangles_and_is_flagged() {
         for own in &first.arrays {
             assert!(now.arrays.contains(own), "{} at frame {number}", own.name);
         }
-        for key in ["changed_cells", "rebuilt_cells", "made_triangles"] {
+        for key in ["changed_cells", "rebuilt_cells", "made_triangles", "matching_iterations"] {
             assert_eq!(reported(folder, "out", number, key), 0, "{key} at frame {number}");
         }
         flagged += array(&now, "flagged").iter().filter(|flag| **flag == 1.0).count();
@@ -405,7 +398,7 @@ fn a_liquid_that_is_gone_takes_its_mesh_along_and_one_that_appears_is_meshed() {
     let folder = tempfile::tempdir().unwrap();
     let folder = folder.path();
     let one = ball(5.0, SIDE, 0.1);
-    mesh::write(&folder.join("one.ply"), &joined(&one.mesh)).unwrap();
+    mesh::write(&folder.join("one.ply"), &welded(&one.mesh)).unwrap();
     let (last_of_one, frames) = (3, 18);
     let far = |frame: i32| DVec3::new(1.0, -0.1 * SPACING * f64::from(frame), 0.0);
     for frame in 1..=frames {

@@ -1,0 +1,53 @@
+//! What unit tests have in common: balls of particles that lie one spacing apart, which is 1 m, their surface, and spheres.
+
+use std::collections::BTreeMap;
+
+use super::{Implicit, Isosurface, Particles};
+use crate::base::{DVec3, TriMesh};
+use crate::context::Context;
+
+/// Places of a lattice, from one distance (m) of its centre to another; from 0 on they are a ball.
+pub fn shell(centre: DVec3, from: f64, to: f64) -> Vec<DVec3> {
+    let most = to.ceil() as i32;
+    let on = || (-most..=most).map(f64::from);
+    let all = on().flat_map(|x| on().flat_map(move |y| on().map(move |z| DVec3::new(x, y, z))));
+    all.filter(|place| (from..=to).contains(&place.norm())).map(|place| place + centre).collect()
+}
+
+/// Particles at these places, numbered from 0 on, without velocities.
+pub fn numbered(places: Vec<DVec3>) -> Particles {
+    Particles { ids: (0..places.len() as i64).collect(), velocities: Vec::new(), places }
+}
+
+/// Two balls, whose centres lie at `apart` and at `-apart` (m).
+pub fn two_balls(radius: f64, apart: DVec3) -> Particles {
+    numbered([shell(apart, 0.0, radius), shell(-apart, 0.0, radius)].concat())
+}
+
+/// The surface of the particles themselves, in cells of half a spacing.
+pub fn own_surface(ctx: &Context, places: &[DVec3]) -> TriMesh {
+    let phi = Implicit::new(ctx, places, 1.0, 0.5).unwrap();
+    Isosurface::new(&phi).mesh(&phi)
+}
+
+/// Places and triangles of a unit sphere: an octahedron whose triangles were divided in four so many times.
+pub fn sphere(levels: u32) -> (Vec<DVec3>, Vec<[u32; 3]>) {
+    let mut places = vec![DVec3::x(), -DVec3::x(), DVec3::y(), -DVec3::y(), DVec3::z(), -DVec3::z()];
+    let mut triangles: Vec<[u32; 3]> =
+        vec![[0, 2, 4], [2, 1, 4], [1, 3, 4], [3, 0, 4], [2, 0, 5], [1, 2, 5], [3, 1, 5], [0, 3, 5]];
+    for _ in 0..levels {
+        let mut middles = BTreeMap::new();
+        let mut finer = Vec::new();
+        for [a, b, c] in triangles {
+            let [ab, bc, ca] = [[a, b], [b, c], [c, a]].map(|[i, j]| {
+                *middles.entry((i.min(j), i.max(j))).or_insert_with(|| {
+                    places.push((places[i as usize] + places[j as usize]).normalize());
+                    places.len() as u32 - 1
+                })
+            });
+            finer.extend([[a, ab, ca], [b, bc, ab], [c, ca, bc], [ab, bc, ca]]);
+        }
+        triangles = finer;
+    }
+    (places, triangles)
+}
