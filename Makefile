@@ -7,11 +7,18 @@ PREFIX := /usr/local
 # Chosen together, packages have the features that the tests build them with: nothing is built twice.
 BUILD := cargo build --release -p frazil -p make_scenes --lib --bin frazil --bin make_scenes
 
-.PHONY: setup demo test test-hosts test-clients test-dist sanitize skinning-numbers pictures lint gates bench header install hosts dist
+# The library without OpenVDB, with its own features: in its own folder.
+CORE := cargo build --release -p frazil --no-default-features --lib --target-dir target/core
+
+.PHONY: setup setup-core demo test test-hosts test-core test-clients test-dist sanitize skinning-numbers pictures lint gates bench header install install-core hosts hosts-core dist
 
 # Everything a build needs, from Debian's packages; quick when it is there.
 setup:
 	@./tools/setup "$(RUST_NEEDED)" $(PACKAGES)
+
+# What the core library's build needs.
+setup-core:
+	@./tools/setup "$(RUST_NEEDED)" gcc libc6-dev
 
 demo: setup
 	rm -rf $(DEMO)
@@ -53,9 +60,9 @@ lint:
 test: setup lint
 	cargo test --release
 	RUSTDOCFLAGS="-D warnings" cargo doc --release --no-deps --lib
-	cargo check --release --no-default-features --lib
 	./tools/bare-cli
 	@$(MAKE) --no-print-directory test-hosts
+	@$(MAKE) --no-print-directory test-core
 
 # The C header, from the texts in src/capi.
 header: setup
@@ -65,6 +72,11 @@ header: setup
 install: setup
 	$(BUILD)
 	./tools/install "$(DESTDIR)$(PREFIX)"
+
+# The C library without OpenVDB: make install-core [PREFIX=/usr/local] [DESTDIR=]; the PREFIX of the whole one will do.
+install-core: setup-core
+	$(CORE)
+	./tools/install-core "$(DESTDIR)$(PREFIX)"
 
 # Programs of hosts in C and C++, built against an installed library.
 hosts: setup
@@ -78,6 +90,18 @@ test-hosts: hosts
 	cmp target/frazil.h include/frazil.h
 	ctest --test-dir target/ctest --output-on-failure
 	FRAZIL_LIBRARY=target/install/lib/libfrazil.so.1 PYTHONPATH=python /usr/bin/python3 tests/python/test_frazil.py
+
+# Programs of hosts of the core library, built against an installed one.
+hosts-core: setup
+	$(CORE)
+	rm -rf target/core/install
+	./tools/install-core "$(CURDIR)/target/core/install"
+	cmake -S tests/ctest_core -B target/core/ctest -DCMAKE_PREFIX_PATH="$(CURDIR)/target/core/install" >/dev/null
+	cmake --build target/core/ctest --parallel $(shell nproc) >/dev/null
+
+test-core: hosts-core
+	./tools/core-symbols target/core/install
+	ctest --test-dir target/core/ctest --output-on-failure
 
 # AddressSanitizer and UndefinedBehaviorSanitizer on the C and C++ sides, valgrind on all programs.
 sanitize: hosts

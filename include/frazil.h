@@ -21,6 +21,10 @@
  * (fields that the header does not have get their usual values) and, within a major version of the interface, may
  * not be older: frz_context_create tells. The major version changes only when an existing function or field does.
  *
+ * FRZ_CORE: defined before this header, it leaves out all that needs OpenVDB. What then compiles is in the core library,
+ * libfrazil_core, which is frazil without OpenVDB; frazil_core.pc and the CMake target frazil::core define it. Programs
+ * that link the whole library, libfrazil, define nothing. A process holds one of the two libraries, never both.
+ *
  * A guest's manners: frazil never prints, exits, installs signal handlers, or changes the locale, the working folder
  * or the floating-point flags of a thread after a call (inside, denormal numbers count as 0). It starts no thread
  * before the first pool and ends all with the last. Results are the same bytes on any number of threads.
@@ -32,6 +36,11 @@
 
 #include <stddef.h>
 #include <stdint.h>
+
+/* Whether the library has OpenVDB. */
+#if !defined(FRZ_CORE)
+#define FRZ_HAS_OPENVDB 1
+#endif
 
 /**
  * Version of the interface that this header describes: major << 16 | minor.
@@ -53,6 +62,7 @@
  */
 #define FRZ_VERSION_PATCH 0
 
+#if defined(FRZ_HAS_OPENVDB)
 /**
  * Flag of frz_grid_save and frz_grid_to_bytes: values in 16 bits, for files that are only rendered.
  */
@@ -97,6 +107,7 @@
  * Flag of parameters of mist: a level ground lies at frz_mist_params.floor.
  */
 #define FRZ_MIST_FLOOR 2
+#endif
 
 /**
  * Status codes. Numbers never change; new ones are added at the end.
@@ -167,6 +178,7 @@ typedef uint32_t frz_status;
 #endif // __STDC_VERSION__ >= 202311L
 #endif // __cplusplus
 
+#if defined(FRZ_HAS_OPENVDB)
 /**
  * How the values of a .vdb file are packed.
  */
@@ -310,6 +322,7 @@ typedef enum frz_grid_class frz_grid_class;
 typedef uint32_t frz_grid_class;
 #endif // __STDC_VERSION__ >= 202311L
 #endif // __cplusplus
+#endif
 
 /**
  * Arrays that frz_mesh_read reads.
@@ -349,6 +362,7 @@ typedef uint32_t frz_mesh_part;
 #endif // __STDC_VERSION__ >= 202311L
 #endif // __cplusplus
 
+#if defined(FRZ_HAS_OPENVDB)
 /**
  * What frz_mist_grid makes a grid of.
  */
@@ -448,6 +462,7 @@ typedef enum frz_smoothing frz_smoothing;
 typedef uint32_t frz_smoothing;
 #endif // __STDC_VERSION__ >= 202311L
 #endif // __cplusplus
+#endif
 
 /**
  * What frz_tracker_read reads of each vertex: in the order of the mesh that the tracker was made with, until a step or frz_tracker_resculpt changes it.
@@ -597,6 +612,7 @@ typedef uint32_t frz_edit_kind;
 #endif // __STDC_VERSION__ >= 202311L
 #endif // __cplusplus
 
+#if defined(FRZ_HAS_OPENVDB)
 /**
  * The type of a grid's values.
  */
@@ -626,12 +642,14 @@ typedef uint32_t frz_value_type;
  * A layer of snow that bodies press into.
  */
 typedef struct frz_base frz_base;
+#endif
 
 /**
  * One computation: cancel flag, progress, polls, warnings, phase times. Cheap: make one for every cook.
  */
 typedef struct frz_context frz_context;
 
+#if defined(FRZ_HAS_OPENVDB)
 /**
  * Grains of snow, all of one size.
  */
@@ -642,16 +660,19 @@ typedef struct frz_grains frz_grains;
  * size, unless a file brought another transform.
  */
 typedef struct frz_grid frz_grid;
+#endif
 
 /**
  * A mesh of polygons with attributes of its vertices.
  */
 typedef struct frz_mesh frz_mesh;
 
+#if defined(FRZ_HAS_OPENVDB)
 /**
  * Powder in the air.
  */
 typedef struct frz_mist frz_mist;
+#endif
 
 /**
  * Worker threads, shared by any number of contexts.
@@ -900,6 +921,7 @@ typedef struct {
     double cell;
 } frz_repair_report;
 
+#if defined(FRZ_HAS_OPENVDB)
 /**
  * Properties of a grid.
  */
@@ -1473,6 +1495,7 @@ typedef struct {
      */
     double fastest;
 } frz_mist_report;
+#endif
 
 /**
  * How a mesh follows particles. All of it but the spacing, the cell and whether it is rebuilt may change between steps.
@@ -1903,6 +1926,7 @@ frz_status frz_mesh_repair(frz_context *context,
                            frz_mesh **out,
                            frz_repair_report *report);
 
+#if defined(FRZ_HAS_OPENVDB)
 /**
  * Destroys a grid; NULL is fine. A grid that belongs to another object stays.
  *
@@ -2810,6 +2834,7 @@ frz_status frz_mist_save(frz_context *context,
                          void *dst,
                          size_t capacity,
                          size_t *size);
+#endif
 
 /**
  * Fills parameters with the usual values; the spacing must be set.

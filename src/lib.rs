@@ -103,6 +103,7 @@ pub mod motion;
 pub mod render;
 #[cfg(feature = "scene")]
 pub mod scene;
+pub mod shallow;
 pub mod snow;
 pub mod surface;
 pub mod sweep;

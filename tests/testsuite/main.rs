@@ -88,6 +88,16 @@ mod snow {
     mod state;
     mod volumes;
 }
+mod shallow {
+    mod flooded;
+    mod probe;
+    mod state;
+    mod surface;
+    mod surface_groups;
+    mod surface_mesh;
+    mod terrain;
+    mod threads;
+}
 mod surface {
     mod command;
     mod easing;

@@ -4,7 +4,7 @@ use std::fs;
 use std::path::{Path, PathBuf};
 
 /// Each room with what it may use besides itself, `error` and `context`.
-const LAW: [(&str, &[&str]); 13] = [
+const LAW: [(&str, &[&str]); 14] = [
     ("base", &[]),
     ("io", &["base"]),
     ("vdb", &["base", "io"]),
@@ -15,16 +15,18 @@ const LAW: [(&str, &[&str]); 13] = [
     ("render", &["base", "io", "vdb"]),
     ("snow", &["base", "vdb", "motion", "sweep", "flow"]),
     ("surface", &["base", "vdb", "distance"]),
-    ("scene", &["base", "io", "vdb", "motion", "sweep", "flow", "snow", "surface"]),
-    ("capi", &["base", "io", "vdb", "motion", "sweep", "flow", "snow", "surface"]),
+    ("shallow", &["base"]),
+    ("scene", &["base", "io", "vdb", "motion", "sweep", "flow", "snow", "surface", "shallow"]),
+    ("capi", &["base", "io", "vdb", "motion", "sweep", "flow", "snow", "surface", "shallow"]),
     ("cli", &[]),
 ];
 
 /// Files besides those of vdb and capi that may contain `unsafe`.
-const UNSAFE: [&str; 8] = [
+const UNSAFE: [&str; 9] = [
     "src/base/cpu.rs",
     "src/base/lanes.rs",
     "src/context/pool.rs",
+    "src/shallow/transfer.rs",
     "src/snow/grains/collide.rs",
     "src/snow/grains/layout.rs",
     "src/snow/grains/rows.rs",

@@ -1,0 +1,35 @@
+//! The time that a frame's budget is measured in.
+
+use std::time::Instant;
+
+use rustix::time::{ClockId, Timespec, clock_gettime};
+
+/// A clock that counts from its start.
+pub enum Clock {
+    /// CPU time of the thread that started it: another process that takes the core does not shorten a frame.
+    Thread(Timespec),
+    /// Time, where several threads work.
+    Wall(Instant),
+}
+
+impl Clock {
+    /// Starts one.
+    pub fn start(are_several: bool) -> Self {
+        if are_several {
+            Self::Wall(Instant::now())
+        } else {
+            Self::Thread(clock_gettime(ClockId::ThreadCPUTime))
+        }
+    }
+
+    /// Seconds since its start.
+    pub fn seconds(&self) -> f64 {
+        match self {
+            Self::Thread(start) => {
+                let now = clock_gettime(ClockId::ThreadCPUTime);
+                (now.tv_sec - start.tv_sec) as f64 + (now.tv_nsec - start.tv_nsec) as f64 * 1e-9
+            }
+            Self::Wall(start) => start.elapsed().as_secs_f64(),
+        }
+    }
+}

@@ -1,0 +1,218 @@
+//! Where liquid comes in and goes out: sources, drains and absorbers, at the end of each step (thesis Alg. 4.1, line 5).
+//!
+//! Each moves whole units. What its rate asks for is shared equally by the columns in its circle; what is left of the division waits for the
+//! next step, so that a source delivers its rate to a unit a column.
+
+use super::columns::Columns;
+use super::flow::Flow;
+use crate::error::{Error, Result};
+
+/// A source, a drain or an absorber.
+#[derive(Debug, Clone, PartialEq)]
+pub struct FlowPoint {
+    /// What it does.
+    pub kind: Kind,
+    /// Its centre (m).
+    pub at: [f64; 3],
+    /// Columns whose centres lie within so much of it, seen from above (m); the nearest one, if none does.
+    pub radius: f64,
+    /// Volume per second (m3/s), 0 and up; 1 ml is 1e-6 m3.
+    pub rate: f64,
+    /// How the rate changes; none: it does not.
+    pub pulse: Option<Pulse>,
+}
+
+/// What a [`FlowPoint`] does.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Kind {
+    /// Liquid comes in.
+    Source,
+    /// Liquid goes out, as long as there is some below it.
+    Drain,
+    /// As a drain, until it has taken so much (m3): gauze.
+    Absorber(f64),
+}
+
+/// A rate that swings: rate (1 + share sin(2 pi frequency t)), never under 0.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Pulse {
+    /// Swings a second, 0 and up.
+    pub frequency: f64,
+    /// By which share of the rate it swings, 0 to 1.
+    pub share: f64,
+}
+
+/// A flow point on its columns.
+#[derive(Debug, Clone, PartialEq)]
+struct Placed {
+    point: FlowPoint,
+    columns: Vec<u32>,
+    /// Units asked for that have not moved.
+    waiting: f64,
+    /// Units moved so far: those that came in or went out.
+    moved: i64,
+}
+
+/// All flow points.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub struct Flows {
+    placed: Vec<Placed>,
+    /// Units that came in through all sources so far.
+    pub sourced: i64,
+    /// Units that went out through all drains so far.
+    pub drained: i64,
+    /// Units that went into all absorbers so far.
+    pub absorbed: i64,
+}
+
+impl FlowPoint {
+    /// Checks the numbers.
+    ///
+    /// # Errors
+    /// `Argument`, naming the field and its range.
+    pub fn validate(&self) -> Result<()> {
+        let [x, y, z] = self.at;
+        if !(x.is_finite() && y.is_finite() && z.is_finite()) {
+            return Err(Error::argument(format!("at = ({x}, {y}, {z}) is not finite")));
+        }
+        let positive = |name: &str, value: f64| {
+            if value >= 0.0 && value.is_finite() {
+                Ok(())
+            } else {
+                Err(Error::argument(format!("{name} = {value} is not 0 or more")))
+            }
+        };
+        positive("radius", self.radius)?;
+        positive("rate", self.rate)?;
+        if let Kind::Absorber(capacity) = self.kind {
+            positive("capacity", capacity)?;
+        }
+        let Some(pulse) = self.pulse else { return Ok(()) };
+        positive("pulse.frequency", pulse.frequency)?;
+        if !(0.0..=1.0).contains(&pulse.share) {
+            return Err(Error::argument(format!("pulse.share = {} is not within 0 to 1", pulse.share)));
+        }
+        Ok(())
+    }
+
+    fn rate_at(&self, time: f64) -> f64 {
+        let swing =
+            |pulse: Pulse| pulse.share * libm::sin(std::f64::consts::TAU * (pulse.frequency * time).fract());
+        (self.rate * (1.0 + self.pulse.map_or(0.0, swing))).max(0.0)
+    }
+
+    /// The columns in its circle: in each cell the one that the centre lies in, or is nearest to.
+    fn columns(&self, columns: &Columns) -> Vec<u32> {
+        let grid = &columns.grid;
+        let [x, y, z] = self.at;
+        let reach = self.radius / grid.cell + 1.0;
+        let range = |axis: usize, at: f64| {
+            let centre = (at - grid.origin[axis]) / grid.cell;
+            let last = grid.size[axis] as f64 - 1.0;
+            let [low, high] = [centre - reach, centre + reach].map(|at| at.floor().clamp(0.0, last) as usize);
+            low..=high
+        };
+        let mut cells: Vec<[usize; 2]> = Vec::new();
+        for row in range(1, z) {
+            for across in range(0, x) {
+                let [cx, cz] = grid.centre([across, row]);
+                if (cx - x).powi(2) + (cz - z).powi(2) <= self.radius * self.radius {
+                    cells.push([across, row]);
+                }
+            }
+        }
+        if cells.is_empty() {
+            cells.extend(grid.cell_at([x, z]));
+        }
+        let off = |i: usize| {
+            let [base, ceiling] =
+                [columns.bases()[i], columns.ceilings()[i]].map(|h| columns.heights.metres(h));
+            (base - y).max(y - ceiling).max(0.0)
+        };
+        let near = self.radius.max(2.0 * grid.cell);
+        let nearest = |cell: [usize; 2]| columns.of_cell(cell).min_by(|&i, &j| off(i).total_cmp(&off(j)));
+        cells.into_iter().filter_map(nearest).filter(|&i| off(i) <= near).map(|i| i as u32).collect()
+    }
+}
+
+impl Flows {
+    /// Sets the flow points, in place of those before; what these have moved stays in the sums. `which` names one in an error.
+    ///
+    /// # Errors
+    /// `Argument`: a number out of range, or a point that has no column within its radius (or two cells): it lies inside solid, or outside of
+    /// the domain.
+    pub fn set(
+        &mut self,
+        columns: &Columns,
+        points: &[FlowPoint],
+        which: impl Fn(usize) -> String,
+    ) -> Result<()> {
+        let mut placed = Vec::with_capacity(points.len());
+        for (at, point) in points.iter().enumerate() {
+            point.validate().map_err(|error| Error::argument(format!("{}: {error}", which(at))))?;
+            let found = point.columns(columns);
+            if found.is_empty() {
+                let [x, y, z] = point.at;
+                return Err(Error::argument(format!(
+                    "{}: at ({x}, {y}, {z}) there is only solid, or it lies outside of the domain",
+                    which(at)
+                )));
+            }
+            placed.push(Placed { point: point.clone(), columns: found, waiting: 0.0, moved: 0 });
+        }
+        self.placed = placed;
+        Ok(())
+    }
+
+    /// Units that a flow point has moved since it was set.
+    pub fn moved(&self, point: usize) -> i64 {
+        self.placed[point].moved
+    }
+
+    /// What each flow point does, waits for and has moved (units), in their order: its part of a saved state.
+    pub(super) fn progress(&self) -> impl ExactSizeIterator<Item = (Kind, f64, i64)> + '_ {
+        self.placed.iter().map(|placed| (placed.point.kind, placed.waiting, placed.moved))
+    }
+
+    /// Puts what a flow point waits for and has moved in place.
+    pub(super) fn set_progress(&mut self, point: usize, waiting: f64, moved: i64) {
+        let placed = &mut self.placed[point];
+        (placed.waiting, placed.moved) = (waiting, moved);
+    }
+
+    /// Moves what the points ask for in a step of `dt` that begins at `time` (s).
+    pub fn step(&mut self, columns: &Columns, flow: &mut Flow, time: f64, dt: f64) {
+        let volume = columns.grid.cell * columns.grid.cell * columns.heights.unit;
+        for placed in &mut self.placed {
+            let sum = match placed.point.kind {
+                Kind::Source => &mut self.sourced,
+                Kind::Drain => &mut self.drained,
+                Kind::Absorber(_) => &mut self.absorbed,
+            };
+            *sum += placed.step(columns, flow, volume, time, dt);
+        }
+    }
+}
+
+impl Placed {
+    /// Moves what the point asks for; returns the units moved.
+    fn step(&mut self, columns: &Columns, flow: &mut Flow, volume: f64, time: f64, dt: f64) -> i64 {
+        self.waiting += self.point.rate_at(time + 0.5 * dt) * dt / volume;
+        let count = self.columns.len() as f64;
+        let mut share = (self.waiting / count).floor().min(1e18) as i64;
+        if let Kind::Absorber(capacity) = self.point.kind {
+            let left = ((capacity / volume - self.moved as f64) / count).floor();
+            share = share.min(left.clamp(0.0, 1e18) as i64);
+        }
+        let sign = if self.point.kind == Kind::Source { 1 } else { -1 };
+        let add = |&column: &u32| flow.add(columns, column as usize, sign * share);
+        let moved = sign * self.columns.iter().map(add).sum::<i64>();
+        self.moved += moved;
+        self.waiting -= moved as f64;
+        if sign < 0 {
+            // A drain over a dry place does not make up for it later.
+            self.waiting = self.waiting.min(count);
+        }
+        moved
+    }
+}

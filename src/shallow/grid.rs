@@ -1,0 +1,106 @@
+//! Cells seen from above, and heights as integers.
+
+use crate::error::{Error, Result};
+
+/// The highest integer height; heights lie from 0 to this, so that sums of two of them fit 32 bits.
+pub const TOP: i32 = 1 << 30;
+/// The bottom of a solid that reaches down for ever.
+pub const BOTTOMLESS: i32 = i32::MIN;
+/// Most cells along an axis.
+pub const MOST_CELLS: usize = 1 << 16;
+
+/// Square cells on the ground: x to the east, z to the south.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Grid {
+    /// Edge of a cell (m).
+    pub cell: f64,
+    /// The corner of cell (0, 0) with the least x and z (m).
+    pub origin: [f64; 2],
+    /// Count of cells along x and along z.
+    pub size: [usize; 2],
+}
+
+impl Grid {
+    /// Checks the numbers.
+    ///
+    /// # Errors
+    /// `Argument`: a cell that is not positive and finite, an origin that is not finite, no cell or over 65,536 along an
+    /// axis.
+    pub fn validate(&self) -> Result<()> {
+        let [nx, nz] = self.size;
+        let [x, z] = self.origin;
+        if !(self.cell > 0.0 && self.cell.is_finite()) {
+            return Err(Error::argument(format!("a cell of {} m is not a positive length", self.cell)));
+        }
+        if !x.is_finite() || !z.is_finite() {
+            return Err(Error::argument(format!("the origin ({x}, {z}) is not finite")));
+        }
+        if !(1..=MOST_CELLS).contains(&nx) || !(1..=MOST_CELLS).contains(&nz) {
+            return Err(Error::argument(format!(
+                "{nx} x {nz} cells are not within 1 x 1 to {MOST_CELLS} x {MOST_CELLS}"
+            )));
+        }
+        Ok(())
+    }
+
+    /// Count of cells.
+    pub fn cells(&self) -> usize {
+        self.size[0] * self.size[1]
+    }
+
+    /// Index of a cell: rows along x, from the least z.
+    pub fn index(&self, [x, z]: [usize; 2]) -> usize {
+        z * self.size[0] + x
+    }
+
+    /// Centre of a cell (m).
+    pub fn centre(&self, [x, z]: [usize; 2]) -> [f64; 2] {
+        [self.origin[0] + (x as f64 + 0.5) * self.cell, self.origin[1] + (z as f64 + 0.5) * self.cell]
+    }
+
+    /// The cell at a place (m), if it is within.
+    pub fn cell_at(&self, [x, z]: [f64; 2]) -> Option<[usize; 2]> {
+        let at = [(x - self.origin[0]) / self.cell, (z - self.origin[1]) / self.cell].map(f64::floor);
+        let within =
+            at[0] >= 0.0 && at[1] >= 0.0 && at[0] < self.size[0] as f64 && at[1] < self.size[1] as f64;
+        within.then_some(at.map(|index| index as usize))
+    }
+}
+
+/// Heights as integers: `low + n unit`, n from 0 to [`TOP`].
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Heights {
+    /// Height of 0 (m).
+    pub low: f64,
+    /// One unit (m): the range / 2^30.
+    pub unit: f64,
+}
+
+impl Heights {
+    /// Heights from `low` to `high` (m).
+    ///
+    /// # Errors
+    /// `Argument` unless both are finite and `high` is above `low`.
+    pub fn between(low: f64, high: f64) -> Result<Self> {
+        let unit = (high - low) / f64::from(TOP);
+        if !(low.is_finite() && unit.is_finite() && unit > 0.0) {
+            return Err(Error::argument(format!("heights from {low} to {high} m are not a range")));
+        }
+        Ok(Self { low, unit })
+    }
+
+    /// The nearest integer height; those outside of the range become its ends.
+    pub fn round(&self, height: f64) -> i32 {
+        ((height - self.low) / self.unit).round().clamp(0.0, f64::from(TOP)) as i32
+    }
+
+    /// The height of an integer (m).
+    pub fn metres(&self, height: i32) -> f64 {
+        self.low + f64::from(height) * self.unit
+    }
+
+    /// A difference of heights (m).
+    pub fn length(&self, units: f64) -> f64 {
+        units * self.unit
+    }
+}

@@ -1,0 +1,39 @@
+//! Small amounts of liquid in real time: virtual pipes between columns, with the right viscosity (thesis chapter 4).
+//!
+//! Words: a *cell* is a square of the ground; a *column* the room for liquid above a solid of a cell, from its *base* to its *ceiling*; a *layer* the
+//! place of a column from the bottom of its cell; a *pipe* joins columns of adjacent cells; a *flux* is what flows through it, a *transfer* what it moves
+//! in a step; a *unit* is the smallest difference of heights and depths, which are integers, so that liquid is neither lost nor made.
+
+pub mod active;
+pub mod bands;
+mod clock;
+pub mod columns;
+pub mod flow;
+pub mod flows;
+pub mod flux;
+pub mod grid;
+mod heads;
+mod identity;
+pub mod links;
+pub mod liquid;
+pub mod pace;
+pub mod params;
+pub mod parts;
+pub mod pipes;
+pub mod places;
+pub mod pressure;
+pub mod probe;
+mod rounds;
+pub mod rows;
+pub mod scale;
+pub mod snapshot;
+mod state;
+pub mod surface;
+pub mod system;
+pub mod terrain;
+pub mod transfer;
+
+pub use params::Params;
+pub use probe::{Reading, View};
+pub use snapshot::Snapshot;
+pub use system::{Balance, Report, Shallow};

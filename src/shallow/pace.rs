@@ -1,0 +1,90 @@
+//! How long a step may be, and what the pipes share in it (thesis 4.3, Fig. 4.12).
+
+use super::flux::{Step, Thinning};
+use super::grid::TOP;
+use super::params::{Pace, Params, Section};
+
+/// Steps are this much shorter than the bound of stability.
+const SAFETY: f64 = 0.9;
+/// Most steps in a frame: a frame that needs more is refused.
+pub const MOST_STEPS: u32 = 1_000_000;
+
+/// The domain's measures that steps depend on.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Measures {
+    /// Edge of a cell (m).
+    pub cell: f64,
+    /// A unit of height (m).
+    pub unit: f64,
+    /// Most pipes of a column.
+    pub pipes: usize,
+}
+
+/// The longest stable step (s) with liquid of a depth (m): the largest dt with P g A' dt^2 / dx^2 <= 1/q + zeta, for P pipes a column, and
+/// 1/q = 1 + 3 dt nu / H^2. With four pipes and nothing lost this is dt = dx / (c sqrt 2).
+pub fn longest(params: &Params, measures: &Measures, depth: f64, frame: f64) -> f64 {
+    let g = -params.gravity[1];
+    let height = if params.section == Section::Wetted { depth } else { measures.cell };
+    let a = measures.pipes as f64 * g * height / (measures.cell * measures.cell);
+    let b = if depth > 0.0 { 3.0 * params.liquid.least_viscosity() / (depth * depth) } else { 0.0 };
+    let c = 1.0 + libm::pow(params.kept, frame);
+    if a <= 0.0 || !b.is_finite() {
+        return frame;
+    }
+    SAFETY * (b + (b * b + 4.0 * a * c).sqrt()) / (2.0 * a)
+}
+
+/// The greatest depth (m) in a pipe's section for which steps of `dt` are stable without viscosity.
+fn deepest_section(params: &Params, measures: &Measures, dt: f64) -> f64 {
+    let waves = measures.pipes as f64 * -params.gravity[1] * dt * dt / (measures.cell * measures.cell);
+    SAFETY * SAFETY * (1.0 + libm::pow(params.kept, dt)) / waves
+}
+
+/// Where a frame is when its next step is chosen.
+pub struct Next<'a> {
+    /// Parameters.
+    pub params: &'a Params,
+    /// Measures of the domain.
+    pub measures: &'a Measures,
+    /// What is left of the frame (s).
+    pub left: f64,
+    /// Greatest depth (m).
+    pub deepest: f64,
+    /// Steps made in this frame.
+    pub steps: u32,
+}
+
+/// The length of the next step (s).
+pub fn next(at: &Next) -> f64 {
+    let longest = match at.params.pace {
+        Pace::Exact => longest(at.params, at.measures, at.deepest, at.left),
+        Pace::Realtime(longest) => longest,
+    };
+    // Rounding of what is left is no reason for another step.
+    at.left / (at.left / longest - 1e-9).ceil().max(1.0)
+}
+
+/// What the pipes share in a step of `dt` after one of `last` (s).
+pub fn step(params: &Params, measures: &Measures, dt: f64, last: f64) -> Step {
+    let Measures { cell, unit, .. } = *measures;
+    let [x, y, z] = params.gravity;
+    let section = match (params.section, params.pace) {
+        (Section::Whole, _) => cell / unit,
+        (Section::Wetted, Pace::Exact) => f64::from(TOP),
+        (Section::Wetted, Pace::Realtime(_)) => deepest_section(params, measures, dt) / unit,
+    };
+    let lean = |along: f64| (along / -y * cell / unit).round().clamp(-1e9, 1e9) as i32;
+    Step {
+        kept: (libm::pow(params.kept, dt) * dt / last) as f32,
+        drive: (dt * dt * -y * unit / (cell * cell)) as f32,
+        drag: (3.0 * dt * params.liquid.viscosity / (unit * unit)).min(1e36) as f32,
+        section: section as f32,
+        is_whole: params.section == Section::Whole,
+        thinning: params.liquid.thinning.map(|law| Thinning {
+            shear: (3.0 * law.time * cell / (last * unit)).min(1e30) as f32,
+            thinnest: (law.thinnest / params.liquid.viscosity) as f32,
+            power: ((law.power - 1.0) / 2.0) as f32,
+        }),
+        tilt: [lean(x), lean(z)],
+    }
+}

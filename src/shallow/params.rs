@@ -1,0 +1,85 @@
+//! What a user chooses.
+
+use super::liquid::Liquid;
+use super::pipes::Border;
+use crate::error::{Error, Result};
+
+/// Parameters of the flow.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Params {
+    /// What flows; blood.
+    pub liquid: Liquid,
+    /// Gravity (m/s2), which may turn, but points down; (0, -9.81, 0).
+    pub gravity: [f64; 3],
+    /// omega: the share of a flux that is kept in a second, 0 to 1; 0.5 (thesis 4.1.1). At 1 nothing is lost but by viscosity.
+    pub kept: f64,
+    /// How a frame is divided into steps.
+    pub pace: Pace,
+    /// What lies beyond the border of the domain; a wall. Chosen once.
+    pub border: Border,
+    /// The section A of a pipe in Eq. 4.1.
+    pub section: Section,
+}
+
+/// How a frame is divided into steps.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Pace {
+    /// As many as stability needs.
+    Exact,
+    /// Of at most this length (s): where liquid is too deep for that, its waves slow down, and films stay as they are. 0.003 in the thesis
+    /// (Table 4.1).
+    Realtime(f64),
+}
+
+/// The section of a pipe.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub enum Section {
+    /// dx H: what is wet.
+    #[default]
+    Wetted,
+    /// dx^2, as the thesis has it: for comparison.
+    Whole,
+}
+
+impl Default for Params {
+    fn default() -> Self {
+        Self {
+            liquid: Liquid::BLOOD,
+            gravity: [0.0, -9.81, 0.0],
+            kept: 0.5,
+            pace: Pace::Realtime(0.003),
+            border: Border::default(),
+            section: Section::default(),
+        }
+    }
+}
+
+impl Params {
+    /// Checks the numbers.
+    ///
+    /// # Errors
+    /// `Argument`, naming the field and its range.
+    pub fn validate(&self) -> Result<()> {
+        self.liquid.validate()?;
+        let [x, y, z] = self.gravity;
+        if !(x.is_finite() && z.is_finite() && (-1e3..=-1e-3).contains(&y)) {
+            return Err(Error::argument(format!(
+                "gravity = ({x}, {y}, {z}) m/s2 does not point down, by 0.001 to 1000"
+            )));
+        }
+        if x.abs().max(z.abs()) > -y {
+            return Err(Error::argument(format!(
+                "gravity = ({x}, {y}, {z}) m/s2 leans by more than 45 degrees"
+            )));
+        }
+        if !(0.0..=1.0).contains(&self.kept) {
+            return Err(Error::argument(format!("kept = {} is not within 0 to 1", self.kept)));
+        }
+        match self.pace {
+            Pace::Realtime(longest) if !(1e-6..=1.0).contains(&longest) => {
+                Err(Error::argument(format!("a longest step of {longest} s is not within 0.000001 to 1")))
+            }
+            _ => Ok(()),
+        }
+    }
+}

@@ -1,0 +1,288 @@
+//! A triangle mesh of the liquid's surface (thesis 4.2.1 to 4.2.3), written into the caller's buffers.
+//!
+//! It needs [`Columns`] and a depth for each of their indices, and so serves any solver of height fields (thesis 4.4). Every wet column
+//! whose surface reaches that of neighbours becomes a vertex at the centre of its cell, and so do the dry columns around them.
+//!
+//! | word | meaning |
+//! |---|---|
+//! | height | eta, the level of a column's surface: its base and the depth (units); of a dry column its base |
+//! | room | [min, max) of a column: from the underside of its solid to its ceiling; the rooms of a cell do not overlap |
+//! | linked | of two columns of neighbouring cells (8), one of them wet: each one's room holds the other's height |
+//! | quartet | the columns of 2 x 2 cells; named by the north-west cell (least x and z) |
+//! | group | four columns of a quartet, or three that are not part of four, in which all pairs with a wet column are linked |
+//! | full | of a quartet and a layer: its four columns are a group |
+//! | odd | of a quartet: a wet column in it is not in a full group, and it is searched for groups column by column |
+//! | wall | a column whose solid a neighbour's surface ends at, below the neighbour's ceiling |
+//! | extra | a vertex within a wall, which the surface below it goes on to |
+//!
+//! Two dry columns of a group need no link. Groups become two triangles or one, which face up; a group of four is divided between two
+//! columns that are both wet or both dry where only one diagonal is so, between the wet ones where both are, else where the sum of the
+//! heights is greater, else from north-west to south-east. The surface ends at the centres of the outermost cells.
+//!
+//! Where a group of four lacks one link, of two cells side by side, its two triangles overlap ([`Check::doubled`]): the liquid of these
+//! columns is at different layers there.
+
+mod boundary;
+mod cells;
+mod check;
+mod full;
+mod groups;
+mod indices;
+mod links;
+mod normals;
+mod room;
+mod strips;
+mod vertices;
+
+use super::columns::{Columns, NONE, STRIP};
+use crate::error::{Error, Result};
+use boundary::{Around, Walls};
+pub use check::{Check, check};
+use groups::Search;
+use links::Scene;
+use normals::Normals;
+pub use room::bound;
+use strips::Found;
+use vertices::Vertices;
+
+/// The liquid in columns.
+#[derive(Debug, Clone, Copy, Default)]
+pub struct Depths<'a> {
+    /// Depth of each index (units): at most from base to ceiling; 0 or less is dry, and so are indices without a column.
+    pub depth: &'a [i32],
+    /// Mean velocity of each index along x and z (m/s); may be empty.
+    pub velocity: &'a [[f32; 2]],
+    /// Whether each strip may have a wet column; without it all are searched.
+    pub active: Option<&'a [bool]>,
+}
+
+/// The axis that points up.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
+pub enum Up {
+    /// Y: x to the east, z to the south.
+    #[default]
+    Y,
+    /// Z: x to the east, y to the north.
+    Z,
+}
+
+/// How the mesh is written. Triangles are counter-clockwise seen from above; with `left_handed` clockwise. In each case the cross product of
+/// a triangle's edges points along its normals.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Layout {
+    /// The caller's units in a metre: 1, or 100 for centimetres. For positions, depths and velocities.
+    pub scale: f64,
+    /// The axis that points up.
+    pub up: Up,
+    /// Left-handed axes: the horizontal axis that is not x points the other way (Y up: z to the north; Z up: y to the south).
+    pub left_handed: bool,
+    /// Least height of a wet vertex above its base (m), against flicker where the terrain is drawn too (thesis 4.2.4: 0.05 of a cell).
+    pub least_depth: f64,
+    /// Depth from which the liquid is opaque (m), for [`Target::opacities`].
+    pub opaque_depth: f64,
+}
+
+impl Default for Layout {
+    fn default() -> Self {
+        Self { scale: 1.0, up: Up::Y, left_handed: false, least_depth: 0.0, opaque_depth: 0.01 }
+    }
+}
+
+/// Where vertex indices go.
+#[derive(Debug, Default)]
+pub enum Indices<'a> {
+    /// Nowhere.
+    #[default]
+    None,
+    /// 16 bits: for at most 65,536 vertices.
+    U16(&'a mut [u16]),
+    /// 32 bits.
+    U32(&'a mut [u32]),
+}
+
+/// Buffers of the caller. They are written from their beginning, in order, and never read, and may be longer than the mesh; those that are
+/// absent are not wanted. Vertices are in order of their columns' indices, extras behind them.
+#[derive(Debug, Default)]
+pub struct Target<'a> {
+    /// Three numbers a vertex (m x scale).
+    pub positions: Option<&'a mut [f32]>,
+    /// Three numbers a vertex: a unit vector.
+    pub normals: Option<&'a mut [f32]>,
+    /// One number a vertex (m x scale); dry and extra: 0.
+    pub depths: Option<&'a mut [f32]>,
+    /// One number a vertex: depth / [`Layout::opaque_depth`], at most 1 (thesis 4.2.2).
+    pub opacities: Option<&'a mut [f32]>,
+    /// Three numbers a vertex (m/s x scale): velocity at the surface, 1.5 times the mean (Eq. 4.4); nothing upward.
+    pub velocities: Option<&'a mut [f32]>,
+    /// Layer of each vertex's column; of an extra, the lowest of the wet columns around whose surface ends there.
+    pub layers: Option<&'a mut [u32]>,
+    /// Index of each vertex's column; [`NONE`] for an extra.
+    pub columns: Option<&'a mut [u32]>,
+    /// Three a triangle.
+    pub indices: Indices<'a>,
+}
+
+/// Size of a mesh.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
+pub struct Counts {
+    /// Count of vertices.
+    pub vertices: usize,
+    /// Of these, extras.
+    pub extras: usize,
+    /// Count of vertex indices: three for each triangle.
+    pub indices: usize,
+}
+
+/// Makes surfaces; keeps its memory from one to the next.
+#[derive(Debug, Default)]
+pub struct Surface {
+    /// Strips above each other in the columns of the last call of `reserve`, or the first.
+    above: Vec<u32>,
+    found: Found,
+    walls: Walls,
+    search: Search,
+    normals: Normals,
+    around: Around,
+}
+
+impl Surface {
+    /// Makes room for whatever liquid these columns may hold: from then on [`Surface::build`] allocates nothing for them.
+    pub fn reserve(&mut self, columns: &Columns) {
+        let layers = columns.strips().iter().map(|strip| strip.layer as usize + 1).max().unwrap_or(0);
+        links::find_above(columns, &mut self.above);
+        self.found.reset(columns);
+        self.normals.reset(columns);
+        self.walls.reserve(room::Walls::of(columns).pairs, layers);
+        self.search.reserve(layers);
+        self.around.reserve();
+    }
+
+    /// Size of the mesh that [`Surface::build`] would write.
+    ///
+    /// # Errors
+    /// As [`Surface::build`], of the depths.
+    pub fn count(&mut self, columns: &Columns, depths: &Depths<'_>) -> Result<Counts> {
+        let len = columns.len();
+        if depths.depth.len() != len {
+            return Err(Error::argument(format!(
+                "{} depths are not one for each of {len} indices",
+                depths.depth.len()
+            )));
+        }
+        if !depths.velocity.is_empty() && depths.velocity.len() != len {
+            let count = depths.velocity.len();
+            return Err(Error::argument(format!("{count} velocities are not one for each of {len} indices")));
+        }
+        if let Some(active) = depths.active.filter(|active| active.len() != len / STRIP) {
+            let (count, strips) = (active.len(), len / STRIP);
+            return Err(Error::argument(format!(
+                "{count} flags of activity are not one for each of {strips} strips"
+            )));
+        }
+        if self.above.len() != len / STRIP {
+            links::find_above(columns, &mut self.above);
+        }
+        let scene = Scene { columns, depth: depths.depth, above: &self.above };
+        self.found.reset(columns);
+        self.walls.clear();
+        full::find_wet(scene, depths.active, &mut self.found);
+        full::find_full(scene, &mut self.found);
+        let mut triangles = self.found.full_triangles;
+        triangles += groups::find_groups(scene, &mut self.found, &mut self.walls, &mut self.search);
+        let columns_used = self.found.number(columns);
+        let extras = self.walls.number(columns_used);
+        self.found.has_means |= extras > 0;
+        Ok(Counts {
+            vertices: (columns_used + extras) as usize,
+            extras: extras as usize,
+            indices: 3 * triangles,
+        })
+    }
+
+    /// Writes the mesh of the liquid's surface and returns its size; [`bound`] is the most that it can be.
+    ///
+    /// # Errors
+    /// `Argument`, and nothing is written: arrays of depths, velocities or activity of another length than the columns'; velocities are
+    /// wanted and none given; a scale or opaque depth that is not positive and finite, a least depth that is negative or not finite; a
+    /// buffer that is too short; over 65,536 vertices for indices of 16 bits.
+    pub fn build(
+        &mut self,
+        columns: &Columns,
+        depths: &Depths<'_>,
+        layout: &Layout,
+        target: &mut Target<'_>,
+    ) -> Result<Counts> {
+        layout.validate()?;
+        if target.velocities.is_some() && depths.velocity.is_empty() && !depths.depth.is_empty() {
+            return Err(Error::argument("velocities of the surface are wanted, and the liquid has none"));
+        }
+        let counts = self.count(columns, depths)?;
+        target.check(&counts)?;
+        let scene = Scene { columns, depth: depths.depth, above: &self.above };
+        let (found, walls) = (&self.found, &self.walls.list);
+        indices::write_triangles(
+            scene,
+            found,
+            walls,
+            &mut self.search,
+            layout.left_handed,
+            &mut target.indices,
+        );
+        self.normals.reset(columns);
+        let vertices = Vertices::new(scene, found, walls, depths.velocity, layout, target.normals.is_some());
+        vertices.write(&mut self.normals, &mut self.around, target);
+        self.normals.clear(found);
+        Ok(counts)
+    }
+}
+
+impl Layout {
+    fn validate(&self) -> Result<()> {
+        let positive = |name: &str, value: f64| {
+            if value > 0.0 && value.is_finite() {
+                Ok(())
+            } else {
+                Err(Error::argument(format!("{name} = {value} is not positive and finite")))
+            }
+        };
+        positive("scale", self.scale)?;
+        positive("opaque_depth", self.opaque_depth)?;
+        if !(self.least_depth >= 0.0 && self.least_depth.is_finite()) {
+            let value = self.least_depth;
+            return Err(Error::argument(format!("least_depth = {value} is not finite and 0 or more")));
+        }
+        Ok(())
+    }
+}
+
+impl Target<'_> {
+    /// Whether the mesh fits.
+    fn check(&self, counts: &Counts) -> Result<()> {
+        let fits = |name: &str, room: Option<usize>, needed: usize| match room {
+            Some(room) if room < needed => Err(Error::argument(format!(
+                "{name} has room for {room} numbers, and the surface has {needed}"
+            ))),
+            _ => Ok(()),
+        };
+        let count = counts.vertices;
+        fits("positions", self.positions.as_ref().map(|out| out.len()), 3 * count)?;
+        fits("normals", self.normals.as_ref().map(|out| out.len()), 3 * count)?;
+        fits("depths", self.depths.as_ref().map(|out| out.len()), count)?;
+        fits("opacities", self.opacities.as_ref().map(|out| out.len()), count)?;
+        fits("velocities", self.velocities.as_ref().map(|out| out.len()), 3 * count)?;
+        fits("layers", self.layers.as_ref().map(|out| out.len()), count)?;
+        fits("columns", self.columns.as_ref().map(|out| out.len()), count)?;
+        let room = match &self.indices {
+            Indices::None => None,
+            Indices::U16(out) => Some(out.len()),
+            Indices::U32(out) => Some(out.len()),
+        };
+        fits("indices", room, counts.indices)?;
+        if matches!(self.indices, Indices::U16(_)) && count > 1 << 16 {
+            return Err(Error::argument(format!(
+                "{count} vertices are too many for indices of 16 bits: take those of 32"
+            )));
+        }
+        Ok(())
+    }
+}

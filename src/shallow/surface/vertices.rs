@@ -1,0 +1,295 @@
+//! Writes vertices into the caller's buffers: in order, and without reading them.
+
+use super::boundary::{Around, Wall, walls_of};
+use super::links::Scene;
+use super::normals::{Normals, Shown, upright};
+use super::strips::{Found, Span, places};
+use super::{Layout, NONE, STRIP, Target, Up};
+use crate::base::cpu::dispatch;
+use crate::shallow::grid::TOP;
+
+/// Velocity at the surface over the mean (Eq. 4.4).
+const SURFACE_SPEED: f32 = 1.5;
+
+/// What vertices are made of.
+pub(super) struct Vertices<'a> {
+    shown: Shown<'a>,
+    found: &'a Found,
+    walls: &'a [Wall],
+    velocity: &'a [[f32; 2]],
+    wants_normals: bool,
+    z_up: bool,
+    /// Sign of z.
+    sign: f32,
+    /// Height of 0, and of a unit; centre of cell (0, 0), and edge of a cell (m x scale).
+    low: f32,
+    unit: f32,
+    origin: [f32; 2],
+    cell: f32,
+    /// Speed at the surface (m/s x scale) over the mean speed (m/s); opacity of a unit.
+    speed: f32,
+    opacity: f32,
+}
+
+/// A vertex, y up.
+struct Vertex {
+    position: [f32; 3],
+    normal: [f32; 3],
+    velocity: [f32; 2],
+    depth: i32,
+    layer: u32,
+    column: u32,
+}
+
+/// Wet columns in a row of a span, with wet ones linked by full quartets on all sides.
+#[derive(Clone, Copy)]
+struct Run {
+    /// First index.
+    first: usize,
+    /// Count of indices.
+    len: usize,
+}
+
+impl<'a> Vertices<'a> {
+    pub fn new(
+        scene: Scene<'a>,
+        found: &'a Found,
+        walls: &'a [Wall],
+        velocity: &'a [[f32; 2]],
+        layout: &Layout,
+        wants_normals: bool,
+    ) -> Self {
+        let (grid, heights) = (&scene.columns.grid, &scene.columns.heights);
+        let scale = layout.scale;
+        let least = (layout.least_depth / heights.unit).round().min(f64::from(TOP)) as i32;
+        let slope = (0.5 * heights.unit / grid.cell) as f32;
+        Self {
+            shown: Shown { scene, least, slope },
+            found,
+            walls,
+            velocity,
+            wants_normals,
+            z_up: layout.up == Up::Z,
+            sign: if layout.left_handed == (layout.up == Up::Y) { -1.0 } else { 1.0 },
+            low: (heights.low * scale) as f32,
+            unit: (heights.unit * scale) as f32,
+            origin: grid.centre([0, 0]).map(|centre| (centre * scale) as f32),
+            cell: (grid.cell * scale) as f32,
+            speed: SURFACE_SPEED * scale as f32,
+            opacity: (heights.unit / layout.opaque_depth) as f32,
+        }
+    }
+
+    /// Writes all vertices.
+    pub fn write(&self, normals: &mut Normals, around: &mut Around, target: &mut Target<'_>) {
+        let vertices = self;
+        dispatch!(write_spans(
+            vertices: &Vertices<'_>,
+            normals: &mut Normals,
+            around: &mut Around,
+            target: &mut Target<'_>
+        ))
+    }
+
+    /// A height (m x scale) of units.
+    #[inline(always)]
+    fn height(&self, units: f32) -> f32 {
+        self.low + units * self.unit
+    }
+
+    /// Centre of a column or row of cells (m x scale).
+    #[inline(always)]
+    fn centre(&self, axis: usize, cell: i32) -> f32 {
+        self.origin[axis] + cell as f32 * self.cell
+    }
+
+    /// A vertex that takes the mean of wet columns around cell (x, z).
+    fn mean(&self, [x, z]: [usize; 2], normals: &mut Normals, around: &Around) -> Vertex {
+        let height = self.height(around.mean_height(|index| self.shown.height(index)) as f32);
+        let mut normal = [0.0, 1.0, 0.0];
+        if self.wants_normals {
+            let [x, y, z] = around.sum(|index| normals.of(&self.shown, self.found, index));
+            let length = ((x * x + z * z) + y * y).sqrt();
+            if length > 0.0 {
+                normal = [x / length, y / length, z / length];
+            }
+        }
+        let mut velocity = [0.0; 2];
+        if !self.velocity.is_empty() {
+            velocity = around.sum(|index| self.velocity[index]).map(|sum| sum / around.len().max(1) as f32);
+        }
+        let position = [self.centre(0, x as i32), height, self.centre(1, z as i32)];
+        Vertex { position, normal, velocity, depth: 0, layer: 0, column: NONE }
+    }
+
+    /// The vertex of a column.
+    fn vertex(&self, index: usize, normals: &mut Normals, around: &mut Around) -> Vertex {
+        let scene = self.shown.scene;
+        let ([x, z], layer) = (scene.columns.cell(index), scene.columns.layer(index) as u32);
+        if !scene.is_wet(index) {
+            let mut walls = walls_of(self.walls, index as u32);
+            match walls.find(|&wall| self.walls[wall].is_own) {
+                Some(own) => around.take_wall(scene, &self.walls[own]),
+                None => around.take_linked(scene, index),
+            }
+            return Vertex { layer, column: index as u32, ..self.mean([x, z], normals, around) };
+        }
+        let height = self.height(self.shown.height(index) as f32);
+        Vertex {
+            position: [self.centre(0, x as i32), height, self.centre(1, z as i32)],
+            normal: if self.wants_normals {
+                normals.of(&self.shown, self.found, index)
+            } else {
+                [0.0, 1.0, 0.0]
+            },
+            velocity: self.velocity.get(index).copied().unwrap_or_default(),
+            depth: scene.depth[index],
+            layer,
+            column: index as u32,
+        }
+    }
+
+    /// Writes one vertex.
+    fn put(&self, at: usize, vertex: &Vertex, target: &mut Target<'_>) {
+        let put = |out: &mut Option<&mut [f32]>, [x, up, z]: [f32; 3]| {
+            if let Some(out) = out {
+                out[3 * at..][..3].copy_from_slice(&self.order(x, up, z * self.sign));
+            }
+        };
+        let [u, w] = vertex.velocity.map(|speed| speed * self.speed);
+        put(&mut target.positions, vertex.position);
+        put(&mut target.normals, vertex.normal);
+        put(&mut target.velocities, [u, 0.0, w]);
+        if let Some(out) = &mut target.depths {
+            out[at] = vertex.depth as f32 * self.unit;
+        }
+        if let Some(out) = &mut target.opacities {
+            out[at] = (vertex.depth as f32 * self.opacity).min(1.0);
+        }
+        if let Some(out) = &mut target.layers {
+            out[at] = vertex.layer;
+        }
+        if let Some(out) = &mut target.columns {
+            out[at] = vertex.column;
+        }
+    }
+
+    /// Axes in the caller's order.
+    #[inline(always)]
+    fn order(&self, x: f32, up: f32, z: f32) -> [f32; 3] {
+        if self.z_up { [x, z, up] } else { [x, up, z] }
+    }
+
+    /// Writes the vertices of a run of a span, from `at` on.
+    #[inline(always)]
+    fn put_run(&self, span: &Span, run: Run, at: usize, target: &mut Target<'_>) {
+        let columns = self.shown.scene.columns;
+        let (bases, depths) = (columns.bases(), self.shown.scene.depth);
+        let strip = columns.strips()[span.first];
+        let Run { first, len } = run;
+        let step = first - span.first * STRIP;
+        let depth = &depths[first..][..len];
+        if let Some(out) = &mut target.positions {
+            let z = self.centre(1, strip.row as i32) * self.sign;
+            let cells = (strip.at as usize * STRIP + step) as i32..;
+            let out = vectors(out, at, len);
+            for (((out, base), depth), cell) in
+                out.iter_mut().zip(&bases[first..][..len]).zip(depth).zip(cells)
+            {
+                let height = self.height(base.wrapping_add((*depth).max(self.shown.least)) as f32);
+                *out = self.order(self.centre(0, cell), height, z);
+            }
+        }
+        if let Some(out) = &mut target.normals {
+            let (north, south) = (span.north as usize * STRIP + step, span.south as usize * STRIP + step);
+            let row = |first: usize| bases[first..][..len].iter().zip(&depths[first..][..len]);
+            let height = |(base, depth): (&i32, &i32)| base.wrapping_add((*depth).max(self.shown.least));
+            let across = row(first - 1).map(height).zip(row(first + 1).map(height));
+            let along = row(north).map(height).zip(row(south).map(height));
+            for ((out, (west, east)), (north, south)) in
+                vectors(out, at, len).iter_mut().zip(across).zip(along)
+            {
+                let slope = |before: i32, behind: i32| before.wrapping_sub(behind) as f32 * self.shown.slope;
+                let [x, y, z] = upright(slope(west, east), slope(north, south));
+                *out = self.order(x, y, z * self.sign);
+            }
+        }
+        if let Some(out) = &mut target.velocities {
+            for (out, [u, w]) in vectors(out, at, len).iter_mut().zip(&self.velocity[first..][..len]) {
+                *out = self.order(u * self.speed, 0.0, w * self.speed * self.sign);
+            }
+        }
+        if let Some(out) = &mut target.depths {
+            for (out, depth) in out[at..][..len].iter_mut().zip(depth) {
+                *out = *depth as f32 * self.unit;
+            }
+        }
+        if let Some(out) = &mut target.opacities {
+            for (out, depth) in out[at..][..len].iter_mut().zip(depth) {
+                *out = (*depth as f32 * self.opacity).min(1.0);
+            }
+        }
+        if let Some(out) = &mut target.layers {
+            out[at..][..len].fill(strip.layer);
+        }
+        if let Some(out) = &mut target.columns {
+            for (out, index) in out[at..][..len].iter_mut().zip(first as u32..) {
+                *out = index;
+            }
+        }
+    }
+}
+
+/// The vectors of a count of vertices from one on.
+#[inline(always)]
+fn vectors(out: &mut [f32], at: usize, count: usize) -> &mut [[f32; 3]] {
+    out[3 * at..][..3 * count].as_chunks_mut().0
+}
+
+#[inline(always)]
+fn write_spans(vertices: &Vertices<'_>, normals: &mut Normals, around: &mut Around, target: &mut Target<'_>) {
+    let found = vertices.found;
+    let mut next = 0;
+    for span in &found.spans {
+        let mut run = Run { first: 0, len: 0 };
+        for strip in span.first..span.first + span.len {
+            let state = &found.states[strip];
+            let [west, east, north, south] = state.sides;
+            let plain = state.wet & west & east & north & south & !state.rough;
+            let first = strip * STRIP;
+            if plain == u16::MAX {
+                run = Run { first: if run.len == 0 { first } else { run.first }, len: run.len + STRIP };
+                continue;
+            }
+            for place in places(state.used) {
+                let index = first + place;
+                let is_plain = plain >> place & 1 == 1;
+                if run.len > 0 && !(is_plain && run.first + run.len == index) {
+                    vertices.put_run(span, run, next, target);
+                    next += run.len;
+                    run.len = 0;
+                }
+                if is_plain {
+                    run = Run { first: if run.len == 0 { index } else { run.first }, len: run.len + 1 };
+                } else {
+                    let vertex = vertices.vertex(index, normals, around);
+                    vertices.put(next, &vertex, target);
+                    next += 1;
+                }
+            }
+        }
+        if run.len > 0 {
+            vertices.put_run(span, run, next, target);
+            next += run.len;
+        }
+    }
+    let columns = vertices.shown.scene.columns;
+    for wall in vertices.walls.iter().filter(|wall| wall.vertex != NONE) {
+        around.take_wall(vertices.shown.scene, wall);
+        let members = wall.members.iter().filter(|member| **member != NONE);
+        let layer = members.map(|&member| columns.layer(member as usize) as u32).min().unwrap_or(0);
+        let mean = vertices.mean(columns.cell(wall.column as usize), normals, around);
+        vertices.put(next, &Vertex { layer, ..mean }, target);
+        next += 1;
+    }
+}

@@ -1,0 +1,311 @@
+//! The liquid of a domain, frame by frame.
+
+use super::clock::Clock;
+use super::columns::Columns;
+use super::flow::Flow;
+use super::flows::{FlowPoint, Flows};
+use super::identity::Identity;
+use super::pace::{self, MOST_STEPS, Measures, Next};
+use super::params::Params;
+use super::pipes::Pipes;
+use super::terrain::Solids;
+use crate::base::cpu::FlushDenormals;
+use crate::context::Context;
+use crate::error::{Error, Result};
+
+/// Liquid that flows over a terrain.
+pub struct Shallow {
+    pub(super) params: Params,
+    pub(super) columns: Columns,
+    /// Where the columns change, a new one takes its place.
+    pub(super) identity: Identity,
+    pub(super) pipes: Pipes,
+    pub(super) flow: Flow,
+    pub(super) flows: Flows,
+    /// Units poured in, less those taken out, other than by flow points.
+    pub(super) poured: i64,
+    /// Seconds since the start.
+    pub(super) time: f64,
+    /// Lengths of the last frame's steps (s).
+    pub(super) steps: Vec<f64>,
+}
+
+/// What a frame did.
+#[derive(Debug, Clone, Copy, Default, PartialEq)]
+pub struct Report {
+    /// Count of steps.
+    pub steps: u32,
+    /// Simulated time (s): less than was asked for when the budget ran out.
+    pub seconds: f64,
+    /// Greatest depth (m).
+    pub deepest: f64,
+    /// Rows, summed over steps, in which columns would have given more than they had (K_min under 1).
+    pub emptied: u64,
+    /// Rows, summed over steps, in which columns would have taken more than they had room for (K_max under 1).
+    pub filled: u64,
+}
+
+/// Where all liquid is (m3).
+#[derive(Debug, Clone, Copy, Default, PartialEq)]
+pub struct Balance {
+    /// In the columns.
+    pub inside: f64,
+    /// Poured in so far.
+    pub poured: f64,
+    /// Come in through sources.
+    pub sourced: f64,
+    /// Gone out through drains.
+    pub drained: f64,
+    /// Gone into absorbers.
+    pub absorbed: f64,
+    /// Gone over the border, or into the void.
+    pub lost: f64,
+    /// Come in over an absorbing border.
+    pub gained: f64,
+    /// What is missing (units): 0.
+    pub error: i64,
+}
+
+impl Shallow {
+    /// Dry ground.
+    ///
+    /// # Errors
+    /// `Argument`: numbers out of range, a terrain without a surface in the domain. `Memory`: more than the context allows.
+    pub fn new(ctx: &Context, solids: &Solids, params: Params) -> Result<Self> {
+        params.validate()?;
+        solids.grid.validate()?;
+        let count: usize = (0..solids.grid.cells()).map(|cell| solids.cell(cell).len()).sum();
+        if count == 0 {
+            return Err(Error::argument("the terrain has no surface that faces up within the domain"));
+        }
+        ctx.allow("the columns of the liquid", count as u64 * BYTES)?;
+        let columns = Columns::new(solids);
+        let pipes = Pipes::new(&columns, params.border);
+        let flow = Flow::new(&columns, &pipes);
+        Ok(Self {
+            params,
+            flow,
+            pipes,
+            columns,
+            identity: Identity::new(),
+            flows: Flows::default(),
+            poured: 0,
+            time: 0.0,
+            steps: Vec::with_capacity(1024),
+        })
+    }
+
+    /// The parameters.
+    pub fn params(&self) -> &Params {
+        &self.params
+    }
+
+    /// Changes the parameters.
+    ///
+    /// # Errors
+    /// `Argument`: numbers out of range, or another border.
+    pub fn set_params(&mut self, params: Params) -> Result<()> {
+        params.validate()?;
+        if params.border != self.params.border {
+            return Err(Error::argument("the border cannot change after the liquid was made"));
+        }
+        self.params = params;
+        Ok(())
+    }
+
+    /// The columns.
+    pub fn columns(&self) -> &Columns {
+        &self.columns
+    }
+
+    /// H of every column index (units).
+    pub fn depths(&self) -> &[i32] {
+        self.flow.depths()
+    }
+
+    /// Fluxes from each column index to the east and to the south: the depth (units) that they move in a step of [`Shallow::last_step`].
+    pub fn fluxes(&self) -> [&[f32]; 2] {
+        self.flow.flux.each_ref().map(Vec::as_slice)
+    }
+
+    /// Length of the step in whose measure fluxes are (s).
+    pub fn last_step(&self) -> f64 {
+        self.flow.last
+    }
+
+    /// Simulated time (s).
+    pub fn time(&self) -> f64 {
+        self.time
+    }
+
+    /// Lengths of the last frame's steps (s): with them [`Shallow::replay`] makes the same frame.
+    pub fn last_steps(&self) -> &[f64] {
+        &self.steps
+    }
+
+    /// Sets sources, drains and absorbers; `which` names one in an error.
+    ///
+    /// # Errors
+    /// As [`Flows::set`].
+    pub fn set_flows(&mut self, points: &[FlowPoint], which: impl Fn(usize) -> String) -> Result<()> {
+        self.flows.set(&self.columns, points, which)
+    }
+
+    /// Adds a depth (m; negative: takes it) to a column, between 0 and its ceiling; returns what was added (m).
+    pub fn pour(&mut self, column: usize, depth: f64) -> f64 {
+        let heights = self.columns.heights;
+        let units = (depth / heights.unit).round().clamp(-4e9, 4e9) as i64;
+        let added = self.flow.add(&self.columns, column, units);
+        self.poured += added;
+        heights.length(added as f64)
+    }
+
+    /// Fills all columns up to a height (m), or their ceiling; those that are fuller stay as they are.
+    pub fn fill(&mut self, height: f64) {
+        let level = i64::from(self.columns.heights.round(height));
+        for index in 0..self.columns.len() {
+            if self.columns.is_column(index) {
+                let missing =
+                    level - i64::from(self.columns.bases()[index]) - i64::from(self.flow.depths()[index]);
+                self.poured += self.flow.add(&self.columns, index, missing.max(0));
+            }
+        }
+    }
+
+    /// One frame of `dt` (s).
+    ///
+    /// The context is asked once, at the start, whether it is cancelled. The caller's thread does all the work, or, where there are many columns,
+    /// the threads of its pool do, which are entered once. Nothing is allocated, locked, logged or polled by a pool without threads, but for
+    /// the list of steps when it grows.
+    ///
+    /// # Errors
+    /// `Argument`: dt is not positive and finite, or needs over a million steps. `Cancelled`, before anything changes.
+    pub fn step(&mut self, ctx: &Context, dt: f64) -> Result<Report> {
+        self.frame(ctx, dt, |pace| Some(pace::next(pace)))
+    }
+
+    /// As [`Shallow::step`], but when the calling thread has worked for `budget` (s), or, where several do, so long has passed, the frame ends
+    /// early, and the rest of its time is dropped. At least one step is made. Another run drops other times: [`Shallow::replay`] makes the
+    /// same one again.
+    ///
+    /// # Errors
+    /// As [`Shallow::step`]; also when the budget is not positive.
+    pub fn step_within(&mut self, ctx: &Context, dt: f64, budget: f64) -> Result<Report> {
+        if budget.is_nan() || budget <= 0.0 {
+            return Err(Error::argument(format!("a budget of {budget} s is not positive")));
+        }
+        let clock = Clock::start(self.flow.divide(&self.columns, ctx.pool().threads()));
+        self.frame(ctx, dt, |pace| (pace.steps == 0 || clock.seconds() < budget).then(|| pace::next(pace)))
+    }
+
+    /// A frame of given steps (s), as [`Shallow::last_steps`] has listed them.
+    ///
+    /// # Errors
+    /// As [`Shallow::step`].
+    pub fn replay(&mut self, ctx: &Context, steps: &[f64]) -> Result<Report> {
+        if let Some(step) = steps.iter().find(|step| step.is_nan() || **step <= 0.0) {
+            return Err(Error::argument(format!("a step of {step} s is not positive")));
+        }
+        self.frame(ctx, steps.iter().sum(), |pace| steps.get(pace.steps as usize).copied())
+    }
+
+    fn frame(
+        &mut self,
+        ctx: &Context,
+        dt: f64,
+        next: impl Fn(&Next) -> Option<f64> + Send,
+    ) -> Result<Report> {
+        if !(dt > 0.0 && dt <= 1e6) {
+            return Err(Error::argument(format!("a frame of {dt} s is not within 0 to 1000000 s")));
+        }
+        if ctx.is_cancelled() {
+            return Err(Error::Cancelled);
+        }
+        if self.flow.divide(&self.columns, ctx.pool().threads()) {
+            ctx.pool().install(|| self.steps(dt, next))
+        } else {
+            let _flush = FlushDenormals::begin();
+            self.steps(dt, next)
+        }
+    }
+
+    /// The steps of a frame.
+    fn steps(&mut self, dt: f64, next: impl Fn(&Next) -> Option<f64>) -> Result<Report> {
+        let measures = self.measures();
+        let mut report = Report::default();
+        self.steps.clear();
+        self.flow.begin_frame(&self.columns);
+        while report.seconds < dt {
+            let left = dt - report.seconds;
+            let deepest = measures.unit * f64::from(self.flow.deepest());
+            let state =
+                Next { params: &self.params, measures: &measures, left, deepest, steps: report.steps };
+            let Some(length) = next(&state) else { break };
+            if report.steps == 0 && left / length > f64::from(MOST_STEPS) {
+                return Err(Error::argument(format!("a frame of {dt} s would take steps of {length} s")));
+            }
+            let step = pace::step(&self.params, &measures, length, self.flow.last);
+            let [emptied, filled] = self.flow.step(&self.columns, &self.pipes, &step, length);
+            self.flows.step(&self.columns, &mut self.flow, self.time, length);
+            self.steps.push(length);
+            self.time += length;
+            report.steps += 1;
+            report.seconds = if length >= left { dt } else { report.seconds + length };
+            report.emptied += u64::from(emptied);
+            report.filled += u64::from(filled);
+        }
+        report.deepest = measures.unit * f64::from(self.flow.deepest());
+        Ok(report)
+    }
+
+    fn measures(&self) -> Measures {
+        Measures {
+            cell: self.columns.grid.cell,
+            unit: self.columns.heights.unit,
+            pipes: self.pipes.links.most,
+        }
+    }
+
+    /// Where all liquid is.
+    pub fn balance(&self) -> Balance {
+        let volume = self.columns.grid.cell * self.columns.grid.cell * self.columns.heights.unit;
+        let cubic = |units: i64| units as f64 * volume;
+        let (flows, links, inside) = (&self.flows, &self.flow.links, self.flow.units());
+        let came = self.poured + flows.sourced + links.gained;
+        let went = flows.drained + flows.absorbed + links.lost;
+        Balance {
+            inside: cubic(inside),
+            poured: cubic(self.poured),
+            sourced: cubic(flows.sourced),
+            drained: cubic(flows.drained),
+            absorbed: cubic(flows.absorbed),
+            lost: cubic(links.lost),
+            gained: cubic(links.gained),
+            error: came - went - inside,
+        }
+    }
+
+    /// The mean velocity of a column over its depth (m/s), along x and z: at its surface it is 1.5 times as fast (Eq. 4.4). 0 where it is dry.
+    pub fn velocity(&self, index: usize) -> [f32; 2] {
+        let depth = self.flow.depths()[index];
+        if depth == 0 {
+            return [0.0; 2];
+        }
+        let [east, south] = &self.flow.flux;
+        let strip = index / super::columns::STRIP;
+        let west = if index.is_multiple_of(super::columns::STRIP) {
+            self.columns.west(strip).map_or(0.0, |_| east[index - 1])
+        } else {
+            east[index - 1]
+        };
+        let north = match self.columns.north(strip) {
+            super::columns::NONE => 0.0,
+            north => south[north as usize * super::columns::STRIP + index % super::columns::STRIP],
+        };
+        let scale = (0.5 * self.columns.grid.cell / self.flow.last) as f32 / depth as f32;
+        [(east[index] + west) * scale, (south[index] + north) * scale]
+    }
+}
+
+/// Bytes of a column with its pipes, and its share of strips.
+const BYTES: u64 = 48;

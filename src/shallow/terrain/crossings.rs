@@ -1,0 +1,500 @@
+//! Where vertical lines cross a triangle: which lines, decided exactly, and at what heights.
+//!
+//! Each line is shifted by a symbolic (e, e^2) in (x, z), e infinitesimal, so that it meets no edge and no vertex. Nothing but the shift
+//! prefers a side: mirroring the scene or turning it by 90 degrees gives the same bits unless a line meets an edge exactly.
+
+/// Corner of a triangle (m).
+pub type Corner = [f64; 3];
+
+/// Unit roundoff of f64.
+const ROUNDOFF: f64 = f64::EPSILON / 2.0;
+
+/// The coordinates of the lines through the cells of one axis.
+pub struct Lines {
+    /// Ascending, between an infinity at either end.
+    places: Vec<f64>,
+    /// 1 / cell (1/m).
+    inverse: f64,
+    /// Greatest magnitude of the numbers that a coordinate is made of (m).
+    reach: f64,
+}
+
+impl Lines {
+    /// Lines at strictly ascending coordinates; `reach` bounds them and the origin that they are counted from.
+    pub fn new(centres: impl Iterator<Item = f64>, cell: f64, reach: f64) -> Self {
+        let mut places = vec![f64::NEG_INFINITY];
+        places.extend(centres);
+        places.push(f64::INFINITY);
+        Self { places, inverse: 1.0 / cell, reach }
+    }
+
+    /// Coordinate of a line.
+    pub fn at(&self, line: u32) -> f64 {
+        self.places[line as usize + 1]
+    }
+
+    /// A coordinate in lines, with rounding errors.
+    fn count(&self, place: f64) -> f64 {
+        (place - self.places[1]) * self.inverse
+    }
+
+    /// Count of lines left of a coordinate after the shift, exactly. A triangle can only cross the lines from the least rank of its
+    /// corners to the line before the greatest.
+    #[inline]
+    pub fn rank(&self, place: f64) -> u32 {
+        let last = (self.places.len() - 2) as f64;
+        let mut rank = lesser(greater(self.count(place), 0.0), last) as usize;
+        while self.places[rank + 1] < place {
+            rank += 1;
+        }
+        while self.places[rank] >= place {
+            rank -= 1;
+        }
+        rank as u32
+    }
+}
+
+/// A triangle that lines may cross.
+pub struct Facet {
+    /// In the triangle's order, from the one whose height no other has: the lowest, or the highest where two are lowest.
+    pub corners: [Corner; 3],
+    /// Least and greatest height (m).
+    range: [f64; 2],
+    /// Rounding may change the sign of an area (m2, twice) up to this.
+    doubt: f64,
+    /// In a triangle of this area (m2, twice) or less, rounding may move a height by 2^-8 units.
+    rough: f64,
+}
+
+impl Facet {
+    /// A triangle whose heights matter to within a small part of a unit (m).
+    #[inline]
+    pub fn new([a, b, c]: [Corner; 3], unit: f64) -> Self {
+        let range = |axis: usize| {
+            [lesser(lesser(a[axis], b[axis]), c[axis]), greater(greater(a[axis], b[axis]), c[axis])]
+        };
+        let [x, y, z] = [range(0), range(1), range(2)];
+        let lowest = [a, b, c].map(|corner| u32::from(corner[1] == y[0]));
+        let own = if lowest[0] + lowest[1] + lowest[2] == 1 { y[0] } else { y[1] };
+        let corners = if a[1] == own {
+            [a, b, c]
+        } else if b[1] == own {
+            [b, c, a]
+        } else {
+            [c, a, b]
+        };
+        let area = (x[1] - x[0]) * (z[1] - z[0]);
+        // A weight (below) is off by 8 roundings of the area at most: three for each product, two for their difference.
+        let doubt = 16.0 * ROUNDOFF * area;
+        // Three weights share in the numerator, three in the denominator.
+        let rough = area * ((y[1] - y[0]) * (48.0 * 256.0 * ROUNDOFF / unit));
+        Self { corners, range: y, doubt, rough }
+    }
+
+    /// The height (m) at which the line at (x, z) crosses the triangle, which must be within the ranks of its corners, and whether the
+    /// triangle faces up there.
+    ///
+    /// Whether it does is exact. The order of corners, mirrors and turns by 90 degrees do not change a bit of the height; on an edge it
+    /// depends on the edge alone.
+    #[inline]
+    pub fn cross(&self, at: [f64; 2]) -> Option<(f64, bool)> {
+        let from = |corner: usize| [self.corners[corner][0] - at[0], self.corners[corner][2] - at[1]];
+        let [r, p, q] = [from(0), from(1), from(2)];
+        let [a, b, c] = [cross(p, q), cross(q, r), cross(r, p)];
+        let sum = (b + c) + a;
+        if lesser(lesser(a.abs(), b.abs()), c.abs()) <= self.doubt {
+            return self.cross_exactly(at, [a, b, c]);
+        }
+        let is_left = a > 0.0;
+        if (b > 0.0) != is_left || (c > 0.0) != is_left {
+            return None;
+        }
+        let height = if sum.abs() <= self.rough { self.exact_height(at) } else { self.height([b, c], sum) };
+        // Seen from above, with x to the right and z downward, a triangle that faces up runs counter-clockwise.
+        Some((height, !is_left))
+    }
+
+    /// The same where the sign of a weight is in doubt.
+    #[inline(never)]
+    fn cross_exactly(&self, at: [f64; 2], mut weights: [f64; 3]) -> Option<(f64, bool)> {
+        let mut sides = [false; 3];
+        for (corner, weight) in weights.iter_mut().enumerate() {
+            let [a, b] = self.opposite(corner);
+            if weight.abs() <= self.doubt {
+                *weight = exact_cross(a, b, at);
+            }
+            sides[corner] = match *weight {
+                // What the shift adds: first -e times the edge's z, then e^2 times its x.
+                0.0 if a[1] != b[1] => b[1] < a[1],
+                0.0 => b[0] > a[0],
+                weight => weight > 0.0,
+            };
+        }
+        if sides != [sides[0]; 3] {
+            return None;
+        }
+        let [r, p, q] = &self.corners;
+        let height = match weights.map(|weight| weight == 0.0) {
+            [true, _, _] => along(p, q, at),
+            [_, true, _] => along(q, r, at),
+            [_, _, true] => along(r, p, at),
+            _ => self.exact_height(at),
+        };
+        Some((height, !sides[0]))
+    }
+
+    /// The edge opposite to a corner, (x, z).
+    fn opposite(&self, corner: usize) -> [[f64; 2]; 2] {
+        [1, 2].map(|turn| self.corners[(corner + turn) % 3]).map(|[x, _, z]| [x, z])
+    }
+
+    /// Height (m) where the last two corners have these weights, twice the areas that a point spans with the edges opposite to them, out
+    /// of a sum. The two share alike, so that their order does not matter.
+    #[inline]
+    fn height(&self, weights: [f64; 2], sum: f64) -> f64 {
+        let [r, p, q] = self.corners.map(|corner| corner[1]);
+        let height = r + (weights[0] * (p - r) + weights[1] * (q - r)) / sum;
+        lesser(greater(height, self.range[0]), self.range[1])
+    }
+
+    /// Height (m) with exact weights.
+    #[inline(never)]
+    fn exact_height(&self, at: [f64; 2]) -> f64 {
+        let [a, b, c] = [0, 1, 2].map(|corner| self.opposite(corner)).map(|[a, b]| exact_cross(a, b, at));
+        self.height([b, c], (b + c) + a)
+    }
+}
+
+/// The edges of a triangle, to find the lines of a row that may cross it.
+pub struct Outline {
+    edges: [Edge; 3],
+    /// How far (lines) a computed place may be from the true one.
+    error: f64,
+}
+
+/// An edge between two coordinates z (m); no row where it has one z only.
+struct Edge {
+    range: [f64; 2],
+    /// At the place of its first end: z (m) and x (lines).
+    from: [f64; 2],
+    /// Change of x (lines) with z (m).
+    slope: f64,
+}
+
+impl Outline {
+    /// The outline of a triangle over lines along x.
+    pub fn new(corners: &[Corner; 3], x: &Lines) -> Self {
+        let edge = |corner: usize| {
+            let (a, b) = (&corners[corner], &corners[(corner + 1) % 3]);
+            // The two others end where a row through all of such an edge meets it.
+            let range = if a[2] == b[2] { [1.0, -1.0] } else { [lesser(a[2], b[2]), greater(a[2], b[2])] };
+            let slope = (b[0] - a[0]) * x.inverse / (b[2] - a[2]);
+            Edge { range, from: [a[2], x.count(a[0])], slope }
+        };
+        let reach = corners.iter().fold(x.reach, |reach, corner| greater(reach, corner[0].abs()));
+        // A place has seen 11 roundings of at most 2 reach, that of a line 6 of at most 1: 28 in all.
+        Self { edges: [edge(0), edge(1), edge(2)], error: 64.0 * ROUNDOFF * reach * x.inverse }
+    }
+
+    /// Of the lines from `first` to before `last`, those that may cross the triangle in the row at z.
+    pub fn span(&self, z: f64, [first, last]: [u32; 2]) -> [u32; 2] {
+        let (mut least, mut greatest) = (f64::INFINITY, f64::NEG_INFINITY);
+        for Edge { range, from, slope } in &self.edges {
+            let place = from[1] + slope * (z - from[0]);
+            let meets = range[0] <= z && z <= range[1];
+            least = lesser(least, if meets { place } else { f64::INFINITY });
+            greatest = greater(greatest, if meets { place } else { f64::NEG_INFINITY });
+        }
+        // Half a line before an end leaves the end.
+        let [start, end] = [first, last].map(|line| f64::from(line as i32) - 0.5);
+        let clamp = |place: f64| lesser(greater(place, start), end);
+        [below(clamp(least - self.error)), up_to(clamp(greatest + self.error))]
+    }
+}
+
+/// Count of the integers from 0 that are below a number from -1/2.
+fn below(number: f64) -> u32 {
+    let whole = number as i32;
+    (whole + i32::from(f64::from(whole) < number)) as u32
+}
+
+/// Count of the integers from 0 up to a number from -1/2.
+fn up_to(number: f64) -> u32 {
+    let whole = number as i32;
+    (whole + i32::from(f64::from(whole) <= number)) as u32
+}
+
+/// The lesser of two numbers that are not NaN: one instruction, unlike `f64::min`.
+fn lesser(a: f64, b: f64) -> f64 {
+    if a < b { a } else { b }
+}
+
+/// The greater of two numbers that are not NaN.
+fn greater(a: f64, b: f64) -> f64 {
+    if a > b { a } else { b }
+}
+
+fn cross(a: [f64; 2], b: [f64; 2]) -> f64 {
+    a[0] * b[1] - a[1] * b[0]
+}
+
+/// Height (m) of an edge at a point (x, z) of it.
+fn along(a: &Corner, b: &Corner, at: [f64; 2]) -> f64 {
+    let (low, high) = if a[1] <= b[1] { (a, b) } else { (b, a) };
+    if low[1] == high[1] {
+        return low[1];
+    }
+    let way = [high[0] - low[0], high[2] - low[2]];
+    let part =
+        if way[0].abs() >= way[1].abs() { (at[0] - low[0]) / way[0] } else { (at[1] - low[2]) / way[1] };
+    low[1] + part * (high[1] - low[1])
+}
+
+/// (b - a) x (s - a), twice the signed area of (a, b, s) in (x, z): the sign is exact, the magnitude the nearest f64 but for some
+/// 2^-64 of it, and both depend on the exact value alone.
+///
+/// Exact because all is done in integers. Each f64 is m 2^k. Where the six coordinates are multiples of a power of two below 2^62 times
+/// it, i128 holds differences (63 bits), products (126) and their difference (127). Otherwise the six products of the expanded
+/// determinant are summed in 768 bits. Those hold multiples of 2^-320 below 2^448: a and b come from f32 without denormals
+/// (multiples of 2^-149 below 2^128), and s from cells and origins between 1e-30 and 1e30 m, so that its last bit is 2^-156 or more.
+pub fn exact_cross(a: [f64; 2], b: [f64; 2], s: [f64; 2]) -> f64 {
+    let products = [[a[0], s[0], b[1], s[1]], [a[1], s[1], b[0], s[0]]].map(exact_product);
+    if let [Some(first), Some(second)] = products {
+        return first - second;
+    }
+    let parts = [a[0], a[1], b[0], b[1], s[0], s[1]].map(integer);
+    let known = || parts.iter().filter(|(mantissa, _)| *mantissa != 0);
+    let Some(low) = known().map(|(_, exponent)| *exponent).min() else { return 0.0 };
+    let ends =
+        known().map(|(mantissa, exponent)| exponent + 64 - mantissa.unsigned_abs().leading_zeros() as i32);
+    if ends.max().unwrap_or(low) - low <= 62 {
+        let [ax, az, bx, bz, sx, sz] = parts.map(|(mantissa, exponent)| match mantissa {
+            0 => 0,
+            _ => mantissa << (exponent - low),
+        });
+        let product = |p: i64, q: i64| i128::from(p) * i128::from(q);
+        let value = product(ax - sx, bz - sz) - product(az - sz, bx - sx);
+        return value as f64 * power_of_two(2 * low);
+    }
+    let [ax, az, bx, bz, sx, sz] = parts;
+    let mut sum = Sum([0; 24]);
+    for (p, q, sign) in [(ax, bz, 1), (az, bx, -1), (ax, sz, -1), (az, sx, 1), (sx, bz, -1), (sz, bx, 1)] {
+        sum.add(i128::from(p.0) * i128::from(q.0) * sign, p.1 + q.1);
+    }
+    sum.value()
+}
+
+/// (a - s) (b - t), where f64 holds it: differences without error that are zero or have up to 26 bits.
+fn exact_product([a, s, b, t]: [f64; 4]) -> Option<f64> {
+    let (p, q) = (a - s, b - t);
+    if p == 0.0 || q == 0.0 {
+        return Some(0.0);
+    }
+    let is_short = |difference: f64| difference.to_bits() & ((1 << 27) - 1) == 0;
+    // What rounding took from a - s (Knuth) is 0.
+    let is_exact = |difference: f64, a: f64, s: f64| {
+        let back = a - difference;
+        (a - (difference + back)) + (back - s) == 0.0
+    };
+    (is_short(p) && is_short(q) && is_exact(p, a, s) && is_exact(q, b, t)).then_some(p * q)
+}
+
+/// An f64 that is no denormal, as odd m (or 0) and k of m 2^k.
+fn integer(value: f64) -> (i64, i32) {
+    let bits = value.to_bits();
+    let exponent = (bits >> 52 & 0x7ff) as i32;
+    if exponent == 0 {
+        return (0, 0);
+    }
+    let mantissa = (bits & ((1 << 52) - 1) | 1 << 52) as i64;
+    let zeros = mantissa.trailing_zeros();
+    let mantissa = mantissa >> zeros;
+    (if value < 0.0 { -mantissa } else { mantissa }, exponent - 1075 + zeros as i32)
+}
+
+/// 2^k, k from -1022 to 1023.
+fn power_of_two(exponent: i32) -> f64 {
+    f64::from_bits(((1023 + exponent) as u64) << 52)
+}
+
+/// A sum of integers times powers of two, in digits of 32 bits, the first of 2^-320.
+struct Sum([i64; 24]);
+
+impl Sum {
+    const LAST: i32 = 320;
+
+    /// Adds an integer below 2^96 times a power of two.
+    fn add(&mut self, value: i128, exponent: i32) {
+        if value == 0 {
+            return;
+        }
+        let place = (exponent + Self::LAST) as usize;
+        let wide = value << (place % 32);
+        let digits = &mut self.0[place / 32..place / 32 + 4];
+        for (turn, digit) in digits.iter_mut().enumerate() {
+            let rest = wide >> (32 * turn);
+            *digit += if turn == 3 { rest as i64 } else { rest as i64 & 0xffff_ffff };
+        }
+    }
+
+    fn carry(&mut self) {
+        let mut carry = 0;
+        for digit in &mut self.0 {
+            let value = *digit + carry;
+            *digit = value & 0xffff_ffff;
+            carry = value >> 32;
+        }
+        // The top digit holds the sign.
+        self.0[23] += carry << 32;
+    }
+
+    fn value(mut self) -> f64 {
+        self.carry();
+        let is_negative = self.0[23] < 0;
+        if is_negative {
+            self.0.iter_mut().for_each(|digit| *digit = -*digit);
+            self.carry();
+        }
+        let Some(top) = self.0.iter().rposition(|digit| *digit != 0) else { return 0.0 };
+        let first = top.saturating_sub(2);
+        let digits = self.0[first..=top].iter().rev().fold(0u128, |sum, digit| sum << 32 | *digit as u128);
+        let value = digits as f64 * power_of_two(32 * first as i32 - Self::LAST);
+        if is_negative { -value } else { value }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn areas_are_exact_at_every_spread_of_exponents() {
+        // Short differences, 62 bits, and more.
+        assert_eq!(exact_cross([0.0, 0.0], [8.0, 4.0], [2.0, 1.0]), 0.0);
+        assert_eq!(exact_cross([0.0, 0.0], [8.0, 4.0], [2.0, 1.5]), 4.0);
+        let tenth = [0.1f64, 0.1];
+        assert_eq!(exact_cross([-1.0, -1.0], [3.0, 3.0], tenth), 0.0);
+        let above = [0.1, 0.1f64.next_up()];
+        assert_eq!(exact_cross([-1.0, -1.0], [3.0, 3.0], above), 4.0 * (above[1] - above[0]));
+        let far = 2f64.powi(100);
+        assert_eq!(exact_cross([-far, -far], [far, far], tenth), 0.0);
+        assert_eq!(exact_cross([-far, -far], [far, far], above), 2.0 * far * (above[1] - above[0]));
+        assert_eq!(exact_cross([far, far], [-far, -far], above), -2.0 * far * (above[1] - above[0]));
+        let near = 2f64.powi(-149);
+        assert_eq!(exact_cross([0.0, near], [far, near], [1.0, 3e-30]), far * (3e-30 - near));
+        assert_eq!(exact_cross([0.0, near], [far, near], [1.0, near]), 0.0);
+    }
+
+    /// Corners on a ring around a line, some of them beside it or on it exactly.
+    #[test]
+    fn a_fan_is_crossed_once_even_at_its_hub_and_its_spokes() {
+        let lines = |places: &[f64]| Lines::new(places.iter().copied(), 0.5, 4.0);
+        let ring =
+            [[2, 0], [2, 1], [2, 2], [1, 2], [0, 2], [-2, 2], [-2, 0], [-2, -2], [-1, -2], [0, -2], [2, -2]];
+        let places = [-1.5, -1.0, -0.5, 0.0, 0.5, 1.0, 1.5].map(|place| 0.25 + place);
+        let lines = [lines(&places), lines(&places)];
+        let corner = |[x, z]: [i32; 2]| [f64::from(x) + 0.25, 0.3, f64::from(z) + 0.25];
+        let mut counts = [[0; 7]; 7];
+        for (turn, spoke) in ring.iter().enumerate() {
+            let corners = [corner([0, 0]), corner(*spoke), corner(ring[(turn + 1) % ring.len()])];
+            let facet = Facet::new(corners, 1e-9);
+            let ranks = corners.map(|corner| [lines[0].rank(corner[0]), lines[1].rank(corner[2])]);
+            let ends = |axis: usize| {
+                let ranks = ranks.map(|rank| rank[axis]);
+                [ranks.into_iter().min().unwrap(), ranks.into_iter().max().unwrap()]
+            };
+            for row in ends(1)[0]..ends(1)[1] {
+                let z = lines[1].at(row);
+                let span = Outline::new(&facet.corners, &lines[0]).span(z, ends(0));
+                for column in ends(0)[0]..ends(0)[1] {
+                    let crossing = facet.cross([lines[0].at(column), z]);
+                    counts[row as usize][column as usize] += i32::from(crossing.is_some());
+                    assert!(crossing.is_none() || (span[0]..span[1]).contains(&column), "({column}, {row})");
+                    assert!(crossing.is_none_or(|(height, up)| height == 0.3 && !up), "{crossing:?}");
+                }
+            }
+        }
+        assert_eq!(counts, [[1; 7]; 7]);
+    }
+
+    #[test]
+    fn lines_beside_an_edge_by_less_than_rounding_are_on_the_right_side() {
+        let mut state = 1u64;
+        let mut random = || {
+            state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+            f64::from((state >> 40) as f32 / (1 << 23) as f32 - 1.0)
+        };
+        // Numbers from -1 to 1 as integers, on a lattice on which i128 has room for areas.
+        let scale = 2f64.powi(57);
+        let exact = |value: f64| (value * scale) as i128;
+        let mut wrong = 0;
+        for n in 0..2000 {
+            let corners = [(); 3].map(|()| [random(), 0.5, random()]);
+            let [a, b, _] = corners;
+            let part = random().abs() / 3.0;
+            let at = [0, 2].map(|axis| ((a[axis] + part * (b[axis] - a[axis])) * scale).round() / scale);
+            let sides = [[0, 1], [1, 2], [2, 0]].map(|edge| {
+                let [a, b] = edge.map(|corner| [corners[corner][0], corners[corner][2]]);
+                let rounded = cross([a[0] - at[0], a[1] - at[1]], [b[0] - at[0], b[1] - at[1]]);
+                let [[ax, az], [bx, bz], [x, z]] = [a, b, at].map(|place| place.map(exact));
+                let side = ((ax - x) * (bz - z) - (az - z) * (bx - x)).signum();
+                wrong += i32::from((rounded > 0.0) != (side > 0) || (rounded < 0.0) != (side < 0));
+                side
+            });
+            let expected = (sides == [sides[0]; 3]).then_some(sides[0] < 0);
+            let found = Facet::new(corners, 1e-9).cross(at).map(|(_, is_up)| is_up);
+            assert!(found == expected || sides.contains(&0), "{n}: {corners:?} {at:?}");
+        }
+        assert!(wrong > 100, "f64 alone is wrong {wrong} times");
+    }
+
+    #[test]
+    fn an_edge_has_the_same_height_in_both_of_its_triangles() {
+        let [a, b] = [[-1.0, 0.1, -1.0], [3.0, 0.7, 3.0]];
+        let sides = [[[3.0, 0.35, -1.7], a, b], [b, a, [-1.3, 0.9, 2.0]]];
+        for place in [0.1, 0.3, 1.7, 2.9] {
+            let heights = sides.map(|corners| {
+                let facet = Facet::new(corners, 1e-9);
+                facet.cross_exactly([place; 2], [0.0; 3]).map(|(height, _)| height)
+            });
+            let height = 0.1 + (place + 1.0) / 4.0 * (0.7 - 0.1);
+            // One of the two has the edge.
+            assert_eq!(heights.map(|height| height.is_some()).iter().filter(|has| **has).count(), 1);
+            assert!(heights.iter().flatten().all(|found| *found == height), "{heights:?}, {height}");
+        }
+        let reversed = sides.map(|[a, b, c]| Facet::new([c, b, a], 1e-9).cross_exactly([0.3; 2], [0.0; 3]));
+        assert_eq!(reversed.iter().flatten().count(), 1);
+    }
+
+    #[test]
+    fn heights_do_not_depend_on_the_order_of_corners() {
+        let corners = [[0.13, 0.2, 0.07], [0.91, 0.2, 0.35], [0.42, 0.83, 0.77]];
+        let at = [0.5, 0.41];
+        let [a, b, c] = corners;
+        let height =
+            |corners: [Corner; 3]| Facet::new(corners, 1e-9).cross(at).map(|(height, _)| height.to_bits());
+        let first = height([a, b, c]);
+        assert!(first.is_some());
+        for other in [[b, c, a], [c, a, b], [c, b, a], [b, a, c], [a, c, b]] {
+            assert_eq!(height(other), first);
+        }
+        let mirrored = corners.map(|[x, y, z]| [-x, y, z]);
+        let found = Facet::new(mirrored, 1e-9).cross([-at[0], at[1]]);
+        assert_eq!(found.map(|(height, _)| height.to_bits()), first);
+        let turned = corners.map(|[x, y, z]| [z, y, -x]);
+        let found = Facet::new(turned, 1e-9).cross([at[1], -at[0]]);
+        assert_eq!(found.map(|(height, _)| height.to_bits()), first);
+    }
+
+    #[test]
+    fn slivers_have_their_heights_too() {
+        // 1 m long and 2^-30 m wide, seen from above: rounded weights would be off by a tenth.
+        let thin = 2f64.powi(-30);
+        let corners = [[0.0, 0.0, 0.0], [1.0, 0.0, 1.0], [1.0, 1.0, 1.0 + thin]];
+        let at = [0.1, 0.1 + thin / 32.0];
+        let (height, _) = Facet::new(corners, 1e-9).cross(at).unwrap();
+        // Across the sliver the height grows from 0 on one edge.
+        let across = (at[1] - at[0]) / thin;
+        assert!((height - across).abs() < 1e-12, "{height} {across}");
+    }
+}

@@ -1,0 +1,228 @@
+//! Solids of signed distances, OpenVDB level sets for instance: whoever has them hands in a function that samples a batch of places.
+
+use super::Solids;
+use super::solids::{Solid, unite};
+use crate::base::DVec3;
+use crate::error::{Error, Result};
+use crate::shallow::grid::{BOTTOMLESS, Grid, Heights, TOP};
+
+/// Places of a batch.
+const BATCH: u64 = 1 << 14;
+/// Most samples on a line.
+const MOST_SAMPLES: f64 = (1 << 24) as f64;
+
+/// The solids of every cell: where distances are negative. Each line is sampled from the least height up in steps of a voxel (m), and
+/// a change of sign is placed by linear interpolation; solids and gaps thinner than a voxel may be missed. What is solid at the least
+/// height is so for ever below.
+///
+/// `sample` gets places (m), at most 16,384 at a time, and puts their distances (m) into its second argument, whatever that held.
+///
+/// # Errors
+/// `Argument`: a grid that [`Grid::validate`] refuses, a voxel that is not a positive length or too small for the heights, another count
+/// of distances than of places, a distance that is not finite. And those of `sample`.
+pub fn solids(
+    grid: Grid,
+    heights: Heights,
+    voxel: f64,
+    mut sample: impl FnMut(&[DVec3], &mut Vec<f32>) -> Result<()>,
+) -> Result<Solids> {
+    grid.validate()?;
+    let ladder = Ladder::new(heights, voxel)?;
+    let mut out = Solids::empty(grid, heights);
+    let (mut places, mut distances) = (Vec::new(), Vec::new());
+    let mut line = Line::default();
+    let count = grid.cells() as u64 * ladder.count;
+    let mut next = 0;
+    while next < count {
+        let end = count.min(next + BATCH);
+        places.clear();
+        places.extend((next..end).map(|index| ladder.place(&grid, index)));
+        sample(&places, &mut distances)?;
+        if distances.len() != places.len() {
+            let (got, wanted) = (distances.len(), places.len());
+            return Err(Error::argument(format!("the sampler returned {got} distances for {wanted} places")));
+        }
+        for ((place, distance), index) in places.iter().zip(&distances).zip(next..) {
+            if !distance.is_finite() {
+                let [x, y, z] = [place.x, place.y, place.z];
+                return Err(Error::argument(format!("the sampler returned {distance} m at ({x}, {y}, {z})")));
+            }
+            line.climb(place.y, f64::from(*distance), &heights);
+            if (index + 1) % ladder.count == 0 {
+                line.finish();
+                out.push(&line.solids);
+                line.solids.clear();
+            }
+        }
+        next = end;
+    }
+    Ok(out)
+}
+
+/// The heights at which each line is sampled.
+struct Ladder {
+    low: f64,
+    high: f64,
+    voxel: f64,
+    count: u64,
+}
+
+impl Ladder {
+    fn new(heights: Heights, voxel: f64) -> Result<Self> {
+        let (low, high) = (heights.low, heights.metres(TOP));
+        if !(voxel > 0.0 && voxel.is_finite()) {
+            return Err(Error::argument(format!("a voxel of {voxel} m is not a positive length")));
+        }
+        let steps = ((high - low) / voxel).ceil();
+        if !(1.0..MOST_SAMPLES).contains(&steps) {
+            return Err(Error::argument(format!(
+                "a voxel of {voxel} m is too small for heights from {low} to {high} m"
+            )));
+        }
+        Ok(Self { low, high, voxel, count: steps as u64 + 1 })
+    }
+
+    /// A sample of all cells' lines, one line after another.
+    fn place(&self, grid: &Grid, index: u64) -> DVec3 {
+        let (cell, step) = ((index / self.count) as usize, index % self.count);
+        let [x, z] = grid.centre([cell % grid.size[0], cell / grid.size[0]]);
+        let y = if step + 1 == self.count { self.high } else { self.low + step as f64 * self.voxel };
+        DVec3::new(x, y, z)
+    }
+}
+
+/// A line on its way up.
+#[derive(Default)]
+struct Line {
+    /// Height and distance of the sample below (m).
+    below: Option<[f64; 2]>,
+    /// The bottom of the solid that the sample below is in.
+    bottom: Option<i32>,
+    solids: Vec<Solid>,
+}
+
+impl Line {
+    fn climb(&mut self, height: f64, distance: f64, heights: &Heights) {
+        let is_solid = distance < 0.0;
+        match self.below {
+            None => self.bottom = is_solid.then_some(BOTTOMLESS),
+            Some([from, before]) if is_solid != (before < 0.0) => {
+                let part = before / (before - distance);
+                let border = heights.round(from + part * (height - from));
+                match self.bottom.take() {
+                    Some(bottom) => self.add([bottom, border]),
+                    None => self.bottom = Some(border),
+                }
+            }
+            Some(_) => {}
+        }
+        self.below = Some([height, distance]);
+    }
+
+    /// Keeps a solid that has units.
+    fn add(&mut self, solid: Solid) {
+        if solid[0] < solid[1] {
+            self.solids.push(solid);
+        }
+    }
+
+    /// Ends the line at the greatest height; the next may begin when its solids are taken.
+    fn finish(&mut self) {
+        if let Some(bottom) = self.bottom.take() {
+            self.add([bottom, TOP]);
+        }
+        self.below = None;
+        unite(&mut self.solids);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const GRID: Grid = Grid { cell: 0.1, origin: [-1.0, -1.0], size: [20, 20] };
+
+    fn heights() -> Heights {
+        Heights::between(-1.0, 1.0).unwrap()
+    }
+
+    fn of(voxel: f64, distance: impl Fn(DVec3) -> f64) -> Result<Solids> {
+        let mut largest = 0;
+        let found = solids(GRID, heights(), voxel, |places, out| {
+            largest = largest.max(places.len());
+            out.clear();
+            out.extend(places.iter().map(|place| distance(*place) as f32));
+            Ok(())
+        });
+        assert!(largest <= 1 << 14, "{largest}");
+        found
+    }
+
+    #[test]
+    fn a_shell_over_ground_has_three_solids_a_line() {
+        let ground = |place: DVec3| place.y + 0.8;
+        let shell = |place: DVec3| ((place - DVec3::new(0.0, 0.1, 0.0)).norm() - 0.5).abs() - 0.1;
+        let found = of(0.03, |place| ground(place).min(shell(place))).unwrap();
+        let mut layers = [0; 4];
+        for z in 0..20 {
+            for x in 0..20 {
+                let cell = [x, z];
+                let [px, pz] = GRID.centre(cell);
+                let across = px * px + pz * pz;
+                let reach = |radius: f64| (radius * radius - across).max(0.0).sqrt();
+                let borders = [0.1 - reach(0.6), 0.1 - reach(0.4), 0.1 + reach(0.4), 0.1 + reach(0.6)];
+                let solids = found.cell(GRID.index(cell));
+                layers[solids.len()] += 1;
+                assert_eq!(solids[0][0], BOTTOMLESS);
+                assert!((heights().metres(solids[0][1]) + 0.8).abs() < 1e-6, "{cell:?}");
+                // Near the rims a line is almost a tangent.
+                if solids.len() == 3 && reach(0.4) > 0.2 {
+                    let metres = solids[1..].as_flattened().iter().map(|&units| heights().metres(units));
+                    for (found, border) in metres.zip(borders) {
+                        assert!((found - border).abs() < 0.002, "{cell:?}: {found} is not {border}");
+                    }
+                }
+            }
+        }
+        assert!(layers[1] > 200 && layers[2] > 20 && layers[3] > 40 && layers[0] == 0, "{layers:?}");
+    }
+
+    #[test]
+    fn what_is_solid_at_both_ends_of_the_range_goes_on_there() {
+        let found = of(0.3, |place| 0.25 - place.y.abs()).unwrap();
+        let units = |metres: f64| heights().round(metres);
+        let [low, high] = [found.cell(7)[0], found.cell(7)[1]];
+        assert_eq!((low[0], high[1], found.cell(7).len()), (BOTTOMLESS, TOP, 2));
+        assert!(
+            (low[1] - units(-0.25)).abs() < 100 && (high[0] - units(0.25)).abs() < 100,
+            "{low:?} {high:?}"
+        );
+    }
+
+    #[test]
+    fn long_lines_are_sampled_in_several_batches() {
+        let found = of(0.00005, |place| (place.y - 0.3).abs() - 0.2).unwrap();
+        for cell in [0, 1, 399] {
+            let [[bottom, top]] = *found.cell(cell) else { panic!("{:?}", found.cell(cell)) };
+            let metres = [bottom, top].map(|units| heights().metres(units));
+            assert!((metres[0] - 0.1).abs() < 1e-6 && (metres[1] - 0.5).abs() < 1e-6, "{metres:?}");
+        }
+    }
+
+    #[test]
+    fn bad_input_is_a_sentence() {
+        let message = |found: Result<Solids>| found.unwrap_err().to_string();
+        assert_eq!(message(of(0.0, |_| 1.0)), "a voxel of 0 m is not a positive length");
+        let what = "a voxel of 0.00000001 m is too small for heights from -1 to 1 m";
+        assert_eq!(message(of(1e-8, |_| 1.0)), what);
+        let nan = of(0.5, |place| if place.y == 0.0 { f64::NAN } else { 1.0 });
+        assert_eq!(message(nan), "the sampler returned NaN m at (-0.95, 0, -0.95)");
+        let few = solids(GRID, heights(), 0.5, |_, out| {
+            *out = vec![1.0; 3];
+            Ok(())
+        });
+        assert_eq!(message(few), "the sampler returned 3 distances for 2000 places");
+        let refused = solids(GRID, heights(), 0.5, |_, _| Err(Error::argument("no grid")));
+        assert_eq!(message(refused), "no grid");
+    }
+}

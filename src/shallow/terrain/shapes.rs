@@ -1,0 +1,315 @@
+//! Solids of simple shapes that move: obstacles for which no triangle is cast.
+
+use std::ops::Range;
+
+use super::solids::Solid;
+use crate::base::DVec3;
+use crate::error::{Error, Result};
+use crate::shallow::grid::{Grid, Heights};
+
+/// How far axes of a cuboid may be from unit vectors that are perpendicular to each other.
+const SKEW: f64 = 1e-6;
+
+/// A solid shape (m).
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Shape {
+    /// A ball.
+    Sphere {
+        /// Its middle.
+        centre: DVec3,
+        /// Its radius.
+        radius: f64,
+    },
+    /// All places within a distance of a line segment.
+    Capsule {
+        /// The ends of the segment.
+        ends: [DVec3; 2],
+        /// The distance.
+        radius: f64,
+    },
+    /// A box in any orientation.
+    Cuboid {
+        /// Its middle.
+        centre: DVec3,
+        /// Unit vectors along its edges, perpendicular to each other.
+        axes: [DVec3; 3],
+        /// Half of its length along each.
+        half: [f64; 3],
+    },
+}
+
+impl Shape {
+    /// Checks the numbers.
+    ///
+    /// # Errors
+    /// `Argument`: a place that is not finite, a length that is not positive and finite, axes that are not perpendicular unit vectors
+    /// (within 1e-6).
+    pub fn validate(&self) -> Result<()> {
+        let (places, lengths): (&[DVec3], &[f64]) = match self {
+            Self::Sphere { centre, radius } => (std::slice::from_ref(centre), std::slice::from_ref(radius)),
+            Self::Capsule { ends, radius } => (ends, std::slice::from_ref(radius)),
+            Self::Cuboid { centre, half, .. } => (std::slice::from_ref(centre), half),
+        };
+        if let Some(place) = places.iter().find(|place| !place.iter().all(|value| value.is_finite())) {
+            let [x, y, z] = [place.x, place.y, place.z];
+            return Err(Error::argument(format!("an obstacle at ({x}, {y}, {z}) is not finite")));
+        }
+        if let Some(length) = lengths.iter().find(|length| !(**length > 0.0 && length.is_finite())) {
+            return Err(Error::argument(format!("an obstacle's {length} m is not a positive length")));
+        }
+        if let Self::Cuboid { axes: [a, b, c], .. } = self {
+            let skew = [a.dot(a) - 1.0, b.dot(b) - 1.0, c.dot(c) - 1.0, a.dot(b), b.dot(c), c.dot(a)];
+            if !skew.iter().all(|skew| skew.abs() <= SKEW) {
+                return Err(Error::argument("the axes of a box are not perpendicular unit vectors"));
+            }
+        }
+        Ok(())
+    }
+
+    /// The cells that it may cover: ranges of x and of z. Those of other cells have no solid of it.
+    pub fn cells(&self, grid: &Grid) -> [Range<usize>; 2] {
+        let bounds = self.bounds();
+        [0, 1].map(|axis| {
+            let count = grid.size[axis] as f64;
+            // In cells, from the centre of the first.
+            let [first, last] =
+                bounds[axis].map(|place| ((place - grid.origin[axis]) / grid.cell - 0.5).floor());
+            let start = first.clamp(0.0, count) as usize;
+            start..((last + 2.0).clamp(0.0, count) as usize).max(start)
+        })
+    }
+
+    /// Least and greatest x, and z (m).
+    fn bounds(&self) -> [[f64; 2]; 2] {
+        let around = |middle: f64, reach: f64| [middle - reach, middle + reach];
+        match self {
+            Self::Sphere { centre, radius } => [around(centre.x, *radius), around(centre.z, *radius)],
+            Self::Capsule { ends: [a, b], radius } => {
+                [[a.x, b.x], [a.z, b.z]].map(|[a, b]| [a.min(b) - radius, a.max(b) + radius])
+            }
+            Self::Cuboid { centre, axes: [a, b, c], half } => {
+                let reach =
+                    |axis: usize| a[axis].abs() * half[0] + b[axis].abs() * half[1] + c[axis].abs() * half[2];
+                [around(centre.x, reach(0)), around(centre.z, reach(2))]
+            }
+        }
+    }
+
+    /// The part of the vertical line at (x, z) that is within: bottom and top (m).
+    pub fn interval(&self, at: [f64; 2]) -> Option<[f64; 2]> {
+        match self {
+            Self::Sphere { centre, radius } => {
+                let [x, z] = [at[0] - centre.x, at[1] - centre.z];
+                let half = root(radius * radius - (x * x + z * z))?;
+                Some([centre.y - half, centre.y + half])
+            }
+            Self::Capsule { ends, radius } => of_capsule(ends, *radius, at),
+            Self::Cuboid { centre, axes, half } => of_cuboid(centre, axes, half, at),
+        }
+    }
+
+    /// The solid of the vertical line at (x, z) in units, if it is as high as one.
+    pub fn solid(&self, at: [f64; 2], heights: &Heights) -> Option<Solid> {
+        let [bottom, top] = self.interval(at)?.map(|height| heights.round(height));
+        (bottom < top).then_some([bottom, top])
+    }
+
+    /// Calls `see` with each cell (x, z) that has a solid of it, row by row along x.
+    pub fn each(&self, grid: &Grid, heights: &Heights, mut see: impl FnMut([usize; 2], Solid)) {
+        let [columns, rows] = self.cells(grid);
+        for z in rows {
+            for x in columns.clone() {
+                if let Some(solid) = self.solid(grid.centre([x, z]), heights) {
+                    see([x, z], solid);
+                }
+            }
+        }
+    }
+}
+
+/// A square root, of numbers from 0 on.
+fn root(square: f64) -> Option<f64> {
+    (square >= 0.0).then(|| square.sqrt())
+}
+
+/// A capsule is what a sphere sweeps on its way from end to end; the highest and the lowest place on the line are each touched by one of
+/// those spheres.
+fn of_capsule([from, to]: &[DVec3; 2], radius: f64, at: [f64; 2]) -> Option<[f64; 2]> {
+    let way = to - from;
+    let [x, z] = [at[0] - from.x, at[1] - from.z];
+    let square = way.x * way.x + way.z * way.z;
+    if square == 0.0 {
+        let half = root(radius * radius - (x * x + z * z))?;
+        return Some([from.y.min(to.y) - half, from.y.max(to.y) + half]);
+    }
+    let length = square.sqrt();
+    // The line as seen from above: how far along the way, and how far beside it.
+    let along = (x * way.x + z * way.z) / length;
+    let beside = (x * way.z - z * way.x) / length;
+    let room = radius * radius - beside * beside;
+    let slant = way.y / (square + way.y * way.y).sqrt();
+    let reach = root(room)? * slant;
+    // Upward +1, downward -1.
+    let end = |side: f64| {
+        let part = ((along + side * reach) / length).clamp(0.0, 1.0);
+        let off = part * length - along;
+        Some(from.y + part * way.y + side * root(room - off * off)?)
+    };
+    Some([end(-1.0)?, end(1.0)?])
+}
+
+/// Between each pair of parallel faces.
+fn of_cuboid(centre: &DVec3, axes: &[DVec3; 3], half: &[f64; 3], at: [f64; 2]) -> Option<[f64; 2]> {
+    let [x, z] = [at[0] - centre.x, at[1] - centre.z];
+    let (mut bottom, mut top) = (f64::NEG_INFINITY, f64::INFINITY);
+    for (axis, half) in axes.iter().zip(half) {
+        let place = axis.x * x + axis.z * z;
+        if axis.y == 0.0 {
+            if place.abs() > *half {
+                return None;
+            }
+            continue;
+        }
+        let ends = [(-half - place) / axis.y, (half - place) / axis.y];
+        bottom = bottom.max(ends[0].min(ends[1]));
+        top = top.min(ends[0].max(ends[1]));
+    }
+    (bottom <= top).then(|| [centre.y + bottom, centre.y + top])
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const GRID: Grid = Grid { cell: 0.05, origin: [-1.0, -1.0], size: [40, 40] };
+
+    fn heights() -> Heights {
+        Heights::between(-2.0, 2.0).unwrap()
+    }
+
+    /// A box turned about all axes.
+    fn cuboid(centre: DVec3, half: [f64; 3]) -> Shape {
+        let a = DVec3::new(0.6, 0.64, 0.48);
+        let b = DVec3::new(0.8, -0.48, -0.36);
+        Shape::Cuboid { centre, axes: [a, b, a.cross(&b)], half }
+    }
+
+    fn shapes() -> [Shape; 7] {
+        let place = DVec3::new;
+        let capsule = |a: DVec3, b: DVec3, radius: f64| Shape::Capsule { ends: [a, b], radius };
+        let upright = [DVec3::z(), DVec3::x(), DVec3::y()];
+        [
+            Shape::Sphere { centre: place(0.1, 0.2, -0.3), radius: 0.4 },
+            capsule(place(-0.5, 0.1, -0.4), place(0.4, 0.6, 0.3), 0.2),
+            capsule(place(0.2, -0.7, 0.1), place(0.2, 0.8, 0.1), 0.3),
+            capsule(place(0.2, -0.7, 0.1), place(0.2 + 1e-9, 0.8, 0.1), 0.3),
+            capsule(place(-0.9, 0.3, 0.2), place(1.3, 0.3, 0.2), 0.1),
+            cuboid(place(0.1, -0.2, 0.05), [0.5, 0.2, 0.3]),
+            Shape::Cuboid { centre: place(0.0, 0.5, 0.0), axes: upright, half: [0.31, 0.42, 0.53] },
+        ]
+    }
+
+    fn is_within(shape: &Shape, place: DVec3) -> bool {
+        match shape {
+            Shape::Sphere { centre, radius } => (place - centre).norm() <= *radius,
+            Shape::Capsule { ends: [a, b], radius } => {
+                let part = ((place - a).dot(&(b - a)) / (b - a).dot(&(b - a))).clamp(0.0, 1.0);
+                (place - (a + (b - a) * part)).norm() <= *radius
+            }
+            Shape::Cuboid { centre, axes, half } => {
+                axes.iter().zip(half).all(|(axis, half)| axis.dot(&(place - centre)).abs() <= *half)
+            }
+        }
+    }
+
+    #[test]
+    fn intervals_end_where_the_shape_does() {
+        for shape in shapes() {
+            shape.validate().unwrap();
+            let mut count = 0;
+            let [columns, rows] = shape.cells(&GRID);
+            for z in 0..40 {
+                for x in 0..40 {
+                    let at = GRID.centre([x, z]);
+                    let interval = shape.interval(at);
+                    let within = |y: f64| is_within(&shape, DVec3::new(at[0], y, at[1]));
+                    for step in 0..=80 {
+                        let y = f64::from(step) * 0.05 - 2.0 + 1e-4;
+                        let listed = interval.is_some_and(|[bottom, top]| (bottom..=top).contains(&y));
+                        assert_eq!(listed, within(y), "{shape:?} at ({x}, {z}), {y} m: {interval:?}");
+                    }
+                    let Some([bottom, top]) = interval else { continue };
+                    count += 1;
+                    assert!(columns.contains(&x) && rows.contains(&z), "{shape:?}: ({x}, {z}) is not listed");
+                    if top - bottom > 1e-6 {
+                        for (inner, outer) in [(bottom + 1e-9, bottom - 1e-9), (top - 1e-9, top + 1e-9)] {
+                            assert!(within(inner) && !within(outer), "{shape:?} at ({x}, {z}): {interval:?}");
+                        }
+                    }
+                }
+            }
+            assert!(count > 50, "{shape:?}: {count} cells");
+            assert!(columns.len() < 40 || rows.len() < 40, "{shape:?}");
+        }
+    }
+
+    #[test]
+    fn each_cell_of_a_shape_is_seen_once_in_units() {
+        for shape in shapes() {
+            let mut seen = Vec::new();
+            shape.each(&GRID, &heights(), |cell, solid| seen.push((GRID.index(cell), solid)));
+            assert!(seen.is_sorted_by(|a, b| a.0 < b.0), "{shape:?}");
+            for (index, [bottom, top]) in seen {
+                let at = GRID.centre([index % 40, index / 40]);
+                let units = shape.interval(at).unwrap().map(|height| heights().round(height));
+                assert!(bottom < top && units == [bottom, top], "{shape:?}: cell {index}");
+            }
+        }
+        let above = Shape::Sphere { centre: DVec3::new(0.0, 9.0, 0.0), radius: 1.0 };
+        above.each(&GRID, &heights(), |cell, _| panic!("{cell:?} is below it"));
+        let beside = Shape::Sphere { centre: DVec3::new(9.0, 0.0, -7.0), radius: 1.0 };
+        assert_eq!(beside.cells(&GRID).map(|range| range.len()), [0, 0]);
+    }
+
+    #[test]
+    fn mirrored_and_turned_shapes_have_the_same_bits() {
+        let change = |shape: &Shape, change: fn(&DVec3) -> DVec3| match shape {
+            Shape::Sphere { centre, radius } => Shape::Sphere { centre: change(centre), radius: *radius },
+            Shape::Capsule { ends: [a, b], radius } => {
+                Shape::Capsule { ends: [change(a), change(b)], radius: *radius }
+            }
+            Shape::Cuboid { centre, axes: [a, b, c], half } => {
+                Shape::Cuboid { centre: change(centre), axes: [change(a), change(b), change(c)], half: *half }
+            }
+        };
+        let bits = |interval: Option<[f64; 2]>| interval.map(|ends| ends.map(f64::to_bits));
+        for shape in shapes() {
+            let mirrored = change(&shape, |p| DVec3::new(-p.x, p.y, p.z));
+            let turned = change(&shape, |p| DVec3::new(p.z, p.y, -p.x));
+            for n in 0..400 {
+                let [x, z] = [f64::from(n % 20) * 0.0917 - 0.9, f64::from(n / 20) * 0.0873 - 0.8];
+                let expected = bits(shape.interval([x, z]));
+                assert_eq!(bits(mirrored.interval([-x, z])), expected, "{shape:?} at ({x}, {z}) mirrored");
+                assert_eq!(bits(turned.interval([z, -x])), expected, "{shape:?} at ({x}, {z}) turned");
+            }
+        }
+    }
+
+    #[test]
+    fn bad_shapes_are_a_sentence() {
+        let message = |shape: Shape| shape.validate().unwrap_err().to_string();
+        let centre = DVec3::new(0.0, f64::NAN, 1.0);
+        assert_eq!(
+            message(Shape::Sphere { centre, radius: 1.0 }),
+            "an obstacle at (0, NaN, 1) is not finite"
+        );
+        let ends = [DVec3::zeros(), DVec3::x()];
+        assert_eq!(
+            message(Shape::Capsule { ends, radius: 0.0 }),
+            "an obstacle's 0 m is not a positive length"
+        );
+        let axes = [DVec3::x(), DVec3::y(), DVec3::y()];
+        let skewed = Shape::Cuboid { centre: DVec3::zeros(), axes, half: [1.0; 3] };
+        assert_eq!(message(skewed), "the axes of a box are not perpendicular unit vectors");
+    }
+}

@@ -1,0 +1,88 @@
+//! Solid intervals along the vertical lines of cells.
+
+use crate::shallow::grid::{Grid, Heights};
+
+/// A solid interval (units): from its bottom ([`super::super::grid::BOTTOMLESS`]: it reaches down for ever) to its top.
+pub type Solid = [i32; 2];
+
+/// The solid intervals of every cell, from the lowest up; they neither touch nor overlap.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Solids {
+    /// Cells.
+    pub grid: Grid,
+    /// Heights.
+    pub heights: Heights,
+    /// Where each cell's intervals begin, row by row, and the end of the last.
+    starts: Vec<u32>,
+    solids: Vec<Solid>,
+}
+
+impl Solids {
+    /// Intervals from lists of each cell, row by row along x (`Grid::index`). Sorted and united here: those that touch or overlap become
+    /// one; empty ones (top below bottom) go.
+    pub fn new(grid: Grid, heights: Heights, cells: impl IntoIterator<Item = Vec<Solid>>) -> Self {
+        let mut out = Self { grid, heights, starts: vec![0], solids: Vec::new() };
+        for mut cell in cells {
+            unite(&mut cell);
+            out.push(&cell);
+        }
+        out
+    }
+
+    /// No cell yet; [`Solids::push`] adds one after another.
+    pub fn empty(grid: Grid, heights: Heights) -> Self {
+        Self { grid, heights, starts: vec![0], solids: Vec::new() }
+    }
+
+    /// Adds the next cell, whose intervals are sorted and apart.
+    pub fn push(&mut self, cell: &[Solid]) {
+        debug_assert!(cell.windows(2).all(|pair| pair[0][1] < pair[1][0]));
+        self.solids.extend_from_slice(cell);
+        self.starts.push(self.solids.len() as u32);
+    }
+
+    /// The intervals of a cell (`Grid::index`).
+    pub fn cell(&self, index: usize) -> &[Solid] {
+        &self.solids[self.starts[index] as usize..self.starts[index + 1] as usize]
+    }
+
+    /// Most intervals that a cell has.
+    pub fn layers(&self) -> usize {
+        self.starts.windows(2).map(|pair| (pair[1] - pair[0]) as usize).max().unwrap_or(0)
+    }
+}
+
+/// Sorts intervals and unites those that touch or overlap.
+pub fn unite(cell: &mut Vec<Solid>) {
+    cell.retain(|[bottom, top]| bottom <= top);
+    cell.sort_unstable();
+    cell.dedup_by(|next, last| {
+        let touches = next[0] <= last[1];
+        if touches {
+            last[1] = last[1].max(next[1]);
+        }
+        touches
+    });
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::shallow::grid::BOTTOMLESS;
+
+    #[test]
+    fn intervals_that_touch_become_one() {
+        let mut cell = vec![[7, 9], [BOTTOMLESS, 2], [2, 3], [12, 11], [8, 20], [4, 5]];
+        unite(&mut cell);
+        assert_eq!(cell, [[BOTTOMLESS, 3], [4, 5], [7, 20]]);
+    }
+
+    #[test]
+    fn cells_keep_their_order() {
+        let grid = Grid { cell: 1.0, origin: [0.0; 2], size: [3, 1] };
+        let heights = Heights::between(0.0, 1.0).unwrap();
+        let solids = Solids::new(grid, heights, [vec![[3, 4], [0, 1]], vec![], vec![[5, 6]]]);
+        assert_eq!(solids.cell(0), [[0, 1], [3, 4]]);
+        assert_eq!((solids.cell(1).len(), solids.cell(2)[0], solids.layers()), (0, [5, 6], 2));
+    }
+}

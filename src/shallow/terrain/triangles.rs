@@ -1,0 +1,457 @@
+//! Solids of triangles, open or closed, that may overlap: a point is solid where the winding number is above 0.
+//!
+//! Going down a vertical line from above, where the winding number is 0, a triangle that faces up adds 1 and one that faces down takes 1.
+//! So solids that overlap unite, an open sheet that faces up is solid down to [`BOTTOMLESS`], and one that faces down is nothing.
+//! Which lines meet a triangle is decided exactly (`crossings.rs`), so no closed surface leaks.
+//!
+//! Heights of crossings, which are right to within 2^-8 units, are rounded to units first, those outside of the range to its ends, and
+//! changes at the same height are summed. A unit of height is thus solid if and only if the winding number at its middle is above 0:
+//! solids thinner than a unit may vanish, and so may gaps.
+//!
+//! A line that meets an edge or vertex exactly goes by it on the side of greater x, or z. A scene that is mirrored or turned by 90 degrees
+//! gives the same solids unless a line meets the silhouette of a solid exactly, which then belongs to the other side.
+
+use std::ops::Range;
+
+use super::Solids;
+use super::crossings::{Facet, Lines, Outline};
+use super::solids::Solid;
+use crate::base::Vec3;
+use crate::base::cpu::FlushDenormals;
+use crate::error::{Error, Result};
+use crate::shallow::grid::{BOTTOMLESS, Grid, Heights};
+
+/// The end of a list of crossings.
+const END: u32 = u32::MAX;
+/// Triangles over more lines along x find those of each row by their edges.
+const WIDE: u32 = 2;
+
+/// The solids of every cell. Triangles are counter-clockwise seen from outside.
+///
+/// # Errors
+/// As [`Caster::new`] and [`Caster::cast`].
+pub fn solids(positions: &[Vec3], triangles: &[[u32; 3]], grid: Grid, heights: Heights) -> Result<Solids> {
+    let mut caster = Caster::new(grid, heights)?;
+    let [nx, nz] = grid.size;
+    caster.cast(positions, triangles, [0..nx, 0..nz])?;
+    let mut out = Solids::empty(grid, heights);
+    for cell in 0..grid.cells() {
+        out.push(caster.at(cell));
+    }
+    Ok(out)
+}
+
+/// Casts the lines through a box of cells again and again. Buffers are kept with room for half as many crossings again: it allocates
+/// only for a larger box, more vertices or many more crossings than before.
+pub struct Caster {
+    heights: Heights,
+    size: [usize; 2],
+    /// Along x and along z.
+    lines: [Lines; 2],
+    /// The cells of the last cast, along x and z.
+    cells: [Range<usize>; 2],
+    /// Counts of lines left of each vertex.
+    ranks: Vec<[u32; 2]>,
+    /// Of each crossing: height (units) x 2 + 1 if the triangle faces up, and the crossing before it in its cell, or [`END`].
+    crossings: Vec<[u32; 2]>,
+    /// The last crossing of each cell, or [`END`].
+    last: Vec<u32>,
+    /// The crossings of one cell.
+    line: Vec<u32>,
+    starts: Vec<u32>,
+    solids: Vec<Solid>,
+}
+
+impl Caster {
+    /// A caster without a cast.
+    ///
+    /// # Errors
+    /// `Argument`: a grid that [`Grid::validate`] refuses, a cell not from 1e-30 to 1e30 m or an origin beyond 1e30 m from 0 (the range
+    /// of exact decisions), cells that f64 cannot tell apart, heights without a range.
+    pub fn new(grid: Grid, heights: Heights) -> Result<Self> {
+        grid.validate()?;
+        let Grid { cell, origin, size } = grid;
+        if !(1e-30..=1e30).contains(&cell) {
+            return Err(Error::argument(format!("a cell of {cell:e} m is not within 1e-30 to 1e30 m")));
+        }
+        if let Some(far) = origin.into_iter().find(|place| place.abs() > 1e30) {
+            return Err(Error::argument(format!("an origin at {far:e} m is beyond 1e30 m")));
+        }
+        if !(heights.low.is_finite() && heights.unit.is_finite() && heights.unit > 0.0) {
+            let Heights { low, unit } = heights;
+            return Err(Error::argument(format!(
+                "heights from {low} m in units of {unit} m are not a range"
+            )));
+        }
+        let centre = |axis: usize, index: usize| grid.centre([index; 2])[axis];
+        for axis in [0, 1] {
+            let merges = |index: &usize| centre(axis, *index) >= centre(axis, *index + 1);
+            if let Some(index) = (0..size[axis] - 1).find(merges) {
+                let place = centre(axis, index);
+                return Err(Error::argument(format!(
+                    "a cell of {cell} m is too fine for places at {place:e} m"
+                )));
+            }
+        }
+        let lines = |axis: usize| {
+            let ends = [origin[axis], centre(axis, 0), centre(axis, size[axis] - 1)].map(f64::abs);
+            let reach = ends.into_iter().fold(0.0, f64::max);
+            Lines::new((0..size[axis]).map(|index| centre(axis, index)), cell, reach)
+        };
+        Ok(Self {
+            heights,
+            size,
+            lines: [0, 1].map(lines),
+            cells: [0..0, 0..0],
+            ranks: Vec::new(),
+            crossings: Vec::new(),
+            last: Vec::new(),
+            line: Vec::with_capacity(64),
+            starts: Vec::new(),
+            solids: Vec::new(),
+        })
+    }
+
+    /// Finds the solids of a box of cells (ranges of x and of z). Denormals are flushed meanwhile.
+    ///
+    /// # Errors
+    /// `Argument`: no triangle, a vertex that is not finite, an index beyond the vertices, a box that is not within the grid. The
+    /// caster then has no cells.
+    pub fn cast(
+        &mut self,
+        positions: &[Vec3],
+        triangles: &[[u32; 3]],
+        cells: [Range<usize>; 2],
+    ) -> Result<()> {
+        let _flushed = FlushDenormals::begin();
+        self.begin(&cells)?;
+        if triangles.is_empty() {
+            return Err(Error::argument("the terrain has no triangles"));
+        }
+        self.rank(positions, &cells)?;
+        self.cross(positions, triangles, &cells)?;
+        self.stack();
+        self.cells = cells;
+        keep_room(&mut self.crossings);
+        keep_room(&mut self.line);
+        keep_room(&mut self.solids);
+        Ok(())
+    }
+
+    fn begin(&mut self, cells: &[Range<usize>; 2]) -> Result<()> {
+        self.cells = [0..0, 0..0];
+        self.starts.clear();
+        self.solids.clear();
+        self.crossings.clear();
+        self.last.clear();
+        let [x, z] = cells;
+        let [nx, nz] = self.size;
+        if x.start > x.end || z.start > z.end || x.end > nx || z.end > nz {
+            return Err(Error::argument(format!(
+                "cells {x:?} x {z:?} are not a box within {nx} x {nz} cells"
+            )));
+        }
+        self.last.resize(x.len() * z.len(), END);
+        Ok(())
+    }
+
+    /// Ranks of all vertices, clamped to the box.
+    fn rank(&mut self, positions: &[Vec3], [x, z]: &[Range<usize>; 2]) -> Result<()> {
+        let [along_x, along_z] = &self.lines;
+        let [x, z] = [x, z].map(|range| [range.start as u32, range.end as u32]);
+        let mut is_finite = true;
+        self.ranks.clear();
+        self.ranks.extend(positions.iter().map(|p| {
+            is_finite &= p.x.is_finite() & p.y.is_finite() & p.z.is_finite();
+            let ranks = [along_x.rank(p.x.into()), along_z.rank(p.z.into())];
+            [ranks[0].clamp(x[0], x[1]), ranks[1].clamp(z[0], z[1])]
+        }));
+        if is_finite {
+            return Ok(());
+        }
+        let wild = positions.iter().position(|p| p.iter().any(|value| !value.is_finite()));
+        Err(Error::argument(format!("vertex {} is not finite", wild.unwrap_or(0) + 1)))
+    }
+
+    /// Lists the crossings of each cell.
+    fn cross(
+        &mut self,
+        positions: &[Vec3],
+        triangles: &[[u32; 3]],
+        [x, z]: &[Range<usize>; 2],
+    ) -> Result<()> {
+        let (heights, width, [along_x, along_z]) = (self.heights, x.len(), &self.lines);
+        let (crossings, last) = (&mut self.crossings, &mut self.last);
+        for (index, triangle) in triangles.iter().enumerate() {
+            let rank = |corner: usize| self.ranks.get(triangle[corner] as usize);
+            let (Some(&a), Some(&b), Some(&c)) = (rank(0), rank(1), rank(2)) else {
+                let (triangle, count) = (index + 1, positions.len());
+                let what = format!("triangle {triangle} names a vertex beyond the {count} there are");
+                return Err(Error::argument(what));
+            };
+            let [columns, rows] = [0, 1].map(|axis| {
+                let (ab, other) = ([a[axis], b[axis]], c[axis]);
+                [ab[0].min(ab[1]).min(other), ab[0].max(ab[1]).max(other)]
+            });
+            if columns[0] == columns[1] || rows[0] == rows[1] {
+                continue;
+            }
+            let corner = |corner: usize| {
+                let p = &positions[triangle[corner] as usize];
+                [p.x, p.y, p.z].map(f64::from)
+            };
+            let facet = Facet::new([corner(0), corner(1), corner(2)], heights.unit);
+            let is_wide = columns[1] - columns[0] > WIDE;
+            let outline = is_wide.then(|| Outline::new(&facet.corners, along_x));
+            for row in rows[0]..rows[1] {
+                let at = along_z.at(row);
+                let columns = match &outline {
+                    Some(outline) => outline.span(at, columns),
+                    None => columns,
+                };
+                for column in columns[0]..columns[1] {
+                    let Some((height, is_up)) = facet.cross([along_x.at(column), at]) else { continue };
+                    let cell = (row as usize - z.start) * width + (column as usize - x.start);
+                    let height = heights.round(height) as u32;
+                    let before = std::mem::replace(&mut last[cell], crossings.len() as u32);
+                    crossings.push([height << 1 | u32::from(is_up), before]);
+                }
+            }
+            if crossings.len() >= END as usize {
+                return Err(Error::argument(
+                    "the terrain has over 4,294,967,294 crossings with lines of cells",
+                ));
+            }
+        }
+        Ok(())
+    }
+
+    /// Sorts the crossings of each cell and makes solids of them.
+    fn stack(&mut self) {
+        self.starts.push(0);
+        for &last in &self.last {
+            self.line.clear();
+            let mut at = last;
+            while at != END {
+                let [crossing, before] = self.crossings[at as usize];
+                self.line.push(crossing);
+                at = before;
+            }
+            self.line.sort_unstable();
+            pile(&self.line, &mut self.solids);
+            self.starts.push(self.solids.len() as u32);
+        }
+    }
+
+    /// The box of the last cast: ranges of x and of z.
+    pub fn cells(&self) -> [Range<usize>; 2] {
+        self.cells.clone()
+    }
+
+    /// Where each cell's solids begin in [`Caster::solids`], row by row along x through the box, and the end of the last.
+    pub fn starts(&self) -> &[u32] {
+        &self.starts
+    }
+
+    /// The solids of all cells of the box; those of a cell from the lowest up, apart from each other.
+    pub fn solids(&self) -> &[Solid] {
+        &self.solids
+    }
+
+    /// The solids of a cell (x, z) of the grid, which must be within the box.
+    pub fn cell(&self, [x, z]: [usize; 2]) -> &[Solid] {
+        let [columns, rows] = &self.cells;
+        assert!(columns.contains(&x) && rows.contains(&z), "cell ({x}, {z}) is not within the box");
+        self.at((z - rows.start) * columns.len() + (x - columns.start))
+    }
+
+    /// The solids of a cell by its index in the box, row by row along x.
+    pub fn at(&self, index: usize) -> &[Solid] {
+        &self.solids[self.starts[index] as usize..self.starts[index + 1] as usize]
+    }
+}
+
+/// Adds the solids of one line, whose crossings ascend.
+fn pile(line: &[u32], solids: &mut Vec<Solid>) {
+    let first = solids.len();
+    let (mut winding, mut top) = (0, 0);
+    for level in line.chunk_by(|a, b| a >> 1 == b >> 1).rev() {
+        let height = (level[0] >> 1) as i32;
+        let before = winding;
+        winding += level.iter().map(|crossing| if crossing & 1 == 1 { 1 } else { -1 }).sum::<i32>();
+        match (before > 0, winding > 0) {
+            (false, true) => top = height,
+            (true, false) => solids.push([height, top]),
+            _ => {}
+        }
+    }
+    if winding > 0 {
+        solids.push([BOTTOMLESS, top]);
+    }
+    solids[first..].reverse();
+}
+
+/// Keeps room for half as much again: frames that find a little more allocate nothing.
+fn keep_room<T>(buffer: &mut Vec<T>) {
+    let wanted = buffer.len() + buffer.len() / 2;
+    if buffer.capacity() < wanted {
+        buffer.reserve_exact(wanted - buffer.len());
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const GRID: Grid = Grid { cell: 0.5, origin: [-2.0, -2.0], size: [8, 8] };
+
+    /// 0 to 1024 m: a unit is 2^-20 m.
+    fn heights() -> Heights {
+        Heights::between(0.0, 1024.0).unwrap()
+    }
+
+    fn units(metres: f64) -> i32 {
+        heights().round(metres)
+    }
+
+    /// Boxes between corners.
+    fn boxes(ends: &[[[f32; 3]; 2]]) -> (Vec<Vec3>, Vec<[u32; 3]>) {
+        let faces = [[0, 2, 3, 1], [4, 5, 7, 6], [0, 1, 5, 4], [2, 6, 7, 3], [0, 4, 6, 2], [1, 3, 7, 5]];
+        let (mut positions, mut triangles) = (Vec::new(), Vec::new());
+        for ends in ends {
+            let first = positions.len() as u32;
+            positions.extend((0..8).map(|n| Vec3::from([0, 1, 2].map(|axis| ends[n >> axis & 1][axis]))));
+            let of_face =
+                |[a, b, c, d]: [u32; 4]| [[a, b, c], [a, c, d]].map(|corners| corners.map(|n| first + n));
+            triangles.extend(faces.into_iter().flat_map(of_face));
+        }
+        (positions, triangles)
+    }
+
+    fn at(solids: &Solids, cell: [usize; 2]) -> Vec<Solid> {
+        solids.cell(GRID.index(cell)).to_vec()
+    }
+
+    #[test]
+    fn sheets_that_face_up_have_no_bottom_and_others_are_nothing() {
+        let (positions, triangles) = boxes(&[[[-9.0, 1.0, -9.0], [9.0, 2.0, 9.0]]]);
+        // The box's upper and lower faces alone.
+        let facing = |axis_up: bool| {
+            let is_one = |triangle: &[u32; 3]| triangle.iter().all(|n| (n >> 1 & 1 == 1) == axis_up);
+            let sheet: Vec<_> = triangles.iter().copied().filter(is_one).collect();
+            assert_eq!(sheet.len(), 2);
+            solids(&positions, &sheet, GRID, heights()).unwrap()
+        };
+        assert_eq!(at(&facing(true), [3, 4]), [[BOTTOMLESS, units(2.0)]]);
+        assert_eq!(facing(false).layers(), 0);
+    }
+
+    #[test]
+    fn solids_that_overlap_or_touch_unite_and_others_stay_apart() {
+        let wide = |low: f32, high: f32| [[-1.0, low, -1.0], [1.0, high, 1.0]];
+        let thin = 2f32.powi(-22);
+        let (positions, triangles) = boxes(&[
+            wide(1.0, 3.0),
+            wide(2.0, 4.0),
+            wide(4.0, 5.0),
+            wide(6.0, 7.0),
+            wide(7.0 + thin, 8.0),
+            wide(9.0, 9.0 + thin),
+            wide(10.0, 12.0),
+            [[-9.0, 10.5, -9.0], [9.0, 11.0, 9.0]],
+        ]);
+        let found = solids(&positions, &triangles, GRID, heights()).unwrap();
+        let expected = [[1.0, 5.0], [6.0, 8.0], [10.0, 12.0]].map(|solid| solid.map(units));
+        for cell in [[2, 2], [3, 3], [5, 2], [4, 5]] {
+            assert_eq!(at(&found, cell), expected, "{cell:?}");
+        }
+        assert_eq!(at(&found, [0, 3]), [[units(10.5), units(11.0)]]);
+        assert_eq!(found.layers(), 3);
+    }
+
+    #[test]
+    fn heights_beyond_the_range_are_its_ends() {
+        let wide = |low: f32, high: f32| [[-9.0, low, -9.0], [9.0, high, 9.0]];
+        let (positions, triangles) =
+            boxes(&[wide(-5.0, -4.0), wide(-3.0, 1.0), wide(1000.0, 2000.0), wide(3000.0, 4000.0)]);
+        let found = solids(&positions, &triangles, GRID, heights()).unwrap();
+        assert_eq!(at(&found, [0, 0]), [[0, units(1.0)], [units(1000.0), units(1024.0)]]);
+    }
+
+    #[test]
+    fn cells_on_a_face_belong_to_one_side() {
+        // Its sides and diagonals pass through centres of cells.
+        let (positions, triangles) = boxes(&[[[-0.75, 1.0, -0.75], [0.75, 2.0, 0.75]]]);
+        let found = solids(&positions, &triangles, GRID, heights()).unwrap();
+        for z in 0..8 {
+            for x in 0..8 {
+                let is_within = (2..5).contains(&x) && (2..5).contains(&z);
+                assert_eq!(at(&found, [x, z]).len(), usize::from(is_within), "({x}, {z})");
+            }
+        }
+    }
+
+    #[test]
+    fn a_box_of_cells_is_cast_like_the_whole_and_without_new_memory() {
+        let (mut positions, triangles) = boxes(&[
+            [[-1.3, 1.0, -1.7], [1.2, 2.0, 0.9]],
+            [[-0.4, 0.5, -0.8], [1.9, 3.0, 1.6]],
+            [[-9.0, 0.1, -9.0], [9.0, 0.2, 9.0]],
+        ]);
+        let mut caster = Caster::new(GRID, heights()).unwrap();
+        caster.cast(&positions, &triangles, [0..8, 0..8]).unwrap();
+        let memory = |caster: &Caster| {
+            let Caster { ranks, crossings, last, line, starts, solids, .. } = caster;
+            let sizes = [ranks.capacity(), last.capacity(), starts.capacity(), line.capacity()];
+            (sizes, ranks.as_ptr(), crossings.as_ptr(), last.as_ptr(), starts.as_ptr(), solids.as_ptr())
+        };
+        let first = memory(&caster);
+        for frame in 0..20u8 {
+            positions.iter_mut().for_each(|p| p.x += 0.01 * f32::from(frame % 5));
+            let whole = solids(&positions, &triangles, GRID, heights()).unwrap();
+            let (start, end) = (usize::from(frame % 4), usize::from(4 + frame % 5));
+            caster.cast(&positions, &triangles, [start..end, 1..end]).unwrap();
+            assert_eq!(caster.starts().len(), (end - start) * (end - 1) + 1);
+            for z in 1..end {
+                for x in start..end {
+                    assert_eq!(
+                        caster.cell([x, z]),
+                        whole.cell(GRID.index([x, z])),
+                        "frame {frame}: ({x}, {z})"
+                    );
+                }
+            }
+            assert!(memory(&caster) == first, "frame {frame}");
+        }
+        caster.cast(&positions, &triangles, [3..3, 2..4]).unwrap();
+        assert_eq!((caster.cells(), caster.solids().len()), ([3..3, 2..4], 0));
+    }
+
+    #[test]
+    fn bad_input_is_a_sentence() {
+        let (positions, triangles) = boxes(&[[[0.0; 3], [1.0; 3]]]);
+        let message = |positions: &[Vec3], triangles: &[[u32; 3]]| {
+            solids(positions, triangles, GRID, heights()).unwrap_err().to_string()
+        };
+        assert_eq!(message(&positions, &[]), "the terrain has no triangles");
+        assert_eq!(
+            message(&positions, &[[0, 1, 2], [0, 8, 1]]),
+            "triangle 2 names a vertex beyond the 8 there are"
+        );
+        for wild in [f32::NAN, f32::INFINITY] {
+            let mut positions = positions.clone();
+            positions[2].y = wild;
+            assert_eq!(message(&positions, &triangles), "vertex 3 is not finite");
+        }
+        let caster = |grid: Grid| Caster::new(grid, heights()).map(|_| ()).unwrap_err().to_string();
+        assert_eq!(caster(Grid { cell: 1e-31, ..GRID }), "a cell of 1e-31 m is not within 1e-30 to 1e30 m");
+        assert_eq!(caster(Grid { origin: [0.0, 2e30], ..GRID }), "an origin at 2e30 m is beyond 1e30 m");
+        assert!(
+            caster(Grid { origin: [1e17, 0.0], ..GRID })
+                .starts_with("a cell of 0.5 m is too fine for places at ")
+        );
+        let mut caster = Caster::new(GRID, heights()).unwrap();
+        let error = caster.cast(&positions, &triangles, [0..9, 0..8]).unwrap_err().to_string();
+        assert_eq!(error, "cells 0..9 x 0..8 are not a box within 8 x 8 cells");
+    }
+}
