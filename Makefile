@@ -133,7 +133,7 @@ pictures: setup
 	@./tools/pictures "$${FRAZIL_DATA:-../shared/data}" target/pictures docs/pictures
 
 # make gates [ONLY=snow.base.wall,...]
-gates: setup hosts
+gates: setup hosts hosts-core
 	@cargo bench --quiet --bench gates -- $(ONLY)
 
 # Times and errors beside the thesis', stock OpenVDB's and other methods': make bench [ONLY=snow,surface]

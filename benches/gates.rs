@@ -104,6 +104,8 @@ mod repair;
 mod rest;
 #[path = "gates/scenes.rs"]
 mod scenes;
+#[path = "gates/shallow_core.rs"]
+mod shallow_core;
 #[path = "gates/shot.rs"]
 mod shot;
 #[path = "gates/snow.rs"]
@@ -188,6 +190,7 @@ fn main() {
     rebuilt_frames::run(&mut h);
     rebuilt_large::run(&mut h);
     matching::run(&mut h);
+    shallow_core::run(&mut h);
     easing::run(&mut h);
     house::run(&mut h);
     h.finish();

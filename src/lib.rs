@@ -16,6 +16,7 @@
 //! | read and write meshes, as polygons with UVs | [`io::mesh`] |
 //! | read particle caches of other programs | [`io::particles`] |
 //! | make the surface of a liquid from its particles; let a detailed mesh follow them | [`surface`] |
+//! | let a little liquid flow over a terrain in real time | [`shallow`] |
 //! | look at any of it | [`render`] |
 //! | link from C or C++ | `include/frazil.h`, which comes from [`capi`] |
 //!

@@ -359,4 +359,7 @@ pub const GATES: &[Gate] = &[
     gate("surface.frame_260k", "s", Most(4.0), Most(2.0)),
     gate("surface.frame_million", "s", Most(12.0), Most(5.0)),
     gate("surface.rebuilt_memory", "GB", Most(2.0), Most(1.0)),
+    // The library without OpenVDB: exported symbols but frz_*, and shared objects beyond the C library's and libgcc_s.
+    none("shallow.core_symbols", "symbols"),
+    none("shallow.core_needs", "objects"),
 ];

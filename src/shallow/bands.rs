@@ -1,6 +1,7 @@
 //! A step on several threads: each works on a band of rows.
 
 use std::ops::Range;
+use std::sync::atomic::{AtomicBool, Ordering};
 
 use super::columns::Columns;
 use super::flux::Step;
@@ -165,6 +166,44 @@ fn run(bands: &mut [Band], step: &Step, ground: &Ground, liquid: Part, deepest: 
                 || run(others, step, ground, high, deepest_high),
             );
         }
+    }
+}
+
+/// Runs the steps of a frame while the other threads of the pool stay awake for their bands: to wake one takes longer than a band of a step.
+/// Without a free thread the frame's own does all.
+pub fn attended<R: Send>(threads: usize, work: impl FnOnce() -> R + Send) -> R {
+    let done = AtomicBool::new(false);
+    let ended = &done;
+    let work = move || {
+        // Also when the work panics.
+        let _end = End(ended);
+        work()
+    };
+    rayon::join(work, || attend(threads.saturating_sub(1), ended)).0
+}
+
+/// Takes jobs of the pool until the frame is done, on so many threads.
+fn attend(threads: usize, ended: &AtomicBool) {
+    let wait = || {
+        while !ended.load(Ordering::Acquire) {
+            if rayon::yield_now() != Some(rayon::Yield::Executed) {
+                std::hint::spin_loop();
+            }
+        }
+    };
+    if threads > 1 {
+        rayon::join(wait, || attend(threads - 1, ended));
+    } else {
+        wait();
+    }
+}
+
+/// Sets a flag when it is dropped.
+struct End<'a>(&'a AtomicBool);
+
+impl Drop for End<'_> {
+    fn drop(&mut self) {
+        self.0.store(true, Ordering::Release);
     }
 }
 

@@ -5,7 +5,7 @@
 //! layers, and to the outside.
 //!
 //! The thesis derives viscosity for level ground. On ground of slope S a film of vertical depth H is thinner by cos, and driven along the slope: its
-//! discharge is that of level ground over (1 + S^2)^2, which [`openness`] gives.
+//! discharge is that of level ground over (1 + S^2)^2, which `openness` gives.
 
 use super::columns::{Columns, NONE, STRIP};
 use super::grid::BOTTOMLESS;

@@ -1,5 +1,6 @@
 //! The liquid of a domain, frame by frame.
 
+use super::bands::attended;
 use super::clock::Clock;
 use super::columns::Columns;
 use super::flow::Flow;
@@ -222,7 +223,8 @@ impl Shallow {
             return Err(Error::Cancelled);
         }
         if self.flow.divide(&self.columns, ctx.pool().threads()) {
-            ctx.pool().install(|| self.steps(dt, next))
+            let threads = ctx.pool().threads();
+            ctx.pool().install(|| attended(threads, || self.steps(dt, next)))
         } else {
             let _flush = FlushDenormals::begin();
             self.steps(dt, next)

@@ -89,6 +89,7 @@ mod snow {
     mod volumes;
 }
 mod shallow {
+    mod balance;
     mod flooded;
     mod probe;
     mod state;
