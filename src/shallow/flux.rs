@@ -65,16 +65,20 @@ pub fn lesser(a: f32, b: f32) -> f32 {
     if a < b { a } else { b }
 }
 
+/// A transfer whose integer part is the nearest integer: always cut toward zero, what is left would push on in the direction of the flux.
+#[inline(always)]
+pub fn rounded(transfer: f32) -> f32 {
+    transfer + 0.5f32.copysign(transfer)
+}
+
 /// The flux through a pipe from i to j after a step (units of depth): `fall` is eta_i - eta_j, `depth` H of both (units), `flux` the last flux.
 #[inline(always)]
 pub fn flux<K: Kind>(step: &Step, fall: i32, depth: [f32; 2], flux: f32, open: f32) -> f32 {
     let kept = step.kept * flux;
     let drive = step.drive * fall as f32;
-    let section = depth.map(|depth| if K::WHOLE { step.section } else { lesser(depth, step.section) });
-    // Each column gives by its own depth: of the two only one does, but where a flux is about to turn.
-    let gives = greater(kept + drive * section[0], 0.0);
-    let takes = lesser(kept + drive * section[1], 0.0);
-    let driven = gives + takes;
+    // The mean depth drives, the same uphill and downhill: with that of the column that gives, waves would gain by each swing.
+    let section = if K::WHOLE { step.section } else { lesser(0.5 * (depth[0] + depth[1]), step.section) };
+    let driven = kept + drive * section;
     let giver = if driven > 0.0 { depth[0] } else { depth[1] };
     if K::VISCOUS {
         let square = giver * giver;
@@ -163,11 +167,11 @@ pub fn flux_row<K: Kind>(
         let fall = eta - (base[x + 1] + depth[x + 1]) + step.tilt[0];
         let f = flux::<K>(step, fall, [own, depth[x + 1] as f32], east[x], open_east[x]);
         east[x] = f;
-        to_east[x] = if f == 0.0 { 0.0 } else { f + left_east[x] };
+        to_east[x] = if f == 0.0 { 0.0 } else { rounded(f + left_east[x]) };
         let fall = eta - (south_base[x] + south_depth[x]) + step.tilt[1];
         let f = flux::<K>(step, fall, [own, south_depth[x] as f32], south[x], open_south[x]);
         south[x] = f;
-        to_south[x] = if f == 0.0 { 0.0 } else { f + left_south[x] };
+        to_south[x] = if f == 0.0 { 0.0 } else { rounded(f + left_south[x]) };
     }
 }
 

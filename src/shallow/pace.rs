@@ -52,12 +52,20 @@ pub struct Next<'a> {
     pub deepest: f64,
     /// Steps made in this frame.
     pub steps: u32,
+    /// Length of the last step (s).
+    pub last: f64,
 }
+
+/// A step stays as long as it was while more is stable, up to this much more: each change of its length heats waves.
+const STEADY: f64 = 0.45;
 
 /// The length of the next step (s).
 pub fn next(at: &Next) -> f64 {
     let longest = match at.params.pace {
-        Pace::Exact => longest(at.params, at.measures, at.deepest, at.left),
+        Pace::Exact => {
+            let longest = longest(at.params, at.measures, at.deepest, at.left);
+            if (STEADY * longest..=longest).contains(&at.last) { at.last } else { longest }
+        }
         Pace::Realtime(longest) => longest,
     };
     // Rounding of what is left is no reason for another step.

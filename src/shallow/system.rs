@@ -240,8 +240,14 @@ impl Shallow {
         while report.seconds < dt {
             let left = dt - report.seconds;
             let deepest = measures.unit * f64::from(self.flow.deepest());
-            let state =
-                Next { params: &self.params, measures: &measures, left, deepest, steps: report.steps };
+            let state = Next {
+                params: &self.params,
+                measures: &measures,
+                left,
+                deepest,
+                steps: report.steps,
+                last: self.flow.last,
+            };
             let Some(length) = next(&state) else { break };
             if report.steps == 0 && left / length > f64::from(MOST_STEPS) {
                 return Err(Error::argument(format!("a frame of {dt} s would take steps of {length} s")));

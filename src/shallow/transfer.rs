@@ -16,6 +16,12 @@ pub unsafe fn whole(transfer: f32) -> i32 {
     unsafe { transfer.to_int_unchecked() }
 }
 
+/// What is left of a transfer (`flux::rounded`) behind its integer part.
+#[inline(always)]
+fn left(transfer: f32, whole: i32) -> f32 {
+    if transfer == 0.0 { 0.0 } else { transfer - whole as f32 - 0.5f32.copysign(transfer) }
+}
+
 /// Moves what the pipes of a span transfer; returns the greatest new depth. `left_east` and `left_south` receive what truncation leaves.
 #[inline(always)]
 pub fn move_units(around: &Around, depth: &mut [i32], left_east: &mut [f32], left_south: &mut [f32]) -> i32 {
@@ -27,8 +33,8 @@ pub fn move_units(around: &Around, depth: &mut [i32], left_east: &mut [f32], lef
     for x in 0..count {
         // SAFETY: all four were scaled by K, or need not be: they are within the depth of the column that gives.
         let [e, w, s, n] = unsafe { [whole(east[x]), whole(west[x]), whole(south[x]), whole(north[x])] };
-        left_east[x] = east[x] - e as f32;
-        left_south[x] = south[x] - s as f32;
+        left_east[x] = left(east[x], e);
+        left_south[x] = left(south[x], s);
         depth[x] += (w - e) + (n - s);
         deepest = depth[x].max(deepest);
     }

@@ -67,6 +67,11 @@ fn scene(ctx: &Context, seed: u64, params: Params) -> Shallow {
         let bridge = shallow.columns().of_cell([21, z]).last().unwrap();
         shallow.pour(bridge, 0.004);
     }
+    // A puddle over the drain.
+    for cell in (18..23).flat_map(|z| (8..13).map(move |x| [x, z])) {
+        let ground = shallow.columns().column(cell, 0).unwrap();
+        shallow.pour(ground, 0.001);
+    }
     shallow
 }
 
