@@ -1,6 +1,6 @@
 # frazil: `make demo` shows what it does, `make test` checks it.
 
-PACKAGES := libopenvdb-dev libboost-dev libboost-iostreams-dev g++ cmake pkg-config clang-format python3-openvdb python3-numpy libopenvdb-tools cbindgen-web patchelf
+PACKAGES := libopenvdb-dev libboost-dev libboost-iostreams-dev g++ cmake pkg-config clang-format python3-openvdb python3-numpy libopenvdb-tools cbindgen-web patchelf mono-mcs mono-runtime
 RUST_NEEDED := 1.89
 DEMO := target/demo
 PREFIX := /usr/local
@@ -136,6 +136,6 @@ pictures: setup
 gates: setup hosts hosts-core
 	@cargo bench --quiet --bench gates -- $(ONLY)
 
-# Times and errors beside the thesis', stock OpenVDB's and other methods': make bench [ONLY=snow,surface]
+# Times and errors beside the thesis', stock OpenVDB's and other methods': make bench [ONLY=snow,surface,shallow]
 bench: setup
 	@cargo bench --quiet --bench times -- $(ONLY)

@@ -78,6 +78,10 @@ mod passes;
 mod piles;
 #[path = "gates/planes.rs"]
 mod planes;
+#[path = "gates/plot.rs"]
+mod plot;
+#[path = "gates/plot_font.rs"]
+mod plot_font;
 #[path = "gates/poses.rs"]
 mod poses;
 #[path = "gates/preview.rs"]
@@ -104,8 +108,34 @@ mod repair;
 mod rest;
 #[path = "gates/scenes.rs"]
 mod scenes;
+#[path = "gates/shallow_bowl.rs"]
+mod shallow_bowl;
 #[path = "gates/shallow_core.rs"]
 mod shallow_core;
+#[path = "gates/shallow_dam.rs"]
+mod shallow_dam;
+#[path = "gates/shallow_delivery.rs"]
+mod shallow_delivery;
+#[path = "gates/shallow_energy.rs"]
+mod shallow_energy;
+#[path = "gates/shallow_film.rs"]
+mod shallow_film;
+#[path = "gates/shallow_ground.rs"]
+mod shallow_ground;
+#[path = "gates/shallow_huppert.rs"]
+mod shallow_huppert;
+#[path = "gates/shallow_lake.rs"]
+mod shallow_lake;
+#[path = "gates/shallow_mass.rs"]
+mod shallow_mass;
+#[path = "gates/shallow_range.rs"]
+mod shallow_range;
+#[path = "gates/shallow_same.rs"]
+mod shallow_same;
+#[path = "gates/shallow_speed.rs"]
+mod shallow_speed;
+#[path = "gates/shallow_spread.rs"]
+mod shallow_spread;
 #[path = "gates/shot.rs"]
 mod shot;
 #[path = "gates/snow.rs"]
@@ -152,6 +182,7 @@ fn main() {
         Some(mist::MEMORY) => return mist::print_memory(),
         Some(rebuilt_large::MILLION) => return rebuilt_large::print_million(),
         Some(damage::FUZZ) => return damage::read_mutated(),
+        Some(shallow_same::HASH) => return shallow_same::print_hash(),
         _ => {}
     }
     let mut h = Harness::from_arguments();
@@ -191,6 +222,18 @@ fn main() {
     rebuilt_large::run(&mut h);
     matching::run(&mut h);
     shallow_core::run(&mut h);
+    shallow_film::run(&mut h);
+    shallow_delivery::run(&mut h);
+    shallow_huppert::run(&mut h);
+    shallow_spread::run(&mut h);
+    shallow_bowl::run(&mut h);
+    shallow_energy::run(&mut h);
+    shallow_lake::run(&mut h);
+    shallow_dam::run(&mut h);
+    shallow_mass::run(&mut h);
+    shallow_range::run(&mut h);
+    shallow_same::run(&mut h);
+    shallow_speed::run(&mut h);
     easing::run(&mut h);
     house::run(&mut h);
     h.finish();

@@ -1,4 +1,4 @@
-//! Times of a frame beside the thesis' and stock OpenVDB's, errors beside those of other methods: `make bench [ONLY=snow,surface]`.
+//! Times of a frame beside the thesis' and stock OpenVDB's, errors beside those of other methods: `make bench [ONLY=snow,surface,shallow]`.
 
 #[path = "../tests/common/mod.rs"]
 mod common;
@@ -20,6 +20,11 @@ mod rebuilt_sequences;
 #[path = "gates/scenes.rs"]
 #[allow(dead_code)]
 mod scenes;
+#[path = "times/shallow.rs"]
+mod shallow;
+#[path = "gates/shallow_speed.rs"]
+#[allow(dead_code)]
+mod shallow_speed;
 #[path = "gates/speed.rs"]
 #[allow(dead_code)]
 mod speed;
@@ -40,7 +45,7 @@ use scenes::context;
 type Make = fn(&Context, f64) -> (BaseLayer, Body);
 
 /// What can be asked for.
-const SYSTEMS: [&str; 2] = ["snow", "surface"];
+const SYSTEMS: [&str; 3] = ["snow", "surface", "shallow"];
 
 fn main() {
     let cores = std::thread::available_parallelism().map_or(1, usize::from);
@@ -48,10 +53,10 @@ fn main() {
     let asked: Vec<String> = std::env::args().skip(1).filter(|argument| argument != "--bench").collect();
     let asked: Vec<&str> = asked.iter().flat_map(|names| names.split(',')).collect();
     if let Some(unknown) = asked.iter().find(|name| !SYSTEMS.contains(name)) {
-        eprintln!("no system is named {unknown}, only {}", SYSTEMS.join(" and "));
+        eprintln!("no system is named {unknown}, only {}", SYSTEMS.join(", "));
         std::process::exit(2);
     }
-    let [snow_too, surface_too] = SYSTEMS.map(|name| asked.is_empty() || asked.contains(&name));
+    let [snow_too, surface_too, shallow_too] = SYSTEMS.map(|name| asked.is_empty() || asked.contains(&name));
     if snow_too {
         snow(cores);
         walk(cores);
@@ -60,6 +65,9 @@ fn main() {
         surface::tables(cores);
         rebuilding::tables();
         matching::tables();
+    }
+    if shallow_too {
+        shallow::tables();
     }
 }
 

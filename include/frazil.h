@@ -45,7 +45,7 @@
 /**
  * Version of the interface that this header describes: major << 16 | minor.
  */
-#define FRZ_ABI_VERSION 65542
+#define FRZ_ABI_VERSION 65543
 
 /**
  * Version of frazil that this header belongs to.
@@ -108,6 +108,32 @@
  */
 #define FRZ_MIST_FLOOR 2
 #endif
+
+/**
+ * Flag of a flow point: it lies on a triangle of the mesh that the liquid was made with, and moves with it.
+ */
+#define FRZ_SHALLOW_ON_TRIANGLE 1
+
+/**
+ * Layer of a volume: all of them.
+ */
+#define FRZ_SHALLOW_ALL_LAYERS 4294967295
+
+/**
+ * Column of a sample: there is none.
+ */
+#define FRZ_SHALLOW_NO_COLUMN 4294967295
+
+/**
+ * Flag of a layout: Z is up. The axes are then (x, -z, y) of those with Y up.
+ */
+#define FRZ_SHALLOW_Z_UP 1
+
+/**
+ * Flag of a layout: left-handed axes, as of Unity (Y up) and Unreal (Z up): the horizontal axis that is not x points the other way, and
+ * faces are clockwise seen from above.
+ */
+#define FRZ_SHALLOW_LEFT_HANDED 2
 
 /**
  * Status codes. Numbers never change; new ones are added at the end.
@@ -437,7 +463,270 @@ typedef enum frz_scheme frz_scheme;
 typedef uint32_t frz_scheme;
 #endif // __STDC_VERSION__ >= 202311L
 #endif // __cplusplus
+#endif
 
+/**
+ * Liquids that frz_shallow_params_liquid knows.
+ */
+enum frz_liquid
+#if defined(__cplusplus) || __STDC_VERSION__ >= 202311L
+  : uint32_t
+#endif // defined(__cplusplus) || __STDC_VERSION__ >= 202311L
+ {
+    /**
+     * Water at 20 C: 1e-6 m2/s.
+     */
+    FRZ_LIQUID_WATER = 0,
+    /**
+     * Blood that does not thin: 4e-6 m2/s.
+     */
+    FRZ_LIQUID_BLOOD = 1,
+    /**
+     * Paint: 4e-5 m2/s.
+     */
+    FRZ_LIQUID_PAINT = 2,
+    /**
+     * Honey at 20 C: 7e-3 m2/s.
+     */
+    FRZ_LIQUID_HONEY = 3,
+    /**
+     * Blood that thins under shear: from 5.28e-5 m2/s at rest to 3.25e-6 m2/s.
+     */
+    FRZ_LIQUID_THINNING_BLOOD = 4,
+};
+#ifndef __cplusplus
+#if __STDC_VERSION__ >= 202311L
+typedef enum frz_liquid frz_liquid;
+#else
+typedef uint32_t frz_liquid;
+#endif // __STDC_VERSION__ >= 202311L
+#endif // __cplusplus
+
+/**
+ * What frz_shallow_read reads of columns. An index without a column has the cell (-1, -1), no depth, and a ceiling on its base.
+ */
+enum frz_shallow_array
+#if defined(__cplusplus) || __STDC_VERSION__ >= 202311L
+  : uint32_t
+#endif // defined(__cplusplus) || __STDC_VERSION__ >= 202311L
+ {
+    /**
+     * float: depth of the liquid (m).
+     */
+    FRZ_SHALLOW_DEPTH = 0,
+    /**
+     * float: height of the ground below it (m).
+     */
+    FRZ_SHALLOW_BASE = 1,
+    /**
+     * float: height of the underside of the next solid above (m), or the greatest height of the domain.
+     */
+    FRZ_SHALLOW_CEILING = 2,
+    /**
+     * int32_t[2]: its cell along x and along z.
+     */
+    FRZ_SHALLOW_CELL = 3,
+    /**
+     * uint32_t: its layer, 0 for the lowest column of a cell.
+     */
+    FRZ_SHALLOW_LAYER = 4,
+    /**
+     * float: what flows to the cell behind along x (m3/s), in the same layer.
+     */
+    FRZ_SHALLOW_FLUX_EAST = 5,
+    /**
+     * float: what flows to the cell behind along z (m3/s), in the same layer.
+     */
+    FRZ_SHALLOW_FLUX_SOUTH = 6,
+    /**
+     * float[2]: mean velocity over the depth along x and z (m/s): at the surface it is 1.5 times as much.
+     */
+    FRZ_SHALLOW_VELOCITY = 7,
+};
+#ifndef __cplusplus
+#if __STDC_VERSION__ >= 202311L
+typedef enum frz_shallow_array frz_shallow_array;
+#else
+typedef uint32_t frz_shallow_array;
+#endif // __STDC_VERSION__ >= 202311L
+#endif // __cplusplus
+
+/**
+ * What lies beyond the border of the domain.
+ */
+enum frz_shallow_border
+#if defined(__cplusplus) || __STDC_VERSION__ >= 202311L
+  : uint32_t
+#endif // defined(__cplusplus) || __STDC_VERSION__ >= 202311L
+ {
+    /**
+     * A wall.
+     */
+    FRZ_SHALLOW_CLOSED = 0,
+    /**
+     * Nothing: liquid flows off as the ground near the border leads it, and is lost.
+     */
+    FRZ_SHALLOW_OPEN = 1,
+    /**
+     * Liquid at rest, at the level that it has at the border at first: waves leave, and do not come back.
+     */
+    FRZ_SHALLOW_ABSORBING = 2,
+};
+#ifndef __cplusplus
+#if __STDC_VERSION__ >= 202311L
+typedef enum frz_shallow_border frz_shallow_border;
+#else
+typedef uint32_t frz_shallow_border;
+#endif // __STDC_VERSION__ >= 202311L
+#endif // __cplusplus
+
+/**
+ * What a flow point does.
+ */
+enum frz_shallow_flow_kind
+#if defined(__cplusplus) || __STDC_VERSION__ >= 202311L
+  : uint32_t
+#endif // defined(__cplusplus) || __STDC_VERSION__ >= 202311L
+ {
+    /**
+     * Liquid comes in.
+     */
+    FRZ_SHALLOW_SOURCE = 0,
+    /**
+     * Liquid goes out, as long as there is some below it: suction.
+     */
+    FRZ_SHALLOW_DRAIN = 1,
+    /**
+     * As a drain, until it has taken frz_shallow_flow.capacity: gauze.
+     */
+    FRZ_SHALLOW_ABSORBER = 2,
+};
+#ifndef __cplusplus
+#if __STDC_VERSION__ >= 202311L
+typedef enum frz_shallow_flow_kind frz_shallow_flow_kind;
+#else
+typedef uint32_t frz_shallow_flow_kind;
+#endif // __STDC_VERSION__ >= 202311L
+#endif // __cplusplus
+
+/**
+ * Arrays of all column indices that frz_shallow_lend lends. A height is frz_shallow_info.low + units x unit.
+ */
+enum frz_shallow_lent
+#if defined(__cplusplus) || __STDC_VERSION__ >= 202311L
+  : uint32_t
+#endif // defined(__cplusplus) || __STDC_VERSION__ >= 202311L
+ {
+    /**
+     * int32_t: depth of the liquid (units).
+     */
+    FRZ_SHALLOW_LENT_DEPTH = 0,
+    /**
+     * int32_t: height of the ground below it (units).
+     */
+    FRZ_SHALLOW_LENT_BASE = 1,
+    /**
+     * int32_t: height of the underside of the next solid above (units).
+     */
+    FRZ_SHALLOW_LENT_CEILING = 2,
+    /**
+     * float: what flows to the east (units of depth in a step of frz_shallow_info.last_step).
+     */
+    FRZ_SHALLOW_LENT_EAST = 3,
+    /**
+     * float: what flows to the south (units of depth in a step of frz_shallow_info.last_step).
+     */
+    FRZ_SHALLOW_LENT_SOUTH = 4,
+};
+#ifndef __cplusplus
+#if __STDC_VERSION__ >= 202311L
+typedef enum frz_shallow_lent frz_shallow_lent;
+#else
+typedef uint32_t frz_shallow_lent;
+#endif // __STDC_VERSION__ >= 202311L
+#endif // __cplusplus
+
+/**
+ * How a frame is divided into steps.
+ */
+enum frz_shallow_pace
+#if defined(__cplusplus) || __STDC_VERSION__ >= 202311L
+  : uint32_t
+#endif // defined(__cplusplus) || __STDC_VERSION__ >= 202311L
+ {
+    /**
+     * Steps of at most frz_shallow_params.longest_step: where liquid is too deep for that, its waves slow down, and films stay as
+     * they are.
+     */
+    FRZ_SHALLOW_REALTIME = 0,
+    /**
+     * As many steps as stability needs.
+     */
+    FRZ_SHALLOW_EXACT = 1,
+};
+#ifndef __cplusplus
+#if __STDC_VERSION__ >= 202311L
+typedef enum frz_shallow_pace frz_shallow_pace;
+#else
+typedef uint32_t frz_shallow_pace;
+#endif // __STDC_VERSION__ >= 202311L
+#endif // __cplusplus
+
+/**
+ * The section of a pipe between two columns.
+ */
+enum frz_shallow_section
+#if defined(__cplusplus) || __STDC_VERSION__ >= 202311L
+  : uint32_t
+#endif // defined(__cplusplus) || __STDC_VERSION__ >= 202311L
+ {
+    /**
+     * What is wet of it: films flow as fast as theory says.
+     */
+    FRZ_SHALLOW_WETTED = 0,
+    /**
+     * The whole cell, as in the thesis: for comparison.
+     */
+    FRZ_SHALLOW_WHOLE = 1,
+};
+#ifndef __cplusplus
+#if __STDC_VERSION__ >= 202311L
+typedef enum frz_shallow_section frz_shallow_section;
+#else
+typedef uint32_t frz_shallow_section;
+#endif // __STDC_VERSION__ >= 202311L
+#endif // __cplusplus
+
+/**
+ * Shapes of bodies.
+ */
+enum frz_shallow_shape
+#if defined(__cplusplus) || __STDC_VERSION__ >= 202311L
+  : uint32_t
+#endif // defined(__cplusplus) || __STDC_VERSION__ >= 202311L
+ {
+    /**
+     * A ball.
+     */
+    FRZ_SHALLOW_SPHERE = 0,
+    /**
+     * All places within a distance of a line: a ball on its way from end to end.
+     */
+    FRZ_SHALLOW_CAPSULE = 1,
+    /**
+     * A box in any orientation.
+     */
+    FRZ_SHALLOW_BOX = 2,
+};
+#ifndef __cplusplus
+#if __STDC_VERSION__ >= 202311L
+typedef enum frz_shallow_shape frz_shallow_shape;
+#else
+typedef uint32_t frz_shallow_shape;
+#endif // __STDC_VERSION__ >= 202311L
+#endif // __cplusplus
+
+#if defined(FRZ_HAS_OPENVDB)
 /**
  * Filters of frz_levelset_smooth.
  */
@@ -678,6 +967,27 @@ typedef struct frz_mist frz_mist;
  * Worker threads, shared by any number of contexts.
  */
 typedef struct frz_pool frz_pool;
+
+/**
+ * A small amount of liquid on a ground: blood, coffee or paint in a fraction of a frame.
+ *
+ * In real time: what a host calls in each frame keeps to stricter manners than all other calls. These are frz_shallow_step, _replay,
+ * _update_terrain, _update_heights, _set_bodies, _save, _restore, _surface and _probe, and frz_shallow_snapshot_take, _surface and
+ * _probe. With a pool of 0 threads, from their second call on, they allocate nothing, take no lock, log and poll nothing, and make no
+ * system call but that for the thread's clock where a step has a budget. Only where there is more than ever before, more columns because
+ * a body uncovers another layer, say, memory grows; so may what fails.
+ *
+ * A cancel is looked at once, at the beginning of such a call. It has no phases, which all other work has: frz_context_progress and
+ * frz_context_timings do not see it. Phases take locks and memory, and a poll between them may take longer than the few milliseconds
+ * that a frame has.
+ */
+typedef struct frz_shallow frz_shallow;
+
+/**
+ * A liquid as it was after a frame, copied: another thread may draw it while the next frame is computed. A host has two of them: one
+ * that is taken, and one that is drawn.
+ */
+typedef struct frz_shallow_snapshot frz_shallow_snapshot;
 
 /**
  * A detailed mesh that follows the particles of a liquid.
@@ -1662,6 +1972,471 @@ typedef struct {
      */
     uint64_t specks;
 } frz_tracker_report;
+
+/**
+ * What flows, and how. All of it but the border may change between frames.
+ */
+typedef struct {
+    /**
+     * sizeof(frz_shallow_params).
+     */
+    uint32_t struct_size;
+    /**
+     * 0.
+     */
+    uint32_t flags;
+    /**
+     * Kinematic viscosity (m2/s), 0 to 1e6; of a liquid that thins, at rest. That of blood, 4e-6, is usual: see
+     * frz_shallow_params_liquid.
+     */
+    double viscosity;
+    /**
+     * Viscosity under strong shear (m2/s), 0 to viscosity, by Carreau's law; only with a thinning_time.
+     */
+    double thinnest;
+    /**
+     * Time of Carreau's law (s), 1e-9 to 1e9; 0, as is usual: the liquid does not thin.
+     */
+    double thinning_time;
+    /**
+     * Power of Carreau's law, 0 to 1; only with a thinning_time.
+     */
+    double thinning_power;
+    /**
+     * Gravity (m/s2), which may turn from frame to frame: it points down by 0.001 to 1000, and leans by at most 45 degrees.
+     * (0, -9.81, 0) is usual.
+     */
+    double gravity[3];
+    /**
+     * Share of the flow that is kept in a second, 0 to 1; 0.5 is usual. At 1 nothing is lost but by viscosity.
+     */
+    double kept;
+    /**
+     * Longest step (s), 1e-6 to 1; only with FRZ_SHALLOW_REALTIME. 0.003 is usual.
+     */
+    double longest_step;
+    /**
+     * A frz_shallow_pace; FRZ_SHALLOW_REALTIME is usual.
+     */
+    uint32_t pace;
+    /**
+     * A frz_shallow_border, which cannot change; FRZ_SHALLOW_CLOSED is usual.
+     */
+    uint32_t border;
+    /**
+     * A frz_shallow_section; FRZ_SHALLOW_WETTED is usual.
+     */
+    uint32_t section;
+    /**
+     * 0.
+     */
+    uint32_t reserved;
+} frz_shallow_params;
+
+/**
+ * Where liquid can be: square cells on the ground, and a range of heights. Heights and depths are integers in it, of a unit
+ * that is 2^-30 of the range.
+ */
+typedef struct {
+    /**
+     * sizeof(frz_shallow_domain).
+     */
+    uint32_t struct_size;
+    /**
+     * 0.
+     */
+    uint32_t flags;
+    /**
+     * Edge of a cell (m), 1e-30 to 1e30.
+     */
+    double cell;
+    /**
+     * The corner with the least x and z (m).
+     */
+    double origin[2];
+    /**
+     * Count of cells along x and along z, 1 to 65536 each.
+     */
+    uint32_t cells[2];
+    /**
+     * The least height (m): ground below is taken to lie there.
+     */
+    double low;
+    /**
+     * The greatest height (m), above low; no liquid stands higher.
+     */
+    double high;
+} frz_shallow_domain;
+
+/**
+ * What a frame did.
+ */
+typedef struct {
+    /**
+     * sizeof(frz_shallow_report), set by the caller.
+     */
+    uint32_t struct_size;
+    /**
+     * Count of steps that the frame was divided into.
+     */
+    uint32_t steps;
+    /**
+     * Simulated time (s): dt, or less where the budget ran out.
+     */
+    double seconds;
+    /**
+     * Time that the budget left out (s): dt less seconds. No liquid is lost with it.
+     */
+    double dropped;
+    /**
+     * Greatest depth (m), or somewhat over it.
+     */
+    double deepest;
+    /**
+     * Rows of cells, summed over steps, in which columns would have given more liquid than they had, and gave what they had.
+     */
+    uint64_t emptied;
+    /**
+     * Rows of cells, summed over steps, in which columns would have taken more than they had room for, and took what fitted.
+     */
+    uint64_t filled;
+} frz_shallow_report;
+
+/**
+ * A place where liquid comes in or goes out. It begins zeroed, and then struct_size.
+ */
+typedef struct {
+    /**
+     * sizeof(frz_shallow_flow), the same in all flow points of a call.
+     */
+    uint32_t struct_size;
+    /**
+     * 0 or FRZ_SHALLOW_ON_TRIANGLE.
+     */
+    uint32_t flags;
+    /**
+     * A frz_shallow_flow_kind.
+     */
+    uint32_t kind;
+    /**
+     * With FRZ_SHALLOW_ON_TRIANGLE: the triangle, of those that frz_mesh_read lists as FRZ_MESH_TRIANGLES; else 0.
+     */
+    uint32_t triangle;
+    /**
+     * With FRZ_SHALLOW_ON_TRIANGLE: shares of its three vertices in the place, finite, whose sum is 1; else they are not looked at.
+     */
+    double shares[3];
+    /**
+     * Without: the place (m). It acts on the ground that is nearest above or below it.
+     */
+    double at[3];
+    /**
+     * It acts on cells whose middles lie within so much of the place, seen from above (m), 0 or more; on the nearest one, if none
+     * does.
+     */
+    double radius;
+    /**
+     * Volume in a second (m3/s), 0 or more: 1 ml/s is 1e-6.
+     */
+    double rate;
+    /**
+     * Volume that an absorber takes (m3), 0 or more; of others it is not looked at.
+     */
+    double capacity;
+    /**
+     * How often in a second the rate swings, 0 or more; 0: it does not.
+     */
+    double pulse_frequency;
+    /**
+     * By which share of itself the rate swings up and down, 0 to 1, in a sine from the start of the simulated time.
+     */
+    double pulse_share;
+} frz_shallow_flow;
+
+/**
+ * Where all liquid is, and came from (m3; 1 ml is 1e-6). inside + held = poured + sourced + gained - drained - absorbed -
+ * lost.
+ */
+typedef struct {
+    /**
+     * sizeof(frz_shallow_balance), set by the caller.
+     */
+    uint32_t struct_size;
+    /**
+     * Nothing.
+     */
+    uint32_t reserved;
+    /**
+     * In the columns.
+     */
+    double inside;
+    /**
+     * Poured in so far, less what was taken.
+     */
+    double poured;
+    /**
+     * Came in through sources.
+     */
+    double sourced;
+    /**
+     * Went out through drains.
+     */
+    double drained;
+    /**
+     * Went into absorbers.
+     */
+    double absorbed;
+    /**
+     * Went over the border, or fell where there is no ground.
+     */
+    double lost;
+    /**
+     * Came in over a border that absorbs waves.
+     */
+    double gained;
+    /**
+     * Waits for room, where ground or a body has swallowed it.
+     */
+    double held;
+    /**
+     * Units (2^-30 of the range of heights, of a cell) that the sum above is off: 0, as all are integers.
+     */
+    int64_t error;
+} frz_shallow_balance;
+
+/**
+ * What a change of the ground did to the liquid.
+ */
+typedef struct {
+    /**
+     * sizeof(frz_shallow_moved), set by the caller.
+     */
+    uint32_t struct_size;
+    /**
+     * Nothing.
+     */
+    uint32_t reserved;
+    /**
+     * Cells whose columns were made anew.
+     */
+    uint64_t cells;
+    /**
+     * Liquid (m3) that could not stay in its column, and went to others of its cell or of those beside it.
+     */
+    double displaced;
+    /**
+     * Liquid (m3) that waits for room now, in all: the ground has swallowed it, and gives it back where there is room again. It is
+     * part of frz_shallow_balance.held.
+     */
+    double held;
+    /**
+     * Liquid (m3) that fell where there is no ground any more: it is part of frz_shallow_balance.lost.
+     */
+    double fallen;
+} frz_shallow_moved;
+
+/**
+ * A solid that moves over the ground: a tool, a finger. It begins zeroed, and then struct_size.
+ */
+typedef struct {
+    /**
+     * sizeof(frz_shallow_body), the same in all bodies of a call.
+     */
+    uint32_t struct_size;
+    /**
+     * A frz_shallow_shape.
+     */
+    uint32_t shape;
+    /**
+     * Its middle, or one end of a capsule's line (m).
+     */
+    double at[3];
+    /**
+     * The other end of a capsule's line (m); of others it is not looked at.
+     */
+    double end[3];
+    /**
+     * Radius of a ball or capsule (m), over 0; of a box it is not looked at.
+     */
+    double radius;
+    /**
+     * Half of a box's length along each of its axes (m), over 0; of others it is not looked at.
+     */
+    double half[3];
+    /**
+     * Unit vectors along a box's axes, perpendicular to each other; all zeroes: those of the world. Of others they are not looked at.
+     */
+    double axes[3][3];
+} frz_shallow_body;
+
+/**
+ * Properties of a shallow liquid.
+ */
+typedef struct {
+    /**
+     * sizeof(frz_shallow_info), set by the caller.
+     */
+    uint32_t struct_size;
+    /**
+     * Most columns above each other in a cell.
+     */
+    uint32_t layers;
+    /**
+     * Column indices: 16 for each strip of 16 cells along x that has a column of a layer. Some of them may have no column.
+     */
+    uint64_t index_count;
+    /**
+     * Columns.
+     */
+    uint64_t column_count;
+    /**
+     * Edge of a cell (m).
+     */
+    double cell;
+    /**
+     * Height of unit 0 (m).
+     */
+    double low;
+    /**
+     * One unit of heights and depths (m).
+     */
+    double unit;
+    /**
+     * Simulated time since the start (s).
+     */
+    double time;
+    /**
+     * Length of the last step (s), in which fluxes of frz_shallow_lend are measured.
+     */
+    double last_step;
+} frz_shallow_info;
+
+/**
+ * How a surface is written.
+ */
+typedef struct {
+    /**
+     * sizeof(frz_shallow_layout).
+     */
+    uint32_t struct_size;
+    /**
+     * FRZ_SHALLOW_Z_UP, FRZ_SHALLOW_LEFT_HANDED, both or 0, which is usual: Y up, right-handed.
+     */
+    uint32_t flags;
+    /**
+     * The host's units of length in a metre, over 0: 1 is usual, 100 for centimetres. For positions, depths and velocities.
+     */
+    double scale;
+    /**
+     * Least height of the surface over wet ground (m), 0 or more, against flicker where the ground is drawn too. 0 is usual; 0.05 of
+     * a cell in the thesis.
+     */
+    double least_depth;
+    /**
+     * Depth (m) from which frz_shallow_target.opacities are 1, over 0; 0.01 is usual.
+     */
+    double opaque_depth;
+} frz_shallow_layout;
+
+/**
+ * Size of a surface.
+ */
+typedef struct {
+    /**
+     * sizeof(frz_shallow_size), set by the caller.
+     */
+    uint32_t struct_size;
+    /**
+     * Nothing.
+     */
+    uint32_t reserved;
+    /**
+     * Count of vertices.
+     */
+    uint64_t vertices;
+    /**
+     * Count of indices: three for each triangle.
+     */
+    uint64_t indices;
+} frz_shallow_size;
+
+/**
+ * Buffers that a surface is written into. Those with data NULL are not wanted, and it begins zeroed: all of them. They may be mapped memory
+ * of a graphics device: each is written from its beginning, in order, and never read. Elements are packed (a stride of 0, or their size) and
+ * aligned to their numbers; no two buffers overlap. They may be longer than the surface; what is behind it is not touched.
+ */
+typedef struct {
+    /**
+     * sizeof(frz_shallow_target).
+     */
+    uint32_t struct_size;
+    /**
+     * Bits of an index: 16, for at most 65536 vertices, or 32. 0 without indices.
+     */
+    uint32_t index_bits;
+    /**
+     * float[3] a vertex: where it is (m x scale).
+     */
+    frz_span positions;
+    /**
+     * float[3] a vertex: a unit vector.
+     */
+    frz_span normals;
+    /**
+     * float a vertex: depth (m x scale); 0 where it is dry.
+     */
+    frz_span depths;
+    /**
+     * float a vertex: depth over frz_shallow_layout.opaque_depth, at most 1.
+     */
+    frz_span opacities;
+    /**
+     * float[3] a vertex: velocity at the surface (m/s x scale), 1.5 times the mean one, level.
+     */
+    frz_span velocities;
+    /**
+     * uint32_t a vertex: the layer of its column.
+     */
+    frz_span layers;
+    /**
+     * uint32_t a vertex: the index of its column; 0xffffffff for one beside a wall, which has none.
+     */
+    frz_span columns;
+    /**
+     * uint16_t or uint32_t for each corner of each triangle: a vertex. Triangles face up.
+     */
+    frz_span indices;
+} frz_shallow_target;
+
+/**
+ * The liquid at a point.
+ */
+typedef struct {
+    /**
+     * Height of its surface (m); of the ground, where it is dry; NaN without a column.
+     */
+    double height;
+    /**
+     * Its depth (m).
+     */
+    double depth;
+    /**
+     * Mean velocity over the depth along x and z (m/s).
+     */
+    float velocity[2];
+    /**
+     * Velocity at the surface along x and z (m/s): 1.5 times the mean one.
+     */
+    float surface_velocity[2];
+    /**
+     * Index of the column; FRZ_SHALLOW_NO_COLUMN outside of the domain and where there is no ground: all else is 0 then.
+     */
+    uint32_t column;
+    /**
+     * Its layer.
+     */
+    uint32_t layer;
+} frz_shallow_sample;
 
 /**
  * How long a phase took.
@@ -3083,6 +3858,458 @@ frz_status frz_tracker_resculpt(frz_context *context,
                                 frz_tracker *tracker,
                                 const frz_mesh *mesh,
                                 const frz_particles *particles);
+
+/**
+ * Fills parameters with the usual values: blood, in real time.
+ *
+ * params: receives them.
+ * size: sizeof(frz_shallow_params).
+ *
+ * Any thread.
+ */
+frz_status frz_shallow_params_init(frz_shallow_params *params, size_t size);
+
+/**
+ * Sets the viscosity of parameters, and how it thins, to those of a known liquid; the rest stays.
+ *
+ * params: filled before, by frz_shallow_params_init for instance.
+ * liquid: a frz_liquid.
+ *
+ * Any thread.
+ */
+frz_status frz_shallow_params_liquid(frz_shallow_params *params, uint32_t liquid);
+
+/**
+ * Makes a liquid on a mesh: dry at first.
+ *
+ * The vertical line through the middle of a cell is solid where it is inside of the mesh: closed parts that overlap are one
+ * solid. Where the mesh is open, all below a face that faces up is solid, and a face that faces down is nothing; a warning says
+ * that it is open. Liquid stands on each solid of a cell, up to the underside of the next one.
+ *
+ * params: NULL for the usual ones.
+ * domain: where liquid can be.
+ * mesh: it is copied. FRZ_ERROR_ARGUMENT where no face of it within the domain faces up.
+ * out: receives the liquid, to be destroyed with frz_shallow_destroy; NULL after a failure.
+ *
+ * Any number of threads may read a mesh; one thread at a time for each context.
+ */
+frz_status frz_shallow_create(frz_context *context,
+                              const frz_shallow_params *params,
+                              const frz_shallow_domain *domain,
+                              const frz_mesh *mesh,
+                              frz_shallow **out);
+
+/**
+ * Makes a liquid on a height field: dry at first.
+ *
+ * params: NULL for the usual ones.
+ * domain: where liquid can be.
+ * heights: float for each cell (m), finite: the height of the ground in its middle, row by row along x from the least z. Heights
+ *     beyond those of the domain become its ends.
+ * out: receives the liquid, to be destroyed with frz_shallow_destroy; NULL after a failure.
+ *
+ * One thread at a time for each context.
+ */
+frz_status frz_shallow_create_heights(frz_context *context,
+                                      const frz_shallow_params *params,
+                                      const frz_shallow_domain *domain,
+                                      frz_view heights,
+                                      frz_shallow **out);
+
+#if defined(FRZ_HAS_OPENVDB)
+/**
+ * Makes a liquid on a level set: dry at first.
+ *
+ * params: NULL for the usual ones.
+ * domain: where liquid can be.
+ * level_set: a grid of distances (m), negative inside; it is sampled at each voxel of the height of the domain. What is solid at
+ *     the least height is so for ever below. The ground cannot move afterwards.
+ * out: receives the liquid, to be destroyed with frz_shallow_destroy; NULL after a failure.
+ *
+ * Any number of threads may read a grid; one thread at a time for each context.
+ */
+frz_status frz_shallow_create_grid(frz_context *context,
+                                   const frz_shallow_params *params,
+                                   const frz_shallow_domain *domain,
+                                   const frz_grid *level_set,
+                                   frz_shallow **out);
+#endif
+
+/**
+ * Destroys a liquid; NULL is fine. Its snapshots stay.
+ *
+ * shallow: may be NULL. Not while a call uses it: it then stays.
+ *
+ * One thread at a time.
+ */
+void frz_shallow_destroy(frz_shallow *shallow);
+
+/**
+ * Sets what flows, and how, from the next frame on. The border must stay.
+ *
+ * params: FRZ_ERROR_ARGUMENT names the field at fault and its range; the old ones then stay.
+ *
+ * One thread at a time.
+ */
+frz_status frz_shallow_set_params(frz_shallow *shallow, const frz_shallow_params *params);
+
+/**
+ * Computes a frame, in real time (frz_shallow). It is divided into steps as frz_shallow_params.pace says.
+ *
+ * dt: length of the frame (s), over 0, up to 1e6.
+ * budget_seconds: CPU time of this thread (s), or time where several threads work, after which no step begins, 0 to 1e6; 0: as much as
+ *     it takes. The rest of the frame is then left out (frz_shallow_report.dropped), never any liquid. At least one step is made. With
+ *     frz_shallow_last_steps and frz_shallow_replay such a frame can be made again.
+ * report: receives what was done, all zeroes after a failure; may be NULL. Its struct_size is set by the caller.
+ *
+ * One thread at a time.
+ */
+frz_status frz_shallow_step(frz_context *context,
+                            frz_shallow *shallow,
+                            double dt,
+                            double budget_seconds,
+                            frz_shallow_report *report);
+
+/**
+ * Computes a frame of given steps, in real time (frz_shallow): from the same state, with the same parameters, flow points and
+ * bodies it becomes the same bytes as the frame that they were reported of.
+ *
+ * steps: double for each step, its length (s), over 0, as frz_shallow_last_steps has listed them: 1 to 1000000, together up to 1e6 s.
+ * report: receives what was done, all zeroes after a failure; may be NULL. Its struct_size is set by the caller.
+ *
+ * One thread at a time.
+ */
+frz_status frz_shallow_replay(frz_context *context,
+                              frz_shallow *shallow,
+                              frz_view steps,
+                              frz_shallow_report *report);
+
+/**
+ * Lists the steps of the last frame: with them frz_shallow_replay makes it again.
+ *
+ * dst: room for a double for each step, its length (s). NULL: count receives their number, and nothing is written.
+ *     FRZ_ERROR_CAPACITY when it is too little.
+ * count: receives their number; 0 after other failures.
+ *
+ * Any number of threads may read a shallow liquid.
+ */
+frz_status frz_shallow_last_steps(const frz_shallow *shallow,
+                                  frz_span dst,
+                                  size_t *count);
+
+/**
+ * Sets sources, drains and absorbers, in place of those before; what these have moved stays in frz_shallow_balance. An absorber
+ * that is set again is dry. The frame after it may allocate.
+ *
+ * flows: count flow points; NULL with a count of 0: there is none. FRZ_ERROR_ARGUMENT names one that is out of range, lies inside of
+ *     solid or outside of the domain, counted from 0; the old ones then stay.
+ * count: number of flow points.
+ *
+ * One thread at a time.
+ */
+frz_status frz_shallow_set_flows(frz_shallow *shallow,
+                                 const frz_shallow_flow *flows,
+                                 size_t count);
+
+/**
+ * Reports how much a flow point has moved since it was set: what came in, or went out.
+ *
+ * flow: which, counted from 0.
+ * volume: receives it (m3); 0 after a failure.
+ *
+ * Any number of threads may read a shallow liquid.
+ */
+frz_status frz_shallow_flow_moved(const frz_shallow *shallow, size_t flow, double *volume);
+
+/**
+ * Pours a volume at a place, shared by the columns that a flow point there would act on; each takes what it has room for, or gives what
+ * it has.
+ *
+ * at: double[3], the place (m): FRZ_ERROR_ARGUMENT where it lies inside of solid or outside of the domain.
+ * radius: as in frz_shallow_flow (m).
+ * volume: what to pour (m3); negative: what to take.
+ * poured: receives what came in (m3), or went out (negative); 0 after a failure. May be NULL.
+ *
+ * One thread at a time.
+ */
+frz_status frz_shallow_pour(frz_shallow *shallow,
+                            const double *at,
+                            double radius,
+                            double volume,
+                            double *poured);
+
+/**
+ * Fills all columns up to a height, or their ceiling; those that are fuller stay as they are.
+ *
+ * height: where the surface is to be (m).
+ *
+ * One thread at a time.
+ */
+frz_status frz_shallow_fill(frz_shallow *shallow, double height);
+
+/**
+ * Sets the depths of all columns: a first state that a host has made, or the liquid of a solver of its own, of which a surface is wanted.
+ * What it adds and takes counts as poured; what flows stays as it is.
+ *
+ * depths: float for each column index (m), as frz_shallow_read lists them: 0 or more, finite; beyond a ceiling the column is full. Of an
+ *     index without a column it is not looked at.
+ *
+ * One thread at a time.
+ */
+frz_status frz_shallow_set_depths(frz_shallow *shallow,
+                                  frz_view depths);
+
+/**
+ * Reports where all liquid is.
+ *
+ * balance: receives it, all zeroes after a failure. Its struct_size is set by the caller.
+ *
+ * Any number of threads may read a shallow liquid.
+ */
+frz_status frz_shallow_get_balance(const frz_shallow *shallow, frz_shallow_balance *balance);
+
+/**
+ * Moves the vertices of the mesh that the liquid was made with, in real time (frz_shallow): bones and organs move, or are deformed. The
+ * liquid is taken along, and none of it is lost; flow points on triangles move with them. After a failure all is as it was.
+ *
+ * positions: float[3] for each vertex (m), finite, in the mesh's order.
+ * bounds: double[4], least x, least z, greatest x and greatest z (m) of all triangles that move, where they were and where they are: the
+ *     ground is made anew there only. NULL: everywhere.
+ * moved: receives what was done, all zeroes after a failure; may be NULL. Its struct_size is set by the caller.
+ *
+ * One thread at a time.
+ */
+frz_status frz_shallow_update_terrain(frz_context *context,
+                                      frz_shallow *shallow,
+                                      frz_view positions,
+                                      const double *bounds,
+                                      frz_shallow_moved *moved);
+
+/**
+ * Changes the heights of the height field that the liquid was made on, in real time (frz_shallow). The liquid is taken along, and none
+ * of it is lost. After a failure all is as it was.
+ *
+ * heights: float for each cell of the domain (m), finite, as in frz_shallow_create_heights.
+ * bounds: as in frz_shallow_update_terrain: heights elsewhere are taken to be as they were.
+ * moved: receives what was done, all zeroes after a failure; may be NULL. Its struct_size is set by the caller.
+ *
+ * One thread at a time.
+ */
+frz_status frz_shallow_update_heights(frz_context *context,
+                                      frz_shallow *shallow,
+                                      frz_view heights,
+                                      const double *bounds,
+                                      frz_shallow_moved *moved);
+
+/**
+ * Sets the solids that move over the ground, in place of those before, in real time (frz_shallow): the ground is made anew where one moves,
+ * and no triangle is looked at. The liquid makes way, and none of it is lost. After a failure all is as it was.
+ *
+ * A body moves from call to call: give it the same place in the list. What does not move costs nothing.
+ *
+ * bodies: count bodies; NULL with a count of 0: there is none. FRZ_ERROR_ARGUMENT names one that is out of range, counted from 0.
+ * count: number of bodies.
+ * moved: receives what was done, all zeroes after a failure; may be NULL. Its struct_size is set by the caller.
+ *
+ * One thread at a time.
+ */
+frz_status frz_shallow_set_bodies(frz_context *context,
+                                  frz_shallow *shallow,
+                                  const frz_shallow_body *bodies,
+                                  size_t count,
+                                  frz_shallow_moved *moved);
+
+/**
+ * Reports the properties of a liquid: the counts that frz_shallow_read needs room for, and its measures.
+ *
+ * info: receives it, all zeroes after a failure. Its struct_size is set by the caller.
+ *
+ * Any number of threads may read a shallow liquid.
+ */
+frz_status frz_shallow_get_info(const frz_shallow *shallow, frz_shallow_info *info);
+
+/**
+ * Copies numbers of columns.
+ *
+ * array: a frz_shallow_array; it says of what type the elements are.
+ * columns: uint32_t for each column that is wanted, its index; data NULL with a count of 0: all indices, in order.
+ * dst: room for as many elements; FRZ_ERROR_CAPACITY when it is too little, and nothing is written.
+ *
+ * Any number of threads may read a shallow liquid.
+ */
+frz_status frz_shallow_read(const frz_shallow *shallow,
+                            uint32_t array,
+                            frz_view columns,
+                            frz_span dst);
+
+/**
+ * Lends an array of all column indices, as it is computed with: nothing is copied.
+ *
+ * array: a frz_shallow_lent; it says of what type the elements are.
+ * out: receives where they are, packed; data NULL with a count of 0 after a failure. The memory is the liquid's, and may be read until
+ *     frz_shallow_update_terrain, _update_heights, _set_bodies or _destroy; its contents change with whatever changes the liquid.
+ *
+ * Any number of threads may read a shallow liquid.
+ */
+frz_status frz_shallow_lend(const frz_shallow *shallow,
+                            uint32_t array,
+                            frz_view *out);
+
+/**
+ * Reads the liquid at points, in real time (frz_shallow): of the column that a point lies in, or else is nearest to above or below it.
+ *
+ * points: double[3] for each (m).
+ * dst: room for a frz_shallow_sample for each; FRZ_ERROR_CAPACITY when it is too little, and nothing is written.
+ *
+ * Any number of threads may read a shallow liquid.
+ */
+frz_status frz_shallow_probe(const frz_shallow *shallow,
+                             frz_view points,
+                             frz_span dst);
+
+/**
+ * Reports how much liquid there is in a box: of the cells whose middles lie within, what is between both heights; or on a
+ * layer.
+ *
+ * low: double[3], the least corner (m), which may be infinite; NULL with high NULL: everywhere.
+ * high: double[3], the greatest corner (m).
+ * layer: 0 for the lowest columns of all cells, and so on: with a layer, low and high are NULL. FRZ_SHALLOW_ALL_LAYERS.
+ * volume: receives it (m3; 1 ml is 1e-6); 0 after a failure.
+ *
+ * Any number of threads may read a shallow liquid.
+ */
+frz_status frz_shallow_volume(const frz_shallow *shallow,
+                              const double *low,
+                              const double *high,
+                              uint32_t layer,
+                              double *volume);
+
+/**
+ * Writes all that the next frame depends on, besides the ground, the parameters, the flow points and the bodies, in real time
+ * (frz_shallow): for a replay, an undo, a host's own cache. The bytes are the same on any number of threads.
+ *
+ * dst: room for capacity bytes. NULL: size receives how many are needed now, and nothing is written. A state has more of them the more
+ *     of the ground is wet.
+ * capacity: bytes at dst. FRZ_ERROR_CAPACITY when they are too few.
+ * size: receives the bytes that were written, or are needed; 0 after other failures.
+ *
+ * One thread at a time for each context; any number may read a shallow liquid.
+ */
+frz_status frz_shallow_save(frz_context *context,
+                            const frz_shallow *shallow,
+                            void *dst,
+                            size_t capacity,
+                            size_t *size);
+
+/**
+ * Puts a saved state in place of the liquid's, in real time (frz_shallow): from there it flows as the saved one did, to the same
+ * bytes, with the same parameters, flow points and bodies, which are set before. What flow points have moved comes back with it.
+ *
+ * state: bytes bytes of frz_shallow_save. FRZ_ERROR_FILE, and the liquid is as it was, where they are damaged, of another version, of
+ *     another ground or border, or of other kinds of flow points.
+ * bytes: their number.
+ *
+ * One thread at a time.
+ */
+frz_status frz_shallow_restore(frz_context *context,
+                               frz_shallow *shallow,
+                               const void *state,
+                               size_t bytes);
+
+/**
+ * Fills a layout with the usual values.
+ *
+ * layout: receives them.
+ * size: sizeof(frz_shallow_layout).
+ *
+ * Any thread.
+ */
+frz_status frz_shallow_layout_init(frz_shallow_layout *layout, size_t size);
+
+/**
+ * Reports the most that the surface of any liquid on this ground can have, so that buffers are made once. It holds until the ground
+ * or a body moves. On ground with uneven ceilings it is several times what a liquid comes to.
+ *
+ * size: receives it, all zeroes after a failure. Its struct_size is set by the caller.
+ *
+ * Any number of threads may read a shallow liquid.
+ */
+frz_status frz_shallow_surface_bound(const frz_shallow *shallow,
+                                     frz_shallow_size *size);
+
+/**
+ * Writes the liquid's surface as triangles, in real time (frz_shallow): the wet columns and the dry ones around them. It ends at the
+ * middles of the outermost cells. Vertices come in the order of their columns' indices, those beside walls behind them.
+ *
+ * layout: NULL for the usual one.
+ * target: the buffers. FRZ_ERROR_CAPACITY when one is too small: nothing is written, and size receives what is needed. With all data
+ *     NULL it is the size only that is asked for.
+ * size: receives the size of the surface, all zeroes after other failures; may be NULL. Its struct_size is set by the caller.
+ *
+ * One thread at a time.
+ */
+frz_status frz_shallow_surface(frz_context *context,
+                               frz_shallow *shallow,
+                               const frz_shallow_layout *layout,
+                               const frz_shallow_target *target,
+                               frz_shallow_size *size);
+
+/**
+ * Makes a snapshot of a liquid as it is now.
+ *
+ * out: receives the snapshot, to be destroyed with frz_shallow_snapshot_destroy; NULL after a failure. It does not need the liquid.
+ *
+ * Any number of threads may read a shallow liquid; one thread at a time for each context.
+ */
+frz_status frz_shallow_snapshot_create(frz_context *context,
+                                       const frz_shallow *shallow,
+                                       frz_shallow_snapshot **out);
+
+/**
+ * Takes a liquid as it is now in place of what a snapshot had, in real time (frz_shallow).
+ *
+ * snapshot: of this liquid or any other. While another thread draws it: FRZ_ERROR_BUSY.
+ *
+ * One thread at a time; any number may read a shallow liquid.
+ */
+frz_status frz_shallow_snapshot_take(frz_shallow_snapshot *snapshot, const frz_shallow *shallow);
+
+/**
+ * Destroys a snapshot; NULL is fine.
+ *
+ * snapshot: may be NULL. Not while a call uses it: it then stays.
+ *
+ * One thread at a time.
+ */
+void frz_shallow_snapshot_destroy(frz_shallow_snapshot *snapshot);
+
+/**
+ * Writes the surface that the liquid had when the snapshot was taken, as frz_shallow_surface does, in real time (frz_shallow).
+ *
+ * context: another one than that of the thread that computes.
+ * layout: NULL for the usual one.
+ * target: the buffers, as those of frz_shallow_surface; their bound is that of the liquid at that time.
+ * size: receives the size of the surface, as there; may be NULL. Its struct_size is set by the caller.
+ *
+ * One thread at a time.
+ */
+frz_status frz_shallow_snapshot_surface(frz_context *context,
+                                        frz_shallow_snapshot *snapshot,
+                                        const frz_shallow_layout *layout,
+                                        const frz_shallow_target *target,
+                                        frz_shallow_size *size);
+
+/**
+ * Reads the liquid at points as it was when the snapshot was taken, as frz_shallow_probe does, in real time (frz_shallow).
+ *
+ * points: double[3] for each (m).
+ * dst: room for a frz_shallow_sample for each; FRZ_ERROR_CAPACITY when it is too little, and nothing is written.
+ *
+ * Any number of threads may read a snapshot.
+ */
+frz_status frz_shallow_snapshot_probe(const frz_shallow_snapshot *snapshot,
+                                      frz_view points,
+                                      frz_span dst);
 
 #ifdef __cplusplus
 }  // extern "C"

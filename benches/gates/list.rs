@@ -362,4 +362,50 @@ pub const GATES: &[Gate] = &[
     // The library without OpenVDB: exported symbols but frz_*, and shared objects beyond the C library's and libgcc_s.
     none("shallow.core_symbols", "symbols"),
     none("shallow.core_needs", "objects"),
+    // Shallow liquids against theory. Steady films: velocity, on slopes to 45 degrees, and what they deliver.
+    gate("shallow.film_exact", "1", Most(1.0e-6), Open),
+    gate("shallow.film_steep", "%", Most(1.0), Most(0.3)),
+    gate("shallow.delivery", "1", Most(1.0e-3), Most(1.0e-5)),
+    // A current down a slope (Huppert 1982): how far its exponent is from 1/3, and its front from its place.
+    gate("shallow.huppert_exponent", "1", Most(0.015), Most(0.008)),
+    gate("shallow.huppert_exponent_coarse", "1", Open, Open),
+    gate("shallow.huppert_front", "%", Most(5.0), Most(3.0)),
+    gate("shallow.huppert_front_coarse", "%", Most(15.0), Most(8.0)),
+    // A puddle that spreads: how far its exponent is from 1/8, and how round it is.
+    gate("shallow.spread_exponent", "1", Most(0.01), Most(0.004)),
+    gate("shallow.spread_round", "%", Most(3.0), Most(1.0)),
+    // The swing in a parabolic bowl (Thacker 1981).
+    gate("shallow.bowl_period", "%", Most(1.0), Most(0.5)),
+    // Energy of waves, over its start, and its growth over a period where there is viscosity.
+    gate("shallow.energy_start", "1", Most(1.02), Open),
+    gate("shallow.energy_high", "1", Most(1.02), Open),
+    gate("shallow.energy_viscous", "1", Most(0.0), Open),
+    // Lakes over islands and layers.
+    gate("shallow.lake_rest", "m/s", Most(0.0), Open),
+    yes("shallow.lake_same"),
+    gate("shallow.lake_disturbed", "m/s", Most(1.0e-6), Open),
+    gate("shallow.lake_storm", "m/s", Most(1.0e-3), Open),
+    // What pipes leave out: a dam that breaks over shallow water, against Stoker. Printed.
+    gate("shallow.dam_front", "%", Open, Open),
+    gate("shallow.dam_depth", "%", Open, Open),
+    // Frames after which units are missing; depths out of range in random scenes.
+    none("shallow.mass", "frames"),
+    none("shallow.depth_range", "columns"),
+    // The same liquid however the scene lies, whatever does the work, and when a run is played again.
+    yes("shallow.same_rotated"),
+    yes("shallow.same_mirrored"),
+    yes("shallow.same_replay"),
+    yes("shallow.same_threads"),
+    yes("shallow.same_cpu"),
+    // Thread CPU time of a frame of 1/60 s: 200 x 200 cells with a floor and with five, 100 x 100 with three; all columns wet.
+    gate("shallow.frame_one_floor", "ms", Most(0.5), Most(0.28)),
+    gate("shallow.frame_five_floors", "ms", Most(2.8), Most(1.6)),
+    gate("shallow.frame_three_floors", "ms", Most(0.2), Most(0.12)),
+    // Columns times steps a second, where no column gives more than it has, on 200 and on 4,000 cells along an edge, and where all would.
+    gate("shallow.rate_200", "M/s", Least(450.0), Least(800.0)),
+    gate("shallow.rate_4000", "M/s", Least(300.0), Least(400.0)),
+    gate("shallow.rate_scaled", "M/s", Least(200.0), Least(300.0)),
+    // A puddle on a hundredth of the ground over liquid on all of it; memory of a column with its pipes.
+    gate("shallow.puddle", "%", Most(5.0), Most(1.5)),
+    gate("shallow.memory", "B", Most(64.0), Most(48.0)),
 ];

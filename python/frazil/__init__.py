@@ -1,4 +1,4 @@
-"""Snow that bodies press into, and meshes that follow liquids: frazil's C library from Python, with NumPy arrays and no build.
+"""Snow that bodies press into, meshes that follow liquids, and shallow liquids: frazil's C library from Python, with NumPy arrays and no build.
 
 The library is found through FRAZIL_LIBRARY, else beside the module, else in the tree that it was installed with, else
 by the system's loader.
@@ -23,6 +23,11 @@ by the system's loader.
     solid, report = mesh.repaired(ctx, cell=0.01)          # closed, as rebuild=True of a Tracker needs it
     tracker.triangles, tracker.edits                       # which change then where the liquid merges or splits
 
+    blood = frazil.Shallow(ctx, bone, cell=0.001, liquid="blood")    # a frazil.Mesh, heights (nz, nx), or a level set
+    blood.set_flows([frazil.Source((0.0, 0.02, 0.0), rate=1e-6), frazil.Drain((0.01, 0.0, 0.0), rate=2e-6)])   # m3/s
+    blood.step(1 / 60, budget=0.004)
+    blood.lent("depth") * blood.info.unit, blood.surface().triangles        # NumPy sees the library's own memory
+
 Lengths are metres, times seconds; Y is up. Everything that fails raises frazil.Error with one sentence.
 Handles have close(), and work in with blocks.
 """
@@ -33,11 +38,12 @@ from .grains import Grains
 from .grid import Grid, Leaf, load, save
 from .mesh import Mesh
 from .mist import Mist
+from .shallow import Absorber, Ball, Box, Capsule, Drain, Shallow, Snapshot, Source, Surface
 from .snow import Base, Body, Noise, snow_layer
 from .tracker import Particles, Tracker, spacing
 from . import level_set
 
 __all__ = [
-    "ABI_VERSION", "Base", "Body", "Context", "Error", "Grains", "Grid", "Leaf", "Mesh", "Mist", "Noise", "Particles",
-    "Pool", "Tracker", "level_set", "library", "load", "save", "snow_layer", "spacing", "version",
+    "ABI_VERSION", "Absorber", "Ball", "Base", "Body", "Box", "Capsule", "Context", "Drain", "Error", "Grains", "Grid", "Leaf",
+    "Mesh", "Mist", "Noise", "Particles", "Pool", "Shallow", "Snapshot", "Source", "Surface", "Tracker", "level_set", "library", "load", "save", "snow_layer", "spacing", "version",
 ]

@@ -9,7 +9,7 @@ import threading
 
 import numpy as np
 
-ABI_VERSION = 0x10006
+ABI_VERSION = 0x10007
 
 OK, CANCELLED = 0, 5
 
@@ -194,6 +194,93 @@ class RepairReport(Struct):
     ]
 
 
+class ShallowParams(Struct):
+    _fields_ = [
+        ("struct_size", c.c_uint32), ("flags", c.c_uint32), ("viscosity", c.c_double), ("thinnest", c.c_double),
+        ("thinning_time", c.c_double), ("thinning_power", c.c_double), ("gravity", c.c_double * 3), ("kept", c.c_double),
+        ("longest_step", c.c_double), ("pace", c.c_uint32), ("border", c.c_uint32), ("section", c.c_uint32),
+        ("reserved", c.c_uint32),
+    ]
+
+
+class ShallowDomain(Struct):
+    _fields_ = [
+        ("struct_size", c.c_uint32), ("flags", c.c_uint32), ("cell", c.c_double), ("origin", c.c_double * 2),
+        ("cells", c.c_uint32 * 2), ("low", c.c_double), ("high", c.c_double),
+    ]
+
+
+class ShallowReport(Struct):
+    _fields_ = [
+        ("struct_size", c.c_uint32), ("steps", c.c_uint32), ("seconds", c.c_double), ("dropped", c.c_double),
+        ("deepest", c.c_double), ("emptied", c.c_uint64), ("filled", c.c_uint64),
+    ]
+
+
+class ShallowFlow(c.Structure):
+    _fields_ = [
+        ("struct_size", c.c_uint32), ("flags", c.c_uint32), ("kind", c.c_uint32), ("triangle", c.c_uint32),
+        ("shares", c.c_double * 3), ("at", c.c_double * 3), ("radius", c.c_double), ("rate", c.c_double),
+        ("capacity", c.c_double), ("pulse_frequency", c.c_double), ("pulse_share", c.c_double),
+    ]
+
+
+class ShallowBalance(Struct):
+    _fields_ = [
+        ("struct_size", c.c_uint32), ("reserved", c.c_uint32), ("inside", c.c_double), ("poured", c.c_double),
+        ("sourced", c.c_double), ("drained", c.c_double), ("absorbed", c.c_double), ("lost", c.c_double),
+        ("gained", c.c_double), ("held", c.c_double), ("error", c.c_int64),
+    ]
+
+
+class ShallowMoved(Struct):
+    _fields_ = [
+        ("struct_size", c.c_uint32), ("reserved", c.c_uint32), ("cells", c.c_uint64), ("displaced", c.c_double),
+        ("held", c.c_double), ("fallen", c.c_double),
+    ]
+
+
+class ShallowBody(c.Structure):
+    _fields_ = [
+        ("struct_size", c.c_uint32), ("shape", c.c_uint32), ("at", c.c_double * 3), ("end", c.c_double * 3),
+        ("radius", c.c_double), ("half", c.c_double * 3), ("axes", c.c_double * 9),
+    ]
+
+
+class ShallowInfo(Struct):
+    _fields_ = [
+        ("struct_size", c.c_uint32), ("layers", c.c_uint32), ("index_count", c.c_uint64), ("column_count", c.c_uint64),
+        ("cell", c.c_double), ("low", c.c_double), ("unit", c.c_double), ("time", c.c_double), ("last_step", c.c_double),
+    ]
+
+
+class ShallowSample(c.Structure):
+    _fields_ = [
+        ("height", c.c_double), ("depth", c.c_double), ("velocity", c.c_float * 2), ("surface_velocity", c.c_float * 2),
+        ("column", c.c_uint32), ("layer", c.c_uint32),
+    ]
+
+
+class ShallowLayout(Struct):
+    _fields_ = [
+        ("struct_size", c.c_uint32), ("flags", c.c_uint32), ("scale", c.c_double), ("least_depth", c.c_double),
+        ("opaque_depth", c.c_double),
+    ]
+
+
+class ShallowTarget(c.Structure):
+    _fields_ = [("struct_size", c.c_uint32), ("index_bits", c.c_uint32)] + [
+        (name, Span)
+        for name in ("positions", "normals", "depths", "opacities", "velocities", "layers", "columns", "indices")
+    ]
+
+
+class ShallowSize(Struct):
+    _fields_ = [
+        ("struct_size", c.c_uint32), ("reserved", c.c_uint32), ("vertices", c.c_uint64), ("indices", c.c_uint64),
+    ]
+
+
 # The structs by their names in the header: a test compares every field's place.
 STRUCTS = {
     "frz_view": View, "frz_span": Span, "frz_progress": Progress, "frz_stage_time": StageTime,
@@ -204,6 +291,10 @@ STRUCTS = {
     "frz_grains_params": GrainsParams, "frz_grains_report": GrainsReport,
     "frz_mist_params": MistParams, "frz_mist_report": MistReport, "frz_particles": ParticlesDesc,
     "frz_tracker_params": TrackerParams, "frz_tracker_report": TrackerReport, "frz_repair_report": RepairReport,
+    "frz_shallow_params": ShallowParams, "frz_shallow_domain": ShallowDomain, "frz_shallow_report": ShallowReport,
+    "frz_shallow_flow": ShallowFlow, "frz_shallow_balance": ShallowBalance, "frz_shallow_moved": ShallowMoved,
+    "frz_shallow_body": ShallowBody, "frz_shallow_info": ShallowInfo, "frz_shallow_sample": ShallowSample,
+    "frz_shallow_layout": ShallowLayout, "frz_shallow_target": ShallowTarget, "frz_shallow_size": ShallowSize,
 }
 
 POLL = c.CFUNCTYPE(c.c_int, c.c_void_p, c.POINTER(Progress))
@@ -248,9 +339,23 @@ _FUNCTIONS = {
     "tracker_read_rest": [_P, _P, _P, _P, Span],
     "tracker_read_eased": [_P, _P, _P, _P, _Z, _U, _D, Span],
     "tracker_save": [_P, _P, _P, _Z, _P],
+    "shallow_params_init": [_P, _Z], "shallow_params_liquid": [_P, _U], "shallow_create": [_P, _P, _P, _P, _P],
+    "shallow_create_heights": [_P, _P, _P, View, _P], "shallow_create_grid": [_P, _P, _P, _P, _P],
+    "shallow_set_params": [_P, _P], "shallow_step": [_P, _P, _D, _D, _P], "shallow_replay": [_P, _P, View, _P],
+    "shallow_last_steps": [_P, Span, _P], "shallow_set_flows": [_P, _P, _Z], "shallow_flow_moved": [_P, _Z, _P],
+    "shallow_pour": [_P, _P, _D, _D, _P], "shallow_fill": [_P, _D], "shallow_set_depths": [_P, View],
+    "shallow_get_balance": [_P, _P], "shallow_update_terrain": [_P, _P, View, _P, _P],
+    "shallow_update_heights": [_P, _P, View, _P, _P], "shallow_set_bodies": [_P, _P, _P, _Z, _P],
+    "shallow_get_info": [_P, _P], "shallow_read": [_P, _U, View, Span], "shallow_lend": [_P, _U, _P],
+    "shallow_probe": [_P, View, Span], "shallow_volume": [_P, _P, _P, _U, _P], "shallow_save": [_P, _P, _P, _Z, _P],
+    "shallow_restore": [_P, _P, _P, _Z], "shallow_layout_init": [_P, _Z], "shallow_surface_bound": [_P, _P],
+    "shallow_surface": [_P, _P, _P, _P, _P], "shallow_snapshot_create": [_P, _P, _P],
+    "shallow_snapshot_take": [_P, _P], "shallow_snapshot_surface": [_P, _P, _P, _P, _P],
+    "shallow_snapshot_probe": [_P, View, Span],
 }
 _VOID = ["pool_destroy", "context_destroy", "context_cancel", "context_reset", "mesh_destroy", "grid_destroy",
-         "base_destroy", "grains_destroy", "mist_destroy", "tracker_destroy"]
+         "base_destroy", "grains_destroy", "mist_destroy", "tracker_destroy", "shallow_destroy",
+         "shallow_snapshot_destroy"]
 _LENT = ["base_grid", "base_removed", "base_compression", "base_touched"]
 
 
@@ -300,15 +405,13 @@ def _load():
                           f"put it beside {pathlib.Path(__file__).parent}") from None
     lib.frz_version.restype = c.c_uint32
     lib.frz_last_error.restype = c.c_char_p
-    for name, arguments in _FUNCTIONS.items():
-        function = getattr(lib, "frz_" + name)
-        function.argtypes, function.restype = arguments, c.c_uint32
-    for name in _VOID:
-        function = getattr(lib, "frz_" + name)
-        function.argtypes, function.restype = [_P], None
-    for name in _LENT:
-        function = getattr(lib, "frz_" + name)
-        function.argtypes, function.restype = [_P], _P
+    kinds = {name: (arguments, c.c_uint32) for name, arguments in _FUNCTIONS.items()}
+    kinds |= {name: ([_P], None) for name in _VOID} | {name: ([_P], _P) for name in _LENT}
+    for name, (arguments, answer) in kinds.items():
+        # The core library lacks what needs OpenVDB.
+        function = getattr(lib, "frz_" + name, None)
+        if function is not None:
+            function.argtypes, function.restype = arguments, answer
     return lib
 
 
@@ -371,11 +474,14 @@ def _interruptible():
 
 def call(name, *arguments):
     """Calls frz_<name>; raises what a callback raised in it, or Error where it fails."""
+    function = getattr(library, "frz_" + name, None)
+    if function is None:
+        raise NotImplementedError(f"the library has no frz_{name}: it is the core library, without OpenVDB, or an older one")
     outer = _calls.raised, _calls.stopped
     _calls.raised, _calls.stopped = None, ()
     try:
         with _interruptible():
-            status = getattr(library, "frz_" + name)(*arguments)
+            status = function(*arguments)
             said = library.frz_last_error() if status != OK else b""
         raised, stopped = _calls.raised, _calls.stopped
     finally:
@@ -388,6 +494,14 @@ def call(name, *arguments):
         raise Error(status, said.decode("utf-8", "replace"))
 
 
+def _kind_of(name):
+    """What a function makes."""
+    if name.startswith(("grid_to_mesh", "mesh_")):
+        return "mesh"
+    kind, create, _ = name.rpartition("_create")
+    return kind if create else "grid"
+
+
 def made(name, *arguments, behind=()):
     """Calls frz_<name> with an out-pointer at the end, but for the arguments `behind` it; the new handle."""
     out = c.c_void_p()
@@ -396,8 +510,7 @@ def made(name, *arguments, behind=()):
     except BaseException:
         # A callback raised at the end of a call that went well.
         if out.value:
-            kind = "mesh" if name.startswith(("grid_to_mesh", "mesh_")) else name.split("_")[0] if name.endswith("_create") else "grid"
-            getattr(library, f"frz_{kind}_destroy")(out.value)
+            getattr(library, f"frz_{_kind_of(name)}_destroy")(out.value)
         raise
     return out.value
 

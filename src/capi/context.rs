@@ -12,6 +12,7 @@ use super::library::FRZ_ABI_VERSION;
 use super::pool::{Threads, frz_pool};
 use super::views::{Plain, frz_span};
 use crate::context::{Context, PhaseTime, Phases, Progress, Running, machine_memory};
+use crate::error::Error;
 
 /// One computation: cancel flag, progress, polls, warnings, phase times. Cheap: make one for every cook.
 pub struct frz_context {
@@ -125,6 +126,47 @@ pub(super) unsafe fn enter<'a>(context: *const frz_context) -> Outcome<Call<'a>>
     call.1 = Some((call.ctx().begin(), call.ctx().collect()));
     call.0.began.set(Some(Instant::now()));
     Ok(call)
+}
+
+/// A call of a frame in real time, which has a context to itself as a [`Call`] has. It takes no lock, allocates nothing, asks no
+/// clock, and has no phases, polls or progress.
+pub(super) struct LightCall<'a>(Reading<'a, State>);
+
+impl LightCall<'_> {
+    /// The library's own context.
+    pub(super) fn ctx(&self) -> &Context {
+        &self.0.ctx
+    }
+}
+
+/// Begins a call of a frame in real time with a context, unless it is cancelled, which is looked at here only.
+///
+/// # Safety
+/// As [`enter`].
+pub(super) unsafe fn enter_light<'a>(context: *const frz_context) -> Outcome<LightCall<'a>> {
+    // SAFETY: the caller's promise.
+    let state = unsafe { read(context) }?;
+    if state.entered.swap(true, Ordering::AcqRel) {
+        return Err(Failure::new(FRZ_ERROR_BUSY, "the context is in use by another call"));
+    }
+    let call = LightCall(state);
+    if call.0.poisoned.load(Ordering::Acquire) {
+        let text = "the context saw an internal error before and can only be destroyed";
+        return Err(Failure::new(FRZ_ERROR_POISONED, text));
+    }
+    if call.ctx().is_cancelled() {
+        return Err(Error::Cancelled.into());
+    }
+    Ok(call)
+}
+
+impl Drop for LightCall<'_> {
+    fn drop(&mut self) {
+        if std::thread::panicking() {
+            self.0.poisoned.store(true, Ordering::Release);
+        }
+        self.0.entered.store(false, Ordering::Release);
+    }
 }
 
 /// A function of the interface that makes an object: `out` receives it, or NULL after a failure.

@@ -84,6 +84,24 @@ pub mod tracker_rest;
 
 pub mod tracker_sculpt;
 
+pub mod shallow_params;
+
+pub mod shallow;
+
+pub mod shallow_flows;
+
+pub mod shallow_terrain;
+
+pub mod shallow_read;
+
+pub mod shallow_state;
+
+pub mod shallow_surface;
+
+pub mod shallow_snapshot;
+
+mod shallow_lists;
+
 mod handle;
 mod saved;
 

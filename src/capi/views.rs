@@ -39,6 +39,8 @@ pub(super) unsafe trait Plain: Copy {}
 // SAFETY: numbers and arrays of numbers.
 unsafe impl Plain for u8 {}
 // SAFETY: as above.
+unsafe impl Plain for u16 {}
+// SAFETY: as above.
 unsafe impl Plain for u32 {}
 // SAFETY: as above.
 unsafe impl Plain for i32 {}
@@ -47,6 +49,8 @@ unsafe impl Plain for i64 {}
 // SAFETY: as above.
 unsafe impl Plain for f32 {}
 // SAFETY: as above.
+unsafe impl Plain for f64 {}
+// SAFETY: as above.
 unsafe impl Plain for [f32; 2] {}
 // SAFETY: as above.
 unsafe impl Plain for [f32; 3] {}
@@ -54,6 +58,8 @@ unsafe impl Plain for [f32; 3] {}
 unsafe impl Plain for [f32; 4] {}
 // SAFETY: as above.
 unsafe impl Plain for [f64; 3] {}
+// SAFETY: as above.
+unsafe impl Plain for [i32; 2] {}
 // SAFETY: as above.
 unsafe impl Plain for [i32; 3] {}
 // SAFETY: as above.
@@ -98,15 +104,41 @@ impl frz_view {
     /// # Safety
     /// The view must describe memory that can be read.
     pub(super) unsafe fn elements<T: Plain>(&self, name: &str) -> Outcome<Vec<T>> {
-        let stride = stride::<T>(name, self.data, self.count, self.stride)?;
-        let first = self.data.cast::<u8>();
+        // SAFETY: the caller's promise.
+        let elements = unsafe { self.in_place::<T>(name) }?;
         let mut out = Vec::new();
         out.try_reserve_exact(self.count)
             .map_err(|_| Failure::argument(format!("{name}: {} elements do not fit", self.count)))?;
-        // SAFETY: the caller's promise, and the whole span was checked to be one that pointers can reach.
-        let element = |index: usize| unsafe { first.add(index * stride).cast::<T>().read_unaligned() };
-        out.extend((0..self.count).map(element));
+        out.extend(elements);
         Ok(out)
+    }
+
+    /// The elements one after another, read where they lie.
+    ///
+    /// # Safety
+    /// The view must describe memory that can be read, for `'a`.
+    pub(super) unsafe fn in_place<'a, T: Plain>(
+        &self,
+        name: &str,
+    ) -> Outcome<impl ExactSizeIterator<Item = T> + Clone + use<'a, T>> {
+        let stride = stride::<T>(name, self.data, self.count, self.stride)?;
+        let first = self.data.cast::<u8>();
+        // SAFETY: the caller's promise, and the whole span was checked to be one that pointers can reach.
+        let element = move |index: usize| unsafe { first.add(index * stride).cast::<T>().read_unaligned() };
+        Ok((0..self.count).map(element))
+    }
+
+    /// Packed bytes where they lie.
+    ///
+    /// # Safety
+    /// As [`frz_view::in_place`].
+    pub(super) unsafe fn bytes<'a>(&self, name: &str) -> Outcome<&'a [u8]> {
+        stride::<u8>(name, self.data, self.count, 1)?;
+        if self.count == 0 {
+            return Ok(&[]);
+        }
+        // SAFETY: the caller's promise, and all of them can be reached.
+        Ok(unsafe { std::slice::from_raw_parts(self.data.cast(), self.count) })
     }
 
     /// Positions or other triples, all finite.
@@ -129,18 +161,66 @@ impl frz_span {
     /// # Safety
     /// The span must describe memory that can be written.
     pub(super) unsafe fn fill<T: Plain>(&self, name: &str, elements: &[T]) -> Outcome {
-        if self.count < elements.len() {
-            let text =
-                format!("{name}: there is room for {} elements, {} are needed", self.count, elements.len());
+        // SAFETY: the caller's promise.
+        unsafe { self.put(name, elements.iter().copied()) }
+    }
+
+    /// Refuses a span that has no room for so many elements.
+    pub(super) fn check_room(&self, name: &str, needed: usize) -> Outcome {
+        if self.count < needed {
+            let text = format!("{name}: there is room for {} elements, {needed} are needed", self.count);
             return Err(Failure::new(FRZ_ERROR_CAPACITY, text));
         }
+        Ok(())
+    }
+
+    /// As [`frz_span::fill`], one after another.
+    ///
+    /// # Safety
+    /// As [`frz_span::fill`].
+    pub(super) unsafe fn put<T: Plain>(
+        &self,
+        name: &str,
+        elements: impl ExactSizeIterator<Item = T>,
+    ) -> Outcome {
+        self.check_room(name, elements.len())?;
         let stride = stride::<T>(name, self.data, elements.len(), self.stride)?;
         let first = self.data.cast::<u8>();
-        for (index, element) in elements.iter().enumerate() {
+        for (index, element) in elements.enumerate() {
             // SAFETY: the caller's promise, and the whole span was checked to be one that pointers can reach.
-            unsafe { first.add(index * stride).cast::<T>().write_unaligned(*element) };
+            unsafe { first.add(index * stride).cast::<T>().write_unaligned(element) };
         }
         Ok(())
+    }
+
+    /// Packed, aligned numbers to be written in place, `width` an element; none where the data are NULL.
+    ///
+    /// # Safety
+    /// As [`frz_span::fill`], for `'a`; nothing else may use the memory meanwhile.
+    pub(super) unsafe fn numbers<'a, T: Plain>(
+        &self,
+        name: &str,
+        width: usize,
+    ) -> Outcome<Option<&'a mut [T]>> {
+        if self.data.is_null() {
+            return Ok(None);
+        }
+        let packed = width * size_of::<T>();
+        if self.stride != 0 && self.stride != packed {
+            let stride = self.stride;
+            return Err(Failure::argument(format!(
+                "{name}: the stride of {stride} bytes is not {packed}, that of packed elements"
+            )));
+        }
+        let first = self.data.cast::<T>();
+        if !first.is_aligned() {
+            let text = format!("{name}: the data are not aligned to {} bytes", align_of::<T>());
+            return Err(Failure::argument(text));
+        }
+        let count = self.count.saturating_mul(width);
+        stride::<T>(name, self.data, count, 0)?;
+        // SAFETY: the caller's promise, and all of it can be reached.
+        Ok(Some(unsafe { std::slice::from_raw_parts_mut(first, count) }))
     }
 
     /// Reports how many elements there are, and writes them unless the span's data are NULL.

@@ -16,7 +16,7 @@ mod preview;
 mod progress;
 mod repair;
 mod session;
-#[cfg(feature = "vdb")]
+mod shallow;
 mod shot;
 mod signals;
 #[cfg(feature = "vdb")]
@@ -32,7 +32,8 @@ use exit::Failure;
 use session::{Globals, Session};
 use std::process::ExitCode;
 
-/// Volumetric effects on OpenVDB: deep snow with prints, detailed meshes that follow liquids, swept volumes, level sets, pictures.
+/// Volumetric effects on OpenVDB: deep snow with prints, detailed meshes that follow liquids, little liquids on terrain, swept volumes,
+/// level sets, pictures.
 ///
 /// Lengths are metres, frames are whole numbers, Y is up.
 #[derive(Parser)]
@@ -55,6 +56,7 @@ enum Command {
     Snow(snow::Args),
     #[cfg(feature = "vdb")]
     Surface(surface::Args),
+    Shallow(shallow::Args),
     #[cfg(feature = "vdb")]
     Vdb(vdb::Args),
     Mesh(mesh::Args),
@@ -72,6 +74,7 @@ impl Command {
             Self::Snow(args) => snow::run(&args, session),
             #[cfg(feature = "vdb")]
             Self::Surface(args) => surface::run(&args, session),
+            Self::Shallow(args) => shallow::run(&args, session),
             #[cfg(feature = "vdb")]
             Self::Vdb(args) => vdb::run(args, session),
             Self::Mesh(args) => mesh::run(&args, session),

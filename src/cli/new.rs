@@ -23,6 +23,8 @@ enum System {
     Snow,
     /// A detailed mesh that follows a liquid.
     Surface,
+    /// A little liquid on a terrain.
+    Shallow,
 }
 
 /// Runs the command.
@@ -30,6 +32,7 @@ pub fn run(args: &Args) -> Result<(), Failure> {
     let system = match args.system {
         System::Snow => scene::System::Snow,
         System::Surface => scene::System::Surface,
+        System::Shallow => scene::System::Shallow,
     };
     output::print(&if args.keys { reference(system) } else { template(system) }).during()
 }

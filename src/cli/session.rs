@@ -79,6 +79,12 @@ impl Session {
         self.globals.max_memory.bytes()
     }
 
+    /// Memory limit of the work (bytes): four fifths of the machine's.
+    #[cfg(not(feature = "vdb"))]
+    pub fn max_memory(&self) -> u64 {
+        frazil::context::machine_memory().map_or(u64::MAX, |bytes| bytes / 5 * 4)
+    }
+
     /// Whether only errors are printed.
     pub fn is_quiet(&self) -> bool {
         self.globals.quiet

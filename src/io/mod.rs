@@ -6,6 +6,8 @@ mod bgeo;
 pub mod caught;
 #[doc(hidden)]
 pub mod extras;
+#[cfg(feature = "cli")]
+pub mod grey;
 pub mod hash;
 pub mod manifest;
 pub mod mesh;

@@ -11,10 +11,20 @@ pub enum Look {
     Fog,
     /// What moves through the snow. A `UsdPreviewSurface`.
     Object,
+    /// Liquids with a surface, as opaque as `displayOpacity` has it. Each a `UsdPreviewSurface`.
+    Water,
+    /// See [`Look::Water`].
+    Blood,
+    /// See [`Look::Water`].
+    Paint,
+    /// See [`Look::Water`].
+    Honey,
 }
 
 /// Where materials are.
 const SCOPE: &str = "materials";
+/// Roughness of a wet surface.
+const WET: f64 = 0.05;
 
 impl Look {
     /// Name of its material.
@@ -23,6 +33,10 @@ impl Look {
             Self::Snow => "snow",
             Self::Fog => "fog",
             Self::Object => "object",
+            Self::Water => "water",
+            Self::Blood => "blood",
+            Self::Paint => "paint",
+            Self::Honey => "honey",
         }
     }
 
@@ -34,12 +48,34 @@ impl Look {
         let _ = writeln!(out, "{indent}rel material:binding = </shot/{SCOPE}/{}>", self.name());
     }
 
+    /// Whether it is as opaque as its mesh says.
+    fn is_liquid(self) -> bool {
+        matches!(self, Self::Water | Self::Blood | Self::Paint | Self::Honey)
+    }
+
+    /// Where the shader has its opacity from, and the shader that reads it.
+    fn opacity(self) -> (String, String) {
+        let name = self.name();
+        let input = format!(
+            "float inputs:opacity.connect = </shot/{SCOPE}/{name}/opacity.outputs:result>\n                "
+        );
+        let reader = "\n            def Shader \"opacity\"\n            {\n                \
+                      uniform token info:id = \"UsdPrimvarReader_float\"\n                \
+                      float inputs:fallback = 1\n                string inputs:varname = \"displayOpacity\"\n                \
+                      float outputs:result\n            }\n";
+        (input, reader.into())
+    }
+
     fn define(self, out: &mut String) {
         let name = self.name();
         // Fresh snow reflects nine tenths of the light, blue a little more than red; its grains scatter forward.
         let (colour, roughness) = match self {
             Self::Snow => ("(0.9, 0.92, 0.95)", 0.75),
             Self::Object => ("(0.32, 0.33, 0.36)", 0.5),
+            Self::Water => ("(0.05, 0.25, 0.3)", WET),
+            Self::Blood => ("(0.3, 0.008, 0.006)", WET),
+            Self::Paint => ("(0.05, 0.2, 0.6)", 0.3),
+            Self::Honey => ("(0.75, 0.36, 0.03)", WET),
             Self::Fog => {
                 let _ = write!(
                     out,
@@ -49,13 +85,14 @@ impl Look {
                 return;
             }
         };
+        let (opacity, reader) = if self.is_liquid() { self.opacity() } else { Default::default() };
         let _ = write!(
             out,
             "        def Material \"{name}\"\n        {{\n            \
              token outputs:surface.connect = </shot/{SCOPE}/{name}/surface.outputs:surface>\n\n            \
              def Shader \"surface\"\n            {{\n                uniform token info:id = \"UsdPreviewSurface\"\n                \
              color3f inputs:diffuseColor = {colour}\n                float inputs:roughness = {roughness}\n                \
-             token outputs:surface\n            }}\n        }}\n"
+             {opacity}token outputs:surface\n            }}\n{reader}        }}\n"
         );
     }
 }

@@ -175,7 +175,7 @@ impl<'a> Splats<'a> {
         let normal = (eye + toward * distance - centre).try_normalize(0.0).unwrap_or(-toward);
         let skin = 0.01 * radius.max(1e-9);
         let albedo = Colour::from(albedo.map(f64::from));
-        Some(Hit { distance, normal, albedo, skin, wrap: WRAP })
+        Some(Hit { distance, normal, albedo, skin, wrap: WRAP, film: None })
     }
 }
 

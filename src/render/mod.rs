@@ -17,6 +17,7 @@ mod cloud;
 mod cut;
 pub mod fog;
 mod gif;
+mod liquid;
 mod model;
 mod models;
 mod palette;

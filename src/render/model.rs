@@ -10,10 +10,12 @@ pub struct Model {
     mesh: TriMesh,
     tree: Bvh,
     /// Unit normals at the vertices of a smooth surface; without them triangles are flat.
-    normals: Option<Vec<Vec3>>,
+    pub(super) normals: Option<Vec<Vec3>>,
     albedo: Colour,
     /// Colours of the vertices, in place of the one.
     colours: Option<Vec<[f32; 3]>>,
+    /// Opacities of the vertices of a liquid, 0 to 1.
+    pub(super) opacities: Option<Vec<f32>>,
     /// Rays towards the light start this far off the surface (m), so that it does not shadow itself.
     pub(super) skin: f64,
 }
@@ -30,6 +32,8 @@ pub(super) struct Hit {
     pub skin: f64,
     /// How far light reaches round to the side that is turned away from the sun: 0 for a surface, 1 for all around.
     pub wrap: f64,
+    /// Opacity of a liquid, 0 to 1; none: it is no liquid.
+    pub film: Option<f64>,
 }
 
 impl Model {
@@ -42,7 +46,7 @@ impl Model {
     pub(super) fn new(mesh: TriMesh, normals: Option<Vec<Vec3>>, albedo: [f32; 3], skin: f64) -> Self {
         let tree = Bvh::new(&mesh);
         let albedo = Colour::from(albedo.map(f64::from));
-        Self { mesh, tree, normals, albedo, colours: None, skin }
+        Self { mesh, tree, normals, albedo, colours: None, opacities: None, skin }
     }
 
     /// With colours for numbers of its vertices, from dark blue at the least to pale yellow at the greatest; numbers that are not
@@ -78,13 +82,30 @@ impl Model {
             let [a, b, c] = corners.map(|index| Colour::from(colours[index].map(f64::from)));
             a * (1.0 - hit.u - hit.v) + b * hit.u + c * hit.v
         });
-        Some(Hit { distance: hit.distance, normal, albedo, skin: self.skin, wrap: 0.0 })
+        let film = self.opacities.as_ref().map(|opacities| {
+            let [a, b, c] = corners.map(|index| f64::from(opacities[index]));
+            (a * (1.0 - hit.u - hit.v) + b * hit.u + c * hit.v).clamp(0.0, 1.0)
+        });
+        Some(Hit { distance: hit.distance, normal, albedo, skin: self.skin, wrap: 0.0, film })
     }
 
-    /// Whether the surface hides a direction from a point.
+    /// Whether the surface hides a direction from a point; a liquid's does not.
     pub(super) fn blocks(&self, origin: DVec3, toward: DVec3) -> bool {
-        self.tree.any_hit(origin, toward, f64::INFINITY)
+        self.opacities.is_none() && self.tree.any_hit(origin, toward, f64::INFINITY)
     }
+}
+
+/// The mean of the triangles' normals around each vertex, weighted by area.
+pub(super) fn smooth_normals(mesh: &TriMesh) -> Vec<Vec3> {
+    let mut normals = vec![Vec3::zeros(); mesh.positions.len()];
+    for triangle in &mesh.triangles {
+        let [a, b, c] = triangle.map(|index| mesh.positions[index as usize]);
+        let area = (b - a).cross(&(c - a));
+        for index in triangle {
+            normals[*index as usize] += area;
+        }
+    }
+    normals.iter().map(|normal| normal.try_normalize(0.0).unwrap_or_else(Vec3::y)).collect()
 }
 
 fn bounds_of(mesh: &TriMesh) -> Option<(DVec3, DVec3)> {

@@ -3,6 +3,7 @@
 use super::camera::{Camera, Lens, Size};
 use super::cloud::{Cloud, Splats};
 use super::fog::{Fog, LitFogs, Veil};
+use super::liquid::{MOST_FILMS, wet};
 use super::model::{Hit, Model};
 use super::picture::Picture;
 use super::shade::{Colour, Light, shade, to_bytes};
@@ -111,7 +112,7 @@ impl Models {
         let mut sum = Colour::zeros();
         for (sample, ((toward, hit), veil)) in rays.iter().zip(&veils).enumerate() {
             if veil.through > 0.0 {
-                sum += self.seen(view, *toward, hit.as_ref(), sample) * veil.through;
+                sum += self.seen(view, (eye, *toward), hit.as_ref(), sample, MOST_FILMS) * veil.through;
             }
             sum += veil.light;
         }
@@ -147,12 +148,28 @@ impl Models {
             || shadows.is_some_and(|shadows| shadows.block(point, toward))
     }
 
-    /// Light that comes along a ray from what it meets, without the fogs before it.
-    fn seen(&self, view: &View<'_>, toward: DVec3, hit: Option<&Hit>, sample: usize) -> Colour {
+    /// Light that comes along a ray, from its origin and in its direction, from what it meets, without the fogs before it; through at most
+    /// so many `films` of liquid.
+    fn seen(
+        &self,
+        view: &View<'_>,
+        (origin, toward): (DVec3, DVec3),
+        hit: Option<&Hit>,
+        sample: usize,
+        films: usize,
+    ) -> Colour {
         let Some(hit) = hit else { return view.light.background(toward) };
-        let point = view.camera.eye + toward * hit.distance + hit.normal * hit.skin;
+        let point = origin + toward * hit.distance + hit.normal * hit.skin;
         let blocked = |direction| self.hide(view.shadows.as_ref(), point, direction);
         let clear = |direction| if self.fogs.is_empty() { 1.0 } else { view.fogs.sunlight(point, direction) };
-        shade(view.light, hit.normal, hit.albedo, sample, hit.wrap, blocked, clear)
+        let own = shade(view.light, hit.normal, hit.albedo, sample, hit.wrap, blocked, clear);
+        let Some(opacity) = hit.film else { return own };
+        if films == 0 || opacity >= 1.0 {
+            return wet(view.light, hit, 1.0, [own, own], toward, blocked);
+        }
+        let behind = origin + toward * (hit.distance + hit.skin);
+        let next = self.hit(behind, toward, None);
+        let below = self.seen(view, (behind, toward), next.as_ref(), sample, films - 1);
+        wet(view.light, hit, opacity, [own, below], toward, blocked)
     }
 }

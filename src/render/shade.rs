@@ -31,6 +31,9 @@ const BOUNCED: Colour = Colour::new(0.085, 0.115, 0.165);
 pub(super) const SURROUNDINGS: Colour = Colour::new(0.50, 0.545, 0.61);
 /// Half the angle of the sun's disc, wider than in nature: the edges of shadows are soft (radians).
 const SUN_RADIUS: f64 = 0.02;
+/// Sharpness of the sun's mirror image in a liquid, and its brightness over the sun's on a surface.
+const GLOSS: f64 = 350.0;
+const SPOT: f64 = 1.0;
 /// Sky rays at each sample of a pixel.
 pub(super) const SKY_RAYS: usize = 4;
 /// Points of the disc that are kept: for the 9 samples of a pixel.
@@ -91,6 +94,27 @@ pub(super) fn shade(
         fill += if open { sky(toward.y.max(0.0)) } else { BOUNCED };
     }
     albedo.component_mul(&(sun + fill / SKY_RAYS as f64))
+}
+
+/// How much of the light a wet surface mirrors (Schlick 1994, of water), and the light that it so sends towards the camera: that of the
+/// sky, and of the sun in a spot that ripples blur.
+///
+/// `toward` is the unit vector from the camera; `blocked(direction)` as in [`shade`].
+pub(super) fn gloss(
+    light: &Light,
+    normal: DVec3,
+    toward: DVec3,
+    blocked: impl Fn(DVec3) -> bool,
+) -> (f64, Colour) {
+    let facing = -normal.dot(&toward);
+    let rest = 1.0 - facing.clamp(0.0, 1.0);
+    let share = 0.02 + 0.98 * (rest * rest) * (rest * rest) * rest;
+    let mirror = toward + normal * (2.0 * facing);
+    let is_blocked = blocked(mirror);
+    let sky = if is_blocked || mirror.y < -0.05 { BOUNCED } else { sky(mirror.y.clamp(0.0, 1.0)) };
+    let spot = libm::pow(mirror.dot(&light.sun).max(0.0), GLOSS);
+    let sun = if is_blocked { Colour::zeros() } else { SUN * (spot * SPOT) };
+    (share, sky * share + sun)
 }
 
 /// A point of the unit disc: the plastic sequence (Roberts 2018), the same at each pixel: flat walls stay flat.

@@ -2,10 +2,10 @@
 
 use super::cut::Field;
 use super::fog::{Fog, Part, Placement};
-use super::model::Model;
+use super::model::{Model, smooth_normals};
 use super::shade::SNOW;
+use crate::base::DVec3;
 use crate::base::blocks::{DIM, Origin};
-use crate::base::{DVec3, TriMesh, Vec3};
 use crate::context::Context;
 use crate::error::{Error, Result};
 use crate::vdb::{DENSITY_SCALE_KEY, FloatGrid, GridClass, MetaValue, Tile, level_set};
@@ -142,17 +142,4 @@ fn placement(grid: &FloatGrid) -> Option<Placement> {
         off.norm() <= 1.0e-6 * placement.cell() * (1.0 + corner.norm())
     });
     is_linear.then_some(placement)
-}
-
-/// The mean of the triangles' normals around each vertex, weighted by area.
-fn smooth_normals(mesh: &TriMesh) -> Vec<Vec3> {
-    let mut normals = vec![Vec3::zeros(); mesh.positions.len()];
-    for triangle in &mesh.triangles {
-        let [a, b, c] = triangle.map(|index| mesh.positions[index as usize]);
-        let area = (b - a).cross(&(c - a));
-        for index in triangle {
-            normals[*index as usize] += area;
-        }
-    }
-    normals.iter().map(|normal| normal.try_normalize(0.0).unwrap_or_else(Vec3::y)).collect()
 }

@@ -1,18 +1,20 @@
 //! Scene files (TOML): what a shot is made of, read with every default filled in ([`Scene::read`], `text/`), checked
 //! against its inputs and run frame by frame.
 //!
-//! [`shot`] runs any stage; [`snow`] and [`surface`] have the inputs, the check and the stages of a system; the stage `objects`
+//! [`shot`] runs any stage; [`snow`], [`surface`] and [`shallow`] have the inputs, the check and the stages of a system; the stage `objects`
 //! writes the objects as they move. A new stage is a type with the traits [`shot::Stage`] and [`shot::Stepping`] beside its
 //! system, named in the system's plan ([`snow::plan`]) and in the scopes of the keys that it depends on.
 
 mod moving;
 mod objects;
+pub mod shallow;
 pub mod shot;
 pub mod snow;
 pub mod surface;
 mod text;
 
 pub use objects::Objects;
+pub use shallow::Shallow;
 #[cfg(feature = "vdb")]
 pub use snow::{
     Forecast, Inputs, Rebuild, RebuildGrains, Walk, changes_since, check_memory, estimate, partial,
@@ -35,6 +37,7 @@ pub struct Scene {
     pub(crate) shot: Shot,
     pub(crate) snow: Option<Snow>,
     pub(crate) surface: Option<Surface>,
+    pub(crate) shallow: Option<Shallow>,
     pub(crate) objects: Vec<Object>,
     pub(crate) output: Output,
     /// The value of every key, from which the others are made.
@@ -48,17 +51,20 @@ pub enum System {
     Snow,
     /// `[surface]`: a detailed mesh follows the particles of a liquid.
     Surface,
+    /// `[shallow]`: a little liquid flows over a terrain.
+    Shallow,
 }
 
 impl System {
     /// All of them.
-    pub const ALL: [Self; 2] = [Self::Snow, Self::Surface];
+    pub const ALL: [Self; 3] = [Self::Snow, Self::Surface, Self::Shallow];
 
     /// Its table in a scene, and its command.
     pub fn name(self) -> &'static str {
         match self {
             Self::Snow => "snow",
             Self::Surface => "surface",
+            Self::Shallow => "shallow",
         }
     }
 
@@ -67,6 +73,7 @@ impl System {
         match self {
             Self::Snow => "Snow that objects press into",
             Self::Surface => "A detailed mesh that follows a liquid",
+            Self::Shallow => "A little liquid on a terrain",
         }
     }
 }
@@ -322,9 +329,25 @@ impl Scene {
             .ok_or_else(|| Error::argument(format!("{}: `surface` is missing", self.path.display())))
     }
 
+    /// How its liquid flows over a terrain.
+    ///
+    /// # Errors
+    /// It has no such liquid.
+    pub fn shallow(&self) -> Result<&Shallow> {
+        self.shallow
+            .as_ref()
+            .ok_or_else(|| Error::argument(format!("{}: `shallow` is missing", self.path.display())))
+    }
+
     /// The files that it reads; of sequences those of its own first frame.
     pub(crate) fn files(&self) -> Vec<PathBuf> {
         let mut out = Vec::new();
+        if let Some(shallow) = &self.shallow {
+            out.push(shallow.terrain_at(self.shot.frames.first));
+            out.extend(
+                shallow.obstacles.iter().filter_map(|obstacle| obstacle.file().map(Path::to_path_buf)),
+            );
+        }
         if let Some(surface) = &self.surface {
             out.extend(surface.mesh.clone());
             out.extend(surface.files_at(self.shot.frames, self.shot.frames.first));

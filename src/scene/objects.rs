@@ -12,6 +12,7 @@ use crate::context::Context;
 use crate::error::Result;
 use crate::io::manifest::Keeps;
 use crate::io::seen::Seen;
+use crate::io::usd_looks::Look;
 use crate::io::{mesh, usd};
 use crate::motion::Drawn;
 use crate::sweep::Body;
@@ -105,7 +106,8 @@ impl Stage for Objects<'_> {
     fn clip(&self) -> Option<Clip<'_>> {
         let uvs = self.bodies.iter().map(|body| body.motion().drawn().uvs);
         let named = self.names.iter().cloned().zip(uvs);
-        let meshes = named.map(|(name, uvs)| MovingMesh { name, uvs, primvars: Vec::new() }).collect();
+        let mesh = |(name, uvs)| MovingMesh { name, look: Look::Object, uvs, primvars: Vec::new() };
+        let meshes = named.map(mesh).collect();
         Some(Clip { kind: "objects", manifest: MANIFEST, prims: Prims::Meshes(meshes) })
     }
 }

@@ -3,6 +3,8 @@
 //! A strip is 16 cells along x of one layer; a column's layer is its place from the bottom of its cell. Strips exist only where they have
 //! a column, and are sorted by row, then layer, then x, so that a run of them is one array, and whatever a row needs lies together.
 
+use std::ops::Range;
+
 use super::grid::{BOTTOMLESS, Grid, Heights, TOP};
 use super::terrain::Solids;
 
@@ -22,7 +24,7 @@ pub struct Strip {
     pub at: u32,
 }
 
-/// The columns of a terrain, by index: strip x 16 + place in the strip. Indices without a column have a ceiling on their base.
+/// The columns of a terrain, by index: strip x 16 + place in the strip. Indices without a column have a ceiling on their base, which is 0.
 #[derive(Debug, PartialEq)]
 pub struct Columns {
     /// Cells.
@@ -43,6 +45,16 @@ pub struct Columns {
     ceiling: Vec<i32>,
     /// min (units): the underside of the solid below, or [`BOTTOMLESS`].
     under: Vec<i32>,
+}
+
+/// A strip that is set anew.
+pub(super) struct StripMut<'a> {
+    /// b.
+    pub base: &'a mut [i32; STRIP],
+    /// max.
+    pub ceiling: &'a mut [i32; STRIP],
+    /// min.
+    pub under: &'a mut [i32; STRIP],
 }
 
 impl Clone for Columns {
@@ -91,7 +103,10 @@ impl Columns {
         for numbers in [&mut columns.base, &mut columns.ceiling, &mut columns.under] {
             numbers.resize(columns.strips.len() * STRIP + STRIP, 0);
         }
-        columns.connect();
+        let count = columns.strips.len();
+        columns.north = vec![NONE; count];
+        columns.south = vec![NONE; count];
+        columns.connect(0..nz);
         columns
     }
 
@@ -124,12 +139,19 @@ impl Columns {
         self.rows.push(self.strips.len() as u32);
     }
 
-    /// Finds the strips beside each other in adjacent rows.
-    fn connect(&mut self) {
-        let count = self.strips.len();
-        self.north = vec![NONE; count];
-        self.south = vec![NONE; count];
-        for row in 0..self.grid.size[1].saturating_sub(1) {
+    /// Finds the strips beside each other in some rows, and in these and the rows around them.
+    pub(super) fn connect(&mut self, rows: Range<usize>) {
+        self.north[self.rows[rows.start] as usize..self.rows[rows.end] as usize].fill(NONE);
+        self.south[self.rows[rows.start] as usize..self.rows[rows.end] as usize].fill(NONE);
+        if rows.start > 0 {
+            let before = self.row(rows.start - 1);
+            self.south[before].fill(NONE);
+        }
+        if rows.end < self.grid.size[1] {
+            let behind = self.row(rows.end);
+            self.north[behind].fill(NONE);
+        }
+        for row in rows.start.saturating_sub(1)..rows.end.min(self.grid.size[1] - 1) {
             let mut below = self.row(row + 1).peekable();
             for strip in self.row(row) {
                 let place = |strip: usize| (self.strips[strip].layer, self.strips[strip].at);
@@ -139,6 +161,49 @@ impl Columns {
                     self.north[other] = strip as u32;
                 }
             }
+        }
+    }
+
+    /// Gives rows other counts of strips: those of the rows behind move. Each strip of the rows is then placed and set, and
+    /// the rows are connected.
+    pub(super) fn resize_rows(&mut self, rows: Range<usize>, counts: impl Iterator<Item = u32>) {
+        let old = self.rows[rows.start] as usize..self.rows[rows.end] as usize;
+        let mut end = self.rows[rows.start];
+        for (row, count) in rows.clone().zip(counts) {
+            end += count;
+            self.rows[row + 1] = end;
+        }
+        let len = end as usize - old.start;
+        if len == old.len() {
+            return;
+        }
+        let shift = end.wrapping_sub(old.end as u32);
+        self.rows[rows.end + 1..].iter_mut().for_each(|first| *first = first.wrapping_add(shift));
+        resize_part(&mut self.strips, old.clone(), len, Strip { row: 0, layer: 0, at: 0 });
+        resize_part(&mut self.present, old.clone(), len, 0);
+        let indices = old.start * STRIP..old.end * STRIP;
+        for numbers in [&mut self.base, &mut self.ceiling, &mut self.under] {
+            resize_part(numbers, indices.clone(), len * STRIP, 0);
+        }
+        for neighbours in [&mut self.north, &mut self.south] {
+            resize_part(neighbours, old.clone(), len, NONE);
+            let behind = neighbours[end as usize..].iter_mut().filter(|strip| **strip != NONE);
+            behind.for_each(|strip| *strip = strip.wrapping_add(shift));
+        }
+    }
+
+    /// Sets where a strip lies.
+    pub(super) fn place_strip(&mut self, strip: usize, place: Strip) {
+        self.strips[strip] = place;
+    }
+
+    /// Sets which places of a strip have a column; the caller writes its numbers, which are 0 for the others.
+    pub(super) fn set_strip(&mut self, strip: usize, present: u16) -> StripMut<'_> {
+        self.present[strip] = present;
+        StripMut {
+            base: strip_mut(&mut self.base, strip),
+            ceiling: strip_mut(&mut self.ceiling, strip),
+            under: strip_mut(&mut self.under, strip),
         }
     }
 
@@ -152,6 +217,15 @@ impl Columns {
         self.strips.is_empty()
     }
 
+    /// Memory (bytes).
+    pub fn bytes(&self) -> usize {
+        let strips =
+            size_of_val(&self.strips[..]) + size_of_val(&self.rows[..]) + size_of_val(&self.present[..]);
+        let beside = size_of_val(&self.north[..]) + size_of_val(&self.south[..]);
+        let heights = [&self.base, &self.ceiling, &self.under];
+        strips + beside + heights.iter().map(|heights| size_of_val(&heights[..])).sum::<usize>()
+    }
+
     /// Count of columns.
     pub fn count(&self) -> usize {
         self.present.iter().map(|bits| bits.count_ones() as usize).sum()
@@ -163,7 +237,7 @@ impl Columns {
     }
 
     /// Indices of the strips of a row.
-    pub fn row(&self, row: usize) -> std::ops::Range<usize> {
+    pub fn row(&self, row: usize) -> Range<usize> {
         self.rows[row] as usize..self.rows[row + 1] as usize
     }
 
@@ -251,10 +325,32 @@ impl Columns {
         self.base[i].max(self.base[j]) < self.ceiling[i].min(self.ceiling[j])
     }
 
-    /// Whether the lowest solid of every cell reaches down for ever.
+    /// Whether the solid below a column reaches down for ever.
     pub fn is_bottomless(&self, index: usize) -> bool {
         self.under[index] == BOTTOMLESS
     }
+}
+
+/// The numbers of a strip.
+#[inline(always)]
+pub(super) fn strip_of<T>(numbers: &[T], strip: usize) -> &[T; STRIP] {
+    &numbers.as_chunks().0[strip]
+}
+
+/// The numbers of a strip, to change.
+#[inline(always)]
+pub(super) fn strip_mut<T>(numbers: &mut [T], strip: usize) -> &mut [T; STRIP] {
+    &mut numbers.as_chunks_mut().0[strip]
+}
+
+/// Gives a part of a list another length; what it then holds is left over from before.
+pub(super) fn resize_part<T: Copy>(list: &mut Vec<T>, part: Range<usize>, len: usize, fill: T) {
+    let (count, end) = (list.len(), part.start + len);
+    if end > part.end {
+        list.resize(count + (end - part.end), fill);
+    }
+    list.copy_within(part.end..count, end);
+    list.truncate(count - part.len() + len);
 }
 
 #[cfg(test)]

@@ -101,8 +101,8 @@ impl FlowPoint {
         (self.rate * (1.0 + self.pulse.map_or(0.0, swing))).max(0.0)
     }
 
-    /// The columns in its circle: in each cell the one that the centre lies in, or is nearest to.
-    fn columns(&self, columns: &Columns) -> Vec<u32> {
+    /// Lists the columns in its circle: in each cell the one that the centre lies in, or is nearest to.
+    pub(super) fn find_columns(&self, columns: &Columns, found: &mut Vec<u32>) {
         let grid = &columns.grid;
         let [x, y, z] = self.at;
         let reach = self.radius / grid.cell + 1.0;
@@ -112,26 +112,30 @@ impl FlowPoint {
             let [low, high] = [centre - reach, centre + reach].map(|at| at.floor().clamp(0.0, last) as usize);
             low..=high
         };
-        let mut cells: Vec<[usize; 2]> = Vec::new();
-        for row in range(1, z) {
-            for across in range(0, x) {
-                let [cx, cz] = grid.centre([across, row]);
-                if (cx - x).powi(2) + (cz - z).powi(2) <= self.radius * self.radius {
-                    cells.push([across, row]);
-                }
-            }
-        }
-        if cells.is_empty() {
-            cells.extend(grid.cell_at([x, z]));
-        }
         let off = |i: usize| {
             let [base, ceiling] =
                 [columns.bases()[i], columns.ceilings()[i]].map(|h| columns.heights.metres(h));
             (base - y).max(y - ceiling).max(0.0)
         };
         let near = self.radius.max(2.0 * grid.cell);
-        let nearest = |cell: [usize; 2]| columns.of_cell(cell).min_by(|&i, &j| off(i).total_cmp(&off(j)));
-        cells.into_iter().filter_map(nearest).filter(|&i| off(i) <= near).map(|i| i as u32).collect()
+        let nearest = |cell: [usize; 2]| {
+            let column = columns.of_cell(cell).min_by(|&i, &j| off(i).total_cmp(&off(j)));
+            column.filter(|&i| off(i) <= near).map(|i| i as u32)
+        };
+        found.clear();
+        let mut has_cells = false;
+        for row in range(1, z) {
+            for across in range(0, x) {
+                let [cx, cz] = grid.centre([across, row]);
+                if (cx - x).powi(2) + (cz - z).powi(2) <= self.radius * self.radius {
+                    has_cells = true;
+                    found.extend(nearest([across, row]));
+                }
+            }
+        }
+        if !has_cells {
+            found.extend(grid.cell_at([x, z]).and_then(nearest));
+        }
     }
 }
 
@@ -150,7 +154,8 @@ impl Flows {
         let mut placed = Vec::with_capacity(points.len());
         for (at, point) in points.iter().enumerate() {
             point.validate().map_err(|error| Error::argument(format!("{}: {error}", which(at))))?;
-            let found = point.columns(columns);
+            let mut found = Vec::new();
+            point.find_columns(columns, &mut found);
             if found.is_empty() {
                 let [x, y, z] = point.at;
                 return Err(Error::argument(format!(
@@ -162,6 +167,35 @@ impl Flows {
         }
         self.placed = placed;
         Ok(())
+    }
+
+    /// Moves a point, and finds its columns again.
+    pub(super) fn move_to(&mut self, columns: &Columns, point: usize, at: [f64; 3]) {
+        let placed = &mut self.placed[point];
+        placed.point.at = at;
+        placed.point.find_columns(columns, &mut placed.columns);
+    }
+
+    /// Gives a flow point another rate (m3/s); what it waits for and has moved stays.
+    ///
+    /// # Errors
+    /// `Argument`: there is no such point, or the rate is negative or not finite.
+    pub fn set_rate(&mut self, point: usize, rate: f64) -> Result<()> {
+        let count = self.placed.len();
+        let Some(placed) = self.placed.get_mut(point) else {
+            return Err(Error::argument(format!("there is no flow point {point} among {count}")));
+        };
+        let changed = FlowPoint { rate, ..placed.point.clone() };
+        changed.validate()?;
+        placed.point = changed;
+        Ok(())
+    }
+
+    /// Finds the columns of all points again, after the terrain has moved. A point that has none rests until it does.
+    pub(super) fn find_again(&mut self, columns: &Columns) {
+        for placed in &mut self.placed {
+            placed.point.find_columns(columns, &mut placed.columns);
+        }
     }
 
     /// Units that a flow point has moved since it was set.
@@ -197,6 +231,9 @@ impl Flows {
 impl Placed {
     /// Moves what the point asks for; returns the units moved.
     fn step(&mut self, columns: &Columns, flow: &mut Flow, volume: f64, time: f64, dt: f64) -> i64 {
+        if self.columns.is_empty() {
+            return 0;
+        }
         self.waiting += self.point.rate_at(time + 0.5 * dt) * dt / volume;
         let count = self.columns.len() as f64;
         let mut share = (self.waiting / count).floor().min(1e18) as i64;

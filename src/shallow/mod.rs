@@ -4,36 +4,28 @@
 //! place of a column from the bottom of its cell; a *pipe* joins columns of adjacent cells; a *flux* is what flows through it, a *transfer* what it moves
 //! in a step; a *unit* is the smallest difference of heights and depths, which are integers, so that liquid is neither lost nor made.
 
-pub mod active;
-pub mod bands;
 mod clock;
 pub mod columns;
 pub mod flow;
 pub mod flows;
-pub mod flux;
 pub mod grid;
-mod heads;
 mod identity;
-pub mod links;
 pub mod liquid;
 pub mod pace;
 pub mod params;
-pub mod parts;
 pub mod pipes;
-pub mod places;
-pub mod pressure;
+mod pour;
 pub mod probe;
-mod rounds;
-pub mod rows;
-pub mod scale;
+pub mod remap;
 pub mod snapshot;
+mod stacks;
 mod state;
 pub mod surface;
 pub mod system;
 pub mod terrain;
-pub mod transfer;
 
 pub use params::Params;
 pub use probe::{Reading, View};
+pub use remap::Moved;
 pub use snapshot::Snapshot;
 pub use system::{Balance, Report, Shallow};

@@ -1,6 +1,6 @@
 //! How long a step may be, and what the pipes share in it (thesis 4.3, Fig. 4.12).
 
-use super::flux::{Step, Thinning};
+use super::flow::flux::{Step, Thinning};
 use super::grid::TOP;
 use super::params::{Pace, Params, Section};
 
@@ -18,6 +18,8 @@ pub struct Measures {
     pub unit: f64,
     /// Most pipes of a column.
     pub pipes: usize,
+    /// Surface of the liquid at rest beyond the border (units), or BOTTOMLESS.
+    pub still: i32,
 }
 
 /// The longest stable step (s) with liquid of a depth (m): the largest dt with P g A' dt^2 / dx^2 <= 1/q + zeta, for P pipes a column, and
@@ -93,6 +95,8 @@ pub fn step(params: &Params, measures: &Measures, dt: f64, last: f64) -> Step {
             thinnest: (law.thinnest / params.liquid.viscosity) as f32,
             power: ((law.power - 1.0) / 2.0) as f32,
         }),
+        still: measures.still,
+        wave: (dt / cell * (-y * unit).sqrt()) as f32,
         tilt: [lean(x), lean(z)],
     }
 }

@@ -2,9 +2,9 @@
 
 use std::ops::Range;
 
-use super::active::runs;
 use super::columns::{Columns, NONE, STRIP};
 use super::flow::Flow;
+use super::flow::active::runs;
 use super::system::Shallow;
 use crate::base::cpu::dispatch;
 use crate::error::{Error, Result};

@@ -1,14 +1,16 @@
 //! The liquid of a domain, frame by frame.
 
-use super::bands::attended;
 use super::clock::Clock;
 use super::columns::Columns;
 use super::flow::Flow;
+use super::flow::bands::attended;
 use super::flows::{FlowPoint, Flows};
+use super::grid::BOTTOMLESS;
 use super::identity::Identity;
 use super::pace::{self, MOST_STEPS, Measures, Next};
 use super::params::Params;
-use super::pipes::Pipes;
+use super::pipes::{Border, Pipes};
+use super::remap::Remap;
 use super::terrain::Solids;
 use crate::base::cpu::FlushDenormals;
 use crate::context::Context;
@@ -23,8 +25,11 @@ pub struct Shallow {
     pub(super) pipes: Pipes,
     pub(super) flow: Flow,
     pub(super) flows: Flows,
+    pub(super) remap: Remap,
     /// Units poured in, less those taken out, other than by flow points.
     pub(super) poured: i64,
+    /// Surface of the liquid at rest beyond an absorbing border (units), or BOTTOMLESS.
+    pub(super) still: i32,
     /// Seconds since the start.
     pub(super) time: f64,
     /// Lengths of the last frame's steps (s).
@@ -63,6 +68,8 @@ pub struct Balance {
     pub lost: f64,
     /// Come in over an absorbing border.
     pub gained: f64,
+    /// Waiting for room, where the terrain moved.
+    pub held: f64,
     /// What is missing (units): 0.
     pub error: i64,
 }
@@ -90,7 +97,9 @@ impl Shallow {
             columns,
             identity: Identity::new(),
             flows: Flows::default(),
+            remap: Remap::default(),
             poured: 0,
+            still: BOTTOMLESS,
             time: 0.0,
             steps: Vec::with_capacity(1024),
         })
@@ -134,6 +143,11 @@ impl Shallow {
         self.flow.last
     }
 
+    /// Memory of the columns, their pipes and what flows (bytes).
+    pub fn bytes(&self) -> usize {
+        self.columns.bytes() + self.pipes.bytes() + self.flow.bytes()
+    }
+
     /// Simulated time (s).
     pub fn time(&self) -> f64 {
         self.time
@@ -161,9 +175,11 @@ impl Shallow {
         heights.length(added as f64)
     }
 
-    /// Fills all columns up to a height (m), or their ceiling; those that are fuller stay as they are.
+    /// Fills all columns up to a height (m), or their ceiling; those that are fuller stay as they are. Beyond an absorbing border liquid
+    /// stands as high.
     pub fn fill(&mut self, height: f64) {
-        let level = i64::from(self.columns.heights.round(height));
+        self.still = self.columns.heights.round(height);
+        let level = i64::from(self.still);
         for index in 0..self.columns.len() {
             if self.columns.is_column(index) {
                 let missing =
@@ -237,6 +253,7 @@ impl Shallow {
         let mut report = Report::default();
         self.steps.clear();
         self.flow.begin_frame(&self.columns);
+        self.release();
         while report.seconds < dt {
             let left = dt - report.seconds;
             let deepest = measures.unit * f64::from(self.flow.deepest());
@@ -271,6 +288,7 @@ impl Shallow {
             cell: self.columns.grid.cell,
             unit: self.columns.heights.unit,
             pipes: self.pipes.links.most,
+            still: if self.params.border == Border::Absorbing { self.still } else { BOTTOMLESS },
         }
     }
 
@@ -280,6 +298,7 @@ impl Shallow {
         let cubic = |units: i64| units as f64 * volume;
         let (flows, links, inside) = (&self.flows, &self.flow.links, self.flow.units());
         let came = self.poured + flows.sourced + links.gained;
+        let held = self.remap.held.units();
         let went = flows.drained + flows.absorbed + links.lost;
         Balance {
             inside: cubic(inside),
@@ -289,7 +308,8 @@ impl Shallow {
             absorbed: cubic(flows.absorbed),
             lost: cubic(links.lost),
             gained: cubic(links.gained),
-            error: came - went - inside,
+            held: cubic(held),
+            error: came - went - inside - held,
         }
     }
 

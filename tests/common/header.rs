@@ -25,23 +25,27 @@ pub fn functions() -> Vec<(String, String)> {
     out
 }
 
-/// Functions without a text, or that no program of tests/ctest calls.
+/// Functions without a text, or that no program of tests/ctest or tests/ctest_core calls.
 pub fn bare_functions() -> Vec<String> {
-    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/ctest");
     let mut called = BTreeSet::new();
-    for entry in fs::read_dir(folder).expect("tests/ctest").flatten() {
-        let name = entry.file_name().into_string().unwrap_or_default();
-        // A program of random calls does not show what they should do.
-        if !(name.ends_with(".c") || name.ends_with(".cpp") || name.ends_with(".h"))
-            || name.starts_with("misuse")
-        {
-            continue;
-        }
-        let text = fs::read_to_string(entry.path()).expect("a program");
-        for word in text.split(|c: char| !(c.is_alphanumeric() || c == '_')) {
-            called.insert(word.to_string());
-        }
+    for folder in ["tests/ctest", "tests/ctest_core"] {
+        add_words(&Path::new(env!("CARGO_MANIFEST_DIR")).join(folder), &mut called);
     }
     let bare = |(name, text): &(String, String)| text.trim().len() < 40 || !called.contains(name);
     functions().into_iter().filter(bare).map(|(name, _)| name).collect()
+}
+
+/// Adds the words of a folder's programs.
+fn add_words(folder: &Path, words: &mut BTreeSet<String>) {
+    for entry in fs::read_dir(folder).expect("a folder of programs").flatten() {
+        let name = entry.file_name().into_string().unwrap_or_default();
+        // A program of random calls does not show what they should do.
+        let is_program = [".c", ".cpp", ".h"].iter().any(|ending| name.ends_with(ending));
+        if !is_program || name.starts_with("misuse") {
+            continue;
+        }
+        let text = fs::read_to_string(entry.path()).expect("a program");
+        let found = text.split(|c: char| !(c.is_alphanumeric() || c == '_'));
+        words.extend(found.map(str::to_string));
+    }
 }

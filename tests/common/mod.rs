@@ -15,6 +15,7 @@ pub mod liquids;
 pub mod made_sets;
 pub mod nearest;
 pub mod repaired;
+pub mod shallow;
 pub mod shapes;
 pub mod sleigh;
 pub mod spot;

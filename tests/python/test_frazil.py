@@ -566,6 +566,166 @@ class Tracker(unittest.TestCase):
             mesh.repaired(ctx, 0)
 
 
+class Shallow(unittest.TestCase):
+    CELL = 0.005
+
+    def bowl(self, n=24):
+        middles = (np.arange(n) + 0.5 - n / 2) * self.CELL
+        return 2 * (middles[:, None] ** 2 + middles[None, :] ** 2)
+
+    def spill(self, ctx, **more):
+        half = -12 * self.CELL
+        return frazil.Shallow(ctx, self.bowl(), self.CELL, origin=(half, half), **more)
+
+    def test_liquid_flows_and_none_is_lost(self):
+        ctx = frazil.Context()
+        water = self.spill(ctx, liquid="water", pace="exact")
+        self.assertEqual(repr(water), "<frazil.Shallow on 576 columns of 24 x 24 cells>")
+        self.assertAlmostEqual(water.pour((0.02, 0, 0.01), 5e-6, radius=0.01), 5e-6, delta=1e-12)
+        for _ in range(20):
+            report = water.step(1 / 60)
+            self.assertAlmostEqual(water.last_steps.sum(), 1 / 60)
+            self.assertEqual((len(water.last_steps), report.dropped), (report.steps, 0))
+        self.assertEqual(water.balance.error, 0)
+        self.assertAlmostEqual(water.volume(), 5e-6, delta=1e-12)
+        self.assertEqual(water.volume(layer=0), water.volume())
+        self.assertLess(water.volume(low=(0, -1, -1), high=(1, 1, 1)), water.volume())
+        # Numbers of all columns, of points, and on the cells agree.
+        depth, cell = water.read("depth"), water.read("cell")
+        own = cell[:, 0] >= 0
+        self.assertAlmostEqual(depth[own].sum() * self.CELL**2, 5e-6, delta=1e-10)
+        image = water.layer("depth")
+        self.assertEqual(image.shape, (24, 24))
+        np.testing.assert_array_equal(image[cell[own, 1], cell[own, 0]], depth[own])
+        self.assertEqual(water.layer("velocity").shape, (24, 24, 2))
+        self.assertTrue(np.isnan(water.layer("depth", layer=3)).all())
+        there, off = water.probe([(0.001, 0, 0.001), (9, 0, 0)])
+        self.assertEqual(np.float32(there["depth"]), depth[there["column"]])
+        self.assertEqual(off["column"], frazil.shallow.NO_COLUMN)
+        np.testing.assert_array_equal(water.read("depth", [there["column"]]), [depth[there["column"]]])
+        water.fill(0.003)
+        self.assertAlmostEqual(water.probe([(0.001, 0, 0.001)])["height"][0], 0.003, places=8)
+        water.set_depths(np.zeros_like(depth))
+        self.assertEqual(water.volume(), 0)
+
+    def test_numpy_sees_the_librarys_memory(self):
+        ctx = frazil.Context()
+        blood = self.spill(ctx)
+        blood.pour((0, 0, 0), 3e-6, radius=0.01)
+        depth, base = blood.lent("depth"), blood.lent("base")
+        self.assertEqual((depth.dtype, base.dtype, blood.lent("flux_east").dtype), (np.int32, np.int32, np.float32))
+        np.testing.assert_allclose(depth * blood.info.unit, blood.read("depth"), rtol=1e-6)
+        np.testing.assert_allclose(blood.info.low + base * blood.info.unit, blood.read("base"), atol=1e-7)
+        before = depth.copy()
+        blood.step(1 / 60)
+        self.assertTrue((depth != before).any())
+        np.testing.assert_allclose(depth * blood.info.unit, blood.read("depth"), rtol=1e-6)
+        measure = blood.info.unit * self.CELL**2 / blood.info.last_step
+        np.testing.assert_allclose(blood.lent("flux_south") * measure, blood.read("flux_south"), rtol=1e-5)
+        with self.assertRaises(ValueError):
+            depth[0] = 7
+        # Memory that is seen does not go away, also where only a part of it is looked at.
+        part = depth[5:9]
+        del depth, base
+        for refused in (blood.close, lambda: blood.set_bodies([]), lambda: blood.update_heights(self.bowl())):
+            with self.assertRaisesRegex(ValueError, "still in use"):
+                refused()
+        expected = part.copy()
+        del blood, refused
+        gc.collect()
+        np.testing.assert_array_equal(part, expected)
+        other = self.spill(ctx)
+        part = other.lent("depth")
+        del part
+        self.assertGreater(other.set_bodies([frazil.Ball((0, 0, 0), 0.01)]).cells, 0)
+        other.close()
+
+    def test_sources_drains_and_gauze_on_a_mesh_that_moves(self):
+        ctx = frazil.Context(log=lambda text: None)
+        n = 17
+        places = np.stack(np.meshgrid(np.linspace(-0.08, 0.08, n), np.linspace(-0.08, 0.08, n)), axis=-1).reshape(-1, 2)
+        positions = np.stack([places[:, 0], 2 * (places**2).sum(axis=1), places[:, 1]], axis=1).astype(np.float32)
+        first = (np.arange(n - 1)[:, None] * n + np.arange(n - 1)[None, :]).reshape(-1)
+        triangles = np.concatenate([np.stack(corners, axis=1) for corners in
+                                    ((first, first + n, first + 1), (first + 1, first + n, first + n + 1))])
+        mesh = frazil.Mesh(ctx, positions, triangles)
+        blood = frazil.Shallow(ctx, mesh, self.CELL, low=-0.1, liquid="thinning blood")
+        self.assertEqual(blood.cells, (32, 32))
+        middle = int(np.argmin(np.abs(positions[triangles[:, 0]][:, (0, 2)]).sum(axis=1)))
+        blood.set_flows([
+            frazil.Source(None, 2e-6, radius=0.006, pulse_frequency=1, pulse_share=0.5, on=(middle, (0.5, 0.25, 0.25))),
+            frazil.Drain((0, 0, 0.01), 0.5e-6, radius=0.006), frazil.Absorber((0, 0, -0.01), 1e-6, 0.1e-6, radius=0.006)])
+        for frame in range(60):
+            moved = positions.copy()
+            moved[:, 1] += 0.002 * np.sin(frame / 10)
+            report = blood.update_terrain(moved)
+            self.assertEqual((report.cells, report.held), (32 * 32, 0))
+            blood.set_bodies([frazil.Capsule((0.02 - frame * 1e-4, 0, 0), (0.02, 0.1, 0), 0.004),
+                              frazil.Box((-0.02, 0, 0), (0.004, 0.004, 0.004))])
+            blood.step(1 / 60, budget=1)
+        self.assertAlmostEqual(blood.moved(0), 2e-6, delta=1e-9)
+        self.assertTrue(0 < blood.moved(1) <= 0.5e-6 and 0.09e-6 < blood.moved(2) <= 0.1e-6)
+        balance = blood.balance
+        self.assertEqual(balance.error, 0)
+        self.assertAlmostEqual(balance.inside, balance.sourced - balance.drained - balance.absorbed, delta=1e-15)
+
+    def test_a_state_goes_on_in_place(self):
+        ctx = frazil.Context()
+        honey = self.spill(ctx, liquid="honey")
+        honey.pour((0.02, 0, 0), 5e-6, radius=0.01)
+        state = honey.save()
+        honey.step(1 / 60)
+        steps, later = honey.last_steps, honey.save()
+        honey.restore(state)
+        self.assertEqual(honey.save(), state)
+        honey.replay(steps)
+        self.assertEqual(honey.save(), later)
+        with self.assertRaises(frazil.Error) as caught:
+            honey.restore(state[:-1])
+        self.assertEqual(str(caught.exception), "the saved state is cut short")
+
+    def test_a_surface_in_the_axes_of_the_host(self):
+        ctx, other = frazil.Context(), frazil.Context()
+        paint = self.spill(ctx, liquid="paint")
+        paint.pour((0, 0, 0), 5e-6, radius=0.02)
+        paint.step(1 / 60)
+        plain = paint.surface()
+        full = paint.surface(parts=("normals", "depths", "opacities", "velocities", "layers", "columns"))
+        np.testing.assert_array_equal(plain.positions, full.positions)
+        np.testing.assert_array_equal(plain.triangles, full.triangles)
+        self.assertIsNone(plain.normals)
+        self.assertLess(plain.triangles.max(), len(plain.positions))
+        np.testing.assert_allclose(np.linalg.norm(full.normals, axis=1), 1, atol=1e-5)
+        np.testing.assert_allclose(full.depths, paint.read("depth", full.columns), atol=1e-8)
+        cm = paint.surface(scale=100, z_up=True)
+        np.testing.assert_allclose(cm.positions[:, (0, 2)], 100 * plain.positions[:, :2], atol=1e-4)
+        np.testing.assert_allclose(cm.positions[:, 1], -100 * plain.positions[:, 2], atol=1e-4)
+        snapshot = frazil.Snapshot(ctx, paint)
+        paint.step(1 / 60)
+        seen = snapshot.surface(other)
+        np.testing.assert_array_equal(seen.positions, plain.positions)
+        snapshot.take(paint)
+        np.testing.assert_array_equal(snapshot.surface(other).positions, paint.surface().positions)
+        np.testing.assert_array_equal(snapshot.probe([(0, 0, 0)]), paint.probe([(0, 0, 0)]))
+
+    def test_parameters_are_checked(self):
+        ctx = frazil.Context()
+        blood = self.spill(ctx, kept=1.0, viscosity=3e-6)
+        blood.set_params(gravity=(1, -9.81, 0))
+        for make, text in (
+            (lambda: self.spill(ctx, viscosity=-1), "viscosity = -1"), (lambda: blood.set_params(border="open"), "border cannot change"),
+            (lambda: blood.step(0), "a frame of 0 s"), (lambda: blood.moved(0), "none of the 0"),
+        ):
+            with self.assertRaisesRegex(frazil.Error, text):
+                make()
+        with self.assertRaisesRegex(ValueError, "liquid is 'tea', not water or blood"):
+            self.spill(ctx, liquid="tea")
+        with self.assertRaisesRegex(TypeError, "no parameter colour"):
+            self.spill(ctx, colour=3)
+        with self.assertRaisesRegex(ValueError, "no array 'mass'"):
+            blood.read("mass")
+
+
 class Vectors(unittest.TestCase):
     """Grids of vectors."""
 

@@ -29,6 +29,7 @@ mod cli {
     mod points;
     mod repair;
     mod runs;
+    mod shallow;
     mod speed;
     mod tools;
     mod words;
@@ -65,6 +66,8 @@ mod scene {
     mod demo_jelly;
     mod demo_walk;
     mod fuzz;
+    mod shallow_shot;
+    mod shallow_volume;
     mod shot_folder;
     mod shot_grain_files;
     mod shot_grain_inputs;
@@ -90,7 +93,10 @@ mod snow {
 }
 mod shallow {
     mod balance;
+    mod border;
     mod flooded;
+    mod flow;
+    mod moving;
     mod probe;
     mod state;
     mod surface;

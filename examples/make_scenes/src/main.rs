@@ -12,6 +12,7 @@ mod common {
     pub mod walk;
 }
 mod drip;
+mod spills;
 
 use std::fmt::Write;
 use std::path::Path;
@@ -43,6 +44,7 @@ fn main() -> frazil::Result<()> {
     Jelly::new(0.0125, 190).write(folder)?;
     // Some 6,000 particles under 50,000 triangles.
     drip::write(folder)?;
+    spills::write(folder)?;
     for (name, text) in [
         ("hero", hero()),
         ("walker", walker()),

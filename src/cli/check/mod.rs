@@ -4,12 +4,13 @@
 mod liquid;
 #[cfg(feature = "vdb")]
 mod scene;
+mod shallow;
 
 use std::fmt::Write;
 use std::path::PathBuf;
 
-use frazil::scene::Override;
 use frazil::scene::shot::verify::{Verified, verify};
+use frazil::scene::{Override, Scene, System};
 
 use super::exit::{Failure, Phase};
 use super::output;
@@ -38,13 +39,19 @@ pub struct Args {
     json: bool,
 }
 
-#[cfg(feature = "vdb")]
 impl Args {
     /// Free bytes where the output is, or is to be.
+    #[cfg(feature = "vdb")]
     fn free_space(&self) -> Option<u64> {
         let absolute = std::path::absolute(self.output.as_deref()?).ok()?;
         let there = absolute.ancestors().find(|folder| folder.exists())?;
         super::machine::free_space(there)
+    }
+
+    /// Not known.
+    #[cfg(not(feature = "vdb"))]
+    fn free_space(&self) -> Option<u64> {
+        None
     }
 }
 
@@ -53,8 +60,12 @@ pub fn run(args: &Args, session: &Session) -> Result<(), Failure> {
     if args.scene.is_dir() {
         return check_folder(args, session);
     }
+    let scene = Scene::read_with(&args.scene, &args.set).before()?;
+    if scene.system() == System::Shallow {
+        return shallow::run(args, session, &scene);
+    }
     #[cfg(feature = "vdb")]
-    return scene::run(args, session);
+    return scene::run(args, session, scene);
     #[cfg(not(feature = "vdb"))]
     super::needs_openvdb(&args.scene).before()
 }

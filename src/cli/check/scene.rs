@@ -12,8 +12,7 @@ use crate::cli::output;
 use crate::cli::session::Session;
 
 /// Checks the scene.
-pub fn run(args: &Args, session: &Session) -> Result<(), Failure> {
-    let mut scene = Scene::read_with(&args.scene, &args.set).before()?;
+pub fn run(args: &Args, session: &Session, mut scene: Scene) -> Result<(), Failure> {
     if scene.system() == System::Surface {
         return liquid::run(args, session, &scene);
     }

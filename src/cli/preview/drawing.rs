@@ -8,11 +8,14 @@ use frazil::render::{Field, SNOW};
 use frazil::vdb::level_set;
 use frazil::{Context, Error, Result};
 
-use super::sources::Part;
+use super::sources::{Part, Wet};
 use crate::cli::exit::Failure;
 
 /// The colour of meshes (linear red, green, blue): leather, which snow is seen beside.
 const BROWN: [f32; 3] = [0.35, 0.16, 0.08];
+/// The colours of the ground below a liquid, pale stone, and of what stands or moves in it, steel.
+const STONE: [f32; 3] = [0.58, 0.54, 0.47];
+const STEEL: [f32; 3] = [0.24, 0.26, 0.29];
 /// The colour of the lines in which a cut meets meshes.
 const INK: [f32; 3] = [0.0; 3];
 
@@ -79,6 +82,21 @@ impl Look {
                         None => model,
                     });
                 }
+                Part::Liquid(detailed, wet) => {
+                    let mesh = &detailed.mesh;
+                    let numbers = self.color.as_deref().and_then(|name| detailed.of_vertices(name));
+                    has_colors |= numbers.is_some();
+                    // Without opacities it hides the ground.
+                    let alpha =
+                        detailed.of_vertices("alpha").unwrap_or_else(|| vec![1.0; mesh.positions.len()]);
+                    let alpha = alpha.iter().map(|opacity| *opacity as f32).collect();
+                    models.push(match numbers {
+                        Some(numbers) => Model::mesh(mesh, wet.colour()).coloured(&numbers),
+                        None => Model::liquid(mesh, wet.colour(), alpha),
+                    });
+                }
+                Part::Ground(mesh) => models.push(Model::mesh(&mesh, STONE)),
+                Part::Obstacle(mesh) => models.push(Model::mesh(&mesh, STEEL)),
                 Part::Points(path, points) => {
                     let cloud = Cloud::new(&points, self.color.as_deref());
                     clouds.push(cloud.map_err(|error| Error::file(path, error.to_string()))?);
@@ -146,7 +164,8 @@ fn cut(ctx: &Context, parts: Vec<Part>, plane: Plane) -> Result<Drawing> {
     let (mut cut, mut hollow) = (Cut::new(plane), None);
     for part in parts {
         match part {
-            Part::Mesh(detailed) => cut = cut.with_surface(&detailed.mesh, INK),
+            Part::Mesh(detailed) | Part::Liquid(detailed, _) => cut = cut.with_surface(&detailed.mesh, INK),
+            Part::Ground(mesh) | Part::Obstacle(mesh) => cut = cut.with_surface(&mesh, INK),
             Part::Points(path, _) => {
                 let what = format!("{}: points are left out of a cut", path.display());
                 log::info!("{what}");
@@ -165,6 +184,18 @@ fn cut(ctx: &Context, parts: Vec<Part>, plane: Plane) -> Result<Drawing> {
         log::info!("the colours of the cut go from {low}, dark blue, to {high}, pale yellow");
     }
     Ok(Drawing { content: Content::Cut(cut), has_colors: false, hollow })
+}
+
+impl Wet {
+    /// Its colour (linear red, green, blue).
+    fn colour(self) -> [f32; 3] {
+        match self {
+            Self::Water => [0.02, 0.16, 0.20],
+            Self::Blood => [0.30, 0.008, 0.006],
+            Self::Paint => [0.05, 0.20, 0.60],
+            Self::Honey => [0.70, 0.32, 0.02],
+        }
+    }
 }
 
 impl Content {

@@ -6,6 +6,7 @@ mod in_order;
 #[cfg(feature = "vdb")]
 mod shot;
 mod sources;
+mod spill;
 
 use std::path::{Path, PathBuf};
 
@@ -37,7 +38,7 @@ use sources::Sources;
 )]
 pub struct Args {
     /// .vdb (its first level set, else its fog, else its points), a mesh, a character, points (.ply), the output folder of
-    /// `frazil snow`, or, with --frame or --frames, a pattern (base.%04d.vdb).
+    /// `frazil snow`, `surface` or `shallow`, or, with --frame or --frames, a pattern (base.%04d.vdb).
     #[arg(required = true)]
     files: Vec<PathBuf>,
     /// The picture (.png); of several frames a pattern (p.%04d.png), or a .gif.

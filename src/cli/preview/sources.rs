@@ -11,6 +11,7 @@ use frazil::{Context, Error, Result, io};
 
 #[cfg(feature = "vdb")]
 use super::shot::Shot;
+use super::spill::Spill;
 #[cfg(feature = "vdb")]
 use crate::cli::vdb::model::{self, Content};
 
@@ -18,6 +19,12 @@ use crate::cli::vdb::model::{self, Content};
 pub enum Part {
     /// A mesh with what it carries.
     Mesh(DetailedMesh),
+    /// The surface of a liquid, with its opacities `alpha`, and what it is.
+    Liquid(DetailedMesh, Wet),
+    /// The ground below a liquid.
+    Ground(TriMesh),
+    /// What stands or moves in a liquid.
+    Obstacle(TriMesh),
     /// Points, and where they came from.
     Points(PathBuf, Points),
     /// A level set.
@@ -28,12 +35,34 @@ pub enum Part {
     Fog(PathBuf, FloatGrid),
 }
 
+/// A liquid that is drawn.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Wet {
+    Water,
+    Blood,
+    Paint,
+    Honey,
+}
+
+impl Wet {
+    /// That of a name; blood where it is another.
+    pub fn of(name: &str) -> Self {
+        match name {
+            "water" => Self::Water,
+            "paint" => Self::Paint,
+            "honey" => Self::Honey,
+            _ => Self::Blood,
+        }
+    }
+}
+
 /// Something to draw.
 enum Source {
     File(PathBuf),
     Sequence(Pattern),
     #[cfg(feature = "vdb")]
     Shot(Box<Shot>),
+    Spill(Box<Spill>),
 }
 
 /// Everything that is drawn.
@@ -99,10 +128,6 @@ impl Sources {
     ///
     /// # Errors
     /// A file that cannot be read; cancel.
-    #[cfg_attr(
-        not(feature = "vdb"),
-        expect(unused_variables, reason = "only shots take long to put together")
-    )]
     pub fn read(&mut self, ctx: &Context, frame: Option<f64>) -> Result<Vec<Part>> {
         let mut parts = Vec::new();
         let fps = if self.has_characters() { self.fps()? } else { FPS };
@@ -118,6 +143,10 @@ impl Sources {
                     let frame = whole(frame, shot.folder())?;
                     parts.extend(shot.read(ctx, frame)?);
                 }
+                Source::Spill(spill) => {
+                    let frame = whole(frame, spill.folder())?;
+                    parts.extend(spill.read(ctx, frame)?);
+                }
             }
         }
         Ok(parts)
@@ -127,6 +156,9 @@ impl Sources {
 impl Source {
     fn open(path: &Path) -> Result<Self> {
         if path.is_dir() {
+            if let Some(spill) = Spill::open(path)? {
+                return Ok(Self::Spill(Box::new(spill)));
+            }
             #[cfg(feature = "vdb")]
             return Ok(Self::Shot(Box::new(Shot::open(path)?)));
             #[cfg(not(feature = "vdb"))]
@@ -140,6 +172,7 @@ impl Source {
         match self {
             #[cfg(feature = "vdb")]
             Self::Shot(shot) => Some(shot.fps()),
+            Self::Spill(spill) => Some(spill.fps()),
             _ => None,
         }
     }
@@ -149,6 +182,7 @@ impl Source {
         match self {
             #[cfg(feature = "vdb")]
             Self::Shot(shot) => Some(shot.frames().to_vec()),
+            Self::Spill(spill) => Some(spill.frames().to_vec()),
             _ => None,
         }
     }
@@ -162,6 +196,7 @@ impl Source {
             }
             #[cfg(feature = "vdb")]
             Self::Shot(shot) => shot.refuse_missing(whole(frame, shot.folder())?),
+            Self::Spill(spill) => spill.refuse_missing(whole(frame, spill.folder())?),
         }
     }
 }

@@ -40,6 +40,8 @@ pub struct Clip<'a> {
 pub struct MovingMesh<'a> {
     /// Name of its prim.
     pub name: String,
+    /// What it is made of.
+    pub look: Look,
     /// Its texture coordinates.
     pub uvs: Option<&'a Uvs>,
     /// Its other arrays.
@@ -98,9 +100,9 @@ pub(super) fn write<'s>(
                 Prims::Meshes(meshes) => usd::ClipPrims::Meshes(
                     meshes
                         .iter()
-                        .map(|MovingMesh { name, uvs, primvars }| usd::MeshPrim {
+                        .map(|MovingMesh { name, look, uvs, primvars }| usd::MeshPrim {
                             name,
-                            look: Look::Object,
+                            look: *look,
                             moves: true,
                             uvs: *uvs,
                             primvars,

@@ -9,6 +9,7 @@ use crate::base::{DetailedMesh, MeshArray, TriMesh, Vec3};
 use crate::context::Context;
 use crate::error::{Error, Result};
 use crate::io::manifest::Keeps;
+use crate::io::usd_looks::Look;
 use crate::io::{mesh, usd, usd_primvars};
 use crate::scene::shot::{
     CONTENT, Clip, FrameFiles, Kind, MovingMesh, Prims, Reads, Settings, Stage, Stepped, Stepping, Stored, To,
@@ -133,7 +134,8 @@ impl Stage for Track<'_> {
         let (mesh, of_frame) = (&self.inputs.mesh, self.arrays(&[], &[], Some(0)));
         let arrays: Vec<&MeshArray> = self.carried(mesh).chain(&of_frame).collect();
         let primvars = usd_primvars::primvars(&arrays);
-        let meshes = vec![MovingMesh { name: NAME.into(), uvs: mesh.uvs.as_ref(), primvars }];
+        let uvs = mesh.uvs.as_ref();
+        let meshes = vec![MovingMesh { name: NAME.into(), look: Look::Object, uvs, primvars }];
         Some(Clip { kind: NAME, manifest: MANIFEST, prims: Prims::Meshes(meshes) })
     }
 }

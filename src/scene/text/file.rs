@@ -1,12 +1,12 @@
 //! Reads a scene file: its tables, the values of their keys, and what systems make of them.
 
-use super::key::{Fallback, Key, OBJECT, heading};
+use super::key::{Fallback, Key, heading, is_many};
 use super::keys::{self, tables};
 use super::overrides::Override;
 use super::table::{Document, Table};
 use super::values::Values;
 use crate::error::{Error, Result};
-use crate::scene::{Object, Output, Scene, Shot, Snow, Surface, System, snow};
+use crate::scene::{Object, Output, Scene, Shallow, Shot, Snow, Surface, System, snow};
 use std::path::{Path, PathBuf};
 use toml::de::DeTable;
 
@@ -75,7 +75,9 @@ impl Scene {
             shot: Shot::of(&values),
             snow: Snow::of(&values),
             surface: Surface::of(&values),
-            objects: Object::all_of(&values),
+            shallow: Shallow::of(&values),
+            // Those of a shallow liquid are obstacles of another kind.
+            objects: if system == System::Shallow { Vec::new() } else { Object::all_of(&values) },
             output: Output::of(&values),
             values,
         }
@@ -121,12 +123,16 @@ fn read_table<'d>(
     values: &mut Values,
 ) -> Result<()> {
     let keys = values.keys();
-    if name == OBJECT {
+    if is_many(name) {
         let tables = root.tables(name, &heading(name), &known(keys, name))?;
-        return tables
-            .iter()
-            .enumerate()
-            .try_for_each(|(index, table)| values.read(name, Some(index), table));
+        return tables.iter().enumerate().try_for_each(|(index, table)| {
+            values.read(name, Some(index), table)?;
+            if root.has(System::Shallow.name()) {
+                Shallow::check_each(name, index, table, values)
+            } else {
+                Ok(())
+            }
+        });
     }
     let table = match root.table(name, &heading(name), &known(keys, name))? {
         Some(table) => table,
@@ -156,6 +162,7 @@ fn check(name: &str, table: &Table, values: &Values) -> Result<()> {
         "snow.noise" => Snow::check_noise(table, values),
         "grains" => snow::check_grains(table, values),
         "mist" => snow::check_mist(table, values),
+        "shallow" => Shallow::check(table, values),
         "output" => Output::check(table, values),
         _ => Ok(()),
     }

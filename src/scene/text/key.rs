@@ -80,7 +80,7 @@ pub struct Key {
     pub kind: Kind,
     /// What is taken where it is left out.
     pub fallback: Fallback,
-    /// What is taken instead where the table's `preset` has one of these names, as a scene writes it.
+    /// What is taken instead where the table's `preset`, or `liquid`, has one of these names, as a scene writes it.
     pub presets: &'static [(&'static str, &'static str)],
     /// Its line in a scene to begin with.
     pub example: Example,
@@ -118,7 +118,7 @@ impl Key {
         Self { fallback: Fallback::Cells(cells), ..self }
     }
 
-    /// What is taken instead where the table's `preset` has one of these names.
+    /// What is taken instead where the table's `preset`, or `liquid`, has one of these names.
     pub const fn with_presets(self, presets: &'static [(&'static str, &'static str)]) -> Self {
         Self { presets, ..self }
     }
@@ -154,10 +154,17 @@ impl Key {
     }
 }
 
-/// The table of which a scene may have many.
+/// The table of objects, of which a scene may have many.
 pub const OBJECT: &str = "object";
+/// All tables of which a scene may have many.
+pub const MANY: [&str; 5] = [OBJECT, "pour", "source", "drain", "absorber"];
+
+/// Whether a scene may have many of a table.
+pub fn is_many(table: &str) -> bool {
+    MANY.contains(&table)
+}
 
 /// A table as a scene writes it: `[snow]`, `[[object]]`.
 pub fn heading(table: &str) -> String {
-    if table == OBJECT { format!("[[{table}]]") } else { format!("[{table}]") }
+    if is_many(table) { format!("[[{table}]]") } else { format!("[{table}]") }
 }

@@ -9,7 +9,7 @@ use crate::io::mesh::EXTENSIONS;
 use crate::io::seen::Seen;
 use crate::io::sequence::Pattern;
 use crate::scene::shot::{CONTENT, Settings};
-use crate::scene::{Role, Scene, System, snow, surface};
+use crate::scene::{Role, Scene, System, shallow, snow, surface};
 
 /// Farthest coordinate that a scene may name (m): f32 positions keep millimetres up to here.
 pub const FAR: f64 = 1.0e5;
@@ -33,6 +33,7 @@ const SHOT: &[Key] = &[
         ("objects", First),
         ("volumes", First),
         ("surface", First),
+        ("liquid", First),
     ]),
     Key::new("shot", "fps", Kind::Number(0.001, 100_000.0, "frames per second"), "frames per second")
         .or("24.0")
@@ -43,6 +44,7 @@ const SHOT: &[Key] = &[
             ("objects", Step),
             ("volumes", Step),
             ("surface", First),
+            ("liquid", Step),
         ]),
 ];
 
@@ -101,9 +103,12 @@ pub fn of(system: System) -> &'static [Key] {
         ordered([SHOT, OBJECTS, &own.concat()[..], OUTPUT])
     });
     static SURFACE: LazyLock<Vec<Key>> = LazyLock::new(|| ordered([SHOT, surface::KEYS, OUTPUT]));
+    static SHALLOW: LazyLock<Vec<Key>> =
+        LazyLock::new(|| ordered([SHOT, shallow::KEYS, shallow::MANY_KEYS, OUTPUT]));
     match system {
         System::Snow => &SNOW,
         System::Surface => &SURFACE,
+        System::Shallow => &SHALLOW,
     }
 }
 
@@ -135,11 +140,13 @@ pub fn settings_of(scene: &Scene, stage: &str, seen: &Seen, roles: &[Role]) -> R
         .values
         .iter()
         .filter(|(key, _, _)| key.scope(stage).is_some())
-        .filter(|(key, object, _)| match object.map(|index| scene.objects[index].role) {
-            None => true,
-            Some(role) if !roles.contains(&role) => false,
-            Some(Role::Static) => key.name == "role" || key.scope(stage) == Some(Object),
-            Some(_) => true,
+        .filter(|(key, object, _)| {
+            match object.and_then(|index| scene.objects.get(index)).map(|object| object.role) {
+                None => true,
+                Some(role) if !roles.contains(&role) => false,
+                Some(Role::Static) => key.name == "role" || key.scope(stage) == Some(Object),
+                Some(_) => true,
+            }
         })
         .map(|(key, object, value)| (super::values::path(key, object), value.to_string()))
         .collect();
@@ -163,10 +170,14 @@ pub fn settings_of(scene: &Scene, stage: &str, seen: &Seen, roles: &[Role]) -> R
 }
 
 /// Those of a stage's settings that make its first state.
-#[cfg(feature = "vdb")]
 pub fn first_of(system: System, settings: &Settings, stage: &str) -> Settings {
-    let firsts = of(system).iter().filter(|key| key.scope(stage) == Some(First));
-    let firsts: Vec<String> = firsts.map(|key| super::values::path(key, None)).collect();
-    let own = settings.iter().filter(|(key, _)| firsts.contains(key));
-    own.map(|(key, value)| (key.clone(), value.clone())).collect()
+    let is_first = |path: &str| {
+        let (table, name) = path.rsplit_once('.').unwrap_or_default();
+        // Of one of many tables: `object[1]`.
+        let table = table.split('[').next().unwrap_or(table);
+        let declared = of(system).iter().find(|key| key.table == table && key.name == name);
+        declared.is_some_and(|key| key.scope(stage) == Some(First))
+    };
+    let own = settings.iter().filter(|(path, _)| is_first(path));
+    own.map(|(path, value)| (path.clone(), value.clone())).collect()
 }

@@ -1,6 +1,6 @@
 //! Writes a scene with every default filled in and commented: the file beside the output that reproduces it.
 
-use super::key::{Key, OBJECT, heading};
+use super::key::{Key, heading, is_many};
 use super::keys::tables;
 use super::values::{Value, pose};
 use crate::scene::Scene;
@@ -17,9 +17,11 @@ impl Scene {
             self.system.name()
         );
         for table in tables(self.values.keys()) {
-            let objects =
-                if table == OBJECT { (0..self.objects.len()).map(Some).collect() } else { vec![None] };
-            objects.into_iter().for_each(|object| self.write_table(&mut out, table, object));
+            let indices = match is_many(table) {
+                true => (0..self.values.count(table)).map(Some).collect(),
+                false => vec![None],
+            };
+            indices.into_iter().for_each(|index| self.write_table(&mut out, table, index));
         }
         out
     }

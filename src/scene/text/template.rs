@@ -1,6 +1,6 @@
 //! What is said of all keys: a scene to begin with, and a table of them.
 
-use super::key::{Example, Fallback, Key, Kind, OBJECT, heading};
+use super::key::{Example, Fallback, Key, Kind, heading, is_many};
 use super::keys::{self, tables};
 use super::resolved::line;
 use super::table::with_value;
@@ -30,7 +30,7 @@ pub(super) fn template_of(system: System, keys: &[Key]) -> String {
         let keys_of = || keys.iter().filter(|key| key.table == table);
         let is_needed = keys_of().any(|key| matches!(key.example, Example::Needed(_)));
         let many = match table {
-            OBJECT => "  # as many as there are",
+            _ if is_many(table) => "  # as many as there are",
             _ if keys::OPTIONAL.contains(&table) => "  # only with this line are there any",
             _ => "",
         };
@@ -79,7 +79,7 @@ fn cells(key: &Key) -> String {
 pub(super) fn reference_of(keys: &[Key]) -> String {
     let mut out = String::new();
     for table in tables(keys) {
-        let many = if table == OBJECT { ", as many as there are" } else { "" };
+        let many = if is_many(table) { ", as many as there are" } else { "" };
         let _ = write!(out, "\n`{}`{many}\n\n", heading(table));
         out.push_str("| key | holds | default | meaning |\n|---|---|---|---|\n");
         for key in keys.iter().filter(|key| key.table == table) {

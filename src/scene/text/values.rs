@@ -37,11 +37,12 @@ pub enum Value {
     Poses(Vec<KeyPose>),
 }
 
-/// The values of a scene's keys: those of the tables that it has, and of each object. A key that has none is not there.
+/// The values of a scene's keys: those of the tables that it has, and of each object, and whatever else it may have many of. A key that
+/// has none is not there.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Values {
     keys: &'static [Key],
-    /// By the key's place in `keys` and the object's index.
+    /// By the key's place in `keys` and the index of its table, where there may be many.
     values: BTreeMap<(Option<usize>, usize), Value>,
 }
 
@@ -64,7 +65,7 @@ impl Values {
         self.keys
     }
 
-    /// Reads the keys of a table, of an object its index: with their defaults, also where the table is not there.
+    /// Reads the keys of a table, of an object (or another of many) its index: with their defaults, also where the table is not there.
     ///
     /// # Errors
     /// A key that is missing, a wrong type or a value outside its range, with file and line.
@@ -89,7 +90,8 @@ impl Values {
 
     /// A key's value in the preset that its table names.
     fn preset(&self, key: &Key) -> Option<&'static str> {
-        let chosen = self.of(None, key.table, "preset")?.text()?;
+        let chosen =
+            ["preset", "liquid"].into_iter().find_map(|name| self.of(None, key.table, name))?.text()?;
         key.presets.iter().find(|(name, _)| *name == chosen).map(|(_, value)| *value)
     }
 
@@ -111,7 +113,18 @@ impl Values {
 
     /// An object's value.
     pub fn of_object(&self, index: usize, name: &str) -> Option<&Value> {
-        self.of(Some(index), super::key::OBJECT, name)
+        self.of_many(super::key::OBJECT, index, name)
+    }
+
+    /// A value of one of many tables: `source`, the first of which has the index 0.
+    pub fn of_many(&self, table: &str, index: usize, name: &str) -> Option<&Value> {
+        self.of(Some(index), table, name)
+    }
+
+    /// How many tables of a name there are, of which there may be many.
+    pub fn count(&self, table: &str) -> usize {
+        let indices = self.iter().filter(|(key, _, _)| key.table == table).filter_map(|(_, index, _)| index);
+        indices.max().map_or(0, |last| last + 1)
     }
 
     /// A number by its key.

@@ -71,8 +71,9 @@ impl Normals {
     /// Makes room for columns.
     pub fn reset(&mut self, columns: &Columns) {
         if self.normals.len() != columns.len() {
-            self.normals = vec![[0.0; 3]; columns.len()];
-            self.known = vec![0; columns.len() / STRIP];
+            self.normals.resize(columns.len(), [0.0; 3]);
+            self.known.clear();
+            self.known.resize(columns.len() / STRIP, 0);
         }
     }
 

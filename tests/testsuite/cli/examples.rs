@@ -10,6 +10,7 @@ use crate::program::{CUBE, GRAINS};
 
 const README: &str = include_str!("../../../README.md");
 const CLI: &str = include_str!("../../../docs/cli.md");
+const SCENE: &str = include_str!("../../../docs/scene.md");
 
 /// Runs a line `frazil ...` in a folder and gives what it says on stdout.
 #[track_caller]
@@ -86,13 +87,18 @@ fn the_readme_takes_a_character_through_snow() {
 fn the_example_scenes_are_sound() {
     let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("examples/scenes");
     let paths: Vec<_> = fs::read_dir(folder).unwrap().map(|entry| entry.unwrap().path()).collect();
-    assert_eq!(paths.len(), 10);
+    assert_eq!(paths.len(), 14);
     for path in paths {
         let name = path.file_stem().unwrap().to_string_lossy().into_owned();
-        assert!(README.contains(&name), "the README does not name {name}");
         let scene = frazil::scene::Scene::read(&path).unwrap();
-        // The command in the comment is the one that the README gives, with this scene's file.
         let text = fs::read_to_string(&path).unwrap();
+        if scene.system() == frazil::scene::System::Shallow {
+            let command = format!("frazil shallow examples/scenes/{name}.toml -o spill/");
+            assert!(text.contains(&command) && SCENE.contains(&format!("{name}.toml")), "{name}");
+            continue;
+        }
+        assert!(README.contains(&name), "the README does not name {name}");
+        // The command in the comment is the one that the README gives, with this scene's file.
         let file = scene.objects()[0].file.file_name().unwrap().to_string_lossy().into_owned();
         let command = format!("frazil snow examples/scenes/{name}.toml --set object.1.file={file} -o cache/");
         assert!(text.contains(&command), "{text}");
@@ -225,6 +231,9 @@ fn every_command_has_help_with_an_example_that_runs() {
     write_cache(folder, "spot", &ball(4.0, 8, 0.0), 3);
     let shot = "[shot]\nframes = \"1-3\"\n[surface]\nparticles = \"spot.%04d.bgeo\"\nmesh = \"spot.ply\"\n";
     fs::write(folder.join("spot.toml"), shot).unwrap();
+    let spill = "[shot]\nframes = \"1-3\"\n[shallow]\nterrain = \"box.obj\"\ncell = 0.02\n\
+                 [[pour]]\nat = [0, 1, 0]\nradius = 0.1\nvolume_ml = 100\n";
+    fs::write(folder.join("spill.toml"), spill).unwrap();
     let mut commands = vec!["frazil".to_string()];
     commands.extend(commands_of(folder, "frazil"));
     for group in ["frazil vdb", "frazil mesh"] {
@@ -246,13 +255,11 @@ fn every_command_has_help_with_an_example_that_runs() {
 #[test]
 fn the_docs_have_every_key_of_a_scene() {
     let folder = tempfile::tempdir().unwrap();
-    let keys = works(folder.path(), "frazil new snow --keys");
-    let text = include_str!("../../../docs/scene.md");
-    assert_eq!(
-        text.split("## Keys\n\n").nth(1),
-        Some(&keys[..]),
-        "docs/scene.md is not what `frazil new snow --keys` says"
-    );
+    let (snow, shallow) = SCENE.split_once("\n## Keys of a little liquid\n\n").unwrap();
+    for (text, system) in [(snow.split("## Keys\n\n").nth(1).unwrap(), "snow"), (shallow, "shallow")] {
+        let keys = works(folder.path(), &format!("frazil new {system} --keys"));
+        assert!(text == keys, "docs/scene.md is not what `frazil new {system} --keys` says:\n{keys}");
+    }
 }
 
 #[test]

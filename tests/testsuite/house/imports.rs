@@ -26,7 +26,7 @@ const UNSAFE: [&str; 9] = [
     "src/base/cpu.rs",
     "src/base/lanes.rs",
     "src/context/pool.rs",
-    "src/shallow/transfer.rs",
+    "src/shallow/flow/transfer.rs",
     "src/snow/grains/collide.rs",
     "src/snow/grains/layout.rs",
     "src/snow/grains/rows.rs",

@@ -1,0 +1,113 @@
+//! Gates of shallow's determinism: the same liquid however the scene lies, whatever does the work, and when a run is played again.
+
+use frazil::base::cpu::cpu_level;
+use frazil::shallow::Shallow;
+use frazil::{Context, Pool};
+
+use crate::common::bodies::Dice;
+use crate::common::shallow::{Plan, Turn, busy, context, hash, turnable};
+use crate::harness::Harness;
+
+/// Random scenes that are turned.
+const SCENES: u64 = 60;
+/// Frames of each.
+const FRAMES: u64 = 30;
+
+/// All of them.
+pub fn run(h: &mut Harness) {
+    if h.wants("shallow.same_rotated") {
+        let (is_same, note) = turned(&Turn::TURNS);
+        h.holds("shallow.same_rotated", is_same, &format!("by 90, 180 and 270 degrees; {note}"));
+    }
+    if h.wants("shallow.same_mirrored") {
+        let (is_same, note) = turned(&Turn::MIRRORS);
+        h.holds("shallow.same_mirrored", is_same, &format!("along x, along z, over both diagonals; {note}"));
+    }
+    if h.wants("shallow.same_replay") {
+        let differ = (0..SCENES).filter(|&seed| !replays(seed)).count();
+        h.holds("shallow.same_replay", differ == 0, &format!("{SCENES} scenes, {differ} differ"));
+    }
+    if h.wants("shallow.same_threads") {
+        let hashes = [0, 1, 2].map(|threads| all(&Context::new(Pool::new(threads).expect("threads"))));
+        h.holds("shallow.same_threads", hashes.iter().all(|hash| *hash == hashes[0]), "0, 1 and 2 threads");
+    }
+    if h.wants("shallow.same_cpu") {
+        let hashes = ["baseline", "avx2", "avx512"].map(hash_at);
+        let is_same = hashes.iter().all(|hash| hash.len() == 17 && *hash == hashes[0]);
+        let note = format!("FRAZIL_CPU baseline, avx2, avx512; this one has {:?}", cpu_level());
+        h.holds("shallow.same_cpu", is_same, &note);
+    }
+}
+
+/// Whether scenes that are turned do the same, cell by cell, layer by layer, in each frame.
+fn turned(turns: &[Turn]) -> (bool, String) {
+    let ctx = context();
+    let (mut links, mut emptied, mut filled, mut differ) = (0, 0, 0, 0);
+    for seed in 0..SCENES {
+        let plan = turnable(seed);
+        links += plan.links();
+        let mut liquids: Vec<Shallow> =
+            [Turn::NONE].iter().chain(turns).map(|turn| plan.make(&ctx, *turn)).collect();
+        let mut is_same = true;
+        for frame in 0..FRAMES {
+            // Columns run dry and get wet again: strips fall asleep, which lie otherwise when the scene is turned.
+            let mut dice = Dice(seed << 32 | frame);
+            let corners = [(); 2].map(|()| plan.size.map(|count| dice.below(count)));
+            let depth = [-1.0, -1.0, 1e-4, 0.0][dice.below(4)];
+            for (liquid, turn) in liquids.iter_mut().zip([Turn::NONE].iter().chain(turns)) {
+                plan.pour(liquid, *turn, corners, depth);
+                let report = liquid.step(&ctx, 1.0 / 60.0).expect("a frame");
+                emptied += report.emptied;
+                filled += report.filled;
+            }
+            let first = plan.depths_of(&liquids[0], Turn::NONE);
+            is_same &=
+                liquids[1..].iter().zip(turns).all(|(liquid, turn)| plan.depths_of(liquid, *turn) == first);
+        }
+        differ += u32::from(!is_same);
+    }
+    let note = format!(
+        "{SCENES} scenes, {differ} differ; {links} links, rows scaled by K_min {emptied}, by K_max {filled}"
+    );
+    (differ == 0 && links > 0 && emptied > 0 && filled > 0, note)
+}
+
+/// Whether a run's steps make the same frames again.
+fn replays(seed: u64) -> bool {
+    let ctx = context();
+    let plan = turnable(seed);
+    let (mut run, mut again) = (plan.make(&ctx, Turn::NONE), plan.make(&ctx, Turn::NONE));
+    (0..FRAMES).all(|_| {
+        run.step(&ctx, 1.0 / 60.0).expect("a frame");
+        again.replay(&ctx, run.last_steps()).expect("a frame");
+        hash(&run) == hash(&again) && run.time() == again.time()
+    })
+}
+
+/// A hash of what scenes have become, one of them wide enough for more than one thread.
+fn all(ctx: &Context) -> u64 {
+    let one = |plan: &Plan| {
+        let mut liquid = plan.make(ctx, Turn::NONE);
+        for _ in 0..FRAMES {
+            liquid.step(ctx, 1.0 / 60.0).expect("a frame");
+        }
+        hash(&liquid)
+    };
+    let small = (0..SCENES).map(|seed| one(&turnable(seed)));
+    small.fold(one(&busy([517, 403])), |all, hash| all.rotate_left(1) ^ hash)
+}
+
+/// Argument of a run that only prints the hash of shallow's scenes.
+pub const HASH: &str = "hash-of-shallow";
+
+/// Such a run.
+pub fn print_hash() {
+    println!("{:016x}", all(&context()));
+}
+
+/// The hash that a process with one set of instructions prints.
+fn hash_at(level: &str) -> Vec<u8> {
+    let program = std::env::current_exe().expect("this program's path");
+    let output = std::process::Command::new(program).arg(HASH).env("FRAZIL_CPU", level).output();
+    output.expect("a process for shallow's scenes").stdout
+}

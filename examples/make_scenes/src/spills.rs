@@ -1,0 +1,88 @@
+//! The terrains of the scenes with a little liquid: an incline, shelves above each other, a bowl.
+
+use std::path::Path;
+
+use frazil::base::{TriMesh, Vec3};
+use frazil::io::mesh;
+
+/// Writes them.
+pub fn write(folder: &Path) -> frazil::Result<()> {
+    mesh::write(&folder.join("incline.obj"), &incline())?;
+    mesh::write(&folder.join("shelves.obj"), &shelves())?;
+    mesh::write(&folder.join("bowl.obj"), &bowl())
+}
+
+/// A sheet over a square around the origin, of an edge (m), of so many points along each.
+fn sheet(edge: f32, points: u32, height: impl Fn(f32, f32) -> f32) -> TriMesh {
+    let place = |index: u32| {
+        let [x, z] =
+            [index % points, index / points].map(|at| edge * (at as f32 / (points - 1) as f32 - 0.5));
+        Vec3::new(x, height(x, z), z)
+    };
+    let is_square = |index: &u32| index % points + 1 < points && index / points + 1 < points;
+    let square = |index: u32| {
+        let [a, b, c, d] = [index, index + points, index + points + 1, index + 1];
+        [[a, b, c], [a, c, d]]
+    };
+    let triangles = (0..points * points).filter(is_square).flat_map(square).collect();
+    TriMesh { positions: (0..points * points).map(place).collect(), triangles }
+}
+
+/// 10 x 10 cm that fall by 35 % along x, with low bumps that part the liquid.
+fn incline() -> TriMesh {
+    let sine = |phase: f32| libm::sinf(phase);
+    sheet(0.1, 201, |x, z| {
+        let bumps = sine(150.0 * x + 1.0) * sine(170.0 * z) + 0.6 * sine(310.0 * z + 90.0 * x);
+        -0.35 * x + 0.0006 * bumps
+    })
+}
+
+/// 6.4 cm wide, 2 cm deep, with a rim.
+fn bowl() -> TriMesh {
+    sheet(0.08, 161, |x, z| {
+        let from_middle = (x * x + z * z).sqrt();
+        let inside = 20.0 * from_middle * from_middle;
+        // Outside it falls a little.
+        inside.min(0.0205 - 0.15 * (from_middle - 0.032))
+    })
+}
+
+/// A basin of 10 x 10 cm, above it a platform with a hole and a rim, above that a smaller one.
+fn shelves() -> TriMesh {
+    let mut mesh = TriMesh::default();
+    let mut put = |low: [f32; 3], high: [f32; 3]| mesh.append(&TriMesh::cuboid(low, high));
+    // The basin, and its walls.
+    put([-0.05, 0.0, -0.05], [0.05, 0.004, 0.05]);
+    for [x0, x1, z0, z1] in walls(0.05, 0.003) {
+        put([x0, 0.0, z0], [x1, 0.012, z1]);
+    }
+    // The platform around its hole, whose corners are pillars' heads, and its rim.
+    let (outer, hole) = (0.032, 0.011);
+    for [x0, x1, z0, z1] in walls(outer, outer - hole) {
+        put([x0, 0.020, z0], [x1, 0.023, z1]);
+    }
+    for [x0, x1, z0, z1] in walls(outer, 0.002) {
+        put([x0, 0.020, z0], [x1, 0.026, z1]);
+    }
+    // It tilts nowhere: liquid falls through the hole, or over the rim where that is cut.
+    for x in [-0.028, 0.028] {
+        for z in [-0.028, 0.028] {
+            put([x - 0.002, 0.0, z - 0.002], [x + 0.002, 0.0225, z + 0.002]);
+        }
+    }
+    // The smallest, without a rim, beside the hole.
+    put([-0.026, 0.038, -0.010], [0.004, 0.041, 0.010]);
+    put([-0.022, 0.020, -0.002], [-0.018, 0.040, 0.002]);
+    mesh
+}
+
+/// Four boxes, seen from above, that make a wall of a thickness along the inside of a square: x0, x1, z0, z1.
+fn walls(half: f32, thick: f32) -> [[f32; 4]; 4] {
+    let inner = half - thick;
+    [
+        [-half, half, -half, -inner],
+        [-half, half, inner, half],
+        [-half, -inner, -inner, inner],
+        [inner, half, -inner, inner],
+    ]
+}

@@ -1,0 +1,416 @@
+"""Small amounts of liquid on a ground, in real time."""
+
+import ctypes as c
+import weakref
+from typing import NamedTuple, Optional, Sequence
+
+import numpy as np
+
+from ._library import (Handle, ShallowBalance, ShallowBody, ShallowDomain, ShallowFlow, ShallowInfo, ShallowLayout,
+                       ShallowMoved, ShallowParams, ShallowReport, ShallowSize, ShallowTarget, Span, View, call,
+                       made, rows, saved, span, view)
+from .grid import Grid
+from .mesh import Mesh
+
+LIQUIDS = {"water": 0, "blood": 1, "paint": 2, "honey": 3, "thinning blood": 4}
+PACES = {"realtime": 0, "exact": 1}
+BORDERS = {"closed": 0, "open": 1, "absorbing": 2}
+SECTIONS = {"wetted": 0, "whole": 1}
+# Arrays of columns: the number in the header, the type, and how many of it a column has.
+ARRAYS = {
+    "depth": (0, np.float32, 1), "base": (1, np.float32, 1), "ceiling": (2, np.float32, 1), "cell": (3, np.int32, 2),
+    "layer": (4, np.uint32, 1), "flux_east": (5, np.float32, 1), "flux_south": (6, np.float32, 1),
+    "velocity": (7, np.float32, 2),
+}
+# Arrays that are lent.
+LENT = {
+    "depth": (0, c.c_int32), "base": (1, c.c_int32), "ceiling": (2, c.c_int32), "flux_east": (3, c.c_float),
+    "flux_south": (4, c.c_float),
+}
+ALL_LAYERS = NO_COLUMN = 0xffffffff
+# What Shallow.probe answers for each point.
+SAMPLE = np.dtype([("height", "f8"), ("depth", "f8"), ("velocity", "f4", 2), ("surface_velocity", "f4", 2), ("column", "u4"),
+                   ("layer", "u4")])
+# Parts of a surface that are written on demand: the type, and how many of it a vertex has.
+PARTS = {
+    "normals": (np.float32, 3), "depths": (np.float32, 1), "opacities": (np.float32, 1), "velocities": (np.float32, 3),
+    "layers": (np.uint32, 1), "columns": (np.uint32, 1),
+}
+
+
+class Source(NamedTuple):
+    """Liquid comes in: rate (m3/s; 1 ml/s is 1e-6) around a place (m), which swings by pulse_share of itself pulse_frequency times a
+    second. In the place of at: on = (triangle, shares), a triangle of the mesh and the shares of its corners, with which it moves."""
+
+    at: Optional[Sequence[float]]
+    rate: float
+    radius: float = 0.0
+    pulse_frequency: float = 0.0
+    pulse_share: float = 0.0
+    on: Optional[tuple] = None
+
+
+class Drain(NamedTuple):
+    """Liquid goes out, as long as there is some: suction. As Source."""
+
+    at: Optional[Sequence[float]]
+    rate: float
+    radius: float = 0.0
+    pulse_frequency: float = 0.0
+    pulse_share: float = 0.0
+    on: Optional[tuple] = None
+
+
+class Absorber(NamedTuple):
+    """Gauze: a Drain, until it has taken its capacity (m3)."""
+
+    at: Optional[Sequence[float]]
+    rate: float
+    capacity: float
+    radius: float = 0.0
+    on: Optional[tuple] = None
+
+
+class Ball(NamedTuple):
+    """A solid that moves (m)."""
+
+    at: Sequence[float]
+    radius: float
+
+
+class Capsule(NamedTuple):
+    """A ball on its way from one place to another (m)."""
+
+    at: Sequence[float]
+    end: Sequence[float]
+    radius: float
+
+
+class Box(NamedTuple):
+    """A box with its middle at a place (m), half of its lengths, and the unit vectors along them."""
+
+    at: Sequence[float]
+    half: Sequence[float]
+    axes: Sequence[Sequence[float]] = ((1, 0, 0), (0, 1, 0), (0, 0, 1))
+
+
+class Surface(NamedTuple):
+    """The surface of a liquid: positions (n, 3), triangles (t, 3) that face up; the others where they were asked for."""
+
+    positions: np.ndarray
+    triangles: np.ndarray
+    normals: Optional[np.ndarray] = None
+    depths: Optional[np.ndarray] = None
+    opacities: Optional[np.ndarray] = None
+    velocities: Optional[np.ndarray] = None
+    layers: Optional[np.ndarray] = None
+    columns: Optional[np.ndarray] = None
+
+
+def _number(kind, name, known):
+    if name not in known:
+        raise ValueError(f"{kind} is {name!r}, not {' or '.join(known)}")
+    return known[name]
+
+
+def _flow(flow):
+    kind = {Source: 0, Drain: 1, Absorber: 2}[type(flow)]
+    triangle, shares = flow.on or (0, (0.0, 0.0, 0.0))
+    return ShallowFlow(
+        c.sizeof(ShallowFlow), int(flow.on is not None), kind, triangle, (c.c_double * 3)(*shares),
+        (c.c_double * 3)(*(flow.at or (0.0, 0.0, 0.0))), flow.radius, flow.rate, getattr(flow, "capacity", 0.0),
+        getattr(flow, "pulse_frequency", 0.0), getattr(flow, "pulse_share", 0.0),
+    )
+
+
+def _body(body):
+    out = ShallowBody(c.sizeof(ShallowBody), {Ball: 0, Capsule: 1, Box: 2}[type(body)], (c.c_double * 3)(*body.at))
+    if isinstance(body, Box):
+        out.half, out.axes = (c.c_double * 3)(*body.half), (c.c_double * 9)(*np.ravel(body.axes))
+    else:
+        out.radius = body.radius
+    if isinstance(body, Capsule):
+        out.end = (c.c_double * 3)(*body.end)
+    return out
+
+
+def _surface(name, ctx, pointer, parts, z_up, left_handed, scale, least_depth, opaque_depth):
+    """The surface of a liquid or a snapshot."""
+    unknown = [part for part in parts if part not in PARTS]
+    if unknown:
+        raise ValueError(f"surfaces have no {unknown[0]!r}, but {', '.join(PARTS)}")
+    layout, size = ShallowLayout(), ShallowSize(c.sizeof(ShallowSize))
+    call("shallow_layout_init", c.byref(layout), c.sizeof(layout))
+    layout.flags, layout.scale, layout.least_depth = int(z_up) | 2 * int(left_handed), scale, least_depth
+    layout.opaque_depth = opaque_depth
+    target = ShallowTarget(c.sizeof(ShallowTarget), 32)
+    start = ctx.pointer, pointer, c.byref(layout), c.byref(target)
+    call(name, *start, c.byref(size))
+    arrays = {part: np.empty((size.vertices, PARTS[part][1]), PARTS[part][0]) for part in parts}
+    arrays["positions"], triangles = np.empty((size.vertices, 3), np.float32), np.empty((size.indices // 3, 3), np.uint32)
+    for part, array in arrays.items():
+        setattr(target, part, span(array))
+    target.indices = Span(span(triangles).data, size.indices, 0)
+    call(name, *start, None)
+    flat = {part: array if array.shape[1] > 1 else array[:, 0] for part, array in arrays.items()}
+    return Surface(flat.pop("positions"), triangles, **flat)
+
+
+def _probe(name, pointer, points):
+    points = rows(points, np.float64, 3)
+    out = np.empty(len(points), SAMPLE)
+    call(name, pointer, view(points), span(out))
+    return out
+
+
+class Shallow(Handle):
+    """A small amount of liquid on a ground.
+
+    ground: a frazil.Mesh; heights (nz, nx) of the middles of cells (m), rows along x; or a frazil.Grid of distances, which must have all
+    of origin, cells, low and high.
+    cell: edge of a cell (m).
+    origin: the corner with the least x and z (m); of a mesh that of its box, else (0, 0).
+    cells: how many along x and z; those that cover the mesh.
+    low, high: range of heights (m); that of the ground, and above it as much again, at least 16 cells.
+    liquid: "water", "blood", "paint", "honey" or "thinning blood".
+    pace: "realtime" or "exact". border: "closed", "open" or "absorbing". section: "wetted" or "whole".
+    Further parameters, as in frz_shallow_params: viscosity, thinnest, thinning_time, thinning_power, gravity, kept, longest_step.
+    """
+
+    _destroy = "frz_shallow_destroy"
+
+    def __init__(self, ctx, ground, cell, origin=None, cells=None, low=None, high=None, **more):
+        params = self._params(**more)
+        heights = None if isinstance(ground, (Mesh, Grid)) else np.ascontiguousarray(ground, np.float32)
+        if heights is not None:
+            if heights.ndim != 2:
+                raise ValueError(f"heights of shape (nz, nx) are needed, not {heights.shape}")
+            corners = (0.0, float(heights.min(initial=np.inf)), 0.0), (0.0, float(heights.max(initial=-np.inf)), 0.0)
+            cells = heights.shape[::-1]
+        elif isinstance(ground, Mesh):
+            corners = ground.info.box_min, ground.info.box_max
+        elif None in (origin, cells, low, high):
+            raise ValueError("origin, cells, low and high are needed for a level set")
+        if origin is None:
+            origin = corners[0][0], corners[0][2]
+        if cells is None:
+            cells = [max(int(np.ceil((corners[1][axis] - origin[axis // 2]) / cell - 1e-6)), 1) for axis in (0, 2)]
+        if low is None:
+            low = corners[0][1]
+        if high is None:
+            high = corners[1][1] + max(corners[1][1] - low, 16 * cell)
+        domain = ShallowDomain(c.sizeof(ShallowDomain), 0, cell, (c.c_double * 2)(*origin), (c.c_uint32 * 2)(*cells), low, high)
+        start = ctx.pointer, c.byref(params), c.byref(domain)
+        if heights is not None:
+            pointer = made("shallow_create_heights", *start, View(heights.ctypes.data, heights.size, 0))
+        else:
+            name = "shallow_create" if isinstance(ground, Mesh) else "shallow_create_grid"
+            pointer = made(name, *start, ground.pointer)
+        super().__init__(pointer)
+        self._ctx, self._more, self._lent = ctx, more, []
+        self.cells, self.origin = tuple(cells), tuple(origin)
+
+    @staticmethod
+    def _params(liquid="blood", pace="realtime", border="closed", section="wetted", **more):
+        params = ShallowParams()
+        call("shallow_params_init", c.byref(params), c.sizeof(params))
+        call("shallow_params_liquid", c.byref(params), _number("liquid", liquid, LIQUIDS))
+        params.pace, params.border = _number("pace", pace, PACES), _number("border", border, BORDERS)
+        params.section = _number("section", section, SECTIONS)
+        for name, value in more.items():
+            if name in ("struct_size", "flags", "reserved") or name not in dict(ShallowParams._fields_):
+                raise TypeError(f"shallow liquids have no parameter {name}")
+            setattr(params, name, (c.c_double * 3)(*value) if name == "gravity" else value)
+        return params
+
+    def _words(self):
+        return f"on {self.info.column_count} columns of {self.cells[0]} x {self.cells[1]} cells"
+
+    def _keep(self):
+        """Refuses what would take memory away below an array that NumPy still sees."""
+        self._lent = [lent for lent in self._lent if lent() is not None]
+        if self._lent:
+            raise ValueError("arrays that lent() gave are still in use: copy what you keep, and delete them first")
+
+    def close(self):
+        """Gives the memory back now; closing twice is fine. Not while an array that lent() gave is in use."""
+        if getattr(self, "_lent", None):
+            self._keep()
+        super().close()
+
+    def set_params(self, **more):
+        """What flows, and how, from the next frame on; what is not given stays as it was last given. The border stays."""
+        more = self._more | more
+        params = self._params(**more)
+        call("shallow_set_params", self.pointer, c.byref(params))
+        self._more = more
+
+    def step(self, dt, budget=0.0):
+        """A frame of dt seconds, within a budget of CPU time (s; 0: none); the report, as frz_shallow_report has it."""
+        report = ShallowReport(c.sizeof(ShallowReport))
+        call("shallow_step", self._ctx.pointer, self.pointer, dt, budget, c.byref(report))
+        return report
+
+    def replay(self, steps):
+        """A frame of given steps (s), as last_steps has listed them; the report."""
+        report, steps = ShallowReport(c.sizeof(ShallowReport)), np.ascontiguousarray(steps, np.float64)
+        call("shallow_replay", self._ctx.pointer, self.pointer, view(steps), c.byref(report))
+        return report
+
+    @property
+    def last_steps(self):
+        """Lengths of the last frame's steps (s)."""
+        count = c.c_size_t()
+        call("shallow_last_steps", self.pointer, Span(None, 0, 0), c.byref(count))
+        out = np.empty(count.value)
+        if count.value:
+            call("shallow_last_steps", self.pointer, span(out), c.byref(count))
+        return out
+
+    def set_flows(self, flows):
+        """Sets Sources, Drains and Absorbers, in place of those before."""
+        array = (ShallowFlow * max(len(flows), 1))(*(_flow(flow) for flow in flows))
+        call("shallow_set_flows", self.pointer, array, len(flows))
+
+    def moved(self, flow):
+        """How much a flow point has moved since it was set (m3)."""
+        out = c.c_double()
+        call("shallow_flow_moved", self.pointer, flow, c.byref(out))
+        return out.value
+
+    def pour(self, at, volume, radius=0.0):
+        """Pours a volume (m3; negative: takes it) around a place (m); what came in."""
+        out = c.c_double()
+        call("shallow_pour", self.pointer, (c.c_double * 3)(*at), radius, volume, c.byref(out))
+        return out.value
+
+    def fill(self, height):
+        """Fills all columns up to a height (m), or their ceiling."""
+        call("shallow_fill", self.pointer, height)
+
+    def set_depths(self, depths):
+        """Sets the depths (m) of all columns, in the order of read("depth")."""
+        call("shallow_set_depths", self.pointer, view(np.ascontiguousarray(depths, np.float32).reshape(-1)))
+
+    @property
+    def balance(self):
+        """Where all liquid is (m3), as frz_shallow_balance has it."""
+        out = ShallowBalance(c.sizeof(ShallowBalance))
+        call("shallow_get_balance", self.pointer, c.byref(out))
+        return out
+
+    @property
+    def info(self):
+        """Counts and measures, as frz_shallow_info has them."""
+        out = ShallowInfo(c.sizeof(ShallowInfo))
+        call("shallow_get_info", self.pointer, c.byref(out))
+        return out
+
+    def update_terrain(self, positions, bounds=None):
+        """Moves the vertices (n, 3) of the mesh; bounds: (x0, z0, x1, z1) of all that moves, where it was and where it is. What that did, as
+        frz_shallow_moved has it."""
+        return self._move("update_terrain", rows(positions, np.float32, 3), bounds)
+
+    def update_heights(self, heights, bounds=None):
+        """Changes the heights (nz, nx) of the height field; as update_terrain."""
+        return self._move("update_heights", np.ascontiguousarray(heights, np.float32).reshape(-1), bounds)
+
+    def _move(self, name, array, bounds):
+        self._keep()
+        moved = ShallowMoved(c.sizeof(ShallowMoved))
+        corners = None if bounds is None else (c.c_double * 4)(*bounds)
+        call("shallow_" + name, self._ctx.pointer, self.pointer, view(array), corners, c.byref(moved))
+        return moved
+
+    def set_bodies(self, bodies):
+        """Sets Balls, Capsules and Boxes that move over the ground, in place of those before; as update_terrain."""
+        self._keep()
+        array = (ShallowBody * max(len(bodies), 1))(*(_body(body) for body in bodies))
+        moved = ShallowMoved(c.sizeof(ShallowMoved))
+        call("shallow_set_bodies", self._ctx.pointer, self.pointer, array, len(bodies), c.byref(moved))
+        return moved
+
+    def read(self, name, columns=None):
+        """A copy of an array of all column indices, or of some: depth, base and ceiling (m), cell (n, 2) along x and z, -1 where an index
+        has no column, layer, flux_east and flux_south (m3/s), velocity (n, 2), the mean over the depth (m/s)."""
+        if name not in ARRAYS:
+            raise ValueError(f"shallow liquids have no array {name!r}, but {', '.join(ARRAYS)}")
+        number, kind, width = ARRAYS[name]
+        columns = None if columns is None else np.ascontiguousarray(columns, np.uint32).reshape(-1)
+        out = np.empty((self.info.index_count if columns is None else len(columns), width), kind)
+        if len(out):
+            call("shallow_read", self.pointer, number, View(None, 0, 0) if columns is None else view(columns), span(out))
+        return out if width > 1 else out[:, 0]
+
+    def lent(self, name):
+        """An array of all column indices in the library's own memory, not to be written: depth, base and ceiling (int32; times info.unit,
+        heights above info.low), flux_east and flux_south (float32; depth in units that a step of info.last_step moves). It changes with
+        whatever changes the liquid. While it is in use the ground and bodies cannot move, and the liquid cannot be closed."""
+        if name not in LENT:
+            raise ValueError(f"shallow liquids lend no array {name!r}, but {', '.join(LENT)}")
+        number, kind = LENT[name]
+        out = View()
+        call("shallow_lend", self.pointer, number, c.byref(out))
+        memory = (kind * out.count).from_address(out.data)
+        # The array keeps this alive, and is known here as long as NumPy has it.
+        memory.owner = self
+        self._lent = [lent for lent in self._lent if lent() is not None] + [weakref.ref(memory)]
+        array = np.ctypeslib.as_array(memory)
+        array.flags.writeable = False
+        return array
+
+    def layer(self, name, layer=0):
+        """An array of read() on the cells: (nz, nx) of one layer; NaN where it has no column."""
+        cell, values = self.read("cell"), self.read(name)
+        own = (cell[:, 0] >= 0) & (self.read("layer") == layer)
+        out = np.full((self.cells[1], self.cells[0], *values.shape[1:]), np.nan, np.float32)
+        out[cell[own, 1], cell[own, 0]] = values[own]
+        return out
+
+    def probe(self, points):
+        """The liquid at points (n, 3): an array with fields height and depth (m), velocity, the mean, and surface_velocity (m/s), column
+        (NO_COLUMN of frazil.shallow where there is none) and layer."""
+        return _probe("shallow_probe", self.pointer, points)
+
+    def volume(self, low=None, high=None, layer=None):
+        """Liquid (m3) in a box, on a layer, or in all."""
+        corners = [None if corner is None else (c.c_double * 3)(*corner) for corner in (low, high)]
+        out = c.c_double()
+        call("shallow_volume", self.pointer, *corners, ALL_LAYERS if layer is None else layer, c.byref(out))
+        return out.value
+
+    def surface(self, parts=(), z_up=False, left_handed=False, scale=1.0, least_depth=0.0, opaque_depth=0.01):
+        """The liquid's Surface, with these parts of it: normals, depths, opacities, velocities, layers, columns."""
+        return _surface("shallow_surface", self._ctx, self.pointer, parts, z_up, left_handed, scale, least_depth, opaque_depth)
+
+    def save(self):
+        """The state between two frames: bytes for restore()."""
+        return saved("shallow_save", self._ctx, self.pointer)
+
+    def restore(self, state):
+        """Puts a saved state in place: from there it flows as the saved one did."""
+        call("shallow_restore", self._ctx.pointer, self.pointer, state, len(state))
+
+
+class Snapshot(Handle):
+    """A liquid as it was after a frame: another thread may draw it while the next frame is computed."""
+
+    _destroy = "frz_shallow_snapshot_destroy"
+
+    def __init__(self, ctx, shallow):
+        super().__init__(made("shallow_snapshot_create", ctx.pointer, shallow.pointer))
+
+    def _words(self):
+        return "of a shallow liquid"
+
+    def take(self, shallow):
+        """Takes a liquid as it is now."""
+        call("shallow_snapshot_take", self.pointer, shallow.pointer)
+
+    def surface(self, ctx, parts=(), z_up=False, left_handed=False, scale=1.0, least_depth=0.0, opaque_depth=0.01):
+        """As Shallow.surface; ctx: another context than that of the thread that computes."""
+        return _surface("shallow_snapshot_surface", ctx, self.pointer, parts, z_up, left_handed, scale, least_depth, opaque_depth)
+
+    def probe(self, points):
+        """As Shallow.probe."""
+        return _probe("shallow_snapshot_probe", self.pointer, points)

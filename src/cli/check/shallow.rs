@@ -1,0 +1,79 @@
+//! What a scene with a liquid on a terrain will do: cells, heights, millilitres, memory, disk, and what looks wrong.
+
+use std::fmt::Write;
+
+use frazil::scene::Scene;
+use frazil::scene::shallow::{Inputs, Report, check};
+
+use super::{Args, size};
+use crate::cli::exit::{Failure, Phase};
+use crate::cli::output;
+use crate::cli::session::Session;
+
+/// Checks the scene.
+pub fn run(args: &Args, session: &Session, scene: &Scene) -> Result<(), Failure> {
+    if args.preview.is_some() {
+        let what = format!("{}: --preview is for snow, not for [shallow]", args.scene.display());
+        return Err(Failure::refused(what));
+    }
+    let limit = session.max_memory();
+    // The terrain becomes columns here too.
+    session.ctx.set_memory_limit(limit);
+    let inputs = Inputs::load(&session.ctx, scene).before()?;
+    let mut report = check(&session.ctx, scene, &inputs).before()?;
+    if let Err(error) = report.check_memory(limit) {
+        report.warnings.push(error.to_string());
+    }
+    let free = args.free_space();
+    if let Some(free) = free.filter(|free| report.disk_bytes > *free) {
+        let (needed, free) = (size(report.disk_bytes), size(free));
+        report.warnings.push(format!("the files may need {needed}, but only {free} are free"));
+    }
+    let text = if args.json {
+        format!("{:#}\n", serde_json::to_value(&report).expect("plain values become JSON"))
+    } else {
+        in_words(&report, limit, free)
+    };
+    output::print(&text).during()
+}
+
+fn in_words(report: &Report, limit: u64, free: Option<u64>) -> String {
+    let mut out = String::new();
+    let [first, last] = report.frames;
+    let count = i64::from(last) - i64::from(first) + 1;
+    let seconds = count as f64 / report.fps;
+    let _ = writeln!(out, "frames    {first}-{last}: {count}, {seconds:.2} s at {} a second", report.fps);
+    let [width, height, depth] = report.size_m;
+    let of = report.triangles.map_or(String::new(), |count| format!(", {count} triangles"));
+    let many = if report.files > 1 { format!(" and {} more", report.files - 1) } else { String::new() };
+    let _ = writeln!(out, "terrain   {}{many}{of}", report.terrain);
+    let _ = writeln!(out, "          {width:.4} x {height:.4} x {depth:.4} m (x, y, z)");
+    let ([across, along], [x0, z0, x1, z1]) = (report.cells, report.area_m);
+    let _ = writeln!(
+        out,
+        "cells     {across} x {along} of {} m, {:.4} x {:.4} m",
+        report.cell_m,
+        x1 - x0,
+        z1 - z0
+    );
+    let void = match report.void_cells {
+        0 => String::new(),
+        count => format!(", {count} cells without ground"),
+    };
+    let _ = writeln!(out, "columns   {} in up to {} layers{void}", report.columns, report.layers);
+    let [low, high] = report.heights_m;
+    let _ = writeln!(out, "heights   {low:.4} to {high:.4} m, in units of {:.2e} m", report.unit_m);
+    let _ = writeln!(
+        out,
+        "liquid    {:.4} ml at the first frame, up to {:.6} m deep; {:.4} ml come later; viscosity {:e} m2/s",
+        report.begins_with_ml, report.deepest_m, report.comes_ml, report.viscosity_m2_per_s
+    );
+    let _ = writeln!(out, "memory    about {} of {}", size(report.memory_bytes), size(limit));
+    let free = free.map_or(String::new(), |free| format!(" of {} free", size(free)));
+    let each = size(report.frame_bytes);
+    let _ = writeln!(out, "disk      at most {}{free}; {each} a frame", size(report.disk_bytes));
+    report.warnings.iter().for_each(|warning| {
+        let _ = writeln!(out, "warning   {warning}");
+    });
+    out
+}

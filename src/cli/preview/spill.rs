@@ -1,0 +1,130 @@
+//! The frames of a liquid on a terrain: the output folder of `frazil shallow`, with the terrain and the obstacles of its scene.
+
+use std::path::{Path, PathBuf};
+
+use frazil::base::TriMesh;
+use frazil::io::mesh;
+use frazil::scene::Scene;
+use frazil::scene::shallow::Around;
+use frazil::scene::shot::Stored;
+use frazil::{Context, Error, Result};
+
+use super::sources::{Part, Wet};
+
+/// The stage, and the kind of its files.
+const LIQUID: &str = "liquid";
+
+/// Such a folder, read frame by frame.
+pub struct Spill {
+    folder: PathBuf,
+    liquid: Stored,
+    /// The scene; none where it cannot be read: the liquid is then drawn alone.
+    scene: Option<Scene>,
+    /// The terrain, where it is the same in all frames and was read.
+    terrain: Option<TriMesh>,
+    /// The frames that there are, ascending; at least one.
+    frames: Vec<i32>,
+}
+
+impl Spill {
+    /// Opens a folder; none where it has no such frames.
+    ///
+    /// # Errors
+    /// Records that cannot be read.
+    pub fn open(folder: &Path) -> Result<Option<Self>> {
+        let liquid = Stored::read(folder, LIQUID)?;
+        let all = liquid.files(LIQUID);
+        let frames: Vec<i32> =
+            all.into_iter().filter(|(_, path)| path.ends_with(".ply")).map(|(frame, _)| frame).collect();
+        if frames.is_empty() {
+            return Ok(None);
+        }
+        let scene = match Scene::read(&folder.join("scene.toml")) {
+            Ok(scene) => Some(scene),
+            Err(error) => {
+                log::warn!("{error}: the liquid is drawn without its terrain");
+                None
+            }
+        };
+        Ok(Some(Self { folder: folder.to_path_buf(), liquid, scene, terrain: None, frames }))
+    }
+
+    /// Where it is.
+    pub fn folder(&self) -> &Path {
+        &self.folder
+    }
+
+    /// The frames that there are, ascending; at least one.
+    pub fn frames(&self) -> &[i32] {
+        &self.frames
+    }
+
+    /// Its frames a second, from its scene.
+    ///
+    /// # Errors
+    /// No scene that can be read.
+    pub fn fps(&self) -> Result<f64> {
+        let fps = self.scene.as_ref().map(|scene| scene.shot().fps);
+        fps.ok_or_else(|| {
+            let what = "has no scene.toml that can be read; --fps says how many frames a second there are";
+            Error::file(&self.folder, what)
+        })
+    }
+
+    /// Refuses a frame that is not there.
+    ///
+    /// # Errors
+    /// Which frames there are.
+    pub fn refuse_missing(&self, frame: i32) -> Result<()> {
+        if self.frames.binary_search(&frame).is_ok() {
+            return Ok(());
+        }
+        let (first, last) = (self.frames[0], self.frames[self.frames.len() - 1]);
+        let count = self.frames.len();
+        let what = format!(
+            "frame {frame} is not there: the folder holds {count} frames, {first} to {last}, of {LIQUID}"
+        );
+        Err(Error::file(&self.folder, what))
+    }
+
+    /// What there is of a frame.
+    ///
+    /// # Errors
+    /// A file that cannot be read or that is not what was written; cancel.
+    pub fn read(&mut self, ctx: &Context, frame: i32) -> Result<Vec<Part>> {
+        let mut parts = self.around(ctx, frame);
+        let look =
+            self.scene.as_ref().and_then(|scene| scene.shallow().ok()).map_or("", |liquid| &*liquid.look);
+        let path = self.liquid.file_with(frame, LIQUID, "ply")?;
+        // A file without faces is no mesh.
+        let report = self.liquid.report(frame)?;
+        let is_dry = report.is_some_and(|report| report["triangles"].as_u64() == Some(0));
+        if !is_dry {
+            parts.push(Part::Liquid(mesh::read_detailed(&path)?.without_unused(), Wet::of(look)));
+        }
+        Ok(parts)
+    }
+
+    /// The terrain, and what stands on it; a warning where it is gone.
+    fn around(&mut self, ctx: &Context, frame: i32) -> Vec<Part> {
+        let Some(scene) = &self.scene else { return Vec::new() };
+        let around = match self.terrain.clone() {
+            Some(terrain) => Around::obstacles(scene, frame).map(|obstacles| Around { terrain, obstacles }),
+            None => Around::read(ctx, scene, frame),
+        };
+        match around {
+            Ok(Around { terrain, obstacles }) => {
+                if !Around::moves(scene) {
+                    self.terrain = Some(terrain.clone());
+                }
+                let obstacles = obstacles.into_iter().map(Part::Obstacle);
+                std::iter::once(Part::Ground(terrain)).chain(obstacles).collect()
+            }
+            Err(error) => {
+                log::warn!("{error}: the liquid is drawn without its terrain");
+                self.scene = None;
+                Vec::new()
+            }
+        }
+    }
+}

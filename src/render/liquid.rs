@@ -1,0 +1,36 @@
+//! Thin liquids: what lies below shines through as far as they are not opaque, and their surface shines.
+
+use super::model::{Hit, Model, smooth_normals};
+use super::shade::{Colour, Light, gloss};
+use crate::base::{DVec3, TriMesh};
+
+/// Surfaces of liquid behind each other that a ray passes at most.
+pub(super) const MOST_FILMS: usize = 8;
+/// The sheen of a liquid is whole from this opacity on, and fades towards its dry rim.
+const SHEEN_FROM: f64 = 0.05;
+
+impl Model {
+    /// The surface of a liquid with a colour (linear red, green, blue, 0 to 1) and an opacity of each vertex, 0 to 1. It is smooth, hides
+    /// no light from others, and shines.
+    pub fn liquid(mesh: &TriMesh, albedo: [f32; 3], opacities: Vec<f32>) -> Self {
+        let mut model = Self::mesh(mesh, albedo);
+        model.normals = Some(smooth_normals(mesh));
+        model.opacities = Some(opacities);
+        model
+    }
+}
+
+/// Light that comes from a liquid's surface: its own, what comes from below as far as it is let through, and what it mirrors.
+pub(super) fn wet(
+    light: &Light,
+    hit: &Hit,
+    opacity: f64,
+    [own, below]: [Colour; 2],
+    toward: DVec3,
+    blocked: impl Fn(DVec3) -> bool,
+) -> Colour {
+    let body = below.lerp(&own, opacity);
+    let (share, mirrored) = gloss(light, hit.normal, toward, blocked);
+    let sheen = (opacity / SHEEN_FROM).min(1.0);
+    body * (1.0 - share * sheen) + mirrored * sheen
+}

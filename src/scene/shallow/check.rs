@@ -1,0 +1,196 @@
+//! Looks at every input of every frame of a scene with `[shallow]`, and computes nothing else.
+
+use std::collections::BTreeMap;
+
+use serde::Serialize;
+
+use super::course::Course;
+use super::inputs::area;
+use super::{Inputs, ML, Shallow, disk, memory};
+use crate::context::Context;
+use crate::error::{Error, Result};
+use crate::scene::{Scene, Value};
+use crate::shallow::flows::Kind;
+use crate::shallow::grid::TOP;
+use crate::shallow::pipes::Border;
+
+/// Fewer cells than this look like a mistake.
+const FEW: usize = 100;
+
+/// What a scene will do.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Report {
+    /// First and last frame.
+    pub frames: [i32; 2],
+    /// Frames a second.
+    pub fps: f64,
+    /// Name of the terrain's file at the first frame.
+    pub terrain: String,
+    /// How many files the terrain has.
+    pub files: usize,
+    /// Triangles of the terrain, where it is a mesh.
+    pub triangles: Option<usize>,
+    /// Width, height and depth of the terrain at the first frame (m).
+    pub size_m: [f64; 3],
+    /// Edge of a cell (m).
+    pub cell_m: f64,
+    /// Count of cells along x and along z.
+    pub cells: [usize; 2],
+    /// Least and greatest x and z of the cells (m).
+    pub area_m: [f64; 4],
+    /// Columns: places for liquid in a cell, one above each solid.
+    pub columns: usize,
+    /// Most columns in a cell.
+    pub layers: usize,
+    /// Cells without ground, through which liquid is lost.
+    pub void_cells: usize,
+    /// Least and greatest height of ground and liquid (m).
+    pub heights_m: [f64; 2],
+    /// Smallest difference of depths (m).
+    pub unit_m: f64,
+    /// Kinematic viscosity (m2/s); of a liquid that thins, at rest.
+    pub viscosity_m2_per_s: f64,
+    /// Liquid at the first frame (ml).
+    pub begins_with_ml: f64,
+    /// Liquid that comes later, poured and from sources, over the shot (ml).
+    pub comes_ml: f64,
+    /// Greatest depth at the first frame (m).
+    pub deepest_m: f64,
+    /// Memory that the run needs, about (bytes).
+    pub memory_bytes: u64,
+    /// Space that the files need at most (bytes): when all columns are wet.
+    pub disk_bytes: u64,
+    /// Space that the files of a frame need at most (bytes).
+    pub frame_bytes: u64,
+    /// What looks wrong, one sentence each.
+    pub warnings: Vec<String>,
+    /// Every setting, defaults filled in.
+    pub settings: BTreeMap<String, Value>,
+}
+
+impl Report {
+    /// Fails where the run would need more memory than a limit (bytes).
+    ///
+    /// # Errors
+    /// [`Error::Memory`] names the counts of cells and columns.
+    pub fn check_memory(&self, limit: u64) -> Result<()> {
+        if self.memory_bytes <= limit {
+            return Ok(());
+        }
+        let [across, along] = self.cells;
+        let what = format!("liquid on {across} x {along} cells, {} columns,", self.columns);
+        Err(Error::Memory { what, needed: self.memory_bytes, limit })
+    }
+}
+
+/// Checks a scene whose inputs are open.
+///
+/// # Errors
+/// A file that cannot be read; a source inside solid, and what else a run would refuse; cancel.
+pub fn check(ctx: &Context, scene: &Scene, inputs: &Inputs) -> Result<Report> {
+    let (of, frames) = (scene.shallow()?, scene.shot.frames);
+    let course = Course::begin(ctx, (scene, of, inputs))?;
+    let columns = course.liquid.columns();
+    let (grid, heights) = (inputs.grid, inputs.heights);
+    for frame in frames.iter().skip(1) {
+        ctx.check()?;
+        inputs.terrain_at(of, frame)?;
+    }
+    let [low, high] = inputs.bounds;
+    let layers = (0..grid.cells()).map(|cell| inputs.solids.cell(cell).len());
+    let void_cells = layers.clone().filter(|layers| *layers == 0).count();
+    let begins_with = course.liquid.balance().inside;
+    let deepest = course.liquid.depths().iter().copied().max().unwrap_or(0);
+    let count = columns.count();
+    let frame_bytes = disk::frame(of.output, count as u64);
+    let mut warnings = inputs.warnings.clone();
+    warnings.extend(odd(of, inputs, &course, void_cells));
+    let triangles = inputs.triangles.unwrap_or(0) as u64;
+    Ok(Report {
+        frames: [frames.first, frames.last],
+        fps: scene.shot.fps,
+        terrain: crate::scene::text::name(&of.terrain_at(frames.first)),
+        files: if of.sequence().is_some() { frames.count() } else { 1 },
+        triangles: inputs.triangles,
+        size_m: (high - low).into(),
+        cell_m: grid.cell,
+        cells: grid.size,
+        area_m: area(&grid),
+        columns: count,
+        layers: layers.max().unwrap_or(0),
+        void_cells,
+        heights_m: [heights.low, heights.metres(TOP)],
+        unit_m: heights.unit,
+        viscosity_m2_per_s: of.params.liquid.viscosity,
+        begins_with_ml: begins_with / ML,
+        comes_ml: comes(scene, of) / ML,
+        deepest_m: heights.length(deepest.into()),
+        memory_bytes: memory::estimate(&grid, count as u64, triangles),
+        disk_bytes: frames.count() as u64 * frame_bytes,
+        frame_bytes,
+        warnings,
+        settings: scene.values.by_path(),
+    })
+}
+
+/// Liquid that comes after the first frame (m3).
+fn comes(scene: &Scene, of: &Shallow) -> f64 {
+    let frames = scene.shot.frames;
+    let later = |frame: i32| frame > frames.first && frame <= frames.last;
+    let poured = of.pours.iter().filter(|pour| pour.frame.is_some_and(later)).map(|pour| pour.volume);
+    let sources = of.points.iter().filter(|point| point.point.kind == Kind::Source);
+    let sourced = sources.map(|point| {
+        let from = point.from.unwrap_or(frames.first).max(frames.first + 1);
+        let to = point.until.unwrap_or(frames.last).min(frames.last);
+        point.point.rate * f64::from((to - from + 1).max(0)) / scene.shot.fps
+    });
+    poured.sum::<f64>() + sourced.sum::<f64>()
+}
+
+/// What looks like a mistake.
+fn odd(of: &Shallow, inputs: &Inputs, course: &Course<'_>, void_cells: usize) -> Vec<String> {
+    let mut out = Vec::new();
+    let (grid, heights) = (inputs.grid, inputs.heights);
+    let share = void_cells as f64 / grid.cells() as f64;
+    if share > 0.5 {
+        out.push(format!(
+            "{:.0} % of the cells have no ground: what gets there is lost (shallow.area takes a smaller part)",
+            100.0 * share
+        ));
+    }
+    let [x0, z0, x1, z1] = area(&grid);
+    let [low, high] = inputs.bounds;
+    if x1 < low.x || x0 > high.x || z1 < low.z || z0 > high.z {
+        out.push("shallow.area lies beside the terrain".into());
+    }
+    if heights.unit > 1e-6 {
+        out.push(format!(
+            "depths are multiples of {:.2e} m, as heights go from {} to {} m: shallow.bottom and shallow.top make them finer",
+            heights.unit,
+            heights.low,
+            heights.metres(TOP)
+        ));
+    }
+    let depths = course.liquid.depths();
+    let columns = course.liquid.columns();
+    let is_border = |index: usize| {
+        let [x, z] = columns.cell(index);
+        x == 0 || z == 0 || x + 1 == grid.size[0] || z + 1 == grid.size[1]
+    };
+    let fills = of.fill.is_some() && of.params.border == Border::Open;
+    if fills && columns.indices().any(|index| depths[index] > 0 && is_border(index)) {
+        out.push(
+            "what stands up to shallow.fill flows off at the border, which is open: \"closed\" or \"absorbing\" keep it".into(),
+        );
+    }
+    if of.points.is_empty() && of.pours.is_empty() && of.fill.is_none() {
+        out.push("there is no liquid: no [[pour]], no [[source]], no shallow.fill".into());
+    }
+    if grid.cells() < FEW {
+        out.push(format!(
+            "{} x {} cells are few: shallow.cell is {} m",
+            grid.size[0], grid.size[1], grid.cell
+        ));
+    }
+    out
+}

@@ -1,0 +1,232 @@
+//! The keys of `[shallow]`, of what a scene with it may have many of, and those of `[output]` in such scenes.
+
+use crate::io::mesh::EXTENSIONS;
+use crate::scene::text::FAR;
+use crate::scene::text::key::{Key, Kind, OBJECT, Scope};
+
+type Scopes = &'static [(&'static str, Scope)];
+const FIRST: Scopes = &[("liquid", Scope::First)];
+const STEP: Scopes = &[("liquid", Scope::Step)];
+const OUTPUT: Scopes = &[("liquid", Scope::Output)];
+
+/// A mesh, a level set or an image of heights.
+const TERRAINS: &[&str] = &[EXTENSIONS[0], EXTENSIONS[1], EXTENSIONS[2], "vdb", "png"];
+/// Most of a volume, and of a rate (ml, ml/s): a cubic kilometre.
+const MOST_ML: f64 = 1.0e15;
+/// Frames that a scene may name.
+const FRAMES: Kind = Kind::Whole(-1_000_000_000, 1_000_000_000);
+/// Lengths of obstacles, and radii of circles (m).
+const LENGTH: Kind = Kind::Number(0.0, FAR, "m");
+
+/// Those of `[shallow]`.
+pub const KEYS: &[Key] = &[
+    Key::new(
+        "shallow",
+        "terrain",
+        Kind::File(TERRAINS),
+        "what the liquid flows over: a mesh, open or closed, a sequence \"organ.%04d.ply\" of one that moves, a level set, or a grey image of heights",
+    )
+    .begins_with("\"terrain.obj\"")
+    .concerns(FIRST),
+    Key::new("shallow", "terrain_size", Kind::Numbers(2, FAR, "m"), "of an image, which lies around the origin: lengths along x and z (m)")
+        .or_nothing()
+        .such_as("[0.2, 0.2]")
+        .concerns(FIRST),
+    Key::new("shallow", "terrain_height", Kind::Numbers(2, FAR, "m"), "of an image: heights of black and of white (m)")
+        .or_nothing()
+        .such_as("[0.0, 0.02]")
+        .concerns(FIRST),
+    Key::new("shallow", "scale", Kind::Number(1.0e-9, 1.0e9, ""), "from a mesh's unit to metres: 0.001 for millimetres")
+        .or("1.0")
+        .concerns(FIRST),
+    Key::new("shallow", "up", Kind::Choice(&["y", "z"]), "a mesh's upward axis: y or z").or("\"y\"").concerns(FIRST),
+    Key::new("shallow", "offset", Kind::Whole(-10_000_000, 10_000_000), "frames that a sequence starts later").or("0").concerns(STEP),
+    Key::new("shallow", "cell", Kind::Number(1.0e-6, 1000.0, "m"), "edge of a cell on the ground (m)")
+        .begins_with("0.001")
+        .concerns(FIRST),
+    Key::new(
+        "shallow",
+        "area",
+        Kind::Numbers(4, FAR, "m"),
+        "of the cells: x0, z0, x1, z1 (m), to whole cells; left out: as far as the terrain goes at the first frame",
+    )
+    .or_nothing()
+    .such_as("[-0.1, -0.1, 0.1, 0.1]")
+    .concerns(FIRST),
+    Key::new(
+        "shallow",
+        "bottom",
+        Kind::Number(-FAR, FAR, "m"),
+        "least height (m) of ground and liquid; left out: the terrain's lowest place, of a sequence deeper by as much as top is higher",
+    )
+    .or_nothing()
+    .such_as("-0.01")
+    .concerns(FIRST),
+    Key::new(
+        "shallow",
+        "top",
+        Kind::Number(-FAR, FAR, "m"),
+        "greatest height (m); left out: above the terrain's highest place by a quarter of its height, at least 0.1 m",
+    )
+    .or_nothing()
+    .such_as("0.1")
+    .concerns(FIRST),
+    Key::new(
+        "shallow",
+        "liquid",
+        Kind::Choice(&["water", "blood", "paint", "honey"]),
+        "water, blood, paint or honey: its viscosity, and its look",
+    )
+    .or("\"blood\"")
+    .concerns(STEP),
+    Key::new("shallow", "viscosity", Kind::Number(0.0, 1.0e6, "m2/s"), "kinematic viscosity (m2/s)")
+        .or("4e-6")
+        .with_presets(&[("water", "1e-6"), ("paint", "4e-5"), ("honey", "7e-3")])
+        .concerns(STEP),
+    Key::new(
+        "shallow",
+        "thinning",
+        Kind::Flag,
+        "of blood: true: its viscosity falls with shear (Carreau's law), whatever viscosity says",
+    )
+    .or("false")
+    .concerns(STEP),
+    Key::new("shallow", "gravity", Kind::Numbers(3, 1000.0, "m/s2"), "x, y, z (m/s2); it may lean by up to 45 degrees")
+        .or("[0.0, -9.81, 0.0]")
+        .concerns(STEP),
+    Key::new(
+        "shallow",
+        "border",
+        Kind::Choice(&["open", "closed", "absorbing"]),
+        "of the area: open: liquid flows off; closed: a wall; absorbing: liquid at rest, into which waves leave",
+    )
+    .or("\"open\"")
+    .concerns(FIRST),
+    Key::new("shallow", "fill", Kind::Number(-FAR, FAR, "m"), "height up to which liquid stands at the first frame (m)")
+        .or_nothing()
+        .such_as("0.005")
+        .concerns(FIRST),
+    Key::new("shallow", "kept", Kind::Number(0.0, 1.0, ""), "share of its momentum that liquid keeps in a second, besides what viscosity takes")
+        .or("0.5")
+        .concerns(STEP),
+    Key::new(
+        "shallow",
+        "pace",
+        Kind::Choice(&["realtime", "exact"]),
+        "realtime: steps of at most `step`, in which waves of deep liquid are slower; exact: as many steps as waves need",
+    )
+    .or("\"realtime\"")
+    .concerns(STEP),
+    Key::new("shallow", "step", Kind::Number(1.0e-6, 1.0, "s"), "longest step of realtime (s)").or("0.003").concerns(STEP),
+    Key::new("shallow", "opaque_depth", Kind::Number(1.0e-6, FAR, "m"), "depth from which the liquid is opaque (m)")
+        .or("0.001")
+        .with_presets(&[("water", "0.05"), ("paint", "0.0005"), ("honey", "0.02")])
+        .concerns(OUTPUT),
+];
+
+/// Those of what there may be many of, and of the output.
+pub const MANY_KEYS: &[Key] = &[
+    Key::new("pour", "at", Kind::Numbers(3, FAR, "m"), "middle (m): liquid is poured onto the ground nearest to it")
+        .such_as("[0.0, 0.05, 0.0]")
+        .concerns(STEP),
+    Key::new("pour", "radius", LENGTH, "of the circle, seen from above, in which it is poured (m)").such_as("0.005").concerns(STEP),
+    Key::new("pour", "volume_ml", Kind::Number(0.0, MOST_ML, "ml"), "how much (ml)").such_as("1.0").concerns(STEP),
+    Key::new("pour", "frame", FRAMES, "when; left out: at the first frame").or_nothing().such_as("1").concerns(STEP),
+    Key::new("source", "at", Kind::Numbers(3, FAR, "m"), "middle (m): liquid comes onto the ground nearest to it")
+        .begins_with("[0.0, 0.05, 0.0]")
+        .concerns(STEP),
+    Key::new("source", "radius", LENGTH, "of the circle, seen from above, in which it comes (m)")
+        .begins_with("0.002")
+        .concerns(STEP),
+    Key::new("source", "rate_ml", Kind::Number(0.0, MOST_ML, "ml/s"), "how much comes in a second (ml)")
+        .begins_with("0.5")
+        .concerns(STEP),
+    Key::new("source", "from", FRAMES, "first frame; left out: from the beginning").or_nothing().such_as("1").concerns(STEP),
+    Key::new("source", "until", FRAMES, "last frame; left out: to the end").or_nothing().such_as("120").concerns(STEP),
+    Key::new("source", "frequency", Kind::Number(0.0, 1.0e6, "1/s"), "how often in a second its rate swells (1/s)")
+        .or("0.0")
+        .such_as("1.2")
+        .concerns(STEP),
+    Key::new("source", "swing", Kind::Number(0.0, 1.0, ""), "share of its rate by which it swells and falls")
+        .or("0.0")
+        .such_as("0.6")
+        .concerns(STEP),
+    Key::new("drain", "at", Kind::Numbers(3, FAR, "m"), "middle (m): liquid goes from the ground nearest to it")
+        .such_as("[0.05, 0.0, 0.0]")
+        .concerns(STEP),
+    Key::new("drain", "radius", LENGTH, "of the circle, seen from above, from which it goes (m)").such_as("0.004").concerns(STEP),
+    Key::new("drain", "rate_ml", Kind::Number(0.0, MOST_ML, "ml/s"), "how much goes in a second (ml), as long as there is some")
+        .such_as("0.5")
+        .concerns(STEP),
+    Key::new("drain", "frequency", Kind::Number(0.0, 1.0e6, "1/s"), "how often in a second its rate swells (1/s)")
+        .or("0.0")
+        .concerns(STEP),
+    Key::new("drain", "swing", Kind::Number(0.0, 1.0, ""), "share of its rate by which it swells and falls")
+        .or("0.0")
+        .concerns(STEP),
+    Key::new("drain", "from", FRAMES, "first frame; left out: from the beginning").or_nothing().such_as("1").concerns(STEP),
+    Key::new("drain", "until", FRAMES, "last frame; left out: to the end").or_nothing().such_as("120").concerns(STEP),
+    Key::new("absorber", "at", Kind::Numbers(3, FAR, "m"), "middle (m): liquid goes into gauze on the ground nearest to it")
+        .such_as("[0.05, 0.0, 0.0]")
+        .concerns(STEP),
+    Key::new("absorber", "radius", LENGTH, "of the gauze, seen from above (m)").such_as("0.01").concerns(STEP),
+    Key::new("absorber", "rate_ml", Kind::Number(0.0, MOST_ML, "ml/s"), "how much it takes up in a second (ml)")
+        .such_as("0.5")
+        .concerns(STEP),
+    Key::new("absorber", "capacity_ml", Kind::Number(0.0, MOST_ML, "ml"), "how much it holds (ml)").such_as("2.0").concerns(STEP),
+    Key::new("absorber", "from", FRAMES, "first frame; left out: from the beginning").or_nothing().such_as("1").concerns(STEP),
+    Key::new("absorber", "until", FRAMES, "last frame; left out: to the end").or_nothing().such_as("120").concerns(STEP),
+    Key::new(
+        OBJECT,
+        "shape",
+        Kind::Choice(&["sphere", "capsule", "box"]),
+        "sphere, capsule or box: an obstacle that may move; or file",
+    )
+    .or_nothing()
+    .such_as("\"capsule\"")
+    .concerns(STEP),
+    Key::new(OBJECT, "radius", LENGTH, "of a sphere or capsule (m)").or_nothing().such_as("0.004").concerns(STEP),
+    Key::new(OBJECT, "length", LENGTH, "of a capsule, along y, between the middles of its ends (m)")
+        .or_nothing()
+        .such_as("0.06")
+        .concerns(STEP),
+    Key::new(OBJECT, "size", Kind::Numbers(3, FAR, "m"), "of a box: along x, y and z (m)").or_nothing().such_as("[0.02, 0.02, 0.02]").concerns(STEP),
+    Key::new(OBJECT, "file", Kind::File(&EXTENSIONS), "a closed mesh that stands on the terrain and does not move")
+        .or_nothing()
+        .such_as("\"stone.obj\"")
+        .concerns(FIRST),
+    Key::new(OBJECT, "scale", Kind::Number(1.0e-9, 1.0e9, ""), "from the file's unit to metres: 0.01 for centimetres")
+        .or("1.0")
+        .concerns(FIRST),
+    Key::new(OBJECT, "up", Kind::Choice(&["y", "z"]), "the file's upward axis: y or z").or("\"y\"").concerns(FIRST),
+    Key::new(OBJECT, "ease", Kind::Flag, "true: keys are joined smoothly, from rest to rest; else straight").or("false").concerns(STEP),
+    Key::new(
+        OBJECT,
+        "keys",
+        Kind::Poses(FAR),
+        "where it is at frames: m, degrees about x, then y, then z; of a file one at most",
+    )
+    .or("[]")
+    .such_as("[{ frame = 1, at = [0.05, 0.04, 0.0] }, { frame = 60, at = [-0.05, 0.04, 0.0], turn_deg = [0.0, 0.0, 90.0] }]")
+    .concerns(STEP),
+    Key::new("output", "liquid", Kind::Choices(&["ply", "usd"]), "\"ply\", \"usd\": liquid/, the surface at each frame")
+        .or("[\"ply\"]")
+        .concerns(OUTPUT),
+    Key::new(
+        "output",
+        "attributes",
+        Kind::Choices(&["v", "depth", "layer", "alpha"]),
+        "of its vertices: velocity of the surface (m/s), depth (m), layer from the bottom, opacity: depth / opaque_depth up to 1",
+    )
+    .or("[\"v\", \"depth\", \"layer\", \"alpha\"]")
+    .concerns(OUTPUT),
+    Key::new(
+        "output",
+        "volume",
+        Kind::Choices(&["vdb"]),
+        "\"vdb\": volume/volume.%04d.vdb: density, the share of each voxel of the size of a cell that is liquid",
+    )
+    .or("[]")
+    .such_as("[\"vdb\"]")
+    .concerns(OUTPUT),
+];

@@ -1,0 +1,385 @@
+//! A little liquid on a terrain in scenes: the keys of `[shallow]` and of what there may be many of beside it, what the files hold
+//! ([`Inputs`]), what a check says of it ([`check`]), memory and disk space that it takes among it, the stage `liquid` (`stage.rs`), and
+//! what a picture of it shows besides ([`Around`]).
+
+mod around;
+mod check;
+mod course;
+mod disk;
+mod inputs;
+mod kept;
+mod keys;
+mod memory;
+mod mesh;
+mod obstacles;
+mod plan;
+mod points;
+mod pours;
+mod rules;
+mod stage;
+mod terrain;
+#[cfg(feature = "vdb")]
+mod volume;
+
+use std::path::{Path, PathBuf};
+
+pub(super) use keys::{KEYS, MANY_KEYS};
+pub use {
+    around::Around,
+    check::{Report, check},
+    inputs::Inputs,
+    plan::plan,
+};
+
+use super::text::{Value, Values};
+use super::{KeyPose, Role};
+use crate::io::sequence::Pattern;
+use crate::motion::{Space, Up};
+use crate::shallow::flows::FlowPoint;
+use crate::shallow::liquid::Liquid;
+use crate::shallow::params::{Pace, Section};
+use crate::shallow::pipes::Border;
+use crate::shallow::{Params, flows};
+
+/// Cubic metres in a millilitre.
+pub const ML: f64 = 1.0e-6;
+
+/// A liquid that flows over a terrain, and what is written of it.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Shallow {
+    /// A mesh, the pattern of a sequence of one that moves, a level set or an image of heights.
+    pub terrain: PathBuf,
+    /// How an image lies on the ground.
+    pub image: Option<ImagePlace>,
+    /// A mesh's unit and upward axis.
+    pub space: Space,
+    /// A sequence starts this many frames later.
+    pub offset: i32,
+    /// Edge of a cell (m).
+    pub cell: f64,
+    /// Least and greatest x and z of the cells, `[x0, z0, x1, z1]` (m); none: those of the terrain.
+    pub area: Option<[f64; 4]>,
+    /// Least height (m); none: as the terrain has it.
+    pub bottom: Option<f64>,
+    /// Greatest height (m); none: as the terrain has it.
+    pub top: Option<f64>,
+    /// What it looks like: water, blood, paint or honey.
+    pub look: String,
+    /// How it flows.
+    pub params: Params,
+    /// Height up to which it stands at the first frame (m).
+    pub fill: Option<f64>,
+    /// What is poured at frames.
+    pub pours: Vec<Pour>,
+    /// Sources, then drains, then absorbers, each in the file's order.
+    pub points: Vec<Point>,
+    /// What stands or moves in its way.
+    pub obstacles: Vec<Obstacle>,
+    /// Depth from which it is opaque (m).
+    pub opaque_depth: f64,
+    /// What is written.
+    pub output: Files,
+}
+
+/// How an image of heights lies around the origin.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct ImagePlace {
+    /// Lengths along x and z (m).
+    pub size: [f64; 2],
+    /// Heights of black and of white (m).
+    pub heights: [f64; 2],
+}
+
+/// Liquid that is poured at a frame.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Pour {
+    /// Middle (m).
+    pub at: [f64; 3],
+    /// Of the circle, seen from above (m).
+    pub radius: f64,
+    /// How much (m3).
+    pub volume: f64,
+    /// When; none: at the first frame.
+    pub frame: Option<i32>,
+}
+
+/// A source, a drain or an absorber, at some frames.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Point {
+    /// Its table, `source`, and its index there, from 0.
+    pub name: (&'static str, usize),
+    /// What it does.
+    pub point: FlowPoint,
+    /// First frame; none: from the beginning.
+    pub from: Option<i32>,
+    /// Last frame; none: to the end.
+    pub until: Option<i32>,
+}
+
+/// What stands or moves in the liquid's way.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Obstacle {
+    /// Its form.
+    pub form: Form,
+    /// Where it is at frames, ascending; may be empty.
+    pub keys: Vec<KeyPose>,
+    /// Whether the keys are joined smoothly.
+    pub ease: bool,
+}
+
+/// The form of an obstacle, around the origin.
+#[derive(Debug, Clone, PartialEq)]
+pub enum Form {
+    /// A ball, of a radius (m).
+    Sphere(f64),
+    /// A capsule along y: its radius, and the distance between the middles of its ends (m).
+    Capsule(f64, f64),
+    /// A box: lengths along x, y and z (m).
+    Cuboid([f64; 3]),
+    /// A closed mesh that does not move, with its file's unit and axis.
+    Mesh(PathBuf, Space),
+}
+
+/// What is written of the liquid.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Files {
+    /// `liquid/liquid.%04d.ply`.
+    pub ply: bool,
+    /// `liquid/liquid.%04d.usda`.
+    pub usd: bool,
+    /// `volume/volume.%04d.vdb`.
+    pub vdb: bool,
+    /// Velocities of the surface.
+    pub velocities: bool,
+    /// Depths.
+    pub depth: bool,
+    /// Layers, from the bottom.
+    pub layer: bool,
+    /// Opacities.
+    pub alpha: bool,
+}
+
+impl Shallow {
+    /// That of a scene; none where it has no such table.
+    pub(super) fn of(values: &Values) -> Option<Self> {
+        let value = |name: &str| values.get(&format!("shallow.{name}"));
+        let number = |name: &str| value(name).and_then(Value::number);
+        let text = |name: &str| value(name).and_then(Value::text);
+        let asked = |name: &str, text: &str| values.get(name).is_some_and(|value| value.holds(text));
+        let (size, heights) = (
+            value("terrain_size").and_then(Value::numbers),
+            value("terrain_height").and_then(Value::numbers),
+        );
+        Some(Self {
+            terrain: value("terrain")?.path()?.to_path_buf(),
+            image: size.zip(heights).map(|(size, heights)| ImagePlace { size, heights }),
+            space: space(number("scale"), text("up")),
+            offset: value("offset").and_then(Value::whole).unwrap_or(0) as i32,
+            cell: number("cell")?,
+            area: value("area").and_then(Value::numbers),
+            bottom: number("bottom"),
+            top: number("top"),
+            look: text("liquid").unwrap_or("blood").to_string(),
+            params: params(values),
+            fill: number("fill"),
+            pours: (0..values.count("pour")).map(|index| Pour::of(values, index)).collect(),
+            points: Point::all_of(values),
+            obstacles: (0..values.count("object")).filter_map(|index| Obstacle::of(values, index)).collect(),
+            opaque_depth: number("opaque_depth").unwrap_or(0.01),
+            output: Files {
+                ply: asked("output.liquid", "ply"),
+                usd: asked("output.liquid", "usd"),
+                vdb: asked("output.volume", "vdb"),
+                velocities: asked("output.attributes", "v"),
+                depth: asked("output.attributes", "depth"),
+                layer: asked("output.attributes", "layer"),
+                alpha: asked("output.attributes", "alpha"),
+            },
+        })
+    }
+
+    /// The terrain's pattern, where it is a sequence.
+    pub(super) fn sequence(&self) -> Option<Pattern> {
+        Pattern::parse(&self.terrain)
+    }
+
+    /// The terrain's file at a frame of the shot.
+    pub(super) fn terrain_at(&self, frame: i32) -> PathBuf {
+        match self.sequence() {
+            Some(pattern) => pattern.path(frame.saturating_sub(self.offset)),
+            None => self.terrain.clone(),
+        }
+    }
+}
+
+impl Pour {
+    fn of(values: &Values, index: usize) -> Self {
+        let value = |name: &str| values.of_many("pour", index, name);
+        let number = |name: &str| value(name).and_then(Value::number).unwrap_or(0.0);
+        Self {
+            at: value("at").and_then(Value::numbers).unwrap_or_default(),
+            radius: number("radius"),
+            volume: number("volume_ml") * ML,
+            frame: value("frame").and_then(Value::whole).map(|frame| frame as i32),
+        }
+    }
+}
+
+impl Point {
+    fn all_of(values: &Values) -> Vec<Self> {
+        let of =
+            |table: &'static str| (0..values.count(table)).map(move |index| Self::of(values, table, index));
+        of("source").chain(of("drain")).chain(of("absorber")).collect()
+    }
+
+    fn of(values: &Values, table: &'static str, index: usize) -> Self {
+        let value = |name: &str| values.of_many(table, index, name);
+        let number = |name: &str| value(name).and_then(Value::number).unwrap_or(0.0);
+        let frame = |name: &str| value(name).and_then(Value::whole).map(|frame| frame as i32);
+        let kind = match table {
+            "source" => flows::Kind::Source,
+            "drain" => flows::Kind::Drain,
+            _ => flows::Kind::Absorber(number("capacity_ml") * ML),
+        };
+        let (frequency, share) = (number("frequency"), number("swing"));
+        let point = FlowPoint {
+            kind,
+            at: value("at").and_then(Value::numbers).unwrap_or_default(),
+            radius: number("radius"),
+            rate: number("rate_ml") * ML,
+            pulse: (frequency > 0.0 && share > 0.0).then_some(flows::Pulse { frequency, share }),
+        };
+        Self { name: (table, index), point, from: frame("from"), until: frame("until") }
+    }
+
+    /// Whether it acts on the way to a frame.
+    pub(super) fn acts(&self, frame: i32) -> bool {
+        self.from.is_none_or(|from| from <= frame) && self.until.is_none_or(|until| frame <= until)
+    }
+
+    /// As messages name it: `source.2`.
+    pub(super) fn title(&self) -> String {
+        format!("{}.{}", self.name.0, self.name.1 + 1)
+    }
+}
+
+impl Obstacle {
+    fn of(values: &Values, index: usize) -> Option<Self> {
+        let value = |name: &str| values.of_object(index, name);
+        let number = |name: &str| value(name).and_then(Value::number);
+        let text = |name: &str| value(name).and_then(Value::text);
+        let form = match (text("shape"), value("file").and_then(Value::path)) {
+            (Some("sphere"), _) => Form::Sphere(number("radius")?),
+            (Some("capsule"), _) => Form::Capsule(number("radius")?, number("length")?),
+            (Some(_), _) => Form::Cuboid(value("size")?.numbers()?),
+            (None, file) => Form::Mesh(file?.to_path_buf(), space(number("scale"), text("up"))),
+        };
+        let keys = if let Some(Value::Poses(poses)) = value("keys") { poses.clone() } else { Vec::new() };
+        Some(Self { form, keys, ease: value("ease").and_then(Value::flag).unwrap_or(false) })
+    }
+
+    /// The file of a mesh.
+    pub(super) fn file(&self) -> Option<&Path> {
+        if let Form::Mesh(path, _) = &self.form { Some(path) } else { None }
+    }
+}
+
+fn space(scale: Option<f64>, up: Option<&str>) -> Space {
+    Space { scale: scale.unwrap_or(1.0), up: if up == Some("z") { Up::Z } else { Up::Y } }
+}
+
+/// How the liquid of a scene flows.
+fn params(values: &Values) -> Params {
+    let value = |name: &str| values.get(&format!("shallow.{name}"));
+    let number = |name: &str| value(name).and_then(Value::number);
+    let text = |name: &str| value(name).and_then(Value::text);
+    let is_thinning = value("thinning").and_then(Value::flag).unwrap_or(false);
+    Params {
+        liquid: match number("viscosity") {
+            _ if is_thinning => Liquid::THINNING_BLOOD,
+            Some(viscosity) => Liquid::new(viscosity),
+            None => Liquid::BLOOD,
+        },
+        gravity: value("gravity").and_then(Value::numbers).unwrap_or([0.0, -9.81, 0.0]),
+        kept: number("kept").unwrap_or(0.5),
+        pace: match text("pace") {
+            Some("exact") => Pace::Exact,
+            _ => Pace::Realtime(number("step").unwrap_or(0.003)),
+        },
+        border: match text("border") {
+            Some("closed") => Border::Closed,
+            Some("absorbing") => Border::Absorbing,
+            _ => Border::Open,
+        },
+        section: Section::default(),
+    }
+}
+
+/// No object of such a scene has a role.
+const ROLES: &[Role] = &[];
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::scene::text::{keys, template};
+    use crate::scene::{Scene, System};
+
+    fn scene(lines: &str) -> Scene {
+        let text = format!("[shot]\nframes = \"1-2\"\n[shallow]\nterrain = \"a.obj\"\ncell = 0.01\n{lines}");
+        Scene::parse(&text, Path::new("/s/shot.toml"), &[]).unwrap()
+    }
+
+    #[test]
+    fn viscosities_of_the_keys_are_those_of_the_library() {
+        for name in ["water", "blood", "paint", "honey"] {
+            let scene = scene(&format!("liquid = \"{name}\"\n"));
+            let shallow = scene.shallow().unwrap();
+            assert_eq!((&*shallow.look, Some(shallow.params.liquid)), (name, Liquid::named(name)));
+        }
+        // But for the border, a scene's defaults are the library's.
+        let params = scene("").shallow().unwrap().params.clone();
+        assert_eq!(params, Params { border: Border::Open, ..Params::default() });
+        let thick = scene("liquid = \"paint\"\nviscosity = 0.25\n");
+        assert_eq!(thick.shallow().unwrap().params.liquid, Liquid::new(0.25));
+        assert_eq!(scene("thinning = true\n").shallow().unwrap().params.liquid, Liquid::THINNING_BLOOD);
+    }
+
+    #[test]
+    fn what_there_may_be_many_of_keeps_its_order_through_the_resolved_scene() {
+        let of = "[[source]]\nat = [0, 0, 0]\nradius = 1\nrate_ml = 2\nfrom = 3\nuntil = 4\n\
+                  [[source]]\nat = [5, 0, 0]\nradius = 0\nrate_ml = 1\nfrequency = 2\nswing = 0.5\n\
+                  [[drain]]\nat = [1, 2, 3]\nradius = 1\nrate_ml = 7\n\
+                  [[pour]]\nat = [0, 1, 0]\nradius = 0.1\nvolume_ml = 3\n\
+                  [[object]]\nshape = \"sphere\"\nradius = 0.5\nkeys = [{ frame = 1, at = [0, 1, 0] }]\n\
+                  [[object]]\nfile = \"stone.obj\"\nscale = 0.001\n";
+        let first = scene(of);
+        let shallow = first.shallow().unwrap();
+        let titles: Vec<String> = shallow.points.iter().map(Point::title).collect();
+        assert_eq!(titles, ["source.1", "source.2", "drain.1"]);
+        let acts = |frame| shallow.points[0].acts(frame);
+        assert_eq!([2, 3, 4, 5].map(acts), [false, true, true, false]);
+        assert_eq!(shallow.pours[0].volume, 3e-6);
+        assert!(matches!(shallow.obstacles[0].form, Form::Sphere(radius) if radius == 0.5));
+        assert_eq!(shallow.obstacles[1].file(), Some(Path::new("/s/stone.obj")));
+        let again = Scene::parse(&first.to_toml(), Path::new("/s/shot.toml"), &[]).unwrap();
+        assert_eq!(again, first);
+    }
+
+    #[test]
+    fn the_scene_to_begin_with_holds_what_its_keys_may_hold() {
+        let shown = template(System::Shallow);
+        let text: Vec<&str> = shown
+            .lines()
+            .map(|line| line.trim_start_matches("# "))
+            .skip_while(|line| *line != "[shot]")
+            .filter(|line| !line.starts_with("file =") && !line.starts_with("terrain_"))
+            .collect();
+        let scene = Scene::parse(&text.join("\n"), Path::new("/s/shot.toml"), &[]).unwrap();
+        let missing: Vec<&str> = keys::of(System::Shallow)
+            .iter()
+            .filter(|key| !scene.values.iter().any(|(own, _, _)| own == *key))
+            .map(|key| key.name)
+            .collect();
+        assert_eq!(missing, ["terrain_size", "terrain_height", "file"]);
+    }
+}

@@ -1,0 +1,340 @@
+//! Which strips a step works on: those with liquid and their neighbours, as runs of each row.
+
+use std::ops::Range;
+
+use crate::shallow::columns::{Columns, NONE, STRIP, resize_part, strip_of};
+use crate::shallow::pipes::Links;
+
+/// A run of active strips of a row that are one array, and whose neighbours in the rows before and behind are one array each.
+#[derive(Debug, Clone, Copy, Default, PartialEq)]
+pub struct Span {
+    /// First index.
+    pub first: u32,
+    /// Count of indices.
+    pub len: u32,
+    /// First index of the strips to the south, or [`NONE`].
+    pub south: u32,
+    /// First index of the strips to the north, or [`NONE`]: there is none, or it is not active.
+    pub north: u32,
+}
+
+/// The active strips.
+#[derive(Debug, Clone, Default)]
+pub struct Active {
+    /// Whether each strip had liquid after the last step.
+    wet: Vec<bool>,
+    /// Whether each strip is worked on.
+    active: Vec<bool>,
+    /// The strips that links lead to from each strip, and where those of each begin.
+    linked: Vec<u32>,
+    linked_starts: Vec<u32>,
+    /// First strip of each row, and the end of the last.
+    rows: Vec<u32>,
+    /// The spans of each row, from where its strips begin.
+    spans: Vec<Span>,
+    counts: Vec<u32>,
+    /// Rows whose spans are to be found anew.
+    stale: Vec<bool>,
+    any_stale: bool,
+}
+
+impl Active {
+    /// Nothing is active yet.
+    pub fn new(columns: &Columns, links: &Links) -> Self {
+        let (strips, rows) = (columns.strips().len(), columns.grid.size[1]);
+        let mut active = Self {
+            wet: vec![false; strips],
+            active: vec![false; strips],
+            linked: Vec::new(),
+            linked_starts: Vec::new(),
+            rows: vec![0; rows + 1],
+            spans: vec![Span::default(); strips],
+            counts: vec![0; rows],
+            stale: vec![false; rows],
+            any_stale: false,
+        };
+        active.find_rows(columns);
+        active.list_linked(strips, links);
+        active
+    }
+
+    fn find_rows(&mut self, columns: &Columns) {
+        for row in 1..self.rows.len() {
+            self.rows[row] = columns.row(row - 1).end as u32;
+        }
+    }
+
+    /// Finds again which strips are wet and active after the columns of some rows have changed, and with them `links`, if it is given.
+    pub(super) fn refit(
+        &mut self,
+        columns: &Columns,
+        links: Option<&Links>,
+        rows: Range<usize>,
+        depth: &[i32],
+    ) {
+        let old = self.rows[rows.start] as usize..self.rows[rows.end] as usize;
+        let new = columns.row(rows.start).start..columns.row(rows.end - 1).end;
+        for flags in [&mut self.wet, &mut self.active] {
+            resize_part(flags, old.clone(), new.len(), false);
+        }
+        resize_part(&mut self.spans, old.clone(), new.len(), Span::default());
+        self.find_rows(columns);
+        if let Some(links) = links {
+            self.list_linked(columns.strips().len(), links);
+        }
+        for strip in new.clone() {
+            self.wet[strip] = strip_of(depth, strip).iter().any(|&depth| depth > 0);
+            self.active[strip] = false;
+        }
+        let count = columns.grid.size[1];
+        let around = rows.start.saturating_sub(1)..(rows.end + 1).min(count);
+        let stale = if old == new { around.end } else { count };
+        (around.start..stale).for_each(|row| self.make_stale(row));
+        for strip in columns.row(around.start).start..columns.row(around.end - 1).end {
+            if self.wet[strip] {
+                self.wake(columns, strip);
+            }
+        }
+    }
+
+    /// Lists for each strip those that links lead to, from either end.
+    fn list_linked(&mut self, strips: usize, links: &Links) {
+        let Self { linked, linked_starts: starts, .. } = self;
+        let pairs = || {
+            let ends = links.from.iter().zip(&links.to).filter(|(_, to)| **to != NONE);
+            ends.map(|(&from, &to)| [from, to].map(|end| end / STRIP as u32))
+                .flat_map(|[a, b]| [[a, b], [b, a]])
+        };
+        starts.clear();
+        starts.resize(strips + 2, 0);
+        pairs().for_each(|[strip, _]| starts[strip as usize + 2] += 1);
+        (2..strips + 2).for_each(|at| starts[at] += starts[at - 1]);
+        linked.clear();
+        linked.resize(2 * links.len(), 0);
+        for [strip, other] in pairs() {
+            let end = &mut starts[strip as usize + 1];
+            linked[*end as usize] = other;
+            *end += 1;
+        }
+        // Each once.
+        let mut count = 0;
+        for strip in 0..strips {
+            let own = starts[strip] as usize..starts[strip + 1] as usize;
+            starts[strip] = count as u32;
+            linked[own.clone()].sort_unstable();
+            for at in own.clone() {
+                if at == own.start || linked[at] != linked[at - 1] {
+                    linked[count] = linked[at];
+                    count += 1;
+                }
+            }
+        }
+        starts.truncate(strips + 1);
+        starts[strips] = count as u32;
+        linked.truncate(count);
+    }
+
+    /// Memory (bytes).
+    pub fn bytes(&self) -> usize {
+        let flags = self.wet.len() + self.active.len() + self.stale.len();
+        let lists = [&self.linked, &self.linked_starts, &self.rows, &self.counts];
+        flags + lists.iter().map(|list| size_of_val(&list[..])).sum::<usize>() + size_of_val(&self.spans[..])
+    }
+
+    /// The spans of a row.
+    pub fn row(&self, row: usize) -> &[Span] {
+        let first = self.rows[row] as usize;
+        &self.spans[first..first + self.counts[row] as usize]
+    }
+
+    /// Whether each strip had liquid at the start of the frame, or got wet since.
+    pub fn wet(&self) -> &[bool] {
+        &self.wet
+    }
+
+    /// Whether each strip is worked on.
+    pub(super) fn active(&self) -> &[bool] {
+        &self.active
+    }
+
+    /// Makes the strips of some runs, which are in order, active, and no others but those beside liquid.
+    pub(super) fn reset(
+        &mut self,
+        columns: &Columns,
+        depth: &[i32],
+        runs: impl Iterator<Item = std::ops::Range<usize>> + Clone,
+    ) {
+        let mut end = 0;
+        for run in runs.clone() {
+            self.let_sleep(columns, end..run.start);
+            end = run.end;
+            for strip in run {
+                let (own, _) = depth[strip * STRIP..].split_at(STRIP);
+                self.wet[strip] = own.iter().fold(0, |any, depth| any | depth) != 0;
+                self.activate(columns, strip);
+            }
+        }
+        self.let_sleep(columns, end..self.active.len());
+        for strip in runs.flatten() {
+            if self.wet[strip] && self.may_be_alone(columns, strip) {
+                self.wake(columns, strip);
+            }
+        }
+        self.refresh(columns);
+    }
+
+    /// Whether a strip might have a neighbour that is not active. Looks at little: nearly always none has.
+    fn may_be_alone(&self, columns: &Columns, strip: usize) -> bool {
+        let active = |other: u32| other == NONE || self.active[other as usize];
+        let next = self.active.get(strip + 1).is_none_or(|next| *next);
+        let before = strip == 0 || self.active[strip - 1];
+        let has_links = self.linked_starts[strip] < self.linked_starts[strip + 1];
+        has_links || !(next && before && active(columns.north(strip)) && active(columns.south(strip)))
+    }
+
+    /// Makes no strip of a range active.
+    fn let_sleep(&mut self, columns: &Columns, strips: std::ops::Range<usize>) {
+        let mut strip = find(&self.active[..strips.end], strips.start, true);
+        while strip < strips.end {
+            (self.active[strip], self.wet[strip]) = (false, false);
+            self.make_stale(columns.strips()[strip].row as usize);
+            strip = find(&self.active[..strips.end], strip + 1, true);
+        }
+    }
+
+    /// Makes a strip that got wet, and its neighbours, active.
+    pub fn wake(&mut self, columns: &Columns, strip: usize) {
+        self.wet[strip] = true;
+        self.activate(columns, strip);
+        let beside = [columns.east(strip), columns.west(strip)];
+        beside.into_iter().flatten().for_each(|other| self.activate(columns, other));
+        for other in [columns.north(strip), columns.south(strip)].into_iter().filter(|&other| other != NONE) {
+            self.activate(columns, other as usize);
+        }
+        for link in self.linked_starts[strip]..self.linked_starts[strip + 1] {
+            self.activate(columns, self.linked[link as usize] as usize);
+        }
+    }
+
+    fn activate(&mut self, columns: &Columns, strip: usize) {
+        if !self.active[strip] {
+            self.active[strip] = true;
+            self.make_stale(columns.strips()[strip].row as usize);
+        }
+    }
+
+    /// The spans of the next row name those of this one.
+    fn make_stale(&mut self, row: usize) {
+        self.any_stale = true;
+        self.stale[row] = true;
+        if let Some(next) = self.stale.get_mut(row + 1) {
+            *next = true;
+        }
+    }
+
+    /// Lets strips sleep that are dry and beside dry ones; `asleep` is called with the indices of each.
+    pub fn settle(
+        &mut self,
+        columns: &Columns,
+        depth: &[i32],
+        mut asleep: impl FnMut(std::ops::Range<usize>),
+    ) {
+        let rows = self.counts.len();
+        for row in (0..rows).filter(|&row| self.counts[row] > 0) {
+            for strip in columns.row(row).filter(|&strip| self.active[strip]) {
+                self.wet[strip] = depth[strip * STRIP..(strip + 1) * STRIP].iter().any(|&depth| depth > 0);
+            }
+        }
+        for row in 0..rows {
+            if self.counts[row] == 0 {
+                continue;
+            }
+            for strip in columns.row(row) {
+                if self.active[strip] && !self.has_wet_beside(columns, strip) {
+                    self.active[strip] = false;
+                    self.make_stale(row);
+                    asleep(strip * STRIP..(strip + 1) * STRIP);
+                }
+            }
+        }
+    }
+
+    fn has_wet_beside(&self, columns: &Columns, strip: usize) -> bool {
+        let wet = |strip: usize| self.wet[strip];
+        let beyond = |strip: u32| strip != NONE && wet(strip as usize);
+        let links = self.linked_starts[strip] as usize..self.linked_starts[strip + 1] as usize;
+        wet(strip)
+            || columns.east(strip).is_some_and(wet)
+            || columns.west(strip).is_some_and(wet)
+            || beyond(columns.north(strip))
+            || beyond(columns.south(strip))
+            || self.linked[links].iter().any(|&other| wet(other as usize))
+    }
+
+    /// Finds the spans of rows that have changed.
+    pub fn refresh(&mut self, columns: &Columns) {
+        if !std::mem::take(&mut self.any_stale) {
+            return;
+        }
+        for row in 0..self.stale.len() {
+            if std::mem::take(&mut self.stale[row]) {
+                self.find_spans(columns, row);
+            }
+        }
+    }
+
+    fn find_spans(&mut self, columns: &Columns, row: usize) {
+        let first = self.rows[row] as usize;
+        let mut count = 0;
+        for strip in columns.row(row).filter(|&strip| self.active[strip]) {
+            let at = |strip: u32| if strip == NONE { NONE } else { strip * STRIP as u32 };
+            let north = columns.north(strip);
+            let north = if north != NONE && self.active[north as usize] { north } else { NONE };
+            let own = Span {
+                first: (strip * STRIP) as u32,
+                len: STRIP as u32,
+                south: at(columns.south(strip)),
+                north: at(north),
+            };
+            // Also across a gap of cells: the pipe over it is closed.
+            let goes_on = |last: &Span| {
+                let follows = |last_at: u32, at: u32| {
+                    if last_at == NONE { at == NONE } else { at == last_at + last.len }
+                };
+                follows(last.first, own.first)
+                    && follows(last.south, own.south)
+                    && follows(last.north, own.north)
+            };
+            let spans = &mut self.spans[first..];
+            match count {
+                1.. if goes_on(&spans[count - 1]) => {
+                    spans[count - 1].len += own.len;
+                }
+                _ => {
+                    spans[count] = own;
+                    count += 1;
+                }
+            }
+        }
+        self.counts[row] = count as u32;
+    }
+}
+
+/// Runs of strips that are marked.
+pub(in crate::shallow) fn runs(marks: &[bool]) -> impl Iterator<Item = std::ops::Range<usize>> + Clone + '_ {
+    let mut end = 0;
+    std::iter::from_fn(move || {
+        let first = find(marks, end, true);
+        end = find(marks, first, false);
+        (first < end).then_some(first..end)
+    })
+}
+
+/// The first strip from one on that is marked, or not; else the count of all.
+fn find(marks: &[bool], from: usize, wanted: bool) -> usize {
+    let rest = &marks[from..];
+    // Many at once, where none is wanted.
+    let has_none = |chunk: &&[bool]| chunk.iter().fold(true, |none, mark| none & (*mark != wanted));
+    let skipped = rest.chunks(64).take_while(has_none).map(<[bool]>::len).sum::<usize>();
+    from + skipped + rest[skipped..].iter().take_while(|mark| **mark != wanted).count()
+}

@@ -1,0 +1,166 @@
+//! Flow through links: pipes between layers, and out of the domain. Few, and one at a time.
+
+use crate::shallow::columns::{Columns, NONE, STRIP, resize_part};
+use std::ops::Range;
+
+use super::flux::{Kind, Step, flux, lesser, rounded};
+use super::parts::LinkPart;
+use super::transfer::left;
+use crate::shallow::pipes::Links;
+
+/// Beyond what any column has (units): sums of transfers stay within 64 bits.
+const MOST: f32 = 2.1e9;
+
+/// The flow through each link.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub struct LinkFlow {
+    /// Flux (units a step).
+    pub flux: Vec<f32>,
+    /// What truncation left (units).
+    pub left: Vec<f32>,
+    /// Transfer in this step (units).
+    pub transfer: Vec<f32>,
+    /// Units that left the domain since the flow began.
+    pub lost: i64,
+    /// Units that came in over an absorbing border.
+    pub gained: i64,
+}
+
+impl LinkFlow {
+    /// No flow.
+    pub fn new(links: &Links) -> Self {
+        let none = vec![0.0; links.len()];
+        Self { flux: none.clone(), left: none.clone(), transfer: none, lost: 0, gained: 0 }
+    }
+
+    /// Puts links with other flow in place of some.
+    pub(in crate::shallow) fn replace(&mut self, part: Range<usize>, flux: &[f32], left: &[f32]) {
+        let new = part.start..part.start + flux.len();
+        for numbers in [&mut self.flux, &mut self.left, &mut self.transfer] {
+            resize_part(numbers, part.clone(), new.len(), 0.0);
+        }
+        self.flux[new.clone()].copy_from_slice(flux);
+        self.left[new.clone()].copy_from_slice(left);
+        self.transfer[new].fill(0.0);
+    }
+}
+
+/// Units that went out of the domain and came in from there.
+#[derive(Debug, Clone, Copy, Default, PartialEq)]
+pub struct Outside {
+    /// Went out.
+    pub lost: i64,
+    /// Came in.
+    pub gained: i64,
+}
+
+impl LinkPart<'_> {
+    /// Computes the flux and the transfer of the links that a row owns; `first` is the part's first link, `depth` H of columns of this row and
+    /// the next one.
+    pub fn drive<K: Kind>(
+        &mut self,
+        step: &Step,
+        columns: &Columns,
+        links: &Links,
+        (row, first): (usize, usize),
+        depth: impl Fn(usize) -> i32,
+    ) {
+        let base = columns.bases();
+        for link in links.row(row) {
+            let (i, open) = (links.from[link] as usize, links.open[link]);
+            let own = depth(i);
+            let at = link - first;
+            let (eta, beyond, is_still) = match links.to[link] {
+                NONE => {
+                    let (eta, is_still) = links.outside(columns, link, step.still);
+                    (eta, if is_still { eta - base[i] } else { 0 }, is_still)
+                }
+                j => (base[j as usize] + depth(j as usize), depth(j as usize), false),
+            };
+            let fall = (base[i] + own).saturating_sub(eta);
+            let f = if is_still {
+                radiated(step, fall, [own as f32, beyond as f32])
+            } else {
+                flux::<K>(step, fall, [own as f32, beyond as f32], self.flux[at], open)
+            };
+            self.flux[at] = f;
+            self.transfer[at] = if f == 0.0 { 0.0 } else { rounded(f + self.left[at]).clamp(-MOST, MOST) };
+        }
+    }
+
+    /// Calls `add` with each column of some that gives through a link of a row, or takes, and how much (units, rounded up, so that sums do not
+    /// depend on their order).
+    pub fn each(
+        &self,
+        links: &Links,
+        (row, first): (usize, usize),
+        within: &Range<u32>,
+        gives: bool,
+        mut add: impl FnMut(u32, i64),
+    ) {
+        for link in links.row(row) {
+            let transfer = self.transfer[link - first];
+            let column = if (transfer > 0.0) == gives { links.from[link] } else { links.to[link] };
+            if transfer != 0.0 && column != NONE && within.contains(&column) {
+                add(column, transfer.abs().ceil() as i64);
+            }
+        }
+    }
+
+    /// Multiplies the transfers and fluxes of the links that a row owns by a factor of the column that gives, or of the one that takes.
+    pub fn scale(
+        &mut self,
+        links: &Links,
+        (row, first): (usize, usize),
+        giver: bool,
+        factor: impl Fn(u32) -> f32,
+    ) {
+        for link in links.row(row) {
+            let transfer = self.transfer[link - first];
+            let column = if (transfer > 0.0) == giver { links.from[link] } else { links.to[link] };
+            if transfer != 0.0 && column != NONE {
+                let k = factor(column);
+                self.transfer[link - first] *= k;
+                self.flux[link - first] *= k;
+            }
+        }
+    }
+
+    /// Finds the units that the links of a row transfer; `change` is called with each column and what it gains.
+    pub fn move_units(
+        &mut self,
+        links: &Links,
+        (row, first): (usize, usize),
+        outside: &mut Outside,
+        mut change: impl FnMut(usize, i32),
+    ) {
+        for link in links.row(row) {
+            let transfer = self.transfer[link - first];
+            // K keeps it within 32 bits.
+            let units = transfer as i32;
+            self.left[link - first] = left(transfer, units);
+            if units == 0 {
+                continue;
+            }
+            change(links.from[link] as usize, -units);
+            match links.to[link] {
+                NONE if units > 0 => outside.lost += i64::from(units),
+                NONE => outside.gained -= i64::from(units),
+                to => change(to as usize, units),
+            }
+        }
+    }
+}
+
+/// The flux of a wave that leaves over the border (units a step): a surface that stands `fall` over the one at rest goes out at the speed of
+/// waves (Sommerfeld's condition), and what came is not thrown back.
+fn radiated(step: &Step, fall: i32, depth: [f32; 2]) -> f32 {
+    let mean = if step.is_whole { step.section } else { lesser(0.5 * (depth[0] + depth[1]), step.section) };
+    lesser(step.wave * mean.sqrt(), 1.0) * fall as f32
+}
+
+/// The indices of a row's columns.
+pub fn indices_of(columns: &Columns, row: usize) -> Range<u32> {
+    let strips = columns.row(row);
+    (strips.start * STRIP) as u32..(strips.end * STRIP) as u32
+}

@@ -1,0 +1,268 @@
+//! The state of the liquid, and one step of it (thesis 4.1.2, Alg. 4.1).
+//!
+//! A step goes over the rows once (`rows.rs`): fluxes (`flux.rs`, `links.rs`), their scaling (`scale.rs`), and transfers (`transfer.rs`), on the
+//! strips that are wet or beside wet ones (`active.rs`), by one band of rows for each thread (`bands.rs`, `parts.rs`). Columns that are full up to their
+//! ceiling are a network of their own, found first (`network.rs`, `heads.rs`, `rounds.rs`).
+
+pub(super) mod active;
+pub(super) mod bands;
+mod buffers;
+pub mod flux;
+mod heads;
+pub mod links;
+mod network;
+mod parts;
+mod places;
+mod rounds;
+mod rows;
+mod scale;
+mod transfer;
+
+use std::ops::Range;
+
+use crate::shallow::columns::{Columns, STRIP, resize_part, strip_mut};
+use crate::shallow::pipes::Pipes;
+use active::{Active, runs};
+use bands::Bands;
+use flux::Step;
+use links::LinkFlow;
+use network::{Network, State};
+use parts::Part;
+use rows::Ground;
+
+/// Depths and fluxes, by column index.
+#[derive(Debug, Clone)]
+pub struct Flow {
+    /// H (units), and 16 more numbers.
+    pub(super) depth: Vec<i32>,
+    /// Flux to the east and to the south (units in a step of `last`).
+    pub(super) flux: [Vec<f32>; 2],
+    /// What truncation left of transfers to the east and to the south (units).
+    pub(super) left: [Vec<f32>; 2],
+    pub(super) links: LinkFlow,
+    active: Active,
+    bands: Bands,
+    pub(super) network: Network,
+    /// Length of the step in whose measure fluxes are (s).
+    pub(super) last: f64,
+}
+
+/// What a restored state replaces.
+pub(super) struct Stored<'a> {
+    /// Whether each strip is worked on.
+    pub active: &'a [bool],
+    /// H (units).
+    pub depth: &'a mut [i32],
+    /// As [`Flow::numbers`].
+    pub numbers: [&'a mut [f32]; 4],
+    /// As [`Flow::heads`].
+    pub heads: &'a mut [f32],
+    /// Among others, the greatest depths of rows.
+    pub bands: &'a mut Bands,
+    /// Flow through links.
+    pub links: &'a mut LinkFlow,
+    /// Length of the last step (s).
+    pub last: &'a mut f64,
+}
+
+impl Stored<'_> {
+    /// Empties the active strips of a range; in others there is nothing.
+    pub fn clear(&mut self, strips: std::ops::Range<usize>) {
+        let first = strips.start;
+        for run in runs(&self.active[strips]) {
+            let run = (first + run.start) * STRIP..(first + run.end) * STRIP;
+            self.depth[run.clone()].fill(0);
+            for numbers in &mut self.numbers {
+                numbers[run.clone()].fill(0.0);
+            }
+            self.heads[run].fill(0.0);
+        }
+    }
+}
+
+impl Flow {
+    /// Dry columns.
+    pub fn new(columns: &Columns, pipes: &Pipes) -> Self {
+        let none = vec![0.0; columns.len()];
+        Self {
+            depth: vec![0; columns.len() + STRIP],
+            flux: [none.clone(), none.clone()],
+            left: [none.clone(), none],
+            links: LinkFlow::new(&pipes.links),
+            active: Active::new(columns, &pipes.links),
+            bands: Bands::new(columns, pipes.links.most),
+            network: Network::new(columns.len()),
+            last: 1.0,
+        }
+    }
+
+    /// Memory (bytes).
+    pub fn bytes(&self) -> usize {
+        let pipes: usize = self.flux.iter().chain(&self.left).map(|numbers| size_of_val(&numbers[..])).sum();
+        let links = [&self.links.flux, &self.links.left, &self.links.transfer];
+        let links: usize = links.iter().map(|numbers| size_of_val(&numbers[..])).sum();
+        size_of_val(&self.depth[..])
+            + pipes
+            + links
+            + self.active.bytes()
+            + self.bands.bytes()
+            + self.network.bytes()
+    }
+
+    /// H of every column index (units).
+    pub fn depths(&self) -> &[i32] {
+        &self.depth[..self.depth.len() - STRIP]
+    }
+
+    /// Whether each strip is worked on: in all others there is neither liquid nor flow.
+    pub(super) fn active(&self) -> &[bool] {
+        self.active.active()
+    }
+
+    /// Fluxes (units in a step of `last`) and what truncation left of transfers (units), both to the east and to the south, by column index.
+    pub(super) fn numbers(&self) -> [&[f32]; 4] {
+        let ([east, south], [left_east, left_south]) = (&self.flux, &self.left);
+        [east, south, left_east, left_south]
+    }
+
+    /// Heads over the surface (units) of full columns, by column index.
+    pub(super) fn heads(&self) -> &[f32] {
+        self.network.over()
+    }
+
+    /// Among others, the greatest depths of rows.
+    pub(super) fn bands(&self) -> &Bands {
+        &self.bands
+    }
+
+    /// All that a restored state replaces; then comes [`Flow::wake`].
+    pub(super) fn stored(&mut self) -> Stored<'_> {
+        let ([east, south], [left_east, left_south]) = (&mut self.flux, &mut self.left);
+        Stored {
+            active: self.active.active(),
+            depth: &mut self.depth,
+            numbers: [east, south, left_east, left_south],
+            heads: self.network.over_mut(),
+            bands: &mut self.bands,
+            links: &mut self.links,
+            last: &mut self.last,
+        }
+    }
+
+    /// Makes the strips of some runs, which are in order, active, and no others but those beside liquid: what is [`Stored`] has changed.
+    pub(super) fn wake(
+        &mut self,
+        columns: &Columns,
+        runs: impl Iterator<Item = std::ops::Range<usize>> + Clone,
+    ) {
+        self.active.reset(columns, &self.depth, runs);
+    }
+
+    /// Units of liquid in all columns.
+    pub fn units(&self) -> i64 {
+        self.depth.iter().map(|&depth| i64::from(depth)).sum()
+    }
+
+    /// Adds to the depth of a column, or takes from it, within 0 and its ceiling; returns what was added.
+    pub fn add(&mut self, columns: &Columns, index: usize, units: i64) -> i64 {
+        let room = i64::from(columns.ceilings()[index]) - i64::from(columns.bases()[index]);
+        let before = i64::from(self.depth[index]);
+        let after = (before + units).clamp(0, room.max(0));
+        self.depth[index] = after as i32;
+        self.bands.deepen(columns.cell(index)[1], after as i32);
+        let strip = index / STRIP;
+        if after > 0 && !self.active.wet()[strip] {
+            self.active.wake(columns, strip);
+        }
+        after - before
+    }
+
+    /// Gives a part of the columns another count of indices; what they hold is then left over from before.
+    pub(super) fn resize_part(&mut self, part: Range<usize>, len: usize) {
+        resize_part(&mut self.depth, part.clone(), len, 0);
+        for numbers in self.flux.iter_mut().chain(&mut self.left) {
+            resize_part(numbers, part.clone(), len, 0.0);
+        }
+        self.network.resize_part(part, len);
+    }
+
+    /// Finds again what depends on the columns of some rows, and on the links unless these join the same ones.
+    pub(super) fn refit(
+        &mut self,
+        columns: &Columns,
+        pipes: &Pipes,
+        rows: Range<usize>,
+        has_same_links: bool,
+    ) {
+        self.bands.refit(columns, pipes.links.most, rows.clone(), &self.depth);
+        let links = (!has_same_links).then_some(&pipes.links);
+        self.active.refit(columns, links, rows.clone(), &self.depth);
+        let Self { flux, left, network, active, .. } = self;
+        for strip in columns.row(rows.start).start..columns.row(rows.end - 1).end {
+            if !active.active()[strip] {
+                flux.iter_mut().chain(&mut *left).for_each(|flow| strip_mut(flow, strip).fill(0.0));
+                strip_mut(network.over_mut(), strip).fill(0.0);
+            }
+        }
+    }
+
+    /// Begins a frame: strips where all is dry sleep.
+    pub fn begin_frame(&mut self, columns: &Columns) {
+        let [east, south] = &mut self.flux;
+        let [left_east, left_south] = &mut self.left;
+        self.active.settle(columns, &self.depth, |asleep| {
+            for numbers in [&mut *east, &mut *south, &mut *left_east, &mut *left_south] {
+                numbers[asleep.clone()].fill(0.0);
+            }
+            self.network.over_mut()[asleep].fill(0.0);
+        });
+    }
+
+    /// At least the greatest depth (units).
+    pub fn deepest(&self) -> i32 {
+        self.bands.deepest()
+    }
+
+    /// One step of `dt` (s); returns the count of rows in which K_min, and in which K_max, was not 1. Runs on the threads of the pool around it,
+    /// if [`Flow::divide`] has divided it.
+    pub fn step(&mut self, columns: &Columns, pipes: &Pipes, step: &Step, dt: f64) -> [u32; 2] {
+        self.active.refresh(columns);
+        if self.bands.find_filling() || !self.network.is_empty() {
+            self.flood(columns, pipes, step);
+        }
+        let ground = Ground { columns, pipes, active: &self.active, network: &self.network, may_fill: &[] };
+        let liquid = Part::new(&mut self.depth, &mut self.flux, &mut self.left, &mut self.links);
+        self.bands.step(step, &ground, liquid);
+        self.network.put_back(&mut self.flux, &mut self.left, &mut self.links);
+        let mut scaled = [0; 2];
+        for stepped in self.bands.results() {
+            scaled = [0, 1].map(|which| scaled[which] + stepped.scaled[which]);
+            self.links.lost += stepped.outside.lost;
+            self.links.gained += stepped.outside.gained;
+            for strip in stepped.woken.drain(..) {
+                self.active.wake(columns, strip as usize);
+            }
+            (stepped.scaled, stepped.outside) = Default::default();
+        }
+        self.last = dt;
+        scaled
+    }
+
+    /// Divides steps among so many threads, where that is faster; whether it is.
+    pub fn divide(&mut self, columns: &Columns, threads: usize) -> bool {
+        self.bands.divide(columns, threads);
+        self.bands.are_several()
+    }
+
+    /// Finds what flows through full columns.
+    fn flood(&mut self, columns: &Columns, pipes: &Pipes, step: &Step) {
+        let ([east, south], [left_east, left_south]) = (&self.flux, &self.left);
+        let state = State {
+            depth: &self.depth,
+            flux: [east, south],
+            left: [left_east, left_south],
+            links: &self.links,
+        };
+        self.network.find(step, columns, pipes, self.bands.filling(), &state);
+    }
+}

@@ -1,0 +1,383 @@
+//! Flooded passages: columns that are full up to their ceiling push with a head instead of a surface (the extended pipes of Dagenais et al.,
+//! Computers & Graphics 76, 2018, which the thesis leaves out).
+//!
+//! What flows into a full column flows out: the heads of a step follow from a linear system, by conjugate gradients whose sums do not
+//! depend on their order. The pipes of full columns form the *network*. What it moves is found before the fluxes of all others, and put in place behind
+//! them: all come from the same surface, or waves would grow. A head below the surface would be suction: such a column gives as if it were free.
+
+use super::flux::Step;
+use super::heads::Node;
+use super::links::LinkFlow;
+use super::rounds::{self, Party};
+use crate::shallow::columns::{Columns, NONE, STRIP, resize_part};
+use crate::shallow::grid::TOP;
+use crate::shallow::pipes::Pipes;
+
+/// A column is full when it misses at most its room over this.
+const SLACK: i32 = 128;
+
+/// A pipe of the network: its place in its array.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum At {
+    /// To the east of a column.
+    East(u32),
+    /// To the south of a column.
+    South(u32),
+    /// A link.
+    Link(u32),
+}
+
+/// A pipe of the network.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Edge {
+    pub at: At,
+    /// Parties at both ends, or [`NONE`]: outside.
+    pub ends: [u32; 2],
+    /// Flux without a difference of heads, and for a unit of it (units a step).
+    pub kept: f64,
+    pub conductance: f64,
+    /// Surface outside (units), where one end is there.
+    pub outside: f64,
+    /// Flux (units a step), and what truncation leaves of it.
+    pub flux: f64,
+    pub left: f64,
+    /// Transfer (units).
+    pub units: i64,
+}
+
+/// The network of a step.
+#[derive(Debug, Clone, Default)]
+pub struct Network {
+    /// Full columns first, then those at the other ends of their pipes.
+    pub(super) parties: Vec<Party>,
+    pub(super) nodes: Vec<Node>,
+    pub(super) edges: Vec<Edge>,
+    /// Party of each column, or [`NONE`].
+    party_of: Vec<u32>,
+    /// Head over the surface of each column in the last step (units).
+    pub(super) over: Vec<f32>,
+    /// The network's pipes, sorted.
+    shut_east: Vec<u32>,
+    shut_south: Vec<u32>,
+    shut_links: Vec<u32>,
+    /// What the network changes: columns, sorted, and units.
+    moves: Vec<(u32, i32)>,
+}
+
+/// The state that a network is found in.
+pub struct State<'a> {
+    /// H (units).
+    pub depth: &'a [i32],
+    /// Flux to the east and to the south (units a step).
+    pub flux: [&'a [f32]; 2],
+    /// What truncation left of both (units).
+    pub left: [&'a [f32]; 2],
+    /// Flow through links.
+    pub links: &'a LinkFlow,
+}
+
+impl Network {
+    /// No network, for so many column indices.
+    pub fn new(columns: usize) -> Self {
+        Self { party_of: vec![NONE; columns], over: vec![0.0; columns], ..Self::default() }
+    }
+
+    /// Gives a part of the columns another count of indices; what they hold is then left over from before.
+    pub(super) fn resize_part(&mut self, part: std::ops::Range<usize>, len: usize) {
+        self.clear();
+        resize_part(&mut self.over, part, len, 0.0);
+        self.party_of.resize(self.over.len(), NONE);
+    }
+
+    /// Heads over the surface (units) by column index: part of the state, as the next step's iterations begin with them.
+    pub fn over_mut(&mut self) -> &mut [f32] {
+        &mut self.over
+    }
+
+    /// As [`Network::over_mut`], to read.
+    pub fn over(&self) -> &[f32] {
+        &self.over
+    }
+
+    /// Memory that does not depend on full columns (bytes).
+    pub fn bytes(&self) -> usize {
+        size_of_val(&self.party_of[..]) + size_of_val(&self.over[..])
+    }
+
+    /// Whether there is no full column.
+    pub fn is_empty(&self) -> bool {
+        self.nodes.is_empty()
+    }
+
+    /// Finds the full columns of some rows, their heads and what flows through their pipes.
+    pub fn find(&mut self, step: &Step, columns: &Columns, pipes: &Pipes, rows: &[bool], state: &State) {
+        self.clear();
+        self.find_full(columns, rows, state.depth);
+        if self.nodes.is_empty() {
+            return;
+        }
+        self.connect(step, columns, pipes, rows, state);
+        self.find_heads(columns);
+        self.flow(columns);
+        rounds::settle(&mut self.parties, &mut self.edges);
+        self.decide(columns);
+    }
+
+    fn clear(&mut self) {
+        for party in self.parties.drain(..) {
+            self.party_of[party.column as usize] = NONE;
+        }
+        self.nodes.clear();
+        self.edges.clear();
+        self.shut_east.clear();
+        self.shut_south.clear();
+        self.shut_links.clear();
+        self.moves.clear();
+    }
+
+    fn find_full(&mut self, columns: &Columns, rows: &[bool], depth: &[i32]) {
+        for row in (0..rows.len()).filter(|&row| rows[row]) {
+            let strips = columns.row(row);
+            for i in strips.start * STRIP..strips.end * STRIP {
+                let room = columns.ceilings()[i] - columns.bases()[i];
+                let is_full = depth[i] > 0 && columns.ceilings()[i] < TOP && room - depth[i] <= room / SLACK;
+                if is_full {
+                    self.add_party(columns, depth, i as u32);
+                    self.nodes.push(Node::new(f64::from(self.over[i])));
+                } else {
+                    self.over[i] = 0.0;
+                }
+            }
+        }
+    }
+
+    fn add_party(&mut self, columns: &Columns, depth: &[i32], column: u32) -> u32 {
+        let i = column as usize;
+        if self.party_of[i] == NONE {
+            self.party_of[i] = self.parties.len() as u32;
+            let room = columns.ceilings()[i] - columns.bases()[i] - depth[i];
+            self.parties.push(Party {
+                column,
+                has: i64::from(depth[i]),
+                room: i64::from(room),
+                gives: 0,
+                takes: 0,
+            });
+        }
+        self.party_of[i]
+    }
+
+    /// Collects the pipes of full columns.
+    fn connect(&mut self, step: &Step, columns: &Columns, pipes: &Pipes, rows: &[bool], state: &State) {
+        for node in 0..self.nodes.len() {
+            let i = self.parties[node].column as usize;
+            let (strip, place) = (i / STRIP, i % STRIP);
+            let beyond = |strip: u32| (strip != NONE).then(|| strip as usize * STRIP + place);
+            let west = if place > 0 { Some(i - 1) } else { columns.west(strip).map(|_| i - 1) };
+            if pipes.east[i] > 0.0 {
+                let edge = self.join(step, columns, state, At::East(i as u32), [i, i + 1], pipes.east[i]);
+                self.meet(edge, node, 0, i + 1, 1);
+            }
+            if let Some(j) = beyond(columns.south(strip)).filter(|_| pipes.south[i] > 0.0) {
+                let edge = self.join(step, columns, state, At::South(i as u32), [i, j], pipes.south[i]);
+                self.meet(edge, node, 2, j, 3);
+            }
+            // Those between two full columns came with the other one.
+            let is_node = |network: &Self, j: usize| (network.party_of[j] as usize) < network.nodes.len();
+            if let Some(j) = west.filter(|&j| pipes.east[j] > 0.0 && !is_node(self, j)) {
+                let edge = self.join(step, columns, state, At::East(j as u32), [j, i], pipes.east[j]);
+                self.nodes[node].edges[1] = edge;
+            }
+            if let Some(j) =
+                beyond(columns.north(strip)).filter(|&j| pipes.south[j] > 0.0 && !is_node(self, j))
+            {
+                let edge = self.join(step, columns, state, At::South(j as u32), [j, i], pipes.south[j]);
+                self.nodes[node].edges[3] = edge;
+            }
+        }
+        self.connect_links(step, columns, pipes, rows, state);
+        self.shut_east.sort_unstable();
+        self.shut_south.sort_unstable();
+    }
+
+    fn connect_links(&mut self, step: &Step, columns: &Columns, pipes: &Pipes, rows: &[bool], state: &State) {
+        let links = &pipes.links;
+        let count = self.nodes.len();
+        for row in 0..rows.len() {
+            if !rows[row] && !rows.get(row + 1).is_some_and(|next| *next) {
+                continue;
+            }
+            for link in links.row(row) {
+                let (from, to) = (links.from[link], links.to[link]);
+                let is_node =
+                    |column: u32| column != NONE && (self.party_of[column as usize] as usize) < count;
+                if is_node(from) || is_node(to) {
+                    let at = At::Link(link as u32);
+                    self.join(step, columns, state, at, [from as usize, to as usize], links.open[link]);
+                    if let (NONE, Some(edge)) = (to, self.edges.last_mut()) {
+                        edge.outside = f64::from(links.outside(columns, link, step.still).0);
+                    }
+                }
+            }
+        }
+    }
+
+    /// Adds a pipe; returns its index.
+    fn join(
+        &mut self,
+        step: &Step,
+        columns: &Columns,
+        state: &State,
+        at: At,
+        [i, j]: [usize; 2],
+        open: f32,
+    ) -> u32 {
+        let (flux, left, tilt) = match at {
+            At::East(at) => {
+                self.shut_east.push(at);
+                (state.flux[0][at as usize], state.left[0][at as usize], step.tilt[0])
+            }
+            At::South(at) => {
+                self.shut_south.push(at);
+                (state.flux[1][at as usize], state.left[1][at as usize], step.tilt[1])
+            }
+            At::Link(at) => {
+                self.shut_links.push(at);
+                (state.links.flux[at as usize], state.links.left[at as usize], 0)
+            }
+        };
+        let outside = j == NONE as usize;
+        let from = self.add_party(columns, state.depth, i as u32);
+        let to = if outside { NONE } else { self.add_party(columns, state.depth, j as u32) };
+        let height = section(columns, state.depth, i, (!outside).then_some(j), flux);
+        let square = height * height;
+        let drag = f64::from(step.drag) * f64::from(step.thinned(flux, square as f32));
+        let held_back =
+            if square > 0.0 && open > 0.0 { square / (square + drag / f64::from(open)) } else { 0.0 };
+        let conductance = held_back * f64::from(step.drive) * height.min(f64::from(step.section));
+        self.edges.push(Edge {
+            at,
+            ends: [from, to],
+            kept: held_back * f64::from(step.kept * flux) + conductance * f64::from(tilt),
+            conductance,
+            outside: 0.0,
+            flux: 0.0,
+            left: f64::from(left),
+            units: 0,
+        });
+        (self.edges.len() - 1) as u32
+    }
+
+    /// Tells both columns of a pipe which it is.
+    fn meet(&mut self, edge: u32, node: usize, side: usize, other: usize, other_side: usize) {
+        self.nodes[node].edges[side] = edge;
+        let other = self.party_of[other] as usize;
+        if let Some(node) = self.nodes.get_mut(other) {
+            node.edges[other_side] = edge;
+        }
+    }
+
+    /// What flows with these heads.
+    fn flow(&mut self, columns: &Columns) {
+        for at in 0..self.edges.len() {
+            let edge = self.edges[at];
+            let head = |end: usize| {
+                let over = self.nodes.get(edge.ends[end] as usize).map_or(0.0, |node| node.over);
+                self.surface(columns, &edge, end) + over
+            };
+            let flux = edge.kept + edge.conductance * (head(0) - head(1));
+            let edge = &mut self.edges[at];
+            (edge.flux, edge.units) = (flux, nearest(flux + edge.left));
+        }
+    }
+
+    /// What the units of the network's pipes leave of its fluxes, and change in its columns.
+    fn decide(&mut self, columns: &Columns) {
+        for edge in &mut self.edges {
+            let asked = nearest(edge.flux + edge.left);
+            if asked == edge.units {
+                edge.left += edge.flux - asked as f64;
+            } else {
+                edge.flux *= edge.units as f64 / asked as f64;
+                edge.left = 0.0;
+            }
+        }
+        for party in self.parties.iter().filter(|party| party.takes != party.gives) {
+            let units = (party.takes - party.gives) as i32;
+            let i = party.column as usize;
+            debug_assert!(
+                party.has >= party.gives && party.has + i64::from(units) <= party.has + party.room,
+                "{i} {columns:?}"
+            );
+            self.moves.push((party.column, units));
+        }
+        self.moves.sort_unstable();
+    }
+
+    /// Moves the network's units in a range of columns, and shuts its pipes there and in a range of links for the rest of the step.
+    pub fn move_units(
+        &self,
+        columns: &std::ops::Range<u32>,
+        links: &std::ops::Range<usize>,
+        mut change: impl FnMut(u32, i32),
+        mut east: impl FnMut(u32),
+        mut south: impl FnMut(u32),
+        mut link: impl FnMut(u32),
+    ) {
+        let first = self.moves.partition_point(|(column, _)| *column < columns.start);
+        for (column, units) in self.moves[first..].iter().take_while(|(column, _)| *column < columns.end) {
+            change(*column, *units);
+        }
+        let within = |list: &[u32], range: std::ops::Range<u32>| {
+            list.partition_point(|&at| at < range.start)..list.partition_point(|&at| at < range.end)
+        };
+        let range = within(&self.shut_east, columns.clone());
+        self.shut_east[range].iter().for_each(|&at| east(at));
+        let range = within(&self.shut_south, columns.clone());
+        self.shut_south[range].iter().for_each(|&at| south(at));
+        let range = within(&self.shut_links, links.start as u32..links.end as u32);
+        self.shut_links[range].iter().for_each(|&at| link(at));
+    }
+
+    /// Puts the fluxes of the network in place, after the rest of the step.
+    pub fn put_back(&self, flux: &mut [Vec<f32>; 2], left: &mut [Vec<f32>; 2], links: &mut LinkFlow) {
+        let ([flux_east, flux_south], [left_east, left_south]) = (flux, left);
+        for edge in &self.edges {
+            match edge.ends {
+                [_, NONE] if edge.units > 0 => links.lost += edge.units,
+                [_, NONE] => links.gained -= edge.units,
+                _ => {}
+            }
+            let (flux, left, at) = match edge.at {
+                At::East(at) => (&mut flux_east[..], &mut left_east[..], at),
+                At::South(at) => (&mut flux_south[..], &mut left_south[..], at),
+                At::Link(at) => (&mut links.flux[..], &mut links.left[..], at),
+            };
+            (flux[at as usize], left[at as usize]) = (edge.flux as f32, edge.left as f32);
+        }
+    }
+}
+
+/// The height of a pipe's section (units): the depth of the column that gave last, within the opening between both.
+fn section(columns: &Columns, depth: &[i32], i: usize, j: Option<usize>, flux: f32) -> f64 {
+    let (base, ceiling) = (columns.bases(), columns.ceilings());
+    let Some(j) = j else { return f64::from(depth[i]) };
+    let opening = ceiling[i].min(ceiling[j]) - base[i].max(base[j]);
+    let eta = |k: usize| base[k] + depth[k];
+    let gives = match flux.partial_cmp(&0.0) {
+        Some(std::cmp::Ordering::Greater) => depth[i],
+        Some(std::cmp::Ordering::Less) => depth[j],
+        // From both ends the same.
+        _ => match eta(i).cmp(&eta(j)) {
+            std::cmp::Ordering::Greater => depth[i],
+            std::cmp::Ordering::Less => depth[j],
+            std::cmp::Ordering::Equal => depth[i].min(depth[j]),
+        },
+    };
+    f64::from(gives.min(opening))
+}
+
+/// The whole units of a transfer, the nearest (`flux::rounded`); those of a restored state may be beyond all bounds, and their sums have to fit 64 bits.
+fn nearest(transfer: f64) -> i64 {
+    transfer.clamp(-1e15, 1e15).round() as i64
+}

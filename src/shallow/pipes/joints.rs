@@ -1,0 +1,281 @@
+//! Finds the pipes of rows of columns: openness of regular ones, and the links.
+//!
+//! Few cells have links. Those that may are found first, 16 at a time.
+
+use std::ops::Range;
+
+use super::slopes::{self, Rises};
+use crate::shallow::columns::{Columns, NONE, STRIP, strip_of};
+use crate::shallow::pipes::{Border, Links};
+use crate::shallow::stacks::Stacks;
+
+/// A side of a cell.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(in crate::shallow) enum Side {
+    East,
+    South,
+    West,
+    North,
+}
+
+impl Side {
+    const ALL: [Self; 4] = [Self::East, Self::South, Self::West, Self::North];
+
+    fn is_along_x(self) -> bool {
+        matches!(self, Self::East | Self::West)
+    }
+
+    fn opposite(self) -> Self {
+        match self {
+            Self::East => Self::West,
+            Self::South => Self::North,
+            Self::West => Self::East,
+            Self::North => Self::South,
+        }
+    }
+
+    /// The cell beyond this side, if it is within the domain.
+    pub(super) fn cell(self, [x, z]: [usize; 2], [nx, nz]: [usize; 2]) -> Option<[usize; 2]> {
+        match self {
+            Self::East => (x + 1 < nx).then(|| [x + 1, z]),
+            Self::South => (z + 1 < nz).then(|| [x, z + 1]),
+            Self::West => x.checked_sub(1).map(|x| [x, z]),
+            Self::North => z.checked_sub(1).map(|z| [x, z]),
+        }
+    }
+}
+
+/// What is known of the rows around the one whose pipes are found; kept, so that nothing is allocated again.
+#[derive(Debug, Clone, Default)]
+pub(in crate::shallow) struct Finder {
+    /// Of the row and the next one, by row modulo 2.
+    rises: [Rises; 2],
+    /// Of the row and those beside it, by row modulo 3.
+    stacks: [Stacks; 3],
+}
+
+impl Finder {
+    /// Finds the pipes of some rows: sets the openness of regular ones, by column index, and adds the links in order.
+    pub fn find(
+        &mut self,
+        columns: &Columns,
+        border: Border,
+        rows: Range<usize>,
+        [east, south]: [&mut [f32]; 2],
+        links: &mut Links,
+    ) {
+        let count = columns.grid.size[1];
+        for row in rows.start.saturating_sub(1)..(rows.start + 1).min(count) {
+            self.stacks[row % 3].find_row(columns, row);
+        }
+        self.rises[rows.start % 2].find(columns, rows.start);
+        for row in rows {
+            if row + 1 < count {
+                self.stacks[(row + 1) % 3].find_row(columns, row + 1);
+                self.rises[(row + 1) % 2].find(columns, row + 1);
+            }
+            let rises = [&self.rises[row % 2], &self.rises[(row + 1) % 2]];
+            slopes::open_row(columns, row, rises, east, south);
+            Joiner::new(self, columns, row, border).join_row(links);
+            links.rows.push(links.len() as u32);
+        }
+    }
+}
+
+/// Finds the links of a row.
+struct Joiner<'a> {
+    columns: &'a Columns,
+    row: usize,
+    border: Border,
+    /// Of the row and the next one.
+    rises: [&'a Rises; 2],
+    own: &'a Stacks,
+    /// None at the edge of the domain.
+    north: Option<&'a Stacks>,
+    south: Option<&'a Stacks>,
+    /// First index of the row and of the next one.
+    starts: [usize; 2],
+    scale: f64,
+}
+
+impl<'a> Joiner<'a> {
+    fn new(finder: &'a Finder, columns: &'a Columns, row: usize, border: Border) -> Self {
+        let count = columns.grid.size[1];
+        let strips = columns.row(row);
+        Self {
+            columns,
+            row,
+            border,
+            rises: [&finder.rises[row % 2], &finder.rises[(row + 1) % 2]],
+            own: &finder.stacks[row % 3],
+            north: (row > 0).then(|| &finder.stacks[(row + 2) % 3]),
+            south: (row + 1 < count).then(|| &finder.stacks[(row + 1) % 3]),
+            starts: [strips.start * STRIP, strips.end * STRIP],
+            scale: slopes::scale(columns),
+        }
+    }
+
+    fn join_row(&self, links: &mut Links) {
+        let nx = self.columns.grid.size[0];
+        let is_outer = self.border != Border::Closed && (self.north.is_none() || self.south.is_none());
+        let is_grounded =
+            [Some(self.own), self.north, self.south].into_iter().flatten().all(|stacks| stacks.is_grounded);
+        for block in 0..nx.div_ceil(STRIP) {
+            let mut cells = self.across_layers(block);
+            if !is_grounded {
+                cells |= self.over_void(block);
+            }
+            if self.border != Border::Closed {
+                cells |= if is_outer { u16::MAX } else { 0 };
+                cells |= u16::from(block == 0);
+                cells |= if block == (nx - 1) / STRIP { 1 << ((nx - 1) % STRIP) } else { 0 };
+            }
+            while cells != 0 {
+                let x = block * STRIP + cells.trailing_zeros() as usize;
+                cells &= cells - 1;
+                for (layer, i) in self.own.columns(self.columns, x).enumerate() {
+                    for side in Side::ALL {
+                        self.join(links, [x, self.row], layer, i, side);
+                    }
+                }
+            }
+        }
+    }
+
+    /// Bits of the cells of a block with columns that may be linked to such of other layers to the east or south.
+    fn across_layers(&self, block: usize) -> u16 {
+        let is_last = (block + 1) * STRIP >= self.columns.grid.size[0];
+        let own = (self.own.of(block), self.own.extents(block));
+        let none = (&[][..], &[][..]);
+        let east = if is_last { none } else { (self.own.of(block + 1), self.own.extents(block + 1)) };
+        let south = self.south.map_or(none, |stacks| (stacks.of(block), stacks.extents(block)));
+        if own.0.len().max(east.0.len()).max(south.0.len()) < 2 {
+            return 0;
+        }
+        let mut cells = 0;
+        for (layer, (&strip, extent)) in own.0.iter().zip(own.1).enumerate() {
+            // Strips of other layers that have a column which meets one of this strip, unless their places are apart.
+            let others = |(strips, extents): (&'a [u32], &'a [[i32; 2]])| {
+                let all = strips.iter().zip(extents).enumerate();
+                all.filter(move |(other, (_, range))| {
+                    *other != layer && extent[0].max(range[0]) < extent[1].min(range[1])
+                })
+                .map(|(_, (&strip, _))| strip as usize)
+            };
+            let strip = strip as usize;
+            others(own).for_each(|other| cells |= self.meeting(strip, other, 1) & !(1 << (STRIP - 1)));
+            others(south).for_each(|other| cells |= self.meeting(strip, other, 0));
+            let last = strip * STRIP + STRIP - 1;
+            if others(east).any(|other| self.columns.overlap(last, other * STRIP)) {
+                cells |= 1 << (STRIP - 1);
+            }
+        }
+        cells
+    }
+
+    /// Bits of the columns of a strip that liquid can pass from to those of another strip, so many places behind theirs.
+    fn meeting(&self, strip: usize, other: usize, places: usize) -> u16 {
+        let (bases, ceilings) = (self.columns.bases(), self.columns.ceilings());
+        let (base, ceiling) = (strip_of(bases, strip), strip_of(ceilings, strip));
+        let first = other * STRIP + places;
+        let (other_base, other_ceiling) = (&bases[first..first + STRIP], &ceilings[first..first + STRIP]);
+        let (mut open, mut any) = ([0; STRIP], 0);
+        for x in 0..STRIP {
+            open[x] = i32::from(base[x].max(other_base[x]) < ceiling[x].min(other_ceiling[x]));
+            any |= open[x];
+        }
+        if any == 0 {
+            return 0;
+        }
+        open.iter().enumerate().fold(0, |bits, (x, open)| bits | (*open as u16) << x)
+    }
+
+    /// Bits of the cells of a block with columns beside a void.
+    fn over_void(&self, block: usize) -> u16 {
+        let nx = self.columns.grid.size[0];
+        let mut cells = 0;
+        for &strip in self.own.of(block) {
+            let present = self.columns.present(strip as usize);
+            let base = strip_of(self.columns.bases(), strip as usize);
+            for (place, base) in base.iter().enumerate().filter(|(place, _)| present >> place & 1 == 1) {
+                let at = [block * STRIP + place, self.row];
+                let falls = Side::ALL.into_iter().any(|side| {
+                    let cell = side.cell(at, [nx, self.columns.grid.size[1]]);
+                    cell.is_some_and(|[x, _]| self.is_void(side, x, *base))
+                });
+                cells |= u16::from(falls) << place;
+            }
+        }
+        cells
+    }
+
+    /// The stacks of the row beyond a side.
+    fn beyond(&self, side: Side) -> Option<&'a Stacks> {
+        match side {
+            Side::East | Side::West => Some(self.own),
+            Side::South => self.south,
+            Side::North => self.north,
+        }
+    }
+
+    /// Whether the cell at x beyond a side has no ground at a height, or it hangs over it.
+    fn is_void(&self, side: Side, x: usize, height: i32) -> bool {
+        self.beyond(side).is_some_and(|stacks| !stacks.is_grounded && height < stacks.sills[x])
+    }
+
+    /// Adds the links of a column over a side: those to columns of other layers, which the cell to the west or north owns, and
+    /// the one to the outside.
+    fn join(&self, links: &mut Links, at: [usize; 2], layer: usize, i: usize, side: Side) {
+        let columns = self.columns;
+        let cell = side.cell(at, columns.grid.size);
+        let is_owner = matches!(side, Side::East | Side::South);
+        let beyond = self.beyond(side);
+        if let (Some([x, _]), Some(stacks)) = (cell.filter(|_| is_owner), beyond) {
+            for (other, j) in stacks.columns(columns, x).enumerate() {
+                if other != layer && columns.overlap(i, j) {
+                    let along = 4 * (i64::from(columns.bases()[j]) - i64::from(columns.bases()[i]));
+                    let across = self.across(i, side) + self.across(j, side);
+                    links.add(i, j as u32, side, self.open(along, across), 0);
+                }
+            }
+        }
+        let falls = cell.is_some_and(|[x, _]| self.is_void(side, x, columns.bases()[i]));
+        if falls || (cell.is_none() && self.border != Border::Closed) {
+            let base = i64::from(columns.bases()[i]);
+            let fall = if falls {
+                (columns.grid.cell / columns.heights.unit).min(f64::from(i32::MAX / 2)) as i64
+            } else {
+                // The ground goes on as it comes, but never rises.
+                let inner = self.beside(i, side.opposite()).filter(|&j| columns.overlap(i, j));
+                inner.map_or(0, |j| (i64::from(columns.bases()[j]) - base).max(0))
+            };
+            let open = self.open(4 * fall, 2 * self.across(i, side));
+            links.add(i, NONE, side, open, (base - fall).max(i64::from(i32::MIN / 2)) as i32);
+        }
+    }
+
+    fn open(&self, along: i64, across: i64) -> f32 {
+        slopes::openness(along as f64, across as f64, self.scale)
+    }
+
+    /// The rise at a column of this row or the next one, across a side's axis.
+    fn across(&self, i: usize, side: Side) -> i64 {
+        let row = usize::from(i >= self.starts[1]);
+        let rises = if side.is_along_x() { &self.rises[row].z } else { &self.rises[row].x };
+        i64::from(rises[i - self.starts[row]])
+    }
+
+    /// The index of the same layer beyond a side.
+    fn beside(&self, i: usize, side: Side) -> Option<usize> {
+        let (strip, place) = (i / STRIP, i % STRIP);
+        let at = |strip: u32| (strip != NONE).then(|| strip as usize * STRIP + place);
+        match side {
+            Side::East if place + 1 < STRIP => Some(i + 1),
+            Side::East => self.columns.east(strip).map(|next| next * STRIP),
+            Side::West if place > 0 => Some(i - 1),
+            Side::West => self.columns.west(strip).map(|before| before * STRIP + STRIP - 1),
+            Side::South => at(self.columns.south(strip)),
+            Side::North => at(self.columns.north(strip)),
+        }
+    }
+}

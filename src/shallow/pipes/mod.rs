@@ -1,0 +1,299 @@
+//! Pipes between columns (thesis 4.1.1): where they are open, how steep the ground below them is, and those that leave the domain.
+//!
+//! A pipe joins two columns of adjacent cells whose [b, max] overlap. Those between columns of one layer are *regular*: each column owns
+//! the one to its east and the one to its south, so that they are arrays beside the columns. All others are *links*, in a list: between
+//! layers, and to the outside.
+
+pub(super) mod joints;
+mod slopes;
+
+use std::ops::Range;
+
+use crate::shallow::columns::{Columns, NONE, STRIP, resize_part};
+use joints::{Finder, Side};
+
+/// What lies beyond the border of the domain.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub enum Border {
+    /// A wall.
+    #[default]
+    Closed,
+    /// Nothing: liquid flows off as the ground near the border leads it, and is counted as lost.
+    Open,
+    /// Liquid at rest, as high as the domain was filled last: waves leave, and do not come back. What goes out and in is counted. Before
+    /// it is filled the border is open, and where the ground is higher.
+    Absorbing,
+}
+
+/// The pipes that are not regular, by owner's row.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub struct Links {
+    /// The column that gives where the flux is positive.
+    pub from: Vec<u32>,
+    /// The other column, or [`NONE`]: the outside.
+    pub to: Vec<u32>,
+    /// The side of the first column that each leads over.
+    pub(super) sides: Vec<Side>,
+    /// As [`Pipes::east`].
+    pub open: Vec<f32>,
+    /// Surface outside (units), where `to` is [`NONE`].
+    pub level: Vec<i32>,
+    /// First link of each row, and the end of the last.
+    pub rows: Vec<u32>,
+    /// Columns with links, row by row.
+    pub columns: Vec<u32>,
+    /// First of those columns of each row, and the end of the last.
+    pub column_rows: Vec<u32>,
+    /// Most pipes that a column has.
+    pub most: usize,
+}
+
+/// All pipes of a terrain.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub struct Pipes {
+    /// Openness of the pipe from each index to the next along x: 0 where there is none.
+    pub east: Vec<f32>,
+    /// Openness of the pipe from each index to the one behind it along z.
+    pub south: Vec<f32>,
+    /// All others.
+    pub links: Links,
+}
+
+impl Pipes {
+    /// The pipes between columns, and over the border of the domain.
+    pub fn new(columns: &Columns, border: Border) -> Self {
+        let mut pipes = Self {
+            east: vec![0.0; columns.len()],
+            south: vec![0.0; columns.len()],
+            links: Links { rows: vec![0], ..Links::default() },
+        };
+        let (rows, open) = (0..columns.grid.size[1], [&mut pipes.east[..], &mut pipes.south[..]]);
+        Finder::default().find(columns, border, rows, open, &mut pipes.links);
+        pipes.links.list_columns(columns, &mut Ends::default());
+        pipes
+    }
+
+    /// Memory (bytes).
+    pub fn bytes(&self) -> usize {
+        let links = &self.links;
+        let ends = size_of_val(&links.from[..]) + size_of_val(&links.to[..]) + size_of_val(&links.sides[..]);
+        let numbers = size_of_val(&links.open[..]) + size_of_val(&links.level[..]);
+        let lists = [&links.rows, &links.columns, &links.column_rows];
+        let lists: usize = lists.iter().map(|list| size_of_val(&list[..])).sum();
+        size_of_val(&self.east[..]) + size_of_val(&self.south[..]) + ends + numbers + lists
+    }
+}
+
+/// The ends of links by column; kept, so that nothing is allocated again.
+#[derive(Debug, Clone, Default)]
+pub(super) struct Ends {
+    /// Bits of the places of each strip that have links.
+    marks: Vec<u16>,
+    /// Where the columns of each strip begin among those that have links.
+    firsts: Vec<u32>,
+    /// Links of each of these columns.
+    counts: Vec<u32>,
+}
+
+impl Ends {
+    /// The rank of a column with links among all of them.
+    fn rank(&self, column: u32) -> usize {
+        let (strip, place) = (column as usize / STRIP, column as usize % STRIP);
+        let before = self.marks[strip] & ((1 << place) - 1);
+        self.firsts[strip] as usize + before.count_ones() as usize
+    }
+}
+
+impl Links {
+    pub(super) fn add(&mut self, from: usize, to: u32, side: Side, open: f32, level: i32) {
+        self.from.push(from as u32);
+        self.to.push(to);
+        self.sides.push(side);
+        self.open.push(open);
+        self.level.push(level);
+    }
+
+    /// Lists the columns with links.
+    pub(super) fn list_columns(&mut self, columns: &Columns, ends: &mut Ends) {
+        let all = || self.from.iter().chain(self.to.iter().filter(|&&to| to != NONE)).copied();
+        ends.marks.clear();
+        ends.marks.resize(columns.strips().len(), 0);
+        all().for_each(|end| ends.marks[end as usize / STRIP] |= 1 << (end as usize % STRIP));
+        self.columns.clear();
+        self.column_rows.clear();
+        self.column_rows.push(0);
+        ends.firsts.clear();
+        for row in 0..columns.grid.size[1] {
+            for strip in columns.row(row) {
+                ends.firsts.push(self.columns.len() as u32);
+                let mut marks = ends.marks[strip];
+                while marks != 0 {
+                    self.columns.push((strip * STRIP) as u32 + marks.trailing_zeros());
+                    marks &= marks - 1;
+                }
+            }
+            self.column_rows.push(self.columns.len() as u32);
+        }
+        ends.counts.clear();
+        ends.counts.resize(self.columns.len(), 0);
+        for end in all() {
+            let rank = ends.rank(end);
+            ends.counts[rank] += 1;
+        }
+        self.most = 4 + ends.counts.iter().copied().max().unwrap_or(0) as usize;
+    }
+
+    /// Puts the links of other rows in place of those of some rows. The indices of the rows behind grow by `shift`, modulo 2^32.
+    pub(super) fn replace_rows(&mut self, rows: Range<usize>, new: &Self, shift: u32) {
+        let old = self.rows[rows.start] as usize..self.rows[rows.end] as usize;
+        let (first, len) = (old.start, new.len());
+        resize_part(&mut self.from, old.clone(), len, 0);
+        resize_part(&mut self.to, old.clone(), len, 0);
+        resize_part(&mut self.sides, old.clone(), len, Side::East);
+        resize_part(&mut self.open, old.clone(), len, 0.0);
+        resize_part(&mut self.level, old.clone(), len, 0);
+        let part = first..first + len;
+        self.from[part.clone()].copy_from_slice(&new.from);
+        self.to[part.clone()].copy_from_slice(&new.to);
+        self.sides[part.clone()].copy_from_slice(&new.sides);
+        self.open[part.clone()].copy_from_slice(&new.open);
+        self.level[part.clone()].copy_from_slice(&new.level);
+        if shift != 0 {
+            let behind = [&mut self.from[part.end..], &mut self.to[part.end..]];
+            let ends = behind.into_iter().flatten().filter(|end| **end != NONE);
+            ends.for_each(|end| *end = end.wrapping_add(shift));
+        }
+        for (row, end) in rows.clone().zip(&new.rows[1..]) {
+            self.rows[row + 1] = first as u32 + end;
+        }
+        let grows = (part.end as u32).wrapping_sub(old.end as u32);
+        self.rows[rows.end + 1..].iter_mut().for_each(|end| *end = end.wrapping_add(grows));
+    }
+
+    /// Removes all links; rows are counted from the first one added.
+    pub(super) fn clear(&mut self) {
+        self.from.clear();
+        self.to.clear();
+        self.sides.clear();
+        self.open.clear();
+        self.level.clear();
+        self.rows.clear();
+        self.rows.push(0);
+    }
+
+    /// Count of links.
+    pub fn len(&self) -> usize {
+        self.from.len()
+    }
+
+    /// Whether there is none.
+    pub fn is_empty(&self) -> bool {
+        self.from.is_empty()
+    }
+
+    /// The surface outside of a link that leads there (units), and whether it is that of liquid at rest, `still`, beyond the border.
+    #[inline]
+    pub fn outside(&self, columns: &Columns, link: usize, still: i32) -> (i32, bool) {
+        let from = self.from[link] as usize;
+        let is_still = still > columns.bases()[from]
+            && self.sides[link].cell(columns.cell(from), columns.grid.size).is_none();
+        if is_still { (still, true) } else { (self.level[link], false) }
+    }
+
+    /// The links that a row owns: from its columns to others of the row, of the next one, or outside.
+    pub fn row(&self, row: usize) -> Range<usize> {
+        self.rows[row] as usize..self.rows[row + 1] as usize
+    }
+
+    /// The columns of a row that have links.
+    pub fn columns_of(&self, row: usize) -> &[u32] {
+        &self.columns[self.column_rows[row] as usize..self.column_rows[row + 1] as usize]
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::shallow::grid::{BOTTOMLESS, Grid, Heights};
+    use crate::shallow::terrain::Solids;
+
+    fn columns(size: [usize; 2], cell: impl Fn([usize; 2]) -> Vec<[i32; 2]>) -> Columns {
+        let grid = Grid { cell: 1.0, origin: [0.0; 2], size };
+        let heights = Heights::between(0.0, 1024.0).unwrap();
+        let cells = (0..grid.cells()).map(|index| cell([index % size[0], index / size[0]]));
+        Columns::new(&Solids::new(grid, heights, cells))
+    }
+
+    /// Units in a metre.
+    const METRE: i32 = 1 << 20;
+
+    #[test]
+    fn a_slope_closes_by_its_square_and_one_the_same_from_both_sides() {
+        let ground = |[x, z]: [usize; 2]| vec![[BOTTOMLESS, (100 + x as i32 + 3 * z as i32) * METRE / 4]];
+        let columns = columns([20, 20], ground);
+        let pipes = Pipes::new(&columns, Border::Closed);
+        // Slopes 0.25 along x and 0.75 along z.
+        let all = (1.0f32 + 0.0625 + 0.5625).powi(-2);
+        let i = columns.column([7, 9], 0).unwrap();
+        assert_eq!((pipes.east[i], pipes.south[i]), (all, all));
+        let last = columns.column([19, 19], 0).unwrap();
+        assert_eq!((pipes.east[last], pipes.south[last]), (0.0, 0.0));
+        assert!(pipes.links.is_empty());
+    }
+
+    #[test]
+    fn a_bridge_has_links_and_walls_have_no_pipes() {
+        let ground = |[x, z]: [usize; 2]| match (x, z) {
+            (_, 1) => vec![[BOTTOMLESS, METRE], [3 * METRE, 4 * METRE]],
+            (2, 2) => vec![[BOTTOMLESS, 3 * METRE]],
+            _ => vec![[BOTTOMLESS, METRE]],
+        };
+        let columns = columns([5, 3], ground);
+        let pipes = Pipes::new(&columns, Border::Closed);
+        let at = |x: usize, z: usize, layer: usize| columns.column([x, z], layer).unwrap();
+        assert!(pipes.south[at(1, 0, 0)] > 0.0 && pipes.south[at(1, 1, 0)] > 0.0);
+        assert_eq!(pipes.south[at(2, 1, 0)], 0.0, "the pillar closes the passage");
+        // From the bridge to both sides, ten in all; the bridge is passed below and above, the pillar's top lies open to the bridge.
+        let joins = |i: usize, j: usize| {
+            (0..pipes.links.len())
+                .any(|link| (pipes.links.from[link], pipes.links.to[link]) == (i as u32, j as u32))
+        };
+        assert!(
+            joins(at(3, 0, 0), at(3, 1, 1))
+                && joins(at(3, 1, 1), at(3, 2, 0))
+                && joins(at(2, 1, 1), at(2, 2, 0))
+        );
+        assert_eq!(pipes.links.len(), 10);
+        assert_eq!(pipes.links.row(0).len(), 5);
+        assert_eq!(pipes.links.columns_of(1).len(), 5, "those of the bridge");
+        assert_eq!(pipes.links.most, 6);
+    }
+
+    #[test]
+    fn open_borders_go_on_downhill_only() {
+        let columns = columns([3, 1], |[x, _]| vec![[BOTTOMLESS, (10 - x as i32) * METRE]]);
+        let pipes = Pipes::new(&columns, Border::Open);
+        let links = &pipes.links;
+        let level = |x: usize, side: usize| {
+            let own: Vec<i32> =
+                (0..links.len()).filter(|&l| links.from[l] == x as u32).map(|l| links.level[l]).collect();
+            own[side]
+        };
+        // The last cell: east, south, north; the first: south, west, north.
+        assert_eq!(level(2, 0), 7 * METRE);
+        assert_eq!(level(2, 1), 8 * METRE);
+        assert_eq!(level(0, 1), 10 * METRE, "it does not rise outside");
+        assert_eq!(links.to, vec![NONE; links.len()]);
+    }
+
+    #[test]
+    fn liquid_falls_where_there_is_no_ground() {
+        let columns = columns([3, 1], |[x, _]| match x {
+            0 => vec![[2 * METRE, 5 * METRE]],
+            1 => vec![],
+            _ => vec![[7 * METRE, 8 * METRE]],
+        });
+        let links = Pipes::new(&columns, Border::Closed).links;
+        assert_eq!((links.len(), links.level[0]), (2, 4 * METRE));
+    }
+}

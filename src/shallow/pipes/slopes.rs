@@ -1,0 +1,158 @@
+//! How open regular pipes are (thesis 4.1.1), strip by strip.
+//!
+//! The thesis derives viscosity for level ground. On ground of slope S a film of vertical depth H is thinner by cos, and driven along the slope: its
+//! discharge is that of level ground over (1 + S^2)^2. Rises are differences of integers, so that nothing depends on the side from which
+//! they are seen.
+
+use crate::base::cpu::dispatch;
+use crate::shallow::columns::{Columns, NONE, STRIP, strip_mut, strip_of};
+
+/// Slopes are taken as at most this steep (60 degrees): a step of the ground is no slope, and liquid falls over its edge.
+const STEEPEST: f64 = 3.0;
+
+/// Numbers of the columns of a strip.
+type Lanes = [i32; STRIP];
+/// Of a strip that is not there.
+const ABSENT: Lanes = [0; STRIP];
+
+/// Twice the rises of the ground (units) over a cell at the columns of a row, along x and along z: by index from the row's first, and one strip more.
+///
+/// The difference of the bases beyond both sides of a column over regular pipes; twice that over one side where the other has none.
+#[derive(Debug, Clone, Default)]
+pub(super) struct Rises {
+    pub x: Vec<i32>,
+    pub z: Vec<i32>,
+}
+
+impl Rises {
+    /// Finds the rises of a row.
+    pub fn find(&mut self, columns: &Columns, row: usize) {
+        let len = (columns.row(row).len() + 1) * STRIP;
+        self.x.resize(len, 0);
+        self.z.resize(len, 0);
+        let rises = self;
+        dispatch!(at most avx2: rise_row(columns: &Columns, row: usize, rises: &mut Rises));
+    }
+}
+
+/// What turns rises, four times as great, into slopes.
+pub(super) fn scale(columns: &Columns) -> f64 {
+    columns.heights.unit / (4.0 * columns.grid.cell)
+}
+
+/// 1 / (1 + slope^2)^2 of the ground between two columns, of four times its rise along their pipe and across: the discharge of a film on it
+/// over that of a film of the same vertical depth and fall on level ground.
+#[inline(always)]
+pub(super) fn openness(along: f64, across: f64, scale: f64) -> f32 {
+    let (along, across) = (along * scale, across * scale);
+    let square = along * along + across * across;
+    let steep = 1.0 + if square < STEEPEST { square } else { STEEPEST };
+    (1.0 / (steep * steep)) as f32
+}
+
+/// Openness of the regular pipes that a row owns, to the east and to the south; `rises` are those of the row and of the next one.
+pub(super) fn open_row(
+    columns: &Columns,
+    row: usize,
+    rises: [&Rises; 2],
+    east: &mut [f32],
+    south: &mut [f32],
+) {
+    dispatch!(at most avx2: open_strips(columns: &Columns, row: usize, rises: [&Rises; 2], east: &mut [f32], south: &mut [f32]));
+}
+
+/// The numbers of a strip between the last one to the west and the first one to the east; 0 where there is none.
+#[inline(always)]
+fn window(numbers: &[i32], strip: usize, [west, east]: [bool; 2]) -> [i32; STRIP + 2] {
+    let mut window = [0; STRIP + 2];
+    window[1..=STRIP].copy_from_slice(strip_of(numbers, strip));
+    if west {
+        window[0] = numbers[strip * STRIP - 1];
+    }
+    if east {
+        window[STRIP + 1] = numbers[(strip + 1) * STRIP];
+    }
+    window
+}
+
+#[inline(always)]
+fn beyond(numbers: &[i32], strip: u32) -> &Lanes {
+    if strip == NONE { &ABSENT } else { strip_of(numbers, strip as usize) }
+}
+
+/// All bits where liquid can pass between columns, of their bases and ceilings. Where there is no column the ceiling is on the lowest base.
+#[inline(always)]
+fn passes(base: [i32; 2], ceiling: [i32; 2]) -> i32 {
+    -i32::from(base[0].max(base[1]) < ceiling[0].min(ceiling[1]))
+}
+
+/// Twice the rise, of those over both sides and whether there are such. Bases where liquid passes are within 0 to 2^30 - 1: it fits.
+#[inline(always)]
+fn twice([before, behind]: [i32; 2], [has_before, has_behind]: [i32; 2]) -> i32 {
+    (behind | (before & !has_behind)) + (before | (behind & !has_before))
+}
+
+#[inline(always)]
+fn rise_row(columns: &Columns, row: usize, rises: &mut Rises) {
+    let (bases, ceilings) = (columns.bases(), columns.ceilings());
+    for (place, strip) in columns.row(row).enumerate() {
+        let beside = [columns.west(strip).is_some(), columns.east(strip).is_some()];
+        let base = window(bases, strip, beside);
+        let ceiling = window(ceilings, strip, beside);
+        let along = strip_mut(&mut rises.x, place);
+        for x in 0..STRIP {
+            let open_west = passes([base[x], base[x + 1]], [ceiling[x], ceiling[x + 1]]);
+            let open_east = passes([base[x + 1], base[x + 2]], [ceiling[x + 1], ceiling[x + 2]]);
+            let steps = [(base[x + 1] - base[x]) & open_west, (base[x + 2] - base[x + 1]) & open_east];
+            along[x] = twice(steps, [open_west, open_east]);
+        }
+        let (base, ceiling) = (strip_of(bases, strip), strip_of(ceilings, strip));
+        let (north, south) = (columns.north(strip), columns.south(strip));
+        let (north_base, north_ceiling) = (beyond(bases, north), beyond(ceilings, north));
+        let (south_base, south_ceiling) = (beyond(bases, south), beyond(ceilings, south));
+        let across = strip_mut(&mut rises.z, place);
+        for x in 0..STRIP {
+            let open_north = passes([north_base[x], base[x]], [north_ceiling[x], ceiling[x]]);
+            let open_south = passes([base[x], south_base[x]], [ceiling[x], south_ceiling[x]]);
+            let steps = [(base[x] - north_base[x]) & open_north, (south_base[x] - base[x]) & open_south];
+            across[x] = twice(steps, [open_north, open_south]);
+        }
+    }
+}
+
+#[inline(always)]
+fn open_strips(columns: &Columns, row: usize, rises: [&Rises; 2], east: &mut [f32], south: &mut [f32]) {
+    let (bases, ceilings, scale) = (columns.bases(), columns.ceilings(), scale(columns));
+    let strips = columns.row(row);
+    for (place, strip) in strips.clone().enumerate() {
+        let (base, ceiling) = (strip_of(bases, strip), strip_of(ceilings, strip));
+        let beside = [false, columns.east(strip).is_some()];
+        let east_base = window(bases, strip, beside);
+        let east_ceiling = window(ceilings, strip, beside);
+        let across = &rises[0].z[place * STRIP..][..=STRIP];
+        let open = strip_mut(east, strip);
+        for x in 0..STRIP {
+            let passes = passes([base[x], east_base[x + 2]], [ceiling[x], east_ceiling[x + 2]]);
+            let along = 4.0 * (f64::from(east_base[x + 2]) - f64::from(base[x]));
+            let across = f64::from(across[x]) + f64::from(across[x + 1]);
+            let openness = openness(along, across, scale);
+            open[x] = f32::from_bits(openness.to_bits() & passes as u32);
+        }
+        let open = strip_mut(south, strip);
+        if columns.south(strip) == NONE {
+            open.fill(0.0);
+            continue;
+        }
+        let behind = columns.south(strip) as usize;
+        let (south_base, south_ceiling) = (strip_of(bases, behind), strip_of(ceilings, behind));
+        let along_own = strip_of(&rises[0].x, place);
+        let along_behind = strip_of(&rises[1].x, behind - strips.end);
+        for x in 0..STRIP {
+            let passes = passes([base[x], south_base[x]], [ceiling[x], south_ceiling[x]]);
+            let along = 4.0 * (f64::from(south_base[x]) - f64::from(base[x]));
+            let across = f64::from(along_own[x]) + f64::from(along_behind[x]);
+            let openness = openness(along, across, scale);
+            open[x] = f32::from_bits(openness.to_bits() & passes as u32);
+        }
+    }
+}

@@ -1,0 +1,69 @@
+//! The rows that change, as they were before.
+
+use std::ops::Range;
+
+use crate::shallow::columns::{Columns, STRIP, Strip};
+use crate::shallow::flow::Flow;
+
+/// The columns of some rows and their liquid. Strips and indices are counted from the first of these rows.
+#[derive(Debug, Clone, Default)]
+pub(super) struct Band {
+    /// The rows.
+    pub rows: Range<usize>,
+    /// The first of their strips among all.
+    pub first: usize,
+    pub strips: Vec<Strip>,
+    /// First strip of each row, and the end of the last.
+    starts: Vec<u32>,
+    pub present: Vec<u16>,
+    pub base: Vec<i32>,
+    pub ceiling: Vec<i32>,
+    pub under: Vec<i32>,
+    pub depth: Vec<i32>,
+    /// Flux to the east and to the south, and what truncation left of both.
+    pub flux: [Vec<f32>; 2],
+    pub left: [Vec<f32>; 2],
+    /// Heads over the surface.
+    pub over: Vec<f32>,
+}
+
+impl Band {
+    /// Keeps what some rows are.
+    pub fn save(&mut self, columns: &Columns, flow: &Flow, rows: Range<usize>) {
+        let strips = columns.row(rows.start).start..columns.row(rows.end - 1).end;
+        self.first = strips.start;
+        self.starts.clear();
+        self.starts.extend(rows.clone().map(|row| (columns.row(row).start - strips.start) as u32));
+        self.starts.push(strips.len() as u32);
+        copy(&mut self.strips, &columns.strips()[strips.clone()]);
+        self.present.clear();
+        self.present.extend(strips.clone().map(|strip| columns.present(strip)));
+        let indices = strips.start * STRIP..strips.end * STRIP;
+        copy(&mut self.base, &columns.bases()[indices.clone()]);
+        copy(&mut self.ceiling, &columns.ceilings()[indices.clone()]);
+        copy(&mut self.under, &columns.unders()[indices.clone()]);
+        copy(&mut self.depth, &flow.depths()[indices.clone()]);
+        for axis in [0, 1] {
+            copy(&mut self.flux[axis], &flow.flux[axis][indices.clone()]);
+            copy(&mut self.left[axis], &flow.left[axis][indices.clone()]);
+        }
+        copy(&mut self.over, &flow.network.over()[indices]);
+        self.rows = rows;
+    }
+
+    /// The strips of a row.
+    pub fn row(&self, row: usize) -> Range<usize> {
+        let at = row - self.rows.start;
+        self.starts[at] as usize..self.starts[at + 1] as usize
+    }
+
+    /// All strips among those of all rows, before.
+    pub fn range(&self) -> Range<usize> {
+        self.first..self.first + self.strips.len()
+    }
+}
+
+fn copy<T: Copy>(to: &mut Vec<T>, from: &[T]) {
+    to.clear();
+    to.extend_from_slice(from);
+}

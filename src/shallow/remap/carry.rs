@@ -1,0 +1,220 @@
+//! Fluxes, and what truncation left, of pipes whose columns are those of before. Others begin at 0.
+
+use std::ops::Range;
+
+use super::band::Band;
+use super::origins::Origins;
+use crate::shallow::columns::{Columns, NONE, STRIP, Strip, strip_mut, strip_of};
+use crate::shallow::flow::Flow;
+use crate::shallow::pipes::joints::Side;
+use crate::shallow::pipes::{Links, Pipes};
+
+/// Flux and what truncation left.
+type Carried = [f32; 2];
+
+/// A link as it was.
+#[derive(Debug, Clone, Copy)]
+struct OldLink {
+    /// Its cell along x.
+    x: u32,
+    from: u32,
+    to: u32,
+    side: Side,
+    carried: Carried,
+}
+
+/// Buffers.
+#[derive(Debug, Clone, Default)]
+pub(super) struct Carry {
+    /// The links of some rows before, and where those of each begin, and the end of the last.
+    old: Vec<OldLink>,
+    starts: Vec<u32>,
+    rows: Range<usize>,
+    /// Of the links of these rows now.
+    pub flux: Vec<f32>,
+    pub left: Vec<f32>,
+}
+
+/// What is carried from before to now.
+pub(super) struct Change<'a> {
+    pub columns: &'a Columns,
+    pub band: &'a Band,
+    pub origins: &'a Origins,
+}
+
+impl Carry {
+    /// Keeps the links of some rows.
+    pub fn save(&mut self, columns: &Columns, links: &Links, flow: &Flow, rows: Range<usize>) {
+        self.old.clear();
+        self.starts.clear();
+        self.starts.push(0);
+        for row in rows.clone() {
+            self.old.extend(links.row(row).map(|link| OldLink {
+                x: columns.cell(links.from[link] as usize)[0] as u32,
+                from: links.from[link],
+                to: links.to[link],
+                side: links.sides[link],
+                carried: [flow.links.flux[link], flow.links.left[link]],
+            }));
+            self.starts.push(self.old.len() as u32);
+        }
+        self.rows = rows;
+    }
+
+    /// Whether the links of these rows now join the columns that they did.
+    pub fn is_same(&self, links: &Links) -> bool {
+        let ends = links.from.iter().zip(&links.to);
+        links.len() == self.old.len()
+            && ends.zip(&self.old).all(|((from, to), old)| (*from, *to) == (old.from, old.to))
+    }
+
+    /// Finds what the new links of these rows carry.
+    pub fn links(&mut self, change: &Change, flow: &Flow, links: &Links) {
+        self.flux.clear();
+        self.left.clear();
+        for link in 0..links.len() {
+            let (from, to, side) = (links.from[link], links.to[link], links.sides[link]);
+            let [flux, left] = self.of(change, flow, [from, to], side);
+            self.flux.push(flux);
+            self.left.push(left);
+        }
+    }
+
+    /// What a pipe over a side carries between two columns, of which the second is the outside for [`NONE`].
+    fn of(&self, change: &Change, flow: &Flow, [from, to]: [u32; 2], side: Side) -> Carried {
+        let Some(old_from) = change.origins.column(from) else { return [0.0; 2] };
+        let old_to = if to == NONE { Some(NONE) } else { change.origins.column(to) };
+        let Some(old_to) = old_to else { return [0.0; 2] };
+        let place = change.old_strip(old_from);
+        if old_to != NONE && change.old_strip(old_to).layer == place.layer {
+            return change.regular(flow, old_from, side);
+        }
+        let row = place.row as usize - self.rows.start;
+        let x = place.at * STRIP as u32 + old_from % STRIP as u32;
+        let links = &self.old[self.starts[row] as usize..self.starts[row + 1] as usize];
+        let first = links.partition_point(|link| link.x < x);
+        let links = links[first..].iter().take_while(|link| link.x == x);
+        links
+            .filter(|link| (link.from, link.to, link.side) == (old_from, old_to, side))
+            .map(|link| link.carried)
+            .next()
+            .unwrap_or_default()
+    }
+
+    /// Carries the regular pipes of the band's rows, and those to the south of the row before, which are in place.
+    pub fn regular(&self, change: &Change, pipes: &Pipes, flow: &mut Flow) {
+        let Change { columns, band, origins } = change;
+        let rows = band.rows.clone();
+        for row in rows.start.saturating_sub(1)..rows.end {
+            for strip in columns.row(row) {
+                let (old, kept) = origins.strip(strip);
+                let south = match columns.south(strip) {
+                    NONE => 0,
+                    behind => origins.strip(behind as usize).1,
+                };
+                let is_in = rows.contains(&row);
+                let old = if is_in && old >= band.first { Some(old - band.first) } else { None };
+                if is_in {
+                    let next = columns.east(strip).map_or(0, |next| origins.strip(next).1);
+                    let kept = kept & (kept >> 1 | next << (STRIP - 1));
+                    self.strip(change, &pipes.east, flow, strip, old, kept, Side::East);
+                }
+                self.strip(change, &pipes.south, flow, strip, old, kept & south, Side::South);
+            }
+        }
+    }
+
+    /// Carries the pipes of a strip over a side: `kept` are the bits of those between columns that stayed in their strips, of which
+    /// that of the band, if it is in it, is `old`.
+    #[expect(clippy::too_many_arguments)]
+    fn strip(
+        &self,
+        change: &Change,
+        open: &[f32],
+        flow: &mut Flow,
+        strip: usize,
+        old: Option<usize>,
+        kept: u16,
+        side: Side,
+    ) {
+        let axis = usize::from(side == Side::South);
+        let open = strip_of(open, strip);
+        let mut before = [[0.0; STRIP]; 2];
+        if kept != 0 {
+            before = match old {
+                Some(old) => [&change.band.flux, &change.band.left].map(|of| *strip_of(&of[axis], old)),
+                None => [&flow.flux, &flow.left].map(|of| *strip_of(&of[axis], strip)),
+            };
+        }
+        for (number, before) in before.iter_mut().enumerate() {
+            for x in 0..STRIP {
+                before[x] = if open[x] > 0.0 { before[x] } else { 0.0 };
+            }
+            if kept != u16::MAX {
+                (0..STRIP).filter(|x| kept >> x & 1 == 0).for_each(|x| before[x] = 0.0);
+            }
+            let now = if number == 0 { &mut flow.flux } else { &mut flow.left };
+            *strip_mut(&mut now[axis], strip) = *before;
+        }
+        if change.origins.odd().is_empty() {
+            return;
+        }
+        for x in (0..STRIP).filter(|x| kept >> x & 1 == 0 && open[*x] > 0.0) {
+            let from = (strip * STRIP + x) as u32;
+            let to = match side {
+                Side::South => change.columns.south(strip) * STRIP as u32 + x as u32,
+                _ => from + 1,
+            };
+            let [flux, left] = self.of(change, flow, [from, to], side);
+            flow.flux[axis][from as usize] = flux;
+            flow.left[axis][from as usize] = left;
+        }
+    }
+
+    /// Carries the heads of the band's columns.
+    pub fn heads(change: &Change, flow: &mut Flow) {
+        let Change { columns, band, origins } = change;
+        let over = flow.network.over_mut();
+        for row in band.rows.clone() {
+            for strip in columns.row(row) {
+                let (old, kept) = origins.strip(strip);
+                let now = strip_mut(over, strip);
+                now.fill(0.0);
+                if kept != 0 {
+                    let before = strip_of(&band.over, old - band.first);
+                    for x in 0..STRIP {
+                        now[x] = if kept >> x & 1 == 1 { before[x] } else { 0.0 };
+                    }
+                }
+            }
+        }
+        for [index, old] in origins.odd() {
+            over[*index as usize] = band.over[*old as usize];
+        }
+    }
+}
+
+impl Change<'_> {
+    /// Where the strip of an index was.
+    fn old_strip(&self, index: u32) -> Strip {
+        let (strip, range) = (index as usize / STRIP, self.band.range());
+        if range.contains(&strip) {
+            return self.band.strips[strip - range.start];
+        }
+        let behind = strip >= range.end;
+        let shift = if behind { self.origins.shift() } else { 0 };
+        self.columns.strips()[(strip as u32).wrapping_add(shift) as usize]
+    }
+
+    /// What the regular pipe of an old index carried over a side. Those behind the band stay regular.
+    fn regular(&self, flow: &Flow, index: u32, side: Side) -> Carried {
+        let axis = usize::from(side == Side::South);
+        let (strip, range) = (index as usize / STRIP, self.band.range());
+        if range.contains(&strip) {
+            let at = index as usize - range.start * STRIP;
+            [self.band.flux[axis][at], self.band.left[axis][at]]
+        } else {
+            [flow.flux[axis][index as usize], flow.left[axis][index as usize]]
+        }
+    }
+}

@@ -1,0 +1,233 @@
+//! What becomes of the liquid of one cell when its columns change.
+//!
+//! A column that was there before keeps its liquid, on its base that rises or sinks. What has no room there is pushed up, into the next
+//! column with room; so is the liquid of a column that is gone, from where it stood. What finds no room above goes down.
+
+use crate::shallow::grid::BOTTOMLESS;
+
+/// No column.
+const NO: u32 = u32::MAX;
+/// Layers for which there is room from the start.
+const LAYERS: usize = 16;
+
+/// A column before.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct Old {
+    pub index: u32,
+    pub base: i32,
+    pub depth: i32,
+}
+
+/// A column now.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct New {
+    pub index: u32,
+    pub base: i32,
+    pub ceiling: i32,
+    /// The liquid that it gets.
+    pub depth: i32,
+    /// Index of the column that it was before, or `u32::MAX`.
+    pub from: u32,
+}
+
+/// Liquid that has to find a place.
+#[derive(Debug, Clone, Copy, PartialEq)]
+struct Parcel {
+    /// It goes to the first column whose ceiling is over this.
+    above: i32,
+    /// Where it stood.
+    height: i32,
+    units: i64,
+}
+
+/// The columns of one cell, from the lowest up.
+#[derive(Debug, Clone)]
+pub(super) struct Cell {
+    pub old: Vec<Old>,
+    pub new: Vec<New>,
+    /// Underside of the lowest solid now.
+    pub under: i32,
+    /// Bases of several columns that move by more than this are not those of the same column.
+    pub reach: i64,
+    parcels: Vec<Parcel>,
+    costs: Vec<i64>,
+}
+
+/// What finds no place in its cell.
+#[derive(Debug, Clone, Copy, Default, PartialEq)]
+pub(super) struct Rest {
+    pub units: i64,
+    /// The lowest place where it stood.
+    pub height: i32,
+    /// Units that did not stay in their columns, the others included.
+    pub displaced: i64,
+}
+
+impl Default for Cell {
+    fn default() -> Self {
+        Self {
+            old: Vec::with_capacity(LAYERS),
+            new: Vec::with_capacity(LAYERS),
+            under: BOTTOMLESS,
+            reach: 0,
+            parcels: Vec::with_capacity(LAYERS),
+            costs: Vec::with_capacity((LAYERS + 1) * (LAYERS + 1)),
+        }
+    }
+}
+
+impl Cell {
+    /// Gives the old columns' liquid to the new ones.
+    pub fn remap(&mut self) -> Rest {
+        self.parcels.clear();
+        self.find_same();
+        self.keep();
+        let mut rest = Rest { height: i32::MAX, ..Rest::default() };
+        for at in 0..self.parcels.len() {
+            let parcel = self.parcels[at];
+            let left = parcel.units - self.place(parcel);
+            rest.displaced += parcel.units;
+            if left > 0 {
+                rest.units += left;
+                rest.height = rest.height.min(parcel.height);
+            }
+        }
+        rest
+    }
+
+    /// Finds for each new column the old one that it was.
+    fn find_same(&mut self) {
+        let reach = self.reach;
+        let is_near = |(old, new): (&Old, &New)| (i64::from(old.base) - i64::from(new.base)).abs() <= reach;
+        let same_count = self.old.len() == self.new.len();
+        if same_count && (self.old.len() == 1 || self.old.iter().zip(&self.new).all(is_near)) {
+            self.new.iter_mut().zip(&self.old).for_each(|(new, old)| new.from = old.index);
+        } else {
+            self.align();
+        }
+    }
+
+    /// Pairs columns in order so that the sum of the ways of their bases, and of the reach for each column without a pair, is least.
+    fn align(&mut self) {
+        let (rows, width) = (self.old.len(), self.new.len() + 1);
+        let way = |old: &Old, new: &New| 2 * (i64::from(old.base) - i64::from(new.base)).abs();
+        self.costs.clear();
+        self.costs.extend((0..width as i64).map(|at| at * self.reach));
+        for (row, old) in self.old.iter().enumerate() {
+            let before = row * width;
+            self.costs.push((row as i64 + 1) * self.reach);
+            for (at, new) in self.new.iter().enumerate() {
+                let pair = self.costs[before + at] + way(old, new);
+                let single = self.costs[before + at + 1].min(self.costs[before + width + at]) + self.reach;
+                self.costs.push(pair.min(single));
+            }
+        }
+        let (mut row, mut at) = (rows, width - 1);
+        while row > 0 && at > 0 {
+            let cost = self.costs[row * width + at];
+            let (old, new) = (&self.old[row - 1], &mut self.new[at - 1]);
+            if cost == self.costs[(row - 1) * width + at - 1] + way(old, new) {
+                new.from = old.index;
+                (row, at) = (row - 1, at - 1);
+            } else if cost == self.costs[row * width + at - 1] + self.reach {
+                at -= 1;
+            } else {
+                row -= 1;
+            }
+        }
+    }
+
+    /// Leaves liquid in its columns, and collects what has no room there, from the lowest up.
+    fn keep(&mut self) {
+        for old in self.old.iter().filter(|old| old.depth > 0) {
+            let parcel = |above, units| Parcel { above, height: old.base, units: i64::from(units) };
+            match self.new.iter_mut().find(|new| new.from == old.index) {
+                Some(new) => {
+                    new.depth = old.depth.min(new.ceiling - new.base);
+                    if new.depth < old.depth {
+                        self.parcels.push(parcel(new.ceiling, old.depth - new.depth));
+                    }
+                }
+                None => self.parcels.push(parcel(old.base, old.depth)),
+            }
+        }
+    }
+
+    /// Fills columns with a parcel, from where it goes first up, then from there down; returns what found a place.
+    fn place(&mut self, parcel: Parcel) -> i64 {
+        if self.under != BOTTOMLESS && parcel.above < self.under {
+            return 0;
+        }
+        let first = self.new.partition_point(|new| new.ceiling <= parcel.above);
+        let (below, above) = self.new.split_at_mut(first);
+        let mut left = parcel.units;
+        for new in above.iter_mut().chain(below.iter_mut().rev()) {
+            let room = new.ceiling - new.base - new.depth;
+            let units = i64::from(room).min(left);
+            new.depth += units as i32;
+            left -= units;
+        }
+        parcel.units - left
+    }
+}
+
+/// A new column without liquid.
+pub(super) fn dry(index: usize, base: i32, ceiling: i32) -> New {
+    New { index: index as u32, base, ceiling, depth: 0, from: NO }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::shallow::grid::TOP;
+
+    /// Remaps columns of (base, depth) to such of [base, ceiling]; returns the depths and what is left.
+    fn remap(old: &[(i32, i32)], new: &[[i32; 2]]) -> (Vec<i32>, Rest) {
+        let mut cell = Cell { under: BOTTOMLESS, reach: 100, ..Cell::default() };
+        let column = |(index, &(base, depth)): (usize, &(i32, i32))| Old { index: index as u32, base, depth };
+        cell.old = old.iter().enumerate().map(column).collect();
+        cell.new = new.iter().enumerate().map(|(index, ends)| dry(index, ends[0], ends[1])).collect();
+        let rest = cell.remap();
+        (cell.new.iter().map(|new| new.depth).collect(), rest)
+    }
+
+    #[test]
+    fn liquid_rides_on_its_base() {
+        assert_eq!(remap(&[(10, 5)], &[[5000, TOP]]).0, [5]);
+        assert_eq!(remap(&[(10, 5), (200, 7)], &[[90, 120], [130, TOP]]).0, [5, 7]);
+    }
+
+    #[test]
+    fn a_body_in_a_pool_lifts_what_it_displaces() {
+        assert_eq!(remap(&[(0, 100)], &[[0, 30], [60, TOP]]).0, [30, 70]);
+        assert_eq!(remap(&[(0, 30), (60, 70)], &[[0, TOP]]).0, [100]);
+        // It sinks: what is below it is pushed up through it.
+        assert_eq!(remap(&[(0, 30), (60, 70)], &[[0, 10], [40, TOP]]).0, [10, 90]);
+        assert_eq!(remap(&[(0, 30), (60, 70)], &[[40, TOP]]).0, [100]);
+    }
+
+    #[test]
+    fn columns_that_appear_or_vanish_leave_the_others_their_liquid() {
+        // A bridge over the ground; its base is far from the others.
+        assert_eq!(remap(&[(0, 5)], &[[3, 1000], [1100, TOP]]).0, [5, 0]);
+        assert_eq!(remap(&[(0, 5), (1100, 9)], &[[3, TOP]]).0, [14]);
+        assert_eq!(remap(&[(0, 5), (50, 6), (1100, 9)], &[[2, 40], [1103, TOP]]).0, [5, 15]);
+    }
+
+    #[test]
+    fn what_finds_no_room_is_left_over() {
+        let (depths, rest) = remap(&[(0, 50), (100, 60)], &[[40, 50], [TOP, TOP]]);
+        assert_eq!(depths, [10, 0]);
+        assert_eq!(rest, Rest { units: 100, height: 0, displaced: 100 });
+        assert_eq!(remap(&[(7, 50)], &[]).1, Rest { units: 50, height: 7, displaced: 50 });
+    }
+
+    #[test]
+    fn liquid_below_a_solid_that_hangs_does_not_get_on_top_of_it() {
+        let mut cell = Cell { under: 100, reach: 10, ..Cell::default() };
+        cell.old = vec![Old { index: 0, base: 20, depth: 5 }, Old { index: 1, base: 200, depth: 5 }];
+        cell.new = vec![dry(0, 200, TOP)];
+        assert_eq!(cell.remap(), Rest { units: 5, height: 20, displaced: 5 });
+        assert_eq!(cell.new[0].depth, 5);
+    }
+}

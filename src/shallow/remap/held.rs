@@ -1,0 +1,220 @@
+//! Liquid that found no room where the terrain moved: it goes to adjacent cells, and waits for what finds no room there either.
+//!
+//! Shares are whole units that depend on no order, so that a mirrored scene gets the mirrored shares.
+
+use crate::shallow::columns::Columns;
+use crate::shallow::flow::Flow;
+use crate::shallow::grid::BOTTOMLESS;
+
+/// Liquid that waits for room.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+pub struct Parcel {
+    /// The cell where it was (`Grid::index`).
+    pub cell: u32,
+    /// The height where it stood (units).
+    pub height: i32,
+    /// How much it is (units), over 0.
+    pub units: i64,
+}
+
+impl Parcel {
+    /// Its cell, height and units, for a saved state.
+    pub(in crate::shallow) fn to_bytes(self) -> [u8; 16] {
+        let mut bytes = [0; 16];
+        bytes[..4].copy_from_slice(&self.cell.to_le_bytes());
+        bytes[4..8].copy_from_slice(&self.height.to_le_bytes());
+        bytes[8..].copy_from_slice(&self.units.to_le_bytes());
+        bytes
+    }
+
+    /// As [`Parcel::to_bytes`] has written it.
+    pub(in crate::shallow) fn from_bytes(bytes: &[u8; 16]) -> Self {
+        let all = i128::from_le_bytes(*bytes);
+        Self { cell: all as u32, height: (all >> 32) as i32, units: (all >> 64) as i64 }
+    }
+
+    /// Whether it may be over such columns.
+    pub(in crate::shallow) fn is_of(&self, columns: &Columns) -> bool {
+        (self.cell as usize) < columns.grid.cells() && self.height >= 0 && self.units > 0
+    }
+}
+
+/// What a parcel offers to an adjacent cell.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+struct Offer {
+    cell: u32,
+    height: i32,
+    units: i64,
+    parcel: u32,
+}
+
+/// All liquid that waits.
+#[derive(Debug, Clone)]
+pub struct Held {
+    /// At most one of each cell, in their order, after [`Held::settle`].
+    parcels: Vec<Parcel>,
+    offers: Vec<Offer>,
+    /// Columns of a cell in the order in which they are filled.
+    order: Vec<u32>,
+}
+
+impl Default for Held {
+    fn default() -> Self {
+        let (parcels, offers) = (Vec::with_capacity(256), Vec::with_capacity(1024));
+        Self { parcels, offers, order: Vec::with_capacity(16) }
+    }
+}
+
+impl Held {
+    /// Adds liquid that finds no room in its cell (`Grid::index`).
+    pub(super) fn add(&mut self, cell: usize, height: i32, units: i64) {
+        if units > 0 {
+            self.parcels.push(Parcel { cell: cell as u32, height, units });
+        }
+    }
+
+    /// Whether nothing waits.
+    pub fn is_empty(&self) -> bool {
+        self.parcels.is_empty()
+    }
+
+    /// Units that wait.
+    pub fn units(&self) -> i64 {
+        self.parcels.iter().map(|parcel| parcel.units).sum()
+    }
+
+    /// What waits, by cell: part of the state.
+    pub fn parcels(&self) -> &[Parcel] {
+        &self.parcels
+    }
+
+    /// Puts back what [`Held::parcels`] was.
+    pub fn set(&mut self, parcels: impl Iterator<Item = Parcel>) {
+        self.parcels.clear();
+        self.parcels.extend(parcels);
+    }
+
+    /// Gives what waits to columns with room: of its own cell, then of the four beside it in equal shares. What was in a cell without
+    /// ground and finds no room beside it falls: returns how much (units).
+    pub(super) fn settle(&mut self, columns: &Columns, flow: &mut Flow) -> i64 {
+        if self.parcels.is_empty() {
+            return 0;
+        }
+        self.unite();
+        for parcel in &mut self.parcels {
+            parcel.units -= put(columns, flow, &mut self.order, *parcel);
+        }
+        self.parcels.retain(|parcel| parcel.units > 0);
+        self.offer(columns, flow);
+        self.take(columns, flow);
+        let mut fallen = 0;
+        self.parcels.retain(|parcel| {
+            let falls = parcel.units > 0 && is_void(columns, parcel.cell, parcel.height);
+            fallen += if falls { parcel.units } else { 0 };
+            parcel.units > 0 && !falls
+        });
+        fallen
+    }
+
+    /// Makes one parcel of those of a cell.
+    fn unite(&mut self) {
+        self.parcels.sort_unstable();
+        self.parcels.dedup_by(|next, first| {
+            let same = next.cell == first.cell;
+            if same {
+                first.units += next.units;
+            }
+            same
+        });
+    }
+
+    /// Offers each parcel to the cells beside it that have room.
+    fn offer(&mut self, columns: &Columns, flow: &Flow) {
+        let [nx, nz] = columns.grid.size;
+        self.offers.clear();
+        for (number, parcel) in self.parcels.iter().enumerate() {
+            let (x, z) = (parcel.cell as usize % nx, parcel.cell as usize / nx);
+            let beside = [
+                (x + 1 < nx).then_some(parcel.cell.wrapping_add(1)),
+                (x > 0).then_some(parcel.cell.wrapping_sub(1)),
+                (z + 1 < nz).then_some(parcel.cell.wrapping_add(nx as u32)),
+                (z > 0).then_some(parcel.cell.wrapping_sub(nx as u32)),
+            ];
+            let first = self.offers.len();
+            for cell in beside.into_iter().flatten() {
+                if room(columns, flow, cell, parcel.height) > 0 {
+                    self.offers.push(Offer { cell, height: parcel.height, units: 0, parcel: number as u32 });
+                }
+            }
+            let count = (self.offers.len() - first) as i64;
+            self.offers[first..].iter_mut().for_each(|offer| offer.units = parcel.units / count);
+        }
+    }
+
+    /// Fills cells with what they are offered; where that is more than they have room for, all offers shrink by the same share.
+    fn take(&mut self, columns: &Columns, flow: &mut Flow) {
+        self.offers.retain(|offer| offer.units > 0);
+        self.offers.sort_unstable();
+        let parcels = &mut self.parcels;
+        for offers in self.offers.chunk_by(|a, b| a.cell == b.cell) {
+            let offered: i64 = offers.iter().map(|offer| offer.units).sum();
+            // The least room that one of them finds: liquid from below a solid that hangs finds none above it.
+            let rooms = offers.iter().map(|offer| room(columns, flow, offer.cell, offer.height));
+            let room = rooms.min().unwrap_or(0);
+            for offer in offers {
+                let units = if offered <= room {
+                    offer.units
+                } else {
+                    (i128::from(offer.units) * i128::from(room) / i128::from(offered)) as i64
+                };
+                let parcel = Parcel { cell: offer.cell, height: offer.height, units };
+                parcels[offer.parcel as usize].units -= put(columns, flow, &mut self.order, parcel);
+            }
+        }
+    }
+}
+
+/// Whether a cell has no ground at a height, or it hangs over it.
+fn is_void(columns: &Columns, cell: u32, height: i32) -> bool {
+    let lowest = columns.of_cell(place(columns, cell)).next();
+    lowest.is_none_or(|lowest| {
+        let under = columns.unders()[lowest];
+        under != BOTTOMLESS && height < under
+    })
+}
+
+fn place(columns: &Columns, cell: u32) -> [usize; 2] {
+    let nx = columns.grid.size[0];
+    [cell as usize % nx, cell as usize / nx]
+}
+
+fn room_of(columns: &Columns, flow: &Flow, column: usize) -> i64 {
+    let room = columns.ceilings()[column] - columns.bases()[column] - flow.depth[column];
+    i64::from(room.max(0))
+}
+
+/// The room of a cell for liquid of a height (units).
+fn room(columns: &Columns, flow: &Flow, cell: u32, height: i32) -> i64 {
+    if is_void(columns, cell, height) {
+        return 0;
+    }
+    columns.of_cell(place(columns, cell)).map(|column| room_of(columns, flow, column)).sum()
+}
+
+/// Fills the columns of a cell, from that at the parcel's height up, then from there down; returns what they took (units).
+fn put(columns: &Columns, flow: &mut Flow, order: &mut Vec<u32>, parcel: Parcel) -> i64 {
+    if is_void(columns, parcel.cell, parcel.height) {
+        return 0;
+    }
+    order.clear();
+    order.extend(columns.of_cell(place(columns, parcel.cell)).map(|column| column as u32));
+    let first = order.partition_point(|&column| columns.ceilings()[column as usize] <= parcel.height);
+    let (below, above) = order.split_at(first);
+    let mut left = parcel.units;
+    for &column in above.iter().chain(below.iter().rev()) {
+        let column = column as usize;
+        let units = room_of(columns, flow, column).min(left);
+        left -= if units > 0 { flow.add(columns, column, units) } else { 0 };
+    }
+    parcel.units - left
+}

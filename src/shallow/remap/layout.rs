@@ -1,0 +1,276 @@
+//! The new columns of rows, and the liquid that stays in them.
+
+use super::band::Band;
+use super::cells::{Cell, Old, dry};
+use super::dirty::Dirty;
+use super::held::Held;
+use super::origins::Origins;
+use crate::shallow::columns::{Columns, NONE, STRIP, Strip, strip_mut, strip_of};
+use crate::shallow::grid::{BOTTOMLESS, TOP};
+use crate::shallow::stacks::Stacks;
+use crate::shallow::terrain::solids::Solid;
+
+/// Several bases of a cell that move by more than so many cells are not those of the same column.
+const REACH: f64 = 4.0;
+
+/// Buffers.
+#[derive(Debug, Clone, Default)]
+pub(super) struct Layout {
+    /// New layers of each block, row by row.
+    layers: Vec<u32>,
+    /// Strips of each new row.
+    pub counts: Vec<u32>,
+    /// Strips of a row before and now.
+    old: Stacks,
+    new: Stacks,
+    cell: Cell,
+}
+
+/// What is made anew.
+pub(super) struct Rows<'a, Cast> {
+    pub dirty: &'a Dirty,
+    pub band: &'a Band,
+    /// New solids of the dirty cells, by their rank, row by row along x.
+    pub cast: Cast,
+}
+
+impl Layout {
+    /// Counts the strips of the new rows.
+    pub fn plan<'s>(&mut self, rows: &Rows<impl Fn(usize) -> &'s [Solid]>) {
+        let Rows { dirty, band, cast } = rows;
+        self.layers.clear();
+        self.counts.clear();
+        let mut next = 0;
+        for row in band.rows.clone() {
+            self.old.find(&band.strips, band.row(row), dirty.blocks());
+            let first = self.layers.len();
+            for block in 0..dirty.blocks() {
+                let (cells, old) = (dirty.of(row, block), self.old.of(block));
+                let stays = |strip: u32| band.present[strip as usize] & !cells != 0;
+                let mut layers = old.iter().rposition(|&strip| stays(strip)).map_or(0, |last| last + 1);
+                for _ in 0..cells.count_ones() {
+                    layers = cast(next).len().max(layers);
+                    next += 1;
+                }
+                self.layers.push(layers as u32);
+            }
+            self.counts.push(self.layers[first..].iter().sum());
+        }
+    }
+
+    /// Makes the new columns, for which there is room, and gives them the liquid that has a place in its cell; the rest goes to `held`. Returns how much
+    /// did not stay in its column (units).
+    pub fn lay<'s>(
+        &mut self,
+        rows: &Rows<impl Fn(usize) -> &'s [Solid]>,
+        columns: &mut Columns,
+        depth: &mut [i32],
+        origins: &mut Origins,
+        held: &mut Held,
+    ) -> i64 {
+        let Rows { dirty, band, cast } = rows;
+        let blocks = dirty.blocks();
+        self.cell.reach = (REACH * columns.grid.cell / columns.heights.unit).min(f64::from(TOP)) as i64;
+        let grid = columns.grid;
+        origins.begin(band, self.counts.iter().sum::<u32>() as usize);
+        let (mut next, mut displaced) = (0, 0);
+        for (number, row) in band.rows.clone().enumerate() {
+            let layers = &self.layers[number * blocks..(number + 1) * blocks];
+            place_strips(columns, row, layers);
+            self.old.find(&band.strips, band.row(row), blocks);
+            self.new.find(columns.strips(), columns.row(row), blocks);
+            for block in 0..blocks {
+                let cells = dirty.of(row, block);
+                let mut block = Block {
+                    cells,
+                    old: self.old.of(block),
+                    new: self.new.of(block),
+                    band,
+                    origins: &mut *origins,
+                };
+                if cells == 0 {
+                    block.copy(columns, depth);
+                    continue;
+                }
+                block.lay(columns, |rank| cast(next + rank));
+                next += cells.count_ones() as usize;
+                let mut moves = block.keep(columns, depth, self.cell.reach as i32);
+                while moves != 0 {
+                    let place = moves.trailing_zeros() as usize;
+                    moves &= moves - 1;
+                    block.remap(columns, depth, place, &mut self.cell, |cell, rest| {
+                        displaced += rest.displaced;
+                        held.add(grid.index(cell), rest.height, rest.units);
+                    });
+                }
+            }
+        }
+        displaced
+    }
+}
+
+/// Sets where the strips of a row lie, in order.
+fn place_strips(columns: &mut Columns, row: usize, layers: &[u32]) {
+    let mut strips = columns.row(row);
+    let most = layers.iter().copied().max().unwrap_or(0);
+    for layer in 0..most {
+        for (at, _) in layers.iter().enumerate().filter(|(_, count)| **count > layer) {
+            let Some(strip) = strips.next() else { return };
+            columns.place_strip(strip, Strip { row: row as u32, layer, at: at as u32 });
+        }
+    }
+}
+
+/// Bits of the places for which something holds.
+fn bits(holds: impl Fn(usize) -> bool) -> u16 {
+    (0..STRIP).fold(0, |bits, x| bits | u16::from(holds(x)) << x)
+}
+
+/// The strips that lie above each other, before and now.
+struct Block<'a> {
+    /// Bits of the cells whose solids change.
+    cells: u16,
+    /// Strips of the band.
+    old: &'a [u32],
+    /// Strips.
+    new: &'a [u32],
+    band: &'a Band,
+    origins: &'a mut Origins,
+}
+
+impl Block<'_> {
+    /// Leaves all as it was.
+    fn copy(&mut self, columns: &mut Columns, depth: &mut [i32]) {
+        for (&old, &new) in self.old.iter().zip(self.new) {
+            let (old, new, band) = (old as usize, new as usize, self.band);
+            self.origins.keep(new, old as u32, band.present[old]);
+            if band.first + old == new {
+                continue;
+            }
+            let strip = columns.set_strip(new, band.present[old]);
+            *strip.base = *strip_of(&band.base, old);
+            *strip.ceiling = *strip_of(&band.ceiling, old);
+            *strip.under = *strip_of(&band.under, old);
+            *strip_mut(depth, new) = *strip_of(&band.depth, old);
+        }
+    }
+
+    /// Makes the new columns; `cast` are the solids of the cells that change, by rank.
+    fn lay<'s>(&self, columns: &mut Columns, cast: impl Fn(usize) -> &'s [Solid]) {
+        let mut solids = [&[][..]; STRIP];
+        let mut rank = 0;
+        for (place, solids) in solids.iter_mut().enumerate() {
+            if self.cells >> place & 1 == 1 {
+                *solids = cast(rank);
+                rank += 1;
+            }
+        }
+        for (layer, &strip) in self.new.iter().enumerate() {
+            let (mut base, mut ceiling, mut under) = ([0; STRIP], [0; STRIP], [0; STRIP]);
+            let mut present = 0;
+            for (place, solids) in solids.iter().enumerate() {
+                if let Some(solid) = solids.get(layer) {
+                    present |= 1 << place;
+                    (under[place], base[place]) = (solid[0], solid[1]);
+                    ceiling[place] = solids.get(layer + 1).map_or(TOP, |above| above[0]);
+                }
+            }
+            if let Some(&old) = self.old.get(layer).filter(|_| self.cells != u16::MAX) {
+                let stays = self.band.present[old as usize] & !self.cells;
+                present |= stays;
+                for place in (0..STRIP).filter(|place| stays >> place & 1 == 1) {
+                    let index = old as usize * STRIP + place;
+                    base[place] = self.band.base[index];
+                    ceiling[place] = self.band.ceiling[index];
+                    under[place] = self.band.under[index];
+                }
+            }
+            let strip = columns.set_strip(strip as usize, present);
+            (*strip.base, *strip.ceiling, *strip.under) = (base, ceiling, under);
+        }
+    }
+
+    /// Leaves liquid where it is in the cells whose columns are the same and have room for it. Returns the bits of all others.
+    fn keep(&mut self, columns: &Columns, depth: &mut [i32], reach: i32) -> u16 {
+        let band = self.band;
+        let (mut moves, mut any) = (0, 0);
+        for layer in 0..self.old.len().max(self.new.len()) {
+            let old = self.old.get(layer).map_or(0, |&strip| band.present[strip as usize]);
+            let new = self.new.get(layer).map_or(0, |&strip| columns.present(strip as usize));
+            moves |= old ^ new;
+            any |= old;
+        }
+        let several = self.new.get(1).map_or(0, |&strip| columns.present(strip as usize));
+        for (&old, &new) in self.old.iter().zip(self.new) {
+            let (old, new) = (old as usize, new as usize);
+            let (old_base, depth) = (strip_of(&band.base, old), strip_of(&band.depth, old));
+            let (base, ceiling) = (strip_of(columns.bases(), new), strip_of(columns.ceilings(), new));
+            // Heights are within 0 to 2^30: their differences fit.
+            let (mut over, mut far) = (0, 0);
+            for x in 0..STRIP {
+                over = (depth[x] - (ceiling[x] - base[x])).max(over);
+                far = (base[x] - old_base[x]).abs().max(far);
+            }
+            if over > 0 {
+                moves |= bits(|x| depth[x] > ceiling[x] - base[x]);
+            }
+            if far > reach && several != 0 {
+                moves |= several & bits(|x| (base[x] - old_base[x]).abs() > reach);
+            }
+        }
+        for (layer, &new) in self.new.iter().enumerate() {
+            let new = new as usize;
+            let depth = strip_mut(depth, new);
+            let kept = columns.present(new) & !moves;
+            match self.old.get(layer) {
+                Some(&old) => {
+                    *depth = *strip_of(&band.depth, old as usize);
+                    if moves != 0 {
+                        (0..STRIP).filter(|x| kept >> x & 1 == 0).for_each(|x| depth[x] = 0);
+                    }
+                    self.origins.keep(new, old, kept);
+                }
+                None => {
+                    depth.fill(0);
+                    self.origins.keep(new, NONE, 0);
+                }
+            }
+        }
+        // Where there was no column there is nothing to remap.
+        moves & any
+    }
+
+    /// Gives the liquid of a cell to its new columns; `see` receives the cell and what finds no place.
+    fn remap(
+        &mut self,
+        columns: &Columns,
+        depth: &mut [i32],
+        place: usize,
+        cell: &mut Cell,
+        see: impl FnOnce([usize; 2], super::cells::Rest),
+    ) {
+        let band = self.band;
+        cell.old.clear();
+        for &strip in self.old.iter().take_while(|&&strip| band.present[strip as usize] >> place & 1 == 1) {
+            let index = strip as usize * STRIP + place;
+            cell.old.push(Old { index: index as u32, base: band.base[index], depth: band.depth[index] });
+        }
+        cell.new.clear();
+        cell.under = BOTTOMLESS;
+        for &strip in self.new.iter().take_while(|&&strip| columns.present(strip as usize) >> place & 1 == 1)
+        {
+            let index = strip as usize * STRIP + place;
+            if cell.new.is_empty() {
+                cell.under = columns.unders()[index];
+            }
+            cell.new.push(dry(index, columns.bases()[index], columns.ceilings()[index]));
+        }
+        let rest = cell.remap();
+        for new in &cell.new {
+            depth[new.index as usize] = new.depth;
+            self.origins.set(new.index, new.from);
+        }
+        let strip = band.strips[self.old[0] as usize];
+        see([strip.at as usize * STRIP + place, strip.row as usize], rest);
+    }
+}

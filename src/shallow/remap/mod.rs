@@ -1,0 +1,230 @@
+//! Terrain that moves: columns are made anew where it does, and take their liquid along.
+//!
+//! Of each cell that changes, columns before and now are matched, and liquid that has no room where it was is pushed up, to other columns of
+//! the cell, to those beside it, or waits until there is room again (`held.rs`): the total never changes. Only the rows with such cells and
+//! those beside them are touched; when the count of columns changes, those behind move along.
+
+mod band;
+mod carry;
+mod cells;
+mod dirty;
+mod held;
+mod layout;
+mod origins;
+#[cfg(test)]
+mod tests;
+
+use std::ops::Range;
+
+use super::Shallow;
+use super::columns::{STRIP, resize_part};
+use super::identity::Identity;
+use super::pipes::joints::Finder;
+use super::pipes::{Ends, Links};
+use super::stacks::Stacks;
+use super::terrain::Solids;
+use super::terrain::ground::Ground;
+use super::terrain::shapes::Shape;
+use super::terrain::solids::Solid;
+use crate::error::{Error, Result};
+use band::Band;
+use carry::{Carry, Change};
+use dirty::Dirty;
+pub use held::{Held, Parcel};
+use layout::{Layout, Rows};
+use origins::Origins;
+
+/// What a change of the terrain did.
+#[derive(Debug, Clone, Copy, Default, PartialEq)]
+pub struct Moved {
+    /// Cells made anew.
+    pub cells: usize,
+    /// Liquid that could not stay in its column (m3).
+    pub displaced: f64,
+    /// Liquid that waits for room now, in all (m3).
+    pub held: f64,
+    /// Liquid that fell where there is no ground any more (m3); it counts as lost.
+    pub fallen: f64,
+}
+
+/// Buffers and shapes.
+#[derive(Debug, Clone, Default)]
+pub struct Remap {
+    dirty: Dirty,
+    ground: Ground,
+    band: Band,
+    layout: Layout,
+    origins: Origins,
+    carry: Carry,
+    stacks: Stacks,
+    finder: Finder,
+    ends: Ends,
+    /// New links of the rows that change.
+    links: Links,
+    pub(super) held: Held,
+}
+
+impl Shallow {
+    /// Changes the terrain everywhere.
+    ///
+    /// Nothing is allocated while there are no more columns and links than ever before.
+    ///
+    /// # Errors
+    /// `Argument`: solids of other cells or heights, or none at all.
+    pub fn update_terrain(&mut self, solids: &Solids) -> Result<Moved> {
+        if (solids.grid, solids.heights) != (self.columns.grid, self.columns.heights) {
+            return Err(Error::argument("the terrain's cells or heights are not those of the liquid"));
+        }
+        if solids.layers() == 0 {
+            return Err(Error::argument("the terrain has no surface that faces up within the domain"));
+        }
+        let [nx, nz] = self.columns.grid.size;
+        self.update_cells([0..nx, 0..nz], |cell| solids.cell(cell))
+    }
+
+    /// Changes the terrain in a box of cells: ranges of x and of z. `solids` are those of its cells, row by row along x, as
+    /// [`Caster::at`](super::terrain::triangles::Caster::at) has them: of each from the lowest up, apart from each other. It is called more than once.
+    ///
+    /// Nothing is allocated while there are no more columns and links than ever before, and no larger box.
+    ///
+    /// # Errors
+    /// `Argument`: the box is not within the domain.
+    pub fn update_cells<'a>(
+        &mut self,
+        cells: [Range<usize>; 2],
+        solids: impl Fn(usize) -> &'a [Solid],
+    ) -> Result<Moved> {
+        let grid = self.columns.grid;
+        let [nx, nz] = grid.size;
+        let [x, z] = &cells;
+        if x.start > x.end || z.start > z.end || x.end > nx || z.end > nz {
+            return Err(Error::argument(format!(
+                "cells {x:?} x {z:?} are not a box within {nx} x {nz} cells"
+            )));
+        }
+        self.remap.dirty.clear(grid.size);
+        self.remap.dirty.mark(&cells);
+        if self.remap.ground.bodies().is_empty() {
+            return Ok(self.rebuild(solids));
+        }
+        self.remap.ground.replace(&grid, &cells, solids);
+        Ok(self.rebuild_over_bodies())
+    }
+
+    /// Sets the solid shapes that move over the terrain, in place of those before.
+    ///
+    /// Only the cells of those that differ from the shape of the same index before are made anew, and no triangle is cast. Nothing is allocated as for
+    /// [`Shallow::update_cells`], while there are no more shapes.
+    ///
+    /// # Errors
+    /// As [`Shape::validate`].
+    pub fn set_bodies(&mut self, bodies: &[Shape]) -> Result<Moved> {
+        bodies.iter().try_for_each(Shape::validate)?;
+        let Self { columns, remap, .. } = self;
+        let Remap { ground, dirty, stacks, .. } = remap;
+        if ground.bodies().is_empty() && !bodies.is_empty() {
+            ground.clear();
+            for row in 0..columns.grid.size[1] {
+                stacks.find_row(columns, row);
+                for x in 0..columns.grid.size[0] {
+                    let indices = stacks.columns(columns, x);
+                    ground.add(indices.map(|index| [columns.unders()[index], columns.bases()[index]]));
+                }
+            }
+        }
+        dirty.clear(columns.grid.size);
+        ground.set_bodies(&columns.grid, bodies, |cells| dirty.mark(&cells));
+        Ok(self.rebuild_over_bodies())
+    }
+
+    /// The solid shapes that move over the terrain.
+    pub fn bodies(&self) -> &[Shape] {
+        self.remap.ground.bodies()
+    }
+
+    fn rebuild_over_bodies(&mut self) -> Moved {
+        let mut ground = std::mem::take(&mut self.remap.ground);
+        ground.unite(&self.columns.grid, &self.columns.heights, self.remap.dirty.iter());
+        let moved = self.rebuild(|rank| ground.united(rank));
+        self.remap.ground = ground;
+        moved
+    }
+
+    /// Makes the dirty cells anew, of solids by their rank among them.
+    fn rebuild<'a>(&mut self, cast: impl Fn(usize) -> &'a [Solid]) -> Moved {
+        let rows = self.remap.dirty.rows();
+        let volume = self.columns.grid.cell * self.columns.grid.cell * self.columns.heights.unit;
+        if rows.is_empty() {
+            return Moved { held: self.remap.held.units() as f64 * volume, ..Moved::default() };
+        }
+        let around = rows.start.saturating_sub(1)..(rows.end + 1).min(self.columns.grid.size[1]);
+        let displaced = self.relay(cast, rows.clone(), around.clone());
+        let is_same = self.join(around.clone());
+        self.identity = Identity::new();
+        let (columns, flow) = (&self.columns, &mut self.flow);
+        flow.refit(columns, &self.pipes, rows, is_same);
+        self.flows.find_again(columns);
+        let fallen = self.remap.held.settle(columns, flow);
+        flow.links.lost += fallen;
+        Moved {
+            cells: self.remap.dirty.count(),
+            displaced: displaced as f64 * volume,
+            held: self.remap.held.units() as f64 * volume,
+            fallen: fallen as f64 * volume,
+        }
+    }
+
+    /// Makes the columns of rows anew and gives them their liquid; returns how much did not stay in its column (units).
+    fn relay<'a>(
+        &mut self,
+        cast: impl Fn(usize) -> &'a [Solid],
+        rows: Range<usize>,
+        around: Range<usize>,
+    ) -> i64 {
+        let Self { columns, pipes, flow, remap, .. } = self;
+        let Remap { dirty, band, layout, origins, carry, held, .. } = remap;
+        carry.save(columns, &pipes.links, flow, around);
+        band.save(columns, flow, rows.clone());
+        let change = Rows { dirty, band, cast };
+        layout.plan(&change);
+        columns.resize_rows(rows.clone(), layout.counts.iter().copied());
+        let strips = columns.row(rows.start).start..columns.row(rows.end - 1).end;
+        let (old, len) = (band.range(), strips.len() * STRIP);
+        let old = old.start * STRIP..old.end * STRIP;
+        for open in [&mut pipes.east, &mut pipes.south] {
+            resize_part(open, old.clone(), len, 0.0);
+        }
+        flow.resize_part(old, len);
+        let displaced = layout.lay(&change, columns, &mut flow.depth, origins, held);
+        origins.finish();
+        columns.connect(rows);
+        displaced
+    }
+
+    /// Finds the pipes of rows anew, and what they carry; whether the links join the columns that they did.
+    fn join(&mut self, rows: Range<usize>) -> bool {
+        let Self { columns, pipes, flow, remap, params, .. } = self;
+        let Remap { band, origins, carry, finder, ends, links, .. } = remap;
+        links.clear();
+        finder.find(columns, params.border, rows.clone(), [&mut pipes.east, &mut pipes.south], links);
+        let change = Change { columns, band, origins };
+        carry.links(&change, flow, links);
+        carry.regular(&change, pipes, flow);
+        Carry::heads(&change, flow);
+        let old = pipes.links.row(rows.start).start..pipes.links.row(rows.end - 1).end;
+        let shift = origins.shift().wrapping_mul(STRIP as u32);
+        let is_same = shift == 0 && carry.is_same(links);
+        flow.links.replace(old, &carry.flux, &carry.left);
+        pipes.links.replace_rows(rows, links, shift);
+        if !is_same {
+            pipes.links.list_columns(columns, ends);
+        }
+        is_same
+    }
+
+    /// Gives liquid that waits for room what there is now.
+    pub(super) fn release(&mut self) {
+        let fallen = self.remap.held.settle(&self.columns, &mut self.flow);
+        self.flow.links.lost += fallen;
+    }
+}

@@ -1,0 +1,91 @@
+//! Which column each one was before.
+
+use super::band::Band;
+use crate::shallow::columns::{NONE, STRIP};
+
+/// The columns of a band, and those around it whose indices move with it.
+#[derive(Debug, Clone)]
+pub(super) struct Origins {
+    /// First strip of the band, and their counts before and now.
+    first: usize,
+    counts: [usize; 2],
+    /// The strip of each strip's layer before, in the band, or [`NONE`], and the bits of its columns that were columns there.
+    strips: Vec<(u32, u16)>,
+    /// Columns that were in other layers: their indices, and those before, in the band.
+    odd: Vec<[u32; 2]>,
+}
+
+impl Default for Origins {
+    fn default() -> Self {
+        Self { first: 0, counts: [0; 2], strips: Vec::new(), odd: Vec::with_capacity(1024) }
+    }
+}
+
+impl Origins {
+    /// Of a band that gets so many strips.
+    pub fn begin(&mut self, band: &Band, count: usize) {
+        self.first = band.first;
+        self.counts = [band.strips.len(), count];
+        self.strips.clear();
+        self.strips.resize(count, (NONE, 0));
+        self.odd.clear();
+    }
+
+    /// Says that some columns of a strip were in a strip of the band.
+    pub fn keep(&mut self, strip: usize, old: u32, places: u16) {
+        self.strips[strip - self.first] = (old, places);
+    }
+
+    /// Says which column of the band one was, or [`NONE`].
+    pub fn set(&mut self, index: u32, old: u32) {
+        let (strip, place) = (index as usize / STRIP, index as usize % STRIP);
+        let (from, places) = &mut self.strips[strip - self.first];
+        if old == NONE {
+            return;
+        }
+        if old / STRIP as u32 == *from {
+            *places |= 1 << place;
+        } else {
+            self.odd.push([index, old]);
+        }
+    }
+
+    /// Ends a band.
+    pub fn finish(&mut self) {
+        self.odd.sort_unstable();
+    }
+
+    /// Columns that were in other layers: their indices, and those before, in the band.
+    pub fn odd(&self) -> &[[u32; 2]] {
+        &self.odd
+    }
+
+    /// By how much the numbers of strips behind the band grow, modulo 2^32.
+    pub fn shift(&self) -> u32 {
+        self.counts[1].wrapping_sub(self.counts[0]) as u32
+    }
+
+    /// The strip that a strip was, among all, and the bits of its columns that were columns there.
+    #[inline]
+    pub fn strip(&self, strip: usize) -> (usize, u16) {
+        if strip < self.first {
+            (strip, u16::MAX)
+        } else if strip >= self.first + self.counts[1] {
+            (strip - self.counts[1] + self.counts[0], u16::MAX)
+        } else {
+            let (old, places) = self.strips[strip - self.first];
+            (self.first.wrapping_add(old as usize), places)
+        }
+    }
+
+    /// The index that a column had, among all.
+    pub fn column(&self, index: u32) -> Option<u32> {
+        let place = index as usize % STRIP;
+        let (strip, places) = self.strip(index as usize / STRIP);
+        if places >> place & 1 == 1 {
+            return Some((strip * STRIP + place) as u32);
+        }
+        let at = self.odd.binary_search_by_key(&index, |[index, _]| *index).ok()?;
+        Some(self.odd[at][1] + (self.first * STRIP) as u32)
+    }
+}

@@ -1,0 +1,205 @@
+//! The terrain's own solids below shapes that move: so that these move without the terrain being cast again.
+
+use std::ops::Range;
+
+use super::shapes::Shape;
+use super::solids::{Solid, unite};
+use crate::shallow::grid::{Grid, Heights};
+
+/// Solids of cells, one after another.
+#[derive(Debug, Clone, Default)]
+struct Listed {
+    /// Where each cell's solids begin, and the end of the last.
+    starts: Vec<u32>,
+    solids: Vec<Solid>,
+}
+
+impl Listed {
+    fn clear(&mut self) {
+        self.starts.clear();
+        self.starts.push(0);
+        self.solids.clear();
+    }
+
+    /// Ends a cell, whose solids have been added.
+    fn end_cell(&mut self) {
+        self.starts.push(self.solids.len() as u32);
+    }
+
+    fn cell(&self, index: usize) -> &[Solid] {
+        &self.solids[self.starts[index] as usize..self.starts[index + 1] as usize]
+    }
+
+    /// Adds a range of another list's cells.
+    fn add(&mut self, other: &Self, cells: Range<usize>) {
+        let from = other.starts[cells.start];
+        let shift = (self.solids.len() as u32).wrapping_sub(from);
+        self.solids.extend_from_slice(&other.solids[from as usize..other.starts[cells.end] as usize]);
+        let ends = &other.starts[cells.start + 1..=cells.end];
+        self.starts.extend(ends.iter().map(|end| end.wrapping_add(shift)));
+    }
+}
+
+/// Shapes that move, and the terrain's own solids.
+#[derive(Debug, Clone, Default)]
+pub struct Ground {
+    bodies: Vec<Shape>,
+    /// Of every cell (`Grid::index`), while there are shapes.
+    own: Listed,
+    /// What `own` is made anew in.
+    spare: Listed,
+    /// The solids of some cells, united with those of the shapes.
+    united: Listed,
+    /// Shapes over the cells of a row, with their cells along x.
+    near: Vec<(usize, Range<usize>)>,
+    cell: Vec<Solid>,
+}
+
+impl Ground {
+    /// The shapes.
+    pub fn bodies(&self) -> &[Shape] {
+        &self.bodies
+    }
+
+    /// Sets the shapes; calls `see` with the boxes of cells that one which changes may have covered, or may cover.
+    pub fn set_bodies(&mut self, grid: &Grid, bodies: &[Shape], mut see: impl FnMut([Range<usize>; 2])) {
+        for index in 0..bodies.len().max(self.bodies.len()) {
+            let (old, new) = (self.bodies.get(index), bodies.get(index));
+            if old != new {
+                old.into_iter().chain(new).for_each(|shape| see(shape.cells(grid)));
+            }
+        }
+        self.bodies.clear();
+        self.bodies.extend_from_slice(bodies);
+    }
+
+    /// Forgets the terrain's solids; [`Ground::add`] is then called for every cell, row by row along x.
+    pub fn clear(&mut self) {
+        self.own.clear();
+    }
+
+    /// Adds the solids of the next cell, from the lowest up.
+    pub fn add(&mut self, solids: impl Iterator<Item = Solid>) {
+        self.own.solids.extend(solids);
+        self.own.end_cell();
+    }
+
+    /// Puts other solids in place of those of a box of cells; `cast` are those of its cells, row by row along x.
+    pub fn replace<'a>(
+        &mut self,
+        grid: &Grid,
+        [across, rows]: &[Range<usize>; 2],
+        cast: impl Fn(usize) -> &'a [Solid],
+    ) {
+        let nx = grid.size[0];
+        let Self { own, spare, .. } = self;
+        spare.clear();
+        spare.add(own, 0..rows.start * nx);
+        let mut next = 0;
+        for row in rows.clone() {
+            spare.add(own, row * nx..row * nx + across.start);
+            for _ in across.clone() {
+                spare.solids.extend_from_slice(cast(next));
+                spare.end_cell();
+                next += 1;
+            }
+            spare.add(own, row * nx + across.end..(row + 1) * nx);
+        }
+        spare.add(own, rows.end * nx..grid.cells());
+        std::mem::swap(own, spare);
+    }
+
+    /// Unites the solids of some cells (x, z), row by row along x, with those of the shapes.
+    pub fn unite(&mut self, grid: &Grid, heights: &Heights, cells: impl Iterator<Item = [usize; 2]>) {
+        let mut last = None;
+        self.united.clear();
+        for [x, z] in cells {
+            if last != Some(z) {
+                last = Some(z);
+                self.near.clear();
+                for (index, shape) in self.bodies.iter().enumerate() {
+                    let [across, rows] = shape.cells(grid);
+                    if rows.contains(&z) && !across.is_empty() {
+                        self.near.push((index, across));
+                    }
+                }
+            }
+            let own = self.own.cell(grid.index([x, z]));
+            self.cell.clear();
+            let over = self.near.iter().filter(|(_, across)| across.contains(&x));
+            let solid = |(index, _): &(usize, _)| self.bodies[*index].solid(grid.centre([x, z]), heights);
+            self.cell.extend(over.filter_map(solid));
+            if self.cell.is_empty() {
+                self.united.solids.extend_from_slice(own);
+            } else {
+                self.cell.extend_from_slice(own);
+                unite(&mut self.cell);
+                self.united.solids.extend_from_slice(&self.cell);
+            }
+            self.united.end_cell();
+        }
+    }
+
+    /// The united solids of a cell, by its rank among those.
+    pub fn united(&self, rank: usize) -> &[Solid] {
+        self.united.cell(rank)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::base::DVec3;
+    use crate::shallow::grid::BOTTOMLESS;
+
+    const GRID: Grid = Grid { cell: 1.0, origin: [0.0; 2], size: [6, 5] };
+
+    fn ground() -> Ground {
+        let mut ground = Ground::default();
+        ground.clear();
+        for cell in 0..30 {
+            let bridge = (cell % 3 == 0).then_some([1000, 2000]);
+            ground.add([[BOTTOMLESS, cell]].into_iter().chain(bridge));
+        }
+        ground
+    }
+
+    #[test]
+    fn a_box_of_cells_gets_other_solids() {
+        let mut ground = ground();
+        let (one, two): (&[Solid], &[Solid]) = (&[[7, 8]], &[[5, 6], [7, 8]]);
+        ground.replace(&GRID, &[2..4, 1..3], |at| [one, &[], two, one][at]);
+        for cell in 0..30 {
+            let expected = match cell {
+                8 => vec![[7, 8]],
+                9 => vec![],
+                14 => vec![[5, 6], [7, 8]],
+                15 => vec![[7, 8]],
+                _ if cell % 3 == 0 => vec![[BOTTOMLESS, cell as i32], [1000, 2000]],
+                _ => vec![[BOTTOMLESS, cell as i32]],
+            };
+            assert_eq!(ground.own.cell(cell), expected, "cell {cell}");
+        }
+    }
+
+    #[test]
+    fn shapes_are_united_with_the_ground_and_leave_it_as_it_was() {
+        let mut ground = ground();
+        let heights = Heights::between(0.0, f64::from(1 << 30)).unwrap();
+        let ball = |y: f64| Shape::Sphere { centre: DVec3::new(2.5, y, 2.5), radius: 1.2 };
+        let mut boxes = Vec::new();
+        ground.set_bodies(&GRID, &[ball(1000.0)], |cells| boxes.push(cells));
+        assert_eq!(boxes.len(), 1);
+        let all = || (0..30).map(|cell| [cell % 6, cell / 6]);
+        ground.unite(&GRID, &heights, all());
+        assert_eq!(ground.united(14), [[BOTTOMLESS, 14], [999, 1001]]);
+        assert_eq!(ground.united(15), [[BOTTOMLESS, 15], [999, 2000]], "it touches the bridge");
+        assert_eq!(ground.united(17), [[BOTTOMLESS, 17]]);
+        ground.set_bodies(&GRID, &[ball(1000.0), ball(10.0)], |cells| boxes.push(cells));
+        assert_eq!(boxes.len(), 2, "the first stays");
+        ground.set_bodies(&GRID, &[], |cells| boxes.push(cells));
+        assert_eq!(boxes.len(), 4);
+        ground.unite(&GRID, &heights, all());
+        assert!((0..30).all(|cell| ground.united(cell) == ground.own.cell(cell)));
+    }
+}

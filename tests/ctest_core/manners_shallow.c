@@ -1,0 +1,175 @@
+/* Real-time manners of shallow liquid: after a warm-up, frames with a pool of 0 threads allocate nothing and make no system call but
+ * clock_gettime. The wound of examples/c/surgery.c, with all that is to keep these manners: manners_shallow [FRAMES].
+ *
+ * Prints the lines of three gates. Allocations are counted by this program's own malloc, which takes the C library's place; system calls
+ * by a filter of the kernel, in a child. */
+#define _DEFAULT_SOURCE
+#define SURGERY_WITHOUT_MAIN
+#include "../../examples/c/surgery.c"
+
+#include <errno.h>
+#include <linux/audit.h>
+#include <linux/filter.h>
+#include <linux/seccomp.h>
+#include <signal.h>
+#include <stddef.h>
+#include <sys/mman.h>
+#include <sys/prctl.h>
+#include <sys/syscall.h>
+#include <sys/wait.h>
+#include <unistd.h>
+
+static volatile long allocations;
+
+/* The C library's own, under their other names. */
+void *__libc_malloc(size_t size);
+void *__libc_calloc(size_t count, size_t size);
+void *__libc_realloc(void *memory, size_t size);
+void *__libc_memalign(size_t alignment, size_t size);
+void __libc_free(void *memory);
+
+void *malloc(size_t size) {
+    ++allocations;
+    return __libc_malloc(size);
+}
+
+void *calloc(size_t count, size_t size) {
+    ++allocations;
+    return __libc_calloc(count, size);
+}
+
+void *realloc(void *memory, size_t size) {
+    ++allocations;
+    return __libc_realloc(memory, size);
+}
+
+void free(void *memory) {
+    if (memory != NULL) ++allocations;
+    __libc_free(memory);
+}
+
+void *aligned_alloc(size_t alignment, size_t size) {
+    ++allocations;
+    return __libc_memalign(alignment, size);
+}
+
+int posix_memalign(void **memory, size_t alignment, size_t size) {
+    ++allocations;
+    *memory = __libc_memalign(alignment, size);
+    return *memory == NULL ? ENOMEM : 0;
+}
+
+/* What the child tells. */
+typedef struct told {
+    long frames, allocations, calls, first_call;
+    double worst, average;
+} told;
+
+static told *shared;
+
+/* A system call that the filter does not let through: it is counted, and does not happen. */
+static void count_call(int number, siginfo_t *info, void *context) {
+    (void)number, (void)context;
+    if (shared->calls++ == 0) shared->first_call = info->si_syscall;
+}
+
+static void forbid_calls(void) {
+#if defined(__x86_64__)
+    const unsigned int machine = AUDIT_ARCH_X86_64;
+#elif defined(__aarch64__)
+    const unsigned int machine = AUDIT_ARCH_AARCH64;
+#else
+    const unsigned int machine = 0;
+#endif
+    struct sock_filter steps[] = {
+        BPF_STMT(BPF_LD | BPF_W | BPF_ABS, offsetof(struct seccomp_data, arch)),
+        BPF_JUMP(BPF_JMP | BPF_JEQ | BPF_K, machine, 1, 0),
+        BPF_STMT(BPF_RET | BPF_K, SECCOMP_RET_KILL_PROCESS),
+        BPF_STMT(BPF_LD | BPF_W | BPF_ABS, offsetof(struct seccomp_data, nr)),
+        BPF_JUMP(BPF_JMP | BPF_JEQ | BPF_K, __NR_clock_gettime, 3, 0),
+        BPF_JUMP(BPF_JMP | BPF_JEQ | BPF_K, __NR_exit_group, 2, 0),
+        /* The end of the handler that counts. */
+        BPF_JUMP(BPF_JMP | BPF_JEQ | BPF_K, __NR_rt_sigreturn, 1, 0),
+        BPF_STMT(BPF_RET | BPF_K, SECCOMP_RET_TRAP),
+        BPF_STMT(BPF_RET | BPF_K, SECCOMP_RET_ALLOW),
+    };
+    struct sock_fprog filter;
+    struct sigaction action;
+    memset(&action, 0, sizeof action);
+    action.sa_sigaction = count_call, action.sa_flags = SA_SIGINFO;
+    filter.len = sizeof steps / sizeof *steps, filter.filter = steps;
+    if (sigaction(SIGSYS, &action, NULL) != 0 || prctl(PR_SET_NO_NEW_PRIVS, 1, 0, 0, 0) != 0 ||
+        prctl(PR_SET_SECCOMP, SECCOMP_MODE_FILTER, &filter) != 0) {
+        perror("a filter of system calls");
+        _exit(3);
+    }
+}
+
+/* A frame with all calls that keep the manners; then one more step, which is taken back and made again from its list. */
+static void full_frame(wound *self, int frame, void *state, size_t room) {
+    double steps[64];
+    size_t size = 0, count = 0;
+    wound_frame(self, frame);
+    must(frz_shallow_save(self->ctx, self->blood, state, room, &size));
+    must(frz_shallow_step(self->ctx, self->blood, 0.25 / FPS, 0, NULL));
+    must(frz_shallow_last_steps(self->blood, (frz_span){steps, 64, 0}, &count));
+    must(frz_shallow_restore(self->ctx, self->blood, state, size));
+    must(frz_shallow_replay(self->ctx, self->blood, (frz_view){steps, count, 0}, NULL));
+}
+
+static void play(int frames) {
+    wound *self = wound_make();
+    /* Two rounds of all that moves: whatever buffers grow to. */
+    const int warm = 2 * SWEEP;
+    const size_t room = 1 << 23;
+    void *state = room_for(room, 1);
+    double sum = 0;
+    int frame, part;
+    for (frame = 0; frame < warm; ++frame) full_frame(self, frame, state, room);
+    if (allocations == 0) _exit(4); /* they are not counted */
+    forbid_calls();
+    (void)getppid(); /* forbidden: what is counted can be counted */
+    if (shared->calls != 1) _exit(5);
+    shared->calls = 0, allocations = 0;
+    for (frame = warm; frame < warm + frames; ++frame) {
+        double all = 0;
+        full_frame(self, frame, state, room);
+        for (part = 0; part < PARTS; ++part) all += self->seconds[part];
+        sum += all;
+        if (all > shared->worst) shared->worst = all;
+        ++shared->frames;
+    }
+    shared->average = sum / frames;
+    shared->allocations = allocations;
+    _exit(0);
+}
+
+static int gate(const char *name, double value, const char *unit, double must_be, double aim) {
+    const char *verdict = value > must_be ? "short" : aim < 0 || value <= aim ? "aim" : "ok";
+    printf("gate %s %.6g %s must <=%.6g aim ", name, value, unit, must_be);
+    if (aim < 0) printf("- %s\n", verdict);
+    else printf("<=%.6g %s\n", aim, verdict);
+    return value > must_be;
+}
+
+int main(int count, char **arguments) {
+    const int frames = count > 1 ? atoi(arguments[1]) : 10000;
+    int status = 0, failed = 0;
+    pid_t child;
+    shared = mmap(NULL, sizeof *shared, PROT_READ | PROT_WRITE, MAP_SHARED | MAP_ANONYMOUS, -1, 0);
+    if (shared == MAP_FAILED) return 1;
+    child = fork();
+    if (child == 0) play(frames);
+    if (child < 0 || waitpid(child, &status, 0) != child) return 1;
+    if (status != 0 || shared->frames != frames) {
+        fprintf(stderr, "the child ended with %#x after %ld frames; the first of %ld system calls was number %ld\n", (unsigned)status,
+                shared->frames, shared->calls, shared->first_call);
+        return 1;
+    }
+    failed |= gate("shallow.manners_allocations", (double)shared->allocations, "calls", 0, -1);
+    failed |= gate("shallow.manners_system_calls", (double)shared->calls, "calls", 0, -1);
+    failed |= gate("shallow.surgery_worst_frame", 1e3 * shared->worst, "ms", 8, 3);
+    printf("# %ld frames, %.3f ms on average\n", shared->frames, 1e3 * shared->average);
+    if (shared->calls) printf("# the first system call was number %ld\n", shared->first_call);
+    return failed;
+}

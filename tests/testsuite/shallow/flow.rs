@@ -1,0 +1,185 @@
+//! The flow: nothing is lost, depths stay within their columns, and the same scene makes the same liquid however it lies.
+
+use std::process::Command;
+
+use frazil::shallow::liquid::Liquid;
+use frazil::shallow::{Params, Shallow};
+use frazil::{Context, Pool};
+
+use crate::common::bodies::Dice;
+use crate::common::shallow::{
+    Turn, busy, context, covered, extreme, extreme_frame, ground, hash, turnable, violations,
+};
+
+const FRAME: f64 = 1.0 / 60.0;
+
+#[test]
+fn no_unit_is_lost_while_liquid_comes_and_goes() {
+    let ctx = context();
+    let plan = busy([61, 45]);
+    let mut liquid = plan.make(&ctx, Turn::NONE);
+    let mut dice = Dice(5);
+    for frame in 0..240 {
+        let corners = [(); 2].map(|()| plan.size.map(|count| dice.below(count)));
+        plan.pour(&mut liquid, Turn::NONE, corners, dice.between(-1e-4, 1e-4));
+        liquid.step(&ctx, FRAME).unwrap();
+        assert_eq!(liquid.balance().error, 0, "frame {frame}");
+        assert_eq!(violations(&liquid), 0, "frame {frame}");
+    }
+    // Everything was at work.
+    let all = liquid.balance();
+    for (what, volume) in [
+        ("poured", all.poured.abs()),
+        ("sourced", all.sourced),
+        ("drained", all.drained),
+        ("absorbed", all.absorbed),
+        ("lost", all.lost),
+    ] {
+        assert!(volume > 0.0, "nothing was {what}");
+    }
+    assert!(all.absorbed <= 2.0e-6, "gauze takes what it holds: {}", all.absorbed);
+}
+
+#[test]
+fn depths_stay_within_their_columns_whatever_is_asked() {
+    let ctx = context();
+    let mut worked = [0; 2];
+    for seed in 0..300 {
+        let (plan, step) = extreme(seed);
+        let mut liquid = plan.make(&ctx, Turn::NONE);
+        for frame in 0..6 {
+            let report = extreme_frame(&ctx, &mut liquid, step, frame);
+            assert_eq!(violations(&liquid), 0, "scene {seed}, frame {frame}");
+            assert_eq!(liquid.balance().error, 0, "scene {seed}, frame {frame}");
+            worked = [worked[0] + report.emptied, worked[1] + report.filled];
+        }
+    }
+    assert!(worked[0] > 0 && worked[1] > 0, "K_min and K_max were at work in {worked:?} rows");
+}
+
+#[test]
+fn a_scene_that_is_turned_or_mirrored_flows_the_same() {
+    let ctx = context();
+    let turns: Vec<Turn> = [Turn::NONE].into_iter().chain(Turn::TURNS).chain(Turn::MIRRORS).collect();
+    let (mut links, mut worked) = (0, [0; 2]);
+    for seed in 0..12 {
+        let plan = turnable(seed);
+        links += plan.links();
+        let mut liquids: Vec<Shallow> = turns.iter().map(|turn| plan.make(&ctx, *turn)).collect();
+        for frame in 0..10 {
+            let mut dice = Dice(seed << 32 | frame);
+            let corners = [(); 2].map(|()| plan.size.map(|count| dice.below(count)));
+            // Strips fall asleep where all is taken, which lie otherwise when the scene is turned.
+            let depth = [-1.0, -1.0, 1e-4, 0.0][dice.below(4)];
+            let mut depths = Vec::new();
+            for (liquid, turn) in liquids.iter_mut().zip(&turns) {
+                plan.pour(liquid, *turn, corners, depth);
+                let report = liquid.step(&ctx, FRAME).unwrap();
+                worked = [worked[0] + report.emptied, worked[1] + report.filled];
+                depths.push(plan.depths_of(liquid, *turn));
+            }
+            for (turn, turned) in turns.iter().zip(&depths) {
+                let differ = turned.iter().zip(&depths[0]).filter(|(a, b)| a != b).count();
+                assert_eq!(differ, 0, "scene {seed}, frame {frame}, {turn:?}: columns that differ");
+            }
+        }
+    }
+    assert!(links > 0 && worked[0] > 0 && worked[1] > 0, "{links} links, {worked:?} rows scaled");
+}
+
+#[test]
+fn recorded_steps_make_the_same_frames_again() {
+    let ctx = context();
+    for seed in 0..12 {
+        let plan = turnable(seed);
+        let (mut run, mut again) = (plan.make(&ctx, Turn::NONE), plan.make(&ctx, Turn::NONE));
+        for frame in 0..10 {
+            run.step(&ctx, FRAME).unwrap();
+            let steps = run.last_steps().to_vec();
+            assert!(!steps.is_empty());
+            again.replay(&ctx, &steps).unwrap();
+            assert_eq!(hash(&run), hash(&again), "scene {seed}, frame {frame}");
+            assert_eq!(run.time().to_bits(), again.time().to_bits(), "scene {seed}, frame {frame}");
+        }
+    }
+}
+
+#[test]
+fn more_threads_make_the_same_liquid() {
+    // Wide enough to be divided.
+    let plan = busy([421, 303]);
+    let hashes = [0, 1, 2, 3].map(|threads| {
+        let ctx = Context::new(Pool::new(threads).unwrap());
+        let mut liquid = plan.make(&ctx, Turn::NONE);
+        for _ in 0..8 {
+            liquid.step(&ctx, FRAME).unwrap();
+        }
+        hash(&liquid)
+    });
+    assert_eq!(hashes, [hashes[0]; 4]);
+}
+
+/// Only for [`all_instruction_sets_make_the_same_liquid`], in processes of its own.
+#[test]
+#[ignore = "prints a hash for another test"]
+fn print_a_hash() {
+    let ctx = context();
+    for seed in 0..12 {
+        let mut liquid = turnable(seed).make(&ctx, Turn::NONE);
+        for _ in 0..10 {
+            liquid.step(&ctx, FRAME).unwrap();
+        }
+        println!("liquid {seed} {:016x}", hash(&liquid));
+    }
+}
+
+#[test]
+fn all_instruction_sets_make_the_same_liquid() {
+    let liquids = ["baseline", "avx2", "avx512"].map(|level| {
+        let mut run = Command::new(std::env::current_exe().unwrap());
+        run.args(["--exact", "shallow::flow::print_a_hash", "--ignored", "--nocapture"]);
+        let output = run.env("FRAZIL_CPU", level).output().unwrap();
+        let text = String::from_utf8(output.stdout).unwrap();
+        text.lines().filter(|line| line.starts_with("liquid ")).map(str::to_string).collect::<Vec<_>>()
+    });
+    assert_eq!(liquids[0].len(), 12);
+    assert_eq!(liquids, [liquids[0].clone(), liquids[0].clone(), liquids[0].clone()]);
+}
+
+#[test]
+fn a_lake_at_rest_stays_as_it_is_to_the_last_unit() {
+    let ctx = context();
+    let islands = |[x, z]: [f64; 2]| 0.02 * (libm::sin(90.0 * x) * libm::cos(70.0 * z)).max(-0.5);
+    let solids = ground([45, 37], 0.005, [-0.05, 0.2], islands);
+    let mut liquid = covered(&ctx, &solids, Params::default(), |_, _| 0.0);
+    liquid.fill(0.015);
+    let before = liquid.depths().to_vec();
+    for _ in 0..30 {
+        liquid.step(&ctx, FRAME).unwrap();
+    }
+    let differ = liquid.depths().iter().zip(&before).filter(|(a, b)| a != b).count();
+    let dry = liquid.columns().indices().filter(|&column| before[column] == 0).count();
+    assert!(dry > 0 && dry < liquid.columns().count(), "there are islands in it");
+    assert_eq!(differ, 0);
+}
+
+#[test]
+fn a_film_of_a_few_units_is_not_frozen() {
+    // Blood of 1 um on a slope of 0.5 moves a thirtieth of a unit a step.
+    let ctx = context();
+    let cell = 0.0005;
+    let solids = ground([64, 3], cell, [-0.01, 0.1], |[x, _]| 0.03 - 0.5 * x);
+    let params = Params { liquid: Liquid::BLOOD, kept: 1.0, ..Params::default() };
+    let mut liquid = covered(&ctx, &solids, params, |_, _| 1e-6);
+    let top = liquid.columns().column([0, 1], 0).unwrap();
+    let first = liquid.depths()[top];
+    for _ in 0..120 {
+        liquid.step(&ctx, FRAME).unwrap();
+    }
+    // u H t / dx of Nusselt's film, on that slope.
+    let nu = Liquid::BLOOD.viscosity;
+    let flux = 9.81 * 0.5 * 1e-18 / (3.0 * nu) / 1.25f64.powi(2);
+    let lost = flux * 2.0 / cell / solids.heights.unit;
+    let is = f64::from(first - liquid.depths()[top]);
+    assert!((is - lost).abs() <= 2.0, "{is} units of {lost}");
+}
