@@ -120,6 +120,8 @@ mod shallow_delivery;
 mod shallow_energy;
 #[path = "gates/shallow_film.rs"]
 mod shallow_film;
+#[path = "gates/shallow_flooded.rs"]
+mod shallow_flooded;
 #[path = "gates/shallow_ground.rs"]
 mod shallow_ground;
 #[path = "gates/shallow_huppert.rs"]
@@ -136,6 +138,14 @@ mod shallow_same;
 mod shallow_speed;
 #[path = "gates/shallow_spread.rs"]
 mod shallow_spread;
+#[path = "gates/shallow_state.rs"]
+mod shallow_state;
+#[path = "gates/shallow_surface.rs"]
+mod shallow_surface;
+#[path = "gates/shallow_terrain.rs"]
+mod shallow_terrain;
+#[path = "gates/shallow_threads.rs"]
+mod shallow_threads;
 #[path = "gates/shot.rs"]
 mod shot;
 #[path = "gates/snow.rs"]
@@ -234,6 +244,11 @@ fn main() {
     shallow_range::run(&mut h);
     shallow_same::run(&mut h);
     shallow_speed::run(&mut h);
+    shallow_flooded::run(&mut h);
+    shallow_terrain::run(&mut h);
+    shallow_state::run(&mut h);
+    shallow_surface::run(&mut h);
+    shallow_threads::run(&mut h);
     easing::run(&mut h);
     house::run(&mut h);
     h.finish();

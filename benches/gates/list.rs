@@ -362,8 +362,13 @@ pub const GATES: &[Gate] = &[
     // The library without OpenVDB: exported symbols but frz_*, and shared objects beyond the C library's and libgcc_s.
     none("shallow.core_symbols", "symbols"),
     none("shallow.core_needs", "objects"),
+    // Frames of a trainer on it, after a warm-up and without threads: what they allocate, and system calls but that for the clock; the worst.
+    none("shallow.manners_allocations", "calls"),
+    none("shallow.manners_system_calls", "calls"),
+    gate("shallow.surgery_worst_frame", "ms", Most(8.0), Most(3.0)),
     // Shallow liquids against theory. Steady films: velocity, on slopes to 45 degrees, and what they deliver.
     gate("shallow.film_exact", "1", Most(1.0e-6), Open),
+    gate("shallow.film_short_steps", "1", Open, Open),
     gate("shallow.film_steep", "%", Most(1.0), Most(0.3)),
     gate("shallow.delivery", "1", Most(1.0e-3), Most(1.0e-5)),
     // A current down a slope (Huppert 1982): how far its exponent is from 1/3, and its front from its place.
@@ -408,4 +413,26 @@ pub const GATES: &[Gate] = &[
     // A puddle on a hundredth of the ground over liquid on all of it; memory of a column with its pipes.
     gate("shallow.puddle", "%", Most(5.0), Most(1.5)),
     gate("shallow.memory", "B", Most(64.0), Most(48.0)),
+    // Legs that a flooded passage joins: the period of their swing, and how far from their level they come to rest, over how far apart they
+    // were.
+    gate("shallow.flooded_period", "%", Most(2.0), Most(0.5)),
+    gate("shallow.flooded_levels", "1", Most(1.0e-3), Most(1.0e-5)),
+    yes("shallow.same_continued"),
+    // Lines through random solids that are not solid where the exact winding number is above 0. Thread CPU time of casting 50,000 triangles that
+    // move through 200 x 200 cells, and through 40 x 40 of them: the slowest of three terrains.
+    none("shallow.terrain_wrong", "lines"),
+    gate("shallow.terrain_all", "ms", Most(6.0), Most(3.0)),
+    gate("shallow.terrain_box", "ms", Most(2.0), Most(1.0)),
+    // Wall-clock time: one thread over two where a step is divided, at 450 and 1,500 cells along an edge; two over one where it is not, or hardly.
+    gate("shallow.threads_gain", "x", Least(1.6), Least(1.85)),
+    gate("shallow.threads_few", "1", Most(1.05), Most(1.0)),
+    // Thread CPU time of states of 200 x 200 cells with five floors.
+    gate("shallow.save", "ms", Most(1.0), Most(0.3)),
+    gate("shallow.restore", "ms", Most(1.0), Most(0.3)),
+    // Thread CPU time of the surfaces of the scenes above, with normals; edges between wet columns that are not linked, and linked ones without
+    // an edge.
+    gate("shallow.surface_one_floor", "ms", Most(0.43), Most(0.215)),
+    gate("shallow.surface_five_floors", "ms", Most(1.4), Most(0.7)),
+    gate("shallow.surface_three_floors", "ms", Most(0.37), Most(0.185)),
+    none("shallow.surface_unlinked", "edges"),
 ];

@@ -11,7 +11,7 @@ use crate::common::shallow::{context, covered, floors, ground, waves};
 use crate::harness::{Harness, median};
 
 /// Seconds that this thread has worked.
-fn thread_seconds() -> f64 {
+pub fn thread_seconds() -> f64 {
     let time = clock_gettime(ClockId::ThreadCPUTime);
     time.tv_sec as f64 + 1e-9 * time.tv_nsec as f64
 }
@@ -91,17 +91,17 @@ pub fn on_floors(solids: &Solids, longest: f64) -> Shallow {
 }
 
 /// As large as the thesis' surgery (Fig. 4.1).
-fn five_floors() -> Shallow {
+pub fn five_floors() -> Shallow {
     on_floors(&stacked(200, 0.0005, 5, false), 0.003)
 }
 
 /// As large as the thesis' three layers (Fig. 4.15).
-fn three_floors() -> Shallow {
+pub fn three_floors() -> Shallow {
     on_floors(&stacked(100, 0.001, 3, false), 0.009)
 }
 
 /// Water with waves on ground that rolls.
-fn waving(edge: usize, depth: f64) -> Shallow {
+pub fn waving(edge: usize, depth: f64) -> Shallow {
     let cell = 0.0005;
     let solids = ground([edge; 2], cell, [-0.01, 0.1], |at| 1e-4 * waves(at, cell));
     covered(&context(), &solids, blood(0.003), |[x, z], _| depth + 1e-4 * waves([2.0 * z, 2.0 * x], cell))

@@ -119,4 +119,32 @@ mod tests {
             assert!(read(bytes).unwrap_err().starts_with("h.png: "));
         }
     }
+
+    #[test]
+    fn damaged_files_are_a_sentence_or_an_image() {
+        let data: Vec<u8> = (0..1024).map(|at| (at * at % 251) as u8).collect();
+        let whole = [
+            png(ColorType::Grayscale, BitDepth::Eight, [32, 32], &data),
+            png(ColorType::GrayscaleAlpha, BitDepth::Sixteen, [16, 16], &data),
+        ];
+        let mut state = 7u64;
+        let mut below = |count: usize| {
+            state = state.wrapping_mul(0x5851_f42d_4c95_7f2d).wrapping_add(0x1405_7b7e_f767_814f);
+            (state >> 33) as usize % count
+        };
+        for round in 0..10_000 {
+            let mut bytes = whole[round % 2].clone();
+            for _ in 0..=below(3) {
+                let at = below(bytes.len());
+                bytes[at] = below(256) as u8;
+            }
+            if below(4) == 0 {
+                bytes.truncate(below(bytes.len()));
+            }
+            match read(&bytes) {
+                Ok(grey) => assert_eq!(grey.values.len(), grey.size[0] * grey.size[1]),
+                Err(what) => assert!(what.starts_with("h.png: "), "{what}"),
+            }
+        }
+    }
 }

@@ -134,7 +134,13 @@ impl FlowPoint {
             }
         }
         if !has_cells {
-            found.extend(grid.cell_at([x, z]).and_then(nearest));
+            // A vertex on the border of a terrain may lie a little outside, in 32 bits.
+            let within = |axis: usize, at: f64| {
+                let (low, size) = (grid.origin[axis], grid.size[axis] as f64 * grid.cell);
+                let inside = at.clamp(low, low + size * (1.0 - 1e-12));
+                if (at - inside).abs() < 1e-3 * grid.cell { inside } else { at }
+            };
+            found.extend(grid.cell_at([within(0, x), within(1, z)]).and_then(nearest));
         }
     }
 }

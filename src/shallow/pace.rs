@@ -1,5 +1,6 @@
 //! How long a step may be, and what the pipes share in it (thesis 4.3, Fig. 4.12).
 
+use super::flow::fast::FAST_WAVES;
 use super::flow::flux::{Step, Thinning};
 use super::grid::TOP;
 use super::params::{Pace, Params, Section};
@@ -56,6 +57,8 @@ pub struct Next<'a> {
     pub steps: u32,
     /// Length of the last step (s).
     pub last: f64,
+    /// How many times steps are halved, for fast films.
+    pub halvings: u32,
 }
 
 /// A step stays as long as it was while more is stable, up to this much more: each change of its length heats waves.
@@ -63,15 +66,30 @@ const STEADY: f64 = 0.45;
 
 /// The length of the next step (s).
 pub fn next(at: &Next) -> f64 {
+    let halved = f64::from(1 << at.halvings);
     let longest = match at.params.pace {
         Pace::Exact => {
-            let longest = longest(at.params, at.measures, at.deepest, at.left);
+            let longest = longest(at.params, at.measures, at.deepest, at.left) / halved;
             if (STEADY * longest..=longest).contains(&at.last) { at.last } else { longest }
         }
-        Pace::Realtime(longest) => longest,
+        Pace::Realtime(longest) => longest / halved,
     };
     // Rounding of what is left is no reason for another step.
     at.left / (at.left / longest - 1e-9).ceil().max(1.0)
+}
+
+/// Most times that steps are halved for fast films, so that a frame's time has a bound.
+const MOST_HALVINGS: u32 = 3;
+
+/// How many times steps are halved, so that a disturbance that goes so far (cells) in a step stays within a cell.
+pub fn halvings(way: f64) -> u32 {
+    (0..MOST_HALVINGS).find(|halvings| way <= f64::from(1 << halvings)).unwrap_or(MOST_HALVINGS)
+}
+
+/// g unit dt^2 / dx^2 of a step (1 / units).
+pub fn drive(params: &Params, measures: &Measures, dt: f64) -> f64 {
+    let Measures { cell, unit, .. } = *measures;
+    dt * dt * -params.gravity[1] * unit / (cell * cell)
 }
 
 /// What the pipes share in a step of `dt` after one of `last` (s).
@@ -86,9 +104,10 @@ pub fn step(params: &Params, measures: &Measures, dt: f64, last: f64) -> Step {
     let lean = |along: f64| (along / -y * cell / unit).round().clamp(-1e9, 1e9) as i32;
     Step {
         kept: (libm::pow(params.kept, dt) * dt / last) as f32,
-        drive: (dt * dt * -y * unit / (cell * cell)) as f32,
+        drive: drive(params, measures, dt) as f32,
         drag: (3.0 * dt * params.liquid.viscosity / (unit * unit)).min(1e36) as f32,
         section: section as f32,
+        lighter: (f64::from(FAST_WAVES) / drive(params, measures, dt)).min(1e36) as f32,
         is_whole: params.section == Section::Whole,
         thinning: params.liquid.thinning.map(|law| Thinning {
             shear: (3.0 * law.time * cell / (last * unit)).min(1e30) as f32,

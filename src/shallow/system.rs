@@ -8,7 +8,7 @@ use super::flows::{FlowPoint, Flows};
 use super::grid::BOTTOMLESS;
 use super::identity::Identity;
 use super::pace::{self, MOST_STEPS, Measures, Next};
-use super::params::Params;
+use super::params::{Params, Section};
 use super::pipes::{Border, Pipes};
 use super::remap::Remap;
 use super::terrain::Solids;
@@ -254,17 +254,10 @@ impl Shallow {
         self.steps.clear();
         self.flow.begin_frame(&self.columns);
         self.release();
+        let halvings = self.find_fast(dt, &measures, &next);
         while report.seconds < dt {
             let left = dt - report.seconds;
-            let deepest = measures.unit * f64::from(self.flow.deepest());
-            let state = Next {
-                params: &self.params,
-                measures: &measures,
-                left,
-                deepest,
-                steps: report.steps,
-                last: self.flow.last,
-            };
+            let state = self.next(&measures, left, report.steps, halvings);
             let Some(length) = next(&state) else { break };
             if report.steps == 0 && left / length > f64::from(MOST_STEPS) {
                 return Err(Error::argument(format!("a frame of {dt} s would take steps of {length} s")));
@@ -281,6 +274,33 @@ impl Shallow {
         }
         report.deepest = measures.unit * f64::from(self.flow.deepest());
         Ok(report)
+    }
+
+    /// Where the frame is, of which so much is left (s).
+    fn next<'a>(&'a self, measures: &'a Measures, left: f64, steps: u32, halvings: u32) -> Next<'a> {
+        let deepest = measures.unit * f64::from(self.flow.deepest());
+        Next { params: &self.params, measures, left, deepest, steps, last: self.flow.last, halvings }
+    }
+
+    /// Finds the fast films of a frame, and how often they want its steps to be halved.
+    fn find_fast(&mut self, dt: f64, measures: &Measures, next: impl Fn(&Next) -> Option<f64>) -> u32 {
+        let Params { liquid, section, .. } = self.params;
+        if liquid.viscosity == 0.0 || section == Section::Whole {
+            self.flow.calm();
+            return 0;
+        }
+        let (params, last) = (&self.params, self.flow.last);
+        let drive = pace::drive(params, measures, last);
+        let way = f64::from(self.flow.find_fast(&self.columns, drive)) / last;
+        let longest = pace::next(&self.next(measures, dt, 0, 0));
+        let halvings = pace::halvings(way * longest);
+        if way > 0.0
+            && let Some(length) = next(&self.next(measures, dt, 0, halvings))
+        {
+            let step = pace::step(params, measures, length, last);
+            self.flow.lighten(&self.columns, drive, &step);
+        }
+        halvings
     }
 
     fn measures(&self) -> Measures {

@@ -7,6 +7,7 @@ pub mod broken_meshes;
 pub mod caches;
 pub mod character;
 pub mod clients;
+pub mod exact_lines;
 pub mod folded;
 pub mod header;
 pub mod hero;

@@ -134,7 +134,7 @@ static void some_flows(frz_shallow_flow flows[8]) {
     for (at = 0; at < 8; ++at) {
         frz_shallow_flow *flow = &flows[at];
         flow->struct_size = size == sizeof *flows && !wild(60) ? (uint32_t)sizeof *flows : size;
-        flow->flags = wild(16) ? any() : 1 - chance(4), flow->kind = wild(16) ? any() : any() % 3;
+        flow->flags = wild(16) ? any() : 1u - (uint32_t)chance(4), flow->kind = wild(16) ? any() : any() % 3;
         flow->triangle = wild(16) ? any() : any() % (2 * (N - 1) * (N - 1));
         flow->shares[0] = wild(16) ? number() : 0.25, flow->shares[1] = 0.5, flow->shares[2] = 0.25;
         flow->at[0] = place() * 0.3, flow->at[1] = place() * 0.05, flow->at[2] = place();

@@ -228,6 +228,8 @@ static void bad_flow_points(frz_context *ctx) {
     FAILS(frz_shallow_set_flows(shallow, &flow, 1), WRONG, "flow 0: the sum of the shares");
     flow.shares[0] = 1;
     FAILS(frz_shallow_set_flows(level, &flow, 1), WRONG, "flow 0: the liquid was not made with a mesh");
+    FAILS(frz_shallow_set_flows(shallow, &flow, 1), WRONG, "outside of the domain");
+    flow.triangle = SHEET_TRIANGLES / 2;
     WORKS(frz_shallow_set_flows(shallow, &flow, 1));
     flow.struct_size = 8;
     FAILS(frz_shallow_set_flows(shallow, &flow, 1), FRZ_ERROR_VERSION, "flow 0: frz_shallow_flow: struct_size = 8");

@@ -372,7 +372,7 @@ mod tests {
             .lines()
             .map(|line| line.trim_start_matches("# "))
             .skip_while(|line| *line != "[shot]")
-            .filter(|line| !line.starts_with("file =") && !line.starts_with("terrain_"))
+            .filter(|line| !["file =", "size =", "terrain_"].iter().any(|start| line.starts_with(start)))
             .collect();
         let scene = Scene::parse(&text.join("\n"), Path::new("/s/shot.toml"), &[]).unwrap();
         let missing: Vec<&str> = keys::of(System::Shallow)
@@ -380,6 +380,6 @@ mod tests {
             .filter(|key| !scene.values.iter().any(|(own, _, _)| own == *key))
             .map(|key| key.name)
             .collect();
-        assert_eq!(missing, ["terrain_size", "terrain_height", "file"]);
+        assert_eq!(missing, ["terrain_size", "terrain_height", "size", "file"]);
     }
 }

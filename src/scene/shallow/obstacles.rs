@@ -117,7 +117,7 @@ fn pill([from, to]: [DVec3; 2], radius: f64) -> TriMesh {
             let at = |ring: usize, point: usize| (ring * AROUND + point % AROUND) as u32;
             let [a, b, c, d] =
                 [at(ring, point), at(ring + 1, point), at(ring + 1, point + 1), at(ring, point + 1)];
-            triangles.extend([[a, b, c], [a, c, d]]);
+            triangles.extend([[a, c, b], [a, d, c]]);
         }
     }
     TriMesh { positions, triangles }

@@ -13,6 +13,8 @@ pub struct Step {
     pub drive: f32,
     /// 3 dt nu / unit^2 (units^2).
     pub drag: f32,
+    /// [`FAST_WAVES`](super::fast::FAST_WAVES) over `drive` (units): over a depth, by how much the inertia of a fast film counts less.
+    pub lighter: f32,
     /// Greatest depth in the section A (units), for stability; where the section is whole, as in the thesis, its depth dx.
     pub section: f32,
     /// Whether all sections are whole.
@@ -75,18 +77,19 @@ pub fn rounded(transfer: f32) -> f32 {
     transfer + 0.5f32.copysign(transfer)
 }
 
-/// The flux through a pipe from i to j after a step (units of depth): `fall` is eta_i - eta_j, `depth` H of both (units), `flux` the last flux.
+/// The flux through a pipe from i to j after a step (units of depth): `fall` is eta_i - eta_j, `depth` H of both (units), `flux` the last flux;
+/// the liquid's inertia counts `light` times less.
 #[inline(always)]
-pub fn flux<K: Kind>(step: &Step, fall: i32, depth: [f32; 2], flux: f32, open: f32) -> f32 {
+pub fn flux<K: Kind>(step: &Step, fall: i32, depth: [f32; 2], flux: f32, open: f32, light: f32) -> f32 {
     let kept = step.kept * flux;
-    let drive = step.drive * fall as f32;
+    let drive = step.drive * light * fall as f32;
     // The mean depth drives, the same uphill and downhill: with that of the column that gives, waves would gain by each swing.
     let section = if K::WHOLE { step.section } else { lesser(0.5 * (depth[0] + depth[1]), step.section) };
     let driven = kept + drive * section;
     let giver = if driven > 0.0 { depth[0] } else { depth[1] };
     if K::VISCOUS {
         let square = giver * giver;
-        let drag = if K::THINS { step.drag * step.thinned(flux, square) } else { step.drag };
+        let drag = light * if K::THINS { step.drag * step.thinned(flux, square) } else { step.drag };
         let open = square * open;
         driven * (open / (open + drag))
     } else {
@@ -147,11 +150,13 @@ pub struct Row<'a> {
     pub left_east: &'a [f32],
     /// The same to the south.
     pub left_south: &'a [f32],
+    /// How much less inertia counts to the east and to the south, where it does.
+    pub light: [&'a [f32]; 2],
 }
 
 /// Computes the fluxes of a span's pipes, and what they are to transfer: the flux and what was left.
 #[inline(always)]
-pub fn flux_row<K: Kind>(
+pub fn flux_row<K: Kind, const LIGHT: bool>(
     step: &Step,
     row: &Row,
     east: &mut [f32],
@@ -164,16 +169,19 @@ pub fn flux_row<K: Kind>(
     let (south_base, south_depth) = (&row.south_base[..count], &row.south_depth[..count]);
     let (open_east, open_south) = (&row.open_east[..count], &row.open_south[..count]);
     let (left_east, left_south) = (&row.left_east[..count], &row.left_south[..count]);
+    let [light_east, light_south] = row.light.map(|light| if LIGHT { &light[..count] } else { light });
     let (south, to_east, to_south) = (&mut south[..count], &mut to_east[..count], &mut to_south[..count]);
     for x in 0..count {
         let eta = base[x] + depth[x];
         let own = depth[x] as f32;
         let fall = eta - (base[x + 1] + depth[x + 1]) + step.tilt[0];
-        let f = flux::<K>(step, fall, [own, depth[x + 1] as f32], east[x], open_east[x]);
+        let light = if LIGHT { light_east[x] } else { 1.0 };
+        let f = flux::<K>(step, fall, [own, depth[x + 1] as f32], east[x], open_east[x], light);
         east[x] = f;
         to_east[x] = if f == 0.0 { 0.0 } else { rounded(f + left_east[x]) };
         let fall = eta - (south_base[x] + south_depth[x]) + step.tilt[1];
-        let f = flux::<K>(step, fall, [own, south_depth[x] as f32], south[x], open_south[x]);
+        let light = if LIGHT { light_south[x] } else { 1.0 };
+        let f = flux::<K>(step, fall, [own, south_depth[x] as f32], south[x], open_south[x], light);
         south[x] = f;
         to_south[x] = if f == 0.0 { 0.0 } else { rounded(f + left_south[x]) };
     }
@@ -200,6 +208,7 @@ mod tests {
             kept: 0.9,
             drive: 1e-7,
             drag: 1e9,
+            lighter: 3.5e6,
             section: 5e4,
             is_whole: false,
             thinning: None,
@@ -210,8 +219,10 @@ mod tests {
         for (fall, depth, last) in
             [(700, [3e4, 2e4], 20.0), (-90, [6e4, 0.0], 31.5), (40, [2e4, 2e4], -0.1), (-5, [0.0, 1e4], 0.0)]
         {
-            let [there, back] = [(fall, depth, last), (-fall, [depth[1], depth[0]], -last)]
-                .map(|(fall, depth, last)| flux::<Of<true, false, false>>(&step, fall, depth, last, 0.7));
+            let [there, back] =
+                [(fall, depth, last), (-fall, [depth[1], depth[0]], -last)].map(|(fall, depth, last)| {
+                    flux::<Of<true, false, false>>(&step, fall, depth, last, 0.7, 1.5)
+                });
             assert_eq!(there, -back, "{fall} {depth:?} {last}");
         }
     }

@@ -7,10 +7,12 @@ use crate::shallow::columns::{Columns, NONE};
 const REFILL: f64 = 0.5;
 /// Most iterations for the heads of a step.
 const ITERATIONS: usize = 500;
-/// Units by which the flow out of a column may miss what it should be.
-const RESIDUAL: f64 = 0.02;
+/// Units by which a column's head may be off, if those around it were right.
+const RESIDUAL: f64 = 0.005;
+/// Heads closer than this (units) are equal, as surfaces are that do not differ by a unit: liquid at rest stays at rest.
+pub(super) const EQUAL: f64 = 0.5;
 /// What a head over the surface takes up, as part of the conductance: so little that a closed cavity has a solution.
-const GIVE: f64 = 1e-9;
+const GIVE: f64 = 1e-12;
 /// Rounds in which columns below their surface leave the system.
 const RELEASES: usize = 3;
 /// Parts of a unit in which flows through links are summed.
@@ -167,7 +169,9 @@ impl Network {
         let by_diagonal: fn(&Node) -> f64 = |node| node.residual * node.residual / node.diagonal;
         let mut rest = held(self, by_diagonal);
         for _ in 0..ITERATIONS {
-            if self.nodes.iter().all(|node| node.residual.abs() <= RESIDUAL) {
+            // Links are not summed any closer.
+            let least = 4.0 / LINK_SCALE;
+            if self.nodes.iter().all(|node| node.residual.abs() <= (RESIDUAL * node.diagonal).max(least)) {
                 break;
             }
             self.apply();

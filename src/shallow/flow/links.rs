@@ -3,6 +3,7 @@
 use crate::shallow::columns::{Columns, NONE, STRIP, resize_part};
 use std::ops::Range;
 
+use super::fast;
 use super::flux::{Kind, Step, flux, lesser, rounded};
 use super::parts::LinkPart;
 use super::transfer::left;
@@ -81,7 +82,10 @@ impl LinkPart<'_> {
             let f = if is_still {
                 radiated(step, fall, [own as f32, beyond as f32])
             } else {
-                flux::<K>(step, fall, [own as f32, beyond as f32], self.flux[at], open)
+                let depth = [own as f32, beyond as f32];
+                let light =
+                    if K::VISCOUS && !K::WHOLE { fast::light(step, depth, self.flux[at]) } else { 1.0 };
+                flux::<K>(step, fall, depth, self.flux[at], open, light)
             };
             self.flux[at] = f;
             self.transfer[at] = if f == 0.0 { 0.0 } else { rounded(f + self.left[at]).clamp(-MOST, MOST) };

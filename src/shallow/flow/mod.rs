@@ -1,12 +1,13 @@
 //! The state of the liquid, and one step of it (thesis 4.1.2, Alg. 4.1).
 //!
-//! A step goes over the rows once (`rows.rs`): fluxes (`flux.rs`, `links.rs`), their scaling (`scale.rs`), and transfers (`transfer.rs`), on the
+//! A step goes over the rows once (`rows.rs`): fluxes (`flux.rs`, `fast.rs`, `links.rs`), their scaling (`scale.rs`), and transfers (`transfer.rs`), on the
 //! strips that are wet or beside wet ones (`active.rs`), by one band of rows for each thread (`bands.rs`, `parts.rs`). Columns that are full up to their
 //! ceiling are a network of their own, found first (`network.rs`, `heads.rs`, `rounds.rs`).
 
 pub(super) mod active;
 pub(super) mod bands;
 mod buffers;
+pub mod fast;
 pub mod flux;
 mod heads;
 pub mod links;
@@ -24,6 +25,7 @@ use crate::shallow::columns::{Columns, STRIP, resize_part, strip_mut};
 use crate::shallow::pipes::Pipes;
 use active::{Active, runs};
 use bands::Bands;
+use fast::{Fast, Films};
 use flux::Step;
 use links::LinkFlow;
 use network::{Network, State};
@@ -45,6 +47,7 @@ pub struct Flow {
     pub(super) network: Network,
     /// Length of the step in whose measure fluxes are (s).
     pub(super) last: f64,
+    fast: Fast,
 }
 
 /// What a restored state replaces.
@@ -93,6 +96,7 @@ impl Flow {
             bands: Bands::new(columns, pipes.links.most),
             network: Network::new(columns.len()),
             last: 1.0,
+            fast: Fast::new(columns.len() + STRIP, columns.grid.size[1]),
         }
     }
 
@@ -183,6 +187,7 @@ impl Flow {
         for numbers in self.flux.iter_mut().chain(&mut self.left) {
             resize_part(numbers, part.clone(), len, 0.0);
         }
+        self.fast.resize_part(part.clone(), len);
         self.network.resize_part(part, len);
     }
 
@@ -218,6 +223,24 @@ impl Flow {
         });
     }
 
+    /// Finds fast films; returns how far a disturbance goes in them in a step as long as the last one (cells). `drive` is g unit dt^2 / dx^2 of
+    /// that step (1 / units).
+    pub fn find_fast(&mut self, columns: &Columns, drive: f64) -> f32 {
+        let Self { fast, active, depth, flux: [east, south], .. } = self;
+        fast.find(&Films { columns, active, depth, flux: [east, south], drive: drive as f32 })
+    }
+
+    /// Lets the inertia of fast films count less in steps like one.
+    pub fn lighten(&mut self, columns: &Columns, drive: f64, step: &Step) {
+        let Self { fast, active, depth, flux: [east, south], .. } = self;
+        fast.lighten(&Films { columns, active, depth, flux: [east, south], drive: drive as f32 }, step);
+    }
+
+    /// No film is fast.
+    pub fn calm(&mut self) {
+        self.fast.clear();
+    }
+
     /// At least the greatest depth (units).
     pub fn deepest(&self) -> i32 {
         self.bands.deepest()
@@ -230,7 +253,14 @@ impl Flow {
         if self.bands.find_filling() || !self.network.is_empty() {
             self.flood(columns, pipes, step);
         }
-        let ground = Ground { columns, pipes, active: &self.active, network: &self.network, may_fill: &[] };
+        let ground = Ground {
+            columns,
+            pipes,
+            active: &self.active,
+            network: &self.network,
+            fast: &self.fast,
+            may_fill: &[],
+        };
         let liquid = Part::new(&mut self.depth, &mut self.flux, &mut self.left, &mut self.links);
         self.bands.step(step, &ground, liquid);
         self.network.put_back(&mut self.flux, &mut self.left, &mut self.links);

@@ -6,7 +6,7 @@
 //! them: all come from the same surface, or waves would grow. A head below the surface would be suction: such a column gives as if it were free.
 
 use super::flux::Step;
-use super::heads::Node;
+use super::heads::{EQUAL, Node};
 use super::links::LinkFlow;
 use super::rounds::{self, Party};
 use crate::shallow::columns::{Columns, NONE, STRIP, resize_part};
@@ -285,7 +285,9 @@ impl Network {
                 let over = self.nodes.get(edge.ends[end] as usize).map_or(0.0, |node| node.over);
                 self.surface(columns, &edge, end) + over
             };
-            let flux = edge.kept + edge.conductance * (head(0) - head(1));
+            let fall = head(0) - head(1);
+            let fall = if fall.abs() < EQUAL { 0.0 } else { fall };
+            let flux = edge.kept + edge.conductance * fall;
             let edge = &mut self.edges[at];
             (edge.flux, edge.units) = (flux, nearest(flux + edge.left));
         }

@@ -7,6 +7,7 @@
 
 use super::active::Active;
 use super::buffers::{RING, Rows, SWEEPS};
+use super::fast::Fast;
 use super::flux::{Kind, Of, Row, Step, flux_row, greater, lesser};
 use super::links::{Outside, indices_of};
 use super::network::Network;
@@ -28,6 +29,8 @@ pub struct Ground<'a> {
     pub active: &'a Active,
     /// What flows through full columns.
     pub network: &'a Network,
+    /// Films whose inertia counts less.
+    pub fast: &'a Fast,
     /// Rows with columns that may fill up.
     pub may_fill: &'a [bool],
 }
@@ -119,7 +122,8 @@ impl Rows {
     /// Fluxes of a row's pipes.
     #[inline(always)]
     fn drive<K: Kind>(&mut self, step: &Step, ground: &Ground, parts: &mut Parts, row: usize) {
-        let Ground { columns, pipes, active, .. } = ground;
+        let Ground { columns, pipes, active, fast, .. } = ground;
+        let (light, is_fast) = (fast.light(), fast.row(row));
         let start = columns.row(row).start * STRIP;
         let buffer = &mut self.ring[row % RING];
         (buffer.is_less, buffer.is_full) = (false, false);
@@ -157,15 +161,15 @@ impl Rows {
                     open_south: &pipes.south[first..],
                     left_east: &own.left[0][mine..],
                     left_south: &own.left[1][mine..],
+                    light: light.map(|light| &light[first..]),
                 };
-                flux_row::<K>(
-                    step,
-                    &row,
-                    &mut flux_east[mine..mine + len],
-                    &mut flux_south[mine..mine + len],
-                    &mut buffer.east[at..at + len],
-                    &mut buffer.south[at..at + len],
-                );
+                let flux = (&mut flux_east[mine..mine + len], &mut flux_south[mine..mine + len]);
+                let to = (&mut buffer.east[at..at + len], &mut buffer.south[at..at + len]);
+                if K::VISCOUS && !K::WHOLE && is_fast {
+                    flux_row::<K, true>(step, &row, flux.0, flux.1, to.0, to.1);
+                } else {
+                    flux_row::<K, false>(step, &row, flux.0, flux.1, to.0, to.1);
+                }
             }
         }
         if !pipes.links.is_empty() {

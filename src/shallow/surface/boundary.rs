@@ -22,7 +22,7 @@ pub(super) struct Wall {
 impl Wall {
     /// Whether a column's surface ends there.
     pub fn has(&self, index: u32) -> bool {
-        self.members.contains(&index)
+        self.members.iter().fold(false, |any, member| any | (*member == index))
     }
 }
 

@@ -23,13 +23,15 @@ pub(super) struct Entry {
 }
 
 impl Entry {
+    #[inline(always)]
     pub fn holds(&self, height: i32) -> bool {
-        self.under <= height && height < self.ceiling
+        (self.under <= height) & (height < self.ceiling)
     }
 
     /// Whether two columns of neighbouring cells are linked, one of them wet.
+    #[inline(always)]
     pub fn is_linked(&self, other: &Self) -> bool {
-        self.holds(other.height) && other.holds(self.height)
+        self.holds(other.height) & other.holds(self.height)
     }
 
     /// Whether the surface of a wet column, whose height `wall` holds, ends at its solid.

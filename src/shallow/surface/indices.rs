@@ -78,7 +78,7 @@ pub(super) fn write_triangles(
     scene: Scene<'_>,
     found: &Found,
     walls: &[Wall],
-    search: &mut Search,
+    search: &Search,
     flipped: bool,
     out: &mut Indices<'_>,
 ) {
@@ -151,7 +151,7 @@ fn write_odd<I: Index>(
     scene: Scene<'_>,
     found: &Found,
     walls: &[Wall],
-    search: &mut Search,
+    search: &Search,
     flipped: bool,
     out: &mut [I],
 ) {
@@ -160,7 +160,7 @@ fn write_odd<I: Index>(
         Some(extra) => walls[extra].vertex,
         None => found.vertex(id as usize / STRIP, id as usize % STRIP),
     };
-    each_odd_triangle(scene, found, walls, search, |corners| {
+    each_odd_triangle(found, search, |corners| {
         let [a, b, c] = corners.map(|id| I::from_vertex(vertex(id)));
         if let Some(out) = out.next() {
             *out = if flipped { [a, c, b] } else { [a, b, c] };

@@ -18,7 +18,7 @@ pub(super) struct Scene<'a> {
     pub columns: &'a Columns,
     /// Depth of each index (units).
     pub depth: &'a [i32],
-    /// Of each strip where the one of the layer above probably is; may be empty.
+    /// Of each strip where the one of the layer above is, or would be, probably; may be empty.
     pub above: &'a [u32],
 }
 
@@ -99,11 +99,21 @@ impl<'a> Scene<'a> {
         self.find(Strip { layer: own.layer + 1, ..own }, guess, strip + 1..end.min(strip + across + 1))
     }
 
-    /// A strip within a range; `guess` is mostly right.
+    /// A strip within a range; `guess`, where it is or would be, is mostly right.
+    #[inline]
     fn find(self, wanted: Strip, guess: usize, range: Range<usize>) -> Option<usize> {
         let strips = self.columns.strips();
-        if strips.get(guess) == Some(&wanted) {
+        let found = strips.get(guess);
+        if found == Some(&wanted) {
             return Some(guess);
+        }
+        if found.is_none_or(|behind| *behind > wanted)
+            && guess
+                .checked_sub(1)
+                .and_then(|before| strips.get(before))
+                .is_some_and(|before| *before < wanted)
+        {
+            return None;
         }
         strips[range.clone()].binary_search(&wanted).ok().map(|found| range.start + found)
     }
@@ -120,13 +130,16 @@ pub(super) fn cell_at([x, z]: [usize; 2], [dx, dz]: [i32; 2]) -> [usize; 2] {
     [x.wrapping_add_signed(dx as isize), z.wrapping_add_signed(dz as isize)]
 }
 
-/// Finds the strips above each other.
+/// Finds where the strips above each other are, or would be.
 pub(super) fn find_above(columns: &Columns, out: &mut Vec<u32>) {
-    let scene = Scene { columns, depth: &[], above: &[] };
+    let strips = columns.strips();
+    let across = columns.grid.size[0].div_ceil(STRIP);
     out.clear();
-    out.extend(
-        (0..columns.strips().len()).map(|strip| scene.above(strip).map_or(NONE, |above| above as u32)),
-    );
+    out.extend(strips.iter().enumerate().map(|(strip, own)| {
+        let wanted = Strip { layer: own.layer + 1, ..*own };
+        let behind = &strips[strip + 1..strips.len().min(strip + across + 2)];
+        (strip + 1 + behind.partition_point(|other| *other < wanted)) as u32
+    }));
 }
 
 #[cfg(test)]

@@ -33,6 +33,7 @@ mod normals;
 mod room;
 mod strips;
 mod vertices;
+mod walled;
 
 use super::columns::{Columns, NONE, STRIP};
 use crate::error::{Error, Result};
@@ -153,7 +154,8 @@ impl Surface {
         self.found.reset(columns);
         self.normals.reset(columns);
         self.walls.reserve(room::Walls::of(columns).pairs, layers);
-        self.search.reserve(layers);
+        let [nx, nz] = columns.grid.size;
+        self.search.reserve(layers, (nx - 1) * (nz - 1), bound(columns).indices / 3);
         self.around.reserve();
     }
 
@@ -220,14 +222,7 @@ impl Surface {
         target.check(&counts)?;
         let scene = Scene { columns, depth: depths.depth, above: &self.above };
         let (found, walls) = (&self.found, &self.walls.list);
-        indices::write_triangles(
-            scene,
-            found,
-            walls,
-            &mut self.search,
-            layout.left_handed,
-            &mut target.indices,
-        );
+        indices::write_triangles(scene, found, walls, &self.search, layout.left_handed, &mut target.indices);
         self.normals.reset(columns);
         let vertices = Vertices::new(scene, found, walls, depths.velocity, layout, target.normals.is_some());
         vertices.write(&mut self.normals, &mut self.around, target);

@@ -3,56 +3,11 @@
 //! Each line is shifted by a symbolic (e, e^2) in (x, z), e infinitesimal, so that it meets no edge and no vertex. Nothing but the shift
 //! prefers a side: mirroring the scene or turning it by 90 degrees gives the same bits unless a line meets an edge exactly.
 
+use super::lines::{LANES, ROUNDOFF, WHOLE, greater, integer_of, lesser, whole};
+use crate::shallow::grid::{Heights, TOP};
+
 /// Corner of a triangle (m).
 pub type Corner = [f64; 3];
-
-/// Unit roundoff of f64.
-const ROUNDOFF: f64 = f64::EPSILON / 2.0;
-
-/// The coordinates of the lines through the cells of one axis.
-pub struct Lines {
-    /// Ascending, between an infinity at either end.
-    places: Vec<f64>,
-    /// 1 / cell (1/m).
-    inverse: f64,
-    /// Greatest magnitude of the numbers that a coordinate is made of (m).
-    reach: f64,
-}
-
-impl Lines {
-    /// Lines at strictly ascending coordinates; `reach` bounds them and the origin that they are counted from.
-    pub fn new(centres: impl Iterator<Item = f64>, cell: f64, reach: f64) -> Self {
-        let mut places = vec![f64::NEG_INFINITY];
-        places.extend(centres);
-        places.push(f64::INFINITY);
-        Self { places, inverse: 1.0 / cell, reach }
-    }
-
-    /// Coordinate of a line.
-    pub fn at(&self, line: u32) -> f64 {
-        self.places[line as usize + 1]
-    }
-
-    /// A coordinate in lines, with rounding errors.
-    fn count(&self, place: f64) -> f64 {
-        (place - self.places[1]) * self.inverse
-    }
-
-    /// Count of lines left of a coordinate after the shift, exactly. A triangle can only cross the lines from the least rank of its
-    /// corners to the line before the greatest.
-    #[inline]
-    pub fn rank(&self, place: f64) -> u32 {
-        let last = (self.places.len() - 2) as f64;
-        let mut rank = lesser(greater(self.count(place), 0.0), last) as usize;
-        while self.places[rank + 1] < place {
-            rank += 1;
-        }
-        while self.places[rank] >= place {
-            rank -= 1;
-        }
-        rank as u32
-    }
-}
 
 /// A triangle that lines may cross.
 pub struct Facet {
@@ -66,9 +21,21 @@ pub struct Facet {
     rough: f64,
 }
 
+/// What several lines are to a triangle.
+#[derive(Default)]
+pub struct Crossed {
+    /// How far they are within it and without (m2, as areas).
+    within: [f64; LANES],
+    beside: [f64; LANES],
+    /// Its area (m2, twice), negative if it faces up.
+    area: [f64; LANES],
+    /// Height (units), within the range and rounded, for [`integer_of`].
+    units: [f64; LANES],
+}
+
 impl Facet {
     /// A triangle whose heights matter to within a small part of a unit (m).
-    #[inline]
+    #[inline(always)]
     pub fn new([a, b, c]: [Corner; 3], unit: f64) -> Self {
         let range = |axis: usize| {
             [lesser(lesser(a[axis], b[axis]), c[axis]), greater(greater(a[axis], b[axis]), c[axis])]
@@ -96,7 +63,7 @@ impl Facet {
     ///
     /// Whether it does is exact. The order of corners, mirrors and turns by 90 degrees do not change a bit of the height; on an edge it
     /// depends on the edge alone.
-    #[inline]
+    #[inline(never)]
     pub fn cross(&self, at: [f64; 2]) -> Option<(f64, bool)> {
         let from = |corner: usize| [self.corners[corner][0] - at[0], self.corners[corner][2] - at[1]];
         let [r, p, q] = [from(0), from(1), from(2)];
@@ -112,6 +79,43 @@ impl Facet {
         let height = if sum.abs() <= self.rough { self.exact_height(at) } else { self.height([b, c], sum) };
         // Seen from above, with x to the right and z downward, a triangle that faces up runs counter-clockwise.
         Some((height, !is_left))
+    }
+
+    /// Computes what [`Facet::one_of`] tells of several lines.
+    #[inline(always)]
+    pub fn cross_all(&self, x: &[f64; LANES], z: &[f64; LANES], heights: &Heights, out: &mut Crossed) {
+        let [r, p, q] = self.corners;
+        for lane in 0..LANES {
+            let from = |corner: Corner| [corner[0] - x[lane], corner[2] - z[lane]];
+            let [r, p, q] = [from(r), from(p), from(q)];
+            let [a, b, c] = [cross(p, q), cross(q, r), cross(r, p)];
+            let sum = (b + c) + a;
+            let least = lesser(lesser(a, b), c);
+            let greatest = greater(greater(a, b), c);
+            out.within[lane] = greater(least, -greatest);
+            out.beside[lane] = lesser(greatest, -least);
+            out.area[lane] = sum;
+            // As `Heights::round`: halves are rounded up.
+            let units = (self.height([b, c], sum) - heights.low) / heights.unit;
+            let units = lesser(greater(units, 0.0), f64::from(TOP));
+            let even = (units + WHOLE) - WHOLE;
+            let up = if units - even >= 0.5 { 1.0 } else { 0.0 };
+            out.units[lane] = whole(even + up);
+        }
+    }
+
+    /// Of one of several lines, the height (units) at which it crosses the triangle, and whether this faces up there.
+    #[inline(always)]
+    pub fn one_of(&self, lane: usize, all: &Crossed, at: [f64; 2], heights: &Heights) -> Option<(u32, bool)> {
+        let area = all.area[lane];
+        if all.within[lane] > self.doubt && area.abs() > self.rough {
+            Some((integer_of(all.units[lane]), area < 0.0))
+        } else if all.beside[lane] > self.doubt {
+            // Weights of both signs, and no doubt of them.
+            None
+        } else {
+            self.cross(at).map(|(height, is_up)| (heights.round(height) as u32, is_up))
+        }
     }
 
     /// The same where the sign of a weight is in doubt.
@@ -150,7 +154,7 @@ impl Facet {
 
     /// Height (m) where the last two corners have these weights, twice the areas that a point spans with the edges opposite to them, out
     /// of a sum. The two share alike, so that their order does not matter.
-    #[inline]
+    #[inline(always)]
     fn height(&self, weights: [f64; 2], sum: f64) -> f64 {
         let [r, p, q] = self.corners.map(|corner| corner[1]);
         let height = r + (weights[0] * (p - r) + weights[1] * (q - r)) / sum;
@@ -165,75 +169,7 @@ impl Facet {
     }
 }
 
-/// The edges of a triangle, to find the lines of a row that may cross it.
-pub struct Outline {
-    edges: [Edge; 3],
-    /// How far (lines) a computed place may be from the true one.
-    error: f64,
-}
-
-/// An edge between two coordinates z (m); no row where it has one z only.
-struct Edge {
-    range: [f64; 2],
-    /// At the place of its first end: z (m) and x (lines).
-    from: [f64; 2],
-    /// Change of x (lines) with z (m).
-    slope: f64,
-}
-
-impl Outline {
-    /// The outline of a triangle over lines along x.
-    pub fn new(corners: &[Corner; 3], x: &Lines) -> Self {
-        let edge = |corner: usize| {
-            let (a, b) = (&corners[corner], &corners[(corner + 1) % 3]);
-            // The two others end where a row through all of such an edge meets it.
-            let range = if a[2] == b[2] { [1.0, -1.0] } else { [lesser(a[2], b[2]), greater(a[2], b[2])] };
-            let slope = (b[0] - a[0]) * x.inverse / (b[2] - a[2]);
-            Edge { range, from: [a[2], x.count(a[0])], slope }
-        };
-        let reach = corners.iter().fold(x.reach, |reach, corner| greater(reach, corner[0].abs()));
-        // A place has seen 11 roundings of at most 2 reach, that of a line 6 of at most 1: 28 in all.
-        Self { edges: [edge(0), edge(1), edge(2)], error: 64.0 * ROUNDOFF * reach * x.inverse }
-    }
-
-    /// Of the lines from `first` to before `last`, those that may cross the triangle in the row at z.
-    pub fn span(&self, z: f64, [first, last]: [u32; 2]) -> [u32; 2] {
-        let (mut least, mut greatest) = (f64::INFINITY, f64::NEG_INFINITY);
-        for Edge { range, from, slope } in &self.edges {
-            let place = from[1] + slope * (z - from[0]);
-            let meets = range[0] <= z && z <= range[1];
-            least = lesser(least, if meets { place } else { f64::INFINITY });
-            greatest = greater(greatest, if meets { place } else { f64::NEG_INFINITY });
-        }
-        // Half a line before an end leaves the end.
-        let [start, end] = [first, last].map(|line| f64::from(line as i32) - 0.5);
-        let clamp = |place: f64| lesser(greater(place, start), end);
-        [below(clamp(least - self.error)), up_to(clamp(greatest + self.error))]
-    }
-}
-
-/// Count of the integers from 0 that are below a number from -1/2.
-fn below(number: f64) -> u32 {
-    let whole = number as i32;
-    (whole + i32::from(f64::from(whole) < number)) as u32
-}
-
-/// Count of the integers from 0 up to a number from -1/2.
-fn up_to(number: f64) -> u32 {
-    let whole = number as i32;
-    (whole + i32::from(f64::from(whole) <= number)) as u32
-}
-
-/// The lesser of two numbers that are not NaN: one instruction, unlike `f64::min`.
-fn lesser(a: f64, b: f64) -> f64 {
-    if a < b { a } else { b }
-}
-
-/// The greater of two numbers that are not NaN.
-fn greater(a: f64, b: f64) -> f64 {
-    if a > b { a } else { b }
-}
-
+#[inline(always)]
 fn cross(a: [f64; 2], b: [f64; 2]) -> f64 {
     a[0] * b[1] - a[1] * b[0]
 }
@@ -365,6 +301,7 @@ impl Sum {
 
 #[cfg(test)]
 mod tests {
+    use super::super::lines::{Lines, Outline, Spans};
     use super::*;
 
     #[test]
@@ -405,7 +342,9 @@ mod tests {
             };
             for row in ends(1)[0]..ends(1)[1] {
                 let z = lines[1].at(row);
-                let span = Outline::new(&facet.corners, &lines[0]).span(z, ends(0));
+                let mut spans = Spans::default();
+                Outline::new(&facet.corners, &lines[0]).spans(&[z; LANES], ends(0), &mut spans);
+                let span = spans.lines(0);
                 for column in ends(0)[0]..ends(0)[1] {
                     let crossing = facet.cross([lines[0].at(column), z]);
                     counts[row as usize][column as usize] += i32::from(crossing.is_some());

@@ -5,6 +5,8 @@
 mod crossings;
 pub mod ground;
 pub mod height;
+mod lines;
+mod piles;
 pub mod sampler;
 pub mod shapes;
 pub mod solids;

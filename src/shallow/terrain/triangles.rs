@@ -14,17 +14,19 @@
 use std::ops::Range;
 
 use super::Solids;
-use super::crossings::{Facet, Lines, Outline};
+use super::crossings::{Crossed, Facet};
+use super::lines::{LANES, Lines, Outline, Spans};
+use super::piles::{Piles, keep_room};
 use super::solids::Solid;
 use crate::base::Vec3;
-use crate::base::cpu::FlushDenormals;
+use crate::base::cpu::{FlushDenormals, dispatch};
 use crate::error::{Error, Result};
-use crate::shallow::grid::{BOTTOMLESS, Grid, Heights};
+use crate::shallow::grid::{Grid, Heights};
 
-/// The end of a list of crossings.
-const END: u32 = u32::MAX;
-/// Triangles over more lines along x find those of each row by their edges.
-const WIDE: u32 = 2;
+/// So many lines of a triangle are asked without a look at its edges.
+const FEW: u32 = 3;
+/// Lines of a triangle that are collected before they are asked.
+const ROOM: usize = 64;
 
 /// The solids of every cell. Triangles are counter-clockwise seen from outside.
 ///
@@ -52,12 +54,7 @@ pub struct Caster {
     cells: [Range<usize>; 2],
     /// Counts of lines left of each vertex.
     ranks: Vec<[u32; 2]>,
-    /// Of each crossing: height (units) x 2 + 1 if the triangle faces up, and the crossing before it in its cell, or [`END`].
-    crossings: Vec<[u32; 2]>,
-    /// The last crossing of each cell, or [`END`].
-    last: Vec<u32>,
-    /// The crossings of one cell.
-    line: Vec<u32>,
+    piles: Piles,
     starts: Vec<u32>,
     solids: Vec<Solid>,
 }
@@ -104,9 +101,7 @@ impl Caster {
             lines: [0, 1].map(lines),
             cells: [0..0, 0..0],
             ranks: Vec::new(),
-            crossings: Vec::new(),
-            last: Vec::new(),
-            line: Vec::with_capacity(64),
+            piles: Piles::default(),
             starts: Vec::new(),
             solids: Vec::new(),
         })
@@ -130,10 +125,9 @@ impl Caster {
         }
         self.rank(positions, &cells)?;
         self.cross(positions, triangles, &cells)?;
-        self.stack();
+        self.piles.stack(&mut self.starts, &mut self.solids);
         self.cells = cells;
-        keep_room(&mut self.crossings);
-        keep_room(&mut self.line);
+        self.piles.keep_room();
         keep_room(&mut self.solids);
         Ok(())
     }
@@ -142,8 +136,6 @@ impl Caster {
         self.cells = [0..0, 0..0];
         self.starts.clear();
         self.solids.clear();
-        self.crossings.clear();
-        self.last.clear();
         let [x, z] = cells;
         let [nx, nz] = self.size;
         if x.start > x.end || z.start > z.end || x.end > nx || z.end > nz {
@@ -151,7 +143,7 @@ impl Caster {
                 "cells {x:?} x {z:?} are not a box within {nx} x {nz} cells"
             )));
         }
-        self.last.resize(x.len() * z.len(), END);
+        self.piles.reset(x.len() * z.len());
         Ok(())
     }
 
@@ -174,73 +166,13 @@ impl Caster {
     }
 
     /// Lists the crossings of each cell.
-    fn cross(
-        &mut self,
-        positions: &[Vec3],
-        triangles: &[[u32; 3]],
-        [x, z]: &[Range<usize>; 2],
-    ) -> Result<()> {
-        let (heights, width, [along_x, along_z]) = (self.heights, x.len(), &self.lines);
-        let (crossings, last) = (&mut self.crossings, &mut self.last);
-        for (index, triangle) in triangles.iter().enumerate() {
-            let rank = |corner: usize| self.ranks.get(triangle[corner] as usize);
-            let (Some(&a), Some(&b), Some(&c)) = (rank(0), rank(1), rank(2)) else {
-                let (triangle, count) = (index + 1, positions.len());
-                let what = format!("triangle {triangle} names a vertex beyond the {count} there are");
-                return Err(Error::argument(what));
-            };
-            let [columns, rows] = [0, 1].map(|axis| {
-                let (ab, other) = ([a[axis], b[axis]], c[axis]);
-                [ab[0].min(ab[1]).min(other), ab[0].max(ab[1]).max(other)]
-            });
-            if columns[0] == columns[1] || rows[0] == rows[1] {
-                continue;
-            }
-            let corner = |corner: usize| {
-                let p = &positions[triangle[corner] as usize];
-                [p.x, p.y, p.z].map(f64::from)
-            };
-            let facet = Facet::new([corner(0), corner(1), corner(2)], heights.unit);
-            let is_wide = columns[1] - columns[0] > WIDE;
-            let outline = is_wide.then(|| Outline::new(&facet.corners, along_x));
-            for row in rows[0]..rows[1] {
-                let at = along_z.at(row);
-                let columns = match &outline {
-                    Some(outline) => outline.span(at, columns),
-                    None => columns,
-                };
-                for column in columns[0]..columns[1] {
-                    let Some((height, is_up)) = facet.cross([along_x.at(column), at]) else { continue };
-                    let cell = (row as usize - z.start) * width + (column as usize - x.start);
-                    let height = heights.round(height) as u32;
-                    let before = std::mem::replace(&mut last[cell], crossings.len() as u32);
-                    crossings.push([height << 1 | u32::from(is_up), before]);
-                }
-            }
-            if crossings.len() >= END as usize {
-                return Err(Error::argument(
-                    "the terrain has over 4,294,967,294 crossings with lines of cells",
-                ));
-            }
-        }
-        Ok(())
-    }
-
-    /// Sorts the crossings of each cell and makes solids of them.
-    fn stack(&mut self) {
-        self.starts.push(0);
-        for &last in &self.last {
-            self.line.clear();
-            let mut at = last;
-            while at != END {
-                let [crossing, before] = self.crossings[at as usize];
-                self.line.push(crossing);
-                at = before;
-            }
-            self.line.sort_unstable();
-            pile(&self.line, &mut self.solids);
-            self.starts.push(self.solids.len() as u32);
-        }
+    fn cross(&mut self, positions: &[Vec3], triangles: &[[u32; 3]], cells: &[Range<usize>; 2]) -> Result<()> {
+        let ([x, z], lines, heights) = (cells, &self.lines, self.heights);
+        let (ranks, piles) = (&self.ranks[..], &mut self.piles);
+        let first = [x.start as u32, z.start as u32];
+        let mut work = Work { positions, ranks, lines, heights, width: x.len() as u32, first, piles };
+        let work = &mut work;
+        dispatch!(at most avx2: cross_triangles(work: &mut Work<'_>, triangles: &[[u32; 3]]) -> Result<()>)
     }
 
     /// The box of the last cast: ranges of x and of z.
@@ -271,37 +203,144 @@ impl Caster {
     }
 }
 
-/// Adds the solids of one line, whose crossings ascend.
-fn pile(line: &[u32], solids: &mut Vec<Solid>) {
-    let first = solids.len();
-    let (mut winding, mut top) = (0, 0);
-    for level in line.chunk_by(|a, b| a >> 1 == b >> 1).rev() {
-        let height = (level[0] >> 1) as i32;
-        let before = winding;
-        winding += level.iter().map(|crossing| if crossing & 1 == 1 { 1 } else { -1 }).sum::<i32>();
-        match (before > 0, winding > 0) {
-            (false, true) => top = height,
-            (true, false) => solids.push([height, top]),
-            _ => {}
-        }
-    }
-    if winding > 0 {
-        solids.push([BOTTOMLESS, top]);
-    }
-    solids[first..].reverse();
+/// What crossings are found from, and where they go.
+struct Work<'a> {
+    positions: &'a [Vec3],
+    ranks: &'a [[u32; 2]],
+    lines: &'a [Lines; 2],
+    heights: Heights,
+    /// Cells of the box along x, and its first cell.
+    width: u32,
+    first: [u32; 2],
+    piles: &'a mut Piles,
 }
 
-/// Keeps room for half as much again: frames that find a little more allocate nothing.
-fn keep_room<T>(buffer: &mut Vec<T>) {
-    let wanted = buffer.len() + buffer.len() / 2;
-    if buffer.capacity() < wanted {
-        buffer.reserve_exact(wanted - buffer.len());
+#[inline(always)]
+fn cross_triangles(work: &mut Work<'_>, triangles: &[[u32; 3]]) -> Result<()> {
+    let mut near = Near::default();
+    for (index, triangle) in triangles.iter().enumerate() {
+        let rank = |corner: usize| work.ranks.get(triangle[corner] as usize);
+        let (Some(&a), Some(&b), Some(&c)) = (rank(0), rank(1), rank(2)) else {
+            let (triangle, count) = (index + 1, work.positions.len());
+            let what = format!("triangle {triangle} names a vertex beyond the {count} there are");
+            return Err(Error::argument(what));
+        };
+        let range = |axis: usize| {
+            let [a, b, c] = [a[axis], b[axis], c[axis]];
+            [a.min(b).min(c), a.max(b).max(c)]
+        };
+        let [columns, rows] = [range(0), range(1)];
+        if columns[0] == columns[1] || rows[0] == rows[1] {
+            continue;
+        }
+        work.cross(triangle, columns, rows, &mut near);
+        if work.piles.len() >= u32::MAX as usize {
+            return Err(Error::argument("the terrain has over 4,294,967,294 crossings with lines of cells"));
+        }
+    }
+    Ok(())
+}
+
+impl Work<'_> {
+    /// Adds the crossings of a triangle within ranges of lines.
+    #[inline(always)]
+    fn cross(&mut self, triangle: &[u32; 3], columns: [u32; 2], rows: [u32; 2], near: &mut Near) {
+        let [along_x, along_z] = self.lines;
+        let corner = |corner: usize| {
+            let p = &self.positions[triangle[corner] as usize];
+            [p.x, p.y, p.z].map(f64::from)
+        };
+        let facet = Facet::new([corner(0), corner(1), corner(2)], self.heights.unit);
+        // Where there are few lines, all are asked; else those of each row that lie between edges.
+        let [width, depth] = [columns, rows].map(|[first, last]| last - first);
+        let first = (rows[0] - self.first[1]) * self.width + (columns[0] - self.first[0]);
+        if width == 1 && depth == 1 {
+            if let Some((height, is_up)) = facet.cross([along_x.at(columns[0]), along_z.at(rows[0])]) {
+                self.piles.add(first as usize, (self.heights.round(height) as u32) << 1 | u32::from(is_up));
+            }
+            return;
+        }
+        let is_wide = width > 1 && width.saturating_mul(depth) > FEW;
+        let outline = is_wide.then(|| Outline::new(&facet.corners, along_x));
+        for some in (rows[0]..rows[1]).step_by(LANES) {
+            let z = along_z.from(some);
+            if let Some(outline) = &outline {
+                outline.spans(z, columns, &mut near.spans);
+            }
+            for (place, row) in (some..rows[1]).take(LANES).enumerate() {
+                let [start, end] = if is_wide { near.spans.lines(place) } else { columns };
+                let first = (row - self.first[1]) * self.width + (start - self.first[0]);
+                let mut column = start;
+                loop {
+                    if near.count > ROOM - LANES {
+                        self.add_all(&facet, near);
+                    }
+                    let count = end.saturating_sub(column);
+                    near.add(along_x.from(column), z[place], first + (column - start), count);
+                    if count <= LANES as u32 {
+                        break;
+                    }
+                    column += LANES as u32;
+                }
+            }
+        }
+        self.add_all(&facet, near);
+    }
+
+    /// Adds the crossings of a triangle with lines near it.
+    #[inline(always)]
+    fn add_all(&mut self, facet: &Facet, near: &mut Near) {
+        let Near { x, z, cells, count, crossed, .. } = near;
+        let lanes = x.as_chunks::<LANES>().0.iter().zip(z.as_chunks::<LANES>().0);
+        for ((x, z), cells) in lanes.zip(cells[..*count].chunks(LANES)) {
+            facet.cross_all(x, z, &self.heights, crossed);
+            for (lane, &cell) in cells.iter().enumerate() {
+                if let Some((height, is_up)) = facet.one_of(lane, crossed, [x[lane], z[lane]], &self.heights)
+                {
+                    self.piles.add(cell as usize, height << 1 | u32::from(is_up));
+                }
+            }
+        }
+        *count = 0;
+    }
+}
+
+/// Lines that may cross a triangle.
+struct Near {
+    x: [f64; ROOM],
+    z: [f64; ROOM],
+    cells: [u32; ROOM],
+    count: usize,
+    spans: Spans,
+    crossed: Crossed,
+}
+
+impl Default for Near {
+    fn default() -> Self {
+        let (spans, crossed) = (Spans::default(), Crossed::default());
+        Self { x: [0.0; ROOM], z: [0.0; ROOM], cells: [0; ROOM], count: 0, spans, crossed }
+    }
+}
+
+impl Near {
+    /// Adds the first of a count of lines side by side, at most [`LANES`].
+    #[inline(always)]
+    fn add(&mut self, x: &[f64; LANES], z: f64, cell: u32, count: u32) {
+        let place = self.count.min(ROOM - LANES);
+        // What is too much, the next ones overwrite.
+        self.x[place..][..LANES].copy_from_slice(x);
+        self.z[place..][..LANES].fill(z);
+        for (lane, out) in (0..).zip(&mut self.cells[place..][..LANES]) {
+            *out = cell.wrapping_add(lane);
+        }
+        self.count = place + count.min(LANES as u32) as usize;
     }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::shallow::grid::BOTTOMLESS;
 
     const GRID: Grid = Grid { cell: 0.5, origin: [-2.0, -2.0], size: [8, 8] };
 
@@ -401,9 +440,9 @@ mod tests {
         let mut caster = Caster::new(GRID, heights()).unwrap();
         caster.cast(&positions, &triangles, [0..8, 0..8]).unwrap();
         let memory = |caster: &Caster| {
-            let Caster { ranks, crossings, last, line, starts, solids, .. } = caster;
-            let sizes = [ranks.capacity(), last.capacity(), starts.capacity(), line.capacity()];
-            (sizes, ranks.as_ptr(), crossings.as_ptr(), last.as_ptr(), starts.as_ptr(), solids.as_ptr())
+            let Caster { ranks, piles, starts, solids, .. } = caster;
+            let sizes = [ranks.capacity(), starts.capacity(), solids.capacity()];
+            (sizes, ranks.as_ptr(), piles.memory(), starts.as_ptr(), solids.as_ptr())
         };
         let first = memory(&caster);
         for frame in 0..20u8 {

@@ -314,7 +314,7 @@ fn damaged_states_are_refused_and_change_nothing() {
     run(&mut shallow, &ctx, 3);
     let before = shallow.save();
     let mut dice = Dice(17);
-    for turn in 0..2000 {
+    for turn in 0..10_000 {
         let bytes = damaged(&saved, &mut dice);
         match shallow.restore(&bytes) {
             Ok(()) => {
@@ -336,7 +336,7 @@ fn states_with_wrong_numbers_and_the_right_hash_are_refused_or_flow() {
     let before = shallow.save();
     let mut dice = Dice(23);
     let mut flowed = 0;
-    for turn in 0..1000 {
+    for turn in 0..10_000 {
         let mut bytes = damaged(&saved, &mut dice);
         if bytes.len() < 16 {
             continue;

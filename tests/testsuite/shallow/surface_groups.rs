@@ -2,9 +2,11 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 
-use super::surface_mesh::{Mesh, Random, build, build_with, columns, ground, pool, random_scene, units};
+use super::surface_mesh::{
+    Mesh, Random, any_depths, build, build_with, columns, ground, pool, random_scene, rough_columns, units,
+};
 use frazil::shallow::columns::{Columns, NONE, STRIP};
-use frazil::shallow::surface::{Check, Depths, Layout, Surface, check};
+use frazil::shallow::surface::{Check, Depths, Layout, Surface, bound, check};
 
 /// The definition of links, groups and walls.
 struct Definition<'a> {
@@ -314,5 +316,58 @@ fn one_maker_serves_all_scenes_and_activity_saves_only_time() {
             assert!(build_with(&mut surface, &columns, depths, &layout) == first, "seed {seed}");
             assert_eq!(surface.count(&columns, depths).unwrap(), first.counts, "seed {seed}");
         }
+    }
+}
+
+#[test]
+fn no_liquid_in_rough_layers_needs_more_than_the_bound() {
+    let mut surface = Surface::default();
+    let mut close = 0;
+    for seed in 0..5000 {
+        let mut random = Random(seed);
+        let columns = rough_columns(&mut random);
+        let most = bound(&columns);
+        for _ in 0..20 {
+            let depth = any_depths(&columns, &mut random);
+            let depths = Depths { depth: &depth, ..Depths::default() };
+            let counts = surface.count(&columns, &depths).unwrap();
+            assert!(
+                counts.vertices <= most.vertices
+                    && counts.extras <= most.extras
+                    && counts.indices <= most.indices,
+                "seed {seed}: {counts:?} of {most:?}, depths {depth:?}"
+            );
+            close += usize::from(3 * counts.indices > 2 * most.indices);
+        }
+    }
+    assert!(close > 10_000, "{close} liquids need two thirds of the bound");
+}
+
+#[test]
+fn the_bound_is_near_what_liquids_below_uneven_ceilings_need() {
+    for seed in 0..3 {
+        let mut random = Random(seed);
+        let cells: Vec<f64> = (0..40 * 40).map(|_| 0.02 * f64::from(random.below(1000)) / 1000.0).collect();
+        let columns = columns([40, 40], |x, z| {
+            let at = cells[40 * z + x];
+            vec![ground(0.3 + at), [units(0.9 + at), units(1.2 + at)], [units(1.8 + at), units(2.1 + at)]]
+        });
+        let most = bound(&columns);
+        let mut depth = vec![0; columns.len()];
+        for index in columns.indices() {
+            depth[index] = columns.ceilings()[index] - columns.bases()[index] - 1;
+        }
+        let need = |depth: &[i32]| {
+            Surface::default().count(&columns, &Depths { depth, ..Depths::default() }).unwrap()
+        };
+        let full = need(&depth);
+        assert!(4 * full.vertices > 3 * most.vertices, "{full:?} of {most:?}");
+        // Every other column, as on a chessboard.
+        for index in columns.indices() {
+            let [x, z] = columns.cell(index);
+            depth[index] *= ((x + z) % 2) as i32;
+        }
+        let every_other = need(&depth);
+        assert!(8 * every_other.indices > 5 * most.indices, "{every_other:?} of {most:?}");
     }
 }

@@ -160,3 +160,42 @@ pub fn random_scene(seed: u64, bumps: u32) -> (Columns, Vec<i32>) {
     }
     (columns, depth)
 }
+
+/// A few cells of one to three rough layers: steps up to the space between layers, some of which are missing.
+pub fn rough_columns(random: &mut Random) -> Columns {
+    let size = [[2, 2], [3, 2], [3, 3], [4, 4]][random.below(4) as usize];
+    let (gap, rough, layers) =
+        (4 + random.below(12) as i32, 1 + random.below(10), 1 + random.below(3) as i32);
+    let mut cells = Vec::new();
+    for _ in 0..size[0] * size[1] {
+        let (mut cell, mut at) = (Vec::new(), random.below(rough) as i32);
+        for layer in 0..layers {
+            if layer > 0 && random.below(6) == 0 {
+                at += gap;
+                continue;
+            }
+            let top = at + 1 + random.below(rough) as i32;
+            cell.push([if layer == 0 { BOTTOMLESS } else { at }, top]);
+            at = (top + 1 + random.below(3) as i32).max((layer + 1) * gap + random.below(rough) as i32);
+        }
+        cells.push(cell);
+    }
+    columns(size, |x, z| cells[z * size[0] + x].clone())
+}
+
+/// Depths of all kinds: dry, anything, full and just below.
+pub fn any_depths(columns: &Columns, random: &mut Random) -> Vec<i32> {
+    let mut depth = vec![0; columns.len()];
+    let wet = 1 + random.below(4);
+    for index in columns.indices() {
+        let room = columns.ceilings()[index].min(60) - columns.bases()[index];
+        if random.below(wet + 1) > 0 && room > 0 {
+            depth[index] = match random.below(4) {
+                0 => room - 1,
+                1 => room,
+                _ => random.below(room as u32 + 1) as i32,
+            };
+        }
+    }
+    depth
+}

@@ -1,0 +1,162 @@
+//! The vertical lines through the cells of a grid, and which of them a triangle may cross.
+
+use super::crossings::Corner;
+
+/// Places that are asked for together.
+pub const LANES: usize = 4;
+
+/// Unit roundoff of f64.
+pub(super) const ROUNDOFF: f64 = f64::EPSILON / 2.0;
+
+/// The coordinates of the lines through the cells of one axis.
+pub struct Lines {
+    /// Ascending, between an infinity at one end and some at the other.
+    places: Vec<f64>,
+    /// Count of lines.
+    count: usize,
+    /// 1 / cell (1/m).
+    inverse: f64,
+    /// Greatest magnitude of the numbers that a coordinate is made of (m).
+    reach: f64,
+}
+
+impl Lines {
+    /// Lines at strictly ascending coordinates; `reach` bounds them and the origin that they are counted from.
+    pub fn new(centres: impl Iterator<Item = f64>, cell: f64, reach: f64) -> Self {
+        let mut places = vec![f64::NEG_INFINITY];
+        places.extend(centres);
+        let count = places.len() - 1;
+        places.extend([f64::INFINITY; LANES]);
+        Self { places, count, inverse: 1.0 / cell, reach }
+    }
+
+    /// Coordinate of a line.
+    pub fn at(&self, line: u32) -> f64 {
+        self.places[line as usize + 1]
+    }
+
+    /// Coordinates of a line and those behind it; infinity behind the last.
+    #[inline(always)]
+    pub fn from(&self, line: u32) -> &[f64; LANES] {
+        self.places[line as usize + 1..].first_chunk().expect("infinities follow the last line")
+    }
+
+    /// A coordinate in lines, with rounding errors.
+    fn lines_to(&self, place: f64) -> f64 {
+        (place - self.places[1]) * self.inverse
+    }
+
+    /// Count of lines left of a coordinate after the shift, exactly. A triangle can only cross the lines from the least rank of its
+    /// corners to the line before the greatest.
+    #[inline]
+    pub fn rank(&self, place: f64) -> u32 {
+        // Mostly it is right.
+        let guess = lesser(greater(self.lines_to(place) + 1.0, 0.0), self.count as f64);
+        let mut rank = guess as i32 as usize;
+        while self.places[rank + 1] < place {
+            rank += 1;
+        }
+        while self.places[rank] >= place {
+            rank -= 1;
+        }
+        rank as u32
+    }
+}
+
+/// The edges of a triangle, to find the lines of a row that may cross it.
+pub struct Outline {
+    edges: [Edge; 3],
+    /// How far (lines) a computed place may be from the true one.
+    error: f64,
+}
+
+/// An edge between two coordinates z (m); no row where it has one z only.
+struct Edge {
+    range: [f64; 2],
+    /// At the place of its first end: z (m) and x (lines).
+    from: [f64; 2],
+    /// Change of x (lines) with z (m).
+    slope: f64,
+}
+
+/// Of several rows, the first line that may cross a triangle, and the one behind the last; as numbers from [`whole`].
+#[derive(Default)]
+pub struct Spans {
+    first: [f64; LANES],
+    last: [f64; LANES],
+}
+
+impl Outline {
+    /// The outline of a triangle over lines along x.
+    #[inline(always)]
+    pub fn new(corners: &[Corner; 3], x: &Lines) -> Self {
+        let edge = |corner: usize| {
+            let (a, b) = (&corners[corner], &corners[(corner + 1) % 3]);
+            // The two others end where a row through all of such an edge meets it.
+            let range = if a[2] == b[2] { [1.0, -1.0] } else { [lesser(a[2], b[2]), greater(a[2], b[2])] };
+            let slope = (b[0] - a[0]) * x.inverse / (b[2] - a[2]);
+            Edge { range, from: [a[2], x.lines_to(a[0])], slope }
+        };
+        let reach = corners.iter().fold(x.reach, |reach, corner| greater(reach, corner[0].abs()));
+        // A place has seen 11 roundings of at most 2 reach, that of a line 6 of at most 1: 28 in all, and as much
+        // again is room for more.
+        Self { edges: [edge(0), edge(1), edge(2)], error: 128.0 * ROUNDOFF * reach * x.inverse }
+    }
+
+    /// Of the lines from `first` to before `last`, finds those that may cross the triangle in rows at several z.
+    #[inline(always)]
+    pub fn spans(&self, z: &[f64; LANES], [first, last]: [u32; 2], out: &mut Spans) {
+        let [a, b, c] = &self.edges;
+        let [first, last] = [first, last].map(|line| f64::from(line as i32));
+        for lane in 0..LANES {
+            let z = z[lane];
+            let place = |edge: &Edge, none: f64| {
+                let place = edge.from[1] + edge.slope * (z - edge.from[0]);
+                let place = if z < edge.range[0] { none } else { place };
+                if z > edge.range[1] { none } else { place }
+            };
+            let least = |edge: &Edge| place(edge, f64::INFINITY);
+            let greatest = |edge: &Edge| place(edge, f64::NEG_INFINITY);
+            let start = lesser(lesser(least(a), least(b)), least(c)) - self.error;
+            let end = greater(greater(greatest(a), greatest(b)), greatest(c)) + self.error;
+            // Half a line on, the nearest line is the first behind a place; the error is larger than what this rounds.
+            out.first[lane] = whole(lesser(greater(start + 0.5, first), last));
+            out.last[lane] = whole(lesser(greater(end + 0.5, first), last));
+        }
+    }
+}
+
+impl Spans {
+    /// The first line of a row, and the one behind the last.
+    #[inline(always)]
+    pub fn lines(&self, row: usize) -> [u32; 2] {
+        [self.first[row], self.last[row]].map(integer_of)
+    }
+}
+
+/// Of a number from 0 to below 2^32 that is rounded to the nearest integer, or the even one: the integer, for [`integer_of`].
+#[inline(always)]
+pub(super) fn whole(number: f64) -> f64 {
+    number + WHOLE
+}
+
+/// The integer of [`whole`].
+#[inline(always)]
+pub(super) fn integer_of(whole: f64) -> u32 {
+    whole.to_bits() as u32
+}
+
+/// f64 has no room for fractions of it: integers that are added stand in its last bits.
+pub(super) const WHOLE: f64 = (1u64 << 52) as f64;
+
+/// The lesser of two numbers that are not NaN: one instruction, unlike `f64::min`.
+#[inline(always)]
+pub(super) fn lesser(a: f64, b: f64) -> f64 {
+    if a < b { a } else { b }
+}
+
+/// The greater of two numbers that are not NaN.
+#[inline(always)]
+pub(super) fn greater(a: f64, b: f64) -> f64 {
+    if a > b { a } else { b }
+}

@@ -1,0 +1,110 @@
+//! Crossings of lines, cell by cell, and the solids between them.
+
+use super::solids::Solid;
+use crate::shallow::grid::BOTTOMLESS;
+
+/// The crossings of the lines of a box of cells: height (units) x 2 + 1 if the triangle faces up.
+#[derive(Debug, Default)]
+pub(super) struct Piles {
+    /// Cell and crossing, in any order.
+    crossings: Vec<[u32; 2]>,
+    /// Of each cell, and behind the last one: count of its crossings, then where they begin in `sorted`, then where they end.
+    ends: Vec<u32>,
+    /// The crossings of each cell together.
+    sorted: Vec<u32>,
+}
+
+impl Piles {
+    /// Forgets the crossings, for a count of cells.
+    pub fn reset(&mut self, cells: usize) {
+        self.crossings.clear();
+        self.ends.clear();
+        self.ends.resize(cells, 0);
+    }
+
+    /// Count of crossings.
+    pub fn len(&self) -> usize {
+        self.crossings.len()
+    }
+
+    /// Adds a crossing of a cell's line.
+    #[inline(always)]
+    pub fn add(&mut self, cell: usize, crossing: u32) {
+        self.ends[cell] += 1;
+        self.crossings.push([cell as u32, crossing]);
+    }
+
+    /// Sorts the crossings of each cell and makes solids of them; `starts` gets where each cell's begin and the end of the last.
+    pub fn stack(&mut self, starts: &mut Vec<u32>, solids: &mut Vec<Solid>) {
+        let Self { crossings, ends, sorted } = self;
+        let mut next = 0;
+        for end in ends.iter_mut() {
+            next += std::mem::replace(end, next);
+        }
+        sorted.resize(crossings.len(), 0);
+        for &[cell, crossing] in crossings.iter() {
+            let end = &mut ends[cell as usize];
+            sorted[*end as usize] = crossing;
+            *end += 1;
+        }
+        starts.push(0);
+        let mut rest = &mut sorted[..];
+        let mut begin = 0;
+        for &end in ends.iter() {
+            let (line, behind) = rest.split_at_mut((end - begin) as usize);
+            (rest, begin) = (behind, end);
+            line.sort_unstable();
+            pile(line, solids);
+            starts.push(solids.len() as u32);
+        }
+    }
+
+    /// Where the buffers lie, and how much they hold.
+    #[cfg(test)]
+    pub fn memory(&self) -> [usize; 6] {
+        let Self { crossings, ends, sorted } = self;
+        let sizes = [crossings.capacity(), ends.capacity(), sorted.capacity()];
+        let places = [crossings.as_ptr() as usize, ends.as_ptr() as usize, sorted.as_ptr() as usize];
+        [sizes[0], sizes[1], sizes[2], places[0], places[1], places[2]]
+    }
+
+    /// Keeps room for half as many crossings again: frames that find a little more allocate nothing.
+    pub fn keep_room(&mut self) {
+        keep_room(&mut self.crossings);
+        keep_room(&mut self.sorted);
+    }
+}
+
+/// Adds the solids of one line, whose crossings ascend.
+fn pile(line: &[u32], solids: &mut Vec<Solid>) {
+    let first = solids.len();
+    let (mut winding, mut top) = (0, 0);
+    let mut is_solid = false;
+    let mut above = line.iter().rev().peekable();
+    while let Some(crossing) = above.next() {
+        winding += ((crossing & 1) << 1) as i32 - 1;
+        // Changes at one height are summed.
+        if above.peek().is_some_and(|next| *next >> 1 == crossing >> 1) || is_solid == (winding > 0) {
+            continue;
+        }
+        is_solid = !is_solid;
+        let height = (crossing >> 1) as i32;
+        if is_solid {
+            top = height;
+        } else {
+            solids.push([height, top]);
+        }
+    }
+    if is_solid {
+        solids.push([BOTTOMLESS, top]);
+    }
+    solids[first..].reverse();
+}
+
+/// Keeps room for half as much again.
+pub(super) fn keep_room<T>(buffer: &mut Vec<T>) {
+    let wanted = buffer.len() + buffer.len() / 2;
+    if buffer.capacity() < wanted {
+        buffer.reserve_exact(wanted - buffer.len());
+    }
+}
