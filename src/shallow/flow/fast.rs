@@ -82,8 +82,8 @@ impl Fast {
 
     /// Finds the rows with fast pipes; returns how far a disturbance goes at most in a step as long as the last one (cells).
     pub fn find(&mut self, films: &Films) -> f32 {
-        let Self { rows, .. } = self;
-        dispatch!(find_rows(rows: &mut Vec<bool>, films: &Films) -> f32)
+        let rows = &mut self.rows[..];
+        dispatch!(find_rows(rows: &mut [bool], films: &Films) -> f32)
     }
 
     /// Finds how much less inertia counts in the fast pipes of those rows, for steps like one.
@@ -94,7 +94,7 @@ impl Fast {
 }
 
 #[inline(always)]
-fn find_rows(rows: &mut Vec<bool>, films: &Films) -> f32 {
+fn find_rows(rows: &mut [bool], films: &Films) -> f32 {
     let mut farthest = 0;
     for (row, is_fast) in rows.iter_mut().enumerate() {
         *is_fast = false;
