@@ -78,14 +78,6 @@ pub fn next(at: &Next) -> f64 {
     at.left / (at.left / longest - 1e-9).ceil().max(1.0)
 }
 
-/// Most times that steps are halved for fast films, so that a frame's time has a bound.
-const MOST_HALVINGS: u32 = 3;
-
-/// How many times steps are halved, so that a disturbance that goes so far (cells) in a step stays within a cell.
-pub fn halvings(way: f64) -> u32 {
-    (0..MOST_HALVINGS).find(|halvings| way <= f64::from(1 << halvings)).unwrap_or(MOST_HALVINGS)
-}
-
 /// g unit dt^2 / dx^2 of a step (1 / units).
 pub fn drive(params: &Params, measures: &Measures, dt: f64) -> f64 {
     let Measures { cell, unit, .. } = *measures;

@@ -289,16 +289,15 @@ impl Shallow {
             self.flow.calm();
             return 0;
         }
-        let (params, last) = (&self.params, self.flow.last);
-        let drive = pace::drive(params, measures, last);
-        let way = f64::from(self.flow.find_fast(&self.columns, drive)) / last;
+        let last = self.flow.last;
+        let drive = pace::drive(&self.params, measures, last);
         let longest = pace::next(&self.next(measures, dt, 0, 0));
-        let halvings = pace::halvings(way * longest);
-        if way > 0.0
-            && let Some(length) = next(&self.next(measures, dt, 0, halvings))
-        {
-            let step = pace::step(params, measures, length, last);
-            self.flow.lighten(&self.columns, drive, &step);
+        let cells = self.flow.find_fast(&self.columns, drive, longest / last);
+        // A disturbance is to stay within a cell.
+        let halvings = cells.trailing_zeros();
+        if let Some(length) = next(&self.next(measures, dt, 0, halvings)) {
+            let step = pace::step(&self.params, measures, length, last);
+            self.flow.lighten(drive, &step);
         }
         halvings
     }

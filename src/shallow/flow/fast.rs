@@ -10,26 +10,26 @@ use std::ops::Range;
 use super::active::Active;
 use super::flux::{Step, greater, lesser};
 use crate::base::cpu::dispatch;
-use crate::shallow::columns::{Columns, NONE, resize_part};
+use crate::shallow::columns::{NONE, resize_part};
 
 /// (c dt / dx)^2 of a fast pipe: below 1/2, the bound of stability.
 pub const FAST_WAVES: f32 = 0.35;
 /// Inertia counts at most so many times less: what is shallower than that is never fast for long.
 const LIGHTEST: f32 = 16.0;
+/// Cells that a disturbance may be found to go in a step: a power of two.
+pub const FARTHEST: u32 = 8;
 
 /// Where inertia counts less.
 #[derive(Debug, Clone)]
 pub struct Fast {
-    /// How many times less, in the pipes to the east and to the south; of rows that have fast pipes.
-    light: [Vec<f32>; 2],
+    /// How many times less in the pipes of each column, to the east and to the south ([`packed`]); of rows that have fast pipes.
+    light: Vec<u32>,
     rows: Vec<bool>,
 }
 
 /// What is fast is found in.
 #[derive(Clone, Copy)]
 pub struct Films<'a> {
-    /// Columns.
-    pub columns: &'a Columns,
     /// Strips that are worked on.
     pub active: &'a Active,
     /// H (units).
@@ -51,18 +51,18 @@ struct Span<'a> {
 impl Fast {
     /// Nothing is fast.
     pub fn new(columns: usize, rows: usize) -> Self {
-        Self { light: [vec![1.0; columns], vec![1.0; columns]], rows: vec![false; rows] }
+        Self { light: vec![packed(1.0, 1.0); columns], rows: vec![false; rows] }
     }
 
     /// Gives a part of the columns another count of indices.
     pub fn resize_part(&mut self, part: Range<usize>, len: usize) {
         self.rows.fill(false);
-        self.light.iter_mut().for_each(|light| resize_part(light, part.clone(), len, 1.0));
+        resize_part(&mut self.light, part, len, packed(1.0, 1.0));
     }
 
     /// Memory (bytes).
     pub fn bytes(&self) -> usize {
-        self.light.iter().map(|light| size_of_val(&light[..])).sum::<usize>() + self.rows.len()
+        size_of_val(&self.light[..]) + self.rows.len()
     }
 
     /// Whether a row has fast pipes.
@@ -70,9 +70,9 @@ impl Fast {
         self.rows[row]
     }
 
-    /// How many times less inertia counts, in the pipes to the east and to the south of all columns.
-    pub fn light(&self) -> [&[f32]; 2] {
-        self.light.each_ref().map(Vec::as_slice)
+    /// How many times less inertia counts in the pipes of all columns ([`packed`]).
+    pub fn light(&self) -> &[u32] {
+        &self.light
     }
 
     /// Nothing is fast: there is no viscosity.
@@ -80,10 +80,11 @@ impl Fast {
         self.rows.fill(false);
     }
 
-    /// Finds the rows with fast pipes; returns how far a disturbance goes at most in a step as long as the last one (cells).
-    pub fn find(&mut self, films: &Films) -> f32 {
+    /// Finds the rows with fast pipes; returns the least power of two, to [`FARTHEST`], of cells that no disturbance leaves behind in
+    /// `step` times the last step.
+    pub fn find(&mut self, films: &Films, step: f32) -> u32 {
         let rows = &mut self.rows[..];
-        dispatch!(find_rows(rows: &mut [bool], films: &Films) -> f32)
+        dispatch!(find_rows(rows: &mut [bool], films: &Films, step: f32) -> u32)
     }
 
     /// Finds how much less inertia counts in the fast pipes of those rows, for steps like one.
@@ -94,35 +95,38 @@ impl Fast {
 }
 
 #[inline(always)]
-fn find_rows(rows: &mut [bool], films: &Films) -> f32 {
-    let mut farthest = 0;
+fn find_rows(rows: &mut [bool], films: &Films, step: f32) -> u32 {
+    let mut cells = 1;
     for (row, is_fast) in rows.iter_mut().enumerate() {
-        *is_fast = false;
+        // Those that were fast mostly still are.
+        let was_fast = std::mem::take(is_fast);
         for (_, span) in films.row(row) {
-            if span.may_be_fast(films.drive) {
-                let way = span.farthest(films.drive);
-                *is_fast |= way > 0;
-                farthest = farthest.max(way);
+            if was_fast || span.may_be_fast(films.drive) {
+                let [any, mut farther] = span.find(films.drive, step / cells as f32);
+                *is_fast |= any;
+                while farther && cells < FARTHEST {
+                    cells *= 2;
+                    farther = span.find(films.drive, step / cells as f32)[1];
+                }
             }
         }
     }
-    f32::from_bits(farthest as u32)
+    cells
 }
 
 #[inline(always)]
 fn lighten_rows(fast: &mut Fast, films: &Films, step: &Step) {
-    let Fast { light: [light_east, light_south], rows } = fast;
+    let Fast { light, rows } = fast;
     for row in (0..rows.len()).filter(|&row| rows[row]) {
         for (first, Span { depth, south_depth, flux: [east, south] }) in films.row(row) {
             let count = east.len();
-            let (light_east, light_south) =
-                (&mut light_east[first..first + count], &mut light_south[first..first + count]);
+            let out = &mut light[first..first + count];
             let (depth, south_depth, south) = (&depth[..count + 1], &south_depth[..count], &south[..count]);
             for x in 0..count {
                 let own = depth[x] as f32;
                 let light = |depth: [f32; 2], flux: f32| light_of(films.drive, step, depth, flux);
-                light_east[x] = light([own, depth[x + 1] as f32], east[x]);
-                light_south[x] = light([own, south_depth[x] as f32], south[x]);
+                let east = light([own, depth[x + 1] as f32], east[x]);
+                out[x] = packed(east, light([own, south_depth[x] as f32], south[x]));
             }
         }
     }
@@ -162,53 +166,62 @@ impl Span<'_> {
             greatest = greatest.max(east.max(south));
             shallowest = shallowest.min(behind(depth[x]).min(behind(south_depth[x])));
         }
-        is_fast(drive, shallowest as f32 + 1.0, f32::from_bits(greatest as u32))
+        let shallowest = shallowest as f32 + 1.0;
+        is_fast(drive, [shallowest; 2], f32::from_bits(greatest as u32))
     }
 
-    /// How far a disturbance goes at most in the fast pipes in the last step (bits of a number of cells); 0: there is none.
+    /// Whether one of its pipes is fast, and whether a disturbance goes further than a cell in one of those in `step` times the last step.
     #[inline(always)]
-    fn farthest(&self, drive: f32) -> i32 {
+    fn find(&self, drive: f32, step: f32) -> [bool; 2] {
         let [east, south] = self.flux;
         let count = east.len();
         let (depth, south_depth, south) =
             (&self.depth[..count + 1], &self.south_depth[..count], &south[..count]);
-        let mut farthest = 0;
+        let (mut any, mut farther) = (0, 0);
         for x in 0..count {
             let own = depth[x] as f32;
-            let east = way(drive, [own, depth[x + 1] as f32], east[x]).to_bits() as i32;
-            let south = way(drive, [own, south_depth[x] as f32], south[x]).to_bits() as i32;
-            farthest = farthest.max(east.max(south));
+            for (depth, flux) in
+                [([own, depth[x + 1] as f32], east[x]), ([own, south_depth[x] as f32], south[x])]
+            {
+                let giver = if flux > 0.0 { depth[0] } else { depth[1] };
+                let is_fast = i32::from(is_fast(drive, depth, flux));
+                any |= is_fast;
+                farther |= is_fast & i32::from(3.0 * step * flux.abs() > giver);
+            }
         }
-        farthest
+        [any != 0, farther != 0]
     }
 }
 
-/// Whether liquid in a section outruns waves.
+/// Whether the liquid of a pipe between wet columns outruns waves.
 #[inline(always)]
-fn is_fast(drive: f32, section: f32, flux: f32) -> bool {
-    9.0 * flux * flux > drive * section * section * section
-}
-
-/// How far a disturbance goes in a step (cells), where the pipe is fast; else 0.
-#[inline(always)]
-fn way(drive: f32, depth: [f32; 2], flux: f32) -> f32 {
-    let giver = if flux > 0.0 { depth[0] } else { depth[1] };
-    let is_wet = lesser(depth[0], depth[1]) > 0.0;
-    let is_fast = is_fast(drive, 0.5 * (depth[0] + depth[1]), flux);
-    if is_wet && is_fast { 3.0 * flux.abs() / greater(giver, 1.0) } else { 0.0 }
+fn is_fast(drive: f32, depth: [f32; 2], flux: f32) -> bool {
+    let mean = 0.5 * (depth[0] + depth[1]);
+    (9.0 * flux * flux > drive * mean * mean * mean) & (lesser(depth[0], depth[1]) > 0.0)
 }
 
 /// How many times less the inertia of a pipe counts in a step; `drive` is the last step's, in which the flux is.
 #[inline(always)]
 fn light_of(drive: f32, step: &Step, depth: [f32; 2], flux: f32) -> f32 {
-    let mean = 0.5 * (depth[0] + depth[1]);
-    let is_wet = lesser(depth[0], depth[1]) > 0.0;
-    let light = lesser(step.lighter / greater(lesser(mean, step.section), 1.0), LIGHTEST);
-    if is_wet && is_fast(drive, mean, flux) { greater(light, 1.0) } else { 1.0 }
+    let section = lesser(0.5 * (depth[0] + depth[1]), step.section);
+    let light = lesser(step.lighter / greater(section, 1.0), LIGHTEST);
+    if is_fast(drive, depth, flux) { greater(light, 1.0) } else { 1.0 }
 }
 
 /// As the others, of a link, whose flux is in the last step's measure, about as long as this one.
 #[inline(always)]
 pub fn light(step: &Step, depth: [f32; 2], flux: f32) -> f32 {
     light_of(step.drive, step, depth, flux)
+}
+
+/// Two numbers in one, each cut to the first half of its bits: what a steady film carries does not depend on them.
+#[inline(always)]
+fn packed(east: f32, south: f32) -> u32 {
+    east.to_bits() >> 16 | south.to_bits() & 0xffff_0000
+}
+
+/// The numbers of [`packed`].
+#[inline(always)]
+pub fn unpacked(both: u32) -> [f32; 2] {
+    [both << 16, both & 0xffff_0000].map(f32::from_bits)
 }

@@ -4,6 +4,8 @@
 //! A = dx H reads w' = zeta w + (dt^2 g unit / dx^2) H (eta_i - eta_j), and Eq. 4.5 w'' = w' H^2 / (H^2 + 3 dt nu (1 + S^2)^2); H is the depth
 //! of the column that gives.
 
+use super::fast::unpacked;
+
 /// The numbers of a step that all pipes share.
 #[derive(Debug, Clone, Copy)]
 pub struct Step {
@@ -150,8 +152,8 @@ pub struct Row<'a> {
     pub left_east: &'a [f32],
     /// The same to the south.
     pub left_south: &'a [f32],
-    /// How much less inertia counts to the east and to the south, where it does.
-    pub light: [&'a [f32]; 2],
+    /// How much less inertia counts to the east and to the south, where it does (`fast::packed`).
+    pub light: &'a [u32],
 }
 
 /// Computes the fluxes of a span's pipes, and what they are to transfer: the flux and what was left.
@@ -169,19 +171,18 @@ pub fn flux_row<K: Kind, const LIGHT: bool>(
     let (south_base, south_depth) = (&row.south_base[..count], &row.south_depth[..count]);
     let (open_east, open_south) = (&row.open_east[..count], &row.open_south[..count]);
     let (left_east, left_south) = (&row.left_east[..count], &row.left_south[..count]);
-    let [light_east, light_south] = row.light.map(|light| if LIGHT { &light[..count] } else { light });
+    let light = if LIGHT { &row.light[..count] } else { row.light };
     let (south, to_east, to_south) = (&mut south[..count], &mut to_east[..count], &mut to_south[..count]);
     for x in 0..count {
         let eta = base[x] + depth[x];
         let own = depth[x] as f32;
         let fall = eta - (base[x + 1] + depth[x + 1]) + step.tilt[0];
-        let light = if LIGHT { light_east[x] } else { 1.0 };
-        let f = flux::<K>(step, fall, [own, depth[x + 1] as f32], east[x], open_east[x], light);
+        let [light_east, light_south] = if LIGHT { unpacked(light[x]) } else { [1.0; 2] };
+        let f = flux::<K>(step, fall, [own, depth[x + 1] as f32], east[x], open_east[x], light_east);
         east[x] = f;
         to_east[x] = if f == 0.0 { 0.0 } else { rounded(f + left_east[x]) };
         let fall = eta - (south_base[x] + south_depth[x]) + step.tilt[1];
-        let light = if LIGHT { light_south[x] } else { 1.0 };
-        let f = flux::<K>(step, fall, [own, south_depth[x] as f32], south[x], open_south[x], light);
+        let f = flux::<K>(step, fall, [own, south_depth[x] as f32], south[x], open_south[x], light_south);
         south[x] = f;
         to_south[x] = if f == 0.0 { 0.0 } else { rounded(f + left_south[x]) };
     }

@@ -111,6 +111,7 @@ impl Flow {
             + self.active.bytes()
             + self.bands.bytes()
             + self.network.bytes()
+            + self.fast.bytes()
     }
 
     /// H of every column index (units).
@@ -223,17 +224,19 @@ impl Flow {
         });
     }
 
-    /// Finds fast films; returns how far a disturbance goes in them in a step as long as the last one (cells). `drive` is g unit dt^2 / dx^2 of
-    /// that step (1 / units).
-    pub fn find_fast(&mut self, columns: &Columns, drive: f64) -> f32 {
+    /// Finds fast films; returns the least power of two of cells, to [`FARTHEST`](fast::FARTHEST), that no disturbance in them leaves behind in
+    /// `step` times the last step. `drive` is g unit dt^2 / dx^2 of that one (1 / units).
+    pub fn find_fast(&mut self, columns: &Columns, drive: f64, step: f64) -> u32 {
+        self.active.refresh(columns);
         let Self { fast, active, depth, flux: [east, south], .. } = self;
-        fast.find(&Films { columns, active, depth, flux: [east, south], drive: drive as f32 })
+        let films = Films { active, depth, flux: [east, south], drive: drive as f32 };
+        fast.find(&films, step as f32)
     }
 
     /// Lets the inertia of fast films count less in steps like one.
-    pub fn lighten(&mut self, columns: &Columns, drive: f64, step: &Step) {
+    pub fn lighten(&mut self, drive: f64, step: &Step) {
         let Self { fast, active, depth, flux: [east, south], .. } = self;
-        fast.lighten(&Films { columns, active, depth, flux: [east, south], drive: drive as f32 }, step);
+        fast.lighten(&Films { active, depth, flux: [east, south], drive: drive as f32 }, step);
     }
 
     /// No film is fast.

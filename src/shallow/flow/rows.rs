@@ -161,7 +161,7 @@ impl Rows {
                     open_south: &pipes.south[first..],
                     left_east: &own.left[0][mine..],
                     left_south: &own.left[1][mine..],
-                    light: light.map(|light| &light[first..]),
+                    light: &light[first..],
                 };
                 let flux = (&mut flux_east[mine..mine + len], &mut flux_south[mine..mine + len]);
                 let to = (&mut buffer.east[at..at + len], &mut buffer.south[at..at + len]);
