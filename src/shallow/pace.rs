@@ -78,6 +78,13 @@ pub fn next(at: &Next) -> f64 {
     at.left / (at.left / longest - 1e-9).ceil().max(1.0)
 }
 
+/// How often steps are halved so that disturbances, which go a power of two of cells in one, stay within a cell: so that the time of a
+/// frame has a bound, at most three times, and once in real time.
+pub fn halvings(params: &Params, cells: u32) -> u32 {
+    let most = if params.pace == Pace::Exact { 3 } else { 1 };
+    cells.trailing_zeros().min(most)
+}
+
 /// g unit dt^2 / dx^2 of a step (1 / units).
 pub fn drive(params: &Params, measures: &Measures, dt: f64) -> f64 {
     let Measures { cell, unit, .. } = *measures;

@@ -293,8 +293,7 @@ impl Shallow {
         let drive = pace::drive(&self.params, measures, last);
         let longest = pace::next(&self.next(measures, dt, 0, 0));
         let cells = self.flow.find_fast(&self.columns, drive, longest / last);
-        // A disturbance is to stay within a cell.
-        let halvings = cells.trailing_zeros();
+        let halvings = pace::halvings(&self.params, cells);
         if let Some(length) = next(&self.next(measures, dt, 0, halvings)) {
             let step = pace::step(&self.params, measures, length, last);
             self.flow.lighten(drive, &step);

@@ -112,10 +112,10 @@ pub const KEYS: &[Key] = &[
     Key::new(
         "shallow",
         "pace",
-        Kind::Choice(&["realtime", "exact"]),
-        "realtime: steps of at most `step`, in which waves of deep liquid are slower; exact: as many steps as waves need",
+        Kind::Choice(&["exact", "realtime"]),
+        "exact: as many steps as waves need; realtime: steps of at most `step`, in which waves of deep liquid are slower",
     )
-    .or("\"realtime\"")
+    .or("\"exact\"")
     .concerns(STEP),
     Key::new("shallow", "step", Kind::Number(1.0e-6, 1.0, "s"), "longest step of realtime (s)").or("0.003").concerns(STEP),
     Key::new("shallow", "opaque_depth", Kind::Number(1.0e-6, FAR, "m"), "depth from which the liquid is opaque (m)")

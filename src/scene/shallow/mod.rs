@@ -303,8 +303,8 @@ fn params(values: &Values) -> Params {
         gravity: value("gravity").and_then(Value::numbers).unwrap_or([0.0, -9.81, 0.0]),
         kept: number("kept").unwrap_or(0.5),
         pace: match text("pace") {
-            Some("exact") => Pace::Exact,
-            _ => Pace::Realtime(number("step").unwrap_or(0.003)),
+            Some("realtime") => Pace::Realtime(number("step").unwrap_or(0.003)),
+            _ => Pace::Exact,
         },
         border: match text("border") {
             Some("closed") => Border::Closed,
@@ -336,9 +336,9 @@ mod tests {
             let shallow = scene.shallow().unwrap();
             assert_eq!((&*shallow.look, Some(shallow.params.liquid)), (name, Liquid::named(name)));
         }
-        // But for the border, a scene's defaults are the library's.
+        // But for the border and the pace, a scene's defaults are the library's.
         let params = scene("").shallow().unwrap().params.clone();
-        assert_eq!(params, Params { border: Border::Open, ..Params::default() });
+        assert_eq!(params, Params { border: Border::Open, pace: Pace::Exact, ..Params::default() });
         let thick = scene("liquid = \"paint\"\nviscosity = 0.25\n");
         assert_eq!(thick.shallow().unwrap().params.liquid, Liquid::new(0.25));
         assert_eq!(scene("thinning = true\n").shallow().unwrap().params.liquid, Liquid::THINNING_BLOOD);
