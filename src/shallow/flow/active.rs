@@ -141,6 +141,11 @@ impl Active {
         flags + lists.iter().map(|list| size_of_val(&list[..])).sum::<usize>() + size_of_val(&self.spans[..])
     }
 
+    /// The strips of a row, active or not.
+    pub fn strips(&self, row: usize) -> Range<usize> {
+        self.rows[row] as usize..self.rows[row + 1] as usize
+    }
+
     /// The spans of a row.
     pub fn row(&self, row: usize) -> &[Span] {
         let first = self.rows[row] as usize;

@@ -10,7 +10,7 @@ use std::ops::Range;
 use super::active::Active;
 use super::flux::{Step, greater, lesser};
 use crate::base::cpu::dispatch;
-use crate::shallow::columns::{NONE, resize_part};
+use crate::shallow::columns::{NONE, STRIP, resize_part};
 
 /// (c dt / dx)^2 of a fast pipe: below 1/2, the bound of stability.
 pub const FAST_WAVES: f32 = 0.35;
@@ -118,6 +118,9 @@ fn find_rows(rows: &mut [bool], films: &Films, step: f32) -> u32 {
 fn lighten_rows(fast: &mut Fast, films: &Films, step: &Step) {
     let Fast { light, rows } = fast;
     for row in (0..rows.len()).filter(|&row| rows[row]) {
+        // Also of strips that wake in this frame.
+        let strips = films.active.strips(row);
+        light[strips.start * STRIP..strips.end * STRIP].fill(packed(1.0, 1.0));
         for (first, Span { depth, south_depth, flux: [east, south] }) in films.row(row) {
             let count = east.len();
             let out = &mut light[first..first + count];
