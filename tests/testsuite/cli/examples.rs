@@ -47,6 +47,9 @@ fn the_readme_runs() {
     let scene = block(README, "## Commands", "toml").replace("cell = 0.005", "cell = 0.02");
     assert!(scene.contains("cell = 0.02"));
     fs::write(folder.path().join("shot.toml"), scene).unwrap();
+    let spill = "[shot]\nframes = \"1-3\"\n[shallow]\nterrain = \"boot.obj\"\ncell = 0.02\n\
+                 [[source]]\nat = [0.0, 0.42, 0.0]\nradius = 0.05\nrate_ml = 100.0\n";
+    fs::write(folder.path().join("spill.toml"), spill).unwrap();
     let lines = lines(block(README, "## Commands", "sh"));
     assert!(lines.len() >= 8, "{lines:?}");
     lines.iter().for_each(|line| {
