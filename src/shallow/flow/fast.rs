@@ -70,7 +70,7 @@ impl Fast {
         self.rows[row]
     }
 
-    /// How many times less inertia counts in the pipes of all columns ([`packed`]).
+    /// How many times less inertia counts in the pipes of all columns (`packed`).
     pub fn light(&self) -> &[u32] {
         &self.light
     }
@@ -223,7 +223,7 @@ fn packed(east: f32, south: f32) -> u32 {
     east.to_bits() >> 16 | south.to_bits() & 0xffff_0000
 }
 
-/// The numbers of [`packed`].
+/// The numbers of `packed`.
 #[inline(always)]
 pub fn unpacked(both: u32) -> [f32; 2] {
     [both << 16, both & 0xffff_0000].map(f32::from_bits)

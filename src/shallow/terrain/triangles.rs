@@ -1,7 +1,7 @@
 //! Solids of triangles, open or closed, that may overlap: a point is solid where the winding number is above 0.
 //!
 //! Going down a vertical line from above, where the winding number is 0, a triangle that faces up adds 1 and one that faces down takes 1.
-//! So solids that overlap unite, an open sheet that faces up is solid down to [`BOTTOMLESS`], and one that faces down is nothing.
+//! So solids that overlap unite, an open sheet that faces up is solid down to [`BOTTOMLESS`](crate::shallow::grid::BOTTOMLESS), and one that faces down is nothing.
 //! Which lines meet a triangle is decided exactly (`crossings.rs`), so no closed surface leaks.
 //!
 //! Heights of crossings, which are right to within 2^-8 units, are rounded to units first, those outside of the range to its ends, and
