@@ -54,7 +54,8 @@ fn example(&(name, edge, floors, step, cell, viscosity, [longest, mean]): &Examp
     });
     let all = Frames::timed(&mut all, FRAMES, |_| ());
     let mut poured = Shallow::new(&context(), &solids, params).expect("a liquid");
-    let top = 0.01 * floors as f64;
+    // Above the highest floor, which may slope.
+    let top = 0.01 * (floors + 1) as f64;
     let at = [-0.3 * edge as f64 * cell, top, 0.0];
     poured.set_flows(&[source(at, 3.0 * cell, 2.0e-6)], |_| "the source".into()).expect("a source");
     let from = Frames::timed(&mut poured, FRAMES, |_| ());

@@ -79,9 +79,9 @@ pub fn next(at: &Next) -> f64 {
 }
 
 /// How often steps are halved so that disturbances, which go a power of two of cells in one, stay within a cell: so that the time of a
-/// frame has a bound, at most three times, and once in real time.
+/// frame has a bound, at most three times, and not in real time.
 pub fn halvings(params: &Params, cells: u32) -> u32 {
-    let most = if params.pace == Pace::Exact { 3 } else { 1 };
+    let most = if params.pace == Pace::Exact { 3 } else { 0 };
     cells.trailing_zeros().min(most)
 }
 
