@@ -16,6 +16,9 @@ use crate::shallow::pipes::Pipes;
 /// A column is full when it misses at most its room over this.
 const SLACK: i32 = 128;
 
+/// Columns of a network that there is room for from the beginning.
+const ROOM: usize = 1024;
+
 /// A pipe of the network: its place in its array.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum At {
@@ -79,7 +82,19 @@ pub struct State<'a> {
 impl Network {
     /// No network, for so many column indices.
     pub fn new(columns: usize) -> Self {
-        Self { party_of: vec![NONE; columns], over: vec![0.0; columns], ..Self::default() }
+        // A tool that dips in floods some hundred columns: frames allocate nothing for them.
+        let room = columns.min(ROOM);
+        Self {
+            parties: Vec::with_capacity(room),
+            nodes: Vec::with_capacity(room),
+            edges: Vec::with_capacity(2 * room),
+            shut_east: Vec::with_capacity(room),
+            shut_south: Vec::with_capacity(room),
+            shut_links: Vec::with_capacity(room),
+            moves: Vec::with_capacity(room),
+            party_of: vec![NONE; columns],
+            over: vec![0.0; columns],
+        }
     }
 
     /// Gives a part of the columns another count of indices; what they hold is then left over from before.
