@@ -354,4 +354,4 @@ impl Shallow {
 }
 
 /// Bytes of a column with its pipes, and its share of strips.
-const BYTES: u64 = 48;
+const BYTES: u64 = 64;
