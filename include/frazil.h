@@ -655,8 +655,8 @@ enum frz_shallow_pace
 #endif // defined(__cplusplus) || __STDC_VERSION__ >= 202311L
  {
     /**
-     * Steps of at most frz_shallow_params.longest_step: where liquid is too deep for that, its waves slow down, and films stay as
-     * they are.
+     * Steps of at most frz_shallow_params.longest_step: where liquid is too deep for that, its waves slow down, and films on slopes that are too
+     * fast are held back.
      */
     FRZ_SHALLOW_REALTIME = 0,
     /**
@@ -2100,6 +2100,11 @@ typedef struct {
      * Rows of cells, summed over steps, in which columns would have taken more than they had room for, and took what fitted.
      */
     uint64_t filled;
+    /**
+     * Rows of cells, summed over steps, in which films on slopes would have been too fast for steps of this length, and were held back: shorter steps let
+     * them go.
+     */
+    uint64_t slowed;
 } frz_shallow_report;
 
 /**

@@ -43,7 +43,7 @@ static class Frazil {
     public struct Report {
         public uint StructSize, Steps;
         public double Seconds, Dropped, Deepest;
-        public ulong Emptied, Filled;
+        public ulong Emptied, Filled, Slowed;
     }
 
     [StructLayout(LayoutKind.Sequential)]

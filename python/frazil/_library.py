@@ -213,7 +213,7 @@ class ShallowDomain(Struct):
 class ShallowReport(Struct):
     _fields_ = [
         ("struct_size", c.c_uint32), ("steps", c.c_uint32), ("seconds", c.c_double), ("dropped", c.c_double),
-        ("deepest", c.c_double), ("emptied", c.c_uint64), ("filled", c.c_uint64),
+        ("deepest", c.c_double), ("emptied", c.c_uint64), ("filled", c.c_uint64), ("slowed", c.c_uint64),
     ]
 
 

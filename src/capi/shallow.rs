@@ -50,6 +50,9 @@ pub struct frz_shallow_report {
     pub emptied: u64,
     /// Rows of cells, summed over steps, in which columns would have taken more than they had room for, and took what fitted.
     pub filled: u64,
+    /// Rows of cells, summed over steps, in which films on slopes would have been too fast for steps of this length, and were held back: shorter steps let
+    /// them go.
+    pub slowed: u64,
 }
 
 // SAFETY: numbers.
@@ -68,6 +71,7 @@ impl frz_shallow_report {
             deepest: done.deepest,
             emptied: done.emptied,
             filled: done.filled,
+            slowed: done.slowed,
         }
     }
 }

@@ -6,6 +6,7 @@
 use std::ops::Range;
 
 use super::grid::{BOTTOMLESS, Grid, Heights, TOP};
+use super::per_column::{Array, PerColumn};
 use super::terrain::Solids;
 
 /// Cells in a strip.
@@ -40,11 +41,11 @@ pub struct Columns {
     /// Bit of each place that has a column.
     present: Vec<u16>,
     /// b (units): where the liquid stands.
-    base: Vec<i32>,
+    base: PerColumn<i32>,
     /// max (units): the underside of the next solid, or [`TOP`].
-    ceiling: Vec<i32>,
+    ceiling: PerColumn<i32>,
     /// min (units): the underside of the solid below, or [`BOTTOMLESS`].
-    under: Vec<i32>,
+    under: PerColumn<i32>,
 }
 
 /// A strip that is set anew.
@@ -92,9 +93,9 @@ impl Columns {
             north: Vec::new(),
             south: Vec::new(),
             present: Vec::new(),
-            base: Vec::new(),
-            ceiling: Vec::new(),
-            under: Vec::new(),
+            base: PerColumn::new(Array::Base, 0, 0),
+            ceiling: PerColumn::new(Array::Ceiling, 0, 0),
+            under: PerColumn::new(Array::Under, 0, 0),
         };
         let [nx, nz] = columns.grid.size;
         for row in 0..nz {
@@ -102,6 +103,8 @@ impl Columns {
         }
         for numbers in [&mut columns.base, &mut columns.ceiling, &mut columns.under] {
             numbers.resize(columns.strips.len() * STRIP + STRIP, 0);
+            // Without the room that it grew by.
+            *numbers = numbers.clone();
         }
         let count = columns.strips.len();
         columns.north = vec![NONE; count];
@@ -183,7 +186,7 @@ impl Columns {
         resize_part(&mut self.present, old.clone(), len, 0);
         let indices = old.start * STRIP..old.end * STRIP;
         for numbers in [&mut self.base, &mut self.ceiling, &mut self.under] {
-            resize_part(numbers, indices.clone(), len * STRIP, 0);
+            numbers.resize_part(indices.clone(), len * STRIP, 0);
         }
         for neighbours in [&mut self.north, &mut self.south] {
             resize_part(neighbours, old.clone(), len, NONE);
@@ -223,7 +226,7 @@ impl Columns {
             size_of_val(&self.strips[..]) + size_of_val(&self.rows[..]) + size_of_val(&self.present[..]);
         let beside = size_of_val(&self.north[..]) + size_of_val(&self.south[..]);
         let heights = [&self.base, &self.ceiling, &self.under];
-        strips + beside + heights.iter().map(|heights| size_of_val(&heights[..])).sum::<usize>()
+        strips + beside + heights.into_iter().map(PerColumn::bytes).sum::<usize>()
     }
 
     /// Count of columns.
@@ -335,6 +338,12 @@ impl Columns {
 #[inline(always)]
 pub(super) fn strip_of<T>(numbers: &[T], strip: usize) -> &[T; STRIP] {
     &numbers.as_chunks().0[strip]
+}
+
+/// As many numbers as a strip has, from any place.
+#[inline(always)]
+pub(super) fn strip_from<T>(numbers: &[T], at: usize) -> &[T; STRIP] {
+    numbers[at..].first_chunk().expect("a strip")
 }
 
 /// The numbers of a strip, to change.

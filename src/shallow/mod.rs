@@ -13,6 +13,7 @@ mod identity;
 pub mod liquid;
 pub mod pace;
 pub mod params;
+mod per_column;
 pub mod pipes;
 mod pour;
 pub mod probe;

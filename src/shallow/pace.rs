@@ -78,12 +78,14 @@ pub fn next(at: &Next) -> f64 {
     at.left / (at.left / longest - 1e-9).ceil().max(1.0)
 }
 
-/// How often steps are halved so that disturbances, which go a power of two of cells in one, stay within a cell: so that the time of a
-/// frame has a bound, at most three times, and not in real time.
-pub fn halvings(params: &Params, cells: u32) -> u32 {
-    let most = if params.pace == Pace::Exact { 3 } else { 0 };
-    cells.trailing_zeros().min(most)
+/// How often steps are halved at most, so that a disturbance in fast films stays within a cell. Where it cannot, these are held back.
+pub fn most_halvings(params: &Params) -> u32 {
+    if params.pace == Pace::Exact { 3 } else { 0 }
 }
+
+/// What a pipe of a fast film moves in a step at most, as part of the depth of the column that gives. A disturbance travels at three times the film's
+/// speed, and where this no longer grows with depth, at that speed: within a cell a step everywhere, or it would grow.
+const FASTEST: f32 = 1.0 / 3.0;
 
 /// g unit dt^2 / dx^2 of a step (1 / units).
 pub fn drive(params: &Params, measures: &Measures, dt: f64) -> f64 {
@@ -107,6 +109,7 @@ pub fn step(params: &Params, measures: &Measures, dt: f64, last: f64) -> Step {
         drag: (3.0 * dt * params.liquid.viscosity / (unit * unit)).min(1e36) as f32,
         section: section as f32,
         lighter: (f64::from(FAST_WAVES) / drive(params, measures, dt)).min(1e36) as f32,
+        fastest: FASTEST,
         is_whole: params.section == Section::Whole,
         thinning: params.liquid.thinning.map(|law| Thinning {
             shear: (3.0 * law.time * cell / (last * unit)).min(1e30) as f32,

@@ -26,8 +26,8 @@ pub struct Params {
 pub enum Pace {
     /// As many as stability needs.
     Exact,
-    /// Of at most this length (s): where liquid is too deep for that, its waves slow down, and films stay as they are. 0.003 in the thesis
-    /// (Table 4.1).
+    /// Of at most this length (s): where liquid is too deep for that, its waves slow down; films on slopes that would move more than a third of their
+    /// depth from cell to cell in a step are held back to that ([`Report::slowed`](super::Report)). 0.003 in the thesis (Table 4.1).
     Realtime(f64),
 }
 

@@ -49,6 +49,9 @@ pub struct Report {
     pub emptied: u64,
     /// Rows, summed over steps, in which columns would have taken more than they had room for (K_max under 1).
     pub filled: u64,
+    /// Rows, summed over steps, in which films on slopes would have gone so fast that steps of this length could not follow, and were held back
+    /// ([`Pace::Realtime`](super::params::Pace)).
+    pub slowed: u64,
 }
 
 /// Where all liquid is (m3).
@@ -135,7 +138,7 @@ impl Shallow {
 
     /// Fluxes from each column index to the east and to the south: the depth (units) that they move in a step of [`Shallow::last_step`].
     pub fn fluxes(&self) -> [&[f32]; 2] {
-        self.flow.flux.each_ref().map(Vec::as_slice)
+        self.flow.flux.each_ref().map(|numbers| &numbers[..])
     }
 
     /// Length of the step in whose measure fluxes are (s).
@@ -263,7 +266,7 @@ impl Shallow {
                 return Err(Error::argument(format!("a frame of {dt} s would take steps of {length} s")));
             }
             let step = pace::step(&self.params, &measures, length, self.flow.last);
-            let [emptied, filled] = self.flow.step(&self.columns, &self.pipes, &step, length);
+            let [emptied, filled, slowed] = self.flow.step(&self.columns, &self.pipes, &step, length);
             self.flows.step(&self.columns, &mut self.flow, self.time, length);
             self.steps.push(length);
             self.time += length;
@@ -271,6 +274,7 @@ impl Shallow {
             report.seconds = if length >= left { dt } else { report.seconds + length };
             report.emptied += u64::from(emptied);
             report.filled += u64::from(filled);
+            report.slowed += u64::from(slowed);
         }
         report.deepest = measures.unit * f64::from(self.flow.deepest());
         Ok(report)
@@ -292,8 +296,9 @@ impl Shallow {
         let last = self.flow.last;
         let drive = pace::drive(&self.params, measures, last);
         let longest = pace::next(&self.next(measures, dt, 0, 0));
-        let cells = self.flow.find_fast(&self.columns, drive, longest / last);
-        let halvings = pace::halvings(&self.params, cells);
+        let farthest = 1 << pace::most_halvings(&self.params);
+        let cells = self.flow.find_fast(&self.columns, drive, longest / last, farthest);
+        let halvings = cells.trailing_zeros();
         if let Some(length) = next(&self.next(measures, dt, 0, halvings)) {
             let step = pace::step(&self.params, measures, length, last);
             self.flow.lighten(drive, &step);

@@ -88,6 +88,7 @@ int main(void) {
     SIZE(frz_shallow_report), FIELD(frz_shallow_report, struct_size), FIELD(frz_shallow_report, steps);
     FIELD(frz_shallow_report, seconds), FIELD(frz_shallow_report, dropped), FIELD(frz_shallow_report, deepest);
     FIELD(frz_shallow_report, emptied), FIELD(frz_shallow_report, filled);
+    FIELD(frz_shallow_report, slowed);
     SIZE(frz_shallow_flow), FIELD(frz_shallow_flow, struct_size), FIELD(frz_shallow_flow, flags);
     FIELD(frz_shallow_flow, kind), FIELD(frz_shallow_flow, triangle), FIELD(frz_shallow_flow, shares);
     FIELD(frz_shallow_flow, at), FIELD(frz_shallow_flow, radius), FIELD(frz_shallow_flow, rate);

@@ -273,6 +273,7 @@ fn told(
         "simulated_s": liquid.time(),
         "emptied_rows": report.emptied,
         "filled_rows": report.filled,
+        "slowed_rows": report.slowed,
         "vertices": mesh.map_or(0, |mesh| mesh.positions.len()),
         "triangles": mesh.map_or(0, |mesh| mesh.triangles.len()),
     }) else {

@@ -24,6 +24,13 @@ pub struct Buffer {
     pub is_full: bool,
 }
 
+impl Buffer {
+    /// All factors are 1.
+    pub fn clear(&mut self) {
+        (self.is_less, self.is_full) = (false, false);
+    }
+}
+
 /// Buffers of a band's rows in work.
 #[derive(Debug, Clone)]
 pub struct Rows {

@@ -3,27 +3,29 @@
 //! In a film on a slope a disturbance travels at 3 u. Where waves are slower, at c, the liquid's inertia lets each bump grow: roll waves, which
 //! liquid that carries its momentum along, and has surface tension, grows far more slowly if at all. A pipe between wet columns where
 //! 3 u > c is *fast*: its inertia counts so much less that (c dt / dx)^2 is [`FAST_WAVES`]. What a steady film carries does not depend on its
-//! inertia. Which pipes are fast is found at the start of each frame, from the state alone.
+//! inertia. Which pipes are fast is found at the start of each frame, from the state alone. Where steps are too long for a disturbance, which would
+//! pass more than a cell in one and grow, a fast pipe is held back.
 
 use std::ops::Range;
 
 use super::active::Active;
 use super::flux::{Step, greater, lesser};
 use crate::base::cpu::dispatch;
-use crate::shallow::columns::{NONE, STRIP, resize_part};
+use crate::shallow::columns::{NONE, STRIP, strip_from, strip_of};
+use crate::shallow::per_column::{Array, PerColumn};
 
 /// (c dt / dx)^2 of a fast pipe: below 1/2, the bound of stability.
 pub const FAST_WAVES: f32 = 0.35;
 /// Inertia counts at most so many times less: what is shallower than that is never fast for long.
 const LIGHTEST: f32 = 16.0;
-/// Cells that a disturbance may be found to go in a step: a power of two.
-pub const FARTHEST: u32 = 8;
+/// And at least this many times: what is fast can be told from what is not.
+const HEAVIEST: f32 = 1.0 + 1.0 / 128.0;
 
 /// Where inertia counts less.
 #[derive(Debug, Clone)]
 pub struct Fast {
     /// How many times less in the pipes of each column, to the east and to the south ([`packed`]); of rows that have fast pipes.
-    light: Vec<u32>,
+    light: PerColumn<u32>,
     rows: Vec<bool>,
 }
 
@@ -51,18 +53,18 @@ struct Span<'a> {
 impl Fast {
     /// Nothing is fast.
     pub fn new(columns: usize, rows: usize) -> Self {
-        Self { light: vec![packed(1.0, 1.0); columns], rows: vec![false; rows] }
+        Self { light: PerColumn::new(Array::Light, columns, packed(1.0, 1.0)), rows: vec![false; rows] }
     }
 
     /// Gives a part of the columns another count of indices.
     pub fn resize_part(&mut self, part: Range<usize>, len: usize) {
         self.rows.fill(false);
-        resize_part(&mut self.light, part, len, packed(1.0, 1.0));
+        self.light.resize_part(part, len, packed(1.0, 1.0));
     }
 
     /// Memory (bytes).
     pub fn bytes(&self) -> usize {
-        size_of_val(&self.light[..]) + self.rows.len()
+        self.light.bytes() + self.rows.len()
     }
 
     /// Whether a row has fast pipes.
@@ -80,11 +82,11 @@ impl Fast {
         self.rows.fill(false);
     }
 
-    /// Finds the rows with fast pipes; returns the least power of two, to [`FARTHEST`], of cells that no disturbance leaves behind in
+    /// Finds the rows with fast pipes; returns the least power of two, to `farthest`, of cells that no disturbance leaves behind in
     /// `step` times the last step.
-    pub fn find(&mut self, films: &Films, step: f32) -> u32 {
+    pub fn find(&mut self, films: &Films, step: f32, farthest: u32) -> u32 {
         let rows = &mut self.rows[..];
-        dispatch!(find_rows(rows: &mut [bool], films: &Films, step: f32) -> u32)
+        dispatch!(find_rows(rows: &mut [bool], films: &Films, step: f32, farthest: u32) -> u32)
     }
 
     /// Finds how much less inertia counts in the fast pipes of those rows, for steps like one.
@@ -95,18 +97,22 @@ impl Fast {
 }
 
 #[inline(always)]
-fn find_rows(rows: &mut [bool], films: &Films, step: f32) -> u32 {
+fn find_rows(rows: &mut [bool], films: &Films, step: f32, farthest: u32) -> u32 {
     let mut cells = 1;
     for (row, is_fast) in rows.iter_mut().enumerate() {
         // Those that were fast mostly still are.
         let was_fast = std::mem::take(is_fast);
         for (_, span) in films.row(row) {
             if was_fast || span.may_be_fast(films.drive) {
-                let [any, mut farther] = span.find(films.drive, step / cells as f32);
-                *is_fast |= any;
-                while farther && cells < FARTHEST {
-                    cells *= 2;
-                    farther = span.find(films.drive, step / cells as f32)[1];
+                if cells < farthest {
+                    let [any, mut farther] = span.find::<true>(films.drive, step / cells as f32);
+                    *is_fast |= any;
+                    while farther && cells < farthest {
+                        cells *= 2;
+                        farther = span.find::<true>(films.drive, step / cells as f32)[1];
+                    }
+                } else if !*is_fast {
+                    [*is_fast, _] = span.find::<false>(films.drive, 0.0);
                 }
             }
         }
@@ -121,18 +127,31 @@ fn lighten_rows(fast: &mut Fast, films: &Films, step: &Step) {
         // Also of strips that wake in this frame.
         let strips = films.active.strips(row);
         light[strips.start * STRIP..strips.end * STRIP].fill(packed(1.0, 1.0));
-        for (first, Span { depth, south_depth, flux: [east, south] }) in films.row(row) {
-            let count = east.len();
-            let out = &mut light[first..first + count];
-            let (depth, south_depth, south) = (&depth[..count + 1], &south_depth[..count], &south[..count]);
-            for x in 0..count {
-                let own = depth[x] as f32;
-                let light = |depth: [f32; 2], flux: f32| light_of(films.drive, step, depth, flux);
-                let east = light([own, depth[x + 1] as f32], east[x]);
-                out[x] = packed(east, light([own, south_depth[x] as f32], south[x]));
+        for (first, span) in films.row(row) {
+            let light = &mut light[first..first + span.flux[0].len()];
+            for (at, light) in light.as_chunks_mut().0.iter_mut().enumerate() {
+                lighten_strip(&span.strip(at), films.drive, step, light);
             }
         }
     }
+}
+
+#[inline(always)]
+fn lighten_strip(strip: &Strip, drive: f32, step: &Step, light: &mut [u32; STRIP]) {
+    let Strip { depth, east_depth, south_depth, flux: [east, south] } = strip;
+    for x in 0..STRIP {
+        let [own, to_east, to_south] = [depth[x], east_depth[x], south_depth[x]].map(|depth| depth as f32);
+        let east = light_of(drive, step, [own, to_east], east[x]);
+        light[x] = packed(east, light_of(drive, step, [own, to_south], south[x]));
+    }
+}
+
+/// A strip of a span.
+struct Strip<'a> {
+    depth: &'a [i32; STRIP],
+    east_depth: &'a [i32; STRIP],
+    south_depth: &'a [i32; STRIP],
+    flux: [&'a [f32; STRIP]; 2],
 }
 
 impl<'a> Films<'a> {
@@ -152,47 +171,65 @@ impl<'a> Films<'a> {
     }
 }
 
-impl Span<'_> {
+impl<'a> Span<'a> {
+    /// Count of its strips.
+    #[inline(always)]
+    fn strips(&self) -> usize {
+        self.flux[0].len() / STRIP
+    }
+
+    #[inline(always)]
+    fn strip(&self, at: usize) -> Strip<'a> {
+        Strip {
+            depth: strip_of(self.depth, at),
+            east_depth: strip_from(self.depth, at * STRIP + 1),
+            south_depth: strip_of(self.south_depth, at),
+            flux: self.flux.map(|flux| strip_of(flux, at)),
+        }
+    }
+
     /// Whether one of its pipes could be fast: its greatest flux, if it were through the shallowest.
     #[inline(always)]
     fn may_be_fast(&self, drive: f32) -> bool {
-        let [east, south] = self.flux;
-        let count = east.len();
-        let (depth, south_depth, south) =
-            (&self.depth[..count + 1], &self.south_depth[..count], &south[..count]);
         // Dry columns, behind all others here, have no fast pipes.
         let behind = |depth: i32| (depth as u32).wrapping_sub(1);
-        let (mut greatest, mut shallowest) = (0, behind(depth[count]));
-        for x in 0..count {
-            // Numbers over 0 are in the order of their bits, and the greatest of integers is found for whole vectors at once.
-            let [east, south] = [east[x], south[x]].map(|flux| flux.abs().to_bits() as i32);
-            greatest = greatest.max(east.max(south));
-            shallowest = shallowest.min(behind(depth[x]).min(behind(south_depth[x])));
+        let (mut greatest, mut shallowest) = ([0; STRIP], [u32::MAX; STRIP]);
+        for at in 0..self.strips() {
+            let Strip { depth, south_depth, flux: [east, south], .. } = self.strip(at);
+            for x in 0..STRIP {
+                // Numbers over 0 are in the order of their bits, and the greatest of integers is found for whole vectors at once.
+                let [east, south] = [east[x], south[x]].map(|flux| flux.abs().to_bits() as i32);
+                greatest[x] = greatest[x].max(east.max(south));
+                shallowest[x] = shallowest[x].min(behind(depth[x]).min(behind(south_depth[x])));
+            }
         }
-        let shallowest = shallowest as f32 + 1.0;
+        let last = behind(self.depth[self.flux[0].len()]);
+        let shallowest = shallowest.into_iter().fold(last, u32::min) as f32 + 1.0;
+        let greatest = greatest.into_iter().fold(0, i32::max);
         is_fast(drive, [shallowest; 2], f32::from_bits(greatest as u32))
     }
 
-    /// Whether one of its pipes is fast, and whether a disturbance goes further than a cell in one of those in `step` times the last step.
+    /// Whether one of its pipes is fast, and, where that is asked for, whether a disturbance goes further than a cell in one of those in `step` times
+    /// the last step.
     #[inline(always)]
-    fn find(&self, drive: f32, step: f32) -> [bool; 2] {
-        let [east, south] = self.flux;
-        let count = east.len();
-        let (depth, south_depth, south) =
-            (&self.depth[..count + 1], &self.south_depth[..count], &south[..count]);
-        let (mut any, mut farther) = (0, 0);
-        for x in 0..count {
-            let own = depth[x] as f32;
-            for (depth, flux) in
-                [([own, depth[x + 1] as f32], east[x]), ([own, south_depth[x] as f32], south[x])]
-            {
-                let giver = if flux > 0.0 { depth[0] } else { depth[1] };
-                let is_fast = i32::from(is_fast(drive, depth, flux));
-                any |= is_fast;
-                farther |= is_fast & i32::from(3.0 * step * flux.abs() > giver);
+    fn find<const WAYS: bool>(&self, drive: f32, step: f32) -> [bool; 2] {
+        let (mut any, mut farther) = ([0; STRIP], [0; STRIP]);
+        for at in 0..self.strips() {
+            let Strip { depth, east_depth, south_depth, flux: [east, south] } = self.strip(at);
+            for x in 0..STRIP {
+                let [own, to_east, to_south] =
+                    [depth[x], east_depth[x], south_depth[x]].map(|depth| depth as f32);
+                for (depth, flux) in [([own, to_east], east[x]), ([own, to_south], south[x])] {
+                    let is_fast = i32::from(is_fast(drive, depth, flux));
+                    any[x] |= is_fast;
+                    if WAYS {
+                        let giver = if flux > 0.0 { depth[0] } else { depth[1] };
+                        farther[x] |= is_fast & i32::from(3.0 * step * flux.abs() > giver);
+                    }
+                }
             }
         }
-        [any != 0, farther != 0]
+        [any, farther].map(|found| found != [0; STRIP])
     }
 }
 
@@ -208,7 +245,7 @@ fn is_fast(drive: f32, depth: [f32; 2], flux: f32) -> bool {
 fn light_of(drive: f32, step: &Step, depth: [f32; 2], flux: f32) -> f32 {
     let section = lesser(0.5 * (depth[0] + depth[1]), step.section);
     let light = lesser(step.lighter / greater(section, 1.0), LIGHTEST);
-    if is_fast(drive, depth, flux) { greater(light, 1.0) } else { 1.0 }
+    if is_fast(drive, depth, flux) { greater(light, HEAVIEST) } else { 1.0 }
 }
 
 /// As the others, of a link, whose flux is in the last step's measure, about as long as this one.

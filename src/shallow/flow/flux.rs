@@ -5,6 +5,7 @@
 //! of the column that gives.
 
 use super::fast::unpacked;
+use crate::shallow::columns::{STRIP, strip_from, strip_mut, strip_of};
 
 /// The numbers of a step that all pipes share.
 #[derive(Debug, Clone, Copy)]
@@ -17,6 +18,8 @@ pub struct Step {
     pub drag: f32,
     /// [`FAST_WAVES`](super::fast::FAST_WAVES) over `drive` (units): over a depth, by how much the inertia of a fast film counts less.
     pub lighter: f32,
+    /// The part of a column's depth that a pipe of a fast film moves in a step at most.
+    pub fastest: f32,
     /// Greatest depth in the section A (units), for stability; where the section is whole, as in the thesis, its depth dx.
     pub section: f32,
     /// Whether all sections are whole.
@@ -73,16 +76,19 @@ pub fn lesser(a: f32, b: f32) -> f32 {
     if a < b { a } else { b }
 }
 
-/// A transfer whose integer part is the nearest integer: always cut toward zero, what is left would push on in the direction of the flux.
+/// What a pipe is to transfer (units): the nearest integer to its flux and what earlier transfers left of theirs; and what this one leaves. Cut
+/// toward zero, what is left would push on in the direction of the flux. A pipe without flux keeps nothing.
 #[inline(always)]
-pub fn rounded(transfer: f32) -> f32 {
-    transfer + 0.5f32.copysign(transfer)
+pub fn split(flux: f32, left: f32) -> [f32; 2] {
+    let asked = if flux == 0.0 { 0.0 } else { flux + left };
+    let whole = asked.round_ties_even();
+    [whole, asked - whole]
 }
 
 /// The flux through a pipe from i to j after a step (units of depth): `fall` is eta_i - eta_j, `depth` H of both (units), `flux` the last flux;
 /// the liquid's inertia counts `light` times less.
 #[inline(always)]
-pub fn flux<K: Kind>(step: &Step, fall: i32, depth: [f32; 2], flux: f32, open: f32, light: f32) -> f32 {
+pub fn flux_of<K: Kind>(step: &Step, fall: i32, depth: [f32; 2], flux: f32, open: f32, light: f32) -> f32 {
     let kept = step.kept * flux;
     let drive = step.drive * light * fall as f32;
     // The mean depth drives, the same uphill and downhill: with that of the column that gives, waves would gain by each swing.
@@ -144,47 +150,89 @@ pub struct Row<'a> {
     pub south_base: &'a [i32],
     /// H to the south.
     pub south_depth: &'a [i32],
-    /// Openness to the east.
-    pub open_east: &'a [f32],
-    /// Openness to the south.
-    pub open_south: &'a [f32],
-    /// What truncation left of the last transfers to the east (units).
-    pub left_east: &'a [f32],
-    /// The same to the south.
-    pub left_south: &'a [f32],
+    /// Openness to the east and to the south.
+    pub open: [&'a [f32]; 2],
     /// How much less inertia counts to the east and to the south, where it does (`fast::packed`).
     pub light: &'a [u32],
 }
 
-/// Computes the fluxes of a span's pipes, and what they are to transfer: the flux and what was left.
+/// What the pipes of a span carry, to the east and to the south.
+pub struct Carried<'a> {
+    /// Flux (units a step).
+    pub flux: [&'a mut [f32]; 2],
+    /// What transfers left (units).
+    pub left: [&'a mut [f32]; 2],
+    /// What is to be transferred (units).
+    pub transfer: [&'a mut [f32]; 2],
+}
+
+/// Computes the fluxes of a span's pipes, and what these are to transfer; whether one of a fast film was held back.
 #[inline(always)]
-pub fn flux_row<K: Kind, const LIGHT: bool>(
+pub fn flux_row<K: Kind, const LIGHT: bool>(step: &Step, row: &Row, carried: Carried) -> bool {
+    let mut held = [0; STRIP];
+    let Carried { flux: [east, south], left: [left_east, left_south], transfer: [to_east, to_south] } =
+        carried;
+    for strip in 0..east.len() / STRIP {
+        let first = strip * STRIP;
+        let base = strip_of(row.base, strip);
+        let depth = strip_of(row.depth, strip);
+        let light = if LIGHT { strip_of(row.light, strip) } else { &[0; STRIP] };
+        let ends = Ends {
+            base: [base, strip_from(row.base, first + 1)],
+            depth: [depth, strip_from(row.depth, first + 1)],
+            open: strip_of(row.open[0], strip),
+            light,
+        };
+        let (flux, left, to) =
+            (strip_mut(east, strip), strip_mut(left_east, strip), strip_mut(to_east, strip));
+        flux_strip::<K, LIGHT, 0>(step, &ends, flux, left, to, &mut held);
+        let ends = Ends {
+            base: [base, strip_of(row.south_base, strip)],
+            depth: [depth, strip_of(row.south_depth, strip)],
+            open: strip_of(row.open[1], strip),
+            light,
+        };
+        let (flux, left, to) =
+            (strip_mut(south, strip), strip_mut(left_south, strip), strip_mut(to_south, strip));
+        flux_strip::<K, LIGHT, 1>(step, &ends, flux, left, to, &mut held);
+    }
+    LIGHT && held != [0; STRIP]
+}
+
+/// The columns at both ends of the pipes of a strip in one direction.
+struct Ends<'a> {
+    base: [&'a [i32; STRIP]; 2],
+    depth: [&'a [i32; STRIP]; 2],
+    open: &'a [f32; STRIP],
+    light: &'a [u32; STRIP],
+}
+
+/// Fluxes of a strip's pipes to the east or to the south. Of a fixed length, and with each array that changes an argument of its own, so that a row of
+/// few strips is neither begun with tests whether arrays overlap nor ended column by column.
+#[inline(always)]
+fn flux_strip<K: Kind, const LIGHT: bool, const AXIS: usize>(
     step: &Step,
-    row: &Row,
-    east: &mut [f32],
-    south: &mut [f32],
-    to_east: &mut [f32],
-    to_south: &mut [f32],
+    ends: &Ends,
+    flux: &mut [f32; STRIP],
+    left: &mut [f32; STRIP],
+    transfer: &mut [f32; STRIP],
+    held: &mut [i32; STRIP],
 ) {
-    let count = east.len();
-    let (base, depth) = (&row.base[..count + 1], &row.depth[..count + 1]);
-    let (south_base, south_depth) = (&row.south_base[..count], &row.south_depth[..count]);
-    let (open_east, open_south) = (&row.open_east[..count], &row.open_south[..count]);
-    let (left_east, left_south) = (&row.left_east[..count], &row.left_south[..count]);
-    let light = if LIGHT { &row.light[..count] } else { row.light };
-    let (south, to_east, to_south) = (&mut south[..count], &mut to_east[..count], &mut to_south[..count]);
-    for x in 0..count {
-        let eta = base[x] + depth[x];
-        let own = depth[x] as f32;
-        let fall = eta - (base[x + 1] + depth[x + 1]) + step.tilt[0];
-        let [light_east, light_south] = if LIGHT { unpacked(light[x]) } else { [1.0; 2] };
-        let f = flux::<K>(step, fall, [own, depth[x + 1] as f32], east[x], open_east[x], light_east);
-        east[x] = f;
-        to_east[x] = if f == 0.0 { 0.0 } else { rounded(f + left_east[x]) };
-        let fall = eta - (south_base[x] + south_depth[x]) + step.tilt[1];
-        let f = flux::<K>(step, fall, [own, south_depth[x] as f32], south[x], open_south[x], light_south);
-        south[x] = f;
-        to_south[x] = if f == 0.0 { 0.0 } else { rounded(f + left_south[x]) };
+    let Ends { base, depth, open, light } = ends;
+    for x in 0..STRIP {
+        let fall = base[0][x] + depth[0][x] - (base[1][x] + depth[1][x]) + step.tilt[AXIS];
+        let depth = [depth[0][x] as f32, depth[1][x] as f32];
+        let light = if LIGHT { unpacked(light[x])[AXIS] } else { 1.0 };
+        let mut f = flux_of::<K>(step, fall, depth, flux[x], open[x], light);
+        if LIGHT {
+            let most =
+                if light > 1.0 { step.fastest * if f > 0.0 { depth[0] } else { depth[1] } } else { f32::MAX };
+            let within = lesser(greater(f, -most), most);
+            held[x] |= i32::from(within != f);
+            f = within;
+        }
+        flux[x] = f;
+        [transfer[x], left[x]] = split(f, left[x]);
     }
 }
 
@@ -210,6 +258,7 @@ mod tests {
             drive: 1e-7,
             drag: 1e9,
             lighter: 3.5e6,
+            fastest: 0.3,
             section: 5e4,
             is_whole: false,
             thinning: None,
@@ -222,7 +271,7 @@ mod tests {
         {
             let [there, back] =
                 [(fall, depth, last), (-fall, [depth[1], depth[0]], -last)].map(|(fall, depth, last)| {
-                    flux::<Of<true, false, false>>(&step, fall, depth, last, 0.7, 1.5)
+                    flux_of::<Of<true, false, false>>(&step, fall, depth, last, 0.7, 1.5)
                 });
             assert_eq!(there, -back, "{fall} {depth:?} {last}");
         }

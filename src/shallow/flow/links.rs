@@ -4,9 +4,8 @@ use crate::shallow::columns::{Columns, NONE, STRIP, resize_part};
 use std::ops::Range;
 
 use super::fast;
-use super::flux::{Kind, Step, flux, lesser, rounded};
+use super::flux::{Kind, Step, flux_of, lesser, split};
 use super::parts::LinkPart;
-use super::transfer::left;
 use crate::shallow::pipes::Links;
 
 /// Beyond what any column has (units): sums of transfers stay within 64 bits.
@@ -85,10 +84,11 @@ impl LinkPart<'_> {
                 let depth = [own as f32, beyond as f32];
                 let light =
                     if K::VISCOUS && !K::WHOLE { fast::light(step, depth, self.flux[at]) } else { 1.0 };
-                flux::<K>(step, fall, depth, self.flux[at], open, light)
+                flux_of::<K>(step, fall, depth, self.flux[at], open, light)
             };
             self.flux[at] = f;
-            self.transfer[at] = if f == 0.0 { 0.0 } else { rounded(f + self.left[at]).clamp(-MOST, MOST) };
+            let [transfer, left] = split(f, self.left[at]);
+            (self.transfer[at], self.left[at]) = (transfer.clamp(-MOST, MOST), left);
         }
     }
 
@@ -142,7 +142,6 @@ impl LinkPart<'_> {
             let transfer = self.transfer[link - first];
             // K keeps it within 32 bits.
             let units = transfer as i32;
-            self.left[link - first] = left(transfer, units);
             if units == 0 {
                 continue;
             }

@@ -21,7 +21,8 @@ mod transfer;
 
 use std::ops::Range;
 
-use crate::shallow::columns::{Columns, STRIP, resize_part, strip_mut};
+use crate::shallow::columns::{Columns, STRIP, strip_mut};
+use crate::shallow::per_column::{Array, PerColumn};
 use crate::shallow::pipes::Pipes;
 use active::{Active, runs};
 use bands::Bands;
@@ -36,11 +37,11 @@ use rows::Ground;
 #[derive(Debug, Clone)]
 pub struct Flow {
     /// H (units), and 16 more numbers.
-    pub(super) depth: Vec<i32>,
+    pub(super) depth: PerColumn<i32>,
     /// Flux to the east and to the south (units in a step of `last`).
-    pub(super) flux: [Vec<f32>; 2],
+    pub(super) flux: [PerColumn<f32>; 2],
     /// What truncation left of transfers to the east and to the south (units).
-    pub(super) left: [Vec<f32>; 2],
+    pub(super) left: [PerColumn<f32>; 2],
     pub(super) links: LinkFlow,
     active: Active,
     bands: Bands,
@@ -86,11 +87,11 @@ impl Stored<'_> {
 impl Flow {
     /// Dry columns.
     pub fn new(columns: &Columns, pipes: &Pipes) -> Self {
-        let none = vec![0.0; columns.len()];
+        let none = |array| PerColumn::new(array, columns.len(), 0.0);
         Self {
-            depth: vec![0; columns.len() + STRIP],
-            flux: [none.clone(), none.clone()],
-            left: [none.clone(), none],
+            depth: PerColumn::new(Array::Depth, columns.len() + STRIP, 0),
+            flux: [none(Array::FluxEast), none(Array::FluxSouth)],
+            left: [none(Array::LeftEast), none(Array::LeftSouth)],
             links: LinkFlow::new(&pipes.links),
             active: Active::new(columns, &pipes.links),
             bands: Bands::new(columns, pipes.links.most),
@@ -102,10 +103,10 @@ impl Flow {
 
     /// Memory (bytes).
     pub fn bytes(&self) -> usize {
-        let pipes: usize = self.flux.iter().chain(&self.left).map(|numbers| size_of_val(&numbers[..])).sum();
+        let pipes: usize = self.flux.iter().chain(&self.left).map(PerColumn::bytes).sum();
         let links = [&self.links.flux, &self.links.left, &self.links.transfer];
         let links: usize = links.iter().map(|numbers| size_of_val(&numbers[..])).sum();
-        size_of_val(&self.depth[..])
+        self.depth.bytes()
             + pipes
             + links
             + self.active.bytes()
@@ -184,9 +185,9 @@ impl Flow {
 
     /// Gives a part of the columns another count of indices; what they hold is then left over from before.
     pub(super) fn resize_part(&mut self, part: Range<usize>, len: usize) {
-        resize_part(&mut self.depth, part.clone(), len, 0);
+        self.depth.resize_part(part.clone(), len, 0);
         for numbers in self.flux.iter_mut().chain(&mut self.left) {
-            resize_part(numbers, part.clone(), len, 0.0);
+            numbers.resize_part(part.clone(), len, 0.0);
         }
         self.fast.resize_part(part.clone(), len);
         self.network.resize_part(part, len);
@@ -224,13 +225,13 @@ impl Flow {
         });
     }
 
-    /// Finds fast films; returns the least power of two of cells, to [`FARTHEST`](fast::FARTHEST), that no disturbance in them leaves behind in
-    /// `step` times the last step. `drive` is g unit dt^2 / dx^2 of that one (1 / units).
-    pub fn find_fast(&mut self, columns: &Columns, drive: f64, step: f64) -> u32 {
+    /// Finds fast films; returns the least power of two of cells, to `farthest`, that no disturbance in them leaves behind in `step` times the last
+    /// step. `drive` is g unit dt^2 / dx^2 of that one (1 / units).
+    pub fn find_fast(&mut self, columns: &Columns, drive: f64, step: f64, farthest: u32) -> u32 {
         self.active.refresh(columns);
         let Self { fast, active, depth, flux: [east, south], .. } = self;
         let films = Films { active, depth, flux: [east, south], drive: drive as f32 };
-        fast.find(&films, step as f32)
+        fast.find(&films, step as f32, farthest)
     }
 
     /// Lets the inertia of fast films count less in steps like one.
@@ -249,9 +250,9 @@ impl Flow {
         self.bands.deepest()
     }
 
-    /// One step of `dt` (s); returns the count of rows in which K_min, and in which K_max, was not 1. Runs on the threads of the pool around it,
-    /// if [`Flow::divide`] has divided it.
-    pub fn step(&mut self, columns: &Columns, pipes: &Pipes, step: &Step, dt: f64) -> [u32; 2] {
+    /// One step of `dt` (s); returns the count of rows in which K_min, and in which K_max, was not 1, and in which fast films were held back. Runs on
+    /// the threads of the pool around it, if [`Flow::divide`] has divided it.
+    pub fn step(&mut self, columns: &Columns, pipes: &Pipes, step: &Step, dt: f64) -> [u32; 3] {
         self.active.refresh(columns);
         if self.bands.find_filling() || !self.network.is_empty() {
             self.flood(columns, pipes, step);
@@ -264,12 +265,14 @@ impl Flow {
             fast: &self.fast,
             may_fill: &[],
         };
-        let liquid = Part::new(&mut self.depth, &mut self.flux, &mut self.left, &mut self.links);
+        let [flux, left] =
+            [&mut self.flux, &mut self.left].map(|both| both.each_mut().map(|numbers| &mut numbers[..]));
+        let liquid = Part::new(&mut self.depth, flux, left, &mut self.links);
         self.bands.step(step, &ground, liquid);
         self.network.put_back(&mut self.flux, &mut self.left, &mut self.links);
-        let mut scaled = [0; 2];
+        let mut scaled = [0; 3];
         for stepped in self.bands.results() {
-            scaled = [0, 1].map(|which| scaled[which] + stepped.scaled[which]);
+            scaled = [0, 1, 2].map(|which| scaled[which] + stepped.scaled[which]);
             self.links.lost += stepped.outside.lost;
             self.links.gained += stepped.outside.gained;
             for strip in stepped.woken.drain(..) {

@@ -9,8 +9,9 @@ use super::flux::Step;
 use super::heads::{EQUAL, Node};
 use super::links::LinkFlow;
 use super::rounds::{self, Party};
-use crate::shallow::columns::{Columns, NONE, STRIP, resize_part};
+use crate::shallow::columns::{Columns, NONE, STRIP};
 use crate::shallow::grid::TOP;
+use crate::shallow::per_column::{Array, PerColumn};
 use crate::shallow::pipes::Pipes;
 
 /// A column is full when it misses at most its room over this.
@@ -49,7 +50,7 @@ pub(super) struct Edge {
 }
 
 /// The network of a step.
-#[derive(Debug, Clone, Default)]
+#[derive(Debug, Clone)]
 pub struct Network {
     /// Full columns first, then those at the other ends of their pipes.
     pub(super) parties: Vec<Party>,
@@ -58,7 +59,7 @@ pub struct Network {
     /// Party of each column, or [`NONE`].
     party_of: Vec<u32>,
     /// Head over the surface of each column in the last step (units).
-    pub(super) over: Vec<f32>,
+    pub(super) over: PerColumn<f32>,
     /// The network's pipes, sorted.
     shut_east: Vec<u32>,
     shut_south: Vec<u32>,
@@ -93,14 +94,14 @@ impl Network {
             shut_links: Vec::with_capacity(room),
             moves: Vec::with_capacity(room),
             party_of: vec![NONE; columns],
-            over: vec![0.0; columns],
+            over: PerColumn::new(Array::Head, columns, 0.0),
         }
     }
 
     /// Gives a part of the columns another count of indices; what they hold is then left over from before.
     pub(super) fn resize_part(&mut self, part: std::ops::Range<usize>, len: usize) {
         self.clear();
-        resize_part(&mut self.over, part, len, 0.0);
+        self.over.resize_part(part, len, 0.0);
         self.party_of.resize(self.over.len(), NONE);
     }
 
@@ -116,7 +117,7 @@ impl Network {
 
     /// Memory that does not depend on full columns (bytes).
     pub fn bytes(&self) -> usize {
-        size_of_val(&self.party_of[..]) + size_of_val(&self.over[..])
+        size_of_val(&self.party_of[..]) + self.over.bytes()
     }
 
     /// Whether there is no full column.
@@ -357,7 +358,12 @@ impl Network {
     }
 
     /// Puts the fluxes of the network in place, after the rest of the step.
-    pub fn put_back(&self, flux: &mut [Vec<f32>; 2], left: &mut [Vec<f32>; 2], links: &mut LinkFlow) {
+    pub fn put_back(
+        &self,
+        flux: &mut [PerColumn<f32>; 2],
+        left: &mut [PerColumn<f32>; 2],
+        links: &mut LinkFlow,
+    ) {
         let ([flux_east, flux_south], [left_east, left_south]) = (flux, left);
         for edge in &self.edges {
             match edge.ends {

@@ -80,7 +80,12 @@ impl Copy {
         Part {
             start,
             first_link,
-            ..Part::new(&mut self.depth, &mut self.flux, &mut self.left, &mut self.links)
+            ..Part::new(
+                &mut self.depth,
+                self.flux.each_mut().map(Vec::as_mut_slice),
+                self.left.each_mut().map(Vec::as_mut_slice),
+                &mut self.links,
+            )
         }
     }
 }
@@ -94,17 +99,16 @@ impl<'a> Part<'a> {
     /// All of a liquid.
     pub fn new(
         depth: &'a mut [i32],
-        flux: &'a mut [Vec<f32>; 2],
-        left: &'a mut [Vec<f32>; 2],
+        flux: [&'a mut [f32]; 2],
+        left: [&'a mut [f32]; 2],
         links: &'a mut LinkFlow,
     ) -> Self {
-        let ([flux_east, flux_south], [left_east, left_south]) = (flux, left);
         Self {
             start: 0,
             first_link: 0,
             depth,
-            flux: [flux_east, flux_south],
-            left: [left_east, left_south],
+            flux,
+            left,
             links: LinkPart { flux: &mut links.flux, left: &mut links.left, transfer: &mut links.transfer },
         }
     }

@@ -8,7 +8,7 @@
 use super::active::Active;
 use super::buffers::{RING, Rows, SWEEPS};
 use super::fast::Fast;
-use super::flux::{Kind, Of, Row, Step, flux_row, greater, lesser};
+use super::flux::{Carried, Kind, Of, Row, Step, flux_row, greater, lesser};
 use super::links::{Outside, indices_of};
 use super::network::Network;
 use super::parts::Parts;
@@ -35,11 +35,25 @@ pub struct Ground<'a> {
     pub may_fill: &'a [bool],
 }
 
+impl Ground<'_> {
+    /// Whether there is nothing to do in a row.
+    #[inline(always)]
+    fn is_idle(&self, row: usize) -> bool {
+        let links = &self.pipes.links;
+        row >= self.columns.grid.size[1]
+            || self.active.row(row).is_empty()
+                && links.row(row).is_empty()
+                && links.columns_of(row).is_empty()
+                && self.network.is_empty()
+    }
+}
+
 /// What a band of a step did.
 #[derive(Debug, Clone, Default)]
 pub struct Stepped {
-    /// Rows with columns that would have given more than they have, and with such that would have taken more than there is room for.
-    pub scaled: [u32; 2],
+    /// Rows with columns that would have given more than they have, with such that would have taken more than there is room for, and with fast
+    /// films that were held back.
+    pub scaled: [u32; 3],
     /// What went out of the domain.
     pub outside: Outside,
     /// Strips that got wet.
@@ -88,9 +102,19 @@ impl Rows {
         let behind = if ground.may_fill.contains(&true) { 1 + SWEEPS } else { 1 };
         let own = parts.rows.clone();
         let start = own.start.saturating_sub(1 + behind);
+        let mut idle = 0;
         for front in start..own.end + behind {
+            idle = if ground.is_idle(front) { idle + 1 } else { 0 };
+            if idle > behind + 1 {
+                self.ring[front % RING].clear();
+                if let Some(row) = front.checked_sub(behind).filter(|row| own.contains(row)) {
+                    deepest[row - own.start] = 0;
+                }
+                continue;
+            }
             if front < count {
-                self.drive::<K>(step, ground, parts, front);
+                let is_held = self.drive::<K>(step, ground, parts, front);
+                stepped.scaled[2] += u32::from(is_held && own.contains(&front));
                 if !ground.network.is_empty() {
                     self.shut(ground, parts, front);
                 }
@@ -119,17 +143,17 @@ impl Rows {
         }
     }
 
-    /// Fluxes of a row's pipes.
+    /// Fluxes of a row's pipes; whether fast films were held back.
     #[inline(always)]
-    fn drive<K: Kind>(&mut self, step: &Step, ground: &Ground, parts: &mut Parts, row: usize) {
+    fn drive<K: Kind>(&mut self, step: &Step, ground: &Ground, parts: &mut Parts, row: usize) -> bool {
         let Ground { columns, pipes, active, fast, .. } = ground;
         let (light, is_fast) = (fast.light(), fast.row(row));
         let start = columns.row(row).start * STRIP;
         let buffer = &mut self.ring[row % RING];
-        (buffer.is_less, buffer.is_full) = (false, false);
+        buffer.clear();
         let (own, beyond) = parts.both(row);
-        let [flux_east, flux_south] = &mut own.flux;
-        let mut end = 0;
+        let ([flux_east, flux_south], [left_east, left_south]) = (&mut own.flux, &mut own.left);
+        let (mut end, mut is_held) = (0, false);
         for span in active.row(row) {
             let at = PAD + span.first as usize - start;
             if at != end {
@@ -157,18 +181,19 @@ impl Rows {
                     depth: if place < cut { depth } else { &last },
                     south_base: &columns.bases()[south..],
                     south_depth,
-                    open_east: &pipes.east[first..],
-                    open_south: &pipes.south[first..],
-                    left_east: &own.left[0][mine..],
-                    left_south: &own.left[1][mine..],
+                    open: [&pipes.east[first..], &pipes.south[first..]],
                     light: &light[first..],
                 };
-                let flux = (&mut flux_east[mine..mine + len], &mut flux_south[mine..mine + len]);
-                let to = (&mut buffer.east[at..at + len], &mut buffer.south[at..at + len]);
+                let (mine, at) = (mine..mine + len, at..at + len);
+                let carried = Carried {
+                    flux: [&mut flux_east[mine.clone()], &mut flux_south[mine.clone()]],
+                    left: [&mut left_east[mine.clone()], &mut left_south[mine]],
+                    transfer: [&mut buffer.east[at.clone()], &mut buffer.south[at]],
+                };
                 if K::VISCOUS && !K::WHOLE && is_fast {
-                    flux_row::<K, true>(step, &row, flux.0, flux.1, to.0, to.1);
+                    is_held |= flux_row::<K, true>(step, &row, carried);
                 } else {
-                    flux_row::<K, false>(step, &row, flux.0, flux.1, to.0, to.1);
+                    flux_row::<K, false>(step, &row, carried);
                 }
             }
         }
@@ -181,6 +206,7 @@ impl Rows {
             };
             own.links.drive::<K>(step, columns, &pipes.links, (row, first_link), depth);
         }
+        is_held
     }
 
     /// What the network moves, behind the fluxes of all pipes of a row.
@@ -404,19 +430,17 @@ impl Rows {
             self.ring.get_disjoint_mut([row % RING, (row + RING - 1) % RING]).expect("two rows");
         let place = Place::new(ground.columns, row);
         let part = parts.of(row);
-        let [left_east, left_south] = &mut part.left;
-        let mut deepest = 0;
+        let mut deepest = [0; STRIP];
         for span in ground.active.row(row) {
             let (mine, len) = (span.first as usize - part.start, span.len as usize);
             let around = place.around(&own.east, &own.south, &north.south, &self.zeros, span);
             let depth = &mut part.depth[mine..mine + len];
-            let left = (&mut left_east[mine..mine + len], &mut left_south[mine..mine + len]);
-            deepest = move_units(&around, depth, left.0, left.1).max(deepest);
+            move_units(&around, depth, &mut deepest);
             let strip = span.first / STRIP as u32;
             let wet = &ground.active.wet()[strip as usize..];
             find_wet(depth, wet, |place| woken.push(strip + place as u32));
         }
-        deepest
+        deepest.into_iter().fold(0, i32::max)
     }
 }
 

@@ -5,6 +5,7 @@
 //! sweeps, from below, so that it is safe after each.
 
 use super::flux::{greater, lesser};
+use crate::shallow::columns::{STRIP, strip_from, strip_mut, strip_of};
 
 /// Depths and room are counted as this much less, and sums of four or more rounded transfers stay within them.
 pub const MARGIN: f32 = 1.0 - 1.0 / (1u32 << 20) as f32;
@@ -19,6 +20,14 @@ pub struct Around<'a> {
     pub south: &'a [f32],
     /// From the north.
     pub north: &'a [f32],
+}
+
+impl<'a> Around<'a> {
+    /// Those of a strip of the span: to the east, from the west, to the south, and from the north.
+    #[inline(always)]
+    pub fn strip(&self, strip: usize) -> [&'a [f32; STRIP]; 4] {
+        [self.east, self.west, self.south, self.north].map(|numbers| strip_of(numbers, strip))
+    }
 }
 
 /// One number of the columns of a span, and of those around them.
@@ -38,30 +47,46 @@ fn spare(depth: i32) -> f32 {
 /// Sums what is to leave each column; whether it is more than the column has anywhere.
 #[inline(always)]
 pub fn outflow(depth: &[i32], around: &Around, out: &mut [f32]) -> bool {
-    let count = out.len();
-    let (depth, east, west) = (&depth[..count], &around.east[..count], &around.west[..count]);
-    let (south, north) = (&around.south[..count], &around.north[..count]);
-    let mut over = false;
-    for x in 0..count {
+    let mut over = [0; STRIP];
+    for strip in 0..out.len() / STRIP {
+        outflow_of(strip_of(depth, strip), &around.strip(strip), strip_mut(out, strip), &mut over);
+    }
+    over != [0; STRIP]
+}
+
+#[inline(always)]
+fn outflow_of(
+    depth: &[i32; STRIP],
+    around: &[&[f32; STRIP]; 4],
+    out: &mut [f32; STRIP],
+    over: &mut [i32; STRIP],
+) {
+    let [east, west, south, north] = around;
+    for x in 0..STRIP {
         let along = greater(east[x], 0.0) - lesser(west[x], 0.0);
         let across = greater(south[x], 0.0) - lesser(north[x], 0.0);
         out[x] = along + across;
-        over |= out[x] > spare(depth[x]);
+        over[x] |= i32::from(out[x] > spare(depth[x]));
     }
-    over
 }
 
 /// Turns what is to leave each column into K_min; returns the least.
 #[inline(always)]
 pub fn least(depth: &[i32], out: &mut [f32]) -> f32 {
-    let depth = &depth[..out.len()];
-    let mut least = 1.0;
-    for x in 0..out.len() {
+    let mut least = [1.0; STRIP];
+    for strip in 0..out.len() / STRIP {
+        least_of(strip_of(depth, strip), strip_mut(out, strip), &mut least);
+    }
+    least.into_iter().fold(1.0, lesser)
+}
+
+#[inline(always)]
+fn least_of(depth: &[i32; STRIP], out: &mut [f32; STRIP], least: &mut [f32; STRIP]) {
+    for x in 0..STRIP {
         let spare = spare(depth[x]);
         out[x] = if out[x] > spare { spare / out[x] } else { 1.0 };
-        least = lesser(out[x], least);
+        least[x] = lesser(out[x], least[x]);
     }
-    least
 }
 
 /// Multiplies transfers and fluxes by K_min of the columns that give.
@@ -97,26 +122,43 @@ fn scale(
     flux_south: &mut [f32],
     takes_own: impl Fn(f32) -> bool,
 ) {
-    let count = east.len();
-    let (own, beyond, south) = (&factor.own[..count + 1], &factor.south[..count], &mut south[..count]);
-    let (flux_east, flux_south) = (&mut flux_east[..count], &mut flux_south[..count]);
-    for x in 0..count {
-        let k = if takes_own(east[x]) { own[x] } else { own[x + 1] };
-        east[x] *= k;
-        flux_east[x] *= k;
-        let k = if takes_own(south[x]) { own[x] } else { beyond[x] };
-        south[x] *= k;
-        flux_south[x] *= k;
+    for strip in 0..east.len() / STRIP {
+        let own = strip_of(factor.own, strip);
+        let factors = [own, strip_from(factor.own, strip * STRIP + 1)];
+        scale_strip(factors, strip_mut(east, strip), strip_mut(flux_east, strip), &takes_own);
+        let factors = [own, strip_of(factor.south, strip)];
+        scale_strip(factors, strip_mut(south, strip), strip_mut(flux_south, strip), &takes_own);
+    }
+}
+
+#[inline(always)]
+fn scale_strip(
+    [own, other]: [&[f32; STRIP]; 2],
+    transfer: &mut [f32; STRIP],
+    flux: &mut [f32; STRIP],
+    takes_own: impl Fn(f32) -> bool,
+) {
+    for x in 0..STRIP {
+        let k = if takes_own(transfer[x]) { own[x] } else { other[x] };
+        // What moves nothing has neither giver nor taker.
+        let k = if transfer[x] == 0.0 { 1.0 } else { k };
+        transfer[x] *= k;
+        flux[x] *= k;
     }
 }
 
 /// Sums what is to come into each column.
 #[inline(always)]
 pub fn inflow(around: &Around, into: &mut [f32]) {
-    let count = into.len();
-    let (east, west) = (&around.east[..count], &around.west[..count]);
-    let (south, north) = (&around.south[..count], &around.north[..count]);
-    for x in 0..count {
+    for strip in 0..into.len() / STRIP {
+        inflow_of(&around.strip(strip), strip_mut(into, strip));
+    }
+}
+
+#[inline(always)]
+fn inflow_of(around: &[&[f32; STRIP]; 4], into: &mut [f32; STRIP]) {
+    let [east, west, south, north] = around;
+    for x in 0..STRIP {
         let along = greater(west[x], 0.0) - lesser(east[x], 0.0);
         let across = greater(north[x], 0.0) - lesser(south[x], 0.0);
         into[x] = along + across;
@@ -138,12 +180,18 @@ pub fn most(into: f32, room: f32) -> f32 {
 /// Turns what is to come into each column into K_max, as if nothing left; returns the least.
 #[inline(always)]
 pub fn find_most(base: &[i32], ceiling: &[i32], depth: &[i32], into: &mut [f32]) -> f32 {
-    let count = into.len();
-    let (base, ceiling, depth) = (&base[..count], &ceiling[..count], &depth[..count]);
-    let mut least = 1.0;
-    for x in 0..count {
-        into[x] = most(into[x], room(base[x], ceiling[x], depth[x]));
-        least = lesser(into[x], least);
+    let mut least = [1.0; STRIP];
+    for strip in 0..into.len() / STRIP {
+        let columns = [base, ceiling, depth].map(|numbers| strip_of(numbers, strip));
+        most_of(columns, strip_mut(into, strip), &mut least);
     }
-    least
+    least.into_iter().fold(1.0, lesser)
+}
+
+#[inline(always)]
+fn most_of([base, ceiling, depth]: [&[i32; STRIP]; 3], into: &mut [f32; STRIP], least: &mut [f32; STRIP]) {
+    for x in 0..STRIP {
+        into[x] = most(into[x], room(base[x], ceiling[x], depth[x]));
+        least[x] = lesser(into[x], least[x]);
+    }
 }

@@ -3,7 +3,7 @@
 //! Without it thin films freeze: blood of 1 um on a slope of 0.5 moves 0.03 units a step.
 
 use super::scale::Around;
-use crate::shallow::columns::STRIP;
+use crate::shallow::columns::{STRIP, strip_mut};
 
 /// The integer part of a transfer (units), toward zero.
 ///
@@ -16,29 +16,23 @@ pub unsafe fn whole(transfer: f32) -> i32 {
     unsafe { transfer.to_int_unchecked() }
 }
 
-/// What is left of a transfer (`flux::rounded`) behind its integer part.
+/// Moves what the pipes of a span transfer; `deepest`, of the places of a strip, grows to the greatest new depths there.
 #[inline(always)]
-pub fn left(transfer: f32, whole: i32) -> f32 {
-    if transfer == 0.0 { 0.0 } else { transfer - whole as f32 - 0.5f32.copysign(transfer) }
+pub fn move_units(around: &Around, depth: &mut [i32], deepest: &mut [i32; STRIP]) {
+    for strip in 0..depth.len() / STRIP {
+        move_strip(&around.strip(strip), strip_mut(depth, strip), deepest);
+    }
 }
 
-/// Moves what the pipes of a span transfer; returns the greatest new depth. `left_east` and `left_south` receive what truncation leaves.
 #[inline(always)]
-pub fn move_units(around: &Around, depth: &mut [i32], left_east: &mut [f32], left_south: &mut [f32]) -> i32 {
-    let count = depth.len();
-    let (east, west) = (&around.east[..count], &around.west[..count]);
-    let (south, north) = (&around.south[..count], &around.north[..count]);
-    let (left_east, left_south) = (&mut left_east[..count], &mut left_south[..count]);
-    let mut deepest = 0;
-    for x in 0..count {
+fn move_strip(around: &[&[f32; STRIP]; 4], depth: &mut [i32; STRIP], deepest: &mut [i32; STRIP]) {
+    let [east, west, south, north] = around;
+    for x in 0..STRIP {
         // SAFETY: all four were scaled by K, or need not be: they are within the depth of the column that gives.
         let [e, w, s, n] = unsafe { [whole(east[x]), whole(west[x]), whole(south[x]), whole(north[x])] };
-        left_east[x] = left(east[x], e);
-        left_south[x] = left(south[x], s);
         depth[x] += (w - e) + (n - s);
-        deepest = depth[x].max(deepest);
+        deepest[x] = depth[x].max(deepest[x]);
     }
-    deepest
 }
 
 /// Calls `got_wet` with the place of each strip that has liquid and was dry.

@@ -10,6 +10,7 @@ mod slopes;
 use std::ops::Range;
 
 use crate::shallow::columns::{Columns, NONE, STRIP, resize_part};
+use crate::shallow::per_column::{Array, PerColumn};
 use joints::{Finder, Side};
 
 /// What lies beyond the border of the domain.
@@ -49,12 +50,12 @@ pub struct Links {
 }
 
 /// All pipes of a terrain.
-#[derive(Debug, Clone, Default, PartialEq)]
+#[derive(Debug, Clone, PartialEq)]
 pub struct Pipes {
     /// Openness of the pipe from each index to the next along x: 0 where there is none.
-    pub east: Vec<f32>,
+    pub east: PerColumn<f32>,
     /// Openness of the pipe from each index to the one behind it along z.
-    pub south: Vec<f32>,
+    pub south: PerColumn<f32>,
     /// All others.
     pub links: Links,
 }
@@ -63,8 +64,8 @@ impl Pipes {
     /// The pipes between columns, and over the border of the domain.
     pub fn new(columns: &Columns, border: Border) -> Self {
         let mut pipes = Self {
-            east: vec![0.0; columns.len()],
-            south: vec![0.0; columns.len()],
+            east: PerColumn::new(Array::OpenEast, columns.len(), 0.0),
+            south: PerColumn::new(Array::OpenSouth, columns.len(), 0.0),
             links: Links { rows: vec![0], ..Links::default() },
         };
         let (rows, open) = (0..columns.grid.size[1], [&mut pipes.east[..], &mut pipes.south[..]]);
@@ -80,7 +81,7 @@ impl Pipes {
         let numbers = size_of_val(&links.open[..]) + size_of_val(&links.level[..]);
         let lists = [&links.rows, &links.columns, &links.column_rows];
         let lists: usize = lists.iter().map(|list| size_of_val(&list[..])).sum();
-        size_of_val(&self.east[..]) + size_of_val(&self.south[..]) + ends + numbers + lists
+        self.east.bytes() + self.south.bytes() + ends + numbers + lists
     }
 }
 

@@ -17,7 +17,7 @@ mod tests;
 use std::ops::Range;
 
 use super::Shallow;
-use super::columns::{STRIP, resize_part};
+use super::columns::STRIP;
 use super::identity::Identity;
 use super::pipes::joints::Finder;
 use super::pipes::{Ends, Links};
@@ -192,7 +192,7 @@ impl Shallow {
         let (old, len) = (band.range(), strips.len() * STRIP);
         let old = old.start * STRIP..old.end * STRIP;
         for open in [&mut pipes.east, &mut pipes.south] {
-            resize_part(open, old.clone(), len, 0.0);
+            open.resize_part(old.clone(), len, 0.0);
         }
         flow.resize_part(old, len);
         let displaced = layout.lay(&change, columns, &mut flow.depth, origins, held);

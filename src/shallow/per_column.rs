@@ -1,0 +1,179 @@
+//! Numbers by column index, placed in memory so that those of one column do not get into each other's way.
+//!
+//! A step reads and writes a dozen arrays at once. Where these begin at about the same place of a page, as large ones do that come from the system, they
+//! compete for a few sets of the first cache, and a read is taken for one of what has just been written elsewhere: a step then takes up to a quarter longer.
+
+use std::ops::{Deref, DerefMut, Range};
+
+/// Bytes after which places in the first cache, and in the tests for reads of what has just been written, come again.
+const PAGE: usize = 4096;
+/// Bytes of a line of the cache.
+const LINE: usize = 64;
+
+/// What the numbers are: each array begins at a place of a page of its own.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Array {
+    /// b.
+    Base,
+    /// H.
+    Depth,
+    /// Openness of pipes.
+    OpenEast,
+    OpenSouth,
+    /// Fluxes.
+    FluxEast,
+    FluxSouth,
+    /// What transfers left.
+    LeftEast,
+    LeftSouth,
+    /// How much less inertia counts.
+    Light,
+    /// Heads of full columns.
+    Head,
+    /// max.
+    Ceiling,
+    /// min.
+    Under,
+}
+
+impl Array {
+    /// Where in a page it begins (bytes).
+    const fn place(self) -> usize {
+        let count = Self::Under as usize + 1;
+        self as usize * (PAGE / count / LINE * LINE)
+    }
+}
+
+/// One number for each column index; a slice of them.
+#[derive(Debug)]
+pub struct PerColumn<T> {
+    array: Array,
+    /// Others before the first, so that this one is at its place.
+    before: usize,
+    list: Vec<T>,
+}
+
+impl<T: Copy> PerColumn<T> {
+    /// So many of the same.
+    pub fn new(array: Array, len: usize, fill: T) -> Self {
+        let mut new = Self { array, before: 0, list: Vec::new() };
+        new.resize(len, fill);
+        new
+    }
+
+    /// Changes their count.
+    pub fn resize(&mut self, len: usize, fill: T) {
+        self.make_room(len, fill);
+        self.list.resize(self.before + len, fill);
+    }
+
+    /// Gives a part of them another length; what it then holds is left over from before.
+    pub fn resize_part(&mut self, part: Range<usize>, len: usize, fill: T) {
+        let (count, end) = (self.len(), part.start + len);
+        if end > part.end {
+            self.resize(count + (end - part.end), fill);
+        }
+        self.copy_within(part.end..count, end);
+        self.list.truncate(self.before + count - part.len() + len);
+    }
+
+    /// Memory (bytes).
+    pub fn bytes(&self) -> usize {
+        self.list.capacity() * size_of::<T>()
+    }
+
+    /// Moves them where there is room for so many, at the right place.
+    fn make_room(&mut self, len: usize, fill: T) {
+        let room = self.list.capacity();
+        if room > 0 && self.before + len <= room {
+            return;
+        }
+        // Twice as much as before, as a list would.
+        let len = if room > 0 { len.max(2 * (room - self.before)) } else { len };
+        let mut list = Vec::with_capacity(len + PAGE / size_of::<T>());
+        let at = <*const T>::addr(list.as_ptr());
+        let before = self.array.place().wrapping_sub(at) % PAGE / size_of::<T>();
+        list.resize(before, fill);
+        list.extend_from_slice(self);
+        (self.before, self.list) = (before, list);
+    }
+}
+
+impl<T> Deref for PerColumn<T> {
+    type Target = [T];
+
+    #[inline(always)]
+    fn deref(&self) -> &[T] {
+        &self.list[self.before..]
+    }
+}
+
+impl<T> DerefMut for PerColumn<T> {
+    #[inline(always)]
+    fn deref_mut(&mut self) -> &mut [T] {
+        &mut self.list[self.before..]
+    }
+}
+
+impl<T: Copy> Clone for PerColumn<T> {
+    fn clone(&self) -> Self {
+        let mut new = Self { array: self.array, before: 0, list: Vec::new() };
+        new.clone_from(self);
+        new
+    }
+
+    /// Allocates nothing where there is room.
+    fn clone_from(&mut self, other: &Self) {
+        let Some(&any) = other.first() else { return self.list.truncate(self.before) };
+        self.make_room(other.len(), any);
+        self.list.truncate(self.before);
+        self.list.extend_from_slice(other);
+    }
+}
+
+impl<T: PartialEq> PartialEq for PerColumn<T> {
+    fn eq(&self, other: &Self) -> bool {
+        self[..] == other[..]
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn place<T>(numbers: &PerColumn<T>) -> usize {
+        numbers.as_ptr().addr() % PAGE
+    }
+
+    #[test]
+    fn arrays_begin_at_places_of_their_own_however_they_grow() {
+        for array in [Array::Base, Array::FluxSouth, Array::Under] {
+            let mut numbers = PerColumn::new(array, 100, 1.0_f32);
+            for len in [101, 5000, 3, 100_000] {
+                numbers.resize(len, 2.0);
+                assert_eq!((numbers.len(), place(&numbers)), (len, array.place()));
+            }
+            assert_eq!((numbers[2], numbers[3]), (1.0, 2.0));
+            let copy = numbers.clone();
+            assert_eq!((place(&copy), copy == numbers), (array.place(), true));
+        }
+        let places = [Array::Base.place(), Array::Depth.place(), Array::Under.place()];
+        assert_eq!(places, [0, 320, 11 * 320]);
+    }
+
+    #[test]
+    fn a_part_gets_another_length() {
+        let mut numbers = PerColumn::new(Array::Depth, 6, 0);
+        numbers.copy_from_slice(&[0, 1, 2, 3, 4, 5]);
+        numbers.resize_part(2..4, 3, 9);
+        assert_eq!((numbers[..2].to_vec(), numbers[5..].to_vec()), (vec![0, 1], vec![4, 5]));
+        numbers.resize_part(2..5, 0, 9);
+        assert_eq!(numbers[..], [0, 1, 4, 5]);
+        let mut other = PerColumn::new(Array::Head, 1000, 7);
+        let room = other.bytes();
+        other.clone_from(&numbers);
+        assert_eq!((&other[..], other.bytes()), (&numbers[..], room));
+        other.clone_from(&PerColumn::new(Array::Head, 0, 0));
+        assert!(other.is_empty());
+    }
+}
