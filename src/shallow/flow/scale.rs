@@ -98,7 +98,7 @@ pub fn shrink(
     flux_east: &mut [f32],
     flux_south: &mut [f32],
 ) {
-    scale(least, east, south, flux_east, flux_south, |transfer| transfer > 0.0);
+    scale(least, east, south, flux_east, flux_south, |own, other| [own, other]);
 }
 
 /// Multiplies transfers and fluxes by K_max of the columns that take.
@@ -110,9 +110,10 @@ pub fn fit(
     flux_east: &mut [f32],
     flux_south: &mut [f32],
 ) {
-    scale(most, east, south, flux_east, flux_south, |transfer| transfer < 0.0);
+    scale(most, east, south, flux_east, flux_south, |own, other| [other, own]);
 }
 
+/// Multiplies by the factors that `order` puts first where liquid flows away from a column, and by the others where it flows towards it.
 #[inline(always)]
 fn scale(
     factor: &Beside,
@@ -120,28 +121,24 @@ fn scale(
     south: &mut [f32],
     flux_east: &mut [f32],
     flux_south: &mut [f32],
-    takes_own: impl Fn(f32) -> bool,
+    order: impl for<'a> Fn(&'a [f32; STRIP], &'a [f32; STRIP]) -> [&'a [f32; STRIP]; 2],
 ) {
     for strip in 0..east.len() / STRIP {
         let own = strip_of(factor.own, strip);
-        let factors = [own, strip_from(factor.own, strip * STRIP + 1)];
-        scale_strip(factors, strip_mut(east, strip), strip_mut(flux_east, strip), &takes_own);
-        let factors = [own, strip_of(factor.south, strip)];
-        scale_strip(factors, strip_mut(south, strip), strip_mut(flux_south, strip), &takes_own);
+        let factors = order(own, strip_from(factor.own, strip * STRIP + 1));
+        scale_strip(factors, strip_mut(east, strip), strip_mut(flux_east, strip));
+        let factors = order(own, strip_of(factor.south, strip));
+        scale_strip(factors, strip_mut(south, strip), strip_mut(flux_south, strip));
     }
 }
 
 #[inline(always)]
-fn scale_strip(
-    [own, other]: [&[f32; STRIP]; 2],
-    transfer: &mut [f32; STRIP],
-    flux: &mut [f32; STRIP],
-    takes_own: impl Fn(f32) -> bool,
-) {
+fn scale_strip([away, towards]: [&[f32; STRIP]; 2], transfer: &mut [f32; STRIP], flux: &mut [f32; STRIP]) {
     for x in 0..STRIP {
-        let k = if takes_own(transfer[x]) { own[x] } else { other[x] };
         // What moves nothing has neither giver nor taker.
-        let k = if transfer[x] == 0.0 { 1.0 } else { k };
+        let (away, towards) = (away[x], towards[x]);
+        let k = if transfer[x] > 0.0 { away } else { 1.0 };
+        let k = if transfer[x] < 0.0 { towards } else { k };
         transfer[x] *= k;
         flux[x] *= k;
     }
