@@ -5,6 +5,7 @@ use std::sync::atomic::{AtomicBool, Ordering};
 
 use super::buffers::Rows;
 use super::flux::Step;
+use super::network::SLACK;
 use super::parts::{BEYOND, Copy, Part, Parts};
 use super::rows::{Ground, Stepped};
 use crate::shallow::columns::{Columns, STRIP, strip_of};
@@ -24,6 +25,13 @@ struct Band {
     stepped: Stepped,
 }
 
+/// For each row, whether it has columns that might fill up to their ceiling in a step, and whether it might have such that are full.
+#[derive(Clone, Copy)]
+pub struct Filling<'a> {
+    pub may_fill: &'a [bool],
+    pub may_be_full: &'a [bool],
+}
+
 /// The bands of a domain.
 #[derive(Debug, Clone)]
 pub struct Bands {
@@ -34,6 +42,8 @@ pub struct Bands {
     deepest: Vec<i32>,
     /// Whether columns of each row might fill up to their ceiling in this step.
     may_fill: Vec<bool>,
+    /// Whether they might be full.
+    may_be_full: Vec<bool>,
     /// A column takes at most so many times the greatest depth beside it, with its own.
     takes: i64,
 }
@@ -47,6 +57,7 @@ impl Bands {
             clearance: (0..count).map(|row| clearance(columns, row)).collect(),
             deepest: vec![0; count],
             may_fill: vec![false; count],
+            may_be_full: vec![false; count],
             takes: pipes as i64 + 1,
         };
         bands.divide(columns, 1);
@@ -57,7 +68,7 @@ impl Bands {
     pub fn bytes(&self) -> usize {
         let woken = |band: &Band| band.stepped.woken.capacity() * size_of::<u32>();
         let bands: usize = self.list.iter().map(|band| band.buffers.bytes() + woken(band)).sum();
-        bands + size_of_val(&self.clearance[..]) + size_of_val(&self.deepest[..]) + self.may_fill.len()
+        bands + size_of_val(&self.clearance[..]) + size_of_val(&self.deepest[..]) + 2 * self.may_fill.len()
     }
 
     /// Divides the rows among so many threads, by their columns; unless they are already.
@@ -132,9 +143,9 @@ impl Bands {
         &mut self.deepest
     }
 
-    /// Whether columns of each row might fill up in this step.
-    pub fn filling(&self) -> &[bool] {
-        &self.may_fill
+    /// Rows that [`Bands::find_filling`] has found.
+    pub fn filling(&self) -> Filling<'_> {
+        Filling { may_fill: &self.may_fill, may_be_full: &self.may_be_full }
     }
 
     /// Finds the rows with columns that might fill up; whether there is one.
@@ -144,6 +155,7 @@ impl Bands {
             let around = row.saturating_sub(1)..(row + 2).min(self.deepest.len());
             let deepest = self.deepest[around].iter().copied().max().unwrap_or(0);
             self.may_fill[row] = self.takes * i64::from(deepest) > i64::from(self.clearance[row]);
+            self.may_be_full[row] = self.deepest[row] >= self.clearance[row] - self.clearance[row] / SLACK;
             any |= self.may_fill[row];
         }
         any

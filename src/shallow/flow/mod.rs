@@ -95,7 +95,7 @@ impl Flow {
             links: LinkFlow::new(&pipes.links),
             active: Active::new(columns, &pipes.links),
             bands: Bands::new(columns, pipes.links.most),
-            network: Network::new(columns.len()),
+            network: Network::new(columns.len(), columns.grid.size[1]),
             last: 1.0,
             fast: Fast::new(columns.len() + STRIP, columns.grid.size[1]),
         }
@@ -208,7 +208,7 @@ impl Flow {
         for strip in columns.row(rows.start).start..columns.row(rows.end - 1).end {
             if !active.active()[strip] {
                 flux.iter_mut().chain(&mut *left).for_each(|flow| strip_mut(flow, strip).fill(0.0));
-                strip_mut(network.over_mut(), strip).fill(0.0);
+                network.dry(strip * STRIP..(strip + 1) * STRIP);
             }
         }
     }
@@ -221,7 +221,7 @@ impl Flow {
             for numbers in [&mut *east, &mut *south, &mut *left_east, &mut *left_south] {
                 numbers[asleep.clone()].fill(0.0);
             }
-            self.network.over_mut()[asleep].fill(0.0);
+            self.network.dry(asleep);
         });
     }
 

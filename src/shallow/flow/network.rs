@@ -5,17 +5,20 @@
 //! depend on their order. The pipes of full columns form the *network*. What it moves is found before the fluxes of all others, and put in place behind
 //! them: all come from the same surface, or waves would grow. A head below the surface would be suction: such a column gives as if it were free.
 
+use std::ops::Range;
+
+use super::bands::Filling;
 use super::flux::Step;
 use super::heads::{EQUAL, Node};
 use super::links::LinkFlow;
 use super::rounds::{self, Party};
-use crate::shallow::columns::{Columns, NONE, STRIP};
+use crate::shallow::columns::{Columns, NONE, STRIP, strip_mut, strip_of};
 use crate::shallow::grid::TOP;
 use crate::shallow::per_column::{Array, PerColumn};
 use crate::shallow::pipes::Pipes;
 
 /// A column is full when it misses at most its room over this.
-const SLACK: i32 = 128;
+pub const SLACK: i32 = 128;
 
 /// Columns of a network that there is room for from the beginning.
 const ROOM: usize = 1024;
@@ -60,6 +63,8 @@ pub struct Network {
     party_of: Vec<u32>,
     /// Head over the surface of each column in the last step (units).
     pub(super) over: PerColumn<f32>,
+    /// Whether a column of each row may have one.
+    has_heads: Vec<bool>,
     /// The network's pipes, sorted.
     shut_east: Vec<u32>,
     shut_south: Vec<u32>,
@@ -81,8 +86,8 @@ pub struct State<'a> {
 }
 
 impl Network {
-    /// No network, for so many column indices.
-    pub fn new(columns: usize) -> Self {
+    /// No network, for so many column indices and rows.
+    pub fn new(columns: usize, rows: usize) -> Self {
         // A tool that dips in floods some hundred columns: frames allocate nothing for them.
         let room = columns.min(ROOM);
         Self {
@@ -95,18 +100,21 @@ impl Network {
             moves: Vec::with_capacity(room),
             party_of: vec![NONE; columns],
             over: PerColumn::new(Array::Head, columns, 0.0),
+            has_heads: vec![false; rows],
         }
     }
 
     /// Gives a part of the columns another count of indices; what they hold is then left over from before.
-    pub(super) fn resize_part(&mut self, part: std::ops::Range<usize>, len: usize) {
+    pub(super) fn resize_part(&mut self, part: Range<usize>, len: usize) {
         self.clear();
+        self.has_heads.fill(true);
         self.over.resize_part(part, len, 0.0);
         self.party_of.resize(self.over.len(), NONE);
     }
 
     /// Heads over the surface (units) by column index: part of the state, as the next step's iterations begin with them.
     pub fn over_mut(&mut self) -> &mut [f32] {
+        self.has_heads.fill(true);
         &mut self.over
     }
 
@@ -117,7 +125,12 @@ impl Network {
 
     /// Memory that does not depend on full columns (bytes).
     pub fn bytes(&self) -> usize {
-        size_of_val(&self.party_of[..]) + self.over.bytes()
+        size_of_val(&self.party_of[..]) + self.over.bytes() + self.has_heads.len()
+    }
+
+    /// Columns that are dry have no heads.
+    pub fn dry(&mut self, columns: Range<usize>) {
+        self.over[columns].fill(0.0);
     }
 
     /// Whether there is no full column.
@@ -125,14 +138,18 @@ impl Network {
         self.nodes.is_empty()
     }
 
-    /// Finds the full columns of some rows, their heads and what flows through their pipes.
-    pub fn find(&mut self, step: &Step, columns: &Columns, pipes: &Pipes, rows: &[bool], state: &State) {
+    /// Finds the full columns of the rows that are filling, of which some may have full ones, their heads and what flows through their pipes.
+    pub fn find(&mut self, step: &Step, columns: &Columns, pipes: &Pipes, filling: Filling, state: &State) {
         self.clear();
-        self.find_full(columns, rows, state.depth);
+        for row in (0..filling.may_fill.len()).filter(|&row| filling.may_fill[row]) {
+            if filling.may_be_full[row] || self.has_heads[row] {
+                self.find_full(columns, row, state.depth);
+            }
+        }
         if self.nodes.is_empty() {
             return;
         }
-        self.connect(step, columns, pipes, rows, state);
+        self.connect(step, columns, pipes, filling.may_fill, state);
         self.find_heads(columns);
         self.flow(columns);
         rounds::settle(&mut self.parties, &mut self.edges);
@@ -151,20 +168,27 @@ impl Network {
         self.moves.clear();
     }
 
-    fn find_full(&mut self, columns: &Columns, rows: &[bool], depth: &[i32]) {
-        for row in (0..rows.len()).filter(|&row| rows[row]) {
-            let strips = columns.row(row);
-            for i in strips.start * STRIP..strips.end * STRIP {
-                let room = columns.ceilings()[i] - columns.bases()[i];
-                let is_full = depth[i] > 0 && columns.ceilings()[i] < TOP && room - depth[i] <= room / SLACK;
-                if is_full {
-                    self.add_party(columns, depth, i as u32);
-                    self.nodes.push(Node::new(f64::from(self.over[i])));
+    /// Finds the full columns of a row; all others have no head.
+    fn find_full(&mut self, columns: &Columns, row: usize, depth: &[i32]) {
+        let before = self.nodes.len();
+        for strip in columns.row(row) {
+            let numbers =
+                [columns.bases(), columns.ceilings(), depth].map(|numbers| strip_of(numbers, strip));
+            let is_full = full_of(numbers);
+            let over = strip_mut(&mut self.over, strip);
+            if is_full == [0; STRIP] && over.iter().fold(0, |any, over| any | over.to_bits()) == 0 {
+                continue;
+            }
+            for (column, is_full) in (strip * STRIP..).zip(is_full) {
+                if is_full == 0 {
+                    self.over[column] = 0.0;
                 } else {
-                    self.over[i] = 0.0;
+                    self.add_party(columns, depth, column as u32);
+                    self.nodes.push(Node::new(f64::from(self.over[column])));
                 }
             }
         }
+        self.has_heads[row] = self.nodes.len() > before;
     }
 
     fn add_party(&mut self, columns: &Columns, depth: &[i32], column: u32) -> u32 {
@@ -335,8 +359,8 @@ impl Network {
     /// Moves the network's units in a range of columns, and shuts its pipes there and in a range of links for the rest of the step.
     pub fn move_units(
         &self,
-        columns: &std::ops::Range<u32>,
-        links: &std::ops::Range<usize>,
+        columns: &Range<u32>,
+        links: &Range<usize>,
         mut change: impl FnMut(u32, i32),
         mut east: impl FnMut(u32),
         mut south: impl FnMut(u32),
@@ -346,7 +370,7 @@ impl Network {
         for (column, units) in self.moves[first..].iter().take_while(|(column, _)| *column < columns.end) {
             change(*column, *units);
         }
-        let within = |list: &[u32], range: std::ops::Range<u32>| {
+        let within = |list: &[u32], range: Range<u32>| {
             list.partition_point(|&at| at < range.start)..list.partition_point(|&at| at < range.end)
         };
         let range = within(&self.shut_east, columns.clone());
@@ -379,6 +403,17 @@ impl Network {
             (flux[at as usize], left[at as usize]) = (edge.flux as f32, edge.left as f32);
         }
     }
+}
+
+/// Which columns of a strip are full, of their bases, ceilings and depths.
+#[inline]
+fn full_of([base, ceiling, depth]: [&[i32; STRIP]; 3]) -> [i32; STRIP] {
+    let mut full = [0; STRIP];
+    for x in 0..STRIP {
+        let room = ceiling[x] - base[x];
+        full[x] = i32::from((depth[x] > 0) & (ceiling[x] < TOP) & (room - depth[x] <= room / SLACK));
+    }
+    full
 }
 
 /// The height of a pipe's section (units): the depth of the column that gave last, within the opening between both.
