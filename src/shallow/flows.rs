@@ -157,22 +157,35 @@ impl Flows {
         points: &[FlowPoint],
         which: impl Fn(usize) -> String,
     ) -> Result<()> {
-        let mut placed = Vec::with_capacity(points.len());
-        for (at, point) in points.iter().enumerate() {
-            point.validate().map_err(|error| Error::argument(format!("{}: {error}", which(at))))?;
-            let mut found = Vec::new();
-            point.find_columns(columns, &mut found);
-            if found.is_empty() {
-                let [x, y, z] = point.at;
-                return Err(Error::argument(format!(
-                    "{}: at ({x}, {y}, {z}) there is only solid, or it lies outside of the domain",
-                    which(at)
-                )));
-            }
-            placed.push(Placed { point: point.clone(), columns: found, waiting: 0.0, moved: 0 });
+        let placed = placed(columns, points, &which)?;
+        if let Some(at) = placed.iter().position(|placed| placed.columns.is_empty()) {
+            let [x, y, z] = points[at].at;
+            return Err(Error::argument(format!(
+                "{}: at ({x}, {y}, {z}) there is only solid, or it lies outside of the domain",
+                which(at)
+            )));
         }
         self.placed = placed;
         Ok(())
+    }
+
+    /// As [`Flows::set`], but a point that has no column rests until it does.
+    ///
+    /// # Errors
+    /// `Argument`: a number out of range.
+    pub(super) fn set_resting(
+        &mut self,
+        columns: &Columns,
+        points: &[FlowPoint],
+        which: impl Fn(usize) -> String,
+    ) -> Result<()> {
+        self.placed = placed(columns, points, &which)?;
+        Ok(())
+    }
+
+    /// Whether a point has no column now.
+    pub(super) fn is_resting(&self, point: usize) -> bool {
+        self.placed[point].columns.is_empty()
     }
 
     /// Moves a point, and finds its columns again.
@@ -232,6 +245,17 @@ impl Flows {
             *sum += placed.step(columns, flow, volume, time, dt);
         }
     }
+}
+
+/// Points on their columns, of which one may have none.
+fn placed(columns: &Columns, points: &[FlowPoint], which: &impl Fn(usize) -> String) -> Result<Vec<Placed>> {
+    let place = |(at, point): (usize, &FlowPoint)| {
+        point.validate().map_err(|error| Error::argument(format!("{}: {error}", which(at))))?;
+        let mut found = Vec::new();
+        point.find_columns(columns, &mut found);
+        Ok(Placed { point: point.clone(), columns: found, waiting: 0.0, moved: 0 })
+    };
+    points.iter().enumerate().map(place).collect()
 }
 
 impl Placed {

@@ -38,6 +38,19 @@ impl Shallow {
         self.flows.move_to(&self.columns, point, at);
     }
 
+    /// As [`Shallow::set_flows`], where the terrain has moved since the points were first set: one that finds no column rests until it does.
+    ///
+    /// # Errors
+    /// `Argument`: a number out of range.
+    pub fn set_flows_resting(&mut self, points: &[FlowPoint], which: impl Fn(usize) -> String) -> Result<()> {
+        self.flows.set_resting(&self.columns, points, which)
+    }
+
+    /// Whether a flow point rests, as it lies inside solid or outside of the domain.
+    pub fn is_resting(&self, point: usize) -> bool {
+        self.flows.is_resting(point)
+    }
+
     /// Gives a flow point another rate (m3/s): a valve. What it has moved, and how much an absorber holds, stays.
     ///
     /// # Errors

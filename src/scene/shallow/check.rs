@@ -92,10 +92,6 @@ pub fn check(ctx: &Context, scene: &Scene, inputs: &Inputs) -> Result<Report> {
     let course = Course::begin(ctx, (scene, of, inputs))?;
     let columns = course.liquid.columns();
     let (grid, heights) = (inputs.grid, inputs.heights);
-    for frame in frames.iter().skip(1) {
-        ctx.check()?;
-        inputs.terrain_at(of, frame)?;
-    }
     let [low, high] = inputs.bounds;
     let layers = (0..grid.cells()).map(|cell| inputs.solids.cell(cell).len());
     let void_cells = layers.clone().filter(|layers| *layers == 0).count();
@@ -105,6 +101,7 @@ pub fn check(ctx: &Context, scene: &Scene, inputs: &Inputs) -> Result<Report> {
     let frame_bytes = disk::frame(of.output, count as u64);
     let mut warnings = inputs.warnings.clone();
     warnings.extend(odd(of, inputs, &course, void_cells));
+    warnings.extend(later(ctx, scene, course)?);
     let triangles = inputs.triangles.unwrap_or(0) as u64;
     Ok(Report {
         frames: [frames.first, frames.last],
@@ -131,6 +128,25 @@ pub fn check(ctx: &Context, scene: &Scene, inputs: &Inputs) -> Result<Report> {
         warnings,
         settings: scene.values.by_path(),
     })
+}
+
+/// Goes through terrain, obstacles and points of all later frames; of points that then should act and rest, a sentence each.
+fn later(ctx: &Context, scene: &Scene, mut course: Course<'_>) -> Result<Vec<String>> {
+    // By their names: the first frame, and how many.
+    let mut resting: BTreeMap<String, (i32, usize)> = BTreeMap::new();
+    for frame in scene.shot.frames.iter().skip(1) {
+        ctx.check()?;
+        course.go_still()?;
+        for name in course.resting() {
+            resting.entry(name).or_insert((frame, 0)).1 += 1;
+        }
+    }
+    let told = |(name, (first, count)): (String, (i32, usize))| {
+        format!(
+            "{name} lies inside solid or outside of the area, and rests, at {count} frames, the first of them {first}"
+        )
+    };
+    Ok(resting.into_iter().map(told).collect())
 }
 
 /// Liquid that comes after the first frame (m3).

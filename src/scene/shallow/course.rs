@@ -1,10 +1,12 @@
 //! The liquid of a scene from frame to frame.
 
 use super::inputs::united;
-use super::{Inputs, Shallow, kept, obstacles, points, pours};
+use super::{Inputs, Point, Shallow, kept, obstacles, points, pours};
+use crate::base::TriMesh;
 use crate::context::Context;
 use crate::error::{Error, Result};
 use crate::scene::Scene;
+use crate::shallow::flows::FlowPoint;
 use crate::shallow::remap::Moved;
 use crate::shallow::terrain::shapes::Shape;
 use crate::shallow::terrain::{Solids, triangles};
@@ -21,6 +23,8 @@ pub(super) struct Course<'a> {
     pub liquid: shallow::Shallow,
     /// The obstacles that stand in it.
     pub shapes: Vec<Shape>,
+    /// Its sources, drains and absorbers.
+    pub points: Vec<FlowPoint>,
     pub frame: i32,
 }
 
@@ -33,7 +37,7 @@ impl<'a> Course<'a> {
         let first = scene.shot.frames.first;
         let shapes = obstacles::shapes_at(of, first)?;
         let mut course = Self::dry(ctx, (scene, of, inputs), first, shapes)?;
-        points::place(scene, of, &mut course.liquid, first)?;
+        points::place(scene, of, &mut course.liquid, &course.points)?;
         if let Some(height) = of.fill {
             course.liquid.fill(height);
         }
@@ -48,24 +52,28 @@ impl<'a> Course<'a> {
     pub fn resume(ctx: &Context, (scene, of, inputs): Of<'a>, frame: i32, bytes: &[u8]) -> Result<Self> {
         let kept = kept::read(bytes)?;
         let mut course = Self::dry(ctx, (scene, of, inputs), frame, kept.shapes)?;
-        course.liquid.set_flows(&kept.points, |index| format!("flow point {}", index + 1))?;
+        // The terrain may have covered some of them since the first frame.
+        let named = |index: usize| format!("flow point {}", index + 1);
+        course.liquid.set_flows_resting(&kept.points, named)?;
         course.liquid.restore(&kept.liquid)?;
-        if points::at(of, frame) != kept.points {
+        if course.points != kept.points {
             // Others from here on.
-            points::place(scene, of, &mut course.liquid, frame)?;
+            course.liquid.set_flows_resting(&course.points, |index| of.points[index].title())?;
         }
         Ok(course)
     }
 
-    /// Dry ground as it is at a frame, with obstacles.
+    /// Dry ground as it is at a frame, with obstacles; its points are not set.
     fn dry(ctx: &Context, (scene, of, inputs): Of<'a>, frame: i32, shapes: Vec<Shape>) -> Result<Self> {
         let moved = inputs.moved(of, frame)?;
-        let solids = moved.as_ref().unwrap_or(&inputs.solids);
+        let (mesh, solids) = moved.as_ref().map(|(mesh, solids)| (mesh, solids)).unzip();
+        let solids = solids.unwrap_or(&inputs.solids);
+        let points = points::at(of, inputs, mesh, frame);
         let liquid = shallow::Shallow::new(ctx, solids, of.params.clone()).map_err(|error| match error {
             Error::Argument(what) => Error::file(&scene.path, what),
             other => other,
         });
-        let mut course = Self { scene, of, inputs, liquid: liquid?, shapes: Vec::new(), frame };
+        let mut course = Self { scene, of, inputs, liquid: liquid?, shapes: Vec::new(), points, frame };
         course.put(shapes)?;
         Ok(course)
     }
@@ -75,23 +83,35 @@ impl<'a> Course<'a> {
     /// # Errors
     /// Files that cannot be read; what a step refuses; cancel.
     pub fn go(&mut self, ctx: &Context) -> Result<(Report, Moved)> {
-        let frame = self.frame + 1;
-        let moved = ctx.phase("terrain", || {
-            let of_terrain = match self.inputs.moved(self.of, frame)? {
-                Some(solids) => self.liquid.update_terrain(&solids)?,
-                None => Moved::default(),
-            };
-            let of_obstacles = self.put(obstacles::shapes_at(self.of, frame)?)?;
-            let last = if of_obstacles.cells > 0 { of_obstacles } else { of_terrain };
-            Ok(Moved { displaced: of_terrain.displaced + of_obstacles.displaced, ..last })
-        })?;
-        let report = ctx.phase("flow", || {
-            points::turn(self.of, &mut self.liquid, frame)?;
-            self.liquid.step(ctx, 1.0 / self.scene.shot.fps)
-        })?;
-        pours::pour(self.scene, self.of, &mut self.liquid, frame)?;
-        self.frame = frame;
+        let moved = ctx.phase("terrain", || self.go_still())?;
+        let report = ctx.phase("flow", || self.liquid.step(ctx, 1.0 / self.scene.shot.fps))?;
+        pours::pour(self.scene, self.of, &mut self.liquid, self.frame)?;
         Ok((report, moved))
+    }
+
+    /// Takes terrain, obstacles and points to the next frame, and lets nothing flow or be poured; what that did to the liquid.
+    ///
+    /// # Errors
+    /// Files that cannot be read.
+    pub fn go_still(&mut self) -> Result<Moved> {
+        let frame = self.frame + 1;
+        let ground = self.inputs.moved(self.of, frame)?;
+        let of_terrain = match &ground {
+            Some((_, solids)) => self.liquid.update_terrain(solids)?,
+            None => Moved::default(),
+        };
+        let of_obstacles = self.put(obstacles::shapes_at(self.of, frame)?)?;
+        let points = points::at(self.of, self.inputs, ground.as_ref().map(|(mesh, _)| mesh), frame);
+        points::turn(&mut self.liquid, &self.points, &points)?;
+        self.points = points;
+        self.frame = frame;
+        let last = if of_obstacles.cells > 0 { of_obstacles } else { of_terrain };
+        Ok(Moved { displaced: of_terrain.displaced + of_obstacles.displaced, ..last })
+    }
+
+    /// Names of the points that should act on the way to its frame and rest, as they lie inside solid or beyond the area.
+    pub fn resting(&self) -> Vec<String> {
+        points::resting(self.of, &self.liquid, self.frame).map(Point::title).collect()
     }
 
     /// Puts obstacles in the place of those that there are.
@@ -106,14 +126,14 @@ impl<'a> Course<'a> {
 }
 
 impl Inputs {
-    /// The solids of a frame, with the meshes that stand on the terrain; none where it does not move.
-    fn moved(&self, of: &Shallow, frame: i32) -> Result<Option<Solids>> {
+    /// The terrain's mesh at a frame, and the solids of it and of the meshes that stand on it; none where it does not move.
+    fn moved(&self, of: &Shallow, frame: i32) -> Result<Option<(TriMesh, Solids)>> {
         let Some(mesh) = self.terrain_at(of, frame)? else { return Ok(None) };
         let mut solids = triangles::solids(&mesh.positions, &mesh.triangles, self.grid, self.heights)?;
-        for mesh in &self.meshes {
-            let on_it = triangles::solids(&mesh.positions, &mesh.triangles, self.grid, self.heights)?;
+        for own in &self.meshes {
+            let on_it = triangles::solids(&own.positions, &own.triangles, self.grid, self.heights)?;
             solids = united(&solids, &on_it);
         }
-        Ok(Some(solids))
+        Ok(Some((mesh, solids)))
     }
 }

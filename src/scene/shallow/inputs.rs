@@ -3,9 +3,10 @@
 use std::path::Path;
 use std::sync::Arc;
 
+use super::attached::{Attached, attach};
 use super::course::Course;
 use super::terrain::{Terrain, read_mesh};
-use super::{Shallow, memory, obstacles};
+use super::{Point, Shallow, memory, obstacles};
 use crate::base::{DVec3, TriMesh};
 use crate::context::Context;
 use crate::error::{Error, Result};
@@ -37,6 +38,8 @@ pub struct Inputs {
     pub(super) meshes: Vec<TriMesh>,
     /// The terrain at the first frame, where it moves.
     pub(super) moving: Option<TriMesh>,
+    /// What each of the scene's points moves with, where it follows the terrain.
+    pub(super) attached: Vec<Option<Attached>>,
     /// Whether the terrain's triangles face down, so that they are turned round.
     pub(super) is_turned: bool,
     /// What the files held when they were read.
@@ -107,8 +110,23 @@ impl Inputs {
             #[cfg(any(feature = "cli", feature = "vdb"))]
             _ => (None, None),
         };
-        let inputs =
-            Self { grid, heights, bounds, triangles, solids, meshes, moving, is_turned, seen, warnings };
+        let attached = moving.as_ref().map(|mesh| attach(ctx, shallow, mesh)).unwrap_or_default();
+        if let Some(mesh) = &moving {
+            warnings.extend(beside(scene, shallow, mesh, &attached));
+        }
+        let inputs = Self {
+            grid,
+            heights,
+            bounds,
+            triangles,
+            solids,
+            meshes,
+            moving,
+            attached,
+            is_turned,
+            seen,
+            warnings,
+        };
         inputs.warnings.iter().for_each(|warning| log::warn!("{warning}"));
         // A source inside solid is refused before anything is written.
         Course::begin(ctx, (scene, shallow, &inputs))?;
@@ -199,6 +217,23 @@ fn heights(shallow: &Shallow, bounds: &[DVec3; 2]) -> Result<Heights> {
         )));
     }
     Heights::between(bottom, top)
+}
+
+/// What to say of points that follow the terrain from a place beside their own, as it is on a slope and where they were given high above it.
+fn beside(scene: &Scene, shallow: &Shallow, mesh: &TriMesh, attached: &[Option<Attached>]) -> Vec<String> {
+    let told = |(point, attached): (&Point, &Option<Attached>)| {
+        let [x, y, z] = attached.as_ref()?.place(mesh);
+        let [own_x, _, own_z] = point.point.at;
+        let off = ((x - own_x).powi(2) + (z - own_z).powi(2)).sqrt();
+        (off > point.point.radius.max(2.0 * shallow.cell)).then(|| {
+            format!(
+                "{}: {}: the place of the terrain that is nearest to it, with which it moves, lies {off:.6} m beside it, at ({x:.6}, {y:.6}, {z:.6})",
+                scene.path.display(),
+                point.title()
+            )
+        })
+    };
+    shallow.points.iter().zip(attached).filter_map(told).collect()
 }
 
 /// What to say of a terrain that looks as if it were in another unit.

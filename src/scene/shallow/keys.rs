@@ -18,6 +18,10 @@ const FRAMES: Kind = Kind::Whole(-1_000_000_000, 1_000_000_000);
 /// Lengths of obstacles, and radii of circles (m).
 const LENGTH: Kind = Kind::Number(0.0, FAR, "m");
 
+/// Of sources, drains and absorbers.
+const FOLLOWS: &str =
+    "true: it moves with the place of the terrain, a sequence, that is nearest to `at` at the first frame";
+
 /// Those of `[shallow]`.
 pub const KEYS: &[Key] = &[
     Key::new(
@@ -143,6 +147,7 @@ pub const MANY_KEYS: &[Key] = &[
         .concerns(STEP),
     Key::new("source", "from", FRAMES, "first frame; left out: from the beginning").or_nothing().such_as("1").concerns(STEP),
     Key::new("source", "until", FRAMES, "last frame; left out: to the end").or_nothing().such_as("120").concerns(STEP),
+    Key::new("source", "follows", Kind::Flag, FOLLOWS).or("false").concerns(STEP),
     Key::new("source", "frequency", Kind::Number(0.0, 1.0e6, "1/s"), "how often in a second its rate swells (1/s)")
         .or("0.0")
         .such_as("1.2")
@@ -166,6 +171,7 @@ pub const MANY_KEYS: &[Key] = &[
         .concerns(STEP),
     Key::new("drain", "from", FRAMES, "first frame; left out: from the beginning").or_nothing().such_as("1").concerns(STEP),
     Key::new("drain", "until", FRAMES, "last frame; left out: to the end").or_nothing().such_as("120").concerns(STEP),
+    Key::new("drain", "follows", Kind::Flag, FOLLOWS).or("false").concerns(STEP),
     Key::new("absorber", "at", Kind::Numbers(3, FAR, "m"), "middle (m): liquid goes into gauze on the ground nearest to it")
         .such_as("[0.05, 0.0, 0.0]")
         .concerns(STEP),
@@ -176,6 +182,7 @@ pub const MANY_KEYS: &[Key] = &[
     Key::new("absorber", "capacity_ml", Kind::Number(0.0, MOST_ML, "ml"), "how much it holds (ml)").such_as("2.0").concerns(STEP),
     Key::new("absorber", "from", FRAMES, "first frame; left out: from the beginning").or_nothing().such_as("1").concerns(STEP),
     Key::new("absorber", "until", FRAMES, "last frame; left out: to the end").or_nothing().such_as("120").concerns(STEP),
+    Key::new("absorber", "follows", Kind::Flag, FOLLOWS).or("false").concerns(STEP),
     Key::new(
         OBJECT,
         "shape",

@@ -3,6 +3,7 @@
 //! what a picture of it shows besides ([`Around`]).
 
 mod around;
+mod attached;
 mod check;
 mod course;
 mod disk;
@@ -108,8 +109,10 @@ pub struct Pour {
 pub struct Point {
     /// Its table, `source`, and its index there, from 0.
     pub name: (&'static str, usize),
-    /// What it does.
+    /// What it does; of one that follows the terrain, where it is before it is put there.
     pub point: FlowPoint,
+    /// Whether it moves with the terrain.
+    pub follows: bool,
     /// First frame; none: from the beginning.
     pub from: Option<i32>,
     /// Last frame; none: to the end.
@@ -249,7 +252,8 @@ impl Point {
             rate: number("rate_ml") * ML,
             pulse: (frequency > 0.0 && share > 0.0).then_some(flows::Pulse { frequency, share }),
         };
-        Self { name: (table, index), point, from: frame("from"), until: frame("until") }
+        let follows = value("follows").and_then(Value::flag).unwrap_or(false);
+        Self { name: (table, index), point, follows, from: frame("from"), until: frame("until") }
     }
 
     /// Whether it acts on the way to a frame.

@@ -1,6 +1,7 @@
 //! Sources, drains and absorbers of a scene, at its frames.
 
-use super::{Point, Shallow};
+use super::{Inputs, Point, Shallow};
+use crate::base::TriMesh;
 use crate::error::{Error, Result};
 use crate::scene::Scene;
 use crate::shallow::{self, flows::FlowPoint};
@@ -12,32 +13,55 @@ impl Point {
     }
 }
 
-/// All of them, as they are on the way to a frame.
-pub(super) fn at(of: &Shallow, frame: i32) -> Vec<FlowPoint> {
-    of.points.iter().map(|point| FlowPoint { rate: point.rate(frame), ..point.point.clone() }).collect()
+/// All of them, as they are on the way to a frame; those that follow the terrain on its mesh of that frame, which there is where it moves.
+pub(super) fn at(of: &Shallow, inputs: &Inputs, mesh: Option<&TriMesh>, frame: i32) -> Vec<FlowPoint> {
+    let at = |(index, point): (usize, &Point)| {
+        let on = inputs.attached.get(index).and_then(Option::as_ref).zip(mesh);
+        let at = on.map_or(point.point.at, |(on, mesh)| on.place(mesh));
+        FlowPoint { at, rate: point.rate(frame), ..point.point.clone() }
+    };
+    of.points.iter().enumerate().map(at).collect()
 }
 
-/// Puts them on a liquid's columns, as they are on the way to a frame.
+/// Puts them on a liquid's columns at the first frame.
 ///
 /// # Errors
 /// One that lies inside solid or beyond the area, with its name.
-pub(super) fn place(scene: &Scene, of: &Shallow, liquid: &mut shallow::Shallow, frame: i32) -> Result<()> {
+pub(super) fn place(
+    scene: &Scene,
+    of: &Shallow,
+    liquid: &mut shallow::Shallow,
+    points: &[FlowPoint],
+) -> Result<()> {
     let named = |index: usize| of.points[index].title();
-    liquid.set_flows(&at(of, frame), named).map_err(|error| match error {
+    liquid.set_flows(points, named).map_err(|error| match error {
         Error::Argument(what) => Error::file(&scene.path, what),
         other => other,
     })
 }
 
-/// Opens and closes them, for the way to a frame.
+/// Moves, opens and closes them, from how they were to how they are on the way to the next frame.
 ///
 /// # Errors
 /// None.
-pub(super) fn turn(of: &Shallow, liquid: &mut shallow::Shallow, frame: i32) -> Result<()> {
-    for (index, point) in of.points.iter().enumerate() {
-        if point.acts(frame) != point.acts(frame - 1) {
-            liquid.set_rate(index, point.rate(frame))?;
+pub(super) fn turn(liquid: &mut shallow::Shallow, before: &[FlowPoint], now: &[FlowPoint]) -> Result<()> {
+    for (index, (before, now)) in before.iter().zip(now).enumerate() {
+        if now.at != before.at {
+            liquid.move_flow(index, now.at);
+        }
+        if now.rate != before.rate {
+            liquid.set_rate(index, now.rate)?;
         }
     }
     Ok(())
+}
+
+/// Those that should act on the way to a frame and cannot, as they lie inside solid or beyond the area.
+pub(super) fn resting<'a>(
+    of: &'a Shallow,
+    liquid: &'a shallow::Shallow,
+    frame: i32,
+) -> impl Iterator<Item = &'a Point> {
+    let rests = move |(index, point): &(usize, &Point)| point.acts(frame) && liquid.is_resting(*index);
+    of.points.iter().enumerate().filter(rests).map(|(_, point)| point)
 }

@@ -3,6 +3,7 @@
 use super::{Form, Obstacle, Shallow};
 use crate::error::Result;
 use crate::io::mesh::{EXTENSIONS, extension};
+use crate::io::sequence::Pattern;
 use crate::scene::text::{Table, Value, Values};
 
 impl Shallow {
@@ -83,7 +84,15 @@ impl Shallow {
                 }
             }
             _ => {
-                let frame = |key: &str| values.of_many(name, index, key).and_then(Value::whole);
+                let value = |key: &str| values.of_many(name, index, key);
+                let terrain = values.get("shallow.terrain").and_then(Value::path);
+                if value("follows").and_then(Value::flag) == Some(true)
+                    && terrain.and_then(Pattern::parse).is_none()
+                {
+                    let what = "must be false where the terrain does not move: it needs a sequence of meshes, as \"organ.%04d.ply\"";
+                    return Err(table.error("follows", what));
+                }
+                let frame = |key: &str| value(key).and_then(Value::whole);
                 match (frame("from"), frame("until")) {
                     (Some(from), Some(until)) if from > until => {
                         Err(table.error("until", format!("must not lie before `from`, {from}")))
@@ -132,7 +141,7 @@ fn check_object(index: usize, table: &Table, values: &Values) -> Result<()> {
         Form::Mesh(..) if obstacle.keys.len() > 1 => {
             Err(table.error("keys", "of a file are one at most: a mesh does not move (a shape does)"))
         }
-        Form::Mesh(path, _) if crate::io::sequence::Pattern::parse(path).is_some() => Err(table
+        Form::Mesh(path, _) if Pattern::parse(path).is_some() => Err(table
             .error("file", "must be one file: a mesh does not move (a shape does, and so does the terrain)")),
         _ => Ok(()),
     }

@@ -4,7 +4,7 @@ use serde_json::json;
 
 use super::course::Course;
 use super::mesh::{Drawn, Mesher};
-use super::{Inputs, ML, ROLES, Shallow, points};
+use super::{Inputs, ML, ROLES, Shallow};
 use crate::base::MeshArray;
 use crate::context::{Context, PhaseTime};
 use crate::error::{Error, Result};
@@ -56,13 +56,29 @@ impl<'a> Liquid<'a> {
         Self { scene, of, inputs }
     }
 
+    /// Takes the liquid to a frame, which may be the one that it is at, and tells of points that cannot act any more.
+    fn go(&self, ctx: &Context, course: &mut Course<'a>, frame: i32) -> Result<(shallow::Report, Moved)> {
+        if frame <= course.frame {
+            return Ok(Default::default());
+        }
+        let before = course.resting();
+        let did = course.go(ctx)?;
+        for point in course.resting().iter().filter(|point| !before.contains(point)) {
+            let path = self.scene.path.display();
+            log::warn!(
+                "{path}: {point}: at frame {frame} it lies inside solid or outside of the area, and rests until it does not"
+            );
+        }
+        Ok(did)
+    }
+
     /// What a frame's files are made from.
     fn written(&self, ctx: &Context, state: &mut State<'a>, to: &To<'_>, made_from: &str) -> Result<Written> {
         let State { course, mesher } = state;
         let liquid = &course.liquid;
         let drawn = ctx.phase("surface", || mesher.draw(liquid, self.of.opaque_depth))?;
         let volume = self.volume(ctx, liquid, to.frame, made_from)?;
-        let state = super::kept::save(&course.shapes, &points::at(self.of, to.frame), liquid);
+        let state = super::kept::save(&course.shapes, &course.points, liquid);
         Ok(Written { drawn, state, volume })
     }
 
@@ -201,13 +217,12 @@ impl<'a> Stepping for Liquid<'a> {
 
     fn step(&self, ctx: &Context, state: &mut State<'a>, to: &To<'_>) -> Result<Stepped<Step>> {
         let ((step, did), phases) = ctx.step(3, || {
-            let course = &mut state.course;
-            let did = if to.frame > course.frame { course.go(ctx)? } else { Default::default() };
+            let did = self.go(ctx, &mut state.course, to.frame)?;
             let written =
                 to.made_from.map(|made_from| self.written(ctx, state, to, made_from)).transpose()?;
             Ok((Step(written), did))
         })?;
-        let report = told(&state.course.liquid, did, step.0.as_ref(), phases);
+        let report = told(&state.course, did, step.0.as_ref(), phases);
         Ok(Stepped { step, report })
     }
 
@@ -246,11 +261,12 @@ impl<'a> Stepping for Liquid<'a> {
 
 /// What the report of a frame says.
 fn told(
-    liquid: &shallow::Shallow,
+    course: &Course<'_>,
     (report, moved): (shallow::Report, Moved),
     written: Option<&Written>,
     phases: Vec<PhaseTime>,
 ) -> Report {
+    let liquid = &course.liquid;
     let (balance, depths) = (liquid.balance(), liquid.depths());
     let wet = depths.iter().filter(|depth| **depth > 0).count();
     let deepest = depths.iter().copied().max().unwrap_or(0);
@@ -269,6 +285,7 @@ fn told(
         "deepest_m": liquid.columns().heights.length(deepest.into()),
         "displaced_ml": ml(moved.displaced),
         "held_ml": ml(moved.held),
+        "resting": course.resting(),
         "steps": report.steps,
         "simulated_s": liquid.time(),
         "emptied_rows": report.emptied,

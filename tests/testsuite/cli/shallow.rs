@@ -170,6 +170,13 @@ fn what_is_wrong_is_one_sentence_and_leaves_nothing_behind() {
     let drain = "[[drain]]\nat = [0, 0, 0]\nradius = 0\nrate_ml = 1\n";
     with(&format!("{drain}from = 3\nuntil = 2\n"), &["spill.toml:12", "`until`", "`from`, 3"]);
     with("[[absorber]]\nat = [0, 0, 0]\nradius = 0\nrate_ml = 1\n", &["`capacity_ml`", "is missing"]);
+    for (table, more) in [("source", ""), ("drain", ""), ("absorber", "capacity_ml = 1\n")] {
+        let point = format!("[[{table}]]\nat = [0, 0, 0]\nradius = 0\nrate_ml = 1\n{more}follows = true\n");
+        with(&point, &["spill.toml:1", "`follows`", "the terrain does not move", "a sequence of meshes"]);
+    }
+    write_scene(folder, drain);
+    refused("--set drain.1.follows=true", &["`follows`", "the terrain does not move"]);
+    refused("--set drain.1.follows=1", &["`follows`", "true or false"]);
     with("[[object]]\nradius = 1\n", &["`shape`", "is missing (or `file`"]);
     with("[[object]]\nshape = \"sphere\"\n", &["`radius`", "is missing"]);
     with("[[object]]\nshape = \"box\"\nsize = [1, 1, 0]\n", &["`size`", "over 0 m"]);

@@ -47,19 +47,19 @@ fn write_shot(folder: &Path, lines: &str, tables: &str) {
     fs::write(folder.join("spill.toml"), scene).unwrap();
 }
 
-fn report(folder: &Path, out: &str, frame: i32) -> Value {
+pub fn report(folder: &Path, out: &str, frame: i32) -> Value {
     let path = folder.join(format!("{out}/report/liquid.{frame:04}.json"));
     serde_json::from_slice(&fs::read(path).unwrap()).unwrap()
 }
 
 /// Millilitres at a frame by name: inside, poured, sourced, drained, absorbed, lost.
-fn ml(report: &Value) -> [f64; 6] {
+pub fn ml(report: &Value) -> [f64; 6] {
     ["inside", "poured", "sourced", "drained", "absorbed", "lost"]
         .map(|name| report[format!("{name}_ml")].as_f64().unwrap())
 }
 
 #[track_caller]
-fn are_same(folder: &Path, a: &str, b: &str) {
+pub fn are_same(folder: &Path, a: &str, b: &str) {
     let [a_files, b_files] = [a, b].map(|out| output(&folder.join(out)));
     assert_eq!(a_files.keys().collect::<Vec<_>>(), b_files.keys().collect::<Vec<_>>(), "{a} and {b}");
     a_files.iter().for_each(|(name, bytes)| assert!(*bytes == b_files[name], "{name} of {a} and {b}"));
@@ -116,7 +116,7 @@ fn threads_kills_and_another_order_of_frames_give_the_same_bytes() {
 
 /// Makes a shot in several ways, all to the same bytes.
 #[track_caller]
-fn resume_in_every_way(folder: &Path) {
+pub fn resume_in_every_way(folder: &Path) {
     // Enough frames that none is the last when it is killed.
     let shot = "shallow spill.toml --set shot.frames=1-40";
     works(folder, &format!("{shot} -o whole --threads 2"));
