@@ -131,6 +131,7 @@ mod shallow_lake;
 #[path = "gates/shallow_mass.rs"]
 mod shallow_mass;
 #[path = "gates/shallow_range.rs"]
+mod shallow_orifice;
 mod shallow_range;
 #[path = "gates/shallow_same.rs"]
 mod shallow_same;
@@ -234,6 +235,7 @@ fn main() {
     shallow_core::run(&mut h);
     shallow_film::run(&mut h);
     shallow_delivery::run(&mut h);
+    shallow_orifice::run(&mut h);
     shallow_huppert::run(&mut h);
     shallow_spread::run(&mut h);
     shallow_bowl::run(&mut h);

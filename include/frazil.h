@@ -600,6 +600,11 @@ enum frz_shallow_flow_kind
      * As a drain, until it has taken frz_shallow_flow.capacity: gauze.
      */
     FRZ_SHALLOW_ABSORBER = 2,
+    /**
+     * A hole in the ground, through which liquid runs out by its own weight: frz_shallow_flow.opening times (2 g H)^(1/2) a second, of the mean depth H
+     * in its circle (Torricelli's law), at most its rate.
+     */
+    FRZ_SHALLOW_ORIFICE = 3,
 };
 #ifndef __cplusplus
 #if __STDC_VERSION__ >= 202311L
@@ -2141,7 +2146,7 @@ typedef struct {
      */
     double radius;
     /**
-     * Volume in a second (m3/s), 0 or more: 1 ml/s is 1e-6.
+     * Volume in a second (m3/s), 0 or more: 1 ml/s is 1e-6. Of an orifice the most that goes out.
      */
     double rate;
     /**
@@ -2156,6 +2161,10 @@ typedef struct {
      * By which share of itself the rate swings up and down, 0 to 1, in a sine from the start of the simulated time.
      */
     double pulse_share;
+    /**
+     * Of an orifice: its area (m2) times the share of it that the jet fills, 0.6 to 0.65 for a sharp edge, 0 or more; of others it is not looked at.
+     */
+    double opening;
 } frz_shallow_flow;
 
 /**

@@ -371,6 +371,8 @@ pub const GATES: &[Gate] = &[
     gate("shallow.film_short_steps", "1", Open, Open),
     gate("shallow.film_steep", "%", Most(1.0), Most(0.3)),
     gate("shallow.delivery", "1", Most(1.0e-3), Most(1.0e-5)),
+    // A basin that runs empty through a hole, against Torricelli's law.
+    gate("shallow.orifice", "%", Most(2.0), Most(0.5)),
     // A current down a slope (Huppert 1982): how far its exponent is from 1/3, and its front from its place.
     gate("shallow.huppert_exponent", "1", Most(0.015), Most(0.008)),
     gate("shallow.huppert_exponent_coarse", "1", Open, Open),

@@ -36,7 +36,7 @@ static class Frazil {
     [StructLayout(LayoutKind.Sequential)]
     public struct Flow {
         public uint StructSize, Flags, Kind, Triangle;
-        public double Share0, Share1, Share2, X, Y, Z, Radius, Rate, Capacity, PulseFrequency, PulseShare;
+        public double Share0, Share1, Share2, X, Y, Z, Radius, Rate, Capacity, PulseFrequency, PulseShare, Opening;
     }
 
     [StructLayout(LayoutKind.Sequential)]

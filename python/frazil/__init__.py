@@ -38,7 +38,7 @@ from .grains import Grains
 from .grid import Grid, Leaf, load, save
 from .mesh import Mesh
 from .mist import Mist
-from .shallow import Absorber, Ball, Box, Capsule, Drain, Shallow, Snapshot, Source, Surface
+from .shallow import Absorber, Ball, Box, Capsule, Drain, Orifice, Shallow, Snapshot, Source, Surface
 from .snow import Base, Body, Noise, snow_layer
 from .tracker import Particles, Tracker, spacing
 from . import level_set

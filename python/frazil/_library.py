@@ -222,6 +222,7 @@ class ShallowFlow(c.Structure):
         ("struct_size", c.c_uint32), ("flags", c.c_uint32), ("kind", c.c_uint32), ("triangle", c.c_uint32),
         ("shares", c.c_double * 3), ("at", c.c_double * 3), ("radius", c.c_double), ("rate", c.c_double),
         ("capacity", c.c_double), ("pulse_frequency", c.c_double), ("pulse_share", c.c_double),
+        ("opening", c.c_double),
     ]
 
 

@@ -71,6 +71,17 @@ class Absorber(NamedTuple):
     on: Optional[tuple] = None
 
 
+class Orifice(NamedTuple):
+    """A hole in the ground, through which liquid runs out by its own weight: opening (m2: its area times the share that the jet fills) times
+    (2 g H)^(1/2) a second, of the mean depth H in its circle, at most rate (m3/s)."""
+
+    at: Optional[Sequence[float]]
+    opening: float
+    rate: float = 1.0
+    radius: float = 0.0
+    on: Optional[tuple] = None
+
+
 class Ball(NamedTuple):
     """A solid that moves (m)."""
 
@@ -114,12 +125,12 @@ def _number(kind, name, known):
 
 
 def _flow(flow):
-    kind = {Source: 0, Drain: 1, Absorber: 2}[type(flow)]
+    kind = {Source: 0, Drain: 1, Absorber: 2, Orifice: 3}[type(flow)]
     triangle, shares = flow.on or (0, (0.0, 0.0, 0.0))
     return ShallowFlow(
         c.sizeof(ShallowFlow), int(flow.on is not None), kind, triangle, (c.c_double * 3)(*shares),
         (c.c_double * 3)(*(flow.at or (0.0, 0.0, 0.0))), flow.radius, flow.rate, getattr(flow, "capacity", 0.0),
-        getattr(flow, "pulse_frequency", 0.0), getattr(flow, "pulse_share", 0.0),
+        getattr(flow, "pulse_frequency", 0.0), getattr(flow, "pulse_share", 0.0), getattr(flow, "opening", 0.0),
     )
 
 
@@ -268,7 +279,7 @@ class Shallow(Handle):
         return out
 
     def set_flows(self, flows):
-        """Sets Sources, Drains and Absorbers, in place of those before."""
+        """Sets Sources, Drains, Orifices and Absorbers, in place of those before."""
         array = (ShallowFlow * max(len(flows), 1))(*(_flow(flow) for flow in flows))
         call("shallow_set_flows", self.pointer, array, len(flows))
 

@@ -23,14 +23,18 @@ pub enum frz_shallow_flow_kind {
     FRZ_SHALLOW_DRAIN = 1,
     /// As a drain, until it has taken frz_shallow_flow.capacity: gauze.
     FRZ_SHALLOW_ABSORBER = 2,
+    /// A hole in the ground, through which liquid runs out by its own weight: frz_shallow_flow.opening times (2 g H)^(1/2) a second, of the mean depth H
+    /// in its circle (Torricelli's law), at most its rate.
+    FRZ_SHALLOW_ORIFICE = 3,
 }
 
 use frz_shallow_flow_kind::*;
 
-const KINDS: [(u32, frz_shallow_flow_kind); 3] = [
+const KINDS: [(u32, frz_shallow_flow_kind); 4] = [
     (FRZ_SHALLOW_SOURCE as u32, FRZ_SHALLOW_SOURCE),
     (FRZ_SHALLOW_DRAIN as u32, FRZ_SHALLOW_DRAIN),
     (FRZ_SHALLOW_ABSORBER as u32, FRZ_SHALLOW_ABSORBER),
+    (FRZ_SHALLOW_ORIFICE as u32, FRZ_SHALLOW_ORIFICE),
 ];
 
 /// A place where liquid comes in or goes out. It begins zeroed, and then struct_size.
@@ -52,7 +56,7 @@ pub struct frz_shallow_flow {
     /// It acts on cells whose middles lie within so much of the place, seen from above (m), 0 or more; on the nearest one, if none
     /// does.
     pub radius: f64,
-    /// Volume in a second (m3/s), 0 or more: 1 ml/s is 1e-6.
+    /// Volume in a second (m3/s), 0 or more: 1 ml/s is 1e-6. Of an orifice the most that goes out.
     pub rate: f64,
     /// Volume that an absorber takes (m3), 0 or more; of others it is not looked at.
     pub capacity: f64,
@@ -60,6 +64,8 @@ pub struct frz_shallow_flow {
     pub pulse_frequency: f64,
     /// By which share of itself the rate swings up and down, 0 to 1, in a sine from the start of the simulated time.
     pub pulse_share: f64,
+    /// Of an orifice: its area (m2) times the share of it that the jet fills, 0.6 to 0.65 for a sharp edge, 0 or more; of others it is not looked at.
+    pub opening: f64,
 }
 
 // SAFETY: numbers.
@@ -81,6 +87,7 @@ impl frz_shallow_flow {
         capacity: 0.0,
         pulse_frequency: 0.0,
         pulse_share: 0.0,
+        opening: 0.0,
     };
 }
 
@@ -99,6 +106,7 @@ impl Attached {
             FRZ_SHALLOW_SOURCE => Kind::Source,
             FRZ_SHALLOW_DRAIN => Kind::Drain,
             FRZ_SHALLOW_ABSORBER => Kind::Absorber(given.capacity),
+            FRZ_SHALLOW_ORIFICE => Kind::Orifice(given.opening),
         };
         let is_attached = given.flags & FRZ_SHALLOW_ON_TRIANGLE != 0;
         let on = is_attached.then_some((given.triangle, given.shares));

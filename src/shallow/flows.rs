@@ -1,4 +1,4 @@
-//! Where liquid comes in and goes out: sources, drains and absorbers, at the end of each step (thesis Alg. 4.1, line 5).
+//! Where liquid comes in and goes out: sources, drains, orifices and absorbers, at the end of each step (thesis Alg. 4.1, line 5).
 //!
 //! Each moves whole units. What its rate asks for is shared equally by the columns in its circle; what is left of the division waits for the
 //! next step, so that a source delivers its rate to a unit a column.
@@ -16,7 +16,7 @@ pub struct FlowPoint {
     pub at: [f64; 3],
     /// Columns whose centres lie within so much of it, seen from above (m); the nearest one, if none does.
     pub radius: f64,
-    /// Volume per second (m3/s), 0 and up; 1 ml is 1e-6 m3.
+    /// Volume per second (m3/s), 0 and up; 1 ml is 1e-6 m3. Of an orifice the most that goes out.
     pub rate: f64,
     /// How the rate changes; none: it does not.
     pub pulse: Option<Pulse>,
@@ -31,6 +31,9 @@ pub enum Kind {
     Drain,
     /// As a drain, until it has taken so much (m3): gauze.
     Absorber(f64),
+    /// A hole in the ground, through which liquid runs out by its own weight: Cd a (2 g H)^(1/2) a second (Torricelli's law), of the mean depth H in its circle. The
+    /// number is Cd a (m2): the hole's area times the share of it that the jet fills, 0.6 to 0.65 for a sharp edge.
+    Orifice(f64),
 }
 
 /// A rate that swings: rate (1 + share sin(2 pi frequency t)), never under 0.
@@ -84,8 +87,10 @@ impl FlowPoint {
         };
         positive("radius", self.radius)?;
         positive("rate", self.rate)?;
-        if let Kind::Absorber(capacity) = self.kind {
-            positive("capacity", capacity)?;
+        match self.kind {
+            Kind::Absorber(capacity) => positive("capacity", capacity)?,
+            Kind::Orifice(opening) => positive("opening", opening)?,
+            Kind::Source | Kind::Drain => {}
         }
         let Some(pulse) = self.pulse else { return Ok(()) };
         positive("pulse.frequency", pulse.frequency)?;
@@ -233,16 +238,17 @@ impl Flows {
         (placed.waiting, placed.moved) = (waiting, moved);
     }
 
-    /// Moves what the points ask for in a step of `dt` that begins at `time` (s).
-    pub fn step(&mut self, columns: &Columns, flow: &mut Flow, time: f64, dt: f64) {
+    /// Moves what the points ask for in a step of `dt` that begins at `time` (s), where things fall by `gravity` (m/s2).
+    pub fn step(&mut self, columns: &Columns, flow: &mut Flow, gravity: f64, time: f64, dt: f64) {
         let volume = columns.grid.cell * columns.grid.cell * columns.heights.unit;
         for placed in &mut self.placed {
             let sum = match placed.point.kind {
                 Kind::Source => &mut self.sourced,
-                Kind::Drain => &mut self.drained,
+                Kind::Drain | Kind::Orifice(_) => &mut self.drained,
                 Kind::Absorber(_) => &mut self.absorbed,
             };
-            *sum += placed.step(columns, flow, volume, time, dt);
+            let rate = placed.rate(columns, flow, gravity, time + 0.5 * dt);
+            *sum += placed.step(columns, flow, rate * dt / volume, volume);
         }
     }
 }
@@ -259,12 +265,21 @@ fn placed(columns: &Columns, points: &[FlowPoint], which: &impl Fn(usize) -> Str
 }
 
 impl Placed {
-    /// Moves what the point asks for; returns the units moved.
-    fn step(&mut self, columns: &Columns, flow: &mut Flow, volume: f64, time: f64, dt: f64) -> i64 {
+    /// What the point asks for in a second (m3).
+    fn rate(&self, columns: &Columns, flow: &Flow, gravity: f64, time: f64) -> f64 {
+        let rate = self.point.rate_at(time);
+        let Kind::Orifice(opening) = self.point.kind else { return rate };
+        let depth: i64 = self.columns.iter().map(|&column| i64::from(flow.depths()[column as usize])).sum();
+        let depth = depth as f64 * columns.heights.unit / self.columns.len().max(1) as f64;
+        (opening * (2.0 * gravity * depth).sqrt()).min(rate)
+    }
+
+    /// Moves what the point asks for, in units of some `volume` (m3); returns those moved.
+    fn step(&mut self, columns: &Columns, flow: &mut Flow, asked: f64, volume: f64) -> i64 {
         if self.columns.is_empty() {
             return 0;
         }
-        self.waiting += self.point.rate_at(time + 0.5 * dt) * dt / volume;
+        self.waiting += asked;
         let count = self.columns.len() as f64;
         let mut share = (self.waiting / count).floor().min(1e18) as i64;
         if let Kind::Absorber(capacity) = self.point.kind {

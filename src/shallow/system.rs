@@ -267,7 +267,7 @@ impl Shallow {
             }
             let step = pace::step(&self.params, &measures, length, self.flow.last);
             let [emptied, filled, slowed] = self.flow.step(&self.columns, &self.pipes, &step, length);
-            self.flows.step(&self.columns, &mut self.flow, self.time, length);
+            self.flows.step(&self.columns, &mut self.flow, -self.params.gravity[1], self.time, length);
             self.steps.push(length);
             self.time += length;
             report.steps += 1;

@@ -93,7 +93,7 @@ int main(void) {
     FIELD(frz_shallow_flow, kind), FIELD(frz_shallow_flow, triangle), FIELD(frz_shallow_flow, shares);
     FIELD(frz_shallow_flow, at), FIELD(frz_shallow_flow, radius), FIELD(frz_shallow_flow, rate);
     FIELD(frz_shallow_flow, capacity), FIELD(frz_shallow_flow, pulse_frequency);
-    FIELD(frz_shallow_flow, pulse_share);
+    FIELD(frz_shallow_flow, pulse_share), FIELD(frz_shallow_flow, opening);
     SIZE(frz_shallow_balance), FIELD(frz_shallow_balance, struct_size), FIELD(frz_shallow_balance, reserved);
     FIELD(frz_shallow_balance, inside), FIELD(frz_shallow_balance, poured), FIELD(frz_shallow_balance, sourced);
     FIELD(frz_shallow_balance, drained), FIELD(frz_shallow_balance, absorbed), FIELD(frz_shallow_balance, lost);

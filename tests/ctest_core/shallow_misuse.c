@@ -216,10 +216,13 @@ static void bad_flow_points(frz_context *ctx) {
     FAILS(frz_shallow_set_flows(shallow, &flow, 1), WRONG, "flow 0: rate = -1");
     flow.rate = ML, flow.radius = (double)NAN;
     FAILS(frz_shallow_set_flows(shallow, &flow, 1), WRONG, "flow 0: radius = NaN");
-    flow.radius = 0.01, flow.kind = 3;
-    FAILS(frz_shallow_set_flows(shallow, &flow, 1), WRONG, "flow 0: kind = 3 is not a value of frz_shallow_flow_kind");
+    flow.radius = 0.01, flow.kind = 4;
+    FAILS(frz_shallow_set_flows(shallow, &flow, 1), WRONG, "flow 0: kind = 4 is not a value of frz_shallow_flow_kind");
     flow.kind = FRZ_SHALLOW_ABSORBER, flow.capacity = -1;
     FAILS(frz_shallow_set_flows(shallow, &flow, 1), WRONG, "flow 0: capacity = -1");
+    flow.kind = FRZ_SHALLOW_ORIFICE, flow.opening = (double)NAN;
+    FAILS(frz_shallow_set_flows(shallow, &flow, 1), WRONG, "flow 0: opening = NaN");
+    flow.kind = FRZ_SHALLOW_ABSORBER;
     flow.capacity = ML, flow.pulse_frequency = 1, flow.pulse_share = 2;
     FAILS(frz_shallow_set_flows(shallow, &flow, 1), WRONG, "flow 0: pulse.share = 2");
     flow.pulse_share = 1, flow.flags = 2;

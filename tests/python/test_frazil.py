@@ -654,7 +654,8 @@ class Shallow(unittest.TestCase):
         middle = int(np.argmin(np.abs(positions[triangles[:, 0]][:, (0, 2)]).sum(axis=1)))
         blood.set_flows([
             frazil.Source(None, 2e-6, radius=0.006, pulse_frequency=1, pulse_share=0.5, on=(middle, (0.5, 0.25, 0.25))),
-            frazil.Drain((0, 0, 0.01), 0.5e-6, radius=0.006), frazil.Absorber((0, 0, -0.01), 1e-6, 0.1e-6, radius=0.006)])
+            frazil.Drain((0, 0, 0.01), 0.5e-6, radius=0.006), frazil.Absorber((0, 0, -0.01), 1e-6, 0.1e-6, radius=0.006),
+            frazil.Orifice((0.005, 0, 0.005), 1e-7, radius=0.006)])
         for frame in range(60):
             moved = positions.copy()
             moved[:, 1] += 0.002 * np.sin(frame / 10)
@@ -664,7 +665,7 @@ class Shallow(unittest.TestCase):
                               frazil.Box((-0.02, 0, 0), (0.004, 0.004, 0.004))])
             blood.step(1 / 60, budget=1)
         self.assertAlmostEqual(blood.moved(0), 2e-6, delta=1e-9)
-        self.assertTrue(0 < blood.moved(1) <= 0.5e-6 and 0.09e-6 < blood.moved(2) <= 0.1e-6)
+        self.assertTrue(0 < blood.moved(1) <= 0.5e-6 and 0.09e-6 < blood.moved(2) <= 0.1e-6 and 0 < blood.moved(3) < 0.1e-6)
         balance = blood.balance
         self.assertEqual(balance.error, 0)
         self.assertAlmostEqual(balance.inside, balance.sourced - balance.drained - balance.absorbed, delta=1e-15)

@@ -35,16 +35,17 @@ pub(super) fn save(shapes: &[Shape], points: &[FlowPoint], liquid: &Shallow) -> 
     }
     to.count(points.len());
     for FlowPoint { kind, at, radius, rate, pulse } in points {
-        let (code, capacity) = match kind {
+        let (code, measure) = match kind {
             Kind::Source => (0, 0.0),
             Kind::Drain => (1, 0.0),
             Kind::Absorber(capacity) => (2, *capacity),
+            Kind::Orifice(opening) => (3, *opening),
         };
         to.u32(code);
         to.u32(u32::from(pulse.is_some()));
         let Pulse { frequency, share } = pulse.unwrap_or(Pulse { frequency: 0.0, share: 0.0 });
         let [x, y, z] = *at;
-        [capacity, x, y, z, *radius, *rate, frequency, share].into_iter().for_each(|number| to.f64(number));
+        [measure, x, y, z, *radius, *rate, frequency, share].into_iter().for_each(|number| to.f64(number));
     }
     let mut own = Vec::new();
     liquid.save_into(&mut own);
@@ -98,14 +99,15 @@ fn shape(from: &mut Reader<'_>) -> Result<Shape> {
 
 fn point(from: &mut Reader<'_>) -> Result<FlowPoint> {
     let (code, has_pulse) = (from.u32()?, from.u32()? != 0);
-    let capacity = from.f64()?;
+    let measure = from.f64()?;
     let at = [from.f64()?, from.f64()?, from.f64()?];
     let (radius, rate) = (from.f64()?, from.f64()?);
     let pulse = Pulse { frequency: from.f64()?, share: from.f64()? };
     let kind = match code {
         0 => Kind::Source,
         1 => Kind::Drain,
-        2 => Kind::Absorber(capacity),
+        2 => Kind::Absorber(measure),
+        3 => Kind::Orifice(measure),
         _ => return Err(Error::Bytes("has a flow point of no known kind".into())),
     };
     Ok(FlowPoint { kind, at, radius, rate, pulse: has_pulse.then_some(pulse) })

@@ -117,7 +117,7 @@ pub const KEYS: &[Key] = &[
         "shallow",
         "pace",
         Kind::Choice(&["exact", "realtime"]),
-        "exact: as many steps as waves need; realtime: steps of at most `step`, in which waves of deep liquid are slower",
+        "exact: as many steps as waves need; realtime: steps of at most `step`, in which waves of deep liquid, and fast films on slopes, are slower",
     )
     .or("\"exact\"")
     .concerns(STEP),
@@ -162,6 +162,13 @@ pub const MANY_KEYS: &[Key] = &[
     Key::new("drain", "radius", LENGTH, "of the circle, seen from above, from which it goes (m)").such_as("0.004").concerns(STEP),
     Key::new("drain", "rate_ml", Kind::Number(0.0, MOST_ML, "ml/s"), "how much goes in a second (ml), as long as there is some")
         .such_as("0.5")
+        .concerns(STEP),
+    Key::new("drain", "orifice_mm2", Kind::Number(0.0, 1.0e12, "mm2"), "area of a hole through which it runs out by its own weight, `rate_ml` at most; left out: it is pumped")
+        .or_nothing()
+        .such_as("20.0")
+        .concerns(STEP),
+    Key::new("drain", "discharge", Kind::Number(0.0, 1.0, ""), "share of the hole that the jet fills: 0.6 to 0.65 for a sharp edge")
+        .or("0.62")
         .concerns(STEP),
     Key::new("drain", "frequency", Kind::Number(0.0, 1.0e6, "1/s"), "how often in a second its rate swells (1/s)")
         .or("0.0")

@@ -241,7 +241,10 @@ impl Point {
         let frame = |name: &str| value(name).and_then(Value::whole).map(|frame| frame as i32);
         let kind = match table {
             "source" => flows::Kind::Source,
-            "drain" => flows::Kind::Drain,
+            "drain" => match value("orifice_mm2").and_then(Value::number) {
+                Some(area) => flows::Kind::Orifice(area * 1e-6 * number("discharge")),
+                None => flows::Kind::Drain,
+            },
             _ => flows::Kind::Absorber(number("capacity_ml") * ML),
         };
         let (frequency, share) = (number("frequency"), number("swing"));

@@ -400,6 +400,7 @@ fn code_of_kind(kind: Kind) -> u32 {
         Kind::Source => 0,
         Kind::Drain => 1,
         Kind::Absorber(_) => 2,
+        Kind::Orifice(_) => 3,
     }
 }
 

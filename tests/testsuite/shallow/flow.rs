@@ -2,6 +2,7 @@
 
 use std::process::Command;
 
+use frazil::shallow::flows::{FlowPoint, Kind};
 use frazil::shallow::liquid::Liquid;
 use frazil::shallow::params::Pace;
 use frazil::shallow::pipes::Border;
@@ -189,6 +190,35 @@ fn a_film_that_is_too_fast_for_real_time_is_held_back_and_stays_smooth() {
     assert!(slowed > 1000, "{slowed} rows");
     let (_, _, slowed) = rolling_film(100, Pace::Realtime(0.001));
     assert_eq!(slowed, 0, "steps of 1 ms are short enough for cells of 1 mm");
+}
+
+#[test]
+fn a_hole_in_the_ground_drains_as_torricelli_says() {
+    let ctx = context();
+    let solids = ground([40; 2], 0.002, [-0.01, 0.1], |_| 0.0);
+    let hole = |opening, rate| FlowPoint {
+        kind: Kind::Orifice(opening),
+        radius: 0.008,
+        rate,
+        ..source([0.0; 3], 0.0, 0.0)
+    };
+    let drained = |point: FlowPoint, time: f64| {
+        let params = Params { liquid: Liquid::WATER, pace: Pace::Exact, ..Params::default() };
+        let mut liquid = covered(&ctx, &solids, params, |_, _| 0.02);
+        liquid.set_flows(&[point], |_| "the hole".into()).unwrap();
+        (0..(time / FRAME) as usize).for_each(|_| {
+            liquid.step(&ctx, FRAME).unwrap();
+        });
+        assert_eq!(liquid.balance().error, 0);
+        liquid.balance().drained
+    };
+    // The root of the depth falls evenly: from 20 mm, with Cd a of 12 mm2 on 64 cm2.
+    let left = |time: f64| (0.02f64.sqrt() - 1.2e-5 / 6.4e-3 * (0.5 * 9.81f64).sqrt() * time).powi(2);
+    let (ours, theory) = (drained(hole(1.2e-5, 1.0), 10.0), 6.4e-3 * (0.02 - left(10.0)));
+    assert!((ours / theory - 1.0).abs() < 0.01, "{ours} m3, not {theory}");
+    // What is behind it may let less through.
+    let ours = drained(hole(1.2e-5, 1e-6), 2.0);
+    assert!((ours / 2e-6 - 1.0).abs() < 1e-3, "{ours} m3, not 2 ml");
 }
 
 #[test]
