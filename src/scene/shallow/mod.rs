@@ -312,6 +312,7 @@ fn params(values: &Values) -> Params {
             _ => Border::Open,
         },
         section: Section::default(),
+        falls: None,
     }
 }
 
