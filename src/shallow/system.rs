@@ -5,6 +5,7 @@ use super::columns::Columns;
 use super::falls::{Falling, Falls};
 use super::flow::Flow;
 use super::flow::bands::attended;
+use super::flow::lips::Lips;
 use super::flows::{FlowPoint, Flows};
 use super::grid::BOTTOMLESS;
 use super::identity::Identity;
@@ -97,7 +98,10 @@ impl Shallow {
         let columns = Columns::new(solids);
         let falls = params.falls.as_ref();
         let pipes = Pipes::with_cliffs(&columns, params.border, Falls::cliffs(falls, &columns));
-        let flow = Flow::new(&columns, &pipes);
+        let mut flow = Flow::new(&columns, &pipes);
+        if falls.is_some() {
+            flow.lips = Lips::with_room(pipes.links.len());
+        }
         Ok(Self {
             remap: Remap::new(falls.map_or(0, |falls| falls.most)),
             falls: Falling::new(falls, pipes.links.len()),

@@ -123,69 +123,82 @@ impl Balls {
         layout.validate()?;
         let counts = self.count(drops);
         target.check(&counts)?;
-        let axes = Axes::of(layout);
-        self.each_vertex(drops, |at, normal, drop| {
-            let write = |to: &mut Option<&mut [f32]>, vector: [f64; 3]| {
-                if let Some(to) = to {
-                    to.as_chunks_mut().0[at] = vector.map(|number| number as f32);
+        let (axes, scale) = (Axes::of(layout), layout.scale);
+        let shape: [[f32; 3]; BALL[0]] =
+            std::array::from_fn(|at| axes.turn(self.vertices[at]).map(|number| number as f32));
+        let turned = |vector: [f64; 3]| axes.turn(vector).map(|number| (number * scale) as f32);
+        if let Some(to) = &mut target.positions {
+            let (balls, strands) = parts(to, drops.len());
+            for (to, (drop, radius)) in balls.zip(drops.iter().zip(&self.radii)) {
+                let (centre, radius) = (turned(drop.position), (radius * self.size * scale) as f32);
+                for (to, normal) in to.iter_mut().zip(&shape) {
+                    *to = [0, 1, 2].map(|n| centre[n] + radius * normal[n]);
                 }
-            };
-            write(&mut target.positions, axes.turn(normal.0).map(|number| number * layout.scale));
-            write(&mut target.normals, axes.turn(normal.1));
-            write(&mut target.velocities, axes.turn(drop.velocity).map(|number| number * layout.scale));
-        });
-        self.each_triangle(drops.len(), |at, [a, b, c]| {
-            let corners = if layout.left_handed { [a, c, b] } else { [a, b, c] };
-            match &mut target.indices {
-                Indices::None => {}
-                Indices::U16(to) => to.as_chunks_mut().0[at] = corners.map(|corner| corner as u16),
-                Indices::U32(to) => to.as_chunks_mut().0[at] = corners,
             }
-        });
+            self.each_corner(drops, strands, |normal, radius, drop| {
+                turned(along(drop.position, normal, radius))
+            });
+        }
+        if let Some(to) = &mut target.normals {
+            let (balls, strands) = parts(to, drops.len());
+            balls.for_each(|to| to.copy_from_slice(&shape));
+            self.each_corner(drops, strands, |normal, _, _| axes.turn(normal).map(|number| number as f32));
+        }
+        if let Some(to) = &mut target.velocities {
+            let (balls, strands) = parts(to, drops.len());
+            balls.zip(drops).for_each(|(to, drop)| to.fill(turned(drop.velocity)));
+            self.each_corner(drops, strands, |_, _, drop| turned(drop.velocity));
+        }
+        match &mut target.indices {
+            Indices::None => {}
+            Indices::U16(to) => {
+                self.write_triangles(drops.len(), layout.left_handed, to, |index| index as u16)
+            }
+            Indices::U32(to) => self.write_triangles(drops.len(), layout.left_handed, to, |index| index),
+        }
         Ok(counts)
     }
 
-    /// Calls `write` with each vertex: its place and normal, and its drop.
-    fn each_vertex(&self, drops: &[Droplet], mut write: impl FnMut(usize, ([f64; 3], [f64; 3]), &Droplet)) {
-        let mut at = 0;
-        for (drop, radius) in drops.iter().zip(&self.radii) {
-            for normal in &self.vertices {
-                write(at, (along(drop.position, *normal, radius * self.size), *normal), drop);
-                at += 1;
-            }
-        }
+    /// Writes a vector for each corner of the strands, of its normal, its distance from its drop's middle (m) and its drop.
+    fn each_corner(
+        &self,
+        drops: &[Droplet],
+        to: &mut [f32],
+        vector: impl Fn([f64; 3], f64, &Droplet) -> [f32; 3],
+    ) {
+        let mut to = to.as_chunks_mut::<3>().0.iter_mut();
         for strand in &self.strands {
             let ends = strand.ends.map(|end| &drops[end as usize]);
             let [aside, across] = beside(between(ends[0].position, ends[1].position));
             for (drop, end) in ends.into_iter().zip(strand.ends) {
                 let radius = self.radii[end as usize].min(strand.radius) * AROUND;
-                for [cos, sin] in HEXAGON {
-                    let normal = [0, 1, 2].map(|n| cos * aside[n] + sin * across[n]);
-                    write(at, (along(drop.position, normal, radius), normal), drop);
-                    at += 1;
+                for ([cos, sin], to) in HEXAGON.into_iter().zip(&mut to) {
+                    *to = vector([0, 1, 2].map(|n| cos * aside[n] + sin * across[n]), radius, drop);
                 }
             }
         }
     }
 
-    /// Calls `write` with each triangle.
-    fn each_triangle(&self, drops: usize, mut write: impl FnMut(usize, [u32; 3])) {
-        let mut at = 0;
-        for drop in 0..drops {
+    /// Writes the triangles of the balls of so many drops, and of the strands.
+    fn write_triangles<T>(&self, drops: usize, is_turned: bool, to: &mut [T], index: impl Fn(u32) -> T) {
+        let corners = |[a, b, c]: [u32; 3]| if is_turned { [a, c, b] } else { [a, b, c] };
+        let shape: [[u32; 3]; BALL[1]] = std::array::from_fn(|at| corners(self.triangles[at]));
+        let (balls, strands) = to.split_at_mut(3 * BALL[1] * drops);
+        for (drop, to) in balls.as_chunks_mut::<3>().0.chunks_exact_mut(BALL[1]).enumerate() {
             let first = (drop * BALL[0]) as u32;
-            for triangle in &self.triangles {
-                write(at, triangle.map(|corner| first + corner));
-                at += 1;
+            for (to, triangle) in to.iter_mut().zip(&shape) {
+                *to = triangle.map(|corner| index(first + corner));
             }
         }
+        let mut to = strands.as_chunks_mut::<3>().0.iter_mut();
         for strand in 0..self.strands.len() {
             let first = (drops * BALL[0] + strand * 2 * SIDES) as u32;
             for side in 0..SIDES as u32 {
                 let [a, b] = [side, (side + 1) % SIDES as u32].map(|corner| first + corner);
                 let [c, d] = [a, b].map(|corner| corner + SIDES as u32);
-                write(at, [a, b, d]);
-                write(at + 1, [a, d, c]);
-                at += 2;
+                for (triangle, to) in [[a, b, d], [a, d, c]].into_iter().zip(&mut to) {
+                    *to = corners(triangle).map(&index);
+                }
             }
         }
     }
@@ -218,6 +231,12 @@ impl Target<'_> {
         }
         Ok(())
     }
+}
+
+/// The vectors of each ball, and those of the strands.
+fn parts(to: &mut [f32], drops: usize) -> (std::slice::ChunksExactMut<'_, [f32; 3]>, &mut [f32]) {
+    let (balls, strands) = to.split_at_mut(3 * BALL[0] * drops);
+    (balls.as_chunks_mut().0.chunks_exact_mut(BALL[0]), strands)
 }
 
 /// How vectors lie for the caller.

@@ -43,6 +43,12 @@ pub struct Over {
 }
 
 impl Lips {
+    /// Room for so many links.
+    pub(in crate::shallow) fn with_room(links: usize) -> Self {
+        let (falls, depth) = (Vec::with_capacity(links), Vec::with_capacity(links));
+        Self { falls, depth, flooded: Vec::with_capacity(links) }
+    }
+
     /// Finds the lips: links from a base that is higher, by over `cliffs`, than the surface at the other end, and those into the void.
     pub(in crate::shallow) fn find(
         &mut self,

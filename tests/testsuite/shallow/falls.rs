@@ -11,7 +11,7 @@ use frazil::shallow::pipes::Border;
 use frazil::shallow::surface::{Indices, Layout, Up};
 use frazil::shallow::terrain::Solids;
 use frazil::shallow::terrain::shapes::Shape;
-use frazil::shallow::{Params, Shallow};
+use frazil::shallow::{Params, Shallow, Snapshot};
 use frazil::{Context, Pool};
 
 use crate::common::bodies::Dice;
@@ -433,7 +433,10 @@ fn drops_and_strands_are_a_mesh_in_buffers_of_known_capacity() {
     for _ in 0..60 {
         liquid.step(&ctx, FRAME).unwrap();
     }
-    let drops: Vec<Droplet> = liquid.drops().collect();
+    let mut seen = Snapshot::new(&table(&ctx, Falls::default()));
+    seen.take(&liquid);
+    let drops = seen.drops().to_vec();
+    assert_eq!(drops, liquid.drops().collect::<Vec<_>>());
     let most = bound(drops.len());
     let mut balls = Balls::default();
     balls.reserve(drops.len());
