@@ -118,6 +118,8 @@ mod shallow_dam;
 mod shallow_delivery;
 #[path = "gates/shallow_energy.rs"]
 mod shallow_energy;
+#[path = "gates/shallow_falls.rs"]
+mod shallow_falls;
 #[path = "gates/shallow_film.rs"]
 mod shallow_film;
 #[path = "gates/shallow_flooded.rs"]
@@ -243,6 +245,7 @@ fn main() {
     shallow_lake::run(&mut h);
     shallow_dam::run(&mut h);
     shallow_mass::run(&mut h);
+    shallow_falls::run(&mut h);
     shallow_range::run(&mut h);
     shallow_same::run(&mut h);
     shallow_speed::run(&mut h);

@@ -398,6 +398,9 @@ pub const GATES: &[Gate] = &[
     // Frames after which units are missing; depths out of range in random scenes.
     none("shallow.mass", "frames"),
     none("shallow.depth_range", "columns"),
+    // Packets, and the first liquid that lands, off from ballistics, of the height of the fall; units that are missing in a busy scene with falls.
+    gate("shallow.fall_path", "%", Most(1.0), Most(0.1)),
+    none("shallow.fall_volume", "units"),
     // The same liquid however the scene lies, whatever does the work, and when a run is played again.
     yes("shallow.same_rotated"),
     yes("shallow.same_mirrored"),

@@ -177,6 +177,7 @@ impl frz_shallow_params {
             pace,
             border: meaning("border", "frz_shallow_border", self.border, &BORDERS)?,
             section: meaning("section", "frz_shallow_section", self.section, &SECTIONS)?,
+            falls: None,
         };
         params.validate()?;
         Ok(params)

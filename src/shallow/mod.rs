@@ -6,6 +6,7 @@
 
 mod clock;
 pub mod columns;
+pub mod falls;
 pub mod flow;
 pub mod flows;
 pub mod grid;

@@ -1,5 +1,6 @@
 //! What a user chooses.
 
+use super::falls::Falls;
 use super::liquid::Liquid;
 use super::pipes::Border;
 use crate::error::{Error, Result};
@@ -19,6 +20,8 @@ pub struct Params {
     pub border: Border,
     /// The section A of a pipe in Eq. 4.1.
     pub section: Section,
+    /// How liquid falls freely over edges; none: it is below at once. Chosen once.
+    pub falls: Option<Falls>,
 }
 
 /// How a frame is divided into steps.
@@ -50,6 +53,7 @@ impl Default for Params {
             pace: Pace::Realtime(0.003),
             border: Border::default(),
             section: Section::default(),
+            falls: None,
         }
     }
 }
@@ -74,6 +78,9 @@ impl Params {
         }
         if !(0.0..=1.0).contains(&self.kept) {
             return Err(Error::argument(format!("kept = {} is not within 0 to 1", self.kept)));
+        }
+        if let Some(falls) = &self.falls {
+            falls.validate()?;
         }
         match self.pace {
             Pace::Realtime(longest) if !(1e-6..=1.0).contains(&longest) => {

@@ -3,6 +3,7 @@
 use std::ops::Range;
 
 use super::columns::{Columns, NONE, STRIP};
+use super::falls::Droplet;
 use super::flow::Flow;
 use super::flow::active::runs;
 use super::system::Shallow;
@@ -20,6 +21,7 @@ pub struct Snapshot {
     depth: Vec<i32>,
     velocity: Vec<[f32; 2]>,
     active: Vec<bool>,
+    drops: Vec<Droplet>,
     time: f64,
 }
 
@@ -33,6 +35,7 @@ impl Snapshot {
             columns,
             depth: vec![0; len],
             velocity: vec![[0.0; 2]; len],
+            drops: Vec::with_capacity(shallow.params.falls.map_or(0, |falls| falls.most)),
             time: 0.0,
         };
         snapshot.take(shallow);
@@ -62,6 +65,8 @@ impl Snapshot {
         }
         self.clear(end..self.active.len());
         self.active.copy_from_slice(shallow.flow.active());
+        self.drops.clear();
+        self.drops.extend(shallow.drops());
         self.time = shallow.time;
     }
 
@@ -93,6 +98,11 @@ impl Snapshot {
     /// Whether each strip of columns may have liquid.
     pub fn active(&self) -> &[bool] {
         &self.active
+    }
+
+    /// As [`Shallow::drops`].
+    pub fn drops(&self) -> &[Droplet] {
+        &self.drops
     }
 
     /// Simulated time (s).

@@ -2,8 +2,10 @@
 
 use super::clock::Clock;
 use super::columns::Columns;
+use super::falls::{Falling, Falls};
 use super::flow::Flow;
 use super::flow::bands::attended;
+use super::flow::lips::Lips;
 use super::flows::{FlowPoint, Flows};
 use super::grid::BOTTOMLESS;
 use super::identity::Identity;
@@ -26,6 +28,7 @@ pub struct Shallow {
     pub(super) flow: Flow,
     pub(super) flows: Flows,
     pub(super) remap: Remap,
+    pub(super) falls: Falling,
     /// Units poured in, less those taken out, other than by flow points.
     pub(super) poured: i64,
     /// Surface of the liquid at rest beyond an absorbing border (units), or BOTTOMLESS.
@@ -73,6 +76,8 @@ pub struct Balance {
     pub gained: f64,
     /// Waiting for room, where the terrain moved.
     pub held: f64,
+    /// In the air ([`Params::falls`]).
+    pub falling: f64,
     /// What is missing (units): 0.
     pub error: i64,
 }
@@ -91,16 +96,21 @@ impl Shallow {
         }
         ctx.allow("the columns of the liquid", count as u64 * BYTES)?;
         let columns = Columns::new(solids);
-        let pipes = Pipes::new(&columns, params.border);
-        let flow = Flow::new(&columns, &pipes);
+        let falls = params.falls.as_ref();
+        let pipes = Pipes::with_cliffs(&columns, params.border, Falls::cliffs(falls, &columns));
+        let mut flow = Flow::new(&columns, &pipes);
+        if falls.is_some() {
+            flow.lips = Lips::with_room(pipes.links.len());
+        }
         Ok(Self {
+            remap: Remap::new(falls.map_or(0, |falls| falls.most)),
+            falls: Falling::new(falls, pipes.links.len()),
             params,
             flow,
             pipes,
             columns,
             identity: Identity::new(),
             flows: Flows::default(),
-            remap: Remap::default(),
             poured: 0,
             still: BOTTOMLESS,
             time: 0.0,
@@ -116,11 +126,14 @@ impl Shallow {
     /// Changes the parameters.
     ///
     /// # Errors
-    /// `Argument`: numbers out of range, or another border.
+    /// `Argument`: numbers out of range, another border, or other falls.
     pub fn set_params(&mut self, params: Params) -> Result<()> {
         params.validate()?;
         if params.border != self.params.border {
             return Err(Error::argument("the border cannot change after the liquid was made"));
+        }
+        if params.falls != self.params.falls {
+            return Err(Error::argument("falls cannot change after the liquid was made"));
         }
         self.params = params;
         Ok(())
@@ -148,7 +161,7 @@ impl Shallow {
 
     /// Memory of the columns, their pipes and what flows (bytes).
     pub fn bytes(&self) -> usize {
-        self.columns.bytes() + self.pipes.bytes() + self.flow.bytes()
+        self.columns.bytes() + self.pipes.bytes() + self.flow.bytes() + self.falls.bytes()
     }
 
     /// Simulated time (s).
@@ -266,7 +279,9 @@ impl Shallow {
                 return Err(Error::argument(format!("a frame of {dt} s would take steps of {length} s")));
             }
             let step = pace::step(&self.params, &measures, length, self.flow.last);
+            self.find_lips();
             let [emptied, filled, slowed] = self.flow.step(&self.columns, &self.pipes, &step, length);
+            self.fall(length);
             self.flows.step(&self.columns, &mut self.flow, -self.params.gravity[1], self.time, length);
             self.steps.push(length);
             self.time += length;
@@ -322,6 +337,7 @@ impl Shallow {
         let (flows, links, inside) = (&self.flows, &self.flow.links, self.flow.units());
         let came = self.poured + flows.sourced + links.gained;
         let held = self.remap.held.units();
+        let falling = self.falls.units();
         let went = flows.drained + flows.absorbed + links.lost;
         Balance {
             inside: cubic(inside),
@@ -332,7 +348,8 @@ impl Shallow {
             lost: cubic(links.lost),
             gained: cubic(links.gained),
             held: cubic(held),
-            error: came - went - inside - held,
+            falling: cubic(falling),
+            error: came - went - inside - held - falling,
         }
     }
 

@@ -370,6 +370,7 @@ pub fn random_params(dice: &mut Dice, step: f64) -> Params {
         pace: Pace::Realtime(step.clamp(1e-6, 1.0)),
         border: [Border::Closed, Border::Open, Border::Absorbing][dice.below(3)],
         section: if dice.one_in(4) { Section::Whole } else { Section::Wetted },
+        falls: None,
     }
 }
 

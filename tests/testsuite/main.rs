@@ -95,6 +95,7 @@ mod snow {
 mod shallow {
     mod balance;
     mod border;
+    mod falls;
     mod flooded;
     mod flow;
     mod moving;

@@ -319,6 +319,7 @@ fn params(values: &Values) -> Params {
             _ => Border::Open,
         },
         section: Section::default(),
+        falls: None,
     }
 }
 

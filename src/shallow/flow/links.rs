@@ -5,6 +5,7 @@ use std::ops::Range;
 
 use super::fast;
 use super::flux::{Kind, Step, flux_of, lesser, split};
+use super::lips::{Fall, Lips, edge};
 use super::parts::LinkPart;
 use crate::shallow::pipes::Links;
 
@@ -62,6 +63,7 @@ impl LinkPart<'_> {
         step: &Step,
         columns: &Columns,
         links: &Links,
+        lips: &Lips,
         (row, first): (usize, usize),
         depth: impl Fn(usize) -> i32,
     ) {
@@ -71,6 +73,13 @@ impl LinkPart<'_> {
             let own = depth(i);
             let at = link - first;
             let (eta, beyond, is_still) = match links.to[link] {
+                // As into the void, whatever lies below.
+                _ if lips.at(link) == Fall::Ahead => (base[i] - edge(columns), 0, false),
+                j if lips.at(link) == Fall::Back => {
+                    let (base, depth) = (base[j as usize], depth(j as usize));
+                    self.drive_back::<K>(step, at, base + depth - (base - edge(columns)), depth, open);
+                    continue;
+                }
                 NONE => {
                     let (eta, is_still) = links.outside(columns, link, step.still);
                     (eta, if is_still { eta - base[i] } else { 0 }, is_still)
@@ -92,11 +101,21 @@ impl LinkPart<'_> {
         }
     }
 
+    /// Computes the flux and the transfer of a link that liquid falls freely over from its second column, of its fall and depth (units).
+    fn drive_back<K: Kind>(&mut self, step: &Step, at: usize, fall: i32, depth: i32, open: f32) {
+        let (flux, depth) = (-self.flux[at], [depth as f32, 0.0]);
+        let light = if K::VISCOUS && !K::WHOLE { fast::light(step, depth, flux) } else { 1.0 };
+        self.flux[at] = -flux_of::<K>(step, fall, depth, flux, open, light);
+        let [transfer, left] = split(self.flux[at], self.left[at]);
+        (self.transfer[at], self.left[at]) = (transfer.clamp(-MOST, MOST), left);
+    }
+
     /// Calls `add` with each column of some that gives through a link of a row, or takes, and how much (units, rounded up, so that sums do not
     /// depend on their order).
     pub fn each(
         &self,
         links: &Links,
+        lips: &Lips,
         (row, first): (usize, usize),
         within: &Range<u32>,
         gives: bool,
@@ -105,7 +124,8 @@ impl LinkPart<'_> {
         for link in links.row(row) {
             let transfer = self.transfer[link - first];
             let column = if (transfer > 0.0) == gives { links.from[link] } else { links.to[link] };
-            if transfer != 0.0 && column != NONE && within.contains(&column) {
+            let is_there = column != NONE && (gives || lips.at(link) == Fall::No);
+            if transfer != 0.0 && is_there && within.contains(&column) {
                 add(column, transfer.abs().ceil() as i64);
             }
         }
@@ -115,6 +135,7 @@ impl LinkPart<'_> {
     pub fn scale(
         &mut self,
         links: &Links,
+        lips: &Lips,
         (row, first): (usize, usize),
         giver: bool,
         factor: impl Fn(u32) -> f32,
@@ -122,7 +143,7 @@ impl LinkPart<'_> {
         for link in links.row(row) {
             let transfer = self.transfer[link - first];
             let column = if (transfer > 0.0) == giver { links.from[link] } else { links.to[link] };
-            if transfer != 0.0 && column != NONE {
+            if transfer != 0.0 && column != NONE && (giver || lips.at(link) == Fall::No) {
                 let k = factor(column);
                 self.transfer[link - first] *= k;
                 self.flux[link - first] *= k;
@@ -130,10 +151,12 @@ impl LinkPart<'_> {
         }
     }
 
-    /// Finds the units that the links of a row transfer; `change` is called with each column and what it gains.
+    /// Finds the units that the links of a row transfer; `change` is called with each column and what it gains. What falls freely leaves its
+    /// column only.
     pub fn move_units(
         &mut self,
         links: &Links,
+        lips: &Lips,
         (row, first): (usize, usize),
         outside: &mut Outside,
         mut change: impl FnMut(usize, i32),
@@ -144,6 +167,17 @@ impl LinkPart<'_> {
             let units = transfer as i32;
             if units == 0 {
                 continue;
+            }
+            match lips.at(link) {
+                Fall::No => {}
+                Fall::Ahead => {
+                    change(links.from[link] as usize, -units);
+                    continue;
+                }
+                Fall::Back => {
+                    change(links.to[link] as usize, units);
+                    continue;
+                }
             }
             change(links.from[link] as usize, -units);
             match links.to[link] {

@@ -11,6 +11,7 @@ pub mod fast;
 pub mod flux;
 mod heads;
 pub mod links;
+pub(super) mod lips;
 mod network;
 mod parts;
 mod places;
@@ -23,12 +24,14 @@ use std::ops::Range;
 
 use crate::shallow::columns::{Columns, STRIP, strip_mut};
 use crate::shallow::per_column::{Array, PerColumn};
-use crate::shallow::pipes::Pipes;
+use crate::shallow::pipes::cliffs::Cliffs;
+use crate::shallow::pipes::{Links, Pipes};
 use active::{Active, runs};
 use bands::Bands;
 use fast::{Fast, Films};
 use flux::Step;
 use links::LinkFlow;
+use lips::Lips;
 use network::{Network, State};
 use parts::Part;
 use rows::Ground;
@@ -43,6 +46,7 @@ pub struct Flow {
     /// What truncation left of transfers to the east and to the south (units).
     pub(super) left: [PerColumn<f32>; 2],
     pub(super) links: LinkFlow,
+    pub(super) lips: Lips,
     active: Active,
     bands: Bands,
     pub(super) network: Network,
@@ -93,6 +97,7 @@ impl Flow {
             flux: [none(Array::FluxEast), none(Array::FluxSouth)],
             left: [none(Array::LeftEast), none(Array::LeftSouth)],
             links: LinkFlow::new(&pipes.links),
+            lips: Lips::default(),
             active: Active::new(columns, &pipes.links),
             bands: Bands::new(columns, pipes.links.most),
             network: Network::new(columns.len(), columns.grid.size[1]),
@@ -250,6 +255,11 @@ impl Flow {
         self.bands.deepest()
     }
 
+    /// Finds the links that liquid falls freely from in the next step.
+    pub(super) fn find_lips(&mut self, columns: &Columns, links: &Links, cliffs: Cliffs) {
+        self.lips.find(columns, links, cliffs, &self.depth);
+    }
+
     /// One step of `dt` (s); returns the count of rows in which K_min, and in which K_max, was not 1, and in which fast films were held back. Runs on
     /// the threads of the pool around it, if [`Flow::divide`] has divided it.
     pub fn step(&mut self, columns: &Columns, pipes: &Pipes, step: &Step, dt: f64) -> [u32; 3] {
@@ -263,13 +273,14 @@ impl Flow {
             active: &self.active,
             network: &self.network,
             fast: &self.fast,
+            lips: &self.lips,
             may_fill: &[],
         };
         let [flux, left] =
             [&mut self.flux, &mut self.left].map(|both| both.each_mut().map(|numbers| &mut numbers[..]));
         let liquid = Part::new(&mut self.depth, flux, left, &mut self.links);
         self.bands.step(step, &ground, liquid);
-        self.network.put_back(&mut self.flux, &mut self.left, &mut self.links);
+        self.network.put_back(&mut self.flux, &mut self.left, &mut self.links, &mut self.lips);
         let mut scaled = [0; 3];
         for stepped in self.bands.results() {
             scaled = [0, 1, 2].map(|which| scaled[which] + stepped.scaled[which]);
@@ -298,6 +309,7 @@ impl Flow {
             flux: [east, south],
             left: [left_east, left_south],
             links: &self.links,
+            lips: &self.lips,
         };
         self.network.find(step, columns, pipes, self.bands.filling(), &state);
     }

@@ -11,6 +11,7 @@ use super::bands::Filling;
 use super::flux::Step;
 use super::heads::{EQUAL, Node};
 use super::links::LinkFlow;
+use super::lips::{Fall, Lips, edge};
 use super::rounds::{self, Party};
 use crate::shallow::columns::{Columns, NONE, STRIP, strip_mut, strip_of};
 use crate::shallow::grid::TOP;
@@ -83,6 +84,21 @@ pub struct State<'a> {
     pub left: [&'a [f32]; 2],
     /// Flow through links.
     pub links: &'a LinkFlow,
+    /// Links that liquid falls freely from.
+    pub lips: &'a Lips,
+}
+
+impl Edge {
+    /// Makes it one that liquid falls freely over, out of a column.
+    fn fall(&mut self, columns: &Columns, giver: u32, fall: Fall) {
+        self.outside = f64::from(columns.bases()[giver as usize] - edge(columns));
+        // What flowed the other way before does not come back.
+        let outward = |flow: f64| if fall == Fall::Ahead { flow.max(0.0) } else { flow.min(0.0) };
+        (self.kept, self.left) = (outward(self.kept), outward(self.left));
+        if fall == Fall::Back {
+            self.ends.swap(0, 1);
+        }
+    }
 }
 
 impl Network {
@@ -249,10 +265,18 @@ impl Network {
             }
             for link in links.row(row) {
                 let (from, to) = (links.from[link], links.to[link]);
+                let at = At::Link(link as u32);
                 let is_node =
                     |column: u32| column != NONE && (self.party_of[column as usize] as usize) < count;
-                if is_node(from) || is_node(to) {
-                    let at = At::Link(link as u32);
+                let fall = state.lips.at(link);
+                if fall != Fall::No {
+                    let giver = if fall == Fall::Ahead { from } else { to };
+                    if is_node(giver) {
+                        let ends = [giver as usize, NONE as usize];
+                        let edge = self.join(step, columns, state, at, ends, links.open[link]);
+                        self.edges[edge as usize].fall(columns, giver, fall);
+                    }
+                } else if is_node(from) || is_node(to) {
                     self.join(step, columns, state, at, [from as usize, to as usize], links.open[link]);
                     if let (NONE, Some(edge)) = (to, self.edges.last_mut()) {
                         edge.outside = f64::from(links.outside(columns, link, step.still).0);
@@ -387,10 +411,16 @@ impl Network {
         flux: &mut [PerColumn<f32>; 2],
         left: &mut [PerColumn<f32>; 2],
         links: &mut LinkFlow,
+        lips: &mut Lips,
     ) {
         let ([flux_east, flux_south], [left_east, left_south]) = (flux, left);
         for edge in &self.edges {
+            let lip = match edge.at {
+                At::Link(link) if lips.at(link as usize) != Fall::No => Some(link as usize),
+                _ => None,
+            };
             match edge.ends {
+                _ if lip.is_some() => lip.iter().for_each(|&lip| lips.add_flooded(lip, edge.units.abs())),
                 [_, NONE] if edge.units > 0 => links.lost += edge.units,
                 [_, NONE] => links.gained -= edge.units,
                 _ => {}

@@ -10,6 +10,7 @@ use super::buffers::{RING, Rows, SWEEPS};
 use super::fast::Fast;
 use super::flux::{Carried, Kind, Of, Row, Step, flux_row, greater, lesser};
 use super::links::{Outside, indices_of};
+use super::lips::Lips;
 use super::network::Network;
 use super::parts::Parts;
 use super::places::{PAD, Place};
@@ -31,6 +32,8 @@ pub struct Ground<'a> {
     pub network: &'a Network,
     /// Films whose inertia counts less.
     pub fast: &'a Fast,
+    /// Links that liquid falls freely from.
+    pub lips: &'a Lips,
     /// Rows with columns that may fill up.
     pub may_fill: &'a [bool],
 }
@@ -204,7 +207,7 @@ impl Rows {
                 Some((start, depth)) if index >= start => depth[index - start],
                 _ => own.depth[index - start],
             };
-            own.links.drive::<K>(step, columns, &pipes.links, (row, first_link), depth);
+            own.links.drive::<K>(step, columns, &pipes.links, ground.lips, (row, first_link), depth);
         }
         is_held
     }
@@ -288,7 +291,7 @@ impl Rows {
         }
         let first_link = part.first_link;
         let factor = |column| place.pick(least, beyond, column);
-        part.links.scale(&ground.pipes.links, (row, first_link), true, factor);
+        part.links.scale(&ground.pipes.links, ground.lips, (row, first_link), true, factor);
     }
 
     /// K_max of a row's columns, as if nothing left them; whether one is not 1.
@@ -396,7 +399,7 @@ impl Rows {
         }
         let first_link = part.first_link;
         let factor = |column| place.pick(most, beyond, column);
-        part.links.scale(&ground.pipes.links, (row, first_link), false, factor);
+        part.links.scale(&ground.pipes.links, ground.lips, (row, first_link), false, factor);
     }
 
     /// Moves what a row's links transfer, from and to the band's own columns.
@@ -413,7 +416,7 @@ impl Rows {
         let (first_link, start) = (part.first_link, part.start);
         let depth = &mut *part.depth;
         let mut next = next.map(|next| (next.start, &mut *next.depth));
-        part.links.move_units(links, (row, first_link), outside, |column, units| {
+        part.links.move_units(links, ground.lips, (row, first_link), outside, |column, units| {
             if own.contains(&column) {
                 match &mut next {
                     Some((start, depth)) if column >= *start => depth[column - *start] += units,
@@ -453,6 +456,6 @@ fn each_link(ground: &Ground, parts: &Parts, row: usize, gives: bool, mut add: i
     let within = indices_of(ground.columns, row);
     for owner in row.saturating_sub(1).max(parts.first)..row + 1 {
         let part = parts.see(owner);
-        part.links.each(links, (owner, part.first_link), &within, gives, &mut add);
+        part.links.each(links, ground.lips, (owner, part.first_link), &within, gives, &mut add);
     }
 }

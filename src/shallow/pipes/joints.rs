@@ -4,6 +4,7 @@
 
 use std::ops::Range;
 
+use super::cliffs::{Cliffs, beside};
 use super::slopes::{self, Rises};
 use crate::shallow::columns::{Columns, NONE, STRIP, strip_of};
 use crate::shallow::pipes::{Border, Links};
@@ -25,7 +26,7 @@ impl Side {
         matches!(self, Self::East | Self::West)
     }
 
-    fn opposite(self) -> Self {
+    pub fn opposite(self) -> Self {
         match self {
             Self::East => Self::West,
             Self::South => Self::North,
@@ -35,7 +36,7 @@ impl Side {
     }
 
     /// The cell beyond this side, if it is within the domain.
-    pub(super) fn cell(self, [x, z]: [usize; 2], [nx, nz]: [usize; 2]) -> Option<[usize; 2]> {
+    pub fn cell(self, [x, z]: [usize; 2], [nx, nz]: [usize; 2]) -> Option<[usize; 2]> {
         match self {
             Self::East => (x + 1 < nx).then(|| [x + 1, z]),
             Self::South => (z + 1 < nz).then(|| [x, z + 1]),
@@ -59,7 +60,7 @@ impl Finder {
     pub fn find(
         &mut self,
         columns: &Columns,
-        border: Border,
+        (border, cliffs): (Border, Cliffs),
         rows: Range<usize>,
         [east, south]: [&mut [f32]; 2],
         links: &mut Links,
@@ -76,7 +77,8 @@ impl Finder {
             }
             let rises = [&self.rises[row % 2], &self.rises[(row + 1) % 2]];
             slopes::open_row(columns, row, rises, east, south);
-            Joiner::new(self, columns, row, border).join_row(links);
+            cliffs.close(columns, row, east, south);
+            Joiner::new(self, columns, row, border, cliffs).join_row(links);
             links.rows.push(links.len() as u32);
         }
     }
@@ -87,6 +89,7 @@ struct Joiner<'a> {
     columns: &'a Columns,
     row: usize,
     border: Border,
+    cliffs: Cliffs,
     /// Of the row and the next one.
     rises: [&'a Rises; 2],
     own: &'a Stacks,
@@ -99,13 +102,14 @@ struct Joiner<'a> {
 }
 
 impl<'a> Joiner<'a> {
-    fn new(finder: &'a Finder, columns: &'a Columns, row: usize, border: Border) -> Self {
+    fn new(finder: &'a Finder, columns: &'a Columns, row: usize, border: Border, cliffs: Cliffs) -> Self {
         let count = columns.grid.size[1];
         let strips = columns.row(row);
         Self {
             columns,
             row,
             border,
+            cliffs,
             rises: [&finder.rises[row % 2], &finder.rises[(row + 1) % 2]],
             own: &finder.stacks[row % 3],
             north: (row > 0).then(|| &finder.stacks[(row + 2) % 3]),
@@ -121,7 +125,7 @@ impl<'a> Joiner<'a> {
         let is_grounded =
             [Some(self.own), self.north, self.south].into_iter().flatten().all(|stacks| stacks.is_grounded);
         for block in 0..nx.div_ceil(STRIP) {
-            let mut cells = self.across_layers(block);
+            let mut cells = self.across_layers(block) | self.over_cliffs(block);
             if !is_grounded {
                 cells |= self.over_void(block);
             }
@@ -171,6 +175,14 @@ impl<'a> Joiner<'a> {
             }
         }
         cells
+    }
+
+    /// Bits of the cells of a block with columns beside a cliff to the east or south.
+    fn over_cliffs(&self, block: usize) -> u16 {
+        let all = self.own.of(block).iter().flat_map(|&strip| {
+            [Side::East, Side::South].map(|side| self.cliffs.of_strip(self.columns, strip as usize, side))
+        });
+        all.fold(0, |cells, more| cells | more)
     }
 
     /// Bits of the columns of a strip that liquid can pass from to those of another strip, so many places behind theirs.
@@ -223,7 +235,7 @@ impl<'a> Joiner<'a> {
         self.beyond(side).is_some_and(|stacks| !stacks.is_grounded && height < stacks.sills[x])
     }
 
-    /// Adds the links of a column over a side: those to columns of other layers, which the cell to the west or north owns, and
+    /// Adds the links of a column over a side: those to columns of other layers or over cliffs, which the cell to the west or north owns, and
     /// the one to the outside.
     fn join(&self, links: &mut Links, at: [usize; 2], layer: usize, i: usize, side: Side) {
         let columns = self.columns;
@@ -232,7 +244,7 @@ impl<'a> Joiner<'a> {
         let beyond = self.beyond(side);
         if let (Some([x, _]), Some(stacks)) = (cell.filter(|_| is_owner), beyond) {
             for (other, j) in stacks.columns(columns, x).enumerate() {
-                if other != layer && columns.overlap(i, j) {
+                if columns.overlap(i, j) && (other != layer || self.cliffs.has(columns, i, j)) {
                     let along = 4 * (i64::from(columns.bases()[j]) - i64::from(columns.bases()[i]));
                     let across = self.across(i, side) + self.across(j, side);
                     links.add(i, j as u32, side, self.open(along, across), 0);
@@ -246,7 +258,7 @@ impl<'a> Joiner<'a> {
                 (columns.grid.cell / columns.heights.unit).min(f64::from(i32::MAX / 2)) as i64
             } else {
                 // The ground goes on as it comes, but never rises.
-                let inner = self.beside(i, side.opposite()).filter(|&j| columns.overlap(i, j));
+                let inner = beside(columns, i, side.opposite()).filter(|&j| columns.overlap(i, j));
                 inner.map_or(0, |j| (i64::from(columns.bases()[j]) - base).max(0))
             };
             let open = self.open(4 * fall, 2 * self.across(i, side));
@@ -263,19 +275,5 @@ impl<'a> Joiner<'a> {
         let row = usize::from(i >= self.starts[1]);
         let rises = if side.is_along_x() { &self.rises[row].z } else { &self.rises[row].x };
         i64::from(rises[i - self.starts[row]])
-    }
-
-    /// The index of the same layer beyond a side.
-    fn beside(&self, i: usize, side: Side) -> Option<usize> {
-        let (strip, place) = (i / STRIP, i % STRIP);
-        let at = |strip: u32| (strip != NONE).then(|| strip as usize * STRIP + place);
-        match side {
-            Side::East if place + 1 < STRIP => Some(i + 1),
-            Side::East => self.columns.east(strip).map(|next| next * STRIP),
-            Side::West if place > 0 => Some(i - 1),
-            Side::West => self.columns.west(strip).map(|before| before * STRIP + STRIP - 1),
-            Side::South => at(self.columns.south(strip)),
-            Side::North => at(self.columns.north(strip)),
-        }
     }
 }

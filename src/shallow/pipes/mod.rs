@@ -2,8 +2,9 @@
 //!
 //! A pipe joins two columns of adjacent cells whose [b, max] overlap. Those between columns of one layer are *regular*: each column owns
 //! the one to its east and the one to its south, so that they are arrays beside the columns. All others are *links*, in a list: between
-//! layers, and to the outside.
+//! layers, to the outside, and, where liquid may fall freely, over cliffs.
 
+pub(super) mod cliffs;
 pub(super) mod joints;
 mod slopes;
 
@@ -11,6 +12,7 @@ use std::ops::Range;
 
 use crate::shallow::columns::{Columns, NONE, STRIP, resize_part};
 use crate::shallow::per_column::{Array, PerColumn};
+use cliffs::Cliffs;
 use joints::{Finder, Side};
 
 /// What lies beyond the border of the domain.
@@ -63,13 +65,18 @@ pub struct Pipes {
 impl Pipes {
     /// The pipes between columns, and over the border of the domain.
     pub fn new(columns: &Columns, border: Border) -> Self {
+        Self::with_cliffs(columns, border, Cliffs::NONE)
+    }
+
+    /// As [`Pipes::new`], but pipes over cliffs are links.
+    pub(super) fn with_cliffs(columns: &Columns, border: Border, cliffs: Cliffs) -> Self {
         let mut pipes = Self {
             east: PerColumn::new(Array::OpenEast, columns.len(), 0.0),
             south: PerColumn::new(Array::OpenSouth, columns.len(), 0.0),
             links: Links { rows: vec![0], ..Links::default() },
         };
         let (rows, open) = (0..columns.grid.size[1], [&mut pipes.east[..], &mut pipes.south[..]]);
-        Finder::default().find(columns, border, rows, open, &mut pipes.links);
+        Finder::default().find(columns, (border, cliffs), rows, open, &mut pipes.links);
         pipes.links.list_columns(columns, &mut Ends::default());
         pipes
     }

@@ -86,19 +86,19 @@ impl Carry {
         let old_to = if to == NONE { Some(NONE) } else { change.origins.column(to) };
         let Some(old_to) = old_to else { return [0.0; 2] };
         let place = change.old_strip(old_from);
-        if old_to != NONE && change.old_strip(old_to).layer == place.layer {
-            return change.regular(flow, old_from, side);
-        }
         let row = place.row as usize - self.rows.start;
         let x = place.at * STRIP as u32 + old_from % STRIP as u32;
         let links = &self.old[self.starts[row] as usize..self.starts[row + 1] as usize];
         let first = links.partition_point(|link| link.x < x);
-        let links = links[first..].iter().take_while(|link| link.x == x);
-        links
-            .filter(|link| (link.from, link.to, link.side) == (old_from, old_to, side))
-            .map(|link| link.carried)
-            .next()
-            .unwrap_or_default()
+        let mut links = links[first..].iter().take_while(|link| link.x == x);
+        let link = links.find(|link| (link.from, link.to, link.side) == (old_from, old_to, side));
+        match link {
+            Some(link) => link.carried,
+            None if old_to != NONE && change.old_strip(old_to).layer == place.layer => {
+                change.regular(flow, old_from, side)
+            }
+            None => [0.0; 2],
+        }
     }
 
     /// Carries the regular pipes of the band's rows, and those to the south of the row before, which are in place.

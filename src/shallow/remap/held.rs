@@ -66,8 +66,14 @@ impl Default for Held {
 }
 
 impl Held {
+    /// Makes room for so many more parcels.
+    pub(super) fn reserve(&mut self, parcels: usize) {
+        self.parcels.reserve(256 + parcels);
+        self.offers.reserve(1024 + 4 * parcels);
+    }
+
     /// Adds liquid that finds no room in its cell (`Grid::index`).
-    pub(super) fn add(&mut self, cell: usize, height: i32, units: i64) {
+    pub(in crate::shallow) fn add(&mut self, cell: usize, height: i32, units: i64) {
         if units > 0 {
             self.parcels.push(Parcel { cell: cell as u32, height, units });
         }

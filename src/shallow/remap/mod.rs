@@ -18,6 +18,7 @@ use std::ops::Range;
 
 use super::Shallow;
 use super::columns::STRIP;
+use super::falls::Falls;
 use super::identity::Identity;
 use super::pipes::joints::Finder;
 use super::pipes::{Ends, Links};
@@ -62,6 +63,15 @@ pub struct Remap {
     /// New links of the rows that change.
     links: Links,
     pub(super) held: Held,
+}
+
+impl Remap {
+    /// With room for so many parcels of liquid that waits, beside those of a terrain that moves.
+    pub(super) fn new(parcels: usize) -> Self {
+        let mut remap = Self::default();
+        remap.held.reserve(parcels);
+        remap
+    }
 }
 
 impl Shallow {
@@ -158,14 +168,13 @@ impl Shallow {
             return Moved { held: self.remap.held.units() as f64 * volume, ..Moved::default() };
         }
         let around = rows.start.saturating_sub(1)..(rows.end + 1).min(self.columns.grid.size[1]);
+        self.let_go_of(around.clone());
         let displaced = self.relay(cast, rows.clone(), around.clone());
         let is_same = self.join(around.clone());
         self.identity = Identity::new();
-        let (columns, flow) = (&self.columns, &mut self.flow);
-        flow.refit(columns, &self.pipes, rows, is_same);
-        self.flows.find_again(columns);
-        let fallen = self.remap.held.settle(columns, flow);
-        flow.links.lost += fallen;
+        self.flow.refit(&self.columns, &self.pipes, rows, is_same);
+        self.flows.find_again(&self.columns);
+        let fallen = self.land_buried() + self.release();
         Moved {
             cells: self.remap.dirty.count(),
             displaced: displaced as f64 * volume,
@@ -203,10 +212,11 @@ impl Shallow {
 
     /// Finds the pipes of rows anew, and what they carry; whether the links join the columns that they did.
     fn join(&mut self, rows: Range<usize>) -> bool {
-        let Self { columns, pipes, flow, remap, params, .. } = self;
+        let Self { columns, pipes, flow, remap, params, falls, .. } = self;
         let Remap { band, origins, carry, finder, ends, links, .. } = remap;
         links.clear();
-        finder.find(columns, params.border, rows.clone(), [&mut pipes.east, &mut pipes.south], links);
+        let beyond = (params.border, Falls::cliffs(params.falls.as_ref(), columns));
+        finder.find(columns, beyond, rows.clone(), [&mut pipes.east, &mut pipes.south], links);
         let change = Change { columns, band, origins };
         carry.links(&change, flow, links);
         carry.regular(&change, pipes, flow);
@@ -214,7 +224,10 @@ impl Shallow {
         let old = pipes.links.row(rows.start).start..pipes.links.row(rows.end - 1).end;
         let shift = origins.shift().wrapping_mul(STRIP as u32);
         let is_same = shift == 0 && carry.is_same(links);
-        flow.links.replace(old, &carry.flux, &carry.left);
+        flow.links.replace(old.clone(), &carry.flux, &carry.left);
+        if params.falls.is_some() {
+            falls.replace(old.clone(), links.len());
+        }
         pipes.links.replace_rows(rows, links, shift);
         if !is_same {
             pipes.links.list_columns(columns, ends);
@@ -222,9 +235,10 @@ impl Shallow {
         is_same
     }
 
-    /// Gives liquid that waits for room what there is now.
-    pub(super) fn release(&mut self) {
+    /// Gives liquid that waits for room what there is now; returns what fell into the void (units).
+    pub(super) fn release(&mut self) -> i64 {
         let fallen = self.remap.held.settle(&self.columns, &mut self.flow);
         self.flow.links.lost += fallen;
+        fallen
     }
 }

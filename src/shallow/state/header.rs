@@ -6,13 +6,14 @@ use super::{Put, heads};
 use crate::base::bytes::Reader;
 use crate::error::Result;
 use crate::shallow::columns::STRIP;
+use crate::shallow::falls::{LIP, PACKET};
 use crate::shallow::flow::active::runs;
 use crate::shallow::system::Shallow;
 
 pub(super) const MAGIC: [u8; 8] = *b"frz shal";
-pub(super) const VERSION: u32 = 1;
+pub(super) const VERSION: u32 = 2;
 /// Bytes of the header.
-pub(super) const HEADER: usize = 136;
+pub(super) const HEADER: usize = 160;
 /// Bytes of the hash.
 pub(super) const SEAL: usize = 16;
 /// Bytes of a strip's share of an array.
@@ -33,6 +34,9 @@ pub(super) struct Counts {
     pub(super) heads: usize,
     /// Parcels of liquid that waits for room.
     pub(super) parcels: usize,
+    /// Packets in the air, and links that liquid may fall from.
+    pub(super) packets: usize,
+    pub(super) lips: usize,
 }
 
 impl Counts {
@@ -48,6 +52,8 @@ impl Counts {
             links: flow.links.flux.len(),
             heads: heads(shallow).count(),
             parcels: shallow.remap.held.parcels().len(),
+            packets: shallow.falls.packets().len(),
+            lips: shallow.falls.waiting().len(),
         }
     }
 
@@ -57,6 +63,8 @@ impl Counts {
             + 8 * self.runs
             + 4 * self.rows
             + 16 * self.parcels
+            + PACKET * self.packets
+            + LIP * self.lips
             + 24 * self.points
             + 8 * self.links
             + (4 + SHARE) * self.heads
@@ -65,7 +73,8 @@ impl Counts {
     }
 }
 
-/// What comes first: magic, version, border, hash of the terrain, length of all, counts, times, level outside, sums.
+/// What comes first: magic, version, border, hash of the terrain, length of all, counts, times, level outside, sums, when
+/// packets were made last.
 pub(super) struct Header {
     pub(super) border: u32,
     pub(super) terrain: [u8; 16],
@@ -76,12 +85,16 @@ pub(super) struct Header {
     pub(super) still: i32,
     /// Units poured, sourced, drained, absorbed, lost and gained.
     pub(super) sums: [i64; 6],
+    /// Seconds since packets were made, and how often they were.
+    pub(super) since: f64,
+    pub(super) tick: u64,
 }
 
 impl Header {
     pub(super) fn put(&self, to: &mut Put<'_>) {
-        let Counts { runs, strips, rows, points, links, heads, parcels } = self.counts;
-        let counts = [runs, strips, rows, points, links, heads, parcels].map(|count| count as u32);
+        let Counts { runs, strips, rows, points, links, heads, parcels, packets, lips } = self.counts;
+        let counts =
+            [runs, strips, rows, points, links, heads, parcels, packets, lips].map(|count| count as u32);
         to.bytes(&MAGIC);
         to.numbers(&[VERSION, self.border], u32::to_le_bytes);
         to.bytes(&self.terrain);
@@ -90,6 +103,8 @@ impl Header {
         to.numbers(&self.times, f64::to_le_bytes);
         to.numbers(&[self.still], i32::to_le_bytes);
         to.numbers(&self.sums, i64::to_le_bytes);
+        to.numbers(&[self.since], f64::to_le_bytes);
+        to.numbers(&[self.tick], u64::to_le_bytes);
     }
 
     /// Reads a header whose magic, version and length are right.
@@ -100,13 +115,15 @@ impl Header {
         let mut count = || from.u32().map(|count| count as usize);
         let (runs, strips, rows) = (count()?, count()?, count()?);
         let (points, links, heads, parcels) = (count()?, count()?, count()?, count()?);
+        let (packets, lips) = (count()?, count()?);
         let times = [from.f64()?, from.f64()?];
         let still = from.u32()? as i32;
         let mut sums = [0; 6];
         for sum in &mut sums {
             *sum = i64::from_le_bytes(from.take()?);
         }
-        let counts = Counts { runs, strips, rows, points, links, heads, parcels };
-        Ok(Self { border, terrain, counts, times, still, sums })
+        let (since, tick) = (from.f64()?, u64::from_le_bytes(from.take()?));
+        let counts = Counts { runs, strips, rows, points, links, heads, parcels, packets, lips };
+        Ok(Self { border, terrain, counts, times, still, sums, since, tick })
     }
 }

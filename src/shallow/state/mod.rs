@@ -9,6 +9,8 @@
 //! | runs of active strips: the first, and how many | 8 each |
 //! | at least the greatest depth of each row | 4 each |
 //! | liquid that waits for room: its cell, its height, units | 16 each |
+//! | packets in the air | [`PACKET`] each |
+//! | what waits at links to fall, if the liquid has falls | [`LIP`] each |
 //! | flow points: what it does, nothing, units it waits for, units it has moved | 24 each |
 //! | fluxes of links, then what truncation left of them | 4 each |
 //! | strips of full columns with heads, then their heads | 4 each, then 64 each |
@@ -22,6 +24,7 @@ use std::ops::{Range, RangeInclusive};
 use xxhash_rust::xxh3::xxh3_128;
 
 use super::columns::{Columns, STRIP};
+use super::falls::{LIP, PACKET, Packet, Waiting};
 use super::flow::active::runs;
 use super::flows::Kind;
 use super::grid::{BOTTOMLESS, TOP};
@@ -85,7 +88,7 @@ impl Shallow {
     ///
     /// # Errors
     /// `Bytes`, and the liquid is as it was: a state that is not of a shallow liquid, of another version, cut short or damaged; of another
-    /// terrain or border; with another count of flow points, or with other kinds.
+    /// terrain or border, or with other falls; with another count of flow points, or with other kinds.
     pub fn restore(&mut self, bytes: &[u8]) -> Result<()> {
         let saved = Saved::read(bytes)?;
         saved.check(self)?;
@@ -103,6 +106,8 @@ impl Shallow {
         }
         to.numbers(flow.bands().row_depths(), i32::to_le_bytes);
         self.remap.held.parcels().iter().for_each(|parcel| to.bytes(&parcel.to_bytes()));
+        self.falls.packets().iter().for_each(|packet| to.bytes(&packet.to_bytes()));
+        self.falls.waiting().iter().for_each(|waiting| to.bytes(&waiting.to_bytes()));
         for (kind, waiting, moved) in self.flows.progress() {
             to.numbers(&[code_of_kind(kind), 0], u32::to_le_bytes);
             to.bytes(&waiting.to_le_bytes());
@@ -132,6 +137,8 @@ impl Shallow {
             times: [self.time, self.flow.last],
             still: self.still,
             sums: [self.poured, flows.sourced, flows.drained, flows.absorbed, links.lost, links.gained],
+            since: self.falls.since,
+            tick: self.falls.tick,
         }
     }
 }
@@ -149,6 +156,8 @@ struct Saved<'a> {
     runs: &'a [[u8; 8]],
     row_depths: &'a [[u8; 4]],
     parcels: &'a [[u8; 16]],
+    packets: &'a [[u8; PACKET]],
+    lips: &'a [[u8; LIP]],
     points: &'a [[u8; 24]],
     /// Fluxes, then what truncation left.
     links: &'a [[u8; 4]],
@@ -186,6 +195,8 @@ impl<'a> Saved<'a> {
             runs: parts(&mut from, counts.runs)?,
             row_depths: parts(&mut from, counts.rows)?,
             parcels: parts(&mut from, counts.parcels)?,
+            packets: parts(&mut from, counts.packets)?,
+            lips: parts(&mut from, counts.lips)?,
             points: parts(&mut from, counts.points)?,
             links: parts(&mut from, 2 * counts.links)?,
             head_strips: parts(&mut from, counts.heads)?,
@@ -204,6 +215,12 @@ impl<'a> Saved<'a> {
         if header.border != code_of_border(shallow.params.border) {
             return Err(refused("belongs to a liquid with another border"));
         }
+        // On the same terrain only cliffs make other links.
+        let (links, most) =
+            (shallow.flow.links.flux.len(), shallow.params.falls.map_or(0, |falls| falls.most));
+        if (counts.links, counts.lips) != (links, shallow.falls.waiting().len()) || counts.packets > most {
+            return Err(refused("belongs to a liquid with other falls"));
+        }
         let own = shallow.flows.progress();
         if own.len() != self.points.len() {
             let (saved, own) = (self.points.len(), own.len());
@@ -218,7 +235,6 @@ impl<'a> Saved<'a> {
         }
         let strips = shallow.columns.strips().len();
         let fits = counts.rows == shallow.flow.bands().row_depths().len()
-            && counts.links == shallow.flow.links.flux.len()
             && is_in_order(self.runs().map(|run| run.start..run.end), strips)
             && self.runs().map(|run| run.len()).sum::<usize>() == counts.strips
             && is_in_order(self.head_strips().map(|strip| strip..strip + 1), strips);
@@ -237,11 +253,18 @@ impl<'a> Saved<'a> {
             && self.points.iter().all(|point| SUMS.contains(&i64::from_le_bytes(part(point, 16))))
             && self.row_depths.iter().all(within)
             && self.parcels().all(|parcel| parcel.is_of(columns) && SUMS.contains(&parcel.units))
+            && self.has_good_falls(columns)
             && self.parcels().is_sorted_by(|a, b| a.cell < b.cell)
             && !is_over(fluxes, MOST_FLUX)
             && !is_over(left, 1.0)
             && !is_over(heads, f32::MAX)
             && !self.has_bad_columns(columns)
+    }
+
+    fn has_good_falls(&self, columns: &Columns) -> bool {
+        (0.0..=1e6).contains(&self.header.since)
+            && self.packets().all(|packet| packet.is_of(columns) && SUMS.contains(&packet.units))
+            && self.lips().all(|waiting| waiting.is_good() && SUMS.contains(&waiting.units))
     }
 
     fn has_bad_columns(&self, columns: &Columns) -> bool {
@@ -256,6 +279,14 @@ impl<'a> Saved<'a> {
 
     fn parcels(&self) -> impl Iterator<Item = Parcel> {
         self.parcels.iter().map(Parcel::from_bytes)
+    }
+
+    fn packets(&self) -> impl Iterator<Item = Packet> {
+        self.packets.iter().map(Packet::from_bytes)
+    }
+
+    fn lips(&self) -> impl Iterator<Item = Waiting> {
+        self.lips.iter().map(Waiting::from_bytes)
     }
 
     fn head_strips(&self) -> impl Iterator<Item = usize> {
@@ -277,8 +308,10 @@ impl<'a> Saved<'a> {
 
     /// Puts the state in place.
     fn apply(&self, shallow: &mut Shallow) {
-        let Shallow { flow, flows, columns, remap, .. } = &mut *shallow;
+        let Shallow { flow, flows, columns, remap, falls, .. } = &mut *shallow;
         remap.held.set(self.parcels());
+        falls.set(self.packets(), self.lips());
+        (falls.since, falls.tick) = (self.header.since, self.header.tick);
         let [poured, sourced, drained, absorbed, lost, gained] = self.header.sums;
         let mut stored = flow.stored();
         let mut end = 0;

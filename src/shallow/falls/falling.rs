@@ -1,0 +1,328 @@
+//! Packets from the lip to the ground, step by step: all that is in the air.
+
+use std::ops::Range;
+
+use super::Falls;
+use super::flight::{Air, End};
+use super::packet::Packet;
+use crate::shallow::columns::{Columns, NONE, resize_part};
+use crate::shallow::flow::Flow;
+use crate::shallow::flow::lips::Over;
+use crate::shallow::pipes::Links;
+use crate::shallow::pipes::cliffs::beside;
+use crate::shallow::pipes::joints::Side;
+use crate::shallow::system::Shallow;
+
+/// Bytes of a lip in a saved state.
+pub(in crate::shallow) const LIP: usize = 24;
+/// What is less than a drop waits for so many intervals.
+const PATIENCE: u32 = 60;
+/// Depth at the brink of a free overfall, of the critical depth (Rouse 1936).
+const BRINK: f64 = 0.715;
+
+/// What went over a link and is no packet yet.
+#[derive(Debug, Clone, Copy, Default, PartialEq)]
+pub(in crate::shallow) struct Waiting {
+    /// How much it is (units), 0 and up.
+    pub units: i64,
+    /// Its speed outward (cells/s), times units.
+    pub impulse: f64,
+    /// Which way it fell last: from the link's second column.
+    pub is_back: bool,
+    /// Intervals that it waits for.
+    pub waits: u32,
+}
+
+/// All that is in the air.
+#[derive(Debug, Clone, Default)]
+pub(in crate::shallow) struct Falling {
+    /// In the order in which they were made.
+    packets: Vec<Packet>,
+    /// By link; none without falls.
+    waiting: Vec<Waiting>,
+    /// Columns that packets land on in a step, and units; kept, so that nothing is allocated again.
+    landed: Vec<(u32, i64)>,
+    /// Seconds since packets were made last, and how often they were.
+    pub since: f64,
+    pub tick: u64,
+}
+
+impl Falling {
+    /// Nothing in the air yet, and room for what may be.
+    pub fn new(falls: Option<&Falls>, links: usize) -> Self {
+        let Some(falls) = falls else { return Self::default() };
+        Self {
+            packets: Vec::with_capacity(falls.most),
+            waiting: vec![Waiting::default(); links],
+            landed: Vec::with_capacity(falls.most),
+            ..Self::default()
+        }
+    }
+
+    /// Memory (bytes).
+    pub fn bytes(&self) -> usize {
+        self.packets.capacity() * (size_of::<Packet>() + size_of::<(u32, i64)>())
+            + size_of_val(&self.waiting[..])
+    }
+
+    /// All packets.
+    pub fn packets(&self) -> &[Packet] {
+        &self.packets
+    }
+
+    /// What waits at each link.
+    pub fn waiting(&self) -> &[Waiting] {
+        &self.waiting
+    }
+
+    /// Puts back what [`Falling::packets`] and [`Falling::waiting`] were, as many as there are links.
+    pub fn set(&mut self, packets: impl Iterator<Item = Packet>, waiting: impl Iterator<Item = Waiting>) {
+        self.packets.clear();
+        self.packets.extend(packets);
+        self.waiting.iter_mut().zip(waiting).for_each(|(to, waiting)| *to = waiting);
+    }
+
+    /// Units in the air.
+    pub fn units(&self) -> i64 {
+        let packets: i64 = self.packets.iter().map(|packet| packet.units).sum();
+        packets + self.waiting.iter().map(|waiting| waiting.units).sum::<i64>()
+    }
+
+    /// Gives some links another count, at which nothing waits.
+    pub fn replace(&mut self, links: Range<usize>, count: usize) {
+        let new = links.start..links.start + count;
+        resize_part(&mut self.waiting, links, count, Waiting::default());
+        self.waiting[new].fill(Waiting::default());
+    }
+}
+
+impl Waiting {
+    /// Its numbers, for a saved state.
+    pub fn to_bytes(self) -> [u8; LIP] {
+        let last = u64::from(self.waits) | u64::from(self.is_back) << 32;
+        let mut bytes = [0; LIP];
+        let numbers = [self.units as u64, self.impulse.to_bits(), last];
+        bytes.as_chunks_mut().0.iter_mut().zip(numbers).for_each(|(to, number)| *to = number.to_le_bytes());
+        bytes
+    }
+
+    /// As [`Waiting::to_bytes`] has written it.
+    pub fn from_bytes(bytes: &[u8; LIP]) -> Self {
+        let [units, impulse, last] = std::array::from_fn(|at| u64::from_le_bytes(bytes.as_chunks().0[at]));
+        Self {
+            units: units as i64,
+            impulse: f64::from_bits(impulse),
+            is_back: last >> 32 != 0,
+            waits: last as u32,
+        }
+    }
+
+    /// Whether it is such as a liquid may have.
+    pub fn is_good(&self) -> bool {
+        self.units >= 0 && (0.0..1e60).contains(&self.impulse)
+    }
+}
+
+impl Shallow {
+    /// Finds the links that liquid falls freely from in the next step.
+    pub(in crate::shallow) fn find_lips(&mut self) {
+        if self.params.falls.is_some() {
+            let cliffs = Falls::cliffs(self.params.falls.as_ref(), &self.columns);
+            self.flow.find_lips(&self.columns, &self.pipes.links, cliffs);
+        }
+    }
+
+    /// What falls, in a step of `dt` (s) that the flow has made.
+    pub(in crate::shallow) fn fall(&mut self, dt: f64) {
+        let Some(falls) = self.params.falls else { return };
+        self.fly(dt);
+        self.gather(dt);
+        self.falls.since += dt;
+        // Steps that add up to an interval but for rounding make one.
+        if self.falls.since >= falls.interval * (1.0 - 1e-9) {
+            self.falls.since = 0.0;
+            self.falls.tick += 1;
+            self.let_go(&falls, 0..self.pipes.links.len(), false);
+        }
+    }
+
+    /// Moves all packets, and lands those that meet something. All fly over the same surfaces, so that nothing depends on their order.
+    fn fly(&mut self, dt: f64) {
+        let mut packets = std::mem::take(&mut self.falls.packets);
+        let mut landed = std::mem::take(&mut self.falls.landed);
+        let (air, mut lost) = (self.air(), 0);
+        packets.retain_mut(|packet| {
+            let end = air.fly(packet, dt);
+            match end {
+                End::Flies => {}
+                End::Lands(column) => landed.push((column as u32, packet.units)),
+                End::Leaves => lost += packet.units,
+            }
+            end == End::Flies
+        });
+        self.flow.links.lost += lost;
+        self.falls.packets = packets;
+        self.land_all(landed);
+    }
+
+    /// Adds what has landed to its columns, and gives what finds no room there to those around; returns what falls from there into the void.
+    fn land_all(&mut self, mut landed: Vec<(u32, i64)>) -> i64 {
+        let mut waits = false;
+        for (column, units) in landed.drain(..) {
+            waits |= self.land(column as usize, units);
+        }
+        self.falls.landed = landed;
+        if waits { self.release() } else { 0 }
+    }
+
+    fn air(&self) -> Air<'_> {
+        let (grid, [x, y, z]) = (self.columns.grid, self.params.gravity);
+        Air {
+            columns: &self.columns,
+            depth: &self.flow.depth,
+            border: self.params.border,
+            lean: [x / grid.cell, z / grid.cell],
+            pull: -y / self.columns.heights.unit,
+        }
+    }
+
+    /// Adds units to a column; whether some find no room there and wait.
+    fn land(&mut self, column: usize, units: i64) -> bool {
+        let (columns, flow) = (&self.columns, &mut self.flow);
+        let rest = units - flow.add(columns, column, units);
+        let cell = columns.grid.index(columns.cell(column));
+        self.remap.held.add(cell, columns.bases()[column], rest);
+        rest > 0
+    }
+
+    /// Takes what went over the lips in a step of `dt` (s).
+    fn gather(&mut self, dt: f64) {
+        let Self { columns, pipes, flow, falls, params, .. } = self;
+        let width = columns.heights.unit * columns.grid.cell / dt;
+        for over in flow.lips.over(&pipes.links, &flow.links) {
+            let is_back = over.from != pipes.links.from[over.link];
+            let side = outward(&pipes.links, over.link, is_back);
+            // Flux over section, in cells: the part of its column that went in a step. Thin liquid is gone before it is as fast as that.
+            let flux = over.units as f64 / (f64::from(over.depth.max(1)) * dt);
+            let brink =
+                libm::cbrt(-params.gravity[1] * over.units as f64 * width) / (BRINK * columns.grid.cell);
+            let speed = flux.min(brink.max(arriving(columns, flow, &over, side)));
+            let waiting = &mut falls.waiting[over.link];
+            waiting.is_back = is_back;
+            waiting.units += over.units;
+            waiting.impulse += over.units as f64 * speed;
+        }
+    }
+
+    /// Makes packets of what waits at some links, if it is enough or `all` is wanted. Where there would be too many packets, it lands at once: all of it,
+    /// so that it does not depend on the links' order.
+    fn let_go(&mut self, falls: &Falls, links: Range<usize>, all: bool) {
+        let (columns, waiting) = (&self.columns, &mut self.falls.waiting);
+        let least = falls.drop / (columns.grid.cell * columns.grid.cell * columns.heights.unit);
+        let mut count = 0;
+        for waiting in waiting[links.clone()].iter_mut().filter(|waiting| waiting.units > 0) {
+            waiting.waits += u32::from(!all);
+            count += usize::from(waiting.goes(least, all));
+        }
+        let fits = self.falls.packets.len() + count <= falls.most;
+        let mut waits = false;
+        for link in links {
+            let waiting = self.falls.waiting[link];
+            if waiting.units == 0 || !waiting.goes(least, all) {
+                continue;
+            }
+            self.falls.waiting[link] = Waiting::default();
+            if fits {
+                let packet = self.packet(link, &waiting);
+                self.falls.packets.push(packet);
+                continue;
+            }
+            let links = &self.pipes.links;
+            match if waiting.is_back { links.from[link] } else { links.to[link] } {
+                NONE => self.flow.links.lost += waiting.units,
+                below => waits |= self.land(below as usize, waiting.units),
+            }
+        }
+        if waits {
+            self.release();
+        }
+    }
+
+    /// A packet at the beginning of its flight: at the side of the cell that it falls into.
+    fn packet(&self, link: usize, waiting: &Waiting) -> Packet {
+        let (columns, links) = (&self.columns, &self.pipes.links);
+        let from = (if waiting.is_back { links.to[link] } else { links.from[link] }) as usize;
+        let side = outward(links, link, waiting.is_back);
+        let own = columns.cell(from);
+        let cell = side.cell(own, columns.grid.size).expect("the border has no lips").map(|at| at as u32);
+        let speed = waiting.impulse / waiting.units as f64;
+        let (offset, along) = match side {
+            Side::East => ([-0.5, 0.0], [speed, 0.0]),
+            Side::West => ([0.5, 0.0], [-speed, 0.0]),
+            Side::South => ([0.0, -0.5], [0.0, speed]),
+            Side::North => ([0.0, 0.5], [0.0, -speed]),
+        };
+        let lip = (columns.grid.index(own) * 4 + side as usize) as u64;
+        Packet {
+            cell,
+            offset,
+            height: f64::from(columns.bases()[from]),
+            down: 0.0,
+            along,
+            age: 0.0,
+            units: waiting.units,
+            source: lip << 16 | columns.layer(from) as u64,
+            tick: self.falls.tick,
+        }
+    }
+
+    /// Makes packets of all that waits at the links of rows, before these change.
+    pub(in crate::shallow) fn let_go_of(&mut self, rows: Range<usize>) {
+        if let Some(falls) = self.params.falls {
+            let links = &self.pipes.links;
+            let links = links.row(rows.start).start..links.row(rows.end - 1).end;
+            self.let_go(&falls, links, true);
+        }
+    }
+
+    /// Lands the packets that are in solid now, on the column above it, after the terrain has moved; returns what falls from
+    /// there into the void (units).
+    pub(in crate::shallow) fn land_buried(&mut self) -> i64 {
+        let mut packets = std::mem::take(&mut self.falls.packets);
+        let mut landed = std::mem::take(&mut self.falls.landed);
+        let air = self.air();
+        packets.retain(|packet| {
+            let above = air.above_solid(packet);
+            landed.extend(above.map(|column| (column as u32, packet.units)));
+            above.is_none()
+        });
+        self.falls.packets = packets;
+        self.land_all(landed)
+    }
+}
+
+impl Waiting {
+    fn goes(&self, least: f64, all: bool) -> bool {
+        all || self.units as f64 >= least || self.waits >= PATIENCE
+    }
+}
+
+/// The side that liquid falls over, seen from the column that it leaves.
+fn outward(links: &Links, link: usize, is_back: bool) -> Side {
+    if is_back { links.sides[link].opposite() } else { links.sides[link] }
+}
+
+/// The speed (cells/s) of what arrives at a lip from the column behind it, which gives over regular pipes: 0 where it does not.
+fn arriving(columns: &Columns, flow: &Flow, over: &Over, side: Side) -> f64 {
+    let from = over.from as usize;
+    let Some(behind) = beside(columns, from, side.opposite()) else { return 0.0 };
+    let [east, south] = &flow.flux;
+    let flux = match side {
+        Side::East => east[behind],
+        Side::West => -east[from],
+        Side::South => south[behind],
+        Side::North => -south[from],
+    };
+    let depth = flow.depth[behind];
+    if flux <= 0.0 || depth <= 0 { 0.0 } else { f64::from(flux) / (f64::from(depth) * flow.last) }
+}

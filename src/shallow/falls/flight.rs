@@ -1,0 +1,301 @@
+//! The flight of packets: ballistics without drag, in closed form from cell to cell, and what a packet meets.
+//!
+//! Places are those of a cell and offsets from its centre, heights those of the lattice: a scene that is turned or mirrored has the same flights, bit
+//! for bit. A packet is followed from one side of a cell to the next, and meets the surface of the column that it is over wherever it passes
+//! it: no step is so long that it goes through one.
+
+use super::packet::Packet;
+use crate::shallow::columns::Columns;
+use crate::shallow::pipes::Border;
+
+/// What packets fly through.
+pub(super) struct Air<'a> {
+    pub columns: &'a Columns,
+    /// H of every column index (units).
+    pub depth: &'a [i32],
+    pub border: Border,
+    /// Gravity: along x and z (cells/s2), and downward (units/s2).
+    pub lean: [f64; 2],
+    pub pull: f64,
+}
+
+/// How a flight ends.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum End {
+    /// It goes on.
+    Flies,
+    /// On a column.
+    Lands(usize),
+    /// Outside of the domain.
+    Leaves,
+}
+
+/// What is at a height of a cell.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Place {
+    /// The room of a column, wet or not.
+    In(usize),
+    /// The solid below a column.
+    Solid(usize),
+    /// No ground below.
+    Void,
+}
+
+impl Air<'_> {
+    /// Moves a packet for `dt` (s), or until its flight ends.
+    pub fn fly(&self, packet: &mut Packet, dt: f64) -> End {
+        let mut left = dt;
+        let mut stopped = [false; 2];
+        packet.age += dt;
+        loop {
+            let (floor, end) = match self.place(packet.cell, packet.height) {
+                Place::Solid(above) => return End::Lands(above),
+                Place::In(column) => (self.surface(column), End::Lands(column)),
+                Place::Void => (0.0, End::Leaves),
+            };
+            if packet.height <= floor {
+                return end;
+            }
+            let exits =
+                [0, 1].map(|axis| if stopped[axis] { f64::INFINITY } else { self.exit(packet, axis) });
+            let first = exits[0].min(exits[1]);
+            let time = first.min(left);
+            if self.down(packet, packet.height - floor) <= time {
+                return end;
+            }
+            self.advance(packet, time, stopped);
+            left -= time;
+            if first > time {
+                return if packet.height <= floor { end } else { End::Flies };
+            }
+            let crossed = exits.map(|exit| exit == first);
+            match self.cross(packet, crossed) {
+                Crossed::Stopped(axes) => (0..2).for_each(|axis| stopped[axis] |= axes[axis]),
+                Crossed::Into(cell) => packet.cell = cell,
+                Crossed::Out => return End::Leaves,
+            }
+        }
+    }
+
+    /// What a packet is in, if that is solid: the column above it.
+    pub fn above_solid(&self, packet: &Packet) -> Option<usize> {
+        match self.place(packet.cell, packet.height) {
+            Place::Solid(above) => Some(above),
+            _ => None,
+        }
+    }
+
+    fn surface(&self, column: usize) -> f64 {
+        f64::from(self.columns.bases()[column] + self.depth[column])
+    }
+
+    fn place(&self, cell: [u32; 2], height: f64) -> Place {
+        let mut place = Place::Void;
+        for column in self.columns.of_cell(cell.map(|at| at as usize)) {
+            if height < f64::from(self.columns.bases()[column]) {
+                let is_below = height < f64::from(self.columns.unders()[column]);
+                // Below the ceiling of the column before it was found there.
+                return if is_below { Place::Void } else { Place::Solid(column) };
+            }
+            place = Place::In(column);
+            if height < f64::from(self.columns.ceilings()[column]) {
+                break;
+            }
+        }
+        place
+    }
+
+    /// The time (s) until a packet leaves its cell along an axis.
+    fn exit(&self, packet: &Packet, axis: usize) -> f64 {
+        let (at, speed, pull) = (packet.offset[axis], packet.along[axis], self.lean[axis]);
+        reach(0.5 - at, speed, pull).min(reach(0.5 + at, -speed, -pull))
+    }
+
+    /// The time (s) until a packet is so much lower (units).
+    fn down(&self, packet: &Packet, drop: f64) -> f64 {
+        let speed = packet.down;
+        2.0 * drop / (speed + (speed * speed + 2.0 * self.pull * drop).sqrt())
+    }
+
+    fn advance(&self, packet: &mut Packet, time: f64, stopped: [bool; 2]) {
+        for axis in (0..2).filter(|&axis| !stopped[axis]) {
+            let (speed, pull) = (packet.along[axis], self.lean[axis]);
+            packet.offset[axis] = (packet.offset[axis] + (speed + 0.5 * pull * time) * time).clamp(-0.5, 0.5);
+            packet.along[axis] = speed + pull * time;
+        }
+        packet.height -= (packet.down + 0.5 * self.pull * time) * time;
+        packet.down += self.pull * time;
+    }
+
+    /// Takes a packet over the sides of its cell that it has reached. Where there is a wall it stops, and falls down along it.
+    fn cross(&self, packet: &mut Packet, crossed: [bool; 2]) -> Crossed {
+        let size = self.columns.grid.size;
+        let (mut cell, mut is_out) = (packet.cell, [false; 2]);
+        let mut offset = packet.offset;
+        for axis in (0..2).filter(|&axis| crossed[axis]) {
+            // The side that is nearer: it is at one of them, but for rounding.
+            let ahead = packet.offset[axis] > 0.0;
+            packet.offset[axis] = if ahead { 0.5 } else { -0.5 };
+            offset[axis] = -packet.offset[axis];
+            let next = if ahead { cell[axis].wrapping_add(1) } else { cell[axis].wrapping_sub(1) };
+            is_out[axis] = next as usize >= size[axis];
+            cell[axis] = next;
+        }
+        let stops = if is_out.contains(&true) {
+            if self.border != Border::Closed {
+                return Crossed::Out;
+            }
+            is_out
+        } else if matches!(self.place(cell, packet.height), Place::Solid(_)) {
+            crossed
+        } else {
+            packet.offset = offset;
+            return Crossed::Into(cell);
+        };
+        (0..2).filter(|&axis| stops[axis]).for_each(|axis| packet.along[axis] = 0.0);
+        Crossed::Stopped(stops)
+    }
+}
+
+/// What is beyond a side of a cell.
+enum Crossed {
+    /// A wall, along these axes.
+    Stopped([bool; 2]),
+    /// Another cell.
+    Into([u32; 2]),
+    /// Nothing: the border is open.
+    Out,
+}
+
+/// The time (s) until something at rest or moving has gone a distance of 0 or more outward, with an acceleration; infinite if it never does.
+fn reach(distance: f64, speed: f64, pull: f64) -> f64 {
+    let square = speed * speed + 2.0 * pull * distance;
+    if speed > 0.0 && square >= 0.0 {
+        2.0 * distance / (speed + square.sqrt())
+    } else if pull > 0.0 {
+        // It comes back, or starts from rest.
+        (square.sqrt() - speed) / pull
+    } else {
+        f64::INFINITY
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    use crate::shallow::grid::{BOTTOMLESS, Grid, Heights};
+    use crate::shallow::terrain::Solids;
+
+    /// Cells of a millimetre; so many units in a metre.
+    const CELL: f64 = 0.001;
+    const METRE: f64 = (1 << 30) as f64 / 8.0;
+
+    /// Columns above the solids (m) of each cell, 8 m high.
+    fn columns(size: [usize; 2], cell: impl Fn([usize; 2]) -> Vec<[f64; 2]>) -> Columns {
+        let heights = Heights::between(0.0, 8.0).unwrap();
+        let solid = |[low, top]: [f64; 2]| {
+            [if low < 0.0 { BOTTOMLESS } else { heights.round(low) }, heights.round(top)]
+        };
+        let cells = (0..size[0] * size[1]).map(|index| cell([index % size[0], index / size[0]]));
+        let cells = cells.map(|cell| cell.into_iter().map(solid).collect::<Vec<_>>());
+        Columns::new(&Solids::new(Grid { cell: CELL, origin: [0.0; 2], size }, heights, cells))
+    }
+
+    /// How a flight ends that begins in the middle of a cell at a height (m), with a velocity (m/s), after steps of `dt` (s); and the packet.
+    fn end(
+        columns: &Columns,
+        border: Border,
+        (cell, height): ([u32; 2], f64),
+        [east, down, south]: [f64; 3],
+        dt: f64,
+    ) -> (End, Packet) {
+        let depth = vec![0; columns.len()];
+        let air = Air { columns, depth: &depth, border, lean: [0.0; 2], pull: 9.81 * METRE };
+        let mut packet = Packet {
+            cell,
+            offset: [0.0; 2],
+            height: height * METRE,
+            down: down * METRE,
+            along: [east / CELL, south / CELL],
+            age: 0.0,
+            units: 1,
+            source: 0,
+            tick: 0,
+        };
+        for _ in 0..10_000 {
+            match air.fly(&mut packet, dt) {
+                End::Flies => {}
+                end => return (end, packet),
+            }
+        }
+        (End::Flies, packet)
+    }
+
+    #[test]
+    fn ten_metres_a_second_pass_no_layer() {
+        // A sheet of 10 um over the ground, hit slantwise, in steps of 30 cm.
+        let sheet = columns([600, 4], |_| vec![[-1.0, 0.1], [0.5, 0.500_01]]);
+        for velocity in [[0.0, 10.0, 0.0], [5.0, 10.0, 0.0], [10.0, 0.1, 0.0], [8.0, 6.0, 0.002]] {
+            for height in [0.501, 0.65, 0.7] {
+                let (end, packet) = end(&sheet, Border::Closed, ([10, 1], height), velocity, 0.03);
+                let End::Lands(column) = end else { panic!("{end:?} {packet:?}") };
+                assert_eq!(sheet.layer(column), 1, "{velocity:?} from {height} m");
+            }
+        }
+        // A wall one cell thick: it falls down along it, onto the ground.
+        let wall = columns([600, 4], |[x, _]| vec![[-1.0, if x == 300 { 3.0 } else { 0.1 }]]);
+        for (cell, east) in [([10, 1], 10.0), ([590, 2], -10.0)] {
+            let (end, packet) = end(&wall, Border::Closed, (cell, 2.0), [east, 0.0, 0.0], 0.03);
+            let End::Lands(column) = end else { panic!("{end:?}") };
+            let [x, _] = wall.cell(column);
+            assert_eq!((x, packet.along[0]), (if east > 0.0 { 299 } else { 301 }, 0.0));
+        }
+        // Along both axes at once, through the corner of four cells.
+        let corner = columns([40, 40], |[x, z]| vec![[-1.0, if x + z >= 40 { 3.0 } else { 0.1 }]]);
+        let (end, packet) = end(&corner, Border::Closed, ([10, 10], 2.0), [10.0, 0.0, 10.0], 0.03);
+        assert!(matches!(end, End::Lands(column) if corner.cell(column) == [19, 19]), "{end:?} {packet:?}");
+    }
+
+    #[test]
+    fn a_flight_ends_where_the_parabola_meets_the_ground() {
+        let ground = columns([4000, 1], |_| vec![[-1.0, 0.1]]);
+        for (height, east) in [(1.1, 1.0), (0.6, 2.0), (3.1, 0.3), (7.9, 2.5)] {
+            for dt in [1e-3, 0.0137, 0.2, 3.0] {
+                let (end, _) = end(&ground, Border::Closed, ([0, 0], height), [east, 0.0, 0.0], dt);
+                let reach = east * (2.0 * (height - 0.1) / 9.81_f64).sqrt() + 0.5 * CELL;
+                let End::Lands(column) = end else { panic!("{end:?}") };
+                assert_eq!(ground.cell(column)[0], (reach / CELL) as usize, "{height} {east} {dt}");
+            }
+        }
+    }
+
+    #[test]
+    fn nowhere_is_outside_and_a_wall_is_not() {
+        let void = columns([30, 3], |[x, _]| if x > 10 { vec![] } else { vec![[0.5, 0.6]] });
+        let at = ([12, 1], 0.6);
+        assert_eq!(end(&void, Border::Closed, at, [0.01, 0.0, 0.0], 0.01).0, End::Leaves, "below");
+        let (over, packet) = end(&void, Border::Open, at, [1.0, 0.0, 0.0], 0.01);
+        assert!(over == End::Leaves && packet.age < 0.03, "over the border: {packet:?}");
+        let (below, packet) = end(&void, Border::Closed, at, [1.0, 0.0, 0.0], 0.01);
+        assert!(below == End::Leaves && packet.age > 0.3 && packet.cell[0] == 29, "{packet:?}");
+        // From the void below a slab it does not come up through it.
+        let back = end(&void, Border::Closed, ([12, 1], 0.55), [-1.0, 0.0, 0.0], 0.01);
+        assert!(back.0 == End::Leaves && back.1.cell[0] == 11 && back.1.along[0] == 0.0, "{back:?}");
+    }
+
+    #[test]
+    fn a_distance_is_reached_where_the_parabola_says() {
+        for (distance, speed, pull) in
+            [(0.3, 2.0, 0.0), (0.3, 2.0, 5.0), (0.3, -2.0, 5.0), (0.3, 2.0, -5.0), (0.9, 0.0, 3.0)]
+        {
+            let time = reach(distance, speed, pull);
+            let gone = speed * time + 0.5 * pull * time * time;
+            assert!((gone - distance).abs() < 1e-12, "{distance} {speed} {pull}: {gone} after {time} s");
+            assert!(speed + pull * time > 0.0, "outward");
+        }
+        assert_eq!(reach(0.3, 1.0, -5.0), f64::INFINITY);
+        assert_eq!(reach(0.3, -1.0, 0.0), f64::INFINITY);
+        assert_eq!((reach(0.0, 1.0, -5.0), reach(0.0, 0.0, 1.0)), (0.0, 0.0));
+    }
+}

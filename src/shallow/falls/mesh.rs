@@ -1,0 +1,357 @@
+//! A triangle mesh of the liquid in the air, written into the caller's buffers: a ball for each drop, and strands between drops that follow each
+//! other from one lip.
+//!
+//! A strand has the section that its drops' volume has over their distance. Where it is longer than 9.02 of its radii, the wavelength that
+//! grows fastest in a jet of little viscosity (Rayleigh 1878), it has broken into drops. Drops in a strand are as thick as it.
+
+use super::Droplet;
+use crate::error::{Error, Result};
+use crate::shallow::surface::{Counts, Indices, Layout, Up};
+
+/// Vertices and triangles of a ball: an icosahedron whose edges are halved.
+const BALL: [usize; 2] = [42, 80];
+/// Sides of a strand.
+const SIDES: usize = 6;
+/// Radius of the circle around a hexagon with the area of a circle of 1: sqrt(pi / (1.5 sqrt 3)).
+const AROUND: f64 = 1.099_636;
+/// Longest strand between two drops, in its radii.
+const LONGEST: f64 = 9.02;
+
+/// Buffers of the caller. They are written from their beginning, in order, and never read, and may be longer than the mesh; those that are
+/// absent are not wanted. The balls' vertices come first, in the order of their drops.
+#[derive(Debug, Default)]
+pub struct Target<'a> {
+    /// Three numbers a vertex (m x scale).
+    pub positions: Option<&'a mut [f32]>,
+    /// Three numbers a vertex: a unit vector.
+    pub normals: Option<&'a mut [f32]>,
+    /// Three numbers a vertex: velocity of its drop (m/s x scale).
+    pub velocities: Option<&'a mut [f32]>,
+    /// Three a triangle.
+    pub indices: Indices<'a>,
+}
+
+/// The largest counts that the mesh of so many drops can have.
+pub fn bound(drops: usize) -> Counts {
+    of(drops, drops.saturating_sub(1))
+}
+
+/// Counts of so many drops and strands; the strands' vertices are extras.
+fn of(drops: usize, strands: usize) -> Counts {
+    let extras = 2 * SIDES * strands;
+    let triangles = BALL[1] * drops + 2 * SIDES * strands;
+    Counts { vertices: BALL[0] * drops + extras, extras, indices: 3 * triangles }
+}
+
+/// A strand between two drops.
+#[derive(Debug, Clone, Copy)]
+struct Strand {
+    ends: [u32; 2],
+    radius: f64,
+}
+
+/// Makes meshes of drops; keeps its memory from one to the next.
+#[derive(Debug)]
+pub struct Balls {
+    /// Directions of a ball's vertices, and its triangles, counter-clockwise from outside.
+    vertices: Vec<[f64; 3]>,
+    triangles: Vec<[u32; 3]>,
+    /// Radius of the ball's vertices, for a volume of that of a ball of radius 1.
+    size: f64,
+    /// Drops by lip, as they followed each other.
+    order: Vec<u32>,
+    strands: Vec<Strand>,
+    /// Radius of each drop (m).
+    radii: Vec<f64>,
+}
+
+impl Default for Balls {
+    fn default() -> Self {
+        let (vertices, triangles) = ball();
+        let volume: f64 = triangles.iter().map(|t| volume(t.map(|at| vertices[at as usize]))).sum();
+        let size = libm::cbrt(4.0 / 3.0 * std::f64::consts::PI / volume);
+        Self { vertices, triangles, size, order: Vec::new(), strands: Vec::new(), radii: Vec::new() }
+    }
+}
+
+impl Balls {
+    /// Makes room for so many drops: from then on [`Balls::build`] allocates nothing for as many.
+    pub fn reserve(&mut self, drops: usize) {
+        self.order.clear();
+        self.order.reserve(drops);
+        self.strands.clear();
+        self.strands.reserve(drops);
+        self.radii.clear();
+        self.radii.reserve(drops);
+    }
+
+    /// Size of the mesh that [`Balls::build`] would write.
+    pub fn count(&mut self, drops: &[Droplet]) -> Counts {
+        self.order.clear();
+        self.order.extend(0..drops.len() as u32);
+        self.order.sort_unstable_by_key(|&at| (drops[at as usize].source, drops[at as usize].number, at));
+        self.strands.clear();
+        self.radii.clear();
+        self.radii.resize(drops.len(), 0.0);
+        for ends in self.order.windows(2) {
+            let [a, b] = [drops[ends[0] as usize], drops[ends[1] as usize]];
+            let long = length(between(a.position, b.position));
+            let section = 0.5 * (a.volume + b.volume) / long;
+            let radius = (section / std::f64::consts::PI).sqrt();
+            let follows = a.source == b.source && b.number - a.number <= 1;
+            if follows && long > 0.0 && long <= LONGEST * radius {
+                self.strands.push(Strand { ends: [ends[0], ends[1]], radius });
+                for end in ends {
+                    let own = &mut self.radii[*end as usize];
+                    *own = own.max(radius);
+                }
+            }
+        }
+        // Those that are close together are no thicker than a drop of their volume.
+        for (radius, drop) in self.radii.iter_mut().zip(drops) {
+            *radius = if *radius > 0.0 { radius.min(drop.radius) } else { drop.radius };
+        }
+        of(drops.len(), self.strands.len())
+    }
+
+    /// Writes the mesh of some drops and returns its size; [`bound`] is the most that it can be.
+    ///
+    /// # Errors
+    /// `Argument`, and nothing is written: a layout as in [`Surface::build`](crate::shallow::surface::Surface::build); a buffer that is too short;
+    /// over 65,536 vertices for indices of 16 bits.
+    pub fn build(&mut self, drops: &[Droplet], layout: &Layout, target: &mut Target<'_>) -> Result<Counts> {
+        layout.validate()?;
+        let counts = self.count(drops);
+        target.check(&counts)?;
+        let (axes, scale) = (Axes::of(layout), layout.scale);
+        let shape: [[f32; 3]; BALL[0]] =
+            std::array::from_fn(|at| axes.turn(self.vertices[at]).map(|number| number as f32));
+        let turned = |vector: [f64; 3]| axes.turn(vector).map(|number| (number * scale) as f32);
+        if let Some(to) = &mut target.positions {
+            let (balls, strands) = parts(to, drops.len());
+            for (to, (drop, radius)) in balls.zip(drops.iter().zip(&self.radii)) {
+                let (centre, radius) = (turned(drop.position), (radius * self.size * scale) as f32);
+                for (to, normal) in to.iter_mut().zip(&shape) {
+                    *to = [0, 1, 2].map(|n| centre[n] + radius * normal[n]);
+                }
+            }
+            self.each_corner(drops, strands, |normal, radius, drop| {
+                turned(along(drop.position, normal, radius))
+            });
+        }
+        if let Some(to) = &mut target.normals {
+            let (balls, strands) = parts(to, drops.len());
+            balls.for_each(|to| to.copy_from_slice(&shape));
+            self.each_corner(drops, strands, |normal, _, _| axes.turn(normal).map(|number| number as f32));
+        }
+        if let Some(to) = &mut target.velocities {
+            let (balls, strands) = parts(to, drops.len());
+            balls.zip(drops).for_each(|(to, drop)| to.fill(turned(drop.velocity)));
+            self.each_corner(drops, strands, |_, _, drop| turned(drop.velocity));
+        }
+        match &mut target.indices {
+            Indices::None => {}
+            Indices::U16(to) => {
+                self.write_triangles(drops.len(), layout.left_handed, to, |index| index as u16)
+            }
+            Indices::U32(to) => self.write_triangles(drops.len(), layout.left_handed, to, |index| index),
+        }
+        Ok(counts)
+    }
+
+    /// Writes a vector for each corner of the strands, of its normal, its distance from its drop's middle (m) and its drop.
+    fn each_corner(
+        &self,
+        drops: &[Droplet],
+        to: &mut [f32],
+        vector: impl Fn([f64; 3], f64, &Droplet) -> [f32; 3],
+    ) {
+        let mut to = to.as_chunks_mut::<3>().0.iter_mut();
+        for strand in &self.strands {
+            let ends = strand.ends.map(|end| &drops[end as usize]);
+            let [aside, across] = beside(between(ends[0].position, ends[1].position));
+            for (drop, end) in ends.into_iter().zip(strand.ends) {
+                let radius = self.radii[end as usize].min(strand.radius) * AROUND;
+                for ([cos, sin], to) in HEXAGON.into_iter().zip(&mut to) {
+                    *to = vector([0, 1, 2].map(|n| cos * aside[n] + sin * across[n]), radius, drop);
+                }
+            }
+        }
+    }
+
+    /// Writes the triangles of the balls of so many drops, and of the strands.
+    fn write_triangles<T>(&self, drops: usize, is_turned: bool, to: &mut [T], index: impl Fn(u32) -> T) {
+        let corners = |[a, b, c]: [u32; 3]| if is_turned { [a, c, b] } else { [a, b, c] };
+        let shape: [[u32; 3]; BALL[1]] = std::array::from_fn(|at| corners(self.triangles[at]));
+        let (balls, strands) = to.split_at_mut(3 * BALL[1] * drops);
+        for (drop, to) in balls.as_chunks_mut::<3>().0.chunks_exact_mut(BALL[1]).enumerate() {
+            let first = (drop * BALL[0]) as u32;
+            for (to, triangle) in to.iter_mut().zip(&shape) {
+                *to = triangle.map(|corner| index(first + corner));
+            }
+        }
+        let mut to = strands.as_chunks_mut::<3>().0.iter_mut();
+        for strand in 0..self.strands.len() {
+            let first = (drops * BALL[0] + strand * 2 * SIDES) as u32;
+            for side in 0..SIDES as u32 {
+                let [a, b] = [side, (side + 1) % SIDES as u32].map(|corner| first + corner);
+                let [c, d] = [a, b].map(|corner| corner + SIDES as u32);
+                for (triangle, to) in [[a, b, d], [a, d, c]].into_iter().zip(&mut to) {
+                    *to = corners(triangle).map(&index);
+                }
+            }
+        }
+    }
+}
+
+impl Target<'_> {
+    /// Whether the mesh fits.
+    fn check(&self, counts: &Counts) -> Result<()> {
+        let vectors =
+            [("positions", &self.positions), ("normals", &self.normals), ("velocities", &self.velocities)];
+        let vectors =
+            vectors.map(|(name, out)| (name, out.as_ref().map(|out| out.len()), 3 * counts.vertices));
+        let indices = match &self.indices {
+            Indices::None => None,
+            Indices::U16(out) => Some(out.len()),
+            Indices::U32(out) => Some(out.len()),
+        };
+        for (name, room, needed) in vectors.into_iter().chain([("indices", indices, counts.indices)]) {
+            if let Some(room) = room.filter(|room| *room < needed) {
+                return Err(Error::argument(format!(
+                    "{name} has room for {room} numbers, and the drops have {needed}"
+                )));
+            }
+        }
+        if matches!(self.indices, Indices::U16(_)) && counts.vertices > 1 << 16 {
+            return Err(Error::argument(format!(
+                "{} vertices are too many for indices of 16 bits: take those of 32",
+                counts.vertices
+            )));
+        }
+        Ok(())
+    }
+}
+
+/// The vectors of each ball, and those of the strands.
+fn parts(to: &mut [f32], drops: usize) -> (std::slice::ChunksExactMut<'_, [f32; 3]>, &mut [f32]) {
+    let (balls, strands) = to.split_at_mut(3 * BALL[0] * drops);
+    (balls.as_chunks_mut().0.chunks_exact_mut(BALL[0]), strands)
+}
+
+/// How vectors lie for the caller.
+struct Axes {
+    z_up: bool,
+    sign: f64,
+}
+
+impl Axes {
+    fn of(layout: &Layout) -> Self {
+        let z_up = layout.up == Up::Z;
+        Self { z_up, sign: if layout.left_handed != z_up { -1.0 } else { 1.0 } }
+    }
+
+    fn turn(&self, [x, y, z]: [f64; 3]) -> [f64; 3] {
+        if self.z_up { [x, self.sign * z, y] } else { [x, y, self.sign * z] }
+    }
+}
+
+/// Cosine and sine of the corners of a hexagon.
+const HEXAGON: [[f64; 2]; SIDES] = {
+    const SIN: f64 = 0.866_025_403_784_438_6;
+    [[1.0, 0.0], [0.5, SIN], [-0.5, SIN], [-1.0, 0.0], [-0.5, -SIN], [0.5, -SIN]]
+};
+
+fn between(a: [f64; 3], b: [f64; 3]) -> [f64; 3] {
+    [0, 1, 2].map(|n| b[n] - a[n])
+}
+
+fn along(from: [f64; 3], direction: [f64; 3], distance: f64) -> [f64; 3] {
+    [0, 1, 2].map(|n| from[n] + distance * direction[n])
+}
+
+fn length([x, y, z]: [f64; 3]) -> f64 {
+    (x * x + y * y + z * z).sqrt()
+}
+
+fn unit(vector: [f64; 3]) -> [f64; 3] {
+    let length = length(vector);
+    vector.map(|number| number / length)
+}
+
+fn cross([a, b, c]: [f64; 3], [x, y, z]: [f64; 3]) -> [f64; 3] {
+    [b * z - c * y, c * x - a * z, a * y - b * x]
+}
+
+/// Two unit vectors across a direction: the three are right-handed, in this order and the direction last.
+fn beside(direction: [f64; 3]) -> [[f64; 3]; 2] {
+    let direction = unit(direction);
+    let other = if direction[0].abs() < 0.7 { [1.0, 0.0, 0.0] } else { [0.0, 0.0, 1.0] };
+    let across = unit(cross(direction, other));
+    [cross(across, direction), across]
+}
+
+/// Six times the volume between a triangle and the origin, over six.
+fn volume([a, b, c]: [[f64; 3]; 3]) -> f64 {
+    let normal = cross(b, c);
+    (0..3).map(|n| a[n] * normal[n]).sum::<f64>() / 6.0
+}
+
+/// Directions and triangles of a ball.
+fn ball() -> (Vec<[f64; 3]>, Vec<[u32; 3]>) {
+    let golden = 0.5 * (1.0 + 5f64.sqrt());
+    let mut vertices = Vec::with_capacity(BALL[0]);
+    for one in [-1.0, 1.0] {
+        for long in [-golden, golden] {
+            vertices.extend([[0.0, one, long], [one, long, 0.0], [long, 0.0, one]].map(unit));
+        }
+    }
+    // The corners of a face are neighbours of each other.
+    let near = |a: usize, b: usize| length(between(vertices[a], vertices[b])) < 1.2;
+    let mut faces = Vec::with_capacity(20);
+    for a in 0..12 {
+        for b in (a + 1..12).filter(|&b| near(a, b)) {
+            for c in (b + 1..12).filter(|&c| near(a, c) && near(b, c)) {
+                let outward = volume([a, b, c].map(|at| vertices[at])) > 0.0;
+                faces.push(if outward { [a, b, c] } else { [a, c, b] });
+            }
+        }
+    }
+    let mut triangles = Vec::with_capacity(BALL[1]);
+    for face in faces {
+        let middles: [u32; 3] = std::array::from_fn(|side| {
+            let ends = [face[side], face[(side + 1) % 3]].map(|at| vertices[at]);
+            let middle = unit(along(ends[0], ends[1], 1.0));
+            // An edge has two faces, whose sums are the same in either order.
+            let at = vertices.iter().position(|vertex| *vertex == middle).unwrap_or(vertices.len());
+            if at == vertices.len() {
+                vertices.push(middle);
+            }
+            at as u32
+        });
+        let [a, b, c] = face.map(|at| at as u32);
+        let [ab, bc, ca] = middles;
+        triangles.extend([[a, ab, ca], [ab, b, bc], [ca, bc, c], [ab, bc, ca]]);
+    }
+    (vertices, triangles)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_ball_is_closed_and_as_large_as_its_drop() {
+        let (vertices, triangles) = ball();
+        assert_eq!([vertices.len(), triangles.len()], BALL);
+        let mut edges: Vec<[u32; 2]> =
+            triangles.iter().flat_map(|&[a, b, c]| [[a, b], [b, c], [c, a]]).collect();
+        edges.sort_unstable();
+        assert!(edges.windows(2).all(|two| two[0] != two[1]));
+        assert!(edges.iter().all(|&[a, b]| edges.binary_search(&[b, a]).is_ok()));
+        let size = Balls::default().size;
+        let all: f64 =
+            triangles.iter().map(|t| volume(t.map(|at| vertices[at as usize].map(|n| n * size)))).sum();
+        assert!((all - 4.0 / 3.0 * std::f64::consts::PI).abs() < 1e-12, "{size} {all}");
+    }
+}

@@ -1,0 +1,118 @@
+//! Liquid that falls freely: over cliffs, through holes and into the void it flies, in packets, until it lands.
+//!
+//! | word | meaning |
+//! |---|---|
+//! | lip | a link that liquid falls freely from in a step: the void is beyond, or the surface there lies deeper than a given height (`flow/lips.rs`) |
+//! | packet | what went over a lip in some steps; whole units of volume, which fly together (`flight.rs`) and land together (`falling.rs`) |
+//! | drop | a packet, as a host sees it |
+//! | strand | a tube between packets that follow each other from the same lip (`mesh.rs`) |
+//!
+//! A packet begins at the lip's base, with the velocity of what went over it, at most that at the brink of a free overfall, 1.4 times the critical
+//! one of its flow (Rouse, Civil Engineering 6, 1936), or of the liquid that arrives there, if that is faster. It flies without drag, and lands, whole, on the first
+//! surface that it meets: without room there, as liquid does where the terrain moves (`remap/held.rs`). At a wall it stops, and falls down along it. Where there
+//! is nothing it leaves the domain below its lowest height, or over an open border, and is lost.
+
+mod falling;
+mod flight;
+pub mod mesh;
+mod packet;
+
+use crate::error::{Error, Result};
+use crate::shallow::columns::Columns;
+use crate::shallow::pipes::cliffs::Cliffs;
+use crate::shallow::system::Shallow;
+pub(super) use falling::{Falling, LIP, Waiting};
+pub(super) use packet::{PACKET, Packet};
+
+/// How liquid falls.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Falls {
+    /// Height (m) from which on liquid falls freely, from the base of the column that gives to the surface below; 0 and up; 0.01. Steps of less than a cell
+    /// are no falls.
+    pub height: f64,
+    /// Time between packets of a lip (s), 0.0001 to 1, at least a step; 1/120.
+    pub interval: f64,
+    /// Least volume of a packet (m3), 0 and up; what is less waits at its lip for more, at most 60 intervals. 6.5e-11, a ball of half a millimetre.
+    pub drop: f64,
+    /// Most packets in the air, 1 to 1,048,576, for which there is room from the beginning; 8192. While there are so many, liquid that goes over a lip is
+    /// below at once.
+    pub most: usize,
+}
+
+impl Default for Falls {
+    fn default() -> Self {
+        Self { height: 0.01, interval: 1.0 / 120.0, drop: 6.5e-11, most: 8192 }
+    }
+}
+
+impl Falls {
+    /// Checks the numbers.
+    ///
+    /// # Errors
+    /// `Argument`, naming the field and its range.
+    pub fn validate(&self) -> Result<()> {
+        for (name, value) in [("height", self.height), ("drop", self.drop)] {
+            if !(value >= 0.0 && value.is_finite()) {
+                return Err(Error::argument(format!("falls.{name} = {value} is not finite and 0 or more")));
+            }
+        }
+        if !(1e-4..=1.0).contains(&self.interval) {
+            let value = self.interval;
+            return Err(Error::argument(format!("falls.interval = {value} s is not within 0.0001 to 1")));
+        }
+        if !(1..=1 << 20).contains(&self.most) {
+            return Err(Error::argument(format!("falls.most = {} is not within 1 to 1048576", self.most)));
+        }
+        Ok(())
+    }
+
+    /// Pipes that liquid may fall freely through.
+    pub(super) fn cliffs(falls: Option<&Self>, columns: &Columns) -> Cliffs {
+        let Some(falls) = falls else { return Cliffs::NONE };
+        let height = falls.height.max(columns.grid.cell) / columns.heights.unit;
+        Cliffs(height.min(f64::from(i32::MAX - 1)) as i32)
+    }
+}
+
+/// Liquid in the air, as a host sees it.
+#[derive(Debug, Clone, Copy, Default, PartialEq)]
+pub struct Droplet {
+    /// Its place (m).
+    pub position: [f64; 3],
+    /// Its velocity (m/s).
+    pub velocity: [f64; 3],
+    /// How much it is (m3).
+    pub volume: f64,
+    /// Radius of a ball of its volume (m).
+    pub radius: f64,
+    /// Seconds since it left its lip.
+    pub age: f64,
+    /// Its lip: the same number for all that come from one side of one column.
+    pub source: u64,
+    /// One more than that of the drop that left the same lip before it, if nothing interrupted the flow there.
+    pub number: u64,
+}
+
+impl Shallow {
+    /// The liquid in the air, in the order in which it left its lips; at most [`Falls::most`].
+    pub fn drops(&self) -> impl ExactSizeIterator<Item = Droplet> + '_ {
+        let (grid, heights) = (self.columns.grid, self.columns.heights);
+        let unit = grid.cell * grid.cell * heights.unit;
+        self.falls.packets().iter().map(move |packet| {
+            let place = |axis: usize| {
+                grid.origin[axis] + (f64::from(packet.cell[axis]) + 0.5 + packet.offset[axis]) * grid.cell
+            };
+            let [east, south] = packet.along.map(|speed| speed * grid.cell);
+            let volume = packet.units as f64 * unit;
+            Droplet {
+                position: [place(0), heights.low + packet.height * heights.unit, place(1)],
+                velocity: [east, -packet.down * heights.unit, south],
+                volume,
+                radius: libm::cbrt(0.75 / std::f64::consts::PI * volume),
+                age: packet.age,
+                source: packet.source,
+                number: packet.tick,
+            }
+        })
+    }
+}

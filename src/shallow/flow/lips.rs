@@ -1,0 +1,123 @@
+//! Lips: links that liquid falls freely from. What goes over one does not arrive at its other end in the same step, and what lies there
+//! does not push back.
+
+use super::links::LinkFlow;
+use crate::shallow::columns::{Columns, NONE};
+use crate::shallow::pipes::Links;
+use crate::shallow::pipes::cliffs::Cliffs;
+
+/// Which way liquid falls freely over a link in a step.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
+pub enum Fall {
+    /// It does not.
+    #[default]
+    No,
+    /// From its first column.
+    Ahead,
+    /// From its second column.
+    Back,
+}
+
+/// The lips of a step, by link. Without falls there is none.
+#[derive(Debug, Clone, Default)]
+pub struct Lips {
+    falls: Vec<Fall>,
+    /// H of the column that gives, at the start of the step (units).
+    depth: Vec<i32>,
+    /// Units that the network of full columns moves over each.
+    flooded: Vec<i64>,
+}
+
+/// What went over a lip in a step.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Over {
+    /// The link.
+    pub link: usize,
+    /// The column that it came from, and the one below; [`NONE`]: the void.
+    pub from: u32,
+    pub to: u32,
+    /// How much (units).
+    pub units: i64,
+    /// H of the column that it came from, at the start of the step (units).
+    pub depth: i32,
+}
+
+impl Lips {
+    /// Room for so many links.
+    pub(in crate::shallow) fn with_room(links: usize) -> Self {
+        let (falls, depth) = (Vec::with_capacity(links), Vec::with_capacity(links));
+        Self { falls, depth, flooded: Vec::with_capacity(links) }
+    }
+
+    /// Finds the lips: links from a base that is higher, by over `cliffs`, than the surface at the other end, and those into the void.
+    pub(in crate::shallow) fn find(
+        &mut self,
+        columns: &Columns,
+        links: &Links,
+        cliffs: Cliffs,
+        depth: &[i32],
+    ) {
+        self.falls.clear();
+        self.depth.clear();
+        self.flooded.clear();
+        self.flooded.resize(links.len(), 0);
+        for link in 0..links.len() {
+            let fall = fall(columns, links, cliffs, link, depth);
+            let from = if fall == Fall::Back { links.to[link] } else { links.from[link] };
+            self.falls.push(fall);
+            self.depth.push(depth[from as usize]);
+        }
+    }
+
+    /// Which way liquid falls freely over a link.
+    #[inline(always)]
+    pub fn at(&self, link: usize) -> Fall {
+        self.falls.get(link).copied().unwrap_or_default()
+    }
+
+    /// Adds what the network of full columns moves over a lip.
+    pub(super) fn add_flooded(&mut self, link: usize, units: i64) {
+        self.flooded[link] += units;
+    }
+
+    /// What went over the lips in a step, in their order.
+    pub(in crate::shallow) fn over<'a>(
+        &'a self,
+        links: &'a Links,
+        flow: &'a LinkFlow,
+    ) -> impl Iterator<Item = Over> + 'a {
+        let lips = (0..self.falls.len()).filter(|&link| self.falls[link] != Fall::No);
+        lips.filter_map(move |link| {
+            let units = i64::from(flow.transfer[link].abs() as i32) + self.flooded[link];
+            let (from, to) = match self.falls[link] {
+                Fall::Back => (links.to[link], links.from[link]),
+                _ => (links.from[link], links.to[link]),
+            };
+            (units > 0).then(|| Over { link, from, to, units, depth: self.depth[link] })
+        })
+    }
+}
+
+/// What a column falls by where the ground beyond it does not count: the edge of a cell (units).
+pub(super) fn edge(columns: &Columns) -> i32 {
+    (columns.grid.cell / columns.heights.unit).min(f64::from(i32::MAX / 2)) as i32
+}
+
+fn fall(columns: &Columns, links: &Links, cliffs: Cliffs, link: usize, depth: &[i32]) -> Fall {
+    let (from, to) = (links.from[link], links.to[link]);
+    if to == NONE {
+        // Beyond the border of the domain there is no void.
+        let is_void = links.sides[link].cell(columns.cell(from as usize), columns.grid.size).is_some();
+        return if is_void { Fall::Ahead } else { Fall::No };
+    }
+    let base = columns.bases();
+    let (i, j) = (from as usize, to as usize);
+    // Bases and depths are within 2^30, and surfaces too.
+    if base[i] - (base[j] + depth[j]) > cliffs.0 {
+        Fall::Ahead
+    } else if base[j] - (base[i] + depth[i]) > cliffs.0 {
+        Fall::Back
+    } else {
+        Fall::No
+    }
+}
