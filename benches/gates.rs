@@ -130,6 +130,8 @@ mod shallow_ground;
 mod shallow_huppert;
 #[path = "gates/shallow_lake.rs"]
 mod shallow_lake;
+#[path = "gates/shallow_lifts.rs"]
+mod shallow_lifts;
 #[path = "gates/shallow_mass.rs"]
 mod shallow_mass;
 #[path = "gates/shallow_range.rs"]
@@ -243,6 +245,7 @@ fn main() {
     shallow_bowl::run(&mut h);
     shallow_energy::run(&mut h);
     shallow_lake::run(&mut h);
+    shallow_lifts::run(&mut h);
     shallow_dam::run(&mut h);
     shallow_mass::run(&mut h);
     shallow_falls::run(&mut h);

@@ -442,4 +442,10 @@ pub const GATES: &[Gate] = &[
     gate("shallow.surface_five_floors", "ms", Most(1.4), Most(0.7)),
     gate("shallow.surface_three_floors", "ms", Most(0.37), Most(0.185)),
     none("shallow.surface_unlinked", "edges"),
+    // Films on the meshes of rough ground: vertices above the surface of four wet columns, and those that were given up. Beside dry ground: how
+    // far the rim is over it, and how far a vertex jumps when its column wets or dries.
+    none("shallow.lift_uncovered", "vertices"),
+    gate("shallow.lift_discarded", "%", Most(1.0), Most(0.1)),
+    gate("shallow.surface_rim", "cells", Most(0.05), Most(0.01)),
+    gate("shallow.surface_jump", "cells", Most(0.05), Most(0.01)),
 ];

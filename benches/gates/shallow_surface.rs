@@ -107,14 +107,19 @@ fn timed(liquid: &mut Shallow) -> (f64, String) {
     let mut counts = Counts::default();
     let layout = Layout::default();
     let drawn = each_frame(liquid, |liquid| {
-        let depths = Depths { depth: liquid.depths(), velocity: &[], active: Some(liquid.active()) };
+        let depths = Depths { depth: liquid.depths(), active: Some(liquid.active()), ..Depths::default() };
         let built = surface.build(liquid.columns(), &depths, &layout, &mut buffers.drawn());
         counts = built.expect("a surface");
     });
     let mut velocity = vec![[0.0; 2]; liquid.columns().len()];
     let all = each_frame(liquid, |liquid| {
         liquid.velocities(&mut velocity).expect("as many places");
-        let depths = Depths { depth: liquid.depths(), velocity: &velocity, active: Some(liquid.active()) };
+        let depths = Depths {
+            depth: liquid.depths(),
+            velocity: &velocity,
+            active: Some(liquid.active()),
+            ..Depths::default()
+        };
         surface.build(liquid.columns(), &depths, &layout, &mut buffers.all()).expect("a surface");
     });
     let least = drawn.iter().copied().fold(f64::INFINITY, f64::min);

@@ -113,6 +113,7 @@ pub unsafe extern "C" fn frz_shallow_snapshot_surface(
                 depth: snapshot.depths(),
                 velocity: snapshot.velocities(),
                 active: Some(snapshot.active()),
+                ..Depths::default()
             };
             wanted.write(surface, snapshot.columns(), &depths)
         }

@@ -59,6 +59,7 @@ impl frz_shallow_layout {
             left_handed: self.flags & FRZ_SHALLOW_LEFT_HANDED != 0,
             least_depth: self.least_depth,
             opaque_depth: self.opaque_depth,
+            ..Layout::default()
         })
     }
 }
@@ -340,7 +341,12 @@ pub unsafe extern "C" fn frz_shallow_surface(
                 shallow.velocities(velocities)?;
             }
             let velocity: &[[f32; 2]] = if wanted.velocities() { velocities } else { &[] };
-            let depths = Depths { depth: shallow.depths(), velocity, active: Some(shallow.active()) };
+            let depths = Depths {
+                depth: shallow.depths(),
+                velocity,
+                active: Some(shallow.active()),
+                ..Depths::default()
+            };
             wanted.write(surface, shallow.columns(), &depths)
         }
     })

@@ -16,6 +16,7 @@ pub mod liquids;
 pub mod made_sets;
 pub mod nearest;
 pub mod repaired;
+pub mod rough_ground;
 pub mod shallow;
 pub mod shapes;
 pub mod sleigh;

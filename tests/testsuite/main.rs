@@ -103,6 +103,7 @@ mod shallow {
     mod state;
     mod surface;
     mod surface_groups;
+    mod surface_lifts;
     mod surface_mesh;
     mod terrain;
     mod threads;

@@ -38,7 +38,7 @@ impl Mesher {
         let columns = liquid.columns();
         self.velocity.clear();
         self.velocity.extend((0..columns.len()).map(|index| liquid.velocity(index)));
-        let depths = Depths { depth: liquid.depths(), velocity: &self.velocity, active: None };
+        let depths = Depths { depth: liquid.depths(), velocity: &self.velocity, ..Depths::default() };
         let Counts { vertices, indices, .. } = self.surface.count(columns, &depths)?;
         let mut drawn = Drawn {
             mesh: TriMesh { positions: vec![Vec3::zeros(); vertices], triangles: vec![[0; 3]; indices / 3] },

@@ -1,4 +1,4 @@
-//! A triangle mesh of the liquid's surface (thesis 4.2.1 to 4.2.3), written into the caller's buffers.
+//! A triangle mesh of the liquid's surface (thesis 4.2.1 to 4.2.4), written into the caller's buffers.
 //!
 //! It needs [`Columns`] and a depth for each of their indices, and so serves any solver of height fields (thesis 4.4). Every wet column
 //! whose surface reaches that of neighbours becomes a vertex at the centre of its cell, and so do the dry columns around them.
@@ -28,9 +28,11 @@ mod check;
 mod full;
 mod groups;
 mod indices;
+pub mod lifts;
 mod links;
 mod normals;
 mod room;
+mod shown;
 mod strips;
 mod vertices;
 mod walled;
@@ -55,6 +57,12 @@ pub struct Depths<'a> {
     pub velocity: &'a [[f32; 2]],
     /// Whether each strip may have a wet column; without it all are searched.
     pub active: Option<&'a [bool]>,
+    /// Least depth at which each index is shown where it is wet (units), at most from base to ceiling; in place of [`Layout::least_depth`].
+    /// May be empty. See [`lifts::Lifts`].
+    pub least: &'a [i32],
+    /// How far below its base each index is shown where it is dry (units), at most to the underside of its solid; in place of
+    /// [`Layout::least_depth`]. May be empty.
+    pub sunk: &'a [i32],
 }
 
 /// The axis that points up.
@@ -77,15 +85,26 @@ pub struct Layout {
     pub up: Up,
     /// Left-handed axes: the horizontal axis that is not x points the other way (Y up: z to the north; Z up: y to the south).
     pub left_handed: bool,
-    /// Least height of a wet vertex above its base (m), against flicker where the terrain is drawn too (thesis 4.2.4: 0.05 of a cell).
+    /// Least height of a wet vertex above its base (m), against flicker where the terrain is drawn too (thesis 4.2.4: 0.05 of a cell), and
+    /// how far below its base a dry one is at least, where the liquid around is not lower still.
     pub least_depth: f64,
+    /// Depth (m) from which a wet vertex is at its full height, so that none jumps as its column wets or dries: thinner liquid is the nearer
+    /// to where the vertex of a dry column is the thinner it is. 0: at once; 0.02 of a cell does well.
+    pub fade_depth: f64,
     /// Depth from which the liquid is opaque (m), for [`Target::opacities`].
     pub opaque_depth: f64,
 }
 
 impl Default for Layout {
     fn default() -> Self {
-        Self { scale: 1.0, up: Up::Y, left_handed: false, least_depth: 0.0, opaque_depth: 0.01 }
+        Self {
+            scale: 1.0,
+            up: Up::Y,
+            left_handed: false,
+            least_depth: 0.0,
+            fade_depth: 0.0,
+            opaque_depth: 0.01,
+        }
     }
 }
 
@@ -144,6 +163,8 @@ pub struct Surface {
     search: Search,
     normals: Normals,
     around: Around,
+    /// Of each index, as it is shown (units).
+    heights: Vec<i32>,
 }
 
 impl Surface {
@@ -153,6 +174,7 @@ impl Surface {
         links::find_above(columns, &mut self.above);
         self.found.reset(columns);
         self.normals.reset(columns);
+        shown::reserve(columns, &mut self.heights);
         self.walls.reserve(room::Walls::of(columns).pairs, layers);
         let [nx, nz] = columns.grid.size;
         self.search.reserve(layers, (nx - 1) * (nz - 1), bound(columns).indices / 3);
@@ -174,6 +196,12 @@ impl Surface {
         if !depths.velocity.is_empty() && depths.velocity.len() != len {
             let count = depths.velocity.len();
             return Err(Error::argument(format!("{count} velocities are not one for each of {len} indices")));
+        }
+        for (name, lengths) in [("least depths", depths.least), ("sunk depths", depths.sunk)] {
+            if !lengths.is_empty() && lengths.len() != len {
+                let count = lengths.len();
+                return Err(Error::argument(format!("{count} {name} are not one for each of {len} indices")));
+            }
         }
         if let Some(active) = depths.active.filter(|active| active.len() != len / STRIP) {
             let (count, strips) = (active.len(), len / STRIP);
@@ -204,9 +232,9 @@ impl Surface {
     /// Writes the mesh of the liquid's surface and returns its size; [`bound`] is the most that it can be.
     ///
     /// # Errors
-    /// `Argument`, and nothing is written: arrays of depths, velocities or activity of another length than the columns'; velocities are
-    /// wanted and none given; a scale or opaque depth that is not positive and finite, a least depth that is negative or not finite; a
-    /// buffer that is too short; over 65,536 vertices for indices of 16 bits.
+    /// `Argument`, and nothing is written: arrays of depths, velocities, activity or lifts of another length than the columns'; velocities
+    /// are wanted and none given; a scale or opaque depth that is not positive and finite, a least or fade depth that is negative or not
+    /// finite; a buffer that is too short; over 65,536 vertices for indices of 16 bits.
     pub fn build(
         &mut self,
         columns: &Columns,
@@ -224,7 +252,16 @@ impl Surface {
         let (found, walls) = (&self.found, &self.walls.list);
         indices::write_triangles(scene, found, walls, &self.search, layout.left_handed, &mut target.indices);
         self.normals.reset(columns);
-        let vertices = Vertices::new(scene, found, walls, depths.velocity, layout, target.normals.is_some());
+        shown::find_heights(columns, found, depths, layout, &mut self.heights);
+        let vertices = Vertices::new(
+            scene,
+            found,
+            walls,
+            &self.heights,
+            depths.velocity,
+            layout,
+            target.normals.is_some(),
+        );
         vertices.write(&mut self.normals, &mut self.around, target);
         self.normals.clear(found);
         Ok(counts)
@@ -242,9 +279,10 @@ impl Layout {
         };
         positive("scale", self.scale)?;
         positive("opaque_depth", self.opaque_depth)?;
-        if !(self.least_depth >= 0.0 && self.least_depth.is_finite()) {
-            let value = self.least_depth;
-            return Err(Error::argument(format!("least_depth = {value} is not finite and 0 or more")));
+        for (name, value) in [("least_depth", self.least_depth), ("fade_depth", self.fade_depth)] {
+            if !(value >= 0.0 && value.is_finite()) {
+                return Err(Error::argument(format!("{name} = {value} is not finite and 0 or more")));
+            }
         }
         Ok(())
     }

@@ -9,19 +9,13 @@ use super::{Columns, STRIP};
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Shown<'a> {
     pub scene: Scene<'a>,
-    /// Least depth (units).
-    pub least: i32,
+    /// Of each index (units).
+    pub heights: &'a [i32],
     /// A unit over two cells.
     pub slope: f32,
 }
 
 impl Shown<'_> {
-    /// Height of a wet column (units).
-    #[inline(always)]
-    pub fn height(&self, index: usize) -> i32 {
-        self.scene.columns.bases()[index].wrapping_add(self.scene.depth[index].max(self.least))
-    }
-
     /// Normal of a wet column: x to the east, y up, z to the south.
     pub fn normal(&self, found: &Found, index: usize) -> [f32; 3] {
         let (columns, scene) = (self.scene.columns, self.scene);
@@ -41,10 +35,10 @@ impl Shown<'_> {
                 has(3).then(|| across(columns.south(strip))),
             ]
         };
-        let own = self.height(index);
+        let own = self.heights[index];
         let slope = |before: Option<usize>, behind: Option<usize>| {
             let cells = if before.is_some() && behind.is_some() { 1.0 } else { 2.0 };
-            let height = |side: Option<usize>| side.map_or(own, |side| self.height(side));
+            let height = |side: Option<usize>| side.map_or(own, |side| self.heights[side]);
             height(before).wrapping_sub(height(behind)) as f32 * self.slope * cells
         };
         upright(slope(west, east), slope(north, south))

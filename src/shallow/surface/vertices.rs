@@ -6,7 +6,6 @@ use super::normals::{Normals, Shown, upright};
 use super::strips::{Found, Span, places};
 use super::{Layout, NONE, STRIP, Target, Up};
 use crate::base::cpu::dispatch;
-use crate::shallow::grid::TOP;
 
 /// Velocity at the surface over the mean (Eq. 4.4).
 const SURFACE_SPEED: f32 = 1.5;
@@ -55,16 +54,16 @@ impl<'a> Vertices<'a> {
         scene: Scene<'a>,
         found: &'a Found,
         walls: &'a [Wall],
+        shown: &'a [i32],
         velocity: &'a [[f32; 2]],
         layout: &Layout,
         wants_normals: bool,
     ) -> Self {
         let (grid, heights) = (&scene.columns.grid, &scene.columns.heights);
         let scale = layout.scale;
-        let least = (layout.least_depth / heights.unit).round().min(f64::from(TOP)) as i32;
         let slope = (0.5 * heights.unit / grid.cell) as f32;
         Self {
-            shown: Shown { scene, least, slope },
+            shown: Shown { scene, heights: shown, slope },
             found,
             walls,
             velocity,
@@ -103,9 +102,10 @@ impl<'a> Vertices<'a> {
         self.origin[axis] + cell as f32 * self.cell
     }
 
-    /// A vertex that takes the mean of wet columns around cell (x, z).
-    fn mean(&self, [x, z]: [usize; 2], normals: &mut Normals, around: &Around) -> Vertex {
-        let height = self.height(around.mean_height(|index| self.shown.height(index)) as f32);
+    /// A vertex that takes the mean of wet columns around cell (x, z), at a height of at most `most` (units).
+    fn mean(&self, [x, z]: [usize; 2], most: i32, normals: &mut Normals, around: &Around) -> Vertex {
+        let mean = around.mean_height(|index| self.shown.heights[index]);
+        let height = self.height(mean.min(f64::from(most)) as f32);
         let mut normal = [0.0, 1.0, 0.0];
         if self.wants_normals {
             let [x, y, z] = around.sum(|index| normals.of(&self.shown, self.found, index));
@@ -132,9 +132,11 @@ impl<'a> Vertices<'a> {
                 Some(own) => around.take_wall(scene, &self.walls[own]),
                 None => around.take_linked(scene, index),
             }
-            return Vertex { layer, column: index as u32, ..self.mean([x, z], normals, around) };
+            // Over ground that is lower than the liquid the rim would hover.
+            let mean = self.mean([x, z], self.shown.heights[index], normals, around);
+            return Vertex { layer, column: index as u32, ..mean };
         }
-        let height = self.height(self.shown.height(index) as f32);
+        let height = self.height(self.shown.heights[index] as f32);
         Vertex {
             position: [self.centre(0, x as i32), height, self.centre(1, z as i32)],
             normal: if self.wants_normals {
@@ -183,9 +185,8 @@ impl<'a> Vertices<'a> {
     /// Writes the vertices of a run of a span, from `at` on.
     #[inline(always)]
     fn put_run(&self, span: &Span, run: Run, at: usize, target: &mut Target<'_>) {
-        let columns = self.shown.scene.columns;
-        let (bases, depths) = (columns.bases(), self.shown.scene.depth);
-        let strip = columns.strips()[span.first];
+        let (heights, depths) = (self.shown.heights, self.shown.scene.depth);
+        let strip = self.shown.scene.columns.strips()[span.first];
         let Run { first, len } = run;
         let step = first - span.first * STRIP;
         let depth = &depths[first..][..len];
@@ -193,23 +194,20 @@ impl<'a> Vertices<'a> {
             let z = self.centre(1, strip.row as i32) * self.sign;
             let cells = (strip.at as usize * STRIP + step) as i32..;
             let out = vectors(out, at, len);
-            for (((out, base), depth), cell) in
-                out.iter_mut().zip(&bases[first..][..len]).zip(depth).zip(cells)
-            {
-                let height = self.height(base.wrapping_add((*depth).max(self.shown.least)) as f32);
-                *out = self.order(self.centre(0, cell), height, z);
+            for ((out, height), cell) in out.iter_mut().zip(&heights[first..][..len]).zip(cells) {
+                *out = self.order(self.centre(0, cell), self.height(*height as f32), z);
             }
         }
         if let Some(out) = &mut target.normals {
             let (north, south) = (span.north as usize * STRIP + step, span.south as usize * STRIP + step);
-            let row = |first: usize| bases[first..][..len].iter().zip(&depths[first..][..len]);
-            let height = |(base, depth): (&i32, &i32)| base.wrapping_add((*depth).max(self.shown.least));
-            let across = row(first - 1).map(height).zip(row(first + 1).map(height));
-            let along = row(north).map(height).zip(row(south).map(height));
+            let row = |first: usize| heights[first..][..len].iter();
+            let across = row(first - 1).zip(row(first + 1));
+            let along = row(north).zip(row(south));
             for ((out, (west, east)), (north, south)) in
                 vectors(out, at, len).iter_mut().zip(across).zip(along)
             {
-                let slope = |before: i32, behind: i32| before.wrapping_sub(behind) as f32 * self.shown.slope;
+                let slope =
+                    |before: &i32, behind: &i32| before.wrapping_sub(*behind) as f32 * self.shown.slope;
                 let [x, y, z] = upright(slope(west, east), slope(north, south));
                 *out = self.order(x, y, z * self.sign);
             }
@@ -288,7 +286,7 @@ fn write_spans(vertices: &Vertices<'_>, normals: &mut Normals, around: &mut Arou
         around.take_wall(vertices.shown.scene, wall);
         let members = wall.members.iter().filter(|member| **member != NONE);
         let layer = members.map(|&member| columns.layer(member as usize) as u32).min().unwrap_or(0);
-        let mean = vertices.mean(columns.cell(wall.column as usize), normals, around);
+        let mean = vertices.mean(columns.cell(wall.column as usize), i32::MAX, normals, around);
         vertices.put(next, &Vertex { layer, ..mean }, target);
         next += 1;
     }

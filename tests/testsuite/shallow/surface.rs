@@ -70,7 +70,7 @@ fn each_layout_points_triangles_along_their_normals() {
     let depth: Vec<i32> =
         (0..columns.len()).map(|index| i32::from(columns.is_column(index)) * units(0.2)).collect();
     let velocity = vec![[2.0, 4.0]; columns.len()];
-    let depths = Depths { depth: &depth, velocity: &velocity, active: None };
+    let depths = Depths { depth: &depth, velocity: &velocity, ..Depths::default() };
     for (up, left_handed) in [(Up::Y, false), (Up::Y, true), (Up::Z, false), (Up::Z, true)] {
         let layout = Layout { scale: 100.0, up, left_handed, opaque_depth: 0.4, ..Layout::default() };
         let mesh = build_with(&mut Surface::default(), &columns, &depths, &layout);

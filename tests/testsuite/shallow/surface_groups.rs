@@ -309,7 +309,7 @@ fn one_maker_serves_all_scenes_and_activity_saves_only_time() {
         let layout = Layout { least_depth: 0.02, ..Layout::default() };
         let (all, some) = (
             Depths { depth: &depth, ..Depths::default() },
-            Depths { depth: &depth, velocity: &[], active: Some(&active) },
+            Depths { depth: &depth, active: Some(&active), ..Depths::default() },
         );
         let first = build_with(&mut Surface::default(), &columns, &all, &layout);
         for depths in [&all, &some] {
