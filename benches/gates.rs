@@ -134,8 +134,9 @@ mod shallow_lake;
 mod shallow_lifts;
 #[path = "gates/shallow_mass.rs"]
 mod shallow_mass;
-#[path = "gates/shallow_range.rs"]
+#[path = "gates/shallow_orifice.rs"]
 mod shallow_orifice;
+#[path = "gates/shallow_range.rs"]
 mod shallow_range;
 #[path = "gates/shallow_same.rs"]
 mod shallow_same;
