@@ -441,6 +441,8 @@ pub const GATES: &[Gate] = &[
     gate("shallow.surface_one_floor", "ms", Most(0.43), Most(0.215)),
     gate("shallow.surface_five_floors", "ms", Most(1.4), Most(0.7)),
     gate("shallow.surface_three_floors", "ms", Most(0.37), Most(0.185)),
+    // The most of the three over the time that copying its bytes takes, each after a frame.
+    gate("shallow.surface_copy", "x", Most(1.7), Most(1.3)),
     none("shallow.surface_unlinked", "edges"),
     // Films on the meshes of rough ground: vertices above the surface of four wet columns, and those that were given up. Beside dry ground: how
     // far the rim is over it, and how far a vertex jumps when its column wets or dries.

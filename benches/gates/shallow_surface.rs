@@ -32,6 +32,17 @@ pub fn run(h: &mut Harness) {
             h.gate(name, time, &note);
         }
     }
+    if h.wants("shallow.surface_copy") {
+        let each = scenes.map(|(name, make, _)| {
+            let [surface, copy] = copied(&mut make());
+            let note =
+                format!("{}: {surface:.3} ms, copy {copy:.3} ms", name.replace("shallow.surface_", ""));
+            (surface / copy, note)
+        });
+        let most = each.iter().map(|(ratio, _)| *ratio).fold(0.0, f64::max);
+        let notes = each.map(|(_, note)| note).join("; ");
+        h.gate("shallow.surface_copy", most, &format!("{:?} {notes}", cpu_level()));
+    }
     if h.wants("shallow.surface_unlinked") {
         unlinked(h);
     }
@@ -131,6 +142,37 @@ fn timed(liquid: &mut Shallow) -> (f64, String) {
         median(all)
     );
     (median(drawn), note)
+}
+
+/// Median times of a surface that is drawn, and of copying its bytes (ms): in turns, each after a frame.
+fn copied(liquid: &mut Shallow) -> [f64; 2] {
+    let mut surface = Surface::default();
+    surface.reserve(liquid.columns());
+    let (mut to, mut from) = (Buffers::new(liquid.columns()), Buffers::new(liquid.columns()));
+    // Memory that was never written is one page of zeros.
+    for numbers in [&mut from.positions, &mut from.normals, &mut from.depths] {
+        numbers.fill(1.0);
+    }
+    from.indices.fill(1);
+    let layout = Layout::default();
+    let mut counts = Counts::default();
+    let mut is_copy = true;
+    let times = each_frame(liquid, |liquid| {
+        is_copy = !is_copy;
+        if is_copy {
+            let Counts { vertices, indices, .. } = counts;
+            to.positions[..3 * vertices].copy_from_slice(&from.positions[..3 * vertices]);
+            to.normals[..3 * vertices].copy_from_slice(&from.normals[..3 * vertices]);
+            to.depths[..vertices].copy_from_slice(&from.depths[..vertices]);
+            to.indices[..indices].copy_from_slice(&from.indices[..indices]);
+            std::hint::black_box(&mut to);
+            return;
+        }
+        let depths = Depths { depth: liquid.depths(), active: Some(liquid.active()), ..Depths::default() };
+        counts = surface.build(liquid.columns(), &depths, &layout, &mut to.drawn()).expect("a surface");
+    });
+    // The first time is that of a copy.
+    [1, 0].map(|first| median(times.iter().skip(first).step_by(2).copied().collect()))
 }
 
 /// Times of what is done after each frame (ms), but the first.
