@@ -117,9 +117,15 @@ impl Waiting {
         }
     }
 
-    /// Whether it is such as a liquid may have.
-    pub fn is_good(&self) -> bool {
-        self.units >= 0 && (0.0..1e60).contains(&self.impulse)
+    /// Whether it is such as may wait at a link.
+    pub fn is_of(&self, columns: &Columns, links: &Links, link: usize) -> bool {
+        let is_void = links.to[link] == NONE;
+        let is_lip = !is_void
+            || !self.is_back
+                && outward(links, link, false)
+                    .cell(columns.cell(links.from[link] as usize), columns.grid.size)
+                    .is_some();
+        self.units >= 0 && (0.0..1e60).contains(&self.impulse) && (self.units == 0 || is_lip)
     }
 }
 

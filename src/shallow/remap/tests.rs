@@ -252,6 +252,35 @@ fn flux_follows_a_column_into_another_layer() {
 }
 
 #[test]
+fn cliffs_that_come_and_go_are_links_as_in_a_terrain_made_anew() {
+    let ctx = Context::new(Pool::new(0).unwrap());
+    let mut dice = Dice(77);
+    let grid = Grid { cell: 0.5, origin: [0.0; 2], size: [40, 12] };
+    let falls = Some(Falls { height: 1.0, drop: 0.0, most: 1 << 16, ..Falls::default() });
+    let mut cells: Vec<Vec<Solid>> = (0..grid.cells()).map(|_| cell(&mut dice, 2)).collect();
+    let params = Params { falls, ..params(Border::Open) };
+    let mut shallow = Shallow::new(&ctx, &solids(grid, &cells), params).unwrap();
+    let flat = Pipes::new(&shallow.columns, Border::Open).links.len();
+    assert!(shallow.pipes.links.len() > flat + 100, "cliffs");
+    let mut flown = 0;
+    for round in 0..60 {
+        for index in shallow.columns.indices().collect::<Vec<_>>() {
+            shallow.pour(index, 1e-3 * dice.below(300) as f64 - 0.1);
+        }
+        shallow.step(&ctx, 0.05).unwrap();
+        flown += shallow.drops().len();
+        let first = dice.below(400);
+        cells[first..first + 60].iter_mut().for_each(|old| *old = cell(&mut dice, 2));
+        shallow.update_terrain(&solids(grid, &cells)).unwrap();
+        let cliffs = Falls::cliffs(falls.as_ref(), &shallow.columns);
+        assert!(shallow.pipes == Pipes::with_cliffs(&shallow.columns, Border::Open, cliffs), "round {round}");
+        assert_eq!(shallow.falls.waiting().len(), shallow.pipes.links.len());
+        assert_eq!(shallow.balance().error, 0, "round {round}");
+    }
+    assert!(flown > 1000, "{flown}");
+}
+
+#[test]
 fn a_saved_state_keeps_what_waits_for_room() {
     let ctx = Context::new(Pool::new(0).unwrap());
     let mut dice = Dice(0x5555_1234_9abc_def1);

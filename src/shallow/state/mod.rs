@@ -238,7 +238,11 @@ impl<'a> Saved<'a> {
             && is_in_order(self.runs().map(|run| run.start..run.end), strips)
             && self.runs().map(|run| run.len()).sum::<usize>() == counts.strips
             && is_in_order(self.head_strips().map(|strip| strip..strip + 1), strips);
-        if fits && self.has_good_numbers(&shallow.columns) { Ok(()) } else { Err(refused("is damaged")) }
+        if fits && self.has_good_numbers(&shallow.columns) && self.has_good_falls(shallow) {
+            Ok(())
+        } else {
+            Err(refused("is damaged"))
+        }
     }
 
     fn has_good_numbers(&self, columns: &Columns) -> bool {
@@ -253,7 +257,6 @@ impl<'a> Saved<'a> {
             && self.points.iter().all(|point| SUMS.contains(&i64::from_le_bytes(part(point, 16))))
             && self.row_depths.iter().all(within)
             && self.parcels().all(|parcel| parcel.is_of(columns) && SUMS.contains(&parcel.units))
-            && self.has_good_falls(columns)
             && self.parcels().is_sorted_by(|a, b| a.cell < b.cell)
             && !is_over(fluxes, MOST_FLUX)
             && !is_over(left, 1.0)
@@ -261,10 +264,14 @@ impl<'a> Saved<'a> {
             && !self.has_bad_columns(columns)
     }
 
-    fn has_good_falls(&self, columns: &Columns) -> bool {
+    fn has_good_falls(&self, shallow: &Shallow) -> bool {
+        let (columns, links) = (&shallow.columns, &shallow.pipes.links);
         (0.0..=1e6).contains(&self.header.since)
             && self.packets().all(|packet| packet.is_of(columns) && SUMS.contains(&packet.units))
-            && self.lips().all(|waiting| waiting.is_good() && SUMS.contains(&waiting.units))
+            && self
+                .lips()
+                .enumerate()
+                .all(|(link, waiting)| waiting.is_of(columns, links, link) && SUMS.contains(&waiting.units))
     }
 
     fn has_bad_columns(&self, columns: &Columns) -> bool {
