@@ -36,6 +36,8 @@ pub struct Bands {
     may_fill: Vec<bool>,
     /// A column takes at most so many times the greatest depth beside it, with its own.
     takes: i64,
+    /// Count of scalars that the liquid carries.
+    scalars: usize,
 }
 
 impl Bands {
@@ -48,6 +50,7 @@ impl Bands {
             deepest: vec![0; count],
             may_fill: vec![false; count],
             takes: pipes as i64 + 1,
+            scalars: 0,
         };
         bands.divide(columns, 1);
         bands
@@ -68,7 +71,7 @@ impl Bands {
             return;
         }
         let strips = columns.strips().len();
-        let mut start = 0;
+        let (mut start, scalars) = (0, self.scalars);
         let band = |number: usize| {
             let end = if number + 1 == wanted {
                 rows
@@ -83,13 +86,21 @@ impl Bands {
             start = end;
             Band {
                 rows,
-                buffers: Rows::new(columns),
+                buffers: Rows::new(columns, scalars),
                 before: Copy::default(),
                 behind: Copy::default(),
                 stepped: Stepped { woken: Vec::with_capacity(strips), ..Stepped::default() },
             }
         };
         self.list = (0..wanted).map(band).collect();
+    }
+
+    /// Makes buffers for liquid that carries so many scalars.
+    pub fn carry(&mut self, columns: &Columns, scalars: usize) {
+        let threads = self.list.len();
+        self.scalars = scalars;
+        self.list.clear();
+        self.divide(columns, threads);
     }
 
     /// Measures rows again after their columns have changed.

@@ -7,12 +7,13 @@ use crate::base::bytes::Reader;
 use crate::error::Result;
 use crate::shallow::columns::STRIP;
 use crate::shallow::flow::active::runs;
+use crate::shallow::scalars::amounts::ACCOUNTS;
 use crate::shallow::system::Shallow;
 
 pub(super) const MAGIC: [u8; 8] = *b"frz shal";
-pub(super) const VERSION: u32 = 1;
+pub(super) const VERSION: u32 = 2;
 /// Bytes of the header.
-pub(super) const HEADER: usize = 136;
+pub(super) const HEADER: usize = 144;
 /// Bytes of the hash.
 pub(super) const SEAL: usize = 16;
 /// Bytes of a strip's share of an array.
@@ -33,6 +34,8 @@ pub(super) struct Counts {
     pub(super) heads: usize,
     /// Parcels of liquid that waits for room.
     pub(super) parcels: usize,
+    /// What the liquid carries.
+    pub(super) scalars: usize,
 }
 
 impl Counts {
@@ -48,6 +51,7 @@ impl Counts {
             links: flow.links.flux.len(),
             heads: heads(shallow).count(),
             parcels: shallow.remap.held.parcels().len(),
+            scalars: shallow.scalars().len(),
         }
     }
 
@@ -61,6 +65,7 @@ impl Counts {
             + 8 * self.links
             + (4 + SHARE) * self.heads
             + ARRAYS * SHARE * self.strips
+            + self.scalars * (SCALAR + 8 * self.parcels + 2 * SHARE * self.strips)
             + SEAL
     }
 }
@@ -78,17 +83,20 @@ pub(super) struct Header {
     pub(super) sums: [i64; 6],
 }
 
+/// Bytes of a scalar's part without those of columns and parcels.
+pub(super) const SCALAR: usize = 32 + 16 * ACCOUNTS;
+
 impl Header {
     pub(super) fn put(&self, to: &mut Put<'_>) {
-        let Counts { runs, strips, rows, points, links, heads, parcels } = self.counts;
-        let counts = [runs, strips, rows, points, links, heads, parcels].map(|count| count as u32);
+        let Counts { runs, strips, rows, points, links, heads, parcels, scalars } = self.counts;
+        let counts = [runs, strips, rows, points, links, heads, parcels, scalars].map(|count| count as u32);
         to.bytes(&MAGIC);
         to.numbers(&[VERSION, self.border], u32::to_le_bytes);
         to.bytes(&self.terrain);
         to.bytes(&(self.counts.size() as u64).to_le_bytes());
         to.numbers(&counts, u32::to_le_bytes);
         to.numbers(&self.times, f64::to_le_bytes);
-        to.numbers(&[self.still], i32::to_le_bytes);
+        to.numbers(&[self.still, 0], i32::to_le_bytes);
         to.numbers(&self.sums, i64::to_le_bytes);
     }
 
@@ -99,14 +107,15 @@ impl Header {
         from.take::<8>()?;
         let mut count = || from.u32().map(|count| count as usize);
         let (runs, strips, rows) = (count()?, count()?, count()?);
-        let (points, links, heads, parcels) = (count()?, count()?, count()?, count()?);
+        let (points, links, heads, parcels, scalars) = (count()?, count()?, count()?, count()?, count()?);
         let times = [from.f64()?, from.f64()?];
         let still = from.u32()? as i32;
+        from.take::<4>()?;
         let mut sums = [0; 6];
         for sum in &mut sums {
             *sum = i64::from_le_bytes(from.take()?);
         }
-        let counts = Counts { runs, strips, rows, points, links, heads, parcels };
+        let counts = Counts { runs, strips, rows, points, links, heads, parcels, scalars };
         Ok(Self { border, terrain, counts, times, still, sums })
     }
 }

@@ -273,7 +273,7 @@ fn a_state_of_something_else_is_refused_with_a_sentence() {
     let mut newer = saved.clone();
     newer[8] = 9;
     seal(&mut newer);
-    let expected = "the saved state has format 9, and this library reads 1";
+    let expected = "the saved state has format 9, and this library reads 2";
     assert_eq!(refusal(&mut shallow, &newer), expected);
     assert_eq!(refusal(&mut shallow, &[]), "the saved state is not of a shallow liquid");
     assert_eq!(refusal(&mut shallow, &saved[1..]), "the saved state is not of a shallow liquid");
