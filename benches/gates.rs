@@ -134,6 +134,8 @@ mod shallow_mass;
 mod shallow_range;
 #[path = "gates/shallow_same.rs"]
 mod shallow_same;
+#[path = "gates/shallow_scalars.rs"]
+mod shallow_scalars;
 #[path = "gates/shallow_speed.rs"]
 mod shallow_speed;
 #[path = "gates/shallow_spread.rs"]
@@ -242,6 +244,7 @@ fn main() {
     shallow_dam::run(&mut h);
     shallow_mass::run(&mut h);
     shallow_range::run(&mut h);
+    shallow_scalars::run(&mut h);
     shallow_same::run(&mut h);
     shallow_speed::run(&mut h);
     shallow_flooded::run(&mut h);

@@ -396,6 +396,11 @@ pub const GATES: &[Gate] = &[
     // Frames after which units are missing; depths out of range in random scenes.
     none("shallow.mass", "frames"),
     none("shallow.depth_range", "columns"),
+    // The same of four scalars on terrain that moves, and frames after which a concentration is beyond those that came in; how many times as
+    // long a frame takes with one.
+    none("shallow.scalars", "frames"),
+    gate("shallow.dyed_one_floor", "x", Open, Most(1.6)),
+    gate("shallow.dyed_five_floors", "x", Open, Most(1.6)),
     // The same liquid however the scene lies, whatever does the work, and when a run is played again.
     yes("shallow.same_rotated"),
     yes("shallow.same_mirrored"),
