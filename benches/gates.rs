@@ -140,6 +140,8 @@ mod shallow_orifice;
 mod shallow_range;
 #[path = "gates/shallow_same.rs"]
 mod shallow_same;
+#[path = "gates/shallow_scalars.rs"]
+mod shallow_scalars;
 #[path = "gates/shallow_speed.rs"]
 mod shallow_speed;
 #[path = "gates/shallow_spread.rs"]
@@ -251,6 +253,7 @@ fn main() {
     shallow_mass::run(&mut h);
     shallow_falls::run(&mut h);
     shallow_range::run(&mut h);
+    shallow_scalars::run(&mut h);
     shallow_same::run(&mut h);
     shallow_speed::run(&mut h);
     shallow_flooded::run(&mut h);

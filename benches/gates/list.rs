@@ -401,6 +401,11 @@ pub const GATES: &[Gate] = &[
     // Packets, and the first liquid that lands, off from ballistics, of the height of the fall; units that are missing in a busy scene with falls.
     gate("shallow.fall_path", "%", Most(1.0), Most(0.1)),
     none("shallow.fall_volume", "units"),
+    // The same of four scalars on terrain that moves, and frames after which a concentration is beyond those that came in; how many times as
+    // long a frame takes with one.
+    none("shallow.scalars", "frames"),
+    gate("shallow.dyed_one_floor", "x", Open, Most(1.6)),
+    gate("shallow.dyed_five_floors", "x", Open, Most(1.6)),
     // The same liquid however the scene lies, whatever does the work, and when a run is played again.
     yes("shallow.same_rotated"),
     yes("shallow.same_mirrored"),

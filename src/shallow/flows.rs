@@ -5,6 +5,8 @@
 
 use super::columns::Columns;
 use super::flow::Flow;
+use super::scalars::amounts::Account;
+use super::scalars::shares::{Levels, MOST};
 use crate::error::{Error, Result};
 
 /// A source, a drain or an absorber.
@@ -54,6 +56,8 @@ struct Placed {
     waiting: f64,
     /// Units moved so far: those that came in or went out.
     moved: i64,
+    /// Concentrations of what comes in.
+    levels: Levels,
 }
 
 /// All flow points.
@@ -215,6 +219,24 @@ impl Flows {
         Ok(())
     }
 
+    /// Gives what comes through a source other concentrations.
+    ///
+    /// # Errors
+    /// `Argument`: there is no such point.
+    pub(super) fn set_levels(&mut self, point: usize, levels: Levels) -> Result<()> {
+        let count = self.placed.len();
+        let Some(placed) = self.placed.get_mut(point) else {
+            return Err(Error::argument(format!("there is no flow point {point} among {count}")));
+        };
+        placed.levels = levels;
+        Ok(())
+    }
+
+    /// What comes through sources carries nothing.
+    pub(super) fn forget_levels(&mut self) {
+        self.placed.iter_mut().for_each(|placed| placed.levels = [0; MOST]);
+    }
+
     /// Finds the columns of all points again, after the terrain has moved. A point that has none rests until it does.
     pub(super) fn find_again(&mut self, columns: &Columns) {
         for placed in &mut self.placed {
@@ -259,7 +281,7 @@ fn placed(columns: &Columns, points: &[FlowPoint], which: &impl Fn(usize) -> Str
         point.validate().map_err(|error| Error::argument(format!("{}: {error}", which(at))))?;
         let mut found = Vec::new();
         point.find_columns(columns, &mut found);
-        Ok(Placed { point: point.clone(), columns: found, waiting: 0.0, moved: 0 })
+        Ok(Placed { point: point.clone(), columns: found, waiting: 0.0, moved: 0, levels: [0; MOST] })
     };
     points.iter().enumerate().map(place).collect()
 }
@@ -287,7 +309,12 @@ impl Placed {
             share = share.min(left.clamp(0.0, 1e18) as i64);
         }
         let sign = if self.point.kind == Kind::Source { 1 } else { -1 };
-        let add = |&column: &u32| flow.add(columns, column as usize, sign * share);
+        let account = match self.point.kind {
+            Kind::Source => Account::Sourced,
+            Kind::Drain | Kind::Orifice(_) => Account::Drained,
+            Kind::Absorber(_) => Account::Absorbed,
+        };
+        let add = |&column: &u32| flow.add(columns, column as usize, sign * share, &self.levels, account);
         let moved = sign * self.columns.iter().map(add).sum::<i64>();
         self.moved += moved;
         self.waiting -= moved as f64;

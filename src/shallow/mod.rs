@@ -2,7 +2,8 @@
 //!
 //! Words: a *cell* is a square of the ground; a *column* the room for liquid above a solid of a cell, from its *base* to its *ceiling*; a *layer* the
 //! place of a column from the bottom of its cell; a *pipe* joins columns of adjacent cells; a *flux* is what flows through it, a *transfer* what it moves
-//! in a step; a *unit* is the smallest difference of heights and depths, which are integers, so that liquid is neither lost nor made.
+//! in a step; a *unit* is the smallest difference of heights and depths, which are integers, so that liquid is neither lost nor made;
+//! an *amount* what a column holds of a scalar, an integer, too.
 
 mod clock;
 pub mod columns;
@@ -19,6 +20,7 @@ pub mod pipes;
 mod pour;
 pub mod probe;
 pub mod remap;
+pub mod scalars;
 pub mod snapshot;
 mod stacks;
 mod state;
@@ -29,5 +31,6 @@ pub mod terrain;
 pub use params::Params;
 pub use probe::{Reading, View};
 pub use remap::Moved;
+pub use scalars::{Law, Scalar, ScalarBalance};
 pub use snapshot::Snapshot;
 pub use system::{Balance, Report, Shallow};

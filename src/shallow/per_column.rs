@@ -85,7 +85,7 @@ impl<T: Copy> PerColumn<T> {
     /// Moves them where there is room for so many, at the right place.
     fn make_room(&mut self, len: usize, fill: T) {
         let room = self.list.capacity();
-        if room > 0 && self.before + len <= room {
+        if self.before + len <= room {
             return;
         }
         // Twice as much as before, as a list would.

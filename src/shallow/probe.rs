@@ -4,6 +4,7 @@ use std::ops::Range;
 
 use super::columns::{Columns, STRIP};
 use super::grid::Grid;
+use super::scalars::check_scalar;
 use super::snapshot::Snapshot;
 use super::system::Shallow;
 use crate::error::{Error, Result};
@@ -14,14 +15,14 @@ pub struct View<'a> {
     columns: &'a Columns,
     depth: &'a [i32],
     active: &'a [bool],
-    velocities: Velocities<'a>,
+    source: Source<'a>,
 }
 
-/// Where velocities are from.
+/// Where velocities and concentrations are from.
 #[derive(Clone, Copy)]
-enum Velocities<'a> {
-    Found(&'a [[f32; 2]]),
-    Of(&'a Shallow),
+enum Source<'a> {
+    Taken(&'a Snapshot),
+    Now(&'a Shallow),
 }
 
 /// The liquid in a column.
@@ -45,15 +46,15 @@ impl Shallow {
     /// The liquid as it is now, to be read.
     pub fn view(&self) -> View<'_> {
         let (columns, depth, active) = (&self.columns, self.flow.depths(), self.flow.active());
-        View { columns, depth, active, velocities: Velocities::Of(self) }
+        View { columns, depth, active, source: Source::Now(self) }
     }
 }
 
 impl Snapshot {
     /// The liquid as it was taken, to be read.
     pub fn view(&self) -> View<'_> {
-        let velocities = Velocities::Found(self.velocities());
-        View { columns: self.columns(), depth: self.depths(), active: self.active(), velocities }
+        let source = Source::Taken(self);
+        View { columns: self.columns(), depth: self.depths(), active: self.active(), source }
     }
 }
 
@@ -81,6 +82,22 @@ impl View<'_> {
             *out = self.cubic_metres(self.units_within(*low, *high));
         }
         Ok(())
+    }
+
+    /// The mean concentration of a scalar over the liquid in a box, as of [`View::volume`], in its own measure: each column counts by its liquid in
+    /// the box. 0 where there is none.
+    ///
+    /// # Errors
+    /// As [`View::volume`]; `Argument` also where there is no such scalar.
+    pub fn mean_concentration(&self, scalar: usize, low: [f64; 3], high: [f64; 3]) -> Result<f64> {
+        check_scalar(scalar, self.scalars())?;
+        check_box(low, high)?;
+        let (mut units, mut sum) = (0, 0.0);
+        self.each_within(low, high, |column, overlap| {
+            units += overlap;
+            sum += overlap as f64 * f64::from(self.concentration(scalar, column));
+        });
+        Ok(if units > 0 { sum / units as f64 } else { 0.0 })
     }
 
     /// Liquid on a layer (m3).
@@ -130,9 +147,26 @@ impl View<'_> {
     }
 
     fn velocity(&self, column: usize) -> [f32; 2] {
-        match self.velocities {
-            Velocities::Found(velocities) => velocities[column],
-            Velocities::Of(shallow) => shallow.velocity(column),
+        match self.source {
+            Source::Taken(snapshot) => snapshot.velocities()[column],
+            Source::Now(shallow) => shallow.velocity(column),
+        }
+    }
+
+    fn scalars(&self) -> usize {
+        match self.source {
+            Source::Taken(snapshot) => {
+                (0..).take_while(|&at| !snapshot.concentrations(at).is_empty()).count()
+            }
+            Source::Now(shallow) => shallow.scalars().len(),
+        }
+    }
+
+    /// The concentration of a scalar that there is, in a column.
+    fn concentration(&self, scalar: usize, column: usize) -> f32 {
+        match self.source {
+            Source::Taken(snapshot) => snapshot.concentrations(scalar)[column],
+            Source::Now(shallow) => shallow.concentration(scalar, column),
         }
     }
 
@@ -141,22 +175,28 @@ impl View<'_> {
         units as f64 * (cell * cell * self.columns.heights.unit)
     }
 
-    /// Units of liquid in a box. Its heights are rounded to units: integers have the same sum in any order.
+    /// Units of liquid in a box: integers have the same sum in any order.
     fn units_within(&self, low: [f64; 3], high: [f64; 3]) -> i64 {
+        let mut units = 0;
+        self.each_within(low, high, |_, overlap| units += overlap);
+        units
+    }
+
+    /// Calls `see` with the columns of a box whose strips are active, and the units of each that lie in it. Heights of the box are rounded to units.
+    #[inline(always)]
+    fn each_within(&self, low: [f64; 3], high: [f64; 3], mut see: impl FnMut(usize, i64)) {
         let columns = self.columns;
         let [across, rows] = [0, 2].map(|axis| cells(&columns.grid, axis / 2, low[axis], high[axis]));
         let [floor, top] = [low[1], high[1]].map(|height| columns.heights.round(height));
-        let mut units = 0;
         for strip in rows.flat_map(|row| columns.row(row)).filter(|&strip| self.active[strip]) {
             let first = columns.strips()[strip].at as usize * STRIP;
             let [from, to] = [across.start, across.end].map(|x| x.clamp(first, first + STRIP) - first);
             let own = strip * STRIP + from..strip * STRIP + to;
-            let overlap = |(base, depth): (&i32, &i32)| {
-                i64::from(((base + depth).min(top) - (*base).max(floor)).max(0))
-            };
-            units += columns.bases()[own.clone()].iter().zip(&self.depth[own]).map(overlap).sum::<i64>();
+            let ends = columns.bases()[own.clone()].iter().zip(&self.depth[own.clone()]);
+            for (column, (base, depth)) in own.zip(ends) {
+                see(column, i64::from(((base + depth).min(top) - (*base).max(floor)).max(0)));
+            }
         }
-        units
     }
 }
 

@@ -6,6 +6,7 @@ use super::columns::{Columns, NONE, STRIP};
 use super::falls::Droplet;
 use super::flow::Flow;
 use super::flow::active::runs;
+use super::scalars::{MOST, find_concentrations};
 use super::system::Shallow;
 use crate::base::cpu::dispatch;
 use crate::error::{Error, Result};
@@ -22,6 +23,8 @@ pub struct Snapshot {
     velocity: Vec<[f32; 2]>,
     active: Vec<bool>,
     drops: Vec<Droplet>,
+    /// Of each scalar; empty for those that are not there.
+    concentrations: [Vec<f32>; MOST],
     time: f64,
 }
 
@@ -36,6 +39,7 @@ impl Snapshot {
             depth: vec![0; len],
             velocity: vec![[0.0; 2]; len],
             drops: Vec::with_capacity(shallow.params.falls.map_or(0, |falls| falls.most)),
+            concentrations: Default::default(),
             time: 0.0,
         };
         snapshot.take(shallow);
@@ -54,6 +58,12 @@ impl Snapshot {
             self.depth.resize(self.columns.len(), 0);
             self.velocity.clear();
             self.velocity.resize(self.columns.len(), [0.0; 2]);
+            self.concentrations.iter_mut().for_each(Vec::clear);
+        }
+        let amounts = &shallow.flow.amounts;
+        for (scalar, concentrations) in self.concentrations.iter_mut().enumerate() {
+            let len = if scalar < amounts.count() { self.columns.len() } else { 0 };
+            concentrations.resize(len, 0.0);
         }
         let mut end = 0;
         for run in runs(shallow.flow.active()) {
@@ -61,7 +71,11 @@ impl Snapshot {
             end = run.end;
             let indices = run.start * STRIP..run.end * STRIP;
             self.depth[indices.clone()].copy_from_slice(&shallow.flow.depth[indices.clone()]);
-            find_velocities(shallow, run, &mut self.velocity[indices]);
+            find_velocities(shallow, run, &mut self.velocity[indices.clone()]);
+            for (scalar, out) in self.concentrations.iter_mut().enumerate().take(amounts.count()) {
+                let (depth, out) = (&self.depth[indices.clone()], &mut out[indices.clone()]);
+                find_concentrations(amounts, scalar, depth, indices.start, out);
+            }
         }
         self.clear(end..self.active.len());
         self.active.copy_from_slice(shallow.flow.active());
@@ -76,7 +90,9 @@ impl Snapshot {
         for run in runs(&self.active[strips]) {
             let run = (first + run.start) * STRIP..(first + run.end) * STRIP;
             self.depth[run.clone()].fill(0);
-            self.velocity[run].fill([0.0; 2]);
+            self.velocity[run.clone()].fill([0.0; 2]);
+            let carried = self.concentrations.iter_mut().filter(|numbers| !numbers.is_empty());
+            carried.for_each(|numbers| numbers[run.clone()].fill(0.0));
         }
     }
 
@@ -93,6 +109,11 @@ impl Snapshot {
     /// As [`Shallow::velocity`], of every column index: the mean velocity over its depth (m/s), along x and z.
     pub fn velocities(&self) -> &[[f32; 2]] {
         &self.velocity
+    }
+
+    /// Concentrations of a scalar by column index, in its own measure, as [`Shallow::concentration`]; empty, if there is no such scalar.
+    pub fn concentrations(&self, scalar: usize) -> &[f32] {
+        self.concentrations.get(scalar).map_or(&[], |numbers| &numbers[..])
     }
 
     /// Whether each strip of columns may have liquid.

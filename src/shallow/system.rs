@@ -13,6 +13,7 @@ use super::pace::{self, MOST_STEPS, Measures, Next};
 use super::params::{Params, Section};
 use super::pipes::{Border, Pipes};
 use super::remap::Remap;
+use super::scalars::amounts::Account;
 use super::terrain::Solids;
 use crate::base::cpu::FlushDenormals;
 use crate::context::Context;
@@ -186,7 +187,8 @@ impl Shallow {
     pub fn pour(&mut self, column: usize, depth: f64) -> f64 {
         let heights = self.columns.heights;
         let units = (depth / heights.unit).round().clamp(-4e9, 4e9) as i64;
-        let added = self.flow.add(&self.columns, column, units);
+        let levels = self.flow.amounts.poured;
+        let added = self.flow.add(&self.columns, column, units, &levels, Account::Poured);
         self.poured += added;
         heights.length(added as f64)
     }
@@ -200,7 +202,9 @@ impl Shallow {
             if self.columns.is_column(index) {
                 let missing =
                     level - i64::from(self.columns.bases()[index]) - i64::from(self.flow.depths()[index]);
-                self.poured += self.flow.add(&self.columns, index, missing.max(0));
+                let levels = self.flow.amounts.poured;
+                let missing = missing.max(0);
+                self.poured += self.flow.add(&self.columns, index, missing, &levels, Account::Poured);
             }
         }
     }

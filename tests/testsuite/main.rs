@@ -100,6 +100,7 @@ mod shallow {
     mod flow;
     mod moving;
     mod probe;
+    mod scalars;
     mod state;
     mod surface;
     mod surface_groups;

@@ -11,6 +11,7 @@ use crate::shallow::flow::lips::Over;
 use crate::shallow::pipes::Links;
 use crate::shallow::pipes::cliffs::beside;
 use crate::shallow::pipes::joints::Side;
+use crate::shallow::scalars::shares::MOST;
 use crate::shallow::system::Shallow;
 
 /// Bytes of a lip in a saved state.
@@ -195,9 +196,10 @@ impl Shallow {
     /// Adds units to a column; whether some find no room there and wait.
     fn land(&mut self, column: usize, units: i64) -> bool {
         let (columns, flow) = (&self.columns, &mut self.flow);
-        let rest = units - flow.add(columns, column, units);
+        let rest = units - flow.change_depth(columns, column, units);
         let cell = columns.grid.index(columns.cell(column));
-        self.remap.held.add(cell, columns.bases()[column], rest);
+        // What falls carries no scalars.
+        self.remap.held.add(cell, columns.bases()[column], rest, [0; MOST]);
         rest > 0
     }
 

@@ -46,6 +46,8 @@ pub struct Bands {
     may_be_full: Vec<bool>,
     /// A column takes at most so many times the greatest depth beside it, with its own.
     takes: i64,
+    /// Count of scalars that the liquid carries.
+    scalars: usize,
 }
 
 impl Bands {
@@ -59,6 +61,7 @@ impl Bands {
             may_fill: vec![false; count],
             may_be_full: vec![false; count],
             takes: pipes as i64 + 1,
+            scalars: 0,
         };
         bands.divide(columns, 1);
         bands
@@ -79,7 +82,7 @@ impl Bands {
             return;
         }
         let strips = columns.strips().len();
-        let mut start = 0;
+        let (mut start, scalars) = (0, self.scalars);
         let band = |number: usize| {
             let end = if number + 1 == wanted {
                 rows
@@ -94,13 +97,21 @@ impl Bands {
             start = end;
             Band {
                 rows,
-                buffers: Rows::new(columns),
+                buffers: Rows::new(columns, scalars),
                 before: Copy::default(),
                 behind: Copy::default(),
                 stepped: Stepped { woken: Vec::with_capacity(strips), ..Stepped::default() },
             }
         };
         self.list = (0..wanted).map(band).collect();
+    }
+
+    /// Makes buffers for liquid that carries so many scalars.
+    pub fn carry(&mut self, columns: &Columns, scalars: usize) {
+        let threads = self.list.len();
+        self.scalars = scalars;
+        self.list.clear();
+        self.divide(columns, threads);
     }
 
     /// Measures rows again after their columns have changed.

@@ -2,6 +2,7 @@
 
 use std::ops::Range;
 
+use super::carry::Lanes;
 use super::places::PAD;
 use crate::shallow::columns::{Columns, STRIP};
 
@@ -40,11 +41,13 @@ pub struct Rows {
     pub ones: Vec<f32>,
     /// Sums over links, by column; 0 between steps.
     pub linked: Vec<i64>,
+    /// What the rows carry.
+    pub carried: Lanes,
 }
 
 impl Rows {
-    /// Buffers for rows of these columns.
-    pub fn new(columns: &Columns) -> Self {
+    /// Buffers for rows of these columns, whose liquid carries so many scalars.
+    pub fn new(columns: &Columns, scalars: usize) -> Self {
         let room = room(columns, 0..columns.grid.size[1]);
         let buffer = Buffer {
             east: vec![0.0; room],
@@ -59,6 +62,7 @@ impl Rows {
             zeros: vec![0.0; room],
             ones: vec![1.0; room],
             linked: vec![0; room],
+            carried: Lanes::new(scalars, room),
         }
     }
 
@@ -75,6 +79,7 @@ impl Rows {
         self.zeros.resize(room, 0.0);
         self.ones.resize(room, 1.0);
         self.linked.resize(room, 0);
+        self.carried.widen(room);
     }
 
     /// Memory (bytes).
@@ -84,7 +89,7 @@ impl Rows {
             all.iter().map(|numbers| size_of_val(&numbers[..])).sum::<usize>()
         };
         let none = size_of_val(&self.zeros[..]) + size_of_val(&self.ones[..]) + size_of_val(&self.linked[..]);
-        self.ring.iter().map(numbers).sum::<usize>() + none
+        self.ring.iter().map(numbers).sum::<usize>() + none + self.carried.bytes()
     }
 }
 

@@ -2,11 +2,12 @@
 //!
 //! A step goes over the rows once (`rows.rs`): fluxes (`flux.rs`, `fast.rs`, `links.rs`), their scaling (`scale.rs`), and transfers (`transfer.rs`), on the
 //! strips that are wet or beside wet ones (`active.rs`), by one band of rows for each thread (`bands.rs`, `parts.rs`). Columns that are full up to their
-//! ceiling are a network of their own, found first (`network.rs`, `heads.rs`, `rounds.rs`).
+//! ceiling are a network of their own, found first (`network.rs`, `heads.rs`, `rounds.rs`). What the liquid carries follows transfers (`carry.rs`).
 
 pub(super) mod active;
 pub(super) mod bands;
 mod buffers;
+mod carry;
 pub mod fast;
 pub mod flux;
 mod heads;
@@ -26,6 +27,8 @@ use crate::shallow::columns::{Columns, STRIP, strip_mut};
 use crate::shallow::per_column::{Array, PerColumn};
 use crate::shallow::pipes::cliffs::Cliffs;
 use crate::shallow::pipes::{Links, Pipes};
+use crate::shallow::scalars::amounts::{Account, Amounts, Changes};
+use crate::shallow::scalars::shares::{Levels, MOST};
 use active::{Active, runs};
 use bands::Bands;
 use fast::{Fast, Films};
@@ -53,6 +56,8 @@ pub struct Flow {
     /// Length of the step in whose measure fluxes are (s).
     pub(super) last: f64,
     fast: Fast,
+    /// What it carries.
+    pub(super) amounts: Amounts,
 }
 
 /// What a restored state replaces.
@@ -71,6 +76,8 @@ pub(super) struct Stored<'a> {
     pub links: &'a mut LinkFlow,
     /// Length of the last step (s).
     pub last: &'a mut f64,
+    /// What it carries.
+    pub amounts: &'a mut Amounts,
 }
 
 impl Stored<'_> {
@@ -83,7 +90,9 @@ impl Stored<'_> {
             for numbers in &mut self.numbers {
                 numbers[run.clone()].fill(0.0);
             }
-            self.heads[run].fill(0.0);
+            self.heads[run.clone()].fill(0.0);
+            let amounts = self.amounts.amounts.iter_mut().filter(|amounts| !amounts.is_empty());
+            amounts.for_each(|amounts| amounts[run.clone()].fill(0.0));
         }
     }
 }
@@ -103,6 +112,7 @@ impl Flow {
             network: Network::new(columns.len(), columns.grid.size[1]),
             last: 1.0,
             fast: Fast::new(columns.len() + STRIP, columns.grid.size[1]),
+            amounts: Amounts::none(),
         }
     }
 
@@ -118,6 +128,7 @@ impl Flow {
             + self.bands.bytes()
             + self.network.bytes()
             + self.fast.bytes()
+            + self.amounts.bytes()
     }
 
     /// H of every column index (units).
@@ -157,6 +168,7 @@ impl Flow {
             bands: &mut self.bands,
             links: &mut self.links,
             last: &mut self.last,
+            amounts: &mut self.amounts,
         }
     }
 
@@ -174,8 +186,31 @@ impl Flow {
         self.depth.iter().map(|&depth| i64::from(depth)).sum()
     }
 
+    /// Carries other scalars, of which there is nothing yet.
+    pub(super) fn carry(&mut self, columns: &Columns, amounts: Amounts) {
+        self.bands.carry(columns, amounts.count());
+        self.amounts = amounts;
+    }
+
+    /// As [`Flow::change_depth`], of liquid that comes with these concentrations, or goes with what it carries.
+    pub(super) fn add(
+        &mut self,
+        columns: &Columns,
+        index: usize,
+        units: i64,
+        levels: &Levels,
+        account: Account,
+    ) -> i64 {
+        let before = i64::from(self.depth[index]);
+        let added = self.change_depth(columns, index, units);
+        if added != 0 {
+            self.amounts.add(index, before, added, levels, account);
+        }
+        added
+    }
+
     /// Adds to the depth of a column, or takes from it, within 0 and its ceiling; returns what was added.
-    pub fn add(&mut self, columns: &Columns, index: usize, units: i64) -> i64 {
+    pub(super) fn change_depth(&mut self, columns: &Columns, index: usize, units: i64) -> i64 {
         let room = i64::from(columns.ceilings()[index]) - i64::from(columns.bases()[index]);
         let before = i64::from(self.depth[index]);
         let after = (before + units).clamp(0, room.max(0));
@@ -194,6 +229,7 @@ impl Flow {
         for numbers in self.flux.iter_mut().chain(&mut self.left) {
             numbers.resize_part(part.clone(), len, 0.0);
         }
+        self.amounts.resize_part(part.clone(), len);
         self.fast.resize_part(part.clone(), len);
         self.network.resize_part(part, len);
     }
@@ -267,6 +303,11 @@ impl Flow {
         if self.bands.find_filling() || !self.network.is_empty() {
             self.flood(columns, pipes, step);
         }
+        self.amounts.begin_step(dt);
+        if !self.network.is_empty() {
+            self.carry_flooded();
+        }
+        let acts = self.amounts.acts();
         let ground = Ground {
             columns,
             pipes,
@@ -275,10 +316,12 @@ impl Flow {
             fast: &self.fast,
             lips: &self.lips,
             may_fill: &[],
+            acts: &acts,
         };
         let [flux, left] =
             [&mut self.flux, &mut self.left].map(|both| both.each_mut().map(|numbers| &mut numbers[..]));
-        let liquid = Part::new(&mut self.depth, flux, left, &mut self.links);
+        let amounts = self.amounts.amounts.each_mut().map(|amounts| &mut amounts[..]);
+        let liquid = Part::new(&mut self.depth, flux, left, &mut self.links, amounts);
         self.bands.step(step, &ground, liquid);
         self.network.put_back(&mut self.flux, &mut self.left, &mut self.links, &mut self.lips);
         let mut scaled = [0; 3];
@@ -289,7 +332,8 @@ impl Flow {
             for strip in stepped.woken.drain(..) {
                 self.active.wake(columns, strip as usize);
             }
-            (stepped.scaled, stepped.outside) = Default::default();
+            self.amounts.settle(&stepped.carried);
+            (stepped.scaled, stepped.outside, stepped.carried) = Default::default();
         }
         self.last = dt;
         scaled
@@ -299,6 +343,16 @@ impl Flow {
     pub fn divide(&mut self, columns: &Columns, threads: usize) -> bool {
         self.bands.divide(columns, threads);
         self.bands.are_several()
+    }
+
+    /// Moves what the flow through full columns takes along.
+    fn carry_flooded(&mut self) {
+        let Amounts { amounts, party_levels, scalars, .. } = &mut self.amounts;
+        let mut changes = [Changes::default(); MOST];
+        for (amounts, changes) in amounts.iter_mut().zip(&mut changes).take(scalars.len()) {
+            self.network.carry(&self.depth, amounts, party_levels, changes);
+        }
+        self.amounts.settle(&changes);
     }
 
     /// Finds what flows through full columns.

@@ -6,6 +6,7 @@ use std::ops::Range;
 use super::links::LinkFlow;
 use crate::shallow::columns::{Columns, STRIP};
 use crate::shallow::pipes::Links;
+use crate::shallow::scalars::MOST;
 
 /// Rows that a band sees beyond its own: three of which transfers are found, and one of depths.
 pub const BEYOND: usize = 4;
@@ -24,6 +25,8 @@ pub struct Part<'a> {
     pub left: [&'a mut [f32]; 2],
     /// Flux of links, what truncation left, and their transfers.
     pub links: LinkPart<'a>,
+    /// Amounts of scalars; empty without them.
+    pub amounts: [&'a mut [f64]; MOST],
 }
 
 /// Links of a run of rows.
@@ -45,6 +48,7 @@ pub struct Copy {
     flux: [Vec<f32>; 2],
     left: [Vec<f32>; 2],
     links: LinkFlow,
+    amounts: [Vec<f64>; MOST],
 }
 
 /// The three parts that a band sees: before it, its own, behind it.
@@ -68,6 +72,9 @@ impl Copy {
             copy(&mut self.flux[axis], &liquid.flux[axis][columns.clone()]);
             copy(&mut self.left[axis], &liquid.left[axis][columns.clone()]);
         }
+        for (own, amounts) in self.amounts.iter_mut().zip(&liquid.amounts) {
+            copy(own, if amounts.is_empty() { &[] } else { &amounts[columns.clone()] });
+        }
         copy(&mut self.links.flux, &liquid.links.flux[links.clone()]);
         copy(&mut self.links.left, &liquid.links.left[links.clone()]);
         copy(&mut self.links.transfer, &liquid.links.transfer[links]);
@@ -85,12 +92,13 @@ impl Copy {
                 self.flux.each_mut().map(Vec::as_mut_slice),
                 self.left.each_mut().map(Vec::as_mut_slice),
                 &mut self.links,
+                self.amounts.each_mut().map(Vec::as_mut_slice),
             )
         }
     }
 }
 
-fn copy(to: &mut Vec<f32>, from: &[f32]) {
+fn copy<T: Clone>(to: &mut Vec<T>, from: &[T]) {
     to.clear();
     to.extend_from_slice(from);
 }
@@ -102,6 +110,7 @@ impl<'a> Part<'a> {
         flux: [&'a mut [f32]; 2],
         left: [&'a mut [f32]; 2],
         links: &'a mut LinkFlow,
+        amounts: [&'a mut [f64]; MOST],
     ) -> Self {
         Self {
             start: 0,
@@ -110,6 +119,7 @@ impl<'a> Part<'a> {
             flux,
             left,
             links: LinkPart { flux: &mut links.flux, left: &mut links.left, transfer: &mut links.transfer },
+            amounts,
         }
     }
 
@@ -124,6 +134,10 @@ impl<'a> Part<'a> {
         let flux = self.links.flux.split_at_mut(at_link);
         let left = self.links.left.split_at_mut(at_link);
         let transfer = self.links.transfer.split_at_mut(at_link);
+        let [mut before, mut behind] = [(); 2].map(|()| [(); MOST].map(|()| &mut [][..]));
+        for (scalar, amounts) in self.amounts.into_iter().enumerate() {
+            (before[scalar], behind[scalar]) = amounts.split_at_mut(at.min(amounts.len()));
+        }
         [
             Self {
                 start: self.start,
@@ -132,6 +146,7 @@ impl<'a> Part<'a> {
                 flux: [flux_east.0, flux_south.0],
                 left: [left_east.0, left_south.0],
                 links: LinkPart { flux: flux.0, left: left.0, transfer: transfer.0 },
+                amounts: before,
             },
             Self {
                 start: index,
@@ -140,6 +155,7 @@ impl<'a> Part<'a> {
                 flux: [flux_east.1, flux_south.1],
                 left: [left_east.1, left_south.1],
                 links: LinkPart { flux: flux.1, left: left.1, transfer: transfer.1 },
+                amounts: behind,
             },
         ]
     }

@@ -29,7 +29,7 @@ impl Place {
 
     /// A number of a column of this row or the next one.
     #[inline(always)]
-    pub fn pick(&self, own: &[f32], beyond: &[f32], index: u32) -> f32 {
+    pub fn pick<T: Copy>(&self, own: &[T], beyond: &[T], index: u32) -> T {
         let index = index as usize;
         if index < self.starts[2] || self.starts[2] == self.starts[1] {
             own[PAD + index - self.starts[1]]
@@ -59,13 +59,13 @@ impl Place {
 
     /// Numbers of the columns to the north of a span.
     #[inline(always)]
-    pub fn north<'a>(&self, numbers: &'a [f32], none: &'a [f32], span: &Span) -> &'a [f32] {
+    pub fn north<'a, T>(&self, numbers: &'a [T], none: &'a [T], span: &Span) -> &'a [T] {
         if span.north == NONE { none } else { &numbers[PAD + span.north as usize - self.starts[0]..] }
     }
 
     /// A number of the columns of a span, and of those around them.
     #[inline(always)]
-    pub fn beside<'a>(&self, own: &'a [f32], beyond: &'a [f32], none: &'a [f32], span: &Span) -> Beside<'a> {
+    pub fn beside<'a, T>(&self, own: &'a [T], beyond: &'a [T], none: &'a [T], span: &Span) -> Beside<'a, T> {
         let south =
             if span.south == NONE { none } else { &beyond[PAD + span.south as usize - self.starts[2]..] };
         Beside { own: &own[self.of(span.first)..], south }

@@ -6,7 +6,7 @@
 //! any more. A band of rows starts some rows before its own, and ends some behind, on copies: it finds the same numbers there as its neighbours.
 
 use super::active::Active;
-use super::buffers::{RING, Rows, SWEEPS};
+use super::buffers::{Buffer, RING, Rows, SWEEPS};
 use super::fast::Fast;
 use super::flux::{Carried, Kind, Of, Row, Step, flux_row, greater, lesser};
 use super::links::{Outside, indices_of};
@@ -19,6 +19,8 @@ use super::transfer::{find_wet, move_units};
 use crate::base::cpu::dispatch;
 use crate::shallow::columns::{Columns, NONE, STRIP};
 use crate::shallow::pipes::Pipes;
+use crate::shallow::scalars::MOST;
+use crate::shallow::scalars::amounts::{Act, Changes};
 
 /// What a step is made on.
 pub struct Ground<'a> {
@@ -36,6 +38,8 @@ pub struct Ground<'a> {
     pub lips: &'a Lips,
     /// Rows with columns that may fill up.
     pub may_fill: &'a [bool],
+    /// What the laws of scalars do.
+    pub acts: &'a [Act],
 }
 
 impl Ground<'_> {
@@ -61,6 +65,8 @@ pub struct Stepped {
     pub outside: Outside,
     /// Strips that got wet.
     pub woken: Vec<u32>,
+    /// What happened to scalars.
+    pub carried: [Changes; MOST],
 }
 
 impl Rows {
@@ -121,6 +127,9 @@ impl Rows {
                 if !ground.network.is_empty() {
                     self.shut(ground, parts, front);
                 }
+                if !self.carried.is_empty() {
+                    self.carried.find_levels(ground, parts, front);
+                }
                 let over = self.find_least(ground, parts, front);
                 stepped.scaled[0] += u32::from(over && own.contains(&front));
             }
@@ -141,6 +150,9 @@ impl Rows {
                 self.move_links(ground, parts, row, &mut stepped.outside);
                 if own.contains(&row) {
                     deepest[row - own.start] = self.transfer(ground, parts, row, &mut stepped.woken);
+                }
+                if !self.carried.is_empty() {
+                    self.carry(ground, parts, row, &mut stepped.carried);
                 }
             }
         }
@@ -444,6 +456,14 @@ impl Rows {
             find_wet(depth, wet, |place| woken.push(strip + place as u32));
         }
         deepest.into_iter().fold(0, i32::max)
+    }
+
+    /// Moves what a row's transfers take along; its depths are final.
+    fn carry(&mut self, ground: &Ground, parts: &mut Parts, row: usize, changes: &mut [Changes; MOST]) {
+        let Self { carried, ring, .. } = self;
+        let Buffer { east, south, .. } = &ring[row % RING];
+        carried.move_links(ground, parts, row, changes);
+        carried.move_row(ground, parts, row, [east, south], changes);
     }
 }
 

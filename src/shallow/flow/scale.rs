@@ -31,11 +31,11 @@ impl<'a> Around<'a> {
 }
 
 /// One number of the columns of a span, and of those around them.
-pub struct Beside<'a> {
+pub struct Beside<'a, T = f32> {
     /// The span's own, and one more: the columns to the east.
-    pub own: &'a [f32],
+    pub own: &'a [T],
     /// Those to the south.
-    pub south: &'a [f32],
+    pub south: &'a [T],
 }
 
 /// The depth that a column can give (units): a dry one keeps what is less than a unit.

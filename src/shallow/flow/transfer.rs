@@ -3,7 +3,9 @@
 //! Without it thin films freeze: blood of 1 um on a slope of 0.5 moves 0.03 units a step.
 
 use super::scale::Around;
+use crate::base::cpu::dispatch;
 use crate::shallow::columns::{STRIP, strip_mut};
+use crate::shallow::scalars::shares::nearest;
 
 /// The integer part of a transfer (units), toward zero.
 ///
@@ -41,6 +43,22 @@ pub fn find_wet(depth: &[i32], wet: &[bool], mut got_wet: impl FnMut(usize)) {
     for (place, (strip, wet)) in depth.as_chunks::<STRIP>().0.iter().zip(wet).enumerate() {
         if !wet && strip.iter().fold(0, |any, depth| any | depth) != 0 {
             got_wet(place);
+        }
+    }
+}
+
+/// Finds what transfers between columns and their neighbours, of these concentrations (levels), take along.
+pub fn take_along(own: &[f64], other: &[f64], transfer: &[f32], moved: &mut [f64]) {
+    dispatch!(body(own: &[f64], other: &[f64], transfer: &[f32], moved: &mut [f64]));
+
+    #[inline(always)]
+    fn body(own: &[f64], other: &[f64], transfer: &[f32], moved: &mut [f64]) {
+        for (((moved, own), other), transfer) in moved.iter_mut().zip(own).zip(other).zip(transfer) {
+            // SAFETY: it was scaled by K, as where its units move.
+            let units = unsafe { whole(*transfer) };
+            // One of both is 0. To choose one of two concentrations, the compiler would gather them.
+            let (goes, comes) = (f64::from(units.max(0)), f64::from(units.min(0)));
+            *moved = nearest(own * goes + other * comes);
         }
     }
 }

@@ -4,6 +4,7 @@ use std::ops::Range;
 
 use crate::shallow::columns::{Columns, STRIP, Strip};
 use crate::shallow::flow::Flow;
+use crate::shallow::scalars::MOST;
 
 /// The columns of some rows and their liquid. Strips and indices are counted from the first of these rows.
 #[derive(Debug, Clone, Default)]
@@ -25,6 +26,8 @@ pub(super) struct Band {
     pub left: [Vec<f32>; 2],
     /// Heads over the surface.
     pub over: Vec<f32>,
+    /// Amounts of scalars; empty without them.
+    pub amounts: [Vec<f64>; MOST],
 }
 
 impl Band {
@@ -47,7 +50,10 @@ impl Band {
             copy(&mut self.flux[axis], &flow.flux[axis][indices.clone()]);
             copy(&mut self.left[axis], &flow.left[axis][indices.clone()]);
         }
-        copy(&mut self.over, &flow.network.over()[indices]);
+        copy(&mut self.over, &flow.network.over()[indices.clone()]);
+        for (own, amounts) in self.amounts.iter_mut().zip(&flow.amounts.amounts) {
+            copy(own, if amounts.is_empty() { &[] } else { &amounts[indices.clone()] });
+        }
         self.rows = rows;
     }
 

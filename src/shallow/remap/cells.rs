@@ -4,6 +4,8 @@
 //! column with room; so is the liquid of a column that is gone, from where it stood. What finds no room above goes down.
 
 use crate::shallow::grid::BOTTOMLESS;
+use crate::shallow::scalars::MOST;
+use crate::shallow::scalars::shares::take;
 
 /// No column.
 const NO: u32 = u32::MAX;
@@ -16,6 +18,7 @@ pub(super) struct Old {
     pub index: u32,
     pub base: i32,
     pub depth: i32,
+    pub amounts: [i64; MOST],
 }
 
 /// A column now.
@@ -28,6 +31,8 @@ pub(super) struct New {
     pub depth: i32,
     /// Index of the column that it was before, or `u32::MAX`.
     pub from: u32,
+    /// Amounts of scalars that it gets.
+    pub amounts: [i64; MOST],
 }
 
 /// Liquid that has to find a place.
@@ -38,6 +43,7 @@ struct Parcel {
     /// Where it stood.
     height: i32,
     units: i64,
+    amounts: [i64; MOST],
 }
 
 /// The columns of one cell, from the lowest up.
@@ -61,6 +67,8 @@ pub(super) struct Rest {
     pub height: i32,
     /// Units that did not stay in their columns, the others included.
     pub displaced: i64,
+    /// Amounts of scalars of the units.
+    pub amounts: [i64; MOST],
 }
 
 impl Default for Cell {
@@ -84,12 +92,13 @@ impl Cell {
         self.keep();
         let mut rest = Rest { height: i32::MAX, ..Rest::default() };
         for at in 0..self.parcels.len() {
-            let parcel = self.parcels[at];
-            let left = parcel.units - self.place(parcel);
+            let mut parcel = self.parcels[at];
             rest.displaced += parcel.units;
-            if left > 0 {
-                rest.units += left;
+            self.place(&mut parcel);
+            if parcel.units > 0 {
+                rest.units += parcel.units;
                 rest.height = rest.height.min(parcel.height);
+                rest.amounts.iter_mut().zip(parcel.amounts).for_each(|(rest, left)| *rest += left);
             }
         }
         rest
@@ -140,40 +149,40 @@ impl Cell {
     /// Leaves liquid in its columns, and collects what has no room there, from the lowest up.
     fn keep(&mut self) {
         for old in self.old.iter().filter(|old| old.depth > 0) {
-            let parcel = |above, units| Parcel { above, height: old.base, units: i64::from(units) };
-            match self.new.iter_mut().find(|new| new.from == old.index) {
-                Some(new) => {
-                    new.depth = old.depth.min(new.ceiling - new.base);
-                    if new.depth < old.depth {
-                        self.parcels.push(parcel(new.ceiling, old.depth - new.depth));
-                    }
-                }
-                None => self.parcels.push(parcel(old.base, old.depth)),
+            let (units, amounts) = (i64::from(old.depth), old.amounts);
+            let mut parcel = Parcel { above: old.base, height: old.base, units, amounts };
+            if let Some(new) = self.new.iter_mut().find(|new| new.from == old.index) {
+                new.depth = old.depth.min(new.ceiling - new.base);
+                take(&mut parcel.amounts, i64::from(new.depth), units, &mut new.amounts);
+                parcel.above = new.ceiling;
+                parcel.units -= i64::from(new.depth);
+            }
+            if parcel.units > 0 {
+                self.parcels.push(parcel);
             }
         }
     }
 
-    /// Fills columns with a parcel, from where it goes first up, then from there down; returns what found a place.
-    fn place(&mut self, parcel: Parcel) -> i64 {
+    /// Fills columns with a parcel, from where it goes first up, then from there down; leaves what finds no place.
+    fn place(&mut self, parcel: &mut Parcel) {
         if self.under != BOTTOMLESS && parcel.above < self.under {
-            return 0;
+            return;
         }
         let first = self.new.partition_point(|new| new.ceiling <= parcel.above);
         let (below, above) = self.new.split_at_mut(first);
-        let mut left = parcel.units;
         for new in above.iter_mut().chain(below.iter_mut().rev()) {
             let room = new.ceiling - new.base - new.depth;
-            let units = i64::from(room).min(left);
+            let units = i64::from(room).min(parcel.units);
             new.depth += units as i32;
-            left -= units;
+            take(&mut parcel.amounts, units, parcel.units, &mut new.amounts);
+            parcel.units -= units;
         }
-        parcel.units - left
     }
 }
 
 /// A new column without liquid.
 pub(super) fn dry(index: usize, base: i32, ceiling: i32) -> New {
-    New { index: index as u32, base, ceiling, depth: 0, from: NO }
+    New { index: index as u32, base, ceiling, depth: 0, from: NO, amounts: [0; MOST] }
 }
 
 #[cfg(test)]
@@ -184,7 +193,12 @@ mod tests {
     /// Remaps columns of (base, depth) to such of [base, ceiling]; returns the depths and what is left.
     fn remap(old: &[(i32, i32)], new: &[[i32; 2]]) -> (Vec<i32>, Rest) {
         let mut cell = Cell { under: BOTTOMLESS, reach: 100, ..Cell::default() };
-        let column = |(index, &(base, depth)): (usize, &(i32, i32))| Old { index: index as u32, base, depth };
+        let column = |(index, &(base, depth)): (usize, &(i32, i32))| Old {
+            index: index as u32,
+            base,
+            depth,
+            amounts: [0; MOST],
+        };
         cell.old = old.iter().enumerate().map(column).collect();
         cell.new = new.iter().enumerate().map(|(index, ends)| dry(index, ends[0], ends[1])).collect();
         let rest = cell.remap();
@@ -218,16 +232,35 @@ mod tests {
     fn what_finds_no_room_is_left_over() {
         let (depths, rest) = remap(&[(0, 50), (100, 60)], &[[40, 50], [TOP, TOP]]);
         assert_eq!(depths, [10, 0]);
-        assert_eq!(rest, Rest { units: 100, height: 0, displaced: 100 });
-        assert_eq!(remap(&[(7, 50)], &[]).1, Rest { units: 50, height: 7, displaced: 50 });
+        assert_eq!(rest, Rest { units: 100, displaced: 100, ..Rest::default() });
+        assert_eq!(
+            remap(&[(7, 50)], &[]).1,
+            Rest { units: 50, height: 7, displaced: 50, amounts: [0; MOST] }
+        );
+    }
+
+    #[test]
+    fn amounts_go_with_their_units() {
+        let mut cell = Cell { under: BOTTOMLESS, reach: 100, ..Cell::default() };
+        cell.old = vec![
+            Old { index: 0, base: 0, depth: 100, amounts: [1000, -50, 7, 0] },
+            Old { index: 1, base: 500, depth: 10, amounts: [10, 0, 0, 1 << 40] },
+        ];
+        // Thirty units stay, seventy are pushed up into what was the upper column.
+        cell.new = vec![dry(0, 0, 30), dry(1, 500, TOP)];
+        assert_eq!(cell.remap().amounts, [0; MOST]);
+        assert_eq!(cell.new[0].amounts, [300, -15, 2, 0]);
+        assert_eq!(cell.new[1].amounts, [710, -35, 5, 1 << 40]);
     }
 
     #[test]
     fn liquid_below_a_solid_that_hangs_does_not_get_on_top_of_it() {
         let mut cell = Cell { under: 100, reach: 10, ..Cell::default() };
-        cell.old = vec![Old { index: 0, base: 20, depth: 5 }, Old { index: 1, base: 200, depth: 5 }];
+        let old = |index, base| Old { index, base, depth: 5, amounts: [7 + i64::from(base); MOST] };
+        cell.old = vec![old(0, 20), old(1, 200)];
         cell.new = vec![dry(0, 200, TOP)];
-        assert_eq!(cell.remap(), Rest { units: 5, height: 20, displaced: 5 });
+        assert_eq!(cell.remap(), Rest { units: 5, height: 20, displaced: 5, amounts: [27; MOST] });
+        assert_eq!(cell.new[0].amounts, [207; MOST]);
         assert_eq!(cell.new[0].depth, 5);
     }
 }

@@ -5,6 +5,9 @@
 use crate::shallow::columns::Columns;
 use crate::shallow::flow::Flow;
 use crate::shallow::grid::BOTTOMLESS;
+use crate::shallow::scalars::MOST;
+use crate::shallow::scalars::amounts::Account;
+use crate::shallow::scalars::shares::{part, take};
 
 /// Liquid that waits for room.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
@@ -15,10 +18,12 @@ pub struct Parcel {
     pub height: i32,
     /// How much it is (units), over 0.
     pub units: i64,
+    /// What it carries: an amount of each scalar.
+    pub amounts: [i64; MOST],
 }
 
 impl Parcel {
-    /// Its cell, height and units, for a saved state.
+    /// Its cell, height and units, for a saved state, which has amounts apart.
     pub(in crate::shallow) fn to_bytes(self) -> [u8; 16] {
         let mut bytes = [0; 16];
         bytes[..4].copy_from_slice(&self.cell.to_le_bytes());
@@ -27,10 +32,11 @@ impl Parcel {
         bytes
     }
 
-    /// As [`Parcel::to_bytes`] has written it.
+    /// As [`Parcel::to_bytes`] has written it; it carries nothing.
     pub(in crate::shallow) fn from_bytes(bytes: &[u8; 16]) -> Self {
         let all = i128::from_le_bytes(*bytes);
-        Self { cell: all as u32, height: (all >> 32) as i32, units: (all >> 64) as i64 }
+        let (cell, height, units) = (all as u32, (all >> 32) as i32, (all >> 64) as i64);
+        Self { cell, height, units, amounts: [0; MOST] }
     }
 
     /// Whether it may be over such columns.
@@ -45,6 +51,7 @@ struct Offer {
     cell: u32,
     height: i32,
     units: i64,
+    amounts: [i64; MOST],
     parcel: u32,
 }
 
@@ -73,9 +80,9 @@ impl Held {
     }
 
     /// Adds liquid that finds no room in its cell (`Grid::index`).
-    pub(in crate::shallow) fn add(&mut self, cell: usize, height: i32, units: i64) {
+    pub(in crate::shallow) fn add(&mut self, cell: usize, height: i32, units: i64, amounts: [i64; MOST]) {
         if units > 0 {
-            self.parcels.push(Parcel { cell: cell as u32, height, units });
+            self.parcels.push(Parcel { cell: cell as u32, height, units, amounts });
         }
     }
 
@@ -87,6 +94,16 @@ impl Held {
     /// Units that wait.
     pub fn units(&self) -> i64 {
         self.parcels.iter().map(|parcel| parcel.units).sum()
+    }
+
+    /// How much of a scalar waits with it.
+    pub fn amount(&self, scalar: usize) -> i128 {
+        self.parcels.iter().map(|parcel| i128::from(parcel.amounts[scalar])).sum()
+    }
+
+    /// Other scalars are carried: what waits has nothing of them.
+    pub(in crate::shallow) fn forget_amounts(&mut self) {
+        self.parcels.iter_mut().for_each(|parcel| parcel.amounts = [0; MOST]);
     }
 
     /// What waits, by cell: part of the state.
@@ -108,7 +125,7 @@ impl Held {
         }
         self.unite();
         for parcel in &mut self.parcels {
-            parcel.units -= put(columns, flow, &mut self.order, *parcel);
+            put(columns, flow, &mut self.order, parcel);
         }
         self.parcels.retain(|parcel| parcel.units > 0);
         self.offer(columns, flow);
@@ -116,7 +133,13 @@ impl Held {
         let mut fallen = 0;
         self.parcels.retain(|parcel| {
             let falls = parcel.units > 0 && is_void(columns, parcel.cell, parcel.height);
-            fallen += if falls { parcel.units } else { 0 };
+            if falls {
+                fallen += parcel.units;
+                flow.amounts.count_in(Account::Lost, &parcel.amounts);
+            } else if parcel.units == 0 {
+                // What was cut off from the shares of adjacent cells.
+                flow.amounts.count_in(Account::Dried, &parcel.amounts);
+            }
             parcel.units > 0 && !falls
         });
         fallen
@@ -129,6 +152,7 @@ impl Held {
             let same = next.cell == first.cell;
             if same {
                 first.units += next.units;
+                first.amounts.iter_mut().zip(next.amounts).for_each(|(all, own)| *all += own);
             }
             same
         });
@@ -149,11 +173,15 @@ impl Held {
             let first = self.offers.len();
             for cell in beside.into_iter().flatten() {
                 if room(columns, flow, cell, parcel.height) > 0 {
-                    self.offers.push(Offer { cell, height: parcel.height, units: 0, parcel: number as u32 });
+                    let (height, amounts) = (parcel.height, [0; MOST]);
+                    self.offers.push(Offer { cell, height, units: 0, amounts, parcel: number as u32 });
                 }
             }
             let count = (self.offers.len() - first) as i64;
-            self.offers[first..].iter_mut().for_each(|offer| offer.units = parcel.units / count);
+            for offer in &mut self.offers[first..] {
+                offer.units = parcel.units / count;
+                offer.amounts = part(&parcel.amounts, offer.units, parcel.units);
+            }
         }
     }
 
@@ -173,8 +201,14 @@ impl Held {
                 } else {
                     (i128::from(offer.units) * i128::from(room) / i128::from(offered)) as i64
                 };
-                let parcel = Parcel { cell: offer.cell, height: offer.height, units };
-                parcels[offer.parcel as usize].units -= put(columns, flow, &mut self.order, parcel);
+                let amounts = part(&offer.amounts, units, offer.units);
+                let mut parcel = Parcel { cell: offer.cell, height: offer.height, units, amounts };
+                put(columns, flow, &mut self.order, &mut parcel);
+                let from = &mut parcels[offer.parcel as usize];
+                from.units -= units - parcel.units;
+                for (at, from) in from.amounts.iter_mut().enumerate() {
+                    *from -= amounts[at] - parcel.amounts[at];
+                }
             }
         }
     }
@@ -207,20 +241,24 @@ fn room(columns: &Columns, flow: &Flow, cell: u32, height: i32) -> i64 {
     columns.of_cell(place(columns, cell)).map(|column| room_of(columns, flow, column)).sum()
 }
 
-/// Fills the columns of a cell, from that at the parcel's height up, then from there down; returns what they took (units).
-fn put(columns: &Columns, flow: &mut Flow, order: &mut Vec<u32>, parcel: Parcel) -> i64 {
+/// Fills the columns of a cell, from that at the parcel's height up, then from there down; leaves what they do not take.
+fn put(columns: &Columns, flow: &mut Flow, order: &mut Vec<u32>, parcel: &mut Parcel) {
     if is_void(columns, parcel.cell, parcel.height) {
-        return 0;
+        return;
     }
     order.clear();
     order.extend(columns.of_cell(place(columns, parcel.cell)).map(|column| column as u32));
     let first = order.partition_point(|&column| columns.ceilings()[column as usize] <= parcel.height);
     let (below, above) = order.split_at(first);
-    let mut left = parcel.units;
     for &column in above.iter().chain(below.iter().rev()) {
         let column = column as usize;
-        let units = room_of(columns, flow, column).min(left);
-        left -= if units > 0 { flow.add(columns, column, units) } else { 0 };
+        let units = room_of(columns, flow, column).min(parcel.units);
+        if units > 0 {
+            let units = flow.change_depth(columns, column, units);
+            let mut amounts = [0; MOST];
+            take(&mut parcel.amounts, units, parcel.units, &mut amounts);
+            parcel.units -= units;
+            flow.amounts.put(column, &amounts);
+        }
     }
-    parcel.units - left
 }

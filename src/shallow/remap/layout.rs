@@ -7,6 +7,7 @@ use super::held::Held;
 use super::origins::Origins;
 use crate::shallow::columns::{Columns, NONE, STRIP, Strip, strip_mut, strip_of};
 use crate::shallow::grid::{BOTTOMLESS, TOP};
+use crate::shallow::scalars::MOST;
 use crate::shallow::stacks::Stacks;
 use crate::shallow::terrain::solids::Solid;
 
@@ -32,6 +33,14 @@ pub(super) struct Rows<'a, Cast> {
     pub band: &'a Band,
     /// New solids of the dirty cells, by their rank, row by row along x.
     pub cast: Cast,
+}
+
+/// The liquid in the columns.
+pub(super) struct Liquid<'a> {
+    /// H (units).
+    pub depth: &'a mut [i32],
+    /// Amounts of scalars; empty without them.
+    pub amounts: [&'a mut [f64]; MOST],
 }
 
 impl Layout {
@@ -64,7 +73,7 @@ impl Layout {
         &mut self,
         rows: &Rows<impl Fn(usize) -> &'s [Solid]>,
         columns: &mut Columns,
-        depth: &mut [i32],
+        liquid: &mut Liquid,
         origins: &mut Origins,
         held: &mut Held,
     ) -> i64 {
@@ -89,18 +98,18 @@ impl Layout {
                     origins: &mut *origins,
                 };
                 if cells == 0 {
-                    block.copy(columns, depth);
+                    block.copy(columns, liquid);
                     continue;
                 }
                 block.lay(columns, |rank| cast(next + rank));
                 next += cells.count_ones() as usize;
-                let mut moves = block.keep(columns, depth, self.cell.reach as i32);
+                let mut moves = block.keep(columns, liquid, self.cell.reach as i32);
                 while moves != 0 {
                     let place = moves.trailing_zeros() as usize;
                     moves &= moves - 1;
-                    block.remap(columns, depth, place, &mut self.cell, |cell, rest| {
+                    block.remap(columns, liquid, place, &mut self.cell, |cell, rest| {
                         displaced += rest.displaced;
-                        held.add(grid.index(cell), rest.height, rest.units);
+                        held.add(grid.index(cell), rest.height, rest.units, rest.amounts);
                     });
                 }
             }
@@ -126,6 +135,22 @@ fn bits(holds: impl Fn(usize) -> bool) -> u16 {
     (0..STRIP).fold(0, |bits, x| bits | u16::from(holds(x)) << x)
 }
 
+/// Leaves the numbers of a strip, which was another one, in the places that are kept, if any cell of it moves; else all.
+#[inline(always)]
+fn keep_strip<T: Copy + Default>(
+    now: &mut [T; STRIP],
+    old: Option<u32>,
+    before: &[T],
+    kept: u16,
+    moves: u16,
+) {
+    let Some(old) = old else { return now.fill(T::default()) };
+    *now = *strip_of(before, old as usize);
+    if moves != 0 {
+        (0..STRIP).filter(|x| kept >> x & 1 == 0).for_each(|x| now[x] = T::default());
+    }
+}
+
 /// The strips that lie above each other, before and now.
 struct Block<'a> {
     /// Bits of the cells whose solids change.
@@ -140,7 +165,7 @@ struct Block<'a> {
 
 impl Block<'_> {
     /// Leaves all as it was.
-    fn copy(&mut self, columns: &mut Columns, depth: &mut [i32]) {
+    fn copy(&mut self, columns: &mut Columns, liquid: &mut Liquid) {
         for (&old, &new) in self.old.iter().zip(self.new) {
             let (old, new, band) = (old as usize, new as usize, self.band);
             self.origins.keep(new, old as u32, band.present[old]);
@@ -151,7 +176,12 @@ impl Block<'_> {
             *strip.base = *strip_of(&band.base, old);
             *strip.ceiling = *strip_of(&band.ceiling, old);
             *strip.under = *strip_of(&band.under, old);
-            *strip_mut(depth, new) = *strip_of(&band.depth, old);
+            *strip_mut(liquid.depth, new) = *strip_of(&band.depth, old);
+            for (amounts, before) in liquid.amounts.iter_mut().zip(&band.amounts) {
+                if !amounts.is_empty() {
+                    *strip_mut(amounts, new) = *strip_of(before, old);
+                }
+            }
         }
     }
 
@@ -191,7 +221,7 @@ impl Block<'_> {
     }
 
     /// Leaves liquid where it is in the cells whose columns are the same and have room for it. Returns the bits of all others.
-    fn keep(&mut self, columns: &Columns, depth: &mut [i32], reach: i32) -> u16 {
+    fn keep(&mut self, columns: &Columns, liquid: &mut Liquid, reach: i32) -> u16 {
         let band = self.band;
         let (mut moves, mut any) = (0, 0);
         for layer in 0..self.old.len().max(self.new.len()) {
@@ -220,20 +250,17 @@ impl Block<'_> {
         }
         for (layer, &new) in self.new.iter().enumerate() {
             let new = new as usize;
-            let depth = strip_mut(depth, new);
             let kept = columns.present(new) & !moves;
-            match self.old.get(layer) {
-                Some(&old) => {
-                    *depth = *strip_of(&band.depth, old as usize);
-                    if moves != 0 {
-                        (0..STRIP).filter(|x| kept >> x & 1 == 0).for_each(|x| depth[x] = 0);
-                    }
-                    self.origins.keep(new, old, kept);
+            let old = self.old.get(layer).copied();
+            keep_strip(strip_mut(liquid.depth, new), old, &band.depth, kept, moves);
+            for (amounts, before) in liquid.amounts.iter_mut().zip(&band.amounts) {
+                if !amounts.is_empty() {
+                    keep_strip(strip_mut(amounts, new), old, before, kept, moves);
                 }
-                None => {
-                    depth.fill(0);
-                    self.origins.keep(new, NONE, 0);
-                }
+            }
+            match old {
+                Some(old) => self.origins.keep(new, old, kept),
+                None => self.origins.keep(new, NONE, 0),
             }
         }
         // Where there was no column there is nothing to remap.
@@ -244,7 +271,7 @@ impl Block<'_> {
     fn remap(
         &mut self,
         columns: &Columns,
-        depth: &mut [i32],
+        liquid: &mut Liquid,
         place: usize,
         cell: &mut Cell,
         see: impl FnOnce([usize; 2], super::cells::Rest),
@@ -253,7 +280,10 @@ impl Block<'_> {
         cell.old.clear();
         for &strip in self.old.iter().take_while(|&&strip| band.present[strip as usize] >> place & 1 == 1) {
             let index = strip as usize * STRIP + place;
-            cell.old.push(Old { index: index as u32, base: band.base[index], depth: band.depth[index] });
+            let amount = |of: &Vec<f64>| of.get(index).map_or(0, |&amount| amount as i64);
+            let amounts = band.amounts.each_ref().map(amount);
+            let (base, depth) = (band.base[index], band.depth[index]);
+            cell.old.push(Old { index: index as u32, base, depth, amounts });
         }
         cell.new.clear();
         cell.under = BOTTOMLESS;
@@ -267,7 +297,12 @@ impl Block<'_> {
         }
         let rest = cell.remap();
         for new in &cell.new {
-            depth[new.index as usize] = new.depth;
+            liquid.depth[new.index as usize] = new.depth;
+            for (amounts, amount) in liquid.amounts.iter_mut().zip(new.amounts) {
+                if let Some(own) = amounts.get_mut(new.index as usize) {
+                    *own = amount as f64;
+                }
+            }
             self.origins.set(new.index, new.from);
         }
         let strip = band.strips[self.old[0] as usize];

@@ -32,7 +32,7 @@ use band::Band;
 use carry::{Carry, Change};
 use dirty::Dirty;
 pub use held::{Held, Parcel};
-use layout::{Layout, Rows};
+use layout::{Layout, Liquid, Rows};
 use origins::Origins;
 
 /// What a change of the terrain did.
@@ -204,7 +204,9 @@ impl Shallow {
             open.resize_part(old.clone(), len, 0.0);
         }
         flow.resize_part(old, len);
-        let displaced = layout.lay(&change, columns, &mut flow.depth, origins, held);
+        let amounts = flow.amounts.amounts.each_mut().map(|amounts| &mut amounts[..]);
+        let mut liquid = Liquid { depth: &mut flow.depth, amounts };
+        let displaced = layout.lay(&change, columns, &mut liquid, origins, held);
         origins.finish();
         columns.connect(rows);
         displaced

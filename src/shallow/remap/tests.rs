@@ -92,7 +92,7 @@ fn made_anew(ctx: &Context, shallow: &Shallow, solids: &Solids) -> Shallow {
     assert!(new.pipes == shallow.pipes, "other pipes");
     for index in 0..new.columns.len() {
         let units = i64::from(shallow.flow.depth[index]);
-        assert_eq!(new.flow.add(&new.columns, index, units), units);
+        assert_eq!(new.flow.change_depth(&new.columns, index, units), units);
     }
     new.flow.flux = shallow.flow.flux.clone();
     new.flow.left = shallow.flow.left.clone();

@@ -8,12 +8,13 @@ use crate::error::Result;
 use crate::shallow::columns::STRIP;
 use crate::shallow::falls::{LIP, PACKET};
 use crate::shallow::flow::active::runs;
+use crate::shallow::scalars::amounts::ACCOUNTS;
 use crate::shallow::system::Shallow;
 
 pub(super) const MAGIC: [u8; 8] = *b"frz shal";
 pub(super) const VERSION: u32 = 2;
 /// Bytes of the header.
-pub(super) const HEADER: usize = 160;
+pub(super) const HEADER: usize = 168;
 /// Bytes of the hash.
 pub(super) const SEAL: usize = 16;
 /// Bytes of a strip's share of an array.
@@ -37,6 +38,8 @@ pub(super) struct Counts {
     /// Packets in the air, and links that liquid may fall from.
     pub(super) packets: usize,
     pub(super) lips: usize,
+    /// What the liquid carries.
+    pub(super) scalars: usize,
 }
 
 impl Counts {
@@ -54,6 +57,7 @@ impl Counts {
             parcels: shallow.remap.held.parcels().len(),
             packets: shallow.falls.packets().len(),
             lips: shallow.falls.waiting().len(),
+            scalars: shallow.scalars().len(),
         }
     }
 
@@ -69,6 +73,7 @@ impl Counts {
             + 8 * self.links
             + (4 + SHARE) * self.heads
             + ARRAYS * SHARE * self.strips
+            + self.scalars * (SCALAR + 8 * self.parcels + 2 * SHARE * self.strips)
             + SEAL
     }
 }
@@ -90,18 +95,22 @@ pub(super) struct Header {
     pub(super) tick: u64,
 }
 
+/// Bytes of a scalar's part without those of columns and parcels.
+pub(super) const SCALAR: usize = 32 + 16 * ACCOUNTS;
+
 impl Header {
     pub(super) fn put(&self, to: &mut Put<'_>) {
-        let Counts { runs, strips, rows, points, links, heads, parcels, packets, lips } = self.counts;
-        let counts =
-            [runs, strips, rows, points, links, heads, parcels, packets, lips].map(|count| count as u32);
+        let Counts { runs, strips, rows, points, links, heads, parcels, packets, lips, scalars } =
+            self.counts;
+        let counts = [runs, strips, rows, points, links, heads, parcels, packets, lips, scalars]
+            .map(|count| count as u32);
         to.bytes(&MAGIC);
         to.numbers(&[VERSION, self.border], u32::to_le_bytes);
         to.bytes(&self.terrain);
         to.bytes(&(self.counts.size() as u64).to_le_bytes());
         to.numbers(&counts, u32::to_le_bytes);
         to.numbers(&self.times, f64::to_le_bytes);
-        to.numbers(&[self.still], i32::to_le_bytes);
+        to.numbers(&[self.still, 0], i32::to_le_bytes);
         to.numbers(&self.sums, i64::to_le_bytes);
         to.numbers(&[self.since], f64::to_le_bytes);
         to.numbers(&[self.tick], u64::to_le_bytes);
@@ -115,15 +124,16 @@ impl Header {
         let mut count = || from.u32().map(|count| count as usize);
         let (runs, strips, rows) = (count()?, count()?, count()?);
         let (points, links, heads, parcels) = (count()?, count()?, count()?, count()?);
-        let (packets, lips) = (count()?, count()?);
+        let (packets, lips, scalars) = (count()?, count()?, count()?);
         let times = [from.f64()?, from.f64()?];
         let still = from.u32()? as i32;
+        from.take::<4>()?;
         let mut sums = [0; 6];
         for sum in &mut sums {
             *sum = i64::from_le_bytes(from.take()?);
         }
         let (since, tick) = (from.f64()?, u64::from_le_bytes(from.take()?));
-        let counts = Counts { runs, strips, rows, points, links, heads, parcels, packets, lips };
+        let counts = Counts { runs, strips, rows, points, links, heads, parcels, packets, lips, scalars };
         Ok(Self { border, terrain, counts, times, still, sums, since, tick })
     }
 }

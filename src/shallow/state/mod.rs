@@ -15,9 +15,11 @@
 //! | fluxes of links, then what truncation left of them | 4 each |
 //! | strips of full columns with heads, then their heads | 4 each, then 64 each |
 //! | of each run: depths; fluxes to the east and to the south; what truncation left of both | 5 x 64 a strip |
+//! | of each scalar: its part ([`scalars`]) | |
 //! | hash of all this | [`SEAL`] |
 
 mod header;
+mod scalars;
 
 use std::ops::{Range, RangeInclusive};
 
@@ -35,6 +37,7 @@ use crate::base::bytes::Reader;
 use crate::base::cpu::dispatch;
 use crate::error::{Error, Result};
 use header::{ARRAYS, Counts, HEADER, Header, MAGIC, SEAL, SHARE, VERSION};
+use scalars::Scalars;
 
 /// Beyond what a flux can be (units a step): K keeps transfers within the depth of what gives.
 const MOST_FLUX: f32 = 2.0 * TOP as f32;
@@ -84,11 +87,12 @@ impl Shallow {
     ///
     /// Where the saved liquid had flow points, the same ones are set first ([`Shallow::set_flows`]): what each of them waits for and has
     /// moved is restored in their order. Their places and rates are not compared; the terrain is, by a hash, and the border.
-    /// [`Shallow::last_steps`] is empty behind it. Nothing is allocated.
+    /// The same scalars are set first, too; what sources and pours carry is not restored. [`Shallow::last_steps`] is empty behind it. Nothing is
+    /// allocated.
     ///
     /// # Errors
     /// `Bytes`, and the liquid is as it was: a state that is not of a shallow liquid, of another version, cut short or damaged; of another
-    /// terrain or border, or with other falls; with another count of flow points, or with other kinds.
+    /// terrain or border, or with other falls; with another count of flow points, or with other kinds; with other scalars, but for their names.
     pub fn restore(&mut self, bytes: &[u8]) -> Result<()> {
         let saved = Saved::read(bytes)?;
         saved.check(self)?;
@@ -124,6 +128,7 @@ impl Shallow {
                 to.numbers(&numbers[run.clone()], f32::to_le_bytes);
             }
         }
+        scalars::put(self, &mut to);
         debug_assert!(to.0.is_empty());
         seal.copy_from_slice(&xxh3_128(body).to_le_bytes());
     }
@@ -165,6 +170,8 @@ struct Saved<'a> {
     heads: &'a [[u8; SHARE]],
     /// Shares of arrays, run by run.
     shares: &'a [[u8; SHARE]],
+    /// The parts of scalars.
+    scalars: Scalars<'a>,
 }
 
 impl<'a> Saved<'a> {
@@ -202,6 +209,7 @@ impl<'a> Saved<'a> {
             head_strips: parts(&mut from, counts.heads)?,
             heads: parts(&mut from, counts.heads)?,
             shares: parts(&mut from, ARRAYS * counts.strips)?,
+            scalars: Scalars::read(&mut from, &counts)?,
             header,
         })
     }
@@ -233,6 +241,7 @@ impl<'a> Saved<'a> {
                 return Err(refused(&format!("has another kind of flow point {at} than the liquid")));
             }
         }
+        self.scalars.check_laws(shallow)?;
         let strips = shallow.columns.strips().len();
         let fits = counts.rows == shallow.flow.bands().row_depths().len()
             && is_in_order(self.runs().map(|run| run.start..run.end), strips)
@@ -262,6 +271,7 @@ impl<'a> Saved<'a> {
             && !is_over(left, 1.0)
             && !is_over(heads, f32::MAX)
             && !self.has_bad_columns(columns)
+            && self.scalars.has_good_numbers(self)
     }
 
     fn has_good_falls(&self, shallow: &Shallow) -> bool {
@@ -316,7 +326,7 @@ impl<'a> Saved<'a> {
     /// Puts the state in place.
     fn apply(&self, shallow: &mut Shallow) {
         let Shallow { flow, flows, columns, remap, falls, .. } = &mut *shallow;
-        remap.held.set(self.parcels());
+        remap.held.set(self.parcels().enumerate().map(|(at, parcel)| self.scalars.with_amounts(at, parcel)));
         falls.set(self.packets(), self.lips());
         (falls.since, falls.tick) = (self.header.since, self.header.tick);
         let [poured, sourced, drained, absorbed, lost, gained] = self.header.sums;
@@ -333,6 +343,7 @@ impl<'a> Saved<'a> {
             stored.heads[run].fill(0.0);
         }
         stored.clear(end..columns.strips().len());
+        self.scalars.apply(self.runs(), stored.amounts);
         for (strip, heads) in self.head_strips().zip(self.heads) {
             get(heads, &mut stored.heads[strip * STRIP..(strip + 1) * STRIP], f32::from_le_bytes);
         }

@@ -1,0 +1,200 @@
+//! The amounts of a liquid's scalars, and where they came from and went.
+
+use std::ops::Range;
+
+use super::shares::{LEVELS, Levels, MOST, integer, level, share};
+use super::{Law, Scalar};
+use crate::shallow::per_column::{Array, PerColumn};
+
+/// Decay is counted after so much of a half-life, or a step, if that is longer: in shorter steps thin films would lose less than half an amount, which is
+/// none.
+const DECAY: f64 = 1.0 / 1024.0;
+
+/// Columns of a flooded network that there is room for from the beginning, and those beside them.
+const PARTIES: usize = 2048;
+
+/// Where an amount came from or went.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(in crate::shallow) enum Account {
+    /// Poured in, less what was taken.
+    Poured,
+    /// Came through sources.
+    Sourced,
+    /// Went through drains, and into absorbers.
+    Drained,
+    Absorbed,
+    /// Went out of the domain, and came in over its border.
+    Lost,
+    Gained,
+    /// What the law has added.
+    Grown,
+    /// What rounding left in columns that ran dry.
+    Dried,
+}
+
+/// Accounts of a scalar.
+pub(in crate::shallow) const ACCOUNTS: usize = Account::Dried as usize + 1;
+
+impl Account {
+    /// Those of flow points go out.
+    fn sign(self) -> i128 {
+        if matches!(self, Self::Drained | Self::Absorbed) { -1 } else { 1 }
+    }
+}
+
+/// What happened to a scalar in a step on some rows (amounts).
+#[derive(Debug, Clone, Copy, Default, PartialEq)]
+pub(in crate::shallow) struct Changes {
+    pub lost: i128,
+    pub gained: i128,
+    pub grown: i128,
+    pub dried: i128,
+}
+
+/// What a law does in a step.
+#[derive(Debug, Clone, Copy, Default, PartialEq)]
+pub(in crate::shallow) struct Act {
+    /// Levels that each unit gains.
+    pub grows: f64,
+    /// Part that it loses.
+    pub loses: f64,
+}
+
+/// The scalars of a liquid.
+#[derive(Debug, Clone)]
+pub(in crate::shallow) struct Amounts {
+    pub scalars: Vec<Scalar>,
+    /// Of each scalar, by column index, and a strip more; empty for those that are not there. 0 where there is no liquid.
+    pub amounts: [PerColumn<f64>; MOST],
+    /// By scalar and account.
+    pub sums: [[i128; ACCOUNTS]; MOST],
+    /// Of laws, what is less than they do at once: levels, or seconds.
+    pub due: [f64; MOST],
+    /// What the laws do in this step.
+    acts: [Act; MOST],
+    /// Concentrations of what is poured.
+    pub poured: Levels,
+    /// Of the parties of a flooded network; kept, so that nothing is allocated again.
+    pub party_levels: Vec<f64>,
+}
+
+impl Amounts {
+    /// No scalars.
+    pub fn none() -> Self {
+        Self::new(Vec::new(), 0)
+    }
+
+    /// None of each scalar in so many indices.
+    pub fn new(scalars: Vec<Scalar>, len: usize) -> Self {
+        // Where the arrays begin that a step does not need at the same time.
+        let places = [Array::Under, Array::Ceiling, Array::Head, Array::Light];
+        let count = scalars.len();
+        Self {
+            amounts: std::array::from_fn(|at| {
+                PerColumn::new(places[at], if at < count { len } else { 0 }, 0.0)
+            }),
+            scalars,
+            sums: [[0; ACCOUNTS]; MOST],
+            due: [0.0; MOST],
+            acts: [Act::default(); MOST],
+            poured: [0; MOST],
+            party_levels: Vec::with_capacity(if count > 0 { PARTIES } else { 0 }),
+        }
+    }
+
+    /// Count of scalars.
+    pub fn count(&self) -> usize {
+        self.scalars.len()
+    }
+
+    /// Memory (bytes).
+    pub fn bytes(&self) -> usize {
+        self.amounts.iter().map(PerColumn::bytes).sum()
+    }
+
+    /// Gives a part of the columns another count of indices; what they hold is then left over from before.
+    pub fn resize_part(&mut self, part: Range<usize>, len: usize) {
+        for amounts in self.amounts.iter_mut().filter(|amounts| !amounts.is_empty()) {
+            amounts.resize_part(part.clone(), len, 0.0);
+        }
+    }
+
+    /// What the laws do in this step, by scalar.
+    pub fn acts(&self) -> [Act; MOST] {
+        self.acts
+    }
+
+    /// Begins a step of `dt` (s).
+    pub fn begin_step(&mut self, dt: f64) {
+        for ((scalar, act), due) in self.scalars.iter().zip(&mut self.acts).zip(&mut self.due) {
+            *act = Act::default();
+            match scalar.law {
+                Law::Dye => {}
+                Law::Ages => {
+                    *due += dt * (LEVELS / scalar.range);
+                    act.grows = due.floor();
+                    *due -= act.grows;
+                }
+                Law::Decays(half) => {
+                    *due += dt;
+                    if *due >= half * DECAY {
+                        act.loses = -libm::expm1(-*due / half * std::f64::consts::LN_2);
+                        *due = 0.0;
+                    }
+                }
+            }
+        }
+    }
+
+    /// Ends a step that has changed amounts on some rows.
+    pub fn settle(&mut self, changes: &[Changes; MOST]) {
+        for (sums, changes) in self.sums.iter_mut().zip(changes) {
+            sums[Account::Lost as usize] += changes.lost;
+            sums[Account::Gained as usize] += changes.gained;
+            sums[Account::Grown as usize] += changes.grown;
+            sums[Account::Dried as usize] += changes.dried;
+        }
+    }
+
+    /// Liquid came into a column or went out: `before` units were there, `added` came (negative: went); what came has these concentrations.
+    pub fn add(&mut self, index: usize, before: i64, added: i64, levels: &Levels, account: Account) {
+        for (at, level_in) in levels.iter().enumerate().take(self.count()) {
+            let amount = &mut self.amounts[at][index];
+            let change = if added > 0 {
+                f64::from(*level_in) * added as f64
+            } else if before + added == 0 {
+                -*amount
+            } else {
+                -share(level(*amount, before as i32), -added as f64)
+            };
+            *amount += change;
+            self.sums[at][account as usize] += account.sign() * i128::from(integer(change));
+        }
+    }
+
+    /// Puts amounts into a column, with liquid that was there before.
+    pub fn put(&mut self, index: usize, amounts: &[i64; MOST]) {
+        for (at, amount) in amounts.iter().enumerate().take(self.count()) {
+            self.amounts[at][index] += *amount as f64;
+        }
+    }
+
+    /// Counts amounts.
+    pub fn count_in(&mut self, account: Account, amounts: &[i64; MOST]) {
+        for (sums, amount) in self.sums.iter_mut().zip(amounts) {
+            sums[account as usize] += i128::from(*amount);
+        }
+    }
+
+    /// The sum over all columns of a scalar.
+    pub fn inside(&self, scalar: usize) -> i128 {
+        let strips = self.amounts[scalar].chunks(1 << 10);
+        strips.map(|amounts| i128::from(amounts.iter().map(|&amount| integer(amount)).sum::<i64>())).sum()
+    }
+
+    /// The concentration of a column, in the scalar's own measure; 0 where it is dry.
+    #[inline(always)]
+    pub fn concentration(&self, scalar: usize, index: usize, depth: i32) -> f32 {
+        (level(self.amounts[scalar][index], depth) * (self.scalars[scalar].range / LEVELS)) as f32
+    }
+}

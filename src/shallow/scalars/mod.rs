@@ -1,0 +1,267 @@
+//! Scalars that the liquid carries: dye, concentrations, age, temperature.
+//!
+//! A column holds an *amount* of each, an integer: its concentration times its depth (`shares.rs`). Of what a pipe moves out of a column goes the same share
+//! of its amounts, of the concentration at the start of the step (upwind), so that amounts are neither lost nor made: [`Shallow::scalar_balance`]
+//! counts them. Concentrations stay between those that came in, to about a level of 2^20 in their range, and a uniform one stays uniform.
+
+pub(super) mod amounts;
+pub(super) mod shares;
+
+use super::columns::STRIP;
+use super::flow::active::runs;
+use super::system::Shallow;
+use crate::base::cpu::dispatch;
+use crate::error::{Error, Result};
+use amounts::{Account, Amounts};
+pub use shares::MOST;
+use shares::{LEVELS, Levels};
+
+/// Something that the liquid carries along.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Scalar {
+    /// Its name: not empty, and not that of another scalar.
+    pub name: String,
+    /// What becomes of it.
+    pub law: Law,
+    /// Concentrations are within -range to range, in the scalar's own measure, and are kept to a 2^20th of it; 1e-9 to 1e9. Of a dye 1, of a
+    /// temperature over that of the room 100 (K), of an age 3600 (s).
+    pub range: f64,
+}
+
+/// What becomes of a scalar but for being carried.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Law {
+    /// Nothing: dye, salt, heat.
+    Dye,
+    /// Half of it goes in each half-life (s), over 0: heat that a room takes.
+    Decays(f64),
+    /// It is the time (s) since the liquid came in, in the mean over the liquid of a column, to `range` at most; liquid that comes in is as old as
+    /// its concentration says.
+    Ages,
+}
+
+/// Where all of a scalar is: concentration x volume (its own measure x m3).
+#[derive(Debug, Clone, Copy, Default, PartialEq)]
+pub struct ScalarBalance {
+    /// In the columns.
+    pub inside: f64,
+    /// Poured in so far, less what was taken.
+    pub poured: f64,
+    /// Come in through sources.
+    pub sourced: f64,
+    /// Gone out through drains.
+    pub drained: f64,
+    /// Gone into absorbers.
+    pub absorbed: f64,
+    /// Gone over the border, or into the void.
+    pub lost: f64,
+    /// Come in over an absorbing border.
+    pub gained: f64,
+    /// Waiting for room, where the terrain moved.
+    pub held: f64,
+    /// Added by its law; negative: taken.
+    pub grown: f64,
+    /// Left by rounding in columns that ran dry: a few of the smallest amounts for each.
+    pub dried: f64,
+    /// What is missing (the smallest amounts): 0.
+    pub error: i128,
+}
+
+impl Scalar {
+    /// A dye, of concentrations from 0 to 1.
+    pub fn dye(name: &str) -> Self {
+        Self { name: name.into(), law: Law::Dye, range: 1.0 }
+    }
+
+    /// Checks the numbers.
+    ///
+    /// # Errors
+    /// `Argument`, naming the field and its range.
+    pub fn validate(&self) -> Result<()> {
+        if self.name.is_empty() {
+            return Err(Error::argument("name is empty"));
+        }
+        if !(1e-9..=1e9).contains(&self.range) {
+            return Err(Error::argument(format!("range = {} is not within 1e-9 to 1e9", self.range)));
+        }
+        match self.law {
+            Law::Decays(half) if !(1e-6..=1e12).contains(&half) => {
+                Err(Error::argument(format!("a half-life of {half} s is not within 1e-6 to 1e12")))
+            }
+            _ => Ok(()),
+        }
+    }
+
+    /// The level of a concentration.
+    fn level(&self, concentration: f64) -> Result<i32> {
+        if concentration.abs() <= self.range {
+            Ok((concentration / self.range * LEVELS).round() as i32)
+        } else {
+            let Self { name, range, .. } = self;
+            Err(Error::argument(format!(
+                "a concentration of {concentration} of {name:?} is not within {} to {range}",
+                -range
+            )))
+        }
+    }
+}
+
+impl Shallow {
+    /// Sets what the liquid carries, in place of what it carried before: of each scalar there is nothing yet, and what is poured and what comes through
+    /// sources has none until [`Shallow::set_poured`] and [`Shallow::set_sourced`]. Frames allocate nothing for scalars.
+    ///
+    /// # Errors
+    /// `Argument`: more than [`MOST`] scalars, as [`Scalar::validate`], or two of the same name; liquid that falls freely, as what is in the air carries
+    /// none.
+    pub fn set_scalars(&mut self, scalars: &[Scalar]) -> Result<()> {
+        if self.params.falls.is_some() && !scalars.is_empty() {
+            return Err(Error::argument("liquid that falls freely carries no scalars: falls, or scalars"));
+        }
+        if scalars.len() > MOST {
+            return Err(Error::argument(format!("{} scalars are more than {MOST}", scalars.len())));
+        }
+        for (at, scalar) in scalars.iter().enumerate() {
+            scalar.validate().map_err(|error| Error::argument(format!("scalar {at}: {error}")))?;
+            if scalars[..at].iter().any(|other| other.name == scalar.name) {
+                return Err(Error::argument(format!("two scalars have the name {:?}", scalar.name)));
+            }
+        }
+        self.flow.carry(&self.columns, Amounts::new(scalars.to_vec(), self.columns.len() + STRIP));
+        self.flows.forget_levels();
+        self.remap.held.forget_amounts();
+        Ok(())
+    }
+
+    /// What the liquid carries.
+    pub fn scalars(&self) -> &[Scalar] {
+        &self.flow.amounts.scalars
+    }
+
+    /// Sets the concentration of each scalar in what [`Shallow::pour`], [`Shallow::pour_at`] and [`Shallow::fill`] pour from now on; 0 at first.
+    ///
+    /// # Errors
+    /// `Argument`: not one for each scalar, or one beyond its range.
+    pub fn set_poured(&mut self, concentrations: &[f64]) -> Result<()> {
+        self.flow.amounts.poured = self.levels(concentrations)?;
+        Ok(())
+    }
+
+    /// Sets the concentration of each scalar in what comes through a flow point that is a source; 0 after [`Shallow::set_flows`].
+    ///
+    /// # Errors
+    /// `Argument`: there is no such point, not one concentration for each scalar, or one beyond its range.
+    pub fn set_sourced(&mut self, point: usize, concentrations: &[f64]) -> Result<()> {
+        let levels = self.levels(concentrations)?;
+        self.flows.set_levels(point, levels)
+    }
+
+    fn levels(&self, concentrations: &[f64]) -> Result<Levels> {
+        let scalars = self.scalars();
+        if concentrations.len() != scalars.len() {
+            let (given, count) = (concentrations.len(), scalars.len());
+            return Err(Error::argument(format!(
+                "{given} concentrations are not one for each of {count} scalars"
+            )));
+        }
+        let mut levels = [0; MOST];
+        for ((level, scalar), concentration) in levels.iter_mut().zip(scalars).zip(concentrations) {
+            *level = scalar.level(*concentration)?;
+        }
+        Ok(levels)
+    }
+
+    /// The concentration of a scalar in a column; 0 where it is dry.
+    ///
+    /// # Panics
+    /// When there is no such scalar or column.
+    pub fn concentration(&self, scalar: usize, column: usize) -> f32 {
+        self.flow.amounts.concentration(scalar, column, self.flow.depths()[column])
+    }
+
+    /// As [`Shallow::concentration`], of every column index.
+    ///
+    /// # Errors
+    /// `Argument`: there is no such scalar, or not one place for each index.
+    pub fn concentrations(&self, scalar: usize, out: &mut [f32]) -> Result<()> {
+        check_scalar(scalar, self.scalars().len())?;
+        let len = self.columns.len();
+        if out.len() != len {
+            let room = out.len();
+            return Err(Error::argument(format!(
+                "room for {room} concentrations is not that of {len} indices"
+            )));
+        }
+        let mut end = 0;
+        for run in runs(self.flow.active()) {
+            out[end * STRIP..run.start * STRIP].fill(0.0);
+            end = run.end;
+            let run = run.start * STRIP..run.end * STRIP;
+            find_concentrations(
+                &self.flow.amounts,
+                scalar,
+                &self.flow.depths()[run.clone()],
+                run.start,
+                &mut out[run],
+            );
+        }
+        out[end * STRIP..].fill(0.0);
+        Ok(())
+    }
+
+    /// Where all of a scalar is.
+    ///
+    /// # Errors
+    /// `Argument`: there is no such scalar.
+    pub fn scalar_balance(&self, scalar: usize) -> Result<ScalarBalance> {
+        check_scalar(scalar, self.scalars().len())?;
+        let amounts = &self.flow.amounts;
+        let cell = self.columns.grid.cell;
+        let unit = cell * cell * self.columns.heights.unit * (amounts.scalars[scalar].range / LEVELS);
+        let of = |account: Account| amounts.sums[scalar][account as usize];
+        let (inside, held) = (amounts.inside(scalar), self.remap.held.amount(scalar));
+        let came = of(Account::Poured) + of(Account::Sourced) + of(Account::Gained) + of(Account::Grown);
+        let went = of(Account::Drained) + of(Account::Absorbed) + of(Account::Lost) + of(Account::Dried);
+        let cubic = |amount: i128| amount as f64 * unit;
+        Ok(ScalarBalance {
+            inside: cubic(inside),
+            poured: cubic(of(Account::Poured)),
+            sourced: cubic(of(Account::Sourced)),
+            drained: cubic(of(Account::Drained)),
+            absorbed: cubic(of(Account::Absorbed)),
+            lost: cubic(of(Account::Lost)),
+            gained: cubic(of(Account::Gained)),
+            held: cubic(held),
+            grown: cubic(of(Account::Grown)),
+            dried: cubic(of(Account::Dried)),
+            error: came - went - inside - held,
+        })
+    }
+}
+
+pub(super) fn check_scalar(scalar: usize, count: usize) -> Result<()> {
+    if scalar < count {
+        Ok(())
+    } else {
+        Err(Error::argument(format!("there is no scalar {scalar} among {count}")))
+    }
+}
+
+/// Concentrations of the columns from an index on that have these depths.
+pub(super) fn find_concentrations(
+    amounts: &Amounts,
+    scalar: usize,
+    depth: &[i32],
+    first: usize,
+    out: &mut [f32],
+) {
+    dispatch!(body(amounts: &Amounts, scalar: usize, depth: &[i32], first: usize, out: &mut [f32]));
+
+    #[inline(always)]
+    fn body(amounts: &Amounts, scalar: usize, depth: &[i32], first: usize, out: &mut [f32]) {
+        let scale = amounts.scalars[scalar].range / LEVELS;
+        let own = &amounts.amounts[scalar][first..];
+        for ((out, depth), amount) in out.iter_mut().zip(depth).zip(own) {
+            *out = (shares::level(*amount, *depth) * scale) as f32;
+        }
+    }
+}
