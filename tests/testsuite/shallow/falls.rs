@@ -291,9 +291,10 @@ fn any_number_of_threads_and_a_restored_liquid_make_the_same_bytes() {
     let run = |threads: usize, frames: usize| {
         let ctx = Context::new(Pool::new(threads).unwrap());
         let ground = solids([340, 320], 0.002, 0.3, |[x, z]| {
-            if (x / 20 + z / 20) % 3 == 0 { vec![[-1.0, 0.01 + 1e-5 * x as f64]] } else { vec![[-1.0, 0.15]] }
+            if (x / 20 + z / 3) % 3 == 0 { vec![[-1.0, 0.01 + 1e-5 * x as f64]] } else { vec![[-1.0, 0.15]] }
         });
-        let mut liquid = Shallow::new(&ctx, &ground, params(Falls::default())).unwrap();
+        let mut liquid =
+            Shallow::new(&ctx, &ground, params(Falls { most: 1 << 16, ..Falls::default() })).unwrap();
         for index in liquid.columns().indices().collect::<Vec<_>>() {
             let [x, z] = liquid.columns().cell(index);
             liquid.pour(index, 0.0001 * ((x * x + 5 * z) % 23) as f64);
