@@ -103,7 +103,7 @@ impl Network {
         for edge in links {
             for end in edge.ends {
                 if let Some(node) = self.nodes.get_mut(end as usize) {
-                    node.linked += (edge.conductance * LINK_SCALE) as i64;
+                    node.linked += scaled(edge.conductance);
                 }
             }
         }
@@ -120,7 +120,7 @@ impl Network {
     fn sum_links(&mut self, flow: impl Fn(&Edge) -> f64) {
         self.nodes.iter_mut().for_each(|node| node.linked = 0);
         for edge in self.edges.iter().filter(|edge| matches!(edge.at, At::Link(_))) {
-            let flow = (flow(edge) * LINK_SCALE) as i64;
+            let flow = scaled(flow(edge));
             for (end, flow) in edge.ends.into_iter().zip([flow, -flow]) {
                 if let Some(node) = self.nodes.get_mut(end as usize) {
                     node.linked += flow;
@@ -203,4 +203,9 @@ fn fixed_sum(numbers: impl Iterator<Item = f64> + Clone) -> f64 {
     let power = |exponent: i64| f64::from_bits(((1023 + exponent.clamp(-1022, 1023)) as u64) << 52);
     let scale = power(40 - exponent);
     numbers.map(|number| (number * scale) as i64).sum::<i64>() as f64 / scale
+}
+
+/// A number of a link for a sum of such, whatever is asked for: their sums stay within 64 bits.
+fn scaled(number: f64) -> i64 {
+    (number * LINK_SCALE).clamp(-1e16, 1e16) as i64
 }
