@@ -77,6 +77,8 @@ struct Triple {
     columns: [usize; 3],
     parts: [f64; 3],
     rises: [f64; 3],
+    /// Least lifts (units).
+    lifts: [f64; 3],
 }
 
 /// The cells whose columns are found anew, and lengths in units.
@@ -172,7 +174,7 @@ impl Lifts {
         find_above(columns, &mut self.above);
         let scene = Scene { columns, depth: &[], above: &self.above };
         let area = Area { scene, cells, cell, least: least * cell, margin: margin * cell, rim: rim * cell };
-        face(positions, triangles, &mut self.facing)?;
+        area.face(positions, triangles, &mut self.facing)?;
         area.clear(&mut self.least, &mut self.sunk);
         self.bare.clear();
         let mut out = Fitted::default();
@@ -214,33 +216,40 @@ impl Lifts {
     }
 }
 
-/// Areas, seen from above, of the triangles around each vertex, twice.
-fn face(positions: &[Vec3], triangles: &[[u32; 3]], facing: &mut Vec<f64>) -> Result<()> {
-    if let Some(bad) = positions.iter().position(|p| !p.iter().all(|length| length.is_finite())) {
-        return Err(Error::argument(format!("vertex {bad} of the terrain is not finite")));
-    }
-    facing.clear();
-    facing.resize(positions.len(), 0.0);
-    for (index, corners) in triangles.iter().enumerate() {
-        let corners = corners.map(|corner| corner as usize);
-        if corners.iter().any(|corner| *corner >= positions.len()) {
-            let count = positions.len();
-            return Err(Error::argument(format!(
-                "triangle {index} of the terrain has a corner beyond its {count} vertices"
-            )));
-        }
-        let [a, b, c] = corners.map(|corner| {
-            let at = positions[corner];
-            [f64::from(at.x), f64::from(at.z)]
-        });
-        let ([bx, bz], [cx, cz]) = ([b[0] - a[0], b[1] - a[1]], [c[0] - a[0], c[1] - a[1]]);
-        let area = bz * cx - bx * cz;
-        corners.into_iter().for_each(|corner| facing[corner] += area);
-    }
-    Ok(())
-}
-
 impl Area<'_> {
+    /// Finds twice the areas, seen from above, of the triangles around each vertex in the quartets of these cells, and around some others.
+    fn face(&self, positions: &[Vec3], triangles: &[[u32; 3]], facing: &mut Vec<f64>) -> Result<()> {
+        if let Some(bad) = positions.iter().position(|p| !p.iter().all(|length| length.is_finite())) {
+            return Err(Error::argument(format!("vertex {bad} of the terrain is not finite")));
+        }
+        facing.clear();
+        facing.resize(positions.len(), 0.0);
+        let grid = self.scene.columns.grid;
+        let [x, z] = [0, 1].map(|axis| {
+            let Range { start, end } = self.cells[axis];
+            let at = |cell: f64| grid.origin[axis] + cell * grid.cell;
+            at(start as f64 - 1.0)..=at(end as f64 + 1.0)
+        });
+        let is_near = |at: &Vec3| x.contains(&f64::from(at.x)) && z.contains(&f64::from(at.z));
+        for (index, corners) in triangles.iter().enumerate() {
+            let corners = corners.map(|corner| corner as usize);
+            let [Some(a), Some(b), Some(c)] = corners.map(|corner| positions.get(corner)) else {
+                let count = positions.len();
+                return Err(Error::argument(format!(
+                    "triangle {index} of the terrain has a corner beyond its {count} vertices"
+                )));
+            };
+            if !(is_near(a) || is_near(b) || is_near(c)) {
+                continue;
+            }
+            let [a, b, c] = [a, b, c].map(|at| [f64::from(at.x), f64::from(at.z)]);
+            let ([bx, bz], [cx, cz]) = ([b[0] - a[0], b[1] - a[1]], [c[0] - a[0], c[1] - a[1]]);
+            let area = bz * cx - bx * cz;
+            corners.into_iter().for_each(|corner| facing[corner] += area);
+        }
+        Ok(())
+    }
+
     /// Gives the columns of the box what they have without a vertex above.
     fn clear(&self, least: &mut [i32], sunk: &mut [i32]) {
         let columns = self.scene.columns;
@@ -324,7 +333,8 @@ impl Area<'_> {
                 columns.iter().all(|&other| (unders[own]..ceilings[own]).contains(&bases[other]))
             });
             let rises = columns.map(|column| f64::from(bases[column]) - height);
-            is_linked.then_some(Triple { columns, parts: [1.0 - (p + q), p, q], rises })
+            let triple = Triple { columns, parts: [1.0 - (p + q), p, q], rises, lifts: [self.least; 3] };
+            is_linked.then(|| Triple { lifts: self.lifts(&triple), ..triple })
         })
     }
 
@@ -337,15 +347,16 @@ impl Area<'_> {
     ) {
         out.upward += 1;
         let highest = triples.clone().flat_map(|triple| triple.rises).fold(f64::NEG_INFINITY, f64::max);
-        let is_high = |triple: &Triple, lifts: [f64; 3]| {
-            (0..3).any(|k| triple.parts[k] > 0.0 && triple.rises[k] + lifts[k] > highest + self.cell)
+        let is_high = |triple: &Triple| {
+            let is_lifted = |k: usize| triple.parts[k] > 0.0 && triple.lifts[k] > self.least;
+            (0..3).any(|k| is_lifted(k) && triple.rises[k] + triple.lifts[k] > highest + self.cell)
         };
-        if triples.clone().any(|triple| self.lifts(triple).is_some_and(|lifts| is_high(triple, lifts))) {
+        if triples.clone().any(is_high) {
             out.discarded += 1;
         } else {
             let mut is_capped = false;
             for triple in triples.clone() {
-                let lifts = self.lifts(triple).unwrap_or([self.least; 3]);
+                let lifts = triple.lifts;
                 let lifted = [0, 1, 2].map(|k| self.lift(triple.columns[k], lifts[k]));
                 for (&column, lifted) in triple.columns.iter().zip(lifted) {
                     if self.has(column) {
@@ -372,20 +383,20 @@ impl Area<'_> {
         self.cells[0].contains(&x) && self.cells[1].contains(&z)
     }
 
-    /// Lifts (units) of three columns for a vertex; none if it is covered anyway.
-    fn lifts(&self, triple: &Triple) -> Option<[f64; 3]> {
+    /// Lifts (units) of three columns for a vertex; the least if it is covered anyway.
+    fn lifts(&self, triple: &Triple) -> [f64; 3] {
         let need = self.margin - triple.mean(triple.rises);
         if need <= self.least {
-            return None;
+            return [self.least; 3];
         }
         let thesis = triple.rises.map(|rise| (-rise).max(LEAST_RISE * self.cell));
         let lifts = triple.least_squares(need, self.least, thesis);
         let most = |lifts: [f64; 3]| lifts.into_iter().fold(0.0, f64::max);
         if most(lifts) <= self.cell {
-            return Some(lifts);
+            return lifts;
         }
         let equal = triple.least_squares(need, self.least, [1.0; 3]);
-        Some(if most(equal) < most(lifts) { equal } else { lifts })
+        if most(equal) < most(lifts) { equal } else { lifts }
     }
 
     /// How far (units) three dry columns go down so that a vertex hides what is between them. One over a cell lower, at the foot of a

@@ -103,15 +103,15 @@ mod tests {
     fn heights<const FADES: bool>(depth: [i32; STRIP]) -> [i32; STRIP] {
         let mut out = [7; STRIP];
         let all = [[1000; STRIP], [-50; STRIP], depth, [300; STRIP], [200; STRIP]];
-        find_strip::<FADES>(all.each_ref(), [100.0, 0.01], &mut out);
+        find_strip::<FADES>(all.each_ref(), [128.0, 1.0 / 128.0], &mut out);
         out
     }
 
     #[test]
     fn heights_rise_with_the_depth_from_where_they_are_dry() {
         let mut depth = [0; STRIP];
-        depth[..9].copy_from_slice(&[-5, 0, 1, 20, 50, 99, 100, 300, 301]);
-        assert_eq!(heights::<true>(depth)[..9], [800, 800, 805, 900, 1050, 1295, 1300, 1300, 1301]);
+        depth[..9].copy_from_slice(&[-5, 0, 1, 32, 64, 127, 128, 300, 301]);
+        assert_eq!(heights::<true>(depth)[..9], [800, 800, 803, 925, 1050, 1296, 1300, 1300, 1301]);
         assert_eq!(heights::<false>(depth)[..9], [800, 800, 1300, 1300, 1300, 1300, 1300, 1300, 1301]);
     }
 
