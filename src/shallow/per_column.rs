@@ -50,13 +50,15 @@ pub struct PerColumn<T> {
     array: Array,
     /// Others before the first, so that this one is at its place.
     before: usize,
+    /// How many there is room for: arrays of one liquid grow in the same frame, and not again for long.
+    room: usize,
     list: Vec<T>,
 }
 
 impl<T: Copy> PerColumn<T> {
     /// So many of the same.
     pub fn new(array: Array, len: usize, fill: T) -> Self {
-        let mut new = Self { array, before: 0, list: Vec::new() };
+        let mut new = Self { array, before: 0, room: 0, list: Vec::new() };
         new.resize(len, fill);
         new
     }
@@ -84,13 +86,12 @@ impl<T: Copy> PerColumn<T> {
 
     /// Moves them where there is room for so many, at the right place.
     fn make_room(&mut self, len: usize, fill: T) {
-        let room = self.list.capacity();
-        if self.before + len <= room {
+        if len <= self.room {
             return;
         }
         // Twice as much as before, as a list would.
-        let len = if room > 0 { len.max(2 * (room - self.before)) } else { len };
-        let mut list = Vec::with_capacity(len + PAGE / size_of::<T>());
+        self.room = len.max(2 * self.room);
+        let mut list = Vec::with_capacity(self.room + PAGE / size_of::<T>());
         let at = <*const T>::addr(list.as_ptr());
         let before = self.array.place().wrapping_sub(at) % PAGE / size_of::<T>();
         list.resize(before, fill);
@@ -117,7 +118,7 @@ impl<T> DerefMut for PerColumn<T> {
 
 impl<T: Copy> Clone for PerColumn<T> {
     fn clone(&self) -> Self {
-        let mut new = Self { array: self.array, before: 0, list: Vec::new() };
+        let mut new = Self { array: self.array, before: 0, room: 0, list: Vec::new() };
         new.clone_from(self);
         new
     }

@@ -33,6 +33,9 @@ pub(super) fn walls_of(list: &[Wall], column: u32) -> std::ops::Range<usize> {
     first..first + count
 }
 
+/// Walls beyond those of the terrain that there is room for: a tool that dips into liquid makes some hundred, in frames that should allocate nothing.
+const ROOM: usize = 1024;
+
 /// All walls, in order of columns.
 #[derive(Debug, Default)]
 pub(super) struct Walls {
@@ -44,11 +47,11 @@ pub(super) struct Walls {
 }
 
 impl Walls {
-    /// Makes room for so many pairs of a wet column and a wall, and so many layers.
+    /// Makes room for so many pairs of a wet column and a wall, and so many layers; and for [`ROOM`] more.
     pub fn reserve(&mut self, pairs: usize, layers: usize) {
         self.clear();
-        self.list.reserve(pairs);
-        self.used.reserve(pairs);
+        self.list.reserve(pairs + ROOM);
+        self.used.reserve(pairs + ROOM);
         self.nodes.reserve(8 * layers);
     }
 
