@@ -7,7 +7,7 @@ use crate::context::Context;
 use crate::shallow::Params;
 use crate::shallow::grid::{Grid, Heights};
 use crate::shallow::liquid::{Carreau, Liquid};
-use crate::shallow::params::{Pace, Section};
+use crate::shallow::params::{Friction, Pace, Section};
 use crate::shallow::pipes::Border;
 
 /// Liquids that frz_shallow_params_liquid knows.
@@ -177,6 +177,7 @@ impl frz_shallow_params {
             pace,
             border: meaning("border", "frz_shallow_border", self.border, &BORDERS)?,
             section: meaning("section", "frz_shallow_section", self.section, &SECTIONS)?,
+            friction: Friction::default(),
             falls: None,
         };
         params.validate()?;

@@ -20,6 +20,8 @@ pub struct Params {
     pub border: Border,
     /// The section A of a pipe in Eq. 4.1.
     pub section: Section,
+    /// Where viscosity holds the liquid back. Chosen once.
+    pub friction: Friction,
     /// How liquid falls freely over edges; none: it is below at once. Chosen once.
     pub falls: Option<Falls>,
 }
@@ -44,6 +46,18 @@ pub enum Section {
     Whole,
 }
 
+/// Where viscosity holds the liquid back.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub enum Friction {
+    /// At the ground, as in the thesis: right where the liquid is far wider than deep.
+    #[default]
+    Ground,
+    /// Also at walls and ceilings, and between liquids that flow beside each other: ducts and channels of any width carry what they do in theory, to
+    /// a few percent (Galerkin's method with the profile of a film). Films thinner than a sixteenth of a cell cost nothing more; nor does it act
+    /// without viscosity, or with [`Section::Whole`]. A closed border is a wall, too. It takes 104 bytes a column.
+    Walls,
+}
+
 impl Default for Params {
     fn default() -> Self {
         Self {
@@ -53,6 +67,7 @@ impl Default for Params {
             pace: Pace::Realtime(0.003),
             border: Border::default(),
             section: Section::default(),
+            friction: Friction::default(),
             falls: None,
         }
     }

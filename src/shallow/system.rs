@@ -2,7 +2,7 @@
 
 use super::clock::Clock;
 use super::columns::Columns;
-use super::falls::{Falling, Falls};
+use super::falls::Falling;
 use super::flow::Flow;
 use super::flow::bands::attended;
 use super::flow::lips::Lips;
@@ -10,7 +10,8 @@ use super::flows::{FlowPoint, Flows};
 use super::grid::BOTTOMLESS;
 use super::identity::Identity;
 use super::pace::{self, MOST_STEPS, Measures, Next};
-use super::params::{Params, Section};
+use super::params::{Friction, Params, Section};
+use super::pipes::rules::Rules;
 use super::pipes::{Border, Pipes};
 use super::remap::Remap;
 use super::scalars::amounts::Account;
@@ -95,11 +96,16 @@ impl Shallow {
         if count == 0 {
             return Err(Error::argument("the terrain has no surface that faces up within the domain"));
         }
-        ctx.allow("the columns of the liquid", count as u64 * BYTES)?;
+        let has_walls = params.friction == Friction::Walls;
+        let bytes = if has_walls { BYTES + WALLS } else { BYTES };
+        ctx.allow("the columns of the liquid", count as u64 * bytes)?;
         let columns = Columns::new(solids);
         let falls = params.falls.as_ref();
-        let pipes = Pipes::with_cliffs(&columns, params.border, Falls::cliffs(falls, &columns));
+        let pipes = Pipes::with_rules(&columns, Rules::of(&params, &columns));
         let mut flow = Flow::new(&columns, &pipes);
+        if has_walls {
+            flow.walls.turn_on(&columns);
+        }
         if falls.is_some() {
             flow.lips = Lips::with_room(pipes.links.len());
         }
@@ -127,7 +133,7 @@ impl Shallow {
     /// Changes the parameters.
     ///
     /// # Errors
-    /// `Argument`: numbers out of range, another border, or other falls.
+    /// `Argument`: numbers out of range, another border, other falls, or other friction.
     pub fn set_params(&mut self, params: Params) -> Result<()> {
         params.validate()?;
         if params.border != self.params.border {
@@ -135,6 +141,9 @@ impl Shallow {
         }
         if params.falls != self.params.falls {
             return Err(Error::argument("falls cannot change after the liquid was made"));
+        }
+        if params.friction != self.params.friction {
+            return Err(Error::argument("friction cannot change after the liquid was made"));
         }
         self.params = params;
         Ok(())
@@ -381,3 +390,5 @@ impl Shallow {
 
 /// Bytes of a column with its pipes, and its share of strips.
 const BYTES: u64 = 64;
+/// More of them for friction at walls.
+const WALLS: u64 = 108;

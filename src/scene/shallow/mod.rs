@@ -38,7 +38,7 @@ use crate::io::sequence::Pattern;
 use crate::motion::{Space, Up};
 use crate::shallow::flows::FlowPoint;
 use crate::shallow::liquid::Liquid;
-use crate::shallow::params::{Pace, Section};
+use crate::shallow::params::{Friction, Pace, Section};
 use crate::shallow::pipes::Border;
 use crate::shallow::{Params, flows};
 
@@ -319,6 +319,7 @@ fn params(values: &Values) -> Params {
             _ => Border::Open,
         },
         section: Section::default(),
+        friction: Friction::default(),
         falls: None,
     }
 }

@@ -6,14 +6,15 @@
 
 pub(super) mod cliffs;
 pub(super) mod joints;
+pub(super) mod rules;
 mod slopes;
 
 use std::ops::Range;
 
 use crate::shallow::columns::{Columns, NONE, STRIP, resize_part};
 use crate::shallow::per_column::{Array, PerColumn};
-use cliffs::Cliffs;
 use joints::{Finder, Side};
+use rules::Rules;
 
 /// What lies beyond the border of the domain.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
@@ -65,18 +66,18 @@ pub struct Pipes {
 impl Pipes {
     /// The pipes between columns, and over the border of the domain.
     pub fn new(columns: &Columns, border: Border) -> Self {
-        Self::with_cliffs(columns, border, Cliffs::NONE)
+        Self::with_rules(columns, Rules::bordered(border))
     }
 
-    /// As [`Pipes::new`], but pipes over cliffs are links.
-    pub(super) fn with_cliffs(columns: &Columns, border: Border, cliffs: Cliffs) -> Self {
+    /// As [`Pipes::new`], but pipes over cliffs are links, and steps may be walls.
+    pub(super) fn with_rules(columns: &Columns, rules: Rules) -> Self {
         let mut pipes = Self {
             east: PerColumn::new(Array::OpenEast, columns.len(), 0.0),
             south: PerColumn::new(Array::OpenSouth, columns.len(), 0.0),
             links: Links { rows: vec![0], ..Links::default() },
         };
         let (rows, open) = (0..columns.grid.size[1], [&mut pipes.east[..], &mut pipes.south[..]]);
-        Finder::default().find(columns, (border, cliffs), rows, open, &mut pipes.links);
+        Finder::default().find(columns, rules, rows, open, &mut pipes.links);
         pipes.links.list_columns(columns, &mut Ends::default());
         pipes
     }

@@ -1,0 +1,278 @@
+//! What is beside a column, across a line: liquid that its own is in contact with, and walls.
+//!
+//! Where the ground beyond a side is higher, it is a wall, up to the liquid's surface; as liquid moves slowly above the ground, the lower part of its
+//! depth counts little: by the profile's part of the mean of phi^2. Where both surfaces stand apart as the ground does, up to a cell's edge, there is no
+//! wall but a slope, with a film on it. A dry edge that is not higher holds nothing back.
+
+use crate::shallow::columns::{Columns, NONE, STRIP, strip_from, strip_of};
+use crate::shallow::flow::flux::{Step, greater, lesser};
+
+/// Walls beside films of less than `THIN` of a cell's edge do not count, and such of over `THICK` do as a whole: one beside a film of `THIN` takes
+/// (2/5)^1/2 `THIN` of the flow in the pipe next to it, or 4 %.
+const THIN: f32 = 1.0 / 16.0;
+const THICK: f32 = 3.0 / 32.0;
+
+/// (k / (6/5))^1/2: over H it is 1 / delta, delta being how far a wall reaches, as exp(-y / delta).
+const REACH: f32 = 1.581_138_8;
+const REACH_FULL: f32 = 3.162_277_7;
+
+/// What columns are in.
+pub struct Around<'a> {
+    pub columns: &'a Columns,
+    /// H (units), and 16 more numbers.
+    pub depth: &'a [i32],
+    /// Whether a strip has ceilings, or places without a column.
+    pub roofed: &'a [bool],
+    /// Places of each strip from which links lead to the east, south, west and north.
+    pub linked: &'a [[u16; 4]],
+}
+
+/// A column of some depth, over 0, or another one beyond a side.
+#[derive(Clone, Copy)]
+pub struct Room {
+    pub base: i32,
+    pub ceiling: i32,
+    pub depth: i32,
+}
+
+/// Whether columns of a depth (units) have friction beside them.
+pub fn counts(step: &Step, depth: i32) -> bool {
+    depth as f32 > THIN * step.cell
+}
+
+/// How much of a wall beside liquid of a depth (units) counts.
+#[inline(always)]
+fn counted(step: &Step, height: f32) -> f32 {
+    let part = (height - THIN * step.cell) * (1.0 / ((THICK - THIN) * step.cell));
+    lesser(greater(part, 0.0), 1.0)
+}
+
+/// The part of the mean of phi^2 that the lowest part x of the depth has, phi = 3/2 (2 x - x^2) below a free surface, and 6 (x - x^2) below a ceiling.
+#[inline(always)]
+fn share<const FULL: bool>(x: f32) -> f32 {
+    let cube = x * x * x;
+    if FULL { cube * (10.0 - x * (15.0 - 6.0 * x)) } else { cube * (2.5 - x * (1.875 - 0.375 * x)) }
+}
+
+/// Friction of a wall over that of a difference of velocities between pipes: dx u'(0) / u for u = 1 - exp(-y / delta), of which pipes have the mean over a
+/// cell. That is s^2 / (s - 1 + exp(-s)) with s = dx / delta, here to 0.1 %; where cells are small, 2. `inverse` is 1 / H.
+#[inline(always)]
+pub fn wall<const FULL: bool>(step: &Step, high: f32, inverse: f32) -> f32 {
+    let s = if FULL { REACH_FULL } else { REACH } * step.cell * inverse;
+    (s + 1.0 + 1.0 / (1.0 + s * (1.0 / 3.0 + 0.057 * s))) * high * counted(step, high)
+}
+
+/// The height of a contact (units), times friction over that of straight lines between pipes, for the same reason: (s / 2)^2 / sinh^2(s / 2), s being
+/// that of the contact's height.
+#[inline(always)]
+fn fitted<const FULL: bool>(step: &Step, contact: f32) -> f32 {
+    let reach = if FULL { REACH_FULL * REACH_FULL } else { REACH * REACH };
+    let x = contact * (1.0 / step.cell);
+    let square = x * x;
+    let cube = square * square * square;
+    let sinh = cube
+        + reach * (1.0 / 12.0) * square * square
+        + reach * reach * (1.0 / 360.0) * square
+        + reach * reach * reach * (1.0 / 20160.0);
+    if x > THIN { contact * (cube / sinh) } else { 0.0 }
+}
+
+/// Over one side: the height (units) in which liquids are in contact ([`fitted`]), and the part of a wall. `inverse` is 1 / H; a ceiling counts where `is_roofed`
+/// and nothing leads there.
+#[inline(always)]
+pub fn side<const FULL: bool, const ROOFED: bool>(
+    step: &Step,
+    own: Room,
+    inverse: f32,
+    beyond: Room,
+    is_linked: bool,
+) -> [f32; 2] {
+    let rise = (beyond.base - own.base) as f32;
+    let over = (beyond.base + beyond.depth - (own.base + own.depth)) as f32;
+    let (high, other) = (own.depth as f32, beyond.depth as f32);
+    // As far as surfaces stand apart as bases do, it is a slope.
+    let most = lesser(greater(rise, -step.cell), step.cell);
+    let lean = lesser(greater(over, lesser(most, 0.0)), greater(most, 0.0));
+    let foot = rise - lean;
+    let up = greater(foot, 0.0);
+    let contact = greater(lesser(high, foot + other) - up, 0.0);
+    let below = share::<FULL>(lesser(up * inverse, 1.0));
+    let wall = if ROOFED {
+        let top = lesser(greater((beyond.ceiling - own.base) as f32 * inverse, 0.0), 1.0);
+        let top = if is_linked { 1.0 } else { top };
+        1.0 - greater(share::<FULL>(top) - below, 0.0)
+    } else {
+        below
+    };
+    [fitted::<FULL>(step, contact), wall]
+}
+
+/// Of columns that are not there.
+const ABSENT: [i32; STRIP] = [0; STRIP];
+
+/// A strip beyond a side.
+struct Beyond<'a> {
+    base: &'a [i32; STRIP],
+    ceiling: &'a [i32; STRIP],
+    depth: &'a [i32; STRIP],
+}
+
+/// Finds what is beside the columns of strips, which start behind `first`: of pipes to the east the sum over both sides of contact and walls
+/// (units), the contact before them and behind; then of pipes to the south.
+pub fn find(step: &Step, around: &Around, strips: &[u32], first: usize, out: [&mut [f32]; 6]) {
+    use crate::base::cpu::dispatch;
+    let out = &mut { out };
+    dispatch!(find_strips(step: &Step, around: &Around, strips: &[u32], first: usize, out: &mut [&mut [f32]; 6]))
+}
+
+#[inline(always)]
+fn find_strips(step: &Step, around: &Around, strips: &[u32], first: usize, out: &mut [&mut [f32]; 6]) {
+    let Around { columns, depth, roofed, linked } = around;
+    let [base, ceiling] = [columns.bases(), columns.ceilings()];
+    for &strip in strips {
+        let strip = strip as usize;
+        let (own, links) = ([base, ceiling, depth].map(|numbers| strip_of(numbers, strip)), linked[strip]);
+        let is_roofed = |other: u32| other == NONE || roofed[other as usize];
+        let beyond = |other: u32| match other {
+            NONE => Beyond { base: &ABSENT, ceiling: &ABSENT, depth: &ABSENT },
+            other => {
+                let [base, ceiling, depth] =
+                    [base, ceiling, depth].map(|numbers| strip_of(numbers, other as usize));
+                Beyond { base, ceiling, depth }
+            }
+        };
+        let [north, south] = [columns.north(strip), columns.south(strip)];
+        let sides = [beyond(north), beyond(south)];
+        let roof = is_roofed(north) || is_roofed(south);
+        let [all, before, behind, ..] = out;
+        let at = (strip - first) * STRIP;
+        let numbers = [all, before, behind].map(|numbers| &mut numbers[at..at + STRIP]);
+        both(step, own, sides, [links[3], links[1]], roof, numbers);
+        // A strip's places and those before and behind them.
+        let (west, east) = (columns.west(strip), columns.east(strip));
+        let shifted = [base, ceiling, depth].map(|numbers| {
+            let mut before = ABSENT;
+            before[1..].copy_from_slice(&numbers[strip * STRIP..][..STRIP - 1]);
+            before[0] = west.map_or(0, |west| numbers[west * STRIP + STRIP - 1]);
+            let mut behind = *strip_from(numbers, strip * STRIP + 1);
+            behind[STRIP - 1] = east.map_or(0, |east| numbers[east * STRIP]);
+            [before, behind]
+        });
+        let [bases, ceilings, depths] = &shifted;
+        let sides =
+            [0, 1].map(|side| Beyond { base: &bases[side], ceiling: &ceilings[side], depth: &depths[side] });
+        let roof =
+            roofed[strip] || [west, east].into_iter().any(|other| other.is_none_or(|other| roofed[other]));
+        let [.., all, before, behind] = out;
+        let numbers = [all, before, behind].map(|numbers| &mut numbers[at..at + STRIP]);
+        both(step, own, sides, [links[2], links[0]], roof, numbers);
+    }
+}
+
+/// Both sides of a strip across one axis.
+#[inline(always)]
+fn both(
+    step: &Step,
+    own: [&[i32; STRIP]; 3],
+    sides: [Beyond; 2],
+    links: [u16; 2],
+    is_roofed: bool,
+    out: [&mut [f32]; 3],
+) {
+    let [all, before, behind] = out.map(|numbers| numbers.first_chunk_mut().expect("a strip"));
+    if is_roofed {
+        both_strips::<true>(step, own, sides, links, all, before, behind);
+    } else {
+        both_strips::<false>(step, own, sides, links, all, before, behind);
+    }
+}
+
+#[inline(always)]
+fn both_strips<const ROOFED: bool>(
+    step: &Step,
+    [base, ceiling, depth]: [&[i32; STRIP]; 3],
+    [first, second]: [Beyond; 2],
+    links: [u16; 2],
+    all: &mut [f32; STRIP],
+    before: &mut [f32; STRIP],
+    behind: &mut [f32; STRIP],
+) {
+    for x in 0..STRIP {
+        let own = Room { base: base[x], ceiling: ceiling[x], depth: depth[x] };
+        let high = own.depth as f32;
+        let inverse = 1.0 / greater(high, 1.0);
+        let room = |beyond: &Beyond| Room {
+            base: beyond.base[x],
+            ceiling: beyond.ceiling[x],
+            depth: beyond.depth[x],
+        };
+        let is_linked = links.map(|links| links >> x & 1 == 1);
+        let [one, part] = side::<false, ROOFED>(step, own, inverse, room(&first), is_linked[0]);
+        let [two, other_part] = side::<false, ROOFED>(step, own, inverse, room(&second), is_linked[1]);
+        all[x] = (one + two) + (part + other_part) * wall::<false>(step, high, inverse);
+        (before[x], behind[x]) = (one, two);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::shallow::grid::TOP;
+
+    /// Cells of 1,000 units.
+    fn step() -> Step {
+        Step { cell: 1000.0, ..Step::still() }
+    }
+
+    fn room(base: i32, depth: i32) -> Room {
+        Room { base, ceiling: TOP, depth }
+    }
+
+    fn between(own: Room, beyond: Room) -> [f32; 2] {
+        side::<false, true>(&step(), own, 1.0 / own.depth as f32, beyond, false)
+    }
+
+    #[test]
+    fn the_profiles_have_a_share_of_1_over_the_whole_depth_and_a_ceilings_is_even() {
+        assert_eq!((share::<false>(1.0), share::<true>(1.0)), (1.0, 1.0));
+        assert_eq!(share::<true>(0.5), 0.5);
+        for (x, free) in [(0.2f32, 2.5 * 0.008 - 1.875 * 0.0016 + 0.375 * 0.00032), (0.5, 0.20703125)] {
+            assert!((share::<false>(x) - free).abs() < 1e-6, "{x}");
+        }
+        let small = share::<false>(0.01);
+        assert!((small / 2.5e-6 - 1.0).abs() < 0.01, "by the cube above the ground: {small}");
+    }
+
+    #[test]
+    fn a_bank_is_a_wall_and_a_slope_with_a_film_is_none() {
+        assert_eq!(between(room(0, 2000), room(3000, 0)), [0.0, 1.0], "a dry bank");
+        assert_eq!(between(room(0, 2000), room(2500, 10)), [0.0, 1.0], "a wet one");
+        assert_eq!(between(room(0, 2000), room(0, 2000)), [2000.0, 0.0], "level ground");
+        assert_eq!(between(room(0, 1000), room(900, 1000)), [1000.0, 0.0], "a film up the slope");
+        assert_eq!(between(room(900, 1000), room(0, 1000)), [1000.0, 0.0], "a film down the slope");
+        assert_eq!(between(room(0, 1000), room(5000, 1000)), [0.0, 1.0], "a terrace above");
+        assert_eq!(between(room(5000, 1000), room(0, 1000)), [0.0, 0.0], "a terrace below");
+        assert_eq!(between(room(0, 2000), room(0, 0)), [0.0, 0.0], "a dry edge");
+        let [contact, wall] = between(room(0, 2000), room(1000, 1000));
+        assert_eq!((contact, wall), (1000.0, share::<false>(0.5)), "a step under a level surface");
+        let [back, none] = between(room(1000, 1000), room(0, 2000));
+        assert_eq!((back, none), (1000.0, 0.0));
+    }
+
+    #[test]
+    fn columns_that_are_not_there_are_walls_unless_links_lead_there() {
+        let nothing = Room { base: 0, ceiling: 0, depth: 0 };
+        let own = room(700, 2000);
+        assert_eq!(between(own, nothing), [0.0, 1.0]);
+        assert_eq!(side::<false, true>(&step(), own, 5e-4, nothing, true), [0.0, 0.0]);
+        let low = Room { base: 700, ceiling: 1700, depth: 1000 };
+        assert_eq!(between(own, low), [1000.0, 1.0 - share::<false>(0.5)], "a ceiling below the surface");
+    }
+
+    #[test]
+    fn thin_contact_does_not_count() {
+        assert!(!counts(&step(), 125) && counts(&step(), 126));
+        assert_eq!(between(room(0, 125), room(0, 2000))[0], 0.0);
+        assert_eq!(between(room(0, 188), room(0, 2000))[0], 188.0);
+    }
+}
