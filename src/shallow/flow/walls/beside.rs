@@ -4,7 +4,8 @@
 //! depth counts little: by the profile's part of the mean of phi^2. Where both surfaces stand apart as the ground does, up to a cell's edge, there is no
 //! wall but a slope, with a film on it. A dry edge that is not higher holds nothing back.
 
-use crate::shallow::columns::{Columns, NONE, STRIP, strip_from, strip_of};
+use crate::base::cpu::dispatch;
+use crate::shallow::columns::{Columns, NONE, STRIP, strip_from, strip_mut, strip_of};
 use crate::shallow::flow::flux::{Step, greater, lesser};
 
 /// Walls beside films of less than `THIN` of a cell's edge do not count, and such of over `THICK` do as a whole: one beside a film of `THIN` takes
@@ -54,12 +55,17 @@ fn share<const FULL: bool>(x: f32) -> f32 {
     if FULL { cube * (10.0 - x * (15.0 - 6.0 * x)) } else { cube * (2.5 - x * (1.875 - 0.375 * x)) }
 }
 
-/// Friction of a wall over that of a difference of velocities between pipes: dx u'(0) / u for u = 1 - exp(-y / delta), of which pipes have the mean over a
-/// cell. That is s^2 / (s - 1 + exp(-s)) with s = dx / delta, here to 0.1 %; where cells are small, 2. `inverse` is 1 / H.
+/// What walls beside liquid of a depth hold back (units): of the part of each side, in lengths of its depth, times friction over that of a difference of
+/// velocities between pipes.
+///
+/// u = 1 - exp(-y / delta) beside one wall, and pipes have its mean over a cell: dx u'(0) / u is s^2 / (s - 1 + exp(-s)) with s = dx / delta, 2 where cells are
+/// small. Between two walls in one cell it is s^2 t / (1 - t), t = tanh(s / 2) / (s / 2), 12 where cells are small. Both are here to 2 %.
 #[inline(always)]
-pub fn wall<const FULL: bool>(step: &Step, high: f32, inverse: f32) -> f32 {
+pub fn walls<const FULL: bool>(step: &Step, high: f32, inverse: f32, parts: [f32; 2]) -> f32 {
     let s = if FULL { REACH_FULL } else { REACH } * step.cell * inverse;
-    (s + 1.0 + 1.0 / (1.0 + s * (1.0 / 3.0 + 0.057 * s))) * high * counted(step, high)
+    let one = s + 1.0 + 1.0 / (1.0 + s * (1.0 / 3.0 + 0.057 * s));
+    let more = 2.0 + 6.0 / (1.0 + s * (0.25 + 0.03 * s));
+    ((parts[0] + parts[1]) * one + parts[0] * parts[1] * more) * high * counted(step, high)
 }
 
 /// The height of a contact (units), times friction over that of straight lines between pipes, for the same reason: (s / 2)^2 / sinh^2(s / 2), s being
@@ -120,97 +126,144 @@ struct Beyond<'a> {
 /// Finds what is beside the columns of strips, which start behind `first`: of pipes to the east the sum over both sides of contact and walls
 /// (units), the contact before them and behind; then of pipes to the south.
 pub fn find(step: &Step, around: &Around, strips: &[u32], first: usize, out: [&mut [f32]; 6]) {
-    use crate::base::cpu::dispatch;
-    let out = &mut { out };
+    let mut out = out;
+    let out = &mut out;
     dispatch!(find_strips(step: &Step, around: &Around, strips: &[u32], first: usize, out: &mut [&mut [f32]; 6]))
 }
 
 #[inline(always)]
 fn find_strips(step: &Step, around: &Around, strips: &[u32], first: usize, out: &mut [&mut [f32]; 6]) {
-    let Around { columns, depth, roofed, linked } = around;
-    let [base, ceiling] = [columns.bases(), columns.ceilings()];
+    let Around { columns, roofed, linked, .. } = around;
+    let [all_z, before_z, behind_z, all_x, before_x, behind_x] = out;
     for &strip in strips {
-        let strip = strip as usize;
-        let (own, links) = ([base, ceiling, depth].map(|numbers| strip_of(numbers, strip)), linked[strip]);
-        let is_roofed = |other: u32| other == NONE || roofed[other as usize];
-        let beyond = |other: u32| match other {
-            NONE => Beyond { base: &ABSENT, ceiling: &ABSENT, depth: &ABSENT },
-            other => {
-                let [base, ceiling, depth] =
-                    [base, ceiling, depth].map(|numbers| strip_of(numbers, other as usize));
-                Beyond { base, ceiling, depth }
-            }
-        };
+        let (strip, place) = (strip as usize, strip as usize - first);
+        let (own, links) = (around.strip(strip), linked[strip]);
         let [north, south] = [columns.north(strip), columns.south(strip)];
-        let sides = [beyond(north), beyond(south)];
-        let roof = is_roofed(north) || is_roofed(south);
-        let [all, before, behind, ..] = out;
-        let at = (strip - first) * STRIP;
-        let numbers = [all, before, behind].map(|numbers| &mut numbers[at..at + STRIP]);
-        both(step, own, sides, [links[3], links[1]], roof, numbers);
-        // A strip's places and those before and behind them.
-        let (west, east) = (columns.west(strip), columns.east(strip));
-        let shifted = [base, ceiling, depth].map(|numbers| {
-            let mut before = ABSENT;
-            before[1..].copy_from_slice(&numbers[strip * STRIP..][..STRIP - 1]);
-            before[0] = west.map_or(0, |west| numbers[west * STRIP + STRIP - 1]);
-            let mut behind = *strip_from(numbers, strip * STRIP + 1);
-            behind[STRIP - 1] = east.map_or(0, |east| numbers[east * STRIP]);
-            [before, behind]
-        });
-        let [bases, ceilings, depths] = &shifted;
-        let sides =
-            [0, 1].map(|side| Beyond { base: &bases[side], ceiling: &ceilings[side], depth: &depths[side] });
-        let roof =
-            roofed[strip] || [west, east].into_iter().any(|other| other.is_none_or(|other| roofed[other]));
-        let [.., all, before, behind] = out;
-        let numbers = [all, before, behind].map(|numbers| &mut numbers[at..at + STRIP]);
-        both(step, own, sides, [links[2], links[0]], roof, numbers);
+        let is_roofed =
+            (north == NONE || roofed[north as usize]) || (south == NONE || roofed[south as usize]);
+        let numbers = (strip_mut(all_z, place), strip_mut(before_z, place), strip_mut(behind_z, place));
+        both(
+            step,
+            &own,
+            [&around.beyond(north), &around.beyond(south)],
+            [links[3], links[1]],
+            is_roofed,
+            numbers,
+        );
+        let (has_west, has_east) = (columns.west(strip).is_some(), columns.east(strip).is_some());
+        let (mut west, mut east) = (around.shifted(strip, has_west, 1), around.shifted(strip, has_east, 0));
+        if !has_west {
+            west.shut(0);
+        }
+        if !has_east {
+            east.shut(STRIP - 1);
+        }
+        let is_roofed = roofed[strip]
+            || !has_west
+            || !has_east
+            || roofed[strip - usize::from(has_west)]
+            || roofed[strip + usize::from(has_east)];
+        let numbers = (strip_mut(all_x, place), strip_mut(before_x, place), strip_mut(behind_x, place));
+        both(step, &own, [&west.see(), &east.see()], [links[2], links[0]], is_roofed, numbers);
     }
 }
 
+impl<'a> Around<'a> {
+    #[inline(always)]
+    fn strip(&self, strip: usize) -> Beyond<'a> {
+        Beyond {
+            base: strip_of(self.columns.bases(), strip),
+            ceiling: strip_of(self.columns.ceilings(), strip),
+            depth: strip_of(self.depth, strip),
+        }
+    }
+
+    #[inline(always)]
+    fn beyond(&self, strip: u32) -> Beyond<'a> {
+        match strip {
+            NONE => Beyond { base: &ABSENT, ceiling: &ABSENT, depth: &ABSENT },
+            strip => self.strip(strip as usize),
+        }
+    }
+
+    /// The columns before those of a strip (`before` 1), or behind them (0).
+    #[inline(always)]
+    fn shifted(&self, strip: usize, is_there: bool, before: usize) -> Shifted {
+        let at = (strip * STRIP + 1).wrapping_sub(2 * before);
+        if is_there || before == 0 {
+            Shifted {
+                base: *strip_from(self.columns.bases(), at),
+                ceiling: *strip_from(self.columns.ceilings(), at),
+                depth: *strip_from(self.depth, at),
+            }
+        } else {
+            let own = self.strip(strip);
+            let mut west = Shifted { base: ABSENT, ceiling: ABSENT, depth: ABSENT };
+            west.base[1..].copy_from_slice(&own.base[..STRIP - 1]);
+            west.ceiling[1..].copy_from_slice(&own.ceiling[..STRIP - 1]);
+            west.depth[1..].copy_from_slice(&own.depth[..STRIP - 1]);
+            west
+        }
+    }
+}
+
+/// Columns beside those of a strip.
+struct Shifted {
+    base: [i32; STRIP],
+    ceiling: [i32; STRIP],
+    depth: [i32; STRIP],
+}
+
+impl Shifted {
+    /// There is no column at a place.
+    #[inline(always)]
+    fn shut(&mut self, place: usize) {
+        (self.base[place], self.ceiling[place], self.depth[place]) = (0, 0, 0);
+    }
+
+    #[inline(always)]
+    fn see(&self) -> Beyond<'_> {
+        Beyond { base: &self.base, ceiling: &self.ceiling, depth: &self.depth }
+    }
+}
+
+/// What is beside the columns of a strip in all, and contact before and behind.
+type Found<'a> = (&'a mut [f32; STRIP], &'a mut [f32; STRIP], &'a mut [f32; STRIP]);
+
 /// Both sides of a strip across one axis.
 #[inline(always)]
-fn both(
-    step: &Step,
-    own: [&[i32; STRIP]; 3],
-    sides: [Beyond; 2],
-    links: [u16; 2],
-    is_roofed: bool,
-    out: [&mut [f32]; 3],
-) {
-    let [all, before, behind] = out.map(|numbers| numbers.first_chunk_mut().expect("a strip"));
+fn both(step: &Step, own: &Beyond, sides: [&Beyond; 2], links: [u16; 2], is_roofed: bool, found: Found) {
     if is_roofed {
-        both_strips::<true>(step, own, sides, links, all, before, behind);
+        both_strips::<true>(step, own, sides, links, found);
     } else {
-        both_strips::<false>(step, own, sides, links, all, before, behind);
+        both_strips::<false>(step, own, sides, links, found);
     }
 }
 
 #[inline(always)]
 fn both_strips<const ROOFED: bool>(
     step: &Step,
-    [base, ceiling, depth]: [&[i32; STRIP]; 3],
-    [first, second]: [Beyond; 2],
+    own: &Beyond,
+    [first, second]: [&Beyond; 2],
     links: [u16; 2],
-    all: &mut [f32; STRIP],
-    before: &mut [f32; STRIP],
-    behind: &mut [f32; STRIP],
+    (all, before, behind): Found,
 ) {
     for x in 0..STRIP {
-        let own = Room { base: base[x], ceiling: ceiling[x], depth: depth[x] };
-        let high = own.depth as f32;
+        let high = own.depth[x] as f32;
         let inverse = 1.0 / greater(high, 1.0);
-        let room = |beyond: &Beyond| Room {
-            base: beyond.base[x],
-            ceiling: beyond.ceiling[x],
-            depth: beyond.depth[x],
-        };
-        let is_linked = links.map(|links| links >> x & 1 == 1);
-        let [one, part] = side::<false, ROOFED>(step, own, inverse, room(&first), is_linked[0]);
-        let [two, other_part] = side::<false, ROOFED>(step, own, inverse, room(&second), is_linked[1]);
-        all[x] = (one + two) + (part + other_part) * wall::<false>(step, high, inverse);
+        let room = own.room(x);
+        let is_linked = [links[0] >> x & 1 == 1, links[1] >> x & 1 == 1];
+        let [one, part] = side::<false, ROOFED>(step, room, inverse, first.room(x), is_linked[0]);
+        let [two, other_part] = side::<false, ROOFED>(step, room, inverse, second.room(x), is_linked[1]);
+        all[x] = (one + two) + walls::<false>(step, high, inverse, [part, other_part]);
         (before[x], behind[x]) = (one, two);
+    }
+}
+
+impl Beyond<'_> {
+    #[inline(always)]
+    fn room(&self, x: usize) -> Room {
+        Room { base: self.base[x], ceiling: self.ceiling[x], depth: self.depth[x] }
     }
 }
 

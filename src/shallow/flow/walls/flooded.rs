@@ -52,22 +52,29 @@ impl Walls {
         let mean = mean(rooms);
         let rise = (columns.bases()[i] - columns.bases()[j]) as f32 / step.cell;
         let lateral = f64::from(step.lateral) * f64::from(1.0 + lesser(rise * rise, 3.0));
-        let (mut held, mut taken) = ([0.0; 2], [0.0; 2]);
-        for (side, bit) in sides.into_iter().enumerate() {
-            let others = [i, j].map(|column| across(columns, column, bit));
-            let pairs = [0, 1].map(|end| {
-                let is_linked = self.linked[[i, j][end] / STRIP][bit] >> ([i, j][end] % STRIP) & 1 == 1;
-                let beyond = others[end].map_or(ABSENT, |other| room(columns, state, other));
-                over(step, rooms[end], beyond, full[end], is_linked)
+        let of_end = |end: usize| {
+            let column = [i, j][end];
+            let beyond = sides.map(|side| {
+                let is_linked = self.linked[column / STRIP][side] >> (column % STRIP) & 1 == 1;
+                (across(columns, column, side).map_or(ABSENT, |other| room(columns, state, other)), is_linked)
             });
-            let [contact, walls] = [0, 1].map(|which| 0.5 * (pairs[0][which] + pairs[1][which]));
-            held[side] = f64::from(contact + walls);
-            if let [Some(first), Some(second)] = others {
-                let depth = self::mean(self::rooms(columns, state, [first, second]));
-                taken[side] = f64::from(lesser(contact / depth.max(1.0), 1.0) * state.flux[axis][first]);
+            if full[end] {
+                over::<true>(step, rooms[end], beyond)
+            } else {
+                over::<false>(step, rooms[end], beyond)
             }
-        }
-        let [held, taken] = [held, taken].map(|sides| sides[0] + sides[1]);
+        };
+        let [one, other] = [0, 1].map(of_end);
+        let [before, behind, walls] = [0, 1, 2].map(|which| 0.5 * (one[which] + other[which]));
+        let held = f64::from((before + behind) + walls);
+        let taken = [0, 1].map(|side| {
+            let others = [i, j].map(|column| across(columns, column, sides[side]));
+            let [Some(first), Some(second)] = others else { return 0.0 };
+            let depth = self::mean(self::rooms(columns, state, [first, second]));
+            let contact = [before, behind][side];
+            f64::from(lesser(contact / depth.max(1.0), 1.0) * state.flux[axis][first])
+        });
+        let taken = taken[0] + taken[1];
         Beside {
             ground,
             held: lateral * held / f64::from(mean.max(1.0)),
@@ -94,20 +101,15 @@ fn mean(rooms: [Room; 2]) -> f32 {
     0.5 * (rooms[0].depth as f32 + rooms[1].depth as f32)
 }
 
-/// Over one side of a column: the height of contact, and walls (units).
-fn over(step: &Step, own: Room, beyond: Room, is_full: bool, is_linked: bool) -> [f32; 2] {
+/// Both sides of a column, from what is there and whether links lead over them: contact over the first and the second, and walls (units).
+fn over<const FULL: bool>(step: &Step, own: Room, beyond: [(Room, bool); 2]) -> [f32; 3] {
     if own.depth <= 0 {
-        return [0.0; 2];
+        return [0.0; 3];
     }
-    let high = own.depth as f32;
-    let inverse = 1.0 / high;
-    if is_full {
-        let [contact, part] = beside::side::<true, true>(step, own, inverse, beyond, is_linked);
-        [contact, part * beside::wall::<true>(step, high, inverse)]
-    } else {
-        let [contact, part] = beside::side::<false, true>(step, own, inverse, beyond, is_linked);
-        [contact, part * beside::wall::<false>(step, high, inverse)]
-    }
+    let (high, inverse) = (own.depth as f32, 1.0 / own.depth as f32);
+    let [one, two] =
+        beyond.map(|(beyond, is_linked)| beside::side::<FULL, true>(step, own, inverse, beyond, is_linked));
+    [one[0], two[0], beside::walls::<FULL>(step, high, inverse, [one[1], two[1]])]
 }
 
 /// The column beside another one over a side, as links count them; it may be one that is not there.

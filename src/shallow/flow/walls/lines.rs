@@ -17,7 +17,7 @@ use crate::shallow::flow::network::Network;
 /// Most reductions: a pipe knows of all within 16 cells.
 const MOST: usize = 4;
 /// What a and b may add up to, that of the last step is taken for.
-const LAGS: f32 = 0.3;
+const LAGS: f32 = 0.5;
 const ZEROS: [f32; STRIP] = [0.0; STRIP];
 
 /// Lines of pipes to the east, which lie along z, and of pipes to the south, along x.
@@ -218,18 +218,13 @@ type System = [[f32; STRIP]; 3];
 
 #[inline(always)]
 fn solve_strips<const THINS: bool>(pass: &Pass, strips: &[u32], start: usize, out: &mut [&mut [f32]; 2]) {
-    let [east, south] = out;
+    let ([east, south], again) = (out, pass.step.again);
     for &strip in strips {
-        let at = (strip as usize - start) * STRIP;
-        for (axis, out) in [&mut **east, &mut **south].into_iter().enumerate() {
-            let out: &mut [f32; STRIP] = out[at..].first_chunk_mut().expect("a strip");
-            let ([rest, a, b], [before, behind]) = if axis == 0 {
-                pass.begin::<THINS, 0>(strip as usize)
-            } else {
-                pass.begin::<THINS, 1>(strip as usize)
-            };
-            end_strip(&rest, &a, &b, &before, &behind, pass.step.again, out);
-        }
+        let (strip, place) = (strip as usize, strip as usize - start);
+        let ([rest, a, b], [before, behind]) = pass.begin::<THINS, 0>(strip);
+        end_strip(&rest, &a, &b, &before, &behind, again, strip_mut(east, place));
+        let ([rest, a, b], [before, behind]) = pass.begin::<THINS, 1>(strip);
+        end_strip(&rest, &a, &b, &before, &behind, again, strip_mut(south, place));
     }
 }
 
@@ -250,24 +245,13 @@ fn begin_strips<const THINS: bool>(pass: &Pass, strips: &[u32], start: usize, ou
 
 #[inline(always)]
 fn reduce_strips(pass: &Pass, strips: &[u32], start: usize, out: &mut [&mut [f32]; 6]) {
+    let [east, east_a, east_b, south, south_a, south_b] = out;
     for &strip in strips {
-        let strip = strip as usize;
-        for axis in 0..2 {
-            let now = &pass.now[axis];
-            let [before, behind] =
-                [0, 1].map(|side| now.each_ref().map(|numbers| pass.far(numbers, axis, strip, side)));
-            let own = now.each_ref().map(|numbers| numbers.before(strip, 0));
-            let place = strip - start;
-            let [rest, a, b] = out[3 * axis..].first_chunk_mut().expect("three of each axis");
-            reduce_strip(
-                own,
-                before,
-                behind,
-                strip_mut(rest, place),
-                strip_mut(a, place),
-                strip_mut(b, place),
-            );
-        }
+        let (strip, place) = (strip as usize, strip as usize - start);
+        let out = (strip_mut(east, place), strip_mut(east_a, place), strip_mut(east_b, place));
+        reduce_strip(pass.own(0, strip), pass.far::<0>(strip, 0), pass.far::<0>(strip, 1), out);
+        let out = (strip_mut(south, place), strip_mut(south_a, place), strip_mut(south_b, place));
+        reduce_strip(pass.own(1, strip), pass.far::<1>(strip, 0), pass.far::<1>(strip, 1), out);
     }
 }
 
@@ -277,9 +261,7 @@ fn reduce_strip(
     [rest, a, b]: [&[f32; STRIP]; 3],
     [rest_before, a_before, b_before]: [&[f32; STRIP]; 3],
     [rest_behind, a_behind, b_behind]: [&[f32; STRIP]; 3],
-    new_rest: &mut [f32; STRIP],
-    new_a: &mut [f32; STRIP],
-    new_b: &mut [f32; STRIP],
+    (new_rest, new_a, new_b): (&mut [f32; STRIP], &mut [f32; STRIP], &mut [f32; STRIP]),
 ) {
     for x in 0..STRIP {
         let (a, b) = (a[x], b[x]);
@@ -295,8 +277,8 @@ fn end_strips(pass: &Pass, strips: &[u32], start: usize, out: &mut [&mut [f32]; 
     for &strip in strips {
         let strip = strip as usize;
         for (axis, out) in out.iter_mut().enumerate() {
-            let [rest, a, b] = pass.now[axis].each_ref().map(|numbers| numbers.before(strip, 0));
-            let [before, behind] = [0, 1].map(|side| pass.last_far(axis, strip, side));
+            let [rest, a, b] = pass.own(axis, strip);
+            let (before, behind) = (pass.last_far(axis, strip, 0), pass.last_far(axis, strip, 1));
             end_strip(rest, a, b, &before, &behind, pass.step.again, strip_mut(out, strip - start));
         }
     }
@@ -325,8 +307,9 @@ struct Pipe<'a> {
     open: &'a [f32; STRIP],
     light: &'a [u32; STRIP],
     flux: &'a [f32; STRIP],
-    /// What is beside the columns in all, contact before them and behind.
-    beside: [[&'a [f32; STRIP]; 2]; 3],
+    /// What is beside the columns in all; contact before them and behind.
+    all: [&'a [f32; STRIP]; 2],
+    contact: [[&'a [f32; STRIP]; 2]; 2],
     /// Depths at both ends of the pipes before and behind.
     before: [&'a [i32; STRIP]; 2],
     behind: [&'a [i32; STRIP]; 2],
@@ -334,90 +317,110 @@ struct Pipe<'a> {
 
 impl Pass<'_> {
     /// What the pipes of a strip depend on, and the last fluxes of those before and behind.
+    ///
+    /// Without arrays that are mapped: closures that do not become part of their caller lack its instructions.
     #[inline(always)]
     fn begin<const THINS: bool, const AXIS: usize>(&self, strip: usize) -> (System, [[f32; STRIP]; 2]) {
         let Liquid { columns, pipes, fast, depth, flux, .. } = *self.liquid;
         let (at, bases) = (strip * STRIP, columns.bases());
         let row = columns.strips()[strip].row as usize;
         let light = if fast.row(row) { strip_of(fast.light(), strip) } else { &[NORMAL; STRIP] };
-        let own_depth = strip_of(depth, strip);
-        let beside = self.beside[AXIS].each_ref().map(|numbers| numbers.before(strip, 0));
+        let [all, contact_before, contact_behind] = &self.beside[AXIS];
+        let (all, all_numbers) = (all.before(strip, 0), all.all());
+        let (first, first_numbers) = (contact_before.before(strip, 0), contact_before.all());
+        let (second, second_numbers) = (contact_behind.before(strip, 0), contact_behind.all());
         let mut system = [ZEROS; 3];
         let [rest, a, b] = &mut system;
-        let (before, behind);
         if AXIS == 0 {
-            // The columns to the east, and those of the rows before and behind.
-            let has_east = columns.east(strip).is_some_and(|east| self.known[east]);
-            let east = self.beside[0].each_ref().map(|numbers| {
-                let mut east = *strip_from(numbers.all(), at + 1);
-                east[STRIP - 1] = if has_east { east[STRIP - 1] } else { 0.0 };
-                east
-            });
+            // The columns to the east, and those of the rows before and behind. Behind the last one no pipe is open.
+            let is_known = columns.east(strip).is_none_or(|east| self.known[east]);
+            let (mut far_all, mut far_first, mut far_second) = (ZEROS, ZEROS, ZEROS);
+            let far = if is_known {
+                [
+                    strip_from(all_numbers, at + 1),
+                    strip_from(first_numbers, at + 1),
+                    strip_from(second_numbers, at + 1),
+                ]
+            } else {
+                far_all[..STRIP - 1].copy_from_slice(&all[1..]);
+                far_first[..STRIP - 1].copy_from_slice(&first[1..]);
+                far_second[..STRIP - 1].copy_from_slice(&second[1..]);
+                [&far_all, &far_first, &far_second]
+            };
             let [north, south] = [columns.north(strip), columns.south(strip)];
-            let beyond = |other: u32| if other == NONE { strip } else { other as usize };
-            let ends = |other: u32| {
-                let other = beyond(other);
-                [strip_of(depth, other), strip_from(depth, other * STRIP + 1)]
-            };
-            let contact = |which: usize, other: u32| {
-                if other == NONE { [&ZEROS; 2] } else { [beside[which], &east[which]] }
-            };
+            let before = if north == NONE { strip } else { north as usize };
+            let behind = if south == NONE { strip } else { south as usize };
             let pipe = Pipe {
                 base: [strip_of(bases, strip), strip_from(bases, at + 1)],
-                depth: [own_depth, strip_from(depth, at + 1)],
+                depth: [strip_of(depth, strip), strip_from(depth, at + 1)],
                 open: strip_of(&pipes.east, strip),
                 light,
                 flux: strip_of(flux[0], strip),
-                beside: [[beside[0], &east[0]], contact(1, north), contact(2, south)],
-                before: ends(north),
-                behind: ends(south),
+                all: [all, far[0]],
+                contact: [
+                    if north == NONE { [&ZEROS; 2] } else { [first, far[1]] },
+                    if south == NONE { [&ZEROS; 2] } else { [second, far[2]] },
+                ],
+                before: [strip_of(depth, before), strip_from(depth, before * STRIP + 1)],
+                behind: [strip_of(depth, behind), strip_from(depth, behind * STRIP + 1)],
             };
             begin_strip::<THINS, 0>(self.step, &pipe, rest, a, b);
-            let last = |other: u32| if other == NONE { ZEROS } else { *strip_of(flux[0], other as usize) };
-            (before, behind) = (last(north), last(south));
+            (system, [*strip_of(flux[0], before), *strip_of(flux[0], behind)])
         } else {
             // The columns to the south, and those to the west and east of both.
             let south = columns.south(strip);
             let far = if south == NONE { strip } else { south as usize };
-            let is_known = south != NONE && self.known[far];
-            let other = self.beside[1]
-                .each_ref()
-                .map(|numbers| if is_known { numbers.before(far, 0) } else { &ZEROS });
+            let [far_all, far_first, far_second] = if south != NONE && self.known[far] {
+                [strip_of(all_numbers, far), strip_of(first_numbers, far), strip_of(second_numbers, far)]
+            } else {
+                [&ZEROS; 3]
+            };
             let (has_west, has_east) = (columns.west(strip).is_some(), columns.east(strip).is_some());
-            let [mut west, mut east] = [1, 2].map(|which| [*beside[which], *other[which]]);
-            if !has_west {
-                west.iter_mut().for_each(|contact| contact[0] = 0.0);
-            }
-            if !has_east {
-                east.iter_mut().for_each(|contact| contact[STRIP - 1] = 0.0);
-            }
-            let [own_west, far_west] = [strip, far].map(|strip| shifted(depth, strip, -1));
+            let (own_west, far_west) = (shifted(depth, strip, -1), shifted(depth, far, -1));
             let pipe = Pipe {
                 base: [strip_of(bases, strip), strip_of(bases, far)],
-                depth: [own_depth, strip_of(depth, far)],
+                depth: [strip_of(depth, strip), strip_of(depth, far)],
                 open: strip_of(&pipes.south, strip),
                 light,
                 flux: strip_of(flux[1], strip),
-                beside: [[beside[0], other[0]], west.each_ref(), east.each_ref()],
+                all: [all, far_all],
+                contact: [[first, far_first], [second, far_second]],
                 before: [&own_west, &far_west],
                 behind: [strip_from(depth, at + 1), strip_from(depth, far * STRIP + 1)],
             };
             begin_strip::<THINS, 1>(self.step, &pipe, rest, a, b);
-            (before, behind) = (shifted(flux[1], strip, -1), shifted(flux[1], strip, 1));
+            if !has_west {
+                a[0] = 0.0;
+            }
+            if !has_east {
+                b[STRIP - 1] = 0.0;
+            }
+            (system, [shifted(flux[1], strip, -1), shifted(flux[1], strip, 1)])
         }
-        (system, [before, behind])
     }
 
-    /// Numbers of the strip that lies at the distance of this pass before another one, or behind it; what has no neighbour there takes nothing of it.
+    /// r, a and b of a strip.
     #[inline(always)]
-    fn far<'a>(&self, numbers: &'a Numbers, axis: usize, strip: usize, side: usize) -> &'a [f32; STRIP] {
-        match (axis, side) {
-            (0, _) => match self.far[side][strip] {
-                NONE => &ZEROS,
-                other => numbers.before(other as usize, 0),
-            },
-            (_, 0) => numbers.before(strip, self.distance),
-            _ => strip_from(numbers.all(), strip * STRIP + self.distance),
+    fn own(&self, axis: usize, strip: usize) -> [&[f32; STRIP]; 3] {
+        let [rest, a, b] = &self.now[axis];
+        [rest.before(strip, 0), a.before(strip, 0), b.before(strip, 0)]
+    }
+
+    /// Those of the pipes at the distance of this pass before a strip's, or behind them; what has none there takes nothing of it.
+    #[inline(always)]
+    fn far<const AXIS: usize>(&self, strip: usize, side: usize) -> [&[f32; STRIP]; 3] {
+        let [rest, a, b] = &self.now[AXIS];
+        if AXIS == 0 {
+            match self.far[side][strip] {
+                NONE => [&ZEROS; 3],
+                other => self.own(0, other as usize),
+            }
+        } else if side == 0 {
+            let places = self.distance;
+            [rest.before(strip, places), a.before(strip, places), b.before(strip, places)]
+        } else {
+            let at = strip * STRIP + self.distance;
+            [strip_from(rest.all(), at), strip_from(a.all(), at), strip_from(b.all(), at)]
         }
     }
 
@@ -458,7 +461,8 @@ fn begin_strip<const THINS: bool, const AXIS: usize>(
     a: &mut [f32; STRIP],
     b: &mut [f32; STRIP],
 ) {
-    let Pipe { base, depth, open, light, flux, beside: [all, before, behind], .. } = pipe;
+    let Pipe { base, depth, open, light, flux, all, contact, before, behind } = pipe;
+    let per_cell = 1.0 / step.cell;
     for x in 0..STRIP {
         let rise = base[0][x] - base[1][x];
         let fall = base[0][x] + depth[0][x] - (base[1][x] + depth[1][x]) + step.tilt[AXIS];
@@ -471,7 +475,7 @@ fn begin_strip<const THINS: bool, const AXIS: usize>(
         let thinned = if THINS { step.thinned(flux[x], square) } else { 1.0 };
         let drag = light * if THINS { step.drag * thinned } else { step.drag };
         // On a slope a film is thinner than its depth, which for friction at the ground `open` knows.
-        let slope = rise as f32 / step.cell;
+        let slope = rise as f32 * per_cell;
         let steep = 1.0 + lesser(slope * slope, 3.0);
         let lateral = if THINS { step.lateral * light * thinned } else { step.lateral * light } * steep;
         let open = square * open[x];
@@ -479,11 +483,13 @@ fn begin_strip<const THINS: bool, const AXIS: usize>(
         let part = open / (open + drag + beside * open);
         rest[x] = driven * part;
         let part = part * lateral;
-        let mean = |ends: [&[i32; STRIP]; 2]| 0.5 * (ends[0][x] as f32 + ends[1][x] as f32);
-        let contact = |ends: &[&[f32; STRIP]; 2], depth: f32| {
-            lesser(0.5 * (ends[0][x] + ends[1][x]) / greater(depth, 1.0), 1.0)
-        };
-        a[x] = part * contact(before, mean(pipe.before));
-        b[x] = part * contact(behind, mean(pipe.behind));
+        a[x] = part * taken([contact[0][0][x], contact[0][1][x]], [before[0][x], before[1][x]]);
+        b[x] = part * taken([contact[1][0][x], contact[1][1][x]], [behind[0][x], behind[1][x]]);
     }
+}
+
+/// The part of a pipe's section that is in contact, of the contact and the depths at both of its ends.
+#[inline(always)]
+fn taken(contact: [f32; 2], depth: [i32; 2]) -> f32 {
+    lesser((contact[0] + contact[1]) / greater(depth[0] as f32 + depth[1] as f32, 1.0), 1.0)
 }

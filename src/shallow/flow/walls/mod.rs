@@ -28,7 +28,7 @@ use crate::shallow::pipes::{Links, Pipes};
 use lines::Lines;
 
 /// What is beside columns is found again after so many steps of a frame.
-const STEPS: u32 = 4;
+const STEPS: u32 = 8;
 /// Columns from which on strips are divided among threads.
 const LEAST: usize = 64 * STRIP;
 
