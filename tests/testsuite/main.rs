@@ -96,11 +96,13 @@ mod shallow {
     mod balance;
     mod border;
     mod falls;
+    mod falls_scalars;
     mod flooded;
     mod flow;
     mod moving;
     mod probe;
     mod scalars;
+    mod stains;
     mod state;
     mod surface;
     mod surface_groups;
