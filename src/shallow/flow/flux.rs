@@ -238,7 +238,7 @@ pub fn solved_row<const LIGHT: bool>(step: &Step, row: &Row, solved: [&[f32]; 2]
 }
 
 #[inline(always)]
-#[allow(clippy::too_many_arguments)]
+#[expect(clippy::too_many_arguments)]
 fn solved_strip<const LIGHT: bool, const AXIS: usize>(
     step: &Step,
     depth: [&[i32; STRIP]; 2],

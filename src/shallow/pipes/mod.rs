@@ -251,6 +251,23 @@ mod tests {
     }
 
     #[test]
+    fn a_bank_is_a_wall_where_friction_is_at_walls_and_a_steep_plane_stays_a_slope() {
+        let rules = |steepest| Rules { steepest, ..Rules::bordered(Border::Closed) };
+        // A channel along x, with banks of three metres beside three cells of one metre.
+        let channel = columns([4, 5], |[_, z]| {
+            vec![[BOTTOMLESS, if z == 0 || z == 4 { 103 * METRE } else { 100 * METRE }]]
+        });
+        let beside = channel.column([1, 1], 0).unwrap();
+        let [walled, open] =
+            [METRE, i32::MAX].map(|most| Pipes::with_rules(&channel, rules(most)).east[beside]);
+        assert_eq!((walled, open), (1.0, (1.0f32 + 2.25).powi(-2)));
+        // A plane of 56 degrees across the pipe.
+        let plane = columns([4, 5], |[_, z]| vec![[BOTTOMLESS, 100 * METRE + 3 * z as i32 * METRE / 2]]);
+        let middle = plane.column([1, 2], 0).unwrap();
+        assert_eq!(Pipes::with_rules(&plane, rules(METRE)).east[middle], (1.0f32 + 2.25).powi(-2));
+    }
+
+    #[test]
     fn a_bridge_has_links_and_walls_have_no_pipes() {
         let ground = |[x, z]: [usize; 2]| match (x, z) {
             (_, 1) => vec![[BOTTOMLESS, METRE], [3 * METRE, 4 * METRE]],

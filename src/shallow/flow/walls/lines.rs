@@ -470,7 +470,9 @@ fn begin_strip<const THINS: bool, const AXIS: usize>(
         let light = unpacked(light[x])[AXIS];
         let mean = 0.5 * (depth[0] + depth[1]);
         let driven = step.kept * flux[x] + step.drive * light * fall as f32 * lesser(mean, step.section);
+        // What nothing drives is moved by its neighbours: from both ends the same.
         let giver = if driven > 0.0 { depth[0] } else { depth[1] };
+        let giver = if driven == 0.0 { lesser(depth[0], depth[1]) } else { giver };
         let square = giver * giver;
         let thinned = if THINS { step.thinned(flux[x], square) } else { 1.0 };
         let drag = light * if THINS { step.drag * thinned } else { step.drag };
