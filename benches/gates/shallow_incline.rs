@@ -17,7 +17,7 @@ const AREA: f64 = 1.0e-6 / 0.016;
 const FIRST: f64 = 0.1;
 const LAST: f64 = 0.2;
 /// Rows of cells: walls do not reach the middle.
-const WIDE: usize = 31;
+const WIDE: usize = 81;
 /// Places of the front that are measured.
 const COUNT: usize = 7;
 

@@ -106,7 +106,8 @@ pub fn side<const FULL: bool, const ROOFED: bool>(
     let wall = if ROOFED {
         let top = lesser(greater((beyond.ceiling - own.base) as f32 * inverse, 0.0), 1.0);
         let top = if is_linked { 1.0 } else { top };
-        1.0 - greater(share::<FULL>(top) - below, 0.0)
+        // Without a ceiling to the last bit what it is where none is looked at.
+        lesser(below + (1.0 - share::<FULL>(top)), 1.0)
     } else {
         below
     };
