@@ -54,7 +54,7 @@ pub enum Friction {
     Ground,
     /// Also at walls and ceilings, and between liquids that flow beside each other: ducts and channels of any width carry what they do in theory, to
     /// a few percent (Galerkin's method with the profile of a film). Films thinner than a sixteenth of a cell cost nothing more; nor does it act
-    /// without viscosity, or with [`Section::Whole`]. A closed border is a wall, too. It takes 104 bytes a column.
+    /// without viscosity, or with [`Section::Whole`]. A closed border is a wall, too. It takes 86 bytes a column.
     Walls,
 }
 

@@ -298,19 +298,54 @@ mod tests {
     }
 
     #[test]
+    fn contact_and_walls_are_fitted_to_the_exponentials_that_solve_a_film_beside_a_wall() {
+        let exp = |x: f64| libm::exp(x);
+        for depth in [100.0f32, 300.0, 1000.0, 3000.0, 30_000.0] {
+            for (is_full, reach) in [(false, REACH), (true, REACH_FULL)] {
+                let s = f64::from(reach) * 1000.0 / f64::from(depth);
+                let sinh = (exp(0.5 * s) - exp(-0.5 * s)) / 2.0;
+                let [contact, one, both] = if is_full {
+                    [
+                        fitted::<true>(&step(), depth),
+                        walls::<true>(&step(), depth, 1.0 / depth, [1.0, 0.0]),
+                        walls::<true>(&step(), depth, 1.0 / depth, [1.0; 2]),
+                    ]
+                } else {
+                    [
+                        fitted::<false>(&step(), depth),
+                        walls::<false>(&step(), depth, 1.0 / depth, [1.0, 0.0]),
+                        walls::<false>(&step(), depth, 1.0 / depth, [1.0; 2]),
+                    ]
+                };
+                let [contact, one, both] = [contact, one, both].map(|height| f64::from(height / depth));
+                // Where little is in contact, that it is little.
+                let exact = (0.5 * s / sinh).powi(2);
+                assert!((contact - exact).abs() < 0.02 * exact + 0.01, "{depth}: {contact}, not {exact}");
+                let exact = s * s / (s - 1.0 + exp(-s));
+                assert!((one / exact - 1.0).abs() < 0.02, "{depth}: {one}, not {exact}");
+                let tanh = libm::tanh(0.5 * s) / (0.5 * s);
+                let exact = s * s * tanh / (1.0 - tanh);
+                assert!((both / exact - 1.0).abs() < 0.03, "{depth}: {both}, not {exact}");
+            }
+        }
+    }
+
+    #[test]
     fn a_bank_is_a_wall_and_a_slope_with_a_film_is_none() {
         assert_eq!(between(room(0, 2000), room(3000, 0)), [0.0, 1.0], "a dry bank");
-        assert_eq!(between(room(0, 2000), room(2500, 10)), [0.0, 1.0], "a wet one");
-        assert_eq!(between(room(0, 2000), room(0, 2000)), [2000.0, 0.0], "level ground");
-        assert_eq!(between(room(0, 1000), room(900, 1000)), [1000.0, 0.0], "a film up the slope");
-        assert_eq!(between(room(900, 1000), room(0, 1000)), [1000.0, 0.0], "a film down the slope");
+        let [contact, wall] = between(room(0, 2000), room(2500, 10));
+        assert!(contact == 0.0 && wall > 0.99, "a wet one: {contact}, {wall}");
+        let fitted = |contact: f32| fitted::<false>(&step(), contact);
+        assert_eq!(between(room(0, 2000), room(0, 2000)), [fitted(2000.0), 0.0], "level ground");
+        assert_eq!(between(room(0, 1000), room(900, 1000)), [fitted(1000.0), 0.0], "a film up the slope");
+        assert_eq!(between(room(900, 1000), room(0, 1000)), [fitted(1000.0), 0.0], "a film down the slope");
         assert_eq!(between(room(0, 1000), room(5000, 1000)), [0.0, 1.0], "a terrace above");
         assert_eq!(between(room(5000, 1000), room(0, 1000)), [0.0, 0.0], "a terrace below");
         assert_eq!(between(room(0, 2000), room(0, 0)), [0.0, 0.0], "a dry edge");
         let [contact, wall] = between(room(0, 2000), room(1000, 1000));
-        assert_eq!((contact, wall), (1000.0, share::<false>(0.5)), "a step under a level surface");
+        assert_eq!((contact, wall), (fitted(1000.0), share::<false>(0.5)), "a step under a level surface");
         let [back, none] = between(room(1000, 1000), room(0, 2000));
-        assert_eq!((back, none), (1000.0, 0.0));
+        assert_eq!((back, none), (fitted(1000.0), 0.0));
     }
 
     #[test]
@@ -320,13 +355,19 @@ mod tests {
         assert_eq!(between(own, nothing), [0.0, 1.0]);
         assert_eq!(side::<false, true>(&step(), own, 5e-4, nothing, true), [0.0, 0.0]);
         let low = Room { base: 700, ceiling: 1700, depth: 1000 };
-        assert_eq!(between(own, low), [1000.0, 1.0 - share::<false>(0.5)], "a ceiling below the surface");
+        let wall = 1.0 - share::<false>(0.5);
+        assert_eq!(
+            between(own, low),
+            [fitted::<false>(&step(), 1000.0), wall],
+            "a ceiling below the surface"
+        );
     }
 
     #[test]
     fn thin_contact_does_not_count() {
-        assert!(!counts(&step(), 125) && counts(&step(), 126));
-        assert_eq!(between(room(0, 125), room(0, 2000))[0], 0.0);
-        assert_eq!(between(room(0, 188), room(0, 2000))[0], 188.0);
+        assert!(!counts(&step(), 62) && counts(&step(), 63));
+        assert_eq!(between(room(0, 62), room(0, 2000))[0], 0.0);
+        assert!((0.0..1.0).contains(&between(room(0, 90), room(0, 2000))[0]));
+        assert_eq!(walls::<false>(&step(), 62.0, 1.0 / 62.0, [1.0; 2]), 0.0);
     }
 }
