@@ -29,12 +29,18 @@ pub fn longest(params: &Params, measures: &Measures, depth: f64, frame: f64) -> 
     let g = -params.gravity[1];
     let height = if params.section == Section::Wetted { depth } else { measures.cell };
     let a = measures.pipes as f64 * g * height / (measures.cell * measures.cell);
-    let b = if depth > 0.0 { 3.0 * params.liquid.least_viscosity() / (depth * depth) } else { 0.0 };
+    let b = if depth > 0.0 { 3.0 * least_viscosity(params) / (depth * depth) } else { 0.0 };
     let c = 1.0 + libm::pow(params.kept, frame);
     if a <= 0.0 || !b.is_finite() {
         return frame;
     }
     SAFETY * (b + (b * b + 4.0 * a * c).sqrt()) / (2.0 * a)
+}
+
+/// The least viscosity (m2/s) that liquid may have.
+fn least_viscosity(params: &Params) -> f64 {
+    let times = params.thickening.map_or(1.0, |law| law.times.min(1.0));
+    params.liquid.least_viscosity() * times
 }
 
 /// The greatest depth (m) in a pipe's section for which steps of `dt` are stable without viscosity.

@@ -3,6 +3,7 @@
 use super::falls::Falls;
 use super::liquid::Liquid;
 use super::pipes::Border;
+use super::thicken::Thickening;
 use crate::error::{Error, Result};
 
 /// Parameters of the flow.
@@ -22,6 +23,8 @@ pub struct Params {
     pub section: Section,
     /// Where viscosity holds the liquid back. Chosen once.
     pub friction: Friction,
+    /// How viscosity depends on what the liquid carries; none: it does not. The scalar has to be there when a frame begins.
+    pub thickening: Option<Thickening>,
     /// How liquid falls freely over edges; none: it is below at once. Chosen once.
     pub falls: Option<Falls>,
 }
@@ -68,6 +71,7 @@ impl Default for Params {
             border: Border::default(),
             section: Section::default(),
             friction: Friction::default(),
+            thickening: None,
             falls: None,
         }
     }
@@ -96,6 +100,12 @@ impl Params {
         }
         if let Some(falls) = &self.falls {
             falls.validate()?;
+        }
+        if let Some(thickening) = &self.thickening {
+            thickening.validate()?;
+            if self.liquid.viscosity == 0.0 {
+                return Err(Error::argument("a liquid without viscosity does not thicken"));
+            }
         }
         match self.pace {
             Pace::Realtime(longest) if !(1e-6..=1.0).contains(&longest) => {

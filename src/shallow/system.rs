@@ -16,6 +16,7 @@ use super::pipes::{Border, Pipes};
 use super::remap::Remap;
 use super::scalars::amounts::Account;
 use super::terrain::Solids;
+use super::thicken::Thick;
 use crate::base::cpu::FlushDenormals;
 use crate::context::Context;
 use crate::error::{Error, Result};
@@ -31,6 +32,7 @@ pub struct Shallow {
     pub(super) flows: Flows,
     pub(super) remap: Remap,
     pub(super) falls: Falling,
+    thick: Thick,
     /// Units poured in, less those taken out, other than by flow points.
     pub(super) poured: i64,
     /// Surface of the liquid at rest beyond an absorbing border (units), or BOTTOMLESS.
@@ -112,6 +114,7 @@ impl Shallow {
         Ok(Self {
             remap: Remap::new(falls.map_or(0, |falls| falls.most)),
             falls: Falling::new(falls, pipes.links.len()),
+            thick: Thick::none(),
             params,
             flow,
             pipes,
@@ -171,7 +174,11 @@ impl Shallow {
 
     /// Memory of the columns, their pipes and what flows (bytes).
     pub fn bytes(&self) -> usize {
-        self.columns.bytes() + self.pipes.bytes() + self.flow.bytes() + self.falls.bytes()
+        self.columns.bytes()
+            + self.pipes.bytes()
+            + self.flow.bytes()
+            + self.falls.bytes()
+            + self.thick.bytes()
     }
 
     /// Simulated time (s).
@@ -276,8 +283,17 @@ impl Shallow {
         }
     }
 
-    /// The steps of a frame.
+    /// The steps of a frame, in which the liquid is as thick as what it carries makes it at the beginning.
     fn steps(&mut self, dt: f64, next: impl Fn(&Next) -> Option<f64>) -> Result<Report> {
+        let Self { params, thick, columns, flow, pipes, .. } = &mut *self;
+        let Some(law) = params.thickening else { return self.flow_on(dt, next) };
+        thick.begin(&law, columns, flow, pipes)?;
+        let report = self.flow_on(dt, next);
+        self.thick.end(&mut self.pipes);
+        report
+    }
+
+    fn flow_on(&mut self, dt: f64, next: impl Fn(&Next) -> Option<f64>) -> Result<Report> {
         let measures = self.measures();
         let mut report = Report::default();
         self.steps.clear();
