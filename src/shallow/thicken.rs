@@ -18,8 +18,9 @@ use crate::error::{Error, Result};
 pub struct Thickening {
     /// Which scalar: an age, of blood that clots; a dye, of what is mixed.
     pub scalar: usize,
-    /// Concentrations, in the scalar's own measure; `to` may be the lesser one.
+    /// Concentration up to which it is the liquid's, in the scalar's own measure.
     pub from: f64,
+    /// Concentration from which on it is `times` that; it may be the lesser one.
     pub to: f64,
     /// 1e-6 to 1e9.
     pub times: f64,
@@ -191,9 +192,9 @@ fn numbers_from<T: Copy + Default>(numbers: &[T], first: usize) -> [T; STRIP] {
 /// Makes pipes less open, by the mean viscosity at their ends.
 #[inline(always)]
 fn close(ends: &Ends, open: &mut [f32; STRIP]) {
-    for x in 0..STRIP {
+    for (x, open) in open.iter_mut().enumerate() {
         let depth = [ends.depth[0][x] as f32, ends.depth[1][x] as f32];
-        open[x] /= mean(depth, [ends.times[0][x], ends.times[1][x]]);
+        *open /= mean(depth, [ends.times[0][x], ends.times[1][x]]);
     }
 }
 

@@ -110,6 +110,7 @@ mod shallow {
     mod surface_lifts;
     mod surface_mesh;
     mod terrain;
+    mod thickening;
     mod threads;
     mod walls;
 }
