@@ -142,6 +142,8 @@ mod shallow_range;
 mod shallow_same;
 #[path = "gates/shallow_scalars.rs"]
 mod shallow_scalars;
+#[path = "gates/shallow_sleeping.rs"]
+mod shallow_sleeping;
 #[path = "gates/shallow_speed.rs"]
 mod shallow_speed;
 #[path = "gates/shallow_spread.rs"]
@@ -256,6 +258,7 @@ fn main() {
     shallow_scalars::run(&mut h);
     shallow_same::run(&mut h);
     shallow_speed::run(&mut h);
+    shallow_sleeping::run(&mut h);
     shallow_flooded::run(&mut h);
     shallow_terrain::run(&mut h);
     shallow_state::run(&mut h);

@@ -178,6 +178,7 @@ impl frz_shallow_params {
             border: meaning("border", "frz_shallow_border", self.border, &BORDERS)?,
             section: meaning("section", "frz_shallow_section", self.section, &SECTIONS)?,
             falls: None,
+            rest: Params::default().rest,
         };
         params.validate()?;
         Ok(params)

@@ -136,8 +136,16 @@ impl Shallow {
         if params.falls != self.params.falls {
             return Err(Error::argument("falls cannot change after the liquid was made"));
         }
+        if params != self.params {
+            self.flow.rouse();
+        }
         self.params = params;
         Ok(())
+    }
+
+    /// Whether pools at rest are worked on all the same, which takes longer, and changes nothing else: for comparison.
+    pub fn set_sleepless(&mut self, is_sleepless: bool) {
+        self.flow.set_sleepless(is_sleepless);
     }
 
     /// The columns.
@@ -197,6 +205,7 @@ impl Shallow {
     /// stands as high.
     pub fn fill(&mut self, height: f64) {
         self.still = self.columns.heights.round(height);
+        self.flow.rouse();
         let level = i64::from(self.still);
         for index in 0..self.columns.len() {
             if self.columns.is_column(index) {
@@ -272,7 +281,7 @@ impl Shallow {
         let measures = self.measures();
         let mut report = Report::default();
         self.steps.clear();
-        self.flow.begin_frame(&self.columns);
+        self.flow.begin_frame(&self.columns, &self.pipes, pace::bounds(&self.params, &measures));
         self.release();
         let halvings = self.find_fast(dt, &measures, &next);
         while report.seconds < dt {

@@ -371,6 +371,7 @@ pub fn random_params(dice: &mut Dice, step: f64) -> Params {
         border: [Border::Closed, Border::Open, Border::Absorbing][dice.below(3)],
         section: if dice.one_in(4) { Section::Whole } else { Section::Wetted },
         falls: None,
+        rest: Params::default().rest,
     }
 }
 

@@ -101,6 +101,7 @@ mod shallow {
     mod moving;
     mod probe;
     mod scalars;
+    mod sleeping;
     mod state;
     mod surface;
     mod surface_groups;

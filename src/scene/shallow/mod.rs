@@ -320,6 +320,7 @@ fn params(values: &Values) -> Params {
         },
         section: Section::default(),
         falls: None,
+        ..Params::default()
     }
 }
 
