@@ -16,7 +16,8 @@ const SETTLED: usize = 900;
 
 /// A resting domain, and one of which nine tenths rest.
 pub fn run(h: &mut Harness) {
-    if !h.wants("shallow.sleeping") && !h.wants("shallow.sleeping_stream") && !h.wants("shallow.same_asleep") {
+    if !h.wants("shallow.sleeping") && !h.wants("shallow.sleeping_stream") && !h.wants("shallow.same_asleep")
+    {
         return;
     }
     let cpu = format!("{:?}", cpu_level());
@@ -52,7 +53,8 @@ fn pool(has_stream: bool) -> Shallow {
         if !has_stream || z < wall - 2.0 * CELL { depth } else { 0.0 }
     });
     if has_stream {
-        let point = |kind, x, rate| FlowPoint { kind, at: [x, 0.003, 0.045], radius: 0.004, rate, pulse: None };
+        let point =
+            |kind, x, rate| FlowPoint { kind, at: [x, 0.003, 0.045], radius: 0.004, rate, pulse: None };
         let points = [point(Kind::Source, -0.045, 1e-6), point(Kind::Drain, 0.045, 1e-4)];
         liquid.set_flows(&points, |at| format!("point {at}")).expect("flow points");
     }

@@ -7,6 +7,7 @@
 
 mod clock;
 pub mod columns;
+pub mod detail;
 pub mod falls;
 pub mod flow;
 pub mod flows;
@@ -28,6 +29,7 @@ pub mod surface;
 pub mod system;
 pub mod terrain;
 
+pub use detail::Detail;
 pub use params::Params;
 pub use probe::{Reading, View};
 pub use remap::Moved;

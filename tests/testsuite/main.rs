@@ -95,6 +95,7 @@ mod snow {
 mod shallow {
     mod balance;
     mod border;
+    mod detail;
     mod falls;
     mod flooded;
     mod flow;

@@ -15,9 +15,8 @@ const FRAME: f64 = 1.0 / 60.0;
 fn pool(ctx: &Context, frames: usize) -> Shallow {
     let cell = 0.001;
     let solids = ground([90, 70], cell, [-0.01, 0.1], |at| 3e-4 * waves(at, cell));
-    let mut pool = covered(ctx, &solids, Params::default(), |[x, z], _| {
-        2e-3 + 4e-4 * waves([2.0 * z, 2.0 * x], cell)
-    });
+    let mut pool =
+        covered(ctx, &solids, Params::default(), |[x, z], _| 2e-3 + 4e-4 * waves([2.0 * z, 2.0 * x], cell));
     (0..frames).for_each(|_| drop(pool.step(ctx, FRAME).unwrap()));
     pool
 }
