@@ -97,12 +97,14 @@ mod shallow {
     mod border;
     mod detail;
     mod falls;
+    mod falls_scalars;
     mod flooded;
     mod flow;
     mod moving;
     mod probe;
     mod scalars;
     mod sleeping;
+    mod stains;
     mod state;
     mod surface;
     mod surface_groups;
