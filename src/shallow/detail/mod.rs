@@ -3,9 +3,11 @@
 //! Two liquids over one lattice of heights: a *fine* one whose ground is there in a box of cells only, the *near* part, and a *coarse* one whose ground is
 //! there in all others (`ground.rs`). What is not theirs is a wall. Along the edge of the box pipes of their own join them (`seam.rs`). A coarse unit is four
 //! fine ones, so volumes are counted in fine units; what makes no coarse unit waits, and is part of the balance. When the box moves, four
-//! fine columns become a coarse one, and back (`shift.rs`). Nothing is lost.
+//! fine columns become a coarse one, and back (`shift.rs`), and
+//! what flows goes on (`momentum.rs`). Nothing is lost.
 
 mod ground;
+mod momentum;
 mod seam;
 mod shift;
 
@@ -24,6 +26,7 @@ use crate::base::cpu::FlushDenormals;
 use crate::context::Context;
 use crate::error::{Error, Result};
 use ground::Ground;
+use momentum::Momentum;
 use seam::Seam;
 use shift::Shift;
 
@@ -40,6 +43,7 @@ pub struct Detail {
     ground: Ground,
     seam: Seam,
     shift: Shift,
+    momentum: Momentum,
     /// The near cells.
     near: Cells,
     /// What of each coarse cell is no coarse unit (fine units), 0 and up.
@@ -76,6 +80,7 @@ impl Detail {
             ground,
             seam: Seam::default(),
             shift: Shift::default(),
+            momentum: Momentum::default(),
             near,
             points: Vec::new(),
         };
@@ -107,9 +112,13 @@ impl Detail {
         if near == self.near {
             return Ok(());
         }
+        let mut momentum = std::mem::take(&mut self.momentum);
+        momentum.begin(self, &self.near, shift::changed(&self.near, &near));
         let old = std::mem::replace(&mut self.near, near);
         self.convert(&old)?;
         self.seam.find(&self.fine, &self.coarse, &self.near);
+        momentum.end(self);
+        self.momentum = momentum;
         self.route();
         Ok(())
     }
@@ -278,9 +287,10 @@ impl Detail {
             if steps == 0 && left / length > f64::from(MOST_STEPS) {
                 return Err(Error::argument(format!("a frame of {dt} s would take steps of {length} s")));
             }
+            seam.begin_step(fine, coarse, &measures[0], length);
             fine.advance(&measures[0], length, &mut report);
             coarse.advance(&measures[1], length, &mut report);
-            seam.step(fine, coarse, rest, &measures[0], length);
+            seam.end_step(fine, coarse, rest);
             report.steps = steps + 1;
             report.seconds = if length >= left { dt } else { report.seconds + length };
         }

@@ -2,11 +2,12 @@
 //!
 //! Each leads from a fine cell over its side to the coarse one beyond: Eq. 4.1 and 4.5 over the distance of their middles, 1.5 cells, through the section of
 //! the fine cell. The coarse surface is taken beside the fine cell's middle, a quarter of a coarse cell aside, where the coarse columns along the edge
-//! say how it leans: or a film that runs along the edge would swing across it. They come after the pipes of both liquids, from the surfaces that these leave.
+//! say how it leans: or a film that runs along the edge would swing across it.
 
 use super::{Cells, FINE};
 use crate::shallow::Shallow;
 use crate::shallow::columns::{Columns, NONE};
+use crate::shallow::flow::fast;
 use crate::shallow::flow::flux::{Kind, Of, Step, flux_of, split};
 use crate::shallow::pace::{self, Measures};
 use crate::shallow::scalars::MOST;
@@ -47,6 +48,8 @@ pub(super) struct Seam {
     /// What each of these gives or takes (fine units), then by which factor it does so.
     sums: [Vec<f64>; 2],
     factors: [Vec<f32>; 2],
+    /// Whether a pipe is to move something in this step.
+    is_moving: bool,
     /// Length of the step in whose measure fluxes are (s).
     last: f64,
 }
@@ -132,20 +135,32 @@ impl Seam {
         }
     }
 
-    /// One step of a length (s).
-    pub fn step(
-        &mut self,
-        fine: &mut Shallow,
-        coarse: &mut Shallow,
-        rest: &mut [i64],
-        measures: &Measures,
-        length: f64,
-    ) {
+    /// The flux of the pipe of a fine column over a side (fine units a step); 0 where there is none.
+    pub fn flux(&self, column: usize, axis: usize, way: i32) -> f32 {
+        self.find_pipe(column, axis, way).map_or(0.0, |pipe| self.pipes[pipe].flux)
+    }
+
+    /// Changes that flux, if there is a pipe.
+    pub fn set_flux(&mut self, column: usize, axis: usize, way: i32, flux: f32) {
+        if let Some(pipe) = self.find_pipe(column, axis, way) {
+            self.pipes[pipe].flux = flux;
+        }
+    }
+
+    fn find_pipe(&self, column: usize, axis: usize, way: i32) -> Option<usize> {
+        let wanted = (axis, way, column as u32);
+        let key = |pipe: &Pipe| (pipe.axis, pipe.way, pipe.ends[0]);
+        let pipe = self.pipes.partition_point(|pipe| key(pipe) < wanted);
+        self.pipes.get(pipe).filter(|pipe| key(pipe) == wanted).map(|_| pipe)
+    }
+
+    /// Finds the fluxes of a step of a length (s), from the surfaces before it, as those of all other pipes: from later ones waves would grow.
+    pub fn begin_step(&mut self, fine: &Shallow, coarse: &Shallow, measures: &Measures, length: f64) {
         let step = pace::step(&fine.params, measures, length, self.last);
         let step = Step { drive: step.drive / APART, ..step };
         self.last = length;
         let (viscous, thins) = (step.drag > 0.0, step.drag > 0.0 && step.thinning.is_some());
-        let any = match (viscous, step.is_whole, thins) {
+        self.is_moving = match (viscous, step.is_whole, thins) {
             (true, true, true) => self.drive::<Of<true, true, true>>(&step, fine, coarse),
             (true, true, false) => self.drive::<Of<true, true, false>>(&step, fine, coarse),
             (true, false, true) => self.drive::<Of<true, false, true>>(&step, fine, coarse),
@@ -153,7 +168,11 @@ impl Seam {
             (false, true, _) => self.drive::<Of<false, true, false>>(&step, fine, coarse),
             (false, false, _) => self.drive::<Of<false, false, false>>(&step, fine, coarse),
         };
-        if any {
+    }
+
+    /// Moves what is to cross the edge, of what the step has left.
+    pub fn end_step(&mut self, fine: &mut Shallow, coarse: &mut Shallow, rest: &mut [i64]) {
+        if self.is_moving {
             self.scale(true, fine, coarse);
             self.scale(false, fine, coarse);
             self.move_units(fine, coarse, rest);
@@ -190,7 +209,8 @@ impl Seam {
             let tilt = (APART * step.tilt[pipe.axis] as f32) as i32 * pipe.way;
             let fall = bases[i] + depth[0] - eta - (pipe.side * rise) / 8 + tilt;
             let depth = depth.map(|depth| depth as f32);
-            pipe.flux = flux_of::<K>(step, fall, depth, pipe.flux, pipe.open, 1.0);
+            let light = if K::VISCOUS && !K::WHOLE { fast::light(step, depth, pipe.flux) } else { 1.0 };
+            pipe.flux = flux_of::<K>(step, fall, depth, pipe.flux, pipe.open, light);
             [pipe.transfer, pipe.left] = split(pipe.flux, pipe.left);
             any |= pipe.transfer != 0.0;
         }

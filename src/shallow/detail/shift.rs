@@ -41,9 +41,14 @@ impl Detail {
             self.take_fine(&cells, &mut shift.leaving);
         }
         for cells in beyond(&new_coarse, &old_coarse) {
-            self.take_coarse(&cells, &mut shift.entering);
+            self.find_coarse(&cells, &mut shift.entering);
         }
-        for cells in beyond(&old_coarse, &new_coarse).into_iter().chain(beyond(&new_coarse, &old_coarse)) {
+        for Moving { cell, layer, .. } in &shift.entering {
+            if let Some(column) = self.coarse.columns.column(*cell, *layer) {
+                take(&mut self.coarse, column);
+            }
+        }
+        for cells in changed(&old_coarse, &new_coarse) {
             let Self { fine, coarse, ground, .. } = self;
             lay(coarse, &cells, |cell| ground.coarse_cell(&near, cell))?;
             lay(fine, &cells.map(|range| 2 * range.start..2 * range.end), |cell| {
@@ -80,10 +85,9 @@ impl Detail {
         }
     }
 
-    /// Takes what is in coarse columns, and how its surface leans.
-    fn take_coarse(&mut self, cells: &Cells, out: &mut Vec<Moving>) {
-        let coarse = &mut self.coarse;
-        let first = out.len();
+    /// Finds what is in coarse columns, and how its surface leans.
+    fn find_coarse(&self, cells: &Cells, out: &mut Vec<Moving>) {
+        let coarse = &self.coarse;
         for cell in each(cells) {
             let mut layer = 0;
             while let Some(column) = coarse.columns.column(cell, layer) {
@@ -92,11 +96,6 @@ impl Detail {
                 let rises = lean(coarse, cell, layer, eta);
                 out.push(Moving { cell, layer, units, eta, rises });
                 layer += 1;
-            }
-        }
-        for moving in &out[first..] {
-            if let Some(column) = coarse.columns.column(moving.cell, moving.layer) {
-                take(coarse, column);
             }
         }
     }
@@ -217,6 +216,11 @@ fn lay<'a>(
 /// The fine cells of a coarse one.
 fn quarters([x, z]: [usize; 2]) -> [[usize; 2]; 4] {
     [[0, 0], [1, 0], [0, 1], [1, 1]].map(|[dx, dz]| [2 * x + dx, 2 * z + dz])
+}
+
+/// The boxes of fine cells that are near in one of two boxes only; some may be empty.
+pub(super) fn changed(old: &Cells, new: &Cells) -> impl Iterator<Item = Cells> {
+    beyond(old, new).into_iter().chain(beyond(new, old))
 }
 
 fn halved(range: &std::ops::Range<usize>) -> std::ops::Range<usize> {

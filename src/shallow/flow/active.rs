@@ -32,6 +32,8 @@ pub struct Active {
     /// Whether what is in each strip may move: an active one whose neighbours rest, too, is asleep.
     moving: Vec<bool>,
     asleep: Vec<bool>,
+    /// Whether one may be asleep.
+    any_asleep: bool,
     /// Whether nothing of a row, nor its links, may move: steps pass over it.
     resting: Vec<bool>,
     /// Greatest depth of the strips of each row that are asleep (units).
@@ -58,6 +60,7 @@ impl Active {
             active: vec![false; strips],
             moving: vec![false; strips],
             asleep: vec![false; strips],
+            any_asleep: false,
             resting: vec![false; rows],
             asleep_depths: vec![0; rows],
             linked: Vec::new(),
@@ -191,6 +194,11 @@ impl Active {
     /// Whether that is so of all rows.
     pub fn all_rest(&self) -> bool {
         !self.resting.contains(&false)
+    }
+
+    /// Whether a strip may be asleep.
+    pub fn may_sleep(&self) -> bool {
+        self.any_asleep
     }
 
     /// Greatest depths of the strips of all rows that are asleep (units).
@@ -352,9 +360,9 @@ impl Active {
             }
         }
         // What began to move beside a strip that is asleep wakes it.
-        let any_asleep = self.asleep.contains(&true);
+        self.any_asleep = self.asleep.contains(&true);
         for row in 0..rows {
-            for strip in if any_asleep && self.counts[row] > 0 { columns.row(row) } else { 0..0 } {
+            for strip in if self.any_asleep && self.counts[row] > 0 { columns.row(row) } else { 0..0 } {
                 if self.moving[strip] {
                     self.for_each_beside(columns, strip, |active, other| active.rouse(columns, other));
                 }
@@ -363,7 +371,7 @@ impl Active {
         for row in 0..rows {
             for strip in if self.counts[row] > 0 { columns.row(row) } else { 0..0 } {
                 if self.is_awake(strip) && !self.is_beside(columns, strip, &self.moving) {
-                    self.asleep[strip] = true;
+                    (self.asleep[strip], self.any_asleep) = (true, true);
                     self.make_stale(row);
                 }
             }

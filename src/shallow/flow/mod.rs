@@ -369,7 +369,9 @@ impl Flow {
             self.amounts.settle(&stepped.carried);
             (stepped.scaled, stepped.outside, stepped.carried) = Default::default();
         }
-        self.stir(columns, &pipes.links);
+        if self.active.may_sleep() {
+            self.stir(columns, &pipes.links);
+        }
         self.last = dt;
         scaled
     }

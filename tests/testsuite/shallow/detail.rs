@@ -139,7 +139,7 @@ fn film(slope: f64, near: [std::ops::Range<usize>; 2]) -> (Detail, f64) {
     let params = Params { kept: 1.0, border: Border::Open, pace: Pace::Exact, ..Params::default() };
     let mut detail = Detail::new(&context(), &solids, params, near).unwrap();
     // A source a coarse cell: each a row of it.
-    let discharge = 2e-6;
+    let discharge = 1e-5;
     let points: Vec<FlowPoint> = (0..16)
         .map(|row| {
             let at = [-0.0395, 0.03 + 0.0395 * slope, -0.008 + 0.001 * (row as f64 + 0.5)];
@@ -157,7 +157,7 @@ fn a_film_crosses_the_edge_both_ways() {
     let ctx = context();
     for slope in [0.1, 0.5] {
         let (mut detail, theory) = film(slope, [60..100, 0..32]);
-        for _ in 0..300 {
+        for _ in 0..480 {
             detail.step(&ctx, FRAME).unwrap();
         }
         let profile = profile(&detail, 0..32);
@@ -175,7 +175,7 @@ fn a_film_crosses_the_edge_both_ways() {
 fn a_film_runs_along_the_edge() {
     let ctx = context();
     let (mut detail, theory) = film(0.3, [0..160, 8..24]);
-    for _ in 0..300 {
+    for _ in 0..480 {
         detail.step(&ctx, FRAME).unwrap();
     }
     let mut worst: f64 = 0.0;
