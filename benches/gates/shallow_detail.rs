@@ -76,7 +76,8 @@ fn cost(h: &mut Harness) {
     let (cell, size) = (0.0005, [200; 2]);
     let solids = ground(size, cell, [-0.01, 0.1], |at @ [x, _]| 0.01 - 0.1 * x + 1e-4 * waves(at, cell));
     let mut fine = covered(&ctx, &solids, Params::default(), |_, _| 1e-3);
-    let mut detail = Detail::new(&ctx, &solids, Params::default(), [50..150, 50..150]).expect("a liquid");
+    // Strips of 16 cells begin at 48.
+    let mut detail = Detail::new(&ctx, &solids, Params::default(), [48..144, 48..152]).expect("a liquid");
     for index in 0..100 * 100 {
         let [x, z] = [index % 100, index / 100].map(|at| -0.05 + 0.001 * (at as f64 + 0.5));
         detail.pour_at([x, 0.01 - 0.1 * x, z], 0.0004, 1e-9).expect("liquid");

@@ -74,3 +74,28 @@ fn mean(four: [&[Solid]; 4]) -> Vec<Solid> {
     unite(&mut solids);
     solids
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::shallow::grid::Heights;
+
+    #[test]
+    fn coarse_ground_is_the_mean_of_each_layer() {
+        let grid = Grid { cell: 1.0, origin: [0.0; 2], size: [4, 2] };
+        let heights = Heights::between(0.0, 1.0).unwrap();
+        let cell = |index: usize| match index {
+            0 => vec![[BOTTOMLESS, 10], [50, 60]],
+            1 | 4 => vec![[BOTTOMLESS, 12]],
+            5 => vec![[BOTTOMLESS, 13], [52, 63]],
+            _ => vec![[0, 7]],
+        };
+        let ground = Ground::new(&Solids::new(grid, heights, (0..8).map(cell)));
+        assert_eq!((ground.coarse.grid.cell, ground.coarse.grid.size), (2.0, [2, 1]));
+        assert_eq!(ground.coarse.cell(0), [[BOTTOMLESS, 11], [51, 61]]);
+        assert_eq!(ground.coarse.cell(1), [[0, 7]]);
+        let near = [2..4, 0..2];
+        assert_eq!((ground.fine_cell(&near, [2, 1]), ground.fine_cell(&near, [1, 1])), (&[[0, 7]][..], WALL));
+        assert_eq!((ground.coarse_cell(&near, [1, 0]), ground.coarse_cell(&near, [0, 0]).len()), (WALL, 2));
+    }
+}

@@ -45,9 +45,12 @@ pub(super) struct Seam {
     /// Columns of both liquids that have such pipes, each once, and the place among them of each pipe's ends.
     columns: [Vec<u32>; 2],
     places: Vec<[u32; 2]>,
-    /// What each of these gives or takes (fine units), then by which factor it does so.
-    sums: [Vec<f64>; 2],
+    /// What each of these gives, and takes (fine units), then by which factor it does so.
+    gives: [Vec<f64>; 2],
+    takes: [Vec<f64>; 2],
     factors: [Vec<f32>; 2],
+    /// Cell of each coarse one (`Grid::index`).
+    cells: Vec<u32>,
     /// Whether a pipe is to move something in this step.
     is_moving: bool,
     /// Length of the step in whose measure fluxes are (s).
@@ -83,9 +86,15 @@ impl Seam {
             columns.extend(self.pipes.iter().map(|pipe| pipe.ends[end]));
             columns.sort_unstable();
             columns.dedup();
-            self.sums[end].resize(columns.len(), 0.0);
+            for sums in [&mut self.gives[end], &mut self.takes[end]] {
+                sums.clear();
+                sums.resize(columns.len(), 0.0);
+            }
             self.factors[end].resize(columns.len(), 1.0);
         }
+        let cell = |&column: &u32| coarse.columns.grid.index(coarse.columns.cell(column as usize)) as u32;
+        self.cells.clear();
+        self.cells.extend(self.columns[1].iter().map(cell));
         let place =
             |end: usize, column: u32| self.columns[end].partition_point(|&other| other < column) as u32;
         self.places.clear();
@@ -172,19 +181,24 @@ impl Seam {
 
     /// Moves what is to cross the edge, of what the step has left.
     pub fn end_step(&mut self, fine: &mut Shallow, coarse: &mut Shallow, rest: &mut [i64]) {
-        if self.is_moving {
-            self.scale(true, fine, coarse);
-            self.scale(false, fine, coarse);
-            self.move_units(fine, coarse, rest);
+        if !self.is_moving {
+            return;
         }
+        for gives in [true, false] {
+            if self.is_beyond(gives, fine, coarse) {
+                self.scale(gives);
+            }
+        }
+        self.move_units(fine, coarse, rest);
     }
 
     /// Finds all fluxes and transfers; whether there is one.
     fn drive<K: Kind>(&mut self, step: &Step, fine: &Shallow, coarse: &Shallow) -> bool {
         let (bases, coarse_bases) = (fine.columns.bases(), coarse.columns.bases());
         let (depths, coarse_depths) = (fine.flow.depths(), coarse.flow.depths());
+        let Self { pipes, places, gives, takes, .. } = self;
         let mut any = false;
-        for pipe in &mut self.pipes {
+        for (pipe, place) in pipes.iter_mut().zip(places) {
             let [i, j] = pipe.ends.map(|end| end as usize);
             let depth = [depths[i], coarse_depths[j]];
             if depth == [0; 2] {
@@ -212,59 +226,77 @@ impl Seam {
             let light = if K::VISCOUS && !K::WHOLE { fast::light(step, depth, pipe.flux) } else { 1.0 };
             pipe.flux = flux_of::<K>(step, fall, depth, pipe.flux, pipe.open, light);
             [pipe.transfer, pipe.left] = split(pipe.flux, pipe.left);
-            any |= pipe.transfer != 0.0;
+            if pipe.transfer != 0.0 {
+                any = true;
+                add(gives, takes, place, pipe.transfer);
+            }
         }
         any
     }
 
-    /// Multiplies transfers by K_min of the columns that give, or by K_max of those that take, as if nothing left them.
-    fn scale(&mut self, gives: bool, fine: &Shallow, coarse: &Shallow) {
-        let Self { pipes, places, sums, factors, columns, .. } = self;
-        // Whole numbers, whose sums do not depend on their order.
-        for (pipe, places) in pipes.iter().zip(&*places) {
-            let end = usize::from((pipe.transfer > 0.0) != gives);
-            sums[end][places[end] as usize] += f64::from(pipe.transfer.abs().ceil());
-        }
+    /// Finds K_min of the columns that give, or K_max of those that take, as if nothing left them; whether one is under 1.
+    fn is_beyond(&mut self, gives: bool, fine: &Shallow, coarse: &Shallow) -> bool {
+        let Self { gives: given, takes: taken, factors, columns, .. } = self;
+        let sums = if gives { given } else { taken };
+        let mut any = false;
         for (end, liquid) in [fine, coarse].into_iter().enumerate() {
             let each = if end == 0 { 1.0 } else { FINE as f64 };
-            for ((sum, factor), &column) in sums[end].iter_mut().zip(&mut factors[end]).zip(&columns[end]) {
-                let (column, sum) = (column as usize, std::mem::take(sum));
+            for ((&sum, factor), &column) in sums[end].iter().zip(&mut factors[end]).zip(&columns[end]) {
+                let column = column as usize;
                 let depth = liquid.flow.depths()[column];
                 let room = liquid.columns.ceilings()[column] - liquid.columns.bases()[column] - depth;
                 // A coarse column may take less than a unit more than it is given.
                 let has = if gives { depth } else { room - 1 };
                 let has = each * f64::from(has.max(0));
                 *factor = if sum > has { (has / sum) as f32 * MARGIN } else { 1.0 };
+                any |= sum > has;
             }
         }
-        for (pipe, places) in pipes.iter_mut().zip(&*places) {
+        any
+    }
+
+    /// Multiplies transfers by the factors of the columns that give, or of those that take.
+    fn scale(&mut self, gives: bool) {
+        let Self { pipes, places, gives: given, takes: taken, factors, .. } = self;
+        given.iter_mut().chain(&mut *taken).for_each(|sums| sums.fill(0.0));
+        for (pipe, places) in pipes.iter_mut().zip(places) {
             let end = usize::from((pipe.transfer > 0.0) != gives);
             let factor = factors[end][places[end] as usize];
             if factor < 1.0 {
-                pipe.transfer *= factor;
+                pipe.transfer = (pipe.transfer * factor).trunc();
                 pipe.flux *= factor;
             }
+            add(given, taken, places, pipe.transfer);
         }
     }
 
     /// Moves whole fine units; what makes no coarse one waits in its cell.
     fn move_units(&mut self, fine: &mut Shallow, coarse: &mut Shallow, rest: &mut [i64]) {
-        let Self { pipes, places, sums, columns, .. } = self;
-        for (pipe, places) in pipes.iter().zip(&*places) {
-            let units = f64::from(pipe.transfer.trunc());
-            sums[0][places[0] as usize] -= units;
-            sums[1][places[1] as usize] += units;
+        let Self { gives, takes, columns, cells, .. } = self;
+        let [(fine_gives, fine_takes), (gives, takes)] = [0, 1].map(|end| (&gives[end], &takes[end]));
+        for ((gives, takes), &column) in fine_gives.iter().zip(fine_takes).zip(&columns[0]) {
+            change(fine, column as usize, (takes - gives) as i64);
         }
-        for (sum, &column) in sums[0].iter_mut().zip(&columns[0]) {
-            change(fine, column as usize, std::mem::take(sum) as i64);
-        }
-        for (sum, &column) in sums[1].iter_mut().zip(&columns[1]) {
-            let units = std::mem::take(sum) as i64;
-            let rest = &mut rest[coarse.columns.grid.index(coarse.columns.cell(column as usize))];
-            let all = *rest + units;
+        for (((gives, takes), &column), &cell) in gives.iter().zip(takes).zip(&columns[1]).zip(&*cells) {
+            let rest = &mut rest[cell as usize];
+            let all = *rest + (takes - gives) as i64;
             *rest = all.rem_euclid(FINE);
             change(coarse, column as usize, all.div_euclid(FINE));
         }
+        self.gives.iter_mut().chain(&mut self.takes).for_each(|sums| sums.fill(0.0));
+    }
+}
+
+/// Adds a transfer to the sums of both ends: whole numbers, whose sums do not depend on their order.
+fn add(gives: &mut [Vec<f64>; 2], takes: &mut [Vec<f64>; 2], places: &[u32; 2], transfer: f32) {
+    let [fine, coarse] = places.map(|place| place as usize);
+    let units = f64::from(transfer.abs());
+    if transfer > 0.0 {
+        gives[0][fine] += units;
+        takes[1][coarse] += units;
+    } else {
+        gives[1][coarse] += units;
+        takes[0][fine] += units;
     }
 }
 

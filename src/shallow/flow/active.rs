@@ -38,6 +38,8 @@ pub struct Active {
     resting: Vec<bool>,
     /// Greatest depth of the strips of each row that are asleep (units).
     asleep_depths: Vec<i32>,
+    /// Whether a column of each strip has room for liquid: walls are never active.
+    has_room: Vec<bool>,
     /// The strips that links lead to from each strip, and where those of each begin.
     linked: Vec<u32>,
     linked_starts: Vec<u32>,
@@ -63,6 +65,7 @@ impl Active {
             any_asleep: false,
             resting: vec![false; rows],
             asleep_depths: vec![0; rows],
+            has_room: (0..strips).map(|strip| has_room(columns, strip)).collect(),
             linked: Vec::new(),
             linked_starts: Vec::new(),
             rows: vec![0; rows + 1],
@@ -92,7 +95,8 @@ impl Active {
     ) {
         let old = self.rows[rows.start] as usize..self.rows[rows.end] as usize;
         let new = columns.row(rows.start).start..columns.row(rows.end - 1).end;
-        for flags in [&mut self.wet, &mut self.active, &mut self.moving, &mut self.asleep] {
+        for flags in [&mut self.wet, &mut self.active, &mut self.moving, &mut self.asleep, &mut self.has_room]
+        {
             resize_part(flags, old.clone(), new.len(), false);
         }
         resize_part(&mut self.spans, old.clone(), new.len(), Span::default());
@@ -103,6 +107,7 @@ impl Active {
         for strip in new.clone() {
             self.wet[strip] = strip_of(depth, strip).iter().any(|&depth| depth > 0);
             (self.active[strip], self.moving[strip]) = (false, false);
+            self.has_room[strip] = has_room(columns, strip);
         }
         let count = columns.grid.size[1];
         let around = rows.start.saturating_sub(1)..(rows.end + 1).min(count);
@@ -155,7 +160,7 @@ impl Active {
 
     /// Memory (bytes).
     pub fn bytes(&self) -> usize {
-        let flags = 4 * self.wet.len() + 2 * self.stale.len() + size_of_val(&self.asleep_depths[..]);
+        let flags = 5 * self.wet.len() + 2 * self.stale.len() + size_of_val(&self.asleep_depths[..]);
         let lists = [&self.linked, &self.linked_starts, &self.rows, &self.counts];
         flags + lists.iter().map(|list| size_of_val(&list[..])).sum::<usize>() + size_of_val(&self.spans[..])
     }
@@ -298,7 +303,7 @@ impl Active {
     }
 
     fn activate(&mut self, columns: &Columns, strip: usize) {
-        if !self.active[strip] || self.asleep[strip] {
+        if self.has_room[strip] && (!self.active[strip] || self.asleep[strip]) {
             (self.active[strip], self.asleep[strip]) = (true, false);
             self.make_stale(columns.strips()[strip].row as usize);
         }
@@ -456,6 +461,11 @@ impl Active {
         }
         self.counts[row] = count as u32;
     }
+}
+
+fn has_room(columns: &Columns, strip: usize) -> bool {
+    let (base, ceiling) = (strip_of(columns.bases(), strip), strip_of(columns.ceilings(), strip));
+    base.iter().zip(ceiling).any(|(base, ceiling)| base < ceiling)
 }
 
 /// Runs of strips that are marked.
