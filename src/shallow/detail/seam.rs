@@ -5,10 +5,12 @@
 //! say how it leans: or a film that runs along the edge would swing across it.
 
 use super::{Cells, FINE};
+use crate::base::cpu::dispatch;
 use crate::shallow::Shallow;
 use crate::shallow::columns::{Columns, NONE};
 use crate::shallow::flow::fast;
 use crate::shallow::flow::flux::{Kind, Of, Step, flux_of, split};
+use crate::shallow::grid::TOP;
 use crate::shallow::pace::{self, Measures};
 use crate::shallow::scalars::MOST;
 
@@ -51,6 +53,8 @@ pub(super) struct Seam {
     factors: [Vec<f32>; 2],
     /// Cell of each coarse one (`Grid::index`).
     cells: Vec<u32>,
+    /// Whether a column has a ceiling.
+    has_ceilings: bool,
     /// Whether a pipe is to move something in this step.
     is_moving: bool,
     /// Length of the step in whose measure fluxes are (s).
@@ -93,6 +97,10 @@ impl Seam {
             self.factors[end].resize(columns.len(), 1.0);
         }
         let cell = |&column: &u32| coarse.columns.grid.index(coarse.columns.cell(column as usize)) as u32;
+        let is_open = |(liquid, columns): (&Shallow, &Vec<u32>)| {
+            columns.iter().all(|&column| liquid.columns.ceilings()[column as usize] == TOP)
+        };
+        self.has_ceilings = ![fine, coarse].into_iter().zip(&self.columns).all(is_open);
         self.cells.clear();
         self.cells.extend(self.columns[1].iter().map(cell));
         let place =
@@ -168,15 +176,23 @@ impl Seam {
         let step = pace::step(&fine.params, measures, length, self.last);
         let step = Step { drive: step.drive / APART, ..step };
         self.last = length;
-        let (viscous, thins) = (step.drag > 0.0, step.drag > 0.0 && step.thinning.is_some());
-        self.is_moving = match (viscous, step.is_whole, thins) {
-            (true, true, true) => self.drive::<Of<true, true, true>>(&step, fine, coarse),
-            (true, true, false) => self.drive::<Of<true, true, false>>(&step, fine, coarse),
-            (true, false, true) => self.drive::<Of<true, false, true>>(&step, fine, coarse),
-            (true, false, false) => self.drive::<Of<true, false, false>>(&step, fine, coarse),
-            (false, true, _) => self.drive::<Of<false, true, false>>(&step, fine, coarse),
-            (false, false, _) => self.drive::<Of<false, false, false>>(&step, fine, coarse),
-        };
+        /// A copy for each kind of flow and each set of instructions.
+        macro_rules! run {
+            ($($viscous:literal $whole:literal $thins:literal)*) => {
+                match (step.drag > 0.0, step.is_whole, step.drag > 0.0 && step.thinning.is_some()) {
+                    $(($viscous, $whole, $thins) => {
+                        #[inline(always)]
+                        fn body(seam: &mut Seam, step: &Step, fine: &Shallow, coarse: &Shallow) -> bool {
+                            seam.drive::<Of<$viscous, $whole, $thins>>(step, fine, coarse)
+                        }
+                        let (seam, step) = (&mut *self, &step);
+                        dispatch!(body(seam: &mut Seam, step: &Step, fine: &Shallow, coarse: &Shallow) -> bool)
+                    })*
+                    (false, _, true) => unreachable!("only viscosity thins"),
+                }
+            };
+        }
+        self.is_moving = run!(true true true true true false true false true true false false false true false false false false);
     }
 
     /// Moves what is to cross the edge, of what the step has left.
@@ -185,7 +201,7 @@ impl Seam {
             return;
         }
         for gives in [true, false] {
-            if self.is_beyond(gives, fine, coarse) {
+            if (gives || self.has_ceilings) && self.is_beyond(gives, fine, coarse) {
                 self.scale(gives);
             }
         }
@@ -193,6 +209,7 @@ impl Seam {
     }
 
     /// Finds all fluxes and transfers; whether there is one.
+    #[inline(always)]
     fn drive<K: Kind>(&mut self, step: &Step, fine: &Shallow, coarse: &Shallow) -> bool {
         let (bases, coarse_bases) = (fine.columns.bases(), coarse.columns.bases());
         let (depths, coarse_depths) = (fine.flow.depths(), coarse.flow.depths());
@@ -239,6 +256,7 @@ impl Seam {
         let Self { gives: given, takes: taken, factors, columns, .. } = self;
         let sums = if gives { given } else { taken };
         let mut any = false;
+        factors.iter_mut().for_each(|factors| factors.fill(1.0));
         for (end, liquid) in [fine, coarse].into_iter().enumerate() {
             let each = if end == 0 { 1.0 } else { FINE as f64 };
             for ((&sum, factor), &column) in sums[end].iter().zip(&mut factors[end]).zip(&columns[end]) {
@@ -248,8 +266,10 @@ impl Seam {
                 // A coarse column may take less than a unit more than it is given.
                 let has = if gives { depth } else { room - 1 };
                 let has = each * f64::from(has.max(0));
-                *factor = if sum > has { (has / sum) as f32 * MARGIN } else { 1.0 };
-                any |= sum > has;
+                // Few are.
+                if sum > has {
+                    (*factor, any) = ((has / sum) as f32 * MARGIN, true);
+                }
             }
         }
         any
