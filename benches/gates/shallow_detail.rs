@@ -1,6 +1,7 @@
 //! Gates of shallow's level of detail: nothing is lost while the near cells move about, and what a domain costs of which a quarter is near.
 
 use frazil::base::cpu::cpu_level;
+use frazil::shallow::detail::Cells;
 use frazil::shallow::flows::{FlowPoint, Kind, Pulse};
 use frazil::shallow::pipes::Border;
 use frazil::shallow::{Detail, Params};
@@ -19,8 +20,14 @@ pub fn run(h: &mut Harness) {
     if h.wants("shallow.detail_mass") {
         mass(h);
     }
-    if h.wants("shallow.detail_cost") {
-        cost(h);
+    // Strips of 16 cells begin at the near cells' sides.
+    for (name, edge, near) in [
+        ("shallow.detail_cost", 1000, [240..752, 256..744]),
+        ("shallow.detail_cost_small", 200, [48..144, 48..152]),
+    ] {
+        if h.wants(name) {
+            cost(h, name, edge, near);
+        }
     }
 }
 
@@ -70,20 +77,23 @@ fn mass(h: &mut Harness) {
     h.gate("shallow.detail_mass", worst as f64, &note);
 }
 
-/// The time of a frame over that of all cells being fine, which takes turns.
-fn cost(h: &mut Harness) {
+/// The time of a frame over that of all cells being fine, in turns: on a domain of so many cells along an edge, of which a quarter is near.
+fn cost(h: &mut Harness, name: &str, edge: usize, near: Cells) {
     let ctx = context();
-    let (cell, size) = (0.0005, [200; 2]);
-    let solids = ground(size, cell, [-0.01, 0.1], |at @ [x, _]| 0.01 - 0.1 * x + 1e-4 * waves(at, cell));
+    let cell = 0.0005;
+    let low = -0.5 * edge as f64 * cell;
+    let height = move |x: f64| 0.01 + 0.05 * (-low - x);
+    let solids = ground([edge; 2], cell, [-0.01, 0.1], |at @ [x, _]| height(x) + 1e-4 * waves(at, cell));
     let mut fine = covered(&ctx, &solids, Params::default(), |_, _| 1e-3);
-    // Strips of 16 cells begin at 48.
-    let mut detail = Detail::new(&ctx, &solids, Params::default(), [48..144, 48..152]).expect("a liquid");
-    for index in 0..100 * 100 {
-        let [x, z] = [index % 100, index / 100].map(|at| -0.05 + 0.001 * (at as f64 + 0.5));
-        detail.pour_at([x, 0.01 - 0.1 * x, z], 0.0004, 1e-9).expect("liquid");
+    let share = [0, 1].map(|axis| near[axis].len()).iter().product::<usize>() as f64 / (edge * edge) as f64;
+    let mut detail = Detail::new(&ctx, &solids, Params::default(), near).expect("a liquid");
+    let half = edge / 2;
+    for index in 0..half * half {
+        let [x, z] = [index % half, index / half].map(|at| low + 2.0 * cell * (at as f64 + 0.5));
+        detail.pour_at([x, height(x), z], 0.8 * cell, 4e-3 * cell * cell).expect("liquid");
     }
     let mut times = [Vec::new(), Vec::new()];
-    for _ in 0..240 {
+    for _ in 0..if edge < 500 { 240 } else { 60 } {
         let start = thread_seconds();
         fine.step(&ctx, FRAME).expect("a frame");
         let middle = thread_seconds();
@@ -92,6 +102,10 @@ fn cost(h: &mut Harness) {
         times[1].push(1e3 * (thread_seconds() - middle));
     }
     let [fine, detail] = times.map(median);
-    let note = format!("{:?} {detail:.3} of {fine:.3} ms", cpu_level());
-    h.gate("shallow.detail_cost", detail / fine, &note);
+    let note = format!(
+        "{:?} {detail:.3} of {fine:.3} ms, {edge} x {edge} cells, {:.1} % near",
+        cpu_level(),
+        100.0 * share
+    );
+    h.gate(name, detail / fine, &note);
 }
