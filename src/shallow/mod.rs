@@ -14,6 +14,7 @@ pub mod flows;
 pub mod grid;
 mod identity;
 pub mod liquid;
+pub mod loads;
 pub mod pace;
 pub mod params;
 mod per_column;
@@ -31,6 +32,7 @@ pub mod system;
 pub mod terrain;
 
 pub use detail::Detail;
+pub use loads::Load;
 pub use params::Params;
 pub use probe::{Reading, View};
 pub use remap::Moved;

@@ -222,6 +222,7 @@ mod tests {
             units: 1,
             source: 0,
             tick: 0,
+            amounts: [0; crate::shallow::scalars::MOST],
         };
         for _ in 0..10_000 {
             match air.fly(&mut packet, dt) {

@@ -37,6 +37,7 @@ use fast::{Fast, Films};
 use flux::Step;
 use links::LinkFlow;
 use lips::Lips;
+pub(super) use network::SLACK;
 use network::{Network, State};
 use parts::Part;
 use rest::{Bounds, Still};
