@@ -47,7 +47,7 @@ fn mass(h: &mut Harness) {
     let points = [
         point(Kind::Source, [0.0, 0.02, 0.0], 2e-6),
         point(Kind::Source, [-0.02, 0.01, 0.012], 2e-6),
-        point(Kind::Drain, [0.02, 0.0, -0.01], 3e-6),
+        point(Kind::Drain, [-0.018, 0.0, 0.012], 1e-6),
         point(Kind::Absorber(1e-4), [0.0, 0.0, 0.018], 1e-7),
     ];
     detail.set_flows(&points, |at| format!("point {at}")).expect("flow points");
