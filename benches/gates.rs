@@ -116,6 +116,8 @@ mod shallow_core;
 mod shallow_dam;
 #[path = "gates/shallow_delivery.rs"]
 mod shallow_delivery;
+#[path = "gates/shallow_detail.rs"]
+mod shallow_detail;
 #[path = "gates/shallow_energy.rs"]
 mod shallow_energy;
 #[path = "gates/shallow_falls.rs"]
@@ -144,6 +146,8 @@ mod shallow_range;
 mod shallow_same;
 #[path = "gates/shallow_scalars.rs"]
 mod shallow_scalars;
+#[path = "gates/shallow_sleeping.rs"]
+mod shallow_sleeping;
 #[path = "gates/shallow_speed.rs"]
 mod shallow_speed;
 #[path = "gates/shallow_spread.rs"]
@@ -265,6 +269,8 @@ fn main() {
     shallow_scalars::run(&mut h);
     shallow_same::run(&mut h);
     shallow_speed::run(&mut h);
+    shallow_sleeping::run(&mut h);
+    shallow_detail::run(&mut h);
     shallow_flooded::run(&mut h);
     shallow_terrain::run(&mut h);
     shallow_state::run(&mut h);

@@ -437,6 +437,15 @@ pub const GATES: &[Gate] = &[
     gate("shallow.rate_scaled", "M/s", Least(200.0), Least(300.0)),
     // A puddle on a hundredth of the ground over liquid on all of it; memory of a column with its pipes.
     gate("shallow.puddle", "%", Most(5.0), Most(1.5)),
+    // A domain at rest, and one of which a tenth flows, over itself while it was stirred; the same bytes where nothing sleeps.
+    gate("shallow.sleeping", "%", Most(5.0), Most(1.0)),
+    gate("shallow.sleeping_stream", "%", Open, Open),
+    yes("shallow.same_asleep"),
+    // Level of detail: units missing while the near cells move, and a frame of a domain of which a quarter is near over that of all fine: 1,000 cells
+    // along an edge, and 200, where rows are short.
+    none("shallow.detail_mass", "units"),
+    gate("shallow.detail_cost", "1", Most(0.55), Most(0.45)),
+    gate("shallow.detail_cost_small", "1", Open, Open),
     gate("shallow.memory", "B", Most(64.0), Most(48.0)),
     // Legs that a flooded passage joins: the period of their swing, and how far from their level they come to rest, over how far apart they
     // were.

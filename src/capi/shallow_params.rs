@@ -180,6 +180,7 @@ impl frz_shallow_params {
             friction: Friction::default(),
             thickening: None,
             falls: None,
+            rest: Params::default().rest,
         };
         params.validate()?;
         Ok(params)

@@ -204,6 +204,18 @@ impl Flows {
         placed.point.find_columns(columns, &mut placed.columns);
     }
 
+    /// Lets a point rest; returns what it waits for and has moved (units), which it forgets.
+    pub(super) fn rest(&mut self, point: usize) -> (f64, i64) {
+        let placed = &mut self.placed[point];
+        placed.columns.clear();
+        (std::mem::take(&mut placed.waiting), std::mem::take(&mut placed.moved))
+    }
+
+    /// What a point waits for and has moved (units).
+    pub(super) fn waiting_and_moved(&self, point: usize) -> (f64, i64) {
+        (self.placed[point].waiting, self.placed[point].moved)
+    }
+
     /// Gives a flow point another rate (m3/s); what it waits for and has moved stays.
     ///
     /// # Errors

@@ -7,6 +7,7 @@
 
 mod clock;
 pub mod columns;
+pub mod detail;
 pub mod falls;
 pub mod flow;
 pub mod flows;
@@ -31,6 +32,7 @@ pub mod system;
 pub mod terrain;
 mod thicken;
 
+pub use detail::Detail;
 pub use loads::Load;
 pub use params::Params;
 pub use probe::{Reading, View};

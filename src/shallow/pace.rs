@@ -2,6 +2,7 @@
 
 use super::flow::fast::FAST_WAVES;
 use super::flow::flux::{Step, Thinning};
+use super::flow::rest::Bounds;
 use super::grid::TOP;
 use super::params::{Friction, Pace, Params, Section};
 
@@ -102,16 +103,48 @@ pub fn drive(params: &Params, measures: &Measures, dt: f64) -> f64 {
     dt * dt * -params.gravity[1] * unit / (cell * cell)
 }
 
+/// The time (s) in which a surface that counts as level would bring liquid from rest to [`Params::rest`].
+const LEVEL: f64 = 1.0 / 60.0;
+
+/// The speed (m/s) of what comes to rest. Beside walls nothing does: what flows drags along what is beside it.
+fn rest(params: &Params) -> f64 {
+    if params.friction == Friction::Walls { 0.0 } else { params.rest }
+}
+
+/// By how much surfaces of adjacent cells may differ where liquid comes to rest (units): a unit at least, unless it never does.
+fn level(params: &Params, measures: &Measures) -> i32 {
+    let fall = rest(params) * measures.cell / (LEVEL * -params.gravity[1]);
+    if rest(params) > 0.0 { (fall / measures.unit).round().clamp(1.0, 1e6) as i32 } else { 0 }
+}
+
+/// What gravity adds to the fall of the surface over a cell along x and along z (units).
+fn tilt(params: &Params, measures: &Measures) -> [i32; 2] {
+    let [x, y, z] = params.gravity;
+    [x, z].map(|along| (along / -y * measures.cell / measures.unit).round().clamp(-1e9, 1e9) as i32)
+}
+
+/// What rests in all steps.
+pub fn bounds(params: &Params, measures: &Measures) -> Bounds {
+    Bounds {
+        level: level(params, measures),
+        tilt: tilt(params, measures),
+        still: measures.still,
+        drags: params.friction == Friction::Walls,
+    }
+}
+
 /// What the pipes share in a step of `dt` after one of `last` (s).
 pub fn step(params: &Params, measures: &Measures, dt: f64, last: f64) -> Step {
     let Measures { cell, unit, .. } = *measures;
-    let [x, y, z] = params.gravity;
+    let y = params.gravity[1];
+    let level = level(params, measures);
     let section = match (params.section, params.pace) {
         (Section::Whole, _) => cell / unit,
         (Section::Wetted, Pace::Exact) => f64::from(TOP),
         (Section::Wetted, Pace::Realtime(_)) => deepest_section(params, measures, dt) / unit,
     };
-    let lean = |along: f64| (along / -y * cell / unit).round().clamp(-1e9, 1e9) as i32;
+    // A level surface must not bring liquid at rest over it, in steps of any length.
+    let slow = (rest(params) * dt / cell).max(1.001 * drive(params, measures, dt) * f64::from(level));
     Step {
         kept: (libm::pow(params.kept, dt) * dt / last) as f32,
         drive: drive(params, measures, dt) as f32,
@@ -127,7 +160,7 @@ pub fn step(params: &Params, measures: &Measures, dt: f64, last: f64) -> Step {
         }),
         still: measures.still,
         wave: (dt / cell * (-y * unit).sqrt()) as f32,
-        tilt: [lean(x), lean(z)],
+        tilt: tilt(params, measures),
         lateral: match (params.friction, params.section) {
             (Friction::Walls, Section::Wetted) => {
                 (BESIDE * dt * params.liquid.viscosity / (cell * cell)).min(1e12) as f32
@@ -136,5 +169,7 @@ pub fn step(params: &Params, measures: &Measures, dt: f64, last: f64) -> Step {
         },
         again: (dt / last) as f32,
         cell: (cell / unit) as f32,
+        level,
+        slow: slow as f32,
     }
 }

@@ -27,6 +27,9 @@ pub struct Params {
     pub thickening: Option<Thickening>,
     /// How liquid falls freely over edges; none: it is below at once. Chosen once.
     pub falls: Option<Falls>,
+    /// Where the liquid is slower than this (m/s), and its surface so level that in 1/60 s it would not get faster from rest, it comes to rest; 0 to 0.01, and
+    /// 1e-6: a micrometre a second on a slope of 6e-6. Pools at rest sleep, and cost nothing. At 0 only liquid that was never stirred is at rest.
+    pub rest: f64,
 }
 
 /// How a frame is divided into steps.
@@ -73,6 +76,7 @@ impl Default for Params {
             friction: Friction::default(),
             thickening: None,
             falls: None,
+            rest: 1e-6,
         }
     }
 }
@@ -97,6 +101,9 @@ impl Params {
         }
         if !(0.0..=1.0).contains(&self.kept) {
             return Err(Error::argument(format!("kept = {} is not within 0 to 1", self.kept)));
+        }
+        if !(0.0..=0.01).contains(&self.rest) {
+            return Err(Error::argument(format!("rest = {} m/s is not within 0 to 0.01", self.rest)));
         }
         if let Some(falls) = &self.falls {
             falls.validate()?;

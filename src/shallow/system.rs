@@ -148,8 +148,16 @@ impl Shallow {
         if params.friction != self.params.friction {
             return Err(Error::argument("friction cannot change after the liquid was made"));
         }
+        if params != self.params {
+            self.flow.rouse();
+        }
         self.params = params;
         Ok(())
+    }
+
+    /// Whether pools at rest are worked on all the same, which takes longer, and changes nothing else: for comparison.
+    pub fn set_sleepless(&mut self, is_sleepless: bool) {
+        self.flow.set_sleepless(is_sleepless);
     }
 
     /// The columns.
@@ -213,6 +221,7 @@ impl Shallow {
     /// stands as high.
     pub fn fill(&mut self, height: f64) {
         self.still = self.columns.heights.round(height);
+        self.flow.rouse();
         let level = i64::from(self.still);
         for index in 0..self.columns.len() {
             if self.columns.is_column(index) {
@@ -296,10 +305,7 @@ impl Shallow {
     fn flow_on(&mut self, dt: f64, next: impl Fn(&Next) -> Option<f64>) -> Result<Report> {
         let measures = self.measures();
         let mut report = Report::default();
-        self.steps.clear();
-        self.flow.begin_frame(&self.columns);
-        self.release();
-        let halvings = self.find_fast(dt, &measures, &next);
+        let halvings = self.begin(dt, &measures, &next);
         while report.seconds < dt {
             let left = dt - report.seconds;
             let state = self.next(&measures, left, report.steps, halvings);
@@ -307,25 +313,44 @@ impl Shallow {
             if report.steps == 0 && left / length > f64::from(MOST_STEPS) {
                 return Err(Error::argument(format!("a frame of {dt} s would take steps of {length} s")));
             }
-            let step = pace::step(&self.params, &measures, length, self.flow.last);
-            self.find_lips();
-            let [emptied, filled, slowed] = self.flow.step(&self.columns, &self.pipes, &step, length);
-            self.fall(length);
-            self.flows.step(&self.columns, &mut self.flow, -self.params.gravity[1], self.time, length);
-            self.steps.push(length);
-            self.time += length;
-            report.steps += 1;
+            self.advance(&measures, length, &mut report);
             report.seconds = if length >= left { dt } else { report.seconds + length };
-            report.emptied += u64::from(emptied);
-            report.filled += u64::from(filled);
-            report.slowed += u64::from(slowed);
         }
         report.deepest = measures.unit * f64::from(self.flow.deepest());
         Ok(report)
     }
 
+    /// Begins a frame; returns how often its steps are halved, for fast films.
+    pub(super) fn begin(&mut self, dt: f64, measures: &Measures, next: impl Fn(&Next) -> Option<f64>) -> u32 {
+        self.steps.clear();
+        self.flow.begin_frame(&self.columns, &self.pipes, pace::bounds(&self.params, measures));
+        self.release();
+        self.find_fast(dt, measures, next)
+    }
+
+    /// One step of a length (s), counted in a report.
+    pub(super) fn advance(&mut self, measures: &Measures, length: f64, report: &mut Report) {
+        let step = pace::step(&self.params, measures, length, self.flow.last);
+        self.find_lips();
+        let [emptied, filled, slowed] = self.flow.step(&self.columns, &self.pipes, &step, length);
+        self.fall(length);
+        self.flows.step(&self.columns, &mut self.flow, -self.params.gravity[1], self.time, length);
+        self.steps.push(length);
+        self.time += length;
+        report.steps += 1;
+        report.emptied += u64::from(emptied);
+        report.filled += u64::from(filled);
+        report.slowed += u64::from(slowed);
+    }
+
     /// Where the frame is, of which so much is left (s).
-    fn next<'a>(&'a self, measures: &'a Measures, left: f64, steps: u32, halvings: u32) -> Next<'a> {
+    pub(super) fn next<'a>(
+        &'a self,
+        measures: &'a Measures,
+        left: f64,
+        steps: u32,
+        halvings: u32,
+    ) -> Next<'a> {
         let deepest = measures.unit * f64::from(self.flow.deepest());
         Next { params: &self.params, measures, left, deepest, steps, last: self.flow.last, halvings }
     }
@@ -350,7 +375,7 @@ impl Shallow {
         halvings
     }
 
-    fn measures(&self) -> Measures {
+    pub(super) fn measures(&self) -> Measures {
         Measures {
             cell: self.columns.grid.cell,
             unit: self.columns.heights.unit,
@@ -361,24 +386,23 @@ impl Shallow {
 
     /// Where all liquid is.
     pub fn balance(&self) -> Balance {
+        let units = self.units();
         let volume = self.columns.grid.cell * self.columns.grid.cell * self.columns.heights.unit;
-        let cubic = |units: i64| units as f64 * volume;
-        let (flows, links, inside) = (&self.flows, &self.flow.links, self.flow.units());
-        let came = self.poured + flows.sourced + links.gained;
-        let held = self.remap.held.units();
-        let falling = self.falls.units();
-        let went = flows.drained + flows.absorbed + links.lost;
-        Balance {
-            inside: cubic(inside),
-            poured: cubic(self.poured),
-            sourced: cubic(flows.sourced),
-            drained: cubic(flows.drained),
-            absorbed: cubic(flows.absorbed),
-            lost: cubic(links.lost),
-            gained: cubic(links.gained),
-            held: cubic(held),
-            falling: cubic(falling),
-            error: came - went - inside - held - falling,
+        units.balance(volume)
+    }
+
+    /// Where all liquid is, in units.
+    pub(super) fn units(&self) -> Units {
+        Units {
+            inside: self.flow.units(),
+            poured: self.poured,
+            sourced: self.flows.sourced,
+            drained: self.flows.drained,
+            absorbed: self.flows.absorbed,
+            lost: self.flow.links.lost,
+            gained: self.flow.links.gained,
+            held: self.remap.held.units(),
+            falling: self.falls.units(),
         }
     }
 
@@ -401,6 +425,40 @@ impl Shallow {
         };
         let scale = (0.5 * self.columns.grid.cell / self.flow.last) as f32 / depth as f32;
         [(east[index] + west) * scale, (south[index] + north) * scale]
+    }
+}
+
+/// As [`Balance`], in units.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Units {
+    pub inside: i64,
+    pub poured: i64,
+    pub sourced: i64,
+    pub drained: i64,
+    pub absorbed: i64,
+    pub lost: i64,
+    pub gained: i64,
+    pub held: i64,
+    pub falling: i64,
+}
+
+impl Units {
+    /// The volumes of units of a volume (m3).
+    pub fn balance(&self, volume: f64) -> Balance {
+        let Self { inside, poured, sourced, drained, absorbed, lost, gained, held, falling } = *self;
+        let cubic = |units: i64| units as f64 * volume;
+        Balance {
+            inside: cubic(inside),
+            poured: cubic(poured),
+            sourced: cubic(sourced),
+            drained: cubic(drained),
+            absorbed: cubic(absorbed),
+            lost: cubic(lost),
+            gained: cubic(gained),
+            held: cubic(held),
+            falling: cubic(falling),
+            error: poured + sourced + gained - drained - absorbed - lost - inside - held - falling,
+        }
     }
 }
 

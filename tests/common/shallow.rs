@@ -373,6 +373,7 @@ pub fn random_params(dice: &mut Dice, step: f64) -> Params {
         friction: Friction::Ground,
         thickening: None,
         falls: None,
+        rest: Params::default().rest,
     }
 }
 

@@ -95,6 +95,7 @@ mod snow {
 mod shallow {
     mod balance;
     mod border;
+    mod detail;
     mod falls;
     mod falls_scalars;
     mod flooded;
@@ -103,6 +104,7 @@ mod shallow {
     mod moving;
     mod probe;
     mod scalars;
+    mod sleeping;
     mod stains;
     mod state;
     mod surface;

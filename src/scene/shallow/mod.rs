@@ -322,6 +322,7 @@ fn params(values: &Values) -> Params {
         friction: Friction::default(),
         thickening: None,
         falls: None,
+        ..Params::default()
     }
 }
 

@@ -1,7 +1,11 @@
-//! Which strips a step works on: those with liquid and their neighbours, as runs of each row.
+//! Which strips a step works on: those with liquid and their neighbours, unless they are asleep (`rest.rs`), as runs of each row.
+//!
+//! Between frames strips fall asleep whose liquid rests, and that of their neighbours, too. Within a frame a strip beside a moving one does not
+//! sleep, so that nothing can come into one that does: as soon as something comes into its neighbour, it is awake.
 
 use std::ops::Range;
 
+use super::rest::Still;
 use crate::shallow::columns::{Columns, NONE, STRIP, resize_part, strip_of};
 use crate::shallow::pipes::Links;
 
@@ -14,7 +18,7 @@ pub struct Span {
     pub len: u32,
     /// First index of the strips to the south, or [`NONE`].
     pub south: u32,
-    /// First index of the strips to the north, or [`NONE`]: there is none, or it is not active.
+    /// First index of the strips to the north, or [`NONE`]: there is none, or it is not worked on.
     pub north: u32,
 }
 
@@ -23,8 +27,19 @@ pub struct Span {
 pub struct Active {
     /// Whether each strip had liquid after the last step.
     wet: Vec<bool>,
-    /// Whether each strip is worked on.
+    /// Whether each strip is wet or beside a wet one: in all others there is neither liquid nor flow.
     active: Vec<bool>,
+    /// Whether what is in each strip may move: an active one whose neighbours rest, too, is asleep.
+    moving: Vec<bool>,
+    asleep: Vec<bool>,
+    /// Whether one may be asleep.
+    any_asleep: bool,
+    /// Whether nothing of a row, nor its links, may move: steps pass over it.
+    resting: Vec<bool>,
+    /// Greatest depth of the strips of each row that are asleep (units).
+    asleep_depths: Vec<i32>,
+    /// Whether a column of each strip has room for liquid: walls are never active.
+    has_room: Vec<bool>,
     /// The strips that links lead to from each strip, and where those of each begin.
     linked: Vec<u32>,
     linked_starts: Vec<u32>,
@@ -45,6 +60,12 @@ impl Active {
         let mut active = Self {
             wet: vec![false; strips],
             active: vec![false; strips],
+            moving: vec![false; strips],
+            asleep: vec![false; strips],
+            any_asleep: false,
+            resting: vec![false; rows],
+            asleep_depths: vec![0; rows],
+            has_room: (0..strips).map(|strip| has_room(columns, strip)).collect(),
             linked: Vec::new(),
             linked_starts: Vec::new(),
             rows: vec![0; rows + 1],
@@ -74,7 +95,8 @@ impl Active {
     ) {
         let old = self.rows[rows.start] as usize..self.rows[rows.end] as usize;
         let new = columns.row(rows.start).start..columns.row(rows.end - 1).end;
-        for flags in [&mut self.wet, &mut self.active] {
+        for flags in [&mut self.wet, &mut self.active, &mut self.moving, &mut self.asleep, &mut self.has_room]
+        {
             resize_part(flags, old.clone(), new.len(), false);
         }
         resize_part(&mut self.spans, old.clone(), new.len(), Span::default());
@@ -84,13 +106,15 @@ impl Active {
         }
         for strip in new.clone() {
             self.wet[strip] = strip_of(depth, strip).iter().any(|&depth| depth > 0);
-            self.active[strip] = false;
+            (self.active[strip], self.moving[strip]) = (false, false);
+            self.has_room[strip] = has_room(columns, strip);
         }
         let count = columns.grid.size[1];
         let around = rows.start.saturating_sub(1)..(rows.end + 1).min(count);
         let stale = if old == new { around.end } else { count };
         (around.start..stale).for_each(|row| self.make_stale(row));
         for strip in columns.row(around.start).start..columns.row(around.end - 1).end {
+            self.asleep[strip] = false;
             if self.wet[strip] {
                 self.wake(columns, strip);
             }
@@ -136,7 +160,7 @@ impl Active {
 
     /// Memory (bytes).
     pub fn bytes(&self) -> usize {
-        let flags = self.wet.len() + self.active.len() + self.stale.len();
+        let flags = 5 * self.wet.len() + 2 * self.stale.len() + size_of_val(&self.asleep_depths[..]);
         let lists = [&self.linked, &self.linked_starts, &self.rows, &self.counts];
         flags + lists.iter().map(|list| size_of_val(&list[..])).sum::<usize>() + size_of_val(&self.spans[..])
     }
@@ -157,9 +181,39 @@ impl Active {
         &self.wet
     }
 
-    /// Whether each strip is worked on.
+    /// Whether each strip is wet or beside a wet one: in all others there is neither liquid nor flow.
     pub(super) fn active(&self) -> &[bool] {
         &self.active
+    }
+
+    /// Whether what is in each strip may move.
+    pub fn moving(&self) -> &[bool] {
+        &self.moving
+    }
+
+    /// Whether nothing of a row, nor its links, may move.
+    pub fn rests(&self, row: usize) -> bool {
+        self.resting[row]
+    }
+
+    /// Whether that is so of all rows.
+    pub fn all_rest(&self) -> bool {
+        !self.resting.contains(&false)
+    }
+
+    /// Whether a strip may be asleep.
+    pub fn may_sleep(&self) -> bool {
+        self.any_asleep
+    }
+
+    /// Greatest depths of the strips of all rows that are asleep (units).
+    pub fn asleep_depths(&self) -> &[i32] {
+        &self.asleep_depths
+    }
+
+    /// Greatest depth of the strips of a row that are asleep (units).
+    pub fn asleep_depth(&self, row: usize) -> i32 {
+        self.asleep_depths[row]
     }
 
     /// Makes the strips of some runs, which are in order, active, and no others but those beside liquid.
@@ -169,6 +223,7 @@ impl Active {
         depth: &[i32],
         runs: impl Iterator<Item = std::ops::Range<usize>> + Clone,
     ) {
+        self.rouse_all();
         let mut end = 0;
         for run in runs.clone() {
             self.let_sleep(columns, end..run.start);
@@ -176,6 +231,7 @@ impl Active {
             for strip in run {
                 let (own, _) = depth[strip * STRIP..].split_at(STRIP);
                 self.wet[strip] = own.iter().fold(0, |any, depth| any | depth) != 0;
+                self.moving[strip] = self.wet[strip];
                 self.activate(columns, strip);
             }
         }
@@ -185,7 +241,7 @@ impl Active {
                 self.wake(columns, strip);
             }
         }
-        self.refresh(columns);
+        self.refresh(columns, depth);
     }
 
     /// Whether a strip might have a neighbour that is not active. Looks at little: nearly always none has.
@@ -201,29 +257,54 @@ impl Active {
     fn let_sleep(&mut self, columns: &Columns, strips: std::ops::Range<usize>) {
         let mut strip = find(&self.active[..strips.end], strips.start, true);
         while strip < strips.end {
-            (self.active[strip], self.wet[strip]) = (false, false);
+            (self.active[strip], self.wet[strip], self.moving[strip]) = (false, false, false);
             self.make_stale(columns.strips()[strip].row as usize);
             strip = find(&self.active[..strips.end], strip + 1, true);
         }
     }
 
-    /// Makes a strip that got wet, and its neighbours, active.
+    /// Makes a strip that got wet, or was stirred, and its neighbours, active and awake.
     pub fn wake(&mut self, columns: &Columns, strip: usize) {
-        self.wet[strip] = true;
+        (self.wet[strip], self.moving[strip]) = (true, true);
         self.activate(columns, strip);
+        self.for_each_beside(columns, strip, |active, other| active.activate(columns, other));
+    }
+
+    /// Calls `see` with each strip that a pipe leads to from one.
+    fn for_each_beside(&mut self, columns: &Columns, strip: usize, mut see: impl FnMut(&mut Self, usize)) {
         let beside = [columns.east(strip), columns.west(strip)];
-        beside.into_iter().flatten().for_each(|other| self.activate(columns, other));
+        beside.into_iter().flatten().for_each(|other| see(self, other));
         for other in [columns.north(strip), columns.south(strip)].into_iter().filter(|&other| other != NONE) {
-            self.activate(columns, other as usize);
+            see(self, other as usize);
         }
         for link in self.linked_starts[strip]..self.linked_starts[strip + 1] {
-            self.activate(columns, self.linked[link as usize] as usize);
+            see(self, self.linked[link as usize] as usize);
+        }
+    }
+
+    /// Wakes a wet strip that something has come into or gone out of.
+    pub fn stir(&mut self, columns: &Columns, strip: usize) {
+        if self.wet[strip] && !self.moving[strip] {
+            self.wake(columns, strip);
+        }
+    }
+
+    /// Wakes all strips: what rests may be decided anew.
+    pub fn rouse_all(&mut self) {
+        self.asleep.fill(false);
+        self.moving.copy_from_slice(&self.wet);
+        (0..self.stale.len()).for_each(|row| self.make_stale(row));
+    }
+
+    fn rouse(&mut self, columns: &Columns, strip: usize) {
+        if std::mem::take(&mut self.asleep[strip]) {
+            self.make_stale(columns.strips()[strip].row as usize);
         }
     }
 
     fn activate(&mut self, columns: &Columns, strip: usize) {
-        if !self.active[strip] {
-            self.active[strip] = true;
+        if self.has_room[strip] && (!self.active[strip] || self.asleep[strip]) {
+            (self.active[strip], self.asleep[strip]) = (true, false);
             self.make_stale(columns.strips()[strip].row as usize);
         }
     }
@@ -232,58 +313,112 @@ impl Active {
     fn make_stale(&mut self, row: usize) {
         self.any_stale = true;
         self.stale[row] = true;
+        self.resting[row] = false;
         if let Some(next) = self.stale.get_mut(row + 1) {
             *next = true;
         }
     }
 
-    /// Lets strips sleep that are dry and beside dry ones; `asleep` is called with the indices of each.
+    /// Finds what is wet, and lets strips go that are dry and beside dry ones; `dried` is called with the indices of each.
     pub fn settle(
         &mut self,
         columns: &Columns,
         depth: &[i32],
-        mut asleep: impl FnMut(std::ops::Range<usize>),
+        mut dried: impl FnMut(std::ops::Range<usize>),
     ) {
         let rows = self.counts.len();
-        for row in (0..rows).filter(|&row| self.counts[row] > 0) {
-            for strip in columns.row(row).filter(|&strip| self.active[strip]) {
-                self.wet[strip] = depth[strip * STRIP..(strip + 1) * STRIP].iter().any(|&depth| depth > 0);
+        // What is asleep stays as wet as it is, and so does what is beside it.
+        let Self { wet, active, asleep, counts, .. } = self;
+        for row in (0..rows).filter(|&row| counts[row] > 0) {
+            for strip in columns.row(row).filter(|&strip| active[strip] && !asleep[strip]) {
+                wet[strip] = strip_of(depth, strip).iter().any(|&depth| depth > 0);
             }
         }
         for row in 0..rows {
-            if self.counts[row] == 0 {
-                continue;
-            }
-            for strip in columns.row(row) {
-                if self.active[strip] && !self.has_wet_beside(columns, strip) {
-                    self.active[strip] = false;
+            for strip in if self.counts[row] > 0 { columns.row(row) } else { 0..0 } {
+                if self.is_awake(strip) && !self.is_beside(columns, strip, &self.wet) {
+                    (self.active[strip], self.moving[strip]) = (false, false);
                     self.make_stale(row);
-                    asleep(strip * STRIP..(strip + 1) * STRIP);
+                    dried(strip * STRIP..(strip + 1) * STRIP);
                 }
             }
         }
     }
 
-    fn has_wet_beside(&self, columns: &Columns, strip: usize) -> bool {
-        let wet = |strip: usize| self.wet[strip];
-        let beyond = |strip: u32| strip != NONE && wet(strip as usize);
+    /// Lets strips fall asleep that rest, and whose neighbours do.
+    pub fn fall_asleep(&mut self, still: &Still) {
+        let (columns, rows) = (still.columns, self.counts.len());
+        for row in 0..rows {
+            for strip in if self.counts[row] > 0 { columns.row(row) } else { 0..0 } {
+                if self.is_awake(strip) {
+                    self.moving[strip] = self.wet[strip] && !still.rests(strip);
+                }
+            }
+        }
+        for row in 0..rows {
+            let links = if self.resting[row] { 0..0 } else { still.pipes.links.row(row) };
+            for [from, to] in still.moving_links(links) {
+                for end in [from, to].into_iter().filter(|&end| end != NONE) {
+                    let strip = end as usize / STRIP;
+                    self.moving[strip] |= self.is_awake(strip);
+                }
+            }
+        }
+        // What began to move beside a strip that is asleep wakes it.
+        self.any_asleep = self.asleep.contains(&true);
+        for row in 0..rows {
+            for strip in if self.any_asleep && self.counts[row] > 0 { columns.row(row) } else { 0..0 } {
+                if self.moving[strip] {
+                    self.for_each_beside(columns, strip, |active, other| active.rouse(columns, other));
+                }
+            }
+        }
+        for row in 0..rows {
+            for strip in if self.counts[row] > 0 { columns.row(row) } else { 0..0 } {
+                if self.is_awake(strip) && !self.is_beside(columns, strip, &self.moving) {
+                    (self.asleep[strip], self.any_asleep) = (true, true);
+                    self.make_stale(row);
+                }
+            }
+        }
+        for row in 0..rows {
+            if !self.resting[row] && !columns.row(row).any(|strip| self.is_awake(strip)) {
+                let mut owners = row.saturating_sub(1)..row + 1;
+                self.resting[row] =
+                    owners.all(|row| still.moving_links(still.pipes.links.row(row)).next().is_none());
+            }
+        }
+    }
+
+    /// Whether a step works on a strip.
+    fn is_awake(&self, strip: usize) -> bool {
+        self.active[strip] && !self.asleep[strip]
+    }
+
+    /// Whether a strip, or one that a pipe leads to, is marked.
+    fn is_beside(&self, columns: &Columns, strip: usize, marks: &[bool]) -> bool {
+        let marked = |strip: usize| marks[strip];
+        let beyond = |strip: u32| strip != NONE && marked(strip as usize);
         let links = self.linked_starts[strip] as usize..self.linked_starts[strip + 1] as usize;
-        wet(strip)
-            || columns.east(strip).is_some_and(wet)
-            || columns.west(strip).is_some_and(wet)
+        marked(strip)
+            || columns.east(strip).is_some_and(marked)
+            || columns.west(strip).is_some_and(marked)
             || beyond(columns.north(strip))
             || beyond(columns.south(strip))
-            || self.linked[links].iter().any(|&other| wet(other as usize))
+            || self.linked[links].iter().any(|&other| marked(other as usize))
     }
 
     /// Finds the spans of rows that have changed.
-    pub fn refresh(&mut self, columns: &Columns) {
+    pub fn refresh(&mut self, columns: &Columns, depth: &[i32]) {
         if !std::mem::take(&mut self.any_stale) {
             return;
         }
         for row in 0..self.stale.len() {
             if std::mem::take(&mut self.stale[row]) {
                 self.find_spans(columns, row);
+                let asleep = columns.row(row).filter(|&strip| self.asleep[strip]);
+                let deepest = |strip| strip_of(depth, strip).iter().copied().fold(0, i32::max);
+                self.asleep_depths[row] = asleep.map(deepest).fold(0, i32::max);
             }
         }
     }
@@ -291,10 +426,13 @@ impl Active {
     fn find_spans(&mut self, columns: &Columns, row: usize) {
         let first = self.rows[row] as usize;
         let mut count = 0;
-        for strip in columns.row(row).filter(|&strip| self.active[strip]) {
+        for strip in columns.row(row) {
+            if !self.is_awake(strip) {
+                continue;
+            }
             let at = |strip: u32| if strip == NONE { NONE } else { strip * STRIP as u32 };
             let north = columns.north(strip);
-            let north = if north != NONE && self.active[north as usize] { north } else { NONE };
+            let north = if north != NONE && self.is_awake(north as usize) { north } else { NONE };
             let own = Span {
                 first: (strip * STRIP) as u32,
                 len: STRIP as u32,
@@ -323,6 +461,11 @@ impl Active {
         }
         self.counts[row] = count as u32;
     }
+}
+
+fn has_room(columns: &Columns, strip: usize) -> bool {
+    let (base, ceiling) = (strip_of(columns.bases(), strip), strip_of(columns.ceilings(), strip));
+    base.iter().zip(ceiling).any(|(base, ceiling)| base < ceiling)
 }
 
 /// Runs of strips that are marked.

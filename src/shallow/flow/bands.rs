@@ -265,7 +265,9 @@ fn clearance(columns: &Columns, row: usize) -> i32 {
         let present = columns.present(strip);
         let (base, ceiling) = (strip_of(columns.bases(), strip), strip_of(columns.ceilings(), strip));
         for x in 0..STRIP {
-            let room = if present >> x & 1 == 1 { ceiling[x] - base[x] } else { i32::MAX };
+            // What has no room at all is a wall.
+            let is_room = present >> x & 1 == 1 && ceiling[x] > base[x];
+            let room = if is_room { ceiling[x] - base[x] } else { i32::MAX };
             least = least.min(room);
         }
     }

@@ -38,6 +38,10 @@ pub struct Step {
     pub again: f32,
     /// Edge of a cell (units).
     pub cell: f32,
+    /// Liquid comes to rest in a pipe whose surfaces differ by so much at most (units),
+    pub level: i32,
+    /// and whose flux is at most this part of the depth in its section: both drive nothing visible.
+    pub slow: f32,
 }
 
 /// Carreau's law, of a flux and the depth of the column that gives it.
@@ -101,7 +105,7 @@ pub fn flux_of<K: Kind>(step: &Step, fall: i32, depth: [f32; 2], flux: f32, open
     let section = if K::WHOLE { step.section } else { lesser(0.5 * (depth[0] + depth[1]), step.section) };
     let driven = kept + drive * section;
     let giver = if driven > 0.0 { depth[0] } else { depth[1] };
-    if K::VISCOUS {
+    let f = if K::VISCOUS {
         let square = giver * giver;
         let drag = light * if K::THINS { step.drag * step.thinned(flux, square) } else { step.drag };
         let open = square * open;
@@ -109,7 +113,11 @@ pub fn flux_of<K: Kind>(step: &Step, fall: i32, depth: [f32; 2], flux: f32, open
     } else {
         // Nothing is held back, but a dry column gives nothing, and a closed pipe lets nothing pass.
         if giver * open > 0.0 { driven } else { 0.0 }
-    }
+    };
+    // Where the surface is level but for less than can be seen, what is slow comes to rest: all of it, so that it can sleep.
+    let moves = (fall.abs() > step.level) | (f.abs() > step.slow * section);
+    // A zero has one sign.
+    if moves { f + 0.0 } else { 0.0 }
 }
 
 impl Step {
@@ -326,6 +334,8 @@ mod tests {
                 lateral: 0.0,
                 again: 1.0,
                 cell: 1.0,
+                level: 4,
+                slow: 1e-9,
             }
         }
     }

@@ -100,10 +100,7 @@ impl LinkPart<'_> {
                     self.drive_back::<K>(step, at, base + depth - (base - edge(columns)), depth, open);
                     continue;
                 }
-                NONE => {
-                    let (eta, is_still) = links.outside(columns, link, step.still);
-                    (eta, if is_still { eta - base[i] } else { 0 }, is_still)
-                }
+                NONE => beyond(links, columns, link, step.still),
                 j => (base[j as usize] + depth(j as usize), depth(j as usize), false),
             };
             let fall = (base[i] + own).saturating_sub(eta);
@@ -125,7 +122,7 @@ impl LinkPart<'_> {
     fn drive_back<K: Kind>(&mut self, step: &Step, at: usize, fall: i32, depth: i32, open: f32) {
         let (flux, depth) = (-self.flux[at], [depth as f32, 0.0]);
         let light = if K::VISCOUS && !K::WHOLE { fast::light(step, depth, flux) } else { 1.0 };
-        self.flux[at] = -flux_of::<K>(step, fall, depth, flux, open, light);
+        self.flux[at] = 0.0 - flux_of::<K>(step, fall, depth, flux, open, light);
         let [transfer, left] = split(self.flux[at], self.left[at]);
         (self.transfer[at], self.left[at]) = (transfer.clamp(-MOST, MOST), left);
     }
@@ -209,11 +206,17 @@ impl LinkPart<'_> {
     }
 }
 
+/// What lies at the far end of a link that leaves the domain: its surface and its depth over the link's column (units), and whether it is liquid at rest.
+pub(super) fn beyond(links: &Links, columns: &Columns, link: usize, still: i32) -> (i32, i32, bool) {
+    let (eta, is_still) = links.outside(columns, link, still);
+    (eta, if is_still { eta - columns.bases()[links.from[link] as usize] } else { 0 }, is_still)
+}
+
 /// The flux of a wave that leaves over the border (units a step): a surface that stands `fall` over the one at rest goes out at the speed of
 /// waves (Sommerfeld's condition), and what came is not thrown back.
 fn radiated(step: &Step, fall: i32, depth: [f32; 2]) -> f32 {
     let mean = if step.is_whole { step.section } else { lesser(0.5 * (depth[0] + depth[1]), step.section) };
-    lesser(step.wave * mean.sqrt(), 1.0) * fall as f32
+    if fall.saturating_abs() <= step.level { 0.0 } else { lesser(step.wave * mean.sqrt(), 1.0) * fall as f32 }
 }
 
 /// The indices of a row's columns.

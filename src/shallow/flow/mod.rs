@@ -1,8 +1,9 @@
 //! The state of the liquid, and one step of it (thesis 4.1.2, Alg. 4.1).
 //!
 //! A step goes over the rows once (`rows.rs`): fluxes (`flux.rs`, `fast.rs`, `links.rs`), their scaling (`scale.rs`), and transfers (`transfer.rs`), on the
-//! strips that are wet or beside wet ones (`active.rs`), by one band of rows for each thread (`bands.rs`, `parts.rs`). Columns that are full up to their
-//! ceiling are a network of their own, found first (`network.rs`, `heads.rs`, `rounds.rs`); then friction beside pipes, if it is wanted (`walls`). What the liquid carries follows transfers (`carry.rs`).
+//! strips that are wet or beside wet ones, unless all rests there (`active.rs`, `rest.rs`), by one band of rows for each thread (`bands.rs`,
+//! `parts.rs`). Columns that are full up to their ceiling are a network of their own, found first (`network.rs`, `heads.rs`, `rounds.rs`); then friction
+//! beside pipes, if it is wanted (`walls`). What the liquid carries follows transfers (`carry.rs`).
 
 pub(super) mod active;
 pub(super) mod bands;
@@ -16,6 +17,7 @@ pub(super) mod lips;
 mod network;
 mod parts;
 mod places;
+pub mod rest;
 mod rounds;
 mod rows;
 mod scale;
@@ -24,7 +26,7 @@ pub(super) mod walls;
 
 use std::ops::Range;
 
-use crate::shallow::columns::{Columns, STRIP, strip_mut};
+use crate::shallow::columns::{Columns, NONE, STRIP, strip_mut};
 use crate::shallow::per_column::{Array, PerColumn};
 use crate::shallow::pipes::cliffs::Cliffs;
 use crate::shallow::pipes::{Links, Pipes};
@@ -39,6 +41,7 @@ use lips::Lips;
 pub(super) use network::SLACK;
 use network::{Network, State};
 use parts::Part;
+use rest::{Bounds, Still};
 use rows::Ground;
 use walls::{Liquid, Walls};
 
@@ -63,6 +66,8 @@ pub struct Flow {
     pub(super) walls: Walls,
     /// What it carries.
     pub(super) amounts: Amounts,
+    /// Whether nothing sleeps, for comparison.
+    is_sleepless: bool,
 }
 
 /// What a restored state replaces.
@@ -119,6 +124,7 @@ impl Flow {
             fast: Fast::new(columns.len() + STRIP, columns.grid.size[1]),
             walls: Walls::default(),
             amounts: Amounts::none(),
+            is_sleepless: false,
         }
     }
 
@@ -143,7 +149,7 @@ impl Flow {
         &self.depth[..self.depth.len() - STRIP]
     }
 
-    /// Whether each strip is worked on: in all others there is neither liquid nor flow.
+    /// Whether each strip is wet or beside a wet one: in all others there is neither liquid nor flow.
     pub(super) fn active(&self) -> &[bool] {
         self.active.active()
     }
@@ -198,6 +204,7 @@ impl Flow {
         self.bands.carry(columns, amounts.count());
         self.links.carry(amounts.count());
         self.amounts = amounts;
+        self.active.rouse_all();
     }
 
     /// As [`Flow::change_depth`], of liquid that comes with these concentrations, or goes with what it carries.
@@ -225,7 +232,7 @@ impl Flow {
         self.depth[index] = after as i32;
         self.bands.deepen(columns.cell(index)[1], after as i32);
         let strip = index / STRIP;
-        if after > 0 && !self.active.wet()[strip] {
+        if after > 0 && !self.active.wet()[strip] || after != before && !self.active.moving()[strip] {
             self.active.wake(columns, strip);
         }
         after - before
@@ -263,23 +270,40 @@ impl Flow {
         }
     }
 
-    /// Begins a frame: strips where all is dry sleep.
-    pub fn begin_frame(&mut self, columns: &Columns) {
+    /// Begins a frame: strips where all is dry are left, and those where all rests sleep.
+    pub fn begin_frame(&mut self, columns: &Columns, pipes: &Pipes, bounds: Bounds) {
         self.walls.begin_frame();
         let [east, south] = &mut self.flux;
         let [left_east, left_south] = &mut self.left;
-        self.active.settle(columns, &self.depth, |asleep| {
+        self.active.settle(columns, &self.depth, |dry| {
             for numbers in [&mut *east, &mut *south, &mut *left_east, &mut *left_south] {
-                numbers[asleep.clone()].fill(0.0);
+                numbers[dry.clone()].fill(0.0);
             }
-            self.network.dry(asleep);
+            self.network.dry(dry);
         });
+        if self.is_sleepless || self.amounts.has_laws() || bounds.drags {
+            return;
+        }
+        let Self { depth, links, network, active, .. } = self;
+        let numbers = [&**east, south, left_east, left_south];
+        active.fall_asleep(&Still { columns, pipes, depth, numbers, links, heads: network.over(), bounds });
+    }
+
+    /// Wakes all that sleeps: something has changed that is not liquid.
+    pub fn rouse(&mut self) {
+        self.active.rouse_all();
+    }
+
+    /// Whether nothing is to sleep from now on.
+    pub fn set_sleepless(&mut self, is_sleepless: bool) {
+        self.is_sleepless = is_sleepless;
+        self.active.rouse_all();
     }
 
     /// Finds fast films; returns the least power of two of cells, to `farthest`, that no disturbance in them leaves behind in `step` times the last
     /// step. `drive` is g unit dt^2 / dx^2 of that one (1 / units).
     pub fn find_fast(&mut self, columns: &Columns, drive: f64, step: f64, farthest: u32) -> u32 {
-        self.active.refresh(columns);
+        self.active.refresh(columns, &self.depth);
         let Self { fast, active, depth, flux: [east, south], .. } = self;
         let films = Films { active, depth, flux: [east, south], drive: drive as f32 };
         fast.find(&films, step as f32, farthest)
@@ -309,10 +333,19 @@ impl Flow {
     /// One step of `dt` (s); returns the count of rows in which K_min, and in which K_max, was not 1, and in which fast films were held back. Runs on
     /// the threads of the pool around it, if [`Flow::divide`] has divided it.
     pub fn step(&mut self, columns: &Columns, pipes: &Pipes, step: &Step, dt: f64) -> [u32; 3] {
-        self.active.refresh(columns);
+        self.active.refresh(columns, &self.depth);
+        if self.active.all_rest() && self.network.is_empty() {
+            self.bands.row_depths_mut().copy_from_slice(self.active.asleep_depths());
+            self.last = dt;
+            return [0; 3];
+        }
         self.walls.begin_step(step, &pipes.links, columns, self.bands.row_depths());
         if self.bands.find_filling() || !self.network.is_empty() {
             self.flood(columns, pipes, step);
+            for strip in self.network.strips() {
+                self.active.stir(columns, strip);
+            }
+            self.active.refresh(columns, &self.depth);
         }
         self.rub(columns, pipes, step);
         self.amounts.begin_step(dt);
@@ -348,6 +381,9 @@ impl Flow {
             self.amounts.settle(&stepped.carried);
             (stepped.scaled, stepped.outside, stepped.carried) = Default::default();
         }
+        if self.active.may_sleep() {
+            self.stir(columns, &pipes.links);
+        }
         self.last = dt;
         scaled
     }
@@ -356,6 +392,15 @@ impl Flow {
     pub fn divide(&mut self, columns: &Columns, threads: usize) -> bool {
         self.bands.divide(columns, threads);
         self.bands.are_several()
+    }
+
+    /// Wakes what the step has moved through links.
+    fn stir(&mut self, columns: &Columns, links: &Links) {
+        for link in (0..links.len()).filter(|&link| self.links.transfer[link] != 0.0) {
+            for end in [links.from[link], links.to[link]].into_iter().filter(|&end| end != NONE) {
+                self.active.stir(columns, end as usize / STRIP);
+            }
+        }
     }
 
     /// Moves what the flow through full columns takes along.

@@ -157,6 +157,11 @@ impl Network {
         self.nodes.is_empty()
     }
 
+    /// The strips of its columns, and of those beside them.
+    pub fn strips(&self) -> impl Iterator<Item = usize> {
+        self.parties.iter().map(|party| party.column as usize / STRIP)
+    }
+
     /// Finds the full columns of the rows that are filling, of which some may have full ones, their heads and what flows through their pipes.
     pub fn find(&mut self, step: &Step, columns: &Columns, pipes: &Pipes, filling: Filling, state: &State) {
         self.clear();
@@ -457,7 +462,7 @@ impl Network {
 
 /// Which columns of a strip are full, of their bases, ceilings and depths.
 #[inline]
-fn full_of([base, ceiling, depth]: [&[i32; STRIP]; 3]) -> [i32; STRIP] {
+pub(super) fn full_of([base, ceiling, depth]: [&[i32; STRIP]; 3]) -> [i32; STRIP] {
     let mut full = [0; STRIP];
     for x in 0..STRIP {
         let room = ceiling[x] - base[x];

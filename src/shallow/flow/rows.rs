@@ -15,7 +15,7 @@ use super::network::Network;
 use super::parts::Parts;
 use super::places::{PAD, Place};
 use super::scale;
-use super::transfer::{find_wet, move_units};
+use super::transfer::{find_woken, move_units};
 use super::walls::Walls;
 use crate::base::cpu::dispatch;
 use crate::shallow::columns::{Columns, NONE, STRIP};
@@ -52,8 +52,7 @@ impl Ground<'_> {
         let links = &self.pipes.links;
         row >= self.columns.grid.size[1]
             || self.active.row(row).is_empty()
-                && links.row(row).is_empty()
-                && links.columns_of(row).is_empty()
+                && (links.row(row).is_empty() && links.columns_of(row).is_empty() || self.active.rests(row))
                 && self.network.is_empty()
     }
 }
@@ -120,7 +119,7 @@ impl Rows {
             if idle > behind + 1 {
                 self.ring[front % RING].clear();
                 if let Some(row) = front.checked_sub(behind).filter(|row| own.contains(row)) {
-                    deepest[row - own.start] = 0;
+                    deepest[row - own.start] = ground.active.asleep_depth(row);
                 }
                 continue;
             }
@@ -463,10 +462,10 @@ impl Rows {
             let depth = &mut part.depth[mine..mine + len];
             move_units(&around, depth, &mut deepest);
             let strip = span.first / STRIP as u32;
-            let wet = &ground.active.wet()[strip as usize..];
-            find_wet(depth, wet, |place| woken.push(strip + place as u32));
+            let marks = [ground.active.wet(), ground.active.moving()].map(|marks| &marks[strip as usize..]);
+            find_woken(&around, depth, marks, |place| woken.push(strip + place as u32));
         }
-        deepest.into_iter().fold(0, i32::max)
+        deepest.into_iter().fold(ground.active.asleep_depth(row), i32::max)
     }
 
     /// Moves what a row's transfers take along; its depths are final.

@@ -37,14 +37,22 @@ fn move_strip(around: &[&[f32; STRIP]; 4], depth: &mut [i32; STRIP], deepest: &m
     }
 }
 
-/// Calls `got_wet` with the place of each strip that has liquid and was dry.
+/// Calls `woken` with the place of each strip that has liquid and was dry, or that rested and from or to which something moves.
 #[inline(always)]
-pub fn find_wet(depth: &[i32], wet: &[bool], mut got_wet: impl FnMut(usize)) {
-    for (place, (strip, wet)) in depth.as_chunks::<STRIP>().0.iter().zip(wet).enumerate() {
-        if !wet && strip.iter().fold(0, |any, depth| any | depth) != 0 {
-            got_wet(place);
+pub fn find_woken(around: &Around, depth: &[i32], [wet, moving]: [&[bool]; 2], mut woken: impl FnMut(usize)) {
+    for (place, ((strip, wet), moving)) in
+        depth.as_chunks::<STRIP>().0.iter().zip(wet).zip(moving).enumerate()
+    {
+        if !wet && strip.iter().fold(0, |any, depth| any | depth) != 0 || !moving && is_stirred(around, place)
+        {
+            woken(place);
         }
     }
+}
+
+fn is_stirred(around: &Around, strip: usize) -> bool {
+    let any = |any: u32, transfer: &f32| any | transfer.to_bits() << 1;
+    around.strip(strip).iter().any(|transfers| transfers.iter().fold(0, any) != 0)
 }
 
 /// Finds what transfers between columns and their neighbours, of these concentrations (levels), take along.

@@ -132,6 +132,11 @@ impl Amounts {
         }
     }
 
+    /// Whether a scalar changes where nothing moves.
+    pub fn has_laws(&self) -> bool {
+        self.scalars.iter().any(|scalar| scalar.law != Law::Dye)
+    }
+
     /// What the laws do in this step, by scalar.
     pub fn acts(&self) -> [Act; MOST] {
         self.acts

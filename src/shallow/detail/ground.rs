@@ -1,0 +1,101 @@
+//! The ground of both sizes of cells.
+
+use super::Cells;
+use crate::shallow::grid::{BOTTOMLESS, Grid, TOP};
+use crate::shallow::terrain::Solids;
+use crate::shallow::terrain::solids::{Solid, unite};
+
+/// What is not of a liquid: solid up to the top, without room.
+pub(super) const WALL: &[Solid] = &[[BOTTOMLESS, TOP]];
+
+/// The terrain, in cells of both sizes.
+pub(super) struct Ground {
+    pub fine: Solids,
+    pub coarse: Solids,
+}
+
+impl Ground {
+    /// Finds the ground of coarse cells.
+    pub fn new(solids: &Solids) -> Self {
+        let Grid { cell, origin, size: [nx, nz] } = solids.grid;
+        let grid = Grid { cell: 2.0 * cell, origin, size: [nx / 2, nz / 2] };
+        let cells = (0..grid.cells()).map(|index| {
+            let [x, z] = [index % grid.size[0], index / grid.size[0]];
+            let four = [[0, 0], [1, 0], [0, 1], [1, 1]];
+            mean(four.map(|[dx, dz]| solids.cell(solids.grid.index([2 * x + dx, 2 * z + dz]))))
+        });
+        Self { fine: solids.clone(), coarse: Solids::new(grid, solids.heights, cells) }
+    }
+
+    /// The fine ground, and walls around the near cells.
+    pub fn fine_solids(&self, near: &Cells) -> Solids {
+        let grid = self.fine.grid;
+        let cell = |index: usize| self.fine_cell(near, [index % grid.size[0], index / grid.size[0]]);
+        let mut out = Solids::empty(grid, self.fine.heights);
+        (0..grid.cells()).for_each(|index| out.push(cell(index)));
+        out
+    }
+
+    /// The coarse ground, with walls in place of the near cells.
+    pub fn coarse_solids(&self, near: &Cells) -> Solids {
+        let grid = self.coarse.grid;
+        let cell = |index: usize| self.coarse_cell(near, [index % grid.size[0], index / grid.size[0]]);
+        let mut out = Solids::empty(grid, self.coarse.heights);
+        (0..grid.cells()).for_each(|index| out.push(cell(index)));
+        out
+    }
+
+    /// The solids of a fine cell.
+    pub fn fine_cell(&self, near: &Cells, [x, z]: [usize; 2]) -> &[Solid] {
+        let is_near = near[0].contains(&x) && near[1].contains(&z);
+        if is_near { self.fine.cell(self.fine.grid.index([x, z])) } else { WALL }
+    }
+
+    /// The solids of a coarse cell.
+    pub fn coarse_cell(&self, near: &Cells, [x, z]: [usize; 2]) -> &[Solid] {
+        let is_near = near[0].contains(&(2 * x)) && near[1].contains(&(2 * z));
+        if is_near { WALL } else { self.coarse.cell(self.coarse.grid.index([x, z])) }
+    }
+}
+
+/// The mean of four cells' solids, layer by layer from the lowest, over those that have each.
+fn mean(four: [&[Solid]; 4]) -> Vec<Solid> {
+    let layers = four.iter().map(|solids| solids.len()).max().unwrap_or(0);
+    let layer = |layer: usize| {
+        let own = || four.iter().filter_map(move |solids| solids.get(layer));
+        let of = |end: usize| {
+            let is_endless = own().any(|solid| solid[end] == BOTTOMLESS);
+            let sum: i64 = own().map(|solid| i64::from(solid[end])).sum();
+            if is_endless { BOTTOMLESS } else { sum.div_euclid(own().count() as i64) as i32 }
+        };
+        [of(0), of(1)]
+    };
+    let mut solids = (0..layers).map(layer).collect();
+    unite(&mut solids);
+    solids
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::shallow::grid::Heights;
+
+    #[test]
+    fn coarse_ground_is_the_mean_of_each_layer() {
+        let grid = Grid { cell: 1.0, origin: [0.0; 2], size: [4, 2] };
+        let heights = Heights::between(0.0, 1.0).unwrap();
+        let cell = |index: usize| match index {
+            0 => vec![[BOTTOMLESS, 10], [50, 60]],
+            1 | 4 => vec![[BOTTOMLESS, 12]],
+            5 => vec![[BOTTOMLESS, 13], [52, 63]],
+            _ => vec![[0, 7]],
+        };
+        let ground = Ground::new(&Solids::new(grid, heights, (0..8).map(cell)));
+        assert_eq!((ground.coarse.grid.cell, ground.coarse.grid.size), (2.0, [2, 1]));
+        assert_eq!(ground.coarse.cell(0), [[BOTTOMLESS, 11], [51, 61]]);
+        assert_eq!(ground.coarse.cell(1), [[0, 7]]);
+        let near = [2..4, 0..2];
+        assert_eq!((ground.fine_cell(&near, [2, 1]), ground.fine_cell(&near, [1, 1])), (&[[0, 7]][..], WALL));
+        assert_eq!((ground.coarse_cell(&near, [1, 0]), ground.coarse_cell(&near, [0, 0]).len()), (WALL, 2));
+    }
+}

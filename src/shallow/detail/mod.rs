@@ -1,0 +1,337 @@
+//! Level of detail: cells of the terrain's size near what matters, and of twice the size everywhere else.
+//!
+//! Two liquids over one lattice of heights: a *fine* one whose ground is there in a box of cells only, the *near* part, and a *coarse* one whose ground is
+//! there in all others (`ground.rs`). What is not theirs is a wall. Along the edge of the box pipes of their own join them (`seam.rs`). A coarse unit is four
+//! fine ones, so volumes are counted in fine units; what makes no coarse unit waits, and is part of the balance. When the box moves, four
+//! fine columns become a coarse one, and back (`shift.rs`), and
+//! what flows goes on (`momentum.rs`). Nothing is lost.
+
+mod ground;
+mod momentum;
+mod seam;
+mod shift;
+
+use std::ops::Range;
+
+use super::Shallow;
+use super::flow::bands::attended;
+use super::flows::FlowPoint;
+use super::grid::Grid;
+use super::pace::{self, MOST_STEPS};
+use super::params::Params;
+use super::system::{Balance, Report, Units};
+use super::terrain::Solids;
+use super::terrain::shapes::Shape;
+use crate::base::cpu::FlushDenormals;
+use crate::context::Context;
+use crate::error::{Error, Result};
+use ground::Ground;
+use momentum::Momentum;
+use seam::Seam;
+use shift::Shift;
+
+/// A box of cells: ranges of x and of z.
+pub type Cells = [Range<usize>; 2];
+
+/// Fine units in a coarse one.
+const FINE: i64 = 4;
+
+/// Liquid that flows over a terrain, in fine cells near and in coarse ones far away.
+pub struct Detail {
+    fine: Shallow,
+    coarse: Shallow,
+    ground: Ground,
+    seam: Seam,
+    shift: Shift,
+    momentum: Momentum,
+    /// The near cells.
+    near: Cells,
+    /// What of each coarse cell is no coarse unit (fine units), 0 and up.
+    rest: Vec<i64>,
+    points: Vec<FlowPoint>,
+}
+
+impl Detail {
+    /// Dry ground; the cells of `near` are fine. All others are of twice the size: their ground is the mean of that of four, layer by layer.
+    ///
+    /// # Errors
+    /// As [`Shallow::new`]; `Argument` also where the domain has an odd count of cells along an axis, as [`Detail::set_near`], and for falls.
+    pub fn new(ctx: &Context, solids: &Solids, params: Params, near: Cells) -> Result<Self> {
+        params.validate()?;
+        solids.grid.validate()?;
+        let [nx, nz] = solids.grid.size;
+        if nx % 2 + nz % 2 > 0 {
+            return Err(Error::argument(format!("{nx} x {nz} cells are not an even count along both axes")));
+        }
+        check_near(&near, solids.grid.size)?;
+        if params.falls.is_some() {
+            return Err(Error::argument("liquid with a level of detail does not fall freely"));
+        }
+        if solids.layers() == 0 {
+            return Err(Error::argument("the terrain has no surface that faces up within the domain"));
+        }
+        let ground = Ground::new(solids);
+        let fine = Shallow::new(ctx, &ground.fine_solids(&near), params.clone())?;
+        let coarse = Shallow::new(ctx, &ground.coarse_solids(&near), params)?;
+        let mut detail = Self {
+            rest: vec![0; coarse.columns.grid.cells()],
+            fine,
+            coarse,
+            ground,
+            seam: Seam::default(),
+            shift: Shift::default(),
+            momentum: Momentum::default(),
+            near,
+            points: Vec::new(),
+        };
+        detail.seam.find(&detail.fine, &detail.coarse, &detail.near);
+        Ok(detail)
+    }
+
+    /// The liquid of the near cells; all its others are walls.
+    pub fn fine(&self) -> &Shallow {
+        &self.fine
+    }
+
+    /// The liquid of the cells of twice the size; those that are near are walls.
+    pub fn coarse(&self) -> &Shallow {
+        &self.coarse
+    }
+
+    /// The near cells.
+    pub fn near(&self) -> &Cells {
+        &self.near
+    }
+
+    /// Moves the near cells. Liquid keeps its volume; its surface stays level where it was.
+    ///
+    /// # Errors
+    /// `Argument`: a box that is not within the domain, or whose sides are not at even cells.
+    pub fn set_near(&mut self, near: Cells) -> Result<()> {
+        check_near(&near, self.fine.columns.grid.size)?;
+        if near == self.near {
+            return Ok(());
+        }
+        let mut momentum = std::mem::take(&mut self.momentum);
+        momentum.begin(self, &self.near, shift::changed(&self.near, &near));
+        let old = std::mem::replace(&mut self.near, near);
+        self.convert(&old)?;
+        self.seam.find(&self.fine, &self.coarse, &self.near);
+        momentum.end(self);
+        self.momentum = momentum;
+        self.route();
+        Ok(())
+    }
+
+    /// Changes the terrain everywhere.
+    ///
+    /// # Errors
+    /// As [`Shallow::update_terrain`].
+    pub fn update_terrain(&mut self, solids: &Solids) -> Result<()> {
+        if (solids.grid, solids.heights) != (self.fine.columns.grid, self.fine.columns.heights) {
+            return Err(Error::argument("the terrain's cells or heights are not those of the liquid"));
+        }
+        if solids.layers() == 0 {
+            return Err(Error::argument("the terrain has no surface that faces up within the domain"));
+        }
+        self.ground = Ground::new(solids);
+        self.fine.update_terrain(&self.ground.fine_solids(&self.near))?;
+        self.coarse.update_terrain(&self.ground.coarse_solids(&self.near))?;
+        self.seam.find(&self.fine, &self.coarse, &self.near);
+        self.route();
+        Ok(())
+    }
+
+    /// Sets the solid shapes that move over the terrain.
+    ///
+    /// # Errors
+    /// As [`Shallow::set_bodies`].
+    pub fn set_bodies(&mut self, bodies: &[Shape]) -> Result<()> {
+        self.fine.set_bodies(bodies)?;
+        self.coarse.set_bodies(bodies)?;
+        self.seam.find(&self.fine, &self.coarse, &self.near);
+        self.route();
+        Ok(())
+    }
+
+    /// Changes the parameters.
+    ///
+    /// # Errors
+    /// As [`Shallow::set_params`].
+    pub fn set_params(&mut self, params: Params) -> Result<()> {
+        self.fine.set_params(params.clone())?;
+        self.coarse.set_params(params)
+    }
+
+    /// Sets sources, drains and absorbers; `which` names one in an error. Each acts on the cells of the size that its centre lies in.
+    ///
+    /// # Errors
+    /// As [`Shallow::set_flows`].
+    pub fn set_flows(&mut self, points: &[FlowPoint], which: impl Fn(usize) -> String) -> Result<()> {
+        for (at, point) in points.iter().enumerate() {
+            let owner = if self.is_near(point) { &self.fine } else { &self.coarse };
+            let mut found = Vec::new();
+            point.validate().map_err(|error| Error::argument(format!("{}: {error}", which(at))))?;
+            point.find_columns(&owner.columns, &mut found);
+            if found.is_empty() {
+                let [x, y, z] = point.at;
+                return Err(Error::argument(format!(
+                    "{}: at ({x}, {y}, {z}) there is only solid, or it lies outside of the domain",
+                    which(at)
+                )));
+            }
+        }
+        self.fine.set_flows_resting(points, &which)?;
+        self.coarse.set_flows_resting(points, &which)?;
+        self.points = points.to_vec();
+        self.route();
+        Ok(())
+    }
+
+    /// Gives a flow point another rate (m3/s).
+    ///
+    /// # Errors
+    /// As [`Shallow::set_rate`].
+    pub fn set_rate(&mut self, point: usize, rate: f64) -> Result<()> {
+        self.fine.set_rate(point, rate)?;
+        self.coarse.set_rate(point, rate)?;
+        self.points[point].rate = rate;
+        Ok(())
+    }
+
+    /// Pours a volume (m3; negative: takes it) as [`Shallow::pour_at`], into the cells of the size that the place lies in; returns what came in (m3).
+    ///
+    /// # Errors
+    /// As [`Shallow::pour_at`].
+    pub fn pour_at(&mut self, at: [f64; 3], radius: f64, volume: f64) -> Result<f64> {
+        let is_near = self.holds(at);
+        if is_near { &mut self.fine } else { &mut self.coarse }.pour_at(at, radius, volume)
+    }
+
+    /// Fills all columns up to a height (m), as [`Shallow::fill`].
+    pub fn fill(&mut self, height: f64) {
+        self.fine.fill(height);
+        self.coarse.fill(height);
+    }
+
+    fn is_near(&self, point: &FlowPoint) -> bool {
+        self.holds(point.at)
+    }
+
+    /// Whether a place lies over near cells.
+    fn holds(&self, [x, _, z]: [f64; 3]) -> bool {
+        let grid = self.fine.columns.grid;
+        let within = |axis: usize, at: f64| {
+            let at = (at - grid.origin[axis]) / grid.cell;
+            self.near[axis].start as f64 <= at && at < self.near[axis].end as f64
+        };
+        within(0, x) && within(1, z)
+    }
+
+    /// Lets each flow point act on the cells of one size, and takes what it waits for and has moved along.
+    fn route(&mut self) {
+        for at in 0..self.points.len() {
+            let is_near = self.is_near(&self.points[at]);
+            let place = self.points[at].at;
+            let [own, other] =
+                if is_near { [&mut self.fine, &mut self.coarse] } else { [&mut self.coarse, &mut self.fine] };
+            own.flows.move_to(&own.columns, at, place);
+            let (waiting, moved) = other.flows.rest(at);
+            let (own_waiting, own_moved) = own.flows.waiting_and_moved(at);
+            // In units of its own.
+            let (waiting, moved) = match is_near {
+                true => (waiting * FINE as f64, moved * FINE),
+                false => (waiting / FINE as f64, moved / FINE),
+            };
+            own.flows.set_progress(at, own_waiting + waiting, own_moved + moved);
+        }
+    }
+
+    /// One frame of `dt` (s).
+    ///
+    /// # Errors
+    /// As [`Shallow::step`].
+    pub fn step(&mut self, ctx: &Context, dt: f64) -> Result<Report> {
+        if !(dt > 0.0 && dt <= 1e6) {
+            return Err(Error::argument(format!("a frame of {dt} s is not within 0 to 1000000 s")));
+        }
+        if ctx.is_cancelled() {
+            return Err(Error::Cancelled);
+        }
+        let threads = ctx.pool().threads();
+        let divided =
+            [&mut self.fine, &mut self.coarse].map(|liquid| liquid.flow.divide(&liquid.columns, threads));
+        if divided.contains(&true) {
+            ctx.pool().install(|| attended(threads, || self.steps(dt)))
+        } else {
+            let _flush = FlushDenormals::begin();
+            self.steps(dt)
+        }
+    }
+
+    fn steps(&mut self, dt: f64) -> Result<Report> {
+        let Self { fine, coarse, seam, rest, .. } = self;
+        let measures = [fine.measures(), coarse.measures()];
+        let mut report = Report::default();
+        let halvings = [&mut *fine, &mut *coarse]
+            .into_iter()
+            .zip(&measures)
+            .map(|(liquid, measures)| liquid.begin(dt, measures, |pace| Some(pace::next(pace))))
+            .fold(0, u32::max);
+        while report.seconds < dt {
+            let left = dt - report.seconds;
+            let steps = report.steps;
+            let next =
+                |liquid: &Shallow, at: usize| pace::next(&liquid.next(&measures[at], left, steps, halvings));
+            let length = next(fine, 0).min(next(coarse, 1));
+            if steps == 0 && left / length > f64::from(MOST_STEPS) {
+                return Err(Error::argument(format!("a frame of {dt} s would take steps of {length} s")));
+            }
+            seam.begin_step(fine, coarse, &measures[0], length);
+            fine.advance(&measures[0], length, &mut report);
+            coarse.advance(&measures[1], length, &mut report);
+            seam.end_step(fine, coarse, rest);
+            report.steps = steps + 1;
+            report.seconds = if length >= left { dt } else { report.seconds + length };
+        }
+        report.deepest = measures[0].unit * f64::from(fine.flow.deepest().max(coarse.flow.deepest()));
+        Ok(report)
+    }
+
+    /// Simulated time (s).
+    pub fn time(&self) -> f64 {
+        self.fine.time()
+    }
+
+    /// Where all liquid is; what is no whole coarse unit counts as held.
+    pub fn balance(&self) -> Balance {
+        let [fine, coarse] = [self.fine.units(), self.coarse.units()];
+        let sum = |of: fn(&Units) -> i64| of(&fine) + FINE * of(&coarse);
+        let Grid { cell, .. } = self.fine.columns.grid;
+        let units = Units {
+            inside: sum(|units| units.inside),
+            poured: sum(|units| units.poured),
+            sourced: sum(|units| units.sourced),
+            drained: sum(|units| units.drained),
+            absorbed: sum(|units| units.absorbed),
+            lost: sum(|units| units.lost),
+            gained: sum(|units| units.gained),
+            held: sum(|units| units.held) + self.rest.iter().sum::<i64>(),
+            falling: 0,
+        };
+        units.balance(cell * cell * self.fine.columns.heights.unit)
+    }
+}
+
+fn check_near(near: &Cells, [nx, nz]: [usize; 2]) -> Result<()> {
+    let [x, z] = near;
+    if x.start >= x.end || z.start >= z.end || x.end > nx || z.end > nz {
+        return Err(Error::argument(format!(
+            "near cells {x:?} x {z:?} are not a box within {nx} x {nz} cells"
+        )));
+    }
+    if [x.start, x.end, z.start, z.end].iter().any(|side| side % 2 > 0) {
+        return Err(Error::argument(format!("near cells {x:?} x {z:?} do not begin and end at even ones")));
+    }
+    Ok(())
+}

@@ -1,0 +1,131 @@
+//! What flows goes on where the near cells move: through each side of a fine cell, whichever pipe it had before and has now.
+//!
+//! A coarse pipe is that of two sides, half of its volume each; within a coarse cell flows the mean of what comes in and goes out.
+
+use super::{Cells, Detail};
+use crate::shallow::Shallow;
+use crate::shallow::columns::STRIP;
+
+/// Fluxes through sides of fine cells (fine units a step): of each cell of some boxes those to the east and to the south, layer by layer.
+#[derive(Debug, Clone, Default)]
+pub(super) struct Momentum {
+    boxes: Vec<Cells>,
+    layers: usize,
+    fluxes: Vec<f32>,
+}
+
+/// The pipe of a side.
+enum Side {
+    /// Of the fine liquid: its column.
+    Fine(usize),
+    /// Of the coarse one, between two of its cells.
+    Coarse(usize),
+    /// Within a coarse cell: its column, and the one before it, if a pipe joins them.
+    Within(usize, Option<usize>),
+    /// Along the edge of the near cells: of this fine column, and which way.
+    Seam(usize, usize, i32),
+    /// None.
+    Closed,
+}
+
+impl Momentum {
+    /// Begins with the sides of boxes of fine cells, and of two cells around them.
+    pub fn begin(&mut self, detail: &Detail, near: &Cells, boxes: impl Iterator<Item = Cells>) {
+        let size = detail.fine.columns.grid.size;
+        let wider = |cells: Cells| {
+            [0, 1].map(|axis| cells[axis].start.saturating_sub(2)..(cells[axis].end + 2).min(size[axis]))
+        };
+        self.boxes.clear();
+        self.boxes.extend(boxes.filter(|cells| cells.iter().all(|range| !range.is_empty())).map(wider));
+        self.layers = detail.ground.fine.layers().max(detail.ground.coarse.layers());
+        let Self { boxes, layers, fluxes } = self;
+        fluxes.clear();
+        for cells in boxes {
+            each(cells, *layers, |cell, layer, axis| {
+                let flux = match side(detail, near, cell, layer, axis) {
+                    Side::Fine(column) => detail.fine.flow.flux[axis][column],
+                    Side::Coarse(column) => 2.0 * detail.coarse.flow.flux[axis][column],
+                    Side::Within(column, before) => {
+                        let flux = &detail.coarse.flow.flux[axis];
+                        flux[column] + before.map_or(0.0, |before| flux[before])
+                    }
+                    Side::Seam(column, axis, way) => way as f32 * detail.seam.flux(column, axis, way),
+                    Side::Closed => 0.0,
+                };
+                fluxes.push(flux);
+            });
+        }
+    }
+
+    /// Gives the sides' pipes of now what flowed before.
+    pub fn end(&self, detail: &mut Detail) {
+        let near = detail.near.clone();
+        let mut first = 0;
+        for cells in &self.boxes {
+            let width = 2 * self.layers;
+            let mut at = first;
+            each(cells, self.layers, |cell, layer, axis| {
+                let flux = self.fluxes[at];
+                match side(detail, &near, cell, layer, axis) {
+                    Side::Fine(column) => set(&mut detail.fine, axis, column, flux),
+                    Side::Coarse(column) if cell[1 - axis].is_multiple_of(2) => {
+                        let row = if axis == 0 { cells[0].len() } else { 1 };
+                        set(&mut detail.coarse, axis, column, 0.25 * (flux + self.fluxes[at + row * width]));
+                    }
+                    Side::Seam(column, axis, way) => {
+                        detail.seam.set_flux(column, axis, way, way as f32 * flux);
+                    }
+                    Side::Coarse(_) | Side::Within(..) | Side::Closed => {}
+                }
+                at += 1;
+            });
+            first = at;
+        }
+    }
+}
+
+fn set(liquid: &mut Shallow, axis: usize, column: usize, flux: f32) {
+    let open = [&liquid.pipes.east, &liquid.pipes.south][axis][column];
+    if open > 0.0 {
+        liquid.flow.flux[axis][column] = flux;
+    }
+}
+
+/// The pipe that leads from a fine cell to the next along an axis.
+fn side(detail: &Detail, near: &Cells, cell: [usize; 2], layer: usize, axis: usize) -> Side {
+    let mut next = cell;
+    next[axis] += 1;
+    let is_near = |cell: [usize; 2]| near[0].contains(&cell[0]) && near[1].contains(&cell[1]);
+    let coarse = |cell: [usize; 2]| detail.coarse.columns.column(cell.map(|at| at / 2), layer);
+    let found = match [is_near(cell), is_near(next)] {
+        [true, true] => detail.fine.columns.column(cell, layer).map(Side::Fine),
+        [true, false] => detail.fine.columns.column(cell, layer).map(|column| Side::Seam(column, axis, 1)),
+        [false, true] => detail.fine.columns.column(next, layer).map(|column| Side::Seam(column, axis, -1)),
+        [false, false] if cell[axis] % 2 == 1 => coarse(cell).map(Side::Coarse),
+        [false, false] => {
+            coarse(cell).map(|column| Side::Within(column, before(&detail.coarse, column, axis)))
+        }
+    };
+    found.unwrap_or(Side::Closed)
+}
+
+/// The column whose regular pipe along an axis leads to another.
+fn before(liquid: &Shallow, column: usize, axis: usize) -> Option<usize> {
+    let (strip, place) = (column / STRIP, column % STRIP);
+    if axis == 0 {
+        return (place > 0 || liquid.columns.west(strip).is_some()).then(|| column - 1);
+    }
+    let north = liquid.columns.north(strip) as usize;
+    (north < liquid.columns.strips().len()).then(|| north * STRIP + place)
+}
+
+/// Calls `see` with each fine cell of a box, layer and axis.
+fn each(cells: &Cells, layers: usize, mut see: impl FnMut([usize; 2], usize, usize)) {
+    for z in cells[1].clone() {
+        for x in cells[0].clone() {
+            for layer in 0..layers {
+                (0..2).for_each(|axis| see([x, z], layer, axis));
+            }
+        }
+    }
+}

@@ -1,0 +1,250 @@
+//! The near cells move: four fine columns become a coarse one, and back.
+//!
+//! A coarse column's liquid goes to the fine ones of its layer under a surface that leans as its neighbours say: level where the liquid is level, and
+//! along the ground where a film runs. What four columns cannot share equally waits in their cell, and goes into the coarse column again.
+
+use super::{Cells, Detail, FINE};
+use crate::error::Result;
+use crate::shallow::Shallow;
+use crate::shallow::scalars::MOST;
+
+/// Buffers.
+#[derive(Debug, Clone, Default)]
+pub(super) struct Shift {
+    /// What goes into coarse columns, and what goes into fine ones.
+    leaving: Vec<Moving>,
+    entering: Vec<Moving>,
+}
+
+/// Liquid of a coarse column that changes its cells.
+#[derive(Debug, Clone, Copy)]
+struct Moving {
+    /// Coarse cell.
+    cell: [usize; 2],
+    layer: usize,
+    /// Fine units.
+    units: i64,
+    /// Surface (units), and eight times its rise from the middle of a fine cell to that of the coarse one, along x and along z.
+    eta: i64,
+    rises: [i64; 2],
+}
+
+impl Detail {
+    /// Gives the cells that were near, or are, to the other liquid.
+    pub(super) fn convert(&mut self, old: &Cells) -> Result<()> {
+        let mut shift = std::mem::take(&mut self.shift);
+        let (near, [old_coarse, new_coarse]) =
+            (self.near.clone(), [old, &self.near].map(|cells| [0, 1].map(|axis| halved(&cells[axis]))));
+        shift.leaving.clear();
+        shift.entering.clear();
+        for cells in beyond(&old_coarse, &new_coarse) {
+            self.take_fine(&cells, &mut shift.leaving);
+        }
+        for cells in beyond(&new_coarse, &old_coarse) {
+            self.find_coarse(&cells, &mut shift.entering);
+        }
+        for Moving { cell, layer, .. } in &shift.entering {
+            if let Some(column) = self.coarse.columns.column(*cell, *layer) {
+                take(&mut self.coarse, column);
+            }
+        }
+        for cells in changed(&old_coarse, &new_coarse) {
+            let Self { fine, coarse, ground, .. } = self;
+            lay(coarse, &cells, |cell| ground.coarse_cell(&near, cell))?;
+            lay(fine, &cells.map(|range| 2 * range.start..2 * range.end), |cell| {
+                ground.fine_cell(&near, cell)
+            })?;
+        }
+        for moving in &shift.leaving {
+            self.give_coarse(moving);
+        }
+        for moving in &shift.entering {
+            self.give_fine(moving);
+        }
+        self.shift = shift;
+        Ok(())
+    }
+
+    /// Takes what is in the fine columns of coarse cells.
+    fn take_fine(&mut self, cells: &Cells, out: &mut Vec<Moving>) {
+        let fine = &mut self.fine;
+        for [x, z] in each(cells) {
+            let first = out.len();
+            for [fx, fz] in quarters([x, z]) {
+                let mut layer = 0;
+                while let Some(column) = fine.columns.column([fx, fz], layer) {
+                    let units = take(fine, column);
+                    let own = out[first..].iter_mut().find(|moving| moving.layer == layer);
+                    match own {
+                        Some(own) => own.units += units,
+                        None => out.push(Moving { cell: [x, z], layer, units, eta: 0, rises: [0; 2] }),
+                    }
+                    layer += 1;
+                }
+            }
+        }
+    }
+
+    /// Finds what is in coarse columns, and how its surface leans.
+    fn find_coarse(&self, cells: &Cells, out: &mut Vec<Moving>) {
+        let coarse = &self.coarse;
+        for cell in each(cells) {
+            let mut layer = 0;
+            while let Some(column) = coarse.columns.column(cell, layer) {
+                let units = FINE * i64::from(coarse.flow.depths()[column]);
+                let eta = surface(coarse, column);
+                let rises = lean(coarse, cell, layer, eta);
+                out.push(Moving { cell, layer, units, eta, rises });
+                layer += 1;
+            }
+        }
+    }
+
+    fn give_coarse(&mut self, moving: &Moving) {
+        let Self { coarse, rest, .. } = self;
+        let index = coarse.columns.grid.index(moving.cell);
+        let units = moving.units + std::mem::take(&mut rest[index]);
+        rest[index] = units.rem_euclid(FINE);
+        let whole = units.div_euclid(FINE);
+        let layers = coarse.columns.of_cell(moving.cell).count();
+        let column = coarse.columns.column(moving.cell, moving.layer.min(layers.saturating_sub(1)));
+        give(coarse, moving.cell, column, whole);
+    }
+
+    fn give_fine(&mut self, moving: &Moving) {
+        let Self { fine, rest, coarse, .. } = self;
+        let index = coarse.columns.grid.index(moving.cell);
+        let mut units = moving.units + std::mem::take(&mut rest[index]);
+        let cells = quarters(moving.cell);
+        let layer = |cell: [usize; 2]| {
+            let layers = fine.columns.of_cell(cell).count();
+            fine.columns.column(cell, moving.layer.min(layers.saturating_sub(1)))
+        };
+        let columns = cells.map(layer);
+        let signs = [[-1, -1], [1, -1], [-1, 1], [1, 1]];
+        let mut depths = [0; 4];
+        for (at, depth) in depths.iter_mut().enumerate() {
+            let Some(column) = columns[at] else { continue };
+            let base = i64::from(fine.columns.bases()[column]);
+            let lift = signs[at][0] * moving.rises[0] + signs[at][1] * moving.rises[1];
+            *depth = (moving.eta + lift.div_euclid(8) - base).max(0);
+        }
+        share(&mut depths, &columns, units);
+        for (at, &depth) in depths.iter().enumerate() {
+            give(fine, cells[at], columns[at], depth);
+            units -= depth;
+        }
+        rest[index] += units;
+    }
+}
+
+/// Makes depths add up to some units, but for what cannot be shared equally.
+fn share(depths: &mut [i64; 4], columns: &[Option<usize>; 4], units: i64) {
+    for _ in 0..4 {
+        let missing = units - depths.iter().sum::<i64>();
+        let is_wet = depths.iter().any(|&depth| depth > 0);
+        let takes = |at: usize, depth: i64| columns[at].is_some() && (depth > 0 || !is_wet && missing > 0);
+        let count = (0..4).filter(|&at| takes(at, depths[at])).count() as i64;
+        if missing == 0 || count == 0 {
+            return;
+        }
+        // Less than a unit each is not shared; what is too much is taken from all.
+        let each = missing.div_euclid(count);
+        for (at, depth) in depths.iter_mut().enumerate() {
+            if takes(at, *depth) {
+                *depth = (*depth + each).max(0);
+            }
+        }
+        if missing > 0 {
+            return;
+        }
+    }
+    // Never more than there is.
+    if depths.iter().sum::<i64>() > units {
+        *depths = [0; 4];
+    }
+}
+
+/// Eight times the rise of a surface from the middle of a coarse column to that of a fine one, along x and along z.
+fn lean(liquid: &Shallow, [x, z]: [usize; 2], layer: usize, eta: i64) -> [i64; 2] {
+    let beside = |x: Option<usize>, z: Option<usize>| {
+        let column = liquid.columns.column([x?, z?], layer)?;
+        (liquid.flow.depths()[column] > 0).then(|| surface(liquid, column))
+    };
+    let rise = |before: Option<i64>, behind: Option<i64>| match [before, behind] {
+        [Some(before), Some(behind)] => behind - before,
+        [Some(before), None] => 2 * (eta - before),
+        [None, Some(behind)] => 2 * (behind - eta),
+        [None, None] => 0,
+    };
+    [
+        rise(beside(x.checked_sub(1), Some(z)), beside(Some(x + 1), Some(z))),
+        rise(beside(Some(x), z.checked_sub(1)), beside(Some(x), Some(z + 1))),
+    ]
+}
+
+fn surface(liquid: &Shallow, column: usize) -> i64 {
+    i64::from(liquid.columns.bases()[column]) + i64::from(liquid.flow.depths()[column])
+}
+
+/// Takes all of a column.
+fn take(liquid: &mut Shallow, column: usize) -> i64 {
+    let depth = i64::from(liquid.flow.depths()[column]);
+    -liquid.flow.change_depth(&liquid.columns, column, -depth)
+}
+
+/// Gives units to a column of a cell; what finds no room waits there.
+fn give(liquid: &mut Shallow, cell: [usize; 2], column: Option<usize>, units: i64) {
+    let Shallow { flow, columns, remap, .. } = liquid;
+    let given = column.map_or(0, |column| flow.change_depth(columns, column, units));
+    let height = column.map_or(0, |column| columns.bases()[column]);
+    remap.held.add(columns.grid.index(cell), height, units - given, [0; MOST]);
+}
+
+/// Changes the ground of a box of cells.
+fn lay<'a>(
+    liquid: &mut Shallow,
+    cells: &Cells,
+    solids: impl Fn([usize; 2]) -> &'a [crate::shallow::terrain::solids::Solid],
+) -> Result<()> {
+    let [x, z] = cells.clone();
+    let width = x.len();
+    liquid.update_cells(cells.clone(), |rank| solids([x.start + rank % width, z.start + rank / width]))?;
+    Ok(())
+}
+
+/// The fine cells of a coarse one.
+fn quarters([x, z]: [usize; 2]) -> [[usize; 2]; 4] {
+    [[0, 0], [1, 0], [0, 1], [1, 1]].map(|[dx, dz]| [2 * x + dx, 2 * z + dz])
+}
+
+/// The boxes of fine cells that are near in one of two boxes only; some may be empty.
+pub(super) fn changed(old: &Cells, new: &Cells) -> impl Iterator<Item = Cells> {
+    beyond(old, new).into_iter().chain(beyond(new, old))
+}
+
+fn halved(range: &std::ops::Range<usize>) -> std::ops::Range<usize> {
+    range.start / 2..range.end / 2
+}
+
+fn each(cells: &Cells) -> impl Iterator<Item = [usize; 2]> {
+    let [x, z] = cells.clone();
+    z.flat_map(move |z| x.clone().map(move |x| [x, z]))
+}
+
+/// The boxes of `cells` that are not in `other`; some may be empty.
+fn beyond(cells: &Cells, other: &Cells) -> [Cells; 4] {
+    let [x, z] = cells;
+    let [ox, oz] = other;
+    let meets = x.start.max(ox.start) < x.end.min(ox.end) && z.start.max(oz.start) < z.end.min(oz.end);
+    if !meets {
+        return [[x.clone(), z.clone()], [0..0, 0..0], [0..0, 0..0], [0..0, 0..0]];
+    }
+    let rows = z.start.max(oz.start)..z.end.min(oz.end);
+    [
+        [x.clone(), z.start..rows.start],
+        [x.clone(), rows.end..z.end],
+        [x.start..ox.start.max(x.start), rows.clone()],
+        [ox.end.min(x.end)..x.end, rows],
+    ]
+}
