@@ -182,6 +182,7 @@ impl frz_shallow_target {
                 layers: self.layers.numbers("layers", 1)?,
                 columns: self.columns.numbers("columns", 1)?,
                 indices,
+                ..Target::default()
             })
         }
     }
