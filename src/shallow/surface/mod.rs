@@ -208,7 +208,9 @@ impl Surface {
                 return Err(Error::argument(format!("{count} {name} are not one for each of {len} indices")));
             }
         }
-        for carried in depths.carried.iter().filter(|carried| !carried.is_empty() && carried.len() != len) {
+        if let Some(carried) =
+            depths.carried.iter().find(|carried| !carried.is_empty() && carried.len() != len)
+        {
             let count = carried.len();
             return Err(Error::argument(format!(
                 "{count} concentrations are not one for each of {len} indices"
