@@ -96,6 +96,7 @@ mod shallow {
     mod balance;
     mod border;
     mod falls;
+    mod falls_scalars;
     mod flooded;
     mod flow;
     mod moving;

@@ -11,7 +11,8 @@ use crate::shallow::flow::lips::Over;
 use crate::shallow::pipes::Links;
 use crate::shallow::pipes::cliffs::beside;
 use crate::shallow::pipes::joints::Side;
-use crate::shallow::scalars::shares::MOST;
+use crate::shallow::scalars::amounts::{Account, Act};
+use crate::shallow::scalars::shares::{MOST, integer, take};
 use crate::shallow::system::Shallow;
 
 /// Bytes of a lip in a saved state.
@@ -24,14 +25,23 @@ const BRINK: f64 = 0.715;
 /// What went over a link and is no packet yet.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
 pub(in crate::shallow) struct Waiting {
-    /// How much it is (units), 0 and up.
+    /// How much it is (units), 0 and up, and what it carries of each scalar, which saved states have apart.
     pub units: i64,
+    pub amounts: [i64; MOST],
     /// Its speed outward (cells/s), times units.
     pub impulse: f64,
     /// Which way it fell last: from the link's second column.
     pub is_back: bool,
     /// Intervals that it waits for.
     pub waits: u32,
+}
+
+/// What lands on a column: units, and what they carry.
+#[derive(Debug, Clone, Copy)]
+struct Landing {
+    column: u32,
+    units: i64,
+    amounts: [i64; MOST],
 }
 
 /// All that is in the air.
@@ -41,8 +51,8 @@ pub(in crate::shallow) struct Falling {
     packets: Vec<Packet>,
     /// By link; none without falls.
     waiting: Vec<Waiting>,
-    /// Columns that packets land on in a step, and units; kept, so that nothing is allocated again.
-    landed: Vec<(u32, i64)>,
+    /// What lands in a step; kept, so that nothing is allocated again.
+    landed: Vec<Landing>,
     /// Seconds since packets were made last, and how often they were.
     pub since: f64,
     pub tick: u64,
@@ -62,7 +72,7 @@ impl Falling {
 
     /// Memory (bytes).
     pub fn bytes(&self) -> usize {
-        self.packets.capacity() * (size_of::<Packet>() + size_of::<(u32, i64)>())
+        self.packets.capacity() * (size_of::<Packet>() + size_of::<Landing>())
             + size_of_val(&self.waiting[..])
     }
 
@@ -89,6 +99,23 @@ impl Falling {
         packets + self.waiting.iter().map(|waiting| waiting.units).sum::<i64>()
     }
 
+    /// What is in the air of a scalar.
+    pub fn amount(&self, scalar: usize) -> i128 {
+        let packets: i128 = self.packets.iter().map(|packet| i128::from(packet.amounts[scalar])).sum();
+        packets + self.waiting.iter().map(|waiting| i128::from(waiting.amounts[scalar])).sum::<i128>()
+    }
+
+    /// Other scalars are carried: what is in the air has nothing of them.
+    pub fn forget_amounts(&mut self) {
+        self.loads().for_each(|(_, amounts)| *amounts = [0; MOST]);
+    }
+
+    /// Units of each packet and of what waits at each link, and what they carry.
+    fn loads(&mut self) -> impl Iterator<Item = (i64, &mut [i64; MOST])> {
+        let packets = self.packets.iter_mut().map(|packet| (packet.units, &mut packet.amounts));
+        packets.chain(self.waiting.iter_mut().map(|waiting| (waiting.units, &mut waiting.amounts)))
+    }
+
     /// Gives some links another count, at which nothing waits.
     pub fn replace(&mut self, links: Range<usize>, count: usize) {
         let new = links.start..links.start + count;
@@ -107,11 +134,12 @@ impl Waiting {
         bytes
     }
 
-    /// As [`Waiting::to_bytes`] has written it.
+    /// As [`Waiting::to_bytes`] has written it; it carries nothing.
     pub fn from_bytes(bytes: &[u8; LIP]) -> Self {
         let [units, impulse, last] = std::array::from_fn(|at| u64::from_le_bytes(bytes.as_chunks().0[at]));
         Self {
             units: units as i64,
+            amounts: [0; MOST],
             impulse: f64::from_bits(impulse),
             is_back: last >> 32 != 0,
             waits: last as u32,
@@ -142,6 +170,7 @@ impl Shallow {
     /// What falls, in a step of `dt` (s) that the flow has made.
     pub(in crate::shallow) fn fall(&mut self, dt: f64) {
         let Some(falls) = self.params.falls else { return };
+        self.obey_in_the_air();
         self.fly(dt);
         self.gather(dt);
         self.falls.since += dt;
@@ -153,30 +182,55 @@ impl Shallow {
         }
     }
 
+    /// Scalars follow their laws in the air, too.
+    fn obey_in_the_air(&mut self) {
+        for (scalar, act) in self.flow.amounts.acts().iter().enumerate() {
+            if *act != Act::default() {
+                let loads = self.falls.loads();
+                let grown = loads.map(|(units, amounts)| act.change(units, &mut amounts[scalar])).sum();
+                self.flow.amounts.grow(scalar, grown);
+            }
+        }
+    }
+
     /// Moves all packets, and lands those that meet something. All fly over the same surfaces, so that nothing depends on their order.
     fn fly(&mut self, dt: f64) {
         let mut packets = std::mem::take(&mut self.falls.packets);
         let mut landed = std::mem::take(&mut self.falls.landed);
-        let (air, mut lost) = (self.air(), 0);
+        let (air, mut lost, mut gone) = (self.air(), 0, [0; MOST]);
         packets.retain_mut(|packet| {
             let end = air.fly(packet, dt);
             match end {
                 End::Flies => {}
-                End::Lands(column) => landed.push((column as u32, packet.units)),
-                End::Leaves => lost += packet.units,
+                End::Lands(column) => landed.push(packet.landing(column)),
+                End::Leaves => {
+                    lost += packet.units;
+                    add(&mut gone, &packet.amounts);
+                }
             }
             end == End::Flies
         });
         self.flow.links.lost += lost;
+        self.flow.amounts.count_in(Account::Lost, &gone);
         self.falls.packets = packets;
         self.land_all(landed);
     }
 
-    /// Adds what has landed to its columns, and gives what finds no room there to those around; returns what falls from there into the void.
-    fn land_all(&mut self, mut landed: Vec<(u32, i64)>) -> i64 {
+    /// Adds what has landed to its columns, all of a column at once, so that it does not depend on their order, and gives what finds no room there to
+    /// those around; returns what falls from there into the void.
+    fn land_all(&mut self, mut landed: Vec<Landing>) -> i64 {
+        landed.sort_unstable_by_key(|landing| landing.column);
+        landed.dedup_by(|next, first| {
+            let same = next.column == first.column;
+            if same {
+                first.units += next.units;
+                add(&mut first.amounts, &next.amounts);
+            }
+            same
+        });
         let mut waits = false;
-        for (column, units) in landed.drain(..) {
-            waits |= self.land(column as usize, units);
+        for landing in landed.drain(..) {
+            waits |= self.land(landing);
         }
         self.falls.landed = landed;
         if waits { self.release() } else { 0 }
@@ -193,14 +247,16 @@ impl Shallow {
         }
     }
 
-    /// Adds units to a column; whether some find no room there and wait.
-    fn land(&mut self, column: usize, units: i64) -> bool {
-        let (columns, flow) = (&self.columns, &mut self.flow);
-        let rest = units - flow.change_depth(columns, column, units);
+    /// Adds liquid to a column; whether some finds no room there and waits.
+    fn land(&mut self, Landing { column, units, mut amounts }: Landing) -> bool {
+        let (columns, flow, column) = (&self.columns, &mut self.flow, column as usize);
+        let added = flow.change_depth(columns, column, units);
+        let mut own = [0; MOST];
+        take(&mut amounts, added, units, &mut own);
+        flow.amounts.put(column, &own);
         let cell = columns.grid.index(columns.cell(column));
-        // What falls carries no scalars.
-        self.remap.held.add(cell, columns.bases()[column], rest, [0; MOST]);
-        rest > 0
+        self.remap.held.add(cell, columns.bases()[column], units - added, amounts);
+        added < units
     }
 
     /// Takes what went over the lips in a step of `dt` (s).
@@ -218,6 +274,10 @@ impl Shallow {
             let waiting = &mut falls.waiting[over.link];
             waiting.is_back = is_back;
             waiting.units += over.units;
+            for (waiting, fallen) in waiting.amounts.iter_mut().zip(&flow.links.fallen) {
+                let fallen = fallen.get(over.link).copied().unwrap_or(0.0);
+                *waiting = waiting.saturating_add(integer(fallen));
+            }
             waiting.impulse += over.units as f64 * speed;
         }
     }
@@ -233,7 +293,7 @@ impl Shallow {
             count += usize::from(waiting.goes(least, all));
         }
         let fits = self.falls.packets.len() + count <= falls.most;
-        let mut waits = false;
+        let mut landed = std::mem::take(&mut self.falls.landed);
         for link in links {
             let waiting = self.falls.waiting[link];
             if waiting.units == 0 || !waiting.goes(least, all) {
@@ -247,13 +307,16 @@ impl Shallow {
             }
             let links = &self.pipes.links;
             match if waiting.is_back { links.from[link] } else { links.to[link] } {
-                NONE => self.flow.links.lost += waiting.units,
-                below => waits |= self.land(below as usize, waiting.units),
+                NONE => {
+                    self.flow.links.lost += waiting.units;
+                    self.flow.amounts.count_in(Account::Lost, &waiting.amounts);
+                }
+                column => {
+                    landed.push(Landing { column, units: waiting.units, amounts: waiting.amounts });
+                }
             }
         }
-        if waits {
-            self.release();
-        }
+        self.land_all(landed);
     }
 
     /// A packet at the beginning of its flight: at the side of the cell that it falls into.
@@ -279,6 +342,7 @@ impl Shallow {
             along,
             age: 0.0,
             units: waiting.units,
+            amounts: waiting.amounts,
             source: lip << 16 | columns.layer(from) as u64,
             tick: self.falls.tick,
         }
@@ -301,12 +365,24 @@ impl Shallow {
         let air = self.air();
         packets.retain(|packet| {
             let above = air.above_solid(packet);
-            landed.extend(above.map(|column| (column as u32, packet.units)));
+            landed.extend(above.map(|column| packet.landing(column)));
             above.is_none()
         });
         self.falls.packets = packets;
         self.land_all(landed)
     }
+}
+
+impl Packet {
+    /// It lands on a column.
+    fn landing(&self, column: usize) -> Landing {
+        Landing { column: column as u32, units: self.units, amounts: self.amounts }
+    }
+}
+
+/// Adds amounts to others.
+fn add(to: &mut [i64; MOST], amounts: &[i64; MOST]) {
+    to.iter_mut().zip(amounts).for_each(|(to, amount)| *to = to.saturating_add(*amount));
 }
 
 impl Waiting {

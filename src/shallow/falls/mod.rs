@@ -20,6 +20,8 @@ mod packet;
 use crate::error::{Error, Result};
 use crate::shallow::columns::Columns;
 use crate::shallow::pipes::cliffs::Cliffs;
+use crate::shallow::scalars::MOST;
+use crate::shallow::scalars::shares::LEVELS;
 use crate::shallow::system::Shallow;
 pub(super) use falling::{Falling, LIP, Waiting};
 pub(super) use packet::{PACKET, Packet};
@@ -89,6 +91,8 @@ pub struct Droplet {
     pub age: f64,
     /// Its lip: the same number for all that come from one side of one column.
     pub source: u64,
+    /// Concentration of each scalar that it carries, in the scalar's own measure.
+    pub concentrations: [f32; MOST],
     /// One more than that of the drop that left the same lip before it, if nothing interrupted the flow there.
     pub number: u64,
 }
@@ -98,7 +102,12 @@ impl Shallow {
     pub fn drops(&self) -> impl ExactSizeIterator<Item = Droplet> + '_ {
         let (grid, heights) = (self.columns.grid, self.columns.heights);
         let unit = grid.cell * grid.cell * heights.unit;
+        let scalars = self.scalars();
         self.falls.packets().iter().map(move |packet| {
+            let mut concentrations = [0.0; MOST];
+            for ((out, scalar), amount) in concentrations.iter_mut().zip(scalars).zip(packet.amounts) {
+                *out = (amount as f64 / packet.units as f64 * (scalar.range / LEVELS)) as f32;
+            }
             let place = |axis: usize| {
                 grid.origin[axis] + (f64::from(packet.cell[axis]) + 0.5 + packet.offset[axis]) * grid.cell
             };
@@ -111,6 +120,7 @@ impl Shallow {
                 radius: libm::cbrt(0.75 / std::f64::consts::PI * volume),
                 age: packet.age,
                 source: packet.source,
+                concentrations,
                 number: packet.tick,
             }
         })

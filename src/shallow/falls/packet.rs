@@ -2,6 +2,7 @@
 
 use crate::shallow::columns::Columns;
 use crate::shallow::grid::TOP;
+use crate::shallow::scalars::MOST;
 
 /// Bytes of a packet in a saved state.
 pub(in crate::shallow) const PACKET: usize = 88;
@@ -21,8 +22,9 @@ pub(in crate::shallow) struct Packet {
     pub along: [f64; 2],
     /// Seconds since it left its lip.
     pub age: f64,
-    /// How much it is (units), over 0.
+    /// How much it is (units), over 0, and what it carries of each scalar, which saved states have apart.
     pub units: i64,
+    pub amounts: [i64; MOST],
     /// Where it came from: the cell (`Grid::index`), its side and its layer.
     pub source: u64,
     /// When it was made: the count of times at which packets were made since the start.
@@ -43,13 +45,24 @@ impl Packet {
         bytes
     }
 
-    /// As [`Packet::to_bytes`] has written it.
+    /// As [`Packet::to_bytes`] has written it; it carries nothing.
     pub fn from_bytes(bytes: &[u8; PACKET]) -> Self {
         let all: [u64; PACKET / 8] = std::array::from_fn(|at| u64::from_le_bytes(bytes.as_chunks().0[at]));
         let [cell, units, source, tick, floats @ ..] = all;
         let [x, z, height, down, east, south, age] = floats.map(f64::from_bits);
         let (cell, units) = ([cell as u32, (cell >> 32) as u32], units as i64);
-        Self { cell, offset: [x, z], height, down, along: [east, south], age, units, source, tick }
+        Self {
+            cell,
+            offset: [x, z],
+            height,
+            down,
+            along: [east, south],
+            age,
+            units,
+            amounts: [0; MOST],
+            source,
+            tick,
+        }
     }
 
     /// Whether it may be in the air over such columns.
@@ -80,6 +93,7 @@ mod tests {
             along: [-3.0, 0.125],
             age: 0.75,
             units: 1 << 40,
+            amounts: [0; MOST],
             source: 99 << 18,
             tick: 5,
         };

@@ -4,7 +4,8 @@
 //! It follows the rows of a step (`rows.rs`): the levels of the row in front, and, when the transfers of a row are final, what these take along.
 
 use super::buffers::RING;
-use super::network::Network;
+use super::lips::{Fall, Lips};
+use super::network::{At, Network};
 use super::parts::{Parts, indices};
 use super::places::Place;
 use super::rows::Ground;
@@ -97,7 +98,7 @@ impl Lanes {
                 if units == 0 {
                     continue;
                 }
-                let (from, to) = (links.from[link], links.to[link]);
+                let (from, to, fall) = (links.from[link], links.to[link], ground.lips.at(link));
                 // From outside comes what is like the liquid inside.
                 let giver = if units > 0 || to == NONE { from } else { to };
                 let moved = share(place.pick(levels, beyond, giver), f64::from(units));
@@ -112,6 +113,12 @@ impl Lanes {
                         }
                     }
                 };
+                if fall != Fall::No {
+                    let fallen = if units > 0 { moved } else { -moved };
+                    change(giver, -fallen);
+                    part.links.fallen[scalar][link - part.first_link] = fallen;
+                    continue;
+                }
                 change(from, -moved);
                 match to {
                     NONE if is_own && units > 0 => changes[scalar].lost += i128::from(integer(moved)),
@@ -250,13 +257,29 @@ fn obey(act: Act, depth: &[i32], amount: &mut [f64]) -> i64 {
 }
 
 impl Network {
-    /// Moves what the network's units take along, at the concentrations before; `depth` is that before, too.
-    pub fn carry(&self, depth: &[i32], amounts: &mut [f64], levels: &mut Vec<f64>, changes: &mut Changes) {
+    /// Moves what the network's units take along, at the concentrations before; `depth` is that before, too. `fallen` gets what goes over lips.
+    pub fn carry(
+        &self,
+        depth: &[i32],
+        (lips, fallen): (&Lips, &mut [f64]),
+        amounts: &mut [f64],
+        levels: &mut Vec<f64>,
+        changes: &mut Changes,
+    ) {
         let of = |column: u32| level(amounts[column as usize], depth[column as usize]);
         levels.clear();
         levels.extend(self.parties.iter().map(|party| of(party.column)));
         for edge in self.edges.iter().filter(|edge| edge.units != 0) {
             let [from, to] = edge.ends;
+            if let At::Link(link) = edge.at
+                && lips.at(link as usize) != Fall::No
+            {
+                let giver = if from == NONE { to } else { from } as usize;
+                let moved = share(levels[giver], edge.units.abs() as f64);
+                amounts[self.parties[giver].column as usize] -= moved;
+                fallen[link as usize] = moved;
+                continue;
+            }
             let giver = if edge.units > 0 || to == NONE { from } else { to };
             let moved = share(levels[giver as usize], edge.units as f64);
             amounts[self.parties[from as usize].column as usize] -= moved;

@@ -8,6 +8,7 @@ use super::flux::{Kind, Step, flux_of, lesser, split};
 use super::lips::{Fall, Lips, edge};
 use super::parts::LinkPart;
 use crate::shallow::pipes::Links;
+use crate::shallow::scalars::MOST as SCALARS;
 
 /// Beyond what any column has (units): sums of transfers stay within 64 bits.
 const MOST: f32 = 2.1e9;
@@ -21,6 +22,8 @@ pub struct LinkFlow {
     pub left: Vec<f32>,
     /// Transfer in this step (units).
     pub transfer: Vec<f32>,
+    /// What went over it freely in the last step: amounts of each scalar that the liquid carries.
+    pub fallen: [Vec<f64>; SCALARS],
     /// Units that left the domain since the flow began.
     pub lost: i64,
     /// Units that came in over an absorbing border.
@@ -31,14 +34,31 @@ impl LinkFlow {
     /// No flow.
     pub fn new(links: &Links) -> Self {
         let none = vec![0.0; links.len()];
-        Self { flux: none.clone(), left: none.clone(), transfer: none, lost: 0, gained: 0 }
+        Self { flux: none.clone(), left: none.clone(), transfer: none, ..Self::default() }
+    }
+
+    /// What falls freely has so many scalars.
+    pub(super) fn carry(&mut self, scalars: usize) {
+        for (at, fallen) in self.fallen.iter_mut().enumerate() {
+            *fallen = vec![0.0; if at < scalars { self.flux.len() } else { 0 }];
+        }
     }
 
     /// Puts links with other flow in place of some.
-    pub(in crate::shallow) fn replace(&mut self, part: Range<usize>, flux: &[f32], left: &[f32]) {
+    pub(in crate::shallow) fn replace(
+        &mut self,
+        part: Range<usize>,
+        flux: &[f32],
+        left: &[f32],
+        scalars: usize,
+    ) {
         let new = part.start..part.start + flux.len();
         for numbers in [&mut self.flux, &mut self.left, &mut self.transfer] {
             resize_part(numbers, part.clone(), new.len(), 0.0);
+        }
+        for fallen in self.fallen.iter_mut().take(scalars) {
+            resize_part(fallen, part.clone(), new.len(), 0.0);
+            fallen[new.clone()].fill(0.0);
         }
         self.flux[new.clone()].copy_from_slice(flux);
         self.left[new.clone()].copy_from_slice(left);

@@ -189,6 +189,7 @@ impl Flow {
     /// Carries other scalars, of which there is nothing yet.
     pub(super) fn carry(&mut self, columns: &Columns, amounts: Amounts) {
         self.bands.carry(columns, amounts.count());
+        self.links.carry(amounts.count());
         self.amounts = amounts;
     }
 
@@ -349,8 +350,9 @@ impl Flow {
     fn carry_flooded(&mut self) {
         let Amounts { amounts, party_levels, scalars, .. } = &mut self.amounts;
         let mut changes = [Changes::default(); MOST];
-        for (amounts, changes) in amounts.iter_mut().zip(&mut changes).take(scalars.len()) {
-            self.network.carry(&self.depth, amounts, party_levels, changes);
+        let each = amounts.iter_mut().zip(&mut self.links.fallen).zip(&mut changes);
+        for ((amounts, fallen), changes) in each.take(scalars.len()) {
+            self.network.carry(&self.depth, (&self.lips, fallen), amounts, party_levels, changes);
         }
         self.amounts.settle(&changes);
     }

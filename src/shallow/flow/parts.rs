@@ -37,6 +37,8 @@ pub struct LinkPart<'a> {
     pub left: &'a mut [f32],
     /// Transfer in this step (units).
     pub transfer: &'a mut [f32],
+    /// What went over it freely; empty without scalars.
+    pub fallen: [&'a mut [f64]; MOST],
 }
 
 /// Copies of the rows beside a band.
@@ -77,7 +79,10 @@ impl Copy {
         }
         copy(&mut self.links.flux, &liquid.links.flux[links.clone()]);
         copy(&mut self.links.left, &liquid.links.left[links.clone()]);
-        copy(&mut self.links.transfer, &liquid.links.transfer[links]);
+        copy(&mut self.links.transfer, &liquid.links.transfer[links.clone()]);
+        for (own, fallen) in self.links.fallen.iter_mut().zip(&liquid.links.fallen) {
+            copy(own, if fallen.is_empty() { &[] } else { &fallen[links.clone()] });
+        }
     }
 
     /// The copies, as a part.
@@ -103,6 +108,17 @@ fn copy<T: Clone>(to: &mut Vec<T>, from: &[T]) {
     to.extend_from_slice(from);
 }
 
+/// Arrays of scalars in two parts; those that are empty have none.
+type Halves<'a> = ([&'a mut [f64]; MOST], [&'a mut [f64]; MOST]);
+
+fn split(all: [&mut [f64]; MOST], at: usize) -> Halves<'_> {
+    let [mut before, mut behind] = [(); 2].map(|()| [(); MOST].map(|()| &mut [][..]));
+    for (scalar, numbers) in all.into_iter().enumerate() {
+        (before[scalar], behind[scalar]) = numbers.split_at_mut(at.min(numbers.len()));
+    }
+    (before, behind)
+}
+
 impl<'a> Part<'a> {
     /// All of a liquid.
     pub fn new(
@@ -118,7 +134,12 @@ impl<'a> Part<'a> {
             depth,
             flux,
             left,
-            links: LinkPart { flux: &mut links.flux, left: &mut links.left, transfer: &mut links.transfer },
+            links: LinkPart {
+                flux: &mut links.flux,
+                left: &mut links.left,
+                transfer: &mut links.transfer,
+                fallen: links.fallen.each_mut().map(Vec::as_mut_slice),
+            },
             amounts,
         }
     }
@@ -134,10 +155,8 @@ impl<'a> Part<'a> {
         let flux = self.links.flux.split_at_mut(at_link);
         let left = self.links.left.split_at_mut(at_link);
         let transfer = self.links.transfer.split_at_mut(at_link);
-        let [mut before, mut behind] = [(); 2].map(|()| [(); MOST].map(|()| &mut [][..]));
-        for (scalar, amounts) in self.amounts.into_iter().enumerate() {
-            (before[scalar], behind[scalar]) = amounts.split_at_mut(at.min(amounts.len()));
-        }
+        let amounts = split(self.amounts, at);
+        let fallen = split(self.links.fallen, at_link);
         [
             Self {
                 start: self.start,
@@ -145,8 +164,8 @@ impl<'a> Part<'a> {
                 depth: depth.0,
                 flux: [flux_east.0, flux_south.0],
                 left: [left_east.0, left_south.0],
-                links: LinkPart { flux: flux.0, left: left.0, transfer: transfer.0 },
-                amounts: before,
+                links: LinkPart { flux: flux.0, left: left.0, transfer: transfer.0, fallen: fallen.0 },
+                amounts: amounts.0,
             },
             Self {
                 start: index,
@@ -154,8 +173,8 @@ impl<'a> Part<'a> {
                 depth: depth.1,
                 flux: [flux_east.1, flux_south.1],
                 left: [left_east.1, left_south.1],
-                links: LinkPart { flux: flux.1, left: left.1, transfer: transfer.1 },
-                amounts: behind,
+                links: LinkPart { flux: flux.1, left: left.1, transfer: transfer.1, fallen: fallen.1 },
+                amounts: amounts.1,
             },
         ]
     }

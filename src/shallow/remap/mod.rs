@@ -226,7 +226,7 @@ impl Shallow {
         let old = pipes.links.row(rows.start).start..pipes.links.row(rows.end - 1).end;
         let shift = origins.shift().wrapping_mul(STRIP as u32);
         let is_same = shift == 0 && carry.is_same(links);
-        flow.links.replace(old.clone(), &carry.flux, &carry.left);
+        flow.links.replace(old.clone(), &carry.flux, &carry.left, flow.amounts.count());
         if params.falls.is_some() {
             falls.replace(old.clone(), links.len());
         }

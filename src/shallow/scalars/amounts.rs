@@ -60,6 +60,19 @@ pub(in crate::shallow) struct Act {
     pub loses: f64,
 }
 
+impl Act {
+    /// What it does to the amount of so many units, as `obey` in `flow/carry.rs` to that of a column; returns by how much it grows.
+    pub fn change(&self, units: i64, amount: &mut i64) -> i128 {
+        let (units, before) = (i128::from(units), i128::from(*amount));
+        let kept = before - (*amount as f64 * self.loses).round_ties_even() as i128;
+        let older = kept + units * self.grows as i128;
+        let most = units * LEVELS as i128;
+        let now = if self.grows > 0.0 { older.min(most) } else { older };
+        *amount = now.clamp(i128::from(i64::MIN), i128::from(i64::MAX)) as i64;
+        i128::from(*amount) - before
+    }
+}
+
 /// The scalars of a liquid.
 #[derive(Debug, Clone)]
 pub(in crate::shallow) struct Amounts {
@@ -177,6 +190,11 @@ impl Amounts {
         for (at, amount) in amounts.iter().enumerate().take(self.count()) {
             self.amounts[at][index] += *amount as f64;
         }
+    }
+
+    /// A law has added so much where no column is.
+    pub fn grow(&mut self, scalar: usize, grown: i128) {
+        self.sums[scalar][Account::Grown as usize] += grown;
     }
 
     /// Counts amounts.

@@ -59,6 +59,8 @@ pub struct ScalarBalance {
     pub gained: f64,
     /// Waiting for room, where the terrain moved.
     pub held: f64,
+    /// In the air ([`Params::falls`](super::Params)).
+    pub falling: f64,
     /// Added by its law; negative: taken.
     pub grown: f64,
     /// Left by rounding in columns that ran dry: a few of the smallest amounts for each.
@@ -111,12 +113,8 @@ impl Shallow {
     /// sources has none until [`Shallow::set_poured`] and [`Shallow::set_sourced`]. Frames allocate nothing for scalars.
     ///
     /// # Errors
-    /// `Argument`: more than [`MOST`] scalars, as [`Scalar::validate`], or two of the same name; liquid that falls freely, as what is in the air carries
-    /// none.
+    /// `Argument`: more than [`MOST`] scalars, as [`Scalar::validate`], or two of the same name.
     pub fn set_scalars(&mut self, scalars: &[Scalar]) -> Result<()> {
-        if self.params.falls.is_some() && !scalars.is_empty() {
-            return Err(Error::argument("liquid that falls freely carries no scalars: falls, or scalars"));
-        }
         if scalars.len() > MOST {
             return Err(Error::argument(format!("{} scalars are more than {MOST}", scalars.len())));
         }
@@ -129,6 +127,7 @@ impl Shallow {
         self.flow.carry(&self.columns, Amounts::new(scalars.to_vec(), self.columns.len() + STRIP));
         self.flows.forget_levels();
         self.remap.held.forget_amounts();
+        self.falls.forget_amounts();
         Ok(())
     }
 
@@ -219,6 +218,7 @@ impl Shallow {
         let unit = cell * cell * self.columns.heights.unit * (amounts.scalars[scalar].range / LEVELS);
         let of = |account: Account| amounts.sums[scalar][account as usize];
         let (inside, held) = (amounts.inside(scalar), self.remap.held.amount(scalar));
+        let falling = self.falls.amount(scalar);
         let came = of(Account::Poured) + of(Account::Sourced) + of(Account::Gained) + of(Account::Grown);
         let went = of(Account::Drained) + of(Account::Absorbed) + of(Account::Lost) + of(Account::Dried);
         let cubic = |amount: i128| amount as f64 * unit;
@@ -231,9 +231,10 @@ impl Shallow {
             lost: cubic(of(Account::Lost)),
             gained: cubic(of(Account::Gained)),
             held: cubic(held),
+            falling: cubic(falling),
             grown: cubic(of(Account::Grown)),
             dried: cubic(of(Account::Dried)),
-            error: came - went - inside - held,
+            error: came - went - inside - held - falling,
         })
     }
 }

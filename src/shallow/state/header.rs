@@ -73,7 +73,8 @@ impl Counts {
             + 8 * self.links
             + (4 + SHARE) * self.heads
             + ARRAYS * SHARE * self.strips
-            + self.scalars * (SCALAR + 8 * self.parcels + 2 * SHARE * self.strips)
+            + self.scalars
+                * (SCALAR + 8 * (self.parcels + self.packets + self.lips) + 2 * SHARE * self.strips)
             + SEAL
     }
 }

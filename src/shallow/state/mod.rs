@@ -327,7 +327,8 @@ impl<'a> Saved<'a> {
     fn apply(&self, shallow: &mut Shallow) {
         let Shallow { flow, flows, columns, remap, falls, .. } = &mut *shallow;
         remap.held.set(self.parcels().enumerate().map(|(at, parcel)| self.scalars.with_amounts(at, parcel)));
-        falls.set(self.packets(), self.lips());
+        let packets = self.packets().enumerate().map(|(at, packet)| self.scalars.in_packet(at, packet));
+        falls.set(packets, self.lips().enumerate().map(|(at, waiting)| self.scalars.at_link(at, waiting)));
         (falls.since, falls.tick) = (self.header.since, self.header.tick);
         let [poured, sourced, drained, absorbed, lost, gained] = self.header.sums;
         let mut stored = flow.stored();

@@ -4,7 +4,7 @@
 //! |---|---|
 //! | its law, nothing, its range, its half-life, what is due | 4, 4, 8, 8, 8 |
 //! | sums of amounts, by account | 16 each |
-//! | amounts of liquid that waits for room | 8 each |
+//! | amounts of liquid that waits for room, of packets in the air, and of what waits at links to fall | 8 each |
 //! | of each run of active strips: amounts | 128 a strip |
 
 use std::ops::Range;
@@ -14,6 +14,7 @@ use super::{Put, Saved, get, part, parts, refused};
 use crate::base::bytes::Reader;
 use crate::error::Result;
 use crate::shallow::columns::STRIP;
+use crate::shallow::falls::{Packet, Waiting};
 use crate::shallow::flow::active::runs;
 use crate::shallow::remap::Parcel;
 use crate::shallow::scalars::amounts::{ACCOUNTS, Amounts};
@@ -36,6 +37,9 @@ pub(super) fn put(shallow: &Shallow, to: &mut Put<'_>) {
         to.numbers(&amounts.sums[at], i128::to_le_bytes);
         let parcels = shallow.remap.held.parcels();
         parcels.iter().for_each(|parcel| to.bytes(&parcel.amounts[at].to_le_bytes()));
+        let (packets, lips) = (shallow.falls.packets(), shallow.falls.waiting());
+        packets.iter().for_each(|packet| to.bytes(&packet.amounts[at].to_le_bytes()));
+        lips.iter().for_each(|waiting| to.bytes(&waiting.amounts[at].to_le_bytes()));
         for run in runs(shallow.flow.active()) {
             to.numbers(&amounts.amounts[at][run.start * STRIP..run.end * STRIP], f64::to_le_bytes);
         }
@@ -47,6 +51,8 @@ pub(super) fn put(shallow: &Shallow, to: &mut Put<'_>) {
 struct Part<'a> {
     head: &'a [u8; SCALAR],
     parcels: &'a [[u8; 8]],
+    packets: &'a [[u8; 8]],
+    lips: &'a [[u8; 8]],
     /// Two shares for each strip.
     shares: &'a [[u8; SHARE]],
 }
@@ -63,8 +69,9 @@ impl<'a> Scalars<'a> {
         let mut all = [None; MOST];
         for own in all.iter_mut().take(counts.scalars) {
             let head = &parts(from, 1)?[0];
-            let (parcels, shares) = (parts(from, counts.parcels)?, parts(from, 2 * counts.strips)?);
-            *own = Some(Part { head, parcels, shares });
+            let parcels = parts(from, counts.parcels)?;
+            let (packets, lips) = (parts(from, counts.packets)?, parts(from, counts.lips)?);
+            *own = Some(Part { head, parcels, packets, lips, shares: parts(from, 2 * counts.strips)? });
         }
         Ok(Self { count: counts.scalars, parts: all })
     }
@@ -101,18 +108,36 @@ impl<'a> Scalars<'a> {
             let due = part.number(24);
             (0.0..1e30).contains(&due)
                 && part.sums().iter().all(|sum| SUMS.contains(sum))
-                && part.parcels.iter().all(|amount| WAITING.contains(&i64::from_le_bytes(*amount)))
+                && [part.parcels, part.packets, part.lips]
+                    .into_iter()
+                    .flatten()
+                    .all(|amount| WAITING.contains(&i64::from_le_bytes(*amount)))
+                && part.lips.iter().zip(saved.lips()).all(|(amount, lip)| lip.units > 0 || *amount == [0; 8])
                 && part.has_good_amounts(saved)
         })
     }
 
     /// A parcel with what it carries.
     pub(super) fn with_amounts(&self, at: usize, parcel: Parcel) -> Parcel {
+        Parcel { amounts: self.amounts(|part| part.parcels, at), ..parcel }
+    }
+
+    /// A packet with what it carries.
+    pub(super) fn in_packet(&self, at: usize, packet: Packet) -> Packet {
+        Packet { amounts: self.amounts(|part| part.packets, at), ..packet }
+    }
+
+    /// What waits at a link, with what it carries.
+    pub(super) fn at_link(&self, at: usize, waiting: Waiting) -> Waiting {
+        Waiting { amounts: self.amounts(|part| part.lips, at), ..waiting }
+    }
+
+    fn amounts(&self, of: impl Fn(&Part<'a>) -> &'a [[u8; 8]], at: usize) -> [i64; MOST] {
         let mut amounts = [0; MOST];
         for (amount, part) in amounts.iter_mut().zip(self.iter()) {
-            *amount = i64::from_le_bytes(part.parcels[at]);
+            *amount = i64::from_le_bytes(of(part)[at]);
         }
-        Parcel { amounts, ..parcel }
+        amounts
     }
 
     /// Puts the amounts of runs in place, and sums.

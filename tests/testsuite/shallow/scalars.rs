@@ -1,7 +1,6 @@
 //! What the liquid carries: amounts add up to the last one, and concentrations stay between those that came in.
 
 use frazil::base::DVec3;
-use frazil::shallow::falls::Falls;
 use frazil::shallow::flows::{FlowPoint, Kind};
 use frazil::shallow::grid::{BOTTOMLESS, Grid, Heights};
 use frazil::shallow::params::Pace;
@@ -12,7 +11,7 @@ use frazil::shallow::{Law, Params, Scalar, Shallow, Snapshot};
 use frazil::{Context, Pool};
 
 use crate::common::bodies::Dice;
-use crate::common::shallow::{Plan, Turn, busy, context, covered, ground, turnable};
+use crate::common::shallow::{Plan, Turn, busy, context, turnable};
 
 const FRAME: f64 = 1.0 / 60.0;
 /// Levels in a range.
@@ -411,11 +410,6 @@ fn wrong_scalars_are_a_sentence() {
         assert_eq!(liquid.set_scalars(&[scalar]).unwrap_err().to_string(), what);
     }
     assert_eq!(liquid.scalars(), [Scalar::dye("dye")]);
-    let params = Params { falls: Some(Falls::default()), ..Params::default() };
-    let mut falling = covered(&ctx, &ground([4; 2], 0.01, [-0.01, 0.1], |_| 0.0), params, |_, _| 0.0);
-    let both = falling.set_scalars(&[Scalar::dye("dye")]).unwrap_err().to_string();
-    assert_eq!(both, "liquid that falls freely carries no scalars: falls, or scalars");
-    falling.set_scalars(&[]).unwrap();
     let not_one = "2 concentrations are not one for each of 1 scalars";
     assert_eq!(liquid.set_poured(&[0.0, 0.0]).unwrap_err().to_string(), not_one);
     let nan = "a concentration of NaN of \"dye\" is not within -1 to 1";
