@@ -2706,6 +2706,10 @@ typedef struct {
      * One more than that of the drop that left the same edge before it, if nothing interrupted the flow there.
      */
     uint64_t number;
+    /**
+     * Concentrations of the scalars that frz_shallow_set_scalars has set; 0 behind them.
+     */
+    float concentrations[4];
 } frz_shallow_drop;
 
 /**

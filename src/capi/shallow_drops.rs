@@ -31,6 +31,8 @@ pub struct frz_shallow_drop {
     pub source: u64,
     /// One more than that of the drop that left the same edge before it, if nothing interrupted the flow there.
     pub number: u64,
+    /// Concentrations of the scalars that frz_shallow_set_scalars has set; 0 behind them.
+    pub concentrations: [f32; 4],
 }
 
 // SAFETY: numbers, without padding.
@@ -38,8 +40,8 @@ unsafe impl Plain for frz_shallow_drop {}
 
 impl From<Droplet> for frz_shallow_drop {
     fn from(drop: Droplet) -> Self {
-        let Droplet { position, velocity, volume, radius, age, source, number, .. } = drop;
-        Self { position, velocity, volume, radius, age, source, number }
+        let Droplet { position, velocity, volume, radius, age, source, number, concentrations } = drop;
+        Self { position, velocity, volume, radius, age, source, number, concentrations }
     }
 }
 

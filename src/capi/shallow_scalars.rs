@@ -269,7 +269,7 @@ impl From<ScalarBalance> for frz_shallow_scalar_balance {
             lost: sum.lost,
             gained: sum.gained,
             held: sum.held,
-            falling: 0.0,
+            falling: sum.falling,
             grown: sum.grown,
             dried: sum.dried,
             error: sum.error.clamp(i64::MIN.into(), i64::MAX.into()) as i64,

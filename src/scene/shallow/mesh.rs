@@ -118,6 +118,10 @@ impl Mesher {
             let deep = 2.0 * drops[drop as usize].radius;
             drawn.depths[vertex] = deep as f32;
             drawn.alpha[vertex] = (deep / opaque_depth).min(1.0) as f32;
+            for ((_, own), concentration) in drawn.scalars.iter_mut().zip(drops[drop as usize].concentrations)
+            {
+                own[vertex] = concentration;
+            }
         }
         let vectors = |numbers: &[f32]| numbers.as_chunks::<3>().0.iter().map(|&v| Vec3::from(v)).collect();
         drawn.mesh.positions = vectors(&places);

@@ -153,8 +153,9 @@ pub(super) fn told(liquid: &shallow::Shallow) -> Result<serde_json::Map<String, 
     scalars
         .map(|(index, scalar)| {
             let balance = liquid.scalar_balance(index)?;
-            let ScalarBalance { inside, poured, sourced, drained, absorbed, lost, gained, held, .. } =
-                balance;
+            let ScalarBalance {
+                inside, poured, sourced, drained, absorbed, lost, gained, held, falling, ..
+            } = balance;
             let ml = |amount: f64| amount / ML;
             let told = serde_json::json!({
                 "inside_ml": ml(inside),
@@ -165,6 +166,7 @@ pub(super) fn told(liquid: &shallow::Shallow) -> Result<serde_json::Map<String, 
                 "lost_ml": ml(lost),
                 "gained_ml": ml(gained),
                 "held_ml": ml(held),
+                "falling_ml": ml(falling),
                 "grown_ml": ml(balance.grown),
                 "dried_ml": ml(balance.dried),
                 "missing": balance.error as f64,
