@@ -82,11 +82,13 @@ pub(super) struct Lifted {
 
 impl Lifted {
     /// Least and sunk depths, if they are of the ground as it is.
+    pub(super) fn known(&self) -> Option<(&[i32], &[i32])> {
+        self.is_current.then(|| (self.lifts.least(), self.lifts.sunk()))
+    }
+
+    /// The same, or the failure of a surface that wants them.
     pub(super) fn current(&self) -> Outcome<(&[i32], &[i32])> {
-        match self.is_current {
-            true => Ok((self.lifts.least(), self.lifts.sunk())),
-            false => Err(no_lifts("since the ground or a body moved")),
-        }
+        self.known().ok_or_else(|| no_lifts("since the ground or a body moved"))
     }
 }
 

@@ -32,7 +32,7 @@ pub(super) struct Taken {
 impl Taken {
     /// Takes the minimum heights of a liquid, if they are of its ground as it is.
     fn lift(&mut self, lifted: &Lifted) {
-        let (least, sunk) = lifted.current().unwrap_or_default();
+        let (least, sunk) = lifted.known().unwrap_or_default();
         self.least.clear();
         self.least.extend_from_slice(least);
         self.sunk.clear();

@@ -201,9 +201,9 @@ static void concentrations(frz_context *ctx) {
     for (vertex = 0; vertex < size.vertices; ++vertex) {
         CHECK(fabsf(of_vertices[vertex] - 0.75f) < 1e-4f && heat[vertex] == 0);
     }
-    target.scalars[3] = target.scalars[2];
-    FAILS(frz_shallow_surface(ctx, shallow, NULL, &target, NULL), WRONG, "overlap");
-    target.scalars[2].data = NULL;
+    target.scalars[1] = target.scalars[0];
+    FAILS(frz_shallow_surface(ctx, shallow, NULL, &target, NULL), WRONG, "scalars and scalars overlap");
+    target.scalars[3] = target.scalars[2], target.scalars[1].data = target.scalars[2].data = NULL;
     FAILS(frz_shallow_surface(ctx, shallow, NULL, &target, NULL), WRONG, "there is no scalar 3 among 3");
     FAILS(frz_shallow_read_scalar(shallow, 3, view_of(NULL, 0), span_of(dye, count)), WRONG, "scalar = 3 is none of the 3");
     FAILS(frz_shallow_read_scalar(shallow, 0, view_of(&no_column, 1), span_of(dye, 1)), WRONG, "is none of the");
