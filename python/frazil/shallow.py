@@ -6,11 +6,12 @@ from typing import NamedTuple, Optional, Sequence
 
 import numpy as np
 
-from ._library import (Handle, ShallowBalance, ShallowBody, ShallowDistance, ShallowDomain, ShallowDropsTarget, ShallowFitted,
-                       ShallowFlow, ShallowInfo, ShallowLayout, ShallowMoved, ShallowParams, ShallowReport, ShallowScalar,
-                       ShallowScalarBalance, ShallowSize, ShallowTarget, Span, View, call, made, rows, saved, span, view)
+from ._library import (Handle, ShallowBalance, ShallowBody, ShallowDistance, ShallowDomain, ShallowFitted, ShallowFlow, ShallowInfo,
+                       ShallowMoved, ShallowParams, ShallowReport, ShallowScalar, ShallowScalarBalance, Span, View, call, made, rows,
+                       saved, span, view)
 from .grid import Grid
 from .mesh import Mesh
+from .shallow_meshes import Drops, Surface, drops_mesh_of, drops_of, surface_of
 
 LIQUIDS = {"water": 0, "blood": 1, "paint": 2, "honey": 3, "thinning blood": 4}
 PACES = {"realtime": 0, "exact": 1}
@@ -31,16 +32,7 @@ ALL_LAYERS = NO_COLUMN = 0xffffffff
 # What Shallow.probe answers for each point.
 SAMPLE = np.dtype([("height", "f8"), ("depth", "f8"), ("velocity", "f4", 2), ("surface_velocity", "f4", 2), ("column", "u4"),
                    ("layer", "u4")])
-# What Shallow.drops lists.
-DROP = np.dtype([("position", "f8", 3), ("velocity", "f8", 3), ("volume", "f8"), ("radius", "f8"), ("age", "f8"), ("source", "u8"),
-                 ("number", "u8"), ("concentrations", "f4", 4)])
 LAWS = {"dye": 0, "decays": 1, "ages": 2}
-LIFTED = 4
-# Parts of a surface that are written on demand: the type, and how many of it a vertex has.
-PARTS = {
-    "normals": (np.float32, 3), "depths": (np.float32, 1), "opacities": (np.float32, 1), "velocities": (np.float32, 3),
-    "layers": (np.uint32, 1), "columns": (np.uint32, 1),
-}
 
 
 class Source(NamedTuple):
@@ -120,30 +112,6 @@ class Box(NamedTuple):
     axes: Sequence[Sequence[float]] = ((1, 0, 0), (0, 1, 0), (0, 0, 1))
 
 
-class Surface(NamedTuple):
-    """The surface of a liquid: positions (n, 3), triangles (t, 3) that face up; the others where they were asked for."""
-
-    positions: np.ndarray
-    triangles: np.ndarray
-    normals: Optional[np.ndarray] = None
-    depths: Optional[np.ndarray] = None
-    opacities: Optional[np.ndarray] = None
-    velocities: Optional[np.ndarray] = None
-    layers: Optional[np.ndarray] = None
-    columns: Optional[np.ndarray] = None
-    # (n,) of each scalar.
-    scalars: Optional[list] = None
-
-
-class Drops(NamedTuple):
-    """A mesh of the liquid in the air: positions and velocities (n, 3), the index (n,) of each vertex's drop, triangles (t, 3) that face outward."""
-
-    positions: np.ndarray
-    velocities: np.ndarray
-    drops: np.ndarray
-    triangles: np.ndarray
-
-
 def _number(kind, name, known):
     if name not in known:
         raise ValueError(f"{kind} is {name!r}, not {' or '.join(known)}")
@@ -169,61 +137,6 @@ def _body(body):
     if isinstance(body, Capsule):
         out.end = (c.c_double * 3)(*body.end)
     return out
-
-
-def _layout(z_up, left_handed, scale):
-    layout = ShallowLayout()
-    call("shallow_layout_init", c.byref(layout), c.sizeof(layout))
-    layout.flags, layout.scale = int(z_up) | 2 * int(left_handed), scale
-    return layout
-
-
-def _surface(name, ctx, pointer, parts, z_up, left_handed, scale, least_depth, opaque_depth, lifted, fade_depth, scalars):
-    """The surface of a liquid or a snapshot."""
-    unknown = [part for part in parts if part not in PARTS]
-    if unknown:
-        raise ValueError(f"surfaces have no {unknown[0]!r}, but {', '.join(PARTS)}")
-    layout, size = _layout(z_up, left_handed, scale), ShallowSize(c.sizeof(ShallowSize))
-    layout.flags |= LIFTED * int(lifted)
-    layout.least_depth, layout.opaque_depth, layout.fade_depth = least_depth, opaque_depth, fade_depth
-    target = ShallowTarget(c.sizeof(ShallowTarget), 32)
-    start = ctx.pointer, pointer, c.byref(layout), c.byref(target)
-    call(name, *start, c.byref(size))
-    arrays = {part: np.empty((size.vertices, PARTS[part][1]), PARTS[part][0]) for part in parts}
-    arrays["positions"], triangles = np.empty((size.vertices, 3), np.float32), np.empty((size.indices // 3, 3), np.uint32)
-    for part, array in arrays.items():
-        setattr(target, part, span(array))
-    carried = [np.empty(size.vertices, np.float32) for _ in range(scalars)]
-    for scalar, array in enumerate(carried):
-        target.scalars[scalar] = span(array)
-    target.indices = Span(span(triangles).data, size.indices, 0)
-    call(name, *start, None)
-    flat = {part: array if array.shape[1] > 1 else array[:, 0] for part, array in arrays.items()}
-    return Surface(flat.pop("positions"), triangles, scalars=carried or None, **flat)
-
-
-def _drops(name, pointer):
-    """The liquid in the air."""
-    count = c.c_size_t()
-    call(name, pointer, Span(None, 0, 0), c.byref(count))
-    out = np.empty(count.value, DROP)
-    if count.value:
-        call(name, pointer, span(out), c.byref(count))
-    return out
-
-
-def _drops_mesh(name, ctx, pointer, z_up, left_handed, scale):
-    """A mesh of the liquid in the air."""
-    layout, size = _layout(z_up, left_handed, scale), ShallowSize(c.sizeof(ShallowSize))
-    target = ShallowDropsTarget(c.sizeof(ShallowDropsTarget), 32)
-    start = ctx.pointer, pointer, c.byref(layout), c.byref(target)
-    call(name, *start, c.byref(size))
-    mesh = Drops(np.empty((size.vertices, 3), np.float32), np.empty((size.vertices, 3), np.float32),
-                 np.empty(size.vertices, np.uint32), np.empty((size.indices // 3, 3), np.uint32))
-    target.positions, target.velocities, target.drops = span(mesh.positions), span(mesh.velocities), span(mesh.drops)
-    target.indices = Span(span(mesh.triangles).data, size.indices, 0)
-    call(name, *start, None)
-    return mesh
 
 
 def _probe(name, pointer, points):
@@ -389,11 +302,11 @@ class Shallow(Handle):
     def drops(self):
         """The liquid in the air: an array with fields position (m), velocity (m/s), volume (m3), radius (m), age (s), source, number and
         concentrations."""
-        return _drops("shallow_drops", self.pointer)
+        return drops_of("shallow_drops", self.pointer)
 
     def drops_mesh(self, z_up=False, left_handed=False, scale=1.0):
         """Drops: a mesh of balls and strands."""
-        return _drops_mesh("shallow_drops_mesh", self._ctx, self.pointer, z_up, left_handed, scale)
+        return drops_mesh_of("shallow_drops_mesh", self._ctx, self.pointer, z_up, left_handed, scale)
 
     def find_lifts(self, bounds=None, least=0.05, margin=0.01, rim=0.1):
         """Finds minimum heights over the mesh, for surface(lifted=True), anew after the ground or bodies have moved: within bounds (x0, z0, x1, z1),
@@ -501,7 +414,7 @@ class Shallow(Handle):
     def surface(self, parts=(), z_up=False, left_handed=False, scale=1.0, least_depth=0.0, opaque_depth=0.01, lifted=False, fade_depth=0.0):
         """The liquid's Surface, with its scalars and these parts of it: normals, depths, opacities, velocities, layers, columns; lifted: at its minimum
         heights, which find_lifts() has found."""
-        return _surface("shallow_surface", self._ctx, self.pointer, parts, z_up, left_handed, scale, least_depth, opaque_depth, lifted,
+        return surface_of("shallow_surface", self._ctx, self.pointer, parts, z_up, left_handed, scale, least_depth, opaque_depth, lifted,
                         fade_depth, self._scalars)
 
     def save(self):
@@ -532,17 +445,17 @@ class Snapshot(Handle):
 
     def surface(self, ctx, parts=(), z_up=False, left_handed=False, scale=1.0, least_depth=0.0, opaque_depth=0.01, lifted=False, fade_depth=0.0):
         """As Shallow.surface; ctx: another context than that of the thread that computes."""
-        return _surface("shallow_snapshot_surface", ctx, self.pointer, parts, z_up, left_handed, scale, least_depth, opaque_depth, lifted,
+        return surface_of("shallow_snapshot_surface", ctx, self.pointer, parts, z_up, left_handed, scale, least_depth, opaque_depth, lifted,
                         fade_depth, self._scalars)
 
     @property
     def drops(self):
         """As Shallow.drops."""
-        return _drops("shallow_snapshot_drops", self.pointer)
+        return drops_of("shallow_snapshot_drops", self.pointer)
 
     def drops_mesh(self, ctx, z_up=False, left_handed=False, scale=1.0):
         """As Shallow.drops_mesh; ctx: another context than that of the thread that computes."""
-        return _drops_mesh("shallow_snapshot_drops_mesh", ctx, self.pointer, z_up, left_handed, scale)
+        return drops_mesh_of("shallow_snapshot_drops_mesh", ctx, self.pointer, z_up, left_handed, scale)
 
     def probe(self, points):
         """As Shallow.probe."""
