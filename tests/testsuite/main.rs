@@ -103,6 +103,7 @@ mod shallow {
     mod moving;
     mod probe;
     mod scalars;
+    mod stains;
     mod state;
     mod surface;
     mod surface_groups;

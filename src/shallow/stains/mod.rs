@@ -1,0 +1,292 @@
+//! What liquid leaves on the ground: stains that fade, and what the ground absorbs. Both stay at the vertices of the terrain's mesh, and go with it where
+//! it deforms.
+//!
+//! A vertex is *wet* while a column of its cell has a film at its height, to a cell (`wet.rs`). Then its *stain* goes towards what the liquid there
+//! stains, and when it has dried, half of it fades in each half-life. What fades is looked at only when a vertex is asked for, or gets wet again: dry ground
+//! costs nothing. Absorbing ground takes whole units, which the liquid's balance counts.
+
+mod state;
+mod wet;
+
+use xxhash_rust::xxh3::xxh3_128;
+
+use super::scalars::MOST;
+use super::scalars::amounts::Account;
+use super::system::Shallow;
+use crate::base::Vec3;
+use crate::error::{Error, Result};
+use wet::Wet;
+
+/// What nobody sees is none, before it is so little that processors differ.
+const UNSEEN: f64 = 1e-6;
+
+/// How liquid stains the ground.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Staining {
+    /// The scalar that stains, by its concentration over its range, from 0 to 1: clear liquid washes it off. None: any liquid stains, fully.
+    pub scalar: Option<usize>,
+    /// Depth from which a column is a film that wets (m), 0 and up; 1e-5.
+    pub film: f64,
+    /// Time (s) in which 63 % of a stain comes or is washed off, 0 and up; 0.2.
+    pub takes: f64,
+    /// Half-life of a stain on dry ground (s), 1e-3 and up; infinite: it stays; 60.
+    pub half_life: f64,
+    /// What the ground absorbs; none.
+    pub absorbs: Option<Absorbing>,
+}
+
+/// How ground absorbs liquid: at `rate` while it is dry, and less and less as it fills, (1 - held / capacity) of it.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Absorbing {
+    /// The most that it holds (m: m3 for each m2 of its mesh), over 0; gauze some 1e-3, soft tissue 1e-4.
+    pub capacity: f64,
+    /// How fast dry ground takes it (m/s), 0 and up.
+    pub rate: f64,
+}
+
+impl Default for Staining {
+    fn default() -> Self {
+        Self { scalar: None, film: 1e-5, takes: 0.2, half_life: 60.0, absorbs: None }
+    }
+}
+
+impl Staining {
+    /// Checks the numbers.
+    ///
+    /// # Errors
+    /// `Argument`, naming the field and its range.
+    pub fn validate(&self) -> Result<()> {
+        let positive = |name: &str, value: f64| {
+            if value >= 0.0 && value.is_finite() {
+                Ok(())
+            } else {
+                Err(Error::argument(format!("{name} = {value} is not finite and 0 or more")))
+            }
+        };
+        positive("film", self.film)?;
+        positive("takes", self.takes)?;
+        if self.half_life.is_nan() || self.half_life < 1e-3 {
+            return Err(Error::argument(format!("half_life = {} s is not 0.001 or more", self.half_life)));
+        }
+        let Some(Absorbing { capacity, rate }) = self.absorbs else { return Ok(()) };
+        positive("absorbs.rate", rate)?;
+        if !(capacity > 0.0 && capacity <= 1e3) {
+            return Err(Error::argument(format!("absorbs.capacity = {capacity} m is not within 0 to 1000")));
+        }
+        Ok(())
+    }
+}
+
+/// The stains on a mesh, and what it has absorbed.
+#[derive(Debug, Clone)]
+pub struct Stains {
+    staining: Staining,
+    /// A hash of the mesh's triangles.
+    mesh: [u8; 16],
+    /// Of each vertex: its stain at the time (s) when it was wet last.
+    stain: Vec<f32>,
+    since: Vec<f64>,
+    /// Of each vertex: units that it has absorbed, and that it holds at most. Empty, if it does not absorb.
+    held: Vec<i64>,
+    capacity: Vec<i64>,
+    /// Volume of a unit of the liquid (m3).
+    unit: f64,
+    /// Simulated time at the last update (s).
+    time: f64,
+    wet: Wet,
+}
+
+impl Stains {
+    /// Clean and dry ground under a liquid: a mesh (positions in m) whose vertices may move, but whose triangles stay.
+    ///
+    /// # Errors
+    /// `Argument`: as [`Staining::validate`]; the liquid has no such scalar; a triangle of a vertex that is not there; a vertex that is not finite.
+    pub fn new(
+        liquid: &Shallow,
+        positions: &[Vec3],
+        triangles: &[[u32; 3]],
+        staining: Staining,
+    ) -> Result<Self> {
+        staining.validate()?;
+        let scalars = liquid.scalars().len();
+        if let Some(scalar) = staining.scalar.filter(|&scalar| scalar >= scalars) {
+            return Err(Error::argument(format!("there is no scalar {scalar} among {scalars} that stains")));
+        }
+        let count = positions.len();
+        if let Some(bad) = triangles.iter().flatten().find(|&&vertex| vertex as usize >= count) {
+            return Err(Error::argument(format!("there is no vertex {bad} among {count}")));
+        }
+        check_finite(positions)?;
+        let unit = unit_of(liquid);
+        let bytes: Vec<u8> =
+            triangles.as_flattened().iter().flat_map(|vertex| vertex.to_le_bytes()).collect();
+        let capacity = staining.absorbs.map_or(Vec::new(), |absorbing| {
+            let units = |area: &f64| (absorbing.capacity * area / unit).min(1e15) as i64;
+            areas(positions, triangles).iter().map(units).collect()
+        });
+        Ok(Self {
+            staining,
+            mesh: xxh3_128(&bytes).to_le_bytes(),
+            stain: vec![0.0; count],
+            since: vec![f64::NEG_INFINITY; count],
+            held: vec![0; capacity.len()],
+            capacity,
+            unit,
+            time: liquid.time(),
+            wet: Wet::default(),
+        })
+    }
+
+    /// How it stains.
+    pub fn staining(&self) -> &Staining {
+        &self.staining
+    }
+
+    /// Count of vertices.
+    pub fn len(&self) -> usize {
+        self.stain.len()
+    }
+
+    /// Whether the mesh has no vertex.
+    pub fn is_empty(&self) -> bool {
+        self.stain.is_empty()
+    }
+
+    /// Follows the liquid to its time, once a frame, with the vertices where they are now: `positions` (m), of the ground that the liquid has. Allocates nothing
+    /// after the first time. Returns what the ground has absorbed since the last call (m3).
+    ///
+    /// # Errors
+    /// `Argument`, and nothing changes: another count of vertices than the mesh has, one that is not finite, a liquid whose units are others or that has not
+    /// the scalar any more.
+    pub fn update(&mut self, liquid: &mut Shallow, positions: &[Vec3]) -> Result<f64> {
+        self.check(liquid, positions)?;
+        let (last, now) = (self.time, liquid.time());
+        self.time = now;
+        // The liquid may have been put back to an earlier time.
+        let passed = (now - last).max(0.0);
+        let heights = liquid.columns.heights;
+        self.wet.find(&liquid.columns, &liquid.flow, (self.staining.film / heights.unit).min(2e9) as i32);
+        if self.wet.is_empty() {
+            return Ok(0.0);
+        }
+        let comes = 1.0 - libm::exp(-passed / self.staining.takes);
+        // Where it takes no time, and none has passed.
+        let comes = if comes.is_nan() { 1.0 } else { comes };
+        let dry = self.staining.absorbs.map_or(0.0, |absorbing| absorbing.rate * passed / absorbing.capacity);
+        let mut absorbed = 0;
+        for (vertex, position) in positions.iter().enumerate() {
+            let Some(column) = self.wet.column_at(&liquid.columns, &liquid.flow.depth, position) else {
+                continue;
+            };
+            let target = match self.staining.scalar {
+                Some(scalar) => {
+                    let range = liquid.flow.amounts.scalars[scalar].range;
+                    (f64::from(liquid.concentration(scalar, column)) / range).clamp(0.0, 1.0)
+                }
+                None => 1.0,
+            };
+            let before = self.at(vertex, last);
+            let after = before + (target - before) * comes;
+            self.stain[vertex] = if after < UNSEEN { 0.0 } else { after as f32 };
+            self.since[vertex] = now;
+            if let (Some(held), Some(capacity)) = (self.held.get_mut(vertex), self.capacity.get(vertex)) {
+                let room = *capacity - *held;
+                let asked = (room as f64 * dry).round_ties_even().min(room as f64) as i64;
+                if asked > 0 {
+                    let flow = &mut liquid.flow;
+                    let taken = -flow.add(&liquid.columns, column, -asked, &[0; MOST], Account::Absorbed);
+                    *held += taken;
+                    absorbed += taken;
+                }
+            }
+        }
+        liquid.flows.absorbed += absorbed;
+        Ok(absorbed as f64 * self.unit)
+    }
+
+    /// How stained each vertex is now, 0 to 1.
+    ///
+    /// # Errors
+    /// `Argument`: there is not one place for each vertex.
+    pub fn stains(&self, out: &mut [f32]) -> Result<()> {
+        self.check_room(out.len())?;
+        for (vertex, out) in out.iter_mut().enumerate() {
+            *out = self.at(vertex, self.time) as f32;
+        }
+        Ok(())
+    }
+
+    /// How soaked each vertex is, 0 to 1 of its capacity; 0, if the ground does not absorb.
+    ///
+    /// # Errors
+    /// As [`Stains::stains`].
+    pub fn soaked(&self, out: &mut [f32]) -> Result<()> {
+        self.check_room(out.len())?;
+        out.fill(0.0);
+        for (out, (held, capacity)) in out.iter_mut().zip(self.held.iter().zip(&self.capacity)) {
+            *out = *held as f32 / (*capacity).max(1) as f32;
+        }
+        Ok(())
+    }
+
+    /// How much the ground has absorbed (m3): part of [`Balance::absorbed`](super::Balance).
+    pub fn absorbed(&self) -> f64 {
+        self.held.iter().sum::<i64>() as f64 * self.unit
+    }
+
+    /// The stain of a vertex at a time (s).
+    fn at(&self, vertex: usize, time: f64) -> f64 {
+        let (stain, dry) = (f64::from(self.stain[vertex]), time - self.since[vertex]);
+        if stain == 0.0 || dry <= 0.0 { stain } else { stain * libm::exp2(-dry / self.staining.half_life) }
+    }
+
+    fn check(&self, liquid: &Shallow, positions: &[Vec3]) -> Result<()> {
+        if positions.len() != self.len() {
+            let (given, count) = (positions.len(), self.len());
+            return Err(Error::argument(format!(
+                "{given} vertices are not the {count} of the terrain that is stained"
+            )));
+        }
+        if unit_of(liquid).to_bits() != self.unit.to_bits() {
+            return Err(Error::argument("the stains were made for a liquid with other cells or heights"));
+        }
+        let scalars = liquid.scalars().len();
+        if let Some(scalar) = self.staining.scalar.filter(|&scalar| scalar >= scalars) {
+            return Err(Error::argument(format!("there is no scalar {scalar} among {scalars} that stains")));
+        }
+        check_finite(positions)
+    }
+
+    fn check_room(&self, room: usize) -> Result<()> {
+        if room == self.len() {
+            return Ok(());
+        }
+        let count = self.len();
+        Err(Error::argument(format!("room for {room} stains is not that of {count} vertices")))
+    }
+}
+
+/// Volume of a unit (m3).
+fn unit_of(liquid: &Shallow) -> f64 {
+    let columns = liquid.columns();
+    columns.grid.cell * columns.grid.cell * columns.heights.unit
+}
+
+fn check_finite(positions: &[Vec3]) -> Result<()> {
+    let finite = |position: &Vec3| position.iter().fold(true, |all, number| all & number.is_finite());
+    match positions.iter().position(|position| !finite(position)) {
+        Some(vertex) => Err(Error::argument(format!("vertex {vertex} of the terrain is not finite"))),
+        None => Ok(()),
+    }
+}
+
+/// A third of the area of the triangles around each vertex (m2).
+fn areas(positions: &[Vec3], triangles: &[[u32; 3]]) -> Vec<f64> {
+    let mut areas = vec![0.0; positions.len()];
+    for triangle in triangles {
+        let [a, b, c] = triangle.map(|vertex| positions[vertex as usize].cast::<f64>());
+        let area = 0.5 * (b - a).cross(&(c - a)).norm();
+        triangle.iter().for_each(|&vertex| areas[vertex as usize] += area / 3.0);
+    }
+    areas
+}

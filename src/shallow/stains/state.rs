@@ -1,0 +1,88 @@
+//! The stains of a mesh as bytes, and back.
+//!
+//! | part | bytes |
+//! |---|---|
+//! | magic, with the version | 8 |
+//! | hash of the mesh's triangles | 16 |
+//! | volume of a unit, time | 8 each |
+//! | count of vertices, count of those that absorb | 8 each |
+//! | stains | 4 each |
+//! | when each was wet last | 8 each |
+//! | units that each holds | 8 each |
+//! | hash of all this | 16 |
+
+use xxhash_rust::xxh3::xxh3_128;
+
+use super::Stains;
+use crate::base::bytes::Reader;
+use crate::error::{Error, Result};
+
+const MAGIC: [u8; 8] = *b"frzstn\0\x01";
+const SEAL: usize = 16;
+
+impl Stains {
+    /// The stains as bytes; how liquid stains is not part of them.
+    pub fn save(&self) -> Vec<u8> {
+        let count = self.len();
+        let mut out = Vec::with_capacity(56 + 12 * count + 8 * self.held.len() + SEAL);
+        out.extend(MAGIC);
+        out.extend(self.mesh);
+        out.extend(self.unit.to_le_bytes());
+        out.extend(self.time.to_le_bytes());
+        out.extend((count as u64).to_le_bytes());
+        out.extend((self.held.len() as u64).to_le_bytes());
+        out.extend(self.stain.iter().flat_map(|stain| stain.to_le_bytes()));
+        out.extend(self.since.iter().flat_map(|since| since.to_le_bytes()));
+        out.extend(self.held.iter().flat_map(|held| held.to_le_bytes()));
+        let seal = xxh3_128(&out).to_le_bytes();
+        out.extend(seal);
+        out
+    }
+
+    /// Puts saved stains in place: with the liquid's state of the same time everything goes on to the same bytes.
+    ///
+    /// # Errors
+    /// `Bytes`, and nothing changes: bytes that are not of stains, cut short or damaged; of another terrain: other triangles, another count of vertices, or a liquid
+    /// with other cells; of ground that absorbs where this does not, or the other way round.
+    pub fn restore(&mut self, bytes: &[u8]) -> Result<()> {
+        if !bytes.starts_with(&MAGIC) {
+            return Err(refused("are not of this format"));
+        }
+        let (body, seal) = bytes.split_at(bytes.len().saturating_sub(SEAL));
+        if xxh3_128(body).to_le_bytes() != *seal {
+            return Err(refused("are cut short or damaged"));
+        }
+        let mut from = Reader::new(&body[MAGIC.len()..]);
+        let (mesh, unit): ([u8; 16], _) = (from.take()?, f64::from_le_bytes(from.take()?));
+        let time = f64::from_le_bytes(from.take()?);
+        let [count, holding] = [u64::from_le_bytes(from.take()?), u64::from_le_bytes(from.take()?)];
+        if (mesh, unit.to_bits(), count) != (self.mesh, self.unit.to_bits(), self.len() as u64) {
+            return Err(refused("are of another terrain"));
+        }
+        if holding != self.held.len() as u64 {
+            return Err(refused("are of ground that absorbs in another way"));
+        }
+        if from.rest().len() as u64 != 12 * count + 8 * holding {
+            return Err(refused("are cut short or damaged"));
+        }
+        let stain = from.bytes(4 * self.len())?.as_chunks().0.iter().map(|stain| f32::from_le_bytes(*stain));
+        let since = from.bytes(8 * self.len())?.as_chunks().0.iter().map(|since| f64::from_le_bytes(*since));
+        let held = from.rest().as_chunks().0.iter().map(|held| i64::from_le_bytes(*held));
+        let is_good = time.is_finite()
+            && stain.clone().all(|stain| (0.0..=1.0).contains(&stain))
+            && since.clone().all(|since| since <= time)
+            && held.clone().zip(&self.capacity).all(|(held, capacity)| (0..=*capacity).contains(&held));
+        if !is_good {
+            return Err(refused("are cut short or damaged"));
+        }
+        self.stain.iter_mut().zip(stain).for_each(|(to, stain)| *to = stain);
+        self.since.iter_mut().zip(since).for_each(|(to, since)| *to = since);
+        self.held.iter_mut().zip(held).for_each(|(to, held)| *to = held);
+        self.time = time;
+        Ok(())
+    }
+}
+
+fn refused(what: &str) -> Error {
+    Error::Bytes(format!("saved stains {what}"))
+}

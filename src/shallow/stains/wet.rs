@@ -1,0 +1,80 @@
+//! Which columns are wet at the vertices of a mesh.
+
+use crate::base::Vec3;
+use crate::shallow::columns::{Columns, NONE, STRIP, strip_of};
+use crate::shallow::flow::Flow;
+use crate::shallow::flow::active::runs;
+
+/// A strip with columns that have a film.
+#[derive(Debug, Clone, Copy)]
+struct WetStrip {
+    strip: u32,
+    /// Bits of the columns that have one.
+    bits: u16,
+    /// The next one over the same cells, or [`NONE`].
+    next: u32,
+}
+
+/// The wet columns of a liquid.
+#[derive(Debug, Clone, Default)]
+pub(super) struct Wet {
+    strips: Vec<WetStrip>,
+    /// The first over each 16 cells of a row, or [`NONE`].
+    first: Vec<u32>,
+}
+
+impl Wet {
+    /// Finds the columns that are deeper than a film (units).
+    pub fn find(&mut self, columns: &Columns, flow: &Flow, film: i32) {
+        let blocks = columns.grid.size[0].div_ceil(STRIP);
+        self.strips.clear();
+        self.first.clear();
+        self.first.resize(blocks * columns.grid.size[1], NONE);
+        for strip in runs(flow.active()).flatten() {
+            let depths = strip_of(&flow.depth, strip);
+            let bits = (0..STRIP).fold(0, |bits, x| bits | u16::from(depths[x] > film) << x);
+            if bits == 0 {
+                continue;
+            }
+            let place = columns.strips()[strip];
+            let first = &mut self.first[place.row as usize * blocks + place.at as usize];
+            self.strips.push(WetStrip { strip: strip as u32, bits, next: *first });
+            *first = self.strips.len() as u32 - 1;
+        }
+    }
+
+    /// Whether there is none.
+    pub fn is_empty(&self) -> bool {
+        self.strips.is_empty()
+    }
+
+    /// The column of a place's cell that wets it: one that is within a cell of it, from the base to the surface. Of several the nearest, of two
+    /// as near the lower one.
+    #[inline(always)]
+    pub fn column_at(&self, columns: &Columns, depth: &[i32], place: &Vec3) -> Option<usize> {
+        let place = place.cast::<f64>();
+        let [x, z] = columns.grid.cell_at([place.x, place.z])?;
+        let blocks = columns.grid.size[0].div_ceil(STRIP);
+        let mut at = self.first[z * blocks + x / STRIP];
+        if at == NONE {
+            return None;
+        }
+        let heights = &columns.heights;
+        let height = (place.y - heights.low) / heights.unit;
+        let (mut nearest, mut least) = (None, columns.grid.cell / heights.unit);
+        while at != NONE {
+            let WetStrip { strip, bits, next } = self.strips[at as usize];
+            at = next;
+            if bits >> (x % STRIP) & 1 == 1 {
+                let column = strip as usize * STRIP + x % STRIP;
+                let base = f64::from(columns.bases()[column]);
+                let off = (base - height).max(height - (base + f64::from(depth[column]))).max(0.0);
+                // The strips of a block are in the order of their layers from above.
+                if off <= least {
+                    (nearest, least) = (Some(column), off);
+                }
+            }
+        }
+        nearest
+    }
+}
