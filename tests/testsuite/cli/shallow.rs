@@ -192,7 +192,7 @@ fn what_is_wrong_is_one_sentence_and_leaves_nothing_behind() {
     ] {
         with(&format!("[[scalar]]\nname = \"{name}\"\n"), &["`name` in [[scalar]]", words]);
     }
-    with(&dye.repeat(2), &["spill.toml:9", "another scalar has that name"]);
+    with(&dye.repeat(2), &["spill.toml:10", "another scalar has that name"]);
     let five: String = (0..5).map(|at| format!("[[scalar]]\nname = \"dye{at}\"\n")).collect();
     with(&five, &["`name`", "one too many", "4 scalars at most"]);
     with(&format!("{dye}law = \"decays\"\n"), &["`half_life`", "is missing"]);

@@ -78,7 +78,7 @@ fn what_falls_and_what_it_carries_add_up_and_are_in_the_mesh() {
     assert_eq!(count as u64, last["vertices"].as_u64().unwrap());
     assert!(falling.is_sorted() && falling.iter().filter(|falling| **falling == 1.0).count() >= 42 * 10);
     for vertex in 0..count {
-        let Vec3 { x, y, .. } = liquid.mesh.positions[vertex];
+        let [x, y, _]: [f32; 3] = liquid.mesh.positions[vertex].into();
         assert!((0.0..=1.0 + 1e-5).contains(&milk[vertex]) && (-1e-5..0.5).contains(&age[vertex]));
         assert!((0.0..=80.0 + 1e-3).contains(&heat[vertex]));
         if falling[vertex] == 1.0 {
@@ -124,7 +124,7 @@ fn a_shot_that_falls_and_carries_resumes_to_the_same_bytes() {
         "shallow.falls_most=9",
         "scalar.1.law=ages",
         "scalar.3.half_life=1",
-        "scalar.1.name=cream",
+        "scalar.2.name=old",
     ] {
         let key = set.split('=').next().unwrap();
         crate::program::fails(folder, &format!("{shot} -o whole --from 20 --set {set}"), 2, &[key]);

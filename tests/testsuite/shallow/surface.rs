@@ -291,7 +291,8 @@ fn vertices_carry_what_their_columns_do_and_dry_ones_what_is_around() {
     let count = surface.count(&columns, &depths).unwrap().vertices;
     let (mut own, mut same, mut of) = (vec![f32::NAN; count + 1], vec![f32::NAN; count], vec![0; count]);
     let mut target = Target { columns: Some(&mut of), ..Target::default() };
-    (target.carried[0], target.carried[2]) = (Some(&mut own), Some(&mut same));
+    target.carried[0] = Some(&mut own);
+    target.carried[2] = Some(&mut same);
     surface.build(&columns, &depths, &Layout::default(), &mut target).unwrap();
     assert!(own[count].is_nan(), "nothing is written behind the mesh");
     let mut dry = 0;
