@@ -154,6 +154,8 @@ mod shallow_surface;
 mod shallow_terrain;
 #[path = "gates/shallow_threads.rs"]
 mod shallow_threads;
+#[path = "gates/shallow_whole.rs"]
+mod shallow_whole;
 #[path = "gates/shot.rs"]
 mod shot;
 #[path = "gates/snow.rs"]
@@ -201,6 +203,7 @@ fn main() {
         Some(rebuilt_large::MILLION) => return rebuilt_large::print_million(),
         Some(damage::FUZZ) => return damage::read_mutated(),
         Some(shallow_same::HASH) => return shallow_same::print_hash(),
+        Some(shallow_same::SURFACES) => return shallow_same::print_surfaces(),
         _ => {}
     }
     let mut h = Harness::from_arguments();
@@ -260,6 +263,7 @@ fn main() {
     shallow_terrain::run(&mut h);
     shallow_state::run(&mut h);
     shallow_surface::run(&mut h);
+    shallow_whole::run(&mut h);
     shallow_threads::run(&mut h);
     easing::run(&mut h);
     house::run(&mut h);

@@ -401,9 +401,10 @@ pub const GATES: &[Gate] = &[
     // Packets, and the first liquid that lands, off from ballistics, of the height of the fall; units that are missing in a busy scene with falls.
     gate("shallow.fall_path", "%", Most(1.0), Most(0.1)),
     none("shallow.fall_volume", "units"),
-    // The same of four scalars on terrain that moves, and frames after which a concentration is beyond those that came in; how many times as
-    // long a frame takes with one.
+    // The same of four scalars on terrain that moves, and frames after which a concentration is beyond those that came in; all of it with falls, and ground that
+    // absorbs; how many times as long a frame takes with a scalar.
     none("shallow.scalars", "frames"),
+    none("shallow.mass_all", "frames"),
     gate("shallow.dyed_one_floor", "x", Open, Most(1.6)),
     gate("shallow.dyed_five_floors", "x", Open, Most(1.6)),
     // The same liquid however the scene lies, whatever does the work, and when a run is played again.
@@ -449,6 +450,11 @@ pub const GATES: &[Gate] = &[
     // The most of the three over the time that copying its bytes takes, each after a frame.
     gate("shallow.surface_copy", "x", Most(1.7), Most(1.3)),
     none("shallow.surface_unlinked", "edges"),
+    yes("shallow.surface_same"),
+    // Thread CPU time of a whole frame: what flows and falls, the surface and the drops.
+    gate("shallow.whole_one_floor", "ms", Most(1.0), Most(0.6)),
+    gate("shallow.whole_five_floors", "ms", Most(5.2), Most(2.8)),
+    gate("shallow.whole_three_floors", "ms", Most(0.69), Most(0.4)),
     // Films on the meshes of rough ground: vertices above the surface of four wet columns, and those that were given up. Beside dry ground: how
     // far the rim is over it, and how far a vertex jumps when its column wets or dries.
     none("shallow.lift_uncovered", "vertices"),

@@ -1,7 +1,12 @@
 //! Gates of shallow's determinism: the same liquid however the scene lies, whatever does the work, and when a run is played again.
 
+use std::hash::{DefaultHasher, Hash, Hasher};
+
 use frazil::base::cpu::cpu_level;
 use frazil::shallow::Shallow;
+use frazil::shallow::falls::mesh::{Balls, Target as DropTarget, bound as drops_bound};
+use frazil::shallow::falls::{Droplet, Falls};
+use frazil::shallow::surface::{Depths, Indices, Layout, Surface, Target, bound};
 use frazil::{Context, Pool};
 
 use crate::common::bodies::Dice;
@@ -32,11 +37,20 @@ pub fn run(h: &mut Harness) {
         h.holds("shallow.same_threads", hashes.iter().all(|hash| *hash == hashes[0]), "0, 1 and 2 threads");
     }
     if h.wants("shallow.same_cpu") {
-        let hashes = ["baseline", "avx2", "avx512"].map(hash_at);
-        let is_same = hashes.iter().all(|hash| hash.len() == 17 && *hash == hashes[0]);
         let note = format!("FRAZIL_CPU baseline, avx2, avx512; this one has {:?}", cpu_level());
-        h.holds("shallow.same_cpu", is_same, &note);
+        h.holds("shallow.same_cpu", is_same_at_levels(HASH), &note);
     }
+    if h.wants("shallow.surface_same") {
+        let hashes = [0, 1, 2].map(|threads| surfaces(&Context::new(Pool::new(threads).expect("threads"))));
+        let is_same = hashes.iter().all(|hash| *hash == hashes[0]) && is_same_at_levels(SURFACES);
+        h.holds("shallow.surface_same", is_same, "0, 1 and 2 threads; FRAZIL_CPU baseline, avx2, avx512");
+    }
+}
+
+/// Whether processes with all sets of instructions print the same.
+fn is_same_at_levels(argument: &str) -> bool {
+    let hashes = ["baseline", "avx2", "avx512"].map(|level| hash_at(argument, level));
+    hashes.iter().all(|hash| hash.len() == 17 && *hash == hashes[0])
 }
 
 /// Whether scenes that are turned do the same, cell by cell, layer by layer, in each frame.
@@ -97,17 +111,111 @@ fn all(ctx: &Context) -> u64 {
     small.fold(one(&busy([517, 403])), |all, hash| all.rotate_left(1) ^ hash)
 }
 
-/// Argument of a run that only prints the hash of shallow's scenes.
+/// A hash of the surfaces of scenes, with all that vertices may have, and of their drops.
+fn surfaces(ctx: &Context) -> u64 {
+    let mut one = Drawn::default();
+    let mut all = 0_u64;
+    let mut draw = |plan: &Plan, frames: u64| {
+        let mut plan = plan.clone();
+        plan.params.falls = Some(Falls { height: 0.001, drop: 0.0, ..Falls::default() });
+        let mut liquid = plan.make(ctx, Turn::NONE);
+        for frame in 0..frames {
+            liquid.step(ctx, 1.0 / 60.0).expect("a frame");
+            if frame % 5 == 4 {
+                all = all.rotate_left(1) ^ one.hash(&liquid);
+            }
+        }
+    };
+    (0..SCENES).for_each(|seed| draw(&turnable(seed), FRAMES));
+    draw(&busy([517, 403]), 10);
+    all
+}
+
+/// Buffers of a surface and of drops.
+#[derive(Default)]
+struct Drawn {
+    surface: Surface,
+    balls: Balls,
+    /// Positions, normals, velocities; depths and opacities.
+    vectors: [Vec<f32>; 3],
+    numbers: [Vec<f32>; 2],
+    layers: Vec<u32>,
+    indices: Vec<u32>,
+}
+
+impl Drawn {
+    fn hash(&mut self, liquid: &Shallow) -> u64 {
+        let columns = liquid.columns();
+        let mut velocity = vec![[0.0; 2]; columns.len()];
+        liquid.velocities(&mut velocity).expect("as many places");
+        let depths = Depths {
+            depth: liquid.depths(),
+            velocity: &velocity,
+            active: Some(liquid.active()),
+            ..Depths::default()
+        };
+        let cell = columns.grid.cell;
+        let layout = Layout { least_depth: 0.05 * cell, fade_depth: 0.02 * cell, ..Layout::default() };
+        let drops: Vec<Droplet> = liquid.drops().collect();
+        let (flat, round) = (bound(columns), drops_bound(drops.len()));
+        let count = flat.vertices.max(round.vertices);
+        self.vectors.iter_mut().for_each(|numbers| numbers.resize(3 * count, 0.0));
+        self.numbers.iter_mut().for_each(|numbers| numbers.resize(count, 0.0));
+        self.layers.resize(count, 0);
+        self.indices.resize(flat.indices.max(round.indices), 0);
+        self.surface.reserve(columns);
+        let [positions, normals, velocities] = &mut self.vectors;
+        let [thick, opaque] = &mut self.numbers;
+        let mut target = Target {
+            positions: Some(positions),
+            normals: Some(normals),
+            velocities: Some(velocities),
+            depths: Some(thick),
+            opacities: Some(opaque),
+            layers: Some(&mut self.layers),
+            indices: Indices::U32(&mut self.indices),
+            ..Target::default()
+        };
+        let counts = self.surface.build(columns, &depths, &layout, &mut target).expect("a surface");
+        let mut hasher = DefaultHasher::new();
+        let bits = |hasher: &mut DefaultHasher, numbers: &[f32]| {
+            numbers.iter().for_each(|number| number.to_bits().hash(hasher));
+        };
+        self.vectors.iter().for_each(|numbers| bits(&mut hasher, &numbers[..3 * counts.vertices]));
+        self.numbers.iter().for_each(|numbers| bits(&mut hasher, &numbers[..counts.vertices]));
+        self.layers[..counts.vertices].hash(&mut hasher);
+        self.indices[..counts.indices].hash(&mut hasher);
+        let [positions, normals, _] = &mut self.vectors;
+        let mut target = DropTarget {
+            positions: Some(positions),
+            normals: Some(normals),
+            indices: Indices::U32(&mut self.indices),
+            ..DropTarget::default()
+        };
+        let counts = self.balls.build(&drops, &layout, &mut target).expect("drops");
+        self.vectors[..2].iter().for_each(|numbers| bits(&mut hasher, &numbers[..3 * counts.vertices]));
+        self.indices[..counts.indices].hash(&mut hasher);
+        hasher.finish()
+    }
+}
+
+/// Arguments of runs that only print the hash of shallow's scenes, and of their surfaces.
 pub const HASH: &str = "hash-of-shallow";
+pub const SURFACES: &str = "hash-of-surfaces";
 
 /// Such a run.
 pub fn print_hash() {
     println!("{:016x}", all(&context()));
 }
 
+/// The other one.
+pub fn print_surfaces() {
+    println!("{:016x}", surfaces(&context()));
+}
+
 /// The hash that a process with one set of instructions prints.
-fn hash_at(level: &str) -> Vec<u8> {
+fn hash_at(argument: &str, level: &str) -> Vec<u8> {
     let program = std::env::current_exe().expect("this program's path");
-    let output = std::process::Command::new(program).arg(HASH).env("FRAZIL_CPU", level).output();
+    let output = std::process::Command::new(program).arg(argument).env("FRAZIL_CPU", level).output();
     output.expect("a process for shallow's scenes").stdout
 }

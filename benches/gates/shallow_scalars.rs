@@ -1,14 +1,16 @@
 //! Gates of what a shallow liquid carries: each scalar adds up to the last amount, and what a frame with one takes.
 
-use frazil::base::DVec3;
 use frazil::base::cpu::cpu_level;
+use frazil::base::{DVec3, Vec3};
+use frazil::shallow::falls::Falls;
 use frazil::shallow::flows::Kind;
 use frazil::shallow::liquid::Liquid;
+use frazil::shallow::stains::Absorbing;
 use frazil::shallow::terrain::shapes::Shape;
-use frazil::shallow::{Law, Scalar, Shallow};
+use frazil::shallow::{Law, Scalar, Shallow, Staining, Stains};
 
 use crate::common::bodies::Dice;
-use crate::common::shallow::{Turn, busy, context};
+use crate::common::shallow::{Plan, Turn, busy, context};
 use crate::harness::{Harness, median};
 use crate::shallow_speed::{five_floors, one_floor, thread_seconds};
 
@@ -24,7 +26,12 @@ const TIMES: usize = 31;
 /// All of them.
 pub fn run(h: &mut Harness) {
     if h.wants("shallow.scalars") {
-        sums(h);
+        let (wrong, note) = sums(false);
+        h.gate("shallow.scalars", wrong, &note);
+    }
+    if h.wants("shallow.mass_all") {
+        let (wrong, note) = sums(true);
+        h.gate("shallow.mass_all", wrong, &note);
     }
     type Make = fn() -> Shallow;
     let scenes: [(&str, Make); 2] =
@@ -48,10 +55,31 @@ fn four() -> [Scalar; 4] {
     ]
 }
 
-/// Frames after which an amount is missing, or too many, or a concentration is beyond those that came in.
-fn sums(h: &mut Harness) {
+/// Ground that blood stains and that takes it in, as a mesh with a vertex at each cell.
+fn stains(liquid: &Shallow, plan: &Plan) -> (Stains, Vec<Vec3>) {
+    let grid = liquid.columns().grid;
+    let [nx, nz] = plan.size.map(|count| count as u32);
+    let place = |cell: usize| {
+        let [x, z] = grid.centre([cell % plan.size[0], cell / plan.size[0]]);
+        let top = plan.solids[cell].first().map_or(0.0, |solid| plan.heights.metres(solid[1]));
+        Vec3::new(x as f32, top as f32, z as f32)
+    };
+    let positions: Vec<Vec3> = (0..grid.cells()).map(place).collect();
+    let quads = (0..nz - 1).flat_map(|z| (0..nx - 1).map(move |x| z * nx + x));
+    let triangles: Vec<[u32; 3]> =
+        quads.flat_map(|at| [[at, at + nx, at + 1], [at + 1, at + nx, at + nx + 1]]).collect();
+    let absorbs = Some(Absorbing { capacity: 1e-3, rate: 1e-5 });
+    let staining = Staining { scalar: Some(0), absorbs, ..Staining::default() };
+    let stains = Stains::new(liquid, &positions, &triangles, staining).expect("stains");
+    (stains, positions)
+}
+
+/// Frames after which an amount is missing, or too many, or a concentration is beyond those that came in, and how it went; with falls and stains or
+/// without.
+fn sums(is_all: bool) -> (f64, String) {
     let ctx = context();
-    let plan = busy([93, 61]);
+    let mut plan = busy([93, 61]);
+    plan.params.falls = is_all.then(|| Falls { height: 0.001, drop: 0.0, ..Falls::default() });
     let mut liquid = plan.make(&ctx, Turn::NONE);
     liquid.set_scalars(&four()).expect("four scalars");
     for (at, point) in plan.points.iter().enumerate() {
@@ -60,6 +88,8 @@ fn sums(h: &mut Harness) {
             liquid.set_sourced(at, &sourced).expect("a source");
         }
     }
+    let mut stains = is_all.then(|| stains(&liquid, &plan));
+    let (mut falling, mut soaked) = (0.0_f64, 0.0);
     let mut dice = Dice(18);
     let (mut steps, mut frame, mut wrong, mut held) = (0, 0, 0, 0.0_f64);
     let mut out = vec![0.0; liquid.columns().len()];
@@ -69,6 +99,10 @@ fn sums(h: &mut Harness) {
             held = held.max(liquid.scalar_balance(0).expect("a dye").held);
         }
         steps += liquid.step(&ctx, FRAME).expect("a frame").steps;
+        if let Some((stains, positions)) = &mut stains {
+            soaked += stains.update(&mut liquid, positions).expect("stains");
+            falling = falling.max(liquid.scalar_balance(0).expect("a dye").falling);
+        }
         let balances = [0, 1, 2, 3].map(|scalar| liquid.scalar_balance(scalar).expect("a scalar"));
         out.resize(liquid.columns().len(), 0.0);
         liquid.concentrations(0, &mut out).expect("concentrations");
@@ -88,10 +122,13 @@ fn sums(h: &mut Harness) {
     let [poured, sourced, drained, absorbed, lost, inside, held] = ml;
     let note = format!(
         "{steps} steps, terrain that moves; ml of dye poured {poured:.1}, sourced {sourced:.1}, drained {drained:.1}, \
-         absorbed {absorbed:.1}, lost {lost:.1}, inside {inside:.1}, waiting at most {held:.2}, left by rounding {:.1e}",
-        all.dried * 1e6
+         absorbed {absorbed:.1}, lost {lost:.1}, inside {inside:.1}, waiting at most {held:.2}, left by rounding {:.1e}; in the air \
+         at most {:.2}; ml of liquid that the ground took {:.2}",
+        all.dried * 1e6,
+        falling * 1e6,
+        soaked * 1e6
     );
-    h.gate("shallow.scalars", f64::from(wrong), &note);
+    (f64::from(wrong), note)
 }
 
 /// Something that a trainer does between frames.

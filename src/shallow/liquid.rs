@@ -53,6 +53,14 @@ impl Liquid {
         })
     }
 
+    /// Viscosity (m2/s) at a shear rate (1/s), by Carreau's law where it thins.
+    pub fn viscosity_at(&self, rate: f64) -> f64 {
+        let Some(law) = &self.thinning else { return self.viscosity };
+        let fast = law.time * rate;
+        let part = libm::pow(1.0 + fast * fast, 0.5 * (law.power - 1.0));
+        law.thinnest + (self.viscosity - law.thinnest) * part
+    }
+
     /// Viscosity under strong shear (m2/s).
     pub fn least_viscosity(&self) -> f64 {
         self.thinning.map_or(self.viscosity, |law| law.thinnest)

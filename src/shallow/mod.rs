@@ -13,6 +13,7 @@ pub mod flows;
 pub mod grid;
 mod identity;
 pub mod liquid;
+pub mod loads;
 pub mod pace;
 pub mod params;
 mod per_column;
@@ -29,6 +30,7 @@ pub mod surface;
 pub mod system;
 pub mod terrain;
 
+pub use loads::Load;
 pub use params::Params;
 pub use probe::{Reading, View};
 pub use remap::Moved;

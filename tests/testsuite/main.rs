@@ -100,6 +100,7 @@ mod shallow {
     mod falls_scalars;
     mod flooded;
     mod flow;
+    mod loads;
     mod moving;
     mod probe;
     mod scalars;

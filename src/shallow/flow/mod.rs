@@ -35,6 +35,7 @@ use fast::{Fast, Films};
 use flux::Step;
 use links::LinkFlow;
 use lips::Lips;
+pub(super) use network::SLACK;
 use network::{Network, State};
 use parts::Part;
 use rows::Ground;

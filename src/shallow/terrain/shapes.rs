@@ -66,6 +66,14 @@ impl Shape {
         Ok(())
     }
 
+    /// Its middle (m).
+    pub fn middle(&self) -> DVec3 {
+        match self {
+            Self::Sphere { centre, .. } | Self::Cuboid { centre, .. } => *centre,
+            Self::Capsule { ends: [a, b], .. } => 0.5 * (a + b),
+        }
+    }
+
     /// The cells that it may cover: ranges of x and of z. Those of other cells have no solid of it.
     pub fn cells(&self, grid: &Grid) -> [Range<usize>; 2] {
         let bounds = self.bounds();
