@@ -128,6 +128,8 @@ mod shallow_flooded;
 mod shallow_ground;
 #[path = "gates/shallow_huppert.rs"]
 mod shallow_huppert;
+#[path = "gates/shallow_incline.rs"]
+mod shallow_incline;
 #[path = "gates/shallow_lake.rs"]
 mod shallow_lake;
 #[path = "gates/shallow_lifts.rs"]
@@ -154,6 +156,8 @@ mod shallow_surface;
 mod shallow_terrain;
 #[path = "gates/shallow_threads.rs"]
 mod shallow_threads;
+#[path = "gates/shallow_walls.rs"]
+mod shallow_walls;
 #[path = "gates/shallow_whole.rs"]
 mod shallow_whole;
 #[path = "gates/shot.rs"]
@@ -247,6 +251,8 @@ fn main() {
     shallow_delivery::run(&mut h);
     shallow_orifice::run(&mut h);
     shallow_huppert::run(&mut h);
+    shallow_incline::run(&mut h);
+    shallow_walls::run(&mut h);
     shallow_spread::run(&mut h);
     shallow_bowl::run(&mut h);
     shallow_energy::run(&mut h);

@@ -378,6 +378,20 @@ pub const GATES: &[Gate] = &[
     gate("shallow.huppert_exponent_coarse", "1", Open, Open),
     gate("shallow.huppert_front", "%", Most(5.0), Most(3.0)),
     gate("shallow.huppert_front_coarse", "%", Most(15.0), Most(8.0)),
+    // The same down the incline of the thesis' Fig. 4.14, on cells as large as it is deep, with friction at walls; and other models of friction on a film:
+    // Mould and Yang's drag, and the longest step of explicit viscosity. Printed.
+    gate("shallow.incline_front", "%", Most(10.0), Most(5.0)),
+    gate("shallow.mould_yang", "%", Open, Open),
+    gate("shallow.explicit_step", "ms", Open, Open),
+    // Passages of 1:1, 2:1 and 8:1 with friction at walls, against the exact flow; without it, printed; and how many steps honey in one takes to be steady.
+    gate("shallow.duct_closed", "%", Most(10.0), Most(3.0)),
+    gate("shallow.duct_closed_ground", "%", Open, Open),
+    gate("shallow.channel_open", "%", Most(10.0), Most(3.0)),
+    gate("shallow.channel_open_ground", "%", Open, Open),
+    gate("shallow.duct_settles", "steps", Open, Open),
+    gate("shallow.walls_frame", "ms", Open, Open),
+    gate("shallow.walls_frame_narrow", "ms", Open, Open),
+    gate("shallow.walls_frame_thick", "ms", Open, Open),
     // A puddle that spreads: how far its exponent is from 1/8, and how round it is.
     gate("shallow.spread_exponent", "1", Most(0.01), Most(0.004)),
     gate("shallow.spread_round", "%", Most(3.0), Most(1.0)),

@@ -8,7 +8,7 @@ use crate::shallow::Params;
 use crate::shallow::falls::Falls;
 use crate::shallow::grid::{Grid, Heights};
 use crate::shallow::liquid::{Carreau, Liquid};
-use crate::shallow::params::{Pace, Section};
+use crate::shallow::params::{Friction, Pace, Section};
 use crate::shallow::pipes::Border;
 
 /// Liquids that frz_shallow_params_liquid knows.
@@ -204,6 +204,8 @@ impl frz_shallow_params {
             pace,
             border: meaning("border", "frz_shallow_border", self.border, &BORDERS)?,
             section: meaning("section", "frz_shallow_section", self.section, &SECTIONS)?,
+            friction: Friction::default(),
+            thickening: None,
             falls: (self.falls_most > 0).then_some(falls),
         };
         params.validate()?;

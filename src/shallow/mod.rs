@@ -29,6 +29,7 @@ mod state;
 pub mod surface;
 pub mod system;
 pub mod terrain;
+mod thicken;
 
 pub use loads::Load;
 pub use params::Params;
@@ -38,3 +39,4 @@ pub use scalars::{Law, Scalar, ScalarBalance};
 pub use snapshot::Snapshot;
 pub use stains::{Staining, Stains};
 pub use system::{Balance, Report, Shallow};
+pub use thicken::Thickening;

@@ -3,7 +3,7 @@
 use super::flow::fast::FAST_WAVES;
 use super::flow::flux::{Step, Thinning};
 use super::grid::TOP;
-use super::params::{Pace, Params, Section};
+use super::params::{Friction, Pace, Params, Section};
 
 /// Steps are this much shorter than the bound of stability.
 const SAFETY: f64 = 0.9;
@@ -29,12 +29,18 @@ pub fn longest(params: &Params, measures: &Measures, depth: f64, frame: f64) -> 
     let g = -params.gravity[1];
     let height = if params.section == Section::Wetted { depth } else { measures.cell };
     let a = measures.pipes as f64 * g * height / (measures.cell * measures.cell);
-    let b = if depth > 0.0 { 3.0 * params.liquid.least_viscosity() / (depth * depth) } else { 0.0 };
+    let b = if depth > 0.0 { 3.0 * least_viscosity(params) / (depth * depth) } else { 0.0 };
     let c = 1.0 + libm::pow(params.kept, frame);
     if a <= 0.0 || !b.is_finite() {
         return frame;
     }
     SAFETY * (b + (b * b + 4.0 * a * c).sqrt()) / (2.0 * a)
+}
+
+/// The least viscosity (m2/s) that liquid may have.
+fn least_viscosity(params: &Params) -> f64 {
+    let times = params.thickening.map_or(1.0, |law| law.times.min(1.0));
+    params.liquid.least_viscosity() * times
 }
 
 /// The greatest depth (m) in a pipe's section for which steps of `dt` are stable without viscosity.
@@ -87,6 +93,9 @@ pub fn most_halvings(params: &Params) -> u32 {
 /// speed, and where this no longer grows with depth, at that speed: within a cell a step everywhere, or it would grow.
 const FASTEST: f32 = 1.0 / 3.0;
 
+/// The mean of phi^2, phi being the profile of a film's velocity over its depth (`flow::walls`).
+const BESIDE: f64 = 1.2;
+
 /// g unit dt^2 / dx^2 of a step (1 / units).
 pub fn drive(params: &Params, measures: &Measures, dt: f64) -> f64 {
     let Measures { cell, unit, .. } = *measures;
@@ -119,5 +128,13 @@ pub fn step(params: &Params, measures: &Measures, dt: f64, last: f64) -> Step {
         still: measures.still,
         wave: (dt / cell * (-y * unit).sqrt()) as f32,
         tilt: [lean(x), lean(z)],
+        lateral: match (params.friction, params.section) {
+            (Friction::Walls, Section::Wetted) => {
+                (BESIDE * dt * params.liquid.viscosity / (cell * cell)).min(1e12) as f32
+            }
+            _ => 0.0,
+        },
+        again: (dt / last) as f32,
+        cell: (cell / unit) as f32,
     }
 }

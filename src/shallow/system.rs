@@ -2,7 +2,7 @@
 
 use super::clock::Clock;
 use super::columns::Columns;
-use super::falls::{Falling, Falls};
+use super::falls::Falling;
 use super::flow::Flow;
 use super::flow::bands::attended;
 use super::flow::lips::Lips;
@@ -10,11 +10,13 @@ use super::flows::{FlowPoint, Flows};
 use super::grid::BOTTOMLESS;
 use super::identity::Identity;
 use super::pace::{self, MOST_STEPS, Measures, Next};
-use super::params::{Params, Section};
+use super::params::{Friction, Params, Section};
+use super::pipes::rules::Rules;
 use super::pipes::{Border, Pipes};
 use super::remap::Remap;
 use super::scalars::amounts::Account;
 use super::terrain::Solids;
+use super::thicken::Thick;
 use crate::base::cpu::FlushDenormals;
 use crate::context::Context;
 use crate::error::{Error, Result};
@@ -30,6 +32,7 @@ pub struct Shallow {
     pub(super) flows: Flows,
     pub(super) remap: Remap,
     pub(super) falls: Falling,
+    thick: Thick,
     /// Units poured in, less those taken out, other than by flow points.
     pub(super) poured: i64,
     /// Surface of the liquid at rest beyond an absorbing border (units), or BOTTOMLESS.
@@ -95,17 +98,23 @@ impl Shallow {
         if count == 0 {
             return Err(Error::argument("the terrain has no surface that faces up within the domain"));
         }
-        ctx.allow("the columns of the liquid", count as u64 * BYTES)?;
+        let has_walls = params.friction == Friction::Walls;
+        let bytes = if has_walls { BYTES + WALLS } else { BYTES };
+        ctx.allow("the columns of the liquid", count as u64 * bytes)?;
         let columns = Columns::new(solids);
         let falls = params.falls.as_ref();
-        let pipes = Pipes::with_cliffs(&columns, params.border, Falls::cliffs(falls, &columns));
+        let pipes = Pipes::with_rules(&columns, Rules::of(&params, &columns));
         let mut flow = Flow::new(&columns, &pipes);
+        if has_walls {
+            flow.walls.turn_on(&columns);
+        }
         if falls.is_some() {
             flow.lips = Lips::with_room(pipes.links.len());
         }
         Ok(Self {
             remap: Remap::new(falls.map_or(0, |falls| falls.most)),
             falls: Falling::new(falls, pipes.links.len()),
+            thick: Thick::none(),
             params,
             flow,
             pipes,
@@ -127,7 +136,7 @@ impl Shallow {
     /// Changes the parameters.
     ///
     /// # Errors
-    /// `Argument`: numbers out of range, another border, or other falls.
+    /// `Argument`: numbers out of range, another border, other falls, or other friction.
     pub fn set_params(&mut self, params: Params) -> Result<()> {
         params.validate()?;
         if params.border != self.params.border {
@@ -135,6 +144,9 @@ impl Shallow {
         }
         if params.falls != self.params.falls {
             return Err(Error::argument("falls cannot change after the liquid was made"));
+        }
+        if params.friction != self.params.friction {
+            return Err(Error::argument("friction cannot change after the liquid was made"));
         }
         self.params = params;
         Ok(())
@@ -162,7 +174,11 @@ impl Shallow {
 
     /// Memory of the columns, their pipes and what flows (bytes).
     pub fn bytes(&self) -> usize {
-        self.columns.bytes() + self.pipes.bytes() + self.flow.bytes() + self.falls.bytes()
+        self.columns.bytes()
+            + self.pipes.bytes()
+            + self.flow.bytes()
+            + self.falls.bytes()
+            + self.thick.bytes()
     }
 
     /// Simulated time (s).
@@ -267,8 +283,17 @@ impl Shallow {
         }
     }
 
-    /// The steps of a frame.
+    /// The steps of a frame, in which the liquid is as thick as what it carries makes it at the beginning.
     fn steps(&mut self, dt: f64, next: impl Fn(&Next) -> Option<f64>) -> Result<Report> {
+        let Self { params, thick, columns, flow, pipes, .. } = &mut *self;
+        let Some(law) = params.thickening else { return self.flow_on(dt, next) };
+        thick.begin(&law, columns, flow, pipes)?;
+        let report = self.flow_on(dt, next);
+        self.thick.end(&mut self.pipes);
+        report
+    }
+
+    fn flow_on(&mut self, dt: f64, next: impl Fn(&Next) -> Option<f64>) -> Result<Report> {
         let measures = self.measures();
         let mut report = Report::default();
         self.steps.clear();
@@ -381,3 +406,5 @@ impl Shallow {
 
 /// Bytes of a column with its pipes, and its share of strips.
 const BYTES: u64 = 64;
+/// More of them for friction at walls.
+const WALLS: u64 = 108;

@@ -7,7 +7,7 @@ use frazil::shallow::columns::Columns;
 use frazil::shallow::flows::{FlowPoint, Kind, Pulse};
 use frazil::shallow::grid::{BOTTOMLESS, Grid, Heights};
 use frazil::shallow::liquid::Liquid;
-use frazil::shallow::params::{Pace, Section};
+use frazil::shallow::params::{Friction, Pace, Section};
 use frazil::shallow::pipes::{Border, Pipes};
 use frazil::shallow::terrain::Solids;
 use frazil::shallow::terrain::solids::{Solid, unite};
@@ -370,6 +370,8 @@ pub fn random_params(dice: &mut Dice, step: f64) -> Params {
         pace: Pace::Realtime(step.clamp(1e-6, 1.0)),
         border: [Border::Closed, Border::Open, Border::Absorbing][dice.below(3)],
         section: if dice.one_in(4) { Section::Whole } else { Section::Wetted },
+        friction: Friction::Ground,
+        thickening: None,
         falls: None,
     }
 }

@@ -112,6 +112,7 @@ mod shallow {
     mod surface_mesh;
     mod terrain;
     mod threads;
+    mod walls;
 }
 mod surface {
     mod command;

@@ -41,7 +41,7 @@ use crate::motion::{Space, Up};
 use crate::shallow::falls::Falls;
 use crate::shallow::flows::FlowPoint;
 use crate::shallow::liquid::Liquid;
-use crate::shallow::params::{Pace, Section};
+use crate::shallow::params::{Friction, Pace, Section};
 use crate::shallow::pipes::Border;
 use crate::shallow::{Params, flows};
 
@@ -341,6 +341,8 @@ fn params(values: &Values) -> Params {
             _ => Border::Open,
         },
         section: Section::default(),
+        friction: Friction::default(),
+        thickening: None,
         falls: value("falls").and_then(Value::flag).filter(|falls| *falls).map(|_| Falls {
             height: number("falls_height").unwrap_or(usual.height),
             interval: number("falls_interval").unwrap_or(usual.interval),

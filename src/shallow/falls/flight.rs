@@ -183,7 +183,6 @@ fn reach(distance: f64, speed: f64, pull: f64) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::shallow::scalars::MOST;
 
     use crate::shallow::grid::{BOTTOMLESS, Grid, Heights};
     use crate::shallow::terrain::Solids;
@@ -223,7 +222,7 @@ mod tests {
             units: 1,
             source: 0,
             tick: 0,
-            amounts: [0; MOST],
+            amounts: Default::default(),
         };
         for _ in 0..10_000 {
             match air.fly(&mut packet, dt) {

@@ -32,6 +32,12 @@ pub struct Step {
     pub wave: f32,
     /// What gravity adds to the fall of the surface over a cell along x and along z (units).
     pub tilt: [i32; 2],
+    /// 6/5 nu dt / dx^2: friction beside pipes (`walls`); 0: there is none.
+    pub lateral: f32,
+    /// The step over the last one, in whose measure fluxes are kept.
+    pub again: f32,
+    /// Edge of a cell (units).
+    pub cell: f32,
 }
 
 /// Carreau's law, of a flux and the depth of the column that gives it.
@@ -107,6 +113,17 @@ pub fn flux_of<K: Kind>(step: &Step, fall: i32, depth: [f32; 2], flux: f32, open
 }
 
 impl Step {
+    /// The flux of a pipe whose inertia counts `light` times less: where that is over 1, it moves so much of the giver's depth at most. Marks
+    /// where it would be more.
+    #[inline(always)]
+    fn held_back(&self, light: f32, depth: [f32; 2], flux: f32, held: &mut i32) -> f32 {
+        let most =
+            if light > 1.0 { self.fastest * if flux > 0.0 { depth[0] } else { depth[1] } } else { f32::MAX };
+        let within = lesser(greater(flux, -most), most);
+        *held |= i32::from(within != flux);
+        within
+    }
+
     /// The viscosity of a flux, as part of that at rest; `square` is the square of the depth (units^2).
     #[inline(always)]
     pub fn thinned(&self, flux: f32, square: f32) -> f32 {
@@ -199,6 +216,50 @@ pub fn flux_row<K: Kind, const LIGHT: bool>(step: &Step, row: &Row, carried: Car
     LIGHT && held != [0; STRIP]
 }
 
+/// As [`flux_row`], with fluxes to the east and to the south that are known (`walls`).
+#[inline(always)]
+pub fn solved_row<const LIGHT: bool>(step: &Step, row: &Row, solved: [&[f32]; 2], carried: Carried) -> bool {
+    let mut held = [0; STRIP];
+    let Carried { flux: [east, south], left: [left_east, left_south], transfer: [to_east, to_south] } =
+        carried;
+    for strip in 0..east.len() / STRIP {
+        let depth = strip_of(row.depth, strip);
+        let light = if LIGHT { strip_of(row.light, strip) } else { &[0; STRIP] };
+        let ends = [depth, strip_from(row.depth, strip * STRIP + 1)];
+        let (flux, left, to) =
+            (strip_mut(east, strip), strip_mut(left_east, strip), strip_mut(to_east, strip));
+        solved_strip::<LIGHT, 0>(step, ends, light, strip_of(solved[0], strip), flux, left, to, &mut held);
+        let ends = [depth, strip_of(row.south_depth, strip)];
+        let (flux, left, to) =
+            (strip_mut(south, strip), strip_mut(left_south, strip), strip_mut(to_south, strip));
+        solved_strip::<LIGHT, 1>(step, ends, light, strip_of(solved[1], strip), flux, left, to, &mut held);
+    }
+    LIGHT && held != [0; STRIP]
+}
+
+#[inline(always)]
+#[expect(clippy::too_many_arguments)]
+fn solved_strip<const LIGHT: bool, const AXIS: usize>(
+    step: &Step,
+    depth: [&[i32; STRIP]; 2],
+    light: &[u32; STRIP],
+    solved: &[f32; STRIP],
+    flux: &mut [f32; STRIP],
+    left: &mut [f32; STRIP],
+    transfer: &mut [f32; STRIP],
+    held: &mut [i32; STRIP],
+) {
+    for x in 0..STRIP {
+        let mut f = solved[x];
+        if LIGHT {
+            let depth = [depth[0][x] as f32, depth[1][x] as f32];
+            f = step.held_back(unpacked(light[x])[AXIS], depth, f, &mut held[x]);
+        }
+        flux[x] = f;
+        [transfer[x], left[x]] = split(f, left[x]);
+    }
+}
+
 /// The columns at both ends of the pipes of a strip in one direction.
 struct Ends<'a> {
     base: [&'a [i32; STRIP]; 2],
@@ -225,11 +286,7 @@ fn flux_strip<K: Kind, const LIGHT: bool, const AXIS: usize>(
         let light = if LIGHT { unpacked(light[x])[AXIS] } else { 1.0 };
         let mut f = flux_of::<K>(step, fall, depth, flux[x], open[x], light);
         if LIGHT {
-            let most =
-                if light > 1.0 { step.fastest * if f > 0.0 { depth[0] } else { depth[1] } } else { f32::MAX };
-            let within = lesser(greater(f, -most), most);
-            held[x] |= i32::from(within != f);
-            f = within;
+            f = step.held_back(light, depth, f, &mut held[x]);
         }
         flux[x] = f;
         [transfer[x], left[x]] = split(f, left[x]);
@@ -251,21 +308,31 @@ mod tests {
         }
     }
 
+    impl Step {
+        /// A step of nothing.
+        pub(in crate::shallow::flow) fn still() -> Self {
+            Self {
+                kept: 1.0,
+                drive: 0.0,
+                drag: 0.0,
+                lighter: 1.0,
+                fastest: 0.3,
+                section: 1e9,
+                is_whole: false,
+                thinning: None,
+                still: 0,
+                wave: 0.0,
+                tilt: [0; 2],
+                lateral: 0.0,
+                again: 1.0,
+                cell: 1.0,
+            }
+        }
+    }
+
     #[test]
     fn a_flux_is_the_same_seen_from_both_ends() {
-        let step = Step {
-            kept: 0.9,
-            drive: 1e-7,
-            drag: 1e9,
-            lighter: 3.5e6,
-            fastest: 0.3,
-            section: 5e4,
-            is_whole: false,
-            thinning: None,
-            still: 0,
-            wave: 0.0,
-            tilt: [0; 2],
-        };
+        let step = Step { kept: 0.9, drive: 1e-7, drag: 1e9, lighter: 3.5e6, section: 5e4, ..Step::still() };
         for (fall, depth, last) in
             [(700, [3e4, 2e4], 20.0), (-90, [6e4, 0.0], 31.5), (40, [2e4, 2e4], -0.1), (-5, [0.0, 1e4], 0.0)]
         {

@@ -2,7 +2,7 @@
 //!
 //! A step goes over the rows once (`rows.rs`): fluxes (`flux.rs`, `fast.rs`, `links.rs`), their scaling (`scale.rs`), and transfers (`transfer.rs`), on the
 //! strips that are wet or beside wet ones (`active.rs`), by one band of rows for each thread (`bands.rs`, `parts.rs`). Columns that are full up to their
-//! ceiling are a network of their own, found first (`network.rs`, `heads.rs`, `rounds.rs`). What the liquid carries follows transfers (`carry.rs`).
+//! ceiling are a network of their own, found first (`network.rs`, `heads.rs`, `rounds.rs`); then friction beside pipes, if it is wanted (`walls`). What the liquid carries follows transfers (`carry.rs`).
 
 pub(super) mod active;
 pub(super) mod bands;
@@ -20,6 +20,7 @@ mod rounds;
 mod rows;
 mod scale;
 mod transfer;
+pub(super) mod walls;
 
 use std::ops::Range;
 
@@ -39,6 +40,7 @@ pub(super) use network::SLACK;
 use network::{Network, State};
 use parts::Part;
 use rows::Ground;
+use walls::{Liquid, Walls};
 
 /// Depths and fluxes, by column index.
 #[derive(Debug, Clone)]
@@ -57,6 +59,8 @@ pub struct Flow {
     /// Length of the step in whose measure fluxes are (s).
     pub(super) last: f64,
     fast: Fast,
+    /// Friction beside pipes.
+    pub(super) walls: Walls,
     /// What it carries.
     pub(super) amounts: Amounts,
 }
@@ -113,6 +117,7 @@ impl Flow {
             network: Network::new(columns.len(), columns.grid.size[1]),
             last: 1.0,
             fast: Fast::new(columns.len() + STRIP, columns.grid.size[1]),
+            walls: Walls::default(),
             amounts: Amounts::none(),
         }
     }
@@ -129,6 +134,7 @@ impl Flow {
             + self.bands.bytes()
             + self.network.bytes()
             + self.fast.bytes()
+            + self.walls.bytes()
             + self.amounts.bytes()
     }
 
@@ -245,6 +251,7 @@ impl Flow {
         has_same_links: bool,
     ) {
         self.bands.refit(columns, pipes.links.most, rows.clone(), &self.depth);
+        self.walls.fit(columns);
         let links = (!has_same_links).then_some(&pipes.links);
         self.active.refit(columns, links, rows.clone(), &self.depth);
         let Self { flux, left, network, active, .. } = self;
@@ -258,6 +265,7 @@ impl Flow {
 
     /// Begins a frame: strips where all is dry sleep.
     pub fn begin_frame(&mut self, columns: &Columns) {
+        self.walls.begin_frame();
         let [east, south] = &mut self.flux;
         let [left_east, left_south] = &mut self.left;
         self.active.settle(columns, &self.depth, |asleep| {
@@ -302,9 +310,11 @@ impl Flow {
     /// the threads of the pool around it, if [`Flow::divide`] has divided it.
     pub fn step(&mut self, columns: &Columns, pipes: &Pipes, step: &Step, dt: f64) -> [u32; 3] {
         self.active.refresh(columns);
+        self.walls.begin_step(step, &pipes.links, columns, self.bands.row_depths());
         if self.bands.find_filling() || !self.network.is_empty() {
             self.flood(columns, pipes, step);
         }
+        self.rub(columns, pipes, step);
         self.amounts.begin_step(dt);
         if !self.network.is_empty() {
             self.carry_flooded();
@@ -316,6 +326,7 @@ impl Flow {
             active: &self.active,
             network: &self.network,
             fast: &self.fast,
+            walls: &self.walls,
             lips: &self.lips,
             may_fill: &[],
             acts: &acts,
@@ -358,6 +369,23 @@ impl Flow {
         self.amounts.settle(&changes);
     }
 
+    /// Finds what flows with friction beside it.
+    fn rub(&mut self, columns: &Columns, pipes: &Pipes, step: &Step) {
+        let [east, south] = &self.flux;
+        let liquid = Liquid {
+            columns,
+            pipes,
+            active: &self.active,
+            fast: &self.fast,
+            network: &self.network,
+            depth: &self.depth,
+            flux: [east, south],
+            row_depths: self.bands.row_depths(),
+            is_divided: self.bands.are_several(),
+        };
+        self.walls.find(step, &liquid);
+    }
+
     /// Finds what flows through full columns.
     fn flood(&mut self, columns: &Columns, pipes: &Pipes, step: &Step) {
         let ([east, south], [left_east, left_south]) = (&self.flux, &self.left);
@@ -367,6 +395,7 @@ impl Flow {
             left: [left_east, left_south],
             links: &self.links,
             lips: &self.lips,
+            walls: &self.walls,
         };
         self.network.find(step, columns, pipes, self.bands.filling(), &state);
     }

@@ -13,6 +13,7 @@ use super::heads::{EQUAL, Node};
 use super::links::LinkFlow;
 use super::lips::{Fall, Lips, edge};
 use super::rounds::{self, Party};
+use super::walls::Walls;
 use crate::shallow::columns::{Columns, NONE, STRIP, strip_mut, strip_of};
 use crate::shallow::grid::TOP;
 use crate::shallow::per_column::{Array, PerColumn};
@@ -86,6 +87,8 @@ pub struct State<'a> {
     pub links: &'a LinkFlow,
     /// Links that liquid falls freely from.
     pub lips: &'a Lips,
+    /// Friction beside pipes.
+    pub walls: &'a Walls,
 }
 
 impl Edge {
@@ -315,14 +318,22 @@ impl Network {
         let to = if outside { NONE } else { self.add_party(columns, state.depth, j as u32) };
         let height = section(columns, state.depth, i, (!outside).then_some(j), flux);
         let square = height * height;
-        let drag = f64::from(step.drag) * f64::from(step.thinned(flux, square as f32));
-        let held_back =
-            if square > 0.0 && open > 0.0 { square / (square + drag / f64::from(open)) } else { 0.0 };
+        let thinned = f64::from(step.thinned(flux, square as f32));
+        let is_full = |party: u32| (party as usize) < self.nodes.len();
+        let beside = state.walls.beside(step, columns, state, at, [i, j], [from, to].map(is_full));
+        let drag = f64::from(step.drag) * thinned * beside.ground;
+        let lateral = square * thinned * beside.held;
+        let held_back = if square > 0.0 && open > 0.0 {
+            square / (square + drag / f64::from(open) + lateral)
+        } else {
+            0.0
+        };
         let conductance = held_back * f64::from(step.drive) * height.min(f64::from(step.section));
         self.edges.push(Edge {
             at,
             ends: [from, to],
-            kept: held_back * f64::from(step.kept * flux) + conductance * f64::from(tilt),
+            kept: held_back * (f64::from(step.kept * flux) + thinned * beside.taken)
+                + conductance * f64::from(tilt),
             conductance,
             outside: 0.0,
             flux: 0.0,
@@ -403,6 +414,15 @@ impl Network {
         self.shut_south[range].iter().for_each(|&at| south(at));
         let range = within(&self.shut_links, links.start as u32..links.end as u32);
         self.shut_links[range].iter().for_each(|&at| link(at));
+    }
+
+    /// Fluxes of the pipes to the east (0) and to the south (1) of columns.
+    pub(super) fn fluxes(&self) -> impl Iterator<Item = (usize, usize, f32)> + '_ {
+        self.edges.iter().filter_map(|edge| match edge.at {
+            At::East(at) => Some((0, at as usize, edge.flux as f32)),
+            At::South(at) => Some((1, at as usize, edge.flux as f32)),
+            At::Link(_) => None,
+        })
     }
 
     /// Puts the fluxes of the network in place, after the rest of the step.

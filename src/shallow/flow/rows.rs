@@ -8,7 +8,7 @@
 use super::active::Active;
 use super::buffers::{Buffer, RING, Rows, SWEEPS};
 use super::fast::Fast;
-use super::flux::{Carried, Kind, Of, Row, Step, flux_row, greater, lesser};
+use super::flux::{Carried, Kind, Of, Row, Step, flux_row, greater, lesser, solved_row};
 use super::links::{Outside, indices_of};
 use super::lips::Lips;
 use super::network::Network;
@@ -16,6 +16,7 @@ use super::parts::Parts;
 use super::places::{PAD, Place};
 use super::scale;
 use super::transfer::{find_wet, move_units};
+use super::walls::Walls;
 use crate::base::cpu::dispatch;
 use crate::shallow::columns::{Columns, NONE, STRIP};
 use crate::shallow::pipes::Pipes;
@@ -34,6 +35,8 @@ pub struct Ground<'a> {
     pub network: &'a Network,
     /// Films whose inertia counts less.
     pub fast: &'a Fast,
+    /// Friction beside pipes.
+    pub walls: &'a Walls,
     /// Links that liquid falls freely from.
     pub lips: &'a Lips,
     /// Rows with columns that may fill up.
@@ -163,6 +166,7 @@ impl Rows {
     fn drive<K: Kind>(&mut self, step: &Step, ground: &Ground, parts: &mut Parts, row: usize) -> bool {
         let Ground { columns, pipes, active, fast, .. } = ground;
         let (light, is_fast) = (fast.light(), fast.row(row));
+        let (walls, is_walled) = (ground.walls, K::VISCOUS && !K::WHOLE && ground.walls.row(row));
         let start = columns.row(row).start * STRIP;
         let buffer = &mut self.ring[row % RING];
         buffer.clear();
@@ -205,7 +209,14 @@ impl Rows {
                     left: [&mut left_east[mine.clone()], &mut left_south[mine]],
                     transfer: [&mut buffer.east[at.clone()], &mut buffer.south[at]],
                 };
-                if K::VISCOUS && !K::WHOLE && is_fast {
+                if is_walled {
+                    let solved = walls.solved().map(|flux| &flux[first..]);
+                    if is_fast {
+                        is_held |= solved_row::<true>(step, &row, solved, carried);
+                    } else {
+                        solved_row::<false>(step, &row, solved, carried);
+                    }
+                } else if K::VISCOUS && !K::WHOLE && is_fast {
                     is_held |= flux_row::<K, true>(step, &row, carried);
                 } else {
                     flux_row::<K, false>(step, &row, carried);

@@ -5,6 +5,7 @@
 use std::ops::Range;
 
 use super::cliffs::{Cliffs, beside};
+use super::rules::Rules;
 use super::slopes::{self, Rises};
 use crate::shallow::columns::{Columns, NONE, STRIP, strip_of};
 use crate::shallow::pipes::{Border, Links};
@@ -60,20 +61,20 @@ impl Finder {
     pub fn find(
         &mut self,
         columns: &Columns,
-        (border, cliffs): (Border, Cliffs),
+        rules: Rules,
         rows: Range<usize>,
         [east, south]: [&mut [f32]; 2],
         links: &mut Links,
     ) {
-        let count = columns.grid.size[1];
+        let (count, Rules { border, cliffs, steepest }) = (columns.grid.size[1], rules);
         for row in rows.start.saturating_sub(1)..(rows.start + 1).min(count) {
             self.stacks[row % 3].find_row(columns, row);
         }
-        self.rises[rows.start % 2].find(columns, rows.start);
+        self.rises[rows.start % 2].find(columns, rows.start, steepest);
         for row in rows {
             if row + 1 < count {
                 self.stacks[(row + 1) % 3].find_row(columns, row + 1);
-                self.rises[(row + 1) % 2].find(columns, row + 1);
+                self.rises[(row + 1) % 2].find(columns, row + 1, steepest);
             }
             let rises = [&self.rises[row % 2], &self.rises[(row + 1) % 2]];
             slopes::open_row(columns, row, rises, east, south);

@@ -6,14 +6,15 @@
 
 pub(super) mod cliffs;
 pub(super) mod joints;
+pub(super) mod rules;
 mod slopes;
 
 use std::ops::Range;
 
 use crate::shallow::columns::{Columns, NONE, STRIP, resize_part};
 use crate::shallow::per_column::{Array, PerColumn};
-use cliffs::Cliffs;
 use joints::{Finder, Side};
+use rules::Rules;
 
 /// What lies beyond the border of the domain.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
@@ -65,18 +66,18 @@ pub struct Pipes {
 impl Pipes {
     /// The pipes between columns, and over the border of the domain.
     pub fn new(columns: &Columns, border: Border) -> Self {
-        Self::with_cliffs(columns, border, Cliffs::NONE)
+        Self::with_rules(columns, Rules::bordered(border))
     }
 
-    /// As [`Pipes::new`], but pipes over cliffs are links.
-    pub(super) fn with_cliffs(columns: &Columns, border: Border, cliffs: Cliffs) -> Self {
+    /// As [`Pipes::new`], but pipes over cliffs are links, and steps may be walls.
+    pub(super) fn with_rules(columns: &Columns, rules: Rules) -> Self {
         let mut pipes = Self {
             east: PerColumn::new(Array::OpenEast, columns.len(), 0.0),
             south: PerColumn::new(Array::OpenSouth, columns.len(), 0.0),
             links: Links { rows: vec![0], ..Links::default() },
         };
         let (rows, open) = (0..columns.grid.size[1], [&mut pipes.east[..], &mut pipes.south[..]]);
-        Finder::default().find(columns, (border, cliffs), rows, open, &mut pipes.links);
+        Finder::default().find(columns, rules, rows, open, &mut pipes.links);
         pipes.links.list_columns(columns, &mut Ends::default());
         pipes
     }
@@ -247,6 +248,23 @@ mod tests {
         let last = columns.column([19, 19], 0).unwrap();
         assert_eq!((pipes.east[last], pipes.south[last]), (0.0, 0.0));
         assert!(pipes.links.is_empty());
+    }
+
+    #[test]
+    fn a_bank_is_a_wall_where_friction_is_at_walls_and_a_steep_plane_stays_a_slope() {
+        let rules = |steepest| Rules { steepest, ..Rules::bordered(Border::Closed) };
+        // A channel along x, with banks of three metres beside three cells of one metre.
+        let channel = columns([4, 5], |[_, z]| {
+            vec![[BOTTOMLESS, if z == 0 || z == 4 { 103 * METRE } else { 100 * METRE }]]
+        });
+        let beside = channel.column([1, 1], 0).unwrap();
+        let [walled, open] =
+            [METRE, i32::MAX].map(|most| Pipes::with_rules(&channel, rules(most)).east[beside]);
+        assert_eq!((walled, open), (1.0, (1.0f32 + 2.25).powi(-2)));
+        // A plane of 56 degrees across the pipe.
+        let plane = columns([4, 5], |[_, z]| vec![[BOTTOMLESS, 100 * METRE + 3 * z as i32 * METRE / 2]]);
+        let middle = plane.column([1, 2], 0).unwrap();
+        assert_eq!(Pipes::with_rules(&plane, rules(METRE)).east[middle], (1.0f32 + 2.25).powi(-2));
     }
 
     #[test]

@@ -25,13 +25,17 @@ pub(super) struct Rises {
 }
 
 impl Rises {
-    /// Finds the rises of a row.
-    pub fn find(&mut self, columns: &Columns, row: usize) {
+    /// Finds the rises of a row; those over more than `steepest` units on one side only are walls.
+    pub fn find(&mut self, columns: &Columns, row: usize, steepest: i32) {
         let len = (columns.row(row).len() + 1) * STRIP;
         self.x.resize(len, 0);
         self.z.resize(len, 0);
         let rises = self;
-        dispatch!(at most avx2: rise_row(columns: &Columns, row: usize, rises: &mut Rises));
+        if steepest == i32::MAX {
+            dispatch!(at most avx2: rise_row(columns: &Columns, row: usize, rises: &mut Rises));
+        } else {
+            dispatch!(at most avx2: rise_row_between_walls(columns: &Columns, row: usize, rises: &mut Rises, steepest: i32));
+        }
     }
 }
 
@@ -92,8 +96,39 @@ fn twice([before, behind]: [i32; 2], [has_before, has_behind]: [i32; 2]) -> i32 
     (behind | (before & !has_behind)) + (before | (behind & !has_before))
 }
 
+/// All bits of the sides that are walls: where the ground rises or falls by over `steepest`, unless it goes on so beyond the column.
+#[inline(always)]
+fn walls([before, behind]: [i32; 2], steepest: i32) -> [i32; 2] {
+    let is_steep = [before, behind].map(|step| -i32::from(step.abs() > steepest));
+    let goes_on = is_steep[0] & is_steep[1] & !((before ^ behind) >> 31);
+    is_steep.map(|steep| steep & !goes_on)
+}
+
 #[inline(always)]
 fn rise_row(columns: &Columns, row: usize, rises: &mut Rises) {
+    rise::<false>(columns, row, rises, i32::MAX);
+}
+
+#[inline(always)]
+fn rise_row_between_walls(columns: &Columns, row: usize, rises: &mut Rises, steepest: i32) {
+    rise::<true>(columns, row, rises, steepest);
+}
+
+/// Twice the rise over open sides, of the steps over both and whether they are open.
+#[inline(always)]
+fn rise_of<const WALLED: bool>(steps: [i32; 2], open: [i32; 2], steepest: i32) -> i32 {
+    let steps = [steps[0] & open[0], steps[1] & open[1]];
+    if WALLED {
+        let walls = walls(steps, steepest);
+        let open = [open[0] & !walls[0], open[1] & !walls[1]];
+        twice([steps[0] & open[0], steps[1] & open[1]], open)
+    } else {
+        twice(steps, open)
+    }
+}
+
+#[inline(always)]
+fn rise<const WALLED: bool>(columns: &Columns, row: usize, rises: &mut Rises, steepest: i32) {
     let (bases, ceilings) = (columns.bases(), columns.ceilings());
     for (place, strip) in columns.row(row).enumerate() {
         let beside = [columns.west(strip).is_some(), columns.east(strip).is_some()];
@@ -103,8 +138,8 @@ fn rise_row(columns: &Columns, row: usize, rises: &mut Rises) {
         for x in 0..STRIP {
             let open_west = passes([base[x], base[x + 1]], [ceiling[x], ceiling[x + 1]]);
             let open_east = passes([base[x + 1], base[x + 2]], [ceiling[x + 1], ceiling[x + 2]]);
-            let steps = [(base[x + 1] - base[x]) & open_west, (base[x + 2] - base[x + 1]) & open_east];
-            along[x] = twice(steps, [open_west, open_east]);
+            let steps = [base[x + 1].wrapping_sub(base[x]), base[x + 2].wrapping_sub(base[x + 1])];
+            along[x] = rise_of::<WALLED>(steps, [open_west, open_east], steepest);
         }
         let (base, ceiling) = (strip_of(bases, strip), strip_of(ceilings, strip));
         let (north, south) = (columns.north(strip), columns.south(strip));
@@ -114,8 +149,8 @@ fn rise_row(columns: &Columns, row: usize, rises: &mut Rises) {
         for x in 0..STRIP {
             let open_north = passes([north_base[x], base[x]], [north_ceiling[x], ceiling[x]]);
             let open_south = passes([base[x], south_base[x]], [ceiling[x], south_ceiling[x]]);
-            let steps = [(base[x] - north_base[x]) & open_north, (south_base[x] - base[x]) & open_south];
-            across[x] = twice(steps, [open_north, open_south]);
+            let steps = [base[x].wrapping_sub(north_base[x]), south_base[x].wrapping_sub(base[x])];
+            across[x] = rise_of::<WALLED>(steps, [open_north, open_south], steepest);
         }
     }
 }

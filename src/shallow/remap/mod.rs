@@ -18,9 +18,9 @@ use std::ops::Range;
 
 use super::Shallow;
 use super::columns::STRIP;
-use super::falls::Falls;
 use super::identity::Identity;
 use super::pipes::joints::Finder;
+use super::pipes::rules::Rules;
 use super::pipes::{Ends, Links};
 use super::stacks::Stacks;
 use super::terrain::Solids;
@@ -217,8 +217,8 @@ impl Shallow {
         let Self { columns, pipes, flow, remap, params, falls, .. } = self;
         let Remap { band, origins, carry, finder, ends, links, .. } = remap;
         links.clear();
-        let beyond = (params.border, Falls::cliffs(params.falls.as_ref(), columns));
-        finder.find(columns, beyond, rows.clone(), [&mut pipes.east, &mut pipes.south], links);
+        let rules = Rules::of(params, columns);
+        finder.find(columns, rules, rows.clone(), [&mut pipes.east, &mut pipes.south], links);
         let change = Change { columns, band, origins };
         carry.links(&change, flow, links);
         carry.regular(&change, pipes, flow);

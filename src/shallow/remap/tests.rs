@@ -4,8 +4,9 @@ use super::*;
 use crate::context::{Context, Pool};
 use crate::shallow::Params;
 use crate::shallow::columns::{Columns, NONE};
+use crate::shallow::falls::Falls;
 use crate::shallow::grid::{BOTTOMLESS, Grid, Heights, TOP};
-use crate::shallow::params::Pace;
+use crate::shallow::params::{Friction, Pace};
 use crate::shallow::pipes::{Border, Pipes};
 
 struct Dice(u64);
@@ -258,7 +259,7 @@ fn cliffs_that_come_and_go_are_links_as_in_a_terrain_made_anew() {
     let grid = Grid { cell: 0.5, origin: [0.0; 2], size: [40, 12] };
     let falls = Some(Falls { height: 1.0, drop: 0.0, most: 1 << 16, ..Falls::default() });
     let mut cells: Vec<Vec<Solid>> = (0..grid.cells()).map(|_| cell(&mut dice, 2)).collect();
-    let params = Params { falls, ..params(Border::Open) };
+    let params = Params { falls, friction: Friction::Walls, ..params(Border::Open) };
     let mut shallow = Shallow::new(&ctx, &solids(grid, &cells), params).unwrap();
     let flat = Pipes::new(&shallow.columns, Border::Open).links.len();
     assert!(shallow.pipes.links.len() > flat + 100, "cliffs");
@@ -272,8 +273,8 @@ fn cliffs_that_come_and_go_are_links_as_in_a_terrain_made_anew() {
         let first = dice.below(400);
         cells[first..first + 60].iter_mut().for_each(|old| *old = cell(&mut dice, 2));
         shallow.update_terrain(&solids(grid, &cells)).unwrap();
-        let cliffs = Falls::cliffs(falls.as_ref(), &shallow.columns);
-        assert!(shallow.pipes == Pipes::with_cliffs(&shallow.columns, Border::Open, cliffs), "round {round}");
+        let rules = Rules::of(&shallow.params, &shallow.columns);
+        assert!(shallow.pipes == Pipes::with_rules(&shallow.columns, rules), "round {round}");
         assert_eq!(shallow.falls.waiting().len(), shallow.pipes.links.len());
         assert_eq!(shallow.balance().error, 0, "round {round}");
     }
