@@ -45,7 +45,7 @@
 /**
  * Version of the interface that this header describes: major << 16 | minor.
  */
-#define FRZ_ABI_VERSION 65543
+#define FRZ_ABI_VERSION 65544
 
 /**
  * Version of frazil that this header belongs to.
@@ -134,6 +134,17 @@
  * faces are clockwise seen from above.
  */
 #define FRZ_SHALLOW_LEFT_HANDED 2
+
+/**
+ * Flag of a layout: films are shown at their minimum heights, which frz_shallow_find_lifts has found since the ground or a body moved last, in place
+ * of frz_shallow_layout.least_depth.
+ */
+#define FRZ_SHALLOW_LIFTED 4
+
+/**
+ * Most scalars that a liquid carries.
+ */
+#define FRZ_SHALLOW_MOST_SCALARS 4
 
 /**
  * Status codes. Numbers never change; new ones are added at the end.
@@ -615,6 +626,35 @@ typedef uint32_t frz_shallow_flow_kind;
 #endif // __cplusplus
 
 /**
+ * What becomes of a scalar but for being carried.
+ */
+enum frz_shallow_law
+#if defined(__cplusplus) || __STDC_VERSION__ >= 202311L
+  : uint32_t
+#endif // defined(__cplusplus) || __STDC_VERSION__ >= 202311L
+ {
+    /**
+     * Nothing: dye, salt, heat.
+     */
+    FRZ_SHALLOW_DYE = 0,
+    /**
+     * Half of it goes in each frz_shallow_scalar.half_life.
+     */
+    FRZ_SHALLOW_DECAYS = 1,
+    /**
+     * It is the time (s) since the liquid came in, in the mean over a column, up to frz_shallow_scalar.range.
+     */
+    FRZ_SHALLOW_AGES = 2,
+};
+#ifndef __cplusplus
+#if __STDC_VERSION__ >= 202311L
+typedef enum frz_shallow_law frz_shallow_law;
+#else
+typedef uint32_t frz_shallow_law;
+#endif // __STDC_VERSION__ >= 202311L
+#endif // __cplusplus
+
+/**
  * Arrays of all column indices that frz_shallow_lend lends. A height is frz_shallow_info.low + units x unit.
  */
 enum frz_shallow_lent
@@ -977,8 +1017,8 @@ typedef struct frz_pool frz_pool;
  * A small amount of liquid on a ground: blood, coffee or paint in a fraction of a frame.
  *
  * In real time: what a host calls in each frame keeps to stricter manners than all other calls. These are frz_shallow_step, _replay,
- * _update_terrain, _update_heights, _set_bodies, _save, _restore, _surface and _probe, and frz_shallow_snapshot_take, _surface and
- * _probe. With a pool of 0 threads, from their second call on, they allocate nothing, take no lock, log and poll nothing, and make no
+ * _update_terrain, _update_heights, _set_bodies, _save, _restore, _surface, _find_lifts, _drops, _drops_mesh, _read_scalar and _probe, and
+ * frz_shallow_snapshot_take, _surface, _drops, _drops_mesh and _probe. With a pool of 0 threads, from their second call on, they allocate nothing, take no lock, log and poll nothing, and make no
  * system call but that for the thread's clock where a step has a budget. Only where there is more than ever before, more columns because
  * a body uncovers another layer, say, memory grows; so may what fails.
  *
@@ -1979,7 +2019,7 @@ typedef struct {
 } frz_tracker_report;
 
 /**
- * What flows, and how. All of it but the border may change between frames.
+ * What flows, and how. All of it but the border and falls may change between frames.
  */
 typedef struct {
     /**
@@ -2036,6 +2076,28 @@ typedef struct {
      * 0.
      */
     uint32_t reserved;
+    /**
+     * Height (m) from which on liquid falls freely over an edge, 0 or more, an edge of a cell at least; 0.01 is usual. This and what follows,
+     * which cannot change, is for falls_most over 0 only.
+     */
+    double falls_height;
+    /**
+     * Time between the drops that leave one place (s), 0.0001 to 1; 1/120 is usual.
+     */
+    double falls_interval;
+    /**
+     * Least volume of a drop (m3), 0 or more; 6.5e-11, a ball of half a millimetre, is usual.
+     */
+    double falls_drop;
+    /**
+     * Most drops in the air, up to 1048576, for which there is room from the beginning; 8192 will do. 0, as is usual: nothing falls freely, and
+     * what goes over an edge is below at once.
+     */
+    uint32_t falls_most;
+    /**
+     * 0.
+     */
+    uint32_t reserved2;
 } frz_shallow_params;
 
 /**
@@ -2168,7 +2230,7 @@ typedef struct {
 } frz_shallow_flow;
 
 /**
- * Where all liquid is, and came from (m3; 1 ml is 1e-6). inside + held = poured + sourced + gained - drained - absorbed -
+ * Where all liquid is, and came from (m3; 1 ml is 1e-6). inside + held + falling = poured + sourced + gained - drained - absorbed -
  * lost.
  */
 typedef struct {
@@ -2216,6 +2278,10 @@ typedef struct {
      * Units (2^-30 of the range of heights, of a cell) that the sum above is off: 0, as all are integers.
      */
     int64_t error;
+    /**
+     * In the air.
+     */
+    double falling;
 } frz_shallow_balance;
 
 /**
@@ -2334,7 +2400,7 @@ typedef struct {
      */
     uint32_t struct_size;
     /**
-     * FRZ_SHALLOW_Z_UP, FRZ_SHALLOW_LEFT_HANDED, both or 0, which is usual: Y up, right-handed.
+     * FRZ_SHALLOW_Z_UP, FRZ_SHALLOW_LEFT_HANDED, FRZ_SHALLOW_LIFTED, several of them or 0, which is usual: Y up, right-handed.
      */
     uint32_t flags;
     /**
@@ -2350,6 +2416,11 @@ typedef struct {
      * Depth (m) from which frz_shallow_target.opacities are 1, over 0; 0.01 is usual.
      */
     double opaque_depth;
+    /**
+     * Depth (m) from which a wet vertex is at its full height, so that none jumps as its column wets or dries, 0 or more; 0 is usual: at once. With
+     * FRZ_SHALLOW_LIFTED 0.02 of a cell does well.
+     */
+    double fade_depth;
 } frz_shallow_layout;
 
 /**
@@ -2420,7 +2491,226 @@ typedef struct {
      * uint16_t or uint32_t for each corner of each triangle: a vertex. Triangles face up.
      */
     frz_span indices;
+    /**
+     * float a vertex, of each scalar that frz_shallow_set_scalars has set: its concentration; of one that is dry or has no column, the mean of the wet
+     * ones around.
+     */
+    frz_span scalars[4];
 } frz_shallow_target;
+
+/**
+ * What a thin film keeps from the ground's mesh, in edges of a cell, each finite and 0 or more.
+ */
+typedef struct {
+    /**
+     * sizeof(frz_shallow_distance).
+     */
+    uint32_t struct_size;
+    /**
+     * 0.
+     */
+    uint32_t flags;
+    /**
+     * How far the surface is over wet ground at least; 0.05 is usual.
+     */
+    double least;
+    /**
+     * How far it is over the mesh's vertices; 0.01 is usual.
+     */
+    double margin;
+    /**
+     * How far its rim is below them and below dry ground; 0.1 is usual. More than the margin.
+     */
+    double rim;
+} frz_shallow_distance;
+
+/**
+ * What became of the mesh's vertices that face up, of those that a call looked at.
+ */
+typedef struct {
+    /**
+     * sizeof(frz_shallow_fitted), set by the caller.
+     */
+    uint32_t struct_size;
+    /**
+     * Nothing.
+     */
+    uint32_t reserved;
+    /**
+     * Count of them.
+     */
+    uint64_t upward;
+    /**
+     * Of these, those that are more than a cell above the ground around: they may be above the surface.
+     */
+    uint64_t discarded;
+    /**
+     * Of the others, those that lie too close under a ceiling.
+     */
+    uint64_t capped;
+} frz_shallow_fitted;
+
+/**
+ * Something that the liquid carries. It begins zeroed, and then struct_size.
+ */
+typedef struct {
+    /**
+     * sizeof(frz_shallow_scalar), the same in all scalars of a call.
+     */
+    uint32_t struct_size;
+    /**
+     * A frz_shallow_law.
+     */
+    uint32_t law;
+    /**
+     * Its name in messages, not empty, and not that of another one; it is copied.
+     */
+    const char *name;
+    /**
+     * Concentrations are within -range to range, in the scalar's own measure, and are kept to a 2^20th of it: 1e-9 to 1e9. Of a dye 1, of an
+     * age 3600 (s).
+     */
+    double range;
+    /**
+     * Of one that decays: 1e-6 to 1e12 (s); of others it is not looked at.
+     */
+    double half_life;
+} frz_shallow_scalar;
+
+/**
+ * Where all of a scalar is, and came from: concentration x volume (its own measure x m3). inside + held + falling = poured + sourced + gained + grown
+ * - drained - absorbed - lost - dried.
+ */
+typedef struct {
+    /**
+     * sizeof(frz_shallow_scalar_balance), set by the caller.
+     */
+    uint32_t struct_size;
+    /**
+     * Nothing.
+     */
+    uint32_t reserved;
+    /**
+     * In the columns.
+     */
+    double inside;
+    /**
+     * Poured in so far, less what was taken.
+     */
+    double poured;
+    /**
+     * Came in through sources.
+     */
+    double sourced;
+    /**
+     * Went out through drains.
+     */
+    double drained;
+    /**
+     * Went into absorbers.
+     */
+    double absorbed;
+    /**
+     * Went over the border, or fell where there is no ground.
+     */
+    double lost;
+    /**
+     * Came in over a border that absorbs waves.
+     */
+    double gained;
+    /**
+     * Waits for room, where ground or a body has swallowed it.
+     */
+    double held;
+    /**
+     * In the air.
+     */
+    double falling;
+    /**
+     * Added by its law; negative: taken.
+     */
+    double grown;
+    /**
+     * Left by rounding in columns that ran dry.
+     */
+    double dried;
+    /**
+     * The smallest amounts that the sum above is off: 0, as all are integers.
+     */
+    int64_t error;
+} frz_shallow_scalar_balance;
+
+/**
+ * Buffers that a mesh of drops is written into, as those of frz_shallow_target. It begins zeroed, and then struct_size.
+ */
+typedef struct {
+    /**
+     * sizeof(frz_shallow_drops_target).
+     */
+    uint32_t struct_size;
+    /**
+     * Bits of an index: 16, for at most 65536 vertices, or 32. 0 without indices.
+     */
+    uint32_t index_bits;
+    /**
+     * float[3] a vertex: where it is (m x scale).
+     */
+    frz_span positions;
+    /**
+     * float[3] a vertex: a unit vector.
+     */
+    frz_span normals;
+    /**
+     * float[3] a vertex: velocity of its drop (m/s x scale).
+     */
+    frz_span velocities;
+    /**
+     * uint32_t a vertex: its drop in the list of frz_shallow_drops.
+     */
+    frz_span drops;
+    /**
+     * uint16_t or uint32_t for each corner of each triangle: a vertex. Triangles face outward.
+     */
+    frz_span indices;
+} frz_shallow_drops_target;
+
+/**
+ * Liquid in the air.
+ */
+typedef struct {
+    /**
+     * Its place (m).
+     */
+    double position[3];
+    /**
+     * Its velocity (m/s).
+     */
+    double velocity[3];
+    /**
+     * How much it is (m3).
+     */
+    double volume;
+    /**
+     * Radius of a ball of its volume (m).
+     */
+    double radius;
+    /**
+     * Seconds since it left the edge that it falls from.
+     */
+    double age;
+    /**
+     * That edge: the same number for all that come from one side of one column.
+     */
+    uint64_t source;
+    /**
+     * One more than that of the drop that left the same edge before it, if nothing interrupted the flow there.
+     */
+    uint64_t number;
+    /**
+     * Concentrations of the scalars that frz_shallow_set_scalars has set; 0 behind them.
+     */
+    float concentrations[4];
+} frz_shallow_drop;
 
 /**
  * The liquid at a point.
@@ -3959,7 +4249,7 @@ frz_status frz_shallow_create_grid(frz_context *context,
 void frz_shallow_destroy(frz_shallow *shallow);
 
 /**
- * Sets what flows, and how, from the next frame on. The border must stay.
+ * Sets what flows, and how, from the next frame on. The border and falls must stay.
  *
  * params: FRZ_ERROR_ARGUMENT names the field at fault and its range; the old ones then stay.
  *
@@ -4267,6 +4557,151 @@ frz_status frz_shallow_surface(frz_context *context,
                                const frz_shallow_layout *layout,
                                const frz_shallow_target *target,
                                frz_shallow_size *size);
+
+/**
+ * Finds the minimum heights of all columns, or of those that have changed, from the mesh that the liquid was made with, in real time (frz_shallow), for
+ * surfaces with FRZ_SHALLOW_LIFTED. They change what is shown, and nothing of the flow. It looks at all triangles once; after
+ * frz_shallow_update_terrain or _set_bodies have moved something it is called again, before the next such surface.
+ *
+ * distance: NULL for the usual one. Another one than before needs all columns.
+ * bounds: double[4], least x, least z, greatest x and greatest z (m) of all that has moved since the last call, triangles and bodies, where they were
+ *     and where they are. NULL, and the first time: all columns.
+ * fitted: receives what became of the vertices, all zeroes after a failure; may be NULL. Its struct_size is set by the caller.
+ *
+ * One thread at a time.
+ */
+frz_status frz_shallow_find_lifts(frz_context *context,
+                                  frz_shallow *shallow,
+                                  const frz_shallow_distance *distance,
+                                  const double *bounds,
+                                  frz_shallow_fitted *fitted);
+
+/**
+ * Sets what the liquid carries, in place of what it carried before. Of each scalar there is nothing yet, and what is poured and what comes through
+ * sources has none until frz_shallow_set_poured and _set_sourced. The frame after it may allocate.
+ *
+ * scalars: count scalars; NULL with a count of 0: there is none. FRZ_ERROR_ARGUMENT names one that is out of range, counted from 0; the old ones
+ *     then stay.
+ * count: number of scalars, up to FRZ_SHALLOW_MOST_SCALARS.
+ *
+ * One thread at a time.
+ */
+frz_status frz_shallow_set_scalars(frz_shallow *shallow,
+                                   const frz_shallow_scalar *scalars,
+                                   size_t count);
+
+/**
+ * Sets the concentrations of scalars in what frz_shallow_pour, _fill and _set_depths add from now on; 0 at first.
+ *
+ * concentrations: double for each scalar, in their order, within its range.
+ *
+ * One thread at a time.
+ */
+frz_status frz_shallow_set_poured(frz_shallow *shallow,
+                                  frz_view concentrations);
+
+/**
+ * Sets the concentrations of scalars in what comes through a source; 0 after frz_shallow_set_flows.
+ *
+ * flow: which flow point, counted from 0.
+ * concentrations: double for each scalar, in their order, within its range.
+ *
+ * One thread at a time.
+ */
+frz_status frz_shallow_set_sourced(frz_shallow *shallow, size_t flow, frz_view concentrations);
+
+/**
+ * Copies the concentrations of a scalar, in real time (frz_shallow); 0 where it is dry.
+ *
+ * scalar: which, counted from 0.
+ * columns: uint32_t for each column that is wanted, its index; data NULL with a count of 0: all indices, in order.
+ * dst: room for a float for each; FRZ_ERROR_CAPACITY when it is too little, and nothing is written.
+ *
+ * Any number of threads may read a shallow liquid.
+ */
+frz_status frz_shallow_read_scalar(const frz_shallow *shallow,
+                                   uint32_t scalar,
+                                   frz_view columns,
+                                   frz_span dst);
+
+/**
+ * Reports where all of a scalar is.
+ *
+ * scalar: which, counted from 0.
+ * balance: receives it, all zeroes after a failure. Its struct_size is set by the caller.
+ *
+ * Any number of threads may read a shallow liquid.
+ */
+frz_status frz_shallow_get_scalar_balance(const frz_shallow *shallow,
+                                          uint32_t scalar,
+                                          frz_shallow_scalar_balance *balance);
+
+/**
+ * Lists the liquid in the air, in the order in which it left its edges, in real time (frz_shallow).
+ *
+ * dst: room for a frz_shallow_drop for each, at most frz_shallow_params.falls_most. NULL: count receives their number, and nothing is written.
+ *     FRZ_ERROR_CAPACITY when it is too little.
+ * count: receives their number; 0 after other failures.
+ *
+ * Any number of threads may read a shallow liquid.
+ */
+frz_status frz_shallow_drops(const frz_shallow *shallow,
+                             frz_span dst,
+                             size_t *count);
+
+/**
+ * Lists the liquid that was in the air when a snapshot was taken, as frz_shallow_drops does, in real time (frz_shallow).
+ *
+ * dst: as there.
+ * count: as there.
+ *
+ * Any number of threads may read a snapshot.
+ */
+frz_status frz_shallow_snapshot_drops(const frz_shallow_snapshot *snapshot,
+                                      frz_span dst,
+                                      size_t *count);
+
+/**
+ * Reports the most that the mesh of the liquid in the air can have, so that buffers are made once.
+ *
+ * size: receives it, all zeroes after a failure. Its struct_size is set by the caller.
+ *
+ * Any number of threads may read a shallow liquid.
+ */
+frz_status frz_shallow_drops_bound(const frz_shallow *shallow, frz_shallow_size *size);
+
+/**
+ * Writes the liquid in the air as triangles, in real time (frz_shallow): a ball for each drop, and strands between drops that follow each other from one
+ * edge. The balls' vertices come first, in the order of their drops.
+ *
+ * layout: NULL for the usual one; its depths and FRZ_SHALLOW_LIFTED are not looked at.
+ * target: the buffers. FRZ_ERROR_CAPACITY when one is too small: nothing is written, and size receives what is needed. With all data
+ *     NULL it is the size only that is asked for.
+ * size: receives the size of the mesh, all zeroes after other failures; may be NULL. Its struct_size is set by the caller.
+ *
+ * One thread at a time.
+ */
+frz_status frz_shallow_drops_mesh(frz_context *context,
+                                  frz_shallow *shallow,
+                                  const frz_shallow_layout *layout,
+                                  const frz_shallow_drops_target *target,
+                                  frz_shallow_size *size);
+
+/**
+ * Writes the liquid that was in the air when a snapshot was taken, as frz_shallow_drops_mesh does, in real time (frz_shallow).
+ *
+ * context: another one than that of the thread that computes.
+ * layout: NULL for the usual one.
+ * target: the buffers, as there.
+ * size: receives the size of the mesh, as there; may be NULL. Its struct_size is set by the caller.
+ *
+ * One thread at a time.
+ */
+frz_status frz_shallow_snapshot_drops_mesh(frz_context *context,
+                                           frz_shallow_snapshot *snapshot,
+                                           const frz_shallow_layout *layout,
+                                           const frz_shallow_drops_target *target,
+                                           frz_shallow_size *size);
 
 /**
  * Makes a snapshot of a liquid as it is now.

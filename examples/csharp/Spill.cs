@@ -1,5 +1,6 @@
-/* A cup of coffee is spilled over a table with a groove: frazil's core library from C#, as a game has it. 60 frames a second; the surface comes
- * as Unity takes it (Y up, left-handed, clockwise, 16-bit indices) into arrays that are allocated once.
+/* A cup of coffee with milk is spilled over a table with a groove, and falls over its edge: frazil's core library from C#, as a game has it. 60
+ * frames a second; the surface, with the share of milk in each vertex, and the drops in the air come as Unity takes them (Y up, left-handed, clockwise)
+ * into arrays that are allocated once.
  *
  *   mcs -optimize -out:spill.exe Spill.cs && LD_LIBRARY_PATH=PREFIX/lib mono spill.exe
  */
@@ -10,7 +11,7 @@ using System.Runtime.InteropServices;
 /// <summary>The part of frazil.h that is used here, name by name.</summary>
 static class Frazil {
     const string Library = "frazil_core"; /* libfrazil_core.so, frazil_core.dll */
-    public const uint AbiVersion = 0x10007, LeftHanded = 2, LiquidWater = 0, Source = 0, Drain = 1, Open = 1;
+    public const uint AbiVersion = 0x10008, LeftHanded = 2, LiquidWater = 0, Source = 0, Drain = 1, Open = 1;
 
     [StructLayout(LayoutKind.Sequential)]
     public struct View {
@@ -23,6 +24,8 @@ static class Frazil {
         public uint StructSize, Flags;
         public double Viscosity, Thinnest, ThinningTime, ThinningPower, GravityX, GravityY, GravityZ, Kept, LongestStep;
         public uint Pace, Border, Section, Reserved;
+        public double FallsHeight, FallsInterval, FallsDrop;
+        public uint FallsMost, Reserved2;
     }
 
     [StructLayout(LayoutKind.Sequential)]
@@ -51,12 +54,13 @@ static class Frazil {
         public uint StructSize, Reserved;
         public double Inside, Poured, Sourced, Drained, Absorbed, Lost, Gained, Held;
         public long Error;
+        public double Falling;
     }
 
     [StructLayout(LayoutKind.Sequential)]
     public struct Layout {
         public uint StructSize, Flags;
-        public double Scale, LeastDepth, OpaqueDepth;
+        public double Scale, LeastDepth, OpaqueDepth, FadeDepth;
     }
 
     [StructLayout(LayoutKind.Sequential)]
@@ -68,7 +72,20 @@ static class Frazil {
     [StructLayout(LayoutKind.Sequential)]
     public struct Target {
         public uint StructSize, IndexBits;
-        public View Positions, Normals, Depths, Opacities, Velocities, Layers, Columns, Indices;
+        public View Positions, Normals, Depths, Opacities, Velocities, Layers, Columns, Indices, Scalar0, Scalar1, Scalar2, Scalar3;
+    }
+
+    [StructLayout(LayoutKind.Sequential)]
+    public struct DropsTarget {
+        public uint StructSize, IndexBits;
+        public View Positions, Normals, Velocities, Drops, Indices;
+    }
+
+    [StructLayout(LayoutKind.Sequential, CharSet = CharSet.Ansi)]
+    public struct Scalar {
+        public uint StructSize, Law;
+        public string Name;
+        public double Range, HalfLife;
     }
 
     [DllImport(Library)] public static extern IntPtr frz_last_error();
@@ -84,6 +101,11 @@ static class Frazil {
     [DllImport(Library)] public static extern uint frz_shallow_set_flows(IntPtr shallow, [In] Flow[] flows, UIntPtr count);
     [DllImport(Library)]
     public static extern uint frz_shallow_step(IntPtr context, IntPtr shallow, double dt, double budget, ref Report report);
+    [DllImport(Library)] public static extern uint frz_shallow_set_scalars(IntPtr shallow, [In] Scalar[] scalars, UIntPtr count);
+    [DllImport(Library)] public static extern uint frz_shallow_set_sourced(IntPtr shallow, UIntPtr flow, View concentrations);
+    [DllImport(Library)] public static extern uint frz_shallow_drops_bound(IntPtr shallow, ref Size size);
+    [DllImport(Library)]
+    public static extern uint frz_shallow_drops_mesh(IntPtr context, IntPtr shallow, ref Layout layout, ref DropsTarget target, ref Size size);
     [DllImport(Library)] public static extern uint frz_shallow_get_balance(IntPtr shallow, ref Balance balance);
     [DllImport(Library)] public static extern uint frz_shallow_layout_init(ref Layout layout, UIntPtr size);
     [DllImport(Library)] public static extern uint frz_shallow_surface_bound(IntPtr shallow, ref Size size);
@@ -119,14 +141,14 @@ static class Spill {
     const int Side = 120;
     const double Cell = 0.004; /* m */
 
-    /// <summary>A table that falls off to its far side, with a groove across and a rim around it.</summary>
+    /// <summary>A table that falls off to its far side, with a groove across and a rim around it, and the floor beyond.</summary>
     static float[] Table() {
         var heights = new float[Side * Side];
         for (int z = 0; z < Side; ++z) {
             for (int x = 0; x < Side; ++x) {
                 double groove = Math.Abs(z - 80) < 5 ? -0.004 : 0.0;
                 bool rim = x == 0 || z == 0 || x == Side - 1;
-                heights[z * Side + x] = (float)(rim ? 0.03 : groove - 0.03 * z * Cell);
+                heights[z * Side + x] = (float)(z > Side - 10 ? -0.09 : rim ? 0.03 : groove - 0.03 * z * Cell);
             }
         }
         return heights;
@@ -137,6 +159,7 @@ static class Spill {
         Frazil.Must(Frazil.frz_shallow_params_init(ref liquid, (UIntPtr)Frazil.SizeOf<Frazil.Params>()));
         Frazil.Must(Frazil.frz_shallow_params_liquid(ref liquid, Frazil.LiquidWater)); /* coffee */
         liquid.Border = Frazil.Open;
+        liquid.FallsMost = 2000;
         var domain = new Frazil.Domain {
             StructSize = Frazil.SizeOf<Frazil.Domain>(), Cell = Cell, OriginX = -0.5 * Side * Cell, OriginZ = -0.5 * Side * Cell,
             CellsX = Side, CellsZ = Side, Low = -0.1, High = 0.1
@@ -148,7 +171,10 @@ static class Spill {
         var cup = new Frazil.Flow {
             StructSize = Frazil.SizeOf<Frazil.Flow>(), Kind = Frazil.Source, Z = -0.15, Radius = 0.012, Rate = 60e-6
         };
+        var milk = new Frazil.Scalar { StructSize = Frazil.SizeOf<Frazil.Scalar>(), Name = "milk", Range = 1 };
+        Frazil.Must(Frazil.frz_shallow_set_scalars(shallow, new[] { milk }, (UIntPtr)1));
         Frazil.Must(Frazil.frz_shallow_set_flows(shallow, new[] { cup }, (UIntPtr)1));
+        using (var third = new Pinned(new[] { 0.3 }, 1)) Frazil.Must(Frazil.frz_shallow_set_sourced(shallow, UIntPtr.Zero, third.View));
         return shallow;
     }
 
@@ -164,7 +190,11 @@ static class Spill {
         var positions = new float[3 * bound.Vertices];
         var normals = new float[3 * bound.Vertices];
         var opacities = new float[bound.Vertices];
+        var milk = new float[bound.Vertices];
         var indices = new ushort[bound.Indices];
+        Frazil.Must(Frazil.frz_shallow_drops_bound(coffee, ref bound));
+        var dropPositions = new float[3 * bound.Vertices];
+        var dropIndices = new uint[bound.Indices];
         var layout = new Frazil.Layout();
         Frazil.Must(Frazil.frz_shallow_layout_init(ref layout, (UIntPtr)Frazil.SizeOf<Frazil.Layout>()));
         layout.Flags = Frazil.LeftHanded;
@@ -172,12 +202,18 @@ static class Spill {
         var report = new Frazil.Report { StructSize = Frazil.SizeOf<Frazil.Report>() };
         var balance = new Frazil.Balance { StructSize = Frazil.SizeOf<Frazil.Balance>() };
         var drawn = new Frazil.Size { StructSize = Frazil.SizeOf<Frazil.Size>() };
+        var falling = drawn;
+        ulong mostFalling = 0;
         double sum = 0, worst = 0;
         const int frames = 300;
-        using (Pinned a = new Pinned(positions, 3), b = new Pinned(normals, 3), c = new Pinned(opacities, 1), d = new Pinned(indices, 1)) {
+        using (Pinned a = new Pinned(positions, 3), b = new Pinned(normals, 3), c = new Pinned(opacities, 1), d = new Pinned(indices, 1),
+                      e = new Pinned(milk, 1), f = new Pinned(dropPositions, 3), g = new Pinned(dropIndices, 1)) {
             var target = new Frazil.Target {
                 StructSize = Frazil.SizeOf<Frazil.Target>(), IndexBits = 16, Positions = a.View, Normals = b.View, Opacities = c.View,
-                Indices = d.View
+                Indices = d.View, Scalar0 = e.View
+            };
+            var drops = new Frazil.DropsTarget {
+                StructSize = Frazil.SizeOf<Frazil.DropsTarget>(), IndexBits = 32, Positions = f.View, Indices = g.View
             };
             for (int frame = 0; frame < frames; ++frame) {
                 /* The cup holds 120 ml: it is empty after two seconds. */
@@ -185,20 +221,24 @@ static class Spill {
                 var watch = Stopwatch.StartNew();
                 Frazil.Must(Frazil.frz_shallow_step(context, coffee, 1.0 / 60, 0.008, ref report));
                 Frazil.Must(Frazil.frz_shallow_surface(context, coffee, ref layout, ref target, ref drawn));
+                Frazil.Must(Frazil.frz_shallow_drops_mesh(context, coffee, ref layout, ref drops, ref falling));
+                mostFalling = Math.Max(mostFalling, falling.Indices / 3);
                 double ms = watch.Elapsed.TotalMilliseconds;
                 sum += ms;
                 worst = Math.Max(worst, ms);
                 if (frame % 60 != 59) continue;
                 Frazil.Must(Frazil.frz_shallow_get_balance(coffee, ref balance));
-                Console.WriteLine("{0,3:0} s: {1,6:0.0} ml poured, {2,6:0.0} on the table, {3,6:0.0} on the floor; {4} triangles",
-                                  (frame + 1) / 60, balance.Sourced * 1e6, balance.Inside * 1e6, balance.Lost * 1e6, drawn.Indices / 3);
+                Console.WriteLine("{0,3:0} s: {1,6:0.0} ml poured, {2,6:0.0} on table and floor, {3,6:0.0} in the air, {4,6:0.0} gone; {5} triangles",
+                                  (frame + 1) / 60, balance.Sourced * 1e6, balance.Inside * 1e6, balance.Falling * 1e6, balance.Lost * 1e6,
+                                  (drawn.Indices + falling.Indices) / 3);
             }
         }
         Console.WriteLine("ms a frame: {0:0.00} on average, {1:0.00} at worst", sum / frames, worst);
         Frazil.Must(Frazil.frz_shallow_get_balance(coffee, ref balance));
         Frazil.frz_shallow_destroy(coffee);
         Frazil.frz_context_destroy(context);
-        /* Heights are integers: nothing is missing. */
-        return balance.Error == 0 && drawn.Indices > 0 && Math.Abs(balance.Sourced - 120e-6) < 1e-9 ? 0 : 1;
+        /* Heights are integers: nothing is missing. All vertices have the milk of the cup. */
+        bool isMixed = drawn.Vertices > 0 && Math.Abs(milk[0] - 0.3) < 1e-3 && Math.Abs(milk[drawn.Vertices - 1] - 0.3) < 1e-3;
+        return balance.Error == 0 && isMixed && mostFalling > 0 && Math.Abs(balance.Sourced - 120e-6) < 1e-9 ? 0 : 1;
     }
 }

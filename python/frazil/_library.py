@@ -199,7 +199,8 @@ class ShallowParams(Struct):
         ("struct_size", c.c_uint32), ("flags", c.c_uint32), ("viscosity", c.c_double), ("thinnest", c.c_double),
         ("thinning_time", c.c_double), ("thinning_power", c.c_double), ("gravity", c.c_double * 3), ("kept", c.c_double),
         ("longest_step", c.c_double), ("pace", c.c_uint32), ("border", c.c_uint32), ("section", c.c_uint32),
-        ("reserved", c.c_uint32),
+        ("reserved", c.c_uint32), ("falls_height", c.c_double), ("falls_interval", c.c_double), ("falls_drop", c.c_double),
+        ("falls_most", c.c_uint32), ("reserved2", c.c_uint32),
     ]
 
 
@@ -230,7 +231,7 @@ class ShallowBalance(Struct):
     _fields_ = [
         ("struct_size", c.c_uint32), ("reserved", c.c_uint32), ("inside", c.c_double), ("poured", c.c_double),
         ("sourced", c.c_double), ("drained", c.c_double), ("absorbed", c.c_double), ("lost", c.c_double),
-        ("gained", c.c_double), ("held", c.c_double), ("error", c.c_int64),
+        ("gained", c.c_double), ("held", c.c_double), ("error", c.c_int64), ("falling", c.c_double),
     ]
 
 
@@ -265,7 +266,7 @@ class ShallowSample(c.Structure):
 class ShallowLayout(Struct):
     _fields_ = [
         ("struct_size", c.c_uint32), ("flags", c.c_uint32), ("scale", c.c_double), ("least_depth", c.c_double),
-        ("opaque_depth", c.c_double),
+        ("opaque_depth", c.c_double), ("fade_depth", c.c_double),
     ]
 
 
@@ -273,12 +274,51 @@ class ShallowTarget(c.Structure):
     _fields_ = [("struct_size", c.c_uint32), ("index_bits", c.c_uint32)] + [
         (name, Span)
         for name in ("positions", "normals", "depths", "opacities", "velocities", "layers", "columns", "indices")
-    ]
+    ] + [("scalars", Span * 4)]
 
 
 class ShallowSize(Struct):
     _fields_ = [
         ("struct_size", c.c_uint32), ("reserved", c.c_uint32), ("vertices", c.c_uint64), ("indices", c.c_uint64),
+    ]
+
+
+class ShallowDistance(Struct):
+    _fields_ = [
+        ("struct_size", c.c_uint32), ("flags", c.c_uint32), ("least", c.c_double), ("margin", c.c_double), ("rim", c.c_double),
+    ]
+
+
+class ShallowFitted(Struct):
+    _fields_ = [
+        ("struct_size", c.c_uint32), ("reserved", c.c_uint32), ("upward", c.c_uint64), ("discarded", c.c_uint64),
+        ("capped", c.c_uint64),
+    ]
+
+
+class ShallowScalar(c.Structure):
+    _fields_ = [
+        ("struct_size", c.c_uint32), ("law", c.c_uint32), ("name", c.c_char_p), ("range", c.c_double), ("half_life", c.c_double),
+    ]
+
+
+class ShallowScalarBalance(Struct):
+    _fields_ = [("struct_size", c.c_uint32), ("reserved", c.c_uint32)] + [
+        (name, c.c_double)
+        for name in ("inside", "poured", "sourced", "drained", "absorbed", "lost", "gained", "held", "falling", "grown", "dried")
+    ] + [("error", c.c_int64)]
+
+
+class ShallowDrop(c.Structure):
+    _fields_ = [
+        ("position", c.c_double * 3), ("velocity", c.c_double * 3), ("volume", c.c_double), ("radius", c.c_double),
+        ("age", c.c_double), ("source", c.c_uint64), ("number", c.c_uint64), ("concentrations", c.c_float * 4),
+    ]
+
+
+class ShallowDropsTarget(c.Structure):
+    _fields_ = [("struct_size", c.c_uint32), ("index_bits", c.c_uint32)] + [
+        (name, Span) for name in ("positions", "normals", "velocities", "drops", "indices")
     ]
 
 
@@ -296,6 +336,9 @@ STRUCTS = {
     "frz_shallow_flow": ShallowFlow, "frz_shallow_balance": ShallowBalance, "frz_shallow_moved": ShallowMoved,
     "frz_shallow_body": ShallowBody, "frz_shallow_info": ShallowInfo, "frz_shallow_sample": ShallowSample,
     "frz_shallow_layout": ShallowLayout, "frz_shallow_target": ShallowTarget, "frz_shallow_size": ShallowSize,
+    "frz_shallow_distance": ShallowDistance, "frz_shallow_fitted": ShallowFitted, "frz_shallow_scalar": ShallowScalar,
+    "frz_shallow_scalar_balance": ShallowScalarBalance, "frz_shallow_drop": ShallowDrop,
+    "frz_shallow_drops_target": ShallowDropsTarget,
 }
 
 POLL = c.CFUNCTYPE(c.c_int, c.c_void_p, c.POINTER(Progress))
@@ -352,7 +395,11 @@ _FUNCTIONS = {
     "shallow_restore": [_P, _P, _P, _Z], "shallow_layout_init": [_P, _Z], "shallow_surface_bound": [_P, _P],
     "shallow_surface": [_P, _P, _P, _P, _P], "shallow_snapshot_create": [_P, _P, _P],
     "shallow_snapshot_take": [_P, _P], "shallow_snapshot_surface": [_P, _P, _P, _P, _P],
-    "shallow_snapshot_probe": [_P, View, Span],
+    "shallow_snapshot_probe": [_P, View, Span], "shallow_find_lifts": [_P, _P, _P, _P, _P],
+    "shallow_set_scalars": [_P, _P, _Z], "shallow_set_poured": [_P, View], "shallow_set_sourced": [_P, _Z, View],
+    "shallow_read_scalar": [_P, _U, View, Span], "shallow_get_scalar_balance": [_P, _U, _P],
+    "shallow_drops": [_P, Span, _P], "shallow_drops_mesh": [_P, _P, _P, _P, _P],
+    "shallow_snapshot_drops": [_P, Span, _P], "shallow_snapshot_drops_mesh": [_P, _P, _P, _P, _P],
 }
 _VOID = ["pool_destroy", "context_destroy", "context_cancel", "context_reset", "mesh_destroy", "grid_destroy",
          "base_destroy", "grains_destroy", "mist_destroy", "tracker_destroy", "shallow_destroy",

@@ -6,11 +6,12 @@ from typing import NamedTuple, Optional, Sequence
 
 import numpy as np
 
-from ._library import (Handle, ShallowBalance, ShallowBody, ShallowDomain, ShallowFlow, ShallowInfo, ShallowLayout,
-                       ShallowMoved, ShallowParams, ShallowReport, ShallowSize, ShallowTarget, Span, View, call,
-                       made, rows, saved, span, view)
+from ._library import (Handle, ShallowBalance, ShallowBody, ShallowDistance, ShallowDomain, ShallowFitted, ShallowFlow, ShallowInfo,
+                       ShallowMoved, ShallowParams, ShallowReport, ShallowScalar, ShallowScalarBalance, Span, View, call, made, rows,
+                       saved, span, view)
 from .grid import Grid
 from .mesh import Mesh
+from .shallow_meshes import Drops, Surface, drops_mesh_of, drops_of, surface_of
 
 LIQUIDS = {"water": 0, "blood": 1, "paint": 2, "honey": 3, "thinning blood": 4}
 PACES = {"realtime": 0, "exact": 1}
@@ -31,11 +32,7 @@ ALL_LAYERS = NO_COLUMN = 0xffffffff
 # What Shallow.probe answers for each point.
 SAMPLE = np.dtype([("height", "f8"), ("depth", "f8"), ("velocity", "f4", 2), ("surface_velocity", "f4", 2), ("column", "u4"),
                    ("layer", "u4")])
-# Parts of a surface that are written on demand: the type, and how many of it a vertex has.
-PARTS = {
-    "normals": (np.float32, 3), "depths": (np.float32, 1), "opacities": (np.float32, 1), "velocities": (np.float32, 3),
-    "layers": (np.uint32, 1), "columns": (np.uint32, 1),
-}
+LAWS = {"dye": 0, "decays": 1, "ages": 2}
 
 
 class Source(NamedTuple):
@@ -82,6 +79,16 @@ class Orifice(NamedTuple):
     on: Optional[tuple] = None
 
 
+class Scalar(NamedTuple):
+    """What the liquid carries: a "dye", what "decays" by half in each half_life (s), or "ages", the time (s) since it came in. Concentrations
+    lie within -range to range."""
+
+    name: str
+    law: str = "dye"
+    range: float = 1.0
+    half_life: float = 0.0
+
+
 class Ball(NamedTuple):
     """A solid that moves (m)."""
 
@@ -103,19 +110,6 @@ class Box(NamedTuple):
     at: Sequence[float]
     half: Sequence[float]
     axes: Sequence[Sequence[float]] = ((1, 0, 0), (0, 1, 0), (0, 0, 1))
-
-
-class Surface(NamedTuple):
-    """The surface of a liquid: positions (n, 3), triangles (t, 3) that face up; the others where they were asked for."""
-
-    positions: np.ndarray
-    triangles: np.ndarray
-    normals: Optional[np.ndarray] = None
-    depths: Optional[np.ndarray] = None
-    opacities: Optional[np.ndarray] = None
-    velocities: Optional[np.ndarray] = None
-    layers: Optional[np.ndarray] = None
-    columns: Optional[np.ndarray] = None
 
 
 def _number(kind, name, known):
@@ -145,28 +139,6 @@ def _body(body):
     return out
 
 
-def _surface(name, ctx, pointer, parts, z_up, left_handed, scale, least_depth, opaque_depth):
-    """The surface of a liquid or a snapshot."""
-    unknown = [part for part in parts if part not in PARTS]
-    if unknown:
-        raise ValueError(f"surfaces have no {unknown[0]!r}, but {', '.join(PARTS)}")
-    layout, size = ShallowLayout(), ShallowSize(c.sizeof(ShallowSize))
-    call("shallow_layout_init", c.byref(layout), c.sizeof(layout))
-    layout.flags, layout.scale, layout.least_depth = int(z_up) | 2 * int(left_handed), scale, least_depth
-    layout.opaque_depth = opaque_depth
-    target = ShallowTarget(c.sizeof(ShallowTarget), 32)
-    start = ctx.pointer, pointer, c.byref(layout), c.byref(target)
-    call(name, *start, c.byref(size))
-    arrays = {part: np.empty((size.vertices, PARTS[part][1]), PARTS[part][0]) for part in parts}
-    arrays["positions"], triangles = np.empty((size.vertices, 3), np.float32), np.empty((size.indices // 3, 3), np.uint32)
-    for part, array in arrays.items():
-        setattr(target, part, span(array))
-    target.indices = Span(span(triangles).data, size.indices, 0)
-    call(name, *start, None)
-    flat = {part: array if array.shape[1] > 1 else array[:, 0] for part, array in arrays.items()}
-    return Surface(flat.pop("positions"), triangles, **flat)
-
-
 def _probe(name, pointer, points):
     points = rows(points, np.float64, 3)
     out = np.empty(len(points), SAMPLE)
@@ -185,7 +157,8 @@ class Shallow(Handle):
     low, high: range of heights (m); that of the ground, and above it as much again, at least 16 cells.
     liquid: "water", "blood", "paint", "honey" or "thinning blood".
     pace: "realtime" or "exact". border: "closed", "open" or "absorbing". section: "wetted" or "whole".
-    Further parameters, as in frz_shallow_params: viscosity, thinnest, thinning_time, thinning_power, gravity, kept, longest_step.
+    Further parameters, as in frz_shallow_params: viscosity, thinnest, thinning_time, thinning_power, gravity, kept, longest_step; falls_most over 0
+    (8192, say) lets liquid fall freely, and falls_height, falls_interval and falls_drop say how.
     """
 
     _destroy = "frz_shallow_destroy"
@@ -218,7 +191,7 @@ class Shallow(Handle):
             name = "shallow_create" if isinstance(ground, Mesh) else "shallow_create_grid"
             pointer = made(name, *start, ground.pointer)
         super().__init__(pointer)
-        self._ctx, self._more, self._lent = ctx, more, []
+        self._ctx, self._more, self._lent, self._scalars = ctx, more, [], 0
         self.cells, self.origin = tuple(cells), tuple(origin)
 
     @staticmethod
@@ -229,7 +202,7 @@ class Shallow(Handle):
         params.pace, params.border = _number("pace", pace, PACES), _number("border", border, BORDERS)
         params.section = _number("section", section, SECTIONS)
         for name, value in more.items():
-            if name in ("struct_size", "flags", "reserved") or name not in dict(ShallowParams._fields_):
+            if name in ("struct_size", "flags", "reserved", "reserved2") or name not in dict(ShallowParams._fields_):
                 raise TypeError(f"shallow liquids have no parameter {name}")
             setattr(params, name, (c.c_double * 3)(*value) if name == "gravity" else value)
         return params
@@ -294,6 +267,54 @@ class Shallow(Handle):
         out = c.c_double()
         call("shallow_pour", self.pointer, (c.c_double * 3)(*at), radius, volume, c.byref(out))
         return out.value
+
+    def set_scalars(self, scalars):
+        """Sets Scalars, up to four, that the liquid carries, in place of those before: there is nothing yet of any."""
+        array = (ShallowScalar * max(len(scalars), 1))(*(
+            ShallowScalar(c.sizeof(ShallowScalar), _number("law", scalar.law, LAWS), scalar.name.encode(), scalar.range, scalar.half_life)
+            for scalar in scalars))
+        call("shallow_set_scalars", self.pointer, array, len(scalars))
+        self._scalars = len(scalars)
+
+    def set_poured(self, concentrations):
+        """Sets the concentration of each scalar in what pour(), fill() and set_depths() add from now on."""
+        call("shallow_set_poured", self.pointer, view(np.ascontiguousarray(concentrations, np.float64)))
+
+    def set_sourced(self, flow, concentrations):
+        """Sets the concentration of each scalar in what comes through a Source; set_flows() sets them to 0."""
+        call("shallow_set_sourced", self.pointer, flow, view(np.ascontiguousarray(concentrations, np.float64)))
+
+    def concentrations(self, scalar, columns=None):
+        """Concentrations of a scalar of all column indices, or of some; 0 where it is dry."""
+        columns = None if columns is None else np.ascontiguousarray(columns, np.uint32).reshape(-1)
+        out = np.empty(self.info.index_count if columns is None else len(columns), np.float32)
+        if len(out):
+            call("shallow_read_scalar", self.pointer, scalar, View(None, 0, 0) if columns is None else view(columns), span(out))
+        return out
+
+    def scalar_balance(self, scalar):
+        """Where all of a scalar is (its own measure x m3), as frz_shallow_scalar_balance has it."""
+        out = ShallowScalarBalance(c.sizeof(ShallowScalarBalance))
+        call("shallow_get_scalar_balance", self.pointer, scalar, c.byref(out))
+        return out
+
+    @property
+    def drops(self):
+        """The liquid in the air: an array with fields position (m), velocity (m/s), volume (m3), radius (m), age (s), source, number and
+        concentrations."""
+        return drops_of("shallow_drops", self.pointer)
+
+    def drops_mesh(self, z_up=False, left_handed=False, scale=1.0):
+        """Drops: a mesh of balls and strands."""
+        return drops_mesh_of("shallow_drops_mesh", self._ctx, self.pointer, z_up, left_handed, scale)
+
+    def find_lifts(self, bounds=None, least=0.05, margin=0.01, rim=0.1):
+        """Finds minimum heights over the mesh, for surface(lifted=True), anew after the ground or bodies have moved: within bounds (x0, z0, x1, z1),
+        or everywhere. What became of its vertices, as frz_shallow_fitted has it."""
+        distance, fitted = ShallowDistance(c.sizeof(ShallowDistance), 0, least, margin, rim), ShallowFitted(c.sizeof(ShallowFitted))
+        corners = None if bounds is None else (c.c_double * 4)(*bounds)
+        call("shallow_find_lifts", self._ctx.pointer, self.pointer, c.byref(distance), corners, c.byref(fitted))
+        return fitted
 
     def fill(self, height):
         """Fills all columns up to a height (m), or their ceiling."""
@@ -390,9 +411,11 @@ class Shallow(Handle):
         call("shallow_volume", self.pointer, *corners, ALL_LAYERS if layer is None else layer, c.byref(out))
         return out.value
 
-    def surface(self, parts=(), z_up=False, left_handed=False, scale=1.0, least_depth=0.0, opaque_depth=0.01):
-        """The liquid's Surface, with these parts of it: normals, depths, opacities, velocities, layers, columns."""
-        return _surface("shallow_surface", self._ctx, self.pointer, parts, z_up, left_handed, scale, least_depth, opaque_depth)
+    def surface(self, parts=(), z_up=False, left_handed=False, scale=1.0, least_depth=0.0, opaque_depth=0.01, lifted=False, fade_depth=0.0):
+        """The liquid's Surface, with its scalars and these parts of it: normals, depths, opacities, velocities, layers, columns; lifted: at its minimum
+        heights, which find_lifts() has found."""
+        return surface_of("shallow_surface", self._ctx, self.pointer, parts, z_up, left_handed, scale, least_depth, opaque_depth, lifted,
+                        fade_depth, self._scalars)
 
     def save(self):
         """The state between two frames: bytes for restore()."""
@@ -410,6 +433,7 @@ class Snapshot(Handle):
 
     def __init__(self, ctx, shallow):
         super().__init__(made("shallow_snapshot_create", ctx.pointer, shallow.pointer))
+        self._scalars = shallow._scalars
 
     def _words(self):
         return "of a shallow liquid"
@@ -417,10 +441,21 @@ class Snapshot(Handle):
     def take(self, shallow):
         """Takes a liquid as it is now."""
         call("shallow_snapshot_take", self.pointer, shallow.pointer)
+        self._scalars = shallow._scalars
 
-    def surface(self, ctx, parts=(), z_up=False, left_handed=False, scale=1.0, least_depth=0.0, opaque_depth=0.01):
+    def surface(self, ctx, parts=(), z_up=False, left_handed=False, scale=1.0, least_depth=0.0, opaque_depth=0.01, lifted=False, fade_depth=0.0):
         """As Shallow.surface; ctx: another context than that of the thread that computes."""
-        return _surface("shallow_snapshot_surface", ctx, self.pointer, parts, z_up, left_handed, scale, least_depth, opaque_depth)
+        return surface_of("shallow_snapshot_surface", ctx, self.pointer, parts, z_up, left_handed, scale, least_depth, opaque_depth, lifted,
+                        fade_depth, self._scalars)
+
+    @property
+    def drops(self):
+        """As Shallow.drops."""
+        return drops_of("shallow_snapshot_drops", self.pointer)
+
+    def drops_mesh(self, ctx, z_up=False, left_handed=False, scale=1.0):
+        """As Shallow.drops_mesh; ctx: another context than that of the thread that computes."""
+        return drops_mesh_of("shallow_snapshot_drops_mesh", ctx, self.pointer, z_up, left_handed, scale)
 
     def probe(self, points):
         """As Shallow.probe."""

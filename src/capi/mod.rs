@@ -98,6 +98,12 @@ pub mod shallow_state;
 
 pub mod shallow_surface;
 
+pub mod shallow_lifts;
+
+pub mod shallow_scalars;
+
+pub mod shallow_drops;
+
 pub mod shallow_snapshot;
 
 mod shallow_lists;

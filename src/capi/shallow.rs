@@ -7,11 +7,15 @@ use super::guard::{Outcome, frz_status, guard};
 use super::handle::{Noun, change, destroy, read, required};
 use super::mesh::frz_mesh;
 use super::shallow_flows::Attached;
+use super::shallow_lifts::Lifted;
 use super::shallow_params::{domain, frz_shallow_domain, frz_shallow_params, params};
 use super::shallow_terrain::Terrain;
 use super::views::{Sized32, fill, frz_span, frz_view, within};
 use crate::context::Context;
+use crate::shallow::falls::Droplet;
+use crate::shallow::falls::mesh::Balls;
 use crate::shallow::pace::MOST_STEPS;
+use crate::shallow::scalars::MOST;
 use crate::shallow::surface::Surface;
 use crate::shallow::terrain::Solids;
 use crate::shallow::terrain::shapes::Shape;
@@ -20,8 +24,8 @@ use crate::shallow::{Params, Report, Shallow};
 /// A small amount of liquid on a ground: blood, coffee or paint in a fraction of a frame.
 ///
 /// In real time: what a host calls in each frame keeps to stricter manners than all other calls. These are frz_shallow_step, _replay,
-/// _update_terrain, _update_heights, _set_bodies, _save, _restore, _surface and _probe, and frz_shallow_snapshot_take, _surface and
-/// _probe. With a pool of 0 threads, from their second call on, they allocate nothing, take no lock, log and poll nothing, and make no
+/// _update_terrain, _update_heights, _set_bodies, _save, _restore, _surface, _find_lifts, _drops, _drops_mesh, _read_scalar and _probe, and
+/// frz_shallow_snapshot_take, _surface, _drops, _drops_mesh and _probe. With a pool of 0 threads, from their second call on, they allocate nothing, take no lock, log and poll nothing, and make no
 /// system call but that for the thread's clock where a step has a budget. Only where there is more than ever before, more columns because
 /// a body uncovers another layer, say, memory grows; so may what fails.
 ///
@@ -88,8 +92,16 @@ pub(super) struct Spill {
     pub shapes: Vec<Shape>,
     /// Makes surfaces.
     pub surface: Surface,
+    /// Minimum heights, once they were found.
+    pub lifted: Lifted,
     /// Mean velocities of all column indices (m/s), when a surface wants them.
     pub velocities: Vec<[f32; 2]>,
+    /// Concentrations of scalars by column index, when a surface wants them.
+    pub concentrations: [Vec<f32>; MOST],
+    /// Makes meshes of what is in the air, and that.
+    pub balls: Balls,
+    /// Drops of the last such mesh.
+    pub drops: Vec<Droplet>,
     /// Steps of a replay (s).
     steps: Vec<f64>,
 }
@@ -106,13 +118,20 @@ impl Spill {
         let shallow = ctx.phase("columns", || Shallow::new(ctx, solids, params))?;
         let mut surface = Surface::default();
         surface.reserve(shallow.columns());
+        let most = shallow.params().falls.map_or(0, |falls| falls.most);
+        let mut balls = Balls::default();
+        balls.reserve(most);
         Ok(Self {
             shallow,
             terrain,
             flows: Vec::new(),
             shapes: Vec::new(),
             surface,
+            lifted: Lifted::default(),
             velocities: Vec::new(),
+            concentrations: Default::default(),
+            balls,
+            drops: Vec::with_capacity(most),
             steps: Vec::with_capacity(1024),
         })
     }
@@ -220,7 +239,7 @@ pub unsafe extern "C" fn frz_shallow_destroy(shallow: *mut frz_shallow) {
     guard(|| unsafe { destroy(shallow) });
 }
 
-/// Sets what flows, and how, from the next frame on. The border must stay.
+/// Sets what flows, and how, from the next frame on. The border and falls must stay.
 ///
 /// params: FRZ_ERROR_ARGUMENT names the field at fault and its range; the old ones then stay.
 ///

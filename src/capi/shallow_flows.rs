@@ -277,7 +277,7 @@ fn set_depths(spill: &mut Spill, wanted: impl Iterator<Item = f32>) {
     }
 }
 
-/// Where all liquid is, and came from (m3; 1 ml is 1e-6). inside + held = poured + sourced + gained - drained - absorbed -
+/// Where all liquid is, and came from (m3; 1 ml is 1e-6). inside + held + falling = poured + sourced + gained - drained - absorbed -
 /// lost.
 #[repr(C)]
 #[derive(Clone, Copy)]
@@ -304,11 +304,13 @@ pub struct frz_shallow_balance {
     pub held: f64,
     /// Units (2^-30 of the range of heights, of a cell) that the sum above is off: 0, as all are integers.
     pub error: i64,
+    /// In the air.
+    pub falling: f64,
 }
 
 // SAFETY: numbers.
 unsafe impl Sized32 for frz_shallow_balance {
-    const SIZES: &'static [usize] = &[size_of::<Self>()];
+    const SIZES: &'static [usize] = &[std::mem::offset_of!(frz_shallow_balance, falling), size_of::<Self>()];
     const NAME: &'static str = "frz_shallow_balance";
 }
 
@@ -326,6 +328,7 @@ impl From<Balance> for frz_shallow_balance {
             gained: sum.gained,
             held: sum.held,
             error: sum.error,
+            falling: sum.falling,
         }
     }
 }

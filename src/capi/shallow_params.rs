@@ -5,6 +5,7 @@ use super::mesh::no_flags;
 use super::views::{Sized32, fill, meaning, sized, within};
 use crate::context::Context;
 use crate::shallow::Params;
+use crate::shallow::falls::Falls;
 use crate::shallow::grid::{Grid, Heights};
 use crate::shallow::liquid::{Carreau, Liquid};
 use crate::shallow::params::{Friction, Pace, Section};
@@ -84,7 +85,7 @@ const BORDERS: [(u32, Border); 3] = [
 const SECTIONS: [(u32, Section); 2] =
     [(FRZ_SHALLOW_WETTED as u32, Section::Wetted), (FRZ_SHALLOW_WHOLE as u32, Section::Whole)];
 
-/// What flows, and how. All of it but the border may change between frames.
+/// What flows, and how. All of it but the border and falls may change between frames.
 #[repr(C)]
 #[derive(Clone, Copy)]
 pub struct frz_shallow_params {
@@ -116,17 +117,31 @@ pub struct frz_shallow_params {
     pub section: u32,
     /// 0.
     pub reserved: u32,
+    /// Height (m) from which on liquid falls freely over an edge, 0 or more, an edge of a cell at least; 0.01 is usual. This and what follows,
+    /// which cannot change, is for falls_most over 0 only.
+    pub falls_height: f64,
+    /// Time between the drops that leave one place (s), 0.0001 to 1; 1/120 is usual.
+    pub falls_interval: f64,
+    /// Least volume of a drop (m3), 0 or more; 6.5e-11, a ball of half a millimetre, is usual.
+    pub falls_drop: f64,
+    /// Most drops in the air, up to 1048576, for which there is room from the beginning; 8192 will do. 0, as is usual: nothing falls freely, and
+    /// what goes over an edge is below at once.
+    pub falls_most: u32,
+    /// 0.
+    pub reserved2: u32,
 }
 
 // SAFETY: numbers.
 unsafe impl Sized32 for frz_shallow_params {
-    const SIZES: &'static [usize] = &[size_of::<Self>()];
+    const SIZES: &'static [usize] =
+        &[std::mem::offset_of!(frz_shallow_params, falls_height), size_of::<Self>()];
     const NAME: &'static str = "frz_shallow_params";
 }
 
 impl frz_shallow_params {
     pub(super) fn usual() -> Self {
         let usual = Params::default();
+        let falls = Falls::default();
         let longest_step = if let Pace::Realtime(longest) = usual.pace { longest } else { 0.0 };
         let mut params = Self {
             struct_size: 0,
@@ -142,6 +157,11 @@ impl frz_shallow_params {
             border: FRZ_SHALLOW_CLOSED as u32,
             section: FRZ_SHALLOW_WETTED as u32,
             reserved: 0,
+            falls_height: falls.height,
+            falls_interval: falls.interval,
+            falls_drop: falls.drop,
+            falls_most: 0,
+            reserved2: 0,
         };
         params.set_liquid(&usual.liquid);
         params
@@ -159,6 +179,13 @@ impl frz_shallow_params {
     pub(super) fn params(&self) -> Outcome<Params> {
         no_flags(self.flags, 0)?;
         within("reserved", f64::from(self.reserved), 0.0..=0.0, "")?;
+        within("reserved2", f64::from(self.reserved2), 0.0..=0.0, "")?;
+        let falls = Falls {
+            height: self.falls_height,
+            interval: self.falls_interval,
+            drop: self.falls_drop,
+            most: self.falls_most as usize,
+        };
         let pace = match meaning("pace", "frz_shallow_pace", self.pace, &PACES)? {
             FRZ_SHALLOW_EXACT => Pace::Exact,
             FRZ_SHALLOW_REALTIME => {
@@ -179,7 +206,7 @@ impl frz_shallow_params {
             section: meaning("section", "frz_shallow_section", self.section, &SECTIONS)?,
             friction: Friction::default(),
             thickening: None,
-            falls: None,
+            falls: (self.falls_most > 0).then_some(falls),
             rest: Params::default().rest,
         };
         params.validate()?;

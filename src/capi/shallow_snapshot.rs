@@ -4,10 +4,12 @@ use super::context::{creates, enter_light, frz_context};
 use super::guard::{frz_status, guard};
 use super::handle::{Noun, change, destroy, read};
 use super::shallow::frz_shallow;
+use super::shallow_lifts::{Lifted, no_lifts};
 use super::shallow_read::probe;
 use super::shallow_surface::{Wanted, frz_shallow_layout, frz_shallow_size, frz_shallow_target};
 use super::views::{frz_span, frz_view};
 use crate::shallow::Snapshot;
+use crate::shallow::falls::mesh::Balls;
 use crate::shallow::surface::{Depths, Surface};
 
 /// A liquid as it was after a frame, copied: another thread may draw it while the next frame is computed. A host has two of them: one
@@ -18,8 +20,24 @@ pub struct frz_shallow_snapshot {
 
 /// The value of a snapshot's handle.
 pub(super) struct Taken {
-    snapshot: Snapshot,
+    pub snapshot: Snapshot,
     surface: Surface,
+    /// Makes meshes of what is in the air.
+    pub balls: Balls,
+    /// Minimum heights, where there were some.
+    least: Vec<i32>,
+    sunk: Vec<i32>,
+}
+
+impl Taken {
+    /// Takes the minimum heights of a liquid, if they are of its ground as it is.
+    fn lift(&mut self, lifted: &Lifted) {
+        let (least, sunk) = lifted.known().unwrap_or_default();
+        self.least.clear();
+        self.least.extend_from_slice(least);
+        self.sunk.clear();
+        self.sunk.extend_from_slice(sunk);
+    }
 }
 
 impl Noun for frz_shallow_snapshot {
@@ -47,13 +65,17 @@ pub unsafe extern "C" fn frz_shallow_snapshot_create(
             let snapshot = Snapshot::new(&spill.shallow);
             let mut surface = Surface::default();
             surface.reserve(snapshot.columns());
-            Ok(Taken { snapshot, surface })
+            let mut balls = Balls::default();
+            balls.reserve(spill.shallow.params().falls.map_or(0, |falls| falls.most));
+            let mut taken = Taken { snapshot, surface, balls, least: Vec::new(), sunk: Vec::new() };
+            taken.lift(&spill.lifted);
+            Ok(taken)
         })
     }
 }
 
-/// Bytes of a snapshot for each column index: bases, ceilings, undersides, depth, velocity, and for a surface.
-const BYTES: u64 = 48;
+/// Bytes of a snapshot for each column index: bases, ceilings, undersides, depth, velocity, scalars, minimum heights, and for a surface.
+const BYTES: u64 = 72;
 
 /// Takes a liquid as it is now in place of what a snapshot had, in real time (frz_shallow).
 ///
@@ -69,7 +91,9 @@ pub unsafe extern "C" fn frz_shallow_snapshot_take(
         // SAFETY: the pointers are NULL or the caller's.
         unsafe {
             let mut taken = change(snapshot)?;
-            taken.snapshot.take(&read(shallow)?.shallow);
+            let spill = read(shallow)?;
+            taken.snapshot.take(&spill.shallow);
+            taken.lift(&spill.lifted);
             Ok(())
         }
     })
@@ -108,12 +132,18 @@ pub unsafe extern "C" fn frz_shallow_snapshot_surface(
             let wanted = Wanted::new(layout, target, size)?;
             let _call = enter_light(context)?;
             let mut taken = change(snapshot)?;
-            let Taken { snapshot, surface } = &mut *taken;
+            let Taken { snapshot, surface, least, sunk, .. } = &mut *taken;
+            if wanted.is_lifted && least.is_empty() {
+                return Err(no_lifts("when the snapshot was taken"));
+            }
+            let lifts: [&[i32]; 2] = if wanted.is_lifted { [least, sunk] } else { [&[]; 2] };
             let depths = Depths {
                 depth: snapshot.depths(),
                 velocity: snapshot.velocities(),
                 active: Some(snapshot.active()),
-                ..Depths::default()
+                least: lifts[0],
+                sunk: lifts[1],
+                carried: std::array::from_fn(|scalar| snapshot.concentrations(scalar)),
             };
             wanted.write(surface, snapshot.columns(), &depths)
         }

@@ -7,6 +7,7 @@ use super::mesh::no_flags;
 use super::shallow::{Spill, frz_shallow};
 use super::views::{Sized32, fill, frz_span, sized};
 use crate::shallow::columns::Columns;
+use crate::shallow::scalars::MOST;
 use crate::shallow::surface::{Counts, Depths, Indices, Layout, Surface, Target, Up, bound};
 
 /// Flag of a layout: Z is up. The axes are then (x, -z, y) of those with Y up.
@@ -16,13 +17,17 @@ pub const FRZ_SHALLOW_Z_UP: u32 = 1;
 /// faces are clockwise seen from above.
 pub const FRZ_SHALLOW_LEFT_HANDED: u32 = 2;
 
+/// Flag of a layout: films are shown at their minimum heights, which frz_shallow_find_lifts has found since the ground or a body moved last, in place
+/// of frz_shallow_layout.least_depth.
+pub const FRZ_SHALLOW_LIFTED: u32 = 4;
+
 /// How a surface is written.
 #[repr(C)]
 #[derive(Clone, Copy)]
 pub struct frz_shallow_layout {
     /// sizeof(frz_shallow_layout).
     pub struct_size: u32,
-    /// FRZ_SHALLOW_Z_UP, FRZ_SHALLOW_LEFT_HANDED, both or 0, which is usual: Y up, right-handed.
+    /// FRZ_SHALLOW_Z_UP, FRZ_SHALLOW_LEFT_HANDED, FRZ_SHALLOW_LIFTED, several of them or 0, which is usual: Y up, right-handed.
     pub flags: u32,
     /// The host's units of length in a metre, over 0: 1 is usual, 100 for centimetres. For positions, depths and velocities.
     pub scale: f64,
@@ -31,11 +36,15 @@ pub struct frz_shallow_layout {
     pub least_depth: f64,
     /// Depth (m) from which frz_shallow_target.opacities are 1, over 0; 0.01 is usual.
     pub opaque_depth: f64,
+    /// Depth (m) from which a wet vertex is at its full height, so that none jumps as its column wets or dries, 0 or more; 0 is usual: at once. With
+    /// FRZ_SHALLOW_LIFTED 0.02 of a cell does well.
+    pub fade_depth: f64,
 }
 
 // SAFETY: numbers.
 unsafe impl Sized32 for frz_shallow_layout {
-    const SIZES: &'static [usize] = &[size_of::<Self>()];
+    const SIZES: &'static [usize] =
+        &[std::mem::offset_of!(frz_shallow_layout, fade_depth), size_of::<Self>()];
     const NAME: &'static str = "frz_shallow_layout";
 }
 
@@ -48,18 +57,20 @@ impl frz_shallow_layout {
             scale: usual.scale,
             least_depth: usual.least_depth,
             opaque_depth: usual.opaque_depth,
+            fade_depth: usual.fade_depth,
         }
     }
 
+    /// The library's own layout, of which some flags may be set.
     fn layout(&self) -> Outcome<Layout> {
-        no_flags(self.flags, FRZ_SHALLOW_Z_UP | FRZ_SHALLOW_LEFT_HANDED)?;
+        no_flags(self.flags, FRZ_SHALLOW_Z_UP | FRZ_SHALLOW_LEFT_HANDED | FRZ_SHALLOW_LIFTED)?;
         Ok(Layout {
             scale: self.scale,
             up: if self.flags & FRZ_SHALLOW_Z_UP != 0 { Up::Z } else { Up::Y },
             left_handed: self.flags & FRZ_SHALLOW_LEFT_HANDED != 0,
             least_depth: self.least_depth,
             opaque_depth: self.opaque_depth,
-            ..Layout::default()
+            fade_depth: self.fade_depth,
         })
     }
 }
@@ -90,15 +101,54 @@ pub struct frz_shallow_target {
     pub columns: frz_span,
     /// uint16_t or uint32_t for each corner of each triangle: a vertex. Triangles face up.
     pub indices: frz_span,
+    /// float a vertex, of each scalar that frz_shallow_set_scalars has set: its concentration; of one that is dry or has no column, the mean of the wet
+    /// ones around.
+    pub scalars: [frz_span; 4],
 }
 
 // SAFETY: numbers and pointers.
 unsafe impl Sized32 for frz_shallow_target {
-    const SIZES: &'static [usize] = &[size_of::<Self>()];
+    const SIZES: &'static [usize] = &[std::mem::offset_of!(frz_shallow_target, scalars), size_of::<Self>()];
     const NAME: &'static str = "frz_shallow_target";
 }
 
-const NO_SPAN: frz_span = frz_span { data: std::ptr::null_mut(), count: 0, stride: 0 };
+pub(super) const NO_SPAN: frz_span = frz_span { data: std::ptr::null_mut(), count: 0, stride: 0 };
+
+/// A buffer: its name, the bytes of an element, and whether there is one for each vertex.
+pub(super) type Buffer<'a> = (&'static str, &'a frz_span, usize, bool);
+
+/// Refuses buffers that overlap, and indices of an unknown size.
+pub(super) fn check_buffers(buffers: &[Buffer<'_>], index_bits: u32) -> Outcome {
+    let ends = |span: &frz_span, bytes: usize| {
+        let first = span.data as usize;
+        [first, first.saturating_add(span.count.saturating_mul(bytes))]
+    };
+    for (at, (name, span, bytes, _)) in buffers.iter().enumerate() {
+        let [first, end] = ends(span, *bytes);
+        for (other, before, bytes, _) in &buffers[..at] {
+            let [other_first, other_end] = ends(before, *bytes);
+            if first < other_end && other_first < end && !span.data.is_null() && !before.data.is_null() {
+                return Err(Failure::argument(format!("{name} and {other} overlap")));
+            }
+        }
+    }
+    let has_indices = buffers.iter().any(|(name, span, ..)| *name == "indices" && !span.data.is_null());
+    if !has_indices || [16, 32].contains(&index_bits) {
+        return Ok(());
+    }
+    Err(Failure::argument(format!("index_bits = {index_bits} is not 16 or 32")))
+}
+
+/// Refuses buffers that are too small.
+pub(super) fn check_room(buffers: &[Buffer<'_>], counts: &Counts) -> Outcome {
+    for (name, span, _, is_of_vertices) in buffers {
+        let needed = if *is_of_vertices { counts.vertices } else { counts.indices };
+        if !span.data.is_null() {
+            span.check_room(name, needed)?;
+        }
+    }
+    Ok(())
+}
 
 impl frz_shallow_target {
     const NONE: Self = Self {
@@ -112,10 +162,12 @@ impl frz_shallow_target {
         layers: NO_SPAN,
         columns: NO_SPAN,
         indices: NO_SPAN,
+        scalars: [NO_SPAN; MOST],
     };
 
-    /// The buffers by name, with the bytes of an element, and whether there is one for each vertex.
-    fn buffers(&self) -> [(&'static str, &frz_span, usize, bool); 8] {
+    /// The buffers.
+    fn buffers(&self) -> [Buffer<'_>; 12] {
+        let [a, b, c, d] = &self.scalars;
         [
             ("positions", &self.positions, 12, true),
             ("normals", &self.normals, 12, true),
@@ -124,41 +176,12 @@ impl frz_shallow_target {
             ("velocities", &self.velocities, 12, true),
             ("layers", &self.layers, 4, true),
             ("columns", &self.columns, 4, true),
+            ("scalars", a, 4, true),
+            ("scalars", b, 4, true),
+            ("scalars", c, 4, true),
+            ("scalars", d, 4, true),
             ("indices", &self.indices, self.index_bits as usize / 8, false),
         ]
-    }
-
-    /// Refuses buffers that overlap.
-    fn check(&self) -> Outcome {
-        let buffers = self.buffers();
-        let ends = |span: &frz_span, bytes: usize| {
-            let first = span.data as usize;
-            [first, first.saturating_add(span.count.saturating_mul(bytes))]
-        };
-        for (at, (name, span, bytes, _)) in buffers.iter().enumerate() {
-            let [first, end] = ends(span, *bytes);
-            for (other, before, bytes, _) in &buffers[..at] {
-                let [other_first, other_end] = ends(before, *bytes);
-                if first < other_end && other_first < end && !span.data.is_null() && !before.data.is_null() {
-                    return Err(Failure::argument(format!("{name} and {other} overlap")));
-                }
-            }
-        }
-        if self.indices.data.is_null() || [16, 32].contains(&self.index_bits) {
-            return Ok(());
-        }
-        Err(Failure::argument(format!("index_bits = {} is not 16 or 32", self.index_bits)))
-    }
-
-    /// Refuses buffers that are too small.
-    fn check_room(&self, counts: &Counts) -> Outcome {
-        for (name, span, _, is_of_vertices) in self.buffers() {
-            let needed = if is_of_vertices { counts.vertices } else { counts.indices };
-            if !span.data.is_null() {
-                span.check_room(name, needed)?;
-            }
-        }
-        Ok(())
     }
 
     /// The library's own buffers.
@@ -166,7 +189,7 @@ impl frz_shallow_target {
     /// # Safety
     /// The spans must describe memory that can be written and that nothing else uses, for `'a`.
     unsafe fn target<'a>(&self) -> Outcome<Target<'a>> {
-        self.check()?;
+        check_buffers(&self.buffers(), self.index_bits)?;
         // SAFETY: the caller's promise, and they do not overlap.
         unsafe {
             let indices = match self.index_bits {
@@ -181,6 +204,13 @@ impl frz_shallow_target {
                 velocities: self.velocities.numbers("velocities", 3)?,
                 layers: self.layers.numbers("layers", 1)?,
                 columns: self.columns.numbers("columns", 1)?,
+                carried: {
+                    let mut carried = [const { None }; MOST];
+                    for (to, span) in carried.iter_mut().zip(&self.scalars) {
+                        *to = span.numbers("scalars", 1)?;
+                    }
+                    carried
+                },
                 indices,
             })
         }
@@ -213,11 +243,26 @@ impl From<Counts> for frz_shallow_size {
     }
 }
 
+/// The library's own layout from a host's, with its flags; the usual one for NULL.
+///
+/// # Safety
+/// As [`sized`].
+pub(super) unsafe fn layout(pointer: *const frz_shallow_layout) -> Outcome<(Layout, u32)> {
+    if pointer.is_null() {
+        return Ok((Layout::default(), 0));
+    }
+    // SAFETY: the caller's promise.
+    let given = unsafe { sized(pointer, frz_shallow_layout::usual()) }?;
+    Ok((given.layout()?, given.flags))
+}
+
 /// What a surface is made of and into.
 pub(super) struct Wanted {
     layout: Layout,
     given: frz_shallow_target,
     size: *mut frz_shallow_size,
+    /// Whether minimum heights are wanted.
+    pub(super) is_lifted: bool,
 }
 
 impl Wanted {
@@ -235,17 +280,20 @@ impl Wanted {
             if !size.is_null() {
                 fill(size, None, Counts::default().into())?;
             }
-            let layout = match layout.is_null() {
-                true => Layout::default(),
-                false => sized(layout, frz_shallow_layout::usual())?.layout()?,
-            };
-            Ok(Self { layout, given: sized(target, frz_shallow_target::NONE)?, size })
+            let (layout, flags) = self::layout(layout)?;
+            let given = sized(target, frz_shallow_target::NONE)?;
+            Ok(Self { layout, given, size, is_lifted: flags & FRZ_SHALLOW_LIFTED != 0 })
         }
     }
 
     /// Whether velocities are wanted.
     pub(super) fn velocities(&self) -> bool {
         !self.given.velocities.data.is_null()
+    }
+
+    /// Whether the concentrations of a scalar are wanted.
+    pub(super) fn scalar(&self, scalar: usize) -> bool {
+        !self.given.scalars[scalar].data.is_null()
     }
 
     /// Writes the surface and its size.
@@ -266,7 +314,7 @@ impl Wanted {
             Ok(counts) => (counts, Ok(())),
             Err(error) => {
                 let counts = surface.count(columns, depths)?;
-                match self.given.check_room(&counts) {
+                match check_room(&self.given.buffers(), &counts) {
                     Ok(()) => return Err(error.into()),
                     short => (counts, short),
                 }
@@ -335,7 +383,15 @@ pub unsafe extern "C" fn frz_shallow_surface(
             let wanted = Wanted::new(layout, target, size)?;
             let _call = enter_light(context)?;
             let mut spill = change(shallow)?;
-            let Spill { shallow, surface, velocities, .. } = &mut *spill;
+            let Spill { shallow, surface, velocities, concentrations, lifted, .. } = &mut *spill;
+            let (least, sunk) = if wanted.is_lifted { lifted.current()? } else { Default::default() };
+            for (scalar, numbers) in concentrations.iter_mut().enumerate() {
+                let len = if wanted.scalar(scalar) { shallow.columns().len() } else { 0 };
+                numbers.resize(len, 0.0);
+                if len > 0 {
+                    shallow.concentrations(scalar, numbers)?;
+                }
+            }
             if wanted.velocities() {
                 velocities.resize(shallow.columns().len(), [0.0; 2]);
                 shallow.velocities(velocities)?;
@@ -345,7 +401,9 @@ pub unsafe extern "C" fn frz_shallow_surface(
                 depth: shallow.depths(),
                 velocity,
                 active: Some(shallow.active()),
-                ..Depths::default()
+                least,
+                sunk,
+                carried: concentrations.each_ref().map(|numbers| &numbers[..]),
             };
             wanted.write(surface, shallow.columns(), &depths)
         }

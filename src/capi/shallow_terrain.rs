@@ -34,10 +34,10 @@ pub(super) enum Terrain {
 
 /// A mesh whose vertices move.
 pub(super) struct Moving {
-    positions: Vec<Vec3>,
+    pub(super) positions: Vec<Vec3>,
     /// Positions on their way in.
     coming: Vec<Vec3>,
-    triangles: Vec<[u32; 3]>,
+    pub(super) triangles: Vec<[u32; 3]>,
     caster: Caster,
 }
 
@@ -117,7 +117,7 @@ const ROUNDING: f64 = 1e-6;
 ///
 /// # Safety
 /// The pointer must be NULL or point to four numbers.
-unsafe fn cells_in(grid: &Grid, bounds: *const f64) -> Outcome<[Range<usize>; 2]> {
+pub(super) unsafe fn cells_in(grid: &Grid, bounds: *const f64) -> Outcome<[Range<usize>; 2]> {
     if bounds.is_null() {
         return Ok(all_cells(grid));
     }
@@ -193,7 +193,11 @@ unsafe fn moves(
             fill(moved, None, Moved::default().into())?;
         }
         let _call = enter_light(context)?;
-        let done = make(&mut *change(shallow)?)?;
+        let mut spill = change(shallow)?;
+        let done = make(&mut spill)?;
+        if done.cells > 0 {
+            spill.lifted.is_current = false;
+        }
         if moved.is_null() { Ok(()) } else { fill(moved, None, done.into()) }
     }
 }

@@ -12,8 +12,8 @@ use super::shot::ShotArgs;
 
 /// Let a little liquid flow over a terrain: blood, water, paint, honey.
 ///
-/// Writes liquid/liquid.%04d.ply (the surface, with velocities, depths, layers and opacities), volume/volume.%04d.vdb where the scene
-/// asks for it, report/liquid.%04d.json (ml inside, come and gone, steps, times), shot.usda and scene.toml, the scene with every
+/// Writes liquid/liquid.%04d.ply (the surface and what is in the air, with velocities, depths, layers, opacities and scalars),
+/// volume/volume.%04d.vdb where the scene asks for it, report/liquid.%04d.json (ml inside, come and gone, steps, times), shot.usda and scene.toml, the scene with every
 /// default filled in. Frames that are there and match are not made again; a folder with frames of other settings is refused.
 #[derive(clap::Args)]
 #[command(after_help = "\

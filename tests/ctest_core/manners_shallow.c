@@ -108,8 +108,18 @@ static void forbid_calls(void) {
 /* A frame with all calls that keep the manners; then one more step, which is taken back and made again from its list. */
 static void full_frame(wound *self, int frame, void *state, size_t room) {
     double steps[64];
-    size_t size = 0, count = 0;
+    size_t size = 0, count = 0, drops = 0;
+    frz_shallow_layout layout;
+    frz_shallow_target target;
     wound_frame(self, frame);
+    must(frz_shallow_find_lifts(self->ctx, self->blood, NULL, NULL, NULL));
+    must(frz_shallow_layout_init(&layout, sizeof layout));
+    layout.flags = FRZ_SHALLOW_LIFTED, layout.fade_depth = 2e-5;
+    memset(&target, 0, sizeof target);
+    target.struct_size = sizeof target;
+    target.positions = (frz_span){self->vertices, (size_t)self->room.vertices, 0};
+    must(frz_shallow_surface(self->ctx, self->blood, &layout, &target, NULL));
+    must(frz_shallow_drops(self->blood, (frz_span){NULL, 0, 0}, &drops));
     must(frz_shallow_save(self->ctx, self->blood, state, room, &size));
     must(frz_shallow_step(self->ctx, self->blood, 0.25 / FPS, 0, NULL));
     must(frz_shallow_last_steps(self->blood, (frz_span){steps, 64, 0}, &count));

@@ -664,6 +664,11 @@ class Shallow(unittest.TestCase):
             blood.set_bodies([frazil.Capsule((0.02 - frame * 1e-4, 0, 0), (0.02, 0.1, 0), 0.004),
                               frazil.Box((-0.02, 0, 0), (0.004, 0.004, 0.004))])
             blood.step(1 / 60, budget=1)
+        with self.assertRaisesRegex(frazil.Error, "has found no minimum heights"):
+            blood.surface(lifted=True)
+        fitted = blood.find_lifts()
+        self.assertTrue(fitted.upward > 100 and fitted.discarded < fitted.upward)
+        self.assertEqual(len(blood.surface(lifted=True).positions), len(blood.surface().positions))
         self.assertAlmostEqual(blood.moved(0), 2e-6, delta=1e-9)
         self.assertTrue(0 < blood.moved(1) <= 0.5e-6 and 0.09e-6 < blood.moved(2) <= 0.1e-6 and 0 < blood.moved(3) < 0.1e-6)
         balance = blood.balance
@@ -708,6 +713,43 @@ class Shallow(unittest.TestCase):
         snapshot.take(paint)
         np.testing.assert_array_equal(snapshot.surface(other).positions, paint.surface().positions)
         np.testing.assert_array_equal(snapshot.probe([(0, 0, 0)]), paint.probe([(0, 0, 0)]))
+
+    def test_liquid_falls_and_carries_a_dye(self):
+        ctx, other = frazil.Context(), frazil.Context()
+        heights = np.where(np.arange(24)[None, :] < 12, 0.05, 0.0) * np.ones((24, 1))
+        milk = frazil.Shallow(ctx, heights, self.CELL, high=0.1, liquid="water", falls_most=500)
+        milk.set_scalars([frazil.Scalar("milk"), frazil.Scalar("age", "ages", 60)])
+        milk.set_flows([frazil.Source((0.05, 0.05, 0.06), 5e-6, radius=0.01)])
+        milk.set_sourced(0, (0.5, 0))
+        for _ in range(40):
+            milk.step(1 / 60)
+        drops, mesh, balance = milk.drops, milk.drops_mesh(), milk.balance
+        self.assertTrue(20 < len(drops) <= 500)
+        np.testing.assert_allclose(drops["concentrations"][:, 0], 0.5, atol=1e-4)
+        self.assertTrue((drops["concentrations"][:, 1] > 0).all() and (drops["velocity"][:, 1] <= 0).all())
+        self.assertEqual((balance.error, milk.scalar_balance(0).error, milk.scalar_balance(1).error), (0, 0, 0))
+        self.assertAlmostEqual(balance.inside + balance.falling, balance.sourced, delta=1e-15)
+        self.assertGreater(balance.falling, 0.99 * drops["volume"].sum())
+        self.assertAlmostEqual(milk.scalar_balance(0).sourced, 0.5 * balance.sourced, delta=1e-12)
+        np.testing.assert_allclose(mesh.velocities, drops["velocity"][mesh.drops], atol=1e-6)
+        self.assertLess(mesh.triangles.max(), len(mesh.positions))
+        wet = milk.read("depth") > 0
+        np.testing.assert_allclose(milk.concentrations(0), np.where(wet, 0.5, 0), atol=1e-4)
+        surface = milk.surface(parts=("columns",))
+        np.testing.assert_allclose(surface.scalars[0], 0.5, atol=1e-4)
+        snapshot = frazil.Snapshot(ctx, milk)
+        milk.step(1 / 60)
+        np.testing.assert_array_equal(snapshot.drops, drops)
+        np.testing.assert_array_equal(snapshot.drops_mesh(other).positions, mesh.positions)
+        np.testing.assert_array_equal(snapshot.surface(other).scalars[0], surface.scalars[0])
+        for make, text in (
+            (lambda: milk.set_poured((1,)), "1 elements, but there are 2 scalars"), (lambda: milk.set_poured((2, 0)), "a concentration of 2"),
+            (lambda: milk.concentrations(2), "scalar = 2 is none of the 2"), (lambda: milk.set_scalars([frazil.Scalar("")]), "name is empty"),
+            (lambda: milk.set_params(falls_most=3), "falls cannot change"), (lambda: milk.find_lifts(), "was not made with a mesh"),
+            (lambda: milk.surface(lifted=True), "has found no minimum heights"),
+        ):
+            with self.assertRaisesRegex(frazil.Error, text):
+                make()
 
     def test_parameters_are_checked(self):
         ctx = frazil.Context()

@@ -66,6 +66,7 @@ mod scene {
     mod demo_jelly;
     mod demo_walk;
     mod fuzz;
+    mod shallow_carried;
     mod shallow_follows;
     mod shallow_shot;
     mod shallow_volume;

@@ -68,6 +68,12 @@ fn in_words(report: &Report, limit: u64, free: Option<u64>) -> String {
         "liquid    {:.4} ml at the first frame, up to {:.6} m deep; {:.4} ml come later; viscosity {:e} m2/s",
         report.begins_with_ml, report.deepest_m, report.comes_ml, report.viscosity_m2_per_s
     );
+    if report.falls {
+        let _ = writeln!(out, "falls     freely over edges");
+    }
+    if !report.scalars.is_empty() {
+        let _ = writeln!(out, "carries   {}", report.scalars.join(", "));
+    }
     let _ = writeln!(out, "memory    about {} of {}", size(report.memory_bytes), size(limit));
     let free = free.map_or(String::new(), |free| format!(" of {} free", size(free)));
     let each = size(report.frame_bytes);

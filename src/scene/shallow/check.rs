@@ -10,6 +10,7 @@ use super::{Inputs, ML, Shallow, disk, memory};
 use crate::context::Context;
 use crate::error::{Error, Result};
 use crate::scene::{Scene, Value};
+use crate::shallow::Law;
 use crate::shallow::flows::Kind;
 use crate::shallow::grid::TOP;
 use crate::shallow::pipes::Border;
@@ -56,6 +57,10 @@ pub struct Report {
     pub comes_ml: f64,
     /// Greatest depth at the first frame (m).
     pub deepest_m: f64,
+    /// Whether liquid falls freely.
+    pub falls: bool,
+    /// Names of the scalars that it carries.
+    pub scalars: Vec<String>,
     /// Memory that the run needs, about (bytes).
     pub memory_bytes: u64,
     /// Space that the files need at most (bytes): when all columns are wet.
@@ -98,7 +103,7 @@ pub fn check(ctx: &Context, scene: &Scene, inputs: &Inputs) -> Result<Report> {
     let begins_with = course.liquid.balance().inside;
     let deepest = course.liquid.depths().iter().copied().max().unwrap_or(0);
     let count = columns.count();
-    let frame_bytes = disk::frame(of.output, count as u64);
+    let frame_bytes = disk::frame(of, count as u64);
     let mut warnings = inputs.warnings.clone();
     warnings.extend(odd(of, inputs, &course, void_cells));
     warnings.extend(later(ctx, scene, course)?);
@@ -122,7 +127,9 @@ pub fn check(ctx: &Context, scene: &Scene, inputs: &Inputs) -> Result<Report> {
         begins_with_ml: begins_with / ML,
         comes_ml: comes(scene, of) / ML,
         deepest_m: heights.length(deepest.into()),
-        memory_bytes: memory::estimate(&grid, count as u64, triangles),
+        falls: of.params.falls.is_some(),
+        scalars: of.scalars.iter().map(|carried| carried.scalar.name.clone()).collect(),
+        memory_bytes: memory::estimate(of, &grid, count as u64, triangles),
         disk_bytes: frames.count() as u64 * frame_bytes,
         frame_bytes,
         warnings,
@@ -198,6 +205,19 @@ fn odd(of: &Shallow, inputs: &Inputs, course: &Course<'_>, void_cells: usize) ->
         out.push(
             "what stands up to shallow.fill flows off at the border, which is open: \"closed\" or \"absorbing\" keep it".into(),
         );
+    }
+    for (index, carried) in of.scalars.iter().enumerate() {
+        let name = &carried.scalar.name;
+        let has = |carries: &Vec<f64>| carries[index] != 0.0;
+        let sources = of.points.iter().filter(|point| point.point.kind == Kind::Source);
+        let is_brought =
+            sources.map(|point| &point.carries).chain(of.pours.iter().map(|pour| &pour.carries)).any(has);
+        if carried.scalar.law != Law::Ages && carried.start == 0.0 && !is_brought {
+            out.push(format!(
+                "no liquid has any {name}: carries = {{ {name} = 1.0 }} of a [[pour]] or [[source]], or start of scalar.{}, gives it some",
+                index + 1
+            ));
+        }
     }
     if of.points.is_empty() && of.pours.is_empty() && of.fill.is_none() {
         out.push("there is no liquid: no [[pour]], no [[source]], no shallow.fill".into());

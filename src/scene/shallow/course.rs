@@ -26,6 +26,10 @@ pub(super) struct Course<'a> {
     /// Its sources, drains and absorbers.
     pub points: Vec<FlowPoint>,
     pub frame: i32,
+    /// The terrain, where it is a mesh that moves (m).
+    ground: Option<TriMesh>,
+    /// Whether ground or obstacles are others than when this was last looked at.
+    pub is_stirred: bool,
 }
 
 impl<'a> Course<'a> {
@@ -38,6 +42,8 @@ impl<'a> Course<'a> {
         let shapes = obstacles::shapes_at(of, first)?;
         let mut course = Self::dry(ctx, (scene, of, inputs), first, shapes)?;
         points::place(scene, of, &mut course.liquid, &course.points)?;
+        of.source_scalars(&mut course.liquid)?;
+        course.liquid.set_poured(&of.start())?;
         if let Some(height) = of.fill {
             course.liquid.fill(height);
         }
@@ -60,20 +66,24 @@ impl<'a> Course<'a> {
             // Others from here on.
             course.liquid.set_flows_resting(&course.points, |index| of.points[index].title())?;
         }
+        of.source_scalars(&mut course.liquid)?;
         Ok(course)
     }
 
     /// Dry ground as it is at a frame, with obstacles; its points are not set.
     fn dry(ctx: &Context, (scene, of, inputs): Of<'a>, frame: i32, shapes: Vec<Shape>) -> Result<Self> {
-        let moved = inputs.moved(of, frame)?;
-        let (mesh, solids) = moved.as_ref().map(|(mesh, solids)| (mesh, solids)).unzip();
-        let solids = solids.unwrap_or(&inputs.solids);
-        let points = points::at(of, inputs, mesh, frame);
+        let (ground, solids) = inputs.moved(of, frame)?.unzip();
+        let solids = solids.as_ref().unwrap_or(&inputs.solids);
+        let points = points::at(of, inputs, ground.as_ref(), frame);
         let liquid = shallow::Shallow::new(ctx, solids, of.params.clone()).map_err(|error| match error {
             Error::Argument(what) => Error::file(&scene.path, what),
             other => other,
         });
-        let mut course = Self { scene, of, inputs, liquid: liquid?, shapes: Vec::new(), points, frame };
+        let mut liquid = liquid?;
+        of.carry(scene, &mut liquid)?;
+        let (shapes_before, is_stirred) = (Vec::new(), true);
+        let mut course =
+            Self { scene, of, inputs, liquid, shapes: shapes_before, points, frame, ground, is_stirred };
         course.put(shapes)?;
         Ok(course)
     }
@@ -95,13 +105,15 @@ impl<'a> Course<'a> {
     /// Files that cannot be read.
     pub fn go_still(&mut self) -> Result<Moved> {
         let frame = self.frame + 1;
-        let ground = self.inputs.moved(self.of, frame)?;
-        let of_terrain = match &ground {
-            Some((_, solids)) => self.liquid.update_terrain(solids)?,
+        let (ground, solids) = self.inputs.moved(self.of, frame)?.unzip();
+        let of_terrain = match &solids {
+            Some(solids) => self.liquid.update_terrain(solids)?,
             None => Moved::default(),
         };
+        self.is_stirred |= ground.is_some();
+        self.ground = ground;
         let of_obstacles = self.put(obstacles::shapes_at(self.of, frame)?)?;
-        let points = points::at(self.of, self.inputs, ground.as_ref().map(|(mesh, _)| mesh), frame);
+        let points = points::at(self.of, self.inputs, self.ground.as_ref(), frame);
         points::turn(&mut self.liquid, &self.points, &points)?;
         self.points = points;
         self.frame = frame;
@@ -121,7 +133,19 @@ impl<'a> Course<'a> {
         }
         let moved = self.liquid.set_bodies(&shapes)?;
         self.shapes = shapes;
+        self.is_stirred = true;
         Ok(moved)
+    }
+
+    /// The ground as one mesh, with those that stand on it (m); none where it is no mesh.
+    pub fn ground(&self) -> Option<TriMesh> {
+        let mut all = self.ground.as_ref().or(self.inputs.still.as_ref())?.clone();
+        for mesh in &self.inputs.meshes {
+            let first = all.positions.len() as u32;
+            all.positions.extend(&mesh.positions);
+            all.triangles.extend(mesh.triangles.iter().map(|corners| corners.map(|corner| corner + first)));
+        }
+        Some(all)
     }
 }
 

@@ -36,8 +36,10 @@ pub struct Inputs {
     pub(super) solids: Solids,
     /// The meshes that stand on it (m).
     pub(super) meshes: Vec<TriMesh>,
-    /// The terrain at the first frame, where it moves.
+    /// The terrain at the first frame, where it is a mesh that moves.
     pub(super) moving: Option<TriMesh>,
+    /// The terrain, where it is a mesh that does not move, and minimum heights are wanted.
+    pub(super) still: Option<TriMesh>,
     /// What each of the scene's points moves with, where it follows the terrain.
     pub(super) attached: Vec<Option<Attached>>,
     /// Whether the terrain's triangles face down, so that they are turned round.
@@ -104,12 +106,14 @@ impl Inputs {
             }
             solids = united(&solids, &on_it);
         }
-        let (triangles, moving) = match terrain {
-            Terrain::Mesh(mesh) if shallow.sequence().is_some() => (Some(mesh.triangles.len()), Some(mesh)),
-            Terrain::Mesh(mesh) => (Some(mesh.triangles.len()), None),
+        let mesh = match terrain {
+            Terrain::Mesh(mesh) => Some(mesh),
             #[cfg(any(feature = "cli", feature = "vdb"))]
-            _ => (None, None),
+            _ => None,
         };
+        let triangles = mesh.as_ref().map(|mesh| mesh.triangles.len());
+        let (moving, still) = if shallow.sequence().is_some() { (mesh, None) } else { (None, mesh) };
+        let still = still.filter(|_| shallow.lifts);
         let attached = moving.as_ref().map(|mesh| attach(ctx, shallow, mesh)).unwrap_or_default();
         if let Some(mesh) = &moving {
             warnings.extend(beside(scene, shallow, mesh, &attached));
@@ -122,6 +126,7 @@ impl Inputs {
             solids,
             meshes,
             moving,
+            still,
             attached,
             is_turned,
             seen,

@@ -18,6 +18,11 @@ const FRAMES: Kind = Kind::Whole(-1_000_000_000, 1_000_000_000);
 /// Lengths of obstacles, and radii of circles (m).
 const LENGTH: Kind = Kind::Number(0.0, FAR, "m");
 
+/// Concentrations by the names of scalars.
+const NAMED: Kind = Kind::Named(1.0e9);
+const CARRIES: &str =
+    "concentrations of scalars in it, by their names; of those that are not named: their `start`";
+
 /// Of sources, drains and absorbers.
 const FOLLOWS: &str =
     "true: it moves with the place of the terrain, a sequence, that is nearest to `at` at the first frame";
@@ -122,6 +127,37 @@ pub const KEYS: &[Key] = &[
     .or("\"exact\"")
     .concerns(STEP),
     Key::new("shallow", "step", Kind::Number(1.0e-6, 1.0, "s"), "longest step of realtime (s)").or("0.003").concerns(STEP),
+    Key::new(
+        "shallow",
+        "falls",
+        Kind::Flag,
+        "true: liquid falls freely over edges, through holes and into the void, in drops and strands; else it is below at once",
+    )
+    .or("false")
+    .concerns(FIRST),
+    Key::new("shallow", "falls_height", LENGTH, "height from which on it falls freely (m); an edge of a cell at least")
+        .or("0.01")
+        .concerns(FIRST),
+    Key::new("shallow", "falls_drop_ml", Kind::Number(0.0, MOST_ML, "ml"), "least volume of a drop (ml)").or("6.5e-5").concerns(FIRST),
+    Key::new("shallow", "falls_interval", Kind::Number(1.0e-4, 1.0, "s"), "time between the drops of a strand (s)")
+        .or("0.008333333333333333")
+        .concerns(FIRST),
+    Key::new(
+        "shallow",
+        "falls_most",
+        Kind::Whole(1, 1 << 20),
+        "most drops in the air: where there would be more, liquid is below at once",
+    )
+    .or("8192")
+    .concerns(FIRST),
+    Key::new(
+        "shallow",
+        "lifts",
+        Kind::Flag,
+        "of a mesh: true: its bumps do not show through films, and the rim of the liquid does not hover (minimum heights); false: films are 0.05 cells above the ground",
+    )
+    .or("true")
+    .concerns(OUTPUT),
     Key::new("shallow", "opaque_depth", Kind::Number(1.0e-6, FAR, "m"), "depth from which the liquid is opaque (m)")
         .or("0.001")
         .with_presets(&[("water", "0.05"), ("paint", "0.0005"), ("honey", "0.02")])
@@ -130,11 +166,33 @@ pub const KEYS: &[Key] = &[
 
 /// Those of what there may be many of, and of the output.
 pub const MANY_KEYS: &[Key] = &[
+    Key::new("scalar", "name", Kind::Text, "of what the liquid carries, up to four: an array of the surface's vertices has it; letters, digits and _")
+        .such_as("\"dye\"")
+        .concerns(FIRST),
+    Key::new(
+        "scalar",
+        "law",
+        Kind::Choice(&["dye", "decays", "ages"]),
+        "dye: it is only carried; decays: half of it goes in each half_life; ages: it is the time (s) since the liquid came in",
+    )
+    .or("\"dye\"")
+    .concerns(FIRST),
+    Key::new("scalar", "half_life", Kind::Number(1.0e-6, 1.0e12, "s"), "of one that decays (s)")
+        .or_nothing()
+        .such_as("60.0")
+        .concerns(FIRST),
+    Key::new("scalar", "range", Kind::Number(1.0e-9, 1.0e9, ""), "concentrations lie within -range to range, and are kept to a 2^20th of it; of ages the oldest (s)")
+        .or("1.0")
+        .concerns(FIRST),
+    Key::new("scalar", "start", Kind::Number(-1.0e9, 1.0e9, ""), "concentration of what stands up to `fill`, and of pours and sources whose `carries` does not name it")
+        .or("0.0")
+        .concerns(FIRST),
     Key::new("pour", "at", Kind::Numbers(3, FAR, "m"), "middle (m): liquid is poured onto the ground nearest to it")
         .such_as("[0.0, 0.05, 0.0]")
         .concerns(STEP),
     Key::new("pour", "radius", LENGTH, "of the circle, seen from above, in which it is poured (m)").such_as("0.005").concerns(STEP),
     Key::new("pour", "volume_ml", Kind::Number(0.0, MOST_ML, "ml"), "how much (ml)").such_as("1.0").concerns(STEP),
+    Key::new("pour", "carries", NAMED, CARRIES).or("{}").such_as("{ dye = 1.0 }").concerns(STEP),
     Key::new("pour", "frame", FRAMES, "when; left out: at the first frame").or_nothing().such_as("1").concerns(STEP),
     Key::new("source", "at", Kind::Numbers(3, FAR, "m"), "middle (m): liquid comes onto the ground nearest to it")
         .begins_with("[0.0, 0.05, 0.0]")
@@ -145,6 +203,7 @@ pub const MANY_KEYS: &[Key] = &[
     Key::new("source", "rate_ml", Kind::Number(0.0, MOST_ML, "ml/s"), "how much comes in a second (ml)")
         .begins_with("0.5")
         .concerns(STEP),
+    Key::new("source", "carries", NAMED, CARRIES).or("{}").such_as("{ dye = 1.0 }").concerns(STEP),
     Key::new("source", "from", FRAMES, "first frame; left out: from the beginning").or_nothing().such_as("1").concerns(STEP),
     Key::new("source", "until", FRAMES, "last frame; left out: to the end").or_nothing().such_as("120").concerns(STEP),
     Key::new("source", "follows", Kind::Flag, FOLLOWS).or("false").concerns(STEP),
@@ -229,10 +288,10 @@ pub const MANY_KEYS: &[Key] = &[
     Key::new(
         "output",
         "attributes",
-        Kind::Choices(&["v", "depth", "layer", "alpha"]),
-        "of its vertices: velocity of the surface (m/s), depth (m), layer from the bottom, opacity: depth / opaque_depth up to 1",
+        Kind::Choices(&["v", "depth", "layer", "alpha", "falling", "scalars"]),
+        "of its vertices: velocity of the surface (m/s), depth (m), layer from the bottom, opacity: depth / opaque_depth up to 1; with falls, whether it is in the air; each scalar, by its name",
     )
-    .or("[\"v\", \"depth\", \"layer\", \"alpha\"]")
+    .or("[\"v\", \"depth\", \"layer\", \"alpha\", \"falling\", \"scalars\"]")
     .concerns(OUTPUT),
     Key::new(
         "output",

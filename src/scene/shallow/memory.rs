@@ -1,5 +1,6 @@
 //! How much memory a liquid on a terrain takes, before any of it is taken.
 
+use super::Shallow;
 use crate::context::Context;
 use crate::error::Result;
 use crate::shallow::grid::Grid;
@@ -9,10 +10,14 @@ const FIXED: u64 = 32_000_000;
 /// Bytes of a cell while the terrain becomes columns: its crossings and solids, in two copies.
 const CELL: u64 = 64;
 /// Bytes of a column: liquid, pipes and what steps need of it 100, its vertex and triangles while they are made 150, in up to three steps
-/// that wait for the writer 120 each, in files and states 100.
-const COLUMN: u64 = 710;
-/// Bytes of a triangle of the terrain: corners and a place, twice while it is read.
-const TRIANGLE: u64 = 100;
+/// that wait for the writer 120 each, in files and states 100, its minimum heights 20.
+const COLUMN: u64 = 730;
+/// Bytes of a scalar of a column: its amount 8, its concentration 4, and in each of those steps, files and states 50.
+const SCALAR: u64 = 62;
+/// Bytes of a drop: what it is 200, its ball and strand while they are made, and in up to three steps that wait for the writer, 5,000 each.
+const DROP: u64 = 20_200;
+/// Bytes of a triangle of the terrain: corners and a place, twice while it is read, or while minimum heights are found, and what these need.
+const TRIANGLE: u64 = 110;
 
 /// Refuses more cells than the context allows, before they are made.
 ///
@@ -25,6 +30,8 @@ pub(super) fn allow_cells(ctx: &Context, grid: &Grid) -> Result<()> {
 }
 
 /// Bytes that a run takes, about.
-pub(super) fn estimate(grid: &Grid, columns: u64, triangles: u64) -> u64 {
-    FIXED + CELL * grid.cells() as u64 + COLUMN * columns + TRIANGLE * triangles
+pub(super) fn estimate(of: &Shallow, grid: &Grid, columns: u64, triangles: u64) -> u64 {
+    let column = COLUMN + SCALAR * of.scalars.len() as u64;
+    let drops = DROP * of.params.falls.map_or(0, |falls| falls.most as u64);
+    FIXED + CELL * grid.cells() as u64 + column * columns + TRIANGLE * triangles + drops
 }

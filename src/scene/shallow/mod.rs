@@ -17,6 +17,7 @@ mod plan;
 mod points;
 mod pours;
 mod rules;
+mod scalars;
 mod stage;
 mod terrain;
 #[cfg(feature = "vdb")]
@@ -30,12 +31,14 @@ pub use {
     check::{Report, check},
     inputs::Inputs,
     plan::plan,
+    scalars::Carried,
 };
 
 use super::text::{Value, Values};
 use super::{KeyPose, Role};
 use crate::io::sequence::Pattern;
 use crate::motion::{Space, Up};
+use crate::shallow::falls::Falls;
 use crate::shallow::flows::FlowPoint;
 use crate::shallow::liquid::Liquid;
 use crate::shallow::params::{Friction, Pace, Section};
@@ -70,12 +73,16 @@ pub struct Shallow {
     pub params: Params,
     /// Height up to which it stands at the first frame (m).
     pub fill: Option<f64>,
+    /// What the liquid carries.
+    pub scalars: Vec<Carried>,
     /// What is poured at frames.
     pub pours: Vec<Pour>,
     /// Sources, then drains, then absorbers, each in the file's order.
     pub points: Vec<Point>,
     /// What stands or moves in its way.
     pub obstacles: Vec<Obstacle>,
+    /// Whether a terrain that is a mesh does not show through films.
+    pub lifts: bool,
     /// Depth from which it is opaque (m).
     pub opaque_depth: f64,
     /// What is written.
@@ -92,7 +99,7 @@ pub struct ImagePlace {
 }
 
 /// Liquid that is poured at a frame.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, PartialEq)]
 pub struct Pour {
     /// Middle (m).
     pub at: [f64; 3],
@@ -102,6 +109,8 @@ pub struct Pour {
     pub volume: f64,
     /// When; none: at the first frame.
     pub frame: Option<i32>,
+    /// Concentrations of the scalars.
+    pub carries: Vec<f64>,
 }
 
 /// A source, a drain or an absorber, at some frames.
@@ -111,6 +120,8 @@ pub struct Point {
     pub name: (&'static str, usize),
     /// What it does; of one that follows the terrain, where it is before it is put there.
     pub point: FlowPoint,
+    /// Concentrations of the scalars in what a source brings.
+    pub carries: Vec<f64>,
     /// Whether it moves with the terrain.
     pub follows: bool,
     /// First frame; none: from the beginning.
@@ -160,6 +171,10 @@ pub struct Files {
     pub layer: bool,
     /// Opacities.
     pub alpha: bool,
+    /// What is in the air.
+    pub falling: bool,
+    /// Concentrations of scalars.
+    pub scalars: bool,
 }
 
 impl Shallow {
@@ -185,9 +200,11 @@ impl Shallow {
             look: text("liquid").unwrap_or("blood").to_string(),
             params: params(values),
             fill: number("fill"),
+            scalars: Carried::all_of(values),
             pours: (0..values.count("pour")).map(|index| Pour::of(values, index)).collect(),
             points: Point::all_of(values),
             obstacles: (0..values.count("object")).filter_map(|index| Obstacle::of(values, index)).collect(),
+            lifts: value("lifts").and_then(Value::flag).unwrap_or(true),
             opaque_depth: number("opaque_depth").unwrap_or(0.01),
             output: Files {
                 ply: asked("output.liquid", "ply"),
@@ -197,6 +214,8 @@ impl Shallow {
                 depth: asked("output.attributes", "depth"),
                 layer: asked("output.attributes", "layer"),
                 alpha: asked("output.attributes", "alpha"),
+                falling: asked("output.attributes", "falling"),
+                scalars: asked("output.attributes", "scalars"),
             },
         })
     }
@@ -224,6 +243,7 @@ impl Pour {
             radius: number("radius"),
             volume: number("volume_ml") * ML,
             frame: value("frame").and_then(Value::whole).map(|frame| frame as i32),
+            carries: scalars::brought(values, "pour", index),
         }
     }
 }
@@ -256,7 +276,8 @@ impl Point {
             pulse: (frequency > 0.0 && share > 0.0).then_some(flows::Pulse { frequency, share }),
         };
         let follows = value("follows").and_then(Value::flag).unwrap_or(false);
-        Self { name: (table, index), point, follows, from: frame("from"), until: frame("until") }
+        let carries = scalars::brought(values, table, index);
+        Self { name: (table, index), point, carries, follows, from: frame("from"), until: frame("until") }
     }
 
     /// Whether it acts on the way to a frame.
@@ -300,6 +321,7 @@ fn params(values: &Values) -> Params {
     let value = |name: &str| values.get(&format!("shallow.{name}"));
     let number = |name: &str| value(name).and_then(Value::number);
     let text = |name: &str| value(name).and_then(Value::text);
+    let usual = Falls::default();
     let is_thinning = value("thinning").and_then(Value::flag).unwrap_or(false);
     Params {
         liquid: match number("viscosity") {
@@ -321,8 +343,13 @@ fn params(values: &Values) -> Params {
         section: Section::default(),
         friction: Friction::default(),
         thickening: None,
-        falls: None,
-        ..Params::default()
+        falls: value("falls").and_then(Value::flag).filter(|falls| *falls).map(|_| Falls {
+            height: number("falls_height").unwrap_or(usual.height),
+            interval: number("falls_interval").unwrap_or(usual.interval),
+            drop: number("falls_drop_ml").map_or(usual.drop, |drop| drop * ML),
+            most: value("falls_most").and_then(Value::whole).map_or(usual.most, |most| most as usize),
+        }),
+        rest: Params::default().rest,
     }
 }
 
@@ -383,7 +410,9 @@ mod tests {
             .lines()
             .map(|line| line.trim_start_matches("# "))
             .skip_while(|line| *line != "[shot]")
-            .filter(|line| !["file =", "size =", "terrain_"].iter().any(|start| line.starts_with(start)))
+            .filter(|line| {
+                !["file =", "size =", "terrain_", "half_life"].iter().any(|start| line.starts_with(start))
+            })
             .collect();
         let scene = Scene::parse(&text.join("\n"), Path::new("/s/shot.toml"), &[]).unwrap();
         let missing: Vec<&str> = keys::of(System::Shallow)
@@ -391,6 +420,6 @@ mod tests {
             .filter(|key| !scene.values.iter().any(|(own, _, _)| own == *key))
             .map(|key| key.name)
             .collect();
-        assert_eq!(missing, ["terrain_size", "terrain_height", "size", "file"]);
+        assert_eq!(missing, ["terrain_size", "terrain_height", "half_life", "size", "file"]);
     }
 }

@@ -21,6 +21,7 @@ pub(super) fn pour(scene: &Scene, of: &Shallow, liquid: &mut shallow::Shallow, f
                 "at ({x}, {y}, {z}) there is only solid, or it lies outside of the area"
             )));
         }
+        liquid.set_poured(&pour.carries)?;
         let lacking = pour.volume - spread(liquid, &columns, pour.volume);
         // What rounding of depths leaves is less than that.
         let (cell, unit) = (liquid.columns().grid.cell, liquid.columns().heights.unit);

@@ -1,6 +1,6 @@
 //! What keys of `[shallow]` must keep together, told with file and line.
 
-use super::{Form, Obstacle, Shallow};
+use super::{Form, Obstacle, Shallow, scalars};
 use crate::error::Result;
 use crate::io::mesh::{EXTENSIONS, extension};
 use crate::io::sequence::Pattern;
@@ -72,7 +72,9 @@ impl Shallow {
     ) -> Result<()> {
         match name {
             "object" => check_object(index, table, values),
+            "scalar" => scalars::check(index, table, values),
             "pour" => {
+                scalars::check_brought(name, index, table, values)?;
                 let frame = values.of_many(name, index, "frame").and_then(Value::whole);
                 let Some(Value::Frames(frames)) = values.get("shot.frames") else { return Ok(()) };
                 match frame.filter(|frame| *frame < i64::from(frames.first)) {
@@ -84,6 +86,7 @@ impl Shallow {
                 }
             }
             _ => {
+                scalars::check_brought(name, index, table, values)?;
                 let value = |key: &str| values.of_many(name, index, key);
                 let terrain = values.get("shallow.terrain").and_then(Value::path);
                 if value("follows").and_then(Value::flag) == Some(true)

@@ -4,7 +4,7 @@ use serde_json::json;
 
 use super::course::Course;
 use super::mesh::{Drawn, Mesher};
-use super::{Inputs, ML, ROLES, Shallow};
+use super::{Inputs, ML, ROLES, Shallow, scalars};
 use crate::base::MeshArray;
 use crate::context::{Context, PhaseTime};
 use crate::error::{Error, Result};
@@ -75,6 +75,9 @@ impl<'a> Liquid<'a> {
     /// What a frame's files are made from.
     fn written(&self, ctx: &Context, state: &mut State<'a>, to: &To<'_>, made_from: &str) -> Result<Written> {
         let State { course, mesher } = state;
+        if self.of.lifts && std::mem::take(&mut course.is_stirred) {
+            ctx.phase("lifts", || mesher.lift(&course.liquid, course.ground()))?;
+        }
         let liquid = &course.liquid;
         let drawn = ctx.phase("surface", || mesher.draw(liquid, self.of.opaque_depth))?;
         let volume = self.volume(ctx, liquid, to.frame, made_from)?;
@@ -187,7 +190,7 @@ impl Stage for Liquid<'_> {
     }
 
     fn clip(&self) -> Option<Clip<'_>> {
-        let arrays = Drawn::default().arrays(self.of.output);
+        let arrays = Drawn::empty(self.of).arrays(self.of.output);
         let primvars = usd_primvars::primvars(&arrays.iter().collect::<Vec<&MeshArray>>());
         let mesh = MovingMesh { name: NAME.into(), look: self.look(), uvs: None, primvars };
         Some(Clip { kind: NAME, manifest: MANIFEST, prims: Prims::Meshes(vec![mesh]) })
@@ -216,13 +219,13 @@ impl<'a> Stepping for Liquid<'a> {
     }
 
     fn step(&self, ctx: &Context, state: &mut State<'a>, to: &To<'_>) -> Result<Stepped<Step>> {
-        let ((step, did), phases) = ctx.step(3, || {
+        let ((step, did), phases) = ctx.step(4, || {
             let did = self.go(ctx, &mut state.course, to.frame)?;
             let written =
                 to.made_from.map(|made_from| self.written(ctx, state, to, made_from)).transpose()?;
             Ok((Step(written), did))
         })?;
-        let report = told(&state.course, did, step.0.as_ref(), phases);
+        let report = told(&state.course, did, step.0.as_ref(), phases)?;
         Ok(Stepped { step, report })
     }
 
@@ -265,7 +268,7 @@ fn told(
     (report, moved): (shallow::Report, Moved),
     written: Option<&Written>,
     phases: Vec<PhaseTime>,
-) -> Report {
+) -> Result<Report> {
     let liquid = &course.liquid;
     let (balance, depths) = (liquid.balance(), liquid.depths());
     let wet = depths.iter().filter(|depth| **depth > 0).count();
@@ -280,7 +283,10 @@ fn told(
         "absorbed_ml": ml(balance.absorbed),
         "lost_ml": ml(balance.lost),
         "gained_ml": ml(balance.gained),
+        "falling_ml": ml(balance.falling),
         "missing_units": balance.error,
+        "drops": liquid.drops().len(),
+        "scalars": scalars::told(liquid)?,
         "wet_columns": wet,
         "deepest_m": liquid.columns().heights.length(deepest.into()),
         "displaced_ml": ml(moved.displaced),
@@ -296,5 +302,5 @@ fn told(
     }) else {
         unreachable!("it is written as an object")
     };
-    Report { results, phases }
+    Ok(Report { results, phases })
 }

@@ -69,16 +69,15 @@ fn density(ctx: &Context, liquid: &shallow::Shallow, scale: f64) -> Result<Float
             if share <= 0.0 {
                 continue;
             }
-            let origin = origin_of([x, y, z]);
-            let block = blocks.entry(origin).or_insert_with(|| Block {
-                origin,
-                values: Box::new([0.0; VOXELS]),
-                mask: [0; DIM],
-            });
-            let [i, j, k] = [x - origin[0], y - origin[1], z - origin[2]].map(|at| at as usize);
-            block.values[offset(i, j, k)] += share;
-            block.mask[i] |= 1 << (j << 3 | k);
+            add(&mut blocks, [x, y, z], share);
         }
+    }
+    // What is in the air, each drop in the voxel of its middle.
+    for drop in liquid.drops() {
+        let [x, y, z] = drop.position;
+        let along = |axis: usize, at: f64| ((at - grid.origin[axis]) / grid.cell).floor() as i32;
+        let at = [along(0, x), (y / grid.cell + 0.5).floor() as i32, along(1, z)];
+        add(&mut blocks, at, (drop.volume / grid.cell.powi(3)) as f32);
     }
     let edits: Vec<BlockEdit> = blocks.into_values().map(BlockEdit::Dense).collect();
     let mut out = FloatGrid::new(grid.cell, 0.0)?;
@@ -89,4 +88,17 @@ fn density(ctx: &Context, liquid: &shallow::Shallow, scale: f64) -> Result<Float
     out.set_class(GridClass::Fog)?;
     out.set_metadata(DENSITY_SCALE_KEY, MetaValue::Float(scale as f32))?;
     Ok(out)
+}
+
+/// Adds a share of a voxel that is liquid.
+fn add(blocks: &mut BTreeMap<Origin, Block>, at: [i32; 3], share: f32) {
+    let origin = origin_of(at);
+    let block = blocks.entry(origin).or_insert_with(|| Block {
+        origin,
+        values: Box::new([0.0; VOXELS]),
+        mask: [0; DIM],
+    });
+    let [i, j, k] = [0, 1, 2].map(|axis| (at[axis] - origin[axis]) as usize);
+    block.values[offset(i, j, k)] += share;
+    block.mask[i] |= 1 << (j << 3 | k);
 }

@@ -40,6 +40,8 @@ pub enum Kind {
     HeightOrFile(f64, &'static [&'static str]),
     /// So many numbers, each at most so far from 0, in a unit; or a file with one of these extensions.
     NumbersOrFile(usize, f64, &'static str, &'static [&'static str]),
+    /// A table of numbers by names of the scene's own, each at most so far from 0.
+    Named(f64),
     /// Rigid poses at frames, each place at most so far from the origin (m).
     Poses(f64),
 }
@@ -157,7 +159,7 @@ impl Key {
 /// The table of objects, of which a scene may have many.
 pub const OBJECT: &str = "object";
 /// All tables of which a scene may have many.
-pub const MANY: [&str; 5] = [OBJECT, "pour", "source", "drain", "absorber"];
+pub const MANY: [&str; 6] = [OBJECT, "scalar", "pour", "source", "drain", "absorber"];
 
 /// Whether a scene may have many of a table.
 pub fn is_many(table: &str) -> bool {

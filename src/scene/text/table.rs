@@ -5,6 +5,8 @@
 
 use super::overrides::Override;
 use crate::error::{Error, Result};
+use std::borrow::Cow;
+use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 use toml::Spanned;
 use toml::de::{DeTable, DeValue};
@@ -208,6 +210,28 @@ impl<'a, 'i> Table<'a, 'i> {
                 Err(self.error(key, format!("must be {}, not \"{text}\"{hint}", names.join(" or "))))
             }
         }
+    }
+
+    /// Finite numbers by names.
+    pub fn named_numbers(&self, key: &str) -> Result<Option<BTreeMap<String, f64>>> {
+        let Some(value) = self.entry(key).map(|value| value.get_ref()) else { return Ok(None) };
+        let DeValue::Table(entries) = value else {
+            return Err(self.wrong_type(key, "a table of numbers", value));
+        };
+        let read =
+            |(name, value): (&Spanned<Cow<'i, str>>, &Spanned<DeValue<'i>>)| match number_of(value.get_ref())
+            {
+                Some(number) => Ok((name.get_ref().to_string(), number)),
+                None => {
+                    let what = format!(
+                        "must hold finite numbers, not {}, `{}`",
+                        kind_of(value.get_ref()),
+                        name.get_ref()
+                    );
+                    Err(self.error(key, what))
+                }
+            };
+        entries.iter().map(read).collect::<Result<_>>().map(Some)
     }
 
     /// A list of so many finite numbers.

@@ -123,6 +123,7 @@ fn holds(key: &Key) -> String {
             let numbers = format!("{count} numbers, each -{0} to {0}{1}", short(far), of_unit(unit));
             format!("{numbers}, or {}", any_of(extensions))
         }
+        Kind::Named(far) => format!("table of numbers by names, each -{0} to {0}", short(far)),
         Kind::Poses(_) => "list of `{ frame, at, turn_deg }`".to_string(),
     };
     if key.of_characters { format!("{held}; .glb and .gltf") } else { held }

@@ -31,6 +31,8 @@ pub enum Value {
     Whole(i64),
     /// As many numbers as the key has.
     Numbers(Vec<f64>),
+    /// Numbers by names.
+    Named(BTreeMap<String, f64>),
     /// The absolute path of a file.
     File(PathBuf),
     /// Rigid poses, by ascending frames.
@@ -175,6 +177,11 @@ impl Value {
         if let Self::Numbers(numbers) = self { numbers[..].try_into().ok() } else { None }
     }
 
+    /// As numbers by names.
+    pub fn named(&self) -> Option<&BTreeMap<String, f64>> {
+        if let Self::Named(numbers) = self { Some(numbers) } else { None }
+    }
+
     /// As a flag.
     pub fn flag(&self) -> Option<bool> {
         if let Self::Flag(flag) = self { Some(*flag) } else { None }
@@ -206,6 +213,7 @@ impl Serialize for Value {
             Self::Number(number) => to.serialize_f64(*number),
             Self::Whole(number) => to.serialize_i64(*number),
             Self::Numbers(numbers) => numbers.serialize(to),
+            Self::Named(numbers) => numbers.serialize(to),
             Self::File(path) => to.serialize_str(&path.to_string_lossy()),
             Self::Poses(poses) => poses.serialize(to),
         }
@@ -223,6 +231,12 @@ impl fmt::Display for Value {
             Self::Number(number) => write!(f, "{number:?}"),
             Self::Whole(number) => write!(f, "{number}"),
             Self::Numbers(numbers) => write!(f, "{numbers:?}"),
+            Self::Named(numbers) if numbers.is_empty() => f.write_str("{}"),
+            Self::Named(numbers) => {
+                let numbers: Vec<String> =
+                    numbers.iter().map(|(name, number)| format!("{} = {number:?}", key_of(name))).collect();
+                write!(f, "{{ {} }}", numbers.join(", "))
+            }
             Self::File(path) => f.write_str(&quoted(&path.to_string_lossy())),
             Self::Poses(poses) => {
                 let poses: Vec<String> = poses.iter().map(pose).collect();
@@ -236,6 +250,12 @@ impl fmt::Display for Value {
 pub fn pose(pose: &KeyPose) -> String {
     let KeyPose { frame, at, turn_deg } = pose;
     format!("{{ frame = {frame:?}, at = {at:?}, turn_deg = {turn_deg:?} }}")
+}
+
+/// A name as a key of TOML.
+fn key_of(name: &str) -> String {
+    let is_bare = |byte: u8| byte.is_ascii_alphanumeric() || byte == b'_';
+    if !name.is_empty() && name.bytes().all(is_bare) { name.to_string() } else { quoted(name) }
 }
 
 fn quoted(text: &str) -> String {
@@ -267,6 +287,12 @@ fn read(key: &Key, table: &Table, cell: Option<f64>) -> Result<Option<Value>> {
         }
         Kind::Whole(low, high) => table.integer_in(name, low..=high)?.map(Value::Whole),
         Kind::Numbers(count, far, unit) => numbers(name, table, count, far, unit)?,
+        Kind::Named(far) => match table.named_numbers(name)? {
+            Some(named) if named.values().any(|number| number.abs() > far) => {
+                return Err(table.error(name, format!("must hold numbers within {far} of 0")));
+            }
+            named => named.map(Value::Named),
+        },
         Kind::File(extensions) => match table.path(name)? {
             None => None,
             Some(path) => Some(file(key, table, path, extensions, "")?),

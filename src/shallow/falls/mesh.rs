@@ -27,6 +27,8 @@ pub struct Target<'a> {
     pub normals: Option<&'a mut [f32]>,
     /// Three numbers a vertex: velocity of its drop (m/s x scale).
     pub velocities: Option<&'a mut [f32]>,
+    /// One a vertex: the index of its drop in the list of them.
+    pub drops: Option<&'a mut [u32]>,
     /// Three a triangle.
     pub indices: Indices<'a>,
 }
@@ -149,6 +151,12 @@ impl Balls {
             balls.zip(drops).for_each(|(to, drop)| to.fill(turned(drop.velocity)));
             self.each_corner(drops, strands, |_, _, drop| turned(drop.velocity));
         }
+        if let Some(to) = &mut target.drops {
+            let (balls, strands) = to.split_at_mut(BALL[0] * drops.len());
+            balls.chunks_exact_mut(BALL[0]).zip(0..).for_each(|(to, drop)| to.fill(drop));
+            let ends = self.strands.iter().flat_map(|strand| strand.ends);
+            strands.chunks_exact_mut(SIDES).zip(ends).for_each(|(to, drop)| to.fill(drop));
+        }
         match &mut target.indices {
             Indices::None => {}
             Indices::U16(to) => {
@@ -216,7 +224,9 @@ impl Target<'_> {
             Indices::U16(out) => Some(out.len()),
             Indices::U32(out) => Some(out.len()),
         };
-        for (name, room, needed) in vectors.into_iter().chain([("indices", indices, counts.indices)]) {
+        let drops = self.drops.as_ref().map(|out| out.len());
+        let others = [("drops", drops, counts.vertices), ("indices", indices, counts.indices)];
+        for (name, room, needed) in vectors.into_iter().chain(others) {
             if let Some(room) = room.filter(|room| *room < needed) {
                 return Err(Error::argument(format!(
                     "{name} has room for {room} numbers, and the drops have {needed}"

@@ -38,6 +38,7 @@ mod vertices;
 mod walled;
 
 use super::columns::{Columns, NONE, STRIP};
+use super::scalars::MOST;
 use crate::error::{Error, Result};
 use boundary::{Around, Walls};
 pub use check::{Check, check};
@@ -63,6 +64,8 @@ pub struct Depths<'a> {
     /// How far below its base each index is shown where it is dry (units), at most to the underside of its solid; in place of
     /// [`Layout::least_depth`]. May be empty.
     pub sunk: &'a [i32],
+    /// A number of each index for each array of [`Target::carried`]: concentrations of scalars. May be empty.
+    pub carried: [&'a [f32]; MOST],
 }
 
 /// The axis that points up.
@@ -134,6 +137,8 @@ pub struct Target<'a> {
     pub opacities: Option<&'a mut [f32]>,
     /// Three numbers a vertex (m/s x scale): velocity at the surface, 1.5 times the mean (Eq. 4.4); nothing upward.
     pub velocities: Option<&'a mut [f32]>,
+    /// One number a vertex of each array of [`Depths::carried`]; of one that is dry or an extra, the mean of the wet columns around.
+    pub carried: [Option<&'a mut [f32]>; MOST],
     /// Layer of each vertex's column; of an extra, the lowest of the wet columns around whose surface ends there.
     pub layers: Option<&'a mut [u32]>,
     /// Index of each vertex's column; [`NONE`] for an extra.
@@ -203,6 +208,14 @@ impl Surface {
                 return Err(Error::argument(format!("{count} {name} are not one for each of {len} indices")));
             }
         }
+        if let Some(carried) =
+            depths.carried.iter().find(|carried| !carried.is_empty() && carried.len() != len)
+        {
+            let count = carried.len();
+            return Err(Error::argument(format!(
+                "{count} concentrations are not one for each of {len} indices"
+            )));
+        }
         if let Some(active) = depths.active.filter(|active| active.len() != len / STRIP) {
             let (count, strips) = (active.len(), len / STRIP);
             return Err(Error::argument(format!(
@@ -232,8 +245,8 @@ impl Surface {
     /// Writes the mesh of the liquid's surface and returns its size; [`bound`] is the most that it can be.
     ///
     /// # Errors
-    /// `Argument`, and nothing is written: arrays of depths, velocities, activity or lifts of another length than the columns'; velocities
-    /// are wanted and none given; a scale or opaque depth that is not positive and finite, a least or fade depth that is negative or not
+    /// `Argument`, and nothing is written: arrays of depths, velocities, activity, lifts or concentrations of another length than the columns';
+    /// velocities or concentrations are wanted and none given; a scale or opaque depth that is not positive and finite, a least or fade depth that is negative or not
     /// finite; a buffer that is too short; over 65,536 vertices for indices of 16 bits.
     pub fn build(
         &mut self,
@@ -246,6 +259,10 @@ impl Surface {
         if target.velocities.is_some() && depths.velocity.is_empty() && !depths.depth.is_empty() {
             return Err(Error::argument("velocities of the surface are wanted, and the liquid has none"));
         }
+        let is_bare = |(to, from): (&Option<&mut [f32]>, &&[f32])| to.is_some() && from.is_empty();
+        if !depths.depth.is_empty() && target.carried.iter().zip(&depths.carried).any(is_bare) {
+            return Err(Error::argument("concentrations of the surface are wanted, and the liquid has none"));
+        }
         let counts = self.count(columns, depths)?;
         target.check(&counts)?;
         let scene = Scene { columns, depth: depths.depth, above: &self.above };
@@ -253,15 +270,8 @@ impl Surface {
         indices::write_triangles(scene, found, walls, &self.search, layout.left_handed, &mut target.indices);
         self.normals.reset(columns);
         shown::find_heights(columns, found, depths, layout, &mut self.heights);
-        let vertices = Vertices::new(
-            scene,
-            found,
-            walls,
-            &self.heights,
-            depths.velocity,
-            layout,
-            target.normals.is_some(),
-        );
+        let vertices =
+            Vertices::new(scene, found, walls, &self.heights, depths, layout, target.normals.is_some());
         vertices.write(&mut self.normals, &mut self.around, target);
         self.normals.clear(found);
         Ok(counts)
@@ -303,6 +313,9 @@ impl Target<'_> {
         fits("depths", self.depths.as_ref().map(|out| out.len()), count)?;
         fits("opacities", self.opacities.as_ref().map(|out| out.len()), count)?;
         fits("velocities", self.velocities.as_ref().map(|out| out.len()), 3 * count)?;
+        for carried in &self.carried {
+            fits("carried", carried.as_ref().map(|out| out.len()), count)?;
+        }
         fits("layers", self.layers.as_ref().map(|out| out.len()), count)?;
         fits("columns", self.columns.as_ref().map(|out| out.len()), count)?;
         let room = match &self.indices {

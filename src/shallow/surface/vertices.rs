@@ -4,7 +4,7 @@ use super::boundary::{Around, Wall, walls_of};
 use super::links::Scene;
 use super::normals::{Normals, Shown, upright};
 use super::strips::{Found, Span, places};
-use super::{Layout, NONE, STRIP, Target, Up};
+use super::{Depths, Layout, MOST, NONE, STRIP, Target, Up};
 use crate::base::cpu::dispatch;
 
 /// Velocity at the surface over the mean (Eq. 4.4).
@@ -16,6 +16,7 @@ pub(super) struct Vertices<'a> {
     found: &'a Found,
     walls: &'a [Wall],
     velocity: &'a [[f32; 2]],
+    carried: [&'a [f32]; MOST],
     wants_normals: bool,
     z_up: bool,
     /// Sign of z.
@@ -35,6 +36,7 @@ struct Vertex {
     position: [f32; 3],
     normal: [f32; 3],
     velocity: [f32; 2],
+    carried: [f32; MOST],
     depth: i32,
     layer: u32,
     column: u32,
@@ -55,7 +57,7 @@ impl<'a> Vertices<'a> {
         found: &'a Found,
         walls: &'a [Wall],
         shown: &'a [i32],
-        velocity: &'a [[f32; 2]],
+        depths: &Depths<'a>,
         layout: &Layout,
         wants_normals: bool,
     ) -> Self {
@@ -66,7 +68,8 @@ impl<'a> Vertices<'a> {
             shown: Shown { scene, heights: shown, slope },
             found,
             walls,
-            velocity,
+            velocity: depths.velocity,
+            carried: depths.carried,
             wants_normals,
             z_up: layout.up == Up::Z,
             sign: if layout.left_handed == (layout.up == Up::Y) { -1.0 } else { 1.0 },
@@ -102,6 +105,12 @@ impl<'a> Vertices<'a> {
         self.origin[axis] + cell as f32 * self.cell
     }
 
+    /// What a column carries.
+    #[inline(always)]
+    fn carried(&self, index: usize) -> [f32; MOST] {
+        self.carried.map(|numbers| numbers.get(index).copied().unwrap_or_default())
+    }
+
     /// A vertex that takes the mean of wet columns around cell (x, z), at a height of at most `most` (units).
     fn mean(&self, [x, z]: [usize; 2], most: i32, normals: &mut Normals, around: &Around) -> Vertex {
         let mean = around.mean_height(|index| self.shown.heights[index]);
@@ -118,8 +127,12 @@ impl<'a> Vertices<'a> {
         if !self.velocity.is_empty() {
             velocity = around.sum(|index| self.velocity[index]).map(|sum| sum / around.len().max(1) as f32);
         }
+        let mut carried = [0.0; MOST];
+        if self.carried.iter().any(|numbers| !numbers.is_empty()) {
+            carried = around.sum(|index| self.carried(index)).map(|sum| sum / around.len().max(1) as f32);
+        }
         let position = [self.centre(0, x as i32), height, self.centre(1, z as i32)];
-        Vertex { position, normal, velocity, depth: 0, layer: 0, column: NONE }
+        Vertex { position, normal, velocity, carried, depth: 0, layer: 0, column: NONE }
     }
 
     /// The vertex of a column.
@@ -145,6 +158,7 @@ impl<'a> Vertices<'a> {
                 [0.0, 1.0, 0.0]
             },
             velocity: self.velocity.get(index).copied().unwrap_or_default(),
+            carried: self.carried(index),
             depth: scene.depth[index],
             layer,
             column: index as u32,
@@ -167,6 +181,11 @@ impl<'a> Vertices<'a> {
         }
         if let Some(out) = &mut target.opacities {
             out[at] = (vertex.depth as f32 * self.opacity).min(1.0);
+        }
+        for (out, carried) in target.carried.iter_mut().zip(vertex.carried) {
+            if let Some(out) = out {
+                out[at] = carried;
+            }
         }
         if let Some(out) = &mut target.layers {
             out[at] = vertex.layer;
@@ -225,6 +244,11 @@ impl<'a> Vertices<'a> {
         if let Some(out) = &mut target.opacities {
             for (out, depth) in out[at..][..len].iter_mut().zip(depth) {
                 *out = (*depth as f32 * self.opacity).min(1.0);
+            }
+        }
+        for (out, carried) in target.carried.iter_mut().zip(&self.carried) {
+            if let Some(out) = out {
+                out[at..][..len].copy_from_slice(&carried[first..][..len]);
             }
         }
         if let Some(out) = &mut target.layers {

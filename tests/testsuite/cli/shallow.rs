@@ -177,6 +177,39 @@ fn what_is_wrong_is_one_sentence_and_leaves_nothing_behind() {
     write_scene(folder, drain);
     refused("--set drain.1.follows=true", &["`follows`", "the terrain does not move"]);
     refused("--set drain.1.follows=1", &["`follows`", "true or false"]);
+    let dye = "[[scalar]]\nname = \"dye\"\n";
+    let pour = |carries: &str| format!("{dye}{POUR}carries = {carries}\n");
+    with(&pour("{ dey = 1.0 }"), &["`carries` in [[pour]]", "`dey`, which is the name of no [[scalar]]"]);
+    with(&pour("{ dye = 1.5 }"), &["`carries`", "dye = 1.5, which is not within -1 to 1"]);
+    with(&pour("{ dye = nan }"), &["`carries`", "finite numbers", "`dye`"]);
+    with(&pour("[1.0]"), &["`carries`", "a table of numbers, not a list"]);
+    with("[[scalar]]\nlaw = \"dye\"\n", &["spill.toml:7", "`name` in [[scalar]] is missing"]);
+    for (name, words) in [
+        ("", "letters, digits and _"),
+        ("a b", "letters"),
+        ("1", "begin with no digit"),
+        ("alpha", "an array of that name"),
+    ] {
+        with(&format!("[[scalar]]\nname = \"{name}\"\n"), &["`name` in [[scalar]]", words]);
+    }
+    with(&dye.repeat(2), &["spill.toml:10", "another scalar has that name"]);
+    let five: String = (0..5).map(|at| format!("[[scalar]]\nname = \"dye{at}\"\n")).collect();
+    with(&five, &["`name`", "one too many", "4 scalars at most"]);
+    with(&format!("{dye}law = \"decays\"\n"), &["`half_life`", "is missing"]);
+    with(&format!("{dye}half_life = 3\n"), &["`half_life`", "leave it out"]);
+    with(&format!("{dye}range = 0\n"), &["`range`", "not 0"]);
+    with(&format!("{dye}start = 2\n"), &["`start`", "-1 to 1, its range"]);
+    with(
+        "[[source]]\nat = [0, 0, 0]\nradius = 0\nrate_ml = 1\ncarries = { dye = 1 }\n",
+        &["`carries` in [[source]]", "`dye`"],
+    );
+    write_scene(folder, POUR);
+    refused("--set shallow.falls=2", &["`falls`", "true or false"]);
+    refused("--set shallow.falls_most=0", &["`falls_most`", "1 to 1048576, not 0"]);
+    refused("--set shallow.falls_height=-1", &["`falls_height`", "not -1"]);
+    refused("--set shallow.falls_interval=2", &["`falls_interval`", "0.0001 to 1 s"]);
+    refused("--set shallow.falls_drop_ml=nan", &["`falls_drop_ml`", "finite"]);
+    refused("--set shallow.lifts=1", &["`lifts`", "true or false"]);
     with("[[object]]\nradius = 1\n", &["`shape`", "is missing (or `file`"]);
     with("[[object]]\nshape = \"sphere\"\n", &["`radius`", "is missing"]);
     with("[[object]]\nshape = \"box\"\nsize = [1, 1, 0]\n", &["`size`", "over 0 m"]);

@@ -445,11 +445,13 @@ fn drops_and_strands_are_a_mesh_in_buffers_of_known_capacity() {
         let layout = Layout { scale: 100.0, up, left_handed, ..Layout::default() };
         let mut vectors = [(); 3].map(|()| vec![f32::NAN; 3 * most.vertices]);
         let mut indices = vec![u32::MAX; most.indices];
+        let mut of_drops = vec![u32::MAX; most.vertices];
         let [positions, normals, velocities] = &mut vectors;
         let mut target = Target {
             positions: Some(positions),
             normals: Some(normals),
             velocities: Some(velocities),
+            drops: Some(&mut of_drops),
             indices: Indices::U32(&mut indices),
         };
         let counts = balls.build(&drops, &layout, &mut target).unwrap();
@@ -471,6 +473,11 @@ fn drops_and_strands_are_a_mesh_in_buffers_of_known_capacity() {
         let first = place(&vectors[0], 0);
         let [_, y, _] = drops[0].position;
         assert!((first[vertical] - 100.0 * y).abs() <= 100.0 * drops[0].radius * 1.2);
+        for (at, drop) in of_drops[..counts.vertices].iter().enumerate() {
+            let down = (100.0 * drops[*drop as usize].velocity[1]) as f32;
+            assert_eq!(vectors[2][3 * at + vertical], down, "vertex {at} of drop {drop}");
+        }
+        assert!(of_drops[counts.vertices..].iter().all(|drop| *drop == u32::MAX));
     }
     let mut short = vec![0.0; 10];
     let mut target = Target { positions: Some(&mut short), ..Target::default() };

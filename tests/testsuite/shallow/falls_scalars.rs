@@ -21,7 +21,7 @@ fn three() -> [Scalar; 3] {
 /// Rough ground, of which liquid falls from ledge to ledge.
 fn falling(seed: u64) -> Plan {
     let mut plan = turnable(seed);
-    let most = if seed % 3 == 0 { 40 } else { 4000 };
+    let most = if seed.is_multiple_of(3) { 40 } else { 4000 };
     plan.params.falls = Some(Falls { height: 0.001, drop: 0.0, most, ..Falls::default() });
     plan
 }

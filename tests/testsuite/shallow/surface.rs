@@ -273,3 +273,58 @@ fn a_least_depth_lifts_thin_films() {
     }
     assert!((mesh.depths[0] - 0.01).abs() < 1e-6, "depths are the liquid's");
 }
+
+#[test]
+fn vertices_carry_what_their_columns_do_and_dry_ones_what_is_around() {
+    // A pool with an island, of different concentrations.
+    let is_dry = |[x, z]: [usize; 2]| (5..8).contains(&x) && z == 4;
+    let columns = columns([20, 9], |x, z| vec![ground(if is_dry([x, z]) { 2.0 } else { 0.5 })]);
+    let depth = pool(&columns, 0, 1.0);
+    let dye: Vec<f32> = (0..columns.len())
+        .map(|index| if depth[index] > 0 { (index * 37 % 101) as f32 / 100.0 } else { 0.0 })
+        .collect();
+    let more = vec![0.25; columns.len()];
+    let mut carried = [&[][..]; 4];
+    (carried[0], carried[2]) = (&dye, &more);
+    let depths = Depths { depth: &depth, carried, ..Depths::default() };
+    let mut surface = Surface::default();
+    let count = surface.count(&columns, &depths).unwrap().vertices;
+    let (mut own, mut same, mut of) = (vec![f32::NAN; count + 1], vec![f32::NAN; count], vec![0; count]);
+    let mut target = Target { columns: Some(&mut of), ..Target::default() };
+    target.carried[0] = Some(&mut own);
+    target.carried[2] = Some(&mut same);
+    surface.build(&columns, &depths, &Layout::default(), &mut target).unwrap();
+    assert!(own[count].is_nan(), "nothing is written behind the mesh");
+    let mut dry = 0;
+    for (&column, &own) in of.iter().zip(&own) {
+        let column = column as usize;
+        if depth[column] > 0 {
+            assert_eq!(own, dye[column]);
+            continue;
+        }
+        let [x, z] = columns.cell(column);
+        let cells = (z - 1..=z + 1).flat_map(|z| (x - 1..=x + 1).map(move |x| [x, z]));
+        let wet = cells.map(|cell| columns.column(cell, 0).unwrap()).filter(|&index| depth[index] > 0);
+        let around: Vec<f32> = wet.map(|index| dye[index]).collect();
+        let mean = around.iter().sum::<f32>() / around.len() as f32;
+        assert!((own - mean).abs() < 1e-6, "{own} at {x}, {z}, and not {mean}");
+        dry += 1;
+    }
+    assert_eq!(dry, 3);
+    assert!(same.iter().all(|number| *number == 0.25));
+    let mut refused = |depths: &Depths<'_>, target: &mut Target<'_>, words: &str| {
+        let error = surface.build(&columns, depths, &Layout::default(), target).unwrap_err().to_string();
+        assert!(error.contains(words), "{error}");
+    };
+    let mut room = vec![f32::NAN; count];
+    let mut target = Target::default();
+    target.carried[1] = Some(&mut room);
+    refused(&depths, &mut target, "concentrations of the surface are wanted");
+    let mut short = vec![0.0; count - 1];
+    let mut target = Target::default();
+    target.carried[2] = Some(&mut short);
+    refused(&depths, &mut target, "carried has room for");
+    let depths = Depths { carried: [&dye[1..], &[], &[], &[]], ..depths };
+    refused(&depths, &mut Target::default(), "concentrations are not one for each of");
+    assert!(room.iter().all(|number| number.is_nan()));
+}

@@ -66,6 +66,7 @@ pub fn build_with(surface: &mut Surface, columns: &Columns, liquid: &Depths<'_>,
         layers: Some(layers),
         columns: Some(of_columns),
         indices: Indices::U32(&mut indices),
+        ..Target::default()
     };
     let counts = surface.build(columns, liquid, layout, &mut target).unwrap();
     assert!(counts.vertices <= most.vertices && counts.indices <= most.indices, "{counts:?} of {most:?}");
