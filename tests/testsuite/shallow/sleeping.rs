@@ -17,7 +17,9 @@ fn pool(ctx: &Context, frames: usize) -> Shallow {
     let solids = ground([90, 70], cell, [-0.01, 0.1], |at| 3e-4 * waves(at, cell));
     let mut pool =
         covered(ctx, &solids, Params::default(), |[x, z], _| 2e-3 + 4e-4 * waves([2.0 * z, 2.0 * x], cell));
-    (0..frames).for_each(|_| drop(pool.step(ctx, FRAME).unwrap()));
+    for _ in 0..frames {
+        pool.step(ctx, FRAME).unwrap();
+    }
     pool
 }
 
@@ -52,7 +54,9 @@ fn liquid_that_never_rests_stays_awake() {
     let ctx = context();
     let mut pool = pool(&ctx, 0);
     pool.set_params(Params { rest: 0.0, ..Params::default() }).unwrap();
-    (0..400).for_each(|_| drop(pool.step(&ctx, FRAME).unwrap()));
+    for _ in 0..400 {
+        pool.step(&ctx, FRAME).unwrap();
+    }
     assert!(flowing(&pool) > 0);
     for rest in [-1e-9, 0.02, f64::NAN] {
         let error = pool.set_params(Params { rest, ..Params::default() }).unwrap_err().to_string();
@@ -67,8 +71,12 @@ fn whatever_happens_to_it_wakes_a_pool() {
     let saved = asleep.save();
     type Wake = fn(&mut Shallow);
     let wakes: [(&str, Wake); 5] = [
-        ("a drop", |pool| drop(pool.pour(pool.columns().column([40, 35], 0).unwrap(), 1e-5))),
-        ("a sip", |pool| drop(pool.pour(pool.columns().column([40, 35], 0).unwrap(), -1e-5))),
+        ("a drop", |pool| {
+            pool.pour(pool.columns().column([40, 35], 0).unwrap(), 1e-5);
+        }),
+        ("a sip", |pool| {
+            pool.pour(pool.columns().column([40, 35], 0).unwrap(), -1e-5);
+        }),
         ("a source", |pool| {
             pool.set_flows(&[source([0.011, 0.001, -0.02], 0.0, 1e-8)], |_| "it".into()).unwrap();
         }),
@@ -87,7 +95,9 @@ fn whatever_happens_to_it_wakes_a_pool() {
         other.set_sleepless(true);
         for pool in [&mut pool, &mut other] {
             pool.restore(&saved).unwrap();
-            (0..3).for_each(|_| drop(pool.step(&ctx, FRAME).unwrap()));
+            for _ in 0..3 {
+                pool.step(&ctx, FRAME).unwrap();
+            }
             wake(pool);
         }
         let mut most = 0;
@@ -151,7 +161,9 @@ fn nothing_depends_on_sleep() {
         for frame in 0..60 {
             if frame % 16 == 9 {
                 let cells = [[frame, 3], [frame + 5, 4]];
-                [&mut liquid, &mut other].map(|liquid| plan.pour(liquid, Turn::NONE, cells, 1e-5));
+                for liquid in [&mut liquid, &mut other] {
+                    plan.pour(liquid, Turn::NONE, cells, 1e-5);
+                }
             }
             let reports = [&mut liquid, &mut other].map(|liquid| liquid.step(&ctx, FRAME).unwrap());
             assert_eq!(reports[0], reports[1], "seed {seed}, frame {frame}");
