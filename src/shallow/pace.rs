@@ -117,15 +117,22 @@ fn level(params: &Params, measures: &Measures) -> i32 {
     if rest(params) > 0.0 { (fall / measures.unit).round().clamp(1.0, 1e6) as i32 } else { 0 }
 }
 
+/// Flux over the depth in its section, in a step of `dt` (s), that is slow: a level surface does not bring liquid at rest over it, in steps of any length.
+fn slow(params: &Params, measures: &Measures, dt: f64) -> f64 {
+    let driven = 1.001 * drive(params, measures, dt) * f64::from(level(params, measures));
+    (rest(params) * dt / measures.cell).max(driven)
+}
+
 /// What gravity adds to the fall of the surface over a cell along x and along z (units).
 fn tilt(params: &Params, measures: &Measures) -> [i32; 2] {
     let [x, y, z] = params.gravity;
     [x, z].map(|along| (along / -y * measures.cell / measures.unit).round().clamp(-1e9, 1e9) as i32)
 }
 
-/// What rests in all steps.
-pub fn bounds(params: &Params, measures: &Measures) -> Bounds {
+/// What rests in all steps, after one of `last` (s).
+pub fn bounds(params: &Params, measures: &Measures, last: f64) -> Bounds {
     Bounds {
+        slow: slow(params, measures, last) as f32,
         level: level(params, measures),
         tilt: tilt(params, measures),
         still: measures.still,
@@ -137,14 +144,11 @@ pub fn bounds(params: &Params, measures: &Measures) -> Bounds {
 pub fn step(params: &Params, measures: &Measures, dt: f64, last: f64) -> Step {
     let Measures { cell, unit, .. } = *measures;
     let y = params.gravity[1];
-    let level = level(params, measures);
     let section = match (params.section, params.pace) {
         (Section::Whole, _) => cell / unit,
         (Section::Wetted, Pace::Exact) => f64::from(TOP),
         (Section::Wetted, Pace::Realtime(_)) => deepest_section(params, measures, dt) / unit,
     };
-    // A level surface must not bring liquid at rest over it, in steps of any length.
-    let slow = (rest(params) * dt / cell).max(1.001 * drive(params, measures, dt) * f64::from(level));
     Step {
         kept: (libm::pow(params.kept, dt) * dt / last) as f32,
         drive: drive(params, measures, dt) as f32,
@@ -169,7 +173,7 @@ pub fn step(params: &Params, measures: &Measures, dt: f64, last: f64) -> Step {
         },
         again: (dt / last) as f32,
         cell: (cell / unit) as f32,
-        level,
-        slow: slow as f32,
+        level: level(params, measures),
+        slow: slow(params, measures, dt) as f32,
     }
 }

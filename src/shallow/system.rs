@@ -11,7 +11,7 @@ use super::grid::BOTTOMLESS;
 use super::identity::Identity;
 use super::pace::{self, MOST_STEPS, Measures, Next};
 use super::params::{Friction, Params, Section};
-use super::pipes::rules::Rules;
+use super::pipes::rules::{Apart, Rules};
 use super::pipes::{Border, Pipes};
 use super::remap::Remap;
 use super::scalars::amounts::Account;
@@ -33,6 +33,8 @@ pub struct Shallow {
     pub(super) remap: Remap,
     pub(super) falls: Falling,
     thick: Thick,
+    /// Cells that are another liquid's.
+    pub(super) apart: Option<Apart>,
     /// Units poured in, less those taken out, other than by flow points.
     pub(super) poured: i64,
     /// Surface of the liquid at rest beyond an absorbing border (units), or BOTTOMLESS.
@@ -92,10 +94,20 @@ impl Shallow {
     /// # Errors
     /// `Argument`: numbers out of range, a terrain without a surface in the domain. `Memory`: more than the context allows.
     pub fn new(ctx: &Context, solids: &Solids, params: Params) -> Result<Self> {
+        Self::beside(ctx, solids, params, None)
+    }
+
+    /// As [`Shallow::new`], beside cells that are another liquid's.
+    pub(super) fn beside(
+        ctx: &Context,
+        solids: &Solids,
+        params: Params,
+        apart: Option<Apart>,
+    ) -> Result<Self> {
         params.validate()?;
         solids.grid.validate()?;
         let count: usize = (0..solids.grid.cells()).map(|cell| solids.cell(cell).len()).sum();
-        if count == 0 {
+        if count == 0 && apart.is_none() {
             return Err(Error::argument("the terrain has no surface that faces up within the domain"));
         }
         let has_walls = params.friction == Friction::Walls;
@@ -103,7 +115,7 @@ impl Shallow {
         ctx.allow("the columns of the liquid", count as u64 * bytes)?;
         let columns = Columns::new(solids);
         let falls = params.falls.as_ref();
-        let pipes = Pipes::with_rules(&columns, Rules::of(&params, &columns));
+        let pipes = Pipes::with_rules(&columns, Rules::of(&params, &columns, apart.as_ref()));
         let mut flow = Flow::new(&columns, &pipes);
         if has_walls {
             flow.walls.turn_on(&columns);
@@ -115,6 +127,7 @@ impl Shallow {
             remap: Remap::new(falls.map_or(0, |falls| falls.most)),
             falls: Falling::new(falls, pipes.links.len()),
             thick: Thick::none(),
+            apart,
             params,
             flow,
             pipes,
@@ -323,7 +336,11 @@ impl Shallow {
     /// Begins a frame; returns how often its steps are halved, for fast films.
     pub(super) fn begin(&mut self, dt: f64, measures: &Measures, next: impl Fn(&Next) -> Option<f64>) -> u32 {
         self.steps.clear();
-        self.flow.begin_frame(&self.columns, &self.pipes, pace::bounds(&self.params, measures));
+        self.flow.begin_frame(
+            &self.columns,
+            &self.pipes,
+            pace::bounds(&self.params, measures, self.flow.last),
+        );
         self.release();
         self.find_fast(dt, measures, next)
     }

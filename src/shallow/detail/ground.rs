@@ -1,12 +1,10 @@
 //! The ground of both sizes of cells.
 
 use super::Cells;
-use crate::shallow::grid::{BOTTOMLESS, Grid, TOP};
+use crate::shallow::grid::{BOTTOMLESS, Grid};
+use crate::shallow::pipes::rules::Apart;
 use crate::shallow::terrain::Solids;
 use crate::shallow::terrain::solids::{Solid, unite};
-
-/// What is not of a liquid: solid up to the top, without room.
-pub(super) const WALL: &[Solid] = &[[BOTTOMLESS, TOP]];
 
 /// The terrain, in cells of both sizes.
 pub(super) struct Ground {
@@ -27,7 +25,7 @@ impl Ground {
         Self { fine: solids.clone(), coarse: Solids::new(grid, solids.heights, cells) }
     }
 
-    /// The fine ground, and walls around the near cells.
+    /// The fine ground of the near cells.
     pub fn fine_solids(&self, near: &Cells) -> Solids {
         let grid = self.fine.grid;
         let cell = |index: usize| self.fine_cell(near, [index % grid.size[0], index / grid.size[0]]);
@@ -36,7 +34,7 @@ impl Ground {
         out
     }
 
-    /// The coarse ground, with walls in place of the near cells.
+    /// The coarse ground of all others.
     pub fn coarse_solids(&self, near: &Cells) -> Solids {
         let grid = self.coarse.grid;
         let cell = |index: usize| self.coarse_cell(near, [index % grid.size[0], index / grid.size[0]]);
@@ -45,16 +43,22 @@ impl Ground {
         out
     }
 
+    /// What of the fine cells is the coarse liquid's, and of the coarse ones the fine liquid's.
+    pub fn apart(near: &Cells) -> [Apart; 2] {
+        let halved = near.clone().map(|range| range.start / 2..range.end / 2);
+        [Apart { cells: near.clone(), is_inside: false }, Apart { cells: halved, is_inside: true }]
+    }
+
     /// The solids of a fine cell.
     pub fn fine_cell(&self, near: &Cells, [x, z]: [usize; 2]) -> &[Solid] {
         let is_near = near[0].contains(&x) && near[1].contains(&z);
-        if is_near { self.fine.cell(self.fine.grid.index([x, z])) } else { WALL }
+        if is_near { self.fine.cell(self.fine.grid.index([x, z])) } else { &[] }
     }
 
     /// The solids of a coarse cell.
     pub fn coarse_cell(&self, near: &Cells, [x, z]: [usize; 2]) -> &[Solid] {
         let is_near = near[0].contains(&(2 * x)) && near[1].contains(&(2 * z));
-        if is_near { WALL } else { self.coarse.cell(self.coarse.grid.index([x, z])) }
+        if is_near { &[] } else { self.coarse.cell(self.coarse.grid.index([x, z])) }
     }
 }
 
@@ -95,7 +99,13 @@ mod tests {
         assert_eq!(ground.coarse.cell(0), [[BOTTOMLESS, 11], [51, 61]]);
         assert_eq!(ground.coarse.cell(1), [[0, 7]]);
         let near = [2..4, 0..2];
-        assert_eq!((ground.fine_cell(&near, [2, 1]), ground.fine_cell(&near, [1, 1])), (&[[0, 7]][..], WALL));
-        assert_eq!((ground.coarse_cell(&near, [1, 0]), ground.coarse_cell(&near, [0, 0]).len()), (WALL, 2));
+        assert_eq!(
+            (ground.fine_cell(&near, [2, 1]), ground.fine_cell(&near, [1, 1])),
+            (&[[0, 7]][..], &[][..])
+        );
+        assert_eq!(
+            (ground.coarse_cell(&near, [1, 0]), ground.coarse_cell(&near, [0, 0]).len()),
+            (&[][..], 2)
+        );
     }
 }

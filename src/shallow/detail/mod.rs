@@ -1,7 +1,7 @@
 //! Level of detail: cells of the terrain's size near what matters, and of twice the size everywhere else.
 //!
 //! Two liquids over one lattice of heights: a *fine* one whose ground is there in a box of cells only, the *near* part, and a *coarse* one whose ground is
-//! there in all others (`ground.rs`). What is not theirs is a wall. Along the edge of the box pipes of their own join them (`seam.rs`). A coarse unit is four
+//! there in all others (`ground.rs`). What is not theirs is without columns, and a wall. Along the edge of the box pipes of their own join them (`seam.rs`). A coarse unit is four
 //! fine ones, so volumes are counted in fine units; what makes no coarse unit waits, and is part of the balance. When the box moves, four
 //! fine columns become a coarse one, and back (`shift.rs`), and
 //! what flows goes on (`momentum.rs`). Nothing is lost.
@@ -71,8 +71,9 @@ impl Detail {
             return Err(Error::argument("the terrain has no surface that faces up within the domain"));
         }
         let ground = Ground::new(solids);
-        let fine = Shallow::new(ctx, &ground.fine_solids(&near), params.clone())?;
-        let coarse = Shallow::new(ctx, &ground.coarse_solids(&near), params)?;
+        let [beyond, within] = Ground::apart(&near).map(Some);
+        let fine = Shallow::beside(ctx, &ground.fine_solids(&near), params.clone(), beyond)?;
+        let coarse = Shallow::beside(ctx, &ground.coarse_solids(&near), params, within)?;
         let mut detail = Self {
             rest: vec![0; coarse.columns.grid.cells()],
             fine,
@@ -88,12 +89,12 @@ impl Detail {
         Ok(detail)
     }
 
-    /// The liquid of the near cells; all its others are walls.
+    /// The liquid of the near cells; in all others it has no columns.
     pub fn fine(&self) -> &Shallow {
         &self.fine
     }
 
-    /// The liquid of the cells of twice the size; those that are near are walls.
+    /// The liquid of the cells of twice the size; where they are near it has no columns.
     pub fn coarse(&self) -> &Shallow {
         &self.coarse
     }
@@ -115,6 +116,7 @@ impl Detail {
         let mut momentum = std::mem::take(&mut self.momentum);
         momentum.begin(self, &self.near, shift::changed(&self.near, &near));
         let old = std::mem::replace(&mut self.near, near);
+        [self.fine.apart, self.coarse.apart] = Ground::apart(&self.near).map(Some);
         self.convert(&old)?;
         self.seam.find(&self.fine, &self.coarse, &self.near);
         momentum.end(self);

@@ -241,7 +241,8 @@ impl Seam {
             let fall = bases[i] + depth[0] - eta - (pipe.side * rise) / 8 + tilt;
             let depth = depth.map(|depth| depth as f32);
             let light = if K::VISCOUS && !K::WHOLE { fast::light(step, depth, pipe.flux) } else { 1.0 };
-            pipe.flux = flux_of::<K>(step, fall, depth, pipe.flux, pipe.open, light);
+            let flux = flux_of::<K>(step, fall, depth, pipe.flux, pipe.open, light);
+            pipe.flux = step.rested::<K>(fall, depth, flux);
             [pipe.transfer, pipe.left] = split(pipe.flux, pipe.left);
             if pipe.transfer != 0.0 {
                 any = true;

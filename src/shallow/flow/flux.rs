@@ -105,7 +105,7 @@ pub fn flux_of<K: Kind>(step: &Step, fall: i32, depth: [f32; 2], flux: f32, open
     let section = if K::WHOLE { step.section } else { lesser(0.5 * (depth[0] + depth[1]), step.section) };
     let driven = kept + drive * section;
     let giver = if driven > 0.0 { depth[0] } else { depth[1] };
-    let f = if K::VISCOUS {
+    if K::VISCOUS {
         let square = giver * giver;
         let drag = light * if K::THINS { step.drag * step.thinned(flux, square) } else { step.drag };
         let open = square * open;
@@ -113,14 +113,19 @@ pub fn flux_of<K: Kind>(step: &Step, fall: i32, depth: [f32; 2], flux: f32, open
     } else {
         // Nothing is held back, but a dry column gives nothing, and a closed pipe lets nothing pass.
         if giver * open > 0.0 { driven } else { 0.0 }
-    };
-    // Where the surface is level but for less than can be seen, what is slow comes to rest: all of it, so that it can sleep.
-    let moves = (fall.abs() > step.level) | (f.abs() > step.slow * section);
-    // A zero has one sign.
-    if moves { f + 0.0 } else { 0.0 }
+    }
 }
 
 impl Step {
+    /// A flux, or none, where the surface is level but for less than can be seen and it is slow: all of it comes to rest, so that it can sleep.
+    #[inline(always)]
+    pub fn rested<K: Kind>(&self, fall: i32, depth: [f32; 2], flux: f32) -> f32 {
+        let section = if K::WHOLE { self.section } else { lesser(0.5 * (depth[0] + depth[1]), self.section) };
+        let moves = (fall.abs() > self.level) | (flux.abs() > self.slow * section);
+        // A zero has one sign.
+        if moves { flux + 0.0 } else { 0.0 }
+    }
+
     /// The flux of a pipe whose inertia counts `light` times less: where that is over 1, it moves so much of the giver's depth at most. Marks
     /// where it would be more.
     #[inline(always)]
@@ -191,9 +196,14 @@ pub struct Carried<'a> {
     pub transfer: [&'a mut [f32]; 2],
 }
 
-/// Computes the fluxes of a span's pipes, and what these are to transfer; whether one of a fast film was held back.
+/// Computes the fluxes of a span's pipes, and what these are to transfer; whether one of a fast film was held back. What is slow comes to rest, if it
+/// may.
 #[inline(always)]
-pub fn flux_row<K: Kind, const LIGHT: bool>(step: &Step, row: &Row, carried: Carried) -> bool {
+pub fn flux_row<K: Kind, const LIGHT: bool, const RESTS: bool>(
+    step: &Step,
+    row: &Row,
+    carried: Carried,
+) -> bool {
     let mut held = [0; STRIP];
     let Carried { flux: [east, south], left: [left_east, left_south], transfer: [to_east, to_south] } =
         carried;
@@ -210,7 +220,7 @@ pub fn flux_row<K: Kind, const LIGHT: bool>(step: &Step, row: &Row, carried: Car
         };
         let (flux, left, to) =
             (strip_mut(east, strip), strip_mut(left_east, strip), strip_mut(to_east, strip));
-        flux_strip::<K, LIGHT, 0>(step, &ends, flux, left, to, &mut held);
+        flux_strip::<K, LIGHT, RESTS, 0>(step, &ends, flux, left, to, &mut held);
         let ends = Ends {
             base: [base, strip_of(row.south_base, strip)],
             depth: [depth, strip_of(row.south_depth, strip)],
@@ -219,7 +229,7 @@ pub fn flux_row<K: Kind, const LIGHT: bool>(step: &Step, row: &Row, carried: Car
         };
         let (flux, left, to) =
             (strip_mut(south, strip), strip_mut(left_south, strip), strip_mut(to_south, strip));
-        flux_strip::<K, LIGHT, 1>(step, &ends, flux, left, to, &mut held);
+        flux_strip::<K, LIGHT, RESTS, 1>(step, &ends, flux, left, to, &mut held);
     }
     LIGHT && held != [0; STRIP]
 }
@@ -279,7 +289,7 @@ struct Ends<'a> {
 /// Fluxes of a strip's pipes to the east or to the south. Of a fixed length, and with each array that changes an argument of its own, so that a row of
 /// few strips is neither begun with tests whether arrays overlap nor ended column by column.
 #[inline(always)]
-fn flux_strip<K: Kind, const LIGHT: bool, const AXIS: usize>(
+fn flux_strip<K: Kind, const LIGHT: bool, const RESTS: bool, const AXIS: usize>(
     step: &Step,
     ends: &Ends,
     flux: &mut [f32; STRIP],
@@ -293,6 +303,9 @@ fn flux_strip<K: Kind, const LIGHT: bool, const AXIS: usize>(
         let depth = [depth[0][x] as f32, depth[1][x] as f32];
         let light = if LIGHT { unpacked(light[x])[AXIS] } else { 1.0 };
         let mut f = flux_of::<K>(step, fall, depth, flux[x], open[x], light);
+        if RESTS {
+            f = step.rested::<K>(fall, depth, f);
+        }
         if LIGHT {
             f = step.held_back(light, depth, f, &mut held[x]);
         }

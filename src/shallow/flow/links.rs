@@ -110,7 +110,7 @@ impl LinkPart<'_> {
                 let depth = [own as f32, beyond as f32];
                 let light =
                     if K::VISCOUS && !K::WHOLE { fast::light(step, depth, self.flux[at]) } else { 1.0 };
-                flux_of::<K>(step, fall, depth, self.flux[at], open, light)
+                step.rested::<K>(fall, depth, flux_of::<K>(step, fall, depth, self.flux[at], open, light))
             };
             self.flux[at] = f;
             let [transfer, left] = split(f, self.left[at]);
@@ -122,7 +122,8 @@ impl LinkPart<'_> {
     fn drive_back<K: Kind>(&mut self, step: &Step, at: usize, fall: i32, depth: i32, open: f32) {
         let (flux, depth) = (-self.flux[at], [depth as f32, 0.0]);
         let light = if K::VISCOUS && !K::WHOLE { fast::light(step, depth, flux) } else { 1.0 };
-        self.flux[at] = 0.0 - flux_of::<K>(step, fall, depth, flux, open, light);
+        let flux = flux_of::<K>(step, fall, depth, flux, open, light);
+        self.flux[at] = 0.0 - step.rested::<K>(fall, depth, flux);
         let [transfer, left] = split(self.flux[at], self.left[at]);
         (self.transfer[at], self.left[at]) = (transfer.clamp(-MOST, MOST), left);
     }

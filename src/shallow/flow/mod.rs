@@ -68,6 +68,8 @@ pub struct Flow {
     pub(super) amounts: Amounts,
     /// Whether nothing sleeps, for comparison.
     is_sleepless: bool,
+    /// Whether enough of it is so quiet, in this frame, that it may come to rest.
+    is_quiet: bool,
 }
 
 /// What a restored state replaces.
@@ -125,6 +127,7 @@ impl Flow {
             walls: Walls::default(),
             amounts: Amounts::none(),
             is_sleepless: false,
+            is_quiet: false,
         }
     }
 
@@ -281,12 +284,15 @@ impl Flow {
             }
             self.network.dry(dry);
         });
-        if self.is_sleepless || self.amounts.has_laws() || bounds.drags {
-            return;
-        }
         let Self { depth, links, network, active, .. } = self;
         let numbers = [&**east, south, left_east, left_south];
-        active.fall_asleep(&Still { columns, pipes, depth, numbers, links, heads: network.over(), bounds });
+        let still = Still { columns, pipes, depth, numbers, links, heads: network.over(), bounds };
+        self.is_quiet = !bounds.drags && still.is_quiet(active.active());
+        if !self.is_quiet {
+            active.rouse_sleepers();
+        } else if !self.is_sleepless && !self.amounts.has_laws() {
+            active.fall_asleep(&still);
+        }
     }
 
     /// Wakes all that sleeps: something has changed that is not liquid.
@@ -361,6 +367,7 @@ impl Flow {
             fast: &self.fast,
             walls: &self.walls,
             lips: &self.lips,
+            may_rest: self.is_quiet,
             may_fill: &[],
             acts: &acts,
         };

@@ -39,6 +39,8 @@ pub struct Ground<'a> {
     pub walls: &'a Walls,
     /// Links that liquid falls freely from.
     pub lips: &'a Lips,
+    /// Whether what is slow may come to rest.
+    pub may_rest: bool,
     /// Rows with columns that may fill up.
     pub may_fill: &'a [bool],
     /// What the laws of scalars do.
@@ -215,10 +217,13 @@ impl Rows {
                     } else {
                         solved_row::<false>(step, &row, solved, carried);
                     }
-                } else if K::VISCOUS && !K::WHOLE && is_fast {
-                    is_held |= flux_row::<K, true>(step, &row, carried);
                 } else {
-                    flux_row::<K, false>(step, &row, carried);
+                    is_held |= match (K::VISCOUS && !K::WHOLE && is_fast, ground.may_rest) {
+                        (true, true) => flux_row::<K, true, true>(step, &row, carried),
+                        (true, false) => flux_row::<K, true, false>(step, &row, carried),
+                        (false, true) => flux_row::<K, false, true>(step, &row, carried),
+                        (false, false) => flux_row::<K, false, false>(step, &row, carried),
+                    };
                 }
             }
         }

@@ -4,7 +4,7 @@
 
 use std::ops::Range;
 
-use super::cliffs::{Cliffs, beside};
+use super::cliffs::beside;
 use super::rules::Rules;
 use super::slopes::{self, Rises};
 use crate::shallow::columns::{Columns, NONE, STRIP, strip_of};
@@ -61,25 +61,25 @@ impl Finder {
     pub fn find(
         &mut self,
         columns: &Columns,
-        rules: Rules,
+        rules: &Rules,
         rows: Range<usize>,
         [east, south]: [&mut [f32]; 2],
         links: &mut Links,
     ) {
-        let (count, Rules { border, cliffs, steepest }) = (columns.grid.size[1], rules);
+        let (count, Rules { cliffs, steepest, .. }) = (columns.grid.size[1], rules);
         for row in rows.start.saturating_sub(1)..(rows.start + 1).min(count) {
             self.stacks[row % 3].find_row(columns, row);
         }
-        self.rises[rows.start % 2].find(columns, rows.start, steepest);
+        self.rises[rows.start % 2].find(columns, rows.start, *steepest);
         for row in rows {
             if row + 1 < count {
                 self.stacks[(row + 1) % 3].find_row(columns, row + 1);
-                self.rises[(row + 1) % 2].find(columns, row + 1, steepest);
+                self.rises[(row + 1) % 2].find(columns, row + 1, *steepest);
             }
             let rises = [&self.rises[row % 2], &self.rises[(row + 1) % 2]];
             slopes::open_row(columns, row, rises, east, south);
             cliffs.close(columns, row, east, south);
-            Joiner::new(self, columns, row, border, cliffs).join_row(links);
+            Joiner::new(self, columns, row, rules).join_row(links);
             links.rows.push(links.len() as u32);
         }
     }
@@ -89,8 +89,7 @@ impl Finder {
 struct Joiner<'a> {
     columns: &'a Columns,
     row: usize,
-    border: Border,
-    cliffs: Cliffs,
+    rules: &'a Rules,
     /// Of the row and the next one.
     rises: [&'a Rises; 2],
     own: &'a Stacks,
@@ -103,14 +102,13 @@ struct Joiner<'a> {
 }
 
 impl<'a> Joiner<'a> {
-    fn new(finder: &'a Finder, columns: &'a Columns, row: usize, border: Border, cliffs: Cliffs) -> Self {
+    fn new(finder: &'a Finder, columns: &'a Columns, row: usize, rules: &'a Rules) -> Self {
         let count = columns.grid.size[1];
         let strips = columns.row(row);
         Self {
             columns,
             row,
-            border,
-            cliffs,
+            rules,
             rises: [&finder.rises[row % 2], &finder.rises[(row + 1) % 2]],
             own: &finder.stacks[row % 3],
             north: (row > 0).then(|| &finder.stacks[(row + 2) % 3]),
@@ -122,7 +120,7 @@ impl<'a> Joiner<'a> {
 
     fn join_row(&self, links: &mut Links) {
         let nx = self.columns.grid.size[0];
-        let is_outer = self.border != Border::Closed && (self.north.is_none() || self.south.is_none());
+        let is_outer = self.rules.border != Border::Closed && (self.north.is_none() || self.south.is_none());
         let is_grounded =
             [Some(self.own), self.north, self.south].into_iter().flatten().all(|stacks| stacks.is_grounded);
         for block in 0..nx.div_ceil(STRIP) {
@@ -130,7 +128,7 @@ impl<'a> Joiner<'a> {
             if !is_grounded {
                 cells |= self.over_void(block);
             }
-            if self.border != Border::Closed {
+            if self.rules.border != Border::Closed {
                 cells |= if is_outer { u16::MAX } else { 0 };
                 cells |= u16::from(block == 0);
                 cells |= if block == (nx - 1) / STRIP { 1 << ((nx - 1) % STRIP) } else { 0 };
@@ -181,7 +179,8 @@ impl<'a> Joiner<'a> {
     /// Bits of the cells of a block with columns beside a cliff to the east or south.
     fn over_cliffs(&self, block: usize) -> u16 {
         let all = self.own.of(block).iter().flat_map(|&strip| {
-            [Side::East, Side::South].map(|side| self.cliffs.of_strip(self.columns, strip as usize, side))
+            [Side::East, Side::South]
+                .map(|side| self.rules.cliffs.of_strip(self.columns, strip as usize, side))
         });
         all.fold(0, |cells, more| cells | more)
     }
@@ -214,7 +213,7 @@ impl<'a> Joiner<'a> {
                 let at = [block * STRIP + place, self.row];
                 let falls = Side::ALL.into_iter().any(|side| {
                     let cell = side.cell(at, [nx, self.columns.grid.size[1]]);
-                    cell.is_some_and(|[x, _]| self.is_void(side, x, *base))
+                    cell.is_some_and(|cell| self.is_void(side, cell, *base))
                 });
                 cells |= u16::from(falls) << place;
             }
@@ -231,9 +230,10 @@ impl<'a> Joiner<'a> {
         }
     }
 
-    /// Whether the cell at x beyond a side has no ground at a height, or it hangs over it.
-    fn is_void(&self, side: Side, x: usize, height: i32) -> bool {
-        self.beyond(side).is_some_and(|stacks| !stacks.is_grounded && height < stacks.sills[x])
+    /// Whether a cell beyond a side has no ground at a height, or it hangs over it.
+    fn is_void(&self, side: Side, cell: [usize; 2], height: i32) -> bool {
+        self.beyond(side).is_some_and(|stacks| !stacks.is_grounded && height < stacks.sills[cell[0]])
+            && !self.rules.apart.as_ref().is_some_and(|apart| apart.has(cell))
     }
 
     /// Adds the links of a column over a side: those to columns of other layers or over cliffs, which the cell to the west or north owns, and
@@ -245,15 +245,15 @@ impl<'a> Joiner<'a> {
         let beyond = self.beyond(side);
         if let (Some([x, _]), Some(stacks)) = (cell.filter(|_| is_owner), beyond) {
             for (other, j) in stacks.columns(columns, x).enumerate() {
-                if columns.overlap(i, j) && (other != layer || self.cliffs.has(columns, i, j)) {
+                if columns.overlap(i, j) && (other != layer || self.rules.cliffs.has(columns, i, j)) {
                     let along = 4 * (i64::from(columns.bases()[j]) - i64::from(columns.bases()[i]));
                     let across = self.across(i, side) + self.across(j, side);
                     links.add(i, j as u32, side, self.open(along, across), 0);
                 }
             }
         }
-        let falls = cell.is_some_and(|[x, _]| self.is_void(side, x, columns.bases()[i]));
-        if falls || (cell.is_none() && self.border != Border::Closed) {
+        let falls = cell.is_some_and(|cell| self.is_void(side, cell, columns.bases()[i]));
+        if falls || (cell.is_none() && self.rules.border != Border::Closed) {
             let base = i64::from(columns.bases()[i]);
             let fall = if falls {
                 (columns.grid.cell / columns.heights.unit).min(f64::from(i32::MAX / 2)) as i64

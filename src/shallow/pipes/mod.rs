@@ -77,7 +77,7 @@ impl Pipes {
             links: Links { rows: vec![0], ..Links::default() },
         };
         let (rows, open) = (0..columns.grid.size[1], [&mut pipes.east[..], &mut pipes.south[..]]);
-        Finder::default().find(columns, rules, rows, open, &mut pipes.links);
+        Finder::default().find(columns, &rules, rows, open, &mut pipes.links);
         pipes.links.list_columns(columns, &mut Ends::default());
         pipes
     }

@@ -1,5 +1,7 @@
 //! What pipes follow from besides the columns.
 
+use std::ops::Range;
+
 use super::Border;
 use super::cliffs::Cliffs;
 use crate::shallow::columns::Columns;
@@ -7,27 +9,44 @@ use crate::shallow::falls::Falls;
 use crate::shallow::params::{Friction, Params};
 
 /// What pipes follow from besides the columns.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, PartialEq, Eq)]
 pub(in crate::shallow) struct Rules {
     pub border: Border,
     pub cliffs: Cliffs,
     /// Ground that rises by more than so many units over a cell, on one side of a column only, is a wall and no slope.
     pub steepest: i32,
+    pub apart: Option<Apart>,
+}
+
+/// Cells that are another liquid's. Without columns, they are no void but a wall.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub(in crate::shallow) struct Apart {
+    /// A box of cells: ranges of x and of z.
+    pub cells: [Range<usize>; 2],
+    /// Whether it is those in the box; else it is all others.
+    pub is_inside: bool,
+}
+
+impl Apart {
+    /// Whether a cell (x, z) is one of them.
+    pub fn has(&self, [x, z]: [usize; 2]) -> bool {
+        (self.cells[0].contains(&x) && self.cells[1].contains(&z)) == self.is_inside
+    }
 }
 
 impl Rules {
     /// Of a liquid.
-    pub fn of(params: &Params, columns: &Columns) -> Self {
+    pub fn of(params: &Params, columns: &Columns, apart: Option<&Apart>) -> Self {
         let steepest = match params.friction {
             Friction::Ground => i32::MAX,
             Friction::Walls => (columns.grid.cell / columns.heights.unit).min(f64::from(i32::MAX)) as i32,
         };
         let cliffs = Falls::cliffs(params.falls.as_ref(), columns);
-        Self { border: params.border, cliffs, steepest }
+        Self { border: params.border, cliffs, steepest, apart: apart.cloned() }
     }
 
     /// With neither cliffs nor walls.
     pub fn bordered(border: Border) -> Self {
-        Self { border, cliffs: Cliffs::NONE, steepest: i32::MAX }
+        Self { border, cliffs: Cliffs::NONE, steepest: i32::MAX, apart: None }
     }
 }

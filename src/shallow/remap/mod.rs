@@ -154,7 +154,8 @@ impl Shallow {
 
     fn rebuild_over_bodies(&mut self) -> Moved {
         let mut ground = std::mem::take(&mut self.remap.ground);
-        ground.unite(&self.columns.grid, &self.columns.heights, self.remap.dirty.iter());
+        let apart = |cell| self.apart.as_ref().is_some_and(|apart| apart.has(cell));
+        ground.unite(&self.columns.grid, &self.columns.heights, self.remap.dirty.iter(), apart);
         let moved = self.rebuild(|rank| ground.united(rank));
         self.remap.ground = ground;
         moved
@@ -214,11 +215,11 @@ impl Shallow {
 
     /// Finds the pipes of rows anew, and what they carry; whether the links join the columns that they did.
     fn join(&mut self, rows: Range<usize>) -> bool {
-        let Self { columns, pipes, flow, remap, params, falls, .. } = self;
+        let Self { columns, pipes, flow, remap, params, falls, apart, .. } = self;
         let Remap { band, origins, carry, finder, ends, links, .. } = remap;
         links.clear();
-        let rules = Rules::of(params, columns);
-        finder.find(columns, rules, rows.clone(), [&mut pipes.east, &mut pipes.south], links);
+        let rules = Rules::of(params, columns, apart.as_ref());
+        finder.find(columns, &rules, rows.clone(), [&mut pipes.east, &mut pipes.south], links);
         let change = Change { columns, band, origins };
         carry.links(&change, flow, links);
         carry.regular(&change, pipes, flow);

@@ -109,8 +109,14 @@ impl Ground {
         std::mem::swap(own, spare);
     }
 
-    /// Unites the solids of some cells (x, z), row by row along x, with those of the shapes.
-    pub fn unite(&mut self, grid: &Grid, heights: &Heights, cells: impl Iterator<Item = [usize; 2]>) {
+    /// Unites the solids of some cells (x, z), row by row along x, with those of the shapes, but in cells that are `apart`.
+    pub fn unite(
+        &mut self,
+        grid: &Grid,
+        heights: &Heights,
+        cells: impl Iterator<Item = [usize; 2]>,
+        apart: impl Fn([usize; 2]) -> bool,
+    ) {
         let mut last = None;
         self.united.clear();
         for [x, z] in cells {
@@ -128,7 +134,9 @@ impl Ground {
             self.cell.clear();
             let over = self.near.iter().filter(|(_, across)| across.contains(&x));
             let solid = |(index, _): &(usize, _)| self.bodies[*index].solid(grid.centre([x, z]), heights);
-            self.cell.extend(over.filter_map(solid));
+            if !apart([x, z]) {
+                self.cell.extend(over.filter_map(solid));
+            }
             if self.cell.is_empty() {
                 self.united.solids.extend_from_slice(own);
             } else {
@@ -191,7 +199,7 @@ mod tests {
         ground.set_bodies(&GRID, &[ball(1000.0)], |cells| boxes.push(cells));
         assert_eq!(boxes.len(), 1);
         let all = || (0..30).map(|cell| [cell % 6, cell / 6]);
-        ground.unite(&GRID, &heights, all());
+        ground.unite(&GRID, &heights, all(), |_| false);
         assert_eq!(ground.united(14), [[BOTTOMLESS, 14], [999, 1001]]);
         assert_eq!(ground.united(15), [[BOTTOMLESS, 15], [999, 2000]], "it touches the bridge");
         assert_eq!(ground.united(17), [[BOTTOMLESS, 17]]);
@@ -199,7 +207,7 @@ mod tests {
         assert_eq!(boxes.len(), 2, "the first stays");
         ground.set_bodies(&GRID, &[], |cells| boxes.push(cells));
         assert_eq!(boxes.len(), 4);
-        ground.unite(&GRID, &heights, all());
+        ground.unite(&GRID, &heights, all(), |_| false);
         assert!((0..30).all(|cell| ground.united(cell) == ground.own.cell(cell)));
     }
 }
