@@ -48,7 +48,7 @@ fn pool(has_stream: bool) -> Shallow {
         z if z < wall => 0.02,
         _ => 0.003 - 0.05 * x,
     });
-    let mut liquid = covered(&context(), &solids, Params::default(), |[x, z], _| {
+    let mut liquid = covered(&context(), &solids, Params { rest: 1e-6, ..Params::default() }, |[x, z], _| {
         let depth = 1e-3 + 3e-4 * waves([2.0 * z, 2.0 * x], CELL);
         if !has_stream || z < wall - 2.0 * CELL { depth } else { 0.0 }
     });

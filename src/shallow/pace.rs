@@ -129,10 +129,9 @@ fn tilt(params: &Params, measures: &Measures) -> [i32; 2] {
     [x, z].map(|along| (along / -y * measures.cell / measures.unit).round().clamp(-1e9, 1e9) as i32)
 }
 
-/// What rests in all steps, after one of `last` (s).
-pub fn bounds(params: &Params, measures: &Measures, last: f64) -> Bounds {
+/// What rests in all steps.
+pub fn bounds(params: &Params, measures: &Measures) -> Bounds {
     Bounds {
-        slow: slow(params, measures, last) as f32,
         level: level(params, measures),
         tilt: tilt(params, measures),
         still: measures.still,

@@ -336,11 +336,7 @@ impl Shallow {
     /// Begins a frame; returns how often its steps are halved, for fast films.
     pub(super) fn begin(&mut self, dt: f64, measures: &Measures, next: impl Fn(&Next) -> Option<f64>) -> u32 {
         self.steps.clear();
-        self.flow.begin_frame(
-            &self.columns,
-            &self.pipes,
-            pace::bounds(&self.params, measures, self.flow.last),
-        );
+        self.flow.begin_frame(&self.columns, &self.pipes, pace::bounds(&self.params, measures));
         self.release();
         self.find_fast(dt, measures, next)
     }

@@ -296,13 +296,6 @@ impl Active {
         (0..self.stale.len()).for_each(|row| self.make_stale(row));
     }
 
-    /// As [`Active::rouse_all`], if anything may sleep.
-    pub fn rouse_sleepers(&mut self) {
-        if std::mem::take(&mut self.any_asleep) {
-            self.rouse_all();
-        }
-    }
-
     fn rouse(&mut self, columns: &Columns, strip: usize) {
         if std::mem::take(&mut self.asleep[strip]) {
             self.make_stale(columns.strips()[strip].row as usize);

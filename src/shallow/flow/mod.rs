@@ -68,8 +68,6 @@ pub struct Flow {
     pub(super) amounts: Amounts,
     /// Whether nothing sleeps, for comparison.
     is_sleepless: bool,
-    /// Whether enough of it is so quiet, in this frame, that it may come to rest.
-    is_quiet: bool,
 }
 
 /// What a restored state replaces.
@@ -127,7 +125,6 @@ impl Flow {
             walls: Walls::default(),
             amounts: Amounts::none(),
             is_sleepless: false,
-            is_quiet: false,
         }
     }
 
@@ -287,10 +284,7 @@ impl Flow {
         let Self { depth, links, network, active, .. } = self;
         let numbers = [&**east, south, left_east, left_south];
         let still = Still { columns, pipes, depth, numbers, links, heads: network.over(), bounds };
-        self.is_quiet = !bounds.drags && still.is_quiet(active.active());
-        if !self.is_quiet {
-            active.rouse_sleepers();
-        } else if !self.is_sleepless && !self.amounts.has_laws() {
+        if !self.is_sleepless && !self.amounts.has_laws() && !bounds.drags {
             active.fall_asleep(&still);
         }
     }
@@ -367,7 +361,7 @@ impl Flow {
             fast: &self.fast,
             walls: &self.walls,
             lips: &self.lips,
-            may_rest: self.is_quiet,
+            may_rest: step.level > 0,
             may_fill: &[],
             acts: &acts,
         };

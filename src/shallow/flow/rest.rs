@@ -5,11 +5,9 @@
 //! neighbours own among them, and sleeps when its neighbours rest, too (`active.rs`). A step would leave it as it is, to the bit: so nothing depends on
 //! what sleeps, and strips of 16 cells along x are as good as any others.
 
-use super::active::runs;
 use super::links::{LinkFlow, beyond};
 use super::network::full_of;
-use crate::base::cpu::dispatch;
-use crate::shallow::columns::{Columns, NONE, STRIP, strip_from, strip_of};
+use crate::shallow::columns::{Columns, NONE, STRIP, strip_of};
 use crate::shallow::pipes::{Links, Pipes};
 
 /// A liquid in which what rests is found.
@@ -40,58 +38,11 @@ pub struct Bounds {
     pub tilt: [i32; 2],
     /// Surface of the liquid at rest beyond the border (units), or BOTTOMLESS: there is none.
     pub still: i32,
-    /// Flux of the last step, over the depth in its section, that is slow.
-    pub slow: f32,
     /// Whether what flows drags along what is beside it: then nothing sleeps.
     pub drags: bool,
 }
 
-/// What is slow may come to rest from so many pipes on that are slow and level, and one more for so many columns of the domain. Where all moves there are fewer,
-/// by chance or by symmetry, and the test whether a pipe rests would take as long as a third of a step.
-const ENOUGH: usize = 64;
-const COLUMNS: usize = 32;
-
 impl Still<'_> {
-    /// Whether enough is quiet that it may come to rest. It is counted over all of the liquid, so that it depends neither on rows nor on what sleeps.
-    pub fn is_quiet(&self, active: &[bool]) -> bool {
-        let still = *self;
-        self.bounds.level > 0 && dispatch!(is_quiet(still: Still<'_>, active: &[bool]) -> bool)
-    }
-
-    /// Counts the pipes of a strip that are slow, level and wet.
-    #[inline(always)]
-    fn quiet(&self, strip: usize) -> i32 {
-        let Self { columns, pipes, depth, numbers: [east, south, ..], .. } = *self;
-        let ends = |first: usize| [columns.bases(), depth].map(|numbers| strip_from(numbers, first));
-        let own = ends(strip * STRIP);
-        let mut count =
-            self.slow([own, ends(strip * STRIP + 1)], [&pipes.east, east].map(|of| strip_of(of, strip)), 0);
-        let beyond = columns.south(strip);
-        if beyond != NONE {
-            let ends = [own, ends(beyond as usize * STRIP)];
-            count += self.slow(ends, [&pipes.south, south].map(|of| strip_of(of, strip)), 1);
-        }
-        count
-    }
-
-    #[inline(always)]
-    fn slow(
-        &self,
-        [[base, depth], [other_base, other_depth]]: [[&[i32; STRIP]; 2]; 2],
-        [open, flux]: [&[f32; STRIP]; 2],
-        axis: usize,
-    ) -> i32 {
-        let Bounds { level, slow, tilt, .. } = self.bounds;
-        let mut count = 0;
-        for x in 0..STRIP {
-            let fall = base[x] + depth[x] - (other_base[x] + other_depth[x]) + tilt[axis];
-            let section = 0.5 * (depth[x] as f32 + other_depth[x] as f32);
-            let is_level = (fall.abs() <= level) & (open[x] > 0.0);
-            count += i32::from(is_level & (section > 0.0) & (flux[x].abs() <= slow * section));
-        }
-        count
-    }
-
     /// Whether the columns of a strip rest, with all their pipes but for links.
     pub fn rests(&self, strip: usize) -> bool {
         let [east, south, left_east, left_south] = self.numbers.map(|numbers| strip_of(numbers, strip));
@@ -153,15 +104,6 @@ impl Still<'_> {
         let giver = if fall > 0 { self.depth[i] } else { taker };
         links.open[link] == 0.0 || fall.saturating_abs() <= self.bounds.level || giver == 0 && !is_still
     }
-}
-
-#[inline(always)]
-fn is_quiet(still: Still<'_>, active: &[bool]) -> bool {
-    let (mut count, enough) = (0, (ENOUGH + still.columns.count() / COLUMNS) as i32);
-    runs(active).flatten().any(|strip| {
-        count += still.quiet(strip);
-        count >= enough
-    })
 }
 
 /// Whether a number is not 0; a step would change -0 into 0.

@@ -15,8 +15,9 @@ const FRAME: f64 = 1.0 / 60.0;
 fn pool(ctx: &Context, frames: usize) -> Shallow {
     let cell = 0.001;
     let solids = ground([90, 70], cell, [-0.01, 0.1], |at| 3e-4 * waves(at, cell));
-    let mut pool =
-        covered(ctx, &solids, Params::default(), |[x, z], _| 2e-3 + 4e-4 * waves([2.0 * z, 2.0 * x], cell));
+    let mut pool = covered(ctx, &solids, Params { rest: 1e-6, ..Params::default() }, |[x, z], _| {
+        2e-3 + 4e-4 * waves([2.0 * z, 2.0 * x], cell)
+    });
     for _ in 0..frames {
         pool.step(ctx, FRAME).unwrap();
     }
@@ -86,7 +87,7 @@ fn whatever_happens_to_it_wakes_a_pool() {
         }),
         ("gravity", |pool| {
             let gravity = [0.02, -9.81, 0.0];
-            pool.set_params(Params { gravity, ..Params::default() }).unwrap();
+            pool.set_params(Params { gravity, rest: 1e-6, ..Params::default() }).unwrap();
         }),
     ];
     for (what, wake) in wakes {
