@@ -179,3 +179,37 @@ fn bumps_of_a_mesh_do_not_show_through_films() {
         assert_eq!(reports[0], reports[1]);
     }
 }
+
+#[test]
+fn liquid_that_thickens_and_that_walls_hold_back_runs_less_far_and_resumes() {
+    let folder = tempfile::tempdir().unwrap();
+    let folder = folder.path();
+    let source = "[[source]]\nat = [-0.03, 0, 0]\nradius = 0.004\nrate_ml = 4\ncarries = { milk = 1 }\n\
+                  [[pour]]\nat = [-0.03, 0, 0]\nradius = 0.006\nvolume_ml = 2\n";
+    let scalars = "[[scalar]]\nname = \"age\"\nlaw = \"ages\"\nrange = 60\n\
+                   [[scalar]]\nname = \"milk\"\nthickens_times = 500\nthickens_to = 0.5\n";
+    write_shot(folder, "border = \"closed\"\nrest = 0\n", &format!("{scalars}{source}"));
+    let wet = |out: &str| report(folder, out, 30)["wet_columns"].as_u64().unwrap();
+    let shot = "shallow spill.toml";
+    works(folder, &format!("{shot} -o thick"));
+    works(folder, &format!("{shot} -o thin --set scalar.2.thickens_times=1"));
+    works(folder, &format!("{shot} -o walls --set shallow.friction=walls"));
+    assert!(wet("thick") + 20 < wet("thin"), "{} and {} columns", wet("thick"), wet("thin"));
+    let last = |out: &str| fs::read(folder.join(out).join("liquid/liquid.0030.ply")).unwrap();
+    assert!(last("walls") != last("thick"));
+    kill_at(folder, &format!("{shot} -o killed"), "killed/liquid/liquid.0014.ply");
+    works(folder, &format!("{shot} -o killed"));
+    are_same(folder, "thick", "killed");
+    // How it thickens and rests may be another from a frame on; where friction acts may not.
+    crate::program::fails(
+        folder,
+        &format!("{shot} -o thick --from 20 --set shallow.friction=walls"),
+        2,
+        &["shallow.friction"],
+    );
+    works(
+        folder,
+        &format!("{shot} -o thick --from 20 --set scalar.2.thickens_times=1 --set shallow.rest=1e-6"),
+    );
+    assert!(last("thick") != last("killed"));
+}
