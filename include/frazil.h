@@ -660,6 +660,31 @@ typedef uint32_t frz_shallow_law;
 #endif // __cplusplus
 
 /**
+ * Where viscosity holds the liquid back.
+ */
+enum frz_shallow_friction
+#if defined(__cplusplus) || __STDC_VERSION__ >= 202311L
+  : uint32_t
+#endif // defined(__cplusplus) || __STDC_VERSION__ >= 202311L
+ {
+    /**
+     * At the ground: right where the liquid is far wider than deep.
+     */
+    FRZ_SHALLOW_GROUND = 0,
+    /**
+     * Also at walls and ceilings, and between liquids that flow beside each other: ducts and channels carry what theory says. It takes longer.
+     */
+    FRZ_SHALLOW_WALLS = 1,
+};
+#ifndef __cplusplus
+#if __STDC_VERSION__ >= 202311L
+typedef enum frz_shallow_friction frz_shallow_friction;
+#else
+typedef uint32_t frz_shallow_friction;
+#endif // __STDC_VERSION__ >= 202311L
+#endif // __cplusplus
+
+/**
  * Arrays of all column indices that frz_shallow_lend lends. A height is frz_shallow_info.low + units x unit.
  */
 enum frz_shallow_lent
