@@ -631,6 +631,31 @@ typedef uint32_t frz_shallow_flow_kind;
 #endif // __cplusplus
 
 /**
+ * Where viscosity holds the liquid back.
+ */
+enum frz_shallow_friction
+#if defined(__cplusplus) || __STDC_VERSION__ >= 202311L
+  : uint32_t
+#endif // defined(__cplusplus) || __STDC_VERSION__ >= 202311L
+ {
+    /**
+     * At the ground: right where the liquid is far wider than deep.
+     */
+    FRZ_SHALLOW_GROUND = 0,
+    /**
+     * Also at walls and ceilings, and between liquids that flow beside each other: ducts and channels carry what theory says. It takes longer.
+     */
+    FRZ_SHALLOW_WALLS = 1,
+};
+#ifndef __cplusplus
+#if __STDC_VERSION__ >= 202311L
+typedef enum frz_shallow_friction frz_shallow_friction;
+#else
+typedef uint32_t frz_shallow_friction;
+#endif // __STDC_VERSION__ >= 202311L
+#endif // __cplusplus
+
+/**
  * What becomes of a scalar but for being carried.
  */
 enum frz_shallow_law
@@ -656,31 +681,6 @@ enum frz_shallow_law
 typedef enum frz_shallow_law frz_shallow_law;
 #else
 typedef uint32_t frz_shallow_law;
-#endif // __STDC_VERSION__ >= 202311L
-#endif // __cplusplus
-
-/**
- * Where viscosity holds the liquid back.
- */
-enum frz_shallow_friction
-#if defined(__cplusplus) || __STDC_VERSION__ >= 202311L
-  : uint32_t
-#endif // defined(__cplusplus) || __STDC_VERSION__ >= 202311L
- {
-    /**
-     * At the ground: right where the liquid is far wider than deep.
-     */
-    FRZ_SHALLOW_GROUND = 0,
-    /**
-     * Also at walls and ceilings, and between liquids that flow beside each other: ducts and channels carry what theory says. It takes longer.
-     */
-    FRZ_SHALLOW_WALLS = 1,
-};
-#ifndef __cplusplus
-#if __STDC_VERSION__ >= 202311L
-typedef enum frz_shallow_friction frz_shallow_friction;
-#else
-typedef uint32_t frz_shallow_friction;
 #endif // __STDC_VERSION__ >= 202311L
 #endif // __cplusplus
 
