@@ -9,7 +9,7 @@ import threading
 
 import numpy as np
 
-ABI_VERSION = 0x10007
+ABI_VERSION = 0x10008
 
 OK, CANCELLED = 0, 5
 

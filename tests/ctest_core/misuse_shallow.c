@@ -109,7 +109,7 @@ static frz_shallow_params some_params(void) {
     if (wild(4)) *fields[any() % 8] = number();
     if (chance(2)) params.gravity[0] = is_tame ? 3 : place() * 30;
     params.pace = wild(12) ? any() : any() % 2, params.border = wild(4) ? any() % 4 : 1;
-    params.section = wild(12) ? any() : any() % 2, params.friction = wild(12) ? any() : 0;
+    params.section = wild(12) ? any() : any() % 2, params.friction = wild(4) ? any() % 3 : 0;
     params.rest = wild(12) ? number() : 1e-6, params.thickening_scalar = wild(30) ? any() % 4 : FRZ_SHALLOW_NO_SCALAR;
     if (wild(30)) params.flags = any();
     params.struct_size = size_near(sizeof params);
