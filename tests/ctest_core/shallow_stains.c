@@ -35,13 +35,15 @@ static void loads(frz_context *ctx) {
     frz_shallow_body bodies[2];
     frz_shallow_load load[2], other[2], wide[2];
     frz_shallow_balance balance;
-    int axis;
+    int axis, frame;
     level_make(&level);
     shallow = on_sheet(ctx, &params, &level);
     WORKS(frz_shallow_fill(shallow, 0.08));
     WORKS(frz_shallow_loads(shallow, water, view_of(NULL, 0), NULL, 0));
     bodies[0] = ball_of(0.04, 0.02), bodies[1] = ball_of(0.15, 0.01);
     WORKS(frz_shallow_set_bodies(ctx, shallow, bodies, 2, NULL));
+    /* Until what the ball pushed up is level. */
+    for (frame = 0; frame < 240; ++frame) WORKS(frz_shallow_step(ctx, shallow, 1.0 / 60, 0, NULL));
     balance = balance_of(shallow);
     CHECK(balance.error == 0);
     load[0].struct_size = load[1].struct_size = sizeof *load;
@@ -49,9 +51,9 @@ static void loads(frz_context *ctx) {
     CHECK(load[0].struct_size == sizeof *load);
     /* 4/3 pi r^3, to what cells a quarter of the radius leave of it. */
     CHECK(fabs(load[0].displaced - 3.35e-5) < 0.05 * 3.35e-5);
-    CHECK(fabs(load[0].pressure[1] - 9.81 * water * load[0].displaced) < 0.01 * load[0].pressure[1]);
+    CHECK(fabs(load[0].pressure[1] - 9.81 * water * load[0].displaced) < 0.005 * load[0].pressure[1]);
     CHECK(load[0].wetted > 0 && load[1].displaced == 0 && load[1].wetted == 0);
-    for (axis = 0; axis < 3; ++axis) CHECK(load[1].pressure[axis] == 0 && load[0].drag[axis] == 0);
+    for (axis = 0; axis < 3; ++axis) CHECK(load[1].pressure[axis] == 0 && load[1].drag[axis] == 0);
     memcpy(other, load, sizeof other);
     WORKS(frz_shallow_loads(shallow, water, view_of(moving, 2), other, 2));
     CHECK(other[0].drag[0] < 0 && other[0].pressure[1] == load[0].pressure[1]);
