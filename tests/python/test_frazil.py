@@ -766,8 +766,8 @@ class Shallow(unittest.TestCase):
         blood.set_poured((1,))
         blood.fill(0.02)
         self.assertEqual(blood.loads(), [])
-        middle, radius = 0.5 * (count - 1) * self.CELL, 0.02
-        blood.set_bodies([frazil.Ball((middle, 0.005, middle), radius), frazil.Ball((0, 0.09, 0), 0.001)])
+        middle = 0.5 * (count - 1) * self.CELL
+        blood.set_bodies([frazil.Ball((middle, 0.016, middle), 0.01), frazil.Ball((0, 0.09, 0), 0.001)])
         blood.set_poured((0,))
         stains = frazil.Stains(ctx, blood, positions, triangles, scalar=0, half_life=1.0, capacity=1e-3, rate=1e-4)
         self.assertEqual((stains.stains.max(), stains.absorbed), (0, 0))
