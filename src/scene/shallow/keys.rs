@@ -174,6 +174,17 @@ pub const KEYS: &[Key] = &[
     )
     .or("true")
     .concerns(OUTPUT),
+    Key::new(
+        "shallow",
+        "stains",
+        Kind::Flag,
+        "of a mesh: true: the liquid leaves stains on it, and terrain/terrain.%04d.ply is the terrain (m, Y up) with an array `stain`, 0 to 1, on its vertices",
+    )
+    .or("false")
+    .concerns(FIRST),
+    Key::new("shallow", "stain_half_life", Kind::Number(1.0e-3, 1.0e12, "s"), "time in which half of a stain on dry ground fades (s)")
+        .or("60.0")
+        .concerns(STEP),
     Key::new("shallow", "opaque_depth", Kind::Number(1.0e-6, FAR, "m"), "depth from which the liquid is opaque (m)")
         .or("0.001")
         .with_presets(&[("water", "0.05"), ("paint", "0.0005"), ("honey", "0.02")])
@@ -203,6 +214,14 @@ pub const MANY_KEYS: &[Key] = &[
     Key::new("scalar", "start", Kind::Number(-1.0e9, 1.0e9, ""), "concentration of what stands up to `fill`, and of pours and sources whose `carries` does not name it")
         .or("0.0")
         .concerns(FIRST),
+    Key::new(
+        "scalar",
+        "stains",
+        Kind::Flag,
+        "of one of them, with shallow.stains: true: its concentration over its range stains, and clear liquid washes stains off; without one any liquid stains",
+    )
+    .or("false")
+    .concerns(STEP),
     Key::new(
         "scalar",
         "thickens_times",

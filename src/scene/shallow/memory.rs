@@ -23,6 +23,9 @@ const DROP: u64 = 20_200;
 /// Bytes of a triangle of the terrain: corners and a place, twice while it is read, or while minimum heights are found, and what these need.
 const TRIANGLE: u64 = 110;
 
+/// Bytes of a triangle more where the liquid stains it: stains, and the mesh in up to three steps that wait for the writer.
+const STAINED: u64 = 110;
+
 /// Refuses more cells than the context allows, before they are made.
 ///
 /// # Errors
@@ -37,7 +40,8 @@ pub(super) fn allow_cells(ctx: &Context, grid: &Grid) -> Result<()> {
 pub(super) fn estimate(of: &Shallow, grid: &Grid, columns: u64, triangles: u64) -> u64 {
     let walls = if of.params.friction == Friction::Walls { WALLS } else { 0 };
     let thick = if of.params.thickening.is_some() { THICK } else { 0 };
+    let triangle = TRIANGLE + if of.staining.is_some() { STAINED } else { 0 };
     let column = COLUMN + SCALAR * of.scalars.len() as u64 + walls + thick;
     let drops = DROP * of.params.falls.map_or(0, |falls| falls.most as u64);
-    FIXED + CELL * grid.cells() as u64 + column * columns + TRIANGLE * triangles + drops
+    FIXED + CELL * grid.cells() as u64 + column * columns + triangle * triangles + drops
 }

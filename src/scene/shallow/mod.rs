@@ -43,7 +43,7 @@ use crate::shallow::flows::FlowPoint;
 use crate::shallow::liquid::Liquid;
 use crate::shallow::params::{Friction, Pace, Section};
 use crate::shallow::pipes::Border;
-use crate::shallow::{Params, flows};
+use crate::shallow::{Params, Staining, flows};
 
 /// Cubic metres in a millilitre.
 pub const ML: f64 = 1.0e-6;
@@ -81,6 +81,8 @@ pub struct Shallow {
     pub points: Vec<Point>,
     /// What stands or moves in its way.
     pub obstacles: Vec<Obstacle>,
+    /// How it stains a terrain that is a mesh, which is then written; none: it does not.
+    pub staining: Option<Staining>,
     /// Whether a terrain that is a mesh does not show through films.
     pub lifts: bool,
     /// Depth from which it is opaque (m).
@@ -204,6 +206,11 @@ impl Shallow {
             pours: (0..values.count("pour")).map(|index| Pour::of(values, index)).collect(),
             points: Point::all_of(values),
             obstacles: (0..values.count("object")).filter_map(|index| Obstacle::of(values, index)).collect(),
+            staining: value("stains").and_then(Value::flag).filter(|stains| *stains).map(|_| Staining {
+                scalar: scalars::staining(values),
+                half_life: number("stain_half_life").unwrap_or(60.0),
+                ..Staining::default()
+            }),
             lifts: value("lifts").and_then(Value::flag).unwrap_or(true),
             opaque_depth: number("opaque_depth").unwrap_or(0.01),
             output: Files {

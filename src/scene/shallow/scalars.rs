@@ -50,6 +50,12 @@ pub(super) fn thickening(values: &Values) -> Option<Thickening> {
     })
 }
 
+/// The scalar that stains: the first that does.
+pub(super) fn staining(values: &Values) -> Option<usize> {
+    (0..values.count("scalar"))
+        .find(|index| values.of_many("scalar", *index, "stains").and_then(Value::flag) == Some(true))
+}
+
 /// Concentrations of the scalars in what a pour or a source brings: those that its `carries` names, and the others' own.
 pub(super) fn brought(values: &Values, table: &str, index: usize) -> Vec<f64> {
     let named = values.of_many(table, index, "carries").and_then(Value::named);
@@ -99,6 +105,14 @@ pub(super) fn check(index: usize, table: &Table, values: &Values) -> Result<()> 
     if start.abs() > scalar.range {
         return Err(table.error("start", format!("must lie within -{0} to {0}, its range", scalar.range)));
     }
+    if values.of_many("scalar", index, "stains").and_then(Value::flag) == Some(true) {
+        if values.get("shallow.stains").and_then(Value::flag) != Some(true) {
+            return Err(table.error("stains", "must be false where shallow.stains is"));
+        }
+        if staining(values).is_some_and(|first| first < index) {
+            return Err(table.error("stains", "must be false: another scalar stains"));
+        }
+    }
     check_thickening(index, table, values, scalar.range)
 }
 
@@ -109,10 +123,10 @@ pub(super) fn check(index: usize, table: &Table, values: &Values) -> Result<()> 
 fn check_thickening(index: usize, table: &Table, values: &Values, range: f64) -> Result<()> {
     let number = |name: &str| values.of_many("scalar", index, name).and_then(Value::number);
     if number("thickens_times").is_none() {
-        let alone = ["thickens_from", "thickens_to"].into_iter().find(|name| table.has(name));
-        return alone.map_or(Ok(()), |name| {
-            Err(table.error(name, "is of a scalar that has `thickens_times`: leave it out"))
-        });
+        return match table.has("thickens_to") {
+            true => Err(table.error("thickens_to", "is of a scalar that has `thickens_times`: leave it out")),
+            false => Ok(()),
+        };
     }
     let Some(to) = number("thickens_to") else {
         return Err(table.error("thickens_to", "is missing: a scalar with `thickens_times` has one"));

@@ -199,6 +199,10 @@ fn what_is_wrong_is_one_sentence_and_leaves_nothing_behind() {
     with(&format!("{dye}half_life = 3\n"), &["`half_life`", "leave it out"]);
     with(&format!("{dye}range = 0\n"), &["`range`", "not 0"]);
     with(&format!("{dye}start = 2\n"), &["`start`", "-1 to 1, its range"]);
+    with(&format!("{dye}stains = true\n"), &["`stains` in [[scalar]]", "where shallow.stains is"]);
+    write_scene(folder, &format!("{POUR}{dye}stains = true\n[[scalar]]\nname = \"age\"\nstains = true\n"));
+    refused("--set shallow.stains=true", &["`stains` in [[scalar]]", "another scalar stains"]);
+    refused("--set shallow.stain_half_life=0", &["`stain_half_life`", "0.001 to"]);
     let thick = format!("{dye}thickens_times = 9\n");
     with(&thick, &["`thickens_to` in [[scalar]]", "is missing"]);
     with(&format!("{thick}thickens_to = 0\n"), &["`thickens_to`", "must not be `thickens_from`, 0"]);
