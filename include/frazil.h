@@ -110,6 +110,11 @@
 #endif
 
 /**
+ * No scalar, where one may be named.
+ */
+#define FRZ_SHALLOW_NO_SCALAR 4294967295
+
+/**
  * Flag of a flow point: it lies on a triangle of the mesh that the liquid was made with, and moves with it.
  */
 #define FRZ_SHALLOW_ON_TRIANGLE 1
@@ -626,6 +631,31 @@ typedef uint32_t frz_shallow_flow_kind;
 #endif // __cplusplus
 
 /**
+ * Where viscosity holds the liquid back.
+ */
+enum frz_shallow_friction
+#if defined(__cplusplus) || __STDC_VERSION__ >= 202311L
+  : uint32_t
+#endif // defined(__cplusplus) || __STDC_VERSION__ >= 202311L
+ {
+    /**
+     * At the ground: right where the liquid is far wider than deep.
+     */
+    FRZ_SHALLOW_GROUND = 0,
+    /**
+     * Also at walls and ceilings, and between liquids that flow beside each other: ducts and channels carry what theory says. It takes longer.
+     */
+    FRZ_SHALLOW_WALLS = 1,
+};
+#ifndef __cplusplus
+#if __STDC_VERSION__ >= 202311L
+typedef enum frz_shallow_friction frz_shallow_friction;
+#else
+typedef uint32_t frz_shallow_friction;
+#endif // __STDC_VERSION__ >= 202311L
+#endif // __cplusplus
+
+/**
  * What becomes of a scalar but for being carried.
  */
 enum frz_shallow_law
@@ -1017,8 +1047,8 @@ typedef struct frz_pool frz_pool;
  * A small amount of liquid on a ground: blood, coffee or paint in a fraction of a frame.
  *
  * In real time: what a host calls in each frame keeps to stricter manners than all other calls. These are frz_shallow_step, _replay,
- * _update_terrain, _update_heights, _set_bodies, _save, _restore, _surface, _find_lifts, _drops, _drops_mesh, _read_scalar and _probe, and
- * frz_shallow_snapshot_take, _surface, _drops, _drops_mesh and _probe. With a pool of 0 threads, from their second call on, they allocate nothing, take no lock, log and poll nothing, and make no
+ * _update_terrain, _update_heights, _set_bodies, _loads, _save, _restore, _surface, _find_lifts, _drops, _drops_mesh, _read_scalar and _probe,
+ * frz_shallow_stains_update, _read and _soaked, and frz_shallow_snapshot_take, _surface, _drops, _drops_mesh and _probe. With a pool of 0 threads, from their second call on, they allocate nothing, take no lock, log and poll nothing, and make no
  * system call but that for the thread's clock where a step has a budget. Only where there is more than ever before, more columns because
  * a body uncovers another layer, say, memory grows; so may what fails.
  *
@@ -1033,6 +1063,12 @@ typedef struct frz_shallow frz_shallow;
  * that is taken, and one that is drawn.
  */
 typedef struct frz_shallow_snapshot frz_shallow_snapshot;
+
+/**
+ * Stains on the vertices of a mesh, and what it has absorbed: they go with ground that deforms. The mesh need not be the one that the liquid was made
+ * with, but lies where its ground is.
+ */
+typedef struct frz_shallow_stains frz_shallow_stains;
 
 /**
  * A detailed mesh that follows the particles of a liquid.
@@ -2019,7 +2055,7 @@ typedef struct {
 } frz_tracker_report;
 
 /**
- * What flows, and how. All of it but the border and falls may change between frames.
+ * What flows, and how. All of it but the border, falls and friction may change between frames.
  */
 typedef struct {
     /**
@@ -2098,6 +2134,32 @@ typedef struct {
      * 0.
      */
     uint32_t reserved2;
+    /**
+     * Velocity (m/s) below which liquid whose surface is level comes to rest, and then takes no time, 0 to 0.01; 1e-6 is usual. At 0 only liquid
+     * that was never stirred is at rest.
+     */
+    double rest;
+    /**
+     * A frz_shallow_friction, which cannot change; FRZ_SHALLOW_GROUND is usual.
+     */
+    uint32_t friction;
+    /**
+     * The scalar that viscosity depends on (frz_shallow_set_scalars), counted from 0: of blood that clots its age. It must be there when a frame
+     * begins. FRZ_SHALLOW_NO_SCALAR is usual, and what follows is then not looked at.
+     */
+    uint32_t thickening_scalar;
+    /**
+     * Concentration up to which viscosity is the liquid's own, finite.
+     */
+    double thickening_from;
+    /**
+     * Concentration from which on it is thickening_times that, and linear between them; finite, not thickening_from, and it may be the lesser one.
+     */
+    double thickening_to;
+    /**
+     * 1e-6 to 1e9.
+     */
+    double thickening_times;
 } frz_shallow_params;
 
 /**
@@ -2673,6 +2735,83 @@ typedef struct {
      */
     frz_span indices;
 } frz_shallow_drops_target;
+
+/**
+ * What a liquid does to a body.
+ */
+typedef struct {
+    /**
+     * sizeof(frz_shallow_load), set by the caller, the same in all loads of a call.
+     */
+    uint32_t struct_size;
+    /**
+     * Nothing.
+     */
+    uint32_t reserved;
+    /**
+     * Force (N) of the liquid's weight: buoyancy, and what deeper liquid on one side does.
+     */
+    double pressure[3];
+    /**
+     * Force (N) of its motion over the body, an estimate.
+     */
+    double drag[3];
+    /**
+     * Torque (N m) of both about the body's middle.
+     */
+    double torque[3];
+    /**
+     * Volume (m3) of the body below the surface of the liquid.
+     */
+    double displaced;
+    /**
+     * Area (m2) of its faces that touch liquid.
+     */
+    double wetted;
+} frz_shallow_load;
+
+/**
+ * How liquid stains the ground, and what the ground absorbs.
+ */
+typedef struct {
+    /**
+     * sizeof(frz_shallow_staining).
+     */
+    uint32_t struct_size;
+    /**
+     * 0.
+     */
+    uint32_t flags;
+    /**
+     * The scalar that stains (frz_shallow_set_scalars), counted from 0, by its concentration over its range, from 0 to 1: clear liquid washes it off.
+     * FRZ_SHALLOW_NO_SCALAR, as is usual: any liquid stains, fully.
+     */
+    uint32_t scalar;
+    /**
+     * 0.
+     */
+    uint32_t reserved;
+    /**
+     * Depth (m) from which liquid wets the ground, 0 or more; 1e-5 is usual.
+     */
+    double film;
+    /**
+     * Time (s) in which 63 % of a stain comes or is washed off, 0 or more; 0.2 is usual.
+     */
+    double takes;
+    /**
+     * Time (s) in which half of a stain on dry ground fades, 0.001 or more; 60 is usual. Infinity: it stays.
+     */
+    double half_life;
+    /**
+     * The most that ground absorbs (m: m3 for each m2 of its mesh), 0 to 1000: gauze some 1e-3. 0, as is usual: nothing.
+     */
+    double capacity;
+    /**
+     * How fast dry ground absorbs (m/s), 0 or more; as it fills, less. Only with a capacity.
+     */
+    double rate;
+} frz_shallow_staining;
 
 /**
  * Liquid in the air.
@@ -4249,7 +4388,7 @@ frz_status frz_shallow_create_grid(frz_context *context,
 void frz_shallow_destroy(frz_shallow *shallow);
 
 /**
- * Sets what flows, and how, from the next frame on. The border and falls must stay.
+ * Sets what flows, and how, from the next frame on. The border, falls and friction must stay.
  *
  * params: FRZ_ERROR_ARGUMENT names the field at fault and its range; the old ones then stay.
  *
@@ -4702,6 +4841,132 @@ frz_status frz_shallow_snapshot_drops_mesh(frz_context *context,
                                            const frz_shallow_layout *layout,
                                            const frz_shallow_drops_target *target,
                                            frz_shallow_size *size);
+
+/**
+ * Reports what the liquid does to each body of frz_shallow_set_bodies now, in real time (frz_shallow): the weight that buoys or pushes it, the drag of
+ * what flows over it and of its own motion, and how much of it is under.
+ *
+ * density: of the liquid (kg/m3), over 0, finite: blood 1060, water 1000.
+ * velocities: double[3] for each body (m/s), finite, in their order; data NULL with a count of 0: none of them moves.
+ * loads: receives a load for each body, all zeroes after a failure. The struct_size of each is set by the caller.
+ * count: number of bodies, as in frz_shallow_set_bodies.
+ *
+ * One thread at a time.
+ */
+frz_status frz_shallow_loads(frz_shallow *shallow,
+                             double density,
+                             frz_view velocities,
+                             frz_shallow_load *loads,
+                             size_t count);
+
+/**
+ * Fills a description of stains with the usual values.
+ *
+ * staining: receives them.
+ * size: sizeof(frz_shallow_staining).
+ *
+ * Any thread.
+ */
+frz_status frz_shallow_staining_init(frz_shallow_staining *staining, size_t size);
+
+/**
+ * Makes stains: none yet, and nothing is absorbed.
+ *
+ * shallow: the liquid that will stain; it is only read, and need not outlive them.
+ * positions: float[3] for each vertex (m), finite.
+ * triangles: uint32_t[3] for each triangle: its vertices. They stay, and a state knows them.
+ * staining: NULL for the usual one; FRZ_ERROR_ARGUMENT names a field that is out of range.
+ * out: receives the stains, to be destroyed with frz_shallow_stains_destroy; NULL after a failure.
+ *
+ * Any number of threads may read a shallow liquid; one thread at a time for each context.
+ */
+frz_status frz_shallow_stains_create(frz_context *context,
+                                     const frz_shallow *shallow,
+                                     frz_view positions,
+                                     frz_view triangles,
+                                     const frz_shallow_staining *staining,
+                                     frz_shallow_stains **out);
+
+/**
+ * Lets the liquid stain the ground, and the ground absorb it, for the time since the last call: once a frame, in real time (frz_shallow).
+ *
+ * shallow: the liquid, after its frame; only ground with a capacity changes it. What it absorbs is a part of frz_shallow_balance.absorbed.
+ * positions: float[3] for each vertex (m), finite, where they are now. After a failure all is as it was.
+ * absorbed: receives the volume (m3) that the ground has absorbed in this call, 0 after a failure; may be NULL.
+ *
+ * One thread at a time.
+ */
+frz_status frz_shallow_stains_update(frz_context *context,
+                                     frz_shallow_stains *stains,
+                                     frz_shallow *shallow,
+                                     frz_view positions,
+                                     double *absorbed);
+
+/**
+ * Copies how stained each vertex is, 0 to 1, in real time (frz_shallow).
+ *
+ * dst: room for a float for each vertex; FRZ_ERROR_CAPACITY when it is too little, and nothing is written.
+ *
+ * Any number of threads may read stains.
+ */
+frz_status frz_shallow_stains_read(const frz_shallow_stains *stains, frz_span dst);
+
+/**
+ * Copies how soaked each vertex is, 0 to 1 of its capacity, in real time (frz_shallow); 0 where the ground does not absorb.
+ *
+ * dst: as in frz_shallow_stains_read.
+ *
+ * Any number of threads may read stains.
+ */
+frz_status frz_shallow_stains_soaked(const frz_shallow_stains *stains,
+                                     frz_span dst);
+
+/**
+ * Reports how much the ground has absorbed in all.
+ *
+ * volume: receives it (m3); 0 after a failure.
+ *
+ * Any number of threads may read stains.
+ */
+frz_status frz_shallow_stains_absorbed(const frz_shallow_stains *stains, double *volume);
+
+/**
+ * Writes stains as bytes, for frz_shallow_stains_restore. How liquid stains is not part of them, nor is the liquid (frz_shallow_save).
+ *
+ * dst: room for capacity bytes. NULL: size receives how many are needed, and nothing is written.
+ * capacity: bytes at dst. FRZ_ERROR_CAPACITY when they are too few.
+ * size: receives the bytes that were written, or are needed; 0 after other failures.
+ *
+ * One thread at a time for each context; any number may read stains.
+ */
+frz_status frz_shallow_stains_save(frz_context *context,
+                                   const frz_shallow_stains *stains,
+                                   void *dst,
+                                   size_t capacity,
+                                   size_t *size);
+
+/**
+ * Puts saved stains in place: with the liquid's state of the same frame everything goes on to the same bytes.
+ *
+ * state: bytes bytes of frz_shallow_stains_save. FRZ_ERROR_FILE, and the stains are as they were, where they are damaged, of other triangles, of a
+ *     liquid with other cells or heights, or of ground that absorbs where this does not.
+ * bytes: their number.
+ *
+ * One thread at a time.
+ */
+frz_status frz_shallow_stains_restore(frz_context *context,
+                                      frz_shallow_stains *stains,
+                                      const void *state,
+                                      size_t bytes);
+
+/**
+ * Destroys stains; NULL is fine.
+ *
+ * stains: may be NULL. Not while a call uses them: they then stay.
+ *
+ * One thread at a time.
+ */
+void frz_shallow_stains_destroy(frz_shallow_stains *stains);
 
 /**
  * Makes a snapshot of a liquid as it is now.

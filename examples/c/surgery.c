@@ -1,4 +1,4 @@
-/* A wound in real time, on the core library alone: a knobbly bone in soft tissue that breathes, two bleeders of which one pulsates, a suction
+/* A wound in real time, on the core library alone: a knobbly bone in soft tissue that breathes, three bleeders of which one pulsates, a suction
  * drain, gauze that fills up, and an instrument that moves through the blood. 60 frames a second; prints the milliseconds of each part of a
  * frame (time of this thread), on average and at worst.
  *
@@ -141,22 +141,23 @@ static uint32_t triangle_near(const wound *self, double x, double z) {
 }
 
 static void set_flows(wound *self) {
-    frz_shallow_flow flows[4];
+    static const double BLEEDERS[3][3] = {{-0.015, -0.002, 0.8}, {0.02, 0.001, 0.5}, {0.0, 0.002, 0.3}}; /* x, z (m), ml/s */
+    frz_shallow_flow flows[5];
     int i;
     memset(flows, 0, sizeof flows);
-    for (i = 0; i < 4; ++i) flows[i].struct_size = sizeof flows[i], flows[i].radius = 0.0015;
-    for (i = 0; i < 2; ++i) { /* bleeders, on triangles of the bone: they move with it */
+    for (i = 0; i < 5; ++i) flows[i].struct_size = sizeof flows[i], flows[i].radius = 0.0015;
+    for (i = 0; i < 3; ++i) { /* bleeders, on triangles of the bone: they move with it */
         flows[i].kind = FRZ_SHALLOW_SOURCE, flows[i].flags = FRZ_SHALLOW_ON_TRIANGLE;
-        flows[i].triangle = triangle_near(self, i ? 0.02 : -0.015, i ? 0.001 : -0.002);
+        flows[i].triangle = triangle_near(self, BLEEDERS[i][0], BLEEDERS[i][1]);
         flows[i].shares[0] = flows[i].shares[1] = flows[i].shares[2] = 1.0 / 3;
-        flows[i].rate = (i ? 0.5 : 0.8) * ML;
+        flows[i].rate = BLEEDERS[i][2] * ML;
     }
     flows[1].pulse_frequency = 1.2, flows[1].pulse_share = 0.9;
-    flows[2].kind = FRZ_SHALLOW_DRAIN, flows[2].rate = 2 * ML; /* suction beside the bone */
-    flows[2].at[0] = 0.005, flows[2].at[1] = -0.016, flows[2].at[2] = 0.0125;
-    flows[3].kind = FRZ_SHALLOW_ABSORBER, flows[3].rate = 0.2 * ML, flows[3].capacity = 3 * ML; /* gauze */
-    flows[3].at[0] = -0.02, flows[3].at[1] = -0.012, flows[3].at[2] = -0.015, flows[3].radius = 0.005;
-    must(frz_shallow_set_flows(self->blood, flows, 4));
+    flows[3].kind = FRZ_SHALLOW_DRAIN, flows[3].rate = 2 * ML; /* suction beside the bone */
+    flows[3].at[0] = 0.005, flows[3].at[1] = -0.016, flows[3].at[2] = 0.0125;
+    flows[4].kind = FRZ_SHALLOW_ABSORBER, flows[4].rate = 0.2 * ML, flows[4].capacity = 3 * ML; /* gauze */
+    flows[4].at[0] = -0.02, flows[4].at[1] = -0.012, flows[4].at[2] = -0.015, flows[4].radius = 0.005;
+    must(frz_shallow_set_flows(self->blood, flows, 5));
 }
 
 static wound *wound_make(void) {

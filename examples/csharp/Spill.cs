@@ -26,6 +26,9 @@ static class Frazil {
         public uint Pace, Border, Section, Reserved;
         public double FallsHeight, FallsInterval, FallsDrop;
         public uint FallsMost, Reserved2;
+        public double Rest;
+        public uint Friction, ThickeningScalar;
+        public double ThickeningFrom, ThickeningTo, ThickeningTimes;
     }
 
     [StructLayout(LayoutKind.Sequential)]

@@ -9,7 +9,7 @@ import threading
 
 import numpy as np
 
-ABI_VERSION = 0x10007
+ABI_VERSION = 0x10008
 
 OK, CANCELLED = 0, 5
 
@@ -200,7 +200,9 @@ class ShallowParams(Struct):
         ("thinning_time", c.c_double), ("thinning_power", c.c_double), ("gravity", c.c_double * 3), ("kept", c.c_double),
         ("longest_step", c.c_double), ("pace", c.c_uint32), ("border", c.c_uint32), ("section", c.c_uint32),
         ("reserved", c.c_uint32), ("falls_height", c.c_double), ("falls_interval", c.c_double), ("falls_drop", c.c_double),
-        ("falls_most", c.c_uint32), ("reserved2", c.c_uint32),
+        ("falls_most", c.c_uint32), ("reserved2", c.c_uint32), ("rest", c.c_double), ("friction", c.c_uint32),
+        ("thickening_scalar", c.c_uint32), ("thickening_from", c.c_double), ("thickening_to", c.c_double),
+        ("thickening_times", c.c_double),
     ]
 
 
@@ -309,6 +311,20 @@ class ShallowScalarBalance(Struct):
     ] + [("error", c.c_int64)]
 
 
+class ShallowLoad(Struct):
+    _fields_ = [
+        ("struct_size", c.c_uint32), ("reserved", c.c_uint32), ("pressure", c.c_double * 3), ("drag", c.c_double * 3),
+        ("torque", c.c_double * 3), ("displaced", c.c_double), ("wetted", c.c_double),
+    ]
+
+
+class ShallowStaining(Struct):
+    _fields_ = [
+        ("struct_size", c.c_uint32), ("flags", c.c_uint32), ("scalar", c.c_uint32), ("reserved", c.c_uint32),
+        ("film", c.c_double), ("takes", c.c_double), ("half_life", c.c_double), ("capacity", c.c_double), ("rate", c.c_double),
+    ]
+
+
 class ShallowDrop(c.Structure):
     _fields_ = [
         ("position", c.c_double * 3), ("velocity", c.c_double * 3), ("volume", c.c_double), ("radius", c.c_double),
@@ -338,6 +354,7 @@ STRUCTS = {
     "frz_shallow_layout": ShallowLayout, "frz_shallow_target": ShallowTarget, "frz_shallow_size": ShallowSize,
     "frz_shallow_distance": ShallowDistance, "frz_shallow_fitted": ShallowFitted, "frz_shallow_scalar": ShallowScalar,
     "frz_shallow_scalar_balance": ShallowScalarBalance, "frz_shallow_drop": ShallowDrop,
+    "frz_shallow_load": ShallowLoad, "frz_shallow_staining": ShallowStaining,
     "frz_shallow_drops_target": ShallowDropsTarget,
 }
 
@@ -399,11 +416,15 @@ _FUNCTIONS = {
     "shallow_set_scalars": [_P, _P, _Z], "shallow_set_poured": [_P, View], "shallow_set_sourced": [_P, _Z, View],
     "shallow_read_scalar": [_P, _U, View, Span], "shallow_get_scalar_balance": [_P, _U, _P],
     "shallow_drops": [_P, Span, _P], "shallow_drops_mesh": [_P, _P, _P, _P, _P],
+    "shallow_loads": [_P, _D, View, _P, _Z], "shallow_staining_init": [_P, _Z],
+    "shallow_stains_create": [_P, _P, View, View, _P, _P], "shallow_stains_update": [_P, _P, _P, View, _P],
+    "shallow_stains_read": [_P, Span], "shallow_stains_soaked": [_P, Span], "shallow_stains_absorbed": [_P, _P],
+    "shallow_stains_save": [_P, _P, _P, _Z, _P], "shallow_stains_restore": [_P, _P, _P, _Z],
     "shallow_snapshot_drops": [_P, Span, _P], "shallow_snapshot_drops_mesh": [_P, _P, _P, _P, _P],
 }
 _VOID = ["pool_destroy", "context_destroy", "context_cancel", "context_reset", "mesh_destroy", "grid_destroy",
          "base_destroy", "grains_destroy", "mist_destroy", "tracker_destroy", "shallow_destroy",
-         "shallow_snapshot_destroy"]
+         "shallow_snapshot_destroy", "shallow_stains_destroy"]
 _LENT = ["base_grid", "base_removed", "base_compression", "base_touched"]
 
 

@@ -7,7 +7,7 @@ from typing import NamedTuple, Optional, Sequence
 import numpy as np
 
 from ._library import (Handle, ShallowBalance, ShallowBody, ShallowDistance, ShallowDomain, ShallowFitted, ShallowFlow, ShallowInfo,
-                       ShallowMoved, ShallowParams, ShallowReport, ShallowScalar, ShallowScalarBalance, Span, View, call, made, rows,
+                       ShallowLoad, ShallowMoved, ShallowParams, ShallowReport, ShallowScalar, ShallowScalarBalance, Span, View, call, made, rows,
                        saved, span, view)
 from .grid import Grid
 from .mesh import Mesh
@@ -17,6 +17,7 @@ LIQUIDS = {"water": 0, "blood": 1, "paint": 2, "honey": 3, "thinning blood": 4}
 PACES = {"realtime": 0, "exact": 1}
 BORDERS = {"closed": 0, "open": 1, "absorbing": 2}
 SECTIONS = {"wetted": 0, "whole": 1}
+FRICTIONS = {"ground": 0, "walls": 1}
 # Arrays of columns: the number in the header, the type, and how many of it a column has.
 ARRAYS = {
     "depth": (0, np.float32, 1), "base": (1, np.float32, 1), "ceiling": (2, np.float32, 1), "cell": (3, np.int32, 2),
@@ -156,9 +157,10 @@ class Shallow(Handle):
     cells: how many along x and z; those that cover the mesh.
     low, high: range of heights (m); that of the ground, and above it as much again, at least 16 cells.
     liquid: "water", "blood", "paint", "honey" or "thinning blood".
-    pace: "realtime" or "exact". border: "closed", "open" or "absorbing". section: "wetted" or "whole".
+    pace: "realtime" or "exact". border: "closed", "open" or "absorbing". section: "wetted" or "whole". friction: "ground" or "walls".
     Further parameters, as in frz_shallow_params: viscosity, thinnest, thinning_time, thinning_power, gravity, kept, longest_step; falls_most over 0
-    (8192, say) lets liquid fall freely, and falls_height, falls_interval and falls_drop say how.
+    (8192, say) lets liquid fall freely, and falls_height, falls_interval and falls_drop say how; rest (m/s); thickening_scalar, the number of a
+    scalar that viscosity depends on, with thickening_from, thickening_to and thickening_times: None, as is usual, is no scalar.
     """
 
     _destroy = "frz_shallow_destroy"
@@ -191,19 +193,21 @@ class Shallow(Handle):
             name = "shallow_create" if isinstance(ground, Mesh) else "shallow_create_grid"
             pointer = made(name, *start, ground.pointer)
         super().__init__(pointer)
-        self._ctx, self._more, self._lent, self._scalars = ctx, more, [], 0
+        self._ctx, self._more, self._lent, self._scalars, self._bodies = ctx, more, [], 0, 0
         self.cells, self.origin = tuple(cells), tuple(origin)
 
     @staticmethod
-    def _params(liquid="blood", pace="realtime", border="closed", section="wetted", **more):
+    def _params(liquid="blood", pace="realtime", border="closed", section="wetted", friction="ground", **more):
         params = ShallowParams()
         call("shallow_params_init", c.byref(params), c.sizeof(params))
         call("shallow_params_liquid", c.byref(params), _number("liquid", liquid, LIQUIDS))
         params.pace, params.border = _number("pace", pace, PACES), _number("border", border, BORDERS)
-        params.section = _number("section", section, SECTIONS)
+        params.section, params.friction = _number("section", section, SECTIONS), _number("friction", friction, FRICTIONS)
         for name, value in more.items():
             if name in ("struct_size", "flags", "reserved", "reserved2") or name not in dict(ShallowParams._fields_):
                 raise TypeError(f"shallow liquids have no parameter {name}")
+            if name == "thickening_scalar" and value is None:
+                continue
             setattr(params, name, (c.c_double * 3)(*value) if name == "gravity" else value)
         return params
 
@@ -223,7 +227,7 @@ class Shallow(Handle):
         super().close()
 
     def set_params(self, **more):
-        """What flows, and how, from the next frame on; what is not given stays as it was last given. The border stays."""
+        """What flows, and how, from the next frame on; what is not given stays as it was last given. The border, falls and friction stay."""
         more = self._more | more
         params = self._params(**more)
         call("shallow_set_params", self.pointer, c.byref(params))
@@ -360,7 +364,17 @@ class Shallow(Handle):
         array = (ShallowBody * max(len(bodies), 1))(*(_body(body) for body in bodies))
         moved = ShallowMoved(c.sizeof(ShallowMoved))
         call("shallow_set_bodies", self._ctx.pointer, self.pointer, array, len(bodies), c.byref(moved))
+        self._bodies = len(bodies)
         return moved
+
+    def loads(self, density=1060.0, velocities=None):
+        """What the liquid of a density (kg/m3) does to each body now, as frz_shallow_load has it: pressure and drag (N), torque (N m), displaced (m3),
+        wetted (m2). velocities (n, 3) are the bodies' (m/s); without them none moves."""
+        velocities = None if velocities is None else rows(velocities, np.float64, 3)
+        loads = (ShallowLoad * max(self._bodies, 1))(*(ShallowLoad(c.sizeof(ShallowLoad)) for _ in range(self._bodies)))
+        given = View(None, 0, 0) if velocities is None else view(velocities)
+        call("shallow_loads", self.pointer, density, given, loads, self._bodies)
+        return list(loads)[: self._bodies]
 
     def read(self, name, columns=None):
         """A copy of an array of all column indices, or of some: depth, base and ceiling (m), cell (n, 2) along x and z, -1 where an index

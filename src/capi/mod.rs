@@ -104,6 +104,10 @@ pub mod shallow_scalars;
 
 pub mod shallow_drops;
 
+pub mod shallow_loads;
+
+pub mod shallow_stains;
+
 pub mod shallow_snapshot;
 
 mod shallow_lists;

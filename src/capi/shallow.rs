@@ -19,13 +19,13 @@ use crate::shallow::scalars::MOST;
 use crate::shallow::surface::Surface;
 use crate::shallow::terrain::Solids;
 use crate::shallow::terrain::shapes::Shape;
-use crate::shallow::{Params, Report, Shallow};
+use crate::shallow::{Load, Params, Report, Shallow};
 
 /// A small amount of liquid on a ground: blood, coffee or paint in a fraction of a frame.
 ///
 /// In real time: what a host calls in each frame keeps to stricter manners than all other calls. These are frz_shallow_step, _replay,
-/// _update_terrain, _update_heights, _set_bodies, _save, _restore, _surface, _find_lifts, _drops, _drops_mesh, _read_scalar and _probe, and
-/// frz_shallow_snapshot_take, _surface, _drops, _drops_mesh and _probe. With a pool of 0 threads, from their second call on, they allocate nothing, take no lock, log and poll nothing, and make no
+/// _update_terrain, _update_heights, _set_bodies, _loads, _save, _restore, _surface, _find_lifts, _drops, _drops_mesh, _read_scalar and _probe,
+/// frz_shallow_stains_update, _read and _soaked, and frz_shallow_snapshot_take, _surface, _drops, _drops_mesh and _probe. With a pool of 0 threads, from their second call on, they allocate nothing, take no lock, log and poll nothing, and make no
 /// system call but that for the thread's clock where a step has a budget. Only where there is more than ever before, more columns because
 /// a body uncovers another layer, say, memory grows; so may what fails.
 ///
@@ -102,6 +102,9 @@ pub(super) struct Spill {
     pub balls: Balls,
     /// Drops of the last such mesh.
     pub drops: Vec<Droplet>,
+    /// Velocities of the bodies (m/s), and what the liquid did to them, as last asked for.
+    pub velocities_of_bodies: Vec<[f64; 3]>,
+    pub loads: Vec<Load>,
     /// Steps of a replay (s).
     steps: Vec<f64>,
 }
@@ -132,6 +135,8 @@ impl Spill {
             concentrations: Default::default(),
             balls,
             drops: Vec::with_capacity(most),
+            velocities_of_bodies: Vec::new(),
+            loads: Vec::new(),
             steps: Vec::with_capacity(1024),
         })
     }
@@ -239,7 +244,7 @@ pub unsafe extern "C" fn frz_shallow_destroy(shallow: *mut frz_shallow) {
     guard(|| unsafe { destroy(shallow) });
 }
 
-/// Sets what flows, and how, from the next frame on. The border and falls must stay.
+/// Sets what flows, and how, from the next frame on. The border, falls and friction must stay.
 ///
 /// params: FRZ_ERROR_ARGUMENT names the field at fault and its range; the old ones then stay.
 ///

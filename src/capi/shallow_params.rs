@@ -4,12 +4,12 @@ use super::guard::{Outcome, frz_status, guard};
 use super::mesh::no_flags;
 use super::views::{Sized32, fill, meaning, sized, within};
 use crate::context::Context;
-use crate::shallow::Params;
 use crate::shallow::falls::Falls;
 use crate::shallow::grid::{Grid, Heights};
 use crate::shallow::liquid::{Carreau, Liquid};
 use crate::shallow::params::{Friction, Pace, Section};
 use crate::shallow::pipes::Border;
+use crate::shallow::{Params, Thickening};
 
 /// Liquids that frz_shallow_params_liquid knows.
 #[repr(u32)]
@@ -60,8 +60,22 @@ pub enum frz_shallow_section {
     FRZ_SHALLOW_WHOLE = 1,
 }
 
+/// Where viscosity holds the liquid back.
+#[repr(u32)]
+#[derive(Clone, Copy)]
+pub enum frz_shallow_friction {
+    /// At the ground: right where the liquid is far wider than deep.
+    FRZ_SHALLOW_GROUND = 0,
+    /// Also at walls and ceilings, and between liquids that flow beside each other: ducts and channels carry what theory says. It takes longer.
+    FRZ_SHALLOW_WALLS = 1,
+}
+
+/// No scalar, where one may be named.
+pub const FRZ_SHALLOW_NO_SCALAR: u32 = 0xFFFF_FFFF;
+
 use frz_liquid::*;
 use frz_shallow_border::*;
+use frz_shallow_friction::*;
 use frz_shallow_pace::*;
 use frz_shallow_section::*;
 
@@ -85,7 +99,10 @@ const BORDERS: [(u32, Border); 3] = [
 const SECTIONS: [(u32, Section); 2] =
     [(FRZ_SHALLOW_WETTED as u32, Section::Wetted), (FRZ_SHALLOW_WHOLE as u32, Section::Whole)];
 
-/// What flows, and how. All of it but the border and falls may change between frames.
+const FRICTIONS: [(u32, Friction); 2] =
+    [(FRZ_SHALLOW_GROUND as u32, Friction::Ground), (FRZ_SHALLOW_WALLS as u32, Friction::Walls)];
+
+/// What flows, and how. All of it but the border, falls and friction may change between frames.
 #[repr(C)]
 #[derive(Clone, Copy)]
 pub struct frz_shallow_params {
@@ -129,6 +146,20 @@ pub struct frz_shallow_params {
     pub falls_most: u32,
     /// 0.
     pub reserved2: u32,
+    /// Velocity (m/s) below which liquid whose surface is level comes to rest, and then takes no time, 0 to 0.01; 1e-6 is usual. At 0 only liquid
+    /// that was never stirred is at rest.
+    pub rest: f64,
+    /// A frz_shallow_friction, which cannot change; FRZ_SHALLOW_GROUND is usual.
+    pub friction: u32,
+    /// The scalar that viscosity depends on (frz_shallow_set_scalars), counted from 0: of blood that clots its age. It must be there when a frame
+    /// begins. FRZ_SHALLOW_NO_SCALAR is usual, and what follows is then not looked at.
+    pub thickening_scalar: u32,
+    /// Concentration up to which viscosity is the liquid's own, finite.
+    pub thickening_from: f64,
+    /// Concentration from which on it is thickening_times that, and linear between them; finite, not thickening_from, and it may be the lesser one.
+    pub thickening_to: f64,
+    /// 1e-6 to 1e9.
+    pub thickening_times: f64,
 }
 
 // SAFETY: numbers.
@@ -162,6 +193,12 @@ impl frz_shallow_params {
             falls_drop: falls.drop,
             falls_most: 0,
             reserved2: 0,
+            rest: usual.rest,
+            friction: FRZ_SHALLOW_GROUND as u32,
+            thickening_scalar: FRZ_SHALLOW_NO_SCALAR,
+            thickening_from: 0.0,
+            thickening_to: 0.0,
+            thickening_times: 1.0,
         };
         params.set_liquid(&usual.liquid);
         params
@@ -193,6 +230,12 @@ impl frz_shallow_params {
                 Pace::Realtime(self.longest_step)
             }
         };
+        let thickening = Thickening {
+            scalar: self.thickening_scalar as usize,
+            from: self.thickening_from,
+            to: self.thickening_to,
+            times: self.thickening_times,
+        };
         let law = Carreau { thinnest: self.thinnest, time: self.thinning_time, power: self.thinning_power };
         let params = Params {
             liquid: Liquid {
@@ -204,10 +247,10 @@ impl frz_shallow_params {
             pace,
             border: meaning("border", "frz_shallow_border", self.border, &BORDERS)?,
             section: meaning("section", "frz_shallow_section", self.section, &SECTIONS)?,
-            friction: Friction::default(),
-            thickening: None,
+            friction: meaning("friction", "frz_shallow_friction", self.friction, &FRICTIONS)?,
+            thickening: (self.thickening_scalar != FRZ_SHALLOW_NO_SCALAR).then_some(thickening),
             falls: (self.falls_most > 0).then_some(falls),
-            rest: Params::default().rest,
+            rest: self.rest,
         };
         params.validate()?;
         Ok(params)

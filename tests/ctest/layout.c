@@ -83,7 +83,17 @@ int main(void) {
     FIELD(frz_shallow_params, pace), FIELD(frz_shallow_params, border), FIELD(frz_shallow_params, section);
     FIELD(frz_shallow_params, reserved), FIELD(frz_shallow_params, falls_height);
     FIELD(frz_shallow_params, falls_interval), FIELD(frz_shallow_params, falls_drop);
-    FIELD(frz_shallow_params, falls_most), FIELD(frz_shallow_params, reserved2);
+    FIELD(frz_shallow_params, falls_most), FIELD(frz_shallow_params, reserved2), FIELD(frz_shallow_params, rest);
+    FIELD(frz_shallow_params, friction), FIELD(frz_shallow_params, thickening_scalar);
+    FIELD(frz_shallow_params, thickening_from), FIELD(frz_shallow_params, thickening_to);
+    FIELD(frz_shallow_params, thickening_times);
+    SIZE(frz_shallow_load), FIELD(frz_shallow_load, struct_size), FIELD(frz_shallow_load, reserved);
+    FIELD(frz_shallow_load, pressure), FIELD(frz_shallow_load, drag), FIELD(frz_shallow_load, torque);
+    FIELD(frz_shallow_load, displaced), FIELD(frz_shallow_load, wetted);
+    SIZE(frz_shallow_staining), FIELD(frz_shallow_staining, struct_size), FIELD(frz_shallow_staining, flags);
+    FIELD(frz_shallow_staining, scalar), FIELD(frz_shallow_staining, reserved), FIELD(frz_shallow_staining, film);
+    FIELD(frz_shallow_staining, takes), FIELD(frz_shallow_staining, half_life);
+    FIELD(frz_shallow_staining, capacity), FIELD(frz_shallow_staining, rate);
     SIZE(frz_shallow_domain), FIELD(frz_shallow_domain, struct_size), FIELD(frz_shallow_domain, flags);
     FIELD(frz_shallow_domain, cell), FIELD(frz_shallow_domain, origin), FIELD(frz_shallow_domain, cells);
     FIELD(frz_shallow_domain, low), FIELD(frz_shallow_domain, high);

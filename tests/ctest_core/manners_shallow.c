@@ -105,13 +105,33 @@ static void forbid_calls(void) {
     }
 }
 
+/* What the blood leaves on the bone. */
+static frz_shallow_stains *stains;
+
+static void make_stains(wound *self) {
+    const frz_view places = {self->positions, VERTICES, 0}, triangles = {self->triangles, self->triangle_count, 0};
+    frz_shallow_staining staining;
+    must(frz_shallow_staining_init(&staining, sizeof staining));
+    staining.capacity = 1e-5, staining.rate = 1e-7;
+    must(frz_shallow_stains_create(self->ctx, self->blood, places, triangles, &staining, &stains));
+}
+
 /* A frame with all calls that keep the manners; then one more step, which is taken back and made again from its list. */
 static void full_frame(wound *self, int frame, void *state, size_t room) {
     double steps[64];
     size_t size = 0, count = 0, drops = 0;
     frz_shallow_layout layout;
     frz_shallow_target target;
+    static float seen[VERTICES];
+    const frz_view places = {self->positions, VERTICES, 0};
+    const frz_span all = {seen, VERTICES, 0};
+    frz_shallow_load load;
+    load.struct_size = sizeof load;
     wound_frame(self, frame);
+    must(frz_shallow_loads(self->blood, 1060, (frz_view){NULL, 0, 0}, &load, 1));
+    must(frz_shallow_stains_update(self->ctx, stains, self->blood, places, NULL));
+    must(frz_shallow_stains_read(stains, all));
+    must(frz_shallow_stains_soaked(stains, all));
     must(frz_shallow_find_lifts(self->ctx, self->blood, NULL, NULL, NULL));
     must(frz_shallow_layout_init(&layout, sizeof layout));
     layout.flags = FRZ_SHALLOW_LIFTED, layout.fade_depth = 2e-5;
@@ -135,6 +155,7 @@ static void play(int frames) {
     void *state = room_for(room, 1);
     double sum = 0;
     int frame, part;
+    make_stains(self);
     for (frame = 0; frame < warm; ++frame) full_frame(self, frame, state, room);
     if (allocations == 0) _exit(4); /* they are not counted */
     forbid_calls();

@@ -109,7 +109,8 @@ static frz_shallow_params some_params(void) {
     if (wild(4)) *fields[any() % 8] = number();
     if (chance(2)) params.gravity[0] = is_tame ? 3 : place() * 30;
     params.pace = wild(12) ? any() : any() % 2, params.border = wild(4) ? any() % 4 : 1;
-    params.section = wild(12) ? any() : any() % 2;
+    params.section = wild(12) ? any() : any() % 2, params.friction = wild(4) ? any() % 3 : 0;
+    params.rest = wild(12) ? number() : 1e-6, params.thickening_scalar = wild(30) ? any() % 4 : FRZ_SHALLOW_NO_SCALAR;
     if (wild(30)) params.flags = any();
     params.struct_size = size_near(sizeof params);
     return params;
@@ -204,6 +205,31 @@ static void make(void) {
     if (out) frz_shallow_destroy(liquids[slot]), liquids[slot] = out, cells_of[slot] = cells, has_mesh[slot] = on_mesh;
 }
 
+/* Stains that are made, used and destroyed. */
+static void leave_stains(frz_shallow *liquid) {
+    const frz_view own = view_of(triangles, sizeof triangles / sizeof *triangles);
+    const frz_view places = view(corners, 12, sizeof corners, N * N);
+    frz_shallow_staining staining;
+    frz_shallow_stains *out = NULL;
+    double volume = 0;
+    size_t count = 0;
+    WORKS(frz_shallow_staining_init(&staining, sizeof staining));
+    staining.struct_size = size_near(sizeof staining), staining.scalar = wild(9) ? any() : FRZ_SHALLOW_NO_SCALAR;
+    staining.film = wild(9) ? number() : 1e-5, staining.takes = wild(9) ? number() : 0.2, staining.half_life = wild(9) ? number() : 60;
+    staining.capacity = wild(9) ? number() : 1e-3, staining.rate = wild(9) ? number() : 1e-3;
+    told(frz_shallow_stains_create(a_context(), liquid, places, wild(9) ? view(whole, 12, sizeof whole, 8) : own,
+                                   chance(4) ? NULL : &staining, wild(30) ? NULL : &out));
+    told(frz_shallow_stains_update(a_context(), out, wild(9) ? a_liquid() : liquid, view(corners, 12, sizeof corners, N * N), &volume));
+    told(frz_shallow_step(a_context(), liquid, 0.016, 0.005, NULL));
+    told(frz_shallow_stains_update(a_context(), out, liquid, view(corners, 12, sizeof corners, N * N), wild(9) ? NULL : &volume));
+    told(frz_shallow_stains_read(out, span(4))), told(frz_shallow_stains_soaked(out, span(4)));
+    told(frz_shallow_stains_absorbed(out, wild(20) ? NULL : &volume));
+    told(frz_shallow_stains_save(a_context(), out, memory, wild(9) ? any() % 1000 : ROOM, &count));
+    if (count > 0 && count <= ROOM && wild(3)) memory[any() % count] ^= (unsigned char)(1u << any() % 8);
+    told(frz_shallow_stains_restore(a_context(), out, wild(20) ? NULL : memory, wild(6) ? any() % (count + 1) : count <= ROOM ? count : 0));
+    frz_shallow_stains_destroy(out);
+}
+
 static void call(void) {
     frz_shallow_report report;
     frz_shallow_moved moved;
@@ -225,7 +251,7 @@ static void call(void) {
     balance.struct_size = size_near(sizeof balance), size.struct_size = size_near(sizeof size);
     bounds[0] = place(), bounds[1] = place(), bounds[2] = bounds[0] + fabs(place()), bounds[3] = bounds[1] + fabs(place());
     for (at = 0; at < 6; ++at) steps[at] = wild(30) ? number() : 0.001 * (1 + any() % 4);
-    switch (any() % 30) {
+    switch (any() % 32) {
         case 0: make(); break;
         case 1:
             if (chance(6)) frz_shallow_destroy(liquids[slot]), liquids[slot] = NULL;
@@ -299,6 +325,15 @@ static void call(void) {
             told(frz_shallow_replay(a_context(), a_liquid(), view(steps, 8, sizeof steps, any() % 7), chance(2) ? NULL : &report));
             told(frz_shallow_last_steps(a_liquid(), span(8), wild(20) ? NULL : &count));
             break;
+        case 28: {
+            frz_shallow_load loads[8];
+            for (at = 0; at < 8; ++at) loads[at].struct_size = wild(90) ? any() % 128 : (uint32_t)sizeof *loads;
+            other = any() % 9;
+            told(frz_shallow_loads(a_liquid(), wild(9) ? number() : 1060, chance(2) ? view_of(NULL, 0) : view(wide, 24, sizeof wide, other),
+                                   wild(20) ? NULL : loads, other));
+            break;
+        }
+        case 29: leave_stains(liquids[slot_of(1)]); break;
         default:
             told(frz_shallow_step(a_context(), a_liquid(), wild(9) ? number() : 0.016, wild(9) ? number() : 0.005, chance(2) ? NULL : &report));
     }

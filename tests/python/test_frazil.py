@@ -751,6 +751,55 @@ class Shallow(unittest.TestCase):
             with self.assertRaisesRegex(frazil.Error, text):
                 make()
 
+    def test_liquid_pushes_bodies_thickens_and_leaves_stains(self):
+        ctx = frazil.Context()
+        count = 25
+        at = np.stack(np.meshgrid(np.arange(count), np.arange(count), indexing="xy"), -1).reshape(-1, 2) * self.CELL
+        positions = np.zeros((count * count, 3), np.float32)
+        positions[:, (0, 2)] = at
+        first = np.arange(count * count).reshape(count, count)[:-1, :-1].reshape(-1, 1)
+        triangles = np.concatenate([first + (0, count, 1), first + (1, count, count + 1)])
+        ground = frazil.Mesh(ctx, positions, triangles)
+        blood = frazil.Shallow(ctx, ground, self.CELL, high=0.1, friction="walls", rest=1e-5, thickening_scalar=0,
+                               thickening_from=0, thickening_to=1, thickening_times=10)
+        blood.set_scalars([frazil.Scalar("dye")])
+        blood.set_poured((1,))
+        blood.fill(0.02)
+        self.assertEqual(blood.loads(), [])
+        middle = 0.5 * (count - 1) * self.CELL
+        blood.set_bodies([frazil.Ball((middle, 0.016, middle), 0.01), frazil.Ball((0, 0.09, 0), 0.001)])
+        blood.set_poured((0,))
+        stains = frazil.Stains(ctx, blood, positions, triangles, scalar=0, half_life=1.0, capacity=1e-3, rate=1e-4)
+        self.assertEqual((stains.stains.max(), stains.absorbed), (0, 0))
+        taken = 0.0
+        for _ in range(20):
+            blood.step(1 / 60)
+            taken += stains.update(positions)
+        wet, dry = blood.loads(1000)
+        self.assertGreater(wet.pressure[1], 0)
+        self.assertEqual((dry.displaced, tuple(dry.pressure)), (0, (0, 0, 0)))
+        self.assertLess(blood.loads(1000, [(0.1, 0, 0), (0, 0, 0)])[0].drag[0], wet.drag[0])
+        self.assertGreater(stains.stains.max(), 0.7)
+        self.assertTrue(0 < stains.soaked.max() <= 1)
+        self.assertAlmostEqual(stains.absorbed, taken, delta=1e-18)
+        self.assertAlmostEqual(blood.balance.absorbed, taken, delta=1e-18)
+        self.assertEqual(blood.balance.error, 0)
+        state, seen = stains.save(), stains.stains
+        other = frazil.Stains(ctx, blood, positions, triangles, scalar=0, half_life=1.0, capacity=1e-3, rate=1e-4)
+        other.restore(state)
+        np.testing.assert_array_equal(other.stains, seen)
+        for make, text in (
+            (lambda: stains.update(positions[1:]), "624 elements, but the mesh has 625 vertices"), (lambda: stains.restore(state[:-1]), "cut short or damaged"),
+            (lambda: frazil.Stains(ctx, blood, positions, triangles, scalar=1), "no scalar 1 among 1"),
+            (lambda: frazil.Stains(ctx, blood, positions, triangles, takes=-1), "takes = -1"),
+            (lambda: blood.loads(0), "density = 0"), (lambda: blood.loads(1, np.zeros((1, 3))), "1 elements, but there are 2 bodies"),
+            (lambda: blood.set_params(rest=1), "rest = 1 m/s"), (lambda: blood.set_params(friction="ground"), "friction cannot change"),
+            (lambda: blood.set_params(thickening_times=0), "thickening.times = 0"),
+        ):
+            with self.assertRaisesRegex(frazil.Error, text):
+                make()
+        blood.set_params(thickening_scalar=None)
+
     def test_parameters_are_checked(self):
         ctx = frazil.Context()
         blood = self.spill(ctx, kept=1.0, viscosity=3e-6)

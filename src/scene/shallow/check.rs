@@ -103,11 +103,11 @@ pub fn check(ctx: &Context, scene: &Scene, inputs: &Inputs) -> Result<Report> {
     let begins_with = course.liquid.balance().inside;
     let deepest = course.liquid.depths().iter().copied().max().unwrap_or(0);
     let count = columns.count();
-    let frame_bytes = disk::frame(of, count as u64);
+    let triangles = inputs.triangles.unwrap_or(0) as u64;
+    let frame_bytes = disk::frame(of, count as u64, triangles);
     let mut warnings = inputs.warnings.clone();
     warnings.extend(odd(of, inputs, &course, void_cells));
     warnings.extend(later(ctx, scene, course)?);
-    let triangles = inputs.triangles.unwrap_or(0) as u64;
     Ok(Report {
         frames: [frames.first, frames.last],
         fps: scene.shot.fps,

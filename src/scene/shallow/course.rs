@@ -10,7 +10,7 @@ use crate::shallow::flows::FlowPoint;
 use crate::shallow::remap::Moved;
 use crate::shallow::terrain::shapes::Shape;
 use crate::shallow::terrain::{Solids, triangles};
-use crate::shallow::{self, Report};
+use crate::shallow::{self, Report, Stains};
 
 /// A scene with its liquid and what its files hold.
 type Of<'a> = (&'a Scene, &'a Shallow, &'a Inputs);
@@ -26,6 +26,8 @@ pub(super) struct Course<'a> {
     /// Its sources, drains and absorbers.
     pub points: Vec<FlowPoint>,
     pub frame: i32,
+    /// What it leaves on the terrain.
+    pub stains: Option<Stains>,
     /// The terrain, where it is a mesh that moves (m).
     ground: Option<TriMesh>,
     /// Whether ground or obstacles are others than when this was last looked at.
@@ -62,6 +64,9 @@ impl<'a> Course<'a> {
         let named = |index: usize| format!("flow point {}", index + 1);
         course.liquid.set_flows_resting(&kept.points, named)?;
         course.liquid.restore(&kept.liquid)?;
+        if let Some(stains) = &mut course.stains {
+            stains.restore(&kept.stains)?;
+        }
         if course.points != kept.points {
             // Others from here on.
             course.liquid.set_flows_resting(&course.points, |index| of.points[index].title())?;
@@ -81,9 +86,25 @@ impl<'a> Course<'a> {
         });
         let mut liquid = liquid?;
         of.carry(scene, &mut liquid)?;
+        let mesh = ground.as_ref().or(inputs.still.as_ref());
+        let stains = of
+            .staining
+            .zip(mesh)
+            .map(|(staining, mesh)| Stains::new(&liquid, &mesh.positions, &mesh.triangles, staining));
+        let stains = stains.transpose()?;
         let (shapes_before, is_stirred) = (Vec::new(), true);
-        let mut course =
-            Self { scene, of, inputs, liquid, shapes: shapes_before, points, frame, ground, is_stirred };
+        let mut course = Self {
+            scene,
+            of,
+            inputs,
+            liquid,
+            shapes: shapes_before,
+            points,
+            frame,
+            stains,
+            ground,
+            is_stirred,
+        };
         course.put(shapes)?;
         Ok(course)
     }
@@ -95,6 +116,10 @@ impl<'a> Course<'a> {
     pub fn go(&mut self, ctx: &Context) -> Result<(Report, Moved)> {
         let moved = ctx.phase("terrain", || self.go_still())?;
         let report = ctx.phase("flow", || self.liquid.step(ctx, 1.0 / self.scene.shot.fps))?;
+        let mesh = self.ground.as_ref().or(self.inputs.still.as_ref());
+        if let Some((stains, mesh)) = self.stains.as_mut().zip(mesh) {
+            ctx.phase("stains", || stains.update(&mut self.liquid, &mesh.positions))?;
+        }
         pours::pour(self.scene, self.of, &mut self.liquid, self.frame)?;
         Ok((report, moved))
     }
@@ -135,6 +160,18 @@ impl<'a> Course<'a> {
         self.shapes = shapes;
         self.is_stirred = true;
         Ok(moved)
+    }
+
+    /// The terrain with how stained each of its vertices is; none where nothing stains it.
+    ///
+    /// # Errors
+    /// None of its own stains.
+    pub fn stained(&self) -> Result<Option<(TriMesh, Vec<f32>)>> {
+        let mesh = self.ground.as_ref().or(self.inputs.still.as_ref());
+        let Some((stains, mesh)) = self.stains.as_ref().zip(mesh) else { return Ok(None) };
+        let mut out = vec![0.0; stains.len()];
+        stains.stains(&mut out)?;
+        Ok(Some((mesh.clone(), out)))
     }
 
     /// The ground as one mesh, with those that stand on it (m); none where it is no mesh.

@@ -12,11 +12,13 @@ const SCALAR: u64 = 8;
 const DROP: u64 = 200;
 /// Bytes of a voxel of a leaf, of which there are some two for each column.
 const VOXEL: u64 = 2 * 4;
+/// Bytes of a triangle of a terrain that is stained: its corners, and of its half a vertex the place, the stain, and that in the exact state.
+const STAINED: u64 = 13 + (12 + 4 + 12) / 2;
 /// Bytes of a frame's report and record.
 const RECORDS: u64 = 3000;
 
-/// Bytes of a frame's files at most, with this many columns: when all are wet, and as many drops are in the air as there may be.
-pub(super) fn frame(of: &Shallow, columns: u64) -> u64 {
+/// Bytes of a frame's files at most, with this many columns, on a mesh of so many triangles: when all are wet, and as many drops are in the air as there may be.
+pub(super) fn frame(of: &Shallow, columns: u64, triangles: u64) -> u64 {
     let output = of.output;
     let scalars = of.scalars.len() as u64;
     let (carried, falling) =
@@ -38,7 +40,8 @@ pub(super) fn frame(of: &Shallow, columns: u64) -> u64 {
     let drops = of.params.falls.map_or(0, |falls| falls.most);
     // As many vertices as its mesh has, each with two triangles.
     let in_air = bound(drops).vertices as u64 * (if_asked(output.ply, ply) + if_asked(output.usd, usd));
-    columns * each + in_air + drops as u64 * DROP + RECORDS
+    let stained = if_asked(of.staining.is_some(), STAINED * triangles);
+    columns * each + in_air + stained + drops as u64 * DROP + RECORDS
 }
 
 #[cfg(test)]
@@ -71,9 +74,9 @@ mod tests {
             Carried { velocities: &drawn.velocities, uvs: None, arrays: &arrays.iter().collect::<Vec<_>>() };
         let bytes = ply_bytes(&drawn.mesh, &carried).len() as u64;
         let more = (STATE + SCALAR) * count as u64;
-        let said = (frame(of, count as u64) - frame(of, 0)) - more;
+        let said = (frame(of, count as u64, 9) - frame(of, 0, 0)) - more;
         assert!(bytes > said && bytes < said + 500, "{bytes} bytes, {said} said");
         // A drop has a ball.
-        assert!(frame(of, 0) > RECORDS + DROP + 42 * 12, "{}", frame(of, 0));
+        assert!(frame(of, 0, 0) > RECORDS + DROP + 42 * 12, "{}", frame(of, 0, 0));
     }
 }

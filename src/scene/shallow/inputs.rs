@@ -38,7 +38,7 @@ pub struct Inputs {
     pub(super) meshes: Vec<TriMesh>,
     /// The terrain at the first frame, where it is a mesh that moves.
     pub(super) moving: Option<TriMesh>,
-    /// The terrain, where it is a mesh that does not move, and minimum heights are wanted.
+    /// The terrain, where it is a mesh that does not move, and minimum heights or stains are wanted.
     pub(super) still: Option<TriMesh>,
     /// What each of the scene's points moves with, where it follows the terrain.
     pub(super) attached: Vec<Option<Attached>>,
@@ -113,7 +113,7 @@ impl Inputs {
         };
         let triangles = mesh.as_ref().map(|mesh| mesh.triangles.len());
         let (moving, still) = if shallow.sequence().is_some() { (mesh, None) } else { (None, mesh) };
-        let still = still.filter(|_| shallow.lifts);
+        let still = still.filter(|_| shallow.lifts || shallow.staining.is_some());
         let attached = moving.as_ref().map(|mesh| attach(ctx, shallow, mesh)).unwrap_or_default();
         if let Some(mesh) = &moving {
             warnings.extend(beside(scene, shallow, mesh, &attached));

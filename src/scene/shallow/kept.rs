@@ -4,9 +4,9 @@ use crate::base::DVec3;
 use crate::base::bytes::{Reader, Writer};
 use crate::base::packed::{self, Magic};
 use crate::error::{Error, Result};
-use crate::shallow::Shallow;
 use crate::shallow::flows::{FlowPoint, Kind, Pulse};
 use crate::shallow::terrain::shapes::Shape;
+use crate::shallow::{Shallow, Stains};
 
 /// Magic bytes, including the version.
 const MAGIC: &Magic = b"frzsha01";
@@ -22,10 +22,17 @@ pub(super) struct Kept {
     pub points: Vec<FlowPoint>,
     /// Its own state.
     pub liquid: Vec<u8>,
+    /// Its stains; empty where it leaves none.
+    pub stains: Vec<u8>,
 }
 
-/// The exact state of a liquid with these obstacles and flow points.
-pub(super) fn save(shapes: &[Shape], points: &[FlowPoint], liquid: &Shallow) -> Vec<u8> {
+/// The exact state of a liquid with these obstacles and flow points, and of its stains.
+pub(super) fn save(
+    shapes: &[Shape],
+    points: &[FlowPoint],
+    liquid: &Shallow,
+    stains: Option<&Stains>,
+) -> Vec<u8> {
     let mut to = Writer::default();
     to.count(shapes.len());
     for shape in shapes {
@@ -51,6 +58,11 @@ pub(super) fn save(shapes: &[Shape], points: &[FlowPoint], liquid: &Shallow) -> 
     liquid.save_into(&mut own);
     to.count(own.len());
     to.0.extend(own);
+    if let Some(stains) = stains {
+        let own = stains.save();
+        to.count(own.len());
+        to.0.extend(own);
+    }
     packed::pack(&to.0, MAGIC)
 }
 
@@ -67,8 +79,13 @@ pub(super) fn read(bytes: &[u8]) -> Result<Kept> {
     let points = (0..count).map(|_| point(&mut from)).collect::<Result<Vec<_>>>()?;
     let length = from.count(1)?;
     let liquid = from.bytes(length)?.to_vec();
+    let mut stains = Vec::new();
+    if !from.rest().is_empty() {
+        let length = from.count(1)?;
+        stains = from.bytes(length)?.to_vec();
+    }
     from.end()?;
-    Ok(Kept { shapes, points, liquid })
+    Ok(Kept { shapes, points, liquid, stains })
 }
 
 fn numbers_of(shape: &Shape) -> (u32, Vec<f64>) {

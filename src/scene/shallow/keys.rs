@@ -129,6 +129,22 @@ pub const KEYS: &[Key] = &[
     Key::new("shallow", "step", Kind::Number(1.0e-6, 1.0, "s"), "longest step of realtime (s)").or("0.003").concerns(STEP),
     Key::new(
         "shallow",
+        "friction",
+        Kind::Choice(&["ground", "walls"]),
+        "where viscosity holds the liquid back: ground: right where it is far wider than deep; walls: also at walls and ceilings, in channels and ducts, which takes longer",
+    )
+    .or("\"ground\"")
+    .concerns(FIRST),
+    Key::new(
+        "shallow",
+        "rest",
+        Kind::Number(0.0, 0.01, "m/s"),
+        "velocity (m/s) below which liquid whose surface is level comes to rest, and then takes no time; 0: only what was never stirred rests",
+    )
+    .or("1e-6")
+    .concerns(STEP),
+    Key::new(
+        "shallow",
         "falls",
         Kind::Flag,
         "true: liquid falls freely over edges, through holes and into the void, in drops and strands; else it is below at once",
@@ -158,6 +174,17 @@ pub const KEYS: &[Key] = &[
     )
     .or("true")
     .concerns(OUTPUT),
+    Key::new(
+        "shallow",
+        "stains",
+        Kind::Flag,
+        "of a mesh: true: the liquid leaves stains on it, and terrain/terrain.%04d.ply is the terrain (m, Y up) with an array `stain`, 0 to 1, on its vertices",
+    )
+    .or("false")
+    .concerns(FIRST),
+    Key::new("shallow", "stain_half_life", Kind::Number(1.0e-3, 1.0e12, "s"), "time in which half of a stain on dry ground fades (s)")
+        .or("60.0")
+        .concerns(STEP),
     Key::new("shallow", "opaque_depth", Kind::Number(1.0e-6, FAR, "m"), "depth from which the liquid is opaque (m)")
         .or("0.001")
         .with_presets(&[("water", "0.05"), ("paint", "0.0005"), ("honey", "0.02")])
@@ -187,6 +214,30 @@ pub const MANY_KEYS: &[Key] = &[
     Key::new("scalar", "start", Kind::Number(-1.0e9, 1.0e9, ""), "concentration of what stands up to `fill`, and of pours and sources whose `carries` does not name it")
         .or("0.0")
         .concerns(FIRST),
+    Key::new(
+        "scalar",
+        "stains",
+        Kind::Flag,
+        "of one of them, with shallow.stains: true: its concentration over its range stains, and clear liquid washes stains off; without one any liquid stains",
+    )
+    .or("false")
+    .concerns(STEP),
+    Key::new(
+        "scalar",
+        "thickens_times",
+        Kind::Number(1.0e-6, 1.0e9, ""),
+        "of one of them: from the concentration `thickens_to` on the liquid's viscosity is so many times its own, up to `thickens_from` its own, and linear between them",
+    )
+    .or_nothing()
+    .such_as("5.0")
+    .concerns(STEP),
+    Key::new("scalar", "thickens_from", Kind::Number(-1.0e9, 1.0e9, ""), "concentration up to which viscosity is the liquid's own, within the range")
+        .or("0.0")
+        .concerns(STEP),
+    Key::new("scalar", "thickens_to", Kind::Number(-1.0e9, 1.0e9, ""), "concentration from which on it is `thickens_times` that, within the range; it may be the lesser one")
+        .or_nothing()
+        .such_as("1.0")
+        .concerns(STEP),
     Key::new("pour", "at", Kind::Numbers(3, FAR, "m"), "middle (m): liquid is poured onto the ground nearest to it")
         .such_as("[0.0, 0.05, 0.0]")
         .concerns(STEP),

@@ -4,6 +4,7 @@ use super::Shallow;
 use crate::context::Context;
 use crate::error::Result;
 use crate::shallow::grid::Grid;
+use crate::shallow::params::Friction;
 
 /// Bytes that every run takes.
 const FIXED: u64 = 32_000_000;
@@ -14,10 +15,16 @@ const CELL: u64 = 64;
 const COLUMN: u64 = 730;
 /// Bytes of a scalar of a column: its amount 8, its concentration 4, and in each of those steps, files and states 50.
 const SCALAR: u64 = 62;
+/// Bytes of a column more for friction at walls, and for viscosity that depends on a scalar.
+const WALLS: u64 = 108;
+const THICK: u64 = 12;
 /// Bytes of a drop: what it is 200, its ball and strand while they are made, and in up to three steps that wait for the writer, 5,000 each.
 const DROP: u64 = 20_200;
 /// Bytes of a triangle of the terrain: corners and a place, twice while it is read, or while minimum heights are found, and what these need.
 const TRIANGLE: u64 = 110;
+
+/// Bytes of a triangle more where the liquid stains it: stains, and the mesh in up to three steps that wait for the writer.
+const STAINED: u64 = 110;
 
 /// Refuses more cells than the context allows, before they are made.
 ///
@@ -31,7 +38,10 @@ pub(super) fn allow_cells(ctx: &Context, grid: &Grid) -> Result<()> {
 
 /// Bytes that a run takes, about.
 pub(super) fn estimate(of: &Shallow, grid: &Grid, columns: u64, triangles: u64) -> u64 {
-    let column = COLUMN + SCALAR * of.scalars.len() as u64;
+    let walls = if of.params.friction == Friction::Walls { WALLS } else { 0 };
+    let thick = if of.params.thickening.is_some() { THICK } else { 0 };
+    let triangle = TRIANGLE + if of.staining.is_some() { STAINED } else { 0 };
+    let column = COLUMN + SCALAR * of.scalars.len() as u64 + walls + thick;
     let drops = DROP * of.params.falls.map_or(0, |falls| falls.most as u64);
-    FIXED + CELL * grid.cells() as u64 + column * columns + TRIANGLE * triangles + drops
+    FIXED + CELL * grid.cells() as u64 + column * columns + triangle * triangles + drops
 }

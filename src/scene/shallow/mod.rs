@@ -43,7 +43,7 @@ use crate::shallow::flows::FlowPoint;
 use crate::shallow::liquid::Liquid;
 use crate::shallow::params::{Friction, Pace, Section};
 use crate::shallow::pipes::Border;
-use crate::shallow::{Params, flows};
+use crate::shallow::{Params, Staining, flows};
 
 /// Cubic metres in a millilitre.
 pub const ML: f64 = 1.0e-6;
@@ -81,6 +81,8 @@ pub struct Shallow {
     pub points: Vec<Point>,
     /// What stands or moves in its way.
     pub obstacles: Vec<Obstacle>,
+    /// How it stains a terrain that is a mesh, which is then written; none: it does not.
+    pub staining: Option<Staining>,
     /// Whether a terrain that is a mesh does not show through films.
     pub lifts: bool,
     /// Depth from which it is opaque (m).
@@ -204,6 +206,11 @@ impl Shallow {
             pours: (0..values.count("pour")).map(|index| Pour::of(values, index)).collect(),
             points: Point::all_of(values),
             obstacles: (0..values.count("object")).filter_map(|index| Obstacle::of(values, index)).collect(),
+            staining: value("stains").and_then(Value::flag).filter(|stains| *stains).map(|_| Staining {
+                scalar: scalars::staining(values),
+                half_life: number("stain_half_life").unwrap_or(60.0),
+                ..Staining::default()
+            }),
             lifts: value("lifts").and_then(Value::flag).unwrap_or(true),
             opaque_depth: number("opaque_depth").unwrap_or(0.01),
             output: Files {
@@ -341,15 +348,15 @@ fn params(values: &Values) -> Params {
             _ => Border::Open,
         },
         section: Section::default(),
-        friction: Friction::default(),
-        thickening: None,
+        friction: if text("friction") == Some("walls") { Friction::Walls } else { Friction::Ground },
+        thickening: scalars::thickening(values),
         falls: value("falls").and_then(Value::flag).filter(|falls| *falls).map(|_| Falls {
             height: number("falls_height").unwrap_or(usual.height),
             interval: number("falls_interval").unwrap_or(usual.interval),
             drop: number("falls_drop_ml").map_or(usual.drop, |drop| drop * ML),
             most: value("falls_most").and_then(Value::whole).map_or(usual.most, |most| most as usize),
         }),
-        rest: Params::default().rest,
+        rest: number("rest").unwrap_or(1e-6),
     }
 }
 
@@ -361,6 +368,7 @@ mod tests {
     use super::*;
     use crate::scene::text::{keys, template};
     use crate::scene::{Scene, System};
+    use crate::shallow::Thickening;
 
     fn scene(lines: &str) -> Scene {
         let text = format!("[shot]\nframes = \"1-2\"\n[shallow]\nterrain = \"a.obj\"\ncell = 0.01\n{lines}");
@@ -379,6 +387,11 @@ mod tests {
         assert_eq!(params, Params { border: Border::Open, pace: Pace::Exact, ..Params::default() });
         let thick = scene("liquid = \"paint\"\nviscosity = 0.25\n");
         assert_eq!(thick.shallow().unwrap().params.liquid, Liquid::new(0.25));
+        let other = scene("friction = \"walls\"\nrest = 0.0\n").shallow().unwrap().params.clone();
+        assert_eq!((other.friction, other.rest, other.thickening), (Friction::Walls, 0.0, None));
+        let carries = "[[scalar]]\nname = \"a\"\n[[scalar]]\nname = \"b\"\nrange = 9\nthickens_times = 3\nthickens_from = 5\nthickens_to = 1\n";
+        let law = Thickening { scalar: 1, from: 5.0, to: 1.0, times: 3.0 };
+        assert_eq!(scene(carries).shallow().unwrap().params.thickening, Some(law));
         assert_eq!(scene("thinning = true\n").shallow().unwrap().params.liquid, Liquid::THINNING_BLOOD);
     }
 

@@ -38,6 +38,11 @@ impl Shallow {
         if !is_mesh && shallow.sequence().is_some() {
             return Err(table.error("terrain", "may be a sequence of meshes, not of other files"));
         }
+        if !is_mesh && shallow.staining.is_some() {
+            return Err(
+                table.error("stains", "must be false: the terrain is no mesh that it could be an array of")
+            );
+        }
         if shallow.area.is_some_and(|[x0, z0, x1, z1]| x1 <= x0 || z1 <= z0) {
             return Err(table.error("area", "must be [x0, z0, x1, z1] with x0 < x1 and z0 < z1"));
         }

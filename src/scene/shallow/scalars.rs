@@ -5,7 +5,7 @@ use crate::error::{Error, Result};
 use crate::scene::Scene;
 use crate::scene::text::{Table, Value, Values};
 use crate::shallow::scalars::MOST;
-use crate::shallow::{self, Law, Scalar, ScalarBalance};
+use crate::shallow::{self, Law, Scalar, ScalarBalance, Thickening};
 
 /// Names that arrays of the surface have anyway, in some file.
 const TAKEN: [&str; 13] =
@@ -39,6 +39,21 @@ impl Carried {
         let scalar = Scalar { name, law, range: number("range").unwrap_or(1.0) };
         Self { scalar, start: number("start").unwrap_or(0.0) }
     }
+}
+
+/// How one of the scalars thickens the liquid: the first that does.
+pub(super) fn thickening(values: &Values) -> Option<Thickening> {
+    (0..values.count("scalar")).find_map(|scalar| {
+        let number = |name: &str| values.of_many("scalar", scalar, name).and_then(Value::number);
+        let (times, to) = (number("thickens_times")?, number("thickens_to")?);
+        Some(Thickening { scalar, from: number("thickens_from").unwrap_or(0.0), to, times })
+    })
+}
+
+/// The scalar that stains: the first that does.
+pub(super) fn staining(values: &Values) -> Option<usize> {
+    (0..values.count("scalar"))
+        .find(|index| values.of_many("scalar", *index, "stains").and_then(Value::flag) == Some(true))
 }
 
 /// Concentrations of the scalars in what a pour or a source brings: those that its `carries` names, and the others' own.
@@ -89,6 +104,47 @@ pub(super) fn check(index: usize, table: &Table, values: &Values) -> Result<()> 
     }
     if start.abs() > scalar.range {
         return Err(table.error("start", format!("must lie within -{0} to {0}, its range", scalar.range)));
+    }
+    if values.of_many("scalar", index, "stains").and_then(Value::flag) == Some(true) {
+        if values.get("shallow.stains").and_then(Value::flag) != Some(true) {
+            return Err(table.error("stains", "must be false where shallow.stains is"));
+        }
+        if staining(values).is_some_and(|first| first < index) {
+            return Err(table.error("stains", "must be false: another scalar stains"));
+        }
+    }
+    check_thickening(index, table, values, scalar.range)
+}
+
+/// Checks how a scalar thickens the liquid; those before it are read.
+///
+/// # Errors
+/// A key without the others; a concentration out of range; a second scalar that thickens, or a liquid that cannot.
+fn check_thickening(index: usize, table: &Table, values: &Values, range: f64) -> Result<()> {
+    let number = |name: &str| values.of_many("scalar", index, name).and_then(Value::number);
+    if number("thickens_times").is_none() {
+        return match table.has("thickens_to") {
+            true => Err(table.error("thickens_to", "is of a scalar that has `thickens_times`: leave it out")),
+            false => Ok(()),
+        };
+    }
+    let Some(to) = number("thickens_to") else {
+        return Err(table.error("thickens_to", "is missing: a scalar with `thickens_times` has one"));
+    };
+    let from = number("thickens_from").unwrap_or(0.0);
+    for (name, concentration) in [("thickens_from", from), ("thickens_to", to)] {
+        if concentration.abs() > range {
+            return Err(table.error(name, format!("must lie within -{range} to {range}, its range")));
+        }
+    }
+    if from == to {
+        return Err(table.error("thickens_to", format!("must not be `thickens_from`, {from}")));
+    }
+    if thickening(values).is_some_and(|law| law.scalar < index) {
+        return Err(table.error("thickens_times", "is one too many: another scalar thickens the liquid"));
+    }
+    if super::params(values).liquid.viscosity == 0.0 {
+        return Err(table.error("thickens_times", "must be left out where shallow.viscosity is 0"));
     }
     Ok(())
 }

@@ -5,7 +5,8 @@ use serde_json::json;
 use super::course::Course;
 use super::mesh::{Drawn, Mesher};
 use super::{Inputs, ML, ROLES, Shallow, scalars};
-use crate::base::MeshArray;
+use crate::base::arrays::{Number, On};
+use crate::base::{MeshArray, TriMesh};
 use crate::context::{Context, PhaseTime};
 use crate::error::{Error, Result};
 use crate::io::manifest::Keeps;
@@ -24,6 +25,8 @@ use crate::shallow::remap::Moved;
 const NAME: &str = "liquid";
 /// Kind of its volumes.
 const VOLUME: &str = "volume";
+/// Kind of the files of a terrain with stains.
+const TERRAIN: &str = "terrain";
 /// What the clips of `liquid/` share.
 const MANIFEST: &str = "liquid/liquid.manifest.usda";
 
@@ -48,6 +51,8 @@ struct Written {
     state: Vec<u8>,
     /// A .vdb file.
     volume: Option<Vec<u8>>,
+    /// The terrain and its stains.
+    terrain: Option<(TriMesh, Vec<f32>)>,
 }
 
 impl<'a> Liquid<'a> {
@@ -81,8 +86,8 @@ impl<'a> Liquid<'a> {
         let liquid = &course.liquid;
         let drawn = ctx.phase("surface", || mesher.draw(liquid, self.of.opaque_depth))?;
         let volume = self.volume(ctx, liquid, to.frame, made_from)?;
-        let state = super::kept::save(&course.shapes, &course.points, liquid);
-        Ok(Written { drawn, state, volume })
+        let state = super::kept::save(&course.shapes, &course.points, liquid, course.stains.as_ref());
+        Ok(Written { drawn, state, volume, terrain: course.stained()? })
     }
 
     #[cfg(feature = "vdb")]
@@ -131,12 +136,20 @@ impl Stage for Liquid<'_> {
     }
 
     fn kinds(&self) -> &'static [Kind] {
-        &[Kind { name: NAME, extensions: &["ply", "usda"] }, Kind { name: VOLUME, extensions: &["vdb"] }]
+        &[
+            Kind { name: NAME, extensions: &["ply", "usda"] },
+            Kind { name: VOLUME, extensions: &["vdb"] },
+            Kind { name: TERRAIN, extensions: &["ply"] },
+        ]
     }
 
     fn writes(&self, kind: &str) -> bool {
         let output = self.of.output;
-        if kind == VOLUME { output.vdb } else { output.ply || output.usd }
+        match kind {
+            VOLUME => output.vdb,
+            TERRAIN => self.of.staining.is_some(),
+            _ => output.ply || output.usd,
+        }
     }
 
     fn state_extension(&self) -> &'static str {
@@ -234,7 +247,9 @@ impl<'a> Stepping for Liquid<'a> {
     }
 
     fn write(&self, _writer: &mut (), step: Step, files: Option<&mut FrameFiles>) -> Result<()> {
-        let (Some(Written { drawn, state, volume }), Some(files)) = (step.0, files) else { return Ok(()) };
+        let (Some(Written { drawn, state, volume, terrain }), Some(files)) = (step.0, files) else {
+            return Ok(());
+        };
         let output = self.of.output;
         let arrays = drawn.arrays(output);
         let arrays: Vec<&MeshArray> = arrays.iter().collect();
@@ -257,6 +272,12 @@ impl<'a> Stepping for Liquid<'a> {
         }
         if let Some(volume) = volume {
             files.save(VOLUME, "vdb", &volume)?;
+        }
+        if let Some((mesh, stains)) = terrain {
+            let values = stains.into_iter().map(f64::from).collect();
+            let stain = MeshArray { name: "stain".into(), on: On::Vertices, number: Number::F32, values };
+            let carried = mesh::Carried { velocities: &[], uvs: None, arrays: &[&stain] };
+            files.save(TERRAIN, "ply", &mesh::ply_bytes(&mesh, &carried))?;
         }
         files.save_state(&state)
     }

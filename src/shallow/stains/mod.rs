@@ -210,10 +210,13 @@ impl Stains {
     /// `Argument`: there is not one place for each vertex.
     pub fn stains(&self, out: &mut [f32]) -> Result<()> {
         self.check_room(out.len())?;
-        for (vertex, out) in out.iter_mut().enumerate() {
-            *out = self.at(vertex, self.time) as f32;
-        }
+        out.iter_mut().zip(self.each()).for_each(|(out, stain)| *out = stain);
         Ok(())
+    }
+
+    /// The stain of each vertex.
+    pub(crate) fn each(&self) -> impl ExactSizeIterator<Item = f32> {
+        (0..self.len()).map(|vertex| self.at(vertex, self.time) as f32)
     }
 
     /// How soaked each vertex is, 0 to 1 of its capacity; 0, if the ground does not absorb.
@@ -222,11 +225,16 @@ impl Stains {
     /// As [`Stains::stains`].
     pub fn soaked(&self, out: &mut [f32]) -> Result<()> {
         self.check_room(out.len())?;
-        out.fill(0.0);
-        for (out, (held, capacity)) in out.iter_mut().zip(self.held.iter().zip(&self.capacity)) {
-            *out = *held as f32 / (*capacity).max(1) as f32;
-        }
+        out.iter_mut().zip(self.each_soaked()).for_each(|(out, soaked)| *out = soaked);
         Ok(())
+    }
+
+    /// How soaked each vertex is.
+    pub(crate) fn each_soaked(&self) -> impl ExactSizeIterator<Item = f32> {
+        (0..self.len()).map(|vertex| match (self.held.get(vertex), self.capacity.get(vertex)) {
+            (Some(held), Some(capacity)) => *held as f32 / (*capacity).max(1) as f32,
+            _ => 0.0,
+        })
     }
 
     /// How much the ground has absorbed (m3): part of [`Balance::absorbed`](super::Balance).

@@ -21,15 +21,19 @@ const MAGIC: [u8; 8] = *b"frzstn\0\x01";
 const SEAL: usize = 16;
 
 impl Stains {
+    /// Count of the bytes of [`Stains::save`].
+    pub fn save_size(&self) -> usize {
+        56 + 12 * self.len() + 8 * self.held.len() + SEAL
+    }
+
     /// The stains as bytes; how liquid stains is not part of them.
     pub fn save(&self) -> Vec<u8> {
-        let count = self.len();
-        let mut out = Vec::with_capacity(56 + 12 * count + 8 * self.held.len() + SEAL);
+        let mut out = Vec::with_capacity(self.save_size());
         out.extend(MAGIC);
         out.extend(self.mesh);
         out.extend(self.unit.to_le_bytes());
         out.extend(self.time.to_le_bytes());
-        out.extend((count as u64).to_le_bytes());
+        out.extend((self.len() as u64).to_le_bytes());
         out.extend((self.held.len() as u64).to_le_bytes());
         out.extend(self.stain.iter().flat_map(|stain| stain.to_le_bytes()));
         out.extend(self.since.iter().flat_map(|since| since.to_le_bytes()));

@@ -199,6 +199,21 @@ fn what_is_wrong_is_one_sentence_and_leaves_nothing_behind() {
     with(&format!("{dye}half_life = 3\n"), &["`half_life`", "leave it out"]);
     with(&format!("{dye}range = 0\n"), &["`range`", "not 0"]);
     with(&format!("{dye}start = 2\n"), &["`start`", "-1 to 1, its range"]);
+    with(&format!("{dye}stains = true\n"), &["`stains` in [[scalar]]", "where shallow.stains is"]);
+    write_scene(folder, &format!("{POUR}{dye}stains = true\n[[scalar]]\nname = \"age\"\nstains = true\n"));
+    refused("--set shallow.stains=true", &["`stains` in [[scalar]]", "another scalar stains"]);
+    refused("--set shallow.stain_half_life=0", &["`stain_half_life`", "0.001 to"]);
+    let thick = format!("{dye}thickens_times = 9\n");
+    with(&thick, &["`thickens_to` in [[scalar]]", "is missing"]);
+    with(&format!("{thick}thickens_to = 0\n"), &["`thickens_to`", "must not be `thickens_from`, 0"]);
+    with(&format!("{thick}thickens_to = 2\n"), &["`thickens_to`", "-1 to 1, its range"]);
+    with(&format!("{thick}thickens_to = 1\nthickens_from = -3\n"), &["`thickens_from`", "-1 to 1"]);
+    with(&format!("{dye}thickens_to = 1\n"), &["`thickens_to`", "has `thickens_times`: leave it out"]);
+    with(&format!("{dye}thickens_times = 0\n"), &["`thickens_times`", "not 0"]);
+    let second = "[[scalar]]\nname = \"age\"\nthickens_times = 2\nthickens_to = 1\n";
+    with(&format!("{thick}thickens_to = 1\n{second}"), &["`thickens_times`", "another scalar thickens"]);
+    write_scene(folder, &format!("{POUR}{thick}thickens_to = 1\n"));
+    refused("--set shallow.viscosity=0", &["`thickens_times`", "shallow.viscosity is 0"]);
     with(
         "[[source]]\nat = [0, 0, 0]\nradius = 0\nrate_ml = 1\ncarries = { dye = 1 }\n",
         &["`carries` in [[source]]", "`dye`"],
@@ -209,6 +224,9 @@ fn what_is_wrong_is_one_sentence_and_leaves_nothing_behind() {
     refused("--set shallow.falls_height=-1", &["`falls_height`", "not -1"]);
     refused("--set shallow.falls_interval=2", &["`falls_interval`", "0.0001 to 1 s"]);
     refused("--set shallow.falls_drop_ml=nan", &["`falls_drop_ml`", "finite"]);
+    refused("--set shallow.friction=floor", &["`friction`", "ground", "walls"]);
+    refused("--set shallow.rest=0.1", &["`rest`", "0 to 0.01 m/s"]);
+    refused("--set shallow.rest=nan", &["`rest`", "finite"]);
     refused("--set shallow.lifts=1", &["`lifts`", "true or false"]);
     with("[[object]]\nradius = 1\n", &["`shape`", "is missing (or `file`"]);
     with("[[object]]\nshape = \"sphere\"\n", &["`radius`", "is missing"]);

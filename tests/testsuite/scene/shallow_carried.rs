@@ -179,3 +179,87 @@ fn bumps_of_a_mesh_do_not_show_through_films() {
         assert_eq!(reports[0], reports[1]);
     }
 }
+
+#[test]
+fn liquid_that_thickens_and_that_walls_hold_back_runs_less_far_and_resumes() {
+    let folder = tempfile::tempdir().unwrap();
+    let folder = folder.path();
+    let source = "[[source]]\nat = [-0.03, 0, 0]\nradius = 0.004\nrate_ml = 4\ncarries = { milk = 1 }\n\
+                  [[pour]]\nat = [-0.03, 0, 0]\nradius = 0.006\nvolume_ml = 2\n";
+    let scalars = "[[scalar]]\nname = \"age\"\nlaw = \"ages\"\nrange = 60\n\
+                   [[scalar]]\nname = \"milk\"\nthickens_times = 500\nthickens_to = 0.5\n";
+    write_shot(folder, "border = \"closed\"\nrest = 0\n", &format!("{scalars}{source}"));
+    let wet = |out: &str| report(folder, out, 30)["wet_columns"].as_u64().unwrap();
+    let shot = "shallow spill.toml";
+    works(folder, &format!("{shot} -o thick"));
+    works(folder, &format!("{shot} -o thin --set scalar.2.thickens_times=1"));
+    works(folder, &format!("{shot} -o walls --set shallow.friction=walls"));
+    assert!(wet("thick") + 20 < wet("thin"), "{} and {} columns", wet("thick"), wet("thin"));
+    let last = |out: &str| fs::read(folder.join(out).join("liquid/liquid.0030.ply")).unwrap();
+    assert!(last("walls") != last("thick"));
+    kill_at(folder, &format!("{shot} -o killed"), "killed/liquid/liquid.0014.ply");
+    works(folder, &format!("{shot} -o killed"));
+    are_same(folder, "thick", "killed");
+    // How it thickens and rests may be another from a frame on; where friction acts may not.
+    crate::program::fails(
+        folder,
+        &format!("{shot} -o thick --from 20 --set shallow.friction=walls"),
+        2,
+        &["shallow.friction"],
+    );
+    works(
+        folder,
+        &format!("{shot} -o thick --from 20 --set scalar.2.thickens_times=1 --set shallow.rest=1e-6"),
+    );
+    assert!(last("thick") != last("killed"));
+}
+
+#[test]
+fn liquid_stains_the_terrain_and_resumes_with_its_stains() {
+    let folder = tempfile::tempdir().unwrap();
+    let folder = folder.path();
+    let tables = "[[scalar]]\nname = \"milk\"\nstains = true\n\
+                  [[pour]]\nat = [0.01, 0, 0]\nradius = 0.006\nvolume_ml = 2\ncarries = { milk = 1 }\n";
+    write_shot(folder, "border = \"closed\"\nstains = true\nlifts = false\n", tables);
+    // Corners of squares of 2 mm: a floor with vertices between which liquid flows.
+    let count = 41u32;
+    let place = |index: u32| {
+        Vec3::new(0.002 * (index % count) as f32 - 0.04, 0.0, 0.002 * (index / count) as f32 - 0.04)
+    };
+    let is_square = |index: &u32| index % count + 1 < count && index / count + 1 < count;
+    let square = |a: u32| [[a, a + count, a + count + 1], [a, a + count + 1, a + 1]];
+    let triangles = (0..count * count).filter(is_square).flat_map(square).collect();
+    let floor = TriMesh { positions: (0..count * count).map(place).collect(), triangles };
+    mesh::write(&folder.join("shelf.ply"), &floor).unwrap();
+    let shot = "shallow spill.toml";
+    works(folder, &format!("{shot} -o whole"));
+    let stains = |out: &str, frame: u32| {
+        let terrain =
+            mesh::read_detailed(&folder.join(out).join(format!("terrain/terrain.{frame:04}.ply"))).unwrap();
+        assert_eq!(terrain.mesh.triangles, floor.triangles);
+        assert_eq!(terrain.mesh.positions, floor.positions);
+        terrain.of_vertices("stain").unwrap()
+    };
+    let (first, last) = (stains("whole", 1), stains("whole", 30));
+    assert!(first.iter().all(|stain| *stain == 0.0));
+    assert!(last.iter().all(|stain| (0.0..=1.0).contains(stain)));
+    // Where it was poured it has stood for 29 frames: 1 - exp(-29 / 60 / 0.2) of a stain.
+    let at = last[(20 * count + 25) as usize];
+    assert!((at - 0.911).abs() < 0.01 && last[0] == 0.0, "{at}");
+    kill_at(folder, &format!("{shot} -o killed"), "killed/liquid/liquid.0014.ply");
+    works(folder, &format!("{shot} -o killed"));
+    are_same(folder, "whole", "killed");
+    assert_eq!(last, stains("killed", 30));
+    // Clear water stains nothing; without a scalar that stains any liquid does. Both may be other ones from a frame on.
+    works(folder, &format!("{shot} -o clear --set pour.1.carries={{milk=0.0}}"));
+    assert!(stains("clear", 30).iter().all(|stain| *stain == 0.0));
+    works(folder, &format!("{shot} -o clear --from 10 --set scalar.1.stains=false"));
+    assert!(stains("clear", 9)[(20 * count + 25) as usize] == 0.0);
+    assert!(stains("clear", 30)[(20 * count + 25) as usize] > 0.7);
+    crate::program::fails(
+        folder,
+        &format!("{shot} -o whole --from 20 --set shallow.stains=false --set scalar.1.stains=false"),
+        2,
+        &["shallow.stains"],
+    );
+}
