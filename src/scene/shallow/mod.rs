@@ -356,7 +356,7 @@ fn params(values: &Values) -> Params {
             drop: number("falls_drop_ml").map_or(usual.drop, |drop| drop * ML),
             most: value("falls_most").and_then(Value::whole).map_or(usual.most, |most| most as usize),
         }),
-        rest: number("rest").unwrap_or(1e-6),
+        rest: number("rest").unwrap_or(0.0),
     }
 }
 
