@@ -272,7 +272,7 @@ static void thickening(frz_context *ctx) {
     float wet[2] = {0, 0};
     int times, at;
     sheet_make(&bowl);
-    CHECK(params.friction == FRZ_SHALLOW_GROUND && params.rest == 1e-6 && params.thickening_scalar == FRZ_SHALLOW_NO_SCALAR);
+    CHECK(params.friction == FRZ_SHALLOW_GROUND && params.rest == 0 && params.thickening_scalar == FRZ_SHALLOW_NO_SCALAR);
     params.thickening_scalar = 0, params.thickening_from = 0, params.thickening_to = 1;
     for (times = 0; times < 2; ++times) {
         static float depths[SIDE * SIDE * 4];
