@@ -4844,7 +4844,8 @@ frz_status frz_shallow_snapshot_drops_mesh(frz_context *context,
 
 /**
  * Reports what the liquid does to each body of frz_shallow_set_bodies now, in real time (frz_shallow): the weight that buoys or pushes it, the drag of
- * what flows over it and of its own motion, and how much of it is under.
+ * what flows over it and of its own motion, and how much of it is under. What stands below a body is as the last step has found it: after
+ * frz_shallow_set_bodies a step comes first.
  *
  * density: of the liquid (kg/m3), over 0, finite: blood 1060, water 1000.
  * velocities: double[3] for each body (m/s), finite, in their order; data NULL with a count of 0: none of them moves.

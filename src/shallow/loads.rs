@@ -57,8 +57,8 @@ struct Face {
 }
 
 impl Shallow {
-    /// What the liquid does to each of [`Shallow::bodies`] now; `velocities` are theirs (m/s), `density` is the liquid's (kg/m3; blood 1,060, water 1,000). Allocates
-    /// nothing.
+    /// What the liquid does to each of [`Shallow::bodies`] now; `velocities` are theirs (m/s), `density` is the liquid's (kg/m3; blood 1,060, water 1,000). What stands
+    /// below a body is as the last step has found it: after [`Shallow::set_bodies`] a step comes first. Allocates nothing.
     ///
     /// # Errors
     /// `Argument`: a density that is not positive and finite, not one velocity and one place for each body, a velocity that is not finite.
