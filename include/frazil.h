@@ -2135,8 +2135,8 @@ typedef struct {
      */
     uint32_t reserved2;
     /**
-     * Velocity (m/s) below which liquid whose surface is level comes to rest, and then takes no time, 0 to 0.01; 0 is usual: only liquid that
-     * was never stirred is at rest. 1e-6 does well.
+     * Velocity (m/s) below which liquid whose surface is level comes to rest, and then takes no time, 0 to 0.01; 0 is usual: never. 1e-6
+     * does well.
      */
     double rest;
     /**

@@ -146,8 +146,8 @@ pub struct frz_shallow_params {
     pub falls_most: u32,
     /// 0.
     pub reserved2: u32,
-    /// Velocity (m/s) below which liquid whose surface is level comes to rest, and then takes no time, 0 to 0.01; 0 is usual: only liquid that
-    /// was never stirred is at rest. 1e-6 does well.
+    /// Velocity (m/s) below which liquid whose surface is level comes to rest, and then takes no time, 0 to 0.01; 0 is usual: never. 1e-6
+    /// does well.
     pub rest: f64,
     /// A frz_shallow_friction, which cannot change; FRZ_SHALLOW_GROUND is usual.
     pub friction: u32,

@@ -131,12 +131,7 @@ fn tilt(params: &Params, measures: &Measures) -> [i32; 2] {
 
 /// What rests in all steps.
 pub fn bounds(params: &Params, measures: &Measures) -> Bounds {
-    Bounds {
-        level: level(params, measures),
-        tilt: tilt(params, measures),
-        still: measures.still,
-        drags: params.friction == Friction::Walls,
-    }
+    Bounds { level: level(params, measures), tilt: tilt(params, measures), still: measures.still }
 }
 
 /// What the pipes share in a step of `dt` after one of `last` (s).

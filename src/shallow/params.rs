@@ -29,7 +29,8 @@ pub struct Params {
     pub falls: Option<Falls>,
     /// Where the liquid is slower than this (m/s), and its surface so level that in 1/60 s it would not get faster from rest, it comes to rest; 0 to 0.01.
     /// 1e-6 does well: a micrometre a second on a slope of 6e-6. Pools at rest sleep, and cost nothing; while liquid moves, the test takes a third of a step
-    /// more. 0: only liquid that was never stirred is at rest.
+    /// more. 0: never; nor beside walls ([`Friction::Walls`]), where what flows drags along
+    /// what is beside it.
     pub rest: f64,
 }
 

@@ -139,7 +139,7 @@ pub const KEYS: &[Key] = &[
         "shallow",
         "rest",
         Kind::Number(0.0, 0.01, "m/s"),
-        "velocity (m/s) below which liquid whose surface is level comes to rest, and then takes no time: 1e-6 does well; 0: only what was never stirred rests",
+        "velocity (m/s) below which liquid whose surface is level comes to rest, and then takes no time: 1e-6 does well; 0: never",
     )
     .or("0")
     .concerns(STEP),

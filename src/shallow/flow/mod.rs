@@ -284,7 +284,7 @@ impl Flow {
         let Self { depth, links, network, active, .. } = self;
         let numbers = [&**east, south, left_east, left_south];
         let still = Still { columns, pipes, depth, numbers, links, heads: network.over(), bounds };
-        if !self.is_sleepless && !self.amounts.has_laws() && !bounds.drags {
+        if bounds.level > 0 && !self.is_sleepless && !self.amounts.has_laws() {
             active.fall_asleep(&still);
         }
     }

@@ -32,14 +32,12 @@ pub struct Still<'a> {
 /// What of a step decides what rests.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Bounds {
-    /// Surfaces that differ by so much at most drive nothing (units).
+    /// Surfaces that differ by so much at most drive nothing (units); 0: nothing comes to rest.
     pub level: i32,
     /// What gravity adds to the fall of the surface over a cell along x and along z (units).
     pub tilt: [i32; 2],
     /// Surface of the liquid at rest beyond the border (units), or BOTTOMLESS: there is none.
     pub still: i32,
-    /// Whether what flows drags along what is beside it: then nothing sleeps.
-    pub drags: bool,
 }
 
 impl Still<'_> {
