@@ -21,7 +21,7 @@ const LIGHTEST: f32 = 16.0;
 /// And at least this many times: what is fast can be told from what is not.
 const HEAVIEST: f32 = 1.0 + 1.0 / 128.0;
 
-/// Inertia of a column's pipes that counts as it is ([`packed`]).
+/// Inertia of a column's pipes that counts as it is (`packed`).
 pub const NORMAL: u32 = 0x3f80_3f80;
 
 /// Where inertia counts less.
