@@ -3,6 +3,7 @@
 use frazil::base::cpu::cpu_level;
 use frazil::shallow::Shallow;
 use frazil::shallow::columns::{Columns, NONE};
+use frazil::shallow::surface::ledges::Ledges;
 use frazil::shallow::surface::{Counts, Depths, Indices, Layout, Surface, Target, bound, check};
 
 use crate::common::bodies::Dice;
@@ -43,7 +44,7 @@ pub fn run(h: &mut Harness) {
         let notes = each.map(|(_, note)| note).join("; ");
         h.gate("shallow.surface_copy", most, &format!("{:?} {notes}", cpu_level()));
     }
-    if h.wants("shallow.surface_unlinked") {
+    if h.wants("shallow.surface_unlinked") || h.wants("shallow.surface_cracks") {
         unlinked(h);
     }
 }
@@ -62,7 +63,14 @@ struct Buffers {
 impl Buffers {
     /// As large as any liquid in these columns needs them.
     fn new(columns: &Columns) -> Self {
-        let most = bound(columns);
+        Self::with(columns, &Ledges::default())
+    }
+
+    /// The same, with skirts.
+    fn with(columns: &Columns, ledges: &Ledges) -> Self {
+        let (mut most, more) = (bound(columns), ledges.bound());
+        most.vertices += more.vertices;
+        most.indices += more.indices;
         let [positions, normals, velocities] = [(); 3].map(|()| vec![0.0; 3 * most.vertices]);
         Self {
             positions,
@@ -199,15 +207,25 @@ struct Pairs {
     missing: usize,
     /// Linked columns that no third one is linked with.
     alone: usize,
+    /// Edges between wet columns, within the domain, that have one triangle only: without skirts, and with them.
+    open: usize,
+    cracks: usize,
 }
 
 impl Pairs {
     /// Looks at the surface of a liquid.
     fn look(&mut self, surface: &mut Surface, columns: &Columns, depth: &[i32]) {
-        let mut buffers = Buffers::new(columns);
+        let mut ledges = Ledges::default();
+        ledges.find(columns);
+        let mut buffers = Buffers::with(columns, &ledges);
+        let depths = Depths { depth, ledges: Some(&ledges), ..Depths::default() };
+        let counts =
+            surface.build(columns, &depths, &Layout::default(), &mut buffers.checked()).expect("a surface");
+        self.cracks += open_edges(columns, depth, &buffers, &counts);
         let depths = Depths { depth, ..Depths::default() };
         let counts =
             surface.build(columns, &depths, &Layout::default(), &mut buffers.checked()).expect("a surface");
+        self.open += open_edges(columns, depth, &buffers, &counts);
         let indices = &buffers.indices[..counts.indices];
         let checked = check(columns, depth, &buffers.columns[..counts.vertices], indices);
         self.missing += checked.unlinked;
@@ -229,6 +247,26 @@ impl Pairs {
             }
         }
     }
+}
+
+/// Count of edges between wet columns that have a triangle on one side only, but for those along the domain's border.
+fn open_edges(columns: &Columns, depth: &[i32], buffers: &Buffers, counts: &Counts) -> usize {
+    let mut edges: Vec<[u32; 2]> = Vec::with_capacity(counts.indices);
+    for [a, b, c] in buffers.indices[..counts.indices].as_chunks::<3>().0 {
+        edges.extend([[*a, *b], [*b, *c], [*c, *a]]);
+    }
+    edges.sort_unstable();
+    let [nx, nz] = columns.grid.size;
+    let is_wet = |column: u32| column != NONE && depth[column as usize] > 0;
+    let is_open = |&&[a, b]: &&[u32; 2]| {
+        let ends = [a, b].map(|vertex| buffers.columns[vertex as usize]);
+        if edges.binary_search(&[b, a]).is_ok() || !ends.into_iter().all(is_wet) {
+            return false;
+        }
+        let [[ax, az], [bx, bz]] = ends.map(|column| columns.cell(column as usize));
+        !(ax == bx && [0, nx - 1].contains(&ax) || az == bz && [0, nz - 1].contains(&az))
+    };
+    edges.iter().filter(is_open).count()
 }
 
 /// Random terrains with layers: liquid that flows there, and depths by chance, in part up to ceilings.
@@ -272,10 +310,17 @@ fn unlinked(h: &mut Harness) {
         liquid.step(&ctx, FRAME).expect("a frame");
         look(liquid.columns(), liquid.depths());
     }
-    let Pairs { edges, false_edges, missing, alone } = pairs;
+    let Pairs { edges, false_edges, missing, alone, open, cracks } = pairs;
     let note = format!(
         "{surfaces} surfaces, up to {layers} layers; of {edges} edges between wet columns {false_edges} join what is not linked; \
          {missing} linked pairs without an edge, but {alone} that no third column is linked with"
     );
-    h.gate("shallow.surface_unlinked", (false_edges + missing) as f64, &note);
+    if h.wants("shallow.surface_unlinked") {
+        h.gate("shallow.surface_unlinked", (false_edges + missing) as f64, &note);
+    }
+    if h.wants("shallow.surface_cracks") {
+        let note =
+            format!("{surfaces} surfaces, up to {layers} layers; without skirts {open} of {edges} edges");
+        h.gate("shallow.surface_cracks", cracks as f64, &note);
+    }
 }

@@ -28,6 +28,7 @@ impl Skirts {
         self.edges.clear();
         self.vertices.clear();
         let Some(ledges) = ledges else { return [0; 2] };
+        self.edges.reserve(ledges.edges.len());
         self.vertices.resize(ledges.hems.len(), NONE);
         for (at, ledge) in ledges.edges.iter().enumerate() {
             let columns = ledge.hems.map(|hem| ledges.hems[hem as usize].column as usize);
