@@ -139,6 +139,7 @@ pub(super) fn find_groups(
     let mut has_walls = false;
     each_odd(found, |found, block| {
         let odd = found.blocks[block].odd;
+        found.blocks[block].searched = odd;
         search.cells.enter(scene, found, &[], block, odd);
         for quartet in places(odd) {
             let is_plain = search.find(quartet, |wall| found.add_wall(wall as usize));
@@ -187,6 +188,13 @@ fn each_odd(found: &mut Found, mut visit: impl FnMut(&mut Found, usize)) {
     let odd = std::mem::take(&mut found.odd);
     odd.iter().for_each(|block| visit(found, block));
     found.odd = odd;
+}
+
+impl Search {
+    /// The columns or extras of all triangles of odd quartets, those without walls first.
+    pub fn triangles(&self) -> impl Iterator<Item = [u32; 3]> + '_ {
+        self.found.iter().flatten().copied()
+    }
 }
 
 /// Calls `add` with the columns or extras of each triangle of odd quartets, in order.

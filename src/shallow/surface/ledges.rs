@@ -1,30 +1,21 @@
-//! Ledges: edges between columns behind which films end over nothing, as at the rim of a shelf or of a hole in it. There the surface of a film would
-//! end half a cell before the ground does, and be open below: a skirt (`skirts.rs`) closes it.
+//! Ledges: where the surface ends between wet columns, as at the rim of a shelf or of a hole in it. It would end half a cell before the ground does, and be
+//! open below: a skirt (`skirts.rs`) closes it.
 //!
 //! | word | meaning |
 //! |---|---|
-//! | ledge | two columns side by side, or at the corners of a cell's diagonal, that a film links, with no film to link them with on one side |
-//! | hem | where the surface of a column at a ledge comes down to the ground: towards the sides where nothing is |
+//! | hem | where the surface of a column comes down to the ground, towards the sides where nothing is linked with it |
 //! | silhouette | where the ground itself ends, between the middles of the cells |
 
-use super::links::{RING, Scene, cell_at};
-use super::{Columns, Depths, Indices, Layout, NONE, Surface, Target, bound};
+use super::links::{RING, cell_at};
+use super::skirts::sides;
+use super::{Columns, Counts, Depths, Indices, Layout, NONE, STRIP, Surface, Target, bound};
 use crate::base::Vec3;
 use crate::error::{Error, Result};
 
 /// How far hems are from the middle of their cell where no mesh says where the ground ends (cells).
 const HALF: f32 = 0.5;
 
-/// Two columns between which the surface ends: as seen from above, nothing is to the right of the way from the first to the second.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub(super) struct Ledge {
-    /// Their hems.
-    pub hems: [u32; 2],
-    /// From each of them, the place in the ring of cells around that nothing is linked with.
-    pub beyond: [u8; 2],
-}
-
-/// Where the surface of a column at a ledge ends.
+/// Where the surface of a column ends.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Hem {
     /// Index of the column.
@@ -43,66 +34,28 @@ impl Hem {
     }
 }
 
-/// The ledges of columns: see [`Depths::ledges`].
+/// Where the ground of columns ends: see [`Depths::ledges`].
 #[derive(Debug, Clone, Default)]
 pub struct Ledges {
-    pub(super) edges: Vec<Ledge>,
-    /// In order of their columns.
-    pub(super) hems: Vec<Hem>,
+    /// Where films end, and the ground with them, in order of columns.
+    hems: Vec<Hem>,
     /// Count of indices of the columns.
     pub(super) columns: usize,
+    /// Count of columns, of which each may have a hem.
+    pub(super) most: usize,
 }
 
 impl Ledges {
-    /// Finds the ledges of columns; the surface goes on for half a cell behind the middle of the last one. To be called again when the
-    /// columns have changed.
-    ///
-    /// 2 ms for 200 x 200 cells with a few layers.
+    /// Takes columns: their surface goes on for half a cell behind the middle of the last one. To be called again when they have changed.
     pub fn find(&mut self, columns: &Columns) {
-        let Self { edges, hems, columns: count } = self;
-        edges.clear();
-        hems.clear();
-        *count = columns.len();
-        let (ways, triangles) = films(columns);
-        let mut found: Vec<([u32; 2], [u8; 2])> = Vec::new();
-        for triangle in triangles {
-            let [a, b, c] = triangle;
-            for ends in [[a, b], [b, c], [c, a]] {
-                let Some(way) = way(columns, ends) else { continue };
-                if ways[ends[1] as usize] >> ((way + 4) % 8) & 1 == 1 {
-                    continue;
-                }
-                // To the right of a way along an axis; of a diagonal, the cell in the corner.
-                let turns = if way % 2 == 0 { [6, 6] } else { [7, 5] };
-                let beyond = turns.map(|turn| (way + turn) % 8);
-                let is_inside = |end: u32, ring: u8| {
-                    let [x, z] = cell_at(columns.cell(end as usize), RING[usize::from(ring)]);
-                    x < columns.grid.size[0] && z < columns.grid.size[1]
-                };
-                if is_inside(ends[0], beyond[0]) && is_inside(ends[1], beyond[1]) {
-                    found.push((ends, beyond));
-                }
-            }
-        }
-        found.sort_unstable();
-        found.dedup();
-        hems.extend(found.iter().flat_map(|(ends, _)| ends).map(|&column| Hem {
-            column,
-            sides: [None; 4],
-            rise: 0.0,
-        }));
-        hems.sort_unstable_by_key(|hem| hem.column);
-        hems.dedup_by_key(|hem| hem.column);
-        for (ends, beyond) in found {
-            let at = ends.map(|column| hems.partition_point(|hem| hem.column < column));
-            for (hem, ring) in at.into_iter().zip(beyond) {
-                hems[hem].sides[usize::from(ring / 2)] = Some(HALF);
-            }
-            edges.push(Ledge { hems: at.map(|hem| hem as u32), beyond });
-        }
+        self.hems.clear();
+        self.columns = columns.len();
+        self.most = columns.count();
     }
 
-    /// Finds the ledges of columns, and where the ground of a mesh, which the columns were made from, ends: the surface goes on to there.
+    /// Takes columns, and finds where the ground of a mesh, which they were made from, ends: the surface goes on to there.
+    ///
+    /// 70 ms for 200 x 200 cells and 380,000 triangles.
     ///
     /// # Errors
     /// `Argument`: a vertex that is not finite, or a face with a vertex that is not there.
@@ -114,6 +67,7 @@ impl Ledges {
             return Err(Error::argument("a face of the ground has a vertex that is not there"));
         }
         self.find(columns);
+        self.hems = ends_of_films(columns);
         let mut ends = vec![[None; 4]; self.hems.len()];
         for face in faces {
             let corners = face.map(|vertex| <[f32; 3]>::from(positions[vertex as usize]).map(f64::from));
@@ -130,6 +84,22 @@ impl Ledges {
             hem.rise = rise.unwrap_or(0.0) as f32;
         }
         Ok(())
+    }
+
+    /// Sets how far the ground reaches on the sides that a hem has.
+    pub(super) fn reach(&self, hem: &mut Hem) {
+        let known = self.hems.binary_search_by_key(&hem.column, |known| known.column).ok();
+        let known = known.map(|at| &self.hems[at]);
+        for (at, reach) in hem.sides.iter_mut().enumerate() {
+            *reach = reach.map(|_| known.and_then(|known| known.sides[at]).unwrap_or(HALF));
+        }
+        hem.rise = known.map_or(0.0, |known| known.rise);
+    }
+
+    /// The most that skirts add to a surface: far more than they do.
+    pub fn bound(&self) -> Counts {
+        // Of the links between a column and those around it half are its own.
+        Counts { vertices: self.most, extras: 0, indices: 6 * 4 * self.most }
     }
 
     /// Looks how far a triangle reaches from the columns at ledges.
@@ -149,8 +119,7 @@ impl Ledges {
         let (xs, zs) = (cells(0, nx), cells(1, nz));
         for z in zs {
             let row = columns.row(z);
-            let own =
-                |strip: usize| self.hems.partition_point(|hem| (hem.column as usize) < strip * super::STRIP);
+            let own = |strip: usize| self.hems.partition_point(|hem| (hem.column as usize) < strip * STRIP);
             for (number, hem) in (own(row.start)..own(row.end)).map(|at| (at, &self.hems[at])) {
                 let [x, _] = columns.cell(hem.column as usize);
                 if !xs.contains(&x) {
@@ -174,11 +143,6 @@ impl Ledges {
                 }
             }
         }
-    }
-
-    /// The most that skirts add to a surface.
-    pub fn bound(&self) -> super::Counts {
-        super::Counts { vertices: self.hems.len(), extras: 0, indices: 6 * self.edges.len() }
     }
 }
 
@@ -219,39 +183,53 @@ fn crossing(corners: [[f64; 3]; 3]) -> Option<End> {
     Some(End { at, height: near[1] + (at - near[0]) / length * (far[1] - near[1]) })
 }
 
-/// The triangles of a film on all columns, and of each column the ways that edges lead from it: a bit for each place of the ring of cells around.
-fn films(columns: &Columns) -> (Vec<u8>, Vec<[u32; 3]>) {
-    let depth: Vec<i32> = (0..columns.len())
-        .map(|index| {
-            i32::from(columns.is_column(index) && columns.ceilings()[index] > columns.bases()[index])
-        })
-        .collect();
+/// Where films end within the domain: hems of the columns there, in order.
+fn ends_of_films(columns: &Columns) -> Vec<Hem> {
+    let is_room =
+        |index: usize| columns.is_column(index) && columns.ceilings()[index] > columns.bases()[index];
+    let depth: Vec<i32> = (0..columns.len()).map(|index| i32::from(is_room(index))).collect();
     let most = bound(columns);
     let (mut of_vertices, mut indices) = (vec![NONE; most.vertices], vec![0; most.indices]);
     let depths = Depths { depth: &depth, ..Depths::default() };
     let mut target =
         Target { columns: Some(&mut of_vertices), indices: Indices::U32(&mut indices), ..Target::default() };
     let built = Surface::default().build(columns, &depths, &Layout::default(), &mut target);
-    let count = built.map_or(0, |counts| counts.indices);
-    let mut ways = vec![0; columns.len()];
-    let mut triangles: Vec<[u32; 3]> = indices[..count].as_chunks().0.to_vec();
-    for triangle in &mut triangles {
-        *triangle = triangle.map(|vertex| of_vertices[vertex as usize]);
-        let [a, b, c] = *triangle;
-        for ends in [[a, b], [b, c], [c, a]] {
-            if let Some(way) = way(columns, ends) {
-                ways[ends[0] as usize] |= 1 << way;
+    let triangles = indices[..built.map_or(0, |counts| counts.indices)].as_chunks::<3>().0;
+    let edges = triangles.iter().flat_map(|&[a, b, c]| [[a, b], [b, c], [c, a]]);
+    let edges = edges.map(|edge| edge.map(|vertex| of_vertices[vertex as usize]));
+    // Of each column the ways that edges lead from it.
+    let mut ways = vec![0u8; columns.len()];
+    for edge in edges.clone() {
+        if let Some(way) = way(columns, edge) {
+            ways[edge[0] as usize] |= 1 << way;
+        }
+    }
+    let mut hems: Vec<Hem> = Vec::new();
+    for edge in edges {
+        let Some(at) = way(columns, edge) else { continue };
+        if ways[edge[1] as usize] >> ((at + 4) % 8) & 1 == 0
+            && edge.iter().all(|&end| depth[end as usize] > 0)
+        {
+            for (&column, side) in edge.iter().zip(sides(at)) {
+                let mut hem = Hem { column, sides: [None; 4], rise: 0.0 };
+                hem.sides[usize::from(side)] = Some(HALF);
+                hems.push(hem);
             }
         }
     }
-    let scene = Scene { columns, depth: &depth, above: &[] };
-    triangles
-        .retain(|triangle| triangle.iter().all(|&column| column != NONE && scene.is_wet(column as usize)));
-    (ways, triangles)
+    hems.sort_unstable_by_key(|hem| hem.column);
+    hems.dedup_by(|next, hem| {
+        let same = next.column == hem.column;
+        if same {
+            (0..4).for_each(|side| hem.sides[side] = hem.sides[side].or(next.sides[side]));
+        }
+        same
+    });
+    hems
 }
 
 /// Place in the ring of cells around a column where another one is.
-fn way(columns: &Columns, [from, to]: [u32; 2]) -> Option<u8> {
+pub(super) fn way(columns: &Columns, [from, to]: [u32; 2]) -> Option<u8> {
     if from == NONE || to == NONE {
         return None;
     }

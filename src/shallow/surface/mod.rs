@@ -246,7 +246,7 @@ impl Surface {
         let extras = self.walls.number(columns_used);
         self.found.has_means |= extras > 0;
         let vertices = columns_used + extras;
-        let [hems, skirts] = self.skirts.find(scene, &self.found, depths.ledges, vertices);
+        let [hems, skirts] = self.skirts.find(scene, &self.found, &self.search, depths.ledges, vertices);
         Ok(Counts {
             vertices: vertices as usize + hems,
             extras: extras as usize,
@@ -280,13 +280,13 @@ impl Surface {
         let scene = Scene { columns, depth: depths.depth, above: &self.above };
         let (found, walls, flipped) = (&self.found, &self.walls.list, layout.left_handed);
         let at = indices::write_triangles(scene, found, walls, &self.search, flipped, &mut target.indices);
-        self.skirts.write_triangles(depths.ledges, found, at, flipped, &mut target.indices);
+        self.skirts.write_triangles(found, at, flipped, &mut target.indices);
         self.normals.reset(columns);
         shown::find_heights(columns, found, depths, layout, &mut self.heights);
         let vertices =
             Vertices::new(scene, found, walls, &self.heights, depths, layout, target.normals.is_some());
         vertices.write(&mut self.normals, &mut self.around, target);
-        self.skirts.write_hems(depths.ledges, &vertices, target);
+        self.skirts.write_hems(&vertices, target);
         self.normals.clear(found);
         Ok(counts)
     }

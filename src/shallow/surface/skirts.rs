@@ -1,98 +1,190 @@
-//! Skirts: where the surface ends at a ledge, it comes down to the ground's edge.
+//! Skirts: where the surface ends between wet columns, it comes down to the ground.
+//!
+//! An edge between two wet columns that has a triangle on one side only lies between a full quartet and an odd one, or in odd ones. Of all other edges both
+//! sides are known to be closed, so that few are looked at.
 
-use super::ledges::Ledges;
-use super::links::{RING, Scene};
-use super::strips::Found;
-use super::vertices::Vertices;
+use super::groups::Search;
+use super::ledges::{Hem, Ledges, way};
+use super::links::{RING, Scene, cell_at};
+use super::strips::{Found, places, some};
 use super::{Indices, NONE, STRIP, Target};
+use crate::shallow::surface::vertices::Vertices;
 
 /// The skirts of a surface; keeps its memory.
 #[derive(Debug, Default)]
 pub(super) struct Skirts {
-    /// Ledges that have one, by place.
-    edges: Vec<u32>,
-    /// The vertex of each hem, or [`NONE`].
-    vertices: Vec<u32>,
+    /// Edges of odd quartets and of full ones beside them, between wet columns, as triangles have them.
+    edges: Vec<[u32; 2]>,
+    /// Of each column the ways that such edges lead from it: a bit for each place of the ring of cells around. 0 between surfaces.
+    ways: Vec<u8>,
+    /// The edges that have a skirt.
+    open: Vec<[u32; 2]>,
+    /// Hems, in order of their vertices, and the first of these.
+    hems: Vec<Hem>,
+    first: u32,
+    /// Of each column the place of its hem, or [`NONE`], as all are between surfaces.
+    places: Vec<u32>,
 }
 
 impl Skirts {
-    /// Finds the ledges with wet columns, behind which no liquid is linked with both; the first hem is vertex `first`. Returns the counts of
-    /// vertices and of indices.
+    /// Finds the edges that have a triangle on one side only; the first hem is vertex `first`. Returns the counts of vertices and of indices.
     pub fn find(
         &mut self,
         scene: Scene<'_>,
         found: &Found,
+        search: &Search,
         ledges: Option<&Ledges>,
         first: u32,
     ) -> [usize; 2] {
-        self.edges.clear();
-        self.vertices.clear();
+        let len = scene.columns.len();
+        self.forget();
+        self.first = first;
+        let Self { edges, ways, open, hems, places, .. } = self;
         let Some(ledges) = ledges else { return [0; 2] };
-        self.edges.reserve(ledges.edges.len());
-        self.vertices.resize(ledges.hems.len(), NONE);
-        for (at, ledge) in ledges.edges.iter().enumerate() {
-            let columns = ledge.hems.map(|hem| ledges.hems[hem as usize].column as usize);
-            let [a, b] = columns;
-            let is_vertex = |column: usize| found.states[column / STRIP].used >> (column % STRIP) & 1 == 1;
-            let is_shown = |column: usize| scene.is_wet(column) && is_vertex(column);
-            if !columns.into_iter().all(is_shown) || !scene.are_linked(a, b) {
+        if ways.len() != len {
+            ways.clear();
+            ways.resize(len, 0);
+            places.clear();
+            places.resize(len, NONE);
+            // From then on nothing is allocated.
+            edges.reserve(4 * ledges.most);
+            open.reserve(ledges.most);
+            hems.reserve(ledges.most);
+        }
+        edges_of_full(scene, found, |edge| edges.push(edge));
+        let is_column = |id: u32| (id as usize) < len;
+        for [a, b, c] in search.triangles() {
+            edges.extend(
+                [[a, b], [b, c], [c, a]].into_iter().filter(|edge| edge.iter().all(|&end| is_column(end))),
+            );
+        }
+        edges.retain(|edge| edge.iter().all(|&end| scene.is_wet(end as usize)));
+        let way = |edge: &[u32; 2]| way(scene.columns, *edge).unwrap_or(0);
+        for edge in edges.iter() {
+            ways[edge[0] as usize] |= 1 << way(edge);
+        }
+        for edge in edges.iter() {
+            let (at, back) = (way(edge), (way(edge) + 4) % 8);
+            let has = |end: usize, way: u8| ways[edge[end] as usize] >> way & 1 == 1;
+            if !has(0, at) || has(1, back) || !ends_within(scene, *edge, at) {
                 continue;
             }
-            let beside = |end: usize| scene.wet_beside(columns[end], RING[usize::from(ledge.beyond[end])]);
-            // The surface goes on there: to one column, or to two that are linked.
-            if let (Some(c), Some(d)) = (beside(0), beside(1))
-                && (c == d || scene.are_linked(c, d))
-            {
-                continue;
+            // Once, if two triangles have it.
+            ways[edge[0] as usize] &= !(1 << at);
+            open.push(*edge);
+            for (end, side) in edge.iter().zip(sides(at)) {
+                let place = &mut places[*end as usize];
+                if *place == NONE {
+                    *place = hems.len() as u32;
+                    hems.push(Hem { column: *end, sides: [None; 4], rise: 0.0 });
+                }
+                hems[*place as usize].sides[usize::from(side)] = Some(0.0);
             }
-            self.edges.push(at as u32);
-            ledge.hems.into_iter().for_each(|hem| self.vertices[hem as usize] = 0);
         }
-        let mut next = first;
-        for vertex in self.vertices.iter_mut().filter(|vertex| **vertex != NONE) {
-            *vertex = next;
-            next += 1;
-        }
-        [(next - first) as usize, 6 * self.edges.len()]
+        edges.iter().for_each(|[from, _]| ways[*from as usize] = 0);
+        hems.iter_mut().for_each(|hem| ledges.reach(hem));
+        [hems.len(), 6 * open.len()]
     }
 
     /// Writes the hems behind all other vertices.
-    pub fn write_hems(&self, ledges: Option<&Ledges>, vertices: &Vertices<'_>, target: &mut Target<'_>) {
-        let Some(ledges) = ledges else { return };
-        for (hem, &vertex) in ledges.hems.iter().zip(&self.vertices).filter(|(_, vertex)| **vertex != NONE) {
-            vertices.put_hem(vertex as usize, hem, target);
+    pub fn write_hems(&self, vertices: &Vertices<'_>, target: &mut Target<'_>) {
+        for (vertex, hem) in (self.first as usize..).zip(&self.hems) {
+            vertices.put_hem(vertex, hem, target);
         }
     }
 
     /// Writes the triangles behind `at` indices; `flipped`: clockwise seen from outside.
-    pub fn write_triangles(
-        &self,
-        ledges: Option<&Ledges>,
-        found: &Found,
-        at: usize,
-        flipped: bool,
-        out: &mut Indices<'_>,
-    ) {
-        let Some(ledges) = ledges else { return };
+    pub fn write_triangles(&self, found: &Found, at: usize, flipped: bool, out: &mut Indices<'_>) {
         match out {
             Indices::None => {}
-            Indices::U16(out) => self.put(ledges, found, flipped, &mut out[at..], |vertex| vertex as u16),
-            Indices::U32(out) => self.put(ledges, found, flipped, &mut out[at..], |vertex| vertex),
+            Indices::U16(out) => self.put(found, flipped, &mut out[at..], |vertex| vertex as u16),
+            Indices::U32(out) => self.put(found, flipped, &mut out[at..], |vertex| vertex),
         }
     }
 
-    fn put<I>(&self, ledges: &Ledges, found: &Found, flipped: bool, out: &mut [I], index: impl Fn(u32) -> I) {
+    fn put<I>(&self, found: &Found, flipped: bool, out: &mut [I], index: impl Fn(u32) -> I) {
         let mut out = out.as_chunks_mut::<3>().0.iter_mut();
-        for &edge in &self.edges {
-            let hems = ledges.edges[edge as usize].hems;
-            let [a, b] = hems.map(|hem| {
-                let column = ledges.hems[hem as usize].column as usize;
-                found.vertex(column / STRIP, column % STRIP)
-            });
-            let [c, d] = hems.map(|hem| self.vertices[hem as usize]);
+        for edge in &self.open {
+            let [a, b] = edge.map(|end| found.vertex(end as usize / STRIP, end as usize % STRIP));
+            let [c, d] = edge.map(|end| self.first + self.places[end as usize]);
             for (corners, out) in [[b, a, c], [b, c, d]].into_iter().zip(&mut out) {
                 let [p, q, r] = corners;
                 *out = if flipped { [p, r, q] } else { corners }.map(&index);
+            }
+        }
+    }
+
+    /// Forgets the surface before.
+    fn forget(&mut self) {
+        self.hems.iter().for_each(|hem| self.places[hem.column as usize] = NONE);
+        self.edges.clear();
+        self.open.clear();
+        self.hems.clear();
+    }
+}
+
+/// To the right of a way between two columns, seen from each of them: the axis that nothing is on. Of a diagonal it is the corner between both.
+pub(super) fn sides(way: u8) -> [u8; 2] {
+    let turns = if way.is_multiple_of(2) { [6, 6] } else { [7, 5] };
+    turns.map(|turn| (way + turn) % 8 / 2)
+}
+
+/// Whether the cells to the right of an edge are in the domain: at its border the surface ends without a skirt.
+fn ends_within(scene: Scene<'_>, edge: [u32; 2], way: u8) -> bool {
+    let [nx, nz] = scene.columns.grid.size;
+    edge.iter().zip(sides(way)).all(|(end, side)| {
+        let [x, z] = cell_at(scene.columns.cell(*end as usize), RING[usize::from(2 * side)]);
+        x < nx && z < nz
+    })
+}
+
+/// Calls `add` with the edges of full quartets beside quartets that were searched.
+fn edges_of_full(scene: Scene<'_>, found: &Found, mut add: impl FnMut([u32; 2])) {
+    let columns = scene.columns;
+    let full = |strip: Option<usize>| strip.map_or(0, |strip| found.states[strip].full);
+    // A column at a place of a strip, or the first one of the strip to the east.
+    let at = |strip: usize, place: usize| match place {
+        STRIP => columns.east(strip).map(|east| (east * STRIP) as u32),
+        _ => Some((strip * STRIP + place) as u32),
+    };
+    let mut join = |from: Option<u32>, to: Option<u32>| {
+        if let (Some(from), Some(to)) = (from, to) {
+            add([from, to]);
+        }
+    };
+    for block in found.odd.iter() {
+        let searched = found.blocks[block].searched;
+        let (row, along) = (block / found.across, block % found.across);
+        let layers =
+            |row: usize| std::iter::successors(scene.lowest([row, along]), |&strip| scene.above(strip));
+        // To the north of a quartet, and to its south.
+        for strip in row.checked_sub(1).into_iter().flat_map(layers) {
+            let edge = some(columns.south(strip));
+            for place in places(full(Some(strip)) & searched) {
+                join(edge.and_then(|edge| at(edge, place)), edge.and_then(|edge| at(edge, place + 1)));
+            }
+        }
+        for strip in layers(row + 1) {
+            for place in places(full(Some(strip)) & searched) {
+                join(at(strip, place + 1), at(strip, place));
+            }
+        }
+        for strip in layers(row) {
+            let (own, south) = (full(Some(strip)), some(columns.south(strip)));
+            let west = own << 1 | full(columns.west(strip)) >> 15;
+            for place in places(west & searched) {
+                join(south.and_then(|south| at(south, place)), at(strip, place));
+            }
+            let east = own >> 1 | full(columns.east(strip)) << 15;
+            for place in places(east & searched) {
+                join(at(strip, place + 1), south.and_then(|south| at(south, place + 1)));
+            }
+        }
+        // Where a layer begins to the east of the block.
+        if searched >> 15 == 1 {
+            let layers = std::iter::successors(scene.lowest([row, along + 1]), |&strip| scene.above(strip));
+            for strip in layers.filter(|&strip| columns.west(strip).is_none() && full(Some(strip)) & 1 == 1) {
+                join(at(strip, 0), some(columns.south(strip)).and_then(|south| at(south, 0)));
             }
         }
     }

@@ -30,6 +30,8 @@ pub(super) struct Block {
     pub odd: u16,
     /// Those in which a surface ends at a wall.
     pub walled: u16,
+    /// Those that were odd, also without triangles.
+    pub searched: u16,
 }
 
 /// Strips that follow each other along x, as do those to the north and to the south of them.
