@@ -97,6 +97,7 @@ mod shallow {
     mod balance;
     mod border;
     mod detail;
+    mod detail_ground;
     mod falls;
     mod falls_scalars;
     mod flooded;

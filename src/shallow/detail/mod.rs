@@ -137,8 +137,11 @@ impl Detail {
             return Err(Error::argument("the terrain has no surface that faces up within the domain"));
         }
         self.ground = Ground::new(solids);
-        self.fine.update_terrain(&self.ground.fine_solids(&self.near))?;
-        self.coarse.update_terrain(&self.ground.coarse_solids(&self.near))?;
+        let Self { ground, near, fine, coarse, .. } = &mut *self;
+        // One of them may have no ground.
+        let all = |liquid: &Shallow| liquid.columns.grid.size.map(|count| 0..count);
+        fine.update_cells(all(fine), |cell| ground.fine_cell(near, ground.fine.grid.place(cell)))?;
+        coarse.update_cells(all(coarse), |cell| ground.coarse_cell(near, ground.coarse.grid.place(cell)))?;
         self.seam.find(&self.fine, &self.coarse, &self.near);
         self.route();
         Ok(())

@@ -304,6 +304,9 @@ impl Seam {
             *rest = all.rem_euclid(FINE);
             change(coarse, column as usize, all.div_euclid(FINE));
         }
+        for liquid in [fine, coarse] {
+            liquid.remap.held.unite();
+        }
         self.gives.iter_mut().chain(&mut self.takes).for_each(|sums| sums.fill(0.0));
     }
 }

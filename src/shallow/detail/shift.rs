@@ -6,6 +6,7 @@
 use super::{Cells, Detail, FINE};
 use crate::error::Result;
 use crate::shallow::Shallow;
+use crate::shallow::remap::Parcel;
 use crate::shallow::scalars::MOST;
 
 /// Buffers.
@@ -14,6 +15,8 @@ pub(super) struct Shift {
     /// What goes into coarse columns, and what goes into fine ones.
     leaving: Vec<Moving>,
     entering: Vec<Moving>,
+    /// What waits for room in them, in fine cells and in coarse ones.
+    held: [Vec<Parcel>; 2],
 }
 
 /// Liquid of a coarse column that changes its cells.
@@ -48,6 +51,7 @@ impl Detail {
                 take(&mut self.coarse, column);
             }
         }
+        self.take_held(&new_coarse, &mut shift.held);
         for cells in changed(&old_coarse, &new_coarse) {
             let Self { fine, coarse, ground, .. } = self;
             lay(coarse, &cells, |cell| ground.coarse_cell(&near, cell))?;
@@ -61,8 +65,42 @@ impl Detail {
         for moving in &shift.entering {
             self.give_fine(moving);
         }
+        self.give_held(&shift.held);
         self.shift = shift;
         Ok(())
+    }
+
+    /// Takes what waits for room in cells that are the other liquid's now: where there is no ground, it would fall.
+    fn take_held(&mut self, near: &Cells, out: &mut [Vec<Parcel>; 2]) {
+        let Self { fine, coarse, .. } = self;
+        let is_near = |[x, z]: [usize; 2]| near[0].contains(&x) && near[1].contains(&z);
+        let (fine_grid, grid) = (fine.columns.grid, coarse.columns.grid);
+        let [fine_held, held] = out;
+        fine_held.clear();
+        held.clear();
+        let is_far = |cell| !is_near(fine_grid.place(cell).map(|at| at / 2));
+        fine.remap.held.take_out(is_far, |parcel| fine_held.push(parcel));
+        coarse.remap.held.take_out(|cell| is_near(grid.place(cell)), |parcel| held.push(parcel));
+    }
+
+    /// Lets it wait in the other liquid's cells.
+    fn give_held(&mut self, [fine_held, held]: &[Vec<Parcel>; 2]) {
+        let Self { fine, coarse, rest, .. } = self;
+        let (fine_grid, grid) = (fine.columns.grid, coarse.columns.grid);
+        for parcel in fine_held {
+            let cell = grid.index(fine_grid.place(parcel.cell as usize).map(|at| at / 2));
+            let units = parcel.units + rest[cell];
+            rest[cell] = units.rem_euclid(FINE);
+            coarse.remap.held.add(cell, parcel.height, units.div_euclid(FINE), [0; MOST]);
+        }
+        for parcel in held {
+            // A coarse unit is one of each of the four.
+            for cell in quarters(grid.place(parcel.cell as usize)) {
+                fine.remap.held.add(fine_grid.index(cell), parcel.height, parcel.units, [0; MOST]);
+            }
+        }
+        fine.remap.held.unite();
+        coarse.remap.held.unite();
     }
 
     /// Takes what is in the fine columns of coarse cells.
