@@ -10,6 +10,7 @@ mod ground;
 mod momentum;
 mod seam;
 mod shift;
+pub mod surface;
 
 use std::ops::Range;
 
@@ -38,16 +39,16 @@ const FINE: i64 = 4;
 
 /// Liquid that flows over a terrain, in fine cells near and in coarse ones far away.
 pub struct Detail {
-    fine: Shallow,
-    coarse: Shallow,
+    pub(super) fine: Shallow,
+    pub(super) coarse: Shallow,
     ground: Ground,
-    seam: Seam,
+    pub(super) seam: Seam,
     shift: Shift,
     momentum: Momentum,
     /// The near cells.
-    near: Cells,
+    pub(super) near: Cells,
     /// What of each coarse cell is no coarse unit (fine units), 0 and up.
-    rest: Vec<i64>,
+    pub(super) rest: Vec<i64>,
     points: Vec<FlowPoint>,
 }
 
@@ -328,7 +329,7 @@ impl Detail {
     }
 }
 
-fn check_near(near: &Cells, [nx, nz]: [usize; 2]) -> Result<()> {
+pub(super) fn check_near(near: &Cells, [nx, nz]: [usize; 2]) -> Result<()> {
     let [x, z] = near;
     if x.start >= x.end || z.start >= z.end || x.end > nx || z.end > nz {
         return Err(Error::argument(format!(

@@ -40,7 +40,7 @@ struct Pipe {
 
 /// All pipes along the edge.
 #[derive(Debug, Clone, Default)]
-pub(super) struct Seam {
+pub(in crate::shallow) struct Seam {
     pipes: Vec<Pipe>,
     /// The pipes before.
     old: Vec<Pipe>,
@@ -161,6 +161,24 @@ impl Seam {
     pub fn set_flux(&mut self, column: usize, axis: usize, way: i32, flux: f32) {
         if let Some(pipe) = self.find_pipe(column, axis, way) {
             self.pipes[pipe].flux = flux;
+        }
+    }
+
+    /// What flows in each pipe and what rounding left, in order: its part of a saved state.
+    pub fn numbers(&self) -> impl ExactSizeIterator<Item = [f32; 2]> + '_ {
+        self.pipes.iter().map(|pipe| [pipe.flux, pipe.left])
+    }
+
+    /// Length of the step in whose measure fluxes are (s).
+    pub fn last(&self) -> f64 {
+        self.last
+    }
+
+    /// Puts a saved state's part back.
+    pub fn set_numbers(&mut self, last: f64, numbers: impl Iterator<Item = [f32; 2]>) {
+        self.last = last;
+        for (pipe, [flux, left]) in self.pipes.iter_mut().zip(numbers) {
+            (pipe.flux, pipe.left) = (flux, left);
         }
     }
 

@@ -8,7 +8,7 @@ use super::{Depths, Layout, MOST, NONE, STRIP, Target, Up};
 use crate::base::cpu::dispatch;
 
 /// Velocity at the surface over the mean (Eq. 4.4).
-const SURFACE_SPEED: f32 = 1.5;
+pub(in crate::shallow) const SURFACE_SPEED: f32 = 1.5;
 
 /// What vertices are made of.
 pub(super) struct Vertices<'a> {

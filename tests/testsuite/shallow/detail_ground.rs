@@ -79,8 +79,7 @@ fn all_cells_may_be_near() {
                 detail.update_terrain(&solids).unwrap();
                 plain.update_terrain(&solids).unwrap();
             }
-            let [own, other] =
-                [detail.step(&ctx, FRAME).unwrap(), plain.step(&ctx, FRAME).unwrap()];
+            let [own, other] = [detail.step(&ctx, FRAME).unwrap(), plain.step(&ctx, FRAME).unwrap()];
             assert_eq!(own, other, "{border:?}, frame {frame}");
             assert!(detail.fine().save() == plain.save(), "{border:?}, frame {frame}");
             assert_eq!(detail.balance(), plain.balance(), "{border:?}, frame {frame}");
@@ -121,7 +120,8 @@ fn a_tool_crosses_the_edge_and_pushes_the_liquid() {
             let columns = liquid.columns();
             let cell = columns.grid.cell_at([x, 0.0]).unwrap();
             let wet = |&column: &usize| {
-                let [base, top] = [columns.bases()[column], columns.bases()[column] + liquid.depths()[column]];
+                let [base, top] =
+                    [columns.bases()[column], columns.bases()[column] + liquid.depths()[column]];
                 let middle = columns.heights.round(0.003);
                 base < middle && middle < top
             };
