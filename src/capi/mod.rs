@@ -110,6 +110,10 @@ pub mod shallow_stains;
 
 pub mod shallow_snapshot;
 
+pub mod shallow_detail;
+
+pub mod shallow_detail_ground;
+
 mod shallow_lists;
 
 mod handle;
