@@ -144,6 +144,7 @@ pub unsafe extern "C" fn frz_shallow_snapshot_surface(
                 least: lifts[0],
                 sunk: lifts[1],
                 carried: std::array::from_fn(|scalar| snapshot.concentrations(scalar)),
+                ledges: None,
             };
             wanted.write(surface, snapshot.columns(), &depths)
         }

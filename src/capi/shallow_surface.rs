@@ -425,6 +425,7 @@ pub unsafe extern "C" fn frz_shallow_surface(
                 least,
                 sunk,
                 carried: concentrations.each_ref().map(|numbers| &numbers[..]),
+                ledges: None,
             };
             wanted.write(surface, shallow.columns(), &depths)
         }

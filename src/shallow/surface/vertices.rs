@@ -1,11 +1,15 @@
 //! Writes vertices into the caller's buffers: in order, and without reading them.
 
+use std::ops::Range;
+
 use super::boundary::{Around, Wall, walls_of};
+use super::ledges::Hem;
 use super::links::Scene;
 use super::normals::{Normals, Shown, upright};
-use super::strips::{Found, Span, places};
+use super::strips::{Found, Span};
 use super::{Depths, Layout, MOST, NONE, STRIP, Target, Up};
 use crate::base::cpu::dispatch;
+use crate::shallow::columns::strip_of;
 
 /// Velocity at the surface over the mean (Eq. 4.4).
 pub(in crate::shallow) const SURFACE_SPEED: f32 = 1.5;
@@ -24,6 +28,9 @@ pub(super) struct Vertices<'a> {
     /// Height of 0, and of a unit; centre of cell (0, 0), and edge of a cell (m x scale).
     low: f32,
     unit: f32,
+    /// The caller's units in a metre, and how far hems are below the ground (units).
+    scale: f32,
+    least: i32,
     origin: [f32; 2],
     cell: f32,
     /// Speed at the surface (m/s x scale) over the mean speed (m/s); opacity of a unit.
@@ -75,6 +82,8 @@ impl<'a> Vertices<'a> {
             sign: if layout.left_handed == (layout.up == Up::Y) { -1.0 } else { 1.0 },
             low: (heights.low * scale) as f32,
             unit: (heights.unit * scale) as f32,
+            scale: scale as f32,
+            least: (layout.least_depth / heights.unit).min(f64::from(i32::MAX / 2)) as i32,
             origin: grid.centre([0, 0]).map(|centre| (centre * scale) as f32),
             cell: (grid.cell * scale) as f32,
             speed: SURFACE_SPEED * scale as f32,
@@ -195,13 +204,107 @@ impl<'a> Vertices<'a> {
         }
     }
 
+    /// Writes a vertex where the surface of a column comes down to the ground's edge.
+    pub fn put_hem(&self, at: usize, hem: &Hem, target: &mut Target<'_>) {
+        let columns = self.shown.scene.columns;
+        let index = hem.column as usize;
+        let [x, z] = columns.cell(index);
+        let [along, across] = hem.offset();
+        let rise = hem.rise * self.scale / self.unit;
+        let ground = columns.bases()[index].wrapping_sub(self.least) as f32 + rise;
+        let height = self.height(ground.max(columns.unders()[index] as f32));
+        let fall = self.height(self.shown.heights[index] as f32) - height;
+        let width = (along * along + across * across).sqrt();
+        let mut normal = [0.0, 1.0, 0.0];
+        if width > 0.0 {
+            let (out, up) = (fall / width, self.cell * width);
+            let length = ((along * along + across * across) * (out * out) + up * up).sqrt();
+            normal = [along * out / length, up / length, across * out / length];
+        }
+        let vertex = Vertex {
+            position: [
+                self.centre(0, x as i32) + along * self.cell,
+                height,
+                self.centre(1, z as i32) + across * self.cell,
+            ],
+            normal,
+            velocity: self.velocity.get(index).copied().unwrap_or_default(),
+            carried: self.carried(index),
+            depth: 0,
+            layer: columns.layer(index) as u32,
+            column: NONE,
+        };
+        self.put(at, &vertex, target);
+    }
+
     /// Axes in the caller's order.
     #[inline(always)]
     fn order(&self, x: f32, up: f32, z: f32) -> [f32; 3] {
         if self.z_up { [x, z, up] } else { [x, up, z] }
     }
 
-    /// Writes the vertices of a run of a span, from `at` on.
+    /// Writes the vertices of a run of a span with wet columns on all sides, from `at` on.
+    #[inline(always)]
+    fn put_inner(&self, span: &Span, run: Run, at: usize, target: &mut Target<'_>) {
+        let (heights, Run { first, len }) = (self.shown.heights, run);
+        let step = first - span.first * STRIP;
+        if let Some(out) = &mut target.normals {
+            let (north, south) = (span.north as usize * STRIP + step, span.south as usize * STRIP + step);
+            let row = |first: usize| heights[first..][..len].iter();
+            let across = row(first - 1).zip(row(first + 1));
+            let along = row(north).zip(row(south));
+            for ((out, (west, east)), (north, south)) in
+                vectors(out, at, len).iter_mut().zip(across).zip(along)
+            {
+                let slope =
+                    |before: &i32, behind: &i32| before.wrapping_sub(*behind) as f32 * self.shown.slope;
+                let [x, y, z] = upright(slope(west, east), slope(north, south));
+                *out = self.order(x, y, z * self.sign);
+            }
+        }
+        self.put_run(span, run, at, target);
+    }
+
+    /// Writes the vertices of some places of a strip, with or without wet columns on their sides, from `at` on.
+    #[inline(always)]
+    fn put_outer(&self, span: &Span, strip: usize, places: Range<usize>, at: usize, target: &mut Target<'_>) {
+        let run = Run { first: strip * STRIP + places.start, len: places.len() };
+        if let Some(out) = &mut target.normals {
+            let normals = self.outer_normals(span, strip);
+            vectors(out, at, run.len).copy_from_slice(&normals[places]);
+        }
+        self.put_run(span, run, at, target);
+    }
+
+    /// The normals of a strip's columns, which full quartets link with those on their sides, if any.
+    #[inline(always)]
+    fn outer_normals(&self, span: &Span, strip: usize) -> [[f32; 3]; STRIP] {
+        let (heights, slope, sides) = (self.shown.heights, self.shown.slope, self.found.states[strip].sides);
+        let (own, first) = (strip_of(heights, strip), strip * STRIP);
+        let mut line = [0; STRIP + 2];
+        line[1..=STRIP].copy_from_slice(own);
+        line[0] = first.checked_sub(1).map_or(0, |before| heights[before]);
+        line[STRIP + 1] = heights.get(first + STRIP).copied().unwrap_or(0);
+        let beside =
+            |row: u32| if row == NONE { own } else { strip_of(heights, row as usize + strip - span.first) };
+        let (north, south) = (beside(span.north), beside(span.south));
+        let mut normals = [[0.0; 3]; STRIP];
+        for x in 0..STRIP {
+            let has = |side: usize| sides[side] >> x & 1 == 1;
+            let slope = |[before, behind]: [i32; 2], has: [bool; 2]| {
+                let [before, behind] =
+                    [if has[0] { before } else { own[x] }, if has[1] { behind } else { own[x] }];
+                let cells = if has[0] & has[1] { 1.0 } else { 2.0 };
+                before.wrapping_sub(behind) as f32 * slope * cells
+            };
+            let along = slope([line[x], line[x + 2]], [has(0), has(1)]);
+            let [x_up, y, z] = upright(along, slope([north[x], south[x]], [has(2), has(3)]));
+            normals[x] = self.order(x_up, y, z * self.sign);
+        }
+        normals
+    }
+
+    /// Writes all of the vertices of a run but their normals, from `at` on.
     #[inline(always)]
     fn put_run(&self, span: &Span, run: Run, at: usize, target: &mut Target<'_>) {
         let (heights, depths) = (self.shown.heights, self.shown.scene.depth);
@@ -215,20 +318,6 @@ impl<'a> Vertices<'a> {
             let out = vectors(out, at, len);
             for ((out, height), cell) in out.iter_mut().zip(&heights[first..][..len]).zip(cells) {
                 *out = self.order(self.centre(0, cell), self.height(*height as f32), z);
-            }
-        }
-        if let Some(out) = &mut target.normals {
-            let (north, south) = (span.north as usize * STRIP + step, span.south as usize * STRIP + step);
-            let row = |first: usize| heights[first..][..len].iter();
-            let across = row(first - 1).zip(row(first + 1));
-            let along = row(north).zip(row(south));
-            for ((out, (west, east)), (north, south)) in
-                vectors(out, at, len).iter_mut().zip(across).zip(along)
-            {
-                let slope =
-                    |before: &i32, behind: &i32| before.wrapping_sub(*behind) as f32 * self.shown.slope;
-                let [x, y, z] = upright(slope(west, east), slope(north, south));
-                *out = self.order(x, y, z * self.sign);
             }
         }
         if let Some(out) = &mut target.velocities {
@@ -283,25 +372,32 @@ fn write_spans(vertices: &Vertices<'_>, normals: &mut Normals, around: &mut Arou
                 run = Run { first: if run.len == 0 { first } else { run.first }, len: run.len + STRIP };
                 continue;
             }
-            for place in places(state.used) {
-                let index = first + place;
-                let is_plain = plain >> place & 1 == 1;
-                if run.len > 0 && !(is_plain && run.first + run.len == index) {
-                    vertices.put_run(span, run, next, target);
-                    next += run.len;
-                    run.len = 0;
-                }
-                if is_plain {
-                    run = Run { first: if run.len == 0 { index } else { run.first }, len: run.len + 1 };
-                } else {
-                    let vertex = vertices.vertex(index, normals, around);
+            if run.len > 0 {
+                vertices.put_inner(span, run, next, target);
+                next += run.len;
+                run.len = 0;
+            }
+            // What lies between columns that are looked at one by one.
+            let smooth = state.used & state.wet & !state.rough;
+            let mut left = state.used;
+            while left != 0 {
+                let place = left.trailing_zeros();
+                let len = (smooth >> place).trailing_ones();
+                if len == 0 {
+                    let vertex = vertices.vertex(first + place as usize, normals, around);
                     vertices.put(next, &vertex, target);
                     next += 1;
+                    left &= left - 1;
+                    continue;
                 }
+                let end = place + len;
+                vertices.put_outer(span, strip, place as usize..end as usize, next, target);
+                next += len as usize;
+                left &= u16::MAX.checked_shl(end).unwrap_or(0);
             }
         }
         if run.len > 0 {
-            vertices.put_run(span, run, next, target);
+            vertices.put_inner(span, run, next, target);
             next += run.len;
         }
     }

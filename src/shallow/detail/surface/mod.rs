@@ -57,11 +57,14 @@ impl Surface {
         self.sewn.reserve(sewn, triangles);
     }
 
-    /// Size of the mesh that [`Surface::build`] would write. `depths` are those of the fine liquid and of the coarse one.
+    /// Size of the mesh that [`Surface::build`] would write. `depths` are those of the fine liquid and of the coarse one; their ledges
+    /// are not looked at.
     ///
     /// # Errors
     /// As [`Surface::build`], of the depths.
     pub fn count(&mut self, detail: &Detail, depths: [&Depths<'_>; 2]) -> Result<Counts> {
+        let depths = depths.map(without_ledges);
+        let depths = depths.each_ref();
         let both = self.find(detail, depths)?;
         Ok(self.sum(both))
     }
@@ -80,6 +83,8 @@ impl Surface {
         target: &mut Target<'_>,
     ) -> Result<Counts> {
         layout.validate()?;
+        let depths = depths.map(without_ledges);
+        let depths = depths.each_ref();
         depths.iter().try_for_each(|depths| target.check_wanted(depths))?;
         let both = self.find(detail, depths)?;
         let counts = self.sum(both);
@@ -128,6 +133,11 @@ impl Surface {
             indices: fine.indices + coarse.indices + self.stitches.indices.len(),
         }
     }
+}
+
+/// Ledges are of one liquid's columns: along the edge of the near cells its surface goes on.
+fn without_ledges<'a>(depths: &Depths<'a>) -> Depths<'a> {
+    Depths { ledges: None, ..*depths }
 }
 
 /// What is behind some vertices, without indices and columns.
