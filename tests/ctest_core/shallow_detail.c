@@ -174,6 +174,10 @@ static void words_of_errors(frz_context *ctx) {
     params.falls_most = 0;
     CHECK(detail == NULL);
     WORKS(frz_shallow_detail_create_heights(ctx, &params, &domain, heights, near, &detail));
+    params.kept = 2;
+    FAILS(frz_shallow_detail_set_params(detail, &params), FRZ_ERROR_ARGUMENT, "kept = 2");
+    params.kept = 0.5;
+    WORKS(frz_shallow_detail_set_params(detail, &params));
     FAILS(frz_shallow_detail_set_near(detail, off), FRZ_ERROR_ARGUMENT, "lie outside of the domain");
     FAILS(frz_shallow_detail_step(ctx, detail, -1, NULL), FRZ_ERROR_ARGUMENT, "a frame of -1 s");
     FAILS(frz_shallow_detail_flow_moved(detail, 0, &volume), FRZ_ERROR_ARGUMENT, "flow = 0 is none of the 0 that were set");

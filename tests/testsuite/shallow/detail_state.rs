@@ -50,6 +50,12 @@ fn params(border: Border) -> Params {
     Params { border, pace: Pace::Realtime(0.003), ..Params::default() }
 }
 
+fn run(detail: &mut Detail, ctx: &Context, frames: usize) {
+    for _ in 0..frames {
+        detail.step(ctx, FRAME).unwrap();
+    }
+}
+
 #[test]
 fn a_restored_liquid_flows_on_to_the_same_bytes() {
     let ctx = context();
@@ -110,13 +116,13 @@ fn all_cells_may_be_near_in_a_state() {
 
 #[test]
 fn any_number_of_threads_saves_the_same_bytes() {
-    let run = |threads: usize| {
+    let saved = |threads: usize| {
         let ctx = Context::new(Pool::new(threads).unwrap());
         let mut detail = scene(&ctx, 0.0, &params(Border::Open), NEAR);
-        (0..5).for_each(|_| drop(detail.step(&ctx, FRAME).unwrap()));
+        run(&mut detail, &ctx, 5);
         detail.save()
     };
-    assert!(run(0) == run(2));
+    assert!(saved(0) == saved(2));
 }
 
 fn refusal(detail: &mut Detail, bytes: &[u8]) -> String {
@@ -193,7 +199,7 @@ fn damaged(saved: &[u8], dice: &mut Dice) -> Vec<u8> {
 fn damaged_states_are_refused_or_flow() {
     let ctx = context();
     let mut detail = scene(&ctx, 0.0, &params(Border::Open), NEAR);
-    (0..10).for_each(|_| drop(detail.step(&ctx, FRAME).unwrap()));
+    run(&mut detail, &ctx, 10);
     let saved = detail.save();
     let mut dice = Dice(17);
     let mut flowed = 0;
