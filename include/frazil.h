@@ -1062,7 +1062,7 @@ typedef struct frz_shallow frz_shallow;
  * Shallow liquid in cells of two sizes: those of its domain in a box that may move, around an instrument or a player, and of twice the length everywhere
  * else, where a frame takes a quarter of the time. No liquid is lost between them.
  *
- * It has no falls, no scalars and no thickening. In real time, as frz_shallow says, are frz_shallow_detail_step, _surface, _save and _set_bodies;
+ * It has no falls and no thickening. In real time, as frz_shallow says, are frz_shallow_detail_step, _surface, _save and _set_bodies;
  * _set_near, _update_terrain and _update_heights may allocate, and so may _restore where it moves the box.
  */
 typedef struct frz_shallow_detail frz_shallow_detail;
@@ -5248,7 +5248,7 @@ frz_status frz_shallow_detail_surface_bound(const frz_shallow_detail *detail,
  * middles of the outermost cells. The first one after the box of small cells has moved may allocate.
  *
  * layout: NULL for the usual one. Without FRZ_SHALLOW_LIFTED.
- * target: the buffers, as in frz_shallow_surface, without scalars. In frz_shallow_target.columns those of large cells follow those of small ones.
+ * target: the buffers, as in frz_shallow_surface. In frz_shallow_target.columns those of large cells follow those of small ones.
  *     FRZ_ERROR_CAPACITY when one is too small: nothing is written, and size receives what is needed.
  * size: receives the size of the surface, all zeroes after other failures; may be NULL. Its struct_size is set by the caller.
  *
@@ -5288,6 +5288,49 @@ frz_status frz_shallow_detail_restore(frz_context *context,
                                       frz_shallow_detail *detail,
                                       const void *state,
                                       size_t bytes);
+
+/**
+ * Sets what the liquid carries, as frz_shallow_set_scalars does. None of them thickens it.
+ *
+ * scalars: count scalars; NULL with a count of 0: there is none. After a failure the old ones stay.
+ * count: number of scalars, up to FRZ_SHALLOW_MOST_SCALARS.
+ *
+ * One thread at a time.
+ */
+frz_status frz_shallow_detail_set_scalars(frz_shallow_detail *detail,
+                                          const frz_shallow_scalar *scalars,
+                                          size_t count);
+
+/**
+ * Sets the concentrations of scalars in what frz_shallow_detail_pour and _fill add from now on; 0 at first.
+ *
+ * concentrations: double for each scalar, in their order, within its range.
+ *
+ * One thread at a time.
+ */
+frz_status frz_shallow_detail_set_poured(frz_shallow_detail *detail, frz_view concentrations);
+
+/**
+ * Sets the concentrations of scalars in what comes through a source; 0 after frz_shallow_detail_set_flows.
+ *
+ * flow: which flow point, counted from 0.
+ * concentrations: double for each scalar, in their order, within its range.
+ *
+ * One thread at a time.
+ */
+frz_status frz_shallow_detail_set_sourced(frz_shallow_detail *detail, size_t flow, frz_view concentrations);
+
+/**
+ * Reports where all of a scalar is.
+ *
+ * scalar: which, counted from 0.
+ * balance: receives it, all zeroes after a failure. Its struct_size is set by the caller.
+ *
+ * Any number of threads may read a shallow liquid in cells of two sizes.
+ */
+frz_status frz_shallow_detail_get_scalar_balance(const frz_shallow_detail *detail,
+                                                 uint32_t scalar,
+                                                 frz_shallow_scalar_balance *balance);
 
 #ifdef __cplusplus
 }  // extern "C"

@@ -428,6 +428,8 @@ _FUNCTIONS = {
     "shallow_detail_get_balance": [_P, _P], "shallow_detail_update_terrain": [_P, _P, View, _P],
     "shallow_detail_update_heights": [_P, _P, View, _P], "shallow_detail_set_bodies": [_P, _P, _P, _Z, _P],
     "shallow_detail_surface_bound": [_P, _P], "shallow_detail_surface": [_P, _P, _P, _P, _P],
+    "shallow_detail_set_scalars": [_P, _P, _Z], "shallow_detail_set_poured": [_P, View],
+    "shallow_detail_set_sourced": [_P, _Z, View], "shallow_detail_get_scalar_balance": [_P, _U, _P],
     "shallow_detail_save": [_P, _P, _P, _Z, _P], "shallow_detail_restore": [_P, _P, _P, _Z],
     "shallow_snapshot_drops": [_P, Span, _P], "shallow_snapshot_drops_mesh": [_P, _P, _P, _P, _P],
 }

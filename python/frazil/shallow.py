@@ -147,6 +147,13 @@ def _probe(name, pointer, points):
     return out
 
 
+def scalars_of(scalars):
+    """Scalars, as the C interface has them."""
+    return (ShallowScalar * max(len(scalars), 1))(*(
+        ShallowScalar(c.sizeof(ShallowScalar), _number("law", scalar.law, LAWS), scalar.name.encode(), scalar.range, scalar.half_life)
+        for scalar in scalars))
+
+
 def domain_of(ground, cell, origin, cells, low, high):
     """Heights, if the ground is such, and the domain."""
     heights = None if isinstance(ground, (Mesh, Grid)) else np.ascontiguousarray(ground, np.float32)
@@ -280,10 +287,7 @@ class Shallow(Handle):
 
     def set_scalars(self, scalars):
         """Sets Scalars, up to four, that the liquid carries, in place of those before: there is nothing yet of any."""
-        array = (ShallowScalar * max(len(scalars), 1))(*(
-            ShallowScalar(c.sizeof(ShallowScalar), _number("law", scalar.law, LAWS), scalar.name.encode(), scalar.range, scalar.half_life)
-            for scalar in scalars))
-        call("shallow_set_scalars", self.pointer, array, len(scalars))
+        call("shallow_set_scalars", self.pointer, scalars_of(scalars), len(scalars))
         self._scalars = len(scalars)
 
     def set_poured(self, concentrations):

@@ -4,15 +4,15 @@ import ctypes as c
 
 import numpy as np
 
-from ._library import (Handle, ShallowBalance, ShallowBody, ShallowFlow, ShallowMoved, ShallowReport, View, call, made, rows, saved, view)
+from ._library import (Handle, ShallowBalance, ShallowBody, ShallowFlow, ShallowMoved, ShallowReport, ShallowScalarBalance, View, call, made, rows, saved, view)
 from .mesh import Mesh
-from .shallow import Shallow, _body, _flow, domain_of
+from .shallow import Shallow, _body, _flow, domain_of, scalars_of
 from .shallow_meshes import surface_of
 
 
 class ShallowDetail(Handle):
     """A small amount of liquid on a ground, in cells of two sizes: of the domain's in a box that may move, of twice the length everywhere else. As
-    Shallow, of a frazil.Mesh or of heights; without falls, scalars and thickening.
+    Shallow, of a frazil.Mesh or of heights; without falls and thickening.
 
     near: (x0, z0, x1, z1) of the box of small cells (m), which goes out to pairs of cells. The counts of cells along x and z are even.
     """
@@ -30,7 +30,7 @@ class ShallowDetail(Handle):
         else:
             raise ValueError("liquid in cells of two sizes needs a mesh or heights")
         super().__init__(pointer)
-        self._ctx, self._more = ctx, more
+        self._ctx, self._more, self._scalars = ctx, more, 0
         self.cells, self.origin = tuple(domain.cells), tuple(domain.origin)
 
     def _words(self):
@@ -84,6 +84,25 @@ class ShallowDetail(Handle):
         """Fills all columns up to a height (m), or their ceiling."""
         call("shallow_detail_fill", self.pointer, height)
 
+    def set_scalars(self, scalars):
+        """As Shallow.set_scalars."""
+        call("shallow_detail_set_scalars", self.pointer, scalars_of(scalars), len(scalars))
+        self._scalars = len(scalars)
+
+    def set_poured(self, concentrations):
+        """Sets the concentration of each scalar in what pour() and fill() add from now on."""
+        call("shallow_detail_set_poured", self.pointer, view(np.ascontiguousarray(concentrations, np.float64)))
+
+    def set_sourced(self, flow, concentrations):
+        """Sets the concentration of each scalar in what comes through a Source; set_flows() sets them to 0."""
+        call("shallow_detail_set_sourced", self.pointer, flow, view(np.ascontiguousarray(concentrations, np.float64)))
+
+    def scalar_balance(self, scalar):
+        """Where all of a scalar is (its own measure x m3), as frz_shallow_scalar_balance has it."""
+        out = ShallowScalarBalance(c.sizeof(ShallowScalarBalance))
+        call("shallow_detail_get_scalar_balance", self.pointer, scalar, c.byref(out))
+        return out
+
     @property
     def balance(self):
         """Where all liquid is (m3), as frz_shallow_balance has it."""
@@ -110,9 +129,9 @@ class ShallowDetail(Handle):
         return moved
 
     def surface(self, parts=(), z_up=False, left_handed=False, scale=1.0, least_depth=0.0, opaque_depth=0.01, fade_depth=0.0):
-        """The Surface of all liquid, one mesh over cells of both sizes, and these parts of it: normals, depths, opacities, velocities, layers, columns."""
+        """The Surface of all liquid, one mesh over cells of both sizes, with its scalars and these parts of it: normals, depths, opacities, velocities, layers, columns."""
         return surface_of("shallow_detail_surface", self._ctx, self.pointer, parts, z_up, left_handed, scale, least_depth, opaque_depth, False,
-                          fade_depth, 0)
+                          fade_depth, self._scalars)
 
     def save(self):
         """The state between two frames, with the box of small cells: bytes for restore()."""

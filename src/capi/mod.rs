@@ -114,6 +114,8 @@ pub mod shallow_detail;
 
 pub mod shallow_detail_ground;
 
+pub mod shallow_detail_scalars;
+
 mod shallow_lists;
 
 mod handle;

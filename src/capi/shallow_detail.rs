@@ -13,6 +13,7 @@ use crate::context::Context;
 use crate::shallow::detail::cells_around;
 use crate::shallow::detail::surface::Surface;
 use crate::shallow::flows::FlowPoint;
+use crate::shallow::scalars::MOST;
 use crate::shallow::terrain::Solids;
 use crate::shallow::terrain::shapes::Shape;
 use crate::shallow::{Balance, Detail, Params, Report};
@@ -20,7 +21,7 @@ use crate::shallow::{Balance, Detail, Params, Report};
 /// Shallow liquid in cells of two sizes: those of its domain in a box that may move, around an instrument or a player, and of twice the length everywhere
 /// else, where a frame takes a quarter of the time. No liquid is lost between them.
 ///
-/// It has no falls, no scalars and no thickening. In real time, as frz_shallow says, are frz_shallow_detail_step, _surface, _save and _set_bodies;
+/// It has no falls and no thickening. In real time, as frz_shallow says, are frz_shallow_detail_step, _surface, _save and _set_bodies;
 /// _set_near, _update_terrain and _update_heights may allocate, and so may _restore where it moves the box.
 pub struct frz_shallow_detail {
     _opaque: [u8; 0],
@@ -40,6 +41,8 @@ pub(super) struct Spread {
     pub is_reserved: bool,
     /// Mean velocities of all column indices of both sizes (m/s), when a surface wants them.
     pub velocities: [Vec<[f32; 2]>; 2],
+    /// Concentrations of scalars by column index of both, when a surface wants them.
+    pub concentrations: [[Vec<f32>; MOST]; 2],
 }
 
 impl Noun for frz_shallow_detail {
@@ -73,6 +76,7 @@ impl Spread {
             surface,
             is_reserved: true,
             velocities: Default::default(),
+            concentrations: Default::default(),
         })
     }
 }

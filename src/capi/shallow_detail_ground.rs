@@ -161,7 +161,7 @@ pub unsafe extern "C" fn frz_shallow_detail_surface_bound(
 /// middles of the outermost cells. The first one after the box of small cells has moved may allocate.
 ///
 /// layout: NULL for the usual one. Without FRZ_SHALLOW_LIFTED.
-/// target: the buffers, as in frz_shallow_surface, without scalars. In frz_shallow_target.columns those of large cells follow those of small ones.
+/// target: the buffers, as in frz_shallow_surface. In frz_shallow_target.columns those of large cells follow those of small ones.
 ///     FRZ_ERROR_CAPACITY when one is too small: nothing is written, and size receives what is needed.
 /// size: receives the size of the surface, all zeroes after other failures; may be NULL. Its struct_size is set by the caller.
 ///
@@ -180,7 +180,7 @@ pub unsafe extern "C" fn frz_shallow_detail_surface(
             let wanted = Wanted::new(layout, target, size)?;
             let _call = enter_light(context)?;
             let mut spread = change(detail)?;
-            let Spread { detail, surface, velocities, is_reserved, .. } = &mut *spread;
+            let Spread { detail, surface, velocities, concentrations, is_reserved, .. } = &mut *spread;
             if wanted.is_lifted {
                 return Err(Failure::argument("FRZ_SHALLOW_LIFTED is not for liquid in cells of two sizes"));
             }
@@ -196,10 +196,20 @@ pub unsafe extern "C" fn frz_shallow_detail_surface(
                     liquid.velocities(velocities)?;
                 }
             }
+            for (concentrations, liquid) in concentrations.iter_mut().zip(liquids) {
+                for (scalar, numbers) in concentrations.iter_mut().enumerate() {
+                    let len = if wanted.scalar(scalar) { liquid.columns().len() } else { 0 };
+                    numbers.resize(len, 0.0);
+                    if wanted.scalar(scalar) {
+                        liquid.concentrations(scalar, numbers)?;
+                    }
+                }
+            }
             let depths = [0, 1].map(|at| Depths {
                 depth: liquids[at].depths(),
                 velocity: &velocities[at],
                 active: Some(liquids[at].active()),
+                carried: concentrations[at].each_ref().map(|numbers| &numbers[..]),
                 ..Depths::default()
             });
             let depths = depths.each_ref();

@@ -152,6 +152,35 @@ static void one_surface(frz_context *ctx) {
     frz_shallow_detail_destroy(detail);
 }
 
+/* Dye comes in, and all of it is found again. */
+static void dye(frz_context *ctx) {
+    const frz_shallow_params params = liquid_of(FRZ_LIQUID_WATER, FRZ_SHALLOW_REALTIME);
+    const double near[4] = {-0.03, -0.05, 0.04, 0.03}, half[1] = {0.5}, all[2] = {1, 1};
+    frz_shallow_detail *detail = on_ground(ctx, &params, near);
+    frz_shallow_scalar scalar;
+    frz_shallow_scalar_balance balance;
+    int frame;
+    memset(&scalar, 0, sizeof scalar);
+    scalar.struct_size = sizeof scalar, scalar.name = "dye", scalar.range = 1;
+    WORKS(frz_shallow_detail_set_scalars(detail, &scalar, 1));
+    WORKS(frz_shallow_detail_set_poured(detail, view_of(half, 1)));
+    FAILS(frz_shallow_detail_set_poured(detail, view_of(all, 2)), FRZ_ERROR_ARGUMENT, "concentrations: 2 elements, but there are 1 scalars");
+    WORKS(frz_shallow_detail_fill(detail, 0.005));
+    set_points(detail);
+    WORKS(frz_shallow_detail_set_sourced(detail, 0, view_of(all, 1)));
+    balance.struct_size = sizeof balance;
+    for (frame = 0; frame < 60; ++frame) {
+        const double x = 0.001 * frame, box[4] = {-0.04 + x, -0.03, x, 0.03};
+        WORKS(frz_shallow_detail_set_near(detail, box));
+        WORKS(frz_shallow_detail_step(ctx, detail, FRAME, NULL));
+        WORKS(frz_shallow_detail_get_scalar_balance(detail, 0, &balance));
+        CHECK(balance.error == 0);
+    }
+    CHECK(fabs(balance.sourced - 3 * ML) < 1e-3 * ML && balance.drained > 0.4 * ML);
+    FAILS(frz_shallow_detail_get_scalar_balance(detail, 1, &balance), FRZ_ERROR_ARGUMENT, "scalar = 1 is none of the 1 that were set");
+    frz_shallow_detail_destroy(detail);
+}
+
 static void words_of_errors(frz_context *ctx) {
     frz_shallow_params params = liquid_of(FRZ_LIQUID_WATER, FRZ_SHALLOW_REALTIME);
     frz_shallow_domain domain = domain_of(-0.1, 0.2);
@@ -198,6 +227,7 @@ int main(void) {
     sheet_make(&rest);
     a_box_follows_a_tool(ctx);
     one_surface(ctx);
+    dye(ctx);
     words_of_errors(ctx);
     frz_context_destroy(ctx);
     return 0;

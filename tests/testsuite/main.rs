@@ -98,6 +98,7 @@ mod shallow {
     mod border;
     mod detail;
     mod detail_ground;
+    mod detail_scalars;
     mod detail_state;
     mod detail_surface;
     mod falls;

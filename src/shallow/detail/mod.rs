@@ -8,6 +8,8 @@
 
 mod ground;
 mod momentum;
+pub(in crate::shallow) mod rests;
+mod scalars;
 mod seam;
 mod shift;
 pub mod surface;
@@ -29,6 +31,7 @@ use crate::context::Context;
 use crate::error::{Error, Result};
 use ground::Ground;
 use momentum::Momentum;
+use rests::Rests;
 use seam::Seam;
 use shift::Shift;
 
@@ -50,8 +53,8 @@ pub struct Detail {
     momentum: Momentum,
     /// The near cells.
     pub(super) near: Cells,
-    /// What of each coarse cell is no coarse unit (fine units), 0 and up.
-    pub(super) rest: Vec<i64>,
+    /// What of each coarse cell is no coarse unit.
+    pub(super) rest: Rests,
     points: Vec<FlowPoint>,
 }
 
@@ -80,7 +83,7 @@ impl Detail {
         let fine = Shallow::beside(ctx, &ground.fine_solids(&near), params.clone(), beyond)?;
         let coarse = Shallow::beside(ctx, &ground.coarse_solids(&near), params, within)?;
         let mut detail = Self {
-            rest: vec![0; coarse.columns.grid.cells()],
+            rest: Rests::new(coarse.columns.grid.cells()),
             fine,
             coarse,
             ground,
@@ -357,7 +360,7 @@ impl Detail {
             absorbed: sum(|units| units.absorbed),
             lost: sum(|units| units.lost),
             gained: sum(|units| units.gained),
-            held: sum(|units| units.held) + self.rest.iter().sum::<i64>(),
+            held: sum(|units| units.held) + self.rest.units(),
             falling: 0,
         };
         units.balance(cell * cell * self.fine.columns.heights.unit)
@@ -366,9 +369,7 @@ impl Detail {
 
 fn check_carried(params: &Params) -> Result<()> {
     match params.thickening {
-        Some(_) => {
-            Err(Error::argument("liquid with a level of detail carries no scalar that could thicken it"))
-        }
+        Some(_) => Err(Error::argument("liquid with a level of detail has no scalar that thickens it")),
         None => Ok(()),
     }
 }

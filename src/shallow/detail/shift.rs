@@ -3,11 +3,11 @@
 //! A coarse column's liquid goes to the fine ones of its layer under a surface that leans as its neighbours say: level where the liquid is level, and
 //! along the ground where a film runs. What four columns cannot share equally waits in their cell, and goes into the coarse column again.
 
-use super::{Cells, Detail, FINE};
+use super::rests::{Load, change, of_column};
+use super::{Cells, Detail};
 use crate::error::Result;
 use crate::shallow::Shallow;
 use crate::shallow::remap::Parcel;
-use crate::shallow::scalars::MOST;
 
 /// Buffers.
 #[derive(Debug, Clone, Default)]
@@ -25,8 +25,8 @@ struct Moving {
     /// Coarse cell.
     cell: [usize; 2],
     layer: usize,
-    /// Fine units.
-    units: i64,
+    /// Fine measure.
+    load: Load,
     /// Surface (units), and eight times its rise from the middle of a fine cell to that of the coarse one, along x and along z.
     eta: i64,
     rises: [i64; 2],
@@ -89,14 +89,13 @@ impl Detail {
         let (fine_grid, grid) = (fine.columns.grid, coarse.columns.grid);
         for parcel in fine_held {
             let cell = grid.index(fine_grid.place(parcel.cell as usize).map(|at| at / 2));
-            let units = parcel.units + rest[cell];
-            rest[cell] = units.rem_euclid(FINE);
-            coarse.remap.held.add(cell, parcel.height, units.div_euclid(FINE), [0; MOST]);
+            let whole = rest.whole(cell, &Load { units: parcel.units, amounts: parcel.amounts });
+            coarse.remap.held.add(cell, parcel.height, whole.units, whole.amounts);
         }
         for parcel in held {
             // A coarse unit is one of each of the four.
             for cell in quarters(grid.place(parcel.cell as usize)) {
-                fine.remap.held.add(fine_grid.index(cell), parcel.height, parcel.units, [0; MOST]);
+                fine.remap.held.add(fine_grid.index(cell), parcel.height, parcel.units, parcel.amounts);
             }
         }
         fine.remap.held.unite();
@@ -111,11 +110,11 @@ impl Detail {
             for [fx, fz] in quarters([x, z]) {
                 let mut layer = 0;
                 while let Some(column) = fine.columns.column([fx, fz], layer) {
-                    let units = take(fine, column);
+                    let load = take(fine, column);
                     let own = out[first..].iter_mut().find(|moving| moving.layer == layer);
                     match own {
-                        Some(own) => own.units += units,
-                        None => out.push(Moving { cell: [x, z], layer, units, eta: 0, rises: [0; 2] }),
+                        Some(own) => own.load = own.load.with(&load),
+                        None => out.push(Moving { cell: [x, z], layer, load, eta: 0, rises: [0; 2] }),
                     }
                     layer += 1;
                 }
@@ -129,10 +128,10 @@ impl Detail {
         for cell in each(cells) {
             let mut layer = 0;
             while let Some(column) = coarse.columns.column(cell, layer) {
-                let units = FINE * i64::from(coarse.flow.depths()[column]);
+                let load = of_column(coarse, column).in_fine();
                 let eta = surface(coarse, column);
                 let rises = lean(coarse, cell, layer, eta);
-                out.push(Moving { cell, layer, units, eta, rises });
+                out.push(Moving { cell, layer, load, eta, rises });
                 layer += 1;
             }
         }
@@ -141,18 +140,16 @@ impl Detail {
     fn give_coarse(&mut self, moving: &Moving) {
         let Self { coarse, rest, .. } = self;
         let index = coarse.columns.grid.index(moving.cell);
-        let units = moving.units + std::mem::take(&mut rest[index]);
-        rest[index] = units.rem_euclid(FINE);
-        let whole = units.div_euclid(FINE);
+        let whole = rest.whole(index, &moving.load);
         let layers = coarse.columns.of_cell(moving.cell).count();
         let column = coarse.columns.column(moving.cell, moving.layer.min(layers.saturating_sub(1)));
-        give(coarse, moving.cell, column, whole);
+        give(coarse, moving.cell, column, &whole);
     }
 
     fn give_fine(&mut self, moving: &Moving) {
         let Self { fine, rest, coarse, .. } = self;
         let index = coarse.columns.grid.index(moving.cell);
-        let mut units = moving.units + std::mem::take(&mut rest[index]);
+        let all = rest.take(index).with(&moving.load);
         let cells = quarters(moving.cell);
         let layer = |cell: [usize; 2]| {
             let layers = fine.columns.of_cell(cell).count();
@@ -167,12 +164,14 @@ impl Detail {
             let lift = signs[at][0] * moving.rises[0] + signs[at][1] * moving.rises[1];
             *depth = (moving.eta + lift.div_euclid(8) - base).max(0);
         }
-        share(&mut depths, &columns, units);
+        share(&mut depths, &columns, all.units);
+        let mut left = all;
         for (at, &depth) in depths.iter().enumerate() {
-            give(fine, cells[at], columns[at], depth);
-            units -= depth;
+            let own = all.part(depth);
+            give(fine, cells[at], columns[at], &own);
+            left = left.without(&own);
         }
-        rest[index] += units;
+        rest.set(index, left);
     }
 }
 
@@ -226,17 +225,21 @@ fn surface(liquid: &Shallow, column: usize) -> i64 {
 }
 
 /// Takes all of a column.
-fn take(liquid: &mut Shallow, column: usize) -> i64 {
-    let depth = i64::from(liquid.flow.depths()[column]);
-    -liquid.flow.change_depth(&liquid.columns, column, -depth)
+fn take(liquid: &mut Shallow, column: usize) -> Load {
+    let load = of_column(liquid, column);
+    change(liquid, column, &Load::default().without(&load));
+    load
 }
 
-/// Gives units to a column of a cell; what finds no room waits there.
-fn give(liquid: &mut Shallow, cell: [usize; 2], column: Option<usize>, units: i64) {
-    let Shallow { flow, columns, remap, .. } = liquid;
-    let given = column.map_or(0, |column| flow.change_depth(columns, column, units));
-    let height = column.map_or(0, |column| columns.bases()[column]);
-    remap.held.add(columns.grid.index(cell), height, units - given, [0; MOST]);
+/// Gives liquid to a column of a cell; what finds no room waits there.
+fn give(liquid: &mut Shallow, cell: [usize; 2], column: Option<usize>, load: &Load) {
+    match column {
+        Some(column) => change(liquid, column, load),
+        None => {
+            let cell = liquid.columns.grid.index(cell);
+            liquid.remap.held.add(cell, 0, load.units, load.amounts);
+        }
+    }
 }
 
 /// Changes the ground of a box of cells.

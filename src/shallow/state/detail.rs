@@ -2,8 +2,8 @@
 //!
 //! | part | bytes |
 //! |---|---|
-//! | header: magic, version, length of all, the near cells, counts of pipes and of cells with a rest, lengths of both states, length of the last step | [`HEADER`] |
-//! | cells with a rest: the cell, nothing, fine units | 16 each |
+//! | header: magic, version, count of scalars, length of all, the near cells, counts of pipes and of cells with a rest, lengths of both states, length of the last step | [`HEADER`] |
+//! | cells with a rest: the cell, nothing, fine units, then an amount of each scalar | 16 each, and 8 |
 //! | pipes along the edge: flux, what truncation left | 8 each |
 //! | states of the fine and of the coarse liquid, as [`super`] has them | |
 //! | hash of all this | [`SEAL`] |
@@ -13,7 +13,9 @@ use xxhash_rust::xxh3::xxh3_128;
 use super::{LAST, MOST_FLUX, Put, SEAL, SUMS, Saved, is_over, part, parts, refused};
 use crate::base::bytes::Reader;
 use crate::error::{Error, Result};
+use crate::shallow::detail::rests::Load;
 use crate::shallow::detail::{Cells, Detail, check_near};
+use crate::shallow::scalars::MOST;
 
 const MAGIC: [u8; 8] = *b"frz shld";
 const VERSION: u32 = 1;
@@ -44,7 +46,9 @@ impl Detail {
 
     /// Count of bytes that [`Detail::save`] would return now.
     pub fn save_size(&self) -> usize {
-        let own = HEADER + 16 * self.rests().count() + 8 * self.seam.numbers().len();
+        let own = HEADER
+            + rest_bytes(self.scalars().len()) * self.rest.iter().count()
+            + 8 * self.seam.numbers().len();
         own + self.fine.save_size() + self.coarse.save_size() + SEAL
     }
 
@@ -79,11 +83,6 @@ impl Detail {
         result
     }
 
-    /// Cells with a rest, and that.
-    fn rests(&self) -> impl Iterator<Item = (usize, i64)> + '_ {
-        self.rest.iter().copied().enumerate().filter(|(_, units)| *units != 0)
-    }
-
     fn write(&self, out: &mut [u8]) {
         let size = out.len();
         let (body, seal) = out.split_at_mut(size - SEAL);
@@ -91,16 +90,17 @@ impl Detail {
         let sizes = [self.fine.save_size(), self.coarse.save_size()];
         let [x, z] = &self.near;
         to.bytes(&MAGIC);
-        to.numbers(&[VERSION, 0], u32::to_le_bytes);
+        to.numbers(&[VERSION, self.scalars().len() as u32], u32::to_le_bytes);
         to.bytes(&(size as u64).to_le_bytes());
         to.numbers(&[x.start, x.end, z.start, z.end].map(|at| at as u32), u32::to_le_bytes);
-        let counts = [self.seam.numbers().len(), self.rests().count()];
+        let counts = [self.seam.numbers().len(), self.rest.iter().count()];
         to.numbers(&counts.map(|count| count as u32), u32::to_le_bytes);
         to.numbers(&sizes.map(|size| size as u64), u64::to_le_bytes);
         to.numbers(&[self.seam.last()], f64::to_le_bytes);
-        for (cell, units) in self.rests() {
+        for (cell, load) in self.rest.iter() {
             to.numbers(&[cell as u32, 0], u32::to_le_bytes);
-            to.bytes(&units.to_le_bytes());
+            to.bytes(&load.units.to_le_bytes());
+            to.numbers(&load.amounts[..self.scalars().len()], i64::to_le_bytes);
         }
         self.seam.numbers().for_each(|numbers| to.numbers(&numbers, f32::to_le_bytes));
         for (liquid, size) in [&self.fine, &self.coarse].into_iter().zip(sizes) {
@@ -111,11 +111,18 @@ impl Detail {
     }
 }
 
+/// Bytes of a cell's rest with so many scalars.
+fn rest_bytes(scalars: usize) -> usize {
+    16 + 8 * scalars
+}
+
 /// A state that is whole, in its parts.
 struct Both<'a> {
     near: Cells,
     last: f64,
-    rests: &'a [[u8; 16]],
+    /// Of as many bytes as a cell's rest has.
+    rests: &'a [u8],
+    scalars: usize,
     /// Flux, and what truncation left.
     pipes: &'a [[u8; 4]],
     liquids: [Saved<'a>; 2],
@@ -136,7 +143,7 @@ impl<'a> Both<'a> {
         if version != VERSION {
             return Err(refused(&format!("has format {version}, and this library reads {VERSION}")));
         }
-        from.u32()?;
+        let scalars = from.u32()? as usize;
         let length = u64::from_le_bytes(from.take()?);
         if length > bytes.len() as u64 {
             return Err(refused("is cut short"));
@@ -150,16 +157,20 @@ impl<'a> Both<'a> {
         let [pipes, rests] = [count()?, count()?];
         let sizes = [u64::from_le_bytes(from.take()?), u64::from_le_bytes(from.take()?)];
         let last = from.f64()?;
-        let fixed = (HEADER + 16 * rests + 8 * pipes + SEAL) as u64;
+        if scalars > MOST {
+            return Err(refused("is damaged"));
+        }
+        let fixed = (HEADER + rest_bytes(scalars) * rests + 8 * pipes + SEAL) as u64;
         let all = sizes[0].checked_add(sizes[1]).and_then(|sum| sum.checked_add(fixed));
         if all != Some(length) {
             return Err(refused("is damaged"));
         }
         let mut from = Reader::new(&body[HEADER..]);
-        let (rests, pipes) = (parts(&mut from, rests)?, parts(&mut from, 2 * pipes)?);
+        let rests = from.bytes(rest_bytes(scalars) * rests)?;
+        let pipes = parts(&mut from, 2 * pipes)?;
         let [fine, coarse] = sizes.map(|size| size as usize);
         let liquids = [Saved::read(from.bytes(fine)?)?, Saved::read(from.bytes(coarse)?)?];
-        Ok(Self { near, last, rests, pipes, liquids })
+        Ok(Self { near, last, rests, scalars, pipes, liquids })
     }
 
     /// Whether it is of this liquid, whose near cells are its own.
@@ -169,20 +180,32 @@ impl<'a> Both<'a> {
         coarse.check(&detail.coarse)?;
         let (flux, left) = (self.pipes.iter().step_by(2), self.pipes.iter().skip(1).step_by(2));
         let cells = self.rests().map(|(cell, _)| cell);
-        let is_good = self.pipes.len() == 2 * detail.seam.numbers().len()
+        let is_good = self.scalars == detail.scalars().len()
+            && self.pipes.len() == 2 * detail.seam.numbers().len()
             && LAST.contains(&self.last)
             && !flux.copied().any(|flux| is_over(&[flux], MOST_FLUX))
             && !left.copied().any(|left| is_over(&[left], 1.0))
             && cells.clone().is_sorted_by(|a, b| a < b)
             && cells.last().is_none_or(|cell| cell < detail.rest.len())
-            && self.rests().all(|(_, units)| units > 0 && SUMS.contains(&units));
+            && self.rests().all(|(_, load)| {
+                load.units >= 0
+                    && load != Load::default()
+                    && SUMS.contains(&load.units)
+                    && load.amounts.iter().all(|amount| SUMS.contains(amount))
+            });
         if is_good { Ok(()) } else { Err(refused("is damaged")) }
     }
 
-    fn rests(&self) -> impl Iterator<Item = (usize, i64)> + Clone {
-        let rest =
-            |rest: &[u8; 16]| (u32::from_le_bytes(part(rest, 0)) as usize, i64::from_le_bytes(part(rest, 8)));
-        self.rests.iter().map(rest)
+    fn rests(&self) -> impl Iterator<Item = (usize, Load)> + Clone {
+        let (bytes, scalars) = (rest_bytes(self.scalars), self.scalars);
+        self.rests.chunks_exact(bytes).map(move |rest| {
+            let mut amounts = [0; MOST];
+            for (at, amount) in amounts[..scalars].iter_mut().enumerate() {
+                *amount = i64::from_le_bytes(part(rest, 16 + 8 * at));
+            }
+            let units = i64::from_le_bytes(part(rest, 8));
+            (u32::from_le_bytes(part(rest, 0)) as usize, Load { units, amounts })
+        })
     }
 
     /// Puts the state in place.
@@ -190,8 +213,8 @@ impl<'a> Both<'a> {
         let [fine, coarse] = &self.liquids;
         fine.apply(&mut detail.fine);
         coarse.apply(&mut detail.coarse);
-        detail.rest.fill(0);
-        self.rests().for_each(|(cell, units)| detail.rest[cell] = units);
+        detail.rest.clear();
+        self.rests().for_each(|(cell, load)| detail.rest.set(cell, load));
         let numbers = self.pipes.as_chunks::<2>().0.iter().map(|pipe| pipe.map(f32::from_le_bytes));
         detail.seam.set_numbers(self.last, numbers);
     }
