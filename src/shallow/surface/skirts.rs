@@ -28,6 +28,7 @@ impl Skirts {
         self.edges.clear();
         self.vertices.clear();
         let Some(ledges) = ledges else { return [0; 2] };
+        self.edges.reserve(ledges.edges.len());
         self.vertices.resize(ledges.hems.len(), NONE);
         for (at, ledge) in ledges.edges.iter().enumerate() {
             let columns = ledge.hems.map(|hem| ledges.hems[hem as usize].column as usize);
@@ -37,9 +38,11 @@ impl Skirts {
             if !columns.into_iter().all(is_shown) || !scene.are_linked(a, b) {
                 continue;
             }
-            let is_linked =
-                |end: usize| scene.wet_beside(columns[end], RING[usize::from(ledge.beyond[end])]).is_some();
-            if is_linked(0) && is_linked(1) {
+            let beside = |end: usize| scene.wet_beside(columns[end], RING[usize::from(ledge.beyond[end])]);
+            // The surface goes on there: to one column, or to two that are linked.
+            if let (Some(c), Some(d)) = (beside(0), beside(1))
+                && (c == d || scene.are_linked(c, d))
+            {
                 continue;
             }
             self.edges.push(at as u32);
