@@ -5270,7 +5270,7 @@ frz_status frz_shallow_detail_surface_bound(const frz_shallow_detail *detail,
  * Writes the surface of all liquid as triangles, in real time (frz_shallow_detail): one mesh, without a crack between small and large cells. It ends at the
  * middles of the outermost cells. The first one after the box of small cells has moved may allocate.
  *
- * layout: NULL for the usual one. Without FRZ_SHALLOW_LIFTED.
+ * layout: NULL for the usual one. Without FRZ_SHALLOW_LIFTED and FRZ_SHALLOW_SKIRTED.
  * target: the buffers, as in frz_shallow_surface. In frz_shallow_target.columns those of large cells follow those of small ones.
  *     FRZ_ERROR_CAPACITY when one is too small: nothing is written, and size receives what is needed.
  * size: receives the size of the surface, all zeroes after other failures; may be NULL. Its struct_size is set by the caller.

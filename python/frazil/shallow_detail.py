@@ -131,7 +131,7 @@ class ShallowDetail(Handle):
     def surface(self, parts=(), z_up=False, left_handed=False, scale=1.0, least_depth=0.0, opaque_depth=0.01, fade_depth=0.0):
         """The Surface of all liquid, one mesh over cells of both sizes, with its scalars and these parts of it: normals, depths, opacities, velocities, layers, columns."""
         return surface_of("shallow_detail_surface", self._ctx, self.pointer, parts, z_up, left_handed, scale, least_depth, opaque_depth, False,
-                          fade_depth, self._scalars)
+                          fade_depth, False, self._scalars)
 
     def save(self):
         """The state between two frames, with the box of small cells: bytes for restore()."""

@@ -160,7 +160,7 @@ pub unsafe extern "C" fn frz_shallow_detail_surface_bound(
 /// Writes the surface of all liquid as triangles, in real time (frz_shallow_detail): one mesh, without a crack between small and large cells. It ends at the
 /// middles of the outermost cells. The first one after the box of small cells has moved may allocate.
 ///
-/// layout: NULL for the usual one. Without FRZ_SHALLOW_LIFTED.
+/// layout: NULL for the usual one. Without FRZ_SHALLOW_LIFTED and FRZ_SHALLOW_SKIRTED.
 /// target: the buffers, as in frz_shallow_surface. In frz_shallow_target.columns those of large cells follow those of small ones.
 ///     FRZ_ERROR_CAPACITY when one is too small: nothing is written, and size receives what is needed.
 /// size: receives the size of the surface, all zeroes after other failures; may be NULL. Its struct_size is set by the caller.
@@ -181,8 +181,12 @@ pub unsafe extern "C" fn frz_shallow_detail_surface(
             let _call = enter_light(context)?;
             let mut spread = change(detail)?;
             let Spread { detail, surface, velocities, concentrations, is_reserved, .. } = &mut *spread;
-            if wanted.is_lifted {
-                return Err(Failure::argument("FRZ_SHALLOW_LIFTED is not for liquid in cells of two sizes"));
+            for (is_wanted, name) in
+                [(wanted.is_lifted, "FRZ_SHALLOW_LIFTED"), (wanted.is_skirted, "FRZ_SHALLOW_SKIRTED")]
+            {
+                if is_wanted {
+                    return Err(Failure::argument(format!("{name} is not for liquid in cells of two sizes")));
+                }
             }
             if !*is_reserved {
                 surface.reserve(detail);

@@ -218,6 +218,8 @@ static void words_of_errors(frz_context *ctx) {
     memset(&target, 0, sizeof target);
     target.struct_size = sizeof target;
     FAILS(frz_shallow_detail_surface(ctx, detail, &layout, &target, NULL), FRZ_ERROR_ARGUMENT, "FRZ_SHALLOW_LIFTED");
+    layout.flags = FRZ_SHALLOW_SKIRTED;
+    FAILS(frz_shallow_detail_surface(ctx, detail, &layout, &target, NULL), FRZ_ERROR_ARGUMENT, "FRZ_SHALLOW_SKIRTED");
     FAILS(frz_shallow_detail_fill(NULL, 0), FRZ_ERROR_ARGUMENT, "NULL");
     frz_shallow_detail_destroy(detail), frz_shallow_detail_destroy(NULL);
 }
