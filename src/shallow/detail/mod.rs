@@ -2,9 +2,8 @@
 //!
 //! Two liquids over one lattice of heights: a *fine* one whose ground is there in a box of cells only, the *near* part, and a *coarse* one whose ground is
 //! there in all others (`ground.rs`). What is not theirs is without columns, and a wall. Along the edge of the box pipes of their own join them (`seam.rs`). A coarse unit is four
-//! fine ones, so volumes are counted in fine units; what makes no coarse unit waits, and is part of the balance. When the box moves, four
-//! fine columns become a coarse one, and back (`shift.rs`), and
-//! what flows goes on (`momentum.rs`). Nothing is lost.
+//! fine ones, so volumes are counted in fine units; what makes no coarse unit waits, with the scalars that it carries, and is part of the balance (`rests.rs`). When the box moves, four
+//! fine columns become a coarse one, and back (`shift.rs`), and what flows goes on (`momentum.rs`). Nothing is lost. `surface/` writes one mesh of both.
 
 mod ground;
 mod momentum;
@@ -62,7 +61,7 @@ impl Detail {
     /// Dry ground; the cells of `near` are fine. All others are of twice the size: their ground is the mean of that of four, layer by layer.
     ///
     /// # Errors
-    /// As [`Shallow::new`]; `Argument` also where the domain has an odd count of cells along an axis, as [`Detail::set_near`], and for falls.
+    /// As [`Shallow::new`]; `Argument` also where the domain has an odd count of cells along an axis, as [`Detail::set_near`], and for falls and thickening.
     pub fn new(ctx: &Context, solids: &Solids, params: Params, near: Cells) -> Result<Self> {
         params.validate()?;
         solids.grid.validate()?;
@@ -187,7 +186,7 @@ impl Detail {
     /// Changes the parameters.
     ///
     /// # Errors
-    /// As [`Shallow::set_params`].
+    /// As [`Shallow::set_params`]; also for thickening.
     pub fn set_params(&mut self, params: Params) -> Result<()> {
         check_carried(&params)?;
         self.fine.set_params(params.clone())?;
