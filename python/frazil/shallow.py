@@ -7,7 +7,7 @@ from typing import NamedTuple, Optional, Sequence
 import numpy as np
 
 from ._library import (Handle, ShallowBalance, ShallowBody, ShallowDistance, ShallowDomain, ShallowFitted, ShallowFlow, ShallowInfo,
-                       ShallowLoad, ShallowMoved, ShallowParams, ShallowReport, ShallowScalar, ShallowScalarBalance, Span, View, call, made, rows,
+                       ShallowLoad, ShallowMoved, ShallowParams, ShallowReport, ShallowScalar, ShallowScalarBalance, ShallowSize, Span, View, call, made, rows,
                        saved, span, view)
 from .grid import Grid
 from .mesh import Mesh
