@@ -1065,6 +1065,15 @@ typedef struct frz_pool frz_pool;
 typedef struct frz_shallow frz_shallow;
 
 /**
+ * Shallow liquid in cells of two sizes: those of its domain in a box that may move, around an instrument or a player, and of twice the length everywhere
+ * else, where a frame takes a quarter of the time. No liquid is lost between them.
+ *
+ * It has no falls and no thickening. In real time, as frz_shallow says, are frz_shallow_detail_step, _surface, _save and _set_bodies;
+ * _set_near, _update_terrain and _update_heights may allocate, and so may _restore where it moves the box.
+ */
+typedef struct frz_shallow_detail frz_shallow_detail;
+
+/**
  * A liquid as it was after a frame, copied: another thread may draw it while the next frame is computed. A host has two of them: one
  * that is taken, and one that is drawn.
  */
@@ -5048,6 +5057,303 @@ frz_status frz_shallow_snapshot_surface(frz_context *context,
 frz_status frz_shallow_snapshot_probe(const frz_shallow_snapshot *snapshot,
                                       frz_view points,
                                       frz_span dst);
+
+/**
+ * Makes a liquid in cells of two sizes on a mesh, as frz_shallow_create does: dry at first.
+ *
+ * params: NULL for the usual ones. Without falls and thickening.
+ * domain: where liquid can be. Its counts of cells are even.
+ * mesh: it is copied.
+ * near: double[4], least x, least z, greatest x and greatest z (m): the small cells are those of the smallest box of pairs of cells that has
+ *     it, as far as the domain goes; all of them may be small. FRZ_ERROR_ARGUMENT where it lies outside.
+ * out: receives the liquid, to be destroyed with frz_shallow_detail_destroy; NULL after a failure.
+ *
+ * Any number of threads may read a mesh; one thread at a time for each context.
+ */
+frz_status frz_shallow_detail_create(frz_context *context,
+                                     const frz_shallow_params *params,
+                                     const frz_shallow_domain *domain,
+                                     const frz_mesh *mesh,
+                                     const double *near,
+                                     frz_shallow_detail **out);
+
+/**
+ * Makes a liquid in cells of two sizes on a height field, as frz_shallow_create_heights does: dry at first.
+ *
+ * params: as in frz_shallow_detail_create.
+ * domain: as in frz_shallow_detail_create.
+ * heights: float for each cell of the domain (m), as in frz_shallow_create_heights.
+ * near: as in frz_shallow_detail_create.
+ * out: receives the liquid, to be destroyed with frz_shallow_detail_destroy; NULL after a failure.
+ *
+ * One thread at a time for each context.
+ */
+frz_status frz_shallow_detail_create_heights(frz_context *context,
+                                             const frz_shallow_params *params,
+                                             const frz_shallow_domain *domain,
+                                             frz_view heights,
+                                             const double *near,
+                                             frz_shallow_detail **out);
+
+/**
+ * Destroys a liquid in cells of two sizes; NULL is fine.
+ *
+ * detail: may be NULL. Not while a call uses it: it then stays.
+ *
+ * One thread at a time.
+ */
+void frz_shallow_detail_destroy(frz_shallow_detail *detail);
+
+/**
+ * Sets what flows, and how, as frz_shallow_set_params does.
+ *
+ * params: FRZ_ERROR_ARGUMENT names the field at fault and its range; the old ones then stay.
+ *
+ * One thread at a time.
+ */
+frz_status frz_shallow_detail_set_params(frz_shallow_detail *detail, const frz_shallow_params *params);
+
+/**
+ * Moves the box of small cells. Liquid keeps its volume and what flows, and its surface stays level where it was. A box of the same cells costs
+ * nothing, and so a host may call it in each frame.
+ *
+ * near: double[4], as in frz_shallow_detail_create. After a failure all is as it was.
+ *
+ * One thread at a time.
+ */
+frz_status frz_shallow_detail_set_near(frz_shallow_detail *detail,
+                                       const double *near);
+
+/**
+ * Reports the box of small cells.
+ *
+ * near: receives double[4]: least x, least z, greatest x and greatest z (m); all zeroes after a failure.
+ *
+ * Any number of threads may read a shallow liquid in cells of two sizes.
+ */
+frz_status frz_shallow_detail_get_near(const frz_shallow_detail *detail, double *near);
+
+/**
+ * Computes a frame, in real time (frz_shallow_detail), as frz_shallow_step does without a budget.
+ *
+ * dt: length of the frame (s), over 0, up to 1e6.
+ * report: receives what was done, all zeroes after a failure; may be NULL. Its struct_size is set by the caller.
+ *
+ * One thread at a time.
+ */
+frz_status frz_shallow_detail_step(frz_context *context,
+                                   frz_shallow_detail *detail,
+                                   double dt,
+                                   frz_shallow_report *report);
+
+/**
+ * Sets sources, drains and absorbers, as frz_shallow_set_flows does. Each acts on the cells of the size that its centre lies in.
+ *
+ * flows: count flow points; NULL with a count of 0: there is none. After a failure the old ones stay.
+ * count: number of flow points.
+ *
+ * One thread at a time.
+ */
+frz_status frz_shallow_detail_set_flows(frz_shallow_detail *detail,
+                                        const frz_shallow_flow *flows,
+                                        size_t count);
+
+/**
+ * Gives a flow point another rate: a valve. What it has moved stays.
+ *
+ * flow: which, counted from 0.
+ * rate: volume in a second (m3/s), 0 or more.
+ *
+ * One thread at a time.
+ */
+frz_status frz_shallow_detail_set_rate(frz_shallow_detail *detail, size_t flow, double rate);
+
+/**
+ * Reports how much a flow point has moved since it was set: what came in, or went out.
+ *
+ * flow: which, counted from 0.
+ * volume: receives it (m3); 0 after a failure.
+ *
+ * Any number of threads may read a shallow liquid in cells of two sizes.
+ */
+frz_status frz_shallow_detail_flow_moved(const frz_shallow_detail *detail, size_t flow, double *volume);
+
+/**
+ * Pours a volume at a place, as frz_shallow_pour does, into the cells of the size that it lies in.
+ *
+ * at: double[3], the place (m).
+ * radius: as in frz_shallow_flow (m).
+ * volume: what to pour (m3); negative: what to take.
+ * poured: receives what came in (m3), or went out (negative); 0 after a failure. May be NULL.
+ *
+ * One thread at a time.
+ */
+frz_status frz_shallow_detail_pour(frz_shallow_detail *detail,
+                                   const double *at,
+                                   double radius,
+                                   double volume,
+                                   double *poured);
+
+/**
+ * Fills all columns up to a height, as frz_shallow_fill does.
+ *
+ * height: where the surface is to be (m).
+ *
+ * One thread at a time.
+ */
+frz_status frz_shallow_detail_fill(frz_shallow_detail *detail, double height);
+
+/**
+ * Reports where all liquid is. Less than a cell's share of four units waits for the rest of a unit of large cells: it is part of held.
+ *
+ * balance: receives it, all zeroes after a failure. Its struct_size is set by the caller.
+ *
+ * Any number of threads may read a shallow liquid in cells of two sizes.
+ */
+frz_status frz_shallow_detail_get_balance(const frz_shallow_detail *detail,
+                                          frz_shallow_balance *balance);
+
+/**
+ * Moves the vertices of the mesh that the liquid was made with, as frz_shallow_update_terrain does, everywhere. After a failure all is as it was.
+ *
+ * positions: float[3] for each vertex (m), finite, in the mesh's order.
+ * moved: receives what was done, all zeroes after a failure; may be NULL. Its struct_size is set by the caller.
+ *
+ * One thread at a time.
+ */
+frz_status frz_shallow_detail_update_terrain(frz_context *context,
+                                             frz_shallow_detail *detail,
+                                             frz_view positions,
+                                             frz_shallow_moved *moved);
+
+/**
+ * Changes the heights of the height field that the liquid was made on, as frz_shallow_update_heights does, everywhere. After a failure all is as it was.
+ *
+ * heights: float for each cell of the domain (m), finite, as in frz_shallow_create_heights.
+ * moved: receives what was done, all zeroes after a failure; may be NULL. Its struct_size is set by the caller.
+ *
+ * One thread at a time.
+ */
+frz_status frz_shallow_detail_update_heights(frz_context *context,
+                                             frz_shallow_detail *detail,
+                                             frz_view heights,
+                                             frz_shallow_moved *moved);
+
+/**
+ * Sets the solids that move over the ground, as frz_shallow_set_bodies does, in real time (frz_shallow_detail). They may cross the edge of the box. After a
+ * failure all is as it was.
+ *
+ * bodies: count bodies; NULL with a count of 0: there is none.
+ * count: number of bodies.
+ * moved: receives what was done, all zeroes after a failure; may be NULL. Its struct_size is set by the caller.
+ *
+ * One thread at a time.
+ */
+frz_status frz_shallow_detail_set_bodies(frz_context *context,
+                                         frz_shallow_detail *detail,
+                                         const frz_shallow_body *bodies,
+                                         size_t count,
+                                         frz_shallow_moved *moved);
+
+/**
+ * Reports the most that the surface of any liquid can have, as frz_shallow_surface_bound does. It holds until the ground, a body or the box of small
+ * cells moves.
+ *
+ * size: receives it, all zeroes after a failure. Its struct_size is set by the caller.
+ *
+ * Any number of threads may read a shallow liquid in cells of two sizes.
+ */
+frz_status frz_shallow_detail_surface_bound(const frz_shallow_detail *detail,
+                                            frz_shallow_size *size);
+
+/**
+ * Writes the surface of all liquid as triangles, in real time (frz_shallow_detail): one mesh, without a crack between small and large cells. It ends at the
+ * middles of the outermost cells. The first one after the box of small cells has moved may allocate.
+ *
+ * layout: NULL for the usual one. Without FRZ_SHALLOW_LIFTED and FRZ_SHALLOW_SKIRTED.
+ * target: the buffers, as in frz_shallow_surface. In frz_shallow_target.columns those of large cells follow those of small ones.
+ *     FRZ_ERROR_CAPACITY when one is too small: nothing is written, and size receives what is needed.
+ * size: receives the size of the surface, all zeroes after other failures; may be NULL. Its struct_size is set by the caller.
+ *
+ * One thread at a time.
+ */
+frz_status frz_shallow_detail_surface(frz_context *context,
+                                      frz_shallow_detail *detail,
+                                      const frz_shallow_layout *layout,
+                                      const frz_shallow_target *target,
+                                      frz_shallow_size *size);
+
+/**
+ * Writes all that the next frame depends on, as frz_shallow_save does, in real time (frz_shallow_detail). The box of small cells is part of it.
+ *
+ * dst: room for capacity bytes. NULL: size receives how many are needed now, and nothing is written.
+ * capacity: bytes at dst. FRZ_ERROR_CAPACITY when they are too few.
+ * size: receives the bytes that were written, or are needed; 0 after other failures.
+ *
+ * One thread at a time for each context; any number may read a shallow liquid in cells of two sizes.
+ */
+frz_status frz_shallow_detail_save(frz_context *context,
+                                   const frz_shallow_detail *detail,
+                                   void *dst,
+                                   size_t capacity,
+                                   size_t *size);
+
+/**
+ * Puts a saved state in place of the liquid's, as frz_shallow_restore does, and moves the box of small cells to where it was.
+ *
+ * state: bytes bytes of frz_shallow_detail_save. FRZ_ERROR_FILE, and the liquid is as it was, where they are damaged, of another version, of
+ *     another ground or border, or of other kinds of flow points.
+ * bytes: their number.
+ *
+ * One thread at a time.
+ */
+frz_status frz_shallow_detail_restore(frz_context *context,
+                                      frz_shallow_detail *detail,
+                                      const void *state,
+                                      size_t bytes);
+
+/**
+ * Sets what the liquid carries, as frz_shallow_set_scalars does. None of them thickens it.
+ *
+ * scalars: count scalars; NULL with a count of 0: there is none. After a failure the old ones stay.
+ * count: number of scalars, up to FRZ_SHALLOW_MOST_SCALARS.
+ *
+ * One thread at a time.
+ */
+frz_status frz_shallow_detail_set_scalars(frz_shallow_detail *detail,
+                                          const frz_shallow_scalar *scalars,
+                                          size_t count);
+
+/**
+ * Sets the concentrations of scalars in what frz_shallow_detail_pour and _fill add from now on; 0 at first.
+ *
+ * concentrations: double for each scalar, in their order, within its range.
+ *
+ * One thread at a time.
+ */
+frz_status frz_shallow_detail_set_poured(frz_shallow_detail *detail, frz_view concentrations);
+
+/**
+ * Sets the concentrations of scalars in what comes through a source; 0 after frz_shallow_detail_set_flows.
+ *
+ * flow: which flow point, counted from 0.
+ * concentrations: double for each scalar, in their order, within its range.
+ *
+ * One thread at a time.
+ */
+frz_status frz_shallow_detail_set_sourced(frz_shallow_detail *detail, size_t flow, frz_view concentrations);
+
+/**
+ * Reports where all of a scalar is.
+ *
+ * scalar: which, counted from 0.
+ * balance: receives it, all zeroes after a failure. Its struct_size is set by the caller.
+ *
+ * Any number of threads may read a shallow liquid in cells of two sizes.
+ */
+frz_status frz_shallow_detail_get_scalar_balance(const frz_shallow_detail *detail,
+                                                 uint32_t scalar,
+                                                 frz_shallow_scalar_balance *balance);
 
 #ifdef __cplusplus
 }  // extern "C"

@@ -39,6 +39,7 @@ from .grid import Grid, Leaf, load, save
 from .mesh import Mesh
 from .mist import Mist
 from .shallow import (Absorber, Ball, Box, Capsule, Drain, Drops, Orifice, Scalar, Shallow, Snapshot, Source, Surface)
+from .shallow_detail import ShallowDetail
 from .shallow_stains import Stains
 from .snow import Base, Body, Noise, snow_layer
 from .tracker import Particles, Tracker, spacing
@@ -46,5 +47,5 @@ from . import level_set
 
 __all__ = [
     "ABI_VERSION", "Absorber", "Ball", "Base", "Body", "Box", "Capsule", "Context", "Drain", "Drops", "Error", "Grains", "Grid", "Leaf",
-    "Mesh", "Mist", "Noise", "Orifice", "Particles", "Pool", "Scalar", "Shallow", "Snapshot", "Source", "Stains", "Surface", "Tracker", "level_set", "library", "load", "save", "snow_layer", "spacing", "version",
+    "Mesh", "Mist", "Noise", "Orifice", "Particles", "Pool", "Scalar", "Shallow", "ShallowDetail", "Snapshot", "Source", "Stains", "Surface", "Tracker", "level_set", "library", "load", "save", "snow_layer", "spacing", "version",
 ]

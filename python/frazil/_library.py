@@ -421,11 +421,22 @@ _FUNCTIONS = {
     "shallow_stains_create": [_P, _P, View, View, _P, _P], "shallow_stains_update": [_P, _P, _P, View, _P],
     "shallow_stains_read": [_P, Span], "shallow_stains_soaked": [_P, Span], "shallow_stains_absorbed": [_P, _P],
     "shallow_stains_save": [_P, _P, _P, _Z, _P], "shallow_stains_restore": [_P, _P, _P, _Z],
+    "shallow_detail_create": [_P, _P, _P, _P, _P, _P], "shallow_detail_create_heights": [_P, _P, _P, View, _P, _P],
+    "shallow_detail_set_params": [_P, _P], "shallow_detail_set_near": [_P, _P], "shallow_detail_get_near": [_P, _P],
+    "shallow_detail_step": [_P, _P, _D, _P], "shallow_detail_set_flows": [_P, _P, _Z],
+    "shallow_detail_set_rate": [_P, _Z, _D], "shallow_detail_flow_moved": [_P, _Z, _P],
+    "shallow_detail_pour": [_P, _P, _D, _D, _P], "shallow_detail_fill": [_P, _D],
+    "shallow_detail_get_balance": [_P, _P], "shallow_detail_update_terrain": [_P, _P, View, _P],
+    "shallow_detail_update_heights": [_P, _P, View, _P], "shallow_detail_set_bodies": [_P, _P, _P, _Z, _P],
+    "shallow_detail_surface_bound": [_P, _P], "shallow_detail_surface": [_P, _P, _P, _P, _P],
+    "shallow_detail_set_scalars": [_P, _P, _Z], "shallow_detail_set_poured": [_P, View],
+    "shallow_detail_set_sourced": [_P, _Z, View], "shallow_detail_get_scalar_balance": [_P, _U, _P],
+    "shallow_detail_save": [_P, _P, _P, _Z, _P], "shallow_detail_restore": [_P, _P, _P, _Z],
     "shallow_snapshot_drops": [_P, Span, _P], "shallow_snapshot_drops_mesh": [_P, _P, _P, _P, _P],
 }
 _VOID = ["pool_destroy", "context_destroy", "context_cancel", "context_reset", "mesh_destroy", "grid_destroy",
          "base_destroy", "grains_destroy", "mist_destroy", "tracker_destroy", "shallow_destroy",
-         "shallow_snapshot_destroy", "shallow_stains_destroy"]
+         "shallow_snapshot_destroy", "shallow_stains_destroy", "shallow_detail_destroy"]
 _LENT = ["base_grid", "base_removed", "base_compression", "base_touched"]
 
 

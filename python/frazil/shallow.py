@@ -7,7 +7,7 @@ from typing import NamedTuple, Optional, Sequence
 import numpy as np
 
 from ._library import (Handle, ShallowBalance, ShallowBody, ShallowDistance, ShallowDomain, ShallowFitted, ShallowFlow, ShallowInfo,
-                       ShallowLoad, ShallowMoved, ShallowParams, ShallowReport, ShallowScalar, ShallowScalarBalance, Span, View, call, made, rows,
+                       ShallowLoad, ShallowMoved, ShallowParams, ShallowReport, ShallowScalar, ShallowScalarBalance, ShallowSize, Span, View, call, made, rows,
                        saved, span, view)
 from .grid import Grid
 from .mesh import Mesh
@@ -147,6 +147,37 @@ def _probe(name, pointer, points):
     return out
 
 
+def scalars_of(scalars):
+    """Scalars, as the C interface has them."""
+    return (ShallowScalar * max(len(scalars), 1))(*(
+        ShallowScalar(c.sizeof(ShallowScalar), _number("law", scalar.law, LAWS), scalar.name.encode(), scalar.range, scalar.half_life)
+        for scalar in scalars))
+
+
+def domain_of(ground, cell, origin, cells, low, high):
+    """Heights, if the ground is such, and the domain."""
+    heights = None if isinstance(ground, (Mesh, Grid)) else np.ascontiguousarray(ground, np.float32)
+    if heights is not None:
+        if heights.ndim != 2:
+            raise ValueError(f"heights of shape (nz, nx) are needed, not {heights.shape}")
+        corners = (0.0, float(heights.min(initial=np.inf)), 0.0), (0.0, float(heights.max(initial=-np.inf)), 0.0)
+        cells = heights.shape[::-1]
+    elif isinstance(ground, Mesh):
+        corners = ground.info.box_min, ground.info.box_max
+    elif None in (origin, cells, low, high):
+        raise ValueError("origin, cells, low and high are needed for a level set")
+    if origin is None:
+        origin = corners[0][0], corners[0][2]
+    if cells is None:
+        cells = [max(int(np.ceil((corners[1][axis] - origin[axis // 2]) / cell - 1e-6)), 1) for axis in (0, 2)]
+    if low is None:
+        low = corners[0][1]
+    if high is None:
+        high = corners[1][1] + max(corners[1][1] - low, 16 * cell)
+    domain = ShallowDomain(c.sizeof(ShallowDomain), 0, cell, (c.c_double * 2)(*origin), (c.c_uint32 * 2)(*cells), low, high)
+    return heights, domain
+
+
 class Shallow(Handle):
     """A small amount of liquid on a ground.
 
@@ -167,25 +198,7 @@ class Shallow(Handle):
 
     def __init__(self, ctx, ground, cell, origin=None, cells=None, low=None, high=None, **more):
         params = self._params(**more)
-        heights = None if isinstance(ground, (Mesh, Grid)) else np.ascontiguousarray(ground, np.float32)
-        if heights is not None:
-            if heights.ndim != 2:
-                raise ValueError(f"heights of shape (nz, nx) are needed, not {heights.shape}")
-            corners = (0.0, float(heights.min(initial=np.inf)), 0.0), (0.0, float(heights.max(initial=-np.inf)), 0.0)
-            cells = heights.shape[::-1]
-        elif isinstance(ground, Mesh):
-            corners = ground.info.box_min, ground.info.box_max
-        elif None in (origin, cells, low, high):
-            raise ValueError("origin, cells, low and high are needed for a level set")
-        if origin is None:
-            origin = corners[0][0], corners[0][2]
-        if cells is None:
-            cells = [max(int(np.ceil((corners[1][axis] - origin[axis // 2]) / cell - 1e-6)), 1) for axis in (0, 2)]
-        if low is None:
-            low = corners[0][1]
-        if high is None:
-            high = corners[1][1] + max(corners[1][1] - low, 16 * cell)
-        domain = ShallowDomain(c.sizeof(ShallowDomain), 0, cell, (c.c_double * 2)(*origin), (c.c_uint32 * 2)(*cells), low, high)
+        heights, domain = domain_of(ground, cell, origin, cells, low, high)
         start = ctx.pointer, c.byref(params), c.byref(domain)
         if heights is not None:
             pointer = made("shallow_create_heights", *start, View(heights.ctypes.data, heights.size, 0))
@@ -194,7 +207,7 @@ class Shallow(Handle):
             pointer = made(name, *start, ground.pointer)
         super().__init__(pointer)
         self._ctx, self._more, self._lent, self._scalars, self._bodies = ctx, more, [], 0, 0
-        self.cells, self.origin = tuple(cells), tuple(origin)
+        self.cells, self.origin = tuple(domain.cells), tuple(domain.origin)
 
     @staticmethod
     def _params(liquid="blood", pace="realtime", border="closed", section="wetted", friction="ground", **more):
@@ -274,10 +287,7 @@ class Shallow(Handle):
 
     def set_scalars(self, scalars):
         """Sets Scalars, up to four, that the liquid carries, in place of those before: there is nothing yet of any."""
-        array = (ShallowScalar * max(len(scalars), 1))(*(
-            ShallowScalar(c.sizeof(ShallowScalar), _number("law", scalar.law, LAWS), scalar.name.encode(), scalar.range, scalar.half_life)
-            for scalar in scalars))
-        call("shallow_set_scalars", self.pointer, array, len(scalars))
+        call("shallow_set_scalars", self.pointer, scalars_of(scalars), len(scalars))
         self._scalars = len(scalars)
 
     def set_poured(self, concentrations):

@@ -111,6 +111,12 @@ pub mod shallow_stains;
 
 pub mod shallow_snapshot;
 
+pub mod shallow_detail;
+
+pub mod shallow_detail_ground;
+
+pub mod shallow_detail_scalars;
+
 mod shallow_lists;
 
 mod handle;

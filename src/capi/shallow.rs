@@ -69,7 +69,7 @@ unsafe impl Sized32 for frz_shallow_report {
 }
 
 impl frz_shallow_report {
-    fn of(done: &Report, dt: f64) -> Self {
+    pub(super) fn of(done: &Report, dt: f64) -> Self {
         Self {
             struct_size: 0,
             steps: done.steps,

@@ -100,6 +100,25 @@ pub(super) struct Attached {
 }
 
 impl Attached {
+    /// The flow points of a host.
+    ///
+    /// # Safety
+    /// As [`each_sized`].
+    pub(super) unsafe fn all(
+        flows: *const frz_shallow_flow,
+        count: usize,
+        terrain: &Terrain,
+    ) -> Outcome<Vec<Self>> {
+        let mut attached = Vec::with_capacity(count.min(1 << 16));
+        let take = |given: frz_shallow_flow| {
+            attached.push(Self::of(&given, terrain)?);
+            Ok(())
+        };
+        // SAFETY: the caller's promise.
+        unsafe { each_sized(flows, count, ["flow", "flows"], frz_shallow_flow::NONE, take) }?;
+        Ok(attached)
+    }
+
     fn of(given: &frz_shallow_flow, terrain: &Terrain) -> Outcome<Self> {
         no_flags(given.flags, FRZ_SHALLOW_ON_TRIANGLE)?;
         let kind = match meaning("kind", "frz_shallow_flow_kind", given.kind, &KINDS)? {
@@ -144,12 +163,7 @@ pub unsafe extern "C" fn frz_shallow_set_flows(
         // SAFETY: the pointers are NULL or the caller's.
         unsafe {
             let mut spill = change(shallow)?;
-            let mut attached = Vec::with_capacity(count.min(1 << 16));
-            let take = |given: frz_shallow_flow| {
-                attached.push(Attached::of(&given, &spill.terrain)?);
-                Ok(())
-            };
-            each_sized(flows, count, ["flow", "flows"], frz_shallow_flow::NONE, take)?;
+            let attached = Attached::all(flows, count, &spill.terrain)?;
             let points: Vec<FlowPoint> = attached.iter().map(|flow| flow.point.clone()).collect();
             spill.shallow.set_flows(&points, |at| format!("flow {at}"))?;
             spill.flows = attached;

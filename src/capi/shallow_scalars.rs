@@ -76,6 +76,26 @@ impl frz_shallow_scalar {
     }
 }
 
+/// Reads the scalars of a host.
+///
+/// # Safety
+/// As [`each_sized`]; names must be NULL or texts that end with a zero.
+pub(super) unsafe fn read_scalars(scalars: *const frz_shallow_scalar, count: usize) -> Outcome<Vec<Scalar>> {
+    if count > FRZ_SHALLOW_MOST_SCALARS as usize {
+        let text = format!("{count} scalars are more than {FRZ_SHALLOW_MOST_SCALARS}");
+        return Err(Failure::argument(text));
+    }
+    let mut given = Vec::with_capacity(count);
+    // SAFETY: the caller's promise.
+    unsafe {
+        each_sized(scalars, count, ["scalar", "scalars"], frz_shallow_scalar::NONE, |scalar| {
+            given.push(scalar.scalar()?);
+            Ok(())
+        })?;
+    }
+    Ok(given)
+}
+
 /// Sets what the liquid carries, in place of what it carried before. Of each scalar there is nothing yet, and what is poured and what comes through
 /// sources has none until frz_shallow_set_poured and _set_sourced. The frame after it may allocate.
 ///
@@ -94,15 +114,7 @@ pub unsafe extern "C" fn frz_shallow_set_scalars(
         // SAFETY: the pointers are NULL or the caller's.
         unsafe {
             let mut spill = change(shallow)?;
-            if count > FRZ_SHALLOW_MOST_SCALARS as usize {
-                let text = format!("{count} scalars are more than {FRZ_SHALLOW_MOST_SCALARS}");
-                return Err(Failure::argument(text));
-            }
-            let mut given = Vec::with_capacity(count);
-            each_sized(scalars, count, ["scalar", "scalars"], frz_shallow_scalar::NONE, |scalar| {
-                given.push(scalar.scalar()?);
-                Ok(())
-            })?;
+            let given = read_scalars(scalars, count)?;
             Ok(spill.shallow.set_scalars(&given)?)
         }
     })
@@ -122,7 +134,7 @@ pub unsafe extern "C" fn frz_shallow_set_poured(
         // SAFETY: the liquid is NULL or was not destroyed; the view is the caller's.
         unsafe {
             let mut spill = change(shallow)?;
-            let given = of_scalars(&spill.shallow, &concentrations)?;
+            let given = of_scalars(spill.shallow.scalars().len(), &concentrations)?;
             Ok(spill.shallow.set_poured(&given[..concentrations.count])?)
         }
     })
@@ -144,7 +156,7 @@ pub unsafe extern "C" fn frz_shallow_set_sourced(
         // SAFETY: the liquid is NULL or was not destroyed; the view is the caller's.
         unsafe {
             let mut spill = change(shallow)?;
-            let given = of_scalars(&spill.shallow, &concentrations)?;
+            let given = of_scalars(spill.shallow.scalars().len(), &concentrations)?;
             Ok(spill.shallow.set_sourced(flow, &given[..concentrations.count])?)
         }
     })
@@ -154,13 +166,12 @@ pub unsafe extern "C" fn frz_shallow_set_sourced(
 ///
 /// # Safety
 /// The view must describe memory that can be read.
-unsafe fn of_scalars(
-    shallow: &Shallow,
+pub(super) unsafe fn of_scalars(
+    count: usize,
     numbers: &frz_view,
 ) -> Outcome<[f64; FRZ_SHALLOW_MOST_SCALARS as usize]> {
     // SAFETY: the caller's promise.
     let given = unsafe { numbers.in_place::<f64>("concentrations") }?;
-    let count = shallow.scalars().len();
     if given.len() != count {
         let text = format!("concentrations: {} elements, but there are {count} scalars", given.len());
         return Err(Failure::argument(text));
@@ -207,7 +218,7 @@ pub unsafe extern "C" fn frz_shallow_read_scalar(
 }
 
 /// A scalar's number, if there is such a scalar.
-fn check_scalar(shallow: &Shallow, scalar: u32) -> Outcome<usize> {
+pub(super) fn check_scalar(shallow: &Shallow, scalar: u32) -> Outcome<usize> {
     let count = shallow.scalars().len();
     match (scalar as usize) < count {
         true => Ok(scalar as usize),

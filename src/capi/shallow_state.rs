@@ -4,7 +4,7 @@ use std::ffi::c_void;
 
 use super::context::{enter_light, frz_context};
 use super::guard::frz_status::FRZ_ERROR_CAPACITY;
-use super::guard::{Failure, frz_status, guard};
+use super::guard::{Failure, Outcome, frz_status, guard};
 use super::handle::{change, clear, read, required};
 use super::shallow::frz_shallow;
 use super::views::{frz_span, frz_view};
@@ -33,16 +33,7 @@ pub unsafe extern "C" fn frz_shallow_save(
             let size = required(size, "size")?;
             let _call = enter_light(context)?;
             let spill = read(shallow)?;
-            let needed = spill.shallow.save_size();
-            size.write_unaligned(needed);
-            let room = frz_span { data: dst, count: capacity, stride: 0 };
-            let Some(room) = room.numbers::<u8>("dst", 1)? else { return Ok(()) };
-            if room.len() < needed {
-                let text = format!("there is room for {capacity} bytes, {needed} are needed");
-                return Err(Failure::new(FRZ_ERROR_CAPACITY, text));
-            }
-            spill.shallow.save_to(room)?;
-            Ok(())
+            put_state(dst, capacity, size, spill.shallow.save_size(), |room| spill.shallow.save_to(room))
         }
     })
 }
@@ -67,9 +58,44 @@ pub unsafe extern "C" fn frz_shallow_restore(
         unsafe {
             let _call = enter_light(context)?;
             let mut spill = change(shallow)?;
-            required(state.cast_mut(), "state")?;
-            let state = frz_view { data: state, count: bytes, stride: 0 }.bytes("state")?;
+            let state = taken_state(state, bytes)?;
             Ok(spill.shallow.restore(state)?)
         }
     })
+}
+
+/// Writes a state of so many bytes to a host's room, if it gives any.
+///
+/// # Safety
+/// There must be room for `capacity` bytes at `dst`, unless it is NULL.
+pub(super) unsafe fn put_state(
+    dst: *mut c_void,
+    capacity: usize,
+    size: *mut usize,
+    needed: usize,
+    save_to: impl FnOnce(&mut [u8]) -> crate::Result<usize>,
+) -> Outcome {
+    let room = frz_span { data: dst, count: capacity, stride: 0 };
+    // SAFETY: the caller's promise.
+    let room = unsafe {
+        size.write_unaligned(needed);
+        room.numbers::<u8>("dst", 1)?
+    };
+    let Some(room) = room else { return Ok(()) };
+    if room.len() < needed {
+        let text = format!("there is room for {capacity} bytes, {needed} are needed");
+        return Err(Failure::new(FRZ_ERROR_CAPACITY, text));
+    }
+    save_to(room)?;
+    Ok(())
+}
+
+/// The bytes of a host's state.
+///
+/// # Safety
+/// The pointer must be NULL or point to so many bytes, for `'a`.
+pub(super) unsafe fn taken_state<'a>(state: *const c_void, bytes: usize) -> Outcome<&'a [u8]> {
+    required(state.cast_mut(), "state")?;
+    // SAFETY: the caller's promise.
+    unsafe { frz_view { data: state, count: bytes, stride: 0 }.bytes("state") }
 }

@@ -1,5 +1,7 @@
 //! The surface of shallow liquid as a mesh, written into a host's buffers.
 
+use std::cell::RefCell;
+
 use super::context::{enter_light, frz_context};
 use super::guard::{Failure, Outcome, frz_status, guard};
 use super::handle::{change, read};
@@ -319,14 +321,33 @@ impl Wanted {
         columns: &Columns,
         depths: &Depths<'_>,
     ) -> Outcome {
+        let surface = RefCell::new(surface);
+        // SAFETY: the caller's promise.
+        unsafe {
+            self.write_with(
+                |layout, target| surface.borrow_mut().build(columns, depths, layout, target),
+                || surface.borrow_mut().count(columns, depths),
+            )
+        }
+    }
+
+    /// Writes a surface and its size, by what builds one and what counts it.
+    ///
+    /// # Safety
+    /// As [`Wanted::write`].
+    pub(super) unsafe fn write_with(
+        &self,
+        build: impl FnOnce(&Layout, &mut Target<'_>) -> crate::Result<Counts>,
+        count: impl FnOnce() -> crate::Result<Counts>,
+    ) -> Outcome {
         // SAFETY: the caller's promise.
         let mut target = unsafe { self.given.target() }?;
-        let built = surface.build(columns, depths, &self.layout, &mut target);
+        let built = build(&self.layout, &mut target);
         // What is too small is found out behind, so that a surface that fits is searched once.
         let (counts, fits) = match built {
             Ok(counts) => (counts, Ok(())),
             Err(error) => {
-                let counts = surface.count(columns, depths)?;
+                let counts = count()?;
                 match check_room(&self.given.buffers(), &counts) {
                     Ok(()) => return Err(error.into()),
                     short => (counts, short),

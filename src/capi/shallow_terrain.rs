@@ -233,7 +233,7 @@ pub unsafe extern "C" fn frz_shallow_update_terrain(
                 mesh.caster.cast(&mesh.coming, &mesh.triangles, cells.clone())?;
                 let caster = &mesh.caster;
                 let moved = shallow.update_cells(cells, |cell| caster.at(cell))?;
-                std::mem::swap(&mut mesh.positions, &mut mesh.coming);
+                mesh.come();
                 for (index, flow) in flows.iter_mut().enumerate() {
                     if let Some(on) = &flow.on {
                         flow.point.at = terrain.place(on)?;
@@ -247,11 +247,24 @@ pub unsafe extern "C" fn frz_shallow_update_terrain(
 }
 
 impl Moving {
+    /// The solids of all cells with the vertices on their way in.
+    pub(super) fn cast(&mut self, grid: Grid, heights: Heights) -> Outcome<Solids> {
+        self.caster.cast(&self.coming, &self.triangles, all_cells(&grid))?;
+        let mut solids = Solids::empty(grid, heights);
+        (0..grid.cells()).for_each(|cell| solids.push(self.caster.at(cell)));
+        Ok(solids)
+    }
+
+    /// They have come.
+    pub(super) fn come(&mut self) {
+        std::mem::swap(&mut self.positions, &mut self.coming);
+    }
+
     /// Reads where vertices come to lie.
     ///
     /// # Safety
     /// The view must describe memory that can be read.
-    unsafe fn take(&mut self, positions: &frz_view) -> Outcome {
+    pub(super) unsafe fn take(&mut self, positions: &frz_view) -> Outcome {
         // SAFETY: the caller's promise.
         let given = unsafe { positions.in_place::<[f32; 3]>("positions") }?;
         let count = self.positions.len();
@@ -297,26 +310,41 @@ pub unsafe extern "C" fn frz_shallow_update_heights(
                         "the liquid was not made on a height field that could change",
                     ));
                 };
-                let tops = heights.in_place::<f32>("heights")?;
-                if tops.len() != grid.cells() {
-                    let text =
-                        format!("heights: {} elements, but there are {} cells", tops.len(), grid.cells());
-                    return Err(Failure::argument(text));
-                }
-                if let Some(at) = tops.clone().position(|top| !top.is_finite()) {
-                    return Err(Failure::argument(format!("heights: element {at} is not finite")));
-                }
-                let [across, rows] = &cells;
-                let is_within = |cell: usize| {
-                    across.contains(&(cell % grid.size[0])) && rows.contains(&(cell / grid.size[0]))
-                };
-                let own = tops.enumerate().filter(|(cell, _)| is_within(*cell));
-                solids.clear();
-                solids.extend(own.map(|(_, top)| [[BOTTOMLESS, range.round(top.into())]]));
+                read_heights(&heights, &grid, &range, cells.clone(), solids)?;
                 Ok(shallow.update_cells(cells, |cell| &solids[cell])?)
             })
         }
     })
+}
+
+/// Reads the solids that a host's heights of all cells make of some.
+///
+/// # Safety
+/// The view must describe memory that can be read.
+pub(super) unsafe fn read_heights(
+    heights: &frz_view,
+    grid: &Grid,
+    range: &Heights,
+    [across, rows]: [Range<usize>; 2],
+    solids: &mut Vec<[Solid; 1]>,
+) -> Outcome {
+    // SAFETY: the caller's promise.
+    let tops = unsafe { heights.in_place::<f32>("heights") }?;
+    if tops.len() != grid.cells() {
+        let text = format!("heights: {} elements, but there are {} cells", tops.len(), grid.cells());
+        return Err(Failure::argument(text));
+    }
+    if let Some(at) = tops.clone().position(|top| !top.is_finite()) {
+        return Err(Failure::argument(format!("heights: element {at} is not finite")));
+    }
+    let is_within = |cell: usize| {
+        let [x, z] = grid.place(cell);
+        across.contains(&x) && rows.contains(&z)
+    };
+    let own = tops.enumerate().filter(|(cell, _)| is_within(*cell));
+    solids.clear();
+    solids.extend(own.map(|(_, top)| [[BOTTOMLESS, range.round(top.into())]]));
+    Ok(())
 }
 
 /// Shapes of bodies.
@@ -393,6 +421,25 @@ impl frz_shallow_body {
     }
 }
 
+/// Reads the bodies of a host.
+///
+/// # Safety
+/// As [`each_sized`].
+pub(super) unsafe fn read_bodies(
+    bodies: *const frz_shallow_body,
+    count: usize,
+    shapes: &mut Vec<Shape>,
+) -> Outcome {
+    shapes.clear();
+    // SAFETY: the caller's promise.
+    unsafe {
+        each_sized(bodies, count, ["body", "bodies"], frz_shallow_body::NONE, |body| {
+            shapes.push(body.shape()?);
+            Ok(())
+        })
+    }
+}
+
 /// Sets the solids that move over the ground, in place of those before, in real time (frz_shallow): the ground is made anew where one moves,
 /// and no triangle is looked at. The liquid makes way, and none of it is lost. After a failure all is as it was.
 ///
@@ -416,11 +463,7 @@ pub unsafe extern "C" fn frz_shallow_set_bodies(
         unsafe {
             moves(context, shallow, moved, |spill| {
                 let Spill { shallow, shapes, .. } = spill;
-                shapes.clear();
-                each_sized(bodies, count, ["body", "bodies"], frz_shallow_body::NONE, |body| {
-                    shapes.push(body.shape()?);
-                    Ok(())
-                })?;
+                read_bodies(bodies, count, shapes)?;
                 Ok(shallow.set_bodies(shapes)?)
             })
         }

@@ -53,6 +53,11 @@ impl Grid {
         z * self.size[0] + x
     }
 
+    /// The cell of an index.
+    pub fn place(&self, index: usize) -> [usize; 2] {
+        [index % self.size[0], index / self.size[0]]
+    }
+
     /// Centre of a cell (m).
     pub fn centre(&self, [x, z]: [usize; 2]) -> [f64; 2] {
         [self.origin[0] + (x as f64 + 0.5) * self.cell, self.origin[1] + (z as f64 + 0.5) * self.cell]

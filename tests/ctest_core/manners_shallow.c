@@ -116,6 +116,41 @@ static void make_stains(wound *self) {
     must(frz_shallow_stains_create(self->ctx, self->blood, places, triangles, &staining, &stains));
 }
 
+/* A basin in cells of two sizes, through which a tool goes. */
+enum { BASIN = 64 };
+static frz_shallow_detail *basin;
+
+static void make_basin(wound *self) {
+    static float flat[BASIN * BASIN];
+    const double near[4] = {-0.02, -0.02, 0.02, 0.02};
+    frz_shallow_domain domain;
+    memset(&domain, 0, sizeof domain);
+    domain.struct_size = sizeof domain;
+    domain.cell = 0.001, domain.origin[0] = domain.origin[1] = -0.0005 * BASIN;
+    domain.cells[0] = domain.cells[1] = BASIN, domain.low = -0.01, domain.high = 0.05;
+    must(frz_shallow_detail_create_heights(self->ctx, NULL, &domain, (frz_view){flat, BASIN * BASIN, 0}, near, &basin));
+    must(frz_shallow_detail_fill(basin, 0.004));
+}
+
+static void basin_frame(wound *self, int frame, void *state, size_t room) {
+    static float places[1 << 16];
+    static uint32_t corners[1 << 16];
+    frz_shallow_body tool;
+    frz_shallow_target target;
+    size_t size = 0;
+    memset(&tool, 0, sizeof tool), memset(&target, 0, sizeof target);
+    tool.struct_size = sizeof tool, tool.radius = 0.004;
+    tool.at[0] = 0.028 * cos(6.283185 * frame / SWEEP), tool.at[2] = 0.028 * sin(6.283185 * frame / SWEEP);
+    must(frz_shallow_detail_set_bodies(self->ctx, basin, &tool, 1, NULL));
+    must(frz_shallow_detail_step(self->ctx, basin, 1.0 / FPS, NULL));
+    target.struct_size = sizeof target, target.index_bits = 32;
+    target.positions = (frz_span){places, sizeof places / 12, 0};
+    target.indices = (frz_span){corners, sizeof corners / 4, 0};
+    must(frz_shallow_detail_surface(self->ctx, basin, NULL, &target, NULL));
+    must(frz_shallow_detail_save(self->ctx, basin, state, room, &size));
+    must(frz_shallow_detail_restore(self->ctx, basin, state, size));
+}
+
 /* A frame with all calls that keep the manners; then one more step, which is taken back and made again from its list. */
 static void full_frame(wound *self, int frame, void *state, size_t room) {
     double steps[64];
@@ -145,6 +180,7 @@ static void full_frame(wound *self, int frame, void *state, size_t room) {
     must(frz_shallow_last_steps(self->blood, (frz_span){steps, 64, 0}, &count));
     must(frz_shallow_restore(self->ctx, self->blood, state, size));
     must(frz_shallow_replay(self->ctx, self->blood, (frz_view){steps, count, 0}, NULL));
+    basin_frame(self, frame, state, room);
 }
 
 static void play(int frames) {
@@ -156,6 +192,7 @@ static void play(int frames) {
     double sum = 0;
     int frame, part;
     make_stains(self);
+    make_basin(self);
     for (frame = 0; frame < warm; ++frame) full_frame(self, frame, state, room);
     if (allocations == 0) _exit(4); /* they are not counted */
     forbid_calls();

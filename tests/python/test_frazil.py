@@ -608,6 +608,43 @@ class Shallow(unittest.TestCase):
         water.set_depths(np.zeros_like(depth))
         self.assertEqual(water.volume(), 0)
 
+    def test_cells_of_two_sizes_lose_nothing(self):
+        ctx, half = frazil.Context(), -12 * self.CELL
+        make = lambda near: frazil.ShallowDetail(ctx, self.bowl(), self.CELL, near, origin=(half, half), liquid="water")
+        water = make((-0.02, -0.02, 0.018, 0.02))
+        self.assertEqual(repr(water), "<frazil.ShallowDetail on 24 x 24 cells>")
+        np.testing.assert_allclose(water.near, (-0.02, -0.02, 0.02, 0.02), atol=1e-12)
+        water.set_scalars([frazil.Scalar("dye")])
+        water.set_poured([0.25])
+        water.fill(0.004)
+        self.assertAlmostEqual(water.pour((0.001, 0, 0.001), 2e-6, radius=0.01), 2e-6, delta=1e-12)
+        water.set_flows([frazil.Source((0.04, 0, 0), rate=1e-6), frazil.Drain((0, 0, 0), rate=1e-6)])
+        water.set_sourced(0, [0.25])
+        for frame in range(20):
+            water.near = (-0.02 + 0.001 * frame, -0.02, 0.02 + 0.001 * frame, 0.02)
+            water.set_bodies([frazil.Ball((0.02 - 0.002 * frame, 0, 0), 0.006)])
+            water.step(1 / 60)
+            self.assertEqual((water.balance.error, water.scalar_balance(0).error), (0, 0))
+        water.set_rate(0, 0)
+        self.assertAlmostEqual(water.moved(0), 20e-6 / 60, delta=1e-10)
+        state = water.save()
+        other = make((0, 0, 0.01, 0.01))
+        other.set_scalars([frazil.Scalar("dye")])
+        other.set_flows([frazil.Source((0.04, 0, 0), rate=0), frazil.Drain((0, 0, 0), rate=1e-6)])
+        other.set_bodies([frazil.Ball((0.02 - 0.002 * 19, 0, 0), 0.006)])
+        other.restore(state)
+        self.assertEqual(other.near, water.near)
+        water.step(1 / 60), other.step(1 / 60)
+        self.assertEqual(other.save(), water.save())
+        surface = water.surface(parts=("normals", "depths"))
+        self.assertEqual(surface.positions.shape, surface.normals.shape)
+        self.assertLess(surface.triangles.max(), len(surface.positions))
+        np.testing.assert_allclose(surface.scalars[0], 0.25, atol=1e-4)
+        self.assertGreater(water.update_heights(self.bowl() + 0.001).cells, 500)
+        self.assertEqual(water.balance.error, 0)
+        with self.assertRaisesRegex(frazil.Error, "lie outside of the domain"):
+            water.near = (1, 1, 2, 2)
+
     def test_numpy_sees_the_librarys_memory(self):
         ctx = frazil.Context()
         blood = self.spill(ctx)

@@ -97,6 +97,10 @@ mod shallow {
     mod balance;
     mod border;
     mod detail;
+    mod detail_ground;
+    mod detail_scalars;
+    mod detail_state;
+    mod detail_surface;
     mod falls;
     mod falls_scalars;
     mod flooded;

@@ -2,14 +2,16 @@
 //!
 //! Two liquids over one lattice of heights: a *fine* one whose ground is there in a box of cells only, the *near* part, and a *coarse* one whose ground is
 //! there in all others (`ground.rs`). What is not theirs is without columns, and a wall. Along the edge of the box pipes of their own join them (`seam.rs`). A coarse unit is four
-//! fine ones, so volumes are counted in fine units; what makes no coarse unit waits, and is part of the balance. When the box moves, four
-//! fine columns become a coarse one, and back (`shift.rs`), and
-//! what flows goes on (`momentum.rs`). Nothing is lost.
+//! fine ones, so volumes are counted in fine units; what makes no coarse unit waits, with the scalars that it carries, and is part of the balance (`rests.rs`). When the box moves, four
+//! fine columns become a coarse one, and back (`shift.rs`), and what flows goes on (`momentum.rs`). Nothing is lost. `surface/` writes one mesh of both.
 
 mod ground;
 mod momentum;
+pub(in crate::shallow) mod rests;
+mod scalars;
 mod seam;
 mod shift;
+pub mod surface;
 
 use std::ops::Range;
 
@@ -19,6 +21,7 @@ use super::flows::FlowPoint;
 use super::grid::Grid;
 use super::pace::{self, MOST_STEPS};
 use super::params::Params;
+use super::remap::Moved;
 use super::system::{Balance, Report, Units};
 use super::terrain::Solids;
 use super::terrain::shapes::Shape;
@@ -27,27 +30,30 @@ use crate::context::Context;
 use crate::error::{Error, Result};
 use ground::Ground;
 use momentum::Momentum;
+use rests::Rests;
 use seam::Seam;
 use shift::Shift;
 
 /// A box of cells: ranges of x and of z.
 pub type Cells = [Range<usize>; 2];
 
+/// By how much a side of a box may be off one of cells that it is taken to be (coarse cells).
+const ROUNDING: f64 = 1e-6;
 /// Fine units in a coarse one.
 const FINE: i64 = 4;
 
 /// Liquid that flows over a terrain, in fine cells near and in coarse ones far away.
 pub struct Detail {
-    fine: Shallow,
-    coarse: Shallow,
+    pub(super) fine: Shallow,
+    pub(super) coarse: Shallow,
     ground: Ground,
-    seam: Seam,
+    pub(super) seam: Seam,
     shift: Shift,
     momentum: Momentum,
     /// The near cells.
-    near: Cells,
-    /// What of each coarse cell is no coarse unit (fine units), 0 and up.
-    rest: Vec<i64>,
+    pub(super) near: Cells,
+    /// What of each coarse cell is no coarse unit.
+    pub(super) rest: Rests,
     points: Vec<FlowPoint>,
 }
 
@@ -55,7 +61,7 @@ impl Detail {
     /// Dry ground; the cells of `near` are fine. All others are of twice the size: their ground is the mean of that of four, layer by layer.
     ///
     /// # Errors
-    /// As [`Shallow::new`]; `Argument` also where the domain has an odd count of cells along an axis, as [`Detail::set_near`], and for falls.
+    /// As [`Shallow::new`]; `Argument` also where the domain has an odd count of cells along an axis, as [`Detail::set_near`], and for falls and thickening.
     pub fn new(ctx: &Context, solids: &Solids, params: Params, near: Cells) -> Result<Self> {
         params.validate()?;
         solids.grid.validate()?;
@@ -67,6 +73,7 @@ impl Detail {
         if params.falls.is_some() {
             return Err(Error::argument("liquid with a level of detail does not fall freely"));
         }
+        check_carried(&params)?;
         if solids.layers() == 0 {
             return Err(Error::argument("the terrain has no surface that faces up within the domain"));
         }
@@ -75,7 +82,7 @@ impl Detail {
         let fine = Shallow::beside(ctx, &ground.fine_solids(&near), params.clone(), beyond)?;
         let coarse = Shallow::beside(ctx, &ground.coarse_solids(&near), params, within)?;
         let mut detail = Self {
-            rest: vec![0; coarse.columns.grid.cells()],
+            rest: Rests::new(coarse.columns.grid.cells()),
             fine,
             coarse,
             ground,
@@ -129,7 +136,7 @@ impl Detail {
     ///
     /// # Errors
     /// As [`Shallow::update_terrain`].
-    pub fn update_terrain(&mut self, solids: &Solids) -> Result<()> {
+    pub fn update_terrain(&mut self, solids: &Solids) -> Result<Moved> {
         if (solids.grid, solids.heights) != (self.fine.columns.grid, self.fine.columns.heights) {
             return Err(Error::argument("the terrain's cells or heights are not those of the liquid"));
         }
@@ -137,30 +144,51 @@ impl Detail {
             return Err(Error::argument("the terrain has no surface that faces up within the domain"));
         }
         self.ground = Ground::new(solids);
-        self.fine.update_terrain(&self.ground.fine_solids(&self.near))?;
-        self.coarse.update_terrain(&self.ground.coarse_solids(&self.near))?;
-        self.seam.find(&self.fine, &self.coarse, &self.near);
-        self.route();
-        Ok(())
+        let Self { ground, near, fine, coarse, .. } = &mut *self;
+        // One of them may have no ground.
+        let all = |liquid: &Shallow| liquid.columns.grid.size.map(|count| 0..count);
+        let moved = [
+            fine.update_cells(all(fine), |cell| ground.fine_cell(near, ground.fine.grid.place(cell)))?,
+            coarse
+                .update_cells(all(coarse), |cell| ground.coarse_cell(near, ground.coarse.grid.place(cell)))?,
+        ];
+        Ok(self.after(moved))
     }
 
     /// Sets the solid shapes that move over the terrain.
     ///
     /// # Errors
     /// As [`Shallow::set_bodies`].
-    pub fn set_bodies(&mut self, bodies: &[Shape]) -> Result<()> {
-        self.fine.set_bodies(bodies)?;
-        self.coarse.set_bodies(bodies)?;
-        self.seam.find(&self.fine, &self.coarse, &self.near);
-        self.route();
-        Ok(())
+    pub fn set_bodies(&mut self, bodies: &[Shape]) -> Result<Moved> {
+        let moved = [self.fine.set_bodies(bodies)?, self.coarse.set_bodies(bodies)?];
+        Ok(self.after(moved))
+    }
+
+    /// Joins cells of both sizes again after the ground has moved; returns what that did in all.
+    fn after(&mut self, [fine, coarse]: [Moved; 2]) -> Moved {
+        if fine.cells + coarse.cells > 0 {
+            self.seam.find(&self.fine, &self.coarse, &self.near);
+            self.route();
+        }
+        Moved {
+            cells: fine.cells + coarse.cells,
+            displaced: fine.displaced + coarse.displaced,
+            held: fine.held + coarse.held,
+            fallen: fine.fallen + coarse.fallen,
+        }
+    }
+
+    /// The solid shapes that move over the terrain.
+    pub fn bodies(&self) -> &[Shape] {
+        self.fine.bodies()
     }
 
     /// Changes the parameters.
     ///
     /// # Errors
-    /// As [`Shallow::set_params`].
+    /// As [`Shallow::set_params`]; also for thickening.
     pub fn set_params(&mut self, params: Params) -> Result<()> {
+        check_carried(&params)?;
         self.fine.set_params(params.clone())?;
         self.coarse.set_params(params)
     }
@@ -214,6 +242,19 @@ impl Detail {
     pub fn fill(&mut self, height: f64) {
         self.fine.fill(height);
         self.coarse.fill(height);
+    }
+
+    /// What a flow point has moved since it was set (m3), in or out.
+    pub fn moved(&self, point: usize) -> f64 {
+        self.fine.moved(point) + self.coarse.moved(point)
+    }
+
+    /// Moves a flow point, as [`Shallow::move_flow`].
+    pub fn move_flow(&mut self, point: usize, at: [f64; 3]) {
+        self.points[point].at = at;
+        self.fine.move_flow(point, at);
+        self.coarse.move_flow(point, at);
+        self.route();
     }
 
     fn is_near(&self, point: &FlowPoint) -> bool {
@@ -318,14 +359,45 @@ impl Detail {
             absorbed: sum(|units| units.absorbed),
             lost: sum(|units| units.lost),
             gained: sum(|units| units.gained),
-            held: sum(|units| units.held) + self.rest.iter().sum::<i64>(),
+            held: sum(|units| units.held) + self.rest.units(),
             falling: 0,
         };
         units.balance(cell * cell * self.fine.columns.heights.unit)
     }
 }
 
-fn check_near(near: &Cells, [nx, nz]: [usize; 2]) -> Result<()> {
+fn check_carried(params: &Params) -> Result<()> {
+    match params.thickening {
+        Some(_) => Err(Error::argument("liquid with a level of detail has no scalar that thickens it")),
+        None => Ok(()),
+    }
+}
+
+/// The smallest box of near cells with all that lies between two corners (m), as far as there are cells: least x and z, then greatest.
+///
+/// # Errors
+/// `Argument`: corners that have no inside, or lie outside of the domain.
+pub fn cells_around(grid: &Grid, bounds: [f64; 4]) -> Result<Cells> {
+    let [x0, z0, x1, z1] = bounds;
+    // Also where one is NaN.
+    if !(x0 < x1 && z0 < z1) {
+        return Err(Error::argument(format!("bounds = {bounds:?} m have no inside")));
+    }
+    let range = |axis: usize, low: f64, high: f64| {
+        let [low, high] = [low, high].map(|at| 0.5 * (at - grid.origin[axis]) / grid.cell);
+        let count = (grid.size[axis] / 2) as f64;
+        // What is off by rounding only adds no cells.
+        let [low, high] = [(low + ROUNDING).floor(), (high - ROUNDING).ceil()];
+        2 * low.clamp(0.0, count) as usize..2 * high.clamp(0.0, count) as usize
+    };
+    let cells = [range(0, x0, x1), range(1, z0, z1)];
+    if cells.iter().any(Range::is_empty) {
+        return Err(Error::argument(format!("bounds = {bounds:?} m lie outside of the domain")));
+    }
+    Ok(cells)
+}
+
+pub(super) fn check_near(near: &Cells, [nx, nz]: [usize; 2]) -> Result<()> {
     let [x, z] = near;
     if x.start >= x.end || z.start >= z.end || x.end > nx || z.end > nz {
         return Err(Error::argument(format!(

@@ -4,6 +4,7 @@
 //! the fine cell. The coarse surface is taken beside the fine cell's middle, a quarter of a coarse cell aside, where the coarse columns along the edge
 //! say how it leans: or a film that runs along the edge would swing across it.
 
+use super::rests::{Load, Rests, change, of_column};
 use super::{Cells, FINE};
 use crate::base::cpu::dispatch;
 use crate::shallow::Shallow;
@@ -13,6 +14,7 @@ use crate::shallow::flow::flux::{Kind, Of, Step, flux_of, split};
 use crate::shallow::grid::TOP;
 use crate::shallow::pace::{self, Measures};
 use crate::shallow::scalars::MOST;
+use crate::shallow::scalars::shares::level;
 
 /// Fine cells between the middles of a fine and a coarse cell.
 const APART: f32 = 1.5;
@@ -40,7 +42,7 @@ struct Pipe {
 
 /// All pipes along the edge.
 #[derive(Debug, Clone, Default)]
-pub(super) struct Seam {
+pub(in crate::shallow) struct Seam {
     pipes: Vec<Pipe>,
     /// The pipes before.
     old: Vec<Pipe>,
@@ -51,6 +53,8 @@ pub(super) struct Seam {
     gives: [Vec<f64>; 2],
     takes: [Vec<f64>; 2],
     factors: [Vec<f32>; 2],
+    /// Of each scalar, what each of these takes, less what it gives; empty where nothing is carried.
+    amounts: [Vec<[i64; MOST]>; 2],
     /// Cell of each coarse one (`Grid::index`).
     cells: Vec<u32>,
     /// Whether a column has a ceiling.
@@ -164,6 +168,24 @@ impl Seam {
         }
     }
 
+    /// What flows in each pipe and what rounding left, in order: its part of a saved state.
+    pub fn numbers(&self) -> impl ExactSizeIterator<Item = [f32; 2]> + '_ {
+        self.pipes.iter().map(|pipe| [pipe.flux, pipe.left])
+    }
+
+    /// Length of the step in whose measure fluxes are (s).
+    pub fn last(&self) -> f64 {
+        self.last
+    }
+
+    /// Puts a saved state's part back.
+    pub fn set_numbers(&mut self, last: f64, numbers: impl Iterator<Item = [f32; 2]>) {
+        self.last = last;
+        for (pipe, [flux, left]) in self.pipes.iter_mut().zip(numbers) {
+            (pipe.flux, pipe.left) = (flux, left);
+        }
+    }
+
     fn find_pipe(&self, column: usize, axis: usize, way: i32) -> Option<usize> {
         let wanted = (axis, way, column as u32);
         let key = |pipe: &Pipe| (pipe.axis, pipe.way, pipe.ends[0]);
@@ -196,7 +218,7 @@ impl Seam {
     }
 
     /// Moves what is to cross the edge, of what the step has left.
-    pub fn end_step(&mut self, fine: &mut Shallow, coarse: &mut Shallow, rest: &mut [i64]) {
+    pub fn end_step(&mut self, fine: &mut Shallow, coarse: &mut Shallow, rest: &mut Rests) {
         if !self.is_moving {
             return;
         }
@@ -291,20 +313,54 @@ impl Seam {
         }
     }
 
-    /// Moves whole fine units; what makes no coarse one waits in its cell.
-    fn move_units(&mut self, fine: &mut Shallow, coarse: &mut Shallow, rest: &mut [i64]) {
-        let Self { gives, takes, columns, cells, .. } = self;
-        let [(fine_gives, fine_takes), (gives, takes)] = [0, 1].map(|end| (&gives[end], &takes[end]));
-        for ((gives, takes), &column) in fine_gives.iter().zip(fine_takes).zip(&columns[0]) {
-            change(fine, column as usize, (takes - gives) as i64);
+    /// Moves whole fine units with what they carry; what makes no coarse one waits in its cell.
+    fn move_units(&mut self, fine: &mut Shallow, coarse: &mut Shallow, rest: &mut Rests) {
+        self.find_amounts(fine, coarse);
+        let Self { gives, takes, columns, cells, amounts, .. } = self;
+        let net = |end: usize, place: usize| Load {
+            units: (takes[end][place] - gives[end][place]) as i64,
+            amounts: amounts[end].get(place).copied().unwrap_or_default(),
+        };
+        for (place, &column) in columns[0].iter().enumerate() {
+            change(fine, column as usize, &net(0, place));
         }
-        for (((gives, takes), &column), &cell) in gives.iter().zip(takes).zip(&columns[1]).zip(&*cells) {
-            let rest = &mut rest[cell as usize];
-            let all = *rest + (takes - gives) as i64;
-            *rest = all.rem_euclid(FINE);
-            change(coarse, column as usize, all.div_euclid(FINE));
+        for (place, (&column, &cell)) in columns[1].iter().zip(&*cells).enumerate() {
+            let net = net(1, place);
+            if net != Load::default() {
+                // All of the column, and what waits.
+                let own = of_column(coarse, column as usize);
+                let now = rest.whole(cell as usize, &own.in_fine().with(&net));
+                change(coarse, column as usize, &now.without(&own));
+            }
+        }
+        for liquid in [fine, coarse] {
+            liquid.remap.held.unite();
         }
         self.gives.iter_mut().chain(&mut self.takes).for_each(|sums| sums.fill(0.0));
+    }
+
+    /// Finds how much of each scalar every column takes (less what it gives): of what a pipe moves, by the concentration of the column that gives.
+    fn find_amounts(&mut self, fine: &Shallow, coarse: &Shallow) {
+        let Self { pipes, places, columns, amounts, .. } = self;
+        let count = fine.flow.amounts.count();
+        for (amounts, columns) in amounts.iter_mut().zip(columns) {
+            amounts.clear();
+            amounts.resize(if count > 0 { columns.len() } else { 0 }, [0; MOST]);
+        }
+        if count == 0 {
+            return;
+        }
+        for (pipe, places) in pipes.iter().zip(places).filter(|(pipe, _)| pipe.transfer != 0.0) {
+            let end = usize::from(pipe.transfer < 0.0);
+            let (liquid, column) = ([fine, coarse][end], pipe.ends[end] as usize);
+            let (depth, units) = (liquid.flow.depths()[column], f64::from(pipe.transfer.abs()));
+            let carried = liquid.flow.amounts.amounts.iter().take(count);
+            for (at, own) in carried.enumerate() {
+                let moved = (level(own[column], depth) * units).round_ties_even() as i64;
+                amounts[end][places[end] as usize][at] -= moved;
+                amounts[1 - end][places[1 - end] as usize][at] += moved;
+            }
+        }
     }
 }
 
@@ -319,18 +375,6 @@ fn add(gives: &mut [Vec<f64>; 2], takes: &mut [Vec<f64>; 2], places: &[u32; 2], 
         gives[1][coarse] += units;
         takes[0][fine] += units;
     }
-}
-
-/// Changes a depth; K has seen to it that there is room.
-fn change(liquid: &mut Shallow, column: usize, units: i64) {
-    if units == 0 {
-        return;
-    }
-    let Shallow { flow, columns, remap, .. } = liquid;
-    let given = flow.change_depth(columns, column, units);
-    debug_assert!(given == units || units > 0, "{given} of {units}");
-    let cell = columns.grid.index(columns.cell(column));
-    remap.held.add(cell, columns.bases()[column], units - given, [0; MOST]);
 }
 
 /// 1 / (1 + slope^2)^2 of the ground between both columns, as between all others: slopes of over 60 degrees count as that.

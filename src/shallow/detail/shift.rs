@@ -3,10 +3,11 @@
 //! A coarse column's liquid goes to the fine ones of its layer under a surface that leans as its neighbours say: level where the liquid is level, and
 //! along the ground where a film runs. What four columns cannot share equally waits in their cell, and goes into the coarse column again.
 
-use super::{Cells, Detail, FINE};
+use super::rests::{Load, change, of_column};
+use super::{Cells, Detail};
 use crate::error::Result;
 use crate::shallow::Shallow;
-use crate::shallow::scalars::MOST;
+use crate::shallow::remap::Parcel;
 
 /// Buffers.
 #[derive(Debug, Clone, Default)]
@@ -14,6 +15,8 @@ pub(super) struct Shift {
     /// What goes into coarse columns, and what goes into fine ones.
     leaving: Vec<Moving>,
     entering: Vec<Moving>,
+    /// What waits for room in them, in fine cells and in coarse ones.
+    held: [Vec<Parcel>; 2],
 }
 
 /// Liquid of a coarse column that changes its cells.
@@ -22,8 +25,8 @@ struct Moving {
     /// Coarse cell.
     cell: [usize; 2],
     layer: usize,
-    /// Fine units.
-    units: i64,
+    /// Fine measure.
+    load: Load,
     /// Surface (units), and eight times its rise from the middle of a fine cell to that of the coarse one, along x and along z.
     eta: i64,
     rises: [i64; 2],
@@ -48,6 +51,7 @@ impl Detail {
                 take(&mut self.coarse, column);
             }
         }
+        self.take_held(&new_coarse, &mut shift.held);
         for cells in changed(&old_coarse, &new_coarse) {
             let Self { fine, coarse, ground, .. } = self;
             lay(coarse, &cells, |cell| ground.coarse_cell(&near, cell))?;
@@ -61,8 +65,41 @@ impl Detail {
         for moving in &shift.entering {
             self.give_fine(moving);
         }
+        self.give_held(&shift.held);
         self.shift = shift;
         Ok(())
+    }
+
+    /// Takes what waits for room in cells that are the other liquid's now: where there is no ground, it would fall.
+    fn take_held(&mut self, near: &Cells, out: &mut [Vec<Parcel>; 2]) {
+        let Self { fine, coarse, .. } = self;
+        let is_near = |[x, z]: [usize; 2]| near[0].contains(&x) && near[1].contains(&z);
+        let (fine_grid, grid) = (fine.columns.grid, coarse.columns.grid);
+        let [fine_held, held] = out;
+        fine_held.clear();
+        held.clear();
+        let is_far = |cell| !is_near(fine_grid.place(cell).map(|at| at / 2));
+        fine.remap.held.take_out(is_far, |parcel| fine_held.push(parcel));
+        coarse.remap.held.take_out(|cell| is_near(grid.place(cell)), |parcel| held.push(parcel));
+    }
+
+    /// Lets it wait in the other liquid's cells.
+    fn give_held(&mut self, [fine_held, held]: &[Vec<Parcel>; 2]) {
+        let Self { fine, coarse, rest, .. } = self;
+        let (fine_grid, grid) = (fine.columns.grid, coarse.columns.grid);
+        for parcel in fine_held {
+            let cell = grid.index(fine_grid.place(parcel.cell as usize).map(|at| at / 2));
+            let whole = rest.whole(cell, &Load { units: parcel.units, amounts: parcel.amounts });
+            coarse.remap.held.add(cell, parcel.height, whole.units, whole.amounts);
+        }
+        for parcel in held {
+            // A coarse unit is one of each of the four.
+            for cell in quarters(grid.place(parcel.cell as usize)) {
+                fine.remap.held.add(fine_grid.index(cell), parcel.height, parcel.units, parcel.amounts);
+            }
+        }
+        fine.remap.held.unite();
+        coarse.remap.held.unite();
     }
 
     /// Takes what is in the fine columns of coarse cells.
@@ -73,11 +110,11 @@ impl Detail {
             for [fx, fz] in quarters([x, z]) {
                 let mut layer = 0;
                 while let Some(column) = fine.columns.column([fx, fz], layer) {
-                    let units = take(fine, column);
+                    let load = take(fine, column);
                     let own = out[first..].iter_mut().find(|moving| moving.layer == layer);
                     match own {
-                        Some(own) => own.units += units,
-                        None => out.push(Moving { cell: [x, z], layer, units, eta: 0, rises: [0; 2] }),
+                        Some(own) => own.load = own.load.with(&load),
+                        None => out.push(Moving { cell: [x, z], layer, load, eta: 0, rises: [0; 2] }),
                     }
                     layer += 1;
                 }
@@ -91,10 +128,10 @@ impl Detail {
         for cell in each(cells) {
             let mut layer = 0;
             while let Some(column) = coarse.columns.column(cell, layer) {
-                let units = FINE * i64::from(coarse.flow.depths()[column]);
+                let load = of_column(coarse, column).in_fine();
                 let eta = surface(coarse, column);
                 let rises = lean(coarse, cell, layer, eta);
-                out.push(Moving { cell, layer, units, eta, rises });
+                out.push(Moving { cell, layer, load, eta, rises });
                 layer += 1;
             }
         }
@@ -103,18 +140,16 @@ impl Detail {
     fn give_coarse(&mut self, moving: &Moving) {
         let Self { coarse, rest, .. } = self;
         let index = coarse.columns.grid.index(moving.cell);
-        let units = moving.units + std::mem::take(&mut rest[index]);
-        rest[index] = units.rem_euclid(FINE);
-        let whole = units.div_euclid(FINE);
+        let whole = rest.whole(index, &moving.load);
         let layers = coarse.columns.of_cell(moving.cell).count();
         let column = coarse.columns.column(moving.cell, moving.layer.min(layers.saturating_sub(1)));
-        give(coarse, moving.cell, column, whole);
+        give(coarse, moving.cell, column, &whole);
     }
 
     fn give_fine(&mut self, moving: &Moving) {
         let Self { fine, rest, coarse, .. } = self;
         let index = coarse.columns.grid.index(moving.cell);
-        let mut units = moving.units + std::mem::take(&mut rest[index]);
+        let all = rest.take(index).with(&moving.load);
         let cells = quarters(moving.cell);
         let layer = |cell: [usize; 2]| {
             let layers = fine.columns.of_cell(cell).count();
@@ -129,12 +164,14 @@ impl Detail {
             let lift = signs[at][0] * moving.rises[0] + signs[at][1] * moving.rises[1];
             *depth = (moving.eta + lift.div_euclid(8) - base).max(0);
         }
-        share(&mut depths, &columns, units);
+        share(&mut depths, &columns, all.units);
+        let mut left = all;
         for (at, &depth) in depths.iter().enumerate() {
-            give(fine, cells[at], columns[at], depth);
-            units -= depth;
+            let own = all.part(depth);
+            give(fine, cells[at], columns[at], &own);
+            left = left.without(&own);
         }
-        rest[index] += units;
+        rest.set(index, left);
     }
 }
 
@@ -188,17 +225,21 @@ fn surface(liquid: &Shallow, column: usize) -> i64 {
 }
 
 /// Takes all of a column.
-fn take(liquid: &mut Shallow, column: usize) -> i64 {
-    let depth = i64::from(liquid.flow.depths()[column]);
-    -liquid.flow.change_depth(&liquid.columns, column, -depth)
+fn take(liquid: &mut Shallow, column: usize) -> Load {
+    let load = of_column(liquid, column);
+    change(liquid, column, &Load::default().without(&load));
+    load
 }
 
-/// Gives units to a column of a cell; what finds no room waits there.
-fn give(liquid: &mut Shallow, cell: [usize; 2], column: Option<usize>, units: i64) {
-    let Shallow { flow, columns, remap, .. } = liquid;
-    let given = column.map_or(0, |column| flow.change_depth(columns, column, units));
-    let height = column.map_or(0, |column| columns.bases()[column]);
-    remap.held.add(columns.grid.index(cell), height, units - given, [0; MOST]);
+/// Gives liquid to a column of a cell; what finds no room waits there.
+fn give(liquid: &mut Shallow, cell: [usize; 2], column: Option<usize>, load: &Load) {
+    match column {
+        Some(column) => change(liquid, column, load),
+        None => {
+            let cell = liquid.columns.grid.index(cell);
+            liquid.remap.held.add(cell, 0, load.units, load.amounts);
+        }
+    }
 }
 
 /// Changes the ground of a box of cells.

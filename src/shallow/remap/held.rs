@@ -86,6 +86,21 @@ impl Held {
         }
     }
 
+    /// Takes what waits in cells that `is_own` names.
+    pub(in crate::shallow) fn take_out(
+        &mut self,
+        is_own: impl Fn(usize) -> bool,
+        mut take: impl FnMut(Parcel),
+    ) {
+        self.parcels.retain(|parcel| {
+            let goes = is_own(parcel.cell as usize);
+            if goes {
+                take(*parcel);
+            }
+            !goes
+        });
+    }
+
     /// Whether nothing waits.
     pub fn is_empty(&self) -> bool {
         self.parcels.is_empty()
@@ -145,8 +160,8 @@ impl Held {
         fallen
     }
 
-    /// Makes one parcel of those of a cell.
-    fn unite(&mut self) {
+    /// Makes one parcel of those of a cell, and puts them in order.
+    pub(in crate::shallow) fn unite(&mut self) {
         self.parcels.sort_unstable();
         self.parcels.dedup_by(|next, first| {
             let same = next.cell == first.cell;

@@ -12,7 +12,7 @@ use super::flow::active::runs;
 use super::system::Shallow;
 use crate::base::cpu::dispatch;
 use crate::error::{Error, Result};
-use amounts::{Account, Amounts};
+use amounts::{ACCOUNTS, Account, Amounts};
 pub use shares::MOST;
 use shares::{LEVELS, Levels};
 
@@ -212,17 +212,54 @@ impl Shallow {
     /// # Errors
     /// `Argument`: there is no such scalar.
     pub fn scalar_balance(&self, scalar: usize) -> Result<ScalarBalance> {
+        Ok(self.scalar_sums(scalar)?.balance(self.amount_unit(scalar)))
+    }
+
+    /// Where all of a scalar is, in amounts.
+    pub(super) fn scalar_sums(&self, scalar: usize) -> Result<Sums> {
         check_scalar(scalar, self.scalars().len())?;
         let amounts = &self.flow.amounts;
+        Ok(Sums {
+            inside: amounts.inside(scalar),
+            held: self.remap.held.amount(scalar),
+            falling: self.falls.amount(scalar),
+            accounts: amounts.sums[scalar],
+        })
+    }
+
+    /// An amount of 1 of a scalar (its own measure x m3).
+    pub(super) fn amount_unit(&self, scalar: usize) -> f64 {
         let cell = self.columns.grid.cell;
-        let unit = cell * cell * self.columns.heights.unit * (amounts.scalars[scalar].range / LEVELS);
-        let of = |account: Account| amounts.sums[scalar][account as usize];
-        let (inside, held) = (amounts.inside(scalar), self.remap.held.amount(scalar));
-        let falling = self.falls.amount(scalar);
+        cell * cell * self.columns.heights.unit * (self.scalars()[scalar].range / LEVELS)
+    }
+}
+
+/// Where all of a scalar is, in amounts.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Sums {
+    pub inside: i128,
+    pub held: i128,
+    pub falling: i128,
+    pub accounts: [i128; ACCOUNTS],
+}
+
+impl Sums {
+    /// Adds so many times another's.
+    pub fn add(&mut self, other: &Self, times: i128) {
+        self.inside += times * other.inside;
+        self.held += times * other.held;
+        self.falling += times * other.falling;
+        self.accounts.iter_mut().zip(other.accounts).for_each(|(sum, other)| *sum += times * other);
+    }
+
+    /// The balance, of a measure of an amount of 1.
+    pub fn balance(&self, unit: f64) -> ScalarBalance {
+        let Self { inside, held, falling, accounts } = *self;
+        let of = |account: Account| accounts[account as usize];
         let came = of(Account::Poured) + of(Account::Sourced) + of(Account::Gained) + of(Account::Grown);
         let went = of(Account::Drained) + of(Account::Absorbed) + of(Account::Lost) + of(Account::Dried);
         let cubic = |amount: i128| amount as f64 * unit;
-        Ok(ScalarBalance {
+        ScalarBalance {
             inside: cubic(inside),
             poured: cubic(of(Account::Poured)),
             sourced: cubic(of(Account::Sourced)),
@@ -235,7 +272,7 @@ impl Shallow {
             grown: cubic(of(Account::Grown)),
             dried: cubic(of(Account::Dried)),
             error: came - went - inside - held - falling,
-        })
+        }
     }
 }
 

@@ -18,6 +18,7 @@
 //! | of each scalar: its part ([`scalars`]) | |
 //! | hash of all this | [`SEAL`] |
 
+mod detail;
 mod header;
 mod scalars;
 

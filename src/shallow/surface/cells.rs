@@ -7,7 +7,7 @@ use super::{Columns, NONE, STRIP};
 
 /// A column, or an extra.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct Entry {
+pub(in crate::shallow) struct Entry {
     /// Index of the column; of an extra, count of indices + its place among the walls.
     pub id: u32,
     /// Layer of the column.

@@ -7,7 +7,7 @@ use super::strips::{Found, places};
 use super::walled::Walled;
 
 /// Corners of a quartet besides one.
-pub(super) const OTHERS: [[usize; 3]; 4] = [[1, 2, 3], [0, 2, 3], [0, 1, 3], [0, 1, 2]];
+pub(in crate::shallow) const OTHERS: [[usize; 3]; 4] = [[1, 2, 3], [0, 2, 3], [0, 1, 3], [0, 1, 2]];
 
 /// The triangle without a corner, facing up.
 const TRIANGLES: [[usize; 3]; 4] = [[1, 2, 3], [0, 2, 3], [1, 0, 3], [0, 2, 1]];
@@ -80,7 +80,12 @@ impl Search {
 
 /// Adds the triangles of groups of which `wet`, at `corner`, is the first that is wet, from what it is linked with.
 #[inline(always)]
-fn add_triangles(corner: usize, wet: &Entry, near: [Option<&Entry>; 4], triangles: &mut Vec<[u32; 3]>) {
+pub(in crate::shallow) fn add_triangles(
+    corner: usize,
+    wet: &Entry,
+    near: [Option<&Entry>; 4],
+    triangles: &mut Vec<[u32; 3]>,
+) {
     let fit = |a: &Entry, b: &Entry| !a.wet && !b.wet || a.is_linked(b);
     let is_first = |at: usize, entry: &Entry| at > corner || !entry.wet;
     let [p, q, r] = OTHERS[corner];

@@ -23,20 +23,20 @@
 //! columns is at different layers there.
 
 mod boundary;
-mod cells;
+pub(in crate::shallow) mod cells;
 mod check;
 mod full;
-mod groups;
+pub(in crate::shallow) mod groups;
 mod indices;
 pub mod ledges;
 pub mod lifts;
 mod links;
-mod normals;
+pub(in crate::shallow) mod normals;
 mod room;
-mod shown;
+pub(in crate::shallow) mod shown;
 mod skirts;
 mod strips;
-mod vertices;
+pub(in crate::shallow) mod vertices;
 mod walled;
 
 use super::columns::{Columns, NONE, STRIP};
@@ -268,13 +268,7 @@ impl Surface {
         target: &mut Target<'_>,
     ) -> Result<Counts> {
         layout.validate()?;
-        if target.velocities.is_some() && depths.velocity.is_empty() && !depths.depth.is_empty() {
-            return Err(Error::argument("velocities of the surface are wanted, and the liquid has none"));
-        }
-        let is_bare = |(to, from): (&Option<&mut [f32]>, &&[f32])| to.is_some() && from.is_empty();
-        if !depths.depth.is_empty() && target.carried.iter().zip(&depths.carried).any(is_bare) {
-            return Err(Error::argument("concentrations of the surface are wanted, and the liquid has none"));
-        }
+        target.check_wanted(depths)?;
         let counts = self.count(columns, depths)?;
         target.check(&counts)?;
         let scene = Scene { columns, depth: depths.depth, above: &self.above };
@@ -313,8 +307,20 @@ impl Layout {
 }
 
 impl Target<'_> {
+    /// Whether the liquid has what is wanted.
+    pub(in crate::shallow) fn check_wanted(&self, depths: &Depths<'_>) -> Result<()> {
+        if self.velocities.is_some() && depths.velocity.is_empty() && !depths.depth.is_empty() {
+            return Err(Error::argument("velocities of the surface are wanted, and the liquid has none"));
+        }
+        let is_bare = |(to, from): (&Option<&mut [f32]>, &&[f32])| to.is_some() && from.is_empty();
+        if !depths.depth.is_empty() && self.carried.iter().zip(&depths.carried).any(is_bare) {
+            return Err(Error::argument("concentrations of the surface are wanted, and the liquid has none"));
+        }
+        Ok(())
+    }
+
     /// Whether the mesh fits.
-    fn check(&self, counts: &Counts) -> Result<()> {
+    pub(in crate::shallow) fn check(&self, counts: &Counts) -> Result<()> {
         let fits = |name: &str, room: Option<usize>, needed: usize| match room {
             Some(room) if room < needed => Err(Error::argument(format!(
                 "{name} has room for {room} numbers, and the surface has {needed}"

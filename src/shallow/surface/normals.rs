@@ -47,7 +47,7 @@ impl Shown<'_> {
 
 /// The unit vector along (x, 1, z).
 #[inline(always)]
-pub(super) fn upright(x: f32, z: f32) -> [f32; 3] {
+pub(in crate::shallow) fn upright(x: f32, z: f32) -> [f32; 3] {
     let y = 1.0 / ((x * x + z * z) + 1.0).sqrt();
     [x * y, y, z * y]
 }

@@ -50,6 +50,26 @@ pub(super) fn find_heights(
     dispatch!(find_strips(columns: &Columns, found: &Found, rule: &Rule<'_>, heights: &mut [i32]))
 }
 
+/// The height of one column.
+pub(in crate::shallow) fn height_of(
+    columns: &Columns,
+    depths: &Depths<'_>,
+    layout: &Layout,
+    index: usize,
+) -> i32 {
+    let units = |length: f64| (length / columns.heights.unit).round().min(f64::from(TOP)) as i32;
+    let (least, fade) = (units(layout.least_depth), units(layout.fade_depth));
+    let of = |numbers: &[i32]| [numbers.get(index).copied().unwrap_or(least); STRIP];
+    let all = [columns.bases(), columns.unders(), depths.depth, depths.least, depths.sunk].map(of);
+    let mut out = [0; STRIP];
+    if fade > 0 {
+        find_strip::<true>(all.each_ref(), [fade as f32, 1.0 / fade as f32], &mut out);
+    } else {
+        find_strip::<false>(all.each_ref(), [0.0; 2], &mut out);
+    }
+    out[0]
+}
+
 #[inline(always)]
 fn find_strips(columns: &Columns, found: &Found, rule: &Rule<'_>, heights: &mut [i32]) {
     let (bases, unders) = (columns.bases(), columns.unders());

@@ -12,7 +12,7 @@ use crate::base::cpu::dispatch;
 use crate::shallow::columns::strip_of;
 
 /// Velocity at the surface over the mean (Eq. 4.4).
-const SURFACE_SPEED: f32 = 1.5;
+pub(in crate::shallow) const SURFACE_SPEED: f32 = 1.5;
 
 /// What vertices are made of.
 pub(super) struct Vertices<'a> {

@@ -1,0 +1,162 @@
+//! What of coarse cells is no whole coarse unit: it waits there, with what it carries.
+
+use super::FINE;
+use crate::shallow::Shallow;
+use crate::shallow::scalars::MOST;
+use crate::shallow::scalars::amounts::Account;
+use crate::shallow::scalars::shares::{integer, part};
+
+/// Some liquid: units, and amounts of scalars.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
+pub(in crate::shallow) struct Load {
+    pub units: i64,
+    pub amounts: [i64; MOST],
+}
+
+impl Load {
+    /// Both together.
+    pub fn with(mut self, other: &Self) -> Self {
+        self.units += other.units;
+        self.amounts.iter_mut().zip(other.amounts).for_each(|(all, own)| *all += own);
+        self
+    }
+
+    /// What is left without another.
+    pub fn without(self, other: &Self) -> Self {
+        let other = Self { units: -other.units, amounts: other.amounts.map(|amount| -amount) };
+        self.with(&other)
+    }
+
+    /// That of a coarse column in fine measure.
+    pub fn in_fine(self) -> Self {
+        Self { units: FINE * self.units, amounts: self.amounts.map(|amount| FINE * amount) }
+    }
+
+    /// The part that so many units take along.
+    pub fn part(&self, units: i64) -> Self {
+        Self { units, amounts: part(&self.amounts, units, self.units) }
+    }
+}
+
+/// The rests of all coarse cells (fine units).
+#[derive(Debug, Clone, Default)]
+pub(in crate::shallow) struct Rests {
+    units: Vec<i64>,
+    /// Empty where nothing is carried.
+    amounts: Vec<[i64; MOST]>,
+}
+
+impl Rests {
+    /// None of so many cells.
+    pub fn new(cells: usize) -> Self {
+        Self { units: vec![0; cells], amounts: Vec::new() }
+    }
+
+    /// The liquid carries so many scalars, of which there is nothing yet.
+    pub fn carry(&mut self, scalars: usize) {
+        self.amounts.clear();
+        self.amounts.resize(if scalars > 0 { self.units.len() } else { 0 }, [0; MOST]);
+    }
+
+    /// Nothing waits.
+    pub fn clear(&mut self) {
+        self.units.fill(0);
+        self.amounts.fill([0; MOST]);
+    }
+
+    /// Count of cells.
+    pub fn len(&self) -> usize {
+        self.units.len()
+    }
+
+    /// Whether something may be carried.
+    pub fn has_amounts(&self) -> bool {
+        !self.amounts.is_empty()
+    }
+
+    /// What waits in a cell.
+    pub fn of(&self, cell: usize) -> Load {
+        Load { units: self.units[cell], amounts: self.amounts.get(cell).copied().unwrap_or_default() }
+    }
+
+    /// Lets liquid wait in a cell, in place of what does.
+    pub fn set(&mut self, cell: usize, load: Load) {
+        self.units[cell] = load.units;
+        if let Some(amounts) = self.amounts.get_mut(cell) {
+            *amounts = load.amounts;
+        }
+    }
+
+    /// Takes what waits in a cell.
+    pub fn take(&mut self, cell: usize) -> Load {
+        let load = self.of(cell);
+        self.set(cell, Load::default());
+        load
+    }
+
+    /// Cells where something waits, and what.
+    pub fn iter(&self) -> impl Iterator<Item = (usize, Load)> + '_ {
+        (0..self.len()).map(|cell| (cell, self.of(cell))).filter(|(_, load)| *load != Load::default())
+    }
+
+    /// Fine units in all.
+    pub fn units(&self) -> i64 {
+        self.units.iter().sum()
+    }
+
+    /// How much of a scalar, in all.
+    pub fn amount(&self, scalar: usize) -> i128 {
+        self.amounts.iter().map(|amounts| i128::from(amounts[scalar])).sum()
+    }
+
+    /// Adds liquid (fine measure) to a cell's rest, and takes what makes whole coarse units (coarse measure), with its share of all amounts.
+    pub fn whole(&mut self, cell: usize, load: &Load) -> Load {
+        let all = self.of(cell).with(load);
+        let rest = all.units.rem_euclid(FINE);
+        let mut whole = Load { units: (all.units - rest) / FINE, amounts: [0; MOST] };
+        let mut left = Load { units: rest, amounts: [0; MOST] };
+        if self.has_amounts() {
+            let share = if all.units > 0 { part(&all.amounts, rest, all.units) } else { all.amounts };
+            for (at, share) in share.into_iter().enumerate() {
+                // Of which all others make whole ones.
+                left.amounts[at] = share + (all.amounts[at] - share).rem_euclid(FINE);
+                whole.amounts[at] = (all.amounts[at] - left.amounts[at]) / FINE;
+            }
+            if whole.units == 0 {
+                (left.amounts, whole.amounts) = (all.amounts, [0; MOST]);
+            }
+        }
+        self.set(cell, left);
+        whole
+    }
+}
+
+/// What is in a column.
+pub(super) fn of_column(liquid: &Shallow, column: usize) -> Load {
+    let amounts = &liquid.flow.amounts;
+    let amount = |at: usize| if at < amounts.count() { integer(amounts.amounts[at][column]) } else { 0 };
+    Load { units: i64::from(liquid.flow.depths()[column]), amounts: std::array::from_fn(amount) }
+}
+
+/// Changes what is in a column: what finds no room in it waits in its cell, and what rounding leaves in a dry one is counted.
+pub(super) fn change(liquid: &mut Shallow, column: usize, load: &Load) {
+    if *load == Load::default() {
+        return;
+    }
+    let Shallow { flow, columns, .. } = &mut *liquid;
+    let given = flow.change_depth(columns, column, load.units);
+    flow.amounts.put(column, &load.amounts);
+    let cell = columns.grid.index(columns.cell(column));
+    let base = columns.bases()[column];
+    let all = of_column(liquid, column);
+    let Shallow { flow, remap, .. } = liquid;
+    if given < load.units {
+        let over = load.units - given;
+        let off = Load { units: all.units + over, ..all }.part(over);
+        flow.amounts.put(column, &off.amounts.map(|amount| -amount));
+        remap.held.add(cell, base, over, off.amounts);
+    } else if all.units == 0 && all.amounts != [0; MOST] {
+        flow.amounts.put(column, &all.amounts.map(|amount| -amount));
+        flow.amounts.count_in(Account::Dried, &all.amounts);
+    }
+}
