@@ -23,8 +23,10 @@ pub enum Part {
     Liquid(DetailedMesh, Wet),
     /// The ground below a liquid.
     Ground(TriMesh),
-    /// What stands or moves in a liquid.
+    /// What moves in a liquid, or stands there: a tool.
     Obstacle(TriMesh),
+    /// A mesh that stands in a liquid.
+    Cloth(TriMesh),
     /// Points, and where they came from.
     Points(PathBuf, Points),
     /// A level set.
@@ -42,6 +44,9 @@ pub enum Wet {
     Blood,
     Paint,
     Honey,
+    /// Those that only dyes look like.
+    Milk,
+    Coffee,
 }
 
 impl Wet {

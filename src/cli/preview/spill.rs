@@ -109,16 +109,17 @@ impl Spill {
     fn around(&mut self, ctx: &Context, frame: i32) -> Vec<Part> {
         let Some(scene) = &self.scene else { return Vec::new() };
         let around = match self.terrain.clone() {
-            Some(terrain) => Around::obstacles(scene, frame).map(|obstacles| Around { terrain, obstacles }),
+            Some(terrain) => Around::with_terrain(terrain, scene, frame),
             None => Around::read(ctx, scene, frame),
         };
         match around {
-            Ok(Around { terrain, obstacles }) => {
+            Ok(Around { terrain, mut obstacles, meshes }) => {
                 if !Around::moves(scene) {
                     self.terrain = Some(terrain.clone());
                 }
-                let obstacles = obstacles.into_iter().map(Part::Obstacle);
-                std::iter::once(Part::Ground(terrain)).chain(obstacles).collect()
+                let tools = obstacles.split_off(meshes).into_iter().map(Part::Obstacle);
+                let parts = std::iter::once(Part::Ground(terrain));
+                parts.chain(obstacles.into_iter().map(Part::Cloth)).chain(tools).collect()
             }
             Err(error) => {
                 log::warn!("{error}: the liquid is drawn without its terrain");

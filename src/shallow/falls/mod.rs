@@ -16,6 +16,8 @@ mod falling;
 mod flight;
 pub mod mesh;
 mod packet;
+mod splash;
+mod threads;
 
 use crate::error::{Error, Result};
 use crate::shallow::columns::Columns;
@@ -93,8 +95,21 @@ pub struct Droplet {
     pub source: u64,
     /// Concentration of each scalar that it carries, in the scalar's own measure.
     pub concentrations: [f32; MOST],
+    /// Where the liquid leaves the ground, if this drop is the last that has left it.
+    pub lip: Option<Lip>,
     /// One more than that of the drop that left the same lip before it, if nothing interrupted the flow there.
     pub number: u64,
+}
+
+/// Where liquid leaves the ground.
+#[derive(Debug, Clone, Copy, Default, PartialEq)]
+pub struct Lip {
+    /// The middle of the column that it comes from, half way up (m).
+    pub place: [f64; 3],
+    /// How deep it is there (m).
+    pub depth: f64,
+    /// A unit vector along the edge.
+    pub edge: [f64; 3],
 }
 
 impl Shallow {
@@ -113,6 +128,7 @@ impl Shallow {
             };
             let [east, south] = packet.along.map(|speed| speed * grid.cell);
             let volume = packet.units as f64 * unit;
+            let lip = (packet.tick == self.falls.tick).then(|| self.lip_of(packet)).flatten();
             Droplet {
                 position: [place(0), heights.low + packet.height * heights.unit, place(1)],
                 velocity: [east, -packet.down * heights.unit, south],
@@ -121,8 +137,22 @@ impl Shallow {
                 age: packet.age,
                 source: packet.source,
                 concentrations,
+                lip,
                 number: packet.tick,
             }
         })
+    }
+
+    /// Where a packet's liquid comes from; none if the ground has moved since.
+    fn lip_of(&self, packet: &Packet) -> Option<Lip> {
+        let (columns, unit) = (&self.columns, self.columns.heights.unit);
+        let (cell, layer) = ((packet.source >> 18) as usize, (packet.source & 0xffff) as usize);
+        let cell = [cell % columns.grid.size[0], cell / columns.grid.size[0]];
+        let column = columns.column(cell, layer)?;
+        let ([x, z], base) = (columns.grid.centre(cell), f64::from(columns.bases()[column]) * unit);
+        let depth = f64::from(self.flow.depth[column]) * unit;
+        // Sides to the east and to the west are even.
+        let edge = if packet.source >> 16 & 1 == 0 { [0.0, 0.0, 1.0] } else { [1.0, 0.0, 0.0] };
+        Some(Lip { place: [x, columns.heights.low + base + 0.5 * depth, z], depth, edge })
     }
 }
