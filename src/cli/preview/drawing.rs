@@ -17,6 +17,8 @@ const BROWN: [f32; 3] = [0.35, 0.16, 0.08];
 /// The colours of the ground below a liquid, pale stone, and of what stands or moves in it, steel.
 const STONE: [f32; 3] = [0.58, 0.54, 0.47];
 const STEEL: [f32; 3] = [0.24, 0.26, 0.29];
+/// How much of a liquid's colour a stain takes.
+const STAINED: f64 = 0.6;
 /// The colour of meshes that stand in a liquid, linen.
 const LINEN: [f32; 3] = [0.78, 0.76, 0.70];
 /// The colour of the lines in which a cut meets meshes.
@@ -107,7 +109,16 @@ impl Look {
                         (None, None) => Model::liquid(mesh, wet.colour(), alpha),
                     });
                 }
-                Part::Ground(mesh) => models.push(Model::mesh(&mesh, STONE)),
+                Part::Ground(mesh, stains, wet) => {
+                    let model = Model::mesh(&mesh, STONE);
+                    let stained = stains.len() == mesh.positions.len();
+                    let stain = |share: &f64| mix(STONE, wet.colour(), STAINED * share.clamp(0.0, 1.0));
+                    models.push(if stained {
+                        model.painted(stains.iter().map(stain).collect())
+                    } else {
+                        model
+                    });
+                }
                 Part::Obstacle(mesh) => models.push(Model::mesh(&mesh, STEEL)),
                 Part::Cloth(mesh) => models.push(Model::mesh(&mesh, LINEN)),
                 Part::Points(path, points) => {
@@ -206,6 +217,11 @@ fn cut(ctx: &Context, parts: Vec<Part>, plane: Plane) -> Result<Drawing> {
     Ok(Drawing { content: Content::Cut(cut), has_colors: false, has_tint: false, hollow })
 }
 
+/// A colour between two.
+fn mix(from: [f32; 3], to: [f32; 3], share: f64) -> [f32; 3] {
+    [0, 1, 2].map(|n| from[n] + share as f32 * (to[n] - from[n]))
+}
+
 impl Wet {
     /// Its colour (linear red, green, blue).
     pub fn colour(self) -> [f32; 3] {
@@ -215,7 +231,7 @@ impl Wet {
             Self::Paint => [0.05, 0.20, 0.60],
             Self::Honey => [0.70, 0.32, 0.02],
             Self::Milk => [0.86, 0.84, 0.78],
-            Self::Coffee => [0.075, 0.022, 0.006],
+            Self::Coffee => [0.045, 0.013, 0.004],
         }
     }
 
@@ -227,7 +243,7 @@ impl Wet {
             Self::Paint => 0.0002,
             Self::Honey => 0.012,
             Self::Milk => 0.0004,
-            Self::Coffee => 0.0015,
+            Self::Coffee => 0.0012,
         }
     }
 

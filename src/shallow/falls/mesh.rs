@@ -10,14 +10,15 @@ use crate::shallow::surface::{Counts, Indices, Layout, Up};
 
 /// Vertices and triangles of a ball: an icosahedron whose edges are halved.
 const BALL: [usize; 2] = [42, 80];
-/// Sides of a strand.
+/// Sides of a strand, and rings of corners: at its ends and in its middle.
 const SIDES: usize = 6;
+const RINGS: usize = 3;
 /// Radius of the circle around a hexagon with the area of a circle of 1: sqrt(pi / (1.5 sqrt 3)).
 const AROUND: f64 = 1.099_636;
 /// Length from which a strand between two drops gets thinner, in its radii; it breaks at twice that.
 const LONGEST: f64 = 9.02;
 /// How much wider it is at its lip, where it is as thick as the film.
-const FLARE: f64 = 2.0;
+const FLARE: f64 = 1.6;
 
 /// Buffers of the caller. They are written from their beginning, in order, and never read, and may be longer than the mesh; those that are
 /// absent are not wanted. The balls' vertices come first, in the order of their drops.
@@ -42,8 +43,8 @@ pub fn bound(drops: usize) -> Counts {
 
 /// Counts of so many drops and strands; the strands' vertices are extras.
 fn of(drops: usize, strands: usize) -> Counts {
-    let extras = 2 * SIDES * strands;
-    let triangles = BALL[1] * drops + 2 * SIDES * strands;
+    let extras = RINGS * SIDES * strands;
+    let triangles = BALL[1] * drops + 2 * (RINGS - 1) * SIDES * strands;
     Counts { vertices: BALL[0] * drops + extras, extras, indices: 3 * triangles }
 }
 
@@ -174,9 +175,9 @@ impl Balls {
         if let Some(to) = &mut target.drops {
             let (balls, strands) = to.split_at_mut(BALL[0] * drops.len());
             balls.chunks_exact_mut(BALL[0]).zip(0..).for_each(|(to, drop)| to.fill(drop));
-            let ends =
-                self.strands.iter().flat_map(|strand| [strand.drop, strand.next.unwrap_or(strand.drop)]);
-            strands.chunks_exact_mut(SIDES).zip(ends).for_each(|(to, drop)| to.fill(drop));
+            let rings = |strand: &Strand| [strand.drop, strand.drop, strand.next.unwrap_or(strand.drop)];
+            let rings = self.strands.iter().flat_map(rings);
+            strands.chunks_exact_mut(SIDES).zip(rings).for_each(|(to, drop)| to.fill(drop));
         }
         match &mut target.indices {
             Indices::None => {}
@@ -208,8 +209,13 @@ impl Balls {
             };
             let way = between(first.position, place);
             let [aside, across] = edge.map_or_else(|| beside(way), |edge| beside_with(way, edge));
-            for (drop, place, axes) in [(first, first.position, [own; 2]), (last, place, axes)] {
-                let axes = axes.map(|radius| radius * strand.whole * AROUND);
+            // What has run into the drops is missing in the middle.
+            let middle = [0, 1].map(|n| 0.5 * (own + axes[n]) * strand.whole);
+            let halfway = along(first.position, way, 0.5);
+            for (drop, place, axes) in
+                [(first, first.position, [own; 2]), (first, halfway, middle), (last, place, axes)]
+            {
+                let axes = axes.map(|radius| radius * AROUND);
                 for ([cos, sin], to) in HEXAGON.into_iter().zip(&mut to) {
                     let off = [0, 1, 2].map(|n| axes[0] * cos * aside[n] + axes[1] * sin * across[n]);
                     let normal = [0, 1, 2].map(|n| cos * aside[n] + sin * across[n]);
@@ -232,9 +238,10 @@ impl Balls {
         }
         let mut to = strands.as_chunks_mut::<3>().0.iter_mut();
         for strand in 0..self.strands.len() {
-            let first = (drops * BALL[0] + strand * 2 * SIDES) as u32;
-            for side in 0..SIDES as u32 {
-                let [a, b] = [side, (side + 1) % SIDES as u32].map(|corner| first + corner);
+            for quad in 0..(RINGS - 1) * SIDES {
+                let (ring, side) = (quad / SIDES, quad % SIDES);
+                let first = drops * BALL[0] + (strand * RINGS + ring) * SIDES;
+                let [a, b] = [side, (side + 1) % SIDES].map(|corner| (first + corner) as u32);
                 let [c, d] = [a, b].map(|corner| corner + SIDES as u32);
                 for (triangle, to) in [[a, b, d], [a, d, c]].into_iter().zip(&mut to) {
                     *to = corners(triangle).map(&index);
