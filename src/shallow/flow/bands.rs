@@ -8,6 +8,7 @@ use super::flux::Step;
 use super::network::SLACK;
 use super::parts::{BEYOND, Copy, Part, Parts};
 use super::rows::{Ground, Stepped};
+use super::scale;
 use crate::shallow::columns::{Columns, STRIP, strip_of};
 
 /// Columns from which on a step is divided among threads: below, starting them takes longer than they save.
@@ -42,6 +43,8 @@ pub struct Bands {
     deepest: Vec<i32>,
     /// Whether columns of each row might fill up to their ceiling in this step.
     may_fill: Vec<bool>,
+    /// The least room that a column of each row then has (units).
+    room: Vec<f32>,
     /// Whether they might be full.
     may_be_full: Vec<bool>,
     /// A column takes at most so many times the greatest depth beside it, with its own.
@@ -59,6 +62,7 @@ impl Bands {
             clearance: (0..count).map(|row| clearance(columns, row)).collect(),
             deepest: vec![0; count],
             may_fill: vec![false; count],
+            room: vec![0.0; count],
             may_be_full: vec![false; count],
             takes: pipes as i64 + 1,
             scalars: 0,
@@ -71,7 +75,11 @@ impl Bands {
     pub fn bytes(&self) -> usize {
         let woken = |band: &Band| band.stepped.woken.capacity() * size_of::<u32>();
         let bands: usize = self.list.iter().map(|band| band.buffers.bytes() + woken(band)).sum();
-        bands + size_of_val(&self.clearance[..]) + size_of_val(&self.deepest[..]) + 2 * self.may_fill.len()
+        bands
+            + size_of_val(&self.clearance[..])
+            + size_of_val(&self.deepest[..])
+            + size_of_val(&self.room[..])
+            + 2 * self.may_fill.len()
     }
 
     /// Divides the rows among so many threads, by their columns; unless they are already.
@@ -166,6 +174,7 @@ impl Bands {
             let around = row.saturating_sub(1)..(row + 2).min(self.deepest.len());
             let deepest = self.deepest[around].iter().copied().max().unwrap_or(0);
             self.may_fill[row] = self.takes * i64::from(deepest) > i64::from(self.clearance[row]);
+            self.room[row] = scale::room(0, self.clearance[row], self.deepest[row]);
             self.may_be_full[row] = self.deepest[row] >= self.clearance[row] - self.clearance[row] / SLACK;
             any |= self.may_fill[row];
         }
@@ -174,8 +183,8 @@ impl Bands {
 
     /// One step; `ground` gets its rows that may fill from here.
     pub fn step(&mut self, step: &Step, ground: &Ground, liquid: Part) {
-        let Self { list, deepest, may_fill, .. } = self;
-        let ground = Ground { may_fill, ..*ground };
+        let Self { list, deepest, may_fill, room, .. } = self;
+        let ground = Ground { may_fill, room, ..*ground };
         let (columns, links) = (ground.columns, &ground.pipes.links);
         let rows = columns.grid.size[1];
         for band in &mut *list {

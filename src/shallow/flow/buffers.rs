@@ -20,6 +20,8 @@ pub struct Buffer {
     /// K_min of each column, if one is not 1.
     pub least: Vec<f32>,
     pub is_less: bool,
+    /// Whether a column may fill up in this step.
+    pub may_fill: bool,
     /// K_max of each column, after each sweep, if one is not 1.
     pub most: [Vec<f32>; SWEEPS],
     pub is_full: bool,
@@ -28,7 +30,7 @@ pub struct Buffer {
 impl Buffer {
     /// All factors are 1.
     pub fn clear(&mut self) {
-        (self.is_less, self.is_full) = (false, false);
+        (self.is_less, self.may_fill, self.is_full) = (false, false, false);
     }
 }
 
@@ -54,6 +56,7 @@ impl Rows {
             south: vec![0.0; room],
             least: vec![1.0; room],
             is_less: false,
+            may_fill: false,
             most: std::array::from_fn(|_| vec![1.0; room]),
             is_full: false,
         };

@@ -10,6 +10,7 @@ pub(super) mod bands;
 mod buffers;
 mod carry;
 pub mod fast;
+mod fit;
 pub mod flux;
 mod heads;
 pub mod links;
@@ -363,6 +364,7 @@ impl Flow {
             lips: &self.lips,
             may_rest: step.level > 0,
             may_fill: &[],
+            room: &[],
             acts: &acts,
         };
         let [flux, left] =

@@ -8,7 +8,8 @@
 use super::active::Active;
 use super::buffers::{Buffer, RING, Rows, SWEEPS};
 use super::fast::Fast;
-use super::flux::{Carried, Kind, Of, Row, Step, flux_row, greater, lesser, solved_row};
+use super::fit::most_through_links;
+use super::flux::{Carried, Kind, Of, Row, Step, flux_row, greater, solved_row};
 use super::links::{Outside, indices_of};
 use super::lips::Lips;
 use super::network::Network;
@@ -41,8 +42,10 @@ pub struct Ground<'a> {
     pub lips: &'a Lips,
     /// Whether what is slow may come to rest.
     pub may_rest: bool,
-    /// Rows with columns that may fill up.
+    /// Rows with columns that may fill up,
     pub may_fill: &'a [bool],
+    /// and the least room that each row's columns have (units).
+    pub room: &'a [f32],
     /// What the laws of scalars do.
     pub acts: &'a [Act],
 }
@@ -263,12 +266,17 @@ impl Rows {
         let [own, north] =
             self.ring.get_disjoint_mut([row % RING, (row + RING - 1) % RING]).expect("two rows");
         let place = Place::new(columns, row);
-        let mut over = false;
+        let (mut over, may_fill, mut into) = (false, ground.may_fill[row], [0.0; STRIP]);
         for span in active.row(row) {
             let (at, len) = (place.of(span.first), span.len as usize);
             let around = place.around(&own.east, &own.south, &north.south, &self.zeros, span);
             let depth = &part.depth[span.first as usize - part.start..];
-            over |= scale::outflow(depth, &around, &mut own.least[at..at + len]);
+            let out = &mut own.least[at..at + len];
+            over |= if may_fill {
+                scale::outflow::<true>(depth, &around, out, &mut into)
+            } else {
+                scale::outflow::<false>(depth, &around, out, &mut into)
+            };
         }
         if !pipes.links.columns_of(row).is_empty() {
             let sums = &mut self.linked;
@@ -278,6 +286,11 @@ impl Rows {
             }
             // Few columns have links, but any may be over now.
             over = true;
+        }
+        if may_fill {
+            let linked = most_through_links(ground, parts, row, &mut self.linked);
+            own.may_fill =
+                into.into_iter().fold(0.0, greater) + linked > ground.room[row] || !ground.network.is_empty();
         }
         let mut is_less = false;
         if over {
@@ -319,114 +332,6 @@ impl Rows {
         let first_link = part.first_link;
         let factor = |column| place.pick(least, beyond, column);
         part.links.scale(&ground.pipes.links, ground.lips, (row, first_link), true, factor);
-    }
-
-    /// K_max of a row's columns, as if nothing left them; whether one is not 1.
-    #[inline(always)]
-    fn find_most(&mut self, ground: &Ground, parts: &Parts, row: usize) -> bool {
-        if !ground.may_fill[row] {
-            return false;
-        }
-        let Ground { columns, active, .. } = ground;
-        let part = parts.see(row);
-        let [own, north] =
-            self.ring.get_disjoint_mut([row % RING, (row + RING - 1) % RING]).expect("two rows");
-        let place = Place::new(columns, row);
-        let [most, _] = &mut own.most;
-        for span in active.row(row) {
-            let (at, len) = (place.of(span.first), span.len as usize);
-            let around = place.around(&own.east, &own.south, &north.south, &self.zeros, span);
-            scale::inflow(&around, &mut most[at..at + len]);
-        }
-        let sums = &mut self.linked;
-        each_link(ground, parts, row, false, |column, units| sums[place.of(column)] += units);
-        for &column in ground.pipes.links.columns_of(row) {
-            most[place.of(column)] += std::mem::take(&mut sums[place.of(column)]) as f32;
-        }
-        let mut is_full = false;
-        for span in active.row(row) {
-            let (at, first, len) = (place.of(span.first), span.first as usize, span.len as usize);
-            let (base, ceiling) = (&columns.bases()[first..], &columns.ceilings()[first..]);
-            let depth = &part.depth[first - part.start..];
-            is_full |= scale::find_most(base, ceiling, depth, &mut most[at..at + len]) < 1.0;
-        }
-        own.is_full = is_full;
-        is_full
-    }
-
-    /// K_max of a row's columns once more, with the room that what leaves them makes.
-    #[inline(always)]
-    fn find_more(&mut self, ground: &Ground, parts: &Parts, row: usize) {
-        let Ground { columns, pipes, active, .. } = ground;
-        let part = parts.see(row);
-        let rows = [row % RING, (row + RING - 1) % RING, (row + 1) % RING];
-        let [own, north, south] = self.ring.get_disjoint_mut(rows).expect("three rows");
-        if !own.is_full {
-            return;
-        }
-        let place = Place::new(columns, row);
-        let count = columns.grid.size[1];
-        let beyond = if row + 1 < count && south.is_full { &south.most[0] } else { &self.ones };
-        let before = if row > 0 && north.is_full { &north.most[0] } else { &self.ones };
-        let [first_most, most] = &mut own.most;
-        for span in active.row(row) {
-            let (at, first, len) = (place.of(span.first), span.first as usize, span.len as usize);
-            let around = place.around(&own.east, &own.south, &north.south, &self.zeros, span);
-            let near = place.beside(first_most, beyond, &self.ones, span);
-            let north_most = place.north(before, &self.ones, span);
-            for x in 0..len {
-                let i = first + x;
-                let k = first_most[at + x];
-                most[at + x] = k;
-                if k < 1.0 {
-                    let along = greater(around.east[x], 0.0) * near.own[x + 1]
-                        - lesser(around.west[x], 0.0) * first_most[at + x - 1];
-                    let across = greater(around.south[x], 0.0) * near.south[x]
-                        - lesser(around.north[x], 0.0) * north_most[x];
-                    // Truncation takes up to a unit from each.
-                    let leaves = greater((along + across) * scale::MARGIN - 4.0, 0.0);
-                    let room =
-                        scale::room(columns.bases()[i], columns.ceilings()[i], part.depth[i - part.start]);
-                    let along = greater(around.west[x], 0.0) - lesser(around.east[x], 0.0);
-                    let across = greater(around.north[x], 0.0) - lesser(around.south[x], 0.0);
-                    most[at + x] = scale::most(along + across, room + leaves).max(k);
-                }
-            }
-        }
-        // What comes through links is not in the sum: their columns keep the first sweep's.
-        for &column in pipes.links.columns_of(row) {
-            most[place.of(column)] = first_most[place.of(column)];
-        }
-    }
-
-    /// Multiplies a row's transfers by K_max.
-    #[inline(always)]
-    fn fit(&mut self, ground: &Ground, parts: &mut Parts, row: usize) {
-        let [own, south] = self.ring.get_disjoint_mut([row % RING, (row + 1) % RING]).expect("two rows");
-        let south_is_full = south.is_full && row + 1 < ground.columns.grid.size[1];
-        if !own.is_full && !south_is_full {
-            return;
-        }
-        let most = if own.is_full { &own.most[1] } else { &self.ones };
-        let beyond = if south_is_full { &south.most[1] } else { &self.ones };
-        let place = Place::new(ground.columns, row);
-        let part = parts.of(row);
-        let [flux_east, flux_south] = &mut part.flux;
-        for span in ground.active.row(row) {
-            let (at, len) = (place.of(span.first), span.len as usize);
-            let mine = span.first as usize - part.start;
-            let factor = place.beside(most, beyond, &self.ones, span);
-            scale::fit(
-                &factor,
-                &mut own.east[at..at + len],
-                &mut own.south[at..at + len],
-                &mut flux_east[mine..mine + len],
-                &mut flux_south[mine..mine + len],
-            );
-        }
-        let first_link = part.first_link;
-        let factor = |column| place.pick(most, beyond, column);
-        part.links.scale(&ground.pipes.links, ground.lips, (row, first_link), false, factor);
     }
 
     /// Moves what a row's links transfer, from and to the band's own columns.
@@ -483,7 +388,13 @@ impl Rows {
 }
 
 /// Calls `add` with each column of a row that gives through a link, or takes, and how much.
-fn each_link(ground: &Ground, parts: &Parts, row: usize, gives: bool, mut add: impl FnMut(u32, i64)) {
+pub(super) fn each_link(
+    ground: &Ground,
+    parts: &Parts,
+    row: usize,
+    gives: bool,
+    mut add: impl FnMut(u32, i64),
+) {
     let links = &ground.pipes.links;
     if links.columns_of(row).is_empty() {
         return;

@@ -44,22 +44,30 @@ fn spare(depth: i32) -> f32 {
     (depth.max(1)) as f32 * MARGIN
 }
 
-/// Sums what is to leave each column; whether it is more than the column has anywhere.
+/// Sums what is to leave each column; whether it is more than the column has anywhere. Where columns may fill up, `into` is raised to the most that is to
+/// come into one of each place.
 #[inline(always)]
-pub fn outflow(depth: &[i32], around: &Around, out: &mut [f32]) -> bool {
+pub fn outflow<const FILLS: bool>(
+    depth: &[i32],
+    around: &Around,
+    out: &mut [f32],
+    into: &mut [f32; STRIP],
+) -> bool {
     let mut over = [0; STRIP];
     for strip in 0..out.len() / STRIP {
-        outflow_of(strip_of(depth, strip), &around.strip(strip), strip_mut(out, strip), &mut over);
+        let around = around.strip(strip);
+        outflow_of::<FILLS>(strip_of(depth, strip), &around, strip_mut(out, strip), &mut over, into);
     }
     over != [0; STRIP]
 }
 
 #[inline(always)]
-fn outflow_of(
+fn outflow_of<const FILLS: bool>(
     depth: &[i32; STRIP],
     around: &[&[f32; STRIP]; 4],
     out: &mut [f32; STRIP],
     over: &mut [i32; STRIP],
+    into: &mut [f32; STRIP],
 ) {
     let [east, west, south, north] = around;
     for x in 0..STRIP {
@@ -67,6 +75,9 @@ fn outflow_of(
         let across = greater(south[x], 0.0) - lesser(north[x], 0.0);
         out[x] = along + across;
         over[x] |= i32::from(out[x] > spare(depth[x]));
+        if FILLS {
+            into[x] = greater(into[x], coming(around, x));
+        }
     }
 }
 
@@ -154,12 +165,17 @@ pub fn inflow(around: &Around, into: &mut [f32]) {
 
 #[inline(always)]
 fn inflow_of(around: &[&[f32; STRIP]; 4], into: &mut [f32; STRIP]) {
-    let [east, west, south, north] = around;
-    for x in 0..STRIP {
-        let along = greater(west[x], 0.0) - lesser(east[x], 0.0);
-        let across = greater(north[x], 0.0) - lesser(south[x], 0.0);
-        into[x] = along + across;
+    for (x, into) in into.iter_mut().enumerate() {
+        *into = coming(around, x);
     }
+}
+
+/// What is to come into a column. Where transfers are scaled, it is less or the same, also as rounded.
+#[inline(always)]
+fn coming([east, west, south, north]: &[&[f32; STRIP]; 4], x: usize) -> f32 {
+    let along = greater(west[x], 0.0) - lesser(east[x], 0.0);
+    let across = greater(north[x], 0.0) - lesser(south[x], 0.0);
+    along + across
 }
 
 /// The room of a column (units).

@@ -1,11 +1,14 @@
 //! Writes vertices into the caller's buffers: in order, and without reading them.
 
+use std::ops::Range;
+
 use super::boundary::{Around, Wall, walls_of};
 use super::links::Scene;
 use super::normals::{Normals, Shown, upright};
-use super::strips::{Found, Span, places};
+use super::strips::{Found, Span};
 use super::{Depths, Layout, MOST, NONE, STRIP, Target, Up};
 use crate::base::cpu::dispatch;
+use crate::shallow::columns::strip_of;
 
 /// Velocity at the surface over the mean (Eq. 4.4).
 const SURFACE_SPEED: f32 = 1.5;
@@ -201,7 +204,68 @@ impl<'a> Vertices<'a> {
         if self.z_up { [x, z, up] } else { [x, up, z] }
     }
 
-    /// Writes the vertices of a run of a span, from `at` on.
+    /// Writes the vertices of a run of a span with wet columns on all sides, from `at` on.
+    #[inline(always)]
+    fn put_inner(&self, span: &Span, run: Run, at: usize, target: &mut Target<'_>) {
+        let (heights, Run { first, len }) = (self.shown.heights, run);
+        let step = first - span.first * STRIP;
+        if let Some(out) = &mut target.normals {
+            let (north, south) = (span.north as usize * STRIP + step, span.south as usize * STRIP + step);
+            let row = |first: usize| heights[first..][..len].iter();
+            let across = row(first - 1).zip(row(first + 1));
+            let along = row(north).zip(row(south));
+            for ((out, (west, east)), (north, south)) in
+                vectors(out, at, len).iter_mut().zip(across).zip(along)
+            {
+                let slope =
+                    |before: &i32, behind: &i32| before.wrapping_sub(*behind) as f32 * self.shown.slope;
+                let [x, y, z] = upright(slope(west, east), slope(north, south));
+                *out = self.order(x, y, z * self.sign);
+            }
+        }
+        self.put_run(span, run, at, target);
+    }
+
+    /// Writes the vertices of some places of a strip, with or without wet columns on their sides, from `at` on.
+    #[inline(always)]
+    fn put_outer(&self, span: &Span, strip: usize, places: Range<usize>, at: usize, target: &mut Target<'_>) {
+        let run = Run { first: strip * STRIP + places.start, len: places.len() };
+        if let Some(out) = &mut target.normals {
+            let normals = self.outer_normals(span, strip);
+            vectors(out, at, run.len).copy_from_slice(&normals[places]);
+        }
+        self.put_run(span, run, at, target);
+    }
+
+    /// The normals of a strip's columns, which full quartets link with those on their sides, if any.
+    #[inline(always)]
+    fn outer_normals(&self, span: &Span, strip: usize) -> [[f32; 3]; STRIP] {
+        let (heights, slope, sides) = (self.shown.heights, self.shown.slope, self.found.states[strip].sides);
+        let (own, first) = (strip_of(heights, strip), strip * STRIP);
+        let mut line = [0; STRIP + 2];
+        line[1..=STRIP].copy_from_slice(own);
+        line[0] = first.checked_sub(1).map_or(0, |before| heights[before]);
+        line[STRIP + 1] = heights.get(first + STRIP).copied().unwrap_or(0);
+        let beside =
+            |row: u32| if row == NONE { own } else { strip_of(heights, row as usize + strip - span.first) };
+        let (north, south) = (beside(span.north), beside(span.south));
+        let mut normals = [[0.0; 3]; STRIP];
+        for x in 0..STRIP {
+            let has = |side: usize| sides[side] >> x & 1 == 1;
+            let slope = |[before, behind]: [i32; 2], has: [bool; 2]| {
+                let [before, behind] =
+                    [if has[0] { before } else { own[x] }, if has[1] { behind } else { own[x] }];
+                let cells = if has[0] & has[1] { 1.0 } else { 2.0 };
+                before.wrapping_sub(behind) as f32 * slope * cells
+            };
+            let along = slope([line[x], line[x + 2]], [has(0), has(1)]);
+            let [x_up, y, z] = upright(along, slope([north[x], south[x]], [has(2), has(3)]));
+            normals[x] = self.order(x_up, y, z * self.sign);
+        }
+        normals
+    }
+
+    /// Writes all of the vertices of a run but their normals, from `at` on.
     #[inline(always)]
     fn put_run(&self, span: &Span, run: Run, at: usize, target: &mut Target<'_>) {
         let (heights, depths) = (self.shown.heights, self.shown.scene.depth);
@@ -215,20 +279,6 @@ impl<'a> Vertices<'a> {
             let out = vectors(out, at, len);
             for ((out, height), cell) in out.iter_mut().zip(&heights[first..][..len]).zip(cells) {
                 *out = self.order(self.centre(0, cell), self.height(*height as f32), z);
-            }
-        }
-        if let Some(out) = &mut target.normals {
-            let (north, south) = (span.north as usize * STRIP + step, span.south as usize * STRIP + step);
-            let row = |first: usize| heights[first..][..len].iter();
-            let across = row(first - 1).zip(row(first + 1));
-            let along = row(north).zip(row(south));
-            for ((out, (west, east)), (north, south)) in
-                vectors(out, at, len).iter_mut().zip(across).zip(along)
-            {
-                let slope =
-                    |before: &i32, behind: &i32| before.wrapping_sub(*behind) as f32 * self.shown.slope;
-                let [x, y, z] = upright(slope(west, east), slope(north, south));
-                *out = self.order(x, y, z * self.sign);
             }
         }
         if let Some(out) = &mut target.velocities {
@@ -283,25 +333,32 @@ fn write_spans(vertices: &Vertices<'_>, normals: &mut Normals, around: &mut Arou
                 run = Run { first: if run.len == 0 { first } else { run.first }, len: run.len + STRIP };
                 continue;
             }
-            for place in places(state.used) {
-                let index = first + place;
-                let is_plain = plain >> place & 1 == 1;
-                if run.len > 0 && !(is_plain && run.first + run.len == index) {
-                    vertices.put_run(span, run, next, target);
-                    next += run.len;
-                    run.len = 0;
-                }
-                if is_plain {
-                    run = Run { first: if run.len == 0 { index } else { run.first }, len: run.len + 1 };
-                } else {
-                    let vertex = vertices.vertex(index, normals, around);
+            if run.len > 0 {
+                vertices.put_inner(span, run, next, target);
+                next += run.len;
+                run.len = 0;
+            }
+            // What lies between columns that are looked at one by one.
+            let smooth = state.used & state.wet & !state.rough;
+            let mut left = state.used;
+            while left != 0 {
+                let place = left.trailing_zeros();
+                let len = (smooth >> place).trailing_ones();
+                if len == 0 {
+                    let vertex = vertices.vertex(first + place as usize, normals, around);
                     vertices.put(next, &vertex, target);
                     next += 1;
+                    left &= left - 1;
+                    continue;
                 }
+                let end = place + len;
+                vertices.put_outer(span, strip, place as usize..end as usize, next, target);
+                next += len as usize;
+                left &= u16::MAX.checked_shl(end).unwrap_or(0);
             }
         }
         if run.len > 0 {
-            vertices.put_run(span, run, next, target);
+            vertices.put_inner(span, run, next, target);
             next += run.len;
         }
     }
