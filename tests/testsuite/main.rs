@@ -99,6 +99,7 @@ mod shallow {
     mod detail;
     mod falls;
     mod falls_scalars;
+    mod falls_threads;
     mod flooded;
     mod flow;
     mod loads;

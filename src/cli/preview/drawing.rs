@@ -194,7 +194,7 @@ fn cut(ctx: &Context, parts: Vec<Part>, plane: Plane) -> Result<Drawing> {
     for part in parts {
         match part {
             Part::Mesh(detailed) | Part::Liquid(detailed, _) => cut = cut.with_surface(&detailed.mesh, INK),
-            Part::Ground(mesh) | Part::Obstacle(mesh) | Part::Cloth(mesh) => {
+            Part::Ground(mesh, ..) | Part::Obstacle(mesh) | Part::Cloth(mesh) => {
                 cut = cut.with_surface(&mesh, INK)
             }
             Part::Points(path, _) => {

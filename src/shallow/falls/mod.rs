@@ -3,13 +3,14 @@
 //! | word | meaning |
 //! |---|---|
 //! | lip | a link that liquid falls freely from in a step: the void is beyond, or the surface there lies deeper than a given height (`flow/lips.rs`) |
-//! | packet | what went over a lip in some steps; whole units of volume, which fly together (`flight.rs`) and land together (`falling.rs`) |
+//! | thread | a lip that takes what goes over those near it (`threads.rs`) |
+//! | packet | what went over a lip in some steps; whole units of volume, which fly together (`flight.rs`) and land together (`falling.rs`, `splash.rs`) |
 //! | drop | a packet, as a host sees it |
-//! | strand | a tube between packets that follow each other from the same lip (`mesh.rs`) |
+//! | strand | a tube between packets that follow each other from the same lip, and from it to the last (`mesh.rs`) |
 //!
 //! A packet begins at the lip's base, with the velocity of what went over it, at most that at the brink of a free overfall, 1.4 times the critical
-//! one of its flow (Rouse, Civil Engineering 6, 1936), or of the liquid that arrives there, if that is faster. It flies without drag, and lands, whole, on the first
-//! surface that it meets: without room there, as liquid does where the terrain moves (`remap/held.rs`). At a wall it stops, and falls down along it. Where there
+//! one of its flow (Rouse, Civil Engineering 6, 1936), or of the liquid that arrives there, if that is faster. It flies without drag, and lands on the first
+//! surface that it meets and around: without room there, as liquid does where the terrain moves (`remap/held.rs`). At a wall it stops, and falls down along it. Where there
 //! is nothing it leaves the domain below its lowest height, or over an open border, and is lost.
 
 mod falling;
@@ -36,7 +37,8 @@ pub struct Falls {
     pub height: f64,
     /// Time between packets of a lip (s), 0.0001 to 1, at least a step; 1/120.
     pub interval: f64,
-    /// Least volume of a packet (m3), 0 and up; what is less waits at its lip for more, at most 60 intervals. 6.5e-11, a ball of half a millimetre.
+    /// Volume of a drop (m3), 0 and up: where it takes longer than 8 intervals liquid waits at its lip until it is one, at most 60. 6.5e-11, a ball of half a
+    /// millimetre.
     pub drop: f64,
     /// Most packets in the air, 1 to 1,048,576, for which there is room from the beginning; 8192. While there are so many, liquid that goes over a lip is
     /// below at once.
