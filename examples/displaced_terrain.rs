@@ -1,7 +1,7 @@
 //! A surface on layers beside one that only displaces the terrain (thesis Fig. 4.16): `cargo run --release --example displaced_terrain DIR`.
 //!
-//! Blood runs over shelves (`make_scenes` writes them). A terrain that is displaced by a depth has one height in each cell, seen from above: at the edge of
-//! a shelf it hangs down to the floor as a curtain, covers the hole, and shows nothing of what runs below. Into DIR come layered.png and
+//! Blood runs over shelves (`make_scenes` writes them). A terrain that is displaced by a depth has one height in each cell, seen from above: from the edges
+//! of shelves and around the hole it hangs down in curtains, and it shows nothing of what runs below. Into DIR come layered.png and
 //! displaced.png.
 
 use std::path::Path;
