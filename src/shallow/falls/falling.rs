@@ -43,7 +43,7 @@ pub(in crate::shallow) struct Waiting {
     /// What came in an interval of late (units), and how much was there when the last one ended.
     pub steady: i64,
     pub before: i64,
-    /// How far its packets are ahead of the others', in 2^31ths of an interval: it follows from what came first.
+    /// How far its packets are ahead of the others', in 2^31ths of an interval: it follows from what came while the flow grew.
     pub phase: u32,
     /// Impulse that others have given; 0 between intervals.
     pub gathered: i64,
@@ -286,9 +286,6 @@ impl Shallow {
                 libm::cbrt(-params.gravity[1] * over.units as f64 * width) / (BRINK * columns.grid.cell);
             let speed = flux.min(brink.max(arriving(columns, flow, &over, side)));
             let waiting = &mut falls.waiting[over.link];
-            if !waiting.is_awake() {
-                waiting.phase = (scatter(over.units as u64) >> 33) as u32;
-            }
             waiting.is_back = is_back;
             waiting.units += over.units;
             for (waiting, fallen) in waiting.amounts.iter_mut().zip(&flow.links.fallen) {
@@ -414,14 +411,6 @@ impl Packet {
     fn landing(&self, column: usize) -> Landing {
         Landing { column: column as u32, units: self.units, amounts: self.amounts }
     }
-}
-
-/// Numbers that are scattered over all, for any that are close together (splitmix64, Steele et al. 2014).
-fn scatter(number: u64) -> u64 {
-    let mixed = number.wrapping_mul(0x9e37_79b9_7f4a_7c15);
-    let mixed = (mixed ^ mixed >> 30).wrapping_mul(0xbf58_476d_1ce4_e5b9);
-    let mixed = (mixed ^ mixed >> 27).wrapping_mul(0x94d0_49bb_1331_11eb);
-    mixed ^ mixed >> 31
 }
 
 /// Adds amounts to others.

@@ -158,7 +158,18 @@ impl Falling {
             own.impulse += own.gathered as f64;
             own.gathered = 0;
             let came = (own.units - own.before).max(0);
+            if came > 2 * own.steady {
+                own.phase = (scatter(came as u64) >> 33) as u32;
+            }
             own.steady = (3 * own.steady + came) / 4;
         }
     }
+}
+
+/// Numbers that are scattered over all, for any that are close together (splitmix64, Steele et al. 2014).
+fn scatter(number: u64) -> u64 {
+    let mixed = number.wrapping_mul(0x9e37_79b9_7f4a_7c15);
+    let mixed = (mixed ^ mixed >> 30).wrapping_mul(0xbf58_476d_1ce4_e5b9);
+    let mixed = (mixed ^ mixed >> 27).wrapping_mul(0x94d0_49bb_1331_11eb);
+    mixed ^ mixed >> 31
 }

@@ -81,7 +81,7 @@ fn a_strand_joins_the_lip_and_its_last_drop() {
 #[test]
 fn a_little_liquid_drips() {
     let drop = 4e-9;
-    let liquid = over_an_edge(5e-7, 240, Falls { drop, ..Falls::default() });
+    let liquid = over_an_edge(2e-7, 300, Falls { drop, ..Falls::default() });
     let drops: Vec<Droplet> = liquid.drops().collect();
     assert!(drops.iter().any(|other| other.volume >= drop && other.volume < 1.5 * drop), "{drops:?}");
     // Each falls alone.
