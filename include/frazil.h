@@ -147,6 +147,12 @@
 #define FRZ_SHALLOW_LIFTED 4
 
 /**
+ * Flag of a layout: where the ground ends over nothing, the surface goes on to its edge and comes down to it, in place of ending in the middle of the
+ * last cell, open below. frz_shallow_find_ledges has found where since the ground or a body moved last.
+ */
+#define FRZ_SHALLOW_SKIRTED 8
+
+/**
  * Most scalars that a liquid carries.
  */
 #define FRZ_SHALLOW_MOST_SCALARS 4
@@ -2462,7 +2468,7 @@ typedef struct {
      */
     uint32_t struct_size;
     /**
-     * FRZ_SHALLOW_Z_UP, FRZ_SHALLOW_LEFT_HANDED, FRZ_SHALLOW_LIFTED, several of them or 0, which is usual: Y up, right-handed.
+     * FRZ_SHALLOW_Z_UP, FRZ_SHALLOW_LEFT_HANDED, FRZ_SHALLOW_LIFTED, FRZ_SHALLOW_SKIRTED, several of them or 0, which is usual: Y up, right-handed.
      */
     uint32_t flags;
     /**
@@ -2546,7 +2552,8 @@ typedef struct {
      */
     frz_span layers;
     /**
-     * uint32_t a vertex: the index of its column; 0xffffffff for one beside a wall, which has none.
+     * uint32_t a vertex: the index of its column; 0xffffffff for one beside a wall or on the ground's edge,
+     * which has none.
      */
     frz_span columns;
     /**
@@ -4671,7 +4678,8 @@ frz_status frz_shallow_layout_init(frz_shallow_layout *layout, size_t size);
 
 /**
  * Reports the most that the surface of any liquid on this ground can have, so that buffers are made once. It holds until the ground
- * or a body moves. On ground with uneven ceilings it is several times what a liquid comes to.
+ * or a body moves. On ground with uneven ceilings it is several times what a liquid comes to. With FRZ_SHALLOW_SKIRTED what
+ * frz_shallow_find_ledges reports comes on top.
  *
  * size: receives it, all zeroes after a failure. Its struct_size is set by the caller.
  *
@@ -4682,7 +4690,8 @@ frz_status frz_shallow_surface_bound(const frz_shallow *shallow,
 
 /**
  * Writes the liquid's surface as triangles, in real time (frz_shallow): the wet columns and the dry ones around them. It ends at the
- * middles of the outermost cells. Vertices come in the order of their columns' indices, those beside walls behind them.
+ * middles of the outermost cells. Vertices come in the order of their columns' indices, those beside walls behind them, and those on the ground's
+ * edges last.
  *
  * layout: NULL for the usual one.
  * target: the buffers. FRZ_ERROR_CAPACITY when one is too small: nothing is written, and size receives what is needed. With all data
@@ -4696,6 +4705,20 @@ frz_status frz_shallow_surface(frz_context *context,
                                const frz_shallow_layout *layout,
                                const frz_shallow_target *target,
                                frz_shallow_size *size);
+
+/**
+ * Finds where the ground ends over nothing, as at the edges of shelves and of holes, for surfaces with FRZ_SHALLOW_SKIRTED. With the mesh that the liquid
+ * was made with it finds where between the middles of cells that is; on other ground the surface goes on for half a cell. It looks at all of the
+ * ground, some milliseconds long, and allocates: once for ground that rests, and again after frz_shallow_update_terrain or _set_bodies have moved
+ * something, before the next such surface.
+ *
+ * size: receives the most that this adds to frz_shallow_surface_bound, all zeroes after a failure; may be NULL. Its struct_size is set by the caller.
+ *
+ * One thread at a time.
+ */
+frz_status frz_shallow_find_ledges(frz_context *context,
+                                   frz_shallow *shallow,
+                                   frz_shallow_size *size);
 
 /**
  * Finds the minimum heights of all columns, or of those that have changed, from the mesh that the liquid was made with, in real time (frz_shallow), for

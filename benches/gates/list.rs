@@ -473,6 +473,7 @@ pub const GATES: &[Gate] = &[
     // The most of the three over the time that copying its bytes takes, each after a frame.
     gate("shallow.surface_copy", "x", Most(1.7), Most(1.3)),
     none("shallow.surface_unlinked", "edges"),
+    none("shallow.surface_cracks", "edges"),
     yes("shallow.surface_same"),
     // Thread CPU time of a whole frame: what flows and falls, the surface and the drops.
     gate("shallow.whole_one_floor", "ms", Most(1.0), Most(0.6)),

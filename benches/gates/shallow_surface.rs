@@ -3,6 +3,7 @@
 use frazil::base::cpu::cpu_level;
 use frazil::shallow::Shallow;
 use frazil::shallow::columns::{Columns, NONE};
+use frazil::shallow::surface::ledges::Ledges;
 use frazil::shallow::surface::{Counts, Depths, Indices, Layout, Surface, Target, bound, check};
 
 use crate::common::bodies::Dice;
@@ -43,7 +44,7 @@ pub fn run(h: &mut Harness) {
         let notes = each.map(|(_, note)| note).join("; ");
         h.gate("shallow.surface_copy", most, &format!("{:?} {notes}", cpu_level()));
     }
-    if h.wants("shallow.surface_unlinked") {
+    if h.wants("shallow.surface_unlinked") || h.wants("shallow.surface_cracks") {
         unlinked(h);
     }
 }
@@ -62,7 +63,14 @@ struct Buffers {
 impl Buffers {
     /// As large as any liquid in these columns needs them.
     fn new(columns: &Columns) -> Self {
-        let most = bound(columns);
+        Self::with(columns, &Ledges::default())
+    }
+
+    /// The same, with skirts.
+    fn with(columns: &Columns, ledges: &Ledges) -> Self {
+        let (mut most, more) = (bound(columns), ledges.bound());
+        most.vertices += more.vertices;
+        most.indices += more.indices;
         let [positions, normals, velocities] = [(); 3].map(|()| vec![0.0; 3 * most.vertices]);
         Self {
             positions,
@@ -199,15 +207,29 @@ struct Pairs {
     missing: usize,
     /// Linked columns that no third one is linked with.
     alone: usize,
+    /// Edges between wet columns, within the domain, that have one triangle only: without skirts, and with them; and of these, those beside
+    /// liquid that stands across the underside of a solid.
+    open: usize,
+    cracks: usize,
+    under: usize,
 }
 
 impl Pairs {
     /// Looks at the surface of a liquid.
     fn look(&mut self, surface: &mut Surface, columns: &Columns, depth: &[i32]) {
-        let mut buffers = Buffers::new(columns);
+        let mut ledges = Ledges::default();
+        ledges.find(columns);
+        let mut buffers = Buffers::with(columns, &ledges);
+        let depths = Depths { depth, ledges: Some(&ledges), ..Depths::default() };
+        let counts =
+            surface.build(columns, &depths, &Layout::default(), &mut buffers.checked()).expect("a surface");
+        let [open, under] = open_edges(columns, depth, &buffers, &counts);
+        self.cracks += open - under;
+        self.under += under;
         let depths = Depths { depth, ..Depths::default() };
         let counts =
             surface.build(columns, &depths, &Layout::default(), &mut buffers.checked()).expect("a surface");
+        self.open += open_edges(columns, depth, &buffers, &counts)[0];
         let indices = &buffers.indices[..counts.indices];
         let checked = check(columns, depth, &buffers.columns[..counts.vertices], indices);
         self.missing += checked.unlinked;
@@ -229,6 +251,41 @@ impl Pairs {
             }
         }
     }
+}
+
+/// Count of edges between wet columns that have a triangle on one side only, but for those along the domain's border; and of these such beside
+/// which liquid stands across the underside of a solid: there it comes to different heights below and beside it, and ends at the solid.
+fn open_edges(columns: &Columns, depth: &[i32], buffers: &Buffers, counts: &Counts) -> [usize; 2] {
+    let mut edges: Vec<[u32; 2]> = Vec::with_capacity(counts.indices);
+    for [a, b, c] in buffers.indices[..counts.indices].as_chunks::<3>().0 {
+        edges.extend([[*a, *b], [*b, *c], [*c, *a]]);
+    }
+    edges.sort_unstable();
+    let [nx, nz] = columns.grid.size;
+    let is_wet = |column: u32| column != NONE && depth[column as usize] > 0;
+    let mut open = [0; 2];
+    for &[a, b] in &edges {
+        let ends = [a, b].map(|vertex| buffers.columns[vertex as usize]);
+        if edges.binary_search(&[b, a]).is_ok() || !ends.into_iter().all(is_wet) {
+            continue;
+        }
+        let [[ax, az], [bx, bz]] = ends.map(|column| columns.cell(column as usize));
+        if ax == bx && [0, nx - 1].contains(&ax) || az == bz && [0, nz - 1].contains(&az) {
+            continue;
+        }
+        open[0] += 1;
+        let cells = (ax.min(bx).saturating_sub(1)..ax.max(bx) + 2)
+            .flat_map(|x| (az.min(bz).saturating_sub(1)..az.max(bz) + 2).map(move |z| [x, z]));
+        let around: Vec<usize> = cells.flat_map(|cell| columns.of_cell(cell)).collect();
+        let crosses = |wet: usize, ceiling: i32| {
+            let base = columns.bases()[wet];
+            depth[wet] > 0 && base < ceiling && ceiling <= base + depth[wet]
+        };
+        let is_under =
+            around.iter().any(|&solid| around.iter().any(|&wet| crosses(wet, columns.ceilings()[solid])));
+        open[1] += usize::from(is_under);
+    }
+    open
 }
 
 /// Random terrains with layers: liquid that flows there, and depths by chance, in part up to ceilings.
@@ -272,10 +329,19 @@ fn unlinked(h: &mut Harness) {
         liquid.step(&ctx, FRAME).expect("a frame");
         look(liquid.columns(), liquid.depths());
     }
-    let Pairs { edges, false_edges, missing, alone } = pairs;
+    let Pairs { edges, false_edges, missing, alone, open, cracks, under } = pairs;
     let note = format!(
         "{surfaces} surfaces, up to {layers} layers; of {edges} edges between wet columns {false_edges} join what is not linked; \
          {missing} linked pairs without an edge, but {alone} that no third column is linked with"
     );
-    h.gate("shallow.surface_unlinked", (false_edges + missing) as f64, &note);
+    if h.wants("shallow.surface_unlinked") {
+        h.gate("shallow.surface_unlinked", (false_edges + missing) as f64, &note);
+    }
+    if h.wants("shallow.surface_cracks") {
+        let note = format!(
+            "{surfaces} surfaces, up to {layers} layers; {open} of {edges} edges without skirts; \
+             {under} more beside liquid that stands across the underside of a solid"
+        );
+        h.gate("shallow.surface_cracks", cracks as f64, &note);
+    }
 }

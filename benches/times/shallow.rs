@@ -4,12 +4,16 @@ use frazil::Context;
 use frazil::base::cpu::cpu_level;
 use frazil::shallow::liquid::Liquid;
 use frazil::shallow::params::{Pace, Section};
+use frazil::shallow::pipes::Border;
+use frazil::shallow::surface::ledges::Ledges;
+use frazil::shallow::surface::lifts::{Distance, Lifts};
 use frazil::shallow::terrain::Solids;
 use frazil::shallow::{Params, Shallow};
 
 use crate::common::bodies::Dice;
+use crate::common::rough_ground::{Kind, rough};
 use crate::common::shallow::{context, covered, ground, source, waves};
-use crate::shallow_speed::{Frames, stacked};
+use crate::shallow_speed::{Frames, stacked, thread_seconds};
 use crate::surface::title;
 
 /// A row of Table 4.1: name, cells along an edge, floors, step (s), cell (m), viscosity (m2/s), greatest and mean time of the simulation (ms).
@@ -44,6 +48,8 @@ pub fn tables() {
     EXAMPLES.iter().for_each(example);
     steps();
     scaling();
+    films();
+    fitting();
 }
 
 fn example(&(name, edge, floors, step, cell, viscosity, [longest, mean]): &Example) {
@@ -154,5 +160,71 @@ fn scaling() {
             frames.worst(),
             1e6 * mean / columns as f64
         );
+    }
+}
+
+/// A fast film: blood from a source at the top of an incline, as exact steps and longer ones find it.
+fn films() {
+    const SLOPE: f64 = 0.35;
+    const SECONDS: f64 = 3.0;
+    title(
+        "Blood, 1 ml/s for 3 s on an incline of 35 % of 200 x 200 cells of 0.5 mm, which it runs off: by the steps.",
+        "steps | steps a frame | deepest at the end (mm) | on the incline at the end (ml) | a frame (ms) | rows held back a frame",
+    );
+    for (name, pace) in [("exact", Pace::Exact), ("1 ms", Pace::Realtime(1e-3)), ("3 ms", Pace::Realtime(3e-3))] {
+        let (cell, edge) = (0.0005, 200);
+        let solids = ground([edge; 2], cell, [-0.05, 0.1], |[x, _]| 0.03 - SLOPE * x);
+        let params =
+            Params { liquid: Liquid::BLOOD, pace, border: Border::Absorbing, ..Params::default() };
+        let (ctx, mut liquid) = (context(), Shallow::new(&context(), &solids, params).expect("a liquid"));
+        let top = source([-0.04, 0.1, 0.0], 0.003, 1e-6);
+        liquid.set_flows(&[top], |_| "the source".into()).expect("a source");
+        let (mut steps, mut held, start) = (0, 0, thread_seconds());
+        let frames = (SECONDS * 60.0) as u32;
+        for _ in 0..frames {
+            let report = liquid.step(&ctx, 1.0 / 60.0).expect("a frame");
+            steps += report.steps;
+            held += report.slowed;
+        }
+        let time = 1e3 * (thread_seconds() - start) / f64::from(frames);
+        let deepest = liquid.depths().iter().copied().max().unwrap_or(0);
+        println!(
+            "| {name} | {:.0} | {:.2} | {:.2} | {time:.2} | {:.0} |",
+            f64::from(steps) / f64::from(frames),
+            1e3 * f64::from(deepest) * solids.heights.unit,
+            1e6 * liquid.balance().inside,
+            held as f64 / f64::from(frames),
+        );
+    }
+}
+
+/// What the surface has to know of the ground's mesh.
+fn fitting() {
+    title(
+        "Milliseconds, the least of five, thread CPU time on one core: what is found of a ground's mesh, once or where it has moved.",
+        "cells | triangles | minimum heights | those near 40 x 40 cells | ledges",
+    );
+    for edge in [100, 200, 300] {
+        let rough = rough(39, Kind { edge, ..Kind::of(39) });
+        let (columns, positions, faces) = (&rough.columns, &rough.positions, &rough.faces);
+        let (mut lifts, mut ledges, distance) = (Lifts::default(), Ledges::default(), Distance::default());
+        let near = [edge / 2 - 20..edge / 2 + 20, edge / 2 - 20..edge / 2 + 20];
+        let mut times = [f64::MAX; 3];
+        for _ in 0..5 {
+            let mut start = thread_seconds();
+            let mut lap = || {
+                let now = thread_seconds();
+                1e3 * (now - std::mem::replace(&mut start, now))
+            };
+            lifts.find(columns, positions, faces, distance).expect("minimum heights");
+            let all = lap();
+            lifts.update(columns, positions, faces, distance, near.clone()).expect("minimum heights");
+            let some = lap();
+            ledges.fit(columns, positions, faces).expect("ledges");
+            let laps = [all, some, lap()];
+            times = std::array::from_fn(|at| times[at].min(laps[at]));
+        }
+        let [all, some, found] = times;
+        println!("| {edge} x {edge} | {} | {all:.1} | {some:.1} | {found:.1} |", faces.len());
     }
 }

@@ -413,6 +413,7 @@ _FUNCTIONS = {
     "shallow_surface": [_P, _P, _P, _P, _P], "shallow_snapshot_create": [_P, _P, _P],
     "shallow_snapshot_take": [_P, _P], "shallow_snapshot_surface": [_P, _P, _P, _P, _P],
     "shallow_snapshot_probe": [_P, View, Span], "shallow_find_lifts": [_P, _P, _P, _P, _P],
+    "shallow_find_ledges": [_P, _P, _P],
     "shallow_set_scalars": [_P, _P, _Z], "shallow_set_poured": [_P, View], "shallow_set_sourced": [_P, _Z, View],
     "shallow_read_scalar": [_P, _U, View, Span], "shallow_get_scalar_balance": [_P, _U, _P],
     "shallow_drops": [_P, Span, _P], "shallow_drops_mesh": [_P, _P, _P, _P, _P],

@@ -320,6 +320,13 @@ class Shallow(Handle):
         call("shallow_find_lifts", self._ctx.pointer, self.pointer, c.byref(distance), corners, c.byref(fitted))
         return fitted
 
+    def find_ledges(self):
+        """Finds where the ground ends over nothing, for surface(skirted=True), anew after the ground or bodies have moved. The most vertices and
+        triangles that this adds to a surface."""
+        size = ShallowSize(c.sizeof(ShallowSize))
+        call("shallow_find_ledges", self._ctx.pointer, self.pointer, c.byref(size))
+        return size.vertices, size.indices // 3
+
     def fill(self, height):
         """Fills all columns up to a height (m), or their ceiling."""
         call("shallow_fill", self.pointer, height)
@@ -425,11 +432,12 @@ class Shallow(Handle):
         call("shallow_volume", self.pointer, *corners, ALL_LAYERS if layer is None else layer, c.byref(out))
         return out.value
 
-    def surface(self, parts=(), z_up=False, left_handed=False, scale=1.0, least_depth=0.0, opaque_depth=0.01, lifted=False, fade_depth=0.0):
+    def surface(self, parts=(), z_up=False, left_handed=False, scale=1.0, least_depth=0.0, opaque_depth=0.01, lifted=False, fade_depth=0.0,
+                skirted=False):
         """The liquid's Surface, with its scalars and these parts of it: normals, depths, opacities, velocities, layers, columns; lifted: at its minimum
-        heights, which find_lifts() has found."""
+        heights, which find_lifts() has found; skirted: it comes down where the ground ends, as find_ledges() has found."""
         return surface_of("shallow_surface", self._ctx, self.pointer, parts, z_up, left_handed, scale, least_depth, opaque_depth, lifted,
-                        fade_depth, self._scalars)
+                        fade_depth, skirted, self._scalars)
 
     def save(self):
         """The state between two frames: bytes for restore()."""
@@ -457,10 +465,11 @@ class Snapshot(Handle):
         call("shallow_snapshot_take", self.pointer, shallow.pointer)
         self._scalars = shallow._scalars
 
-    def surface(self, ctx, parts=(), z_up=False, left_handed=False, scale=1.0, least_depth=0.0, opaque_depth=0.01, lifted=False, fade_depth=0.0):
+    def surface(self, ctx, parts=(), z_up=False, left_handed=False, scale=1.0, least_depth=0.0, opaque_depth=0.01, lifted=False, fade_depth=0.0,
+                skirted=False):
         """As Shallow.surface; ctx: another context than that of the thread that computes."""
         return surface_of("shallow_snapshot_surface", ctx, self.pointer, parts, z_up, left_handed, scale, least_depth, opaque_depth, lifted,
-                        fade_depth, self._scalars)
+                        fade_depth, skirted, self._scalars)
 
     @property
     def drops(self):

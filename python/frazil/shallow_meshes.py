@@ -10,7 +10,7 @@ from ._library import ShallowDropsTarget, ShallowLayout, ShallowSize, ShallowTar
 # What Shallow.drops lists.
 DROP = np.dtype([("position", "f8", 3), ("velocity", "f8", 3), ("volume", "f8"), ("radius", "f8"), ("age", "f8"), ("source", "u8"),
                  ("number", "u8"), ("concentrations", "f4", 4)])
-LIFTED = 4
+LIFTED, SKIRTED = 4, 8
 # Parts of a surface that are written on demand: the type, and how many of it a vertex has.
 PARTS = {
     "normals": (np.float32, 3), "depths": (np.float32, 1), "opacities": (np.float32, 1), "velocities": (np.float32, 3),
@@ -49,13 +49,13 @@ def layout_of(z_up, left_handed, scale):
     return layout
 
 
-def surface_of(name, ctx, pointer, parts, z_up, left_handed, scale, least_depth, opaque_depth, lifted, fade_depth, scalars):
+def surface_of(name, ctx, pointer, parts, z_up, left_handed, scale, least_depth, opaque_depth, lifted, fade_depth, skirted, scalars):
     """The surface of a liquid or a snapshot."""
     unknown = [part for part in parts if part not in PARTS]
     if unknown:
         raise ValueError(f"surfaces have no {unknown[0]!r}, but {', '.join(PARTS)}")
     layout, size = layout_of(z_up, left_handed, scale), ShallowSize(c.sizeof(ShallowSize))
-    layout.flags |= LIFTED * int(lifted)
+    layout.flags |= LIFTED * int(lifted) | SKIRTED * int(skirted)
     layout.least_depth, layout.opaque_depth, layout.fade_depth = least_depth, opaque_depth, fade_depth
     target = ShallowTarget(c.sizeof(ShallowTarget), 32)
     start = ctx.pointer, pointer, c.byref(layout), c.byref(target)

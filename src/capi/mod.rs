@@ -98,6 +98,7 @@ pub mod shallow_state;
 
 pub mod shallow_surface;
 
+pub mod shallow_ledges;
 pub mod shallow_lifts;
 
 pub mod shallow_scalars;

@@ -1,5 +1,7 @@
 //! Small amounts of liquid on a terrain, in real time.
 
+use std::sync::Arc;
+
 use super::context::{creates, enter_light, frz_context};
 #[cfg(feature = "vdb")]
 use super::grid::frz_grid;
@@ -17,6 +19,7 @@ use crate::shallow::falls::mesh::Balls;
 use crate::shallow::pace::MOST_STEPS;
 use crate::shallow::scalars::MOST;
 use crate::shallow::surface::Surface;
+use crate::shallow::surface::ledges::Ledges;
 use crate::shallow::terrain::Solids;
 use crate::shallow::terrain::shapes::Shape;
 use crate::shallow::{Load, Params, Report, Shallow};
@@ -94,6 +97,8 @@ pub(super) struct Spill {
     pub surface: Surface,
     /// Minimum heights, once they were found.
     pub lifted: Lifted,
+    /// Ledges of the ground as it is, once they were found.
+    pub ledges: Option<Arc<Ledges>>,
     /// Mean velocities of all column indices (m/s), when a surface wants them.
     pub velocities: Vec<[f32; 2]>,
     /// Concentrations of scalars by column index, when a surface wants them.
@@ -131,6 +136,7 @@ impl Spill {
             shapes: Vec::new(),
             surface,
             lifted: Lifted::default(),
+            ledges: None,
             velocities: Vec::new(),
             concentrations: Default::default(),
             balls,

@@ -1,15 +1,19 @@
 //! Shallow liquid as it was after a frame, for another thread.
 
+use std::sync::Arc;
+
 use super::context::{creates, enter_light, frz_context};
 use super::guard::{frz_status, guard};
 use super::handle::{Noun, change, destroy, read};
-use super::shallow::frz_shallow;
-use super::shallow_lifts::{Lifted, no_lifts};
+use super::shallow::{Spill, frz_shallow};
+use super::shallow_ledges::wanted as wanted_ledges;
+use super::shallow_lifts::no_lifts;
 use super::shallow_read::probe;
 use super::shallow_surface::{Wanted, frz_shallow_layout, frz_shallow_size, frz_shallow_target};
 use super::views::{frz_span, frz_view};
 use crate::shallow::Snapshot;
 use crate::shallow::falls::mesh::Balls;
+use crate::shallow::surface::ledges::Ledges;
 use crate::shallow::surface::{Depths, Surface};
 
 /// A liquid as it was after a frame, copied: another thread may draw it while the next frame is computed. A host has two of them: one
@@ -27,12 +31,15 @@ pub(super) struct Taken {
     /// Minimum heights, where there were some.
     least: Vec<i32>,
     sunk: Vec<i32>,
+    /// Ledges, where they were known.
+    ledges: Option<Arc<Ledges>>,
 }
 
 impl Taken {
-    /// Takes the minimum heights of a liquid, if they are of its ground as it is.
-    fn lift(&mut self, lifted: &Lifted) {
-        let (least, sunk) = lifted.known().unwrap_or_default();
+    /// Takes the minimum heights and the ledges of a liquid, if they are of its ground as it is.
+    fn fit(&mut self, spill: &Spill) {
+        self.ledges.clone_from(&spill.ledges);
+        let (least, sunk) = spill.lifted.known().unwrap_or_default();
         self.least.clear();
         self.least.extend_from_slice(least);
         self.sunk.clear();
@@ -67,8 +74,9 @@ pub unsafe extern "C" fn frz_shallow_snapshot_create(
             surface.reserve(snapshot.columns());
             let mut balls = Balls::default();
             balls.reserve(spill.shallow.params().falls.map_or(0, |falls| falls.most));
-            let mut taken = Taken { snapshot, surface, balls, least: Vec::new(), sunk: Vec::new() };
-            taken.lift(&spill.lifted);
+            let mut taken =
+                Taken { snapshot, surface, balls, least: Vec::new(), sunk: Vec::new(), ledges: None };
+            taken.fit(&spill);
             Ok(taken)
         })
     }
@@ -93,7 +101,7 @@ pub unsafe extern "C" fn frz_shallow_snapshot_take(
             let mut taken = change(snapshot)?;
             let spill = read(shallow)?;
             taken.snapshot.take(&spill.shallow);
-            taken.lift(&spill.lifted);
+            taken.fit(&spill);
             Ok(())
         }
     })
@@ -132,10 +140,11 @@ pub unsafe extern "C" fn frz_shallow_snapshot_surface(
             let wanted = Wanted::new(layout, target, size)?;
             let _call = enter_light(context)?;
             let mut taken = change(snapshot)?;
-            let Taken { snapshot, surface, least, sunk, .. } = &mut *taken;
+            let Taken { snapshot, surface, least, sunk, ledges, .. } = &mut *taken;
             if wanted.is_lifted && least.is_empty() {
                 return Err(no_lifts("when the snapshot was taken"));
             }
+            let ledges = wanted_ledges(wanted.is_skirted, ledges, "when the snapshot was taken")?;
             let lifts: [&[i32]; 2] = if wanted.is_lifted { [least, sunk] } else { [&[]; 2] };
             let depths = Depths {
                 depth: snapshot.depths(),
@@ -144,6 +153,7 @@ pub unsafe extern "C" fn frz_shallow_snapshot_surface(
                 least: lifts[0],
                 sunk: lifts[1],
                 carried: std::array::from_fn(|scalar| snapshot.concentrations(scalar)),
+                ledges,
             };
             wanted.write(surface, snapshot.columns(), &depths)
         }

@@ -5,6 +5,7 @@ use super::guard::{Failure, Outcome, frz_status, guard};
 use super::handle::{change, read};
 use super::mesh::no_flags;
 use super::shallow::{Spill, frz_shallow};
+use super::shallow_ledges::wanted as wanted_ledges;
 use super::views::{Sized32, fill, frz_span, sized};
 use crate::shallow::columns::Columns;
 use crate::shallow::scalars::MOST;
@@ -21,13 +22,17 @@ pub const FRZ_SHALLOW_LEFT_HANDED: u32 = 2;
 /// of frz_shallow_layout.least_depth.
 pub const FRZ_SHALLOW_LIFTED: u32 = 4;
 
+/// Flag of a layout: where the ground ends over nothing, the surface goes on to its edge and comes down to it, in place of ending in the middle of the
+/// last cell, open below. frz_shallow_find_ledges has found where since the ground or a body moved last.
+pub const FRZ_SHALLOW_SKIRTED: u32 = 8;
+
 /// How a surface is written.
 #[repr(C)]
 #[derive(Clone, Copy)]
 pub struct frz_shallow_layout {
     /// sizeof(frz_shallow_layout).
     pub struct_size: u32,
-    /// FRZ_SHALLOW_Z_UP, FRZ_SHALLOW_LEFT_HANDED, FRZ_SHALLOW_LIFTED, several of them or 0, which is usual: Y up, right-handed.
+    /// FRZ_SHALLOW_Z_UP, FRZ_SHALLOW_LEFT_HANDED, FRZ_SHALLOW_LIFTED, FRZ_SHALLOW_SKIRTED, several of them or 0, which is usual: Y up, right-handed.
     pub flags: u32,
     /// The host's units of length in a metre, over 0: 1 is usual, 100 for centimetres. For positions, depths and velocities.
     pub scale: f64,
@@ -63,7 +68,10 @@ impl frz_shallow_layout {
 
     /// The library's own layout, of which some flags may be set.
     fn layout(&self) -> Outcome<Layout> {
-        no_flags(self.flags, FRZ_SHALLOW_Z_UP | FRZ_SHALLOW_LEFT_HANDED | FRZ_SHALLOW_LIFTED)?;
+        no_flags(
+            self.flags,
+            FRZ_SHALLOW_Z_UP | FRZ_SHALLOW_LEFT_HANDED | FRZ_SHALLOW_LIFTED | FRZ_SHALLOW_SKIRTED,
+        )?;
         Ok(Layout {
             scale: self.scale,
             up: if self.flags & FRZ_SHALLOW_Z_UP != 0 { Up::Z } else { Up::Y },
@@ -97,7 +105,8 @@ pub struct frz_shallow_target {
     pub velocities: frz_span,
     /// uint32_t a vertex: the layer of its column.
     pub layers: frz_span,
-    /// uint32_t a vertex: the index of its column; 0xffffffff for one beside a wall, which has none.
+    /// uint32_t a vertex: the index of its column; 0xffffffff for one beside a wall or on the ground's edge,
+    /// which has none.
     pub columns: frz_span,
     /// uint16_t or uint32_t for each corner of each triangle: a vertex. Triangles face up.
     pub indices: frz_span,
@@ -263,6 +272,8 @@ pub(super) struct Wanted {
     size: *mut frz_shallow_size,
     /// Whether minimum heights are wanted.
     pub(super) is_lifted: bool,
+    /// Whether it comes down at ledges.
+    pub(super) is_skirted: bool,
 }
 
 impl Wanted {
@@ -282,7 +293,9 @@ impl Wanted {
             }
             let (layout, flags) = self::layout(layout)?;
             let given = sized(target, frz_shallow_target::NONE)?;
-            Ok(Self { layout, given, size, is_lifted: flags & FRZ_SHALLOW_LIFTED != 0 })
+            let has = |flag: u32| flags & flag != 0;
+            let (is_lifted, is_skirted) = (has(FRZ_SHALLOW_LIFTED), has(FRZ_SHALLOW_SKIRTED));
+            Ok(Self { layout, given, size, is_lifted, is_skirted })
         }
     }
 
@@ -341,7 +354,8 @@ pub unsafe extern "C" fn frz_shallow_layout_init(layout: *mut frz_shallow_layout
 }
 
 /// Reports the most that the surface of any liquid on this ground can have, so that buffers are made once. It holds until the ground
-/// or a body moves. On ground with uneven ceilings it is several times what a liquid comes to.
+/// or a body moves. On ground with uneven ceilings it is several times what a liquid comes to. With FRZ_SHALLOW_SKIRTED what
+/// frz_shallow_find_ledges reports comes on top.
 ///
 /// size: receives it, all zeroes after a failure. Its struct_size is set by the caller.
 ///
@@ -361,7 +375,8 @@ pub unsafe extern "C" fn frz_shallow_surface_bound(
 }
 
 /// Writes the liquid's surface as triangles, in real time (frz_shallow): the wet columns and the dry ones around them. It ends at the
-/// middles of the outermost cells. Vertices come in the order of their columns' indices, those beside walls behind them.
+/// middles of the outermost cells. Vertices come in the order of their columns' indices, those beside walls behind them, and those on the ground's
+/// edges last.
 ///
 /// layout: NULL for the usual one.
 /// target: the buffers. FRZ_ERROR_CAPACITY when one is too small: nothing is written, and size receives what is needed. With all data
@@ -383,8 +398,9 @@ pub unsafe extern "C" fn frz_shallow_surface(
             let wanted = Wanted::new(layout, target, size)?;
             let _call = enter_light(context)?;
             let mut spill = change(shallow)?;
-            let Spill { shallow, surface, velocities, concentrations, lifted, .. } = &mut *spill;
+            let Spill { shallow, surface, velocities, concentrations, lifted, ledges, .. } = &mut *spill;
             let (least, sunk) = if wanted.is_lifted { lifted.current()? } else { Default::default() };
+            let ledges = wanted_ledges(wanted.is_skirted, ledges, "since the ground or a body moved")?;
             for (scalar, numbers) in concentrations.iter_mut().enumerate() {
                 let len = if wanted.scalar(scalar) { shallow.columns().len() } else { 0 };
                 numbers.resize(len, 0.0);
@@ -404,6 +420,7 @@ pub unsafe extern "C" fn frz_shallow_surface(
                 least,
                 sunk,
                 carried: concentrations.each_ref().map(|numbers| &numbers[..]),
+                ledges,
             };
             wanted.write(surface, shallow.columns(), &depths)
         }

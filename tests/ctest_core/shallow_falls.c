@@ -1,4 +1,4 @@
-/* Shallow liquid that falls off a table with a dye: its drops, their mesh, and its scalars; and minimum heights. */
+/* Shallow liquid that falls off a table with a dye: its drops, their mesh, and its scalars; minimum heights, and skirts. */
 #include "shallow.h"
 
 #include <stddef.h>
@@ -276,6 +276,58 @@ static void lifts(frz_context *ctx) {
     frz_shallow_destroy(heights), frz_shallow_destroy(shallow);
 }
 
+/* A film on a slab comes down at the slab's edges. */
+static void skirts(frz_context *ctx) {
+    static sheet ground;
+    static float positions[3 * 8 * SIDE * SIDE];
+    frz_shallow *shallow;
+    frz_shallow_layout layout;
+    frz_shallow_snapshot *snapshot = NULL;
+    frz_shallow_target target;
+    frz_shallow_size size, plain, more;
+    frz_shallow_body slab;
+    const double at[3] = {0, 0.09, 0};
+    double poured = 0;
+    sheet_make(&ground);
+    shallow = on_sheet(ctx, NULL, &ground);
+    memset(&slab, 0, sizeof slab);
+    slab.struct_size = sizeof slab, slab.shape = FRZ_SHALLOW_BOX, slab.at[1] = 0.08;
+    slab.half[0] = 0.03, slab.half[1] = 0.005, slab.half[2] = 0.02;
+    slab.axes[0][0] = slab.axes[1][1] = slab.axes[2][2] = 1;
+    WORKS(frz_shallow_set_bodies(ctx, shallow, &slab, 1, NULL));
+    WORKS(frz_shallow_pour(shallow, at, 0.05, 4 * ML, &poured));
+    CHECK(poured > 3.9 * ML);
+    memset(&target, 0, sizeof target);
+    target.struct_size = sizeof target;
+    size.struct_size = plain.struct_size = more.struct_size = sizeof size;
+    WORKS(frz_shallow_surface(ctx, shallow, NULL, &target, &plain));
+    WORKS(frz_shallow_layout_init(&layout, sizeof layout));
+    layout.flags = FRZ_SHALLOW_SKIRTED;
+    FAILS(frz_shallow_surface(ctx, shallow, &layout, &target, &size), WRONG, "frz_shallow_find_ledges has found no ledges since the ground");
+    WORKS(frz_shallow_find_ledges(ctx, shallow, &more));
+    /* 12 x 8 columns are on the slab. */
+    CHECK(more.vertices == 36 && more.indices == 6 * 36);
+    WORKS(frz_shallow_surface(ctx, shallow, &layout, &target, &size));
+    CHECK(size.vertices == plain.vertices + 36 && size.indices == plain.indices + 6 * 36);
+    target.positions = span_of(positions, (size_t)size.vertices);
+    WORKS(frz_shallow_surface(ctx, shallow, &layout, &target, &size));
+    CHECK(fabsf(positions[3 * size.vertices - 2] - 0.085f) < 1e-5f);
+    CHECK(fabsf(positions[3 * size.vertices - 3] - 0.03f) < 1e-5f && fabsf(positions[3 * size.vertices - 1] - 0.02f) < 1e-5f);
+    WORKS(frz_shallow_snapshot_create(ctx, shallow, &snapshot));
+    slab.at[0] = 0.01;
+    WORKS(frz_shallow_set_bodies(ctx, shallow, &slab, 1, NULL));
+    FAILS(frz_shallow_surface(ctx, shallow, &layout, &target, &size), WRONG, "has found no ledges since the ground");
+    WORKS(frz_shallow_snapshot_surface(ctx, snapshot, &layout, &target, &size));
+    CHECK(size.vertices == plain.vertices + 36);
+    WORKS(frz_shallow_snapshot_take(snapshot, shallow));
+    FAILS(frz_shallow_snapshot_surface(ctx, snapshot, &layout, &target, &size), WRONG, "when the snapshot was taken");
+    more.struct_size = 3;
+    FAILS(frz_shallow_find_ledges(ctx, shallow, &more), FRZ_ERROR_VERSION, "struct_size = 3");
+    WORKS(frz_shallow_find_ledges(ctx, shallow, NULL));
+    frz_shallow_snapshot_destroy(snapshot);
+    frz_shallow_destroy(shallow);
+}
+
 /* Wrong calls are one sentence each, and change nothing. */
 static void misuse(frz_context *ctx) {
     frz_shallow *shallow = table_of(ctx, 0);
@@ -346,6 +398,7 @@ int main(void) {
     states(ctx);
     concentrations(ctx);
     lifts(ctx);
+    skirts(ctx);
     misuse(ctx);
     frz_context_destroy(ctx);
     return 0;

@@ -669,6 +669,12 @@ class Shallow(unittest.TestCase):
         fitted = blood.find_lifts()
         self.assertTrue(fitted.upward > 100 and fitted.discarded < fitted.upward)
         self.assertEqual(len(blood.surface(lifted=True).positions), len(blood.surface().positions))
+        with self.assertRaisesRegex(frazil.Error, "has found no ledges"):
+            blood.surface(skirted=True)
+        most = blood.find_ledges()
+        plain, skirted = blood.surface(), blood.surface(skirted=True)
+        self.assertTrue(0 <= len(skirted.positions) - len(plain.positions) <= most[0])
+        self.assertTrue(0 <= len(skirted.triangles) - len(plain.triangles) <= most[1])
         self.assertAlmostEqual(blood.moved(0), 2e-6, delta=1e-9)
         self.assertTrue(0 < blood.moved(1) <= 0.5e-6 and 0.09e-6 < blood.moved(2) <= 0.1e-6 and 0 < blood.moved(3) < 0.1e-6)
         balance = blood.balance

@@ -113,6 +113,7 @@ mod shallow {
     mod surface_groups;
     mod surface_lifts;
     mod surface_mesh;
+    mod surface_skirts;
     mod terrain;
     mod thickening;
     mod threads;

@@ -113,7 +113,7 @@ impl Inputs {
         };
         let triangles = mesh.as_ref().map(|mesh| mesh.triangles.len());
         let (moving, still) = if shallow.sequence().is_some() { (mesh, None) } else { (None, mesh) };
-        let still = still.filter(|_| shallow.lifts || shallow.staining.is_some());
+        let still = still.filter(|_| shallow.lifts || shallow.skirts || shallow.staining.is_some());
         let attached = moving.as_ref().map(|mesh| attach(ctx, shallow, mesh)).unwrap_or_default();
         if let Some(mesh) = &moving {
             warnings.extend(beside(scene, shallow, mesh, &attached));

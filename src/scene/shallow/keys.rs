@@ -176,6 +176,14 @@ pub const KEYS: &[Key] = &[
     .concerns(OUTPUT),
     Key::new(
         "shallow",
+        "skirts",
+        Kind::Flag,
+        "true: where the ground ends, as at the edges of shelves and holes, the surface goes on to there and comes down to it; false: it ends in the middle of the last cell, open below",
+    )
+    .or("true")
+    .concerns(OUTPUT),
+    Key::new(
+        "shallow",
         "stains",
         Kind::Flag,
         "of a mesh: true: the liquid leaves stains on it, and terrain/terrain.%04d.ply is the terrain (m, Y up) with an array `stain`, 0 to 1, on its vertices",

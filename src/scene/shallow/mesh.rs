@@ -8,6 +8,7 @@ use crate::shallow::Shallow;
 use crate::shallow::falls::Droplet;
 use crate::shallow::falls::mesh::{Balls, Target as BallTarget};
 use crate::shallow::scalars::MOST;
+use crate::shallow::surface::ledges::Ledges;
 use crate::shallow::surface::lifts::{Distance, Lifts};
 use crate::shallow::surface::{Counts, Depths, Indices, Layout, Surface, Target};
 
@@ -22,6 +23,7 @@ pub(super) struct Mesher {
     surface: Surface,
     balls: Balls,
     lifts: Lifts,
+    ledges: Option<Ledges>,
     velocity: Vec<[f32; 2]>,
     concentrations: [Vec<f32>; MOST],
     drops: Vec<Droplet>,
@@ -45,14 +47,24 @@ pub(super) struct Drawn {
 }
 
 impl Mesher {
-    /// Finds minimum heights over the ground; none where it is no mesh.
+    /// Finds minimum heights over the ground, none where it is no mesh, and where it ends, if a shot wants them.
     ///
     /// # Errors
     /// A mesh with a vertex that is not finite.
-    pub fn lift(&mut self, liquid: &Shallow, ground: Option<TriMesh>) -> Result<()> {
-        let Some(ground) = ground else { return Ok(()) };
-        let (positions, triangles) = (&ground.positions, &ground.triangles);
-        self.lifts.find(liquid.columns(), positions, triangles, Distance::default()).map(drop)
+    pub fn fit(&mut self, liquid: &Shallow, ground: Option<TriMesh>, of: &Of) -> Result<()> {
+        let columns = liquid.columns();
+        let ledges = of.skirts.then(|| self.ledges.get_or_insert_default());
+        let Some(TriMesh { positions, triangles }) = &ground else {
+            ledges.into_iter().for_each(|ledges| ledges.find(columns));
+            return Ok(());
+        };
+        if let Some(ledges) = ledges {
+            ledges.fit(columns, positions, triangles)?;
+        }
+        if of.lifts {
+            self.lifts.find(columns, positions, triangles, Distance::default())?;
+        }
+        Ok(())
     }
 
     /// The surface of a liquid that is opaque from a depth on (m).
@@ -60,7 +72,7 @@ impl Mesher {
     /// # Errors
     /// None of a liquid's own columns.
     pub fn draw(&mut self, liquid: &Shallow, opaque_depth: f64) -> Result<Drawn> {
-        let Self { surface, balls, lifts, velocity, concentrations, drops } = self;
+        let Self { surface, balls, lifts, ledges, velocity, concentrations, drops } = self;
         let columns = liquid.columns();
         velocity.clear();
         velocity.extend((0..columns.len()).map(|index| liquid.velocity(index)));
@@ -75,6 +87,7 @@ impl Mesher {
             velocity,
             least: lifts.least(),
             sunk: lifts.sunk(),
+            ledges: ledges.as_ref(),
             carried: concentrations.each_ref().map(|numbers| &numbers[..]),
             ..Depths::default()
         };

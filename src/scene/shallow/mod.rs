@@ -85,6 +85,8 @@ pub struct Shallow {
     pub staining: Option<Staining>,
     /// Whether a terrain that is a mesh does not show through films.
     pub lifts: bool,
+    /// Whether the surface comes down where the ground ends.
+    pub skirts: bool,
     /// Depth from which it is opaque (m).
     pub opaque_depth: f64,
     /// What is written.
@@ -212,6 +214,7 @@ impl Shallow {
                 ..Staining::default()
             }),
             lifts: value("lifts").and_then(Value::flag).unwrap_or(true),
+            skirts: value("skirts").and_then(Value::flag).unwrap_or(true),
             opaque_depth: number("opaque_depth").unwrap_or(0.01),
             output: Files {
                 ply: asked("output.liquid", "ply"),

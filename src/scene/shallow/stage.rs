@@ -80,8 +80,8 @@ impl<'a> Liquid<'a> {
     /// What a frame's files are made from.
     fn written(&self, ctx: &Context, state: &mut State<'a>, to: &To<'_>, made_from: &str) -> Result<Written> {
         let State { course, mesher } = state;
-        if self.of.lifts && std::mem::take(&mut course.is_stirred) {
-            ctx.phase("lifts", || mesher.lift(&course.liquid, course.ground()))?;
+        if std::mem::take(&mut course.is_stirred) {
+            ctx.phase("lifts", || mesher.fit(&course.liquid, course.ground(), self.of))?;
         }
         let liquid = &course.liquid;
         let drawn = ctx.phase("surface", || mesher.draw(liquid, self.of.opaque_depth))?;

@@ -11,7 +11,7 @@ use std::ops::Range;
 use super::active::Active;
 use super::flux::{Step, greater, lesser};
 use crate::base::cpu::dispatch;
-use crate::shallow::columns::{NONE, STRIP, strip_from, strip_of};
+use crate::shallow::columns::{NONE, STRIP, resize_part, strip_from, strip_of};
 use crate::shallow::per_column::{Array, PerColumn};
 
 /// (c dt / dx)^2 of a fast pipe: below 1/2, the bound of stability.
@@ -29,6 +29,8 @@ pub const NORMAL: u32 = 0x3f80_3f80;
 pub struct Fast {
     /// How many times less in the pipes of each column, to the east and to the south ([`packed`]); of rows that have fast pipes.
     light: PerColumn<u32>,
+    /// Strips of those rows where it does.
+    strips: Vec<bool>,
     rows: Vec<bool>,
 }
 
@@ -56,18 +58,20 @@ struct Span<'a> {
 impl Fast {
     /// Nothing is fast.
     pub fn new(columns: usize, rows: usize) -> Self {
-        Self { light: PerColumn::new(Array::Light, columns, packed(1.0, 1.0)), rows: vec![false; rows] }
+        let light = PerColumn::new(Array::Light, columns, packed(1.0, 1.0));
+        Self { light, strips: vec![false; columns / STRIP], rows: vec![false; rows] }
     }
 
     /// Gives a part of the columns another count of indices.
     pub fn resize_part(&mut self, part: Range<usize>, len: usize) {
         self.rows.fill(false);
+        resize_part(&mut self.strips, part.start / STRIP..part.end / STRIP, len / STRIP, false);
         self.light.resize_part(part, len, packed(1.0, 1.0));
     }
 
     /// Memory (bytes).
     pub fn bytes(&self) -> usize {
-        self.light.bytes() + self.rows.len()
+        self.light.bytes() + self.strips.len() + self.rows.len()
     }
 
     /// Whether a row has fast pipes.
@@ -78,6 +82,11 @@ impl Fast {
     /// How many times less inertia counts in the pipes of all columns (`packed`).
     pub fn light(&self) -> &[u32] {
         &self.light
+    }
+
+    /// Of strips in rows with fast pipes, whether they have some.
+    pub fn strips(&self) -> &[bool] {
+        &self.strips
     }
 
     /// Nothing is fast: there is no viscosity.
@@ -125,28 +134,32 @@ fn find_rows(rows: &mut [bool], films: &Films, step: f32, farthest: u32) -> u32 
 
 #[inline(always)]
 fn lighten_rows(fast: &mut Fast, films: &Films, step: &Step) {
-    let Fast { light, rows } = fast;
+    let Fast { light, strips: is_fast, rows } = fast;
     for row in (0..rows.len()).filter(|&row| rows[row]) {
         // Also of strips that wake in this frame.
         let strips = films.active.strips(row);
         light[strips.start * STRIP..strips.end * STRIP].fill(packed(1.0, 1.0));
+        is_fast[strips].fill(false);
         for (first, span) in films.row(row) {
             let light = &mut light[first..first + span.flux[0].len()];
             for (at, light) in light.as_chunks_mut().0.iter_mut().enumerate() {
-                lighten_strip(&span.strip(at), films.drive, step, light);
+                is_fast[first / STRIP + at] = lighten_strip(&span.strip(at), films.drive, step, light);
             }
         }
     }
 }
 
 #[inline(always)]
-fn lighten_strip(strip: &Strip, drive: f32, step: &Step, light: &mut [u32; STRIP]) {
+fn lighten_strip(strip: &Strip, drive: f32, step: &Step, light: &mut [u32; STRIP]) -> bool {
+    let mut any = 0;
     let Strip { depth, east_depth, south_depth, flux: [east, south] } = strip;
     for x in 0..STRIP {
         let [own, to_east, to_south] = [depth[x], east_depth[x], south_depth[x]].map(|depth| depth as f32);
         let east = light_of(drive, step, [own, to_east], east[x]);
         light[x] = packed(east, light_of(drive, step, [own, to_south], south[x]));
+        any |= light[x] ^ NORMAL;
     }
+    any != 0
 }
 
 /// A strip of a span.

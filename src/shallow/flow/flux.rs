@@ -184,6 +184,8 @@ pub struct Row<'a> {
     pub open: [&'a [f32]; 2],
     /// How much less inertia counts to the east and to the south, where it does (`fast::packed`).
     pub light: &'a [u32],
+    /// In which strips it does.
+    pub is_light: &'a [bool],
 }
 
 /// What the pipes of a span carry, to the east and to the south.
@@ -211,7 +213,8 @@ pub fn flux_row<K: Kind, const LIGHT: bool, const RESTS: bool>(
         let first = strip * STRIP;
         let base = strip_of(row.base, strip);
         let depth = strip_of(row.depth, strip);
-        let light = if LIGHT { strip_of(row.light, strip) } else { &[0; STRIP] };
+        let is_light = LIGHT && row.is_light[strip];
+        let light = if is_light { strip_of(row.light, strip) } else { &[0; STRIP] };
         let ends = Ends {
             base: [base, strip_from(row.base, first + 1)],
             depth: [depth, strip_from(row.depth, first + 1)],
@@ -220,7 +223,11 @@ pub fn flux_row<K: Kind, const LIGHT: bool, const RESTS: bool>(
         };
         let (flux, left, to) =
             (strip_mut(east, strip), strip_mut(left_east, strip), strip_mut(to_east, strip));
-        flux_strip::<K, LIGHT, RESTS, 0>(step, &ends, flux, left, to, &mut held);
+        if is_light {
+            flux_strip::<K, true, RESTS, 0>(step, &ends, flux, left, to, &mut held);
+        } else {
+            flux_strip::<K, false, RESTS, 0>(step, &ends, flux, left, to, &mut held);
+        }
         let ends = Ends {
             base: [base, strip_of(row.south_base, strip)],
             depth: [depth, strip_of(row.south_depth, strip)],
@@ -229,7 +236,11 @@ pub fn flux_row<K: Kind, const LIGHT: bool, const RESTS: bool>(
         };
         let (flux, left, to) =
             (strip_mut(south, strip), strip_mut(left_south, strip), strip_mut(to_south, strip));
-        flux_strip::<K, LIGHT, RESTS, 1>(step, &ends, flux, left, to, &mut held);
+        if is_light {
+            flux_strip::<K, true, RESTS, 1>(step, &ends, flux, left, to, &mut held);
+        } else {
+            flux_strip::<K, false, RESTS, 1>(step, &ends, flux, left, to, &mut held);
+        }
     }
     LIGHT && held != [0; STRIP]
 }

@@ -206,6 +206,7 @@ impl Rows {
                     south_depth,
                     open: [&pipes.east[first..], &pipes.south[first..]],
                     light: &light[first..],
+                    is_light: &fast.strips()[first / STRIP..],
                 };
                 let (mine, at) = (mine..mine + len, at..at + len);
                 let carried = Carried {

@@ -73,7 +73,7 @@ impl Pattern {
     }
 }
 
-/// Writes all triangles; `flipped`: clockwise seen from above.
+/// Writes all triangles but those of skirts; `flipped`: clockwise seen from above. Returns the count of their indices.
 pub(super) fn write_triangles(
     scene: Scene<'_>,
     found: &Found,
@@ -81,16 +81,16 @@ pub(super) fn write_triangles(
     search: &Search,
     flipped: bool,
     out: &mut Indices<'_>,
-) {
+) -> usize {
     match out {
-        Indices::None => {}
+        Indices::None => 0,
         Indices::U16(out) => {
             let done = write_full_u16(found, flipped, out);
-            write_odd(scene, found, walls, search, flipped, &mut out[done..]);
+            done + write_odd(scene, found, walls, search, flipped, &mut out[done..])
         }
         Indices::U32(out) => {
             let done = write_full_u32(found, flipped, out);
-            write_odd(scene, found, walls, search, flipped, &mut out[done..]);
+            done + write_odd(scene, found, walls, search, flipped, &mut out[done..])
         }
     }
 }
@@ -146,7 +146,7 @@ fn runs(places: u16) -> impl Iterator<Item = Range<usize>> {
     })
 }
 
-/// Writes the triangles of odd quartets.
+/// Writes the triangles of odd quartets and returns the count of indices.
 fn write_odd<I: Index>(
     scene: Scene<'_>,
     found: &Found,
@@ -154,7 +154,8 @@ fn write_odd<I: Index>(
     search: &Search,
     flipped: bool,
     out: &mut [I],
-) {
+) -> usize {
+    let mut count = 0;
     let mut out = out.as_chunks_mut::<3>().0.iter_mut();
     let vertex = |id: u32| match (id as usize).checked_sub(scene.columns.len()) {
         Some(extra) => walls[extra].vertex,
@@ -164,8 +165,10 @@ fn write_odd<I: Index>(
         let [a, b, c] = corners.map(|id| I::from_vertex(vertex(id)));
         if let Some(out) = out.next() {
             *out = if flipped { [a, c, b] } else { [a, b, c] };
+            count += 3;
         }
     });
+    count
 }
 
 #[cfg(test)]

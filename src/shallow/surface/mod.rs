@@ -28,11 +28,13 @@ mod check;
 mod full;
 mod groups;
 mod indices;
+pub mod ledges;
 pub mod lifts;
 mod links;
 mod normals;
 mod room;
 mod shown;
+mod skirts;
 mod strips;
 mod vertices;
 mod walled;
@@ -43,9 +45,11 @@ use crate::error::{Error, Result};
 use boundary::{Around, Walls};
 pub use check::{Check, check};
 use groups::Search;
+use ledges::Ledges;
 use links::Scene;
 use normals::Normals;
 pub use room::bound;
+use skirts::Skirts;
 use strips::Found;
 use vertices::Vertices;
 
@@ -66,6 +70,8 @@ pub struct Depths<'a> {
     pub sunk: &'a [i32],
     /// A number of each index for each array of [`Target::carried`]: concentrations of scalars. May be empty.
     pub carried: [&'a [f32]; MOST],
+    /// Where the surface ends over nothing, and comes down to the ground's edge; without them it ends in the middle of the last cell.
+    pub ledges: Option<&'a Ledges>,
 }
 
 /// The axis that points up.
@@ -165,6 +171,7 @@ pub struct Surface {
     above: Vec<u32>,
     found: Found,
     walls: Walls,
+    skirts: Skirts,
     search: Search,
     normals: Normals,
     around: Around,
@@ -222,6 +229,9 @@ impl Surface {
                 "{count} flags of activity are not one for each of {strips} strips"
             )));
         }
+        if depths.ledges.is_some_and(|ledges| ledges.columns != len) {
+            return Err(Error::argument("the ledges are those of other columns"));
+        }
         if self.above.len() != len / STRIP {
             links::find_above(columns, &mut self.above);
         }
@@ -235,10 +245,12 @@ impl Surface {
         let columns_used = self.found.number(columns);
         let extras = self.walls.number(columns_used);
         self.found.has_means |= extras > 0;
+        let vertices = columns_used + extras;
+        let [hems, skirts] = self.skirts.find(scene, &self.found, depths.ledges, vertices);
         Ok(Counts {
-            vertices: (columns_used + extras) as usize,
+            vertices: vertices as usize + hems,
             extras: extras as usize,
-            indices: 3 * triangles,
+            indices: 3 * triangles + skirts,
         })
     }
 
@@ -266,13 +278,15 @@ impl Surface {
         let counts = self.count(columns, depths)?;
         target.check(&counts)?;
         let scene = Scene { columns, depth: depths.depth, above: &self.above };
-        let (found, walls) = (&self.found, &self.walls.list);
-        indices::write_triangles(scene, found, walls, &self.search, layout.left_handed, &mut target.indices);
+        let (found, walls, flipped) = (&self.found, &self.walls.list, layout.left_handed);
+        let at = indices::write_triangles(scene, found, walls, &self.search, flipped, &mut target.indices);
+        self.skirts.write_triangles(depths.ledges, found, at, flipped, &mut target.indices);
         self.normals.reset(columns);
         shown::find_heights(columns, found, depths, layout, &mut self.heights);
         let vertices =
             Vertices::new(scene, found, walls, &self.heights, depths, layout, target.normals.is_some());
         vertices.write(&mut self.normals, &mut self.around, target);
+        self.skirts.write_hems(depths.ledges, &vertices, target);
         self.normals.clear(found);
         Ok(counts)
     }

@@ -55,20 +55,44 @@ fn find_strips(columns: &Columns, found: &Found, rule: &Rule<'_>, heights: &mut 
     let (bases, unders) = (columns.bases(), columns.unders());
     for span in &found.spans {
         for strip in span.first..span.first + span.len {
+            let (base, depth) = (strip_of(bases, strip), strip_of(rule.depth, strip));
+            let out = strip_mut(heights, strip);
+            if found.states[strip].wet == u16::MAX && are_over(depth, rule.fade) {
+                match rule.least_of {
+                    [] => find_full(base, depth, &[rule.least; STRIP], out),
+                    least => find_full(base, depth, strip_of(least, strip), out),
+                }
+                continue;
+            }
             let of = |numbers: &[i32]| {
                 if numbers.is_empty() { [rule.least; STRIP] } else { *strip_of(numbers, strip) }
             };
-            let (base, under, depth) =
-                (strip_of(bases, strip), strip_of(unders, strip), strip_of(rule.depth, strip));
             let (least, sunk) = (of(rule.least_of), of(rule.sunk_of));
-            let out = strip_mut(heights, strip);
+            let columns = [base, strip_of(unders, strip), depth, &least, &sunk];
             if rule.fade > 0 {
-                let ends = [rule.fade as f32, rule.per_fade];
-                find_strip::<true>([base, under, depth, &least, &sunk], ends, out);
+                find_strip::<true>(columns, [rule.fade as f32, rule.per_fade], out);
             } else {
-                find_strip::<false>([base, under, depth, &least, &sunk], [0.0; 2], out);
+                find_strip::<false>(columns, [0.0; 2], out);
             }
         }
+    }
+}
+
+/// Whether all depths of a strip are at least so great.
+#[inline(always)]
+fn are_over(depth: &[i32; STRIP], least: i32) -> bool {
+    let mut under = [0; STRIP];
+    for place in 0..STRIP {
+        under[place] = i32::from(depth[place] < least);
+    }
+    under == [0; STRIP]
+}
+
+/// Finds the heights of a strip whose columns are all at their full height.
+#[inline(always)]
+fn find_full(base: &[i32; STRIP], depth: &[i32; STRIP], least: &[i32; STRIP], out: &mut [i32; STRIP]) {
+    for place in 0..STRIP {
+        out[place] = base[place].wrapping_add(depth[place].max(least[place]));
     }
 }
 

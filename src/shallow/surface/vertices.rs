@@ -3,6 +3,7 @@
 use std::ops::Range;
 
 use super::boundary::{Around, Wall, walls_of};
+use super::ledges::Hem;
 use super::links::Scene;
 use super::normals::{Normals, Shown, upright};
 use super::strips::{Found, Span};
@@ -27,6 +28,9 @@ pub(super) struct Vertices<'a> {
     /// Height of 0, and of a unit; centre of cell (0, 0), and edge of a cell (m x scale).
     low: f32,
     unit: f32,
+    /// The caller's units in a metre, and how far hems are below the ground (units).
+    scale: f32,
+    least: i32,
     origin: [f32; 2],
     cell: f32,
     /// Speed at the surface (m/s x scale) over the mean speed (m/s); opacity of a unit.
@@ -78,6 +82,8 @@ impl<'a> Vertices<'a> {
             sign: if layout.left_handed == (layout.up == Up::Y) { -1.0 } else { 1.0 },
             low: (heights.low * scale) as f32,
             unit: (heights.unit * scale) as f32,
+            scale: scale as f32,
+            least: (layout.least_depth / heights.unit).min(f64::from(i32::MAX / 2)) as i32,
             origin: grid.centre([0, 0]).map(|centre| (centre * scale) as f32),
             cell: (grid.cell * scale) as f32,
             speed: SURFACE_SPEED * scale as f32,
@@ -196,6 +202,39 @@ impl<'a> Vertices<'a> {
         if let Some(out) = &mut target.columns {
             out[at] = vertex.column;
         }
+    }
+
+    /// Writes a vertex where the surface of a column comes down to the ground's edge.
+    pub fn put_hem(&self, at: usize, hem: &Hem, target: &mut Target<'_>) {
+        let columns = self.shown.scene.columns;
+        let index = hem.column as usize;
+        let [x, z] = columns.cell(index);
+        let [along, across] = hem.offset();
+        let rise = hem.rise * self.scale / self.unit;
+        let ground = columns.bases()[index].wrapping_sub(self.least) as f32 + rise;
+        let height = self.height(ground.max(columns.unders()[index] as f32));
+        let fall = self.height(self.shown.heights[index] as f32) - height;
+        let width = (along * along + across * across).sqrt();
+        let mut normal = [0.0, 1.0, 0.0];
+        if width > 0.0 {
+            let (out, up) = (fall / width, self.cell * width);
+            let length = ((along * along + across * across) * (out * out) + up * up).sqrt();
+            normal = [along * out / length, up / length, across * out / length];
+        }
+        let vertex = Vertex {
+            position: [
+                self.centre(0, x as i32) + along * self.cell,
+                height,
+                self.centre(1, z as i32) + across * self.cell,
+            ],
+            normal,
+            velocity: self.velocity.get(index).copied().unwrap_or_default(),
+            carried: self.carried(index),
+            depth: 0,
+            layer: columns.layer(index) as u32,
+            column: NONE,
+        };
+        self.put(at, &vertex, target);
     }
 
     /// Axes in the caller's order.

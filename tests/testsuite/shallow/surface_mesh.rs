@@ -50,7 +50,11 @@ pub struct Mesh {
 }
 
 pub fn build_with(surface: &mut Surface, columns: &Columns, liquid: &Depths<'_>, layout: &Layout) -> Mesh {
-    let most = bound(columns);
+    let mut most = bound(columns);
+    if let Some(ledges) = liquid.ledges {
+        most.vertices += ledges.bound().vertices;
+        most.indices += ledges.bound().indices;
+    }
     let mut vectors = [(); 3].map(|()| vec![f32::NAN; 3 * most.vertices]);
     let mut numbers = [(); 2].map(|()| vec![f32::NAN; most.vertices]);
     let mut labels = [(); 2].map(|()| vec![77; most.vertices]);
