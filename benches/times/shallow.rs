@@ -171,11 +171,12 @@ fn films() {
         "Blood, 1 ml/s for 3 s on an incline of 35 % of 200 x 200 cells of 0.5 mm, which it runs off: by the steps.",
         "steps | steps a frame | deepest at the end (mm) | on the incline at the end (ml) | a frame (ms) | rows held back a frame",
     );
-    for (name, pace) in [("exact", Pace::Exact), ("1 ms", Pace::Realtime(1e-3)), ("3 ms", Pace::Realtime(3e-3))] {
+    for (name, pace) in
+        [("exact", Pace::Exact), ("1 ms", Pace::Realtime(1e-3)), ("3 ms", Pace::Realtime(3e-3))]
+    {
         let (cell, edge) = (0.0005, 200);
         let solids = ground([edge; 2], cell, [-0.05, 0.1], |[x, _]| 0.03 - SLOPE * x);
-        let params =
-            Params { liquid: Liquid::BLOOD, pace, border: Border::Absorbing, ..Params::default() };
+        let params = Params { liquid: Liquid::BLOOD, pace, border: Border::Absorbing, ..Params::default() };
         let (ctx, mut liquid) = (context(), Shallow::new(&context(), &solids, params).expect("a liquid"));
         let top = source([-0.04, 0.1, 0.0], 0.003, 1e-6);
         liquid.set_flows(&[top], |_| "the source".into()).expect("a source");
