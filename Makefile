@@ -55,10 +55,13 @@ demo: setup
 	target/release/frazil preview $(DEMO)/spill --frame 301 -o $(DEMO)/spill.png --size 640x480 --eye=0.13,0.14,0.17 --target 0,0.008,0 --fov 30
 	target/release/frazil preview $(DEMO)/spill -o $(DEMO)/spill.gif --size 320x240 --eye=0.13,0.14,0.17 --target 0,0.008,0 --fov 30
 	target/release/frazil shallow examples/scenes/spill_falls.toml -o $(DEMO)/falls --frames 121
-	target/release/frazil preview $(DEMO)/falls --frame 121 --color milk -o $(DEMO)/falls.png --size 640x480 --eye=0.13,0.11,0.17 --target 0,0.016,0 --fov 30
+	target/release/frazil preview $(DEMO)/falls --frame 121 --tint milk=milk -o $(DEMO)/falls.png --size 640x480 --eye=0.13,0.11,0.17 --target 0,0.016,0 --fov 30
 	target/release/frazil shallow examples/scenes/spill_incline.toml -o $(DEMO)/incline --frames 181
 	target/release/frazil preview $(DEMO)/incline --frame 181 -o $(DEMO)/incline.png --size 480x360 --eye=0.1,0.16,0.13 --target 0,-0.008,0 --fov 38 --sun=-60,35
-	@echo "Pictures: $(DEMO)/hero.png $(DEMO)/hero.gif (base layer, grains and mist) $(DEMO)/walker.png $(DEMO)/print.png $(DEMO)/box.png $(DEMO)/cube.png $(DEMO)/ball.png $(DEMO)/plough.png (grains) $(DEMO)/liquid.png $(DEMO)/liquid.gif (a mesh that followed a liquid; beside it $(DEMO)/liquid_plain.png, the particles surfaced anew, and $(DEMO)/liquid_particles.png) $(DEMO)/drip.png (a mesh whose liquid pinches off and merges; beside it $(DEMO)/drip_plain.png) $(DEMO)/spill.png $(DEMO)/spill.gif $(DEMO)/incline.png (a little blood on shelves and down an incline) $(DEMO)/falls.png (milk that falls into water); volumes: $(DEMO)/hero/base/*.vdb; the whole shot: $(DEMO)/hero/shot.usda"
+	target/release/frazil shallow examples/scenes/spill_bone.toml -o $(DEMO)/bone --frames 1-481x60
+	target/release/frazil preview $(DEMO)/bone --frame 301 --tint blood=blood -o $(DEMO)/bone.png --size 480x360 --eye=0.06,0.075,0.125 --target 0.006,0.014,0 --fov 30 --sun=-45,38
+	target/release/frazil preview $(DEMO)/bone --tint blood=blood -o $(DEMO)/bone.gif --size 200x150 --eye=0.06,0.075,0.125 --target 0.006,0.014,0 --fov 30 --sun=-45,38
+	@echo "Pictures: $(DEMO)/hero.png $(DEMO)/hero.gif (base layer, grains and mist) $(DEMO)/walker.png $(DEMO)/print.png $(DEMO)/box.png $(DEMO)/cube.png $(DEMO)/ball.png $(DEMO)/plough.png (grains) $(DEMO)/liquid.png $(DEMO)/liquid.gif (a mesh that followed a liquid; beside it $(DEMO)/liquid_plain.png, the particles surfaced anew, and $(DEMO)/liquid_particles.png) $(DEMO)/drip.png (a mesh whose liquid pinches off and merges; beside it $(DEMO)/drip_plain.png) $(DEMO)/spill.png $(DEMO)/spill.gif $(DEMO)/incline.png (a little blood on shelves and down an incline) $(DEMO)/falls.png (milk that falls into water) $(DEMO)/bone.png $(DEMO)/bone.gif (a bone that bleeds and is rinsed); volumes: $(DEMO)/hero/base/*.vdb; the whole shot: $(DEMO)/hero/shot.usda"
 
 lint:
 	@if cargo fmt --version >/dev/null 2>&1; then cargo fmt --all --check; else echo "lint: rustfmt is not installed, skipped"; fi

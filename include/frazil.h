@@ -2137,7 +2137,7 @@ typedef struct {
      */
     double falls_interval;
     /**
-     * Least volume of a drop (m3), 0 or more; 6.5e-11, a ball of half a millimetre, is usual.
+     * Volume of a drop (m3), 0 or more; 6.5e-11, a ball of half a millimetre, is usual. Where it takes longer than 8 intervals liquid drips.
      */
     double falls_drop;
     /**

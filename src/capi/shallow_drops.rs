@@ -40,7 +40,8 @@ unsafe impl Plain for frz_shallow_drop {}
 
 impl From<Droplet> for frz_shallow_drop {
     fn from(drop: Droplet) -> Self {
-        let Droplet { position, velocity, volume, radius, age, source, number, concentrations } = drop;
+        let Droplet { position, velocity, volume, radius, age, source, number, concentrations, lip: _ } =
+            drop;
         Self { position, velocity, volume, radius, age, source, number, concentrations }
     }
 }

@@ -139,7 +139,7 @@ pub struct frz_shallow_params {
     pub falls_height: f64,
     /// Time between the drops that leave one place (s), 0.0001 to 1; 1/120 is usual.
     pub falls_interval: f64,
-    /// Least volume of a drop (m3), 0 or more; 6.5e-11, a ball of half a millimetre, is usual.
+    /// Volume of a drop (m3), 0 or more; 6.5e-11, a ball of half a millimetre, is usual. Where it takes longer than 8 intervals liquid drips.
     pub falls_drop: f64,
     /// Most drops in the air, up to 1048576, for which there is room from the beginning; 8192 will do. 0, as is usual: nothing falls freely, and
     /// what goes over an edge is below at once.

@@ -59,6 +59,11 @@ impl Model {
         Self { colours: Some(colours.collect()), ..self }
     }
 
+    /// With a colour of each vertex (linear red, green, blue, 0 to 1).
+    pub fn painted(self, colours: Vec<[f32; 3]>) -> Self {
+        Self { colours: Some(colours), ..self }
+    }
+
     /// Its least and greatest corner (m); none when it is empty.
     pub fn bounds(&self) -> Option<(DVec3, DVec3)> {
         bounds_of(&self.mesh)

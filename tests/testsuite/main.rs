@@ -103,6 +103,7 @@ mod shallow {
     mod detail_surface;
     mod falls;
     mod falls_scalars;
+    mod falls_threads;
     mod flooded;
     mod flow;
     mod loads;

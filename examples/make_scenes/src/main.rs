@@ -13,6 +13,7 @@ mod common {
 }
 mod drip;
 mod spills;
+mod stages;
 
 use std::fmt::Write;
 use std::path::Path;
@@ -45,6 +46,7 @@ fn main() -> frazil::Result<()> {
     // Some 6,000 particles under 50,000 triangles.
     drip::write(folder)?;
     spills::write(folder)?;
+    stages::write(folder)?;
     for (name, text) in [
         ("hero", hero()),
         ("walker", walker()),

@@ -12,26 +12,27 @@ pub fn write(folder: &Path) -> frazil::Result<()> {
     mesh::write(&folder.join("bowl.obj"), &bowl())
 }
 
-/// A sheet over a square around the origin, of an edge (m), of so many points along each.
-fn sheet(edge: f32, points: u32, height: impl Fn(f32, f32) -> f32) -> TriMesh {
+/// A sheet over a rectangle around the origin, of edges (m), of so many points along each.
+pub fn sheet(edges: [f32; 2], points: [u32; 2], height: impl Fn(f32, f32) -> f32) -> TriMesh {
+    let [nx, nz] = points;
     let place = |index: u32| {
-        let [x, z] =
-            [index % points, index / points].map(|at| edge * (at as f32 / (points - 1) as f32 - 0.5));
+        let at = [index % nx, index / nx];
+        let [x, z] = [0, 1].map(|n| edges[n] * (at[n] as f32 / (points[n] - 1) as f32 - 0.5));
         Vec3::new(x, height(x, z), z)
     };
-    let is_square = |index: &u32| index % points + 1 < points && index / points + 1 < points;
+    let is_square = |index: &u32| index % nx + 1 < nx && index / nx + 1 < nz;
     let square = |index: u32| {
-        let [a, b, c, d] = [index, index + points, index + points + 1, index + 1];
+        let [a, b, c, d] = [index, index + nx, index + nx + 1, index + 1];
         [[a, b, c], [a, c, d]]
     };
-    let triangles = (0..points * points).filter(is_square).flat_map(square).collect();
-    TriMesh { positions: (0..points * points).map(place).collect(), triangles }
+    let triangles = (0..nx * nz).filter(is_square).flat_map(square).collect();
+    TriMesh { positions: (0..nx * nz).map(place).collect(), triangles }
 }
 
 /// 10 x 10 cm that fall by 35 % along x, with low bumps that part the liquid.
 fn incline() -> TriMesh {
     let sine = |phase: f32| libm::sinf(phase);
-    sheet(0.1, 201, |x, z| {
+    sheet([0.1; 2], [201; 2], |x, z| {
         let bumps = sine(150.0 * x + 1.0) * sine(170.0 * z) + 0.6 * sine(310.0 * z + 90.0 * x);
         -0.35 * x + 0.0006 * bumps
     })
@@ -39,7 +40,7 @@ fn incline() -> TriMesh {
 
 /// 6.4 cm wide, 2 cm deep, with a rim.
 fn bowl() -> TriMesh {
-    sheet(0.08, 161, |x, z| {
+    sheet([0.08; 2], [161; 2], |x, z| {
         let from_middle = (x * x + z * z).sqrt();
         let inside = 20.0 * from_middle * from_middle;
         // Outside it falls a little.
@@ -53,15 +54,15 @@ fn shelves() -> TriMesh {
     let mut put = |low: [f32; 3], high: [f32; 3]| mesh.append(&TriMesh::cuboid(low, high));
     // The basin, and its walls.
     put([-0.05, 0.0, -0.05], [0.05, 0.004, 0.05]);
-    for [x0, x1, z0, z1] in walls(0.05, 0.003) {
+    for [x0, x1, z0, z1] in walls([0.05; 2], 0.003) {
         put([x0, 0.0, z0], [x1, 0.012, z1]);
     }
     // The platform around its hole, whose corners are pillars' heads, and its rim.
     let (outer, hole) = (0.032, 0.011);
-    for [x0, x1, z0, z1] in walls(outer, outer - hole) {
+    for [x0, x1, z0, z1] in walls([outer; 2], outer - hole) {
         put([x0, 0.020, z0], [x1, 0.023, z1]);
     }
-    for [x0, x1, z0, z1] in walls(outer, 0.002) {
+    for [x0, x1, z0, z1] in walls([outer; 2], 0.002) {
         put([x0, 0.020, z0], [x1, 0.026, z1]);
     }
     // It tilts nowhere: liquid falls through the hole, or over the rim where that is cut.
@@ -76,13 +77,13 @@ fn shelves() -> TriMesh {
     mesh
 }
 
-/// Four boxes, seen from above, that make a wall of a thickness along the inside of a square: x0, x1, z0, z1.
-fn walls(half: f32, thick: f32) -> [[f32; 4]; 4] {
-    let inner = half - thick;
+/// Four boxes, seen from above, that make a wall of a thickness along the inside of a rectangle: x0, x1, z0, z1.
+pub fn walls([x, z]: [f32; 2], thick: f32) -> [[f32; 4]; 4] {
+    let [inner_x, inner_z] = [x, z].map(|half| half - thick);
     [
-        [-half, half, -half, -inner],
-        [-half, half, inner, half],
-        [-half, -inner, -inner, inner],
-        [inner, half, -inner, inner],
+        [-x, x, -z, -inner_z],
+        [-x, x, inner_z, z],
+        [-x, -inner_x, -inner_z, inner_z],
+        [inner_x, x, -inner_z, inner_z],
     ]
 }

@@ -9,6 +9,7 @@ use frazil::vdb::level_set;
 use frazil::{Context, Error, Result};
 
 use super::sources::{Part, Wet};
+use super::tint::Tint;
 use crate::cli::exit::Failure;
 
 /// The colour of meshes (linear red, green, blue): leather, which snow is seen beside.
@@ -16,6 +17,10 @@ const BROWN: [f32; 3] = [0.35, 0.16, 0.08];
 /// The colours of the ground below a liquid, pale stone, and of what stands or moves in it, steel.
 const STONE: [f32; 3] = [0.58, 0.54, 0.47];
 const STEEL: [f32; 3] = [0.24, 0.26, 0.29];
+/// How much of a liquid's colour a stain takes.
+const STAINED: f64 = 0.6;
+/// The colour of meshes that stand in a liquid, linen.
+const LINEN: [f32; 3] = [0.78, 0.76, 0.70];
 /// The colour of the lines in which a cut meets meshes.
 const INK: [f32; 3] = [0.0; 3];
 
@@ -29,6 +34,8 @@ pub struct Look {
     pub light: Option<Light>,
     /// The attribute that colours points and meshes.
     pub color: Option<String>,
+    /// The scalar that tints liquids, and what it looks like.
+    pub tint: Option<Tint>,
     /// The plane that is drawn in place of the whole.
     pub cut: Option<Plane>,
     /// Extinction (1/m) of a fog of density 1 whose file does not say it.
@@ -41,6 +48,8 @@ pub struct Drawing {
     content: Content,
     /// Whether anything in it has what `--color` asks for.
     has_colors: bool,
+    /// Whether a liquid in it is tinted.
+    has_tint: bool,
     /// Why nothing may be seen of it: a fog without density, points that a cut leaves out.
     hollow: Option<String>,
 }
@@ -70,7 +79,7 @@ impl Look {
             return cut(ctx, parts, plane);
         }
         let (mut models, mut clouds, mut fogs, mut hollow) = (Vec::new(), Vec::new(), Vec::new(), None);
-        let mut has_colors = false;
+        let (mut has_colors, mut has_tint) = (false, false);
         for part in parts {
             match part {
                 Part::Mesh(detailed) => {
@@ -90,13 +99,28 @@ impl Look {
                     let alpha =
                         detailed.of_vertices("alpha").unwrap_or_else(|| vec![1.0; mesh.positions.len()]);
                     let alpha = alpha.iter().map(|opacity| *opacity as f32).collect();
-                    models.push(match numbers {
-                        Some(numbers) => Model::mesh(mesh, wet.colour()).coloured(&numbers),
-                        None => Model::liquid(mesh, wet.colour(), alpha),
+                    let tinted = self.tint.as_ref().and_then(|tint| tint.of(&detailed));
+                    has_tint |= tinted.is_some();
+                    models.push(match (numbers, tinted) {
+                        (Some(numbers), _) => Model::mesh(mesh, wet.colour()).coloured(&numbers),
+                        (None, Some((colours, alpha))) => {
+                            Model::liquid(mesh, wet.colour(), alpha).painted(colours)
+                        }
+                        (None, None) => Model::liquid(mesh, wet.colour(), alpha),
                     });
                 }
-                Part::Ground(mesh) => models.push(Model::mesh(&mesh, STONE)),
+                Part::Ground(mesh, stains, wet) => {
+                    let model = Model::mesh(&mesh, STONE);
+                    let stained = stains.len() == mesh.positions.len();
+                    let stain = |share: &f64| mix(STONE, wet.colour(), STAINED * share.clamp(0.0, 1.0));
+                    models.push(if stained {
+                        model.painted(stains.iter().map(stain).collect())
+                    } else {
+                        model
+                    });
+                }
                 Part::Obstacle(mesh) => models.push(Model::mesh(&mesh, STEEL)),
+                Part::Cloth(mesh) => models.push(Model::mesh(&mesh, LINEN)),
                 Part::Points(path, points) => {
                     let cloud = Cloud::new(&points, self.color.as_deref());
                     clouds.push(cloud.map_err(|error| Error::file(path, error.to_string()))?);
@@ -122,7 +146,7 @@ impl Look {
         }
         has_colors |= !clouds.is_empty();
         let models = Models::new(models).with_clouds(clouds).with_fogs(fogs);
-        Ok(Drawing { content: Content::Models(models), has_colors, hollow })
+        Ok(Drawing { content: Content::Models(models), has_colors, has_tint, hollow })
     }
 
     /// The camera and the light that were chosen, or those that show all drawings as wholes.
@@ -134,6 +158,11 @@ impl Look {
         {
             let what =
                 format!("--color {name}: no points are drawn, and no mesh has such an array of its vertices");
+            return Err(Failure::refused(what));
+        }
+        if let Some(tint) = self.tint.as_ref().filter(|_| drawings.iter().all(|drawing| !drawing.has_tint)) {
+            let name = &tint.name;
+            let what = format!("--tint {name}: no liquid is drawn that has arrays {name} and depth");
             return Err(Failure::refused(what));
         }
         let boxes = drawings.iter().filter_map(|drawing| drawing.content.bounds());
@@ -165,7 +194,9 @@ fn cut(ctx: &Context, parts: Vec<Part>, plane: Plane) -> Result<Drawing> {
     for part in parts {
         match part {
             Part::Mesh(detailed) | Part::Liquid(detailed, _) => cut = cut.with_surface(&detailed.mesh, INK),
-            Part::Ground(mesh) | Part::Obstacle(mesh) => cut = cut.with_surface(&mesh, INK),
+            Part::Ground(mesh, ..) | Part::Obstacle(mesh) | Part::Cloth(mesh) => {
+                cut = cut.with_surface(&mesh, INK)
+            }
             Part::Points(path, _) => {
                 let what = format!("{}: points are left out of a cut", path.display());
                 log::info!("{what}");
@@ -183,17 +214,48 @@ fn cut(ctx: &Context, parts: Vec<Part>, plane: Plane) -> Result<Drawing> {
     if let Some([low, high]) = cut.range() {
         log::info!("the colours of the cut go from {low}, dark blue, to {high}, pale yellow");
     }
-    Ok(Drawing { content: Content::Cut(cut), has_colors: false, hollow })
+    Ok(Drawing { content: Content::Cut(cut), has_colors: false, has_tint: false, hollow })
+}
+
+/// A colour between two.
+fn mix(from: [f32; 3], to: [f32; 3], share: f64) -> [f32; 3] {
+    [0, 1, 2].map(|n| from[n] + share as f32 * (to[n] - from[n]))
 }
 
 impl Wet {
     /// Its colour (linear red, green, blue).
-    fn colour(self) -> [f32; 3] {
+    pub fn colour(self) -> [f32; 3] {
         match self {
             Self::Water => [0.02, 0.16, 0.20],
             Self::Blood => [0.30, 0.008, 0.006],
             Self::Paint => [0.05, 0.20, 0.60],
             Self::Honey => [0.70, 0.32, 0.02],
+            Self::Milk => [0.86, 0.84, 0.78],
+            Self::Coffee => [0.045, 0.013, 0.004],
+        }
+    }
+
+    /// The depth in which it takes 63 % of the light (m).
+    pub fn depth(self) -> f64 {
+        match self {
+            Self::Water => 0.05,
+            Self::Blood => 0.0004,
+            Self::Paint => 0.0002,
+            Self::Honey => 0.012,
+            Self::Milk => 0.0004,
+            Self::Coffee => 0.0012,
+        }
+    }
+
+    /// What it is called.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Water => "water",
+            Self::Blood => "blood",
+            Self::Paint => "paint",
+            Self::Honey => "honey",
+            Self::Milk => "milk",
+            Self::Coffee => "coffee",
         }
     }
 }

@@ -7,6 +7,7 @@ mod in_order;
 mod shot;
 mod sources;
 mod spill;
+mod tint;
 
 use std::path::{Path, PathBuf};
 
@@ -23,6 +24,7 @@ use super::{options, output};
 use drawing::Look;
 use flipbook::Flipbook;
 use sources::Sources;
+use tint::Tint;
 
 /// Draw meshes, level sets, points, fog or frames of a shot: a PNG, or a flipbook.
 #[derive(clap::Args)]
@@ -47,10 +49,13 @@ pub struct Args {
     /// Attribute that gives points, and vertices of a mesh, their colours, from dark blue to pale yellow over its values.
     #[arg(long, value_name = "NAME")]
     color: Option<String>,
+    /// Scalar that tints a liquid, from clear water at 0 to blood, paint, honey, milk or coffee at 1.
+    #[arg(long, value_name = "NAME=LIQUID", conflicts_with = "color")]
+    tint: Option<Tint>,
     /// Draw a plane across an axis at a place (m), seen from the axis' end, in place of the whole: the first grid in colours from
     /// dark blue to pale yellow, of a level set from the inner end of its narrow band to the outer, of any other from the least of
     /// its values and 0 to the greatest (-v prints both), level sets as white lines and meshes as black ones; points are left out.
-    #[arg(long, value_name = "AXIS=M", value_parser = plane, conflicts_with_all = ["color", "sun", "fog_density"])]
+    #[arg(long, value_name = "AXIS=M", value_parser = plane, conflicts_with_all = ["color", "tint", "sun", "fog_density"])]
     cut: Option<Plane>,
     /// Clip that characters play [default: they are at rest, or play their only clip with --frame].
     #[arg(long, value_name = "NAME")]
@@ -165,7 +170,8 @@ impl Args {
         }
         let light = self.sun.map(|(azimuth, elevation)| Light::from_degrees(azimuth, elevation));
         let (size, color, fog_density) = (self.size, self.color.clone(), self.fog_density);
-        Ok(Look { size, camera, light, color, cut: self.cut, fog_density })
+        let tint = self.tint.clone();
+        Ok(Look { size, camera, light, color, tint, cut: self.cut, fog_density })
     }
 
     /// Refuses options that nothing of what is drawn depends on.

@@ -21,10 +21,12 @@ pub enum Part {
     Mesh(DetailedMesh),
     /// The surface of a liquid, with its opacities `alpha`, and what it is.
     Liquid(DetailedMesh, Wet),
-    /// The ground below a liquid.
-    Ground(TriMesh),
-    /// What stands or moves in a liquid.
+    /// The ground below a liquid, with the stains on its vertices, 0 to 1, and what left them; there may be none.
+    Ground(TriMesh, Vec<f64>, Wet),
+    /// What moves in a liquid, or stands there: a tool.
     Obstacle(TriMesh),
+    /// A mesh that stands in a liquid.
+    Cloth(TriMesh),
     /// Points, and where they came from.
     Points(PathBuf, Points),
     /// A level set.
@@ -42,6 +44,9 @@ pub enum Wet {
     Blood,
     Paint,
     Honey,
+    /// Those that only dyes look like.
+    Milk,
+    Coffee,
 }
 
 impl Wet {

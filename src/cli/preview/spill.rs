@@ -13,6 +13,8 @@ use super::sources::{Part, Wet};
 
 /// The stage, and the kind of its files.
 const LIQUID: &str = "liquid";
+/// The kind of the files of a terrain with stains.
+const TERRAIN: &str = "terrain";
 
 /// Such a folder, read frame by frame.
 pub struct Spill {
@@ -92,33 +94,41 @@ impl Spill {
     /// # Errors
     /// A file that cannot be read or that is not what was written; cancel.
     pub fn read(&mut self, ctx: &Context, frame: i32) -> Result<Vec<Part>> {
-        let mut parts = self.around(ctx, frame);
-        let look =
-            self.scene.as_ref().and_then(|scene| scene.shallow().ok()).map_or("", |liquid| &*liquid.look);
+        let look = self.scene.as_ref().and_then(|scene| scene.shallow().ok());
+        let look = Wet::of(look.map_or("", |liquid| &*liquid.look));
+        let mut parts = self.around(ctx, frame, look);
+        let is_stained = |(at, path): &(i32, String)| *at == frame && path.ends_with(".ply");
+        if self.liquid.files(TERRAIN).iter().any(is_stained) {
+            let stained = mesh::read_detailed(&self.liquid.file_with(frame, TERRAIN, "ply")?)?;
+            let stains = stained.of_vertices("stain").unwrap_or_default();
+            parts.retain(|part| !matches!(part, Part::Ground(..)));
+            parts.push(Part::Ground(stained.mesh, stains, look));
+        }
         let path = self.liquid.file_with(frame, LIQUID, "ply")?;
         // A file without faces is no mesh.
         let report = self.liquid.report(frame)?;
         let is_dry = report.is_some_and(|report| report["triangles"].as_u64() == Some(0));
         if !is_dry {
-            parts.push(Part::Liquid(mesh::read_detailed(&path)?.without_unused(), Wet::of(look)));
+            parts.push(Part::Liquid(mesh::read_detailed(&path)?.without_unused(), look));
         }
         Ok(parts)
     }
 
     /// The terrain, and what stands on it; a warning where it is gone.
-    fn around(&mut self, ctx: &Context, frame: i32) -> Vec<Part> {
+    fn around(&mut self, ctx: &Context, frame: i32, look: Wet) -> Vec<Part> {
         let Some(scene) = &self.scene else { return Vec::new() };
         let around = match self.terrain.clone() {
-            Some(terrain) => Around::obstacles(scene, frame).map(|obstacles| Around { terrain, obstacles }),
+            Some(terrain) => Around::with_terrain(terrain, scene, frame),
             None => Around::read(ctx, scene, frame),
         };
         match around {
-            Ok(Around { terrain, obstacles }) => {
+            Ok(Around { terrain, mut obstacles, meshes }) => {
                 if !Around::moves(scene) {
                     self.terrain = Some(terrain.clone());
                 }
-                let obstacles = obstacles.into_iter().map(Part::Obstacle);
-                std::iter::once(Part::Ground(terrain)).chain(obstacles).collect()
+                let tools = obstacles.split_off(meshes).into_iter().map(Part::Obstacle);
+                let parts = std::iter::once(Part::Ground(terrain, Vec::new(), look));
+                parts.chain(obstacles.into_iter().map(Part::Cloth)).chain(tools).collect()
             }
             Err(error) => {
                 log::warn!("{error}: the liquid is drawn without its terrain");

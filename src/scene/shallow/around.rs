@@ -12,8 +12,10 @@ use crate::scene::Scene;
 pub struct Around {
     /// The terrain.
     pub terrain: TriMesh,
-    /// What stands or moves on it, each by itself.
+    /// What stands or moves on it, each by itself; first the meshes of files.
     pub obstacles: Vec<TriMesh>,
+    /// How many meshes of files there are.
+    pub meshes: usize,
 }
 
 impl Around {
@@ -23,18 +25,19 @@ impl Around {
     /// A scene without a liquid; files that cannot be read; cancel.
     pub fn read(ctx: &Context, scene: &Scene, frame: i32) -> Result<Self> {
         let terrain = Terrain::read(scene.shallow()?, frame, &Seen::default())?.mesh(ctx)?;
-        Ok(Self { terrain, obstacles: Self::obstacles(scene, frame)? })
+        Self::with_terrain(terrain, scene, frame)
     }
 
-    /// What stands or moves on the terrain at a frame.
+    /// As [`Around::read`], where the terrain is known.
     ///
     /// # Errors
-    /// As [`Around::read`].
-    pub fn obstacles(scene: &Scene, frame: i32) -> Result<Vec<TriMesh>> {
+    /// As there.
+    pub fn with_terrain(terrain: TriMesh, scene: &Scene, frame: i32) -> Result<Self> {
         let of = scene.shallow()?;
         let mut obstacles = obstacles::meshes(of, scene.shot.frames.first, &Seen::default())?;
+        let meshes = obstacles.len();
         obstacles.extend(obstacles::shapes_at(of, frame)?.iter().map(obstacles::drawn));
-        Ok(obstacles)
+        Ok(Self { terrain, obstacles, meshes })
     }
 
     /// Whether the terrain is another one at each frame.

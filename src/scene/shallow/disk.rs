@@ -9,7 +9,7 @@ const INDEX: u64 = 8;
 /// Bytes of a column in the exact state, before it is packed, and of a scalar of it; of a drop, with what waits at a link.
 const STATE: u64 = 20;
 const SCALAR: u64 = 8;
-const DROP: u64 = 200;
+const DROP: u64 = 220;
 /// Bytes of a voxel of a leaf, of which there are some two for each column.
 const VOXEL: u64 = 2 * 4;
 /// Bytes of a triangle of a terrain that is stained: its corners, and of its half a vertex the place, the stain, and that in the exact state.

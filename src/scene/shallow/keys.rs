@@ -154,7 +154,7 @@ pub const KEYS: &[Key] = &[
     Key::new("shallow", "falls_height", LENGTH, "height from which on it falls freely (m); an edge of a cell at least")
         .or("0.01")
         .concerns(FIRST),
-    Key::new("shallow", "falls_drop_ml", Kind::Number(0.0, MOST_ML, "ml"), "least volume of a drop (ml)").or("6.5e-5").concerns(FIRST),
+    Key::new("shallow", "falls_drop_ml", Kind::Number(0.0, MOST_ML, "ml"), "volume of a drop (ml): where it takes longer than 8 intervals liquid drips").or("6.5e-5").concerns(FIRST),
     Key::new("shallow", "falls_interval", Kind::Number(1.0e-4, 1.0, "s"), "time between the drops of a strand (s)")
         .or("0.008333333333333333")
         .concerns(FIRST),

@@ -18,8 +18,8 @@ const SCALAR: u64 = 62;
 /// Bytes of a column more for friction at walls, and for viscosity that depends on a scalar.
 const WALLS: u64 = 108;
 const THICK: u64 = 12;
-/// Bytes of a drop: what it is 200, its ball and strand while they are made, and in up to three steps that wait for the writer, 5,000 each.
-const DROP: u64 = 20_200;
+/// Bytes of a drop: what it is 500, its ball and strand while they are made, and in up to three steps that wait for the writer, 5,600 each.
+const DROP: u64 = 22_900;
 /// Bytes of a triangle of the terrain: corners and a place, twice while it is read, or while minimum heights are found, and what these need.
 const TRIANGLE: u64 = 110;
 

@@ -5,6 +5,8 @@ use std::ops::Range;
 use super::Falls;
 use super::flight::{Air, End};
 use super::packet::Packet;
+use super::splash::{Landing, merge, spread};
+use super::threads::Threads;
 use crate::shallow::columns::{Columns, NONE, resize_part};
 use crate::shallow::flow::Flow;
 use crate::shallow::flow::lips::Over;
@@ -16,9 +18,13 @@ use crate::shallow::scalars::shares::{MOST, integer, take};
 use crate::shallow::system::Shallow;
 
 /// Bytes of a lip in a saved state.
-pub(in crate::shallow) const LIP: usize = 24;
+pub(in crate::shallow) const LIP: usize = 40;
 /// What is less than a drop waits for so many intervals.
 const PATIENCE: u32 = 60;
+/// Room for what lands: so many columns for each packet.
+const SPLASHES: usize = 4;
+/// A lip drips if a drop takes longer than so many intervals; else it pours, in a packet each interval.
+const DRIPS: i64 = 8;
 /// Depth at the brink of a free overfall, of the critical depth (Rouse 1936).
 const BRINK: f64 = 0.715;
 
@@ -34,14 +40,13 @@ pub(in crate::shallow) struct Waiting {
     pub is_back: bool,
     /// Intervals that it waits for.
     pub waits: u32,
-}
-
-/// What lands on a column: units, and what they carry.
-#[derive(Debug, Clone, Copy)]
-struct Landing {
-    column: u32,
-    units: i64,
-    amounts: [i64; MOST],
+    /// What came in an interval of late (units), and how much was there when the last one ended.
+    pub steady: i64,
+    pub before: i64,
+    /// How far its packets are ahead of the others', in 2^31ths of an interval: it follows from what came while the flow grew.
+    pub phase: u32,
+    /// Impulse that others have given; 0 between intervals.
+    pub gathered: i64,
 }
 
 /// All that is in the air.
@@ -50,9 +55,10 @@ pub(in crate::shallow) struct Falling {
     /// In the order in which they were made.
     packets: Vec<Packet>,
     /// By link; none without falls.
-    waiting: Vec<Waiting>,
+    pub(super) waiting: Vec<Waiting>,
     /// What lands in a step; kept, so that nothing is allocated again.
     landed: Vec<Landing>,
+    pub(super) threads: Threads,
     /// Seconds since packets were made last, and how often they were.
     pub since: f64,
     pub tick: u64,
@@ -65,15 +71,17 @@ impl Falling {
         Self {
             packets: Vec::with_capacity(falls.most),
             waiting: vec![Waiting::default(); links],
-            landed: Vec::with_capacity(falls.most),
+            landed: Vec::with_capacity(SPLASHES * falls.most),
+            threads: Threads::with_room(links),
             ..Self::default()
         }
     }
 
     /// Memory (bytes).
     pub fn bytes(&self) -> usize {
-        self.packets.capacity() * (size_of::<Packet>() + size_of::<Landing>())
+        self.packets.capacity() * (size_of::<Packet>() + SPLASHES * size_of::<Landing>())
             + size_of_val(&self.waiting[..])
+            + self.threads.bytes()
     }
 
     /// All packets.
@@ -127,22 +135,28 @@ impl Falling {
 impl Waiting {
     /// Its numbers, for a saved state.
     pub fn to_bytes(self) -> [u8; LIP] {
-        let last = u64::from(self.waits) | u64::from(self.is_back) << 32;
+        let last = u64::from(self.waits) | u64::from(self.is_back) << 32 | u64::from(self.phase) << 33;
         let mut bytes = [0; LIP];
-        let numbers = [self.units as u64, self.impulse.to_bits(), last];
+        let numbers =
+            [self.units as u64, self.impulse.to_bits(), last, self.steady as u64, self.before as u64];
         bytes.as_chunks_mut().0.iter_mut().zip(numbers).for_each(|(to, number)| *to = number.to_le_bytes());
         bytes
     }
 
     /// As [`Waiting::to_bytes`] has written it; it carries nothing.
     pub fn from_bytes(bytes: &[u8; LIP]) -> Self {
-        let [units, impulse, last] = std::array::from_fn(|at| u64::from_le_bytes(bytes.as_chunks().0[at]));
+        let [units, impulse, last, steady, before] =
+            std::array::from_fn(|at| u64::from_le_bytes(bytes.as_chunks().0[at]));
         Self {
             units: units as i64,
             amounts: [0; MOST],
             impulse: f64::from_bits(impulse),
-            is_back: last >> 32 != 0,
+            is_back: last >> 32 & 1 != 0,
             waits: last as u32,
+            steady: steady as i64,
+            before: before as i64,
+            phase: (last >> 33) as u32,
+            gathered: 0,
         }
     }
 
@@ -154,7 +168,12 @@ impl Waiting {
                 && outward(links, link, false)
                     .cell(columns.cell(links.from[link] as usize), columns.grid.size)
                     .is_some();
-        self.units >= 0 && (0.0..1e60).contains(&self.impulse) && (self.units == 0 || is_lip)
+        let steady = 0..i64::MAX / 8;
+        self.units >= 0
+            && (0.0..1e60).contains(&self.impulse)
+            && steady.contains(&self.steady)
+            && steady.contains(&self.before)
+            && (!self.is_awake() || is_lip)
     }
 }
 
@@ -178,6 +197,7 @@ impl Shallow {
         if self.falls.since >= falls.interval * (1.0 - 1e-9) {
             self.falls.since = 0.0;
             self.falls.tick += 1;
+            self.falls.gather_threads(&self.columns, &self.pipes.links);
             self.let_go(&falls, 0..self.pipes.links.len(), false);
         }
     }
@@ -219,15 +239,9 @@ impl Shallow {
     /// Adds what has landed to its columns, all of a column at once, so that it does not depend on their order, and gives what finds no room there to
     /// those around; returns what falls from there into the void.
     fn land_all(&mut self, mut landed: Vec<Landing>) -> i64 {
-        landed.sort_unstable_by_key(|landing| landing.column);
-        landed.dedup_by(|next, first| {
-            let same = next.column == first.column;
-            if same {
-                first.units += next.units;
-                add(&mut first.amounts, &next.amounts);
-            }
-            same
-        });
+        merge(&mut landed);
+        spread(&self.columns, &mut landed);
+        merge(&mut landed);
         let mut waits = false;
         for landing in landed.drain(..) {
             waits |= self.land(landing);
@@ -293,29 +307,48 @@ impl Shallow {
             count += usize::from(waiting.goes(least, all));
         }
         let fits = self.falls.packets.len() + count <= falls.most;
+        let mut packets = std::mem::take(&mut self.falls.packets);
         let mut landed = std::mem::take(&mut self.falls.landed);
         for link in links {
             let waiting = self.falls.waiting[link];
-            if waiting.units == 0 || !waiting.goes(least, all) {
+            if waiting.units == 0 {
+                self.falls.waiting[link].before = 0;
                 continue;
             }
-            self.falls.waiting[link] = Waiting::default();
-            if fits {
-                let packet = self.packet(link, &waiting);
-                self.falls.packets.push(packet);
+            if !waiting.goes(least, all) {
+                self.falls.waiting[link].before = waiting.units;
                 continue;
             }
-            let links = &self.pipes.links;
-            match if waiting.is_back { links.from[link] } else { links.to[link] } {
-                NONE => {
+            self.falls.waiting[link].clear();
+            let end = if fits {
+                let mut packet = self.packet(link, &waiting);
+                // It has waited, and left before now: not all lips let go at the same time.
+                let ahead = if all { 0.0 } else { f64::from(waiting.phase) / f64::from(1u32 << 31) };
+                let end = self.air().fly(&mut packet, ahead * falls.interval);
+                if end == End::Flies {
+                    packets.push(packet);
+                }
+                end
+            } else {
+                let links = &self.pipes.links;
+                match if waiting.is_back { links.from[link] } else { links.to[link] } {
+                    NONE => End::Leaves,
+                    column => End::Lands(column as usize),
+                }
+            };
+            match end {
+                End::Flies => {}
+                End::Leaves => {
                     self.flow.links.lost += waiting.units;
                     self.flow.amounts.count_in(Account::Lost, &waiting.amounts);
                 }
-                column => {
-                    landed.push(Landing { column, units: waiting.units, amounts: waiting.amounts });
+                End::Lands(column) => {
+                    let (column, units, amounts) = (column as u32, waiting.units, waiting.amounts);
+                    landed.push(Landing { column, units, amounts });
                 }
             }
         }
+        self.falls.packets = packets;
         self.land_all(landed);
     }
 
@@ -381,13 +414,25 @@ impl Packet {
 }
 
 /// Adds amounts to others.
-fn add(to: &mut [i64; MOST], amounts: &[i64; MOST]) {
+pub(super) fn add(to: &mut [i64; MOST], amounts: &[i64; MOST]) {
     to.iter_mut().zip(amounts).for_each(|(to, amount)| *to = to.saturating_add(*amount));
 }
 
 impl Waiting {
     fn goes(&self, least: f64, all: bool) -> bool {
-        all || self.units as f64 >= least || self.waits >= PATIENCE
+        let most = self.units.max(DRIPS * self.steady);
+        all || most as f64 >= least || self.waits >= PATIENCE
+    }
+
+    /// Whether liquid is there, or was of late.
+    pub(super) fn is_awake(&self) -> bool {
+        self.units > 0 || self.steady > 0
+    }
+
+    /// What is there has gone.
+    pub(super) fn clear(&mut self) {
+        let Self { is_back, steady, phase, .. } = *self;
+        *self = Self { is_back, steady, phase, ..Self::default() };
     }
 }
 

@@ -1,8 +1,8 @@
 //! A triangle mesh of the liquid in the air, written into the caller's buffers: a ball for each drop, and strands between drops that follow each
-//! other from one lip.
+//! other from one lip, and from the lip to the newest of them.
 //!
-//! A strand has the section that its drops' volume has over their distance. Where it is longer than 9.02 of its radii, the wavelength that
-//! grows fastest in a jet of little viscosity (Rayleigh 1878), it has broken into drops. Drops in a strand are as thick as it.
+//! A strand has the section that its drops' volume has over their distance. From 9.02 of its radii on, the wavelength that grows fastest in a jet of
+//! little viscosity (Rayleigh 1878), its liquid runs into its drops, and at twice that length it has broken. Drops in a strand are as thick as it.
 
 use super::Droplet;
 use crate::error::{Error, Result};
@@ -10,12 +10,15 @@ use crate::shallow::surface::{Counts, Indices, Layout, Up};
 
 /// Vertices and triangles of a ball: an icosahedron whose edges are halved.
 const BALL: [usize; 2] = [42, 80];
-/// Sides of a strand.
+/// Sides of a strand, and rings of corners: at its ends and in its middle.
 const SIDES: usize = 6;
+const RINGS: usize = 3;
 /// Radius of the circle around a hexagon with the area of a circle of 1: sqrt(pi / (1.5 sqrt 3)).
 const AROUND: f64 = 1.099_636;
-/// Longest strand between two drops, in its radii.
+/// Length from which a strand between two drops gets thinner, in its radii; it breaks at twice that.
 const LONGEST: f64 = 9.02;
+/// How much wider it is at its lip, where it is as thick as the film.
+const FLARE: f64 = 1.6;
 
 /// Buffers of the caller. They are written from their beginning, in order, and never read, and may be longer than the mesh; those that are
 /// absent are not wanted. The balls' vertices come first, in the order of their drops.
@@ -35,21 +38,25 @@ pub struct Target<'a> {
 
 /// The largest counts that the mesh of so many drops can have.
 pub fn bound(drops: usize) -> Counts {
-    of(drops, drops.saturating_sub(1))
+    of(drops, drops)
 }
 
 /// Counts of so many drops and strands; the strands' vertices are extras.
 fn of(drops: usize, strands: usize) -> Counts {
-    let extras = 2 * SIDES * strands;
-    let triangles = BALL[1] * drops + 2 * SIDES * strands;
+    let extras = RINGS * SIDES * strands;
+    let triangles = BALL[1] * drops + 2 * (RINGS - 1) * SIDES * strands;
     Counts { vertices: BALL[0] * drops + extras, extras, indices: 3 * triangles }
 }
 
-/// A strand between two drops.
+/// A strand from a drop to the one that follows it, or to their lip.
 #[derive(Debug, Clone, Copy)]
 struct Strand {
-    ends: [u32; 2],
+    drop: u32,
+    next: Option<u32>,
+    /// Section of its liquid, as a radius (m).
     radius: f64,
+    /// How much of it has not run into its drops yet, 0 to 1.
+    whole: f64,
 }
 
 /// Makes meshes of drops; keeps its memory from one to the next.
@@ -65,6 +72,8 @@ pub struct Balls {
     strands: Vec<Strand>,
     /// Radius of each drop (m).
     radii: Vec<f64>,
+    /// Of each drop: sums of its strands' radii (m) and of how whole they are, and their count.
+    sums: Vec<[f64; 3]>,
 }
 
 impl Default for Balls {
@@ -72,7 +81,15 @@ impl Default for Balls {
         let (vertices, triangles) = ball();
         let volume: f64 = triangles.iter().map(|t| volume(t.map(|at| vertices[at as usize]))).sum();
         let size = libm::cbrt(4.0 / 3.0 * std::f64::consts::PI / volume);
-        Self { vertices, triangles, size, order: Vec::new(), strands: Vec::new(), radii: Vec::new() }
+        Self {
+            vertices,
+            triangles,
+            size,
+            order: Vec::new(),
+            strands: Vec::new(),
+            radii: Vec::new(),
+            sums: Vec::new(),
+        }
     }
 }
 
@@ -85,6 +102,8 @@ impl Balls {
         self.strands.reserve(drops);
         self.radii.clear();
         self.radii.reserve(drops);
+        self.sums.clear();
+        self.sums.reserve(drops);
     }
 
     /// Size of the mesh that [`Balls::build`] would write.
@@ -93,26 +112,30 @@ impl Balls {
         self.order.extend(0..drops.len() as u32);
         self.order.sort_unstable_by_key(|&at| (drops[at as usize].source, drops[at as usize].number, at));
         self.strands.clear();
-        self.radii.clear();
-        self.radii.resize(drops.len(), 0.0);
-        for ends in self.order.windows(2) {
-            let [a, b] = [drops[ends[0] as usize], drops[ends[1] as usize]];
-            let long = length(between(a.position, b.position));
-            let section = 0.5 * (a.volume + b.volume) / long;
-            let radius = (section / std::f64::consts::PI).sqrt();
-            let follows = a.source == b.source && b.number - a.number <= 1;
-            if follows && long > 0.0 && long <= LONGEST * radius {
-                self.strands.push(Strand { ends: [ends[0], ends[1]], radius });
-                for end in ends {
-                    let own = &mut self.radii[*end as usize];
-                    *own = own.max(radius);
-                }
+        self.sums.clear();
+        self.sums.resize(drops.len(), [0.0; 3]);
+        for (place, &at) in self.order.iter().enumerate() {
+            let drop = &drops[at as usize];
+            let next = self.order.get(place + 1).copied().filter(|&next| {
+                let next = &drops[next as usize];
+                drop.source == next.source && next.number - drop.number <= 1
+            });
+            let Some(strand) = Strand::new(drops, at, next) else { continue };
+            for end in [Some(at), next].into_iter().flatten() {
+                let [radius, whole, count] = &mut self.sums[end as usize];
+                *radius += strand.radius;
+                *whole += strand.whole;
+                *count += 1.0;
             }
+            self.strands.push(strand);
         }
-        // Those that are close together are no thicker than a drop of their volume.
-        for (radius, drop) in self.radii.iter_mut().zip(drops) {
-            *radius = if *radius > 0.0 { radius.min(drop.radius) } else { drop.radius };
-        }
+        self.radii.clear();
+        self.radii.extend(drops.iter().zip(&self.sums).map(|(drop, &[radius, whole, count])| {
+            // Those that are close together are no thicker than a drop of their volume.
+            let part = if count > 0.0 { whole / count } else { 0.0 };
+            let strand = if count > 0.0 { (radius / count).min(drop.radius) } else { 0.0 };
+            drop.radius + part * (strand - drop.radius)
+        }));
         of(drops.len(), self.strands.len())
     }
 
@@ -137,9 +160,7 @@ impl Balls {
                     *to = [0, 1, 2].map(|n| centre[n] + radius * normal[n]);
                 }
             }
-            self.each_corner(drops, strands, |normal, radius, drop| {
-                turned(along(drop.position, normal, radius))
-            });
+            self.each_corner(drops, strands, |_, place, _| turned(place));
         }
         if let Some(to) = &mut target.normals {
             let (balls, strands) = parts(to, drops.len());
@@ -154,8 +175,9 @@ impl Balls {
         if let Some(to) = &mut target.drops {
             let (balls, strands) = to.split_at_mut(BALL[0] * drops.len());
             balls.chunks_exact_mut(BALL[0]).zip(0..).for_each(|(to, drop)| to.fill(drop));
-            let ends = self.strands.iter().flat_map(|strand| strand.ends);
-            strands.chunks_exact_mut(SIDES).zip(ends).for_each(|(to, drop)| to.fill(drop));
+            let rings = |strand: &Strand| [strand.drop, strand.drop, strand.next.unwrap_or(strand.drop)];
+            let rings = self.strands.iter().flat_map(rings);
+            strands.chunks_exact_mut(SIDES).zip(rings).for_each(|(to, drop)| to.fill(drop));
         }
         match &mut target.indices {
             Indices::None => {}
@@ -167,21 +189,37 @@ impl Balls {
         Ok(counts)
     }
 
-    /// Writes a vector for each corner of the strands, of its normal, its distance from its drop's middle (m) and its drop.
+    /// Writes a vector for each corner of the strands, of its normal, its place (m) and its drop.
     fn each_corner(
         &self,
         drops: &[Droplet],
         to: &mut [f32],
-        vector: impl Fn([f64; 3], f64, &Droplet) -> [f32; 3],
+        vector: impl Fn([f64; 3], [f64; 3], &Droplet) -> [f32; 3],
     ) {
         let mut to = to.as_chunks_mut::<3>().0.iter_mut();
         for strand in &self.strands {
-            let ends = strand.ends.map(|end| &drops[end as usize]);
-            let [aside, across] = beside(between(ends[0].position, ends[1].position));
-            for (drop, end) in ends.into_iter().zip(strand.ends) {
-                let radius = self.radii[end as usize].min(strand.radius) * AROUND;
+            let first = &drops[strand.drop as usize];
+            let own = self.radii[strand.drop as usize];
+            let (last, place, edge, axes) = match (strand.next.map(|next| next as usize), first.lip) {
+                (Some(next), _) => (&drops[next], drops[next].position, None, [self.radii[next]; 2]),
+                (None, Some(lip)) => {
+                    (first, lip.place, Some(lip.edge), [FLARE * own, own.min(0.5 * lip.depth)])
+                }
+                (None, None) => (first, first.position, None, [own; 2]),
+            };
+            let way = between(first.position, place);
+            let [aside, across] = edge.map_or_else(|| beside(way), |edge| beside_with(way, edge));
+            // What has run into the drops is missing in the middle.
+            let middle = [0, 1].map(|n| 0.5 * (own + axes[n]) * strand.whole);
+            let halfway = along(first.position, way, 0.5);
+            for (drop, place, axes) in
+                [(first, first.position, [own; 2]), (first, halfway, middle), (last, place, axes)]
+            {
+                let axes = axes.map(|radius| radius * AROUND);
                 for ([cos, sin], to) in HEXAGON.into_iter().zip(&mut to) {
-                    *to = vector([0, 1, 2].map(|n| cos * aside[n] + sin * across[n]), radius, drop);
+                    let off = [0, 1, 2].map(|n| axes[0] * cos * aside[n] + axes[1] * sin * across[n]);
+                    let normal = [0, 1, 2].map(|n| cos * aside[n] + sin * across[n]);
+                    *to = vector(normal, along(place, off, 1.0), drop);
                 }
             }
         }
@@ -200,15 +238,34 @@ impl Balls {
         }
         let mut to = strands.as_chunks_mut::<3>().0.iter_mut();
         for strand in 0..self.strands.len() {
-            let first = (drops * BALL[0] + strand * 2 * SIDES) as u32;
-            for side in 0..SIDES as u32 {
-                let [a, b] = [side, (side + 1) % SIDES as u32].map(|corner| first + corner);
+            for quad in 0..(RINGS - 1) * SIDES {
+                let (ring, side) = (quad / SIDES, quad % SIDES);
+                let first = drops * BALL[0] + (strand * RINGS + ring) * SIDES;
+                let [a, b] = [side, (side + 1) % SIDES].map(|corner| (first + corner) as u32);
                 let [c, d] = [a, b].map(|corner| corner + SIDES as u32);
                 for (triangle, to) in [[a, b, d], [a, d, c]].into_iter().zip(&mut to) {
                     *to = corners(triangle).map(&index);
                 }
             }
         }
+    }
+}
+
+impl Strand {
+    /// That from a drop to the next one, or to its lip; none where it has broken.
+    fn new(drops: &[Droplet], at: u32, next: Option<u32>) -> Option<Self> {
+        let drop = &drops[at as usize];
+        let (place, volume) = match next.map(|next| &drops[next as usize]) {
+            Some(next) => (next.position, 0.5 * (drop.volume + next.volume)),
+            None => (drop.lip?.place, drop.volume),
+        };
+        let long = length(between(drop.position, place));
+        if long <= 0.0 {
+            return None;
+        }
+        let radius = (volume / (std::f64::consts::PI * long)).sqrt().min(drop.radius);
+        let whole = (2.0 - long / (LONGEST * radius)).clamp(0.0, 1.0);
+        (whole > 0.0).then_some(Self { drop: at, next, radius, whole })
     }
 }
 
@@ -295,8 +352,13 @@ fn cross([a, b, c]: [f64; 3], [x, y, z]: [f64; 3]) -> [f64; 3] {
 
 /// Two unit vectors across a direction: the three are right-handed, in this order and the direction last.
 fn beside(direction: [f64; 3]) -> [[f64; 3]; 2] {
+    let is_steep = direction[0].abs() < 0.7 * length(direction);
+    beside_with(direction, if is_steep { [1.0, 0.0, 0.0] } else { [0.0, 0.0, 1.0] })
+}
+
+/// As [`beside`]; the first is near another direction.
+fn beside_with(direction: [f64; 3], other: [f64; 3]) -> [[f64; 3]; 2] {
     let direction = unit(direction);
-    let other = if direction[0].abs() < 0.7 { [1.0, 0.0, 0.0] } else { [0.0, 0.0, 1.0] };
     let across = unit(cross(direction, other));
     [cross(across, direction), across]
 }

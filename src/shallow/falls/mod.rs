@@ -3,19 +3,22 @@
 //! | word | meaning |
 //! |---|---|
 //! | lip | a link that liquid falls freely from in a step: the void is beyond, or the surface there lies deeper than a given height (`flow/lips.rs`) |
-//! | packet | what went over a lip in some steps; whole units of volume, which fly together (`flight.rs`) and land together (`falling.rs`) |
+//! | thread | a lip that takes what goes over those near it (`threads.rs`) |
+//! | packet | what went over a lip in some steps; whole units of volume, which fly together (`flight.rs`) and land together (`falling.rs`, `splash.rs`) |
 //! | drop | a packet, as a host sees it |
-//! | strand | a tube between packets that follow each other from the same lip (`mesh.rs`) |
+//! | strand | a tube between packets that follow each other from the same lip, and from it to the last (`mesh.rs`) |
 //!
 //! A packet begins at the lip's base, with the velocity of what went over it, at most that at the brink of a free overfall, 1.4 times the critical
-//! one of its flow (Rouse, Civil Engineering 6, 1936), or of the liquid that arrives there, if that is faster. It flies without drag, and lands, whole, on the first
-//! surface that it meets: without room there, as liquid does where the terrain moves (`remap/held.rs`). At a wall it stops, and falls down along it. Where there
+//! one of its flow (Rouse, Civil Engineering 6, 1936), or of the liquid that arrives there, if that is faster. It flies without drag, and lands on the first
+//! surface that it meets and around: without room there, as liquid does where the terrain moves (`remap/held.rs`). At a wall it stops, and falls down along it. Where there
 //! is nothing it leaves the domain below its lowest height, or over an open border, and is lost.
 
 mod falling;
 mod flight;
 pub mod mesh;
 mod packet;
+mod splash;
+mod threads;
 
 use crate::error::{Error, Result};
 use crate::shallow::columns::Columns;
@@ -34,7 +37,8 @@ pub struct Falls {
     pub height: f64,
     /// Time between packets of a lip (s), 0.0001 to 1, at least a step; 1/120.
     pub interval: f64,
-    /// Least volume of a packet (m3), 0 and up; what is less waits at its lip for more, at most 60 intervals. 6.5e-11, a ball of half a millimetre.
+    /// Volume of a drop (m3), 0 and up: where it takes longer than 8 intervals liquid waits at its lip until it is one, at most 60. 6.5e-11, a ball of half a
+    /// millimetre.
     pub drop: f64,
     /// Most packets in the air, 1 to 1,048,576, for which there is room from the beginning; 8192. While there are so many, liquid that goes over a lip is
     /// below at once.
@@ -93,8 +97,21 @@ pub struct Droplet {
     pub source: u64,
     /// Concentration of each scalar that it carries, in the scalar's own measure.
     pub concentrations: [f32; MOST],
+    /// Where the liquid leaves the ground, if this drop is the last that has left it.
+    pub lip: Option<Lip>,
     /// One more than that of the drop that left the same lip before it, if nothing interrupted the flow there.
     pub number: u64,
+}
+
+/// Where liquid leaves the ground.
+#[derive(Debug, Clone, Copy, Default, PartialEq)]
+pub struct Lip {
+    /// The middle of the column that it comes from, half way up (m).
+    pub place: [f64; 3],
+    /// How deep it is there (m).
+    pub depth: f64,
+    /// A unit vector along the edge.
+    pub edge: [f64; 3],
 }
 
 impl Shallow {
@@ -113,6 +130,7 @@ impl Shallow {
             };
             let [east, south] = packet.along.map(|speed| speed * grid.cell);
             let volume = packet.units as f64 * unit;
+            let lip = (packet.tick == self.falls.tick).then(|| self.lip_of(packet)).flatten();
             Droplet {
                 position: [place(0), heights.low + packet.height * heights.unit, place(1)],
                 velocity: [east, -packet.down * heights.unit, south],
@@ -121,8 +139,22 @@ impl Shallow {
                 age: packet.age,
                 source: packet.source,
                 concentrations,
+                lip,
                 number: packet.tick,
             }
         })
+    }
+
+    /// Where a packet's liquid comes from; none if the ground has moved since.
+    fn lip_of(&self, packet: &Packet) -> Option<Lip> {
+        let (columns, unit) = (&self.columns, self.columns.heights.unit);
+        let (cell, layer) = ((packet.source >> 18) as usize, (packet.source & 0xffff) as usize);
+        let cell = [cell % columns.grid.size[0], cell / columns.grid.size[0]];
+        let column = columns.column(cell, layer)?;
+        let ([x, z], base) = (columns.grid.centre(cell), f64::from(columns.bases()[column]) * unit);
+        let depth = f64::from(self.flow.depth[column]) * unit;
+        // Sides to the east and to the west are even.
+        let edge = if packet.source >> 16 & 1 == 0 { [0.0, 0.0, 1.0] } else { [1.0, 0.0, 0.0] };
+        Some(Lip { place: [x, columns.heights.low + base + 0.5 * depth, z], depth, edge })
     }
 }

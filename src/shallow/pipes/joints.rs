@@ -36,6 +36,16 @@ impl Side {
         }
     }
 
+    /// Which way it faces, along x and z.
+    pub fn outward(self) -> [i32; 2] {
+        match self {
+            Self::East => [1, 0],
+            Self::South => [0, 1],
+            Self::West => [-1, 0],
+            Self::North => [0, -1],
+        }
+    }
+
     /// The cell beyond this side, if it is within the domain.
     pub fn cell(self, [x, z]: [usize; 2], [nx, nz]: [usize; 2]) -> Option<[usize; 2]> {
         match self {

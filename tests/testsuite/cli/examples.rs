@@ -90,7 +90,7 @@ fn the_readme_takes_a_character_through_snow() {
 fn the_example_scenes_are_sound() {
     let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("examples/scenes");
     let paths: Vec<_> = fs::read_dir(folder).unwrap().map(|entry| entry.unwrap().path()).collect();
-    assert_eq!(paths.len(), 15);
+    assert_eq!(paths.len(), 19);
     for path in paths {
         let name = path.file_stem().unwrap().to_string_lossy().into_owned();
         let scene = frazil::scene::Scene::read(&path).unwrap();

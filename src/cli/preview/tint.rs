@@ -1,0 +1,73 @@
+//! Dyes: a clear liquid takes the colour of another one, as far as it carries it.
+
+use std::str::FromStr;
+
+use frazil::base::DetailedMesh;
+
+use super::sources::Wet;
+
+/// A scalar that tints a liquid.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Tint {
+    /// The scalar: from 0, water, to 1.
+    pub name: String,
+    look: Wet,
+}
+
+/// Colours (linear red, green, blue) and opacities of vertices.
+pub type Tinted = (Vec<[f32; 3]>, Vec<f32>);
+
+impl FromStr for Tint {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<Self, String> {
+        let wrong = || "write a scalar and what it looks like, such as dye=blood: blood, paint, honey, milk or coffee";
+        let (name, look) = text.split_once('=').ok_or_else(wrong)?;
+        let looks = [Wet::Blood, Wet::Paint, Wet::Honey, Wet::Milk, Wet::Coffee];
+        let look = looks.into_iter().find(|known| known.name() == look).ok_or_else(wrong)?;
+        Ok(Self { name: name.into(), look })
+    }
+}
+
+impl Tint {
+    /// What light is left with on its way through liquid of these depths that carries so much (Lambert, Beer); none for a mesh that does not
+    /// say both.
+    pub fn of(&self, liquid: &DetailedMesh) -> Option<Tinted> {
+        let (shares, depths) = (liquid.of_vertices(&self.name)?, liquid.of_vertices("depth")?);
+        let [clear, dye] = [Wet::Water, self.look].map(|look| (look.colour(), 1.0 / look.depth()));
+        let vertex = |(share, depth): (f64, f64)| {
+            let share = share.clamp(0.0, 1.0);
+            let [clear_part, dye_part] = [(1.0 - share) * clear.1, share * dye.1];
+            let all = clear_part + dye_part;
+            let mix = (dye_part / all) as f32;
+            let colour = [0, 1, 2].map(|n| clear.0[n] + mix * (dye.0[n] - clear.0[n]));
+            (colour, (1.0 - libm::exp(-depth.max(0.0) * all)) as f32)
+        };
+        Some(shares.into_iter().zip(depths).map(vertex).unzip())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use frazil::base::arrays::{MeshArray, Number, On};
+    use frazil::base::{TriMesh, Vec3};
+
+    #[test]
+    fn more_of_a_dye_and_more_depth_hide_more() {
+        let tint: Tint = "milk=milk".parse().unwrap();
+        let array = |name: &str, values: &[f64]| MeshArray {
+            name: name.into(),
+            on: On::Vertices,
+            number: Number::F32,
+            values: values.to_vec(),
+        };
+        let mesh = TriMesh { positions: vec![Vec3::zeros(); 4], triangles: vec![[0, 1, 2]] };
+        let arrays = vec![array("milk", &[0.0, 0.1, 1.0, 1.0]), array("depth", &[0.001, 0.001, 0.001, 0.0])];
+        let (colours, opacities) = tint.of(&DetailedMesh { mesh, uvs: None, arrays }).unwrap();
+        assert!(opacities.windows(2).take(2).all(|two| two[0] < two[1]), "{opacities:?}");
+        assert!(opacities[0] < 0.05 && opacities[2] > 0.9 && opacities[3] == 0.0, "{opacities:?}");
+        assert_eq!((colours[0], colours[2]), (Wet::Water.colour(), Wet::Milk.colour()));
+        assert!("milk".parse::<Tint>().is_err() && "milk=snow".parse::<Tint>().is_err());
+    }
+}

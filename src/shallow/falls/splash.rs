@@ -1,0 +1,131 @@
+//! Where drops land: not in one column only.
+//!
+//! A drop that hits a surface spreads over about twice its own width. All of it in a column that is thinner than the drop would stand there as a spike, and
+//! leave ripples of a cell's size. Equal parts go to the columns around that lie as low as its own and are open above.
+
+use super::falling::add;
+use crate::shallow::columns::Columns;
+use crate::shallow::scalars::MOST;
+use crate::shallow::scalars::shares::part;
+
+/// Furthest that it spreads (cells).
+const FURTHEST: i32 = 3;
+
+/// What lands on a column: units, and what they carry.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Landing {
+    pub column: u32,
+    pub units: i64,
+    pub amounts: [i64; MOST],
+}
+
+/// Adds up what lands on the same column, so that it does not depend on the order; by column.
+pub(super) fn merge(landed: &mut Vec<Landing>) {
+    landed.sort_unstable_by_key(|landing| landing.column);
+    landed.dedup_by(|next, first| {
+        let same = next.column == first.column;
+        if same {
+            first.units += next.units;
+            add(&mut first.amounts, &next.amounts);
+        }
+        same
+    });
+}
+
+/// Gives equal parts to the columns around, where there is room in the list for all of them, else to none.
+pub(super) fn spread(columns: &Columns, landed: &mut Vec<Landing>) {
+    let mut count = 0;
+    for landing in &*landed {
+        around(columns, landing, |_| count += 1);
+    }
+    if landed.len() + count > landed.capacity() {
+        return;
+    }
+    for at in 0..landed.len() {
+        let landing = landed[at];
+        let mut count = 1;
+        around(columns, &landing, |_| count += 1);
+        let units = landing.units / count;
+        let amounts = part(&landing.amounts, units, landing.units);
+        around(columns, &landing, |column| {
+            let own = &mut landed[at];
+            own.units -= units;
+            own.amounts.iter_mut().zip(amounts).for_each(|(own, part)| *own -= part);
+            landed.push(Landing { column, units, amounts });
+        });
+    }
+}
+
+/// The columns that a landing spreads to.
+fn around(columns: &Columns, landing: &Landing, mut with: impl FnMut(u32)) {
+    let (own, grid) = (landing.column as usize, columns.grid);
+    let depth = landing.units as f64 * columns.heights.unit / grid.cell;
+    // A ball of its volume has this radius, in cells; twice that is squared here.
+    let radius = libm::cbrt(0.75 / std::f64::consts::PI * depth);
+    let square = (4.0 * radius * radius).min(f64::from(FURTHEST * FURTHEST)) as i32;
+    if square < 1 {
+        return;
+    }
+    let ([x, z], base) = (columns.cell(own), columns.bases()[own]);
+    let step = grid.cell / columns.heights.unit;
+    for south in -FURTHEST..=FURTHEST {
+        for east in -FURTHEST..=FURTHEST {
+            let away = east * east + south * south;
+            if away == 0 || away > square {
+                continue;
+            }
+            let cell = [x.wrapping_add_signed(east as isize), z.wrapping_add_signed(south as isize)];
+            if cell[0] >= grid.size[0] || cell[1] >= grid.size[1] {
+                continue;
+            }
+            // No further up or down than a slope of 45 degrees, and of those there may be one only.
+            let most = step * f64::from(away).sqrt();
+            let joins = |&column: &usize| {
+                f64::from((columns.bases()[column] - base).abs()) <= most && columns.overlap(own, column)
+            };
+            if let Some(column) = columns.of_cell(cell).find(joins) {
+                with(column as u32);
+            }
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::shallow::grid::{BOTTOMLESS, Grid, Heights};
+    use crate::shallow::terrain::Solids;
+
+    #[test]
+    fn a_drop_spreads_over_level_ground_and_not_over_an_edge() {
+        let heights = Heights::between(0.0, 1.0).unwrap();
+        let grid = Grid { cell: 0.001, origin: [0.0; 2], size: [20, 20] };
+        let cells = (0..grid.cells())
+            .map(|index| vec![[BOTTOMLESS, heights.round(if index % 20 < 10 { 0.5 } else { 0.1 })]]);
+        let columns = Columns::new(&Solids::new(grid, heights, cells));
+        let spread_at = |x: usize, volume: f64| {
+            let column = columns.column([x, 9], 0).unwrap() as u32;
+            let units = (volume / (1e-6 * heights.unit)) as i64;
+            let mut landed = Vec::with_capacity(200);
+            landed.push(Landing { column, units, amounts: [7 * units; MOST] });
+            spread(&columns, &mut landed);
+            merge(&mut landed);
+            assert_eq!(landed.iter().map(|landing| landing.units).sum::<i64>(), units);
+            assert!(landed.iter().all(|landing| landing.amounts == [7 * landing.units; MOST]));
+            assert!(landed.iter().all(|landing| columns.cell(landing.column as usize)[0] < 10) == (x < 10));
+            landed.len()
+        };
+        // Balls of 0.2 mm, 0.5 mm, and many cells, in the open and beside the edge.
+        assert_eq!([3.4e-11, 5.3e-10, 1e-6].map(|volume| spread_at(5, volume)), [1, 5, 29]);
+        assert_eq!([5.3e-10, 1e-6].map(|volume| spread_at(9, volume)), [4, 18]);
+        // Without room for all it lands whole.
+        let mut landed = Vec::with_capacity(4);
+        landed.push(Landing {
+            column: columns.column([5, 5], 0).unwrap() as u32,
+            units: 1 << 29,
+            amounts: [0; MOST],
+        });
+        spread(&columns, &mut landed);
+        assert_eq!((landed.len(), landed[0].units), (1, 1 << 29));
+    }
+}
