@@ -240,7 +240,8 @@ impl Shallow {
     /// those around; returns what falls from there into the void.
     fn land_all(&mut self, mut landed: Vec<Landing>) -> i64 {
         merge(&mut landed);
-        spread(&self.columns, &mut landed);
+        let most = self.params.falls.map_or(0, |falls| SPLASHES * falls.most);
+        spread(&self.columns, &mut landed, most);
         merge(&mut landed);
         let mut waits = false;
         for landing in landed.drain(..) {

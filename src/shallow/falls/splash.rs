@@ -32,13 +32,13 @@ pub(super) fn merge(landed: &mut Vec<Landing>) {
     });
 }
 
-/// Gives equal parts to the columns around, where there is room in the list for all of them, else to none.
-pub(super) fn spread(columns: &Columns, landed: &mut Vec<Landing>) {
+/// Gives equal parts to the columns around, if the list then has `most` at most, else to none.
+pub(super) fn spread(columns: &Columns, landed: &mut Vec<Landing>, most: usize) {
     let mut count = 0;
     for landing in &*landed {
         around(columns, landing, |_| count += 1);
     }
-    if landed.len() + count > landed.capacity() {
+    if landed.len() + count > most {
         return;
     }
     for at in 0..landed.len() {
@@ -108,7 +108,7 @@ mod tests {
             let units = (volume / (1e-6 * heights.unit)) as i64;
             let mut landed = Vec::with_capacity(200);
             landed.push(Landing { column, units, amounts: [7 * units; MOST] });
-            spread(&columns, &mut landed);
+            spread(&columns, &mut landed, 200);
             merge(&mut landed);
             assert_eq!(landed.iter().map(|landing| landing.units).sum::<i64>(), units);
             assert!(landed.iter().all(|landing| landing.amounts == [7 * landing.units; MOST]));
@@ -125,7 +125,7 @@ mod tests {
             units: 1 << 29,
             amounts: [0; MOST],
         });
-        spread(&columns, &mut landed);
+        spread(&columns, &mut landed, 4);
         assert_eq!((landed.len(), landed[0].units), (1, 1 << 29));
     }
 }
