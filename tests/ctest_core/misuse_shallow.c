@@ -164,7 +164,7 @@ static void some_bodies(frz_shallow_body bodies[8]) {
 static frz_shallow_layout a_layout(void) {
     frz_shallow_layout layout;
     WORKS(frz_shallow_layout_init(&layout, sizeof layout));
-    layout.flags = wild(16) ? any() : any() % 4, layout.scale = wild(9) ? number() : 100;
+    layout.flags = wild(16) ? any() : any() % 4 | (chance(3) ? FRZ_SHALLOW_SKIRTED : 0), layout.scale = wild(9) ? number() : 100;
     if (wild(9)) layout.least_depth = number();
     if (wild(9)) layout.opaque_depth = number();
     layout.struct_size = size_near(sizeof layout);
@@ -230,6 +230,70 @@ static void leave_stains(frz_shallow *liquid) {
     frz_shallow_stains_destroy(out);
 }
 
+/* A liquid in cells of two sizes that is made, used in some ways and destroyed. */
+static void leave_detail(void) {
+    frz_shallow_params params = some_params();
+    frz_shallow_domain domain = a_domain();
+    frz_shallow_layout layout = a_layout();
+    frz_shallow_target target = a_target();
+    frz_shallow_flow flows[8];
+    frz_shallow_body bodies[8];
+    frz_shallow_scalar scalar;
+    frz_shallow_scalar_balance carried;
+    frz_shallow_report report;
+    frz_shallow_moved moved;
+    frz_shallow_balance balance;
+    frz_shallow_size size;
+    frz_shallow_detail *out = NULL;
+    double near[4], poured = 0;
+    size_t cells, count = 0;
+    int turn;
+    if (!wild(4)) domain.cells[0] += domain.cells[0] % 2, domain.cells[1] += domain.cells[1] % 2;
+    cells = (size_t)domain.cells[0] * domain.cells[1];
+    near[0] = place() * 0.3, near[1] = place() * 0.3, near[2] = near[0] + fabs(place()), near[3] = near[1] + fabs(place());
+    report.struct_size = size_near(sizeof report), moved.struct_size = size_near(sizeof moved);
+    balance.struct_size = size_near(sizeof balance), size.struct_size = size_near(sizeof size), carried.struct_size = size_near(sizeof carried);
+    memset(&scalar, 0, sizeof scalar);
+    scalar.struct_size = size_near(sizeof scalar), scalar.name = "dye", scalar.law = wild(9) ? any() : any() % 3;
+    scalar.range = wild(9) ? number() : 10, scalar.half_life = wild(9) ? number() : 1;
+    if (chance(2)) told(frz_shallow_detail_create(a_context(), chance(4) ? NULL : &params, &domain, wild(30) ? NULL : mesh, wild(20) ? NULL : near, &out));
+    else {
+        told(frz_shallow_detail_create_heights(a_context(), chance(4) ? NULL : &params, &domain, view(floats, 4, sizeof floats, cells > 4096 ? 4096 : cells), near,
+                                               &out));
+    }
+    for (turn = 0; turn < 12; ++turn) {
+        some_flows(flows), some_bodies(bodies);
+        near[any() % 2] = place() * 0.3, near[2] = near[0] + fabs(place()), near[3] = wild(9) ? number() : near[1] + fabs(place());
+        switch (any() % 16) {
+            case 0: told(frz_shallow_detail_set_near(out, wild(20) ? NULL : near)); break;
+            case 1: told(frz_shallow_detail_set_params(out, &params)), told(frz_shallow_detail_get_near(out, wild(20) ? NULL : near)); break;
+            case 2: told(frz_shallow_detail_set_flows(out, wild(20) ? NULL : flows, any() % (wild(2) ? 9 : 3))); break;
+            case 3: told(frz_shallow_detail_set_rate(out, any() % 3, wild(9) ? number() : 1e-6)), told(frz_shallow_detail_flow_moved(out, any() % 3, &poured)); break;
+            case 4: told(frz_shallow_detail_pour(out, near, wild(9) ? number() : 0.02, wild(9) ? number() : 1e-6, wild(20) ? NULL : &poured)); break;
+            case 5: told(frz_shallow_detail_fill(out, place())); break;
+            case 6: told(frz_shallow_detail_update_terrain(a_context(), out, view(corners, 12, sizeof corners, N * N), wild(9) ? NULL : &moved)); break;
+            case 7: told(frz_shallow_detail_update_heights(a_context(), out, view(floats, 4, sizeof floats, cells > 4096 ? 4096 : cells), &moved)); break;
+            case 8: told(frz_shallow_detail_set_bodies(a_context(), out, wild(20) ? NULL : bodies, any() % 3, &moved)); break;
+            case 9: told(frz_shallow_detail_surface_bound(out, &size)), told(frz_shallow_detail_surface(a_context(), out, &layout, &target, &size)); break;
+            case 10:
+                told(frz_shallow_detail_save(a_context(), out, memory, wild(9) ? any() % 1000 : ROOM, &count));
+                if (count > 0 && count <= ROOM && wild(3)) memory[any() % count] ^= (unsigned char)(1u << any() % 8);
+                told(frz_shallow_detail_restore(a_context(), out, memory, wild(6) ? any() % (count + 1) : count <= ROOM ? count : 0));
+                break;
+            case 11: told(frz_shallow_detail_set_scalars(out, wild(20) ? NULL : &scalar, any() % 2)); break;
+            case 12: told(frz_shallow_detail_set_poured(out, view(wide, 8, sizeof wide, 1))), told(frz_shallow_detail_set_sourced(out, any() % 3, view(wide, 8, sizeof wide, 1))); break;
+            default: told(frz_shallow_detail_step(a_context(), out, wild(9) ? number() : 0.016, chance(2) ? NULL : &report));
+        }
+    }
+    balance.struct_size = sizeof balance;
+    if (out) {
+        told(frz_shallow_detail_get_scalar_balance(out, any() % 2, &carried));
+        WORKS(frz_shallow_detail_get_balance(out, &balance));
+        CHECK(balance.error == 0);
+    }
+    frz_shallow_detail_destroy(out);
+}
+
 static void call(void) {
     frz_shallow_report report;
     frz_shallow_moved moved;
@@ -251,7 +315,7 @@ static void call(void) {
     balance.struct_size = size_near(sizeof balance), size.struct_size = size_near(sizeof size);
     bounds[0] = place(), bounds[1] = place(), bounds[2] = bounds[0] + fabs(place()), bounds[3] = bounds[1] + fabs(place());
     for (at = 0; at < 6; ++at) steps[at] = wild(30) ? number() : 0.001 * (1 + any() % 4);
-    switch (any() % 32) {
+    switch (any() % 36) {
         case 0: make(); break;
         case 1:
             if (chance(6)) frz_shallow_destroy(liquids[slot]), liquids[slot] = NULL;
@@ -334,6 +398,8 @@ static void call(void) {
             break;
         }
         case 29: leave_stains(liquids[slot_of(1)]); break;
+        case 30: told(frz_shallow_find_ledges(a_context(), a_liquid(), chance(2) ? NULL : &size)); break;
+        case 31: leave_detail(); break;
         default:
             told(frz_shallow_step(a_context(), a_liquid(), wild(9) ? number() : 0.016, wild(9) ? number() : 0.005, chance(2) ? NULL : &report));
     }

@@ -227,7 +227,7 @@ fn saved_stains_go_on_to_the_same_bytes_and_others_are_refused() {
     let mut other = Stains::new(&all.0, &mesh.positions, &mesh.triangles, plain).unwrap();
     assert!(other.restore(&saved.1).unwrap_err().to_string().contains("absorbs in another way"));
     let mut dice = Dice(18);
-    for _ in 0..2000 {
+    for _ in 0..10_000 {
         let mut bad = saved.1.clone();
         match dice.below(2) {
             0 => bad.truncate(dice.below(bad.len())),
