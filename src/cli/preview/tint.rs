@@ -40,7 +40,7 @@ impl Tint {
             let [clear_part, dye_part] = [(1.0 - share) * clear.1, share * dye.1];
             let all = clear_part + dye_part;
             let mix = (dye_part / all) as f32;
-            let colour = [0, 1, 2].map(|n| clear.0[n] + mix * (dye.0[n] - clear.0[n]));
+            let colour = [0, 1, 2].map(|n| (1.0 - mix) * clear.0[n] + mix * dye.0[n]);
             (colour, (1.0 - libm::exp(-depth.max(0.0) * all)) as f32)
         };
         Some(shares.into_iter().zip(depths).map(vertex).unzip())
