@@ -221,11 +221,15 @@ impl Pairs {
         let depths = Depths { depth, ledges: Some(&ledges), ..Depths::default() };
         let counts =
             surface.build(columns, &depths, &Layout::default(), &mut buffers.checked()).expect("a surface");
-        self.cracks += open_edges(columns, depth, &buffers, &counts);
+        let [open, doubled] = open_edges(columns, depth, &buffers, &counts);
+        self.cracks += open + doubled;
         let depths = Depths { depth, ..Depths::default() };
         let counts =
             surface.build(columns, &depths, &Layout::default(), &mut buffers.checked()).expect("a surface");
-        self.open += open_edges(columns, depth, &buffers, &counts);
+        let [open, doubled_before] = open_edges(columns, depth, &buffers, &counts);
+        self.open += open;
+        // Where liquid parts into two layers, and nowhere else, edges are doubled.
+        self.cracks -= doubled.min(doubled_before);
         let indices = &buffers.indices[..counts.indices];
         let checked = check(columns, depth, &buffers.columns[..counts.vertices], indices);
         self.missing += checked.unlinked;
@@ -249,13 +253,15 @@ impl Pairs {
     }
 }
 
-/// Count of edges between wet columns that have a triangle on one side only, but for those along the domain's border.
-fn open_edges(columns: &Columns, depth: &[i32], buffers: &Buffers, counts: &Counts) -> usize {
+/// Count of edges between wet columns that have a triangle on one side only, but for those along the domain's border; and of those that have two on a
+/// side.
+fn open_edges(columns: &Columns, depth: &[i32], buffers: &Buffers, counts: &Counts) -> [usize; 2] {
     let mut edges: Vec<[u32; 2]> = Vec::with_capacity(counts.indices);
     for [a, b, c] in buffers.indices[..counts.indices].as_chunks::<3>().0 {
         edges.extend([[*a, *b], [*b, *c], [*c, *a]]);
     }
     edges.sort_unstable();
+    let doubled = edges.windows(2).filter(|two| two[0] == two[1]).count();
     let [nx, nz] = columns.grid.size;
     let is_wet = |column: u32| column != NONE && depth[column as usize] > 0;
     let is_open = |&&[a, b]: &&[u32; 2]| {
@@ -266,7 +272,7 @@ fn open_edges(columns: &Columns, depth: &[i32], buffers: &Buffers, counts: &Coun
         let [[ax, az], [bx, bz]] = ends.map(|column| columns.cell(column as usize));
         !(ax == bx && [0, nx - 1].contains(&ax) || az == bz && [0, nz - 1].contains(&az))
     };
-    edges.iter().filter(is_open).count()
+    [edges.iter().filter(is_open).count(), doubled]
 }
 
 /// Random terrains with layers: liquid that flows there, and depths by chance, in part up to ceilings.

@@ -138,7 +138,7 @@ fn ends_within(scene: Scene<'_>, edge: [u32; 2], way: u8) -> bool {
     })
 }
 
-/// Calls `add` with the edges of full quartets beside quartets that were searched.
+/// Calls `add` with the edges of full quartets beside quartets that were searched and are not full themselves, of the same layer.
 fn edges_of_full(scene: Scene<'_>, found: &Found, mut add: impl FnMut([u32; 2])) {
     let columns = scene.columns;
     let full = |strip: Option<usize>| strip.map_or(0, |strip| found.states[strip].full);
@@ -160,23 +160,23 @@ fn edges_of_full(scene: Scene<'_>, found: &Found, mut add: impl FnMut([u32; 2]))
         // To the north of a quartet, and to its south.
         for strip in row.checked_sub(1).into_iter().flat_map(layers) {
             let edge = some(columns.south(strip));
-            for place in places(full(Some(strip)) & searched) {
+            for place in places(full(Some(strip)) & searched & !full(edge)) {
                 join(edge.and_then(|edge| at(edge, place)), edge.and_then(|edge| at(edge, place + 1)));
             }
         }
         for strip in layers(row + 1) {
-            for place in places(full(Some(strip)) & searched) {
+            for place in places(full(Some(strip)) & searched & !full(some(columns.north(strip)))) {
                 join(at(strip, place + 1), at(strip, place));
             }
         }
         for strip in layers(row) {
             let (own, south) = (full(Some(strip)), some(columns.south(strip)));
             let west = own << 1 | full(columns.west(strip)) >> 15;
-            for place in places(west & searched) {
+            for place in places(west & searched & !own) {
                 join(south.and_then(|south| at(south, place)), at(strip, place));
             }
             let east = own >> 1 | full(columns.east(strip)) << 15;
-            for place in places(east & searched) {
+            for place in places(east & searched & !own) {
                 join(at(strip, place + 1), south.and_then(|south| at(south, place + 1)));
             }
         }

@@ -72,6 +72,28 @@ fn a_film_on_a_shelf_ends_at_its_edge_and_nowhere_over_it() {
 }
 
 #[test]
+fn the_surface_beside_a_hole_goes_on_under_another_shelf() {
+    // Over the whole of a floor with a hole a second one: in the cells of the hole it is of another layer.
+    let columns = columns([40, 10], |x, z| {
+        let is_hole = (14..20).contains(&x) && (4..7).contains(&z);
+        let (low, high) = ([units(1.2), units(1.5)], [units(2.2), units(2.5)]);
+        if is_hole { vec![ground(0.5), high] } else { vec![ground(0.5), low, high] }
+    });
+    let deep = |index: usize| if columns.bases()[index] > units(1.0) { units(0.1) } else { 0 };
+    let depth: Vec<i32> =
+        (0..columns.len()).map(|index| if columns.is_column(index) { deep(index) } else { 0 }).collect();
+    let mut ledges = Ledges::default();
+    ledges.find(&columns);
+    let mesh = skirted(&columns, &depth, &ledges);
+    let bare = Depths { depth: &depth, ..Depths::default() };
+    let bare = build_with(&mut Surface::default(), &columns, &bare, &Layout::default());
+    mesh.assert_manifold();
+    // 6 x 3 cells: 2 x (6 + 3) columns beside it and 4 at its corners.
+    assert_eq!(mesh.positions.len() - bare.positions.len(), 22);
+    assert_eq!(mesh.triangles.len() - bare.triangles.len(), 2 * 22);
+}
+
+#[test]
 fn hems_are_half_a_cell_out_and_their_normals_lean_out() {
     let columns = shelf(|x, z| (3..9).contains(&x) && (2..8).contains(&z));
     let depth = film(&columns, 1, 0.25);
