@@ -261,15 +261,19 @@ fn open_edges(columns: &Columns, depth: &[i32], buffers: &Buffers, counts: &Coun
         edges.extend([[*a, *b], [*b, *c], [*c, *a]]);
     }
     edges.sort_unstable();
-    let doubled = edges.windows(2).filter(|two| two[0] == two[1]).count();
     let [nx, nz] = columns.grid.size;
-    let is_wet = |column: u32| column != NONE && depth[column as usize] > 0;
+    let is_wet = |vertex: u32| {
+        let column = buffers.columns[vertex as usize];
+        column != NONE && depth[column as usize] > 0
+    };
+    let is_twice = |two: &&[[u32; 2]]| two[0] == two[1] && two[0].into_iter().all(is_wet);
+    let doubled = edges.windows(2).filter(is_twice).count();
     let is_open = |&&[a, b]: &&[u32; 2]| {
-        let ends = [a, b].map(|vertex| buffers.columns[vertex as usize]);
-        if edges.binary_search(&[b, a]).is_ok() || !ends.into_iter().all(is_wet) {
+        if edges.binary_search(&[b, a]).is_ok() || !is_wet(a) || !is_wet(b) {
             return false;
         }
-        let [[ax, az], [bx, bz]] = ends.map(|column| columns.cell(column as usize));
+        let [[ax, az], [bx, bz]] =
+            [a, b].map(|vertex| columns.cell(buffers.columns[vertex as usize] as usize));
         !(ax == bx && [0, nx - 1].contains(&ax) || az == bz && [0, nz - 1].contains(&az))
     };
     [edges.iter().filter(is_open).count(), doubled]

@@ -124,7 +124,8 @@ static void falls(frz_context *ctx) {
         const frz_shallow_drop *of;
         CHECK(into.drops[vertex] < count);
         of = &drops[into.drops[vertex]];
-        CHECK(fabs(into.positions[3 * vertex] - of->position[0]) < 2 * of->radius);
+        /* Strands reach as far as the lip, or the next drop. */
+        CHECK(fabs(into.positions[3 * vertex] - of->position[0]) < (vertex < 42 * count ? 2 * of->radius : 4 * CELL));
         CHECK(fabsf(into.velocities[3 * vertex + 1] - (float)of->velocity[1]) < 1e-6f);
     }
     for (vertex = 0; vertex < size.indices; ++vertex) CHECK(into.indices[vertex] < size.vertices);

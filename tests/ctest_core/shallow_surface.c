@@ -179,8 +179,8 @@ static void bad_buffers(frz_context *ctx) {
     WORKS(frz_shallow_layout_init(&layout, sizeof layout));
     layout.scale = (double)NAN;
     FAILS(frz_shallow_surface(ctx, shallow, &layout, &target, NULL), FRZ_ERROR_ARGUMENT, "scale = NaN");
-    layout.scale = 1, layout.flags = 8;
-    FAILS(frz_shallow_surface(ctx, shallow, &layout, &target, NULL), FRZ_ERROR_ARGUMENT, "flags = 0x8");
+    layout.scale = 1, layout.flags = 16;
+    FAILS(frz_shallow_surface(ctx, shallow, &layout, &target, NULL), FRZ_ERROR_ARGUMENT, "flags = 0x10");
     CHECK(((unsigned char *)of.positions)[0] == 0x55);
     buffers_free(&of);
     frz_shallow_destroy(shallow);

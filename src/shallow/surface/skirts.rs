@@ -175,15 +175,17 @@ fn edges_of_full(scene: Scene<'_>, found: &Found, mut add: impl FnMut([u32; 2]))
             for place in places(west & searched & !own) {
                 join(south.and_then(|south| at(south, place)), at(strip, place));
             }
-            let east = own >> 1 | full(columns.east(strip)) << 15;
-            for place in places(east & searched & !own) {
+            let east = own >> 1 & 0x7fff & searched & !own;
+            for place in places(east) {
                 join(at(strip, place + 1), south.and_then(|south| at(south, place + 1)));
             }
         }
-        // Where a layer begins to the east of the block.
+        // Over the block's east side, where there may be no strip of the layer in it.
         if searched >> 15 == 1 {
             let layers = std::iter::successors(scene.lowest([row, along + 1]), |&strip| scene.above(strip));
-            for strip in layers.filter(|&strip| columns.west(strip).is_none() && full(Some(strip)) & 1 == 1) {
+            for strip in
+                layers.filter(|&strip| full(Some(strip)) & 1 & !(full(columns.west(strip)) >> 15) == 1)
+            {
                 join(at(strip, 0), some(columns.south(strip)).and_then(|south| at(south, 0)));
             }
         }
