@@ -2191,7 +2191,7 @@ typedef struct {
      */
     uint32_t flags;
     /**
-     * Edge of a cell (m), 1e-30 to 1e30.
+     * Edge of a cell (m), 1e-9 to 1e9.
      */
     double cell;
     /**

@@ -311,7 +311,7 @@ pub struct frz_shallow_domain {
     pub struct_size: u32,
     /// 0.
     pub flags: u32,
-    /// Edge of a cell (m), 1e-30 to 1e30.
+    /// Edge of a cell (m), 1e-9 to 1e9.
     pub cell: f64,
     /// The corner with the least x and z (m).
     pub origin: [f64; 2],

@@ -12,7 +12,7 @@ pub const MOST_CELLS: usize = 1 << 16;
 /// Square cells on the ground: x to the east, z to the south.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Grid {
-    /// Edge of a cell (m).
+    /// Edge of a cell (m), 1e-9 to 1e9.
     pub cell: f64,
     /// The corner of cell (0, 0) with the least x and z (m).
     pub origin: [f64; 2],
@@ -29,8 +29,9 @@ impl Grid {
     pub fn validate(&self) -> Result<()> {
         let [nx, nz] = self.size;
         let [x, z] = self.origin;
-        if !(self.cell > 0.0 && self.cell.is_finite()) {
-            return Err(Error::argument(format!("a cell of {} m is not a positive length", self.cell)));
+        // Beyond, single precision would not hold what flows.
+        if !(1e-9..=1e9).contains(&self.cell) {
+            return Err(Error::argument(format!("a cell of {} m is not within 1e-9 to 1e9 m", self.cell)));
         }
         if !x.is_finite() || !z.is_finite() {
             return Err(Error::argument(format!("the origin ({x}, {z}) is not finite")));
