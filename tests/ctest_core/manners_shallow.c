@@ -59,10 +59,15 @@ int posix_memalign(void **memory, size_t alignment, size_t size) {
     return *memory == NULL ? ENOMEM : 0;
 }
 
-/* What the child tells. */
+/* The same frames are played so often, and each counts with its least time: what else the machine does is no part of it. */
+enum { TURNS = 3, MOST_FRAMES = 20000 };
+
+/* What a child tells. */
 typedef struct told {
     long frames, allocations, calls, first_call;
-    double worst, average;
+    double average;
+    /* The least time of each frame so far (s). */
+    double least[MOST_FRAMES];
 } told;
 
 static told *shared;
@@ -204,7 +209,7 @@ static void play(int frames) {
         full_frame(self, frame, state, room);
         for (part = 0; part < PARTS; ++part) all += self->seconds[part];
         sum += all;
-        if (all > shared->worst) shared->worst = all;
+        if (shared->least[frame - warm] == 0 || all < shared->least[frame - warm]) shared->least[frame - warm] = all;
         ++shared->frames;
     }
     shared->average = sum / frames;
@@ -222,23 +227,31 @@ static int gate(const char *name, double value, const char *unit, double must_be
 
 int main(int count, char **arguments) {
     const int frames = count > 1 ? atoi(arguments[1]) : 10000;
-    int status = 0, failed = 0;
+    int status = 0, failed = 0, turn, frame;
+    long allocated = 0, called = 0;
+    double worst = 0;
     pid_t child;
+    if (frames < 1 || frames > MOST_FRAMES) return 1;
     shared = mmap(NULL, sizeof *shared, PROT_READ | PROT_WRITE, MAP_SHARED | MAP_ANONYMOUS, -1, 0);
     if (shared == MAP_FAILED) return 1;
-    child = fork();
-    if (child == 0) play(frames);
-    if (child < 0 || waitpid(child, &status, 0) != child) return 1;
-    if (status != 0 || shared->frames != frames) {
-        fprintf(stderr, "the child ended with %#x after %ld frames; the first of %ld system calls was number %ld\n", (unsigned)status,
-                shared->frames, shared->calls, shared->first_call);
-        return 1;
+    for (turn = 0; turn < TURNS; ++turn) {
+        shared->frames = 0;
+        child = fork();
+        if (child == 0) play(frames);
+        if (child < 0 || waitpid(child, &status, 0) != child) return 1;
+        if (status != 0 || shared->frames != frames) {
+            fprintf(stderr, "the child ended with %#x after %ld frames; the first of %ld system calls was number %ld\n", (unsigned)status,
+                    shared->frames, shared->calls, shared->first_call);
+            return 1;
+        }
+        allocated += shared->allocations, called += shared->calls;
     }
-    failed |= gate("shallow.manners_allocations", (double)shared->allocations, "calls", 0, -1);
-    failed |= gate("shallow.manners_system_calls", (double)shared->calls, "calls", 0, -1);
+    for (frame = 0; frame < frames; ++frame) worst = shared->least[frame] > worst ? shared->least[frame] : worst;
+    failed |= gate("shallow.manners_allocations", (double)allocated, "calls", 0, -1);
+    failed |= gate("shallow.manners_system_calls", (double)called, "calls", 0, -1);
     /* A time, which is no reason to fail here. */
-    gate("shallow.surgery_worst_frame", 1e3 * shared->worst, "ms", 8, 3);
+    gate("shallow.surgery_worst_frame", 1e3 * worst, "ms", 8, 3);
     printf("# %ld frames, %.3f ms on average\n", shared->frames, 1e3 * shared->average);
-    if (shared->calls) printf("# the first system call was number %ld\n", shared->first_call);
+    if (called) printf("# the first system call was number %ld\n", shared->first_call);
     return failed;
 }
