@@ -46,8 +46,8 @@ impl Skirts {
             ways.resize(len, 0);
             places.clear();
             places.resize(len, NONE);
-            // From then on nothing is allocated.
-            edges.reserve(4 * ledges.most);
+            // From then on nothing is allocated: a column has eight ways at most.
+            edges.reserve(8 * ledges.most);
             open.reserve(ledges.most);
             hems.reserve(ledges.most);
         }
