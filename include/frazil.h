@@ -1053,7 +1053,7 @@ typedef struct frz_pool frz_pool;
  * A small amount of liquid on a ground: blood, coffee or paint in a fraction of a frame.
  *
  * In real time: what a host calls in each frame keeps to stricter manners than all other calls. These are frz_shallow_step, _replay,
- * _update_terrain, _update_heights, _set_bodies, _loads, _save, _restore, _surface, _find_lifts, _drops, _drops_mesh, _read_scalar and _probe,
+ * _update_terrain, _update_heights, _set_bodies, _loads, _save, _restore, _surface, _find_lifts, _find_ledges, _drops, _drops_mesh, _read_scalar and _probe,
  * frz_shallow_stains_update, _read and _soaked, and frz_shallow_snapshot_take, _surface, _drops, _drops_mesh and _probe. With a pool of 0 threads, from their second call on, they allocate nothing, take no lock, log and poll nothing, and make no
  * system call but that for the thread's clock where a step has a budget. Only where there is more than ever before, more columns because
  * a body uncovers another layer, say, memory grows; so may what fails.
@@ -4717,9 +4717,8 @@ frz_status frz_shallow_surface(frz_context *context,
 
 /**
  * Finds where the ground ends over nothing, as at the edges of shelves and of holes, for surfaces with FRZ_SHALLOW_SKIRTED. With the mesh that the liquid
- * was made with it finds where between the middles of cells that is; on other ground the surface goes on for half a cell. It looks at all of the
- * ground, some milliseconds long, and allocates: once for ground that rests, and again after frz_shallow_update_terrain or _set_bodies have moved
- * something, before the next such surface.
+ * was made with it finds where between the middles of cells that is; on other ground the surface goes on for half a cell. In real time (frz_shallow): it
+ * looks at all triangles once; after frz_shallow_update_terrain or _set_bodies have moved something it is called again, before the next such surface.
  *
  * size: receives the most that this adds to frz_shallow_surface_bound, all zeroes after a failure; may be NULL. Its struct_size is set by the caller.
  *

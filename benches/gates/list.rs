@@ -366,6 +366,8 @@ pub const GATES: &[Gate] = &[
     none("shallow.manners_allocations", "calls"),
     none("shallow.manners_system_calls", "calls"),
     gate("shallow.surgery_worst_frame", "ms", Most(8.0), Most(3.0)),
+    // With minimum heights and ledges, which are found anew as the ground moves.
+    gate("shallow.surgery_fitted_frame", "ms", Most(8.0), Open),
     // Shallow liquids against theory. Steady films: velocity, on slopes to 45 degrees, and what they deliver.
     gate("shallow.film_exact", "1", Most(1.0e-6), Open),
     gate("shallow.film_short_steps", "1", Open, Open),

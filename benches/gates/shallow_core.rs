@@ -14,8 +14,12 @@ pub fn run(h: &mut Harness) {
     };
     pass_on(h, symbols, ["shallow.core_symbols", "shallow.core_needs"], "by nm and readelf");
     let frames = || Command::new(format!("{root}/target/core/ctest/manners_shallow"));
-    let names =
-        ["shallow.manners_allocations", "shallow.manners_system_calls", "shallow.surgery_worst_frame"];
+    let names = [
+        "shallow.manners_allocations",
+        "shallow.manners_system_calls",
+        "shallow.surgery_worst_frame",
+        "shallow.surgery_fitted_frame",
+    ];
     pass_on(h, frames, names, "10000 frames of examples/c/surgery.c on the core library");
 }
 

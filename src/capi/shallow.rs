@@ -1,7 +1,5 @@
 //! Small amounts of liquid on a terrain, in real time.
 
-use std::sync::Arc;
-
 use super::context::{creates, enter_light, frz_context};
 #[cfg(feature = "vdb")]
 use super::grid::frz_grid;
@@ -9,6 +7,7 @@ use super::guard::{Outcome, frz_status, guard};
 use super::handle::{Noun, change, destroy, read, required};
 use super::mesh::frz_mesh;
 use super::shallow_flows::Attached;
+use super::shallow_ledges::Ledged;
 use super::shallow_lifts::Lifted;
 use super::shallow_params::{domain, frz_shallow_domain, frz_shallow_params, params};
 use super::shallow_terrain::Terrain;
@@ -19,7 +18,6 @@ use crate::shallow::falls::mesh::Balls;
 use crate::shallow::pace::MOST_STEPS;
 use crate::shallow::scalars::MOST;
 use crate::shallow::surface::Surface;
-use crate::shallow::surface::ledges::Ledges;
 use crate::shallow::terrain::Solids;
 use crate::shallow::terrain::shapes::Shape;
 use crate::shallow::{Load, Params, Report, Shallow};
@@ -27,7 +25,7 @@ use crate::shallow::{Load, Params, Report, Shallow};
 /// A small amount of liquid on a ground: blood, coffee or paint in a fraction of a frame.
 ///
 /// In real time: what a host calls in each frame keeps to stricter manners than all other calls. These are frz_shallow_step, _replay,
-/// _update_terrain, _update_heights, _set_bodies, _loads, _save, _restore, _surface, _find_lifts, _drops, _drops_mesh, _read_scalar and _probe,
+/// _update_terrain, _update_heights, _set_bodies, _loads, _save, _restore, _surface, _find_lifts, _find_ledges, _drops, _drops_mesh, _read_scalar and _probe,
 /// frz_shallow_stains_update, _read and _soaked, and frz_shallow_snapshot_take, _surface, _drops, _drops_mesh and _probe. With a pool of 0 threads, from their second call on, they allocate nothing, take no lock, log and poll nothing, and make no
 /// system call but that for the thread's clock where a step has a budget. Only where there is more than ever before, more columns because
 /// a body uncovers another layer, say, memory grows; so may what fails.
@@ -97,8 +95,8 @@ pub(super) struct Spill {
     pub surface: Surface,
     /// Minimum heights, once they were found.
     pub lifted: Lifted,
-    /// Ledges of the ground as it is, once they were found.
-    pub ledges: Option<Arc<Ledges>>,
+    /// Ledges, once they were found.
+    pub ledged: Ledged,
     /// Mean velocities of all column indices (m/s), when a surface wants them.
     pub velocities: Vec<[f32; 2]>,
     /// Concentrations of scalars by column index, when a surface wants them.
@@ -136,7 +134,7 @@ impl Spill {
             shapes: Vec::new(),
             surface,
             lifted: Lifted::default(),
-            ledges: None,
+            ledged: Ledged::default(),
             velocities: Vec::new(),
             concentrations: Default::default(),
             balls,

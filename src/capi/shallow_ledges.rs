@@ -1,39 +1,46 @@
 //! Ledges of shallow liquid: where its surface ends over nothing, and comes down to the ground's edge.
 
-use std::sync::Arc;
-
 use super::context::{enter_light, frz_context};
 use super::guard::{Failure, Outcome, frz_status, guard};
 use super::handle::change;
-use super::shallow::frz_shallow;
+use super::shallow::{Spill, frz_shallow};
 use super::shallow_surface::frz_shallow_size;
 use super::shallow_terrain::Terrain;
 use super::views::fill;
 use crate::shallow::surface::Counts;
 use crate::shallow::surface::ledges::Ledges;
 
-/// The failure of a surface for which there are no ledges.
-pub(super) fn no_ledges(when: &str) -> Failure {
-    Failure::argument(format!("FRZ_SHALLOW_SKIRTED: frz_shallow_find_ledges has found no ledges {when}"))
+/// Ledges of a liquid.
+#[derive(Default)]
+pub(super) struct Ledged {
+    ledges: Ledges,
+    /// Whether they are of the ground as it is.
+    pub is_current: bool,
 }
 
-/// The ledges of a surface that wants them, or none.
-pub(super) fn wanted<'a>(
-    is_skirted: bool,
-    ledges: &'a Option<Arc<Ledges>>,
-    when: &str,
-) -> Outcome<Option<&'a Ledges>> {
-    match ledges {
-        Some(ledges) if is_skirted => Ok(Some(ledges)),
-        None if is_skirted => Err(no_ledges(when)),
-        _ => Ok(None),
+impl Ledged {
+    /// The ledges of a surface that may want them, or the failure of one that does where there are none.
+    pub(super) fn wanted(&self, is_skirted: bool, when: &str) -> Outcome<Option<&Ledges>> {
+        if is_skirted && !self.is_current {
+            return Err(Failure::argument(format!(
+                "FRZ_SHALLOW_SKIRTED: frz_shallow_find_ledges has found no ledges {when}"
+            )));
+        }
+        Ok(is_skirted.then_some(&self.ledges))
+    }
+
+    /// Takes those of another, if they are of its ground as it is.
+    pub(super) fn copy_from(&mut self, other: &Self) {
+        self.is_current = other.is_current;
+        if self.is_current {
+            self.ledges.copy_from(&other.ledges);
+        }
     }
 }
 
 /// Finds where the ground ends over nothing, as at the edges of shelves and of holes, for surfaces with FRZ_SHALLOW_SKIRTED. With the mesh that the liquid
-/// was made with it finds where between the middles of cells that is; on other ground the surface goes on for half a cell. It looks at all of the
-/// ground, some milliseconds long, and allocates: once for ground that rests, and again after frz_shallow_update_terrain or _set_bodies have moved
-/// something, before the next such surface.
+/// was made with it finds where between the middles of cells that is; on other ground the surface goes on for half a cell. In real time (frz_shallow): it
+/// looks at all triangles once; after frz_shallow_update_terrain or _set_bodies have moved something it is called again, before the next such surface.
 ///
 /// size: receives the most that this adds to frz_shallow_surface_bound, all zeroes after a failure; may be NULL. Its struct_size is set by the caller.
 ///
@@ -52,13 +59,15 @@ pub unsafe extern "C" fn frz_shallow_find_ledges(
             }
             let _call = enter_light(context)?;
             let mut spill = change(shallow)?;
-            let (columns, mut ledges) = (spill.shallow.columns(), Ledges::default());
-            match &spill.terrain {
+            let Spill { shallow, terrain, ledged: Ledged { ledges, is_current }, .. } = &mut *spill;
+            let columns = shallow.columns();
+            *is_current = false;
+            match terrain {
                 Terrain::Mesh(mesh) => ledges.fit(columns, &mesh.positions, &mesh.triangles)?,
                 _ => ledges.find(columns),
             }
+            *is_current = true;
             let most = ledges.bound();
-            spill.ledges = Some(Arc::new(ledges));
             if size.is_null() { Ok(()) } else { fill(size, None, most.into()) }
         }
     })

@@ -1,19 +1,16 @@
 //! Shallow liquid as it was after a frame, for another thread.
 
-use std::sync::Arc;
-
 use super::context::{creates, enter_light, frz_context};
 use super::guard::{frz_status, guard};
 use super::handle::{Noun, change, destroy, read};
 use super::shallow::{Spill, frz_shallow};
-use super::shallow_ledges::wanted as wanted_ledges;
+use super::shallow_ledges::Ledged;
 use super::shallow_lifts::no_lifts;
 use super::shallow_read::probe;
 use super::shallow_surface::{Wanted, frz_shallow_layout, frz_shallow_size, frz_shallow_target};
 use super::views::{frz_span, frz_view};
 use crate::shallow::Snapshot;
 use crate::shallow::falls::mesh::Balls;
-use crate::shallow::surface::ledges::Ledges;
 use crate::shallow::surface::{Depths, Surface};
 
 /// A liquid as it was after a frame, copied: another thread may draw it while the next frame is computed. A host has two of them: one
@@ -31,14 +28,14 @@ pub(super) struct Taken {
     /// Minimum heights, where there were some.
     least: Vec<i32>,
     sunk: Vec<i32>,
-    /// Ledges, where they were known.
-    ledges: Option<Arc<Ledges>>,
+    /// Ledges, where there were some.
+    ledged: Ledged,
 }
 
 impl Taken {
     /// Takes the minimum heights and the ledges of a liquid, if they are of its ground as it is.
     fn fit(&mut self, spill: &Spill) {
-        self.ledges.clone_from(&spill.ledges);
+        self.ledged.copy_from(&spill.ledged);
         let (least, sunk) = spill.lifted.known().unwrap_or_default();
         self.least.clear();
         self.least.extend_from_slice(least);
@@ -74,8 +71,14 @@ pub unsafe extern "C" fn frz_shallow_snapshot_create(
             surface.reserve(snapshot.columns());
             let mut balls = Balls::default();
             balls.reserve(spill.shallow.params().falls.map_or(0, |falls| falls.most));
-            let mut taken =
-                Taken { snapshot, surface, balls, least: Vec::new(), sunk: Vec::new(), ledges: None };
+            let mut taken = Taken {
+                snapshot,
+                surface,
+                balls,
+                least: Vec::new(),
+                sunk: Vec::new(),
+                ledged: Ledged::default(),
+            };
             taken.fit(&spill);
             Ok(taken)
         })
@@ -140,11 +143,11 @@ pub unsafe extern "C" fn frz_shallow_snapshot_surface(
             let wanted = Wanted::new(layout, target, size)?;
             let _call = enter_light(context)?;
             let mut taken = change(snapshot)?;
-            let Taken { snapshot, surface, least, sunk, ledges, .. } = &mut *taken;
+            let Taken { snapshot, surface, least, sunk, ledged, .. } = &mut *taken;
             if wanted.is_lifted && least.is_empty() {
                 return Err(no_lifts("when the snapshot was taken"));
             }
-            let ledges = wanted_ledges(wanted.is_skirted, ledges, "when the snapshot was taken")?;
+            let ledges = ledged.wanted(wanted.is_skirted, "when the snapshot was taken")?;
             let lifts: [&[i32]; 2] = if wanted.is_lifted { [least, sunk] } else { [&[]; 2] };
             let depths = Depths {
                 depth: snapshot.depths(),

@@ -7,7 +7,6 @@ use super::guard::{Failure, Outcome, frz_status, guard};
 use super::handle::{change, read};
 use super::mesh::no_flags;
 use super::shallow::{Spill, frz_shallow};
-use super::shallow_ledges::wanted as wanted_ledges;
 use super::views::{Sized32, fill, frz_span, sized};
 use crate::shallow::columns::Columns;
 use crate::shallow::scalars::MOST;
@@ -419,9 +418,9 @@ pub unsafe extern "C" fn frz_shallow_surface(
             let wanted = Wanted::new(layout, target, size)?;
             let _call = enter_light(context)?;
             let mut spill = change(shallow)?;
-            let Spill { shallow, surface, velocities, concentrations, lifted, ledges, .. } = &mut *spill;
+            let Spill { shallow, surface, velocities, concentrations, lifted, ledged, .. } = &mut *spill;
             let (least, sunk) = if wanted.is_lifted { lifted.current()? } else { Default::default() };
-            let ledges = wanted_ledges(wanted.is_skirted, ledges, "since the ground or a body moved")?;
+            let ledges = ledged.wanted(wanted.is_skirted, "since the ground or a body moved")?;
             for (scalar, numbers) in concentrations.iter_mut().enumerate() {
                 let len = if wanted.scalar(scalar) { shallow.columns().len() } else { 0 };
                 numbers.resize(len, 0.0);

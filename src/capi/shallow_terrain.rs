@@ -197,7 +197,7 @@ unsafe fn moves(
         let done = make(&mut spill)?;
         if done.cells > 0 {
             spill.lifted.is_current = false;
-            spill.ledges = None;
+            spill.ledged.is_current = false;
         }
         if moved.is_null() { Ok(()) } else { fill(moved, None, done.into()) }
     }

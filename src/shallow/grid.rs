@@ -24,8 +24,7 @@ impl Grid {
     /// Checks the numbers.
     ///
     /// # Errors
-    /// `Argument`: a cell that is not positive and finite, an origin that is not finite, no cell or over 65,536 along an
-    /// axis.
+    /// `Argument`: a cell not within 1e-9 to 1e9 m, an origin that is not finite, no cell or over 65,536 along an axis.
     pub fn validate(&self) -> Result<()> {
         let [nx, nz] = self.size;
         let [x, z] = self.origin;

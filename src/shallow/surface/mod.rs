@@ -34,6 +34,7 @@ mod links;
 pub(in crate::shallow) mod normals;
 mod room;
 pub(in crate::shallow) mod shown;
+mod silhouette;
 mod skirts;
 mod strips;
 pub(in crate::shallow) mod vertices;

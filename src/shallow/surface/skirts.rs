@@ -4,11 +4,11 @@
 //! sides are known to be closed, so that few are looked at.
 
 use super::groups::Search;
-use super::ledges::{Hem, Ledges, way};
+use super::ledges::{Hem, Ledges};
 use super::links::{RING, Scene, cell_at};
 use super::strips::{Found, places, some};
-use super::{Indices, NONE, STRIP, Target};
-use crate::shallow::surface::vertices::Vertices;
+use super::vertices::Vertices;
+use super::{Columns, Indices, NONE, STRIP, Target};
 
 /// The skirts of a surface; keeps its memory.
 #[derive(Debug, Default)]
@@ -86,6 +86,11 @@ impl Skirts {
         [hems.len(), 6 * open.len()]
     }
 
+    /// The hems, in order of their vertices.
+    pub fn hems(&self) -> &[Hem] {
+        &self.hems
+    }
+
     /// Writes the hems behind all other vertices.
     pub fn write_hems(&self, vertices: &Vertices<'_>, target: &mut Target<'_>) {
         for (vertex, hem) in (self.first as usize..).zip(&self.hems) {
@@ -123,8 +128,17 @@ impl Skirts {
     }
 }
 
+/// Place in the ring of cells around a column where another one is.
+fn way(columns: &Columns, [from, to]: [u32; 2]) -> Option<u8> {
+    if from == NONE || to == NONE {
+        return None;
+    }
+    let [from, to] = [from, to].map(|column| columns.cell(column as usize));
+    RING.iter().position(|&step| cell_at(from, step) == to).map(|way| way as u8)
+}
+
 /// To the right of a way between two columns, seen from each of them: the axis that nothing is on. Of a diagonal it is the corner between both.
-pub(super) fn sides(way: u8) -> [u8; 2] {
+fn sides(way: u8) -> [u8; 2] {
     let turns = if way.is_multiple_of(2) { [6, 6] } else { [7, 5] };
     turns.map(|turn| (way + turn) % 8 / 2)
 }

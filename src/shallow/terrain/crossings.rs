@@ -192,7 +192,7 @@ fn along(a: &Corner, b: &Corner, at: [f64; 2]) -> f64 {
 /// Exact because all is done in integers. Each f64 is m 2^k. Where the six coordinates are multiples of a power of two below 2^62 times
 /// it, i128 holds differences (63 bits), products (126) and their difference (127). Otherwise the six products of the expanded
 /// determinant are summed in 768 bits. Those hold multiples of 2^-320 below 2^448: a and b come from f32 without denormals
-/// (multiples of 2^-149 below 2^128), and s from cells and origins between 1e-30 and 1e30 m, so that its last bit is 2^-156 or more.
+/// (multiples of 2^-149 below 2^128), and s is the centre of a cell of 1e-9 m or more, a multiple of 2^-84, within some 2^100.
 pub fn exact_cross(a: [f64; 2], b: [f64; 2], s: [f64; 2]) -> f64 {
     let products = [[a[0], s[0], b[1], s[1]], [a[1], s[1], b[0], s[0]]].map(exact_product);
     if let [Some(first), Some(second)] = products {

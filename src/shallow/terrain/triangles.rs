@@ -63,14 +63,11 @@ impl Caster {
     /// A caster without a cast.
     ///
     /// # Errors
-    /// `Argument`: a grid that [`Grid::validate`] refuses, a cell not from 1e-30 to 1e30 m or an origin beyond 1e30 m from 0 (the range
-    /// of exact decisions), cells that f64 cannot tell apart, heights without a range.
+    /// `Argument`: a grid that [`Grid::validate`] refuses, an origin beyond 1e30 m from 0 (the range of exact decisions), cells that f64
+    /// cannot tell apart, heights without a range.
     pub fn new(grid: Grid, heights: Heights) -> Result<Self> {
         grid.validate()?;
         let Grid { cell, origin, size } = grid;
-        if !(1e-30..=1e30).contains(&cell) {
-            return Err(Error::argument(format!("a cell of {cell:e} m is not within 1e-30 to 1e30 m")));
-        }
         if let Some(far) = origin.into_iter().find(|place| place.abs() > 1e30) {
             return Err(Error::argument(format!("an origin at {far:e} m is beyond 1e30 m")));
         }
@@ -483,7 +480,10 @@ mod tests {
             assert_eq!(message(&positions, &triangles), "vertex 3 is not finite");
         }
         let caster = |grid: Grid| Caster::new(grid, heights()).map(|_| ()).unwrap_err().to_string();
-        assert_eq!(caster(Grid { cell: 1e-31, ..GRID }), "a cell of 1e-31 m is not within 1e-30 to 1e30 m");
+        assert_eq!(
+            caster(Grid { cell: 1e-10, ..GRID }),
+            "a cell of 0.0000000001 m is not within 1e-9 to 1e9 m"
+        );
         assert_eq!(caster(Grid { origin: [0.0, 2e30], ..GRID }), "an origin at 2e30 m is beyond 1e30 m");
         assert!(
             caster(Grid { origin: [1e17, 0.0], ..GRID })

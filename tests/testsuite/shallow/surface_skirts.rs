@@ -203,6 +203,18 @@ fn skirts_end_at_the_silhouette_of_the_ground() {
         *corners.entry([along, across]).or_default() += 1;
     }
     assert_eq!(corners[&[true, true]], 4);
+    // Those of ground that has moved are as if they were the first.
+    let turned: Vec<Vec3> = positions.iter().map(|at| Vec3::new(at.z, at.y, -at.x)).collect();
+    let other = Columns::new(
+        &triangles::solids(&turned, &faces, grid, Heights::between(-0.5, 1.0).unwrap()).unwrap(),
+    );
+    ledges.fit(&other, &turned, &faces).unwrap();
+    ledges.fit(&columns, &positions, &faces).unwrap();
+    let mut copy = Ledges::default();
+    copy.copy_from(&ledges);
+    for ledges in [&ledges, &copy] {
+        assert!(skirted(&columns, &depth, ledges).positions == mesh.positions);
+    }
     // Bad meshes.
     assert!(ledges.fit(&columns, &positions, &[[0, 1, 99]]).unwrap_err().to_string().contains("not there"));
     positions[3].y = f32::NAN;
