@@ -32,8 +32,8 @@ fn find_wet_strips(scene: Scene<'_>, active: Option<&[bool]>, found: &mut Found)
     found.find_spans(columns);
 }
 
-/// 16 places and the one behind: depth, base, ceiling, underside.
-type Windows<'a> = [&'a [i32; STRIP + 1]; 4];
+/// 16 places, and those to the east of them: depth, base, ceiling, underside.
+type Windows<'a> = [[&'a [i32; STRIP]; 2]; 4];
 
 /// Places whose quartet is linked as a whole: the highest of its heights is under the lowest ceiling, the lowest not under the highest
 /// underside; and those where the sum of the heights in the north-east and south-west is the greater.
@@ -42,14 +42,14 @@ fn compare([depth, base, ceiling, under]: Windows<'_>, south: Windows<'_>) -> [u
     let [depth_s, base_s, ceiling_s, under_s] = south;
     let (mut linked, mut greater) = (0u32, 0u32);
     for place in 0..STRIP {
-        let north = |at: usize| base[at].wrapping_add(depth[at].max(0));
-        let south = |at: usize| base_s[at].wrapping_add(depth_s[at].max(0));
-        let [a, b, c, d] = [north(place), north(place + 1), south(place), south(place + 1)];
-        let least = |n: &[i32; STRIP + 1], s: &[i32; STRIP + 1]| {
-            n[place].min(n[place + 1]).min(s[place].min(s[place + 1]))
+        let north = |at: usize| base[at][place].wrapping_add(depth[at][place].max(0));
+        let south = |at: usize| base_s[at][place].wrapping_add(depth_s[at][place].max(0));
+        let [a, b, c, d] = [north(0), north(1), south(0), south(1)];
+        let least = |[n, n_east]: [&[i32; STRIP]; 2], [s, s_east]: [&[i32; STRIP]; 2]| {
+            n[place].min(n_east[place]).min(s[place].min(s_east[place]))
         };
-        let most = |n: &[i32; STRIP + 1], s: &[i32; STRIP + 1]| {
-            n[place].max(n[place + 1]).max(s[place].max(s[place + 1]))
+        let most = |[n, n_east]: [&[i32; STRIP]; 2], [s, s_east]: [&[i32; STRIP]; 2]| {
+            n[place].max(n_east[place]).max(s[place].max(s_east[place]))
         };
         let highest = a.max(b).max(c.max(d));
         let lowest = a.min(b).min(c.min(d));
@@ -94,7 +94,11 @@ fn find_full_spans(scene: Scene<'_>, found: &mut Found) {
                 let wets = [wet, from_east(wet, wet_east), wet_south, from_east(wet_south, wet_south_east)];
                 let any = wets[0] | wets[1] | wets[2] | wets[3];
                 if any != 0 {
-                    let windows_south = if south == last { ends.each_ref() } else { windows(arrays, south) };
+                    let windows_south = if south == last {
+                        windows(ends.each_ref().map(|end| end.as_slice()), 0)
+                    } else {
+                        windows(arrays, south)
+                    };
                     let [linked, greater] = compare(windows(arrays, strip), windows_south);
                     full = linked & any;
                     if step == end && (corners.east == none || corners.south_east == none) {
@@ -166,8 +170,9 @@ fn windows(arrays: [&[i32]; 4], strip: usize) -> Windows<'_> {
 }
 
 #[inline(always)]
-fn window(numbers: &[i32], strip: usize) -> &[i32; STRIP + 1] {
-    numbers[strip * STRIP..].first_chunk().expect("a strip follows")
+fn window(numbers: &[i32], strip: usize) -> [&[i32; STRIP]; 2] {
+    let window: &[i32; STRIP + 1] = numbers[strip * STRIP..].first_chunk().expect("a strip follows");
+    [window.first_chunk().expect("16 of 17"), window.last_chunk().expect("16 of 17")]
 }
 
 /// Chooses diagonals: the quartets to divide from north-east to south-west, from what is wet in their corners and where the sum of the heights

@@ -33,7 +33,7 @@ impl Hem {
     }
 }
 
-/// Where the ground of columns ends: see [`Depths::ledges`]. Keeps its memory.
+/// Where the ground of columns ends: see [`Depths::ledges`](super::Depths::ledges). Keeps its memory.
 #[derive(Debug, Default)]
 pub struct Ledges {
     /// Where films end, and the ground with them, in order of columns.

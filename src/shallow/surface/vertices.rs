@@ -14,6 +14,10 @@ use crate::shallow::columns::strip_of;
 /// Velocity at the surface over the mean (Eq. 4.4).
 pub(in crate::shallow) const SURFACE_SPEED: f32 = 1.5;
 
+/// Columns at the end of a strip with which a run begins, and beside each other that are looked at one by one: what is fastest.
+const LONG: u32 = 8;
+const SHORT: u32 = 2;
+
 /// What vertices are made of.
 pub(super) struct Vertices<'a> {
     shown: Shown<'a>,
@@ -372,18 +376,23 @@ fn write_spans(vertices: &Vertices<'_>, normals: &mut Normals, around: &mut Arou
                 run = Run { first: if run.len == 0 { first } else { run.first }, len: run.len + STRIP };
                 continue;
             }
+            // Those that go on with the run before, and those that begin one for the strip behind.
+            let before = if run.len > 0 { plain.trailing_ones() } else { 0 };
+            let behind = plain.leading_ones();
+            let behind = if behind < LONG { 0 } else { behind };
+            run.len += before as usize;
             if run.len > 0 {
                 vertices.put_inner(span, run, next, target);
                 next += run.len;
-                run.len = 0;
             }
+            let between = u16::MAX << before & (u32::from(u16::MAX) >> behind) as u16;
             // What lies between columns that are looked at one by one.
-            let smooth = state.used & state.wet & !state.rough;
-            let mut left = state.used;
+            let smooth = state.used & state.wet & !state.rough & between;
+            let mut left = state.used & between;
             while left != 0 {
                 let place = left.trailing_zeros();
                 let len = (smooth >> place).trailing_ones();
-                if len == 0 {
+                if len <= SHORT {
                     let vertex = vertices.vertex(first + place as usize, normals, around);
                     vertices.put(next, &vertex, target);
                     next += 1;
@@ -395,6 +404,7 @@ fn write_spans(vertices: &Vertices<'_>, normals: &mut Normals, around: &mut Arou
                 next += len as usize;
                 left &= u16::MAX.checked_shl(end).unwrap_or(0);
             }
+            run = Run { first: first + STRIP - behind as usize, len: behind as usize };
         }
         if run.len > 0 {
             vertices.put_inner(span, run, next, target);
