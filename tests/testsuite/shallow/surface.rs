@@ -3,7 +3,7 @@
 use std::collections::BTreeSet;
 
 use super::surface_mesh::{Mesh, build, build_with, columns, ground, pool, units};
-use frazil::shallow::columns::{Columns, NONE};
+use frazil::shallow::columns::{Columns, NONE, STRIP};
 use frazil::shallow::surface::{Counts, Depths, Indices, Layout, Surface, Target, Up, bound};
 
 #[test]
@@ -45,6 +45,37 @@ fn dry_columns_around_a_pool_take_its_level() {
         (depth - if is_wet(x, z) { 0.5 } else { 0.0 }).abs() < 1e-6
     }));
     assert!(mesh.columns.is_sorted(), "in order of columns");
+}
+
+#[test]
+fn a_pool_has_the_same_vertices_wherever_its_strips_begin() {
+    // Waves on rolling ground with islands, 40 cells long, in strips of 16 that begin anywhere in it.
+    let mut first = None;
+    for shift in 0..STRIP {
+        let wave = |x: usize, z: usize| ((3 * x + 5 * z) as f64 * 0.7).sin();
+        let columns = columns([STRIP + 40, 11], |x, z| match x.checked_sub(shift) {
+            Some(x) if x < 40 => {
+                vec![ground(1.0 + 0.05 * wave(x, z) + f64::from(x % 19 == 12 && z % 4 == 1))]
+            }
+            _ => vec![],
+        });
+        let mut depth = vec![0; columns.len()];
+        for index in columns.indices() {
+            let [x, z] = columns.cell(index);
+            let level = units(1.2 + 0.04 * wave(z, x - shift));
+            depth[index] = (level - columns.bases()[index]).max(0);
+        }
+        let mesh = build(&columns, &depth);
+        let vertex = |at: usize| {
+            let [x, z] = mesh.cell(&columns, at as u32);
+            let ([_, height, _], normal) = (mesh.positions[at], mesh.normals[at]);
+            ([x - shift, z], [height, mesh.depths[at]].map(f32::to_bits), normal.map(f32::to_bits))
+        };
+        let vertices: Vec<_> = (0..mesh.positions.len()).map(vertex).collect();
+        assert!(vertices.len() > 400, "{}", vertices.len());
+        let sorted = vertices.into_iter().collect::<BTreeSet<_>>();
+        assert!(*first.get_or_insert_with(|| sorted.clone()) == sorted, "shifted by {shift}");
+    }
 }
 
 #[test]
