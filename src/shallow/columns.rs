@@ -299,7 +299,15 @@ impl Columns {
         }
         let wanted = Strip { row: z as u32, layer: layer as u32, at: (x / STRIP) as u32 };
         let row = self.row(z);
-        let strip = row.start + self.strips[row].binary_search(&wanted).ok()?;
+        // Where all of the layers below are there along the whole row, and the layer itself up to here.
+        let guess = row.start + layer * nx.div_ceil(STRIP) + x / STRIP;
+        let strip = match self.strips[row.clone()].last() {
+            Some(last) if wanted <= *last => match self.strips.get(guess) {
+                Some(strip) if *strip == wanted => guess,
+                _ => row.start + self.strips[row].binary_search(&wanted).ok()?,
+            },
+            _ => return None,
+        };
         Some(strip * STRIP + x % STRIP).filter(|&index| self.is_column(index))
     }
 

@@ -283,9 +283,14 @@ impl Shallow {
             let side = outward(&pipes.links, over.link, is_back);
             // Flux over section, in cells: the part of its column that went in a step. Thin liquid is gone before it is as fast as that.
             let flux = over.units as f64 / (f64::from(over.depth.max(1)) * dt);
-            let brink =
-                libm::cbrt(-params.gravity[1] * over.units as f64 * width) / (BRINK * columns.grid.cell);
-            let speed = flux.min(brink.max(arriving(columns, flow, &over, side)));
+            // It leaves no faster than its depth at the brink allows, unless it has arrived faster; for thin liquid neither is computed.
+            let (most, scale) = (-params.gravity[1] * over.units as f64 * width, BRINK * columns.grid.cell);
+            let scaled = flux * scale;
+            let speed = if scaled * scaled * scaled <= most {
+                flux
+            } else {
+                flux.min((libm::cbrt(most) / scale).max(arriving(columns, flow, &over, side)))
+            };
             let waiting = &mut falls.waiting[over.link];
             waiting.is_back = is_back;
             waiting.units += over.units;
