@@ -10,7 +10,7 @@ use crate::base::Vec3;
 use crate::error::Result;
 use crate::shallow::grid::Grid;
 
-/// Finds it; keeps its memory.
+/// Finds the silhouette of the ground; keeps its memory.
 #[derive(Debug, Default)]
 pub(super) struct Silhouette {
     /// Films on all of the ground (units): where their surface ends, there may be a hem.
@@ -129,7 +129,7 @@ impl Silhouette {
     }
 }
 
-/// How many hems there are in boxes of cells.
+/// How many hems there are in boxes of cells: a summed-area table.
 #[derive(Debug, Default)]
 struct Crowd {
     /// Hems in the cells that are both west and north of a corner of the grid, row by row: one more along each axis than there are cells.

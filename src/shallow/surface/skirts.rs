@@ -46,11 +46,11 @@ impl Skirts {
             ways.resize(len, 0);
             places.clear();
             places.resize(len, NONE);
-            // From then on nothing is allocated: a column has eight ways at most.
-            edges.reserve(8 * ledges.most);
-            open.reserve(ledges.most);
-            hems.reserve(ledges.most);
         }
+        // With as many columns nothing is allocated any more: a column has eight ways at most.
+        edges.reserve(8 * ledges.most);
+        open.reserve(ledges.most);
+        hems.reserve(ledges.most);
         edges_of_full(scene, found, |edge| edges.push(edge));
         let is_column = |id: u32| (id as usize) < len;
         for [a, b, c] in search.triangles() {

@@ -14,7 +14,7 @@ use crate::shallow::columns::strip_of;
 /// Velocity at the surface over the mean (Eq. 4.4).
 pub(in crate::shallow) const SURFACE_SPEED: f32 = 1.5;
 
-/// Columns at the end of a strip with which a run begins, and beside each other that are looked at one by one: what is fastest.
+/// A run begins within a strip with at least so many columns at its end; at most so many columns beside each other are written one by one.
 const LONG: u32 = 8;
 const SHORT: u32 = 2;
 
