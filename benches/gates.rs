@@ -102,6 +102,10 @@ mod rebuilt_sequences;
 mod rebuilt_speed;
 #[path = "gates/rebuilt_topology.rs"]
 mod rebuilt_topology;
+#[path = "gates/reliability/bugs.rs"]
+mod reliability_bugs;
+#[path = "gates/reliability/gltf_valid.rs"]
+mod reliability_gltf_valid;
 #[path = "gates/repair.rs"]
 mod repair;
 #[path = "gates/rest.rs"]
@@ -278,6 +282,8 @@ fn main() {
     shallow_whole::run(&mut h);
     shallow_threads::run(&mut h);
     easing::run(&mut h);
+    reliability_bugs::run(&mut h);
+    reliability_gltf_valid::run(&mut h);
     house::run(&mut h);
     h.finish();
 }

@@ -9,6 +9,8 @@ pub mod character;
 pub mod clients;
 pub mod exact_lines;
 pub mod folded;
+pub mod gltf_maker;
+pub mod gltf_variants;
 pub mod header;
 pub mod hero;
 pub mod jelly;

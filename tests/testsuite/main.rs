@@ -54,6 +54,7 @@ mod io {
 }
 mod motion {
     mod gltf;
+    mod gltf_extensions;
 }
 mod render {
     mod cut;

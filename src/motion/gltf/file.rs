@@ -1,12 +1,15 @@
 //! The file: its buffers, and the numbers that its accessors point at.
 
+use std::collections::{HashMap, HashSet};
 use std::path::Path;
 
 use gltf::accessor::{DataType, Dimensions};
-use gltf::json::validation::Checked;
 use gltf::{Accessor, Document};
 
-use super::uri;
+use super::json::{self, Instancing};
+use super::nodes::{Local, rotation};
+use super::{meshopt, uri};
+use crate::base::DVec3;
 use crate::error::{Error, Result, one_line};
 use crate::io::hash::Hasher;
 use crate::io::source;
@@ -15,6 +18,13 @@ use crate::io::source;
 pub(super) struct File {
     pub document: Document,
     buffers: Vec<Vec<u8>>,
+    /// The data of compressed buffer views, by their index.
+    decoded: HashMap<usize, Vec<u8>>,
+    instances: HashMap<usize, Instancing>,
+    /// Accessors of zeros, for which there is no data.
+    zeros: HashSet<usize>,
+    /// Whether it has materials, which are not read.
+    pub has_materials: bool,
     /// Hash of the file and of its buffers.
     pub content: String,
 }
@@ -28,15 +38,8 @@ impl File {
     pub fn open(path: &Path) -> Result<Self> {
         let bytes = source::read(path)?;
         check_length(&bytes).map_err(|what| Error::file(path, what))?;
-        let (document, blob) =
-            parse(&bytes).map_err(|error| Error::file(path, format!("not a whole glTF file ({error})")))?;
-        let known = ["KHR_mesh_quantization", "KHR_texture_transform", "KHR_materials_unlit"];
-        if let Some(needed) = document.extensions_required().find(|name| !known.contains(name)) {
-            return Err(Error::file(
-                path,
-                format!("needs the glTF extension {needed}, which frazil does not read"),
-            ));
-        }
+        let parsed = json::parse(&bytes).map_err(|what| Error::file(path, what))?;
+        let json::Parsed { document, blob, compressed, fallbacks, instances, zeros, has_materials } = parsed;
         let folder = path.parent().unwrap_or(Path::new("."));
         // Each by itself, so that the message can name the one at fault.
         let mut blob = blob;
@@ -48,6 +51,9 @@ impl File {
                 _ => (buffer.index() + 1).to_string(),
             };
             let wrong = |what: String| Error::file(path, format!("buffer {name} {what}"));
+            if fallbacks.contains(&buffer.index()) {
+                return Ok(Vec::new());
+            }
             let data = uri::read(&buffer, folder, &mut blob)?.map_err(wrong)?;
             if data.len() < buffer.length() {
                 return Err(wrong(format!("has {} bytes, not {}", data.len(), buffer.length())));
@@ -60,7 +66,16 @@ impl File {
         buffers.iter().for_each(|buffer| {
             content.add(buffer);
         });
-        Ok(Self { document, buffers, content: content.finish() })
+        let mut decoded = HashMap::new();
+        for (view, found) in compressed {
+            let wrong = |what: String| Error::file(path, format!("compressed buffer view {view} {what}"));
+            let end = found.offset.saturating_add(found.length);
+            let data = buffers.get(found.buffer).and_then(|buffer| buffer.get(found.offset..end));
+            let data = data.ok_or_else(|| wrong("reaches beyond its buffer".into()))?;
+            decoded.insert(view, meshopt::decode(&found, data).map_err(wrong)?);
+        }
+        let content = content.finish();
+        Ok(Self { document, buffers, decoded, instances, zeros, has_materials, content })
     }
 
     /// The elements of an accessor as rows of `N` numbers; normalised integers become 0..=1 or -1..=1.
@@ -68,10 +83,6 @@ impl File {
     /// # Errors
     /// Another number of components; data that lies beyond its buffer; a number that is not finite.
     pub fn rows<const N: usize>(&self, accessor: &Accessor) -> std::result::Result<Vec<[f32; N]>, String> {
-        let place = format!("accessor {}", accessor.index());
-        if components(accessor.dimensions()) != N {
-            return Err(format!("{place} has not {N} components"));
-        }
         let scale = |value: f64| match (accessor.normalized(), accessor.data_type()) {
             (true, DataType::I8) => (value / 127.0).max(-1.0),
             (true, DataType::U8) => value / 255.0,
@@ -79,17 +90,74 @@ impl File {
             (true, DataType::U16) => value / 65535.0,
             _ => value,
         };
-        let row = |values: [f64; N]| values.map(|value| scale(value) as f32);
-        let beyond = || format!("{place} reaches beyond its buffer");
-        let mut rows: Vec<[f32; N]> = match accessor.view() {
+        let rows = self.values::<N>(accessor)?.into_iter();
+        let rows: Vec<[f32; N]> = rows.map(|values| values.map(|value| scale(value) as f32)).collect();
+        if rows.as_flattened().iter().any(|value| !value.is_finite()) {
+            return Err(format!("accessor {} has numbers that are not finite", accessor.index()));
+        }
+        Ok(rows)
+    }
+
+    /// The whole numbers of an accessor in rows of `N`: indices, joints.
+    ///
+    /// # Errors
+    /// As [`File::rows`].
+    pub fn indices<const N: usize>(&self, accessor: &Accessor) -> std::result::Result<Vec<[u32; N]>, String> {
+        let rows = self.values::<N>(accessor)?.into_iter();
+        Ok(rows.map(|row| row.map(|value| value as u32)).collect())
+    }
+
+    /// The transforms of the copies of a node's mesh, relative to the node; none where it is drawn once.
+    ///
+    /// # Errors
+    /// As [`File::rows`]; transforms of different counts.
+    pub fn instances(&self, node: usize) -> std::result::Result<Option<Vec<Local>>, String> {
+        let Some(found) = self.instances.get(&node) else { return Ok(None) };
+        let accessor =
+            |index: usize| self.document.accessors().nth(index).ok_or("instances name no accessor");
+        let triples = |index: Option<usize>| -> std::result::Result<_, String> {
+            index.map(|index| self.rows::<3>(&accessor(index)?)).transpose()
+        };
+        let (translations, scales) = (triples(found.translation)?, triples(found.scale)?);
+        let rotations = found.rotation.map(|index| self.rows::<4>(&accessor(index)?)).transpose()?;
+        let counts = [
+            translations.as_ref().map(Vec::len),
+            rotations.as_ref().map(Vec::len),
+            scales.as_ref().map(Vec::len),
+        ];
+        let mut counts = counts.into_iter().flatten();
+        let count = counts.next().unwrap_or(1);
+        if counts.any(|other| other != count) {
+            return Err(format!("the instances of node {node} have transforms of different counts"));
+        }
+        let vector = |rows: &Option<Vec<[f32; 3]>>, at: usize, default: f64| {
+            rows.as_ref().map_or(DVec3::repeat(default), |rows| DVec3::from(rows[at].map(f64::from)))
+        };
+        let turn =
+            |at: usize| rotations.as_ref().map_or([0.0, 0.0, 0.0, 1.0], |rows| rows[at].map(f64::from));
+        let local = |at: usize| Local {
+            translation: vector(&translations, at, 0.0),
+            rotation: rotation(turn(at)),
+            scale: vector(&scales, at, 1.0),
+            weights: Vec::new(),
+        };
+        Ok(Some((0..count).map(local).collect()))
+    }
+
+    /// The elements of an accessor as they are stored, with those that a sparse accessor replaces.
+    fn values<const N: usize>(&self, accessor: &Accessor) -> std::result::Result<Vec<[f64; N]>, String> {
+        let name = format!("accessor {}", accessor.index());
+        if components(accessor.dimensions()) != N {
+            return Err(format!("{name} has not {N} components"));
+        }
+        let beyond = || format!("{name} reaches beyond its buffer");
+        let view = accessor.view().filter(|_| !self.zeros.contains(&accessor.index()));
+        let mut rows = match view {
             Some(view) => self
                 .numbers::<N>(&view, accessor.offset(), accessor.count(), accessor.data_type())
-                .ok_or_else(beyond)?
-                .into_iter()
-                .map(row)
-                .collect(),
+                .ok_or_else(beyond)?,
             // Zeros that no data stands for: as many as there are vertices, and each of those has bytes somewhere.
-            None if accessor.count() > self.buffers.iter().map(Vec::len).sum() => return Err(beyond()),
+            None if accessor.count() > self.bytes() => return Err(beyond()),
             None => vec![[0.0; N]; accessor.count()],
         };
         if let Some(sparse) = accessor.sparse() {
@@ -103,29 +171,24 @@ impl File {
             let new =
                 self.numbers::<N>(&values.view(), values.offset(), sparse.count(), accessor.data_type());
             for ([index], values) in at.ok_or_else(beyond)?.into_iter().zip(new.ok_or_else(beyond)?) {
-                *rows.get_mut(index as usize).ok_or_else(beyond)? = row(values);
+                *rows.get_mut(index as usize).ok_or_else(beyond)? = values;
             }
-        }
-        if rows.as_flattened().iter().any(|value| !value.is_finite()) {
-            return Err(format!("{place} has numbers that are not finite"));
         }
         Ok(rows)
     }
 
-    /// The whole numbers of an accessor in rows of `N`: indices, joints.
-    ///
-    /// # Errors
-    /// As [`File::rows`].
-    pub fn indices<const N: usize>(&self, accessor: &Accessor) -> std::result::Result<Vec<[u32; N]>, String> {
-        let place = format!("accessor {}", accessor.index());
-        if components(accessor.dimensions()) != N {
-            return Err(format!("{place} has not {N} components"));
+    /// Bytes of all buffers and of what was decompressed.
+    fn bytes(&self) -> usize {
+        self.buffers.iter().chain(self.decoded.values()).map(Vec::len).sum()
+    }
+
+    /// The bytes of a buffer view; none when they lie beyond the data.
+    fn data(&self, view: &gltf::buffer::View) -> Option<&[u8]> {
+        if let Some(decoded) = self.decoded.get(&view.index()) {
+            return Some(decoded);
         }
-        let numbers = accessor.view().and_then(|view| {
-            self.numbers::<N>(&view, accessor.offset(), accessor.count(), accessor.data_type())
-        });
-        let numbers = numbers.ok_or_else(|| format!("{place} reaches beyond its buffer"))?;
-        Ok(numbers.into_iter().map(|row| row.map(|value| value as u32)).collect())
+        let buffer = self.buffers.get(view.buffer().index())?;
+        buffer.get(view.offset()..view.offset().checked_add(view.length())?)
     }
 
     /// Reads packed or strided numbers; none when they lie beyond the data.
@@ -146,8 +209,7 @@ impl File {
         if stride < size * N {
             return None;
         }
-        let buffer = self.buffers.get(view.buffer().index())?;
-        let data = buffer.get(view.offset()..view.offset().checked_add(view.length())?)?;
+        let data = self.data(view)?;
         let length = stride.checked_mul(count - 1)?.checked_add(size * N)?;
         let data = data.get(offset..offset.checked_add(length)?)?;
         let number = |at: usize| -> f64 {
@@ -164,44 +226,6 @@ impl File {
         let row = |index: usize| std::array::from_fn(|column| number(index * stride + column * size));
         Some((0..count).map(row).collect())
     }
-}
-
-/// Reads the JSON and checks that what it names is there.
-fn parse(bytes: &[u8]) -> std::result::Result<(Document, Option<Vec<u8>>), String> {
-    let said = |error: gltf::Error| one_line(&error.to_string());
-    let gltf::Gltf { document, blob } = gltf::Gltf::from_slice_without_validation(bytes).map_err(said)?;
-    let mut root = document.into_json();
-    // The check below looks at the bounds of positions before it knows that they are there, and insists on them;
-    // nothing here needs the bounds.
-    for attribute in root.meshes.iter().flat_map(|mesh| &mesh.primitives).flat_map(|p| p.attributes.values())
-    {
-        let accessor = root.accessors.get_mut(attribute.value()).ok_or("an attribute names no accessor")?;
-        accessor.min = Some(vec![0.0; 3].into());
-        accessor.max = Some(vec![0.0; 3].into());
-    }
-    let (nodes, accessors) = (root.nodes.len(), root.accessors.len());
-    for animation in &mut root.animations {
-        // Extensions animate other properties than a node's: they move no vertex.
-        animation.channels.retain(|channel| matches!(channel.target.path, Checked::Valid(_)));
-        let samplers = animation.samplers.len();
-        if animation.channels.iter().any(|channel| channel.sampler.value() >= samplers) {
-            return Err("a channel names no sampler".into());
-        }
-        if animation.channels.iter().any(|channel| channel.target.node.value() >= nodes) {
-            return Err("a channel names no node".into());
-        }
-        let keys = animation.samplers.iter().flat_map(|sampler| [sampler.input, sampler.output]);
-        if keys.into_iter().any(|accessor| accessor.value() >= accessors) {
-            return Err("the sampler of an animation names no accessor".into());
-        }
-    }
-    let targets =
-        root.meshes.iter().flat_map(|mesh| &mesh.primitives).flat_map(|p| p.targets.iter().flatten());
-    let mut named = targets.flat_map(|target| [target.positions, target.normals, target.tangents]).flatten();
-    if named.any(|accessor| accessor.value() >= accessors) {
-        return Err("a morph target names no accessor".into());
-    }
-    Ok((Document::from_json(root).map_err(said)?, blob))
 }
 
 /// A .glb says its own length.

@@ -5,10 +5,13 @@
 
 mod clip;
 mod file;
+mod json;
+mod meshopt;
 mod nodes;
 mod skin;
 mod uri;
 
+use std::collections::HashMap;
 use std::path::Path;
 
 use super::{Drawn, Motion};
@@ -153,7 +156,7 @@ impl Character {
     /// A file that is cut short or malformed.
     pub fn extras(path: &Path) -> Result<Vec<&'static str>> {
         caught(path, || {
-            let document = File::open(path)?.document;
+            let File { document, has_materials, .. } = File::open(path)?;
             let has = |wanted: fn(&gltf::Semantic) -> bool| {
                 let mut parts = document.meshes().flat_map(|mesh| mesh.primitives());
                 parts.any(|part| part.attributes().any(|(name, _)| wanted(&name)))
@@ -163,7 +166,7 @@ impl Character {
                 (has(|name| matches!(name, gltf::Semantic::TexCoords(1..))), "further UVs"),
                 (has(|name| matches!(name, gltf::Semantic::Normals)), "normals"),
                 (has(|name| matches!(name, gltf::Semantic::Colors(_))), "colours"),
-                (document.materials().next().is_some(), "materials"),
+                (has_materials, "materials"),
             ];
             Ok(there.into_iter().filter(|(there, _)| *there).map(|(_, name)| name).collect())
         })
@@ -346,10 +349,26 @@ fn tree(file: &File, nodes: &[Node]) -> Vec<(String, usize, bool)> {
     out
 }
 
+/// A name for each clip: its own, or its index where it has none; clips that share a name are numbered: "go #1", "go #2".
 fn clip_names(file: &File) -> Vec<String> {
-    let name =
+    let own =
         |clip: gltf::Animation| clip.name().map_or_else(|| format!("clip {}", clip.index()), str::to_string);
-    file.document.animations().map(name).collect()
+    let own: Vec<String> = file.document.animations().map(own).collect();
+    let mut taken: HashMap<&str, usize> = HashMap::new();
+    own.iter().for_each(|name| *taken.entry(name).or_default() += 1);
+    let mut names: Vec<String> = Vec::new();
+    for name in &own {
+        let mut numbered = name.clone();
+        let mut number = 1;
+        while taken[name.as_str()] > 1
+            && (numbered == *name || taken.contains_key(&*numbered) || names.contains(&numbered))
+        {
+            numbered = format!("{name} #{number}");
+            number += 1;
+        }
+        names.push(numbered);
+    }
+    names
 }
 
 fn clip(file: &File, name: Option<&str>) -> std::result::Result<Option<Clip>, String> {
@@ -360,10 +379,13 @@ fn clip(file: &File, name: Option<&str>) -> std::result::Result<Option<Clip>, St
         (None, 1) => 0,
         (None, count) => return Err(format!("has {count} clips and none is chosen; they are {}", there())),
         (Some(name), 0) => return Err(format!("has no clip \"{name}\", and no other")),
-        (Some(name), _) => names
-            .iter()
-            .position(|own| own == name)
-            .ok_or_else(|| format!("has no clip \"{name}\"; its clips are {}", there()))?,
+        (Some(name), _) => names.iter().position(|own| own == name).ok_or_else(|| {
+            let same = file.document.animations().filter(|clip| clip.name() == Some(name)).count();
+            match same {
+                0 => format!("has no clip \"{name}\"; its clips are {}", there()),
+                _ => format!("has {same} clips \"{name}\": choose one of {}", there()),
+            }
+        })?,
     };
     let animation = file.document.animations().nth(number).ok_or("has no such clip")?;
     let clip = Clip::read(file, &animation).map_err(|what| format!("clip \"{}\": {what}", names[number]))?;

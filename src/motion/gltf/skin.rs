@@ -1,6 +1,7 @@
 //! The vertices: morphed by their targets, carried by their joints or by their node.
 
 use std::collections::HashMap;
+use std::ops::Range;
 
 use gltf::Semantic;
 use gltf::mesh::Mode;
@@ -16,10 +17,18 @@ struct Skin {
     inverse_bind: Vec<Matrix4<f64>>,
 }
 
+/// Most triangles, or vertices, that copies of a mesh may have.
+const MOST_COPIED: usize = 1 << 25;
+
 /// Vertices of one node that move alike: all by joints of one skin, or all by the node.
+#[derive(Clone)]
 struct Part {
     node: usize,
     skin: Option<usize>,
+    /// Where this copy of the mesh is, relative to the node; none where there is one.
+    instance: Option<Matrix4<f64>>,
+    /// Its triangles in the whole.
+    triangles: Range<usize>,
     /// Numbers of its vertices in the whole: `first..first + rest.len()`.
     first: usize,
     rest: Vec<DVec3>,
@@ -90,9 +99,17 @@ impl Vertices {
         }
         for node in file.document.nodes().filter(|node| wanted(node.index())) {
             let Some(mesh) = node.mesh() else { continue };
+            // A skin puts vertices where its joints are, whatever the node's transform.
+            let instances = if node.skin().is_some() { None } else { file.instances(node.index())? };
+            if instances.as_ref().is_some_and(Vec::is_empty) {
+                continue;
+            }
+            let begin = [out.triangles.len(), out.drawn.vertices.len(), out.drawn.triangles.len()];
             let part = Part {
                 node: node.index(),
                 skin: node.skin().map(|skin| skin.index()),
+                instance: instances.as_ref().map(|instances| instances[0].matrix()),
+                triangles: begin[0]..begin[0],
                 first: out.count,
                 rest: Vec::new(),
                 deltas: Vec::new(),
@@ -107,8 +124,41 @@ impl Vertices {
                     format!("mesh \"{}\": {what}", mesh.name().or(node.name()).unwrap_or("without a name"))
                 })?;
             }
+            out.parts.last_mut().expect("just added").triangles.end = out.triangles.len();
+            if let Some([_, copies @ ..]) = instances.as_deref() {
+                out.copy_last(copies, begin)?;
+            }
         }
         Ok(out)
+    }
+
+    /// Adds copies of the last part, whose triangles, drawn vertices and drawn triangles begin at `begin`.
+    fn copy_last(&mut self, copies: &[Local], begin: [usize; 3]) -> Result<(), String> {
+        let original = self.parts.last().expect("a part to copy").clone();
+        let [triangles, corners] = [original.triangles.len(), self.drawn.vertices.len() - begin[1]];
+        if triangles.max(corners).saturating_mul(copies.len()) > MOST_COPIED {
+            return Err(format!(
+                "its {} instances of {triangles} triangles are more than {MOST_COPIED} triangles",
+                copies.len() + 1
+            ));
+        }
+        for copy in copies {
+            let shift = (self.count - original.first) as u32;
+            let first = self.triangles.len();
+            let shifted = |triangle: &[u32; 3], by: u32| triangle.map(|vertex| vertex + by);
+            for at in original.triangles.clone() {
+                self.triangles.push(shifted(&self.triangles[at], shift));
+            }
+            self.drawn.copy(begin[1]..begin[1] + corners, begin[2]..begin[2] + triangles, shift);
+            self.parts.push(Part {
+                instance: Some(copy.matrix()),
+                triangles: first..self.triangles.len(),
+                first: self.count,
+                ..original.clone()
+            });
+            self.count += original.rest.len();
+        }
+        Ok(())
     }
 
     /// Adds a primitive's corners and triangles to the last part.
@@ -172,18 +222,31 @@ impl Vertices {
         self.drawn.add(file, primitive, &numbers, &own)
     }
 
-    /// Flips the triangles of parts whose node mirrors them, as glTF requires.
+    /// Flips the triangles of parts that the transforms of their node or of their joints mirror.
     pub fn face_outward(&mut self, globals: &[Matrix4<f64>]) {
-        for part in self.parts.iter().filter(|part| part.skin.is_none()) {
-            if globals[part.node].fixed_view::<3, 3>(0, 0).determinant() < 0.0 {
-                let own = part.first as u32..(part.first + part.rest.len()) as u32;
-                let both = self.triangles.iter_mut().zip(&mut self.drawn.triangles);
-                both.filter(|(triangle, _)| own.contains(&triangle[0])).for_each(|(triangle, drawn)| {
-                    triangle.swap(1, 2);
-                    drawn.swap(1, 2);
-                });
+        for part in &self.parts {
+            if self.is_mirrored(part, globals) {
+                let own = part.triangles.clone();
+                self.triangles[own.clone()].iter_mut().for_each(|triangle| triangle.swap(1, 2));
+                self.drawn.triangles[own].iter_mut().for_each(|triangle| triangle.swap(1, 2));
             }
         }
+    }
+
+    /// Whether the transforms of a part turn its faces round: of a skinned one most of its vertices by weight, wherever in the
+    /// tree the mirroring node is.
+    fn is_mirrored(&self, part: &Part, globals: &[Matrix4<f64>]) -> bool {
+        let handedness = |matrix: Matrix4<f64>| {
+            let determinant = matrix.fixed_view::<3, 3>(0, 0).determinant();
+            if determinant == 0.0 { 0.0 } else { determinant.signum() }
+        };
+        let Some(skin) = part.skin.map(|skin| &self.skins[skin]) else {
+            return handedness(part.node_matrix(globals)) < 0.0;
+        };
+        let pairs = skin.joints.iter().zip(&skin.inverse_bind);
+        let joints: Vec<f64> = pairs.map(|(&joint, inverse)| handedness(globals[joint] * inverse)).collect();
+        let weighted = part.influences.iter().map(|&(joint, weight)| joints[joint as usize] * weight);
+        weighted.sum::<f64>() < 0.0
     }
 
     /// World positions of all vertices (the file's unit).
@@ -201,7 +264,7 @@ impl Vertices {
             .collect();
         for part in &self.parts {
             let weights = &locals[part.node].weights;
-            let node = [upper(globals[part.node])];
+            let node = [upper(part.node_matrix(globals))];
             let matrices = part.skin.map_or(&node[..], |skin| &skins[skin]);
             for (vertex, rest) in part.rest.iter().enumerate() {
                 let moved = part.deltas.iter().zip(weights).filter(|(_, weight)| **weight != 0.0);
@@ -221,7 +284,28 @@ impl Vertices {
     }
 }
 
+impl Part {
+    /// What carries its vertices where it has no skin.
+    fn node_matrix(&self, globals: &[Matrix4<f64>]) -> Matrix4<f64> {
+        self.instance.map_or(globals[self.node], |instance| globals[self.node] * instance)
+    }
+}
+
 impl Sheet {
+    /// Adds a copy of some vertices and of the triangles over them; `shift` is from the index of a moving vertex to its copy's.
+    fn copy(&mut self, vertices: Range<usize>, triangles: Range<usize>, shift: u32) {
+        let by = (self.vertices.len() - vertices.start) as u32;
+        for at in triangles {
+            self.triangles.push(self.triangles[at].map(|vertex| vertex + by));
+        }
+        if let Some(uvs) = &mut self.uvs {
+            uvs.places.extend_from_within(vertices.clone());
+        }
+        for at in vertices {
+            self.vertices.push(self.vertices[at] + shift);
+        }
+    }
+
     /// Adds a primitive: its vertices, by what moves like them, and its triangles over those.
     fn add(
         &mut self,

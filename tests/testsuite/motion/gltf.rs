@@ -2,7 +2,7 @@
 
 use std::f64::consts::PI;
 use std::fs;
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
 use crate::common::character;
 use crate::common::hero;
@@ -10,112 +10,10 @@ use frazil::base::DVec3;
 use frazil::motion::{Character, Key, Keys, Motion, Placed, Play, Space};
 use frazil::sweep::Body;
 use proptest::prelude::*;
-use serde_json::{Value, json};
+use serde_json::json;
 use tempfile::TempDir;
 
-/// A glTF file in the making: its JSON and its one buffer.
-struct Maker {
-    json: Value,
-    bytes: Vec<u8>,
-}
-
-impl Maker {
-    /// A file whose scene has node 0.
-    fn new() -> Self {
-        let json = json!({
-            "asset": { "version": "2.0" }, "scene": 0, "scenes": [{ "nodes": [0] }],
-            "nodes": [], "meshes": [], "skins": [], "animations": [], "accessors": [], "bufferViews": [],
-        });
-        Self { json, bytes: Vec::new() }
-    }
-
-    fn accessor(&mut self, kind: u32, shape: &str, count: usize, bytes: &[u8]) -> usize {
-        self.bytes.resize(self.bytes.len().next_multiple_of(4), 0);
-        let list = |name: &str, json: &Value| json[name].as_array().unwrap().len();
-        let view = list("bufferViews", &self.json);
-        let number = list("accessors", &self.json);
-        let view_json = json!({ "buffer": 0, "byteOffset": self.bytes.len(), "byteLength": bytes.len() });
-        let mut accessor =
-            json!({ "bufferView": view, "componentType": kind, "type": shape, "count": count });
-        // The specification asks for the bounds of positions.
-        accessor["min"] = json!([0, 0, 0]);
-        accessor["max"] = json!([1, 1, 1]);
-        self.push("bufferViews", view_json);
-        self.push("accessors", accessor);
-        self.bytes.extend_from_slice(bytes);
-        number
-    }
-
-    fn floats(&mut self, shape: &str, count: usize, values: &[f32]) -> usize {
-        let bytes: Vec<u8> = values.iter().flat_map(|value| value.to_le_bytes()).collect();
-        self.accessor(5126, shape, count, &bytes)
-    }
-
-    fn push(&mut self, list: &str, value: Value) {
-        self.json[list].as_array_mut().unwrap().push(value);
-    }
-
-    /// A channel of the last clip.
-    fn channel(&mut self, node: usize, path: &str, how: &str, times: &[f32], values: &[f32]) {
-        let (shape, width) = match path {
-            "weights" => ("SCALAR", 1),
-            "rotation" => ("VEC4", 4),
-            _ => ("VEC3", 3),
-        };
-        let input = self.floats("SCALAR", times.len(), times);
-        let output = self.floats(shape, values.len() / width, values);
-        let animation = self.json["animations"].as_array_mut().unwrap().last_mut().unwrap();
-        let sampler = animation["samplers"].as_array().unwrap().len();
-        let samplers = animation["samplers"].as_array_mut().unwrap();
-        samplers.push(json!({ "input": input, "output": output, "interpolation": how }));
-        let channels = animation["channels"].as_array_mut().unwrap();
-        channels.push(json!({ "sampler": sampler, "target": { "node": node, "path": path } }));
-    }
-
-    fn clip(&mut self, name: &str) {
-        self.push("animations", json!({ "name": name, "samplers": [], "channels": [] }));
-    }
-
-    /// A mesh of one triangle (0 0 0), (1 0 0), (0 1 0).
-    fn triangle(&mut self) -> usize {
-        let positions = self.floats("VEC3", 3, &[0., 0., 0., 1., 0., 0., 0., 1., 0.]);
-        self.push("meshes", json!({ "primitives": [{ "attributes": { "POSITION": positions } }] }));
-        self.json["meshes"].as_array().unwrap().len() - 1
-    }
-
-    fn glb(&self) -> Vec<u8> {
-        let mut json = self.json.clone();
-        json["buffers"] = json!([{ "byteLength": self.bytes.len() }]);
-        // Empty lists are not allowed.
-        for list in ["skins", "animations", "accessors", "bufferViews", "meshes"] {
-            if json[list].as_array().is_some_and(Vec::is_empty) {
-                json.as_object_mut().unwrap().remove(list);
-            }
-        }
-        let padded = |mut bytes: Vec<u8>, with: u8| {
-            bytes.resize(bytes.len().next_multiple_of(4), with);
-            bytes
-        };
-        let (json, bytes) = (padded(json.to_string().into_bytes(), b' '), padded(self.bytes.clone(), 0));
-        let mut out = b"glTF".to_vec();
-        let total = 12 + 8 + json.len() + 8 + bytes.len();
-        for word in [2, total as u32, json.len() as u32] {
-            out.extend(word.to_le_bytes());
-        }
-        out.extend(b"JSON");
-        out.extend(json);
-        out.extend((bytes.len() as u32).to_le_bytes());
-        out.extend(b"BIN\0");
-        out.extend(bytes);
-        out
-    }
-
-    fn write(&self, folder: &TempDir) -> PathBuf {
-        let path = folder.path().join("made.glb");
-        fs::write(&path, self.glb()).unwrap();
-        path
-    }
-}
+use crate::common::gltf_maker::Maker;
 
 fn open(path: &Path) -> Character {
     Character::open(path, Play { repeat: false, ..Play::default() }).unwrap()
