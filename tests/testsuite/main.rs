@@ -50,6 +50,7 @@ mod io {
     mod files;
     mod particles;
     mod particles_damage;
+    mod text_variants;
     mod uvs;
 }
 mod motion {
