@@ -43,6 +43,7 @@ mod house {
     mod gates;
     mod imports;
     mod readers;
+    mod tracked;
 }
 mod io {
     mod arrays;
