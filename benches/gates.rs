@@ -102,6 +102,8 @@ mod rebuilt_sequences;
 mod rebuilt_speed;
 #[path = "gates/rebuilt_topology.rs"]
 mod rebuilt_topology;
+#[path = "gates/reliability/guard_page.rs"]
+mod reliability_guard_page;
 #[path = "gates/repair.rs"]
 mod repair;
 #[path = "gates/rest.rs"]
@@ -229,6 +231,7 @@ fn main() {
     volumes::run(&mut h);
     capi::run(&mut h);
     cancel::run(&mut h);
+    reliability_guard_page::run(&mut h);
     flip::run(&mut h);
     far::run(&mut h);
     band::run(&mut h);

@@ -487,4 +487,6 @@ pub const GATES: &[Gate] = &[
     gate("shallow.lift_discarded", "%", Most(1.0), Most(0.1)),
     gate("shallow.surface_rim", "cells", Most(0.05), Most(0.01)),
     gate("shallow.surface_jump", "cells", Most(0.05), Most(0.01)),
+    // Structs of callers: functions that write them x sizes that they are told, with something written outside.
+    none("reliability.guard_page", "writes"),
 ];
