@@ -70,6 +70,8 @@ mod mist_passes;
 mod mist_walls;
 #[path = "gates/oracle.rs"]
 mod oracle;
+#[path = "gates/reliability/orientation.rs"]
+mod orientation;
 #[path = "gates/particles.rs"]
 mod particles;
 #[path = "gates/passes.rs"]
@@ -281,6 +283,7 @@ fn main() {
     shallow_whole::run(&mut h);
     shallow_threads::run(&mut h);
     easing::run(&mut h);
+    orientation::run(&mut h);
     house::run(&mut h);
     h.finish();
 }

@@ -3479,7 +3479,8 @@ frz_status frz_body_init(frz_body *body, size_t size);
 /**
  * Makes a level set of the solid that a mesh bounds: points that its faces wind around.
  *
- * The mesh may be open (open loops are closed), cross itself, and have faces that are doubled or reversed.
+ * The mesh may be open (open loops are closed), cross itself, and have faces that are doubled or reversed: closed parts are turned
+ * outward, doubled faces count once, and what of that cannot be decided is a warning.
  *
  * mesh: with at least one face.
  * voxel_size: edge of a voxel (m), 1e-6 to 1000.

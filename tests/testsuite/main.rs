@@ -12,6 +12,7 @@ mod program;
 mod base {
     mod faults;
     mod meshes;
+    mod orientation;
 }
 mod capi {
     mod header;
