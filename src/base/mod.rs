@@ -7,6 +7,8 @@ pub mod bytes;
 #[doc(hidden)]
 pub mod cpu;
 pub mod deviation;
+#[doc(hidden)]
+pub mod digits;
 pub mod doubles;
 pub(crate) mod ears;
 pub mod edges;

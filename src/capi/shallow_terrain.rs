@@ -93,7 +93,8 @@ impl Terrain {
         heights: Heights,
     ) -> Outcome<(Self, Solids)> {
         let solids = ctx.phase("sample", || {
-            sampler::solids(grid, heights, level_set.voxel_size(), |places, distances| {
+            let (voxel, between) = (level_set.voxel_size(), level_set.heights());
+            sampler::solids(grid, heights, voxel, between, |places, distances| {
                 ctx.check()?;
                 level_set.sample_linear(ctx, places, distances)
             })
@@ -362,9 +363,9 @@ pub(super) unsafe fn read_heights(
 #[repr(u32)]
 #[derive(Clone, Copy)]
 pub enum frz_shallow_shape {
-    /// A ball.
+    /// A sphere.
     FRZ_SHALLOW_SPHERE = 0,
-    /// All places within a distance of a line: a ball on its way from end to end.
+    /// All places within a distance of a line: a sphere on its way from end to end.
     FRZ_SHALLOW_CAPSULE = 1,
     /// A box in any orientation.
     FRZ_SHALLOW_BOX = 2,
@@ -390,7 +391,7 @@ pub struct frz_shallow_body {
     pub at: [f64; 3],
     /// The other end of a capsule's line (m); of others it is not looked at.
     pub end: [f64; 3],
-    /// Radius of a ball or capsule (m), over 0; of a box it is not looked at.
+    /// Radius of a sphere or capsule (m), over 0; of a box it is not looked at.
     pub radius: f64,
     /// Half of a box's length along each of its axes (m), over 0; of others it is not looked at.
     pub half: [f64; 3],

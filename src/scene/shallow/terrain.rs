@@ -116,8 +116,11 @@ impl Terrain {
             }
             #[cfg(feature = "vdb")]
             Self::Grid(level_set) => {
-                let voxel = level_set.voxel_size();
-                sampler::solids(grid, heights, voxel, |places, out| level_set.sample_linear(ctx, places, out))
+                let (voxel, between) = (level_set.voxel_size(), level_set.heights());
+                sampler::solids(grid, heights, voxel, between, |places, out| {
+                    ctx.check()?;
+                    level_set.sample_linear(ctx, places, out)
+                })
             }
         }
     }
