@@ -15,7 +15,7 @@ pub enum Kind {
     Doubtful,
 }
 
-/// A mesh around the origin, within 0.45 m in x and 0.2 m in y and z.
+/// A mesh around the origin, within 0.43 m in x and 0.22 m in y and z.
 pub struct Case {
     pub name: String,
     pub kind: Kind,
@@ -33,7 +33,7 @@ pub struct Case {
 /// How far bodies move along z (m).
 pub const MOVE: f64 = 0.02;
 /// Sizes of a cavity and of the solid in it, over the outer one's.
-const NESTED: [f64; 3] = [1.0, 0.7, 0.4];
+const NESTED: [f64; 3] = [1.0, 0.7, 0.5];
 
 /// Numbers from a seed.
 pub struct Random(u64);
@@ -55,7 +55,8 @@ struct Root {
     /// Half an edge of a box or the radius of a ball (m).
     size: f64,
     is_ball: bool,
-    x: f64,
+    /// Its middle (m).
+    at: [f64; 3],
     /// 1 to 3 surfaces.
     levels: usize,
 }
@@ -68,7 +69,8 @@ impl Root {
         } else {
             shapes::cuboid([2.0 * size; 3])
         };
-        mesh.positions.iter_mut().for_each(|p| p.x += self.x as f32);
+        let at = Vec3::from(self.at.map(|x| x as f32));
+        mesh.positions.iter_mut().for_each(|p| *p += at);
         if level == 1 { mesh.reversed() } else { mesh }
     }
 
@@ -91,11 +93,11 @@ pub fn case(seed: u64) -> Case {
     let mut random = Random::new(seed);
     let count = 1 + random.below(2) as usize;
     let mut roots: Vec<Root> = (0..count)
-        .map(|at| Root {
-            size: 0.15 + 0.05 * random.below(2) as f64,
-            is_ball: random.below(2) == 1,
-            x: if count == 1 { 0.0 } else { 0.46 * at as f64 - 0.23 },
-            levels: 1 + random.below(3) as usize,
+        .map(|at| {
+            let x = if count == 1 { 0.0 } else { 0.46 * at as f64 - 0.23 };
+            let [y, z] = [(); 2].map(|()| 0.01 * random.below(5) as f64 - 0.02);
+            let (is_ball, levels) = (random.below(2) == 1, 1 + random.below(3) as usize);
+            Root { size: 0.2, is_ball, at: [x, y, z], levels }
         })
         .collect();
     let variant = seed % 10;
@@ -103,7 +105,7 @@ pub fn case(seed: u64) -> Case {
     if which == 9 {
         roots[0].levels = 2;
     } else if which > 9 {
-        roots = vec![Root { size: 0.1875, is_ball: false, x: 0.1875, levels: 1 }];
+        roots = vec![Root { size: 0.1875, is_ball: false, at: [0.1875, 0.0, 0.0], levels: 1 }];
     }
     let mut mesh = TriMesh::default();
     let (mut volume, mut swept, mut seen) = (0.0, 0.0, [0.0; 2]);

@@ -20,14 +20,14 @@ const DECIDABLE: &str = "reliability.orientation_decidable";
 const CORRECT: &str = "reliability.orientation_correct";
 /// Meshes, each through every door.
 const MESHES: u64 = 200;
-const CELL: f64 = 0.0125;
+const CELL: f64 = 0.01;
 /// Edge of a cell of the shallow system (m): all boxes end between the middles of cells.
 const COLUMN: f64 = 0.005;
 /// Half the extent (m) of layers along x and along z.
 const HALF: [f64; 2] = [0.6, 0.36];
 /// Depth of the snow on what stands in the air (m).
 const DEPTH: f64 = 0.3;
-/// Error of a volume (of what is meant) that is none; the smallest surface is more.
+/// Error of a volume (of what is meant) that is none; the smallest surface is more than twice as much.
 const TOLERANCE: f64 = 0.03;
 
 /// What a door makes of a mesh: its volume beside the one that is meant (m3), and a warning.
