@@ -70,6 +70,8 @@ mod mist_passes;
 mod mist_walls;
 #[path = "gates/oracle.rs"]
 mod oracle;
+#[path = "gates/reliability/orientation.rs"]
+mod orientation;
 #[path = "gates/particles.rs"]
 mod particles;
 #[path = "gates/passes.rs"]
@@ -106,6 +108,8 @@ mod rebuilt_topology;
 mod reliability_bugs;
 #[path = "gates/reliability/gltf_valid.rs"]
 mod reliability_gltf_valid;
+#[path = "gates/reliability/guard_page.rs"]
+mod reliability_guard_page;
 #[path = "gates/repair.rs"]
 mod repair;
 #[path = "gates/rest.rs"]
@@ -233,6 +237,7 @@ fn main() {
     volumes::run(&mut h);
     capi::run(&mut h);
     cancel::run(&mut h);
+    reliability_guard_page::run(&mut h);
     flip::run(&mut h);
     far::run(&mut h);
     band::run(&mut h);
@@ -284,6 +289,7 @@ fn main() {
     easing::run(&mut h);
     reliability_bugs::run(&mut h);
     reliability_gltf_valid::run(&mut h);
+    orientation::run(&mut h);
     house::run(&mut h);
     h.finish();
 }

@@ -45,7 +45,7 @@
 /**
  * Version of the interface that this header describes: major << 16 | minor.
  */
-#define FRZ_ABI_VERSION 65544
+#define FRZ_ABI_VERSION 0x10008
 
 /**
  * Version of frazil that this header belongs to.
@@ -787,11 +787,11 @@ enum frz_shallow_shape
 #endif // defined(__cplusplus) || __STDC_VERSION__ >= 202311L
  {
     /**
-     * A ball.
+     * A sphere.
      */
     FRZ_SHALLOW_SPHERE = 0,
     /**
-     * All places within a distance of a line: a ball on its way from end to end.
+     * All places within a distance of a line: a sphere on its way from end to end.
      */
     FRZ_SHALLOW_CAPSULE = 1,
     /**
@@ -1058,8 +1058,10 @@ typedef struct frz_pool frz_pool;
  * system call but that for the thread's clock where a step has a budget. Only where there is more than ever before, more columns because
  * a body uncovers another layer, say, memory grows; so may what fails.
  *
- * A cancel is looked at once, at the beginning of such a call. It has no phases, which all other work has: frz_context_progress and
- * frz_context_timings do not see it. Phases take locks and memory, and a poll between them may take longer than the few milliseconds
+ * A cancel is looked at at the beginning of such a call, and in the course of a frame that may take long: one of exact steps, of over some two million columns
+ * times steps, or with many full columns. Such a frame begins with a copy of what it changes, and is as if it had not begun when it is cancelled. None of these calls
+ * has phases, which all other work has: frz_context_progress and
+ * frz_context_timings do not see them. Phases take locks and memory, and a poll between them may take longer than the few milliseconds
  * that a frame has.
  */
 typedef struct frz_shallow frz_shallow;
@@ -2413,7 +2415,7 @@ typedef struct {
      */
     double end[3];
     /**
-     * Radius of a ball or capsule (m), over 0; of a box it is not looked at.
+     * Radius of a sphere or capsule (m), over 0; of a box it is not looked at.
      */
     double radius;
     /**
@@ -3479,7 +3481,8 @@ frz_status frz_body_init(frz_body *body, size_t size);
 /**
  * Makes a level set of the solid that a mesh bounds: points that its faces wind around.
  *
- * The mesh may be open (open loops are closed), cross itself, and have faces that are doubled or reversed.
+ * The mesh may be open (open loops are closed), cross itself, and have faces that are doubled or reversed: closed parts are turned
+ * outward, doubled faces count once, and what of that cannot be decided is a warning.
  *
  * mesh: with at least one face.
  * voxel_size: edge of a voxel (m), 1e-6 to 1000.
@@ -4415,7 +4418,7 @@ frz_status frz_shallow_set_params(frz_shallow *shallow, const frz_shallow_params
 /**
  * Computes a frame, in real time (frz_shallow). It is divided into steps as frz_shallow_params.pace says.
  *
- * dt: length of the frame (s), over 0, up to 1e6.
+ * dt: length of the frame (s), 1e-12 to 1e6. FRZ_ERROR_ARGUMENT, too, where it would take over a million steps: the liquid is then as it was.
  * budget_seconds: CPU time of this thread (s), or time where several threads work, after which no step begins, 0 to 1e6; 0: as much as
  *     it takes. The rest of the frame is then left out (frz_shallow_report.dropped), never any liquid. At least one step is made. With
  *     frz_shallow_last_steps and frz_shallow_replay such a frame can be made again.
@@ -4433,7 +4436,7 @@ frz_status frz_shallow_step(frz_context *context,
  * Computes a frame of given steps, in real time (frz_shallow): from the same state, with the same parameters, flow points and
  * bodies it becomes the same bytes as the frame that they were reported of.
  *
- * steps: double for each step, its length (s), over 0, as frz_shallow_last_steps has listed them: 1 to 1000000, together up to 1e6 s.
+ * steps: double for each step, its length (s), 1e-12 to 1e6, as frz_shallow_last_steps has listed them: 1 to 1000000, together up to 1e6 s.
  * report: receives what was done, all zeroes after a failure; may be NULL. Its struct_size is set by the caller.
  *
  * One thread at a time.
@@ -5135,7 +5138,7 @@ frz_status frz_shallow_detail_get_near(const frz_shallow_detail *detail, double 
 /**
  * Computes a frame, in real time (frz_shallow_detail), as frz_shallow_step does without a budget.
  *
- * dt: length of the frame (s), over 0, up to 1e6.
+ * dt: as there.
  * report: receives what was done, all zeroes after a failure; may be NULL. Its struct_size is set by the caller.
  *
  * One thread at a time.

@@ -490,4 +490,11 @@ pub const GATES: &[Gate] = &[
     gate("shallow.lift_discarded", "%", Most(1.0), Most(0.1)),
     gate("shallow.surface_rim", "cells", Most(0.05), Most(0.01)),
     gate("shallow.surface_jump", "cells", Most(0.05), Most(0.01)),
+    // Structs of callers: functions that write them x sizes that they are told, with something written outside.
+    none("reliability.guard_page", "writes"),
+    // 200 meshes whose parts are turned, doubled or mixed, through every door: wrong without a warning; those that mean one solid, but
+    // not right or warned of; right ones that are warned of or refused.
+    none("reliability.orientation_silent", "cases"),
+    none("reliability.orientation_decidable", "cases"),
+    none("reliability.orientation_correct", "cases"),
 ];

@@ -119,12 +119,17 @@ impl Bvh {
     /// origin. A ray that meets a common edge of triangles counts both.
     pub fn surrounding(&self, origin: DVec3, direction: DVec3) -> i32 {
         let mut sum = 0;
+        self.crossings(origin, direction, |_, way| sum += way);
+        sum
+    }
+
+    /// Shows all triangles that a ray passes through, with 1 where it leaves through their front and -1 where it enters.
+    pub fn crossings(&self, origin: DVec3, direction: DVec3, mut see: impl FnMut(usize, i32)) {
         self.walk(origin, direction, f64::INFINITY, |hit| {
             let [a, b, c] = self.corners[hit.triangle].map(|corner| corner.cast::<f64>());
-            sum += if (b - a).cross(&(c - a)).dot(&direction) > 0.0 { 1 } else { -1 };
+            see(hit.triangle, if (b - a).cross(&(c - a)).dot(&direction) > 0.0 { 1 } else { -1 });
             Some(f64::INFINITY)
         });
-        sum
     }
 
     /// Calls `see` with hits; it returns the new limit, or none to stop.

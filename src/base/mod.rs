@@ -7,7 +7,11 @@ pub mod bytes;
 #[doc(hidden)]
 pub mod cpu;
 pub mod deviation;
+#[doc(hidden)]
+pub mod digits;
+pub mod doubles;
 pub(crate) mod ears;
+pub mod edges;
 pub mod faults;
 #[doc(hidden)]
 pub mod lanes;
@@ -16,6 +20,7 @@ pub mod mesh;
 pub(crate) mod monotone;
 mod near;
 pub mod orient;
+pub mod orientation;
 pub mod packed;
 pub mod points;
 pub mod polygons;

@@ -11,6 +11,7 @@ use super::guard::{Failure, Outcome, frz_status, guard};
 use super::handle::{Noun, change, destroy, read};
 use super::saved::{Saved, resumed};
 use super::views::{Sized32, fill, frz_view, sized, within};
+use crate::base::digits;
 use crate::context::Context;
 use crate::snow::grains::{Base, Grains, Surroundings, memory};
 use crate::vdb::{FloatGrid, GridClass};
@@ -161,6 +162,8 @@ const RADII: [f64; 2] = [0.02, 0.5];
 fn check_size(radius: f64, voxel: f64) -> Outcome {
     let [low, high] = RADII.map(|part| part * voxel);
     if radius < low || radius > high {
+        let [radius, voxel] = [radius, voxel].map(digits::given);
+        let [low, high] = [low, high].map(digits::end);
         let text = format!(
             "radius = {radius} is not within {low} to {high} m, as the base layer's voxels of {voxel} m want it"
         );

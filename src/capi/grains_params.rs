@@ -183,7 +183,7 @@ pub unsafe extern "C" fn frz_grains_params_of_snow(
             now.params()?;
             now.attraction = grain_cohesion::of_wall(stands, 2.0 * now.radius, repose_angle_deg).min(1000.0);
             now.friction = grain_friction::of_repose(repose_angle_deg, now.attraction > 0.0);
-            to.write_unaligned(now);
+            fill(to, None, now)?;
         }
         Ok(())
     })

@@ -10,6 +10,7 @@ use super::views::{finite, frz_view, meaning};
 use crate::base::DVec3;
 use crate::context::Context;
 use crate::error::{Error, Result};
+use crate::motion::{Keys, Rigid};
 use crate::snow::{NoiseParams, base_layer};
 use crate::sweep::{self, Body, Settings, surface_bytes};
 use crate::vdb::level_set::{self, Scheme};
@@ -136,7 +137,8 @@ unsafe fn changes(
 
 /// Makes a level set of the solid that a mesh bounds: points that its faces wind around.
 ///
-/// The mesh may be open (open loops are closed), cross itself, and have faces that are doubled or reversed.
+/// The mesh may be open (open loops are closed), cross itself, and have faces that are doubled or reversed: closed parts are turned
+/// outward, doubled faces count once, and what of that cannot be decided is a warning.
 ///
 /// mesh: with at least one face.
 /// voxel_size: edge of a voxel (m), 1e-6 to 1000.
@@ -159,7 +161,13 @@ pub unsafe extern "C" fn frz_levelset_from_mesh(
             let settings = settings(voxel_size, half_width)?;
             ctx.allow("a level set of the mesh", surface_bytes(mesh.triangles.area(), voxel_size))?;
             let solid = mesh.triangles.clone();
-            let grid = ctx.polled(|| sweep::voxelise(ctx, solid, &settings))?;
+            let grid = ctx.polled(|| {
+                let still = Body::new(Box::new(Rigid::new(solid, Keys::default())), 0.0)?;
+                if let Some(what) = still.warning() {
+                    ctx.warn(&format!("the mesh: {what}"));
+                }
+                sweep::chain(ctx, &[still], 0.0, 0.0, &settings)
+            })?;
             Ok(Grid::from(grid))
         })
     }

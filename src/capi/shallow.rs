@@ -30,8 +30,10 @@ use crate::shallow::{Load, Params, Report, Shallow};
 /// system call but that for the thread's clock where a step has a budget. Only where there is more than ever before, more columns because
 /// a body uncovers another layer, say, memory grows; so may what fails.
 ///
-/// A cancel is looked at once, at the beginning of such a call. It has no phases, which all other work has: frz_context_progress and
-/// frz_context_timings do not see it. Phases take locks and memory, and a poll between them may take longer than the few milliseconds
+/// A cancel is looked at at the beginning of such a call, and in the course of a frame that may take long: one of exact steps, of over some two million columns
+/// times steps, or with many full columns. Such a frame begins with a copy of what it changes, and is as if it had not begun when it is cancelled. None of these calls
+/// has phases, which all other work has: frz_context_progress and
+/// frz_context_timings do not see them. Phases take locks and memory, and a poll between them may take longer than the few milliseconds
 /// that a frame has.
 pub struct frz_shallow {
     _opaque: [u8; 0],
@@ -270,7 +272,7 @@ pub unsafe extern "C" fn frz_shallow_set_params(
 
 /// Computes a frame, in real time (frz_shallow). It is divided into steps as frz_shallow_params.pace says.
 ///
-/// dt: length of the frame (s), over 0, up to 1e6.
+/// dt: length of the frame (s), 1e-12 to 1e6. FRZ_ERROR_ARGUMENT, too, where it would take over a million steps: the liquid is then as it was.
 /// budget_seconds: CPU time of this thread (s), or time where several threads work, after which no step begins, 0 to 1e6; 0: as much as
 ///     it takes. The rest of the frame is then left out (frz_shallow_report.dropped), never any liquid. At least one step is made. With
 ///     frz_shallow_last_steps and frz_shallow_replay such a frame can be made again.
@@ -303,7 +305,7 @@ pub unsafe extern "C" fn frz_shallow_step(
 /// Computes a frame of given steps, in real time (frz_shallow): from the same state, with the same parameters, flow points and
 /// bodies it becomes the same bytes as the frame that they were reported of.
 ///
-/// steps: double for each step, its length (s), over 0, as frz_shallow_last_steps has listed them: 1 to 1000000, together up to 1e6 s.
+/// steps: double for each step, its length (s), 1e-12 to 1e6, as frz_shallow_last_steps has listed them: 1 to 1000000, together up to 1e6 s.
 /// report: receives what was done, all zeroes after a failure; may be NULL. Its struct_size is set by the caller.
 ///
 /// One thread at a time.

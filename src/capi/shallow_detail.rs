@@ -234,7 +234,7 @@ pub unsafe extern "C" fn frz_shallow_detail_get_near(
 
 /// Computes a frame, in real time (frz_shallow_detail), as frz_shallow_step does without a budget.
 ///
-/// dt: length of the frame (s), over 0, up to 1e6.
+/// dt: as there.
 /// report: receives what was done, all zeroes after a failure; may be NULL. Its struct_size is set by the caller.
 ///
 /// One thread at a time.

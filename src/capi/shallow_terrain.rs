@@ -12,6 +12,7 @@ use crate::base::{DVec3, TriMesh, Vec3};
 use crate::context::Context;
 use crate::shallow::Moved;
 use crate::shallow::grid::{BOTTOMLESS, Grid, Heights};
+use crate::shallow::terrain::facing::facing;
 #[cfg(feature = "vdb")]
 use crate::shallow::terrain::sampler;
 use crate::shallow::terrain::shapes::Shape;
@@ -37,7 +38,10 @@ pub(super) struct Moving {
     pub(super) positions: Vec<Vec3>,
     /// Positions on their way in.
     coming: Vec<Vec3>,
+    /// Closed parts outward, without doubled ones.
     pub(super) triangles: Vec<[u32; 3]>,
+    /// As the host gave them, where that is not the same.
+    own: Option<Vec<[u32; 3]>>,
     caster: Caster,
 }
 
@@ -49,19 +53,25 @@ impl Terrain {
         grid: Grid,
         heights: Heights,
     ) -> Outcome<(Self, Solids)> {
-        if !mesh.is_closed() {
+        let orientation = facing(mesh);
+        let triangles = orientation.applied(&mesh.triangles);
+        if orientation.has_open() {
             ctx.warn("the mesh is open: all below its faces that face up is solid");
+        }
+        if let Some(what) = orientation.warning() {
+            ctx.warn(&format!("the mesh: {what}"));
         }
         let mut caster = Caster::new(grid, heights)?;
         let solids = ctx.phase("cast", || {
-            caster.cast(&mesh.positions, &mesh.triangles, all_cells(&grid))?;
+            caster.cast(&mesh.positions, &triangles, all_cells(&grid))?;
             let mut solids = Solids::empty(grid, heights);
             (0..grid.cells()).for_each(|cell| solids.push(caster.at(cell)));
             Ok(solids)
         })?;
-        let (positions, triangles) = (mesh.positions.clone(), mesh.triangles.clone());
+        let positions = mesh.positions.clone();
+        let own = (!orientation.is_unchanged()).then(|| mesh.triangles.clone());
         let coming = Vec::with_capacity(positions.len());
-        Ok((Self::Mesh(Box::new(Moving { positions, coming, triangles, caster })), solids))
+        Ok((Self::Mesh(Box::new(Moving { positions, coming, triangles, own, caster })), solids))
     }
 
     /// The ground that a height of each cell (m) is, and its solids.
@@ -83,7 +93,8 @@ impl Terrain {
         heights: Heights,
     ) -> Outcome<(Self, Solids)> {
         let solids = ctx.phase("sample", || {
-            sampler::solids(grid, heights, level_set.voxel_size(), |places, distances| {
+            let (voxel, between) = (level_set.voxel_size(), level_set.heights());
+            sampler::solids(grid, heights, voxel, between, |places, distances| {
                 ctx.check()?;
                 level_set.sample_linear(ctx, places, distances)
             })
@@ -96,8 +107,9 @@ impl Terrain {
         let Self::Mesh(mesh) = self else {
             return Err(Failure::argument("the liquid was not made with a mesh: there is no triangle"));
         };
-        let Some(corners) = mesh.triangles.get(*triangle as usize) else {
-            let count = mesh.triangles.len();
+        let own = mesh.own.as_ref().unwrap_or(&mesh.triangles);
+        let Some(corners) = own.get(*triangle as usize) else {
+            let count = own.len();
             return Err(Failure::argument(format!("triangle = {triangle} is none of the mesh's {count}")));
         };
         let corner = |corner: usize| mesh.positions[corners[corner] as usize].cast::<f64>() * shares[corner];
@@ -351,9 +363,9 @@ pub(super) unsafe fn read_heights(
 #[repr(u32)]
 #[derive(Clone, Copy)]
 pub enum frz_shallow_shape {
-    /// A ball.
+    /// A sphere.
     FRZ_SHALLOW_SPHERE = 0,
-    /// All places within a distance of a line: a ball on its way from end to end.
+    /// All places within a distance of a line: a sphere on its way from end to end.
     FRZ_SHALLOW_CAPSULE = 1,
     /// A box in any orientation.
     FRZ_SHALLOW_BOX = 2,
@@ -379,7 +391,7 @@ pub struct frz_shallow_body {
     pub at: [f64; 3],
     /// The other end of a capsule's line (m); of others it is not looked at.
     pub end: [f64; 3],
-    /// Radius of a ball or capsule (m), over 0; of a box it is not looked at.
+    /// Radius of a sphere or capsule (m), over 0; of a box it is not looked at.
     pub radius: f64,
     /// Half of a box's length along each of its axes (m), over 0; of others it is not looked at.
     pub half: [f64; 3],

@@ -10,6 +10,7 @@ use super::saved::{Saved, resumed};
 use super::tracker_edits::Edits;
 pub use super::tracker_params::{frz_tracker_params, frz_tracker_params_init};
 use super::views::{Sized32, fill, finite, frz_view, sized};
+use crate::base::orientation::{Closing, Orientation};
 use crate::base::topology::Topology;
 use crate::surface::{Change, Outlook, Particles, Tracker, estimate_spacing};
 
@@ -223,6 +224,9 @@ pub unsafe extern "C" fn frz_tracker_create(
             let mut tracker = match restart.is_null() {
                 true => {
                     let particles = self::particles(particles)?;
+                    if params.rebuild && !Orientation::of_mesh(triangles, Closing::Caps).is_unchanged() {
+                        ctx.warn("the mesh: parts of it are inside out: reverse their faces");
+                    }
                     Tracker::new(ctx, params, triangles, &particles)?
                 }
                 false => resumed(ctx, "a tracker", Tracker::unpacked(&state), || {

@@ -6,6 +6,7 @@ use std::ops::RangeInclusive;
 use super::guard::frz_status::FRZ_ERROR_CAPACITY;
 use super::guard::frz_status::FRZ_ERROR_VERSION;
 use super::guard::{Failure, Outcome};
+use crate::base::digits;
 
 /// An array that the caller lends for the time of the call.
 #[repr(C)]
@@ -287,6 +288,7 @@ pub(super) fn within(name: &str, value: f64, range: RangeInclusive<f64>, unit: &
     finite(name, value)?;
     if !range.contains(&value) {
         let (low, high) = range.into_inner();
+        let (value, low, high) = (digits::given(value), digits::end(low), digits::end(high));
         return Err(Failure::argument(format!("{name} = {value} is not within {low} to {high}{unit}")));
     }
     Ok(())

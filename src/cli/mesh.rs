@@ -218,8 +218,8 @@ const PARTS: [Counted; 2] = [
     (
         "inverted_parts",
         [
-            "part is inside out: it vanishes where the mesh is used",
-            "parts are inside out: they vanish where the mesh is used",
+            "part is inside out: it is turned outward where the mesh is used",
+            "parts are inside out: they are turned outward where the mesh is used",
         ],
     ),
 ];
@@ -330,7 +330,7 @@ fn in_words(mesh: &Value) -> String {
         out += &format!("  {:>8} {}, by the vertices' indices\n", as_it_is(key), form(as_it_is(key), forms));
     }
     if number("volume_m3") < 0.0 {
-        out += "           inside out: flipped where it is used\n";
+        out += "           inside out: turned outward where it is used\n";
     }
     out
 }

@@ -83,6 +83,11 @@ impl Context {
         self.cancel.begin()
     }
 
+    /// As [`Context::begin`], for work in real time: it takes no lock and allocates nothing, and the count of phases goes on.
+    pub fn begin_light(&self) -> Running {
+        self.cancel.begin()
+    }
+
     /// Cancels the running call and all later ones until [`Context::reset`].
     pub fn cancel(&self) {
         self.cancel.request();

@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use super::source;
+use super::{source, text};
 use crate::error::Result;
 
 /// Names of what a mesh file contains besides positions and faces, in the plural: "UVs", "normals" ... Empty for a kind of file
@@ -28,7 +28,7 @@ fn obj(bytes: &[u8]) -> Vec<&'static str> {
         (&[b"l", b"p", b"curv", b"surf"], "lines and points"),
     ];
     let mut found = [false; 5];
-    for line in bytes.split(|&byte| byte == b'\n') {
+    for (_, line) in text::lines(bytes) {
         let word = line.trim_ascii().split(u8::is_ascii_whitespace).next().unwrap_or(line);
         if let Some(at) = names.iter().position(|(words, _)| words.contains(&word)) {
             found[at] = true;
@@ -38,7 +38,7 @@ fn obj(bytes: &[u8]) -> Vec<&'static str> {
 }
 
 fn ply(bytes: &[u8]) -> Vec<&'static str> {
-    let head = bytes.split(|&byte| byte == b'\n').take_while(|line| line.trim_ascii() != b"end_header");
+    let head = text::lines(bytes).map(|(_, line)| line).take_while(|line| line.trim_ascii() != b"end_header");
     let names = [
         (&["s", "t", "u", "v", "texture_u", "texture_v", "texcoord"][..], "UVs"),
         (&["nx", "ny", "nz"], "normals"),

@@ -4,7 +4,7 @@ use std::path::Path;
 
 use super::caught::caught;
 use super::{atomic, obj, ply, ply_write, source, stl};
-use crate::base::{DetailedMesh, PolygonMesh, TriMesh};
+use crate::base::{DVec3, DetailedMesh, PolygonMesh, TriMesh};
 use crate::error::{Error, Result};
 
 pub use ply_write::Carried;
@@ -33,20 +33,33 @@ pub fn read_polygons(path: &Path) -> Result<PolygonMesh> {
 /// # Errors
 /// As [`read`].
 pub fn parse_polygons(path: &Path, bytes: &[u8]) -> Result<PolygonMesh> {
+    parse_polygons_from(path, bytes, DVec3::zeros())
+}
+
+/// As [`parse_polygons`], with positions less `origin` (in the file's unit and axes), which is subtracted in 64 bits while they
+/// are read: coordinates of a map projection, as far as the file holds them, keep all their digits.
+///
+/// # Errors
+/// As [`read`].
+pub fn parse_polygons_from(path: &Path, bytes: &[u8], origin: DVec3) -> Result<PolygonMesh> {
     if bytes.is_empty() {
         return Err(Error::file(path, "the file is empty"));
     }
+    let origin = origin.into();
     let parse = || match extension(path).as_str() {
-        "obj" => obj::parse(bytes),
-        "ply" => ply::parse(bytes),
-        "stl" => stl::parse(bytes),
+        "obj" => obj::parse(bytes, origin).map(|mesh| (mesh, None)),
+        "ply" => ply::parse(bytes, origin).map(|mesh| (mesh, None)),
+        "stl" => stl::parse(bytes, origin),
         other => Err(format!(
             "a mesh file must be {}, not \".{other}\"",
             EXTENSIONS.map(|e| format!(".{e}")).join(", ")
         )),
     };
-    let mesh = caught(path, || parse().map_err(|what| Error::file(path, what)))?;
+    let (mesh, warning) = caught(path, || parse().map_err(|what| Error::file(path, what)))?;
     mesh.validate().map_err(|error| Error::file(path, error.to_string()))?;
+    if let Some(warning) = warning {
+        log::warn!("{}: {warning}", path.display());
+    }
     Ok(mesh)
 }
 

@@ -15,6 +15,7 @@ mod numbers;
 mod obj;
 pub mod particles;
 mod ply;
+mod ply_header;
 mod ply_write;
 pub mod points_ply;
 #[doc(hidden)]
@@ -24,6 +25,8 @@ pub mod sequence;
 #[doc(hidden)]
 pub mod source;
 mod stl;
+mod stl_text;
+mod text;
 pub mod usd;
 pub mod usd_looks;
 pub mod usd_points;

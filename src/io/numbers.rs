@@ -1,6 +1,6 @@
 //! Arrays of numbers as particle files have them: of any type, in either byte order or as text.
 
-use super::source;
+use super::{source, text};
 
 /// Bytes that deflate makes of one, at most.
 const MOST_INFLATED: u64 = 1032;
@@ -123,14 +123,14 @@ impl Kind {
         let read = match (self, out) {
             // By way of 64 bits some numbers would be rounded twice.
             (Self::F32, Numbers::Real(values)) => {
-                text.parse::<f32>().map(|value| values.push(value.into())).ok()
+                text::number::<f32>(word).map(|value| values.push(value.into()))
             }
-            (_, Numbers::Real(values)) => text.parse().map(|value| values.push(value)).ok(),
+            (_, Numbers::Real(values)) => text::number(word).map(|value| values.push(value)),
             (_, Numbers::Whole(values)) => text.parse().map(|value| values.push(value)).ok(),
         };
-        read.ok_or_else(|| {
-            let shown: String = String::from_utf8_lossy(word).chars().take(40).collect();
-            format!("\"{shown}\" is not {}", if self.is_real() { "a number" } else { "an integer" })
+        read.ok_or_else(|| match self.is_real() {
+            true => text::no_number(word),
+            false => format!("\"{}\" is not an integer", text::shown(word)),
         })
     }
 }

@@ -1,38 +1,68 @@
-//! Wavefront OBJ: positions, colours of vertices (three numbers behind the place), texture coordinates and faces, in the file's order; everything else is passed over.
+//! Wavefront OBJ: positions, colours of vertices (three numbers behind the position), texture coordinates and faces, in the file's
+//! order; everything else is passed over. A line that ends in a backslash goes on in the next.
 
 use std::io::Write;
 
 use super::ply_write::Carried;
-use super::source;
+use super::{source, text};
 use crate::base::arrays::{MeshArray, Number, On};
 use crate::base::{PolygonMesh, TriMesh, Uvs, Vec3, uvs};
-use crate::error::one_line;
 
 /// Lines between two looks at whether to stop.
 const PIECE: usize = 1 << 14;
 /// Names of the arrays that a vertex' three numbers behind its place are.
 const COLOURS: [&str; 3] = ["red", "green", "blue"];
-/// Letters of a word that a message repeats.
-const LONGEST_WORD: usize = 40;
-/// Byte order mark of UTF-8, which some programs write.
-const BYTE_ORDER_MARK: &[u8] = b"\xef\xbb\xbf";
 
-/// Reads positions, faces and texture coordinates. Lines of other kinds may be of any encoding.
-pub(super) fn parse(bytes: &[u8]) -> Result<PolygonMesh, String> {
-    let bytes = bytes.strip_prefix(BYTE_ORDER_MARK).unwrap_or(bytes);
-    let mut reader = Reader::default();
-    for (number, line) in bytes.split(|&byte| byte == b'\n').enumerate() {
+/// Reads positions, less an origin that is subtracted in 64 bits, faces and texture coordinates. Lines of other kinds may be of
+/// any encoding.
+pub(super) fn parse(bytes: &[u8], origin: [f64; 3]) -> Result<PolygonMesh, String> {
+    let mut reader = Reader { origin, ..Reader::default() };
+    let mut lines = text::lines(text::without_mark(bytes)?);
+    let mut joined = Vec::new();
+    while let Some((number, line)) = lines.next() {
         if number % PIECE == 0 && source::is_stopped() {
             return Err("stopped".into());
         }
-        reader.line(line).map_err(|what| format!("line {}: {what}", number + 1))?;
+        let read = match continued(line) {
+            None => reader.line(line),
+            Some(begin) => {
+                joined.clear();
+                joined.extend_from_slice(begin);
+                for (_, line) in lines.by_ref() {
+                    // As white space: what stands behind the line end begins a word.
+                    joined.push(b' ');
+                    let more = goes_on(line);
+                    joined.extend_from_slice(more.unwrap_or(line));
+                    if more.is_none() {
+                        break;
+                    }
+                }
+                reader.line(&joined)
+            }
+        };
+        read.map_err(|what| format!("line {number}: {what}"))?;
     }
     Ok(reader.finish())
+}
+
+/// A line without the backslash at its end by which it goes on in the next.
+fn goes_on(line: &[u8]) -> Option<&[u8]> {
+    line.trim_ascii_end().strip_suffix(b"\\")
+}
+
+/// As [`goes_on`], of a line that is read: a comment, or the name of a material or group, may end in a backslash that means
+/// nothing, and must not swallow the vertex behind it.
+fn continued(line: &[u8]) -> Option<&[u8]> {
+    let begin = goes_on(line)?;
+    let word = begin.trim_ascii_start().split(u8::is_ascii_whitespace).next();
+    let is_read = matches!(word, Some(b"v" | b"vt" | b"f"));
+    (is_read && !begin.contains(&b'#')).then_some(begin)
 }
 
 /// The contents of the lines so far.
 #[derive(Default)]
 struct Reader {
+    origin: [f64; 3],
     mesh: PolygonMesh,
     places: Vec<[f32; 2]>,
     /// For each corner its index into `places`, or none.
@@ -54,11 +84,18 @@ impl Reader {
     }
 
     fn vertex<'a>(&mut self, mut words: impl Iterator<Item = &'a [u8]>) -> Result<(), String> {
-        let mut next = || words.next().and_then(number).filter(|value| value.is_finite());
-        match (next(), next(), next()) {
-            (Some(x), Some(y), Some(z)) => self.mesh.positions.push(Vec3::new(x, y, z)),
-            _ => return Err("the vertex is not three finite numbers".into()),
+        let mut place = [0.0; 3];
+        for (value, origin) in place.iter_mut().zip(self.origin) {
+            let word = words.next().unwrap_or_default();
+            let read = text::coordinate(word, origin).filter(|value| value.is_finite());
+            *value = read.ok_or_else(|| {
+                let what = "the vertex is not three finite numbers";
+                let has_comma = text::has_decimal_comma(word);
+                if has_comma { format!("{what}: {}", text::no_number(word)) } else { what.into() }
+            })?;
         }
+        self.mesh.positions.push(Vec3::from(place));
+        let mut next = || words.next().and_then(number).filter(|value| value.is_finite());
         if let (Some(red), Some(green), Some(blue)) = (next(), next(), next()) {
             self.colours.push([red, green, blue]);
         }
@@ -114,7 +151,7 @@ impl Reader {
 }
 
 fn number(word: &[u8]) -> Option<f32> {
-    std::str::from_utf8(word).ok()?.parse().ok()
+    text::number(word)
 }
 
 /// An index from 0, of one that counts from 1, or back from the last.
@@ -125,8 +162,7 @@ fn index(word: &[u8], count: usize) -> Option<u32> {
 }
 
 fn names(word: &[u8], what: &str, count: usize) -> String {
-    let word: String = String::from_utf8_lossy(word).chars().take(LONGEST_WORD).collect();
-    format!("the face names {what} {}, but there are {count} before it", one_line(&word))
+    format!("the face names {what} {}, but there are {count} before it", text::shown(word))
 }
 
 /// Writes positions, colours and texture coordinates where there are any, and triangles.

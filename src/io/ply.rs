@@ -4,9 +4,12 @@
 
 use std::collections::HashMap;
 
-use super::source;
+use super::ply_header::{self, Format, Header};
+use super::{source, text};
 use crate::base::arrays::{MeshArray, Number, On};
 use crate::base::{PolygonMesh, Uvs, Vec3, uvs};
+
+pub(super) use super::ply_header::{Element, NAMES};
 
 /// Names of a vertex' texture coordinates.
 pub(super) const PLACES: [[&str; 2]; 3] = [["s", "t"], ["u", "v"], ["texture_u", "texture_v"]];
@@ -16,33 +19,6 @@ const NO_ARRAYS: [&str; 6] = ["x", "y", "z", "nx", "ny", "nz"];
 
 /// Rows between two looks at whether to stop.
 const PIECE: usize = 1 << 14;
-
-#[derive(Clone, Copy, PartialEq)]
-enum Format {
-    Ascii,
-    Little,
-    Big,
-}
-
-pub(super) struct Property {
-    pub name: String,
-    number: Number,
-    /// Type of the count, for a list.
-    pub list: Option<Number>,
-}
-
-impl Property {
-    /// Whether its numbers are floats.
-    pub fn is_float(&self) -> bool {
-        self.number.is_float()
-    }
-}
-
-pub(super) struct Element {
-    pub name: String,
-    pub count: usize,
-    pub properties: Vec<Property>,
-}
 
 /// A file whose header is read.
 pub(super) struct Body<'a> {
@@ -76,21 +52,14 @@ impl Body<'_> {
 
 /// Reads the header of a file that has vertices.
 pub(super) fn open(bytes: &[u8]) -> Result<Body<'_>, String> {
-    let end = find(bytes, b"end_header").ok_or("not a .ply file, or its header is cut short")?;
-    let body =
-        end + bytes[end..].iter().position(|&byte| byte == b'\n').ok_or("the .ply header is cut short")? + 1;
-    let header = std::str::from_utf8(&bytes[..end]).map_err(|_| "the .ply header is not text")?;
-    let (format, elements) = parse_header(header)?;
-    check_coordinates(&elements)?;
-    let comments = header.lines().filter_map(|line| line.strip_prefix("comment "));
-    let comments = comments.map(|text| text.trim().to_string()).collect();
-    Ok(Body { elements, comments, reader: Reader { format, bytes: &bytes[body..], at: 0 } })
+    let Header { format, elements, comments, body } = ply_header::read(bytes)?;
+    Ok(Body { elements, comments, reader: Reader { format, bytes: body, at: 0 } })
 }
 
-/// Reads the vertices and faces of a PLY file.
-pub(super) fn parse(bytes: &[u8]) -> Result<PolygonMesh, String> {
+/// Reads the vertices, less an origin that is subtracted in 64 bits, and faces of a PLY file.
+pub(super) fn parse(bytes: &[u8], origin: [f64; 3]) -> Result<PolygonMesh, String> {
     let Body { elements, mut reader, .. } = open(bytes)?;
-    let mut parsed = Parsed::new(&elements);
+    let mut parsed = Parsed::new(&elements, origin);
     // An element without properties has no rows in the file, whatever its count.
     for element in elements.iter().filter(|element| !element.properties.is_empty()) {
         for row in 0..element.count {
@@ -105,6 +74,7 @@ pub(super) fn parse(bytes: &[u8]) -> Result<PolygonMesh, String> {
 
 /// The mesh so far, and the texture coordinates of its vertices or corners.
 struct Parsed {
+    origin: [f64; 3],
     mesh: PolygonMesh,
     /// Names of the vertices' texture coordinates, where they have any.
     names: Option<[&'static str; 2]>,
@@ -145,13 +115,14 @@ fn arrays_of(elements: &[Element], names: Option<[&str; 2]>) -> Vec<(usize, Mesh
 const LISTS: [&str; 3] = ["vertex_indices", "vertex_index", "texcoord"];
 
 impl Parsed {
-    fn new(elements: &[Element]) -> Self {
+    fn new(elements: &[Element], origin: [f64; 3]) -> Self {
         let vertex = elements.iter().find(|element| element.name == "vertex");
         let has = |name: &&str| {
             vertex.is_some_and(|vertex| vertex.properties.iter().any(|p| p.name == *name && p.list.is_none()))
         };
         let names = PLACES.into_iter().find(|pair| pair.iter().all(has));
         Self {
+            origin,
             mesh: PolygonMesh::default(),
             names,
             arrays: arrays_of(elements, names),
@@ -219,73 +190,6 @@ impl Parsed {
     }
 }
 
-fn find(bytes: &[u8], needle: &[u8]) -> Option<usize> {
-    bytes.windows(needle.len()).position(|window| window == needle)
-}
-
-fn parse_header(header: &str) -> Result<(Format, Vec<Element>), String> {
-    let mut lines = header.lines();
-    if lines.next().map(str::trim) != Some("ply") {
-        return Err("not a .ply file".into());
-    }
-    let mut format = None;
-    let mut elements: Vec<Element> = Vec::new();
-    for (number, line) in lines.enumerate() {
-        let words: Vec<&str> = line.split_whitespace().collect();
-        let wrong = || format!("line {}: \"{}\" is not a line of a .ply header", number + 2, line.trim());
-        match words.as_slice() {
-            ["format", "ascii", _] => format = Some(Format::Ascii),
-            ["format", "binary_little_endian", _] => format = Some(Format::Little),
-            ["format", "binary_big_endian", _] => format = Some(Format::Big),
-            ["element", name, count] => {
-                let count = count.parse().map_err(|_| wrong())?;
-                elements.push(Element { name: name.to_string(), count, properties: Vec::new() });
-            }
-            ["property", "list", count, number, name] => {
-                let (list, number) =
-                    (Some(number_of(count).ok_or_else(wrong)?), number_of(number).ok_or_else(wrong)?);
-                let element = elements.last_mut().ok_or_else(wrong)?;
-                element.properties.push(Property { name: name.to_string(), number, list });
-            }
-            ["property", number, name] => {
-                let number = number_of(number).ok_or_else(wrong)?;
-                let element = elements.last_mut().ok_or_else(wrong)?;
-                element.properties.push(Property { name: name.to_string(), number, list: None });
-            }
-            [] | ["comment" | "obj_info", ..] => {}
-            _ => return Err(wrong()),
-        }
-    }
-    Ok((format.ok_or("the .ply header names no format")?, elements))
-}
-
-/// A vertex without one of x, y, z would lie at 0.
-fn check_coordinates(elements: &[Element]) -> Result<(), String> {
-    let vertex =
-        elements.iter().find(|element| element.name == "vertex").ok_or("the .ply file has no vertices")?;
-    let has = |axis: &str| vertex.properties.iter().any(|p| p.name == axis && p.list.is_none());
-    match ["x", "y", "z"].into_iter().find(|axis| !has(axis)) {
-        Some(axis) => Err(format!("the vertices of the .ply file have no property {axis}")),
-        None => Ok(()),
-    }
-}
-
-fn number_of(name: &str) -> Option<Number> {
-    NAMES.iter().find(|(names, _)| names.contains(&name)).map(|(_, number)| *number)
-}
-
-/// Types by the names that a header gives them; the first is what we write.
-pub(super) const NAMES: [([&str; 2], Number); 8] = [
-    (["char", "int8"], Number::I8),
-    (["uchar", "uint8"], Number::U8),
-    (["short", "int16"], Number::I16),
-    (["ushort", "uint16"], Number::U16),
-    (["int", "int32"], Number::I32),
-    (["uint", "uint32"], Number::U32),
-    (["float", "float32"], Number::F32),
-    (["double", "float64"], Number::F64),
-];
-
 struct Reader<'a> {
     format: Format,
     bytes: &'a [u8],
@@ -305,7 +209,7 @@ impl Fault {
         let place = format_args!("{} {} of {}", element.name, row + 1, element.count);
         match self {
             Self::End => format!("the .ply file ends in {place}"),
-            Self::Text(text) => format!("{place}: \"{text}\" is not a number"),
+            Self::Text(what) => format!("{place}: {what}"),
             Self::Count(count) => format!("{place} cannot have {count} entries"),
         }
     }
@@ -328,8 +232,8 @@ impl Reader<'_> {
             let start = rest.iter().position(|byte| !byte.is_ascii_whitespace()).ok_or(Fault::End)?;
             let length = rest[start..].iter().position(u8::is_ascii_whitespace).unwrap_or(rest.len() - start);
             self.at += start + length;
-            let text = String::from_utf8_lossy(&rest[start..start + length]);
-            return text.parse().map_err(|_| Fault::Text(text.chars().take(40).collect()));
+            let word = &rest[start..start + length];
+            return text::number(word).ok_or_else(|| Fault::Text(text::no_number(word)));
         }
         let size = number.size();
         let raw = self.bytes.get(self.at..self.at + size).ok_or(Fault::End)?;
@@ -390,7 +294,8 @@ fn read_row(reader: &mut Reader<'_>, element: &Element, parsed: &mut Parsed) -> 
     }
     match element.name.as_str() {
         "vertex" => {
-            parsed.mesh.positions.push(Vec3::from(position.map(|value| value as f32)));
+            let near = [0, 1, 2].map(|axis| (position[axis] - parsed.origin[axis]) as f32);
+            parsed.mesh.positions.push(Vec3::from(near));
             if parsed.names.is_some() {
                 parsed.of_vertices.push(place.map(|value| value as f32));
             }
@@ -440,9 +345,13 @@ mod tests {
         };
         let mut bytes = Vec::new();
         write(&mut bytes, &mesh, &Carried::default()).unwrap();
-        assert_eq!(parse(&bytes).unwrap().into_triangles(), mesh);
+        assert_eq!(parse(&bytes, [0.0; 3]).unwrap().into_triangles(), mesh);
         for length in 0..bytes.len() {
-            assert!(parse(&bytes[..length]).is_err(), "{length} of {} bytes were accepted", bytes.len());
+            assert!(
+                parse(&bytes[..length], [0.0; 3]).is_err(),
+                "{length} of {} bytes were accepted",
+                bytes.len()
+            );
         }
     }
 
@@ -451,7 +360,7 @@ mod tests {
         let text = "ply\nformat ascii 1.0\nelement vertex 4\nproperty float x\nproperty float y\nproperty float z\n\
                     element face 1\nproperty list uchar int vertex_indices\nelement tristrips 1\n\
                     property list int int vertex_indices\nend_header\n0 0 0\n1 0 0\n1 1 0\n0 1 0\n4 0 1 2 3\n5 0 1 2 3 -1\n";
-        let mesh = parse(text.as_bytes()).unwrap();
+        let mesh = parse(text.as_bytes(), [0.0; 3]).unwrap();
         assert_eq!(mesh.triangles(), [[0, 1, 2], [0, 2, 3], [0, 1, 2], [2, 1, 3]]);
     }
 
@@ -462,7 +371,7 @@ mod tests {
                     element face 3\nproperty int part\nproperty list uchar int vertex_indices\nproperty list uchar float wet\n\
                     end_header\n0 0 0 1 255 0.1\n1 0 0 1 0 2\n1 1 0 1 7 3\n0 1 0 1 8 4\n\
                     5 4 0 1 2 3 4 .5 .25 .125 1\n6 2 0 1 2 9 9\n-7 3 2 1 0 3 9 8 7\n";
-        let mesh = parse(text.as_bytes()).unwrap().into_detailed();
+        let mesh = parse(text.as_bytes(), [0.0; 3]).unwrap().into_detailed();
         assert_eq!(mesh.mesh.triangles, [[0, 1, 2], [0, 2, 3], [2, 1, 0]]);
         let array = |name: &str| mesh.arrays.iter().find(|array| array.name == name).unwrap();
         assert_eq!(mesh.arrays.len(), 4);
@@ -476,7 +385,7 @@ mod tests {
         let arrays: Vec<&MeshArray> = mesh.arrays.iter().collect();
         let mut bytes = Vec::new();
         write(&mut bytes, &mesh.mesh, &Carried { arrays: &arrays, ..Carried::default() }).unwrap();
-        let again = parse(&bytes).unwrap().into_detailed();
+        let again = parse(&bytes, [0.0; 3]).unwrap().into_detailed();
         assert_eq!(again.mesh, mesh.mesh);
         arrays.iter().for_each(|array| assert!(again.arrays.contains(array), "{}", array.name));
     }

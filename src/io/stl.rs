@@ -1,55 +1,81 @@
-//! STL, binary and text: triangles whose corners are joined where they have the same place.
+//! STL, binary and text: triangles whose corners are joined where they have the same position.
 
 use std::collections::HashMap;
-use std::io::{Cursor, Write};
+use std::io::Write;
 
-use super::source;
+use super::{source, stl_text, text};
 use crate::base::{PolygonMesh, TriMesh, Vec3};
 
 /// Triangles between two looks at whether to stop.
 const PIECE: usize = 1 << 14;
-/// Bytes of a binary file before its triangles, and of each of them.
-const HEADER: usize = 84;
+/// Bytes of a binary file before its triangles, of each of them, and of the normal that each begins with.
+pub(super) const HEADER: usize = 84;
 const TRIANGLE: usize = 50;
+const NORMAL: usize = 12;
 
-/// Reads the triangles of an STL file.
-pub(super) fn parse(bytes: &[u8]) -> Result<PolygonMesh, String> {
-    let told = bytes.get(80..HEADER).map_or(0, |b| u32::from_le_bytes([b[0], b[1], b[2], b[3]]) as usize);
-    let length = HEADER + told * TRIANGLE;
-    let is_text = bytes.starts_with(b"solid") && bytes.len() != length;
-    if !is_text && (bytes.len() < HEADER || bytes.len() < length) {
+/// Reads the triangles of an STL file, less an origin that is subtracted in 64 bits; with what about the file should be said.
+pub(super) fn parse(bytes: &[u8], origin: [f64; 3]) -> Result<(PolygonMesh, Option<String>), String> {
+    let count = bytes.get(80..HEADER).map_or(0, |b| u32::from_le_bytes([b[0], b[1], b[2], b[3]]) as usize);
+    let length = HEADER + count * TRIANGLE;
+    if bytes.len() != length || bytes.len() < HEADER {
+        let text = text::without_mark(bytes)?;
+        if stl_text::is_one(text) {
+            return stl_text::parse(text, origin);
+        }
+        if !bytes[..bytes.len().min(HEADER)].contains(&0) {
+            return Err("not an .stl file: a text one begins with \"solid\"".into());
+        }
+    }
+    if bytes.len() < length {
         return Err(format!(
-            "the .stl file is cut short: {told} triangles need {length} bytes, not {}",
+            "the .stl file is cut short: {count} triangles need {length} bytes, not {}",
             bytes.len()
         ));
     }
-    let mut copy = bytes.to_vec();
-    if !is_text {
-        // Some programs begin binary files with the word that text files begin with.
-        copy[..5].fill(b' ');
-    }
-    let mut reader = Cursor::new(copy);
-    let triangles = stl_io::create_stl_reader(&mut reader)
-        .map_err(|error| format!("the .stl file cannot be read ({error})"))?;
-    let mut mesh = PolygonMesh::default();
-    let mut known: HashMap<[u32; 3], u32> = HashMap::new();
-    for (number, triangle) in triangles.enumerate() {
+    let mut joined = Joined::default();
+    for (number, triangle) in bytes[HEADER..length].chunks_exact(TRIANGLE).enumerate() {
         if number % PIECE == 0 && source::is_stopped() {
             return Err("stopped".into());
         }
-        let triangle =
-            triangle.map_err(|error| format!("triangle {} cannot be read ({error})", number + 1))?;
-        let corners = triangle.vertices.map(|vertex| {
-            // Adding zero makes -0 and 0 the same.
-            let place = vertex.0.map(|value| value + 0.0);
-            *known.entry(place.map(f32::to_bits)).or_insert_with(|| {
-                mesh.positions.push(Vec3::from(place));
-                mesh.positions.len() as u32 - 1
-            })
-        });
-        mesh.push(corners);
+        let value = |at: usize| {
+            let raw = &triangle[NORMAL + 4 * at..][..4];
+            f32::from_le_bytes([raw[0], raw[1], raw[2], raw[3]])
+        };
+        for corner in 0..3 {
+            let place = [0, 1, 2].map(|axis| less(value(3 * corner + axis), origin[axis]));
+            let corner = joined.corner(place);
+            joined.mesh.corners.push(corner);
+        }
+        joined.mesh.ends.push(joined.mesh.corners.len() as u32);
     }
-    Ok(mesh)
+    let more = bytes.len() - length;
+    let warning = (more > 0)
+        .then(|| format!("{more} bytes behind the {count} triangles that its header names are not read"));
+    Ok((joined.mesh, warning))
+}
+
+fn less(value: f32, origin: f64) -> f32 {
+    if origin == 0.0 { value } else { (f64::from(value) - origin) as f32 }
+}
+
+/// A mesh whose corners are joined where they have the same position.
+#[derive(Default)]
+pub(super) struct Joined {
+    pub mesh: PolygonMesh,
+    known: HashMap<[u32; 3], u32>,
+}
+
+impl Joined {
+    /// The vertex at a position.
+    pub fn corner(&mut self, place: [f32; 3]) -> u32 {
+        // Adding zero makes -0 and 0 the same.
+        let place = place.map(|value| value + 0.0);
+        let positions = &mut self.mesh.positions;
+        *self.known.entry(place.map(f32::to_bits)).or_insert_with(|| {
+            positions.push(Vec3::from(place));
+            positions.len() as u32 - 1
+        })
+    }
 }
 
 /// Writes binary STL.
@@ -73,6 +99,10 @@ pub(super) fn write(out: &mut dyn Write, mesh: &TriMesh) -> std::io::Result<()> 
 mod tests {
     use super::*;
 
+    fn read(bytes: &[u8]) -> Result<TriMesh, String> {
+        parse(bytes, [0.0; 3]).map(|(mesh, _)| mesh.into_triangles())
+    }
+
     #[test]
     fn what_is_written_is_read_and_a_cut_file_is_refused() {
         let mesh = TriMesh {
@@ -81,19 +111,16 @@ mod tests {
         };
         let mut bytes = Vec::new();
         write(&mut bytes, &mesh).unwrap();
-        let read = parse(&bytes).unwrap().into_triangles();
-        assert_eq!(read.positions.len(), 4);
-        assert!(read.is_manifold() && (read.volume() - 1.0 / 6.0).abs() < 1e-7);
-        (0..bytes.len()).for_each(|length| assert!(parse(&bytes[..length]).is_err(), "{length}"));
+        let mesh = read(&bytes).unwrap();
+        assert_eq!(mesh.positions.len(), 4);
+        assert!(mesh.is_manifold() && (mesh.volume() - 1.0 / 6.0).abs() < 1e-7);
+        (0..bytes.len()).for_each(|length| assert!(read(&bytes[..length]).is_err(), "{length}"));
+        // Some programs begin binary files with the word that text files begin with.
         bytes[..6].copy_from_slice(b"solid ");
-        assert_eq!(parse(&bytes).unwrap().ends.len(), 4);
-    }
-
-    #[test]
-    fn text_is_read() {
-        let text = "solid a\nfacet normal 0 0 1\nouter loop\nvertex 0 0 0\nvertex 1 0 0\nvertex 0 1 0\nendloop\nendfacet\n\
-                    endsolid a\n";
-        assert_eq!(parse(text.as_bytes()).unwrap().into_triangles().triangles, [[0, 1, 2]]);
-        assert!(parse(b"solid a\nfacet normal 0 0 1\nouter loop\nvertex 0 x 0\n").is_err());
+        assert_eq!(read(&bytes).unwrap(), mesh);
+        assert!(read(&bytes[..200]).unwrap_err().contains("cut short"));
+        bytes.extend(b"more");
+        let (again, warning) = parse(&bytes, [0.0; 3]).unwrap();
+        assert!(again.into_triangles() == mesh && warning.unwrap().starts_with("4 bytes"));
     }
 }

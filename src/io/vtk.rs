@@ -3,9 +3,11 @@
 //!
 //! The file is a sequence of lines, each with a keyword; arrays of numbers follow some of them.
 
+use std::borrow::Cow;
+
 use super::numbers::{Kind, Numbers, Order};
 use super::particles::Found;
-use super::source;
+use super::{source, text};
 
 /// Bytes that a line of keywords may have: one that is longer is no such line.
 const LONGEST: usize = 1 << 12;
@@ -31,7 +33,8 @@ enum Owner {
 
 /// Reads the points of a file.
 pub(super) fn parse(bytes: &[u8]) -> Result<Found, String> {
-    let mut reader = Reader::open(bytes)?;
+    let bytes = with_line_feeds(text::without_mark(bytes)?)?;
+    let mut reader = Reader::open(&bytes)?;
     let mut found: Option<Found> = None;
     let (mut owner, mut count) = (Owner::File, 0);
     while let Some(line) = reader.line()? {
@@ -85,6 +88,22 @@ pub(super) fn parse(bytes: &[u8]) -> Result<Found, String> {
         }
     }
     found.ok_or_else(|| "the file has no points: it is cut short, or of another kind".into())
+}
+
+/// A file whose lines end with carriage returns alone, if it is text, with line feeds.
+fn with_line_feeds(bytes: &[u8]) -> Result<Cow<'_, [u8]>, String> {
+    let end = bytes.iter().position(|byte| matches!(byte, b'\n' | b'\r')).unwrap_or(0);
+    if bytes.get(end) != Some(&b'\r') || bytes.get(end + 1) == Some(&b'\n') {
+        return Ok(Cow::Borrowed(bytes));
+    }
+    let encoding = text::lines(bytes).nth(2).map_or(&b""[..], |(_, line)| line.trim_ascii());
+    if encoding.eq_ignore_ascii_case(b"binary") {
+        return Err(
+            "the lines of the .vtk file end with carriage returns alone: they must end with line feeds"
+                .into(),
+        );
+    }
+    Ok(Cow::Owned(bytes.iter().map(|&byte| if byte == b'\r' { b'\n' } else { byte }).collect()))
 }
 
 fn check_dataset(kind: &str) -> Result<(), String> {

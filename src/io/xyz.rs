@@ -1,14 +1,16 @@
-//! .xyz: places and nothing else, as text or in binary.
+//! .xyz: positions and nothing else, as text or in binary.
 //!
-//! A file in which every byte is a tab, a line end or printable ASCII is text; any other is binary. Text has a particle a line: three
-//! numbers, between spaces, tabs or commas, and any further columns, which are left out; lines that are empty or begin with `#` are
-//! skipped. Binary, as splashsurf has it, is three little-endian 32-bit floats a particle.
+//! A file in which every byte is a tab, a line end or printable ASCII, but for those of comments, is text; any other is binary.
+//! Text has a particle a line: three numbers and any further columns, which are left out; lines that are empty or begin with `#`
+//! are skipped. Columns stand between blanks, semicolons or commas. A comma within a word is a decimal comma where blanks or
+//! semicolons stand between three such words; where neither reading is certain the file is refused. Binary, as splashsurf has it, is
+//! three little-endian 32-bit floats a particle.
 
 use std::io::Write;
 
 use super::numbers::{Kind, Numbers, Order};
 use super::particles::Found;
-use super::source;
+use super::{source, text};
 use crate::base::points::Points;
 
 /// Bytes of a particle in binary.
@@ -18,9 +20,10 @@ const PIECE: usize = 1 << 14;
 
 /// Reads the particles of a file.
 pub(super) fn parse(bytes: &[u8]) -> Result<Found, String> {
-    let is_of_text = |byte: &u8| matches!(byte, b'\t' | b'\n' | b'\r' | b' '..=b'~');
-    if let Some(text) = std::str::from_utf8(bytes).ok().filter(|_| bytes.iter().all(is_of_text)) {
-        return parse_text(text);
+    let marked = text::without_mark(bytes);
+    let marked = if is_wide(bytes) { marked? } else { marked.unwrap_or(bytes) };
+    if is_text(marked) {
+        return parse_text(marked);
     }
     if !bytes.len().is_multiple_of(ROW) {
         let length = bytes.len();
@@ -33,28 +36,127 @@ pub(super) fn parse(bytes: &[u8]) -> Result<Found, String> {
     Ok(Found::new(numbers))
 }
 
-fn parse_text(text: &str) -> Result<Found, String> {
+/// Whether every other byte is 0, as in UTF-16, behind what may be its mark or the first bytes of a float.
+fn is_wide(bytes: &[u8]) -> bool {
+    let head = &bytes[..bytes.len().min(64)];
+    [2, 3].into_iter().any(|from| head.len() > from && head[from..].iter().step_by(2).all(|&byte| byte == 0))
+}
+
+fn is_text(bytes: &[u8]) -> bool {
+    let is_letter = |byte: &u8| matches!(byte, b'\t' | b' '..=b'~');
+    let is_of_comment = |byte: &u8| *byte == b'\t' || !byte.is_ascii_control();
+    text::lines(bytes).all(|(_, line)| match line.first() {
+        Some(b'#') => line.iter().all(is_of_comment),
+        _ => line.iter().all(is_letter),
+    })
+}
+
+fn parse_text(bytes: &[u8]) -> Result<Found, String> {
     let mut numbers = Vec::new();
-    for (n, line) in text.lines().enumerate() {
+    // Most files have no comma, and then nothing to be weighed.
+    let mut commas = bytes.contains(&b',').then(Commas::default);
+    let mut points = Vec::new();
+    for (n, line) in text::lines(bytes) {
         if n.is_multiple_of(PIECE) && source::is_stopped() {
             return Err("stopped".into());
         }
-        let line = line.trim();
-        if line.is_empty() || line.starts_with('#') {
+        let line = line.trim_ascii();
+        if line.is_empty() || line.starts_with(b"#") {
             continue;
         }
-        let mut columns = line.split([' ', '\t', ',']).filter(|column| !column.is_empty());
+        let words: &mut dyn Iterator<Item = &[u8]> = match &mut commas {
+            None => &mut columns(line),
+            Some(commas) => {
+                points.clear();
+                commas.read(n, line, &mut points).map_err(|what| format!("line {n}: {what}"))?;
+                &mut points.split(|&byte| byte == b' ').filter(|word| !word.is_empty())
+            }
+        };
         for _ in 0..3 {
-            let column =
-                columns.next().ok_or_else(|| format!("line {}: there are no three numbers", n + 1))?;
-            let number = column.parse::<f64>();
-            numbers.push(number.map_err(|_| {
-                let shown: String = column.chars().take(40).collect();
-                format!("line {}: \"{shown}\" is not a number", n + 1)
-            })?);
+            let word = words.next().ok_or_else(|| format!("line {n}: there are no three numbers"))?;
+            numbers.push(text::number(word).ok_or_else(|| format!("line {n}: {}", text::no_number(word)))?);
         }
     }
     Ok(Found::new(Numbers::Real(numbers)))
+}
+
+/// What stands between blanks and semicolons.
+fn columns(line: &[u8]) -> impl Iterator<Item = &[u8]> {
+    let is_between = |byte: &u8| byte.is_ascii_whitespace() || *byte == b';';
+    line.split(is_between).filter(|column| !column.is_empty())
+}
+
+/// What the commas of a file have been found to be: the first line of each kind.
+#[derive(Default)]
+struct Commas {
+    /// Decimal commas.
+    decimal: Option<usize>,
+    /// Decimal points, or commas that separate numbers without a blank.
+    others: Option<usize>,
+}
+
+impl Commas {
+    /// Writes the words of a line to `out`, each with a blank behind it, and with decimal points.
+    fn read(&mut self, n: usize, line: &[u8], out: &mut Vec<u8>) -> Result<(), String> {
+        let mut words: Vec<&[u8]> = Vec::new();
+        for word in columns(line) {
+            let word = word.strip_suffix(b",").unwrap_or(word);
+            match word.strip_prefix(b",") {
+                // ",5" is a half to some.
+                Some(number) if !number.is_empty() && !number.contains(&b'.') => return Err(unclear(word)),
+                Some(number) => words.push(number),
+                None => words.push(word),
+            }
+        }
+        words.retain(|word| !word.is_empty());
+        let inner = |word: &[u8]| word.iter().filter(|&&byte| byte == b',').count();
+        let has_columns = words.len() >= 3 && inner(words[0]) <= 1;
+        let first = &words[..words.len().min(3)];
+        if first.iter().any(|word| inner(word) > 0) && has_columns {
+            // Such as 1,234.5, whose comma is neither.
+            let is_odd = |word: &&&[u8]| inner(word) > 0 && !text::has_decimal_comma(word);
+            if let Some(word) = first.iter().find(is_odd) {
+                return Err(unclear(word));
+            }
+            self.decimal.get_or_insert(n);
+            first.iter().for_each(|word| {
+                out.extend(word.iter().map(|&byte| if byte == b',' { b'.' } else { byte }));
+                out.push(b' ');
+            });
+        } else {
+            let between: Vec<&[u8]> =
+                words.iter().flat_map(|word| word.split(|&byte| byte == b',')).collect();
+            let is_separator = words.iter().any(|word| inner(word) > 0);
+            // Digits that begin with 0 are those behind a decimal comma.
+            let is_share =
+                |word: &&&[u8]| word.len() > 1 && word.iter().all(u8::is_ascii_digit) && word[0] == b'0';
+            if let Some(word) = between.iter().find(is_share).filter(|_| is_separator) {
+                return Err(unclear(word));
+            }
+            let has_point = |word: &&[u8]| word.contains(&b'.');
+            if is_separator || between.iter().take(3).any(has_point) {
+                self.others.get_or_insert(n);
+            }
+            for word in between {
+                out.extend_from_slice(word);
+                out.push(b' ');
+            }
+        }
+        match (self.decimal, self.others) {
+            (Some(commas), Some(points)) => Err(format!(
+                "numbers have decimal commas in line {commas}, and none in line {points}: write decimal points, and blanks between numbers"
+            )),
+            _ => Ok(()),
+        }
+    }
+}
+
+/// What is wrong with a comma that may be a decimal one, or stand between numbers or thousands.
+fn unclear(word: &[u8]) -> String {
+    format!(
+        "\"{}\" may have a decimal comma, or commas between numbers or thousands: write decimal points, and blanks between numbers",
+        text::shown(word)
+    )
 }
 
 /// Writes the places of points in binary.

@@ -1,7 +1,8 @@
 //! Where liquid comes in and goes out: sources, drains, orifices and absorbers, at the end of each step (thesis Alg. 4.1, line 5).
 //!
 //! Each moves whole units. What its rate asks for is shared equally by the columns in its circle; what is left of the division waits for the
-//! next step, so that a source delivers its rate to a unit a column.
+//! next step, so that a source delivers its rate to a unit a column. What finds no room in them waits, too, but no more than a step asks for: a
+//! source in a cavity that is full stands still, and does not make up for it when the cavity opens.
 
 use super::columns::Columns;
 use super::flow::Flow;
@@ -59,6 +60,9 @@ struct Placed {
     /// Concentrations of what comes in.
     levels: Levels,
 }
+
+/// Units a column that a source owes at most, beside what a step asks for: what is left of a division, in cells of half the length, too.
+const OWED: f64 = 4.0;
 
 /// All flow points.
 #[derive(Debug, Clone, Default, PartialEq)]
@@ -313,8 +317,9 @@ impl Placed {
         if self.columns.is_empty() {
             return 0;
         }
-        self.waiting += asked;
         let count = self.columns.len() as f64;
+        // Nothing is owed for long; a drain over a dry place does not make up for it either.
+        self.waiting = self.waiting.min(asked.max(OWED * count)) + asked;
         let mut share = (self.waiting / count).floor().min(1e18) as i64;
         if let Kind::Absorber(capacity) = self.point.kind {
             let left = ((capacity / volume - self.moved as f64) / count).floor();

@@ -1,5 +1,6 @@
 //! What flows.
 
+use crate::base::digits;
 use crate::error::{Error, Result};
 
 /// A liquid.
@@ -75,6 +76,7 @@ impl Liquid {
             if (low..=high).contains(&value) {
                 Ok(())
             } else {
+                let (value, low, high) = (digits::given(value), digits::end(low), digits::end(high));
                 Err(Error::argument(format!("{name} = {value} is not within {low} to {high}")))
             }
         };

@@ -11,6 +11,7 @@ pub mod detail;
 pub mod falls;
 pub mod flow;
 pub mod flows;
+mod frame;
 pub mod grid;
 mod identity;
 pub mod liquid;

@@ -1,5 +1,7 @@
 //! How long a step may be, and what the pipes share in it (thesis 4.3, Fig. 4.12).
 
+use std::ops::RangeInclusive;
+
 use super::flow::fast::FAST_WAVES;
 use super::flow::flux::{Step, Thinning};
 use super::flow::rest::Bounds;
@@ -10,6 +12,9 @@ use super::params::{Friction, Pace, Params, Section};
 const SAFETY: f64 = 0.9;
 /// Most steps in a frame: a frame that needs more is refused.
 pub const MOST_STEPS: u32 = 1_000_000;
+/// Lengths of frames, and of the steps of a replay (s). In shorter ones nothing would move, and numbers in single precision would not hold what they
+/// share.
+pub const LENGTHS: RangeInclusive<f64> = 1e-12..=1e6;
 
 /// The domain's measures that steps depend on.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -25,7 +30,8 @@ pub struct Measures {
 }
 
 /// The longest stable step (s) with liquid of a depth (m): the largest dt with P g A' dt^2 / dx^2 <= 1/q + zeta, for P pipes a column, and
-/// 1/q = 1 + 3 dt nu / H^2. With four pipes and nothing lost this is dt = dx / (c sqrt 2).
+/// 1/q = 1 + 3 dt nu / H^2. With four pipes and nothing lost this is dt = dx / (c sqrt 2). Infinite where nothing bounds it, as on dry ground. `frame` is
+/// what is left of the frame (s).
 pub fn longest(params: &Params, measures: &Measures, depth: f64, frame: f64) -> f64 {
     let g = -params.gravity[1];
     let height = if params.section == Section::Wetted { depth } else { measures.cell };
@@ -33,7 +39,7 @@ pub fn longest(params: &Params, measures: &Measures, depth: f64, frame: f64) -> 
     let b = if depth > 0.0 { 3.0 * least_viscosity(params) / (depth * depth) } else { 0.0 };
     let c = 1.0 + libm::pow(params.kept, frame);
     if a <= 0.0 || !b.is_finite() {
-        return frame;
+        return f64::INFINITY;
     }
     SAFETY * (b + (b * b + 4.0 * a * c).sqrt()) / (2.0 * a)
 }
@@ -81,7 +87,7 @@ pub fn next(at: &Next) -> f64 {
         }
         Pace::Realtime(longest) => longest / halved,
     };
-    // Rounding of what is left is no reason for another step.
+    // Rounding of what is left is no reason for another step; where nothing bounds a step it takes all that is left.
     at.left / (at.left / longest - 1e-9).ceil().max(1.0)
 }
 

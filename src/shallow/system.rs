@@ -1,15 +1,15 @@
 //! The liquid of a domain, frame by frame.
 
-use super::clock::Clock;
 use super::columns::Columns;
 use super::falls::Falling;
 use super::flow::Flow;
-use super::flow::bands::attended;
 use super::flow::lips::Lips;
+use super::flow::stop::Stop;
 use super::flows::{FlowPoint, Flows};
+use super::frame::Kept;
 use super::grid::BOTTOMLESS;
 use super::identity::Identity;
-use super::pace::{self, MOST_STEPS, Measures, Next};
+use super::pace::{self, Measures, Next};
 use super::params::{Friction, Params, Section};
 use super::pipes::rules::{Apart, Rules};
 use super::pipes::{Border, Pipes};
@@ -17,7 +17,6 @@ use super::remap::Remap;
 use super::scalars::amounts::Account;
 use super::terrain::Solids;
 use super::thicken::Thick;
-use crate::base::cpu::FlushDenormals;
 use crate::context::Context;
 use crate::error::{Error, Result};
 
@@ -32,7 +31,9 @@ pub struct Shallow {
     pub(super) flows: Flows,
     pub(super) remap: Remap,
     pub(super) falls: Falling,
-    thick: Thick,
+    pub(super) thick: Thick,
+    /// The state at the beginning of a frame that may take long.
+    pub(super) kept: Kept,
     /// Cells that are another liquid's.
     pub(super) apart: Option<Apart>,
     /// Units poured in, less those taken out, other than by flow points.
@@ -127,6 +128,7 @@ impl Shallow {
             remap: Remap::new(falls.map_or(0, |falls| falls.most)),
             falls: Falling::new(falls, pipes.links.len()),
             thick: Thick::none(),
+            kept: Kept::default(),
             apart,
             params,
             flow,
@@ -247,92 +249,6 @@ impl Shallow {
         }
     }
 
-    /// One frame of `dt` (s).
-    ///
-    /// The context is asked once, at the start, whether it is cancelled. The caller's thread does all the work, or, where there are many columns,
-    /// the threads of its pool do, which are entered once. Nothing is allocated, locked, logged or polled by a pool without threads, but for
-    /// the list of steps when it grows.
-    ///
-    /// # Errors
-    /// `Argument`: dt is not positive and finite, or needs over a million steps. `Cancelled`, before anything changes.
-    pub fn step(&mut self, ctx: &Context, dt: f64) -> Result<Report> {
-        self.frame(ctx, dt, |pace| Some(pace::next(pace)))
-    }
-
-    /// As [`Shallow::step`], but when the calling thread has worked for `budget` (s), or, where several do, so long has passed, the frame ends
-    /// early, and the rest of its time is dropped. At least one step is made. Another run drops other times: [`Shallow::replay`] makes the
-    /// same one again.
-    ///
-    /// # Errors
-    /// As [`Shallow::step`]; also when the budget is not positive.
-    pub fn step_within(&mut self, ctx: &Context, dt: f64, budget: f64) -> Result<Report> {
-        if budget.is_nan() || budget <= 0.0 {
-            return Err(Error::argument(format!("a budget of {budget} s is not positive")));
-        }
-        let clock = Clock::start(self.flow.divide(&self.columns, ctx.pool().threads()));
-        self.frame(ctx, dt, |pace| (pace.steps == 0 || clock.seconds() < budget).then(|| pace::next(pace)))
-    }
-
-    /// A frame of given steps (s), as [`Shallow::last_steps`] has listed them.
-    ///
-    /// # Errors
-    /// As [`Shallow::step`].
-    pub fn replay(&mut self, ctx: &Context, steps: &[f64]) -> Result<Report> {
-        if let Some(step) = steps.iter().find(|step| step.is_nan() || **step <= 0.0) {
-            return Err(Error::argument(format!("a step of {step} s is not positive")));
-        }
-        self.frame(ctx, steps.iter().sum(), |pace| steps.get(pace.steps as usize).copied())
-    }
-
-    fn frame(
-        &mut self,
-        ctx: &Context,
-        dt: f64,
-        next: impl Fn(&Next) -> Option<f64> + Send,
-    ) -> Result<Report> {
-        if !(dt > 0.0 && dt <= 1e6) {
-            return Err(Error::argument(format!("a frame of {dt} s is not within 0 to 1000000 s")));
-        }
-        if ctx.is_cancelled() {
-            return Err(Error::Cancelled);
-        }
-        if self.flow.divide(&self.columns, ctx.pool().threads()) {
-            let threads = ctx.pool().threads();
-            ctx.pool().install(|| attended(threads, || self.steps(dt, next)))
-        } else {
-            let _flush = FlushDenormals::begin();
-            self.steps(dt, next)
-        }
-    }
-
-    /// The steps of a frame, in which the liquid is as thick as what it carries makes it at the beginning.
-    fn steps(&mut self, dt: f64, next: impl Fn(&Next) -> Option<f64>) -> Result<Report> {
-        let Self { params, thick, columns, flow, pipes, .. } = &mut *self;
-        let Some(law) = params.thickening else { return self.flow_on(dt, next) };
-        thick.begin(&law, columns, flow, pipes)?;
-        let report = self.flow_on(dt, next);
-        self.thick.end(&mut self.pipes);
-        report
-    }
-
-    fn flow_on(&mut self, dt: f64, next: impl Fn(&Next) -> Option<f64>) -> Result<Report> {
-        let measures = self.measures();
-        let mut report = Report::default();
-        let halvings = self.begin(dt, &measures, &next);
-        while report.seconds < dt {
-            let left = dt - report.seconds;
-            let state = self.next(&measures, left, report.steps, halvings);
-            let Some(length) = next(&state) else { break };
-            if report.steps == 0 && left / length > f64::from(MOST_STEPS) {
-                return Err(Error::argument(format!("a frame of {dt} s would take steps of {length} s")));
-            }
-            self.advance(&measures, length, &mut report);
-            report.seconds = if length >= left { dt } else { report.seconds + length };
-        }
-        report.deepest = measures.unit * f64::from(self.flow.deepest());
-        Ok(report)
-    }
-
     /// Begins a frame; returns how often its steps are halved, for fast films.
     pub(super) fn begin(&mut self, dt: f64, measures: &Measures, next: impl Fn(&Next) -> Option<f64>) -> u32 {
         self.steps.clear();
@@ -342,10 +258,10 @@ impl Shallow {
     }
 
     /// One step of a length (s), counted in a report.
-    pub(super) fn advance(&mut self, measures: &Measures, length: f64, report: &mut Report) {
+    pub(super) fn advance(&mut self, measures: &Measures, length: f64, report: &mut Report, stop: &Stop) {
         let step = pace::step(&self.params, measures, length, self.flow.last);
         self.find_lips();
-        let [emptied, filled, slowed] = self.flow.step(&self.columns, &self.pipes, &step, length);
+        let [emptied, filled, slowed] = self.flow.step(&self.columns, &self.pipes, &step, length, stop);
         self.fall(length);
         self.flows.step(&self.columns, &mut self.flow, -self.params.gravity[1], self.time, length);
         self.steps.push(length);

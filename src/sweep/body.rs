@@ -10,6 +10,7 @@ use super::refine::{edge_error, refine};
 use super::topology::{Simplex, Topology};
 use crate::base::DVec3;
 use crate::base::mesh::coincident;
+use crate::base::orientation::{Closing, Orientation};
 use crate::context::Context;
 use crate::distance::Face;
 use crate::distance::lattice::{Fixed, Lattice, UNITS};
@@ -49,15 +50,18 @@ pub struct Shape {
     triangles: u128,
     /// For each vertex the first one at the same position; itself when there is none before it.
     same: Vec<u32>,
-    /// Whether the triangles were flipped.
-    reversed: bool,
+    /// The triangles as they have to be turned, where they are not the motion's own.
+    oriented: Option<Vec<[u32; 3]>>,
     topology: Topology,
     contradictions: usize,
+    /// What of its orientation is not decided, in a sentence.
+    doubts: Option<String>,
 }
 
 impl Body {
-    /// Prepares a motion: welds vertices that coincide at `time` (s), closes open loops, and flips
-    /// the triangles if the solid would have a negative volume.
+    /// Prepares a motion by its pose at `time` (s): welds vertices that coincide, leaves out doubled triangles, turns closed parts
+    /// outward (see [`crate::base::orientation`]) and closes open loops; open parts are turned round where the whole solid
+    /// would have a negative volume.
     ///
     /// # Errors
     /// When the motion has no triangles, or its pose cannot be computed.
@@ -65,8 +69,8 @@ impl Body {
         Self::shaped(motion, time, None)
     }
 
-    /// As [`Body::new`]; `known` is the shape of an earlier body, which is shared if this body has the same one.
-    /// The result is the same with and without.
+    /// As [`Body::new`]; `known` is the shape of an earlier body, which is shared if this body has the same one, and its
+    /// volume is not negative with it.
     ///
     /// # Errors
     /// As [`Body::new`].
@@ -82,12 +86,22 @@ impl Body {
         } else {
             coincident(pose.iter().copied())
         };
-        let known = known.filter(|known| known.triangles == triangles && known.same == same);
-        let shape = known.unwrap_or_else(|| Arc::new(Shape::new(&*motion, triangles, same)));
-        shape.topology.complete(&mut pose);
-        let volume = volume(&shape.topology, &pose);
-        let inside_out = if shape.reversed { volume > 0.0 } else { volume < 0.0 };
-        let shape = if inside_out != shape.reversed { Arc::new(shape.turned_round()) } else { shape };
+        let known = known.filter(|known| {
+            let is_same = known.triangles == triangles && known.same == same;
+            is_same && {
+                known.topology.complete(&mut pose);
+                volume(&known.topology, &pose) >= 0.0
+            }
+        });
+        let shape = match known {
+            Some(known) => known,
+            None => {
+                pose.truncate(same.len());
+                let shape = Shape::new(motion.triangles(), triangles, same, &pose);
+                shape.topology.complete(&mut pose);
+                Arc::new(shape)
+            }
+        };
         let length = |&[i, j]: &[u32; 2]| (pose[i as usize] - pose[j as usize]).norm();
         let edges = shape.topology.edges.par_iter().with_min_len(GRAIN);
         let longest_edge = edges.map(length).reduce(|| 0.0, f64::max);
@@ -148,9 +162,26 @@ impl Body {
         if all > 0.0 { topology.caps().map(area).sum::<f64>() / all } else { 0.0 }
     }
 
-    /// Whether its triangles face inward as its motion has them.
-    pub fn is_reversed(&self) -> bool {
-        self.shape.reversed
+    /// Its motion's triangles, turned so that they face outward, without doubled ones.
+    pub fn triangles(&self) -> &[[u32; 3]] {
+        self.shape.oriented.as_deref().unwrap_or(self.motion.triangles())
+    }
+
+    /// What of its orientation is not decided, in a sentence without its name.
+    pub fn doubts(&self) -> Option<&str> {
+        self.shape.doubts.as_deref()
+    }
+
+    /// What to say of triangles that do not agree about inside and outside, in a sentence without its name.
+    pub fn warning(&self) -> Option<String> {
+        let edges = self.contradictions();
+        let disagree = || {
+            format!(
+                "its triangles disagree about inside and outside at {edges} edges, which `frazil mesh check` lists; holes are \
+                 closed by cones, look at the result"
+            )
+        };
+        self.doubts().map(String::from).or_else(|| (edges > 0).then(disagree))
     }
 
     /// Whether its imprints have ragged edges.
@@ -184,7 +215,7 @@ impl Body {
         let separate;
         let topology = if apart {
             let identity: Vec<u32> = (0..self.motion.vertex_count() as u32).collect();
-            separate = Topology::new(self.motion.triangles(), identity.len(), &identity, true);
+            separate = Topology::new(self.triangles(), identity.len(), &identity, true);
             &separate
         } else {
             &self.shape.topology
@@ -347,16 +378,29 @@ impl Near {
 }
 
 impl Shape {
-    fn new(motion: &dyn Motion, triangles: u128, same: Vec<u32>) -> Self {
-        let made = |close| Topology::new(motion.triangles(), motion.vertex_count(), &same, close);
-        let (topology, contradictions) = (made(true), made(false).contradictions());
-        Self { triangles, same, reversed: false, topology, contradictions }
-    }
-
-    fn turned_round(&self) -> Self {
-        let mut topology = self.topology.clone();
-        topology.simplices.iter_mut().for_each(|simplex| simplex.sign = -simplex.sign);
-        Self { same: self.same.clone(), reversed: !self.reversed, topology, ..*self }
+    /// Of triangles with this hash, in their first pose.
+    fn new(own: &[[u32; 3]], triangles: u128, same: Vec<u32>, pose: &[DVec3]) -> Self {
+        let mut orientation = Orientation::of(pose, own, &same, Closing::Caps);
+        let of = |orientation: &Orientation| {
+            let oriented = (!orientation.is_unchanged()).then(|| orientation.applied(own));
+            let topology = Topology::new(oriented.as_deref().unwrap_or(own), pose.len(), &same, false);
+            let contradictions = topology.contradictions();
+            (oriented, topology, contradictions)
+        };
+        let (mut oriented, mut topology, mut contradictions) = of(&orientation);
+        topology.close();
+        if orientation.has_open() {
+            // As the motion has the triangles, all of them.
+            let mut closed = pose.to_vec();
+            topology.complete(&mut closed);
+            let [before, now] = orientation.volumes();
+            if volume(&topology, &closed) - now + before < 0.0 {
+                orientation.turn_open();
+                (oriented, topology, contradictions) = of(&orientation);
+                topology.close();
+            }
+        }
+        Self { triangles, same, oriented, topology, contradictions, doubts: orientation.warning() }
     }
 }
 

@@ -106,10 +106,17 @@ impl Topology {
             topology.push_triangle(triangle.map(|vertex| same[vertex as usize]));
         }
         topology.index_edges();
-        if close && topology.cap_open_loops() {
-            topology.index_edges();
+        if close {
+            topology.close();
         }
         topology
+    }
+
+    /// Caps its open loops.
+    pub fn close(&mut self) {
+        if self.cap_open_loops() {
+            self.index_edges();
+        }
     }
 
     /// The caps of open loops: the triangles with a derived vertex.

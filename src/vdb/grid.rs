@@ -261,6 +261,17 @@ impl FloatGrid {
         ffi::active_bbox(&self.inner, &mut low, &mut high).ok()?.then_some((low, high))
     }
 
+    /// Heights (m) between which all active voxels lie, with a neighbour of each: below and above them are tiles only. All heights where no voxel is active.
+    pub fn heights(&self) -> [f64; 2] {
+        let Some((low, high)) = self.active_bbox() else { return [f64::NEG_INFINITY, f64::INFINITY] };
+        let ends = |axis: usize| [f64::from(low[axis]) - 1.0, f64::from(high[axis]) + 1.0];
+        let corners = (0..8).map(|corner| {
+            let index = [0, 1, 2].map(|axis| ends(axis)[corner >> axis & 1]);
+            self.index_to_world(DVec3::from(index)).y
+        });
+        corners.fold([f64::INFINITY, f64::NEG_INFINITY], |[low, high], y| [low.min(y), high.max(y)])
+    }
+
     /// Every leaf, in the tree's order; nothing is copied.
     ///
     /// # Errors

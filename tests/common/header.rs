@@ -25,6 +25,30 @@ pub fn functions() -> Vec<(String, String)> {
     out
 }
 
+/// Functions that write a struct of their caller: each with a parameter that points to one of the header's structs and is not const.
+pub fn struct_writers() -> BTreeSet<String> {
+    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("include/frazil.h");
+    let text = fs::read_to_string(path).expect("the header");
+    let names =
+        |line: &str| line.strip_prefix("} ").and_then(|rest| rest.strip_suffix(';')).map(str::to_string);
+    let structs: BTreeSet<String> =
+        text.lines().filter_map(names).filter(|name| name.starts_with("frz_")).collect();
+    let mut writers = BTreeSet::new();
+    for statement in text.split(';') {
+        let code = statement.rsplit("*/").next().unwrap_or_default();
+        let Some((before, parameters)) = code.split_once('(') else { continue };
+        let name = before.split_whitespace().last().unwrap_or_default().trim_start_matches('*');
+        let writes = |parameter: &str| {
+            let kind = parameter.split_once('*').map(|(kind, _)| kind.trim());
+            kind.is_some_and(|kind| structs.contains(kind))
+        };
+        if name.starts_with("frz_") && parameters.split(',').any(writes) {
+            writers.insert(name.to_string());
+        }
+    }
+    writers
+}
+
 /// Functions without a text, or that no program of tests/ctest or tests/ctest_core calls.
 pub fn bare_functions() -> Vec<String> {
     let mut called = BTreeSet::new();

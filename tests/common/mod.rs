@@ -17,6 +17,7 @@ pub mod jelly;
 pub mod liquids;
 pub mod made_sets;
 pub mod nearest;
+pub mod oriented;
 pub mod repaired;
 pub mod rough_ground;
 pub mod shallow;

@@ -12,6 +12,7 @@ mod program;
 mod base {
     mod faults;
     mod meshes;
+    mod orientation;
 }
 mod capi {
     mod header;
@@ -43,6 +44,7 @@ mod house {
     mod gates;
     mod imports;
     mod readers;
+    mod tracked;
 }
 mod io {
     mod arrays;
@@ -50,6 +52,7 @@ mod io {
     mod files;
     mod particles;
     mod particles_damage;
+    mod text_variants;
     mod uvs;
 }
 mod motion {

@@ -4,7 +4,8 @@ use super::VdbOutput;
 use crate::cli::exit::{Failure, Phase};
 use crate::cli::options::{MeshSpace, positive};
 use crate::cli::session::Session;
-use frazil::sweep::{self, Settings};
+use frazil::motion::{Keys, Rigid};
+use frazil::sweep::{self, Body, Settings};
 use std::path::PathBuf;
 
 /// Make a level set of the solid that a mesh bounds; open meshes are closed
@@ -35,6 +36,10 @@ pub fn run(args: &Args, session: &Session) -> Result<(), Failure> {
         log::warn!("{what}");
     }
     super::check_surface(session, mesh.area(), args.cell).before()?;
-    let grid = sweep::voxelise(&session.ctx, mesh, &settings).during()?;
+    let still = Body::new(Box::new(Rigid::new(mesh, Keys::default())), 0.0).before()?;
+    if let Some(what) = still.warning() {
+        log::warn!("{}: {what}", args.mesh.display());
+    }
+    let grid = sweep::chain(&session.ctx, &[still], 0.0, 0.0, &settings).during()?;
     args.output.write(session, grid).during()
 }

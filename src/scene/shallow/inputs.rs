@@ -7,6 +7,7 @@ use super::attached::{Attached, attach};
 use super::course::Course;
 use super::terrain::{Terrain, read_mesh};
 use super::{Point, Shallow, memory, obstacles};
+use crate::base::orientation::Orientation;
 use crate::base::{DVec3, TriMesh};
 use crate::context::Context;
 use crate::error::{Error, Result};
@@ -15,6 +16,7 @@ use crate::io::source;
 use crate::motion::Space;
 use crate::scene::Scene;
 use crate::shallow::grid::{Grid, Heights, MOST_CELLS};
+use crate::shallow::terrain::facing::facing;
 use crate::shallow::terrain::{Solids, triangles};
 
 /// Room above the terrain, where `top` is left out: share of the terrain's height, and the least (m).
@@ -42,7 +44,9 @@ pub struct Inputs {
     pub(super) still: Option<TriMesh>,
     /// What each of the scene's points moves with, where it follows the terrain.
     pub(super) attached: Vec<Option<Attached>>,
-    /// Whether the terrain's triangles face down, so that they are turned round.
+    /// How the terrain's triangles are turned.
+    pub(super) orientation: Orientation,
+    /// Whether all of them are turned after that, as they face down.
     pub(super) is_turned: bool,
     /// What the files held when they were read.
     pub(in crate::scene) seen: Arc<Seen>,
@@ -75,6 +79,8 @@ impl Inputs {
         // What was meant in millimetres takes too much.
         memory::allow_cells(ctx, &grid)
             .inspect_err(|_| warnings.iter().for_each(|warning| log::warn!("{warning}")))?;
+        let orientation = terrain.turn_outward();
+        warnings.extend(orientation.warning().map(|what| format!("{}: {what}", path.display())));
         let mut solids = terrain.solids(ctx, grid, heights).map_err(|error| told(&path, error))?;
         let mut is_turned = false;
         if solids.layers() == 0
@@ -96,11 +102,14 @@ impl Inputs {
             );
             return Err(Error::file(path, what));
         }
-        let meshes = obstacles::meshes(shallow, frames.first, &seen)?;
-        for (mesh, own) in meshes.iter().zip(shallow.obstacles.iter().filter_map(|own| own.file())) {
+        let mut meshes = obstacles::meshes(shallow, frames.first, &seen)?;
+        for (mesh, own) in meshes.iter_mut().zip(shallow.obstacles.iter().filter_map(|own| own.file())) {
+            let orientation = facing(mesh);
+            *mesh = orientation.applied_to(std::mem::take(mesh));
+            warnings.extend(orientation.warning().map(|what| format!("{}: {what}", own.display())));
             let on_it = triangles::solids(&mesh.positions, &mesh.triangles, grid, heights);
             let on_it = on_it.map_err(|error| told(own, error))?;
-            if !mesh.is_closed() {
+            if orientation.has_open() {
                 let what = "is not closed: below a surface of it that faces up all is solid";
                 warnings.push(format!("{}: {what}", own.display()));
             }
@@ -128,6 +137,7 @@ impl Inputs {
             moving,
             still,
             attached,
+            orientation,
             is_turned,
             seen,
             warnings,
@@ -146,19 +156,27 @@ impl Inputs {
         let Some(first) = &self.moving else { return Ok(None) };
         let path = shallow.terrain_at(frame);
         let mut mesh = read_mesh(&path, shallow.space, &self.seen)?;
-        if self.is_turned {
-            mesh = mesh.reversed();
-        }
-        if mesh.positions.len() != first.positions.len() || mesh.triangles != first.triangles {
+        let other = |mesh: &TriMesh| {
             let count = |mesh: &TriMesh| {
                 format!("{} vertices and {} triangles", mesh.positions.len(), mesh.triangles.len())
             };
             let what = format!(
                 "is another mesh than that of the first frame, {} and not {}, or has other triangles: a terrain that moves keeps them",
-                count(&mesh),
+                count(mesh),
                 count(first)
             );
-            return Err(Error::file(path, what));
+            Error::file(&path, what)
+        };
+        // As at the first frame.
+        if !self.orientation.fits(mesh.triangles.len()) {
+            return Err(other(&mesh));
+        }
+        mesh = self.orientation.applied_to(mesh);
+        if self.is_turned {
+            mesh = mesh.reversed();
+        }
+        if mesh.positions.len() != first.positions.len() || mesh.triangles != first.triangles {
+            return Err(other(&mesh));
         }
         let (low, high) = mesh.bounds().unwrap_or_default();
         let range = [self.heights.low, self.heights.metres(crate::shallow::grid::TOP)];

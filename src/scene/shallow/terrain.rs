@@ -3,6 +3,7 @@
 use std::path::Path;
 
 use super::{ImagePlace, Shallow};
+use crate::base::orientation::Orientation;
 use crate::base::{DVec3, TriMesh};
 use crate::context::Context;
 use crate::error::{Error, Result};
@@ -10,6 +11,7 @@ use crate::io::mesh::{extension, parse_polygons};
 use crate::io::seen::Seen;
 use crate::motion::Space;
 use crate::shallow::grid::{Grid, Heights};
+use crate::shallow::terrain::facing::facing;
 use crate::shallow::terrain::{Solids, triangles};
 #[cfg(feature = "cli")]
 use crate::{io::grey, shallow::terrain::height};
@@ -43,6 +45,19 @@ impl Terrain {
             ("vdb", _) => of_vdb(&path, seen),
             ("png", Some(place)) => of_image(&path, place, seen),
             _ => Ok(Self::Mesh(read_mesh(&path, shallow.space, seen)?)),
+        }
+    }
+
+    /// Turns the closed parts of a mesh outward; returns how.
+    pub fn turn_outward(&mut self) -> Orientation {
+        match self {
+            Self::Mesh(mesh) => {
+                let orientation = facing(mesh);
+                *mesh = orientation.applied_to(std::mem::take(mesh));
+                orientation
+            }
+            #[cfg(any(feature = "cli", feature = "vdb"))]
+            _ => Orientation::default(),
         }
     }
 
@@ -101,8 +116,11 @@ impl Terrain {
             }
             #[cfg(feature = "vdb")]
             Self::Grid(level_set) => {
-                let voxel = level_set.voxel_size();
-                sampler::solids(grid, heights, voxel, |places, out| level_set.sample_linear(ctx, places, out))
+                let (voxel, between) = (level_set.voxel_size(), level_set.heights());
+                sampler::solids(grid, heights, voxel, between, |places, out| {
+                    ctx.check()?;
+                    level_set.sample_linear(ctx, places, out)
+                })
             }
         }
     }

@@ -224,6 +224,9 @@ impl<'a> Course<'a> {
 
     /// Triangles that disagree about inside and outside.
     fn inside_out(&self) -> Option<String> {
+        if let Some(what) = self.body.doubts() {
+            return Some(format!("{}: {what}", self.name));
+        }
         let edges = self.body.contradictions();
         (edges > 0).then(|| {
             format!(

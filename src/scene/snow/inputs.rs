@@ -7,6 +7,7 @@ use super::drift::Drift;
 use super::mist;
 use super::warnings::{replaced, too_small};
 use crate::base::mesh::{farthest, too_far as far_mesh};
+use crate::base::orientation::{Closing, Orientation};
 use crate::base::{DVec3, TriMesh};
 use crate::context::Context;
 use crate::error::{Error, Result};
@@ -67,18 +68,20 @@ impl Inputs {
     pub fn load(scene: &Scene) -> Result<Self> {
         let seen = Arc::new(Seen::default());
         let snow = scene.snow()?.clone();
+        let mut warnings = Vec::new();
         let source = match &snow.layer {
             Layer::Grid(path) => {
-                Source::Given { grid: layer_grid(path, snow.cell, &seen)?, ground: under(&snow, &seen)? }
+                let grid = layer_grid(path, snow.cell, &seen)?;
+                Source::Given { grid, ground: under(&snow, &seen, &mut warnings)? }
             }
             Layer::Depth(depth) => {
-                Source::Made { ground: ground(&snow, &seen)?, cover: Cover::Depth(*depth) }
+                Source::Made { ground: ground(&snow, &seen, &mut warnings)?, cover: Cover::Depth(*depth) }
             }
             Layer::Top(path) => {
-                Source::Made { ground: ground(&snow, &seen)?, cover: Cover::Top(read_mesh(path, &seen)?) }
+                let ground = ground(&snow, &seen, &mut warnings)?;
+                Source::Made { ground, cover: Cover::Top(read_mesh(path, &seen, &mut warnings)?) }
             }
         };
-        let mut warnings = Vec::new();
         if let Source::Made { ground, cover } = &source {
             initial::fits(ground, cover, snow.cell)
                 .map_err(|error| Error::argument(format!("{}: {error}", scene.path.display())))?;
@@ -92,9 +95,12 @@ impl Inputs {
             }
             let motion = motion(scene, object, &seen, &mut warnings)?;
             match object.role {
-                Role::Static => statics.push(posed(&*motion, start)?),
+                Role::Static => {
+                    let mesh = posed(&*motion, start)?;
+                    statics.push(oriented(mesh, &object_name(index, object), &mut warnings));
+                }
                 _ => {
-                    let name = format!("object {} ({})", index + 1, text::name(&object.file));
+                    let name = object_name(index, object);
                     let body = Body::new(motion, start)?.with_noise(object.noise).with_name(name);
                     log::info!(
                         "{}: {} triangles, {} open loops closed",
@@ -102,12 +108,8 @@ impl Inputs {
                         body.motion().triangles().len(),
                         body.closed_loops()
                     );
-                    if body.contradictions() > 0 {
-                        log::warn!(
-                            "{}: the triangles disagree about inside and outside at {} edges; look at its prints",
-                            object.file.display(),
-                            body.contradictions()
-                        );
+                    if let Some(what) = body.warning() {
+                        log::warn!("{}: {what}", object.file.display());
                     }
                     warnings.extend(too_small(scene, object, &body, start)?);
                     bodies.push(body);
@@ -274,27 +276,39 @@ impl Source {
     }
 }
 
-fn read_mesh(path: &Path, seen: &Seen) -> Result<TriMesh> {
-    // Vertices that no face names are not part of the snow.
-    mesh::parse_polygons(path, &seen.read(path)?).map(|mesh| mesh.into_triangles().without_unused())
+fn object_name(index: usize, object: &Object) -> String {
+    format!("object {} ({})", index + 1, text::name(&object.file))
 }
 
-fn ground(snow: &Snow, seen: &Seen) -> Result<initial::Ground> {
+/// A mesh with its closed parts outward; what of that is not decided joins the warnings.
+fn oriented(mesh: TriMesh, name: &str, warnings: &mut Vec<String>) -> TriMesh {
+    let orientation = Orientation::of_mesh(&mesh, Closing::Caps);
+    warnings.extend(orientation.warning().map(|what| format!("{name}: {what}")));
+    orientation.applied_to(mesh)
+}
+
+fn read_mesh(path: &Path, seen: &Seen, warnings: &mut Vec<String>) -> Result<TriMesh> {
+    let mesh = mesh::parse_polygons(path, &seen.read(path)?)?;
+    // Vertices that no face names are not part of the snow.
+    Ok(oriented(mesh.into_triangles().without_unused(), &path.display().to_string(), warnings))
+}
+
+fn ground(snow: &Snow, seen: &Seen, warnings: &mut Vec<String>) -> Result<initial::Ground> {
     match &snow.ground {
         Some(Ground::Plane { height, area: Some(area) }) => {
             Ok(initial::Ground::Plane { height: *height, area: *area })
         }
-        Some(Ground::Mesh(path)) => Ok(initial::Ground::Mesh(read_mesh(path, seen)?)),
+        Some(Ground::Mesh(path)) => Ok(initial::Ground::Mesh(read_mesh(path, seen, warnings)?)),
         _ => Err(Error::argument("the snow has no ground")),
     }
 }
 
 /// The ground beside a layer that is given.
-fn under(snow: &Snow, seen: &Seen) -> Result<Option<Under>> {
+fn under(snow: &Snow, seen: &Seen, warnings: &mut Vec<String>) -> Result<Option<Under>> {
     Ok(match &snow.ground {
         None => None,
         Some(Ground::Plane { height, .. }) => Some(Under::Level(*height)),
-        Some(Ground::Mesh(path)) => Some(Under::Mesh(read_mesh(path, seen)?)),
+        Some(Ground::Mesh(path)) => Some(Under::Mesh(read_mesh(path, seen, warnings)?)),
     })
 }
 

@@ -7,6 +7,7 @@ use super::time::Liquid;
 use super::{Surface, sculpts};
 use crate::base::arrays::{Number, On};
 use crate::base::faults::Faults;
+use crate::base::orientation::{Closing, Orientation};
 use crate::base::{DetailedMesh, MeshArray, TriMesh};
 use crate::context::Context;
 use crate::error::{Error, Result};
@@ -139,12 +140,15 @@ pub(super) fn read_mesh(
     let mut mesh = parse_polygons(path, &bytes)?.into_detailed();
     let space = surface.space;
     mesh.mesh.positions.iter_mut().for_each(|p| *p = space.place(p.cast()).cast());
+    let orientation = Orientation::of_mesh(&mesh.mesh, Closing::Caps);
+    let mesh = orientation.applied_to_detailed(mesh);
+    let doubts = || orientation.warning().map(|what| format!("{}: {what}", path.display()));
     if !surface.rebuild {
-        let warning = faults(path, &mesh.mesh);
+        let warning = faults(path, &mesh.mesh).or_else(doubts);
         return Ok((mesh, warning));
     }
     let (mesh, warning) = closed(ctx, mesh, spacing * surface.cell).map_err(|error| told(path, error))?;
-    Ok((mesh, warning.map(|warning| format!("{}: {warning}", path.display()))))
+    Ok((mesh, warning.map(|warning| format!("{}: {warning}", path.display())).or_else(doubts)))
 }
 
 /// What is painted to last in the array `detail` of the vertices: shares 0..=1, of bytes 0 to 255.
@@ -184,8 +188,9 @@ fn told(path: &Path, error: Error) -> Error {
 fn closed(ctx: &Context, mesh: DetailedMesh, cell: f64) -> Result<(DetailedMesh, Option<String>)> {
     let faults = ctx.pool().install(|| Faults::of(&mesh.mesh));
     let crossings = faults.crossings + faults.corner_crossings + faults.folds + faults.overlaps;
-    let is_closed = faults.by_index.is_watertight() && faults.volume > 0.0 && faults.inverted_parts == 0;
-    if is_closed && crossings == 0 {
+    let is_closed = faults.by_index.is_watertight();
+    let is_outward = faults.volume > 0.0 && faults.inverted_parts == 0;
+    if is_closed && is_outward && crossings == 0 {
         return Ok((mesh, None));
     }
     let repaired = repair(ctx, &mesh.mesh, cell)?;
@@ -193,6 +198,8 @@ fn closed(ctx: &Context, mesh: DetailedMesh, cell: f64) -> Result<(DetailedMesh,
     let mut what = Vec::new();
     if !is_closed {
         what.push("is not closed as its indices have it");
+    } else if !is_outward {
+        what.push("is inside out in parts");
     }
     if crossings > 0 {
         what.push("crosses itself");

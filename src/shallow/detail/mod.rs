@@ -5,6 +5,7 @@
 //! fine ones, so volumes are counted in fine units; what makes no coarse unit waits, with the scalars that it carries, and is part of the balance (`rests.rs`). When the box moves, four
 //! fine columns become a coarse one, and back (`shift.rs`), and what flows goes on (`momentum.rs`). Nothing is lost. `surface/` writes one mesh of both.
 
+mod frame;
 mod ground;
 mod momentum;
 pub(in crate::shallow) mod rests;
@@ -16,16 +17,13 @@ pub mod surface;
 use std::ops::Range;
 
 use super::Shallow;
-use super::flow::bands::attended;
 use super::flows::FlowPoint;
 use super::grid::Grid;
-use super::pace::{self, MOST_STEPS};
 use super::params::Params;
 use super::remap::Moved;
-use super::system::{Balance, Report, Units};
+use super::system::{Balance, Units};
 use super::terrain::Solids;
 use super::terrain::shapes::Shape;
-use crate::base::cpu::FlushDenormals;
 use crate::context::Context;
 use crate::error::{Error, Result};
 use ground::Ground;
@@ -55,6 +53,8 @@ pub struct Detail {
     /// What of each coarse cell is no coarse unit.
     pub(super) rest: Rests,
     points: Vec<FlowPoint>,
+    /// The state at the beginning of a frame that may take long.
+    kept: Vec<u8>,
 }
 
 impl Detail {
@@ -91,6 +91,7 @@ impl Detail {
             momentum: Momentum::default(),
             near,
             points: Vec::new(),
+            kept: Vec::new(),
         };
         detail.seam.find(&detail.fine, &detail.coarse, &detail.near);
         Ok(detail)
@@ -288,57 +289,6 @@ impl Detail {
             };
             own.flows.set_progress(at, own_waiting + waiting, own_moved + moved);
         }
-    }
-
-    /// One frame of `dt` (s).
-    ///
-    /// # Errors
-    /// As [`Shallow::step`].
-    pub fn step(&mut self, ctx: &Context, dt: f64) -> Result<Report> {
-        if !(dt > 0.0 && dt <= 1e6) {
-            return Err(Error::argument(format!("a frame of {dt} s is not within 0 to 1000000 s")));
-        }
-        if ctx.is_cancelled() {
-            return Err(Error::Cancelled);
-        }
-        let threads = ctx.pool().threads();
-        let divided =
-            [&mut self.fine, &mut self.coarse].map(|liquid| liquid.flow.divide(&liquid.columns, threads));
-        if divided.contains(&true) {
-            ctx.pool().install(|| attended(threads, || self.steps(dt)))
-        } else {
-            let _flush = FlushDenormals::begin();
-            self.steps(dt)
-        }
-    }
-
-    fn steps(&mut self, dt: f64) -> Result<Report> {
-        let Self { fine, coarse, seam, rest, .. } = self;
-        let measures = [fine.measures(), coarse.measures()];
-        let mut report = Report::default();
-        let halvings = [&mut *fine, &mut *coarse]
-            .into_iter()
-            .zip(&measures)
-            .map(|(liquid, measures)| liquid.begin(dt, measures, |pace| Some(pace::next(pace))))
-            .fold(0, u32::max);
-        while report.seconds < dt {
-            let left = dt - report.seconds;
-            let steps = report.steps;
-            let next =
-                |liquid: &Shallow, at: usize| pace::next(&liquid.next(&measures[at], left, steps, halvings));
-            let length = next(fine, 0).min(next(coarse, 1));
-            if steps == 0 && left / length > f64::from(MOST_STEPS) {
-                return Err(Error::argument(format!("a frame of {dt} s would take steps of {length} s")));
-            }
-            seam.begin_step(fine, coarse, &measures[0], length);
-            fine.advance(&measures[0], length, &mut report);
-            coarse.advance(&measures[1], length, &mut report);
-            seam.end_step(fine, coarse, rest);
-            report.steps = steps + 1;
-            report.seconds = if length >= left { dt } else { report.seconds + length };
-        }
-        report.deepest = measures[0].unit * f64::from(fine.flow.deepest().max(coarse.flow.deepest()));
-        Ok(report)
     }
 
     /// Simulated time (s).

@@ -79,6 +79,11 @@ impl Active {
         active
     }
 
+    /// Count of strips that a step works on.
+    pub fn count(&self) -> usize {
+        self.moving.iter().filter(|moving| **moving).count()
+    }
+
     fn find_rows(&mut self, columns: &Columns) {
         for row in 1..self.rows.len() {
             self.rows[row] = columns.row(row - 1).end as u32;

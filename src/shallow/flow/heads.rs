@@ -1,22 +1,19 @@
-//! The heads of full columns: conjugate gradients, each node by its diagonal, with sums that do not depend on their order.
+//! The heads of full columns: the system that they follow from, which [`super::gradients`] solves.
 
 use super::network::{At, Edge, Network};
+use super::stop::Stop;
 use crate::shallow::columns::{Columns, NONE};
 
 /// What is missing of a full column, and comes in a step.
 const REFILL: f64 = 0.5;
-/// Most iterations for the heads of a step.
-const ITERATIONS: usize = 500;
-/// Units by which a column's head may be off, if those around it were right.
-const RESIDUAL: f64 = 0.005;
 /// Heads closer than this (units) are equal, as surfaces are that do not differ by a unit: liquid at rest stays at rest.
 pub(super) const EQUAL: f64 = 0.5;
 /// What a head over the surface takes up, as part of the conductance: so little that a closed cavity has a solution.
-const GIVE: f64 = 1e-12;
+pub(super) const GIVE: f64 = 1e-12;
 /// Rounds in which columns below their surface leave the system.
 const RELEASES: usize = 3;
 /// Parts of a unit in which flows through links are summed.
-const LINK_SCALE: f64 = 65536.0;
+pub(super) const LINK_SCALE: f64 = 65536.0;
 
 /// A full column in the system of heads.
 #[derive(Debug, Clone, Copy)]
@@ -27,10 +24,8 @@ pub(super) struct Node {
     pub is_held: bool,
     /// Head over its surface (units).
     pub over: f64,
+    /// What is to come in, less what would without heads; and the diagonal of the system.
     pub right: f64,
-    pub residual: f64,
-    pub direction: f64,
-    pub product: f64,
     pub diagonal: f64,
     /// Sum over links, in 1/65536 unit.
     pub linked: i64,
@@ -39,26 +34,17 @@ pub(super) struct Node {
 impl Node {
     /// A node with the head over its surface of the last step.
     pub fn new(over: f64) -> Self {
-        Self {
-            edges: [NONE; 4],
-            is_held: true,
-            over,
-            right: 0.0,
-            residual: 0.0,
-            direction: 0.0,
-            product: 0.0,
-            diagonal: 0.0,
-            linked: 0,
-        }
+        Self { edges: [NONE; 4], is_held: true, over, right: 0.0, diagonal: 0.0, linked: 0 }
     }
 }
 
 impl Network {
     /// Finds the heads of full columns with which as much flows out of each as flows in.
-    pub(super) fn find_heads(&mut self, columns: &Columns) {
+    pub(super) fn find_heads(&mut self, columns: &Columns, stop: &Stop) {
+        self.gradients.set(&self.nodes, &self.edges);
         for _ in 0..=RELEASES {
             self.set_up(columns);
-            self.solve();
+            self.gradients.solve(&mut self.nodes, stop);
             let mut released = false;
             for node in self.nodes.iter_mut().filter(|node| node.is_held && node.over < 0.0) {
                 (node.is_held, node.over) = (false, 0.0);
@@ -136,76 +122,28 @@ impl Network {
         let [east, west, south, north] = node.edges.map(through);
         (east - west) + (south - north) + node.linked as f64 / LINK_SCALE
     }
-
-    /// Applies the system to directions.
-    fn apply(&mut self) {
-        for at in 0..self.edges.len() {
-            let edge = self.edges[at];
-            let direction = |end: u32| {
-                self.nodes.get(end as usize).filter(|node| node.is_held).map_or(0.0, |node| node.direction)
-            };
-            self.edges[at].flux = edge.conductance * (direction(edge.ends[0]) - direction(edge.ends[1]));
-        }
-        self.sum_links(|edge| edge.flux);
-        for node in 0..self.nodes.len() {
-            let out = self.out(node, |edge| edge.flux);
-            let node = &mut self.nodes[node];
-            node.product = out + GIVE * node.diagonal * node.direction;
-        }
-    }
-
-    /// Conjugate gradients, from the heads of the last step, each node by its diagonal.
-    fn solve(&mut self) {
-        self.nodes.iter_mut().for_each(|node| node.direction = node.over);
-        self.apply();
-        for node in &mut self.nodes {
-            node.is_held &= node.diagonal > 0.0;
-            node.residual = if node.is_held { node.right - node.product } else { 0.0 };
-            node.direction = if node.is_held { node.residual / node.diagonal } else { 0.0 };
-        }
-        let held = |network: &Self, number: fn(&Node) -> f64| {
-            fixed_sum(network.nodes.iter().filter(|node| node.is_held).map(number))
-        };
-        let by_diagonal: fn(&Node) -> f64 = |node| node.residual * node.residual / node.diagonal;
-        let mut rest = held(self, by_diagonal);
-        for _ in 0..ITERATIONS {
-            // Links are not summed any closer.
-            let least = 4.0 / LINK_SCALE;
-            if self.nodes.iter().all(|node| node.residual.abs() <= (RESIDUAL * node.diagonal).max(least)) {
-                break;
-            }
-            self.apply();
-            let along = held(self, |node| node.direction * node.product);
-            if along <= 0.0 || rest <= 0.0 {
-                break;
-            }
-            let step = rest / along;
-            for node in self.nodes.iter_mut().filter(|node| node.is_held) {
-                node.over += step * node.direction;
-                node.residual -= step * node.product;
-            }
-            let next = held(self, by_diagonal);
-            for node in self.nodes.iter_mut().filter(|node| node.is_held) {
-                node.direction = node.residual / node.diagonal + next / rest * node.direction;
-            }
-            rest = next;
-        }
-    }
-}
-
-/// A sum that does not depend on its order: addends are cut to 2^-40 of the power of two below the greatest.
-fn fixed_sum(numbers: impl Iterator<Item = f64> + Clone) -> f64 {
-    let greatest = numbers.clone().fold(0.0, |greatest, number| f64::max(greatest, number.abs()));
-    if greatest == 0.0 || !greatest.is_finite() {
-        return greatest;
-    }
-    let exponent = (greatest.to_bits() >> 52) as i64 - 1023;
-    let power = |exponent: i64| f64::from_bits(((1023 + exponent.clamp(-1022, 1023)) as u64) << 52);
-    let scale = power(40 - exponent);
-    numbers.map(|number| (number * scale) as i64).sum::<i64>() as f64 / scale
 }
 
 /// A number of a link for a sum of such, whatever is asked for: their sums stay within 64 bits.
-fn scaled(number: f64) -> i64 {
+pub(super) fn scaled(number: f64) -> i64 {
     (number * LINK_SCALE).clamp(-1e16, 1e16) as i64
+}
+
+/// The height of a pipe's section (units): the depth of the column that gave last, within the opening between both.
+pub(super) fn section(columns: &Columns, depth: &[i32], i: usize, j: Option<usize>, flux: f32) -> f64 {
+    let (base, ceiling) = (columns.bases(), columns.ceilings());
+    let Some(j) = j else { return f64::from(depth[i]) };
+    let opening = ceiling[i].min(ceiling[j]) - base[i].max(base[j]);
+    let eta = |k: usize| base[k] + depth[k];
+    let gives = match flux.partial_cmp(&0.0) {
+        Some(std::cmp::Ordering::Greater) => depth[i],
+        Some(std::cmp::Ordering::Less) => depth[j],
+        // From both ends the same.
+        _ => match eta(i).cmp(&eta(j)) {
+            std::cmp::Ordering::Greater => depth[i],
+            std::cmp::Ordering::Less => depth[j],
+            std::cmp::Ordering::Equal => depth[i].min(depth[j]),
+        },
+    };
+    f64::from(gives.min(opening))
 }

@@ -12,6 +12,7 @@ mod carry;
 pub mod fast;
 mod fit;
 pub mod flux;
+mod gradients;
 mod heads;
 pub mod links;
 pub(super) mod lips;
@@ -22,6 +23,7 @@ pub mod rest;
 mod rounds;
 mod rows;
 mod scale;
+pub mod stop;
 mod transfer;
 pub(super) mod walls;
 
@@ -44,6 +46,7 @@ use network::{Network, State};
 use parts::Part;
 use rest::{Bounds, Still};
 use rows::Ground;
+use stop::Stop;
 use walls::{Liquid, Walls};
 
 /// Depths and fluxes, by column index.
@@ -333,7 +336,7 @@ impl Flow {
 
     /// One step of `dt` (s); returns the count of rows in which K_min, and in which K_max, was not 1, and in which fast films were held back. Runs on
     /// the threads of the pool around it, if [`Flow::divide`] has divided it.
-    pub fn step(&mut self, columns: &Columns, pipes: &Pipes, step: &Step, dt: f64) -> [u32; 3] {
+    pub fn step(&mut self, columns: &Columns, pipes: &Pipes, step: &Step, dt: f64, stop: &Stop) -> [u32; 3] {
         self.active.refresh(columns, &self.depth);
         if self.active.all_rest() && self.network.is_empty() {
             self.bands.row_depths_mut().copy_from_slice(self.active.asleep_depths());
@@ -342,7 +345,7 @@ impl Flow {
         }
         self.walls.begin_step(step, &pipes.links, columns, self.bands.row_depths());
         if self.bands.find_filling() || !self.network.is_empty() {
-            self.flood(columns, pipes, step);
+            self.flood(columns, pipes, step, stop);
             for strip in self.network.strips() {
                 self.active.stir(columns, strip);
             }
@@ -417,6 +420,18 @@ impl Flow {
         self.amounts.settle(&changes);
     }
 
+    /// Columns of strips that a step works on, and at most how many of them may be full.
+    pub(super) fn work(&mut self, columns: &Columns) -> [usize; 2] {
+        let wet = STRIP * self.active.count();
+        if !self.bands.find_filling() {
+            return [wet, self.network.len()];
+        }
+        let may_be_full = self.bands.filling().may_be_full;
+        let rows = (0..may_be_full.len()).filter(|&row| may_be_full[row]);
+        let full = rows.map(|row| STRIP * columns.row(row).len()).sum::<usize>();
+        [wet, full.min(wet).max(self.network.len())]
+    }
+
     /// Finds what flows with friction beside it.
     fn rub(&mut self, columns: &Columns, pipes: &Pipes, step: &Step) {
         let [east, south] = &self.flux;
@@ -435,7 +450,7 @@ impl Flow {
     }
 
     /// Finds what flows through full columns.
-    fn flood(&mut self, columns: &Columns, pipes: &Pipes, step: &Step) {
+    fn flood(&mut self, columns: &Columns, pipes: &Pipes, step: &Step, stop: &Stop) {
         let ([east, south], [left_east, left_south]) = (&self.flux, &self.left);
         let state = State {
             depth: &self.depth,
@@ -445,6 +460,6 @@ impl Flow {
             lips: &self.lips,
             walls: &self.walls,
         };
-        self.network.find(step, columns, pipes, self.bands.filling(), &state);
+        self.network.find(step, columns, pipes, self.bands.filling(), &state, stop);
     }
 }

@@ -9,10 +9,12 @@ use std::ops::Range;
 
 use super::bands::Filling;
 use super::flux::Step;
-use super::heads::{EQUAL, Node};
+use super::gradients::Gradients;
+use super::heads::{EQUAL, Node, section};
 use super::links::LinkFlow;
 use super::lips::{Fall, Lips, edge};
 use super::rounds::{self, Party};
+use super::stop::Stop;
 use super::walls::Walls;
 use crate::shallow::columns::{Columns, NONE, STRIP, strip_mut, strip_of};
 use crate::shallow::grid::TOP;
@@ -61,6 +63,7 @@ pub struct Network {
     pub(super) parties: Vec<Party>,
     pub(super) nodes: Vec<Node>,
     pub(super) edges: Vec<Edge>,
+    pub(super) gradients: Gradients,
     /// Party of each column, or [`NONE`].
     party_of: Vec<u32>,
     /// Head over the surface of each column in the last step (units).
@@ -113,6 +116,7 @@ impl Network {
             parties: Vec::with_capacity(room),
             nodes: Vec::with_capacity(room),
             edges: Vec::with_capacity(2 * room),
+            gradients: Gradients::with_room(room),
             shut_east: Vec::with_capacity(room),
             shut_south: Vec::with_capacity(room),
             shut_links: Vec::with_capacity(room),
@@ -157,13 +161,26 @@ impl Network {
         self.nodes.is_empty()
     }
 
+    /// Count of full columns.
+    pub fn len(&self) -> usize {
+        self.nodes.len()
+    }
+
     /// The strips of its columns, and of those beside them.
     pub fn strips(&self) -> impl Iterator<Item = usize> {
         self.parties.iter().map(|party| party.column as usize / STRIP)
     }
 
     /// Finds the full columns of the rows that are filling, of which some may have full ones, their heads and what flows through their pipes.
-    pub fn find(&mut self, step: &Step, columns: &Columns, pipes: &Pipes, filling: Filling, state: &State) {
+    pub fn find(
+        &mut self,
+        step: &Step,
+        columns: &Columns,
+        pipes: &Pipes,
+        filling: Filling,
+        state: &State,
+        stop: &Stop,
+    ) {
         self.clear();
         for row in (0..filling.may_fill.len()).filter(|&row| filling.may_fill[row]) {
             if filling.may_be_full[row] || self.has_heads[row] {
@@ -174,9 +191,12 @@ impl Network {
             return;
         }
         self.connect(step, columns, pipes, filling.may_fill, state);
-        self.find_heads(columns);
+        self.find_heads(columns, stop);
         self.flow(columns);
-        rounds::settle(&mut self.parties, &mut self.edges);
+        rounds::settle(&mut self.parties, &mut self.edges, stop);
+        if stop.is_asked() {
+            return;
+        }
         self.decide(columns);
     }
 
@@ -469,25 +489,6 @@ pub(super) fn full_of([base, ceiling, depth]: [&[i32; STRIP]; 3]) -> [i32; STRIP
         full[x] = i32::from((depth[x] > 0) & (ceiling[x] < TOP) & (room - depth[x] <= room / SLACK));
     }
     full
-}
-
-/// The height of a pipe's section (units): the depth of the column that gave last, within the opening between both.
-fn section(columns: &Columns, depth: &[i32], i: usize, j: Option<usize>, flux: f32) -> f64 {
-    let (base, ceiling) = (columns.bases(), columns.ceilings());
-    let Some(j) = j else { return f64::from(depth[i]) };
-    let opening = ceiling[i].min(ceiling[j]) - base[i].max(base[j]);
-    let eta = |k: usize| base[k] + depth[k];
-    let gives = match flux.partial_cmp(&0.0) {
-        Some(std::cmp::Ordering::Greater) => depth[i],
-        Some(std::cmp::Ordering::Less) => depth[j],
-        // From both ends the same.
-        _ => match eta(i).cmp(&eta(j)) {
-            std::cmp::Ordering::Greater => depth[i],
-            std::cmp::Ordering::Less => depth[j],
-            std::cmp::Ordering::Equal => depth[i].min(depth[j]),
-        },
-    };
-    f64::from(gives.min(opening))
 }
 
 /// The whole units of a transfer, the nearest (`flux::rounded`); those of a restored state may be beyond all bounds, and their sums have to fit 64 bits.

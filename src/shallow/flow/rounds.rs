@@ -5,6 +5,7 @@
 //! as takers: that is for the next round.
 
 use super::network::Edge;
+use super::stop::Stop;
 use crate::shallow::columns::NONE;
 
 /// Rounds in which inflow is cut in proportion; then it is cut to nothing.
@@ -23,8 +24,8 @@ pub(super) struct Party {
     pub takes: i64,
 }
 
-/// Cuts the units of transfers.
-pub(super) fn settle(parties: &mut [Party], edges: &mut [Edge]) {
+/// Cuts the units of transfers, unless it is stopped.
+pub(super) fn settle(parties: &mut [Party], edges: &mut [Edge], stop: &Stop) {
     count(parties, edges);
     for edge in edges.iter_mut() {
         if let Some(giver) = parties.get(edge.ends[usize::from(edge.units < 0)] as usize)
@@ -35,7 +36,7 @@ pub(super) fn settle(parties: &mut [Party], edges: &mut [Edge]) {
     }
     for round in 0.. {
         count(parties, edges);
-        if parties.iter().all(|party| party.takes - party.gives <= party.room) {
+        if parties.iter().all(|party| party.takes - party.gives <= party.room) || stop.is_asked() {
             return;
         }
         for edge in edges.iter_mut() {

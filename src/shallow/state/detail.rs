@@ -13,6 +13,7 @@ use xxhash_rust::xxh3::xxh3_128;
 use super::{LAST, MOST_FLUX, Put, SEAL, SUMS, Saved, is_over, part, parts, refused};
 use crate::base::bytes::Reader;
 use crate::error::{Error, Result};
+use crate::shallow::Shallow;
 use crate::shallow::detail::rests::Load;
 use crate::shallow::detail::{Cells, Detail, check_near};
 use crate::shallow::scalars::MOST;
@@ -81,6 +82,23 @@ impl Detail {
             own.apply(self);
         }
         result
+    }
+
+    /// Saves the state into a vector, which is given room for the largest that this liquid can have.
+    pub(in crate::shallow) fn keep(&self, out: &mut Vec<u8>) {
+        let most = [&self.fine, &self.coarse].map(Shallow::most_save_size);
+        let rests = rest_bytes(self.scalars().len()) * self.rest.len();
+        out.clear();
+        out.reserve(HEADER + rests + 8 * self.seam.numbers().len() + most[0] + most[1] + SEAL);
+        out.resize(self.save_size(), 0);
+        self.write(out);
+    }
+
+    /// Puts a state in place that was saved of this liquid, with the same near cells.
+    pub(in crate::shallow) fn put_back(&mut self, bytes: &[u8]) {
+        let saved = Both::read(bytes);
+        debug_assert!(saved.is_ok());
+        saved.into_iter().for_each(|saved| saved.apply(self));
     }
 
     fn write(&self, out: &mut [u8]) {

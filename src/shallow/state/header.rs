@@ -61,6 +61,12 @@ impl Counts {
         }
     }
 
+    /// As [`Counts::of`], if all columns were wet and full.
+    pub(super) fn most_of(shallow: &Shallow) -> Self {
+        let strips = shallow.columns.strips().len();
+        Self { runs: strips.div_ceil(2), strips, heads: strips, ..Self::of(shallow) }
+    }
+
     /// Bytes of a state.
     pub(super) fn size(&self) -> usize {
         HEADER

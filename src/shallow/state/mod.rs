@@ -101,6 +101,18 @@ impl Shallow {
         Ok(())
     }
 
+    /// Count of bytes that [`Shallow::save`] could return at most, however the liquid flowed from here in a frame.
+    pub(super) fn most_save_size(&self) -> usize {
+        Counts::most_of(self).size()
+    }
+
+    /// Puts a state in place that was saved of this liquid, on the same columns.
+    pub(super) fn put_back(&mut self, bytes: &[u8]) {
+        let saved = Saved::read(bytes);
+        debug_assert!(saved.is_ok());
+        saved.into_iter().for_each(|saved| saved.apply(self));
+    }
+
     fn write(&self, counts: &Counts, out: &mut [u8]) {
         let (body, seal) = out.split_at_mut(counts.size() - SEAL);
         let mut to = Put(&mut *body);

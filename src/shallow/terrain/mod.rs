@@ -3,6 +3,7 @@
 //! From triangles ([`triangles`]), a height field ([`height`]), signed distances ([`sampler`]), and moving shapes ([`shapes`]).
 
 mod crossings;
+pub mod facing;
 pub mod ground;
 pub mod height;
 mod lines;

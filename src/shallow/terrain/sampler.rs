@@ -8,12 +8,17 @@ use crate::shallow::grid::{BOTTOMLESS, Grid, Heights, TOP};
 
 /// Places of a batch.
 const BATCH: u64 = 1 << 14;
-/// Most samples on a line.
+/// Most samples on a line, but for its ends.
 const MOST_SAMPLES: f64 = (1 << 24) as f64;
+/// Most voxels from its one end to the other.
+const MOST_STEPS: f64 = 1e15;
 
 /// The solids of every cell: where distances are negative. Each line is sampled from the least height up in steps of a voxel (m), and
 /// a change of sign is placed by linear interpolation; solids and gaps thinner than a voxel may be missed. What is solid at the least
 /// height is so for ever below.
+///
+/// Below and above the heights `between` (m) distances keep their sign: there only the ends of the lines are sampled, and a level set may lie in a range of any
+/// length.
 ///
 /// `sample` gets places (m), at most 16,384 at a time, and puts their distances (m) into its second argument, whatever that held.
 ///
@@ -24,10 +29,11 @@ pub fn solids(
     grid: Grid,
     heights: Heights,
     voxel: f64,
+    between: [f64; 2],
     mut sample: impl FnMut(&[DVec3], &mut Vec<f32>) -> Result<()>,
 ) -> Result<Solids> {
     grid.validate()?;
-    let ladder = Ladder::new(heights, voxel)?;
+    let ladder = Ladder::new(heights, voxel, between)?;
     let mut out = Solids::empty(grid, heights);
     let (mut places, mut distances) = (Vec::new(), Vec::new());
     let mut line = Line::default();
@@ -64,29 +70,38 @@ struct Ladder {
     low: f64,
     high: f64,
     voxel: f64,
+    /// Samples between the first, at the least height, and the last: the first of these, in voxels, and their count.
+    first: u64,
     count: u64,
 }
 
 impl Ladder {
-    fn new(heights: Heights, voxel: f64) -> Result<Self> {
+    fn new(heights: Heights, voxel: f64, between: [f64; 2]) -> Result<Self> {
         let (low, high) = (heights.low, heights.metres(TOP));
         if !(voxel > 0.0 && voxel.is_finite()) {
             return Err(Error::argument(format!("a voxel of {voxel} m is not a positive length")));
         }
         let steps = ((high - low) / voxel).ceil();
-        if !(1.0..MOST_SAMPLES).contains(&steps) {
+        // The samples around those heights; nothing where they do not meet the range.
+        let first = ((between[0] - low) / voxel).floor().clamp(1.0, steps.max(1.0));
+        let end = (((between[1] - low) / voxel).ceil() + 1.0).clamp(first, steps.max(1.0));
+        if steps < 1.0 || end - first >= MOST_SAMPLES || steps >= MOST_STEPS {
             return Err(Error::argument(format!(
                 "a voxel of {voxel} m is too small for heights from {low} to {high} m"
             )));
         }
-        Ok(Self { low, high, voxel, count: steps as u64 + 1 })
+        Ok(Self { low, high, voxel, first: first as u64, count: (end - first) as u64 + 2 })
     }
 
     /// A sample of all cells' lines, one line after another.
     fn place(&self, grid: &Grid, index: u64) -> DVec3 {
         let (cell, step) = ((index / self.count) as usize, index % self.count);
         let [x, z] = grid.centre([cell % grid.size[0], cell / grid.size[0]]);
-        let y = if step + 1 == self.count { self.high } else { self.low + step as f64 * self.voxel };
+        let y = match step {
+            0 => self.low,
+            step if step + 1 == self.count => self.high,
+            step => self.low + (self.first + step - 1) as f64 * self.voxel,
+        };
         DVec3::new(x, y, z)
     }
 }
@@ -148,7 +163,7 @@ mod tests {
 
     fn of(voxel: f64, distance: impl Fn(DVec3) -> f64) -> Result<Solids> {
         let mut largest = 0;
-        let found = solids(GRID, heights(), voxel, |places, out| {
+        let found = solids(GRID, heights(), voxel, [-1.0, 1.0], |places, out| {
             largest = largest.max(places.len());
             out.clear();
             out.extend(places.iter().map(|place| distance(*place) as f32));
@@ -200,6 +215,43 @@ mod tests {
     }
 
     #[test]
+    fn a_range_of_any_length_has_samples_where_distances_change_only() {
+        let ball = |place: DVec3| (place.norm() - 0.55) as f32;
+        let count = std::cell::Cell::new(0);
+        let of = |heights: Heights, between: [f64; 2]| {
+            count.set(0);
+            let found = solids(GRID, heights, 0.1, between, |places, out| {
+                count.set(count.get() + places.len());
+                out.clear();
+                out.extend(places.iter().map(|place| ball(*place)));
+                Ok(())
+            });
+            found.unwrap()
+        };
+        let tall = Heights::between(-65_000.0, 66_000.0).unwrap();
+        let found = of(tall, [-0.6, 0.6]);
+        assert!(count.get() < 20 * 400, "{}", count.get());
+        let middle = found.cell(GRID.index([10, 10]));
+        let metres = middle.as_flattened().iter().map(|&units| tall.metres(units));
+        assert!(
+            middle.len() == 1
+                && metres.zip([-0.55, 0.55]).all(|(found, wanted)| (found - wanted).abs() < 0.01),
+            "{middle:?}"
+        );
+        // The same samples as of the whole range, and so the same solids.
+        let whole = of(heights(), [-1.0, 1.0]);
+        let part = of(heights(), [-0.6, 0.6]);
+        assert!((0..GRID.cells()).all(|cell| whole.cell(cell) == part.cell(cell)));
+        // A ball that lies above the range, or around all of it.
+        assert!(
+            (0..GRID.cells())
+                .all(|cell| of(Heights::between(-9.0, -7.0).unwrap(), [-0.6, 0.6]).cell(cell).is_empty())
+        );
+        let inside = of(Heights::between(-0.1, 0.1).unwrap(), [-0.6, 0.6]);
+        assert_eq!(inside.cell(GRID.index([10, 10])), [[BOTTOMLESS, TOP]]);
+    }
+
+    #[test]
     fn long_lines_are_sampled_in_several_batches() {
         let found = of(0.00005, |place| (place.y - 0.3).abs() - 0.2).unwrap();
         for cell in [0, 1, 399] {
@@ -217,12 +269,12 @@ mod tests {
         assert_eq!(message(of(1e-8, |_| 1.0)), what);
         let nan = of(0.5, |place| if place.y == 0.0 { f64::NAN } else { 1.0 });
         assert_eq!(message(nan), "the sampler returned NaN m at (-0.95, 0, -0.95)");
-        let few = solids(GRID, heights(), 0.5, |_, out| {
+        let few = solids(GRID, heights(), 0.5, [-1.0, 1.0], |_, out| {
             *out = vec![1.0; 3];
             Ok(())
         });
         assert_eq!(message(few), "the sampler returned 3 distances for 2000 places");
-        let refused = solids(GRID, heights(), 0.5, |_, _| Err(Error::argument("no grid")));
+        let refused = solids(GRID, heights(), 0.5, [-1.0, 1.0], |_, _| Err(Error::argument("no grid")));
         assert_eq!(message(refused), "no grid");
     }
 }

@@ -5,6 +5,7 @@
 //! numbers then gives the layer, without the ghost surfaces that CSG of coincident faces leaves.
 
 use crate::base::mesh::coincident;
+use crate::base::orientation::{Closing, Orientation};
 use crate::base::{DVec3, TriMesh};
 use crate::context::Context;
 use crate::error::{Error, Result};
@@ -50,8 +51,8 @@ pub fn layer(
     half_width: f32,
 ) -> Result<FloatGrid> {
     fits(ground, cover, cell)?;
-    let ground = upright(sheet_of(ground)?);
-    let statics: Vec<Sheet> = statics.iter().map(|mesh| upright(Sheet::of(mesh))).collect();
+    let ground = upright(ctx, sheet_of(ground)?);
+    let statics: Vec<Sheet> = statics.iter().map(|mesh| upright(ctx, Sheet::of(mesh))).collect();
     let lattice = Lattice::near(cell, centre(&ground)?)?;
     let faces = ctx.phase("prisms", || {
         let mut faces = Vec::new();
@@ -66,7 +67,7 @@ pub fn layer(
                 }
             }
             Cover::Top(top) => {
-                let top = &upright(Sheet::of(top));
+                let top = &upright(ctx, Sheet::of(top));
                 centre(top)?;
                 let floor = ground.lowest().min(top.lowest()) - 16.0 * cell;
                 let sunk = |p: DVec3| DVec3::new(p.x, floor, p.z);
@@ -208,21 +209,24 @@ fn centre(sheet: &Sheet) -> Result<DVec3> {
     Ok(sheet.positions.iter().sum::<DVec3>() / sheet.positions.len() as f64)
 }
 
-/// A mesh with its intended orientation: a solid with its faces outward, a sheet with its faces upward.
-fn upright(mut sheet: Sheet) -> Sheet {
-    let inward = if sheet.is_solid() {
-        // Relative to its own position, so that no precision is lost far from the world's origin.
-        let origin = sheet.positions.first().copied().unwrap_or_default();
-        let six = |corners: [DVec3; 3]| {
-            let [a, b, c] = corners.map(|p| p - origin);
-            a.dot(&b.cross(&c))
-        };
-        sheet.corners().map(six).sum::<f64>() < 0.0
-    } else {
-        sheet.corners().map(|[a, b, c]| (b - a).cross(&(c - a)).y).sum::<f64>() < 0.0
+/// A mesh with its intended orientation: closed parts with their faces outward, sheets with their faces upward; what of that is not
+/// decided, the context is told.
+fn upright(ctx: &Context, mut sheet: Sheet) -> Sheet {
+    let same = coincident(sheet.positions.iter().copied());
+    let mut orientation = Orientation::of(&sheet.positions, &sheet.triangles, &same, Closing::Caps);
+    let up = |(at, [a, b, c]): (usize, [DVec3; 3])| {
+        let up = (b - a).cross(&(c - a)).y;
+        if orientation.is_turned(at) { -up } else { up }
     };
-    if inward {
-        sheet.triangles.iter_mut().for_each(|[_, b, c]| std::mem::swap(b, c));
+    let is_open = |(at, _): &(usize, [DVec3; 3])| orientation.is_open(*at);
+    if sheet.corners().enumerate().filter(is_open).map(up).sum::<f64>() < 0.0 {
+        orientation.turn_open();
+    }
+    if let Some(what) = orientation.warning() {
+        ctx.warn(&format!("a mesh of the ground, of the snow's top or a static one: {what}"));
+    }
+    if !orientation.is_unchanged() {
+        sheet.triangles = orientation.applied(&sheet.triangles);
     }
     sheet
 }

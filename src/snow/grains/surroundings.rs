@@ -114,12 +114,9 @@ impl<'a> Surroundings<'a> {
                 first.clone_from(&last);
             }
             way = first.iter().zip(&last).map(|(a, b)| way_near(*a, *b, grains)).fold(way, f64::max);
-            let turn = |triangle: &[u32; 3]| {
-                if body.is_reversed() { [triangle[0], triangle[2], triangle[1]] } else { *triangle }
-            };
             let triangles = match closed {
                 true => body.closed_triangles().collect(),
-                false => body.motion().triangles().iter().map(turn).collect(),
+                false => body.triangles().to_vec(),
             };
             let shell =
                 Shell::new(object.friction as f32, triangles, closed, first).with_stick(object.stick as f32);

@@ -6,7 +6,8 @@
 use std::collections::BTreeSet;
 use std::iter::repeat_n;
 
-use super::prepare::{Closed, Use, is_same_edge, rotated, runs, sides};
+use super::prepare::{Closed, rotated};
+use crate::base::edges::{Use, is_same_edge, runs, sides};
 use crate::base::{DVec3, PolygonMesh, Vec3};
 
 /// Most corners of a ring that is cut into triangles between them: cutting larger ones takes too long.

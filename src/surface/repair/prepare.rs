@@ -7,10 +7,10 @@ use rayon::prelude::*;
 
 use super::copies::{copies, doubled, is_balanced};
 use super::holes::close;
+use crate::base::edges::{Use, agree, edge_uses, is_same_edge, parts_of, side, sound};
 use crate::base::mesh::coincident;
 use crate::base::orient::is_flat;
 use crate::base::{DVec3, TriMesh, Vec3};
-use crate::surface::specks::root;
 
 /// What was done to a mesh before anything was cut.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
@@ -43,15 +43,8 @@ pub(super) struct Closed {
     pub prepared: Prepared,
 }
 
-/// An edge, lesser vertex first, and a triangle that has it.
-pub(super) type Use = ([u32; 2], u32);
-
 /// Triangles a task looks at.
 const GRAIN: usize = 2048;
-/// Of an edge that no second triangle has.
-const NONE: u32 = u32::MAX;
-/// The least closed part, a tetrahedron, has so many triangles.
-const LEAST: u32 = 4;
 
 /// Closes a mesh, whose positions are finite and whose indices are in range, and turns it outward, part by part: a part is what
 /// hangs together by edges. The solid is where the winding number is over 0 then. A cavity, which is a part that lies inside
@@ -81,7 +74,7 @@ pub(super) fn prepare(mesh: &TriMesh) -> Closed {
         }
         closed.leave_out(&loose_needles(&closed.positions, &closed.triangles));
         let uses = edge_uses(vertices, &closed.triangles);
-        closed.prepared.turned_triangles = agree(&closed.positions, &mut closed.triangles, &uses);
+        closed.make_agree(&uses);
         close(&mut closed, &uses);
         let uses = edge_uses(closed.positions.len(), &closed.triangles);
         parts = parts_of(closed.triangles.len(), &uses);
@@ -108,6 +101,19 @@ impl Closed {
         }
         for (triangle, _) in self.triangles.iter_mut().zip(is_sound).filter(|(_, sound)| !**sound) {
             *triangle = triangle.map(|vertex| names[vertex as usize]);
+        }
+    }
+
+    /// Turns triangles round so that two which are alone on an edge agree.
+    fn make_agree(&mut self, uses: &[Use]) {
+        let area = |at: usize| {
+            let [a, b, c] = corners(&self.positions, &self.triangles[at]);
+            (b - a).cross(&(c - a)).norm()
+        };
+        let turned = agree(&self.triangles, uses, area).turned;
+        for (triangle, _) in self.triangles.iter_mut().zip(&turned).filter(|(_, turned)| **turned) {
+            triangle.swap(1, 2);
+            self.prepared.turned_triangles += 1;
         }
     }
 
@@ -141,44 +147,6 @@ impl Closed {
     }
 }
 
-/// The edges of triangles among so many vertices, sorted, each with all triangles that have it.
-pub(super) fn edge_uses(vertices: usize, triangles: &[[u32; 3]]) -> Vec<Use> {
-    // Sorted by counting after the lesser vertex, then by comparing: few edges begin at one vertex.
-    let mut next = vec![0usize; vertices + 1];
-    triangles.iter().flat_map(sides).for_each(|ends| next[ends[0] as usize + 1] += 1);
-    (0..vertices).for_each(|vertex| next[vertex + 1] += next[vertex]);
-    let mut uses: Vec<Use> = vec![([0; 2], 0); 3 * triangles.len()];
-    for (triangle, number) in triangles.iter().zip(0..) {
-        for ends in sides(triangle) {
-            let place = &mut next[ends[0] as usize];
-            uses[*place] = (ends, number);
-            *place += 1;
-        }
-    }
-    // Each place has moved on to the end of its vertex.
-    let mut begin = 0;
-    for &end in &next[..vertices] {
-        uses[begin..end].sort_unstable();
-        begin = end;
-    }
-    uses
-}
-
-/// The edges of a triangle, lesser vertex first.
-pub(super) fn sides(&[a, b, c]: &[u32; 3]) -> [[u32; 2]; 3] {
-    [[a, b], [b, c], [c, a]].map(|[from, to]| [from.min(to), from.max(to)])
-}
-
-/// Whether two uses are of the same edge.
-pub(super) fn is_same_edge(a: &Use, b: &Use) -> bool {
-    a.0 == b.0
-}
-
-/// Whether a triangle runs along an edge from its first end to its second.
-pub(super) fn runs(triangle: &[u32; 3], [from, to]: [u32; 2]) -> bool {
-    (0..3).any(|side| triangle[side] == from && triangle[(side + 1) % 3] == to)
-}
-
 /// Corners of a triangle beginning with the least, so that those which are turned the same way are equal.
 pub(super) fn rotated<T: Ord + Copy>([a, b, c]: [T; 3]) -> [T; 3] {
     [a, b, c].min([b, c, a]).min([c, a, b])
@@ -186,33 +154,6 @@ pub(super) fn rotated<T: Ord + Copy>([a, b, c]: [T; 3]) -> [T; 3] {
 
 fn corners(positions: &[Vec3], triangle: &[u32; 3]) -> [DVec3; 3] {
     triangle.map(|vertex| positions[vertex as usize].cast())
-}
-
-/// The part of each of so many triangles, named by its first triangle.
-pub(super) fn parts_of(count: usize, uses: &[Use]) -> Vec<u32> {
-    let mut parent: Vec<u32> = (0..count as u32).collect();
-    for pair in uses.windows(2).filter(|pair| is_same_edge(&pair[0], &pair[1])) {
-        let [a, b] = [pair[0].1, pair[1].1].map(|triangle| root(&mut parent, triangle));
-        parent[a.max(b) as usize] = a.min(b);
-    }
-    (0..count as u32).map(|triangle| root(&mut parent, triangle)).collect()
-}
-
-/// Which triangles are of parts that are closed as they are, each edge with two triangles that agree.
-fn sound(triangles: &[[u32; 3]], uses: &[Use], parts: &[u32]) -> Vec<bool> {
-    let mut is_sound = vec![true; parts.len()];
-    for run in uses.chunk_by(is_same_edge) {
-        let agrees = match *run {
-            [(ends, a), (_, b)] => runs(&triangles[a as usize], ends) != runs(&triangles[b as usize], ends),
-            _ => false,
-        };
-        if !agrees {
-            is_sound[parts[run[0].1 as usize] as usize] = false;
-        }
-    }
-    let mut counts = vec![0u32; parts.len()];
-    parts.iter().for_each(|&part| counts[part as usize] += 1);
-    parts.iter().map(|&part| is_sound[part as usize] && counts[part as usize] >= LEAST).collect()
 }
 
 /// Which triangles name a vertex twice.
@@ -256,60 +197,6 @@ fn loose_needles(positions: &[Vec3], triangles: &[[u32; 3]]) -> Vec<bool> {
         }
     }
     is_out
-}
-
-/// Which side of a triangle an edge is.
-fn side(triangle: &[u32; 3], ends: [u32; 2]) -> usize {
-    // It begins behind the corner that is not on it.
-    triangle.iter().position(|vertex| !ends.contains(vertex)).map_or(0, |apart| (apart + 1) % 3)
-}
-
-/// Turns triangles so that two which are alone on an edge run along it opposite ways, as far as a surface has two sides. In each
-/// patch that hangs together by such edges the way round that has more area stays. Returns how many it turned.
-fn agree(positions: &[Vec3], triangles: &mut [[u32; 3]], uses: &[Use]) -> usize {
-    let mut beside = vec![[NONE; 3]; triangles.len()];
-    for run in uses.chunk_by(is_same_edge) {
-        if let [(ends, a), (_, b)] = *run {
-            beside[a as usize][side(&triangles[a as usize], ends)] = b;
-            beside[b as usize][side(&triangles[b as usize], ends)] = a;
-        }
-    }
-    // Whether each one is turned against the first of its patch; none: not reached yet.
-    let mut is_turned: Vec<Option<bool>> = vec![None; triangles.len()];
-    let mut patch: Vec<u32> = Vec::new();
-    let mut count = 0;
-    for first in 0..triangles.len() as u32 {
-        if is_turned[first as usize].is_some() {
-            continue;
-        }
-        is_turned[first as usize] = Some(false);
-        patch.clear();
-        patch.push(first);
-        let mut areas = [0.0f64; 2];
-        let mut reached = 0;
-        while reached < patch.len() {
-            let at = patch[reached] as usize;
-            reached += 1;
-            let turned = is_turned[at] == Some(true);
-            let [a, b, c] = corners(positions, &triangles[at]);
-            areas[usize::from(turned)] += (b - a).cross(&(c - a)).norm();
-            for side in 0..3 {
-                let other = beside[at][side];
-                if other == NONE || is_turned[other as usize].is_some() {
-                    continue;
-                }
-                let back = [triangles[at][(side + 1) % 3], triangles[at][side]];
-                is_turned[other as usize] = Some(turned == runs(&triangles[other as usize], back));
-                patch.push(other);
-            }
-        }
-        let stays = areas[1] > areas[0];
-        for &triangle in patch.iter().filter(|at| is_turned[**at as usize] != Some(stays)) {
-            triangles[triangle as usize].swap(1, 2);
-            count += 1;
-        }
-    }
-    count
 }
 
 #[cfg(test)]

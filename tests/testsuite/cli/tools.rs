@@ -166,7 +166,7 @@ fn mesh_check_tells_solids_from_other_meshes() {
 }
 
 #[test]
-fn mesh_check_finds_parts_that_vanish() {
+fn mesh_check_finds_parts_that_are_inside_out() {
     let folder = folder();
     let [mut two, second] = [0.0, 2.0].map(|x| TriMesh::cuboid([x, 0.0, 0.0], [x + 1.0, 1.0, 1.0]));
     // Mirrored, and so inside out.
@@ -175,7 +175,7 @@ fn mesh_check_finds_parts_that_vanish() {
     assert_eq!((&report["solid"], &report["inverted_parts"]), (&false.into(), &1.into()));
     let said = works(folder.path(), "mesh check mesh.ply");
     assert!(said.contains("mesh.ply: not a solid as it is\n"), "{said}");
-    assert!(said.contains("1 part is inside out: it vanishes where the mesh is used\n"), "{said}");
+    assert!(said.contains("1 part is inside out: it is turned outward where the mesh is used\n"), "{said}");
     // Area and volume are those of the triangles that count.
     let mut doubled = TriMesh::cuboid([0.0; 3], [1.0; 3]);
     doubled.triangles.extend_from_within(..6);

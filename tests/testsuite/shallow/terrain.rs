@@ -89,7 +89,7 @@ fn a_sphere_is_the_same_from_triangles_distances_and_its_formula() {
     let heights = Heights::between(-1.0, 1.0).unwrap();
     let mesh = shapes::sphere(0.5, 40);
     let cast = triangles::solids(&mesh.positions, &mesh.triangles, grid, heights).unwrap();
-    let sampled = sampler::solids(grid, heights, 0.02, |places, out| {
+    let sampled = sampler::solids(grid, heights, 0.02, [-0.6, 0.6], |places, out| {
         out.clear();
         out.extend(places.iter().map(|place| (place.norm() - 0.5) as f32));
         Ok(())

@@ -1,0 +1,55 @@
+//! Numbers in messages.
+
+/// Significant digits of a number that a user gave: what rounding of a sum or a product has added is left out.
+const DIGITS: usize = 12;
+/// Those of an end of a range, which may have been computed.
+const ENDS: usize = 6;
+
+/// A number that a user gave, as it is written.
+pub fn given(value: f64) -> String {
+    digits(value, DIGITS)
+}
+
+/// An end of a range.
+pub fn end(value: f64) -> String {
+    digits(value, ENDS)
+}
+
+/// A number with so many significant digits at most, with an exponent where it would be all zeroes.
+fn digits(value: f64, most: usize) -> String {
+    let rounded = format!("{value:.*e}", most - 1).parse().unwrap_or(value);
+    // No minus before nothing.
+    let rounded = if rounded == 0.0 { 0.0 } else { rounded };
+    if rounded == 0.0 || !rounded.is_finite() || (1e-10..1e15).contains(&rounded.abs()) {
+        format!("{rounded}")
+    } else {
+        format!("{rounded:e}")
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn numbers_have_digits_that_say_something() {
+        for (value, wanted) in [
+            (0.1 + 0.2, "0.3"),
+            (-0.0, "0"),
+            (1e6, "1000000"),
+            (6e7, "60000000"),
+            (1e-5, "0.00001"),
+            (1e-12, "1e-12"),
+            (1e300, "1e300"),
+            (f64::NAN, "NaN"),
+            (f64::INFINITY, "inf"),
+            (1.0 / 24.0, "0.0416666666667"),
+        ] {
+            assert_eq!(given(value), wanted);
+        }
+        assert_eq!(
+            (end(0.02 * 0.02), end(8.0 * 0.02), end(2.0 / 3.0)),
+            ("0.0004".into(), "0.16".into(), "0.666667".into())
+        );
+    }
+}

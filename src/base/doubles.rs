@@ -1,0 +1,114 @@
+//! Triangles and parts that are there twice.
+
+use rayon::prelude::*;
+
+use super::edges::{Use, imbalance, is_same_edge, parts_of};
+
+/// What is there twice among triangles.
+pub(super) struct Doubles {
+    /// Of each triangle whether it goes: it has the vertices of one before it, in any order.
+    pub(super) is_double: Vec<bool>,
+    /// Of each triangle whether there is one that is turned the other way.
+    pub(super) is_two_sided: Vec<bool>,
+}
+
+impl Doubles {
+    /// Of triangles with these edges. Doubled triangles stay where they are the common walls of closed parts, which cancel.
+    pub(super) fn of(triangles: &[[u32; 3]], uses: &[Use]) -> Self {
+        let count = triangles.len();
+        let mut out = Self { is_double: vec![false; count], is_two_sided: vec![false; count] };
+        let by_vertices = |(&[a, b, c], number): (&[u32; 3], u32)| {
+            let [a, b, c] = [a, b, c].min([b, c, a]).min([c, a, b]);
+            ([a, b.min(c), b.max(c)], number, b < c)
+        };
+        let mut order: Vec<([u32; 3], u32, bool)> = triangles.iter().zip(0..).map(by_vertices).collect();
+        order.par_sort_unstable();
+        let mut is_alone = vec![true; count];
+        for same in order.chunk_by(|a, b| a.0 == b.0).filter(|same| same.len() > 1) {
+            let is_two_sided = same.iter().any(|(_, _, way)| *way != same[0].2);
+            for (at, (_, number, _)) in same.iter().enumerate() {
+                let number = *number as usize;
+                (out.is_double[number], is_alone[number]) = (at > 0, false);
+                out.is_two_sided[number] = is_two_sided;
+            }
+        }
+        if !out.is_double.contains(&true) {
+            return out;
+        }
+        let bodies = parts_of(count, uses);
+        let (mut has_single, mut is_balanced, mut is_closed) =
+            (vec![false; count], vec![true; count], vec![true; count]);
+        bodies.iter().zip(&is_alone).for_each(|(body, is_alone)| has_single[*body as usize] |= is_alone);
+        for run in uses.chunk_by(is_same_edge) {
+            let body = bodies[run[0].1 as usize] as usize;
+            is_balanced[body] &= imbalance(triangles, run) == 0;
+            let kept = run.iter().filter(|used| !out.is_double[used.1 as usize]).count();
+            is_closed[body] &= kept % 2 == 0;
+        }
+        for (is_double, body) in out.is_double.iter_mut().zip(&bodies) {
+            let body = *body as usize;
+            *is_double &= !(has_single[body] && is_balanced[body] && !is_closed[body]);
+        }
+        out
+    }
+}
+
+/// Which of so many triangles are of parts that lie on one before them, triangle by triangle: their keys are the same. Only parts of
+/// some triangles are compared.
+pub fn copies<K: Ord + Copy + Send>(
+    parts: &[u32],
+    is_compared: impl Fn(usize) -> bool,
+    key: impl Fn(usize) -> K,
+) -> Vec<bool> {
+    let mut is_copy = vec![false; parts.len()];
+    // Parts that are alike have as many triangles, and the same least key: only such are compared.
+    let mut marks: Vec<(u32, Option<K>)> = vec![(0, None); parts.len()];
+    for (at, &part) in parts.iter().enumerate() {
+        let (count, least) = &mut marks[part as usize];
+        *count += 1;
+        let own = key(at);
+        *least = Some(least.map_or(own, |least| least.min(own)));
+    }
+    let mut named: Vec<u32> = (0..parts.len() as u32)
+        .filter(|at| parts[*at as usize] == *at && is_compared(*at as usize))
+        .collect();
+    named.sort_unstable_by_key(|&part| (marks[part as usize], part));
+    let mut is_like_another = vec![false; parts.len()];
+    let is_alike = |a: &u32, b: &u32| marks[*a as usize] == marks[*b as usize];
+    for alike in named.chunk_by(is_alike).filter(|alike| alike.len() > 1) {
+        alike.iter().for_each(|&part| is_like_another[part as usize] = true);
+    }
+    let mut order: Vec<(u32, K, u32)> = (0u32..)
+        .zip(parts)
+        .filter(|(_, part)| is_like_another[**part as usize])
+        .map(|(at, part)| (*part, key(at as usize), at))
+        .collect();
+    order.par_sort_unstable();
+    // The sort is stable: of parts at the same position the first stays first.
+    let mut bodies: Vec<&[(u32, K, u32)]> = order.chunk_by(|a, b| a.0 == b.0).collect();
+    let keys = |body: &&[(u32, K, u32)]| -> Vec<K> { body.iter().map(|one| one.1).collect() };
+    bodies.sort_by_cached_key(|body| (body.len(), keys(body)));
+    for same in bodies.chunk_by(|a, b| a.len() == b.len() && a.iter().zip(*b).all(|(a, b)| a.1 == b.1)) {
+        same[1..].iter().copied().flatten().for_each(|(_, _, at)| is_copy[*at as usize] = true);
+    }
+    is_copy
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::edges::edge_uses;
+    use super::*;
+
+    const TETRAHEDRON: [[u32; 3]; 4] = [[0, 2, 1], [0, 1, 3], [1, 2, 3], [2, 0, 3]];
+
+    #[test]
+    fn doubled_faces_go_and_walls_that_cancel_stay() {
+        let of = |triangles: &[[u32; 3]]| Doubles::of(triangles, &edge_uses(5, triangles)).is_double;
+        let back = TETRAHEDRON.map(|[a, b, c]| [a, c, b]);
+        assert_eq!(of(&[&TETRAHEDRON[..], &back].concat()), [[false; 4], [true; 4]].concat());
+        assert_eq!(of(&[&TETRAHEDRON[..], &back[..1]].concat()), [false, false, false, false, true]);
+        // Another on its face 0: the wall is there from both sides.
+        let other = [[1, 2, 0], [1, 0, 4], [2, 1, 4], [0, 2, 4]];
+        assert_eq!(of(&[TETRAHEDRON, other].concat()), vec![false; 8]);
+    }
+}

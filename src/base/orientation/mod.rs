@@ -1,0 +1,221 @@
+//! Closed parts of a mesh are turned outward, one way for all that take meshes.
+//!
+//! A part is what hangs together by edges, vertices at the same position joined. Parts that are closed by their indices are parts of their
+//! own, whatever they touch. Doubled triangles count once; triangles of a closed part that disagree about which side is out are made to
+//! agree; closed parts whose outermost corners lie in no other part are turned outward, so that cavities stay cavities, and a solid with
+//! cavities whose whole surface is inside out is turned with them. A mesh that is right stays as it is. Open sheets stay as
+//! they are, too: what faces out there is decided where they are used.
+
+mod nesting;
+mod pieces;
+
+use self::pieces::Pieces;
+use super::edges::{edge_uses, imbalance, is_same_edge, parts_of};
+use super::mesh::coincident;
+use super::topology::collapsed;
+use super::{DVec3, DetailedMesh, TriMesh};
+
+/// What an open part bounds.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Closing {
+    /// Its loops are closed by cones.
+    Caps,
+    /// All below its triangles that face up is solid.
+    Below,
+}
+
+/// What becomes of a triangle.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Fate {
+    Stays,
+    Turned,
+    /// It is the double of one before it.
+    LeftOut,
+}
+
+/// What a mesh leaves undecided.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
+pub struct Doubts {
+    /// Parts in which no choice makes all triangles agree: they have one side only.
+    pub one_sided: usize,
+    /// Edges with more than two triangles that do not say which side is out.
+    pub crowded_edges: usize,
+    /// Parts that are inside out and hold parts of which it is not clear whether they are cavities.
+    pub nested: usize,
+}
+
+/// How the triangles of a mesh have to be turned.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub struct Orientation {
+    /// Empty: all triangles stay.
+    fates: Vec<Fate>,
+    /// Whether each triangle is of an open part; empty: none is.
+    open: Vec<bool>,
+    /// Signed volume of the closed parts (m3), before they were turned and now.
+    volumes: [f64; 2],
+    /// Parts turned as a whole.
+    pub turned_parts: usize,
+    /// What is not decided.
+    pub doubts: Doubts,
+}
+
+impl Orientation {
+    /// The orientation of triangles among vertices at positions (m), which are finite; `same` names the vertex that each one is
+    /// joined with, itself where there is none before it.
+    pub fn of(positions: &[DVec3], triangles: &[[u32; 3]], same: &[u32], closing: Closing) -> Self {
+        let joined = triangles.iter().map(|corners| corners.map(|vertex| same[vertex as usize]));
+        let (named, numbers): (Vec<[u32; 3]>, Vec<u32>) =
+            joined.zip(0u32..).filter(|(corners, _)| !collapsed(*corners)).unzip();
+        let uses = edge_uses(positions.len(), &named);
+        let is_regular = uses.chunk_by(is_same_edge).all(|run| match run {
+            [_] => true,
+            [_, _] => imbalance(&named, run) == 0,
+            _ => false,
+        });
+        let mut out = Self::default();
+        let mut pieces = Pieces::new(positions, named, numbers);
+        if is_regular {
+            pieces.take_parts(parts_of(pieces.count(), &uses), &uses);
+        } else {
+            out.fates = vec![Fate::Stays; triangles.len()];
+            pieces.sort_out(triangles, closing, &mut out);
+        }
+        pieces.turn_outward(closing, triangles.len(), &mut out);
+        if out.fates.iter().all(|fate| *fate == Fate::Stays) {
+            out.fates.clear();
+        }
+        out
+    }
+
+    /// As [`Orientation::of`], of a mesh whose vertices at the same position are one.
+    pub fn of_mesh(mesh: &TriMesh, closing: Closing) -> Self {
+        let positions: Vec<DVec3> = mesh.positions.iter().map(|p| p.cast()).collect();
+        let same = coincident(positions.iter().copied());
+        Self::of(&positions, &mesh.triangles, &same, closing)
+    }
+
+    /// Whether all triangles stay as they are.
+    pub fn is_unchanged(&self) -> bool {
+        self.fates.is_empty()
+    }
+
+    /// Whether a triangle is left out: it is the double of another.
+    pub fn leaves_out(&self) -> bool {
+        self.fates.contains(&Fate::LeftOut)
+    }
+
+    /// Whether a triangle is turned round.
+    pub fn is_turned(&self, triangle: usize) -> bool {
+        self.fates.get(triangle) == Some(&Fate::Turned)
+    }
+
+    /// Whether a triangle is of an open part.
+    pub fn is_open(&self, triangle: usize) -> bool {
+        self.open.get(triangle) == Some(&true)
+    }
+
+    /// Whether there is an open part.
+    pub fn has_open(&self) -> bool {
+        !self.open.is_empty()
+    }
+
+    /// Signed volume of the closed parts (m3), before they were turned and now.
+    pub fn volumes(&self) -> [f64; 2] {
+        self.volumes
+    }
+
+    /// Turns all triangles of open parts round.
+    pub fn turn_open(&mut self) {
+        if self.fates.is_empty() {
+            self.fates = vec![Fate::Stays; self.open.len()];
+        }
+        for (fate, _) in self.fates.iter_mut().zip(&self.open).filter(|(_, is_open)| **is_open) {
+            *fate = match fate {
+                Fate::Stays => Fate::Turned,
+                Fate::Turned => Fate::Stays,
+                Fate::LeftOut => Fate::LeftOut,
+            };
+        }
+    }
+
+    /// The triangles of the mesh as they have to be; a triangle that is turned keeps its first corner.
+    pub fn applied(&self, triangles: &[[u32; 3]]) -> Vec<[u32; 3]> {
+        if self.fates.is_empty() {
+            return triangles.to_vec();
+        }
+        let with_fate = triangles.iter().zip(&self.fates).filter(|(_, fate)| **fate != Fate::LeftOut);
+        with_fate
+            .map(|(&[a, b, c], fate)| if *fate == Fate::Turned { [a, c, b] } else { [a, b, c] })
+            .collect()
+    }
+
+    /// Whether it can be that of a mesh of so many triangles.
+    pub fn fits(&self, triangles: usize) -> bool {
+        self.fates.is_empty() || self.fates.len() == triangles
+    }
+
+    /// A mesh with its triangles, and what their corners carry, as they have to be.
+    pub fn applied_to_detailed(&self, mesh: DetailedMesh) -> DetailedMesh {
+        if self.fates.is_empty() {
+            return mesh;
+        }
+        let faces: Vec<usize> = (0..self.fates.len()).filter(|at| self.fates[*at] != Fate::LeftOut).collect();
+        let of_face = |face: &usize| {
+            let [a, b, c] = [0, 1, 2].map(|corner| 3 * face + corner);
+            if self.is_turned(*face) { [a, c, b] } else { [a, b, c] }
+        };
+        let corners: Vec<[usize; 3]> = faces.iter().map(of_face).collect();
+        DetailedMesh {
+            mesh: self.applied_to(mesh.mesh),
+            uvs: mesh.uvs.map(|uvs| uvs.of_triangles(&corners)),
+            arrays: mesh.arrays.into_iter().map(|array| array.of_triangles(&corners, &faces)).collect(),
+        }
+    }
+
+    /// The mesh with its triangles as they have to be.
+    pub fn applied_to(&self, mut mesh: TriMesh) -> TriMesh {
+        if !self.fates.is_empty() {
+            mesh.triangles = self.applied(&mesh.triangles);
+        }
+        mesh
+    }
+
+    /// What is not decided, in a sentence without the mesh's name: none where all is.
+    pub fn warning(&self) -> Option<String> {
+        self.doubts.told()
+    }
+}
+
+impl Doubts {
+    fn told(&self) -> Option<String> {
+        let counted = |count: usize, one: &str, several: &str| {
+            (count > 0).then(|| if count == 1 { format!("1 {one}") } else { format!("{count} {several}") })
+        };
+        let what: Vec<String> = [
+            counted(
+                self.one_sided,
+                "part has one side only (inconsistently oriented edges)",
+                "parts have one side only (inconsistently oriented edges)",
+            ),
+            counted(
+                self.crowded_edges,
+                "non-manifold edge has more than two triangles that do not agree",
+                "non-manifold edges have more than two triangles that do not agree",
+            ),
+            counted(
+                self.nested,
+                "part is inside out and so are parts within it, which are taken for cavities",
+                "parts are inside out and so are parts within them, which are taken for cavities",
+            ),
+        ]
+        .into_iter()
+        .flatten()
+        .collect();
+        (!what.is_empty()).then(|| {
+            format!(
+                "which side is out cannot be decided everywhere: {}; `frazil mesh check` lists the faults, `frazil mesh repair` mends them",
+                what.join(", ")
+            )
+        })
+    }
+}

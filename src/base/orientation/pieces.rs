@@ -1,0 +1,339 @@
+//! The parts of a mesh, found where triangles are doubled, disagree, or crowd an edge, too.
+
+use super::nesting::{ASLANT, Shape, Turns, turns};
+use super::{Closing, Fate, Orientation};
+use crate::base::bvh::Bvh;
+use crate::base::doubles::{Doubles, copies};
+use crate::base::edges::{Agreement, Use, agree, edge_uses, imbalance, is_same_edge, parts_of, sound};
+use crate::base::topology::Sets;
+use crate::base::{DVec3, TriMesh};
+
+/// Volumes of parts up to this many cubes of their size are none: rounding makes as much.
+const ROUNDING: f64 = 1e-12;
+/// An open part counts as closed where the caps that close it have at most this share of its area.
+const CAPS: f64 = 0.05;
+
+/// The triangles that count, by parts.
+#[derive(Default)]
+pub(super) struct Pieces<'a> {
+    positions: &'a [DVec3],
+    /// Their corners: vertices of the mesh where a part is closed by its indices, else joined ones, which count from the number of
+    /// vertices on where there are both.
+    named: Vec<[u32; 3]>,
+    /// Which triangles of the mesh they are.
+    numbers: Vec<u32>,
+    /// The part of each.
+    part: Vec<u32>,
+    /// Of each part, by its name, whether it is open.
+    is_open: Vec<bool>,
+}
+
+impl<'a> Pieces<'a> {
+    /// Triangles of so many named corners, which have these numbers in the mesh.
+    pub(super) fn new(positions: &'a [DVec3], named: Vec<[u32; 3]>, numbers: Vec<u32>) -> Self {
+        Self { positions, named, numbers, ..Self::default() }
+    }
+
+    pub(super) fn count(&self) -> usize {
+        self.named.len()
+    }
+
+    /// Takes the parts of triangles that agree wherever they have neighbours.
+    pub(super) fn take_parts(&mut self, part: Vec<u32>, uses: &[Use]) {
+        self.is_open = vec![false; part.len()];
+        self.part = part;
+        let open = uses.chunk_by(is_same_edge).filter(|run| run.len() == 1);
+        open.for_each(|run| self.is_open[self.part[run[0].1 as usize] as usize] = true);
+    }
+
+    fn corners(&self, triangle: usize) -> [DVec3; 3] {
+        self.named[triangle].map(|name| self.positions[name as usize % self.positions.len()])
+    }
+
+    fn area(&self, triangle: usize) -> f64 {
+        let [a, b, c] = self.corners(triangle);
+        (b - a).cross(&(c - a)).norm()
+    }
+
+    /// Leaves triangles out.
+    fn leave_out(&mut self, is_out: &[bool], out: &mut Orientation) {
+        let is_in = |at: &usize| !is_out[*at];
+        let outs = self.numbers.iter().zip(is_out).filter(|(_, is_out)| **is_out);
+        outs.for_each(|(number, _)| out.fates[*number as usize] = Fate::LeftOut);
+        let kept: Vec<usize> = (0..self.named.len()).filter(is_in).collect();
+        self.named = kept.iter().map(|at| self.named[*at]).collect();
+        self.numbers = kept.iter().map(|at| self.numbers[*at]).collect();
+    }
+
+    fn turn(&mut self, triangle: usize, out: &mut Orientation) {
+        self.named[triangle].swap(1, 2);
+        let fate = &mut out.fates[self.numbers[triangle] as usize];
+        *fate = if *fate == Fate::Turned { Fate::Stays } else { Fate::Turned };
+    }
+
+    /// Finds the parts of triangles with doubled triangles, neighbours that disagree, or crowded edges.
+    pub(super) fn sort_out(&mut self, triangles: &[[u32; 3]], closing: Closing, out: &mut Orientation) {
+        let vertices = self.positions.len();
+        let raw: Vec<[u32; 3]> = self.numbers.iter().map(|at| triangles[*at as usize]).collect();
+        let uses = edge_uses(vertices, &raw);
+        let parts = parts_of(raw.len(), &uses);
+        let is_sound = sound(&raw, &uses, &parts);
+        let sorted = |at: usize| {
+            let mut corners = self.named[at];
+            corners.sort_unstable();
+            corners
+        };
+        let is_copy = copies(&parts, |at| is_sound[at], sorted);
+        for (at, corners) in raw.iter().enumerate() {
+            let joined = self.named[at].map(|vertex| vertex + vertices as u32);
+            self.named[at] = if is_sound[at] { *corners } else { joined };
+        }
+        if is_copy.contains(&true) {
+            self.leave_out(&is_copy, out);
+        }
+        let uses = edge_uses(2 * vertices, &self.named);
+        let Doubles { is_double, is_two_sided } = Doubles::of(&self.named, &uses);
+        let mut two_sided: Vec<u32> = Vec::new();
+        if is_double.contains(&true) {
+            two_sided =
+                self.numbers.iter().zip(&is_two_sided).filter(|(_, is)| **is).map(|(at, _)| *at).collect();
+            self.leave_out(&is_double, out);
+        }
+        let uses = edge_uses(2 * vertices, &self.named);
+        let agreement = agree(&self.named, &uses, |at| self.area(at));
+        self.divide(&uses, &agreement, out);
+        for at in 0..self.named.len() {
+            let is_alone = self.part[at] == agreement.patch[at];
+            let is_one_sided = agreement.one_sided.binary_search(&agreement.patch[at]).is_ok();
+            if agreement.turned[at] && is_alone && !is_one_sided {
+                self.turn(at, out);
+            }
+        }
+        self.face_up(&agreement, &two_sided, closing, out);
+    }
+
+    /// Names the parts: patches that are closed by themselves, or hang together with no other, and what is left of each body.
+    fn divide(&mut self, uses: &[Use], agreement: &Agreement, out: &mut Orientation) {
+        let count = self.named.len();
+        let bodies = parts_of(count, uses);
+        let Agreement { turned, patch, one_sided } = agreement;
+        let agreed: Vec<[u32; 3]> = self
+            .named
+            .iter()
+            .zip(turned)
+            .map(|(&[a, b, c], turned)| if *turned { [a, c, b] } else { [a, b, c] })
+            .collect();
+        let (mut is_closed, mut is_crowded) = (vec![true; count], vec![false; count]);
+        let mut of_run: Vec<Use> = Vec::new();
+        for run in uses.chunk_by(is_same_edge).filter(|run| run.len() != 2) {
+            is_crowded[bodies[run[0].1 as usize] as usize] |= run.len() > 2;
+            of_run.clear();
+            of_run.extend_from_slice(run);
+            of_run.sort_by_key(|used| patch[used.1 as usize]);
+            for own in of_run.chunk_by(|a, b| patch[a.1 as usize] == patch[b.1 as usize]) {
+                is_closed[patch[own[0].1 as usize] as usize] &= imbalance(&agreed, own) == 0;
+            }
+        }
+        one_sided.iter().for_each(|patch| is_closed[*patch as usize] = false);
+        let is_left = |at: usize| is_crowded[bodies[at] as usize] && !is_closed[patch[at] as usize];
+        // What is left of a body has a name that no patch has.
+        self.part =
+            (0..count).map(|at| if is_left(at) { count as u32 + bodies[at] } else { patch[at] }).collect();
+        self.is_open = (0..count).map(|patch| !is_closed[patch]).chain(vec![false; count]).collect();
+        for run in uses.chunk_by(is_same_edge) {
+            let left: Vec<Use> = run.iter().copied().filter(|used| is_left(used.1 as usize)).collect();
+            let off = imbalance(&self.named, &left);
+            if off != 0 {
+                self.is_open[count + bodies[left[0].1 as usize] as usize] = true;
+                out.doubts.crowded_edges += usize::from(left.len() % 2 == 0);
+            }
+        }
+        out.doubts.one_sided += one_sided.len();
+        let left: Vec<u32> = (0..count as u32).filter(|at| is_left(*at as usize)).collect();
+        if left.iter().any(|at| !self.is_open[self.part[*at as usize] as usize]) {
+            out.doubts.crowded_edges += self.backward(&left, patch);
+        }
+    }
+
+    /// Of what is left of bodies, but is closed, the patches that have less than nothing on a side: parts of it are inside out.
+    fn backward(&self, left: &[u32], patch: &[u32]) -> usize {
+        let mut order: Vec<u32> = left.to_vec();
+        order.sort_by_key(|at| self.part[*at as usize]);
+        let mut found = 0;
+        for part in order.chunk_by(|a, b| self.part[*a as usize] == self.part[*b as usize]) {
+            if self.is_open[self.part[part[0] as usize] as usize] {
+                continue;
+            }
+            let (volume, low, size) = self.volume(part);
+            let way = if volume < 0.0 { -1 } else { 1 };
+            let local = |at: &u32| self.corners(*at as usize).map(|p| (p - low).cast::<f32>());
+            let positions = part.iter().flat_map(local).collect();
+            let triangles = (0..part.len() as u32).map(|at| [3 * at, 3 * at + 1, 3 * at + 2]).collect();
+            let tree = Bvh::new(&TriMesh { positions, triangles });
+            let mut largest: Vec<(u32, f64, u32)> =
+                part.iter().map(|at| (patch[*at as usize], self.area(*at as usize), *at)).collect();
+            largest.sort_by(|a, b| a.0.cmp(&b.0).then(b.1.total_cmp(&a.1)));
+            for of_patch in largest.chunk_by(|a, b| a.0 == b.0) {
+                let [a, b, c] = self.corners(of_patch[0].2 as usize).map(|p| p - low);
+                let off = (b - a).cross(&(c - a)).try_normalize(0.0).unwrap_or_default() * (1e-4 * size);
+                let beside =
+                    [off, -off].map(|off| tree.surrounding((a + b + c) / 3.0 + off, ASLANT[0]) * way);
+                found += usize::from(beside.iter().any(|count| *count < 0));
+            }
+        }
+        found
+    }
+
+    /// Turns open parts up, or so that they bound something, that say both or nothing: two-sided sheets, and those whose neighbours
+    /// disagreed.
+    fn face_up(&mut self, agreement: &Agreement, two_sided: &[u32], closing: Closing, out: &mut Orientation) {
+        let count = self.named.len();
+        let mut is_asked = vec![false; count];
+        for at in 0..count {
+            let is_mixed = agreement.turned[at] && self.part[at] == agreement.patch[at];
+            if is_mixed || two_sided.binary_search(&self.numbers[at]).is_ok() {
+                is_asked[agreement.patch[at] as usize] = true;
+            }
+        }
+        agreement.one_sided.iter().for_each(|patch| is_asked[*patch as usize] = false);
+        let mut sums = vec![0.0f64; count];
+        let is_it = |pieces: &Self, at: usize| {
+            let part = pieces.part[at] as usize;
+            part < count && is_asked[part] && pieces.is_open[part]
+        };
+        for at in (0..count).filter(|at| is_it(self, *at)) {
+            let first = self.corners(self.part[at] as usize)[0];
+            let [a, b, c] = self.corners(at);
+            sums[self.part[at] as usize] += match closing {
+                Closing::Below => (b - a).cross(&(c - a)).y,
+                Closing::Caps => (a - first).dot(&(b - first).cross(&(c - first))),
+            };
+        }
+        for at in 0..count {
+            if is_it(self, at) && sums[self.part[at] as usize] < 0.0 {
+                self.turn(at, out);
+            }
+        }
+    }
+
+    /// Signed volume (m3) of triangles, 0 where rounding decides, with their least corner and their size (m).
+    fn volume(&self, triangles: &[u32]) -> (f64, DVec3, f64) {
+        let nowhere = (DVec3::repeat(f64::INFINITY), DVec3::repeat(f64::NEG_INFINITY));
+        let corners = triangles.iter().flat_map(|at| self.corners(*at as usize));
+        let (low, high) = corners.fold(nowhere, |(low, high), p| (low.inf(&p), high.sup(&p)));
+        let six = triangles.iter().map(|at| six_of(&self.corners(*at as usize), low));
+        let size = (high - low).norm();
+        (substantial(six.sum::<f64>() / 6.0, size), low, size)
+    }
+
+    /// Turns the parts that are inside out.
+    pub(super) fn turn_outward(&mut self, closing: Closing, count: usize, out: &mut Orientation) {
+        let mut order: Vec<u32> = (0..self.named.len() as u32).collect();
+        order.sort_by_key(|at| self.part[*at as usize]);
+        let parts: Vec<&[u32]> =
+            order.chunk_by(|a, b| self.part[*a as usize] == self.part[*b as usize]).collect();
+        let is_open = |part: &[u32]| self.is_open[self.part[part[0] as usize] as usize];
+        let shapes: Vec<Shape> = parts.iter().map(|part| self.shape(part, is_open(part), closing)).collect();
+        if shapes.iter().any(|shape| !shape.can_turn) {
+            out.open = vec![false; count];
+            for (part, _) in parts.iter().zip(&shapes).filter(|(_, shape)| !shape.can_turn) {
+                part.iter().for_each(|at| out.open[self.numbers[*at as usize] as usize] = true);
+            }
+        }
+        let closed =
+            |shapes: &[Shape]| -> f64 { shapes.iter().filter(|s| s.can_turn).map(|s| s.volume).sum() };
+        out.volumes = [closed(&shapes); 2];
+        if !shapes.iter().any(|shape| shape.can_turn && shape.volume < 0.0) {
+            return;
+        }
+        let shapes: Vec<Shape> =
+            parts.iter().zip(shapes).map(|(part, shape)| self.filled(part, shape)).collect();
+        let Turns { turned, ambiguous } = turns(&shapes);
+        out.doubts.nested += ambiguous;
+        out.turned_parts += turned.iter().filter(|turned| **turned).count();
+        for (_, shape) in turned.iter().zip(&shapes).filter(|(turned, _)| **turned) {
+            out.volumes[1] -= 2.0 * shape.volume;
+        }
+        if out.fates.is_empty() {
+            out.fates = vec![Fate::Stays; count];
+        }
+        let to_turn: Vec<u32> = parts
+            .iter()
+            .zip(&turned)
+            .filter(|(_, turned)| **turned)
+            .flat_map(|(part, _)| part.to_vec())
+            .collect();
+        to_turn.into_iter().for_each(|at| self.turn(at as usize, out));
+    }
+
+    /// A part without its triangles; those of what closes it are there.
+    fn shape(&self, part: &[u32], is_open: bool, closing: Closing) -> Shape {
+        let (volume, low, size) = self.volume(part);
+        let mut shape =
+            Shape { triangles: Vec::new(), own: 0, volume, can_turn: !is_open, is_bottomless: false };
+        if is_open {
+            shape.is_bottomless = closing == Closing::Below;
+            if closing == Closing::Caps {
+                shape.triangles = self.caps(part);
+                let own: f64 = part.iter().map(|at| self.area(*at as usize)).sum();
+                let of_caps = |[a, b, c]: &[DVec3; 3]| (b - a).cross(&(c - a)).norm();
+                shape.can_turn = shape.triangles.iter().map(of_caps).sum::<f64>() <= CAPS * own;
+                let six =
+                    part.iter().map(|at| self.corners(*at as usize)).chain(shape.triangles.iter().copied());
+                shape.volume = substantial(six.map(|corners| six_of(&corners, low)).sum::<f64>() / 6.0, size);
+            }
+        }
+        shape
+    }
+
+    /// The part with its triangles.
+    fn filled(&self, part: &[u32], shape: Shape) -> Shape {
+        let mut triangles: Vec<[DVec3; 3]> = part.iter().map(|at| self.corners(*at as usize)).collect();
+        triangles.extend(&shape.triangles);
+        Shape { triangles, own: part.len(), ..shape }
+    }
+
+    /// Cones to the middles of a part's open loops.
+    fn caps(&self, part: &[u32]) -> Vec<[DVec3; 3]> {
+        let triangles: Vec<[u32; 3]> = part.iter().map(|at| self.named[*at as usize]).collect();
+        let mut edges: Vec<([u32; 2], i32)> = triangles
+            .iter()
+            .flat_map(|&[a, b, c]| [[a, b], [b, c], [c, a]])
+            .map(|[i, j]| if i < j { ([i, j], 1) } else { ([j, i], -1) })
+            .collect();
+        edges.sort_unstable();
+        let off = |run: &[([u32; 2], i32)]| (run[0].0, run.iter().map(|(_, way)| way).sum::<i32>());
+        let open: Vec<([u32; 2], i32)> =
+            edges.chunk_by(|a, b| a.0 == b.0).map(off).filter(|(_, off)| *off != 0).collect();
+        let mut rim: Vec<u32> = open.iter().flat_map(|(ends, _)| *ends).collect();
+        rim.sort_unstable();
+        rim.dedup();
+        let index = |name: u32| rim.partition_point(|other| *other < name) as u32;
+        let mut loops = Sets::new(rim.len());
+        open.iter().for_each(|([i, j], _)| loops.join(index(*i), index(*j)));
+        let position = |name: u32| self.positions[name as usize % self.positions.len()];
+        let mut sums = vec![(DVec3::zeros(), 0.0); rim.len()];
+        for (at, name) in (0..).zip(&rim) {
+            let sum = &mut sums[loops.root(at) as usize];
+            *sum = (sum.0 + position(*name), sum.1 + 1.0);
+        }
+        let mut out = Vec::new();
+        for ([i, j], off) in open {
+            let (sum, count) = sums[loops.root(index(i)) as usize];
+            let [from, to] = if off > 0 { [j, i] } else { [i, j] };
+            out.extend((0..off.abs()).map(|_| [position(from), position(to), sum / count]));
+        }
+        out
+    }
+}
+
+/// Six times the signed volume (m3) of the tetrahedron over a triangle, with its tip at an origin.
+fn six_of(corners: &[DVec3; 3], origin: DVec3) -> f64 {
+    let [a, b, c] = corners.map(|p| p - origin);
+    a.dot(&b.cross(&c))
+}
+
+/// The volume of a part of this size, but 0 where rounding decides.
+fn substantial(volume: f64, size: f64) -> f64 {
+    if volume.abs() > ROUNDING * size.powi(3) { volume } else { 0.0 }
+}

@@ -1,0 +1,196 @@
+//! Frames: in which steps they are made, and what ends them. One that fails or is cancelled leaves the liquid as it was.
+//!
+//! For that a frame that may take long begins with a copy of what it changes, 20 bytes a column where there is liquid, and looks for a cancel between its steps,
+//! and between the rounds in which the heads of full columns are found. All others are over before a cancel would matter: they copy nothing.
+
+use std::sync::atomic::AtomicBool;
+
+use super::clock::Clock;
+use super::flow::bands::attended;
+use super::flow::stop::Stop;
+use super::pace::{self, LENGTHS, MOST_STEPS, Measures, Next};
+use super::params::Pace;
+use super::system::{Report, Shallow};
+use crate::base::cpu::FlushDenormals;
+use crate::base::digits;
+use crate::context::Context;
+use crate::error::{Error, Result};
+
+/// The state at the beginning of a frame, and the steps of the frame before.
+#[derive(Debug, Default)]
+pub(super) struct Kept {
+    state: Vec<u8>,
+    steps: Vec<f64>,
+}
+
+/// Columns times steps of a frame that may take long: some 20 ms.
+const LONG: f64 = (1 << 21) as f64;
+/// A column that may be full counts as so many: its head is found in rounds.
+const FULL: f64 = 16.0;
+
+/// Refuses a length of a frame.
+pub(super) fn check_length(dt: f64) -> Result<()> {
+    if LENGTHS.contains(&dt) {
+        return Ok(());
+    }
+    Err(outside("frame", dt))
+}
+
+/// The failure of a frame or a step of a length (s) out of range.
+fn outside(noun: &str, length: f64) -> Error {
+    let (least, most) = LENGTHS.into_inner();
+    let [least, most] = [least, most].map(digits::end);
+    Error::argument(format!("a {noun} of {} s is not within {least} to {most} s", digits::given(length)))
+}
+
+/// The failure of a frame that would take too many steps, after some of them.
+pub(super) fn too_many_steps(dt: f64, done: f64, length: f64) -> Error {
+    let [dt, done, length] = [dt, done, length].map(digits::given);
+    Error::argument(format!(
+        "a frame of {dt} s takes over {MOST_STEPS} steps: after {done} s they are of {length} s"
+    ))
+}
+
+impl Shallow {
+    /// One frame of `dt` (s), 1e-12 to 1e6.
+    ///
+    /// The context is asked whether it is cancelled at the start, and where the frame may take long (exact steps; over some two million columns times steps; many
+    /// full columns) in its course, too: within some milliseconds. The caller's thread does all the work, or, where there are many columns,
+    /// the threads of its pool do, which are entered once. Nothing is allocated, locked, logged or polled by a pool without threads, but for
+    /// the list of steps when it grows.
+    ///
+    /// # Errors
+    /// `Argument`: dt out of range, or it needs over a million steps. `Cancelled`. In either case the liquid is as it was.
+    pub fn step(&mut self, ctx: &Context, dt: f64) -> Result<Report> {
+        self.frame(ctx, dt, None, |pace| Some(pace::next(pace)))
+    }
+
+    /// As [`Shallow::step`], but when the calling thread has worked for `budget` (s), or, where several do, so long has passed, the frame ends
+    /// early, and the rest of its time is dropped. At least one step is made. Another run drops other times: [`Shallow::replay`] makes the
+    /// same one again.
+    ///
+    /// # Errors
+    /// As [`Shallow::step`]; also when the budget is not positive.
+    pub fn step_within(&mut self, ctx: &Context, dt: f64, budget: f64) -> Result<Report> {
+        if budget.is_nan() || budget <= 0.0 {
+            return Err(Error::argument(format!("a budget of {budget} s is not positive")));
+        }
+        let clock = Clock::start(self.flow.divide(&self.columns, ctx.pool().threads()));
+        let next = |pace: &Next| (pace.steps == 0 || clock.seconds() < budget).then(|| pace::next(pace));
+        self.frame(ctx, dt, None, next)
+    }
+
+    /// A frame of given steps (s), as [`Shallow::last_steps`] has listed them.
+    ///
+    /// # Errors
+    /// As [`Shallow::step`].
+    pub fn replay(&mut self, ctx: &Context, steps: &[f64]) -> Result<Report> {
+        if let Some(step) = steps.iter().find(|step| !LENGTHS.contains(*step)) {
+            return Err(outside("step", *step));
+        }
+        let next = |pace: &Next| steps.get(pace.steps as usize).copied();
+        self.frame(ctx, steps.iter().sum(), Some(steps.len()), next)
+    }
+
+    /// A frame; the count of its steps, where that is known.
+    fn frame(
+        &mut self,
+        ctx: &Context,
+        dt: f64,
+        count: Option<usize>,
+        next: impl Fn(&Next) -> Option<f64> + Send,
+    ) -> Result<Report> {
+        check_length(dt)?;
+        let running = ctx.begin_light();
+        if ctx.is_cancelled() {
+            return Err(Error::Cancelled);
+        }
+        let cancel = running.latch();
+        if self.flow.divide(&self.columns, ctx.pool().threads()) {
+            let threads = ctx.pool().threads();
+            ctx.pool().install(|| attended(threads, || self.whole(dt, count, next, cancel)))
+        } else {
+            let _flush = FlushDenormals::begin();
+            self.whole(dt, count, next, cancel)
+        }
+    }
+
+    /// All of a frame, or nothing of it.
+    fn whole(
+        &mut self,
+        dt: f64,
+        count: Option<usize>,
+        next: impl Fn(&Next) -> Option<f64>,
+        cancel: &AtomicBool,
+    ) -> Result<Report> {
+        if !self.may_take_long(dt, count) {
+            return self.steps(dt, next, &Stop::NEVER);
+        }
+        self.keep();
+        let result = self.steps(dt, next, &Stop::when(cancel));
+        if result.is_err() {
+            self.put_kept_back();
+        }
+        result
+    }
+
+    /// Whether a frame, of so many steps where that is known, may take so long that a cancel should end it.
+    pub(super) fn may_take_long(&mut self, dt: f64, count: Option<usize>) -> bool {
+        let steps = match (count, self.params.pace) {
+            (Some(count), _) => count as f64,
+            // How long exact steps are only shows in their course.
+            (None, Pace::Exact) => return true,
+            (None, Pace::Realtime(longest)) => (dt / longest).max(1.0),
+        };
+        let [wet, full] = self.flow.work(&self.columns).map(|count| count as f64);
+        steps * (wet + FULL * full) > LONG
+    }
+
+    fn keep(&mut self) {
+        let mut kept = std::mem::take(&mut self.kept);
+        // Not again when the liquid spreads.
+        kept.state.clear();
+        kept.state.reserve(self.most_save_size());
+        self.save_into(&mut kept.state);
+        kept.steps.clone_from(&self.steps);
+        self.kept = kept;
+    }
+
+    fn put_kept_back(&mut self) {
+        let kept = std::mem::take(&mut self.kept);
+        self.put_back(&kept.state);
+        self.steps.clone_from(&kept.steps);
+        self.kept = kept;
+    }
+
+    /// The steps of a frame, in which the liquid is as thick as what it carries makes it at the beginning.
+    fn steps(&mut self, dt: f64, next: impl Fn(&Next) -> Option<f64>, stop: &Stop) -> Result<Report> {
+        let Self { params, thick, columns, flow, pipes, .. } = &mut *self;
+        let Some(law) = params.thickening else { return self.flow_on(dt, next, stop) };
+        thick.begin(&law, columns, flow, pipes)?;
+        let report = self.flow_on(dt, next, stop);
+        self.thick.end(&mut self.pipes);
+        report
+    }
+
+    fn flow_on(&mut self, dt: f64, next: impl Fn(&Next) -> Option<f64>, stop: &Stop) -> Result<Report> {
+        let measures: Measures = self.measures();
+        let mut report = Report::default();
+        let halvings = self.begin(dt, &measures, &next);
+        while report.seconds < dt {
+            let left = dt - report.seconds;
+            let state = self.next(&measures, left, report.steps, halvings);
+            let Some(length) = next(&state) else { break };
+            if report.steps == 0 && left / length > f64::from(MOST_STEPS) || report.steps >= MOST_STEPS {
+                return Err(too_many_steps(dt, report.seconds, length));
+            }
+            self.advance(&measures, length, &mut report, stop);
+            if stop.is_asked() {
+                return Err(Error::Cancelled);
+            }
+            report.seconds = if length >= left { dt } else { report.seconds + length };
+        }
+        report.deepest = measures.unit * f64::from(self.flow.deepest());
+        Ok(report)
+    }
+}

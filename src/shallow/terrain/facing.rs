@@ -1,0 +1,22 @@
+//! Which way the triangles of a terrain face: closed parts outward.
+
+use crate::base::TriMesh;
+use crate::base::orientation::{Closing, Orientation};
+
+/// The orientation of a terrain's mesh, or of a mesh that stands on it. Open sheets stay as they are, as one that faces up is ground; but
+/// where the whole mesh is inside out, its closed parts by their volume and its sheets facing down everywhere, these are turned
+/// with it.
+pub fn facing(mesh: &TriMesh) -> Orientation {
+    let mut orientation = Orientation::of_mesh(mesh, Closing::Below);
+    if orientation.has_open() && orientation.volumes()[0] < 0.0 {
+        let faces_down = |triangle: usize| {
+            let [a, b, c] = mesh.corners(triangle);
+            let up = (b - a).cross(&(c - a)).y;
+            if orientation.is_turned(triangle) { up >= 0.0 } else { up <= 0.0 }
+        };
+        if (0..mesh.triangles.len()).filter(|at| orientation.is_open(*at)).all(faces_down) {
+            orientation.turn_open();
+        }
+    }
+    orientation
+}
