@@ -1,6 +1,9 @@
 //! Meshes whose parts are turned every way, with the volumes that they mean by their construction.
 
+use base64::Engine;
+use base64::engine::general_purpose::STANDARD;
 use frazil::base::{TriMesh, Vec3};
+use serde_json::{Value, json};
 
 use super::shapes;
 
@@ -192,6 +195,45 @@ pub fn loose(mesh: &TriMesh) -> TriMesh {
         mesh.triangles.as_flattened().iter().map(|&vertex| mesh.positions[vertex as usize]).collect();
     let triangles = (0..mesh.triangles.len() as u32).map(|at| [3 * at, 3 * at + 1, 3 * at + 2]).collect();
     TriMesh { positions, triangles }
+}
+
+/// The text of a .gltf file that has a mesh mirrored in x, right side out where the mesh is, as a skin whose joint hangs on a node that
+/// mirrors it back: glTF says that its faces turn with it.
+pub fn mirrored_skin(mesh: &TriMesh) -> String {
+    let vertices = mesh.positions.len();
+    let mirrored = mesh.positions.iter().flat_map(|p| [-p.x, p.y, p.z]).flat_map(f32::to_le_bytes);
+    let weights = (0..vertices).flat_map(|_| [1.0f32, 0.0, 0.0, 0.0]).flat_map(f32::to_le_bytes);
+    let indices = mesh.triangles.iter().flat_map(|&[a, b, c]| [a, c, b]).flat_map(u32::to_le_bytes);
+    let parts: [Vec<u8>; 4] =
+        [mirrored.collect(), vec![0; 4 * vertices], weights.collect(), indices.collect()];
+    let mut start = 0;
+    let views: Vec<Value> = parts
+        .iter()
+        .map(|part| {
+            start += part.len();
+            json!({ "buffer": 0, "byteOffset": start - part.len(), "byteLength": part.len() })
+        })
+        .collect();
+    let (low, high) = mesh.bounds().unwrap_or_default();
+    let data = STANDARD.encode(parts.concat());
+    json!({
+        "asset": { "version": "2.0" }, "scene": 0, "scenes": [{ "nodes": [0] }],
+        "nodes": [{ "scale": [-1, 1, 1], "children": [1, 2] }, { "name": "joint" }, { "mesh": 0, "skin": 0 }],
+        "skins": [{ "joints": [1] }],
+        "meshes": [{ "primitives": [
+            { "attributes": { "POSITION": 0, "JOINTS_0": 1, "WEIGHTS_0": 2 }, "indices": 3 }
+        ] }],
+        "accessors": [
+            { "bufferView": 0, "componentType": 5126, "type": "VEC3", "count": vertices,
+              "min": [-high.x, low.y, low.z], "max": [-low.x, high.y, high.z] },
+            { "bufferView": 1, "componentType": 5121, "type": "VEC4", "count": vertices },
+            { "bufferView": 2, "componentType": 5126, "type": "VEC4", "count": vertices },
+            { "bufferView": 3, "componentType": 5125, "type": "SCALAR", "count": 3 * mesh.triangles.len() },
+        ],
+        "bufferViews": views,
+        "buffers": [{ "byteLength": start, "uri": format!("data:application/octet-stream;base64,{data}") }],
+    })
+    .to_string()
 }
 
 /// A Klein bottle: closed, and with one side only.

@@ -4,7 +4,7 @@ use std::path::{Path, PathBuf};
 use std::sync::{Arc, Mutex};
 
 use frazil::base::{DVec3, TriMesh};
-use frazil::motion::{Key, Keys, Rigid};
+use frazil::motion::{Character, Key, Keys, Play, Rigid};
 use frazil::scene::{self, Scene};
 use frazil::snow::base_layer::initial::{Cover, Ground, layer};
 use frazil::snow::base_layer::{BaseLayer, Params};
@@ -12,7 +12,7 @@ use frazil::sweep::{self, Body, Settings};
 use frazil::vdb::level_set::measure;
 use frazil::{Context, Pool, io};
 
-use crate::common::oriented::{Case, Kind, MOVE, case};
+use crate::common::oriented::{Case, Kind, MOVE, case, mirrored_skin};
 use crate::harness::Harness;
 
 const SILENT: &str = "reliability.orientation_silent";
@@ -39,7 +39,7 @@ struct Found {
 
 type Door = (&'static str, fn(&Doors, &Case) -> frazil::Result<Found>);
 
-const DOORS: [Door; 8] = [
+const DOORS: [Door; 9] = [
     ("from-mesh", Doors::still),
     ("sweep", Doors::swept),
     ("snow, moving", Doors::pressed),
@@ -48,6 +48,7 @@ const DOORS: [Door; 8] = [
     ("shallow, terrain", Doors::terrain),
     ("shallow, object", Doors::object),
     ("surface", Doors::followed),
+    ("mirrored skin", Doors::skinned),
 ];
 
 pub fn run(h: &mut Harness) {
@@ -62,6 +63,10 @@ pub fn run(h: &mut Harness) {
         for (name, door) in DOORS {
             // Loose triangles share no vertex to follow: the surface system repairs them, and says so.
             if name == "surface" && !case.is_shared {
+                continue;
+            }
+            // Right, turned as a whole, or mirrored twice.
+            if name == "mirrored skin" && ![0, 3, 8].contains(&(seed % 10)) {
                 continue;
             }
             let (is_right, is_warned, what) = match door(&doors, &case) {
@@ -126,6 +131,16 @@ impl Doors {
         let grid = sweep::chain(&self.ctx, &body, 0.0, 1.0, &Settings::new(CELL))?;
         let volume = measure(&self.ctx, &grid)?.volume;
         Ok(Found { volume, meant: case.swept, warning: body[0].warning() })
+    }
+
+    /// The mesh as a skin that an ancestor of its joint mirrors.
+    fn skinned(&self, case: &Case) -> frazil::Result<Found> {
+        let file = self.folder.join("skin.gltf");
+        std::fs::write(&file, mirrored_skin(&case.mesh)).expect("a file");
+        let body = [Body::new(Box::new(Character::open(&file, Play::default())?), 0.0)?];
+        let grid = sweep::chain(&self.ctx, &body, 0.0, 0.0, &Settings::new(CELL))?;
+        let volume = measure(&self.ctx, &grid)?.volume;
+        Ok(Found { volume, meant: case.volume, warning: body[0].warning() })
     }
 
     /// Snow 0.6 m deep around the body.

@@ -109,7 +109,7 @@ impl Inputs {
             warnings.extend(orientation.warning().map(|what| format!("{}: {what}", own.display())));
             let on_it = triangles::solids(&mesh.positions, &mesh.triangles, grid, heights);
             let on_it = on_it.map_err(|error| told(own, error))?;
-            if orientation.has_open() {
+            if orientation.has_open() && orientation.warning().is_none() {
                 let what = "is not closed: below a surface of it that faces up all is solid";
                 warnings.push(format!("{}: {what}", own.display()));
             }
