@@ -82,7 +82,7 @@ impl<'a> Words<'a> {
         }
     }
 
-    /// The word behind the next one is looked at, and not taken.
+    /// The next word, which is not taken.
     pub fn peek(&self) -> Option<&'a [u8]> {
         Self { bytes: self.bytes, at: self.at, line: self.line }.next()
     }

@@ -110,9 +110,9 @@ impl Commas {
         }
         words.retain(|word| !word.is_empty());
         let inner = |word: &[u8]| word.iter().filter(|&&byte| byte == b',').count();
-        let has_columns = words.len() >= 3 && inner(words[0]) <= 1;
-        let first = &words[..words.len().min(3)];
-        if first.iter().any(|word| inner(word) > 0) && has_columns {
+        let first = words.get(..3).filter(|first| inner(first[0]) <= 1).unwrap_or_default();
+        let has_point = |word: &&[u8]| word.contains(&b'.');
+        if first.iter().any(|word| inner(word) > 0) {
             // Such as 1,234.5, whose comma is neither.
             let is_odd = |word: &&&[u8]| inner(word) > 0 && !text::has_decimal_comma(word);
             if let Some(word) = first.iter().find(is_odd) {
@@ -123,24 +123,23 @@ impl Commas {
                 out.extend(word.iter().map(|&byte| if byte == b',' { b'.' } else { byte }));
                 out.push(b' ');
             });
+        } else if !first.is_empty() {
+            // Commas of further columns are none of ours.
+            if first.iter().any(has_point) {
+                self.others.get_or_insert(n);
+            }
+            out.extend_from_slice(&first.join(&b' '));
         } else {
             let between: Vec<&[u8]> =
                 words.iter().flat_map(|word| word.split(|&byte| byte == b',')).collect();
-            let is_separator = words.iter().any(|word| inner(word) > 0);
             // Digits that begin with 0 are those behind a decimal comma.
             let is_share =
                 |word: &&&[u8]| word.len() > 1 && word.iter().all(u8::is_ascii_digit) && word[0] == b'0';
-            if let Some(word) = between.iter().find(is_share).filter(|_| is_separator) {
+            if let Some(word) = between.iter().find(is_share) {
                 return Err(unclear(word));
             }
-            let has_point = |word: &&[u8]| word.contains(&b'.');
-            if is_separator || between.iter().take(3).any(has_point) {
-                self.others.get_or_insert(n);
-            }
-            for word in between {
-                out.extend_from_slice(word);
-                out.push(b' ');
-            }
+            self.others.get_or_insert(n);
+            out.extend_from_slice(&between.join(&b' '));
         }
         match (self.decimal, self.others) {
             (Some(commas), Some(points)) => Err(format!(

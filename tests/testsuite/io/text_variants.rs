@@ -265,7 +265,7 @@ proptest! {
             for row in &rows {
                 let mut line = row.join(separator);
                 if more {
-                    line += &format!("{separator}255{separator}7");
+                    line += &format!("{separator}255{separator}{}", if has_commas { "0.05" } else { "7" });
                 }
                 lines.push(if has_commas && separator == ", " {
                     let words: Vec<String> = row.iter().map(|word| word.replace('.', ",")).collect();
