@@ -11,6 +11,7 @@ pub mod exact_lines;
 pub mod folded;
 pub mod header;
 pub mod hero;
+pub mod hills;
 pub mod jelly;
 pub mod liquids;
 pub mod made_sets;
