@@ -4,6 +4,8 @@
 mod band;
 #[path = "gates/beds.rs"]
 mod beds;
+#[path = "gates/behind_ground.rs"]
+mod behind_ground;
 #[path = "gates/births.rs"]
 mod births;
 #[path = "gates/bytes.rs"]
@@ -14,6 +16,8 @@ mod cancel;
 mod cancel_latency;
 #[path = "gates/capi.rs"]
 mod capi;
+#[path = "gates/collapse.rs"]
+mod collapse;
 #[path = "gates/collisions.rs"]
 mod collisions;
 #[path = "gates/columns.rs"]

@@ -59,6 +59,7 @@ fn step(
         base: Base::Changed(base.surface(), base.before()),
         objects: &[Object::new(body, 0.3)],
         statics: &[],
+        ground: &[],
         floor: None,
         lowest: LOWEST,
     };
@@ -163,6 +164,7 @@ fn speed(h: &mut Harness) {
             base: Base::Whole(layers),
             objects: &[],
             statics: &[],
+            ground: &[],
             floor: None,
             lowest: LOWEST,
         };

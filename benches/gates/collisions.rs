@@ -70,8 +70,14 @@ fn through(h: &mut Harness, name: &str, motion: Box<dyn Motion>, frames: i32) {
     for frame in 1..=12 + frames {
         let objects = [Object::new(&body, 0.3)];
         let objects = if frame <= 12 { &objects[..0] } else { &objects[..] };
-        let around =
-            Surroundings { base: Base::Missing, objects, statics: &[], floor: Some(0.0), lowest: -1.0 };
+        let around = Surroundings {
+            base: Base::Missing,
+            objects,
+            statics: &[],
+            ground: &[],
+            floor: Some(0.0),
+            lowest: -1.0,
+        };
         let times = [frame - 13, frame - 12].map(|frame| f64::from(frame.max(0)) * FRAME);
         let times = if frame <= 12 { [0.0, FRAME] } else { times };
         let report = grains.step(&ctx, &around, times, frame).expect("a step");

@@ -11,7 +11,7 @@ use crate::grains::{Experiment, walls};
 use crate::harness::Harness;
 
 /// Diameter of a grain (m).
-const D: f64 = 0.005;
+pub const D: f64 = 0.005;
 /// Angle of repose (degrees): that of the materials in the paper.
 const REPOSE: f64 = 31.0;
 /// Approximate count of grains of a column.
@@ -28,19 +28,25 @@ pub fn run(h: &mut Harness) {
     }
     let errors = [1.0, 2.0, 4.0].map(|aspect| {
         let (ran, aspect) = collapse(aspect);
-        let expected = if aspect < 1.7 { 1.24 * aspect } else { 1.6 * aspect.sqrt() };
+        let expected = expected(aspect);
         println!("# aspect {aspect:.3}: {ran:.3} radii, after Lube et al. {expected:.3}");
         (ran / expected - 1.0).abs() * 100.0
     });
     h.gate(name, errors.into_iter().fold(0.0, f64::max), &format!("aspects 1, 2, 4: {errors:.1?} %"));
 }
 
-/// Runout (radii) of a column of about an aspect ratio, and its aspect ratio once settled.
-fn collapse(aspect: f64) -> (f64, f64) {
+/// Runout (radii) after Lube et al.
+pub fn expected(aspect: f64) -> f64 {
+    if aspect < 1.7 { 1.24 * aspect } else { 1.6 * aspect.sqrt() }
+}
+
+/// A column of about an aspect ratio and count of grains that has settled in a cylinder, the cylinder's radius and the mean height
+/// of its top (m).
+pub fn settled(aspect: f64, grains: f64) -> (Experiment, f64, f64) {
     let mut column = Experiment::new(2, D, of_repose(REPOSE, false), 3);
     column.params.air = 1.0;
     // The grains fill a cylinder of that aspect ratio at a packing of 0.6.
-    let radius = (GRAINS / (6.0 * 0.6 * aspect)).cbrt() * D;
+    let radius = (grains / (6.0 * 0.6 * aspect)).cbrt() * D;
     let corner = |n: usize| {
         let angle = n as f64 / 64.0 * std::f64::consts::TAU;
         [angle.cos() * radius, angle.sin() * radius]
@@ -50,9 +56,9 @@ fn collapse(aspect: f64) -> (f64, f64) {
     let across = (2.0 * radius / (1.16 * D)).ceil() as u32 + 1;
     let inside = |place: DVec3| place.xz().norm() < radius - 0.7 * D;
     let each = across * across * 4 / 5;
-    column.scatter([across, 2 * GRAINS as u32 / each, across], |place| {
+    column.scatter([across, 2 * grains as u32 / each, across], |place| {
         inside(place)
-            && place.y < 1.16 * D * GRAINS / (std::f64::consts::PI * (radius / (1.16 * D) - 0.6).powi(2))
+            && place.y < 1.16 * D * grains / (std::f64::consts::PI * (radius / (1.16 * D) - 0.6).powi(2))
     });
     let mut frames = 0;
     while frames < 24 || column.heap.fastest() > 0.02 && frames < 96 {
@@ -69,12 +75,19 @@ fn collapse(aspect: f64) -> (f64, f64) {
     let height = tops.values().sum::<f64>() / tops.len() as f64;
     println!("# {} grains, {:.1} radii high after {frames} frames", column.heap.count(), height / radius);
     column.colliders.shells.clear();
-    frames = 0;
+    (column, radius, height)
+}
+
+/// Runout (radii) of a column of about an aspect ratio, and its aspect ratio once settled.
+fn collapse(aspect: f64) -> (f64, f64) {
+    let (mut column, radius, height) = settled(aspect, GRAINS);
+    let mut frames = 0;
     while frames < 24 || column.heap.fastest() > 0.02 && frames < 144 {
         column.step();
         frames += 1;
     }
-    let edge = edge(&column);
+    let places: Vec<DVec3> = column.heap.places().collect();
+    let edge = edge(&places);
     println!(
         "# {frames} frames later the edge lies at {:.2} radii, the slope is {:.1}",
         edge / radius,
@@ -83,9 +96,8 @@ fn collapse(aspect: f64) -> (f64, f64) {
     (edge / radius - 1.0, height / radius)
 }
 
-/// Radius (m) of the deposit.
-fn edge(column: &Experiment) -> f64 {
-    let places: Vec<DVec3> = column.heap.places().collect();
+/// Radius (m) of the deposit of grains at some places.
+pub fn edge(places: &[DVec3]) -> f64 {
     let cell = |place: &DVec3| [0, 1, 2].map(|axis: usize| (place[axis] / (TOUCHING * D)).floor() as i32);
     let mut cells = std::collections::HashMap::<[i32; 3], Vec<usize>>::new();
     for (index, place) in places.iter().enumerate() {
@@ -114,10 +126,10 @@ fn edge(column: &Experiment) -> f64 {
         *sector = sector.max(place.xz().norm() + 0.5 * D);
     }
     let strays = is_part.iter().filter(|is_part| !**is_part).count();
-    let most = far(&places, 0.99) / D;
+    let most = far(places, 0.99) / D;
     println!(
         "# {strays} strays; 99 % of the grains lie within {most:.1} diameters, all within {:.1}",
-        far(&places, 1.0) / D
+        far(places, 1.0) / D
     );
     sectors.iter().sum::<f64>() / SECTORS as f64
 }

@@ -56,8 +56,14 @@ pub fn print_memory() {
     let each = |kilobytes: f64| kilobytes * 1024.0 / count as f64;
     grains.emit(&places, &[], 0).expect("grains");
     println!("# grains that were added: {:.0} bytes each", each(kilobytes("VmRSS:") - before));
-    let around =
-        Surroundings { base: Base::Missing, objects: &[], statics: &[], floor: Some(0.0), lowest: -1.0 };
+    let around = Surroundings {
+        base: Base::Missing,
+        objects: &[],
+        statics: &[],
+        ground: &[],
+        floor: Some(0.0),
+        lowest: -1.0,
+    };
     for frame in 0..SETTLE {
         grains.step(&ctx, &around, [0.0, FRAME], frame as i32).expect("a step");
     }

@@ -8,8 +8,9 @@ use frazil::snow::grains::heap::{Colliders, Division, Floor, Heap, Pose, Shell};
 use crate::harness::Harness;
 use crate::scenes::context;
 use crate::{
-    beds, births, collisions, columns, crowd, distance, free, grain_cancel, grain_memory, grain_readers,
-    materials, particles, passes, piles, planes, preview, rate, rest, table, turned,
+    beds, behind_ground, births, collapse, collisions, columns, crowd, distance, free, grain_cancel,
+    grain_memory, grain_readers, materials, particles, passes, piles, planes, preview, rate, rest, table,
+    turned,
 };
 
 /// Length of a frame (s).
@@ -23,6 +24,8 @@ pub fn run(h: &mut Harness) {
     beds::run(h);
     turned::run(h);
     columns::run(h);
+    collapse::run(h);
+    behind_ground::run(h);
     planes::run(h);
     materials::run(h);
     collisions::run(h);

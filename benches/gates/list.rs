@@ -41,6 +41,8 @@ pub const GATES: &[Gate] = &[
     gate("snow.grains.turned_bed_most", "deg", Most(5.0), Open),
     // Columns that collapse, and a grain on a plane that leans.
     gate("snow.grains.column_runout", "%", Most(15.0), Most(8.0)),
+    // The same as scenes with default settings, on their snow.
+    gate("snow.grains.collapse", "%", Most(15.0), Most(8.0)),
     yes("snow.grains.slope_rests"),
     yes("snow.grains.slope_slides"),
     // Walls that stand or fall as asked, bounces, and what clings to an object that stops and that shakes.
@@ -55,6 +57,8 @@ pub const GATES: &[Gate] = &[
     none("snow.grains.deep_blades", "grains"),
     none("snow.grains.deep_sheet", "grains"),
     none("snow.grains.deep_walker", "grains"),
+    // Grains behind ground at the end of a frame, trapped or not, and deep in level ground.
+    none("snow.grains.behind_ground", "grains"),
     // Births: the account of snow and grains, the same print in few and many frames, and how fast grains are born.
     none("snow.grains.ledger", "grains"),
     gate("snow.grains.birth_spread", "%", Most(2.0), Most(0.5)),

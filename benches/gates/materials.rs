@@ -187,8 +187,14 @@ fn stick(h: &mut Harness) {
         .collect();
     grains.emit(&sites, &[], 0).expect("grains");
     let objects = [Object { stick: 5.0, ..Object::new(&body, 0.5) }];
-    let around =
-        Surroundings { base: Base::Missing, objects: &objects, statics: &[], floor: None, lowest: -100.0 };
+    let around = Surroundings {
+        base: Base::Missing,
+        objects: &objects,
+        statics: &[],
+        ground: &[],
+        floor: None,
+        lowest: -100.0,
+    };
     let mut hanging = |frames: std::ops::Range<i32>| {
         let last = f64::from(frames.end) * FRAME;
         for frame in frames {

@@ -61,8 +61,14 @@ fn seconds(man: &std::path::Path, rests: bool, settle: i32, walk: i32) -> [f64; 
     for frame in 1 - settle..=walk {
         let objects = [Object::new(&body, 0.3)];
         let objects = if frame <= 0 { &objects[..0] } else { &objects[..] };
-        let around =
-            Surroundings { base: Base::Missing, objects, statics: &[&walls], floor: Some(0.0), lowest: -1.0 };
+        let around = Surroundings {
+            base: Base::Missing,
+            objects,
+            statics: &[&walls],
+            ground: &[],
+            floor: Some(0.0),
+            lowest: -1.0,
+        };
         let times = [frame - 1, frame].map(|frame| f64::from(frame.max(0)) * FRAME);
         let times = if frame <= 0 { [0.0, FRAME] } else { times };
         let start = Instant::now();

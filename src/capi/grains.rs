@@ -131,7 +131,7 @@ impl Heap {
         }
         let objects: Vec<_> = bodies.iter().map(|(body, surface)| surface.of(body)).collect();
         let Ground { floor, lowest } = self.ground;
-        let around = Surroundings { base, objects: &objects, statics: &[], floor, lowest };
+        let around = Surroundings { base, objects: &objects, statics: &[], ground: &[], floor, lowest };
         let done = self.grains.step(ctx, &around, [0.0, dt], frame)?;
         self.saved.take();
         Ok(frz_grains_report {

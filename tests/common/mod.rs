@@ -13,6 +13,7 @@ pub mod gltf_maker;
 pub mod gltf_variants;
 pub mod header;
 pub mod hero;
+pub mod hills;
 pub mod jelly;
 pub mod liquids;
 pub mod made_sets;

@@ -86,6 +86,7 @@ mod scene {
 }
 mod snow {
     mod base;
+    mod behind_ground;
     mod crumbs;
     mod grain_limits;
     mod grain_options;

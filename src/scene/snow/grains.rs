@@ -1,6 +1,7 @@
 //! The stage `grains`: snow removed from the base is pushed, piled and thrown.
 
 use std::path::Path;
+use std::sync::OnceLock;
 
 use serde_json::json;
 
@@ -9,7 +10,7 @@ use super::grain_files::{self, WHOLE_EVERY, ordered, told_apart};
 use super::grain_keys::material;
 use super::inputs::Inputs;
 use super::{base, drift};
-use crate::base::{DVec3, Points};
+use crate::base::{DVec3, Points, TriMesh};
 use crate::context::Context;
 use crate::error::{Error, Result};
 use crate::io::manifest::Keeps;
@@ -20,7 +21,7 @@ use crate::scene::shot::{
 use crate::scene::text::keys::{first_of, settings_of};
 use crate::scene::{self, Role, Scene, System, moving};
 use crate::snow::base_layer::Grids;
-use crate::snow::grains::{self, Base, Object, Params, StepReport, Surroundings};
+use crate::snow::grains::{self, Base, Ground, Object, Params, StepReport, Surroundings};
 use crate::sweep::Body;
 
 /// The stage for a scene.
@@ -29,6 +30,25 @@ pub struct Grains<'a> {
     inputs: &'a Inputs,
     /// Moving objects as the grains see them.
     objects: Vec<Object<'a>>,
+    /// What does not move, once a frame needs it.
+    still: OnceLock<Still<'a>>,
+}
+
+/// What does not move.
+struct Still<'a> {
+    /// The ground's mesh, and static objects that are solids.
+    ground: Vec<Ground>,
+    /// Other static objects.
+    sheets: Vec<&'a TriMesh>,
+}
+
+impl<'a> Still<'a> {
+    fn of(inputs: &'a Inputs) -> Self {
+        let (solids, sheets): (Vec<_>, Vec<_>) =
+            inputs.statics().iter().partition(|mesh| Ground::is_solid(mesh));
+        let ground = solids.into_iter().chain(inputs.ground()).map(Ground::new).collect();
+        Self { ground, sheets }
+    }
 }
 
 /// State carried from frame to frame.
@@ -36,6 +56,8 @@ pub struct State {
     grains: grains::Grains,
     /// The base layer after a frame.
     layer: Option<(i32, Grids)>,
+    /// Whether it was said that grains fell past the edge of the ground.
+    has_told: bool,
 }
 
 /// Input of the writer: the grains after a step, if their files or the changes are written.
@@ -51,7 +73,7 @@ pub struct Writer {
 
 /// Manifest shared by the clips in `grains/`.
 const MANIFEST: &str = "grains/grains.manifest.usda";
-/// Grains are dropped this far below the snow (m).
+/// Grains are dropped this far below the ground and the snow (m).
 const BELOW: f64 = 1.0;
 
 impl<'a> Grains<'a> {
@@ -70,7 +92,7 @@ impl<'a> Grains<'a> {
             }
         };
         let objects = moving.zip(&inputs.bodies).map(object).collect();
-        Self { scene, inputs, objects }
+        Self { scene, inputs, objects, still: OnceLock::new() }
     }
 
     /// Adds the grains that a file gives at the first frame, except those in the snow or below the ground; returns the frame's report.
@@ -121,7 +143,7 @@ impl<'a> Grains<'a> {
         frame: i32,
     ) -> Result<StepReport> {
         let (floor, ground) = (self.inputs.floor(), self.inputs.ground());
-        let statics: Vec<_> = self.inputs.statics().iter().chain(ground).collect();
+        let still = self.still.get_or_init(|| Still::of(self.inputs));
         let surface = &layers[1].surface;
         let of_layer = surface.active_bbox().map_or(0.0, |(low, _)| f64::from(low[1]) * surface.voxel_size());
         let of_ground = ground.and_then(|mesh| mesh.bounds()).map(|(low, _)| f64::from(low.y));
@@ -129,15 +151,25 @@ impl<'a> Grains<'a> {
         let around = Surroundings {
             base: Base::Whole([&layers[0].surface, surface]),
             objects: &self.objects,
-            statics: &statics,
+            statics: &still.sheets,
+            ground: &still.ground,
             floor,
             lowest: bottom - BELOW,
         };
         let time = |frame: i32| f64::from(frame) / self.scene.shot.fps;
-        state.grains.step(ctx, &around, [time(frame - 1), time(frame)], frame).map_err(|error| match error {
+        let step = state.grains.step(ctx, &around, [time(frame - 1), time(frame)], frame);
+        let report = step.map_err(|error| match error {
             Error::Argument(what) => Error::file(&self.scene.path, format!("grains: {what}")),
             other => other,
-        })
+        })?;
+        if report.fell > 0 && !std::mem::replace(&mut state.has_told, true) {
+            log::warn!(
+                "frame {frame}: {} grains fell past the edge of the ground to {BELOW} m below it and are dropped, as are all that follow \
+                 them (`fell` in the reports): larger ground keeps them",
+                report.fell
+            );
+        }
+        Ok(report)
     }
 }
 
@@ -276,7 +308,7 @@ impl Stepping for Grains<'_> {
             Error::Argument(what) => Error::file(&self.scene.path, format!("grains: {what}")),
             other => other,
         })?;
-        Ok(State { grains, layer: None })
+        Ok(State { grains, layer: None, has_told: false })
     }
 
     fn step(&self, ctx: &Context, state: &mut State, to: &To<'_>) -> Result<Stepped<Step>> {
@@ -339,6 +371,7 @@ fn told(report: &StepReport) -> Report {
         // A sum of nothing is -0.
         "owed": report.owed + 0.0,
         "dropped": report.dropped,
+        "fell": report.fell,
         "expired": report.expired,
         "removed_m3": report.removed_volume,
         "sub_steps": report.sub_steps,

@@ -36,7 +36,7 @@ pub struct Colliders<'a> {
     pub floor: Option<Floor>,
     /// A level set that does not move during the step.
     pub field: Option<Field<'a>>,
-    /// Moving meshes, each with its pose (m) at a share 0..=1 of the step.
+    /// Meshes, each with its pose (m) at a share 0..=1 of the step, which ground ignores.
     pub shells: Vec<(Shell, Pose<'a>)>,
 }
 
@@ -181,12 +181,11 @@ impl Heap {
         colliders: &mut Colliders<'_>,
     ) -> Result<()> {
         let dt = division.dt / division.sub_steps as f64;
-        let mut pose = Vec::new();
-        for (number, (shell, at)) in (touch::FIRST_SHELL..).zip(&mut colliders.shells) {
+        for (number, (shell, _)) in (touch::FIRST_SHELL..).zip(&mut colliders.shells) {
             shell.collider = number;
-            at(0.0, &mut pose)?;
-            shell.follow(&pose);
         }
+        let mut pose = Vec::new();
+        follow(&mut colliders.shells, 0.0, &mut pose)?;
         self.make_room(ctx, colliders, MOST_BEFORE)?;
         let Colliders { floor, field, shells } = colliders;
         let mut field = field.as_ref().map(|field| Seen::new(field, self.diameter));
@@ -201,10 +200,7 @@ impl Heap {
         for sub in 0..division.sub_steps {
             ctx.check()?;
             layout.follow(&mut self.rows, &self.ids, ahead);
-            for (shell, at) in &mut *shells {
-                at((sub + 1) as f64 / division.sub_steps as f64, &mut pose)?;
-                shell.follow(&pose);
-            }
+            follow(shells, (sub + 1) as f64 / division.sub_steps as f64, &mut pose)?;
             let meshes: Vec<&Shell> = shells.iter().map(|(shell, _)| shell).collect();
             let travel = Travel::of(&meshes, self.diameter);
             let search = Search { shells: meshes, diameter: self.diameter, dt, before, travel };
@@ -221,10 +217,7 @@ impl Heap {
             fastest = sub_step(ctx, &mut self.rows, &mut layout, &coefficients, motion)?;
             ctx.advance();
         }
-        for (shell, at) in &mut *shells {
-            at(1.0, &mut pose)?;
-            shell.follow(&pose);
-        }
+        follow(shells, 1.0, &mut pose)?;
         let end = trapped::End { layout: &layout, diameter: self.diameter, dt, travelled: before };
         let deep = end.deep(&self.rows, &self.ids, &self.trapped, field.as_ref());
         self.trapped = end.release(&mut self.rows, &self.ids, &deep, colliders)?;
@@ -342,6 +335,15 @@ impl Heap {
     }
 }
 
+/// Advances meshes to the pose at a share 0..=1 of the step.
+fn follow(shells: &mut [(Shell, Pose<'_>)], share: f64, pose: &mut Vec<DVec3>) -> Result<()> {
+    for (shell, at) in shells {
+        at(share, pose)?;
+        shell.follow(pose);
+    }
+    Ok(())
+}
+
 impl Floor {
     /// Touches of a block's members near the floor.
     fn touches(&self, block: &super::layout::Block, rows: &[Row], diameter: f64, reach: f32) -> Vec<Touch> {
@@ -358,6 +360,7 @@ impl Floor {
             normal: [0.0, 1.0, 0.0],
             offset: height + 0.5,
             friction: self.friction,
+            is_ground: true,
             ..Touch::default()
         };
         near.map(touch).collect()

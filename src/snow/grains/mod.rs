@@ -27,6 +27,7 @@ mod crowd;
 mod density;
 mod distance;
 pub(super) mod field;
+mod ground;
 #[doc(hidden)]
 pub mod heap;
 mod layout;
@@ -59,6 +60,7 @@ use layout::locate;
 use sourcing::Sourcing;
 use surroundings::{Bounds, Obstacles, TIES, have_stayed};
 
+pub use ground::Ground;
 pub use params::Params;
 pub use sourcing::{Base, PACKING, Removal, removals};
 pub(super) use surroundings::HOLES;
@@ -104,6 +106,8 @@ pub struct StepReport {
     pub owed: f64,
     /// Count of grains removed below the lowest height, outside [`Params::keep_box`] or beyond the range of coordinates.
     pub dropped: usize,
+    /// Count of those of them that fell below the lowest height, beyond the edge of ground.
+    pub fell: usize,
     /// Count of grains that reached [`Params::lifetime`].
     pub expired: usize,
     /// Count of trapped grains: see [`Grains::trapped`].
@@ -264,7 +268,7 @@ impl Grains {
             let sub_steps = self.params.sub_steps(to - from, obstacles.way);
             let division = Division { dt: to - from, sub_steps };
             let all = self.heap.count();
-            let (expired, resting, fastest) = ctx.phase("move", || {
+            let ([expired, fell], resting, fastest) = ctx.phase("move", || {
                 let coefficients = self.params.coefficients(&division);
                 if let Some(distance) = self.params.active_distance.filter(|_| self.params.rests) {
                     self.heap.rest_far_away(
@@ -274,8 +278,8 @@ impl Grains {
                     )?;
                 }
                 self.heap.step(ctx, division, coefficients, &mut obstacles.colliders)?;
-                let expired = self.limit(around.lowest, to - from, frame);
-                Ok((expired, self.heap.resting(), self.heap.fastest()))
+                let left = self.limit(around.lowest, to - from, frame);
+                Ok((left, self.heap.resting(), self.heap.fastest()))
             })?;
             // A sum of nothing is -0.
             let (count, owed) = (self.heap.count(), self.owed.values().sum::<f64>() + 0.0);
@@ -287,6 +291,7 @@ impl Grains {
                 removed_volume,
                 owed,
                 dropped,
+                fell,
                 expired,
                 trapped: self.heap.trapped().len(),
                 sub_steps,
@@ -317,7 +322,9 @@ impl Grains {
         let claims = Claims::new(around.objects, self.params.compression, [from, to])?;
         let sourcing = Sourcing { diameter: self.heap.diameter, claims, seed: self.params.seed, frame };
         ctx.allow("finding places for grains", sourcing.bytes(removals.len(), after.voxel_size()))?;
-        let places = sourcing.places(before.grid(), after, &removals, &mut self.owed)?;
+        let cell = after.voxel_size();
+        let behind = |place: DVec3| around.is_behind(place, 2.0 * cell);
+        let places = sourcing.places([before.grid(), after], &removals, &mut self.owed, behind)?;
         self.room_for(places.len(), frame)?;
         ctx.allow("the grains", memory(self.heap.count() + places.len()))?;
         for place in &places {
@@ -337,8 +344,8 @@ impl Grains {
         Ok(obstacles)
     }
 
-    /// Removes grains that are too old, too low or outside the box; returns the count of those that are too old.
-    fn limit(&mut self, lowest: f64, dt: f64, frame: i32) -> usize {
+    /// Removes grains that are too old, too low or outside the box; returns the counts of those that are too old and too low.
+    fn limit(&mut self, lowest: f64, dt: f64, frame: i32) -> [usize; 2] {
         let Params { lifetime, keep_box, .. } = self.params;
         let all = self.heap.count();
         if let Some(lifetime) = lifetime {
@@ -349,10 +356,12 @@ impl Grains {
             self.heap.retain(|id, _| age(id) < lifetime);
         }
         let expired = all - self.heap.count();
-        self.heap.retain(|_, place| {
-            place.y >= lowest && keep_box.is_none_or(|[low, high]| low <= place && place <= high)
-        });
-        expired
+        self.heap.retain(|_, place| place.y >= lowest);
+        let fell = all - expired - self.heap.count();
+        if let Some([low, high]) = keep_box {
+            self.heap.retain(|_, place| low <= place && place <= high);
+        }
+        [expired, fell]
     }
 
     /// Wakes the grains within a diameter and a cell of the blocks of the base that lost snow; a cell is `cell` m wide.

@@ -7,6 +7,7 @@
 
 use rayon::prelude::*;
 
+use super::ground::RIM_CORNER;
 use super::rows::{Row, dot};
 use super::touch::{FIRST_SHELL, Touch};
 use crate::base::DVec3;
@@ -18,6 +19,7 @@ const VERTICES: usize = 4096;
 const LEAF: usize = LANES;
 
 /// A mesh as a collider.
+#[derive(Clone)]
 pub struct Shell {
     /// Collider index, set by the step.
     pub collider: u32,
@@ -28,6 +30,9 @@ pub struct Shell {
     triangles: Vec<[u32; 3]>,
     /// Whether it has an inside.
     closed: bool,
+    /// Of ground, which has an inside and does not move: the sides and corners of each triangle that lie on the rim of a sheet
+    /// ([`RIM_CORNER`]).
+    rims: Option<Vec<u8>>,
     now: Vec<DVec3>,
     next: Vec<DVec3>,
     /// Bounding boxes of a complete binary tree over leaves of triangles, root first.
@@ -56,6 +61,8 @@ pub struct Nearest {
     /// Height of the position above the plane of its triangle.
     height: f64,
     normal: DVec3,
+    /// Whether the point lies on the rim of a sheet of ground.
+    is_on_rim: bool,
 }
 
 impl Shell {
@@ -73,6 +80,7 @@ impl Shell {
             stick,
             triangles,
             closed,
+            rims: None,
             now,
             next,
             boxes,
@@ -90,6 +98,34 @@ impl Shell {
         let mut shell = Self::new(0.0, triangles, false, pose.clone());
         shell.follow(&pose);
         shell
+    }
+
+    /// Ground: a mesh that does not move and whose inside no grain may enter, but beyond the rims of its sheets.
+    pub fn in_front(
+        friction: f32,
+        triangles: Vec<[u32; 3]>,
+        rims: impl FnOnce(&[[u32; 3]]) -> Vec<u8>,
+        pose: Vec<DVec3>,
+    ) -> Self {
+        let mut shell = Self::new(friction, triangles, true, pose.clone());
+        shell.follow(&pose);
+        shell.rims = Some(rims(&shell.triangles));
+        shell
+    }
+
+    /// Whether it is ground, which does not move.
+    pub fn is_ground(&self) -> bool {
+        self.rims.is_some()
+    }
+
+    /// Whether a position (m) is inside, at most `within` (m) deep.
+    pub fn is_behind(&self, place: DVec3, within: f64) -> bool {
+        self.nearest(place, within).is_some_and(|nearest| self.side(place, &nearest).1)
+    }
+
+    /// Positions of the vertices (m).
+    pub fn vertices(&self) -> &[DVec3] {
+        &self.now
     }
 
     /// Distance (m) of a position from the surface; none if it is over `within`.
@@ -118,8 +154,11 @@ impl Shell {
         });
     }
 
-    /// Advances to the next sub-step: the next pose becomes the current one, and `pose` the next.
+    /// Advances to the next sub-step: the next pose becomes the current one, and `pose` the next. Ground stays as it is.
     pub fn follow(&mut self, pose: &[DVec3]) {
+        if self.is_ground() {
+            return;
+        }
         std::mem::swap(&mut self.now, &mut self.next);
         self.next.clear();
         self.next.extend_from_slice(pose);
@@ -195,6 +234,7 @@ impl Shell {
             velocity: [velocity.x as f32, velocity.y as f32, velocity.z as f32],
             friction: self.friction,
             stick: self.stick,
+            is_ground: self.is_ground(),
             ..Touch::default()
         }
     }
@@ -202,7 +242,7 @@ impl Shell {
     /// Distance (m) of a position from its nearest point, whether it is inside, and the outward direction.
     fn side(&self, place: DVec3, nearest: &Nearest) -> (f64, bool, DVec3) {
         let distance = nearest.square.sqrt();
-        let inside = self.closed && nearest.height < 0.0;
+        let inside = self.closed && nearest.height < 0.0 && !nearest.is_on_rim;
         let out = if distance > LEAST {
             (place - nearest.point) * (if inside { -1.0 } else { 1.0 } / distance)
         } else {
@@ -339,8 +379,18 @@ impl Shell {
             (self.next[index] - self.now[index]) * weights[corner]
         };
         let (height, normal) = self.plane(triangle, place);
-        Nearest { square, point, motion: way(0) + way(1) + way(2), height, normal }
+        let is_on_rim = self.rims.as_ref().is_some_and(|rims| is_on_rim(rims[triangle], weights));
+        Nearest { square, point, motion: way(0) + way(1) + way(2), height, normal, is_on_rim }
     }
+}
+
+/// Whether a point of a triangle (barycentric weights) lies on one of the sides or corners of a rim.
+fn is_on_rim(rim: u8, weights: [f64; 3]) -> bool {
+    let is_on = |corner: usize| {
+        rim >> corner & 1 == 1 && weights[corner] <= 0.0
+            || rim >> (RIM_CORNER as usize + corner) & 1 == 1 && weights[corner] >= 1.0
+    };
+    rim != 0 && (0..3).any(is_on)
 }
 
 /// The nearest triangle so far.

@@ -175,6 +175,10 @@ fn advance(rows: &mut [Row], layout: &mut Layout, c: &Coefficients, motion: Moti
     let reached = layout.blocks.par_iter_mut().filter(|block| block.is_reached);
     let fastest = reached.map(|block| {
         resist_all(rows, &mut block.touches, true, c);
+        for touch in block.touches.iter().filter(|touch| touch.is_ground) {
+            // SAFETY: a touch's grain is a member of its block, which one task has.
+            hold(unsafe { rows.get(touch.grain as usize) }, touch, c);
+        }
         let far = (0.5 * block.skin).powi(2);
         let mut fastest = 0.0f32;
         let Block { members, anchors, .. } = block;
@@ -258,6 +262,23 @@ fn resist(row: &mut Row, touch: &mut Touch, c: &Coefficients, last: bool) {
         }
     }
 }
+
+/// Keeps a grain in front of ground, whatever else presses on it: what is pressed between an object, or the underside of the
+/// base layer, and the ground stays on the ground.
+fn hold(row: &mut Row, touch: &Touch, c: &Coefficients) {
+    if row.rests() {
+        return;
+    }
+    let gap = dot(touch.normal, row.place) - touch.offset;
+    let moves = dot(row.velocity, touch.normal) * (c.dt / c.diameter) + dot(row.push, touch.normal);
+    let missing = (-gap).min(FARTHEST) - moves;
+    if missing > HELD {
+        row.push = add(row.push, scaled(touch.normal, missing));
+    }
+}
+
+/// Depth (diameters) to which something else may press a grain into ground.
+const HELD: f32 = 1.0e-3;
 
 /// A vector shortened to at most a length.
 #[inline(always)]

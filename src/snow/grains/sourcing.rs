@@ -200,16 +200,17 @@ impl Sourcing {
         (blocks as f64 * sites * size_of::<Site>() as f64) as u64
     }
 
-    /// Positions (m) of new grains. `owed` holds the grains that each block has paid for but that do not exist yet.
+    /// Positions (m) of new grains, none of which `is_behind` ground: interpolated between cells, the layer reaches into it. `owed`
+    /// holds the grains that each block has paid for but that do not exist yet.
     ///
     /// # Errors
     /// When a grid cannot be read.
     pub fn places(
         &self,
-        before: &FloatGrid,
-        after: &FloatGrid,
+        [before, after]: [&FloatGrid; 2],
         removals: &[Removal],
         owed: &mut BTreeMap<Origin, f64>,
+        is_behind: impl Fn(DVec3) -> bool + Sync,
     ) -> Result<Vec<DVec3>> {
         let around = |removal: &Removal| {
             [removal.origin.map(|at| (at >> 3) - 1), removal.origin.map(|at| (at >> 3) + 1)]
@@ -225,7 +226,8 @@ impl Sourcing {
                 let low = DVec3::from(removal.origin.map(|at| (f64::from(at) - 0.5) * cell));
                 let high = low + DVec3::repeat(DIM as f64 * cell);
                 let claims = self.claims.in_box(&[low, high]);
-                let sites = self.sites(removal.origin, cell, windows, |place| claims.share(place));
+                let mut sites = self.sites(removal.origin, cell, windows, |place| claims.share(place));
+                sites.retain(|site| !is_behind(site.place));
                 let share = match sites.len() {
                     0 => claims.share((low + high) * 0.5),
                     count => sites.iter().map(|site| site.share).sum::<f64>() / count as f64,

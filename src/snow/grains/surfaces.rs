@@ -104,32 +104,50 @@ impl<'a> Surfaces<'a> {
         }
     }
 
-    /// Displacement (diameters) that moves a grain at a position (m) out of the surfaces; none if no free position is found.
-    pub fn release(&self, from: DVec3, nearby: &mut [Nearby]) -> Option<V> {
+    /// Displacement (diameters) that moves a grain at a position (m) out of the surfaces, and whether it is trapped: it has no free
+    /// position, and is only moved out of the ground.
+    pub fn release(&self, from: DVec3, nearby: &mut [Nearby]) -> (V, bool) {
+        let way = |place: DVec3| {
+            let way = (place - from) / self.diameter;
+            [0, 1, 2].map(|axis| way[axis] as f32)
+        };
         let mut place = from;
         for _ in 0..ROUNDS {
             let mut is_out = true;
-            self.for_each_way_out(&mut place, nearby, |depth| is_out &= depth <= ROUNDED * DEEP);
+            self.for_each_way_out(&mut place, nearby, false, |depth| is_out &= depth <= ROUNDED * DEEP);
             if is_out {
-                let way = (place - from) / self.diameter;
-                return Some([0, 1, 2].map(|axis| way[axis] as f32));
+                return (way(place), false);
             }
             if (place - from).norm() > FARTHEST * self.diameter {
-                return None;
+                break;
             }
         }
-        None
+        place = from;
+        for _ in 0..ROUNDS {
+            let mut is_out = true;
+            self.for_each_way_out(&mut place, nearby, true, |depth| is_out &= depth <= ROUNDED * DEEP);
+            if is_out {
+                break;
+            }
+        }
+        (way(place), true)
     }
 
-    /// Moves a position (m) out of each surface in turn, and reports the depth (diameters) that it had in each.
-    fn for_each_way_out(&self, place: &mut DVec3, nearby: &mut [Nearby], mut tell: impl FnMut(f64)) {
+    /// Moves a position (m) out of each surface in turn, or of ground only, and reports the depth (diameters) that it had in each.
+    fn for_each_way_out(
+        &self,
+        place: &mut DVec3,
+        nearby: &mut [Nearby],
+        only_ground: bool,
+        mut tell: impl FnMut(f64),
+    ) {
         let half = 0.5 * self.diameter;
         if let Some(floor) = &self.floor {
             let depth = floor.height + half - place.y;
             tell(depth / self.diameter);
             place.y += depth.max(0.0);
         }
-        if let Some((cell, window)) = &self.field {
+        if let Some((cell, window)) = self.field.as_ref().filter(|_| !only_ground) {
             let (distance, gradient) = window.sample([0, 1, 2].map(|axis| place[axis] / cell));
             let depth = half - f64::from(distance);
             tell(depth / self.diameter);
@@ -139,6 +157,9 @@ impl<'a> Surfaces<'a> {
             }
         }
         for ((shell, _), nearby) in self.shells.iter().zip(nearby) {
+            if only_ground && !shell.is_ground() {
+                continue;
+            }
             let nearest = nearby.nearest(shell, *place, DEPTHS * half);
             if let Some((depth, out)) = shell.depth_beside(*place, half, nearest) {
                 tell(depth / self.diameter);

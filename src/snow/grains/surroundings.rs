@@ -1,6 +1,7 @@
 //! Inputs of a step of grains besides the grains themselves, as colliders, and the changes in them that wake all grains.
 
 use super::field::Field;
+use super::ground::{FRICTION, Ground};
 use super::heap::{Colliders, Floor};
 use super::shell::Shell;
 use super::{Base, Params};
@@ -14,8 +15,10 @@ pub struct Surroundings<'a> {
     pub base: Base<'a>,
     /// Moving objects.
     pub objects: &'a [Object<'a>],
-    /// Static meshes: triangles and positions (m).
+    /// Static meshes that have two sides: triangles and positions (m).
     pub statics: &'a [&'a TriMesh],
+    /// Ground and static solids, in front of which grains stay.
+    pub ground: &'a [Ground],
     /// Height of a level ground plane (m).
     pub floor: Option<f64>,
     /// Grains below this height (m) are dropped.
@@ -59,8 +62,6 @@ pub struct Obstacles<'a> {
     pub boxes: [Vec<Bounds>; 2],
 }
 
-/// Friction of grains against the floor and static meshes.
-const GROUND: f32 = 0.5;
 /// Largest jump (diameters) of a mesh's box between two steps; a larger one wakes all grains.
 const JUMP: f64 = 0.1;
 /// Holes of less than this share of an object's area are closed; an object with larger ones, such as a bowl, collides on both
@@ -82,12 +83,18 @@ impl<'a> Surroundings<'a> {
         [gravity, friction, attraction, f64::from(rests), f64::from(has_base), floor]
     }
 
+    /// Whether a position (m) is below the floor, or at most `within` (m) behind ground.
+    pub fn is_behind(&self, place: DVec3, within: f64) -> bool {
+        self.floor.is_some_and(|floor| place.y < floor)
+            || self.ground.iter().any(|ground| ground.is_behind(place, within))
+    }
+
     /// The colliders near grains within a box (m), from `from` to `to` (s).
     ///
     /// # Errors
     /// A pose that cannot be computed.
     pub fn obstacles(&self, params: &Params, grains: &Bounds, [from, to]: [f64; 2]) -> Result<Obstacles<'a>> {
-        let floor = self.floor.map(|height| Floor { height, friction: GROUND });
+        let floor = self.floor.map(|height| Floor { height, friction: FRICTION });
         let field = |grid| Field { grid, friction: params.friction_of_base() as f32 };
         let mut colliders = Colliders { floor, field: self.base.after().map(field), shells: Vec::new() };
         let mut way = 0.0f64;
@@ -130,12 +137,20 @@ impl<'a> Surroundings<'a> {
         for mesh in self.statics {
             let pose: Vec<DVec3> = mesh.positions.iter().map(|place| place.cast::<f64>()).collect();
             boxes.iter_mut().for_each(|boxes| boxes.push(bounds(&pose)));
-            let shell = Shell::new(GROUND, mesh.triangles.clone(), false, pose.clone());
+            let shell = Shell::new(FRICTION, mesh.triangles.clone(), false, pose.clone());
             let rests = move |_: f64, out: &mut Vec<DVec3>| {
                 out.clone_from(&pose);
                 Ok(())
             };
             colliders.shells.push((shell, Box::new(rests)));
+        }
+        for ground in self.ground {
+            let shell = ground.shell().clone();
+            let bounds = bounds(shell.vertices());
+            boxes.iter_mut().for_each(|boxes| boxes.push(bounds));
+            // Its shell ignores poses.
+            let stands = |_: f64, _: &mut Vec<DVec3>| Ok(());
+            colliders.shells.push((shell, Box::new(stands)));
         }
         Ok(Obstacles { colliders, way, boxes })
     }

@@ -22,6 +22,8 @@ pub struct Touch {
     pub friction: f32,
     /// Acceleration up to which the collider holds the grain (weights of the grain).
     pub stick: f32,
+    /// Whether no grain may be behind the plane at the end of a sub-step: ground.
+    pub is_ground: bool,
     /// Impulse along the normal (m/s).
     pub impulse: f32,
     /// Tangential impulse (m/s).

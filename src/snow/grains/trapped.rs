@@ -1,6 +1,6 @@
 //! Grains that a step leaves inside a surface, for example pressed between a sole and the base. At the end of the step each
 //! is moved out of the surfaces around it, one after another, repeatedly. A grain that reaches no free position within a
-//! diameter and a half stays where it was: it is *trapped*.
+//! diameter and a half stays where it was, but in front of ground: it is *trapped*.
 
 use rayon::prelude::*;
 
@@ -70,12 +70,12 @@ impl End<'_> {
             surfaces.find(deep.iter().map(|&slot| place(slot)), nearby);
             deep.iter().map(|&slot| (slot, surfaces.release(place(slot), nearby))).collect::<Vec<_>>()
         });
-        let released: Vec<Vec<(u32, Option<V>)>> = released.collect();
+        let released: Vec<Vec<(u32, (V, bool))>> = released.collect();
         let mut trapped = Vec::new();
-        for (slot, way) in released.into_iter().flatten() {
-            match way {
-                Some(way) => rows[slot as usize].place = add(rows[slot as usize].place, way),
-                None => trapped.push(ids[slot as usize]),
+        for (slot, (way, is_trapped)) in released.into_iter().flatten() {
+            rows[slot as usize].place = add(rows[slot as usize].place, way);
+            if is_trapped {
+                trapped.push(ids[slot as usize]);
             }
         }
         trapped.par_sort_unstable();

@@ -34,8 +34,14 @@ fn ball(low: f64, time: f64, from: f64, to: f64) -> Body {
 /// Steps through a frame on a floor; how many rest then.
 fn step(ctx: &Context, grains: &mut Grains, body: Option<&Body>, frame: i32) -> usize {
     let objects: Vec<Object<'_>> = body.map(|body| Object::new(body, 0.3)).into_iter().collect();
-    let around =
-        Surroundings { base: Base::Missing, objects: &objects, statics: &[], floor: Some(0.0), lowest: -1.0 };
+    let around = Surroundings {
+        base: Base::Missing,
+        objects: &objects,
+        statics: &[],
+        ground: &[],
+        floor: Some(0.0),
+        lowest: -1.0,
+    };
     let times = [frame - 1, frame].map(|frame| f64::from(frame) / 24.0);
     grains.step(ctx, &around, times, frame).unwrap().resting
 }
@@ -168,8 +174,14 @@ fn a_grain_among_others_feels_less_of_the_air() {
             Params { gravity: 0.0, air: 0.01, air_by_density, sub_steps: Some(sub_steps), ..params() };
         let mut grains = Grains::new(params).unwrap();
         grains.emit(&places, &vec![[0.0, 1.0, 0.0]; places.len()], 0).unwrap();
-        let around =
-            Surroundings { base: Base::Missing, objects: &[], statics: &[], floor: None, lowest: -1.0 };
+        let around = Surroundings {
+            base: Base::Missing,
+            objects: &[],
+            statics: &[],
+            ground: &[],
+            floor: None,
+            lowest: -1.0,
+        };
         grains.step(&ctx, &around, [0.0, dt], 1).unwrap();
         let mut speeds = vec![0.0; places.len()];
         grains

@@ -63,6 +63,7 @@ fn a_grain_lies_on_a_base_up_to_its_angle_of_repose() {
             base: Base::Whole([&base; 2]),
             objects: &[],
             statics: &[],
+            ground: &[],
             floor: None,
             lowest: -1.0,
         };

@@ -51,7 +51,7 @@ fn story(ctx: &Context) -> Story {
 
 /// Objects over a level ground.
 pub fn on_floor<'a>(base: Base<'a>, objects: &'a [Object<'a>]) -> Surroundings<'a> {
-    Surroundings { base, objects, statics: &[], floor: Some(0.0), lowest: -1.0 }
+    Surroundings { base, objects, statics: &[], ground: &[], floor: Some(0.0), lowest: -1.0 }
 }
 
 fn params() -> Params {
@@ -168,6 +168,7 @@ fn a_layer_that_remembers_its_changed_blocks_gives_the_same_grains() {
             base: Base::Changed(base.surface(), base.before()),
             objects: &[Object::new(&story.body, 0.3)],
             statics: &[],
+            ground: &[],
             floor: Some(0.0),
             lowest: -1.0,
         };
@@ -201,7 +202,14 @@ fn loose_grains_are_added_or_refused_all_together() {
         assert!(error.contains(words), "{error}");
         assert!(grains.save() == before);
     }
-    let around = Surroundings { base: Base::Missing, objects: &[], statics: &[], floor: None, lowest: -1.0 };
+    let around = Surroundings {
+        base: Base::Missing,
+        objects: &[],
+        statics: &[],
+        ground: &[],
+        floor: None,
+        lowest: -1.0,
+    };
     let report = grains.step(&ctx, &around, [0.0, 0.1], 6).unwrap();
     assert_eq!((report.count, report.born, report.removed_volume), (3, 0, 0.0));
     let mut ids = grains.ids().to_vec();
@@ -225,6 +233,7 @@ fn too_many_grains_are_refused_and_leave_the_others_as_they_were() {
         base: Base::Whole([&story.layers[3], &story.layers[FRAMES as usize]]),
         objects: &[],
         statics: &[],
+        ground: &[],
         floor: Some(0.0),
         lowest: -1.0,
     };
@@ -390,6 +399,7 @@ fn grains_that_rest_wake_when_the_base_below_them_or_gravity_changes() {
             base: Base::Whole(base),
             objects: &[],
             statics: &[],
+            ground: &[],
             floor: Some(0.0),
             lowest: -1.0,
         };
@@ -409,6 +419,7 @@ fn grains_that_rest_wake_when_the_base_below_them_or_gravity_changes() {
         base: Base::Whole([last, last]),
         objects: &[],
         statics: &[],
+        ground: &[],
         floor: None,
         lowest: -1.0,
     };
@@ -417,7 +428,8 @@ fn grains_that_rest_wake_when_the_base_below_them_or_gravity_changes() {
     let mut beside = Grains::resume(params(), &grains.save()).unwrap();
     let mut at = |from: f64, objects: &[Object<'_>]| {
         let base = Base::Whole([last, last]);
-        let around = Surroundings { base, objects, statics: &[], floor: Some(0.0), lowest: -1.0 };
+        let around =
+            Surroundings { base, objects, statics: &[], ground: &[], floor: Some(0.0), lowest: -1.0 };
         beside.step(&ctx, &around, [from, from + 1.0 / 24.0], 99).unwrap().resting
     };
     let far = ball();
@@ -460,6 +472,7 @@ fn snow_is_pressed_together_as_the_object_that_took_it_says() {
             base: Base::Whole([&before, base.surface()]),
             objects: &[object(0), object(1)],
             statics: &[],
+            ground: &[],
             floor: None,
             lowest: -1.0,
         };
@@ -483,7 +496,14 @@ fn grains_grow_old_and_leave_their_box() {
     let ctx = context(1);
     let mut grains = Grains::new(Params { lifetime: Some(0.25), gravity: 0.0, ..params() }).unwrap();
     grains.emit(&[DVec3::zeros(), DVec3::new(0.1, 0.0, 0.0)], &[[0.0; 3], [1.0, 0.0, 0.0]], 3).unwrap();
-    let around = Surroundings { base: Base::Missing, objects: &[], statics: &[], floor: None, lowest: -1.0 };
+    let around = Surroundings {
+        base: Base::Missing,
+        objects: &[],
+        statics: &[],
+        ground: &[],
+        floor: None,
+        lowest: -1.0,
+    };
     let step = |grains: &mut Grains, frame: i32| {
         let report = grains.step(&ctx, &around, [0.0, 1.0 / 24.0], frame).unwrap();
         (report.count, report.expired, report.dropped)

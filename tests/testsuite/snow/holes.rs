@@ -25,6 +25,7 @@ fn height_below(end: f32) -> f64 {
         base: Base::Missing,
         objects: &[Object::new(&body, 0.3)],
         statics: &[],
+        ground: &[],
         floor: None,
         lowest: -1.0,
     };

@@ -1,0 +1,60 @@
+//! Gate of collapsing columns as scenes with default settings, made by the program: grains that settled in a cylinder are the
+//! `initial` ones of a scene, on its snow. Run-out after Lube et al. (2004): see `columns`.
+
+use std::fmt::Write;
+use std::path::Path;
+use std::process::{Command, Stdio};
+
+use frazil::base::DVec3;
+use frazil::io::points_ply;
+
+use crate::columns::{self, D};
+use crate::harness::Harness;
+
+/// Approximate count of grains of a column.
+const GRAINS: f64 = 12_000.0;
+/// Depth (m) of the snow on which it stands.
+const DEPTH: f64 = 0.04;
+/// Frames of a collapse.
+const FRAMES: i32 = 30;
+
+pub fn run(h: &mut Harness) {
+    let name = "snow.grains.collapse";
+    if !h.wants(name) {
+        return;
+    }
+    let errors = [0.5, 1.0, 3.0, 10.0].map(|aspect| {
+        let (column, radius, height) = columns::settled(aspect, GRAINS);
+        let aspect = height / radius;
+        let places: Vec<DVec3> = column.heap.places().map(|at| at + DVec3::y() * DEPTH).collect();
+        let folder = tempfile::tempdir().expect("a folder");
+        let ran = columns::edge(&collapsed(folder.path(), &places)) / radius - 1.0;
+        let expected = columns::expected(aspect);
+        println!("# aspect {aspect:.3}: {ran:.3} radii, after Lube et al. {expected:.3}");
+        (ran / expected - 1.0).abs() * 100.0
+    });
+    h.gate(name, errors.into_iter().fold(0.0, f64::max), &format!("aspects 0.5, 1, 3, 10: {errors:.1?} %"));
+}
+
+/// Positions (m) of grains at the end of a scene that begins with them.
+fn collapsed(folder: &Path, places: &[DVec3]) -> Vec<DVec3> {
+    let mut cloud = format!(
+        "ply\nformat ascii 1.0\nelement vertex {}\nproperty double x\nproperty double y\nproperty double z\nend_header\n",
+        places.len()
+    );
+    places.iter().for_each(|at| writeln!(cloud, "{} {} {}", at.x, at.y, at.z).expect("text"));
+    let scene = format!(
+        "[shot]\nframes = \"1-{FRAMES}\"\n[snow]\nground = 0.0\narea = [-0.6, -0.6, 0.6, 0.6]\ndepth = {DEPTH}\ncell = 0.01\n\
+         [grains]\nradius = {}\ninitial = \"column.ply\"\n[output]\ngrains = [\"ply\"]\nusd = false\n",
+        0.5 * D
+    );
+    std::fs::write(folder.join("column.ply"), cloud).expect("points");
+    std::fs::write(folder.join("scene.toml"), scene).expect("a scene");
+    let mut run = Command::new(env!("CARGO_BIN_EXE_frazil"));
+    let run = run.arg("snow").arg(folder.join("scene.toml")).arg("-o").arg(folder.join("out"));
+    assert!(run.args(["-q", "--threads", "2"]).stderr(Stdio::null()).status().expect("frazil").success());
+    let last = folder.join(format!("out/grains/grains.{FRAMES:04}.ply"));
+    let end = points_ply::read(&last).expect("grains").places;
+    assert_eq!(end.len(), places.len(), "none is lost");
+    end
+}
