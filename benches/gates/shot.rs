@@ -5,7 +5,7 @@ use std::process::{Command, Stdio};
 use std::time::{Duration, Instant};
 
 use frazil::base::DVec3;
-use frazil::motion::{Character, Key, Keys, Motion, Placed, Play, Space, Up};
+use frazil::motion::{Character, Key, Keys, Motion, Placed, Play, Space};
 use frazil::scene::{Inputs, Scene};
 use frazil::snow::base_layer::{BaseLayer, Params};
 use frazil::sweep::{self, Body, Settings};
@@ -68,7 +68,7 @@ fn walker(path: &Path, clip: &str, speed: f64) -> Box<dyn Motion> {
     let height = heights.clone().fold(f64::MIN, f64::max) - heights.fold(f64::MAX, f64::min);
     let key = |time: f64| Key { time, at: DVec3::z() * speed * time, turn: DVec3::zeros() };
     let keys = Keys::new(vec![key(0.0), key(10.0)]).expect("keys");
-    Box::new(Placed::new(inner, Space { scale: 1.7 / height, up: Up::Y }, keys))
+    Box::new(Placed::new(inner, Space { scale: 1.7 / height, ..Space::OWN }, keys))
 }
 
 /// The four fastest frames of each character against the union of 256 capped poses, on a lattice of half a cell.

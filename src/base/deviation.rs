@@ -194,7 +194,7 @@ impl NearestTree {
             let [one, two] = [boxes[2 * node + 1], boxes[2 * node + 2]];
             boxes[node] = (one.0.inf(&two.0), one.1.sup(&two.1));
         }
-        let reach = mesh.positions.iter().map(|place| f64::from(place.amax())).fold(0.0, f64::max);
+        let reach = mesh.farthest();
         Self { boxes, facets, levels, reach }
     }
 

@@ -38,10 +38,19 @@ impl TriMesh {
         self.triangles[triangle].map(|index| self.positions[index as usize].cast())
     }
 
-    /// Least and greatest corner (m); none without vertices.
+    /// Least and greatest corner (m) of the triangles; none without any. Vertices that no triangle names do not count.
     pub fn bounds(&self) -> Option<(Vec3, Vec3)> {
-        let first = *self.positions.first()?;
-        Some(self.positions.iter().fold((first, first), |(low, high), p| (low.inf(p), high.sup(p))))
+        self.corner_positions().map(|p| (p, p)).reduce(|(low, high), (l, h)| (low.inf(&l), high.sup(&h)))
+    }
+
+    /// Largest absolute coordinate of the triangles' corners (m); 0 without any.
+    pub fn farthest(&self) -> f64 {
+        f64::from(self.corner_positions().map(|p| p.amax()).fold(0.0, f32::max))
+    }
+
+    /// Positions of the triangles' corners, in their order.
+    fn corner_positions(&self) -> impl Iterator<Item = Vec3> {
+        self.triangles.as_flattened().iter().map(|&vertex| self.positions[vertex as usize])
     }
 
     /// Unit normals of the vertices: means over the triangles around, weighted by their areas; zero where there is none.
@@ -151,20 +160,35 @@ pub fn spacing(coordinate: f64) -> f64 {
     f64::from(at.next_up()) - f64::from(at)
 }
 
-/// A sentence about vertices so far from the origin (in a file's unit of `scale` m) that their 32-bit coordinates are
-/// coarse against a cell (m).
-pub fn too_far(name: &str, farthest: f64, scale: f64, cell: f64) -> Option<String> {
+/// A sentence about vertices or particles so far from the origin (in a file's unit of `scale` m) that their 32-bit coordinates are
+/// coarse against a cell (m), with what to do about it.
+pub fn too_far(name: &str, farthest: f64, scale: f64, cell: f64, advice: &str) -> Option<String> {
     // Rounding by half the gap may cost as much as the default tolerance of a sweep: 0.02 cell.
     let gap = spacing(farthest) * scale;
     (gap > 0.04 * cell).then(|| {
         format!(
-            "{name}: its vertices lie up to {:.0} m from the origin, where the file's 32-bit numbers are {:.1} mm apart: \
-             save it near the origin and bring it there by keys",
+            "{name}: it reaches {:.0} m from the origin, where 32-bit numbers are {:.1} mm apart: {advice}",
             farthest * scale,
             gap * 1e3
         )
     })
 }
+
+/// As [`too_far`], of a mesh as it is read (m), against the mean length of its edges.
+pub fn is_coarse(name: &str, mesh: &TriMesh, advice: &str) -> Option<String> {
+    let lengths = (0..mesh.triangles.len()).map(|triangle| {
+        let [a, b, c] = mesh.corners(triangle);
+        (b - a).norm() + (c - b).norm() + (a - c).norm()
+    });
+    let edge = lengths.sum::<f64>() / (3 * mesh.triangles.len()).max(1) as f64;
+    too_far(name, mesh.farthest(), 1.0, edge, advice)
+}
+
+/// What to do about a mesh too far from the origin: by a key of a scene, and by an option of a command.
+pub const BY_KEY: &str = "give it an `origin` nearby, which is subtracted in 64 bits, or save it near the origin and bring it there by keys";
+/// See [`BY_KEY`].
+pub const BY_OPTION: &str =
+    "give --origin X,Y,Z nearby, which is subtracted in 64 bits, or save it near the origin";
 
 /// Largest absolute coordinate of positions.
 pub fn farthest<'a>(places: impl Iterator<Item = &'a DVec3>) -> f64 {
@@ -250,10 +274,10 @@ mod tests {
     #[test]
     fn coordinates_far_from_the_origin_are_told() {
         assert_eq!(spacing(60_000.0), 1.0 / 256.0);
-        assert_eq!(too_far("a.obj", 1_200.0, 1.0, 0.0075), None);
-        let said = too_far("a.obj", 60_000.0, 1.0, 0.0075).unwrap();
+        assert_eq!(too_far("a.obj", 1_200.0, 1.0, 0.0075, BY_KEY), None);
+        let said = too_far("a.obj", 60_000.0, 1.0, 0.0075, BY_KEY).unwrap();
         assert!(said.contains("a.obj") && said.contains("60000 m") && said.contains("3.9 mm"), "{said}");
-        assert!(too_far("a.obj", 6_000_000.0, 0.01, 0.0075).is_some());
+        assert!(too_far("a.obj", 6_000_000.0, 0.01, 0.0075, BY_KEY).is_some());
     }
 
     #[test]

@@ -8,6 +8,7 @@ use rayon::prelude::*;
 use super::guard::{Failure, Outcome, frz_status, guard};
 use super::mesh::{no_flags, polygons};
 use super::views::{Sized32, check_size, fill, finite, frz_view, sized, within};
+use crate::base::mesh::{renumbered, used};
 use crate::base::{DVec3, PolygonMesh, Vec3};
 use crate::context::Context;
 use crate::error::Result;
@@ -101,6 +102,17 @@ struct HostMotion {
     poses: Vec<Vec<Vec3>>,
     /// Length of the step (s).
     end: f64,
+}
+
+impl HostMotion {
+    /// Poses of all of the host's vertices, of which those that triangles name count.
+    fn new(triangles: Vec<[u32; 3]>, mut poses: Vec<Vec<Vec3>>, end: f64) -> Self {
+        let Some(used) = used(poses[0].len(), &triangles) else { return Self { triangles, poses, end } };
+        for pose in &mut poses {
+            *pose = used.iter().map(|&vertex| pose[vertex as usize]).collect();
+        }
+        Self { triangles: renumbered(&triangles, &used), poses, end }
+    }
 }
 
 impl Motion for HostMotion {
@@ -201,8 +213,7 @@ pub(super) unsafe fn bodies(
     let make = |body: Arrived| {
         ctx.check()?;
         ctx.advance();
-        let triangles = body.mesh.triangles();
-        let motion = HostMotion { triangles, poses: body.poses, end: dt };
+        let motion = HostMotion::new(body.mesh.triangles(), body.poses, dt);
         let made = Body::shaped(Box::new(motion), 0.0, known.get(&body.id).cloned())?;
         Ok((body.id, made.with_noise(!body.exact), body.surface))
     };
@@ -242,8 +253,10 @@ fn warn(ctx: &Context, role: Role, id: u64, body: &Body, known: Option<&Arc<Shap
 
 /// Refuses a body so far away that its speed could not be computed.
 fn check_far(body: &Arrived) -> Outcome {
-    let is_far = |place: &Vec3| place.iter().any(|x| x.abs() > FARTHEST);
-    match body.poses.iter().flat_map(|pose| pose.iter().position(is_far)).next() {
+    let is_far = |pose: &[Vec3], vertex: u32| pose[vertex as usize].iter().any(|x| x.abs() > FARTHEST);
+    let far_of =
+        |pose: &Vec<Vec3>| body.mesh.corners.iter().copied().filter(|&vertex| is_far(pose, vertex)).min();
+    match body.poses.iter().find_map(far_of) {
         None => Ok(()),
         Some(vertex) => {
             let text = format!("vertex {vertex} lies more than {FARTHEST} m from the origin along an axis");

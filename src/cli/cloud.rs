@@ -2,8 +2,8 @@
 
 use std::path::{Path, PathBuf};
 
-use frazil::base::Points;
 use frazil::base::points::Values;
+use frazil::base::{DVec3, Points};
 use frazil::io::mesh::extension;
 use frazil::io::particles::{self, Cloud};
 use frazil::io::sequence::Pattern;
@@ -42,8 +42,9 @@ pub fn described(points: &Points) -> Map<String, Value> {
 }
 
 /// Points of a file that is not .vdb, for `frazil info`.
-pub fn info(path: &Path) -> Result<Vec<Value>> {
-    let cloud = particles::read(path)?;
+pub fn info(path: &Path, origin: DVec3) -> Result<Vec<Value>> {
+    let mut cloud = particles::read(path)?;
+    Space { origin, ..Space::OWN }.bring(&mut cloud);
     // Its voxels are of no use where the file has none.
     let size = cloud.voxel_size.unwrap_or(1.0);
     let known = cloud.voxel_size.is_some();

@@ -2,15 +2,16 @@
 
 use std::path::{Path, PathBuf};
 
+use frazil::base::TriMesh;
 use frazil::base::deviation::{Deviation, NearestTree, from_surface, from_vertices, second_differences};
-use frazil::base::{PolygonMesh, TriMesh};
 use frazil::io::sequence::Pattern;
-use frazil::motion::{Character, is_gltf};
 use frazil::scene::FrameChoice;
 use frazil::{Context, Error, io};
 use serde_json::{Map, Value, json};
 
+use super::compared::Model;
 use super::exit::{Failure, Phase};
+use super::options::Origin;
 use super::output;
 use super::session::Session;
 
@@ -38,6 +39,8 @@ pub struct Args {
     /// still camera sees tremble.
     #[arg(long)]
     flicker: bool,
+    #[command(flatten)]
+    origin: Origin,
     /// Print JSON.
     #[arg(long)]
     json: bool,
@@ -96,8 +99,11 @@ impl Args {
 
     /// Compares two files.
     fn files(&self, session: &Session) -> Result<(), Failure> {
-        let models =
-            self.paths().map(|path| Model::read(path)).collect::<frazil::Result<Vec<_>>>().before()?;
+        let models = self
+            .paths()
+            .map(|path| Model::read(path, &self.origin))
+            .collect::<frazil::Result<Vec<_>>>()
+            .before()?;
         let [a, b] = &models[..] else { return Err(Failure::refused("a second mesh is missing")) };
         let found = Comparison::of(&session.ctx, a, b).during()?;
         if self.json {
@@ -122,7 +128,9 @@ impl Args {
         let mut flickers: Vec<Option<Flicker>> = self.paths().map(watched).collect();
         let mut found: Vec<(i32, Comparison)> = Vec::new();
         let models = |frame: i32| {
-            self.paths().map(|path| Model::read(&of_frame(path, frame))).collect::<frazil::Result<Vec<_>>>()
+            self.paths()
+                .map(|path| Model::read(&of_frame(path, frame), &self.origin))
+                .collect::<frazil::Result<Vec<_>>>()
         };
         // What the first frame is without, nothing can be begun with.
         self.look(session, models(frames[0]).before()?, frames[0], &mut found, &mut flickers)?;
@@ -177,30 +185,6 @@ impl Args {
 /// The file of a frame, of one file or of a sequence.
 fn of_frame(path: &Path, frame: i32) -> PathBuf {
     Pattern::parse(path).map_or_else(|| path.to_path_buf(), |pattern| pattern.path(frame))
-}
-
-/// A mesh in triangles, and its faces as the file has them: those of bent polygons may be cut otherwise in another frame.
-struct Model {
-    mesh: TriMesh,
-    faces: PolygonMesh,
-}
-
-impl Model {
-    fn read(path: &Path) -> frazil::Result<Self> {
-        if !is_gltf(path) {
-            let read = io::mesh::read_polygons(path)?;
-            let mesh = TriMesh { triangles: read.triangles(), positions: read.positions.clone() };
-            return Ok(Self { mesh, faces: PolygonMesh { uvs: None, arrays: Vec::new(), ..read } });
-        }
-        let mesh = Character::at_rest(path)?;
-        let mut faces = PolygonMesh { positions: mesh.positions.clone(), ..PolygonMesh::default() };
-        mesh.triangles.iter().for_each(|triangle| faces.push(*triangle));
-        Ok(Self { mesh, faces })
-    }
-
-    fn has_faces_of(&self, other: &Self) -> bool {
-        self.faces.has_faces_of(&other.faces)
-    }
 }
 
 /// Distances from the surface of one mesh to that of another, and back.

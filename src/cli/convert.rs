@@ -1,21 +1,20 @@
 //! `frazil convert`: meshes, sequences, characters and points from one file to another.
 
 use std::path::{Path, PathBuf};
+use std::sync::Arc;
 
 use frazil::base::arrays::On;
 use frazil::base::{MeshArray, TriMesh, Uvs, Vec3};
 use frazil::io::mesh::extension;
 use frazil::io::sequence::Pattern;
 use frazil::io::{self, atomic, usd};
-use frazil::motion::{
-    Character, Keys, MeshSequence, Motion, Placed, Play, Rigid, Space, is_gltf, missing_uvs,
-};
+use frazil::motion::{Character, Keys, MeshSequence, Motion, Placed, Play, Rigid, is_gltf, missing_uvs};
 use frazil::scene::{FrameChoice, Frames};
 use serde_json::json;
 
 use super::cloud;
 use super::exit::{Failure, Phase};
-use super::options::{Axis, MeshSpace, positive};
+use super::options::{Axis, MeshSpace, positive, warn_if_far};
 use super::output;
 use super::session::Session;
 
@@ -218,6 +217,10 @@ impl Args {
         let is_sequence = pattern.is_some();
         let losses = Losses { output: &self.output, keeps_space: self.keeps_space(), is_sequence };
         let one = pattern.map_or_else(|| self.input.clone(), |pattern| pattern.path(frame));
+        let mut pose = Vec::new();
+        motion.drawn_pose(f64::from(frame) / self.fps, &mut pose)?;
+        let triangles = motion.drawn().triangles.to_vec();
+        warn_if_far(&one, &TriMesh { positions: usd::to_floats(&pose), triangles });
         losses.warn(&one, motion.drawn().uvs)
     }
 
@@ -242,7 +245,7 @@ impl Args {
                 }
                 (
                     Box::new(Rigid::of_polygons(
-                        io::mesh::read_polygons(&self.input).before()?,
+                        self.space.origin.read(&self.input).before()?,
                         Keys::default(),
                     )),
                     one,
@@ -253,10 +256,27 @@ impl Args {
                     || Failure::refused(format!("{}: a sequence needs --frames A-B", self.input.display()));
                 let frames = self.frames.clone().ok_or_else(needed)?;
                 let (first, last) = (frames.first(), frames.last());
-                (Box::new(MeshSequence::open(pattern, first, last, self.fps, 0.0).before()?), frames)
+                (
+                    Box::new(
+                        MeshSequence::open_seen(
+                            pattern,
+                            first,
+                            last,
+                            self.fps,
+                            0.0,
+                            Arc::default(),
+                            self.space.origin.at,
+                        )
+                        .before()?,
+                    ),
+                    frames,
+                )
             }
         };
-        Ok((Box::new(Placed::new(motion, self.space.space(), Keys::default())), frames))
+        let space = self.space.space();
+        // Meshes are read less the origin.
+        let space = if is_character { space } else { space.without_origin() };
+        Ok((Box::new(Placed::new(motion, space, Keys::default())), frames))
     }
 
     /// The arrays of a frame's mesh, where the output holds any: characters have none.
@@ -275,7 +295,7 @@ impl Args {
 
     /// Whether places stay what they are.
     fn keeps_space(&self) -> bool {
-        self.space.space() == Space::OWN && self.to_scale == 1.0 && self.to_up == Axis::Y
+        self.space.space().keeps_vectors() && self.to_scale == 1.0 && self.to_up == Axis::Y
     }
 
     fn write(&self, path: &Path, motion: &dyn Motion, frame: i32) -> frazil::Result<()> {

@@ -7,6 +7,7 @@ use frazil::motion::{Character, Play, gait, is_gltf};
 use serde_json::{Map, Value, json};
 
 use super::exit::{Failure, Phase};
+use super::options::{Origin, warn_if_far};
 use super::output;
 use super::session::Session;
 
@@ -20,6 +21,8 @@ pub struct Args {
     /// Measure area and volume too (reads everything).
     #[arg(long)]
     measure: bool,
+    #[command(flatten)]
+    origin: Origin,
     /// Print JSON.
     #[arg(long)]
     json: bool,
@@ -35,10 +38,12 @@ pub fn run(args: Args, session: &Session) -> Result<(), Failure> {
             "vdb" => super::vdb::info::grids(path, args.measure, &session.ctx),
             #[cfg(not(feature = "vdb"))]
             "vdb" => super::needs_openvdb(path),
-            _ if is_gltf(path) => character(path),
-            "ply" if io::points_ply::holds_points(path).is_ok_and(|yes| yes) => super::cloud::info(path),
-            _ if super::cloud::is_named(path) => super::cloud::info(path),
-            _ => mesh(path),
+            _ if is_gltf(path) => character(path, &args.origin),
+            "ply" if io::points_ply::holds_points(path).is_ok_and(|yes| yes) => {
+                super::cloud::info(path, args.origin.at)
+            }
+            _ if super::cloud::is_named(path) => super::cloud::info(path, args.origin.at),
+            _ => mesh(path, &args.origin),
         };
         all.push(json!({ "file": path.display().to_string(), "holds": holds.before()? }));
     }
@@ -46,8 +51,9 @@ pub fn run(args: Args, session: &Session) -> Result<(), Failure> {
     output::print(&text).during()
 }
 
-fn mesh(path: &Path) -> frazil::Result<Vec<Value>> {
-    let mesh = io::mesh::read(path)?;
+fn mesh(path: &Path, origin: &Origin) -> frazil::Result<Vec<Value>> {
+    let mesh = origin.read(path)?.into_triangles();
+    warn_if_far(path, &mesh);
     let vertices = mesh.positions.len();
     let mesh = mesh.without_unused();
     let bounds = mesh.bounds().map(|(low, high)| (<[f32; 3]>::from(low), <[f32; 3]>::from(high)));
@@ -64,9 +70,10 @@ fn mesh(path: &Path) -> frazil::Result<Vec<Value>> {
     })])
 }
 
-fn character(path: &Path) -> frazil::Result<Vec<Value>> {
+fn character(path: &Path, origin: &Origin) -> frazil::Result<Vec<Value>> {
     let contents = Character::describe(path)?;
-    let rest = Character::at_rest(path)?;
+    let rest = Character::at_rest_from(path, origin.at)?;
+    warn_if_far(path, &rest);
     let bounds = rest.bounds().map(|(low, high)| (<[f32; 3]>::from(low), <[f32; 3]>::from(high)));
     let (mut clips, mut gaits) = (Map::new(), Map::new());
     for (name, seconds) in contents.clips {

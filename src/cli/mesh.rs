@@ -12,7 +12,7 @@ use frazil::motion::{Character, is_gltf};
 use serde_json::{Value, json};
 
 use super::exit::{Failure, Phase};
-use super::options::MeshSpace;
+use super::options::{MeshSpace, warn_if_far};
 use super::session::Session;
 use super::{compare, output, repair};
 
@@ -62,6 +62,7 @@ fn check(args: &CheckArgs, session: &Session) -> Result<(), Failure> {
     let mut all = Vec::new();
     for path in &args.files {
         let mesh = args.read(path).before()?;
+        warn_if_far(path, &mesh);
         let faults = session.ctx.phase("faults", || Ok(Faults::of(&mesh))).during()?;
         let bodies = session.ctx.phase("bodies", || Ok(Body::all(&mesh, &faults))).during()?;
         let report = report(path, &mesh, &faults, &bodies);
@@ -79,8 +80,8 @@ impl CheckArgs {
         if !is_gltf(path) {
             return self.space.read(path);
         }
-        let (mut mesh, space) = (Character::at_rest(path)?, self.space.space());
-        mesh.positions.iter_mut().for_each(|p| *p = space.place(p.cast()).cast());
+        let mut mesh = Character::at_rest_from(path, self.space.origin.at)?;
+        self.space.bring(&mut mesh);
         Ok(mesh)
     }
 }

@@ -3,6 +3,7 @@
 mod check;
 mod cloud;
 mod compare;
+mod compared;
 mod convert;
 mod exit;
 mod info;

@@ -1,7 +1,8 @@
 //! Options that several commands share, and how their values are written.
 
 use frazil::Result;
-use frazil::base::{DVec3, TriMesh};
+use frazil::base::mesh::{BY_OPTION, is_coarse};
+use frazil::base::{DVec3, PolygonMesh, TriMesh};
 use frazil::motion::{Space, Up};
 use frazil::render::Size;
 use std::path::Path;
@@ -15,6 +16,16 @@ pub struct MeshSpace {
     /// The file's upward axis.
     #[arg(long, value_name = "AXIS", default_value = "y")]
     pub up: Axis,
+    #[command(flatten)]
+    pub origin: Origin,
+}
+
+/// What coordinates of a file are read less.
+#[derive(clap::Args)]
+pub struct Origin {
+    /// A position in the file's unit and axes that becomes the origin; it is subtracted in 64 bits.
+    #[arg(id = "origin", long = "origin", value_name = "X,Y,Z", default_value = "0,0,0", value_parser = triple, allow_hyphen_values = true)]
+    pub at: DVec3,
 }
 
 /// An upward axis.
@@ -33,15 +44,34 @@ impl MeshSpace {
             Axis::Y => Up::Y,
             Axis::Z => Up::Z,
         };
-        Space { scale: self.scale, up }
+        Space { scale: self.scale, up, origin: self.origin.at }
     }
 
     /// Reads a mesh into metres, Y up.
     pub fn read(&self, path: &Path) -> Result<TriMesh> {
-        let mut mesh = frazil::io::mesh::read(path)?;
-        let space = self.space();
-        mesh.positions.iter_mut().for_each(|position| *position = space.place(position.cast()).cast());
+        let mut mesh = self.origin.read(path)?.into_triangles();
+        self.bring(&mut mesh);
         Ok(mesh)
+    }
+
+    /// Brings a mesh that was read less the origin into metres, Y up.
+    pub fn bring(&self, mesh: &mut TriMesh) {
+        let space = self.space();
+        mesh.positions.iter_mut().for_each(|position| *position = space.vector(position.cast()).cast());
+    }
+}
+
+impl Origin {
+    /// Reads the polygons of a mesh less the origin.
+    pub fn read(&self, path: &Path) -> Result<PolygonMesh> {
+        frazil::io::mesh::read_polygons_from(path, self.at)
+    }
+}
+
+/// Warns of a mesh, as it was read, whose coordinates are too large for 32 bits.
+pub fn warn_if_far(path: &Path, mesh: &TriMesh) {
+    if let Some(what) = is_coarse(&path.display().to_string(), mesh, BY_OPTION) {
+        log::warn!("{what}");
     }
 }
 

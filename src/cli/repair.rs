@@ -7,7 +7,7 @@ use frazil::base::{DVec3, DetailedMesh, MeshArray, TriMesh};
 use frazil::io::mesh::extension;
 use frazil::io::sequence::Pattern;
 use frazil::io::{self, atomic, usd};
-use frazil::motion::{Character, Space, is_gltf};
+use frazil::motion::{Character, is_gltf};
 use frazil::scene::{FrameChoice, Frames};
 use frazil::surface::{Prepared, Repaired, carry_attributes, repair};
 use frazil::{Error, Result};
@@ -16,7 +16,7 @@ use serde_json::{Value, json};
 use super::convert::{Losses, VELOCITY, check_output, prim_name, vectors};
 use super::exit::{Failure, Phase};
 use super::mesh::{Counted, form};
-use super::options::{MeshSpace, positive};
+use super::options::{MeshSpace, positive, warn_if_far};
 use super::output;
 use super::session::Session;
 
@@ -197,22 +197,23 @@ impl Args {
     }
 
     fn keeps_space(&self) -> bool {
-        self.space.space() == Space::OWN
+        self.space.space().keeps_vectors()
     }
 
     /// A mesh in metres with Y up, with all that it carries; of a character only the mesh.
     fn read(&self, path: &Path) -> Result<DetailedMesh> {
         let mut detail = if is_gltf(path) {
-            DetailedMesh { mesh: Character::at_rest(path)?, ..DetailedMesh::default() }
+            let mesh = Character::at_rest_from(path, self.space.origin.at)?;
+            DetailedMesh { mesh, ..DetailedMesh::default() }
         } else {
-            io::mesh::read_detailed(path)?
+            self.space.origin.read(path)?.into_detailed()
         };
         if !self.keeps_space() {
-            let space = self.space.space();
-            detail.mesh.positions.iter_mut().for_each(|place| *place = space.place(place.cast()).cast());
+            self.space.bring(&mut detail.mesh);
             // In another space velocities would be others.
             detail.arrays.retain(|array| !VELOCITY.contains(&&*array.name));
         }
+        warn_if_far(path, &detail.mesh);
         Ok(detail)
     }
 

@@ -25,7 +25,15 @@ pub fn read(path: &Path) -> Result<TriMesh> {
 /// # Errors
 /// As [`read`].
 pub fn read_polygons(path: &Path) -> Result<PolygonMesh> {
-    parse_polygons(path, &source::read(path)?)
+    read_polygons_from(path, DVec3::zeros())
+}
+
+/// As [`read_polygons`], with positions less `origin`: see [`parse_polygons_from`].
+///
+/// # Errors
+/// As [`read`].
+pub fn read_polygons_from(path: &Path, origin: DVec3) -> Result<PolygonMesh> {
+    parse_polygons_from(path, &source::read(path)?, origin)
 }
 
 /// As [`read_polygons`], from the bytes of the file.

@@ -348,7 +348,9 @@ pub fn clip(kind: &str, frame: i32, fps: f64, units: Units, meshes: &[MeshFrame]
             mesh.name
         );
         let zero = (Vec3::zeros(), Vec3::zeros());
-        let bounds = mesh.points.iter().map(|p| (*p, *p)).reduce(|a, b| (a.0.inf(&b.0), a.1.sup(&b.1)));
+        // Points that no face names do not show.
+        let corners = mesh.triangles.as_flattened().iter().map(|&vertex| mesh.points[vertex as usize]);
+        let bounds = corners.map(|p| (p, p)).reduce(|a, b| (a.0.inf(&b.0), a.1.sup(&b.1)));
         let (low, high) = bounds.unwrap_or(zero);
         let values = [
             list([low, high].iter(), row),

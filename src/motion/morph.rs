@@ -1,6 +1,7 @@
 //! One mesh that becomes another.
 
 use super::{Motion, between};
+use crate::base::mesh::used;
 use crate::base::{DVec3, TriMesh, Vec3};
 use crate::error::{Error, Result};
 
@@ -23,7 +24,10 @@ impl Morph {
                 to.len()
             )));
         }
-        Ok(Self { from, to })
+        // Vertices that no triangle names sweep nothing.
+        let Some(used) = used(to.len(), &from.triangles) else { return Ok(Self { from, to }) };
+        let to = used.iter().map(|&vertex| to[vertex as usize]).collect();
+        Ok(Self { from: from.without_unused(), to })
     }
 }
 

@@ -28,6 +28,8 @@ pub struct MeshSequence {
     first_path: PathBuf,
     /// The files' contents when they were read.
     seen: Arc<Seen>,
+    /// What positions are read less (the files' unit).
+    origin: DVec3,
     /// Whether the frame after the last can be used: the velocities ahead at the last frame need it.
     continues: OnceLock<bool>,
     kept: Mutex<Vec<(i32, Arc<Vec<Vec3>>)>>,
@@ -39,10 +41,11 @@ impl MeshSequence {
     /// # Errors
     /// A frame that is missing (named), or a first frame that cannot be read.
     pub fn open(pattern: Pattern, first: i32, last: i32, fps: f64, offset: f64) -> Result<Self> {
-        Self::open_seen(pattern, first, last, fps, offset, Arc::default())
+        Self::open_seen(pattern, first, last, fps, offset, Arc::default(), DVec3::zeros())
     }
 
-    /// As [`MeshSequence::open`]; `seen` records the contents of the files when they were read.
+    /// As [`MeshSequence::open`]; `seen` records the contents of the files when they were read; positions are read less
+    /// `origin` (the files' unit and axes).
     ///
     /// # Errors
     /// As [`MeshSequence::open`]; later, from a pose, a file that has changed.
@@ -53,17 +56,31 @@ impl MeshSequence {
         fps: f64,
         offset: f64,
         seen: Arc<Seen>,
+        origin: DVec3,
     ) -> Result<Self> {
         if let Some(missing) = (first..=last).map(|frame| pattern.path(frame)).find(|path| !path.is_file()) {
             return Err(Error::file(missing, "the frame is missing from the sequence"));
         }
         let first_path = pattern.path(first);
-        let mut polygons = mesh::parse_polygons(&first_path, &seen.read(&first_path)?)?;
+        let mut polygons = mesh::parse_polygons_from(&first_path, &seen.read(&first_path)?, origin)?;
         let (faces, positions) = Faces::new(polygons.clone());
         polygons.uvs = None;
         let kept = Mutex::new(vec![(first, Arc::new(positions))]);
         let continues = OnceLock::new();
-        Ok(Self { pattern, first, last, fps, offset, polygons, faces, first_path, seen, continues, kept })
+        Ok(Self {
+            pattern,
+            first,
+            last,
+            fps,
+            offset,
+            polygons,
+            faces,
+            first_path,
+            seen,
+            origin,
+            continues,
+            kept,
+        })
     }
 
     fn frame(&self, frame: i32) -> Result<Arc<Vec<Vec3>>> {
@@ -87,7 +104,7 @@ impl MeshSequence {
 
     fn read(&self, frame: i32) -> Result<Vec<Vec3>> {
         let path = self.pattern.path(frame);
-        let mesh = mesh::parse_polygons(&path, &self.seen.read(&path)?)?;
+        let mesh = mesh::parse_polygons_from(&path, &self.seen.read(&path)?, self.origin)?;
         if !mesh.has_faces_of(&self.polygons) {
             return Err(Error::file(
                 path,

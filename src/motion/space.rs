@@ -20,14 +20,32 @@ pub struct Space {
     pub scale: f64,
     /// The file's upward axis.
     pub up: Up,
+    /// A position in the file's unit and axes that becomes the origin: coordinates of a map projection are so large that 32 bits
+    /// would round them.
+    pub origin: DVec3,
 }
 
 impl Space {
     /// Metres, Y up.
-    pub const OWN: Self = Self { scale: 1.0, up: Up::Y };
+    pub const OWN: Self = Self { scale: 1.0, up: Up::Y, origin: DVec3::new(0.0, 0.0, 0.0) };
+
+    /// The space of what was read less the origin, as [`crate::io::mesh::parse_polygons_from`] does.
+    pub fn without_origin(self) -> Self {
+        Self { origin: DVec3::zeros(), ..self }
+    }
+
+    /// Whether vectors of the file, such as velocities, are what they are in metres with Y up.
+    pub fn keeps_vectors(&self) -> bool {
+        self.without_origin() == Self::OWN
+    }
 
     /// A position of the file in metres, Y up.
     pub fn place(&self, p: DVec3) -> DVec3 {
+        self.vector(p - self.origin)
+    }
+
+    /// A vector of the file, such as a velocity, in metres, Y up.
+    pub fn vector(&self, p: DVec3) -> DVec3 {
         let p = p * self.scale;
         match self.up {
             Up::Y => p,
@@ -45,9 +63,10 @@ impl Space {
         cloud.voxel_size = cloud.voxel_size.map(|size| size * self.scale);
         for attribute in &mut cloud.attributes {
             match (attribute.name.as_str(), &mut attribute.values) {
-                ("v" | "vel" | "velocity" | "rest", Values::Vector(column)) => {
+                (name @ ("v" | "vel" | "velocity" | "rest"), Values::Vector(column)) => {
+                    let space = if name == "rest" { *self } else { self.without_origin() };
                     for vector in column.stored_mut() {
-                        *vector = self.place(DVec3::from(vector.map(f64::from))).cast::<f32>().into();
+                        *vector = space.place(DVec3::from(vector.map(f64::from))).cast::<f32>().into();
                     }
                 }
                 ("pscale", Values::Float(column)) => {

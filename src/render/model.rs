@@ -114,8 +114,5 @@ pub(super) fn smooth_normals(mesh: &TriMesh) -> Vec<Vec3> {
 }
 
 fn bounds_of(mesh: &TriMesh) -> Option<(DVec3, DVec3)> {
-    let first = mesh.positions.first()?;
-    let (low, high) =
-        mesh.positions.iter().fold((*first, *first), |(low, high), at| (low.inf(at), high.sup(at)));
-    Some((low.cast(), high.cast()))
+    mesh.bounds().map(|(low, high)| (low.cast(), high.cast()))
 }

@@ -22,6 +22,7 @@ pub use snow::{
 pub use surface::Surface;
 pub use text::{FrameChoice, Frames, Override, Value, Values, reference, template};
 
+use crate::base::DVec3;
 use crate::error::{Error, Result};
 use crate::io::sequence::Pattern;
 use crate::motion::Space;
@@ -94,6 +95,8 @@ pub struct Snow {
     pub ground: Option<Ground>,
     /// How the layer is given.
     pub layer: Layer,
+    /// A position in the meshes of ground and top (m) that becomes the origin.
+    pub origin: DVec3,
     /// Edge of a voxel (m), over 0, up to 10.
     pub cell: f64,
     /// Raggedness of the edges; an amplitude of 0 switches it off.

@@ -26,6 +26,7 @@ mod cli {
     mod forecasts;
     mod honest;
     mod limits;
+    mod origin;
     mod outputs;
     mod points;
     mod repair;

@@ -16,7 +16,7 @@ use super::output;
 use super::session::Session;
 use clap::{Subcommand, ValueEnum};
 use frazil::base::TriMesh;
-use frazil::base::mesh::too_far;
+use frazil::base::mesh::{BY_OPTION, too_far};
 use frazil::sweep::surface_bytes;
 use frazil::vdb::file::{self, Compression, WriteOptions};
 use frazil::vdb::{FloatGrid, GridClass};
@@ -157,8 +157,7 @@ fn read_level_set(path: &Path, name: Option<&str>) -> Result<FloatGrid> {
 
 /// The message for a mesh so far away (m) that its file's 32-bit positions are coarse compared with a cell (m).
 fn far_mesh(path: &Path, mesh: &TriMesh, cell: f64) -> Option<String> {
-    let farthest = mesh.positions.iter().map(|p| f64::from(p.amax())).fold(0.0, f64::max);
-    too_far(&path.display().to_string(), farthest, 1.0, cell)
+    too_far(&path.display().to_string(), mesh.farthest(), 1.0, cell, BY_OPTION)
 }
 
 /// Refuses a level set whose surface (m2) would need too much memory with this cell (m).

@@ -2,16 +2,16 @@
 
 use super::VdbOutput;
 use crate::cli::exit::{Failure, Phase};
-use crate::cli::options::{MeshSpace, positive, triple};
+use crate::cli::options::{MeshSpace, Origin, positive, triple};
 use crate::cli::session::Session;
 use frazil::base::{DVec3, TriMesh};
-use frazil::io;
 use frazil::io::sequence::Pattern;
 use frazil::motion::{Key, Keys, MeshSequence, Morph, Motion, Placed, Rigid};
 use frazil::scene::Frames;
 use frazil::sweep::{self, Body, SamplesSettings, Settings};
 use frazil::vdb::FloatGrid;
 use std::path::{Path, PathBuf};
+use std::sync::Arc;
 
 /// Make a level set of all the space that a moving mesh passes through
 ///
@@ -128,7 +128,7 @@ impl Args {
         let (motion, from, to) = match &self.mesh[..] {
             [from, to] => {
                 self.refuse_motion("two meshes", ["--frames", "--move", "--turn-deg"])?;
-                (morph(from, to)?, 0.0, 1.0)
+                (morph(&self.space.origin, from, to)?, 0.0, 1.0)
             }
             [path, ..] => match Pattern::parse(path) {
                 Some(pattern) => {
@@ -136,7 +136,16 @@ impl Args {
                     let needed = format!("{}: a sequence needs --frames A-B", path.display());
                     let frames = self.frames.ok_or_else(|| Failure::refused(needed))?;
                     let (first, last) = (frames.first, frames.last);
-                    let sequence = MeshSequence::open(pattern, first, last, 1.0, 0.0).before()?;
+                    let sequence = MeshSequence::open_seen(
+                        pattern,
+                        first,
+                        last,
+                        1.0,
+                        0.0,
+                        Arc::default(),
+                        self.space.origin.at,
+                    )
+                    .before()?;
                     (Box::new(sequence) as Box<dyn Motion>, first.into(), last.into())
                 }
                 None => {
@@ -145,13 +154,13 @@ impl Args {
                         let what = format!("{}: one mesh needs --move or --turn-deg", path.display());
                         return Err(Failure::refused(what));
                     }
-                    let still = Rigid::of_polygons(io::mesh::read_polygons(path).before()?, Keys::default());
+                    let still = Rigid::of_polygons(self.space.origin.read(path).before()?, Keys::default());
                     (Box::new(still) as Box<dyn Motion>, 0.0, 1.0)
                 }
             },
             [] => return Err(Failure::refused("a sweep needs a mesh")),
         };
-        Ok((Box::new(Placed::new(motion, self.space.space(), self.keys()?)), from, to))
+        Ok((Box::new(Placed::new(motion, self.space.space().without_origin(), self.keys()?)), from, to))
     }
 
     /// The keys of `--move` and `--turn-deg`.
@@ -179,8 +188,8 @@ impl Args {
 }
 
 /// One mesh that becomes another with the same faces.
-fn morph(from: &Path, to: &Path) -> Result<Box<dyn Motion>, Failure> {
-    let [first, second] = [from, to].map(io::mesh::read_polygons);
+fn morph(origin: &Origin, from: &Path, to: &Path) -> Result<Box<dyn Motion>, Failure> {
+    let [first, second] = [from, to].map(|path| origin.read(path));
     let (first, second) = (first.before()?, second.before()?);
     if !first.has_faces_of(&second) {
         return Err(Failure::refused(format!("{}: has other faces than {}", to.display(), from.display())));

@@ -15,6 +15,7 @@ use std::collections::HashMap;
 use std::path::Path;
 
 use super::{Drawn, Motion};
+use crate::base::mesh::{renumbered, used};
 use crate::base::{DVec3, TriMesh};
 use crate::error::{Error, Result};
 use crate::io::caught::caught;
@@ -69,6 +70,8 @@ pub struct Character {
     /// Node numbers, parents first.
     order: Vec<usize>,
     vertices: Vertices,
+    /// The vertices that triangles name, and the triangles over these; none when they name all.
+    moving: Option<(Vec<u32>, Vec<[u32; 3]>)>,
     clip: Option<Clip>,
     play: Play,
     kinks: Vec<f64>,
@@ -100,10 +103,24 @@ impl Character {
         }
         let clip = clip(&file, play.clip.as_deref()).map_err(wrong)?;
         let kinks = clip.as_ref().map(Clip::kinks).unwrap_or_default();
-        let mut character =
-            Self { nodes, order, vertices, clip, play, kinks, jump: None, content: file.content };
+        let mut character = Self {
+            nodes,
+            order,
+            vertices,
+            moving: None,
+            clip,
+            play,
+            kinks,
+            jump: None,
+            content: file.content,
+        };
         let rest: Vec<_> = character.nodes.iter().map(|node| node.rest.clone()).collect();
         character.vertices.face_outward(&nodes::globals(&character.nodes, &character.order, &rest));
+        let triangles = &character.vertices.triangles;
+        character.moving = used(character.vertices.count, triangles).map(|used| {
+            let own = renumbered(triangles, &used);
+            (used, own)
+        });
         character.jump = character.find_jump();
         Ok(character)
     }
@@ -147,7 +164,7 @@ impl Character {
         let mut pose = Vec::new();
         character.pose(time, &mut pose)?;
         let positions = pose.iter().map(|place| place.cast()).collect();
-        Ok(TriMesh { positions, triangles: character.vertices.triangles })
+        Ok(TriMesh { positions, triangles: character.triangles().to_vec() })
     }
 
     /// Names of what a file holds besides places, triangles and motion, in the plural: "UVs", "materials" ...
@@ -177,11 +194,19 @@ impl Character {
     /// # Errors
     /// As [`Character::open`].
     pub fn at_rest(path: &Path) -> Result<TriMesh> {
+        Self::at_rest_from(path, DVec3::zeros())
+    }
+
+    /// As [`Character::at_rest`], less `origin`, which is subtracted in 64 bits.
+    ///
+    /// # Errors
+    /// As [`Character::open`].
+    pub fn at_rest_from(path: &Path, origin: DVec3) -> Result<TriMesh> {
         let rest = Self::open(path, Play { clip: Some(String::new()), ..Play::default() })?;
         let mut pose = Vec::new();
         rest.pose_at_own(0.0, &mut pose);
         Ok(TriMesh {
-            positions: pose.iter().map(|place| place.cast()).collect(),
+            positions: pose.iter().map(|place| (place - origin).cast()).collect(),
             triangles: rest.vertices.triangles,
         })
     }
@@ -218,11 +243,22 @@ impl Character {
         self.vertices.pose(&locals, &globals, out);
     }
 
+    /// Keeps the positions of vertices that triangles name.
+    fn keep_moving(&self, places: &mut Vec<DVec3>) {
+        if let Some((used, _)) = &self.moving {
+            // They ascend: none is overwritten before it is read.
+            used.iter().enumerate().for_each(|(to, &from)| places[to] = places[from as usize]);
+            places.truncate(used.len());
+        }
+    }
+
     fn find_jump(&self) -> Option<f64> {
         let clip = self.clip.as_ref().filter(|_| self.repeats())?;
         let (mut first, mut last) = (Vec::new(), Vec::new());
-        self.pose_at_own(clip.start, &mut first);
-        self.pose_at_own(clip.end, &mut last);
+        for (time, pose) in [(clip.start, &mut first), (clip.end, &mut last)] {
+            self.pose_at_own(time, pose);
+            self.keep_moving(pose);
+        }
         let size = first.iter().fold((first[0], first[0]), |(l, h), p| (l.inf(p), h.sup(p)));
         let farthest = first.iter().zip(&last).map(|(a, b)| (a - b).norm()).fold(0.0, f64::max);
         (farthest > SAME_POSE * (size.1 - size.0).norm()).then_some(farthest)
@@ -231,15 +267,16 @@ impl Character {
 
 impl Motion for Character {
     fn triangles(&self) -> &[[u32; 3]] {
-        &self.vertices.triangles
+        self.moving.as_ref().map_or(&self.vertices.triangles, |(_, own)| own)
     }
 
     fn vertex_count(&self) -> usize {
-        self.vertices.count
+        self.moving.as_ref().map_or(self.vertices.count, |(used, _)| used.len())
     }
 
     fn pose(&self, time: f64, out: &mut Vec<DVec3>) -> Result<()> {
         self.pose_at_own(self.own_time(time), out);
+        self.keep_moving(out);
         Ok(())
     }
 
@@ -250,7 +287,7 @@ impl Motion for Character {
 
     fn drawn_pose(&self, time: f64, out: &mut Vec<DVec3>) -> Result<()> {
         let mut moving = Vec::new();
-        self.pose(time, &mut moving)?;
+        self.pose_at_own(self.own_time(time), &mut moving);
         out.clear();
         out.extend(self.vertices.drawn.vertices.iter().map(|&vertex| moving[vertex as usize]));
         Ok(())

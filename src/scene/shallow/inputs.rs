@@ -8,7 +8,7 @@ use super::course::Course;
 use super::terrain::{Terrain, read_mesh};
 use super::{Point, Shallow, memory, obstacles};
 use crate::base::orientation::Orientation;
-use crate::base::{DVec3, TriMesh};
+use crate::base::{DVec3, TriMesh, mesh};
 use crate::context::Context;
 use crate::error::{Error, Result};
 use crate::io::seen::Seen;
@@ -23,6 +23,11 @@ use crate::shallow::terrain::{Solids, triangles};
 const ROOM: (f64, f64) = (0.25, 0.1);
 /// A terrain wider than this (m) looks like one in millimetres or centimetres.
 const WIDE: f64 = 20.0;
+
+/// What to say of a mesh (m) that 32-bit numbers round too much.
+fn too_far(path: &Path, mesh: &TriMesh, cell: f64) -> Option<String> {
+    mesh::too_far(&path.display().to_string(), mesh.farthest(), 1.0, cell, mesh::BY_KEY)
+}
 
 /// What a scene's files hold.
 pub struct Inputs {
@@ -76,6 +81,9 @@ impl Inputs {
         let grid = grid(shallow, &bounds).map_err(|error| told(&scene.path, error))?;
         let heights = heights(shallow, &bounds).map_err(|error| told(&scene.path, error))?;
         let mut warnings: Vec<String> = wide(shallow, &path, &bounds).into_iter().collect();
+        if let Terrain::Mesh(mesh) = &terrain {
+            warnings.extend(too_far(&path, mesh, grid.cell));
+        }
         // What was meant in millimetres takes too much.
         memory::allow_cells(ctx, &grid)
             .inspect_err(|_| warnings.iter().for_each(|warning| log::warn!("{warning}")))?;
@@ -109,6 +117,7 @@ impl Inputs {
             warnings.extend(orientation.warning().map(|what| format!("{}: {what}", own.display())));
             let on_it = triangles::solids(&mesh.positions, &mesh.triangles, grid, heights);
             let on_it = on_it.map_err(|error| told(own, error))?;
+            warnings.extend(too_far(own, mesh, grid.cell));
             if orientation.has_open() && orientation.warning().is_none() {
                 let what = "is not closed: below a surface of it that faces up all is solid";
                 warnings.push(format!("{}: {what}", own.display()));

@@ -1,8 +1,8 @@
 //! The keys of `[shallow]`, of what a scene with it may have many of, and those of `[output]` in such scenes.
 
 use crate::io::mesh::EXTENSIONS;
-use crate::scene::text::FAR;
 use crate::scene::text::key::{Key, Kind, OBJECT, Scope};
+use crate::scene::text::{FAR, NO_ORIGIN, ORIGIN, ORIGIN_MEANS};
 
 type Scopes = &'static [(&'static str, Scope)];
 const FIRST: Scopes = &[("liquid", Scope::First)];
@@ -49,6 +49,7 @@ pub const KEYS: &[Key] = &[
         .or("1.0")
         .concerns(FIRST),
     Key::new("shallow", "up", Kind::Choice(&["y", "z"]), "a mesh's upward axis: y or z").or("\"y\"").concerns(FIRST),
+    Key::new("shallow", "origin", ORIGIN, ORIGIN_MEANS).or(NO_ORIGIN).concerns(FIRST),
     Key::new("shallow", "offset", Kind::Whole(-10_000_000, 10_000_000), "frames that a sequence starts later").or("0").concerns(STEP),
     Key::new("shallow", "cell", Kind::Number(1.0e-6, 1000.0, "m"), "edge of a cell on the ground (m)")
         .begins_with("0.001")
@@ -331,6 +332,7 @@ pub const MANY_KEYS: &[Key] = &[
         .or("1.0")
         .concerns(FIRST),
     Key::new(OBJECT, "up", Kind::Choice(&["y", "z"]), "the file's upward axis: y or z").or("\"y\"").concerns(FIRST),
+    Key::new(OBJECT, "origin", ORIGIN, ORIGIN_MEANS).or(NO_ORIGIN).concerns(FIRST),
     Key::new(OBJECT, "ease", Kind::Flag, "true: keys are joined smoothly, from rest to rest; else straight").or("false").concerns(STEP),
     Key::new(
         OBJECT,

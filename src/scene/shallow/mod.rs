@@ -195,7 +195,7 @@ impl Shallow {
         Some(Self {
             terrain: value("terrain")?.path()?.to_path_buf(),
             image: size.zip(heights).map(|(size, heights)| ImagePlace { size, heights }),
-            space: space(number("scale"), text("up")),
+            space: space(number("scale"), text("up"), value("origin")),
             offset: value("offset").and_then(Value::whole).unwrap_or(0) as i32,
             cell: number("cell")?,
             area: value("area").and_then(Value::numbers),
@@ -310,7 +310,9 @@ impl Obstacle {
             (Some("sphere"), _) => Form::Sphere(number("radius")?),
             (Some("capsule"), _) => Form::Capsule(number("radius")?, number("length")?),
             (Some(_), _) => Form::Cuboid(value("size")?.numbers()?),
-            (None, file) => Form::Mesh(file?.to_path_buf(), space(number("scale"), text("up"))),
+            (None, file) => {
+                Form::Mesh(file?.to_path_buf(), space(number("scale"), text("up"), value("origin")))
+            }
         };
         let keys = if let Some(Value::Poses(poses)) = value("keys") { poses.clone() } else { Vec::new() };
         Some(Self { form, keys, ease: value("ease").and_then(Value::flag).unwrap_or(false) })
@@ -322,8 +324,12 @@ impl Obstacle {
     }
 }
 
-fn space(scale: Option<f64>, up: Option<&str>) -> Space {
-    Space { scale: scale.unwrap_or(1.0), up: if up == Some("z") { Up::Z } else { Up::Y } }
+fn space(scale: Option<f64>, up: Option<&str>, origin: Option<&Value>) -> Space {
+    Space {
+        scale: scale.unwrap_or(1.0),
+        up: if up == Some("z") { Up::Z } else { Up::Y },
+        origin: origin.and_then(Value::numbers::<3>).unwrap_or_default().into(),
+    }
 }
 
 /// How the liquid of a scene flows.

@@ -32,7 +32,7 @@ impl Shallow {
             return Err(table.error("terrain_height", "must be [low, high] with low < high"));
         }
         if !is_mesh && shallow.space != crate::motion::Space::OWN {
-            let name = if table.has("scale") { "scale" } else { "up" };
+            let name = ["scale", "up"].into_iter().find(|name| table.has(name)).unwrap_or("origin");
             return Err(table.error(name, "is for meshes: leave it out"));
         }
         if !is_mesh && shallow.sequence().is_some() {

@@ -7,7 +7,7 @@ use crate::base::orientation::Orientation;
 use crate::base::{DVec3, TriMesh};
 use crate::context::Context;
 use crate::error::{Error, Result};
-use crate::io::mesh::{extension, parse_polygons};
+use crate::io::mesh::{extension, parse_polygons_from};
 use crate::io::seen::Seen;
 use crate::motion::Space;
 use crate::shallow::grid::{Grid, Heights};
@@ -146,9 +146,9 @@ impl Terrain {
 /// # Errors
 /// A file that cannot be read, or that has changed since it was read.
 pub(super) fn read_mesh(path: &Path, space: Space, seen: &Seen) -> Result<TriMesh> {
-    let mut mesh = parse_polygons(path, &seen.read(path)?)?.into_triangles();
-    if space != Space::OWN {
-        mesh.positions.iter_mut().for_each(|place| *place = space.place(place.cast()).cast());
+    let mut mesh = parse_polygons_from(path, &seen.read(path)?, space.origin)?.into_triangles();
+    if !space.keeps_vectors() {
+        mesh.positions.iter_mut().for_each(|place| *place = space.vector(place.cast()).cast());
     }
     Ok(mesh)
 }

@@ -6,7 +6,7 @@ use std::sync::Arc;
 use super::drift::Drift;
 use super::mist;
 use super::warnings::{replaced, too_small};
-use crate::base::mesh::{farthest, too_far as far_mesh};
+use crate::base::mesh::{BY_KEY, farthest, too_far as far_mesh};
 use crate::base::orientation::{Closing, Orientation};
 use crate::base::{DVec3, TriMesh};
 use crate::context::Context;
@@ -79,7 +79,7 @@ impl Inputs {
             }
             Layer::Top(path) => {
                 let ground = ground(&snow, &seen, &mut warnings)?;
-                Source::Made { ground, cover: Cover::Top(read_mesh(path, &seen, &mut warnings)?) }
+                Source::Made { ground, cover: Cover::Top(read_mesh(path, &snow, &seen, &mut warnings)?) }
             }
         };
         if let Source::Made { ground, cover } = &source {
@@ -287,8 +287,8 @@ fn oriented(mesh: TriMesh, name: &str, warnings: &mut Vec<String>) -> TriMesh {
     orientation.applied_to(mesh)
 }
 
-fn read_mesh(path: &Path, seen: &Seen, warnings: &mut Vec<String>) -> Result<TriMesh> {
-    let mesh = mesh::parse_polygons(path, &seen.read(path)?)?;
+fn read_mesh(path: &Path, snow: &Snow, seen: &Seen, warnings: &mut Vec<String>) -> Result<TriMesh> {
+    let mesh = mesh::parse_polygons_from(path, &seen.read(path)?, snow.origin)?;
     // Vertices that no face names are not part of the snow.
     Ok(oriented(mesh.into_triangles().without_unused(), &path.display().to_string(), warnings))
 }
@@ -298,7 +298,7 @@ fn ground(snow: &Snow, seen: &Seen, warnings: &mut Vec<String>) -> Result<initia
         Some(Ground::Plane { height, area: Some(area) }) => {
             Ok(initial::Ground::Plane { height: *height, area: *area })
         }
-        Some(Ground::Mesh(path)) => Ok(initial::Ground::Mesh(read_mesh(path, seen, warnings)?)),
+        Some(Ground::Mesh(path)) => Ok(initial::Ground::Mesh(read_mesh(path, snow, seen, warnings)?)),
         _ => Err(Error::argument("the snow has no ground")),
     }
 }
@@ -308,16 +308,17 @@ fn under(snow: &Snow, seen: &Seen, warnings: &mut Vec<String>) -> Result<Option<
     Ok(match &snow.ground {
         None => None,
         Some(Ground::Plane { height, .. }) => Some(Under::Level(*height)),
-        Some(Ground::Mesh(path)) => Some(Under::Mesh(read_mesh(path, seen, warnings)?)),
+        Some(Ground::Mesh(path)) => Some(Under::Mesh(read_mesh(path, snow, seen, warnings)?)),
     })
 }
 
 /// What to say of a ground's or top's mesh that lies far from the origin.
 fn far_meshes(snow: &Snow, source: &Source) -> Vec<String> {
     let told = |path: &Path, mesh: &TriMesh| {
-        let farthest = mesh.positions.iter().map(|p| f64::from(p.amax())).fold(0.0, f64::max);
-        far_mesh(&path.display().to_string(), farthest, 1.0, snow.cell)
+        far_mesh(&path.display().to_string(), mesh.farthest(), 1.0, snow.cell, FOR_SNOW)
     };
+    /// No key moves these.
+    const FOR_SNOW: &str = "give snow.origin nearby, which is subtracted in 64 bits, or save it near the origin and move the scene there too";
     let mut out = Vec::new();
     if let (Some(Ground::Mesh(path)), Some(mesh)) = (&snow.ground, source.ground()) {
         out.extend(told(path, mesh));
@@ -325,9 +326,6 @@ fn far_meshes(snow: &Snow, source: &Source) -> Vec<String> {
     if let (Layer::Top(path), Some(mesh)) = (&snow.layer, source.top()) {
         out.extend(told(path, mesh));
     }
-    // No key moves these.
-    out.iter_mut()
-        .for_each(|what| *what = what.replace("bring it there by keys", "move the scene there too"));
     out
 }
 
@@ -367,24 +365,29 @@ fn motion(
     let own: Box<dyn Motion> = match Pattern::parse(&object.file) {
         None if is_gltf(&object.file) => Box::new(character(scene, object, seen)?),
         None => {
-            let polygons = mesh::parse_polygons(&object.file, &seen.read(&object.file)?)?;
+            let polygons =
+                mesh::parse_polygons_from(&object.file, &seen.read(&object.file)?, object.space.origin)?;
             Box::new(Rigid::of_polygons(polygons, Keys::default()))
         }
         Some(pattern) => {
             let first = (f64::from(scene.shot.frames.first) - object.offset).floor() as i32;
             let last = (f64::from(scene.shot.frames.last) - object.offset).ceil() as i32;
-            Box::new(MeshSequence::open_seen(pattern, first, last, fps, object.offset, seen.clone())?)
+            let origin = object.space.origin;
+            Box::new(MeshSequence::open_seen(pattern, first, last, fps, object.offset, seen.clone(), origin)?)
         }
     };
     let mut pose = Vec::new();
     own.pose(f64::from(scene.shot.frames.first) / fps, &mut pose)?;
+    // Meshes are read less the origin.
+    let space = if is_gltf(&object.file) { object.space } else { object.space.without_origin() };
+    pose.iter_mut().for_each(|place| *place -= space.origin);
     let name = object.file.display().to_string();
-    warnings.extend(far_mesh(&name, farthest(pose.iter()), object.space.scale, scene.snow()?.cell));
+    warnings.extend(far_mesh(&name, farthest(pose.iter()), space.scale, scene.snow()?.cell, BY_KEY));
     if scene.output.objects_usd || scene.output.objects_ply {
         let missing = own.drawn().uvs.map_or(0, |uvs| uvs.missing);
         warnings.extend((missing > 0).then(|| missing_uvs(&name, missing)));
     }
-    Ok(Box::new(Placed::new(own, object.space, keys)))
+    Ok(Box::new(Placed::new(own, space, keys)))
 }
 
 fn character(scene: &Scene, object: &Object, seen: &Seen) -> Result<Character> {

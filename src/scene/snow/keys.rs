@@ -4,7 +4,7 @@ use super::mist_keys::mist_params;
 use crate::error::Result;
 use crate::io::mesh::{EXTENSIONS, extension};
 use crate::scene::text::key::{Key, Kind, OBJECT, Scope};
-use crate::scene::text::{FAR, Table, Value, Values};
+use crate::scene::text::{FAR, NO_ORIGIN, ORIGIN, Table, Value, Values};
 use crate::scene::{Ground, Layer, Snow};
 use crate::snow::NoiseParams;
 
@@ -47,6 +47,14 @@ pub const KEYS: &[Key] = &[
     .or_nothing()
     .such_as("\"snow_top.ply\"")
     .concerns(FIRST),
+    Key::new(
+        "snow",
+        "origin",
+        ORIGIN,
+        "position that becomes the origin of the meshes of ground and top (m), subtracted in 64 bits",
+    )
+    .or(NO_ORIGIN)
+    .concerns(GROUND),
     Key::new("snow", "cell", Kind::Number(CELLS.0, CELLS.1, "m"), "edge of a voxel (m)")
         .begins_with("0.0075")
         .concerns(FIRST),
@@ -87,7 +95,8 @@ impl Snow {
         let plane = values.number("snow.ground").map(|height| Ground::Plane { height, area });
         let ground = plane.or(path("snow.ground").map(Ground::Mesh));
         let min_crumb = values.get("snow.min_crumb")?.whole()? as usize;
-        Some(Self { ground, layer, cell, noise: noise(values)?, min_crumb })
+        let origin = values.get("snow.origin").and_then(Value::numbers::<3>).unwrap_or_default().into();
+        Some(Self { ground, layer, origin, cell, noise: noise(values)?, min_crumb })
     }
 
     /// Checks what single keys do not show.
@@ -102,6 +111,12 @@ impl Snow {
             _ => {}
         }
         let is_grid = value("top").and_then(Value::path).is_some_and(|path| extension(path) == "vdb");
+        let is_mesh = value("ground").and_then(Value::path).is_some() || !is_grid && value("top").is_some();
+        let has_origin =
+            value("origin").and_then(Value::numbers::<3>).is_some_and(|origin| origin != [0.0; 3]);
+        if has_origin && !is_mesh {
+            return Err(snow.error("origin", "is for meshes of ground and top: leave it out"));
+        }
         match (value("ground"), value("area")) {
             (_, Some(_)) if is_grid => {
                 return Err(snow.error("area", "is of no use beside a .vdb layer in `top`: leave it out"));

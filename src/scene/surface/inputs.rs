@@ -8,10 +8,10 @@ use super::{Surface, sculpts};
 use crate::base::arrays::{Number, On};
 use crate::base::faults::Faults;
 use crate::base::orientation::{Closing, Orientation};
-use crate::base::{DetailedMesh, MeshArray, TriMesh};
+use crate::base::{DetailedMesh, MeshArray, TriMesh, mesh as base_mesh};
 use crate::context::Context;
 use crate::error::{Error, Result};
-use crate::io::mesh::{extension, parse_polygons};
+use crate::io::mesh::{extension, parse_polygons_from};
 use crate::io::seen::Seen;
 use crate::io::sequence::Pattern;
 use crate::io::source;
@@ -97,6 +97,10 @@ impl Inputs {
                 first.display()
             ));
         }
+        // The mesh is made, or written, with 32-bit numbers where the particles are.
+        let far = base_mesh::farthest(particles.places.iter());
+        let name = first.display().to_string();
+        warnings.extend(base_mesh::too_far(&name, far, 1.0, surface.cell * spacing, base_mesh::BY_KEY));
         let mut mesh = match &surface.mesh {
             Some(path) => {
                 let (mesh, warning) = read_mesh(ctx, surface, path, &seen, spacing)?;
@@ -137,9 +141,10 @@ pub(super) fn read_mesh(
     spacing: f64,
 ) -> Result<(DetailedMesh, Option<String>)> {
     let bytes = seen.read(path)?;
-    let mut mesh = parse_polygons(path, &bytes)?.into_detailed();
+    // Vertices that no face names follow nothing.
+    let mut mesh = parse_polygons_from(path, &bytes, surface.space.origin)?.into_detailed().without_unused();
     let space = surface.space;
-    mesh.mesh.positions.iter_mut().for_each(|p| *p = space.place(p.cast()).cast());
+    mesh.mesh.positions.iter_mut().for_each(|p| *p = space.vector(p.cast()).cast());
     let orientation = Orientation::of_mesh(&mesh.mesh, Closing::Caps);
     let mesh = orientation.applied_to_detailed(mesh);
     let doubts = || orientation.warning().map(|what| format!("{}: {what}", path.display()));

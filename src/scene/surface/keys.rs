@@ -2,6 +2,7 @@
 
 use crate::io::mesh::EXTENSIONS;
 use crate::scene::text::key::{Key, Kind, Scope};
+use crate::scene::text::{NO_ORIGIN, ORIGIN, ORIGIN_MEANS};
 
 type Scopes = &'static [(&'static str, Scope)];
 const FIRST: Scopes = &[("surface", Scope::First)];
@@ -38,6 +39,7 @@ pub const KEYS: &[Key] = &[
         .or("1.0")
         .concerns(FIRST),
     Key::new("surface", "up", Kind::Choice(&["y", "z"]), "the files' upward axis: y or z").or("\"y\"").concerns(FIRST),
+    Key::new("surface", "origin", ORIGIN, ORIGIN_MEANS).or(NO_ORIGIN).concerns(FIRST),
     Key::new("surface", "offset", Kind::Number(-1.0e7, 1.0e7, "frames"), "frames that the sequence starts later")
         .or("0.0")
         .concerns(FIRST),

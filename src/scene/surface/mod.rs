@@ -116,6 +116,7 @@ impl Surface {
             space: Space {
                 scale: number("scale").unwrap_or(1.0),
                 up: if text("up") == Some("z") { Up::Z } else { Up::Y },
+                origin: value("origin").and_then(Value::numbers::<3>).unwrap_or_default().into(),
             },
             offset: number("offset").unwrap_or(0.0),
             speed: number("speed").unwrap_or(1.0),

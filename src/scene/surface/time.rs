@@ -53,7 +53,7 @@ pub(super) fn read(path: &Path, surface: &Surface, seen: &Seen) -> Result<Partic
             .map(|attribute| &attribute.values)
     };
     let (count, space) = (cloud.places.len(), surface.space);
-    let brought = |speed: [f32; 3]| space.place(DVec3::from(speed.map(f64::from))).cast::<f32>().into();
+    let brought = |speed: [f32; 3]| space.vector(DVec3::from(speed.map(f64::from))).cast::<f32>().into();
     let velocities = named(&VELOCITIES).find_map(|values| match values {
         Values::Vector(column) => Some((0..count).map(|point| brought(column.get(point))).collect()),
         _ => None,

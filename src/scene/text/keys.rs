@@ -14,6 +14,14 @@ use crate::scene::{Role, Scene, System, shallow, snow, surface};
 /// Farthest coordinate that a scene may name (m): f32 positions keep millimetres up to here.
 pub const FAR: f64 = 1.0e5;
 
+/// An origin of a file: of any map projection, in any unit.
+pub const ORIGIN: Kind = Kind::Numbers(3, 1.0e12, "");
+/// What it means.
+pub const ORIGIN_MEANS: &str =
+    "position in the file's unit and axes that becomes the origin, subtracted in 64 bits";
+/// Its default.
+pub const NO_ORIGIN: &str = "[0.0, 0.0, 0.0]";
+
 type Scopes = &'static [(&'static str, Scope)];
 
 /// Concerns every stage that knows the objects.
@@ -73,6 +81,7 @@ const OBJECTS: &[Key] = &[
         .or("1.0")
         .concerns(MOVES),
     Key::new(OBJECT, "up", Kind::Choice(&["y", "z"]), "the file's upward axis: y or z").or("\"y\"").concerns(MOVES),
+    Key::new(OBJECT, "origin", ORIGIN, ORIGIN_MEANS).or(NO_ORIGIN).concerns(MOVES),
     Key::new(
         OBJECT,
         "role",

@@ -19,7 +19,7 @@ pub use template::{reference, template};
 pub use values::{Value, Values};
 
 pub(super) use file::name;
-pub(super) use keys::FAR;
+pub(super) use keys::{FAR, NO_ORIGIN, ORIGIN, ORIGIN_MEANS};
 pub(super) use table::Table;
 pub(super) use template::rounded;
 

@@ -34,7 +34,11 @@ impl Object {
             clip: text("clip").map(str::to_string),
             repeat: value("loop").is_none() || flag("loop"),
             offset: number("offset"),
-            space: Space { scale: number("scale"), up: if text("up") == Some("z") { Up::Z } else { Up::Y } },
+            space: Space {
+                scale: number("scale"),
+                up: if text("up") == Some("z") { Up::Z } else { Up::Y },
+                origin: value("origin").and_then(Value::numbers::<3>).unwrap_or_default().into(),
+            },
             role: match text("role") {
                 Some("base") => Role::Base,
                 Some("grains") => Role::Grains,

@@ -163,8 +163,10 @@ struct Sheet {
 
 impl Sheet {
     fn of(mesh: &TriMesh) -> Self {
+        // Vertices that no triangle names are not part of the snow.
+        let mesh = mesh.clone().without_unused();
         let positions = mesh.positions.iter().map(|p| p.cast()).collect();
-        Self { positions, triangles: mesh.triangles.clone() }
+        Self { positions, triangles: mesh.triangles }
     }
 
     fn corners(&self) -> impl Iterator<Item = [DVec3; 3]> + '_ {

@@ -170,12 +170,14 @@ fn allow(ctx: &Context, area: f64, cell: f64) -> Result<()> {
 
 /// The rungs of the ladder, for a mesh whose first `own` vertices came in. None where nothing is left.
 fn rebuild(ctx: &Context, closed: &Closed, own: usize, cell: f64) -> Result<Option<Repaired>> {
-    let Some((low, high)) = (TriMesh { positions: closed.positions.clone(), triangles: Vec::new() }).bounds()
-    else {
-        return Ok(None);
-    };
+    let mesh = TriMesh { positions: closed.positions.clone(), triangles: closed.triangles.clone() };
+    let Some((low, high)) = mesh.bounds() else { return Ok(None) };
     let lattice = Lattice::near(cell, (low.cast::<f64>() + high.cast::<f64>()) / 2.0)?;
-    let in_cells: Vec<DVec3> = closed.positions.iter().map(|place| lattice.to_cells(place.cast())).collect();
+    let mut in_cells = vec![DVec3::zeros(); closed.positions.len()];
+    // Vertices that no triangle names may be anywhere.
+    for &vertex in closed.triangles.as_flattened() {
+        in_cells[vertex as usize] = lattice.to_cells(closed.positions[vertex as usize].cast());
+    }
     let fixed = in_cells.iter().map(|place| lattice.fix(*place)).collect::<Result<Vec<_>>>()?;
     let pierces = Pierces::of(&fixed, &closed.triangles);
     let shape = Shape { fixed, triangles: closed.triangles.clone(), pierces };

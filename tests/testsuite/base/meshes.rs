@@ -224,7 +224,7 @@ fn a_file_in_centimetres_with_z_up_is_turned_before_its_keys() {
         triangles: vec![[0, 1, 2]],
     };
     let key = Key { time: 0.0, at: DVec3::y(), turn: DVec3::zeros() };
-    let space = Space { scale: 0.01, up: Up::Z };
+    let space = Space { scale: 0.01, up: Up::Z, ..Space::OWN };
     let own = Box::new(Rigid::new(triangle, Keys::default()));
     let mut pose = Vec::new();
     Placed::new(own, space, Keys::new(vec![key]).unwrap()).pose(0.0, &mut pose).unwrap();

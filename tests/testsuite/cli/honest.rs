@@ -83,7 +83,7 @@ fn a_mesh_far_from_the_origin_is_named_with_what_to_do() {
         ["check shot.toml --set object.1.file=far.obj", "vdb from-mesh far.obj --cell 0.01 -o out.vdb"]
     {
         let said = works(folder.path(), command);
-        for word in ["far.obj", "60000 m from the origin", "3.9 mm", "keys"] {
+        for word in ["far.obj", "60000 m from the origin", "3.9 mm", "64 bits"] {
             assert!(said.contains(word), "{command}: no {word:?} in {said}");
         }
     }
