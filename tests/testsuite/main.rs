@@ -42,6 +42,7 @@ mod flow {
     mod pressure;
 }
 mod house {
+    mod defaults;
     mod gates;
     mod imports;
     mod readers;

@@ -196,12 +196,12 @@ impl Shallow {
             terrain: value("terrain")?.path()?.to_path_buf(),
             image: size.zip(heights).map(|(size, heights)| ImagePlace { size, heights }),
             space: space(number("scale"), text("up"), value("origin")),
-            offset: value("offset").and_then(Value::whole).unwrap_or(0) as i32,
+            offset: values.settled::<i64>("shallow", None, "offset") as i32,
             cell: number("cell")?,
             area: value("area").and_then(Value::numbers),
             bottom: number("bottom"),
             top: number("top"),
-            look: text("liquid").unwrap_or("blood").to_string(),
+            look: values.settled("shallow", None, "liquid"),
             params: params(values),
             fill: number("fill"),
             scalars: Carried::all_of(values),
@@ -210,12 +210,12 @@ impl Shallow {
             obstacles: (0..values.count("object")).filter_map(|index| Obstacle::of(values, index)).collect(),
             staining: value("stains").and_then(Value::flag).filter(|stains| *stains).map(|_| Staining {
                 scalar: scalars::staining(values),
-                half_life: number("stain_half_life").unwrap_or(60.0),
+                half_life: values.settled("shallow", None, "stain_half_life"),
                 ..Staining::default()
             }),
-            lifts: value("lifts").and_then(Value::flag).unwrap_or(true),
-            skirts: value("skirts").and_then(Value::flag).unwrap_or(true),
-            opaque_depth: number("opaque_depth").unwrap_or(0.01),
+            lifts: values.settled("shallow", None, "lifts"),
+            skirts: values.settled("shallow", None, "skirts"),
+            opaque_depth: values.settled("shallow", None, "opaque_depth"),
             output: Files {
                 ply: asked("output.liquid", "ply"),
                 usd: asked("output.liquid", "usd"),
@@ -285,7 +285,7 @@ impl Point {
             rate: number("rate_ml") * ML,
             pulse: (frequency > 0.0 && share > 0.0).then_some(flows::Pulse { frequency, share }),
         };
-        let follows = value("follows").and_then(Value::flag).unwrap_or(false);
+        let follows = values.settled(table, Some(index), "follows");
         let carries = scalars::brought(values, table, index);
         Self { name: (table, index), point, carries, follows, from: frame("from"), until: frame("until") }
     }
@@ -315,7 +315,7 @@ impl Obstacle {
             }
         };
         let keys = if let Some(Value::Poses(poses)) = value("keys") { poses.clone() } else { Vec::new() };
-        Some(Self { form, keys, ease: value("ease").and_then(Value::flag).unwrap_or(false) })
+        Some(Self { form, keys, ease: values.settled("object", Some(index), "ease") })
     }
 
     /// The file of a mesh.
@@ -337,18 +337,17 @@ fn params(values: &Values) -> Params {
     let value = |name: &str| values.get(&format!("shallow.{name}"));
     let number = |name: &str| value(name).and_then(Value::number);
     let text = |name: &str| value(name).and_then(Value::text);
-    let usual = Falls::default();
-    let is_thinning = value("thinning").and_then(Value::flag).unwrap_or(false);
+    let is_thinning: bool = values.settled("shallow", None, "thinning");
     Params {
         liquid: match number("viscosity") {
             _ if is_thinning => Liquid::THINNING_BLOOD,
             Some(viscosity) => Liquid::new(viscosity),
             None => Liquid::BLOOD,
         },
-        gravity: value("gravity").and_then(Value::numbers).unwrap_or([0.0, -9.81, 0.0]),
-        kept: number("kept").unwrap_or(0.5),
+        gravity: values.settled("shallow", None, "gravity"),
+        kept: values.settled("shallow", None, "kept"),
         pace: match text("pace") {
-            Some("realtime") => Pace::Realtime(number("step").unwrap_or(0.003)),
+            Some("realtime") => Pace::Realtime(values.settled("shallow", None, "step")),
             _ => Pace::Exact,
         },
         border: match text("border") {
@@ -360,12 +359,12 @@ fn params(values: &Values) -> Params {
         friction: if text("friction") == Some("walls") { Friction::Walls } else { Friction::Ground },
         thickening: scalars::thickening(values),
         falls: value("falls").and_then(Value::flag).filter(|falls| *falls).map(|_| Falls {
-            height: number("falls_height").unwrap_or(usual.height),
-            interval: number("falls_interval").unwrap_or(usual.interval),
-            drop: number("falls_drop_ml").map_or(usual.drop, |drop| drop * ML),
-            most: value("falls_most").and_then(Value::whole).map_or(usual.most, |most| most as usize),
+            height: values.settled("shallow", None, "falls_height"),
+            interval: values.settled("shallow", None, "falls_interval"),
+            drop: values.settled::<f64>("shallow", None, "falls_drop_ml") * ML,
+            most: values.settled::<i64>("shallow", None, "falls_most") as usize,
         }),
-        rest: number("rest").unwrap_or(0.0),
+        rest: values.settled("shallow", None, "rest"),
     }
 }
 

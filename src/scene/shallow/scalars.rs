@@ -36,8 +36,8 @@ impl Carried {
             _ => Law::Dye,
         };
         let name = text("name").unwrap_or_default().into();
-        let scalar = Scalar { name, law, range: number("range").unwrap_or(1.0) };
-        Self { scalar, start: number("start").unwrap_or(0.0) }
+        let scalar = Scalar { name, law, range: values.settled("scalar", Some(index), "range") };
+        Self { scalar, start: values.settled("scalar", Some(index), "start") }
     }
 }
 
@@ -46,7 +46,8 @@ pub(super) fn thickening(values: &Values) -> Option<Thickening> {
     (0..values.count("scalar")).find_map(|scalar| {
         let number = |name: &str| values.of_many("scalar", scalar, name).and_then(Value::number);
         let (times, to) = (number("thickens_times")?, number("thickens_to")?);
-        Some(Thickening { scalar, from: number("thickens_from").unwrap_or(0.0), to, times })
+        let from = values.settled("scalar", Some(scalar), "thickens_from");
+        Some(Thickening { scalar, from, to, times })
     })
 }
 
@@ -131,7 +132,7 @@ fn check_thickening(index: usize, table: &Table, values: &Values, range: f64) ->
     let Some(to) = number("thickens_to") else {
         return Err(table.error("thickens_to", "is missing: a scalar with `thickens_times` has one"));
     };
-    let from = number("thickens_from").unwrap_or(0.0);
+    let from: f64 = values.settled("scalar", Some(index), "thickens_from");
     for (name, concentration) in [("thickens_from", from), ("thickens_to", to)] {
         if concentration.abs() > range {
             return Err(table.error(name, format!("must lie within -{range} to {range}, its range")));

@@ -18,6 +18,7 @@ use crate::io::{points_ply, usd_points};
 use crate::scene::shot::{
     Clip, FrameFiles, Kind, Prims, Reads, Report, Settings, Stage, Stepped, Stepping, Stored, To,
 };
+use crate::scene::text::key::OBJECT;
 use crate::scene::text::keys::{first_of, settings_of};
 use crate::scene::{self, Role, Scene, System, moving};
 use crate::snow::base_layer::Grids;
@@ -84,8 +85,8 @@ impl<'a> Grains<'a> {
             let number = |name: &str| scene.values.of_object(index, name).and_then(|value| value.number());
             Object {
                 body,
-                friction: number("friction").unwrap_or(0.0),
-                stick: number("stick").unwrap_or(0.0),
+                friction: scene.values.settled(OBJECT, Some(index), "friction"),
+                stick: scene.values.settled(OBJECT, Some(index), "stick"),
                 compression: number("compression"),
                 removes: object.role.removes(),
                 pushes: object.role.pushes(),
@@ -178,27 +179,26 @@ pub(super) fn params(scene: &Scene, cell: f64) -> Params {
     let values = &scene.values;
     let number = |name: &str| values.number(&format!("grains.{name}"));
     let whole = |name: &str| values.get(&format!("grains.{name}")).and_then(|value| value.whole());
-    let flag = |name: &str| values.get(&format!("grains.{name}")).and_then(|value| value.flag());
     let usual = Params::for_cell(cell);
     let radius = number("radius").unwrap_or(usual.radius);
     let [friction, attraction] = material(values, radius);
     let keep_box = values.get("grains.keep_box").and_then(|value| value.numbers());
     Params {
         radius,
-        compression: number("compression").unwrap_or(usual.compression),
+        compression: values.settled("grains", None, "compression"),
         friction,
         attraction,
-        restitution: number("restitution").unwrap_or(usual.restitution),
-        air: number("air").unwrap_or(usual.air),
-        air_by_density: flag("air_by_density").unwrap_or(usual.air_by_density),
-        gravity: number("gravity").unwrap_or(usual.gravity),
-        rests: flag("rest").unwrap_or(usual.rests),
+        restitution: values.settled("grains", None, "restitution"),
+        air: values.settled("grains", None, "air"),
+        air_by_density: values.settled("grains", None, "air_by_density"),
+        gravity: values.settled("grains", None, "gravity"),
+        rests: values.settled("grains", None, "rest"),
         active_distance: number("active_distance"),
         lifetime: number("lifetime"),
         keep_box: keep_box.map(|[a, b, c, d, e, f]| [DVec3::new(a, b, c), DVec3::new(d, e, f)]),
         sub_steps: whole("substeps").map(|count| count as u32),
-        most: whole("max").map_or(usual.most, |most| most as usize),
-        seed: whole("seed").unwrap_or(0) as u64,
+        most: values.settled::<i64>("grains", None, "max") as usize,
+        seed: values.settled::<i64>("grains", None, "seed") as u64,
     }
 }
 

@@ -115,17 +115,17 @@ pub fn mist_params(values: &Values) -> Option<Params> {
     let value = |name: &str| values.get(&format!("mist.{name}"));
     let usual = Params::for_cell(number("cell")?);
     Some(Params {
-        from_speed: number("from_speed").unwrap_or(usual.from_speed),
-        falling: value("falling").and_then(|value| value.flag()).unwrap_or(usual.falling),
-        gravity: number("gravity").unwrap_or(usual.gravity),
-        half_life: number("half_life").unwrap_or(usual.half_life),
-        wind: value("wind").and_then(|value| value.numbers()).unwrap_or(usual.wind),
-        turbulence: number("turbulence").unwrap_or(usual.turbulence),
+        from_speed: values.settled("mist", None, "from_speed"),
+        falling: values.settled("mist", None, "falling"),
+        gravity: values.settled("mist", None, "gravity"),
+        half_life: values.settled("mist", None, "half_life"),
+        wind: value("wind").and_then(|value| value.numbers()).unwrap_or_default(),
+        turbulence: values.settled("mist", None, "turbulence"),
         turbulence_size: number("turbulence_size").unwrap_or(usual.turbulence_size),
-        confinement: number("confinement").unwrap_or(usual.confinement),
-        noise: number("noise").unwrap_or(usual.noise),
+        confinement: values.settled("mist", None, "confinement"),
+        noise: values.settled("mist", None, "noise"),
         noise_size: number("noise_size").unwrap_or(usual.noise_size),
-        seed: value("seed").and_then(|value| value.whole()).map_or(usual.seed, |seed| seed as i32),
+        seed: values.settled::<i64>("mist", None, "seed") as i32,
         ..usual
     })
 }

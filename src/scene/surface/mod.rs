@@ -106,7 +106,6 @@ impl Surface {
     pub(super) fn of(values: &Values) -> Option<Self> {
         let value = |name: &str| values.get(&format!("surface.{name}"));
         let number = |name: &str| value(name).and_then(Value::number);
-        let whole = |name: &str| value(name).and_then(Value::whole);
         let text = |name: &str| value(name).and_then(Value::text);
         let asked = |name: &str, text: &str| values.get(name).is_some_and(|value| value.holds(text));
         Some(Self {
@@ -114,25 +113,25 @@ impl Surface {
             mesh: value("mesh").and_then(Value::path).map(Into::into),
             resculpt: value("resculpt").and_then(Value::path).map(Into::into),
             space: Space {
-                scale: number("scale").unwrap_or(1.0),
+                scale: values.settled("surface", None, "scale"),
                 up: if text("up") == Some("z") { Up::Z } else { Up::Y },
                 origin: value("origin").and_then(Value::numbers::<3>).unwrap_or_default().into(),
             },
-            offset: number("offset").unwrap_or(0.0),
-            speed: number("speed").unwrap_or(1.0),
+            offset: values.settled("surface", None, "offset"),
+            speed: values.settled("surface", None, "speed"),
             spacing: number("spacing"),
-            cell: number("cell").unwrap_or(0.5),
-            change: number("change").unwrap_or(0.5),
-            rebuild: value("rebuild").and_then(Value::flag).unwrap_or(true),
+            cell: values.settled("surface", None, "cell"),
+            change: values.settled("surface", None, "change"),
+            rebuild: values.settled("surface", None, "rebuild"),
             every: text("match") == Some("every"),
-            min_drop: whole("min_drop").and_then(|count| usize::try_from(count).ok()).unwrap_or(8),
-            ahead: whole("ahead").and_then(|frames| i32::try_from(frames).ok()).unwrap_or(4),
+            min_drop: values.settled::<i64>("surface", None, "min_drop") as usize,
+            ahead: values.settled::<i64>("surface", None, "ahead") as i32,
             weighting: match text("weighting") {
                 Some("mean") => Weighting::Mean,
                 _ => Weighting::Affine,
             },
             half_life: number("half_life"),
-            fade: number("fade").unwrap_or(0.0),
+            fade: values.settled("surface", None, "fade"),
             output: Files {
                 ply: asked("output.surface", "ply"),
                 obj: asked("output.surface", "obj"),

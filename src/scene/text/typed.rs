@@ -12,7 +12,7 @@ impl Shot {
             Some(Value::Frames(frames)) => *frames,
             _ => Frames { first: 0, last: 0 },
         };
-        Self { frames, fps: values.number("shot.fps").unwrap_or(24.0) }
+        Self { frames, fps: values.settled("shot", None, "fps") }
     }
 }
 

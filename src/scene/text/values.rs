@@ -48,6 +48,42 @@ pub struct Values {
     values: BTreeMap<(Option<usize>, usize), Value>,
 }
 
+/// What the value of a key may be taken as.
+pub trait Settled: Sized {
+    /// None of a value of another type.
+    fn of(value: &Value) -> Option<Self>;
+}
+
+impl Settled for f64 {
+    fn of(value: &Value) -> Option<Self> {
+        value.number()
+    }
+}
+
+impl Settled for i64 {
+    fn of(value: &Value) -> Option<Self> {
+        value.whole()
+    }
+}
+
+impl Settled for bool {
+    fn of(value: &Value) -> Option<Self> {
+        value.flag()
+    }
+}
+
+impl Settled for String {
+    fn of(value: &Value) -> Option<Self> {
+        value.text().map(String::from)
+    }
+}
+
+impl<const N: usize> Settled for [f64; N] {
+    fn of(value: &Value) -> Option<Self> {
+        value.numbers()
+    }
+}
+
 /// A key's path in settings: `snow.noise.size`, `object[1].scale`.
 pub fn path(key: &Key, object: Option<usize>) -> String {
     match object {
@@ -121,6 +157,24 @@ impl Values {
     /// A value of one of many tables: `source`, the first of which has the index 0.
     pub fn of_many(&self, table: &str, index: usize, name: &str) -> Option<&Value> {
         self.of(Some(index), table, name)
+    }
+
+    /// The value of a key that has a default or may not be left out, of one of many tables its index: its declaration alone says what the
+    /// default is.
+    ///
+    /// # Panics
+    /// A key that is not declared, has no default, or holds something else: a mistake in the program, whatever the scene.
+    pub fn settled<T: Settled>(&self, table: &str, index: Option<usize>, name: &str) -> T {
+        let value = self.of(index, table, name).cloned().or_else(|| self.declared(table, name));
+        let value = value.as_ref().and_then(T::of);
+        value.unwrap_or_else(|| panic!("{table}.{name} has no default of this type"))
+    }
+
+    /// A key's default by its declaration.
+    fn declared(&self, table: &str, name: &str) -> Option<Value> {
+        let key = self.keys.iter().find(|key| key.table == table && key.name == name)?;
+        let Fallback::Is(text) = key.fallback else { return None };
+        with_value(key.name, text, |table| read(key, table, None)).ok()?
     }
 
     /// How many tables of a name there are, of which there may be many.

@@ -1,0 +1,77 @@
+//! A key's default is declared once, with the key: nothing that reads its value has another.
+
+use std::collections::BTreeSet;
+use std::fs;
+use std::path::{Path, PathBuf};
+
+fn sources(folder: &Path, out: &mut Vec<PathBuf>) {
+    for entry in fs::read_dir(folder).unwrap() {
+        let path = entry.unwrap().path();
+        if path.is_dir() {
+            sources(&path, out);
+        } else {
+            out.push(path);
+        }
+    }
+}
+
+/// Without its unit tests.
+fn text(path: &Path) -> String {
+    fs::read_to_string(path).unwrap().split("#[cfg(test)]").next().unwrap_or_default().to_string()
+}
+
+/// Names of keys that are declared with a default.
+fn declared(files: &[PathBuf]) -> BTreeSet<String> {
+    let mut names = BTreeSet::new();
+    for path in files.iter().filter(|path| path.to_str().unwrap().ends_with("keys.rs")) {
+        for key in text(path).split("Key::new(").skip(1).filter(|key| key.contains(".or(")) {
+            let name = key
+                .split('"')
+                .skip(1)
+                .step_by(2)
+                .find(|part| !part.contains([' ', ':']) && *part != table_of(key));
+            names.extend(name.map(String::from));
+        }
+    }
+    names
+}
+
+/// A key's table, where it is written as text.
+fn table_of(key: &str) -> &str {
+    let first = key.trim_start();
+    if first.starts_with('"') { first.split('"').nth(1).unwrap_or_default() } else { "" }
+}
+
+/// Names of keys whose value is replaced where there is none: `number("name").unwrap_or(1.0)`, in one statement or field.
+fn replaced(text: &str) -> Vec<String> {
+    let mut names = Vec::new();
+    for call in ["number(\"", "value(\"", "flag(\"", "whole(\"", "text(\"", "name, \""] {
+        for rest in text.split(call).skip(1) {
+            let Some((name, rest)) = rest.split_once("\")") else { continue };
+            let end = rest.find([';', ',']).unwrap_or(rest.len());
+            if rest[..end].contains(".unwrap_or(") || rest[..end].contains(".map_or(usual") {
+                names.push(name.rsplit('.').next().unwrap_or(name).to_string());
+            }
+        }
+    }
+    names
+}
+
+#[test]
+fn a_default_is_declared_once() {
+    let mut files = Vec::new();
+    sources(&Path::new(env!("CARGO_MANIFEST_DIR")).join("src/scene"), &mut files);
+    let declared = declared(&files);
+    for name in ["opaque_depth", "friction", "falls_height", "thickens_from", "turbulence", "fps", "kept"] {
+        assert!(declared.contains(name), "{name} is not among {declared:?}");
+    }
+    let second = |path: &PathBuf| {
+        let names = replaced(&text(path)).into_iter().filter(|name| declared.contains(name));
+        let at = path.clone();
+        names.map(move |name| format!("{}: {name}", at.display())).collect::<Vec<_>>()
+    };
+    let second: Vec<String> = files.iter().flat_map(second).collect();
+    assert!(second.is_empty(), "second defaults; Values::settled has the declared one: {second:#?}");
+    // What this looks for.
+    assert_eq!(replaced("opaque_depth: number(\"opaque_depth\").unwrap_or(0.01),"), ["opaque_depth"]);
+}
