@@ -9,7 +9,9 @@ use super::options::{Origin, warn_if_far};
 
 /// A mesh in triangles, and its faces as the file has them: those of bent polygons may be cut otherwise in another frame.
 pub struct Model {
+    /// In triangles.
     pub mesh: TriMesh,
+    /// As the file has them, without what they carry.
     pub faces: PolygonMesh,
 }
 
