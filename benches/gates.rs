@@ -68,6 +68,8 @@ mod materials;
 mod mist;
 #[path = "gates/mist_cancel.rs"]
 mod mist_cancel;
+#[path = "gates/mist_eddies.rs"]
+mod mist_eddies;
 #[path = "gates/mist_passes.rs"]
 mod mist_passes;
 #[path = "gates/mist_walls.rs"]
@@ -234,6 +236,7 @@ fn main() {
     readers::run(&mut h);
     grains::run(&mut h);
     mist::run(&mut h);
+    mist_eddies::run(&mut h);
     mist_walls::run(&mut h);
     mist_passes::run(&mut h);
     mist_cancel::run(&mut h);

@@ -1,5 +1,6 @@
 //! Turbulence: eddies of a size push the air about. Their acceleration is the curl of three smooth noises, which neither gathers
-//! nor spreads the air (Bridson, Houriham and Nordenstam 2007), carried along by the wind and changing with time.
+//! nor spreads the air (Bridson, Houriham and Nordenstam 2007). The wind carries them along, and each set of noises fades into
+//! another one that has nothing to do with it, so that eddies come and go: moved noises would be the same eddies for ever.
 
 use fastnoise_lite::{FastNoiseLite, NoiseType};
 use rayon::prelude::*;
@@ -14,8 +15,8 @@ use crate::flow::Flow;
 const UNIT: f64 = 0.231_8;
 /// Share of its size over which a difference is taken.
 const STEP: f64 = 0.05;
-/// Way that an eddy's noise goes in a second, in units of its size, so that eddies come and go.
-const CHANGE: f64 = 0.7;
+/// Time (s) in which one set of noises fades into the next.
+const LIFETIME: f64 = 0.7;
 
 /// The eddies act on the air for `dt` (s) from a time (s) on.
 ///
@@ -42,31 +43,37 @@ pub fn stir(ctx: &Context, flow: &mut Flow, params: &Params, time: f64, dt: f64)
 
 /// The noises at a time.
 struct Eddies {
-    noises: [FastNoiseLite; 3],
+    /// Two sets of three, each with its weight: the sum of the weights' squares is 1, and thus the strength always the same.
+    sets: [([FastNoiseLite; 3], f64); 2],
     size: f64,
-    /// Where the noises have gone (m).
+    /// How far the wind has carried them (m).
     shift: DVec3,
 }
 
 impl Eddies {
     fn new(params: &Params, time: f64) -> Self {
-        let noise = |component: i32| {
-            let mut noise = FastNoiseLite::with_seed(params.seed.wrapping_mul(3).wrapping_add(component));
-            noise.set_noise_type(Some(NoiseType::OpenSimplex2));
-            noise.set_frequency(Some(1.0));
-            noise
-        };
-        let size = params.turbulence_size;
-        // Each noise goes its own way: at rest, they would be the same eddies for ever.
-        let shift = DVec3::from(params.wind) * time;
-        Self { noises: [0, 1, 2].map(noise), size, shift: shift - DVec3::new(0.0, CHANGE * size * time, 0.0) }
+        let lives = time / LIFETIME;
+        let first = lives.floor();
+        let share = lives - first;
+        // Neither the weights nor their rates of change jump.
+        let angle = std::f64::consts::FRAC_PI_2 * share * share * (3.0 - 2.0 * share);
+        let (rising, falling) = libm::sincos(angle);
+        let set = |life: f64| [0, 1, 2].map(|component| noise(params.seed, life as i64, component));
+        Self {
+            sets: [(set(first), falling), (set(first + 1.0), rising)],
+            size: params.turbulence_size,
+            shift: DVec3::from(params.wind) * time,
+        }
     }
 
-    /// A noise at a place (m), which goes along an axis of its own.
+    /// A noise at a place (m).
     fn potential(&self, component: usize, place: DVec3) -> f64 {
         let [x, y, z] = ((place - self.shift) / self.size).into();
-        let turned = [[x, y, z], [y, z, x], [z, x, y]][component];
-        f64::from(self.noises[component].get_noise_3d(turned[0], turned[1], turned[2]))
+        let of_set = |(noises, weight): &([FastNoiseLite; 3], f64)| match *weight {
+            0.0 => 0.0,
+            weight => weight * f64::from(noises[component].get_noise_3d(x, y, z)),
+        };
+        of_set(&self.sets[0]) + of_set(&self.sets[1])
     }
 
     /// Their curl at a place (m), with a root mean square of 1.
@@ -79,6 +86,24 @@ impl Eddies {
         };
         UNIT * DVec3::new(slope(2, 1) - slope(1, 2), slope(0, 2) - slope(2, 0), slope(1, 0) - slope(0, 1))
     }
+}
+
+/// The noise of a component in a life, which has nothing to do with those of others.
+fn noise(seed: i32, life: i64, component: u64) -> FastNoiseLite {
+    let mut noise = FastNoiseLite::with_seed(mixed(seed, life, component));
+    noise.set_noise_type(Some(NoiseType::OpenSimplex2));
+    noise.set_frequency(Some(1.0));
+    noise
+}
+
+/// A seed for a component in a life (Steele, Lea and Flood 2014: SplitMix64).
+fn mixed(seed: i32, life: i64, component: u64) -> i32 {
+    let mut state = (life as u64).wrapping_mul(3).wrapping_add(component);
+    state = state.wrapping_mul(0x9e37_79b9_7f4a_7c15)
+        ^ u64::from(seed as u32).wrapping_mul(0xd6e8_feb8_6659_fd93);
+    state = (state ^ state >> 30).wrapping_mul(0xbf58_476d_1ce4_e5b9);
+    state = (state ^ state >> 27).wrapping_mul(0x94d0_49bb_1331_11eb);
+    (state ^ state >> 31) as i32
 }
 
 #[cfg(test)]
@@ -108,5 +133,56 @@ mod tests {
             .sum();
         // Of a unit field of this size, slopes are about 1 / size = 5.
         assert!(divergence.abs() < 0.02, "{divergence}");
+    }
+
+    /// The field (m/s2) at 24^3 points, a sixth of the size apart, at a time (s).
+    fn sampled(params: &Params, time: f64) -> Vec<DVec3> {
+        let eddies = Eddies::new(params, time);
+        let at =
+            |index: usize| DVec3::new((index / 576) as f64, (index / 24 % 24) as f64, (index % 24) as f64);
+        (0..24usize.pow(3)).map(|index| eddies.curl(at(index) * (params.turbulence_size / 6.0))).collect()
+    }
+
+    /// The best correlation of two such fields over all shifts by up to 8 points on each axis.
+    fn best_correlation(one: &[DVec3], other: &[DVec3]) -> f64 {
+        let shifts =
+            (-8i32..=8).flat_map(|x| (-8i32..=8).flat_map(move |y| (-8i32..=8).map(move |z| [x, y, z])));
+        let of_shift = |[x, y, z]: [i32; 3]| {
+            let (mut both, mut first, mut second) = (0.0, 0.0, 0.0);
+            let range = |by: i32| (0.max(-by)..24.min(24 - by)).step_by(2);
+            for i in range(x) {
+                for j in range(y) {
+                    for k in range(z) {
+                        let a = one[(576 * i + 24 * j + k) as usize];
+                        let b = other[(576 * (i + x) + 24 * (j + y) + k + z) as usize];
+                        both += a.dot(&b);
+                        first += a.norm_squared();
+                        second += b.norm_squared();
+                    }
+                }
+            }
+            both / f64::sqrt(first * second)
+        };
+        shifts.map(of_shift).fold(-1.0, f64::max)
+    }
+
+    #[test]
+    fn eddies_change_and_do_not_only_move() {
+        let params = Params { turbulence: 1.0, turbulence_size: 0.2, seed: 3, ..Params::for_cell(0.01) };
+        let first = sampled(&params, 0.25);
+        let later = [0.05, 0.35, 0.7, 2.0].map(|by| best_correlation(&first, &sampled(&params, 0.25 + by)));
+        assert!(later[0] > 0.95 && later.is_sorted_by(|a, b| a >= b), "{later:?}");
+        // What is left is what two fields of so many eddies have in common at the best of 4,913 shifts.
+        assert!(later[2] < 0.6 && later[3] < 0.4, "{later:?}");
+        // One set of noises after another: no jump.
+        for time in [0.0, LIFETIME, -LIFETIME, 3.0 * LIFETIME] {
+            let [before, after] = [-1.0e-5, 1.0e-5].map(|by| sampled(&params, time + by));
+            let farthest = before.iter().zip(&after).map(|(a, b)| (a - b).norm()).fold(0.0, f64::max);
+            assert!(farthest < 1.0e-3, "{time}: {farthest}");
+        }
+        // The wind carries them along.
+        let blown = Params { wind: [0.2 / 6.0 * 4.0, 0.0, 0.0], ..params };
+        let best = best_correlation(&first, &sampled(&blown, 0.25));
+        assert!(best > 0.8, "{best}");
     }
 }
