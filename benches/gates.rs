@@ -106,6 +106,8 @@ mod rebuilt_topology;
 mod repair;
 #[path = "gates/rest.rs"]
 mod rest;
+#[path = "gates/rest_kept.rs"]
+mod rest_kept;
 #[path = "gates/scenes.rs"]
 mod scenes;
 #[path = "gates/shallow_bowl.rs"]
@@ -278,6 +280,7 @@ fn main() {
     shallow_whole::run(&mut h);
     shallow_threads::run(&mut h);
     easing::run(&mut h);
+    rest_kept::run(&mut h);
     house::run(&mut h);
     h.finish();
 }
