@@ -120,6 +120,8 @@ mod reliability_guard_page;
 mod repair;
 #[path = "gates/rest.rs"]
 mod rest;
+#[path = "gates/rest_kept.rs"]
+mod rest_kept;
 #[path = "gates/scenes.rs"]
 mod scenes;
 #[path = "gates/shallow_bowl.rs"]
@@ -297,6 +299,7 @@ fn main() {
     reliability_bugs::run(&mut h);
     reliability_gltf_valid::run(&mut h);
     orientation::run(&mut h);
+    rest_kept::run(&mut h);
     house::run(&mut h);
     h.finish();
 }

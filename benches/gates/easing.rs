@@ -86,7 +86,8 @@ fn follow(ctx: &Context, sequence: &Sequence, every: usize, (jumps, shown): (&mu
         outlook.look(ctx, &tracker, from.clone(), coming, sequence.dt).expect("steps");
         let title = || sequence.title(frame - 1);
         let moved: Vec<DVec3> = outlook
-            .eased(&tracker, AHEAD)
+            .eased(ctx, &tracker, AHEAD)
+            .expect("places")
             .iter()
             .zip(tracker.vertices())
             .map(|(shown, own)| shown - own)
@@ -99,7 +100,7 @@ fn follow(ctx: &Context, sequence: &Sequence, every: usize, (jumps, shown): (&mu
         match &report.change {
             Some(change) => jumps.see(sequence, (change, &triangles), &moved, || sequence.title(frame)),
             None => {
-                let after = outlook.eased(&next, AHEAD);
+                let after = outlook.eased(ctx, &next, AHEAD).expect("places");
                 for ((shown, own), before) in after.iter().zip(next.vertices()).zip(&moved) {
                     jumps.step.see(((shown - own) - before).norm() / sequence.spacing, title);
                 }

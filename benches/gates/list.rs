@@ -347,6 +347,10 @@ pub const GATES: &[Gate] = &[
     gate("surface.easing_jump", "r", Most(0.5), Most(0.3)),
     gate("surface.easing_depth", "cells", Most(1.0), Open),
     gate("surface.easing_volume", "1", Most(1.0e-4), Open),
+    // Triangles that are made in 40 frames in which particles at rest tremble.
+    none("surface.rest_kept_made", "triangles"),
+    // Pairs of triangles that meet in a frame as it is shown, less those without easing.
+    none("surface.rest_kept_crossings", "pairs"),
     // Topology matched near the flags against the whole grid: signs and differences, and the volume of a neck.
     yes("surface.match_near"),
     gate("surface.match_neck", "%", Most(1.0), Open),

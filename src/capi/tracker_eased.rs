@@ -64,7 +64,7 @@ pub unsafe extern "C" fn frz_tracker_read_eased(
                 return dst.fill("dst", &places.map(|p| [p.x, p.y, p.z]).collect::<Vec<_>>());
             }
             follower.outlook.look(call.ctx(), &follower.tracker, now, coming, dt)?;
-            let places = follower.outlook.eased(&follower.tracker, ahead as usize);
+            let places = follower.outlook.eased(call.ctx(), &follower.tracker, ahead as usize)?;
             dst.fill("dst", &places.iter().map(|p| [p.x, p.y, p.z]).collect::<Vec<_>>())
         }
     })

@@ -48,6 +48,8 @@ pub struct Change {
     pub delta: Vec<f32>,
     /// For each vertex the lengths (m) of the shortest and of the longest edge around it at its birth.
     pub sizes: Vec<[f32; 2]>,
+    /// For each vertex its displacement (m) since the reference of [`super::Tracker`], from which edges at rest are known.
+    pub drifts: Vec<[f32; 3]>,
     /// What improved the mesh; of several steps, in the last.
     pub improvements: Improvements,
     /// Parts without particles that were taken away.
@@ -64,6 +66,8 @@ pub struct Change {
     pub iterations: usize,
 }
 
+/// By how much lengths change where particles only tremble (spacings), at most.
+const TREMBLE: f64 = 0.01;
 /// Where the mesh has passed through itself by less than this (cells) it is left alone: mending takes more of it than that is worth.
 const DEEP: f64 = 0.25;
 /// Lengths of the shortest and of the longest edge around a vertex that was made (cells).
@@ -80,6 +84,7 @@ impl Change {
             before: unfit.vertices.to_vec(),
             delta: Vec::new(),
             sizes: Vec::new(),
+            drifts: Vec::new(),
             improvements: Improvements::default(),
             dry: 0,
             specks: 0,
@@ -185,6 +190,7 @@ pub fn change(
         before: unfit.vertices.to_vec(),
         delta: Vec::new(),
         sizes: Vec::new(),
+        drifts: Vec::new(),
         improvements: Improvements::default(),
         dry: 0,
         specks: 0,
@@ -196,7 +202,7 @@ pub fn change(
 }
 
 /// Takes parts with too few particles away, improves a mesh (thesis 2.6), also where it was changed, and measures the vertices
-/// that were made. Sizes are those of the mesh before the change; vertices that were made keep a distance of at most `most` (m): what lies
+/// that were made. Sizes, and drifts up to now, are those of the mesh before the change; vertices that were made keep a distance of at most `most` (m): what lies
 /// farther from the particles' surface is no detail, and moves there, or is rebuilt again, in the next frame. None where nothing has
 /// changed.
 ///
@@ -205,7 +211,7 @@ pub fn change(
 pub fn improved(
     ctx: &Context,
     unfit: &Unfit<'_>,
-    sizes: &[Size],
+    (sizes, drifts): (&[Size], &[[f32; 3]]),
     change: Option<Change>,
     distances: &Distances,
     crowd: &Crowd<'_>,
@@ -218,15 +224,18 @@ pub fn improved(
     is_changed |= change.dry + change.specks > 0;
     let born = BORN.map(|share| (share * cell) as f32);
     change.sizes = change.origins.iter().map(|at| at.map_or(born, |at| sizes[at as usize])).collect();
+    change.drifts = change.origins.iter().map(|at| at.map_or([0.0; 3], |at| drifts[at as usize])).collect();
     let mut flags: Vec<bool> =
         change.origins.iter().map(|at| at.is_some_and(|at| unfit.flags[at as usize])).collect();
     let mut mesh = Improvable {
         places: &mut change.vertices,
         triangles: &mut change.triangles,
         sizes: &mut change.sizes,
+        drifts: &mut change.drifts,
         origins: &mut change.origins,
         sources: &mut change.sources,
         flags: &mut flags,
+        tremble: TREMBLE * crowd.spacing,
     };
     change.improvements = ctx.phase("improve", || improve(ctx, &mut mesh))?;
     if !is_changed && change.improvements == Improvements::default() {

@@ -50,6 +50,16 @@ impl Leads {
         Self { ways: Vec::new(), origins: Some(vec![None; vertices]) }
     }
 
+    /// The vertex before the step that a vertex after it was; none: it was made.
+    pub fn before(&self, vertex: u32) -> Option<u32> {
+        origin(&self.origins, vertex)
+    }
+
+    /// Whether a vertex before the step goes, and has something that takes its place.
+    pub fn takes(&self, vertex: u32) -> bool {
+        self.ways.binary_search_by_key(&vertex, |(vertex, _)| *vertex).is_ok()
+    }
+
     /// Of two steps, one after the other.
     pub fn then(mut self, next: &Self) -> Self {
         let ways = next.ways.iter().filter_map(|(vertex, way)| Some((origin(&self.origins, *vertex)?, *way)));

@@ -1,4 +1,4 @@
-//! A detailed triangle mesh follows a particle liquid without losing its detail (thesis chapter 2).
+//! A detailed triangle mesh follows a particle liquid and keeps its detail where that neither breaks nor stretches (thesis chapter 2).
 //!
 //! Each frame the mesh is carried along by the particles (`advect.rs`), then moved so that each vertex is as far from the
 //! surface of the particles as it was at the first frame (`project.rs`). That surface is where an implicit function of the
@@ -38,6 +38,7 @@ mod cells;
 mod change;
 mod coverage;
 mod cubes;
+mod drift;
 mod dry;
 mod easing;
 mod enclosed;
@@ -69,6 +70,7 @@ mod spheres;
 mod state;
 mod tracker;
 mod transfer;
+mod uncrossed;
 mod unfit;
 
 pub use advect::{Weighting, carried};
@@ -85,7 +87,7 @@ pub use isosurface::Isosurface;
 #[cfg(feature = "vdb")]
 pub use level_set::{HALF_WIDTH, level_set};
 pub use matching::{Matched, Matching, Node, Solver, match_topology};
-pub use outlook::Outlook;
+pub use outlook::{Outlook, displaced};
 pub use params::Params;
 pub use paths::interpolate;
 pub use project::{Foot, foot};
@@ -100,6 +102,7 @@ pub use specks::specks;
 pub use spheres::{is_sphere_radius, spheres};
 pub use tracker::Tracker;
 pub use transfer::transfer;
+pub use uncrossed::{Displaced, uncrossed};
 
 use crate::base::DVec3;
 use crate::error::{Error, Result};

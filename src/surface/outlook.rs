@@ -7,6 +7,7 @@ use super::Particles;
 use super::easing::{Eased, Leads, eased};
 use super::report::StepReport;
 use super::tracker::Tracker;
+use super::uncrossed::{Displaced, uncrossed};
 use crate::base::DVec3;
 use crate::context::Context;
 use crate::error::Result;
@@ -82,14 +83,24 @@ impl Outlook {
     }
 
     /// Places (m) of the tracker's vertices as they are shown: those that a step to come takes away go towards what it makes, for
-    /// `ahead` steps before it.
-    pub fn eased(&self, tracker: &Tracker, ahead: usize) -> Vec<DVec3> {
+    /// `ahead` steps before it, as far as the mesh does not pass through itself.
+    ///
+    /// # Errors
+    /// Cancel.
+    pub fn eased(&self, ctx: &Context, tracker: &Tracker, ahead: usize) -> Result<Vec<DVec3>> {
         let mut places = tracker.vertices().to_vec();
-        for Eased { vertex, now, .. } in eased(self.steps.iter().map(|step| &step.leads), ahead) {
-            places[vertex as usize] += now;
+        let moved = displaced(&eased(self.steps.iter().map(|step| &step.leads), ahead));
+        for (vertex, by) in uncrossed(ctx, tracker.vertices(), tracker.triangles(), moved)? {
+            places[vertex as usize] += by;
         }
-        places
+        Ok(places)
     }
+}
+
+/// The vertices that are displaced now.
+pub fn displaced(eased: &[Eased]) -> Vec<Displaced> {
+    let moved = eased.iter().filter(|eased| eased.now != DVec3::zeros());
+    moved.map(|eased| (eased.vertex, eased.now)).collect()
 }
 
 #[cfg(test)]
@@ -119,7 +130,7 @@ mod tests {
             let (from, to) = (balls(frame), balls(frame + 1));
             let coming: Vec<Particles> = (1..=3).map(|ahead| balls(frame + ahead)).collect();
             outlook.look(&ctx, &tracker, from.clone(), coming, DT).unwrap();
-            let places = outlook.eased(&tracker, 3);
+            let places = outlook.eased(&ctx, &tracker, 3).unwrap();
             moved += places.iter().zip(tracker.vertices()).filter(|(shown, own)| shown != own).count();
             let (next, report) = outlook.take(&from, &to, DT).unwrap();
             tracker = next;

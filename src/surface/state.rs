@@ -3,6 +3,7 @@
 use xxhash_rust::xxh3::xxh3_128;
 
 use super::ahead::Ahead;
+use super::drift::{Drift, WINDOW};
 use super::improve::sizes;
 use super::params::Params;
 use super::tracker::Tracker;
@@ -12,7 +13,7 @@ use crate::base::{DVec3, TriMesh};
 use crate::error::{Error, Result};
 
 /// Magic bytes, including the version.
-const MAGIC: &Magic = b"frzsrf03";
+const MAGIC: &Magic = b"frzsrf04";
 /// What messages call it.
 const NOUN: &str = "surface";
 
@@ -21,6 +22,9 @@ impl Tracker {
     pub fn save(&self) -> Vec<u8> {
         let mut to = Writer::default();
         [self.params.spacing, self.params.cell, self.reach].into_iter().for_each(|number| to.f64(number));
+        to.u32(self.drift.steps);
+        to.count(self.drift.vertices.len());
+        to.f32s(self.drift.vertices.as_flattened());
         to.u32(u32::from(self.is_rebuilt));
         if self.is_rebuilt {
             to.count(self.triangles.len());
@@ -67,6 +71,7 @@ impl Tracker {
         if !(0.0..=100.0).contains(&reach) {
             return wrong(format!("has a band of {reach} spacings"));
         }
+        let drift = drift(&mut from)?;
         let is_rebuilt = from.u32()? != 0;
         let (mut triangles, mut lasting) = (mesh.triangles.clone(), Vec::new());
         let (mut is_other, mut own) = (false, Vec::new());
@@ -117,6 +122,12 @@ impl Tracker {
                 sizes(&places, &mesh.triangles)
             }
         };
+        let drift = match (params.rebuild, drift.vertices.len()) {
+            (false, _) => Drift::default(),
+            (true, 0) => Drift::at_reference(count),
+            (true, own) if own == count => drift,
+            (true, _) => return wrong("has displacements that do not fit".into()),
+        };
         Ok(Self {
             params,
             vertices,
@@ -128,9 +139,21 @@ impl Tracker {
             reach,
             is_rebuilt,
             sizes,
+            drift,
             ahead: Ahead::default(),
         })
     }
+}
+
+/// The displacements of a state.
+fn drift(from: &mut Reader<'_>) -> Result<Drift> {
+    let steps = from.u32()?;
+    let count = from.count(12)?;
+    let vertices = (0..count).map(|_| from.f32s::<3>()).collect::<Result<Vec<_>>>()?;
+    if steps >= WINDOW {
+        return Err(Error::Bytes(format!("has displacements over {steps} steps, not under {WINDOW}")));
+    }
+    Ok(Drift { steps, vertices })
 }
 
 /// Tells meshes of other triangles apart.

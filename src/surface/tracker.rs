@@ -11,6 +11,7 @@ use super::apart::{Apart, Lacking, Parts, Wanted};
 use super::band::Distances;
 use super::cells::cell_of;
 use super::coverage::Cover;
+use super::drift::Drift;
 use super::enclosed::Crowd;
 use super::fade::fade;
 use super::implicit::Implicit;
@@ -48,6 +49,8 @@ pub struct Tracker {
     pub(super) is_rebuilt: bool,
     /// Lengths (m) of the shortest and of the longest edge around each vertex at its birth; empty where the mesh is not rebuilt.
     pub(super) sizes: Vec<Size>,
+    /// Displacements of the vertices over the last steps; empty where the mesh is not rebuilt.
+    pub(super) drift: Drift,
     /// What is known of the particles to come.
     pub(super) ahead: Ahead,
 }
@@ -101,6 +104,7 @@ impl Tracker {
         let is_rebuilt = false;
         let ahead = Ahead::default();
         let sizes = if params.rebuild { sizes(&vertices, &mesh.triangles) } else { Vec::new() };
+        let drift = if params.rebuild { Drift::at_reference(vertices.len()) } else { Drift::default() };
         let mut tracker = Self {
             params,
             vertices,
@@ -112,6 +116,7 @@ impl Tracker {
             reach,
             is_rebuilt,
             sizes,
+            drift,
             ahead,
         };
         let surface = ctx.phase("phi", || tracker.surface_of(ctx, particles))?;
@@ -271,6 +276,7 @@ impl Tracker {
                     triangles: surface.1.count(),
                     ..StepReport::default()
                 },
+                drifts: self.drift.after(&self.vertices, &vertices),
                 vertices,
                 delta,
             };
@@ -288,9 +294,12 @@ impl Tracker {
         let mut report = StepReport { phases, ..next.report };
         (self.vertices, self.delta, self.flags) = (next.vertices, next.delta, next.flags);
         self.ahead = ahead;
+        self.drift.vertices = next.drifts;
         if let Some(change) = &mut report.change {
             self.take(change);
         }
+        let drifts = std::mem::take(&mut self.drift.vertices);
+        self.drift = self.drift.next(drifts);
         Ok(report)
     }
 
@@ -413,6 +422,8 @@ pub(super) struct Next {
     pub vertices: Vec<DVec3>,
     pub delta: Vec<f32>,
     pub flags: Vec<bool>,
+    /// See [`Drift`].
+    pub drifts: Vec<[f32; 3]>,
     pub report: StepReport,
 }
 

@@ -45,7 +45,8 @@ impl Tracker {
         let unfit = Unfit { vertices, triangles, flags: &flags, bare: &bare, everywhere };
         let changed = change(ctx, &unfit, phi, distances)?;
         let crowd = self.crowd(particles);
-        improved(ctx, &unfit, &self.sizes, changed, distances, &crowd, farthest * spacing)
+        let own = (&*self.sizes, &*next.drifts);
+        improved(ctx, &unfit, own, changed, distances, &crowd, farthest * spacing)
     }
 
     /// Takes the flags off vertices that jump alone, were placed in the last step, and have only covered surface beside them: mostly the
@@ -82,6 +83,7 @@ impl Tracker {
             self.lasting = change.carried_shares(&self.lasting);
         }
         self.sizes.clone_from(&change.sizes);
+        self.drift.vertices.clone_from(&change.drifts);
         self.vertices.clone_from(&change.vertices);
         self.triangles.clone_from(&change.triangles);
         self.is_rebuilt = true;

@@ -116,7 +116,8 @@ pub fn check(ctx: &Context, scene: &Scene, inputs: &Inputs) -> Result<Report> {
         warnings
             .push("some files have neither ids nor velocities: where their particles go is not known".into());
     }
-    let (count, frame) = (shot.frames.count() as u64, FrameSize::of(surface.output, &inputs.mesh));
+    let (count, frame) =
+        (shot.frames.count() as u64, FrameSize::of(surface.output, surface.rebuild, &inputs.mesh));
     Ok(Report {
         frames: [shot.frames.first, shot.frames.last],
         fps: shot.fps,

@@ -10,6 +10,8 @@ const TEXT: u64 = 12;
 const AROUND_INDEX: u64 = 2;
 /// Bytes of a vertex in the exact state: its place in 64 bits, the distance that it keeps, its flag. Places hardly pack.
 const STATE_PER_VERTEX: u64 = 3 * 8 + 4 + 1;
+/// More of a mesh that is rebuilt: its displacement since a reference.
+const DRIFT_PER_VERTEX: u64 = 3 * 4;
 /// Bytes of a frame's report and record; parts that the mesh does not cover, of which up to a hundred are listed, make it more.
 const RECORDS: u64 = 6000;
 
@@ -24,8 +26,8 @@ pub(super) struct FrameSize {
 }
 
 impl FrameSize {
-    /// Estimates it for a mesh.
-    pub fn of(output: Files, detail: &DetailedMesh) -> Self {
+    /// Estimates it for a mesh, which is rebuilt or not.
+    pub fn of(output: Files, is_rebuilt: bool, detail: &DetailedMesh) -> Self {
         let [vertices, triangles] = counts(detail);
         let (places, corners) = detail.uvs.as_ref().map_or((0, 0), |uvs| {
             (uvs.places.len() as u64, uvs.corners.as_ref().map_or(0, |corners| corners.len() as u64))
@@ -47,7 +49,7 @@ impl FrameSize {
             ply: if_asked(output.ply, ply(output, detail)),
             obj: if_asked(output.obj, obj),
             usd: if_asked(output.usd, usd),
-            state: STATE_PER_VERTEX * vertices,
+            state: (STATE_PER_VERTEX + if_asked(is_rebuilt, DRIFT_PER_VERTEX)) * vertices,
         }
     }
 
@@ -122,9 +124,9 @@ mod tests {
         let bytes = ply_bytes(&detail.mesh, &carried);
         let end = b"end_header\n";
         let header = bytes.windows(end.len()).position(|part| part == end).unwrap() + end.len();
-        assert_eq!(FrameSize::of(plain, &detail).ply, (bytes.len() - header) as u64);
+        assert_eq!(FrameSize::of(plain, true, &detail).ply, (bytes.len() - header) as u64);
         let moving = Files { velocities: true, delta: true, flagged: true, rebuilt: true, ..plain };
         let more = 4 * (12 + 4 + 1) + 2;
-        assert_eq!(FrameSize::of(moving, &detail).ply, (bytes.len() - header) as u64 + more);
+        assert_eq!(FrameSize::of(moving, true, &detail).ply, (bytes.len() - header) as u64 + more);
     }
 }

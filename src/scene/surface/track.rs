@@ -161,17 +161,15 @@ impl<'a> Stepping for Track<'a> {
     fn step(&self, ctx: &Context, walk: &mut Walk<'a>, to: &To<'_>) -> Result<Stepped<Step>> {
         walk.go(ctx, to.frame)?;
         let At { tracker, detail, report, source, .. } = walk.now();
-        let step = to.made_from.map(|_| {
-            let (places, velocities) = walk.shown();
-            Written {
-                places: usd::to_floats(&places),
-                triangles: tracker.triangles().to_vec(),
-                detail: detail.clone(),
-                velocities,
-                delta: tracker.delta().to_vec(),
-                flags: tracker.flags().to_vec(),
-                state: kept::save(tracker, detail.as_deref().unwrap_or(&self.inputs.mesh), source.sculpted),
-            }
+        let shown = to.made_from.map(|_| walk.shown(ctx)).transpose()?;
+        let step = shown.map(|(places, velocities)| Written {
+            places: usd::to_floats(&places),
+            triangles: tracker.triangles().to_vec(),
+            detail: detail.clone(),
+            velocities,
+            delta: tracker.delta().to_vec(),
+            flags: tracker.flags().to_vec(),
+            state: kept::save(tracker, detail.as_deref().unwrap_or(&self.inputs.mesh), source.sculpted),
         });
         Ok(Stepped { step: Step(step), report: report.clone() })
     }

@@ -19,7 +19,8 @@ use crate::io::usd;
 use crate::scene::shot::{Reads, Report};
 use crate::scene::{Frames, Scene};
 use crate::surface::{
-    Change, Eased, Leads, Params, Particles, Rest, StepReport, Traced, Tracker, carry_attributes, eased,
+    Change, Displaced, Eased, Leads, Params, Particles, Rest, StepReport, Traced, Tracker, carry_attributes,
+    displaced, eased, uncrossed,
 };
 
 /// A scene's liquid, and the mesh that goes along.
@@ -156,7 +157,10 @@ impl<'a> Walk<'a> {
 
     /// Places (m) of its vertices as they are shown: those that a change will take away already go towards what it makes; with the
     /// velocities that lead to the next frame's (m/s), or where that is not known from the one before.
-    pub fn shown(&self) -> (Vec<DVec3>, Vec<Vec3>) {
+    ///
+    /// # Errors
+    /// Cancel.
+    pub fn shown(&self, ctx: &Context) -> Result<(Vec<DVec3>, Vec<Vec3>)> {
         let now = self.now();
         let mut places = now.tracker.vertices().to_vec();
         let mut velocities = match self.known.get(1) {
@@ -164,12 +168,38 @@ impl<'a> Walk<'a> {
             None if now.way.of_after.is_empty() => vec![Vec3::zeros(); places.len()],
             None => now.way.of_after.clone(),
         };
-        let coming = self.known.iter().skip(1).map(|at| &at.leads);
-        for Eased { vertex, now, next } in eased(coming, self.surface.ahead as usize) {
-            places[vertex as usize] += now;
-            velocities[vertex as usize] += ((next - now) * self.scene.shot.fps).cast::<f32>();
+        let moved = self.displaced(ctx, 0)?;
+        moved.iter().for_each(|(vertex, by)| places[*vertex as usize] += by);
+        let Some(next) = self.known.get(1) else { return Ok((places, velocities)) };
+        let mut then: Vec<Displaced> = self.displaced(ctx, 1)?;
+        then = then.into_iter().filter_map(|(at, by)| Some((next.leads.before(at)?, by))).collect();
+        then.sort_unstable_by_key(|(vertex, _)| *vertex);
+        let of = |list: &[Displaced], vertex: u32| {
+            let at = list.binary_search_by_key(&vertex, |(vertex, _)| *vertex);
+            at.map_or(DVec3::zeros(), |at| list[at].1)
+        };
+        for Eased { vertex, now: asked, next: asked_next } in self.eased(0) {
+            let now = of(&moved, vertex);
+            // What goes in the step arrives as nearly as it has come.
+            let to = match next.leads.takes(vertex) {
+                true if asked != DVec3::zeros() => asked_next * (now.norm() / asked.norm()),
+                true => asked_next,
+                false => of(&then, vertex),
+            };
+            velocities[vertex as usize] += ((to - now) * self.scene.shot.fps).cast::<f32>();
         }
-        (places, velocities)
+        Ok((places, velocities))
+    }
+
+    /// The vertices of a frame that is known which are moved for changes to come.
+    fn eased(&self, index: usize) -> Vec<Eased> {
+        eased(self.known.iter().skip(index + 1).map(|at| &at.leads), self.surface.ahead as usize)
+    }
+
+    /// By how much they are, as far as the mesh does not pass through itself.
+    fn displaced(&self, ctx: &Context, index: usize) -> Result<Vec<Displaced>> {
+        let tracker = &self.known[index].tracker;
+        uncrossed(ctx, tracker.vertices(), tracker.triangles(), displaced(&self.eased(index)))
     }
 
     /// The frame after those that are known, where it is there: beyond the shot's end a cache need not have it.

@@ -139,6 +139,11 @@ impl<'m, 'a> Fans<'m, 'a> {
         self.mesh.stretch(ends)
     }
 
+    /// See [`Improvable::needs`].
+    pub fn needs(&self, ends: [u32; 2], is_out: fn(f64) -> bool) -> bool {
+        self.mesh.needs(ends, is_out)
+    }
+
     /// The triangles around a vertex; none where it went into another.
     pub fn around(&self, vertex: u32) -> &[u32] {
         let at = vertex as usize;
@@ -228,6 +233,8 @@ impl<'m, 'a> Fans<'m, 'a> {
         let size = mean(self.size(a), self.size(b));
         self.mesh.places.push(place);
         self.mesh.sizes.push(size);
+        let drift = self.mean_drift(a, b);
+        self.mesh.drifts.push(drift);
         self.mesh.origins.push(None);
         self.mesh.flags.push(false);
         self.is_gone.push(false);
@@ -254,6 +261,9 @@ impl<'m, 'a> Fans<'m, 'a> {
     pub fn collapse(&mut self, collapse: &Collapse) {
         let &Collapse { from, to, place, size } = collapse;
         self.moving(collapse).into_iter().for_each(|triangle| self.becomes_part(triangle));
+        if place != self.place(to) {
+            self.mesh.drifts[to as usize] = self.mean_drift(from, to);
+        }
         self.mesh.places[to as usize] = place;
         self.mesh.sizes[to as usize] = size;
         self.is_gone[from as usize] = true;
@@ -285,6 +295,12 @@ impl<'m, 'a> Fans<'m, 'a> {
         self.remove(b, one);
         self.add(c, two);
         self.add(d, one);
+    }
+
+    /// The drift of a vertex between two.
+    fn mean_drift(&self, a: u32, b: u32) -> [f32; 3] {
+        let [one, two] = [a, b].map(|vertex| self.mesh.drifts[vertex as usize]);
+        [0, 1, 2].map(|axis| 0.5 * (one[axis] + two[axis]))
     }
 
     fn becomes_part(&mut self, triangle: u32) {
@@ -329,6 +345,7 @@ impl<'m, 'a> Fans<'m, 'a> {
         drop_marked(mesh.sources, &is_dead);
         drop_marked(mesh.places, &is_gone);
         drop_marked(mesh.sizes, &is_gone);
+        drop_marked(mesh.drifts, &is_gone);
         drop_marked(mesh.origins, &is_gone);
         drop_marked(mesh.flags, &is_gone);
         let mut numbers = vec![0; is_gone.len()];

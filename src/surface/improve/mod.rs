@@ -1,6 +1,7 @@
 //! Mesh improvement (thesis 2.6): where the tracked mesh was stretched its edges are split, where it was squeezed they collapse, and
 //! thin triangles that were made flip. What is measured against is the length that the edges around a vertex had at its birth: long and
-//! short edges stay as they were sculpted. Nearly all of a mesh needs nothing, and stays as it is, bit for bit.
+//! short edges stay as they were sculpted. Nearly all of a mesh needs nothing, and stays as it is, bit for bit; so does all of one at rest
+//! (`strain.rs`).
 //!
 //! After Wojtan et al. 2009, and Brochu and Bridson 2009 ("Robust topological operations for dynamic explicit surfaces") for what
 //! stays on ridges and in corners. `fans.rs` has the operations, `butterfly.rs`, `collapse.rs`, `flip.rs` and `relax.rs` say where and
@@ -18,6 +19,7 @@ mod fans;
 mod flip;
 mod relax;
 mod shape;
+mod strain;
 
 use rayon::prelude::*;
 
@@ -53,10 +55,14 @@ pub struct Improvable<'a> {
     pub sizes: &'a mut Vec<Size>,
     /// Of each vertex the vertex that it was; none: it was made in this frame.
     pub origins: &'a mut Vec<Option<u32>>,
+    /// Displacement of each vertex since a reference some frames ago; not finite: it is not known.
+    pub drifts: &'a mut Vec<[f32; 3]>,
     /// Of each triangle where it comes from.
     pub sources: &'a mut Vec<Source>,
     /// Of each vertex whether its triangles are left alone: what is broken is rebuilt in the next frame.
     pub flags: &'a mut Vec<bool>,
+    /// By how much lengths change where the liquid only trembles.
+    pub tremble: f64,
 }
 
 /// Lengths of the shortest and of the longest edge around a vertex.
@@ -128,13 +134,18 @@ impl Improvable<'_> {
         if stretch.is_finite() { stretch } else { 1.0 }
     }
 
+    /// Whether an edge is out of range, and not at rest.
+    fn needs(&self, ends: [u32; 2], is_out: fn(f64) -> bool) -> bool {
+        is_out(self.stretch(ends)) && self.is_strained(ends)
+    }
+
     /// Whether something about a triangle may be out of range: where none was made or changed in this frame, its edges alone.
     fn is_due(&self, [a, b, c]: [u32; 3], source: Source) -> bool {
         if [a, b, c].into_iter().any(|corner| self.flags[corner as usize]) {
             return false;
         }
-        let mut stretches = [[a, b], [b, c], [c, a]].into_iter().map(|ends| self.stretch(ends));
-        !matches!(source, Source::Whole(_)) || stretches.any(|stretch| is_long(stretch) || is_short(stretch))
+        let is_out = |ends: [u32; 2]| self.needs(ends, is_long) || self.needs(ends, is_short);
+        !matches!(source, Source::Whole(_)) || [[a, b], [b, c], [c, a]].into_iter().any(is_out)
     }
 }
 
@@ -235,7 +246,7 @@ impl Work<'_, '_, '_> {
         self.rounds -= usize::from(!edges.is_empty());
         for (n, ends) in edges.into_iter().enumerate() {
             self.look(n)?;
-            let edge = self.fans.edge(ends).filter(|_| is_long(self.fans.stretch(ends)));
+            let edge = self.fans.edge(ends).filter(|_| self.fans.needs(ends, is_long));
             if let Some(edge) = edge
                 && !edge.corners.iter().any(|&corner| self.fans.is_flagged(corner))
             {
@@ -252,7 +263,7 @@ impl Work<'_, '_, '_> {
         let edges = self.edges(near, is_short, 1.0);
         for (n, ends) in edges.into_iter().enumerate() {
             self.look(n)?;
-            if self.fans.edge(ends).is_none() || !is_short(self.fans.stretch(ends)) {
+            if self.fans.edge(ends).is_none() || !self.fans.needs(ends, is_short) {
                 continue;
             }
             let way = self.fans.collapses(ends).into_iter().find(|way| self.fans.may(way, &[]));
@@ -305,14 +316,14 @@ impl Work<'_, '_, '_> {
         Ok(())
     }
 
-    /// Edges of triangles whose stretch is wanted, each once, in the order of their lengths times a sign, then of their vertices.
-    fn edges(&self, near: &[u32], is_wanted: fn(f64) -> bool, sign: f64) -> Vec<[u32; 2]> {
+    /// Edges of triangles that are out of range and not at rest, each once, in the order of their lengths times a sign, then of their vertices.
+    fn edges(&self, near: &[u32], is_out: fn(f64) -> bool, sign: f64) -> Vec<[u32; 2]> {
         let mut edges = Vec::new();
         for &triangle in near.iter().filter(|triangle| self.fans.is_there(**triangle)) {
             let [a, b, c] = self.fans.corners(triangle);
             for [a, b] in [[a, b], [b, c], [c, a]] {
                 let ends = [a.min(b), a.max(b)];
-                if is_wanted(self.fans.stretch(ends)) {
+                if self.fans.needs(ends, is_out) {
                     edges.push((sign * self.fans.length(ends), ends));
                 }
             }

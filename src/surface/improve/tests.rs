@@ -10,25 +10,32 @@ use crate::context::Pool;
 use crate::error::Error;
 use crate::surface::balls;
 
+/// The drift of a vertex of which nothing is known: so large that no edge rests, and equal to itself as NaN is not.
+const UNKNOWN: [f32; 3] = [f32::INFINITY; 3];
+
 /// A mesh with all that is improved along with it.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) struct Body {
     pub places: Vec<DVec3>,
     pub triangles: Vec<[u32; 3]>,
     pub sizes: Vec<Size>,
+    pub drifts: Vec<[f32; 3]>,
     pub origins: Vec<Option<u32>>,
     pub sources: Vec<Source>,
     pub flags: Vec<bool>,
+    pub tremble: f64,
 }
 
 impl Body {
-    /// As it is born.
+    /// As it is born; how its vertices moved before is not known.
     pub fn of(places: Vec<DVec3>, triangles: Vec<[u32; 3]>) -> Self {
         Self {
             sizes: sizes(&places, &triangles),
+            drifts: vec![UNKNOWN; places.len()],
             origins: (0..places.len() as u32).map(Some).collect(),
             sources: (0..triangles.len() as u32).map(Source::Whole).collect(),
             flags: vec![false; places.len()],
+            tremble: 0.0,
             places,
             triangles,
         }
@@ -39,16 +46,19 @@ impl Body {
             places: &mut self.places,
             triangles: &mut self.triangles,
             sizes: &mut self.sizes,
+            drifts: &mut self.drifts,
             origins: &mut self.origins,
             sources: &mut self.sources,
             flags: &mut self.flags,
+            tremble: self.tremble,
         }
     }
 
     /// Checks that arrays are in step and that the mesh is closed.
     pub fn check(&self) {
         let vertices = self.places.len();
-        assert_eq!([self.sizes.len(), self.origins.len(), self.flags.len()], [vertices; 3]);
+        let counts = [self.sizes.len(), self.drifts.len(), self.origins.len(), self.flags.len()];
+        assert_eq!(counts, [vertices; 4]);
         assert_eq!(self.sources.len(), self.triangles.len());
         let topology = Topology::of(vertices, &self.triangles);
         assert!(topology.is_watertight(), "{topology:?}");
@@ -188,6 +198,28 @@ fn what_is_as_it_was_born_stays_bit_for_bit() {
         let (after, done) = body.clone().improved(2);
         assert_eq!(done, Improvements::default());
         assert!(after == body);
+    }
+}
+
+#[test]
+fn what_rests_stays_bit_for_bit_however_it_is_stretched() {
+    let at_reference = |by: f64| {
+        let mut body = torus().stretched([by, 1.0, 0.6]);
+        body.drifts = vec![[0.0; 3]; body.places.len()];
+        body
+    };
+    for by in [0.4, 1.7, 4.0] {
+        let (after, done) = at_reference(by).improved(2);
+        assert_eq!(done, Improvements::default());
+        assert!(after == at_reference(by));
+        // As it is drawn out since the reference, it is improved as if nothing were known.
+        let mut body = at_reference(by);
+        for (drift, (now, before)) in body.drifts.iter_mut().zip(body.places.iter().zip(&torus().places)) {
+            *drift = (now - before).cast::<f32>().into();
+        }
+        let (_, done) = body.improved(2);
+        assert_eq!(done, torus().stretched([by, 1.0, 0.6]).improved(2).1);
+        assert!(done.splits + done.collapses > 100, "{done:?}");
     }
 }
 

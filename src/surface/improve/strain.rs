@@ -1,0 +1,73 @@
+//! Which edges have changed of late. An edge that is out of range is left alone while it rests: it was tried when it came to be so, and
+//! what trembles around a limit would be remade in every frame.
+
+use super::{Improvable, TOO_LONG, TOO_SHORT};
+use crate::base::DVec3;
+
+/// Change of a length since the reference from which on an edge is not at rest (targets, and [`Improvable::tremble`]). Particles at
+/// rest that tremble by 0.02 spacings change lengths by up to 0.02 targets, and by 0.01 spacings.
+const STRAIN: f64 = 0.04;
+/// Of a liquid that creeps, an edge that changes more slowly is looked at as well when it is so many times out of range, and so many
+/// times farther each time.
+const BEYOND: [f64; 2] = [4.0 / 3.0, 1.5];
+/// Limits that are told apart.
+const LIMITS: u32 = 64;
+
+impl Improvable<'_> {
+    /// Whether an edge is of a vertex that was made in this frame, or its length has changed since the reference by more than what
+    /// particles at rest do. Where that is not known (not finite) it has.
+    pub(super) fn is_strained(&self, ends: [u32; 2]) -> bool {
+        let [a, b] = ends.map(|end| end as usize);
+        if self.origins[a].is_none() || self.origins[b].is_none() {
+            return true;
+        }
+        let now = self.places[a] - self.places[b];
+        let drift = |at: usize| DVec3::from(self.drifts[at].map(f64::from));
+        let (now, before) = (now.norm(), (now - (drift(a) - drift(b))).norm());
+        let [shortest, longest] = self.target(ends);
+        let target = if now > longest { longest } else { shortest };
+        let change = (now - before).abs();
+        let rests = change <= (STRAIN * target).max(self.tremble);
+        !rests || limits(now / target) != limits(before / target)
+    }
+}
+
+/// How many of the limits a length (targets) is beyond.
+fn limits(length: f64) -> u32 {
+    let out = (length / TOO_LONG).max(TOO_SHORT / length);
+    let (mut count, mut limit) = (0, BEYOND[0]);
+    while out > limit && count < LIMITS {
+        limit *= BEYOND[1];
+        count += 1;
+    }
+    count
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::tests::Body;
+    use super::*;
+
+    #[test]
+    fn limits_are_farther_and_farther_out() {
+        let counts = [1.0, 1.9, 2.1, 2.9, 3.1, 0.4, 0.37, 0.26, 0.24, 0.0, f64::MAX].map(limits);
+        assert_eq!(counts, [0, 0, 1, 1, 2, 0, 1, 1, 2, LIMITS, LIMITS]);
+    }
+
+    #[test]
+    fn an_edge_rests_until_it_changes_or_creeps_far_out() {
+        // Two vertices 1.6 targets apart, of which the second came from a place this much nearer.
+        let is_strained = |length: f64, nearer: f32, tremble: f64| {
+            let places = vec![DVec3::zeros(), DVec3::x() * length, DVec3::y()];
+            let mut body = Body::of(places, vec![[0, 1, 2]]);
+            body.sizes = vec![[1.0; 2]; 3];
+            body.drifts = vec![[100.0, 7.0, 0.0], [100.0 + nearer, 7.0, 0.0], [0.0; 3]];
+            body.tremble = tremble;
+            body.improvable().is_strained([0, 1])
+        };
+        assert!(!is_strained(1.6, 0.0, 0.0) && !is_strained(1.6, 0.03, 0.0) && !is_strained(1.6, -0.03, 0.0));
+        assert!(is_strained(1.6, 0.05, 0.0) && is_strained(1.6, -0.05, 0.0) && !is_strained(1.6, 0.05, 0.1));
+        assert!(is_strained(2.01, 0.02, 0.1) && !is_strained(2.05, 0.02, 0.1));
+        assert!(is_strained(1.6, f32::NAN, 0.0));
+    }
+}
