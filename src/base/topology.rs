@@ -218,14 +218,15 @@ pub(super) fn groups(vertices: usize, links: impl Iterator<Item = [u32; 2]>) -> 
 }
 
 /// Disjoint sets: each index leads to a lesser one of its set, the least to itself.
-struct Sets(Vec<u32>);
+#[derive(Clone)]
+pub(super) struct Sets(Vec<u32>);
 
 impl Sets {
-    fn new(count: usize) -> Self {
+    pub(super) fn new(count: usize) -> Self {
         Self((0..count as u32).collect())
     }
 
-    fn root(&mut self, mut at: u32) -> u32 {
+    pub(super) fn root(&mut self, mut at: u32) -> u32 {
         while self.0[at as usize] != at {
             let up = self.0[self.0[at as usize] as usize];
             self.0[at as usize] = up;
@@ -234,7 +235,7 @@ impl Sets {
         at
     }
 
-    fn join(&mut self, a: u32, b: u32) {
+    pub(super) fn join(&mut self, a: u32, b: u32) {
         let (a, b) = (self.root(a), self.root(b));
         self.0[a.max(b) as usize] = a.min(b);
     }

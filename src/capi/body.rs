@@ -220,6 +220,9 @@ fn warn(ctx: &Context, role: Role, id: u64, body: &Body, known: Option<&Arc<Shap
     if known.is_some_and(|known| Arc::ptr_eq(known, body.shape())) {
         return;
     }
+    if let Some(what) = body.weld_warning() {
+        ctx.warn(&format!("body {id}: {what}"));
+    }
     let (loops, edges) = (body.closed_loops(), body.contradictions());
     if role == Role::Push && loops + edges > 0 {
         ctx.warn(&format!("body {id}: the mesh has no inside: grains collide with both of its sides"));

@@ -1,6 +1,7 @@
 //! Options that several commands share, and how their values are written.
 
 use frazil::Result;
+use frazil::base::weld::Weld;
 use frazil::base::{DVec3, TriMesh};
 use frazil::motion::{Space, Up};
 use frazil::render::Size;
@@ -40,8 +41,25 @@ impl MeshSpace {
     pub fn read(&self, path: &Path) -> Result<TriMesh> {
         let mut mesh = frazil::io::mesh::read(path)?;
         let space = self.space();
+        if space.scale != 1.0 {
+            join_corners(&mut mesh);
+        }
         mesh.positions.iter_mut().for_each(|position| *position = space.place(position.cast()).cast());
         Ok(mesh)
+    }
+}
+
+/// Brings vertices that are one corner to one position: once they are scaled, nothing says what rounding they have.
+pub fn join_corners(mesh: &mut TriMesh) {
+    let places: Vec<DVec3> = mesh.positions.iter().map(|place| place.cast()).collect();
+    Weld::of(&places, &mesh.triangles).unify(&mut mesh.positions);
+}
+
+/// Warns of corners of a file's mesh that rounding does not decide.
+pub fn warn_of_corners(path: &Path, mesh: &TriMesh) {
+    let places: Vec<DVec3> = mesh.positions.iter().map(|place| place.cast()).collect();
+    if let Some(what) = Weld::of(&places, &mesh.triangles).warning() {
+        log::warn!("{}: {what}", path.display());
     }
 }
 

@@ -9,7 +9,8 @@ use super::chain::{Weights, Window, boundary};
 use super::refine::{edge_error, refine};
 use super::topology::{Simplex, Topology};
 use crate::base::DVec3;
-use crate::base::mesh::coincident;
+use crate::base::mesh::{coincident, spacing};
+use crate::base::weld::{Boundary, STEPS, Weld};
 use crate::context::Context;
 use crate::distance::Face;
 use crate::distance::lattice::{Fixed, Lattice, UNITS};
@@ -48,7 +49,13 @@ pub struct Shape {
     /// Hash of the triangles.
     triangles: u128,
     /// For each vertex the first one at the same position; itself when there is none before it.
-    same: Vec<u32>,
+    exact: Vec<u32>,
+    /// What these leave open.
+    boundary: Boundary,
+    /// Which vertices are one corner, those within rounding of one another included.
+    weld: Weld,
+    /// How far welded vertices that are not at one position were apart (m), at most.
+    slack: f64,
     /// Whether the triangles were flipped.
     reversed: bool,
     topology: Topology,
@@ -56,8 +63,8 @@ pub struct Shape {
 }
 
 impl Body {
-    /// Prepares a motion: welds vertices that coincide at `time` (s), closes open loops, and flips
-    /// the triangles if the solid would have a negative volume.
+    /// Prepares a motion: welds vertices that coincide at `time` (s), or on open edges lie within rounding of each other
+    /// ([`Weld`]), closes open loops, and flips the triangles if the solid would have a negative volume.
     ///
     /// # Errors
     /// When the motion has no triangles, or its pose cannot be computed.
@@ -77,13 +84,15 @@ impl Body {
         let mut pose = Vec::new();
         motion.pose(time, &mut pose)?;
         let triangles = hash_of(motion.triangles());
-        let same = if motion.keeps_its_welds() {
+        let exact = if motion.keeps_its_welds() {
             (0..pose.len() as u32).collect()
         } else {
             coincident(pose.iter().copied())
         };
-        let known = known.filter(|known| known.triangles == triangles && known.same == same);
-        let shape = known.unwrap_or_else(|| Arc::new(Shape::new(&*motion, triangles, same)));
+        let shape = match known.filter(|known| known.triangles == triangles && known.exact == exact) {
+            Some(known) if known.is_welded_alike(&*motion, time)? => known,
+            _ => Arc::new(Shape::new(&*motion, time, &pose, triangles, exact)?),
+        };
         shape.topology.complete(&mut pose);
         let volume = volume(&shape.topology, &pose);
         let inside_out = if shape.reversed { volume > 0.0 } else { volume < 0.0 };
@@ -123,6 +132,16 @@ impl Body {
     /// counterpart.
     pub fn contradictions(&self) -> usize {
         self.shape.contradictions
+    }
+
+    /// For each vertex of its motion the first one that is the same corner; itself where there is none before it.
+    pub fn corners(&self) -> &[u32] {
+        &self.shape.weld.firsts
+    }
+
+    /// What to say about corners that rounding does not decide; none where there are none.
+    pub fn weld_warning(&self) -> Option<String> {
+        self.shape.weld.warning()
     }
 
     /// Its triangles with the caps of its open loops, counter-clockwise seen from outside; [`Body::closed_pose`] has their vertices.
@@ -180,7 +199,7 @@ impl Body {
         let near = Near::new(window, self.longest_edge / lattice.voxel);
         let mut poses = self.poses(ctx, from, to, lattice, tolerance, &near)?;
         ctx.check()?;
-        let apart = self.welds_part(&poses);
+        let apart = self.welds_part(&poses, lattice);
         let separate;
         let topology = if apart {
             let identity: Vec<u32> = (0..self.motion.vertex_count() as u32).collect();
@@ -308,11 +327,23 @@ impl Body {
         arcs.max(twists).ceil().clamp(1.0, MOST_STEPS) as usize
     }
 
-    /// Whether welded vertices have moved apart.
-    fn welds_part(&self, poses: &[Vec<DVec3>]) -> bool {
-        self.shape.same.iter().enumerate().any(|(vertex, &same)| {
-            same as usize != vertex && poses.iter().any(|pose| pose[vertex] != pose[same as usize])
-        })
+    /// Whether welded vertices have moved apart in poses (cells): those that were at one position at all, the others by more than the
+    /// rounding of their coordinates.
+    fn welds_part(&self, poses: &[Vec<DVec3>], lattice: &Lattice) -> bool {
+        let Shape { exact, weld, slack, .. } = &*self.shape;
+        let origin = DVec3::from(lattice.origin.map(f64::from));
+        let rounding = |cells: &DVec3| {
+            let farthest = (cells + origin).amax() * lattice.voxel;
+            (slack + f64::from(STEPS as i32) * 3f64.sqrt() * spacing(farthest)) / lattice.voxel
+        };
+        let differ = |(vertex, &first): (usize, &u32)| {
+            first as usize != vertex && poses.iter().any(|pose| pose[vertex] != pose[first as usize])
+        };
+        let is_apart = |&vertex: &u32| {
+            let [vertex, first] = [vertex, weld.firsts[vertex as usize]].map(|vertex| vertex as usize);
+            poses.iter().any(|pose| (pose[vertex] - pose[first]).norm() > rounding(&pose[vertex]))
+        };
+        exact.iter().enumerate().any(differ) || weld.near.iter().any(is_apart)
     }
 }
 
@@ -347,17 +378,51 @@ impl Near {
 }
 
 impl Shape {
-    fn new(motion: &dyn Motion, triangles: u128, same: Vec<u32>) -> Self {
-        let made = |close| Topology::new(motion.triangles(), motion.vertex_count(), &same, close);
-        let (topology, contradictions) = (made(true), made(false).contradictions());
-        Self { triangles, same, reversed: false, topology, contradictions }
+    /// Of a motion that has this pose at a time (s), where the hash of its triangles and its vertices at equal positions are known.
+    fn new(motion: &dyn Motion, time: f64, pose: &[DVec3], triangles: u128, exact: Vec<u32>) -> Result<Self> {
+        let made =
+            |same: &[u32], close| Topology::new(motion.triangles(), motion.vertex_count(), same, close);
+        let mut open = made(&exact, false);
+        let (mut boundary, mut weld) =
+            (Boundary::default(), Weld { firsts: exact.clone(), ..Weld::default() });
+        if !motion.keeps_its_welds() && open.has_lone_triangles() {
+            boundary = Boundary::of(motion.triangles(), &exact);
+            weld = welded(motion, time, &exact, &boundary)?;
+            open = made(&weld.firsts, false);
+        }
+        let apart = |&vertex: &u32| {
+            let first = weld.firsts[vertex as usize];
+            (pose[vertex as usize] - pose[first as usize]).norm()
+        };
+        let slack = weld.near.iter().map(apart).fold(0.0, f64::max);
+        let (topology, contradictions) = (made(&weld.firsts, true), open.contradictions());
+        Ok(Self { triangles, exact, boundary, weld, slack, reversed: false, topology, contradictions })
+    }
+
+    /// Whether a motion with the same triangles and the same vertices at equal positions has the same corners at a time (s).
+    fn is_welded_alike(&self, motion: &dyn Motion, time: f64) -> Result<bool> {
+        Ok(self.boundary.is_empty() || welded(motion, time, &self.exact, &self.boundary)? == self.weld)
     }
 
     fn turned_round(&self) -> Self {
         let mut topology = self.topology.clone();
         topology.simplices.iter_mut().for_each(|simplex| simplex.sign = -simplex.sign);
-        Self { same: self.same.clone(), reversed: !self.reversed, topology, ..*self }
+        Self {
+            exact: self.exact.clone(),
+            boundary: self.boundary.clone(),
+            weld: self.weld.clone(),
+            reversed: !self.reversed,
+            topology,
+            ..*self
+        }
     }
+}
+
+/// The corners of a motion at a time (s), by the rounding of its coordinates as they were read.
+fn welded(motion: &dyn Motion, time: f64, exact: &[u32], boundary: &Boundary) -> Result<Weld> {
+    let mut read = Vec::new();
+    motion.pose_as_read(time, &mut read)?;
+    Ok(Weld::with_boundary(&read, motion.triangles(), exact.to_vec(), boundary))
 }
 
 fn hash_of(triangles: &[[u32; 3]]) -> u128 {

@@ -12,6 +12,7 @@ mod program;
 mod base {
     mod faults;
     mod meshes;
+    mod weld;
 }
 mod capi {
     mod header;
@@ -30,6 +31,7 @@ mod cli {
     mod repair;
     mod runs;
     mod shallow;
+    mod soup;
     mod speed;
     mod tools;
     mod words;
@@ -144,6 +146,7 @@ mod sweep {
     mod chain;
     mod folds;
     mod methods;
+    mod soup;
     mod window;
 }
 mod vdb {

@@ -2,7 +2,7 @@
 
 use super::VdbOutput;
 use crate::cli::exit::{Failure, Phase};
-use crate::cli::options::{MeshSpace, positive};
+use crate::cli::options::{MeshSpace, positive, warn_of_corners};
 use crate::cli::session::Session;
 use frazil::sweep::{self, Settings};
 use std::path::PathBuf;
@@ -34,6 +34,7 @@ pub fn run(args: &Args, session: &Session) -> Result<(), Failure> {
     if let Some(what) = super::far_mesh(&args.mesh, &mesh, args.cell) {
         log::warn!("{what}");
     }
+    warn_of_corners(&args.mesh, &mesh);
     super::check_surface(session, mesh.area(), args.cell).before()?;
     let grid = sweep::voxelise(&session.ctx, mesh, &settings).during()?;
     args.output.write(session, grid).during()

@@ -105,6 +105,9 @@ impl Args {
         }
         self.check_memory(session, [&ends[0], &ends[1]])?;
         let bodies = [Body::new(motion, from).before()?];
+        if let Some(what) = bodies[0].weld_warning() {
+            log::warn!("{}: {what}", self.mesh[0].display());
+        }
         match self.method {
             Method::Chain => sweep::chain(&session.ctx, &bodies, from, to, settings).during(),
             Method::Samples => {

@@ -5,6 +5,7 @@
 //! numbers then gives the layer, without the ghost surfaces that CSG of coincident faces leaves.
 
 use crate::base::mesh::coincident;
+use crate::base::weld::Weld;
 use crate::base::{DVec3, TriMesh};
 use crate::context::Context;
 use crate::error::{Error, Result};
@@ -154,7 +155,8 @@ fn nowhere_thick(layer: &FloatGrid) -> Result<Option<String>> {
     }))
 }
 
-/// A mesh with 64-bit positions: the corners of a plane are exact, however far from the origin.
+/// A mesh with 64-bit positions: the corners of a plane are exact, however far from the origin. Vertices that are one corner are at one
+/// position.
 struct Sheet {
     positions: Vec<DVec3>,
     triangles: Vec<[u32; 3]>,
@@ -162,7 +164,8 @@ struct Sheet {
 
 impl Sheet {
     fn of(mesh: &TriMesh) -> Self {
-        let positions = mesh.positions.iter().map(|p| p.cast()).collect();
+        let mut positions: Vec<DVec3> = mesh.positions.iter().map(|p| p.cast()).collect();
+        Weld::of(&positions, &mesh.triangles).unify(&mut positions);
         Self { positions, triangles: mesh.triangles.clone() }
     }
 
