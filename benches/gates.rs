@@ -102,6 +102,8 @@ mod rebuilt_sequences;
 mod rebuilt_speed;
 #[path = "gates/rebuilt_topology.rs"]
 mod rebuilt_topology;
+#[path = "gates/reliability/soup.rs"]
+mod reliability_soup;
 #[path = "gates/repair.rs"]
 mod repair;
 #[path = "gates/rest.rs"]
@@ -243,6 +245,7 @@ fn main() {
     splashsurf::run(&mut h);
     tracker_cancel::run(&mut h);
     repair::run(&mut h);
+    reliability_soup::run(&mut h);
     rebuilt::run(&mut h);
     rebuilt_topology::run(&mut h);
     textures::run(&mut h);

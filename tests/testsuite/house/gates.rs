@@ -63,8 +63,11 @@ fn gates_are_declared_once_and_an_aim_keeps_the_bound() {
 #[test]
 fn the_names_in_the_code_are_declared() {
     let mut count = 0;
-    for entry in fs::read_dir(Path::new(env!("CARGO_MANIFEST_DIR")).join("benches/gates")).unwrap() {
-        let path = entry.unwrap().path();
+    let gates = Path::new(env!("CARGO_MANIFEST_DIR")).join("benches/gates");
+    let files = |folder: &Path| fs::read_dir(folder).unwrap().map(|entry| entry.unwrap().path());
+    let (folders, mut sources): (Vec<_>, Vec<_>) = files(&gates).partition(|path| path.is_dir());
+    sources.extend(folders.iter().flat_map(|folder| files(folder)));
+    for path in sources {
         let text = fs::read_to_string(&path).unwrap();
         for (call, is_whole) in [("gate", true), ("holds", true), ("skipped", false), ("wants", false)] {
             for rest in text.split(&format!("h.{call}(")).skip(1) {
