@@ -116,6 +116,8 @@ mod reliability_bugs;
 mod reliability_gltf_valid;
 #[path = "gates/reliability/guard_page.rs"]
 mod reliability_guard_page;
+#[path = "gates/reliability/soup.rs"]
+mod reliability_soup;
 #[path = "gates/repair.rs"]
 mod repair;
 #[path = "gates/rest.rs"]
@@ -261,6 +263,7 @@ fn main() {
     splashsurf::run(&mut h);
     tracker_cancel::run(&mut h);
     repair::run(&mut h);
+    reliability_soup::run(&mut h);
     rebuilt::run(&mut h);
     rebuilt_topology::run(&mut h);
     textures::run(&mut h);

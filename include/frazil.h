@@ -1284,7 +1284,7 @@ typedef struct {
      */
     uint32_t rung;
     /**
-     * Vertices joined with others at the same place.
+     * Vertices joined with others that are the same corner: at the same position, or on open edges within rounding of it.
      */
     uint64_t joined_vertices;
     /**
@@ -3150,7 +3150,8 @@ frz_status frz_mesh_attribute(const frz_mesh *mesh,
  *
  * mesh: it stays as it is.
  * cell: edge of a cell (m), 1e-9 to 1e6, about as long as the mesh's edges: what is thinner may be lost where it is rebuilt.
- *     FRZ_ERROR_ARGUMENT where the mesh reaches farther than 131072 cells from its middle, or encloses nothing.
+ *     FRZ_ERROR_ARGUMENT where the mesh reaches farther than 131072 cells from its middle, encloses nothing, or nearly all of it would
+ *     be lost. Where less is lost a warning says so: half of the volume, or a twentieth of its extent and two cells.
  * out: receives the new mesh, to be destroyed with frz_mesh_destroy; NULL after a failure.
  * report: receives what was done, all zeroes after a failure; may be NULL. Its struct_size is set by the caller.
  *

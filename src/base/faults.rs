@@ -8,6 +8,7 @@ use super::mesh::{coincident, used};
 use super::near::Near;
 use super::orient::is_flat;
 use super::topology::{Survey, Topology, collapsed, firsts, groups, parts};
+use super::weld::Weld;
 use super::{DVec3, TriMesh};
 
 /// Triangles a task looks at.
@@ -15,14 +16,19 @@ const GRAIN: usize = 512;
 /// Volumes of parts up to this many cubes of their size are none: rounding makes as much.
 const ROUNDING: f64 = 1e-12;
 
-/// Faults and properties of a mesh. Vertices at the same position count as one, but in `by_index`. Every count is exact
-/// for the mesh's 32-bit coordinates, without tolerance, but for `inverted_parts`, which go by volumes and rays in 64 bits.
+/// Faults and properties of a mesh. Vertices at the same position count as one, and so do those within rounding of one another on open
+/// edges ([`Weld`]), but in `by_index`. Every count is exact for the 32-bit coordinates that this leaves, without tolerance, but for
+/// `inverted_parts`, which go by volumes and rays in 64 bits.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Faults {
     /// Vertices that no triangle names.
     pub unused_vertices: usize,
     /// Vertices that share their place with one before them.
     pub doubled_vertices: usize,
+    /// Vertices on open edges that are joined with one before them within rounding.
+    pub near_vertices: usize,
+    /// Vertices on open edges that are within rounding of others, but which of them are one is not clear ([`Weld::ambiguous`]).
+    pub ambiguous_vertices: usize,
     /// Triangles with two corners at the same place, or without area; nothing below counts them.
     pub degenerate: usize,
     /// Triangles with the corners of one before them, in any order; nothing below counts them.
@@ -69,11 +75,12 @@ impl Faults {
     /// Surveys a mesh whose positions are finite and whose indices are in range.
     pub fn of(mesh: &TriMesh) -> Self {
         let vertices = mesh.positions.len();
-        let same = coincident(mesh.positions.iter().map(|p| p.cast()));
-        let doubled_vertices =
-            same.iter().enumerate().filter(|(vertex, same)| **same as usize != *vertex).count();
+        let places: Vec<DVec3> = mesh.positions.iter().map(|p| p.cast()).collect();
+        let weld = Weld::of(&places, &mesh.triangles);
+        let same = &weld.firsts;
+        let one_corner = same.iter().enumerate().filter(|(vertex, same)| **same as usize != *vertex).count();
         let flat = |corners: [u32; 3]| is_flat(&corners.map(|vertex| mesh.positions[vertex as usize]));
-        let Kept { kept, degenerate, doubled_triangles } = kept(&mesh.triangles, &same, flat);
+        let Kept { kept, degenerate, doubled_triangles } = kept(&mesh.triangles, same, flat);
         let survey = Survey::of(vertices, &kept);
         let parts = parts(vertices, &kept);
         let joined = TriMesh { positions: mesh.positions.clone(), triangles: kept };
@@ -82,7 +89,9 @@ impl Faults {
         let is_closed = survey.open.is_empty() && survey.crowded.is_empty() && survey.turned.is_empty();
         Self {
             unused_vertices: used(vertices, &mesh.triangles).map_or(0, |used| vertices - used.len()),
-            doubled_vertices,
+            doubled_vertices: one_corner - weld.near.len(),
+            near_vertices: weld.near.len(),
+            ambiguous_vertices: weld.ambiguous.len(),
             degenerate,
             doubled_triangles,
             holes: groups(vertices, survey.open.iter().copied()),
@@ -147,15 +156,21 @@ pub fn meeting_pairs(mesh: &TriMesh) -> Vec<[u32; 2]> {
 }
 
 /// Holes of a mesh: connected sets of edges with one triangle, as [`Faults::holes`]; in 64 bits, where rounding decides
-/// whether a triangle has an area.
-pub fn holes(places: &[DVec3], triangles: &[[u32; 3]]) -> usize {
-    let same = coincident(places.iter().copied());
+/// whether a triangle has an area. `same` has for each vertex the first one that is the same corner ([`Weld::firsts`]).
+pub fn holes(places: &[DVec3], triangles: &[[u32; 3]], same: &[u32]) -> usize {
     let flat = |corners: [u32; 3]| {
         let [a, b, c] = corners.map(|vertex| places[vertex as usize]);
         (b - a).cross(&(c - a)).norm_squared() == 0.0
     };
-    let survey = Survey::of(places.len(), &kept(triangles, &same, flat).kept);
+    let survey = Survey::of(places.len(), &kept(triangles, same, flat).kept);
     groups(places.len(), survey.open.into_iter())
+}
+
+/// Area (m2) of the triangles that count: all but those with the corners of one before them.
+pub fn counted_area(mesh: &TriMesh) -> f64 {
+    let places: Vec<DVec3> = mesh.positions.iter().map(|p| p.cast()).collect();
+    let kept = kept(&mesh.triangles, &Weld::of(&places, &mesh.triangles).firsts, |_| false).kept;
+    TriMesh { positions: mesh.positions.clone(), triangles: kept }.area()
 }
 
 /// The triangles that count, with joined corners, and how many do not.

@@ -26,6 +26,7 @@ pub mod points;
 pub mod polygons;
 pub mod topology;
 pub mod uvs;
+pub mod weld;
 
 /// A point, direction or velocity in 32 bits: fields and mesh vertices (m, m/s).
 pub type Vec3 = nalgebra::Vector3<f32>;

@@ -218,6 +218,7 @@ pub(super) fn groups(vertices: usize, links: impl Iterator<Item = [u32; 2]>) -> 
 }
 
 /// Disjoint sets: each index leads to a lesser one of its set, the least to itself.
+#[derive(Clone)]
 pub(super) struct Sets(Vec<u32>);
 
 impl Sets {

@@ -231,7 +231,7 @@ fn warn(ctx: &Context, role: Role, id: u64, body: &Body, known: Option<&Arc<Shap
     if known.is_some_and(|known| Arc::ptr_eq(known, body.shape())) {
         return;
     }
-    if let Some(what) = body.doubts() {
+    for what in body.doubts().map(String::from).into_iter().chain(body.weld_warning()) {
         ctx.warn(&format!("body {id}: {what}"));
     }
     let (loops, edges) = (body.closed_loops(), body.contradictions());

@@ -19,7 +19,7 @@ pub struct frz_repair_report {
     /// How much more was rebuilt than the cells at fault, and what they need: 0 nothing, 1 a ring of cells around them, 2 the whole
     /// parts of the mesh that pass through them, 3 everything.
     pub rung: u32,
-    /// Vertices joined with others at the same place.
+    /// Vertices joined with others that are the same corner: at the same position, or on open edges within rounding of it.
     pub joined_vertices: u64,
     /// Triangles left out: without area, doubled or alone, and those of parts that lay on a part like them.
     pub dropped_triangles: u64,
@@ -80,7 +80,8 @@ impl frz_repair_report {
 ///
 /// mesh: it stays as it is.
 /// cell: edge of a cell (m), 1e-9 to 1e6, about as long as the mesh's edges: what is thinner may be lost where it is rebuilt.
-///     FRZ_ERROR_ARGUMENT where the mesh reaches farther than 131072 cells from its middle, or encloses nothing.
+///     FRZ_ERROR_ARGUMENT where the mesh reaches farther than 131072 cells from its middle, encloses nothing, or nearly all of it would
+///     be lost. Where less is lost a warning says so: half of the volume, or a twentieth of its extent and two cells.
 /// out: receives the new mesh, to be destroyed with frz_mesh_destroy; NULL after a failure.
 /// report: receives what was done, all zeroes after a failure; may be NULL. Its struct_size is set by the caller.
 ///
@@ -114,6 +115,9 @@ pub unsafe extern "C" fn frz_mesh_repair(
 /// A repaired mesh with its attributes, and what was done.
 fn repaired(ctx: &Context, mesh: &Mesh, cell: f64) -> Outcome<(Mesh, RepairReport)> {
     let Repaired { mesh: solid, vertices, sources, report } = repair(ctx, &mesh.triangles, cell)?;
+    if let Some(what) = report.losses.warning(report.cell) {
+        ctx.warn(&what);
+    }
     // One array for each component: they are carried one by one.
     let arrays = mesh.attributes().flat_map(|(name, components, values)| {
         (0..components).map(move |component| {

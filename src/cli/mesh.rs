@@ -3,11 +3,11 @@
 use std::path::{Path, PathBuf};
 
 use clap::Subcommand;
-use frazil::base::TriMesh;
 use frazil::base::faults::Faults;
-use frazil::base::mesh::coincident;
 use frazil::base::orient::is_flat;
 use frazil::base::topology::Topology;
+use frazil::base::weld::Weld;
+use frazil::base::{DVec3, TriMesh};
 use frazil::motion::{Character, is_gltf};
 use serde_json::{Value, json};
 
@@ -114,6 +114,8 @@ fn report(path: &Path, mesh: &TriMesh, faults: &Faults, bodies: &[Body]) -> Valu
         "degenerate_triangles": faults.degenerate,
         "doubled_triangles": faults.doubled_triangles,
         "doubled_vertices": faults.doubled_vertices,
+        "near_vertices": faults.near_vertices,
+        "ambiguous_vertices": faults.ambiguous_vertices,
         "unused_vertices": faults.unused_vertices,
         "bodies": bodies.iter().map(Body::report).collect::<Value>(),
         "by_index": by_index(&faults.by_index),
@@ -169,7 +171,8 @@ impl Body {
 
 /// See [`Body`].
 fn bodies(mesh: &TriMesh) -> Vec<TriMesh> {
-    let same = coincident(mesh.positions.iter().map(|place| place.cast()));
+    let places: Vec<DVec3> = mesh.positions.iter().map(|place| place.cast()).collect();
+    let same = Weld::of(&places, &mesh.triangles).firsts;
     let joined = mesh.triangles.iter().map(|corners| corners.map(|vertex| same[vertex as usize]));
     let place = |vertex: u32| mesh.positions[vertex as usize];
     let triangles: Vec<[u32; 3]> = joined.filter(|corners| !is_flat(&corners.map(place))).collect();
@@ -251,7 +254,7 @@ const JOINTS: [Counted; 4] = [
     ),
 ];
 
-const TRIANGLES: [Counted; 9] = [
+const TRIANGLES: [Counted; 11] = [
     (
         "crossings",
         [
@@ -291,6 +294,20 @@ const TRIANGLES: [Counted; 9] = [
         ["vertex at the place of another: joined", "vertices at the place of another: joined"],
     ),
     (
+        "near_vertices",
+        [
+            "vertex on an open edge within rounding of another: joined",
+            "vertices on open edges within rounding of others: joined",
+        ],
+    ),
+    (
+        "ambiguous_vertices",
+        [
+            "vertex on an open edge within rounding of others: which of them it is is not clear",
+            "vertices on open edges within rounding of others: which of them are one is not clear",
+        ],
+    ),
+    (
         "unused_vertices",
         ["vertex that no triangle names: ignored", "vertices that no triangle names: ignored"],
     ),
@@ -303,6 +320,9 @@ fn in_words(mesh: &Value) -> String {
     let what = match (mesh["solid"] == json!(true), as_it_is("open_edges")) {
         (false, _) => "not a solid as it is",
         (true, 0) => "a solid",
+        (true, _) if count("near_vertices") > 0 => {
+            "a solid, once vertices within rounding of one position are joined"
+        }
         (true, _) => "a solid, once vertices at one place are joined",
     };
     let [vertices, triangles, parts] = [

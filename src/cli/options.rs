@@ -2,6 +2,7 @@
 
 use frazil::Result;
 use frazil::base::mesh::{BY_OPTION, is_coarse};
+use frazil::base::weld::Weld;
 use frazil::base::{DVec3, PolygonMesh, TriMesh};
 use frazil::motion::{Space, Up};
 use frazil::render::Size;
@@ -57,6 +58,9 @@ impl MeshSpace {
     /// Brings a mesh that was read less the origin into metres, Y up.
     pub fn bring(&self, mesh: &mut TriMesh) {
         let space = self.space();
+        if space.scale != 1.0 {
+            join_corners(mesh);
+        }
         mesh.positions.iter_mut().for_each(|position| *position = space.vector(position.cast()).cast());
     }
 }
@@ -72,6 +76,20 @@ impl Origin {
 pub fn warn_if_far(path: &Path, mesh: &TriMesh) {
     if let Some(what) = is_coarse(&path.display().to_string(), mesh, BY_OPTION) {
         log::warn!("{what}");
+    }
+}
+
+/// Brings vertices that are one corner to one position: once they are scaled, nothing says what rounding they have.
+pub fn join_corners(mesh: &mut TriMesh) {
+    let places: Vec<DVec3> = mesh.positions.iter().map(|place| place.cast()).collect();
+    Weld::of(&places, &mesh.triangles).unify(&mut mesh.positions);
+}
+
+/// Warns of corners of a file's mesh that rounding does not decide.
+pub fn warn_of_corners(path: &Path, mesh: &TriMesh) {
+    let places: Vec<DVec3> = mesh.positions.iter().map(|place| place.cast()).collect();
+    if let Some(what) = Weld::of(&places, &mesh.triangles).warning() {
+        log::warn!("{}: {what}", path.display());
     }
 }
 

@@ -80,6 +80,9 @@ pub fn run(args: &Args, session: &Session) -> std::result::Result<(), Failure> {
             Err(error @ Error::File { .. }) if told.is_empty() => return Err(Failure::refused(error)),
             repaired => repaired.during()?,
         };
+        if let Some(what) = warning(&repaired) {
+            log::warn!("{}: {what}", from.display());
+        }
         let mut report = report(&detail.mesh, &repaired, cell);
         report["file"] = json!(from.display().to_string());
         report["output"] = json!(to.display().to_string());
@@ -126,6 +129,18 @@ fn repaired(session: &Session, path: &Path, mesh: &TriMesh, cell: f64) -> Result
         Error::Argument(what) => Error::file(path, what),
         other => other,
     })
+}
+
+/// What to say of a repair besides what was done: what is lost, and corners of which it is not clear which are one.
+fn warning(repaired: &Repaired) -> Option<String> {
+    let report = &repaired.report;
+    let count = report.prepared.ambiguous_vertices;
+    let unclear = format!(
+        "{count} corners on open edges lie within rounding of others, but which of them are one is not clear: they are left as they are"
+    );
+    let all: Vec<String> =
+        (count > 0).then_some(unclear).into_iter().chain(report.losses.warning(report.cell)).collect();
+    (!all.is_empty()).then(|| all.join("; "))
 }
 
 /// Whether a mesh had no need of a repair.
@@ -271,6 +286,12 @@ fn report(mesh: &TriMesh, repaired: &Repaired, cell: Cell) -> Value {
         "made_triangles": after.triangles.len() - report.kept_triangles,
         "triangles": after.triangles.len(),
         "slivers": report.slivers,
+        "area_before_m2": report.losses.areas[0],
+        "area_m2": report.losses.areas[1],
+        "longest_side_before_m": report.losses.sides[0],
+        "longest_side_m": report.losses.sides[1],
+        "lost": report.losses.warning(report.cell).is_some(),
+        "ambiguous_vertices": done.ambiguous_vertices,
         "volume_before_m3": mesh.volume(),
         "volume_m3": after.volume(),
     })
@@ -280,7 +301,10 @@ fn report(mesh: &TriMesh, repaired: &Repaired, cell: Cell) -> Value {
 const DONE: [Counted; 5] = [
     (
         "joined_vertices",
-        ["vertex joined with another at its place", "vertices joined with others at their places"],
+        [
+            "vertex joined with another that is the same corner",
+            "vertices joined with others that are the same corners",
+        ],
     ),
     (
         "dropped_triangles",
@@ -313,7 +337,8 @@ fn in_words(report: &Value, cell: Cell) -> String {
     if report["solid_already"] == json!(true) {
         return format!("{file} is a solid already: written as it is\n");
     }
-    let mut out = format!("{file}: a solid now, in {output}\n");
+    let what = if report["lost"] == json!(true) { "a solid now, but not all of it" } else { "a solid now" };
+    let mut out = format!("{file}: {what}, in {output}\n");
     for (key, forms) in DONE.into_iter().filter(|(key, _)| count(key) > 0) {
         out += &format!("  {:>8} {}\n", count(key), form(count(key), forms));
     }

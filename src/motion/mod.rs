@@ -43,6 +43,15 @@ pub trait Motion: Send + Sync {
     /// What a file read on demand reports.
     fn pose(&self, time: f64, out: &mut Vec<DVec3>) -> Result<()>;
 
+    /// As [`Motion::pose`], but in the unit and around the origin in which the vertices were read, before anything turned or moved them:
+    /// the rounding of these coordinates is known ([`crate::base::weld`]).
+    ///
+    /// # Errors
+    /// As [`Motion::pose`].
+    fn pose_as_read(&self, time: f64, out: &mut Vec<DVec3>) -> Result<()> {
+        self.pose(time, out)
+    }
+
     /// The mesh as its file has it, to write. [`Motion::triangles`], which sweep the snow, may join vertices that always move
     /// together, and omit vertices without a triangle.
     fn drawn(&self) -> Drawn<'_> {

@@ -174,6 +174,12 @@ impl Motion for Rigid {
         Ok(())
     }
 
+    fn pose_as_read(&self, _time: f64, out: &mut Vec<DVec3>) -> Result<()> {
+        out.clone_from(&self.positions);
+        self.faces.keep_moving(out);
+        Ok(())
+    }
+
     fn drawn(&self) -> Drawn<'_> {
         self.faces.drawn()
     }
@@ -226,6 +232,10 @@ impl Motion for Placed {
         self.inner.pose(time, out)?;
         self.place(time, out);
         Ok(())
+    }
+
+    fn pose_as_read(&self, time: f64, out: &mut Vec<DVec3>) -> Result<()> {
+        self.inner.pose_as_read(time, out)
     }
 
     fn drawn(&self) -> Drawn<'_> {

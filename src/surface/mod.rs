@@ -91,7 +91,9 @@ pub use outlook::{Outlook, displaced};
 pub use params::Params;
 pub use paths::interpolate;
 pub use project::{Foot, foot};
-pub use repair::{Prepared, RepairReport, Repaired, Source, Traced, carried as carry_attributes, repair};
+pub use repair::{
+    Losses, Prepared, RepairReport, Repaired, Source, Traced, carried as carry_attributes, repair,
+};
 pub use report::StepReport;
 pub use rest::Rest;
 pub use sample::Sampler;

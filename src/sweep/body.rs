@@ -9,8 +9,9 @@ use super::chain::{Weights, Window, boundary};
 use super::refine::{edge_error, refine};
 use super::topology::{Simplex, Topology};
 use crate::base::DVec3;
-use crate::base::mesh::coincident;
+use crate::base::mesh::{coincident, spacing};
 use crate::base::orientation::{Closing, Orientation};
+use crate::base::weld::{Boundary, STEPS, Weld};
 use crate::context::Context;
 use crate::distance::Face;
 use crate::distance::lattice::{Fixed, Lattice, UNITS};
@@ -49,7 +50,13 @@ pub struct Shape {
     /// Hash of the triangles.
     triangles: u128,
     /// For each vertex the first one at the same position; itself when there is none before it.
-    same: Vec<u32>,
+    exact: Vec<u32>,
+    /// What these leave open.
+    boundary: Boundary,
+    /// Which vertices are one corner, those within rounding of one another included.
+    weld: Weld,
+    /// How far welded vertices that are not at one position were apart (m), at most.
+    slack: f64,
     /// The triangles as they have to be turned, where they are not the motion's own.
     oriented: Option<Vec<[u32; 3]>>,
     topology: Topology,
@@ -59,9 +66,9 @@ pub struct Shape {
 }
 
 impl Body {
-    /// Prepares a motion by its pose at `time` (s): welds vertices that coincide, leaves out doubled triangles, turns closed parts
-    /// outward (see [`crate::base::orientation`]) and closes open loops; open parts are turned round where the whole solid
-    /// would have a negative volume.
+    /// Prepares a motion by its pose at `time` (s): welds vertices that coincide, or on open edges lie within rounding of each other
+    /// ([`Weld`]), leaves out doubled triangles, turns closed parts outward (see [`crate::base::orientation`]) and closes open loops;
+    /// open parts are turned round where the whole solid would have a negative volume.
     ///
     /// # Errors
     /// When the motion has no triangles, or its pose cannot be computed.
@@ -81,23 +88,23 @@ impl Body {
         let mut pose = Vec::new();
         motion.pose(time, &mut pose)?;
         let triangles = hash_of(motion.triangles());
-        let same = if motion.keeps_its_welds() {
+        let exact = if motion.keeps_its_welds() {
             (0..pose.len() as u32).collect()
         } else {
             coincident(pose.iter().copied())
         };
-        let known = known.filter(|known| {
-            let is_same = known.triangles == triangles && known.same == same;
-            is_same && {
+        let known = match known.filter(|known| known.triangles == triangles && known.exact == exact) {
+            Some(known) if known.is_welded_alike(&*motion, time)? => {
                 known.topology.complete(&mut pose);
-                volume(&known.topology, &pose) >= 0.0
+                (volume(&known.topology, &pose) >= 0.0).then_some(known)
             }
-        });
+            _ => None,
+        };
         let shape = match known {
             Some(known) => known,
             None => {
-                pose.truncate(same.len());
-                let shape = Shape::new(motion.triangles(), triangles, same, &pose);
+                pose.truncate(exact.len());
+                let shape = Shape::new(&*motion, time, &pose, triangles, exact)?;
                 shape.topology.complete(&mut pose);
                 Arc::new(shape)
             }
@@ -137,6 +144,16 @@ impl Body {
     /// counterpart.
     pub fn contradictions(&self) -> usize {
         self.shape.contradictions
+    }
+
+    /// For each vertex of its motion the first one that is the same corner; itself where there is none before it.
+    pub fn corners(&self) -> &[u32] {
+        &self.shape.weld.firsts
+    }
+
+    /// What to say about corners that rounding does not decide; none where there are none.
+    pub fn weld_warning(&self) -> Option<String> {
+        self.shape.weld.warning()
     }
 
     /// Its triangles with the caps of its open loops, counter-clockwise seen from outside; [`Body::closed_pose`] has their vertices.
@@ -211,7 +228,7 @@ impl Body {
         let near = Near::new(window, self.longest_edge / lattice.voxel);
         let mut poses = self.poses(ctx, from, to, lattice, tolerance, &near)?;
         ctx.check()?;
-        let apart = self.welds_part(&poses);
+        let apart = self.welds_part(&poses, lattice);
         let separate;
         let topology = if apart {
             let identity: Vec<u32> = (0..self.motion.vertex_count() as u32).collect();
@@ -339,11 +356,23 @@ impl Body {
         arcs.max(twists).ceil().clamp(1.0, MOST_STEPS) as usize
     }
 
-    /// Whether welded vertices have moved apart.
-    fn welds_part(&self, poses: &[Vec<DVec3>]) -> bool {
-        self.shape.same.iter().enumerate().any(|(vertex, &same)| {
-            same as usize != vertex && poses.iter().any(|pose| pose[vertex] != pose[same as usize])
-        })
+    /// Whether welded vertices have moved apart in poses (cells): those that were at one position at all, the others by more than the
+    /// rounding of their coordinates.
+    fn welds_part(&self, poses: &[Vec<DVec3>], lattice: &Lattice) -> bool {
+        let Shape { exact, weld, slack, .. } = &*self.shape;
+        let origin = DVec3::from(lattice.origin.map(f64::from));
+        let rounding = |cells: &DVec3| {
+            let farthest = (cells + origin).amax() * lattice.voxel;
+            (slack + f64::from(STEPS as i32) * 3f64.sqrt() * spacing(farthest)) / lattice.voxel
+        };
+        let differ = |(vertex, &first): (usize, &u32)| {
+            first as usize != vertex && poses.iter().any(|pose| pose[vertex] != pose[first as usize])
+        };
+        let is_apart = |&vertex: &u32| {
+            let [vertex, first] = [vertex, weld.firsts[vertex as usize]].map(|vertex| vertex as usize);
+            poses.iter().any(|pose| (pose[vertex] - pose[first]).norm() > rounding(&pose[vertex]))
+        };
+        exact.iter().enumerate().any(differ) || weld.near.iter().any(is_apart)
     }
 }
 
@@ -378,12 +407,24 @@ impl Near {
 }
 
 impl Shape {
-    /// Of triangles with this hash, in their first pose.
-    fn new(own: &[[u32; 3]], triangles: u128, same: Vec<u32>, pose: &[DVec3]) -> Self {
-        let mut orientation = Orientation::of(pose, own, &same, Closing::Caps);
+    /// Of a motion that has this pose at a time (s), where the hash of its triangles and its vertices at equal positions are known.
+    fn new(motion: &dyn Motion, time: f64, pose: &[DVec3], triangles: u128, exact: Vec<u32>) -> Result<Self> {
+        let own = motion.triangles();
+        let (mut boundary, mut weld) =
+            (Boundary::default(), Weld { firsts: exact.clone(), ..Weld::default() });
+        if !motion.keeps_its_welds() && Topology::new(own, pose.len(), &exact, false).has_lone_triangles() {
+            boundary = Boundary::of(own, &exact);
+            weld = welded(motion, time, &exact, &boundary)?;
+        }
+        let apart = |&vertex: &u32| {
+            let first = weld.firsts[vertex as usize];
+            (pose[vertex as usize] - pose[first as usize]).norm()
+        };
+        let slack = weld.near.iter().map(apart).fold(0.0, f64::max);
+        let mut orientation = Orientation::of(pose, own, &weld.firsts, Closing::Caps);
         let of = |orientation: &Orientation| {
             let oriented = (!orientation.is_unchanged()).then(|| orientation.applied(own));
-            let topology = Topology::new(oriented.as_deref().unwrap_or(own), pose.len(), &same, false);
+            let topology = Topology::new(oriented.as_deref().unwrap_or(own), pose.len(), &weld.firsts, false);
             let contradictions = topology.contradictions();
             (oriented, topology, contradictions)
         };
@@ -400,8 +441,21 @@ impl Shape {
                 topology.close();
             }
         }
-        Self { triangles, same, oriented, topology, contradictions, doubts: orientation.warning() }
+        let doubts = orientation.warning();
+        Ok(Self { triangles, exact, boundary, weld, slack, oriented, topology, contradictions, doubts })
     }
+
+    /// Whether a motion with the same triangles and the same vertices at equal positions has the same corners at a time (s).
+    fn is_welded_alike(&self, motion: &dyn Motion, time: f64) -> Result<bool> {
+        Ok(self.boundary.is_empty() || welded(motion, time, &self.exact, &self.boundary)? == self.weld)
+    }
+}
+
+/// The corners of a motion at a time (s), by the rounding of its coordinates as they were read.
+fn welded(motion: &dyn Motion, time: f64, exact: &[u32], boundary: &Boundary) -> Result<Weld> {
+    let mut read = Vec::new();
+    motion.pose_as_read(time, &mut read)?;
+    Ok(Weld::with_boundary(&read, motion.triangles(), exact.to_vec(), boundary))
 }
 
 fn hash_of(triangles: &[[u32; 3]]) -> u128 {

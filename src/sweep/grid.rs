@@ -44,12 +44,16 @@ pub fn chain(ctx: &Context, bodies: &[Body], from: f64, to: f64, settings: &Sett
     fill(ctx, faces, lattice, settings.half_width)
 }
 
-/// Level set of the solid that a mesh bounds: winding number > 0, coincident vertices welded, open loops closed.
+/// Level set of the solid that a mesh bounds: winding number > 0, vertices that are one corner welded ([`crate::base::weld`]), open
+/// loops closed. Corners that rounding does not decide are a warning of the context.
 ///
 /// # Errors
 /// As [`chain`].
 pub fn voxelise(ctx: &Context, mesh: TriMesh, settings: &Settings) -> Result<FloatGrid> {
     let still = Body::new(Box::new(Rigid::new(mesh, Keys::default())), 0.0)?;
+    if let Some(what) = still.weld_warning() {
+        ctx.warn(&what);
+    }
     chain(ctx, &[still], 0.0, 0.0, settings)
 }
 

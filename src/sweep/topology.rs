@@ -151,6 +151,11 @@ impl Topology {
         (0..self.edges.len()).all(|edge| self.imbalance(edge) == 0)
     }
 
+    /// Whether some edge has one triangle.
+    pub fn has_lone_triangles(&self) -> bool {
+        (0..self.edges.len()).any(|edge| self.beside(edge).len() == 1)
+    }
+
     /// Edges along which two or more triangles run one way without a counterpart.
     pub fn contradictions(&self) -> usize {
         (0..self.edges.len()).filter(|&edge| self.imbalance(edge).abs() > 1).count()

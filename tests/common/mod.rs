@@ -24,6 +24,7 @@ pub mod rough_ground;
 pub mod shallow;
 pub mod shapes;
 pub mod sleigh;
+pub mod soups;
 pub mod spot;
 pub mod tools;
 pub mod usda;

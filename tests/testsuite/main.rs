@@ -13,6 +13,7 @@ mod base {
     mod faults;
     mod meshes;
     mod orientation;
+    mod weld;
 }
 mod capi {
     mod header;
@@ -32,6 +33,7 @@ mod cli {
     mod repair;
     mod runs;
     mod shallow;
+    mod soup;
     mod speed;
     mod tools;
     mod words;
@@ -149,6 +151,7 @@ mod sweep {
     mod chain;
     mod folds;
     mod methods;
+    mod soup;
     mod window;
 }
 mod vdb {

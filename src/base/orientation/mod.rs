@@ -11,8 +11,8 @@ mod pieces;
 
 use self::pieces::Pieces;
 use super::edges::{edge_uses, imbalance, is_same_edge, parts_of};
-use super::mesh::coincident;
 use super::topology::collapsed;
+use super::weld::Weld;
 use super::{DVec3, DetailedMesh, TriMesh};
 
 /// What an open part bounds.
@@ -87,11 +87,11 @@ impl Orientation {
         out
     }
 
-    /// As [`Orientation::of`], of a mesh whose vertices at the same position are one.
+    /// As [`Orientation::of`], of a mesh as it was read: vertices that are one corner ([`Weld`]) are joined.
     pub fn of_mesh(mesh: &TriMesh, closing: Closing) -> Self {
         let positions: Vec<DVec3> = mesh.positions.iter().map(|p| p.cast()).collect();
-        let same = coincident(positions.iter().copied());
-        Self::of(&positions, &mesh.triangles, &same, closing)
+        let corners = Weld::of(&positions, &mesh.triangles).firsts;
+        Self::of(&positions, &mesh.triangles, &corners, closing)
     }
 
     /// Whether all triangles stay as they are.

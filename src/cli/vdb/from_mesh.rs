@@ -2,7 +2,7 @@
 
 use super::VdbOutput;
 use crate::cli::exit::{Failure, Phase};
-use crate::cli::options::{MeshSpace, positive};
+use crate::cli::options::{MeshSpace, positive, warn_of_corners};
 use crate::cli::session::Session;
 use frazil::motion::{Keys, Rigid};
 use frazil::sweep::{self, Body, Settings};
@@ -35,6 +35,7 @@ pub fn run(args: &Args, session: &Session) -> Result<(), Failure> {
     if let Some(what) = super::far_mesh(&args.mesh, &mesh, args.cell) {
         log::warn!("{what}");
     }
+    warn_of_corners(&args.mesh, &mesh);
     super::check_surface(session, mesh.area(), args.cell).before()?;
     let still = Body::new(Box::new(Rigid::new(mesh, Keys::default())), 0.0).before()?;
     if let Some(what) = still.warning() {

@@ -105,7 +105,7 @@ impl Args {
         }
         self.check_memory(session, [&ends[0], &ends[1]])?;
         let bodies = [Body::new(motion, from).before()?];
-        if let Some(what) = bodies[0].warning() {
+        for what in bodies[0].warning().into_iter().chain(bodies[0].weld_warning()) {
             log::warn!("{}: {what}", self.mesh[0].display());
         }
         match self.method {

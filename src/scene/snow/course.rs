@@ -143,7 +143,7 @@ impl<'a> Course<'a> {
         let mut pose = Vec::new();
         let shot = self.scene.shot;
         self.body.motion().pose(f64::from(shot.frames.first) / shot.fps, &mut pose)?;
-        Ok(faults::holes(&pose, self.body.motion().triangles()))
+        Ok(faults::holes(&pose, self.body.motion().triangles(), self.body.corners()))
     }
 
     /// The lowest vertex of all frames, by height above the ground.

@@ -8,6 +8,7 @@ use super::mist;
 use super::warnings::{replaced, too_small};
 use crate::base::mesh::{BY_KEY, farthest, too_far as far_mesh};
 use crate::base::orientation::{Closing, Orientation};
+use crate::base::weld::Weld;
 use crate::base::{DVec3, TriMesh};
 use crate::context::Context;
 use crate::error::{Error, Result};
@@ -87,6 +88,7 @@ impl Inputs {
                 .map_err(|error| Error::argument(format!("{}: {error}", scene.path.display())))?;
         }
         warnings.extend(far_meshes(&snow, &source));
+        warnings.extend(unclear_corners(&snow, &source));
         let start = f64::from(scene.shot.frames.first) / scene.shot.fps;
         let (mut statics, mut bodies) = (Vec::new(), Vec::new());
         for (index, object) in scene.objects.iter().enumerate() {
@@ -96,7 +98,8 @@ impl Inputs {
             let motion = motion(scene, object, &seen, &mut warnings)?;
             match object.role {
                 Role::Static => {
-                    let mesh = posed(&*motion, start)?;
+                    let (mesh, unclear) = posed(&*motion, start)?;
+                    warnings.extend(unclear.map(|what| format!("{}: {what}", object.file.display())));
                     statics.push(oriented(mesh, &object_name(index, object), &mut warnings));
                 }
                 _ => {
@@ -111,6 +114,8 @@ impl Inputs {
                     if let Some(what) = body.warning() {
                         log::warn!("{}: {what}", object.file.display());
                     }
+                    warnings
+                        .extend(body.weld_warning().map(|what| format!("{}: {what}", object.file.display())));
                     warnings.extend(too_small(scene, object, &body, start)?);
                     bodies.push(body);
                 }
@@ -329,6 +334,24 @@ fn far_meshes(snow: &Snow, source: &Source) -> Vec<String> {
     out
 }
 
+/// What to say of corners of a ground's or top's mesh that rounding does not decide.
+fn unclear_corners(snow: &Snow, source: &Source) -> Vec<String> {
+    let told = |path: &Path, mesh: &TriMesh| {
+        let places: Vec<DVec3> = mesh.positions.iter().map(|p| p.cast()).collect();
+        let what = Weld::of(&places, &mesh.triangles).warning();
+        what.map(|what| format!("{}: {what}", path.display()))
+    };
+    let ground = match (&snow.ground, source.ground()) {
+        (Some(Ground::Mesh(path)), Some(mesh)) => told(path, mesh),
+        _ => None,
+    };
+    let top = match (&snow.layer, source.top()) {
+        (Layer::Top(path), Some(mesh)) => told(path, mesh),
+        _ => None,
+    };
+    ground.into_iter().chain(top).collect()
+}
+
 fn layer_grid(path: &Path, cell: f64, seen: &Seen) -> Result<FloatGrid> {
     // OpenVDB reads the file itself: it must be the same before and after.
     seen.hash(path)?;
@@ -409,8 +432,14 @@ fn character(scene: &Scene, object: &Object, seen: &Seen) -> Result<Character> {
     Ok(character)
 }
 
-fn posed(motion: &dyn Motion, time: f64) -> Result<TriMesh> {
+/// A motion's mesh at a time (s), with vertices that are one corner at one position, and what to say about those that may not be.
+fn posed(motion: &dyn Motion, time: f64) -> Result<(TriMesh, Option<String>)> {
     let mut pose = Vec::new();
+    motion.pose_as_read(time, &mut pose)?;
+    // Once it is turned, nothing says what rounding its coordinates have.
+    let weld = Weld::of(&pose, motion.triangles());
     motion.pose(time, &mut pose)?;
-    Ok(TriMesh { positions: pose.iter().map(|p| p.cast()).collect(), triangles: motion.triangles().to_vec() })
+    weld.unify(&mut pose);
+    let positions = pose.iter().map(|p| p.cast()).collect();
+    Ok((TriMesh { positions, triangles: motion.triangles().to_vec() }, weld.warning()))
 }

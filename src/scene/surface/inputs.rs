@@ -17,7 +17,8 @@ use crate::io::sequence::Pattern;
 use crate::io::source;
 use crate::scene::Scene;
 use crate::surface::{
-    Implicit, Isosurface, Particles, carry_attributes, estimate_spacing, repair, rough_spacing,
+    Implicit, Isosurface, Particles, Prepared, Repaired, carry_attributes, estimate_spacing, repair,
+    rough_spacing,
 };
 
 /// Arrays of the mesh that are written anew in each frame, and those that a moving mesh does not keep.
@@ -200,6 +201,13 @@ fn closed(ctx: &Context, mesh: DetailedMesh, cell: f64) -> Result<(DetailedMesh,
     }
     let repaired = repair(ctx, &mesh.mesh, cell)?;
     let kept = repaired.report.kept_triangles;
+    if is_only_joined(&mesh.mesh, &repaired) {
+        let joined = repaired.report.prepared.joined_vertices;
+        log::info!("{joined} vertices are joined with others that are the same corners");
+        let detail = carry_attributes(&mesh, repaired.mesh, &repaired.vertices, &repaired.sources, None);
+        return Ok((detail, None));
+    }
+    let lost = repaired.report.losses.warning(repaired.report.cell);
     let mut what = Vec::new();
     if !is_closed {
         what.push("is not closed as its indices have it");
@@ -211,13 +219,20 @@ fn closed(ctx: &Context, mesh: DetailedMesh, cell: f64) -> Result<(DetailedMesh,
     }
     let warning = format!(
         "it {}: it was repaired, as `frazil mesh repair --cell {:.6}` does; {kept} of {} triangles are as they were \
-         (surface.rebuild = false follows it as it is)",
+         (surface.rebuild = false follows it as it is){}",
         what.join(" and "),
         repaired.report.cell,
         mesh.mesh.triangles.len(),
+        lost.map_or(String::new(), |lost| format!("; {lost}")),
     );
     let detail = carry_attributes(&mesh, repaired.mesh, &repaired.vertices, &repaired.sources, None);
     Ok((detail, Some(warning)))
+}
+
+/// Whether all that a repair did was to join vertices that are one corner: the mesh was triangle soup, and closed.
+fn is_only_joined(mesh: &TriMesh, Repaired { report, .. }: &Repaired) -> bool {
+    let joined = Prepared { joined_vertices: report.prepared.joined_vertices, ..Prepared::default() };
+    report.prepared == joined && report.rebuilt_cells == 0 && report.kept_triangles == mesh.triangles.len()
 }
 
 /// What about a mesh matters for what follows, in a sentence.

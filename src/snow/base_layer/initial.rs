@@ -6,6 +6,7 @@
 
 use crate::base::mesh::coincident;
 use crate::base::orientation::{Closing, Orientation};
+use crate::base::weld::Weld;
 use crate::base::{DVec3, TriMesh};
 use crate::context::Context;
 use crate::error::{Error, Result};
@@ -155,7 +156,8 @@ fn nowhere_thick(layer: &FloatGrid) -> Result<Option<String>> {
     }))
 }
 
-/// A mesh with 64-bit positions: the corners of a plane are exact, however far from the origin.
+/// A mesh with 64-bit positions: the corners of a plane are exact, however far from the origin. Vertices that are one corner are at one
+/// position.
 struct Sheet {
     positions: Vec<DVec3>,
     triangles: Vec<[u32; 3]>,
@@ -165,7 +167,8 @@ impl Sheet {
     fn of(mesh: &TriMesh) -> Self {
         // Vertices that no triangle names are not part of the snow.
         let mesh = mesh.clone().without_unused();
-        let positions = mesh.positions.iter().map(|p| p.cast()).collect();
+        let mut positions: Vec<DVec3> = mesh.positions.iter().map(|p| p.cast()).collect();
+        Weld::of(&positions, &mesh.triangles).unify(&mut positions);
         Self { positions, triangles: mesh.triangles }
     }
 

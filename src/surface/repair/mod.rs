@@ -31,6 +31,7 @@ mod fans;
 mod fill;
 mod flags;
 mod holes;
+mod losses;
 mod pierces;
 mod polygon;
 mod prepare;
@@ -53,6 +54,7 @@ use crate::distance::lattice::Lattice;
 use crate::error::{Error, Result};
 
 pub use self::attributes::carried;
+pub use self::losses::Losses;
 pub use self::prepare::Prepared;
 pub use self::traced::Traced;
 pub(super) use self::{
@@ -120,6 +122,8 @@ pub struct RepairReport {
     pub rung: usize,
     /// Triangles that were made and have an altitude below 1e-4 of an edge.
     pub slivers: usize,
+    /// What it has lost.
+    pub losses: Losses,
 }
 
 /// How often a set of cells may grow by what cannot be cut.
@@ -135,13 +139,15 @@ const HALVINGS: u32 = 6;
 /// closed first. What is broken is rebuilt within a cell of that solid; solids thinner than a cell may go where they are rebuilt.
 ///
 /// # Errors
-/// A mesh that is not valid, or too large for the cell; one that encloses nothing; more memory than the context allows; cancel.
+/// A mesh that is not valid, or too large for the cell; one that encloses nothing, or of which nearly all would be lost; more memory than
+/// the context allows; cancel.
 pub fn repair(ctx: &Context, mesh: &TriMesh, cell: f64) -> Result<Repaired> {
     mesh.validate()?;
     if !(cell > 0.0 && cell.is_finite()) {
         return Err(Error::argument(format!("cell = {cell} is not over 0 m")));
     }
     let closed = ctx.phase("prepare", || Ok(prepare(mesh)))?;
+    let mut lost = None;
     let area = TriMesh { positions: closed.positions.clone(), triangles: closed.triangles.clone() }.area();
     for halving in 0..HALVINGS {
         let cell = cell / f64::from(1u32 << halving);
@@ -155,11 +161,16 @@ pub fn repair(ctx: &Context, mesh: &TriMesh, cell: f64) -> Result<Repaired> {
         }
         allowed?;
         let repaired = ctx.phase("rebuild", || rebuild(ctx, &closed, mesh.positions.len(), cell))?;
-        if let Some(repaired) = repaired {
-            return Ok(repaired);
+        if let Some(mut repaired) = repaired {
+            let losses = Losses::of(mesh, &closed, &repaired.mesh);
+            if !losses.is_nearly_all() {
+                repaired.report.losses = losses;
+                return Ok(repaired);
+            }
+            lost.get_or_insert_with(|| losses.refusal(cell));
         }
     }
-    Err(Error::argument("nothing in the mesh encloses a volume"))
+    Err(Error::argument(lost.unwrap_or_else(|| "nothing in the mesh encloses a volume".into())))
 }
 
 /// Refuses cells (m) so small that memory would not do for all of those that a surface of an area (m2) passes through.

@@ -1,6 +1,6 @@
 //! Any triangles become triangles that are closed as a chain and turned outward.
 //!
-//! Parts that are closed by their indices stay as they are. The others are joined where vertices are at the same place, then turned so
+//! Parts that are closed by their indices stay as they are. The others are joined where vertices are one corner, then turned so
 //! that neighbours agree, and their holes are closed (`holes.rs`). Every step takes some n log n operations for n triangles.
 
 use rayon::prelude::*;
@@ -8,15 +8,17 @@ use rayon::prelude::*;
 use super::copies::{copies, doubled, is_balanced};
 use super::holes::close;
 use crate::base::edges::{Use, agree, edge_uses, is_same_edge, parts_of, side, sound};
-use crate::base::mesh::coincident;
 use crate::base::orient::is_flat;
+use crate::base::weld::Weld;
 use crate::base::{DVec3, TriMesh, Vec3};
 
 /// What was done to a mesh before anything was cut.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
 pub struct Prepared {
-    /// Vertices joined with others at the same place.
+    /// Vertices joined with others at the same position, or within rounding of theirs on open edges ([`Weld`]).
     pub joined_vertices: usize,
+    /// Vertices on open edges that are within rounding of others, but which of them are one is not clear.
+    pub ambiguous_vertices: usize,
     /// Triangles without area, doubled or alone, that were left out, and those of parts that lay on a part like them.
     pub dropped_triangles: usize,
     /// Triangles turned round so that they agree with their neighbours.
@@ -86,7 +88,7 @@ pub(super) fn prepare(mesh: &TriMesh) -> Closed {
 }
 
 impl Closed {
-    /// Joins vertices at the same place, among those of triangles that are not sound: each takes the name of the first.
+    /// Joins vertices that are one corner, among those of triangles that are not sound: each takes the name of the first.
     fn join(&mut self, is_sound: &[bool]) {
         let mut is_named = vec![false; self.positions.len()];
         for (triangle, _) in self.triangles.iter().zip(is_sound).filter(|(_, sound)| !**sound) {
@@ -94,8 +96,13 @@ impl Closed {
         }
         let mut names: Vec<u32> = (0..self.positions.len() as u32).collect();
         let named: Vec<u32> = names.iter().copied().filter(|&vertex| is_named[vertex as usize]).collect();
-        let firsts = coincident(named.iter().map(|&vertex| self.positions[vertex as usize].cast()));
-        for (&vertex, first) in named.iter().zip(firsts) {
+        let places: Vec<DVec3> = named.iter().map(|&vertex| self.positions[vertex as usize].cast()).collect();
+        let unsound = self.triangles.iter().zip(is_sound).filter(|(_, sound)| !**sound);
+        let number = |vertex: u32| named.partition_point(|other| *other < vertex) as u32;
+        let triangles: Vec<[u32; 3]> = unsound.map(|(triangle, _)| triangle.map(number)).collect();
+        let weld = Weld::of(&places, &triangles);
+        self.prepared.ambiguous_vertices = weld.ambiguous.len();
+        for (&vertex, first) in named.iter().zip(weld.firsts) {
             names[vertex as usize] = named[first as usize];
             self.prepared.joined_vertices += usize::from(names[vertex as usize] != vertex);
         }
