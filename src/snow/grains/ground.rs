@@ -6,7 +6,7 @@
 use rayon::prelude::*;
 
 use super::shell::Shell;
-use crate::base::mesh::coincident;
+use crate::base::weld::Weld;
 use crate::base::{DVec3, TriMesh};
 
 /// A mesh that does not move and has a front.
@@ -75,7 +75,7 @@ struct Side {
 
 impl Sides {
     fn of(triangles: &[[u32; 3]], places: &[DVec3]) -> Self {
-        let same = coincident(places.iter().copied());
+        let same = Weld::of(places, triangles).firsts;
         let side = |(index, triangle): (usize, &[u32; 3])| {
             let ends = triangle.map(|vertex| same[vertex as usize]);
             [0, 1, 2].map(|corner: usize| {
