@@ -57,7 +57,7 @@ fn corners_are_those_of_the_file_however_a_body_is_scaled_turned_and_moved() {
         let still = Body::new(Box::new(Rigid::new(soup.clone(), Keys::default())), 0.0).unwrap();
         let far = pose_at(DVec3::new(1e5, 0.0, -3e4), turn);
         let inner = Box::new(Rigid::new(soup.clone(), Keys::default()));
-        let placed = Placed::new(inner, Space { scale: 0.01, up: Up::Z }, far.clone());
+        let placed = Placed::new(inner, Space { scale: 0.01, up: Up::Z, ..Space::OWN }, far.clone());
         let moved = Body::new(Box::new(placed), 0.0).unwrap();
         assert_eq!((still.closed_loops(), moved.closed_loops()), (0, 0), "{}", solid.name);
         assert_eq!(still.corners(), moved.corners());
