@@ -395,9 +395,12 @@ fn united([low, high]: [[i64; 3]; 2], [other_low, other_high]: [[i64; 3]; 2]) ->
     ]
 }
 
+/// The largest distance of two vertices on an axis and the sum of their distances (steps), and the vertices.
+type NearPair = ([i64; 2], [u32; 2]);
+
 /// Pairs of some vertices (the lesser first) within [`STEPS`] on each axis, each after the largest of its distances and after their
 /// sum; and the vertices that have too many others around them.
-fn near_pairs(steps: &[[i64; 3]], some: &[u32]) -> (Vec<([i64; 2], [u32; 2])>, Vec<u32>) {
+fn near_pairs(steps: &[[i64; 3]], some: &[u32]) -> (Vec<NearPair>, Vec<u32>) {
     let cell = |at: [i64; 3]| at.map(|step| step.div_euclid(CELL));
     // Open addressing, at most half full; each slot leads to the last vertex of its cell, and that to the one before it.
     let bits = (2 * some.len().max(1)).next_power_of_two().ilog2().max(1);

@@ -22,8 +22,11 @@ const REQUIRED: [&str; 8] = [
     "KHR_xmp_json_ld",
 ];
 
-/// What a file makes of its geometry: triangles, and the positions at some times; the refusal if it is refused.
-pub fn geometry(path: &Path) -> Result<(Vec<[u32; 3]>, Vec<Vec<DVec3>>), String> {
+/// Triangles, and the positions of their corners at each of [`TIMES`].
+pub type Geometry = (Vec<[u32; 3]>, Vec<Vec<DVec3>>);
+
+/// What a file makes of its geometry; the refusal if it is refused.
+pub fn geometry(path: &Path) -> Result<Geometry, String> {
     let play = Play { repeat: false, ..Play::default() };
     let character = Character::open(path, play).map_err(|error| error.to_string())?;
     let pose = |time: &f64| {

@@ -64,7 +64,7 @@ impl Bugs {
         vec![
             ("01 several solids", self.volume("01-stl-several-solids/two.stl", 3.0)),
             ("01 empty first solid", self.is_read("01-stl-several-solids/empty_first.stl")),
-            ("02 from-mesh", self.from_mesh("02-inside-out-part-vanishes/boots.obj", 0.024)),
+            ("02 from-mesh", self.makes_a_volume("02-inside-out-part-vanishes/boots.obj", 0.024)),
             ("02 sweep", self.sweeps_alike()),
             ("02 snow", self.snow_is_removed("boots") && self.snow_is_removed("boots_right")),
             (
@@ -75,7 +75,7 @@ impl Bugs {
                 "02 shallow terrain",
                 self.liquid_on("02-inside-out-part-vanishes", "slab_block_inside_out", 84_000.0),
             ),
-            ("04 from-mesh", self.from_mesh("04-double-sided/box2.obj", 0.027)),
+            ("04 from-mesh", self.makes_a_volume("04-double-sided/box2.obj", 0.027)),
             ("04 shallow object", self.liquid_around("04-double-sided", "block2", 84_000.0)),
             ("04 shallow terrain", self.liquid_on("04-double-sided", "slab2", 100_000.0)),
             ("04 static object", self.statics_are_alike()),
@@ -168,7 +168,7 @@ impl Bugs {
         (said, measured)
     }
 
-    fn from_mesh(&self, name: &str, expected: f64) -> bool {
+    fn makes_a_volume(&self, name: &str, expected: f64) -> bool {
         is_close(&self.volume_of(&["vdb", "from-mesh", &self.path(name), "--cell", "0.02"]).1, expected)
     }
 

@@ -176,7 +176,7 @@ impl Case<'_> {
             let depth = if door == "ground" { 0.3 * size } else { 1.7 * size };
             _ = write!(text, "[snow]\nground = {ground}\ndepth = {depth}\ncell = {cell}\n");
             if door != "ground" {
-                _ = write!(text, "area = [{}, {}, {}, {}]\n", low.x, low.z, high.x, high.z);
+                _ = writeln!(text, "area = [{}, {}, {}, {}]", low.x, low.z, high.x, high.z);
                 let role = if door == "moving" { "collide" } else { "static" };
                 _ = write!(text, "[[object]]\nfile = \"{file}\"\nrole = \"{role}\"\n");
             }

@@ -145,7 +145,7 @@ impl<'a> Pieces<'a> {
             let off = imbalance(&self.named, &left);
             if off != 0 {
                 self.is_open[count + bodies[left[0].1 as usize] as usize] = true;
-                out.doubts.crowded_edges += usize::from(left.len() % 2 == 0);
+                out.doubts.crowded_edges += usize::from(left.len().is_multiple_of(2));
             }
         }
         out.doubts.one_sided += one_sided.len();

@@ -265,7 +265,7 @@ fn is_read(attribute: &str) -> bool {
         let set = attribute.strip_prefix(*start);
         set.is_some_and(|set| !set.is_empty() && set.bytes().all(|byte| byte.is_ascii_digit()))
     };
-    SEMANTICS.contains(&attribute) || NUMBERED_SEMANTICS.iter().any(|start| is_numbered(&start))
+    SEMANTICS.contains(&attribute) || NUMBERED_SEMANTICS.iter().any(is_numbered)
 }
 
 /// Takes out extensions and what applications add, at any depth.

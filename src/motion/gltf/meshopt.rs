@@ -19,7 +19,9 @@ pub(super) fn decode(view: &Compressed, data: &[u8]) -> Result<Vec<u8>, String> 
     let size = size.ok_or("is shorter than its count")?;
     let mut bytes = match view.mode.as_str() {
         "ATTRIBUTES" => vertices(view, data)?,
-        "TRIANGLES" if view.count % 3 != 0 => return Err("has indices that are no triangles".into()),
+        "TRIANGLES" if !view.count.is_multiple_of(3) => {
+            return Err("has indices that are no triangles".into());
+        }
         "TRIANGLES" => {
             let mut indices = vec![0u32; view.count];
             decode_index_buffer(&mut indices, data).map_err(damaged)?;

@@ -114,7 +114,8 @@ impl Gradients {
     fn begin(&mut self, nodes: &mut [Node]) {
         let count = nodes.len();
         let number = |held: bool| if held { 1.0 } else { 0.0 };
-        let lists: [(&mut Vec<f64>, fn(&Node) -> f64); 4] = [
+        type Value = fn(&Node) -> f64;
+        let lists: [(&mut Vec<f64>, Value); 4] = [
             (&mut self.diagonal, |node| node.diagonal),
             (&mut self.over, |node| node.over),
             (&mut self.residual, |node| node.right),

@@ -214,7 +214,8 @@ mod tests {
         let slope = sheet(|x, z| 0.8 * x + 0.1 * z * z);
         for turned in 0..4 {
             let mut mesh = slope.clone();
-            let is_turned = |index: usize| [false, true, index % 3 == 0, index % 3 > 0][turned];
+            let is_turned =
+                |index: usize| [false, true, index.is_multiple_of(3), !index.is_multiple_of(3)][turned];
             let triangles = mesh.triangles.iter_mut().enumerate();
             triangles.filter(|(index, _)| is_turned(*index)).for_each(|(_, triangle)| triangle.swap(0, 1));
             let ground = Ground::new(&mesh);

@@ -25,8 +25,7 @@ fn no_built_file_is_tracked() {
         let path = Path::new(path);
         let folders = || path.parent().into_iter().flat_map(Path::iter).filter_map(|part| part.to_str());
         let is_in = |folder: &&str| folders().any(|part| part.ends_with(*folder));
-        FOLDERS.iter().any(|folder| is_in(&folder))
-            || ENDINGS.iter().any(|ending| path.extension() == Some(ending.as_ref()))
+        FOLDERS.iter().any(is_in) || ENDINGS.iter().any(|ending| path.extension() == Some(ending.as_ref()))
     };
     let built: Vec<&str> = tracked.lines().filter(is_built).collect();
     assert!(built.is_empty(), "{built:?}");

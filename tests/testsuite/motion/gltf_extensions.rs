@@ -8,7 +8,7 @@ use frazil::motion::{Character, Motion, Play};
 use serde_json::json;
 
 use crate::common::gltf_maker::Maker;
-use crate::common::gltf_variants::{complete, geometry, variants};
+use crate::common::gltf_variants::{Geometry, complete, geometry, variants};
 
 #[test]
 fn optional_fields_may_be_left_out() {
@@ -271,7 +271,7 @@ fn compressed(mut maker: Maker) -> Maker {
 }
 
 /// Like [`geometry`], with the order of corners in triangles free: the encoder turns them.
-fn turned(path: &Path) -> (Vec<[u32; 3]>, Vec<Vec<DVec3>>) {
+fn turned(path: &Path) -> Geometry {
     let (mut triangles, poses) = geometry(path).unwrap();
     for triangle in &mut triangles {
         let least = (0..3).min_by_key(|at| triangle[*at]).unwrap();
