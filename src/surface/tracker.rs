@@ -298,8 +298,10 @@ impl Tracker {
         if let Some(change) = &mut report.change {
             self.take(change);
         }
-        let drifts = std::mem::take(&mut self.drift.vertices);
-        self.drift = self.drift.next(drifts);
+        if self.params.rebuild {
+            let drifts = std::mem::take(&mut self.drift.vertices);
+            self.drift = self.drift.next(drifts);
+        }
         Ok(report)
     }
 
