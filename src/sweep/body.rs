@@ -356,23 +356,22 @@ impl Body {
         arcs.max(twists).ceil().clamp(1.0, MOST_STEPS) as usize
     }
 
-    /// Whether welded vertices have moved apart in poses (cells): those that were at one position at all, the others by more than the
-    /// rounding of their coordinates.
+    /// Whether welded vertices have moved apart in poses (cells), by more than the rounding of their coordinates.
     fn welds_part(&self, poses: &[Vec<DVec3>], lattice: &Lattice) -> bool {
-        let Shape { exact, weld, slack, .. } = &*self.shape;
+        let Shape { weld, slack, .. } = &*self.shape;
         let origin = DVec3::from(lattice.origin.map(f64::from));
         let rounding = |cells: &DVec3| {
             let farthest = (cells + origin).amax() * lattice.voxel;
             (slack + f64::from(STEPS as i32) * 3f64.sqrt() * spacing(farthest)) / lattice.voxel
         };
-        let differ = |(vertex, &first): (usize, &u32)| {
-            first as usize != vertex && poses.iter().any(|pose| pose[vertex] != pose[first as usize])
+        let is_apart = |(vertex, &first): (usize, &u32)| {
+            let first = first as usize;
+            let differ = |pose: &Vec<DVec3>| {
+                pose[vertex] != pose[first] && (pose[vertex] - pose[first]).norm() > rounding(&pose[vertex])
+            };
+            first != vertex && poses.iter().any(differ)
         };
-        let is_apart = |&vertex: &u32| {
-            let [vertex, first] = [vertex, weld.firsts[vertex as usize]].map(|vertex| vertex as usize);
-            poses.iter().any(|pose| (pose[vertex] - pose[first]).norm() > rounding(&pose[vertex]))
-        };
-        exact.iter().enumerate().any(differ) || weld.near.iter().any(is_apart)
+        weld.firsts.iter().enumerate().any(is_apart)
     }
 }
 
