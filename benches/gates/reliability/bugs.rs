@@ -90,7 +90,7 @@ impl Bugs {
             (
                 "13 ids are rows",
                 self.follows("13-ids-are-row-numbers/rows/p.%04d.bgeo", "13-ids-are-row-numbers/ball.ply")
-                    .objects("id"),
+                    .objects("row numbers"),
             ),
             (
                 "13 stable ids",
@@ -115,12 +115,13 @@ impl Bugs {
             ("21 mixed winding", self.mixed_winding()),
             (
                 "ids are rows",
-                self.follows("surface-ids_are_rows/p.%04d.ply", "surface-ids_are_rows/m.ply").objects("id"),
+                self.follows("surface-ids_are_rows/p.%04d.ply", "surface-ids_are_rows/m.ply")
+                    .objects("row numbers"),
             ),
             (
                 "velocity unit",
                 self.follows("surface-velocity_unit/p.%04d.ply", "surface-velocity_unit/m.ply")
-                    .objects("velocit"),
+                    .objects("their unit"),
             ),
             ("inside-out words", self.inside_out_is_named()),
         ]
@@ -272,7 +273,7 @@ impl Bugs {
 
     fn is_silent(&self, particles: &str, mesh: &str) -> bool {
         let said = self.follows(particles, mesh);
-        said.is_done() && !said.err.contains("id")
+        said.is_done() && !said.err.contains("row numbers")
     }
 
     fn every_frame_is_surfaced(&self) -> bool {
