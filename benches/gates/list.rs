@@ -208,6 +208,8 @@ pub const GATES: &[Gate] = &[
     none("reliability.fuzz_glb", "inputs"),
     none("reliability.fuzz_vdb", "inputs"),
     none("reliability.cut", "files"),
+    // Empty and missing frames of sequences: what could be made of them and was not.
+    none("reliability.empty_frames", "frames"),
     gate("reliability.child_cost", "x", Most(2.2), Most(1.3)),
     // The rules of CONTRIBUTING.md that tests and tools hold.
     yes("house.stages"),

@@ -47,7 +47,7 @@ pub fn run(args: Args, session: &Session) -> Result<(), Failure> {
 }
 
 fn mesh(path: &Path) -> frazil::Result<Vec<Value>> {
-    let mesh = io::mesh::read(path)?;
+    let mesh = io::mesh::read_any(path)?.into_triangles();
     let vertices = mesh.positions.len();
     let mesh = mesh.without_unused();
     let bounds = mesh.bounds().map(|(low, high)| (<[f32; 3]>::from(low), <[f32; 3]>::from(high)));

@@ -4,6 +4,7 @@ mod check;
 mod cloud;
 mod compare;
 mod convert;
+mod each;
 mod exit;
 mod info;
 #[cfg(feature = "vdb")]

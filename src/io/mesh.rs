@@ -33,6 +33,27 @@ pub fn read_polygons(path: &Path) -> Result<PolygonMesh> {
 /// # Errors
 /// As [`read`].
 pub fn parse_polygons(path: &Path, bytes: &[u8]) -> Result<PolygonMesh> {
+    let mesh = parse(path, bytes)?;
+    mesh.validate().map_err(|error| Error::file(path, error.to_string()))?;
+    Ok(mesh)
+}
+
+/// As [`read_polygons`], of a file that may hold an empty mesh, as frames of a liquid that has not come yet, or is gone, do: one that
+/// says so, as a .ply of 0 faces and an .obj of ours do, and any .stl.
+///
+/// # Errors
+/// As [`read`], but for a mesh that has neither vertices nor faces.
+pub fn read_any(path: &Path) -> Result<PolygonMesh> {
+    let bytes = source::read(path)?;
+    let mesh = parse(path, &bytes)?;
+    let is_empty = mesh.positions.is_empty() && mesh.ends.is_empty();
+    if !is_empty || extension(path) == "obj" && !obj::is_empty_of_ours(&bytes) {
+        mesh.validate().map_err(|error| Error::file(path, error.to_string()))?;
+    }
+    Ok(mesh)
+}
+
+fn parse(path: &Path, bytes: &[u8]) -> Result<PolygonMesh> {
     if bytes.is_empty() {
         return Err(Error::file(path, "the file is empty"));
     }
@@ -45,9 +66,7 @@ pub fn parse_polygons(path: &Path, bytes: &[u8]) -> Result<PolygonMesh> {
             EXTENSIONS.map(|e| format!(".{e}")).join(", ")
         )),
     };
-    let mesh = caught(path, || parse().map_err(|what| Error::file(path, what)))?;
-    mesh.validate().map_err(|error| Error::file(path, error.to_string()))?;
-    Ok(mesh)
+    caught(path, || parse().map_err(|what| Error::file(path, what)))
 }
 
 /// Reads a mesh in triangles with all that it carries.

@@ -8,6 +8,8 @@ use crate::base::arrays::{MeshArray, Number, On};
 use crate::base::{PolygonMesh, TriMesh, Uvs, Vec3, uvs};
 use crate::error::one_line;
 
+/// What is written of a mesh without vertices.
+const EMPTY: &[u8] = b"# an empty mesh\n";
 /// Lines between two looks at whether to stop.
 const PIECE: usize = 1 << 14;
 /// Names of the arrays that a vertex' three numbers behind its place are.
@@ -28,6 +30,11 @@ pub(super) fn parse(bytes: &[u8]) -> Result<PolygonMesh, String> {
         reader.line(line).map_err(|what| format!("line {}: {what}", number + 1))?;
     }
     Ok(reader.finish())
+}
+
+/// Whether the file was written of a mesh without vertices: a file of any other text has none either.
+pub(super) fn is_empty_of_ours(bytes: &[u8]) -> bool {
+    bytes == EMPTY
 }
 
 /// The contents of the lines so far.
@@ -140,7 +147,7 @@ pub(super) fn write(out: &mut dyn Write, mesh: &TriMesh, carried: &Carried<'_>) 
     };
     if mesh.positions.is_empty() {
         // A file without bytes looks like one that was cut.
-        return writeln!(out, "# an empty mesh");
+        return out.write_all(EMPTY);
     }
     for (vertex, p) in mesh.positions.iter().enumerate() {
         match colours {
