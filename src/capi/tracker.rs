@@ -123,6 +123,8 @@ pub(super) struct Follower {
     /// Steps that were made ahead.
     pub outlook: Outlook,
     pub saved: Saved,
+    /// Whether what is wrong with the particles was logged.
+    pub is_told: bool,
 }
 
 /// Refuses to rebuild a mesh of a state that is not closed, as [`Tracker::new`] does one at the first frame.
@@ -240,7 +242,13 @@ pub unsafe extern "C" fn frz_tracker_create(
             if !tracker.is_rebuilt() {
                 tracker.set_lasting(mesh.attribute("detail", 1).unwrap_or_default().to_vec())?;
             }
-            Ok(Follower { tracker, edits: None, outlook: Outlook::default(), saved: Saved::default() })
+            Ok(Follower {
+                tracker,
+                edits: None,
+                outlook: Outlook::default(),
+                saved: Saved::default(),
+                is_told: false,
+            })
         })
     }
 }
@@ -342,6 +350,7 @@ pub unsafe extern "C" fn frz_tracker_step(
                 None => follower.tracker.step(call.ctx(), &from, &to, dt)?,
             };
             follower.saved.take();
+            done.news(&mut follower.is_told).for_each(|warning| log::warn!("frz_tracker_step: {warning}"));
             let drops = done.apart.iter().filter(|apart| apart.volume >= 0.0).count();
             let of_change = |count: fn(&Change) -> usize| done.change.as_ref().map_or(0, count);
             let told = frz_tracker_report {
